@@ -1,0 +1,219 @@
+# Lull: one non-recursive Makefile. `make help` lists the targets.
+#
+# Sources are found by folder, so that a new file needs no line here. What a file may include is decided by the -I flags of
+# its folder: that is how the dependency arrows of the README are enforced (an illegal include does not compile).
+#
+#   MODE=release|debug|asan|tsan   objects and results of each mode live apart (release: build/, others: build/MODE/)
+#   DESTDIR PREFIX CC CXX CFLAGS LDFLAGS are honoured; CFLAGS and LDFLAGS are appended to the project's own.
+
+MODE    ?= release
+PREFIX  ?= /usr/local
+DESTDIR ?=
+CC      := $(if $(filter default,$(origin CC)),gcc,$(CC))
+CXX     := $(if $(filter default,$(origin CXX)),g++,$(CXX))
+PKG     := pkg-config
+
+ifeq ($(filter $(MODE),release debug asan tsan),)
+$(error MODE=$(MODE): expected release, debug, asan or tsan)
+endif
+
+OUT := $(if $(filter release,$(MODE)),build,build/$(MODE))
+OBJ := $(OUT)/obj
+BIN := $(OUT)/bin
+LIB := $(OUT)/lib/lull
+
+# --- flags ---------------------------------------------------------------------------------------------------------------
+WARN  := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wundef -Wvla
+WARNC := $(WARN) -Wstrict-prototypes -Wmissing-prototypes
+# No -ffast-math ever: it removes NaN checks and, in a shared object, switches the host to flush-to-zero at dlopen.
+# -ffp-contract=off: the same bytes whatever the compiler would fuse.
+NUM   := -ffp-contract=off -fno-math-errno
+OPT_release := -O3 -g
+OPT_debug   := -O0 -g3
+OPT_asan    := -O1 -g -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=undefined
+OPT_tsan    := -O1 -g -fsanitize=thread
+SAN_asan    := -fsanitize=address,undefined
+SAN_tsan    := -fsanitize=thread
+COMMON  := $(OPT_$(MODE)) -fPIC -fvisibility=hidden -pthread -MMD -MP $(NUM)
+CFLAGS_ALL   = -std=c17 -D_POSIX_C_SOURCE=200809L $(COMMON) $(WARNC) $(CFLAGS)
+CXXFLAGS_ALL = -std=c++17 $(COMMON) $(WARN) $(CFLAGS)
+LDFLAGS_ALL  = -pthread $(SAN_$(MODE)) $(LDFLAGS)
+
+# --- libraries -----------------------------------------------------------------------------------------------------------
+EXR_CFLAGS  := $(shell $(PKG) --cflags OpenEXR 2>/dev/null)
+BLAS_CFLAGS := $(shell $(PKG) --cflags openblas 2>/dev/null)
+PT_LIBS  := -lembree3 -lOpenEXRCore-3_1 -lOpenImageIO -lOpenImageIO_Util -lcjson -lz -ldl -lstdc++ -lm
+GGN_LIBS := -lopenblas -llapacke -lsvm -lOpenImageIO -lOpenImageIO_Util -lcjson -lz -lstdc++ -lm
+
+# --- include paths: the dependency arrows --------------------------------------------------------------------------------
+API := -Iplugin-api/include
+INC_plugin-api         := $(API)
+INC_pathtracer         := -Ipathtracer $(EXR_CFLAGS)
+INC_pathtracer_host    := $(INC_pathtracer) $(API)# pathtracer/render and the command: the only hosts of criteria
+INC_ggn                := -Iggn $(BLAS_CFLAGS)
+INC_ggn_plugin         := $(INC_ggn) $(API)# ggn/plugin: the only folder of ggn that knows the ABI
+INC_tests_pt           := -Itests -Itests/support $(INC_pathtracer_host)
+INC_tests_ggn          := -Itests -Itests/support $(INC_ggn_plugin)
+INC_tests_api          := -Itests -Itests/support $(API)
+
+# --- sources -------------------------------------------------------------------------------------------------------------
+LOADER_SRC  := $(wildcard plugin-api/src/*.c)
+EXAMPLE_SRC := $(wildcard plugin-api/examples/*.c)
+TOOL_SRC    := $(wildcard plugin-api/tools/*.c)
+PT_SRC      := $(wildcard pathtracer/*/*.c pathtracer/*/*.cpp)
+PT_MAIN     := $(wildcard pathtracer/*.c)
+GGN_SRC     := $(filter-out ggn/plugin/% ggn/cli/%,$(wildcard ggn/*/*.c ggn/*/*.cpp))
+GGN_PLUGIN  := $(wildcard ggn/plugin/*.c)
+GGN_CLI     := $(wildcard ggn/cli/*.c)
+# Tests name what they test by prefix: pt_ (path tracer), ggn_, api_ (plugin-api).
+TEST_SRC    := $(wildcard tests/unit/*.c tests/grad/*.c tests/golden/*.c tests/stat/*.c tests/abi/*.c tests/hard/*.c tests/oom/*.c)
+# The subset that also runs under ASan+UBSan in `make test`.
+SANE_SRC    := $(wildcard tests/unit/*.c tests/abi/*.c tests/oom/*.c)
+SCRIPT_TEST := $(wildcard tests/cli/*.sh tests/e2e/*.sh)
+FUZZ_SRC    := $(filter-out tests/fuzz/replay.c,$(wildcard tests/fuzz/*.c))
+
+o = $(addprefix $(OBJ)/,$(addsuffix .o,$(1)))
+PT_OBJ      := $(call o,$(PT_SRC))
+LOADER_OBJ  := $(call o,$(LOADER_SRC))
+GGN_OBJ     := $(call o,$(GGN_SRC))
+GGN_PLUGIN_OBJ := $(call o,$(GGN_PLUGIN))
+
+PROGRAMS := $(if $(PT_MAIN),$(BIN)/pathtracer) $(if $(GGN_CLI),$(BIN)/ggn) $(if $(TOOL_SRC),$(BIN)/lull-check)
+CRITERIA := $(EXAMPLE_SRC:plugin-api/examples/%.c=$(LIB)/%.so) $(if $(GGN_PLUGIN),$(LIB)/ggn.so)
+TESTS    := $(patsubst tests/%.c,$(OUT)/tests/%,$(TEST_SRC))
+SANE     := $(patsubst tests/%.c,build/asan/tests/%,$(SANE_SRC))
+REPLAY   := $(patsubst tests/fuzz/%.c,$(OUT)/fuzz/replay-%,$(FUZZ_SRC))
+FUZZERS  := $(patsubst tests/fuzz/%.c,build/fuzz/%,$(FUZZ_SRC))
+
+.DEFAULT_GOAL := all
+.PHONY: all demo test bench asan tsan fuzz hdr-check abi-check install compdb clean help setup tests replay train-demo
+.SECONDARY:
+
+all: $(PROGRAMS) $(CRITERIA) ## build the programs and the criteria
+
+# --- compiling: one rule, flags by folder --------------------------------------------------------------------------------
+inc = $(or $(strip \
+  $(if $(filter plugin-api/%,$(1)),$(INC_plugin-api)) \
+  $(if $(filter pathtracer/%,$(1)),$(if $(filter pathtracer/render/% $(PT_MAIN),$(1)),$(INC_pathtracer_host),$(INC_pathtracer))) \
+  $(if $(filter ggn/%,$(1)),$(if $(filter ggn/plugin/%,$(1)),$(INC_ggn_plugin),$(INC_ggn))) \
+  $(if $(filter tests/%,$(1)),$(if $(filter pt_%,$(notdir $(1))),$(INC_tests_pt),$(if $(filter ggn_%,$(notdir $(1))),$(INC_tests_ggn),$(INC_tests_api))))),)
+# Kernels for one instruction set carry it in their name (x_avx2.c, x_avx512.c); they are reached by run-time dispatch only.
+ifneq ($(filter x86_64%,$(shell $(CC) -dumpmachine)),)
+isa = $(if $(filter %_avx2.c,$(1)),-mavx2 -mfma)$(if $(filter %_avx512.c,$(1)),-mavx512f -mavx512vl -mavx512bw -mavx512dq -mfma -mprefer-vector-width=512)$(if $(filter %_avx512bf16.c,$(1)),-mavx512f -mavx512vl -mavx512bw -mavx512dq -mavx512bf16 -mfma)
+endif
+
+$(OBJ)/%.c.o: %.c
+	@mkdir -p $(@D)
+	@echo "  CC   $<"
+	@$(CC) $(CFLAGS_ALL) $(call inc,$<) $(call isa,$<) -c $< -o $@
+
+$(OBJ)/%.cpp.o: %.cpp
+	@mkdir -p $(@D)
+	@echo "  CXX  $<"
+	@$(CXX) $(CXXFLAGS_ALL) $(call inc,$<) -c $< -o $@
+
+link = @mkdir -p $(@D); echo "  LD   $@"; $(CC)
+so   = @mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--version-script=plugin-api/plugin.map -Wl,-z,defs
+
+$(BIN)/pathtracer: $(call o,$(PT_MAIN)) $(PT_OBJ) $(LOADER_OBJ)
+	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) -o $@
+$(BIN)/ggn: $(call o,$(GGN_CLI)) $(GGN_OBJ)
+	$(link) $^ $(LDFLAGS_ALL) $(GGN_LIBS) -o $@
+$(BIN)/lull-check: $(call o,$(TOOL_SRC)) $(LOADER_OBJ)
+	$(link) $^ $(LDFLAGS_ALL) -ldl -lm -o $@
+$(LIB)/ggn.so: $(GGN_PLUGIN_OBJ) $(GGN_OBJ) plugin-api/plugin.map
+	$(so) $(filter %.o,$^) $(LDFLAGS_ALL) $(GGN_LIBS) -o $@
+$(LIB)/%.so: $(OBJ)/plugin-api/examples/%.c.o plugin-api/plugin.map
+	$(so) $(filter %.o,$^) $(LDFLAGS_ALL) -lm -o $@
+
+# --- tests ---------------------------------------------------------------------------------------------------------------
+# tests/support/*.c is linked into every test of its prefix (pt_*.c, ggn_*.c) or into all (no prefix).
+SUPPORT_pt  := $(call o,$(filter-out tests/support/ggn_%,$(wildcard tests/support/*.c)))
+SUPPORT_ggn := $(call o,$(filter-out tests/support/pt_%,$(wildcard tests/support/*.c)))
+SUPPORT_api := $(call o,$(filter-out tests/support/pt_% tests/support/ggn_%,$(wildcard tests/support/*.c)))
+define test_rules
+$(OUT)/tests/$(1)/pt_%: $(OBJ)/tests/$(1)/pt_%.c.o $(PT_OBJ) $(LOADER_OBJ) $(SUPPORT_pt)
+	$$(link) $$^ $$(LDFLAGS_ALL) $(PT_LIBS) -lcmocka -o $$@
+$(OUT)/tests/$(1)/ggn_%: $(OBJ)/tests/$(1)/ggn_%.c.o $(GGN_OBJ) $(SUPPORT_ggn)
+	$$(link) $$^ $$(LDFLAGS_ALL) $(GGN_LIBS) -lcmocka -o $$@
+$(OUT)/tests/$(1)/api_%: $(OBJ)/tests/$(1)/api_%.c.o $(LOADER_OBJ) $(SUPPORT_api)
+	$$(link) $$^ $$(LDFLAGS_ALL) -ldl -lm -lcmocka -o $$@
+endef
+$(foreach d,unit grad golden stat abi hard oom,$(eval $(call test_rules,$(d))))
+$(OUT)/fuzz/replay-pt_%: $(OBJ)/tests/fuzz/pt_%.c.o $(OBJ)/tests/fuzz/replay.c.o $(PT_OBJ) $(LOADER_OBJ)
+	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) -o $@
+$(OUT)/fuzz/replay-ggn_%: $(OBJ)/tests/fuzz/ggn_%.c.o $(OBJ)/tests/fuzz/replay.c.o $(GGN_OBJ)
+	$(link) $^ $(LDFLAGS_ALL) $(GGN_LIBS) -o $@
+
+setup: ## install the Debian packages that are missing
+	@scripts/setup
+
+tests: $(TESTS)
+replay: $(REPLAY)
+
+# `test` builds in sub-makes so that packages installed by setup are seen by pkg-config.
+test: setup ## build everything, run every test; closes with "N passed, N failed"
+	@$(MAKE) --no-print-directory all tests
+	@$(MAKE) --no-print-directory MODE=asan all replay $(SANE)
+	@BUILD=build tests/run $(patsubst tests/%.c,build/tests/%,$(TEST_SRC)) $(SCRIPT_TEST) \
+	    --asan $(SANE) --replay $(patsubst tests/fuzz/%.c,build/asan/fuzz/replay-%,$(FUZZ_SRC))
+
+asan tsan: ## run the unit and ABI tests under the sanitizer
+	@$(MAKE) --no-print-directory MODE=$@ all tests
+	@BUILD=build/$@ tests/run --$@ $(patsubst tests/%.c,build/$@/tests/%,$(SANE_SRC)) $(if $(filter tsan,$@),$(wildcard tests/tsan/*.sh))
+
+FUZZ_SECONDS ?= 60
+FUZZ_FLAGS := -g -O1 -fsanitize=fuzzer-no-link,address,undefined -fno-sanitize-recover=undefined
+fuzz: ## fuzz each target for FUZZ_SECONDS (default 60) under ASan+UBSan; needs clang
+	@$(MAKE) --no-print-directory MODE=asan OUT=build/fuzz-objects CC=clang CXX=clang++ OPT_asan="$(FUZZ_FLAGS)" fuzzers
+	@for f in $(FUZZERS); do tests/fuzz/run $$f $(FUZZ_SECONDS) || exit 1; done
+.PHONY: fuzzers
+fuzzers: $(FUZZERS)
+build/fuzz/pt_%: $(OBJ)/tests/fuzz/pt_%.c.o $(PT_OBJ) $(LOADER_OBJ)
+	$(link) -fsanitize=fuzzer $^ $(LDFLAGS_ALL) $(PT_LIBS) -o $@
+build/fuzz/ggn_%: $(OBJ)/tests/fuzz/ggn_%.c.o $(GGN_OBJ)
+	$(link) -fsanitize=fuzzer $^ $(LDFLAGS_ALL) $(GGN_LIBS) -o $@
+
+# Every header compiles alone; the ABI header also as C99 and C++11.
+HEADERS := $(shell find pathtracer ggn plugin-api tests -name '*.h' 2>/dev/null)
+hdr-check: ## each header compiles alone; the ABI header as C99 and C++11
+	@$(foreach h,$(HEADERS),$(CC) -std=c17 -D_POSIX_C_SOURCE=200809L $(WARNC) -Wno-unused-const-variable $(call inc,$(h)) -x c -fsyntax-only $(h) &&) true
+	@$(CC) -std=c99 $(WARNC) $(API) -x c -fsyntax-only plugin-api/include/lull/criterion.h
+	@$(CXX) -std=c++11 $(WARN) $(API) -x c++ -fsyntax-only plugin-api/include/lull/criterion.h
+abi-check: $(OUT)/tests/abi/api_layout ## the ABI's layout is the frozen one (plugin-api/layout-1.txt)
+	@$<
+
+# --- running -------------------------------------------------------------------------------------------------------------
+demo: setup ## install what is missing, build, render a scene with per-block stopping
+	@$(MAKE) --no-print-directory all
+	@scripts/demo
+bench: all ## measure speed as ratios, interleaved, against the peers that are installed
+	@scripts/bench
+train-demo: all ## train a tiny model on a tiny bundled data set and show that it learns
+	@scripts/train-demo
+
+install: all ## install under $(DESTDIR)$(PREFIX)
+	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib/lull $(DESTDIR)$(PREFIX)/lib/pkgconfig \
+	    $(DESTDIR)$(PREFIX)/include/lull $(DESTDIR)$(PREFIX)/share/man/man1 $(DESTDIR)$(PREFIX)/share/man/man7
+	install -m 755 $(PROGRAMS) $(DESTDIR)$(PREFIX)/bin
+	install -m 755 $(CRITERIA) $(DESTDIR)$(PREFIX)/lib/lull
+	install -m 644 plugin-api/include/lull/*.h $(DESTDIR)$(PREFIX)/include/lull
+	install -m 644 $(wildcard docs/man/*.1) $(DESTDIR)$(PREFIX)/share/man/man1
+	install -m 644 $(wildcard docs/man/*.7) $(DESTDIR)$(PREFIX)/share/man/man7
+	$(if $(wildcard ggn/models/*.ggn),install -d $(DESTDIR)$(PREFIX)/share/lull && install -m 644 $(wildcard ggn/models/*.ggn) $(DESTDIR)$(PREFIX)/share/lull)
+	sed 's|@PREFIX@|$(PREFIX)|g' plugin-api/lull-criterion.pc.in > $(DESTDIR)$(PREFIX)/lib/pkgconfig/lull-criterion.pc
+
+compdb: ## write compile_commands.json
+	@{ echo '['; sep=; for f in $(PT_SRC) $(PT_MAIN) $(GGN_SRC) $(GGN_PLUGIN) $(GGN_CLI) $(LOADER_SRC) $(EXAMPLE_SRC) $(TOOL_SRC); do \
+	  printf '%s' "$$sep"; $(MAKE) --no-print-directory -s compdb-one F=$$f; sep=,; done; echo ']'; } > compile_commands.json
+.PHONY: compdb-one
+compdb-one:
+	@echo '{"directory":"$(CURDIR)","file":"$(F)","command":"$(if $(filter %.cpp,$(F)),$(CXX) $(CXXFLAGS_ALL),$(CC) $(CFLAGS_ALL)) $(call inc,$(F)) $(call isa,$(F)) -c $(F)"}'
+
+clean: ## remove build/
+	rm -rf build compile_commands.json
+
+help: ## this list
+	@grep -hE '^[a-z][a-z -]*:.*## ' Makefile | sed -E 's/^([a-z -]+):[^#]*## /\1\t/' | awk -F'\t' '{printf "  %-12s %s\n", $$1, $$2}'
+
+-include $(shell find $(OBJ) -name '*.d' 2>/dev/null)
