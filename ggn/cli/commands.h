@@ -1,0 +1,33 @@
+/*
+ * The subcommands of `ggn`: one file each, ggn/cli/NAME.c, with `int ggn_cmd_NAME(int argc, char **argv)`.
+ *
+ * A subcommand parses its own argv with argp (argv[0] is "ggn NAME" already, so usage lines read right) and returns the exit
+ * status: 0 done, 1 failed (out of memory, an output could not be written), 2 bad usage or bad input, 130 interrupted.
+ * To add one: write the file and add its line to GGN_COMMANDS.
+ */
+#ifndef GGN_CLI_COMMANDS_H
+#define GGN_CLI_COMMANDS_H
+
+#include <signal.h>
+
+#include "base/err.h"
+
+/* X(name, one-line help), in the order `ggn --help` lists them. */
+#define GGN_COMMANDS(X) \
+    X(golden, "print the golden values of the published networks as JSON")
+
+#define GGN_DECLARE_COMMAND(name, help) int ggn_cmd_##name(int argc, char **argv);
+GGN_COMMANDS(GGN_DECLARE_COMMAND)
+#undef GGN_DECLARE_COMMAND
+
+enum { GGN_EXIT_OK = 0, GGN_EXIT_FAILED = 1, GGN_EXIT_BAD_INPUT = 2, GGN_EXIT_INTERRUPTED = 130 };
+
+/* Prints "COMMAND: text" on stderr and returns the exit status that err->code stands for (`command` is argv[0]). */
+int ggn_cmd_fail(const char *command, const struct ggn_err *err);
+
+/* After ggn_cmd_catch_interrupt(), SIGINT and SIGTERM set the flag instead of ending the process; a second one ends it. The
+ * command polls the flag, leaves its outputs whole and returns GGN_EXIT_INTERRUPTED. */
+extern volatile sig_atomic_t ggn_cmd_interrupted;
+void ggn_cmd_catch_interrupt(void);
+
+#endif
