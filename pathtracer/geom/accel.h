@@ -1,0 +1,43 @@
+/*
+ * Ray queries against a scene. The implementation (accel.c) is the only file that knows Embree.
+ *
+ * Queries are thread-safe and depend on nothing but their arguments. Distances are along the ray's direction, which need not
+ * be unit.
+ */
+#ifndef PT_GEOM_ACCEL_H
+#define PT_GEOM_ACCEL_H
+
+#include "base/err.h"
+#include "scene/scene.h"
+
+/* Builds scene->accel and the bounds from shapes, objects and instances. On failure the scene is unchanged. */
+int pt_accel_build(struct pt_scene *scene, struct pt_err *err);
+/* Frees scene->accel; safe when there is none. */
+void pt_accel_release(struct pt_scene *scene);
+/* Bytes that the structure holds. */
+long long pt_accel_bytes(const struct pt_scene *scene);
+
+struct pt_ray {
+    pt_vec3 origin, direction;
+    float t_min, t_max;
+    float time;               /* in [0, 1] over the shutter */
+};
+
+struct pt_hit {
+    float t;
+    float u, v;               /* mesh: weights of corners 1 and 2; quadric: surface parameters in [0, 1] */
+    int32_t shape;            /* id, -1 = nothing was hit */
+    int32_t primitive;        /* mesh: triangle */
+    int32_t instance;         /* id, -1 = a shape of the world */
+    pt_vec3 n_object;         /* unnormalised geometric normal in the shape's space: right-hand rule, before flip_normal */
+};
+
+/* Nearest hit; returns 1 and fills *hit, or 0. `coherent`: neighbouring calls have similar rays. Alpha is not looked at. */
+int pt_accel_intersect(const struct pt_scene *scene, const struct pt_ray *ray, int coherent, struct pt_hit *hit);
+/* 1 when anything lies in (t_min, t_max). Alpha is not looked at. */
+int pt_accel_occluded(const struct pt_scene *scene, const struct pt_ray *ray);
+
+/* Object → render transform of instance `id` at `time`, the one its hits were found with. */
+void pt_accel_instance_transform(const struct pt_scene *scene, int32_t id, float time, struct pt_mat34 *to_render);
+
+#endif

@@ -1,0 +1,288 @@
+/*
+ * The renderable: what a loaded scene is while it is being rendered. Plain data; read-only once built, so any thread may read.
+ *
+ * Spaces. *Render space* is world space translated so that the camera (at shutter open) sits at the origin; the translation
+ * is applied in double before anything becomes float, so that a scene far from the world's origin keeps its precision.
+ * Everything here is in render space and scene units, but for the shapes of an object (see pt_object), which are in the
+ * space of their object. Colours are linear Rec.709 RGB. Ids are indices into the arrays of pt_scene, -1 = none.
+ *
+ * Ownership. All arrays live in the scene's arena unless a field says otherwise.
+ *
+ * How a scene is made: zero the struct, fill camera … media, radiance_scale and effects, then call in this order
+ * pt_camera_init (shade/camera.h), pt_accel_build (geom/accel.h), pt_lights_build (shade/light.h).
+ * pt_accel_release, then pt_arena_release give everything back.
+ */
+#ifndef PT_SCENE_SCENE_H
+#define PT_SCENE_SCENE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "base/arena.h"
+#include "base/vec.h"
+#include "integ/effects.h"
+#include "scene/load.h"
+
+/* Affine transform: three rows of four, applied to column vectors (x, y, z, 1). */
+struct pt_mat34 {
+    float m[12];
+};
+static inline pt_vec3 pt_mat34_point(const struct pt_mat34 *t, pt_vec3 p)
+{
+    const float *m = t->m;
+    return v3(m[0] * p.x + m[1] * p.y + m[2] * p.z + m[3], m[4] * p.x + m[5] * p.y + m[6] * p.z + m[7],
+              m[8] * p.x + m[9] * p.y + m[10] * p.z + m[11]);
+}
+static inline pt_vec3 pt_mat34_vector(const struct pt_mat34 *t, pt_vec3 v)
+{
+    const float *m = t->m;
+    return v3(m[0] * v.x + m[1] * v.y + m[2] * v.z, m[4] * v.x + m[5] * v.y + m[6] * v.z,
+              m[8] * v.x + m[9] * v.y + m[10] * v.z);
+}
+/* Normal by the inverse transform `inv` (its transpose is applied); not normalised. */
+static inline pt_vec3 pt_mat34_normal(const struct pt_mat34 *inv, pt_vec3 n)
+{
+    const float *m = inv->m;
+    return v3(m[0] * n.x + m[4] * n.y + m[8] * n.z, m[1] * n.x + m[5] * n.y + m[9] * n.z,
+              m[2] * n.x + m[6] * n.y + m[10] * n.z);
+}
+/* Inverse in double; 0 and *inv untouched when singular, else 1. In geom/mat34.c. */
+int pt_mat34_invert(const struct pt_mat34 *t, struct pt_mat34 *inv);
+
+/* --- camera -------------------------------------------------------------------------------------------------------------- */
+
+enum pt_camera_kind { PT_CAMERA_PERSPECTIVE, PT_CAMERA_ORTHOGRAPHIC };
+
+struct pt_camera {
+    /* filled by the builder */
+    int32_t kind;               /* enum pt_camera_kind */
+    int32_t width, height;      /* of the full image, pixels */
+    float fov_deg;              /* perspective: full angle over the screen coordinate range [-1, 1] */
+    float screen[4];            /* x0, x1, y0, y1 of the screen window; short side is [-1, 1] by default; y up */
+    float lens_radius;          /* scene units; 0 = pinhole */
+    float focal_distance;       /* scene units along +z of the camera */
+    struct pt_mat34 to_render[2]; /* camera (+x right, +y up, +z forward; may be left-handed) → render, at shutter open/close */
+    int32_t animated;           /* to_render[1] counts */
+    int32_t medium;             /* the camera lies in it, -1 = vacuum */
+    /* derived by pt_camera_init */
+    float x0, dx, y0, dy;       /* z = 1 (perspective) or z = 0 (orthographic) plane: x = x0 + dx·raster_x, likewise y */
+};
+
+/* --- textures ------------------------------------------------------------------------------------------------------------ */
+
+enum pt_wrap { PT_WRAP_REPEAT, PT_WRAP_BLACK, PT_WRAP_CLAMP, PT_WRAP_OCTAHEDRAL };
+enum pt_pixel_type { PT_PIXEL_U8_SRGB, PT_PIXEL_U8_LINEAR, PT_PIXEL_FLOAT };
+
+/* An image in memory, row 0 on top. Shared by textures that name the same file with the same encoding. */
+struct pt_image_map {
+    int32_t width, height;   /* >= 1 */
+    int32_t channels;        /* 1, 3 or 4 (rgb + alpha), interleaved */
+    int32_t type;            /* enum pt_pixel_type */
+    float gamma;             /* U8_LINEAR only: exponent that linearises; 1 = as is */
+    const void *pixels;      /* width · height · channels values */
+};
+
+enum pt_texture_kind {
+    PT_TEXTURE_CONSTANT,
+    PT_TEXTURE_IMAGE,
+    PT_TEXTURE_SCALE,        /* in[0] · in[1] */
+    PT_TEXTURE_MIX,          /* (1 - in[2]) in[0] + in[2] in[1] */
+    PT_TEXTURE_CHECKERBOARD, /* in[0] where floor(s) + floor(t) is even, in[1] elsewhere */
+    PT_TEXTURE_BILERP        /* corners in[0] (0,0), in[1] (0,1), in[2] (1,0), in[3] (1,1) */
+};
+
+/* A number or colour that may be textured. */
+struct pt_input {
+    int32_t texture;         /* -1: `value`; else id of the texture, always greater-or-equal 0 and acyclic */
+    pt_vec3 value;           /* a float input has it in x (and y, z equal to x) */
+};
+
+struct pt_texture {
+    int32_t kind;            /* enum pt_texture_kind */
+    int32_t image;           /* id, IMAGE only */
+    int32_t wrap;            /* enum pt_wrap, IMAGE only */
+    int32_t invert;          /* IMAGE only: 1 - value, before scale; never below 0 */
+    int32_t channel;         /* IMAGE read as a float: -1 = average of rgb, 3 = alpha */
+    float scale;             /* IMAGE only */
+    float su, sv, du, dv;    /* s = su·u + du, t = sv·v + dv */
+    struct pt_input in[4];   /* ids smaller than this texture's own: the array is in dependency order */
+};
+
+/* --- materials ----------------------------------------------------------------------------------------------------------- */
+
+enum pt_material_kind { /* the first seven equal enum pt_bsdf_kind */
+    PT_MATERIAL_DIFFUSE,
+    PT_MATERIAL_CONDUCTOR,
+    PT_MATERIAL_DIELECTRIC,
+    PT_MATERIAL_THIN_DIELECTRIC,
+    PT_MATERIAL_DIFFUSE_TRANSMISSION,
+    PT_MATERIAL_COATED_DIFFUSE,
+    PT_MATERIAL_COATED_CONDUCTOR,
+    PT_MATERIAL_MIX,
+    PT_MATERIAL_INTERFACE    /* bounds media only: light passes */
+};
+
+struct pt_material {
+    int32_t kind;                 /* enum pt_material_kind */
+    int32_t remap_roughness;      /* GGX alpha = sqrt(roughness) as in pbrt-v4; 0: alpha = roughness */
+    int32_t conductor_by_colour;  /* conductor (or base of a coated one) given by reflectance instead of eta and k */
+    int32_t bump;                 /* displacement texture (scene units), -1 = none */
+    int32_t normal_map;           /* texture with rgb = (n + 1)/2 in tangent space, -1 = none */
+    int32_t mix_a, mix_b;         /* materials, MIX only; smaller ids than this one's */
+    struct pt_input mix_amount;   /* float: share of mix_b */
+    struct pt_input reflectance, transmittance;
+    struct pt_input roughness_u, roughness_v;
+    struct pt_input base_roughness_u, base_roughness_v; /* coated conductor: the metal */
+    struct pt_input eta_rgb, k_rgb;                     /* conductor */
+    struct pt_input thickness, g, albedo;               /* coatings */
+    float eta;                    /* dielectric interface, inside / outside */
+    const float *coat_table;      /* see pt_bsdf.coat_table; made by shade/, in the arena or static; NULL = none */
+};
+
+/* --- shapes -------------------------------------------------------------------------------------------------------------- */
+
+struct pt_mesh {
+    uint32_t vertex_count, triangle_count;
+    const float *positions;    /* [vertex_count][3] and one float of padding after the last (the ray kernel loads 16 bytes) */
+    const uint32_t *indices;   /* [triangle_count][3], each < vertex_count */
+    const float *normals;      /* [vertex_count][3] shading normals, need not be unit; or NULL */
+    const float *uvs;          /* [vertex_count][2]; or NULL: (0,0), (1,0), (1,1) at the three corners */
+};
+
+enum pt_quadric_kind { PT_QUADRIC_SPHERE, PT_QUADRIC_DISK, PT_QUADRIC_CYLINDER };
+
+struct pt_quadric {
+    int32_t kind;                        /* enum pt_quadric_kind */
+    float radius, inner_radius;          /* inner: disk only */
+    float z_min, z_max;                  /* sphere (clip, -radius and radius = whole), cylinder; disk: height in z_min */
+    float phi_max;                       /* radians, 2π = whole */
+    struct pt_mat34 to_render, from_render; /* quadric's own space ↔ render (or the object's) space */
+};
+
+enum pt_shape_kind { PT_SHAPE_MESH, PT_SHAPE_QUADRIC };
+
+struct pt_shape {
+    int32_t kind;              /* enum pt_shape_kind */
+    int32_t data;              /* id in meshes or quadrics */
+    int32_t material;          /* id, never -1 */
+    int32_t light;             /* id of the area light it carries, -1 = none; always -1 in objects */
+    int32_t medium_in, medium_out; /* on the side against / along the geometric normal; equal = the ray keeps its medium */
+    int32_t flip_normal;       /* the geometric normal is against the right-hand rule (reverse orientation XOR a transform
+                                  that swaps handedness): pbrt's meaning for lights and media */
+    int32_t has_alpha;         /* `alpha` is not constant 1 */
+    struct pt_input alpha;     /* float: probability that a hit counts */
+};
+
+/* A group of shapes that instances place; its shapes are consecutive and in the object's own space. */
+struct pt_object {
+    int32_t first_shape, shape_count;
+};
+/* A shape that moves by itself is an object of one shape with one animated instance. */
+struct pt_instance {
+    int32_t object;
+    int32_t animated;               /* to_render[1] counts: interpolated as translation, rotation (slerp), scale over the shutter */
+    struct pt_mat34 to_render[2];   /* object → render at shutter open and close */
+};
+
+/* --- lights -------------------------------------------------------------------------------------------------------------- */
+
+enum pt_light_kind {
+    PT_LIGHT_AREA,          /* every shape that names it */
+    PT_LIGHT_ENV_CONSTANT,
+    PT_LIGHT_ENV_IMAGE,
+    PT_LIGHT_DISTANT,
+    PT_LIGHT_POINT,
+    PT_LIGHT_SPOT
+};
+enum pt_env_map { PT_ENV_LATLONG, PT_ENV_EQUAL_AREA };
+
+struct pt_light {
+    /* filled by the builder */
+    int32_t kind;              /* enum pt_light_kind */
+    int32_t two_sided;         /* AREA */
+    int32_t shape;             /* AREA: the shape; one light per shape */
+    int32_t image;             /* ENV_IMAGE: id of a FLOAT image map of 3 channels */
+    int32_t mapping;           /* ENV_IMAGE: enum pt_env_map. LATLONG: z up, u = φ/2π from +x, v = θ/π from +z (row 0) */
+    pt_vec3 emission;          /* AREA, ENV: radiance (ENV_IMAGE: factor on the image); POINT, SPOT: intensity W/sr;
+                                  DISTANT: irradiance on a surface facing it. All scales applied */
+    pt_vec3 position;          /* POINT, SPOT */
+    pt_vec3 direction;         /* SPOT: axis; DISTANT: the way the light travels; unit */
+    float cos_total, cos_start; /* SPOT: full darkness beyond, full light within */
+    struct pt_mat34 from_render; /* ENV_IMAGE: render → light space, rotation only */
+    /* derived by pt_lights_build */
+    int32_t first_emitter;     /* AREA: emitter of primitive 0 */
+    float emitter_pmf;         /* other kinds: probability that next-event estimation selects this light */
+};
+
+/* What next-event estimation selects: a whole light, or one triangle of an area light. Derived by pt_lights_build. */
+struct pt_emitter {
+    int32_t light;
+    int32_t primitive;   /* AREA on a mesh: triangle */
+    int32_t alias;       /* Walker/Vose alias table over the emitters … */
+    float alias_q;       /* … keep this one when the fractional part is below q */
+    float pmf;           /* > 0 for all that can emit */
+};
+
+/* 2D piecewise-constant distribution over an environment image; derived. */
+struct pt_env_distribution {
+    int32_t width, height;
+    const float *alias_q;      /* [height · width] */
+    const int32_t *alias;      /* [height · width] */
+    const float *pdf;          /* [height · width] density over the unit square of the map */
+};
+
+/* --- media --------------------------------------------------------------------------------------------------------------- */
+
+enum pt_medium_kind { PT_MEDIUM_HOMOGENEOUS, PT_MEDIUM_GRID };
+
+struct pt_medium {
+    int32_t kind;               /* enum pt_medium_kind */
+    float g;                    /* Henyey–Greenstein asymmetry */
+    pt_vec3 sigma_a, sigma_s;   /* 1 / scene unit, scale applied; GRID: at density 1 */
+    pt_vec3 emission;           /* radiance emitted per unit absorption (σa·Le), GRID: at density 1 */
+    /* GRID: density at the centres of cells of the box [0,1]³ of the grid's space, trilinear, 0 outside */
+    int32_t nx, ny, nz;
+    const float *density;       /* [nz][ny][nx], >= 0 */
+    struct pt_mat34 from_render; /* render → grid's unit box */
+    int32_t mx, my, mz;         /* majorant cells; made by shade/medium */
+    const float *majorant;      /* [mz][my][mx] largest density in each */
+};
+
+/* --- the scene ----------------------------------------------------------------------------------------------------------- */
+
+struct pt_accel;
+
+struct pt_scene {
+    struct pt_camera camera;
+    struct pt_image_map *images;
+    struct pt_texture *textures;
+    struct pt_material *materials;
+    struct pt_mesh *meshes;
+    struct pt_quadric *quadrics;
+    struct pt_shape *shapes;       /* [0, world_shape_count): in render space; then the objects' */
+    struct pt_object *objects;
+    struct pt_instance *instances;
+    struct pt_light *lights;
+    struct pt_medium *media;
+    int32_t image_count, texture_count, material_count, mesh_count, quadric_count;
+    int32_t shape_count, world_shape_count, object_count, instance_count, light_count, medium_count;
+    float radiance_scale;          /* the film's exposure: factor from radiance to pixel value */
+    pt_effects effects;            /* needed or forced */
+
+    /* derived by pt_accel_build */
+    struct pt_accel *accel;        /* owns; released by pt_accel_release */
+    pt_vec3 bounds_min, bounds_max; /* of all shapes; 0 when there are none */
+
+    /* derived by pt_lights_build */
+    struct pt_emitter *emitters;
+    int32_t emitter_count;
+    int32_t *env_lights;           /* ids of ENV_* lights */
+    int32_t env_light_count;
+    struct pt_env_distribution *env_distributions; /* [light_count] or NULL; used for ENV_IMAGE */
+
+    struct pt_arena arena;
+    struct pt_effect_reason effect_reasons[PT_FX_COUNT]; /* for --explain */
+    struct pt_scene_stats stats;
+};
+
+#endif
