@@ -1,0 +1,206 @@
+#include "image/oiio.h"
+
+#include <OpenImageIO/filesystem.h>
+#include <OpenImageIO/imageio.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <mutex>
+#include <new>
+#include <string>
+
+#include <strings.h>
+#include <unistd.h>
+#include <zlib.h>
+
+extern "C" {
+#include "base/fio.h"
+}
+
+namespace {
+
+constexpr long long max_pixels = 1LL << 28;
+
+/* OpenImageIO's own pool would add threads that nobody asked for. */
+void configure_once()
+{
+    static std::once_flag once;
+    std::call_once(once, [] {
+        OIIO::attribute("threads", 1);
+        OIIO::attribute("exr_threads", -1);
+    });
+}
+
+/* One line, whatever the library said. */
+std::string one_line(const std::string &text)
+{
+    std::string line = text.substr(0, text.find('\n'));
+    return line.empty() ? std::string("unknown reason") : line;
+}
+
+int read_pixels(OIIO::ImageInput &input, const char *name, pt_oiio_image *out, pt_err *err)
+{
+    const OIIO::ImageSpec &spec = input.spec();
+    const int channels = std::min(spec.nchannels, 4);
+    if (spec.width <= 0 || spec.height <= 0 || channels <= 0 || spec.depth > 1)
+        return pt_fail(err, PT_EINVAL, "%s: not a 2-D image (%dx%dx%d, %d channels)", name, spec.width, spec.height, spec.depth,
+                       spec.nchannels);
+    if (static_cast<long long>(spec.width) * spec.height > max_pixels)
+        return pt_fail(err, PT_EINVAL, "%s: %dx%d pixels, more than the 2^28 an image may have", name, spec.width, spec.height);
+    const bool bytes = spec.format == OIIO::TypeDesc::UINT8;
+    const OIIO::TypeDesc type = bytes ? OIIO::TypeDesc::UINT8 : OIIO::TypeDesc::FLOAT;
+    const bool is_float = spec.format.is_floating_point();
+    const int width = spec.width, height = spec.height;
+    const size_t count = static_cast<size_t>(width) * static_cast<size_t>(height) * static_cast<size_t>(channels);
+    void *pixels = std::calloc(count, bytes ? 1 : sizeof(float));
+    if (pixels == nullptr)
+        return pt_fail_nomem(err, name);
+    if (!input.read_image(0, 0, 0, channels, type, pixels)) {
+        std::free(pixels);
+        return pt_fail(err, PT_EINVAL, "%s: %s", name, one_line(input.geterror()).c_str());
+    }
+    *out = pt_oiio_image{width, height, channels, is_float, bytes ? static_cast<uint8_t *>(pixels) : nullptr,
+                         bytes ? nullptr : static_cast<float *>(pixels)};
+    return PT_OK;
+}
+
+/* Keeps alpha as stored: pbrt never premultiplies. */
+OIIO::ImageSpec raw_config()
+{
+    OIIO::ImageSpec config;
+    config.attribute("oiio:UnassociatedAlpha", 1);
+    return config;
+}
+
+bool is_png(const char *name)
+{
+    const char *dot = std::strrchr(name, '.');
+    return dot != nullptr && strcasecmp(dot, ".png") == 0;
+}
+
+/* libpng prints on stderr when a file is damaged (and OpenImageIO then leaks), so damage is found before it sees the data:
+ * signature, chunk lengths, checksums, end marker (PNG specification, §5). */
+int check_png(const char *name, const unsigned char *data, size_t size, pt_err *err)
+{
+    static const unsigned char signature[8] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
+    if (size < sizeof signature || std::memcmp(data, signature, sizeof signature) != 0)
+        return pt_fail(err, PT_EINVAL, "%s: not a PNG file", name);
+    const auto be32 = [data](size_t at) {
+        return static_cast<uint32_t>(data[at]) << 24 | static_cast<uint32_t>(data[at + 1]) << 16 |
+               static_cast<uint32_t>(data[at + 2]) << 8 | static_cast<uint32_t>(data[at + 3]);
+    };
+    for (size_t at = sizeof signature; at < size;) {
+        if (size - at < 12 || be32(at) > size - at - 12)
+            return pt_fail(err, PT_EINVAL, "%s: truncated PNG file", name);
+        const size_t length = be32(at);
+        if (crc32(0, data + at + 4, static_cast<uInt>(length + 4)) != be32(at + 8 + length))
+            return pt_fail(err, PT_EINVAL, "%s: damaged PNG file (checksum at byte %zu)", name, at);
+        if (std::memcmp(data + at + 4, "IEND", 4) == 0)
+            return PT_OK;
+        at += length + 12;
+    }
+    return pt_fail(err, PT_EINVAL, "%s: truncated PNG file", name);
+}
+
+} // namespace
+
+extern "C" int pt_oiio_read(const char *path, struct pt_oiio_image *out, struct pt_err *err)
+{
+    try {
+        configure_once();
+        if (access(path, R_OK) != 0)
+            return pt_fail(err, PT_EIO, "%s: %s", path, std::strerror(errno));
+        if (is_png(path)) {
+            char *data = nullptr;
+            size_t size = 0;
+            int rc = pt_fio_read(path, 1u << 30, &data, &size, err);
+            if (rc == PT_OK)
+                rc = pt_oiio_read_memory(path, data, size, out, err);
+            std::free(data);
+            return rc;
+        }
+        const OIIO::ImageSpec config = raw_config();
+        std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::open(path, &config);
+        if (!input)
+            return pt_fail(err, PT_EINVAL, "%s: not an image that can be read: %s", path, one_line(OIIO::geterror()).c_str());
+        return read_pixels(*input, path, out, err);
+    } catch (const std::bad_alloc &) {
+        return pt_fail_nomem(err, path);
+    } catch (const std::exception &e) {
+        return pt_fail(err, PT_EINVAL, "%s: %s", path, one_line(e.what()).c_str());
+    }
+}
+
+extern "C" int pt_oiio_read_memory(const char *name, const void *data, size_t size, struct pt_oiio_image *out,
+                                   struct pt_err *err)
+{
+    try {
+        configure_once();
+        if (is_png(name)) {
+            const int rc = check_png(name, static_cast<const unsigned char *>(data), size, err);
+            if (rc != PT_OK)
+                return rc;
+        }
+        OIIO::Filesystem::IOMemReader reader(data, size);
+        const char *dot = std::strrchr(name, '.');
+        const std::string extension = dot != nullptr ? dot + 1 : name;
+        std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(extension, false);
+        if (!input || input->supports("ioproxy") == 0) {
+            OIIO::geterror();
+            return pt_fail(err, PT_EINVAL, "%s: this format cannot be read from memory", name);
+        }
+        OIIO::ImageSpec config = raw_config(), spec;
+        OIIO::Filesystem::IOProxy *proxy = &reader;
+        config.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &proxy);
+        if (!input->open(name, spec, config))
+            return pt_fail(err, PT_EINVAL, "%s: not an image that can be read: %s", name, one_line(input->geterror()).c_str());
+        return read_pixels(*input, name, out, err);
+    } catch (const std::bad_alloc &) {
+        return pt_fail_nomem(err, name);
+    } catch (const std::exception &e) {
+        return pt_fail(err, PT_EINVAL, "%s: %s", name, one_line(e.what()).c_str());
+    }
+}
+
+extern "C" void pt_oiio_release(struct pt_oiio_image *image)
+{
+    std::free(image->u8);
+    std::free(image->f32);
+    *image = pt_oiio_image{};
+}
+
+extern "C" int pt_oiio_write_png(const char *path, int32_t width, int32_t height, int32_t channels, const uint8_t *pixels,
+                                 struct pt_err *err)
+{
+    char tmp_path[4128];
+    if (width < 1 || height < 1 || channels < 1 || channels > 4)
+        return pt_fail(err, PT_EINVAL, "%s: cannot write %dx%d pixels of %d channels as PNG", path, width, height, channels);
+    int rc = pt_fio_tmp_name(path, tmp_path, sizeof tmp_path, err);
+    if (rc != PT_OK)
+        return rc;
+    try {
+        configure_once();
+        std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create("png");
+        if (!output)
+            return pt_fail(err, PT_EIO, "%s: OpenImageIO was built without PNG", path);
+        OIIO::ImageSpec spec(width, height, channels, OIIO::TypeDesc::UINT8);
+        spec.attribute("oiio:ColorSpace", "sRGB");
+        if (channels == 4)
+            spec.attribute("oiio:UnassociatedAlpha", 1);
+        if (!output->open(tmp_path, spec))
+            return pt_fail(err, PT_EIO, "%s: %s", path, one_line(output->geterror()).c_str());
+        const bool written = output->write_image(OIIO::TypeDesc::UINT8, pixels) && output->close();
+        if (!written) {
+            rc = pt_fail(err, PT_EIO, "%s: %s", path, one_line(output->geterror()).c_str());
+            unlink(tmp_path);
+            return rc;
+        }
+    } catch (const std::exception &e) {
+        unlink(tmp_path);
+        return pt_fail(err, PT_EIO, "%s: %s", path, one_line(e.what()).c_str());
+    }
+    return pt_fio_rename(tmp_path, path, err);
+}

@@ -1,0 +1,95 @@
+/* Image files: what is written is what is read, from disk and from memory; what is no image is refused in one line. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "base/fio.h"
+#include "image/oiio.h"
+
+static char dir[] = "/tmp/pt_oiio_XXXXXX";
+
+static int make_dir(void **state)
+{
+    (void)state;
+    return mkdtemp(dir) == NULL;
+}
+
+static int remove_dir(void **state)
+{
+    (void)state;
+    char path[64];
+    snprintf(path, sizeof path, "%s/a.png", dir);
+    unlink(path);
+    snprintf(path, sizeof path, "%s/bad.png", dir);
+    unlink(path);
+    return rmdir(dir);
+}
+
+static void png_round_trip(void **state)
+{
+    (void)state;
+    enum { W = 5, H = 3, C = 4 };
+    uint8_t pixels[W * H * C];
+    for (int i = 0; i < W * H * C; i++)
+        pixels[i] = (uint8_t)(i * 4 + 3);
+    pixels[3] = 0; /* colour under zero alpha must survive: no premultiplication */
+    char path[64];
+    snprintf(path, sizeof path, "%s/a.png", dir);
+    struct pt_err err = {0};
+    assert_int_equal(pt_oiio_write_png(path, W, H, C, pixels, &err), PT_OK);
+    struct pt_oiio_image image = {0};
+    assert_int_equal(pt_oiio_read(path, &image, &err), PT_OK);
+    assert_int_equal(image.width, W);
+    assert_int_equal(image.height, H);
+    assert_int_equal(image.channels, C);
+    assert_false(image.is_float_file);
+    assert_non_null(image.u8);
+    assert_memory_equal(image.u8, pixels, sizeof pixels);
+    pt_oiio_release(&image);
+
+    char *data;
+    size_t size;
+    assert_int_equal(pt_fio_read(path, 1 << 20, &data, &size, &err), PT_OK);
+    int rc = pt_oiio_read_memory("a.png", data, size, &image, &err);
+    if (rc != PT_OK)
+        print_error("%s\n", err.text);
+    assert_int_equal(rc, PT_OK);
+    assert_memory_equal(image.u8, pixels, sizeof pixels);
+    pt_oiio_release(&image);
+    assert_null(image.u8);
+    assert_int_equal(pt_oiio_read_memory("a.png", data, size / 3, &image, &err), PT_EINVAL);
+    assert_null(strchr(err.text, '\n'));
+    free(data);
+}
+
+static void refusals(void **state)
+{
+    (void)state;
+    struct pt_err err = {0};
+    struct pt_oiio_image image = {0};
+    assert_int_equal(pt_oiio_read("/nonexistent/x.png", &image, &err), PT_EIO);
+    char path[64];
+    snprintf(path, sizeof path, "%s/bad.png", dir);
+    FILE *f = fopen(path, "wb");
+    assert_non_null(f);
+    fputs("not a png", f);
+    fclose(f);
+    err = (struct pt_err){0};
+    assert_int_equal(pt_oiio_read(path, &image, &err), PT_EINVAL);
+    assert_null(strchr(err.text, '\n'));
+    uint8_t pixel[3] = {1, 2, 3};
+    assert_int_equal(pt_oiio_write_png("/nonexistent/x.png", 1, 1, 3, pixel, &err), PT_EIO);
+    assert_int_equal(pt_oiio_write_png(path, 0, 1, 3, pixel, &err), PT_EINVAL);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(png_round_trip), cmocka_unit_test(refusals)};
+    return cmocka_run_group_tests(tests, make_dir, remove_dir);
+}
