@@ -25,9 +25,10 @@
  *           Where pointers have 8 bytes there is no padding anywhere; layout-1.txt lists every offset.
  * Memory.   Nobody frees what the other allocated. Text in static tables lives for ever. A pointer in an argument is
  *           borrowed until the call returns, unless its comment says otherwise; who needs it longer copies it.
- * Errors.   Functions return LULL_OK or a negative LULL_E_ code and, if err is not NULL, fill *err. A call that fails has
- *           changed nothing, decisions included. err is untouched on success. A criterion never exits, aborts, prints,
- *           raises signals or lets an exception out.
+ * Errors.   Functions return LULL_OK or a negative LULL_E_ code and, if err is not NULL, fill *err. A call that fails leaves
+ *           the instance as it was and its results are ignored; the blocks of a failed evaluate continue, so that an error
+ *           costs time and never quality. err is untouched on success. A criterion never exits, aborts, prints, raises
+ *           signals or lets an exception out.
  * Threads.  Every function says which calls may overlap:
  *             [ctl]  calls on one instance never overlap each other or an [eval] call on that instance;
  *             [eval] like [ctl], but may overlap other [eval] calls on the instance if the criterion declares
