@@ -37,7 +37,7 @@ struct pt_bsdf {
     float base_alpha_x, base_alpha_y; /* coated conductor: roughness of the metal */
     float thickness, g;       /* coatings: thickness of the layer, Henyey–Greenstein asymmetry inside */
     pt_vec3 albedo;           /* coatings: single-scattering albedo of the layer; black = clear */
-    const float *coat_table;  /* borrows until scene release: directional albedo table of the rough coating, or NULL */
+    const float *coat_table;  /* borrows until scene release: table of the coating (coat_table.h), never NULL for coatings */
 };
 
 enum {

@@ -1,0 +1,112 @@
+/*
+ * Base under a dielectric coating.
+ *
+ * Diffuse base. Because the base forgets directions, the layered solution factors exactly:
+ *     f = f_interface + A(μo) A(μi) R S / (π η²),   S = Σ_{n<5} (R Fi)^n
+ * with A(μ) the flux that reaches the base from direction cosine μ (refraction and the layer's extinction exp(-t/|cos|), unit
+ * coefficient, on the way) and Fi the flux that the interface returns to the base from diffuse light below it. Rough
+ * interfaces have A, Fi and the albedo of f_interface tabulated (coat_table.h); smooth ones need Fi only. Five base bounces
+ * is what pbrt-v4's walk of depth 10 admits.
+ */
+#ifndef PT_SHADE_BSDF_COATED_H
+#define PT_SHADE_BSDF_COATED_H
+
+#include "shade/bsdf.h"
+#include "shade/bsdf_conductor.h"
+#include "shade/bsdf_dielectric.h"
+#include "shade/bsdf_diffuse.h"
+#include "shade/coat_table.h"
+
+/* What the coating does to light of cosine mu > 0: *base gets A(mu), *spec the albedo of the interface's reflection. */
+static inline void pt_coat_split(const struct pt_bsdf *b, float mu, float *base, float *spec)
+{
+    if (b->alpha_x > 0.0f && b->eta != 1.0f) {
+        pt_coat_lookup(b->coat_table, pt_coat_alpha(b->alpha_x, b->alpha_y), mu, base, spec);
+        return;
+    }
+    float cos_t, r = pt_fresnel_dielectric_t(mu, b->eta, &cos_t);
+    *spec = r;
+    *base = cos_t > 0.0f ? (1.0f - r) * expf(-b->thickness / cos_t) : 0.0f;
+}
+
+/* R S / (π η²) per channel */
+static inline pt_vec3 pt_coat_base_factor(const struct pt_bsdf *b)
+{
+    float fi = pt_coat_internal(b->coat_table, pt_coat_alpha(b->alpha_x, b->alpha_y));
+    float norm = PT_INV_PI / (b->eta * b->eta);
+    pt_vec3 r = b->reflectance, q = v3_scale(r, fi);
+    pt_vec3 one = v3_splat(1.0f), s = v3_add(one, v3_mul(q, v3_add(one, q)));
+    pt_vec3 q3 = v3_mul(q, v3_mul(q, q));
+    s = v3_add(s, v3_mul(q3, v3_add(one, q))); /* 1 + q + q² + q³ + q⁴ */
+    return v3_scale(v3_mul(r, s), norm);
+}
+
+/* Chance of sampling the interface's reflection. */
+static inline float pt_coat_choice(float spec, float base, pt_vec3 factor)
+{
+    /* 2∫A μ dμ is near (1 - spec at normal incidence): 0.95 is close enough for a choice */
+    float d = base * 0.95f * PT_PI * v3_luminance(factor);
+    return spec + d > 0.0f ? spec / (spec + d) : 0.0f;
+}
+
+static inline pt_vec3 pt_coated_diffuse_eval(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, pt_vec3 wi,
+                                             float *pdf_solid)
+{
+    *pdf_solid = 0.0f;
+    if (!(wo.z * wi.z > 0.0f))
+        return v3_splat(0.0f);
+    if (wo.z < 0.0f) { /* both faces are coated alike */
+        wo = v3_neg(wo);
+        wi = v3_neg(wi);
+    }
+    float base_o, spec_o, base_i, spec_i;
+    pt_coat_split(b, wo.z, &base_o, &spec_o);
+    pt_coat_split(b, wi.z, &base_i, &spec_i);
+    pt_vec3 factor = pt_coat_base_factor(b);
+    float p = pt_coat_choice(spec_o, base_o, factor), pdf_spec = 0.0f;
+    pt_vec3 f = v3_scale(factor, base_o * base_i * wi.z);
+    if ((fx & PT_FX_GLOSSY) && b->alpha_x > 0.0f && b->eta != 1.0f) {
+        pt_vec3 m = v3_norm(v3_add(wo, wi));
+        float ax = b->alpha_x, ay = b->alpha_y, d = pt_ggx_d(m, ax, ay);
+        float fresnel = pt_fresnel_dielectric(v3_dot(wo, m), b->eta);
+        pdf_spec = 0.5f * d / (wo.z + pt_ggx_stretch(wo, ax, ay));
+        f = v3_add(f, v3_splat(0.25f * d * fresnel * pt_ggx_g2_over_cos(wo, wi, ax, ay) * wi.z));
+    }
+    *pdf_solid = p * pdf_spec + (1.0f - p) * wi.z * PT_INV_PI;
+    return f;
+}
+
+static inline int pt_coated_diffuse_sample(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, float u_lobe, float u0,
+                                           float u1, struct pt_bsdf_sample *out)
+{
+    if (wo.z == 0.0f)
+        return 0;
+    float side = wo.z < 0.0f ? -1.0f : 1.0f, base, spec;
+    pt_vec3 w = v3_scale(wo, side), wi;
+    pt_coat_split(b, w.z, &base, &spec);
+    float p = pt_coat_choice(spec, base, pt_coat_base_factor(b));
+    int rough = b->alpha_x > 0.0f && b->eta != 1.0f;
+    out->eta_scale = 1.0f;
+    out->flags = 0;
+    if (u_lobe < p) {
+        if (!((fx & PT_FX_GLOSSY) && rough)) {
+            out->wi = v3(-wo.x, -wo.y, wo.z);
+            out->weight = v3_splat(spec / p);
+            out->pdf_solid = p;
+            out->flags = PT_SCATTER_DELTA;
+            return 1;
+        }
+        pt_vec3 m = pt_ggx_sample_visible(w, b->alpha_x, b->alpha_y, u0, u1);
+        wi = v3_norm(v3_sub(v3_scale(m, 2.0f * v3_dot(w, m)), w));
+        if (!(wi.z > 0.0f))
+            return 0;
+    } else {
+        wi = pt_sample_cosine(u0, u1);
+    }
+    pt_vec3 f = pt_coated_diffuse_eval(fx, b, w, wi, &out->pdf_solid);
+    out->wi = v3_scale(wi, side);
+    out->weight = v3_scale(f, 1.0f / out->pdf_solid);
+    return out->pdf_solid > 0.0f;
+}
+
+#endif

@@ -1,0 +1,114 @@
+/*
+ * Glass-like interfaces: a single boundary between two media (smooth or GGX, Walter et al. 2007) and the thin slab that
+ * neither bends nor shifts a ray. wo.z > 0 is outside; b->eta = inside / outside.
+ */
+#ifndef PT_SHADE_BSDF_DIELECTRIC_H
+#define PT_SHADE_BSDF_DIELECTRIC_H
+
+#include "shade/bsdf.h"
+#include "shade/fresnel.h"
+#include "shade/microfacet.h"
+
+static inline int pt_dielectric_is_smooth(const struct pt_bsdf *b) { return b->alpha_x == 0.0f || b->eta == 1.0f; }
+
+static inline int pt_dielectric_sample_smooth(const struct pt_bsdf *b, pt_vec3 wo, float u_lobe, struct pt_bsdf_sample *out)
+{
+    float cos_t, r = pt_fresnel_dielectric_t(wo.z, b->eta, &cos_t);
+    if (wo.z == 0.0f)
+        return 0;
+    if (u_lobe < r) {
+        out->wi = v3(-wo.x, -wo.y, wo.z);
+        out->weight = v3_splat(1.0f);
+        out->pdf_solid = r;
+        out->eta_scale = 1.0f;
+        out->flags = PT_SCATTER_DELTA;
+        return 1;
+    }
+    float inv_etap = wo.z < 0.0f ? b->eta : 1.0f / b->eta;
+    out->wi = v3(-wo.x * inv_etap, -wo.y * inv_etap, copysignf(cos_t, -wo.z));
+    out->weight = v3_splat(inv_etap * inv_etap);
+    out->pdf_solid = 1.0f - r;
+    out->eta_scale = inv_etap * inv_etap;
+    out->flags = PT_SCATTER_DELTA | PT_SCATTER_TRANSMIT;
+    return 1;
+}
+
+/* f |cos θi| and pdf of the rough interface; the visible normals are sampled, then F chooses reflection or refraction. */
+static inline pt_vec3 pt_dielectric_eval(const struct pt_bsdf *b, pt_vec3 wo, pt_vec3 wi, float *pdf_solid)
+{
+    *pdf_solid = 0.0f;
+    if (pt_dielectric_is_smooth(b) || wo.z == 0.0f || wi.z == 0.0f)
+        return v3_splat(0.0f);
+    float ax = b->alpha_x, ay = b->alpha_y;
+    int reflected = wo.z * wi.z > 0.0f;
+    float etap = reflected ? 1.0f : wo.z > 0.0f ? b->eta : 1.0f / b->eta;
+    pt_vec3 m = v3_madd(wo, etap, wi); /* Walter et al., eq. 13 and 16 */
+    float len2 = v3_dot(m, m);
+    if (!(len2 > 0.0f))
+        return v3_splat(0.0f);
+    m = v3_scale(m, copysignf(1.0f / sqrtf(len2), m.z));
+    float om = v3_dot(wo, m), im = v3_dot(wi, m);
+    if (om * wo.z <= 0.0f || im * wi.z <= 0.0f) /* seen from behind */
+        return v3_splat(0.0f);
+    float d = pt_ggx_d(m, ax, ay), fresnel = pt_fresnel_dielectric(om, b->eta);
+    float g = pt_ggx_g2_over_cos(wo, wi, ax, ay) * fabsf(wi.z), visible = fabsf(wo.z) + pt_ggx_stretch(wo, ax, ay);
+    if (reflected) {
+        *pdf_solid = 0.5f * d * fresnel / visible;
+        return v3_splat(0.25f * d * g * fresnel);
+    }
+    float denom = im + om / etap;
+    float jacobian = fabsf(im) / (denom * denom); /* dωm/dωi, eq. 17 */
+    *pdf_solid = 2.0f * d * fabsf(om) / visible * jacobian * (1.0f - fresnel);
+    /* eq. 21; radiance shrinks by 1/etap² */
+    return v3_splat(d * g * fabsf(om) * jacobian * (1.0f - fresnel) / (etap * etap));
+}
+
+static inline int pt_dielectric_sample_rough(const struct pt_bsdf *b, pt_vec3 wo, float u_lobe, float u0, float u1,
+                                             struct pt_bsdf_sample *out)
+{
+    float ax = b->alpha_x, ay = b->alpha_y;
+    if (wo.z == 0.0f)
+        return 0;
+    pt_vec3 m = pt_ggx_sample_visible(wo, ax, ay, u0, u1); /* m.z > 0: the sign of om is that of wo.z */
+    float om = v3_dot(wo, m), cos_t, fresnel = pt_fresnel_dielectric_t(om, b->eta, &cos_t);
+    float visible = fabsf(wo.z) + pt_ggx_stretch(wo, ax, ay), d = pt_ggx_d(m, ax, ay);
+    out->eta_scale = 1.0f;
+    out->flags = 0;
+    if (u_lobe < fresnel) {
+        out->wi = v3_norm(v3_sub(v3_scale(m, 2.0f * om), wo));
+        if (!(wo.z * out->wi.z > 0.0f))
+            return 0;
+        out->pdf_solid = 0.5f * d * fresnel / visible;
+        out->weight = v3_splat(pt_ggx_g2_over_g1(wo, out->wi, ax, ay));
+        return 1;
+    }
+    float inv_etap = wo.z < 0.0f ? b->eta : 1.0f / b->eta;
+    float im = copysignf(cos_t, -om);
+    out->wi = v3_norm(v3_madd(v3_scale(wo, -inv_etap), om * inv_etap + im, m));
+    if (!(wo.z * out->wi.z < 0.0f))
+        return 0;
+    float denom = im + om * inv_etap;
+    float jacobian = fabsf(im) / fmaxf(denom * denom, 1e-20f);
+    out->pdf_solid = 2.0f * d * fabsf(om) / visible * jacobian * (1.0f - fresnel);
+    out->weight = v3_splat(pt_ggx_g2_over_g1(wo, out->wi, ax, ay) * inv_etap * inv_etap);
+    out->eta_scale = inv_etap * inv_etap;
+    out->flags = PT_SCATTER_TRANSMIT;
+    return out->pdf_solid > 0.0f;
+}
+
+/* Slab of two parallel faces: reflections between them summed, R' = R + T²R/(1 - R²). */
+static inline int pt_thin_dielectric_sample(const struct pt_bsdf *b, pt_vec3 wo, float u_lobe, struct pt_bsdf_sample *out)
+{
+    float r = pt_fresnel_dielectric(fabsf(wo.z), b->eta);
+    if (r < 1.0f)
+        r = 2.0f * r / (1.0f + r);
+    int reflected = u_lobe < r;
+    out->wi = reflected ? v3(-wo.x, -wo.y, wo.z) : v3_neg(wo);
+    out->weight = v3_splat(1.0f);
+    out->pdf_solid = reflected ? r : 1.0f - r;
+    out->eta_scale = 1.0f;
+    out->flags = reflected ? PT_SCATTER_DELTA : PT_SCATTER_DELTA | PT_SCATTER_TRANSMIT;
+    return wo.z != 0.0f;
+}
+
+#endif

@@ -1,0 +1,52 @@
+/*
+ * Maps from the unit square to the shapes that scattering needs, with their densities. Inputs are in [0, 1).
+ *
+ * Sines and cosines are short polynomials on [-π/4, π/4]: faster than the C library's, and the same bytes wherever the
+ * program is built.
+ */
+#ifndef PT_SHADE_WARP_H
+#define PT_SHADE_WARP_H
+
+#include "base/vec.h"
+
+/* |x| <= π/4; absolute error below 1e-7. Taylor series. */
+static inline void pt_sincos_quarter(float x, float *s, float *c)
+{
+    float x2 = x * x;
+    *s = x * (1.0f + x2 * (-1.6666667e-1f + x2 * (8.3333333e-3f + x2 * (-1.9841270e-4f + x2 * 2.7557319e-6f))));
+    *c = 1.0f + x2 * (-0.5f + x2 * (4.1666667e-2f + x2 * (-1.3888889e-3f + x2 * 2.4801587e-5f)));
+}
+
+/* Sine and cosine of 2πu, u in [0, 1]. */
+static inline void pt_sincos_turn(float u, float *s, float *c)
+{
+    float quarters = 4.0f * u;
+    int q = (int)(quarters + 0.5f);
+    float sq, cq;
+    pt_sincos_quarter((quarters - (float)q) * (0.5f * PT_PI), &sq, &cq);
+    float ss = (q & 1) ? cq : sq, cc = (q & 1) ? sq : cq;
+    *s = (q & 2) ? -ss : ss;
+    *c = ((q + 1) & 2) ? -cc : cc;
+}
+
+/* Cosine-weighted hemisphere around +z; pdf_solid = z/π. Shirley and Chiu's concentric map (1997), then Malley's lift. */
+static inline pt_vec3 pt_sample_cosine(float u0, float u1)
+{
+    float a = 2.0f * u0 - 1.0f, b = 2.0f * u1 - 1.0f;
+    int wide = fabsf(a) > fabsf(b);
+    float num = wide ? b : a, den = wide ? a : b;
+    float s, c;
+    pt_sincos_quarter(den != 0.0f ? 0.25f * PT_PI * (num / den) : 0.0f, &s, &c);
+    float x = den * (wide ? c : s), y = den * (wide ? s : c);
+    return v3(x, y, sqrtf(fmaxf(1e-12f, 1.0f - den * den)));
+}
+
+/* Uniform on the sphere; pdf_solid = 1/(4π). */
+static inline pt_vec3 pt_sample_sphere(float u0, float u1)
+{
+    float z = 1.0f - 2.0f * u0, r = sqrtf(fmaxf(0.0f, 1.0f - z * z)), s, c;
+    pt_sincos_turn(u1, &s, &c);
+    return v3(r * c, r * s, z);
+}
+
+#endif
