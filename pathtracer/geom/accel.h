@@ -25,11 +25,12 @@ struct pt_ray {
 
 struct pt_hit {
     float t;
-    float u, v;               /* mesh: weights of corners 1 and 2; quadric: surface parameters in [0, 1] */
+    float u, v;               /* mesh: weights of corners 1 and 2 */
     int32_t shape;            /* id, -1 = nothing was hit */
     int32_t primitive;        /* mesh: triangle */
     int32_t instance;         /* id, -1 = a shape of the world */
-    pt_vec3 n_object;         /* unnormalised geometric normal in the shape's space: right-hand rule, before flip_normal */
+    pt_vec3 geometric;        /* mesh: unnormalised normal in the shape's space (right-hand rule, before flip_normal);
+                                 quadric: the hit point in the quadric's own space */
 };
 
 /* Nearest hit; returns 1 and fills *hit, or 0. `coherent`: neighbouring calls have similar rays. Alpha is not looked at. */
