@@ -14,7 +14,9 @@
 
 /* X(name, one-line help), in the order `ggn --help` lists them. */
 #define GGN_COMMANDS(X) \
-    X(golden, "print the golden values of the published networks as JSON")
+    X(golden, "print the golden values of the published networks as JSON") \
+    X(flip, "visible difference of two images (LDR-FLIP)") \
+    X(compare, "stop maps or thresholds against (human) thresholds")
 
 #define GGN_DECLARE_COMMAND(name, help) int ggn_cmd_##name(int argc, char **argv);
 GGN_COMMANDS(GGN_DECLARE_COMMAND)

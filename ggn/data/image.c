@@ -1,0 +1,67 @@
+#include "data/image.h"
+
+#include <math.h>
+#include <pthread.h>
+#include <stdlib.h>
+
+void ggn_image8_release(struct ggn_image8 *image)
+{
+    free(image->data);
+    *image = (struct ggn_image8){0};
+}
+
+void ggn_imagef_release(struct ggn_imagef *image)
+{
+    free(image->data);
+    *image = (struct ggn_imagef){0};
+}
+
+double ggn_srgb_oetf(double linear)
+{
+    return linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1.0 / 2.4) - 0.055;
+}
+
+double ggn_srgb_eotf(double encoded)
+{
+    return encoded <= 0.04045 ? encoded / 12.92 : pow((encoded + 0.055) / 1.055, 2.4);
+}
+
+uint8_t ggn_srgb_code(double linear)
+{
+    if (!(linear > 0.0))
+        return 0;
+    if (linear >= 1.0)
+        return 255;
+    return (uint8_t)floor(255.0 * ggn_srgb_oetf(linear) + 0.5);
+}
+
+static float decode_table[256];
+
+static void fill_table(void)
+{
+    for (int i = 0; i < 256; i++)
+        decode_table[i] = (float)ggn_srgb_eotf(i / 255.0);
+}
+
+const float *ggn_srgb_table(void)
+{
+    static pthread_once_t once = PTHREAD_ONCE_INIT;
+    pthread_once(&once, fill_table);
+    return decode_table;
+}
+
+void ggn_colormap_rgb(enum ggn_colormap map, double v, uint8_t rgb[3])
+{
+    static const uint8_t knots[2][9][3] = {
+        [GGN_MAGMA] = {{0, 0, 4}, {29, 17, 71}, {81, 18, 124}, {130, 38, 129}, {182, 54, 121}, {230, 81, 100},
+                       {251, 136, 97}, {254, 194, 135}, {252, 253, 191}},
+        [GGN_VIRIDIS] = {{68, 1, 84}, {71, 45, 123}, {59, 82, 139}, {44, 114, 142}, {33, 144, 140}, {39, 173, 129},
+                         {93, 200, 99}, {170, 220, 50}, {253, 231, 37}},
+    };
+    double x = v > 0.0 ? (v < 1.0 ? 8.0 * v : 8.0) : 0.0;
+    int i = x < 7.0 ? (int)x : 7;
+    for (int c = 0; c < 3; c++) {
+        double a = knots[map][i][c], b = knots[map][i + 1][c];
+        rgb[c] = (uint8_t)(a + (b - a) * (x - i) + 0.5);
+    }
+}

@@ -1,0 +1,209 @@
+#include "data/thresholds.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cjson/cJSON.h>
+
+#include "base/fio.h"
+#include "data/image.h"
+
+enum { MAX_TEXT = 1 << 26, MAX_VIEWS = 1 << 20 };
+
+void ggn_thresholds_release(struct ggn_thresholds *t)
+{
+    for (int i = 0; i < t->n; i++)
+        free(t->views[i].spp);
+    free(t->views);
+    *t = (struct ggn_thresholds){0};
+}
+
+const struct ggn_view *ggn_thresholds_find(const struct ggn_thresholds *t, const char *name)
+{
+    for (int i = 0; i < t->n; i++)
+        if (strcmp(t->views[i].name, name) == 0)
+            return &t->views[i];
+    return NULL;
+}
+
+/* Appends a view with room for n blocks, all unknown. NULL: out of memory. */
+static struct ggn_view *add_view(struct ggn_thresholds *t, const char *name, int n)
+{
+    if ((t->n & (t->n - 1)) == 0) {
+        size_t room = t->n == 0 ? 1 : 2 * (size_t)t->n;
+        struct ggn_view *views = realloc(t->views, room * sizeof *views);
+        if (views == NULL)
+            return NULL;
+        t->views = views;
+    }
+    struct ggn_view *v = &t->views[t->n];
+    *v = (struct ggn_view){.n = n, .spp = malloc((size_t)n * sizeof *v->spp)};
+    if (v->spp == NULL)
+        return NULL;
+    snprintf(v->name, sizeof v->name, "%s", name);
+    for (int i = 0; i < n; i++)
+        v->spp[i] = (double)NAN;
+    t->n++;
+    return v;
+}
+
+static int parse_line(const char *path, int number, char *line, struct ggn_thresholds *t, struct ggn_err *err)
+{
+    char *sep = strchr(line, ';');
+    if (sep == NULL || sep == line || sep - line >= GGN_VIEW_NAME)
+        return ggn_fail(err, GGN_EINVAL, "%s:%d: expected NAME;T0;T1;…", path, number);
+    *sep = '\0';
+    int n = 0;
+    for (const char *p = sep + 1; *p != '\0'; p++)
+        n += *p == ';';
+    n += sep[1] != '\0' && sep[strlen(sep + 1)] != ';'; /* a last value without its ';' */
+    if (n < 1 || n > GGN_VIEW_BLOCKS)
+        return ggn_fail(err, GGN_EINVAL, "%s:%d: %d thresholds", path, number, n);
+    if (ggn_thresholds_find(t, line) != NULL)
+        return ggn_fail(err, GGN_EINVAL, "%s:%d: view '%s' appears twice", path, number, line);
+    struct ggn_view *v = add_view(t, line, n);
+    if (v == NULL)
+        return ggn_fail_nomem(err, path);
+    char *at = sep + 1;
+    for (int i = 0; i < n; i++) {
+        char *end;
+        double value = strtod(at, &end);
+        if (end == at || !(value > 0.0 && value < 1e12) || (*end != ';' && *end != '\0'))
+            return ggn_fail(err, GGN_EINVAL, "%s:%d: threshold %d is not a positive number", path, number, i);
+        v->spp[i] = value;
+        at = end + 1;
+    }
+    return GGN_OK;
+}
+
+int ggn_thresholds_parse_csv(const char *path, char *text, struct ggn_thresholds *out, struct ggn_err *err)
+{
+    struct ggn_thresholds t = {0};
+    int rc = GGN_OK, number = 0;
+    for (char *line = text, *next; line != NULL && rc == GGN_OK; line = next) {
+        next = strchr(line, '\n');
+        if (next != NULL)
+            *next++ = '\0';
+        number++;
+        line[strcspn(line, "\r")] = '\0';
+        if (line[0] == '\0' || line[0] == '#')
+            continue;
+        rc = t.n < MAX_VIEWS ? parse_line(path, number, line, &t, err) : ggn_fail(err, GGN_EINVAL, "%s: too many lines", path);
+    }
+    if (rc == GGN_OK && t.n == 0)
+        rc = ggn_fail(err, GGN_EINVAL, "%s: no thresholds in it", path);
+    if (rc != GGN_OK) {
+        ggn_thresholds_release(&t);
+        return rc;
+    }
+    *out = t;
+    return GGN_OK;
+}
+
+/* Reports name their blocks by id; ids may be any subset of the grid. */
+static int parse_json(const char *path, const char *text, size_t size, struct ggn_thresholds *out, struct ggn_err *err)
+{
+    struct ggn_thresholds t = {0};
+    cJSON *root = cJSON_ParseWithLength(text, size);
+    const cJSON *blocks = cJSON_GetObjectItemCaseSensitive(root, "blocks");
+    const cJSON *scene = cJSON_GetObjectItemCaseSensitive(root, "scene");
+    int rc = GGN_OK, last = -1, columns = 0;
+    if (!cJSON_IsArray(blocks)) {
+        rc = ggn_fail(err, GGN_EINVAL, "%s: not a report: no list of blocks", path);
+        goto out;
+    }
+    const cJSON *block;
+    cJSON_ArrayForEach(block, blocks) {
+        const cJSON *id = cJSON_GetObjectItemCaseSensitive(block, "id");
+        const cJSON *y0 = cJSON_GetObjectItemCaseSensitive(block, "y0");
+        if (!cJSON_IsNumber(id) || !(id->valuedouble >= 0 && id->valuedouble < GGN_VIEW_BLOCKS)) {
+            rc = ggn_fail(err, GGN_EINVAL, "%s: a block without a usable id", path);
+            goto out;
+        }
+        last = id->valueint > last ? id->valueint : last;
+        columns += cJSON_IsNumber(y0) && y0->valuedouble == 0.0;
+    }
+    struct ggn_view *v = last < 0 ? NULL : add_view(&t, cJSON_IsString(scene) ? scene->valuestring : path, last + 1);
+    if (v == NULL) {
+        rc = last < 0 ? ggn_fail(err, GGN_EINVAL, "%s: no blocks in it", path) : ggn_fail_nomem(err, path);
+        goto out;
+    }
+    v->columns = columns;
+    cJSON_ArrayForEach(block, blocks) {
+        const cJSON *id = cJSON_GetObjectItemCaseSensitive(block, "id");
+        const cJSON *spp = cJSON_GetObjectItemCaseSensitive(block, "threshold");
+        if (spp == NULL)
+            spp = cJSON_GetObjectItemCaseSensitive(block, "spp");
+        if (!cJSON_IsNumber(spp) || !(spp->valuedouble > 0.0 && spp->valuedouble < 1e12)) {
+            rc = ggn_fail(err, GGN_EINVAL, "%s: block %d has no positive spp", path, id->valueint);
+            goto out;
+        }
+        v->spp[id->valueint] = spp->valuedouble;
+    }
+    *out = t;
+    t = (struct ggn_thresholds){0};
+out:
+    ggn_thresholds_release(&t);
+    cJSON_Delete(root);
+    return rc;
+}
+
+/* One value per block: the largest in the block (a block is one value; the largest forgives borders that are filtered). */
+static int read_exr(const char *path, int block, struct ggn_thresholds *out, struct ggn_err *err)
+{
+    struct ggn_imagef image;
+    struct ggn_thresholds t = {0};
+    int rc = ggn_imagef_read_channel(path, "lull.spp", &image, err);
+    if (rc != GGN_OK)
+        return rc;
+    long columns = (image.width + block - 1) / block, rows = (image.height + block - 1) / block;
+    const char *slash = strrchr(path, '/');
+    if (columns * rows > GGN_VIEW_BLOCKS) {
+        rc = ggn_fail(err, GGN_EINVAL, "%s: %ld blocks of %d pixels", path, columns * rows, block);
+        goto out;
+    }
+    struct ggn_view *v = add_view(&t, slash != NULL ? slash + 1 : path, (int)(columns * rows));
+    if (v == NULL) {
+        rc = ggn_fail_nomem(err, path);
+        goto out;
+    }
+    v->columns = (int)columns;
+    for (int y = 0; y < image.height; y++)
+        for (int x = 0; x < image.width; x++) {
+            double *s = &v->spp[y / block * columns + x / block];
+            double value = (double)image.data[(size_t)y * (size_t)image.width + (size_t)x];
+            if (!(*s >= value))
+                *s = value;
+        }
+    for (int i = 0; i < v->n && rc == GGN_OK; i++)
+        if (!(v->spp[i] > 0.0 && v->spp[i] < 1e12))
+            rc = ggn_fail(err, GGN_EINVAL, "%s: block %d has no positive spp", path, i);
+    if (rc == GGN_OK) {
+        *out = t;
+        t = (struct ggn_thresholds){0};
+    }
+out:
+    ggn_thresholds_release(&t);
+    ggn_imagef_release(&image);
+    return rc;
+}
+
+int ggn_thresholds_read(const char *path, int block, struct ggn_thresholds *out, struct ggn_err *err)
+{
+    const char *dot = strrchr(path, '.');
+    char *text = NULL;
+    size_t size;
+    if (dot != NULL && strcmp(dot, ".exr") == 0)
+        return read_exr(path, block, out, err);
+    int rc = ggn_fio_read(path, MAX_TEXT, &text, &size, err);
+    if (rc != GGN_OK)
+        return rc;
+    if (dot != NULL && strcmp(dot, ".json") == 0)
+        rc = parse_json(path, text, size, out, err);
+    else
+        rc = ggn_thresholds_parse_csv(path, text, out, err);
+    free(text);
+    return rc;
+}

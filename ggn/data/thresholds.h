@@ -1,0 +1,32 @@
+/*
+ * Thresholds (or stops) per block of one or more views, from any file that says them.
+ *
+ * CSV `name;t0;…;tN;` (one view per line) · a render's report JSON (`blocks[].spp`) · labels.json · an EXR with `lull.spp`.
+ */
+#ifndef GGN_DATA_THRESHOLDS_H
+#define GGN_DATA_THRESHOLDS_H
+
+#include "base/err.h"
+
+enum { GGN_VIEW_NAME = 128, GGN_VIEW_BLOCKS = 65536 };
+
+struct ggn_view {
+    char name[GGN_VIEW_NAME];
+    int columns; /* blocks per row; 0 if the file does not say (then a square grid is assumed for pictures) */
+    int n;
+    double *spp; /* owns; [n], row-major, each > 0; NaN where the file has no value for the block */
+};
+
+struct ggn_thresholds {
+    int n;
+    struct ggn_view *views; /* owns */
+};
+
+/* The kind of file is taken from its name: .csv, .json, .exr. block: side of a block in pixels, for EXR only. */
+int ggn_thresholds_read(const char *path, int block, struct ggn_thresholds *out, struct ggn_err *err);
+/* text is NUL-terminated at text[size]; it is modified. `path` is for messages. */
+int ggn_thresholds_parse_csv(const char *path, char *text, struct ggn_thresholds *out, struct ggn_err *err);
+void ggn_thresholds_release(struct ggn_thresholds *t);
+const struct ggn_view *ggn_thresholds_find(const struct ggn_thresholds *t, const char *name);
+
+#endif

@@ -1,0 +1,71 @@
+#!/bin/sh
+# `ggn flip` and `ggn compare` from the outside: outputs, formats, and what they say about bad input.
+set -u
+cd "$(dirname "$0")/../.." || exit 2
+ggn=${BUILD:-build}/bin/ggn
+n=0
+tmp=$(mktemp -d) || exit 2
+trap 'rm -rf "$tmp"' EXIT
+check() { # check NAME STATUS
+    n=$((n + 1))
+    if [ "$2" -eq 0 ]; then echo "ok $n - $1"; else echo "not ok $n - $1"; sed 's/^/# /' "$tmp/err" 2>/dev/null; fi
+}
+fails() { # fails NAME PATTERN COMMAND…: exit 2, the last line on stderr has PATTERN
+    name=$1 pattern=$2
+    shift 2
+    "$@" >"$tmp/out" 2>"$tmp/err"
+    rc=$?
+    [ "$rc" -eq 2 ] && tail -n 1 "$tmp/err" | grep "^ggn " | grep -q "$pattern"
+    check "$name" $?
+}
+
+printf 'a;100;200;400;800;\nb;50;60;70;80;\n' >"$tmp/t.csv"
+printf 'a;100;400;400;800;\nc;1;\n' >"$tmp/m.csv"
+$ggn compare "$tmp/t.csv" "$tmp/m.csv" --json >"$tmp/out" 2>"$tmp/err" && grep -q '"blocks": 4,' "$tmp/out" &&
+    grep -q '"samples_ratio": 1.133333' "$tmp/out" && grep -q '"mae": 50.000000' "$tmp/out" && grep -q '"share_below": 0.000000' "$tmp/out"
+check "csv against csv" $?
+for key in blocks pearson_r pearson_r_below_cap spearman mae mae_below_cap rmse share_below samples_ratio median_abs_log2; do
+    grep -q "\"$key\":" "$tmp/out" || { echo "no $key" >"$tmp/err"; false; }
+    check "json key $key" $?
+done
+cat >"$tmp/r.json" <<'END'
+{"scene": "whatever", "blocks": [{"id": 0, "x0": 0, "y0": 0, "spp": 50}, {"id": 3, "x0": 1, "y0": 1, "spp": 160},
+ {"id": 1, "x0": 1, "y0": 0, "spp": 60}, {"id": 2, "x0": 0, "y0": 1, "spp": 70}]}
+END
+$ggn compare "$tmp/t.csv" "$tmp/r.json" --view b --json >"$tmp/out" 2>"$tmp/err" && grep -q '"samples_ratio": 1.307692' "$tmp/out"
+check "report JSON against one view" $?
+$ggn compare "$tmp/t.csv" "$tmp/m.csv" -o "$tmp/pictures" >"$tmp/out" 2>"$tmp/err" &&
+    [ -s "$tmp/pictures/scatter.png" ] && [ -s "$tmp/pictures/errors.png" ] && [ -s "$tmp/pictures/heatmaps.png" ] &&
+    [ "$(wc -l <"$tmp/pictures/blocks.csv")" -eq 5 ] && [ "$(find "$tmp/pictures" -name '.tmp*' | wc -l)" -eq 0 ]
+check "pictures, table, nothing temporary left" $?
+
+oiiotool --pattern constant:color=300 8x4 1 --chnames lull.spp -d float -o "$tmp/map.exr" >"$tmp/err" 2>&1 &&
+    printf 'map.exr;100;600;\n' >"$tmp/e.csv" && $ggn compare "$tmp/e.csv" "$tmp/map.exr" -b 4 --json >"$tmp/out" 2>"$tmp/err" &&
+    grep -q '"blocks": 2,' "$tmp/out" && grep -q '"samples_ratio": 0.857143' "$tmp/out"
+check "EXR stop map" $?
+fails "missing file" 'No such file' $ggn compare "$tmp/none.csv" "$tmp/m.csv"
+fails "no common view" 'same name' $ggn compare "$tmp/t.csv" "$tmp/e.csv" --cap 10
+fails "unknown view" "no view called 'zz'" $ggn compare "$tmp/t.csv" "$tmp/m.csv" --view zz
+printf 'a;1;2;\n' >"$tmp/short.csv"
+fails "block counts differ" '4 blocks against 2' $ggn compare "$tmp/t.csv" "$tmp/short.csv"
+printf '{"blocks": [{"id": -1}]}' >"$tmp/bad.json"
+fails "bad report" 'usable id' $ggn compare "$tmp/t.csv" "$tmp/bad.json"
+fails "EXR without the channel" 'no channel' sh -c "oiiotool --pattern constant:color=1,1,1 4x4 3 -d float -o $tmp/rgb.exr && $ggn compare $tmp/t.csv $tmp/rgb.exr"
+
+oiiotool --pattern checker 40x40 3 -d uint8 -o "$tmp/a.png" --pattern constant:color=.5,.5,.5 40x30 3 -d uint8 -o "$tmp/b.png" >/dev/null 2>&1
+$ggn flip "$tmp/a.png" "$tmp/a.png" --json -o "$tmp/map.png" >"$tmp/out" 2>"$tmp/err" && grep -qx '{"mean": 0.000000, "max": 0.000000}' "$tmp/out" && [ -s "$tmp/map.png" ]
+check "flip of equal images is 0" $?
+fails "flip: sizes differ" 'sizes must be equal' $ggn flip "$tmp/a.png" "$tmp/b.png"
+head -c 100 "$tmp/a.png" >"$tmp/cut.png"
+fails "flip: truncated image" 'cut.png' $ggn flip "$tmp/a.png" "$tmp/cut.png"
+fails "flip: not an image" 'm.csv' $ggn flip "$tmp/a.png" "$tmp/m.csv"
+$ggn flip "$tmp/a.png" "$tmp/a.png" -o "$tmp/nodir/map.png" >"$tmp/out" 2>"$tmp/err"; [ $? -ne 0 ] && [ -s "$tmp/err" ]
+check "flip: map that cannot be written" $?
+s=../shared/sequences/cornell-box/p3d_cornel-box-view0_
+if [ -e ${s}10000.png ]; then
+    $ggn flip ${s}10000.png ${s}00500.png --json >"$tmp/out" 2>"$tmp/err" && grep -qx '{"mean": 0.043397, "max": 0.570340}' "$tmp/out"
+    check "flip: published figures" $?
+else
+    n=$((n + 1)); echo "ok $n - flip: published figures # SKIP ../shared is absent"
+fi
+echo "1..$n"
