@@ -1,0 +1,141 @@
+#include "shade/material.h"
+
+#include "shade/coat_table.h"
+
+/* Unit, on the side of the geometric normal; `fallback` when there is no direction left. */
+static pt_vec3 keep_side(pt_vec3 n, pt_vec3 n_geometric, pt_vec3 fallback)
+{
+    n = v3_norm(n);
+    if (!v3_is_finite(n) || v3_is_black(n))
+        return fallback;
+    return v3_dot(n, n_geometric) < 0.0f ? v3_neg(n) : n;
+}
+
+static pt_vec3 normal_from_map(const struct pt_scene *scene, const struct pt_material *m, const struct pt_surface *s)
+{
+    pt_vec3 n = v3_sub(v3_scale(pt_texture_eval(scene, m->normal_map, s->u, s->v), 2.0f), v3_splat(1.0f));
+    pt_vec3 tangent = v3_norm(v3_madd(s->dpdu, -v3_dot(s->dpdu, s->n_shading), s->n_shading));
+    struct pt_frame frame = {tangent, v3_cross(s->n_shading, tangent), s->n_shading};
+    return keep_side(pt_frame_to_world(&frame, v3_norm(n)), s->n_geometric, s->n_shading);
+}
+
+pt_vec3 pt_material_bumped_normal(const struct pt_scene *scene, const struct pt_material *m, const struct pt_surface *s)
+{
+    if (m->normal_map >= 0)
+        return normal_from_map(scene, m, s);
+    float du, dv;
+    pt_texture_step(scene, m->bump, &du, &dv);
+    float d = pt_texture_eval(scene, m->bump, s->u, s->v).x;
+    float slope_u = (pt_texture_eval(scene, m->bump, s->u + du, s->v).x - d) / du;
+    float slope_v = (pt_texture_eval(scene, m->bump, s->u, s->v + dv).x - d) / dv;
+    pt_vec3 tangent_u = v3_madd(s->dpdu, slope_u, s->n_shading), tangent_v = v3_madd(s->dpdv, slope_v, s->n_shading);
+    pt_vec3 flat = v3_cross(s->dpdu, s->dpdv), n = v3_cross(tangent_u, tangent_v);
+    /* dpdu × dpdv may be on either side of the normal */
+    return keep_side(v3_dot(flat, s->n_shading) < 0.0f ? v3_neg(n) : n, s->n_geometric, s->n_shading);
+}
+
+static pt_effects input_effects(const struct pt_input *in) { return in->texture >= 0 ? PT_FX_TEXTURE : 0; }
+
+/* Whether a roughness can be smooth, can be rough, as effects. */
+static pt_effects roughness_effects(const struct pt_material *m, const struct pt_input *u, const struct pt_input *v)
+{
+    if (u->texture >= 0 || v->texture >= 0)
+        return PT_FX_SPECULAR | PT_FX_GLOSSY;
+    float x = fmaxf(u->value.x, v->value.x);
+    return (m->remap_roughness ? pt_roughness_to_alpha(x) : x) >= PT_ALPHA_SMOOTH ? PT_FX_GLOSSY : PT_FX_SPECULAR;
+}
+
+pt_effects pt_material_effects(const struct pt_scene *scene, int32_t id)
+{
+    const struct pt_material *m = &scene->materials[id];
+    pt_effects surface = input_effects(&m->roughness_u) | input_effects(&m->roughness_v) |
+                         roughness_effects(m, &m->roughness_u, &m->roughness_v);
+    pt_effects fx = m->bump >= 0 || m->normal_map >= 0 ? PT_FX_BUMP | PT_FX_TEXTURE : 0;
+    pt_effects colour = input_effects(&m->reflectance);
+    pt_effects metal = input_effects(&m->eta_rgb) | input_effects(&m->k_rgb) | (m->conductor_by_colour ? colour : 0);
+    pt_effects layer = PT_FX_COATED | input_effects(&m->thickness) | input_effects(&m->g) | input_effects(&m->albedo);
+    switch (m->kind) {
+    case PT_MATERIAL_DIFFUSE:
+        return fx | colour;
+    case PT_MATERIAL_CONDUCTOR:
+        return fx | surface | metal;
+    case PT_MATERIAL_DIELECTRIC:
+        return fx | PT_FX_TRANSMISSION | surface;
+    case PT_MATERIAL_THIN_DIELECTRIC:
+        return fx | PT_FX_TRANSMISSION | PT_FX_SPECULAR;
+    case PT_MATERIAL_DIFFUSE_TRANSMISSION:
+        return fx | PT_FX_TRANSMISSION | colour | input_effects(&m->transmittance);
+    case PT_MATERIAL_COATED_DIFFUSE:
+        return fx | layer | surface | colour;
+    case PT_MATERIAL_COATED_CONDUCTOR:
+        return fx | layer | surface | metal | input_effects(&m->base_roughness_u) | input_effects(&m->base_roughness_v) |
+               roughness_effects(m, &m->base_roughness_u, &m->base_roughness_v);
+    case PT_MATERIAL_MIX: /* smaller ids: the recursion ends */
+        return PT_FX_MIX | input_effects(&m->mix_amount) | pt_material_effects(scene, m->mix_a) |
+               pt_material_effects(scene, m->mix_b);
+    default:
+        return PT_FX_INTERFACE;
+    }
+}
+
+struct coat_key {
+    float eta, thickness, alpha_min, alpha_max;
+    int rows;
+};
+
+static struct coat_key coat_key(const struct pt_scene *scene, const struct pt_material *m)
+{
+    struct pt_surface s = {0};
+    struct coat_key key = {.eta = m->eta, .thickness = fmaxf(0.0f, m->thickness.value.x), .rows = 1};
+    if (m->roughness_u.texture >= 0 || m->roughness_v.texture >= 0) {
+        key.rows = PT_COAT_TEXTURED_ROWS;
+        key.alpha_max = 1.0f;
+        return key;
+    }
+    float ax, ay;
+    pt_material_alpha(0, scene, m, &m->roughness_u, &m->roughness_v, &s, &ax, &ay);
+    key.alpha_min = key.alpha_max = pt_coat_alpha(ax, ay);
+    return key;
+}
+
+static int same_key(const struct coat_key *a, const struct coat_key *b)
+{
+    return a->eta == b->eta && a->thickness == b->thickness && a->alpha_min == b->alpha_min &&
+           a->alpha_max == b->alpha_max && a->rows == b->rows;
+}
+
+static const float *find_table(const struct pt_scene *scene, int32_t before, const struct coat_key *key)
+{
+    for (int32_t i = 0; i < before; i++) {
+        const struct pt_material *m = &scene->materials[i];
+        if (m->kind == PT_MATERIAL_COATED_DIFFUSE && m->coat_table) {
+            struct coat_key other = coat_key(scene, m);
+            if (same_key(key, &other))
+                return m->coat_table;
+        }
+    }
+    return NULL;
+}
+
+int pt_materials_build(struct pt_scene *scene, struct pt_err *err)
+{
+    for (int32_t i = 0; i < scene->material_count; i++) {
+        struct pt_material *m = &scene->materials[i];
+        m->reflectance.value = pt_clamp_unit(m->reflectance.value);
+        m->transmittance.value = pt_clamp_unit(m->transmittance.value);
+        m->albedo.value = pt_clamp_unit(m->albedo.value);
+        m->coat_table = NULL;
+        if (m->kind != PT_MATERIAL_COATED_DIFFUSE)
+            continue;
+        struct coat_key key = coat_key(scene, m);
+        m->coat_table = find_table(scene, i, &key);
+        if (m->coat_table)
+            continue;
+        float *table = pt_arena_alloc(&scene->arena, pt_coat_table_floats(key.rows), sizeof(float));
+        if (!table)
+            return pt_fail_nomem(err, "the table of a coating");
+        pt_coat_table_build(table, key.rows, key.eta, key.thickness, key.alpha_min, key.alpha_max);
+        m->coat_table = table;
+    }
+    return 0;
+}
