@@ -145,7 +145,8 @@ struct pt_mesh {
     uint32_t vertex_count, triangle_count;
     const float *positions;    /* [vertex_count][3] and one float of padding after the last (the ray kernel loads 16 bytes) */
     const uint32_t *indices;   /* [triangle_count][3], each < vertex_count */
-    const float *normals;      /* [vertex_count][3] shading normals, need not be unit; or NULL */
+    const float *normals;      /* [vertex_count][3] shading normals, need not be unit, already negated for a shape with
+                                  reverse orientation: where present they decide the side of the geometric normal; or NULL */
     const float *uvs;          /* [vertex_count][2]; or NULL: (0,0), (1,0), (1,1) at the three corners */
 };
 
@@ -221,14 +222,16 @@ struct pt_emitter {
     int32_t alias;       /* Walker/Vose alias table over the emitters … */
     float alias_q;       /* … keep this one when the fractional part is below q */
     float pmf;           /* > 0 for all that can emit */
+    float inv_area;      /* AREA on a mesh: of the triangle */
+    pt_vec3 p0, e1, e2;  /* AREA on a mesh: corner and edges to the other two */
+    pt_vec3 n;           /* AREA on a mesh: unit normal of the emitting side */
 };
 
-/* 2D piecewise-constant distribution over an environment image; derived. */
+/* 2D piecewise-constant distribution over an environment image as cumulative sums from 0 to 1; derived. */
 struct pt_env_distribution {
     int32_t width, height;
-    const float *alias_q;      /* [height · width] */
-    const int32_t *alias;      /* [height · width] */
-    const float *pdf;          /* [height · width] density over the unit square of the map */
+    const float *rows;         /* [height + 1] */
+    const float *columns;      /* [height][width + 1] */
 };
 
 /* --- media --------------------------------------------------------------------------------------------------------------- */

@@ -2,6 +2,8 @@
  * Lights: selection, sampling towards a point, emission met by chance, and the densities that multiple importance sampling
  * needs for both. All densities are per solid angle at the reference point and include the probability of the selection.
  * Pure, thread-safe, no allocation (but for pt_lights_build).
+ *
+ * A constant environment is never selected: sampling the BSDF or phase function is already the better strategy for it.
  */
 #ifndef PT_SHADE_LIGHT_H
 #define PT_SHADE_LIGHT_H
@@ -11,5 +13,14 @@
 
 /* Makes emitters, env_lights and env_distributions in the scene's arena, after pt_accel_build (it needs the bounds). */
 int pt_lights_build(struct pt_scene *scene, struct pt_err *err);
+
+struct pt_light_sample {
+    pt_vec3 wi;          /* unit, from the reference point to the light */
+    pt_vec3 radiance;    /* arriving along wi when nothing is in between; for a DELTA light: irradiance on a facing surface */
+    float pdf_solid;     /* delta: probability of the selection */
+    int delta;           /* no other strategy can find it */
+    int finite;          /* `target` counts; else the light is at infinity along wi */
+    pt_vec3 target;      /* point on the light, already moved off its surface towards the reference side */
+};
 
 #endif

@@ -1,0 +1,148 @@
+#include "shade/light_area.h"
+
+#include <math.h>
+
+#include "geom/quadric.h"
+
+/* A whole sphere under a similarity has its centre and radius in render space; else the radius is 0. */
+static float whole_sphere(const struct pt_quadric *q, pt_vec3 *centre)
+{
+    const float *m = q->to_render.m;
+    *centre = v3(m[3], m[7], m[11]);
+    if (q->kind != PT_QUADRIC_SPHERE || q->z_min > -q->radius || q->z_max < q->radius || q->phi_max < 2.0f * PT_PI - 1e-4f)
+        return 0.0f;
+    pt_vec3 x = v3(m[0], m[4], m[8]), y = v3(m[1], m[5], m[9]), z = v3(m[2], m[6], m[10]);
+    float xx = v3_dot(x, x), tolerance = 1e-4f * xx;
+    int similar = fabsf(v3_dot(y, y) - xx) < tolerance && fabsf(v3_dot(z, z) - xx) < tolerance &&
+                  fabsf(v3_dot(x, y)) < tolerance && fabsf(v3_dot(x, z)) < tolerance && fabsf(v3_dot(y, z)) < tolerance;
+    return similar ? q->radius * sqrtf(xx) : 0.0f;
+}
+
+/* 1 - cos of the half angle of the cone that the sphere fills, 0 when seen from inside. Without cancellation:
+ * 1 - cos θ = sin² θ / (1 + cos θ). */
+static float cone(pt_vec3 to_centre, float radius)
+{
+    float dist2 = v3_dot(to_centre, to_centre), sin2 = radius * radius / dist2;
+    return sin2 < 1.0f ? sin2 / (1.0f + sqrtf(1.0f - sin2)) : 0.0f;
+}
+
+/* Area in the quadric's own space. */
+static float area_of(const struct pt_quadric *q)
+{
+    if (q->kind == PT_QUADRIC_DISK)
+        return 0.5f * q->phi_max * (q->radius * q->radius - q->inner_radius * q->inner_radius);
+    /* Archimedes: the zone of a sphere has the area of the cylinder around it */
+    float z0 = q->kind == PT_QUADRIC_SPHERE ? fmaxf(q->z_min, -q->radius) : q->z_min;
+    float z1 = q->kind == PT_QUADRIC_SPHERE ? fminf(q->z_max, q->radius) : q->z_max;
+    return q->phi_max * q->radius * (z1 - z0);
+}
+
+/* dA in render space per dA in the quadric's space, where its unit normal there is n: |det M| |M⁻ᵀ n|. */
+static float area_scale(const struct pt_quadric *q, pt_vec3 n)
+{
+    const float *m = q->to_render.m;
+    float det = m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) + m[2] * (m[4] * m[9] - m[5] * m[8]);
+    return fabsf(det) * v3_len(pt_mat34_normal(&q->from_render, n));
+}
+
+static pt_vec3 point_on(const struct pt_quadric *q, float u0, float u1, pt_vec3 *n)
+{
+    float phi = u0 * q->phi_max, c = cosf(phi), s = sinf(phi);
+    if (q->kind == PT_QUADRIC_DISK) {
+        float r2 = q->inner_radius * q->inner_radius, r = sqrtf(r2 + u1 * (q->radius * q->radius - r2));
+        *n = v3(0.0f, 0.0f, 1.0f);
+        return v3(r * c, r * s, q->z_min);
+    }
+    if (q->kind == PT_QUADRIC_CYLINDER) {
+        *n = v3(c, s, 0.0f);
+        return v3(q->radius * c, q->radius * s, q->z_min + u1 * (q->z_max - q->z_min));
+    }
+    float z0 = fmaxf(q->z_min, -q->radius), z1 = fminf(q->z_max, q->radius), z = z0 + u1 * (z1 - z0);
+    float rho = sqrtf(fmaxf(0.0f, q->radius * q->radius - z * z));
+    *n = v3(rho * c / q->radius, rho * s / q->radius, z / q->radius);
+    return v3(rho * c, rho * s, z);
+}
+
+float pt_light_quadric_area(const struct pt_quadric *q)
+{
+    /* exact for similarities and disks; an estimate by six normals otherwise, used for selection only */
+    static const pt_vec3 axes[3] = {{1.0f, 0.0f, 0.0f}, {0.0f, 1.0f, 0.0f}, {0.0f, 0.0f, 1.0f}};
+    if (q->kind == PT_QUADRIC_DISK)
+        return area_of(q) * area_scale(q, axes[2]);
+    int n = q->kind == PT_QUADRIC_CYLINDER ? 2 : 3;
+    float scale = 0.0f;
+    for (int i = 0; i < n; i++)
+        scale += area_scale(q, axes[i]) / (float)n;
+    return area_of(q) * scale;
+}
+
+static int finish(const struct pt_light *light, const struct pt_shape *shape, pt_vec3 p_ref, pt_vec3 p, pt_vec3 n_out,
+                  pt_vec3 error, struct pt_light_sample *out)
+{
+    pt_vec3 d = v3_sub(p, p_ref), n = shape->flip_normal ? v3_neg(n_out) : n_out;
+    if (!(v3_dot(n, d) < 0.0f) && !light->two_sided)
+        return 0;
+    out->radiance = light->emission;
+    out->delta = 0;
+    out->finite = 1;
+    out->target = pt_offset_point(p, n, error, v3_neg(d));
+    return out->pdf_solid > 0.0f && out->pdf_solid < INFINITY;
+}
+
+static int sample_cone(const struct pt_light *light, const struct pt_shape *shape, pt_vec3 p_ref, pt_vec3 centre, float radius,
+                       float one_minus_cos, float u0, float u1, struct pt_light_sample *out)
+{
+    pt_vec3 to_centre = v3_sub(centre, p_ref);
+    float dist = v3_len(to_centre), h = u0 * one_minus_cos, cos_theta = 1.0f - h, sin2 = h * (2.0f - h), phi = 2.0f * PT_PI * u1;
+    float sin_theta = sqrtf(sin2);
+    struct pt_frame frame = pt_frame_from_normal(v3_scale(to_centre, 1.0f / dist));
+    out->wi = pt_frame_to_world(&frame, v3(sin_theta * cosf(phi), sin_theta * sinf(phi), cos_theta));
+    float t = dist * cos_theta - sqrtf(fmaxf(0.0f, radius * radius - dist * dist * sin2));
+    pt_vec3 n = v3_norm(v3_sub(v3_madd(p_ref, t, out->wi), centre)), p = v3_madd(centre, radius, n);
+    pt_vec3 error = v3(PT_OFFSET_ERROR * (fabsf(centre.x) + radius), PT_OFFSET_ERROR * (fabsf(centre.y) + radius),
+                       PT_OFFSET_ERROR * (fabsf(centre.z) + radius));
+    out->pdf_solid = 1.0f / (2.0f * PT_PI * one_minus_cos);
+    return finish(light, shape, p_ref, p, n, error, out);
+}
+
+int pt_light_quadric_sample(const struct pt_scene *scene, const struct pt_emitter *e, pt_vec3 p_ref, float u0, float u1,
+                            struct pt_light_sample *out)
+{
+    const struct pt_light *light = &scene->lights[e->light];
+    const struct pt_shape *shape = &scene->shapes[light->shape];
+    const struct pt_quadric *q = &scene->quadrics[shape->data];
+    pt_vec3 centre, n_quadric;
+    float radius = whole_sphere(q, &centre), one_minus_cos = radius > 0.0f ? cone(v3_sub(centre, p_ref), radius) : 0.0f;
+    if (one_minus_cos > 0.0f) {
+        int lit = sample_cone(light, shape, p_ref, centre, radius, one_minus_cos, u0, u1, out);
+        out->pdf_solid *= e->pmf;
+        return lit;
+    }
+    struct pt_quadric_point at;
+    pt_vec3 p_quadric = point_on(q, u0, u1, &n_quadric);
+    pt_quadric_at(q, p_quadric, &at);
+    pt_vec3 n = v3_norm(at.n), d = v3_sub(at.p, p_ref);
+    float dist2 = v3_dot(d, d), dist = sqrtf(dist2), cosine = fabsf(v3_dot(n, d)) / dist;
+    if (!(cosine > 0.0f))
+        return 0;
+    out->wi = v3_scale(d, 1.0f / dist);
+    out->pdf_solid = e->pmf * dist2 / (cosine * area_of(q) * area_scale(q, n_quadric));
+    return finish(light, shape, p_ref, at.p, n, at.error, out);
+}
+
+float pt_light_quadric_pdf(const struct pt_scene *scene, const struct pt_shape *shape, pt_vec3 p_ref, pt_vec3 p, pt_vec3 n,
+                           pt_vec3 wi)
+{
+    const struct pt_quadric *q = &scene->quadrics[shape->data];
+    pt_vec3 centre;
+    float radius = whole_sphere(q, &centre), one_minus_cos = radius > 0.0f ? cone(v3_sub(centre, p_ref), radius) : 0.0f;
+    if (one_minus_cos > 0.0f)
+        return 1.0f / (2.0f * PT_PI * one_minus_cos);
+    /* n_quadric ∝ Mᵀ n */
+    const float *m = q->to_render.m;
+    pt_vec3 n_quadric = v3_norm(v3(m[0] * n.x + m[4] * n.y + m[8] * n.z, m[1] * n.x + m[5] * n.y + m[9] * n.z,
+                                   m[2] * n.x + m[6] * n.y + m[10] * n.z));
+    pt_vec3 d = v3_sub(p, p_ref);
+    float cosine = fabsf(v3_dot(n, wi));
+    return cosine > 0.0f ? v3_dot(d, d) / (cosine * area_of(q) * area_scale(q, n_quadric)) : 0.0f;
+}

@@ -1,0 +1,65 @@
+/* Area lights: triangles of meshes, and quadrics. The density is uniform over the area, but for whole spheres seen from
+ * outside, where it is uniform over the cone they fill (Shirley, Wang & Zimmerman 1996). */
+#ifndef PT_SHADE_LIGHT_AREA_H
+#define PT_SHADE_LIGHT_AREA_H
+
+#include "geom/offset.h"
+#include "shade/light.h"
+
+/* Area in render space. */
+float pt_light_quadric_area(const struct pt_quadric *q);
+
+/* Out of line: quadrics are rare as lights. 0 when the point cannot be lit. */
+int pt_light_quadric_sample(const struct pt_scene *scene, const struct pt_emitter *e, pt_vec3 p_ref, float u0, float u1,
+                            struct pt_light_sample *out);
+float pt_light_quadric_pdf(const struct pt_scene *scene, const struct pt_shape *shape, pt_vec3 p_ref, pt_vec3 p, pt_vec3 n,
+                           pt_vec3 wi);
+
+static inline int pt_light_triangle_sample(const struct pt_scene *scene, const struct pt_emitter *e, pt_vec3 p_ref, float u0,
+                                           float u1, struct pt_light_sample *out)
+{
+    const struct pt_light *light = &scene->lights[e->light];
+    /* Uniform on the triangle: Heitz 2019, "A Low-Distortion Map Between Triangle and Square" */
+    float b1 = u0, b2 = u1;
+    if (b2 > b1) {
+        b1 *= 0.5f;
+        b2 -= b1;
+    } else {
+        b2 *= 0.5f;
+        b1 -= b2;
+    }
+    pt_vec3 p = v3_madd(v3_madd(e->p0, b1, e->e1), b2, e->e2), d = v3_sub(p, p_ref);
+    float dist2 = v3_dot(d, d), towards = -v3_dot(e->n, d);
+    if (!(towards > 0.0f)) {
+        if (!light->two_sided || !(towards < 0.0f))
+            return 0;
+        towards = -towards;
+    }
+    float inv_dist = 1.0f / sqrtf(dist2);
+    out->wi = v3_scale(d, inv_dist);
+    /* dω = cos dA / dist², cos = towards / dist */
+    out->pdf_solid = e->pmf * e->inv_area * dist2 / (towards * inv_dist);
+    out->radiance = light->emission;
+    out->delta = 0;
+    out->finite = 1;
+    pt_vec3 error = v3(PT_OFFSET_ERROR * (fabsf(e->p0.x) + fabsf(e->e1.x) + fabsf(e->e2.x)),
+                       PT_OFFSET_ERROR * (fabsf(e->p0.y) + fabsf(e->e1.y) + fabsf(e->e2.y)),
+                       PT_OFFSET_ERROR * (fabsf(e->p0.z) + fabsf(e->e1.z) + fabsf(e->e2.z)));
+    out->target = pt_offset_point(p, e->n, error, v3_neg(d));
+    return out->pdf_solid < INFINITY;
+}
+
+/* Density with which sampling from p_ref would have chosen the point p (unit geometric normal n) of a shape's primitive. */
+static inline float pt_light_area_pdf(pt_effects fx, const struct pt_scene *scene, const struct pt_shape *shape,
+                                      int32_t primitive, pt_vec3 p_ref, pt_vec3 p, pt_vec3 n, pt_vec3 wi)
+{
+    const struct pt_light *light = &scene->lights[shape->light];
+    if ((fx & PT_FX_QUADRIC) && shape->kind == PT_SHAPE_QUADRIC)
+        return scene->emitters[light->first_emitter].pmf * pt_light_quadric_pdf(scene, shape, p_ref, p, n, wi);
+    const struct pt_emitter *e = &scene->emitters[light->first_emitter + primitive];
+    pt_vec3 d = v3_sub(p, p_ref);
+    float cosine = fabsf(v3_dot(e->n, wi));
+    return cosine > 0.0f ? e->pmf * e->inv_area * v3_dot(d, d) / cosine : 0.0f;
+}
+
+#endif

@@ -1,0 +1,197 @@
+#include "shade/light_env.h"
+
+#include <math.h>
+
+/* The importance table has at most this many columns: it only steers sampling, and the cost of searching it grows with its
+ * size. */
+enum { TABLE_MAX = 1024 };
+
+/* Square → sphere, area preserving (Clarberg 2008, "Fast Equal-Area Mapping of the (Hemi)Sphere using SIMD"). */
+static pt_vec3 square_to_sphere(float s, float t)
+{
+    float u = 2.0f * s - 1.0f, v = 2.0f * t - 1.0f, up = fabsf(u), vp = fabsf(v);
+    float signed_distance = 1.0f - (up + vp), d = fabsf(signed_distance), r = 1.0f - d;
+    float phi = (r == 0.0f ? 1.0f : (vp - up) / r + 1.0f) * (PT_PI / 4.0f);
+    float z = copysignf(1.0f - r * r, signed_distance), scale = r * sqrtf(fmaxf(0.0f, 2.0f - r * r));
+    return v3(copysignf(cosf(phi), u) * scale, copysignf(sinf(phi), v) * scale, z);
+}
+
+static void sphere_to_square(pt_vec3 w, float *s, float *t)
+{
+    float x = fabsf(w.x), y = fabsf(w.y), z = fabsf(w.z), r = sqrtf(fmaxf(0.0f, 1.0f - z));
+    float a = fmaxf(x, y), b = fminf(x, y);
+    float phi = a == 0.0f ? 0.0f : atanf(b / a) * (2.0f / PT_PI);
+    if (x < y)
+        phi = 1.0f - phi;
+    float v = phi * r, u = r - v;
+    if (w.z < 0.0f) {
+        float swap = u;
+        u = 1.0f - v;
+        v = 1.0f - swap;
+    }
+    *s = 0.5f * (copysignf(u, w.x) + 1.0f);
+    *t = 0.5f * (copysignf(v, w.y) + 1.0f);
+}
+
+static void direction_to_map(const struct pt_light *light, pt_vec3 w, float *s, float *t, float *sin_theta)
+{
+    pt_vec3 l = v3_norm(pt_mat34_vector(&light->from_render, w));
+    if (light->mapping == PT_ENV_EQUAL_AREA) {
+        sphere_to_square(l, s, t);
+        *sin_theta = 1.0f;
+        return;
+    }
+    float phi = atan2f(l.y, l.x);
+    *s = (phi < 0.0f ? phi + 2.0f * PT_PI : phi) * (0.5f * PT_INV_PI);
+    *t = acosf(fminf(1.0f, fmaxf(-1.0f, l.z))) * PT_INV_PI;
+    *sin_theta = sqrtf(l.x * l.x + l.y * l.y);
+}
+
+static int32_t cell(float x, int32_t n)
+{
+    int32_t i = (int32_t)(x * (float)n);
+    return i < 0 ? 0 : i >= n ? n - 1 : i;
+}
+
+pt_vec3 pt_light_env_image_eval(const struct pt_scene *scene, const struct pt_light *light, pt_vec3 w)
+{
+    const struct pt_image_map *map = &scene->images[light->image];
+    float s, t, sin_theta;
+    direction_to_map(light, w, &s, &t, &sin_theta);
+    const float *px = (const float *)map->pixels + 3 * ((size_t)cell(t, map->height) * (size_t)map->width +
+                                                        (size_t)cell(s, map->width));
+    return v3_mul(light->emission, v3(px[0], px[1], px[2]));
+}
+
+/* Density over the square → density per solid angle. */
+static float to_solid(const struct pt_light *light, float pdf_square, float sin_theta)
+{
+    if (light->mapping == PT_ENV_EQUAL_AREA)
+        return pdf_square * (0.25f * PT_INV_PI);
+    return sin_theta > 0.0f ? pdf_square / (2.0f * PT_PI * PT_PI * sin_theta) : 0.0f;
+}
+
+float pt_light_env_image_pdf(const struct pt_scene *scene, const struct pt_light *light, pt_vec3 w)
+{
+    const struct pt_env_distribution *d = &scene->env_distributions[light - scene->lights];
+    float s, t, sin_theta;
+    direction_to_map(light, w, &s, &t, &sin_theta);
+    int32_t y = cell(t, d->height), x = cell(s, d->width);
+    const float *columns = d->columns + (size_t)y * (size_t)(d->width + 1);
+    float pdf = (columns[x + 1] - columns[x]) * (float)d->width * ((d->rows[y + 1] - d->rows[y]) * (float)d->height);
+    return to_solid(light, pdf, sin_theta);
+}
+
+/* Largest i < n with cdf[i] <= u; *inside: position between cdf[i] and cdf[i + 1]. */
+static int32_t invert_cdf(const float *cdf, int32_t n, float u, float *inside)
+{
+    int32_t lo = 0, hi = n;
+    while (hi - lo > 1) {
+        int32_t mid = (lo + hi) / 2;
+        if (cdf[mid] <= u)
+            lo = mid;
+        else
+            hi = mid;
+    }
+    float width = cdf[lo + 1] - cdf[lo];
+    *inside = width > 0.0f ? fminf((u - cdf[lo]) / width, 0x1.fffffep-1f) : 0.5f;
+    return lo;
+}
+
+int pt_light_env_image_sample(const struct pt_scene *scene, const struct pt_light *light, float u0, float u1,
+                              struct pt_light_sample *out)
+{
+    const struct pt_env_distribution *d = &scene->env_distributions[light - scene->lights];
+    float in_x, in_y, sin_theta = 1.0f;
+    int32_t y = invert_cdf(d->rows, d->height, u1, &in_y);
+    const float *columns = d->columns + (size_t)y * (size_t)(d->width + 1);
+    int32_t x = invert_cdf(columns, d->width, u0, &in_x);
+    float s = ((float)x + in_x) / (float)d->width, t = ((float)y + in_y) / (float)d->height;
+    pt_vec3 l;
+    if (light->mapping == PT_ENV_EQUAL_AREA) {
+        l = square_to_sphere(s, t);
+    } else {
+        float theta = t * PT_PI, phi = 2.0f * PT_PI * s;
+        sin_theta = sinf(theta);
+        l = v3(sin_theta * cosf(phi), sin_theta * sinf(phi), cosf(theta));
+    }
+    float pdf = (columns[x + 1] - columns[x]) * (float)d->width * ((d->rows[y + 1] - d->rows[y]) * (float)d->height);
+    /* from_render is a rotation (perhaps mirrored): its transpose is its inverse */
+    out->wi = v3_norm(pt_mat34_normal(&light->from_render, l));
+    out->pdf_solid = to_solid(light, pdf, sin_theta);
+    out->radiance = pt_light_env_image_eval(scene, light, out->wi);
+    out->delta = 0;
+    out->finite = 0;
+    return out->pdf_solid > 0.0f;
+}
+
+static double row_weight(const struct pt_light *light, int32_t y, int32_t height)
+{
+    return light->mapping == PT_ENV_EQUAL_AREA ? 1.0 : sin(((double)y + 0.5) / (double)height * 3.14159265358979323846);
+}
+
+static double luminance_of(const float *px)
+{
+    float l = v3_luminance(v3(px[0], px[1], px[2]));
+    return l > 0.0f && isfinite(l) ? (double)l : 0.0;
+}
+
+float pt_light_env_mean(const struct pt_scene *scene, const struct pt_light *light)
+{
+    float scale = v3_luminance(light->emission);
+    if (light->kind == PT_LIGHT_ENV_CONSTANT)
+        return scale;
+    const struct pt_image_map *map = &scene->images[light->image];
+    const float *px = map->pixels;
+    double sum = 0.0, weights = 0.0;
+    for (int32_t y = 0; y < map->height; y++) {
+        double weight = row_weight(light, y, map->height);
+        weights += weight * map->width;
+        for (int32_t x = 0; x < map->width; x++, px += 3)
+            sum += weight * luminance_of(px);
+    }
+    return scale * (float)(sum / weights);
+}
+
+/* weights[n] → cdf[n + 1]; returns the sum. All zero: uniform. */
+static double accumulate(const double *weights, int32_t n, float *cdf)
+{
+    double sum = 0.0, part = 0.0;
+    for (int32_t i = 0; i < n; i++)
+        sum += weights[i];
+    cdf[0] = 0.0f;
+    for (int32_t i = 0; i < n; i++) {
+        part += weights[i];
+        cdf[i + 1] = (float)(sum > 0.0 ? part / sum : (double)(i + 1) / n);
+    }
+    cdf[n] = 1.0f;
+    return sum;
+}
+
+int pt_light_env_build(struct pt_scene *scene, const struct pt_light *light, struct pt_env_distribution *out)
+{
+    const struct pt_image_map *map = &scene->images[light->image];
+    int32_t w = map->width < TABLE_MAX ? map->width : TABLE_MAX, h = map->height < TABLE_MAX ? map->height : TABLE_MAX;
+    size_t n = (size_t)w * (size_t)h;
+    struct pt_arena scratch = {0};
+    double *weights = pt_arena_alloc(&scratch, n, sizeof *weights), *sums = pt_arena_alloc(&scratch, (size_t)h, sizeof *sums);
+    float *rows = pt_arena_alloc(&scene->arena, (size_t)h + 1, sizeof *rows);
+    float *columns = pt_arena_alloc(&scene->arena, n + (size_t)h, sizeof *columns);
+    if (!weights || !sums || !rows || !columns) {
+        pt_arena_release(&scratch);
+        return 0;
+    }
+    const float *px = map->pixels;
+    for (int32_t y = 0; y < map->height; y++) {
+        double weight = row_weight(light, y, map->height);
+        size_t row = (size_t)((int64_t)y * h / map->height) * (size_t)w;
+        for (int32_t x = 0; x < map->width; x++, px += 3)
+            weights[row + (size_t)((int64_t)x * w / map->width)] += weight * luminance_of(px);
+    }
+    for (int32_t y = 0; y < h; y++)
+        sums[y] = accumulate(weights + (size_t)y * (size_t)w, w, columns + (size_t)y * (size_t)(w + 1));
+    accumulate(sums, h, rows);
+    pt_arena_release(&scratch);
+    *out = (struct pt_env_distribution){w, h, rows, columns};
+    return 1;
+}
