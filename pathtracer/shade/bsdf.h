@@ -26,7 +26,7 @@ enum pt_bsdf_kind {
     PT_BSDF_COATED_CONDUCTOR
 };
 
-/* Which fields count depends on kind; unused ones are 0. */
+/* Which fields count depends on kind; the others may hold anything. */
 struct pt_bsdf {
     int32_t kind;             /* enum pt_bsdf_kind */
     float alpha_x, alpha_y;   /* GGX roughness of the (outer) interface, after any remapping; 0 = smooth */
@@ -37,7 +37,8 @@ struct pt_bsdf {
     float base_alpha_x, base_alpha_y; /* coated conductor: roughness of the metal */
     float thickness, g;       /* coatings: thickness of the layer, Henyey–Greenstein asymmetry inside */
     pt_vec3 albedo;           /* coatings: single-scattering albedo of the layer; black = clear */
-    const float *coat_table;  /* borrows until scene release: table of the coating (coat_table.h), never NULL for coatings */
+    uint32_t walk_key;        /* coatings: any number, new for every path vertex (models that are evaluated stochastically) */
+    const float *coat_table;  /* borrows until scene release: table of the coating (coat_table.h), may be NULL but for coated diffuse */
 };
 
 enum {

@@ -11,6 +11,7 @@
 
 #include "shade/bsdf.h"
 #include "shade/bsdf_coated.h"
+#include "shade/bsdf_coated_walk.h"
 #include "shade/bsdf_conductor.h"
 #include "shade/bsdf_dielectric.h"
 #include "shade/bsdf_diffuse.h"
@@ -52,10 +53,16 @@ static inline int pt_bsdf_has_smooth(pt_effects fx, const struct pt_bsdf *b)
     case PT_BSDF_THIN_DIELECTRIC:
         return 0;
     case PT_BSDF_COATED_CONDUCTOR:
-        return b->alpha_x > 0.0f || b->base_alpha_x > 0.0f;
+        return !pt_coated_walk_is_delta(b);
     default:
         return 1;
     }
+}
+
+/* Coatings that only the walk can evaluate. */
+static inline int pt_bsdf_is_walked(const struct pt_bsdf *b)
+{
+    return b->kind == PT_BSDF_COATED_CONDUCTOR || (b->kind == PT_BSDF_COATED_DIFFUSE && !v3_is_black(b->albedo));
 }
 
 /* f(wo, wi) |cos θi|, without delta parts; *pdf_solid gets the density with which pt_bsdf_sample returns wi. */
@@ -65,6 +72,8 @@ static inline pt_vec3 pt_bsdf_eval(pt_effects fx, const struct pt_bsdf *b, pt_ve
         return pt_diffuse_eval(b, wo, wi, pdf_solid);
     if ((fx & PT_FX_GLOSSY) && b->kind == PT_BSDF_CONDUCTOR)
         return pt_conductor_eval(b, wo, wi, pdf_solid);
+    if ((fx & PT_FX_COATED) && pt_bsdf_is_walked(b))
+        return pt_coated_walk_eval(b, wo, wi, pdf_solid);
     if ((fx & PT_FX_COATED) && b->kind == PT_BSDF_COATED_DIFFUSE)
         return pt_coated_diffuse_eval(fx, b, wo, wi, pdf_solid);
     if ((fx & PT_FX_TRANSMISSION) && (fx & PT_FX_GLOSSY) && b->kind == PT_BSDF_DIELECTRIC)
@@ -86,6 +95,8 @@ static inline int pt_bsdf_sample(pt_effects fx, const struct pt_bsdf *b, pt_vec3
             return pt_conductor_sample_rough(b, wo, u0, u1, out);
         return pt_conductor_sample_smooth(b, wo, out);
     }
+    if ((fx & PT_FX_COATED) && pt_bsdf_is_walked(b))
+        return pt_coated_walk_sample(b, wo, u_lobe, u0, u1, out);
     if ((fx & PT_FX_COATED) && b->kind == PT_BSDF_COATED_DIFFUSE)
         return pt_coated_diffuse_sample(fx, b, wo, u_lobe, u0, u1, out);
     if ((fx & PT_FX_TRANSMISSION) && b->kind == PT_BSDF_DIELECTRIC) {

@@ -162,6 +162,7 @@ static inline void pt_material_bsdf(pt_effects fx, const struct pt_scene *scene,
         b->g = pt_input_float(fx, scene, &m->g, s->u, s->v);
         b->albedo = pt_material_colour(fx, scene, &m->albedo, s);
         b->coat_table = m->coat_table;
+        b->walk_key = 0; /* for the caller to set */
         if (m->kind == PT_MATERIAL_COATED_DIFFUSE) {
             b->reflectance = pt_material_colour(fx, scene, &m->reflectance, s);
         } else {

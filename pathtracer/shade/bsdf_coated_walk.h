@@ -1,0 +1,148 @@
+/*
+ * Coatings without a factored solution: over metal, or scattering light inside the layer. The value is one estimate by the
+ * walk of bsdf_layered.h from a stream keyed by (walk_key, wo, wi): a function of its arguments whose mean over walk_key is
+ * the layered BSDF. Directions are drawn from closed-form lobes, so that the pdf is exact: the interface's reflection, the
+ * metal seen through the interface, and a cosine lobe for what bounced in between.
+ *
+ * Mirror-like interface over mirror-like metal is a delta whose weight is summed in closed form.
+ */
+#ifndef PT_SHADE_BSDF_COATED_WALK_H
+#define PT_SHADE_BSDF_COATED_WALK_H
+
+#include <string.h>
+
+#include "shade/bsdf_layered.h"
+
+/* Probabilities and roughness of the three lobes. */
+struct pt_coat_lobes {
+    float interface, metal, cosine; /* sum to 1 */
+    float metal_x, metal_y;         /* GGX alpha of the metal as it looks from outside; 0 = none */
+};
+
+static inline struct pt_coat_lobes pt_coat_lobes(const struct pt_bsdf *b, float mu)
+{
+    float r = pt_fresnel_dielectric(mu, b->eta), t = (1.0f - r) * (1.0f - r);
+    struct pt_coat_lobes l = {0};
+    if (b->kind == PT_BSDF_COATED_CONDUCTOR) {
+        /* Small slopes: the metal's are magnified by refraction, those of the two crossings enter with (η - 1)/2 each. */
+        float bend = 0.5f * (b->eta - 1.0f) * (b->eta - 1.0f), eta2 = b->eta * b->eta;
+        l.metal_x = fminf(1.0f, sqrtf(eta2 * b->base_alpha_x * b->base_alpha_x + bend * b->alpha_x * b->alpha_x));
+        l.metal_y = fminf(1.0f, sqrtf(eta2 * b->base_alpha_y * b->base_alpha_y + bend * b->alpha_y * b->alpha_y));
+        l.metal = 0.85f * t * v3_max(pt_fresnel_conductor_rgb(mu, b->eta_rgb, b->k_rgb));
+        l.cosine = 0.15f * t;
+    } else {
+        l.cosine = t * fmaxf(v3_max(b->reflectance), v3_max(b->albedo));
+    }
+    l.interface = r;
+    float sum = l.interface + l.metal + l.cosine, scale = sum > 0.0f ? 1.0f / sum : 0.0f;
+    l.interface *= scale;
+    l.metal *= scale;
+    l.cosine = 1.0f - l.interface - l.metal;
+    return l;
+}
+
+static inline struct pt_rng pt_coat_stream(const struct pt_bsdf *b, pt_vec3 wo, pt_vec3 wi)
+{
+    float values[6] = {wo.x, wo.y, wo.z, wi.x, wi.y, wi.z};
+    uint64_t key = b->walk_key;
+    for (int i = 0; i < 6; i += 2) {
+        uint32_t bits[2];
+        memcpy(bits, values + i, sizeof bits);
+        key = pt_hash64(key ^ ((uint64_t)bits[0] << 32 | bits[1])) + 0x9e3779b97f4a7c15u;
+    }
+    return pt_rng_make(key);
+}
+
+static inline int pt_coated_walk_is_delta(const struct pt_bsdf *b)
+{
+    return b->kind == PT_BSDF_COATED_CONDUCTOR && pt_dielectric_is_smooth(b) && b->base_alpha_x == 0.0f &&
+           v3_is_black(b->albedo);
+}
+
+/* wo.z, wi.z > 0 */
+static inline float pt_coated_walk_pdf(const struct pt_bsdf *b, const struct pt_coat_lobes *l, pt_vec3 wo, pt_vec3 wi,
+                                       pt_vec3 m)
+{
+    float pdf = l->cosine * wi.z * PT_INV_PI;
+    if (!pt_dielectric_is_smooth(b))
+        pdf += l->interface * 0.5f * pt_ggx_d(m, b->alpha_x, b->alpha_y) /
+               (wo.z + pt_ggx_stretch(wo, b->alpha_x, b->alpha_y));
+    if (l->metal_x > 0.0f)
+        pdf += l->metal * 0.5f * pt_ggx_d(m, l->metal_x, l->metal_y) / (wo.z + pt_ggx_stretch(wo, l->metal_x, l->metal_y));
+    return pdf;
+}
+
+__attribute__((noinline, unused)) static pt_vec3 pt_coated_walk_eval(const struct pt_bsdf *b, pt_vec3 wo, pt_vec3 wi,
+                                                                      float *pdf_solid)
+{
+    *pdf_solid = 0.0f;
+    if (!(wo.z * wi.z > 0.0f) || pt_coated_walk_is_delta(b))
+        return v3_splat(0.0f);
+    struct pt_rng rng = pt_coat_stream(b, wo, wi);
+    if (wo.z < 0.0f) {
+        wo = v3_neg(wo);
+        wi = v3_neg(wi);
+    }
+    struct pt_coat_lobes l = pt_coat_lobes(b, wo.z);
+    pt_vec3 m = v3_norm(v3_add(wo, wi)), f = pt_layer_walk_eval(b, wo, wi, &rng);
+    *pdf_solid = pt_coated_walk_pdf(b, &l, wo, wi, m);
+    if (!pt_dielectric_is_smooth(b)) {
+        float d = pt_ggx_d(m, b->alpha_x, b->alpha_y), fresnel = pt_fresnel_dielectric(v3_dot(wo, m), b->eta);
+        f = v3_add(f, v3_splat(0.25f * d * fresnel * pt_ggx_g2_over_cos(wo, wi, b->alpha_x, b->alpha_y)));
+    }
+    return v3_scale(f, wi.z);
+}
+
+/* Reflectance of a smooth interface over smooth metal: F + T² Rc e² Σ_{n<5} (F Rc e²)^n with e the layer's transmittance. */
+static inline pt_vec3 pt_coated_mirror(const struct pt_bsdf *b, float mu)
+{
+    float cos_t, r = pt_fresnel_dielectric_t(mu, b->eta, &cos_t);
+    if (!(cos_t > 0.0f))
+        return v3_splat(r);
+    float e2 = expf(-2.0f * b->thickness / cos_t), t2 = (1.0f - r) * (1.0f - r);
+    pt_vec3 once = v3_scale(pt_fresnel_conductor_rgb(cos_t, b->eta_rgb, b->k_rgb), e2), sum = v3_splat(0.0f), term = once;
+    for (int n = 0; n < PT_LAYER_EVENTS / 2; n++) {
+        sum = v3_add(sum, term);
+        term = v3_scale(v3_mul(term, once), r);
+    }
+    return v3_madd(v3_splat(r), t2, sum);
+}
+
+__attribute__((noinline, unused)) static int pt_coated_walk_sample(const struct pt_bsdf *b, pt_vec3 wo, float u_lobe,
+                                                                    float u0, float u1, struct pt_bsdf_sample *out)
+{
+    if (wo.z == 0.0f)
+        return 0;
+    float side = wo.z < 0.0f ? -1.0f : 1.0f;
+    pt_vec3 w = v3_scale(wo, side), wi;
+    out->eta_scale = 1.0f;
+    out->flags = PT_SCATTER_DELTA;
+    out->wi = v3(-wo.x, -wo.y, wo.z);
+    if (pt_coated_walk_is_delta(b)) {
+        out->weight = pt_coated_mirror(b, w.z);
+        out->pdf_solid = 1.0f;
+        return 1;
+    }
+    struct pt_coat_lobes l = pt_coat_lobes(b, w.z);
+    if (u_lobe < l.interface && pt_dielectric_is_smooth(b)) {
+        out->weight = v3_splat(pt_fresnel_dielectric(w.z, b->eta) / l.interface);
+        out->pdf_solid = l.interface;
+        return 1;
+    }
+    if (u_lobe < l.interface + l.metal) {
+        int top = u_lobe < l.interface;
+        pt_vec3 m = pt_ggx_sample_visible(w, top ? b->alpha_x : l.metal_x, top ? b->alpha_y : l.metal_y, u0, u1);
+        wi = v3_norm(v3_sub(v3_scale(m, 2.0f * v3_dot(w, m)), w));
+        if (!(wi.z > 0.0f))
+            return 0;
+    } else {
+        wi = pt_sample_cosine(u0, u1);
+    }
+    out->flags = 0;
+    out->wi = v3_scale(wi, side);
+    pt_vec3 f = pt_coated_walk_eval(b, wo, out->wi, &out->pdf_solid);
+    out->weight = v3_scale(f, 1.0f / out->pdf_solid);
+    return out->pdf_solid > 0.0f;
+}
+
+#endif

@@ -1,0 +1,233 @@
+/*
+ * Random walk between the interface of a coating and its base: the reference solution of the layered model (Guo, Hašan and
+ * Zhao 2018, "Position-Free Monte Carlo Simulation for Arbitrary Layered BSDFs", in the form of pbrt-v4: unit extinction in a
+ * layer of `thickness` mean free paths, at most PT_LAYER_EVENTS interactions). One call is one unbiased estimate.
+ *
+ * The path tracer uses it where no factored solution exists (coated metals, coatings that scatter inside); tests use it as
+ * the oracle of the others.
+ */
+#ifndef PT_SHADE_BSDF_LAYERED_H
+#define PT_SHADE_BSDF_LAYERED_H
+
+#include "base/rng.h"
+#include "shade/bsdf.h"
+#include "shade/bsdf_conductor.h"
+#include "shade/bsdf_dielectric.h"
+#include "shade/bsdf_diffuse.h"
+#include "shade/phase.h"
+
+enum { PT_LAYER_EVENTS = 10, PT_LAYER_ROULETTE = 4 };
+
+struct pt_layer_ray {
+    pt_vec3 wi;
+    float weight;    /* f |cos| / pdf */
+    float pdf_solid; /* 0 for a delta */
+};
+
+/* Base of the layer as a closure of its own. */
+static inline struct pt_bsdf pt_layer_base(const struct pt_bsdf *b)
+{
+    struct pt_bsdf base = {.kind = b->kind == PT_BSDF_COATED_CONDUCTOR ? PT_BSDF_CONDUCTOR : PT_BSDF_DIFFUSE,
+                           .alpha_x = b->base_alpha_x, .alpha_y = b->base_alpha_y, .reflectance = b->reflectance,
+                           .eta_rgb = b->eta_rgb, .k_rgb = b->k_rgb};
+    return base;
+}
+
+static inline int pt_layer_base_is_delta(const struct pt_bsdf *base)
+{
+    return base->kind == PT_BSDF_CONDUCTOR && base->alpha_x == 0.0f;
+}
+
+/* Through the interface, given that it transmits; the 1/etap² of radiance is left to the caller. 0: nothing passes. */
+static inline int pt_layer_transmit(const struct pt_bsdf *b, pt_vec3 wo, float u0, float u1, struct pt_layer_ray *out)
+{
+    float cos_t, inv_etap = wo.z < 0.0f ? b->eta : 1.0f / b->eta;
+    int smooth = pt_dielectric_is_smooth(b);
+    pt_vec3 m = smooth ? v3(0.0f, 0.0f, 1.0f) : pt_ggx_sample_visible(wo, b->alpha_x, b->alpha_y, u0, u1);
+    float om = v3_dot(wo, m), r = pt_fresnel_dielectric_t(om, b->eta, &cos_t);
+    float im = copysignf(cos_t, -om);
+    if (r >= 1.0f)
+        return 0;
+    out->wi = v3_norm(v3_madd(v3_scale(wo, -inv_etap), om * inv_etap + im, m));
+    if (!(wo.z * out->wi.z < 0.0f))
+        return 0;
+    out->weight = 1.0f - r;
+    out->pdf_solid = 0.0f;
+    if (!smooth) {
+        float denom = im + om * inv_etap;
+        out->weight *= pt_ggx_g2_over_g1(wo, out->wi, b->alpha_x, b->alpha_y);
+        out->pdf_solid =
+            pt_ggx_visible_pdf(wo, m, b->alpha_x, b->alpha_y) * fabsf(im) / fmaxf(denom * denom, 1e-20f);
+    }
+    return 1;
+}
+
+/* Reflection off the interface, given that it reflects. */
+static inline int pt_layer_reflect(const struct pt_bsdf *b, pt_vec3 wo, float u0, float u1, struct pt_layer_ray *out)
+{
+    if (pt_dielectric_is_smooth(b)) {
+        out->wi = v3(-wo.x, -wo.y, wo.z);
+        out->weight = pt_fresnel_dielectric(wo.z, b->eta);
+        out->pdf_solid = 0.0f;
+        return 1;
+    }
+    pt_vec3 m = pt_ggx_sample_visible(wo, b->alpha_x, b->alpha_y, u0, u1);
+    float om = v3_dot(wo, m);
+    out->wi = v3_norm(v3_sub(v3_scale(m, 2.0f * om), wo));
+    if (!(wo.z * out->wi.z > 0.0f))
+        return 0;
+    out->weight = pt_fresnel_dielectric(om, b->eta) * pt_ggx_g2_over_g1(wo, out->wi, b->alpha_x, b->alpha_y);
+    out->pdf_solid = 0.25f * pt_ggx_visible_pdf(wo, m, b->alpha_x, b->alpha_y) / fabsf(om);
+    return 1;
+}
+
+/* Density with which pt_layer_transmit(b, outside) would find `inside`: what next-event estimation through the interface is
+ * weighed against. */
+static inline float pt_layer_transmit_pdf(const struct pt_bsdf *b, pt_vec3 outside, pt_vec3 inside)
+{
+    pt_vec3 m = v3_norm(v3_madd(outside, b->eta, inside));
+    if (m.z < 0.0f)
+        m = v3_neg(m);
+    float om = v3_dot(outside, m), im = v3_dot(inside, m);
+    if (om * outside.z <= 0.0f || im * inside.z <= 0.0f)
+        return 0.0f;
+    float denom = im + om / b->eta;
+    return pt_ggx_visible_pdf(outside, m, b->alpha_x, b->alpha_y) * fabsf(im) / fmaxf(denom * denom, 1e-20f);
+}
+
+static inline float pt_layer_extinction(float distance, float cosine)
+{
+    return distance > 0.0f ? expf(-distance / fmaxf(fabsf(cosine), 1e-6f)) : 1.0f;
+}
+
+/* Power heuristic with exponent 2; b = 0 gives 1. */
+static inline float pt_layer_mis(float a, float b)
+{
+    float a2 = a * a, b2 = b * b;
+    return a2 > 0.0f && isfinite(a2) ? a2 / (a2 + b2) : a > b ? 1.0f : 0.0f;
+}
+
+/* State of one walk; the interface lies at z = thickness, the base at 0. */
+struct pt_layer_walk {
+    const struct pt_bsdf *top;   /* eta and alpha of the interface */
+    struct pt_bsdf base;
+    struct pt_layer_ray exit;    /* from the far end: wi refracted into the layer */
+    pt_vec3 wi;                  /* outside */
+    pt_vec3 w, beta, f;          /* current direction (along the walk), throughput, result */
+    float z;
+    int top_delta, base_delta;
+};
+
+/* Light that leaves by `exit` after scattering at height z with f |cos| = `scattered` and sampling density pdf. */
+static inline void pt_layer_connect(struct pt_layer_walk *k, pt_vec3 scattered, float pdf)
+{
+    float weight = k->top_delta ? 1.0f : pt_layer_mis(k->exit.pdf_solid, pdf);
+    float through = weight * k->exit.weight / fabsf(k->exit.wi.z) *
+                    pt_layer_extinction(k->top->thickness - k->z, k->exit.wi.z);
+    k->f = v3_madd(k->f, through, v3_mul(k->beta, scattered));
+}
+
+/* The same when the sampled direction k->w happens to refract into wi; pdf is its density, 0 for a delta. */
+static inline void pt_layer_escape(struct pt_layer_walk *k, float pdf)
+{
+    float ignored;
+    pt_vec3 f = pt_dielectric_eval(k->top, v3_neg(k->w), k->wi, &ignored);
+    if (v3_is_black(f))
+        return;
+    float weight = pdf > 0.0f ? pt_layer_mis(pdf, pt_layer_transmit_pdf(k->top, k->wi, v3_neg(k->w))) : 1.0f;
+    float through = weight / fabsf(k->wi.z) * pt_layer_extinction(k->top->thickness - k->z, k->w.z);
+    k->f = v3_madd(k->f, through, v3_mul(k->beta, f));
+}
+
+/* Scattering inside the layer: 1 when it happened before the next boundary, else k->z is on that boundary. */
+static inline int pt_layer_medium(struct pt_layer_walk *k, struct pt_rng *rng)
+{
+    const struct pt_bsdf *b = k->top;
+    float dz = -log1pf(-pt_rng_float(rng)) * fabsf(k->w.z), z = k->w.z > 0.0f ? k->z + dz : k->z - dz;
+    if (!(z > 0.0f && z < b->thickness)) {
+        k->z = k->w.z > 0.0f ? b->thickness : 0.0f;
+        return 0;
+    }
+    k->z = z;
+    pt_vec3 wo = v3_neg(k->w);
+    k->beta = v3_mul(k->beta, b->albedo);
+    float p = pt_phase_eval(b->g, wo, v3_neg(k->exit.wi));
+    /* exit.wi points down into the layer from outside; the walk has to head the other way */
+    pt_layer_connect(k, v3_splat(p), p);
+    float u0 = pt_rng_float(rng), u1 = pt_rng_float(rng), pdf = pt_phase_sample(b->g, wo, u0, u1, &k->w);
+    if (k->w.z > 0.0f && !k->top_delta)
+        pt_layer_escape(k, pdf);
+    return 1;
+}
+
+static inline int pt_layer_at_interface(struct pt_layer_walk *k, struct pt_rng *rng)
+{
+    struct pt_layer_ray r;
+    float u0 = pt_rng_float(rng), u1 = pt_rng_float(rng);
+    if (!pt_layer_reflect(k->top, v3_neg(k->w), u0, u1, &r))
+        return 0;
+    k->beta = v3_scale(k->beta, r.weight);
+    k->w = r.wi;
+    return 1;
+}
+
+static inline int pt_layer_at_base(struct pt_layer_walk *k, struct pt_rng *rng)
+{
+    pt_vec3 wo = v3_neg(k->w);
+    struct pt_bsdf_sample s;
+    float u0 = pt_rng_float(rng), u1 = pt_rng_float(rng), pdf;
+    int metal = k->base.kind == PT_BSDF_CONDUCTOR, ok;
+    if (!k->base_delta) {
+        pt_vec3 to_exit = v3_neg(k->exit.wi);
+        pt_vec3 f = metal ? pt_conductor_eval(&k->base, wo, to_exit, &pdf) : pt_diffuse_eval(&k->base, wo, to_exit, &pdf);
+        pt_layer_connect(k, f, pdf);
+        ok = metal ? pt_conductor_sample_rough(&k->base, wo, u0, u1, &s) : pt_diffuse_sample(&k->base, wo, u0, u1, &s);
+    } else {
+        ok = pt_conductor_sample_smooth(&k->base, wo, &s);
+    }
+    if (!ok)
+        return 0;
+    k->beta = v3_mul(k->beta, s.weight);
+    k->w = s.wi;
+    if (!k->top_delta)
+        pt_layer_escape(k, k->base_delta ? 0.0f : s.pdf_solid);
+    return 1;
+}
+
+/* One estimate of f(wo, wi) of light that reached the base or scattered in the layer; wo.z, wi.z > 0. The interface's own
+ * reflection and all delta paths are left out. */
+static inline pt_vec3 pt_layer_walk_eval(const struct pt_bsdf *b, pt_vec3 wo, pt_vec3 wi, struct pt_rng *rng)
+{
+    struct pt_layer_walk k = {.top = b, .base = pt_layer_base(b), .wi = wi, .f = v3_splat(0.0f), .z = b->thickness};
+    struct pt_layer_ray enter;
+    k.base_delta = pt_layer_base_is_delta(&k.base);
+    k.top_delta = pt_dielectric_is_smooth(b);
+    float u0 = pt_rng_float(rng), u1 = pt_rng_float(rng), u2 = pt_rng_float(rng), u3 = pt_rng_float(rng);
+    if (!pt_layer_transmit(b, wo, u0, u1, &enter) || !pt_layer_transmit(b, wi, u2, u3, &k.exit))
+        return k.f;
+    int scatters = !v3_is_black(b->albedo);
+    k.w = enter.wi;
+    k.beta = v3_splat(enter.weight / (b->eta * b->eta));
+    for (int depth = 0; depth < PT_LAYER_EVENTS; depth++) {
+        float strength = v3_max(k.beta);
+        if (depth >= PT_LAYER_ROULETTE && strength < 0.25f) {
+            if (!(strength > 0.0f) || pt_rng_float(rng) >= strength)
+                break;
+            k.beta = v3_scale(k.beta, 1.0f / strength);
+        }
+        if (k.w.z == 0.0f)
+            break;
+        if (scatters) {
+            if (pt_layer_medium(&k, rng))
+                continue;
+        } else {
+            k.z = k.w.z > 0.0f ? b->thickness : 0.0f;
+            k.beta = v3_scale(k.beta, pt_layer_extinction(b->thickness, k.w.z));
+        }
+        if (!(k.w.z > 0.0f ? pt_layer_at_interface(&k, rng) : pt_layer_at_base(&k, rng)))
+            break;
+    }
+    return k.f;
+}
+
+#endif
