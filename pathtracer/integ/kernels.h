@@ -1,0 +1,20 @@
+/* The compiled kernels: each kernel_NAME.c is the path kernel for one effect set. */
+#ifndef PT_INTEG_KERNELS_H
+#define PT_INTEG_KERNELS_H
+
+#include "integ/integrator.h"
+
+/* Diffuse surfaces lit by area lights: the classic Cornell box. */
+#define PT_FX_SET_DIFFUSE (PT_FX_MANY_LIGHTS)
+/* Textured interiors: all surfaces, no media, nothing moves. */
+#define PT_FX_SET_SURFACES                                                                                                        \
+    (PT_FX_MANY_LIGHTS | PT_FX_TEXTURE | PT_FX_BUMP | PT_FX_SPECULAR | PT_FX_GLOSSY | PT_FX_TRANSMISSION | PT_FX_COATED |         \
+     PT_FX_ENVIRONMENT | PT_FX_DELTA_LIGHT | PT_FX_QUADRIC | PT_FX_DEFOCUS)
+/* Plain (untextured) mirrors and glass among diffuse surfaces. */
+#define PT_FX_SET_SPECULAR (PT_FX_MANY_LIGHTS | PT_FX_SPECULAR | PT_FX_GLOSSY | PT_FX_TRANSMISSION | PT_FX_QUADRIC)
+/* Everything but media. */
+#define PT_FX_SET_NO_MEDIA (PT_FX_ALL & ~(pt_effects)(PT_FX_MEDIA | PT_FX_INTERFACE))
+
+pt_kernel pt_kernel_diffuse, pt_kernel_specular, pt_kernel_surfaces, pt_kernel_no_media, pt_kernel_all;
+
+#endif

@@ -1,0 +1,365 @@
+/*
+ * The path kernel: one source, compiled once per effect set by the files kernel_*.c.
+ *
+ * Unidirectional path tracing with next-event estimation and multiple importance sampling (power heuristic; Veach 1997, §9.2),
+ * Russian roulette on the throughput without refraction's radiance scaling, participating media, interfaces and alpha.
+ * Every number drawn has its own dimension (sample/sampler.h), and code for an absent effect would only have tested data that
+ * is not there: so all kernels that cover a scene return the same bits.
+ *
+ * `fx` is a compile-time constant wherever it appears; `trace` is a constant NULL but in the tracing kernel.
+ */
+#ifndef PT_INTEG_PATH_H
+#define PT_INTEG_PATH_H
+
+#include "integ/surface.h"
+#include "integ/trace.h"
+#include "sample/sampler.h"
+#include "shade/bsdf_dispatch.h"
+#include "shade/camera.h"
+#include "shade/light_select.h"
+#include "shade/medium.h"
+#include "shade/phase.h"
+
+#define PT_KERNEL_INLINE static inline __attribute__((always_inline))
+
+/* Shadow rays end this share before their target, which is already off its surface. */
+#define PT_SHADOW_END 0.9999f
+
+struct pt_path {
+    const struct pt_scene *scene;
+    const struct pt_integrator *settings;
+    struct pt_trace *trace;
+    struct pt_sampler sampler;
+    struct pt_ray ray;
+    pt_vec3 throughput, radiance;
+    pt_vec3 p_prev;      /* last vertex, and … */
+    float pdf_prev;      /* … density of the direction taken there; 0: no other strategy could have found what comes next */
+    float eta_scale;
+    int32_t medium;      /* the ray is in it, -1 = vacuum */
+    int32_t depth;       /* bounces so far */
+    uint32_t rays;
+};
+
+PT_KERNEL_INLINE int32_t pt_medium_towards(const struct pt_place *at, pt_vec3 w, int32_t current)
+{
+    if (at->shape->medium_in == at->shape->medium_out)
+        return current;
+    return v3_dot(w, at->s.n_geometric) > 0.0f ? at->shape->medium_out : at->shape->medium_in;
+}
+
+/* Whether the ray passes through this hit by chance (alpha). */
+PT_KERNEL_INLINE int pt_passes_alpha(const struct pt_scene *scene, const struct pt_ray *ray, const struct pt_hit *hit,
+                                     struct pt_rng *rng)
+{
+    const struct pt_shape *shape = &scene->shapes[hit->shape];
+    if (!shape->has_alpha)
+        return 0;
+    struct pt_place at;
+    pt_place_at_hit(PT_FX_ALL, scene, ray, hit, &at);
+    float alpha = pt_shape_alpha(scene, shape, at.s.u, at.s.v);
+    return alpha < 1.0f && (alpha <= 0.0f || pt_rng_float(rng) >= alpha);
+}
+
+/* Nearest hit that counts. The same primitive cannot be met again: its distance is the same bits, and hits at t_min do not
+ * count. */
+PT_KERNEL_INLINE int pt_path_intersect(pt_effects fx, struct pt_path *path, int coherent, struct pt_hit *hit)
+{
+    struct pt_rng rng;
+    if (fx & PT_FX_ALPHA)
+        rng = pt_sampler_stream(&path->sampler, PT_DIM_ALPHA);
+    for (;;) {
+        path->rays++;
+        if (!pt_accel_intersect(path->scene, &path->ray, coherent, hit))
+            return 0;
+        if (!(fx & PT_FX_ALPHA) || !pt_passes_alpha(path->scene, &path->ray, hit, &rng))
+            return 1;
+        path->ray.t_min = hit->t;
+    }
+}
+
+/* What gets through a shadow ray that may cross alpha masks and interfaces; direction unnormalised, its length in `length`. */
+PT_KERNEL_INLINE pt_vec3 pt_path_transmittance(pt_effects fx, struct pt_path *path, struct pt_ray *ray, float length,
+                                               int32_t medium)
+{
+    const struct pt_scene *scene = path->scene;
+    struct pt_rng rng = pt_sampler_stream(&path->sampler, PT_DIM_SHADOW);
+    pt_vec3 through = v3_splat(1.0f), unit = v3_scale(ray->direction, 1.0f / length);
+    for (;;) {
+        struct pt_hit hit;
+        path->rays++;
+        int found = pt_accel_intersect(scene, ray, 0, &hit);
+        int alpha = found && (fx & PT_FX_ALPHA) && pt_passes_alpha(scene, ray, &hit, &rng);
+        int interface = found && (fx & PT_FX_INTERFACE) &&
+                        scene->materials[scene->shapes[hit.shape].material].kind == PT_MATERIAL_INTERFACE;
+        if (found && !alpha && !interface)
+            return v3_splat(0.0f);
+        float end = found ? hit.t : ray->t_max;
+        if ((fx & PT_FX_MEDIA) && medium >= 0)
+            through = v3_mul(through, pt_medium_transmittance(&scene->media[medium], v3_madd(ray->origin, ray->t_min, ray->direction),
+                                                              unit, (end - ray->t_min) * length, &rng));
+        if (!found || v3_is_black(through))
+            return through;
+        if ((fx & PT_FX_MEDIA) && interface && !alpha) {
+            struct pt_place at;
+            pt_place_at_hit(fx, scene, ray, &hit, &at);
+            medium = pt_medium_towards(&at, ray->direction, medium);
+        }
+        ray->t_min = hit.t;
+    }
+}
+
+/* Share of the light's contribution that arrives at `origin`. */
+PT_KERNEL_INLINE pt_vec3 pt_path_visibility(pt_effects fx, struct pt_path *path, const struct pt_light_sample *light,
+                                            pt_vec3 origin, int32_t medium)
+{
+    struct pt_ray ray = {origin, light->wi, 0.0f, INFINITY, path->ray.time};
+    if (light->finite) {
+        ray.direction = v3_sub(light->target, origin);
+        ray.t_max = PT_SHADOW_END;
+    }
+    if (!(fx & (PT_FX_ALPHA | PT_FX_INTERFACE | PT_FX_MEDIA))) {
+        path->rays++;
+        return v3_splat(pt_accel_occluded(path->scene, &ray) ? 0.0f : 1.0f);
+    }
+    return pt_path_transmittance(fx, path, &ray, v3_len(ray.direction), medium);
+}
+
+/* Power heuristic for the strategy of density p against q, without overflow of the squares. */
+PT_KERNEL_INLINE float pt_mis_weight(float p, float q)
+{
+    float r = q / p;
+    return 1.0f / (1.0f + r * r);
+}
+
+PT_KERNEL_INLINE int pt_path_sample_light(pt_effects fx, const struct pt_path *path, pt_vec3 p, struct pt_light_sample *light)
+{
+    if (path->scene->emitter_count == 0 || path->settings->strategy != PT_STRATEGY_MIS)
+        return 0;
+    struct pt_sample2 u = pt_sampler_2d(&path->sampler, PT_DIM_LIGHT);
+    return pt_light_sample(fx, path->scene, p, pt_sampler_1d(&path->sampler, PT_DIM_LIGHT_PICK), u.x, u.y, light);
+}
+
+/* Adds what light sampling found; `f` is BSDF · cos or the phase function, `pdf` its density for the same direction. */
+PT_KERNEL_INLINE void pt_path_add_light(pt_effects fx, struct pt_path *path, const struct pt_light_sample *light, pt_vec3 f,
+                                        float pdf, pt_vec3 origin, int32_t medium)
+{
+    if (v3_is_black(f))
+        return;
+    pt_vec3 visible = pt_path_visibility(fx, path, light, origin, medium);
+    if (v3_is_black(visible))
+        return;
+    float scale = 1.0f / light->pdf_solid;
+    if (!((fx & PT_FX_DELTA_LIGHT) && light->delta))
+        scale *= pt_mis_weight(light->pdf_solid, pdf);
+    pt_vec3 l = v3_scale(v3_mul(f, light->radiance), scale);
+    if (fx & (PT_FX_ALPHA | PT_FX_INTERFACE | PT_FX_MEDIA))
+        l = v3_mul(l, visible);
+    l = v3_mul(l, path->throughput);
+    path->radiance = v3_add(path->radiance, l);
+    if (path->trace)
+        pt_trace_light(path->trace, light->wi, l);
+}
+
+/* Emission of the surface that the path has met. */
+PT_KERNEL_INLINE void pt_path_add_emission(pt_effects fx, struct pt_path *path, const struct pt_place *at)
+{
+    const struct pt_light *light = &path->scene->lights[at->shape->light];
+    if (!light->two_sided && !(v3_dot(at->s.n_geometric, path->ray.direction) < 0.0f))
+        return;
+    float weight = 1.0f;
+    if (path->pdf_prev > 0.0f && path->settings->strategy == PT_STRATEGY_MIS)
+        weight = pt_mis_weight(path->pdf_prev, pt_light_area_pdf(fx, path->scene, at->shape, at->primitive, path->p_prev, at->p,
+                                                                 at->s.n_geometric, path->ray.direction));
+    pt_vec3 l = v3_scale(v3_mul(path->throughput, light->emission), weight);
+    path->radiance = v3_add(path->radiance, l);
+    if (path->trace)
+        pt_trace_emission(path->trace, weight, l);
+}
+
+PT_KERNEL_INLINE void pt_path_add_environment(struct pt_path *path)
+{
+    for (int32_t i = 0; i < path->scene->env_light_count; i++) {
+        const struct pt_light *light = &path->scene->lights[path->scene->env_lights[i]];
+        float weight = 1.0f;
+        if (path->pdf_prev > 0.0f && path->settings->strategy == PT_STRATEGY_MIS)
+            weight = pt_mis_weight(path->pdf_prev, pt_light_env_pdf(path->scene, light, path->ray.direction));
+        pt_vec3 l = v3_scale(v3_mul(path->throughput, pt_light_env_eval(path->scene, light, path->ray.direction)), weight);
+        path->radiance = v3_add(path->radiance, l);
+        if (path->trace)
+            pt_trace_emission(path->trace, weight, l);
+    }
+}
+
+/* Russian roulette; 0 when the path ends. */
+PT_KERNEL_INLINE int pt_path_survives(struct pt_path *path)
+{
+    if (path->depth < path->settings->rr_depth)
+        return 1;
+    float keep = v3_max(path->throughput) * path->eta_scale;
+    if (!(keep < 1.0f))
+        return 1;
+    if (!(pt_sampler_1d(&path->sampler, PT_DIM_ROULETTE) < keep))
+        return 0;
+    path->throughput = v3_scale(path->throughput, 1.0f / keep);
+    return 1;
+}
+
+PT_KERNEL_INLINE int pt_path_at_max_depth(const struct pt_path *path)
+{
+    return path->settings->max_depth >= 0 && path->depth >= path->settings->max_depth;
+}
+
+/* The way to the next surface through the current medium, from ray.t_min to t_end. 1: the path scattered on the way (its ray is
+ * the next one), 0: it reached t_end, -1: it is over. */
+PT_KERNEL_INLINE int pt_path_cross_medium(pt_effects fx, struct pt_path *path, float t_end)
+{
+    const struct pt_medium *medium = &path->scene->media[path->medium];
+    struct pt_rng rng = pt_sampler_stream(&path->sampler, PT_DIM_MEDIUM);
+    struct pt_medium_event event;
+    pt_vec3 start = v3_madd(path->ray.origin, path->ray.t_min, path->ray.direction);
+    pt_medium_sample_distance(medium, start, path->ray.direction, t_end - path->ray.t_min, &rng, &event);
+    path->radiance = v3_add(path->radiance, v3_mul(path->throughput, event.emitted));
+    path->throughput = v3_mul(path->throughput, event.weight);
+    if (v3_is_black(path->throughput))
+        return -1;
+    if (!event.scattered || !(fx & PT_FX_SCATTERING))
+        return 0;
+    if (pt_path_at_max_depth(path))
+        return -1;
+    pt_vec3 p = v3_madd(start, event.t, path->ray.direction), wo = v3_neg(path->ray.direction), wi;
+    if (path->trace)
+        pt_trace_scatter(path->trace, path->medium, p, path->throughput);
+    struct pt_light_sample light;
+    if (pt_path_sample_light(fx, path, p, &light)) {
+        float phase = pt_phase_eval(medium->g, wo, light.wi);
+        pt_path_add_light(fx, path, &light, v3_splat(phase), phase, p, path->medium);
+    }
+    struct pt_sample2 u = pt_sampler_2d(&path->sampler, PT_DIM_PHASE);
+    path->pdf_prev = pt_phase_sample(medium->g, wo, u.x, u.y, &wi);
+    path->p_prev = p;
+    path->ray = (struct pt_ray){p, wi, 0.0f, INFINITY, path->ray.time};
+    path->depth++;
+    return pt_path_survives(path) ? 1 : -1;
+}
+
+PT_KERNEL_INLINE void pt_path_aux(pt_effects fx, const struct pt_path *path, const struct pt_bsdf *bsdf, pt_vec3 wo,
+                                  const struct pt_frame *frame, float t, struct pt_path_result *out)
+{
+    if (out->depth == INFINITY) {
+        out->depth = t;
+        out->normal_world = v3_dot(frame->n, path->ray.direction) > 0.0f ? v3_neg(frame->n) : frame->n;
+    }
+    if (pt_bsdf_has_smooth(fx, bsdf) && v3_is_black(out->albedo))
+        out->albedo = pt_clamp_unit(pt_bsdf_albedo(fx, bsdf, wo));
+}
+
+/* Light and the next direction at a surface. 0: the path ends. */
+PT_KERNEL_INLINE int pt_path_bounce(pt_effects fx, struct pt_path *path, const struct pt_place *at, float t,
+                                    struct pt_path_result *out)
+{
+    float u_mix = fx & PT_FX_MIX ? pt_sampler_1d(&path->sampler, PT_DIM_MIX) : 0.0f;
+    const struct pt_material *material = pt_material_resolve(fx, path->scene, at->shape->material, &at->s, u_mix);
+    struct pt_frame frame = pt_material_frame(fx, path->scene, material, &at->s);
+    struct pt_bsdf bsdf;
+    pt_material_bsdf(fx, path->scene, material, &at->s, &bsdf);
+    pt_vec3 wo = pt_frame_to_local(&frame, v3_neg(path->ray.direction));
+    if (path->settings->want_aux)
+        pt_path_aux(fx, path, &bsdf, wo, &frame, t, out);
+    if (path->trace)
+        pt_trace_surface(path->trace, at, &bsdf, path->throughput);
+
+    struct pt_light_sample light;
+    if (pt_bsdf_has_smooth(fx, &bsdf) && pt_path_sample_light(fx, path, at->p, &light)) {
+        float pdf;
+        pt_vec3 f = pt_bsdf_eval(fx, &bsdf, wo, pt_frame_to_local(&frame, light.wi), &pdf);
+        pt_path_add_light(fx, path, &light, f, pdf, pt_offset_point(at->p, at->s.n_geometric, at->error, light.wi),
+                          fx & PT_FX_MEDIA ? pt_medium_towards(at, light.wi, path->medium) : -1);
+    }
+
+    struct pt_bsdf_sample next;
+    struct pt_sample2 u = pt_sampler_2d(&path->sampler, PT_DIM_BSDF);
+    float u_lobe = fx & PT_FX_BSDF ? pt_sampler_1d(&path->sampler, PT_DIM_BSDF_LOBE) : 0.0f;
+    if (!pt_bsdf_sample(fx, &bsdf, wo, u_lobe, u.x, u.y, &next))
+        return 0;
+    path->throughput = v3_mul(path->throughput, next.weight);
+    if (v3_is_black(path->throughput))
+        return 0;
+    int delta = (fx & PT_FX_BSDF) && (next.flags & PT_SCATTER_DELTA);
+    path->pdf_prev = delta ? 0.0f : next.pdf_solid;
+    if (fx & PT_FX_TRANSMISSION)
+        path->eta_scale *= next.eta_scale;
+    pt_vec3 wi = pt_frame_to_world(&frame, next.wi);
+    if (fx & PT_FX_MEDIA)
+        path->medium = pt_medium_towards(at, wi, path->medium);
+    path->p_prev = at->p;
+    path->ray = (struct pt_ray){pt_offset_point(at->p, at->s.n_geometric, at->error, wi), wi, 0.0f, INFINITY, path->ray.time};
+    path->depth++;
+    return pt_path_survives(path);
+}
+
+PT_KERNEL_INLINE void pt_path_start(pt_effects fx, struct pt_path *path, uint32_t x, uint32_t y)
+{
+    const struct pt_camera *camera = &path->scene->camera;
+    struct pt_sample2 pixel = pt_sampler_2d(&path->sampler, PT_DIM_PIXEL), lens = {0.5f, 0.5f};
+    float dx, dy, time = 0.0f;
+    pt_filter_sample(path->settings, pixel.x, pixel.y, &dx, &dy);
+    if (fx & PT_FX_DEFOCUS)
+        lens = pt_sampler_2d(&path->sampler, PT_DIM_LENS);
+    if (fx & PT_FX_MOTION)
+        time = pt_sampler_1d(&path->sampler, PT_DIM_TIME);
+    pt_camera_ray(fx, camera, (float)x + 0.5f + dx, (float)y + 0.5f + dy, lens.x, lens.y, time, &path->ray);
+    path->medium = fx & PT_FX_MEDIA ? camera->medium : -1;
+    path->p_prev = path->ray.origin;
+}
+
+PT_KERNEL_INLINE pt_vec3 pt_path_exposed(const struct pt_path *path)
+{
+    pt_vec3 c = v3_scale(path->radiance, path->scene->radiance_scale);
+    float peak = v3_max(c), limit = path->settings->max_component;
+    return peak > limit && isfinite(peak) ? v3_scale(c, limit / peak) : c;
+}
+
+PT_KERNEL_INLINE void pt_path_sample(pt_effects fx, const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x,
+                                     uint32_t y, uint32_t sample, struct pt_trace *trace, struct pt_path_result *out)
+{
+    struct pt_path path = {.scene = scene, .settings = settings, .trace = trace, .throughput = {1.0f, 1.0f, 1.0f}, .eta_scale = 1.0f};
+    path.sampler = pt_sampler_make(settings->sampler, settings->seed, x, y, sample);
+    *out = (struct pt_path_result){.depth = INFINITY};
+    pt_path_start(fx, &path, x, y);
+    if (trace)
+        pt_trace_camera(trace, &path.ray);
+    for (uint32_t vertex = 1;; vertex++) {
+        struct pt_hit hit;
+        struct pt_place at;
+        pt_sampler_block(&path.sampler, vertex);
+        int found = pt_path_intersect(fx, &path, vertex == 1, &hit);
+        if ((fx & PT_FX_MEDIA) && path.medium >= 0) {
+            int crossed = pt_path_cross_medium(fx, &path, found ? hit.t : INFINITY);
+            if (crossed > 0)
+                continue;
+            if (crossed < 0)
+                break;
+        }
+        if (!found) {
+            if (fx & PT_FX_ENVIRONMENT)
+                pt_path_add_environment(&path);
+            break;
+        }
+        pt_place_at_hit(fx, scene, &path.ray, &hit, &at);
+        if ((fx & PT_FX_INTERFACE) && scene->materials[at.shape->material].kind == PT_MATERIAL_INTERFACE) {
+            path.medium = pt_medium_towards(&at, path.ray.direction, path.medium);
+            path.ray.t_min = hit.t;
+            continue;
+        }
+        if (at.shape->light >= 0)
+            pt_path_add_emission(fx, &path, &at);
+        if (pt_path_at_max_depth(&path) || !pt_path_bounce(fx, &path, &at, hit.t, out))
+            break;
+    }
+    out->radiance = pt_path_exposed(&path);
+    out->rays = path.rays;
+    if (trace)
+        pt_trace_end(trace, out->radiance);
+}
+
+#endif

@@ -1,0 +1,133 @@
+/*
+ * From a hit to a place on a surface: position with its error bound, normals, texture coordinates, tangents.
+ * Inline, pure; `fx` is the kernel's compile-time effect set.
+ */
+#ifndef PT_INTEG_SURFACE_H
+#define PT_INTEG_SURFACE_H
+
+#include "geom/accel.h"
+#include "geom/offset.h"
+#include "geom/quadric.h"
+#include "shade/material.h"
+
+struct pt_place {
+    pt_vec3 p, error;        /* render space; bound on the rounding of p, per axis */
+    struct pt_surface s;
+    const struct pt_shape *shape;
+    int32_t primitive;
+};
+
+static inline pt_vec3 pt_vertex(const float *data, uint32_t i)
+{
+    data += 3 * (size_t)i;
+    return v3(data[0], data[1], data[2]);
+}
+
+static inline pt_vec3 pt_corners_mix(pt_vec3 a, pt_vec3 b, pt_vec3 c, float u, float v)
+{
+    return v3_madd(v3_madd(v3_scale(a, 1.0f - u - v), u, b), v, c);
+}
+
+/* Plain maximum: faster than fmaxf, and corners are never NaN. */
+static inline float pt_max3_abs(float a, float b, float c)
+{
+    a = fabsf(a);
+    b = fabsf(b);
+    c = fabsf(c);
+    a = a > b ? a : b;
+    return a > c ? a : c;
+}
+
+static inline void pt_place_uv(const struct pt_mesh *mesh, const uint32_t *index, float u, float v, struct pt_surface *s)
+{
+    if (!mesh->uvs) { /* (0,0), (1,0), (1,1) */
+        s->u = u + v;
+        s->v = v;
+        return;
+    }
+    const float *a = mesh->uvs + 2 * (size_t)index[0], *b = mesh->uvs + 2 * (size_t)index[1], *c = mesh->uvs + 2 * (size_t)index[2];
+    float w = 1.0f - u - v;
+    s->u = w * a[0] + u * b[0] + v * c[0];
+    s->v = w * a[1] + u * b[1] + v * c[1];
+}
+
+/* Tangents from positions and texture coordinates (Pharr, Jakob & Humphreys 2016, §3.6.2); zero when those are degenerate. */
+static inline void pt_place_tangents(const struct pt_mesh *mesh, const uint32_t *index, pt_vec3 e1, pt_vec3 e2,
+                                     struct pt_surface *s)
+{
+    float u1 = 1.0f, v1 = 0.0f, u2 = 1.0f, v2 = 1.0f;
+    if (mesh->uvs) {
+        const float *a = mesh->uvs + 2 * (size_t)index[0], *b = mesh->uvs + 2 * (size_t)index[1];
+        const float *c = mesh->uvs + 2 * (size_t)index[2];
+        u1 = b[0] - a[0];
+        v1 = b[1] - a[1];
+        u2 = c[0] - a[0];
+        v2 = c[1] - a[1];
+    }
+    float det = u1 * v2 - u2 * v1;
+    if (det == 0.0f) {
+        struct pt_frame frame = pt_frame_from_normal(s->n_geometric);
+        s->dpdu = frame.s;
+        s->dpdv = frame.t;
+        return;
+    }
+    s->dpdu = v3_scale(v3_sub(v3_scale(e1, v2), v3_scale(e2, v1)), 1.0f / det);
+    s->dpdv = v3_scale(v3_sub(v3_scale(e2, u1), v3_scale(e1, u2)), 1.0f / det);
+}
+
+static inline void pt_place_mesh(pt_effects fx, const struct pt_scene *scene, const struct pt_hit *hit, struct pt_place *at)
+{
+    const struct pt_shape *shape = at->shape;
+    const struct pt_mesh *mesh = &scene->meshes[shape->data];
+    const uint32_t *index = mesh->indices + 3 * (size_t)hit->primitive;
+    pt_vec3 a = pt_vertex(mesh->positions, index[0]), b = pt_vertex(mesh->positions, index[1]);
+    pt_vec3 c = pt_vertex(mesh->positions, index[2]);
+    struct pt_surface *s = &at->s;
+    at->p = pt_corners_mix(a, b, c, hit->u, hit->v);
+    at->error = v3_scale(v3(pt_max3_abs(a.x, b.x, c.x), pt_max3_abs(a.y, b.y, c.y), pt_max3_abs(a.z, b.z, c.z)), PT_OFFSET_ERROR);
+    pt_vec3 n = v3_norm(hit->geometric);
+    if (mesh->normals) {
+        pt_vec3 ns = v3_norm(pt_corners_mix(pt_vertex(mesh->normals, index[0]), pt_vertex(mesh->normals, index[1]),
+                                            pt_vertex(mesh->normals, index[2]), hit->u, hit->v));
+        s->n_shading = v3_is_black(ns) ? n : ns;
+        s->n_geometric = v3_dot(s->n_shading, n) < 0.0f ? v3_neg(n) : n;
+    } else {
+        s->n_geometric = s->n_shading = shape->flip_normal ? v3_neg(n) : n;
+    }
+    if (fx & (PT_FX_TEXTURE | PT_FX_ALPHA | PT_FX_BUMP))
+        pt_place_uv(mesh, index, hit->u, hit->v, s);
+    const struct pt_material *m = &scene->materials[shape->material];
+    if ((fx & (PT_FX_BUMP | PT_FX_GLOSSY | PT_FX_MIX)) && (m->kind == PT_MATERIAL_MIX || pt_material_needs_tangents(fx, m)))
+        pt_place_tangents(mesh, index, v3_sub(b, a), v3_sub(c, a), s);
+}
+
+static inline void pt_place_quadric(const struct pt_scene *scene, const struct pt_hit *hit, struct pt_place *at)
+{
+    const struct pt_quadric *q = &scene->quadrics[at->shape->data];
+    struct pt_quadric_point point;
+    pt_quadric_at(q, hit->geometric, &point);
+    at->p = point.p;
+    at->error = point.error;
+    pt_vec3 n = v3_norm(point.n);
+    at->s.n_geometric = at->s.n_shading = at->shape->flip_normal ? v3_neg(n) : n;
+    pt_quadric_uv(q, hit->geometric, &at->s.u, &at->s.v, &at->s.dpdu, &at->s.dpdv);
+}
+
+/* Object → render space. Out of line in surface.c: only instances need it. */
+void pt_place_instance(const struct pt_scene *scene, int32_t instance, float time, struct pt_place *at);
+
+/* All of *at but for what the effect set says nobody will read. */
+static inline void pt_place_at_hit(pt_effects fx, const struct pt_scene *scene, const struct pt_ray *ray, const struct pt_hit *hit,
+                                   struct pt_place *at)
+{
+    at->shape = &scene->shapes[hit->shape];
+    at->primitive = hit->primitive;
+    if ((fx & PT_FX_QUADRIC) && at->shape->kind == PT_SHAPE_QUADRIC)
+        pt_place_quadric(scene, hit, at);
+    else
+        pt_place_mesh(fx, scene, hit, at);
+    if ((fx & PT_FX_INSTANCES) && hit->instance >= 0)
+        pt_place_instance(scene, hit->instance, ray->time, at);
+}
+
+#endif
