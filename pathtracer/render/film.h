@@ -1,0 +1,138 @@
+/*
+ * What has been sampled so far, per pixel: sums in double, one array per plane, planes on demand only.
+ *
+ * A sample with a non-finite radiance is dropped: it enters no sum of radiance, and `dropped` counts it, so that the
+ * mean of a pixel is sum / (spp of its block - dropped). Half A is a fixed half of the sample indices (pt_film_in_half). Different threads may
+ * work on different pixels at the same time; the bytes depend on the order of samples within a pixel only.
+ */
+#ifndef PT_RENDER_FILM_H
+#define PT_RENDER_FILM_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "base/err.h"
+#include "base/vec.h"
+#include "integ/integrator.h"
+
+enum {
+    PT_FILM_COLOR = 1,    /* always there */
+    PT_FILM_HALF = 2,     /* radiance of half A */
+    PT_FILM_MOMENT2 = 4,  /* squared luminance */
+    PT_FILM_ALBEDO = 8,
+    PT_FILM_NORMAL = 16,
+    PT_FILM_DEPTH = 32,
+    PT_FILM_ALL = 63
+};
+#define PT_FILM_AUX (PT_FILM_ALBEDO | PT_FILM_NORMAL | PT_FILM_DEPTH)
+
+struct pt_film {
+    int x0, y0, x1, y1; /* the part of the image that is kept, end exclusive */
+    uint32_t planes;    /* PT_FILM_* */
+    size_t pixels;      /* (x1-x0)(y1-y0); the arrays below are in rows from the top, owned, NULL when not in planes */
+    double *color;      /* [pixels, 3] sums */
+    double *half;       /* [pixels, 3] sums over half A */
+    double *moment2;    /* [pixels] sums */
+    double *albedo;     /* [pixels, 3] sums */
+    double *normal;     /* [pixels, 3] sums */
+    double *depth;      /* [pixels] mean over the samples that hit something */
+    uint32_t *depth_hits;   /* [pixels] samples in depth */
+    uint32_t *dropped;      /* [pixels] */
+    uint32_t *dropped_half; /* [pixels] of half A; with PT_FILM_HALF */
+    size_t bytes;       /* of all arrays */
+};
+
+/* One pixel of the film while it is being sampled. */
+struct pt_film_pixel {
+    double color[3], half[3], moment2, albedo[3], normal[3], depth;
+    uint32_t depth_hits, dropped, dropped_half;
+};
+
+/* Zeroed planes for the pixels of [x0, x1) x [y0, y1), which must not be empty. On failure *film is untouched. */
+int pt_film_init(struct pt_film *film, int x0, int y0, int x1, int y1, uint32_t planes, struct pt_err *err);
+void pt_film_release(struct pt_film *film);
+/* Bytes per pixel that these planes cost. */
+size_t pt_film_pixel_bytes(uint32_t planes);
+
+/* Index of a pixel given in image coordinates. */
+static inline size_t pt_film_index(const struct pt_film *film, int x, int y)
+{
+    return (size_t)(y - film->y0) * (size_t)(film->x1 - film->x0) + (size_t)(x - film->x0);
+}
+
+/* Is this sample in half A? The parity of some bits of the index: a linear functional over GF(2) that is none of the first
+ * digits of a Sobol dimension (bit 0 alone is the first digit of dimension 0, all bits together that of dimension 1), so
+ * that either half is spread over the pixel as well as the whole. Bit 0 takes part: each pair (2k, 2k+1) is split. */
+static inline int pt_film_in_half(uint32_t sample)
+{
+    return !__builtin_parity(sample & UINT32_C(0x7F4A7C1B));
+}
+/* How many of the samples [0, spp) are in half A: within one of spp / 2. */
+static inline uint64_t pt_film_half_spp(uint64_t spp)
+{
+    return spp / 2 + (spp & 1 && pt_film_in_half((uint32_t)(spp - 1)));
+}
+
+void pt_film_load(const struct pt_film *film, size_t index, struct pt_film_pixel *pixel);
+void pt_film_store(struct pt_film *film, size_t index, const struct pt_film_pixel *pixel);
+
+/* Adds one sample. Returns 0 when it was dropped. */
+static inline int pt_film_add(struct pt_film_pixel *p, uint32_t planes, uint32_t sample, const struct pt_path_result *r)
+{
+    int in_half = (planes & PT_FILM_HALF) && pt_film_in_half(sample);
+    if (planes & PT_FILM_AUX) {
+        if (v3_is_finite(r->albedo)) {
+            p->albedo[0] += (double)r->albedo.x;
+            p->albedo[1] += (double)r->albedo.y;
+            p->albedo[2] += (double)r->albedo.z;
+        }
+        if (v3_is_finite(r->normal_world)) {
+            p->normal[0] += (double)r->normal_world.x;
+            p->normal[1] += (double)r->normal_world.y;
+            p->normal[2] += (double)r->normal_world.z;
+        }
+        if (isfinite(r->depth))
+            p->depth += ((double)r->depth - p->depth) / ++p->depth_hits;
+    }
+    if (!v3_is_finite(r->radiance)) {
+        p->dropped++;
+        p->dropped_half += (uint32_t)in_half;
+        return 0;
+    }
+    double rgb[3] = {(double)r->radiance.x, (double)r->radiance.y, (double)r->radiance.z};
+    for (int c = 0; c < 3; c++)
+        p->color[c] += rgb[c];
+    if (in_half)
+        for (int c = 0; c < 3; c++)
+            p->half[c] += rgb[c];
+    if (planes & PT_FILM_MOMENT2) {
+        double luminance = 0.2126729 * rgb[0] + 0.7151522 * rgb[1] + 0.0721750 * rgb[2];
+        p->moment2 += luminance * luminance;
+    }
+    return 1;
+}
+
+/* The arrays that are there, in a fixed order, for saving and loading. Returns how many of out[] were filled. */
+enum { PT_FILM_ARRAYS = 9 };
+struct pt_film_array {
+    void *data; /* borrows */
+    size_t bytes;
+};
+int pt_film_list_arrays(const struct pt_film *film, struct pt_film_array out[PT_FILM_ARRAYS]);
+
+/* Mean radiance of a pixel after spp samples; black when there is none. */
+void pt_film_mean(const struct pt_film *film, size_t index, uint64_t spp, double rgb[3]);
+/* Mean of half A, half_spp = pt_film_half_spp(spp). */
+void pt_film_half_mean(const struct pt_film *film, size_t index, uint64_t half_spp, double rgb[3]);
+
+/* Scales the sums of the pixels that dropped samples as if all samples had been kept, so that sum / spp is their mean, and
+ * keeps the true sums. pt_film_unpatch puts them back, byte for byte. Pixels outside [x0, x1) x [y0, y1) are left alone. */
+struct pt_film_patch {
+    struct pt_film_patch_pixel *pixels; /* owns */
+    size_t count, room;
+};
+int pt_film_patch(struct pt_film *film, int x0, int y0, int x1, int y1, uint64_t spp, struct pt_film_patch *patch,
+                  struct pt_err *err);
+void pt_film_unpatch(struct pt_film *film, struct pt_film_patch *patch);
+
+#endif

@@ -1,0 +1,143 @@
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "render/film.h"
+
+static struct pt_path_result sample_of(float r, float g, float b)
+{
+    return (struct pt_path_result){.radiance = v3(r, g, b), .albedo = v3_splat(0.5f), .normal_world = v3(0, 1, 0), .depth = 3.0f};
+}
+
+static void half_is_balanced(void **state)
+{
+    (void)state;
+    uint64_t in_half = 0;
+    for (uint32_t s = 0; s < 100000; s++) {
+        assert_int_equal(pt_film_half_spp(s), in_half);
+        in_half += (uint64_t)pt_film_in_half(s);
+    }
+}
+
+/* Points of the first two Sobol dimensions: in every box of 1/4 x 1/4 the two halves of 256 points must be of equal size, as
+ * they are neither for "even/odd" (left and right half) nor for the full parity (upper and lower half). */
+static void half_is_spread(void **state)
+{
+    (void)state;
+    int boxes[4][4] = {{0}};
+    for (uint32_t s = 0; s < 256; s++) {
+        uint32_t x = 0, y = 0, column = 1u << 31;
+        for (uint32_t bits = s, k = 0; bits != 0; bits >>= 1, k++) {
+            if (bits & 1) {
+                x ^= 1u << (31 - k);
+                y ^= column;
+            }
+            column ^= column >> 1;
+        }
+        boxes[x >> 30][y >> 30] += pt_film_in_half(s) ? 1 : -1;
+    }
+    for (int i = 0; i < 4; i++)
+        for (int k = 0; k < 4; k++)
+            assert_int_equal(boxes[i][k], 0);
+}
+
+static void planes_on_demand(void **state)
+{
+    (void)state;
+    struct pt_film film;
+    struct pt_err err = {0};
+    assert_int_equal(pt_film_init(&film, 0, 0, 10, 10, PT_FILM_COLOR, &err), PT_OK);
+    assert_null(film.half);
+    assert_null(film.moment2);
+    assert_null(film.albedo);
+    assert_int_equal(film.bytes, 100 * pt_film_pixel_bytes(PT_FILM_COLOR));
+    pt_film_release(&film);
+    assert_in_range(pt_film_pixel_bytes(PT_FILM_ALL), 1, 200);
+}
+
+static void sums_survive_load_and_store(void **state)
+{
+    (void)state;
+    struct pt_film film;
+    struct pt_film_pixel p;
+    struct pt_err err = {0};
+    double mean[3];
+    assert_int_equal(pt_film_init(&film, 5, 6, 9, 9, PT_FILM_ALL, &err), PT_OK);
+    size_t i = pt_film_index(&film, 7, 8);
+    for (uint32_t s = 0; s < 64; s++) {
+        struct pt_path_result r = sample_of((float)s, 1.0f, 2.0f);
+        pt_film_load(&film, i, &p);
+        assert_true(pt_film_add(&p, film.planes, s, &r));
+        pt_film_store(&film, i, &p);
+    }
+    pt_film_mean(&film, i, 64, mean);
+    assert_true(mean[0] == 31.5 && mean[1] == 1.0 && mean[2] == 2.0);
+    assert_true(film.half[3 * i + 1] == 32.0);
+    assert_true(film.albedo[3 * i] == 32.0 && film.normal[3 * i + 1] == 64.0 && film.depth[i] == 3.0);
+    assert_int_equal(film.depth_hits[i], 64);
+    double y = 0.2126729 * 0 + 0.7151522 + 0.0721750 * 2, all = 0.0;
+    for (int s = 0; s < 64; s++)
+        all += (y + 0.2126729 * s) * (y + 0.2126729 * s);
+    assert_true(fabs(film.moment2[i] - all) < 1e-9 * all);
+    pt_film_release(&film);
+}
+
+/* 10^6 samples of a value that is no dyadic fraction: the mean must not drift. */
+static void million_samples_of_a_constant(void **state)
+{
+    (void)state;
+    struct pt_film_pixel p = {0};
+    struct pt_path_result r = sample_of(0.1f, 1234.567f, 1e-5f);
+    for (uint32_t s = 0; s < 1000000; s++)
+        pt_film_add(&p, PT_FILM_ALL, s, &r);
+    const float *expected = &r.radiance.x;
+    for (int c = 0; c < 3; c++) {
+        assert_true(fabs(p.color[c] / 1e6 / (double)expected[c] - 1.0) < 1e-6);
+        assert_true(fabs(p.half[c] / 5e5 / (double)expected[c] - 1.0) < 1e-6);
+    }
+}
+
+static void non_finite_samples_are_dropped(void **state)
+{
+    (void)state;
+    struct pt_film film;
+    struct pt_film_pixel p;
+    struct pt_err err = {0};
+    double mean[3];
+    assert_int_equal(pt_film_init(&film, 0, 0, 2, 1, PT_FILM_ALL, &err), PT_OK);
+    pt_film_load(&film, 1, &p);
+    for (uint32_t s = 0; s < 32; s++) {
+        struct pt_path_result r = sample_of(s % 4 == 1 ? NAN : 2.0f, s % 8 == 3 ? -INFINITY : 2.0f, 2.0f);
+        assert_int_equal(pt_film_add(&p, film.planes, s, &r), s % 4 != 1 && s % 8 != 3);
+    }
+    pt_film_store(&film, 1, &p);
+    assert_int_equal(film.dropped[1], 12);
+    pt_film_mean(&film, 1, 32, mean);
+    assert_true(mean[0] == 2.0 && mean[1] == 2.0);
+
+    struct pt_film before = film;
+    double color[3];
+    memcpy(color, film.color + 3, sizeof color);
+    struct pt_film_patch patch = {0};
+    assert_int_equal(pt_film_patch(&film, 0, 0, 2, 1, 32, &patch, &err), PT_OK);
+    assert_int_equal(patch.count, 1);
+    assert_true(fabs(film.color[3] / 32.0 - 2.0) < 1e-12);
+    assert_true(fabs(film.half[3] / 16.0 - 2.0) < 1e-12);
+    pt_film_unpatch(&film, &patch);
+    assert_memory_equal(color, before.color + 3, sizeof color);
+    pt_film_release(&film);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(half_is_balanced),       cmocka_unit_test(half_is_spread),
+        cmocka_unit_test(planes_on_demand),       cmocka_unit_test(sums_survive_load_and_store),
+        cmocka_unit_test(million_samples_of_a_constant), cmocka_unit_test(non_finite_samples_are_dropped),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
