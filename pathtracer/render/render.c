@@ -1,0 +1,438 @@
+#include "render/render.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/clock.h"
+
+/* Length of a slice: short enough for a live line, an interrupt and a time budget, long enough that its barrier costs
+ * nothing. */
+static const double SLICE_S = 0.25;
+
+/* One row of one block from its spp to `to`: the unit of work. Results are summed by the main thread in a fixed order. */
+struct item {
+    uint32_t block;
+    int32_t y;
+    uint32_t from, to;
+    uint64_t rays;
+    double thread_s;
+    uint32_t dropped, first_x, first_sample; /* the first dropped sample of the row */
+};
+
+struct pt_render_work {
+    struct item *items;  /* [rows of all blocks] */
+    uint32_t *order;     /* [rows of all blocks] item to be done n-th */
+    size_t count;
+    uint32_t *due;       /* [blocks] */
+    uint8_t *final;      /* [blocks] */
+    struct lull_decision *decisions; /* [blocks] */
+};
+
+uint32_t pt_render_active(const struct pt_render *r)
+{
+    uint32_t n = 0;
+    for (uint32_t i = 0; i < r->blocks.count; i++)
+        n += r->blocks.list[i].reason == PT_REASON_NONE;
+    return n;
+}
+
+double pt_render_elapsed_s(const struct pt_render *r)
+{
+    return r->totals.render_s + r->totals.criterion_s;
+}
+
+static struct pt_render_work *work_create(const struct pt_blocks *blocks)
+{
+    size_t rows = 0, n = blocks->count;
+    for (uint32_t i = 0; i < n; i++)
+        rows += (size_t)(blocks->list[i].y1 - blocks->list[i].y0);
+    struct pt_render_work *w = calloc(1, sizeof *w);
+    if (w == NULL)
+        return NULL;
+    w->items = calloc(rows, sizeof *w->items);
+    w->order = calloc(rows, sizeof *w->order);
+    w->due = calloc(n, sizeof *w->due);
+    w->final = calloc(n, sizeof *w->final);
+    w->decisions = calloc(n, sizeof *w->decisions);
+    return w;
+}
+
+static void work_destroy(struct pt_render_work *w)
+{
+    if (w == NULL)
+        return;
+    free(w->items);
+    free(w->order);
+    free(w->due);
+    free(w->final);
+    free(w->decisions);
+    free(w);
+}
+
+static int open_frame(struct pt_render *r, struct pt_err *err)
+{
+    const struct pt_render_config *c = &r->config;
+    struct pt_criterion_frame frame = {
+        .width = c->width,
+        .height = c->height,
+        .spp_min = c->spp_min,
+        .spp_max = c->spp_max,
+        .seed = c->integrator.seed,
+        .time_budget_s = c->time_budget_s,
+        .sample_clamp = isfinite(c->integrator.max_component) ? (double)c->integrator.max_component : 0.0,
+        .deterministic = c->time_budget_s <= 0.0 && c->max_check_overhead <= 0.0,
+        .independent = c->integrator.sampler == PT_SAMPLER_INDEPENDENT,
+    };
+    return pt_criterion_begin(r->criterion, &frame, &r->blocks, &r->film, err);
+}
+
+/* Samples at the first check. */
+static uint64_t first_check(const struct pt_render *r)
+{
+    uint64_t spp = r->config.spp_min;
+    if (r->config.uniform)
+        return r->config.spp_max;
+    uint64_t useful = pt_criterion_requirements(r->criterion)->first_spp;
+    if (useful > spp)
+        spp = useful;
+    return spp < r->config.spp_max ? spp : r->config.spp_max;
+}
+
+int pt_render_create(const struct pt_render_config *config, const struct pt_scene *scene, pt_kernel *kernel,
+                     struct pt_threads *threads, struct pt_criterion *criterion, struct pt_render **out, struct pt_err *err)
+{
+    struct pt_render *r = calloc(1, sizeof *r);
+    if (r == NULL)
+        return pt_fail_nomem(err, "renderer");
+    r->config = *config;
+    r->scene = scene;
+    r->kernel = kernel;
+    r->threads = threads;
+    r->criterion = criterion;
+    uint32_t planes = config->planes | (criterion != NULL ? pt_criterion_film_planes(criterion) : 0);
+    r->config.integrator.want_aux = (planes & PT_FILM_AUX) != 0;
+    /* Without a judge nobody needs whole blocks. */
+    int clip = criterion == NULL;
+    int rc = pt_blocks_init(&r->blocks, config->width, config->height, config->block_width, config->block_height,
+                            config->crop, clip, err);
+    if (rc == PT_OK)
+        rc = pt_film_init(&r->film, r->blocks.x0, r->blocks.y0, r->blocks.x1, r->blocks.y1, planes, err);
+    if (rc == PT_OK) {
+        struct pt_render_work *w = r->work = work_create(&r->blocks);
+        if (w == NULL || !w->items || !w->order || !w->due || !w->final || !w->decisions)
+            rc = pt_fail_nomem(err, "work list");
+    }
+    if (rc == PT_OK && criterion != NULL)
+        rc = open_frame(r, err);
+    if (rc != PT_OK) {
+        pt_render_destroy(r);
+        return rc;
+    }
+    for (uint32_t i = 0; i < r->blocks.count; i++)
+        r->blocks.list[i].next_spp = first_check(r);
+    *out = r;
+    return PT_OK;
+}
+
+void pt_render_destroy(struct pt_render *r)
+{
+    if (r == NULL)
+        return;
+    work_destroy(r->work);
+    pt_blocks_release(&r->blocks);
+    pt_film_release(&r->film);
+    free(r);
+}
+
+/* --- one slice ------------------------------------------------------------------------------------------------------ */
+
+static void sample_row(void *data, long n, int worker)
+{
+    struct pt_render *r = data;
+    struct item *item = &r->work->items[r->work->order[n]];
+    const struct pt_block *block = &r->blocks.list[item->block];
+    uint32_t planes = r->film.planes;
+    double start_s = pt_clock_thread_s();
+    (void)worker;
+    for (int x = block->x0; x < block->x1; x++) {
+        size_t index = pt_film_index(&r->film, x, item->y);
+        struct pt_film_pixel pixel;
+        pt_film_load(&r->film, index, &pixel);
+        for (uint32_t s = item->from; s < item->to; s++) {
+            struct pt_path_result path;
+            r->kernel(r->scene, &r->config.integrator, (uint32_t)x, (uint32_t)item->y, s, &path);
+            item->rays += path.rays;
+            if (!pt_film_add(&pixel, planes, s, &path) && item->dropped++ == 0) {
+                item->first_x = (uint32_t)x;
+                item->first_sample = s;
+            }
+        }
+        pt_film_store(&r->film, index, &pixel);
+    }
+    item->thread_s = pt_clock_thread_s() - start_s;
+}
+
+/* Lists the rows of every active block that has not reached its next check, at most `step` samples further. */
+static size_t list_items(struct pt_render *r, uint64_t step)
+{
+    struct pt_render_work *w = r->work;
+    w->count = 0;
+    for (uint32_t i = 0; i < r->blocks.count; i++) {
+        const struct pt_block *b = &r->blocks.list[i];
+        if (b->reason != PT_REASON_NONE || b->spp >= b->next_spp)
+            continue;
+        uint64_t to = b->next_spp - b->spp > step ? b->spp + step : b->next_spp;
+        for (int y = b->y0; y < b->y1; y++) {
+            w->order[w->count] = (uint32_t)w->count;
+            w->items[w->count++] = (struct item){.block = i, .y = y, .from = (uint32_t)b->spp, .to = (uint32_t)to};
+        }
+    }
+    if (r->config.order_seed != 0) {
+        uint32_t state = r->config.order_seed;
+        for (size_t i = w->count; i > 1; i--) {
+            state = state * 1664525u + 1013904223u; /* Numerical Recipes' quick generator: any order will do */
+            size_t j = state % i;
+            uint32_t swap = w->order[i - 1];
+            w->order[i - 1] = w->order[j];
+            w->order[j] = swap;
+        }
+    }
+    return w->count;
+}
+
+static void gather(struct pt_render *r)
+{
+    const struct pt_render_work *w = r->work;
+    for (size_t k = 0; k < w->count; k++) {
+        const struct item *item = &w->items[k];
+        struct pt_block *b = &r->blocks.list[item->block];
+        uint64_t samples = (uint64_t)(b->x1 - b->x0) * (item->to - item->from);
+        b->rays += item->rays;
+        b->thread_s += item->thread_s;
+        b->dropped += item->dropped;
+        if (item->y == b->y1 - 1)
+            b->spp = item->to;
+        r->totals.samples += samples;
+        r->totals.paths += samples;
+        r->totals.rays += item->rays;
+        r->totals.dropped += item->dropped;
+        if (item->dropped > 0 && r->dropped_count < PT_DROPPED_KEPT)
+            r->dropped[r->dropped_count++] =
+                (struct pt_dropped_sample){item->first_x, (uint32_t)item->y, item->first_sample};
+    }
+}
+
+static uint64_t active_pixels(const struct pt_render *r)
+{
+    uint64_t pixels = 0;
+    for (uint32_t i = 0; i < r->blocks.count; i++) {
+        const struct pt_block *b = &r->blocks.list[i];
+        if (b->reason == PT_REASON_NONE && b->spp < b->next_spp)
+            pixels += (uint64_t)(b->x1 - b->x0) * (uint64_t)(b->y1 - b->y0);
+    }
+    return pixels;
+}
+
+/* Samples about SLICE_S worth, less when the time budget ends sooner. Returns 0 when every block is at its check. */
+static int slice(struct pt_render *r)
+{
+    double span_s = SLICE_S;
+    if (r->config.time_budget_s > 0.0)
+        span_s = fmax(0.01, fmin(span_s, r->config.time_budget_s - pt_render_elapsed_s(r)));
+    uint64_t pixels = active_pixels(r);
+    if (pixels == 0)
+        return 0;
+    double step = r->samples_per_s * span_s / (double)pixels;
+    list_items(r, step > 1.0 ? (uint64_t)fmin(step, 1e9) : 1);
+    uint64_t before = r->totals.samples;
+    double start_s = pt_clock_wall_s();
+    pt_threads_for(r->threads, (long)r->work->count, sample_row, r);
+    double wall_s = pt_clock_wall_s() - start_s;
+    gather(r);
+    r->totals.render_s += wall_s;
+    double rate = (double)(r->totals.samples - before) / fmax(wall_s, 1e-6);
+    r->samples_per_s = r->samples_per_s > 0.0 ? 0.7 * r->samples_per_s + 0.3 * rate : rate;
+    return 1;
+}
+
+/* --- checks --------------------------------------------------------------------------------------------------------- */
+
+static void note(struct pt_block *b, const struct lull_decision *d)
+{
+    b->checks++;
+    b->asked = 1;
+    b->asked_spp = b->spp;
+    b->p_noisy = d->p_noisy;
+    b->error = d->error;
+    b->predicted_spp = d->predicted_spp;
+}
+
+/* A block that dropped samples stops at the second STOP in a row, and never counts as converged. */
+static void settle(struct pt_render *r, struct pt_block *b, const struct lull_decision *d)
+{
+    int stop = d->action == LULL_STOP && b->spp >= r->config.spp_min;
+    b->stop_votes = stop ? b->stop_votes + 1 : 0;
+    if (r->config.uniform)
+        b->reason = PT_REASON_UNIFORM;
+    else if (stop && b->dropped == 0)
+        b->reason = PT_REASON_CRITERION;
+    else if (stop && b->stop_votes > 1)
+        b->reason = PT_REASON_DROPPED;
+    else if (b->spp >= r->config.spp_max)
+        b->reason = PT_REASON_SPP_MAX;
+    else {
+        b->reason = PT_REASON_NONE;
+        b->next_spp = pt_blocks_next_check(b->spp, d->next_spp, r->config.spp_max);
+    }
+}
+
+static void warn_once(struct pt_render *r, const struct pt_render_hooks *hooks, const char *line)
+{
+    if (r->totals.failed_checks++ == 0 && hooks->warn != NULL)
+        hooks->warn(hooks->data, line);
+}
+
+/* Asks about the `count` blocks of work->due and times it. Failure leaves every decision at CONTINUE. */
+static void ask(struct pt_render *r, uint32_t count, const struct pt_render_hooks *hooks)
+{
+    struct pt_render_work *w = r->work;
+    struct pt_err err = {0};
+    double start_s = pt_clock_wall_s();
+    if (pt_criterion_evaluate(r->criterion, &r->film, &r->blocks, w->due, count, w->final, w->decisions, &err) != PT_OK)
+        warn_once(r, hooks, err.text);
+    r->totals.criterion_s += pt_clock_wall_s() - start_s;
+    r->totals.checks += count;
+}
+
+/* Checks may take config.max_check_overhead of the elapsed time: beyond it they are left out until rendering caught up. */
+static int too_expensive(const struct pt_render *r)
+{
+    double share = r->config.max_check_overhead;
+    return share > 0.0 && r->totals.criterion_s > share * pt_render_elapsed_s(r);
+}
+
+/* All active blocks are at their next check. */
+static void check(struct pt_render *r, const struct pt_render_hooks *hooks)
+{
+    struct pt_render_work *w = r->work;
+    static const struct lull_decision keep_on = {.action = LULL_CONTINUE, .p_noisy = NAN, .predicted_spp = NAN, .error = NAN};
+    int reopens = r->criterion != NULL && !r->config.uniform &&
+                  (pt_criterion_table(r->criterion)->capabilities & LULL_CAP_REOPENS);
+    int skip = r->criterion == NULL || too_expensive(r);
+    uint32_t n = 0, active = 0;
+    for (uint32_t i = 0; i < r->blocks.count; i++) {
+        struct pt_block *b = &r->blocks.list[i];
+        int is_active = b->reason == PT_REASON_NONE;
+        int again = reopens && b->reason == PT_REASON_CRITERION && b->spp < r->config.spp_max;
+        if (!is_active && !again)
+            continue;
+        int final = is_active && b->spp >= r->config.spp_max;
+        if (skip && !(final && r->criterion != NULL)) {
+            if (is_active)
+                settle(r, b, &keep_on);
+            r->totals.skipped_checks += r->criterion != NULL;
+            continue;
+        }
+        w->due[n] = i;
+        w->final[n++] = (uint8_t)final;
+        active += (uint32_t)is_active;
+    }
+    if (active == 0)
+        return;
+    ask(r, n, hooks);
+    for (uint32_t k = 0; k < n; k++) {
+        struct pt_block *b = &r->blocks.list[w->due[k]];
+        note(b, &w->decisions[k]);
+        settle(r, b, &w->decisions[k]);
+    }
+}
+
+/* Blocks still active get no more samples: the criterion is asked once more, for the report only. */
+static void close_blocks(struct pt_render *r, int reason, const struct pt_render_hooks *hooks)
+{
+    struct pt_render_work *w = r->work;
+    uint32_t n = 0;
+    for (uint32_t i = 0; i < r->blocks.count; i++) {
+        struct pt_block *b = &r->blocks.list[i];
+        if (b->reason != PT_REASON_NONE)
+            continue;
+        b->reason = reason;
+        if (b->spp == 0 || (b->asked && b->asked_spp == b->spp))
+            continue;
+        w->due[n] = i;
+        w->final[n++] = 1;
+    }
+    if (r->criterion == NULL || n == 0)
+        return;
+    for (uint32_t k = 0; k < n; k++)
+        r->blocks.list[w->due[k]].reason = PT_REASON_NONE;
+    ask(r, n, hooks);
+    for (uint32_t k = 0; k < n; k++) {
+        note(&r->blocks.list[w->due[k]], &w->decisions[k]);
+        r->blocks.list[w->due[k]].reason = reason;
+    }
+}
+
+static int suspend(struct pt_render *r, const struct pt_render_hooks *hooks, int reason, struct pt_err *err)
+{
+    int rc = hooks->suspend != NULL ? hooks->suspend(hooks->data, r, err) : PT_OK;
+    close_blocks(r, reason, hooks);
+    return rc;
+}
+
+int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum pt_render_outcome *outcome, struct pt_err *err)
+{
+    int rc = PT_OK;
+    *outcome = PT_RENDER_DONE;
+    while (pt_render_active(r) > 0) {
+        if (!slice(r)) {
+            check(r, hooks);
+            if (r->config.max_seam >= 1.0)
+                pt_blocks_reopen(&r->blocks, r->config.max_seam);
+            continue;
+        }
+        if (hooks->slice != NULL && (rc = hooks->slice(hooks->data, r, err)) != PT_OK)
+            break;
+        if (hooks->interrupted != NULL && hooks->interrupted(hooks->data)) {
+            *outcome = PT_RENDER_INTERRUPTED;
+            rc = suspend(r, hooks, PT_REASON_INTERRUPT, err);
+            break;
+        }
+        if (r->config.time_budget_s > 0.0 && pt_render_elapsed_s(r) >= r->config.time_budget_s) {
+            *outcome = PT_RENDER_OUT_OF_TIME;
+            rc = suspend(r, hooks, PT_REASON_TIME, err);
+            break;
+        }
+    }
+    return rc;
+}
+
+int pt_render_advance(struct pt_render *r, uint64_t spp, const struct pt_render_hooks *hooks, int *stopped, struct pt_err *err)
+{
+    for (uint32_t i = 0; i < r->blocks.count; i++)
+        r->blocks.list[i].next_spp = spp;
+    while (slice(r)) {
+        int rc = hooks->slice != NULL ? hooks->slice(hooks->data, r, err) : PT_OK;
+        if (rc != PT_OK)
+            return rc;
+        if (hooks->interrupted != NULL && hooks->interrupted(hooks->data)) {
+            *stopped = 1;
+            break;
+        }
+    }
+    return PT_OK;
+}
+
+void pt_render_judge(struct pt_render *r, const struct pt_render_hooks *hooks)
+{
+    if (r->criterion == NULL)
+        return;
+    for (uint32_t i = 0; i < r->blocks.count; i++) {
+        r->work->due[i] = i;
+        r->work->final[i] = 0;
+    }
+    ask(r, r->blocks.count, hooks);
+    for (uint32_t i = 0; i < r->blocks.count; i++)
+        note(&r->blocks.list[i], &r->work->decisions[i]);
+}

@@ -1,0 +1,95 @@
+/*
+ * The wave loop: samples every active block up to its next check, asks the criterion about all of them at once, stops or
+ * schedules each, until none is active.
+ *
+ * Between two checks the work is cut into slices of a fraction of a second, after which the caller may show progress, write
+ * a checkpoint or ask for an end. Slices leave no trace in the image: samples of a pixel are summed in index order whatever
+ * the slices, threads and order of blocks. Not thread-safe; uses the pool that it is given.
+ */
+#ifndef PT_RENDER_RENDER_H
+#define PT_RENDER_RENDER_H
+
+#include <stdint.h>
+
+#include "base/err.h"
+#include "base/threads.h"
+#include "integ/integrator.h"
+#include "render/blocks.h"
+#include "render/criterion.h"
+#include "render/film.h"
+
+struct pt_render_config {
+    int width, height;       /* of the image, pixels */
+    int crop[4];             /* x0, y0, x1, y1, end exclusive, not empty, inside the image */
+    int block_width, block_height;
+    uint64_t spp_min, spp_max; /* 1 <= spp_min <= spp_max <= 2^31 - 1; equal: uniform */
+    int uniform;             /* every block gets spp_max samples; a criterion is asked once at the end */
+    double time_budget_s;    /* 0 = none */
+    double max_check_overhead; /* share of the elapsed time that checks may take; 0 = no bound */
+    double max_seam;         /* most ratio of samples of neighbouring blocks, 0 = any (pt_blocks_reopen) */
+    uint32_t planes;         /* PT_FILM_* wanted besides those of the criterion */
+    struct pt_integrator integrator; /* want_aux is set by the renderer */
+    uint32_t order_seed;     /* not 0: work is handed out in a shuffled order (tests) */
+};
+
+struct pt_render_totals {
+    uint64_t samples, paths, rays, dropped;
+    double render_s, criterion_s; /* wall seconds */
+    uint64_t checks, failed_checks, skipped_checks;
+};
+
+/* The first dropped samples, so that their paths can be replayed with --debug-path. */
+struct pt_dropped_sample {
+    uint32_t x, y, sample;
+};
+enum { PT_DROPPED_KEPT = 16 };
+
+struct pt_render {
+    struct pt_render_config config;
+    const struct pt_scene *scene;     /* borrows */
+    pt_kernel *kernel;
+    struct pt_threads *threads;       /* borrows */
+    struct pt_criterion *criterion;   /* borrows; NULL only with config.uniform */
+    struct pt_film film;
+    struct pt_blocks blocks;
+    struct pt_render_totals totals;
+    struct pt_dropped_sample dropped[PT_DROPPED_KEPT]; /* in no particular order */
+    uint32_t dropped_count;           /* entries used */
+    struct pt_render_work *work;      /* owns; scratch of the slices */
+    double samples_per_s;             /* recent, 0 = not known yet */
+};
+
+enum pt_render_outcome { PT_RENDER_DONE, PT_RENDER_OUT_OF_TIME, PT_RENDER_INTERRUPTED };
+
+struct pt_render_hooks {
+    /* After every slice; a negative code ends pt_render_run with it. May be NULL. */
+    int (*slice)(void *data, struct pt_render *render, struct pt_err *err);
+    /* Not 0: end after this slice. May be NULL. */
+    int (*interrupted)(void *data);
+    /* Called once before the blocks still active are closed for time or interrupt, while everything is as a later run needs
+     * it to go on. May be NULL. */
+    int (*suspend)(void *data, struct pt_render *render, struct pt_err *err);
+    void (*warn)(void *data, const char *line); /* may be NULL */
+    void *data;
+};
+
+/* Allocates film and blocks and opens the criterion's frame. The config is copied; scene, threads and criterion are borrowed
+ * until destroy. */
+int pt_render_create(const struct pt_render_config *config, const struct pt_scene *scene, pt_kernel *kernel,
+                     struct pt_threads *threads, struct pt_criterion *criterion, struct pt_render **out, struct pt_err *err);
+void pt_render_destroy(struct pt_render *render);
+
+/* Renders until all blocks are stopped, time is up, or interrupted() says so. */
+int pt_render_run(struct pt_render *render, const struct pt_render_hooks *hooks, enum pt_render_outcome *outcome,
+                  struct pt_err *err);
+
+/* For recording: samples every block up to spp, without checks; *stopped is set when interrupted() said so before. */
+int pt_render_advance(struct pt_render *render, uint64_t spp, const struct pt_render_hooks *hooks, int *stopped,
+                      struct pt_err *err);
+/* Asks the criterion, if there is one, about every block as it is and notes the answers; nothing is stopped. */
+void pt_render_judge(struct pt_render *render, const struct pt_render_hooks *hooks);
+
+uint32_t pt_render_active(const struct pt_render *render);
+double pt_render_elapsed_s(const struct pt_render *render); /* render_s + criterion_s */
+
+#endif

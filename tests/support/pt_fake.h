@@ -1,0 +1,28 @@
+/* Analytic kernels and a criterion in memory, so that film and wave loop are tested without scene or shading. */
+#ifndef TESTS_SUPPORT_PT_FAKE_H
+#define TESTS_SUPPORT_PT_FAKE_H
+
+#include <lull/criterion.h>
+
+#include "render/render.h"
+
+/* Radiance (0.5 + 0.5 u, 0.25, x / 1000) with u uniform in [0, 1) by a hash of (seed, x, y, sample). */
+pt_kernel pt_fake_noise;
+/* The same radiance always: (0.1, 0.2, 0.3); normal +z, depth 2, albedo 0.5. */
+pt_kernel pt_fake_constant;
+/* Like pt_fake_noise, but every 97th sample of pixels with x < 8 is NaN. */
+pt_kernel pt_fake_nan;
+/* Nothing but NaN for x < 8. */
+pt_kernel pt_fake_all_nan;
+
+/* Stops a block when its spp reach the value of parameter "at" times (1 + x0 / 16 % 4); keeps a count per block as state. */
+const struct lull_criterion *pt_fake_criterion(void);
+
+/* 4x3 blocks of 16x16 pixels, the last column and row narrower (60x44 pixels), spp 8 to 256. */
+struct pt_render_config pt_fake_config(void);
+
+/* Renders to the end. The caller destroys *render. at: as above, NULL for a uniform render. */
+int pt_fake_render(const struct pt_render_config *config, pt_kernel *kernel, int threads, const char *at,
+                   struct pt_render **render, struct pt_criterion **criterion, struct pt_threads **pool);
+
+#endif
