@@ -1,0 +1,133 @@
+#include "image/exr.h"
+
+#include <openexr.h>
+
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "base/fio.h"
+
+enum { MAX_CHANNELS = 64 };
+
+static void ignore_message(exr_const_context_t file, exr_result_t code, const char *text)
+{
+    (void)file;
+    (void)code;
+    (void)text;
+}
+
+/* EXR's windows include their last pixel. */
+static exr_attr_box2i_t box(int x0, int y0, int x1, int y1)
+{
+    exr_attr_box2i_t b;
+    b.min.x = x0;
+    b.min.y = y0;
+    b.max.x = x1 - 1;
+    b.max.y = y1 - 1;
+    return b;
+}
+
+static exr_result_t write_header(exr_context_t file, const struct pt_exr_image *image)
+{
+    int part = 0;
+    exr_result_t rc = exr_add_part(file, "lull", EXR_STORAGE_SCANLINE, &part);
+    exr_attr_box2i_t display = box(0, 0, image->width, image->height), stored = box(image->x0, image->y0, image->x1, image->y1);
+    exr_attr_v2f_t centre;
+    centre.x = centre.y = 0.0f;
+    if (rc == EXR_ERR_SUCCESS)
+        rc = exr_initialize_required_attr(file, part, &display, &stored, 1.0f, &centre, 1.0f, EXR_LINEORDER_INCREASING_Y,
+                                          EXR_COMPRESSION_ZIP);
+    for (int c = 0; c < image->channel_count && rc == EXR_ERR_SUCCESS; c++)
+        rc = exr_add_channel(file, part, image->channels[c], EXR_PIXEL_FLOAT, EXR_PERCEPTUALLY_LINEAR, 1, 1);
+    for (int i = 0; i < image->attribute_count && rc == EXR_ERR_SUCCESS; i++) {
+        const struct pt_exr_attribute *a = &image->attributes[i];
+        rc = a->text != NULL ? exr_attr_set_string(file, part, a->name, a->text)
+                             : exr_attr_set_double(file, part, a->name, a->number);
+    }
+    return rc == EXR_ERR_SUCCESS ? exr_write_header(file) : rc;
+}
+
+/* Which of our channels the library calls `name` (it sorts them). */
+static int channel_index(const struct pt_exr_image *image, const char *name)
+{
+    for (int c = 0; c < image->channel_count; c++)
+        if (strcmp(image->channels[c], name) == 0)
+            return c;
+    return 0;
+}
+
+static exr_result_t write_chunk(exr_context_t file, const struct pt_exr_image *image, exr_encode_pipeline_t *pipe, int y,
+                                int lines, float *pixels)
+{
+    size_t width = (size_t)(image->x1 - image->x0), plane = width * (size_t)lines;
+    exr_chunk_info_t chunk;
+    exr_result_t rc = exr_write_scanline_chunk_info(file, 0, y, &chunk);
+    if (rc != EXR_ERR_SUCCESS)
+        return rc;
+    int first = y == image->y0;
+    rc = first ? exr_encoding_initialize(file, 0, &chunk, pipe) : exr_encoding_update(file, 0, &chunk, pipe);
+    if (rc != EXR_ERR_SUCCESS)
+        return rc;
+    for (int line = 0; line < chunk.height; line++) {
+        float *rows[MAX_CHANNELS];
+        for (int c = 0; c < image->channel_count; c++)
+            rows[c] = pixels + (size_t)c * plane + (size_t)line * width;
+        image->row(image->data, y + line, rows);
+    }
+    for (int i = 0; i < pipe->channel_count; i++) {
+        exr_coding_channel_info_t *ch = &pipe->channels[i];
+        ch->encode_from_ptr = (const uint8_t *)(pixels + (size_t)channel_index(image, ch->channel_name) * plane);
+        ch->user_pixel_stride = (int32_t)sizeof(float);
+        ch->user_line_stride = (int32_t)(width * sizeof(float));
+        ch->user_bytes_per_element = sizeof(float);
+        ch->user_data_type = EXR_PIXEL_FLOAT;
+    }
+    if (first)
+        rc = exr_encoding_choose_default_routines(file, 0, pipe);
+    return rc == EXR_ERR_SUCCESS ? exr_encoding_run(file, 0, pipe) : rc;
+}
+
+static exr_result_t write_pixels(exr_context_t file, const struct pt_exr_image *image)
+{
+    int32_t lines = 1;
+    exr_encode_pipeline_t pipe = EXR_ENCODE_PIPELINE_INITIALIZER;
+    exr_result_t rc = exr_get_scanlines_per_chunk(file, 0, &lines);
+    if (rc != EXR_ERR_SUCCESS)
+        return rc;
+    float *pixels = calloc((size_t)image->channel_count * (size_t)(image->x1 - image->x0) * (size_t)lines, sizeof *pixels);
+    if (pixels == NULL)
+        return EXR_ERR_OUT_OF_MEMORY;
+    for (int y = image->y0; y < image->y1 && rc == EXR_ERR_SUCCESS; y += lines)
+        rc = write_chunk(file, image, &pipe, y, lines, pixels);
+    exr_encoding_destroy(file, &pipe);
+    free(pixels);
+    return rc;
+}
+
+int pt_exr_write(const char *path, const struct pt_exr_image *image, struct pt_err *err)
+{
+    char tmp_path[4200];
+    int rc = pt_fio_tmp_name(path, tmp_path, sizeof tmp_path, err);
+    if (rc != PT_OK)
+        return rc;
+    if (image->channel_count < 1 || image->channel_count > MAX_CHANNELS)
+        return pt_fail(err, PT_EINVAL, "%s: %d channels, at most %d can be written", path, image->channel_count, MAX_CHANNELS);
+    exr_context_t file = NULL;
+    exr_context_initializer_t init = EXR_DEFAULT_CONTEXT_INITIALIZER;
+    init.error_handler_fn = ignore_message;
+    exr_result_t code = exr_start_write(&file, tmp_path, EXR_WRITE_FILE_DIRECTLY, &init);
+    if (code == EXR_ERR_SUCCESS)
+        code = write_header(file, image);
+    if (code == EXR_ERR_SUCCESS)
+        code = write_pixels(file, image);
+    exr_result_t finish = file != NULL ? exr_finish(&file) : EXR_ERR_SUCCESS;
+    if (code == EXR_ERR_SUCCESS)
+        code = finish;
+    if (code == EXR_ERR_SUCCESS)
+        return pt_fio_rename(tmp_path, path, err);
+    unlink(tmp_path);
+    if (code == EXR_ERR_OUT_OF_MEMORY)
+        return pt_fail_nomem(err, path);
+    return pt_fail(err, PT_EIO, "%s: cannot write EXR: %s", path, exr_get_default_error_message(code));
+}
