@@ -1,0 +1,205 @@
+#include "render/output.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+#include "base/fio.h"
+#include "image/exr.h"
+#include "image/oiio.h"
+#include "image/stopmap.h"
+#include "image/tonemap.h"
+
+int pt_output_has_ending(const char *path, const char *ending)
+{
+    const char *dot = strrchr(path, '.');
+    return dot != NULL && strcasecmp(dot + 1, ending) == 0;
+}
+
+/* The block that a pixel is in. Blocks of the list form a full rectangle of grid cells. */
+static const struct pt_block *block_at(const struct pt_blocks *b, int x, int y)
+{
+    int column = x / b->block_width - b->list[0].x0 / b->block_width;
+    int row = y / b->block_height - b->list[0].y0 / b->block_height;
+    return &b->list[(uint32_t)row * b->list_columns + (uint32_t)column];
+}
+
+/* --- EXR ------------------------------------------------------------------------------------------------------------ */
+
+enum { R, G, B, SPP, P_NOISY, ERROR, REASON, FIRST_AOV, CHANNELS_MAX = FIRST_AOV + 7 };
+
+struct exr_source {
+    const struct pt_render *render;
+    uint32_t aov;
+};
+
+static void aov_pixel(const struct pt_film *f, uint32_t aov, size_t i, uint64_t spp, size_t x, float *const *rows)
+{
+    int c = FIRST_AOV;
+    double n = spp > 0 ? (double)spp : 1.0;
+    for (int k = 0; k < 3 && (aov & PT_FILM_ALBEDO); k++)
+        rows[c++][x] = (float)(f->albedo[3 * i + (size_t)k] / n);
+    for (int k = 0; k < 3 && (aov & PT_FILM_NORMAL); k++)
+        rows[c++][x] = (float)(f->normal[3 * i + (size_t)k] / n);
+    if (aov & PT_FILM_DEPTH)
+        rows[c][x] = (float)f->depth[i];
+}
+
+static void exr_row(void *data, int y, float *const *rows)
+{
+    const struct exr_source *source = data;
+    const struct pt_render *r = source->render;
+    int x0 = r->config.crop[0];
+    for (int x = x0; x < r->config.crop[2]; x++) {
+        const struct pt_block *b = block_at(&r->blocks, x, y);
+        size_t i = pt_film_index(&r->film, x, y), k = (size_t)(x - x0);
+        double rgb[3];
+        pt_film_mean(&r->film, i, b->spp, rgb);
+        for (int c = 0; c < 3; c++)
+            rows[c][k] = (float)rgb[c];
+        rows[SPP][k] = (float)(b->spp - r->film.dropped[i]);
+        rows[P_NOISY][k] = (float)b->p_noisy;
+        rows[ERROR][k] = (float)b->error;
+        rows[REASON][k] = (float)b->reason;
+        aov_pixel(&r->film, source->aov, i, b->spp, k, rows);
+    }
+}
+
+static void effect_names(pt_effects effects, char *text, size_t room)
+{
+    size_t used = 0;
+    text[0] = '\0';
+    for (int i = 0; i < PT_FX_COUNT; i++)
+        if (effects >> i & 1 && used < room)
+            used += (size_t)snprintf(text + used, room - used, "%s%s", used ? "," : "", pt_effects_name(i));
+}
+
+static void criterion_text(const struct pt_render *r, const struct pt_output_info *info, char *text, size_t room)
+{
+    if (r->criterion == NULL) {
+        snprintf(text, room, "none");
+        return;
+    }
+    const struct lull_criterion *t = pt_criterion_table(r->criterion);
+    size_t used = (size_t)snprintf(text, room, "%s %s", t->id, t->version);
+    for (uint32_t i = 0; i < info->param_count && used < room; i++)
+        used += (size_t)snprintf(text + used, room - used, " %s=%s", info->params[i].key, info->params[i].value);
+}
+
+int pt_output_exr(const char *path, const struct pt_render *r, const struct pt_output_info *info, struct pt_err *err)
+{
+    static const char *const base[FIRST_AOV] = {"R", "G", "B", "lull.spp", "lull.p_noisy", "lull.error", "lull.reason"};
+    const char *channels[CHANNELS_MAX];
+    int n = FIRST_AOV;
+    memcpy(channels, base, sizeof base);
+    if (info->aov & PT_FILM_ALBEDO) {
+        channels[n++] = "albedo.R";
+        channels[n++] = "albedo.G";
+        channels[n++] = "albedo.B";
+    }
+    if (info->aov & PT_FILM_NORMAL) {
+        channels[n++] = "normal.X";
+        channels[n++] = "normal.Y";
+        channels[n++] = "normal.Z";
+    }
+    if (info->aov & PT_FILM_DEPTH)
+        channels[n++] = "depth.Z";
+
+    char effects[512], criterion[2048], reasons[256];
+    size_t used = 0;
+    for (int i = 0; i < PT_REASON_COUNT; i++)
+        used += (size_t)snprintf(reasons + used, sizeof reasons - used, "%s%d=%s", i ? " " : "", i, pt_block_reason_name(i));
+    effect_names(info->effects, effects, sizeof effects);
+    criterion_text(r, info, criterion, sizeof criterion);
+    const struct pt_exr_attribute attributes[] = {
+        {"lull:scene", info->scene, 0.0},
+        {"lull:criterion", criterion, 0.0},
+        {"lull:effects", effects, 0.0},
+        {"lull:reasons", reasons, 0.0},
+        {"lull:seed", NULL, (double)r->config.integrator.seed},
+        {"lull:samples", NULL, (double)r->totals.samples},
+        {"software", "lull pathtracer 1.0", 0.0},
+        {"lull:seconds", NULL, pt_render_elapsed_s(r)}, /* last: left out of reproducible files */
+    };
+    struct exr_source source = {r, info->aov};
+    const int *crop = r->config.crop;
+    struct pt_exr_image image = {
+        .width = r->config.width,
+        .height = r->config.height,
+        .x0 = crop[0],
+        .y0 = crop[1],
+        .x1 = crop[2],
+        .y1 = crop[3],
+        .channel_count = n,
+        .channels = channels,
+        .attribute_count = (int)(sizeof attributes / sizeof attributes[0]) - (info->reproducible ? 1 : 0),
+        .attributes = attributes,
+        .row = exr_row,
+        .data = &source,
+    };
+    return pt_exr_write(path, &image, err);
+}
+
+/* --- pictures ------------------------------------------------------------------------------------------------------- */
+
+int pt_output_preview(const char *path, const struct pt_render *r, struct pt_err *err)
+{
+    const int *crop = r->config.crop;
+    int width = crop[2] - crop[0], height = crop[3] - crop[1];
+    uint8_t *pixels = malloc((size_t)width * (size_t)height * 3);
+    if (pixels == NULL)
+        return pt_fail_nomem(err, "preview");
+    uint8_t *out = pixels;
+    for (int y = crop[1]; y < crop[3]; y++) {
+        for (int x = crop[0]; x < crop[2]; x++, out += 3) {
+            double rgb[3];
+            pt_film_mean(&r->film, pt_film_index(&r->film, x, y), block_at(&r->blocks, x, y)->spp, rgb);
+            for (int c = 0; c < 3; c++)
+                out[c] = pt_srgb_u8(rgb[c]);
+        }
+    }
+    int rc = pt_oiio_write_png(path, width, height, 3, pixels, err);
+    free(pixels);
+    return rc;
+}
+
+static int stop_map_png(const char *path, const struct pt_render *r, struct pt_err *err)
+{
+    const struct pt_blocks *b = &r->blocks;
+    struct pt_stopmap_block *list = calloc(b->count, sizeof *list);
+    if (list == NULL)
+        return pt_fail_nomem(err, "stop map");
+    for (uint32_t i = 0; i < b->count; i++)
+        list[i] = (struct pt_stopmap_block){b->list[i].x0, b->list[i].y0, b->list[i].x1, b->list[i].y1, b->list[i].spp};
+    struct pt_stopmap map = {0};
+    int rc = pt_stopmap_draw(b->x0, b->y0, b->x1, b->y1, list, b->count, &map, err);
+    if (rc == PT_OK)
+        rc = pt_oiio_write_png(path, map.width, map.height, 3, map.rgb, err);
+    pt_stopmap_release(&map);
+    free(list);
+    return rc;
+}
+
+/* name;t0;…;t15; with the scene file's name without folder and ending. */
+static int stop_map_csv(const char *path, const struct pt_render *r, const char *scene, struct pt_err *err)
+{
+    struct pt_fio_out out;
+    int rc = pt_fio_begin(&out, path, err);
+    if (rc != PT_OK)
+        return rc;
+    const char *slash = strrchr(scene, '/');
+    const char *name = slash != NULL ? slash + 1 : scene;
+    const char *dot = strrchr(name, '.');
+    fprintf(out.file, "%.*s;", dot != NULL ? (int)(dot - name) : (int)strlen(name), name);
+    for (uint32_t i = 0; i < r->blocks.count; i++)
+        fprintf(out.file, "%llu;", (unsigned long long)r->blocks.list[i].spp);
+    fprintf(out.file, "\n");
+    return pt_fio_commit(&out, err);
+}
+
+int pt_output_stop_map(const char *path, const struct pt_render *r, const struct pt_output_info *info, struct pt_err *err)
+{
+    return pt_output_has_ending(path, "csv") ? stop_map_csv(path, r, info->scene, err) : stop_map_png(path, r, err);
+}

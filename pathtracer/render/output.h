@@ -1,0 +1,35 @@
+/*
+ * What a render leaves behind, made from film and blocks: EXR, preview, stop map (picture or table), JSON report. Every file
+ * is replaced as a whole or not at all.
+ */
+#ifndef PT_RENDER_OUTPUT_H
+#define PT_RENDER_OUTPUT_H
+
+#include "base/err.h"
+#include "render/render.h"
+
+struct pt_output_info {
+    const char *scene;           /* path of the scene file */
+    const struct lull_pair *params; /* of the criterion, as given */
+    uint32_t param_count;
+    pt_effects effects;          /* what the scene calls for */
+    const char *kernel;          /* name of the kernel that rendered it */
+    int threads;
+    int reproducible;            /* leave times out of the EXR, so that equal renders are equal files */
+    uint32_t aov;                /* PT_FILM_ALBEDO | NORMAL | DEPTH to be written */
+    int64_t scene_bytes;         /* memory of the scene; < 0 = not known */
+    int interrupted;
+};
+
+/* RGB, lull.spp, lull.p_noisy, lull.error, lull.reason and the AOVs, cropped as the config says. */
+int pt_output_exr(const char *path, const struct pt_render *render, const struct pt_output_info *info, struct pt_err *err);
+/* sRGB, 8 bits. */
+int pt_output_preview(const char *path, const struct pt_render *render, struct pt_err *err);
+/* PNG or CSV by the name's ending. */
+int pt_output_stop_map(const char *path, const struct pt_render *render, const struct pt_output_info *info, struct pt_err *err);
+int pt_output_report(const char *path, const struct pt_render *render, const struct pt_output_info *info, struct pt_err *err);
+
+/* `path` ends in `.ending`, whatever the case. */
+int pt_output_has_ending(const char *path, const char *ending);
+
+#endif

@@ -1,0 +1,29 @@
+/*
+ * The live line of a render: share done, active blocks, their range of samples, speed, time left. On a terminal it is
+ * redrawn in place, elsewhere it is a plain line now and then. What is not known is said so: without predictions of the
+ * criterion, the share is a lower bound and the time an upper one.
+ */
+#ifndef PT_RENDER_PROGRESS_H
+#define PT_RENDER_PROGRESS_H
+
+#include <stdio.h>
+
+#include "render/render.h"
+
+struct pt_progress {
+    FILE *out;      /* NULL: silent */
+    int terminal;
+    double next_s;  /* wall time of the next line */
+    int shown;      /* a live line stands on the screen */
+};
+
+void pt_progress_init(struct pt_progress *progress, FILE *out);
+/* Shows a line if it is time for one. */
+void pt_progress_update(struct pt_progress *progress, const struct pt_render *render);
+/* Clears the live line, so that other text may be printed. */
+void pt_progress_clear(struct pt_progress *progress);
+
+/* The line itself, without newline. */
+void pt_progress_text(const struct pt_render *render, char *text, size_t room);
+
+#endif

@@ -1,0 +1,37 @@
+/*
+ * Records a view as a block sequence (ggn/data/FORMAT.md): block after block, each at rising sample counts, with a reference
+ * of independent samples. A finished block is one file plus its line in the manifest; running again goes on after the last
+ * finished block and refuses a folder that was begun with other settings.
+ */
+#ifndef PT_RENDER_SEQUENCE_H
+#define PT_RENDER_SEQUENCE_H
+
+#include "base/err.h"
+#include "render/render.h"
+
+enum { PT_SEQUENCE_MAX_LEVELS = 4000 };
+
+struct pt_sequence_config {
+    const char *directory;      /* made when it is not there */
+    const char *levels;         /* "geometric:20:10000:1.15", "linear:20:10000:20"; NULL = the first of these */
+    const char *blocks;         /* "0,3,5-8"; NULL = all */
+    const char *name;           /* "SCENE" or "SCENE/VIEW"; NULL = by the scene file's name */
+    uint64_t reference_spp;     /* 0 = no reference */
+    const char *scene_path;
+    uint32_t scene_crc;
+    int quiet;
+    struct pt_render_config render; /* size, block, integrator; the rest is set here */
+};
+
+/* Parses levels into spp[]; returns their number or PT_EINVAL. */
+int pt_sequence_levels(const char *text, uint32_t spp[PT_SEQUENCE_MAX_LEVELS], struct pt_err *err);
+/* Marks the listed ids in chosen[0 … count). */
+int pt_sequence_choose(const char *text, uint8_t *chosen, uint32_t count, struct pt_err *err);
+
+/* criterion may be NULL; else its `error` is recorded at every level. *interrupted is set when interrupted() said so: the
+ * block being recorded is lost, all before it are safe. say gets a line per block. */
+int pt_sequence_record(const struct pt_sequence_config *config, const struct pt_scene *scene, pt_kernel *kernel,
+                       struct pt_threads *threads, struct pt_criterion *criterion, int (*interrupted)(void *data),
+                       void (*say)(void *data, const char *line), void *data, int *was_interrupted, struct pt_err *err);
+
+#endif
