@@ -39,7 +39,7 @@ static const char *segments_fault(int fd, const ElfW(Ehdr) *h, uint64_t size)
     return NULL;
 }
 
-const char *elf_file_fault(const char *path)
+const char *lull_elf_file_fault(const char *path)
 {
     int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
     if (fd < 0)

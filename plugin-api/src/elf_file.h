@@ -7,6 +7,6 @@
 
 /* NULL if the file is an ELF shared object of this machine's class whose segments all lie within the file; else static text
  * that says what is wrong with it. */
-const char *elf_file_fault(const char *path);
+const char *lull_elf_file_fault(const char *path);
 
 #endif

@@ -47,14 +47,14 @@ static void say(const struct lull_search *search, int32_t level, const char *for
 /* --- one library ----------------------------------------------------------------------------------------------------- */
 
 /* Tells about, and where possible undoes, what loading did to the process. */
-static void compare_process(const struct lull_search *search, const char *path, const struct process_state *before)
+static void compare_process(const struct lull_search *search, const char *path, const struct lull_process_state *before)
 {
-    struct process_state after;
-    process_state_read(&after);
+    struct lull_process_state after;
+    lull_process_state_read(&after);
     if (after.fp_control != before->fp_control) {
         say(search, LULL_LOG_WARNING, "%s: loading changed the floating-point control register from %#llx to %#llx; restored",
             path, before->fp_control, after.fp_control);
-        process_state_restore(before);
+        lull_process_state_restore(before);
     }
     if (after.thread_count > before->thread_count)
         say(search, LULL_LOG_WARNING, "%s: loading started %ld thread(s)", path, after.thread_count - before->thread_count);
@@ -62,12 +62,12 @@ static void compare_process(const struct lull_search *search, const char *path, 
 
 static int32_t load_entry(const struct lull_search *search, const char *path, lull_entry_fn *entry, struct lull_error *err)
 {
-    const char *fault = elf_file_fault(path);
+    const char *fault = lull_elf_file_fault(path);
     if (fault != NULL)
         return lull_error_set(err, LULL_E_IO, "%s: %s", path, fault);
 
-    struct process_state before;
-    process_state_read(&before);
+    struct lull_process_state before;
+    lull_process_state_read(&before);
     void *library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
     const char *why = library == NULL ? dlerror() : NULL;
     compare_process(search, path, &before);

@@ -42,7 +42,7 @@ static void fp_control_set(unsigned long long value)
 }
 #endif
 
-void process_state_read(struct process_state *state)
+void lull_process_state_read(struct lull_process_state *state)
 {
     state->fp_control = fp_control_get();
     state->thread_count = 0;
@@ -54,7 +54,7 @@ void process_state_read(struct process_state *state)
     closedir(tasks);
 }
 
-void process_state_restore(const struct process_state *state)
+void lull_process_state_restore(const struct lull_process_state *state)
 {
     fp_control_set(state->fp_control);
 }

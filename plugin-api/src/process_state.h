@@ -6,14 +6,14 @@
 #ifndef LULL_PROCESS_STATE_H
 #define LULL_PROCESS_STATE_H
 
-struct process_state {
+struct lull_process_state {
     unsigned long long fp_control; /* MXCSR without its status flags, FPCR; 0 on other machines */
     long thread_count;             /* 0 if the system does not say */
 };
 
-void process_state_read(struct process_state *state);
+void lull_process_state_read(struct lull_process_state *state);
 
 /* Sets the calling thread's floating-point control register to what it was. */
-void process_state_restore(const struct process_state *state);
+void lull_process_state_restore(const struct lull_process_state *state);
 
 #endif

@@ -1,0 +1,220 @@
+/* SPDX-License-Identifier: MIT
+ *
+ * lull-check: what its parts share.
+ *
+ * Each check runs in a child process of its own, which loads the library anew: a criterion that crashes, exits, hangs or
+ * leaves a mess fails one check and no more. Not thread safe unless said.
+ */
+#ifndef LULL_CHECK_H
+#define LULL_CHECK_H
+
+#include <lull/loader.h>
+
+#include "../src/process_state.h"
+
+/* --- a check and its world ------------------------------------------------------------------------------------------- */
+
+enum { LC_EXIT_OK = 0, LC_EXIT_FAILED = 1, LC_EXIT_USAGE = 2 };
+
+struct lc {
+    const char *path;                      /* the library */
+    const struct lull_criterion *criterion; /* the one under test */
+    const struct lull_pair *pairs;         /* of the command line, given to every create */
+    uint32_t pair_count;
+    struct lull_requirements req; /* of an instance made with them */
+    uint32_t workers;             /* threads for concurrent checks, at least 2 */
+    int report_fd;
+    int failed;
+    int concurrent; /* the check itself runs threads: their number says nothing */
+};
+
+/* One line each to the report; a check with a failure is "not ok". Thread safe. */
+__attribute__((format(printf, 2, 3))) void lc_fail(struct lc *c, const char *format, ...);
+__attribute__((format(printf, 2, 3))) void lc_note(struct lc *c, const char *format, ...);
+__attribute__((format(printf, 2, 3))) void lc_skip(struct lc *c, const char *format, ...);
+
+#define LC_EXPECT(c, condition, ...) ((condition) ? 1 : (lc_fail((c), __VA_ARGS__), 0))
+
+struct lc_check {
+    const char *name;
+    const char *title;
+    void (*run)(struct lc *c);
+};
+
+/* One table per file of checks, ended by a NULL name. */
+extern const struct lc_check lc_table_checks[];
+extern const struct lc_check lc_create_checks[];
+extern const struct lc_check lc_struct_checks[];
+extern const struct lc_check lc_pixel_checks[];
+extern const struct lc_check lc_life_checks[];
+extern const struct lc_check lc_batch_checks[];
+extern const struct lc_check lc_thread_checks[];
+extern const struct lc_check lc_state_checks[];
+extern const struct lc_check lc_cost_checks[];
+
+/* --- host -------------------------------------------------------------------------------------------------------------- */
+
+/* A host with real threads that can misbehave on request. */
+struct lc_host {
+    struct lull_host host; /* first: context points back */
+    uint32_t threads;      /* per parallel_for; 1 = in the caller's thread */
+    int reverse;           /* last task first */
+    int cancel;            /* cancelled() says so, and parallel_for leaves out all tasks but the first */
+    struct lc *check;
+    struct lc_workers *workers; /* owns: which worker numbers are taken */
+};
+
+/* max_workers is 2 * threads, so that two evaluate calls may each run `threads` tasks. */
+int lc_host_init(struct lc_host *h, struct lc *c, uint32_t threads);
+void lc_host_release(struct lc_host *h);
+
+/* --- image ------------------------------------------------------------------------------------------------------------- */
+
+/* A picture of blocks with made-up noise that falls with the number of samples. All estimates are multiples of 1/256
+ * below 8 in magnitude, so that every storage type holds them exactly and answers can be compared across types. */
+struct lc_film {
+    int32_t width, height;
+    uint32_t seed;
+    uint32_t block_count;
+    struct lull_rect *rects;        /* owns, [block_count] */
+    struct lull_block *blocks;      /* owns, [block_count]: state */
+    double *sum[LULL_PLANE_COUNT];  /* owns: sums over samples, [height][width][channels]; SPP and WEIGHT unused */
+    double *half_sum;               /* owns: for HALF */
+    void (*paint)(double rgb[3], double *sigma, int32_t x, int32_t y); /* truth and relative noise; NULL = a default */
+};
+
+extern const uint32_t lc_plane_channels[LULL_PLANE_COUNT];
+extern const char *const lc_plane_names[LULL_PLANE_COUNT];
+
+/* Blocks of block_w x block_h, smaller at the right and bottom edge. 0 or -1 (out of memory). */
+int lc_film_init(struct lc_film *f, int32_t width, int32_t height, int32_t block_w, int32_t block_h, uint32_t seed);
+void lc_film_release(struct lc_film *f);
+/* The frame that suits the criterion: two by one blocks of its size and the rest at the edges, one of them 1x1. */
+int lc_film_init_for(struct lc_film *f, const struct lull_requirements *req, uint32_t seed);
+/* Adds samples until the block has spp; nothing if it has. */
+void lc_film_advance(struct lc_film *f, uint32_t id, uint64_t spp);
+/* The estimate that a plane holds at a pixel. */
+double lc_film_estimate(const struct lc_film *f, unsigned plane, int32_t x, int32_t y, unsigned channel);
+void lc_film_frame(const struct lc_film *f, struct lull_frame *frame, uint32_t planes);
+
+/* How an image is stored. All zero: tight interleaved float estimates, top-down. */
+struct lc_layout {
+    int32_t type;
+    int32_t normaliser;    /* ONE, SPP (HALF then uses HALF_SPP) or WEIGHT */
+    int padded;            /* a fourth, unused channel of NaN */
+    int planar;            /* channel planes */
+    int bottom_up;
+    int right_left;
+    int guard;             /* each plane between two pages that cannot be read */
+    double scale;          /* 0 = 1 */
+    uint32_t extra_planes; /* unknown planes after the known ones */
+    uint32_t plane_slack;  /* bytes between plane descriptors */
+};
+
+struct lc_image {
+    struct lull_view view;
+    char *descriptors;               /* owns */
+    void *memory[LULL_PLANE_COUNT];  /* owns */
+    size_t mapped[LULL_PLANE_COUNT]; /* bytes if from mmap, else 0 */
+};
+
+/* Stores the film's planes of the mask. 0 or -1. Overwrites *image, which needs lc_image_release afterwards. */
+int lc_image_build(struct lc_image *image, const struct lc_film *f, const struct lc_layout *layout, uint32_t planes);
+void lc_image_release(struct lc_image *image);
+struct lull_plane *lc_image_plane(struct lc_image *image, unsigned plane);
+/* Overwrites the stored COLOR (and MOMENT2, HALF) of a pixel of a float image with default layout. */
+void lc_image_poke(struct lc_image *image, int32_t x, int32_t y, float value);
+
+/* Memory that ends right before a page that cannot be touched; size bytes, zeroed. NULL if there is none. */
+void *lc_guard_alloc(size_t size, size_t *mapped);
+void lc_guard_free(void *memory, size_t mapped);
+
+/* --- sessions -------------------------------------------------------------------------------------------------------- */
+
+enum lc_ask { LC_ASK_ALL, LC_ASK_TWICE, LC_ASK_REVERSED, LC_ASK_SINGLY, LC_ASK_CONCURRENTLY };
+
+/* How a session asks. All zero: no host, all due blocks in one call, tight structs. */
+struct lc_manner {
+    const struct lull_host *host;
+    struct lc_layout layout;
+    enum lc_ask ask;
+    uint32_t slack;     /* bytes between the elements of arrays and after structs, filled with garbage */
+    int required_only;  /* supply only the required planes */
+    int no_all;         /* view.all is NULL */
+    uint32_t frame_flags;
+    uint32_t seed;
+};
+
+struct lc_answer {
+    uint32_t step, id;
+    uint64_t spp;
+    struct lull_decision decision;
+};
+
+struct lc_log {
+    struct lc_answer *items; /* owns */
+    size_t count, room;
+};
+
+/* One render from begin_frame to end_frame. */
+struct lc_session {
+    struct lc *check;
+    struct lc_manner manner;
+    struct lc_film film;
+    struct lull_instance *instance; /* owns */
+    uint32_t planes;                /* mask supplied */
+    uint64_t spp;                   /* of the even blocks at the next step; odd ones have twice as many */
+    uint32_t step;
+    struct lc_log log;
+    double evaluate_s; /* in evaluate so far */
+    uint64_t evaluated; /* blocks */
+    int open;
+};
+
+enum { LC_STEPS = 7 };
+
+/* Makes an instance and begins the frame. Not 0 if that failed (which is reported). */
+int lc_session_open(struct lc_session *s, struct lc *c, const struct lc_manner *manner);
+/* The same with a film of the caller's choice (taken over). */
+int lc_session_open_film(struct lc_session *s, struct lc *c, const struct lc_manner *manner, struct lc_film *film);
+/* Begins the frame again (RESTART) with no samples and an empty log. */
+int lc_session_restart(struct lc_session *s);
+/* Adds samples, asks about the blocks that have not stopped, logs the answers. Not 0 if that failed (which is reported). */
+int lc_session_step(struct lc_session *s);
+int lc_session_steps(struct lc_session *s, int steps);
+/* Only the asking: status of the call, answers into decisions[film.block_count] by id; reports nothing but broken rules. */
+int32_t lc_session_ask(struct lc_session *s, const struct lc_image *image, const uint32_t *ids, uint32_t count,
+                       struct lull_decision *decisions, struct lull_error *err);
+int lc_session_image(struct lc_session *s, struct lc_image *image);
+void lc_session_close(struct lc_session *s);
+
+/* The whole session in one manner: its log. Not 0 if it failed (which is reported). */
+int lc_run(struct lc *c, const struct lc_manner *manner, struct lc_log *log);
+void lc_log_release(struct lc_log *log);
+/* Reports the first difference as "what: …". exact: bit for bit; else the actions and, within 0.1 %, the numbers. */
+int lc_log_compare(struct lc *c, const struct lc_log *expected, const struct lc_log *got, int exact, const char *what);
+
+/* An instance with the command line's parameters; NULL after a failure, which is reported. */
+struct lull_instance *lc_create(struct lc *c, const struct lull_host *host);
+int32_t lc_begin(struct lc *c, struct lull_instance *instance, const struct lull_frame *frame, struct lull_error *err);
+void lc_decision_preset(struct lull_decision *d);
+/* Reports an answer that breaks a rule of the header. */
+void lc_decision_check(struct lc *c, const struct lull_block *block, const struct lull_decision *d);
+/* Reports a call that changed the floating-point environment since `before`, and undoes it. */
+void lc_fp_check(struct lc *c, const struct lull_process_state *before, const char *call);
+int lc_deterministic(const struct lc *c);
+
+/* --- the rest ---------------------------------------------------------------------------------------------------------- */
+
+/* The entry of a library that the loader has accepted before; NULL if that fails. */
+lull_entry_fn lc_entry(const char *path);
+
+/* Calls visit for every symbol that a shared object defines for others. 0, or -1 if the file is not understood. */
+int lc_elf_exports(const char *path, void (*visit)(void *context, const char *name), void *context);
+
+/* Calls of malloc and friends by this process; -1 in a build that cannot count them (sanitizers). */
+long lc_alloc_count(void);
+/* The k-th allocation from now on (0 = the next) fails, and so do all that follow; -1 = none. No effect where not counted. */
+void lc_alloc_fail_after(long k);
+
+#endif

@@ -1,0 +1,66 @@
+/* SPDX-License-Identifier: MIT
+ *
+ * The same questions put in other ways.
+ */
+#include "check.h"
+
+static void compare_manners(struct lc *c, const struct lc_manner *a, const struct lc_manner *b, const char *what)
+{
+    struct lc_log expected, got;
+    if (lc_run(c, a, &expected) == 0 && lc_run(c, b, &got) == 0) {
+        lc_log_compare(c, &expected, &got, lc_deterministic(c), what);
+        lc_log_release(&got);
+    }
+    lc_log_release(&expected);
+}
+
+static void check_repeat(struct lc *c)
+{
+    struct lc_manner plain = {0}, twice = {.ask = LC_ASK_TWICE};
+    if (!lc_deterministic(c))
+        lc_note(c, "not deterministic: compared with a tolerance");
+    compare_manners(c, &plain, &plain, "the same session once more");
+    compare_manners(c, &plain, &twice, "each question twice");
+}
+
+static void check_batch(struct lc *c)
+{
+    if (!(c->criterion->capabilities & LULL_CAP_BATCH_INVARIANT)) {
+        lc_skip(c, "it does not declare BATCH_INVARIANT");
+        return;
+    }
+    struct lc_manner plain = {0}, reversed = {.ask = LC_ASK_REVERSED}, singly = {.ask = LC_ASK_SINGLY};
+    compare_manners(c, &plain, &reversed, "blocks in reverse order");
+    compare_manners(c, &plain, &singly, "one block per call");
+}
+
+/* Two instances whose calls alternate, on different pictures. */
+static void check_two(struct lc *c)
+{
+    struct lc_manner one = {.seed = 1}, two = {.seed = 2};
+    struct lc_log alone[2];
+    struct lc_session a, b;
+    if (lc_run(c, &one, &alone[0]) != 0 || lc_run(c, &two, &alone[1]) != 0)
+        return;
+    if (lc_session_open(&a, c, &one) == 0) {
+        if (lc_session_open(&b, c, &two) == 0) {
+            for (int i = 0; i < LC_STEPS; i++) {
+                lc_session_step(&a);
+                lc_session_step(&b);
+            }
+            lc_log_compare(c, &alone[0], &a.log, lc_deterministic(c), "first of two instances");
+            lc_log_compare(c, &alone[1], &b.log, lc_deterministic(c), "second of two instances");
+            lc_session_close(&b);
+        }
+        lc_session_close(&a);
+    }
+    lc_log_release(&alone[0]);
+    lc_log_release(&alone[1]);
+}
+
+const struct lc_check lc_batch_checks[] = {
+    {"repeat", "the same question gets the same answer and leaves no trace", check_repeat},
+    {"batch", "an answer does not depend on the blocks beside it", check_batch},
+    {"two-instances", "two instances do not know of each other", check_two},
+    {0},
+};

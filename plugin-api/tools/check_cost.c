@@ -1,0 +1,183 @@
+/* SPDX-License-Identifier: MIT
+ *
+ * Memory, descriptors, time.
+ */
+#include "check.h"
+
+#include <dirent.h>
+#include <malloc.h>
+#include <stdlib.h>
+#include <time.h>
+
+static double now_s(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static long descriptors(void)
+{
+    long count = 0;
+    DIR *d = opendir("/proc/self/fd");
+    if (d == NULL)
+        return 0;
+    while (readdir(d) != NULL)
+        count++;
+    closedir(d);
+    return count;
+}
+
+static size_t bytes_in_use(void)
+{
+    struct mallinfo2 info = mallinfo2();
+    return info.uordblks + info.hblkhd;
+}
+
+/* Repeats something, up to 1000 times or so many seconds, and looks at what is left after the first tenth. */
+static void repeat(struct lc *c, void (*once)(struct lc *), const char *what)
+{
+    enum { MOST = 1000, WARM = 20, SLACK = 2048 };
+    const double limit_s = 8;
+    double start = now_s();
+    size_t bytes = 0;
+    long files = 0;
+    int i = 0;
+    for (; i < MOST + WARM && !c->failed && (i <= WARM || now_s() - start < limit_s); i++) {
+        if (i == WARM) {
+            bytes = bytes_in_use();
+            files = descriptors();
+        }
+        once(c);
+    }
+    size_t now = bytes_in_use();
+    LC_EXPECT(c, now < bytes + SLACK, "%d times %s left %zu bytes behind", i - WARM, what, now - bytes);
+    LC_EXPECT(c, descriptors() <= files, "%s leaves files open", what);
+    lc_note(c, "%d times %s", i, what);
+}
+
+static void create_destroy(struct lc *c)
+{
+    struct lull_instance *instance = lc_create(c, NULL);
+    if (instance != NULL)
+        c->criterion->destroy(instance);
+}
+
+static void failing_create(struct lc *c)
+{
+    struct lull_pair bad = {"no-such-parameter", "1"};
+    struct lull_instance *instance = NULL;
+    c->criterion->create(NULL, &bad, 1, sizeof bad, &instance, NULL);
+}
+
+static void short_session(struct lc *c)
+{
+    struct lc_session s;
+    struct lc_manner plain = {0};
+    if (lc_session_open(&s, c, &plain) != 0)
+        return;
+    lc_session_steps(&s, 1);
+    lc_session_restart(&s);
+    lc_session_steps(&s, 2);
+    lc_session_close(&s);
+}
+
+static void check_leaks(struct lc *c)
+{
+    repeat(c, create_destroy, "create and destroy");
+    repeat(c, failing_create, "a failing create");
+    repeat(c, short_session, "a frame with RESTART");
+}
+
+/* --- allocation ---------------------------------------------------------------------------------------------------------- */
+
+/* create and begin_frame with the k-th allocation failing, for every k: an error or success, never a crash or a leak. */
+static void check_out_of_memory(struct lc *c)
+{
+    enum { MOST = 20000 };
+    if (lc_alloc_count() < 0) {
+        lc_skip(c, "allocations cannot be counted in a sanitizer build");
+        return;
+    }
+    struct lc_film film;
+    if (lc_film_init_for(&film, &c->req, 1) != 0)
+        return;
+    struct lull_frame frame;
+    lc_film_frame(&film, &frame, c->req.planes_used);
+    double start = now_s();
+    long k = 0;
+    int done = 0;
+    for (; k < MOST && !done && !c->failed && now_s() - start < 10; k++) {
+        struct lull_instance *instance = NULL;
+        struct lull_error err = {.struct_size = sizeof err};
+        lc_alloc_fail_after(k);
+        int32_t status = c->criterion->create(NULL, c->pairs, c->pair_count, sizeof *c->pairs, &instance, &err);
+        int created = status == LULL_OK;
+        if (created)
+            status = c->criterion->begin_frame(instance, &frame, &err);
+        lc_alloc_fail_after(-1);
+        LC_EXPECT(c, created || instance == NULL, "create ran out of memory and touched the instance");
+        LC_EXPECT(c, status <= 0, "create or begin_frame returned %d", status);
+        done = status == LULL_OK;
+        if (created && !done) /* the instance is as before: it can still do it */
+            LC_EXPECT(c, c->criterion->begin_frame(instance, &frame, NULL) == LULL_OK,
+                      "begin_frame cannot be repeated after it ran out of memory");
+        if (created)
+            c->criterion->destroy(instance);
+    }
+    lc_note(c, "%ld allocations in create and begin_frame", k - done);
+    lc_film_release(&film);
+}
+
+/* After its first calls, evaluate allocates nothing. */
+static void check_evaluate_allocates(struct lc *c)
+{
+    if (lc_alloc_count() < 0) {
+        lc_skip(c, "allocations cannot be counted in a sanitizer build");
+        return;
+    }
+    struct lc_session s;
+    struct lc_manner plain = {0};
+    if (lc_session_open(&s, c, &plain) != 0)
+        return;
+    lc_session_steps(&s, 2); /* libraries underneath may allocate on first use */
+    lc_film_advance(&s.film, 0, s.spp);
+    struct lc_image image;
+    if (lc_session_image(&s, &image) == 0) {
+        struct lull_decision d;
+        lc_decision_preset(&d);
+        long before = lc_alloc_count();
+        int32_t status =
+            c->criterion->evaluate(s.instance, &image.view, &s.film.blocks[0], sizeof(struct lull_block), &d, sizeof d, 1, NULL);
+        long after = lc_alloc_count();
+        LC_EXPECT(c, status == LULL_OK, "evaluate: %d", status);
+        LC_EXPECT(c, after == before, "evaluate made %ld allocations", after - before);
+        lc_image_release(&image);
+    }
+    lc_session_close(&s);
+}
+
+static void check_time(struct lc *c)
+{
+    int flexible = (c->req.flags & LULL_REQ_FLEXIBLE) != 0;
+    int32_t w = c->req.block_width > 0 ? (int32_t)c->req.block_width : 200;
+    int32_t h = c->req.block_height > 0 ? (int32_t)c->req.block_height : 200;
+    struct lc_film film;
+    struct lc_session s;
+    struct lc_manner plain = {0};
+    if (lc_film_init(&film, 2 * w, h, w, h, 1) != 0 || lc_session_open_film(&s, c, &plain, &film) != 0)
+        return;
+    lc_session_steps(&s, LC_STEPS);
+    if (s.evaluated > 0)
+        lc_note(c, "%.3f ms per block of %dx%d%s, one thread, mean of %llu", 1e3 * s.evaluate_s / (double)s.evaluated, w, h,
+                flexible ? " (flexible)" : "", (unsigned long long)s.evaluated);
+    lc_session_close(&s);
+}
+
+const struct lc_check lc_cost_checks[] = {
+    {"leaks", "1000 times create and destroy, frames, failures: nothing is left", check_leaks},
+    {"out-of-memory", "create and begin_frame survive every failing allocation", check_out_of_memory},
+    {"evaluate-allocates", "evaluate allocates nothing", check_evaluate_allocates},
+    {"time", "time per block", check_time},
+    {0},
+};

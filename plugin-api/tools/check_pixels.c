@@ -1,0 +1,363 @@
+/* SPDX-License-Identifier: MIT
+ *
+ * The same picture stored in every way; pictures that are extreme; planes that are missing or broken.
+ */
+#include "check.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static void compare_layouts(struct lc *c, const struct lc_layout *layouts, const char *const *names, size_t count, int exact)
+{
+    struct lc_manner plain = {0};
+    struct lc_log expected;
+    if (lc_run(c, &plain, &expected) == 0)
+        for (size_t i = 0; i < count; i++) {
+            struct lc_manner manner = {.layout = layouts[i]};
+            struct lc_log got;
+            if (lc_run(c, &manner, &got) == 0)
+                lc_log_compare(c, &expected, &got, exact && lc_deterministic(c), names[i]);
+            else
+                lc_note(c, "that was with %s", names[i]);
+            lc_log_release(&got);
+        }
+    lc_log_release(&expected);
+}
+
+#define COUNT(array) (sizeof(array) / sizeof *(array))
+
+static void check_strides(struct lc *c)
+{
+    static const struct lc_layout layouts[] = {{.bottom_up = 1},
+                                               {.right_left = 1},
+                                               {.padded = 1},
+                                               {.planar = 1},
+                                               {.padded = 1, .bottom_up = 1},
+                                               {.planar = 1, .bottom_up = 1, .right_left = 1},
+                                               {.guard = 1},
+                                               {.guard = 1, .bottom_up = 1}};
+    static const char *const names[COUNT(layouts)] = {"rows bottom-up",
+                                                      "columns from the right",
+                                                      "RGBA",
+                                                      "planar channels",
+                                                      "RGBA bottom-up",
+                                                      "planar, bottom-up, from the right",
+                                                      "nothing readable beyond the image",
+                                                      "nothing readable beyond the image, bottom-up"};
+    compare_layouts(c, layouts, names, COUNT(layouts), 1);
+}
+
+static void check_types(struct lc *c)
+{
+    static const struct lc_layout layouts[] = {
+        {.type = LULL_TYPE_F16}, {.type = LULL_TYPE_F64}, {.type = LULL_TYPE_U32, .scale = 1.0 / 256}, {.scale = 0.25}};
+    static const char *const names[COUNT(layouts)] = {"f16", "f64", "u32 with scale 1/256", "f32 with scale 1/4"};
+    compare_layouts(c, layouts, names, COUNT(layouts), 0);
+}
+
+static void check_normalisers(struct lc *c)
+{
+    static const struct lc_layout layouts[] = {{.normaliser = LULL_NORM_SPP},
+                                               {.normaliser = LULL_NORM_SPP, .type = LULL_TYPE_F64},
+                                               {.normaliser = LULL_NORM_SPP, .type = LULL_TYPE_U32, .scale = 1.0 / 256},
+                                               {.normaliser = LULL_NORM_WEIGHT},
+                                               {.normaliser = LULL_NORM_WEIGHT, .type = LULL_TYPE_F64}};
+    static const char *const names[COUNT(layouts)] = {"f32 sums", "f64 sums", "u32 sums", "f32 weighted sums",
+                                                      "f64 weighted sums"};
+    compare_layouts(c, layouts, names, COUNT(layouts), 0);
+}
+
+/* --- a crop ------------------------------------------------------------------------------------------------------------ */
+
+/* The same blocks as the window of a larger picture: a view that does not begin at the origin. */
+static void check_window(struct lc *c)
+{
+    enum { DX = 1000, DY = 700 };
+    struct lc_session s;
+    struct lc_manner plain = {0};
+    if (lc_session_open(&s, c, &plain) != 0)
+        return;
+    c->criterion->end_frame(s.instance);
+    struct lull_frame frame;
+    lc_film_frame(&s.film, &frame, s.planes);
+    frame.width += DX + 5;
+    frame.height += DY + 7;
+    struct lull_error err = {.struct_size = sizeof err};
+    for (uint32_t i = 0; i < s.film.block_count; i++) {
+        struct lull_rect *r = &s.film.rects[i];
+        *r = (struct lull_rect){r->x0 + DX, r->y0 + DY, r->x1 + DX, r->y1 + DY};
+        lc_film_advance(&s.film, i, s.spp);
+    }
+    int32_t status = lc_begin(c, s.instance, &frame, &err);
+    struct lc_image image;
+    if (LC_EXPECT(c, status == LULL_OK, "begin_frame of a crop: %d, %s", status, err.message) &&
+        lc_session_image(&s, &image) == 0) {
+        image.view.x0 += DX, image.view.x1 += DX, image.view.y0 += DY, image.view.y1 += DY;
+        struct lull_decision *d = calloc(s.film.block_count, sizeof *d);
+        uint32_t *ids = calloc(s.film.block_count, sizeof *ids);
+        for (uint32_t i = 0; i < s.film.block_count && ids != NULL; i++) {
+            struct lull_block *b = &s.film.blocks[i];
+            b->x0 += DX, b->x1 += DX, b->y0 += DY, b->y1 += DY;
+            ids[i] = i;
+        }
+        if (d != NULL && ids != NULL) {
+            status = lc_session_ask(&s, &image, ids, s.film.block_count, d, &err);
+            LC_EXPECT(c, status == LULL_OK, "evaluate of a crop: %d, %s", status, err.message);
+            for (uint32_t i = 0; i < s.film.block_count && status == LULL_OK; i++)
+                lc_decision_check(c, &s.film.blocks[i], &d[i]);
+        }
+        free(d);
+        free(ids);
+        lc_image_release(&image);
+    }
+    lc_session_close(&s);
+}
+
+/* --- planes ------------------------------------------------------------------------------------------------------------ */
+
+/* One evaluate call on a spoilt image: 0 refused, 1 answered. */
+enum spoil { SPOIL_ABSENT, SPOIL_CUT, SPOIL_TYPE, SPOIL_NORMALISER, SPOIL_CHANNELS, SPOIL_WEIGHT, SPOIL_COUNT };
+
+static int32_t ask_spoilt(struct lc *c, unsigned plane, enum spoil spoil)
+{
+    struct lc_session s;
+    struct lc_manner plain = {0};
+    if (lc_session_open(&s, c, &plain) != 0)
+        return 1;
+    lc_film_advance(&s.film, 0, s.spp);
+    struct lc_image image;
+    struct lull_decision decision[16];
+    uint32_t id = 0;
+    struct lull_error err = {.struct_size = sizeof err};
+    int32_t status = 1;
+    if (s.film.block_count <= 16 && lc_session_image(&s, &image) == 0) {
+        struct lull_plane *p = lc_image_plane(&image, plane);
+        switch (spoil) {
+        case SPOIL_ABSENT: p->data = NULL; break;
+        case SPOIL_CUT: image.view.plane_count = plane; break;
+        case SPOIL_TYPE: p->type = 99; break;
+        case SPOIL_NORMALISER: p->normaliser = -1; break;
+        case SPOIL_CHANNELS: p->channels = lc_plane_channels[plane] - 1; break;
+        default:
+            p->normaliser = LULL_NORM_WEIGHT;
+            lc_image_plane(&image, LULL_PLANE_WEIGHT)->data = NULL;
+        }
+        status = lc_session_ask(&s, &image, &id, 1, decision, &err);
+        lc_image_release(&image);
+        if (status != LULL_OK && lc_session_steps(&s, 2) != 0)
+            lc_note(c, "that was after a refused evaluate");
+    }
+    lc_session_close(&s);
+    return status;
+}
+
+static void check_missing(struct lc *c)
+{
+    struct lull_instance *instance = lc_create(c, NULL);
+    struct lc_film film;
+    if (instance == NULL || lc_film_init_for(&film, &c->req, 1) != 0)
+        return;
+    for (unsigned p = 0; p < LULL_PLANE_COUNT; p++) {
+        if (!(c->req.planes_required & LULL_PLANE_BIT(p)))
+            continue;
+        struct lull_frame frame;
+        lc_film_frame(&film, &frame, c->req.planes_used & ~LULL_PLANE_BIT(p));
+        struct lull_error err = {.struct_size = sizeof err};
+        int32_t status = lc_begin(c, instance, &frame, &err);
+        LC_EXPECT(c, status == LULL_E_PLANE, "begin_frame without %s: %d", lc_plane_names[p], status);
+        if (status == LULL_OK)
+            c->criterion->end_frame(instance);
+        LC_EXPECT(c, ask_spoilt(c, p, SPOIL_ABSENT) == LULL_E_PLANE, "evaluate without %s is not refused", lc_plane_names[p]);
+        LC_EXPECT(c, ask_spoilt(c, p, SPOIL_CUT) == LULL_E_PLANE, "evaluate with planes up to %s is not refused",
+                  lc_plane_names[p]);
+    }
+    c->criterion->destroy(instance);
+    lc_film_release(&film);
+    struct lc_log log;
+    struct lc_manner required = {.required_only = 1};
+    lc_run(c, &required, &log);
+    lc_log_release(&log);
+    if (c->req.halo > 0) {
+        struct lc_manner no_all = {.no_all = 1};
+        lc_run(c, &no_all, &log);
+        lc_log_release(&log);
+    }
+}
+
+static void check_broken_planes(struct lc *c)
+{
+    static const char *const what[SPOIL_COUNT] = {
+        "", "", "of an unknown type", "of an unknown normaliser", "with too few channels", "normalised by an absent WEIGHT"};
+    if (c->req.planes_required == 0)
+        lc_skip(c, "it reads no plane");
+    for (unsigned p = 0; p < LULL_PLANE_COUNT; p++) {
+        if (!(c->req.planes_required & LULL_PLANE_BIT(p)))
+            continue;
+        for (unsigned spoil = SPOIL_TYPE; spoil < SPOIL_COUNT; spoil++)
+            if (p != LULL_PLANE_WEIGHT || spoil != SPOIL_WEIGHT)
+                LC_EXPECT(c, ask_spoilt(c, p, (enum spoil)spoil) == LULL_E_PLANE, "%s %s is not refused", lc_plane_names[p],
+                          what[spoil]);
+    }
+}
+
+/* --- values ------------------------------------------------------------------------------------------------------------ */
+
+/* Steps with a value poked into every `every`-th pixel (all planes); returns the flags that all answers share. */
+static uint32_t steps_with_value(struct lc *c, float value, int every)
+{
+    struct lc_session s;
+    struct lc_manner plain = {0};
+    uint32_t flags = ~UINT32_C(0);
+    if (lc_session_open(&s, c, &plain) != 0)
+        return flags;
+    uint32_t ids[16];
+    struct lull_decision d[16];
+    for (uint32_t i = 0; i < s.film.block_count && i < 16; i++)
+        ids[i] = i;
+    uint32_t count = s.film.block_count < 16 ? s.film.block_count : 16;
+    for (int step = 0; step < LC_STEPS; step++, s.spp *= 2) {
+        struct lc_image image;
+        for (uint32_t i = 0; i < count; i++)
+            lc_film_advance(&s.film, i, s.spp);
+        if (lc_session_image(&s, &image) != 0)
+            break;
+        for (int32_t i = 0; i < s.film.width * s.film.height; i += every)
+            lc_image_poke(&image, i % s.film.width, i / s.film.width, value);
+        struct lull_error err = {.struct_size = sizeof err};
+        int32_t status = lc_session_ask(&s, &image, ids, count, d, &err);
+        lc_image_release(&image);
+        if (!LC_EXPECT(c, status == LULL_OK, "evaluate with pixels of %g: %d, %s", (double)value, status, err.message))
+            break;
+        for (uint32_t i = 0; i < count; i++) {
+            lc_decision_check(c, &s.film.blocks[i], &d[i]);
+            flags &= d[i].flags | (d[i].flags & LULL_DECISION_TOO_EARLY ? LULL_DECISION_BAD_INPUT : 0);
+        }
+    }
+    lc_session_close(&s);
+    return flags;
+}
+
+static void check_values(struct lc *c)
+{
+    static const float values[] = {NAN, INFINITY, -INFINITY, -1, 1e30f, -1e30f, 3e38f, 1e-42f, 0};
+    for (size_t i = 0; i < COUNT(values); i++)
+        for (int every = 1; every <= 97; every += 96) {
+            uint32_t flags = steps_with_value(c, values[i], every);
+            if (!isfinite(values[i]) && every == 1 && (c->req.planes_required & LULL_PLANE_BIT(LULL_PLANE_COLOR)))
+                LC_EXPECT(c, flags & LULL_DECISION_BAD_INPUT, "pixels of %g are not flagged as bad input", (double)values[i]);
+        }
+}
+
+static void paint_black(double rgb[3], double *sigma, int32_t x, int32_t y)
+{
+    (void)x, (void)y;
+    rgb[0] = rgb[1] = rgb[2] = 0;
+    *sigma = 0;
+}
+
+static void paint_constant(double rgb[3], double *sigma, int32_t x, int32_t y)
+{
+    (void)x, (void)y;
+    rgb[0] = rgb[1] = rgb[2] = 0.5;
+    *sigma = 0;
+}
+
+static void paint_half_black(double rgb[3], double *sigma, int32_t x, int32_t y)
+{
+    paint_black(rgb, sigma, x, y);
+    if (x % 24 >= 12)
+        rgb[0] = rgb[1] = rgb[2] = *sigma = 1;
+}
+
+static void run_painted(struct lc *c, void (*paint)(double *, double *, int32_t, int32_t))
+{
+    struct lc_film film;
+    struct lc_session s;
+    struct lc_manner plain = {0};
+    if (lc_film_init_for(&film, &c->req, 1) != 0)
+        return;
+    film.paint = paint;
+    if (lc_session_open_film(&s, c, &plain, &film) != 0)
+        return;
+    lc_session_steps(&s, LC_STEPS);
+    lc_session_close(&s);
+}
+
+static void check_flat(struct lc *c)
+{
+    run_painted(c, paint_black);
+    run_painted(c, paint_constant);
+    run_painted(c, paint_half_black);
+}
+
+/* A pixel that holds a light found once in so many samples that the mean over its block hardly shows it. */
+static void check_firefly(struct lc *c)
+{
+    struct lc_session s;
+    struct lc_manner plain = {0};
+    if (lc_session_open(&s, c, &plain) != 0)
+        return;
+    uint32_t ids[1] = {0};
+    struct lull_decision d[16];
+    s.film.paint = paint_constant;
+    for (int step = 0; step < LC_STEPS && s.film.block_count <= 16; step++, s.spp *= 2) {
+        struct lc_image image;
+        lc_film_advance(&s.film, 0, s.spp);
+        if (lc_session_image(&s, &image) != 0)
+            break;
+        lc_image_poke(&image, 3, 3, (float)(1e4 / (double)s.spp));
+        struct lull_error err = {.struct_size = sizeof err};
+        int32_t status = lc_session_ask(&s, &image, ids, 1, d, &err);
+        lc_image_release(&image);
+        if (LC_EXPECT(c, status == LULL_OK, "evaluate with a firefly: %d, %s", status, err.message))
+            lc_decision_check(c, &s.film.blocks[0], &d[0]);
+    }
+    lc_session_close(&s);
+}
+
+/* Before the first sample nothing can be decided, and nothing may be divided by it. */
+static void check_no_samples(struct lc *c)
+{
+    static const int32_t normalisers[] = {LULL_NORM_ONE, LULL_NORM_SPP, LULL_NORM_WEIGHT};
+    for (size_t k = 0; k < COUNT(normalisers); k++) {
+        struct lc_session s;
+        struct lc_manner manner = {.layout = {.normaliser = normalisers[k]}};
+        if (lc_session_open(&s, c, &manner) != 0)
+            return;
+        uint32_t ids[16];
+        struct lull_decision d[16];
+        uint32_t count = s.film.block_count < 16 ? s.film.block_count : 16;
+        for (uint32_t i = 0; i < count; i++)
+            ids[i] = i;
+        struct lull_error err = {.struct_size = sizeof err};
+        for (uint64_t spp = 0; spp < 3; spp++) {
+            struct lc_image image;
+            for (uint32_t i = 0; i < count; i++)
+                lc_film_advance(&s.film, i, spp * (i % 2)); /* even blocks stay without */
+            if (lc_session_image(&s, &image) != 0)
+                break;
+            int32_t status = lc_session_ask(&s, &image, ids, count, d, &err);
+            lc_image_release(&image);
+            if (LC_EXPECT(c, status == LULL_OK, "evaluate at 0 samples: %d, %s", status, err.message))
+                for (uint32_t i = 0; i < count; i++)
+                    lc_decision_check(c, &s.film.blocks[i], &d[i]);
+        }
+        lc_session_steps(&s, 2);
+        lc_session_close(&s);
+    }
+}
+
+const struct lc_check lc_pixel_checks[] = {
+    {"strides", "negative, interleaved and planar strides give the same answers", check_strides},
+    {"types", "f16, f64, u32 and scaled values give the same answers", check_types},
+    {"normalisers", "sums and weighted sums give the same answers", check_normalisers},
+    {"window", "a view that does not begin at the origin", check_window},
+    {"missing-planes", "required planes are missed, others are not", check_missing},
+    {"broken-planes", "planes of an unknown form are refused", check_broken_planes},
+    {"bad-values", "NaN, infinite, negative and huge pixels", check_values},
+    {"flat", "black, constant and half black blocks", check_flat},
+    {"firefly", "a pixel found once", check_firefly},
+    {"no-samples", "blocks without samples continue", check_no_samples},
+    {0},
+};

@@ -1,0 +1,243 @@
+/* SPDX-License-Identifier: MIT
+ *
+ * Hosts of other versions: structs that end where version 1.0 ends (nothing may be read or written beyond), structs that
+ * are too short, structs and array elements that are longer.
+ */
+#include "check.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* A copy of a struct of which only `size` bytes exist. */
+struct guarded {
+    void *at;
+    size_t mapped;
+};
+
+static int guarded_init(struct lc *c, struct guarded *g, const void *from, size_t size)
+{
+    g->at = lc_guard_alloc(size, &g->mapped);
+    if (g->at == NULL) {
+        lc_fail(c, "out of memory");
+        return -1;
+    }
+    memcpy(g->at, from, size);
+    uint32_t struct_size = (uint32_t)size;
+    memcpy(g->at, &struct_size, sizeof struct_size);
+    return 0;
+}
+
+static void guarded_release(struct guarded *g)
+{
+    lc_guard_free(g->at, g->mapped);
+}
+
+/* Every struct that the host passes, each of so many bytes fewer than in version 1.0. */
+struct short_structs {
+    size_t host, requirements, frame, view, error;
+};
+
+struct short_calls {
+    int32_t create, requirements, begin_frame, evaluate;
+    struct lull_requirements got;
+};
+
+static int short_evaluate(struct lc *c, const struct short_structs *cut, struct lull_instance *instance,
+                          struct lc_film *film, uint32_t planes, struct lull_error *err, struct short_calls *calls)
+{
+    struct lc_image image;
+    struct lc_layout layout = {0};
+    if (lc_image_build(&image, film, &layout, planes) != 0)
+        return -1;
+    struct guarded view, planes_array, blocks, decisions;
+    size_t blocks_size = film->block_count * sizeof(struct lull_block);
+    size_t decisions_size = film->block_count * sizeof(struct lull_decision);
+    struct lull_view *v = &image.view;
+    planes_array.at = lc_guard_alloc(sizeof(struct lull_plane) * LULL_PLANE_COUNT, &planes_array.mapped);
+    blocks.at = lc_guard_alloc(blocks_size, &blocks.mapped);
+    decisions.at = lc_guard_alloc(decisions_size, &decisions.mapped);
+    if (planes_array.at != NULL && blocks.at != NULL && decisions.at != NULL) {
+        memcpy(planes_array.at, v->planes, sizeof(struct lull_plane) * LULL_PLANE_COUNT);
+        memcpy(blocks.at, film->blocks, blocks_size);
+        v->planes = planes_array.at;
+        v->all = blocks.at;
+        struct lull_decision *d = decisions.at;
+        for (uint32_t i = 0; i < film->block_count; i++)
+            lc_decision_preset(&d[i]);
+        if (guarded_init(c, &view, v, sizeof *v - cut->view) == 0) {
+            calls->evaluate = c->criterion->evaluate(instance, view.at, blocks.at, sizeof(struct lull_block), d,
+                                                     sizeof *d, film->block_count, err);
+            for (uint32_t i = 0; i < film->block_count && calls->evaluate == LULL_OK; i++)
+                lc_decision_check(c, &film->blocks[i], &d[i]);
+            guarded_release(&view);
+        }
+    }
+    guarded_release(&planes_array);
+    guarded_release(&blocks);
+    guarded_release(&decisions);
+    lc_image_release(&image);
+    return 0;
+}
+
+static void short_frame(struct lc *c, const struct short_structs *cut, struct lull_instance *instance, struct lull_error *err,
+                        struct short_calls *calls)
+{
+    struct lc_film film;
+    if (lc_film_init_for(&film, &c->req, 1) != 0)
+        return;
+    for (uint32_t i = 0; i < film.block_count; i++)
+        lc_film_advance(&film, i, c->req.first_spp + c->req.first_spp % 2 + 2);
+    struct lull_frame frame;
+    lc_film_frame(&film, &frame, c->req.planes_used);
+    struct guarded rects, g;
+    rects.at = lc_guard_alloc(film.block_count * sizeof *film.rects, &rects.mapped);
+    if (rects.at != NULL) {
+        memcpy(rects.at, film.rects, film.block_count * sizeof *film.rects);
+        frame.blocks = rects.at;
+        if (guarded_init(c, &g, &frame, sizeof frame - cut->frame) == 0) {
+            calls->begin_frame = c->criterion->begin_frame(instance, g.at, err);
+            guarded_release(&g);
+        }
+        if (calls->begin_frame == LULL_OK) {
+            short_evaluate(c, cut, instance, &film, frame.planes, err, calls);
+            c->criterion->end_frame(instance);
+        }
+        guarded_release(&rects);
+    }
+    lc_film_release(&film);
+}
+
+static void short_life(struct lc *c, const struct short_structs *cut, struct short_calls *calls)
+{
+    *calls = (struct short_calls){1, 1, 1, 1, {0}};
+    struct lc_host host;
+    struct guarded h, r, e;
+    struct lull_error blank = {0};
+    struct lull_requirements req = {0};
+    if (lc_host_init(&host, c, 1) != 0)
+        return;
+    if (guarded_init(c, &h, &host.host, sizeof host.host - cut->host) != 0 ||
+        guarded_init(c, &r, &req, sizeof req - cut->requirements) != 0 ||
+        guarded_init(c, &e, &blank, sizeof blank - cut->error) != 0)
+        return;
+    struct lull_instance *instance = NULL;
+    calls->create = c->criterion->create(h.at, c->pairs, c->pair_count, sizeof *c->pairs, &instance, e.at);
+    if (calls->create == LULL_OK) {
+        calls->requirements = c->criterion->requirements(instance, r.at, e.at);
+        memcpy(&calls->got, r.at, sizeof req - cut->requirements);
+        short_frame(c, cut, instance, e.at, calls);
+        c->criterion->destroy(instance);
+    }
+    guarded_release(&h);
+    guarded_release(&r);
+    guarded_release(&e);
+    lc_host_release(&host);
+}
+
+static void check_older(struct lc *c)
+{
+    struct short_structs exact = {0};
+    struct short_calls calls;
+    short_life(c, &exact, &calls);
+    LC_EXPECT(c, calls.create == LULL_OK && calls.requirements == LULL_OK && calls.begin_frame == LULL_OK &&
+                     calls.evaluate == LULL_OK,
+              "structs of exactly version 1.0: create %d, requirements %d, begin_frame %d, evaluate %d", calls.create,
+              calls.requirements, calls.begin_frame, calls.evaluate);
+    LC_EXPECT(c, calls.got.planes_used == c->req.planes_used && calls.got.first_spp == c->req.first_spp &&
+                     calls.got.bytes_per_block == c->req.bytes_per_block,
+              "requirements differ for a struct of exactly version 1.0");
+
+    /* the error struct is for the caller's convenience: a short one is not written, or not beyond its end */
+    struct short_structs no_message = {.error = sizeof(struct lull_error) - 8};
+    short_life(c, &no_message, &calls);
+    LC_EXPECT(c, calls.evaluate == LULL_OK, "an error struct of 8 bytes makes a call fail (%d)", calls.evaluate);
+    struct short_structs one_short = {.host = 8, .error = sizeof(struct lull_error) - 8};
+    short_life(c, &one_short, &calls);
+    LC_EXPECT(c, calls.create != LULL_OK, "create succeeds with a host struct shorter than 1.0");
+}
+
+static void check_too_short(struct lc *c)
+{
+    struct short_calls calls;
+    struct short_structs host = {.host = 8}, req = {.requirements = 8}, frame = {.frame = 8}, view = {.view = 8};
+    short_life(c, &host, &calls);
+    LC_EXPECT(c, calls.create == LULL_E_VERSION, "host struct shorter than 1.0: create %d", calls.create);
+    short_life(c, &req, &calls);
+    LC_EXPECT(c, calls.requirements == LULL_E_VERSION, "struct shorter than 1.0: requirements %d", calls.requirements);
+    short_life(c, &frame, &calls);
+    LC_EXPECT(c, calls.begin_frame == LULL_E_VERSION, "frame struct shorter than 1.0: begin_frame %d", calls.begin_frame);
+    short_life(c, &view, &calls);
+    LC_EXPECT(c, calls.evaluate == LULL_E_VERSION, "view struct shorter than 1.0: evaluate %d", calls.evaluate);
+
+    struct short_structs host_8 = {.host = sizeof(struct lull_host) - 8}, frame_8 = {.frame = sizeof(struct lull_frame) - 8};
+    struct short_structs req_8 = {.requirements = sizeof(struct lull_requirements) - 8};
+    struct short_structs view_8 = {.view = sizeof(struct lull_view) - 8};
+    short_life(c, &host_8, &calls);
+    LC_EXPECT(c, calls.create == LULL_E_VERSION, "host struct of 8 bytes: create %d", calls.create);
+    short_life(c, &req_8, &calls);
+    LC_EXPECT(c, calls.requirements == LULL_E_VERSION, "struct of 8 bytes: requirements %d", calls.requirements);
+    short_life(c, &frame_8, &calls);
+    LC_EXPECT(c, calls.begin_frame == LULL_E_VERSION, "frame struct of 8 bytes: begin_frame %d", calls.begin_frame);
+    short_life(c, &view_8, &calls);
+    LC_EXPECT(c, calls.evaluate == LULL_E_VERSION, "view struct of 8 bytes: evaluate %d", calls.evaluate);
+}
+
+/* requirements and the error in memory whose rest must stay as it is. */
+static void check_tails(struct lc *c)
+{
+    enum { TAIL = 64 };
+    struct {
+        struct lull_requirements req;
+        unsigned char tail[TAIL];
+    } r;
+    struct {
+        struct lull_error err;
+        unsigned char tail[TAIL];
+    } e;
+    memset(&r, 0xa5, sizeof r);
+    memset(&e, 0xa5, sizeof e);
+    r.req.struct_size = sizeof r;
+    e.err = (struct lull_error){.struct_size = sizeof e};
+    struct lull_instance *instance = lc_create(c, NULL);
+    if (instance == NULL)
+        return;
+    int32_t status = c->criterion->requirements(instance, &r.req, &e.err);
+    LC_EXPECT(c, status == LULL_OK && r.req.struct_size == sizeof r, "requirements into a longer struct: %d, size %u", status,
+              r.req.struct_size);
+    c->criterion->destroy(instance);
+    struct lull_pair unknown = {"no-such-parameter", "1"};
+    struct lull_instance *none = NULL;
+    c->criterion->create(NULL, &unknown, 1, sizeof unknown, &none, &e.err);
+    for (int i = 0; i < TAIL; i++)
+        if (!LC_EXPECT(c, r.tail[i] == 0xa5 && e.tail[i] == 0xa5, "wrote past the end of a struct it knows"))
+            return;
+}
+
+static void check_newer(struct lc *c)
+{
+    struct lc_manner plain = {0}, wide = {.slack = 40, .layout = {.extra_planes = 3, .plane_slack = 24}};
+    struct lc_log expected, got;
+    if (lc_run(c, &plain, &expected) == 0 && lc_run(c, &wide, &got) == 0)
+        lc_log_compare(c, &expected, &got, lc_deterministic(c), "wider structs and strides");
+    else
+        got = (struct lc_log){0};
+    lc_log_release(&expected);
+    lc_log_release(&got);
+
+    /* pairs with a stride */
+    struct {
+        struct lull_pair pair;
+        uint64_t rest;
+    } pairs[2] = {{{"no-such-parameter", "1"}, ~UINT64_C(0)}, {{"nor-this", "1"}, ~UINT64_C(0)}};
+    struct lull_instance *none = NULL;
+    LC_EXPECT(c, c->criterion->create(NULL, &pairs[0].pair, 2, sizeof pairs[0], &none, NULL) == LULL_E_KEY,
+              "pairs with a wider stride are misread");
+    check_tails(c);
+}
+
+const struct lc_check lc_struct_checks[] = {
+    {"older-host", "reads and writes nothing past structs of version 1.0", check_older},
+    {"short-structs", "structs shorter than 1.0 are refused", check_too_short},
+    {"newer-host", "longer structs and wider strides change nothing", check_newer},
+    {0},
+};

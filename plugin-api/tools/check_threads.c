@@ -1,0 +1,141 @@
+/* SPDX-License-Identifier: MIT
+ *
+ * The host's workers, concurrent calls, the floating-point environment. Run a TSan build of lull-check and of the
+ * criterion to find races, not only their results.
+ */
+#include "check.h"
+
+#include <pthread.h>
+#include <string.h>
+
+#if defined(__SSE__)
+#include <xmmintrin.h>
+#endif
+
+static void check_workers(struct lc *c)
+{
+    struct lc_manner plain = {0};
+    struct lc_log expected;
+    if (lc_run(c, &plain, &expected) != 0)
+        return;
+    for (uint32_t threads = 1; threads <= c->workers; threads *= 2)
+        for (int reverse = 0; reverse < 2; reverse++) {
+            struct lc_host host;
+            struct lc_log got;
+            if (lc_host_init(&host, c, threads) != 0)
+                return;
+            host.reverse = reverse;
+            struct lc_manner hosted = {.host = &host.host};
+            if (lc_run(c, &hosted, &got) == 0)
+                lc_log_compare(c, &expected, &got, lc_deterministic(c), "parallel_for of the host");
+            else
+                lc_note(c, "that was with %u workers", host.host.max_workers);
+            lc_log_release(&got);
+            lc_host_release(&host);
+        }
+    lc_log_release(&expected);
+}
+
+static void check_concurrent(struct lc *c)
+{
+    if (c->criterion->thread_level < LULL_THREADS_FULL) {
+        lc_skip(c, "it does not declare FULL");
+        return;
+    }
+    struct lc_manner plain = {0};
+    struct lc_log expected, got;
+    struct lc_host host;
+    if (lc_run(c, &plain, &expected) != 0 || lc_host_init(&host, c, 4) != 0)
+        return;
+    for (int i = 0; i < 4; i++) {
+        struct lc_manner concurrent = {.ask = LC_ASK_CONCURRENTLY, .host = &host.host, .slack = i % 2 ? 8 : 0};
+        if (lc_run(c, &concurrent, &got) == 0)
+            lc_log_compare(c, &expected, &got, lc_deterministic(c), "concurrent calls");
+        lc_log_release(&got);
+    }
+    lc_log_release(&expected);
+    lc_host_release(&host);
+}
+
+/* --- several instances at once ---------------------------------------------------------------------------------------- */
+
+struct instance_thread {
+    struct lc *check;
+    struct lc_log log;
+    pthread_t id;
+    int result, started;
+};
+
+static void *instance_run(void *arg)
+{
+    struct instance_thread *t = arg;
+    struct lc_manner plain = {0};
+    t->result = lc_run(t->check, &plain, &t->log);
+    return NULL;
+}
+
+static void check_instances(struct lc *c)
+{
+    enum { THREADS = 3 };
+    if (c->criterion->thread_level < LULL_THREADS_INSTANCE) {
+        lc_skip(c, "it declares NONE");
+        return;
+    }
+    struct lc_manner plain = {0};
+    struct lc_log expected;
+    if (lc_run(c, &plain, &expected) != 0)
+        return;
+    c->concurrent = 1;
+    struct instance_thread threads[THREADS];
+    for (int i = 0; i < THREADS; i++) {
+        threads[i] = (struct instance_thread){.check = c, .result = -1};
+        threads[i].started = pthread_create(&threads[i].id, NULL, instance_run, &threads[i]) == 0;
+    }
+    for (int i = 0; i < THREADS; i++) {
+        if (threads[i].started)
+            pthread_join(threads[i].id, NULL);
+        if (threads[i].result == 0)
+            lc_log_compare(c, &expected, &threads[i].log, lc_deterministic(c), "one of three concurrent instances");
+        lc_log_release(&threads[i].log);
+    }
+    c->concurrent = 0;
+    lc_log_release(&expected);
+}
+
+/* --- floating point ------------------------------------------------------------------------------------------------------ */
+
+/* Every call already compares the control register; here with a host that flushes subnormals and traps nothing. */
+static void check_fp(struct lc *c)
+{
+    struct lc_manner plain = {0};
+    struct lc_log expected, got;
+    struct lull_process_state before, after;
+    lull_process_state_read(&before);
+    if (lc_run(c, &plain, &expected) != 0)
+        return;
+    lull_process_state_read(&after);
+    LC_EXPECT(c, after.thread_count <= before.thread_count, "a session left %ld thread(s) behind",
+              after.thread_count - before.thread_count);
+#if defined(__SSE__)
+    enum { FTZ_DAZ = 0x8040 };
+    _mm_setcsr(_mm_getcsr() | FTZ_DAZ);
+    int result = lc_run(c, &plain, &got);
+    LC_EXPECT(c, (_mm_getcsr() & FTZ_DAZ) == FTZ_DAZ, "a session changed the host's FTZ or DAZ");
+    _mm_setcsr(_mm_getcsr() & ~(unsigned)FTZ_DAZ);
+    if (result == 0)
+        lc_log_compare(c, &expected, &got, 0, "with FTZ and DAZ");
+    lc_log_release(&got);
+#else
+    (void)got;
+    lc_note(c, "FTZ and DAZ are not tried on this machine");
+#endif
+    lc_log_release(&expected);
+}
+
+const struct lc_check lc_thread_checks[] = {
+    {"workers", "any number of workers, tasks in any order", check_workers},
+    {"concurrent", "concurrent evaluate calls on one instance", check_concurrent},
+    {"instances", "concurrent instances", check_instances},
+    {"fp", "floating-point control and threads are left alone, FTZ and DAZ tolerated", check_fp},
+    {0},
+};

@@ -1,0 +1,382 @@
+/* SPDX-License-Identifier: MIT
+ *
+ * Made-up renders: a gradient with noise, and its storage in every form the ABI allows.
+ */
+#define _DEFAULT_SOURCE 1 /* MAP_ANONYMOUS */
+#include "check.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+const uint32_t lc_plane_channels[LULL_PLANE_COUNT] = {3, 1, 1, 1, 3, 3, 3, 1};
+const char *const lc_plane_names[LULL_PLANE_COUNT] = {"COLOR", "WEIGHT", "SPP",    "MOMENT2",
+                                                      "HALF",  "ALBEDO", "NORMAL", "DEPTH"};
+static const double luminance[3] = {0.2126, 0.7152, 0.0722};
+
+/* --- film ------------------------------------------------------------------------------------------------------------ */
+
+static int film_alloc(struct lc_film *f)
+{
+    size_t pixels = (size_t)f->width * (size_t)f->height;
+    f->rects = calloc(f->block_count, sizeof *f->rects);
+    f->blocks = calloc(f->block_count, sizeof *f->blocks);
+    f->half_sum = calloc(pixels * 3, sizeof(double));
+    int ok = f->rects != NULL && f->blocks != NULL && f->half_sum != NULL;
+    for (unsigned p = 0; p < LULL_PLANE_COUNT; p++) {
+        f->sum[p] = calloc(pixels * lc_plane_channels[p], sizeof(double));
+        ok = ok && f->sum[p] != NULL;
+    }
+    return ok ? 0 : -1;
+}
+
+int lc_film_init(struct lc_film *f, int32_t width, int32_t height, int32_t block_w, int32_t block_h, uint32_t seed)
+{
+    int32_t columns = (width + block_w - 1) / block_w, rows = (height + block_h - 1) / block_h;
+    *f = (struct lc_film){.width = width, .height = height, .seed = seed, .block_count = (uint32_t)(columns * rows)};
+    if (film_alloc(f) != 0) {
+        lc_film_release(f);
+        return -1;
+    }
+    for (int32_t i = 0; i < columns * rows; i++) {
+        int32_t x0 = i % columns * block_w, y0 = i / columns * block_h;
+        int32_t x1 = x0 + block_w < width ? x0 + block_w : width, y1 = y0 + block_h < height ? y0 + block_h : height;
+        f->rects[i] = (struct lull_rect){x0, y0, x1, y1};
+        f->blocks[i] =
+            (struct lull_block){.id = (uint32_t)i, .x0 = x0, .y0 = y0, .x1 = x1, .y1 = y1, .thread_s = (double)NAN};
+    }
+    return 0;
+}
+
+int lc_film_init_for(struct lc_film *f, const struct lull_requirements *req, uint32_t seed)
+{
+    int flexible = (req->flags & LULL_REQ_FLEXIBLE) != 0;
+    int32_t w = req->block_width > 0 && !flexible ? (int32_t)req->block_width : 24;
+    int32_t h = req->block_height > 0 && !flexible ? (int32_t)req->block_height : 16;
+    return lc_film_init(f, 2 * w + 1, h + 1, w, h, seed);
+}
+
+void lc_film_release(struct lc_film *f)
+{
+    for (unsigned p = 0; p < LULL_PLANE_COUNT; p++)
+        free(f->sum[p]);
+    free(f->half_sum);
+    free(f->rects);
+    free(f->blocks);
+    *f = (struct lc_film){0};
+}
+
+/* A hash of several numbers (the finaliser of MurmurHash3). */
+static uint32_t hash(uint32_t a, uint32_t b, uint32_t c, uint32_t d)
+{
+    uint32_t h = a * 0x9e3779b1u + b * 0x85ebca77u + c * 0xc2b2ae3du + d * 0x27d4eb2fu;
+    h = (h ^ (h >> 16)) * 0x85ebca6bu;
+    h = (h ^ (h >> 13)) * 0xc2b2ae35u;
+    return h ^ (h >> 16);
+}
+
+/* About normal with variance 1: the sum of twelve uniform numbers, less 6; from three hashes of four bytes each. */
+static double normal(uint32_t a, uint32_t b, uint32_t c, uint32_t d)
+{
+    double sum = 0;
+    for (uint32_t i = 0; i < 3; i++) {
+        uint32_t h = hash(a + i, b, c, d);
+        for (int k = 0; k < 32; k += 8)
+            sum += ((double)((h >> k) & 255) + 0.5) / 256;
+    }
+    return sum - 6;
+}
+
+static void paint_default(double rgb[3], double *sigma, int32_t x, int32_t y)
+{
+    rgb[0] = 0.2 + 0.3 * (x % 32) / 32.0;
+    rgb[1] = 0.4 + 0.2 * (y % 32) / 32.0;
+    rgb[2] = 0.3;
+    *sigma = 0.4;
+}
+
+static void add_samples(struct lc_film *f, int32_t x, int32_t y, uint64_t from, uint64_t count, int half)
+{
+    size_t at = (size_t)y * (size_t)f->width + (size_t)x;
+    double rgb[3], sigma, mean_y = 0, n = (double)count;
+    (f->paint != NULL ? f->paint : paint_default)(rgb, &sigma, x, y);
+    for (uint32_t c = 0; c < 3; c++) {
+        double noise = sigma == 0 ? 0 : normal(f->seed * 7919u + c * 3u, (uint32_t)at, (uint32_t)from, (uint32_t)half);
+        double sum = rgb[c] * (n + sigma * sqrt(n) * noise);
+        f->sum[LULL_PLANE_COLOR][at * 3 + c] += sum;
+        if (half)
+            f->half_sum[at * 3 + c] += sum;
+        f->sum[LULL_PLANE_ALBEDO][at * 3 + c] += 0.5 * n;
+        f->sum[LULL_PLANE_NORMAL][at * 3 + c] += (c == 2 ? -1 : 0) * n;
+        mean_y += luminance[c] * rgb[c];
+    }
+    f->sum[LULL_PLANE_MOMENT2][at] += mean_y * mean_y * (1 + sigma * sigma) * n;
+    f->sum[LULL_PLANE_DEPTH][at] += 2.5 * n;
+}
+
+void lc_film_advance(struct lc_film *f, uint32_t id, uint64_t spp)
+{
+    struct lull_block *b = &f->blocks[id];
+    if (spp <= b->spp)
+        return;
+    uint64_t half_spp = spp / 2, half = half_spp - b->half_spp, other = spp - b->spp - half;
+    for (int32_t y = b->y0; y < b->y1; y++)
+        for (int32_t x = b->x0; x < b->x1; x++) {
+            if (half > 0)
+                add_samples(f, x, y, b->spp, half, 1);
+            if (other > 0)
+                add_samples(f, x, y, b->spp, other, 0);
+        }
+    b->spp = spp;
+    b->half_spp = half_spp;
+}
+
+static const struct lull_block *block_at(const struct lc_film *f, int32_t x, int32_t y)
+{
+    for (uint32_t i = 0; i < f->block_count; i++)
+        if (x >= f->blocks[i].x0 && x < f->blocks[i].x1 && y >= f->blocks[i].y0 && y < f->blocks[i].y1)
+            return &f->blocks[i];
+    return NULL;
+}
+
+static double estimate_in(const struct lc_film *f, const struct lull_block *b, unsigned plane, size_t at, unsigned channel)
+{
+    if (plane == LULL_PLANE_SPP)
+        return (double)b->spp;
+    if (plane == LULL_PLANE_WEIGHT)
+        return (double)b->spp * (at % 3 == 0 ? 2 : 1);
+    double n = (double)(plane == LULL_PLANE_HALF ? b->half_spp : b->spp);
+    const double *sum = plane == LULL_PLANE_HALF ? f->half_sum : f->sum[plane];
+    double value = n > 0 ? sum[at * lc_plane_channels[plane] + channel] / n : 0;
+    return fmin(fmax(rint(value * 256) / 256, -7), 7);
+}
+
+double lc_film_estimate(const struct lc_film *f, unsigned plane, int32_t x, int32_t y, unsigned channel)
+{
+    return estimate_in(f, block_at(f, x, y), plane, (size_t)y * (size_t)f->width + (size_t)x, channel);
+}
+
+void lc_film_frame(const struct lc_film *f, struct lull_frame *frame, uint32_t planes)
+{
+    *frame = (struct lull_frame){
+        .struct_size = sizeof *frame,
+        .flags = LULL_FRAME_DETERMINISTIC | LULL_FRAME_INDEPENDENT,
+        .width = (uint32_t)f->width,
+        .height = (uint32_t)f->height,
+        .blocks = f->rects,
+        .block_count = f->block_count,
+        .block_stride = sizeof *f->rects,
+        .planes = planes,
+        .transfer = LULL_TRANSFER_SRGB,
+        .gamma = 2.2,
+        .exposure = 1,
+        .spp_min = 1,
+        .spp_max = 1 << 20,
+        .seed = f->seed,
+        /* IEC 61966-2-1 primaries */
+        .rgb_to_xyz = {0.4124, 0.3576, 0.1805, luminance[0], luminance[1], luminance[2], 0.0193, 0.1192, 0.9505},
+    };
+}
+
+/* --- guarded memory ---------------------------------------------------------------------------------------------------- */
+
+void *lc_guard_alloc(size_t size, size_t *mapped)
+{
+    size_t page = (size_t)sysconf(_SC_PAGESIZE), inner = (size + page - 1) / page * page;
+    *mapped = inner + 2 * page;
+    char *base = mmap(NULL, *mapped, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (base == MAP_FAILED)
+        return NULL;
+    if (mprotect(base + page, inner, PROT_READ | PROT_WRITE) != 0) {
+        munmap(base, *mapped);
+        return NULL;
+    }
+    return base + page + inner - size;
+}
+
+void lc_guard_free(void *memory, size_t mapped)
+{
+    if (memory == NULL)
+        return;
+    size_t page = (size_t)sysconf(_SC_PAGESIZE); /* the block begins in the first page after the guard */
+    munmap((char *)memory - (uintptr_t)memory % page - page, mapped);
+}
+
+/* --- image ----------------------------------------------------------------------------------------------------------- */
+
+static size_t type_size(int32_t type)
+{
+    return type == LULL_TYPE_F64 ? 8 : type == LULL_TYPE_F16 ? 2 : 4;
+}
+
+/* Exact for the values of a film: multiples of 1/256 below 8. */
+static uint16_t to_half_float(double v)
+{
+    if (isnan(v))
+        return 0x7e00;
+    uint16_t sign = v < 0 ? 0x8000 : 0;
+    v = fabs(v);
+    if (v == 0)
+        return sign;
+    int exponent;
+    double mantissa = frexp(v, &exponent); /* in [0.5, 1) */
+    if (exponent > 16)
+        return (uint16_t)(sign | 0x7c00);
+    if (exponent < -13)
+        return (uint16_t)(sign | (uint16_t)lrint(ldexp(v, 24)));
+    return (uint16_t)(sign | ((exponent + 14) << 10 | ((int)lrint(ldexp(mantissa, 11)) - 1024)));
+}
+
+static void store(char *at, int32_t type, double v)
+{
+    switch (type) {
+    case LULL_TYPE_F16: {
+        uint16_t h = to_half_float(v);
+        memcpy(at, &h, sizeof h);
+        break;
+    }
+    case LULL_TYPE_F64:
+        memcpy(at, &v, sizeof v);
+        break;
+    case LULL_TYPE_U32: {
+        uint32_t u = v > 0 && v < 4294967295.0 ? (uint32_t)llrint(v) : 0;
+        memcpy(at, &u, sizeof u);
+        break;
+    }
+    default: {
+        float s = (float)v;
+        memcpy(at, &s, sizeof s);
+        break;
+    }
+    }
+}
+
+/* Some planes have one sensible form only: counts are numbers of samples, normals have signs that u32 lacks. */
+static struct lc_layout layout_of(const struct lc_layout *wanted, unsigned plane)
+{
+    struct lc_layout l = *wanted;
+    if (plane == LULL_PLANE_SPP || plane == LULL_PLANE_WEIGHT) {
+        l.normaliser = LULL_NORM_ONE;
+        l.scale = 1;
+        l.type = l.type == LULL_TYPE_F16 ? LULL_TYPE_F32 : l.type;
+    }
+    if (plane == LULL_PLANE_NORMAL && l.type == LULL_TYPE_U32)
+        l.type = LULL_TYPE_F32;
+    if (plane == LULL_PLANE_HALF && l.normaliser == LULL_NORM_SPP)
+        l.normaliser = LULL_NORM_HALF_SPP;
+    if (l.scale == 0)
+        l.scale = 1;
+    return l;
+}
+
+static void store_block(const struct lc_film *f, const struct lull_block *b, unsigned plane, const struct lc_layout *l,
+                        const struct lull_plane *out)
+{
+    for (int32_t y = b->y0; y < b->y1; y++)
+        for (int32_t x = b->x0; x < b->x1; x++) {
+            size_t pixel = (size_t)y * (size_t)f->width + (size_t)x;
+            double n = l->normaliser == LULL_NORM_SPP        ? (double)b->spp
+                     : l->normaliser == LULL_NORM_HALF_SPP ? (double)b->half_spp
+                     : l->normaliser == LULL_NORM_WEIGHT   ? estimate_in(f, b, LULL_PLANE_WEIGHT, pixel, 0)
+                                                            : 1;
+            char *at = (char *)(uintptr_t)out->data + x * out->stride_x + y * out->stride_y;
+            for (unsigned c = 0; c < lc_plane_channels[plane] + (l->padded ? 1u : 0u); c++)
+                store(at + c * out->stride_c, l->type,
+                      c < lc_plane_channels[plane] ? estimate_in(f, b, plane, pixel, c) * n / l->scale : (double)NAN);
+        }
+}
+
+static int build_plane(struct lc_image *image, const struct lc_film *f, unsigned plane, const struct lc_layout *wanted)
+{
+    struct lc_layout l = layout_of(wanted, plane);
+    int64_t size = (int64_t)type_size(l.type), channels = lc_plane_channels[plane] + (l.padded ? 1 : 0);
+    int64_t pixels = (int64_t)f->width * f->height;
+    size_t bytes = (size_t)(size * channels * pixels);
+    char *memory = l.guard ? lc_guard_alloc(bytes, &image->mapped[plane]) : malloc(bytes);
+    if (memory == NULL)
+        return -1;
+    image->memory[plane] = memory;
+    struct lull_plane *p = lc_image_plane(image, plane);
+    *p = (struct lull_plane){.stride_x = l.planar ? size : size * channels,
+                             .stride_c = l.planar ? size * pixels : size,
+                             .scale = l.scale,
+                             .type = l.type,
+                             .normaliser = l.normaliser,
+                             .channels = (uint32_t)channels};
+    p->stride_y = p->stride_x * f->width;
+    if (l.bottom_up) {
+        memory += p->stride_y * (f->height - 1);
+        p->stride_y = -p->stride_y;
+    }
+    if (l.right_left) {
+        memory += p->stride_x * (f->width - 1);
+        p->stride_x = -p->stride_x;
+    }
+    p->data = memory;
+    for (uint32_t i = 0; i < f->block_count; i++)
+        store_block(f, &f->blocks[i], plane, &l, p);
+    return 0;
+}
+
+int lc_image_build(struct lc_image *image, const struct lc_film *f, const struct lc_layout *layout, uint32_t planes)
+{
+    uint32_t count = LULL_PLANE_COUNT + layout->extra_planes;
+    uint32_t stride = (uint32_t)sizeof(struct lull_plane) + layout->plane_slack;
+    if (layout->normaliser == LULL_NORM_WEIGHT)
+        planes |= LULL_PLANE_BIT(LULL_PLANE_WEIGHT);
+    *image = (struct lc_image){.descriptors = malloc((size_t)count * stride)};
+    if (image->descriptors == NULL)
+        return -1;
+    memset(image->descriptors, 0xa5, (size_t)count * stride); /* garbage between, and in planes from the future */
+    image->view = (struct lull_view){.struct_size = sizeof image->view,
+                                     .x1 = f->width,
+                                     .y1 = f->height,
+                                     .planes = (const struct lull_plane *)(const void *)image->descriptors,
+                                     .plane_count = count,
+                                     .plane_stride = stride,
+                                     .all = f->blocks,
+                                     .all_count = f->block_count,
+                                     .all_stride = sizeof *f->blocks,
+                                     .elapsed_s = (double)NAN};
+    for (unsigned p = 0; p < LULL_PLANE_COUNT; p++) {
+        *lc_image_plane(image, p) = (struct lull_plane){.scale = 1};
+        if ((planes & LULL_PLANE_BIT(p)) && build_plane(image, f, p, layout) != 0) {
+            lc_image_release(image);
+            return -1;
+        }
+    }
+    return 0;
+}
+
+void lc_image_release(struct lc_image *image)
+{
+    for (unsigned p = 0; p < LULL_PLANE_COUNT; p++)
+        if (image->mapped[p] > 0)
+            lc_guard_free(image->memory[p], image->mapped[p]);
+        else
+            free(image->memory[p]);
+    free(image->descriptors);
+    *image = (struct lc_image){0};
+}
+
+struct lull_plane *lc_image_plane(struct lc_image *image, unsigned plane)
+{
+    size_t stride = image->view.plane_stride > 0 ? image->view.plane_stride : sizeof(struct lull_plane);
+    return (struct lull_plane *)(void *)(image->descriptors + plane * stride);
+}
+
+void lc_image_poke(struct lc_image *image, int32_t x, int32_t y, float value)
+{
+    static const unsigned planes[] = {LULL_PLANE_COLOR, LULL_PLANE_MOMENT2, LULL_PLANE_HALF, LULL_PLANE_ALBEDO,
+                                      LULL_PLANE_NORMAL, LULL_PLANE_DEPTH};
+    for (size_t i = 0; i < sizeof planes / sizeof *planes; i++) {
+        const struct lull_plane *p = lc_image_plane(image, planes[i]);
+        if (p->data == NULL)
+            continue;
+        char *at = (char *)(uintptr_t)p->data + x * p->stride_x + y * p->stride_y;
+        for (uint32_t c = 0; c < lc_plane_channels[planes[i]]; c++)
+            memcpy(at + c * p->stride_c, &value, sizeof value);
+    }
+}

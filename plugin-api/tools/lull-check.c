@@ -1,0 +1,311 @@
+/* SPDX-License-Identifier: MIT
+ *
+ * lull-check: holds a stopping criterion against the whole contract of lull/criterion.h.
+ */
+#include "child.h"
+
+#include <argp.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { PAIRS_MAX = 64, NAMES_MAX = 64, SPECS_MAX = 256, IDS_MAX = LC_LINES_MAX };
+
+struct arguments {
+    struct lull_pair pairs[PAIRS_MAX];
+    uint32_t pair_count;
+    const char *only[NAMES_MAX];
+    int only_count;
+    const char *specs[SPECS_MAX];
+    int spec_count;
+    uint32_t workers;
+    unsigned limit_s;
+    int quiet, list;
+};
+
+static const struct lc_check *const groups[] = {lc_table_checks, lc_create_checks, lc_struct_checks,
+                                                lc_pixel_checks, lc_life_checks,   lc_batch_checks,
+                                                lc_thread_checks, lc_state_checks,  lc_cost_checks};
+enum { GROUPS = sizeof groups / sizeof *groups };
+
+/* --- command line -------------------------------------------------------------------------------------------------------- */
+
+static const struct argp_option options[] = {
+    {"param", 'p', "KEY=VALUE", 0, "Give the criterion this parameter (repeatable)", 0},
+    {"only", 'o', "CHECK", 0, "Run this check only (repeatable)", 0},
+    {"list", 'l', NULL, 0, "List the checks and exit", 0},
+    {"quiet", 'q', NULL, 0, "Print failures and the last line only", 0},
+    {"threads", 't', "N", 0, "Threads for the concurrent checks, 2 to 32 (default 4)", 0},
+    {"limit", 'L', "SECONDS", 0, "A check that takes longer has failed (default 120)", 0},
+    {0},
+};
+
+static const char doc[] =
+    "Holds stopping criteria against the whole contract of lull/criterion.h."
+    "\vCRITERION is NAME (looked for in LULL_PLUGIN_PATH and in lib/lull beside this program), PATH (every criterion of the "
+    "library) or PATH:ID. Each check runs in a process of its own; the output is TAP.\n\n"
+    "Exit status: 0 all checks passed, 1 one failed, 2 wrong usage or no such criterion.";
+
+static long number(struct argp_state *state, const char *text, long min, long max)
+{
+    char *end;
+    long value = strtol(text, &end, 10);
+    if (end == text || *end != '\0' || value < min || value > max)
+        argp_error(state, "'%s' is not an integer in [%ld, %ld]", text, min, max);
+    return value;
+}
+
+static void add_only(struct argp_state *state, struct arguments *a, const char *name)
+{
+    int known = 0;
+    for (int g = 0; g < GROUPS; g++)
+        for (const struct lc_check *k = groups[g]; k->name != NULL; k++)
+            known |= strcmp(k->name, name) == 0;
+    if (!known)
+        argp_error(state, "no check '%s'; --list names them", name);
+    if (a->only_count == NAMES_MAX)
+        argp_error(state, "too many checks");
+    a->only[a->only_count++] = name;
+}
+
+static void add_pair(struct argp_state *state, struct arguments *a, char *text)
+{
+    char *equals = strchr(text, '=');
+    if (equals == NULL || equals == text)
+        argp_error(state, "'%s' is not KEY=VALUE", text);
+    if (a->pair_count == PAIRS_MAX)
+        argp_error(state, "too many parameters");
+    if (equals != NULL)
+        *equals++ = '\0';
+    a->pairs[a->pair_count++] = (struct lull_pair){text, equals};
+}
+
+static error_t parse(int key, char *arg, struct argp_state *state)
+{
+    struct arguments *a = state->input;
+    switch (key) {
+    case 'p': add_pair(state, a, arg); break;
+    case 'o': add_only(state, a, arg); break;
+    case 'l': a->list = 1; break;
+    case 'q': a->quiet = 1; break;
+    case 't': a->workers = (uint32_t)number(state, arg, 2, 32); break;
+    case 'L': a->limit_s = (unsigned)number(state, arg, 1, 100000); break;
+    case ARGP_KEY_ARG:
+        if (a->spec_count == SPECS_MAX)
+            argp_error(state, "too many criteria");
+        a->specs[a->spec_count++] = arg;
+        break;
+    case ARGP_KEY_END:
+        if (a->spec_count == 0 && !a->list)
+            argp_error(state, "no criterion given");
+        break;
+    default: return ARGP_ERR_UNKNOWN;
+    }
+    return 0;
+}
+
+/* --- finding ------------------------------------------------------------------------------------------------------------- */
+
+/* PREFIX/lib/lull for a program in PREFIX/bin. */
+static void own_directory(char dir[LULL_PATH_MAX])
+{
+    char exe[LULL_PATH_MAX];
+    ssize_t length = readlink("/proc/self/exe", exe, sizeof exe - 1);
+    dir[0] = '\0';
+    if (length <= 0)
+        return;
+    exe[length] = '\0';
+    char *slash = strrchr(exe, '/');
+    if (slash != NULL && (size_t)(slash - exe) + sizeof "/../lib/lull" < LULL_PATH_MAX)
+        snprintf(dir, LULL_PATH_MAX, "%.*s/../lib/lull", (int)(slash - exe), exe);
+}
+
+/* In a child: reports the path and then the ids to check as notes; skipped means that there is no such criterion. */
+static void find(struct lc *c, const void *arg)
+{
+    const char *spec = arg;
+    char own[LULL_PATH_MAX];
+    own_directory(own);
+    const char *dirs[] = {getenv("LULL_PLUGIN_PATH"), own};
+    struct lull_search search = {.dirs = dirs, .dir_count = 2};
+    struct lull_found *found = malloc(sizeof *found);
+    struct lull_error err = {.struct_size = sizeof err, .message = "out of memory"};
+    if (found == NULL || lull_open(&search, spec, found, &err) != LULL_OK) {
+        if (err.code == LULL_E_INVALID || err.code == LULL_E_KEY || (err.code == LULL_E_IO && access(spec, R_OK) != 0))
+            lc_skip(c, "%s", err.message);
+        else
+            lc_fail(c, "%s", err.message);
+        free(found);
+        return;
+    }
+    lc_note(c, "%s", found->path);
+    const char *id = found->criterion->id;
+    size_t length = strlen(spec), id_length = strlen(id);
+    int is_path = strchr(spec, '/') != NULL || (length > 3 && strcmp(spec + length - 3, ".so") == 0);
+    int names_id = length > id_length && spec[length - id_length - 1] == ':' && strcmp(spec + length - id_length, id) == 0;
+    lull_entry_fn entry = lc_entry(found->path);
+    if (!is_path || names_id)
+        lc_note(c, "%s", id);
+    else
+        for (uint32_t i = 0; entry(i) != NULL; i++)
+            lc_note(c, "%s", entry(i)->id);
+    free(found);
+}
+
+/* Loads the criterion and what it requires, in a child. */
+static int prepare(struct lc *c, const char *id)
+{
+    lull_entry_fn entry = lc_entry(c->path);
+    c->criterion = NULL;
+    for (uint32_t i = 0; entry != NULL && c->criterion == NULL && entry(i) != NULL; i++)
+        if (strcmp(entry(i)->id, id) == 0)
+            c->criterion = entry(i);
+    if (!LC_EXPECT(c, c->criterion != NULL, "no criterion %s", id))
+        return -1;
+    struct lull_instance *instance = NULL;
+    struct lull_error err = {.struct_size = sizeof err};
+    int32_t status = c->criterion->create(NULL, c->pairs, c->pair_count, sizeof *c->pairs, &instance, &err);
+    if (c->pair_count > 0 && (status == LULL_E_KEY || status == LULL_E_VALUE)) {
+        lc_skip(c, "%s", err.message);
+        return -1;
+    }
+    if (!LC_EXPECT(c, status == LULL_OK && instance != NULL, "create failed (%d): %s", status, err.message))
+        return -1;
+    c->req = (struct lull_requirements){.struct_size = sizeof c->req};
+    status = c->criterion->requirements(instance, &c->req, &err);
+    c->criterion->destroy(instance);
+    return LC_EXPECT(c, status == LULL_OK, "requirements failed (%d): %s", status, err.message) ? 0 : -1;
+}
+
+/* --- running ------------------------------------------------------------------------------------------------------------- */
+
+struct task {
+    const char *id;
+    const struct lc_check *check; /* NULL: only see whether the criterion can be made */
+};
+
+static void run_task(struct lc *c, const void *arg)
+{
+    const struct task *task = arg;
+    if (prepare(c, task->id) == 0 && task->check != NULL)
+        task->check->run(c);
+}
+
+struct totals {
+    int checks, failed;
+};
+
+static void print_report(const struct arguments *a, struct totals *t, const char *name, const char *title,
+                         const struct lc_report *r)
+{
+    t->checks++;
+    t->failed += r->failures > 0;
+    if (r->failures > 0)
+        printf("not ok %d - %s: %s\n", t->checks, name, title);
+    else if (!a->quiet)
+        printf("ok %d - %s: %s", t->checks, name, title);
+    for (int i = 0; i < r->line_count; i++) {
+        if (r->failures > 0)
+            printf("#   %s\n", r->lines[i]);
+        else if (!a->quiet && r->kind[i] == 'S')
+            printf(" # SKIP %s", r->lines[i]);
+        else if (!a->quiet)
+            printf(" (%s)", r->lines[i]);
+    }
+    if (r->failures == 0 && !a->quiet)
+        putchar('\n');
+    if (r->lines_left_out > 0)
+        printf("#   and %d more\n", r->lines_left_out);
+    fflush(stdout);
+}
+
+static int wanted(const struct arguments *a, const struct lc_check *check)
+{
+    for (int i = 0; i < a->only_count; i++)
+        if (strcmp(a->only[i], check->name) == 0)
+            return 1;
+    return a->only_count == 0;
+}
+
+static int no_process(void)
+{
+    fputs("lull-check: cannot start a process\n", stderr);
+    return LC_EXIT_FAILED;
+}
+
+static int check_criterion(const struct arguments *a, struct lc *c, const char *id, struct totals *t)
+{
+    struct lc_report *r = malloc(sizeof *r);
+    if (r == NULL)
+        return no_process();
+    if (!a->quiet)
+        printf("# %s:%s\n", c->path, id);
+    int result = lc_child_run(c, run_task, &(struct task){id, NULL}, a->limit_s, r);
+    if (result == 0 && r->skipped) {
+        fprintf(stderr, "lull-check: %s: %s\n", id, r->lines[0]);
+        free(r);
+        return LC_EXIT_USAGE;
+    }
+    if (result == 0 && r->failures > 0)
+        print_report(a, t, "create", "an instance can be made", r);
+    else
+        for (int g = 0; g < GROUPS && result == 0; g++)
+            for (const struct lc_check *k = groups[g]; k->name != NULL && result == 0; k++) {
+                if (!wanted(a, k))
+                    continue;
+                result = lc_child_run(c, run_task, &(struct task){id, k}, a->limit_s, r);
+                if (result == 0)
+                    print_report(a, t, k->name, k->title, r);
+            }
+    free(r);
+    return result == 0 ? LC_EXIT_OK : no_process();
+}
+
+static int check_spec(const struct arguments *a, const char *spec, struct totals *t)
+{
+    struct lc c = {.pairs = a->pairs, .pair_count = a->pair_count, .workers = a->workers};
+    struct lc_report *r = malloc(sizeof *r);
+    if (r == NULL || lc_child_run(&c, find, spec, a->limit_s, r) != 0) {
+        free(r);
+        return no_process();
+    }
+    int status = LC_EXIT_OK;
+    if (r->skipped) {
+        fprintf(stderr, "lull-check: %s\n", r->lines[0]);
+        status = LC_EXIT_USAGE;
+    } else if (r->failures > 0) {
+        if (!a->quiet)
+            printf("# %s\n", spec);
+        print_report(a, t, "find", "the library can be loaded and its tables read", r);
+    } else {
+        c.path = r->lines[0];
+        for (int i = 1; i < r->line_count && status == LC_EXIT_OK; i++)
+            status = check_criterion(a, &c, r->lines[i], t);
+    }
+    free(r);
+    return status;
+}
+
+int main(int argc, char **argv)
+{
+    static const struct argp argp = {options, parse, "CRITERION...", doc, NULL, NULL, NULL};
+    static struct arguments a = {.workers = 4, .limit_s = 120};
+    argp_err_exit_status = LC_EXIT_USAGE;
+    argp_parse(&argp, argc, argv, 0, NULL, &a);
+    if (a.list) {
+        for (int g = 0; g < GROUPS; g++)
+            for (const struct lc_check *k = groups[g]; k->name != NULL; k++)
+                printf("%-20s %s\n", k->name, k->title);
+        return LC_EXIT_OK;
+    }
+    struct totals t = {0};
+    for (int i = 0; i < a.spec_count; i++) {
+        int status = check_spec(&a, a.specs[i], &t);
+        if (status != LC_EXIT_OK)
+            return status;
+    }
+    printf("1..%d\n# %d checks, %d failed\n", t.checks, t.checks, t.failed);
+    if (fflush(stdout) != 0 || ferror(stdout))
+        return LC_EXIT_FAILED;
+    return t.failed > 0 ? LC_EXIT_FAILED : LC_EXIT_OK;
+}

@@ -1,0 +1,465 @@
+/* SPDX-License-Identifier: MIT
+ *
+ * One render as a criterion sees it, asked in a chosen manner; every answer is held against the header's rules.
+ */
+#include "check.h"
+
+#include <math.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+static double now_s(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+int lc_deterministic(const struct lc *c)
+{
+    return (c->criterion->capabilities & LULL_CAP_DETERMINISTIC) != 0;
+}
+
+void lc_fp_check(struct lc *c, const struct lull_process_state *before, const char *call)
+{
+    struct lull_process_state after;
+    lull_process_state_read(&after);
+    LC_EXPECT(c, after.fp_control == before->fp_control, "%s changed the floating-point control register: %#llx, was %#llx",
+              call, after.fp_control, before->fp_control);
+    LC_EXPECT(c, c->concurrent || after.thread_count <= before->thread_count, "%s started %ld thread(s)", call,
+              after.thread_count - before->thread_count);
+    lull_process_state_restore(before);
+}
+
+struct lull_instance *lc_create(struct lc *c, const struct lull_host *host)
+{
+    struct lull_instance *instance = NULL;
+    struct lull_error err = {.struct_size = sizeof err};
+    struct lull_process_state before;
+    lull_process_state_read(&before);
+    int32_t status = c->criterion->create(host, c->pairs, c->pair_count, sizeof *c->pairs, &instance, &err);
+    lc_fp_check(c, &before, "create");
+    if (!LC_EXPECT(c, status == LULL_OK, "create failed (%d): %s", status, err.message))
+        return NULL;
+    LC_EXPECT(c, instance != NULL, "create succeeded without an instance");
+    return instance;
+}
+
+int32_t lc_begin(struct lc *c, struct lull_instance *instance, const struct lull_frame *frame, struct lull_error *err)
+{
+    struct lull_process_state before;
+    lull_process_state_read(&before);
+    int32_t status = c->criterion->begin_frame(instance, frame, err);
+    lc_fp_check(c, &before, "begin_frame");
+    return status;
+}
+
+/* --- decisions ------------------------------------------------------------------------------------------------------- */
+
+void lc_decision_preset(struct lull_decision *d)
+{
+    *d = (struct lull_decision){
+        .action = LULL_CONTINUE, .p_noisy = (double)NAN, .predicted_spp = (double)NAN, .error = (double)NAN};
+}
+
+void lc_decision_check(struct lc *c, const struct lull_block *b, const struct lull_decision *d)
+{
+    const uint32_t known = LULL_DECISION_TOO_EARLY | LULL_DECISION_BAD_INPUT;
+    unsigned id = b->id;
+    unsigned long long spp = b->spp;
+    LC_EXPECT(c, d->action == LULL_CONTINUE || d->action == LULL_STOP, "block %u at %llu spp: unknown action %d", id, spp,
+              d->action);
+    LC_EXPECT(c, (d->flags & ~known) == 0, "block %u at %llu spp: unknown decision flags %#x", id, spp, d->flags);
+    if (d->action == LULL_CONTINUE)
+        LC_EXPECT(c, d->next_spp == 0 || d->next_spp > b->spp, "block %u at %llu spp: next_spp %llu is not later", id, spp,
+                  (unsigned long long)d->next_spp);
+    LC_EXPECT(c, isnan(d->p_noisy) || (d->p_noisy >= 0 && d->p_noisy <= 1), "block %u at %llu spp: p_noisy is %g", id, spp,
+              d->p_noisy);
+    LC_EXPECT(c, isnan(d->error) || (d->error >= 0 && isfinite(d->error)), "block %u at %llu spp: error is %g", id, spp,
+              d->error);
+    LC_EXPECT(c, isnan(d->predicted_spp) || (d->predicted_spp >= 0 && isfinite(d->predicted_spp)),
+              "block %u at %llu spp: predicted_spp is %g", id, spp, d->predicted_spp);
+    LC_EXPECT(c, b->spp > 0 || d->action == LULL_CONTINUE, "block %u is stopped without any sample", id);
+    LC_EXPECT(c, d->action == LULL_CONTINUE || !(d->flags & LULL_DECISION_TOO_EARLY),
+              "block %u at %llu spp: stopped, although too early to say", id, spp);
+    LC_EXPECT(c, b->spp >= c->req.first_spp || d->action == LULL_CONTINUE, "block %u is stopped at %llu spp, before first_spp",
+              id, spp);
+}
+
+static int same_number(double a, double b, int exact)
+{
+    if (isnan(a) || isnan(b))
+        return isnan(a) && isnan(b);
+    return exact ? memcmp(&a, &b, sizeof a) == 0 : fabs(a - b) <= 1e-3 * fmax(fabs(a), fabs(b)) + 1e-9;
+}
+
+int lc_log_compare(struct lc *c, const struct lc_log *expected, const struct lc_log *got, int exact, const char *what)
+{
+    for (size_t i = 0; i < expected->count && i < got->count; i++) {
+        const struct lc_answer *a = &expected->items[i], *b = &got->items[i];
+        const struct lull_decision *p = &a->decision, *q = &b->decision;
+        if (a->id == b->id && a->spp == b->spp && p->action == q->action && p->flags == q->flags &&
+            same_number(p->p_noisy, q->p_noisy, exact) && same_number(p->error, q->error, exact) &&
+            (!exact || (p->next_spp == q->next_spp && same_number(p->predicted_spp, q->predicted_spp, exact))))
+            continue;
+        lc_fail(c, "%s: block %u at %llu spp answers action %d error %.9g p %.9g next %llu, block %u at %llu spp before: "
+                   "action %d error %.9g p %.9g next %llu",
+                what, b->id, (unsigned long long)b->spp, q->action, q->error, q->p_noisy, (unsigned long long)q->next_spp,
+                a->id, (unsigned long long)a->spp, p->action, p->error, p->p_noisy, (unsigned long long)p->next_spp);
+        return -1;
+    }
+    if (!LC_EXPECT(c, expected->count == got->count, "%s: %zu answers, %zu before", what, got->count, expected->count))
+        return -1;
+    return 0;
+}
+
+void lc_log_release(struct lc_log *log)
+{
+    free(log->items);
+    *log = (struct lc_log){0};
+}
+
+static int log_add(struct lc_log *log, const struct lc_answer *answer)
+{
+    if (log->count == log->room) {
+        size_t room = log->room == 0 ? 64 : 2 * log->room;
+        struct lc_answer *items = realloc(log->items, room * sizeof *items);
+        if (items == NULL)
+            return -1;
+        log->items = items;
+        log->room = room;
+    }
+    log->items[log->count++] = *answer;
+    return 0;
+}
+
+/* --- asking ------------------------------------------------------------------------------------------------------------ */
+
+enum { GARBAGE = 0xa5 };
+
+/* Arrays with slack between the elements, as a newer host would have them. */
+struct ask_arrays {
+    char *blocks, *decisions, *view;
+    uint32_t block_stride, decision_stride;
+};
+
+static int ask_arrays_init(struct ask_arrays *a, const struct lc_session *s, const struct lc_image *image,
+                           const uint32_t *ids, uint32_t count)
+{
+    a->block_stride = (uint32_t)sizeof(struct lull_block) + s->manner.slack;
+    a->decision_stride = (uint32_t)sizeof(struct lull_decision) + s->manner.slack;
+    a->blocks = malloc((size_t)count * a->block_stride + 1);
+    a->decisions = malloc((size_t)count * a->decision_stride + 1);
+    a->view = malloc(sizeof image->view + s->manner.slack);
+    if (a->blocks == NULL || a->decisions == NULL || a->view == NULL)
+        return -1;
+    struct lull_view view = image->view;
+    view.struct_size += s->manner.slack;
+    memset(a->view, GARBAGE, sizeof view + s->manner.slack);
+    memcpy(a->view, &view, sizeof view);
+    memset(a->blocks, GARBAGE, (size_t)count * a->block_stride);
+    memset(a->decisions, GARBAGE, (size_t)count * a->decision_stride);
+    for (uint32_t i = 0; i < count; i++) {
+        struct lull_decision preset;
+        lc_decision_preset(&preset);
+        memcpy(a->blocks + (size_t)i * a->block_stride, &s->film.blocks[ids[i]], sizeof(struct lull_block));
+        memcpy(a->decisions + (size_t)i * a->decision_stride, &preset, sizeof preset);
+    }
+    return 0;
+}
+
+static void ask_arrays_take(struct lc_session *s, const struct ask_arrays *a, const uint32_t *ids, uint32_t count,
+                            struct lull_decision *decisions)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        const char *at = a->decisions + (size_t)i * a->decision_stride;
+        memcpy(&decisions[ids[i]], at, sizeof *decisions);
+        for (uint32_t k = (uint32_t)sizeof *decisions; k < a->decision_stride; k++)
+            if (!LC_EXPECT(s->check, (unsigned char)at[k] == GARBAGE, "evaluate wrote past the end of a decision (stride %u)",
+                           a->decision_stride))
+                break;
+    }
+}
+
+/* One call of evaluate for some of the blocks. */
+static int32_t ask_some(struct lc_session *s, const struct lc_image *image, const uint32_t *ids, uint32_t count,
+                        struct lull_decision *decisions, struct lull_error *err)
+{
+    struct ask_arrays a = {0};
+    int32_t status = LULL_E_MEMORY;
+    if (ask_arrays_init(&a, s, image, ids, count) == 0) {
+        struct lull_process_state before, after;
+        lull_process_state_read(&before);
+        const void *blocks = a.blocks, *view = a.view;
+        void *out = a.decisions;
+        status = s->check->criterion->evaluate(s->instance, view, blocks, a.block_stride, out, a.decision_stride, count, err);
+        lull_process_state_read(&after);
+        LC_EXPECT(s->check, after.fp_control == before.fp_control, "evaluate changed the floating-point control register");
+        lull_process_state_restore(&before);
+        if (status == LULL_OK)
+            ask_arrays_take(s, &a, ids, count, decisions);
+    }
+    free(a.blocks);
+    free(a.decisions);
+    free(a.view);
+    return status;
+}
+
+struct ask_thread {
+    struct lc_session *s;
+    const struct lc_image *image;
+    const uint32_t *ids;
+    struct lull_decision *decisions;
+    struct lull_error err;
+    uint32_t first, count, step;
+    int32_t status;
+    pthread_t id;
+    int started;
+};
+
+static void *ask_thread_run(void *arg)
+{
+    struct ask_thread *t = arg;
+    for (uint32_t i = t->first; i < t->count && t->status == LULL_OK; i += t->step)
+        t->status = ask_some(t->s, t->image, &t->ids[i], 1, t->decisions, &t->err);
+    return NULL;
+}
+
+static int32_t ask_concurrently(struct lc_session *s, const struct lc_image *image, const uint32_t *ids, uint32_t count,
+                                struct lull_decision *decisions, struct lull_error *err)
+{
+    enum { THREADS = 4 };
+    struct ask_thread threads[THREADS];
+    for (uint32_t t = 0; t < THREADS; t++) {
+        threads[t] = (struct ask_thread){s, image, ids, decisions, *err, t, count, THREADS, LULL_OK, 0, 0};
+        threads[t].started = pthread_create(&threads[t].id, NULL, ask_thread_run, &threads[t]) == 0;
+        if (!threads[t].started)
+            ask_thread_run(&threads[t]);
+    }
+    int32_t status = LULL_OK;
+    for (uint32_t t = 0; t < THREADS; t++) {
+        if (threads[t].started)
+            pthread_join(threads[t].id, NULL);
+        if (threads[t].status != LULL_OK) {
+            status = threads[t].status;
+            *err = threads[t].err;
+        }
+    }
+    return status;
+}
+
+int32_t lc_session_ask(struct lc_session *s, const struct lc_image *image, const uint32_t *ids, uint32_t count,
+                       struct lull_decision *decisions, struct lull_error *err)
+{
+    double start = now_s();
+    int32_t status = LULL_OK;
+    uint32_t *order = malloc((count + 1) * sizeof *order);
+    if (order == NULL)
+        return LULL_E_MEMORY;
+    for (uint32_t i = 0; i < count; i++)
+        order[i] = s->manner.ask == LC_ASK_REVERSED ? ids[count - 1 - i] : ids[i];
+    if (s->manner.ask == LC_ASK_SINGLY)
+        for (uint32_t i = 0; i < count && status == LULL_OK; i++)
+            status = ask_some(s, image, &order[i], 1, decisions, err);
+    else if (s->manner.ask == LC_ASK_CONCURRENTLY)
+        status = ask_concurrently(s, image, order, count, decisions, err);
+    else
+        status = ask_some(s, image, order, count, decisions, err);
+    if (s->manner.ask == LC_ASK_TWICE && status == LULL_OK) /* the second answer is the one that is logged */
+        status = ask_some(s, image, order, count, decisions, err);
+    free(order);
+    s->evaluate_s += now_s() - start;
+    s->evaluated += count;
+    return status;
+}
+
+/* --- sessions ---------------------------------------------------------------------------------------------------------- */
+
+/* A frame struct with a tail, and rectangles with gaps, as the manner asks for. */
+static int32_t begin_with_slack(struct lc_session *s, uint32_t flags, struct lull_error *err)
+{
+    uint32_t slack = s->manner.slack, stride = (uint32_t)sizeof(struct lull_rect) + slack;
+    char *frame_memory = malloc(sizeof(struct lull_frame) + slack);
+    char *rects = malloc((size_t)s->film.block_count * stride);
+    int32_t status = LULL_E_MEMORY;
+    if (frame_memory != NULL && rects != NULL) {
+        memset(frame_memory, GARBAGE, sizeof(struct lull_frame) + slack);
+        memset(rects, GARBAGE, (size_t)s->film.block_count * stride);
+        for (uint32_t i = 0; i < s->film.block_count; i++)
+            memcpy(rects + (size_t)i * stride, &s->film.rects[i], sizeof(struct lull_rect));
+        struct lull_frame frame;
+        lc_film_frame(&s->film, &frame, s->planes);
+        frame.struct_size += slack;
+        frame.flags |= s->manner.frame_flags | flags;
+        frame.blocks = (const struct lull_rect *)(const void *)rects;
+        frame.block_stride = stride;
+        memcpy(frame_memory, &frame, sizeof frame);
+        status = lc_begin(s->check, s->instance, (const struct lull_frame *)(const void *)frame_memory, err);
+        /* what begin_frame was given is gone now: a criterion that kept a pointer reads garbage */
+        memset(frame_memory, GARBAGE, sizeof frame + slack);
+        memset(rects, GARBAGE, (size_t)s->film.block_count * stride);
+    }
+    free(frame_memory);
+    free(rects);
+    return status;
+}
+
+static int begin(struct lc_session *s, uint32_t flags)
+{
+    struct lull_error err = {.struct_size = sizeof err};
+    int32_t status = begin_with_slack(s, flags, &err);
+    if (!LC_EXPECT(s->check, status == LULL_OK, "begin_frame failed (%d): %s", status, err.message))
+        return -1;
+    s->spp = s->check->req.first_spp > 2 ? s->check->req.first_spp : 2;
+    s->spp += s->spp % 2;
+    s->step = 0;
+    s->log.count = 0;
+    s->open = 1;
+    return 0;
+}
+
+int lc_session_open_film(struct lc_session *s, struct lc *c, const struct lc_manner *manner, struct lc_film *film)
+{
+    *s = (struct lc_session){.check = c, .manner = *manner, .film = *film};
+    *film = (struct lc_film){0};
+    s->planes = manner->required_only ? c->req.planes_required : c->req.planes_used;
+    s->instance = lc_create(c, manner->host);
+    if (s->instance != NULL && begin(s, 0) == 0)
+        return 0;
+    lc_session_close(s);
+    return -1;
+}
+
+int lc_session_open(struct lc_session *s, struct lc *c, const struct lc_manner *manner)
+{
+    struct lc_film film;
+    *s = (struct lc_session){0};
+    if (lc_film_init_for(&film, &c->req, 1 + manner->seed) != 0) {
+        lc_fail(c, "out of memory");
+        return -1;
+    }
+    return lc_session_open_film(s, c, manner, &film);
+}
+
+int lc_session_restart(struct lc_session *s)
+{
+    struct lc_film fresh;
+    if (lc_film_init_for(&fresh, &s->check->req, s->film.seed) != 0) {
+        lc_fail(s->check, "out of memory");
+        return -1;
+    }
+    lc_film_release(&s->film);
+    s->film = fresh;
+    return begin(s, LULL_FRAME_RESTART);
+}
+
+int lc_session_image(struct lc_session *s, struct lc_image *image)
+{
+    if (lc_image_build(image, &s->film, &s->manner.layout, s->planes) != 0) {
+        lc_fail(s->check, "out of memory");
+        return -1;
+    }
+    if (s->manner.no_all) {
+        image->view.all = NULL;
+        image->view.all_count = 0;
+    }
+    return 0;
+}
+
+/* Samples for the next step, as the first block that continues has asked for them: at least a quarter more, at most twice
+ * as many as now, so that a session stays short. */
+static uint64_t next_spp(const struct lc_session *s, const struct lull_decision *decisions, const uint32_t *ids,
+                         uint32_t count)
+{
+    uint64_t wanted = 0;
+    for (uint32_t i = 0; i < count && wanted == 0; i++)
+        if (decisions[ids[i]].action == LULL_CONTINUE)
+            wanted = decisions[ids[i]].next_spp >> (ids[i] % 2);
+    uint64_t least = s->spp + s->spp / 4 + 1, most = 2 * s->spp;
+    if (wanted == 0)
+        wanted = s->spp + s->spp / 2;
+    wanted = wanted < least ? least : wanted > most ? most : wanted;
+    return wanted + wanted % 2;
+}
+
+static int step_with(struct lc_session *s, const uint32_t *ids, uint32_t count, struct lull_decision *decisions)
+{
+    struct lc_image image;
+    if (lc_session_image(s, &image) != 0)
+        return -1;
+    struct lull_error err = {.struct_size = sizeof err};
+    int32_t status = lc_session_ask(s, &image, ids, count, decisions, &err);
+    lc_image_release(&image);
+    if (!LC_EXPECT(s->check, status == LULL_OK, "evaluate failed (%d): %s", status, err.message))
+        return -1;
+    for (uint32_t i = 0; i < count; i++) {
+        struct lull_block *b = &s->film.blocks[ids[i]];
+        const struct lull_decision *d = &decisions[ids[i]];
+        lc_decision_check(s->check, b, d);
+        if (log_add(&s->log, &(struct lc_answer){s->step, b->id, b->spp, *d}) != 0) {
+            lc_fail(s->check, "out of memory");
+            return -1;
+        }
+        if (d->action == LULL_STOP)
+            b->flags |= LULL_BLOCK_STOPPED;
+    }
+    s->spp = next_spp(s, decisions, ids, count);
+    s->step++;
+    return 0;
+}
+
+int lc_session_step(struct lc_session *s)
+{
+    uint32_t *ids = calloc(s->film.block_count, sizeof *ids);
+    struct lull_decision *decisions = calloc(s->film.block_count, sizeof *decisions);
+    uint32_t count = 0;
+    int result = -1;
+    if (ids == NULL || decisions == NULL) {
+        lc_fail(s->check, "out of memory");
+        goto out;
+    }
+    for (uint32_t i = 0; i < s->film.block_count; i++)
+        if (!(s->film.blocks[i].flags & LULL_BLOCK_STOPPED)) {
+            lc_film_advance(&s->film, i, s->spp << (i % 2)); /* neighbours with different spp */
+            ids[count++] = i;
+        }
+    result = step_with(s, ids, count, decisions);
+out:
+    free(ids);
+    free(decisions);
+    return result;
+}
+
+int lc_session_steps(struct lc_session *s, int steps)
+{
+    for (int i = 0; i < steps; i++)
+        if (lc_session_step(s) != 0)
+            return -1;
+    return 0;
+}
+
+void lc_session_close(struct lc_session *s)
+{
+    if (s->instance != NULL && s->open)
+        s->check->criterion->end_frame(s->instance);
+    if (s->instance != NULL)
+        s->check->criterion->destroy(s->instance);
+    lc_film_release(&s->film);
+    lc_log_release(&s->log);
+    s->instance = NULL;
+}
+
+int lc_run(struct lc *c, const struct lc_manner *manner, struct lc_log *log)
+{
+    struct lc_session s;
+    *log = (struct lc_log){0};
+    if (lc_session_open(&s, c, manner) != 0)
+        return -1;
+    int result = lc_session_steps(&s, LC_STEPS);
+    *log = s.log;
+    s.log = (struct lc_log){0};
+    lc_session_close(&s);
+    return result;
+}
