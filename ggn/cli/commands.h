@@ -3,7 +3,7 @@
  *
  * A subcommand parses its own argv with argp (argv[0] is "ggn NAME" already, so usage lines read right) and returns the exit
  * status: 0 done, 1 failed (out of memory, an output could not be written), 2 bad usage or bad input, 130 interrupted.
- * To add one: write the file and add its line to GGN_COMMANDS.
+ * To add one: write the file and add its line to GGN_COMMANDS. An underscore in the name is a hyphen on the command line.
  */
 #ifndef GGN_CLI_COMMANDS_H
 #define GGN_CLI_COMMANDS_H
@@ -16,7 +16,8 @@
 #define GGN_COMMANDS(X) \
     X(golden, "print the golden values of the published networks as JSON") \
     X(flip, "visible difference of two images (LDR-FLIP)") \
-    X(compare, "stop maps or thresholds against (human) thresholds")
+    X(compare, "stop maps or thresholds against (human) thresholds") \
+    X(import_sin3d, "SIN3D images into block sequences")
 
 #define GGN_DECLARE_COMMAND(name, help) int ggn_cmd_##name(int argc, char **argv);
 GGN_COMMANDS(GGN_DECLARE_COMMAND)

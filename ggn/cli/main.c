@@ -45,6 +45,14 @@ int ggn_cmd_fail(const char *command, const struct ggn_err *err)
     return err->code == GGN_EINVAL || err->code == GGN_EIO ? GGN_EXIT_BAD_INPUT : GGN_EXIT_FAILED;
 }
 
+/* import_sin3d is typed as import-sin3d. */
+static int is_name(const char *typed, const char *name)
+{
+    while (*name && *typed == (*name == '_' ? '-' : *name))
+        typed++, name++;
+    return *name == '\0' && *typed == '\0';
+}
+
 struct choice {
     const struct command *command;
     int argc;
@@ -58,7 +66,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
     switch (key) {
     case ARGP_KEY_ARG:
         for (int i = 0; i < N_COMMANDS && !choice->command; i++)
-            if (!strcmp(arg, commands[i].name))
+            if (is_name(arg, commands[i].name))
                 choice->command = &commands[i];
         if (!choice->command)
             argp_error(state, "unknown command '%s'", arg);
@@ -88,8 +96,12 @@ static char *list_commands(int key, const char *text, void *input)
     if (!list)
         return NULL;
     used += (size_t)snprintf(list, room, "Commands:\n");
-    for (int i = 0; i < N_COMMANDS; i++)
+    for (int i = 0; i < N_COMMANDS; i++) {
+        char *name = list + used + 2;
         used += (size_t)snprintf(list + used, room - used, "  %-12s %s\n", commands[i].name, commands[i].help);
+        for (; *name != ' '; name++)
+            *name = *name == '_' ? '-' : *name;
+    }
     snprintf(list + used, room - used, "\n`ggn COMMAND --help` says more.");
     return list;
 }
@@ -109,7 +121,7 @@ int main(int argc, char **argv)
     argp_err_exit_status = GGN_EXIT_BAD_INPUT;
     argp_parse(&argp, argc, argv, ARGP_IN_ORDER, NULL, &choice);
 
-    snprintf(name, sizeof name, "ggn %s", choice.command->name);
+    snprintf(name, sizeof name, "ggn %s", choice.argv[0]);
     choice.argv[0] = name;
     int status = choice.command->run(choice.argc, choice.argv);
     if (fflush(stdout) || ferror(stdout)) {

@@ -4,6 +4,7 @@
 #ifndef GGN_DATA_MANIFEST_H
 #define GGN_DATA_MANIFEST_H
 
+#include <stddef.h>
 #include <stdint.h>
 
 #include "base/err.h"

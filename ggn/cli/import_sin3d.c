@@ -1,0 +1,158 @@
+/* `ggn import-sin3d DIR`: the public SIN3D layout into block sequences. */
+#include <argp.h>
+#include <dirent.h>
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "cli/commands.h"
+#include "data/sin3d.h"
+
+struct options {
+    const char *dir, *thresholds, *out;
+    int block, allow_gaps;
+};
+
+static const struct argp_option option_table[] = {
+    {"output", 'o', "OUT", 0, "data set to write, one folder per view (required)", 0},
+    {"thresholds", 't', "CSV", 0, "human thresholds, name;t0;…;t15; (written as labels)", 0},
+    {"block", 'b', "PIXELS", 0, "side of a block (default 200)", 0},
+    {"allow-gaps", 'g', NULL, 0, "take levels that are not evenly spaced", 0},
+    {0},
+};
+
+static error_t parse(int key, char *arg, struct argp_state *state)
+{
+    struct options *o = state->input;
+    char *end;
+
+    switch (key) {
+    case 'o':
+        o->out = arg;
+        return 0;
+    case 't':
+        o->thresholds = arg;
+        return 0;
+    case 'g':
+        o->allow_gaps = 1;
+        return 0;
+    case 'b':
+        o->block = (int)strtol(arg, &end, 10);
+        if (*end != '\0' || o->block < 1 || o->block > 4096)
+            argp_error(state, "--block %s: expected 1 … 4096", arg);
+        return 0;
+    case ARGP_KEY_ARG:
+        if (state->arg_num >= 1)
+            return ARGP_ERR_UNKNOWN;
+        o->dir = arg;
+        return 0;
+    case ARGP_KEY_END:
+        if (o->dir == NULL || o->out == NULL)
+            argp_error(state, "DIR and --output are needed");
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static void show_progress(void *data, const char *view, int done, int of)
+{
+    (void)data;
+    fprintf(stderr, "\r%s: %d of %d images%s", view, done, of, done == of ? "\n" : "");
+}
+
+static int import_one(const struct options *o, const struct ggn_sin3d_options *so, const char *dir, struct ggn_err *err)
+{
+    char copy[4096], out[4200];
+    int labelled = 0;
+    snprintf(copy, sizeof copy, "%s", dir);
+    for (size_t n = strlen(copy); n > 1 && copy[n - 1] == '/';)
+        copy[--n] = '\0';
+    const char *slash = strrchr(copy, '/');
+    int n = snprintf(out, sizeof out, "%s/%s", o->out, slash != NULL ? slash + 1 : copy);
+    if (n < 0 || (size_t)n >= 4096)
+        return ggn_fail(err, GGN_EINVAL, "%.64s...: the path is too long", o->out);
+    int rc = ggn_sin3d_import_view(copy, out, so, &labelled, err);
+    if (rc == GGN_OK)
+        printf("%s: %s\n", out, labelled ? "imported with thresholds" : "imported, no thresholds for it");
+    return rc;
+}
+
+static int compare_names(const void *a, const void *b)
+{
+    return strcmp(*(char *const *)a, *(char *const *)b);
+}
+
+/* Every view folder in the root, in order of name. */
+static int import_all(const struct options *o, const struct ggn_sin3d_options *so, struct ggn_err *err)
+{
+    DIR *d = opendir(o->dir);
+    char **names = NULL;
+    size_t n = 0;
+    int rc = GGN_OK, found = 0;
+    if (d == NULL)
+        return ggn_fail(err, GGN_EIO, "%s: %s", o->dir, strerror(errno));
+    for (const struct dirent *e; rc == GGN_OK && (e = readdir(d)) != NULL;) {
+        char **more = e->d_name[0] == '.' ? names : realloc(names, (n + 1) * sizeof *names);
+        if (e->d_name[0] == '.')
+            continue;
+        if (more != NULL) {
+            names = more;
+            names[n] = strdup(e->d_name);
+        }
+        if (more == NULL || names[n++] == NULL)
+            rc = ggn_fail_nomem(err, o->dir);
+    }
+    closedir(d);
+    if (rc == GGN_OK && n > 0)
+        qsort(names, n, sizeof *names, compare_names);
+    for (size_t i = 0; i < n && rc == GGN_OK && !ggn_cmd_interrupted; i++) {
+        char path[4096];
+        int length = snprintf(path, sizeof path, "%s/%s", o->dir, names[i]);
+        struct stat st;
+        if (length < 0 || (size_t)length >= sizeof path || stat(path, &st) != 0 || !S_ISDIR(st.st_mode) || !ggn_sin3d_is_view(path))
+            continue;
+        found++;
+        rc = import_one(o, so, path, err);
+    }
+    for (size_t i = 0; i < n; i++)
+        free(names[i]);
+    free(names);
+    if (rc == GGN_OK && !found)
+        rc = ggn_fail(err, GGN_EINVAL, "%s: no NAME_00020.png … in it or in its folders", o->dir);
+    return rc;
+}
+
+int ggn_cmd_import_sin3d(int argc, char **argv)
+{
+    static const struct argp argp = {
+        .options = option_table,
+        .parser = parse,
+        .args_doc = "DIR",
+        .doc = "Reads views in the layout of the public SIN3D data set (VIEW_part6/VIEW_00020.png … or .rawls; DIR is one view or the "
+               "folder of all) into block sequences. Running it again continues where it stopped.",
+    };
+    struct options o = {.block = 200};
+    struct ggn_thresholds thresholds = {0};
+    struct ggn_err err = {0};
+
+    argp_parse(&argp, argc, argv, 0, NULL, &o);
+    ggn_cmd_catch_interrupt();
+    struct ggn_sin3d_options so = {.block = o.block, .allow_gaps = o.allow_gaps, .progress = isatty(2) ? show_progress : NULL};
+    int rc = GGN_OK;
+    if (o.thresholds != NULL) {
+        rc = ggn_thresholds_read(o.thresholds, o.block, &thresholds, &err);
+        so.thresholds = &thresholds;
+    }
+    if (rc == GGN_OK && mkdir(o.out, 0777) != 0 && errno != EEXIST)
+        rc = ggn_fail(&err, GGN_EIO, "%s: %s", o.out, strerror(errno));
+    if (rc == GGN_OK)
+        rc = ggn_sin3d_is_view(o.dir) ? import_one(&o, &so, o.dir, &err) : import_all(&o, &so, &err);
+    ggn_thresholds_release(&thresholds);
+    if (rc != GGN_OK)
+        return ggn_cmd_fail(argv[0], &err);
+    return ggn_cmd_interrupted ? GGN_EXIT_INTERRUPTED : GGN_EXIT_OK;
+}

@@ -1,0 +1,135 @@
+#include "data/dataset.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include <cjson/cJSON.h>
+
+#include "base/fio.h"
+
+const char *const ggn_split_names[GGN_SPLITS] = {"train", "validation", "test", "none"};
+
+static int exists(const char *dir, const char *name)
+{
+    char path[8192];
+    struct stat st;
+    snprintf(path, sizeof path, "%s/%s", dir, name);
+    return stat(path, &st) == 0;
+}
+
+void ggn_dataset_release(struct ggn_dataset *data)
+{
+    for (int i = 0; i < data->n; i++) {
+        ggn_manifest_release(&data->views[i].manifest);
+        ggn_labels_release(&data->views[i].labels);
+    }
+    free(data->views);
+    *data = (struct ggn_dataset){0};
+}
+
+static int add_view(struct ggn_dataset *d, const char *dir, struct ggn_err *err)
+{
+    struct ggn_dataset_view *views = realloc(d->views, (size_t)(d->n + 1) * sizeof *views);
+    if (views == NULL)
+        return ggn_fail_nomem(err, dir);
+    d->views = views;
+    struct ggn_dataset_view *v = &views[d->n];
+    *v = (struct ggn_dataset_view){.split = GGN_SPLIT_NONE};
+    if (strlen(dir) >= sizeof v->dir)
+        return ggn_fail(err, GGN_EINVAL, "%.64s...: the path is too long", dir);
+    strcpy(v->dir, dir);
+    int rc = ggn_manifest_read(dir, &v->manifest, err);
+    if (rc != GGN_OK)
+        return rc;
+    d->n++;
+    if (exists(dir, "labels.json")) {
+        rc = ggn_labels_read(dir, &v->labels, err);
+        v->has_labels = rc == GGN_OK;
+    }
+    return rc;
+}
+
+static int compare_views(const void *a, const void *b)
+{
+    return strcmp(((const struct ggn_dataset_view *)a)->dir, ((const struct ggn_dataset_view *)b)->dir);
+}
+
+static int scan(const char *path, struct ggn_dataset *d, struct ggn_err *err)
+{
+    DIR *dir = opendir(path);
+    if (dir == NULL)
+        return ggn_fail(err, GGN_EIO, "%s: %s", path, strerror(errno));
+    int rc = GGN_OK;
+    for (const struct dirent *e; rc == GGN_OK && (e = readdir(dir)) != NULL;) {
+        char sub[4096];
+        int n = snprintf(sub, sizeof sub, "%s/%s", path, e->d_name);
+        if (e->d_name[0] == '.' || n < 0 || (size_t)n >= sizeof sub || !exists(sub, "manifest.json"))
+            continue;
+        rc = add_view(d, sub, err);
+    }
+    closedir(dir);
+    if (rc == GGN_OK && d->n == 0)
+        rc = ggn_fail(err, GGN_EINVAL, "%s: no recorded sequence in it (no manifest.json)", path);
+    return rc;
+}
+
+static int apply_split(const char *path, const cJSON *root, struct ggn_dataset *d, struct ggn_err *err)
+{
+    for (int s = 0; s < GGN_SPLIT_NONE; s++) {
+        const cJSON *list = cJSON_GetObjectItemCaseSensitive(root, ggn_split_names[s]), *v;
+        cJSON_ArrayForEach(v, list) {
+            if (!cJSON_IsString(v))
+                return ggn_fail(err, GGN_EINVAL, "%s: %s: a scene is a string", path, ggn_split_names[s]);
+            for (int i = 0; i < d->n; i++) {
+                struct ggn_dataset_view *view = &d->views[i];
+                if (strcmp(view->manifest.scene, v->valuestring) != 0)
+                    continue;
+                if (view->split != GGN_SPLIT_NONE && view->split != (enum ggn_split)s)
+                    return ggn_fail(err, GGN_EINVAL, "%s: scene '%s' is in %s and in %s", path, v->valuestring,
+                                    ggn_split_names[view->split], ggn_split_names[s]);
+                view->split = (enum ggn_split)s;
+            }
+        }
+    }
+    return GGN_OK;
+}
+
+static int read_split(const char *dir, struct ggn_dataset *d, struct ggn_err *err)
+{
+    char path[4096], *text;
+    size_t size;
+    int n = snprintf(path, sizeof path, "%s/split.json", dir);
+    if (n < 0 || (size_t)n >= sizeof path || !exists(dir, "split.json"))
+        return GGN_OK;
+    int rc = ggn_fio_read(path, 1 << 24, &text, &size, err);
+    if (rc != GGN_OK)
+        return rc;
+    cJSON *root = cJSON_ParseWithLength(text, size);
+    rc = cJSON_IsObject(root) ? apply_split(path, root, d, err) : ggn_fail(err, GGN_EINVAL, "%s: not JSON", path);
+    cJSON_Delete(root);
+    free(text);
+    return rc;
+}
+
+int ggn_dataset_open(const char *path, struct ggn_dataset *data, struct ggn_err *err)
+{
+    struct ggn_dataset d = {0};
+    int rc = exists(path, "manifest.json") ? add_view(&d, path, err) : scan(path, &d, err);
+    if (rc == GGN_OK)
+        rc = read_split(path, &d, err);
+    if (rc != GGN_OK) {
+        ggn_dataset_release(&d);
+        return rc;
+    }
+    qsort(d.views, (size_t)d.n, sizeof *d.views, compare_views);
+    for (int i = 0; i < d.n; i++) {
+        const char *slash = strrchr(d.views[i].dir, '/');
+        d.views[i].name = slash != NULL ? slash + 1 : d.views[i].dir;
+    }
+    *data = d;
+    return GGN_OK;
+}

@@ -1,0 +1,35 @@
+/*
+ * A data set: a folder of recorded sequences, their labels, and the split by scene.
+ *
+ * DATA/NAME/manifest.json (+ labels.json) for each view, and DATA/split.json:
+ *     { "train": ["scene", …], "validation": ["scene", …], "test": ["scene", …] }
+ * A scene is on one side only; scenes that are not listed are used by nobody. DATA may also be one sequence itself.
+ */
+#ifndef GGN_DATA_DATASET_H
+#define GGN_DATA_DATASET_H
+
+#include "data/labels.h"
+#include "data/manifest.h"
+
+enum ggn_split { GGN_SPLIT_TRAIN, GGN_SPLIT_VALIDATION, GGN_SPLIT_TEST, GGN_SPLIT_NONE, GGN_SPLITS };
+extern const char *const ggn_split_names[GGN_SPLITS]; /* "train", "validation", "test", "none" */
+
+struct ggn_dataset_view {
+    char dir[4096];
+    const char *name; /* borrows from dir: its last component */
+    struct ggn_manifest manifest;
+    int has_labels;
+    struct ggn_labels labels;
+    enum ggn_split split;
+};
+
+struct ggn_dataset {
+    int n;
+    struct ggn_dataset_view *views; /* owns; in order of name */
+};
+
+/* Reads manifests, labels and split (no pixels). A folder without split.json has all views in GGN_SPLIT_NONE. */
+int ggn_dataset_open(const char *path, struct ggn_dataset *data, struct ggn_err *err);
+void ggn_dataset_release(struct ggn_dataset *data);
+
+#endif

@@ -1,0 +1,156 @@
+#include "data/labels.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cjson/cJSON.h>
+
+#include "base/fio.h"
+
+enum { MAX_TEXT = 1 << 26, MAX_LABELS = 1 << 20 };
+
+void ggn_labels_release(struct ggn_labels *labels)
+{
+    free(labels->labels);
+    *labels = (struct ggn_labels){0};
+}
+
+const struct ggn_label *ggn_labels_find(const struct ggn_labels *labels, uint32_t id)
+{
+    for (uint32_t i = 0; i < labels->n; i++)
+        if (labels->labels[i].id == id)
+            return &labels->labels[i];
+    return NULL;
+}
+
+int ggn_label_noisy(const struct ggn_label *label, double spp)
+{
+    if (label->censored && spp >= label->threshold)
+        return -1;
+    return spp < label->threshold;
+}
+
+double ggn_label_p_noisy(const struct ggn_label *label, double spp, double spread)
+{
+    if (ggn_label_noisy(label, spp) < 0)
+        return (double)NAN;
+    double p = 0.5 * erfc(log2(spp / label->threshold) / (spread * sqrt(2.0)));
+    return label->censored ? 0.5 + 0.5 * p : p; /* the true threshold lies at the cap or above it */
+}
+
+static int get_positive(const cJSON *o, const char *name, double *out)
+{
+    const cJSON *v = cJSON_GetObjectItemCaseSensitive(o, name);
+    if (!cJSON_IsNumber(v) || !(v->valuedouble > 0.0 && v->valuedouble < 1e12))
+        return 0;
+    *out = v->valuedouble;
+    return 1;
+}
+
+static int parse_entries(const char *path, const cJSON *blocks, struct ggn_labels *l, struct ggn_err *err)
+{
+    int n = cJSON_GetArraySize(blocks);
+    const cJSON *v;
+    if (!cJSON_IsArray(blocks) || n < 1 || n > MAX_LABELS)
+        return ggn_fail(err, GGN_EINVAL, "%s: no list of blocks", path);
+    l->labels = malloc((size_t)n * sizeof *l->labels);
+    if (l->labels == NULL)
+        return ggn_fail_nomem(err, path);
+    cJSON_ArrayForEach(v, blocks) {
+        const cJSON *id = cJSON_GetObjectItemCaseSensitive(v, "id");
+        struct ggn_label *label = &l->labels[l->n];
+        if (!cJSON_IsNumber(id) || !(id->valuedouble >= 0 && id->valuedouble < UINT32_MAX) || !get_positive(v, "threshold", &label->threshold))
+            return ggn_fail(err, GGN_EINVAL, "%s: entry %u of blocks has no id or no threshold", path, l->n);
+        label->id = (uint32_t)id->valuedouble;
+        label->censored = cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(v, "censored"));
+        if (ggn_labels_find(l, label->id) != NULL)
+            return ggn_fail(err, GGN_EINVAL, "%s: block %u is labelled twice", path, label->id);
+        l->n++;
+    }
+    return GGN_OK;
+}
+
+int ggn_labels_parse(const char *path, const char *text, size_t size, struct ggn_labels *out, struct ggn_err *err)
+{
+    struct ggn_labels l = {0};
+    cJSON *root = cJSON_ParseWithLength(text, size);
+    const cJSON *format = cJSON_GetObjectItemCaseSensitive(root, "format"), *source = cJSON_GetObjectItemCaseSensitive(root, "source");
+    const cJSON *detail = cJSON_GetObjectItemCaseSensitive(root, "detail");
+    int rc;
+    if (!cJSON_IsString(format) || strcmp(format->valuestring, "lull-labels") != 0)
+        rc = ggn_fail(err, GGN_EINVAL, "%s: not a file of labels", path);
+    else if (!cJSON_IsString(source) || (strcmp(source->valuestring, "human") != 0 && strcmp(source->valuestring, "observer") != 0))
+        rc = ggn_fail(err, GGN_EINVAL, "%s: source must be \"human\" or \"observer\"", path);
+    else if (!get_positive(root, "cap", &l.cap) || !get_positive(root, "spread", &l.spread))
+        rc = ggn_fail(err, GGN_EINVAL, "%s: cap or spread is missing", path);
+    else
+        rc = parse_entries(path, cJSON_GetObjectItemCaseSensitive(root, "blocks"), &l, err);
+    if (rc == GGN_OK) {
+        snprintf(l.source, sizeof l.source, "%s", source->valuestring);
+        snprintf(l.detail, sizeof l.detail, "%s", cJSON_IsString(detail) ? detail->valuestring : "");
+        *out = l;
+    } else {
+        ggn_labels_release(&l);
+    }
+    cJSON_Delete(root);
+    return rc;
+}
+
+static int path_of(const char *dir, char *path, size_t room, struct ggn_err *err)
+{
+    int n = snprintf(path, room, "%s/labels.json", dir);
+    if (n < 0 || (size_t)n >= room)
+        return ggn_fail(err, GGN_EINVAL, "%.64s...: the path is too long", dir);
+    return GGN_OK;
+}
+
+int ggn_labels_read(const char *dir, struct ggn_labels *labels, struct ggn_err *err)
+{
+    char path[4096], *text;
+    size_t size;
+    int rc = path_of(dir, path, sizeof path, err);
+    if (rc == GGN_OK)
+        rc = ggn_fio_read(path, MAX_TEXT, &text, &size, err);
+    if (rc != GGN_OK)
+        return rc;
+    rc = ggn_labels_parse(path, text, size, labels, err);
+    free(text);
+    return rc;
+}
+
+int ggn_labels_write(const char *dir, const struct ggn_labels *labels, struct ggn_err *err)
+{
+    char path[4096];
+    struct ggn_fio_out out;
+    int rc = path_of(dir, path, sizeof path, err);
+    if (rc != GGN_OK)
+        return rc;
+    cJSON *root = cJSON_CreateObject();
+    cJSON_AddStringToObject(root, "format", "lull-labels");
+    cJSON_AddNumberToObject(root, "version", 1);
+    cJSON_AddStringToObject(root, "source", labels->source);
+    cJSON_AddStringToObject(root, "detail", labels->detail);
+    cJSON_AddNumberToObject(root, "cap", labels->cap);
+    cJSON_AddNumberToObject(root, "spread", labels->spread);
+    cJSON *blocks = cJSON_AddArrayToObject(root, "blocks");
+    for (uint32_t i = 0; i < labels->n; i++) {
+        cJSON *o = cJSON_CreateObject();
+        cJSON_AddNumberToObject(o, "id", labels->labels[i].id);
+        cJSON_AddNumberToObject(o, "threshold", labels->labels[i].threshold);
+        cJSON_AddBoolToObject(o, "censored", labels->labels[i].censored);
+        cJSON_AddItemToArray(blocks, o);
+    }
+    char *text = cJSON_Print(root);
+    cJSON_Delete(root);
+    if (text == NULL)
+        return ggn_fail_nomem(err, path);
+    rc = ggn_fio_begin(&out, path, err);
+    if (rc == GGN_OK) {
+        fprintf(out.file, "%s\n", text);
+        rc = ggn_fio_commit(&out, err);
+    }
+    cJSON_free(text);
+    return rc;
+}

@@ -1,0 +1,83 @@
+#include "data/rawls.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/fio.h"
+
+static uint32_t get32(const char *p)
+{
+    uint32_t v = 0;
+    for (int i = 3; i >= 0; i--)
+        v = v << 8 | (uint8_t)p[i];
+    return v;
+}
+
+/* The start of the line after a line "DATA", or NULL. */
+static const char *find_data(const char *p, const char *end)
+{
+    while (p < end) {
+        const char *eol = memchr(p, '\n', (size_t)(end - p));
+        if (eol == NULL)
+            return NULL;
+        if (eol - p == 4 && memcmp(p, "DATA", 4) == 0)
+            return eol + 1;
+        p = eol + 1;
+    }
+    return NULL;
+}
+
+static int read_rows(const char *path, const char *p, uint32_t width, uint32_t height, uint32_t channels, float *out, struct ggn_err *err)
+{
+    for (uint32_t y = 0; y < height; y++, p++)
+        for (uint32_t x = 0; x < width; x++) {
+            for (uint32_t c = 0; c < 3; c++) {
+                uint32_t bits = get32(p + 4 * (channels == 3 ? c : 0));
+                memcpy(out, &bits, sizeof *out);
+                if (!isfinite(*out++))
+                    return ggn_fail(err, GGN_EINVAL, "%s: pixel %u,%u is not finite", path, x, y);
+            }
+            p += 4 * channels;
+        }
+    return GGN_OK;
+}
+
+int ggn_rawls_parse(const char *path, const char *data, size_t size, struct ggn_imagef *image, struct ggn_err *err)
+{
+    static const char head[] = "IHDR\n12\n", comments[] = "\nCOMMENTS\n";
+    const size_t fixed = sizeof head - 1 + 12 + sizeof comments - 1;
+    if (size < fixed || memcmp(data, head, sizeof head - 1) != 0 || memcmp(data + 20, comments, sizeof comments - 1) != 0)
+        return ggn_fail(err, GGN_EINVAL, "%s: not a rawls image", path);
+    uint32_t width = get32(data + 8), height = get32(data + 12), channels = get32(data + 16);
+    if (width < 1 || height < 1 || width > GGN_IMAGE_MAX_SIDE || height > GGN_IMAGE_MAX_SIDE ||
+        (size_t)width * height > GGN_IMAGE_MAX_PIXELS || (channels != 1 && channels != 3))
+        return ggn_fail(err, GGN_EINVAL, "%s: %ux%u with %u channels cannot be used", path, width, height, channels);
+    const char *end = data + size, *p = find_data(data + fixed, end);
+    p = p != NULL ? memchr(p, '\n', (size_t)(end - p)) : NULL; /* the line with the size says nothing new */
+    size_t row = (size_t)width * channels * 4 + 1;
+    if (p == NULL || (size_t)(end - (p + 1)) < row * height - 1)
+        return ggn_fail(err, GGN_EINVAL, "%s: truncated", path);
+    float *out = malloc((size_t)width * height * 3 * sizeof *out);
+    if (out == NULL)
+        return ggn_fail_nomem(err, path);
+    int rc = read_rows(path, p + 1, width, height, channels, out, err);
+    if (rc != GGN_OK) {
+        free(out);
+        return rc;
+    }
+    *image = (struct ggn_imagef){(int)width, (int)height, 3, out};
+    return GGN_OK;
+}
+
+int ggn_rawls_read(const char *path, struct ggn_imagef *image, struct ggn_err *err)
+{
+    char *data;
+    size_t size;
+    int rc = ggn_fio_read(path, (size_t)1 << 31, &data, &size, err);
+    if (rc != GGN_OK)
+        return rc;
+    rc = ggn_rawls_parse(path, data, size, image, err);
+    free(data);
+    return rc;
+}
