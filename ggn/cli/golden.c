@@ -1,7 +1,153 @@
+/* `ggn golden`: what the published networks give for weights that a hash defines; the same figures from any implementation. */
+#include <argp.h>
+#include <cjson/cJSON.h>
+#include <stdio.h>
+#include <stdlib.h>
+
 #include "cli/commands.h"
+#include "model/golden.h"
+
+enum { KEY_BASE_R = 256, KEY_BASE_M, KEY_BASE_D, KEY_TRAIN, KEY_FLOAT, KEY_THREADS };
+
+struct options {
+    struct ggn_golden_seeds seeds;
+    int train_step, single, threads;
+};
+
+static error_t parse(int key, char *arg, struct argp_state *state)
+{
+    struct options *o = state->input;
+    char *end = NULL;
+    unsigned long value = arg ? strtoul(arg, &end, 10) : 0;
+
+    if (arg && (*end || end == arg || *arg == '-' || value > 0xffffffffUL))
+        argp_error(state, "'%s' is not a number in 0..4294967295", arg);
+    switch (key) {
+    case KEY_BASE_R:
+    case KEY_BASE_M:
+    case KEY_BASE_D:
+        o->seeds.base[key - KEY_BASE_R] = (uint32_t)value;
+        return 0;
+    case KEY_TRAIN:
+        o->train_step = 1;
+        return 0;
+    case KEY_FLOAT:
+        o->single = 1;
+        return 0;
+    case KEY_THREADS:
+        if (value < 1 || value > 1024)
+            argp_error(state, "--threads must be in 1..1024");
+        o->threads = (int)value;
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static void add_number(cJSON *to, const char *name, double value)
+{
+    char text[40];
+    snprintf(text, sizeof text, "%.12g", value);
+    if (name)
+        cJSON_AddRawToObject(to, name, text);
+    else
+        cJSON_AddItemToArray(to, cJSON_CreateRaw(text));
+}
+
+static void add_array(cJSON *to, const char *name, const double *value, int n)
+{
+    cJSON *array = cJSON_AddArrayToObject(to, name);
+    for (int i = 0; i < n; i++)
+        add_number(array, NULL, value[i]);
+}
+
+static void add_nets(cJSON *to, const char *name, const double value[GGN_NETS])
+{
+    static const char *const net[GGN_NETS] = {"r", "m", "d"};
+    cJSON *object = cJSON_AddObjectToObject(to, name);
+    for (int i = 0; i < GGN_NETS; i++)
+        add_number(object, net[i], value[i]);
+}
+
+static void add_train(cJSON *j, const struct ggn_golden_train *t)
+{
+    add_array(j, "denoiser_loss", t->denoiser_loss, 6);
+    add_number(j, "denoiser_grad_l2", t->denoiser_grad_l2);
+    add_array(j, "d_prob_before", t->d_prob_before, 4);
+    add_number(j, "bce_before", t->bce_before);
+    add_number(j, "d_grad_l2", t->d_grad_l2);
+    add_number(j, "m_grad_l2", t->m_grad_l2);
+    add_array(j, "d_prob_after", t->d_prob_after, 4);
+    add_number(j, "bce_after", t->bce_after);
+    add_number(j, "m_grad_l2_accumulated", t->m_grad_l2_accumulated);
+    add_nets(j, "sum_params", t->sum_params);
+    add_nets(j, "sum_running_mean", t->sum_running_mean);
+    add_nets(j, "sum_running_var", t->sum_running_var);
+}
+
+static cJSON *to_json(const struct ggn_golden *g, int train_step)
+{
+    static const char *const ssim_name[4] = {"x0", "x2", "x5", "denoised0"};
+    cJSON *j = cJSON_CreateObject();
+
+    add_number(j, "x_first", g->x_first);
+    add_number(j, "x_last", g->x_last);
+    add_number(j, "x_mean", g->x_mean);
+    add_number(j, "denoiser_mean", g->denoiser_mean);
+    add_number(j, "denoiser_std", g->denoiser_std);
+    add_array(j, "denoiser_at", g->denoiser_at, 3);
+    add_number(j, "generator_noisy_mean", g->generator_noisy_mean);
+    add_number(j, "generator_noisy_std", g->generator_noisy_std);
+    add_array(j, "generator_noisy_at", g->generator_noisy_at, 3);
+    add_number(j, "generator_denoised_mean", g->generator_denoised_mean);
+    add_number(j, "generator_denoised_std", g->generator_denoised_std);
+    add_number(j, "generator_denoised_at", g->generator_denoised_at);
+    cJSON *stages = cJSON_AddObjectToObject(j, "stage_rms");
+    for (int i = 0; i < g->n_stages; i++)
+        add_number(stages, g->stage[i].name, g->stage[i].rms);
+    add_array(j, "logit", g->logit, 4);
+    add_array(j, "p", g->p, 4);
+    cJSON *ssim = cJSON_AddObjectToObject(j, "ssim");
+    for (int i = 0; i < 4; i++)
+        add_number(ssim, ssim_name[i], g->ssim[i]);
+    if (train_step)
+        add_train(j, &g->train);
+    return j;
+}
+
 int ggn_cmd_golden(int argc, char **argv)
 {
-    (void)argc;
-    struct ggn_err err = {.code = GGN_EINVAL, .text = "not built yet"};
-    return ggn_cmd_fail(argv[0], &err);
+    static const struct argp_option list[] = {
+        {"base-r", KEY_BASE_R, "N", 0, "Seed of the denoiser's weights (100)", 0},
+        {"base-m", KEY_BASE_M, "N", 0, "Seed of the generator's weights (300)", 0},
+        {"base-d", KEY_BASE_D, "N", 0, "Seed of the discriminator's weights (500)", 0},
+        {"train-step", KEY_TRAIN, NULL, 0, "Also make one published training iteration and report it", 0},
+        {"float", KEY_FLOAT, NULL, 0, "The single-precision networks that inference and training use, not the double ones", 0},
+        {"threads", KEY_THREADS, "N", 0, "Threads (all processors); the figures do not depend on it", 0},
+        {0}};
+    static const struct argp argp = {
+        .options = list, .parser = parse, .doc = "Prints the golden values of the published networks as one JSON object."};
+    struct options o = {.seeds = {{100, 300, 500}}, .threads = ggn_threads_available()};
+    struct ggn_golden golden;
+    struct ggn_err err = {0};
+
+    argp_parse(&argp, argc, argv, 0, NULL, &o);
+    struct ggn_threads *threads = ggn_threads_create(o.threads, &err);
+    if (!threads)
+        return ggn_cmd_fail(argv[0], &err);
+    int rc = (o.single ? ggn_golden_run_f32 : ggn_golden_run_f64)(&o.seeds, o.train_step, threads, &golden, &err);
+    ggn_threads_destroy(threads);
+    if (rc)
+        return ggn_cmd_fail(argv[0], &err);
+
+    cJSON *json = to_json(&golden, o.train_step);
+    char *text = cJSON_Print(json);
+    cJSON_Delete(json);
+    if (!text) {
+        ggn_fail_nomem(&err, "JSON");
+        return ggn_cmd_fail(argv[0], &err);
+    }
+    puts(text);
+    cJSON_free(text);
+    return GGN_EXIT_OK;
 }

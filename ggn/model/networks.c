@@ -1,0 +1,157 @@
+#include "model/networks.h"
+
+static const double SLOPE = 0.2; /* LeakyReLU */
+
+struct ggn_hyper ggn_hyper_default(enum ggn_preset preset)
+{
+    return (struct ggn_hyper){
+        .preset = preset, .height = 200, .width = 200, .window = 6, .k_r = 16, .k_m = 20, .k_d = 64};
+}
+
+int ggn_hyper_check(const struct ggn_hyper *p, struct ggn_err *err)
+{
+    const struct {
+        const char *name;
+        int value, min, max;
+    } fields[] = {{"preset", (int)p->preset, GGN_PRESET_PAPER, GGN_PRESET_LULL},
+                  {"height", p->height, 16, 1024},
+                  {"width", p->width, 16, 1024},
+                  {"window", p->window, 1, 16},
+                  {"k_r", p->k_r, 1, 128},
+                  {"k_m", p->k_m, 1, 128},
+                  {"k_d", p->k_d, 1, 64}};
+
+    for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++)
+        if (fields[i].value < fields[i].min || fields[i].value > fields[i].max)
+            return ggn_fail(err, GGN_EINVAL, "hyper-parameter %s = %d is not in %d..%d", fields[i].name, fields[i].value,
+                            fields[i].min, fields[i].max);
+    return GGN_OK;
+}
+
+static const char *const enc_name[5] = {"enc0", "enc1", "enc2", "enc3", "enc4"};
+static const char *const dec_name[5] = {"dec0", "dec1", "dec2", "dec3", "dec4"};
+
+/* Conv → LReLU → Conv → LReLU, with MaxPool first and BN between from stage 1 on (both networks' encoders). */
+static int encoder_stage(struct ggn_graph *g, int x, int stage, int width)
+{
+    ggn_graph_stage(g, enc_name[stage]);
+    if (stage)
+        x = ggn_graph_maxpool(g, x, 2);
+    x = ggn_graph_conv(g, x, -1, width << stage, 3, 0, SLOPE);
+    if (stage)
+        x = ggn_graph_bn(g, x);
+    x = ggn_graph_conv(g, x, -1, width << stage, 3, 0, SLOPE);
+    ggn_graph_mark(g, x, enc_name[stage]);
+    return x;
+}
+
+/* Up to the size of value `like`: one zero row or column where that size is odd. */
+static int up_like(struct ggn_graph *g, int x, int like)
+{
+    return ggn_graph_up(g, x, g->value[like].h & 1, g->value[like].w & 1);
+}
+
+static void build_denoiser(struct ggn_graph *g, const struct ggn_hyper *p)
+{
+    const int k = p->k_r;
+    int skip[4], x = 0;
+
+    ggn_graph_begin(g, "denoiser", 3, p->height, p->width);
+    for (int i = 0; i < 4; i++)
+        x = skip[i] = encoder_stage(g, x, i, k);
+    ggn_graph_stage(g, "enc4");
+    x = ggn_graph_maxpool(g, x, 2);
+    x = ggn_graph_conv(g, x, -1, 16 * k, 3, 0, SLOPE);
+    x = ggn_graph_bn(g, x);
+    x = ggn_graph_conv(g, x, -1, 8 * k, 3, 0, SLOPE);
+    x = up_like(g, x, skip[3]);
+    ggn_graph_mark(g, x, "enc4");
+    for (int i = 0; i < 3; i++) {
+        ggn_graph_stage(g, dec_name[i]);
+        x = ggn_graph_conv(g, x, skip[3 - i], 8 * k >> i, 3, 1, SLOPE);
+        x = ggn_graph_bn(g, x);
+        x = ggn_graph_conv(g, x, -1, 4 * k >> i, 3, 1, SLOPE);
+        x = up_like(g, x, skip[2 - i]);
+        ggn_graph_mark(g, x, dec_name[i]);
+    }
+    ggn_graph_stage(g, "dec3");
+    x = ggn_graph_conv(g, x, skip[0], k, 3, 1, SLOPE);
+    x = ggn_graph_conv(g, x, -1, k, 3, 1, SLOPE);
+    x = ggn_graph_conv(g, x, -1, 3, 1, 0, 1);
+    x = ggn_graph_sigmoid(g, x);
+    ggn_graph_mark(g, x, "dec3");
+}
+
+static void build_generator(struct ggn_graph *g, const struct ggn_hyper *p)
+{
+    const int k = p->k_m;
+    int like[4], x = 0;
+
+    ggn_graph_begin(g, "generator", 3 * p->window, p->height, p->width);
+    for (int i = 0; i < 4; i++)
+        x = like[i] = encoder_stage(g, x, i, k);
+    ggn_graph_stage(g, "enc4");
+    x = ggn_graph_maxpool(g, x, 2);
+    x = ggn_graph_conv(g, x, -1, 16 * k, 3, 0, SLOPE);
+    x = ggn_graph_bn(g, x);
+    ggn_graph_stage(g, "dec0");
+    x = ggn_graph_conv(g, x, -1, 8 * k, 3, 1, SLOPE);
+    x = ggn_graph_bn(g, x);
+    x = ggn_graph_conv(g, x, -1, 4 * k, 3, 1, SLOPE);
+    x = up_like(g, x, like[3]);
+    for (int i = 1; i < 4; i++) {
+        ggn_graph_stage(g, dec_name[i]);
+        x = ggn_graph_bn(g, x);
+        x = ggn_graph_conv(g, x, -1, i < 3 ? 4 * k >> i : k, 3, 1, SLOPE);
+        x = up_like(g, x, like[3 - i]);
+    }
+    ggn_graph_stage(g, "dec4");
+    x = ggn_graph_conv(g, x, -1, 1, 1, 0, 1);
+    ggn_graph_sigmoid(g, x);
+}
+
+static void build_discriminator(struct ggn_graph *g, const struct ggn_hyper *p)
+{
+    static const char *const conv[3] = {"conv1", "conv2", "conv3"};
+    static const char *const pool[3] = {"pool1", "pool2", "pool3"};
+    static const char *const fc[3] = {"fc1", "fc2", "fc3"};
+    const int k = p->k_d;
+    int x = 0;
+
+    ggn_graph_begin(g, "discriminator", 2, p->height, p->width);
+    for (int i = 0; i < 3; i++) {
+        ggn_graph_stage(g, conv[i]);
+        x = ggn_graph_conv_strided(g, x, k << i, 3, 2);
+        ggn_graph_mark(g, x, conv[i]);
+        x = ggn_graph_bn(g, x);
+        x = ggn_graph_lrelu(g, x, SLOPE);
+        x = ggn_graph_maxpool(g, x, 3);
+        ggn_graph_mark(g, x, pool[i]);
+    }
+    x = ggn_graph_flatten(g, x);
+    for (int i = 0; i < 3; i++) {
+        ggn_graph_stage(g, fc[i]);
+        x = ggn_graph_linear(g, x, 4 * k >> i);
+        ggn_graph_mark(g, x, fc[i]);
+        x = ggn_graph_bn(g, x);
+        x = ggn_graph_lrelu(g, x, SLOPE);
+        x = ggn_graph_dropout(g, x, 0.5);
+    }
+    ggn_graph_stage(g, "fc4");
+    x = ggn_graph_linear(g, x, 1);
+    if (p->preset == GGN_PRESET_PAPER) {
+        x = ggn_graph_lrelu(g, x, SLOPE);
+        ggn_graph_dropout(g, x, 0.5);
+    }
+}
+
+int ggn_network_build(struct ggn_graph *graph, int net, const struct ggn_hyper *hyper, struct ggn_err *err)
+{
+    static void (*const build[GGN_NETS])(struct ggn_graph *, const struct ggn_hyper *) = {build_denoiser, build_generator,
+                                                                                          build_discriminator};
+    int rc = ggn_hyper_check(hyper, err);
+    if (rc)
+        return rc;
+    build[net](graph, hyper);
+    return ggn_graph_end(graph, err);
+}

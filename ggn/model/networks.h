@@ -1,0 +1,34 @@
+/*
+ * The three networks of the paper (denoiser R, feature map generator M, discriminator D) as graphs, for any width, window
+ * and block size, in the published or the mended form.
+ *
+ * Source: Buisine, Teytaud, Delepoulle, Renaud, "Guided-Generative Network", Deep Learning Applications 4, Springer 2022.
+ */
+#ifndef GGN_MODEL_NETWORKS_H
+#define GGN_MODEL_NETWORKS_H
+
+#include "nn/graph.h"
+
+enum ggn_preset {
+    GGN_PRESET_PAPER, /* published: D's logit passes LeakyReLU and dropout */
+    GGN_PRESET_LULL   /* mended: the logit is linear */
+};
+
+enum { GGN_NET_R, GGN_NET_M, GGN_NET_D, GGN_NETS };
+
+struct ggn_hyper {
+    enum ggn_preset preset;
+    int height, width; /* block, pixels; 16..1024 */
+    int window;        /* images per window, S; 1..16 */
+    int k_r, k_m, k_d; /* widths; 1..256 (k_d ≤ 64·16) */
+};
+
+/* The paper's sizes: 200×200, S = 6, K = 16, 20, 64. */
+struct ggn_hyper ggn_hyper_default(enum ggn_preset preset);
+/* GGN_EINVAL naming the field that is out of range. */
+int ggn_hyper_check(const struct ggn_hyper *hyper, struct ggn_err *err);
+
+/* R: 3×H×W → 3×H×W (sigmoid). M: 3S×H×W → 1×H×W (sigmoid). D: 2×H×W → logit (flat, 1). */
+int ggn_network_build(struct ggn_graph *graph, int net, const struct ggn_hyper *hyper, struct ggn_err *err);
+
+#endif

@@ -1,0 +1,5 @@
+#include "nn/exec.h"
+
+#define REAL float
+#define TYPED(name) GGN_TYPED(name, f32)
+#include "nn/exec.inc"
