@@ -1,0 +1,311 @@
+/* Everything a render writes, made with an analytic kernel and read back. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include <cjson/cJSON.h>
+#include <openexr.h>
+
+#include "base/fio.h"
+#include "image/oiio.h"
+#include "image/stopmap.h"
+#include "image/tonemap.h"
+#include "render/output.h"
+#include "render/progress.h"
+#include "support/pt_fake.h"
+
+static struct pt_render *render;
+static struct pt_criterion *criterion;
+static struct pt_threads *pool;
+static char folder[] = "/tmp/pt_report_XXXXXX";
+static struct lull_pair param = {"at", "32"};
+static struct pt_output_info info;
+
+static const char *in_folder(const char *name)
+{
+    static char path[4096];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    return path;
+}
+
+static int setup(void **state)
+{
+    (void)state;
+    struct pt_render_config config = pt_fake_config();
+    int crop[4] = {3, 5, 60, 40};
+    memcpy(config.crop, crop, sizeof crop);
+    config.planes = PT_FILM_AUX;
+    info = (struct pt_output_info){.scene = "dir/fake-view1.pbrt", .params = &param, .param_count = 1,
+                                   .effects = PT_FX_ALPHA | PT_FX_MOTION, .kernel = "fake", .threads = 2, .aov = PT_FILM_AUX,
+                                   .scene_bytes = 1000};
+    if (mkdtemp(folder) == NULL)
+        return -1;
+    return pt_fake_render(&config, pt_fake_nan, 2, "32", &render, &criterion, &pool);
+}
+
+static int teardown(void **state)
+{
+    (void)state;
+    pt_render_destroy(render);
+    pt_criterion_destroy(criterion);
+    pt_threads_destroy(pool);
+    static const char *const names[] = {"a.exr", "a.png", "s.png", "s.csv", "r.json"};
+    for (int i = 0; i < 5; i++)
+        unlink(in_folder(names[i]));
+    return rmdir(folder); /* fails when a temporary was left behind */
+}
+
+/* --- EXR ------------------------------------------------------------------------------------------------------------ */
+
+/* Reads one float channel of the file's only part, data window 57x35 at (3, 5). */
+static void read_channel(exr_context_t file, const char *name, float *out)
+{
+    exr_decode_pipeline_t pipe = EXR_DECODE_PIPELINE_INITIALIZER;
+    int32_t lines = 0, found = 0;
+    assert_int_equal(exr_get_scanlines_per_chunk(file, 0, &lines), EXR_ERR_SUCCESS);
+    for (int y = 5; y < 40; y += lines) {
+        exr_chunk_info_t chunk;
+        assert_int_equal(exr_read_scanline_chunk_info(file, 0, y, &chunk), EXR_ERR_SUCCESS);
+        assert_int_equal(y == 5 ? exr_decoding_initialize(file, 0, &chunk, &pipe) : exr_decoding_update(file, 0, &chunk, &pipe), 0);
+        for (int c = 0; c < pipe.channel_count; c++) {
+            int wanted = strcmp(pipe.channels[c].channel_name, name) == 0;
+            found += wanted;
+            pipe.channels[c].decode_to_ptr = wanted ? (uint8_t *)(out + (size_t)(y - 5) * 57) : NULL;
+            pipe.channels[c].user_pixel_stride = 4;
+            pipe.channels[c].user_line_stride = 4 * 57;
+            pipe.channels[c].user_bytes_per_element = 4;
+            pipe.channels[c].user_data_type = EXR_PIXEL_FLOAT;
+        }
+        if (y == 5)
+            assert_int_equal(exr_decoding_choose_default_routines(file, 0, &pipe), EXR_ERR_SUCCESS);
+        assert_int_equal(exr_decoding_run(file, 0, &pipe), EXR_ERR_SUCCESS);
+    }
+    exr_decoding_destroy(file, &pipe);
+    assert_true(found > 0);
+}
+
+static void exr_holds_every_layer(void **state)
+{
+    (void)state;
+    struct pt_err err = {0};
+    static float pixels[57 * 35];
+    exr_context_t file = NULL;
+    exr_attr_box2i_t window;
+    int32_t length;
+    const char *text;
+    assert_int_equal(pt_output_exr(in_folder("a.exr"), render, &info, &err), PT_OK);
+    assert_int_equal(exr_start_read(&file, in_folder("a.exr"), NULL), EXR_ERR_SUCCESS);
+    assert_int_equal(exr_get_data_window(file, 0, &window), EXR_ERR_SUCCESS);
+    assert_true(window.min.x == 3 && window.min.y == 5 && window.max.x == 59 && window.max.y == 39);
+    assert_int_equal(exr_get_display_window(file, 0, &window), EXR_ERR_SUCCESS);
+    assert_true(window.min.x == 0 && window.max.x == 59 && window.max.y == 43);
+    assert_int_equal(exr_attr_get_string(file, 0, "lull:criterion", &length, &text), EXR_ERR_SUCCESS);
+    assert_string_equal(text, "fake 1 at=32");
+    assert_int_equal(exr_attr_get_string(file, 0, "lull:effects", &length, &text), EXR_ERR_SUCCESS);
+    assert_string_equal(text, "alpha,motion");
+    static const char *const names[] = {"R", "lull.spp", "lull.reason", "lull.p_noisy", "lull.error", "albedo.G", "normal.Z", "depth.Z"};
+    for (int k = 0; k < 8; k++) {
+        read_channel(file, names[k], pixels);
+        for (int y = 5; y < 40; y++) {
+            for (int x = 3; x < 60; x++) {
+                const struct pt_block *b = &render->blocks.list[y / 16 * 4 + x / 16];
+                size_t i = pt_film_index(&render->film, x, y);
+                double rgb[3];
+                pt_film_mean(&render->film, i, b->spp, rgb);
+                const double expected[8] = {rgb[0], (double)(b->spp - render->film.dropped[i]), b->reason, b->p_noisy, b->error,
+                                            0.5, 1.0, 2.0};
+                assert_true(pixels[(y - 5) * 57 + x - 3] == (float)expected[k]);
+            }
+        }
+    }
+    exr_finish(&file);
+}
+
+static void exr_of_equal_renders_are_equal(void **state)
+{
+    (void)state;
+    struct pt_err err = {0};
+    char *a, *b;
+    size_t na, nb;
+    info.reproducible = 1;
+    assert_int_equal(pt_output_exr(in_folder("a.exr"), render, &info, &err), PT_OK);
+    assert_int_equal(pt_fio_read(in_folder("a.exr"), 1 << 24, &a, &na, &err), PT_OK);
+    render->totals.render_s += 1.0;
+    assert_int_equal(pt_output_exr(in_folder("a.exr"), render, &info, &err), PT_OK);
+    assert_int_equal(pt_fio_read(in_folder("a.exr"), 1 << 24, &b, &nb, &err), PT_OK);
+    info.reproducible = 0;
+    assert_int_equal(na, nb);
+    assert_memory_equal(a, b, na);
+    free(a);
+    free(b);
+}
+
+static void unwritable_folder_is_one_line(void **state)
+{
+    (void)state;
+    struct pt_err err = {0};
+    assert_int_equal(pt_output_exr("/nowhere/a.exr", render, &info, &err), PT_EIO);
+    assert_non_null(strstr(err.text, "/nowhere/a.exr"));
+    assert_null(strchr(err.text, '\n'));
+    assert_int_equal(pt_output_report("/nowhere/a.json", render, &info, &err), PT_EIO);
+    assert_int_not_equal(pt_output_preview("/nowhere/a.png", render, &err), PT_OK);
+    assert_int_equal(pt_output_stop_map("/nowhere/a.csv", render, &info, &err), PT_EIO);
+}
+
+/* --- pictures ------------------------------------------------------------------------------------------------------- */
+
+static void preview_is_srgb(void **state)
+{
+    (void)state;
+    struct pt_err err = {0};
+    struct pt_oiio_image image;
+    double rgb[3];
+    assert_int_equal(pt_output_preview(in_folder("a.png"), render, &err), PT_OK);
+    assert_int_equal(pt_oiio_read(in_folder("a.png"), &image, &err), PT_OK);
+    assert_true(image.width == 57 && image.height == 35 && image.channels == 3 && image.u8 != NULL);
+    pt_film_mean(&render->film, pt_film_index(&render->film, 13, 15), render->blocks.list[0].spp, rgb);
+    for (int c = 0; c < 3; c++)
+        assert_int_equal(image.u8[3 * (10 * 57 + 10) + c], pt_srgb_u8(rgb[c]));
+    pt_oiio_release(&image);
+}
+
+static void srgb_codes(void **state)
+{
+    (void)state;
+    assert_int_equal(pt_srgb_u8(0.0), 0);
+    assert_int_equal(pt_srgb_u8(1.0), 255);
+    assert_int_equal(pt_srgb_u8(7.0), 255);
+    assert_int_equal(pt_srgb_u8(-1.0), 0);
+    assert_int_equal(pt_srgb_u8((double)NAN), 0);
+    assert_int_equal(pt_srgb_u8(0.18), 118);
+    assert_int_equal(pt_srgb_u8(0.5), 188);
+    for (int i = 0; i < 256; i++)
+        assert_int_equal(pt_srgb_u8(pt_srgb_decode(i / 255.0)), i);
+}
+
+/* Colours lie between the ends of the scale, numbers are drawn, the legend is below. */
+static void stop_map_picture(void **state)
+{
+    (void)state;
+    struct pt_err err = {0};
+    struct pt_stopmap map;
+    const struct pt_stopmap_block blocks[2] = {{0, 0, 200, 100, 32}, {200, 0, 400, 100, 10000}};
+    uint8_t low[3], high[3];
+    assert_int_equal(pt_stopmap_draw(0, 0, 400, 100, blocks, 2, &map, &err), PT_OK);
+    assert_int_equal(map.width, 400);
+    assert_true(map.height > 100);
+    pt_viridis(0.0, low);
+    pt_viridis(1.0, high);
+    assert_memory_equal(map.rgb + 3 * (5 * 400 + 5), low, 3);
+    assert_memory_equal(map.rgb + 3 * (5 * 400 + 205), high, 3);
+    int ink = 0;
+    for (int y = 0; y < 100; y++)
+        for (int x = 0; x < 199; x++)
+            ink += map.rgb[3 * (y * 400 + x)] == 255;
+    assert_in_range(ink, 100, 2000);
+    pt_stopmap_release(&map);
+    assert_int_equal(pt_output_stop_map(in_folder("s.png"), render, &info, &err), PT_OK);
+}
+
+static void stop_map_table(void **state)
+{
+    (void)state;
+    struct pt_err err = {0};
+    char *text, expected[512];
+    size_t n;
+    assert_int_equal(pt_output_stop_map(in_folder("s.csv"), render, &info, &err), PT_OK);
+    assert_int_equal(pt_fio_read(in_folder("s.csv"), 4096, &text, &n, &err), PT_OK);
+    int used = snprintf(expected, sizeof expected, "fake-view1;");
+    for (uint32_t i = 0; i < render->blocks.count; i++)
+        used += snprintf(expected + used, sizeof expected - (size_t)used, "%llu;", (unsigned long long)render->blocks.list[i].spp);
+    snprintf(expected + used, sizeof expected - (size_t)used, "\n");
+    assert_string_equal(text, expected);
+    free(text);
+}
+
+/* --- report and progress -------------------------------------------------------------------------------------------- */
+
+static void has_keys(const cJSON *object, const char *const *keys)
+{
+    for (; *keys != NULL; keys++)
+        if (!cJSON_HasObjectItem(object, *keys))
+            fail_msg("no key %s", *keys);
+}
+
+static void report_has_every_key(void **state)
+{
+    (void)state;
+    static const char *const top[] = {"scene", "width", "height", "block", "seed", "threads", "criterion", "effects", "blocks", "totals", NULL};
+    static const char *const block[] = {"id", "x0", "y0", "x1", "y1", "spp", "reason", "p_noisy", "error", "checks", "thread_s", NULL};
+    static const char *const totals[] = {"samples", "render_s", "criterion_s", "paths", "rays", "paths_per_s", "rays_per_s", "dropped_samples", NULL};
+    static const char *const by[] = {"id", "version", "params", NULL};
+    struct pt_err err = {0};
+    char *text;
+    size_t n;
+    assert_int_equal(pt_output_report(in_folder("r.json"), render, &info, &err), PT_OK);
+    assert_int_equal(pt_fio_read(in_folder("r.json"), 1 << 20, &text, &n, &err), PT_OK);
+    cJSON *root = cJSON_Parse(text);
+    assert_non_null(root);
+    has_keys(root, top);
+    has_keys(cJSON_GetObjectItem(root, "criterion"), by);
+    has_keys(cJSON_GetObjectItem(root, "totals"), totals);
+    const cJSON *blocks = cJSON_GetObjectItem(root, "blocks");
+    assert_int_equal(cJSON_GetArraySize(blocks), 12);
+    double samples = 0.0;
+    const cJSON *b;
+    cJSON_ArrayForEach(b, blocks)
+    {
+        has_keys(b, block);
+        samples += cJSON_GetObjectItem(b, "spp")->valuedouble *
+                   (cJSON_GetObjectItem(b, "x1")->valuedouble - cJSON_GetObjectItem(b, "x0")->valuedouble) *
+                   (cJSON_GetObjectItem(b, "y1")->valuedouble - cJSON_GetObjectItem(b, "y0")->valuedouble);
+    }
+    assert_true(samples == cJSON_GetObjectItem(cJSON_GetObjectItem(root, "totals"), "samples")->valuedouble);
+    assert_true(cJSON_GetArraySize(cJSON_GetObjectItem(root, "dropped")) > 0);
+    assert_string_equal(cJSON_GetStringValue(cJSON_GetObjectItem(cJSON_GetObjectItem(cJSON_GetObjectItem(root, "criterion"), "params"), "at")), "32");
+    cJSON_Delete(root);
+    free(text);
+}
+
+static void progress_is_honest(void **state)
+{
+    (void)state;
+    char text[256];
+    struct pt_render r = *render;
+    struct pt_block list[2] = {{.x1 = 10, .y1 = 10, .spp = 100, .next_spp = 120, .asked = 1, .predicted_spp = 200},
+                               {.x1 = 10, .y1 = 10, .spp = 50, .reason = PT_REASON_CRITERION}};
+    r.blocks.list = list;
+    r.blocks.count = 2;
+    r.config.spp_max = 1000;
+    r.samples_per_s = 1000.0;
+    pt_progress_text(&r, text, sizeof text);
+    assert_string_equal(text, " 60%  1 of 2 blocks active  spp 100..100  0.00 Mpaths/s  ETA 0:10");
+    list[0].predicted_spp = (double)NAN;
+    pt_progress_text(&r, text, sizeof text);
+    assert_string_equal(text, ">= 14%  1 of 2 blocks active  spp 100..100  0.00 Mpaths/s  ETA at most 1:30");
+    r.config.time_budget_s = pt_render_elapsed_s(&r) + 4.0;
+    pt_progress_text(&r, text, sizeof text);
+    assert_non_null(strstr(text, "0:04"));
+    r.config.time_budget_s = 0.0;
+    r.samples_per_s = 0.0;
+    pt_progress_text(&r, text, sizeof text);
+    assert_non_null(strstr(text, "ETA unknown"));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(exr_holds_every_layer), cmocka_unit_test(exr_of_equal_renders_are_equal),
+        cmocka_unit_test(unwritable_folder_is_one_line), cmocka_unit_test(preview_is_srgb),
+        cmocka_unit_test(srgb_codes), cmocka_unit_test(stop_map_picture), cmocka_unit_test(stop_map_table),
+        cmocka_unit_test(report_has_every_key), cmocka_unit_test(progress_is_honest),
+    };
+    return cmocka_run_group_tests(tests, setup, teardown);
+}

@@ -1,0 +1,374 @@
+/* Block sequences as ggn/data/FORMAT.md says, read back byte by byte. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include <cjson/cJSON.h>
+#include <zlib.h>
+
+#include "base/fio.h"
+#include "image/tonemap.h"
+#include "render/blockstats.h"
+#include "render/lseq.h"
+#include "render/sequence.h"
+#include "support/pt_fake.h"
+
+static void half_floats(void **state)
+{
+    (void)state;
+    static const struct {
+        double x;
+        uint16_t bits;
+    } cases[] = {{0.0, 0},        {-0.0, 0x8000},    {1.0, 0x3c00},        {-2.0, 0xc000},       {65504.0, 0x7bff}, {1e9, 0x7bff},
+                 {-1e9, 0xfbff},  {0x1p-14, 0x0400}, {0x1p-24, 0x0001},    {0x1p-25, 0x0000},    {0x1.8p-25, 1},    {0.1, 0x2e66},
+                 {2049.0, 0x6800}, {2051.0, 0x6802}, {0x1.ffcp-1, 0x3bff}, {0x1.ffep-1, 0x3c00}, {0x1.ff8p-15, 0x03ff}, {1.0 / 3.0, 0x3555}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++)
+        assert_int_equal(pt_lseq_half_float(cases[i].x), cases[i].bits);
+}
+
+/* Reading back lands in the same eighth of the display step. */
+static void fine_codes(void **state)
+{
+    (void)state;
+    for (int k = 0; k < 20000; k++) {
+        double x = pow(10.0, -5.0 + k * 5.0 / 20000.0), lo, hi;
+        uint8_t d = pt_srgb_u8(x), q = pt_lseq_fine(x, d);
+        if (d == 255)
+            continue;
+        lo = d > 0 ? pt_srgb_decode((d - 0.5) / 255.0) : 0.0;
+        hi = pt_srgb_decode((d + 0.5) / 255.0);
+        assert_in_range(q, 0, 7);
+        assert_true(fabs(lo + (q + 0.5) / 8.0 * (hi - lo) - x) <= (hi - lo) / 16.0 * 1.0001 + 1e-12);
+    }
+    double lo = pt_srgb_decode(254.5 / 255.0);
+    assert_int_equal(pt_lseq_fine(lo * 16.0, 255), 64);
+    assert_int_equal(pt_lseq_fine(1e30, 255), 255);
+}
+
+static void half_log_codes(void **state)
+{
+    (void)state;
+    assert_int_equal(pt_lseq_half_log(0.0), 0);
+    assert_int_equal(pt_lseq_half_log(1e-7), 0);
+    assert_int_equal(pt_lseq_half_log(1.0), 80);
+    assert_int_equal(pt_lseq_half_log(-1.0), 80 | 128);
+    assert_int_equal(pt_lseq_half_log(2.0), 84);
+    assert_int_equal(pt_lseq_half_log(1e30), 127);
+    assert_int_equal(pt_lseq_half_log(exp2(-19.875)), 1);
+}
+
+static void levels(void **state)
+{
+    (void)state;
+    static uint32_t spp[PT_SEQUENCE_MAX_LEVELS];
+    struct pt_err err = {0};
+    assert_int_equal(pt_sequence_levels("linear:20:100:20", spp, &err), 5);
+    assert_int_equal(spp[4], 100);
+    int n = pt_sequence_levels("geometric:20:10000:1.15", spp, &err);
+    assert_in_range(n, 45, 46);
+    assert_int_equal(spp[0], 20);
+    assert_int_equal(spp[1], 23);
+    assert_int_equal(spp[n - 1], 10000);
+    for (int i = 1; i < n; i++)
+        assert_true(spp[i] > spp[i - 1]);
+    assert_int_equal(pt_sequence_levels("geometric:1:5:1.01", spp, &err), 5);
+    static const char *const bad[] = {"", "linear", "linear:1:2", "cubic:1:2:3", "linear:0:5:1", "linear:5:1:1", "geometric:1:9:1",
+                                      "linear:1:9:1:2", "linear:1:9:nan", "linear:1:100000:1", "geometric:1:inf:2"};
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
+        assert_int_equal(pt_sequence_levels(bad[i], spp, &err), PT_EINVAL);
+}
+
+static void block_lists(void **state)
+{
+    (void)state;
+    struct pt_err err = {0};
+    uint8_t chosen[12] = {0};
+    assert_int_equal(pt_sequence_choose("0,3,8-10", chosen, 12, &err), PT_OK);
+    static const uint8_t expected[12] = {1, 0, 0, 1, 0, 0, 0, 0, 1, 1, 1, 0};
+    assert_memory_equal(chosen, expected, 12);
+    static const char *const bad[] = {"", "12", "1-", "3-1", "-1", "a", "1,", "1;2", "0-12"};
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
+        assert_int_equal(pt_sequence_choose(bad[i], chosen, 12, &err), PT_EINVAL);
+}
+
+static void statistics(void **state)
+{
+    (void)state;
+    const double mean[12] = {1, 1, 2, 0, 0, 0, 1, 1, 1, 1, 1, 1}, half[12] = {1.5, 1, 2, 1, 1, 1, 1, 1, 1, 1, 1, 1};
+    const double d[12] = {0, 0, 0, 0.1, 0.1, 0.1, 0, 0, 0, -0.3, -0.3, -0.3}, m2[4] = {2, 1, 1, 1};
+    double scratch[4];
+    struct pt_block_stats s;
+    pt_block_stats(mean, half, d, m2, 4, 5, scratch, &s);
+    assert_true(fabs(s.dammertz - 0.5 / 2.0 / 4.0) < 1e-12);
+    double y0 = 0.2126 + 0.7152 + 0.0722 * 2, mean_y = (y0 + 2.0) / 4.0;
+    assert_true(fabs(s.rsem - sqrt((2 - y0 * y0 + 1.0) / 4.0 / 4.0) / mean_y) < 1e-12);
+    assert_true(fabs(s.tail999 - 0.3 / mean_y) < 1e-12);
+    assert_true(fabs(s.gini - (1 * 0.1 + 3 * 0.3) / (4 * 0.4)) < 1e-12);
+}
+
+/* --- a recorded folder ---------------------------------------------------------------------------------------------- */
+
+static char folder[64];
+static struct pt_threads *pool;
+
+static int setup(void **state)
+{
+    (void)state;
+    struct pt_err err = {0};
+    strcpy(folder, "/tmp/pt_sequence_XXXXXX");
+    pool = pt_threads_create(2, &err);
+    return mkdtemp(folder) != NULL && pool != NULL ? 0 : -1;
+}
+
+static int teardown(void **state)
+{
+    (void)state;
+    char command[128];
+    pt_threads_destroy(pool);
+    snprintf(command, sizeof command, "rm -r %s", folder);
+    return system(command);
+}
+
+static struct pt_sequence_config make_config(void)
+{
+    return (struct pt_sequence_config){.directory = folder, .levels = "linear:16:352:112", .blocks = "1,11", .reference_spp = 64,
+                                       .scene_path = "x/room-view3.pbrt", .scene_crc = 0xabc, .render = pt_fake_config()};
+}
+
+static int lines_said;
+static void say(void *data, const char *line)
+{
+    (void)data;
+    (void)line;
+    lines_said++;
+}
+
+static int record(const struct pt_sequence_config *config, struct pt_criterion *criterion, struct pt_err *err)
+{
+    int stopped;
+    return pt_sequence_record(config, NULL, pt_fake_noise, pool, criterion, NULL, say, NULL, &stopped, err);
+}
+
+static uint32_t u32(const unsigned char *p)
+{
+    return p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
+}
+
+static double f64(const unsigned char *p)
+{
+    double v;
+    memcpy(&v, p, sizeof v);
+    return v;
+}
+
+static unsigned char *read_all(const char *name, size_t *size)
+{
+    char path[128], *data;
+    struct pt_err err = {0};
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    assert_int_equal(pt_fio_read(path, 1 << 26, &data, size, &err), PT_OK);
+    return (unsigned char *)data;
+}
+
+/* Undoes subtract green and average of a P-pixel RGB plane. */
+static void unfilter(unsigned char *p, int width, int height)
+{
+    size_t pixels = (size_t)(width * height);
+    for (size_t c = 0; c < 3; c++)
+        for (int y = 0; y < height; y++)
+            for (int x = 0; x < width; x++) {
+                unsigned char *q = p + c * pixels + (size_t)(y * width + x);
+                *q = (unsigned char)(*q + ((x > 0 ? q[-1] : 0) + (y > 0 ? q[-width] : 0)) / 2);
+            }
+    for (size_t i = 0; i < pixels; i++) {
+        p[i] = (unsigned char)(p[i] + p[pixels + i]);
+        p[2 * pixels + i] = (unsigned char)(p[2 * pixels + i] + p[pixels + i]);
+    }
+}
+
+/* The film of one block at spp, rendered by itself. */
+static struct pt_render *render_block(int x0, int y0, int x1, int y1, uint32_t spp, uint32_t seed)
+{
+    struct pt_render_config c = pt_fake_config();
+    int crop[4] = {x0, y0, x1, y1};
+    struct pt_render *r;
+    struct pt_render_hooks none = {0};
+    enum pt_render_outcome outcome;
+    struct pt_err err = {0};
+    memcpy(c.crop, crop, sizeof crop);
+    c.spp_min = c.spp_max = spp;
+    c.uniform = 1;
+    c.planes = PT_FILM_HALF;
+    c.integrator.seed = seed;
+    assert_int_equal(pt_render_create(&c, NULL, pt_fake_noise, pool, NULL, &r, &err), PT_OK);
+    assert_int_equal(pt_render_run(r, &none, &outcome, &err), PT_OK);
+    return r;
+}
+
+static const unsigned char *check_plane(const unsigned char *p, uint32_t id, const struct pt_render *r)
+{
+    static unsigned char raw[6 * 256];
+    uLongf n = sizeof raw;
+    size_t pixels = r->film.pixels;
+    int width = r->film.x1 - r->film.x0;
+    uint64_t spp = r->blocks.list[0].spp, half = pt_film_half_spp(spp);
+    assert_int_equal(u32(p), id);
+    assert_int_equal(uncompress(raw, &n, p + 16, u32(p + 12)), Z_OK);
+    assert_int_equal(n, u32(p + 8));
+    if (id == 1)
+        unfilter(raw, width, (int)pixels / width);
+    for (size_t i = 0; i < pixels; i++) {
+        double mean[3], a[3], d[3];
+        pt_film_mean(&r->film, i, spp, mean);
+        pt_film_half_mean(&r->film, i, half, a);
+        for (int c = 0; c < 3; c++)
+            d[c] = (a[c] - (r->film.color[3 * i + (size_t)c] - r->film.half[3 * i + (size_t)c]) / (double)(spp - half)) / 2.0;
+        for (size_t c = 0; c < 3; c++) {
+            uint16_t h = (uint16_t)(raw[c * pixels + i] | raw[(id > 3 ? 3 * pixels : 0) + c * pixels + i] << 8);
+            if (id == 1)
+                assert_int_equal(raw[c * pixels + i], pt_srgb_u8(mean[c]));
+            else if (id == 2)
+                assert_int_equal(raw[c * pixels + i], pt_lseq_fine(mean[c], pt_srgb_u8(mean[c])));
+            else if (id >= 4)
+                assert_int_equal(h, pt_lseq_half_float(id == 4 ? mean[c] : d[c]));
+        }
+        if (id == 3)
+            assert_int_equal(raw[i], pt_lseq_half_log(0.2126 * d[0] + 0.7152 * d[1] + 0.0722 * d[2]));
+    }
+    return p + 16 + u32(p + 12);
+}
+
+static void check_block(const char *name, int x0, int y0, int x1, int y1, int with_criterion)
+{
+    static const uint32_t spp[5] = {16, 128, 240, 352, 64};
+    size_t size;
+    unsigned char *data = read_all(name, &size);
+    const unsigned char *p = data + 64;
+    assert_memory_equal(data, "LULLSEQ1", 8);
+    assert_int_equal(u32(data + 16), x1 - x0);
+    assert_int_equal(u32(data + 20), y1 - y0);
+    assert_int_equal(u32(data + 24), x0);
+    assert_int_equal(u32(data + 28), y0);
+    assert_int_equal(u32(data + 36), 5);
+    assert_int_equal(u32(data + 60), crc32(0, data, 60));
+    for (int k = 0; k < 5; k++) {
+        uint32_t statistics_count = u32(p + 12), bytes = u32(p + 20);
+        assert_int_equal(u32(p), k < 4 ? 1 : 2);
+        assert_int_equal(u32(p + 4), spp[k]);
+        assert_int_equal(u32(p + 8), spp[k] / 2);
+        assert_int_equal(statistics_count, k == 4 ? 1 : 5 + with_criterion);
+        assert_int_equal(u32(p + 16), 3);
+        assert_int_equal(u32(p + 24), crc32(0, p + 32, bytes));
+        assert_int_equal(u32(p + 28), crc32(0, p, 28));
+        if (with_criterion && k < 4) {
+            assert_string_equal((const char *)p + 32 + 5 * 32, "fake.error");
+            assert_true(fabs(f64(p + 32 + 5 * 32 + 24) - 0.75) < 0.02);
+        }
+        struct pt_render *r = render_block(x0, y0, x1, y1, spp[k], k < 4 ? 7 : 7 ^ 0x5bd1e995u);
+        const unsigned char *q = p + 32 + 32 * statistics_count;
+        q = check_plane(q, 1, r);
+        q = check_plane(q, k >= 3 ? 4 : 2, r); /* 352 is the first level of 320 or more */
+        q = check_plane(q, k >= 3 ? 5 : 3, r);
+        pt_render_destroy(r);
+        p += 32 + bytes;
+        assert_ptr_equal(p, q);
+    }
+    assert_ptr_equal(p, data + size);
+    free(data);
+}
+
+static cJSON *read_manifest(void)
+{
+    size_t size;
+    char *text = (char *)read_all("manifest.json", &size);
+    cJSON *m = cJSON_Parse(text);
+    assert_non_null(m);
+    free(text);
+    return m;
+}
+
+static void recorded_folder(void **state)
+{
+    (void)state;
+    struct pt_sequence_config config = make_config();
+    struct pt_criterion *criterion = NULL;
+    struct pt_err err = {0};
+    assert_int_equal(pt_criterion_create_table(pt_fake_criterion(), NULL, 0, pool, NULL, NULL, &criterion, &err), PT_OK);
+    assert_int_equal(record(&config, criterion, &err), PT_OK);
+    pt_criterion_destroy(criterion);
+    check_block("block-00001.lseq", 16, 0, 32, 16, 1);
+    check_block("block-00011.lseq", 48, 32, 60, 44, 1);
+    cJSON *m = read_manifest();
+    assert_string_equal(cJSON_GetStringValue(cJSON_GetObjectItem(m, "scene")), "room");
+    assert_string_equal(cJSON_GetStringValue(cJSON_GetObjectItem(m, "camera")), "view3");
+    assert_string_equal(cJSON_GetStringValue(cJSON_GetObjectItem(m, "source_crc32")), "00000abc");
+    assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(m, "levels")), 4);
+    assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(m, "blocks")), 2);
+    size_t size;
+    unsigned char *data = read_all("block-00011.lseq", &size);
+    const cJSON *entry = cJSON_GetArrayItem(cJSON_GetObjectItem(m, "blocks"), 1);
+    char crc[16];
+    snprintf(crc, sizeof crc, "%08x", (unsigned)crc32(0, data, (uInt)size));
+    assert_string_equal(cJSON_GetStringValue(cJSON_GetObjectItem(entry, "crc32")), crc);
+    assert_true(cJSON_GetObjectItem(entry, "bytes")->valuedouble == (double)size);
+    free(data);
+    cJSON_Delete(m);
+}
+
+static void going_on(void **state)
+{
+    (void)state;
+    struct pt_sequence_config config = make_config();
+    struct pt_err err = {0};
+    struct stat before, after;
+    char path[128];
+    snprintf(path, sizeof path, "%s/block-00001.lseq", folder);
+    stat(path, &before);
+    lines_said = 0;
+    config.blocks = "1,2,11";
+    assert_int_equal(record(&config, NULL, &err), PT_OK);
+    assert_int_equal(lines_said, 1);
+    stat(path, &after);
+    assert_true(before.st_ino == after.st_ino);
+    check_block("block-00002.lseq", 32, 0, 48, 16, 0);
+
+    FILE *f = fopen(path, "r+b"); /* a damaged file is made again */
+    fseek(f, 100, SEEK_SET);
+    fputc('x', f);
+    fclose(f);
+    lines_said = 0;
+    assert_int_equal(record(&config, NULL, &err), PT_OK);
+    assert_int_equal(lines_said, 1);
+    check_block("block-00001.lseq", 16, 0, 32, 16, 0);
+    cJSON *m = read_manifest();
+    assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(m, "blocks")), 3);
+    cJSON_Delete(m);
+
+    config.reference_spp = 65;
+    assert_int_equal(record(&config, NULL, &err), PT_EINVAL);
+    assert_non_null(strstr(err.text, "another reference_spp"));
+    config = make_config();
+    config.render.integrator.max_depth = 3;
+    assert_int_equal(record(&config, NULL, &err), PT_EINVAL);
+    assert_non_null(strstr(err.text, "another renderer"));
+    config = make_config();
+    config.directory = "/proc/nope/deep";
+    assert_int_equal(record(&config, NULL, &err), PT_EINVAL);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(half_floats),   cmocka_unit_test(fine_codes), cmocka_unit_test(half_log_codes), cmocka_unit_test(levels),
+        cmocka_unit_test(block_lists),   cmocka_unit_test(statistics), cmocka_unit_test(recorded_folder), cmocka_unit_test(going_on),
+    };
+    return cmocka_run_group_tests(tests, setup, teardown);
+}
