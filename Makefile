@@ -145,6 +145,11 @@ $(OUT)/fuzz/replay-pt_%: $(OBJ)/tests/fuzz/pt_%.c.o $(OBJ)/tests/fuzz/replay.c.o
 $(OUT)/fuzz/replay-ggn_%: $(OBJ)/tests/fuzz/ggn_%.c.o $(OBJ)/tests/fuzz/replay.c.o $(GGN_OBJ)
 	$(link) $^ $(LDFLAGS_ALL) $(GGN_LIBS) -o $@
 
+# Measuring programs; scripts/bench runs them.
+BENCHES := $(patsubst tests/bench/%.c,$(OUT)/bench/%,$(wildcard tests/bench/*.c))
+$(OUT)/bench/pt_%: $(OBJ)/tests/bench/pt_%.c.o $(PT_OBJ) $(LOADER_OBJ) $(SUPPORT_pt)
+	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) -o $@
+
 setup: ## install the Debian packages that are missing
 	@scripts/setup
 
@@ -187,7 +192,7 @@ abi-check: $(OUT)/tests/abi/api_layout ## the ABI's layout is the frozen one (pl
 demo: setup ## install what is missing, build, render a scene with per-block stopping
 	@$(MAKE) --no-print-directory all
 	@scripts/demo
-bench: all ## measure speed as ratios, interleaved, against the peers that are installed
+bench: all $(BENCHES) ## measure speed as ratios, interleaved, against the peers that are installed
 	@scripts/bench
 train-demo: all ## train a tiny model on a tiny bundled data set and show that it learns
 	@scripts/train-demo

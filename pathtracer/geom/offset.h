@@ -16,7 +16,7 @@
 static inline pt_vec3 pt_offset_point(pt_vec3 p, pt_vec3 n, pt_vec3 error, pt_vec3 w)
 {
     float d = fabsf(n.x) * error.x + fabsf(n.y) * error.y + fabsf(n.z) * error.z;
-    return v3_madd(p, v3_dot(n, w) < 0.0f ? -d : d, n);
+    return v3_madd(p, copysignf(d, v3_dot(n, w)), n);
 }
 
 #endif

@@ -196,7 +196,7 @@ PT_KERNEL_INLINE int pt_path_survives(struct pt_path *path)
     if (path->depth < path->settings->rr_depth)
         return 1;
     float keep = v3_max(path->throughput) * path->eta_scale;
-    if (!(keep < 1.0f))
+    if (keep >= 1.0f)
         return 1;
     if (!(pt_sampler_1d(&path->sampler, PT_DIM_ROULETTE) < keep))
         return 0;

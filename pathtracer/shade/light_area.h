@@ -19,15 +19,8 @@ static inline int pt_light_triangle_sample(const struct pt_scene *scene, const s
                                            float u1, struct pt_light_sample *out)
 {
     const struct pt_light *light = &scene->lights[e->light];
-    /* Uniform on the triangle: Heitz 2019, "A Low-Distortion Map Between Triangle and Square" */
-    float b1 = u0, b2 = u1;
-    if (b2 > b1) {
-        b1 *= 0.5f;
-        b2 -= b1;
-    } else {
-        b2 *= 0.5f;
-        b1 -= b2;
-    }
+    /* Uniform on the triangle: Heitz 2019, "A Low-Distortion Map Between Triangle and Square", without its branch */
+    float half = 0.5f * (u0 < u1 ? u0 : u1), b1 = u0 - half, b2 = u1 - half;
     pt_vec3 p = v3_madd(v3_madd(e->p0, b1, e->e1), b2, e->e2), d = v3_sub(p, p_ref);
     float dist2 = v3_dot(d, d), towards = -v3_dot(e->n, d);
     if (!(towards > 0.0f)) {

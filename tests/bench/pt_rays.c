@@ -1,0 +1,171 @@
+/*
+ * How much of the time of a render is spent tracing rays: the kernel against a loop that only traces the rays that the kernel
+ * traced, in the same order, without shading. One thread, interleaved, medians.
+ *
+ *   build/bench/pt_rays SCENE.pbrt|cornell [WIDTHxHEIGHT] [ROUNDS] [MAX_DEPTH] [all]
+ *
+ * Prints one line of JSON: paths/s, rays/s, rays/s of the ray-only loop, and the share of the two.
+ */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "geom/accel.h"
+#include "integ/integrator.h"
+#include "scene/load.h"
+#include "support/pt_scenes.h"
+
+enum { RAYS_MAX = 4000000, ROUNDS_MAX = 64 };
+
+static struct recorded {
+    struct pt_ray ray;
+    int kind; /* 0 nearest, 1 nearest coherent, 2 occlusion */
+} *rays;
+static size_t ray_count;
+
+static void record(const struct pt_ray *ray, int kind)
+{
+    if (ray_count < RAYS_MAX)
+        rays[ray_count++] = (struct recorded){*ray, kind};
+}
+
+static int intersect_recorded(const struct pt_scene *scene, const struct pt_ray *ray, int coherent, struct pt_hit *hit)
+{
+    record(ray, coherent ? 1 : 0);
+    return pt_accel_intersect(scene, ray, coherent, hit);
+}
+
+static int occluded_recorded(const struct pt_scene *scene, const struct pt_ray *ray)
+{
+    record(ray, 2);
+    return pt_accel_occluded(scene, ray);
+}
+
+/* The kernel once more, with its queries going through the recorder. */
+#define pt_accel_intersect intersect_recorded
+#define pt_accel_occluded occluded_recorded
+#include "integ/path.h"
+#undef pt_accel_intersect
+#undef pt_accel_occluded
+
+struct window {
+    uint32_t width, height, row_step;
+};
+
+static unsigned long long run_kernel(const struct pt_scene *scene, const struct pt_integrator *settings, pt_kernel *kernel,
+                                     const struct window *w, uint32_t sample, unsigned long long *paths)
+{
+    unsigned long long count = 0;
+    struct pt_path_result result;
+    for (uint32_t y = 0; y < w->height; y += w->row_step)
+        for (uint32_t x = 0; x < w->width; x++) {
+            kernel(scene, settings, x, y, sample, &result);
+            count += result.rays;
+            ++*paths;
+        }
+    return count;
+}
+
+static void record_rays(const struct pt_scene *scene, const struct pt_integrator *settings, const struct window *w)
+{
+    const pt_effects through = PT_FX_MEDIA | PT_FX_INTERFACE | PT_FX_ALPHA; /* they turn occlusion queries into nearest hits */
+    struct pt_path_result result;
+    for (uint32_t y = 0; y < w->height; y += w->row_step)
+        for (uint32_t x = 0; x < w->width; x++)
+            if (scene->effects & through)
+                pt_path_sample(PT_FX_ALL, scene, settings, x, y, 0, NULL, &result);
+            else
+                pt_path_sample(PT_FX_ALL & ~through, scene, settings, x, y, 0, NULL, &result);
+}
+
+static unsigned long long replay(const struct pt_scene *scene)
+{
+    unsigned long long hits = 0;
+    for (size_t i = 0; i < ray_count; i++) {
+        struct pt_hit hit;
+        if (rays[i].kind == 2)
+            hits += (unsigned)pt_accel_occluded(scene, &rays[i].ray);
+        else
+            hits += (unsigned)pt_accel_intersect(scene, &rays[i].ray, rays[i].kind, &hit);
+    }
+    return hits;
+}
+
+static int by_value(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static double median(double *values, int n)
+{
+    qsort(values, (size_t)n, sizeof *values, by_value);
+    return n % 2 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
+}
+
+static void measure(const struct pt_scene *scene, const struct pt_integrator *settings, const char *name, pt_kernel *kernel,
+                    const struct window *w, int rounds)
+{
+    double paths_s[ROUNDS_MAX], rays_s[ROUNDS_MAX], only_s[ROUNDS_MAX], share[ROUNDS_MAX];
+    unsigned long long sink = 0;
+    for (int i = 0; i < rounds; i++) {
+        unsigned long long paths = 0;
+        double t0 = pt_clock_thread_s();
+        unsigned long long traced = run_kernel(scene, settings, kernel, w, (uint32_t)i, &paths);
+        double t1 = pt_clock_thread_s();
+        sink += replay(scene);
+        double t2 = pt_clock_thread_s();
+        paths_s[i] = (double)paths / (t1 - t0);
+        rays_s[i] = (double)traced / (t1 - t0);
+        only_s[i] = (double)ray_count / (t2 - t1);
+        share[i] = rays_s[i] / only_s[i];
+    }
+    printf("{\"kernel\":\"%s\",\"paths_per_s\":%.0f,\"rays_per_s\":%.0f,\"ray_only_per_s\":%.0f,\"share\":%.3f,\"hits\":%llu}\n", name,
+           median(paths_s, rounds), median(rays_s, rounds), median(only_s, rounds), median(share, rounds), sink);
+}
+
+int main(int argc, char **argv)
+{
+    if (argc < 2) {
+        fprintf(stderr, "usage: %s SCENE.pbrt|cornell [WIDTHxHEIGHT] [ROUNDS] [MAX_DEPTH] [all]\n", argv[0]);
+        return 2;
+    }
+    struct pt_scene cornell, *scene = &cornell;
+    struct pt_integrator settings = test_integrator(8);
+    struct window w = {400, 400, 1};
+    int rounds = argc > 3 ? atoi(argv[3]) : 7, builtin = strcmp(argv[1], "cornell") == 0;
+    rounds = rounds < 1 ? 1 : rounds > ROUNDS_MAX ? ROUNDS_MAX : rounds;
+    if (argc > 2 && sscanf(argv[2], "%ux%u", &w.width, &w.height) != 2)
+        return 2;
+    if (builtin) {
+        test_cornell(&cornell, (int)w.width, 1.0f, v3_splat(0.0f));
+    } else {
+        struct pt_scene_defaults defaults;
+        struct pt_err err = {0};
+        struct pt_load_options options = {.width = (int)w.width, .height = (int)w.height, .quiet = 1};
+        if (pt_scene_load(argv[1], &options, &scene, &defaults, &err) != PT_OK) {
+            fprintf(stderr, "%s\n", err.text);
+            return 2;
+        }
+        settings = defaults.integrator;
+    }
+    if (argc > 4 && atoi(argv[4]) != 0)
+        settings.max_depth = atoi(argv[4]);
+    rays = malloc(RAYS_MAX * sizeof *rays);
+    if (!rays)
+        return 1;
+    /* about 100,000 paths a round: whole rows, spread over the height */
+    while ((unsigned long long)w.width * (w.height / w.row_step) > 100000)
+        w.row_step++;
+    record_rays(scene, &settings, &w);
+    const char *name;
+    pt_kernel *kernel = pt_kernel_select(argc > 5 ? PT_FX_ALL : scene->effects, NULL, &name);
+    measure(scene, &settings, name, kernel, &w, rounds);
+    free(rays);
+    if (builtin)
+        test_scene_end(scene);
+    else
+        pt_scene_destroy(scene);
+    return 0;
+}
