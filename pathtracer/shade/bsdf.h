@@ -49,7 +49,7 @@ enum {
 struct pt_bsdf_sample {
     pt_vec3 wi;
     pt_vec3 weight;  /* f |cos θi| / pdf */
-    float pdf_solid; /* 1/sr; for DELTA the probability of the choice */
+    float pdf_solid; /* 1/sr; for DELTA the probability of the choice; see bsdf_coated_walk.h for walked coatings */
     float eta_scale; /* (eta_i/eta_t)² removed by refraction, for Russian roulette; 1 otherwise */
     uint32_t flags;  /* PT_SCATTER_* */
 };

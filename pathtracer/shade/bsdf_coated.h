@@ -20,7 +20,7 @@
 /* What the coating does to light of cosine mu > 0: *base gets A(mu), *spec the albedo of the interface's reflection. */
 static inline void pt_coat_split(const struct pt_bsdf *b, float mu, float *base, float *spec)
 {
-    if (b->alpha_x > 0.0f && b->eta != 1.0f) {
+    if (!pt_dielectric_is_smooth(b)) {
         pt_coat_lookup(b->coat_table, pt_coat_alpha(b->alpha_x, b->alpha_y), mu, base, spec);
         return;
     }
@@ -65,7 +65,7 @@ static inline pt_vec3 pt_coated_diffuse_eval(pt_effects fx, const struct pt_bsdf
     pt_vec3 factor = pt_coat_base_factor(b);
     float p = pt_coat_choice(spec_o, base_o, factor), pdf_spec = 0.0f;
     pt_vec3 f = v3_scale(factor, base_o * base_i * wi.z);
-    if ((fx & PT_FX_GLOSSY) && b->alpha_x > 0.0f && b->eta != 1.0f) {
+    if ((fx & PT_FX_GLOSSY) && !pt_dielectric_is_smooth(b)) {
         pt_vec3 m = v3_norm(v3_add(wo, wi));
         float ax = b->alpha_x, ay = b->alpha_y, d = pt_ggx_d(m, ax, ay);
         float fresnel = pt_fresnel_dielectric(v3_dot(wo, m), b->eta);
@@ -85,7 +85,7 @@ static inline int pt_coated_diffuse_sample(pt_effects fx, const struct pt_bsdf *
     pt_vec3 w = v3_scale(wo, side), wi;
     pt_coat_split(b, w.z, &base, &spec);
     float p = pt_coat_choice(spec, base, pt_coat_base_factor(b));
-    int rough = b->alpha_x > 0.0f && b->eta != 1.0f;
+    int rough = !pt_dielectric_is_smooth(b);
     out->eta_scale = 1.0f;
     out->flags = 0;
     if (u_lobe < p) {

@@ -1,8 +1,10 @@
 /*
  * Coatings without a factored solution: over metal, or scattering light inside the layer. The value is one estimate by the
  * walk of bsdf_layered.h from a stream keyed by (walk_key, wo, wi): a function of its arguments whose mean over walk_key is
- * the layered BSDF. Directions are drawn from closed-form lobes, so that the pdf is exact: the interface's reflection, the
- * metal seen through the interface, and a cosine lobe for what bounced in between.
+ * the layered BSDF. A direction is drawn by following light through the layer, so its weight has no peaks; the density of
+ * such a walk has no closed form, and pdf_solid is that of lobes fitted to it: the interface's reflection, the metal seen
+ * through the interface, a cosine lobe for what bounced in between. Weights of multiple importance sampling need only that
+ * both strategies use the same function, so the result is unbiased; weight · pdf is not f.
  *
  * Mirror-like interface over mirror-like metal is a delta whose weight is summed in closed form.
  */
@@ -37,7 +39,7 @@ static inline struct pt_coat_lobes pt_coat_lobes(const struct pt_bsdf *b, float 
     float sum = l.interface + l.metal + l.cosine, scale = sum > 0.0f ? 1.0f / sum : 0.0f;
     l.interface *= scale;
     l.metal *= scale;
-    l.cosine = 1.0f - l.interface - l.metal;
+    l.cosine = fmaxf(0.0f, 1.0f - l.interface - l.metal);
     return l;
 }
 
@@ -123,25 +125,18 @@ __attribute__((noinline, unused)) static int pt_coated_walk_sample(const struct 
         out->pdf_solid = 1.0f;
         return 1;
     }
-    struct pt_coat_lobes l = pt_coat_lobes(b, w.z);
-    if (u_lobe < l.interface && pt_dielectric_is_smooth(b)) {
-        out->weight = v3_splat(pt_fresnel_dielectric(w.z, b->eta) / l.interface);
-        out->pdf_solid = l.interface;
+    struct pt_rng rng = pt_coat_stream(b, w, v3(u_lobe, u0, u1));
+    int what = pt_layer_walk_sample(b, w, u_lobe, u0, u1, &rng, &wi, &out->weight);
+    if (!what)
+        return 0;
+    if (what == 1 && pt_dielectric_is_smooth(b)) {
+        out->pdf_solid = pt_fresnel_dielectric(w.z, b->eta);
         return 1;
     }
-    if (u_lobe < l.interface + l.metal) {
-        int top = u_lobe < l.interface;
-        pt_vec3 m = pt_ggx_sample_visible(w, top ? b->alpha_x : l.metal_x, top ? b->alpha_y : l.metal_y, u0, u1);
-        wi = v3_norm(v3_sub(v3_scale(m, 2.0f * v3_dot(w, m)), w));
-        if (!(wi.z > 0.0f))
-            return 0;
-    } else {
-        wi = pt_sample_cosine(u0, u1);
-    }
+    struct pt_coat_lobes l = pt_coat_lobes(b, w.z);
     out->flags = 0;
     out->wi = v3_scale(wi, side);
-    pt_vec3 f = pt_coated_walk_eval(b, wo, out->wi, &out->pdf_solid);
-    out->weight = v3_scale(f, 1.0f / out->pdf_solid);
+    out->pdf_solid = pt_coated_walk_pdf(b, &l, w, wi, v3_norm(v3_add(w, wi)));
     return out->pdf_solid > 0.0f;
 }
 

@@ -9,7 +9,13 @@
 #include "shade/fresnel.h"
 #include "shade/microfacet.h"
 
-static inline int pt_dielectric_is_smooth(const struct pt_bsdf *b) { return b->alpha_x == 0.0f || b->eta == 1.0f; }
+/* Indices closer than this bend light by less than float resolves at the roughness of a lobe: passed straight on. */
+#define PT_ETA_MATCHED 5e-4f
+
+static inline int pt_dielectric_is_smooth(const struct pt_bsdf *b)
+{
+    return b->alpha_x == 0.0f || fabsf(b->eta - 1.0f) < PT_ETA_MATCHED;
+}
 
 static inline int pt_dielectric_sample_smooth(const struct pt_bsdf *b, pt_vec3 wo, float u_lobe, struct pt_bsdf_sample *out)
 {

@@ -18,23 +18,24 @@
 
 #define PT_FX_BSDF (PT_FX_SPECULAR | PT_FX_GLOSSY | PT_FX_TRANSMISSION | PT_FX_COATED)
 
+static inline pt_effects pt_alpha_effects(float alpha) { return alpha > 0.0f ? PT_FX_GLOSSY : PT_FX_SPECULAR; }
+
 /* Effects that evaluating *b needs; alphas of 0 count as smooth. */
 static inline pt_effects pt_bsdf_effects(const struct pt_bsdf *b)
 {
-    pt_effects interface = b->alpha_x > 0.0f ? PT_FX_GLOSSY : PT_FX_SPECULAR;
     switch (b->kind) {
     case PT_BSDF_CONDUCTOR:
-        return interface;
+        return pt_alpha_effects(b->alpha_x);
     case PT_BSDF_DIELECTRIC:
-        return PT_FX_TRANSMISSION | interface;
+        return PT_FX_TRANSMISSION | pt_alpha_effects(b->alpha_x);
     case PT_BSDF_THIN_DIELECTRIC:
         return PT_FX_TRANSMISSION | PT_FX_SPECULAR;
     case PT_BSDF_DIFFUSE_TRANSMISSION:
         return PT_FX_TRANSMISSION;
     case PT_BSDF_COATED_DIFFUSE:
-        return PT_FX_COATED | interface;
+        return PT_FX_COATED | pt_alpha_effects(b->alpha_x);
     case PT_BSDF_COATED_CONDUCTOR:
-        return PT_FX_COATED | interface | (b->base_alpha_x > 0.0f ? PT_FX_GLOSSY : PT_FX_SPECULAR);
+        return PT_FX_COATED | pt_alpha_effects(b->alpha_x) | pt_alpha_effects(b->base_alpha_x);
     default:
         return 0;
     }

@@ -230,4 +230,99 @@ static inline pt_vec3 pt_layer_walk_eval(const struct pt_bsdf *b, pt_vec3 wo, pt
     return k.f;
 }
 
+/* Interaction of a sampled walk with the interface: reflected or transmitted by chance. Direction and weight f cos / p. */
+static inline int pt_layer_cross(const struct pt_bsdf *b, pt_vec3 wo, float u_lobe, float u0, float u1, pt_vec3 *wi,
+                                 float *weight, int *transmitted)
+{
+    int smooth = pt_dielectric_is_smooth(b);
+    float cos_t, inv_etap = wo.z < 0.0f ? b->eta : 1.0f / b->eta;
+    pt_vec3 m = smooth ? v3(0.0f, 0.0f, 1.0f) : pt_ggx_sample_visible(wo, b->alpha_x, b->alpha_y, u0, u1);
+    float om = v3_dot(wo, m), r = pt_fresnel_dielectric_t(om, b->eta, &cos_t);
+    *transmitted = !(u_lobe < r);
+    *wi = *transmitted ? v3_madd(v3_scale(wo, -inv_etap), om * inv_etap + copysignf(cos_t, -om), m)
+                       : v3_sub(v3_scale(m, 2.0f * om), wo);
+    *wi = v3_norm(*wi);
+    *weight = smooth ? 1.0f : pt_ggx_g2_over_g1(wo, *wi, b->alpha_x, b->alpha_y);
+    return *transmitted ? wo.z * wi->z < 0.0f : wo.z * wi->z > 0.0f;
+}
+
+/* Distance to the next scattering inside the layer: 1 and a new direction, or 0 and *z on the boundary that was reached. */
+static inline int pt_layer_scatter(const struct pt_bsdf *b, pt_vec3 *w, pt_vec3 *beta, float *z, struct pt_rng *rng)
+{
+    float dz = -log1pf(-pt_rng_float(rng)) * fabsf(w->z), next = w->z > 0.0f ? *z + dz : *z - dz;
+    if (!(next > 0.0f && next < b->thickness)) {
+        *z = w->z > 0.0f ? b->thickness : 0.0f;
+        return 0;
+    }
+    *z = next;
+    *beta = v3_mul(*beta, b->albedo);
+    float u0 = pt_rng_float(rng), u1 = pt_rng_float(rng);
+    pt_phase_sample(b->g, v3_neg(*w), u0, u1, w);
+    return 1;
+}
+
+static inline int pt_layer_bounce(const struct pt_bsdf *base, pt_vec3 wo, struct pt_rng *rng, struct pt_bsdf_sample *s)
+{
+    float u0 = pt_rng_float(rng), u1 = pt_rng_float(rng);
+    if (base->kind != PT_BSDF_CONDUCTOR)
+        return pt_diffuse_sample(base, wo, u0, u1, s);
+    return base->alpha_x > 0.0f ? pt_conductor_sample_rough(base, wo, u0, u1, s) : pt_conductor_sample_smooth(base, wo, s);
+}
+
+/*
+ * Follows light from wo (z > 0) through the layer until it leaves: 0 absorbed, 1 reflected by the interface, 2 came from
+ * below it. The weight is that of a perfect sample, at most 1 but for roulette: what pt_layer_walk_eval estimates pointwise,
+ * this estimates as a whole, without its peaks. The two crossings' (η)² cancel. u_lobe, u0, u1 serve the first crossing.
+ */
+static inline int pt_layer_walk_sample(const struct pt_bsdf *b, pt_vec3 wo, float u_lobe, float u0, float u1,
+                                       struct pt_rng *rng, pt_vec3 *wi, pt_vec3 *weight)
+{
+    struct pt_bsdf base = pt_layer_base(b);
+    pt_vec3 w, beta;
+    float factor, z = b->thickness;
+    int transmitted, scatters = !v3_is_black(b->albedo);
+    if (!pt_layer_cross(b, wo, u_lobe, u0, u1, &w, &factor, &transmitted))
+        return 0;
+    beta = v3_splat(factor);
+    if (!transmitted) {
+        *wi = w;
+        *weight = beta;
+        return 1;
+    }
+    for (int depth = 0; depth < PT_LAYER_EVENTS; depth++) {
+        float strength = v3_max(beta);
+        if (depth >= PT_LAYER_ROULETTE && strength < 0.25f) {
+            if (!(strength > 0.0f) || pt_rng_float(rng) >= strength)
+                return 0;
+            beta = v3_scale(beta, 1.0f / strength);
+        }
+        if (w.z == 0.0f)
+            return 0;
+        if (scatters) {
+            if (pt_layer_scatter(b, &w, &beta, &z, rng))
+                continue;
+        } else {
+            beta = v3_scale(beta, pt_layer_extinction(b->thickness, w.z));
+        }
+        if (w.z < 0.0f) {
+            struct pt_bsdf_sample s;
+            if (!pt_layer_bounce(&base, v3_neg(w), rng, &s))
+                return 0;
+            beta = v3_mul(beta, s.weight);
+            w = s.wi;
+            continue;
+        }
+        float v_lobe = pt_rng_float(rng), v0 = pt_rng_float(rng), v1 = pt_rng_float(rng);
+        if (!pt_layer_cross(b, v3_neg(w), v_lobe, v0, v1, &w, &factor, &transmitted))
+            return 0;
+        beta = v3_scale(beta, factor);
+        if (transmitted) {
+            *wi = w;
+            *weight = beta;
+            return 2;
+        }
+    }
+    return 0;
+}
+
 #endif

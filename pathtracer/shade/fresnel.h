@@ -14,6 +14,10 @@ static inline float pt_fresnel_dielectric_t(float cos_i, float eta, float *cos_t
 {
     float etap = cos_i < 0.0f ? 1.0f / eta : eta;
     float ci = fminf(fabsf(cos_i), 1.0f);
+    if (eta == 1.0f) { /* exactly nothing, whatever the square roots below would round to */
+        *cos_t = ci;
+        return 0.0f;
+    }
     float sin2_t = (1.0f - ci * ci) / (etap * etap);
     if (sin2_t >= 1.0f) {
         *cos_t = 0.0f;

@@ -64,18 +64,6 @@ static float pdf_of(const void *data, pt_vec3 wi)
     return pdf;
 }
 
-/* The density of a walked model costs a walk per call: its pdf alone. */
-static float walked_pdf_of(const void *data, pt_vec3 wi)
-{
-    const struct pdf_of *p = data;
-    if (!(p->wo.z * wi.z > 0.0f) || pt_coated_walk_is_delta(p->b))
-        return 0.0f;
-    pt_vec3 wo = p->wo.z < 0.0f ? v3_neg(p->wo) : p->wo;
-    wi = p->wo.z < 0.0f ? v3_neg(wi) : wi;
-    struct pt_coat_lobes l = pt_coat_lobes(p->b, wo.z);
-    return pt_coated_walk_pdf(p->b, &l, wo, wi, v3_norm(v3_add(wo, wi)));
-}
-
 static void samples_follow_the_density(void **state)
 {
     (void)state;
@@ -85,16 +73,16 @@ static void samples_follow_the_density(void **state)
     static struct chi2 c;
     for (int i = 0; i < n; i++) {
         for (int k = 0; k < COSINES; k++) {
+            if (pt_bsdf_is_walked(&cases[i].b) && !pt_coated_walk_is_delta(&cases[i].b))
+                continue; /* their pdf is a fit: walked_samples_follow_the_value */
             struct pdf_of data = {&cases[i].b, case_direction(cosines[k])};
             struct pt_rng rng = pt_rng_make((uint64_t)(SEED + 100 * i + k));
             double delta_pdf[3] = {0.0, 0.0, 0.0}, delta = 0.0; /* by reflection, transmission */
             c = (struct chi2){.samples = CHI2_SAMPLES};
-            int walked = pt_bsdf_is_walked(data.b);
-            chi2_expect(&c, walked ? walked_pdf_of : pdf_of, &data);
-            for (int s = 0, count = walked ? CHI2_SAMPLES / 4 : CHI2_SAMPLES; s < count; s++) {
+            chi2_expect(&c, pdf_of, &data);
+            for (int s = 0; s < CHI2_SAMPLES; s++) {
                 struct pt_bsdf_sample out;
                 float u = pt_rng_float(&rng), u0 = pt_rng_float(&rng), u1 = pt_rng_float(&rng);
-                c.samples = count;
                 if (!pt_bsdf_sample(PT_FX_ALL, data.b, data.wo, u, u0, u1, &out)) {
                     c.other += 1.0;
                 } else if (out.flags & PT_SCATTER_DELTA) {
@@ -114,6 +102,55 @@ static void samples_follow_the_density(void **state)
     }
 }
 
+enum { COARSE_Z = 8, COARSE_PHI = 4, COARSE = COARSE_Z * COARSE_PHI, WALKS = 400000 };
+
+static int coarse_cell(pt_vec3 w)
+{
+    int z = (int)(fabsf(w.z) * COARSE_Z), p = (int)((atan2f(w.y, w.x) / (2.0f * PT_PI) + 0.5f) * COARSE_PHI);
+    return (z < COARSE_Z ? z : COARSE_Z - 1) * COARSE_PHI + (p < COARSE_PHI ? p : COARSE_PHI - 1);
+}
+
+/* Two estimates of the light scattered into each coarse cell: weights of sampled walks, and the walk's value at directions
+ * drawn half from a cosine and half around the mirror direction. */
+static void walked_samples_follow_the_value(void **state)
+{
+    (void)state;
+    const struct pt_bsdf models[] = {bsdf_coated_conductor(0.0f, 0.2f), bsdf_coated_conductor(0.3f, 0.2f), bsdf_coated_conductor(0.3f, 0.0f),
+                                     bsdf_scattering_coat(0.2f, 0.9f, 0.5f, 0.3f), bsdf_scattering_coat(0.0f, 0.5f, 1.0f, -0.4f)};
+    for (int i = 0; i < 5; i++) {
+        struct pt_bsdf b = models[i];
+        struct pt_rng rng = pt_rng_make((uint64_t)(SEED + i));
+        pt_vec3 wo = case_direction(i & 1 ? -0.6f : 0.8f);
+        double value[2][COARSE] = {{0}}, square[2][COARSE] = {{0}};
+        for (int s = 0; s < WALKS; s++) {
+            struct pt_bsdf_sample out;
+            float u = pt_rng_float(&rng), u0 = pt_rng_float(&rng), u1 = pt_rng_float(&rng), ignored;
+            b.walk_key = (uint32_t)s;
+            if (pt_bsdf_sample(PT_FX_ALL, &b, wo, u, u0, u1, &out) && !(out.flags & PT_SCATTER_DELTA)) {
+                double x = (double)out.weight.x;
+                value[0][coarse_cell(out.wi)] += x;
+                square[0][coarse_cell(out.wi)] += x * x;
+            }
+            pt_vec3 w = v3_scale(wo, wo.z < 0.0f ? -1.0f : 1.0f), wi, m = pt_ggx_sample_visible(w, 0.4f, 0.4f, u0, u1);
+            wi = u < 0.5f ? pt_sample_cosine(u0, u1) : v3_norm(v3_sub(v3_scale(m, 2.0f * v3_dot(w, m)), w));
+            if (wi.z <= 0.0f)
+                continue;
+            m = v3_norm(v3_add(w, wi));
+            float pdf = 0.5f * wi.z * PT_INV_PI + 0.125f * pt_ggx_visible_pdf(w, m, 0.4f, 0.4f) / v3_dot(w, m);
+            wi = v3_scale(wi, wo.z < 0.0f ? -1.0f : 1.0f);
+            double x = (double)(pt_bsdf_eval(PT_FX_ALL, &b, wo, wi, &ignored).x / pdf);
+            value[1][coarse_cell(wi)] += x;
+            square[1][coarse_cell(wi)] += x * x;
+        }
+        for (int k = 0; k < COARSE; k++) {
+            double a = value[0][k] / WALKS, c = value[1][k] / WALKS;
+            double error = sqrt((square[0][k] + square[1][k]) / WALKS / WALKS);
+            if (fabs(a - c) > 4.5 * error + 1e-5)
+                fail_msg("model %d cell %d: sampled %g, evaluated %g ± %g", i, k, a, c, error);
+        }
+    }
+}
+
 /* Relative, or absolute for small numbers. */
 static int near(float a, float b, float tolerance) { return fabsf(a - b) <= tolerance * fmaxf(fmaxf(fabsf(a), fabsf(b)), 1e-3f); }
 
@@ -124,6 +161,8 @@ static void weights_are_f_cos_over_pdf(void **state)
     const float tolerance = 5e-3f;
     struct bsdf_case cases[CASES_MAX];
     for (int i = 0, n = all_cases(cases); i < n; i++) {
+        if (pt_bsdf_is_walked(&cases[i].b))
+            continue;
         struct pt_rng rng = pt_rng_make((uint64_t)(SEED + i));
         for (int s = 0; s < 4000; s++) {
             pt_vec3 wo = pt_sample_sphere(pt_rng_float(&rng), pt_rng_float(&rng));
@@ -282,6 +321,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(samples_follow_the_density), cmocka_unit_test(weights_are_f_cos_over_pdf),
+        cmocka_unit_test(walked_samples_follow_the_value),
         cmocka_unit_test(scattering_is_reciprocal),   cmocka_unit_test(energy_is_never_created),
         cmocka_unit_test(white_furnace),              cmocka_unit_test(visible_normals_agree_with_plain_ones),
     };

@@ -1,0 +1,197 @@
+/* Materials → closures and frames; the Fresnel terms they rest on. */
+#include <complex.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+
+#include "shade/bsdf_dispatch.h"
+#include "shade/material.h"
+
+static int near(float a, float b) { return fabsf(a - b) < 1e-5f; }
+
+#define CONST(v) {.texture = -1, .value = {v, v, v}}
+#define ROUGH(r) .roughness_u = CONST(r), .roughness_v = CONST(r)
+#define PLAIN .bump = -1, .normal_map = -1, .reflectance = CONST(0.5f), .transmittance = CONST(0.25f), .albedo = CONST(0.0f), \
+        .thickness = CONST(0.01f), .g = CONST(0.0f), .eta_rgb = CONST(0.2f), .k_rgb = CONST(3.0f), \
+        .base_roughness_u = CONST(0.0f), .base_roughness_v = CONST(0.0f), .eta = 1.5f
+
+static void fresnel_of_glass(void **state)
+{
+    (void)state;
+    assert_true(near(pt_fresnel_dielectric(1.0f, 1.5f), 0.04f));
+    assert_true(near(pt_fresnel_dielectric(-1.0f, 1.5f), 0.04f));
+    assert_true(pt_fresnel_dielectric(0.0f, 1.5f) == 1.0f);
+    assert_true(pt_fresnel_dielectric(-0.5f, 1.5f) == 1.0f); /* sin 60° > 1/1.5 */
+    for (float mu = 0.0f; mu <= 1.0f; mu += 0.05f)
+        assert_true(pt_fresnel_dielectric(mu + 1e-3f, 1.0f) < 1e-6f);
+    /* Brewster's angle: half of the unpolarised reflectance is the s part, ((n² - 1)/(n² + 1))² */
+    float brewster = cosf(atanf(1.5f)), rs = (2.25f - 1.0f) / (2.25f + 1.0f);
+    assert_true(near(pt_fresnel_dielectric(brewster, 1.5f), 0.5f * rs * rs));
+}
+
+/* The real formula against complex arithmetic. */
+static void fresnel_of_metal(void **state)
+{
+    (void)state;
+    for (float mu = 0.0f; mu <= 1.0f; mu += 0.1f) {
+        double complex n = 0.37 + 2.39 * I, s2 = 1.0 - (double)(mu * mu), ct = csqrt(1.0 - s2 / (n * n));
+        double complex rp = (n * (double)mu - ct) / (n * (double)mu + ct), rs = ((double)mu - n * ct) / ((double)mu + n * ct);
+        double expected = 0.5 * (cabs(rp) * cabs(rp) + cabs(rs) * cabs(rs));
+        assert_true(fabs(expected - (double)pt_fresnel_conductor(mu, 0.37f, 2.39f)) < 1e-5);
+        assert_true(fabs((double)(pt_fresnel_conductor(mu, 1.5f, 0.0f) - pt_fresnel_dielectric(mu, 1.5f))) < 1e-5);
+    }
+    for (float r = 0.0f; r < 1.0f; r += 0.1f)
+        assert_true(near(pt_fresnel_conductor(1.0f, 1.0f, pt_conductor_k_from_reflectance(r)), r));
+}
+
+static void roughness_is_remapped_as_in_pbrt(void **state)
+{
+    (void)state;
+    struct pt_scene scene = {0};
+    struct pt_surface s = {.n_geometric = {0, 0, 1}, .n_shading = {0, 0, 1}};
+    struct {
+        float roughness;
+        int remap;
+        float alpha;
+    } cases[] = {{0.25f, 1, 0.5f}, {0.25f, 0, 0.25f}, {0.0f, 1, 0.0f}, {5e-4f, 0, 0.0f}, {2e-3f, 0, 2e-3f}, {4.0f, 0, 1.0f}, {-1.0f, 1, 0.0f}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        struct pt_material m = {.kind = PT_MATERIAL_CONDUCTOR, .remap_roughness = cases[i].remap, PLAIN, ROUGH(cases[i].roughness)};
+        struct pt_bsdf b;
+        pt_material_bsdf(PT_FX_ALL, &scene, &m, &s, &b);
+        assert_int_equal(b.kind, PT_BSDF_CONDUCTOR);
+        assert_true(near(b.alpha_x, cases[i].alpha) && near(b.alpha_y, cases[i].alpha));
+    }
+}
+
+static void effects_are_those_the_closure_needs(void **state)
+{
+    (void)state;
+    struct pt_material materials[] = {
+        {.kind = PT_MATERIAL_DIFFUSE, PLAIN, ROUGH(0.0f)},
+        {.kind = PT_MATERIAL_CONDUCTOR, PLAIN, ROUGH(0.0f)},
+        {.kind = PT_MATERIAL_CONDUCTOR, PLAIN, ROUGH(0.3f)},
+        {.kind = PT_MATERIAL_DIELECTRIC, PLAIN, ROUGH(0.0f)},
+        {.kind = PT_MATERIAL_COATED_DIFFUSE, PLAIN, ROUGH(0.1f)},
+        {.kind = PT_MATERIAL_MIX, .mix_a = 0, .mix_b = 4, .mix_amount = {.texture = 0}, .bump = -1, .normal_map = -1},
+        {.kind = PT_MATERIAL_INTERFACE, PLAIN},
+    };
+    struct pt_scene scene = {.materials = materials, .material_count = 7};
+    const pt_effects expected[] = {0, PT_FX_SPECULAR, PT_FX_GLOSSY, PT_FX_TRANSMISSION | PT_FX_SPECULAR,
+                                   PT_FX_COATED | PT_FX_GLOSSY, PT_FX_MIX | PT_FX_TEXTURE | PT_FX_COATED | PT_FX_GLOSSY, PT_FX_INTERFACE};
+    for (int i = 0; i < 7; i++)
+        assert_int_equal(pt_material_effects(&scene, i), expected[i]);
+    assert_int_equal(pt_materials_build(&scene, NULL), 0);
+    assert_non_null(materials[4].coat_table);
+    struct pt_surface s = {.n_geometric = {0, 0, 1}, .n_shading = {0, 0, 1}};
+    for (int i = 0; i < 5; i++) { /* a kernel with exactly these effects gives what the general one gives */
+        struct pt_bsdf narrow, wide;
+        struct pt_bsdf_sample a, b;
+        pt_material_bsdf(expected[i], &scene, &materials[i], &s, &narrow);
+        pt_material_bsdf(PT_FX_ALL, &scene, &materials[i], &s, &wide);
+        assert_int_equal(pt_bsdf_effects(&wide), expected[i]);
+        for (float u = 0.0f; u < 1.0f; u += 0.09f) {
+            pt_vec3 wo = v3_norm(v3(0.3f, 0.1f, u - 0.5f));
+            int ra = pt_bsdf_sample(expected[i], &narrow, wo, u, 0.3f, u, &a), rb = pt_bsdf_sample(PT_FX_ALL, &wide, wo, u, 0.3f, u, &b);
+            assert_int_equal(ra, rb);
+            if (ra)
+                assert_memory_equal(&a, &b, sizeof a);
+        }
+        assert_int_equal(pt_bsdf_has_smooth(expected[i], &narrow), pt_bsdf_has_smooth(PT_FX_ALL, &wide));
+    }
+    pt_arena_release(&scene.arena);
+}
+
+static void coatings_share_tables(void **state)
+{
+    (void)state;
+    struct pt_material materials[] = {
+        {.kind = PT_MATERIAL_COATED_DIFFUSE, PLAIN, ROUGH(0.1f)},
+        {.kind = PT_MATERIAL_COATED_DIFFUSE, PLAIN, ROUGH(0.1f)},
+        {.kind = PT_MATERIAL_COATED_DIFFUSE, PLAIN, ROUGH(0.2f)},
+    };
+    materials[1].reflectance.value = v3(2.0f, -1.0f, 0.5f);
+    struct pt_scene scene = {.materials = materials, .material_count = 3};
+    assert_int_equal(pt_materials_build(&scene, NULL), 0);
+    assert_ptr_equal(materials[0].coat_table, materials[1].coat_table);
+    assert_ptr_not_equal(materials[0].coat_table, materials[2].coat_table);
+    assert_true(materials[1].reflectance.value.x == 1.0f && materials[1].reflectance.value.y == 0.0f);
+    pt_arena_release(&scene.arena);
+}
+
+static void mixes_choose_by_amount(void **state)
+{
+    (void)state;
+    struct pt_material materials[] = {
+        {.kind = PT_MATERIAL_DIFFUSE, PLAIN, ROUGH(0.0f)},
+        {.kind = PT_MATERIAL_CONDUCTOR, PLAIN, ROUGH(0.0f)},
+        {.kind = PT_MATERIAL_MIX, .mix_a = 0, .mix_b = 1, .mix_amount = CONST(0.25f)},
+        {.kind = PT_MATERIAL_MIX, .mix_a = 2, .mix_b = 1, .mix_amount = CONST(0.5f)},
+        {.kind = PT_MATERIAL_MIX, .mix_a = 0, .mix_b = 1, .mix_amount = CONST(1.0f)},
+    };
+    struct pt_scene scene = {.materials = materials, .material_count = 5};
+    struct pt_surface s = {0};
+    int metal = 0, all = 0;
+    for (int i = 0; i < 1000; i++) {
+        float u = ((float)i + 0.5f) / 1000.0f;
+        metal += pt_material_resolve(PT_FX_ALL, &scene, 3, &s, u) == &materials[1];
+        all += pt_material_resolve(PT_FX_ALL, &scene, 4, &s, u) == &materials[1];
+    }
+    assert_true(metal >= 623 && metal <= 627); /* 0.5 + 0.5 · 0.25 */
+    assert_int_equal(all, 1000);
+}
+
+/* A displacement that rises along u tips the normal against it, by the angle of the slope; sides stay sides. */
+static void bump_tips_the_normal(void **state)
+{
+    (void)state;
+    static const float slope[2] = {0.0f, 0.5f};
+    struct pt_image_map image = {.width = 2, .height = 1, .channels = 1, .type = PT_PIXEL_FLOAT, .gamma = 1, .pixels = slope};
+    struct pt_texture texture = {.kind = PT_TEXTURE_IMAGE, .wrap = PT_WRAP_CLAMP, .scale = 1, .su = 0.1f, .sv = 0.1f, .du = 0.4f};
+    struct pt_scene scene = {.images = &image, .textures = &texture, .image_count = 1, .texture_count = 1};
+    struct pt_material m = {.kind = PT_MATERIAL_DIFFUSE, PLAIN, ROUGH(0.0f)};
+    m.bump = 0;
+    /* height = 0.5 · (2 · (0.1 u + 0.4) - 0.5) between the texel centres: slope 0.1 per u; 2 scene units per u */
+    for (int side = -1; side <= 1; side += 2) {
+        struct pt_surface s = {.u = 0.0f, .v = 0.0f, .n_geometric = {0, 0, (float)side}, .n_shading = {0, 0, (float)side},
+                               .dpdu = {2, 0, 0}, .dpdv = {0, 2, 0}};
+        struct pt_frame f = pt_material_frame(PT_FX_ALL, &scene, &m, &s);
+        /* one texel of step leaves the ramp half-way: a secant */
+        assert_true(f.n.z * (float)side > 0.9f && f.n.x < 0.0f && fabsf(f.n.y) < 1e-6f);
+        assert_true(fabsf(v3_dot(f.s, f.n)) < 1e-6f && fabsf(v3_len(f.s) - 1.0f) < 1e-6f);
+        pt_vec3 t = v3_cross(f.n, f.s);
+        assert_true(fabsf(t.x - f.t.x) + fabsf(t.y - f.t.y) + fabsf(t.z - f.t.z) < 1e-6f);
+    }
+}
+
+static void normal_maps_are_in_tangent_space(void **state)
+{
+    (void)state;
+    static const float texel[3] = {0.8f, 0.5f, 0.9f}; /* (0.6, 0, 0.8) */
+    struct pt_image_map image = {.width = 1, .height = 1, .channels = 3, .type = PT_PIXEL_FLOAT, .gamma = 1, .pixels = texel};
+    struct pt_texture texture = {.kind = PT_TEXTURE_IMAGE, .wrap = PT_WRAP_REPEAT, .scale = 1, .su = 1, .sv = 1};
+    struct pt_scene scene = {.images = &image, .textures = &texture, .image_count = 1, .texture_count = 1};
+    struct pt_material m = {.kind = PT_MATERIAL_DIFFUSE, PLAIN, ROUGH(0.0f)};
+    m.normal_map = 0;
+    struct pt_surface s = {.n_geometric = {0, 1, 0}, .n_shading = {0, 1, 0}, .dpdu = {0, 0, 3}, .dpdv = {3, 0, 0}};
+    pt_vec3 n = pt_material_frame(PT_FX_ALL, &scene, &m, &s).n;
+    assert_true(near(n.x, 0.0f) && near(n.y, 0.8f) && near(n.z, 0.6f));
+    s.dpdu = v3_splat(0.0f); /* no tangent: the plain normal, not NaN */
+    assert_true(v3_is_finite(pt_material_frame(PT_FX_ALL, &scene, &m, &s).n));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(fresnel_of_glass),
+        cmocka_unit_test(fresnel_of_metal),
+        cmocka_unit_test(roughness_is_remapped_as_in_pbrt),
+        cmocka_unit_test(effects_are_those_the_closure_needs),
+        cmocka_unit_test(coatings_share_tables),
+        cmocka_unit_test(mixes_choose_by_amount),
+        cmocka_unit_test(bump_tips_the_normal),
+        cmocka_unit_test(normal_maps_are_in_tangent_space),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
