@@ -34,7 +34,7 @@ struct pt_path {
     pt_vec3 throughput, radiance;
     pt_vec3 p_prev;      /* last vertex, and … */
     float pdf_prev;      /* … density of the direction taken there; 0: no other strategy could have found what comes next */
-    float eta_scale;
+    float eta_scale;     /* undoes in the roulette what refraction did to the throughput */
     int32_t medium;      /* the ray is in it, -1 = vacuum */
     int32_t depth;       /* bounces so far */
     uint32_t rays;
@@ -262,6 +262,8 @@ PT_KERNEL_INLINE int pt_path_bounce(pt_effects fx, struct pt_path *path, const s
     struct pt_frame frame = pt_material_frame(fx, path->scene, material, &at->s);
     struct pt_bsdf bsdf;
     pt_material_bsdf(fx, path->scene, material, &at->s, &bsdf);
+    if (fx & PT_FX_COATED)
+        bsdf.walk_key = pt_sampler_bits(&path->sampler, PT_DIM_BSDF_WALK);
     pt_vec3 wo = pt_frame_to_local(&frame, v3_neg(path->ray.direction));
     if (path->settings->want_aux)
         pt_path_aux(fx, path, &bsdf, wo, &frame, t, out);
@@ -287,7 +289,7 @@ PT_KERNEL_INLINE int pt_path_bounce(pt_effects fx, struct pt_path *path, const s
     int delta = (fx & PT_FX_BSDF) && (next.flags & PT_SCATTER_DELTA);
     path->pdf_prev = delta ? 0.0f : next.pdf_solid;
     if (fx & PT_FX_TRANSMISSION)
-        path->eta_scale *= next.eta_scale;
+        path->eta_scale /= next.eta_scale;
     pt_vec3 wi = pt_frame_to_world(&frame, next.wi);
     if (fx & PT_FX_MEDIA)
         path->medium = pt_medium_towards(at, wi, path->medium);
