@@ -1,0 +1,83 @@
+#include "scene/load.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "geom/accel.h"
+#include "scene/build.h"
+#include "scene/load_source.h"
+#include "scene/pbrt.h"
+
+static const struct pt_load_options no_options;
+
+void pt_scene_destroy(struct pt_scene *scene)
+{
+    if (scene == NULL)
+        return;
+    pt_accel_release(scene);
+    pt_arena_release(&scene->arena);
+    free(scene);
+}
+
+int pt_scene_load_source(const char *path, const struct pt_source *source, const struct pt_load_options *options,
+                         struct pt_scene **out, struct pt_scene_defaults *defaults, struct pt_err *err)
+{
+    struct pt_scene_defaults found = {0};
+    struct pt_scene *scene = calloc(1, sizeof *scene);
+    struct pt_builder *b = calloc(1, sizeof *b);
+    int rc = PT_OK;
+    double start_s = pt_clock_wall_s();
+    if (scene == NULL || b == NULL) {
+        rc = pt_fail_nomem(err, "the scene");
+        goto out;
+    }
+    rc = pt_builder_init(b, scene, &found, options != NULL ? options : &no_options, source, err);
+    const char *slash = strrchr(path, '/');
+    size_t length = slash != NULL ? (size_t)(slash - path) + 1 : 0;
+    if (length >= sizeof b->directory) {
+        rc = pt_fail(err, PT_EINVAL, "%.64s...: the path is too long", path);
+        goto out;
+    }
+    memcpy(b->directory, path, length);
+    if (rc == PT_OK)
+        rc = pt_pbrt_read(b, path);
+    scene->stats.parse_s = pt_clock_wall_s() - start_s - scene->stats.texture_s;
+    start_s = pt_clock_wall_s();
+    if (rc == PT_OK)
+        rc = pt_builder_finish(b);
+    scene->stats.build_s = pt_clock_wall_s() - start_s - scene->stats.accel_s;
+    if (rc == PT_OK) {
+        *out = scene;
+        *defaults = found;
+        scene = NULL;
+    }
+out:
+    if (b != NULL)
+        pt_builder_release(b);
+    free(b);
+    pt_scene_destroy(scene);
+    return rc;
+}
+
+int pt_scene_load(const char *path, const struct pt_load_options *options, struct pt_scene **out,
+                  struct pt_scene_defaults *defaults, struct pt_err *err)
+{
+    return pt_scene_load_source(path, &pt_source_files, options, out, defaults, err);
+}
+
+pt_effects pt_scene_effects(const struct pt_scene *scene)
+{
+    return scene->effects;
+}
+
+const struct pt_effect_reason *pt_scene_effect_reason(const struct pt_scene *scene, int i)
+{
+    return &scene->effect_reasons[i];
+}
+
+void pt_scene_get_stats(const struct pt_scene *scene, struct pt_scene_stats *stats)
+{
+    *stats = scene->stats;
+}
