@@ -6,7 +6,7 @@
 #include <stdint.h>
 
 struct pt_block_stats {
-    double dammertz, rsem, tail999, gini;
+    double dammertz, half_unsettled, rse, rse_unsettled, tail999, gini;
 };
 
 /* mean, half_mean (of half A), difference D: [pixels, 3]; moment2: [pixels] means of the squared luminance;

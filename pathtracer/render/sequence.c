@@ -299,14 +299,16 @@ static int put_level(struct recorder *r, struct pt_lseq *file, const struct pt_r
                      struct pt_err *err)
 {
     const struct pt_block *b = &render->blocks.list[0];
-    struct pt_lseq_statistic statistics[6];
+    struct pt_lseq_statistic statistics[8];
     struct pt_block_stats s;
     uint32_t n = 0;
     read_film(r, &render->film, b->spp);
     if (kind == PT_LSEQ_LEVEL) {
         pt_block_stats(r->mean, r->half, r->difference, r->moment2, render->film.pixels, b->spp, r->scratch, &s);
         add_statistic(statistics, &n, "dammertz", s.dammertz);
-        add_statistic(statistics, &n, "rsem", s.rsem);
+        add_statistic(statistics, &n, "half_unsettled", s.half_unsettled);
+        add_statistic(statistics, &n, "rse", s.rse);
+        add_statistic(statistics, &n, "rse_unsettled", s.rse_unsettled);
         add_statistic(statistics, &n, "tail999", s.tail999);
         add_statistic(statistics, &n, "gini", s.gini);
     }

@@ -109,7 +109,9 @@ static void statistics(void **state)
     pt_block_stats(mean, half, d, m2, 4, 5, scratch, &s);
     assert_true(fabs(s.dammertz - 0.5 / 2.0 / 4.0) < 1e-12);
     double y0 = 0.2126 + 0.7152 + 0.0722 * 2, mean_y = (y0 + 2.0) / 4.0;
-    assert_true(fabs(s.rsem - sqrt((2 - y0 * y0 + 1.0) / 4.0 / 4.0) / mean_y) < 1e-12);
+    /* Pixel 0: variance of the mean (2 - y0^2)/4; pixel 1 is black with moment 1, so its error counts against the floor 0.02. */
+    assert_true(fabs(s.rse - sqrt(((2 - y0 * y0) / 4.0 / (y0 * y0) + 0.25 / (0.02 * 0.02)) / 4.0)) < 1e-12);
+    assert_true(s.rse_unsettled == 0.25 && s.half_unsettled == 0.25);
     assert_true(fabs(s.tail999 - 0.3 / mean_y) < 1e-12);
     assert_true(fabs(s.gini - (1 * 0.1 + 3 * 0.3) / (4 * 0.4)) < 1e-12);
 }
@@ -264,13 +266,13 @@ static void check_block(const char *name, int x0, int y0, int x1, int y1, int wi
         assert_int_equal(u32(p), k < 4 ? 1 : 2);
         assert_int_equal(u32(p + 4), spp[k]);
         assert_int_equal(u32(p + 8), spp[k] / 2);
-        assert_int_equal(statistics_count, k == 4 ? 1 : 5 + with_criterion);
+        assert_int_equal(statistics_count, k == 4 ? 1 : 7 + with_criterion);
         assert_int_equal(u32(p + 16), 3);
         assert_int_equal(u32(p + 24), crc32(0, p + 32, bytes));
         assert_int_equal(u32(p + 28), crc32(0, p, 28));
         if (with_criterion && k < 4) {
-            assert_string_equal((const char *)p + 32 + 5 * 32, "fake.error");
-            assert_true(fabs(f64(p + 32 + 5 * 32 + 24) - 0.75) < 0.02);
+            assert_string_equal((const char *)p + 32 + 7 * 32, "fake.error");
+            assert_true(fabs(f64(p + 32 + 7 * 32 + 24) - 0.75) < 0.02);
         }
         struct pt_render *r = render_block(x0, y0, x1, y1, spp[k], k < 4 ? 7 : 7 ^ 0x5bd1e995u);
         const unsigned char *q = p + 32 + 32 * statistics_count;
