@@ -17,7 +17,8 @@
     X(golden, "print the golden values of the published networks as JSON") \
     X(flip, "visible difference of two images (LDR-FLIP)") \
     X(compare, "stop maps or thresholds against (human) thresholds") \
-    X(import_sin3d, "SIN3D images into block sequences")
+    X(import_sin3d, "SIN3D images into block sequences") \
+    X(label, "thresholds for recorded sequences: human, or a model observer's")
 
 #define GGN_DECLARE_COMMAND(name, help) int ggn_cmd_##name(int argc, char **argv);
 GGN_COMMANDS(GGN_DECLARE_COMMAND)

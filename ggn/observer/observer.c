@@ -1,0 +1,393 @@
+#include "observer/observer.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cjson/cJSON.h>
+
+#include "base/fio.h"
+#include "data/image.h"
+#include "observer/flip.h"
+
+const struct ggn_observer ggn_observer_default = {
+    .map = GGN_MAP_LIGHTNESS, .blur_px = 1.0, .masking = 0.2, .window_px = 5, .percentile = 99.0, .tau = 1.5, .spread = 0.25,
+};
+
+static const char *const map_names[] = {[GGN_MAP_FLIP] = "flip", [GGN_MAP_LIGHTNESS] = "lightness"};
+
+void ggn_observer_describe(const struct ggn_observer *o, char *text, size_t room)
+{
+    snprintf(text, room, "model observer: %s, blur %.2f px, masking %.2f over %d px, percentile %.1f, tau %.5g", map_names[o->map],
+             o->blur_px, o->masking, o->window_px, o->percentile, o->tau);
+}
+
+static int get(const cJSON *root, const char *name, double lo, double hi, double *out)
+{
+    const cJSON *v = cJSON_GetObjectItemCaseSensitive(root, name);
+    if (!cJSON_IsNumber(v) || !(v->valuedouble >= lo && v->valuedouble <= hi))
+        return 0;
+    *out = v->valuedouble;
+    return 1;
+}
+
+int ggn_observer_read(const char *path, struct ggn_observer *out, struct ggn_err *err)
+{
+    struct ggn_observer o = {0};
+    char *text;
+    size_t size;
+    double window = 1;
+    int rc = ggn_fio_read(path, 1 << 24, &text, &size, err);
+    if (rc != GGN_OK)
+        return rc;
+    cJSON *root = cJSON_ParseWithLength(text, size);
+    const cJSON *map = cJSON_GetObjectItemCaseSensitive(root, "map");
+    if (cJSON_IsString(map) && strcmp(map->valuestring, map_names[GGN_MAP_LIGHTNESS]) == 0)
+        o.map = GGN_MAP_LIGHTNESS;
+    else if (!cJSON_IsString(map) || strcmp(map->valuestring, map_names[GGN_MAP_FLIP]) != 0)
+        rc = ggn_fail(err, GGN_EINVAL, "%s: map must be \"flip\" or \"lightness\"", path);
+    if (rc == GGN_OK && !(get(root, "blur_px", 0, 50, &o.blur_px) && get(root, "masking", 0, 100, &o.masking) &&
+                          get(root, "window_px", 1, 99, &window) && get(root, "percentile", 0.1, 100, &o.percentile) &&
+                          get(root, "tau", 1e-9, 1e9, &o.tau) && get(root, "spread", 1e-3, 10, &o.spread)))
+        rc = ggn_fail(err, GGN_EINVAL, "%s: blur_px, masking, window_px, percentile, tau or spread is missing or out of range", path);
+    if (rc == GGN_OK) {
+        o.window_px = (int)window | 1;
+        *out = o;
+    }
+    cJSON_Delete(root);
+    free(text);
+    return rc;
+}
+
+int ggn_observer_write(const char *path, const struct ggn_observer *o, const char *calibration, struct ggn_err *err)
+{
+    struct ggn_fio_out out;
+    int rc = ggn_fio_begin(&out, path, err);
+    if (rc != GGN_OK)
+        return rc;
+    fprintf(out.file, "{\n  \"map\": \"%s\", \"blur_px\": %.6g, \"masking\": %.6g, \"window_px\": %d, \"percentile\": %.6g, \"tau\": %.8g, \"spread\": %.6g",
+            map_names[o->map], o->blur_px, o->masking, o->window_px, o->percentile, o->tau, o->spread);
+    if (calibration != NULL)
+        fprintf(out.file, ",\n  \"calibration\": %s", calibration);
+    fputs("\n}\n", out.file);
+    return ggn_fio_commit(&out, err);
+}
+
+/* --- pictures of visibility --- */
+
+/* CIE 1976 lightness of a display image. */
+static void lightness(const uint8_t *rgb, size_t n, float *out)
+{
+    const float *linear = ggn_srgb_table();
+    for (size_t i = 0; i < n; i++) {
+        double y = ggn_luminance((double)linear[rgb[3 * i]], (double)linear[rgb[3 * i + 1]], (double)linear[rgb[3 * i + 2]]);
+        out[i] = (float)(y > 216.0 / 24389.0 ? 116.0 * cbrt(y) - 16.0 : y * 24389.0 / 27.0);
+    }
+}
+
+static int clamp_index(int i, int n)
+{
+    return i < 0 ? 0 : i >= n ? n - 1 : i;
+}
+
+/* Convolves along x with taps [2r+1] and transposes, so that two calls filter both ways. in [h][w] -> out [w][h]. */
+static void filter_transpose(const float *in, float *out, int w, int h, const float *taps, int r)
+{
+    for (int y = 0; y < h; y++) {
+        const float *row = in + (size_t)y * (size_t)w;
+        for (int x = 0; x < w; x++) {
+            float s = 0.0f;
+            if (x >= r && x + r < w)
+                for (int k = -r; k <= r; k++)
+                    s += taps[k + r] * row[x + k];
+            else
+                for (int k = -r; k <= r; k++)
+                    s += taps[k + r] * row[clamp_index(x + k, w)];
+            out[(size_t)x * (size_t)h + (size_t)y] = s;
+        }
+    }
+}
+
+static void filter(float *image, float *tmp, int w, int h, const float *taps, int r)
+{
+    filter_transpose(image, tmp, w, h, taps, r);
+    filter_transpose(tmp, image, h, w, taps, r);
+}
+
+static int lightness_map(double blur_px, const uint8_t *reference, const uint8_t *test, int w, int h, float *map, struct ggn_err *err)
+{
+    enum { MAX_RADIUS = 200 };
+    size_t n = (size_t)w * (size_t)h;
+    float *other = malloc(n * sizeof *other), taps[2 * MAX_RADIUS + 1];
+    if (other == NULL)
+        return ggn_fail_nomem(err, "observer");
+    lightness(reference, n, other);
+    lightness(test, n, map);
+    for (size_t i = 0; i < n; i++)
+        map[i] -= other[i];
+    if (blur_px > 0.0) {
+        int r = (int)ceil(3.0 * blur_px);
+        double sum = 0.0;
+        r = r < MAX_RADIUS ? r : MAX_RADIUS;
+        for (int i = -r; i <= r; i++)
+            sum += exp(-0.5 * i * i / (blur_px * blur_px));
+        for (int i = -r; i <= r; i++)
+            taps[i + r] = (float)(exp(-0.5 * i * i / (blur_px * blur_px)) / sum);
+        filter(map, other, w, h, taps, r);
+    }
+    for (size_t i = 0; i < n; i++)
+        map[i] = fabsf(map[i]);
+    free(other);
+    return GGN_OK;
+}
+
+int ggn_observer_error_map(enum ggn_observer_map kind, double blur_px, const uint8_t *reference, const uint8_t *test, int w, int h,
+                           float *map, struct ggn_err *err)
+{
+    struct ggn_flip_stats stats;
+    if (kind == GGN_MAP_LIGHTNESS)
+        return lightness_map(blur_px, reference, test, w, h, map, err);
+    return ggn_flip(reference, test, w, h, GGN_FLIP_PPD, map, &stats, err);
+}
+
+int ggn_observer_deviation(const uint8_t *reference, int w, int h, int window_px, float *deviation, struct ggn_err *err)
+{
+    enum { MAX_RADIUS = 49 };
+    size_t n = (size_t)w * (size_t)h;
+    int r = window_px / 2;
+    float taps[2 * MAX_RADIUS + 1], *mean = malloc(2 * n * sizeof *mean);
+    if (mean == NULL)
+        return ggn_fail_nomem(err, "observer");
+    float *tmp = mean + n;
+    r = r < MAX_RADIUS ? r : MAX_RADIUS;
+    for (int i = 0; i <= 2 * r; i++)
+        taps[i] = 1.0f / (float)(2 * r + 1);
+    lightness(reference, n, mean);
+    for (size_t i = 0; i < n; i++)
+        deviation[i] = mean[i] * mean[i];
+    filter(mean, tmp, w, h, taps, r);
+    filter(deviation, tmp, w, h, taps, r);
+    for (size_t i = 0; i < n; i++) {
+        float v = deviation[i] - mean[i] * mean[i];
+        deviation[i] = v > 0.0f ? sqrtf(v) : 0.0f;
+    }
+    free(mean);
+    return GGN_OK;
+}
+
+/* The k-th smallest value; x is reordered (Hoare's FIND). */
+static float select_kth(float *x, size_t n, size_t k)
+{
+    ptrdiff_t lo = 0, hi = (ptrdiff_t)n - 1, at = (ptrdiff_t)k;
+    while (lo < hi) {
+        float pivot = x[at];
+        ptrdiff_t i = lo, j = hi;
+        while (i <= j) {
+            while (x[i] < pivot)
+                i++;
+            while (x[j] > pivot)
+                j--;
+            if (i <= j) {
+                float t = x[i];
+                x[i++] = x[j];
+                x[j--] = t;
+            }
+        }
+        if (j < at)
+            lo = i;
+        if (i > at)
+            hi = j;
+    }
+    return x[k];
+}
+
+double ggn_observer_pool(const float *map, const float *deviation, size_t n, double masking, double percentile, float *scratch)
+{
+    float k = (float)masking;
+    for (size_t i = 0; i < n; i++)
+        scratch[i] = map[i] / (1.0f + k * deviation[i]);
+    double at = ceil(percentile / 100.0 * (double)n) - 1.0;
+    size_t index = at > 0.0 ? (size_t)at : 0;
+    return (double)select_kth(scratch, n, index < n ? index : n - 1);
+}
+
+/* --- stimuli --- */
+
+void ggn_stimuli_release(struct ggn_stimuli *s)
+{
+    free(s->base);
+    free(s->difference);
+    free(s->work);
+    free(s->converged);
+    *s = (struct ggn_stimuli){0};
+}
+
+static void encode(const float *linear, size_t pixels, uint8_t *rgb)
+{
+    for (size_t i = 0; i < pixels; i++)
+        for (size_t c = 0; c < 3; c++)
+            rgb[3 * i + c] = ggn_srgb_code((double)linear[c * pixels + i]);
+}
+
+/* The level whose half-buffer difference is kept in full. */
+static const struct ggn_seq_record *full_level(const struct ggn_seq_block *b)
+{
+    for (uint32_t i = 0; i < b->n_levels; i++)
+        if (ggn_seq_has(&b->levels[i], GGN_PLANE_HALF_F16))
+            return &b->levels[i];
+    return NULL;
+}
+
+static int init_halves(struct ggn_stimuli *s, int reference_independent, struct ggn_err *err)
+{
+    const struct ggn_seq_block *b = s->block;
+    const struct ggn_seq_record *full = full_level(b);
+    if (full == NULL)
+        return ggn_fail(err, GGN_EINVAL, "block %u has no full level with a half-buffer difference", b->id);
+    const struct ggn_seq_record *base = b->reference != NULL && reference_independent && b->reference->spp >= full->spp ? b->reference : full;
+    s->spp0 = full->spp;
+    int rc = ggn_seq_half(b, full, s->difference, err);
+    if (rc == GGN_OK)
+        rc = ggn_seq_mean(b, base, s->base, err);
+    if (rc == GGN_OK)
+        encode(s->base, (size_t)b->width * b->height, s->converged);
+    return rc;
+}
+
+static int init_rendered(struct ggn_stimuli *s, int reference_independent, struct ggn_err *err)
+{
+    const struct ggn_seq_block *b = s->block;
+    if (b->reference == NULL)
+        return ggn_fail(err, GGN_EINVAL, "block %u has no reference", b->id);
+    s->scale = reference_independent && ggn_seq_has(b->reference, GGN_PLANE_MEAN_F16);
+    int rc = s->scale ? ggn_seq_mean(b, b->reference, s->base, err) : GGN_OK;
+    return rc == GGN_OK ? ggn_seq_display(b, b->reference, s->converged, err) : rc;
+}
+
+int ggn_stimuli_init(struct ggn_stimuli *out, const struct ggn_seq_block *block, enum ggn_observer_source source,
+                     int reference_independent, struct ggn_err *err)
+{
+    size_t pixels = (size_t)block->width * block->height;
+    struct ggn_stimuli s = {.block = block, .source = source};
+    s.base = malloc(3 * pixels * sizeof(float));
+    s.difference = malloc(3 * pixels * sizeof(float));
+    s.work = malloc(3 * pixels * sizeof(float));
+    s.converged = malloc(3 * pixels);
+    int rc = GGN_OK;
+    if (s.base == NULL || s.difference == NULL || s.work == NULL || s.converged == NULL)
+        rc = ggn_fail_nomem(err, "observer");
+    else if (source == GGN_SOURCE_HALVES)
+        rc = init_halves(&s, reference_independent, err);
+    else
+        rc = init_rendered(&s, reference_independent, err);
+    if (rc != GGN_OK) {
+        ggn_stimuli_release(&s);
+        return rc;
+    }
+    *out = s;
+    return GGN_OK;
+}
+
+int ggn_stimuli_make(struct ggn_stimuli *s, uint32_t level, uint8_t *test, struct ggn_err *err)
+{
+    const struct ggn_seq_block *b = s->block;
+    const struct ggn_seq_record *r = &b->levels[level];
+    size_t pixels = (size_t)b->width * b->height;
+    if (s->source == GGN_SOURCE_HALVES) {
+        float scale = (float)sqrt(s->spp0 / r->spp);
+        for (size_t i = 0; i < 3 * pixels; i++)
+            s->work[i] = s->base[i] + scale * s->difference[i];
+    } else if (s->scale && (ggn_seq_has(r, GGN_PLANE_MEAN_F16) || ggn_seq_has(r, GGN_PLANE_FINE))) {
+        float scale = (float)sqrt((double)b->reference->spp / ((double)b->reference->spp + r->spp));
+        int rc = ggn_seq_mean(b, r, s->work, err);
+        if (rc != GGN_OK)
+            return rc;
+        for (size_t i = 0; i < 3 * pixels; i++)
+            s->work[i] = s->base[i] + scale * (s->work[i] - s->base[i]);
+    } else {
+        return ggn_seq_display(b, r, test, err);
+    }
+    encode(s->work, pixels, test);
+    return GGN_OK;
+}
+
+/* --- curves --- */
+
+void ggn_curve_release(struct ggn_curve *c)
+{
+    free(c->spp);
+    free(c->score);
+    *c = (struct ggn_curve){0};
+}
+
+int ggn_observer_curve(const struct ggn_observer *o, const struct ggn_seq_block *block, enum ggn_observer_source source,
+                       int reference_independent, struct ggn_curve *curve, struct ggn_err *err)
+{
+    struct ggn_stimuli s;
+    int w = (int)block->width, h = (int)block->height;
+    size_t n = (size_t)w * (size_t)h;
+    int rc = ggn_stimuli_init(&s, block, source, reference_independent, err);
+    if (rc != GGN_OK)
+        return rc;
+    struct ggn_curve c = {.n = (int)block->n_levels};
+    c.spp = malloc(block->n_levels * sizeof *c.spp);
+    c.score = malloc(block->n_levels * sizeof *c.score);
+    uint8_t *test = malloc(3 * n);
+    float *map = malloc(3 * n * sizeof *map);
+    if (c.spp == NULL || c.score == NULL || test == NULL || map == NULL)
+        rc = ggn_fail_nomem(err, "observer");
+    else
+        rc = ggn_observer_deviation(s.converged, w, h, o->window_px, map + n, err);
+    for (uint32_t i = 0; i < block->n_levels && rc == GGN_OK; i++) {
+        rc = ggn_stimuli_make(&s, i, test, err);
+        if (rc == GGN_OK)
+            rc = ggn_observer_error_map(o->map, o->blur_px, s.converged, test, w, h, map, err);
+        if (rc == GGN_OK) {
+            c.spp[i] = block->levels[i].spp;
+            c.score[i] = ggn_observer_pool(map, map + n, n, o->masking, o->percentile, map + 2 * n);
+        }
+    }
+    free(map);
+    free(test);
+    ggn_stimuli_release(&s);
+    if (rc != GGN_OK)
+        ggn_curve_release(&c);
+    else
+        *curve = c;
+    return rc;
+}
+
+/* Where the line through two points crosses y in log-log; half way where a point cannot be drawn. */
+static double log_cross(double x0, double y0, double x1, double y1, double y)
+{
+    double t = y0 > 0.0 && y1 > 0.0 && y0 != y1 ? log(y / y0) / log(y1 / y0) : 0.5;
+    t = t > 0.0 ? (t < 1.0 ? t : 1.0) : 0.0;
+    return x0 * pow(x1 / x0, t);
+}
+
+double ggn_curve_threshold(const struct ggn_curve *c, double tau, int *censored)
+{
+    int last = c->n - 1;
+    while (last >= 0 && !(c->score[last] > tau))
+        last--;
+    *censored = last == c->n - 1;
+    if (last < 0)
+        return c->spp[0];
+    if (*censored)
+        return c->spp[last];
+    return log_cross(c->spp[last], c->score[last], c->spp[last + 1], c->score[last + 1], tau);
+}
+
+double ggn_curve_at(const struct ggn_curve *c, double spp)
+{
+    int i = 0;
+    if (spp <= c->spp[0])
+        return c->score[0];
+    if (spp >= c->spp[c->n - 1])
+        return c->score[c->n - 1];
+    while (c->spp[i + 1] < spp)
+        i++;
+    double t = log(spp / c->spp[i]) / log(c->spp[i + 1] / c->spp[i]), a = c->score[i], b = c->score[i + 1];
+    return a > 0.0 && b > 0.0 ? a * pow(b / a, t) : a + t * (b - a);
+}
