@@ -33,6 +33,9 @@ struct pt_hit {
                                  quadric: the hit point in the quadric's own space */
 };
 
+/* t_min for going on behind a hit at t: the hit's own distance is known to a few roundings only. */
+static inline float pt_ray_beyond(float t) { return t * 1.000001f + 1e-37f; }
+
 /* Nearest hit; returns 1 and fills *hit, or 0. `coherent`: neighbouring calls have similar rays. Alpha is not looked at. */
 int pt_accel_intersect(const struct pt_scene *scene, const struct pt_ray *ray, int coherent, struct pt_hit *hit);
 /* 1 when anything lies in (t_min, t_max). Alpha is not looked at. */

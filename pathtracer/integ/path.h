@@ -60,8 +60,7 @@ PT_KERNEL_INLINE int pt_passes_alpha(const struct pt_scene *scene, const struct 
     return alpha < 1.0f && (alpha <= 0.0f || pt_rng_float(rng) >= alpha);
 }
 
-/* Nearest hit that counts. The same primitive cannot be met again: its distance is the same bits, and hits at t_min do not
- * count. */
+/* Nearest hit that counts. */
 PT_KERNEL_INLINE int pt_path_intersect(pt_effects fx, struct pt_path *path, int coherent, struct pt_hit *hit)
 {
     struct pt_rng rng;
@@ -73,7 +72,7 @@ PT_KERNEL_INLINE int pt_path_intersect(pt_effects fx, struct pt_path *path, int 
             return 0;
         if (!(fx & PT_FX_ALPHA) || !pt_passes_alpha(path->scene, &path->ray, hit, &rng))
             return 1;
-        path->ray.t_min = hit->t;
+        path->ray.t_min = pt_ray_beyond(hit->t);
     }
 }
 
@@ -104,7 +103,7 @@ PT_KERNEL_INLINE pt_vec3 pt_path_transmittance(pt_effects fx, struct pt_path *pa
             pt_place_at_hit(fx, scene, ray, &hit, &at);
             medium = pt_medium_towards(&at, ray->direction, medium);
         }
-        ray->t_min = hit.t;
+        ray->t_min = pt_ray_beyond(hit.t);
     }
 }
 
@@ -350,7 +349,7 @@ PT_KERNEL_INLINE void pt_path_sample(pt_effects fx, const struct pt_scene *scene
         pt_place_at_hit(fx, scene, &path.ray, &hit, &at);
         if ((fx & PT_FX_INTERFACE) && scene->materials[at.shape->material].kind == PT_MATERIAL_INTERFACE) {
             path.medium = pt_medium_towards(&at, path.ray.direction, path.medium);
-            path.ray.t_min = hit.t;
+            path.ray.t_min = pt_ray_beyond(hit.t);
             continue;
         }
         if (at.shape->light >= 0)

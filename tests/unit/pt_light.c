@@ -1,0 +1,217 @@
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+#include <math.h>
+#include <string.h>
+
+#include "base/rng.h"
+#include "geom/accel.h"
+#include "geom/quadric.h"
+#include "integ/surface.h"
+#include "shade/alias.h"
+#include "shade/light_select.h"
+#include "shade/warp.h"
+#include "support/pt_scenes.h"
+
+enum { SAMPLES = 200000 };
+static const double PI = 3.14159265358979323846;
+
+static void alias_table_keeps_probabilities(void **state)
+{
+    (void)state;
+    const double weights[6] = {1.0, 0.0, 3.0, 0.5, 0.0, 2.5};
+    float q[6];
+    int32_t alias[6], work[6];
+    double p[6] = {0};
+    pt_alias_build(weights, 6, q, alias, work);
+    for (int i = 0; i < 6; i++) {
+        p[i] += (double)q[i] / 6.0;
+        p[alias[i]] += (1.0 - (double)q[i]) / 6.0;
+    }
+    for (int i = 0; i < 6; i++)
+        assert_true(fabs(p[i] - weights[i] / 7.0) < 1e-6);
+}
+
+/* Density of a direction by asking what it hits, as the kernel does for BSDF sampling. */
+static float pdf_of(const struct pt_scene *scene, pt_vec3 p_ref, pt_vec3 wi)
+{
+    struct pt_ray ray = {p_ref, wi, 0.0f, INFINITY, 0.0f};
+    struct pt_hit hit;
+    struct pt_place at;
+    if (!pt_accel_intersect(scene, &ray, 0, &hit)) {
+        float pdf = 0.0f;
+        for (int32_t i = 0; i < scene->env_light_count; i++)
+            pdf += pt_light_env_pdf(scene, &scene->lights[scene->env_lights[i]], wi);
+        return pdf;
+    }
+    pt_place_at_hit(PT_FX_ALL, scene, &ray, &hit, &at);
+    if (v3_dot(at.s.n_geometric, wi) >= 0.0f)
+        return 0.0f;
+    return pt_light_area_pdf(PT_FX_ALL, scene, at.shape, at.primitive, p_ref, at.p, at.s.n_geometric, wi);
+}
+
+/* The density of samples equals the density asked for, it integrates to 1 over directions
+ * (when all of the light is visible), and the estimate of the irradiance
+ * on a sphere around p_ref (∫ L dω) agrees with uniform sampling of directions. */
+static void check_light(const struct pt_scene *scene, pt_vec3 p_ref, int all_visible)
+{
+    struct pt_rng rng = pt_rng_make(11);
+    double norm = 0.0, by_light = 0.0, by_direction = 0.0, square = 0.0;
+    int compared = 0;
+    for (int i = 0; i < SAMPLES; i++) {
+        struct pt_light_sample s;
+        float pick = pt_rng_float(&rng), u0 = pt_rng_float(&rng), u1 = pt_rng_float(&rng);
+        if (pt_light_sample(PT_FX_ALL, scene, p_ref, pick, u0, u1, &s)) {
+            by_light += (double)v3_luminance(s.radiance) / (double)s.pdf_solid / SAMPLES;
+            float pdf = pdf_of(scene, p_ref, s.wi);
+            if (i < 2000 && fabsf(pdf - s.pdf_solid) > 2e-3f * s.pdf_solid)
+                compared--; /* the very rim of a shape may round to another primitive */
+            compared += i < 2000;
+            assert_true(fabsf(v3_len(s.wi) - 1.0f) < 1e-4f);
+        }
+        pt_vec3 w = pt_sample_sphere(pt_rng_float(&rng), pt_rng_float(&rng));
+        double pdf = (double)pdf_of(scene, p_ref, w);
+        norm += pdf * 4.0 * PI / SAMPLES;
+        square += pdf * pdf * 16.0 * PI * PI / SAMPLES;
+        struct pt_ray ray = {p_ref, w, 0.0f, INFINITY, 0.0f};
+        struct pt_hit hit;
+        double l = 0.0;
+        if (pt_accel_intersect(scene, &ray, 0, &hit))
+            l = pdf > 0.0 ? (double)v3_luminance(scene->lights[scene->shapes[hit.shape].light].emission) : 0.0;
+        else
+            for (int32_t k = 0; k < scene->env_light_count; k++)
+                l += (double)v3_luminance(pt_light_env_eval(scene, &scene->lights[scene->env_lights[k]], w));
+        by_direction += l * 4.0 * PI / SAMPLES;
+    }
+    double error = sqrt(fmax(0.0, square - norm * norm) / SAMPLES);
+    if (all_visible && fabs(norm - 1.0) > 5.0 * error + 1e-4)
+        fail_msg("the density integrates to %g ± %g", norm, error);
+    if (fabs(by_light - by_direction) > 5.0 * error * by_light + 1e-3)
+        fail_msg("irradiance %g by light sampling, %g by direction", by_light, by_direction);
+    assert_true(compared > 1900);
+}
+
+static void run(void (*build)(struct pt_scene *scene), int all_visible)
+{
+    struct pt_scene scene;
+    test_scene_begin(&scene);
+    build(&scene);
+    test_scene_finish(&scene);
+    check_light(&scene, v3(0.2f, 0.1f, -0.3f), all_visible);
+    test_scene_end(&scene);
+}
+
+static void build_quad(struct pt_scene *s)
+{
+    int32_t black = test_add_diffuse(s, v3_splat(0.0f));
+    test_add_area_light(s, test_add_quad(s, black, v3(-1, -1, 1), v3(0, 2, 0), v3(2, 0, 0)), v3(1, 2, 3), 0);
+    test_add_area_light(s, test_add_quad(s, black, v3(-1, -1, -2), v3(2, 0, 0), v3(0, 2, 0)), v3(5, 1, 3), 0);
+}
+
+static void build_sphere(struct pt_scene *s)
+{
+    int32_t black = test_add_diffuse(s, v3_splat(0.0f));
+    test_add_area_light(s, test_add_sphere(s, black, v3(2, 0.5f, 1), 1.0f), v3(1, 2, 3), 0);
+}
+
+static void set_transform(struct pt_quadric *q, struct pt_mat34 t)
+{
+    q->to_render = t;
+    assert_int_equal(pt_mat34_invert(&t, &q->from_render), 1);
+}
+
+/* An ellipsoid, a clipped sphere: sampled by area, with the stretch of the surface taken into account. */
+static void build_ellipsoid(struct pt_scene *s)
+{
+    int32_t black = test_add_diffuse(s, v3_splat(0.0f)), id = test_add_sphere(s, black, v3(0, 0, 0), 1.0f);
+    set_transform(&s->quadrics[0], (struct pt_mat34){{1, 0, 0, 3, 0, 2, 0, 0.5f, 0, 0.3f, 0.5f, 1}});
+    test_add_area_light(s, id, v3(1, 2, 3), 0);
+}
+
+static void build_cylinder(struct pt_scene *s)
+{
+    int32_t black = test_add_diffuse(s, v3_splat(0.0f)), id = test_add_sphere(s, black, v3(0, 0, 0), 1.0f);
+    s->quadrics[0].kind = PT_QUADRIC_CYLINDER;
+    set_transform(&s->quadrics[0], (struct pt_mat34){{1, 0, 0, 3, 0, 1, 0, 0.5f, 0, 0, 1, 1}});
+    test_add_area_light(s, id, v3(1, 2, 3), 0);
+}
+
+static void build_disk(struct pt_scene *s)
+{
+    int32_t black = test_add_diffuse(s, v3_splat(0.0f)), id = test_add_sphere(s, black, v3(0, 0, 0), 1.0f);
+    s->quadrics[0] = (struct pt_quadric){.kind = PT_QUADRIC_DISK, .radius = 1.0f, .inner_radius = 0.25f, .phi_max = 4.0f};
+    set_transform(&s->quadrics[0], (struct pt_mat34){{2, 0, 0, 0.3f, 0, -1, 0, 0, 0, 0, -1, 1}});
+    test_add_area_light(s, id, v3(1, 2, 3), 0);
+}
+
+static void build_env(struct pt_scene *s, int32_t mapping, int32_t width, int32_t height)
+{
+    float *px = pt_arena_alloc(&s->arena, (size_t)(3 * width * height), sizeof *px);
+    assert_non_null(px);
+    struct pt_rng rng = pt_rng_make(5);
+    for (int i = 0; i < 3 * width * height; i++)
+        px[i] = pt_rng_float(&rng) * (i % 37 == 0 ? 10.0f : 1.0f);
+    s->images[s->image_count++] = (struct pt_image_map){width, height, 3, PT_PIXEL_FLOAT, 1.0f, px};
+    struct pt_light light = {.kind = PT_LIGHT_ENV_IMAGE, .shape = -1, .image = 0, .mapping = mapping, .emission = {1, 1, 2},
+                             .from_render = {{0, 0, 1, 0, 0, 1, 0, 0, -1, 0, 0, 0}}};
+    test_add_light(s, &light);
+}
+
+static void build_latlong(struct pt_scene *s) { build_env(s, PT_ENV_LATLONG, 32, 16); }
+static void build_equal_area(struct pt_scene *s) { build_env(s, PT_ENV_EQUAL_AREA, 24, 24); }
+
+static void quads(void **state) { (void)state; run(build_quad, 1); }
+static void sphere_outside(void **state) { (void)state; run(build_sphere, 1); }
+static void ellipsoid(void **state) { (void)state; run(build_ellipsoid, 0); }
+static void cylinder(void **state) { (void)state; run(build_cylinder, 0); }
+static void disk(void **state) { (void)state; run(build_disk, 1); }
+static void latlong(void **state) { (void)state; run(build_latlong, 1); }
+static void equal_area(void **state) { (void)state; run(build_equal_area, 1); }
+
+/* From inside, an emitting sphere turned inwards fills all directions. */
+static void sphere_inside(void **state)
+{
+    (void)state;
+    struct pt_scene scene;
+    test_scene_begin(&scene);
+    build_sphere(&scene);
+    scene.shapes[0].flip_normal = 1;
+    test_scene_finish(&scene);
+    check_light(&scene, v3(2.3f, 0.4f, 1.1f), 1);
+    test_scene_end(&scene);
+}
+
+/* Point, spot and distant lights against their closed forms. */
+static void delta_lights(void **state)
+{
+    (void)state;
+    struct pt_light point = {.kind = PT_LIGHT_POINT, .emission = {8, 8, 8}, .position = {0, 0, 2}};
+    struct pt_light spot = {.kind = PT_LIGHT_SPOT, .emission = {8, 8, 8}, .position = {0, 0, 2}, .direction = {0, 0, -1},
+                            .cos_total = 0.8f, .cos_start = 0.9f};
+    struct pt_light distant = {.kind = PT_LIGHT_DISTANT, .emission = {3, 3, 3}, .direction = {0, 0, -1}};
+    struct pt_light_sample s;
+    assert_int_equal(pt_light_delta_sample(&point, 0.5f, v3(0, 0, 0), &s), 1);
+    assert_true(fabsf(s.radiance.x - 2.0f) < 1e-6f && s.delta && s.finite && s.pdf_solid == 0.5f);
+    assert_int_equal(pt_light_delta_sample(&spot, 1.0f, v3(0, 0, 0), &s), 1);
+    assert_true(fabsf(s.radiance.x - 2.0f) < 1e-6f);
+    assert_int_equal(pt_light_delta_sample(&spot, 1.0f, v3(1.6f, 0, 0), &s), 0);
+    float r = 2.0f * sqrtf(1.0f - 0.85f * 0.85f) / 0.85f; /* half way between the cones: smoothstep is 1/2 */
+    assert_int_equal(pt_light_delta_sample(&spot, 1.0f, v3(r, 0, 0), &s), 1);
+    assert_true(fabsf(s.radiance.x - 0.5f * 8.0f / (4.0f + r * r)) < 1e-4f);
+    assert_int_equal(pt_light_delta_sample(&distant, 1.0f, v3(5, 6, 7), &s), 1);
+    assert_true(!s.finite && s.wi.z == 1.0f && s.radiance.x == 3.0f);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(alias_table_keeps_probabilities), cmocka_unit_test(quads),     cmocka_unit_test(sphere_outside),
+        cmocka_unit_test(sphere_inside),                   cmocka_unit_test(ellipsoid), cmocka_unit_test(cylinder),
+        cmocka_unit_test(disk),                            cmocka_unit_test(latlong),   cmocka_unit_test(equal_area),
+        cmocka_unit_test(delta_lights),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
