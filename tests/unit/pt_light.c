@@ -60,16 +60,15 @@ static void check_light(const struct pt_scene *scene, pt_vec3 p_ref, int all_vis
 {
     struct pt_rng rng = pt_rng_make(11);
     double norm = 0.0, by_light = 0.0, by_direction = 0.0, square = 0.0;
-    int compared = 0;
+    int lit = 0, agree = 0;
     for (int i = 0; i < SAMPLES; i++) {
         struct pt_light_sample s;
         float pick = pt_rng_float(&rng), u0 = pt_rng_float(&rng), u1 = pt_rng_float(&rng);
         if (pt_light_sample(PT_FX_ALL, scene, p_ref, pick, u0, u1, &s)) {
             by_light += (double)v3_luminance(s.radiance) / (double)s.pdf_solid / SAMPLES;
             float pdf = pdf_of(scene, p_ref, s.wi);
-            if (i < 2000 && fabsf(pdf - s.pdf_solid) > 2e-3f * s.pdf_solid)
-                compared--; /* the very rim of a shape may round to another primitive */
-            compared += i < 2000;
+            lit++;
+            agree += fabsf(pdf - s.pdf_solid) <= 2e-3f * s.pdf_solid;
             assert_true(fabsf(v3_len(s.wi) - 1.0f) < 1e-4f);
         }
         pt_vec3 w = pt_sample_sphere(pt_rng_float(&rng), pt_rng_float(&rng));
@@ -91,7 +90,7 @@ static void check_light(const struct pt_scene *scene, pt_vec3 p_ref, int all_vis
         fail_msg("the density integrates to %g ± %g", norm, error);
     if (fabs(by_light - by_direction) > 5.0 * error * by_light + 1e-3)
         fail_msg("irradiance %g by light sampling, %g by direction", by_light, by_direction);
-    assert_true(compared > 1900);
+    assert_true(agree > 0.98 * lit); /* at the very rim of a shape rounding may find another primitive */
 }
 
 static void run(void (*build)(struct pt_scene *scene), int all_visible)
