@@ -140,6 +140,11 @@ $(OUT)/tests/$(1)/api_%: $(OBJ)/tests/$(1)/api_%.c.o $(LOADER_OBJ) $(SUPPORT_api
 	$$(link) $$^ $$(LDFLAGS_ALL) -ldl -lm -lcmocka -o $$@
 endef
 $(foreach d,unit grad golden stat abi hard oom,$(eval $(call test_rules,$(d))))
+# Criteria for the tests of the loader and of lull-check, most of them broken on purpose.
+ABI_PLUGINS := $(patsubst tests/%.c,$(OUT)/tests/%.so,$(wildcard tests/abi/plugins/*.c))
+$(OUT)/tests/abi/plugins/%.so: $(OBJ)/tests/abi/plugins/%.c.o
+	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared $< $(LDFLAGS_ALL) -lm -o $@
+$(patsubst tests/%.c,$(OUT)/tests/%,$(wildcard tests/abi/api_*.c)): | $(ABI_PLUGINS) $(CRITERIA)
 $(OUT)/fuzz/replay-pt_%: $(OBJ)/tests/fuzz/pt_%.c.o $(OBJ)/tests/fuzz/replay.c.o $(PT_OBJ) $(LOADER_OBJ)
 	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) -o $@
 $(OUT)/fuzz/replay-ggn_%: $(OBJ)/tests/fuzz/ggn_%.c.o $(OBJ)/tests/fuzz/replay.c.o $(GGN_OBJ)
@@ -153,7 +158,7 @@ $(OUT)/bench/pt_%: $(OBJ)/tests/bench/pt_%.c.o $(PT_OBJ) $(LOADER_OBJ) $(SUPPORT
 setup: ## install the Debian packages that are missing
 	@scripts/setup
 
-tests: $(TESTS)
+tests: $(TESTS) $(ABI_PLUGINS)
 replay: $(REPLAY)
 
 # `test` builds in sub-makes so that packages installed by setup are seen by pkg-config.

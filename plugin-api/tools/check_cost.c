@@ -39,6 +39,8 @@ static void repeat(struct lc *c, void (*once)(struct lc *), const char *what)
 {
     enum { MOST = 1000, WARM = 20, SLACK = 2048 };
     const double limit_s = 8;
+    if (c->failed)
+        return;
     double start = now_s();
     size_t bytes = 0;
     long files = 0;

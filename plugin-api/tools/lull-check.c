@@ -23,6 +23,7 @@ struct arguments {
     int quiet, list;
 };
 
+/* The first group needs no instance. */
 static const struct lc_check *const groups[] = {lc_table_checks, lc_create_checks, lc_struct_checks,
                                                 lc_pixel_checks, lc_life_checks,   lc_batch_checks,
                                                 lc_thread_checks, lc_state_checks,  lc_cost_checks};
@@ -131,7 +132,9 @@ static void find(struct lc *c, const void *arg)
     struct lull_found *found = malloc(sizeof *found);
     struct lull_error err = {.struct_size = sizeof err, .message = "out of memory"};
     if (found == NULL || lull_open(&search, spec, found, &err) != LULL_OK) {
-        if (err.code == LULL_E_INVALID || err.code == LULL_E_KEY || (err.code == LULL_E_IO && access(spec, R_OK) != 0))
+        size_t last = strlen(spec) > 0 ? strlen(spec) - 1 : 0;
+        int senseless = spec[0] == '\0' || spec[0] == ':' || spec[last] == ':';
+        if (senseless || err.code == LULL_E_KEY || (err.code == LULL_E_IO && access(spec, R_OK) != 0))
             lc_skip(c, "%s", err.message);
         else
             lc_fail(c, "%s", err.message);
@@ -152,16 +155,20 @@ static void find(struct lc *c, const void *arg)
     free(found);
 }
 
-/* Loads the criterion and what it requires, in a child. */
-static int prepare(struct lc *c, const char *id)
+/* Loads the criterion, in a child. */
+static int find_table(struct lc *c, const char *id)
 {
     lull_entry_fn entry = lc_entry(c->path);
     c->criterion = NULL;
     for (uint32_t i = 0; entry != NULL && c->criterion == NULL && entry(i) != NULL; i++)
         if (strcmp(entry(i)->id, id) == 0)
             c->criterion = entry(i);
-    if (!LC_EXPECT(c, c->criterion != NULL, "no criterion %s", id))
-        return -1;
+    return LC_EXPECT(c, c->criterion != NULL, "no criterion %s", id) ? 0 : -1;
+}
+
+/* And what it requires. */
+static int prepare(struct lc *c)
+{
     struct lull_instance *instance = NULL;
     struct lull_error err = {.struct_size = sizeof err};
     int32_t status = c->criterion->create(NULL, c->pairs, c->pair_count, sizeof *c->pairs, &instance, &err);
@@ -182,12 +189,13 @@ static int prepare(struct lc *c, const char *id)
 struct task {
     const char *id;
     const struct lc_check *check; /* NULL: only see whether the criterion can be made */
+    int needs_instance;
 };
 
 static void run_task(struct lc *c, const void *arg)
 {
     const struct task *task = arg;
-    if (prepare(c, task->id) == 0 && task->check != NULL)
+    if (find_table(c, task->id) == 0 && (!task->needs_instance || prepare(c) == 0) && task->check != NULL)
         task->check->run(c);
 }
 
@@ -233,32 +241,41 @@ static int no_process(void)
     return LC_EXIT_FAILED;
 }
 
+static int run_group(const struct arguments *a, struct lc *c, const struct lc_check *group, struct task task,
+                     struct totals *t, struct lc_report *r)
+{
+    for (task.check = group; task.check->name != NULL; task.check++) {
+        if (!wanted(a, task.check))
+            continue;
+        if (lc_child_run(c, run_task, &task, a->limit_s, r) != 0)
+            return no_process();
+        print_report(a, t, task.check->name, task.check->title, r);
+    }
+    return LC_EXIT_OK;
+}
+
 static int check_criterion(const struct arguments *a, struct lc *c, const char *id, struct totals *t)
 {
-    struct lc_report *r = malloc(sizeof *r);
-    if (r == NULL)
-        return no_process();
-    if (!a->quiet)
-        printf("# %s:%s\n", c->path, id);
-    int result = lc_child_run(c, run_task, &(struct task){id, NULL}, a->limit_s, r);
-    if (result == 0 && r->skipped) {
-        fprintf(stderr, "lull-check: %s: %s\n", id, r->lines[0]);
-        free(r);
-        return LC_EXIT_USAGE;
+    struct lc_report *r = malloc(sizeof *r), *made = malloc(sizeof *made);
+    const struct task make_one = {id, NULL, 1};
+    int result = LC_EXIT_OK;
+    if (r == NULL || made == NULL || lc_child_run(c, run_task, &make_one, a->limit_s, made) != 0) {
+        result = no_process();
+    } else if (made->skipped) { /* the command line's parameters are wrong */
+        fprintf(stderr, "lull-check: %s: %s\n", id, made->lines[0]);
+        result = LC_EXIT_USAGE;
+    } else {
+        if (!a->quiet)
+            printf("# %s:%s\n", c->path, id);
+        result = run_group(a, c, groups[0], (struct task){id, NULL, 0}, t, r);
+        if (made->failures > 0)
+            print_report(a, t, "create", "an instance can be made", made);
+        for (int g = 1; g < GROUPS && result == LC_EXIT_OK && made->failures == 0; g++)
+            result = run_group(a, c, groups[g], (struct task){id, NULL, 1}, t, r);
     }
-    if (result == 0 && r->failures > 0)
-        print_report(a, t, "create", "an instance can be made", r);
-    else
-        for (int g = 0; g < GROUPS && result == 0; g++)
-            for (const struct lc_check *k = groups[g]; k->name != NULL && result == 0; k++) {
-                if (!wanted(a, k))
-                    continue;
-                result = lc_child_run(c, run_task, &(struct task){id, k}, a->limit_s, r);
-                if (result == 0)
-                    print_report(a, t, k->name, k->title, r);
-            }
     free(r);
-    return result == 0 ? LC_EXIT_OK : no_process();
+    free(made);
+    return result;
 }
 
 static int check_spec(const struct arguments *a, const char *spec, struct totals *t)

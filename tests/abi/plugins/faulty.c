@@ -1,0 +1,420 @@
+/*
+ * A criterion with history and lull.state/1 that is correct unless its parameter `fault` says otherwise: then it breaks one
+ * rule of the contract, for the tests of lull-check. The faults are listed in tests/cli/lull_check_faults.sh.
+ *
+ * Rule: mean luminance of the block and a halo of one pixel at each check; stops when the last three means are close.
+ */
+#include "../../../plugin-api/examples/support.h"
+
+#include <fcntl.h>
+#include <pthread.h>
+#include <unistd.h>
+
+#if defined(__SSE__)
+#include <xmmintrin.h>
+#endif
+
+enum fault {
+    NONE, LEAK, FILE_LEAK, WIDE_WRITE, FP_CONTROL, THREAD, BATCH_INDEX, REPEAT, NO_RESTART, GLOBAL_STATE, TIGHT_STRIDES,
+    ONLY_F32, GLOBAL_SPP, KEEPS_POINTER, DIVIDES_BY_ZERO, PRINTS, EXITS, CRASHES_AT_1X1, ANY_KEY, ANY_VALUE, LOAD_SHORT,
+    LOAD_DIRTY, ALLOCATES, RACE, NEXT_IN_PAST, READS_BEYOND, NO_PLANE_CHECK, TOUCHES_INSTANCE, UNCHECKED_MALLOC, STOPS_AT_0,
+    HANGS, TWO_FRAMES, ANY_ID, RANDOM, SHORT_STRUCT, ANONYMOUS_KEY, SAVE_IGNORES, READS_LATER_FIELD, FAULT_COUNT
+};
+
+enum { THRESHOLD, FIRST_SPP, FAULT, PARAM_COUNT };
+enum { KEPT = 3 };
+
+static const struct lull_param params[PARAM_COUNT] = {
+    [THRESHOLD] = {.name = "threshold", .help = "largest relative change of the mean", .default_value = "0.01",
+                   .max = 1, .type = LULL_PARAM_FLOAT},
+    [FIRST_SPP] = {.name = "first-spp", .help = "samples before the first check", .default_value = "4",
+                   .min = 2, .max = 1e6, .type = LULL_PARAM_INT},
+    [FAULT] = {.name = "fault", .help = "the rule to break, 0 for none", .default_value = "0",
+               .max = FAULT_COUNT - 1, .type = LULL_PARAM_INT},
+};
+
+/* What a block answered, by spp: the last KEPT checks. */
+struct history {
+    uint64_t spp[KEPT];
+    double mean[KEPT];
+    uint64_t count; /* checks so far */
+};
+
+struct faulty {
+    struct lull_instance base; /* first */
+    struct history *history;   /* owns, [base.block_count] */
+    uint32_t history_count;
+    const struct lull_rect *rects; /* KEEPS_POINTER */
+};
+
+static struct history global_history[1024];
+static double shared_scratch[2];
+
+static struct faulty *faulty(const struct lull_instance *in)
+{
+    return (struct faulty *)(uintptr_t)in;
+}
+
+static enum fault fault_of(const struct lull_instance *in)
+{
+    return (enum fault)(int)in->value[FAULT];
+}
+
+/* --- pixels ---------------------------------------------------------------------------------------------------------- */
+
+static const struct lull_block *owner(const struct lull_view *view, int32_t x, int32_t y)
+{
+    for (uint32_t i = 0; i < view->all_count; i++) {
+        const void *at = (const char *)view->all + (size_t)i * view->all_stride;
+        const struct lull_block *b = at;
+        if (x >= b->x0 && x < b->x1 && y >= b->y0 && y < b->y1)
+            return b;
+    }
+    return NULL;
+}
+
+static double pixel(const struct lull_instance *in, const struct lull_view *view, const struct lull_block *b, int32_t x,
+                    int32_t y)
+{
+    struct lull_plane color = *ex_plane(view, LULL_PLANE_COLOR);
+    if (fault_of(in) == TIGHT_STRIDES) {
+        color.stride_c = 4, color.stride_x = 12;
+        color.stride_y = 12 * ((int64_t)view->x1 - view->x0);
+    }
+    if (fault_of(in) == ONLY_F32)
+        color.type = LULL_TYPE_F32;
+    if (fault_of(in) == GLOBAL_SPP && view->all != NULL)
+        b = view->all;
+    double rgb[3];
+    ex_span(view, &color, b, x, y, 1, 3, rgb);
+    return ex_luminance(in, rgb);
+}
+
+static double mean_of(const struct lull_instance *in, const struct lull_view *view, const struct lull_block *block, int *bad)
+{
+    int32_t halo = view->all != NULL ? 1 : 0;
+    double sum = 0, count = 0;
+    for (int32_t y = block->y0 - halo; y < block->y1 + halo; y++)
+        for (int32_t x = block->x0 - halo; x < block->x1 + halo; x++) {
+            int inside = x >= view->x0 && y >= view->y0 && x < view->x1 && y < view->y1;
+            if (!inside && fault_of(in) != READS_BEYOND)
+                continue;
+            const struct lull_block *b = inside && view->all != NULL ? owner(view, x, y) : block;
+            if (b == NULL)
+                continue;
+            double v = pixel(in, view, b, x, y);
+            if (isfinite(v)) {
+                sum += v;
+                count++;
+            } else if (b->spp > 0) {
+                *bad = 1;
+            }
+        }
+    return count > 0 ? sum / count : 0;
+}
+
+/* --- judging ----------------------------------------------------------------------------------------------------------- */
+
+/* Faults whose place is before the judgement. */
+static void misbehave(const struct lull_instance *in, const struct lull_block *block)
+{
+    switch (fault_of(in)) {
+#if defined(__SSE__)
+    case FP_CONTROL: _mm_setcsr(_mm_getcsr() | 0x8040); break;
+#endif
+    case PRINTS: puts("hello"); fflush(stdout); break;
+    case CRASHES_AT_1X1:
+        if (block->x1 - block->x0 == 1 && block->y1 - block->y0 == 1)
+            abort();
+        break;
+    case ALLOCATES: {
+        void *volatile memory = malloc(64); /* volatile: compilers leave out a malloc that is freed at once */
+        free(memory);
+        break;
+    }
+    case HANGS:
+        for (;;)
+            pause();
+    case RACE: shared_scratch[0] += 1; break;
+    default: break;
+    }
+}
+
+static double change(const struct history *h)
+{
+    double low = h->mean[0], high = h->mean[0];
+    for (int i = 1; i < KEPT; i++) {
+        low = fmin(low, h->mean[i]);
+        high = fmax(high, h->mean[i]);
+    }
+    return (high - low) / (fabs(high) + fabs(low) + 1e-9);
+}
+
+static struct history *history_of(const struct lull_instance *in, uint32_t id)
+{
+    return fault_of(in) == GLOBAL_STATE ? &global_history[id % 1024] : &faulty(in)->history[id];
+}
+
+static void remember(const struct lull_instance *in, const struct lull_view *view, const struct lull_block *block,
+                     struct lull_decision *d)
+{
+    struct history *h = history_of(in, block->id);
+    int bad = 0;
+    uint64_t last = h->count > 0 ? h->spp[(h->count - 1) % KEPT] : UINT64_MAX;
+    double mean = mean_of(in, view, block, &bad);
+    if (fault_of(in) == KEEPS_POINTER)
+        mean += faulty(in)->rects[block->id].x0;
+    if (block->spp != last || fault_of(in) == REPEAT) { /* the same question leaves no trace */
+        h->spp[h->count % KEPT] = block->spp;
+        h->mean[h->count % KEPT] = mean;
+        h->count++;
+    }
+    d->flags |= bad ? LULL_DECISION_BAD_INPUT : 0;
+}
+
+static void judge(const struct lull_instance *in, const struct lull_view *view, const struct lull_block *block,
+                  struct lull_decision *d)
+{
+    misbehave(in, block);
+    d->flags = 0;
+    d->action = LULL_CONTINUE;
+    if (fault_of(in) == STOPS_AT_0 && block->spp == 0)
+        d->action = LULL_STOP;
+    if (fault_of(in) == DIVIDES_BY_ZERO)
+        d->error = 1 / (double)block->spp;
+    remember(in, view, block, d);
+    if (fault_of(in) == EXITS && (d->flags & LULL_DECISION_BAD_INPUT))
+        exit(3);
+    const struct history *h = history_of(in, block->id);
+    if (h->count < KEPT || block->spp < ex_first_spp(in)) {
+        d->flags |= LULL_DECISION_TOO_EARLY;
+        d->next_spp = block->spp + block->spp / 2 + 2;
+        return;
+    }
+    d->error = change(h);
+    if (fault_of(in) == RANDOM) {
+        static unsigned calls;
+        d->error += 1e-6 * calls++;
+    }
+    d->action = d->error <= in->value[THRESHOLD] ? LULL_STOP : LULL_CONTINUE;
+    d->next_spp = fault_of(in) == NEXT_IN_PAST ? block->spp : block->spp + block->spp / 2 + 2;
+}
+
+static const struct ex_rule ex_rule = {
+    .params = params,
+    .param_count = PARAM_COUNT,
+    .planes_required = LULL_PLANE_BIT(LULL_PLANE_COLOR),
+    .planes_used = LULL_PLANE_BIT(LULL_PLANE_COLOR),
+    .first_spp_param = FIRST_SPP,
+    .judge = judge,
+};
+
+/* --- functions of the table ------------------------------------------------------------------------------------------------ */
+
+static void *sleeper(void *arg)
+{
+    pause();
+    return arg;
+}
+
+static void create_faults(struct faulty *f)
+{
+    pthread_t thread;
+    if (fault_of(&f->base) == LEAK)
+        f->rects = malloc(40);
+    if (fault_of(&f->base) == FILE_LEAK)
+        (void)!open("/dev/null", O_RDONLY);
+    if (fault_of(&f->base) == THREAD && pthread_create(&thread, NULL, sleeper, NULL) == 0)
+        pthread_detach(thread);
+}
+
+/* 1 if the pairs choose this fault: for what happens before an instance exists. */
+static int chosen(const struct lull_pair *pairs, uint32_t count, enum fault fault)
+{
+    double number;
+    return count > 0 && pairs != NULL && pairs->key != NULL && strcmp(pairs->key, "fault") == 0 &&
+           ex_number(pairs->value, &number) && number == (double)fault;
+}
+
+static int32_t create(const struct lull_host *host, const struct lull_pair *pairs, uint32_t pair_count, uint32_t pair_stride,
+                      struct lull_instance **instance, struct lull_error *err)
+{
+    if (instance == NULL)
+        return ex_fail(err, LULL_E_INVALID, "create: no place for the instance");
+    struct lull_host whole = {.struct_size = sizeof whole};
+    if (chosen(pairs, pair_count, SHORT_STRUCT) && host != NULL) {
+        whole = *host;
+        whole.struct_size = sizeof whole;
+        host = &whole;
+    }
+    struct lull_instance *base = NULL;
+    int32_t status = ex_create(host, pairs, pair_count, pair_stride, &base, err);
+    if ((status == LULL_E_KEY && chosen(pairs, pair_count, ANY_KEY)) ||
+        (status == LULL_E_VALUE && chosen(pairs, pair_count, ANY_VALUE)))
+        status = ex_create(host, pairs, 1, pair_stride, &base, NULL);
+    if (status != LULL_OK) {
+        if (chosen(pairs, pair_count, TOUCHES_INSTANCE))
+            *instance = NULL;
+        if (chosen(pairs, pair_count, ANONYMOUS_KEY) && err != NULL)
+            ex_fail(err, status, "cannot");
+        return status;
+    }
+    struct faulty *f = calloc(1, sizeof *f);
+    if (f == NULL && fault_of(base) != UNCHECKED_MALLOC) {
+        ex_destroy(base);
+        return ex_fail(err, LULL_E_MEMORY, "out of memory");
+    }
+    f->base = *base;
+    if (host == &whole)
+        f->base.host = NULL;
+    ex_destroy(base);
+    create_faults(f);
+    *instance = &f->base;
+    return LULL_OK;
+}
+
+static int32_t requirements(const struct lull_instance *in, struct lull_requirements *req, struct lull_error *err)
+{
+    int32_t status = ex_requirements(in, req, err);
+    if (status == LULL_OK) {
+        req->halo = 1;
+        req->bytes_per_block = sizeof(struct history);
+    }
+    return status;
+}
+
+static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *frame, struct lull_error *err)
+{
+    struct faulty *f = faulty(in);
+    struct lull_instance before = *in;
+    struct lull_frame lenient;
+    if (frame != NULL && LULL_HAS(struct lull_frame, frame, rgb_to_xyz)) {
+        lenient = *frame;
+        if (fault_of(in) == TWO_FRAMES)
+            lenient.flags |= LULL_FRAME_RESTART;
+        if (fault_of(in) == NO_PLANE_CHECK)
+            lenient.planes = ~UINT32_C(0);
+        frame = &lenient;
+    }
+    int32_t status = ex_begin_frame(in, frame, err);
+    if (status != LULL_OK)
+        return status;
+    struct history *history = calloc(frame->block_count, sizeof *history);
+    if (history == NULL) {
+        *in = before;
+        return ex_fail(err, LULL_E_MEMORY, "out of memory");
+    }
+    if (fault_of(in) == NO_RESTART && f->history != NULL && f->history_count == frame->block_count)
+        memcpy(history, f->history, f->history_count * sizeof *history);
+    free(f->history);
+    f->history = history;
+    f->history_count = frame->block_count;
+    if (fault_of(in) == KEEPS_POINTER)
+        f->rects = frame->blocks;
+    return LULL_OK;
+}
+
+static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, const struct lull_block *blocks,
+                        uint32_t block_stride, struct lull_decision *decisions, uint32_t decision_stride, uint32_t count,
+                        struct lull_error *err)
+{
+    if (fault_of(in) == ANY_ID && count > 0 && blocks != NULL && blocks->id >= in->block_count)
+        return LULL_OK;
+    int32_t status = ex_evaluate(in, view, blocks, block_stride, decisions, decision_stride, count, err);
+    if (status == LULL_OK && fault_of(in) == WIDE_WRITE && count > 0 && decision_stride >= sizeof *decisions + 8)
+        memset(decisions + 1, 0, 8);
+    if (status == LULL_OK && fault_of(in) == READS_LATER_FIELD)
+        return *((const volatile char *)(view + 1)) == 0 ? LULL_OK : LULL_OK;
+    if (status == LULL_OK && fault_of(in) == BATCH_INDEX)
+        for (uint32_t i = 0; i < count; i++) {
+            void *at = (char *)decisions + (size_t)i * decision_stride;
+            ((struct lull_decision *)at)->predicted_spp = 100 + (double)i;
+        }
+    return status;
+}
+
+static void end_frame(struct lull_instance *in)
+{
+    ex_end_frame(in);
+    if (fault_of(in) == NO_RESTART)
+        return;
+    free(faulty(in)->history);
+    faulty(in)->history = NULL;
+}
+
+static void destroy(struct lull_instance *in)
+{
+    if (in != NULL)
+        free(faulty(in)->history);
+    free(in);
+}
+
+/* --- state ------------------------------------------------------------------------------------------------------------- */
+
+static int32_t save(const struct lull_instance *in, const struct lull_writer *writer, struct lull_error *err)
+{
+    uint32_t count = in->block_count;
+    int32_t status = writer->write(writer, &count, sizeof count);
+    if (status == LULL_OK)
+        status = writer->write(writer, faulty(in)->history, count * sizeof(struct history));
+    if (fault_of(in) == SAVE_IGNORES)
+        return LULL_OK;
+    return status == LULL_OK ? LULL_OK : ex_fail(err, status, "the history cannot be written");
+}
+
+static int32_t load(struct lull_instance *in, const struct lull_reader *reader, struct lull_error *err)
+{
+    uint32_t count;
+    if (in->block_count == 0)
+        return ex_fail(err, LULL_E_STATE, "load: no frame is open");
+    struct history *fresh = calloc(in->block_count, sizeof *fresh);
+    if (fresh == NULL)
+        return ex_fail(err, LULL_E_MEMORY, "out of memory");
+    if (fault_of(in) == LOAD_DIRTY)
+        memset(faulty(in)->history, 0, in->block_count * sizeof *fresh);
+    int32_t status = reader->read(reader, &count, sizeof count);
+    if (status == LULL_OK && count != in->block_count)
+        status = LULL_E_IO;
+    if (status == LULL_OK)
+        status = reader->read(reader, fresh, in->block_count * sizeof *fresh);
+    if (status != LULL_OK) {
+        free(fresh);
+        return fault_of(in) == LOAD_SHORT ? LULL_OK : ex_fail(err, LULL_E_IO, "the state does not fit the frame");
+    }
+    free(faulty(in)->history);
+    faulty(in)->history = fresh;
+    return LULL_OK;
+}
+
+static const struct lull_state state = {.struct_size = sizeof state, .save = save, .load = load};
+
+static const void *get_extension(const char *id)
+{
+    return strcmp(id, LULL_EXT_STATE) == 0 ? &state : NULL;
+}
+
+static const struct lull_criterion criterion = {
+    .struct_size = sizeof(struct lull_criterion),
+    .api_minor = LULL_API_MINOR,
+    .id = "faulty",
+    .name = "For the tests of lull-check",
+    .version = "1",
+    .description = "Stops when the last three means of a block are close, or does something wrong.",
+    .params = params,
+    .param_count = PARAM_COUNT,
+    .param_stride = sizeof(struct lull_param),
+    .thread_level = LULL_THREADS_FULL,
+    .capabilities = LULL_CAP_DETERMINISTIC | LULL_CAP_BATCH_INVARIANT,
+    .create = create,
+    .requirements = requirements,
+    .begin_frame = begin_frame,
+    .evaluate = evaluate,
+    .end_frame = end_frame,
+    .destroy = destroy,
+    .get_extension = get_extension,
+};
+
+const struct lull_criterion *lull_criterion_entry_v1(uint32_t index)
+{
+    return index == 0 ? &criterion : NULL;
+}

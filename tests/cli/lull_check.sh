@@ -1,0 +1,60 @@
+#!/bin/sh
+# lull-check: its options and exit statuses, and every criterion of the build against the whole contract.
+BUILD=${BUILD:-build}
+check=$BUILD/bin/lull-check
+tmp=$(mktemp -d) || exit 2
+trap 'rm -rf "$tmp"' EXIT
+n=0
+t() { # t NAME COMMAND...: passes if the command does
+    n=$((n + 1)) name=$1
+    shift
+    if "$@" >"$tmp/log" 2>&1; then echo "ok $n - $name"; else
+        echo "not ok $n - $name"
+        tail -n 30 "$tmp/log" | sed 's/^/#   /'
+    fi
+}
+status() { # status N ARGS...: lull-check ends with this status
+    want=$1
+    shift
+    "$check" "$@"
+    got=$?
+    [ "$got" = "$want" ] || { echo "exit status $got, expected $want"; return 1; }
+}
+says() { # says TEXT ARGS...
+    text=$1
+    shift
+    "$check" "$@" 2>&1 | grep -F -e "$text"
+}
+
+t "--help" says "Exit status: 0 all checks passed" --help
+t "--help names every option" sh -c '"$1" --help | grep -c -e --param= -e --only= -e --list -e --quiet -e --threads= -e --limit= | grep -qx 6' - "$check"
+t "--list names the checks" sh -c '[ "$("$1" --list | wc -l)" -ge 40 ]' - "$check"
+t "no criterion: 2" status 2
+t "unknown option: 2" status 2 --no-such-option null
+t "no such name: 2" status 2 no-such-criterion
+t "no such file: 2" status 2 ./no-such.so
+t "no such id: 2" status 2 "$BUILD/lib/lull/null.so:other"
+t "unknown check: 2" status 2 -o no-such-check null
+t "bad number: 2" status 2 -t 1 null
+t "-p without '=': 2" status 2 -p threshold halfbuf
+t "-p unknown key: 2" status 2 -p no-such=1 halfbuf
+t "-p unknown key is named" says no-such -p no-such=1 halfbuf
+t "-p bad value: 2" status 2 -p threshold=x halfbuf
+t "a file that is no library: 1" status 1 ./Makefile
+t "by name, from beside the program" status 0 -o table null
+t "by name, from LULL_PLUGIN_PATH" env LULL_PLUGIN_PATH="$BUILD/tests/abi/plugins" "$check" -q -o entry faulty
+t "by path and id" status 0 -o table "$BUILD/lib/lull/null.so:null"
+t "a library of two: both are checked" sh -c '[ "$("$1" "$2" | grep -c "^not ok .* create:")" = 2 ]' - "$check" "$BUILD/tests/abi/plugins/pair.so"
+t "-p reaches the criterion" says "first at 77 spp" -o requirements -p first-spp=77 halfbuf
+t "-q says little" sh -c '[ "$("$1" -q -o table null | wc -l)" = 2 ]' - "$check"
+t "TAP: a plan at the end" says "1..1" -o table null
+t "a limit that is too short fails the check" status 1 -L 1 -o shapes -p fault=30 "$BUILD/tests/abi/plugins/faulty.so"
+t "the correct test criterion" status 0 -q "$BUILD/tests/abi/plugins/faulty.so"
+for so in "$BUILD"/lib/lull/*.so; do
+    t "${so##*/} keeps the contract" status 0 -q "$so"
+done
+for so in build/asan/lib/lull/*.so; do
+    [ "$BUILD" = build ] && [ -x build/asan/bin/lull-check ] && [ -e "$so" ] || continue
+    t "${so##*/} keeps the contract under ASan and UBSan" build/asan/bin/lull-check -q "$so"
+done
+echo "1..$n"

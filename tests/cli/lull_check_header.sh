@@ -1,0 +1,58 @@
+#!/bin/sh
+# The ABI's header is clean C99 and C++11 with every compiler there is, has no padding, needs only stddef.h and stdint.h, and
+# makes a working criterion with nothing else; the version script leaves one symbol.
+tmp=$(mktemp -d) || exit 2
+trap 'rm -rf "$tmp"' EXIT
+n=0
+t() { # t NAME COMMAND...
+    n=$((n + 1)) name=$1
+    shift
+    if "$@" >"$tmp/log" 2>&1; then echo "ok $n - $name"; else
+        echo "not ok $n - $name"
+        tail -n 20 "$tmp/log" | sed 's/^/#   /'
+    fi
+}
+header=plugin-api/include/lull/criterion.h
+flags="-Wall -Wextra -Wpedantic -Wshadow -Wundef -Werror -fsyntax-only"
+for cc in gcc clang; do
+    command -v $cc >/dev/null 2>&1 || continue
+    # shellcheck disable=SC2086
+    t "$cc, C99, no padding" $cc -std=c99 $flags -Wpadded -xc $header
+    # shellcheck disable=SC2086
+    t "$cc, C99 without a C library" $cc -std=c99 -ffreestanding -nostdinc -isystem "$($cc -print-file-name=include)" $flags -xc $header
+done
+for cxx in g++ clang++; do
+    command -v $cxx >/dev/null 2>&1 || continue
+    # shellcheck disable=SC2086
+    t "$cxx, C++11, no padding" $cxx -std=c++11 $flags -Wold-style-cast -Wpadded -xc++ $header
+done
+t "includes stddef.h and stdint.h only" sh -c "[ \"\$(grep -c '^#include' $header)\" = 2 ]"
+t "declares one function" sh -c "[ \"\$(grep -c '^LULL_EXPORT' $header)\" = 1 ]"
+t "null.c builds as its comment says" sh -c "\${CC:-cc} -shared -fPIC -fvisibility=hidden -Wl,--version-script=plugin-api/plugin.map \
+    -Iplugin-api/include plugin-api/examples/null.c -o $tmp/null.so && nm -D --defined-only $tmp/null.so | awk '\$2 != \"A\"' | \
+    awk 'END { exit !(NR == 1 && \$3 == \"lull_criterion_entry_v1\") }'"
+t "and keeps the contract" "${BUILD:-build}/bin/lull-check" -q "$tmp/null.so"
+# a criterion in C++ against the same header
+cat >"$tmp/cxx.cc" <<'CXX'
+#include <lull/criterion.h>
+struct lull_instance { int unused; };
+static int32_t create(const lull_host *, const lull_pair *, uint32_t, uint32_t, lull_instance **i, lull_error *)
+{ static lull_instance one; *i = &one; return LULL_OK; }
+static int32_t requirements(const lull_instance *, lull_requirements *r, lull_error *) { r->first_spp = 1; return LULL_OK; }
+static int32_t begin(lull_instance *, const lull_frame *, lull_error *) { return LULL_OK; }
+static int32_t evaluate(lull_instance *, const lull_view *, const lull_block *, uint32_t, lull_decision *, uint32_t, uint32_t,
+                        lull_error *) { return LULL_OK; }
+static void end(lull_instance *) {}
+static const void *extension(const char *) { return nullptr; }
+static const lull_criterion c = {sizeof(lull_criterion), LULL_API_MINOR, "cxx", "cxx", "1", "cxx", nullptr, 0, 0,
+    LULL_THREADS_NONE, 0, create, requirements, begin, evaluate, end, end, extension};
+const lull_criterion *lull_criterion_entry_v1(uint32_t index) { return index == 0 ? &c : nullptr; }
+CXX
+t "a criterion in C++" sh -c "\${CXX:-c++} -std=c++11 -Wall -Wextra -Werror -shared -fPIC -fvisibility=hidden -Iplugin-api/include \
+    $tmp/cxx.cc -o $tmp/cxx.so && ${BUILD:-build}/bin/lull-check -q -o entry -o table -o symbols $tmp/cxx.so"
+# pkg-config, installed elsewhere
+t "pkg-config names the include and the criterion directory" sh -c "sed 's|@PREFIX@|/opt/x|g' plugin-api/lull-criterion.pc.in >$tmp/lull-criterion.pc &&
+    PKG_CONFIG_PATH=$tmp pkg-config --cflags lull-criterion | grep -qF -e -I/opt/x/include &&
+    [ \"\$(PKG_CONFIG_PATH=$tmp pkg-config --variable=criteriondir lull-criterion)\" = /opt/x/lib/lull ] &&
+    [ \"\$(PKG_CONFIG_PATH=$tmp pkg-config --modversion lull-criterion)\" = 1.0 ]"
+echo "1..$n"

@@ -1,0 +1,21 @@
+#!/bin/sh
+# Under ThreadSanitizer: the criteria that may be called concurrently have no race, and a race would be found.
+BUILD=${BUILD:-build/tsan}
+check=$BUILD/bin/lull-check n=0
+log=$(mktemp) || exit 2
+trap 'rm -f "$log"' EXIT
+for so in "$BUILD"/lib/lull/*.so "$BUILD/tests/abi/plugins/faulty.so"; do
+    n=$((n + 1))
+    if "$check" -q -o workers -o concurrent -o instances -o cancel "$so" >"$log" 2>&1; then echo "ok $n - ${so##*/}"; else
+        echo "not ok $n - ${so##*/}"
+        sed 's/^/#   /' "$log"
+    fi
+done
+n=$((n + 1))
+if "$check" -q -o concurrent -p fault=23 "$BUILD/tests/abi/plugins/faulty.so" >"$log" 2>&1 || ! grep -q "data race" "$log"; then
+    echo "not ok $n - a race is found"
+    sed 's/^/#   /' "$log"
+else
+    echo "ok $n - a race is found"
+fi
+echo "1..$n"
