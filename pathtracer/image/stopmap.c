@@ -43,7 +43,8 @@ static void put(const struct pt_canvas *c, int x, int y, const uint8_t rgb[3])
     memcpy(c->rgb + 3 * ((size_t)y * (size_t)c->width + (size_t)x), rgb, 3);
 }
 
-static void paint_block(const struct pt_canvas *canvas, int x0, int y0, int x1, int y1, uint64_t spp, double t)
+/* digits: of the longest number, so that all are written in the same size. */
+static void paint_block(const struct pt_canvas *canvas, int x0, int y0, int x1, int y1, uint64_t spp, double t, int digits)
 {
     uint8_t colour[3], edge[3];
     pt_viridis(t, colour);
@@ -56,7 +57,7 @@ static void paint_block(const struct pt_canvas *canvas, int x0, int y0, int x1, 
     int length = snprintf(text, sizeof text, "%llu", (unsigned long long)spp);
     for (int scale = 4; scale >= 1; scale--) {
         int w = (length * PT_FONT_WIDTH - 1) * scale, h = PT_FONT_HEIGHT * scale;
-        if (w * 5 > (x1 - x0) * 4 || h * 3 > (y1 - y0) * 2)
+        if ((digits * PT_FONT_WIDTH - 1) * scale * 5 > (x1 - x0) * 4 || h * 3 > (y1 - y0) * 2)
             continue;
         pt_font_draw(canvas, (x0 + x1 - w) / 2, (y0 + y1 - h) / 2, scale, ink(colour), text);
         break;
@@ -107,11 +108,13 @@ int pt_stopmap_draw(int x0, int y0, int x1, int y1, const struct pt_stopmap_bloc
     map.rgb = calloc((size_t)map.width * (size_t)map.height, 3);
     if (map.rgb == NULL)
         return pt_fail_nomem(err, "stop map");
+    char longest[24];
+    int digits = snprintf(longest, sizeof longest, "%llu", (unsigned long long)high);
     struct pt_canvas canvas = {.width = map.width, .height = map.height, .rgb = map.rgb};
     for (uint32_t i = 0; i < count; i++) {
         const struct pt_stopmap_block *b = &blocks[i];
         paint_block(&canvas, (b->x0 - x0) * enlarge, (b->y0 - y0) * enlarge, (b->x1 - x0) * enlarge, (b->y1 - y0) * enlarge,
-                    b->spp, scale_of(b->spp > 0 ? b->spp : 1, low, high));
+                    b->spp, scale_of(b->spp > 0 ? b->spp : 1, low, high), digits);
     }
     paint_legend(&canvas, (y1 - y0) * enlarge, low, high);
     *out = map;

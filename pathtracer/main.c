@@ -1,0 +1,430 @@
+#include <errno.h>
+#include <math.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <zlib.h>
+
+#include "base/clock.h"
+#include "base/fio.h"
+#include "cli.h"
+#include "render/checkpoint.h"
+#include "render/output.h"
+#include "render/progress.h"
+#include "render/render.h"
+#include "render/sequence.h"
+#include "scene/load.h"
+
+/* The criterion when none is named. */
+static const char DEFAULT_CRITERION[] = "halfbuf";
+
+enum { EXIT_FAILED = 1, EXIT_BAD_INPUT = 2, EXIT_INTERRUPTED = 130 };
+
+static volatile sig_atomic_t interrupt_seen;
+
+static void on_interrupt(int number)
+{
+    (void)number;
+    interrupt_seen = 1;
+}
+
+/* The first SIGINT asks for an end, a second one kills. */
+static void catch_interrupt(void)
+{
+    struct sigaction action = {.sa_handler = on_interrupt, .sa_flags = (int)SA_RESETHAND};
+    sigemptyset(&action.sa_mask);
+    sigaction(SIGINT, &action, NULL);
+}
+
+struct session {
+    struct pt_cli cli;
+    struct pt_threads *threads;
+    struct pt_scene *scene;
+    struct pt_scene_defaults defaults;
+    struct pt_criterion *criterion;
+    struct pt_render *render;
+    struct pt_progress progress;
+    pt_kernel *kernel;
+    const char *kernel_name;
+    char settings[4096];    /* what decides the image, for checkpoints */
+    double checkpoint_at_s; /* wall time of the next one */
+    char default_output[1024];
+};
+
+static void say(void *data, const char *line)
+{
+    struct session *s = data;
+    pt_progress_clear(&s->progress);
+    fprintf(stderr, "pathtracer: %s\n", line);
+}
+
+/* Notes are for people at the terminal; -q has none. */
+static void note(void *data, const char *line)
+{
+    struct session *s = data;
+    if (!s->cli.quiet)
+        say(data, line);
+}
+
+/* --- setting up ----------------------------------------------------------------------------------------------------- */
+
+static int load_scene(struct session *s, struct pt_err *err)
+{
+    struct pt_load_options options = {.strict = s->cli.strict, .width = s->cli.width, .height = s->cli.height,
+                                      .forced = s->cli.all_effects ? PT_FX_ALL : 0, .quiet = s->cli.quiet, .warn = note,
+                                      .warn_data = s};
+    int rc = pt_scene_load(s->cli.scene, &options, &s->scene, &s->defaults, err);
+    if (rc != PT_OK)
+        return rc;
+    s->kernel = pt_kernel_select(pt_scene_effects(s->scene), NULL, &s->kernel_name);
+    return PT_OK;
+}
+
+static void override_integrator(const struct pt_cli *cli, struct pt_integrator *i)
+{
+    i->seed = cli->seed;
+    if (cli->sampler >= 0)
+        i->sampler = cli->sampler;
+    if (cli->strategy >= 0)
+        i->strategy = cli->strategy;
+    if (cli->has_max_depth)
+        i->max_depth = cli->max_depth;
+    if (cli->filter >= 0) {
+        static const float usual_radius[3] = {0.5f, 1.0f, 1.5f};
+        i->filter = cli->filter;
+        i->filter_x = i->filter_y = cli->filter_radius > 0.0f ? cli->filter_radius : usual_radius[cli->filter];
+        i->filter_sigma = 0.5f;
+    }
+}
+
+static int make_config(const struct session *s, struct pt_render_config *config, struct pt_err *err)
+{
+    const struct pt_cli *cli = &s->cli;
+    *config = (struct pt_render_config){
+        .width = s->defaults.width,
+        .height = s->defaults.height,
+        .block_width = cli->block_width,
+        .block_height = cli->block_height,
+        .spp_min = cli->spp > 0 ? cli->spp : cli->spp_min,
+        .spp_max = cli->spp > 0 ? cli->spp : cli->spp_max,
+        .uniform = cli->spp > 0,
+        .time_budget_s = cli->time_budget_s,
+        .max_check_overhead = cli->max_check_overhead,
+        .max_seam = cli->max_seam,
+        .planes = cli->aov,
+        .integrator = s->defaults.integrator,
+        .order_seed = cli->order_seed,
+    };
+    memcpy(config->crop, cli->has_crop ? cli->crop : s->defaults.crop, sizeof config->crop);
+    override_integrator(cli, &config->integrator);
+    if (config->crop[2] > config->width || config->crop[3] > config->height)
+        return pt_fail(err, PT_EINVAL, "--crop %d,%d,%d,%d: the image has %dx%d pixels", config->crop[0], config->crop[1],
+                       config->crop[2], config->crop[3], config->width, config->height);
+    return PT_OK;
+}
+
+static int open_criterion(struct session *s, struct pt_err *err)
+{
+    const struct pt_cli *cli = &s->cli;
+    const char *spec = cli->criterion != NULL ? cli->criterion : DEFAULT_CRITERION;
+    if (cli->criterion == NULL && cli->spp > 0)
+        return PT_OK;
+    return pt_criterion_create(spec, cli->params, cli->param_count, s->threads, note, s, &s->criterion, err);
+}
+
+/* An output that cannot be written should not be found out after hours: its folder is looked at now. */
+static int check_folder(const char *path, struct pt_err *err)
+{
+    char folder[4096];
+    const char *slash = path != NULL ? strrchr(path, '/') : NULL;
+    if (path == NULL)
+        return PT_OK;
+    size_t n = slash == NULL ? 0 : slash == path ? 1 : (size_t)(slash - path);
+    if (n >= sizeof folder)
+        return pt_fail(err, PT_EINVAL, "%.64s...: the path is too long", path);
+    memcpy(folder, path, n);
+    folder[n] = '\0';
+    if (access(n > 0 ? folder : ".", W_OK | X_OK) != 0)
+        return pt_fail(err, PT_EINVAL, "%s: cannot write there: %s", path, strerror(errno));
+    return PT_OK;
+}
+
+static int check_outputs(struct session *s, struct pt_err *err)
+{
+    struct pt_cli *cli = &s->cli;
+    if (cli->output == NULL && cli->preview == NULL && cli->report == NULL && cli->stop_map_count == 0) {
+        const char *slash = strrchr(cli->scene, '/'), *name = slash != NULL ? slash + 1 : cli->scene;
+        const char *dot = strrchr(name, '.');
+        int n = dot != NULL ? (int)(dot - name) : (int)strlen(name);
+        if (n > (int)sizeof s->default_output - 8)
+            return pt_fail(err, PT_EINVAL, "%.64s...: the path is too long", cli->scene);
+        snprintf(s->default_output, sizeof s->default_output, "%.*s.exr", n, name);
+        cli->output = s->default_output;
+    }
+    const char *paths[] = {cli->output, cli->preview, cli->report, cli->checkpoint};
+    for (size_t i = 0; i < sizeof paths / sizeof paths[0]; i++)
+        if (check_folder(paths[i], err) != PT_OK)
+            return PT_EINVAL;
+    for (int i = 0; i < cli->stop_map_count; i++)
+        if (check_folder(cli->stop_maps[i], err) != PT_OK)
+            return PT_EINVAL;
+    return PT_OK;
+}
+
+/* CRC of the scene file itself; included files are not followed. */
+static int scene_crc(const char *path, uint32_t *crc, struct pt_err *err)
+{
+    char *data = NULL;
+    size_t size = 0;
+    int rc = pt_fio_read(path, (size_t)1 << 32, &data, &size, err);
+    if (rc == PT_OK)
+        *crc = (uint32_t)crc32_z(0, (const unsigned char *)data, size);
+    free(data);
+    return rc;
+}
+
+/* Everything that decides the bytes of the image, and nothing else. */
+static int describe_settings(struct session *s, const struct pt_render_config *c, struct pt_err *err)
+{
+    uint32_t crc = 0;
+    int rc = scene_crc(s->cli.scene, &crc, err);
+    if (rc != PT_OK)
+        return rc;
+    const struct pt_integrator *i = &c->integrator;
+    size_t room = sizeof s->settings, used = (size_t)snprintf(
+        s->settings, room,
+        "scene-crc=%08x\nsize=%dx%d\ncrop=%d,%d,%d,%d\nblock=%dx%d\nspp-min=%llu\nspp-max=%llu\nuniform=%d\nmax-seam=%g\n"
+        "aov=%u\nseed=%u\nsampler=%d\nintegrator=%d\nfilter=%d:%gx%g:%g\nmax-depth=%d\nrr-depth=%d\nclamp=%g\n",
+        crc, c->width, c->height, c->crop[0], c->crop[1], c->crop[2], c->crop[3], c->block_width, c->block_height,
+        (unsigned long long)c->spp_min, (unsigned long long)c->spp_max, c->uniform, c->max_seam, c->planes, i->seed, i->sampler,
+        i->strategy, i->filter, (double)i->filter_x, (double)i->filter_y, (double)i->filter_sigma, i->max_depth, i->rr_depth,
+        (double)i->max_component);
+    const struct lull_criterion *t = s->criterion != NULL ? pt_criterion_table(s->criterion) : NULL;
+    used += (size_t)snprintf(s->settings + used, room - used, "criterion=%s %s\n", t ? t->id : "none", t ? t->version : "");
+    for (uint32_t k = 0; k < s->cli.param_count && used < room; k++)
+        used += (size_t)snprintf(s->settings + used, room - used, "param=%s=%s\n", s->cli.params[k].key, s->cli.params[k].value);
+    return used < room ? PT_OK : pt_fail(err, PT_EINVAL, "the criterion's parameters are too long");
+}
+
+/* --- rendering ------------------------------------------------------------------------------------------------------ */
+
+static int after_slice(void *data, struct pt_render *render, struct pt_err *err)
+{
+    struct session *s = data;
+    pt_progress_update(&s->progress, render);
+    if (s->cli.checkpoint == NULL || pt_clock_wall_s() < s->checkpoint_at_s)
+        return PT_OK;
+    int rc = pt_checkpoint_save(s->cli.checkpoint, render, s->settings, err);
+    s->checkpoint_at_s = pt_clock_wall_s() + s->cli.checkpoint_every_s;
+    return rc;
+}
+
+static int on_suspend(void *data, struct pt_render *render, struct pt_err *err)
+{
+    struct session *s = data;
+    return s->cli.checkpoint != NULL ? pt_checkpoint_save(s->cli.checkpoint, render, s->settings, err) : PT_OK;
+}
+
+static int interrupted(void *data)
+{
+    (void)data;
+    return interrupt_seen != 0;
+}
+
+/* Writes what was asked for; goes on after a failure so that one full disk does not cost the other files. */
+static int write_outputs(struct session *s, int was_interrupted, struct pt_err *err)
+{
+    const struct pt_cli *cli = &s->cli;
+    struct pt_scene_stats stats = {0};
+    pt_scene_get_stats(s->scene, &stats);
+    struct pt_output_info info = {.scene = cli->scene, .params = cli->params, .param_count = cli->param_count,
+                                  .effects = pt_scene_effects(s->scene), .kernel = s->kernel_name,
+                                  .threads = pt_threads_count(s->threads), .reproducible = cli->reproducible, .aov = cli->aov,
+                                  .scene_bytes = stats.bytes, .interrupted = was_interrupted};
+    struct pt_err e = {0};
+    if (cli->output != NULL && pt_output_exr(cli->output, s->render, &info, &e) != PT_OK)
+        *err = e;
+    if (cli->preview != NULL && pt_output_preview(cli->preview, s->render, &e) != PT_OK)
+        *err = e;
+    for (int i = 0; i < cli->stop_map_count; i++)
+        if (pt_output_stop_map(cli->stop_maps[i], s->render, &info, &e) != PT_OK)
+            *err = e;
+    if (cli->report != NULL && pt_output_report(cli->report, s->render, &info, &e) != PT_OK)
+        *err = e;
+    return err->code;
+}
+
+static void tell_summary(struct session *s)
+{
+    const struct pt_render *r = s->render;
+    uint32_t by_reason[PT_REASON_COUNT] = {0};
+    for (uint32_t i = 0; i < r->blocks.count; i++)
+        by_reason[r->blocks.list[i].reason]++;
+    double pixels = (double)r->film.pixels;
+    char line[512];
+    size_t used = (size_t)snprintf(line, sizeof line, "%.0f spp on average, %.1f s, %.2f Mpaths/s, criterion %.1f %%; blocks:",
+                                   (double)r->totals.samples / pixels, pt_render_elapsed_s(r),
+                                   (double)r->totals.paths / fmax(r->totals.render_s, 1e-9) * 1e-6,
+                                   100.0 * r->totals.criterion_s / fmax(pt_render_elapsed_s(r), 1e-9));
+    for (int i = 0; i < PT_REASON_COUNT && used < sizeof line; i++)
+        if (by_reason[i] > 0)
+            used += (size_t)snprintf(line + used, sizeof line - used, " %u %s", by_reason[i], pt_block_reason_name(i));
+    note(s, line);
+    if (r->totals.dropped > 0) {
+        snprintf(line, sizeof line, "%llu samples were not finite and were dropped, the first seen at --debug-path %u,%u,%u",
+                 (unsigned long long)r->totals.dropped, r->dropped[0].x, r->dropped[0].y, r->dropped[0].sample);
+        say(s, line);
+    }
+}
+
+static int render_image(struct session *s, int *status, struct pt_err *err)
+{
+    struct pt_render_config config;
+    enum pt_render_outcome outcome;
+    int rc = make_config(s, &config, err);
+    if (rc != PT_OK || (rc = check_outputs(s, err)) != PT_OK || (rc = open_criterion(s, err)) != PT_OK ||
+        (rc = describe_settings(s, &config, err)) != PT_OK)
+        return rc;
+    rc = pt_render_create(&config, s->scene, s->kernel, s->threads, s->criterion, &s->render, err);
+    if (rc == PT_OK && s->cli.resume)
+        rc = pt_checkpoint_load(s->cli.checkpoint, s->render, s->settings, err);
+    if (rc != PT_OK) {
+        if (rc == PT_EIO)
+            rc = err->code = PT_EINVAL; /* the checkpoint is an input */
+        return rc;
+    }
+    struct pt_render_hooks hooks = {.slice = after_slice, .interrupted = interrupted, .suspend = on_suspend, .warn = say, .data = s};
+    s->checkpoint_at_s = pt_clock_wall_s() + s->cli.checkpoint_every_s;
+    rc = pt_render_run(s->render, &hooks, &outcome, err);
+    pt_progress_clear(&s->progress);
+    struct pt_err write_err = {0};
+    if (write_outputs(s, outcome == PT_RENDER_INTERRUPTED, &write_err) != PT_OK && rc == PT_OK) {
+        *err = write_err;
+        return err->code;
+    }
+    tell_summary(s);
+    *status = outcome == PT_RENDER_INTERRUPTED ? EXIT_INTERRUPTED : 0;
+    return rc;
+}
+
+/* --- other actions -------------------------------------------------------------------------------------------------- */
+
+static void explain(struct session *s)
+{
+    pt_effects covers = 0;
+    const char *name = "";
+    struct pt_scene_stats stats = {0};
+    pt_kernel_select(pt_scene_effects(s->scene), &covers, &name);
+    pt_scene_get_stats(s->scene, &stats);
+    printf("effects of %s:\n", s->cli.scene);
+    for (int i = 0; i < PT_FX_COUNT; i++) {
+        const struct pt_effect_reason *why = pt_scene_effect_reason(s->scene, i);
+        if (!(pt_scene_effects(s->scene) >> i & 1))
+            continue;
+        if (why != NULL && why->line > 0)
+            printf("  %-14s %s:%d\n", pt_effects_name(i), why->file, why->line);
+        else
+            printf("  %-14s %s\n", pt_effects_name(i), s->cli.all_effects ? "--effects=all" : "the scene as a whole");
+    }
+    printf("kernel: %s, compiled for", name);
+    for (int i = 0; i < PT_FX_COUNT; i++)
+        if (covers >> i & 1)
+            printf(" %s", pt_effects_name(i));
+    printf("%s\nscene: %lld triangles, %lld quadrics, %lld instances, %lld lights, %lld materials, %lld textures, %.1f MB\n",
+           covers == 0 ? " no effect" : "", stats.triangles, stats.quadrics, stats.instances, stats.lights, stats.materials,
+           stats.textures, (double)stats.bytes * 1e-6);
+}
+
+static void print_line(void *data, const char *text)
+{
+    (void)data;
+    puts(text);
+}
+
+static int debug_path(struct session *s, struct pt_err *err)
+{
+    struct pt_integrator integrator = s->defaults.integrator;
+    override_integrator(&s->cli, &integrator);
+    if (s->cli.debug_x >= (uint32_t)s->defaults.width || s->cli.debug_y >= (uint32_t)s->defaults.height)
+        return pt_fail(err, PT_EINVAL, "--debug-path %u,%u,%u: the image has %dx%d pixels", s->cli.debug_x, s->cli.debug_y,
+                       s->cli.debug_sample, s->defaults.width, s->defaults.height);
+    return pt_kernel_trace(s->scene, &integrator, s->cli.debug_x, s->cli.debug_y, s->cli.debug_sample, print_line, NULL);
+}
+
+static int record_sequence(struct session *s, int *status, struct pt_err *err)
+{
+    struct pt_sequence_config config = {.directory = s->cli.sequence, .levels = s->cli.levels, .blocks = s->cli.sequence_blocks,
+                                        .reference_spp = s->cli.reference_spp, .scene_path = s->cli.scene,
+                                        .name = s->cli.name, .quiet = s->cli.quiet};
+    int rc = make_config(s, &config.render, err);
+    if (rc == PT_OK)
+        rc = scene_crc(s->cli.scene, &config.scene_crc, err);
+    if (rc == PT_OK && s->cli.criterion != NULL)
+        rc = open_criterion(s, err);
+    if (rc != PT_OK)
+        return rc;
+    int was_interrupted = 0;
+    rc = pt_sequence_record(&config, s->scene, s->kernel, s->threads, s->criterion, interrupted, say, s, &was_interrupted, err);
+    *status = was_interrupted ? EXIT_INTERRUPTED : 0;
+    return rc;
+}
+
+static int run(struct session *s, int *status, struct pt_err *err)
+{
+    if (s->cli.action == PT_CLI_LIST_CRITERIA) {
+        if (pt_criterion_list(stdout, note, s) == 0)
+            return pt_fail(err, PT_EINVAL, "no criterion was found (LULL_PLUGIN_PATH names more folders to look in)");
+        return PT_OK;
+    }
+    s->threads = pt_threads_create(s->cli.threads > 0 ? s->cli.threads : pt_threads_available(), err);
+    if (s->threads == NULL)
+        return PT_ENOMEM;
+    int rc = load_scene(s, err);
+    if (rc != PT_OK) {
+        if (rc == PT_EIO)
+            rc = err->code = PT_EINVAL; /* the scene and its files are inputs */
+        return rc;
+    }
+    catch_interrupt();
+    switch (s->cli.action) {
+    case PT_CLI_EXPLAIN:
+        explain(s);
+        return PT_OK;
+    case PT_CLI_DEBUG_PATH:
+        return debug_path(s, err);
+    case PT_CLI_SEQUENCE:
+        return record_sequence(s, status, err);
+    default:
+        return render_image(s, status, err);
+    }
+}
+
+int main(int argc, char **argv)
+{
+    static struct session s;
+    struct pt_err err = {0};
+    int status = 0;
+    int rc = pt_cli_parse(&s.cli, argc, argv, &err);
+    if (rc == PT_OK) {
+        pt_progress_init(&s.progress, s.cli.quiet ? NULL : stderr);
+        rc = run(&s, &status, &err);
+    }
+    if (rc != PT_OK) {
+        pt_progress_clear(&s.progress);
+        fprintf(stderr, "pathtracer: %s\n", err.text);
+        status = rc == PT_EINVAL ? EXIT_BAD_INPUT : EXIT_FAILED;
+    }
+    pt_render_destroy(s.render);
+    pt_criterion_destroy(s.criterion);
+    pt_scene_destroy(s.scene);
+    pt_threads_destroy(s.threads);
+    pt_cli_release(&s.cli);
+    if ((fflush(stdout) != 0 || ferror(stdout)) && status == 0) {
+        fprintf(stderr, "pathtracer: cannot write standard output\n");
+        status = EXIT_FAILED;
+    }
+    return status;
+}

@@ -1,0 +1,209 @@
+#!/bin/sh
+# The command line of pathtracer: every option, every error, interrupting and going on.
+set -u
+here=$(cd "$(dirname "$0")" && pwd)
+P=$(cd "${BUILD:-build}" && pwd)/bin/pathtracer
+scene=$here/room.pbrt
+dir=$(mktemp -d) || exit 2
+trap 'rm -rf "$dir"' EXIT
+cd "$dir" || exit 2
+n=0 bad=0
+unset LULL_PLUGIN_PATH
+
+t() { # t DESCRIPTION COMMAND...: passes when the command succeeds
+    n=$((n + 1)); what=$1; shift
+    if "$@" >log 2>&1; then echo "ok $n - $what"; else echo "not ok $n - $what"; sed 's/^/# /' log; bad=1; fi
+}
+refused() { # refused TEXT ARGUMENTS...: exit status 2, one line on stderr that contains TEXT, nothing left behind
+    n=$((n + 1)); text=$1; shift
+    before=$(ls -A)
+    "$P" "$@" >out 2>err; status=$?
+    rm -f out
+    lines=$(wc -l <err)
+    if [ $status -eq 2 ] && [ "$lines" -eq 1 ] && grep -qF -- "$text" err; then echo "ok $n - refused: $*"
+    else echo "not ok $n - refused: $* (status $status)"; sed 's/^/# /' err; bad=1; fi
+    rm -f err
+    [ "$before" = "$(ls -A)" ] || { n=$((n + 1)); bad=1; echo "not ok $n - left files behind: $*"; }
+}
+layers() { oiiotool --info -v "$1" | grep -F 'channel list' | grep -qF "$2"; }
+same() { cmp "$1" "$2"; }
+differ() { ! cmp -s "$1" "$2"; }
+spp_of() { tr ';' '\n' <"$1" | sed -n '2,$p' | grep . | sort -n | uniq | tr '\n' ' '; }
+
+# --- help and lists ---
+t "--help" sh -c "$P --help | grep -q -- --time-budget"
+t "--usage" sh -c "$P --usage | grep -q -- --criterion"
+t "--version" sh -c "$P --version | grep -q 1.0"
+t "--list-criteria names criteria and parameters" sh -c "$P --list-criteria | grep -q '^halfbuf ' && $P --list-criteria | grep -q -- '-p threshold='"
+
+# --- errors: one line, exit 2, nothing left behind ---
+refused "a scene file is needed"
+refused "No such file" nowhere.pbrt -q
+refused "unknown option" "$scene" --nonsense
+refused "its value is missing" "$scene" --seed
+refused "one scene at a time" "$scene" "$scene"
+printf 'Camera "perspective"\nWorldBegin\nShape "sphere" "float radius" [oops]\n' >broken.pbrt
+refused "broken.pbrt:3" broken.pbrt -q -o a.exr
+refused "--block 0" "$scene" --block 0
+refused "--block 3y4" "$scene" --block 3y4
+refused "--spp 0" "$scene" --spp 0
+refused "--spp 1e3" "$scene" --spp 1e3
+refused "--spp-min" "$scene" --spp-min -4
+refused "--spp-max" "$scene" --spp-max 99999999999
+refused "is above --spp-max" "$scene" --spp-min 100 --spp-max 50
+refused "leave out --spp-min" "$scene" --spp 10 --spp-max 50
+refused "--time-budget" "$scene" --time-budget soon
+refused "--time-budget" "$scene" --time-budget -1
+refused "--time-budget" "$scene" --time-budget nan
+refused "--max-check-overhead" "$scene" --max-check-overhead 2
+refused "--max-seam" "$scene" --max-seam 0.5
+refused "--size" "$scene" --size 100
+refused "--size" "$scene" --size 0x100
+refused "--size" "$scene" --size 100x100000000
+refused "--crop" "$scene" --crop 1,2,3
+refused "X0 < X1" "$scene" --crop 5,5,5,9
+refused "64x48" "$scene" --crop 0,0,100,10 -q
+refused "--sampler" "$scene" --sampler halton
+refused "--integrator" "$scene" --integrator magic
+refused "--max-depth" "$scene" --max-depth deep
+refused "--filter" "$scene" --filter sinc
+refused "--filter" "$scene" --filter box:0
+refused "--seed" "$scene" --seed -1
+refused "--effects" "$scene" --effects none
+refused "--threads" "$scene" --threads 0
+refused "ends in .exr" "$scene" -o a.png
+refused "ends in .png" "$scene" --preview a.exr
+refused "ends in .json" "$scene" --report a.txt
+refused ".png or .csv" "$scene" --stop-map a.exr
+refused "--aov" "$scene" --aov albedo,beauty
+refused "cannot write there" "$scene" -q -o nowhere/a.exr
+refused "cannot write there" "$scene" -q --report nowhere/a.json
+refused "cannot write there" "$scene" -q --stop-map nowhere/a.csv
+refused "cannot write there" "$scene" -q --checkpoint nowhere/a.ckp
+refused "nosuch" "$scene" -q -c nosuch
+refused "nosuch.so" "$scene" -q -c ./nosuch.so
+refused "'nope'" "$scene" -q -c halfbuf -p nope=1
+refused "threshold" "$scene" -q -c halfbuf -p threshold=-1
+refused "KEY=VALUE" "$scene" -p threshold
+refused "no criterion is used" "$scene" --spp 4 -p threshold=1
+refused "--resume needs" "$scene" --resume
+refused "--checkpoint-every" "$scene" --checkpoint-every x
+refused "--debug-path" "$scene" --debug-path 1,2
+refused "64x48" "$scene" -q --debug-path 64,0,0
+refused "belong to --sequence" "$scene" --levels linear:1:2:1
+refused "goes with neither" "$scene" --sequence s --spp 4
+refused "--levels" "$scene" -q --sequence s --levels cubic:1:2:3
+refused "--blocks" "$scene" -q --sequence s --blocks 99
+refused "square blocks" "$scene" -q --sequence s --block 16x8
+
+# --- what is written ---
+common="$scene -q --block 16 -c fixed -p spp=40 --spp-min 8 --reproducible"
+t "all outputs at once" "$P" $common -o a.exr --preview a.png --stop-map a.csv --stop-map s.png --report r.json --aov albedo,normal,depth
+t "EXR layers by name" layers a.exr "B, G, R, albedo.B"
+t "EXR layers of Lull" sh -c "oiiotool --info -v a.exr | grep -q 'lull.error, lull.p_noisy, lull.reason, lull.spp'"
+t "EXR header by exrheader" sh -c "exrheader a.exr | grep -q 'lull:criterion.*fixed.*spp=40'"
+t "EXR has no NaN in RGB" sh -c "oiiotool a.exr --ch R,G,B --printstats | grep -q 'NanCount: 0 0 0'"
+t "preview is 64x48 RGB" sh -c "oiiotool --info a.png | grep -q '64 x *48, 3 channel'"
+t "stop map is a picture" sh -c "oiiotool --info s.png | grep -q '3 channel, uint8 png'"
+t "table: every block at 40" test "$(cat a.csv)" = "room;40;40;40;40;40;40;40;40;40;40;40;40;"
+t "report is JSON with totals" sh -c "grep -q '\"samples\":[[:space:]]*122880,' r.json && grep -q '\"reason\":[[:space:]]*\"criterion\"' r.json"
+t "-q is silent" test -z "$("$P" $common -o q.exr 2>&1)"
+t "a summary without -q" sh -c "$P $scene --spp 2 -o q.exr 2>&1 | grep -q 'spp on average'"
+t "default output is named after the scene" sh -c "$P $scene -q --spp 1 && test -s room.exr"
+t "no temporaries left" test -z "$(ls -A | grep tmp)"
+
+# --- what decides the image ---
+for threads in 1 2 3 8; do "$P" $common --threads $threads -o t$threads.exr; done
+t "same bytes for 1 and 2 threads" same t1.exr t2.exr
+t "same bytes for 1 and 3 threads" same t1.exr t3.exr
+t "same bytes for 1 and 8 threads" same t1.exr t8.exr
+"$P" $common --order-seed 5 -o order.exr
+t "same bytes for another order of blocks" same t1.exr order.exr
+"$P" "$scene" -q --spp 8 -o plain.exr --reproducible
+"$P" "$scene" -q --spp 8 -o general.exr --reproducible --effects all
+t "--effects all: the same pixels" sh -c "oiiotool --fail 0 --warn 0 plain.exr general.exr --diff"
+"$P" "$scene" -q --spp 8 --seed 2 -o other.exr
+t "another seed is another image" sh -c "! oiiotool --fail 0 plain.exr other.exr --diff"
+"$P" "$scene" -q --spp 8 --sampler sobol -o sobol.exr
+t "--sampler sobol is another image" sh -c "! oiiotool --fail 0 plain.exr sobol.exr --diff"
+"$P" "$scene" -q --spp 8 --max-depth 1 -o shallow.exr
+t "--max-depth 1 is another image" sh -c "! oiiotool --fail 0 plain.exr shallow.exr --diff"
+"$P" "$scene" -q --spp 8 --filter triangle:2 -o soft.exr
+t "--filter is another image" sh -c "! oiiotool --fail 0 plain.exr soft.exr --diff"
+"$P" "$scene" -q --spp 400 -o mis.exr --size 16x12
+"$P" "$scene" -q --spp 4000 -o brute.exr --size 16x12 --integrator bsdf-only
+t "--integrator bsdf-only has the same mean" sh -c "a=\$(oiiotool mis.exr --ch R --printstats | awk '/Avg/{print \$3}'); b=\$(oiiotool brute.exr --ch R --printstats | awk '/Avg/{print \$3}'); echo \$a \$b | awk '{exit !(\$1 > 0.01 && \$1/\$2 > 0.93 && \$1/\$2 < 1.07)}'"
+t "--size" sh -c "oiiotool --info brute.exr | grep -q '16 x *12'"
+"$P" $common --crop 20,10,40,30 -o crop.exr --stop-map crop.csv
+t "--crop keeps the pixels" sh -c "oiiotool t1.exr --ch R,G,B,lull.spp --cut 20x20+20+10 --origin +0+0 -o c1.exr && oiiotool crop.exr --ch R,G,B,lull.spp --cut 20x20+20+10 --origin +0+0 -o c2.exr && oiiotool --fail 0 --warn 0 c1.exr c2.exr --diff"
+t "--crop keeps the thresholds" test "$(spp_of crop.csv)" = "40 "
+"$P" "$scene" -q --block 16 -c halfbuf -p threshold=0.02 --spp-max 600 --stop-map whole.csv --max-seam 1.5
+"$P" "$scene" -q --block 16 -c halfbuf -p threshold=0.02 --spp-max 600 --stop-map part.csv --crop 0,0,16,16
+t "halfbuf: blocks differ" test "$(spp_of whole.csv | wc -w)" -gt 1
+"$P" "$scene" -q --block 16 -c null --spp-max 9 --spp-min 3 --stop-map null.csv --report null.json
+t "--spp-max ends null" test "$(spp_of null.csv)" = "9 "
+t "the reason is spp-max" grep -q '"spp-max"' null.json
+"$P" "$scene" -q --spp 5 --stop-map five.csv --report five.json
+t "--spp is uniform" test "$(spp_of five.csv)" = "5 "
+t "--spp without criterion: null in the report" grep -q '"criterion":[[:space:]]*null' five.json
+"$P" "$scene" -q --spp 5 -c halfbuf --report asked.json
+t "--spp asks a criterion once" sh -c "grep -q '\"checks\":[[:space:]]*1,' asked.json"
+mkdir plugins && cp "$(dirname "$P")/../lib/lull/fixed.so" plugins/mine.so
+t "a criterion by path" "$P" "$scene" -q -c ./plugins/mine.so -p spp=3 --spp-min 1 --stop-map path.csv
+t "  …and it decided" test "$(spp_of path.csv)" = "3 "
+t "a criterion by path and id" "$P" "$scene" -q -c plugins/mine.so:fixed -p spp=3 --spp-min 1 --stop-map path.csv
+t "LULL_PLUGIN_PATH" env LULL_PLUGIN_PATH="$dir/plugins" "$P" "$scene" -q -c mine -p spp=3 --spp-min 1 --stop-map path.csv
+t "--max-check-overhead" "$P" "$scene" -q -c halfbuf --max-check-overhead 0.01 --spp-max 100 --stop-map o.csv
+
+# --- looking inside ---
+t "--explain tells effects and kernel" sh -c "$P $scene --explain | grep -q '^kernel: '"
+t "--explain names the line" sh -c "$P $scene --explain | grep -q 'quadric.*room.pbrt:'"
+t "--debug-path tells the path" sh -c "test \$($P $scene --debug-path 30,20,1 | wc -l) -ge 2"
+
+# --- time, interrupt, checkpoint ---
+long="$scene -q --size 128x96 --block 32 -c null --spp-min 4 --spp-max 400 --reproducible --threads 2"
+start=$(date +%s)
+t "--time-budget" "$P" "$scene" -q -c null --spp-max 100000000 --time-budget 1 --report time.json -o time.exr
+t "  …ends in time" test $(($(date +%s) - start)) -le 5
+t "  …and says so" grep -q '"reason":[[:space:]]*"time"' time.json
+"$P" $long -o full.exr
+"$P" $long --spp-max 1000000 -o int.exr --report int.json --preview int.png --stop-map int.csv 2>err &
+pid=$!
+sleep 1
+kill -INT $pid
+wait $pid
+t "SIGINT: exit status 130" test $? -eq 130
+t "  …everything is written" test -s int.exr -a -s int.json -a -s int.png -a -s int.csv
+t "  …and the report says so" sh -c "grep -q '\"interrupt\"' int.json && grep -q '\"interrupted\":[[:space:]]*true' int.json"
+t "stopped by time, with a checkpoint" "$P" $long --time-budget 0.3 --checkpoint c.ckp -o part.exr
+t "resumed, stopped again" "$P" $long --time-budget 0.6 --checkpoint c.ckp --resume -o part.exr --threads 3
+t "resumed and finished" "$P" $long --checkpoint c.ckp --resume -o part.exr
+t "the resumed image is the uninterrupted one, byte for byte" same full.exr part.exr
+t "--checkpoint-every" "$P" $long --checkpoint d.ckp --checkpoint-every 0.1 -o part.exr
+t "  …wrote one" test -s d.ckp
+refused "seed=" $long --checkpoint c.ckp --resume -o part2.exr --seed 9
+refused "criterion=" "$scene" -q --size 128x96 --block 32 -c fixed --spp-min 4 --spp-max 400 --checkpoint c.ckp --resume
+head -c 5000 c.ckp >short.ckp
+refused "damaged or cut off" $long --checkpoint short.ckp --resume
+cp c.ckp flip.ckp && printf 'X' | dd of=flip.ckp bs=1 seek=3000 conv=notrunc 2>/dev/null
+refused "damaged or cut off" $long --checkpoint flip.ckp --resume
+refused "not a checkpoint" $long --checkpoint "$scene" --resume
+refused "No such file" $long --checkpoint none.ckp --resume
+
+# --- progress ---
+"$P" "$scene" --size 128x96 -c null --spp-max 100000000 --time-budget 3 -o p.exr 2>progress
+t "plain progress lines when not a terminal" grep -q 'blocks active.*Mpaths/s.*ETA' progress
+t "  …without control characters" sh -c "! grep -q '[[:cntrl:]]' progress"
+
+# --- sequences ---
+seq="$scene -q --block 16 --levels linear:8:32:8 --blocks 0,5-6 --reference-spp 64 -c halfbuf"
+t "--sequence" "$P" $seq --sequence seq --name rooms/view4
+t "  …manifest" sh -c "grep -q '\"camera\":[[:space:]]*\"view4\"' seq/manifest.json && test \$(ls seq/*.lseq | wc -l) -eq 3"
+cp seq/block-00005.lseq five.lseq && rm seq/block-00005.lseq
+t "  …goes on where files are missing" "$P" $seq --sequence seq --name rooms/view4
+t "  …refuses nothing that is the same" test -s seq/block-00005.lseq
+refused "begun with another" $seq --sequence seq --name rooms/view4 --seed 3
+t "  …no temporaries" test -z "$(ls -A seq | grep tmp)"
+
+echo "1..$n"
+exit $bad
