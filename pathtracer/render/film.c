@@ -76,46 +76,6 @@ int pt_film_list_arrays(const struct pt_film *film, struct pt_film_array out[PT_
     return n;
 }
 
-void pt_film_load(const struct pt_film *f, size_t i, struct pt_film_pixel *p)
-{
-    *p = (struct pt_film_pixel){.dropped = f->dropped[i]};
-    memcpy(p->color, f->color + 3 * i, sizeof p->color);
-    if (f->planes & PT_FILM_HALF) {
-        memcpy(p->half, f->half + 3 * i, sizeof p->half);
-        p->dropped_half = f->dropped_half[i];
-    }
-    if (f->planes & PT_FILM_MOMENT2)
-        p->moment2 = f->moment2[i];
-    if (f->planes & PT_FILM_ALBEDO)
-        memcpy(p->albedo, f->albedo + 3 * i, sizeof p->albedo);
-    if (f->planes & PT_FILM_NORMAL)
-        memcpy(p->normal, f->normal + 3 * i, sizeof p->normal);
-    if (f->planes & PT_FILM_DEPTH) {
-        p->depth = f->depth[i];
-        p->depth_hits = f->depth_hits[i];
-    }
-}
-
-void pt_film_store(struct pt_film *f, size_t i, const struct pt_film_pixel *p)
-{
-    f->dropped[i] = p->dropped;
-    memcpy(f->color + 3 * i, p->color, sizeof p->color);
-    if (f->planes & PT_FILM_HALF) {
-        memcpy(f->half + 3 * i, p->half, sizeof p->half);
-        f->dropped_half[i] = p->dropped_half;
-    }
-    if (f->planes & PT_FILM_MOMENT2)
-        f->moment2[i] = p->moment2;
-    if (f->planes & PT_FILM_ALBEDO)
-        memcpy(f->albedo + 3 * i, p->albedo, sizeof p->albedo);
-    if (f->planes & PT_FILM_NORMAL)
-        memcpy(f->normal + 3 * i, p->normal, sizeof p->normal);
-    if (f->planes & PT_FILM_DEPTH) {
-        f->depth[i] = p->depth;
-        f->depth_hits[i] = p->depth_hits;
-    }
-}
-
 static void mean_of(const double *sum, uint64_t spp, uint32_t dropped, double rgb[3])
 {
     double n = spp > dropped ? (double)(spp - dropped) : 0.0;

@@ -10,6 +10,7 @@
 
 #include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 
 #include "base/err.h"
 #include "base/vec.h"
@@ -73,8 +74,54 @@ static inline uint64_t pt_film_half_spp(uint64_t spp)
     return spp / 2 + (spp & 1 && pt_film_in_half((uint32_t)(spp - 1)));
 }
 
-void pt_film_load(const struct pt_film *film, size_t index, struct pt_film_pixel *pixel);
-void pt_film_store(struct pt_film *film, size_t index, const struct pt_film_pixel *pixel);
+/* A pixel out of the film and back. Fields of planes that the film does not have are not set by the one and not read by the
+ * other (the auxiliary ones are zero, because pt_film_add sums all of them as soon as one is wanted). */
+static inline void pt_film_load(const struct pt_film *f, size_t i, struct pt_film_pixel *p)
+{
+    memcpy(p->color, f->color + 3 * i, sizeof p->color);
+    p->dropped = f->dropped[i];
+    p->dropped_half = 0;
+    if (f->planes & PT_FILM_HALF) {
+        memcpy(p->half, f->half + 3 * i, sizeof p->half);
+        p->dropped_half = f->dropped_half[i];
+    }
+    if (f->planes & PT_FILM_MOMENT2)
+        p->moment2 = f->moment2[i];
+    if (!(f->planes & PT_FILM_AUX))
+        return;
+    memset(p->albedo, 0, sizeof p->albedo);
+    memset(p->normal, 0, sizeof p->normal);
+    p->depth = 0.0;
+    p->depth_hits = 0;
+    if (f->planes & PT_FILM_ALBEDO)
+        memcpy(p->albedo, f->albedo + 3 * i, sizeof p->albedo);
+    if (f->planes & PT_FILM_NORMAL)
+        memcpy(p->normal, f->normal + 3 * i, sizeof p->normal);
+    if (f->planes & PT_FILM_DEPTH) {
+        p->depth = f->depth[i];
+        p->depth_hits = f->depth_hits[i];
+    }
+}
+
+static inline void pt_film_store(struct pt_film *f, size_t i, const struct pt_film_pixel *p)
+{
+    memcpy(f->color + 3 * i, p->color, sizeof p->color);
+    f->dropped[i] = p->dropped;
+    if (f->planes & PT_FILM_HALF) {
+        memcpy(f->half + 3 * i, p->half, sizeof p->half);
+        f->dropped_half[i] = p->dropped_half;
+    }
+    if (f->planes & PT_FILM_MOMENT2)
+        f->moment2[i] = p->moment2;
+    if (f->planes & PT_FILM_ALBEDO)
+        memcpy(f->albedo + 3 * i, p->albedo, sizeof p->albedo);
+    if (f->planes & PT_FILM_NORMAL)
+        memcpy(f->normal + 3 * i, p->normal, sizeof p->normal);
+    if (f->planes & PT_FILM_DEPTH) {
+        f->depth[i] = p->depth;
+        f->depth_hits[i] = p->depth_hits;
+    }
+}
 
 /* Adds one sample. Returns 0 when it was dropped. */
 static inline int pt_film_add(struct pt_film_pixel *p, uint32_t planes, uint32_t sample, const struct pt_path_result *r)
