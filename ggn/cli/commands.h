@@ -14,6 +14,7 @@
 
 /* X(name, one-line help), in the order `ggn --help` lists them. */
 #define GGN_COMMANDS(X) \
+    X(bench, "measure inference and training speed") \
     X(golden, "print the golden values of the published networks as JSON") \
     X(flip, "visible difference of two images (LDR-FLIP)") \
     X(compare, "stop maps or thresholds against (human) thresholds") \

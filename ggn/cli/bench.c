@@ -1,0 +1,273 @@
+/* `ggn bench`: how fast the networks run on this machine, per layer and as medians. */
+#include <argp.h>
+#include <cblas.h>
+#include <cjson/cJSON.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "cli/commands.h"
+#include "model/trainer.h"
+
+enum { KEY_JSON = 256, KEY_THREADS, KEY_ROUNDS, KEY_BATCH, MAX_ROUNDS = 101, SGEMM_N = 768 };
+
+struct options {
+    int json, threads, rounds, batch;
+};
+
+struct bench {
+    struct options o;
+    struct ggn_threads *threads;
+    struct ggn_trainer_f32 *trainer;
+    struct ggn_exec_f32 *r, *m, *d; /* inference */
+    float *planes;                  /* random pictures */
+    const float *noisy[64 * 18], *reference[64 * 3];
+};
+
+enum { DENOISER, GENERATOR, DISCRIMINATOR, DECISION, DENOISER_TRAIN, GENERATOR_TRAIN, TRAIN_SAMPLE, SGEMM, N_FIGURES };
+
+static const char *const figure_name[N_FIGURES] = {
+    "denoiser_forward_ms", "generator_forward_ms", "discriminator_forward_ms", "decision_ms",
+    "denoiser_train_ms",   "generator_train_ms",   "train_sample_ms",          "sgemm_gflops",
+};
+
+static error_t parse(int key, char *arg, struct argp_state *state)
+{
+    struct options *o = state->input;
+    int value = arg ? atoi(arg) : 0;
+
+    switch (key) {
+    case KEY_JSON:
+        o->json = 1;
+        return 0;
+    case KEY_THREADS:
+        if (value < 1 || value > 1024)
+            argp_error(state, "--threads must be in 1..1024");
+        o->threads = value;
+        return 0;
+    case KEY_ROUNDS:
+        if (value < 1 || value > MAX_ROUNDS)
+            argp_error(state, "--rounds must be in 1..%d", MAX_ROUNDS);
+        o->rounds = value;
+        return 0;
+    case KEY_BATCH:
+        if (value < 1 || value > 64)
+            argp_error(state, "--batch must be in 1..64");
+        o->batch = value;
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static int setup(struct bench *b, struct ggn_err *err)
+{
+    struct ggn_hyper hyper = ggn_hyper_default(GGN_PRESET_LULL);
+    struct ggn_train_options options = ggn_train_options_default(GGN_PRESET_LULL);
+    enum { AREA = 200 * 200, PLANES = 21 };
+
+    options.batch = b->o.batch;
+    b->threads = ggn_threads_create(b->o.threads, err);
+    b->trainer = b->threads ? ggn_trainer_create_f32(&hyper, &options, b->threads, err) : NULL;
+    if (!b->trainer)
+        return GGN_ENOMEM;
+    b->r = ggn_exec_create_f32(&b->trainer->graph[GGN_NET_R], NULL, 1, 0, b->threads, err);
+    b->m = ggn_exec_create_f32(&b->trainer->graph[GGN_NET_M], NULL, 1, 0, b->threads, err);
+    b->d = ggn_exec_create_f32(&b->trainer->graph[GGN_NET_D], NULL, 1, 0, b->threads, err);
+    b->planes = malloc((size_t)b->o.batch * PLANES * AREA * sizeof *b->planes);
+    if (!b->r || !b->m || !b->d || !b->planes)
+        return ggn_fail_nomem(err, "bench");
+    for (int i = 0; i < b->o.batch; i++)
+        for (int c = 0; c < PLANES; c++) {
+            float *plane = b->planes + (size_t)(i * PLANES + c) * AREA;
+            for (int k = 0; k < AREA; k++)
+                plane[k] = (float)ggn_hash_unit((uint32_t)k, (uint32_t)(i * PLANES + c));
+            *(c < 18 ? &b->noisy[i * 18 + c] : &b->reference[i * 3 + c - 18]) = plane;
+        }
+    for (int c = 0; c < 18; c++)
+        for (int y = 0; y < 200; y++) {
+            memcpy(ggn_exec_plane_f32(b->m, 0, 0, c) + (long)y * 201, b->noisy[c] + y * 200, 200 * sizeof(float));
+            if (c < 3)
+                memcpy(ggn_exec_plane_f32(b->r, 0, 0, c) + (long)y * 201, b->noisy[c] + y * 200, 200 * sizeof(float));
+            if (c < 2)
+                memcpy(ggn_exec_plane_f32(b->d, 0, 0, c) + (long)y * 201, b->noisy[c] + y * 200, 200 * sizeof(float));
+        }
+    return GGN_OK;
+}
+
+static void release(struct bench *b)
+{
+    ggn_exec_destroy_f32(b->r);
+    ggn_exec_destroy_f32(b->m);
+    ggn_exec_destroy_f32(b->d);
+    ggn_trainer_destroy_f32(b->trainer);
+    ggn_threads_destroy(b->threads);
+    free(b->planes);
+}
+
+static double forward_ms(struct bench *b, struct ggn_exec_f32 *e, int net)
+{
+    double start = ggn_clock_wall_s();
+    ggn_exec_forward_f32(e, b->trainer->weights[net], 1, GGN_EVAL);
+    return 1e3 * (ggn_clock_wall_s() - start);
+}
+
+static double denoiser_train_ms(struct bench *b, struct ggn_err *err)
+{
+    double loss, start = ggn_clock_wall_s();
+    const float *x[64 * 3];
+
+    for (int i = 0; i < 3 * b->o.batch; i++)
+        x[i] = b->noisy[i / 3 * 18 + i % 3];
+    if (ggn_trainer_denoiser_step_f32(b->trainer, x, b->reference, b->o.batch, &loss, err))
+        return 0;
+    return 1e3 * (ggn_clock_wall_s() - start) / b->o.batch;
+}
+
+/* Generator and discriminator on both windows of each sample. */
+static double judge_train_ms(struct bench *b, struct ggn_err *err)
+{
+    double label[64], bce, start = ggn_clock_wall_s();
+    struct ggn_batch_f32 batch = {.count = b->o.batch, .noisy = b->noisy, .denoised = b->noisy, .label = label};
+
+    for (int i = 0; i < b->o.batch; i++)
+        label[i] = i & 1;
+    if (ggn_trainer_judge_step_f32(b->trainer, &batch, &bce, NULL, err))
+        return 0;
+    return 1e3 * (ggn_clock_wall_s() - start) / b->o.batch;
+}
+
+static double generator_train_ms(struct bench *b)
+{
+    struct ggn_exec_f32 *m = b->trainer->m;
+    double start = ggn_clock_wall_s();
+
+    ggn_exec_forward_f32(m, b->trainer->weights[GGN_NET_M], b->o.batch, GGN_TRAIN);
+    ggn_exec_backward_f32(m, b->trainer->weights[GGN_NET_M], b->trainer->grad[GGN_NET_M]);
+    return 1e3 * (ggn_clock_wall_s() - start) / b->o.batch;
+}
+
+static double sgemm_gflops(const struct bench *b, float *memory)
+{
+    float *x = memory, *y = x + SGEMM_N * SGEMM_N, *z = y + SGEMM_N * SGEMM_N;
+
+    openblas_set_num_threads(b->o.threads);
+    double start = ggn_clock_wall_s();
+    cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, SGEMM_N, SGEMM_N, SGEMM_N, 1, x, SGEMM_N, y, SGEMM_N, 0, z, SGEMM_N);
+    double elapsed = ggn_clock_wall_s() - start;
+    openblas_set_num_threads(1);
+    return 2e-9 * SGEMM_N * SGEMM_N * SGEMM_N / elapsed;
+}
+
+static int compare(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static double median(double *value, int n)
+{
+    qsort(value, (size_t)n, sizeof *value, compare);
+    return n % 2 ? value[n / 2] : (value[n / 2 - 1] + value[n / 2]) / 2;
+}
+
+static int measure(struct bench *b, double figure[N_FIGURES], struct ggn_err *err)
+{
+    double sample[N_FIGURES][MAX_ROUNDS];
+    float *gemm = calloc((size_t)3 * SGEMM_N * SGEMM_N, sizeof *gemm);
+
+    if (!gemm)
+        return ggn_fail_nomem(err, "sgemm");
+    for (int i = -1; i < b->o.rounds; i++) { /* round −1 warms up */
+        int k = i < 0 ? 0 : i;
+        sample[DENOISER][k] = forward_ms(b, b->r, GGN_NET_R);
+        sample[GENERATOR][k] = forward_ms(b, b->m, GGN_NET_M);
+        sample[DISCRIMINATOR][k] = forward_ms(b, b->d, GGN_NET_D);
+        sample[DECISION][k] = forward_ms(b, b->r, GGN_NET_R) + forward_ms(b, b->m, GGN_NET_M) + forward_ms(b, b->m, GGN_NET_M) +
+                              forward_ms(b, b->d, GGN_NET_D);
+        sample[SGEMM][k] = sgemm_gflops(b, gemm);
+    }
+    for (int i = -1; i < (b->o.rounds + 2) / 3; i++) {
+        int k = i < 0 ? 0 : i;
+        sample[DENOISER_TRAIN][k] = denoiser_train_ms(b, err);
+        sample[GENERATOR_TRAIN][k] = generator_train_ms(b);
+        sample[TRAIN_SAMPLE][k] = b->trainer->hyper.window * sample[DENOISER_TRAIN][k] + judge_train_ms(b, err);
+    }
+    for (int f = 0; f < N_FIGURES; f++)
+        figure[f] = median(sample[f], f >= DENOISER_TRAIN && f <= TRAIN_SAMPLE ? (b->o.rounds + 2) / 3 : b->o.rounds);
+    free(gemm);
+    return err->code;
+}
+
+static int print_layers(struct bench *b, struct ggn_exec_f32 *e, int net, struct ggn_err *err)
+{
+    static const char *const op_name[] = {"conv", "im2col", "batch norm", "leaky relu", "sigmoid",
+                                          "max pool", "upsample", "flatten", "linear", "dropout"};
+    const struct ggn_graph *g = e->graph;
+    double s[GGN_MAX_LAYERS] = {0}, total = 0;
+
+    e->layer_s = s;
+    for (int i = 0; i < b->o.rounds; i++)
+        ggn_exec_forward_f32(e, b->trainer->weights[net], 1, GGN_EVAL);
+    e->layer_s = NULL;
+    printf("%s: %.3f GFLOP\n%-7s %-11s %14s %9s %9s %9s\n", g->name, 2e-9 * ggn_graph_mac(g), "stage", "layer", "output",
+           "GFLOP", "ms", "GFLOP/s");
+    for (int i = 0; i < g->n_layers; i++) {
+        const struct ggn_layer *l = &g->layer[i];
+        const struct ggn_value *v = &g->value[l->out];
+        double flop = 2 * ggn_layer_mac(g, i), ms = 1e3 * s[i] / b->o.rounds;
+        char shape[32];
+        snprintf(shape, sizeof shape, "%dx%dx%d", v->c, v->h, v->w);
+        total += ms;
+        if (ms > 0)
+            printf("%-7s %-11s %14s %9.4f %9.3f %9.1f\n", l->stage, op_name[l->op], shape, 1e-9 * flop, ms, 1e-6 * flop / ms);
+    }
+    printf("%-7s %-11s %14s %9.4f %9.3f %9.1f\n\n", "all", "", "", 2e-9 * ggn_graph_mac(g), total,
+           2e-6 * ggn_graph_mac(g) / total);
+    (void)err;
+    return GGN_OK;
+}
+
+static void print_figures(const struct bench *b, const double figure[N_FIGURES])
+{
+    if (!b->o.json) {
+        for (int f = 0; f < N_FIGURES; f++)
+            printf("%-26s %9.3f\n", figure_name[f], figure[f]);
+        return;
+    }
+    printf("{\"threads\": %d, \"isa\": \"%s\", \"batch\": %d", b->o.threads, ggn_isa_name(b->r->kernels->isa), b->o.batch);
+    for (int f = 0; f < N_FIGURES; f++)
+        printf(", \"%s\": %.3f", figure_name[f], figure[f]);
+    printf("}\n");
+}
+
+int ggn_cmd_bench(int argc, char **argv)
+{
+    static const struct argp_option list[] = {
+        {"json", KEY_JSON, NULL, 0, "One JSON object of medians instead of tables", 0},
+        {"threads", KEY_THREADS, "N", 0, "Threads (all processors)", 0},
+        {"rounds", KEY_ROUNDS, "N", 0, "Measurements per figure (9)", 0},
+        {"batch", KEY_BATCH, "N", 0, "Batch of the training figures, which are per image or sample (4)", 0},
+        {0}};
+    static const struct argp argp = {
+        .options = list, .parser = parse, .doc = "Measures inference and training of the networks at the published size."};
+    struct bench b = {.o = {.threads = ggn_threads_available(), .rounds = 9, .batch = 4}};
+    double figure[N_FIGURES];
+    struct ggn_err err = {0};
+
+    argp_parse(&argp, argc, argv, 0, NULL, &b.o);
+    int rc = setup(&b, &err);
+    if (!rc && !b.o.json) {
+        printf("instruction set %s, %d threads\n\n", ggn_isa_name(b.r->kernels->isa), b.o.threads);
+        print_layers(&b, b.r, GGN_NET_R, &err);
+        print_layers(&b, b.m, GGN_NET_M, &err);
+        print_layers(&b, b.d, GGN_NET_D, &err);
+    }
+    if (!rc)
+        rc = measure(&b, figure, &err);
+    if (!rc)
+        print_figures(&b, figure);
+    release(&b);
+    return rc ? ggn_cmd_fail(argv[0], &err) : GGN_EXIT_OK;
+}
