@@ -16,6 +16,7 @@
 #define GGN_COMMANDS(X) \
     X(bench, "measure inference and training speed") \
     X(golden, "print the golden values of the published networks as JSON") \
+    X(inspect, "print what a model file holds") \
     X(flip, "visible difference of two images (LDR-FLIP)") \
     X(compare, "stop maps or thresholds against (human) thresholds") \
     X(import_sin3d, "SIN3D images into block sequences") \

@@ -225,6 +225,58 @@ int ggn_graph_end(struct ggn_graph *g, struct ggn_err *err)
     return GGN_OK;
 }
 
+static int same_geometry(const struct ggn_value *a, const struct ggn_value *b)
+{
+    return a->h == b->h && a->w == b->w && a->flat == b->flat;
+}
+
+/* First layer that writes and last that reads each value; input and output live for ever. */
+static void find_lifetimes(const struct ggn_graph *g, int born[], int dies[])
+{
+    for (int i = 0; i < g->n_values; i++) {
+        born[i] = -1;
+        dies[i] = g->n_layers;
+    }
+    for (int i = 0; i < g->n_layers; i++) {
+        const struct ggn_layer *l = &g->layer[i];
+        born[l->out] = i;
+        if (l->in > 0)
+            dies[l->in] = i;
+        if (l->in2 > 0)
+            dies[l->in2] = i;
+    }
+    dies[g->n_values - 1] = g->n_layers;
+}
+
+size_t ggn_graph_place(const struct ggn_graph *g, size_t offset[GGN_MAX_LAYERS + 1])
+{
+    int born[GGN_MAX_LAYERS + 1], dies[GGN_MAX_LAYERS + 1];
+    size_t total = 0;
+
+    find_lifetimes(g, born, dies);
+    for (int first = 0; first < g->n_values; first++) { /* one round per geometry, led by its first value */
+        size_t end = total;
+        int seen = 0;
+        for (int j = 0; j < first; j++)
+            seen |= same_geometry(&g->value[j], &g->value[first]);
+        for (int i = first; i < g->n_values && !seen; i++) {
+            const struct ggn_value *v = &g->value[i];
+            if (!same_geometry(v, &g->value[first]))
+                continue;
+            offset[i] = total;
+            for (int j = first; j < i; j++)
+                if (same_geometry(&g->value[j], v) && dies[j] >= born[i] && offset[j] < offset[i] + v->size &&
+                    offset[i] < offset[j] + g->value[j].size) {
+                    offset[i] = offset[j] + g->value[j].size;
+                    j = first - 1; /* moved: look at all of them again */
+                }
+            end = offset[i] + v->size > end ? offset[i] + v->size : end;
+        }
+        total = end;
+    }
+    return total;
+}
+
 double ggn_layer_mac(const struct ggn_graph *g, int layer)
 {
     const struct ggn_layer *l = &g->layer[layer];

@@ -109,6 +109,10 @@ void ggn_graph_mark(struct ggn_graph *g, int value, const char *stage);
 /* Plans the backward pass; the last value is the output. GGN_EINVAL with the first failure. */
 int ggn_graph_end(struct ggn_graph *g, struct ggn_err *err);
 
+/* Memory for inference: offset[value] such that values alive at the same time do not overlap, and memory is only handed on
+ * between values of equal height and width, whose zero padding lies at the same places. Returns the elements per image. */
+size_t ggn_graph_place(const struct ggn_graph *g, size_t offset[GGN_MAX_LAYERS + 1]);
+
 /* Multiply-accumulates of one layer for one image, and of all. */
 double ggn_layer_mac(const struct ggn_graph *g, int layer);
 double ggn_graph_mac(const struct ggn_graph *g);

@@ -1,0 +1,96 @@
+/* `ggn inspect`: what is in a model file. */
+#include <argp.h>
+#include <cjson/cJSON.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "cli/commands.h"
+#include "model/infer.h"
+
+struct options {
+    const char *path;
+    int json, tensors;
+};
+
+static error_t parse(int key, char *arg, struct argp_state *state)
+{
+    struct options *o = state->input;
+
+    switch (key) {
+    case 'j':
+        o->json = 1;
+        return 0;
+    case 't':
+        o->tensors = 1;
+        return 0;
+    case ARGP_KEY_ARG:
+        if (o->path)
+            argp_error(state, "one FILE at a time");
+        o->path = arg;
+        return 0;
+    case ARGP_KEY_NO_ARGS:
+        argp_error(state, "a FILE is needed");
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static void print_tensors(const struct ggn_container *c)
+{
+    for (int i = 0; i < c->n_entries; i++) {
+        const struct ggn_entry *e = &c->entry[i];
+        char shape[64];
+        int used = 0;
+        for (int d = 0; d < e->rank; d++)
+            used += snprintf(shape + used, sizeof shape - (size_t)used, "%s%u", d ? "x" : "", e->dim[d]);
+        printf("  %-38s %-16s %-5s offset %llu\n", e->name, shape, ggn_type_name(e->type), (unsigned long long)e->offset);
+    }
+}
+
+static void print_model(const struct ggn_model *m, const struct ggn_container *c)
+{
+    const struct ggn_hyper *h = &m->hyper;
+    char *provenance = cJSON_Print(m->provenance);
+
+    printf("preset       %s\n", h->preset == GGN_PRESET_PAPER ? "paper" : "lull");
+    printf("block        %d x %d pixels, window of %d images\n", h->width, h->height, h->window);
+    printf("widths       denoiser %d, generator %d, discriminator %d\n", h->k_r, h->k_m, h->k_d);
+    for (int net = 0; net < GGN_NETS; net++)
+        printf("%-12s %zu parameters, %.0f MAC\n", m->graph[net].name, m->graph[net].n_params, ggn_graph_mac(&m->graph[net]));
+    printf("decision     %.3f GMAC, history %.2f MB per block, workspace %.1f MB per thread\n",
+           1e-9 * (ggn_graph_mac(&m->graph[0]) + 2 * ggn_graph_mac(&m->graph[1]) + ggn_graph_mac(&m->graph[2])),
+           1e-6 * (double)ggn_history_bytes(h), 1e-6 * (double)ggn_infer_bytes(m, GGN_PRECISION_F32, 1));
+    printf("calibration  p = sigmoid(%g * logit + %g), stops below %g in %d checks in a row, spacing %g\n", m->calibration.scale,
+           m->calibration.shift, m->calibration.threshold, m->calibration.consecutive, m->calibration.spacing);
+    printf("file         %zu bytes, version %d, %d tensors\n", c->size, GGN_CONTAINER_VERSION, c->n_entries);
+    printf("provenance   %s\n", provenance ? provenance : "");
+    cJSON_free(provenance);
+}
+
+int ggn_cmd_inspect(int argc, char **argv)
+{
+    static const struct argp_option list[] = {{"json", 'j', NULL, 0, "Print the description as stored (JSON)", 0},
+                                              {"tensors", 't', NULL, 0, "List the tensors too", 0},
+                                              {0}};
+    static const struct argp argp = {
+        .options = list, .parser = parse, .args_doc = "FILE", .doc = "Prints what a model file (.ggn) holds and checks it."};
+    struct options o = {0};
+    struct ggn_container c;
+    struct ggn_model *model = NULL;
+    struct ggn_err err = {0};
+
+    argp_parse(&argp, argc, argv, 0, NULL, &o);
+    if (ggn_container_read(&c, o.path, &err))
+        return ggn_cmd_fail(argv[0], &err);
+    int rc = ggn_model_load_memory(o.path, c.data, c.size, &model, &err);
+    if (!rc && o.json)
+        printf("%s\n", c.json);
+    else if (!rc)
+        print_model(model, &c);
+    if (!rc && o.tensors)
+        print_tensors(&c);
+    ggn_model_destroy(model);
+    ggn_container_release(&c);
+    return rc ? ggn_cmd_fail(argv[0], &err) : GGN_EXIT_OK;
+}

@@ -1,0 +1,334 @@
+#include "model/container.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/fio.h"
+
+static const char MAGIC[8] = {'L', 'U', 'L', 'L', 'G', 'G', 'N', '\n'};
+
+enum { HEADER = 64, ENTRY = 88, ALIGN = 64, AT_CHECKSUM = 48, MAX_JSON = 1 << 20 };
+static const uint64_t MAX_FILE = (uint64_t)4 << 30;
+
+static const char *const type_name[GGN_TYPES] = {"f32", "f16", "bf16"};
+static const unsigned type_size[GGN_TYPES] = {4, 2, 2};
+
+const char *ggn_type_name(enum ggn_type type)
+{
+    return type_name[type];
+}
+
+/* --- numbers ----------------------------------------------------------------------------------------------------------- */
+
+static uint32_t bits_of(float x)
+{
+    uint32_t u;
+    memcpy(&u, &x, sizeof u);
+    return u;
+}
+
+static float float_of(uint32_t u)
+{
+    float x;
+    memcpy(&x, &u, sizeof x);
+    return x;
+}
+
+uint16_t ggn_f32_to_bf16(float x)
+{
+    uint32_t u = bits_of(x);
+    if ((u & 0x7fffffffu) > 0x7f800000u)
+        return (uint16_t)(u >> 16 | 0x40);
+    return (uint16_t)((u + 0x7fff + (u >> 16 & 1)) >> 16);
+}
+
+float ggn_bf16_to_f32(uint16_t x)
+{
+    return float_of((uint32_t)x << 16);
+}
+
+uint16_t ggn_f32_to_f16(float x)
+{
+    uint32_t u = bits_of(x), sign = u >> 16 & 0x8000, a = u & 0x7fffffff;
+
+    if (a > 0x7f800000u)
+        return (uint16_t)(sign | 0x7e00);
+    if (a >= 0x477ff000u) /* 65520 and more round to infinity */
+        return (uint16_t)(sign | 0x7c00);
+    if (a < 0x38800000u) { /* subnormal: units of 2^-24 */
+        float scaled = float_of(a) * 16777216.0f;
+        return (uint16_t)(sign | (uint32_t)lrintf(scaled));
+    }
+    a += 0xfff + (a >> 13 & 1);
+    return (uint16_t)(sign | (a - 0x38000000u) >> 13);
+}
+
+float ggn_f16_to_f32(uint16_t x)
+{
+    uint32_t sign = (uint32_t)(x & 0x8000) << 16, e = x >> 10 & 31, m = x & 0x3ff;
+
+    if (e == 31)
+        return float_of(sign | 0x7f800000u | m << 13);
+    if (e == 0) {
+        float magnitude = (float)m / 16777216.0f;
+        return sign ? -magnitude : magnitude;
+    }
+    return float_of(sign | (e + 112) << 23 | m << 13);
+}
+
+static void put32(unsigned char *p, uint32_t v)
+{
+    for (int i = 0; i < 4; i++)
+        p[i] = (unsigned char)(v >> 8 * i);
+}
+
+static void put64(unsigned char *p, uint64_t v)
+{
+    for (int i = 0; i < 8; i++)
+        p[i] = (unsigned char)(v >> 8 * i);
+}
+
+static uint32_t get32(const unsigned char *p)
+{
+    return p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
+}
+
+static uint64_t get64(const unsigned char *p)
+{
+    return get32(p) | (uint64_t)get32(p + 4) << 32;
+}
+
+/* FNV-1a, 64 bit (Fowler, Noll, Vo), with the checksum's own bytes as zero. */
+static uint64_t checksum(const unsigned char *p, size_t size)
+{
+    uint64_t h = 0xcbf29ce484222325u;
+    for (size_t i = 0; i < size; i++) {
+        unsigned char byte = i >= AT_CHECKSUM && i < AT_CHECKSUM + 8 ? 0 : p[i];
+        h = (h ^ byte) * 0x100000001b3u;
+    }
+    return h;
+}
+
+/* --- writing ----------------------------------------------------------------------------------------------------------- */
+
+void ggn_container_release(struct ggn_container *c)
+{
+    free(c->entry);
+    free(c->json);
+    free(c->data);
+    memset(c, 0, sizeof *c);
+}
+
+int ggn_container_add(struct ggn_container *c, const char *name, enum ggn_type type, int rank, const int *dim,
+                      const float *values, struct ggn_err *err)
+{
+    struct ggn_entry *grown = realloc(c->entry, ((size_t)c->n_entries + 1) * sizeof *grown);
+
+    if (!grown)
+        return ggn_fail_nomem(err, "tensor table");
+    c->entry = grown;
+    struct ggn_entry *e = &grown[c->n_entries++];
+    *e = (struct ggn_entry){.type = type, .rank = rank, .count = 1, .write = values};
+    snprintf(e->name, sizeof e->name, "%s", name);
+    for (int i = 0; i < 4; i++) {
+        e->dim[i] = i < rank ? (uint32_t)dim[i] : 1;
+        e->count *= e->dim[i];
+    }
+    return GGN_OK;
+}
+
+static void encode(unsigned char *p, const struct ggn_entry *e)
+{
+    for (size_t i = 0; i < e->count; i++) {
+        if (e->type == GGN_F32) {
+            put32(p + 4 * i, bits_of(e->write[i]));
+        } else {
+            uint16_t v = e->type == GGN_F16 ? ggn_f32_to_f16(e->write[i]) : ggn_f32_to_bf16(e->write[i]);
+            p[2 * i] = (unsigned char)v;
+            p[2 * i + 1] = (unsigned char)(v >> 8);
+        }
+    }
+}
+
+static size_t aligned(size_t n)
+{
+    return (n + ALIGN - 1) / ALIGN * ALIGN;
+}
+
+/* The whole file in memory; NULL without memory. */
+static unsigned char *assemble(struct ggn_container *c, size_t *size)
+{
+    size_t json_at = HEADER + (size_t)c->n_entries * ENTRY, json_size = strlen(c->json), at = aligned(json_at + json_size);
+
+    for (int i = 0; i < c->n_entries; i++) {
+        struct ggn_entry *e = &c->entry[i];
+        e->offset = at;
+        e->size = e->count * type_size[e->type];
+        at = aligned(at + e->size);
+    }
+    unsigned char *file = calloc(1, at);
+    if (!file)
+        return NULL;
+    memcpy(file, MAGIC, sizeof MAGIC);
+    put32(file + 8, GGN_CONTAINER_VERSION);
+    put32(file + 12, (uint32_t)c->n_entries);
+    put64(file + 16, at);
+    put64(file + 24, json_at);
+    put64(file + 32, json_size);
+    put64(file + 40, HEADER);
+    memcpy(file + json_at, c->json, json_size);
+    for (int i = 0; i < c->n_entries; i++) {
+        const struct ggn_entry *e = &c->entry[i];
+        unsigned char *p = file + HEADER + (size_t)i * ENTRY;
+        memcpy(p, e->name, sizeof e->name);
+        put32(p + 48, (uint32_t)e->type);
+        put32(p + 52, (uint32_t)e->rank);
+        for (int d = 0; d < 4; d++)
+            put32(p + 56 + 4 * d, e->dim[d]);
+        put64(p + 72, e->offset);
+        put64(p + 80, e->size);
+        encode(file + e->offset, e);
+    }
+    put64(file + AT_CHECKSUM, checksum(file, at));
+    *size = at;
+    return file;
+}
+
+int ggn_container_write(struct ggn_container *c, const char *path, struct ggn_err *err)
+{
+    struct ggn_fio_out out = {0};
+    size_t size;
+    unsigned char *file = assemble(c, &size);
+
+    if (!file)
+        return ggn_fail_nomem(err, "model file");
+    int rc = ggn_fio_begin(&out, path, err);
+    if (!rc && fwrite(file, 1, size, out.file) != size)
+        rc = ggn_fail(err, GGN_EIO, "%s: cannot write", path);
+    if (!rc)
+        rc = ggn_fio_commit(&out, err);
+    ggn_fio_abort(&out);
+    free(file);
+    return rc;
+}
+
+/* --- reading ----------------------------------------------------------------------------------------------------------- */
+
+static int check_header(const unsigned char *p, size_t size, const char *name, struct ggn_err *err)
+{
+    if (size < HEADER || memcmp(p, MAGIC, sizeof MAGIC) != 0)
+        return ggn_fail(err, GGN_EINVAL, "%s: not a .ggn file", name);
+    if (get32(p + 8) != GGN_CONTAINER_VERSION)
+        return ggn_fail(err, GGN_EINVAL, "%s: .ggn version %u; this program reads version %d", name, get32(p + 8),
+                        GGN_CONTAINER_VERSION);
+    if (get64(p + 16) != size)
+        return ggn_fail(err, GGN_EINVAL, "%s: %s: the header says %llu bytes, the file has %zu", name,
+                        get64(p + 16) > size ? "truncated" : "too long", (unsigned long long)get64(p + 16), size);
+    if (get64(p + AT_CHECKSUM) != checksum(p, size))
+        return ggn_fail(err, GGN_EINVAL, "%s: damaged (checksum does not match)", name);
+    uint64_t json_at = get64(p + 24), json_size = get64(p + 32), table = get64(p + 40), entries = get32(p + 12);
+    if (json_at > size || json_size > size - json_at || json_size > MAX_JSON)
+        return ggn_fail(err, GGN_EINVAL, "%s: the description lies outside of the file", name);
+    if (entries > GGN_CONTAINER_TENSORS || table > size || entries * ENTRY > size - table)
+        return ggn_fail(err, GGN_EINVAL, "%s: the tensor table lies outside of the file", name);
+    return GGN_OK;
+}
+
+static int read_entry(struct ggn_entry *e, const unsigned char *p, size_t size, const char *name, struct ggn_err *err)
+{
+    uint32_t type = get32(p + 48), rank = get32(p + 52);
+    uint64_t count = 1;
+
+    memcpy(e->name, p, sizeof e->name);
+    e->name[sizeof e->name - 1] = 0;
+    for (char *s = e->name; *s; s++) /* names go into messages and listings */
+        if ((unsigned char)*s < 0x20 || (unsigned char)*s > 0x7e)
+            *s = '?';
+    if (type >= GGN_TYPES || rank < 1 || rank > 4)
+        return ggn_fail(err, GGN_EINVAL, "%s: tensor '%s' has an unknown type or rank", name, e->name);
+    for (int d = 0; d < 4; d++) {
+        e->dim[d] = get32(p + 56 + 4 * d);
+        if (e->dim[d] < 1 || (d >= (int)rank && e->dim[d] != 1) || count > MAX_FILE / e->dim[d])
+            return ggn_fail(err, GGN_EINVAL, "%s: tensor '%s' has an impossible shape", name, e->name);
+        count *= e->dim[d];
+    }
+    e->type = (enum ggn_type)type;
+    e->rank = (int)rank;
+    e->count = (size_t)count;
+    e->offset = get64(p + 72);
+    e->size = get64(p + 80);
+    if (e->size != count * type_size[type] || e->offset % ALIGN || e->offset > size || e->size > size - e->offset)
+        return ggn_fail(err, GGN_EINVAL, "%s: tensor '%s' lies outside of the file", name, e->name);
+    return GGN_OK;
+}
+
+/* Takes over c->data, c->size. */
+static int parse_owned(struct ggn_container *c, const char *name, struct ggn_err *err)
+{
+    const unsigned char *p = (const unsigned char *)c->data;
+    int rc = check_header(p, c->size, name, err);
+
+    if (rc)
+        return rc;
+    size_t json_size = (size_t)get64(p + 32);
+    c->n_entries = (int)get32(p + 12);
+    c->entry = calloc((size_t)c->n_entries + 1, sizeof *c->entry);
+    c->json = malloc(json_size + 1);
+    if (!c->entry || !c->json)
+        return ggn_fail_nomem(err, "model file");
+    memcpy(c->json, p + get64(p + 24), json_size);
+    c->json[json_size] = 0;
+    for (int i = 0; i < c->n_entries && !rc; i++)
+        rc = read_entry(&c->entry[i], p + get64(p + 40) + (size_t)i * ENTRY, c->size, name, err);
+    return rc;
+}
+
+int ggn_container_parse(struct ggn_container *c, const char *name, const void *data, size_t size, struct ggn_err *err)
+{
+    memset(c, 0, sizeof *c);
+    c->data = malloc(size + 1);
+    if (!c->data)
+        return ggn_fail_nomem(err, "model file");
+    memcpy(c->data, data, size);
+    c->size = size;
+    int rc = parse_owned(c, name, err);
+    if (rc)
+        ggn_container_release(c);
+    return rc;
+}
+
+int ggn_container_read(struct ggn_container *c, const char *path, struct ggn_err *err)
+{
+    memset(c, 0, sizeof *c);
+    int rc = ggn_fio_read(path, (size_t)MAX_FILE, &c->data, &c->size, err);
+    if (!rc)
+        rc = parse_owned(c, path, err);
+    if (rc)
+        ggn_container_release(c);
+    return rc;
+}
+
+int ggn_container_get(const struct ggn_container *c, const char *name, int rank, const int *dim, float *out,
+                      struct ggn_err *err)
+{
+    const struct ggn_entry *e = NULL;
+
+    for (int i = 0; i < c->n_entries && !e; i++)
+        if (!strcmp(c->entry[i].name, name))
+            e = &c->entry[i];
+    if (!e)
+        return ggn_fail(err, GGN_EINVAL, "tensor '%s' is missing", name);
+    for (int d = 0; d < 4; d++)
+        if (e->rank != rank || e->dim[d] != (d < rank ? (uint32_t)dim[d] : 1))
+            return ggn_fail(err, GGN_EINVAL, "tensor '%s' does not have the shape that the network asks for", name);
+    const unsigned char *p = (const unsigned char *)c->data + e->offset;
+    for (size_t i = 0; i < e->count; i++) {
+        uint16_t half = (uint16_t)(p[i * type_size[e->type]] | p[i * type_size[e->type] + 1] << 8);
+        out[i] = e->type == GGN_F32 ? float_of(get32(p + 4 * i)) : e->type == GGN_F16 ? ggn_f16_to_f32(half) : ggn_bf16_to_f32(half);
+        if (!isfinite(out[i]))
+            return ggn_fail(err, GGN_EINVAL, "tensor '%s' holds a value that is not finite", name);
+    }
+    return GGN_OK;
+}

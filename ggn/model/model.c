@@ -1,0 +1,182 @@
+#include "model/model.h"
+
+#include <cjson/cJSON.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "model/model_json.h"
+
+struct ggn_model *ggn_model_create(const struct ggn_hyper *hyper, struct ggn_err *err)
+{
+    struct ggn_model *m = calloc(1, sizeof *m);
+
+    if (!m) {
+        ggn_fail_nomem(err, "model");
+        return NULL;
+    }
+    m->hyper = *hyper;
+    m->calibration = (struct ggn_calibration){.scale = 1, .threshold = 0.5, .consecutive = 2, .spacing = 1.2};
+    m->provenance = cJSON_CreateObject();
+    int rc = m->provenance ? GGN_OK : ggn_fail_nomem(err, "model");
+    for (int net = 0; net < GGN_NETS && !rc; net++) {
+        rc = ggn_network_build(&m->graph[net], net, hyper, err);
+        if (!rc && !(m->weights[net] = ggn_weights_create_f32(&m->graph[net], NULL, 0, err)))
+            rc = GGN_ENOMEM;
+    }
+    if (!rc)
+        return m;
+    ggn_model_destroy(m);
+    return NULL;
+}
+
+void ggn_model_destroy(struct ggn_model *m)
+{
+    if (!m)
+        return;
+    for (int net = 0; net < GGN_NETS; net++)
+        ggn_weights_destroy_f32(m->weights[net]);
+    cJSON_Delete(m->provenance);
+    free(m);
+}
+
+/* Calls fn for every tensor of a network, running statistics included. */
+struct visit {
+    const struct ggn_container *from;
+    struct ggn_container *to;
+    enum ggn_type type;
+};
+
+static int visit(const struct visit *v, const char *name, int is_weight, int rank, const int *dim, float *values,
+                 struct ggn_err *err)
+{
+    if (v->from)
+        return ggn_container_get(v->from, name, rank, dim, values, err);
+    return ggn_container_add(v->to, name, is_weight ? v->type : GGN_F32, rank, dim, values, err);
+}
+
+static int visit_all(const struct visit *v, const struct ggn_model *m, int *count, struct ggn_err *err)
+{
+    char name[GGN_CONTAINER_NAME];
+
+    for (int net = 0; net < GGN_NETS; net++) {
+        const struct ggn_graph *g = &m->graph[net];
+        for (int i = 0; i < g->n_tensors; i++) {
+            const struct ggn_tensor *t = &g->tensor[i];
+            const size_t stats = g->layer[t->layer].stats;
+            snprintf(name, sizeof name, "%s/%s", g->name, t->name);
+            int rc = visit(v, name, t->ndim > 1, t->ndim, t->dim, m->weights[net]->params + t->offset, err);
+            ++*count;
+            if (!rc && t->is_bn) { /* weight and bias of a batch norm bring the mean and the variance with them */
+                size_t stem = strlen(name) - strlen(t->is_bias ? "bias" : "weight");
+                snprintf(name + stem, sizeof name - stem, "%s", t->is_bias ? "var" : "mean");
+                rc = visit(v, name, 0, 1, t->dim, (t->is_bias ? m->weights[net]->var : m->weights[net]->mean) + stats, err);
+                ++*count;
+            }
+            if (rc)
+                return rc;
+        }
+    }
+    return GGN_OK;
+}
+
+static int check_statistics(const struct ggn_model *m, struct ggn_err *err)
+{
+    for (int net = 0; net < GGN_NETS; net++)
+        for (size_t i = 0; i < m->graph[net].n_stats; i++)
+            if (m->weights[net]->var[i] < 0)
+                return ggn_fail(err, GGN_EINVAL, "a running variance of the %s is negative", m->graph[net].name);
+    return GGN_OK;
+}
+
+/* The parameters must fit into the file before memory is asked for them. */
+static int check_size(const struct ggn_hyper *hyper, const struct ggn_container *c, struct ggn_err *err)
+{
+    struct ggn_graph *g = malloc(sizeof *g);
+    size_t params = 0;
+
+    if (!g)
+        return ggn_fail_nomem(err, "model");
+    int rc = GGN_OK;
+    for (int net = 0; net < GGN_NETS && !rc; net++) {
+        rc = ggn_network_build(g, net, hyper, err);
+        params += g->n_params;
+    }
+    free(g);
+    if (!rc && params * 2 > c->size)
+        rc = ggn_fail(err, GGN_EINVAL, "the file is too small for networks of this size");
+    return rc;
+}
+
+static int from_container(const struct ggn_container *c, struct ggn_model **model, struct ggn_err *err)
+{
+    struct ggn_model_description d = {0};
+    struct ggn_model *m = NULL;
+    int count = 0;
+    int rc = ggn_model_json_parse(c->json, &d, err);
+
+    if (!rc)
+        rc = ggn_hyper_check(&d.hyper, err);
+    if (!rc)
+        rc = check_size(&d.hyper, c, err);
+    if (!rc && !(m = ggn_model_create(&d.hyper, err)))
+        rc = GGN_ENOMEM;
+    if (!rc)
+        rc = visit_all(&(struct visit){.from = c}, m, &count, err);
+    if (!rc && count != c->n_entries)
+        rc = ggn_fail(err, GGN_EINVAL, "%d tensors where the networks have %d", c->n_entries, count);
+    if (!rc)
+        rc = check_statistics(m, err);
+    if (rc) {
+        cJSON_Delete(d.provenance);
+        ggn_model_destroy(m);
+        return rc;
+    }
+    m->calibration = d.calibration;
+    cJSON_Delete(m->provenance);
+    m->provenance = d.provenance;
+    for (int net = 0; net < GGN_NETS; net++)
+        ggn_weights_pack_f32(m->weights[net]);
+    *model = m;
+    return GGN_OK;
+}
+
+static int finish_load(struct ggn_container *c, const char *name, struct ggn_model **model, struct ggn_err *err)
+{
+    struct ggn_err inner = {0};
+    int rc = from_container(c, model, &inner);
+
+    ggn_container_release(c);
+    return rc ? ggn_fail(err, rc, "%s: %s", name, inner.text) : GGN_OK;
+}
+
+int ggn_model_load(const char *path, struct ggn_model **model, struct ggn_err *err)
+{
+    struct ggn_container c;
+    int rc = ggn_container_read(&c, path, err);
+    return rc ? rc : finish_load(&c, path, model, err);
+}
+
+int ggn_model_load_memory(const char *name, const void *data, size_t size, struct ggn_model **model, struct ggn_err *err)
+{
+    struct ggn_container c;
+    int rc = ggn_container_parse(&c, name, data, size, err);
+    return rc ? rc : finish_load(&c, name, model, err);
+}
+
+int ggn_model_save(const struct ggn_model *m, const char *path, enum ggn_type type, struct ggn_err *err)
+{
+    struct ggn_container c = {0};
+    int count = 0;
+    int rc = visit_all(&(struct visit){.to = &c, .type = type}, m, &count, err);
+
+    if (!rc)
+        c.json = ggn_model_json_print(m);
+    if (!rc && !c.json)
+        rc = ggn_fail_nomem(err, "model file");
+    if (!rc)
+        rc = ggn_container_write(&c, path, err);
+    ggn_container_release(&c);
+    return rc;
+}

@@ -1,0 +1,125 @@
+#include "model/model_json.h"
+
+#include <cjson/cJSON.h>
+#include <stddef.h>
+#include <string.h>
+
+static const char *const preset_name[] = {"paper", "lull"};
+
+/* Hyper-parameters and calibration as tables, so that reading and writing cannot disagree. */
+static const struct {
+    const char *name;
+    size_t at;
+} hyper_field[] = {{"height", offsetof(struct ggn_hyper, height)}, {"width", offsetof(struct ggn_hyper, width)},
+                   {"window", offsetof(struct ggn_hyper, window)}, {"k_r", offsetof(struct ggn_hyper, k_r)},
+                   {"k_m", offsetof(struct ggn_hyper, k_m)},       {"k_d", offsetof(struct ggn_hyper, k_d)}};
+
+static const struct {
+    const char *name;
+    size_t at;
+    double min, max;
+} calibration_field[] = {{"scale", offsetof(struct ggn_calibration, scale), -1e6, 1e6},
+                         {"shift", offsetof(struct ggn_calibration, shift), -1e6, 1e6},
+                         {"threshold", offsetof(struct ggn_calibration, threshold), 0, 1},
+                         {"spacing", offsetof(struct ggn_calibration, spacing), 1, 16}};
+
+enum {
+    N_HYPER = sizeof hyper_field / sizeof hyper_field[0],
+    N_CALIBRATION = sizeof calibration_field / sizeof calibration_field[0]
+};
+
+static int get_number(const cJSON *object, const char *name, double min, double max, double *out, struct ggn_err *err)
+{
+    const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, name);
+
+    if (!cJSON_IsNumber(item) || !(item->valuedouble >= min && item->valuedouble <= max))
+        return ggn_fail(err, GGN_EINVAL, "'%s' is missing or not a number in %g..%g", name, min, max);
+    *out = item->valuedouble;
+    return GGN_OK;
+}
+
+static int get_int(const cJSON *object, const char *name, int min, int max, int *out, struct ggn_err *err)
+{
+    double value = 0;
+    int rc = get_number(object, name, min, max, &value, err);
+
+    if (!rc && value != (double)(int)value)
+        rc = ggn_fail(err, GGN_EINVAL, "'%s' is not a whole number", name);
+    if (!rc)
+        *out = (int)value;
+    return rc;
+}
+
+static int get_preset(const cJSON *root, enum ggn_preset *out, struct ggn_err *err)
+{
+    const cJSON *item = cJSON_GetObjectItemCaseSensitive(root, "preset");
+
+    for (int i = 0; cJSON_IsString(item) && i < 2; i++)
+        if (!strcmp(item->valuestring, preset_name[i])) {
+            *out = (enum ggn_preset)i;
+            return GGN_OK;
+        }
+    return ggn_fail(err, GGN_EINVAL, "'preset' is neither \"paper\" nor \"lull\"");
+}
+
+static int parse_root(const cJSON *root, struct ggn_model_description *d, struct ggn_err *err)
+{
+    const cJSON *kind = cJSON_GetObjectItemCaseSensitive(root, "kind");
+    const cJSON *calibration = cJSON_GetObjectItemCaseSensitive(root, "calibration");
+
+    if (!cJSON_IsString(kind) || strcmp(kind->valuestring, "model") != 0)
+        return ggn_fail(err, GGN_EINVAL, "not a model (its description has no \"kind\": \"model\")");
+    int rc = get_preset(root, &d->hyper.preset, err);
+    for (size_t i = 0; i < N_HYPER && !rc; i++)
+        rc = get_int(root, hyper_field[i].name, 1, 1 << 20, (int *)(void *)((char *)&d->hyper + hyper_field[i].at), err);
+    for (size_t i = 0; i < N_CALIBRATION && !rc; i++)
+        rc = get_number(calibration, calibration_field[i].name, calibration_field[i].min, calibration_field[i].max,
+                        (double *)(void *)((char *)&d->calibration + calibration_field[i].at), err);
+    if (!rc)
+        rc = get_int(calibration, "consecutive", 1, 16, &d->calibration.consecutive, err);
+    return rc;
+}
+
+int ggn_model_json_parse(const char *json, struct ggn_model_description *out, struct ggn_err *err)
+{
+    cJSON *root = cJSON_Parse(json);
+    struct ggn_model_description d = {0};
+
+    if (!root)
+        return ggn_fail(err, GGN_EINVAL, "the description is not JSON");
+    int rc = parse_root(root, &d, err);
+    if (!rc) {
+        cJSON *provenance = cJSON_DetachItemFromObjectCaseSensitive(root, "provenance");
+        if (provenance && !cJSON_IsObject(provenance)) {
+            cJSON_Delete(provenance);
+            rc = ggn_fail(err, GGN_EINVAL, "'provenance' is not an object");
+        } else {
+            d.provenance = provenance ? provenance : cJSON_CreateObject();
+            *out = d;
+        }
+    }
+    cJSON_Delete(root);
+    return rc;
+}
+
+char *ggn_model_json_print(const struct ggn_model *m)
+{
+    cJSON *root = cJSON_CreateObject();
+    char *text = NULL;
+
+    cJSON_AddStringToObject(root, "kind", "model");
+    cJSON_AddStringToObject(root, "preset", preset_name[m->hyper.preset]);
+    for (size_t i = 0; i < N_HYPER; i++)
+        cJSON_AddNumberToObject(root, hyper_field[i].name,
+                                *(const int *)(const void *)((const char *)&m->hyper + hyper_field[i].at));
+    cJSON *calibration = cJSON_AddObjectToObject(root, "calibration");
+    for (size_t i = 0; i < N_CALIBRATION; i++)
+        cJSON_AddNumberToObject(calibration, calibration_field[i].name,
+                                *(const double *)(const void *)((const char *)&m->calibration + calibration_field[i].at));
+    cJSON_AddNumberToObject(calibration, "consecutive", m->calibration.consecutive);
+    cJSON *provenance = cJSON_Duplicate(m->provenance, 1);
+    if (provenance && calibration && cJSON_AddItemToObject(root, "provenance", provenance))
+        text = cJSON_Print(root);
+    cJSON_Delete(root);
+    return text;
+}
