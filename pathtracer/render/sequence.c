@@ -1,6 +1,5 @@
 #include "render/sequence.h"
 
-#include <cjson/cJSON.h>
 #include <zlib.h>
 
 #include <errno.h>
@@ -12,6 +11,7 @@
 #include "base/clock.h"
 #include "base/fio.h"
 #include "render/blockstats.h"
+#include "render/json.h"
 #include "render/lseq.h"
 
 /* Seeds of levels and reference differ in these bits: no sample is shared, and the reference of one seed is not the input of
@@ -113,6 +113,7 @@ static void name_view(const struct pt_sequence_config *c, char *scene, char *vie
     }
 }
 
+/* NULL when out of memory. */
 static cJSON *new_manifest(const struct recorder *r)
 {
     static const char *const samplers[] = {"independent", "sobol"}, *const filters[] = {"box", "triangle", "gaussian"};
@@ -124,24 +125,29 @@ static cJSON *new_manifest(const struct recorder *r)
     snprintf(renderer, sizeof renderer, "lull pathtracer 1.0, %s sampler, %s, filter %s %g, max depth %d, clamp %g",
              samplers[i->sampler], i->strategy == PT_STRATEGY_MIS ? "path" : "bsdf-only", filters[i->filter],
              (double)i->filter_x, i->max_depth, (double)i->max_component);
+    int failed = 0;
     cJSON *m = cJSON_CreateObject();
-    cJSON_AddStringToObject(m, "format", "lull-sequence");
-    cJSON_AddNumberToObject(m, "version", 1);
-    cJSON_AddStringToObject(m, "scene", scene);
-    cJSON_AddStringToObject(m, "source", c->scene_path);
-    cJSON_AddStringToObject(m, "source_crc32", crc);
-    cJSON_AddStringToObject(m, "camera", view);
-    cJSON_AddStringToObject(m, "renderer", renderer);
-    cJSON_AddNumberToObject(m, "width", c->render.width);
-    cJSON_AddNumberToObject(m, "height", c->render.height);
-    cJSON_AddNumberToObject(m, "block", c->render.block_width);
-    cJSON_AddNumberToObject(m, "seed", r->seed);
-    cJSON_AddNumberToObject(m, "reference_seed", r->reference_seed);
-    cJSON_AddNumberToObject(m, "reference_spp", (double)c->reference_spp);
-    cJSON *levels = cJSON_AddArrayToObject(m, "levels");
+    pt_json_text(m, "format", "lull-sequence", &failed);
+    pt_json_number(m, "version", 1, &failed);
+    pt_json_text(m, "scene", scene, &failed);
+    pt_json_text(m, "source", c->scene_path, &failed);
+    pt_json_text(m, "source_crc32", crc, &failed);
+    pt_json_text(m, "camera", view, &failed);
+    pt_json_text(m, "renderer", renderer, &failed);
+    pt_json_number(m, "width", c->render.width, &failed);
+    pt_json_number(m, "height", c->render.height, &failed);
+    pt_json_number(m, "block", c->render.block_width, &failed);
+    pt_json_number(m, "seed", r->seed, &failed);
+    pt_json_number(m, "reference_seed", r->reference_seed, &failed);
+    pt_json_number(m, "reference_spp", (double)c->reference_spp, &failed);
+    cJSON *levels = pt_json_array(m, "levels", &failed);
     for (int k = 0; k < r->level_count; k++)
-        cJSON_AddItemToArray(levels, cJSON_CreateNumber(r->levels[k]));
-    cJSON_AddArrayToObject(m, "blocks");
+        pt_json_number(levels, NULL, r->levels[k], &failed);
+    pt_json_array(m, "blocks", &failed);
+    if (failed) {
+        cJSON_Delete(m);
+        m = NULL;
+    }
     return m;
 }
 
@@ -154,19 +160,8 @@ static int path_in(const struct recorder *r, const char *name, char *path, size_
 static int write_manifest(const struct recorder *r, struct pt_err *err)
 {
     char path[4096];
-    struct pt_fio_out out;
     int rc = path_in(r, "manifest.json", path, sizeof path, err);
-    char *text = rc == PT_OK ? cJSON_Print(r->manifest) : NULL;
-    if (rc == PT_OK && text == NULL)
-        rc = pt_fail_nomem(err, path);
-    if (rc == PT_OK)
-        rc = pt_fio_begin(&out, path, err);
-    if (rc == PT_OK) {
-        fprintf(out.file, "%s\n", text);
-        rc = pt_fio_commit(&out, err);
-    }
-    cJSON_free(text);
-    return rc;
+    return rc == PT_OK ? pt_json_write(path, r->manifest, 0, err) : rc;
 }
 
 /* The members up to `levels` must be those of this run; `source` may differ, its CRC decides. */
@@ -208,7 +203,7 @@ static int resume(struct recorder *r, struct pt_err *err)
     if (rc != PT_OK || (stat(path, &st) != 0 && errno == ENOENT))
         return rc;
     if ((rc = pt_fio_read(path, (size_t)1 << 26, &text, &size, err)) != PT_OK)
-        return err->code = PT_EINVAL;
+        return rc;
     cJSON *old = cJSON_Parse(text);
     free(text);
     if (old == NULL)
@@ -222,7 +217,12 @@ static int resume(struct recorder *r, struct pt_err *err)
             const cJSON *id = cJSON_GetObjectItemCaseSensitive(entry, "id");
             if (!cJSON_IsNumber(id) || id->valuedouble < 0.0 || id->valuedouble >= r->grid.count || !file_is_whole(r, entry))
                 continue;
-            cJSON_AddItemToArray(blocks, cJSON_Duplicate(entry, 1));
+            cJSON *copy = cJSON_Duplicate(entry, 1);
+            if (copy == NULL) {
+                rc = pt_fail_nomem(err, path);
+                break;
+            }
+            cJSON_AddItemToArray(blocks, copy);
             r->chosen[(uint32_t)id->valuedouble] = 0;
         }
     }
@@ -234,19 +234,19 @@ static int add_to_manifest(struct recorder *r, const struct pt_block *b, const c
                            double seconds, struct pt_err *err)
 {
     char text[16];
+    int failed = 0;
     snprintf(text, sizeof text, "%08x", crc);
-    cJSON *o = cJSON_CreateObject();
-    cJSON_AddNumberToObject(o, "id", b->id);
-    cJSON_AddNumberToObject(o, "x0", b->x0);
-    cJSON_AddNumberToObject(o, "y0", b->y0);
-    cJSON_AddNumberToObject(o, "x1", b->x1);
-    cJSON_AddNumberToObject(o, "y1", b->y1);
-    cJSON_AddStringToObject(o, "file", file);
-    cJSON_AddNumberToObject(o, "bytes", (double)bytes);
-    cJSON_AddStringToObject(o, "crc32", text);
-    cJSON_AddNumberToObject(o, "seconds", seconds);
-    cJSON_AddItemToArray(cJSON_GetObjectItemCaseSensitive(r->manifest, "blocks"), o);
-    return write_manifest(r, err);
+    cJSON *o = pt_json_object(cJSON_GetObjectItemCaseSensitive(r->manifest, "blocks"), NULL, &failed);
+    pt_json_number(o, "id", b->id, &failed);
+    pt_json_number(o, "x0", b->x0, &failed);
+    pt_json_number(o, "y0", b->y0, &failed);
+    pt_json_number(o, "x1", b->x1, &failed);
+    pt_json_number(o, "y1", b->y1, &failed);
+    pt_json_text(o, "file", file, &failed);
+    pt_json_number(o, "bytes", (double)bytes, &failed);
+    pt_json_text(o, "crc32", text, &failed);
+    pt_json_number(o, "seconds", seconds, &failed);
+    return failed ? pt_fail_nomem(err, file) : write_manifest(r, err);
 }
 
 /* --- one block ------------------------------------------------------------------------------------------------------ */
@@ -414,7 +414,8 @@ static int prepare(struct recorder *r, struct pt_err *err)
         return rc;
     r->seed = c->integrator.seed;
     r->reference_seed = r->seed ^ REFERENCE_SEED_BITS;
-    r->manifest = new_manifest(r);
+    if ((r->manifest = new_manifest(r)) == NULL)
+        return pt_fail_nomem(err, "manifest");
     if (mkdir(r->config->directory, 0777) != 0 && errno != EEXIST)
         return pt_fail(err, PT_EINVAL, "%s: %s", r->config->directory, strerror(errno));
     return resume(r, err);

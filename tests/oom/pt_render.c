@@ -1,0 +1,192 @@
+/* Every allocation of a render, of its outputs and of a sequence fails once: an error, no crash, no leak, no file left. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "render/checkpoint.h"
+#include "render/output.h"
+#include "render/sequence.h"
+#include "support/fail_alloc.h"
+#include "support/pt_fake.h"
+
+static char folder[] = "/tmp/pt_oom_XXXXXX";
+static struct pt_threads *pool;
+
+static int setup(void **state)
+{
+    struct pt_err err;
+    (void)state;
+    pool = pt_threads_create(1, &err);
+    return mkdtemp(folder) != NULL && pool != NULL ? 0 : -1;
+}
+
+static int teardown(void **state)
+{
+    char command[64];
+    (void)state;
+    pt_threads_destroy(pool);
+    snprintf(command, sizeof command, "rm -r %s", folder);
+    return system(command);
+}
+
+static const char *in_folder(const char *name)
+{
+    static char path[128];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    return path;
+}
+
+static int open_render(struct pt_render **render, struct pt_criterion **criterion, struct pt_err *err)
+{
+    struct pt_render_config config = pt_fake_config();
+    int rc = pt_criterion_create_table(pt_fake_criterion(), NULL, 0, pool, NULL, NULL, criterion, err);
+    config.planes = PT_FILM_ALL;
+    return rc == PT_OK ? pt_render_create(&config, NULL, pt_fake_nan, pool, *criterion, render, err) : rc;
+}
+
+static void creating(void **state)
+{
+    int failures = 0;
+    (void)state;
+    for (long k = 1; k < 1000; k++) {
+        struct pt_render *render = NULL;
+        struct pt_criterion *criterion = NULL;
+        struct pt_err err = {0};
+        fail_arm(k);
+        int rc = open_render(&render, &criterion, &err);
+        int happened = fail_disarm();
+        if (happened) {
+            assert_int_equal(rc, PT_ENOMEM);
+            assert_null(render);
+            assert_true(err.text[0] != '\0');
+            failures++;
+        }
+        pt_render_destroy(render);
+        pt_criterion_destroy(criterion);
+        if (!happened)
+            break;
+    }
+    assert_in_range(failures, 12, 100);
+}
+
+/* A check that runs out of memory costs time only: the blocks go on. */
+static void checking(void **state)
+{
+    struct pt_render *render = NULL;
+    struct pt_criterion *criterion = NULL;
+    struct pt_err err = {0};
+    struct pt_render_hooks hooks = {0};
+    enum pt_render_outcome outcome;
+    (void)state;
+    assert_int_equal(open_render(&render, &criterion, &err), PT_OK);
+    fail_arm(1); /* the first allocation of a running render is the list of patched pixels */
+    assert_int_equal(pt_render_run(render, &hooks, &outcome, &err), PT_OK);
+    assert_true(fail_disarm());
+    assert_int_equal(render->totals.failed_checks, 1);
+    for (uint32_t i = 0; i < render->blocks.count; i++)
+        assert_int_not_equal(render->blocks.list[i].reason, PT_REASON_NONE);
+    pt_render_destroy(render);
+    pt_criterion_destroy(criterion);
+}
+
+static struct pt_output_info info = {.scene = "a.pbrt", .kernel = "k", .aov = PT_FILM_AUX, .effects = PT_FX_ALL};
+
+static int write_report(struct pt_render *r, struct pt_err *err)
+{
+    return pt_output_report(in_folder("r.json"), r, &info, err);
+}
+static int write_exr(struct pt_render *r, struct pt_err *err)
+{
+    return pt_output_exr(in_folder("a.exr"), r, &info, err);
+}
+static int write_csv(struct pt_render *r, struct pt_err *err)
+{
+    return pt_output_stop_map(in_folder("s.csv"), r, &info, err);
+}
+static int save_checkpoint(struct pt_render *r, struct pt_err *err)
+{
+    return pt_checkpoint_save(in_folder("c.ckp"), r, "a=1\n", err);
+}
+static int load_checkpoint(struct pt_render *r, struct pt_err *err)
+{
+    return pt_checkpoint_load(in_folder("c.ckp"), r, "a=1\n", err);
+}
+
+static void writing(void **state)
+{
+    int (*const jobs[])(struct pt_render *, struct pt_err *) = {write_report, write_exr, write_csv, save_checkpoint, load_checkpoint};
+    struct pt_render *render = NULL;
+    struct pt_criterion *criterion = NULL;
+    struct pt_err err = {0};
+    struct pt_render_hooks hooks = {0};
+    enum pt_render_outcome outcome;
+    (void)state;
+    assert_int_equal(open_render(&render, &criterion, &err), PT_OK);
+    assert_int_equal(pt_render_run(render, &hooks, &outcome, &err), PT_OK);
+    for (int j = 0; j < 5; j++) {
+        for (long k = 1;; k++) {
+            fail_arm(k);
+            int rc = jobs[j](render, &err);
+            int happened = fail_disarm();
+            if (!happened) {
+                assert_int_equal(rc, PT_OK);
+                break;
+            }
+            if (rc == PT_OK) /* a library did without */
+                continue;
+            assert_true(rc == PT_ENOMEM || rc == PT_EIO);
+        }
+    }
+    pt_render_destroy(render);
+    pt_criterion_destroy(criterion);
+}
+
+static void say(void *data, const char *line)
+{
+    (void)data;
+    (void)line;
+}
+
+static void recording(void **state)
+{
+    struct pt_sequence_config config = {.directory = in_folder("seq"), .levels = "linear:2:4:2", .blocks = "3", .reference_spp = 2,
+                                        .scene_path = "a.pbrt", .quiet = 1, .render = pt_fake_config()};
+    char directory[128];
+    (void)state;
+    snprintf(directory, sizeof directory, "%s", config.directory);
+    config.directory = directory;
+    for (long k = 1;; k++) {
+        struct pt_err err = {0};
+        int stopped;
+        config.reference_spp = (uint64_t)k + 1; /* never to be resumed */
+        char manifest[160];
+        snprintf(manifest, sizeof manifest, "%s/manifest.json", directory);
+        unlink(manifest);
+        fail_arm(k);
+        int rc = pt_sequence_record(&config, NULL, pt_fake_noise, pool, NULL, NULL, say, NULL, &stopped, &err);
+        int happened = fail_disarm();
+        if (!happened) {
+            assert_int_equal(rc, PT_OK);
+            break;
+        }
+        assert_true(rc == PT_OK || rc == PT_ENOMEM || rc == PT_EIO);
+        if (k > 5000)
+            fail();
+    }
+    char command[160];
+    snprintf(command, sizeof command, "! ls -A %s | grep -q tmp", directory);
+    assert_int_equal(system(command), 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(creating), cmocka_unit_test(checking), cmocka_unit_test(writing),
+                                       cmocka_unit_test(recording)};
+    return cmocka_run_group_tests(tests, setup, teardown);
+}
