@@ -1,0 +1,30 @@
+/*
+ * The three networks at work on one block: noisy image → denoised image, window of both → logit of "still noisy".
+ *
+ * A judge owns activations for one image and one window and borrows the model; nothing is allocated after create. One call at
+ * a time per judge; any number of judges on one model. The result depends on the window alone, never on other blocks.
+ * Images are planar (see model/window.h), of any size: blocks unlike the network's size are cut into tiles or continued by
+ * reflection, and the noisiest tile speaks for the block.
+ */
+#ifndef GGN_MODEL_JUDGE_H
+#define GGN_MODEL_JUDGE_H
+
+#include "base/threads.h"
+#include "model/model.h"
+
+struct ggn_judge;
+
+/* `threads` may be NULL: the calling thread alone. NULL on failure. */
+struct ggn_judge *ggn_judge_create(const struct ggn_model *model, struct ggn_threads *threads, struct ggn_err *err);
+void ggn_judge_destroy(struct ggn_judge *judge);
+
+/* noisy [3][height][width] display codes → denoised, 16-bit fixed point. */
+void ggn_judge_denoise(struct ggn_judge *judge, const uint8_t *noisy, uint16_t *denoised, int width, int height);
+/* noisy, denoised: S images each, noisiest first. The raw logit of the discriminator; calibrate it with ggn_policy_p. */
+double ggn_judge_logit(struct ggn_judge *judge, const uint8_t *const *noisy, const uint16_t *const *denoised, int width,
+                       int height);
+/* The noise feature map of the last tile that was judged, for pictures: 0 of the denoised window, 1 of the noisy one. Rows are
+ * *row apart. Borrowed until the next call. */
+const float *ggn_judge_feature_map(const struct ggn_judge *judge, int which, int *row);
+
+#endif

@@ -1,0 +1,124 @@
+#include "model/policy.h"
+
+#include <cjson/cJSON.h>
+#include <math.h>
+#include <string.h>
+
+#include "nn/loss.h"
+
+/* Every field with its range but passes, which is an integer. `own`: a model's calibration has no place for it. */
+static const struct {
+    const char *name;
+    size_t offset;
+    double min, max;
+    int own;
+} fields[] = {
+    {"first_spp", offsetof(struct ggn_policy, first_spp), 1, 1e9, 1},
+    {"ratio", offsetof(struct ggn_policy, ratio), 0, 100, 1},
+    {"step_spp", offsetof(struct ggn_policy, step_spp), 0, 1e9, 1},
+    {"scale", offsetof(struct ggn_policy, scale), 1e-6, 1e6, 0},
+    {"shift", offsetof(struct ggn_policy, shift), -1e6, 1e6, 0},
+    {"threshold", offsetof(struct ggn_policy, threshold), 0, 1, 0},
+    {"gate_noise", offsetof(struct ggn_policy, gate_noise), 0, 1e6, 1},
+    {"slope", offsetof(struct ggn_policy, slope), 0, 1e6, 1},
+    {"tail999", offsetof(struct ggn_policy, tail999), 0, 1e30, 1},
+    {"gini", offsetof(struct ggn_policy, gini), 0, 2, 1},
+};
+enum { N_FIELDS = sizeof fields / sizeof fields[0], PASSES_MAX = 16 };
+
+static double get(const struct ggn_policy *p, int i)
+{
+    double v;
+    memcpy(&v, (const char *)p + fields[i].offset, sizeof v);
+    return v;
+}
+
+struct ggn_policy ggn_policy_default(void)
+{
+    return (struct ggn_policy){.first_spp = 20, .ratio = 1.15, .scale = 1, .threshold = 0.5, .passes = 2};
+}
+
+int ggn_policy_check(const struct ggn_policy *p, struct ggn_err *err)
+{
+    for (int i = 0; i < N_FIELDS; i++) {
+        double v = get(p, i);
+        if (!(v >= fields[i].min && v <= fields[i].max))
+            return ggn_fail(err, GGN_EINVAL, "policy: %s = %g is not in %g..%g", fields[i].name, v, fields[i].min, fields[i].max);
+    }
+    if (p->passes < 1 || p->passes > PASSES_MAX)
+        return ggn_fail(err, GGN_EINVAL, "policy: passes = %d is not in 1..%d", p->passes, PASSES_MAX);
+    if (p->ratio <= 1.001 && p->step_spp < 1)
+        return ggn_fail(err, GGN_EINVAL, "policy: neither a ratio above 1 nor a step says how levels are spaced");
+    return GGN_OK;
+}
+
+double ggn_policy_p(const struct ggn_policy *p, double logit)
+{
+    return ggn_sigmoid(p->scale * logit + p->shift);
+}
+
+double ggn_policy_next(const struct ggn_policy *p, double spp)
+{
+    double next = p->ratio > 1.001 ? floor(spp * p->ratio + 0.5) : spp + p->step_spp;
+
+    return fmax(next, spp + 1);
+}
+
+double ggn_policy_predict(const struct ggn_policy *policy, double p, double threshold, double spp)
+{
+    if (!(policy->slope > 0) || !(p >= 0))
+        return (double)NAN;
+    double clamped = fmin(fmax(p, 1e-6), 1 - 1e-6), t = fmin(fmax(threshold, 1e-6), 1 - 1e-6);
+    double above = log(clamped / (1 - clamped)) - log(t / (1 - t));
+    return above > 0 ? spp * exp2(fmin(above / policy->slope, 20)) : spp;
+}
+
+int ggn_policy_set(struct ggn_model *model, const struct ggn_policy *policy, struct ggn_err *err)
+{
+    cJSON *object = cJSON_CreateObject();
+    int rc = ggn_policy_check(policy, err), ok = object != NULL;
+
+    for (int i = 0; i < N_FIELDS && !rc; i++)
+        if (fields[i].own)
+            ok = ok && cJSON_AddNumberToObject(object, fields[i].name, get(policy, i));
+    if (!rc && !ok)
+        rc = ggn_fail_nomem(err, "model policy");
+    if (rc) {
+        cJSON_Delete(object);
+        return rc;
+    }
+    cJSON_DeleteItemFromObjectCaseSensitive(model->provenance, "policy");
+    cJSON_AddItemToObject(model->provenance, "policy", object);
+    model->calibration = (struct ggn_calibration){
+        .scale = policy->scale,
+        .shift = policy->shift,
+        .threshold = policy->threshold,
+        .consecutive = policy->passes,
+        .spacing = policy->ratio > 1 ? policy->ratio : 1,
+    };
+    return GGN_OK;
+}
+
+int ggn_policy_of(const struct ggn_model *model, struct ggn_policy *policy, struct ggn_err *err)
+{
+    struct ggn_policy p = ggn_policy_default();
+    const struct ggn_calibration *c = &model->calibration;
+    const cJSON *object = cJSON_GetObjectItemCaseSensitive(model->provenance, "policy");
+
+    p.scale = c->scale;
+    p.shift = c->shift;
+    p.threshold = c->threshold;
+    p.passes = c->consecutive;
+    p.ratio = c->spacing;
+    for (int i = 0; i < N_FIELDS; i++) {
+        const cJSON *item = fields[i].own ? cJSON_GetObjectItemCaseSensitive(object, fields[i].name) : NULL;
+        if (item && !cJSON_IsNumber(item))
+            return ggn_fail(err, GGN_EINVAL, "policy: %s is not a number", fields[i].name);
+        if (item)
+            memcpy((char *)&p + fields[i].offset, &item->valuedouble, sizeof item->valuedouble);
+    }
+    int rc = ggn_policy_check(&p, err);
+    if (!rc)
+        *policy = p;
+    return rc;
+}

@@ -1,0 +1,39 @@
+/*
+ * How a trained model is to be used: cadence, calibration, threshold, gate. Chosen on validation scenes by the trainer. In a
+ * model file: the model's calibration, and what that does not have as "policy" in its provenance. A plain value.
+ */
+#ifndef GGN_MODEL_POLICY_H
+#define GGN_MODEL_POLICY_H
+
+#include <stddef.h>
+
+#include "model/model.h"
+
+struct ggn_policy {
+    double first_spp;  /* samples of the first image of a window */
+    double ratio;      /* samples of one image to those of the one before, > 1; 0: levels are step_spp apart */
+    double step_spp;
+    double scale, shift; /* calibration (Platt): p_noisy = sigmoid(scale · logit + shift) */
+    double threshold;  /* stop when p_noisy < threshold ... */
+    int passes;        /* ... in so many checks in a row */
+    double gate_noise; /* above this window noise (ggn_window_noise) a block is plainly noisy: no network needed; 0: never */
+    double slope;      /* by how much the calibrated logit falls when the samples double; for predictions; 0: not known */
+    double tail999, gini; /* a block whose half buffer exceeds either is held back, see the criterion; 0: no guard */
+};
+
+struct ggn_policy ggn_policy_default(void);
+/* GGN_EINVAL naming the field that is out of range. */
+int ggn_policy_check(const struct ggn_policy *policy, struct ggn_err *err);
+
+double ggn_policy_p(const struct ggn_policy *policy, double logit);
+/* Samples at which a block last judged at `spp` is to be judged again; > spp. */
+double ggn_policy_next(const struct ggn_policy *policy, double spp);
+/* Samples at which p is expected to fall below `threshold`, from p at spp; at least spp. NaN if the slope is not known. */
+double ggn_policy_predict(const struct ggn_policy *policy, double p, double threshold, double spp);
+
+/* What the model says, defaults elsewhere. GGN_EINVAL when a field is out of range. */
+int ggn_policy_of(const struct ggn_model *model, struct ggn_policy *policy, struct ggn_err *err);
+/* Puts the policy into the model. */
+int ggn_policy_set(struct ggn_model *model, const struct ggn_policy *policy, struct ggn_err *err);
+
+#endif

@@ -1,0 +1,127 @@
+#include "model/window.h"
+
+#include <math.h>
+#include <string.h>
+
+double ggn_window_noise(const uint8_t *first, const uint8_t *last, size_t count, double spp_first, double spp_last)
+{
+    uint64_t sum = 0;
+
+    for (size_t i = 0; i < count; i++) {
+        int d = (int)first[i] - last[i];
+        sum += (uint64_t)(d * d);
+    }
+    return count ? sqrt((double)sum / (double)count / (spp_last / spp_first - 1)) / 255 : 0;
+}
+
+int ggn_tile_count(int size, int tile)
+{
+    return size <= tile ? 1 : (size + tile - 1) / tile;
+}
+
+int ggn_tile_start(int size, int tile, int index)
+{
+    int n = ggn_tile_count(size, tile);
+
+    return n == 1 ? 0 : (int)((long)(size - tile) * index / (n - 1));
+}
+
+/* Position inside [0, size) of position i >= 0 of the endless reflection. */
+static int reflect(int i, int size)
+{
+    int k = i % (2 * size);
+
+    return k < size ? k : 2 * size - 1 - k;
+}
+
+#define TILE_LOAD(NAME, TYPE)                                                                                         \
+    void NAME(const TYPE *src, int width, int height, int x0, int y0, int tile_w, int tile_h, float scale, float *dst, \
+              size_t dst_row, size_t dst_plane)                                                                       \
+    {                                                                                                                 \
+        int inside = width - x0 < tile_w ? width - x0 : tile_w;                                                       \
+                                                                                                                      \
+        for (int c = 0; c < 3; c++)                                                                                   \
+            for (int y = 0; y < tile_h; y++) {                                                                        \
+                const TYPE *from = src + ((size_t)c * (size_t)height + (size_t)reflect(y0 + y, height)) * (size_t)width; \
+                float *to = dst + (size_t)c * dst_plane + (size_t)y * dst_row;                                        \
+                for (int x = 0; x < inside; x++)                                                                      \
+                    to[x] = (float)from[x0 + x] * scale;                                                              \
+                for (int x = inside; x < tile_w; x++)                                                                 \
+                    to[x] = (float)from[reflect(x0 + x, width)] * scale;                                              \
+            }                                                                                                         \
+    }
+TILE_LOAD(ggn_tile_load_u8, uint8_t)
+TILE_LOAD(ggn_tile_load_u16, uint16_t)
+
+void ggn_tile_store_u16(uint16_t *dst, int width, int height, int x0, int y0, int tile_w, int tile_h, const float *src,
+                        size_t src_row, size_t src_plane)
+{
+    int w = width - x0 < tile_w ? width - x0 : tile_w, h = height - y0 < tile_h ? height - y0 : tile_h;
+
+    for (int c = 0; c < 3; c++)
+        for (int y = 0; y < h; y++) {
+            const float *from = src + (size_t)c * src_plane + (size_t)y * src_row;
+            uint16_t *to = dst + ((size_t)c * (size_t)height + (size_t)(y0 + y)) * (size_t)width + x0;
+            for (int x = 0; x < w; x++) {
+                float v = from[x] > 0 ? from[x] : 0;
+                to[x] = (uint16_t)((v < 1 ? v : 1) * 65535 + 0.5F);
+            }
+        }
+}
+
+/* 32 bins to the octave from 2^-30 on. */
+static const double BINS_PER_OCTAVE = 32, LOWEST = -30;
+
+static double bin_value(int bin)
+{
+    return bin ? exp2(LOWEST + (bin - 0.5) / BINS_PER_OCTAVE) : 0;
+}
+
+void ggn_tail_clear(struct ggn_tail *tail)
+{
+    memset(tail, 0, sizeof *tail);
+}
+
+void ggn_tail_add(struct ggn_tail *tail, double y, double d)
+{
+    double a = fabs(d);
+    int bin = 0;
+
+    if (a >= 0x1p-30) {
+        double position = (log2(a) - LOWEST) * BINS_PER_OCTAVE + 1;
+        bin = position < GGN_TAIL_BINS - 1 ? (int)position : GGN_TAIL_BINS - 1;
+    }
+    tail->bin[bin]++;
+    tail->sum_y += y;
+    tail->pixels++;
+}
+
+double ggn_tail_999(const struct ggn_tail *tail)
+{
+    if (!tail->pixels)
+        return 0;
+    double mean = tail->sum_y / tail->pixels;
+    uint32_t rank = (uint32_t)ceil(0.999 * tail->pixels), seen = 0;
+    int bin = 0;
+
+    for (; bin < GGN_TAIL_BINS - 1; bin++) {
+        seen += tail->bin[bin];
+        if (seen >= rank)
+            break;
+    }
+    return bin_value(bin) / (mean > 1e-4 ? mean : 1e-4);
+}
+
+double ggn_tail_gini(const struct ggn_tail *tail)
+{
+    double sum = 0, weighted = 0, below = 0;
+
+    /* Σ (2i − P − 1) a_i over the sorted values; the ranks of a bin average to below + (count + 1)/2. */
+    for (int bin = 0; bin < GGN_TAIL_BINS; bin++) {
+        double count = tail->bin[bin], a = bin_value(bin);
+        weighted += count * a * (2 * below + count - (double)tail->pixels);
+        sum += count * a;
+        below += count;
+    }
+    return sum > 0 ? weighted / (tail->pixels * sum) : 0;
+}

@@ -1,0 +1,48 @@
+/*
+ * What trainer, evaluation and criterion must do alike with a block's images: fixed point of denoised images, the noise
+ * statistic that spares the network, tiles of blocks that have another size than the network. Pure functions, any thread.
+ *
+ * A block's image is planar here: [3][height][width], all of R, then G, then B; display code 0..255 (noisy) or 16-bit
+ * fixed point, 65535 = 1 (denoised).
+ */
+#ifndef GGN_MODEL_WINDOW_H
+#define GGN_MODEL_WINDOW_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+/* Root mean square, in display units (1 = white), of the noise left in `last`, told from an earlier image of the same block
+ * whose samples `last` contains: var(first − last) = σ²·(1/n_first − 1/n_last), so noise² = msd / (n_last/n_first − 1).
+ * count: values per image. Needs spp_last > spp_first. */
+double ggn_window_noise(const uint8_t *first, const uint8_t *last, size_t count, double spp_first, double spp_last);
+
+/* Tiles of size `tile` that cover `size` pixels, evenly spread, overlapping as needed: their number, and where one begins.
+ * A block smaller than a tile is one tile at 0, continued by reflection. */
+int ggn_tile_count(int size, int tile);
+int ggn_tile_start(int size, int tile, int index);
+
+/* Copies the tile at (x0, y0) of a planar image into a planar float tile, dst(c, y, x) = src · scale. dst_row and dst_plane are
+ * the distances in floats between rows and planes of dst. Beyond the edge the image is reflected (… c b a | a b c …). */
+void ggn_tile_load_u8(const uint8_t *src, int width, int height, int x0, int y0, int tile_w, int tile_h, float scale,
+                      float *dst, size_t dst_row, size_t dst_plane);
+void ggn_tile_load_u16(const uint16_t *src, int width, int height, int x0, int y0, int tile_w, int tile_h, float scale,
+                       float *dst, size_t dst_row, size_t dst_plane);
+/* Stores the part of a float tile in [0, 1] that lies inside the image, rounded to 16-bit fixed point; NaN is 0. */
+void ggn_tile_store_u16(uint16_t *dst, int width, int height, int x0, int y0, int tile_w, int tile_h, const float *src,
+                        size_t src_row, size_t src_plane);
+
+/* The statistics `tail999` and `gini` of ggn/data/FORMAT.md from a histogram of |Y(D)| in logarithmic bins (relative error
+ * below 1.5 %): no sorting, no allocation. */
+enum { GGN_TAIL_BINS = 2048 };
+struct ggn_tail {
+    uint32_t bin[GGN_TAIL_BINS]; /* bin 0: below 2^-30 */
+    double sum_y;
+    uint32_t pixels;
+};
+void ggn_tail_clear(struct ggn_tail *tail);
+/* y: luminance of the mean; d: of the half-buffer difference. Both finite. */
+void ggn_tail_add(struct ggn_tail *tail, double y, double d);
+double ggn_tail_999(const struct ggn_tail *tail);
+double ggn_tail_gini(const struct ggn_tail *tail);
+
+#endif
