@@ -1,0 +1,10 @@
+#include "plugin/criteria.h"
+
+static const struct lull_criterion *const criteria[] = {
+    &ggn_plugin_network,
+};
+
+LULL_EXPORT const struct lull_criterion *lull_criterion_entry_v1(uint32_t index)
+{
+    return index < sizeof criteria / sizeof criteria[0] ? criteria[index] : NULL;
+}

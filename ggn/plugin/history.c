@@ -1,0 +1,182 @@
+#include "plugin/history.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "plugin/text.h"
+#include "plugin/view.h"
+
+static size_t pixels_of(const struct lull_rect *r)
+{
+    return (size_t)((int64_t)r->x1 - r->x0) * (size_t)((int64_t)r->y1 - r->y0);
+}
+
+/* A slot: 3 bytes and 3 16-bit values per pixel, kept 64-byte aligned. */
+static size_t slot_bytes(size_t pixels)
+{
+    return (9 * pixels + 63) & ~(size_t)63;
+}
+
+uint64_t gp_history_block_bytes(int window, int32_t width, int32_t height)
+{
+    return (uint64_t)(window + 1) * slot_bytes((size_t)width * (size_t)height) + 2 * sizeof(struct gp_head);
+}
+
+static void head_clear(struct gp_head *head, int window)
+{
+    memset(head, 0, sizeof *head);
+    for (int i = 0; i <= window; i++)
+        head->order[i] = (uint32_t)i;
+}
+
+int32_t gp_history_create(struct gp_history *history, int window, const struct lull_frame *frame, struct lull_error *err)
+{
+    uint64_t pixels = 0;
+    size_t n = frame->block_count;
+
+    for (uint32_t i = 0; i < frame->block_count; i++)
+        pixels += (uint64_t)(window + 1) * slot_bytes(pixels_of(gp_frame_block(frame, i)));
+    uint64_t heads = 2 * n * sizeof(struct gp_head) + n * (sizeof(struct lull_rect) + sizeof(size_t)) + 256;
+    if (pixels > PTRDIFF_MAX - heads)
+        return gp_fail(err, LULL_E_MEMORY, "begin_frame: the blocks are too large for memory");
+    unsigned char *memory = aligned_alloc(64, (size_t)((pixels + heads + 63) & ~(uint64_t)63));
+    if (!memory)
+        return gp_fail(err, LULL_E_MEMORY, "begin_frame: no memory for the history of %u blocks", frame->block_count);
+
+    struct gp_history h = {.window = window, .count = frame->block_count, .memory = memory, .pixels = memory};
+    void *p = memory + pixels;
+    h.head = p;
+    h.pending = h.head + n;
+    p = h.pending + n;
+    h.at = p;
+    p = h.at + n;
+    h.rect = p;
+    size_t at = 0;
+    for (uint32_t i = 0; i < frame->block_count; i++) {
+        h.rect[i] = *gp_frame_block(frame, i);
+        h.at[i] = at;
+        at += (size_t)(window + 1) * slot_bytes(pixels_of(&h.rect[i]));
+        head_clear(&h.head[i], window);
+    }
+    *history = h;
+    return LULL_OK;
+}
+
+void gp_history_release(struct gp_history *history)
+{
+    free(history->memory);
+    *history = (struct gp_history){0};
+}
+
+uint8_t *gp_history_noisy(const struct gp_history *h, uint32_t id, uint32_t slot)
+{
+    return h->pixels + h->at[id] + slot * slot_bytes(pixels_of(&h->rect[id])) + 6 * pixels_of(&h->rect[id]);
+}
+
+uint16_t *gp_history_denoised(const struct gp_history *h, uint32_t id, uint32_t slot)
+{
+    void *p = h->pixels + h->at[id] + slot * slot_bytes(pixels_of(&h->rect[id]));
+    return p;
+}
+
+uint32_t gp_head_push(struct gp_head *head, int window, uint64_t spp)
+{
+    uint32_t slot = head->order[head->used];
+
+    if (head->used < (uint32_t)window) {
+        head->used++;
+    } else {
+        /* the oldest image leaves; its slot is the next spare one */
+        uint32_t oldest = head->order[0];
+        memmove(head->order, head->order + 1, (size_t)window * sizeof head->order[0]);
+        head->order[window] = oldest;
+    }
+    head->spp[slot] = spp;
+    head->denoised &= ~(UINT32_C(1) << slot);
+    head->regular = head->jumped ? 1 : head->regular < head->used ? head->regular + 1 : head->used;
+    head->jumped = 0;
+    return slot;
+}
+
+/* --- lull.state/1 ------------------------------------------------------------------------------------------------------ */
+
+static const char MAGIC[8] = {'G', 'G', 'N', 'S', 'T', 'A', 'T', '1'};
+
+struct state_header {
+    char magic[8];
+    uint32_t key, count, window, head_bytes;
+};
+
+static struct state_header header_of(const struct gp_history *h, uint32_t key)
+{
+    struct state_header header = {{0}, key, h->count, (uint32_t)h->window, (uint32_t)sizeof(struct gp_head)};
+
+    memcpy(header.magic, MAGIC, sizeof MAGIC);
+    return header;
+}
+
+int32_t gp_history_save(const struct gp_history *h, uint32_t key, const struct lull_writer *writer, struct lull_error *err)
+{
+    struct state_header header = header_of(h, key);
+    int32_t status = writer->write(writer, &header, sizeof header);
+
+    for (uint32_t id = 0; !status && id < h->count; id++) {
+        struct gp_head head = h->head[id];
+        size_t image = 3 * pixels_of(&h->rect[id]);
+
+        head.denoised = 0; /* denoised images are computed again on demand: the same bytes, and a file a third of the size */
+        status = writer->write(writer, &h->rect[id], sizeof h->rect[id]);
+        if (!status)
+            status = writer->write(writer, &head, sizeof head);
+        for (uint32_t i = 0; !status && i < head.used; i++)
+            status = writer->write(writer, gp_history_noisy(h, id, head.order[i]), image);
+    }
+    return status ? gp_fail(err, status, "state: the host could not write it") : LULL_OK;
+}
+
+/* Whether a head from a file may be trusted as an index into memory. */
+static int head_valid(const struct gp_head *head, int window)
+{
+    uint32_t seen = 0;
+
+    for (int i = 0; i <= window; i++) {
+        if (head->order[i] > (uint32_t)window || (seen >> head->order[i] & 1))
+            return 0;
+        seen |= UINT32_C(1) << head->order[i];
+    }
+    for (uint32_t i = 0; i < head->used && i < (uint32_t)window; i++)
+        if (!head->spp[head->order[i]] || (i && head->spp[head->order[i]] <= head->spp[head->order[i - 1]]))
+            return 0;
+    return head->used <= (uint32_t)window && head->regular <= head->used && head->denoised == 0 && head->jumped <= 1 &&
+           (head->answer.action == LULL_CONTINUE || head->answer.action == LULL_STOP);
+}
+
+static int32_t load_blocks(struct gp_history *h, const struct lull_reader *reader, struct lull_error *err)
+{
+    for (uint32_t id = 0; id < h->count; id++) {
+        struct lull_rect rect;
+        struct gp_head head;
+        size_t image = 3 * pixels_of(&h->rect[id]);
+
+        if (reader->read(reader, &rect, sizeof rect) || reader->read(reader, &head, sizeof head))
+            return gp_fail(err, LULL_E_IO, "state: it ends early, at block %u", id);
+        if (memcmp(&rect, &h->rect[id], sizeof rect) || !head_valid(&head, h->window))
+            return gp_fail(err, LULL_E_IO, "state: block %u does not fit the frame", id);
+        for (uint32_t i = 0; i < head.used; i++)
+            if (reader->read(reader, gp_history_noisy(h, id, head.order[i]), image))
+                return gp_fail(err, LULL_E_IO, "state: it ends early, at block %u", id);
+        h->head[id] = head;
+    }
+    return LULL_OK;
+}
+
+int32_t gp_history_load(struct gp_history *h, uint32_t key, const struct lull_reader *reader, struct lull_error *err)
+{
+    struct state_header header, wanted = header_of(h, key);
+
+    if (reader->read(reader, &header, sizeof header))
+        return gp_fail(err, LULL_E_IO, "state: it ends early");
+    if (memcmp(&header, &wanted, sizeof header))
+        return gp_fail(err, LULL_E_IO, "state: saved by another criterion, model, parameter set or frame");
+    return load_blocks(h, reader, err);
+}

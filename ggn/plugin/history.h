@@ -1,0 +1,65 @@
+/*
+ * What the criterion remembers of a frame: for each block the last S images it judged, keyed by spp.
+ *
+ * One allocation per frame. A block owns S + 1 slots: a new image goes into the spare one and becomes part of the history only
+ * when the whole evaluate call has succeeded (gp_history_commit), so that a failed or cancelled call leaves no trace. Tasks on
+ * different blocks may run at the same time; nothing else is thread-safe.
+ */
+#ifndef GGN_PLUGIN_HISTORY_H
+#define GGN_PLUGIN_HISTORY_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include <lull/criterion.h>
+
+enum { GP_WINDOW_MAX = 16, GP_SLOTS_MAX = GP_WINDOW_MAX + 1 };
+
+/* The answer kept for a block that is asked again. */
+struct gp_answer {
+    int32_t action;
+    uint32_t flags;
+    uint64_t next_spp;
+    double p_noisy, predicted_spp, error;
+};
+
+/* Fixed-size part of a block's history. Copied as a whole between pending and current. */
+struct gp_head {
+    uint64_t asked_spp;            /* of `answer`; 0 = never asked */
+    uint64_t spp[GP_SLOTS_MAX];    /* by slot */
+    uint32_t order[GP_SLOTS_MAX];  /* slots, oldest image first; order[used] is the spare one */
+    uint32_t used;                 /* images kept, 0..S */
+    uint32_t regular;              /* of those the newest that are spaced as the network learned them */
+    uint32_t denoised;             /* bit per slot: its denoised image is there */
+    uint32_t passes;               /* checks in a row below the threshold */
+    uint32_t jumped;               /* the last answer asked for a larger step than the network learned */
+    struct gp_answer answer;
+};
+
+struct gp_history {
+    int window;                   /* S */
+    uint32_t count;               /* blocks */
+    struct lull_rect *rect;       /* owns, with everything below, as one allocation */
+    size_t *at;                   /* offset of the block's slots in `pixels` */
+    struct gp_head *head, *pending;
+    unsigned char *pixels;
+    void *memory;
+};
+
+/* Bytes of one block of this size. */
+uint64_t gp_history_block_bytes(int window, int32_t width, int32_t height);
+/* Copies the rectangles of a checked frame. LULL_E_MEMORY leaves *history as it was. */
+int32_t gp_history_create(struct gp_history *history, int window, const struct lull_frame *frame, struct lull_error *err);
+void gp_history_release(struct gp_history *history);
+
+uint8_t *gp_history_noisy(const struct gp_history *h, uint32_t id, uint32_t slot);      /* [3][height][width] */
+uint16_t *gp_history_denoised(const struct gp_history *h, uint32_t id, uint32_t slot);  /* [3][height][width] */
+
+/* Makes the spare slot the newest image of `head` (a pending one); returns the slot. */
+uint32_t gp_head_push(struct gp_head *head, int window, uint64_t spp);
+
+/* lull.state/1: everything above, checked on the way in. `key` identifies model and parameters. */
+int32_t gp_history_save(const struct gp_history *h, uint32_t key, const struct lull_writer *writer, struct lull_error *err);
+int32_t gp_history_load(struct gp_history *h, uint32_t key, const struct lull_reader *reader, struct lull_error *err);
+
+#endif

@@ -1,0 +1,38 @@
+#define _GNU_SOURCE /* dladdr */
+#include "plugin/model_path.h"
+
+#include <dlfcn.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#define MODEL_NAME "lull-1.ggn"
+
+int gp_model_find(char *path, size_t room)
+{
+    /* build/lib/lull and build/MODE/lib/lull lie three and four folders below the tree's root */
+    static const char *const places[] = {".", "../share/lull", "../../share/lull", "../../../ggn/models", "../../../../ggn/models"};
+    static const char anchor = 0; /* an address inside this shared object */
+    const char *named = getenv("LULL_MODEL");
+    char folder[4096] = ".";
+    Dl_info info;
+
+    if (named && *named) {
+        snprintf(path, room, "%s", named);
+        return 1;
+    }
+    if (dladdr(&anchor, &info) && info.dli_fname) {
+        const char *slash = strrchr(info.dli_fname, '/');
+        if (slash)
+            snprintf(folder, sizeof folder, "%.*s", (int)(slash - info.dli_fname), info.dli_fname);
+    }
+    for (size_t i = 0; i < sizeof places / sizeof places[0]; i++) {
+        int n = snprintf(path, room, "%s/%s/" MODEL_NAME, folder, places[i]);
+        if (n > 0 && (size_t)n < room && access(path, R_OK) == 0)
+            return 1;
+    }
+    snprintf(path, room, "no " MODEL_NAME " beside %.200s, in ../share/lull, ../../share/lull or the source tree's ggn/models; "
+                         "give model=FILE or set LULL_MODEL", info.dli_fname ? info.dli_fname : "the criterion");
+    return 0;
+}
