@@ -20,7 +20,8 @@
     X(flip, "visible difference of two images (LDR-FLIP)") \
     X(compare, "stop maps or thresholds against (human) thresholds") \
     X(import_sin3d, "SIN3D images into block sequences") \
-    X(label, "thresholds for recorded sequences: human, or a model observer's")
+    X(label, "thresholds for recorded sequences: human, or a model observer's") \
+    X(train, "train a stopping criterion on block sequences")
 
 #define GGN_DECLARE_COMMAND(name, help) int ggn_cmd_##name(int argc, char **argv);
 GGN_COMMANDS(GGN_DECLARE_COMMAND)

@@ -1,0 +1,34 @@
+/* From logits on the validation scenes to a policy. Pure functions but for scratch memory. */
+#ifndef GGN_TRAIN_CALIBRATE_H
+#define GGN_TRAIN_CALIBRATE_H
+
+#include "model/policy.h"
+#include "train/windows.h"
+
+/* Platt 1999: scale, shift that maximise the likelihood of `label` under sigmoid(scale·logit + shift); a weak prior keeps
+ * scale positive and finite when the classes are separable. Without both classes the policy keeps what it has. */
+void ggn_calibrate_platt(const double *logit, const double *label, int n, struct ggn_policy *policy);
+
+/* What a threshold t does to the blocks of a window list. */
+struct ggn_stopping {
+    int blocks;
+    double early_rate;    /* share stopped below 0.8 of the true threshold */
+    double samples_ratio; /* samples spent / samples at the true thresholds */
+    double median_abs_log2;
+};
+/* logit: of each window of `windows`. */
+int ggn_calibrate_stopping(const struct ggn_windows *windows, const double *logit, const struct ggn_policy *policy, double t,
+                           struct ggn_stopping *out, struct ggn_err *err);
+
+/* The largest threshold, in steps of 0.01, that keeps the early rate at or below `early_rate`; 0.01 if none does. */
+int ggn_calibrate_threshold(const struct ggn_windows *windows, const double *logit, double early_rate, struct ggn_policy *policy,
+                            struct ggn_stopping *out, struct ggn_err *err);
+
+/* Mean fall of the calibrated logit per octave of samples near the threshold. */
+double ggn_calibrate_slope(const struct ggn_windows *windows, const double *logit, const struct ggn_policy *policy);
+
+/* Gate and guard limits from windows at or beyond the threshold (down to 0.8 of it for the gate): the largest seen, with a
+ * margin. Raises what the policy already has, so that several lists can be gone through. */
+void ggn_calibrate_limits(const struct ggn_windows *windows, struct ggn_policy *policy);
+
+#endif

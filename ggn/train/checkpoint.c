@@ -1,0 +1,214 @@
+/*
+ * OUT.ckpt: everything that continuing a run bit-exactly needs, as a .ggn file (model/container.h): the arrays of
+ * ggn_session_array as tensors "0", "1", …, progress, optimiser counts and learning curves as JSON of "kind": "training".
+ */
+#include <cjson/cJSON.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <zlib.h>
+
+#include "model/container.h"
+#include "train/session.h"
+
+enum { N_ROW = 9 };
+
+uint32_t ggn_session_key(const struct ggn_session *s)
+{
+    const struct ggn_train_plan *p = s->plan;
+    const double numbers[] = {(double)p->preset, p->window, p->k_r, p->k_m, p->k_d, p->crop, p->batch_r, p->batch, p->steps_r, p->steps,
+                              p->epochs, p->epoch_steps, p->patience, p->lr_r, p->lr, p->difference, p->soft_labels, p->jitter,
+                              p->synthetic, p->validation_windows, p->seed, s->set.width, s->set.height, s->set.n};
+    uLong crc = crc32(0, (const Bytef *)numbers, sizeof numbers);
+
+    for (int i = 0; i < s->set.n; i++) {
+        const struct ggn_chain *c = &s->set.chains[i];
+        const double what[] = {c->split, c->block, c->n_levels, c->has_label ? c->label.threshold : -1};
+        crc = crc32(crc, (const Bytef *)what, sizeof what);
+        if (c->n_levels)
+            crc = crc32(crc, c->noisy, (uInt)(ggn_chains_values(&s->set) < 4096 ? ggn_chains_values(&s->set) : 4096));
+    }
+    if (p->init)
+        crc = crc32(crc, (const Bytef *)p->init, (uInt)strlen(p->init));
+    return (uint32_t)crc;
+}
+
+float *ggn_session_array(struct ggn_session *s, int i, size_t *count)
+{
+    const struct ggn_graph *g;
+
+    if (s->progress.phase == GGN_PHASE_DENOISER)
+        return ggn_trainer_state_f32(s->trainer, GGN_NET_R, i, count);
+    if (i < 5 && s->hyper.preset == GGN_PRESET_PAPER)
+        return ggn_trainer_state_f32(s->trainer, GGN_NET_R, i, count);
+    if (i < 3) {
+        *count = i == 0 ? s->r_graph.n_params : s->r_graph.n_stats;
+        return i == 0 ? s->r->params : i == 1 ? s->r->mean : s->r->var;
+    }
+    i -= s->hyper.preset == GGN_PRESET_PAPER ? 5 : 3;
+    if (i < 10)
+        return ggn_trainer_state_f32(s->trainer, i < 5 ? GGN_NET_M : GGN_NET_D, i % 5, count);
+    i -= 10;
+    if (i > 1 && !(i == 2 && s->best_r))
+        return NULL;
+    g = &s->trainer->graph[i == 0 ? GGN_NET_M : i == 1 ? GGN_NET_D : GGN_NET_R];
+    *count = g->n_params + 2 * g->n_stats;
+    return i == 2 ? s->best_r : s->best[i];
+}
+
+/* --- JSON ---------------------------------------------------------------------------------------------------------------- */
+
+static double *row_field(struct ggn_log_row *r, int i)
+{
+    double *const fields[N_ROW] = {NULL, &r->step, &r->loss, &r->accuracy, &r->validation_loss, &r->validation_accuracy,
+                                   &r->validation_auc, &r->lr, &r->seconds};
+    return fields[i];
+}
+
+static char *describe(struct ggn_session *s)
+{
+    const struct ggn_progress *p = &s->progress;
+    cJSON *root = cJSON_CreateObject(), *rows = cJSON_AddArrayToObject(root, "log");
+    const struct {
+        const char *name;
+        double value;
+    } numbers[] = {{"key", ggn_session_key(s)}, {"phase", p->phase}, {"step", (double)p->step}, {"stale", p->stale}, {"divergences", p->divergences},
+                   {"best_auc", p->best_auc}, {"best_loss", p->best_loss}, {"best_step", (double)p->best_step},
+                   {"seconds0", p->seconds[0]}, {"seconds1", p->seconds[1]},
+                   {"steps", (double)s->trainer->steps}, {"t0", (double)s->trainer->adam_t[0]},
+                   {"t1", (double)s->trainer->adam_t[1]}, {"t2", (double)s->trainer->adam_t[2]}};
+
+    cJSON_AddStringToObject(root, "kind", "training");
+    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)
+        cJSON_AddNumberToObject(root, numbers[i].name, numbers[i].value); /* NaN is written as null */
+    for (int i = 0; i < s->log.n; i++) {
+        cJSON *row = cJSON_CreateArray();
+        cJSON_AddItemToArray(row, cJSON_CreateNumber(s->log.rows[i].phase));
+        for (int k = 1; k < N_ROW; k++)
+            cJSON_AddItemToArray(row, cJSON_CreateNumber(*row_field(&s->log.rows[i], k)));
+        cJSON_AddItemToArray(rows, row);
+    }
+    char *text = cJSON_PrintUnformatted(root);
+    cJSON_Delete(root);
+    return text;
+}
+
+static double number(const cJSON *item)
+{
+    return cJSON_IsNumber(item) ? item->valuedouble : (double)NAN;
+}
+
+static double field(const cJSON *root, const char *name)
+{
+    return number(cJSON_GetObjectItemCaseSensitive(root, name));
+}
+
+static int restore(struct ggn_session *s, const cJSON *root, const char *path, struct ggn_err *err)
+{
+    struct ggn_progress *p = &s->progress;
+    const cJSON *row;
+    double step = field(root, "step"), steps = field(root, "steps");
+
+    if (!(step >= 0) || !(steps >= 0) || !(field(root, "t0") >= 0) || !(field(root, "t1") >= 0) || !(field(root, "t2") >= 0))
+        return ggn_fail(err, GGN_EINVAL, "%s: progress is missing", path);
+    p->step = (uint64_t)step;
+    p->stale = (int)fmax(field(root, "stale"), 0);
+    p->divergences = (int)fmax(field(root, "divergences"), 0);
+    p->best_auc = field(root, "best_auc");
+    p->best_loss = field(root, "best_loss");
+    p->best_step = (uint64_t)fmax(field(root, "best_step"), 0);
+    p->seconds[0] = field(root, "seconds0");
+    p->seconds[1] = field(root, "seconds1");
+    s->trainer->steps = (uint64_t)steps;
+    s->trainer->adam_t[0] = (uint64_t)field(root, "t0");
+    s->trainer->adam_t[1] = (uint64_t)field(root, "t1");
+    s->trainer->adam_t[2] = (uint64_t)field(root, "t2");
+    ggn_log_release(&s->log);
+    cJSON_ArrayForEach(row, cJSON_GetObjectItemCaseSensitive(root, "log")) {
+        struct ggn_log_row r = {.phase = (int)number(cJSON_GetArrayItem(row, 0)) != 0};
+        for (int k = 1; k < N_ROW; k++)
+            *row_field(&r, k) = number(cJSON_GetArrayItem(row, k));
+        int rc = ggn_log_add(&s->log, &r, err);
+        if (rc)
+            return rc;
+    }
+    return GGN_OK;
+}
+
+/* --- file ---------------------------------------------------------------------------------------------------------------- */
+
+int ggn_session_save(struct ggn_session *s, const char *path, struct ggn_err *err)
+{
+    struct ggn_container c = {.json = describe(s)};
+    size_t count;
+    float *array;
+    int rc = c.json ? GGN_OK : ggn_fail_nomem(err, "checkpoint");
+
+    for (int i = 0; !rc && (array = ggn_session_array(s, i, &count)); i++) {
+        char name[16];
+        int dim = (int)count;
+        snprintf(name, sizeof name, "%d", i);
+        rc = ggn_container_add(&c, name, GGN_F32, 1, &dim, array, err);
+    }
+    if (!rc)
+        rc = ggn_container_write(&c, path, err);
+    ggn_container_release(&c);
+    return rc;
+}
+
+static int read_file(const char *path, struct ggn_container *c, cJSON **root, struct ggn_err *err)
+{
+    int rc = ggn_container_read(c, path, err);
+
+    if (rc)
+        return rc;
+    *root = cJSON_Parse(c->json);
+    const cJSON *kind = cJSON_GetObjectItemCaseSensitive(*root, "kind");
+    if (cJSON_IsString(kind) && !strcmp(kind->valuestring, "training"))
+        return GGN_OK;
+    cJSON_Delete(*root);
+    ggn_container_release(c);
+    return ggn_fail(err, GGN_EINVAL, "%s: not a checkpoint of a training", path);
+}
+
+int ggn_session_saved_phase(const char *path, int *phase, struct ggn_err *err)
+{
+    struct ggn_container c = {0};
+    cJSON *root = NULL;
+    int rc = read_file(path, &c, &root, err);
+
+    if (rc)
+        return rc;
+    double v = field(root, "phase");
+    cJSON_Delete(root);
+    ggn_container_release(&c);
+    if (v != GGN_PHASE_DENOISER && v != GGN_PHASE_JUDGE)
+        return ggn_fail(err, GGN_EINVAL, "%s: of an unknown phase", path);
+    *phase = (int)v;
+    return GGN_OK;
+}
+
+int ggn_session_restore(struct ggn_session *s, const char *path, struct ggn_err *err)
+{
+    struct ggn_container c = {0};
+    cJSON *root = NULL;
+    size_t count;
+    float *array;
+    int rc = read_file(path, &c, &root, err);
+
+    if (rc)
+        return rc;
+    if (field(root, "key") != ggn_session_key(s))
+        rc = ggn_fail(err, GGN_EINVAL, "%s: made with other data or options", path);
+    for (int i = 0; !rc && (array = ggn_session_array(s, i, &count)); i++) {
+        char name[16];
+        int dim = (int)count;
+        snprintf(name, sizeof name, "%d", i);
+        rc = ggn_container_get(&c, name, 1, &dim, array, err);
+    }
+    if (!rc)
+        rc = restore(s, root, path, err);
+    cJSON_Delete(root);
+    ggn_container_release(&c);
+    return rc;
+}

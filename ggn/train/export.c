@@ -1,0 +1,162 @@
+/* The end of a training: the model file and the card that says how it was made; and the way back for --init. */
+#include <cjson/cJSON.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/fio.h"
+#include "train/session.h"
+#include "train/start.h"
+
+static void copy_weights(struct ggn_weights_f32 *to, const struct ggn_weights_f32 *from)
+{
+    memcpy(to->params, from->params, from->graph->n_params * sizeof *to->params);
+    memcpy(to->mean, from->mean, from->graph->n_stats * sizeof *to->mean);
+    memcpy(to->var, from->var, from->graph->n_stats * sizeof *to->var);
+    ggn_weights_pack_f32(to);
+}
+
+/* What a run is made of. The same data, options and seed give the same bytes, so nothing of time or place is in it. */
+static cJSON *describe_run(const struct ggn_session *s)
+{
+    const struct ggn_train_plan *p = s->plan;
+    cJSON *o = cJSON_CreateObject();
+    const struct {
+        const char *name;
+        double value;
+    } numbers[] = {{"seed", p->seed}, {"steps_denoiser", p->steps_r}, {"steps", p->steps}, {"epochs", p->epochs},
+                   {"batch_denoiser", p->batch_r}, {"batch", p->batch}, {"crop", p->crop}, {"lr_denoiser", p->lr_r}, {"lr", p->lr},
+                   {"difference", p->difference}, {"soft_labels", p->soft_labels}, {"jitter", p->jitter},
+                   {"synthetic_per_block", p->synthetic}, {"best_step", (double)s->progress.best_step},
+                   {"divergences", s->progress.divergences}, {"data_key", ggn_session_key(s)}};
+
+    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)
+        cJSON_AddNumberToObject(o, numbers[i].name, numbers[i].value);
+    return o;
+}
+
+static cJSON *describe_data(const struct ggn_session *s)
+{
+    cJSON *o = cJSON_CreateObject();
+
+    for (int split = 0; split < GGN_SPLIT_NONE; split++) {
+        cJSON *list = cJSON_AddArrayToObject(o, ggn_split_names[split]);
+        for (int i = 0; i < s->set.data.n; i++) {
+            int first = s->set.data.views[i].split == (enum ggn_split)split;
+            for (int k = 0; k < i && first; k++)
+                first = strcmp(s->set.data.views[k].manifest.scene, s->set.data.views[i].manifest.scene) != 0;
+            if (first)
+                cJSON_AddItemToArray(list, cJSON_CreateString(s->set.data.views[i].manifest.scene));
+        }
+    }
+    cJSON_AddNumberToObject(o, "training_blocks", ggn_chains_count(&s->set, GGN_SPLIT_TRAIN, 1));
+    cJSON_AddNumberToObject(o, "synthetic_chains", ggn_chains_count(&s->set, GGN_SPLIT_TRAIN, 0) -
+                                                       ggn_chains_count(&s->set, GGN_SPLIT_TRAIN, 1));
+    cJSON_AddNumberToObject(o, "validation_blocks", ggn_chains_count(&s->set, GGN_SPLIT_VALIDATION, 1));
+    cJSON_AddNumberToObject(o, "training_windows", s->train.n);
+    cJSON_AddNumberToObject(o, "validation_windows", s->validation.n);
+    const char *source = "none";
+    for (int i = 0; i < s->set.data.n; i++)
+        if (s->set.data.views[i].has_labels)
+            source = !strcmp(source, "none") || !strcmp(source, s->set.data.views[i].labels.source) ? s->set.data.views[i].labels.source
+                                                                                                    : "mixed";
+    cJSON_AddStringToObject(o, "labels", source);
+    return o;
+}
+
+static cJSON *describe_validation(const struct ggn_stopping *st, double auc, double accuracy)
+{
+    cJSON *o = cJSON_CreateObject();
+
+    cJSON_AddNumberToObject(o, "auc", auc); /* NaN becomes null */
+    cJSON_AddNumberToObject(o, "accuracy", accuracy);
+    cJSON_AddNumberToObject(o, "early_stop_rate", st->early_rate);
+    cJSON_AddNumberToObject(o, "samples_ratio", st->samples_ratio);
+    cJSON_AddNumberToObject(o, "median_abs_log2", st->median_abs_log2);
+    return o;
+}
+
+static int write_card(const struct ggn_session *s, const struct ggn_model *model, struct ggn_err *err)
+{
+    struct ggn_fio_out out;
+    char path[4096];
+    cJSON *card = cJSON_Duplicate(model->provenance, 1);
+
+    cJSON_AddNumberToObject(card, "k_r", s->hyper.k_r);
+    cJSON_AddNumberToObject(card, "k_m", s->hyper.k_m);
+    cJSON_AddNumberToObject(card, "k_d", s->hyper.k_d);
+    cJSON_AddNumberToObject(card, "scale", model->calibration.scale);
+    cJSON_AddNumberToObject(card, "shift", model->calibration.shift);
+    cJSON_AddNumberToObject(card, "threshold", model->calibration.threshold);
+    cJSON_AddNumberToObject(card, "consecutive", model->calibration.consecutive);
+    cJSON_AddNumberToObject(card, "seconds_denoiser", floor(s->progress.seconds[0]));
+    cJSON_AddNumberToObject(card, "seconds_judge", floor(s->progress.seconds[1]));
+    char *text = cJSON_Print(card);
+    cJSON_Delete(card);
+    snprintf(path, sizeof path, "%s.card.json", s->plan->out);
+    int rc = text ? ggn_fio_begin(&out, path, err) : ggn_fail_nomem(err, "card");
+    if (!rc) {
+        fprintf(out.file, "%s\n", text);
+        rc = ggn_fio_commit(&out, err);
+    }
+    free(text);
+    return rc;
+}
+
+int ggn_session_export(struct ggn_session *s, const struct ggn_policy *policy, const struct ggn_stopping *stopping, double auc,
+                       double accuracy, struct ggn_err *err)
+{
+    struct ggn_model *model = ggn_model_create(&s->hyper, err);
+
+    if (!model)
+        return GGN_ENOMEM;
+    copy_weights(model->weights[GGN_NET_R], s->r);
+    copy_weights(model->weights[GGN_NET_M], s->trainer->weights[GGN_NET_M]);
+    copy_weights(model->weights[GGN_NET_D], s->trainer->weights[GGN_NET_D]);
+    if (s->hyper.preset == GGN_PRESET_LULL)
+        ggn_train_fold(&model->graph[GGN_NET_M], model->weights[GGN_NET_M]->params, s->hyper.window, s->plan->difference);
+    cJSON_AddItemToObject(model->provenance, "training", describe_run(s));
+    cJSON_AddItemToObject(model->provenance, "data", describe_data(s));
+    cJSON_AddItemToObject(model->provenance, "validation", describe_validation(stopping, auc, accuracy));
+    int rc = ggn_policy_set(model, policy, err);
+    /* f32: folding makes the newest image's weight a difference of large numbers, which half floats would not keep */
+    if (!rc)
+        rc = ggn_model_save(model, s->plan->out, GGN_F32, err);
+    if (!rc)
+        rc = write_card(s, model, err);
+    ggn_model_destroy(model);
+    if (!rc && s->plan->progress)
+        fprintf(s->plan->progress,
+                "%s: validation AUC %.4f, accuracy %.3f; threshold %.2f stops %.1f %% of %d blocks early, %.2f of the samples needed, "
+                "median |log2| %.2f\n", s->plan->out, auc, accuracy, policy->threshold, 100 * stopping->early_rate, stopping->blocks,
+                stopping->samples_ratio, stopping->median_abs_log2);
+    return rc;
+}
+
+int ggn_session_import(struct ggn_session *s, const char *path, struct ggn_err *err)
+{
+    struct ggn_model *model = NULL;
+    int rc = ggn_model_load(path, &model, err);
+
+    if (rc)
+        return rc;
+    const struct ggn_hyper *a = &model->hyper, *b = &s->hyper;
+    if (a->preset != b->preset || a->height != b->height || a->width != b->width || a->window != b->window || a->k_r != b->k_r ||
+        a->k_m != b->k_m || a->k_d != b->k_d) {
+        ggn_model_destroy(model);
+        return ggn_fail(err, GGN_EINVAL, "%s: networks of another size or preset", path);
+    }
+    if (!s->trainer) {
+        copy_weights(s->r, model->weights[GGN_NET_R]);
+    } else {
+        if (s->hyper.preset == GGN_PRESET_PAPER)
+            copy_weights(s->trainer->weights[GGN_NET_R], model->weights[GGN_NET_R]);
+        copy_weights(s->trainer->weights[GGN_NET_M], model->weights[GGN_NET_M]);
+        copy_weights(s->trainer->weights[GGN_NET_D], model->weights[GGN_NET_D]);
+        if (s->hyper.preset == GGN_PRESET_LULL)
+            ggn_train_unfold(&s->trainer->graph[GGN_NET_M], s->trainer->weights[GGN_NET_M]->params, s->hyper.window, s->plan->difference);
+        ggn_weights_pack_f32(s->trainer->weights[GGN_NET_M]);
+    }
+    ggn_model_destroy(model);
+    return GGN_OK;
+}

@@ -1,0 +1,24 @@
+/* Learning curves: one row per epoch, kept in the checkpoint, written as CSV and drawn. */
+#ifndef GGN_TRAIN_LOG_H
+#define GGN_TRAIN_LOG_H
+
+#include "base/err.h"
+
+struct ggn_log_row {
+    int phase; /* 0 denoiser, 1 generator and discriminator */
+    double step, loss, accuracy, validation_loss, validation_accuracy, validation_auc, lr; /* NaN = not measured */
+    double seconds; /* since the phase began, on this machine; the only column that two runs may differ in */
+};
+
+struct ggn_log {
+    int n;
+    struct ggn_log_row *rows; /* owns */
+};
+
+int ggn_log_add(struct ggn_log *log, const struct ggn_log_row *row, struct ggn_err *err);
+void ggn_log_release(struct ggn_log *log);
+int ggn_log_write_csv(const struct ggn_log *log, const char *path, struct ggn_err *err);
+/* Needs gnuplot. */
+int ggn_log_draw(const struct ggn_log *log, const char *path, struct ggn_err *err);
+
+#endif

@@ -1,0 +1,173 @@
+/* Phase 0 of preset lull: the denoiser on crops of noisy images and their references. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "nn/weights.h"
+#include "train/session.h"
+
+enum { VALIDATION_CROPS = 32 };
+static const uint32_t VALIDATION_SEED = 77;
+
+/* One sample of a step: which chain and level, which crop. */
+struct crop {
+    int chain, level, x0, y0;
+    struct ggn_augment augment;
+};
+
+static double draw(uint32_t what, uint64_t step, int i, uint32_t seed)
+{
+    return ggn_hash_unit(what, ggn_hash((uint32_t)i, ggn_hash((uint32_t)step, seed)));
+}
+
+/* The k-th chain of the split that has a reference; their number when k < 0. */
+static int nth_chain(const struct ggn_session *s, enum ggn_split split, int k)
+{
+    int n = 0;
+
+    for (int i = 0; i < s->set.n; i++)
+        if (s->set.chains[i].split == split && s->set.chains[i].reference && s->set.chains[i].n_levels && n++ == k)
+            return i;
+    return n;
+}
+
+static struct crop draw_crop(const struct ggn_session *s, enum ggn_split split, uint64_t step, int i, uint32_t seed)
+{
+    const int size = s->plan->crop, chains = nth_chain(s, split, -1);
+    struct crop c = {.chain = nth_chain(s, split, (int)(draw(21, step, i, seed) * chains)), .augment = ggn_augment_none()};
+
+    c.level = (int)(draw(22, step, i, seed) * s->set.chains[c.chain].n_levels);
+    c.x0 = (int)(draw(23, step, i, seed) * (s->set.width - size + 1));
+    c.y0 = (int)(draw(24, step, i, seed) * (s->set.height - size + 1));
+    if (split == GGN_SPLIT_TRAIN)
+        c.augment = ggn_augment_draw(step, i, seed ^ 1, 1, s->plan->jitter);
+    return c;
+}
+
+struct fill {
+    struct ggn_session *s;
+    enum ggn_split split;
+    uint64_t step;
+    uint32_t seed;
+    int first;
+};
+
+static void fill_sample(void *data, long i, int worker)
+{
+    const struct fill *f = data;
+    const int size = f->s->plan->crop;
+    const size_t values = 3 * (size_t)size * (size_t)size;
+    struct crop c = draw_crop(f->s, f->split, f->step, f->first + (int)i, f->seed);
+    float *noisy = f->s->buffer + 2 * (size_t)i * values;
+
+    ggn_crop_planes(&f->s->set.chains[c.chain], c.level, f->s->set.width, f->s->set.height, c.x0, c.y0, size, size, &c.augment,
+                    noisy, noisy + values);
+    (void)worker;
+}
+
+static void fill_batch(struct ggn_session *s, enum ggn_split split, uint64_t step, uint32_t seed, int first, int count)
+{
+    struct fill f = {s, split, step, seed, first};
+
+    ggn_threads_for(s->threads, count, fill_sample, &f);
+}
+
+static int train_step(struct ggn_session *s, uint64_t step, double *loss, struct ggn_err *err)
+{
+    const int n = s->plan->batch_r;
+    const size_t plane = (size_t)s->plan->crop * (size_t)s->plan->crop;
+    const float **x = s->planes, **y = s->planes + 3 * (size_t)n;
+
+    fill_batch(s, GGN_SPLIT_TRAIN, step, ggn_session_seed(s), 0, n);
+    for (int i = 0; i < 3 * n; i++) {
+        x[i] = s->buffer + ((size_t)(i / 3) * 6 + (size_t)(i % 3)) * plane;
+        y[i] = x[i] + 3 * plane;
+    }
+    s->trainer->options.lr[GGN_NET_R] = ggn_session_lr(s, s->plan->lr_r, step, (uint64_t)s->plan->steps_r);
+    return ggn_trainer_denoiser_step_f32(s->trainer, x, y, n, loss, err);
+}
+
+/* Mean of 1 − SSIM over fixed crops of the validation scenes; NaN without any. */
+static double validate(struct ggn_session *s)
+{
+    struct ggn_trainer_f32 *t = s->trainer;
+    const struct ggn_value *in = &t->r->graph->value[0];
+    const int out = t->r->graph->n_values - 1, n = s->plan->batch_r;
+    const size_t plane = (size_t)s->plan->crop * (size_t)s->plan->crop;
+    double total = 0;
+
+    if (!nth_chain(s, GGN_SPLIT_VALIDATION, -1))
+        return (double)NAN;
+    ggn_weights_pack_f32(t->weights[GGN_NET_R]);
+    for (int first = 0; first < VALIDATION_CROPS; first += n) {
+        int count = VALIDATION_CROPS - first < n ? VALIDATION_CROPS - first : n;
+        fill_batch(s, GGN_SPLIT_VALIDATION, 0, VALIDATION_SEED, first, count);
+        for (int i = 0; i < count; i++)
+            for (int c = 0; c < 3; c++)
+                for (int row = 0; row < in->h; row++) {
+                    const float *x = s->buffer + ((size_t)i * 6 + (size_t)c) * plane + (size_t)row * (size_t)in->w;
+                    memcpy(ggn_exec_plane_f32(t->r, 0, i, c) + (long)row * in->row, x, (size_t)in->w * sizeof *x);
+                    /* the input's gradient is not used here: its planes hold the reference in the output's layout */
+                    memcpy(ggn_exec_grad_f32(t->r, 0, i, c) + (long)row * in->row, x + 3 * plane, (size_t)in->w * sizeof *x);
+                }
+        ggn_exec_forward_f32(t->r, t->weights[GGN_NET_R], count, GGN_EVAL);
+        for (int i = 0; i < count; i++) {
+            const float *x[3], *y[3];
+            for (int c = 0; c < 3; c++) {
+                x[c] = ggn_exec_plane_f32(t->r, out, i, c);
+                y[c] = ggn_exec_grad_f32(t->r, 0, i, c);
+            }
+            total += 1 - ggn_ssim_mean_f32(t->ssim, x, y, NULL, 3, in->row, 0);
+        }
+    }
+    return total / VALIDATION_CROPS;
+}
+
+/* One epoch; on divergence the trainer is back at the epoch's start and so is the step. */
+static int epoch(struct ggn_session *s, uint64_t end, struct ggn_err *err)
+{
+    struct ggn_log_row row = {.phase = GGN_PHASE_DENOISER, .accuracy = (double)NAN, .validation_accuracy = (double)NAN,
+                              .validation_auc = (double)NAN};
+    const uint64_t begin = s->progress.step;
+    double start = ggn_clock_wall_s(), loss;
+
+    while (s->progress.step < end) {
+        if (ggn_session_interrupted(s))
+            return GGN_TRAIN_INTERRUPTED;
+        int rc = train_step(s, s->progress.step, &loss, err);
+        if (rc) {
+            s->progress.step = begin;
+            return rc;
+        }
+        row.loss += loss / (double)(end - begin);
+        s->progress.step++;
+    }
+    double seconds = ggn_clock_wall_s() - start;
+    row.lr = s->trainer->options.lr[GGN_NET_R];
+    row.validation_loss = validate(s);
+    s->progress.seconds[0] += ggn_clock_wall_s() - start;
+    ggn_trainer_keep_f32(s->trainer);
+    return ggn_session_epoch(s, &row, (uint64_t)s->plan->steps_r, (double)(end - begin) * s->plan->batch_r, seconds, err);
+}
+
+int ggn_phase_denoiser(struct ggn_session *s, struct ggn_err *err)
+{
+    const uint64_t steps = (uint64_t)s->plan->steps_r;
+
+    if (!nth_chain(s, GGN_SPLIT_TRAIN, -1) && steps)
+        return ggn_fail(err, GGN_EINVAL, "%s: no training block has a reference for the denoiser", s->plan->data.dir);
+    while (s->progress.step < steps) {
+        uint64_t end = s->progress.step + (uint64_t)s->plan->epoch_steps;
+        int rc = epoch(s, end < steps ? end : steps, err);
+        if (rc == GGN_EDIVERGED && ++s->progress.divergences <= 8) {
+            if (s->plan->progress)
+                fprintf(s->plan->progress, "%s; learning rates halved\n", err->text);
+            err->code = GGN_OK;
+            continue;
+        }
+        if (rc)
+            return rc;
+    }
+    return GGN_OK;
+}

@@ -1,0 +1,354 @@
+/* Phase 1: generator and discriminator on windows with cached denoised images; in preset paper all three networks at once. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "eval/stats.h"
+#include "model/window.h"
+#include "train/session.h"
+
+static size_t window_values(const struct ggn_session *s)
+{
+    return (size_t)s->hyper.window * ggn_chains_values(&s->set);
+}
+
+static float difference(const struct ggn_session *s)
+{
+    return s->hyper.preset == GGN_PRESET_LULL ? (float)s->plan->difference : 0;
+}
+
+/* --- pixels of a batch --------------------------------------------------------------------------------------------------- */
+
+struct fill {
+    struct ggn_session *s;
+    const struct ggn_windows *windows;
+    const int *index;  /* of the windows */
+    uint64_t step;
+    int augment, denoised;
+};
+
+static void fill_window(void *data, long i, int worker)
+{
+    const struct fill *f = data;
+    const struct ggn_session *s = f->s;
+    const struct ggn_window *w = &f->windows->list[f->index[i]];
+    const struct ggn_chain *c = &s->set.chains[w->chain];
+    struct ggn_augment augment = f->augment ? ggn_augment_draw(f->step, (int)i, ggn_session_seed(s) ^ 2,
+                                                               s->set.width == s->set.height, s->plan->jitter)
+                                            : ggn_augment_none();
+    float *at = s->buffer + 2 * (size_t)i * window_values(s);
+
+    ggn_window_planes(c, w->last, s->hyper.window, s->set.width, s->set.height, 0, &augment, difference(s), at);
+    at += window_values(s);
+    if (f->denoised) {
+        ggn_window_planes(c, w->last, s->hyper.window, s->set.width, s->set.height, 1, &augment, difference(s), at);
+    } else {
+        /* the reference, in the place of the window that preset paper denoises itself */
+        struct ggn_chain once = *c;
+        once.noisy = c->reference;
+        ggn_window_planes(&once, 0, 1, s->set.width, s->set.height, 0, &augment, 0, at);
+    }
+    (void)worker;
+}
+
+/* Fills the buffer and the plane pointers: noisy windows first, then denoised ones (or references). */
+static struct ggn_batch_f32 fill_batch(struct ggn_session *s, const struct fill *f, int count)
+{
+    const size_t plane = (size_t)s->set.width * (size_t)s->set.height;
+    const size_t planes = 3 * (size_t)s->hyper.window;
+    const float **noisy = s->planes, **second = s->planes + planes * (size_t)s->plan->batch;
+
+    ggn_threads_for(s->threads, count, fill_window, (void *)(size_t)f);
+    for (size_t i = 0; i < (size_t)count; i++)
+        for (size_t k = 0; k < planes; k++) {
+            noisy[i * planes + k] = s->buffer + 2 * i * window_values(s) + k * plane;
+            if (f->denoised)
+                second[i * planes + k] = noisy[i * planes + k] + window_values(s);
+            else if (k < 3)
+                second[3 * i + k] = noisy[i * planes + k] + window_values(s);
+        }
+    return (struct ggn_batch_f32){.count = count, .noisy = noisy, .denoised = f->denoised ? second : NULL,
+                                  .reference = f->denoised ? NULL : second};
+}
+
+/* --- evaluation mode ----------------------------------------------------------------------------------------------------- */
+
+static void copy_planes(const struct ggn_exec_f32 *e, int value, int image, int c, const float *src, int row)
+{
+    const struct ggn_value *v = &e->graph->value[value];
+
+    for (int y = 0; y < v->h; y++)
+        memcpy(ggn_exec_plane_f32(e, value, image, c) + (long)y * v->row, src + (long)y * row, (size_t)v->w * sizeof *src);
+}
+
+/* NFM of `count` windows whose planes are given, into channel `channel` of D's input. */
+static void generate(struct ggn_session *s, const float *const *planes, int count, int channel)
+{
+    struct ggn_trainer_f32 *t = s->trainer;
+    const int n = 3 * s->hyper.window, out = t->m->graph->n_values - 1;
+
+    for (int i = 0; i < count; i++)
+        for (int k = 0; k < n; k++)
+            copy_planes(t->m, 0, i, k, planes[i * n + k], s->set.width);
+    ggn_exec_forward_f32(t->m, t->weights[GGN_NET_M], count, GGN_EVAL);
+    for (int i = 0; i < count; i++)
+        copy_planes(t->d, 0, i, channel, ggn_exec_plane_f32(t->m, out, i, 0), t->m->graph->value[out].row);
+}
+
+int ggn_session_logits(struct ggn_session *s, const struct ggn_windows *windows, const int *index, int n, double *logit,
+                       struct ggn_err *err)
+{
+    struct ggn_trainer_f32 *t = s->trainer;
+    const int out = t->d->graph->n_values - 1;
+
+    (void)err;
+    ggn_weights_pack_f32(t->weights[GGN_NET_M]);
+    ggn_weights_pack_f32(t->weights[GGN_NET_D]);
+    for (int first = 0; first < n; first += s->plan->batch) {
+        int count = n - first < s->plan->batch ? n - first : s->plan->batch;
+        struct fill f = {.s = s, .windows = windows, .index = index + first, .denoised = 1};
+        struct ggn_batch_f32 b = fill_batch(s, &f, count);
+        generate(s, b.denoised, count, 0);
+        generate(s, b.noisy, count, 1);
+        ggn_exec_forward_f32(t->d, t->weights[GGN_NET_D], count, GGN_EVAL);
+        for (int i = 0; i < count; i++)
+            logit[first + i] = (double)*ggn_exec_plane_f32(t->d, out, i, 0);
+    }
+    return GGN_OK;
+}
+
+struct denoise {
+    struct ggn_session *s;
+    struct ggn_exec_f32 *exec;
+};
+
+static void denoise_images(const struct denoise *d, struct ggn_chain *c, int first, int count)
+{
+    const struct ggn_value *in = &d->exec->graph->value[0];
+    const int out = d->exec->graph->n_values - 1, width = d->s->set.width, height = d->s->set.height;
+    const size_t values = ggn_chains_values(&d->s->set);
+
+    for (int i = 0; i < count; i++)
+        ggn_tile_load_u8(c->noisy + (size_t)(first + i) * values, width, height, 0, 0, width, height, 1.0F / 255,
+                         ggn_exec_plane_f32(d->exec, 0, i, 0), (size_t)in->row, in->plane);
+    ggn_exec_forward_f32(d->exec, d->s->r, count, GGN_EVAL);
+    for (int i = 0; i < count; i++)
+        ggn_tile_store_u16(c->denoised + (size_t)(first + i) * values, width, height, 0, 0, width, height,
+                           ggn_exec_plane_f32(d->exec, out, i, 0), (size_t)d->exec->graph->value[out].row,
+                           d->exec->graph->value[out].plane);
+}
+
+int ggn_session_denoise(struct ggn_session *s, enum ggn_split split, struct ggn_err *err)
+{
+    enum { AT_ONCE = 4 };
+    struct denoise d = {s, ggn_exec_create_f32(&s->r_graph, NULL, AT_ONCE, 0, s->threads, err)};
+
+    if (!d.exec)
+        return GGN_ENOMEM;
+    ggn_weights_pack_f32(s->r);
+    for (int i = 0; i < s->set.n; i++) {
+        struct ggn_chain *c = &s->set.chains[i];
+        if (split != GGN_SPLITS && c->split != split)
+            continue;
+        if (!c->denoised)
+            c->denoised = malloc((size_t)(c->n_levels ? c->n_levels : 1) * ggn_chains_values(&s->set) * sizeof *c->denoised);
+        if (!c->denoised) {
+            ggn_exec_destroy_f32(d.exec);
+            return ggn_fail_nomem(err, "denoised images");
+        }
+        for (int k = 0; k < c->n_levels; k += AT_ONCE)
+            denoise_images(&d, c, k, c->n_levels - k < AT_ONCE ? c->n_levels - k : AT_ONCE);
+    }
+    ggn_exec_destroy_f32(d.exec);
+    return GGN_OK;
+}
+
+/* --- one step ------------------------------------------------------------------------------------------------------------ */
+
+/* Steps of an epoch over all windows (preset paper). */
+static uint64_t epoch_length(const struct ggn_session *s)
+{
+    uint64_t n = (uint64_t)(s->train.n / s->plan->batch);
+
+    return n ? n : 1;
+}
+
+/* Sample i of a step of preset paper: all windows once per epoch, in an order drawn for it. Sorting by hash is a permutation
+ * that needs no memory between steps; walking it with a stride coprime to n would repeat neighbours, this does not. */
+static int paper_window(const struct ggn_session *s, uint64_t step, int i)
+{
+    const uint32_t n = (uint32_t)s->train.n, seed = ggn_hash((uint32_t)(step / epoch_length(s)), ggn_session_seed(s));
+    uint32_t bits = 1, k = (uint32_t)(step % epoch_length(s)) * (uint32_t)s->plan->batch + (uint32_t)i;
+
+    while (UINT32_C(1) << bits < n)
+        bits++;
+    /* A Feistel-like walk: each round is a bijection on [0, 2^bits); values beyond n are walked on. */
+    const uint32_t mask = (UINT32_C(1) << bits) - 1;
+    k %= n;
+    do {
+        for (uint32_t round = 0; round < 4; round++) {
+            k = (k + ggn_hash(round, seed)) & mask;
+            k = (k * (2 * (ggn_hash(round, seed ^ 5) >> 1) + 1)) & mask;
+            k ^= k >> (bits / 2 + 1);
+        }
+    } while (k >= n);
+    return (int)k;
+}
+
+static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, double *loss, double *right, struct ggn_err *err)
+{
+    const int paper = s->hyper.preset == GGN_PRESET_PAPER, n = s->plan->batch;
+    int index[1024];
+    double label[1024], logit[1024];
+    struct ggn_paper_record_f32 record;
+
+    for (int i = 0; i < n; i++) {
+        index[i] = paper ? paper_window(s, step, i) : ggn_windows_draw(&s->train, step, i, ggn_session_seed(s));
+        label[i] = s->train.list[index[i]].label;
+    }
+    struct fill f = {.s = s, .windows = &s->train, .index = index, .step = step, .augment = !paper, .denoised = !paper};
+    struct ggn_batch_f32 b = fill_batch(s, &f, n);
+    b.label = label;
+    double scale = paper ? 1 : ggn_session_lr(s, 1, step, steps);
+    s->trainer->options.lr[GGN_NET_M] = s->trainer->options.lr[GGN_NET_D] = s->plan->lr * scale;
+    s->trainer->options.lr[GGN_NET_R] = s->plan->lr_r * scale;
+    int rc = paper ? ggn_trainer_paper_step_f32(s->trainer, &b, &record, err)
+                   : ggn_trainer_judge_step_f32(s->trainer, &b, loss, logit, err);
+    if (rc)
+        return rc;
+    if (paper)
+        *loss = record.bce_before;
+    *right = 0;
+    for (int i = 0; i < n; i++) {
+        double z = !paper ? logit[i] : i < 64 ? record.logit_before[i] : (double)NAN;
+        *right += (z > 0) == s->train.list[index[i]].noisy;
+    }
+    *right /= n;
+    return GGN_OK;
+}
+
+/* --- validation ---------------------------------------------------------------------------------------------------------- */
+
+/* Evenly strided windows, at most as many as the plan says. */
+static int choose_validation(const struct ggn_session *s, int *index)
+{
+    int n = s->validation.n < s->plan->validation_windows ? s->validation.n : s->plan->validation_windows;
+
+    for (int i = 0; i < n; i++)
+        index[i] = (int)((long)i * s->validation.n / n);
+    return n;
+}
+
+static int validate(struct ggn_session *s, struct ggn_log_row *row, struct ggn_err *err)
+{
+    size_t room = (size_t)s->plan->validation_windows + 1;
+    int *index = malloc(room * sizeof *index), right = 0;
+    double *logit = malloc(room * sizeof *logit);
+    unsigned char *noisy = malloc(room);
+    int rc = index && logit && noisy ? GGN_OK : ggn_fail_nomem(err, "validation");
+
+    row->validation_loss = row->validation_accuracy = row->validation_auc = (double)NAN;
+    int n = rc ? 0 : choose_validation(s, index);
+    if (n)
+        rc = ggn_session_logits(s, &s->validation, index, n, logit, err);
+    if (n && !rc) {
+        row->validation_loss = 0;
+        for (int i = 0; i < n; i++) {
+            const struct ggn_window *w = &s->validation.list[index[i]];
+            noisy[i] = (unsigned char)w->noisy;
+            right += (logit[i] > 0) == w->noisy;
+            row->validation_loss += ggn_bce(logit[i], w->label) / n;
+        }
+        row->validation_accuracy = (double)right / n;
+        rc = ggn_stats_auc(logit, noisy, (size_t)n, &row->validation_auc, err);
+    }
+    free(index);
+    free(logit);
+    free(noisy);
+    return rc;
+}
+
+/* Preset paper: the denoiser has moved on; its copy and the denoised validation images follow. */
+static int renew_denoiser(struct ggn_session *s, struct ggn_err *err)
+{
+    const struct ggn_weights_f32 *from = s->trainer->weights[GGN_NET_R];
+
+    memcpy(s->r->params, from->params, s->r_graph.n_params * sizeof *from->params);
+    memcpy(s->r->mean, from->mean, s->r_graph.n_stats * sizeof *from->mean);
+    memcpy(s->r->var, from->var, s->r_graph.n_stats * sizeof *from->var);
+    return ggn_session_denoise(s, GGN_SPLIT_VALIDATION, err);
+}
+
+/* An AUC within this of the best counts as equal and the loss decides. */
+static const double SAME_AUC = 2e-4;
+
+static int note_best(struct ggn_session *s, const struct ggn_log_row *row, struct ggn_err *err)
+{
+    struct ggn_progress *p = &s->progress;
+    /* without validation windows (or with one class only) the last epoch counts */
+    int better = !(row->validation_auc == row->validation_auc) || row->validation_auc > p->best_auc + SAME_AUC ||
+                 (row->validation_auc > p->best_auc - SAME_AUC && row->validation_loss < p->best_loss);
+
+    p->stale = better ? 0 : p->stale + 1;
+    if (!better)
+        return GGN_OK;
+    p->best_auc = row->validation_auc;
+    p->best_loss = row->validation_loss;
+    p->best_step = p->step;
+    return ggn_session_keep_best(s, err);
+}
+
+static int epoch(struct ggn_session *s, uint64_t end, uint64_t steps, struct ggn_err *err)
+{
+    struct ggn_log_row row = {.phase = GGN_PHASE_JUDGE};
+    const uint64_t begin = s->progress.step;
+    double start = ggn_clock_wall_s(), loss, right;
+
+    while (s->progress.step < end) {
+        if (ggn_session_interrupted(s))
+            return GGN_TRAIN_INTERRUPTED;
+        int rc = train_step(s, s->progress.step, steps, &loss, &right, err);
+        if (rc) {
+            s->progress.step = begin;
+            return rc;
+        }
+        row.loss += loss / (double)(end - begin);
+        row.accuracy += right / (double)(end - begin);
+        s->progress.step++;
+    }
+    double seconds = ggn_clock_wall_s() - start;
+    int rc = s->hyper.preset == GGN_PRESET_PAPER ? renew_denoiser(s, err) : GGN_OK;
+    if (!rc)
+        rc = validate(s, &row, err);
+    if (!rc)
+        rc = note_best(s, &row, err);
+    if (rc)
+        return rc;
+    row.lr = s->trainer->options.lr[GGN_NET_M];
+    s->progress.seconds[1] += ggn_clock_wall_s() - start;
+    ggn_trainer_keep_f32(s->trainer);
+    return ggn_session_epoch(s, &row, steps, (double)(end - begin) * s->plan->batch, seconds, err);
+}
+
+int ggn_phase_judge(struct ggn_session *s, struct ggn_err *err)
+{
+    const uint64_t steps = s->plan->steps ? (uint64_t)s->plan->steps : (uint64_t)s->plan->epochs * epoch_length(s);
+    const uint64_t length = s->plan->epoch_steps ? (uint64_t)s->plan->epoch_steps : epoch_length(s);
+
+    while (s->progress.step < steps) {
+        uint64_t end = s->progress.step + length;
+        int rc = epoch(s, end < steps ? end : steps, steps, err);
+        if (rc == GGN_EDIVERGED && ++s->progress.divergences <= 8) {
+            if (s->plan->progress)
+                fprintf(s->plan->progress, "%s; learning rates halved\n", err->text);
+            err->code = GGN_OK;
+            continue;
+        }
+        if (rc)
+            return rc;
+        if (s->plan->patience && s->progress.stale >= s->plan->patience)
+            break;
+    }
+    return GGN_OK;
+}

@@ -1,0 +1,320 @@
+/*
+ * The trainer's parts: synthetic levels, windows and their labels, folding, calibration. `--write-demo DIR` makes the data set of
+ * `make train-demo` instead.
+ */
+#include <math.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "ggn_seqgen.h"
+#include "nn/exec.h"
+#include "train/calibrate.h"
+#include "train/start.h"
+#include "train/windows.h"
+
+static char dir[64];
+
+static void load(struct ggn_chains *set, double ratio)
+{
+    struct ggn_chains_options o = {.dir = dir, .ratio = ratio};
+    struct ggn_err err = {0};
+
+    if (ggn_chains_load(set, &o, &err))
+        fail_msg("%s", err.text);
+}
+
+static void splits_and_levels(void **state)
+{
+    struct ggn_chains set, thin;
+
+    load(&set, 0);
+    assert_int_equal(set.n, 12);
+    assert_int_equal(ggn_chains_count(&set, GGN_SPLIT_TRAIN, 1), 9);
+    assert_int_equal(ggn_chains_count(&set, GGN_SPLIT_VALIDATION, 1), 3);
+    assert_int_equal(set.n_scenes, 4);
+    assert_int_equal(set.chains[0].n_levels, 14);
+    assert_true(fabs(set.ratio - 1.35) < 0.02);
+    load(&thin, 1.7);
+    assert_int_equal(thin.chains[0].n_levels, 7);
+    ggn_chains_release(&set);
+    ggn_chains_release(&thin);
+    (void)state;
+}
+
+/* Noise of a synthetic level against the reference: as large as that of a rendered level at the same samples. */
+static void synthetic_noise_has_the_variance_of_rendered_noise(void **state)
+{
+    struct ggn_chains set;
+    struct ggn_err err = {0};
+    double ratio_sum = 0;
+    int compared = 0;
+
+    load(&set, 0);
+    assert_int_equal(ggn_chains_add_synthetic(&set, 1, 3, &err), 0);
+    assert_int_equal(set.n, 21);
+    size_t values = ggn_chains_values(&set);
+    for (int i = 12; i < set.n; i++) {
+        const struct ggn_chain *c = &set.chains[i], *real = NULL;
+        for (int k = 0; k < 12; k++)
+            if (set.chains[k].view == c->view && set.chains[k].block == c->block)
+                real = &set.chains[k];
+        assert_non_null(real);
+        assert_true(c->synthetic && c->label.threshold == real->label.threshold);
+        double e[2] = {0, 0};
+        for (size_t v = 0; v < values; v++) {
+            double r = real->noisy[4 * values + v] - c->reference[v], s = c->noisy[4 * values + v] - c->reference[v];
+            e[0] += r * r * real->spp[4];
+            e[1] += s * s * c->spp[4];
+        }
+        ratio_sum += e[1] / e[0];
+        compared++;
+    }
+    assert_true(fabs(ratio_sum / compared - 1) < 0.1);
+    ggn_chains_release(&set);
+    (void)state;
+}
+
+static void windows_are_labelled_by_their_last_image(void **state)
+{
+    struct ggn_chains set;
+    struct ggn_windows w, published;
+    struct ggn_window_options o = {.split = GGN_SPLIT_TRAIN, .length = 6, .soft = 1};
+    struct ggn_err err = {0};
+    int drawn[2] = {0, 0};
+
+    load(&set, 0);
+    assert_int_equal(ggn_windows_create(&w, &set, &o, &err), 0);
+    o.label_first = 1;
+    assert_int_equal(ggn_windows_create(&published, &set, &o, &err), 0);
+    assert_int_equal(w.n, 9 * (14 - 5));
+    int later = 0;
+    for (int i = 0; i < w.n; i++) {
+        const struct ggn_chain *c = &set.chains[w.list[i].chain];
+        assert_int_equal(w.list[i].noisy, c->spp[w.list[i].last] < c->label.threshold);
+        assert_true(fabs(w.list[i].label - w.list[i].noisy) <= 0.5);
+        later += published.list[i].noisy && !w.list[i].noisy;
+    }
+    assert_true(later > 0);
+    for (int i = 0; i < 400; i++) {
+        int a = ggn_windows_draw(&w, (uint64_t)i, i % 16, 7);
+        assert_int_equal(a, ggn_windows_draw(&w, (uint64_t)i, i % 16, 7));
+        assert_in_range(a, 0, w.n - 1);
+        assert_int_equal(set.chains[w.list[a].chain].split, GGN_SPLIT_TRAIN);
+        drawn[w.list[a].noisy]++;
+    }
+    assert_true(drawn[0] > 120 && drawn[1] > 120);
+    ggn_windows_release(&w);
+    ggn_windows_release(&published);
+    ggn_chains_release(&set);
+    (void)state;
+}
+
+/* All eight symmetries, the same for noisy images and reference of a crop that is the whole block. */
+static void augmentation_moves_whole_windows(void **state)
+{
+    struct ggn_chains set;
+
+    load(&set, 0);
+    const struct ggn_chain *c = &set.chains[0];
+    size_t values = ggn_chains_values(&set), pixels = values / 3;
+    float *window = malloc(2 * values * sizeof *window), *crop = malloc(2 * values * sizeof *crop);
+    double sum[8] = {0};
+    for (int k = 0; k < 8; k++) {
+        struct ggn_augment a = ggn_augment_none();
+        a.flip_x = k & 1;
+        a.flip_y = k >> 1 & 1;
+        a.transpose = k >> 2;
+        ggn_window_planes(c, 3, 2, set.width, set.height, 0, &a, 0, window);
+        for (size_t i = 0; i < pixels; i++)
+            sum[k] += (double)window[i] * (double)i;
+        for (int m = 0; m < k; m++)
+            assert_true(fabs(sum[k] - sum[m]) > 1e-6);
+        /* a flip undone by reading backwards */
+        if (k == 3)
+            for (size_t i = 0; i < pixels; i++)
+                assert_float_equal(window[values + pixels - 1 - i], c->noisy[3 * values + i] / 255.0F, 1e-6);
+        ggn_crop_planes(c, 3, set.width, set.height, 0, 0, set.width, set.height, &a, crop, crop + values);
+    }
+    struct ggn_augment none = ggn_augment_none();
+    ggn_window_planes(c, 3, 2, set.width, set.height, 0, &none, 8, window);
+    for (size_t i = 0; i < values; i++)
+        assert_float_equal(window[i], 8 * ((float)c->noisy[2 * values + i] - (float)c->noisy[3 * values + i]) / 255, 1e-4);
+    free(window);
+    free(crop);
+    ggn_chains_release(&set);
+    (void)state;
+}
+
+/* The generator on differences and the folded one on plain images give the same map. */
+static void folding_keeps_the_function(void **state)
+{
+    struct ggn_hyper hyper = {.preset = GGN_PRESET_LULL, .height = 32, .width = 32, .window = 3, .k_r = 3, .k_m = 3, .k_d = 2};
+    struct ggn_graph *g = malloc(sizeof *g);
+    struct ggn_err err = {0};
+    float out[2][32 * 32], before[1];
+
+    assert_int_equal(ggn_network_build(g, GGN_NET_M, &hyper, &err), 0);
+    struct ggn_weights_f32 *w = ggn_weights_create_f32(g, NULL, 0, &err);
+    struct ggn_exec_f32 *e = ggn_exec_create_f32(g, NULL, 1, 0, NULL, &err);
+    ggn_weights_init_f32(w, GGN_INIT_HE, 5);
+    before[0] = w->params[10];
+    for (int fold = 0; fold < 2; fold++) {
+        if (fold)
+            ggn_train_fold(g, w->params, 3, 8);
+        ggn_weights_pack_f32(w);
+        for (int k = 0; k < 9; k++)
+            for (int y = 0; y < 32; y++)
+                for (int x = 0; x < 32; x++) {
+                    double v = ggn_hash_unit((uint32_t)(y * 32 + x), (uint32_t)k);
+                    double newest = ggn_hash_unit((uint32_t)(y * 32 + x), (uint32_t)(6 + k % 3));
+                    ggn_exec_plane_f32(e, 0, 0, k)[y * g->value[0].row + x] = (float)(fold || k > 5 ? v : 8 * (v - newest));
+                }
+        ggn_exec_forward_f32(e, w, 1, GGN_EVAL);
+        for (int y = 0; y < 32; y++)
+            memcpy(out[fold] + 32 * y, ggn_exec_plane_f32(e, g->n_values - 1, 0, 0) + y * g->value[g->n_values - 1].row, 32 * sizeof(float));
+    }
+    for (int i = 0; i < 32 * 32; i++)
+        assert_float_equal(out[0][i], out[1][i], 1e-4);
+    ggn_train_unfold(g, w->params, 3, 8);
+    assert_float_equal(w->params[10], before[0], 1e-5);
+    ggn_exec_destroy_f32(e);
+    ggn_weights_destroy_f32(w);
+    free(g);
+    (void)state;
+}
+
+/* The denoiser begins as sigmoid(4·(x − 1/2)), up to what the random channels add. */
+static void the_denoiser_begins_near_its_input(void **state)
+{
+    struct ggn_hyper hyper = {.preset = GGN_PRESET_LULL, .height = 32, .width = 32, .window = 6, .k_r = 8, .k_m = 3, .k_d = 2};
+    struct ggn_graph *g = malloc(sizeof *g);
+    struct ggn_err err = {0};
+    double error = 0;
+
+    assert_int_equal(ggn_network_build(g, GGN_NET_R, &hyper, &err), 0);
+    struct ggn_weights_f32 *w = ggn_weights_create_f32(g, NULL, 0, &err);
+    struct ggn_exec_f32 *e = ggn_exec_create_f32(g, NULL, 1, 0, NULL, &err);
+    ggn_weights_init_f32(w, GGN_INIT_HE, 5);
+    ggn_train_identity(g, w->params);
+    ggn_weights_pack_f32(w);
+    for (int pass = 0; pass < 2; pass++) {
+        for (int k = 0; k < 3; k++)
+            for (int y = 0; y < 32; y++)
+                for (int x = 0; x < 32; x++) {
+                    double v = ggn_hash_unit((uint32_t)(y * 32 + x), (uint32_t)k);
+                    if (!pass)
+                        ggn_exec_plane_f32(e, 0, 0, k)[y * g->value[0].row + x] = (float)v;
+                    else
+                        error += fabs((double)ggn_exec_plane_f32(e, g->n_values - 1, 0, k)[y * g->value[g->n_values - 1].row + x] -
+                                      1 / (1 + exp(2 - 4 * v))) / (3 * 32 * 32);
+                }
+        if (!pass)
+            ggn_exec_forward_f32(e, w, 1, GGN_EVAL);
+    }
+    assert_true(error < 0.06);
+    ggn_exec_destroy_f32(e);
+    ggn_weights_destroy_f32(w);
+    free(g);
+    (void)state;
+}
+
+static void platt_recovers_the_scale(void **state)
+{
+    enum { N = 4000 };
+    static double logit[N], label[N];
+    struct ggn_policy policy = ggn_policy_default();
+
+    for (int i = 0; i < N; i++) {
+        logit[i] = 12 * ggn_hash_unit((uint32_t)i, 1) - 6;
+        label[i] = ggn_hash_unit((uint32_t)i, 2) < 1 / (1 + exp(-(0.5 * logit[i] - 1)));
+    }
+    ggn_calibrate_platt(logit, label, N, &policy);
+    assert_true(fabs(policy.scale - 0.5) < 0.06);
+    assert_true(fabs(policy.shift + 1) < 0.15);
+    /* one class says nothing */
+    struct ggn_policy same = ggn_policy_default();
+    for (int i = 0; i < N; i++)
+        label[i] = 1;
+    ggn_calibrate_platt(logit, label, N, &same);
+    assert_true(same.scale == 1 && same.shift == 0);
+    (void)state;
+}
+
+/* A judge whose logit crosses 0 one check after the true threshold: no early stop at t = 0.5, and t grows no further than
+ * the early rate allows. */
+static void the_threshold_respects_the_early_rate(void **state)
+{
+    struct ggn_chains set;
+    struct ggn_windows w;
+    struct ggn_window_options o = {.split = GGN_SPLIT_TRAIN, .length = 6};
+    struct ggn_policy policy = ggn_policy_default();
+    struct ggn_stopping at, chosen;
+    struct ggn_err err = {0};
+
+    load(&set, 0);
+    assert_int_equal(ggn_windows_create(&w, &set, &o, &err), 0);
+    double *logit = malloc((size_t)w.n * sizeof *logit);
+    for (int i = 0; i < w.n; i++)
+        logit[i] = -6 * w.list[i].octave;
+    policy.passes = 1;
+    assert_int_equal(ggn_calibrate_stopping(&w, logit, &policy, 0.5, &at, &err), 0);
+    assert_int_equal(at.blocks, 9);
+    assert_true(at.early_rate == 0 && at.samples_ratio >= 1);
+    assert_int_equal(ggn_calibrate_threshold(&w, logit, 0, &policy, &chosen, &err), 0);
+    assert_true(policy.threshold >= 0.5 && chosen.early_rate == 0 && chosen.samples_ratio <= at.samples_ratio);
+    double slope = ggn_calibrate_slope(&w, logit, &policy);
+    assert_true(fabs(slope - 6) < 1e-6);
+    free(logit);
+    ggn_windows_release(&w);
+    ggn_chains_release(&set);
+    (void)state;
+}
+
+static int make_data(void **state)
+{
+    struct seqgen g = seqgen_default();
+    struct ggn_err err = {0};
+
+    snprintf(dir, sizeof dir, "/tmp/ggn_train.%ld", (long)getpid());
+    (void)state;
+    return seqgen_write(dir, &g, &err);
+}
+
+static int remove_data(void **state)
+{
+    char command[128];
+
+    snprintf(command, sizeof command, "rm -r %s", dir);
+    (void)state;
+    return system(command);
+}
+
+int main(int argc, char **argv)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(splits_and_levels),
+        cmocka_unit_test(synthetic_noise_has_the_variance_of_rendered_noise),
+        cmocka_unit_test(windows_are_labelled_by_their_last_image),
+        cmocka_unit_test(augmentation_moves_whole_windows),
+        cmocka_unit_test(folding_keeps_the_function),
+        cmocka_unit_test(the_denoiser_begins_near_its_input),
+        cmocka_unit_test(platt_recovers_the_scale),
+        cmocka_unit_test(the_threshold_respects_the_early_rate),
+    };
+
+    if (argc == 3 && !strcmp(argv[1], "--write-demo")) {
+        struct seqgen g = seqgen_default();
+        struct ggn_err err = {0};
+        if (seqgen_write(argv[2], &g, &err))
+            fprintf(stderr, "%s\n", err.text);
+        return err.code != 0;
+    }
+    return cmocka_run_group_tests(tests, make_data, remove_data);
+}
