@@ -31,9 +31,10 @@ static void read_roughness(struct pt_builder *b, struct pt_params *p, const char
         size_t n = strlen(prefix);
         memcpy(name, prefix, n);
         strcpy(name + n, suffix[i]);
-        values[i] = i > 0 && pt_params_find(p, name) == NULL ? values[0] : pt_build_float_input(b, p, name, fallback);
-        if (values[i].texture < 0 && values[i].value.x < 0)
-            pt_diag_fail(&b->diag, pt_params_find(p, name)->loc, "\"%s\" is %g (expected 0 or more)", name, (double)values[i].value.x);
+        const struct pt_param *given = pt_params_find(p, name);
+        values[i] = i > 0 && given == NULL ? values[0] : pt_build_float_input(b, p, name, fallback);
+        if (given != NULL && values[i].texture < 0 && values[i].value.x < 0)
+            pt_diag_fail(&b->diag, given->loc, "\"%s\" is %g (expected 0 or more)", name, (double)values[i].value.x);
     }
     *u = values[1];
     *v = values[2];

@@ -6,7 +6,7 @@
 #include "scene/number.h"
 #include "scene/spectra.h"
 
-enum { NAME_MAX_BYTES = 1024, STATE_DEPTH = 4096 };
+enum { NAME_MAX_BYTES = 1024, STATE_DEPTH = 1024 };
 
 struct frame {
     struct pt_state state;

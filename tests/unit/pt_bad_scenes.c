@@ -1,0 +1,73 @@
+/* Every malformed scene of tests/bad-input gives the one line that its first line announces, and nothing else. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <dirent.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "base/fio.h"
+#include "scene/load.h"
+
+static const char folder[] = "tests/bad-input";
+enum { LEAST = 100 };
+
+static int is_scene(const struct dirent *entry)
+{
+    size_t n = strlen(entry->d_name);
+    return n > 5 && strcmp(entry->d_name + n - 5, ".pbrt") == 0;
+}
+
+/* "# expect: 4: words" → 4 and words; "# expect: words" → 0 and words. */
+static const char *expectation(char *bytes, int *line)
+{
+    static const char mark[] = "# expect: ";
+    assert_memory_equal(bytes, mark, sizeof mark - 1);
+    char *words = bytes + sizeof mark - 1, *end = strchr(words, '\n');
+    assert_non_null(end);
+    *end = '\0';
+    char *rest;
+    *line = (int)strtol(words, &rest, 10);
+    return *line > 0 && rest[0] == ':' ? rest + 2 : words;
+}
+
+static void each_gives_its_line(void **state)
+{
+    (void)state;
+    struct dirent **entries;
+    int n = scandir(folder, &entries, is_scene, alphasort), wrong = 0;
+    assert_true(n >= LEAST);
+    for (int i = 0; i < n; i++) {
+        char path[512], place[600], *bytes;
+        int line;
+        size_t size;
+        struct pt_err err = {0};
+        struct pt_scene *scene = NULL;
+        struct pt_scene_defaults defaults;
+        snprintf(path, sizeof path, "%s/%s", folder, entries[i]->d_name);
+        assert_int_equal(pt_fio_read(path, 1 << 20, &bytes, &size, &err), PT_OK);
+        const char *words = expectation(bytes, &line);
+        snprintf(place, sizeof place, line > 0 ? "%s:%d:" : "%s", path, line);
+        int rc = pt_scene_load(path, NULL, &scene, &defaults, &err);
+        if (rc != PT_EINVAL || scene != NULL || strncmp(err.text, place, line > 0 ? strlen(place) : 0) != 0 ||
+            strstr(err.text, words) == NULL || strchr(err.text, '\n') != NULL) {
+            print_error("%s: expected %s … %s, got %d \"%s\"\n", path, place, words, rc, err.text);
+            wrong++;
+        }
+        free(bytes);
+        free(entries[i]);
+    }
+    free(entries);
+    assert_int_equal(wrong, 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(each_gives_its_line)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

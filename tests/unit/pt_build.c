@@ -1,0 +1,315 @@
+/* What scene text becomes: shapes, lights, materials, media, camera, film, effects; v3 and v4 spellings of the same. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "pt_text_scene.h"
+
+#define TRIANGLE "\"integer indices\" [ 0 1 2 ] \"point3 P\" [ 0 0 1  1 0 1  0 1 1 ]"
+
+static void near(float a, double b, double tolerance)
+{
+    if (!(fabs((double)a - b) <= tolerance))
+        fail_msg("%.9g is not within %g of %.9g", (double)a, tolerance, b);
+}
+
+static void film_and_camera(void **state)
+{
+    (void)state;
+    struct pt_scene_defaults d;
+    struct pt_scene *s = text_scene("Film \"rgb\" \"integer xresolution\" 60 \"integer yresolution\" 40 \"float iso\" 150 "
+                                    "\"float exposuretime\" 2 \"float cropwindow\" [ 0.5 1 0.25 0.75 ] \"float maxcomponentvalue\" 9\n"
+                                    "PixelFilter \"triangle\" \"float xradius\" 1 \"float yradius\" 1.5\n"
+                                    "Sampler \"independent\" \"integer pixelsamples\" 7 Integrator \"volpath\" \"integer maxdepth\" 65\n"
+                                    "LookAt 1 2 3  1 2 13  0 1 0 Camera \"perspective\" \"float fov\" 50 \"float lensradius\" 0.1 "
+                                    "\"float focaldistance\" 4\nWorldBegin\n",
+                                    &d, NULL);
+    assert_true(d.width == 60 && d.height == 40 && d.spp == 7 && d.integrator.max_depth == 65);
+    assert_true(d.crop[0] == 30 && d.crop[1] == 10 && d.crop[2] == 60 && d.crop[3] == 30);
+    assert_true(d.integrator.filter == PT_FILTER_TRIANGLE && d.integrator.filter_y == 1.5f && d.integrator.max_component == 9);
+    assert_int_equal(d.integrator.sampler, PT_SAMPLER_INDEPENDENT);
+    near(s->radiance_scale, 3, 1e-6);
+    near(s->camera.fov_deg, 50, 0);
+    near(s->camera.screen[1], 1.5, 1e-6); /* the field of view is that of the short side */
+    near(s->camera.screen[3], 1, 1e-6);
+    near(s->camera.to_render[0].m[3], 0, 0); /* the camera is the origin */
+    near(s->camera.to_render[0].m[10], 1, 1e-6);
+    assert_true(pt_scene_effects(s) == PT_FX_DEFOCUS);
+    assert_int_equal(pt_scene_effect_reason(s, 15)->line, 4);
+    pt_scene_destroy(s);
+    s = text_scene("Film \"image\" \"float scale\" 4 PixelFilter \"triangle\" \"float xwidth\" 1 WorldBegin", &d, NULL);
+    near(s->radiance_scale, 4, 0);
+    assert_true(d.width == 640 && d.integrator.filter_x == 1);
+    pt_scene_destroy(s);
+}
+
+/* The same scene far from the origin keeps its vertices to the last bits. */
+static void far_from_the_origin(void **state)
+{
+    (void)state;
+    /* the object is defined where it stands */
+    static const char format[] = "LookAt %d 0 -5  %d 0 0  0 1 0 Camera \"perspective\" WorldBegin\n"
+                                 "Translate %d 0 0 Shape \"trianglemesh\" " TRIANGLE
+                                 " ObjectBegin \"o\" Shape \"trianglemesh\" " TRIANGLE " ObjectEnd Identity ObjectInstance \"o\"";
+    char text[1024];
+    struct pt_scene *s[2];
+    for (int i = 0; i < 2; i++) {
+        int shift = i * 100000;
+        snprintf(text, sizeof text, format, shift, shift, shift);
+        s[i] = text_scene(text, NULL, NULL);
+    }
+    for (int i = 0; i < 9; i++)
+        near(s[1]->meshes[0].positions[i], (double)s[0]->meshes[0].positions[i], 1e-6);
+    near(s[0]->meshes[0].positions[2], 6, 1e-6);
+    for (int i = 0; i < 3; i++) {
+        const float *p[2];
+        pt_vec3 q[2];
+        for (int k = 0; k < 2; k++) {
+            p[k] = s[k]->meshes[1].positions + 3 * i;
+            q[k] = pt_mat34_point(&s[k]->instances[0].to_render[0], v3(p[k][0], p[k][1], p[k][2]));
+        }
+        near(q[1].x, (double)q[0].x, 1e-6);
+        near(q[1].z, (double)q[0].z, 1e-6);
+    }
+    pt_scene_destroy(s[0]);
+    pt_scene_destroy(s[1]);
+}
+
+static void orientation(void **state)
+{
+    (void)state;
+    struct pt_scene *s = world_scene("Shape \"trianglemesh\" " TRIANGLE "\n AttributeBegin ReverseOrientation Shape \"trianglemesh\" " TRIANGLE
+                                     " \"normal N\" [ 0 0 1 0 0 1 0 0 1 ] AttributeEnd\nScale -1 1 1 Shape \"trianglemesh\" " TRIANGLE
+                                     " ReverseOrientation Shape \"sphere\"");
+    assert_int_equal(s->shape_count, 4);
+    assert_true(!s->shapes[0].flip_normal && s->shapes[1].flip_normal && s->shapes[2].flip_normal && !s->shapes[3].flip_normal);
+    near(s->meshes[1].normals[2], -1, 0); /* reversed orientation negates the given normals */
+    pt_scene_destroy(s);
+}
+
+static void lights(void **state)
+{
+    (void)state;
+    struct pt_scene *s = world_scene(
+        "AttributeBegin AreaLightSource \"diffuse\" \"rgb L\" [ 1 2 3 ] \"float scale\" 2 \"bool twosided\" true\n"
+        "Shape \"trianglemesh\" " TRIANGLE " AttributeEnd\n"
+        "LightSource \"point\" \"rgb I\" [ 1 1 1 ] \"float power\" 12.566370614 \"point3 from\" [ 1 2 3 ]\n"
+        "LightSource \"distant\" \"point from\" [ 0 0 0 ] \"point to\" [ 0 0 -2 ] \"rgb L\" [ 5 5 5 ]\n"
+        "LightSource \"spot\" \"float coneangle\" 60 \"float conedeltaangle\" 60 \"blackbody I\" 6500 \"float scale\" 10\n"
+        "LightSource \"infinite\" \"rgb L\" [ 1 1 1 ] \"float illuminance\" 6.2831853\n"
+        "LightSource \"point\" \"rgb I\" [ 0 0 0 ]\n"
+        "AttributeBegin AreaLightSource \"diffuse\" \"float power\" 10 Translate 5 0 0 Shape \"sphere\" AttributeEnd");
+    assert_int_equal(s->light_count, 6); /* the black one is gone */
+    assert_true(s->lights[0].kind == PT_LIGHT_AREA && s->lights[0].shape == 0 && s->lights[0].two_sided && s->shapes[0].light == 0);
+    near(s->lights[0].emission.z, 6, 1e-6);
+    near(s->lights[1].emission.x, 1, 1e-6); /* Φ / 4π */
+    near(s->lights[1].position.y, 2, 1e-6);
+    near(s->lights[2].direction.z, -1, 0);
+    near(s->lights[3].cos_total, 0.5, 1e-6);
+    near(s->lights[3].cos_start, 1, 1e-6);
+    near(v3_luminance(s->lights[3].emission), 10, 0.01); /* v4: a black body of any heat has luminance 1 before its scale */
+    near(s->lights[4].emission.x, 2, 1e-5);
+    near(s->lights[5].emission.x, 10 / (4 * 3.14159265 * 3.14159265), 1e-5); /* Φ / (π area) */
+    assert_true(pt_scene_effects(s) == (PT_FX_DELTA_LIGHT | PT_FX_ENVIRONMENT | PT_FX_MANY_LIGHTS | PT_FX_QUADRIC));
+    pt_scene_destroy(s);
+    /* v3: [T scale], absolute */
+    s = text_scene("Film \"image\" WorldBegin LightSource \"infinite\" \"blackbody L\" [ 5000 3 ] \"rgb scale\" [ 2 2 2 ]", NULL, NULL);
+    assert_true(v3_luminance(s->lights[0].emission) > 5 && v3_luminance(s->lights[0].emission) < 6);
+    pt_scene_destroy(s);
+}
+
+static void materials_of_both_versions(void **state)
+{
+    (void)state;
+    struct pt_scene *s = world_scene(
+        "MakeNamedMaterial \"a\" \"string type\" \"matte\" \"color Kd\" [ .1 .2 .3 ]\n"
+        "MakeNamedMaterial \"b\" \"string type\" \"plastic\" \"float roughness\" 0.1 \"bool remaproughness\" \"false\"\n"
+        "MakeNamedMaterial \"c\" \"string type\" [ \"glass\" ] \"float index\" [ 1.3 ]\n"
+        "MakeNamedMaterial \"d\" \"string type\" \"mirror\"\n"
+        "MakeNamedMaterial \"e\" \"string type\" \"metal\" \"float roughness\" 0.1\n"
+        "MakeNamedMaterial \"f\" \"string type\" \"mix\" \"string namedmaterial1\" \"a\" \"string namedmaterial2\" \"d\" \"rgb amount\" [ .2 .2 .2 ]\n"
+        "MakeNamedMaterial \"g\" \"string type\" \"mix\" \"string materials\" [ \"a\" \"d\" ] \"float amount\" 0.2\n"
+        "Material \"coateddiffuse\" \"float roughness\" 0.25 Shape \"sphere\"\n"
+        "Material \"conductor\" \"spectrum eta\" \"metal-Au-eta\" \"spectrum k\" \"metal-Au-k\" Shape \"sphere\"\n"
+        "Material \"\" Shape \"sphere\" NamedMaterial \"e\" Shape \"sphere\"");
+    const struct pt_material *m = s->materials;
+    assert_true(m[0].kind == PT_MATERIAL_DIFFUSE && m[0].reflectance.value.z == 0.3f);
+    assert_true(m[1].kind == PT_MATERIAL_COATED_DIFFUSE && m[1].roughness_u.value.x == 0.1f && !m[1].remap_roughness);
+    assert_true(m[2].kind == PT_MATERIAL_DIELECTRIC && m[2].eta == 1.3f);
+    assert_true(m[3].kind == PT_MATERIAL_CONDUCTOR && m[3].conductor_by_colour);
+    /* v3 remaps roughness by a polynomial: 0.1 is alpha 0.4618 */
+    assert_true(m[4].kind == PT_MATERIAL_CONDUCTOR && !m[4].remap_roughness);
+    near(m[4].roughness_u.value.x, 0.4618, 1e-3);
+    /* v3 mixes by the share of the first, v4 by that of the second */
+    assert_true(m[5].mix_b == 0 && m[5].mix_a == 3);
+    near(m[5].mix_amount.value.x, 0.2, 1e-6);
+    assert_true(m[6].mix_a == 0 && m[6].mix_b == 3);
+    assert_true(m[7].remap_roughness && m[7].kind == PT_MATERIAL_COATED_DIFFUSE);
+    assert_true(m[8].eta_rgb.value.z > 1.2f && m[9].kind == PT_MATERIAL_INTERFACE);
+    /* only materials in use ask for effects: no mix, no transmission, no mirror */
+    pt_effects fx = pt_scene_effects(s);
+    assert_true((fx & PT_FX_COATED) && (fx & PT_FX_GLOSSY) && (fx & PT_FX_INTERFACE) && (fx & PT_FX_SPECULAR));
+    assert_false(fx & (PT_FX_MIX | PT_FX_TRANSMISSION | PT_FX_MEDIA));
+    pt_scene_destroy(s);
+}
+
+static void textures(void **state)
+{
+    (void)state;
+    struct pt_scene *s = world_scene(
+        "Texture \"one\" \"spectrum\" \"constant\" \"rgb value\" [ .2 .4 .6 ]\n"
+        "Texture \"half\" \"spectrum\" \"scale\" \"texture tex\" \"one\" \"float scale\" 0.5\n"
+        "Texture \"check\" \"spectrum\" \"checkerboard\" \"texture tex1\" \"half\" \"rgb tex2\" [ 1 1 1 ] \"float uscale\" 8\n"
+        "Texture \"mask\" \"float\" \"checkerboard\"\n"
+        "Material \"diffuse\" \"texture reflectance\" \"half\" Shape \"sphere\"\n"
+        "Material \"diffuse\" \"texture reflectance\" \"check\" Shape \"sphere\" \"texture alpha\" \"mask\"");
+    /* constants fold: nothing is looked up for them */
+    assert_int_equal(s->materials[0].reflectance.texture, -1);
+    near(s->materials[0].reflectance.value.z, 0.3, 1e-6);
+    const struct pt_texture *t = &s->textures[s->materials[1].reflectance.texture];
+    assert_true(t->kind == PT_TEXTURE_CHECKERBOARD && t->su == 8 && t->in[0].texture == -1 && t->in[0].value.x == 0.1f);
+    assert_true(s->shapes[1].has_alpha && !s->shapes[0].has_alpha);
+    assert_int_equal(pt_scene_effects(s), PT_FX_TEXTURE | PT_FX_ALPHA | PT_FX_QUADRIC);
+    pt_scene_destroy(s);
+}
+
+static void media(void **state)
+{
+    (void)state;
+    struct pt_scene *s = text_scene("MediumInterface \"\" \"fog\" Camera \"perspective\" WorldBegin\n"
+                                    "MakeNamedMedium \"fog\" \"string type\" \"homogeneous\" \"rgb sigma_a\" [ 1 2 3 ] "
+                                    "\"rgb sigma_s\" [ 0 0 0 ] \"float scale\" 0.5\n"
+                                    "MakeNamedMedium \"smoke\" \"string type\" \"uniformgrid\" \"integer nx\" 2 \"float density\" [ 1 3 ] "
+                                    "\"point3 p0\" [ -1 -1 -1 ] \"point3 p1\" [ 1 1 1 ]\n"
+                                    "MediumInterface \"smoke\" \"fog\" Material \"interface\" Shape \"sphere\"",
+                                    NULL, NULL);
+    assert_int_equal(s->camera.medium, 0); /* named before it was made */
+    near(s->media[0].sigma_a.z, 1.5, 1e-6);
+    assert_true(s->shapes[0].medium_in == 1 && s->shapes[0].medium_out == 0);
+    assert_true(s->media[1].kind == PT_MEDIUM_GRID && s->media[1].density[1] == 3);
+    pt_vec3 corner = pt_mat34_point(&s->media[1].from_render, v3(1, -1, 0));
+    near(corner.x, 1, 1e-6);
+    near(corner.y, 0, 1e-6);
+    near(corner.z, 0.5, 1e-6);
+    pt_effects fx = pt_scene_effects(s);
+    assert_true((fx & PT_FX_ABSORPTION) && (fx & PT_FX_SCATTERING) && (fx & PT_FX_GRID_MEDIUM) && (fx & PT_FX_INTERFACE));
+    pt_scene_destroy(s);
+}
+
+static void instances_and_motion(void **state)
+{
+    (void)state;
+    struct pt_scene *s = world_scene("ObjectBegin \"o\" Translate 1 0 0 Shape \"sphere\" Shape \"trianglemesh\" " TRIANGLE " ObjectEnd\n"
+                                     "Shape \"disk\"\nTranslate 0 5 0 ObjectInstance \"o\"\n"
+                                     "ActiveTransform EndTime Translate 0 2 0 ActiveTransform All ObjectInstance \"o\" Shape \"sphere\"");
+    assert_true(s->world_shape_count == 1 && s->shape_count == 4 && s->object_count == 2 && s->instance_count == 3);
+    assert_true(s->objects[0].first_shape == 1 && s->objects[0].shape_count == 2);
+    near(s->quadrics[0].to_render.m[3], 1, 0);
+    assert_true(!s->instances[0].animated && s->instances[1].animated && s->instances[2].animated && s->instances[2].object == 1);
+    near(s->instances[0].to_render[0].m[7], 5, 0);
+    near(s->instances[1].to_render[1].m[7], 7, 0);
+    assert_true((pt_scene_effects(s) & (PT_FX_MOTION | PT_FX_INSTANCES)) == (PT_FX_MOTION | PT_FX_INSTANCES));
+    pt_scene_destroy(s);
+}
+
+/* The shutter need not be open from the first to the last transform. */
+static void part_of_the_motion(void **state)
+{
+    (void)state;
+    struct pt_scene *s = text_scene("TransformTimes 0 4 Camera \"perspective\" \"float shutteropen\" 1 \"float shutterclose\" 2 WorldBegin\n"
+                                    "ActiveTransform EndTime Translate 0 0 8 Rotate 80 0 1 0 ActiveTransform All Shape \"sphere\"",
+                                    NULL, NULL);
+    const struct pt_instance *i = &s->instances[0];
+    near(i->to_render[0].m[11], 2, 1e-5);
+    near(i->to_render[1].m[11], 4, 1e-5);
+    near(i->to_render[0].m[0], cos(20 * 3.14159265358979 / 180), 1e-5);
+    near(i->to_render[1].m[2], sin(40 * 3.14159265358979 / 180), 1e-5);
+    pt_scene_destroy(s);
+}
+
+static void graphics_state(void **state)
+{
+    (void)state;
+    struct pt_scene *s = world_scene("AttributeBegin Translate 1 0 0 Attribute \"shape\" \"float radius\" 3 Shape \"sphere\" AttributeEnd\n"
+                                     "Shape \"sphere\" TransformBegin Scale 2 2 2 CoordinateSystem \"twice\" TransformEnd\n"
+                                     "CoordSysTransform \"twice\" Shape \"sphere\" \"float radius\" 5\nCoordSysTransform \"camera\" Shape \"sphere\"");
+    near(s->quadrics[0].radius, 3, 0);
+    near(s->quadrics[0].to_render.m[3], 1, 0);
+    near(s->quadrics[1].radius, 1, 0);
+    near(s->quadrics[1].to_render.m[3], 0, 0);
+    near(s->quadrics[2].to_render.m[0], 2, 0);
+    near(s->quadrics[3].to_render.m[0], 1, 0);
+    pt_scene_destroy(s);
+}
+
+static void warnings_come_once_and_strict_refuses(void **state)
+{
+    (void)state;
+    static const char text[] = "WorldBegin\nMaterial \"hair\" Material \"hair\"\nMaterial \"measured\" \"string filename\" \"x\"";
+    int warnings = 0;
+    struct pt_err err;
+    pt_scene_destroy(text_scene(text, NULL, &warnings));
+    assert_int_equal(warnings, 2);
+    assert_int_equal(text_scene_error(text, 1, &err), PT_EINVAL);
+    assert_memory_equal(err.text, "t.pbrt:2:1: material \"hair\"", 27);
+}
+
+/* A sphere made of patches, curves, subdivided and revolved surfaces: they load, are finite, and about the right size. */
+static void tessellated(void **state)
+{
+    (void)state;
+    struct pt_scene *s = world_scene(
+        "Shape \"loopsubdiv\" \"integer levels\" 4 \"integer indices\" [ 0 2 4 2 1 4 1 3 4 3 0 4 2 0 5 1 2 5 3 1 5 0 3 5 ] "
+        "\"point3 P\" [ 1 0 0 -1 0 0 0 1 0 0 -1 0 0 0 1 0 0 -1 ]\n"
+        "Shape \"loopsubdiv\" \"integer levels\" 2 \"integer indices\" [ 0 1 2 0 2 3 ] \"point3 P\" [ 0 0 0 1 0 0 1 1 0 0 1 0 ]\n"
+        "Shape \"bilinearmesh\" \"point3 P\" [ 0 0 0 1 0 0 0 1 0 1 1 0 ]\nShape \"bilinearmesh\" \"point3 P\" [ 0 0 0 1 0 0 0 1 0 1 1 1 ]\n"
+        "Shape \"curve\" \"float width\" 0.1 \"point3 P\" [ 0 0 0 1 0 0 2 0 0 3 0 0 ]\nShape \"cone\" \"float height\" 2\n"
+        "Shape \"heightfield\" \"integer nu\" 2 \"integer nv\" 2 \"float Pz\" [ 0 0 1 1 ]");
+    assert_int_equal(s->mesh_count, 7);
+    const struct pt_mesh *ball = &s->meshes[0];
+    assert_int_equal(ball->triangle_count, 8 * 256);
+    for (uint32_t i = 0; i < ball->vertex_count; i++) {
+        const float *p = ball->positions + 3 * i, *n = ball->normals + 3 * i;
+        float r = sqrtf(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]), along = p[0] * n[0] + p[1] * n[1] + p[2] * n[2];
+        float len = sqrtf(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+        assert_true(r > 0.4f && r < 0.7f && fabsf(along) > 0.9f * r * len); /* a rounded octahedron: normals point along p */
+        assert_true(along * (ball->normals[0] * ball->positions[0] + ball->normals[1] * ball->positions[1] +
+                             ball->normals[2] * ball->positions[2]) > 0);
+    }
+    for (uint32_t i = 0; i < s->meshes[1].vertex_count; i++)
+        assert_true(fabsf(s->meshes[1].positions[3 * i + 2]) < 1e-6f); /* flat stays flat, boundary included */
+    assert_int_equal(s->meshes[2].triangle_count, 2);
+    assert_int_equal(s->meshes[3].triangle_count, 128);
+    const struct pt_mesh *tube = &s->meshes[4];
+    for (uint32_t i = 0; i < tube->vertex_count; i++)
+        near(hypotf(tube->positions[3 * i + 1], tube->positions[3 * i + 2]), 0.05, 1e-5);
+    pt_scene_destroy(s);
+}
+
+static void pixel_bounds(void **state)
+{
+    (void)state;
+    struct pt_scene_defaults d;
+    struct pt_scene *s = text_scene("Film \"rgb\" \"integer xresolution\" 100 \"integer yresolution\" 100 \"integer pixelbounds\" [ 10 20 30 60 ] "
+                                    "WorldBegin", &d, NULL);
+    assert_true(d.crop[0] == 10 && d.crop[2] == 20 && d.crop[1] == 30 && d.crop[3] == 60);
+    pt_scene_destroy(s);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(film_and_camera), cmocka_unit_test(far_from_the_origin), cmocka_unit_test(orientation), cmocka_unit_test(lights),
+        cmocka_unit_test(materials_of_both_versions), cmocka_unit_test(textures), cmocka_unit_test(media),
+        cmocka_unit_test(instances_and_motion), cmocka_unit_test(part_of_the_motion), cmocka_unit_test(graphics_state),
+        cmocka_unit_test(warnings_come_once_and_strict_refuses), cmocka_unit_test(tessellated),
+        cmocka_unit_test(pixel_bounds)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

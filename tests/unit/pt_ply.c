@@ -1,0 +1,95 @@
+/* PLY: the three formats, extra properties, quads, and what is refused. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "scene/ply.h"
+
+static const char ascii[] = "ply\nformat ascii 1.0\ncomment two faces\nelement vertex 4\nproperty float x\nproperty float y\n"
+                            "property float z\nproperty uchar red\nproperty float s\nproperty float t\nelement face 2\n"
+                            "property uchar flag\nproperty list uchar int vertex_index\nend_header\n"
+                            "0 0 0 255 0 0\n1 0 0 255 1 0\n1 1 0.5 255 1 1\n0 1 0 255 0 1\n7 4 0 1 2 3\n7 3 0 1 2\n";
+
+static void check(const struct pt_ply *p)
+{
+    static const uint32_t expected[9] = {0, 1, 2, 0, 2, 3, 0, 1, 2};
+    assert_int_equal(p->vertex_count, 4);
+    assert_int_equal(p->triangle_count, 3);
+    assert_memory_equal(p->indices, expected, sizeof expected);
+    assert_true(p->positions[3 * 2 + 2] == 0.5f && p->uvs[2 * 2] == 1 && p->uvs[2 * 1 + 1] == 0);
+    assert_null(p->normals);
+    assert_int_equal(p->polygons, 0);
+}
+
+static void reads_ascii(void **state)
+{
+    (void)state;
+    struct pt_ply ply;
+    struct pt_err err = {0};
+    assert_int_equal(pt_ply_parse("a.ply", ascii, sizeof ascii - 1, &ply, &err), PT_OK);
+    check(&ply);
+    pt_ply_release(&ply);
+}
+
+static size_t put(char *out, size_t at, const void *value, size_t n, int swap)
+{
+    for (size_t i = 0; i < n; i++)
+        out[at + i] = ((const char *)value)[swap ? n - 1 - i : i];
+    return at + n;
+}
+
+static size_t binary(char *out, int big)
+{
+    static const float v[4][5] = {{0, 0, 0, 0, 0}, {1, 0, 0, 1, 0}, {1, 1, 0.5f, 1, 1}, {0, 1, 0, 0, 1}};
+    static const int32_t faces[7] = {0, 1, 2, 3, 0, 1, 2};
+    const char *end = strstr(ascii, "end_header\n") + 11;
+    char header[1024];
+    snprintf(header, sizeof header, "%.*s", (int)(end - ascii), ascii);
+    char *format = strstr(header, "ascii");
+    size_t n = (size_t)snprintf(out, 1024, "%.*s%s%s", (int)(format - header), header, big ? "binary_big_endian" : "binary_little_endian",
+                                format + 5);
+    for (int i = 0; i < 4; i++)
+        for (int k = 0; k < 5; k++) {
+            if (k == 3)
+                out[n++] = (char)255;
+            n = put(out, n, &v[i][k], 4, big);
+        }
+    for (int f = 0, at = 0; f < 2; f++) {
+        int corners = f == 0 ? 4 : 3;
+        out[n++] = 7;
+        out[n++] = (char)corners;
+        for (int k = 0; k < corners; k++)
+            n = put(out, n, &faces[at++], 4, big);
+    }
+    return n;
+}
+
+static void reads_binary(void **state)
+{
+    (void)state;
+    char bytes[2048];
+    for (int big = 0; big < 2; big++) {
+        size_t n = binary(bytes, big);
+        struct pt_ply ply;
+        struct pt_err err = {0};
+        if (pt_ply_parse("b.ply", bytes, n, &ply, &err) != PT_OK)
+            fail_msg("%s", err.text);
+        check(&ply);
+        pt_ply_release(&ply);
+        /* Any cut is noticed. */
+        for (size_t cut = 0; cut < n; cut++)
+            assert_int_equal(pt_ply_parse("b.ply", bytes, cut, &ply, &err), PT_EINVAL);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(reads_ascii), cmocka_unit_test(reads_binary)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
