@@ -12,11 +12,12 @@
  */
 #include "support.h"
 
+/* The default threshold: in a picture of 5 x 5 blocks it is a standard error of about 3 % at a grey of 0.2. */
 enum { THRESHOLD, AREA, FLOOR, TAIL_ERROR, TAIL_SHARE, FIRST_SPP, GROWTH, PARAM_COUNT };
 
 static const struct lull_param params[PARAM_COUNT] = {
     [THRESHOLD] = {.name = "threshold", .help = "stop when the block's error is at most this",
-                   .default_value = "0.002", .min = 0, .max = 1e6, .type = LULL_PARAM_FLOAT},
+                   .default_value = "0.004", .min = 0, .max = 1e6, .type = LULL_PARAM_FLOAT},
     [AREA] = {.name = "area", .help = "weigh the error by sqrt(block pixels / picture pixels), as the paper does",
               .default_value = "1", .max = 1, .type = LULL_PARAM_BOOL},
     [FLOOR] = {.name = "floor", .help = "luminance (1 = display white) below which the tail guard counts differences as absolute",
