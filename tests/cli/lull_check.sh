@@ -28,6 +28,8 @@ says() { # says TEXT ARGS...
 
 t "--help" says "Exit status: 0 all checks passed" --help
 t "--help names every option" sh -c '"$1" --help | grep -c -e --param= -e --only= -e --list -e --quiet -e --threads= -e --limit= | grep -qx 6' - "$check"
+t "the manual page names every option" sh -c 'for o in $("$1" --help | grep -o -e "--[a-z]*" | sort -u); do
+    tr -d "\\\\" <docs/man/lull-check.1 | grep -qF -e "$o" || case $o in --usage | --version) ;; *) echo "$o"; exit 1 ;; esac; done' - "$check"
 t "--list names the checks" sh -c '[ "$("$1" --list | wc -l)" -ge 40 ]' - "$check"
 t "no criterion: 2" status 2
 t "unknown option: 2" status 2 --no-such-option null
