@@ -53,9 +53,9 @@ static double triangle_emitter(const struct pt_scene *scene, const struct pt_sha
 /* Radiant power up to a common factor (luminance). */
 static double power_of(const struct pt_scene *scene, const struct pt_light *light, double area)
 {
-    double pi = 3.14159265358979323846, l = fmax(0.0, (double)v3_luminance(light->emission));
-    if (!isfinite(l))
-        l = 1.0; /* still selected, so that the bad value is met and counted */
+    double pi = 3.14159265358979323846, l = (double)v3_luminance(light->emission);
+    /* a bad value must still be selected, so that it is met and counted */
+    l = !isfinite(l) ? 1.0 : l > 0.0 ? l : 0.0;
     pt_vec3 d = v3_sub(scene->bounds_max, scene->bounds_min);
     double disk = pi * 0.25 * (double)v3_dot(d, d);
     switch (light->kind) {

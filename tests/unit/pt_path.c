@@ -1,0 +1,184 @@
+/* The kernels: the same bits whichever covers the scene, no code of absent effects, planes and traces. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "integ/kernels.h"
+#include "shade/medium.h"
+#include "shade/texture.h"
+#include "support/pt_scenes.h"
+
+static struct pt_input grey(float x) { return (struct pt_input){-1, {x, x, x}}; }
+
+/* All but media: glass, metal, coating, a texture with alpha, lens, point light. */
+static void rich_scene(struct pt_scene *scene, int media)
+{
+    static const unsigned char checks[4] = {255, 30, 90, 200};
+    test_scene_begin(scene);
+    test_camera(scene, v3(0, 2, -6), v3(0, 0.5f, 0), v3(0, 1, 0), 40.0f, 24);
+    scene->camera.lens_radius = 0.05f;
+    scene->camera.focal_distance = 6.0f;
+    scene->images[scene->image_count++] = (struct pt_image_map){2, 2, 1, PT_PIXEL_U8_LINEAR, 1.0f, checks};
+    scene->textures[scene->texture_count++] =
+        (struct pt_texture){.kind = PT_TEXTURE_IMAGE, .image = 0, .scale = 1.0f, .su = 3.0f, .sv = 3.0f};
+    int32_t metal = test_add_material(scene, PT_MATERIAL_CONDUCTOR), coat = test_add_material(scene, PT_MATERIAL_COATED_DIFFUSE);
+    int32_t glass = test_add_material(scene, PT_MATERIAL_DIELECTRIC), black = test_add_diffuse(scene, v3_splat(0.0f));
+    int32_t textured = test_add_diffuse(scene, v3_splat(0.5f));
+    scene->materials[textured].reflectance.texture = 0;
+    scene->materials[metal].roughness_u = grey(0.2f);
+    scene->materials[metal].roughness_v = grey(0.3f);
+    scene->materials[coat].roughness_u = scene->materials[coat].roughness_v = grey(0.25f);
+    test_add_quad(scene, textured, v3(-3, 0, -2), v3(0, 0, 5), v3(6, 0, 0));
+    test_add_sphere(scene, glass, v3(0, 0.8f, 0), 0.7f);
+    test_add_sphere(scene, metal, v3(-1.4f, 0.6f, 0), 0.5f);
+    test_add_sphere(scene, coat, v3(1.4f, 0.6f, 0), 0.5f);
+    int32_t leaf = test_add_quad(scene, textured, v3(-2, 0, 2), v3(4, 0, 0), v3(0, 2, 0));
+    scene->shapes[leaf].has_alpha = 1;
+    scene->shapes[leaf].alpha.texture = 0;
+    test_add_area_light(scene, test_add_sphere(scene, black, v3(-1.5f, 2.5f, 0.5f), 0.5f), v3(8, 6, 4), 0);
+    struct pt_light point = {.kind = PT_LIGHT_POINT, .shape = -1, .image = -1, .emission = {6, 6, 9}, .position = {2, 2, 4}};
+    test_add_light(scene, &point);
+    if (media) {
+        scene->camera.medium = test_add_medium(scene, v3_splat(0.02f), v3(0.05f, 0.04f, 0.03f), 0.4f);
+        int32_t id = test_add_material(scene, PT_MATERIAL_INTERFACE);
+        int32_t box = test_add_box(scene, id, v3(-2, 0.1f, -1.8f), v3(-1, 1, -1), 0);
+        scene->shapes[box].medium_in = test_add_medium(scene, v3(0.3f, 0.1f, 0.0f), v3_splat(1.0f), 0.0f);
+        scene->shapes[box].medium_out = scene->camera.medium;
+    }
+    test_scene_finish(scene);
+}
+
+/* Every kernel that covers the scene against the general one, bit for bit. */
+static void compare_kernels(const struct pt_scene *scene, pt_kernel *const *kernels, int count)
+{
+    for (int sampler = 0; sampler < 2; sampler++) {
+        struct pt_integrator settings = test_integrator(6);
+        settings.sampler = sampler;
+        settings.want_aux = 1;
+        for (uint32_t i = 0; i < 24 * 24 * 4; i++) {
+            struct pt_path_result expected, got;
+            memset(&expected, 0, sizeof expected);
+            pt_kernel_all(scene, &settings, i % 24, i / 24 % 24, i / 576, &expected);
+            for (int k = 0; k < count; k++) {
+                memset(&got, 0, sizeof got);
+                kernels[k](scene, &settings, i % 24, i / 24 % 24, i / 576, &got);
+                assert_memory_equal(&got.radiance, &expected.radiance, sizeof got.radiance);
+                assert_memory_equal(&got.albedo, &expected.albedo, sizeof got.albedo);
+                assert_memory_equal(&got.normal_world, &expected.normal_world, sizeof got.normal_world);
+                assert_memory_equal(&got.depth, &expected.depth, sizeof got.depth);
+            }
+        }
+    }
+}
+
+static void diffuse_kernel_is_exact(void **state)
+{
+    (void)state;
+    struct pt_scene scene;
+    test_cornell(&scene, 24, 1.0f, v3_splat(0.0f));
+    assert_true(pt_kernel_select(scene.effects, NULL, NULL) == pt_kernel_diffuse);
+    compare_kernels(&scene, (pt_kernel *const[]){pt_kernel_diffuse, pt_kernel_specular, pt_kernel_surfaces, pt_kernel_no_media}, 4);
+    test_scene_end(&scene);
+}
+
+static void surface_kernels_are_exact(void **state)
+{
+    (void)state;
+    struct pt_scene scene;
+    rich_scene(&scene, 0);
+    assert_true(pt_kernel_select(scene.effects, NULL, NULL) == pt_kernel_no_media);
+    compare_kernels(&scene, (pt_kernel *const[]){pt_kernel_no_media}, 1);
+    test_scene_end(&scene);
+}
+
+/* Whatever is needed is covered, and never by more than the general kernel. */
+static void selection_covers(void **state)
+{
+    (void)state;
+    for (pt_effects needed = 0; needed <= PT_FX_ALL; needed += 37) {
+        pt_effects covers = 0;
+        const char *name = NULL;
+        assert_non_null(pt_kernel_select(needed, &covers, &name));
+        assert_non_null(name);
+        assert_int_equal(needed & ~covers, 0);
+    }
+}
+
+/* Counted, not assumed: what the scene does not call for is not executed, by the general kernel either. */
+static void absent_effects_run_no_code(void **state)
+{
+    (void)state;
+    struct pt_scene scene;
+    struct pt_integrator settings = test_integrator(6);
+    test_cornell(&scene, 16, 1.0f, v3_splat(0.0f));
+    unsigned long long media = pt_medium_queries, textures = pt_texture_lookups;
+    test_mean(&scene, &settings, pt_kernel_select(scene.effects, NULL, NULL), 4, NULL);
+    test_mean(&scene, &settings, pt_kernel_all, 4, NULL);
+    assert_true(pt_medium_queries == media && pt_texture_lookups == textures);
+    test_scene_end(&scene);
+    rich_scene(&scene, 1);
+    test_mean(&scene, &settings, pt_kernel_select(scene.effects, NULL, NULL), 4, NULL);
+    assert_true(pt_medium_queries > media && pt_texture_lookups > textures);
+    test_scene_end(&scene);
+}
+
+static void planes(void **state)
+{
+    (void)state;
+    struct pt_scene scene;
+    struct pt_integrator settings = test_integrator(3);
+    struct pt_path_result r;
+    test_cornell(&scene, 24, 1.0f, v3_splat(0.0f));
+    settings.want_aux = 1;
+    pt_kernel_diffuse(&scene, &settings, 12, 3, 0, &r); /* the back wall */
+    assert_true(fabsf(r.albedo.x - 0.725f) < 1e-6f && fabsf(r.albedo.y - 0.71f) < 1e-6f);
+    assert_true(r.normal_world.z > 0.999f); /* towards the camera */
+    assert_true(r.depth > 7.7f && r.depth < 8.0f);
+    test_scene_end(&scene);
+}
+
+struct lines {
+    int count;
+    char last[256];
+};
+
+static void keep_line(void *data, const char *text)
+{
+    struct lines *lines = data;
+    lines->count++;
+    strncpy(lines->last, text, sizeof lines->last - 1);
+}
+
+/* The traced path ends with the value that the kernel returns. */
+static void trace_tells_the_same_path(void **state)
+{
+    (void)state;
+    struct pt_scene scene;
+    struct pt_integrator settings = test_integrator(4);
+    struct pt_path_result r;
+    struct lines lines = {0};
+    char expected[256];
+    rich_scene(&scene, 1);
+    pt_kernel_all(&scene, &settings, 12, 14, 3, &r);
+    assert_int_equal(pt_kernel_trace(&scene, &settings, 12, 14, 3, keep_line, &lines), 0);
+    snprintf(expected, sizeof expected, "end: pixel value (%g, %g, %g)", (double)r.radiance.x, (double)r.radiance.y,
+             (double)r.radiance.z);
+    assert_string_equal(lines.last, expected);
+    assert_true(lines.count >= 3);
+    test_scene_end(&scene);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(diffuse_kernel_is_exact), cmocka_unit_test(surface_kernels_are_exact), cmocka_unit_test(selection_covers),
+        cmocka_unit_test(absent_effects_run_no_code), cmocka_unit_test(planes), cmocka_unit_test(trace_tells_the_same_path),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
