@@ -1,6 +1,8 @@
 #include "nn/exec.h"
 #include "nn/weights.h"
+#include "nn/winograd.h"
 
+#define REAL_IS_FLOAT 0
 #define REAL double
 #define TYPED(name) GGN_TYPED(name, f64)
 #include "nn/weights.inc"
