@@ -15,5 +15,6 @@ typedef float vf __attribute__((vector_size(4 * sizeof(float))));
 typedef int vi __attribute__((vector_size(4 * sizeof(float))));
 #define SET1(s) ((vf){(s), (s), (s), (s)})
 #define FMA(a, b, c) ((a) * (b) + (c))
+#define KEEP(v) ((void)(v))
 
 #include "nn/kernels.inc"

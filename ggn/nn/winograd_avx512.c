@@ -136,6 +136,7 @@ INLINE void multiply_tile(float *m, const float *u, const float *v, int n_in, in
             x[k] = _mm512_loadu_ps(v + k * L);
         for (int o = 0; o < ot; o++) {
             vf w = _mm512_set1_ps(u[o]);
+            __asm__("" : "+v"(w)); /* loaded once, not once per multiply-add */
             for (int k = 0; k < nv; k++)
                 acc[o][k] = _mm512_fmadd_ps(w, x[k], acc[o][k]);
         }
