@@ -72,10 +72,12 @@ int ggn_calibrate_stopping(const struct ggn_windows *w, const double *logit, con
         spent += stop;
         needed += truth;
         error[out->blocks++] = fabs(log2(stop / truth));
+        out->mean_abs_log2 += error[out->blocks - 1];
     }
     if (out->blocks) {
         out->early_rate = (double)early / out->blocks;
         out->samples_ratio = spent / needed;
+        out->mean_abs_log2 /= out->blocks;
         out->median_abs_log2 = ggn_stats_quantile(error, (size_t)out->blocks, 0.5);
     }
     free(error);
@@ -85,14 +87,21 @@ int ggn_calibrate_stopping(const struct ggn_windows *w, const double *logit, con
 int ggn_calibrate_threshold(const struct ggn_windows *w, const double *logit, double early_rate, struct ggn_policy *policy,
                             struct ggn_stopping *out, struct ggn_err *err)
 {
-    for (int percent = 99; percent >= 1; percent--) {
-        int rc = ggn_calibrate_stopping(w, logit, policy, percent / 100.0, out, err);
+    struct ggn_stopping best = {0};
+    double threshold = 0;
+
+    for (int percent = 1; percent <= 99; percent++) {
+        struct ggn_stopping now;
+        int rc = ggn_calibrate_stopping(w, logit, policy, percent / 100.0, &now, err);
         if (rc)
             return rc;
-        policy->threshold = percent / 100.0;
-        if (out->early_rate <= early_rate)
-            break;
+        if (threshold > 0 && (now.early_rate > early_rate || now.mean_abs_log2 >= best.mean_abs_log2))
+            continue;
+        best = now;
+        threshold = percent / 100.0;
     }
+    policy->threshold = threshold;
+    *out = best;
     return GGN_OK;
 }
 
