@@ -1,0 +1,91 @@
+#!/bin/sh
+# `ggn train` from the outside: same bytes again, with another number of threads and after an interruption; bad input; the model in
+# the criterion.
+set -u
+cd "$(dirname "$0")/../.." || exit 2
+build=${BUILD:-build}
+ggn=$build/bin/ggn
+data=tests/data/train-demo
+n=0
+tmp=$(mktemp -d) || exit 2
+trap 'rm -rf "$tmp"' EXIT
+check() { # check NAME STATUS
+    n=$((n + 1))
+    if [ "$2" -eq 0 ]; then echo "ok $n - $1"; else echo "not ok $n - $1"; sed 's/^/# /' "$tmp/err" 2>/dev/null; fi
+}
+fails() { # fails NAME PATTERN COMMAND…: exit 2, the last line on stderr has PATTERN, no model is left
+    name=$1 pattern=$2
+    shift 2
+    rm -f "$tmp/bad.ggn"
+    "$@" --out "$tmp/bad.ggn" -q >"$tmp/out" 2>"$tmp/err"
+    rc=$?
+    [ "$rc" -eq 2 ] && tail -n 1 "$tmp/err" | grep "^ggn train: " | grep -q -e "$pattern" && [ ! -e "$tmp/bad.ggn" ]
+    check "$name" $?
+}
+tiny="--data $data --kr 3 --km 3 --kd 4 --crop 32 --ratio 0 --batch 8 --steps-denoiser 20 --steps 20 --epoch-steps 10"
+
+$ggn train $tiny --out "$tmp/a.ggn" 2>"$tmp/err"
+check "a tiny model" $?
+grep -q "judge .*10/20 .*AUC .*windows/s .*ETA" "$tmp/err"
+check "progress has loss, AUC, rate and ETA" $?
+$ggn inspect "$tmp/a.ggn" >"$tmp/out" 2>"$tmp/err" && grep -q "stops below" "$tmp/out"
+check "inspect reads it" $?
+[ "$(wc -l <"$tmp/a.ggn.csv")" -eq 5 ] && [ -s "$tmp/a.ggn.png" ] && grep -q '"labels":.*"observer"' "$tmp/a.ggn.card.json"
+check "curves, picture and card" $?
+
+$ggn train $tiny --out "$tmp/b.ggn" --threads 1 -q 2>"$tmp/err" && cmp "$tmp/a.ggn" "$tmp/b.ggn" 2>"$tmp/err"
+check "the same bytes with one thread" $?
+$ggn train $tiny --out "$tmp/c.ggn" --seed 2 -q 2>"$tmp/err" && ! cmp -s "$tmp/a.ggn" "$tmp/c.ggn"
+check "other bytes with another seed" $?
+
+# interrupted once in each phase: as soon as the curves have so many rows
+for rows in 2 4; do
+    $ggn train $tiny --out "$tmp/d.ggn" --resume -q 2>"$tmp/err" &
+    pid=$!
+    for _ in $(seq 1000); do
+        [ "$(cat "$tmp/d.ggn.csv" 2>/dev/null | wc -l)" -ge "$rows" ] && break
+        sleep 0.01
+    done
+    kill -INT $pid
+    wait $pid
+    echo "status $?" >>"$tmp/interrupted"
+done
+grep -q "status 130" "$tmp/interrupted" && $ggn train $tiny --out "$tmp/d.ggn" --resume -q 2>"$tmp/err" &&
+    cmp "$tmp/a.ggn" "$tmp/d.ggn" 2>"$tmp/err"
+check "interrupted and resumed: the same bytes" $?
+cp "$tmp/a.ggn.ckpt" "$tmp/bad.ggn.ckpt"
+fails "a checkpoint of another run is refused" "other data or options" $ggn train $tiny --seed 3 --resume
+head -c 4000 "$tmp/a.ggn.ckpt" >"$tmp/bad.ggn.ckpt"
+fails "a truncated checkpoint" "bad.ggn.ckpt" $ggn train $tiny --resume
+rm -f "$tmp/bad.ggn.ckpt"
+
+$ggn train $tiny --out "$tmp/e.ggn" --init "$tmp/a.ggn" -q 2>"$tmp/err" && ! cmp -s "$tmp/a.ggn" "$tmp/e.ggn"
+check "starting from a model" $?
+fails "a model of another size to start from" "another size" $ggn train $tiny --init "$tmp/a.ggn" --km 4
+$ggn train --data $data --preset paper --kr 3 --km 3 --kd 4 --batch 8 --steps 6 --epoch-steps 3 --out "$tmp/p.ggn" -q 2>"$tmp/err" &&
+    $ggn inspect "$tmp/p.ggn" >"$tmp/out" 2>"$tmp/err" && grep -q paper "$tmp/out"
+check "preset paper" $?
+
+mkdir "$tmp/empty"
+fails "no sequence" "no recorded sequence" $ggn train --data "$tmp/empty"
+fails "no such scene" "no scene 'nowhere'" $ggn train --data $data --validation nowhere
+fails "a crop larger than a block" "crop" $ggn train --data $data --crop 64
+cp -r $data "$tmp/cut" && head -c 3000 $data/scene1/block-00001.lseq >"$tmp/cut/scene1/block-00001.lseq"
+fails "a truncated block" "block-00001" $ggn train --data "$tmp/cut" --crop 32
+cp -r $data "$tmp/bare" && rm "$tmp"/bare/scene*/labels.json
+fails "no labels" "label" $ggn train --data "$tmp/bare" --crop 32
+cp -r $data "$tmp/quiet" && sed -i 's/"threshold":.*,/"threshold": 1,/' "$tmp"/quiet/scene*/labels.json
+fails "no noisy window" "free of noise" $ggn train --data "$tmp/quiet" --crop 32
+$ggn train $tiny --out "$tmp/no/such/folder/m.ggn" -q 2>"$tmp/err"
+[ $? -ne 0 ] && [ "$(wc -l <"$tmp/err")" -eq 1 ]
+check "an output folder that is not there" $?
+
+# the criterion with this model holds to the whole contract
+LULL_MODEL=$tmp/a.ggn $build/bin/lull-check "$build/lib/lull/ggn.so:ggn" >"$tmp/out" 2>&1
+rc=$?
+grep '^not ok' "$tmp/out" >"$tmp/err"
+check "lull-check passes the criterion ggn" $rc
+LULL_MODEL=$tmp/a.ggn $build/bin/lull-check -q -o state -o repeat -o batch -p gate=0 -p threshold=0.9 -p passes=1 \
+    "$build/lib/lull/ggn.so:ggn" >"$tmp/err" 2>&1
+check "and with other parameters" $?
+echo "1..$n"
