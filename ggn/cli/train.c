@@ -38,6 +38,7 @@ static const struct field fields[] = {
     {"soft-labels", INTEGER, AT(soft_labels), 0, 1, "1: labels between 0 and 1 near the threshold (lull 1)"},
     {"jitter", REAL, AT(jitter), 0, 2, "octaves over which the exposure of a window is varied (lull 0.3)"},
     {"synthetic", INTEGER, AT(synthetic), 0, 63, "synthetic sequences per block, made from its half buffers (lull 1)"},
+    {"extend", INTEGER, AT(extend), 0, 1, "1: continue recordings that end near their threshold with samples of the reference (lull 1)"},
     {"ratio", REAL, AT(data.ratio), 0, 10, "thin the recorded levels to at least this ratio, 0 = all (lull 1.1)"},
     {"validation-windows", INTEGER, AT(validation_windows), 1, 1e6, "most windows per validation (400)"},
     {"early-rate", REAL, AT(early_rate), 0, 1, "share of validation blocks that the threshold may stop early (0.02)"},

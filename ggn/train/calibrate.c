@@ -40,18 +40,17 @@ void ggn_calibrate_platt(const double *logit, const double *label, int n, struct
     policy->shift = b;
 }
 
-/* Where the block of list entries first … end − 1 stops. */
+/* Where the block of list entries first … end − 1 stops; 0 if it does not. */
 static double stop_of(const struct ggn_windows *w, int first, int end, const double *logit, const struct ggn_policy *policy, double t)
 {
-    const struct ggn_chain *c = &w->set->chains[w->list[first].chain];
     int passes = 0;
 
     for (int i = first; i < end; i++) {
         passes = ggn_policy_p(policy, logit[i]) < t ? passes + 1 : 0;
         if (passes >= policy->passes)
-            return c->spp[w->list[i].last];
+            return w->set->chains[w->list[i].chain].spp[w->list[i].last];
     }
-    return c->spp[c->n_levels - 1];
+    return 0;
 }
 
 int ggn_calibrate_stopping(const struct ggn_windows *w, const double *logit, const struct ggn_policy *policy, double t,
@@ -64,15 +63,17 @@ int ggn_calibrate_stopping(const struct ggn_windows *w, const double *logit, con
         return ggn_fail_nomem(err, "thresholds");
     *out = (struct ggn_stopping){0};
     for (int c = 0; c < w->set->n; c++) {
+        const struct ggn_chain *chain = &w->set->chains[c];
         if (w->first[c + 1] == w->first[c])
             continue;
-        double stop = stop_of(w, w->first[c], w->first[c + 1], logit, policy, t);
-        double truth = w->set->chains[c].label.threshold;
+        double stop = stop_of(w, w->first[c], w->first[c + 1], logit, policy, t), truth = chain->label.threshold;
+        if (stop == 0) /* nothing is known after the end of the chain: right if the noise is seen until there */
+            stop = fmax(chain->spp[chain->n_levels - 1], truth);
         early += stop < 0.8 * truth;
         spent += stop;
         needed += truth;
-        error[out->blocks++] = fabs(log2(stop / truth));
-        out->mean_abs_log2 += error[out->blocks - 1];
+        error[out->blocks] = fabs(log2(stop / truth));
+        out->mean_abs_log2 += error[out->blocks++];
     }
     if (out->blocks) {
         out->early_rate = (double)early / out->blocks;

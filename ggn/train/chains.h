@@ -52,6 +52,10 @@ void ggn_chains_release(struct ggn_chains *set);
  * same seed gives the same chains. */
 int ggn_chains_add_synthetic(struct ggn_chains *set, int per_chain, uint32_t seed, struct ggn_err *err);
 
+/* Continues recorded chains of all splits that end near or before their threshold, up to 0.7 of the reference's samples beyond the
+ * last level: the reference's samples go on where the recording stopped, their running mean simulated from the half buffers. */
+int ggn_chains_extend(struct ggn_chains *set, uint32_t seed, struct ggn_err *err);
+
 /* Chains of a split, real ones only if real_only. */
 int ggn_chains_count(const struct ggn_chains *set, enum ggn_split split, int real_only);
 /* Values of one image: 3·H·W. */

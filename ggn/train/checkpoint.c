@@ -18,7 +18,7 @@ uint32_t ggn_session_key(const struct ggn_session *s)
     const struct ggn_train_plan *p = s->plan;
     const double numbers[] = {(double)p->preset, p->window, p->k_r, p->k_m, p->k_d, p->crop, p->batch_r, p->batch, p->steps_r, p->steps,
                               p->epochs, p->epoch_steps, p->patience, p->lr_r, p->lr, p->difference, p->soft_labels, p->jitter,
-                              p->synthetic, p->validation_windows, p->seed, s->set.width, s->set.height, s->set.n};
+                              p->synthetic, p->extend, p->validation_windows, p->seed, s->set.width, s->set.height, s->set.n};
     uLong crc = crc32(0, (const Bytef *)numbers, sizeof numbers);
 
     for (int i = 0; i < s->set.n; i++) {

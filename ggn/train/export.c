@@ -27,7 +27,7 @@ static cJSON *describe_run(const struct ggn_session *s)
     } numbers[] = {{"seed", p->seed}, {"steps_denoiser", p->steps_r}, {"steps", p->steps}, {"epochs", p->epochs},
                    {"batch_denoiser", p->batch_r}, {"batch", p->batch}, {"crop", p->crop}, {"lr_denoiser", p->lr_r}, {"lr", p->lr},
                    {"difference", p->difference}, {"soft_labels", p->soft_labels}, {"jitter", p->jitter},
-                   {"synthetic_per_block", p->synthetic}, {"best_step", (double)s->progress.best_step},
+                   {"synthetic_per_block", p->synthetic}, {"extended", p->extend}, {"best_step", (double)s->progress.best_step},
                    {"divergences", s->progress.divergences}, {"data_key", ggn_session_key(s)}};
 
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)

@@ -34,6 +34,7 @@ struct ggn_train_plan ggn_train_plan_default(enum ggn_preset preset)
         .soft_labels = lull,
         .jitter = lull ? 0.3 : 0,
         .synthetic = lull ? 1 : 0,
+        .extend = lull,
         .validation_windows = 400,
         .early_rate = 0.02,
         .seed = 1,
@@ -170,6 +171,8 @@ static int prepare(struct ggn_session *s, struct ggn_err *err)
 
     if (!rc && p->synthetic > 0)
         rc = ggn_chains_add_synthetic(&s->set, p->synthetic, p->seed, err);
+    if (!rc && p->extend)
+        rc = ggn_chains_extend(&s->set, p->seed, err);
     if (rc)
         return rc;
     struct ggn_window_options train = {.split = GGN_SPLIT_TRAIN, .length = p->window, .synthetic = 1, .label_first = paper,

@@ -37,6 +37,7 @@ struct ggn_train_plan {
     int soft_labels;
     double jitter;               /* octaves of exposure; see ggn_augment_draw */
     int synthetic;               /* synthetic chains per block */
+    int extend;                  /* continue recorded chains beyond their last level, see ggn_chains_extend */
     int validation_windows;      /* most windows per validation */
     double early_rate;           /* share of validation blocks that may be stopped early (below 0.8 of their threshold) */
     uint32_t seed;

@@ -81,6 +81,39 @@ static void synthetic_noise_has_the_variance_of_rendered_noise(void **state)
     (void)state;
 }
 
+/* Continued levels: rising, and their noise goes on falling as 1/n. */
+static void extended_levels_continue_the_recording(void **state)
+{
+    struct ggn_chains set;
+    struct ggn_err err = {0};
+    double sum = 0;
+    int extended = 0;
+
+    load(&set, 0);
+    size_t values = ggn_chains_values(&set);
+    for (int i = 0; i < set.n; i++)
+        set.chains[i].label.threshold = i ? 400 : 30;
+    assert_int_equal(ggn_chains_extend(&set, 3, &err), 0);
+    assert_int_equal(set.chains[0].n_levels, 14);
+    for (int i = 1; i < set.n; i++) {
+        const struct ggn_chain *c = &set.chains[i];
+        assert_true(c->n_levels > 17 && c->spp[14] > c->spp[13] && c->spp[c->n_levels - 1] > 1800);
+        assert_true(isnan(c->tail999[14]));
+        double e[2] = {0, 0};
+        for (size_t v = 0; v < values; v++) {
+            /* a level and the next share samples: so do their errors */
+            double a = c->noisy[13 * values + v] - c->noisy[12 * values + v], b = c->noisy[14 * values + v] - c->noisy[13 * values + v];
+            e[0] += a * a / (1 / c->spp[12] - 1 / c->spp[13]);
+            e[1] += b * b / (1 / c->spp[13] - 1 / c->spp[14]);
+        }
+        sum += e[1] / e[0];
+        extended++;
+    }
+    assert_true(fabs(sum / extended - 1) < 0.2);
+    ggn_chains_release(&set);
+    (void)state;
+}
+
 static void windows_are_labelled_by_their_last_image(void **state)
 {
     struct ggn_chains set;
@@ -302,6 +335,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(splits_and_levels),
         cmocka_unit_test(synthetic_noise_has_the_variance_of_rendered_noise),
+        cmocka_unit_test(extended_levels_continue_the_recording),
         cmocka_unit_test(windows_are_labelled_by_their_last_image),
         cmocka_unit_test(augmentation_moves_whole_windows),
         cmocka_unit_test(folding_keeps_the_function),
