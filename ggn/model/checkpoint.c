@@ -38,22 +38,26 @@ static int add_arrays(struct ggn_trainer_f32 *t, struct ggn_container *c, struct
     return GGN_OK;
 }
 
+static int add_item(cJSON *to, const char *name, cJSON *item)
+{
+    return item && (name ? cJSON_AddItemToObject(to, name, item) : cJSON_AddItemToArray(to, item));
+}
+
 static char *describe(const struct ggn_trainer_f32 *t, const cJSON *loop)
 {
     const int hyper[] = {(int)t->hyper.preset, t->hyper.height, t->hyper.width, t->hyper.window,
                          t->hyper.k_r,         t->hyper.k_m,    t->hyper.k_d};
     cJSON *root = cJSON_CreateObject();
-    char *text = NULL;
+    int ok = root && cJSON_AddStringToObject(root, "kind", "checkpoint") &&
+             add_item(root, "hyper", cJSON_CreateIntArray(hyper, sizeof hyper / sizeof hyper[0])) &&
+             cJSON_AddNumberToObject(root, "steps", (double)t->steps);
+    cJSON *updates = ok ? cJSON_AddArrayToObject(root, "updates") : NULL;
 
-    cJSON_AddStringToObject(root, "kind", "checkpoint");
-    cJSON_AddItemToObject(root, "hyper", cJSON_CreateIntArray(hyper, sizeof hyper / sizeof hyper[0]));
-    cJSON_AddNumberToObject(root, "steps", (double)t->steps);
-    cJSON *updates = cJSON_AddArrayToObject(root, "updates");
+    ok = updates != NULL;
     for (int net = 0; net < GGN_NETS; net++)
-        cJSON_AddItemToArray(updates, cJSON_CreateNumber((double)t->adam_t[net]));
-    cJSON *copy = loop ? cJSON_Duplicate(loop, 1) : cJSON_CreateObject();
-    if (copy && updates && cJSON_AddItemToObject(root, "loop", copy))
-        text = cJSON_Print(root);
+        ok = ok && add_item(updates, NULL, cJSON_CreateNumber((double)t->adam_t[net]));
+    ok = ok && add_item(root, "loop", loop ? cJSON_Duplicate(loop, 1) : cJSON_CreateObject());
+    char *text = ok ? cJSON_Print(root) : NULL;
     cJSON_Delete(root);
     return text;
 }

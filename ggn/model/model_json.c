@@ -102,24 +102,30 @@ int ggn_model_json_parse(const char *json, struct ggn_model_description *out, st
     return rc;
 }
 
+/* cJSON's adders return NULL without memory; nothing may be left out silently. */
+static int fill(cJSON *root, const struct ggn_model *m)
+{
+    int ok = cJSON_AddStringToObject(root, "kind", "model") && cJSON_AddStringToObject(root, "preset", preset_name[m->hyper.preset]);
+
+    for (size_t i = 0; i < N_HYPER; i++)
+        ok = ok && cJSON_AddNumberToObject(root, hyper_field[i].name,
+                                           *(const int *)(const void *)((const char *)&m->hyper + hyper_field[i].at));
+    cJSON *calibration = ok ? cJSON_AddObjectToObject(root, "calibration") : NULL;
+    ok = calibration != NULL;
+    for (size_t i = 0; i < N_CALIBRATION; i++)
+        ok = ok && cJSON_AddNumberToObject(
+                       calibration, calibration_field[i].name,
+                       *(const double *)(const void *)((const char *)&m->calibration + calibration_field[i].at));
+    ok = ok && cJSON_AddNumberToObject(calibration, "consecutive", m->calibration.consecutive);
+    cJSON *provenance = ok ? cJSON_Duplicate(m->provenance, 1) : NULL;
+    return provenance && cJSON_AddItemToObject(root, "provenance", provenance);
+}
+
 char *ggn_model_json_print(const struct ggn_model *m)
 {
     cJSON *root = cJSON_CreateObject();
-    char *text = NULL;
+    char *text = root && fill(root, m) ? cJSON_Print(root) : NULL;
 
-    cJSON_AddStringToObject(root, "kind", "model");
-    cJSON_AddStringToObject(root, "preset", preset_name[m->hyper.preset]);
-    for (size_t i = 0; i < N_HYPER; i++)
-        cJSON_AddNumberToObject(root, hyper_field[i].name,
-                                *(const int *)(const void *)((const char *)&m->hyper + hyper_field[i].at));
-    cJSON *calibration = cJSON_AddObjectToObject(root, "calibration");
-    for (size_t i = 0; i < N_CALIBRATION; i++)
-        cJSON_AddNumberToObject(calibration, calibration_field[i].name,
-                                *(const double *)(const void *)((const char *)&m->calibration + calibration_field[i].at));
-    cJSON_AddNumberToObject(calibration, "consecutive", m->calibration.consecutive);
-    cJSON *provenance = cJSON_Duplicate(m->provenance, 1);
-    if (provenance && calibration && cJSON_AddItemToObject(root, "provenance", provenance))
-        text = cJSON_Print(root);
     cJSON_Delete(root);
     return text;
 }

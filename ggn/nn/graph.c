@@ -239,7 +239,7 @@ static void find_lifetimes(const struct ggn_graph *g, int born[], int dies[])
     }
     for (int i = 0; i < g->n_layers; i++) {
         const struct ggn_layer *l = &g->layer[i];
-        born[l->out] = i;
+        born[l->out] = l->op == GGN_OP_BN && i > 0 ? i - 1 : i; /* a convolution may write the batch norm's output itself */
         if (l->in > 0)
             dies[l->in] = i;
         if (l->in2 > 0)
