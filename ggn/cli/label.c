@@ -13,6 +13,7 @@
 #include "observer/calibrate.h"
 
 enum { MAX_INPUTS = 256, KEY_HUMAN = 256, KEY_VIEW, KEY_CALIBRATE, KEY_SOURCE, KEY_CHECK, KEY_TRIALS, KEY_SPREAD };
+enum { HALVES_CAP = 10000 }; /* the last sample count that GGN_SOURCE_HALVES simulates */
 
 struct options {
     const char *inputs[MAX_INPUTS];
@@ -190,6 +191,8 @@ static int label_observer(const struct options *o, const struct ggn_observer *ob
     int rc = start_labels(&l, "observer", v, observer->spread, err);
     if (rc != GGN_OK)
         return rc;
+    if (o->source == GGN_SOURCE_HALVES)
+        l.cap = HALVES_CAP;
     struct work w = {.view = v, .observer = observer, .source = o->source, .labels = l.labels};
     rc = run_work(&w, threads, err);
     l.n = v->manifest.n_blocks;
@@ -237,7 +240,7 @@ static int collect(const struct options *o, const struct ggn_thresholds *t, cons
     for (int i = 0; i < d->n && rc == GGN_OK; i++) {
         const struct ggn_dataset_view *v = &d->views[i];
         const struct ggn_view *row = find_row(o, t, v);
-        double cap = v->manifest.levels[v->manifest.n_levels - 1];
+        double cap = o->source == GGN_SOURCE_HALVES ? HALVES_CAP : v->manifest.levels[v->manifest.n_levels - 1];
         for (uint32_t b = 0; row != NULL && b < v->manifest.n_blocks && rc == GGN_OK; b++) {
             uint32_t id = v->manifest.blocks[b].id;
             if (id >= (uint32_t)row->n || row->spp[id] >= cap)

@@ -55,21 +55,20 @@ static int block_curves(const struct ggn_calibration_block *b, enum ggn_observer
         rc = ggn_fail_nomem(err, "calibration");
     float *map = planes + MASKINGS * n, *scratch = map + n;
     for (int m = 0; m < MASKINGS && rc == GGN_OK; m++)
-        rc = ggn_observer_deviation(s.converged, w, h, maskings[m].window_px, planes + (size_t)m * n, err);
+        rc = ggn_stimuli_deviation(&s, maskings[m].window_px, planes + (size_t)m * n, err);
     for (int f = 0; f < FORMS && rc == GGN_OK; f++) {
-        curves[f] = (struct ggn_curve){.n = (int)block->n_levels, .spp = malloc(block->n_levels * sizeof(double)),
-                                       .score = malloc(block->n_levels * sizeof(double))};
+        curves[f] = (struct ggn_curve){.n = s.n, .spp = malloc((size_t)s.n * sizeof(double)), .score = malloc((size_t)s.n * sizeof(double))};
         if (curves[f].spp == NULL || curves[f].score == NULL)
             rc = ggn_fail_nomem(err, "calibration");
-        for (uint32_t i = 0; i < block->n_levels && rc == GGN_OK; i++)
-            curves[f].spp[i] = block->levels[i].spp;
+        for (int i = 0; i < s.n && rc == GGN_OK; i++)
+            curves[f].spp[i] = s.spp[i];
     }
-    for (uint32_t i = 0; i < block->n_levels && rc == GGN_OK; i++) {
+    for (int i = 0; i < s.n && rc == GGN_OK; i++) {
         rc = ggn_stimuli_make(&s, i, test, err);
         for (int k = 0; k < MAPS && rc == GGN_OK; k++) {
             rc = ggn_observer_error_map(maps[k].map, maps[k].blur_px, s.converged, test, w, h, map, err);
             if (rc == GGN_OK)
-                pool_level(curves, (int)i, map, k, planes, n, scratch);
+                pool_level(curves, i, map, k, planes, n, scratch);
         }
     }
     free(test);

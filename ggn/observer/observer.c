@@ -151,28 +151,35 @@ int ggn_observer_error_map(enum ggn_observer_map kind, double blur_px, const uin
     return ggn_flip(reference, test, w, h, GGN_FLIP_PPD, map, &stats, err);
 }
 
-int ggn_observer_deviation(const uint8_t *reference, int w, int h, int window_px, float *deviation, struct ggn_err *err)
+/* Local variance of a plane in a box, in place; room for two planes. */
+static void local_variance(float *plane, float *room, int w, int h, int window_px)
 {
     enum { MAX_RADIUS = 49 };
     size_t n = (size_t)w * (size_t)h;
-    int r = window_px / 2;
-    float taps[2 * MAX_RADIUS + 1], *mean = malloc(2 * n * sizeof *mean);
-    if (mean == NULL)
-        return ggn_fail_nomem(err, "observer");
-    float *tmp = mean + n;
-    r = r < MAX_RADIUS ? r : MAX_RADIUS;
+    float taps[2 * MAX_RADIUS + 1], *mean = room, *tmp = room + n;
+    int r = window_px / 2 < MAX_RADIUS ? window_px / 2 : MAX_RADIUS;
     for (int i = 0; i <= 2 * r; i++)
         taps[i] = 1.0f / (float)(2 * r + 1);
-    lightness(reference, n, mean);
+    memcpy(mean, plane, n * sizeof *mean);
     for (size_t i = 0; i < n; i++)
-        deviation[i] = mean[i] * mean[i];
+        plane[i] *= plane[i];
     filter(mean, tmp, w, h, taps, r);
-    filter(deviation, tmp, w, h, taps, r);
-    for (size_t i = 0; i < n; i++) {
-        float v = deviation[i] - mean[i] * mean[i];
-        deviation[i] = v > 0.0f ? sqrtf(v) : 0.0f;
-    }
-    free(mean);
+    filter(plane, tmp, w, h, taps, r);
+    for (size_t i = 0; i < n; i++)
+        plane[i] = fmaxf(plane[i] - mean[i] * mean[i], 0.0f);
+}
+
+int ggn_observer_deviation(const uint8_t *reference, int w, int h, int window_px, float *deviation, struct ggn_err *err)
+{
+    size_t n = (size_t)w * (size_t)h;
+    float *room = malloc(2 * n * sizeof *room);
+    if (room == NULL)
+        return ggn_fail_nomem(err, "observer");
+    lightness(reference, n, deviation);
+    local_variance(deviation, room, w, h, window_px);
+    for (size_t i = 0; i < n; i++)
+        deviation[i] = sqrtf(deviation[i]);
+    free(room);
     return GGN_OK;
 }
 
@@ -216,6 +223,7 @@ double ggn_observer_pool(const float *map, const float *deviation, size_t n, dou
 
 void ggn_stimuli_release(struct ggn_stimuli *s)
 {
+    free(s->spp);
     free(s->base);
     free(s->difference);
     free(s->work);
@@ -228,6 +236,19 @@ static void encode(const float *linear, size_t pixels, uint8_t *rgb)
     for (size_t i = 0; i < pixels; i++)
         for (size_t c = 0; c < 3; c++)
             rgb[3 * i + c] = ggn_srgb_code((double)linear[c * pixels + i]);
+}
+
+/* Sample counts that halves stand for. spp may be NULL; returns their number. */
+static int virtual_levels(double *spp)
+{
+    int n = 0;
+    double v = 20.0;
+    for (; v < 10000.0; v *= 1.15, n++)
+        if (spp != NULL)
+            spp[n] = round(v);
+    if (spp != NULL)
+        spp[n] = 10000.0;
+    return n + 1;
 }
 
 /* The level whose half-buffer difference is kept in full. */
@@ -247,6 +268,7 @@ static int init_halves(struct ggn_stimuli *s, int reference_independent, struct 
         return ggn_fail(err, GGN_EINVAL, "block %u has no full level with a half-buffer difference", b->id);
     const struct ggn_seq_record *base = b->reference != NULL && reference_independent && b->reference->spp >= full->spp ? b->reference : full;
     s->spp0 = full->spp;
+    s->noisy_base = base == full;
     int rc = ggn_seq_half(b, full, s->difference, err);
     if (rc == GGN_OK)
         rc = ggn_seq_mean(b, base, s->base, err);
@@ -270,12 +292,14 @@ int ggn_stimuli_init(struct ggn_stimuli *out, const struct ggn_seq_block *block,
 {
     size_t pixels = (size_t)block->width * block->height;
     struct ggn_stimuli s = {.block = block, .source = source};
+    s.n = source == GGN_SOURCE_HALVES ? virtual_levels(NULL) : (int)block->n_levels;
+    s.spp = malloc((size_t)s.n * sizeof *s.spp);
     s.base = malloc(3 * pixels * sizeof(float));
     s.difference = malloc(3 * pixels * sizeof(float));
     s.work = malloc(3 * pixels * sizeof(float));
     s.converged = malloc(3 * pixels);
     int rc = GGN_OK;
-    if (s.base == NULL || s.difference == NULL || s.work == NULL || s.converged == NULL)
+    if (s.spp == NULL || s.base == NULL || s.difference == NULL || s.work == NULL || s.converged == NULL)
         rc = ggn_fail_nomem(err, "observer");
     else if (source == GGN_SOURCE_HALVES)
         rc = init_halves(&s, reference_independent, err);
@@ -285,20 +309,58 @@ int ggn_stimuli_init(struct ggn_stimuli *out, const struct ggn_seq_block *block,
         ggn_stimuli_release(&s);
         return rc;
     }
+    if (source == GGN_SOURCE_HALVES)
+        virtual_levels(s.spp);
+    else
+        for (int i = 0; i < s.n; i++)
+            s.spp[i] = block->levels[i].spp;
     *out = s;
     return GGN_OK;
 }
 
-int ggn_stimuli_make(struct ggn_stimuli *s, uint32_t level, uint8_t *test, struct ggn_err *err)
+int ggn_stimuli_deviation(struct ggn_stimuli *s, int window_px, float *deviation, struct ggn_err *err)
+{
+    int w = (int)s->block->width, h = (int)s->block->height;
+    size_t n = (size_t)w * (size_t)h;
+    if (!s->noisy_base)
+        return ggn_observer_deviation(s->converged, w, h, window_px, deviation, err);
+    uint8_t *rgb = malloc(3 * n);
+    float *room = malloc(4 * n * sizeof *room);
+    int rc = rgb == NULL || room == NULL ? ggn_fail_nomem(err, "observer") : GGN_OK;
+    if (rc == GGN_OK) {
+        float *noise = room + 2 * n, *other = room + 3 * n;
+        for (int side = 0; side < 2; side++) { /* M + D and M - D: half of their difference is noise as strong as M's own */
+            for (size_t i = 0; i < 3 * n; i++)
+                s->work[i] = s->base[i] + (side == 0 ? s->difference[i] : -s->difference[i]);
+            encode(s->work, n, rgb);
+            lightness(rgb, n, side == 0 ? noise : other);
+        }
+        for (size_t i = 0; i < n; i++)
+            noise[i] = 0.5f * (noise[i] - other[i]);
+        local_variance(noise, room, w, h, window_px);
+        lightness(s->converged, n, deviation);
+        local_variance(deviation, room, w, h, window_px);
+        for (size_t i = 0; i < n; i++)
+            deviation[i] = sqrtf(fmaxf(deviation[i] - noise[i], 0.0f));
+    }
+    free(room);
+    free(rgb);
+    return rc;
+}
+
+int ggn_stimuli_make(struct ggn_stimuli *s, int level, uint8_t *test, struct ggn_err *err)
 {
     const struct ggn_seq_block *b = s->block;
-    const struct ggn_seq_record *r = &b->levels[level];
     size_t pixels = (size_t)b->width * b->height;
     if (s->source == GGN_SOURCE_HALVES) {
-        float scale = (float)sqrt(s->spp0 / r->spp);
+        float scale = (float)sqrt(s->spp0 / s->spp[level]);
         for (size_t i = 0; i < 3 * pixels; i++)
             s->work[i] = s->base[i] + scale * s->difference[i];
-    } else if (s->scale && (ggn_seq_has(r, GGN_PLANE_MEAN_F16) || ggn_seq_has(r, GGN_PLANE_FINE))) {
+        encode(s->work, pixels, test);
+        return GGN_OK;
+    }
+    const struct ggn_seq_record *r = &b->levels[level];
+    if (s->scale && (ggn_seq_has(r, GGN_PLANE_MEAN_F16) || ggn_seq_has(r, GGN_PLANE_FINE))) {
         float scale = (float)sqrt((double)b->reference->spp / ((double)b->reference->spp + r->spp));
         int rc = ggn_seq_mean(b, r, s->work, err);
         if (rc != GGN_OK)
@@ -330,21 +392,21 @@ int ggn_observer_curve(const struct ggn_observer *o, const struct ggn_seq_block 
     int rc = ggn_stimuli_init(&s, block, source, reference_independent, err);
     if (rc != GGN_OK)
         return rc;
-    struct ggn_curve c = {.n = (int)block->n_levels};
-    c.spp = malloc(block->n_levels * sizeof *c.spp);
-    c.score = malloc(block->n_levels * sizeof *c.score);
+    struct ggn_curve c = {.n = s.n};
+    c.spp = malloc((size_t)s.n * sizeof *c.spp);
+    c.score = malloc((size_t)s.n * sizeof *c.score);
     uint8_t *test = malloc(3 * n);
     float *map = malloc(3 * n * sizeof *map);
     if (c.spp == NULL || c.score == NULL || test == NULL || map == NULL)
         rc = ggn_fail_nomem(err, "observer");
     else
-        rc = ggn_observer_deviation(s.converged, w, h, o->window_px, map + n, err);
-    for (uint32_t i = 0; i < block->n_levels && rc == GGN_OK; i++) {
+        rc = ggn_stimuli_deviation(&s, o->window_px, map + n, err);
+    for (int i = 0; i < s.n && rc == GGN_OK; i++) {
         rc = ggn_stimuli_make(&s, i, test, err);
         if (rc == GGN_OK)
             rc = ggn_observer_error_map(o->map, o->blur_px, s.converged, test, w, h, map, err);
         if (rc == GGN_OK) {
-            c.spp[i] = block->levels[i].spp;
+            c.spp[i] = s.spp[i];
             c.score[i] = ggn_observer_pool(map, map + n, n, o->masking, o->percentile, map + 2 * n);
         }
     }

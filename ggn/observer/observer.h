@@ -60,26 +60,33 @@ enum ggn_observer_source {
 };
 
 /*
- * Display images to judge, one for each level of the block: the converged one and the one at levels[i].
+ * Display images to judge: the converged one, and the one at any of `n` sample counts: the recorded levels, or for GGN_SOURCE_HALVES
+ * 20, 23, … 10,000 spp (each 1.15 times the one before), whatever was recorded.
  *
  * A reference of n_r independent samples has noise of its own: I_n - R has the variance s^2 (1/n + 1/n_r), not s^2/n. Scaling that
  * linear difference by sqrt(n_r/(n_r + n)) gives it the variance that I_n has against a perfect reference, so that R may stand for
  * the converged image even for n > n_r. Without linear data, or when the reference is not independent, images are taken as they are.
- * converged, test: [P][3].
+ * Halves without a reference take the mean of the full level for the converged image; then its noise, known from D, is taken out of
+ * the local deviation that masks.
  */
 struct ggn_stimuli {
     const struct ggn_seq_block *block; /* borrows */
     enum ggn_observer_source source;
     int scale;                         /* whether the difference is scaled */
+    int noisy_base;                    /* the converged image is a mean with the noise `difference` */
     double spp0;                       /* of D */
+    int n;
+    double *spp;                       /* owns; [n]; rising */
     float *base, *difference, *work;   /* own; [3][P]; linear */
     uint8_t *converged;                /* owns; [P][3] */
 };
 int ggn_stimuli_init(struct ggn_stimuli *s, const struct ggn_seq_block *block, enum ggn_observer_source source,
                      int reference_independent, struct ggn_err *err);
 void ggn_stimuli_release(struct ggn_stimuli *s);
-/* test: [P][3], the picture at block->levels[level]. */
-int ggn_stimuli_make(struct ggn_stimuli *s, uint32_t level, uint8_t *test, struct ggn_err *err);
+/* test: [P][3], the picture at spp[i]. */
+int ggn_stimuli_make(struct ggn_stimuli *s, int i, uint8_t *test, struct ggn_err *err);
+/* Local deviation of the converged image, [P], without its noise where that is known. */
+int ggn_stimuli_deviation(struct ggn_stimuli *s, int window_px, float *deviation, struct ggn_err *err);
 
 /* The curve of one block as the observer sees it. */
 int ggn_observer_curve(const struct ggn_observer *o, const struct ggn_seq_block *block, enum ggn_observer_source source,

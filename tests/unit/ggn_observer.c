@@ -11,78 +11,19 @@
 #include <cmocka.h>
 
 #include "support/ggn_near.h"
+#include "support/ggn_noise.h"
 
-#include "data/image.h"
 #include "observer/calibrate.h"
 
 enum { W = 48, H = 40, P = W * H };
 
-static uint32_t hash(uint32_t k, uint32_t s)
-{
-    uint32_t h = k + s * 0x9E3779B9u;
-    h ^= h >> 16;
-    h *= 0x7feb352du;
-    h ^= h >> 15;
-    h *= 0x846ca68bu;
-    return h ^ h >> 16;
-}
-
-static double gauss(uint32_t k, uint32_t s)
-{
-    double u = (hash(k, s) + 0.5) / 4294967296.0, v = (hash(k, s + 7919) + 0.5) / 4294967296.0;
-    return sqrt(-2.0 * log(u)) * cos(6.283185307179586 * v);
-}
-
-static double truth(int pixel, int c, double texture)
-{
-    int x = pixel % W, y = pixel / W;
-    return 0.4 + 0.1 * c + 0.1 * sin(0.05 * x + 0.04 * y) + texture * ((hash((uint32_t)pixel, 99) & 1) ? 1.0 : -1.0);
-}
-
 static const uint32_t levels[] = {20, 30, 45, 68, 101, 152, 228, 342, 513, 769, 1153, 1730, 2595, 3892, 5839, 8758};
 enum { LEVELS = sizeof levels / sizeof levels[0] };
 
-/* A block whose pixels have per-sample standard deviation sigma: nested levels of equal halves, an independent reference. */
 static struct ggn_seq_block make_block(double sigma, double texture, uint32_t seed, uint32_t reference_spp)
 {
-    static float mean[3 * P], half[3 * P], sum[2][3 * P];
-    static uint8_t display[3 * P];
-    struct ggn_seq_builder w;
-    struct ggn_seq_block b;
-    uint32_t have = 0, crc;
-    int full_done = 0;
-    char path[] = "/tmp/ggn_observer.XXXXXX";
-    assert_int_equal(ggn_seq_builder_init(&w, W, H, 0, 0, seed, seed, NULL), GGN_OK);
-    memset(sum, 0, sizeof sum);
-    for (uint32_t i = 0; i <= LEVELS; i++) {
-        uint32_t spp = i < LEVELS ? levels[i] : reference_spp;
-        for (int c = 0; c < 3; c++)
-            for (int p = 0; p < P; p++) {
-                int k = c * P + p;
-                double t = truth(p, c, texture);
-                if (i < LEVELS) {
-                    double more = 0.5 * (spp - have);
-                    for (int side = 0; side < 2; side++) /* grey noise, as most of path tracing's is */
-                        sum[side][k] += (float)(more * t + sigma * sqrt(more) * gauss((uint32_t)p, seed * 1000 + 10 * i + (uint32_t)side * 5));
-                    mean[k] = (sum[0][k] + sum[1][k]) / (float)spp;
-                    half[k] = (sum[0][k] - sum[1][k]) / (float)spp;
-                } else {
-                    mean[k] = (float)(t + sigma / sqrt(spp) * gauss((uint32_t)p, seed * 1000 + 777));
-                }
-                display[k] = ggn_srgb_code((double)mean[k]);
-            }
-        struct ggn_seq_frame f = {.spp = spp, .half_spp = i < LEVELS ? spp / 2 : 0, .is_reference = i == LEVELS,
-                                  .full = !full_done && spp >= 320, .display = display, .mean = mean, .half = i < LEVELS ? half : NULL};
-        full_done |= f.full;
-        have = spp;
-        assert_int_equal(ggn_seq_builder_add(&w, &f, NULL), GGN_OK);
-    }
-    close(mkstemp(path));
-    assert_int_equal(ggn_seq_builder_write(&w, path, &crc, NULL), GGN_OK);
-    assert_int_equal(ggn_seq_block_read(path, &b, NULL), GGN_OK);
-    unlink(path);
-    ggn_seq_builder_release(&w);
-    return b;
+    struct ggn_noise n = {W, H, levels, LEVELS, reference_spp, sigma, texture, seed};
+    return ggn_noise_block(&n);
 }
 
 static int ascending(const void *a, const void *b)
@@ -97,8 +38,8 @@ static void pooling(void **state)
     static float map[P], deviation[P], scratch[P], sorted[P];
     for (uint32_t seed = 0; seed < 40; seed++) {
         for (uint32_t i = 0; i < P; i++) {
-            map[i] = (float)(hash(i, seed) % (seed % 4 == 0 ? 3 : 100000));
-            deviation[i] = (float)(hash(i, seed + 1000) % 10);
+            map[i] = (float)(ggn_noise_hash(i, seed) % (seed % 4 == 0 ? 3 : 100000));
+            deviation[i] = (float)(ggn_noise_hash(i, seed + 1000) % 10);
             sorted[i] = map[i] / (1.0f + 0.25f * deviation[i]);
         }
         qsort(sorted, P, sizeof *sorted, ascending);
@@ -209,6 +150,24 @@ static void noisy_reference(void **state)
     ggn_seq_block_release(&poor);
 }
 
+/* Halves without a reference: the mean's own noise must not mask, texture must. */
+static void halves_alone(void **state)
+{
+    (void)state;
+    struct ggn_observer o = ggn_observer_default;
+    o.percentile = 80;
+    o.tau = 0.6;
+    o.masking = 0.3;
+    for (int i = 0; i < 2; i++) {
+        double texture = 0.06 * i;
+        struct ggn_seq_block with = make_block(0.9, texture, 8, 1000000), without = make_block(0.9, texture, 8, 0);
+        double a = threshold_of(&with, &o, GGN_SOURCE_HALVES), b = threshold_of(&without, &o, GGN_SOURCE_HALVES);
+        assert_near(log2(b / a), 0.0, 0.25); /* 1.4 octaves too low when the noise is left in */
+        ggn_seq_block_release(&with);
+        ggn_seq_block_release(&without);
+    }
+}
+
 static void calibration(void **state)
 {
     (void)state;
@@ -265,9 +224,9 @@ static void trials(void **state)
     char path[] = "/tmp/ggn_trials.XXXXXX";
     FILE *f = fdopen(mkstemp(path), "w");
     for (uint32_t i = 0; i < 800; i++) { /* four blocks, spread of half an octave */
-        double level = 5.0 * exp2(6.0 * (hash(i, 1) / 4294967296.0));
+        double level = 5.0 * exp2(6.0 * (ggn_noise_hash(i, 1) / 4294967296.0));
         double x = log2(20.0 * level), t = 8.5 + 0.4 * (i % 4);
-        fprintf(f, "%u.0;%.1f;%d\n", i % 4, level, x + 0.5 * gauss(i, 3) < t);
+        fprintf(f, "%u.0;%.1f;%d\n", i % 4, level, x + 0.5 * ggn_noise_gauss(i, 3) < t);
     }
     fputs("0.0;1.0;05.0;6.0;1\n0.0;0.0;0\n", f);
     fclose(f);
@@ -283,7 +242,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(pooling), cmocka_unit_test(masking), cmocka_unit_test(thresholds), cmocka_unit_test(scaling),
-        cmocka_unit_test(noisy_reference), cmocka_unit_test(calibration), cmocka_unit_test(parameters), cmocka_unit_test(trials),
+        cmocka_unit_test(noisy_reference), cmocka_unit_test(halves_alone), cmocka_unit_test(calibration), cmocka_unit_test(parameters), cmocka_unit_test(trials),
     };
     return cmocka_run_group_tests_name("observer", tests, NULL, NULL);
 }
