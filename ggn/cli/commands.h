@@ -21,7 +21,9 @@
     X(compare, "stop maps or thresholds against (human) thresholds") \
     X(import_sin3d, "SIN3D images into block sequences") \
     X(label, "thresholds for recorded sequences: human, or a model observer's") \
-    X(train, "train a stopping criterion on block sequences")
+    X(train, "train a stopping criterion on block sequences") \
+    X(evaluate, "figures of models and baselines on recorded sequences") \
+    X(reconstruct, "the picture with each block at its threshold")
 
 #define GGN_DECLARE_COMMAND(name, help) int ggn_cmd_##name(int argc, char **argv);
 GGN_COMMANDS(GGN_DECLARE_COMMAND)

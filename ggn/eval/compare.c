@@ -177,8 +177,7 @@ static int columns_of(const struct ggn_pair *p)
     return c > 0 ? c : (int)lround(ceil(sqrt((double)p->truth->n)));
 }
 
-/* One small picture per view: the true map left, the model's right, one colour scale for all. */
-static int heat_maps(const char *path, const struct ggn_pairing *p, const char *truth_name, const char *model_name, struct ggn_err *err)
+int ggn_plot_heatmaps(const char *path, const struct ggn_pairing *p, const char *truth_name, const char *model_name, struct ggn_err *err)
 {
     enum { MOST = 100 };
     struct ggn_plot plot;
@@ -208,14 +207,17 @@ static int heat_maps(const char *path, const struct ggn_pairing *p, const char *
             const double *spp = side == 0 ? pair->truth->spp : pair->model->spp;
             fprintf(s, "$v%d_%d << EOD\n", v, side);
             for (int b = 0; b < pair->truth->n; b++)
-                fprintf(s, "%d %d %.0f\n", side * (columns + 1) + b % columns, b / columns, spp[b]);
+                if (!isnan(spp[b]))
+                    fprintf(s, "%d %d %.0f\n", side * (columns + 1) + b % columns, b / columns, spp[b]);
             fputs("EOD\n", s);
         }
         fputs("set title ", s);
         ggn_plot_quote(s, pair->truth->name);
-        fprintf(s, "\nset xrange [-0.5:%d.5]\nset yrange [%d.5:-0.5]\nset size ratio %g\n%splot $v%d_0 using 1:2:3 with image notitle, "
-                   "$v%d_1 using 1:2:3 with image notitle",
-                2 * columns, rows - 1, (double)rows / (2 * columns + 1), shown > 1 ? "unset colorbox\n" : "", v, v);
+        fprintf(s, "\nset xrange [-0.5:%d.5]\nset yrange [%d.5:-0.5]\nset size ratio %g\n%splot ", 2 * columns, rows - 1,
+                (double)rows / (2 * columns + 1), shown > 1 ? "unset colorbox\n" : "");
+        for (int side = 0; side < 2; side++)
+            fprintf(s, "%s$v%d_%d using 1:2:($1-0.5):($1+0.5):($2-0.5):($2+0.5):3 with boxxyerror fs solid noborder lc palette notitle",
+                    side > 0 ? ", " : "", v, side);
         for (int side = 0; side < 2 && labels && columns <= 16; side++)
             fprintf(s, ", $v%d_%d using 1:2:(sprintf('%%d',int($3))) with labels font ',%d' tc '#ffffff' notitle", v, side,
                     shown == 1 ? 10 : 7);
@@ -256,6 +258,6 @@ int ggn_compare_pictures(const char *dir, const struct ggn_pairing *p, const cha
         rc = ggn_plot_errors(path, p->truth, p->model, p->n, model_name, err);
     snprintf(path, sizeof path, "%s/heatmaps.png", dir);
     if (rc == GGN_OK)
-        rc = heat_maps(path, p, truth_name, model_name, err);
+        rc = ggn_plot_heatmaps(path, p, truth_name, model_name, err);
     return rc;
 }

@@ -39,4 +39,7 @@ int ggn_plot_scatter(const char *path, const double *truth, const double *model,
                      const char *model_name, struct ggn_err *err);
 int ggn_plot_errors(const char *path, const double *truth, const double *model, size_t n, const char *title, struct ggn_err *err);
 
+/* One small picture per view: the true map left, the model's right, one colour scale for all. At most 100 views. */
+int ggn_plot_heatmaps(const char *path, const struct ggn_pairing *p, const char *truth_name, const char *model_name, struct ggn_err *err);
+
 #endif

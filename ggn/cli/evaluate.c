@@ -1,0 +1,252 @@
+/* `ggn evaluate --data DATA [--model MODEL]`: every metric of every method, on scenes that were kept apart. */
+#include <argp.h>
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include <cjson/cJSON.h>
+
+#include "base/fio.h"
+#include "cli/commands.h"
+#include "eval/network.h"
+#include "eval/report.h"
+
+enum { MAX_MODELS = 8, MAX_METHODS = 8 + MAX_MODELS, KEY_EARLY = 256, KEY_NO_QUALITY, KEY_PRECISION, KEY_RETUNE };
+
+struct options {
+    const char *data, *out, *models[MAX_MODELS];
+    int n_models, json, quality, threads, window, retune;
+    double early;
+    enum ggn_precision precision;
+};
+
+static const struct argp_option option_table[] = {
+    {"data", 'd', "DATA", 0, "labelled data set: a folder of sequences with split.json (required)", 1},
+    {"model", 'm', "FILE", 0, "trained model (.ggn); may be repeated", 1},
+    {"json", 'j', NULL, 0, "print the figures as JSON", 2},
+    {"output", 'o', "DIR", 0, "write figures.json and pictures there", 2},
+    {"early", KEY_EARLY, "RATE", 0, "early-stop rate that cuts are tuned for on the training scenes (default 0.05)", 3},
+    {"retune", KEY_RETUNE, NULL, 0, "tune the models' thresholds too, on the validation scenes, instead of taking the stored ones", 3},
+    {"no-quality", KEY_NO_QUALITY, NULL, 0, "skip FLIP and SSIM at the stop", 3},
+    {"window", 'w', "S", 0, "levels that a window has when no model says so (default 6)", 3},
+    {"precision", KEY_PRECISION, "f32|bf16", 0, "arithmetic of the models", 3},
+    {"threads", 't', "N", 0, "worker threads (default: all processors)", 4},
+    {0},
+};
+
+static error_t parse(int key, char *arg, struct argp_state *state)
+{
+    struct options *o = state->input;
+    char *end = NULL;
+
+    switch (key) {
+    case 'd': o->data = arg; return 0;
+    case 'o': o->out = arg; return 0;
+    case 'j': o->json = 1; return 0;
+    case KEY_NO_QUALITY: o->quality = 0; return 0;
+    case KEY_RETUNE: o->retune = 1; return 0;
+    case 'm':
+        if (o->n_models == MAX_MODELS)
+            argp_error(state, "more than %d models", MAX_MODELS);
+        o->models[o->n_models++] = arg;
+        return 0;
+    case KEY_EARLY:
+        o->early = strtod(arg, &end);
+        if (end == arg || *end != '\0' || !(o->early >= 0.0 && o->early <= 1.0))
+            argp_error(state, "--early %s: expected 0 … 1", arg);
+        return 0;
+    case KEY_PRECISION:
+        if (strcmp(arg, "f32") != 0 && strcmp(arg, "bf16") != 0)
+            argp_error(state, "--precision %s: expected f32 or bf16", arg);
+        o->precision = arg[0] == 'b' ? GGN_PRECISION_BF16 : GGN_PRECISION_F32;
+        return 0;
+    case 'w':
+    case 't': {
+        long n = strtol(arg, &end, 10);
+        if (end == arg || *end != '\0' || n < 1 || n > (key == 'w' ? 16 : 1024))
+            argp_error(state, "-%c %s: expected 1 … %d", key, arg, key == 'w' ? 16 : 1024);
+        *(key == 'w' ? &o->window : &o->threads) = (int)n;
+        return 0;
+    }
+    case ARGP_KEY_END:
+        if (o->data == NULL)
+            argp_error(state, "--data is needed");
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+struct job {
+    const struct options *o;
+    struct ggn_dataset data;
+    struct ggn_eval_set set;
+    struct ggn_model *models[MAX_MODELS];
+    struct ggn_method methods[MAX_METHODS];
+    int n;
+    enum ggn_split tuning, tuning_models;
+};
+
+static int load_models(struct job *j, int *window, struct ggn_err *err)
+{
+    *window = j->o->window;
+    for (int i = 0; i < j->o->n_models; i++) {
+        int rc = ggn_model_load(j->o->models[i], &j->models[i], err);
+        if (rc != GGN_OK)
+            return rc;
+        *window = i == 0 || j->models[i]->hyper.window > *window ? j->models[i]->hyper.window : *window;
+    }
+    return GGN_OK;
+}
+
+/* A method that could be made takes its place in the list; one that lacks its data does not. */
+static int add_trivial(struct job *j, struct ggn_err *err)
+{
+    int available, rc = ggn_method_spp(&j->methods[j->n], &j->set, err);
+    if (rc == GGN_OK)
+        rc = ggn_method_tune(&j->methods[j->n++], &j->set, j->tuning, j->o->early, err);
+    if (rc == GGN_OK && (rc = ggn_method_constant(&j->methods[j->n], &j->set, err)) == GGN_OK)
+        j->n++;
+    if (rc == GGN_OK && (rc = ggn_method_scene_mean(&j->methods[j->n], &j->set, err)) == GGN_OK)
+        j->n++;
+    for (int k = 0; k < 2 && rc == GGN_OK; k++) {
+        struct ggn_method *m = &j->methods[j->n];
+        rc = k == 0 ? ggn_method_halfbuf(m, &j->set, &available, err) : ggn_method_variance(m, &j->set, &available, err);
+        if (rc == GGN_OK && !available)
+            ggn_method_release(m);
+        else if (rc == GGN_OK)
+            rc = ggn_method_tune(&j->methods[j->n++], &j->set, j->tuning, j->o->early, err);
+    }
+    return rc;
+}
+
+static int add_models(struct job *j, struct ggn_threads *threads, struct ggn_err *err)
+{
+    int rc = GGN_OK;
+    for (int i = 0; i < j->o->n_models && rc == GGN_OK; i++) {
+        const char *slash = strrchr(j->o->models[i], '/');
+        rc = ggn_eval_network(&j->methods[j->n], &j->set, j->models[i], slash != NULL ? slash + 1 : j->o->models[i], j->o->precision, threads, err);
+        if (rc != GGN_OK)
+            return rc;
+        struct ggn_method *m = &j->methods[j->n++];
+        if (j->o->retune)
+            rc = ggn_method_tune(m, &j->set, j->tuning_models, j->o->early, err);
+    }
+    return rc;
+}
+
+static int pictures(const struct job *j, enum ggn_split split, struct ggn_err *err)
+{
+    char path[4096];
+    int rc = ggn_report_pictures(j->o->out, &j->set, split, j->methods, j->n, err);
+    if (rc != GGN_OK || j->o->n_models == 0 || split == GGN_SPLIT_TRAIN)
+        return rc;
+    snprintf(path, sizeof path, "%.3900s/%s-denoiser.png", j->o->out, ggn_split_names[split]);
+    return ggn_eval_denoiser_picture(path, &j->set, j->models[0], split, err);
+}
+
+static int write_json(const struct options *o, const char *text, struct ggn_err *err)
+{
+    char path[4096];
+    struct ggn_fio_out out;
+    snprintf(path, sizeof path, "%.3900s/figures.json", o->out);
+    int rc = ggn_fio_begin(&out, path, err);
+    if (rc != GGN_OK)
+        return rc;
+    fprintf(out.file, "%s\n", text);
+    return ggn_fio_commit(&out, err);
+}
+
+/* "human", "observer" or "mixed" */
+static const char *label_source(const struct ggn_dataset *d)
+{
+    const char *source = NULL;
+    for (int i = 0; i < d->n; i++)
+        if (d->views[i].has_labels)
+            source = source == NULL || strcmp(source, d->views[i].labels.source) == 0 ? d->views[i].labels.source : "mixed";
+    return source != NULL ? source : "none";
+}
+
+static int report(struct job *j, int skipped, struct ggn_err *err)
+{
+    struct ggn_method_metrics metrics[MAX_METHODS];
+    cJSON *root = cJSON_CreateObject();
+    cJSON_AddStringToObject(root, "data", j->o->data);
+    cJSON_AddStringToObject(root, "labels", label_source(&j->data));
+    cJSON_AddNumberToObject(root, "window", j->set.window);
+    cJSON_AddNumberToObject(root, "early_rate_tuned_for", j->o->early);
+    cJSON_AddStringToObject(root, "tuned_on", ggn_split_names[j->tuning]);
+    cJSON *splits = cJSON_AddObjectToObject(root, "splits");
+    int rc = GGN_OK;
+    if (!j->o->json)
+        printf("labels: %s; cuts tuned on %s for %.1f %% early stops%s\n", label_source(&j->data), ggn_split_names[j->tuning], 100.0 * j->o->early,
+               skipped > 0 ? "; views without labels are left out" : "");
+    for (int split = 0; split < GGN_SPLITS && rc == GGN_OK; split++) {
+        if (ggn_eval_count(&j->set, (enum ggn_split)split) == 0)
+            continue;
+        for (int i = 0; i < j->n && rc == GGN_OK; i++)
+            rc = ggn_method_measure(&j->methods[i], &j->set, (enum ggn_split)split, &metrics[i], err);
+        if (rc != GGN_OK)
+            break;
+        if (!j->o->json)
+            ggn_report_table(stdout, &j->set, (enum ggn_split)split, j->methods, metrics, j->n);
+        cJSON_AddItemToObject(splits, ggn_split_names[split], ggn_report_json(j->methods, metrics, j->n));
+        if (j->o->out != NULL)
+            rc = pictures(j, (enum ggn_split)split, err);
+    }
+    char *text = rc == GGN_OK ? cJSON_Print(root) : NULL;
+    cJSON_Delete(root);
+    if (rc == GGN_OK && text == NULL)
+        rc = ggn_fail_nomem(err, "report");
+    if (rc == GGN_OK && j->o->json)
+        puts(text);
+    if (rc == GGN_OK && j->o->out != NULL)
+        rc = write_json(j->o, text, err);
+    cJSON_free(text);
+    return rc;
+}
+
+int ggn_cmd_evaluate(int argc, char **argv)
+{
+    static const struct argp argp = {
+        .options = option_table,
+        .parser = parse,
+        .doc = "Measures models, the trivial baselines and the criteria halfbuf and variance on the same recorded sequences, separately for training, "
+               "validation and test scenes.",
+    };
+    struct options o = {.early = 0.05, .quality = 1, .threads = ggn_threads_available(), .window = 6};
+    struct job j = {.o = &o};
+    struct ggn_err err = {0};
+    int window, skipped = 0;
+
+    argp_parse(&argp, argc, argv, 0, NULL, &o);
+    struct ggn_threads *threads = ggn_threads_create(o.threads, &err);
+    int rc = threads == NULL ? err.code : GGN_OK;
+    if (rc == GGN_OK && o.out != NULL && mkdir(o.out, 0777) != 0 && errno != EEXIST)
+        rc = ggn_fail(&err, GGN_EIO, "%s: %s", o.out, strerror(errno));
+    if (rc == GGN_OK)
+        rc = load_models(&j, &window, &err);
+    if (rc == GGN_OK)
+        rc = ggn_dataset_open(o.data, &j.data, &err);
+    if (rc == GGN_OK)
+        rc = ggn_eval_set_load(&j.set, &j.data, window, o.quality, threads, &skipped, &err);
+    if (rc == GGN_OK) {
+        j.tuning = ggn_eval_count(&j.set, GGN_SPLIT_TRAIN) > 0 ? GGN_SPLIT_TRAIN : j.set.blocks[0].split;
+        j.tuning_models = ggn_eval_count(&j.set, GGN_SPLIT_VALIDATION) > 0 ? GGN_SPLIT_VALIDATION : j.tuning;
+        rc = add_trivial(&j, &err);
+    }
+    if (rc == GGN_OK)
+        rc = add_models(&j, threads, &err);
+    if (rc == GGN_OK)
+        rc = report(&j, skipped, &err);
+    for (int i = 0; i < j.n; i++)
+        ggn_method_release(&j.methods[i]);
+    ggn_eval_set_release(&j.set);
+    ggn_dataset_release(&j.data);
+    for (int i = 0; i < o.n_models; i++)
+        ggn_model_destroy(j.models[i]);
+    ggn_threads_destroy(threads);
+    return rc == GGN_OK ? GGN_EXIT_OK : ggn_cmd_fail(argv[0], &err);
+}

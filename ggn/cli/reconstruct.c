@@ -1,0 +1,198 @@
+/* `ggn reconstruct SEQUENCE`: the picture in which each block is taken at its threshold or stop. */
+#include <argp.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "cli/commands.h"
+#include "data/image.h"
+#include "data/labels.h"
+#include "data/manifest.h"
+#include "data/thresholds.h"
+#include "observer/flip.h"
+
+struct options {
+    const char *dir, *stops, *view, *out, *reference;
+    int json;
+};
+
+static const struct argp_option option_table[] = {
+    {"stops", 's', "FILE", 0, "stops or thresholds per block: CSV, report JSON or EXR stop map (default: the sequence's labels)", 0},
+    {"view", 'v', "NAME", 0, "row of the CSV", 0},
+    {"output", 'o', "OUT.png", 0, "the picture (required)", 0},
+    {"reference", 'r', "REF.png", 0, "write the reference too", 0},
+    {"json", 'j', NULL, 0, "print the figures as JSON", 0},
+    {0},
+};
+
+static error_t parse(int key, char *arg, struct argp_state *state)
+{
+    struct options *o = state->input;
+
+    switch (key) {
+    case 's': o->stops = arg; return 0;
+    case 'v': o->view = arg; return 0;
+    case 'o': o->out = arg; return 0;
+    case 'r': o->reference = arg; return 0;
+    case 'j': o->json = 1; return 0;
+    case ARGP_KEY_ARG:
+        if (state->arg_num >= 1)
+            return ARGP_ERR_UNKNOWN;
+        o->dir = arg;
+        return 0;
+    case ARGP_KEY_END:
+        if (o->dir == NULL || o->out == NULL)
+            argp_error(state, "SEQUENCE and --output are needed");
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+struct picture {
+    uint8_t *taken, *reference; /* own; [height][width][3] */
+    double samples, worst_flip;
+    int blocks, beyond;         /* beyond: stops after the last level, which was taken instead */
+    uint32_t worst_block;
+};
+
+/* The first level that is not below spp, or the last one. */
+static const struct ggn_seq_record *level_at(const struct ggn_seq_block *b, double spp, int *beyond)
+{
+    for (uint32_t i = 0; i < b->n_levels; i++)
+        if (b->levels[i].spp >= spp)
+            return &b->levels[i];
+    *beyond += 1;
+    return &b->levels[b->n_levels - 1];
+}
+
+static void paste(uint8_t *image, const struct ggn_manifest *m, const struct ggn_seq_block *b, const uint8_t *rgb)
+{
+    for (uint32_t y = 0; y < b->height; y++)
+        memcpy(image + 3 * (((size_t)b->y0 + y) * m->width + (size_t)b->x0), rgb + 3 * (size_t)y * b->width, 3 * (size_t)b->width);
+}
+
+static int take_block(struct picture *p, const struct ggn_manifest *m, const struct ggn_seq_block *b, double spp, struct ggn_err *err)
+{
+    size_t pixels = (size_t)b->width * b->height;
+    uint8_t *rgb = malloc(6 * pixels);
+    struct ggn_flip_stats flip;
+    if (rgb == NULL)
+        return ggn_fail_nomem(err, "picture");
+    const struct ggn_seq_record *r = level_at(b, spp, &p->beyond);
+    int rc = ggn_seq_display(b, r, rgb, err);
+    if (rc == GGN_OK)
+        paste(p->taken, m, b, rgb);
+    if (rc == GGN_OK && b->reference != NULL) {
+        rc = ggn_seq_display(b, b->reference, rgb + 3 * pixels, err);
+        if (rc == GGN_OK)
+            rc = ggn_flip(rgb + 3 * pixels, rgb, (int)b->width, (int)b->height, GGN_FLIP_PPD, NULL, &flip, err);
+        if (rc == GGN_OK) {
+            paste(p->reference, m, b, rgb + 3 * pixels);
+            if (flip.mean > p->worst_flip) {
+                p->worst_flip = flip.mean;
+                p->worst_block = b->id;
+            }
+        }
+    }
+    free(rgb);
+    p->samples += (double)r->spp;
+    p->blocks++;
+    return rc;
+}
+
+/* Where block `id` stops: from the file of stops or from the labels; NaN if neither knows. */
+static double stop_of(const struct ggn_view *stops, const struct ggn_labels *labels, uint32_t id)
+{
+    if (stops != NULL)
+        return id < (uint32_t)stops->n ? stops->spp[id] : (double)NAN;
+    const struct ggn_label *l = ggn_labels_find(labels, id);
+    return l != NULL ? l->threshold : (double)NAN;
+}
+
+static int build(const struct options *o, const struct ggn_manifest *m, const struct ggn_view *stops, const struct ggn_labels *labels,
+                 struct picture *p, struct ggn_err *err)
+{
+    size_t pixels = (size_t)m->width * m->height;
+    int rc = GGN_OK;
+    if (pixels > GGN_IMAGE_MAX_PIXELS)
+        return ggn_fail(err, GGN_EINVAL, "%s: %ux%u is too large", o->dir, m->width, m->height);
+    p->taken = calloc(3, pixels);
+    p->reference = calloc(3, pixels);
+    if (p->taken == NULL || p->reference == NULL)
+        return ggn_fail_nomem(err, "picture");
+    for (uint32_t i = 0; i < m->n_blocks && rc == GGN_OK; i++) {
+        struct ggn_seq_block b;
+        double spp = stop_of(stops, labels, m->blocks[i].id);
+        if (isnan(spp))
+            return ggn_fail(err, GGN_EINVAL, "%s: block %u has no stop", o->dir, m->blocks[i].id);
+        rc = ggn_manifest_read_block(o->dir, m, i, &b, err);
+        if (rc != GGN_OK)
+            break;
+        rc = take_block(p, m, &b, spp, err);
+        ggn_seq_block_release(&b);
+    }
+    if (rc == GGN_OK && m->n_blocks == 0)
+        rc = ggn_fail(err, GGN_EINVAL, "%s: no finished block in it", o->dir);
+    if (rc == GGN_OK)
+        rc = ggn_image8_write_png(o->out, p->taken, (int)m->width, (int)m->height, err);
+    if (rc == GGN_OK && o->reference != NULL)
+        rc = ggn_image8_write_png(o->reference, p->reference, (int)m->width, (int)m->height, err);
+    return rc;
+}
+
+static int report(const struct options *o, const struct ggn_manifest *m, const struct picture *p, struct ggn_err *err)
+{
+    struct ggn_flip_stats flip;
+    int rc = ggn_flip(p->reference, p->taken, (int)m->width, (int)m->height, GGN_FLIP_PPD, NULL, &flip, err);
+    if (rc != GGN_OK)
+        return rc;
+    double mean_spp = p->samples / p->blocks;
+    if (o->json)
+        printf("{\"blocks\": %d, \"mean_spp\": %.2f, \"flip_mean\": %.6f, \"flip_max\": %.6f, \"worst_block\": %u, \"worst_block_flip\": %.6f, "
+               "\"beyond_last_level\": %d}\n", p->blocks, mean_spp, flip.mean, flip.max, p->worst_block, p->worst_flip, p->beyond);
+    else
+        printf("%d blocks, %.1f samples per pixel on average; FLIP mean %.4f, worst block %u with %.4f%s\n", p->blocks, mean_spp, flip.mean,
+               p->worst_block, p->worst_flip, p->beyond > 0 ? "; some stops lie beyond the last level" : "");
+    return GGN_OK;
+}
+
+int ggn_cmd_reconstruct(int argc, char **argv)
+{
+    static const struct argp argp = {
+        .options = option_table,
+        .parser = parse,
+        .args_doc = "SEQUENCE",
+        .doc = "Builds the picture in which each block is taken at its threshold (the first recorded level that is not below it), for looking "
+               "at and for figures of quality.",
+    };
+    struct options o = {0};
+    struct ggn_manifest m = {0};
+    struct ggn_labels labels = {0};
+    struct ggn_thresholds stops = {0};
+    struct picture p = {0};
+    struct ggn_err err = {0};
+    const struct ggn_view *view = NULL;
+
+    argp_parse(&argp, argc, argv, 0, NULL, &o);
+    int rc = ggn_manifest_read(o.dir, &m, &err);
+    if (rc == GGN_OK && o.stops == NULL)
+        rc = ggn_labels_read(o.dir, &labels, &err);
+    if (rc == GGN_OK && o.stops != NULL) {
+        rc = ggn_thresholds_read(o.stops, (int)m.block, &stops, &err);
+        view = rc != GGN_OK ? NULL : o.view != NULL ? ggn_thresholds_find(&stops, o.view) : stops.n == 1 ? &stops.views[0] : NULL;
+        if (rc == GGN_OK && view == NULL)
+            rc = ggn_fail(&err, GGN_EINVAL, "%s: %s", o.stops, o.view != NULL ? "no such view" : "several views: --view NAME chooses one");
+    }
+    if (rc == GGN_OK)
+        rc = build(&o, &m, view, &labels, &p, &err);
+    if (rc == GGN_OK)
+        rc = report(&o, &m, &p, &err);
+    free(p.taken);
+    free(p.reference);
+    ggn_thresholds_release(&stops);
+    ggn_labels_release(&labels);
+    ggn_manifest_release(&m);
+    return rc == GGN_OK ? GGN_EXIT_OK : ggn_cmd_fail(argv[0], &err);
+}

@@ -1,0 +1,66 @@
+/*
+ * Methods that say from an image whether its noise is still seen, and what their decisions are worth.
+ *
+ * A method gives every case a score (higher: noisier). A block stops at the first case whose score is below the cut and that no guard
+ * holds back; it never stops earlier, and never later than its last level. Methods without scores give a stop per block directly.
+ */
+#ifndef GGN_EVAL_METHOD_H
+#define GGN_EVAL_METHOD_H
+
+#include "eval/set.h"
+#include "eval/stats.h"
+
+enum { GGN_METHOD_NAME = 48 };
+
+struct ggn_method {
+    char name[GGN_METHOD_NAME];
+    double *score;       /* owns; [cases]; NaN: not judged there. NULL: fixed stops only */
+    const double *guard; /* borrows from the set; [cases]; the block is held back while it exceeds guard_limit; NULL: none */
+    double guard_limit;
+    int passes;          /* cases in a row below the cut that stop a block, >= 1 */
+    double cut;          /* the block goes on while score >= cut */
+    double *stop;        /* owns; [blocks], spp */
+    int is_oracle;       /* it looked at the answers */
+};
+
+void ggn_method_release(struct ggn_method *m);
+
+/* Trivial baselines. score = -spp (looks at no pixel); the median threshold of the training blocks; the mean threshold of the
+ * block's own scene (an oracle). GGN_SPLIT_NONE stands for training when there are no training blocks. */
+int ggn_method_spp(struct ggn_method *m, const struct ggn_eval_set *s, struct ggn_err *err);
+int ggn_method_constant(struct ggn_method *m, const struct ggn_eval_set *s, struct ggn_err *err);
+int ggn_method_scene_mean(struct ggn_method *m, const struct ggn_eval_set *s, struct ggn_err *err);
+/* The criteria of plugin-api/examples from their recorded errors; *available: whether every case has them. */
+int ggn_method_halfbuf(struct ggn_method *m, const struct ggn_eval_set *s, int *available, struct ggn_err *err);
+int ggn_method_variance(struct ggn_method *m, const struct ggn_eval_set *s, int *available, struct ggn_err *err);
+/* Any other scores: copies score [cases]. */
+int ggn_method_scores(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, const double *score, struct ggn_err *err);
+
+/* Sets stop from score, guard, passes and cut. */
+void ggn_method_run(struct ggn_method *m, const struct ggn_eval_set *s);
+/* Chooses the cut on the blocks of `split`: the one that spends fewest samples with at most `early_rate` of the blocks stopped below
+ * 0.8 of their threshold; if none does, the smallest early rate. The limit of a guard is chosen with it. Then runs. */
+int ggn_method_tune(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, double early_rate, struct ggn_err *err);
+
+struct ggn_method_metrics {
+    int blocks, censored, scenes;
+    size_t cases;                  /* with a known label */
+    double auc, auc_scene_mean;    /* pooled over all cases; mean of the scenes that have both classes */
+    double accuracy;               /* of "score >= cut" */
+    double best_accuracy;
+    struct ggn_agreement agreement; /* on blocks that are not censored */
+    double early_stop_rate;         /* on all blocks: a censored one counts when it stops below 0.8 of the cap */
+    double samples_ratio;           /* on all blocks */
+    double flip_mean, flip_worst, ssim_mean, ssim_worst; /* at the stop, over blocks */
+    double uniform_spp, time_vs_uniform, samples_vs_uniform; /* uniform sampling whose worst block is as good (FLIP) */
+};
+
+/* GGN_EINVAL when the split has no blocks. Undefined figures are NaN. */
+int ggn_method_measure(const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, struct ggn_method_metrics *out,
+                       struct ggn_err *err);
+
+/* The case of block b at which it stops (spp >= stop), the last if none. */
+size_t ggn_method_stop_case(const struct ggn_method *m, const struct ggn_eval_set *s, int b);
+int ggn_eval_count(const struct ggn_eval_set *s, enum ggn_split split);
+
+#endif

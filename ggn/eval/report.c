@@ -1,0 +1,302 @@
+#include "eval/report.h"
+
+#include <ctype.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cjson/cJSON.h>
+
+#include "base/fio.h"
+#include "eval/compare.h"
+#include "eval/plot.h"
+
+/* key, column head, format, value */
+#define COLUMNS(X) \
+    X(auc, "AUC", "%.4f", m->auc) \
+    X(auc_scene_mean, "AUC/scene", "%.4f", m->auc_scene_mean) \
+    X(accuracy, "accuracy", "%.4f", m->accuracy) \
+    X(best_accuracy, "best acc", "%.4f", m->best_accuracy) \
+    X(early_stop_rate, "early", "%.3f", m->early_stop_rate) \
+    X(samples_ratio, "samples", "%.3f", m->samples_ratio) \
+    X(median_abs_log2, "|log2|", "%.3f", m->agreement.median_abs_log2) \
+    X(median_log2, "log2", "%.3f", m->agreement.median_log2) \
+    X(iqr_log2, "IQR", "%.3f", m->agreement.iqr_log2) \
+    X(within_half, "in 1/2", "%.3f", m->agreement.within_half) \
+    X(within_one, "in 1", "%.3f", m->agreement.within_one) \
+    X(pearson_r, "r", "%.3f", m->agreement.pearson_r) \
+    X(spearman, "rho", "%.3f", m->agreement.spearman) \
+    X(mae, "MAE", "%.0f", m->agreement.mae) \
+    X(flip_mean, "FLIP", "%.4f", m->flip_mean) \
+    X(flip_worst, "worst", "%.4f", m->flip_worst) \
+    X(ssim_mean, "SSIM", "%.4f", m->ssim_mean) \
+    X(ssim_worst, "worst", "%.4f", m->ssim_worst) \
+    X(uniform_spp, "uniform", "%.0f", m->uniform_spp) \
+    X(samples_vs_uniform, "smp/uni", "%.3f", m->samples_vs_uniform) \
+    X(time_vs_uniform, "time/uni", "%.3f", m->time_vs_uniform)
+
+static void print_rows(FILE *f, const struct ggn_method *methods, const struct ggn_method_metrics *metrics, int n, int from, int to)
+{
+    int column = 0;
+    fprintf(f, "%-30s", "");
+#define HEAD(key, head, format, value) \
+    if (column >= from && column < to) \
+        fprintf(f, " %9s", head); \
+    column++;
+    COLUMNS(HEAD)
+#undef HEAD
+    fputc('\n', f);
+    for (int i = 0; i < n; i++) {
+        const struct ggn_method_metrics *m = &metrics[i];
+        fprintf(f, "%-30.30s", methods[i].name);
+        column = 0;
+#define CELL(key, head, format, value) \
+        if (column >= from && column < to) { \
+            char text[32]; \
+            snprintf(text, sizeof text, format, value); \
+            fprintf(f, " %9s", isnan(value) ? "-" : text); \
+        } \
+        column++;
+        COLUMNS(CELL)
+#undef CELL
+        fputc('\n', f);
+    }
+}
+
+void ggn_report_table(FILE *f, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *methods,
+                      const struct ggn_method_metrics *metrics, int n)
+{
+    (void)s;
+    fprintf(f, "\n%s: %d blocks of %d scenes (%d censored), %zu windows\n", ggn_split_names[split], metrics[0].blocks, metrics[0].scenes,
+            metrics[0].censored, metrics[0].cases);
+    print_rows(f, methods, metrics, n, 0, 14);
+    print_rows(f, methods, metrics, n, 14, 21);
+}
+
+struct cJSON *ggn_report_json(const struct ggn_method *methods, const struct ggn_method_metrics *metrics, int n)
+{
+    cJSON *root = cJSON_CreateObject();
+    for (int i = 0; i < n && root != NULL; i++) {
+        const struct ggn_method_metrics *m = &metrics[i];
+        cJSON *o = cJSON_AddObjectToObject(root, methods[i].name);
+        cJSON_AddNumberToObject(o, "blocks", m->blocks);
+        cJSON_AddNumberToObject(o, "censored", m->censored);
+        cJSON_AddNumberToObject(o, "windows", (double)m->cases);
+        cJSON_AddBoolToObject(o, "oracle", methods[i].is_oracle);
+        if (!isnan(methods[i].cut))
+            cJSON_AddNumberToObject(o, "cut", methods[i].cut);
+#define MEMBER(key, head, format, value) \
+        if (isnan(value)) \
+            cJSON_AddNullToObject(o, #key); \
+        else \
+            cJSON_AddNumberToObject(o, #key, value);
+        COLUMNS(MEMBER)
+#undef MEMBER
+    }
+    return root;
+}
+
+/* --- pictures --- */
+
+static int picture_path(char path[4096], const char *dir, enum ggn_split split, const char *kind, const struct ggn_method *method, const char *end,
+                        struct ggn_err *err)
+{
+    char word[GGN_METHOD_NAME] = "";
+    size_t n = 0;
+    for (const char *p = method != NULL ? method->name : ""; *p != '\0' && *p != '(' && n + 2 < sizeof word; p++)
+        if (isalnum((unsigned char)*p))
+            word[n++] = *p;
+    word[n] = '\0';
+    int length = snprintf(path, 4096, "%s/%s-%s%s%s%s", dir, ggn_split_names[split], kind, n > 0 ? "-" : "", word, end);
+    return length > 0 && length < 4096 ? GGN_OK : ggn_fail(err, GGN_EINVAL, "%.64s...: the path is too long", dir);
+}
+
+struct point {
+    double score;
+    int noisy;
+};
+
+static int by_score_falling(const void *a, const void *b)
+{
+    double x = ((const struct point *)a)->score, y = ((const struct point *)b)->score;
+    return (x < y) - (x > y);
+}
+
+static int write_roc(FILE *f, const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, struct ggn_err *err)
+{
+    struct point *p = malloc((s->n > 0 ? s->n : 1) * sizeof *p);
+    size_t n = 0, positive = 0, hit = 0, step;
+    if (p == NULL)
+        return ggn_fail_nomem(err, m->name);
+    for (int b = 0; b < s->n_blocks; b++)
+        for (size_t i = s->blocks[b].first; i < s->blocks[b].end; i++)
+            if (s->blocks[b].split == split && s->noisy[i] >= 0 && !isnan(m->score[i])) {
+                p[n++] = (struct point){m->score[i], s->noisy[i]};
+                positive += s->noisy[i] == 1;
+            }
+    qsort(p, n, sizeof *p, by_score_falling);
+    step = n / 500 + 1;
+    fputs("0 0\n", f);
+    for (size_t i = 0; i < n; i++) {
+        hit += p[i].noisy == 1;
+        if (i + 1 == n || (p[i + 1].score != p[i].score && i % step == 0))
+            fprintf(f, "%.5f %.5f\n", n > positive ? (double)(i + 1 - hit) / (double)(n - positive) : 0.0, positive > 0 ? (double)hit / (double)positive : 0.0);
+    }
+    free(p);
+    return GGN_OK;
+}
+
+static int plot_roc(const char *path, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *methods, int n, struct ggn_err *err)
+{
+    struct ggn_plot plot;
+    int rc = ggn_plot_begin(&plot, path, 720, 680, err), first = 1;
+    if (rc != GGN_OK)
+        return rc;
+    for (int i = 0; i < n && rc == GGN_OK; i++) {
+        if (methods[i].score == NULL)
+            continue;
+        fprintf(plot.script, "$m%d << EOD\n", i);
+        rc = write_roc(plot.script, &methods[i], s, split, err);
+        fputs("EOD\n", plot.script);
+    }
+    fprintf(plot.script, "set size square\nset xrange [0:1]\nset yrange [0:1]\nset grid\nset key bottom right\nset title 'all windows of the %s scenes pooled'\n"
+                         "set xlabel 'share of converged images called noisy'\nset ylabel 'share of noisy images called noisy'\nplot ", ggn_split_names[split]);
+    for (int i = 0; i < n; i++)
+        if (methods[i].score != NULL) {
+            fprintf(plot.script, "%s$m%d with lines lw 2 title ", first ? "" : ", ", i);
+            ggn_plot_quote(plot.script, methods[i].name);
+            first = 0;
+        }
+    fputs(", x dt 2 lc '#999999' notitle\n", plot.script);
+    if (rc != GGN_OK) {
+        ggn_plot_end(&plot, 0, NULL);
+        return rc;
+    }
+    return ggn_plot_end(&plot, !first, err);
+}
+
+/* Score against spp for six blocks spread over the split by threshold; dashed: the threshold. */
+static int plot_scores(const char *path, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *m, struct ggn_err *err)
+{
+    enum { SHOWN = 6 };
+    struct ggn_plot plot;
+    int chosen[SHOWN], n = 0, total = ggn_eval_count(s, split), seen = 0;
+    static const char *const colours[SHOWN] = {"#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#17becf"};
+    for (int b = 0; b < s->n_blocks && n < SHOWN; b++)
+        if (s->blocks[b].split == split && seen++ * SHOWN >= n * total)
+            chosen[n++] = b;
+    int rc = ggn_plot_begin(&plot, path, 900, 560, err);
+    if (rc != GGN_OK)
+        return rc;
+    FILE *f = plot.script;
+    for (int k = 0; k < n; k++) {
+        const struct ggn_eval_block *b = &s->blocks[chosen[k]];
+        fprintf(f, "$b%d << EOD\n", k);
+        for (size_t i = b->first; i < b->end; i++)
+            if (!isnan(m->score[i]))
+                fprintf(f, "%.0f %.6g\n", s->spp[i], m->score[i]);
+        fprintf(f, "EOD\nset arrow from %.6g, graph 0 to %.6g, graph 1 nohead dt 2 lc '%s'\n", b->label.threshold, b->label.threshold, colours[k]);
+    }
+    fputs("set logscale x\nset grid\nset key outside right\nset xlabel 'samples per pixel (dashed: threshold)'\nset ylabel ", f);
+    ggn_plot_quote(f, m->name);
+    fputs("\nplot ", f);
+    for (int k = 0; k < n; k++) {
+        const struct ggn_eval_block *b = &s->blocks[chosen[k]];
+        const struct ggn_dataset_view *v = &s->data->views[b->view];
+        char title[200];
+        snprintf(title, sizeof title, "%.120s %u", v->name, v->manifest.blocks[b->index].id);
+        fprintf(f, "%s$b%d with linespoints pt 7 ps 0.5 lw 2 lc '%s' title ", k > 0 ? ", " : "", k, colours[k]);
+        ggn_plot_quote(f, title);
+    }
+    fprintf(f, ", %.9g dt 3 lc '#444444' title 'cut'\n", isnan(m->cut) ? 0.0 : m->cut);
+    return ggn_plot_end(&plot, 1, err);
+}
+
+static void fill_view(struct ggn_view *v, const struct ggn_eval_set *s, int view, const double *stop)
+{
+    const struct ggn_manifest *m = &s->data->views[view].manifest;
+    snprintf(v->name, sizeof v->name, "%.100s", s->data->views[view].name);
+    v->columns = (int)((m->width + m->block - 1) / m->block);
+    for (int i = 0; i < v->n; i++)
+        v->spp[i] = (double)NAN;
+    for (int b = 0; b < s->n_blocks; b++) {
+        uint32_t id = m->blocks[s->blocks[b].index < m->n_blocks ? s->blocks[b].index : 0].id;
+        if (s->blocks[b].view == view && id < (uint32_t)v->n)
+            v->spp[id] = stop != NULL ? stop[b] : s->blocks[b].label.threshold;
+    }
+}
+
+/* Thresholds (stop NULL) or stops of the split's views, for the heat maps. */
+static int make_maps(struct ggn_thresholds *t, const struct ggn_eval_set *s, enum ggn_split split, const double *stop, struct ggn_err *err)
+{
+    *t = (struct ggn_thresholds){.views = calloc((size_t)s->data->n, sizeof *t->views)};
+    if (t->views == NULL)
+        return ggn_fail_nomem(err, "maps");
+    for (int v = 0; v < s->data->n; v++) {
+        const struct ggn_manifest *m = &s->data->views[v].manifest;
+        uint32_t blocks = (m->width + m->block - 1) / m->block * ((m->height + m->block - 1) / m->block);
+        int used = 0;
+        for (int b = 0; b < s->n_blocks; b++)
+            used |= s->blocks[b].view == v && s->blocks[b].split == split;
+        if (!used || blocks > GGN_VIEW_BLOCKS)
+            continue;
+        struct ggn_view *view = &t->views[t->n];
+        view->n = (int)blocks;
+        view->spp = malloc(blocks * sizeof *view->spp);
+        if (view->spp == NULL) {
+            ggn_thresholds_release(t);
+            return ggn_fail_nomem(err, "maps");
+        }
+        t->n++;
+        fill_view(view, s, v, stop);
+    }
+    return GGN_OK;
+}
+
+static int method_pictures(const char *dir, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *m, struct ggn_err *err)
+{
+    char path[4096];
+    struct ggn_thresholds truth = {0}, stops = {0};
+    struct ggn_pairing pairing = {0};
+    int rc = make_maps(&truth, s, split, NULL, err);
+    if (rc == GGN_OK)
+        rc = make_maps(&stops, s, split, m->stop, err);
+    if (rc == GGN_OK)
+        rc = ggn_pairing_init(&pairing, &truth, &stops, NULL, err);
+    if (rc == GGN_OK && (rc = picture_path(path, dir, split, "scatter", m, ".png", err)) == GGN_OK)
+        rc = ggn_plot_scatter(path, pairing.truth, pairing.model, pairing.n, "threshold", m->name, err);
+    if (rc == GGN_OK && (rc = picture_path(path, dir, split, "errors", m, ".png", err)) == GGN_OK)
+        rc = ggn_plot_errors(path, pairing.truth, pairing.model, pairing.n, m->name, err);
+    if (rc == GGN_OK && (rc = picture_path(path, dir, split, "heatmaps", m, ".png", err)) == GGN_OK)
+        rc = ggn_plot_heatmaps(path, &pairing, "thresholds", m->name, err);
+    struct ggn_fio_out out;
+    if (rc == GGN_OK && (rc = picture_path(path, dir, split, "stops", m, ".csv", err)) == GGN_OK && (rc = ggn_fio_begin(&out, path, err)) == GGN_OK) {
+        fputs("view;block;threshold;censored;stop\n", out.file);
+        for (int b = 0; b < s->n_blocks; b++) {
+            const struct ggn_eval_block *e = &s->blocks[b];
+            if (e->split == split)
+                fprintf(out.file, "%s;%u;%.6g;%d;%.6g\n", s->data->views[e->view].name, e->label.id, e->label.threshold, e->label.censored, m->stop[b]);
+        }
+        rc = ggn_fio_commit(&out, err);
+    }
+    ggn_pairing_release(&pairing);
+    ggn_thresholds_release(&truth);
+    ggn_thresholds_release(&stops);
+    return rc;
+}
+
+int ggn_report_pictures(const char *dir, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *methods, int n, struct ggn_err *err)
+{
+    char path[4096];
+    const struct ggn_method *last = NULL;
+    int rc = picture_path(path, dir, split, "roc", NULL, ".png", err);
+    if (rc == GGN_OK)
+        rc = plot_roc(path, s, split, methods, n, err);
+    for (int i = 0; i < n && rc == GGN_OK; i++) {
+        last = methods[i].score != NULL ? &methods[i] : last;
+        rc = method_pictures(dir, s, split, &methods[i], err);
+    }
+    if (rc == GGN_OK && last != NULL && (rc = picture_path(path, dir, split, "score", NULL, ".png", err)) == GGN_OK)
+        rc = plot_scores(path, s, split, last, err);
+    return rc;
+}

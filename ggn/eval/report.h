@@ -1,0 +1,21 @@
+/* What an evaluation says: table, JSON, pictures. */
+#ifndef GGN_EVAL_REPORT_H
+#define GGN_EVAL_REPORT_H
+
+#include <stdio.h>
+
+#include "eval/method.h"
+
+struct cJSON;
+
+void ggn_report_table(FILE *f, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *methods,
+                      const struct ggn_method_metrics *metrics, int n);
+/* An object with one member per method; NULL: out of memory. */
+struct cJSON *ggn_report_json(const struct ggn_method *methods, const struct ggn_method_metrics *metrics, int n);
+
+/* Pictures of one split into DIR: SPLIT-roc.png, SPLIT-score.png (score against spp with thresholds, for the last method that has
+ * scores), and for each method SPLIT-errors-K.png, SPLIT-scatter-K.png, SPLIT-heatmaps-K.png; stops-K.csv of all views. */
+int ggn_report_pictures(const char *dir, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *methods, int n,
+                        struct ggn_err *err);
+
+#endif

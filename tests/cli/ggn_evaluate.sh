@@ -1,0 +1,87 @@
+#!/bin/sh
+# import-sin3d, label, evaluate and reconstruct from the outside, on a small made-up view in the SIN3D layout.
+set -u
+cd "$(dirname "$0")/../.." || exit 2
+ggn=${BUILD:-build}/bin/ggn
+n=0
+tmp=$(mktemp -d) || exit 2
+trap 'rm -rf "$tmp"' EXIT
+check() { # check NAME STATUS
+    n=$((n + 1))
+    if [ "$2" -eq 0 ]; then echo "ok $n - $1"; else echo "not ok $n - $1"; sed 's/^/# /' "$tmp/err" "$tmp/out" 2>/dev/null | tail -n 20; fi
+}
+fails() { # fails NAME PATTERN COMMAND…: exit 2, the last line on stderr has PATTERN
+    name=$1 pattern=$2
+    shift 2
+    "$@" >"$tmp/out" 2>"$tmp/err"
+    rc=$?
+    [ "$rc" -eq 2 ] && tail -n 1 "$tmp/err" | grep "^ggn " | grep -q "$pattern"
+    check "$name" $?
+}
+
+view=$tmp/sin3d/p3d_toy-view0_part6
+mkdir -p "$view"
+# Noise of amplitude 4/level over grey, 8 levels.
+for i in 1 2 3 4 5 6 7 8; do
+    a=$((64 / i))
+    oiiotool --pattern constant:color=.4,.5,.6 64x32 3 --noise:type=gaussian:mean=0:stddev="$(printf '0.%03d' $a)":seed=$i -d uint8 \
+        -o "$view/p3d_toy-view0_$(printf %05d $((20 * i))).png" >/dev/null 2>&1
+done
+printf 'p3d_toy-view0_part6;90;160;\n' >"$tmp/human.csv"
+$ggn import-sin3d "$tmp/sin3d" -o "$tmp/data" --block 32 --thresholds "$tmp/human.csv" >"$tmp/out" 2>"$tmp/err" &&
+    [ -s "$tmp/data/p3d_toy-view0_part6/manifest.json" ] && grep -q 'imported with thresholds' "$tmp/out"
+check "import a folder of views" $?
+d=$tmp/data/p3d_toy-view0_part6
+grep -q '"source":.*"human"' "$d/labels.json"
+check "imported thresholds are human labels" $?
+fails "import: nothing there" 'no NAME_' $ggn import-sin3d "$tmp/data" -o "$tmp/x"
+fails "import: missing folder" 'No such file' $ggn import-sin3d "$tmp/none" -o "$tmp/x"
+fails "import: thresholds that do not fit" '2 blocks, but 1' sh -c "printf 'p3d_toy-view0_part6;90;\n' >$tmp/one.csv; $ggn import-sin3d $tmp/sin3d -o $tmp/y --block 32 -t $tmp/one.csv"
+
+$ggn evaluate -d "$tmp/data" --json >"$tmp/out" 2>"$tmp/err" && grep -q '"labels":.*"human"' "$tmp/out" && grep -q '"-spp"' "$tmp/out" &&
+    ! grep -q halfbuf "$tmp/out"
+check "evaluate without recorded statistics" $?
+$ggn evaluate -d "$tmp/data" -o "$tmp/report" >"$tmp/out" 2>"$tmp/err" && [ -s "$tmp/report/figures.json" ] && [ -s "$tmp/report/none-roc.png" ] &&
+    [ -s "$tmp/report/none-heatmaps-spp.png" ] && [ "$(find "$tmp/report" -name '.tmp*' | wc -l)" -eq 0 ] && grep -q '^constant' "$tmp/out"
+check "evaluate: table and pictures" $?
+fails "evaluate: window longer than the levels" 'a window needs 9' $ggn evaluate -d "$tmp/data" -w 9
+fails "evaluate: no model file" 'No such file' $ggn evaluate -d "$tmp/data" -m "$tmp/none.ggn"
+fails "evaluate: not a model" 'human.csv' $ggn evaluate -d "$tmp/data" -m "$tmp/human.csv"
+
+$ggn label "$tmp/data" >"$tmp/out" 2>"$tmp/err" && grep -q 'model observer' "$tmp/out" && grep -q '"source":.*"observer"' "$d/labels.json" &&
+    ! grep -q human "$d/labels.json"
+check "observer labels are not called human" $?
+$ggn label "$tmp/data" --human "$tmp/human.csv" >"$tmp/out" 2>"$tmp/err" && grep -q '"threshold":.*90' "$d/labels.json"
+check "label --human" $?
+cp "$d/labels.json" "$tmp/a.json"
+$ggn label "$tmp/data" --human "$tmp/human.csv" -t 1 >"$tmp/out" 2>"$tmp/err" && cmp -s "$d/labels.json" "$tmp/a.json"
+check "labels are the same bytes again" $?
+fails "label --human: unknown view" 'no thresholds for' $ggn label "$tmp/data" --human "$tmp/human.csv" --view other
+fails "label --check without half buffers" 'no full level' $ggn label "$tmp/data" --check
+fails "label --calibrate with too few blocks" 'at least 3 blocks' $ggn label "$tmp/data" --calibrate "$tmp/human.csv"
+fails "label: bad observer" 'map must be' sh -c "echo '{}' >$tmp/o.json; $ggn label $tmp/data -O $tmp/o.json"
+
+$ggn reconstruct "$d" -o "$tmp/r.png" -r "$tmp/ref.png" --json >"$tmp/out" 2>"$tmp/err" && grep -q '"mean_spp": 130.00' "$tmp/out" && [ -s "$tmp/r.png" ]
+check "reconstruct at the labels (100 and 160)" $?
+$ggn flip "$tmp/ref.png" "$tmp/r.png" --json >"$tmp/flip" 2>"$tmp/err" && [ "$(sed 's/.*"mean": \([0-9.]*\).*/\1/' "$tmp/flip")" = "$(sed 's/.*"flip_mean": \([0-9.]*\).*/\1/' "$tmp/out")" ]
+check "its FLIP is that of ggn flip" $?
+fails "reconstruct: several views" 'view NAME' sh -c "printf 'a;1;2;\nb;1;2;\n' >$tmp/two.csv; $ggn reconstruct $d -o $tmp/r.png -s $tmp/two.csv"
+
+# Damage: each is one clear line and exit 2.
+cp -r "$tmp/data" "$tmp/bad"
+b=$tmp/bad/p3d_toy-view0_part6
+head -c 2000 "$d/block-00001.lseq" >"$b/block-00001.lseq"
+fails "truncated block" 'truncated' $ggn evaluate -d "$tmp/bad"
+cp "$d/block-00000.lseq" "$b/block-00001.lseq"
+fails "wrong block under a name" 'not the file that the manifest lists' $ggn evaluate -d "$tmp/bad"
+sed 's/"levels":.*\[20/"levels": [10, 20/' "$d/manifest.json" >"$b/manifest.json"
+cp "$d/block-00001.lseq" "$b/"
+fails "a level that the files lack" '10 spp is missing' $ggn evaluate -d "$tmp/bad"
+echo '{"train": 3}' >"$tmp/bad/split.json"
+cp "$d/manifest.json" "$b/"
+rm "$b/labels.json"
+fails "no labels" 'run ggn label first' $ggn evaluate -d "$tmp/bad"
+if [ -w /dev/full ]; then
+    fails "disk full" 'write' sh -c "$ggn evaluate -d $tmp/data >/dev/full; rc=\$?; [ \$rc -ne 0 ] && exit 2"
+fi
+echo "1..$n"

@@ -1,0 +1,202 @@
+/* Evaluation on made-up sequences whose thresholds are known: good scores look good, trivial ones do not, censoring is honoured. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <cmocka.h>
+
+#include "support/ggn_near.h"
+#include "support/ggn_noise.h"
+
+#include "eval/method.h"
+
+static const uint32_t levels[] = {20, 40, 80, 160, 320, 640, 1280};
+enum { LEVELS = 7, WINDOW = 2, BLOCKS = 5 };
+
+static char root[] = "/tmp/ggn_eval.XXXXXX";
+static struct ggn_dataset data;
+static struct ggn_eval_set set;
+static struct ggn_threads *threads;
+
+static void shell(const char *command)
+{
+    char line[256];
+    snprintf(line, sizeof line, "%s %s", command, root);
+    assert_int_equal(system(line), 0);
+}
+
+/* Three scenes; thresholds 1000 sigma^2 = 50, 110, 230, 550, and one above the cap. */
+static int setup(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"a", "b", "c"};
+    char dir[128], path[128];
+    struct ggn_err err = {0};
+    int skipped;
+    if (mkdtemp(root) == NULL)
+        return -1;
+    for (int v = 0; v < 3; v++) {
+        double sigma[BLOCKS];
+        static const double t[BLOCKS] = {50, 110, 230, 550, 3000};
+        struct ggn_noise n = {24, 20, levels, LEVELS, 2000, 0, 0, (uint32_t)v + 1};
+        for (int i = 0; i < BLOCKS; i++)
+            sigma[i] = sqrt(t[i] / 1000.0 * (1.0 + 0.1 * v));
+        snprintf(dir, sizeof dir, "%s/%s", root, names[v]);
+        ggn_noise_view(dir, names[v], &n, sigma, BLOCKS, 1000.0);
+    }
+    snprintf(path, sizeof path, "%s/split.json", root);
+    FILE *f = fopen(path, "w");
+    fputs("{\"train\": [\"a\"], \"validation\": [\"b\"], \"test\": [\"c\"]}", f);
+    fclose(f);
+    threads = ggn_threads_create(2, &err);
+    if (threads == NULL || ggn_dataset_open(root, &data, &err) != GGN_OK ||
+        ggn_eval_set_load(&set, &data, WINDOW, 1, threads, &skipped, &err) != GGN_OK)
+        fail_msg("%s", err.text);
+    return 0;
+}
+
+static int teardown(void **state)
+{
+    (void)state;
+    ggn_eval_set_release(&set);
+    ggn_dataset_release(&data);
+    ggn_threads_destroy(threads);
+    shell("rm -rf");
+    return 0;
+}
+
+static void cases(void **state)
+{
+    (void)state;
+    assert_int_equal(set.n_blocks, 3 * BLOCKS);
+    assert_int_equal(set.n, 3 * BLOCKS * (LEVELS - WINDOW + 1));
+    const struct ggn_eval_block *b = &set.blocks[0];
+    assert_near(set.spp[b->first], 40, 0); /* the first window ends at the second level */
+    assert_int_equal(set.noisy[b->first], 1); /* threshold 50 */
+    assert_int_equal(set.noisy[b->first + 1], 0);
+    const struct ggn_eval_block *capped = &set.blocks[4];
+    assert_true(capped->label.censored);
+    assert_int_equal(set.noisy[capped->end - 2], 1);
+    assert_int_equal(set.noisy[capped->end - 1], -1); /* at the cap nothing is known */
+    /* Better images with more samples, by either measure. */
+    for (size_t i = b->first; i + 1 < b->end; i++)
+        assert_true(set.flip[i + 1] < set.flip[i] && set.ssim[i + 1] > set.ssim[i]);
+}
+
+static void informed_scores(void **state)
+{
+    (void)state;
+    struct ggn_method spp, halfbuf, variance;
+    struct ggn_method_metrics a, b, c;
+    int available;
+    assert_int_equal(ggn_method_spp(&spp, &set, NULL), GGN_OK);
+    assert_int_equal(ggn_method_halfbuf(&halfbuf, &set, &available, NULL), GGN_OK);
+    assert_true(available);
+    assert_int_equal(ggn_method_variance(&variance, &set, &available, NULL), GGN_OK);
+    ggn_method_tune(&spp, &set, GGN_SPLIT_TRAIN, 0.0, NULL);
+    ggn_method_tune(&halfbuf, &set, GGN_SPLIT_TRAIN, 0.0, NULL);
+    ggn_method_tune(&variance, &set, GGN_SPLIT_TRAIN, 0.0, NULL);
+    ggn_method_measure(&spp, &set, GGN_SPLIT_TEST, &a, NULL);
+    ggn_method_measure(&halfbuf, &set, GGN_SPLIT_TEST, &b, NULL);
+    ggn_method_measure(&variance, &set, GGN_SPLIT_TEST, &c, NULL);
+    assert_true(b.auc > 0.99 && c.auc > 0.99 && a.auc < 0.93); /* noise / threshold is the same in all blocks */
+    assert_true(b.best_accuracy > a.best_accuracy);
+    assert_near(b.early_stop_rate, 0.0, 0.0);
+    assert_true(b.samples_ratio < 1.5 && b.samples_ratio > 1.0 && a.samples_ratio > b.samples_ratio);
+    assert_true(b.agreement.median_abs_log2 < 1.0); /* levels are an octave apart */
+    assert_int_equal(b.censored, 1);
+    assert_int_equal(b.agreement.blocks, BLOCKS - 1);
+    assert_int_equal(b.cases, BLOCKS * (LEVELS - WINDOW + 1) - 1);
+    /* Stopping where noise is equal costs less than uniform sampling that is as good everywhere. */
+    assert_true(b.samples_vs_uniform < 0.7 && b.time_vs_uniform < 0.7 && b.flip_worst >= b.flip_mean);
+    ggn_method_release(&spp);
+    ggn_method_release(&halfbuf);
+    ggn_method_release(&variance);
+}
+
+static void fixed_stops(void **state)
+{
+    (void)state;
+    struct ggn_method constant, oracle;
+    struct ggn_method_metrics m;
+    ggn_method_constant(&constant, &set, NULL);
+    assert_near(constant.stop[0], 230, 1e-6); /* median of the training scene alone */
+    assert_near(constant.stop[14], 230, 1e-6);
+    ggn_method_scene_mean(&oracle, &set, NULL);
+    assert_near(oracle.stop[5], 1.1 * (50 + 110 + 230 + 550) / 5.0 + 1280 / 5.0, 1e-6);
+    assert_true(oracle.is_oracle);
+    ggn_method_measure(&constant, &set, GGN_SPLIT_TRAIN, &m, NULL);
+    assert_true(isnan(m.auc));
+    assert_near(m.early_stop_rate, 0.4, 1e-12); /* 550 and the censored one */
+    assert_near(m.agreement.mae, (180 + 120 + 0 + 320) / 4.0, 1e-6);
+    ggn_method_release(&constant);
+    ggn_method_release(&oracle);
+}
+
+/* Passes in a row, guards, unjudged cases. */
+static void decisions(void **state)
+{
+    (void)state;
+    static double score[3 * BLOCKS * (LEVELS - WINDOW + 1)], guard[3 * BLOCKS * (LEVELS - WINDOW + 1)];
+    struct ggn_method m;
+    const struct ggn_eval_block *b = &set.blocks[0];
+    for (size_t i = 0; i < set.n; i++)
+        score[i] = 1.0;
+    score[b->first] = 0.2; /* one slip at 40 */
+    score[b->first + 1] = 0.9;
+    score[b->first + 2] = 0.1;
+    score[b->first + 3] = (double)NAN;
+    score[b->first + 4] = 0.1;
+    assert_int_equal(ggn_method_scores(&m, &set, "made up", score, NULL), GGN_OK);
+    m.cut = 0.5;
+    ggn_method_run(&m, &set);
+    assert_near(m.stop[0], 40, 0);
+    assert_near(m.stop[1], 1280, 0); /* never stopped: the last level */
+    m.passes = 2;
+    ggn_method_run(&m, &set);
+    assert_near(m.stop[0], 640, 0); /* 160, (320 not judged), 640 */
+    guard[b->first + 2] = 0.01;
+    m.guard = guard;
+    ggn_method_run(&m, &set);
+    assert_near(m.stop[0], 1280, 0);
+    m.guard_limit = 0.01;
+    ggn_method_run(&m, &set);
+    assert_near(m.stop[0], 640, 0);
+    ggn_method_release(&m);
+}
+
+static void one_class(void **state)
+{
+    (void)state;
+    signed char keep[3 * BLOCKS * (LEVELS - WINDOW + 1)];
+    struct ggn_method m;
+    struct ggn_method_metrics metrics;
+    struct ggn_err err = {0};
+    memcpy(keep, set.noisy, set.n);
+    for (size_t i = 0; i < set.n; i++)
+        set.noisy[i] = 1; /* no negative label at all */
+    ggn_method_spp(&m, &set, NULL);
+    assert_int_equal(ggn_method_tune(&m, &set, GGN_SPLIT_TRAIN, 0.05, &err), GGN_OK);
+    assert_int_equal(ggn_method_measure(&m, &set, GGN_SPLIT_TEST, &metrics, &err), GGN_OK);
+    assert_true(isnan(metrics.auc) && isnan(metrics.auc_scene_mean) && !isnan(metrics.samples_ratio));
+    memcpy(set.noisy, keep, set.n);
+    assert_int_equal(ggn_method_measure(&m, &set, GGN_SPLIT_NONE, &metrics, &err), GGN_EINVAL);
+    ggn_method_release(&m);
+    struct ggn_eval_set none;
+    int skipped;
+    assert_int_equal(ggn_eval_set_load(&none, &data, LEVELS + 1, 0, threads, &skipped, &err), GGN_EINVAL);
+    assert_non_null(strstr(err.text, "a window needs 8"));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(cases), cmocka_unit_test(informed_scores), cmocka_unit_test(fixed_stops), cmocka_unit_test(decisions),
+        cmocka_unit_test(one_class),
+    };
+    return cmocka_run_group_tests_name("eval_method", tests, setup, teardown);
+}
