@@ -89,8 +89,9 @@ extern const char *const lc_plane_names[LULL_PLANE_COUNT];
 /* Blocks of block_w x block_h, smaller at the right and bottom edge. 0 or -1 (out of memory). */
 int lc_film_init(struct lc_film *f, int32_t width, int32_t height, int32_t block_w, int32_t block_h, uint32_t seed);
 void lc_film_release(struct lc_film *f);
-/* The frame that suits the criterion: two by one blocks of its size and the rest at the edges, one of them 1x1. */
-int lc_film_init_for(struct lc_film *f, const struct lull_requirements *req, uint32_t seed);
+/* The frame that suits the criterion: two by one blocks and the rest at the edges, one of them 1x1. The blocks are of the size
+ * it was made for if that is the only one it takes or if nominal is set, else small, which saves time. */
+int lc_film_init_for(struct lc_film *f, const struct lull_requirements *req, uint32_t seed, int nominal);
 /* Adds samples until the block has spp; nothing if it has. */
 void lc_film_advance(struct lc_film *f, uint32_t id, uint64_t spp);
 /* The estimate that a plane holds at a pixel. */
@@ -141,6 +142,7 @@ struct lc_manner {
     uint32_t slack;     /* bytes between the elements of arrays and after structs, filled with garbage */
     int required_only;  /* supply only the required planes */
     int no_all;         /* view.all is NULL */
+    int nominal;        /* blocks of the size that the criterion was made for */
     uint32_t frame_flags;
     uint32_t seed;
 };

@@ -21,6 +21,11 @@ static void check_repeat(struct lc *c)
         lc_note(c, "not deterministic: compared with a tolerance");
     compare_manners(c, &plain, &plain, "the same session once more");
     compare_manners(c, &plain, &twice, "each question twice");
+    if (c->req.block_width == 0 && c->req.block_height == 0)
+        return;
+    struct lc_manner nominal = {.nominal = 1}, nominal_singly = {.nominal = 1, .ask = LC_ASK_SINGLY};
+    int invariant = (c->criterion->capabilities & LULL_CAP_BATCH_INVARIANT) != 0;
+    compare_manners(c, &nominal, invariant ? &nominal_singly : &nominal, "blocks of the size it was made for, once more");
 }
 
 static void check_batch(struct lc *c)

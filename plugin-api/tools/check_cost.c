@@ -38,7 +38,7 @@ static size_t bytes_in_use(void)
 static void repeat(struct lc *c, void (*once)(struct lc *), const char *what)
 {
     enum { MOST = 1000, WARM = 20, SLACK = 2048 };
-    const double limit_s = 8;
+    const double limit_s = lc_alloc_count() < 0 ? 2 : 4; /* a sanitizer sees the first leak */
     if (c->failed)
         return;
     double start = now_s();
@@ -102,7 +102,7 @@ static void check_out_of_memory(struct lc *c)
         return;
     }
     struct lc_film film;
-    if (lc_film_init_for(&film, &c->req, 1) != 0)
+    if (lc_film_init_for(&film, &c->req, 1, 0) != 0)
         return;
     struct lull_frame frame;
     lc_film_frame(&film, &frame, c->req.planes_used);

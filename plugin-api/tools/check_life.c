@@ -51,7 +51,7 @@ static void check_order(struct lc *c)
     if (fresh == NULL)
         return;
     struct lc_film film;
-    if (lc_film_init_for(&film, &c->req, 1) == 0) {
+    if (lc_film_init_for(&film, &c->req, 1, 0) == 0) {
         struct lc_session unopened = {.check = c, .film = film, .instance = fresh, .planes = c->req.planes_used};
         LC_EXPECT(c, evaluate_nothing(&unopened) == LULL_E_STATE, "evaluate before begin_frame is not refused");
         lc_film_release(&film);

@@ -156,7 +156,7 @@ static void check_missing(struct lc *c)
 {
     struct lull_instance *instance = lc_create(c, NULL);
     struct lc_film film;
-    if (instance == NULL || lc_film_init_for(&film, &c->req, 1) != 0)
+    if (instance == NULL || lc_film_init_for(&film, &c->req, 1, 0) != 0)
         return;
     for (unsigned p = 0; p < LULL_PLANE_COUNT; p++) {
         if (!(c->req.planes_required & LULL_PLANE_BIT(p)))
@@ -275,7 +275,7 @@ static void run_painted(struct lc *c, void (*paint)(double *, double *, int32_t,
     struct lc_film film;
     struct lc_session s;
     struct lc_manner plain = {0};
-    if (lc_film_init_for(&film, &c->req, 1) != 0)
+    if (lc_film_init_for(&film, &c->req, 1, 0) != 0)
         return;
     film.paint = paint;
     if (lc_session_open_film(&s, c, &plain, &film) != 0)

@@ -83,7 +83,7 @@ static void short_frame(struct lc *c, const struct short_structs *cut, struct lu
                         struct short_calls *calls)
 {
     struct lc_film film;
-    if (lc_film_init_for(&film, &c->req, 1) != 0)
+    if (lc_film_init_for(&film, &c->req, 1, 0) != 0)
         return;
     for (uint32_t i = 0; i < film.block_count; i++)
         lc_film_advance(&film, i, c->req.first_spp + c->req.first_spp % 2 + 2);

@@ -50,11 +50,11 @@ int lc_film_init(struct lc_film *f, int32_t width, int32_t height, int32_t block
     return 0;
 }
 
-int lc_film_init_for(struct lc_film *f, const struct lull_requirements *req, uint32_t seed)
+int lc_film_init_for(struct lc_film *f, const struct lull_requirements *req, uint32_t seed, int nominal)
 {
-    int flexible = (req->flags & LULL_REQ_FLEXIBLE) != 0;
-    int32_t w = req->block_width > 0 && !flexible ? (int32_t)req->block_width : 24;
-    int32_t h = req->block_height > 0 && !flexible ? (int32_t)req->block_height : 16;
+    int own_size = nominal || !(req->flags & LULL_REQ_FLEXIBLE);
+    int32_t w = req->block_width > 0 && own_size ? (int32_t)req->block_width : 24;
+    int32_t h = req->block_height > 0 && own_size ? (int32_t)req->block_height : 16;
     return lc_film_init(f, 2 * w + 1, h + 1, w, h, seed);
 }
 

@@ -336,7 +336,7 @@ int lc_session_open(struct lc_session *s, struct lc *c, const struct lc_manner *
 {
     struct lc_film film;
     *s = (struct lc_session){0};
-    if (lc_film_init_for(&film, &c->req, 1 + manner->seed) != 0) {
+    if (lc_film_init_for(&film, &c->req, 1 + manner->seed, manner->nominal) != 0) {
         lc_fail(c, "out of memory");
         return -1;
     }
@@ -346,7 +346,7 @@ int lc_session_open(struct lc_session *s, struct lc *c, const struct lc_manner *
 int lc_session_restart(struct lc_session *s)
 {
     struct lc_film fresh;
-    if (lc_film_init_for(&fresh, &s->check->req, s->film.seed) != 0) {
+    if (lc_film_init_for(&fresh, &s->check->req, s->film.seed, s->manner.nominal) != 0) {
         lc_fail(s->check, "out of memory");
         return -1;
     }

@@ -52,11 +52,17 @@ t "-q says little" sh -c '[ "$("$1" -q -o table null | wc -l)" = 2 ]' - "$check"
 t "TAP: a plan at the end" says "1..1" -o table null
 t "a limit that is too short fails the check" status 1 -L 1 -o shapes -p fault=30 "$BUILD/tests/abi/plugins/faulty.so"
 t "the correct test criterion" status 0 -q "$BUILD/tests/abi/plugins/faulty.so"
+# ggn cannot be made without a model
+lacks_model() {
+    [ "${1##*/}" = ggn.so ] && [ -z "${LULL_MODEL:-}" ] && ! ls ggn/models/*.ggn >/dev/null 2>&1 || return 1
+    n=$((n + 1))
+    echo "ok $n - ggn.so keeps the contract # SKIP no model in ggn/models"
+}
 for so in "$BUILD"/lib/lull/*.so; do
-    t "${so##*/} keeps the contract" status 0 -q "$so"
+    lacks_model "$so" || t "${so##*/} keeps the contract" status 0 -q "$so"
 done
 for so in build/asan/lib/lull/*.so; do
     [ "$BUILD" = build ] && [ -x build/asan/bin/lull-check ] && [ -e "$so" ] || continue
-    t "${so##*/} keeps the contract under ASan and UBSan" build/asan/bin/lull-check -q "$so"
+    lacks_model "$so" || t "${so##*/} keeps the contract under ASan and UBSan" build/asan/bin/lull-check -q "$so"
 done
 echo "1..$n"

@@ -6,6 +6,10 @@ log=$(mktemp) || exit 2
 trap 'rm -f "$log"' EXIT
 for so in "$BUILD"/lib/lull/*.so "$BUILD/tests/abi/plugins/faulty.so"; do
     n=$((n + 1))
+    if [ "${so##*/}" = ggn.so ] && [ -z "${LULL_MODEL:-}" ] && ! ls ggn/models/*.ggn >/dev/null 2>&1; then
+        echo "ok $n - ggn.so # SKIP no model in ggn/models"
+        continue
+    fi
     if "$check" -q -o workers -o concurrent -o instances -o cancel "$so" >"$log" 2>&1; then echo "ok $n - ${so##*/}"; else
         echo "not ok $n - ${so##*/}"
         sed 's/^/#   /' "$log"
