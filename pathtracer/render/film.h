@@ -61,17 +61,21 @@ static inline size_t pt_film_index(const struct pt_film *film, int x, int y)
     return (size_t)(y - film->y0) * (size_t)(film->x1 - film->x0) + (size_t)(x - film->x0);
 }
 
-/* Is this sample in half A? The parity of some bits of the index: a linear functional over GF(2) that is none of the first
- * digits of a Sobol dimension (bit 0 alone is the first digit of dimension 0, all bits together that of dimension 1), so
- * that either half is spread over the pixel as well as the whole. Bit 0 takes part: each pair (2k, 2k+1) is split. */
+/* Is this sample in half A? Groups of four successive samples stay together, and the parity of some bits of the group's number
+ * tells its half. Single samples would not do: an Owen-shuffled Sobol sequence draws at random within a pair (2k, 2k+1), so
+ * that half of it would be no better than random numbers and the difference of the halves would overstate the noise (measured:
+ * by 1.4 against 1.2 with groups of four). Bit 2 takes part: two successive groups are split. The mask leaves out bits, because
+ * the parity of all of them is the first digit of Sobol dimension 1. */
 static inline int pt_film_in_half(uint32_t sample)
 {
-    return !__builtin_parity(sample & UINT32_C(0x7F4A7C1B));
+    return !__builtin_parity(sample & UINT32_C(0x7D29F06C));
 }
-/* How many of the samples [0, spp) are in half A: within one of spp / 2. */
+/* How many of the samples [0, spp) are in half A: within two of spp / 2. */
 static inline uint64_t pt_film_half_spp(uint64_t spp)
 {
-    return spp / 2 + (spp & 1 && pt_film_in_half((uint32_t)(spp - 1)));
+    uint64_t pairs = spp / 8, rest = spp % 8, first_in = (uint64_t)pt_film_in_half((uint32_t)(8 * pairs));
+    uint64_t first = rest < 4 ? rest : 4;
+    return 4 * pairs + (first_in ? first : rest - first);
 }
 
 /* A pixel out of the film and back. Fields of planes that the film does not have are not set by the one and not read by the

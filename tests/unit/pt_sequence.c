@@ -265,7 +265,7 @@ static void check_block(const char *name, int x0, int y0, int x1, int y1, int wi
         uint32_t statistics_count = u32(p + 12), bytes = u32(p + 20);
         assert_int_equal(u32(p), k < 4 ? 1 : 2);
         assert_int_equal(u32(p + 4), spp[k]);
-        assert_int_equal(u32(p + 8), spp[k] / 2);
+        assert_int_equal(u32(p + 8), pt_film_half_spp(spp[k]));
         assert_int_equal(statistics_count, k == 4 ? 1 : 7 + with_criterion);
         assert_int_equal(u32(p + 16), 3);
         assert_int_equal(u32(p + 24), crc32(0, p + 32, bytes));
