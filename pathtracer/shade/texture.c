@@ -51,6 +51,24 @@ pt_vec3 pt_image_texel(const struct pt_image_map *image, int32_t wrap, int32_t c
     return v3(r, g, b);
 }
 
+/* Colour of the texel whose first channel is value i; linear RGB. */
+static inline pt_vec3 colour_at(const struct pt_image_map *image, size_t i)
+{
+    if (image->channels < 3)
+        return v3_splat(decode(image, i));
+    if (image->type == PT_PIXEL_U8_SRGB) {
+        const uint8_t *p = (const uint8_t *)image->pixels + i;
+        return v3(pt_srgb_to_linear[p[0]], pt_srgb_to_linear[p[1]], pt_srgb_to_linear[p[2]]);
+    }
+    return v3(decode(image, i), decode(image, i + 1), decode(image, i + 2));
+}
+
+static inline pt_vec3 blend4(pt_vec3 a, pt_vec3 b, pt_vec3 c, pt_vec3 d, float dx, float dy)
+{
+    pt_vec3 top = v3_madd(v3_scale(a, 1.0f - dx), dx, b), bottom = v3_madd(v3_scale(c, 1.0f - dx), dx, d);
+    return v3_madd(v3_scale(top, 1.0f - dy), dy, bottom);
+}
+
 pt_vec3 pt_image_bilinear(const struct pt_image_map *image, int32_t wrap, int32_t channel, float s, float t)
 {
     /* Beyond this, texel indices have no meaning left in float; also catches NaN. */
@@ -60,10 +78,16 @@ pt_vec3 pt_image_bilinear(const struct pt_image_map *image, int32_t wrap, int32_
         fx = fy = 0.0f;
     float x0 = floorf(fx), y0 = floorf(fy), dx = fx - x0, dy = fy - y0;
     int64_t x = (int64_t)x0, y = (int64_t)y0;
-    pt_vec3 a = pt_image_texel(image, wrap, channel, x, y), b = pt_image_texel(image, wrap, channel, x + 1, y);
-    pt_vec3 c = pt_image_texel(image, wrap, channel, x, y + 1), d = pt_image_texel(image, wrap, channel, x + 1, y + 1);
-    pt_vec3 top = v3_madd(v3_scale(a, 1.0f - dx), dx, b), bottom = v3_madd(v3_scale(c, 1.0f - dx), dx, d);
-    return v3_madd(v3_scale(top, 1.0f - dy), dy, bottom);
+    if (channel == PT_CHANNEL_RGB && wrap != PT_WRAP_BLACK) { /* nearly all lookups: each index is wrapped once */
+        int64_t xa = wrap_index(wrap, x, image->width), xb = wrap_index(wrap, x + 1, image->width);
+        int64_t row_a = wrap_index(wrap, y, image->height) * image->width;
+        int64_t row_b = wrap_index(wrap, y + 1, image->height) * image->width;
+        size_t n = (size_t)image->channels;
+        return blend4(colour_at(image, (size_t)(row_a + xa) * n), colour_at(image, (size_t)(row_a + xb) * n),
+                      colour_at(image, (size_t)(row_b + xa) * n), colour_at(image, (size_t)(row_b + xb) * n), dx, dy);
+    }
+    return blend4(pt_image_texel(image, wrap, channel, x, y), pt_image_texel(image, wrap, channel, x + 1, y),
+                  pt_image_texel(image, wrap, channel, x, y + 1), pt_image_texel(image, wrap, channel, x + 1, y + 1), dx, dy);
 }
 
 static pt_vec3 eval_image(const struct pt_scene *scene, const struct pt_texture *t, float s, float v)
