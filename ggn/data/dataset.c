@@ -58,7 +58,8 @@ static int compare_views(const void *a, const void *b)
     return strcmp(((const struct ggn_dataset_view *)a)->dir, ((const struct ggn_dataset_view *)b)->dir);
 }
 
-static int scan(const char *path, struct ggn_dataset *d, struct ggn_err *err)
+/* Adds the sequences that are folders of `path` itself. */
+static int scan(const char *path, enum ggn_split split, struct ggn_dataset *d, struct ggn_err *err)
 {
     DIR *dir = opendir(path);
     if (dir == NULL)
@@ -70,8 +71,27 @@ static int scan(const char *path, struct ggn_dataset *d, struct ggn_err *err)
         if (e->d_name[0] == '.' || n < 0 || (size_t)n >= sizeof sub || !exists(sub, "manifest.json"))
             continue;
         rc = add_view(d, sub, err);
+        if (rc == GGN_OK)
+            d->views[d->n - 1].split = split;
     }
     closedir(dir);
+    return rc;
+}
+
+static int scan_all(const char *path, struct ggn_dataset *d, struct ggn_err *err)
+{
+    int rc = scan(path, GGN_SPLIT_NONE, d, err);
+    for (int s = 0; s < GGN_SPLIT_NONE && rc == GGN_OK; s++) {
+        char sub[4096];
+        int n = snprintf(sub, sizeof sub, "%s/%s", path, ggn_split_names[s]);
+        if (n > 0 && (size_t)n < sizeof sub && exists(path, ggn_split_names[s]))
+            rc = scan(sub, (enum ggn_split)s, d, err);
+    }
+    for (int i = 0; i < d->n && rc == GGN_OK; i++)
+        for (int k = 0; k < i; k++)
+            if (strcmp(d->views[i].manifest.scene, d->views[k].manifest.scene) == 0 && d->views[i].split != d->views[k].split)
+                rc = ggn_fail(err, GGN_EINVAL, "%s: scene '%s' is in %s and in %s", path, d->views[i].manifest.scene,
+                              ggn_split_names[d->views[k].split], ggn_split_names[d->views[i].split]);
     if (rc == GGN_OK && d->n == 0)
         rc = ggn_fail(err, GGN_EINVAL, "%s: no recorded sequence in it (no manifest.json)", path);
     return rc;
@@ -118,7 +138,7 @@ static int read_split(const char *dir, struct ggn_dataset *d, struct ggn_err *er
 int ggn_dataset_open(const char *path, struct ggn_dataset *data, struct ggn_err *err)
 {
     struct ggn_dataset d = {0};
-    int rc = exists(path, "manifest.json") ? add_view(&d, path, err) : scan(path, &d, err);
+    int rc = exists(path, "manifest.json") ? add_view(&d, path, err) : scan_all(path, &d, err);
     if (rc == GGN_OK)
         rc = read_split(path, &d, err);
     if (rc != GGN_OK) {

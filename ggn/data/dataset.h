@@ -3,7 +3,8 @@
  *
  * DATA/NAME/manifest.json (+ labels.json) for each view, and DATA/split.json:
  *     { "train": ["scene", …], "validation": ["scene", …], "test": ["scene", …] }
- * A scene is on one side only; scenes that are not listed are used by nobody. DATA may also be one sequence itself.
+ * Instead of split.json the views may lie in DATA/train, DATA/validation and DATA/test (scripts/make-dataset does so). A scene is on
+ * one side only; scenes that are on none are used by nobody. DATA may also be one sequence itself.
  */
 #ifndef GGN_DATA_DATASET_H
 #define GGN_DATA_DATASET_H
@@ -28,7 +29,7 @@ struct ggn_dataset {
     struct ggn_dataset_view *views; /* owns; in order of name */
 };
 
-/* Reads manifests, labels and split (no pixels). A folder without split.json has all views in GGN_SPLIT_NONE. */
+/* Reads manifests, labels and split (no pixels). Without a split all views are in GGN_SPLIT_NONE. */
 int ggn_dataset_open(const char *path, struct ggn_dataset *data, struct ggn_err *err);
 void ggn_dataset_release(struct ggn_dataset *data);
 

@@ -118,8 +118,32 @@ static void splits(void **state)
     assert_int_equal(ggn_dataset_open("/tmp/does/not/exist", &d, &err), GGN_EIO);
 }
 
+static void split_folders(void **state)
+{
+    (void)state;
+    struct ggn_dataset d;
+    struct ggn_err err = {0};
+    char command[300];
+    snprintf(command, sizeof command, "rm -r %s/*", root);
+    assert_int_equal(system(command), 0);
+    snprintf(command, sizeof command, "mkdir %s/train %s/test", root, root);
+    assert_int_equal(system(command), 0);
+    add_view("train/x", "x");
+    add_view("test/y-view0", "y");
+    add_view("z", "z");
+    if (ggn_dataset_open(root, &d, &err) != GGN_OK)
+        fail_msg("%s", err.text);
+    assert_int_equal(d.n, 3);
+    for (int i = 0; i < 3; i++)
+        assert_int_equal(d.views[i].split, d.views[i].name[0] == 'x' ? GGN_SPLIT_TRAIN : d.views[i].name[0] == 'y' ? GGN_SPLIT_TEST : GGN_SPLIT_NONE);
+    ggn_dataset_release(&d);
+    add_view("test/x-view1", "x");
+    assert_int_equal(ggn_dataset_open(root, &d, &err), GGN_EINVAL);
+    assert_non_null(strstr(err.text, "scene 'x' is in"));
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(probabilities), cmocka_unit_test(round_trip), cmocka_unit_test(splits)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(probabilities), cmocka_unit_test(round_trip), cmocka_unit_test(splits), cmocka_unit_test(split_folders)};
     return cmocka_run_group_tests_name("data_labels", tests, setup, teardown);
 }
