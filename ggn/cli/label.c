@@ -13,7 +13,6 @@
 #include "observer/calibrate.h"
 
 enum { MAX_INPUTS = 256, KEY_HUMAN = 256, KEY_VIEW, KEY_CALIBRATE, KEY_SOURCE, KEY_CHECK, KEY_TRIALS, KEY_SPREAD };
-enum { HALVES_CAP = 10000 }; /* the last sample count that GGN_SOURCE_HALVES simulates */
 
 struct options {
     const char *inputs[MAX_INPUTS];
@@ -27,7 +26,7 @@ struct options {
 static const struct argp_option option_table[] = {
     {"human", KEY_HUMAN, "CSV", 0, "label with human thresholds, name;t0;t1;…, matched by --view or by the folder's name", 1},
     {"observer", 'O', "FILE", 0, "parameters of the model observer (default: built in)", 2},
-    {"source", KEY_SOURCE, "rendered|halves", 0, "judge the recorded levels (default) or simulate them from two independent halves", 2},
+    {"source", KEY_SOURCE, "auto|rendered|halves", 0, "judge the recorded levels, or simulate them from two independent halves, or (auto, the default) simulate only beyond the last one", 2},
     {"spread", KEY_SPREAD, "OCTAVES", 0, "standard deviation of the psychometric curve, for soft labels", 2},
     {"check", KEY_CHECK, NULL, 0, "write nothing: compare the cheap thresholds (halves) with those of the rendered levels", 3},
     {"calibrate", KEY_CALIBRATE, "CSV", 0, "fit the observer to human thresholds; -o FILE gets its parameters", 4},
@@ -52,9 +51,9 @@ static error_t parse(int key, char *arg, struct argp_state *state)
     case 'O': o->observer_path = arg; return 0;
     case 'o': o->out = arg; return 0;
     case KEY_SOURCE:
-        if (strcmp(arg, "rendered") != 0 && strcmp(arg, "halves") != 0)
-            argp_error(state, "--source %s: expected rendered or halves", arg);
-        o->source = arg[0] == 'h' ? GGN_SOURCE_HALVES : GGN_SOURCE_RENDERED;
+        if (strcmp(arg, "auto") != 0 && strcmp(arg, "rendered") != 0 && strcmp(arg, "halves") != 0)
+            argp_error(state, "--source %s: expected auto, rendered or halves", arg);
+        o->source = arg[0] == 'a' ? GGN_SOURCE_AUTO : arg[0] == 'h' ? GGN_SOURCE_HALVES : GGN_SOURCE_RENDERED;
         return 0;
     case KEY_SPREAD:
         o->spread = strtod(arg, &end);
@@ -134,11 +133,13 @@ struct work {
     int both;                /* rendered and halves */
     enum ggn_observer_source source;
     struct ggn_label *labels, *cheap; /* [n_blocks] */
+    double *caps;            /* [n_blocks]; the last sample count that was judged; may be NULL */
     int *rc;
     struct ggn_err *errs;
 };
 
-static int judge(const struct work *w, const struct ggn_seq_block *b, enum ggn_observer_source source, struct ggn_label *out, struct ggn_err *err)
+static int judge(const struct work *w, const struct ggn_seq_block *b, enum ggn_observer_source source, struct ggn_label *out, double *cap,
+                 struct ggn_err *err)
 {
     struct ggn_curve curve;
     int rc = ggn_observer_curve(w->observer, b, source, w->view->manifest.reference_independent, &curve, err);
@@ -146,6 +147,7 @@ static int judge(const struct work *w, const struct ggn_seq_block *b, enum ggn_o
         return rc;
     out->id = b->id;
     out->threshold = ggn_curve_threshold(&curve, w->observer->tau, &out->censored);
+    *cap = curve.spp[curve.n - 1];
     ggn_curve_release(&curve);
     return GGN_OK;
 }
@@ -160,9 +162,12 @@ static void work_block(void *data, long i, int worker)
     w->rc[i] = ggn_manifest_read_block(w->view->dir, &w->view->manifest, (uint32_t)i, &b, &w->errs[i]);
     if (w->rc[i] != GGN_OK)
         return;
-    w->rc[i] = judge(w, &b, w->both ? GGN_SOURCE_RENDERED : w->source, &w->labels[i], &w->errs[i]);
+    double cap = 0.0;
+    w->rc[i] = judge(w, &b, w->both ? GGN_SOURCE_RENDERED : w->source, &w->labels[i], &cap, &w->errs[i]);
+    if (w->rc[i] == GGN_OK && w->caps != NULL)
+        w->caps[i] = cap;
     if (w->rc[i] == GGN_OK && w->both)
-        w->rc[i] = judge(w, &b, GGN_SOURCE_HALVES, &w->cheap[i], &w->errs[i]);
+        w->rc[i] = judge(w, &b, GGN_SOURCE_HALVES, &w->cheap[i], &cap, &w->errs[i]);
     ggn_seq_block_release(&b);
 }
 
@@ -191,13 +196,15 @@ static int label_observer(const struct options *o, const struct ggn_observer *ob
     int rc = start_labels(&l, "observer", v, observer->spread, err);
     if (rc != GGN_OK)
         return rc;
-    if (o->source == GGN_SOURCE_HALVES)
-        l.cap = HALVES_CAP;
-    struct work w = {.view = v, .observer = observer, .source = o->source, .labels = l.labels};
-    rc = run_work(&w, threads, err);
+    double *caps = calloc(v->manifest.n_blocks, sizeof *caps);
+    struct work w = {.view = v, .observer = observer, .source = o->source, .labels = l.labels, .caps = caps};
+    rc = caps != NULL ? run_work(&w, threads, err) : ggn_fail_nomem(err, v->dir);
     l.n = v->manifest.n_blocks;
-    ggn_observer_describe(observer, l.detail, sizeof l.detail - 32);
-    strcat(l.detail, o->source == GGN_SOURCE_HALVES ? ", from two halves" : ", rendered levels");
+    for (uint32_t i = 0; i < l.n && rc == GGN_OK; i++)
+        l.cap = fmax(l.cap, caps[i]);
+    free(caps);
+    ggn_observer_describe(observer, l.detail, sizeof l.detail - 64);
+    strcat(l.detail, o->source == GGN_SOURCE_HALVES ? ", from two halves" : o->source == GGN_SOURCE_AUTO ? ", recorded levels, beyond them two halves" : ", recorded levels");
     if (rc == GGN_OK && !ggn_cmd_interrupted)
         rc = ggn_labels_write(v->dir, &l, err);
     uint32_t censored = 0;
@@ -240,7 +247,7 @@ static int collect(const struct options *o, const struct ggn_thresholds *t, cons
     for (int i = 0; i < d->n && rc == GGN_OK; i++) {
         const struct ggn_dataset_view *v = &d->views[i];
         const struct ggn_view *row = find_row(o, t, v);
-        double cap = o->source == GGN_SOURCE_HALVES ? HALVES_CAP : v->manifest.levels[v->manifest.n_levels - 1];
+        double cap = o->source != GGN_SOURCE_RENDERED ? GGN_SIMULATED_CAP : v->manifest.levels[v->manifest.n_levels - 1];
         for (uint32_t b = 0; row != NULL && b < v->manifest.n_blocks && rc == GGN_OK; b++) {
             uint32_t id = v->manifest.blocks[b].id;
             if (id >= (uint32_t)row->n || row->spp[id] >= cap)
@@ -351,7 +358,7 @@ int ggn_cmd_label(int argc, char **argv)
         .doc = "Attaches thresholds to recorded sequences (DATA: a sequence or a folder of them): those of people, or those of the model "
                "observer, which are never called human.",
     };
-    struct options o = {.source = GGN_SOURCE_RENDERED, .threads = ggn_threads_available()};
+    struct options o = {.source = GGN_SOURCE_AUTO, .threads = ggn_threads_available()};
     struct ggn_observer observer = ggn_observer_default;
     struct ggn_thresholds human = {0};
     struct ggn_threads *threads = NULL;

@@ -238,16 +238,18 @@ static void encode(const float *linear, size_t pixels, uint8_t *rgb)
             rgb[3 * i + c] = ggn_srgb_code((double)linear[c * pixels + i]);
 }
 
-/* Sample counts that halves stand for. spp may be NULL; returns their number. */
-static int virtual_levels(double *spp)
+/* Sample counts above `beyond` that halves stand for. spp may be NULL; returns their number. */
+static int simulated_levels(double beyond, double *spp)
 {
     int n = 0;
-    double v = 20.0;
-    for (; v < 10000.0; v *= 1.15, n++)
-        if (spp != NULL)
-            spp[n] = round(v);
+    for (double v = 20.0; v < GGN_SIMULATED_CAP; v *= 1.15)
+        if (round(v) > beyond) {
+            if (spp != NULL)
+                spp[n] = round(v);
+            n++;
+        }
     if (spp != NULL)
-        spp[n] = 10000.0;
+        spp[n] = GGN_SIMULATED_CAP;
     return n + 1;
 }
 
@@ -258,6 +260,13 @@ static const struct ggn_seq_record *full_level(const struct ggn_seq_block *b)
         if (ggn_seq_has(&b->levels[i], GGN_PLANE_HALF_F16))
             return &b->levels[i];
     return NULL;
+}
+
+int ggn_stimuli_extend(const struct ggn_seq_block *b, int reference_independent)
+{
+    /* Up to a tenth of an octave is not worth simulating. */
+    return reference_independent && b->reference != NULL && full_level(b) != NULL && 1.07 * b->levels[b->n_levels - 1].spp < GGN_SIMULATED_CAP &&
+           ggn_seq_has(b->reference, GGN_PLANE_MEAN_F16);
 }
 
 static int init_halves(struct ggn_stimuli *s, int reference_independent, struct ggn_err *err)
@@ -277,13 +286,17 @@ static int init_halves(struct ggn_stimuli *s, int reference_independent, struct 
     return rc;
 }
 
-static int init_rendered(struct ggn_stimuli *s, int reference_independent, struct ggn_err *err)
+static int init_rendered(struct ggn_stimuli *s, int reference_independent, int extend, struct ggn_err *err)
 {
     const struct ggn_seq_block *b = s->block;
     if (b->reference == NULL)
         return ggn_fail(err, GGN_EINVAL, "block %u has no reference", b->id);
     s->scale = reference_independent && ggn_seq_has(b->reference, GGN_PLANE_MEAN_F16);
     int rc = s->scale ? ggn_seq_mean(b, b->reference, s->base, err) : GGN_OK;
+    if (rc == GGN_OK && extend) {
+        s->spp0 = full_level(b)->spp;
+        rc = ggn_seq_half(b, full_level(b), s->difference, err);
+    }
     return rc == GGN_OK ? ggn_seq_display(b, b->reference, s->converged, err) : rc;
 }
 
@@ -291,8 +304,12 @@ int ggn_stimuli_init(struct ggn_stimuli *out, const struct ggn_seq_block *block,
                      int reference_independent, struct ggn_err *err)
 {
     size_t pixels = (size_t)block->width * block->height;
-    struct ggn_stimuli s = {.block = block, .source = source};
-    s.n = source == GGN_SOURCE_HALVES ? virtual_levels(NULL) : (int)block->n_levels;
+    if (source == GGN_SOURCE_AUTO && block->reference == NULL)
+        source = GGN_SOURCE_HALVES;
+    struct ggn_stimuli s = {.block = block, .recorded = source == GGN_SOURCE_HALVES ? 0 : (int)block->n_levels};
+    int extend = source == GGN_SOURCE_AUTO && ggn_stimuli_extend(block, reference_independent);
+    double beyond = s.recorded > 0 ? 1.07 * block->levels[s.recorded - 1].spp : 0.0;
+    s.n = s.recorded + (extend || s.recorded == 0 ? simulated_levels(beyond, NULL) : 0);
     s.spp = malloc((size_t)s.n * sizeof *s.spp);
     s.base = malloc(3 * pixels * sizeof(float));
     s.difference = malloc(3 * pixels * sizeof(float));
@@ -304,16 +321,15 @@ int ggn_stimuli_init(struct ggn_stimuli *out, const struct ggn_seq_block *block,
     else if (source == GGN_SOURCE_HALVES)
         rc = init_halves(&s, reference_independent, err);
     else
-        rc = init_rendered(&s, reference_independent, err);
+        rc = init_rendered(&s, reference_independent, extend, err);
     if (rc != GGN_OK) {
         ggn_stimuli_release(&s);
         return rc;
     }
-    if (source == GGN_SOURCE_HALVES)
-        virtual_levels(s.spp);
-    else
-        for (int i = 0; i < s.n; i++)
-            s.spp[i] = block->levels[i].spp;
+    for (int i = 0; i < s.recorded; i++)
+        s.spp[i] = block->levels[i].spp;
+    if (s.n > s.recorded)
+        simulated_levels(beyond, s.spp + s.recorded);
     *out = s;
     return GGN_OK;
 }
@@ -352,7 +368,7 @@ int ggn_stimuli_make(struct ggn_stimuli *s, int level, uint8_t *test, struct ggn
 {
     const struct ggn_seq_block *b = s->block;
     size_t pixels = (size_t)b->width * b->height;
-    if (s->source == GGN_SOURCE_HALVES) {
+    if (level >= s->recorded) {
         float scale = (float)sqrt(s->spp0 / s->spp[level]);
         for (size_t i = 0; i < 3 * pixels; i++)
             s->work[i] = s->base[i] + scale * s->difference[i];

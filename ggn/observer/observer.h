@@ -56,12 +56,15 @@ void ggn_curve_release(struct ggn_curve *c);
 /* What stands for the image at n spp. */
 enum ggn_observer_source {
     GGN_SOURCE_RENDERED, /* the recorded levels */
-    GGN_SOURCE_HALVES    /* reference (or mean) + sqrt(spp0/n) * half-buffer difference of the full level at spp0 */
+    GGN_SOURCE_HALVES,   /* reference (or mean) + sqrt(spp0/n) * half-buffer difference of the full level at spp0 */
+    GGN_SOURCE_AUTO      /* the recorded levels, and beyond the last one the halves, where the block has what that takes; halves alone
+                            where there is no reference */
 };
 
 /*
  * Display images to judge: the converged one, and the one at any of `n` sample counts: the recorded levels, or for GGN_SOURCE_HALVES
- * 20, 23, … 10,000 spp (each 1.15 times the one before), whatever was recorded.
+ * 20, 23, … 10,000 spp (each 1.15 times the one before), whatever was recorded, or for GGN_SOURCE_AUTO the former and then those of the
+ * latter that lie beyond.
  *
  * A reference of n_r independent samples has noise of its own: I_n - R has the variance s^2 (1/n + 1/n_r), not s^2/n. Scaling that
  * linear difference by sqrt(n_r/(n_r + n)) gives it the variance that I_n has against a perfect reference, so that R may stand for
@@ -71,7 +74,7 @@ enum ggn_observer_source {
  */
 struct ggn_stimuli {
     const struct ggn_seq_block *block; /* borrows */
-    enum ggn_observer_source source;
+    int recorded;                      /* the first so many are recorded levels, the others simulated */
     int scale;                         /* whether the difference is scaled */
     int noisy_base;                    /* the converged image is a mean with the noise `difference` */
     double spp0;                       /* of D */
@@ -87,6 +90,11 @@ void ggn_stimuli_release(struct ggn_stimuli *s);
 int ggn_stimuli_make(struct ggn_stimuli *s, int i, uint8_t *test, struct ggn_err *err);
 /* Local deviation of the converged image, [P], without its noise where that is known. */
 int ggn_stimuli_deviation(struct ggn_stimuli *s, int window_px, float *deviation, struct ggn_err *err);
+
+/* Whether GGN_SOURCE_AUTO goes beyond the last level of this block. */
+int ggn_stimuli_extend(const struct ggn_seq_block *block, int reference_independent);
+/* The last sample count that is simulated. */
+enum { GGN_SIMULATED_CAP = 10000 };
 
 /* The curve of one block as the observer sees it. */
 int ggn_observer_curve(const struct ggn_observer *o, const struct ggn_seq_block *block, enum ggn_observer_source source,

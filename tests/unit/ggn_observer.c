@@ -168,6 +168,23 @@ static void halves_alone(void **state)
     }
 }
 
+/* Recorded to 342 spp only, a threshold beyond is found where the full recording puts it. */
+static void beyond_the_last_level(void **state)
+{
+    (void)state;
+    struct ggn_observer o = ggn_observer_default;
+    o.percentile = 80;
+    o.tau = 0.5;
+    struct ggn_noise n = {W, H, levels, LEVELS, 4096, 0.9, 0.0, 6}, few = {W, H, levels, 8, 4096, 0.9, 0.0, 6};
+    struct ggn_seq_block all = ggn_noise_block(&n), head = ggn_noise_block(&few);
+    double a = threshold_of(&all, &o, GGN_SOURCE_RENDERED), b = threshold_of(&head, &o, GGN_SOURCE_AUTO);
+    assert_true(a > 500);
+    assert_near(log2(b / a), 0.0, 0.4);
+    assert_true(ggn_stimuli_extend(&head, 1) && !ggn_stimuli_extend(&head, 0));
+    ggn_seq_block_release(&all);
+    ggn_seq_block_release(&head);
+}
+
 static void calibration(void **state)
 {
     (void)state;
@@ -242,7 +259,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(pooling), cmocka_unit_test(masking), cmocka_unit_test(thresholds), cmocka_unit_test(scaling),
-        cmocka_unit_test(noisy_reference), cmocka_unit_test(halves_alone), cmocka_unit_test(calibration), cmocka_unit_test(parameters), cmocka_unit_test(trials),
+        cmocka_unit_test(noisy_reference), cmocka_unit_test(halves_alone), cmocka_unit_test(beyond_the_last_level), cmocka_unit_test(calibration), cmocka_unit_test(parameters), cmocka_unit_test(trials),
     };
     return cmocka_run_group_tests_name("observer", tests, NULL, NULL);
 }
