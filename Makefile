@@ -153,7 +153,7 @@ $(OUT)/fuzz/replay-ggn_%: $(OBJ)/tests/fuzz/ggn_%.c.o $(OBJ)/tests/fuzz/replay.c
 # Measuring programs; scripts/bench runs them.
 BENCHES := $(patsubst tests/bench/%.c,$(OUT)/bench/%,$(wildcard tests/bench/*.c))
 $(OUT)/bench/pt_%: $(OBJ)/tests/bench/pt_%.c.o $(PT_OBJ) $(LOADER_OBJ) $(SUPPORT_pt)
-	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) -o $@
+	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) -lcmocka -o $@
 
 setup: ## install the Debian packages that are missing
 	@scripts/setup

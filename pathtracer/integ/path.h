@@ -107,22 +107,6 @@ PT_KERNEL_INLINE pt_vec3 pt_path_transmittance(pt_effects fx, struct pt_path *pa
     }
 }
 
-/* Share of the light's contribution that arrives at `origin`. */
-PT_KERNEL_INLINE pt_vec3 pt_path_visibility(pt_effects fx, struct pt_path *path, const struct pt_light_sample *light,
-                                            pt_vec3 origin, int32_t medium)
-{
-    struct pt_ray ray = {origin, light->wi, 0.0f, INFINITY, path->ray.time};
-    if (light->finite) {
-        ray.direction = v3_sub(light->target, origin);
-        ray.t_max = PT_SHADOW_END;
-    }
-    if (!(fx & (PT_FX_ALPHA | PT_FX_INTERFACE | PT_FX_MEDIA))) {
-        path->rays++;
-        return v3_splat(pt_accel_occluded(path->scene, &ray) ? 0.0f : 1.0f);
-    }
-    return pt_path_transmittance(fx, path, &ray, v3_len(ray.direction), medium);
-}
-
 /* Power heuristic for the strategy of density p against q, without overflow of the squares. */
 PT_KERNEL_INLINE float pt_mis_weight(float p, float q)
 {
@@ -138,25 +122,49 @@ PT_KERNEL_INLINE int pt_path_sample_light(pt_effects fx, const struct pt_path *p
     return pt_light_sample(fx, path->scene, p, pt_sampler_1d(&path->sampler, PT_DIM_LIGHT_PICK), u.x, u.y, light);
 }
 
-/* Adds what light sampling found; `f` is BSDF · cos or the phase function, `pdf` its density for the same direction. */
-PT_KERNEL_INLINE void pt_path_add_light(pt_effects fx, struct pt_path *path, const struct pt_light_sample *light, pt_vec3 f,
-                                        float pdf, pt_vec3 origin, int32_t medium)
+/* What a light adds if nothing is in between. It is worked out before the shadow ray is traced, together with the path's next
+ * direction: two independent chains of arithmetic then overlap, where a query between them would make the second wait. */
+struct pt_light_plan {
+    struct pt_light_sample light;
+    pt_vec3 add;         /* to the path's radiance; black: no shadow ray needed */
+    pt_vec3 origin;
+    int32_t medium;      /* the shadow ray starts in it */
+};
+
+/* `f` is BSDF · cos or the phase function towards the light, `pdf` the density with which it would have sampled that. */
+PT_KERNEL_INLINE void pt_path_plan_light(pt_effects fx, const struct pt_path *path, pt_vec3 f, float pdf, pt_vec3 origin,
+                                         int32_t medium, struct pt_light_plan *plan)
 {
-    if (v3_is_black(f))
-        return;
-    pt_vec3 visible = pt_path_visibility(fx, path, light, origin, medium);
-    if (v3_is_black(visible))
-        return;
-    float scale = 1.0f / light->pdf_solid;
+    const struct pt_light_sample *light = &plan->light;
+    float scale = light->inv_pdf_solid, r = pdf * scale;
     if (!((fx & PT_FX_DELTA_LIGHT) && light->delta))
-        scale *= pt_mis_weight(light->pdf_solid, pdf);
-    pt_vec3 l = v3_scale(v3_mul(f, light->radiance), scale);
-    if (fx & (PT_FX_ALPHA | PT_FX_INTERFACE | PT_FX_MEDIA))
-        l = v3_mul(l, visible);
-    l = v3_mul(l, path->throughput);
-    path->radiance = v3_add(path->radiance, l);
+        scale *= 1.0f / (1.0f + r * r); /* power heuristic */
+    plan->add = v3_mul(v3_scale(v3_mul(f, light->radiance), scale), path->throughput);
+    plan->origin = origin;
+    plan->medium = medium;
+}
+
+PT_KERNEL_INLINE void pt_path_resolve_light(pt_effects fx, struct pt_path *path, const struct pt_light_plan *plan)
+{
+    if (v3_is_black(plan->add))
+        return;
+    const struct pt_light_sample *light = &plan->light;
+    struct pt_ray ray = {plan->origin, light->wi, 0.0f, INFINITY, path->ray.time};
+    pt_vec3 add = plan->add;
+    if (light->finite) {
+        ray.direction = v3_sub(light->target, plan->origin);
+        ray.t_max = PT_SHADOW_END;
+    }
+    if (!(fx & (PT_FX_ALPHA | PT_FX_INTERFACE | PT_FX_MEDIA))) {
+        path->rays++;
+        if (pt_accel_occluded(path->scene, &ray))
+            return;
+    } else {
+        add = v3_mul(add, pt_path_transmittance(fx, path, &ray, v3_len(ray.direction), plan->medium));
+    }
+    path->radiance = v3_add(path->radiance, add);
     if (path->trace)
-        pt_trace_light(path->trace, light->wi, l);
+        pt_trace_light(path->trace, light->wi, add);
 }
 
 /* Emission of the surface that the path has met. */
@@ -197,7 +205,7 @@ PT_KERNEL_INLINE int pt_path_survives(struct pt_path *path)
     float keep = v3_max(path->throughput) * path->eta_scale;
     if (keep >= 1.0f)
         return 1;
-    if (!(pt_sampler_1d(&path->sampler, PT_DIM_ROULETTE) < keep))
+    if (!(pt_bits_to_float(pt_sampler_bits(&path->sampler, PT_DIM_ROULETTE)) < keep))
         return 0;
     path->throughput = v3_scale(path->throughput, 1.0f / keep);
     return 1;
@@ -228,10 +236,11 @@ PT_KERNEL_INLINE int pt_path_cross_medium(pt_effects fx, struct pt_path *path, f
     pt_vec3 p = v3_madd(start, event.t, path->ray.direction), wo = v3_neg(path->ray.direction), wi;
     if (path->trace)
         pt_trace_scatter(path->trace, path->medium, p, path->throughput);
-    struct pt_light_sample light;
-    if (pt_path_sample_light(fx, path, p, &light)) {
-        float phase = pt_phase_eval(medium->g, wo, light.wi);
-        pt_path_add_light(fx, path, &light, v3_splat(phase), phase, p, path->medium);
+    struct pt_light_plan plan;
+    if (pt_path_sample_light(fx, path, p, &plan.light)) {
+        float phase = pt_phase_eval(medium->g, wo, plan.light.wi);
+        pt_path_plan_light(fx, path, v3_splat(phase), phase, p, path->medium, &plan);
+        pt_path_resolve_light(fx, path, &plan);
     }
     struct pt_sample2 u = pt_sampler_2d(&path->sampler, PT_DIM_PHASE);
     path->pdf_prev = pt_phase_sample(medium->g, wo, u.x, u.y, &wi);
@@ -252,6 +261,31 @@ PT_KERNEL_INLINE void pt_path_aux(pt_effects fx, const struct pt_path *path, con
         out->albedo = pt_clamp_unit(pt_bsdf_albedo(fx, bsdf, wo));
 }
 
+/* The next direction: its ray replaces the path's. 0: the path ends. */
+PT_KERNEL_INLINE int pt_path_scatter(pt_effects fx, struct pt_path *path, const struct pt_place *at, const struct pt_frame *frame,
+                                     const struct pt_bsdf *bsdf, pt_vec3 wo)
+{
+    struct pt_bsdf_sample next;
+    struct pt_sample2 u = pt_sampler_2d(&path->sampler, PT_DIM_BSDF);
+    float u_lobe = fx & PT_FX_BSDF ? pt_sampler_1d(&path->sampler, PT_DIM_BSDF_LOBE) : 0.0f;
+    if (!pt_bsdf_sample(fx, bsdf, wo, u_lobe, u.x, u.y, &next))
+        return 0;
+    path->throughput = v3_mul(path->throughput, next.weight);
+    if (v3_is_black(path->throughput))
+        return 0;
+    int delta = (fx & PT_FX_BSDF) && (next.flags & PT_SCATTER_DELTA);
+    path->pdf_prev = delta ? 0.0f : next.pdf_solid;
+    if (fx & PT_FX_TRANSMISSION)
+        path->eta_scale /= next.eta_scale;
+    pt_vec3 wi = pt_frame_to_world(frame, next.wi);
+    if (fx & PT_FX_MEDIA)
+        path->medium = pt_medium_towards(at, wi, path->medium);
+    path->p_prev = at->p;
+    path->ray = (struct pt_ray){pt_offset_point(at->p, at->s.n_geometric, at->error, wi), wi, 0.0f, INFINITY, path->ray.time};
+    path->depth++;
+    return pt_path_survives(path);
+}
+
 /* Light and the next direction at a surface. 0: the path ends. */
 PT_KERNEL_INLINE int pt_path_bounce(pt_effects fx, struct pt_path *path, const struct pt_place *at, float t,
                                     struct pt_path_result *out)
@@ -269,33 +303,16 @@ PT_KERNEL_INLINE int pt_path_bounce(pt_effects fx, struct pt_path *path, const s
     if (path->trace)
         pt_trace_surface(path->trace, at, &bsdf, path->throughput);
 
-    struct pt_light_sample light;
-    if (pt_bsdf_has_smooth(fx, &bsdf) && pt_path_sample_light(fx, path, at->p, &light)) {
+    struct pt_light_plan plan = {.add = {0.0f, 0.0f, 0.0f}};
+    if (pt_bsdf_has_smooth(fx, &bsdf) && pt_path_sample_light(fx, path, at->p, &plan.light)) {
         float pdf;
-        pt_vec3 f = pt_bsdf_eval(fx, &bsdf, wo, pt_frame_to_local(&frame, light.wi), &pdf);
-        pt_path_add_light(fx, path, &light, f, pdf, pt_offset_point(at->p, at->s.n_geometric, at->error, light.wi),
-                          fx & PT_FX_MEDIA ? pt_medium_towards(at, light.wi, path->medium) : -1);
+        pt_vec3 wi = plan.light.wi, f = pt_bsdf_eval(fx, &bsdf, wo, pt_frame_to_local(&frame, wi), &pdf);
+        pt_path_plan_light(fx, path, f, pdf, pt_offset_point(at->p, at->s.n_geometric, at->error, wi),
+                           fx & PT_FX_MEDIA ? pt_medium_towards(at, wi, path->medium) : -1, &plan);
     }
-
-    struct pt_bsdf_sample next;
-    struct pt_sample2 u = pt_sampler_2d(&path->sampler, PT_DIM_BSDF);
-    float u_lobe = fx & PT_FX_BSDF ? pt_sampler_1d(&path->sampler, PT_DIM_BSDF_LOBE) : 0.0f;
-    if (!pt_bsdf_sample(fx, &bsdf, wo, u_lobe, u.x, u.y, &next))
-        return 0;
-    path->throughput = v3_mul(path->throughput, next.weight);
-    if (v3_is_black(path->throughput))
-        return 0;
-    int delta = (fx & PT_FX_BSDF) && (next.flags & PT_SCATTER_DELTA);
-    path->pdf_prev = delta ? 0.0f : next.pdf_solid;
-    if (fx & PT_FX_TRANSMISSION)
-        path->eta_scale /= next.eta_scale;
-    pt_vec3 wi = pt_frame_to_world(&frame, next.wi);
-    if (fx & PT_FX_MEDIA)
-        path->medium = pt_medium_towards(at, wi, path->medium);
-    path->p_prev = at->p;
-    path->ray = (struct pt_ray){pt_offset_point(at->p, at->s.n_geometric, at->error, wi), wi, 0.0f, INFINITY, path->ray.time};
-    path->depth++;
-    return pt_path_survives(path);
+    int alive = pt_path_scatter(fx, path, at, &frame, &bsdf, wo);
+    pt_path_resolve_light(fx, path, &plan);
+    return alive;
 }
 
 PT_KERNEL_INLINE void pt_path_start(pt_effects fx, struct pt_path *path, uint32_t x, uint32_t y)

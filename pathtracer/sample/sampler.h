@@ -19,7 +19,7 @@
 
 enum {
     PT_DIMS_PER_VERTEX = 16,
-    PT_SOBOL_BLOCKS = 6
+    PT_SOBOL_BLOCKS = 3
 };
 
 enum pt_camera_dim { PT_DIM_PIXEL = 0, PT_DIM_LENS = 2, PT_DIM_TIME = 4 };
@@ -38,10 +38,10 @@ enum pt_vertex_dim {
 };
 
 struct pt_sampler {
-    uint64_t key;            /* of (seed, pixel) */
     uint32_t index_reversed; /* Sobol: sample index, bits reversed */
     uint32_t sobol;
     uint32_t base;           /* first dimension of the current block */
+    uint32_t pixel_key;      /* of (seed, pixel) */
     uint32_t path_key;       /* of (seed, pixel, sample) */
 };
 
@@ -65,24 +65,23 @@ static inline uint32_t pt_owen_hash(uint32_t x, uint32_t seed)
     return x;
 }
 
-/* Second Sobol' dimension of an index, bits of the result reversed. Its matrix is Pascal's triangle mod 2, entry (i, j) set
- * when the bits of i are among those of j (Lucas), so the product is five steps of an xor over subsets. */
-static inline uint32_t pt_sobol1_reversed(uint32_t index)
+/* Second Sobol' dimension from the first, both as 32-bit fractions. Its matrix is Pascal's triangle mod 2, an entry set when the
+ * bits of one index are among those of the other (Lucas), so the product is five steps of an xor over subsets. */
+static inline uint32_t pt_sobol_second(uint32_t first)
 {
-    index ^= (index & 0xaaaaaaaau) >> 1;
-    index ^= (index & 0xccccccccu) >> 2;
-    index ^= (index & 0xf0f0f0f0u) >> 4;
-    index ^= (index & 0xff00ff00u) >> 8;
-    index ^= (index & 0xffff0000u) >> 16;
-    return index;
+    first ^= (first & 0x55555555u) << 1;
+    first ^= (first & 0x33333333u) << 2;
+    first ^= (first & 0x0f0f0f0fu) << 4;
+    first ^= (first & 0x00ff00ffu) << 8;
+    first ^= first << 16;
+    return first;
 }
 
 static inline struct pt_sampler pt_sampler_make(int32_t kind, uint32_t seed, uint32_t x, uint32_t y, uint32_t sample)
 {
     uint64_t pixel_key = pt_hash64(((uint64_t)y << 32 | x) + 0x9e3779b97f4a7c15u * ((uint64_t)seed + 1));
     uint32_t path_key = (uint32_t)(pt_hash64(pixel_key + 0xd1342543de82ef95u * ((uint64_t)sample + 1)) >> 16);
-    return (struct pt_sampler){pixel_key, kind == PT_SAMPLER_SOBOL ? pt_reverse_bits(sample) : 0,
-                               kind == PT_SAMPLER_SOBOL, 0, path_key};
+    return (struct pt_sampler){pt_reverse_bits(sample), kind == PT_SAMPLER_SOBOL, 0, (uint32_t)(pixel_key >> 32), path_key};
 }
 
 /* Moves to block `block` (0 = camera, k + 1 = vertex k). */
@@ -97,13 +96,12 @@ struct pt_sample2 {
     float x, y;
 };
 
+/* The Owen shuffle of the index is at the same time an Owen scramble of the first dimension, which is the index reversed. */
 static inline struct pt_sample2 pt_sobol_pair(const struct pt_sampler *s, uint32_t dim)
 {
-    uint64_t seeds = pt_hash64(s->key + 0xa0761d6478bd642fu * dim);
-    uint32_t seed_x = (uint32_t)seeds, seed_y = (uint32_t)(seeds >> 32);
-    uint32_t index = pt_reverse_bits(pt_owen_hash(s->index_reversed, pt_hash32(seed_x ^ seed_y)));
-    uint32_t x = pt_reverse_bits(pt_owen_hash(index, seed_x));
-    uint32_t y = pt_reverse_bits(pt_owen_hash(pt_sobol1_reversed(index), seed_y));
+    uint32_t seed = pt_hash32(s->pixel_key + 0x9e3779b9u * dim);
+    uint32_t x = pt_owen_hash(s->index_reversed, seed);
+    uint32_t y = pt_reverse_bits(pt_owen_hash(pt_reverse_bits(pt_sobol_second(x)), seed * 0x2c1b3c6du + 0x297a2d39u));
     return (struct pt_sample2){pt_bits_to_float(x), pt_bits_to_float(y)};
 }
 

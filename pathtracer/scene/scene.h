@@ -222,7 +222,7 @@ struct pt_emitter {
     int32_t alias;       /* Walker/Vose alias table over the emitters … */
     float alias_q;       /* … keep this one when the fractional part is below q */
     float pmf;           /* > 0 for all that can emit */
-    float inv_area;      /* AREA on a mesh: of the triangle */
+    float area_over_pmf; /* AREA on a mesh: of the triangle, units² */
     pt_vec3 p0, e1, e2;  /* AREA on a mesh: corner and edges to the other two */
     pt_vec3 n;           /* AREA on a mesh: unit normal of the emitting side */
 };

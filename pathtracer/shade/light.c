@@ -38,7 +38,7 @@ static double triangle_emitter(const struct pt_scene *scene, const struct pt_sha
     pt_vec3 n = v3_cross(e->e1, e->e2);
     double area = 0.5 * sqrt((double)n.x * (double)n.x + (double)n.y * (double)n.y + (double)n.z * (double)n.z);
     e->n = area > 0.0 ? v3_scale(n, (float)(0.5 / area)) : v3_splat(0.0f);
-    e->inv_area = area > 0.0 ? (float)(1.0 / area) : 0.0f;
+    e->area_over_pmf = (float)area; /* divided by the pmf once that is known */
     int against = shape->flip_normal;
     if (mesh->normals) {
         pt_vec3 ns = v3_add(vertex(mesh->normals, index[0]), v3_add(vertex(mesh->normals, index[1]),
@@ -47,7 +47,7 @@ static double triangle_emitter(const struct pt_scene *scene, const struct pt_sha
     }
     if (against)
         e->n = v3_neg(e->n);
-    return area > 0.0 && isfinite(e->inv_area) ? area : 0.0;
+    return isfinite(e->area_over_pmf) ? area : 0.0;
 }
 
 /* Radiant power up to a common factor (luminance). */
@@ -143,6 +143,7 @@ static int make_table(struct pt_scene *scene, double *weights, struct pt_arena *
         e->alias = alias[i];
         e->alias_q = q[i];
         e->pmf = (float)(weights[i] / sum);
+        e->area_over_pmf = e->pmf > 0.0f ? e->area_over_pmf / e->pmf : 0.0f;
         if (e->primitive < 0)
             scene->lights[e->light].emitter_pmf = e->pmf;
     }

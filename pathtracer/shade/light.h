@@ -17,7 +17,7 @@ int pt_lights_build(struct pt_scene *scene, struct pt_err *err);
 struct pt_light_sample {
     pt_vec3 wi;          /* unit, from the reference point to the light */
     pt_vec3 radiance;    /* arriving along wi when nothing is in between; for a DELTA light: irradiance on a facing surface */
-    float pdf_solid;     /* delta: probability of the selection */
+    float inv_pdf_solid; /* 1 / density: kept so that the kernel need not divide; delta: 1 / probability of the selection */
     int delta;           /* no other strategy can find it */
     int finite;          /* `target` counts; else the light is at infinity along wi */
     pt_vec3 target;      /* point on the light, already moved off its surface towards the reference side */

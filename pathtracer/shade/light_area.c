@@ -86,7 +86,7 @@ static int finish(const struct pt_light *light, const struct pt_shape *shape, pt
     out->delta = 0;
     out->finite = 1;
     out->target = pt_offset_point(p, n, error, v3_neg(d));
-    return out->pdf_solid > 0.0f && out->pdf_solid < INFINITY;
+    return out->inv_pdf_solid > 0.0f && out->inv_pdf_solid < INFINITY;
 }
 
 static int sample_cone(const struct pt_light *light, const struct pt_shape *shape, pt_vec3 p_ref, pt_vec3 centre, float radius,
@@ -101,7 +101,7 @@ static int sample_cone(const struct pt_light *light, const struct pt_shape *shap
     pt_vec3 n = v3_norm(v3_sub(v3_madd(p_ref, t, out->wi), centre)), p = v3_madd(centre, radius, n);
     pt_vec3 error = v3(PT_OFFSET_ERROR * (fabsf(centre.x) + radius), PT_OFFSET_ERROR * (fabsf(centre.y) + radius),
                        PT_OFFSET_ERROR * (fabsf(centre.z) + radius));
-    out->pdf_solid = 1.0f / (2.0f * PT_PI * one_minus_cos);
+    out->inv_pdf_solid = 2.0f * PT_PI * one_minus_cos;
     return finish(light, shape, p_ref, p, n, error, out);
 }
 
@@ -115,7 +115,7 @@ int pt_light_quadric_sample(const struct pt_scene *scene, const struct pt_emitte
     float radius = whole_sphere(q, &centre), one_minus_cos = radius > 0.0f ? cone(v3_sub(centre, p_ref), radius) : 0.0f;
     if (one_minus_cos > 0.0f) {
         int lit = sample_cone(light, shape, p_ref, centre, radius, one_minus_cos, u0, u1, out);
-        out->pdf_solid *= e->pmf;
+        out->inv_pdf_solid /= e->pmf;
         return lit;
     }
     struct pt_quadric_point at;
@@ -126,7 +126,7 @@ int pt_light_quadric_sample(const struct pt_scene *scene, const struct pt_emitte
     if (!(cosine > 0.0f))
         return 0;
     out->wi = v3_scale(d, 1.0f / dist);
-    out->pdf_solid = e->pmf * dist2 / (cosine * area_of(q) * area_scale(q, n_quadric));
+    out->inv_pdf_solid = cosine * area_of(q) * area_scale(q, n_quadric) / (e->pmf * dist2);
     return finish(light, shape, p_ref, at.p, n, at.error, out);
 }
 

@@ -31,7 +31,7 @@ static inline int pt_light_triangle_sample(const struct pt_scene *scene, const s
     float inv_dist = 1.0f / sqrtf(dist2);
     out->wi = v3_scale(d, inv_dist);
     /* dω = cos dA / dist², cos = towards / dist */
-    out->pdf_solid = e->pmf * e->inv_area * dist2 / (towards * inv_dist);
+    out->inv_pdf_solid = e->area_over_pmf * towards * inv_dist * (inv_dist * inv_dist);
     out->radiance = light->emission;
     out->delta = 0;
     out->finite = 1;
@@ -39,7 +39,7 @@ static inline int pt_light_triangle_sample(const struct pt_scene *scene, const s
                        PT_OFFSET_ERROR * (fabsf(e->p0.y) + fabsf(e->e1.y) + fabsf(e->e2.y)),
                        PT_OFFSET_ERROR * (fabsf(e->p0.z) + fabsf(e->e1.z) + fabsf(e->e2.z)));
     out->target = pt_offset_point(p, e->n, error, v3_neg(d));
-    return out->pdf_solid < INFINITY;
+    return out->inv_pdf_solid > 0.0f;
 }
 
 /* Density with which sampling from p_ref would have chosen the point p (unit geometric normal n) of a shape's primitive. */
@@ -52,7 +52,7 @@ static inline float pt_light_area_pdf(pt_effects fx, const struct pt_scene *scen
     const struct pt_emitter *e = &scene->emitters[light->first_emitter + primitive];
     pt_vec3 d = v3_sub(p, p_ref);
     float cosine = fabsf(v3_dot(e->n, wi));
-    return cosine > 0.0f ? e->pmf * e->inv_area * v3_dot(d, d) / cosine : 0.0f;
+    return cosine > 0.0f ? v3_dot(d, d) / (e->area_over_pmf * cosine) : 0.0f;
 }
 
 #endif

@@ -118,11 +118,12 @@ int pt_light_env_image_sample(const struct pt_scene *scene, const struct pt_ligh
     float pdf = (columns[x + 1] - columns[x]) * (float)d->width * ((d->rows[y + 1] - d->rows[y]) * (float)d->height);
     /* from_render is a rotation (perhaps mirrored): its transpose is its inverse */
     out->wi = v3_norm(pt_mat34_normal(&light->from_render, l));
-    out->pdf_solid = to_solid(light, pdf, sin_theta);
+    pdf = to_solid(light, pdf, sin_theta);
+    out->inv_pdf_solid = 1.0f / pdf;
     out->radiance = pt_light_env_image_eval(scene, light, out->wi);
     out->delta = 0;
     out->finite = 0;
-    return out->pdf_solid > 0.0f;
+    return pdf > 0.0f;
 }
 
 static double row_weight(const struct pt_light *light, int32_t y, int32_t height)

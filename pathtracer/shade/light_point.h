@@ -7,7 +7,7 @@
 static inline int pt_light_delta_sample(const struct pt_light *light, float pmf, pt_vec3 p_ref, struct pt_light_sample *out)
 {
     out->delta = 1;
-    out->pdf_solid = pmf;
+    out->inv_pdf_solid = 1.0f / pmf;
     out->radiance = light->emission;
     if (light->kind == PT_LIGHT_DISTANT) {
         out->finite = 0;

@@ -23,7 +23,7 @@ static inline int pt_light_sample(pt_effects fx, const struct pt_scene *scene, p
             return pt_light_quadric_sample(scene, e, p_ref, u0, u1, out);
         if ((fx & PT_FX_ENVIRONMENT) && light->kind == PT_LIGHT_ENV_IMAGE) {
             int lit = pt_light_env_image_sample(scene, light, u0, u1, out);
-            out->pdf_solid *= e->pmf;
+            out->inv_pdf_solid /= e->pmf;
             return lit;
         }
         if ((fx & PT_FX_DELTA_LIGHT) && light->kind >= PT_LIGHT_DISTANT)

@@ -65,10 +65,10 @@ static void check_light(const struct pt_scene *scene, pt_vec3 p_ref, int all_vis
         struct pt_light_sample s;
         float pick = pt_rng_float(&rng), u0 = pt_rng_float(&rng), u1 = pt_rng_float(&rng);
         if (pt_light_sample(PT_FX_ALL, scene, p_ref, pick, u0, u1, &s)) {
-            by_light += (double)v3_luminance(s.radiance) / (double)s.pdf_solid / SAMPLES;
+            by_light += (double)v3_luminance(s.radiance) / (1.0 / (double)s.inv_pdf_solid) / SAMPLES;
             float pdf = pdf_of(scene, p_ref, s.wi);
             lit++;
-            agree += fabsf(pdf - s.pdf_solid) <= 2e-3f * s.pdf_solid;
+            agree += fabsf(pdf * s.inv_pdf_solid - 1.0f) <= 2e-3f;
             assert_true(fabsf(v3_len(s.wi) - 1.0f) < 1e-4f);
         }
         pt_vec3 w = pt_sample_sphere(pt_rng_float(&rng), pt_rng_float(&rng));
@@ -193,7 +193,7 @@ static void delta_lights(void **state)
     struct pt_light distant = {.kind = PT_LIGHT_DISTANT, .emission = {3, 3, 3}, .direction = {0, 0, -1}};
     struct pt_light_sample s;
     assert_int_equal(pt_light_delta_sample(&point, 0.5f, v3(0, 0, 0), &s), 1);
-    assert_true(fabsf(s.radiance.x - 2.0f) < 1e-6f && s.delta && s.finite && s.pdf_solid == 0.5f);
+    assert_true(fabsf(s.radiance.x - 2.0f) < 1e-6f && s.delta && s.finite && s.inv_pdf_solid == 2.0f);
     assert_int_equal(pt_light_delta_sample(&spot, 1.0f, v3(0, 0, 0), &s), 1);
     assert_true(fabsf(s.radiance.x - 2.0f) < 1e-6f);
     assert_int_equal(pt_light_delta_sample(&spot, 1.0f, v3(1.6f, 0, 0), &s), 0);

@@ -7,13 +7,14 @@
 
 #include "sample/sampler.h"
 
-/* Direction numbers of the second Sobol' dimension by its recurrence (primitive polynomial x + 1): v_k = v_{k-1} ^ v_{k-1} >> 1. */
+/* Direction numbers of the second Sobol' dimension by its recurrence (primitive polynomial x + 1): v_k = v_{k-1} ^ v_{k-1} >> 1.
+ * Those of the first are single bits. */
 static void second_dimension_is_sobol(void **state)
 {
     (void)state;
     uint32_t v = 0x80000000u;
     for (int k = 0; k < 32; k++) {
-        assert_int_equal(pt_reverse_bits(pt_sobol1_reversed(1u << k)), v);
+        assert_int_equal(pt_sobol_second(0x80000000u >> k), v);
         v ^= v >> 1;
     }
 }
