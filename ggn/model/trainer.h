@@ -26,6 +26,7 @@ struct ggn_train_options {
     double beta1, beta2, eps;
     double clip;     /* largest L2 norm of a network's gradient; 0 = no clipping */
     double explode;  /* a loss or gradient norm above it counts as divergence */
+    int keep_every;  /* steps between automatic calls of ggn_trainer_keep; 0 = never */
     int dropout;
     enum ggn_init init[GGN_NETS];
     uint32_t seed;

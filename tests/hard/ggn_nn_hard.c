@@ -1,0 +1,349 @@
+/* Numerically hard cases of the networks, the losses and training. */
+#include "support/ggn_cmocka.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "model/infer.h"
+#include "model/preprocess.h"
+#include "model/trainer.h"
+#include "nn/loss.h"
+
+#if defined(__x86_64__)
+#include <xmmintrin.h>
+#endif
+
+static const struct ggn_hyper hyper = {GGN_PRESET_LULL, 32, 32, 3, 4, 4, 3};
+enum { SIDE = 32, AREA = SIDE * SIDE, BYTES = 3 * AREA };
+
+static struct ggn_model *make(void)
+{
+    struct ggn_model *m = ggn_model_create(&hyper, NULL);
+
+    assert_non_null(m);
+    for (int net = 0; net < GGN_NETS; net++) {
+        ggn_weights_init_f32(m->weights[net], GGN_INIT_HASH, 70 + (uint32_t)net);
+        ggn_weights_pack_f32(m->weights[net]);
+    }
+    return m;
+}
+
+/* The decision on a window whose images are the given linear blocks, cleaned by the shared function. */
+static double decide(const struct ggn_model *m, float (*block)(int image, int k), struct ggn_pixel_counts *counts)
+{
+    struct ggn_infer *f = ggn_infer_create(m, GGN_PRECISION_F32, NULL, NULL);
+    void *history = calloc(1, ggn_history_bytes(&hyper));
+    static float linear[BYTES];
+    static uint8_t rgb[BYTES];
+    double p = NAN;
+
+    assert_true(f && history);
+    for (int i = 0; i < hyper.window; i++) {
+        struct ggn_linear_view view = {linear, AREA, 1, SIDE, SIDE, SIDE, 1};
+        for (int k = 0; k < BYTES; k++)
+            linear[k] = block(i, k);
+        ggn_preprocess(&view, rgb, counts);
+        ggn_infer_push(f, history, rgb, (uint64_t)i + 1);
+    }
+    assert_int_equal(ggn_infer_decide(f, history, &p, NULL), GGN_OK);
+    ggn_infer_destroy(f);
+    free(history);
+    return p;
+}
+
+static float constant(int image, int k)
+{
+    (void)image;
+    (void)k;
+    return 0.18f;
+}
+
+static float black(int image, int k)
+{
+    (void)image;
+    (void)k;
+    return 0;
+}
+
+static float white(int image, int k)
+{
+    (void)image;
+    (void)k;
+    return 50;
+}
+
+static float firefly(int image, int k)
+{
+    (void)image;
+    return k == 500 ? 1e4f : 0;
+}
+
+static float equal_images(int image, int k)
+{
+    (void)image;
+    return (float)ggn_hash_unit((uint32_t)k, 3);
+}
+
+static float broken(int image, int k)
+{
+    static const float bad[6] = {1e30f, NAN, INFINITY, -INFINITY, -5, 1e-42f};
+    return k % 97 == 0 ? bad[(k / 97 + image) % 6] : (float)ggn_hash_unit((uint32_t)k, 3);
+}
+
+static void test_blocks(void **state)
+{
+    float (*const block[])(int, int) = {constant, black, white, firefly, equal_images, broken};
+    struct ggn_model *m = make();
+
+    for (size_t i = 0; i < sizeof block / sizeof block[0]; i++) {
+        struct ggn_pixel_counts counts = {0};
+        double p = decide(m, block[i], &counts);
+        assert_true(p > 0 && p < 1);
+        assert_int_equal(ggn_pixel_counts_bad(&counts) > 0, block[i] == broken);
+    }
+    ggn_model_destroy(m);
+    (void)state;
+}
+
+/* Flush-to-zero and denormals-are-zero must not change a decision, even with activations in the denormal range. */
+static void test_flush_to_zero(void **state)
+{
+#if defined(__x86_64__)
+    struct ggn_model *m = make();
+    struct ggn_pixel_counts counts = {0};
+    unsigned mode = _mm_getcsr();
+    double before[2], after[2];
+
+    for (int pass = 0; pass < 2; pass++) {
+        before[pass] = decide(m, broken, &counts);
+        _mm_setcsr(mode | 0x8040);
+        after[pass] = decide(m, broken, &counts);
+        _mm_setcsr(mode);
+        for (size_t i = 0; i < m->graph[GGN_NET_M].n_params; i++) /* now tiny weights */
+            m->weights[GGN_NET_M]->params[i] *= 1e-18f;
+        ggn_weights_pack_f32(m->weights[GGN_NET_M]);
+    }
+    for (int pass = 0; pass < 2; pass++)
+        assert_true(fabs(before[pass] - after[pass]) < 1e-6);
+    ggn_model_destroy(m);
+#endif
+    (void)state;
+}
+
+/* Logits up to ±1e4: no NaN, no logarithm of 0, gradients in [−1, 1]. */
+static void test_bce_extremes(void **state)
+{
+    for (int i = -4; i <= 4; i++)
+        for (int y = 0; y <= 2; y++) {
+            double z = (i < 0 ? -1 : 1) * pow(10, abs(i)) * (i != 0), loss = ggn_bce(z, y / 2.0), grad = ggn_bce_grad(z, y / 2.0);
+            assert_true(isfinite(loss) && loss >= 0);
+            assert_true(grad >= -1 && grad <= 1);
+        }
+    assert_true(ggn_bce(1e4, 1) == 0);
+    assert_true(ggn_bce(1e4, 0) == 1e4);
+    assert_true(ggn_sigmoid(1e4) == 1 && ggn_sigmoid(-1e4) >= 0);
+    (void)state;
+}
+
+/* Flat against flat is 0/0 without the constants. */
+static void test_ssim_flat(void **state)
+{
+    static float x[AREA], y[AREA], dx[AREA];
+    const float *px[1] = {x}, *py[1] = {y};
+    float *pd[1] = {dx};
+    static const float level[4] = {0, 0.25f, 0.5f, 1};
+    struct ggn_ssim_f32 *s = ggn_ssim_create_f32(SIDE, SIDE, NULL, NULL);
+
+    assert_non_null(s);
+    for (int i = 0; i < 4; i++)
+        for (int j = 0; j < 4; j++) {
+            for (int k = 0; k < AREA; k++) {
+                x[k] = level[i];
+                y[k] = level[j];
+            }
+            double mean = ggn_ssim_mean_f32(s, px, py, pd, 1, SIDE, 1);
+            assert_true(mean <= 1 + 1e-6 && mean >= -1);
+            if (i == j)
+                assert_true(fabs(mean - 1) < 1e-5);
+            for (int k = 0; k < AREA; k++)
+                assert_true(isfinite(dx[k]));
+        }
+    ggn_ssim_destroy_f32(s);
+    (void)state;
+}
+
+/* Constant input: every batch norm sees zero variance; batch 1, and D's last ones see a single value. */
+static void test_zero_variance(void **state)
+{
+    static struct ggn_graph g;
+
+    for (int net = 0; net < GGN_NETS; net++) {
+        assert_int_equal(ggn_network_build(&g, net, &hyper, NULL), GGN_OK);
+        struct ggn_weights_f32 *w = ggn_weights_create_f32(&g, NULL, 1, NULL);
+        struct ggn_exec_f32 *e = ggn_exec_create_f32(&g, NULL, 1, GGN_EXEC_GRADS | GGN_EXEC_INPUT_GRAD, NULL, NULL);
+        float *grad = calloc(g.n_params, sizeof *grad);
+        const struct ggn_value *out = &g.value[g.n_values - 1];
+        assert_true(w && e && grad);
+        ggn_weights_init_f32(w, GGN_INIT_HE, 3);
+        memset(w->params, 0, g.tensor[0].count * sizeof(float)); /* the first layer is constant too */
+        ggn_weights_pack_f32(w);
+        ggn_exec_forward_f32(e, w, 1, GGN_TRAIN);
+        for (int c = 0; c < out->c; c++)
+            for (int y = 0; y < out->h; y++)
+                for (int x = 0; x < out->w; x++) {
+                    assert_true(isfinite(ggn_exec_plane_f32(e, g.n_values - 1, 0, c)[y * out->row + x]));
+                    ggn_exec_grad_f32(e, g.n_values - 1, 0, c)[y * out->row + x] = 1;
+                }
+        ggn_exec_backward_f32(e, w, grad);
+        for (size_t i = 0; i < g.n_params; i++)
+            assert_true(isfinite(grad[i]));
+        for (size_t i = 0; i < g.n_stats; i++)
+            assert_true(isfinite(w->mean[i]) && w->var[i] >= 0);
+        ggn_weights_destroy_f32(w);
+        ggn_exec_destroy_f32(e);
+        free(grad);
+    }
+    (void)state;
+}
+
+enum { BATCH = 2, PLANES = 9 };
+static float noisy[BATCH * PLANES][AREA], reference[BATCH * 3][AREA];
+static const float *p_noisy[BATCH * PLANES], *p_reference[BATCH * 3], *p_image[BATCH * 3];
+
+static void fill_training(void)
+{
+    for (int i = 0; i < BATCH * PLANES; i++) {
+        for (int k = 0; k < AREA; k++)
+            noisy[i][k] = (float)ggn_hash_unit((uint32_t)k, (uint32_t)i);
+        p_noisy[i] = noisy[i];
+    }
+    for (int i = 0; i < BATCH * 3; i++) {
+        for (int k = 0; k < AREA; k++)
+            reference[i][k] = 0.5f;
+        p_reference[i] = reference[i];
+        p_image[i] = noisy[i];
+    }
+}
+
+static struct ggn_trainer_f32 *trainer(double lr, double clip)
+{
+    struct ggn_train_options o = ggn_train_options_default(GGN_PRESET_LULL);
+
+    o.batch = BATCH;
+    o.clip = clip;
+    for (int net = 0; net < GGN_NETS; net++)
+        o.lr[net] = lr;
+    struct ggn_trainer_f32 *t = ggn_trainer_create_f32(&hyper, &o, NULL, NULL);
+    assert_non_null(t);
+    return t;
+}
+
+static int all_finite(struct ggn_trainer_f32 *t)
+{
+    size_t count;
+    float *x;
+
+    for (int net = 0; net < GGN_NETS; net++)
+        for (int i = 0; (x = ggn_trainer_state_f32(t, net, i, &count)) != NULL; i++)
+            for (size_t k = 0; k < count; k++)
+                if (!isfinite(x[k]))
+                    return 0;
+    return 1;
+}
+
+static void test_equal_labels(void **state)
+{
+    static const double label[2][BATCH] = {{0, 0}, {1, 1}};
+    struct ggn_trainer_f32 *t = trainer(2e-4, 1);
+    struct ggn_err err = {0};
+    double bce;
+
+    fill_training();
+    for (int i = 0; i < 6; i++) {
+        struct ggn_batch_f32 b = {.count = BATCH, .noisy = p_noisy, .denoised = p_noisy, .label = label[i & 1]};
+        assert_int_equal(ggn_trainer_judge_step_f32(t, &b, &bce, NULL, &err), GGN_OK);
+        assert_true(isfinite(bce));
+    }
+    assert_true(all_finite(t));
+    ggn_trainer_destroy_f32(t);
+    (void)state;
+}
+
+/* An absurd learning rate is noticed, named, and leaves the last good weights. */
+static void test_divergence(void **state)
+{
+    struct ggn_trainer_f32 *t = trainer(1e37, 0);
+    struct ggn_err err = {0};
+    int rc = GGN_OK, steps = 0;
+    double loss;
+    float *good = malloc(t->graph[0].n_params * sizeof *good);
+
+    assert_non_null(good);
+    fill_training();
+    memcpy(good, t->weights[0]->params, t->graph[0].n_params * sizeof *good);
+    while (rc == GGN_OK && steps++ < 50)
+        rc = ggn_trainer_denoiser_step_f32(t, p_image, p_reference, BATCH, &loss, &err);
+    assert_int_equal(rc, GGN_EDIVERGED);
+    assert_non_null(strstr(err.text, "denoiser"));
+    assert_non_null(strstr(err.text, ".weight") ? strstr(err.text, ".weight") : strstr(err.text, ".bias"));
+    assert_true(all_finite(t));
+    assert_memory_equal(good, t->weights[0]->params, t->graph[0].n_params * sizeof *good);
+    assert_int_equal(t->steps, 0);
+    t->options.lr[0] = 1e-4; /* and training can go on */
+    assert_int_equal(ggn_trainer_denoiser_step_f32(t, p_image, p_reference, BATCH, &loss, &err), GGN_OK);
+    free(good);
+    ggn_trainer_destroy_f32(t);
+    (void)state;
+}
+
+/* A NaN in the data is divergence as well, not a NaN in the weights. */
+static void test_nan_data(void **state)
+{
+    struct ggn_trainer_f32 *t = trainer(2e-4, 1);
+    static const double label[BATCH] = {0, 1};
+    struct ggn_batch_f32 b = {.count = BATCH, .noisy = p_noisy, .denoised = p_noisy, .label = label};
+    struct ggn_err err = {0};
+    double bce;
+
+    fill_training();
+    noisy[4][77] = NAN;
+    assert_int_equal(ggn_trainer_judge_step_f32(t, &b, &bce, NULL, &err), GGN_EDIVERGED);
+    assert_true(all_finite(t));
+    noisy[4][77] = 0.5f;
+    assert_int_equal(ggn_trainer_judge_step_f32(t, &b, &bce, NULL, &err), GGN_OK);
+    ggn_trainer_destroy_f32(t);
+    (void)state;
+}
+
+/* 1/(1 − β^t) stays exact for many steps: a constant gradient moves a parameter by lr each step (Kingma & Ba 2015, section 2.1). */
+static void test_many_adam_steps(void **state)
+{
+    enum { STEPS = 100000 };
+    const struct ggn_kernels_f32 *k = ggn_kernels_best_f32();
+    float param[16] = {0}, grad[16], m[16] = {0}, v[16] = {0};
+    double sum = 0;
+
+    for (int i = 0; i < 16; i++)
+        grad[i] = 1e-3f;
+    for (long t = 1; t <= STEPS; t++) {
+        double c1 = 1 / -expm1((double)t * log(0.5)), c2 = 1 / -expm1((double)t * log(0.999));
+        float before = param[3];
+        k->adam(param, grad, m, v, 16, 1e-6f, 0.5f, 0.999f, (float)c1, (float)c2, 1e-8f);
+        sum += (double)(before - param[3]);
+        if (t % 10000 == 1) /* the step itself, free of the sum's rounding */
+            assert_true(fabs((double)m[3] * c1 / (sqrt((double)v[3] * c2) + 1e-8) - 1) < 1e-3);
+    }
+    assert_true(fabs(sum - STEPS * 1e-6) < 0.02 * STEPS * 1e-6);
+    (void)state;
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_blocks),        cmocka_unit_test(test_flush_to_zero), cmocka_unit_test(test_bce_extremes),
+        cmocka_unit_test(test_ssim_flat),     cmocka_unit_test(test_zero_variance), cmocka_unit_test(test_equal_labels),
+        cmocka_unit_test(test_divergence),    cmocka_unit_test(test_nan_data),      cmocka_unit_test(test_many_adam_steps)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,108 @@
+/* Every allocation of loading, saving, inference and training set-up fails once: an error, no crash, no leak. */
+#include "support/ggn_cmocka.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+#include "model/checkpoint.h"
+#include "model/infer.h"
+#include "support/fail_alloc.h"
+
+static const struct ggn_hyper hyper = {GGN_PRESET_LULL, 16, 16, 2, 1, 1, 1};
+static char path[] = "/tmp/ggn_oom.XXXXXX";
+
+static int setup(void **state)
+{
+    int fd = mkstemp(path);
+    (void)state;
+    return fd < 0 ? -1 : close(fd);
+}
+
+static int teardown(void **state)
+{
+    (void)state;
+    return unlink(path);
+}
+
+static int save_and_load(struct ggn_err *err)
+{
+    struct ggn_model *m = ggn_model_create(&hyper, err), *read = NULL;
+    int rc = m ? ggn_model_save(m, path, GGN_F16, err) : GGN_ENOMEM;
+
+    if (!rc)
+        rc = ggn_model_load(path, &read, err);
+    ggn_model_destroy(m);
+    ggn_model_destroy(read);
+    return rc;
+}
+
+static int infer(struct ggn_err *err)
+{
+    struct ggn_model *m = ggn_model_create(&hyper, err);
+    struct ggn_infer *f = m ? ggn_infer_create(m, GGN_PRECISION_F32, NULL, err) : NULL;
+    int rc = f ? GGN_OK : GGN_ENOMEM;
+
+    ggn_infer_destroy(f);
+    ggn_model_destroy(m);
+    return rc;
+}
+
+static int train(struct ggn_err *err)
+{
+    struct ggn_train_options o = ggn_train_options_default(GGN_PRESET_LULL);
+    o.batch = 1;
+    struct ggn_trainer_f32 *t = ggn_trainer_create_f32(&hyper, &o, NULL, err);
+    int rc = t ? ggn_checkpoint_save(t, NULL, path, err) : GGN_ENOMEM;
+
+    if (!rc)
+        rc = ggn_checkpoint_load(t, NULL, path, err);
+    ggn_trainer_destroy_f32(t);
+    return rc;
+}
+
+static void fail_each(int (*fn)(struct ggn_err *), int least)
+{
+    int failures = 0;
+
+    for (long k = 1; k < 2000; k++) {
+        struct ggn_err err = {0};
+        fail_arm(k);
+        int rc = fn(&err);
+        int happened = fail_disarm();
+        if (happened && rc == GGN_OK)
+            fail_msg("allocation %ld failed and nothing was reported", k);
+        if (happened) {
+            assert_true(err.text[0] != '\0');
+            failures++;
+        } else {
+            assert_int_equal(rc, GGN_OK);
+            break;
+        }
+    }
+    assert_in_range(failures, least, 1500);
+}
+
+static void test_files(void **state)
+{
+    (void)state;
+    fail_each(save_and_load, 30);
+}
+
+static void test_infer(void **state)
+{
+    (void)state;
+    fail_each(infer, 10);
+}
+
+static void test_train(void **state)
+{
+    (void)state;
+    fail_each(train, 30);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_files), cmocka_unit_test(test_infer), cmocka_unit_test(test_train)};
+    return cmocka_run_group_tests(tests, setup, teardown);
+}
