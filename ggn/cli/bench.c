@@ -10,10 +10,10 @@
 #include "cli/commands.h"
 #include "model/trainer.h"
 
-enum { KEY_JSON = 256, KEY_THREADS, KEY_ROUNDS, KEY_BATCH, MAX_ROUNDS = 101, SGEMM_N = 768 };
+enum { KEY_JSON = 256, KEY_THREADS, KEY_ROUNDS, KEY_BATCH, KEY_PRECISION, MAX_ROUNDS = 101, SGEMM_N = 768 };
 
 struct options {
-    int json, threads, rounds, batch;
+    int json, threads, rounds, batch, bf16;
 };
 
 struct bench {
@@ -56,6 +56,11 @@ static error_t parse(int key, char *arg, struct argp_state *state)
             argp_error(state, "--batch must be in 1..64");
         o->batch = value;
         return 0;
+    case KEY_PRECISION:
+        o->bf16 = !strcmp(arg, "bf16");
+        if (!o->bf16 && strcmp(arg, "f32") != 0)
+            argp_error(state, "--precision is f32 or bf16");
+        return 0;
     default:
         return ARGP_ERR_UNKNOWN;
     }
@@ -66,15 +71,17 @@ static int setup(struct bench *b, struct ggn_err *err)
     struct ggn_hyper hyper = ggn_hyper_default(GGN_PRESET_LULL);
     struct ggn_train_options options = ggn_train_options_default(GGN_PRESET_LULL);
     enum { AREA = 200 * 200, PLANES = 21 };
+    const int flags = b->o.bf16 ? GGN_EXEC_BF16 : 0;
 
     options.batch = b->o.batch;
+    options.bf16 = b->o.bf16;
     b->threads = ggn_threads_create(b->o.threads, err);
     b->trainer = b->threads ? ggn_trainer_create_f32(&hyper, &options, b->threads, err) : NULL;
     if (!b->trainer)
         return GGN_ENOMEM;
-    b->r = ggn_exec_create_f32(&b->trainer->graph[GGN_NET_R], NULL, 1, 0, b->threads, err);
-    b->m = ggn_exec_create_f32(&b->trainer->graph[GGN_NET_M], NULL, 1, 0, b->threads, err);
-    b->d = ggn_exec_create_f32(&b->trainer->graph[GGN_NET_D], NULL, 1, 0, b->threads, err);
+    b->r = ggn_exec_create_f32(&b->trainer->graph[GGN_NET_R], NULL, 1, flags, b->threads, err);
+    b->m = ggn_exec_create_f32(&b->trainer->graph[GGN_NET_M], NULL, 1, flags, b->threads, err);
+    b->d = ggn_exec_create_f32(&b->trainer->graph[GGN_NET_D], NULL, 1, flags, b->threads, err);
     b->planes = malloc((size_t)b->o.batch * PLANES * AREA * sizeof *b->planes);
     if (!b->r || !b->m || !b->d || !b->planes)
         return ggn_fail_nomem(err, "bench");
@@ -236,7 +243,8 @@ static void print_figures(const struct bench *b, const double figure[N_FIGURES])
             printf("%-26s %9.3f\n", figure_name[f], figure[f]);
         return;
     }
-    printf("{\"threads\": %d, \"isa\": \"%s\", \"batch\": %d", b->o.threads, ggn_isa_name(b->r->kernels->isa), b->o.batch);
+    printf("{\"threads\": %d, \"isa\": \"%s\", \"precision\": \"%s\", \"batch\": %d", b->o.threads, ggn_isa_name(b->r->kernels->isa),
+           b->o.bf16 && b->trainer->weights[0]->bf16 ? "bf16" : "f32", b->o.batch);
     for (int f = 0; f < N_FIGURES; f++)
         printf(", \"%s\": %.3f", figure_name[f], figure[f]);
     printf("}\n");
@@ -247,6 +255,7 @@ int ggn_cmd_bench(int argc, char **argv)
     static const struct argp_option list[] = {
         {"json", KEY_JSON, NULL, 0, "One JSON object of medians instead of tables", 0},
         {"threads", KEY_THREADS, "N", 0, "Threads (all processors)", 0},
+        {"precision", KEY_PRECISION, "f32|bf16", 0, "Of inference (f32); bf16 is f32 where the processor has no bfloat16", 0},
         {"rounds", KEY_ROUNDS, "N", 0, "Measurements per figure (9)", 0},
         {"batch", KEY_BATCH, "N", 0, "Batch of the training figures, which are per image or sample (4)", 0},
         {0}};

@@ -7,11 +7,11 @@
 #include "cli/commands.h"
 #include "model/golden.h"
 
-enum { KEY_BASE_R = 256, KEY_BASE_M, KEY_BASE_D, KEY_TRAIN, KEY_FLOAT, KEY_THREADS };
+enum { KEY_BASE_R = 256, KEY_BASE_M, KEY_BASE_D, KEY_TRAIN, KEY_FLOAT, KEY_BF16, KEY_THREADS };
 
 struct options {
     struct ggn_golden_seeds seeds;
-    int train_step, single, threads;
+    int train_step, single, bf16, threads;
 };
 
 static error_t parse(int key, char *arg, struct argp_state *state)
@@ -33,6 +33,9 @@ static error_t parse(int key, char *arg, struct argp_state *state)
         return 0;
     case KEY_FLOAT:
         o->single = 1;
+        return 0;
+    case KEY_BF16:
+        o->single = o->bf16 = 1;
         return 0;
     case KEY_THREADS:
         if (value < 1 || value > 1024)
@@ -123,6 +126,7 @@ int ggn_cmd_golden(int argc, char **argv)
         {"base-d", KEY_BASE_D, "N", 0, "Seed of the discriminator's weights (500)", 0},
         {"train-step", KEY_TRAIN, NULL, 0, "Also make one published training iteration and report it", 0},
         {"float", KEY_FLOAT, NULL, 0, "The single-precision networks that inference and training use, not the double ones", 0},
+        {"bf16", KEY_BF16, NULL, 0, "As --float, with bfloat16 products where the processor has them", 0},
         {"threads", KEY_THREADS, "N", 0, "Threads (all processors); the figures do not depend on it", 0},
         {0}};
     static const struct argp argp = {
@@ -135,7 +139,7 @@ int ggn_cmd_golden(int argc, char **argv)
     struct ggn_threads *threads = ggn_threads_create(o.threads, &err);
     if (!threads)
         return ggn_cmd_fail(argv[0], &err);
-    int rc = (o.single ? ggn_golden_run_f32 : ggn_golden_run_f64)(&o.seeds, o.train_step, threads, &golden, &err);
+    int rc = (o.single ? ggn_golden_run_f32 : ggn_golden_run_f64)(&o.seeds, o.train_step, o.bf16, threads, &golden, &err);
     ggn_threads_destroy(threads);
     if (rc)
         return ggn_cmd_fail(argv[0], &err);

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "nn/bf16.h"
 #include "nn/exec.h"
 #include "nn/loss.h"
 
@@ -85,7 +86,12 @@ static uint16_t *denoised_of(const void *history, const struct ggn_hyper *h, int
 
 int ggn_infer_has_bf16(void)
 {
-    return 0;
+    return ggn_bf16_available();
+}
+
+static int exec_flags(enum ggn_precision precision)
+{
+    return precision == GGN_PRECISION_BF16 ? GGN_EXEC_BF16 : 0;
 }
 
 size_t ggn_infer_bytes(const struct ggn_model *model, enum ggn_precision precision, int workers)
@@ -93,8 +99,7 @@ size_t ggn_infer_bytes(const struct ggn_model *model, enum ggn_precision precisi
     size_t bytes = sizeof(struct ggn_infer);
 
     for (int net = 0; net < GGN_NETS; net++)
-        bytes += ggn_exec_bytes_f32(&model->graph[net], 1, 0, workers);
-    (void)precision;
+        bytes += ggn_exec_bytes_f32(&model->graph[net], 1, exec_flags(precision), workers);
     return bytes;
 }
 
@@ -102,22 +107,18 @@ struct ggn_infer *ggn_infer_create(const struct ggn_model *model, enum ggn_preci
                                    struct ggn_err *err)
 {
     struct ggn_infer *f = calloc(1, sizeof *f);
+    const int flags = exec_flags(precision);
 
     if (!f) {
         ggn_fail_nomem(err, "inference");
         return NULL;
     }
-    if (precision == GGN_PRECISION_BF16 && !ggn_infer_has_bf16()) {
-        ggn_fail(err, GGN_EINVAL, "this processor has no AVX512-BF16");
-        free(f);
-        return NULL;
-    }
     f->model = model;
     for (int i = 0; i < 256; i++)
         f->of_byte[i] = (float)i / 255.0f;
-    f->r = ggn_exec_create_f32(&model->graph[GGN_NET_R], NULL, 1, 0, threads, err);
-    f->m = f->r ? ggn_exec_create_f32(&model->graph[GGN_NET_M], NULL, 1, 0, threads, err) : NULL;
-    f->d = f->m ? ggn_exec_create_f32(&model->graph[GGN_NET_D], NULL, 1, 0, threads, err) : NULL;
+    f->r = ggn_exec_create_f32(&model->graph[GGN_NET_R], NULL, 1, flags, threads, err);
+    f->m = f->r ? ggn_exec_create_f32(&model->graph[GGN_NET_M], NULL, 1, flags, threads, err) : NULL;
+    f->d = f->m ? ggn_exec_create_f32(&model->graph[GGN_NET_D], NULL, 1, flags, threads, err) : NULL;
     if (f->d)
         return f;
     ggn_infer_destroy(f);

@@ -30,7 +30,7 @@ struct ggn_infer;
 
 size_t ggn_infer_bytes(const struct ggn_model *model, enum ggn_precision precision, int workers);
 /* `threads`: NULL (a call uses the calling thread only) or a pool over which one decision is spread. NULL on failure.
- * GGN_PRECISION_BF16 without AVX512-BF16 is an error (see ggn_infer_has_bf16). */
+ * GGN_PRECISION_BF16 is f32 on processors without AVX512-BF16 (ggn_infer_has_bf16). */
 struct ggn_infer *ggn_infer_create(const struct ggn_model *model, enum ggn_precision precision, struct ggn_threads *threads,
                                    struct ggn_err *err);
 void ggn_infer_destroy(struct ggn_infer *infer);

@@ -22,7 +22,7 @@ struct ggn_model *ggn_model_create(const struct ggn_hyper *hyper, struct ggn_err
     int rc = m->provenance ? GGN_OK : ggn_fail_nomem(err, "model");
     for (int net = 0; net < GGN_NETS && !rc; net++) {
         rc = ggn_network_build(&m->graph[net], net, hyper, err);
-        if (!rc && !(m->weights[net] = ggn_weights_create_f32(&m->graph[net], NULL, 0, err)))
+        if (!rc && !(m->weights[net] = ggn_weights_create_f32(&m->graph[net], NULL, GGN_WEIGHTS_BF16, err)))
             rc = GGN_ENOMEM;
     }
     if (!rc)

@@ -28,6 +28,7 @@ struct ggn_train_options {
     double explode;  /* a loss or gradient norm above it counts as divergence */
     int keep_every;  /* steps between automatic calls of ggn_trainer_keep; 0 = never */
     int dropout;
+    int bf16;        /* weights also packed for GGN_EXEC_BF16 */
     enum ggn_init init[GGN_NETS];
     uint32_t seed;
 };

@@ -1,4 +1,5 @@
 #include "nn/exec.h"
+#include "nn/bf16.h"
 #include "nn/winograd.h"
 
 #define REAL_IS_FLOAT 0

@@ -14,6 +14,11 @@
 uint32_t ggn_hash(uint32_t k, uint32_t s);
 double ggn_hash_unit(uint32_t k, uint32_t s);
 
+enum {
+    GGN_WEIGHTS_BACKWARD = 1, /* also packed for the backward pass */
+    GGN_WEIGHTS_BF16 = 2      /* also packed in bfloat16, where the processor has it */
+};
+
 enum ggn_init {
     GGN_INIT_HASH,  /* golden values: tensor i is hashed with seed base + i */
     GGN_INIT_PAPER, /* U(±1/√fan_in); batch norm 1 and 0 */

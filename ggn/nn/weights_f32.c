@@ -1,6 +1,7 @@
 #include "nn/exec.h"
 #include "nn/weights.h"
 #include "nn/winograd.h"
+#include "nn/bf16.h"
 
 #define REAL_IS_FLOAT 1
 #define REAL float

@@ -232,7 +232,8 @@ INLINE void join_phases(float *row, const float *from, int n, int add)
                  _mm512_castpd_ps(_mm512_permutex2var_pd(b01, low, b23)), _mm512_castpd_ps(_mm512_permutex2var_pd(b01, high, b23))};
 
     for (int k = 0; k < 4 && n > 0; k++, n -= L) {
-        __mmask16 mask = n >= L ? (__mmask16)0xffff : (__mmask16)((1u << n) - 1);
+        unsigned bits = n >= L ? 0xffffu : (1u << n) - 1;
+        __mmask16 mask = (__mmask16)bits;
         if (add)
             out[k] = _mm512_add_ps(out[k], _mm512_maskz_loadu_ps(mask, row + L * k));
         _mm512_mask_storeu_ps(row + L * k, mask, out[k]);

@@ -64,7 +64,7 @@ static void run(int single, int train_step, struct ggn_golden *g)
     struct ggn_err err = {0};
     struct ggn_threads *threads = ggn_threads_create(2, &err);
 
-    if ((single ? ggn_golden_run_f32 : ggn_golden_run_f64)(&seeds, train_step, threads, g, &err))
+    if ((single ? ggn_golden_run_f32 : ggn_golden_run_f64)(&seeds, train_step, 0, threads, g, &err))
         fail_msg("%s", err.text);
     ggn_threads_destroy(threads);
 }

@@ -119,6 +119,30 @@ static void test_against_networks(void **state)
     (void)state;
 }
 
+/* bfloat16 has 8 bits: close to float, deterministic, and float itself where the processor lacks it. */
+static void test_bf16(void **state)
+{
+    struct ggn_model *m = make();
+    struct ggn_infer *f = ggn_infer_create(m, GGN_PRECISION_F32, NULL, NULL), *b = ggn_infer_create(m, GGN_PRECISION_BF16, NULL, NULL);
+    void *history = calloc(1, ggn_history_bytes(&hyper));
+    double exact, rounded, again;
+
+    assert_true(f && b && history);
+    exact = decide(f, history, 1, 3);
+    ggn_history_clear(history);
+    rounded = decide(b, history, 1, 3);
+    ggn_history_clear(history);
+    again = decide(b, history, 1, 3);
+    assert_memory_equal(&rounded, &again, sizeof again);
+    assert_true(fabs(rounded - exact) < 0.1);
+    assert_int_equal(rounded != exact, ggn_infer_has_bf16());
+    ggn_infer_destroy(f);
+    ggn_infer_destroy(b);
+    free(history);
+    ggn_model_destroy(m);
+    (void)state;
+}
+
 static void test_memory_bounds(void **state)
 {
     struct ggn_hyper full = ggn_hyper_default(GGN_PRESET_LULL);
@@ -127,6 +151,7 @@ static void test_memory_bounds(void **state)
     assert_non_null(m);
     assert_true(ggn_history_bytes(&full) <= (size_t)3 << 20);
     assert_true(ggn_infer_bytes(m, GGN_PRECISION_F32, 1) <= 64000000);
+    assert_true(ggn_infer_bytes(m, GGN_PRECISION_BF16, 1) <= 64000000);
     ggn_model_destroy(m);
     (void)state;
 }
@@ -178,7 +203,7 @@ static void test_cleaning(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_history),       cmocka_unit_test(test_against_networks),
-                                       cmocka_unit_test(test_memory_bounds), cmocka_unit_test(test_srgb),
+                                       cmocka_unit_test(test_memory_bounds), cmocka_unit_test(test_bf16), cmocka_unit_test(test_srgb),
                                        cmocka_unit_test(test_cleaning)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -10,7 +10,7 @@
 
 #include "model/checkpoint.h"
 
-enum { H = 20, W = 27, AREA = H * W, WINDOW = 2, PLANES = 3 * WINDOW, BATCH = 4 };
+enum { H = 17, W = 21, AREA = H * W, WINDOW = 2, PLANES = 3 * WINDOW, BATCH = 4 };
 
 static char path[] = "/tmp/ggn_trainer.XXXXXX";
 
@@ -92,10 +92,10 @@ static double denoise(struct ggn_trainer_f32 *t)
 
 static void test_learns(void **state)
 {
-    struct ggn_trainer_f32 *t = make(GGN_PRESET_LULL, 2e-3, NULL);
+    struct ggn_trainer_f32 *t = make(GGN_PRESET_LULL, 4e-3, NULL);
     double first = denoise(t), first_bce = judge(t), last = 0, last_bce = 0;
 
-    for (int i = 0; i < 60; i++) {
+    for (int i = 0; i < 40; i++) {
         last = denoise(t);
         last_bce = judge(t);
     }

@@ -1,0 +1,104 @@
+/* The bfloat16 convolution for AVX512-BF16; see nn/bf16.h. */
+#if defined(__x86_64__)
+#include <immintrin.h>
+
+#include "nn/bf16.h"
+
+enum { L = 16, TILE_V = 3 };
+
+typedef __m512 vf;
+#define INLINE static inline __attribute__((always_inline))
+
+/* Pairs of channels side by side: out[p] = bf16(x0[p]) | bf16(x1[p]) << 16. */
+static void pair_channels(uint32_t *out, const float *x0, const float *x1, long n)
+{
+    const __m512i interleave =
+        _mm512_set_epi16(31, 15, 30, 14, 29, 13, 28, 12, 27, 11, 26, 10, 25, 9, 24, 8, 23, 7, 22, 6, 21, 5, 20, 4, 19, 3, 18, 2,
+                         17, 1, 16, 0);
+
+    for (long p = 0; p < n; p += L) {
+        vf low = _mm512_loadu_ps(x0 + p), high = x1 ? _mm512_loadu_ps(x1 + p) : _mm512_setzero_ps();
+        __m512i both = (__m512i)_mm512_cvtne2ps_pbh(high, low);
+        _mm512_storeu_si512(out + p, _mm512_permutexvar_epi16(interleave, both));
+    }
+}
+
+INLINE void tile(const struct ggn_conv_f32 *a, const uint32_t *w, const uint32_t *x, long x_stride, int oc, long p, const int ot,
+                 const int nv)
+{
+    vf acc[8][TILE_V];
+
+    for (int o = 0; o < ot; o++)
+        for (int v = 0; v < nv; v++)
+            acc[o][v] = _mm512_set1_ps(a->bias ? a->bias[oc + o] : 0);
+    for (int i = 0; i < (a->n_in + 1) / 2; i++, x += x_stride)
+        for (int ky = 0; ky < 3; ky++)
+            for (int kx = 0; kx < 3; kx++, w += ot) {
+                __m512i xv[TILE_V];
+                for (int v = 0; v < nv; v++)
+                    xv[v] = _mm512_loadu_si512(x + (long)ky * a->row + kx + v * L);
+                for (int o = 0; o < ot; o++) {
+                    __m512i wo = _mm512_set1_epi32((int)w[o]);
+                    __asm__("" : "+v"(wo)); /* loaded once, not once per product */
+                    for (int v = 0; v < nv; v++)
+                        acc[o][v] = _mm512_dpbf16_ps(acc[o][v], (__m512bh)xv[v], (__m512bh)wo);
+                }
+            }
+    for (int o = 0; o < ot; o++)
+        for (int v = 0; v < nv; v++) {
+            vf y = acc[o][v];
+            if (a->slope != 1)
+                y = _mm512_max_ps(y, _mm512_mul_ps(_mm512_set1_ps(a->slope), y));
+            if (a->scale)
+                y = _mm512_fmadd_ps(y, _mm512_set1_ps(a->scale[oc + o]), _mm512_set1_ps(a->shift[oc + o]));
+            _mm512_storeu_ps(a->y[oc + o] + p + v * L, y);
+        }
+}
+
+#define TILE(OT, NV) \
+    static void tile_##OT##_##NV(const struct ggn_conv_f32 *a, const uint32_t *w, const uint32_t *x, long x_stride, int oc, long p) \
+    { \
+        tile(a, w, x, x_stride, oc, p, OT, NV); \
+    }
+TILE(1, 1)
+TILE(1, 3)
+TILE(2, 1)
+TILE(2, 3)
+TILE(4, 1)
+TILE(4, 3)
+TILE(8, 1)
+TILE(8, 3)
+
+void ggn_bf16_conv_avx512(const struct ggn_conv_f32 *a, const uint32_t *w, long p0, long p1, int oc0, int oc1,
+                          uint32_t *scratch)
+{
+    typedef void tile_fn(const struct ggn_conv_f32 *, const uint32_t *, const uint32_t *, long, int, long);
+    static tile_fn *const tiles[2][4] = {{tile_1_3, tile_2_3, tile_4_3, tile_8_3}, {tile_1_1, tile_2_1, tile_4_1, tile_8_1}};
+    const long end = (long)a->h * a->row, pairs = (a->n_in + 1) / 2;
+
+    if (p1 > end)
+        p1 = end;
+    /* rows above and below, and what the last register tile reads past its end */
+    const long x_stride = (p1 - p0 + 2L * a->row + 2 + TILE_V * L + L - 1) / L * L;
+    for (long i = 0; i < pairs; i++)
+        pair_channels(scratch + i * x_stride, a->x[2 * i] + p0 - a->row - 1,
+                      2 * i + 1 < a->n_in ? a->x[2 * i + 1] + p0 - a->row - 1 : NULL, p1 - p0 + 2L * a->row + 2);
+    for (long p = p0, n; p < p1; p += n) {
+        const int narrow = p1 - p <= L;
+        n = narrow ? L : TILE_V * L;
+        for (int oc = oc0, lg; oc < oc1; oc += 1 << lg) {
+            lg = oc1 - oc >= 8 ? 3 : oc1 - oc >= 4 ? 2 : oc1 - oc >= 2 ? 1 : 0;
+            tiles[narrow][lg](a, w + (long)oc * pairs * 9, scratch + (p - p0), x_stride, oc, p);
+        }
+        for (int o = oc0; o < oc1; o++) { /* the zeros of the layout */
+            for (long q = p + (a->w_px - p % a->row); q < p + n; q += a->row)
+                a->y[o][q] = 0;
+            for (long q = end > p ? end : p; q < p + n; q++)
+                a->y[o][q] = 0;
+        }
+    }
+}
+
+#else
+typedef int ggn_no_bf16_here; /* ISO C forbids an empty file */
+#endif
