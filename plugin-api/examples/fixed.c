@@ -7,8 +7,12 @@
 enum { SPP };
 
 static const struct lull_param params[] = {
-    [SPP] = {.name = "spp", .help = "samples per pixel at which every block stops", .default_value = "64",
-             .min = 1, .max = 1e15, .type = LULL_PARAM_INT},
+    [SPP] = {.name = "spp",
+             .help = "samples per pixel at which every block stops",
+             .default_value = "64",
+             .min = 1,
+             .max = 1e15,
+             .type = LULL_PARAM_INT},
 };
 
 static void judge(const struct lull_instance *in, const struct lull_view *view, const struct lull_block *block,

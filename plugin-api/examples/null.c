@@ -76,8 +76,8 @@ static int32_t null_begin_frame(struct lull_instance *instance, const struct lul
 }
 
 static int32_t null_evaluate(struct lull_instance *instance, const struct lull_view *view, const struct lull_block *blocks,
-                             uint32_t block_stride, struct lull_decision *decisions, uint32_t decision_stride, uint32_t count,
-                             struct lull_error *err)
+                             uint32_t block_stride, struct lull_decision *decisions, uint32_t decision_stride,
+                             uint32_t count, struct lull_error *err)
 {
     if (instance == NULL || view == NULL || (count > 0 && (blocks == NULL || decisions == NULL)))
         return fail(err, LULL_E_INVALID, "evaluate: an argument is missing");

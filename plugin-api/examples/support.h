@@ -42,8 +42,8 @@ struct ex_rule {
 
 static const struct ex_rule ex_rule;
 
-__attribute__((format(printf, 3, 4)))
-static inline int32_t ex_fail(struct lull_error *err, int32_t code, const char *format, ...)
+__attribute__((format(printf, 3, 4))) static inline int32_t ex_fail(struct lull_error *err, int32_t code, const char *format,
+                                                                    ...)
 {
     if (err != NULL && LULL_HAS(struct lull_error, err, message)) {
         err->code = code;
@@ -114,7 +114,8 @@ static inline int32_t ex_create(const struct lull_host *host, const struct lull_
 {
     if (instance == NULL || (pair_count > 0 && pairs == NULL))
         return ex_fail(err, LULL_E_INVALID, "create: an argument is missing");
-    if ((host != NULL && !LULL_HAS(struct lull_host, host, get_extension)) || (pair_count > 0 && pair_stride < sizeof *pairs))
+    if ((host != NULL && !LULL_HAS(struct lull_host, host, get_extension)) ||
+        (pair_count > 0 && pair_stride < sizeof *pairs))
         return ex_fail(err, LULL_E_VERSION, "create: the host's structs are older than version 1.0");
     struct lull_instance made = {.host = host};
     for (uint32_t i = 0; i < ex_rule.param_count; i++)
@@ -226,9 +227,9 @@ static inline const struct lull_plane *ex_plane(const struct lull_view *view, un
 static inline double ex_half_float(uint16_t h)
 {
     int exponent = (h >> 10) & 31, mantissa = h & 1023;
-    double value = exponent == 31 ? (mantissa ? (double)NAN : (double)INFINITY)
-                 : exponent == 0  ? ldexp(mantissa, -24)
-                                  : ldexp(mantissa + 1024, exponent - 25);
+    double value = exponent == 31  ? (mantissa ? (double)NAN : (double)INFINITY)
+                   : exponent == 0 ? ldexp(mantissa, -24)
+                                   : ldexp(mantissa + 1024, exponent - 25);
     return h & 0x8000 ? -value : value;
 }
 
@@ -269,7 +270,7 @@ static inline void ex_span(const struct lull_view *view, const struct lull_plane
 {
     const struct lull_plane *weight = plane->normaliser == LULL_NORM_WEIGHT ? ex_plane(view, LULL_PLANE_WEIGHT) : NULL;
     double n = plane->normaliser == LULL_NORM_SPP        ? (double)block->spp
-             : plane->normaliser == LULL_NORM_HALF_SPP ? (double)block->half_spp
+               : plane->normaliser == LULL_NORM_HALF_SPP ? (double)block->half_spp
                                                          : 1;
     const char *at = ex_address(view, plane, x, y);
     for (int32_t i = 0; i < count; i++, at += plane->stride_x) {
@@ -386,11 +387,12 @@ static inline const void *ex_get_extension(const char *id)
 }
 
 /* The functions of a rule's table. */
-#define EX_FUNCTIONS                                                                                                     \
-    .create = ex_create, .requirements = ex_requirements, .begin_frame = ex_begin_frame, .evaluate = ex_evaluate,         \
+#define EX_FUNCTIONS                                                                                                        \
+    .create = ex_create, .requirements = ex_requirements, .begin_frame = ex_begin_frame, .evaluate = ex_evaluate,           \
     .end_frame = ex_end_frame, .destroy = ex_destroy, .get_extension = ex_get_extension
 
-/* --- the next check ------------------------------------------------------------------------------------------------------ */
+/* --- the next check ------------------------------------------------------------------------------------------------------
+ */
 
 static inline uint64_t ex_spp(double spp)
 {
@@ -398,7 +400,8 @@ static inline uint64_t ex_spp(double spp)
 }
 
 /* Schedules the next check of a block that continues: where it is expected to stop, but at least a tenth and at most
- * `growth` times more samples than now, so that the checks of a block stay a logarithmic number. predicted_spp may be NaN. */
+ * `growth` times more samples than now, so that the checks of a block stay a logarithmic number. predicted_spp may be NaN.
+ */
 static inline void ex_continue(const struct lull_instance *in, const struct lull_block *block, double growth,
                                double predicted_spp, struct lull_decision *decision)
 {
@@ -415,10 +418,10 @@ static inline void ex_continue(const struct lull_instance *in, const struct lull
 
 /* Gathers over the pixels of a block. */
 struct ex_tally {
-    double sum;      /* of the rule's error over the valid pixels */
-    double valid;    /* pixels with a judgement */
-    double early;    /* pixels with too few samples for one */
-    double bad;      /* pixels that are NaN or infinite: left out, or one of them would keep the block alive for ever */
+    double sum;       /* of the rule's error over the valid pixels */
+    double valid;     /* pixels with a judgement */
+    double early;     /* pixels with too few samples for one */
+    double bad;       /* pixels that are NaN or infinite: left out, or one of them would keep the block alive for ever */
     double unsettled; /* valid pixels that hang on few samples, see the tail parameters */
 };
 

@@ -15,7 +15,7 @@ static int read_at(int fd, void *out, size_t size, uint64_t offset)
     return offset <= INT64_MAX && pread(fd, out, size, (off_t)offset) == (ssize_t)size;
 }
 
-static const char *header_fault(const ElfW(Ehdr) *h)
+static const char *header_fault(const ElfW(Ehdr) * h)
 {
     unsigned char own_class = sizeof(void *) == 8 ? ELFCLASS64 : ELFCLASS32;
     if (memcmp(h->e_ident, ELFMAG, SELFMAG) != 0)
@@ -27,7 +27,7 @@ static const char *header_fault(const ElfW(Ehdr) *h)
     return NULL;
 }
 
-static const char *segments_fault(int fd, const ElfW(Ehdr) *h, uint64_t size)
+static const char *segments_fault(int fd, const ElfW(Ehdr) * h, uint64_t size)
 {
     for (unsigned i = 0; i < h->e_phnum; i++) {
         ElfW(Phdr) p;

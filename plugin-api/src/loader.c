@@ -31,8 +31,8 @@ int32_t lull_error_set(struct lull_error *err, int32_t code, const char *format,
     return code;
 }
 
-__attribute__((format(printf, 3, 4)))
-static void say(const struct lull_search *search, int32_t level, const char *format, ...)
+__attribute__((format(printf, 3, 4))) static void say(const struct lull_search *search, int32_t level, const char *format,
+                                                      ...)
 {
     if (search == NULL || search->log == NULL)
         return;
@@ -52,8 +52,9 @@ static void compare_process(const struct lull_search *search, const char *path, 
     struct lull_process_state after;
     lull_process_state_read(&after);
     if (after.fp_control != before->fp_control) {
-        say(search, LULL_LOG_WARNING, "%s: loading changed the floating-point control register from %#llx to %#llx; restored",
-            path, before->fp_control, after.fp_control);
+        say(search, LULL_LOG_WARNING,
+            "%s: loading changed the floating-point control register from %#llx to %#llx; restored", path,
+            before->fp_control, after.fp_control);
         lull_process_state_restore(before);
     }
     if (after.thread_count > before->thread_count)

@@ -17,9 +17,9 @@
 enum { LC_EXIT_OK = 0, LC_EXIT_FAILED = 1, LC_EXIT_USAGE = 2 };
 
 struct lc {
-    const char *path;                      /* the library */
+    const char *path;                       /* the library */
     const struct lull_criterion *criterion; /* the one under test */
-    const struct lull_pair *pairs;         /* of the command line, given to every create */
+    const struct lull_pair *pairs;          /* of the command line, given to every create */
     uint32_t pair_count;
     struct lull_requirements req; /* of an instance made with them */
     uint32_t workers;             /* threads for concurrent checks, at least 2 */
@@ -76,10 +76,10 @@ struct lc_film {
     int32_t width, height;
     uint32_t seed;
     uint32_t block_count;
-    struct lull_rect *rects;        /* owns, [block_count] */
-    struct lull_block *blocks;      /* owns, [block_count]: state */
-    double *sum[LULL_PLANE_COUNT];  /* owns: sums over samples, [height][width][channels]; SPP and WEIGHT unused */
-    double *half_sum;               /* owns: for HALF */
+    struct lull_rect *rects;       /* owns, [block_count] */
+    struct lull_block *blocks;     /* owns, [block_count]: state */
+    double *sum[LULL_PLANE_COUNT]; /* owns: sums over samples, [height][width][channels]; SPP and WEIGHT unused */
+    double *half_sum;              /* owns: for HALF */
     void (*paint)(double rgb[3], double *sigma, int32_t x, int32_t y); /* truth and relative noise; NULL = a default */
 };
 
@@ -89,8 +89,8 @@ extern const char *const lc_plane_names[LULL_PLANE_COUNT];
 /* Blocks of block_w x block_h, smaller at the right and bottom edge. 0 or -1 (out of memory). */
 int lc_film_init(struct lc_film *f, int32_t width, int32_t height, int32_t block_w, int32_t block_h, uint32_t seed);
 void lc_film_release(struct lc_film *f);
-/* The frame that suits the criterion: two by one blocks and the rest at the edges, one of them 1x1. The blocks are of the size
- * it was made for if that is the only one it takes or if nominal is set, else small, which saves time. */
+/* The frame that suits the criterion: two by one blocks and the rest at the edges, one of them 1x1. The blocks are of the
+ * size it was made for if that is the only one it takes or if nominal is set, else small, which saves time. */
 int lc_film_init_for(struct lc_film *f, const struct lull_requirements *req, uint32_t seed, int nominal);
 /* Adds samples until the block has spp; nothing if it has. */
 void lc_film_advance(struct lc_film *f, uint32_t id, uint64_t spp);
@@ -101,9 +101,9 @@ void lc_film_frame(const struct lc_film *f, struct lull_frame *frame, uint32_t p
 /* How an image is stored. All zero: tight interleaved float estimates, top-down. */
 struct lc_layout {
     int32_t type;
-    int32_t normaliser;    /* ONE, SPP (HALF then uses HALF_SPP) or WEIGHT */
-    int padded;            /* a fourth, unused channel of NaN */
-    int planar;            /* channel planes */
+    int32_t normaliser; /* ONE, SPP (HALF then uses HALF_SPP) or WEIGHT */
+    int padded;         /* a fourth, unused channel of NaN */
+    int planar;         /* channel planes */
     int bottom_up;
     int right_left;
     int guard;             /* each plane between two pages that cannot be read */
@@ -139,10 +139,10 @@ struct lc_manner {
     const struct lull_host *host;
     struct lc_layout layout;
     enum lc_ask ask;
-    uint32_t slack;     /* bytes between the elements of arrays and after structs, filled with garbage */
-    int required_only;  /* supply only the required planes */
-    int no_all;         /* view.all is NULL */
-    int nominal;        /* blocks of the size that the criterion was made for */
+    uint32_t slack;    /* bytes between the elements of arrays and after structs, filled with garbage */
+    int required_only; /* supply only the required planes */
+    int no_all;        /* view.all is NULL */
+    int nominal;       /* blocks of the size that the criterion was made for */
     uint32_t frame_flags;
     uint32_t seed;
 };
@@ -168,7 +168,7 @@ struct lc_session {
     uint64_t spp;                   /* of the even blocks at the next step; odd ones have twice as many */
     uint32_t step;
     struct lc_log log;
-    double evaluate_s; /* in evaluate so far */
+    double evaluate_s;  /* in evaluate so far */
     uint64_t evaluated; /* blocks */
     int open;
 };
@@ -216,7 +216,8 @@ int lc_elf_exports(const char *path, void (*visit)(void *context, const char *na
 
 /* Calls of malloc and friends by this process; -1 in a build that cannot count them (sanitizers). */
 long lc_alloc_count(void);
-/* The k-th allocation from now on (0 = the next) fails, and so do all that follow; -1 = none. No effect where not counted. */
+/* The k-th allocation from now on (0 = the next) fails, and so do all that follow; -1 = none. No effect where not counted.
+ */
 void lc_alloc_fail_after(long k);
 
 #endif

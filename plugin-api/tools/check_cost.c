@@ -91,7 +91,8 @@ static void check_leaks(struct lc *c)
     repeat(c, short_session, "a frame with RESTART");
 }
 
-/* --- allocation ---------------------------------------------------------------------------------------------------------- */
+/* --- allocation ----------------------------------------------------------------------------------------------------------
+ */
 
 /* create and begin_frame with the k-th allocation failing, for every k: an error or success, never a crash or a leak. */
 static void check_out_of_memory(struct lc *c)
@@ -149,8 +150,8 @@ static void check_evaluate_allocates(struct lc *c)
         struct lull_decision d;
         lc_decision_preset(&d);
         long before = lc_alloc_count();
-        int32_t status =
-            c->criterion->evaluate(s.instance, &image.view, &s.film.blocks[0], sizeof(struct lull_block), &d, sizeof d, 1, NULL);
+        int32_t status = c->criterion->evaluate(s.instance, &image.view, &s.film.blocks[0], sizeof(struct lull_block), &d,
+                                                sizeof d, 1, NULL);
         long after = lc_alloc_count();
         LC_EXPECT(c, status == LULL_OK, "evaluate: %d", status);
         LC_EXPECT(c, after == before, "evaluate made %ld allocations", after - before);

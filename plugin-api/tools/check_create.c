@@ -93,7 +93,8 @@ static int beyond(double limit, double direction, char text[400])
 
 static void check_params(struct lc *c)
 {
-    static const char *const not_numbers[] = {"", " ", "x", "1x", "1 2", "--1", "nan", "inf", "1e", "0x10", "1,5", "1e99999"};
+    static const char *const not_numbers[] = {"",    " ",   "x",  "1x",   "1 2", "--1",
+                                              "nan", "inf", "1e", "0x10", "1,5", "1e99999"};
     for (uint32_t i = 0; i < c->criterion->param_count; i++) {
         const struct lull_param *p = param(c, i);
         if (p->default_value != NULL)
@@ -127,13 +128,15 @@ static void check_null(struct lc *c)
     const struct lull_criterion *t = c->criterion;
     struct lull_instance *instance = NULL;
     struct lull_pair bad = {"no-such-parameter", "1"}, hole = {NULL, NULL};
-    LC_EXPECT(c, t->create(NULL, &bad, 1, sizeof bad, &instance, NULL) == LULL_E_KEY, "unknown key, NULL error: not refused");
+    LC_EXPECT(c, t->create(NULL, &bad, 1, sizeof bad, &instance, NULL) == LULL_E_KEY,
+              "unknown key, NULL error: not refused");
     LC_EXPECT(c, t->create(NULL, &hole, 1, sizeof hole, &instance, NULL) != LULL_OK, "a pair of NULLs is accepted");
     LC_EXPECT(c, instance == NULL, "a failed create touched the instance");
     LC_EXPECT(c, t->create(NULL, c->pairs, c->pair_count, sizeof bad, NULL, NULL) == LULL_E_INVALID,
               "create without a place for the instance is not refused");
     if (c->pair_count == 0) {
-        LC_EXPECT(c, t->create(NULL, NULL, 0, 0, &instance, NULL) == LULL_OK, "create(NULL, NULL, 0, 0, &instance, NULL) fails");
+        LC_EXPECT(c, t->create(NULL, NULL, 0, 0, &instance, NULL) == LULL_OK,
+                  "create(NULL, NULL, 0, 0, &instance, NULL) fails");
         t->destroy(instance);
     }
     t->destroy(NULL);
@@ -173,9 +176,9 @@ static void check_requirements(struct lc *c)
     LC_EXPECT(c, (q->flags & LULL_REQ_FLEXIBLE) || (q->block_width > 0 && q->block_height > 0),
               "not flexible, but without a block size");
     LC_EXPECT(c, q->block_width <= 16384 && q->block_height <= 16384 && q->halo <= 16384, "absurd block size or halo");
-    lc_note(c, "block %ux%u%s, halo %u, first at %llu spp, %llu bytes per block, planes used %#x, required %#x", q->block_width,
-            q->block_height, q->flags & LULL_REQ_FLEXIBLE ? " (flexible)" : "", q->halo, (unsigned long long)q->first_spp,
-            (unsigned long long)q->bytes_per_block, q->planes_used, q->planes_required);
+    lc_note(c, "block %ux%u%s, halo %u, first at %llu spp, %llu bytes per block, planes used %#x, required %#x",
+            q->block_width, q->block_height, q->flags & LULL_REQ_FLEXIBLE ? " (flexible)" : "", q->halo,
+            (unsigned long long)q->first_spp, (unsigned long long)q->bytes_per_block, q->planes_used, q->planes_required);
     c->criterion->destroy(instance);
 }
 

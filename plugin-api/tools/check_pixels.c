@@ -134,11 +134,21 @@ static int32_t ask_spoilt(struct lc *c, unsigned plane, enum spoil spoil)
     if (s.film.block_count <= 16 && lc_session_image(&s, &image) == 0) {
         struct lull_plane *p = lc_image_plane(&image, plane);
         switch (spoil) {
-        case SPOIL_ABSENT: p->data = NULL; break;
-        case SPOIL_CUT: image.view.plane_count = plane; break;
-        case SPOIL_TYPE: p->type = 99; break;
-        case SPOIL_NORMALISER: p->normaliser = -1; break;
-        case SPOIL_CHANNELS: p->channels = lc_plane_channels[plane] - 1; break;
+        case SPOIL_ABSENT:
+            p->data = NULL;
+            break;
+        case SPOIL_CUT:
+            image.view.plane_count = plane;
+            break;
+        case SPOIL_TYPE:
+            p->type = 99;
+            break;
+        case SPOIL_NORMALISER:
+            p->normaliser = -1;
+            break;
+        case SPOIL_CHANNELS:
+            p->channels = lc_plane_channels[plane] - 1;
+            break;
         default:
             p->normaliser = LULL_NORM_WEIGHT;
             lc_image_plane(&image, LULL_PLANE_WEIGHT)->data = NULL;
@@ -168,7 +178,8 @@ static void check_missing(struct lc *c)
         LC_EXPECT(c, status == LULL_E_PLANE, "begin_frame without %s: %d", lc_plane_names[p], status);
         if (status == LULL_OK)
             c->criterion->end_frame(instance);
-        LC_EXPECT(c, ask_spoilt(c, p, SPOIL_ABSENT) == LULL_E_PLANE, "evaluate without %s is not refused", lc_plane_names[p]);
+        LC_EXPECT(c, ask_spoilt(c, p, SPOIL_ABSENT) == LULL_E_PLANE, "evaluate without %s is not refused",
+                  lc_plane_names[p]);
         LC_EXPECT(c, ask_spoilt(c, p, SPOIL_CUT) == LULL_E_PLANE, "evaluate with planes up to %s is not refused",
                   lc_plane_names[p]);
     }
@@ -245,7 +256,8 @@ static void check_values(struct lc *c)
         for (int every = 1; every <= 97; every += 96) {
             uint32_t flags = steps_with_value(c, values[i], every);
             if (!isfinite(values[i]) && every == 1 && (c->req.planes_required & LULL_PLANE_BIT(LULL_PLANE_COLOR)))
-                LC_EXPECT(c, flags & LULL_DECISION_BAD_INPUT, "pixels of %g are not flagged as bad input", (double)values[i]);
+                LC_EXPECT(c, flags & LULL_DECISION_BAD_INPUT, "pixels of %g are not flagged as bad input",
+                          (double)values[i]);
         }
 }
 

@@ -65,8 +65,8 @@ static int short_evaluate(struct lc *c, const struct short_structs *cut, struct 
         for (uint32_t i = 0; i < film->block_count; i++)
             lc_decision_preset(&d[i]);
         if (guarded_init(c, &view, v, sizeof *v - cut->view) == 0) {
-            calls->evaluate = c->criterion->evaluate(instance, view.at, blocks.at, sizeof(struct lull_block), d,
-                                                     sizeof *d, film->block_count, err);
+            calls->evaluate = c->criterion->evaluate(instance, view.at, blocks.at, sizeof(struct lull_block), d, sizeof *d,
+                                                     film->block_count, err);
             for (uint32_t i = 0; i < film->block_count && calls->evaluate == LULL_OK; i++)
                 lc_decision_check(c, &film->blocks[i], &d[i]);
             guarded_release(&view);
@@ -79,8 +79,8 @@ static int short_evaluate(struct lc *c, const struct short_structs *cut, struct 
     return 0;
 }
 
-static void short_frame(struct lc *c, const struct short_structs *cut, struct lull_instance *instance, struct lull_error *err,
-                        struct short_calls *calls)
+static void short_frame(struct lc *c, const struct short_structs *cut, struct lull_instance *instance,
+                        struct lull_error *err, struct short_calls *calls)
 {
     struct lc_film film;
     if (lc_film_init_for(&film, &c->req, 1, 0) != 0)
@@ -139,12 +139,14 @@ static void check_older(struct lc *c)
     struct short_structs exact = {0};
     struct short_calls calls;
     short_life(c, &exact, &calls);
-    LC_EXPECT(c, calls.create == LULL_OK && calls.requirements == LULL_OK && calls.begin_frame == LULL_OK &&
-                     calls.evaluate == LULL_OK,
+    LC_EXPECT(c,
+              calls.create == LULL_OK && calls.requirements == LULL_OK && calls.begin_frame == LULL_OK &&
+                  calls.evaluate == LULL_OK,
               "structs of exactly version 1.0: create %d, requirements %d, begin_frame %d, evaluate %d", calls.create,
               calls.requirements, calls.begin_frame, calls.evaluate);
-    LC_EXPECT(c, calls.got.planes_used == c->req.planes_used && calls.got.first_spp == c->req.first_spp &&
-                     calls.got.bytes_per_block == c->req.bytes_per_block,
+    LC_EXPECT(c,
+              calls.got.planes_used == c->req.planes_used && calls.got.first_spp == c->req.first_spp &&
+                  calls.got.bytes_per_block == c->req.bytes_per_block,
               "requirements differ for a struct of exactly version 1.0");
 
     /* the error struct is for the caller's convenience: a short one is not written, or not beyond its end */
@@ -202,8 +204,8 @@ static void check_tails(struct lc *c)
     if (instance == NULL)
         return;
     int32_t status = c->criterion->requirements(instance, &r.req, &e.err);
-    LC_EXPECT(c, status == LULL_OK && r.req.struct_size == sizeof r, "requirements into a longer struct: %d, size %u", status,
-              r.req.struct_size);
+    LC_EXPECT(c, status == LULL_OK && r.req.struct_size == sizeof r, "requirements into a longer struct: %d, size %u",
+              status, r.req.struct_size);
     c->criterion->destroy(instance);
     struct lull_pair unknown = {"no-such-parameter", "1"};
     struct lull_instance *none = NULL;

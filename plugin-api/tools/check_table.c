@@ -45,8 +45,8 @@ static void check_symbols(struct lc *c)
 
 /* --- loading --------------------------------------------------------------------------------------------------------- */
 
-static const int signals[] = {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGILL, SIGABRT, SIGFPE, SIGSEGV, SIGBUS,
-                              SIGPIPE, SIGALRM, SIGUSR1, SIGUSR2, SIGCHLD, SIGPROF};
+static const int signals[] = {SIGINT, SIGTERM, SIGHUP,  SIGQUIT, SIGILL,  SIGABRT, SIGFPE, SIGSEGV,
+                              SIGBUS, SIGPIPE, SIGALRM, SIGUSR1, SIGUSR2, SIGCHLD, SIGPROF};
 enum { SIGNALS = sizeof signals / sizeof *signals };
 
 static void note_log(void *context, int32_t level, const char *text)
@@ -96,7 +96,8 @@ static void check_table(struct lc *c)
     const uint32_t known = LULL_CAP_DETERMINISTIC | LULL_CAP_BATCH_INVARIANT | LULL_CAP_REOPENS;
     if (t->api_minor <= LULL_API_MINOR)
         LC_EXPECT(c, (t->capabilities & ~known) == 0, "unknown capabilities %#x", t->capabilities);
-    LC_EXPECT(c, *t->name != '\0' && *t->version != '\0' && *t->description != '\0', "name, version or description is empty");
+    LC_EXPECT(c, *t->name != '\0' && *t->version != '\0' && *t->description != '\0',
+              "name, version or description is empty");
     LC_EXPECT(c, t->get_extension("no.such/1") == NULL, "it claims the extension no.such/1");
     static const char *const levels[] = {"NONE", "INSTANCE", "FULL"};
     lc_note(c, "%s %s: %s; threads %s%s%s%s", t->id, t->version, t->name, levels[t->thread_level],

@@ -102,7 +102,8 @@ static void check_instances(struct lc *c)
     lc_log_release(&expected);
 }
 
-/* --- floating point ------------------------------------------------------------------------------------------------------ */
+/* --- floating point ------------------------------------------------------------------------------------------------------
+ */
 
 /* Every call already compares the control register; here with a host that flushes subnormals and traps nothing. */
 static void check_fp(struct lc *c)

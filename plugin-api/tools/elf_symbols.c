@@ -22,7 +22,7 @@ static const void *within(const struct bytes *file, uint64_t offset, uint64_t si
     return offset <= file->size && size <= file->size - offset ? file->data + offset : NULL;
 }
 
-static int is_export(const ElfW(Sym) *symbol)
+static int is_export(const ElfW(Sym) * symbol)
 {
     unsigned bind = symbol->st_info >> 4, visibility = symbol->st_other & 3;
     return symbol->st_shndx != SHN_UNDEF && symbol->st_shndx != SHN_ABS &&
@@ -30,7 +30,7 @@ static int is_export(const ElfW(Sym) *symbol)
            (visibility == STV_DEFAULT || visibility == STV_PROTECTED);
 }
 
-static int visit_table(const struct bytes *file, const ElfW(Shdr) *table, const ElfW(Shdr) *strings,
+static int visit_table(const struct bytes *file, const ElfW(Shdr) * table, const ElfW(Shdr) * strings,
                        void (*visit)(void *context, const char *name), void *context)
 {
     const ElfW(Sym) *symbols = within(file, table->sh_offset, table->sh_size);

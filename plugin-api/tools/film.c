@@ -278,9 +278,9 @@ static void store_block(const struct lc_film *f, const struct lull_block *b, uns
         for (int32_t x = b->x0; x < b->x1; x++) {
             size_t pixel = (size_t)y * (size_t)f->width + (size_t)x;
             double n = l->normaliser == LULL_NORM_SPP        ? (double)b->spp
-                     : l->normaliser == LULL_NORM_HALF_SPP ? (double)b->half_spp
-                     : l->normaliser == LULL_NORM_WEIGHT   ? estimate_in(f, b, LULL_PLANE_WEIGHT, pixel, 0)
-                                                            : 1;
+                       : l->normaliser == LULL_NORM_HALF_SPP ? (double)b->half_spp
+                       : l->normaliser == LULL_NORM_WEIGHT   ? estimate_in(f, b, LULL_PLANE_WEIGHT, pixel, 0)
+                                                             : 1;
             char *at = (char *)(uintptr_t)out->data + x * out->stride_x + y * out->stride_y;
             for (unsigned c = 0; c < lc_plane_channels[plane] + (l->padded ? 1u : 0u); c++)
                 store(at + c * out->stride_c, l->type,
@@ -369,8 +369,8 @@ struct lull_plane *lc_image_plane(struct lc_image *image, unsigned plane)
 
 void lc_image_poke(struct lc_image *image, int32_t x, int32_t y, float value)
 {
-    static const unsigned planes[] = {LULL_PLANE_COLOR, LULL_PLANE_MOMENT2, LULL_PLANE_HALF, LULL_PLANE_ALBEDO,
-                                      LULL_PLANE_NORMAL, LULL_PLANE_DEPTH};
+    static const unsigned planes[] = {LULL_PLANE_COLOR,  LULL_PLANE_MOMENT2, LULL_PLANE_HALF,
+                                      LULL_PLANE_ALBEDO, LULL_PLANE_NORMAL,  LULL_PLANE_DEPTH};
     for (size_t i = 0; i < sizeof planes / sizeof *planes; i++) {
         const struct lull_plane *p = lc_image_plane(image, planes[i]);
         if (p->data == NULL)

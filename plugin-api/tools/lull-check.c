@@ -24,12 +24,13 @@ struct arguments {
 };
 
 /* The first group needs no instance. */
-static const struct lc_check *const groups[] = {lc_table_checks, lc_create_checks, lc_struct_checks,
-                                                lc_pixel_checks, lc_life_checks,   lc_batch_checks,
+static const struct lc_check *const groups[] = {lc_table_checks,  lc_create_checks, lc_struct_checks,
+                                                lc_pixel_checks,  lc_life_checks,   lc_batch_checks,
                                                 lc_thread_checks, lc_state_checks,  lc_cost_checks};
 enum { GROUPS = sizeof groups / sizeof *groups };
 
-/* --- command line -------------------------------------------------------------------------------------------------------- */
+/* --- command line --------------------------------------------------------------------------------------------------------
+ */
 
 static const struct argp_option options[] = {
     {"param", 'p', "KEY=VALUE", 0, "Give the criterion this parameter (repeatable)", 0},
@@ -85,12 +86,24 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 {
     struct arguments *a = state->input;
     switch (key) {
-    case 'p': add_pair(state, a, arg); break;
-    case 'o': add_only(state, a, arg); break;
-    case 'l': a->list = 1; break;
-    case 'q': a->quiet = 1; break;
-    case 't': a->workers = (uint32_t)number(state, arg, 2, 32); break;
-    case 'L': a->limit_s = (unsigned)number(state, arg, 1, 100000); break;
+    case 'p':
+        add_pair(state, a, arg);
+        break;
+    case 'o':
+        add_only(state, a, arg);
+        break;
+    case 'l':
+        a->list = 1;
+        break;
+    case 'q':
+        a->quiet = 1;
+        break;
+    case 't':
+        a->workers = (uint32_t)number(state, arg, 2, 32);
+        break;
+    case 'L':
+        a->limit_s = (unsigned)number(state, arg, 1, 100000);
+        break;
     case ARGP_KEY_ARG:
         if (a->spec_count == SPECS_MAX)
             argp_error(state, "too many criteria");
@@ -100,12 +113,14 @@ static error_t parse(int key, char *arg, struct argp_state *state)
         if (a->spec_count == 0 && !a->list)
             argp_error(state, "no criterion given");
         break;
-    default: return ARGP_ERR_UNKNOWN;
+    default:
+        return ARGP_ERR_UNKNOWN;
     }
     return 0;
 }
 
-/* --- finding ------------------------------------------------------------------------------------------------------------- */
+/* --- finding -------------------------------------------------------------------------------------------------------------
+ */
 
 /* PREFIX/lib/lull for a program in PREFIX/bin. */
 static void own_directory(char dir[LULL_PATH_MAX])
@@ -184,7 +199,8 @@ static int prepare(struct lc *c)
     return LC_EXPECT(c, status == LULL_OK, "requirements failed (%d): %s", status, err.message) ? 0 : -1;
 }
 
-/* --- running ------------------------------------------------------------------------------------------------------------- */
+/* --- running -------------------------------------------------------------------------------------------------------------
+ */
 
 struct task {
     const char *id;

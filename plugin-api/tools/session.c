@@ -84,8 +84,8 @@ void lc_decision_check(struct lc *c, const struct lull_block *b, const struct lu
     LC_EXPECT(c, b->spp > 0 || d->action == LULL_CONTINUE, "block %u is stopped without any sample", id);
     LC_EXPECT(c, d->action == LULL_CONTINUE || !(d->flags & LULL_DECISION_TOO_EARLY),
               "block %u at %llu spp: stopped, although too early to say", id, spp);
-    LC_EXPECT(c, b->spp >= c->req.first_spp || d->action == LULL_CONTINUE, "block %u is stopped at %llu spp, before first_spp",
-              id, spp);
+    LC_EXPECT(c, b->spp >= c->req.first_spp || d->action == LULL_CONTINUE,
+              "block %u is stopped at %llu spp, before first_spp", id, spp);
 }
 
 static int same_number(double a, double b, int exact)
@@ -104,8 +104,9 @@ int lc_log_compare(struct lc *c, const struct lc_log *expected, const struct lc_
             same_number(p->p_noisy, q->p_noisy, exact) && same_number(p->error, q->error, exact) &&
             (!exact || (p->next_spp == q->next_spp && same_number(p->predicted_spp, q->predicted_spp, exact))))
             continue;
-        lc_fail(c, "%s: block %u at %llu spp answers action %d error %.9g p %.9g next %llu, block %u at %llu spp before: "
-                   "action %d error %.9g p %.9g next %llu",
+        lc_fail(c,
+                "%s: block %u at %llu spp answers action %d error %.9g p %.9g next %llu, block %u at %llu spp before: "
+                "action %d error %.9g p %.9g next %llu",
                 what, b->id, (unsigned long long)b->spp, q->action, q->error, q->p_noisy, (unsigned long long)q->next_spp,
                 a->id, (unsigned long long)a->spp, p->action, p->error, p->p_noisy, (unsigned long long)p->next_spp);
         return -1;
@@ -177,8 +178,8 @@ static void ask_arrays_take(struct lc_session *s, const struct ask_arrays *a, co
         const char *at = a->decisions + (size_t)i * a->decision_stride;
         memcpy(&decisions[ids[i]], at, sizeof *decisions);
         for (uint32_t k = (uint32_t)sizeof *decisions; k < a->decision_stride; k++)
-            if (!LC_EXPECT(s->check, (unsigned char)at[k] == GARBAGE, "evaluate wrote past the end of a decision (stride %u)",
-                           a->decision_stride))
+            if (!LC_EXPECT(s->check, (unsigned char)at[k] == GARBAGE,
+                           "evaluate wrote past the end of a decision (stride %u)", a->decision_stride))
                 break;
     }
 }
@@ -194,7 +195,8 @@ static int32_t ask_some(struct lc_session *s, const struct lc_image *image, cons
         lull_process_state_read(&before);
         const void *blocks = a.blocks, *view = a.view;
         void *out = a.decisions;
-        status = s->check->criterion->evaluate(s->instance, view, blocks, a.block_stride, out, a.decision_stride, count, err);
+        status =
+            s->check->criterion->evaluate(s->instance, view, blocks, a.block_stride, out, a.decision_stride, count, err);
         lull_process_state_read(&after);
         LC_EXPECT(s->check, after.fp_control == before.fp_control, "evaluate changed the floating-point control register");
         lull_process_state_restore(&before);

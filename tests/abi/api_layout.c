@@ -26,14 +26,20 @@ struct layout {
     size_t count;
 };
 
-#define F(T, field) {#field, offsetof(struct T, field), sizeof(((struct T *)0)->field)}
+#define F(T, field)                                                                                                         \
+    {                                                                                                                       \
+#field, offsetof(struct T, field), sizeof(((struct T *)0)->field)                                                   \
+    }
 #define LAYOUT(T, ...) static const struct field T##_fields[] = {__VA_ARGS__}
-#define ENTRY(T) {#T, sizeof(struct T), T##_fields, sizeof T##_fields / sizeof *T##_fields}
+#define ENTRY(T)                                                                                                            \
+    {                                                                                                                       \
+#T, sizeof(struct T), T##_fields, sizeof T##_fields / sizeof *T##_fields                                            \
+    }
 
 LAYOUT(lull_error, F(lull_error, struct_size), F(lull_error, code), F(lull_error, message));
 LAYOUT(lull_host, F(lull_host, struct_size), F(lull_host, api_minor), F(lull_host, context), F(lull_host, name),
-       F(lull_host, max_workers), F(lull_host, flags), F(lull_host, log), F(lull_host, parallel_for), F(lull_host, cancelled),
-       F(lull_host, get_extension));
+       F(lull_host, max_workers), F(lull_host, flags), F(lull_host, log), F(lull_host, parallel_for),
+       F(lull_host, cancelled), F(lull_host, get_extension));
 LAYOUT(lull_param, F(lull_param, name), F(lull_param, help), F(lull_param, default_value), F(lull_param, choices),
        F(lull_param, min), F(lull_param, max), F(lull_param, type), F(lull_param, flags));
 LAYOUT(lull_pair, F(lull_pair, key), F(lull_pair, value));
@@ -67,8 +73,8 @@ LAYOUT(lull_reader, F(lull_reader, struct_size), F(lull_reader, flags), F(lull_r
 LAYOUT(lull_state, F(lull_state, struct_size), F(lull_state, flags), F(lull_state, save), F(lull_state, load));
 
 static const struct layout layouts[] = {
-    ENTRY(lull_error),    ENTRY(lull_host),     ENTRY(lull_param),  ENTRY(lull_pair),   ENTRY(lull_requirements),
-    ENTRY(lull_rect),     ENTRY(lull_frame),    ENTRY(lull_plane),  ENTRY(lull_block),  ENTRY(lull_view),
+    ENTRY(lull_error),    ENTRY(lull_host),      ENTRY(lull_param),  ENTRY(lull_pair),   ENTRY(lull_requirements),
+    ENTRY(lull_rect),     ENTRY(lull_frame),     ENTRY(lull_plane),  ENTRY(lull_block),  ENTRY(lull_view),
     ENTRY(lull_decision), ENTRY(lull_criterion), ENTRY(lull_writer), ENTRY(lull_reader), ENTRY(lull_state),
 };
 enum { LAYOUTS = sizeof layouts / sizeof *layouts };
@@ -78,7 +84,8 @@ static void print_layout(FILE *out)
     for (int i = 0; i < LAYOUTS; i++) {
         fprintf(out, "struct %s %zu\n", layouts[i].name, layouts[i].size);
         for (size_t k = 0; k < layouts[i].count; k++)
-            fprintf(out, "  %zu %zu %s\n", layouts[i].fields[k].offset, layouts[i].fields[k].size, layouts[i].fields[k].name);
+            fprintf(out, "  %zu %zu %s\n", layouts[i].fields[k].offset, layouts[i].fields[k].size,
+                    layouts[i].fields[k].name);
     }
 }
 
@@ -128,8 +135,8 @@ static void structs_have_no_padding(void **state)
 static void growing_structs_begin_with_their_size(void **state)
 {
     (void)state;
-    static const char *const elements[] = {"lull_param", "lull_pair", "lull_rect", "lull_plane", "lull_block",
-                                           "lull_decision"};
+    static const char *const elements[] = {"lull_param", "lull_pair",  "lull_rect",
+                                           "lull_plane", "lull_block", "lull_decision"};
     for (int i = 0; i < LAYOUTS; i++) {
         int is_element = 0;
         for (size_t k = 0; k < sizeof elements / sizeof *elements; k++)
@@ -153,9 +160,9 @@ static void has_counts_whole_fields(void **state)
 static void numbers_are_frozen(void **state)
 {
     (void)state;
-    const int32_t status[] = {LULL_OK,      LULL_E_INVALID, LULL_E_KEY,         LULL_E_VALUE,     LULL_E_MEMORY,  LULL_E_PLANE,
-                              LULL_E_STATE, LULL_E_IO,      LULL_E_VERSION,     LULL_E_UNSUPPORTED, LULL_E_CANCELLED,
-                              LULL_E_INTERNAL};
+    const int32_t status[] = {LULL_OK,        LULL_E_INVALID,     LULL_E_KEY,       LULL_E_VALUE,
+                              LULL_E_MEMORY,  LULL_E_PLANE,       LULL_E_STATE,     LULL_E_IO,
+                              LULL_E_VERSION, LULL_E_UNSUPPORTED, LULL_E_CANCELLED, LULL_E_INTERNAL};
     for (size_t i = 0; i < sizeof status / sizeof *status; i++)
         assert_int_equal(status[i], -(int)i);
     const unsigned planes[] = {LULL_PLANE_COLOR, LULL_PLANE_WEIGHT, LULL_PLANE_SPP,    LULL_PLANE_MOMENT2,
@@ -184,13 +191,16 @@ int main(int argc, char **argv)
 {
     if (argc > 1 && strcmp(argv[1], "--print") == 0) {
         puts("# lull/criterion.h 1.0 where pointers have 8 bytes: each struct and its size, each field's offset and size.");
-        puts("# Frozen: lines may be added (a minor version appends fields), never changed. Made by tests/abi/api_layout --print.");
+        puts("# Frozen: lines may be added (a minor version appends fields), never changed. Made by tests/abi/api_layout "
+             "--print.");
         print_layout(stdout);
         return 0;
     }
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(layout_is_the_frozen_one), cmocka_unit_test(structs_have_no_padding),
-        cmocka_unit_test(growing_structs_begin_with_their_size), cmocka_unit_test(has_counts_whole_fields),
+        cmocka_unit_test(layout_is_the_frozen_one),
+        cmocka_unit_test(structs_have_no_padding),
+        cmocka_unit_test(growing_structs_begin_with_their_size),
+        cmocka_unit_test(has_counts_whole_fields),
         cmocka_unit_test(numbers_are_frozen),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

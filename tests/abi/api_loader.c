@@ -268,9 +268,9 @@ static void tables_are_checked(void **state)
     struct lull_criterion bad = good;
     bad.struct_size = sizeof bad - 1;
     assert_int_equal(lull_table_check(&bad, &err), LULL_E_VERSION);
-#define REFUSED(change)                                                                                                    \
-    bad = good;                                                                                                            \
-    change;                                                                                                                \
+#define REFUSED(change)                                                                                                     \
+    bad = good;                                                                                                             \
+    change;                                                                                                                 \
     assert_int_equal(lull_table_check(&bad, &err), LULL_E_INVALID)
     REFUSED(bad.id = NULL);
     REFUSED(bad.id = "");
@@ -291,12 +291,12 @@ static void tables_are_checked(void **state)
     REFUSED(bad.params = NULL);
     REFUSED(bad.param_stride = 8);
     struct lull_param params[2], *p = params;
-#define PARAM_REFUSED(change)                                                                                              \
-    params[0] = params[1] = good.params[0];                                                                                \
-    params[1].name = "other";                                                                                              \
-    bad = good, bad.params = params, bad.param_count = 2;                                                                  \
-    assert_int_equal(lull_table_check(&bad, &err), LULL_OK);                                                               \
-    change;                                                                                                                \
+#define PARAM_REFUSED(change)                                                                                               \
+    params[0] = params[1] = good.params[0];                                                                                 \
+    params[1].name = "other";                                                                                               \
+    bad = good, bad.params = params, bad.param_count = 2;                                                                   \
+    assert_int_equal(lull_table_check(&bad, &err), LULL_OK);                                                                \
+    change;                                                                                                                 \
     assert_int_equal(lull_table_check(&bad, &err), LULL_E_INVALID)
     PARAM_REFUSED(p->name = NULL);
     PARAM_REFUSED(p->name = "has space");

@@ -191,19 +191,19 @@ struct lull_rect {
 #define LULL_FRAME_RESTART UINT32_C(1)       /* a frame is open: drop its history, its samples were thrown away */
 #define LULL_FRAME_DETERMINISTIC UINT32_C(2) /* decisions must depend on samples only, not on time */
 #define LULL_FRAME_INDEPENDENT UINT32_C(4)   /* the samples of a pixel are independent (not stratified, no sequence) */
-#define LULL_FRAME_SHARED UINT32_C(8)        /* neighbouring pixels share samples (splatted filter): their noise correlates */
+#define LULL_FRAME_SHARED UINT32_C(8) /* neighbouring pixels share samples (splatted filter): their noise correlates */
 
 /* How linear radiance becomes what is seen: out = transfer(exposure * value), clamped to [0, 1]. */
 #define LULL_TRANSFER_UNKNOWN 0 /* treat as sRGB */
 #define LULL_TRANSFER_LINEAR 1
-#define LULL_TRANSFER_SRGB 2    /* IEC 61966-2-1 */
-#define LULL_TRANSFER_GAMMA 3   /* out = in^(1 / gamma) */
+#define LULL_TRANSFER_SRGB 2  /* IEC 61966-2-1 */
+#define LULL_TRANSFER_GAMMA 3 /* out = in^(1 / gamma) */
 
 /* What stays constant while a frame is rendered. */
 struct lull_frame {
     uint32_t struct_size;
-    uint32_t flags;  /* LULL_FRAME_ */
-    uint32_t width;  /* of the whole picture, pixels, also if only a part of it (a crop) is rendered */
+    uint32_t flags; /* LULL_FRAME_ */
+    uint32_t width; /* of the whole picture, pixels, also if only a part of it (a crop) is rendered */
     uint32_t height;
 
     /* The blocks: disjoint, not empty, inside the picture; any tiling, none need cover it. The index is the block's id. */
@@ -211,15 +211,15 @@ struct lull_frame {
     uint32_t block_count;
     uint32_t block_stride; /* bytes from one rectangle to the next */
 
-    uint32_t planes;    /* mask of the planes that every view of this frame will supply */
-    int32_t transfer;   /* LULL_TRANSFER_ */
-    double gamma;       /* for LULL_TRANSFER_GAMMA */
-    double exposure;    /* linear factor, > 0 */
-    double sample_clamp; /* the host clamps samples to this value; 0 = it does not (then rare bright samples may come) */
+    uint32_t planes;      /* mask of the planes that every view of this frame will supply */
+    int32_t transfer;     /* LULL_TRANSFER_ */
+    double gamma;         /* for LULL_TRANSFER_GAMMA */
+    double exposure;      /* linear factor, > 0 */
+    double sample_clamp;  /* the host clamps samples to this value; 0 = it does not (then rare bright samples may come) */
     double time_budget_s; /* wall seconds for the whole frame; 0 = no limit */
-    uint64_t spp_min;   /* the host will not stop a block before, whatever is decided */
-    uint64_t spp_max;   /* the host stops every block here; 0 = no limit */
-    uint64_t seed;      /* of the render; a criterion that needs random numbers derives them from it */
+    uint64_t spp_min;     /* the host will not stop a block before, whatever is decided */
+    uint64_t spp_max;     /* the host stops every block here; 0 = no limit */
+    uint64_t seed;        /* of the render; a criterion that needs random numbers derives them from it */
     double rgb_to_xyz[9]; /* row major: XYZ = M * RGB; row 2 gives luminance */
 };
 
@@ -234,20 +234,21 @@ struct lull_frame {
 #define LULL_NORM_ONE 0      /* N = 1: the estimate itself is stored */
 #define LULL_NORM_SPP 1      /* N = spp of the block that the pixel belongs to: a sum is stored */
 #define LULL_NORM_HALF_SPP 2 /* N = half_spp of that block */
-#define LULL_NORM_WEIGHT 3   /* N = WEIGHT at that pixel; WEIGHT itself uses ONE. May share memory with a per-pixel SPP */
+#define LULL_NORM_WEIGHT 3   /* N = WEIGHT at that pixel, which is then supplied whether a criterion asked for it or not, uses
+                              * ONE itself, and may share its memory with SPP */
 
 /* Where one plane lies. Element (x, y, channel) is at
  *     (const char *)data + (x - view.x0) * stride_x + (y - view.y0) * stride_y + channel * stride_c
  * and is aligned to its type. Strides may be negative (bottom-up images) or wider than the pixel (RGBA, interleaved).
  * Stored values can be anything, NaN and infinities included; where N = 0 there is no estimate. */
 struct lull_plane {
-    const void *data; /* NULL: this plane is absent */
+    const void *data;                     /* NULL: this plane is absent */
     int64_t stride_x, stride_y, stride_c; /* bytes */
-    double scale;       /* finite, not 0; usually 1 */
-    int32_t type;       /* LULL_TYPE_ */
-    int32_t normaliser; /* LULL_NORM_ */
-    uint32_t channels;  /* at least as many as listed at LULL_PLANE_; the rest is not read */
-    uint32_t flags;     /* 0 */
+    double scale;                         /* finite, not 0; usually 1 */
+    int32_t type;                         /* LULL_TYPE_ */
+    int32_t normaliser;                   /* LULL_NORM_ */
+    uint32_t channels;                    /* at least as many as listed at LULL_PLANE_; the rest is not read */
+    uint32_t flags;                       /* 0 */
 };
 
 #define LULL_BLOCK_STOPPED UINT32_C(1) /* was stopped; only asked about if the criterion declares LULL_CAP_REOPENS */
@@ -266,17 +267,17 @@ struct lull_block {
 /* The image at this moment. */
 struct lull_view {
     uint32_t struct_size;
-    uint32_t flags;                 /* 0 */
-    int32_t x0, y0, x1, y1;         /* the pixels that the planes hold: contains every block of the frame; a pixel inside
-                                     * it may be read even if it belongs to no block or to one that was not asked about */
+    uint32_t flags;                  /* 0 */
+    int32_t x0, y0, x1, y1;          /* the pixels that the planes hold: contains every block of the frame; a pixel inside
+                                      * it may be read even if it belongs to no block or to one that was not asked about */
     const struct lull_plane *planes; /* index LULL_PLANE_ */
-    uint32_t plane_count;           /* planes at and after this index are absent */
-    uint32_t plane_stride;          /* bytes */
-    const struct lull_block *all;   /* state of every block by id, for reading across edges (N of the neighbours);
-                                     * NULL: not kept, take a block's edge for the edge of the image */
+    uint32_t plane_count;            /* planes at and after this index are absent */
+    uint32_t plane_stride;           /* bytes */
+    const struct lull_block *all;    /* state of every block by id, for reading across edges (N of the neighbours);
+                                      * NULL: not kept, take a block's edge for the edge of the image */
     uint32_t all_count;
-    uint32_t all_stride;            /* bytes */
-    double elapsed_s;               /* wall seconds since begin_frame; NaN = not known */
+    uint32_t all_stride; /* bytes */
+    double elapsed_s;    /* wall seconds since begin_frame; NaN = not known */
 };
 
 /* --- decisions ----------------------------------------------------------------------------------------------------- */
@@ -319,14 +320,14 @@ struct lull_criterion {
     const char *description; /* what it measures (what error means) and whose method it is; may have several lines */
     const struct lull_param *params;
     uint32_t param_count;
-    uint32_t param_stride;   /* bytes */
-    int32_t thread_level;    /* LULL_THREADS_ */
-    uint32_t capabilities;   /* LULL_CAP_ */
+    uint32_t param_stride; /* bytes */
+    int32_t thread_level;  /* LULL_THREADS_ */
+    uint32_t capabilities; /* LULL_CAP_ */
 
     /* [any], but see LULL_THREADS_NONE. Makes an instance with the defaults, overridden by pairs (a later pair wins). On
      * failure *instance is untouched and the message names the key. The instance is owned by the host until destroy. */
-    int32_t (*create)(const struct lull_host *host, const struct lull_pair *pairs, uint32_t pair_count,
-                      uint32_t pair_stride, struct lull_instance **instance, struct lull_error *err);
+    int32_t (*create)(const struct lull_host *host, const struct lull_pair *pairs, uint32_t pair_count, uint32_t pair_stride,
+                      struct lull_instance **instance, struct lull_error *err);
 
     /* [ctl] May depend on the parameters, not on the frame. */
     int32_t (*requirements)(const struct lull_instance *instance, struct lull_requirements *req, struct lull_error *err);
@@ -369,8 +370,8 @@ typedef const struct lull_criterion *(*lull_entry_fn)(uint32_t index);
 /* Made by the host for one save or load. */
 struct lull_writer {
     uint32_t struct_size;
-    uint32_t flags; /* 0 */
-    void *context;  /* the host's own */
+    uint32_t flags;                                                                      /* 0 */
+    void *context;                                                                       /* the host's own */
     int32_t (*write)(const struct lull_writer *writer, const void *data, uint64_t size); /* all, or a LULL_E_ code */
 };
 

@@ -50,7 +50,8 @@ int32_t lull_open(const struct lull_search *search, const char *spec, struct lul
 int32_t lull_list(const struct lull_search *search, int32_t (*visit)(void *context, const struct lull_found *found),
                   void *context);
 
-/* Does this table keep the promises that can be seen without calling it? LULL_OK, or a code with err (may be NULL) filled. */
+/* Does this table keep the promises that can be seen without calling it? LULL_OK, or a code with err (may be NULL) filled.
+ */
 int32_t lull_table_check(const struct lull_criterion *criterion, struct lull_error *err);
 
 /* Fills err (may be NULL) with code and a printf-formatted message, cut to fit, and returns code. For hosts and criteria
@@ -58,7 +59,8 @@ int32_t lull_table_check(const struct lull_criterion *criterion, struct lull_err
 #if defined(__GNUC__)
 __attribute__((format(printf, 3, 4)))
 #endif
-int32_t lull_error_set(struct lull_error *err, int32_t code, const char *format, ...);
+int32_t
+lull_error_set(struct lull_error *err, int32_t code, const char *format, ...);
 
 #ifdef __cplusplus
 }

@@ -15,22 +15,67 @@
 #endif
 
 enum fault {
-    NONE, LEAK, FILE_LEAK, WIDE_WRITE, FP_CONTROL, THREAD, BATCH_INDEX, REPEAT, NO_RESTART, GLOBAL_STATE, TIGHT_STRIDES,
-    ONLY_F32, GLOBAL_SPP, KEEPS_POINTER, DIVIDES_BY_ZERO, PRINTS, EXITS, CRASHES_AT_1X1, ANY_KEY, ANY_VALUE, LOAD_SHORT,
-    LOAD_DIRTY, ALLOCATES, RACE, NEXT_IN_PAST, READS_BEYOND, NO_PLANE_CHECK, TOUCHES_INSTANCE, UNCHECKED_MALLOC, STOPS_AT_0,
-    HANGS, TWO_FRAMES, ANY_ID, RANDOM, SHORT_STRUCT, ANONYMOUS_KEY, SAVE_IGNORES, READS_LATER_FIELD, FAULT_COUNT
+    NONE,
+    LEAK,
+    FILE_LEAK,
+    WIDE_WRITE,
+    FP_CONTROL,
+    THREAD,
+    BATCH_INDEX,
+    REPEAT,
+    NO_RESTART,
+    GLOBAL_STATE,
+    TIGHT_STRIDES,
+    ONLY_F32,
+    GLOBAL_SPP,
+    KEEPS_POINTER,
+    DIVIDES_BY_ZERO,
+    PRINTS,
+    EXITS,
+    CRASHES_AT_1X1,
+    ANY_KEY,
+    ANY_VALUE,
+    LOAD_SHORT,
+    LOAD_DIRTY,
+    ALLOCATES,
+    RACE,
+    NEXT_IN_PAST,
+    READS_BEYOND,
+    NO_PLANE_CHECK,
+    TOUCHES_INSTANCE,
+    UNCHECKED_MALLOC,
+    STOPS_AT_0,
+    HANGS,
+    TWO_FRAMES,
+    ANY_ID,
+    RANDOM,
+    SHORT_STRUCT,
+    ANONYMOUS_KEY,
+    SAVE_IGNORES,
+    READS_LATER_FIELD,
+    FAULT_COUNT
 };
 
 enum { THRESHOLD, FIRST_SPP, FAULT, PARAM_COUNT };
 enum { KEPT = 3 };
 
 static const struct lull_param params[PARAM_COUNT] = {
-    [THRESHOLD] = {.name = "threshold", .help = "largest relative change of the mean", .default_value = "0.01",
-                   .max = 1, .type = LULL_PARAM_FLOAT},
-    [FIRST_SPP] = {.name = "first-spp", .help = "samples before the first check", .default_value = "4",
-                   .min = 2, .max = 1e6, .type = LULL_PARAM_INT},
-    [FAULT] = {.name = "fault", .help = "the rule to break, 0 for none", .default_value = "0",
-               .max = FAULT_COUNT - 1, .type = LULL_PARAM_INT},
+    [THRESHOLD] = {.name = "threshold",
+                   .help = "largest relative change of the mean",
+                   .default_value = "0.01",
+                   .max = 1,
+                   .type = LULL_PARAM_FLOAT},
+    [FIRST_SPP] = {.name = "first-spp",
+                   .help = "samples before the first check",
+                   .default_value = "4",
+                   .min = 2,
+                   .max = 1e6,
+                   .type = LULL_PARAM_INT},
+    [FAULT] = {.name = "fault",
+               .help = "the rule to break, 0 for none",
+               .default_value = "0",
+               .max = FAULT_COUNT - 1,
+               .type = LULL_PARAM_INT},
 };
 
 /* What a block answered, by spp: the last KEPT checks. */
@@ -120,9 +165,14 @@ static void misbehave(const struct lull_instance *in, const struct lull_block *b
 {
     switch (fault_of(in)) {
 #if defined(__SSE__)
-    case FP_CONTROL: _mm_setcsr(_mm_getcsr() | 0x8040); break;
+    case FP_CONTROL:
+        _mm_setcsr(_mm_getcsr() | 0x8040);
+        break;
 #endif
-    case PRINTS: puts("hello"); fflush(stdout); break;
+    case PRINTS:
+        puts("hello");
+        fflush(stdout);
+        break;
     case CRASHES_AT_1X1:
         if (block->x1 - block->x0 == 1 && block->y1 - block->y0 == 1)
             abort();
@@ -135,8 +185,11 @@ static void misbehave(const struct lull_instance *in, const struct lull_block *b
     case HANGS:
         for (;;)
             pause();
-    case RACE: shared_scratch[0] += 1; break;
-    default: break;
+    case RACE:
+        shared_scratch[0] += 1;
+        break;
+    default:
+        break;
     }
 }
 
@@ -209,7 +262,8 @@ static const struct ex_rule ex_rule = {
     .judge = judge,
 };
 
-/* --- functions of the table ------------------------------------------------------------------------------------------------ */
+/* --- functions of the table
+ * ------------------------------------------------------------------------------------------------ */
 
 static void *sleeper(void *arg)
 {

@@ -13,7 +13,8 @@ static inline int32_t stub_create(const struct lull_host *host, const struct lul
     return LULL_E_UNSUPPORTED;
 }
 
-static inline int32_t stub_requirements(const struct lull_instance *in, struct lull_requirements *req, struct lull_error *err)
+static inline int32_t stub_requirements(const struct lull_instance *in, struct lull_requirements *req,
+                                        struct lull_error *err)
 {
     (void)in, (void)req, (void)err;
     return LULL_E_UNSUPPORTED;
@@ -44,12 +45,12 @@ static inline const void *stub_extension(const char *id)
     return NULL;
 }
 
-#define STUB(the_id)                                                                                                       \
-    {                                                                                                                      \
-        .struct_size = sizeof(struct lull_criterion), .api_minor = LULL_API_MINOR, .id = the_id, .name = "stub",          \
-        .version = "1", .description = "does nothing", .create = stub_create, .requirements = stub_requirements,          \
-        .begin_frame = stub_begin, .evaluate = stub_evaluate, .end_frame = stub_end, .destroy = stub_end,                  \
-        .get_extension = stub_extension                                                                                    \
+#define STUB(the_id)                                                                                                        \
+    {                                                                                                                       \
+        .struct_size = sizeof(struct lull_criterion), .api_minor = LULL_API_MINOR, .id = the_id, .name = "stub",            \
+        .version = "1", .description = "does nothing", .create = stub_create, .requirements = stub_requirements,            \
+        .begin_frame = stub_begin, .evaluate = stub_evaluate, .end_frame = stub_end, .destroy = stub_end,                   \
+        .get_extension = stub_extension                                                                                     \
     }
 
 #endif
