@@ -13,12 +13,12 @@
 #include "eval/network.h"
 #include "eval/report.h"
 
-enum { MAX_MODELS = 8, MAX_METHODS = 8 + MAX_MODELS, KEY_EARLY = 256, KEY_NO_QUALITY, KEY_PRECISION, KEY_RETUNE };
+enum { MAX_MODELS = 8, MAX_METHODS = 8 + MAX_MODELS, KEY_EARLY = 256, KEY_NO_QUALITY, KEY_PRECISION, KEY_RETUNE, KEY_RECORDED, KEY_RATIO };
 
 struct options {
     const char *data, *out, *models[MAX_MODELS];
-    int n_models, json, quality, threads, window, retune;
-    double early;
+    int n_models, json, quality, threads, window, retune, recorded;
+    double early, ratio;
     enum ggn_precision precision;
 };
 
@@ -30,6 +30,8 @@ static const struct argp_option option_table[] = {
     {"early", KEY_EARLY, "RATE", 0, "early-stop rate that cuts are tuned for on the training scenes (default 0.05)", 3},
     {"retune", KEY_RETUNE, NULL, 0, "tune the models' thresholds too, on the validation scenes, instead of taking the stored ones", 3},
     {"no-quality", KEY_NO_QUALITY, NULL, 0, "skip FLIP and SSIM at the stop", 3},
+    {"recorded", KEY_RECORDED, NULL, 0, "stop at the last recorded level instead of going on with the samples of the reference", 3},
+    {"ratio", KEY_RATIO, "R", 0, "thin the levels to this ratio of samples (SIN3D: 1.15); default: keep all", 3},
     {"window", 'w', "S", 0, "levels that a window has when no model says so (default 6)", 3},
     {"precision", KEY_PRECISION, "f32|bf16", 0, "arithmetic of the models", 3},
     {"threads", 't', "N", 0, "worker threads (default: all processors)", 4},
@@ -47,6 +49,12 @@ static error_t parse(int key, char *arg, struct argp_state *state)
     case 'j': o->json = 1; return 0;
     case KEY_NO_QUALITY: o->quality = 0; return 0;
     case KEY_RETUNE: o->retune = 1; return 0;
+    case KEY_RECORDED: o->recorded = 1; return 0;
+    case KEY_RATIO:
+        o->ratio = strtod(arg, &end);
+        if (end == arg || *end != '\0' || !(o->ratio >= 1.0 && o->ratio <= 16.0))
+            argp_error(state, "--ratio %s: expected 1 … 16", arg);
+        return 0;
     case 'm':
         if (o->n_models == MAX_MODELS)
             argp_error(state, "more than %d models", MAX_MODELS);
@@ -81,7 +89,6 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 
 struct job {
     const struct options *o;
-    struct ggn_dataset data;
     struct ggn_eval_set set;
     struct ggn_model *models[MAX_MODELS];
     struct ggn_method methods[MAX_METHODS];
@@ -174,14 +181,14 @@ static int report(struct job *j, int skipped, struct ggn_err *err)
     struct ggn_method_metrics metrics[MAX_METHODS];
     cJSON *root = cJSON_CreateObject();
     cJSON_AddStringToObject(root, "data", j->o->data);
-    cJSON_AddStringToObject(root, "labels", label_source(&j->data));
+    cJSON_AddStringToObject(root, "labels", label_source(&j->set.chains.data));
     cJSON_AddNumberToObject(root, "window", j->set.window);
     cJSON_AddNumberToObject(root, "early_rate_tuned_for", j->o->early);
     cJSON_AddStringToObject(root, "tuned_on", ggn_split_names[j->tuning]);
     cJSON *splits = cJSON_AddObjectToObject(root, "splits");
     int rc = GGN_OK;
     if (!j->o->json)
-        printf("labels: %s; cuts tuned on %s for %.1f %% early stops%s\n", label_source(&j->data), ggn_split_names[j->tuning], 100.0 * j->o->early,
+        printf("labels: %s; cuts tuned on %s for %.1f %% early stops%s\n", label_source(&j->set.chains.data), ggn_split_names[j->tuning], 100.0 * j->o->early,
                skipped > 0 ? "; views without labels are left out" : "");
     for (int split = 0; split < GGN_SPLITS && rc == GGN_OK; split++) {
         if (ggn_eval_count(&j->set, (enum ggn_split)split) == 0)
@@ -228,10 +235,10 @@ int ggn_cmd_evaluate(int argc, char **argv)
         rc = ggn_fail(&err, GGN_EIO, "%s: %s", o.out, strerror(errno));
     if (rc == GGN_OK)
         rc = load_models(&j, &window, &err);
-    if (rc == GGN_OK)
-        rc = ggn_dataset_open(o.data, &j.data, &err);
-    if (rc == GGN_OK)
-        rc = ggn_eval_set_load(&j.set, &j.data, window, o.quality, threads, &skipped, &err);
+    if (rc == GGN_OK) {
+        struct ggn_eval_options eo = {.dir = o.data, .window = window, .quality = o.quality, .recorded = o.recorded, .ratio = o.ratio, .seed = 1};
+        rc = ggn_eval_set_load(&j.set, &eo, threads, &skipped, &err);
+    }
     if (rc == GGN_OK) {
         j.tuning = ggn_eval_count(&j.set, GGN_SPLIT_TRAIN) > 0 ? GGN_SPLIT_TRAIN : j.set.blocks[0].split;
         j.tuning_models = ggn_eval_count(&j.set, GGN_SPLIT_VALIDATION) > 0 ? GGN_SPLIT_VALIDATION : j.tuning;
@@ -244,7 +251,6 @@ int ggn_cmd_evaluate(int argc, char **argv)
     for (int i = 0; i < j.n; i++)
         ggn_method_release(&j.methods[i]);
     ggn_eval_set_release(&j.set);
-    ggn_dataset_release(&j.data);
     for (int i = 0; i < o.n_models; i++)
         ggn_model_destroy(j.models[i]);
     ggn_threads_destroy(threads);

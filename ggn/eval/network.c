@@ -22,45 +22,36 @@ struct run {
     void **history;           /* [workers] */
 };
 
-static int check_size(const struct ggn_model *model, const struct ggn_seq_block *p, struct ggn_err *err)
+static int check_size(const struct ggn_model *model, const struct ggn_chains *c, struct ggn_err *err)
 {
-    if ((int)p->width != model->hyper.width || (int)p->height != model->hyper.height)
-        return ggn_fail(err, GGN_EINVAL, "block %u is %ux%u, the model judges %dx%d", p->id, p->width, p->height, model->hyper.width, model->hyper.height);
+    if (c->width != model->hyper.width || c->height != model->hyper.height)
+        return ggn_fail(err, GGN_EINVAL, "the blocks are %dx%d, the model judges %dx%d", c->width, c->height, model->hyper.width, model->hyper.height);
     return GGN_OK;
 }
 
-static int judge_block(void *data, int index, const struct ggn_seq_block *p, int worker, struct ggn_err *err)
+static int judge_block(void *data, int index, int worker, struct ggn_err *err)
 {
     struct run *r = data;
     const struct ggn_eval_block *b = &r->set->blocks[index];
+    const struct ggn_chain *c = &r->set->chains.chains[b->chain];
+    size_t values = ggn_chains_values(&r->set->chains);
     void *history = r->history[worker];
     double last = 0.0;
-    int rc = check_size(r->model, p, err);
-    if (rc != GGN_OK)
-        return rc;
-    uint8_t *rgb = malloc(3 * (size_t)p->width * p->height);
-    if (rgb == NULL)
-        return ggn_fail_nomem(err, "evaluation");
+    int rc = GGN_OK;
     ggn_history_clear(history);
-    for (uint32_t i = 0; i < p->n_levels && rc == GGN_OK; i++) {
-        double spp = p->levels[i].spp, p_noisy;
-        if (last > 0.0 && spp < spacing_slack * r->model->calibration.spacing * last)
+    for (int i = 0; i < c->n_levels && rc == GGN_OK; i++) {
+        size_t at = b->first + (size_t)i - (size_t)(r->set->window - 1);
+        double p_noisy;
+        if (last > 0.0 && c->spp[i] < spacing_slack * r->model->calibration.spacing * last)
             continue;
-        last = spp;
-        rc = ggn_seq_display_planar(p, &p->levels[i], rgb, err);
-        if (rc != GGN_OK)
-            break;
-        ggn_infer_push(r->infer[worker], history, rgb, p->levels[i].spp);
-        for (size_t c = b->first; c < b->end && ggn_history_count(history) == r->model->hyper.window; c++)
-            if (r->set->spp[c] == spp) {
-                rc = ggn_infer_decide(r->infer[worker], history, &p_noisy, NULL);
-                r->method->score[c] = p_noisy;
-            }
+        last = c->spp[i];
+        ggn_infer_push(r->infer[worker], history, c->noisy + values * (size_t)i, (uint64_t)c->spp[i]);
+        if (i < r->set->window - 1 || ggn_history_count(history) < r->model->hyper.window)
+            continue;
+        rc = ggn_infer_decide(r->infer[worker], history, &p_noisy, NULL);
+        r->method->score[at] = p_noisy;
     }
-    free(rgb);
-    if (rc != GGN_OK && err->text[0] == '\0')
-        ggn_fail(err, rc, "block %u: the model gives no decision", p->id);
-    return rc;
+    return rc == GGN_OK ? rc : ggn_fail(err, rc, "block %u: the model gives no decision", b->label.id);
 }
 
 int ggn_eval_network(struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_model *model, const char *name,
@@ -69,7 +60,7 @@ int ggn_eval_network(struct ggn_method *m, const struct ggn_eval_set *s, const s
     int workers = ggn_threads_count(threads);
     double *nothing = malloc(s->n * sizeof *nothing);
     struct run r = {s, model, m, calloc((size_t)workers, sizeof *r.infer), calloc((size_t)workers, sizeof *r.history)};
-    int rc = nothing == NULL || r.infer == NULL || r.history == NULL ? ggn_fail_nomem(err, name) : GGN_OK;
+    int rc = nothing == NULL || r.infer == NULL || r.history == NULL ? ggn_fail_nomem(err, name) : check_size(model, &s->chains, err);
     for (size_t i = 0; i < s->n && rc == GGN_OK; i++)
         nothing[i] = (double)NAN;
     if (rc == GGN_OK)
@@ -108,56 +99,39 @@ struct strip {
     char title[256];
 };
 
-static int make_strip(const struct ggn_eval_set *s, int index, const struct ggn_model *model, struct ggn_infer *infer, const char *path,
-                      int number, struct strip *strip, struct ggn_err *err)
+static int make_strip(const struct ggn_eval_set *s, int index, struct ggn_infer *infer, const char *path, int number, struct strip *strip,
+                      struct ggn_err *err)
 {
     const struct ggn_eval_block *b = &s->blocks[index];
-    const struct ggn_dataset_view *v = &s->data->views[b->view];
-    struct ggn_seq_block p;
-    int rc = ggn_manifest_read_block(v->dir, &v->manifest, b->index, &p, err);
-    if (rc != GGN_OK)
-        return rc;
-    size_t w = p.width, h = p.height, pixels = w * h;
-    uint8_t *bytes = malloc(6 * pixels), *rgb = malloc(9 * pixels);
+    const struct ggn_chain *chain = &s->chains.chains[b->chain];
+    size_t w = (size_t)s->chains.width, h = (size_t)s->chains.height, pixels = w * h;
+    uint8_t *rgb = malloc(9 * pixels);
     float *planes = malloc(9 * pixels * sizeof *planes);
     struct ggn_ssim_f32 *ssim = ggn_ssim_create_f32((int)h, (int)w, NULL, err);
-    uint8_t *noisy = bytes, *reference = bytes + 3 * pixels;
-    rc = check_size(model, &p, err);
-    if (rc == GGN_OK && p.reference == NULL)
-        rc = ggn_fail(err, GGN_EINVAL, "block %u has no reference", p.id);
-    if (rc == GGN_OK && (bytes == NULL || rgb == NULL || planes == NULL || ssim == NULL))
-        rc = ggn_fail_nomem(err, path);
-    if (rc == GGN_OK)
-        rc = ggn_seq_display_planar(&p, &p.levels[0], noisy, err);
-    if (rc == GGN_OK)
-        rc = ggn_seq_display_planar(&p, p.reference, reference, err);
+    int rc = rgb == NULL || planes == NULL || ssim == NULL ? ggn_fail_nomem(err, path) : GGN_OK;
     if (rc == GGN_OK) {
         float *part[3] = {planes, planes + 3 * pixels, planes + 6 * pixels};
+        const float *x[3][3];
         for (size_t i = 0; i < 3 * pixels; i++) {
-            part[0][i] = (float)noisy[i] / 255.0f;
-            part[2][i] = (float)reference[i] / 255.0f;
+            part[0][i] = (float)chain->noisy[i] / 255.0f;
+            part[2][i] = (float)chain->reference[i] / 255.0f;
         }
-        ggn_infer_denoise(infer, noisy, part[1]);
+        ggn_infer_denoise(infer, chain->noisy, part[1]);
         for (size_t k = 0; k < 3; k++)
-            for (size_t i = 0; i < pixels; i++)
-                for (size_t c = 0; c < 3; c++)
+            for (size_t c = 0; c < 3; c++) {
+                x[k][c] = part[k] + c * pixels;
+                for (size_t i = 0; i < pixels; i++)
                     rgb[3 * ((i / w) * 3 * w + k * w + i % w) + c] = (uint8_t)(255.0f * part[k][c * pixels + i] + 0.5f);
-        const float *x[2][3], *y[3];
-        for (size_t c = 0; c < 3; c++) {
-            x[0][c] = part[0] + c * pixels;
-            x[1][c] = part[1] + c * pixels;
-            y[c] = part[2] + c * pixels;
-        }
-        double before = ggn_ssim_mean_f32(ssim, x[0], y, NULL, 3, (int)w, 0.0), after = ggn_ssim_mean_f32(ssim, x[1], y, NULL, 3, (int)w, 0.0);
-        snprintf(strip->title, sizeof strip->title, "%.80s block %u at %u spp: SSIM %.3f  denoised %.3f  reference", v->name, p.id, p.levels[0].spp, before, after);
+            }
+        double before = ggn_ssim_mean_f32(ssim, x[0], x[2], NULL, 3, (int)w, 0.0), after = ggn_ssim_mean_f32(ssim, x[1], x[2], NULL, 3, (int)w, 0.0);
+        snprintf(strip->title, sizeof strip->title, "%.80s block %u at %.0f spp: SSIM %.3f  denoised %.3f  reference",
+                 s->chains.data.views[b->view].name, b->label.id, chain->spp[0], before, after);
         snprintf(strip->file, sizeof strip->file, "%.4000s.part%d.png", path, number);
         rc = ggn_image8_write_png(strip->file, rgb, (int)(3 * w), (int)h, err);
     }
     ggn_ssim_destroy_f32(ssim);
     free(planes);
     free(rgb);
-    free(bytes);
-    ggn_seq_block_release(&p);
     return rc;
 }
 
@@ -172,10 +146,11 @@ int ggn_eval_denoiser_picture(const char *path, const struct ggn_eval_set *s, co
         return err->code;
     for (int pass = 0; pass < 2; pass++) /* first one block of each view */
         for (int b = 0; b < s->n_blocks && n < MOST && rc == GGN_OK; b++) {
-            if (s->blocks[b].split != split || (s->blocks[b].view == last_view) == (pass == 0))
+            if (s->blocks[b].split != split || (s->blocks[b].view == last_view) == (pass == 0) ||
+                s->chains.chains[s->blocks[b].chain].reference == NULL)
                 continue;
             last_view = s->blocks[b].view;
-            rc = make_strip(s, b, model, infer, path, n, &strips[n], err);
+            rc = make_strip(s, b, infer, path, n, &strips[n], err);
             n += rc == GGN_OK;
         }
     ggn_infer_destroy(infer);

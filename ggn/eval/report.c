@@ -202,7 +202,7 @@ static int plot_scores(const char *path, const struct ggn_eval_set *s, enum ggn_
     fputs("\nplot ", f);
     for (int k = 0; k < n; k++) {
         const struct ggn_eval_block *b = &s->blocks[chosen[k]];
-        const struct ggn_dataset_view *v = &s->data->views[b->view];
+        const struct ggn_dataset_view *v = &s->chains.data.views[b->view];
         char title[200];
         snprintf(title, sizeof title, "%.120s %u", v->name, v->manifest.blocks[b->index].id);
         fprintf(f, "%s$b%d with linespoints pt 7 ps 0.5 lw 2 lc '%s' title ", k > 0 ? ", " : "", k, colours[k]);
@@ -214,8 +214,8 @@ static int plot_scores(const char *path, const struct ggn_eval_set *s, enum ggn_
 
 static void fill_view(struct ggn_view *v, const struct ggn_eval_set *s, int view, const double *stop)
 {
-    const struct ggn_manifest *m = &s->data->views[view].manifest;
-    snprintf(v->name, sizeof v->name, "%.100s", s->data->views[view].name);
+    const struct ggn_manifest *m = &s->chains.data.views[view].manifest;
+    snprintf(v->name, sizeof v->name, "%.100s", s->chains.data.views[view].name);
     v->columns = (int)((m->width + m->block - 1) / m->block);
     for (int i = 0; i < v->n; i++)
         v->spp[i] = (double)NAN;
@@ -229,11 +229,11 @@ static void fill_view(struct ggn_view *v, const struct ggn_eval_set *s, int view
 /* Thresholds (stop NULL) or stops of the split's views, for the heat maps. */
 static int make_maps(struct ggn_thresholds *t, const struct ggn_eval_set *s, enum ggn_split split, const double *stop, struct ggn_err *err)
 {
-    *t = (struct ggn_thresholds){.views = calloc((size_t)s->data->n, sizeof *t->views)};
+    *t = (struct ggn_thresholds){.views = calloc((size_t)s->chains.data.n, sizeof *t->views)};
     if (t->views == NULL)
         return ggn_fail_nomem(err, "maps");
-    for (int v = 0; v < s->data->n; v++) {
-        const struct ggn_manifest *m = &s->data->views[v].manifest;
+    for (int v = 0; v < s->chains.data.n; v++) {
+        const struct ggn_manifest *m = &s->chains.data.views[v].manifest;
         uint32_t blocks = (m->width + m->block - 1) / m->block * ((m->height + m->block - 1) / m->block);
         int used = 0;
         for (int b = 0; b < s->n_blocks; b++)
@@ -275,7 +275,7 @@ static int method_pictures(const char *dir, const struct ggn_eval_set *s, enum g
         for (int b = 0; b < s->n_blocks; b++) {
             const struct ggn_eval_block *e = &s->blocks[b];
             if (e->split == split)
-                fprintf(out.file, "%s;%u;%.6g;%d;%.6g\n", s->data->views[e->view].name, e->label.id, e->label.threshold, e->label.censored, m->stop[b]);
+                fprintf(out.file, "%s;%u;%.6g;%d;%.6g\n", s->chains.data.views[e->view].name, e->label.id, e->label.threshold, e->label.censored, m->stop[b]);
         }
         rc = ggn_fio_commit(&out, err);
     }

@@ -9,6 +9,7 @@
 
 void ggn_eval_set_release(struct ggn_eval_set *s)
 {
+    ggn_chains_release(&s->chains);
     free(s->blocks);
     free(s->spp); /* one allocation for all columns of doubles */
     free(s->noisy);
@@ -23,31 +24,41 @@ static int scene_index(const struct ggn_dataset *d, int view)
     return view;
 }
 
+static uint32_t manifest_index(const struct ggn_manifest *m, uint32_t id)
+{
+    uint32_t i = 0;
+    while (i < m->n_blocks && m->blocks[i].id != id)
+        i++;
+    return i;
+}
+
 /* Lists the labelled blocks and counts the cases. */
 static int list_blocks(struct ggn_eval_set *s, int *skipped, struct ggn_err *err)
 {
-    size_t room = 1;
-    *skipped = 0;
-    for (int v = 0; v < s->data->n; v++)
-        room += s->data->views[v].manifest.n_blocks;
-    s->blocks = malloc(room * sizeof *s->blocks);
+    const struct ggn_dataset *d = &s->chains.data;
+    s->n_scenes = d->n;
+    s->blocks = malloc((size_t)(s->chains.n > 0 ? s->chains.n : 1) * sizeof *s->blocks);
     if (s->blocks == NULL)
         return ggn_fail_nomem(err, "evaluation");
-    for (int v = 0; v < s->data->n; v++) {
-        const struct ggn_dataset_view *view = &s->data->views[v];
-        const struct ggn_manifest *m = &view->manifest;
-        *skipped += !view->has_labels;
-        for (uint32_t i = 0; i < m->n_blocks && view->has_labels; i++) {
-            const struct ggn_label *label = ggn_labels_find(&view->labels, m->blocks[i].id);
-            if (label == NULL)
-                continue;
-            if (m->n_levels < (uint32_t)s->window)
-                return ggn_fail(err, GGN_EINVAL, "%s: %u level%s, a window needs %d", view->dir, m->n_levels, m->n_levels == 1 ? "" : "s", s->window);
-            size_t cases = m->n_levels - (uint32_t)s->window + 1;
-            s->blocks[s->n_blocks++] = (struct ggn_eval_block){.view = v, .scene = scene_index(s->data, v), .index = i, .split = view->split,
-                                                               .label = *label, .cap = m->levels[m->n_levels - 1], .first = s->n, .end = s->n + cases};
-            s->n += cases;
+    *skipped = 0;
+    for (int v = 0; v < d->n; v++)
+        *skipped += !d->views[v].has_labels;
+    for (int i = 0; i < s->chains.n; i++) {
+        const struct ggn_chain *c = &s->chains.chains[i];
+        const struct ggn_dataset_view *view = &d->views[c->view];
+        if (!c->has_label)
+            continue;
+        if (c->n_levels < s->window)
+            return ggn_fail(err, GGN_EINVAL, "%s: %d level%s, a window needs %d", view->dir, c->n_levels, c->n_levels == 1 ? "" : "s", s->window);
+        size_t cases = (size_t)(c->n_levels - s->window + 1);
+        struct ggn_eval_block b = {.chain = i, .view = c->view, .scene = scene_index(d, c->view), .index = manifest_index(&view->manifest, c->block),
+                                   .split = view->split, .label = c->label, .cap = c->spp[c->n_levels - 1], .first = s->n, .end = s->n + cases};
+        if (b.label.threshold >= b.cap) {
+            b.label.threshold = b.cap;
+            b.label.censored = 1;
         }
+        s->blocks[s->n_blocks++] = b;
+        s->n += cases;
     }
     if (s->n_blocks == 0)
         return ggn_fail(err, GGN_EINVAL, "no labelled block in the data (run ggn label first)");
@@ -70,9 +81,9 @@ static int make_columns(struct ggn_eval_set *s, struct ggn_err *err)
     }
     for (int b = 0; b < s->n_blocks; b++) {
         const struct ggn_eval_block *block = &s->blocks[b];
-        const struct ggn_manifest *m = &s->data->views[block->view].manifest;
+        const struct ggn_chain *c = &s->chains.chains[block->chain];
         for (size_t i = block->first; i < block->end; i++) {
-            s->spp[i] = m->levels[i - block->first + (size_t)s->window - 1];
+            s->spp[i] = c->spp[i - block->first + (size_t)s->window - 1];
             s->noisy[i] = (signed char)ggn_label_noisy(&block->label, s->spp[i]);
         }
     }
@@ -82,8 +93,7 @@ static int make_columns(struct ggn_eval_set *s, struct ggn_err *err)
 /* --- blocks in parallel --- */
 
 struct each {
-    const struct ggn_eval_set *set;
-    int (*fn)(void *, int, const struct ggn_seq_block *, int, struct ggn_err *);
+    int (*fn)(void *, int, int, struct ggn_err *);
     void *data;
     int *rc;
     struct ggn_err *errs;
@@ -92,22 +102,14 @@ struct each {
 static void each_block(void *data, long i, int worker)
 {
     struct each *e = data;
-    const struct ggn_eval_block *b = &e->set->blocks[i];
-    const struct ggn_dataset_view *view = &e->set->data->views[b->view];
-    struct ggn_seq_block pixels;
-    e->rc[i] = ggn_manifest_read_block(view->dir, &view->manifest, b->index, &pixels, &e->errs[i]);
-    if (e->rc[i] != GGN_OK)
-        return;
-    e->rc[i] = e->fn(e->data, (int)i, &pixels, worker, &e->errs[i]);
-    ggn_seq_block_release(&pixels);
+    e->rc[i] = e->fn(e->data, (int)i, worker, &e->errs[i]);
 }
 
 int ggn_eval_each_block(const struct ggn_eval_set *set, struct ggn_threads *threads,
-                        int (*fn)(void *data, int block, const struct ggn_seq_block *pixels, int worker, struct ggn_err *err), void *data,
-                        struct ggn_err *err)
+                        int (*fn)(void *data, int block, int worker, struct ggn_err *err), void *data, struct ggn_err *err)
 {
     int n = set->n_blocks, rc = GGN_OK;
-    struct each e = {.set = set, .fn = fn, .data = data, .rc = calloc((size_t)n, sizeof(int)), .errs = calloc((size_t)n, sizeof(struct ggn_err))};
+    struct each e = {.fn = fn, .data = data, .rc = calloc((size_t)n, sizeof(int)), .errs = calloc((size_t)n, sizeof(struct ggn_err))};
     if (e.rc == NULL || e.errs == NULL)
         rc = ggn_fail_nomem(err, "evaluation");
     else
@@ -149,60 +151,132 @@ static void interleave(const uint8_t *planar, size_t pixels, uint8_t *rgb)
             rgb[3 * i + c] = planar[c * pixels + i];
 }
 
-static int measure_quality(struct ggn_eval_set *s, const struct ggn_eval_block *block, const struct ggn_seq_block *p, struct ggn_err *err)
+static int measure_quality(struct ggn_eval_set *s, const struct ggn_eval_block *block, struct ggn_err *err)
 {
-    size_t pixels = (size_t)p->width * p->height;
-    int w = (int)p->width, h = (int)p->height, rc;
-    uint8_t *bytes = malloc(12 * pixels);
-    float *work = malloc(6 * pixels * sizeof *work);
+    const struct ggn_chain *c = &s->chains.chains[block->chain];
+    int w = s->chains.width, h = s->chains.height, rc = GGN_OK;
+    size_t pixels = (size_t)w * (size_t)h, values = 3 * pixels;
+    uint8_t *rgb = malloc(2 * values);
+    float *work = malloc(2 * values * sizeof *work);
     struct ggn_ssim_f32 *ssim = ggn_ssim_create_f32(h, w, NULL, err);
-    if (bytes == NULL || work == NULL || ssim == NULL) {
+    if (rgb == NULL || work == NULL || ssim == NULL) {
         rc = ggn_fail_nomem(err, "quality");
         goto out;
     }
-    uint8_t *reference = bytes, *level = bytes + 3 * pixels, *reference_rgb = bytes + 6 * pixels, *level_rgb = bytes + 9 * pixels;
-    rc = ggn_seq_display_planar(p, p->reference, reference, err);
-    interleave(reference, pixels, reference_rgb);
+    interleave(c->reference, pixels, rgb);
     for (size_t i = block->first; i < block->end && rc == GGN_OK; i++) {
+        const uint8_t *level = c->noisy + (i - block->first + (size_t)s->window - 1) * values;
         struct ggn_flip_stats flip;
-        rc = ggn_seq_display_planar(p, ggn_seq_level(p, (uint32_t)s->spp[i]), level, err);
-        if (rc != GGN_OK)
-            break;
-        interleave(level, pixels, level_rgb);
-        rc = ggn_flip(reference_rgb, level_rgb, w, h, GGN_FLIP_PPD, NULL, &flip, err);
+        interleave(level, pixels, rgb + values);
+        rc = ggn_flip(rgb, rgb + values, w, h, GGN_FLIP_PPD, NULL, &flip, err);
         s->flip[i] = flip.mean;
-        s->ssim[i] = ssim_of(ssim, level, reference, pixels, w, work);
+        s->ssim[i] = ssim_of(ssim, level, c->reference, pixels, w, work);
     }
 out:
     ggn_ssim_destroy_f32(ssim);
     free(work);
-    free(bytes);
+    free(rgb);
     return rc;
 }
 
-static int fill_block(void *data, int index, const struct ggn_seq_block *p, int worker, struct ggn_err *err)
+/* Share of pixels that the tail guard of halfbuf would call unsettled at `scale` times the last recorded half-buffer difference. */
+static double unsettled_share(const float *y, const float *d, size_t pixels, double scale)
 {
-    struct fill *f = data;
-    struct ggn_eval_set *s = f->set;
-    const struct ggn_eval_block *block = &s->blocks[index];
-    (void)worker;
-    for (size_t i = block->first; i < block->end; i++) {
-        const struct ggn_seq_record *r = ggn_seq_level(p, (uint32_t)s->spp[i]);
+    size_t n = 0;
+    for (size_t i = 0; i < pixels; i++)
+        n += scale * fabs((double)d[i]) > 0.5 * fmax(fabs((double)y[i]), 0.02);
+    return (double)n / (double)pixels;
+}
+
+/* The criteria's figures beyond the recording, from its last level. */
+static int extrapolate(struct ggn_eval_set *s, const struct ggn_eval_block *block, size_t from, const struct ggn_seq_block *p, struct ggn_err *err)
+{
+    const struct ggn_seq_record *last = &p->levels[p->n_levels - 1];
+    size_t pixels = (size_t)p->width * p->height;
+    double half = ggn_seq_stat(last, "half_unsettled");
+    float *planes = malloc(4 * pixels * sizeof *planes);
+    int rc = planes == NULL ? ggn_fail_nomem(err, "evaluation") : ggn_seq_mean(p, last, planes, err);
+    if (rc == GGN_OK)
+        rc = ggn_seq_half_luminance(p, last, planes + 3 * pixels, err);
+    for (size_t i = 0; i < pixels && rc == GGN_OK; i++)
+        planes[i] = (float)ggn_luminance((double)planes[i], (double)planes[pixels + i], (double)planes[2 * pixels + i]);
+    for (size_t i = from; i < block->end && rc == GGN_OK; i++) {
+        double scale = sqrt(last->spp / s->spp[i]);
+        s->seconds[i] = ggn_seq_stat(last, "seconds") * s->spp[i] / last->spp;
+        s->dammertz[i] = scale * ggn_seq_stat(last, "dammertz");
+        s->rse[i] = scale * ggn_seq_stat(last, "rse");
+        s->half_unsettled[i] = unsettled_share(planes, planes + 3 * pixels, pixels, scale);
+        s->rse_unsettled[i] = half > 0.0 ? ggn_seq_stat(last, "rse_unsettled") * s->half_unsettled[i] / half : 0.0;
+    }
+    free(planes);
+    return rc;
+}
+
+static int fill_statistics(struct ggn_eval_set *s, const struct ggn_eval_block *block, struct ggn_err *err)
+{
+    const struct ggn_dataset_view *v = &s->chains.data.views[block->view];
+    struct ggn_seq_block p;
+    size_t i = block->first;
+    int rc = ggn_manifest_read_block(v->dir, &v->manifest, block->index, &p, err);
+    if (rc != GGN_OK)
+        return rc;
+    for (const struct ggn_seq_record *r; i < block->end && (r = ggn_seq_level(&p, (uint32_t)s->spp[i])) != NULL; i++) {
         s->seconds[i] = ggn_seq_stat(r, "seconds");
         s->dammertz[i] = ggn_seq_stat(r, "dammertz");
         s->half_unsettled[i] = ggn_seq_stat(r, "half_unsettled");
         s->rse[i] = ggn_seq_stat(r, "rse");
         s->rse_unsettled[i] = ggn_seq_stat(r, "rse_unsettled");
     }
-    return f->quality && p->reference != NULL ? measure_quality(s, block, p, err) : GGN_OK;
+    if (i < block->end)
+        rc = extrapolate(s, block, i, &p, err);
+    ggn_seq_block_release(&p);
+    return rc;
 }
 
-int ggn_eval_set_load(struct ggn_eval_set *out, const struct ggn_dataset *data, int window, int quality, struct ggn_threads *threads,
-                      int *skipped, struct ggn_err *err)
+static int fill_block(void *data, int index, int worker, struct ggn_err *err)
 {
-    struct ggn_eval_set s = {.data = data, .window = window, .n_scenes = data->n};
-    struct fill f = {&s, quality};
-    int rc = list_blocks(&s, skipped, err);
+    struct fill *f = data;
+    const struct ggn_eval_block *block = &f->set->blocks[index];
+    (void)worker;
+    int rc = fill_statistics(f->set, block, err);
+    return rc == GGN_OK && f->quality && f->set->chains.chains[block->chain].reference != NULL ? measure_quality(f->set, block, err) : rc;
+}
+
+/* Continues every labelled chain, also those that training has no use for: a method that does not stop in time must be seen to. */
+static int extend(struct ggn_chains *chains, uint32_t seed, struct ggn_err *err)
+{
+    struct ggn_label *labels = malloc((size_t)(chains->n > 0 ? chains->n : 1) * sizeof *labels);
+    if (labels == NULL)
+        return ggn_fail_nomem(err, "evaluation");
+    for (int i = 0; i < chains->n; i++) {
+        labels[i] = chains->chains[i].label;
+        chains->chains[i].label = (struct ggn_label){labels[i].id, INFINITY, 0};
+    }
+    int rc = ggn_chains_extend(chains, seed, err);
+    for (int i = 0; i < chains->n; i++) {
+        const struct ggn_chain *c = &chains->chains[i];
+        chains->chains[i].label = labels[i];
+        /* A threshold that is only known to lie beyond the recording stays there. */
+        if (labels[i].censored)
+            for (int k = c->n_levels - 1; k > 0 && c->spp[k] > labels[i].threshold; k--)
+                chains->chains[i].n_levels = k;
+    }
+    free(labels);
+    return rc;
+}
+
+int ggn_eval_set_load(struct ggn_eval_set *out, const struct ggn_eval_options *o, struct ggn_threads *threads, int *skipped, struct ggn_err *err)
+{
+    struct ggn_eval_set s = {.window = o->window};
+    struct ggn_chains_options co = {.dir = o->dir, .ratio = o->ratio, .with_test = 1};
+    struct fill f = {&s, o->quality};
+    int rc = ggn_chains_load(&s.chains, &co, err);
+    if (rc != GGN_OK)
+        return rc;
+    if (!o->recorded)
+        rc = extend(&s.chains, o->seed, err);
+    if (rc == GGN_OK)
+        rc = list_blocks(&s, skipped, err);
     if (rc == GGN_OK)
         rc = make_columns(&s, err);
     if (rc == GGN_OK)

@@ -6,20 +6,21 @@
 #define GGN_EVAL_SET_H
 
 #include "base/threads.h"
-#include "data/dataset.h"
+#include "train/chains.h"
 
 struct ggn_eval_block {
-    int view;          /* index into data->views */
+    int chain;         /* index into chains.chains */
+    int view;          /* index into chains.data.views */
     int scene;         /* index that equal scene names share */
     uint32_t index;    /* in the view's manifest */
     enum ggn_split split;
-    struct ggn_label label;
+    struct ggn_label label; /* thresholds beyond the last level are censored there */
     double cap;        /* last level, spp */
     size_t first, end; /* its cases */
 };
 
 struct ggn_eval_set {
-    const struct ggn_dataset *data; /* borrows */
+    struct ggn_chains chains;       /* owns: the images, continued beyond the recording where possible */
     int window;                     /* S: the first S-1 levels of a block make no case */
     int n_blocks, n_scenes;
     struct ggn_eval_block *blocks;  /* owns; ordered by view, then as the manifest lists them */
@@ -30,15 +31,23 @@ struct ggn_eval_set {
     double *flip, *ssim;            /* own; [n]: against the block's reference; NaN unless asked for */
 };
 
-/* Views without labels are left out (and so counted in *skipped). quality: also compute FLIP and SSIM of every case. GGN_EINVAL if
- * nothing is left. Parallel over blocks; the same result for any number of threads. */
-int ggn_eval_set_load(struct ggn_eval_set *set, const struct ggn_dataset *data, int window, int quality, struct ggn_threads *threads,
-                      int *skipped, struct ggn_err *err);
+struct ggn_eval_options {
+    const char *dir;  /* data set */
+    int window;       /* S */
+    int quality;      /* also compute FLIP and SSIM of every case */
+    int recorded;     /* only recorded levels; else each block goes on to about 0.7 of its reference's samples (ggn_chains_extend) */
+    double ratio;     /* thin the levels to at least this ratio; 0: keep all */
+    uint32_t seed;    /* of the continuation */
+};
+
+/* Blocks without a label are left out; *skipped counts the views without any. GGN_EINVAL if nothing is left. Errors of the criteria at levels beyond
+ * the recording are scaled from the last recorded one (by the square root of the samples). The same result for any number of threads. */
+int ggn_eval_set_load(struct ggn_eval_set *set, const struct ggn_eval_options *options, struct ggn_threads *threads, int *skipped,
+                      struct ggn_err *err);
 void ggn_eval_set_release(struct ggn_eval_set *set);
 
-/* Calls fn for each block with its pixels loaded, in parallel; stops at the first error (in order of blocks). */
+/* Calls fn for each block, in parallel; returns the first error (in order of blocks). */
 int ggn_eval_each_block(const struct ggn_eval_set *set, struct ggn_threads *threads,
-                        int (*fn)(void *data, int block, const struct ggn_seq_block *pixels, int worker, struct ggn_err *err), void *data,
-                        struct ggn_err *err);
+                        int (*fn)(void *data, int block, int worker, struct ggn_err *err), void *data, struct ggn_err *err);
 
 #endif

@@ -41,8 +41,8 @@ fails "import: thresholds that do not fit" '2 blocks, but 1' sh -c "printf 'p3d_
 $ggn evaluate -d "$tmp/data" --json >"$tmp/out" 2>"$tmp/err" && grep -q '"labels":.*"human"' "$tmp/out" && grep -q '"-spp"' "$tmp/out" &&
     ! grep -q halfbuf "$tmp/out"
 check "evaluate without recorded statistics" $?
-$ggn evaluate -d "$tmp/data" -o "$tmp/report" >"$tmp/out" 2>"$tmp/err" && [ -s "$tmp/report/figures.json" ] && [ -s "$tmp/report/none-roc.png" ] &&
-    [ -s "$tmp/report/none-heatmaps-spp.png" ] && [ "$(find "$tmp/report" -name '.tmp*' | wc -l)" -eq 0 ] && grep -q '^constant' "$tmp/out"
+$ggn evaluate -d "$tmp/data" -o "$tmp/report" >"$tmp/out" 2>"$tmp/err" && [ -s "$tmp/report/figures.json" ] && [ -s "$tmp/report/train-roc.png" ] &&
+    [ -s "$tmp/report/train-heatmaps-spp.png" ] && [ "$(find "$tmp/report" -name '.tmp*' | wc -l)" -eq 0 ] && grep -q '^constant' "$tmp/out"
 check "evaluate: table and pictures" $?
 fails "evaluate: window longer than the levels" 'a window needs 9' $ggn evaluate -d "$tmp/data" -w 9
 fails "evaluate: no model file" 'No such file' $ggn evaluate -d "$tmp/data" -m "$tmp/none.ggn"

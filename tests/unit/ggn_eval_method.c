@@ -18,7 +18,6 @@ static const uint32_t levels[] = {20, 40, 80, 160, 320, 640, 1280};
 enum { LEVELS = 7, WINDOW = 2, BLOCKS = 5 };
 
 static char root[] = "/tmp/ggn_eval.XXXXXX";
-static struct ggn_dataset data;
 static struct ggn_eval_set set;
 static struct ggn_threads *threads;
 
@@ -53,8 +52,8 @@ static int setup(void **state)
     fputs("{\"train\": [\"a\"], \"validation\": [\"b\"], \"test\": [\"c\"]}", f);
     fclose(f);
     threads = ggn_threads_create(2, &err);
-    if (threads == NULL || ggn_dataset_open(root, &data, &err) != GGN_OK ||
-        ggn_eval_set_load(&set, &data, WINDOW, 1, threads, &skipped, &err) != GGN_OK)
+    struct ggn_eval_options o = {.dir = root, .window = WINDOW, .quality = 1, .recorded = 1};
+    if (threads == NULL || ggn_eval_set_load(&set, &o, threads, &skipped, &err) != GGN_OK)
         fail_msg("%s", err.text);
     return 0;
 }
@@ -63,7 +62,6 @@ static int teardown(void **state)
 {
     (void)state;
     ggn_eval_set_release(&set);
-    ggn_dataset_release(&data);
     ggn_threads_destroy(threads);
     shell("rm -rf");
     return 0;
@@ -169,6 +167,34 @@ static void decisions(void **state)
     ggn_method_release(&m);
 }
 
+/* Blocks go on with the samples of their reference; one whose threshold is only known to lie beyond the recording does not. */
+static void continued(void **state)
+{
+    (void)state;
+    struct ggn_eval_options o = {.dir = root, .window = WINDOW, .quality = 1, .seed = 3};
+    struct ggn_eval_set more, again;
+    struct ggn_err err = {0};
+    int skipped;
+    if (ggn_eval_set_load(&more, &o, threads, &skipped, &err) != GGN_OK || ggn_eval_set_load(&again, &o, threads, &skipped, &err) != GGN_OK)
+        fail_msg("%s", err.text);
+    assert_int_equal(more.n_blocks, set.n_blocks);
+    assert_near(more.blocks[4].cap, 1280, 0);
+    assert_true(more.blocks[4].label.censored);
+    const struct ggn_eval_block *b = &more.blocks[3], *recorded = &set.blocks[3];
+    size_t known = recorded->end - recorded->first;
+    assert_true(b->cap > 2000 && b->end - b->first > known && !b->label.censored);
+    for (size_t i = 0; i < b->end - b->first; i++) {
+        if (i < known)
+            assert_near(more.dammertz[b->first + i], set.dammertz[recorded->first + i], 0);
+        if (i > 0)
+            assert_true(more.dammertz[b->first + i] < more.dammertz[b->first + i - 1] && more.flip[b->first + i] < more.flip[b->first + i - 1]);
+    }
+    for (size_t i = 0; i < more.n; i++)
+        assert_true(more.flip[i] == again.flip[i]);
+    ggn_eval_set_release(&more);
+    ggn_eval_set_release(&again);
+}
+
 static void one_class(void **state)
 {
     (void)state;
@@ -186,16 +212,17 @@ static void one_class(void **state)
     memcpy(set.noisy, keep, set.n);
     assert_int_equal(ggn_method_measure(&m, &set, GGN_SPLIT_NONE, &metrics, &err), GGN_EINVAL);
     ggn_method_release(&m);
+    struct ggn_eval_options o = {.dir = root, .window = LEVELS + 1, .recorded = 1};
     struct ggn_eval_set none;
     int skipped;
-    assert_int_equal(ggn_eval_set_load(&none, &data, LEVELS + 1, 0, threads, &skipped, &err), GGN_EINVAL);
+    assert_int_equal(ggn_eval_set_load(&none, &o, threads, &skipped, &err), GGN_EINVAL);
     assert_non_null(strstr(err.text, "a window needs 8"));
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(cases), cmocka_unit_test(informed_scores), cmocka_unit_test(fixed_stops), cmocka_unit_test(decisions),
+        cmocka_unit_test(cases), cmocka_unit_test(informed_scores), cmocka_unit_test(fixed_stops), cmocka_unit_test(decisions), cmocka_unit_test(continued),
         cmocka_unit_test(one_class),
     };
     return cmocka_run_group_tests_name("eval_method", tests, setup, teardown);
