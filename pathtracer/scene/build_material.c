@@ -141,6 +141,9 @@ static void make_dielectric(struct context *c)
 {
     pt_build_roughness(c->b, c->p, 0, 0, c->m);
     c->m->eta = (float)pt_build_index(c->b, c->p, "eta", 1.5);
+    /* Index-matched: nothing is bent or reflected, and light sampling may look through it. */
+    if (c->m->eta == 1)
+        c->m->kind = PT_MATERIAL_INTERFACE;
 }
 
 static void make_thin_dielectric(struct context *c)
