@@ -18,6 +18,7 @@ typedef float vf __attribute__((vector_size(8 * sizeof(float))));
 typedef int vi __attribute__((vector_size(8 * sizeof(float))));
 #define SET1(s) ((vf)_mm256_set1_ps(s))
 #define FMA(a, b, c) ((vf)_mm256_fmadd_ps((__m256)(a), (__m256)(b), (__m256)(c)))
+#define VSUM(v) ((((v)[0] + (v)[4]) + ((v)[2] + (v)[6])) + (((v)[1] + (v)[5]) + ((v)[3] + (v)[7])))
 #define KEEP(v) __asm__("" : "+x"(v))
 
 #include "nn/kernels.inc"

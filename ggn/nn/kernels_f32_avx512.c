@@ -18,6 +18,7 @@ typedef float vf __attribute__((vector_size(16 * sizeof(float))));
 typedef int vi __attribute__((vector_size(16 * sizeof(float))));
 #define SET1(s) ((vf)_mm512_set1_ps(s))
 #define FMA(a, b, c) ((vf)_mm512_fmadd_ps((__m512)(a), (__m512)(b), (__m512)(c)))
+#define VSUM(v) _mm512_reduce_add_ps((__m512)(v))
 #define KEEP(v) __asm__("" : "+v"(v))
 
 #include "nn/kernels.inc"

@@ -15,6 +15,7 @@ typedef float vf __attribute__((vector_size(4 * sizeof(float))));
 typedef int vi __attribute__((vector_size(4 * sizeof(float))));
 #define SET1(s) ((vf){(s), (s), (s), (s)})
 #define FMA(a, b, c) ((a) * (b) + (c))
+#define VSUM(v) (((v)[0] + (v)[2]) + ((v)[1] + (v)[3]))
 #define KEEP(v) ((void)(v))
 
 #include "nn/kernels.inc"

@@ -18,6 +18,7 @@ typedef double vf __attribute__((vector_size(4 * sizeof(double))));
 typedef long long vi __attribute__((vector_size(4 * sizeof(double))));
 #define SET1(s) ((vf)_mm256_set1_pd(s))
 #define FMA(a, b, c) ((vf)_mm256_fmadd_pd((__m256d)(a), (__m256d)(b), (__m256d)(c)))
+#define VSUM(v) (((v)[0] + (v)[2]) + ((v)[1] + (v)[3]))
 #define KEEP(v) __asm__("" : "+x"(v))
 
 #include "nn/kernels.inc"

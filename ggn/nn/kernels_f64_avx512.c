@@ -18,6 +18,7 @@ typedef double vf __attribute__((vector_size(8 * sizeof(double))));
 typedef long long vi __attribute__((vector_size(8 * sizeof(double))));
 #define SET1(s) ((vf)_mm512_set1_pd(s))
 #define FMA(a, b, c) ((vf)_mm512_fmadd_pd((__m512d)(a), (__m512d)(b), (__m512d)(c)))
+#define VSUM(v) _mm512_reduce_add_pd((__m512d)(v))
 #define KEEP(v) __asm__("" : "+v"(v))
 
 #include "nn/kernels.inc"

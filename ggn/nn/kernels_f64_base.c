@@ -15,6 +15,7 @@ typedef double vf __attribute__((vector_size(2 * sizeof(double))));
 typedef long long vi __attribute__((vector_size(2 * sizeof(double))));
 #define SET1(s) ((vf){(s), (s)})
 #define FMA(a, b, c) ((a) * (b) + (c))
+#define VSUM(v) ((v)[0] + (v)[1])
 #define KEEP(v) ((void)(v))
 
 #include "nn/kernels.inc"

@@ -7,6 +7,7 @@
 #ifndef GGN_NN_WEIGHTS_H
 #define GGN_NN_WEIGHTS_H
 
+#include "base/threads.h"
 #include "nn/graph.h"
 #include "nn/kernels.h"
 

@@ -25,26 +25,31 @@ size_t ggn_wino_scratch(int n_in)
 }
 
 /* G g Gᵀ of `tile` weights side by side: in[9][tile], out[36] with stride `stride`. */
-static void pack_tile(float *out, size_t stride, const float *in, int tile)
+static inline __attribute__((always_inline)) void pack_tile(float *restrict out, size_t stride, const float *restrict in,
+                                                            const int tile)
 {
-    static const double g[6][3] = {{1.0 / 4, 0, 0},
-                                   {-1.0 / 6, -1.0 / 6, -1.0 / 6},
-                                   {-1.0 / 6, 1.0 / 6, -1.0 / 6},
-                                   {1.0 / 24, 1.0 / 12, 1.0 / 6},
-                                   {1.0 / 24, -1.0 / 12, 1.0 / 6},
-                                   {0, 0, 1}};
+    float half[6][3][GGN_TILE_MAX];
 
-    for (int o = 0; o < tile; o++) {
-        double half[6][3];
-        for (int i = 0; i < 6; i++)
-            for (int x = 0; x < 3; x++)
-                half[i][x] = g[i][0] * (double)in[x * tile + o] + g[i][1] * (double)in[(3 + x) * tile + o] +
-                             g[i][2] * (double)in[(6 + x) * tile + o];
-        for (int i = 0; i < 6; i++)
-            for (int j = 0; j < 6; j++)
-                out[(size_t)(6 * i + j) * stride + (size_t)o] =
-                    (float)(half[i][0] * g[j][0] + half[i][1] * g[j][1] + half[i][2] * g[j][2]);
-    }
+    for (int x = 0; x < 3; x++)
+        for (int o = 0; o < tile; o++) {
+            float a = in[x * tile + o], b = in[(3 + x) * tile + o], c = in[(6 + x) * tile + o];
+            half[0][x][o] = a * 0.25f;
+            half[1][x][o] = ((a + c) + b) * (-1.0f / 6);
+            half[2][x][o] = ((a + c) - b) * (-1.0f / 6);
+            half[3][x][o] = (a * (1.0f / 24) + c * (1.0f / 6)) + b * (1.0f / 12);
+            half[4][x][o] = (a * (1.0f / 24) + c * (1.0f / 6)) - b * (1.0f / 12);
+            half[5][x][o] = c;
+        }
+    for (int i = 0; i < 6; i++, out += 6 * stride)
+        for (int o = 0; o < tile; o++) {
+            float a = half[i][0][o], b = half[i][1][o], c = half[i][2][o];
+            out[o] = a * 0.25f;
+            out[stride + (size_t)o] = ((a + c) + b) * (-1.0f / 6);
+            out[2 * stride + (size_t)o] = ((a + c) - b) * (-1.0f / 6);
+            out[3 * stride + (size_t)o] = (a * (1.0f / 24) + c * (1.0f / 6)) + b * (1.0f / 12);
+            out[4 * stride + (size_t)o] = (a * (1.0f / 24) + c * (1.0f / 6)) - b * (1.0f / 12);
+            out[5 * stride + (size_t)o] = c;
+        }
 }
 
 void ggn_wino_pack(float *u, const float *packed, int n_in, int n_out, int tile_oc)
@@ -54,8 +59,13 @@ void ggn_wino_pack(float *u, const float *packed, int n_in, int n_out, int tile_
     for (int oc = 0, tile; oc < n_out; oc += tile) {
         for (tile = tile_oc; tile > n_out - oc;)
             tile /= 2;
-        for (int i = 0; i < n_in; i++, packed += 9 * tile)
-            pack_tile(u + (size_t)oc * (size_t)n_in + (size_t)(i * tile), stride, packed, tile);
+        for (int i = 0; i < n_in; i++, packed += 9 * tile) {
+            float *to = u + (size_t)oc * (size_t)n_in + (size_t)(i * tile);
+            if (tile == GGN_TILE_MAX)
+                pack_tile(to, stride, packed, GGN_TILE_MAX);
+            else
+                pack_tile(to, stride, packed, tile);
+        }
     }
 }
 
