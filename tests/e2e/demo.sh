@@ -1,0 +1,44 @@
+#!/bin/sh
+# What `make demo` leaves behind, at a smaller size: files, layers, and every pixel within bounds that the scene sets.
+set -u
+dir=$(mktemp -d) || exit 2
+trap 'rm -rf "$dir"' EXIT
+cd "$(dirname "$0")/../.." || exit 2
+n=0 bad=0
+t() {
+    n=$((n + 1)); what=$1; shift
+    if "$@" >"$dir/log" 2>&1; then echo "ok $n - $what"; else echo "not ok $n - $what"; sed 's/^/# /' "$dir/log"; bad=1; fi
+}
+# stats CHANNELS RECTANGLE: "min max avg" of the first channel named, over WxH+X+Y
+stats() { oiiotool "$dir/demo.exr" --ch "$1" --cut "$2" --printstats 2>/dev/null |
+    awk '/Stats Min/{a=$3} /Stats Max/{b=$3} /Stats Avg/{c=$3} END{print a, b, c}'; }
+# within CHANNEL RECTANGLE LOW HIGH: every pixel is
+within() { stats "$1" "$2" | tee "$dir/log2" | awk -v l="$3" -v h="$4" 'NF == 3 {ok = $1 >= l && $2 <= h} END {exit !ok}'; }
+# mean CHANNEL RECTANGLE LOW HIGH: the average is
+mean() { stats "$1" "$2" | tee "$dir/log2" | awk -v l="$3" -v h="$4" 'NF == 3 {ok = $3 >= l && $3 <= h} END {exit !ok}'; }
+
+args="--criterion halfbuf -p threshold=0.05 --size 240x160 --block 40 --spp-min 16 --spp-max 150 --seed 3 -q"
+t "the demo runs" env DEMO_DIR="$dir" DEMO_ARGS="$args" scripts/demo
+for f in demo.exr demo.png stop-map.png stop-map.csv report.json; do t "it leaves $f" test -s "$dir/$f"; done
+t "nothing temporary is left" test -z "$(ls "$dir" | grep tmp)"
+t "the image has 240x160 pixels and all layers" sh -c "oiiotool --info -v $dir/demo.exr | tr -d ' ' | grep -q '240x160,14channel'"
+t "no pixel is negative, NaN or infinite" sh -c "oiiotool $dir/demo.exr --ch R,G,B --printstats | awk '/Min/{if (\$3 < 0 || \$4 < 0 || \$5 < 0) bad=1} /NanCount/{if (\$3+\$4+\$5) bad=1} /InfCount/{if (\$3+\$4+\$5) bad=1} END{exit bad}'"
+t "samples lie between the limits" within lull.spp 240x160+0+0 16 150
+t "reasons are criterion or spp-max" within lull.reason 240x160+0+0 1 2
+t "outside of the room it is black" within G 240x8+0+152 0 0
+t "the lamp is white" within G 14x3+110+7 1 1000
+t "the window is bluish and bright: red" within R 10x24+39+48 1.55 2.2
+t "the window is bluish and bright: blue" within B 10x24+39+48 3.15 4
+t "the back wall is lit: every pixel" within G 60x20+80+30 0.05 3
+t "the back wall is grey: mean" mean G 60x20+80+30 0.2 0.9
+t "the right wall is ochre: blue" mean B 15x50+200+50 0.02 0.25
+t "the right wall is ochre: red" mean R 15x50+200+50 0.1 1
+t "albedo lies in [0, 1]" within albedo.G 240x160+0+0 0 1.0001
+t "normals are at most unit" within normal.Y 240x160+0+0 -1.0001 1.0001
+t "depth is that of the room" within depth.Z 60x20+80+30 3 12
+t "24 numbers in the table" test "$(tr -cd ';' <"$dir/stop-map.csv" | wc -c)" -eq 25
+t "blocks stop at different samples" test "$(tr ';' '\n' <"$dir/stop-map.csv" | sed 1d | grep . | sort -u | wc -l)" -gt 2
+t "the report tells 24 blocks" test "$(grep -c '"reason"' "$dir/report.json")" -eq 24
+t "preview is the image" sh -c "oiiotool $dir/demo.exr --ch R,G,B --clamp:min=0:max=1 --colorconvert linear sRGB -d uint8 -o $dir/x.png && oiiotool --fail 0.005 --failpercent 0 --hardfail 0.01 $dir/x.png $dir/demo.png --diff"
+echo "1..$n"
+exit $bad
