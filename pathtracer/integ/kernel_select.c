@@ -11,6 +11,7 @@ static const struct {
     {PT_FX_SET_DIFFUSE, pt_kernel_diffuse, "diffuse"},
     {PT_FX_SET_SPECULAR, pt_kernel_specular, "specular"},
     {PT_FX_SET_SURFACES, pt_kernel_surfaces, "surfaces"},
+    {PT_FX_SET_MEDIA, pt_kernel_media, "media"},
     {PT_FX_SET_NO_MEDIA, pt_kernel_no_media, "no-media"},
     {PT_FX_ALL, pt_kernel_all, "all"},
 };

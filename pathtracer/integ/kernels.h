@@ -10,11 +10,13 @@
 #define PT_FX_SET_SURFACES                                                                                                        \
     (PT_FX_MANY_LIGHTS | PT_FX_TEXTURE | PT_FX_BUMP | PT_FX_SPECULAR | PT_FX_GLOSSY | PT_FX_TRANSMISSION | PT_FX_COATED |         \
      PT_FX_ENVIRONMENT | PT_FX_DELTA_LIGHT | PT_FX_QUADRIC | PT_FX_DEFOCUS)
+/* The same with glass that absorbs, or in fog. */
+#define PT_FX_SET_MEDIA (PT_FX_SET_SURFACES | PT_FX_ABSORPTION | PT_FX_SCATTERING)
 /* Plain (untextured) mirrors and glass among diffuse surfaces. */
 #define PT_FX_SET_SPECULAR (PT_FX_MANY_LIGHTS | PT_FX_SPECULAR | PT_FX_GLOSSY | PT_FX_TRANSMISSION | PT_FX_QUADRIC)
 /* Everything but media. */
 #define PT_FX_SET_NO_MEDIA (PT_FX_ALL & ~(pt_effects)(PT_FX_MEDIA | PT_FX_INTERFACE))
 
-pt_kernel pt_kernel_diffuse, pt_kernel_specular, pt_kernel_surfaces, pt_kernel_no_media, pt_kernel_all;
+pt_kernel pt_kernel_diffuse, pt_kernel_specular, pt_kernel_surfaces, pt_kernel_no_media, pt_kernel_media, pt_kernel_all;
 
 #endif

@@ -76,6 +76,14 @@ PT_KERNEL_INLINE int pt_path_intersect(pt_effects fx, struct pt_path *path, int 
     }
 }
 
+/* Of a medium that fills the whole shadow ray; direction unnormalised, its length in `length`. */
+PT_KERNEL_INLINE pt_vec3 pt_path_medium_transmittance(const struct pt_path *path, const struct pt_ray *ray, float length, int32_t medium)
+{
+    struct pt_rng rng = pt_sampler_stream(&path->sampler, PT_DIM_SHADOW);
+    return pt_medium_transmittance(&path->scene->media[medium], ray->origin, v3_scale(ray->direction, 1.0f / length),
+                                   ray->t_max * length, &rng);
+}
+
 /* What gets through a shadow ray that may cross alpha masks and interfaces; direction unnormalised, its length in `length`. */
 PT_KERNEL_INLINE pt_vec3 pt_path_transmittance(pt_effects fx, struct pt_path *path, struct pt_ray *ray, float length,
                                                int32_t medium)
@@ -155,13 +163,17 @@ PT_KERNEL_INLINE void pt_path_resolve_light(pt_effects fx, struct pt_path *path,
         ray.direction = v3_sub(light->target, plan->origin);
         ray.t_max = PT_SHADOW_END;
     }
-    if (!(fx & (PT_FX_ALPHA | PT_FX_INTERFACE | PT_FX_MEDIA))) {
+    if (fx & (PT_FX_ALPHA | PT_FX_INTERFACE)) {
+        add = v3_mul(add, pt_path_transmittance(fx, path, &ray, v3_len(ray.direction), plan->medium));
+    } else {
         path->rays++;
         if (pt_accel_occluded(path->scene, &ray))
             return;
-    } else {
-        add = v3_mul(add, pt_path_transmittance(fx, path, &ray, v3_len(ray.direction), plan->medium));
+        if ((fx & PT_FX_MEDIA) && plan->medium >= 0)
+            add = v3_mul(add, pt_path_medium_transmittance(path, &ray, v3_len(ray.direction), plan->medium));
     }
+    if ((fx & PT_FX_ENVIRONMENT) && light->pixel)
+        add = v3_mul(add, v3(light->pixel[0], light->pixel[1], light->pixel[2]));
     path->radiance = v3_add(path->radiance, add);
     if (path->trace)
         pt_trace_light(path->trace, light->wi, add);

@@ -232,6 +232,9 @@ struct pt_env_distribution {
     int32_t width, height;
     const float *rows;         /* [height + 1] */
     const float *columns;      /* [height][width + 1] */
+    /* where to start looking in a cumulative sum of n cells for u: at guide[floor(u · n)] (Chen & Asau 1974) */
+    const uint16_t *row_guide;    /* [height] */
+    const uint16_t *column_guide; /* [height][width] */
 };
 
 /* --- media --------------------------------------------------------------------------------------------------------------- */

@@ -1,10 +1,13 @@
 #include "shade/light_env.h"
 
 #include <math.h>
+#include <string.h>
 
-/* The importance table has at most this many columns: it only steers sampling, and the cost of searching it grows with its
- * size. */
-enum { TABLE_MAX = 1024 };
+/* The importance table has at most this many columns: it only steers sampling, and its reads miss the cache when it is large.
+ * A smaller one is taken while the variance that it adds stays small (see squared_weight). */
+enum { TABLE_MAX = 1024, TABLE_MIN = 128 };
+/* E[w²]/E[w]² of the weights that a table may leave within its cells. */
+#define TABLE_SQUARED_WEIGHT 1.3
 
 /* Square → sphere, area preserving (Clarberg 2008, "Fast Equal-Area Mapping of the (Hemi)Sphere using SIMD"). */
 static pt_vec3 square_to_sphere(float s, float t)
@@ -53,16 +56,6 @@ static int32_t cell(float x, int32_t n)
     return i < 0 ? 0 : i >= n ? n - 1 : i;
 }
 
-pt_vec3 pt_light_env_image_eval(const struct pt_scene *scene, const struct pt_light *light, pt_vec3 w)
-{
-    const struct pt_image_map *map = &scene->images[light->image];
-    float s, t, sin_theta;
-    direction_to_map(light, w, &s, &t, &sin_theta);
-    const float *px = (const float *)map->pixels + 3 * ((size_t)cell(t, map->height) * (size_t)map->width +
-                                                        (size_t)cell(s, map->width));
-    return v3_mul(light->emission, v3(px[0], px[1], px[2]));
-}
-
 /* Density over the square → density per solid angle. */
 static float to_solid(const struct pt_light *light, float pdf_square, float sin_theta)
 {
@@ -83,19 +76,28 @@ float pt_light_env_image_pdf(const struct pt_scene *scene, const struct pt_light
 }
 
 /* Largest i < n with cdf[i] <= u; *inside: position between cdf[i] and cdf[i + 1]. */
-static int32_t invert_cdf(const float *cdf, int32_t n, float u, float *inside)
+static int32_t invert_cdf(const float *cdf, const uint16_t *guide, int32_t n, float u, float *inside)
 {
-    int32_t lo = 0, hi = n;
-    while (hi - lo > 1) {
-        int32_t mid = (lo + hi) / 2;
-        if (cdf[mid] <= u)
-            lo = mid;
-        else
-            hi = mid;
-    }
-    float width = cdf[lo + 1] - cdf[lo];
-    *inside = width > 0.0f ? fminf((u - cdf[lo]) / width, 0x1.fffffep-1f) : 0.5f;
-    return lo;
+    int32_t i = guide[cell(u, n)];
+    while (i + 1 < n && cdf[i + 1] <= u)
+        i++;
+    float width = cdf[i + 1] - cdf[i];
+    *inside = width > 0.0f ? fminf((u - cdf[i]) / width, 0x1.fffffep-1f) : 0.5f;
+    return i;
+}
+
+static const float *pixel_at(const struct pt_scene *scene, const struct pt_light *light, float s, float t)
+{
+    const struct pt_image_map *map = &scene->images[light->image];
+    return (const float *)map->pixels + 3 * ((size_t)cell(t, map->height) * (size_t)map->width + (size_t)cell(s, map->width));
+}
+
+pt_vec3 pt_light_env_image_eval(const struct pt_scene *scene, const struct pt_light *light, pt_vec3 w)
+{
+    float s, t, sin_theta;
+    direction_to_map(light, w, &s, &t, &sin_theta);
+    const float *px = pixel_at(scene, light, s, t);
+    return v3_mul(light->emission, v3(px[0], px[1], px[2]));
 }
 
 int pt_light_env_image_sample(const struct pt_scene *scene, const struct pt_light *light, float u0, float u1,
@@ -103,9 +105,9 @@ int pt_light_env_image_sample(const struct pt_scene *scene, const struct pt_ligh
 {
     const struct pt_env_distribution *d = &scene->env_distributions[light - scene->lights];
     float in_x, in_y, sin_theta = 1.0f;
-    int32_t y = invert_cdf(d->rows, d->height, u1, &in_y);
+    int32_t y = invert_cdf(d->rows, d->row_guide, d->height, u1, &in_y);
     const float *columns = d->columns + (size_t)y * (size_t)(d->width + 1);
-    int32_t x = invert_cdf(columns, d->width, u0, &in_x);
+    int32_t x = invert_cdf(columns, d->column_guide + (size_t)y * (size_t)d->width, d->width, u0, &in_x);
     float s = ((float)x + in_x) / (float)d->width, t = ((float)y + in_y) / (float)d->height;
     pt_vec3 l;
     if (light->mapping == PT_ENV_EQUAL_AREA) {
@@ -120,7 +122,8 @@ int pt_light_env_image_sample(const struct pt_scene *scene, const struct pt_ligh
     out->wi = v3_norm(pt_mat34_normal(&light->from_render, l));
     pdf = to_solid(light, pdf, sin_theta);
     out->inv_pdf_solid = 1.0f / pdf;
-    out->radiance = pt_light_env_image_eval(scene, light, out->wi);
+    out->radiance = light->emission;
+    out->pixel = pixel_at(scene, light, s, t);
     out->delta = 0;
     out->finite = 0;
     return pdf > 0.0f;
@@ -154,8 +157,8 @@ float pt_light_env_mean(const struct pt_scene *scene, const struct pt_light *lig
     return scale * (float)(sum / weights);
 }
 
-/* weights[n] → cdf[n + 1]; returns the sum. All zero: uniform. */
-static double accumulate(const double *weights, int32_t n, float *cdf)
+/* weights[n] → cdf[n + 1] and its guide[n]; returns the sum. All zero: uniform. */
+static double accumulate(const double *weights, int32_t n, float *cdf, uint16_t *guide)
 {
     double sum = 0.0, part = 0.0;
     for (int32_t i = 0; i < n; i++)
@@ -166,33 +169,71 @@ static double accumulate(const double *weights, int32_t n, float *cdf)
         cdf[i + 1] = (float)(sum > 0.0 ? part / sum : (double)(i + 1) / n);
     }
     cdf[n] = 1.0f;
+    /* the first u that cell() sends to k is within a rounding of k/n: start one cell early */
+    for (int32_t k = 0, i = 0; k < n; k++) {
+        while (i + 1 < n && (double)cdf[i + 1] <= (double)k / n)
+            i++;
+        guide[k] = (uint16_t)(i > 0 ? i - 1 : 0);
+    }
     return sum;
+}
+
+/* Sums of importance over the cells of a w × h table. */
+static void sum_cells(const struct pt_light *light, const struct pt_image_map *map, int32_t w, int32_t h, double *cells)
+{
+    const float *px = map->pixels;
+    memset(cells, 0, (size_t)w * (size_t)h * sizeof *cells);
+    for (int32_t y = 0; y < map->height; y++) {
+        double weight = row_weight(light, y, map->height);
+        double *row = cells + (size_t)((int64_t)y * h / map->height) * (size_t)w;
+        for (int32_t x = 0; x < map->width; x++, px += 3)
+            row[(int64_t)x * w / map->width] += weight * luminance_of(px);
+    }
+}
+
+/* E[(l/p)²] / E[l/p]² over samples of density p, uniform within each cell. */
+static double squared_weight(const struct pt_light *light, const struct pt_image_map *map, int32_t w, int32_t h, const double *cells)
+{
+    const float *px = map->pixels;
+    double pixels_per_cell = (double)map->width / w * ((double)map->height / h), total = 0.0, second = 0.0;
+    for (int32_t y = 0; y < map->height; y++) {
+        double weight = row_weight(light, y, map->height);
+        const double *row = cells + (size_t)((int64_t)y * h / map->height) * (size_t)w;
+        for (int32_t x = 0; x < map->width; x++, px += 3) {
+            double l = weight * luminance_of(px);
+            total += l;
+            second += l > 0.0 ? l * l / row[(int64_t)x * w / map->width] : 0.0;
+        }
+    }
+    return total > 0.0 ? second * pixels_per_cell / total : 1.0;
 }
 
 int pt_light_env_build(struct pt_scene *scene, const struct pt_light *light, struct pt_env_distribution *out)
 {
     const struct pt_image_map *map = &scene->images[light->image];
-    int32_t w = map->width < TABLE_MAX ? map->width : TABLE_MAX, h = map->height < TABLE_MAX ? map->height : TABLE_MAX;
-    size_t n = (size_t)w * (size_t)h;
     struct pt_arena scratch = {0};
-    double *weights = pt_arena_alloc(&scratch, n, sizeof *weights), *sums = pt_arena_alloc(&scratch, (size_t)h, sizeof *sums);
+    double *cells = pt_arena_alloc(&scratch, (size_t)TABLE_MAX * TABLE_MAX, sizeof *cells);
+    double *sums = pt_arena_alloc(&scratch, TABLE_MAX, sizeof *sums);
+    int32_t w = 0, h = 0;
+    for (int32_t size = TABLE_MIN; cells && size <= TABLE_MAX; size *= 2) {
+        w = map->width < size ? map->width : size;
+        h = map->height < size ? map->height : size;
+        sum_cells(light, map, w, h, cells);
+        if (squared_weight(light, map, w, h, cells) <= TABLE_SQUARED_WEIGHT)
+            break;
+    }
+    size_t n = (size_t)w * (size_t)h;
     float *rows = pt_arena_alloc(&scene->arena, (size_t)h + 1, sizeof *rows);
     float *columns = pt_arena_alloc(&scene->arena, n + (size_t)h, sizeof *columns);
-    if (!weights || !sums || !rows || !columns) {
-        pt_arena_release(&scratch);
-        return 0;
+    uint16_t *row_guide = pt_arena_alloc(&scene->arena, (size_t)h, sizeof *row_guide);
+    uint16_t *column_guide = pt_arena_alloc(&scene->arena, n, sizeof *column_guide);
+    int ok = cells && sums && rows && columns && row_guide && column_guide;
+    if (ok) {
+        for (size_t y = 0; y < (size_t)h; y++)
+            sums[y] = accumulate(cells + y * (size_t)w, w, columns + y * (size_t)(w + 1), column_guide + y * (size_t)w);
+        accumulate(sums, h, rows, row_guide);
+        *out = (struct pt_env_distribution){w, h, rows, columns, row_guide, column_guide};
     }
-    const float *px = map->pixels;
-    for (int32_t y = 0; y < map->height; y++) {
-        double weight = row_weight(light, y, map->height);
-        size_t row = (size_t)((int64_t)y * h / map->height) * (size_t)w;
-        for (int32_t x = 0; x < map->width; x++, px += 3)
-            weights[row + (size_t)((int64_t)x * w / map->width)] += weight * luminance_of(px);
-    }
-    for (int32_t y = 0; y < h; y++)
-        sums[y] = accumulate(weights + (size_t)y * (size_t)w, w, columns + (size_t)y * (size_t)(w + 1));
-    accumulate(sums, h, rows);
     pt_arena_release(&scratch);
-    *out = (struct pt_env_distribution){w, h, rows, columns};
-    return 1;
+    return ok;
 }

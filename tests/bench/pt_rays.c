@@ -69,7 +69,7 @@ static unsigned long long run_kernel(const struct pt_scene *scene, const struct 
 
 static void record_rays(const struct pt_scene *scene, const struct pt_integrator *settings, const struct window *w)
 {
-    const pt_effects through = PT_FX_MEDIA | PT_FX_INTERFACE | PT_FX_ALPHA; /* they turn occlusion queries into nearest hits */
+    const pt_effects through = PT_FX_INTERFACE | PT_FX_ALPHA; /* they turn occlusion queries into nearest hits */
     struct pt_path_result result;
     for (uint32_t y = 0; y < w->height; y += w->row_step)
         for (uint32_t x = 0; x < w->width; x++)

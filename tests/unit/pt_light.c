@@ -65,6 +65,8 @@ static void check_light(const struct pt_scene *scene, pt_vec3 p_ref, int all_vis
         struct pt_light_sample s;
         float pick = pt_rng_float(&rng), u0 = pt_rng_float(&rng), u1 = pt_rng_float(&rng);
         if (pt_light_sample(PT_FX_ALL, scene, p_ref, pick, u0, u1, &s)) {
+            if (s.pixel)
+                s.radiance = v3_mul(s.radiance, v3(s.pixel[0], s.pixel[1], s.pixel[2]));
             by_light += (double)v3_luminance(s.radiance) / (1.0 / (double)s.inv_pdf_solid) / SAMPLES;
             float pdf = pdf_of(scene, p_ref, s.wi);
             lit++;

@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "geom/accel.h"
 #include "integ/kernels.h"
 #include "shade/medium.h"
 #include "shade/texture.h"
@@ -97,6 +98,24 @@ static void surface_kernels_are_exact(void **state)
     test_scene_end(&scene);
 }
 
+/* Fog and nested media without interfaces: occlusion queries there, nearest hits in the general kernel, the same answer. */
+static void media_kernel_is_exact(void **state)
+{
+    (void)state;
+    struct pt_scene scene;
+    test_cornell(&scene, 24, 1.0f, v3_splat(0.0f));
+    pt_accel_release(&scene);
+    scene.camera.medium = test_add_medium(&scene, v3(0.1f, 0.2f, 0.3f), v3(0.1f, 0.05f, 0.0f), 0.3f);
+    int32_t glass = test_add_material(&scene, PT_MATERIAL_DIELECTRIC);
+    int32_t ball = test_add_sphere(&scene, glass, v3(0, 1, 0.2f), 0.4f);
+    scene.shapes[ball].medium_out = scene.camera.medium;
+    scene.shapes[ball].medium_in = test_add_medium(&scene, v3(2, 1, 0), v3_splat(0.0f), 0.0f);
+    test_scene_finish(&scene);
+    assert_true(pt_kernel_select(scene.effects, NULL, NULL) == pt_kernel_media);
+    compare_kernels(&scene, (pt_kernel *const[]){pt_kernel_media}, 1);
+    test_scene_end(&scene);
+}
+
 /* Whatever is needed is covered, and never by more than the general kernel. */
 static void selection_covers(void **state)
 {
@@ -177,7 +196,7 @@ static void trace_tells_the_same_path(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(diffuse_kernel_is_exact), cmocka_unit_test(surface_kernels_are_exact), cmocka_unit_test(selection_covers),
+        cmocka_unit_test(diffuse_kernel_is_exact), cmocka_unit_test(surface_kernels_are_exact), cmocka_unit_test(selection_covers), cmocka_unit_test(media_kernel_is_exact),
         cmocka_unit_test(absent_effects_run_no_code), cmocka_unit_test(planes), cmocka_unit_test(trace_tells_the_same_path),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
