@@ -46,6 +46,44 @@ static void fresnel_of_metal(void **state)
         assert_true(near(pt_fresnel_conductor(1.0f, 1.0f, pt_conductor_k_from_reflectance(r)), r));
 }
 
+/* Values that can be worked out by hand: the statistical tests hold models to themselves, these to the world. */
+static void models_have_their_closed_forms(void **state)
+{
+    (void)state;
+    struct pt_bsdf_sample s;
+    pt_vec3 up = v3(0, 0, 1), wo = v3_norm(v3(0.6f, 0, 0.8f)), wi = v3_norm(v3(0, 0.8f, 0.6f));
+    float pdf;
+    /* thin slab: 2R/(1 + R) with R = 0.04 */
+    struct pt_bsdf thin = {.kind = PT_BSDF_THIN_DIELECTRIC, .eta = 1.5f};
+    assert_int_equal(pt_bsdf_sample(PT_FX_ALL, &thin, up, 0.0f, 0, 0, &s), 1);
+    assert_true(near(s.pdf_solid, 0.08f / 1.04f) && s.flags == PT_SCATTER_DELTA && s.wi.z == 1.0f);
+    assert_int_equal(pt_bsdf_sample(PT_FX_ALL, &thin, wo, 0.99f, 0, 0, &s), 1);
+    assert_true(s.wi.x == -wo.x && s.wi.z == -wo.z && (s.flags & PT_SCATTER_TRANSMIT)); /* neither bent … */
+    assert_true(s.weight.x == 1.0f && s.eta_scale == 1.0f);                              /* … nor compressed */
+    /* Snell's law, and radiance compressed by 1/n² */
+    struct pt_bsdf glass = {.kind = PT_BSDF_DIELECTRIC, .eta = 1.5f};
+    assert_int_equal(pt_bsdf_sample(PT_FX_ALL, &glass, wo, 0.99f, 0, 0, &s), 1);
+    assert_true(near(s.wi.x, -0.4f) && near(s.wi.z, -sqrtf(1.0f - 0.16f)) && near(s.weight.x, 1.0f / 2.25f));
+    /* sides of a translucent film */
+    struct pt_bsdf film = {.kind = PT_BSDF_DIFFUSE_TRANSMISSION, .reflectance = {0.2f, 0.2f, 0.2f}, .transmittance = {0.6f, 0.6f, 0.6f}};
+    assert_true(near(pt_bsdf_eval(PT_FX_ALL, &film, wo, wi, &pdf).x, 0.2f * 0.6f * PT_INV_PI));
+    assert_true(near(pt_bsdf_eval(PT_FX_ALL, &film, wo, v3_neg(wi), &pdf).x, 0.6f * 0.6f * PT_INV_PI));
+    /* a coat of matched index only absorbs, once each way */
+    float table[PT_COAT_HEADER + 2 * PT_COAT_ROW];
+    pt_coat_table_build(table, 1, 1.0f, 0.3f, 0.0f, 0.0f);
+    struct pt_bsdf coat = {.kind = PT_BSDF_COATED_DIFFUSE, .eta = 1.0f, .thickness = 0.3f, .reflectance = {0.5f, 0.5f, 0.5f}, .coat_table = table};
+    float expected = 0.5f * PT_INV_PI * 0.6f * expf(-0.3f / 0.8f) * expf(-0.3f / 0.6f);
+    assert_true(near(pt_bsdf_eval(PT_FX_ALL, &coat, wo, wi, &pdf).x, expected));
+    /* and over a mirror likewise: Rc exp(-2t) at normal incidence */
+    struct pt_bsdf mirror = {.kind = PT_BSDF_COATED_CONDUCTOR, .eta = 1.0f, .thickness = 0.3f, .eta_rgb = {1, 1, 1}, .k_rgb = {2, 2, 2}};
+    assert_int_equal(pt_bsdf_sample(PT_FX_ALL, &mirror, up, 0.5f, 0, 0, &s), 1);
+    assert_true(near(s.weight.x, 0.5f * expf(-0.6f))); /* k² / (4 + k²) = 1/2 */
+    /* the peak of a GGX lobe: F / (4 π alpha²) at normal incidence, where nothing shadows */
+    struct pt_bsdf metal = {.kind = PT_BSDF_CONDUCTOR, .alpha_x = 0.2f, .alpha_y = 0.5f, .eta_rgb = {1, 1, 1}, .k_rgb = {2, 2, 2}};
+    assert_true(near(pt_bsdf_eval(PT_FX_ALL, &metal, up, up, &pdf).x, 0.5f / (4.0f * PT_PI * 0.1f)));
+    assert_true(near(pdf, 1.0f / (4.0f * PT_PI * 0.1f)));
+}
+
 static void roughness_is_remapped_as_in_pbrt(void **state)
 {
     (void)state;
@@ -186,6 +224,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(fresnel_of_glass),
         cmocka_unit_test(fresnel_of_metal),
+        cmocka_unit_test(models_have_their_closed_forms),
         cmocka_unit_test(roughness_is_remapped_as_in_pbrt),
         cmocka_unit_test(effects_are_those_the_closure_needs),
         cmocka_unit_test(coatings_share_tables),
