@@ -29,9 +29,8 @@ pt_vec3 pt_material_bumped_normal(const struct pt_scene *scene, const struct pt_
     float slope_u = (pt_texture_eval(scene, m->bump, s->u + du, s->v).x - d) / du;
     float slope_v = (pt_texture_eval(scene, m->bump, s->u, s->v + dv).x - d) / dv;
     pt_vec3 tangent_u = v3_madd(s->dpdu, slope_u, s->n_shading), tangent_v = v3_madd(s->dpdv, slope_v, s->n_shading);
-    pt_vec3 flat = v3_cross(s->dpdu, s->dpdv), n = v3_cross(tangent_u, tangent_v);
-    /* dpdu × dpdv may be on either side of the normal */
-    return keep_side(v3_dot(flat, s->n_shading) < 0.0f ? v3_neg(n) : n, s->n_geometric, s->n_shading);
+    /* dpdu × dpdv may be on either side of the surface */
+    return keep_side(v3_cross(tangent_u, tangent_v), s->n_geometric, s->n_shading);
 }
 
 static pt_effects input_effects(const struct pt_input *in) { return in->texture >= 0 ? PT_FX_TEXTURE : 0; }

@@ -167,16 +167,19 @@ static void mixes_choose_by_amount(void **state)
         {.kind = PT_MATERIAL_MIX, .mix_a = 0, .mix_b = 1, .mix_amount = CONST(0.25f)},
         {.kind = PT_MATERIAL_MIX, .mix_a = 2, .mix_b = 1, .mix_amount = CONST(0.5f)},
         {.kind = PT_MATERIAL_MIX, .mix_a = 0, .mix_b = 1, .mix_amount = CONST(1.0f)},
+        {.kind = PT_MATERIAL_MIX, .mix_a = 1, .mix_b = 2, .mix_amount = CONST(0.5f)},
     };
-    struct pt_scene scene = {.materials = materials, .material_count = 5};
+    struct pt_scene scene = {.materials = materials, .material_count = 6};
     struct pt_surface s = {0};
-    int metal = 0, all = 0;
+    int metal = 0, all = 0, other = 0;
     for (int i = 0; i < 1000; i++) {
         float u = ((float)i + 0.5f) / 1000.0f;
         metal += pt_material_resolve(PT_FX_ALL, &scene, 3, &s, u) == &materials[1];
+        other += pt_material_resolve(PT_FX_ALL, &scene, 5, &s, u) == &materials[1];
         all += pt_material_resolve(PT_FX_ALL, &scene, 4, &s, u) == &materials[1];
     }
     assert_true(metal >= 623 && metal <= 627); /* 0.5 + 0.5 · 0.25 */
+    assert_true(other >= 623 && other <= 627); /* nested in the second place too */
     assert_int_equal(all, 1000);
 }
 
