@@ -190,6 +190,21 @@ refused "damaged or cut off" $long --checkpoint flip.ckp --resume
 refused "not a checkpoint" $long --checkpoint "$scene" --resume
 refused "No such file" $long --checkpoint none.ckp --resume
 
+# --- the shipped network, when it is there: its history goes through the checkpoint ---
+model=$here/../../ggn/models/lull-1.ggn
+if [ -f "$model" ]; then
+    net="$scene -q --size 200x200 -c ggn -p model=$model --spp-min 4 --spp-max 60 --reproducible"
+    "$P" $net -o net.exr
+    t "ggn: same bytes for 1 thread and another order" sh -c "$P $net -t 1 --order-seed 4 -o net1.exr && cmp net.exr net1.exr"
+    "$P" $net --time-budget 0.3 --checkpoint net.ckp -o part.exr
+    [ -s net.ckp ] || "$P" $net --checkpoint net.ckp --checkpoint-every 0 -o part.exr
+    t "ggn: same bytes after interrupt and resume" sh -c "$P $net --checkpoint net.ckp --resume -o net2.exr && cmp net.exr net2.exr"
+else
+    n=$((n + 2))
+    echo "ok $((n - 1)) - ggn: same bytes for 1 thread and another order # SKIP no ggn/models/lull-1.ggn"
+    echo "ok $n - ggn: same bytes after interrupt and resume # SKIP no ggn/models/lull-1.ggn"
+fi
+
 # --- progress ---
 "$P" "$scene" --size 128x96 -c null --spp-max 100000000 --time-budget 3 -o p.exr 2>progress
 t "plain progress lines when not a terminal" grep -q 'blocks active.*Mpaths/s.*ETA' progress
