@@ -173,7 +173,7 @@ asan tsan: ## run the unit and ABI tests under the sanitizer
 	@BUILD=build/$@ tests/run --$@ $(patsubst tests/%.c,build/$@/tests/%,$(SANE_SRC)) $(if $(filter tsan,$@),$(wildcard tests/tsan/*.sh))
 
 FUZZ_SECONDS ?= 60
-FUZZ_FLAGS := -g -O1 -fsanitize=fuzzer-no-link,address,undefined -fno-sanitize-recover=undefined
+FUZZ_FLAGS := -g -O1 -fsanitize=fuzzer-no-link,address,undefined -fno-sanitize=vptr -fno-sanitize-recover=undefined
 fuzz: ## fuzz each target for FUZZ_SECONDS (default 60) under ASan+UBSan; needs clang
 	@$(MAKE) --no-print-directory MODE=asan OUT=build/fuzz-objects CC=clang CXX=clang++ OPT_asan="$(FUZZ_FLAGS)" fuzzers
 	@for f in $(FUZZERS); do tests/fuzz/run $$f $(FUZZ_SECONDS) || exit 1; done
