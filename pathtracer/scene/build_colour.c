@@ -44,10 +44,15 @@ static int read_spd_file(struct pt_builder *b, const struct pt_param *param, con
     return b->diag.rc;
 }
 
+static const double *values_of(const struct pt_params *p, const struct pt_param *param)
+{
+    return param->count > 0 && !param->is_text ? p->numbers + param->first : NULL;
+}
+
 /* SPECTRUM and BLACKBODY parameters. `extend`: see pt_spd_from_pairs. */
 static int read_spectrum(struct pt_builder *b, struct pt_params *p, struct pt_param *param, int extend, struct pt_spd *out)
 {
-    const double *v = p->numbers + param->first;
+    const double *v = values_of(p, param);
     pt_spd_constant(0, out);
     if (param->type == PT_PARAM_BLACKBODY) {
         if (param->count < 1 || param->count > 2 || !(v[0] >= 100 && v[0] <= 1e6))
@@ -110,7 +115,7 @@ int pt_build_colour(struct pt_builder *b, const struct pt_state *s, struct pt_pa
     if (param == NULL)
         return 0;
     param->used = 1;
-    const double *v = p->numbers + param->first;
+    const double *v = values_of(p, param);
     switch (param->type) {
     case PT_PARAM_RGB:
     case PT_PARAM_XYZ:

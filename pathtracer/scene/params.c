@@ -432,7 +432,7 @@ const double *pt_params_floats(struct pt_params *params, const char *name, size_
     unsigned types = components == 1 ? NUMBERS : components == 2 ? PAIRS | NUMBERS : TRIPLES;
     const struct pt_param *p = take(params, name, types, expected[components]);
     *count = 0;
-    if (p == NULL)
+    if (p == NULL || p->count == 0)
         return NULL;
     if (p->count % components != 0) {
         pt_diag_fail(params->diag, p->loc, "parameter \"%s\" has %zu values (expected a multiple of %zu)", name, p->count,
@@ -450,7 +450,7 @@ const double *pt_params_ints(struct pt_params *params, const char *name, size_t 
 {
     const struct pt_param *p = take(params, name, NUMBERS, "integer");
     *count = 0;
-    if (p == NULL)
+    if (p == NULL || p->count == 0)
         return NULL;
     for (size_t i = 0; i < p->count; i++) {
         double v = params->numbers[p->first + i];

@@ -73,7 +73,7 @@ int pt_params_bool(struct pt_params *params, const char *name, int fallback);
 const char *pt_params_string(struct pt_params *params, const char *name, const char *fallback);
 /* 1 and xyz when given, else 0 and xyz untouched. */
 int pt_params_point(struct pt_params *params, const char *name, double xyz[3]);
-/* Arrays: NULL and *count = 0 when absent. `components`: 1 for floats, 2 or 3 for points; *count is in those. */
+/* Arrays: NULL and *count = 0 when absent or empty. `components`: 1 for floats, 2 or 3 for points; *count is in those. */
 const double *pt_params_floats(struct pt_params *params, const char *name, size_t components, size_t *count);
 /* Whole numbers, each in [-2^31, 2^31). */
 const double *pt_params_ints(struct pt_params *params, const char *name, size_t *count);

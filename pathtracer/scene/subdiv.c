@@ -7,7 +7,7 @@
 
 static const double pi = 3.14159265358979323846;
 enum { MAX_LEVELS = 8 };
-static const size_t max_triangles = (size_t)1 << 24;
+static const size_t max_triangles = (size_t)1 << 22;
 
 struct mesh {
     size_t vertices, triangles;
