@@ -102,8 +102,8 @@ static void light_sampling_changes_no_mean(void **state)
         test_add_area_light(&scene, lamp, v3(1.0f, 1.0f, 1.0f), 0);
         test_scene_finish(&scene);
         double e_mis, e_bsdf;
-        double mis = (double)v3_luminance(render(&scene, 3, PT_STRATEGY_MIS, 200, &e_mis));
-        double bsdf = (double)v3_luminance(render(&scene, 3, PT_STRATEGY_BSDF_ONLY, 400, &e_bsdf));
+        double mis = (double)v3_luminance(render(&scene, 3, PT_STRATEGY_MIS, 1600, &e_mis));
+        double bsdf = (double)v3_luminance(render(&scene, 3, PT_STRATEGY_BSDF_ONLY, 2400, &e_bsdf));
         double z = (mis - bsdf) / sqrt(e_mis * e_mis + e_bsdf * e_bsdf);
         if (!(mis > 0.01) || fabs(z) > 4.0)
             fail_msg("%s: %g ± %g with, %g ± %g without light sampling, z = %g", cases[i].name, mis, e_mis, bsdf, e_bsdf, z);
