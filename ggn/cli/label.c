@@ -94,8 +94,6 @@ static int start_labels(struct ggn_labels *l, const char *source, const struct g
 {
     *l = (struct ggn_labels){.cap = v->manifest.levels[v->manifest.n_levels - 1], .spread = spread};
     snprintf(l->source, sizeof l->source, "%s", source);
-    if (v->manifest.n_blocks == 0)
-        return ggn_fail(err, GGN_EINVAL, "%s: no finished block in it", v->dir);
     l->labels = malloc(v->manifest.n_blocks * sizeof *l->labels);
     return l->labels != NULL ? GGN_OK : ggn_fail_nomem(err, v->dir);
 }
@@ -335,7 +333,9 @@ static int run_dataset(const struct options *o, const struct ggn_dataset *d, con
     if (o->check)
         printf("%-24s %5s %10s %10s %8s\n", "view", "block", "rendered", "halves", "log2");
     for (int i = 0; i < d->n && rc == GGN_OK && !ggn_cmd_interrupted; i++) {
-        if (o->check)
+        if (d->views[i].manifest.n_blocks == 0)
+            fprintf(stderr, "ggn label: %s: no finished block yet, left out\n", d->views[i].dir);
+        else if (o->check)
             rc = check_view(observer, threads, &d->views[i], errors, &count, err);
         else if (o->human != NULL)
             rc = label_human(o, human, &d->views[i], err);

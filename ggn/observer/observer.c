@@ -12,7 +12,7 @@
 #include "observer/flip.h"
 
 const struct ggn_observer ggn_observer_default = {
-    .map = GGN_MAP_LIGHTNESS, .blur_px = 1.0, .masking = 0.2, .window_px = 5, .percentile = 99.0, .tau = 1.5, .spread = 0.25,
+    .map = GGN_MAP_FLIP, .blur_px = 0.0, .masking = 0.2, .window_px = 3, .percentile = 95.0, .tau = 0.041672, .spread = 0.25,
 };
 
 static const char *const map_names[] = {[GGN_MAP_FLIP] = "flip", [GGN_MAP_LIGHTNESS] = "lightness"};

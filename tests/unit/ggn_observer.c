@@ -26,6 +26,8 @@ static struct ggn_seq_block make_block(double sigma, double texture, uint32_t se
     return ggn_noise_block(&n);
 }
 
+static const struct ggn_observer lightness = {GGN_MAP_LIGHTNESS, 1.0, 0.2, 5, 99.0, 1.5, 0.25};
+
 static int ascending(const void *a, const void *b)
 {
     float x = *(const float *)a, y = *(const float *)b;
@@ -115,7 +117,7 @@ static double threshold_of(const struct ggn_seq_block *b, const struct ggn_obser
 static void scaling(void **state)
 {
     (void)state;
-    struct ggn_observer o = ggn_observer_default;
+    struct ggn_observer o = lightness;
     o.percentile = 80; /* a high one rests on a handful of pixels of so small a block */
     o.tau = 0.8;
     double last = 0.0;
@@ -138,7 +140,7 @@ static void scaling(void **state)
 static void noisy_reference(void **state)
 {
     (void)state;
-    struct ggn_observer o = ggn_observer_default;
+    struct ggn_observer o = lightness;
     o.masking = 0.0;
     o.percentile = 80;
     o.tau = 0.4;
@@ -154,7 +156,7 @@ static void noisy_reference(void **state)
 static void halves_alone(void **state)
 {
     (void)state;
-    struct ggn_observer o = ggn_observer_default;
+    struct ggn_observer o = lightness;
     o.percentile = 80;
     o.tau = 0.6;
     o.masking = 0.3;
@@ -172,7 +174,7 @@ static void halves_alone(void **state)
 static void beyond_the_last_level(void **state)
 {
     (void)state;
-    struct ggn_observer o = ggn_observer_default;
+    struct ggn_observer o = lightness;
     o.percentile = 80;
     o.tau = 0.5;
     struct ggn_noise n = {W, H, levels, LEVELS, 4096, 0.9, 0.0, 6}, few = {W, H, levels, 8, 4096, 0.9, 0.0, 6};
@@ -235,6 +237,21 @@ static void parameters(void **state)
     unlink(path);
 }
 
+/* The file beside the code says what the code has built in. */
+static void built_in(void **state)
+{
+    (void)state;
+    struct ggn_observer o;
+    struct ggn_err err = {0};
+    if (ggn_observer_read("ggn/observer/observer.json", &o, &err) != GGN_OK)
+        fail_msg("%s", err.text);
+    assert_true(o.map == ggn_observer_default.map && o.window_px == ggn_observer_default.window_px);
+    assert_near(o.tau, ggn_observer_default.tau, 1e-6);
+    assert_near(o.masking, ggn_observer_default.masking, 1e-6);
+    assert_near(o.percentile, ggn_observer_default.percentile, 1e-6);
+    assert_near(o.spread, ggn_observer_default.spread, 1e-6);
+}
+
 static void trials(void **state)
 {
     (void)state;
@@ -259,7 +276,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(pooling), cmocka_unit_test(masking), cmocka_unit_test(thresholds), cmocka_unit_test(scaling),
-        cmocka_unit_test(noisy_reference), cmocka_unit_test(halves_alone), cmocka_unit_test(beyond_the_last_level), cmocka_unit_test(calibration), cmocka_unit_test(parameters), cmocka_unit_test(trials),
+        cmocka_unit_test(noisy_reference), cmocka_unit_test(halves_alone), cmocka_unit_test(beyond_the_last_level), cmocka_unit_test(calibration), cmocka_unit_test(parameters), cmocka_unit_test(built_in), cmocka_unit_test(trials),
     };
     return cmocka_run_group_tests_name("observer", tests, NULL, NULL);
 }
