@@ -9,15 +9,16 @@
 #include <cjson/cJSON.h>
 
 #include "base/fio.h"
+#include "baselines/learned.h"
 #include "cli/commands.h"
 #include "eval/network.h"
 #include "eval/report.h"
 
-enum { MAX_MODELS = 8, MAX_METHODS = 8 + MAX_MODELS, KEY_EARLY = 256, KEY_NO_QUALITY, KEY_PRECISION, KEY_RETUNE, KEY_RECORDED, KEY_RATIO };
+enum { MAX_MODELS = 8, MAX_METHODS = 8 + MAX_MODELS, KEY_EARLY = 256, KEY_NO_QUALITY, KEY_PRECISION, KEY_RETUNE, KEY_RECORDED, KEY_RATIO, KEY_BASELINES, KEY_EPOCHS };
 
 struct options {
     const char *data, *out, *models[MAX_MODELS];
-    int n_models, json, quality, threads, window, retune, recorded;
+    int n_models, json, quality, threads, window, retune, recorded, baselines, epochs;
     double early, ratio;
     enum ggn_precision precision;
 };
@@ -30,6 +31,8 @@ static const struct argp_option option_table[] = {
     {"early", KEY_EARLY, "RATE", 0, "early-stop rate that cuts are tuned for on the training scenes (default 0.05)", 3},
     {"retune", KEY_RETUNE, NULL, 0, "tune the models' thresholds too, on the validation scenes, instead of taking the stored ones", 3},
     {"no-quality", KEY_NO_QUALITY, NULL, 0, "skip FLIP and SSIM at the stop", 3},
+    {"baselines", KEY_BASELINES, NULL, 0, "train the published baselines on the training scenes and measure them too (minutes)", 3},
+    {"epochs", KEY_EPOCHS, "N", 0, "epochs of the LSTM baseline (default 15)", 3},
     {"recorded", KEY_RECORDED, NULL, 0, "stop at the last recorded level instead of going on with the samples of the reference", 3},
     {"ratio", KEY_RATIO, "R", 0, "thin the levels to this ratio of samples (SIN3D: 1.15); default: keep all", 3},
     {"window", 'w', "S", 0, "levels that a window has when no model says so (default 6)", 3},
@@ -50,6 +53,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
     case KEY_NO_QUALITY: o->quality = 0; return 0;
     case KEY_RETUNE: o->retune = 1; return 0;
     case KEY_RECORDED: o->recorded = 1; return 0;
+    case KEY_BASELINES: o->baselines = 1; return 0;
     case KEY_RATIO:
         o->ratio = strtod(arg, &end);
         if (end == arg || *end != '\0' || !(o->ratio >= 1.0 && o->ratio <= 16.0))
@@ -70,12 +74,14 @@ static error_t parse(int key, char *arg, struct argp_state *state)
             argp_error(state, "--precision %s: expected f32 or bf16", arg);
         o->precision = arg[0] == 'b' ? GGN_PRECISION_BF16 : GGN_PRECISION_F32;
         return 0;
+    case KEY_EPOCHS:
     case 'w':
     case 't': {
+        int most = key == 'w' ? 16 : 1024;
         long n = strtol(arg, &end, 10);
-        if (end == arg || *end != '\0' || n < 1 || n > (key == 'w' ? 16 : 1024))
-            argp_error(state, "-%c %s: expected 1 … %d", key, arg, key == 'w' ? 16 : 1024);
-        *(key == 'w' ? &o->window : &o->threads) = (int)n;
+        if (end == arg || *end != '\0' || n < 1 || n > most)
+            argp_error(state, "%s: expected 1 … %d", arg, most);
+        *(key == 'w' ? &o->window : key == 't' ? &o->threads : &o->epochs) = (int)n;
         return 0;
     }
     case ARGP_KEY_END:
@@ -124,6 +130,23 @@ static int add_trivial(struct job *j, struct ggn_err *err)
         if (rc == GGN_OK && !available)
             ggn_method_release(m);
         else if (rc == GGN_OK)
+            rc = ggn_method_tune(&j->methods[j->n++], &j->set, j->tuning, j->o->early, err);
+    }
+    return rc;
+}
+
+static int add_baselines(struct job *j, struct ggn_threads *threads, struct ggn_err *err)
+{
+    int rc = GGN_OK;
+    for (int k = 0; k < 3 && rc == GGN_OK; k++) {
+        struct ggn_method *m = &j->methods[j->n];
+        if (k == 0)
+            rc = ggn_method_attributes_svm(m, &j->set, j->tuning, threads, err);
+        else if (k == 1)
+            rc = ggn_method_mask_svm(m, &j->set, j->tuning, threads, err);
+        else
+            rc = ggn_method_svd_lstm(m, &j->set, j->tuning, 0, j->o->epochs, threads, err);
+        if (rc == GGN_OK)
             rc = ggn_method_tune(&j->methods[j->n++], &j->set, j->tuning, j->o->early, err);
     }
     return rc;
@@ -223,7 +246,7 @@ int ggn_cmd_evaluate(int argc, char **argv)
         .doc = "Measures models, the trivial baselines and the criteria halfbuf and variance on the same recorded sequences, separately for training, "
                "validation and test scenes.",
     };
-    struct options o = {.early = 0.05, .quality = 1, .threads = ggn_threads_available(), .window = 6};
+    struct options o = {.early = 0.05, .quality = 1, .threads = ggn_threads_available(), .window = 6, .epochs = 15};
     struct job j = {.o = &o};
     struct ggn_err err = {0};
     int window, skipped = 0;
@@ -244,6 +267,8 @@ int ggn_cmd_evaluate(int argc, char **argv)
         j.tuning_models = ggn_eval_count(&j.set, GGN_SPLIT_VALIDATION) > 0 ? GGN_SPLIT_VALIDATION : j.tuning;
         rc = add_trivial(&j, &err);
     }
+    if (rc == GGN_OK && o.baselines)
+        rc = add_baselines(&j, threads, &err);
     if (rc == GGN_OK)
         rc = add_models(&j, threads, &err);
     if (rc == GGN_OK)

@@ -1,0 +1,348 @@
+#include "baselines/lstm.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cblas.h>
+
+enum { LAYERS = 3, BATCH = 64 };
+static const int widths[LAYERS] = {512, 128, 32};
+static const float dropout = 0.4f;
+
+struct layer {
+    int in, out;
+    size_t w, u, b;  /* offsets of W [4·out, in], U [4·out, out], b [4·out] in the parameters; gates in the order i, f, g, o */
+    float *z;        /* [steps][BATCH][4·out]: gates after their activation; then d loss / d pre-activation */
+    float *c, *s, *h; /* [steps][BATCH][out]: cell, sigmoid(cell), output (before dropout) */
+    float *x;        /* [steps][BATCH][in]: what came in (after dropout) */
+    float *dx;       /* the same shape: d loss / d x */
+    float *mask;     /* [steps][BATCH][out]: dropout of the output, 0 or 1/(1-p) */
+};
+
+struct ggn_lstm {
+    int inputs, steps;
+    uint32_t seed, calls;
+    size_t n, dense;        /* parameters; offset of the last unit's [32] weights and bias */
+    long adam_steps;
+    float *p, *grad, *m, *v; /* [n] each; p owns all four */
+    float *activations;      /* owns what the layers point to */
+    float *dh, *dc;          /* [BATCH][512] scratch of the backward pass */
+    struct layer layers[LAYERS];
+};
+
+static uint32_t hash(uint32_t k, uint32_t s)
+{
+    uint32_t h = k + s * 0x9E3779B9u;
+    h ^= h >> 16;
+    h *= 0x7feb352du;
+    h ^= h >> 15;
+    h *= 0x846ca68bu;
+    return h ^ h >> 16;
+}
+
+static float uniform(uint32_t k, uint32_t s)
+{
+    return (float)hash(k, s) / 4294967296.0f;
+}
+
+static float sigmoid(float x)
+{
+    return 1.0f / (1.0f + expf(-x));
+}
+
+static float hard_sigmoid(float x)
+{
+    float y = 0.2f * x + 0.5f;
+    return y < 0.0f ? 0.0f : y > 1.0f ? 1.0f : y;
+}
+
+/* Glorot uniform; forget gates start open (bias 1), as the published code's library has it. */
+static void init_weights(struct ggn_lstm *l, uint32_t seed)
+{
+    memset(l->p, 0, 4 * l->n * sizeof *l->p);
+    for (int k = 0; k < LAYERS; k++) {
+        const struct layer *y = &l->layers[k];
+        size_t nw = 4 * (size_t)y->out * (size_t)y->in, nu = 4 * (size_t)y->out * (size_t)y->out;
+        float limit_w = sqrtf(6.0f / (float)(y->in + 4 * y->out)), limit_u = sqrtf(6.0f / (float)(5 * y->out));
+        for (size_t i = 0; i < nw; i++)
+            l->p[y->w + i] = limit_w * (2.0f * uniform((uint32_t)i, seed + 10 * (uint32_t)k) - 1.0f);
+        for (size_t i = 0; i < nu; i++)
+            l->p[y->u + i] = limit_u * (2.0f * uniform((uint32_t)i, seed + 10 * (uint32_t)k + 1) - 1.0f);
+        for (int i = 0; i < y->out; i++)
+            l->p[y->b + (size_t)(y->out + i)] = 1.0f;
+    }
+    float limit = sqrtf(6.0f / (float)(widths[LAYERS - 1] + 1));
+    for (int i = 0; i < widths[LAYERS - 1]; i++)
+        l->p[l->dense + (size_t)i] = limit * (2.0f * uniform((uint32_t)i, seed + 99) - 1.0f);
+}
+
+void ggn_lstm_destroy(struct ggn_lstm *l)
+{
+    if (l == NULL)
+        return;
+    free(l->p);
+    free(l->activations);
+    free(l);
+}
+
+struct ggn_lstm *ggn_lstm_create(int inputs, int steps, uint32_t seed, struct ggn_err *err)
+{
+    struct ggn_lstm *l = calloc(1, sizeof *l);
+    if (l == NULL) {
+        ggn_fail_nomem(err, "LSTM");
+        return NULL;
+    }
+    l->inputs = inputs;
+    l->steps = steps;
+    l->seed = seed;
+    size_t rows = (size_t)steps * BATCH, floats = 2 * BATCH * (size_t)widths[0];
+    for (int k = 0; k < LAYERS; k++) {
+        struct layer *y = &l->layers[k];
+        y->in = k == 0 ? inputs : widths[k - 1];
+        y->out = widths[k];
+        y->w = l->n;
+        y->u = y->w + 4 * (size_t)y->out * (size_t)y->in;
+        y->b = y->u + 4 * (size_t)y->out * (size_t)y->out;
+        l->n = y->b + 4 * (size_t)y->out;
+        floats += rows * (size_t)(8 * y->out + 2 * y->in);
+    }
+    l->dense = l->n;
+    l->n += (size_t)widths[LAYERS - 1] + 1;
+    l->p = malloc(4 * l->n * sizeof *l->p);
+    l->activations = calloc(floats, sizeof *l->activations);
+    if (l->p == NULL || l->activations == NULL) {
+        ggn_fail_nomem(err, "LSTM");
+        ggn_lstm_destroy(l);
+        return NULL;
+    }
+    l->grad = l->p + l->n;
+    l->m = l->grad + l->n;
+    l->v = l->m + l->n;
+    float *at = l->activations;
+    l->dh = at;
+    l->dc = at + BATCH * (size_t)widths[0];
+    at += 2 * BATCH * (size_t)widths[0];
+    for (int k = 0; k < LAYERS; k++) {
+        struct layer *y = &l->layers[k];
+        size_t out = rows * (size_t)y->out, in = rows * (size_t)y->in;
+        y->z = at;
+        y->c = y->z + 4 * out;
+        y->s = y->c + out;
+        y->h = y->s + out;
+        y->mask = y->h + out;
+        y->x = y->mask + out;
+        y->dx = y->x + in;
+        at = y->dx + in;
+    }
+    openblas_set_num_threads(1);
+    init_weights(l, seed);
+    return l;
+}
+
+size_t ggn_lstm_parameters(const struct ggn_lstm *l)
+{
+    return l->n;
+}
+
+float *ggn_lstm_weights(struct ggn_lstm *l)
+{
+    return l->p;
+}
+
+/* Z = X·Wᵀ + H₋·Uᵀ + b; i, f, o = hard sigmoid, g = sigmoid; c = f∘c₋ + i∘g; h = o∘sigmoid(c). */
+static void forward_step(const struct ggn_lstm *l, const struct layer *y, int t, int batch)
+{
+    int out = y->out;
+    float *z = y->z + (size_t)t * BATCH * 4 * (size_t)out;
+    const float *x = y->x + (size_t)t * BATCH * (size_t)y->in;
+    for (int r = 0; r < batch; r++)
+        memcpy(z + (size_t)r * 4 * (size_t)out, l->p + y->b, 4 * (size_t)out * sizeof *z);
+    cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasTrans, batch, 4 * out, y->in, 1.0f, x, y->in, l->p + y->w, y->in, 1.0f, z, 4 * out);
+    if (t > 0)
+        cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasTrans, batch, 4 * out, out, 1.0f, y->h + (size_t)(t - 1) * BATCH * (size_t)out, out,
+                    l->p + y->u, out, 1.0f, z, 4 * out);
+    for (int r = 0; r < batch; r++)
+        for (int k = 0; k < out; k++) {
+            float *g = z + (size_t)r * 4 * (size_t)out + (size_t)k;
+            size_t at = ((size_t)t * BATCH + (size_t)r) * (size_t)out + (size_t)k;
+            float before = t > 0 ? y->c[at - (size_t)BATCH * (size_t)out] : 0.0f;
+            g[0] = hard_sigmoid(g[0]);
+            g[out] = hard_sigmoid(g[out]);
+            g[2 * out] = sigmoid(g[2 * out]);
+            g[3 * out] = hard_sigmoid(g[3 * out]);
+            y->c[at] = g[out] * before + g[0] * g[2 * out];
+            y->s[at] = sigmoid(y->c[at]);
+            y->h[at] = g[3 * out] * y->s[at];
+        }
+}
+
+/* Logits of a batch whose inputs lie in layers[0].x. training: draws dropout masks. */
+static void forward(struct ggn_lstm *l, int batch, int training, float *logit)
+{
+    for (int k = 0; k < LAYERS; k++) {
+        const struct layer *y = &l->layers[k];
+        size_t n = (size_t)l->steps * BATCH * (size_t)y->out;
+        for (int t = 0; t < l->steps; t++)
+            forward_step(l, y, t, batch);
+        l->calls += training != 0;
+        for (size_t i = 0; i < n; i++)
+            y->mask[i] = !training ? 1.0f : uniform((uint32_t)i, l->seed + 1000 + l->calls) < dropout ? 0.0f : 1.0f / (1.0f - dropout);
+        for (size_t i = 0; i < n && k + 1 < LAYERS; i++)
+            l->layers[k + 1].x[i] = y->h[i] * y->mask[i];
+    }
+    const struct layer *last = &l->layers[LAYERS - 1];
+    for (int r = 0; r < batch; r++) {
+        size_t at = ((size_t)(l->steps - 1) * BATCH + (size_t)r) * (size_t)last->out;
+        logit[r] = l->p[l->dense + (size_t)last->out];
+        for (int k = 0; k < last->out; k++)
+            logit[r] += l->p[l->dense + (size_t)k] * last->h[at + (size_t)k] * last->mask[at + (size_t)k];
+    }
+}
+
+/* Slope of the hard sigmoid from its value: flat at both ends. */
+static float hard_slope(float y)
+{
+    return y > 0.0f && y < 1.0f ? 0.2f : 0.0f;
+}
+
+/* One step back: dh (in l->dh) and dc (in l->dc) come from step t+1 and leave for t-1; z becomes d loss / d pre-activation. */
+static void backward_step(struct ggn_lstm *l, struct layer *y, int t, int batch)
+{
+    int out = y->out;
+    float *z = y->z + (size_t)t * BATCH * 4 * (size_t)out;
+    for (int r = 0; r < batch; r++)
+        for (int k = 0; k < out; k++) {
+            float *g = z + (size_t)r * 4 * (size_t)out + (size_t)k;
+            size_t at = ((size_t)t * BATCH + (size_t)r) * (size_t)out + (size_t)k, rk = (size_t)r * (size_t)out + (size_t)k;
+            float before = t > 0 ? y->c[at - (size_t)BATCH * (size_t)out] : 0.0f;
+            float i = g[0], f = g[out], c = g[2 * out], o = g[3 * out], s = y->s[at];
+            float dh = l->dh[rk], dc = l->dc[rk] + dh * o * s * (1.0f - s);
+            g[0] = dc * c * hard_slope(i);
+            g[out] = dc * before * hard_slope(f);
+            g[2 * out] = dc * i * c * (1.0f - c);
+            g[3 * out] = dh * s * hard_slope(o);
+            l->dc[rk] = dc * f;
+        }
+    const float *x = y->x + (size_t)t * BATCH * (size_t)y->in;
+    /* dW += dZᵀ·X, dU += dZᵀ·H₋, dX = dZ·W, dH₋ = dZ·U */
+    cblas_sgemm(CblasRowMajor, CblasTrans, CblasNoTrans, 4 * out, y->in, batch, 1.0f, z, 4 * out, x, y->in, 1.0f, l->grad + y->w, y->in);
+    cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, batch, y->in, 4 * out, 1.0f, z, 4 * out, l->p + y->w, y->in, 0.0f,
+                y->dx + (size_t)t * BATCH * (size_t)y->in, y->in);
+    for (int r = 0; r < batch; r++)
+        for (int k = 0; k < 4 * out; k++)
+            l->grad[y->b + (size_t)k] += z[(size_t)r * 4 * (size_t)out + (size_t)k];
+    if (t == 0)
+        return;
+    cblas_sgemm(CblasRowMajor, CblasTrans, CblasNoTrans, 4 * out, out, batch, 1.0f, z, 4 * out, y->h + (size_t)(t - 1) * BATCH * (size_t)out, out,
+                1.0f, l->grad + y->u, out);
+    cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, batch, out, 4 * out, 1.0f, z, 4 * out, l->p + y->u, out, 0.0f, l->dh, out);
+}
+
+/* Gradients of the sum over the batch of d[r]·logit[r]. */
+static void backward(struct ggn_lstm *l, int batch, const float *d)
+{
+    memset(l->grad, 0, l->n * sizeof *l->grad);
+    struct layer *last = &l->layers[LAYERS - 1];
+    for (int layer = LAYERS - 1; layer >= 0; layer--) {
+        struct layer *y = &l->layers[layer];
+        size_t out = (size_t)y->out;
+        memset(l->dh, 0, (size_t)batch * out * sizeof *l->dh);
+        memset(l->dc, 0, (size_t)batch * out * sizeof *l->dc);
+        for (int t = l->steps - 1; t >= 0; t--) {
+            size_t first = (size_t)t * BATCH * out;
+            for (size_t i = 0; i < (size_t)batch * out; i++) {
+                if (layer + 1 < LAYERS) /* what the layer above asks for */
+                    l->dh[i] += l->layers[layer + 1].dx[first + i] * y->mask[first + i];
+                else if (t == l->steps - 1)
+                    l->dh[i] += d[i / out] * l->p[l->dense + i % out] * y->mask[first + i];
+            }
+            backward_step(l, y, t, batch);
+        }
+    }
+    for (int r = 0; r < batch; r++) {
+        size_t at = ((size_t)(l->steps - 1) * BATCH + (size_t)r) * (size_t)last->out;
+        for (int k = 0; k < last->out; k++)
+            l->grad[l->dense + (size_t)k] += d[r] * last->h[at + (size_t)k] * last->mask[at + (size_t)k];
+        l->grad[l->dense + (size_t)last->out] += d[r];
+    }
+}
+
+static void load_sequence(struct ggn_lstm *l, int r, const double *sequence)
+{
+    for (int t = 0; t < l->steps; t++)
+        for (int k = 0; k < l->inputs; k++)
+            l->layers[0].x[((size_t)t * BATCH + (size_t)r) * (size_t)l->inputs + (size_t)k] = (float)sequence[t * l->inputs + k];
+}
+
+/* Kingma & Ba 2015, lr 1e-3. */
+static void adam(struct ggn_lstm *l)
+{
+    const float b1 = 0.9f, b2 = 0.999f;
+    double step = (double)++l->adam_steps;
+    float rate = (float)(1e-3 * sqrt(1.0 - pow(0.999, step)) / (1.0 - pow(0.9, step)));
+    for (size_t i = 0; i < l->n; i++) {
+        l->m[i] = b1 * l->m[i] + (1.0f - b1) * l->grad[i];
+        l->v[i] = b2 * l->v[i] + (1.0f - b2) * l->grad[i] * l->grad[i];
+        l->p[i] -= rate * l->m[i] / (sqrtf(l->v[i]) + 1e-7f);
+    }
+}
+
+/* max(z, 0) − y·z + log(1 + e^−|z|) */
+static double cross_entropy(double z, int y)
+{
+    return fmax(z, 0.0) - y * z + log1p(exp(-fabs(z)));
+}
+
+double ggn_lstm_epoch(struct ggn_lstm *l, const double *const *sequences, const unsigned char *label, size_t n, uint32_t epoch)
+{
+    float logit[BATCH], d[BATCH];
+    double loss = 0.0, positive = 0.0;
+    size_t *order = malloc((n > 0 ? n : 1) * sizeof *order);
+    if (order == NULL)
+        return (double)NAN;
+    for (size_t i = 0; i < n; i++) {
+        positive += label[i];
+        order[i] = i;
+    }
+    for (size_t i = n; i > 1; i--) { /* Fisher-Yates */
+        size_t j = hash((uint32_t)i, l->seed + 77 + epoch) % i, keep = order[i - 1];
+        order[i - 1] = order[j];
+        order[j] = keep;
+    }
+    double weight[2] = {positive < (double)n ? 0.5 * (double)n / ((double)n - positive) : 0.0, positive > 0.0 ? 0.5 * (double)n / positive : 0.0};
+    for (size_t at = 0; at < n; at += BATCH) {
+        int batch = n - at < BATCH ? (int)(n - at) : BATCH;
+        for (int r = 0; r < batch; r++)
+            load_sequence(l, r, sequences[order[at + (size_t)r]]);
+        forward(l, batch, 1, logit);
+        for (int r = 0; r < batch; r++) {
+            int y = label[order[at + (size_t)r]];
+            loss += weight[y] * cross_entropy((double)logit[r], y);
+            d[r] = (float)weight[y] * (sigmoid(logit[r]) - (float)y) / (float)batch;
+        }
+        backward(l, batch, d);
+        adam(l);
+    }
+    free(order);
+    return n > 0 ? loss / (double)n : (double)NAN;
+}
+
+double ggn_lstm_predict(struct ggn_lstm *l, const double *sequence)
+{
+    float logit;
+    load_sequence(l, 0, sequence);
+    forward(l, 1, 0, &logit);
+    return (double)sigmoid(logit);
+}
+
+double ggn_lstm_gradient(struct ggn_lstm *l, const double *sequence, int label, float *grad)
+{
+    float logit, d;
+    load_sequence(l, 0, sequence);
+    forward(l, 1, 0, &logit);
+    d = sigmoid(logit) - (float)label;
+    backward(l, 1, &d);
+    memcpy(grad, l->grad, l->n * sizeof *grad);
+    return cross_entropy((double)logit, label);
+}

@@ -1,0 +1,118 @@
+/* The baselines' models: the LSTM's size and gradients, and that both learners learn. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <cmocka.h>
+
+#include "support/ggn_near.h"
+#include "support/ggn_noise.h"
+
+#include "baselines/lstm.h"
+#include "baselines/svm.h"
+
+static void size(void **state)
+{
+    (void)state;
+    struct ggn_lstm *l = ggn_lstm_create(100, 6, 1, NULL);
+    assert_non_null(l);
+    assert_int_equal(ggn_lstm_parameters(l), 1604257); /* the published count */
+    ggn_lstm_destroy(l);
+}
+
+/* Central differences along random directions, and for single parameters of every kind. */
+static void gradients(void **state)
+{
+    (void)state;
+    enum { IN = 3, STEPS = 4 };
+    double sequence[STEPS * IN];
+    struct ggn_lstm *l = ggn_lstm_create(IN, STEPS, 5, NULL);
+    size_t n = ggn_lstm_parameters(l);
+    float *grad = malloc(n * sizeof *grad), *other = malloc(n * sizeof *other), *keep = malloc(n * sizeof *keep), *p = ggn_lstm_weights(l);
+    for (int i = 0; i < STEPS * IN; i++)
+        sequence[i] = ggn_noise_gauss((uint32_t)i, 3);
+    /* Larger weights, so that no gate sits in the linear middle of its sigmoid. */
+    for (size_t i = 0; i < n; i++)
+        p[i] *= 3.0f;
+    memcpy(keep, p, n * sizeof *p);
+    ggn_lstm_gradient(l, sequence, 1, grad);
+    for (uint32_t d = 0; d < 6; d++) {
+        const double h = 2e-3;
+        double slope = 0.0, loss[2];
+        for (int side = 0; side < 2; side++) {
+            for (size_t i = 0; i < n; i++)
+                p[i] = keep[i] + (float)((side == 0 ? -h : h) * (ggn_noise_hash((uint32_t)i, d) & 1 ? 1.0 : -1.0) / sqrt((double)n) * 30.0);
+            loss[side] = ggn_lstm_gradient(l, sequence, 1, other);
+        }
+        for (size_t i = 0; i < n; i++)
+            slope += (double)grad[i] * (ggn_noise_hash((uint32_t)i, d) & 1 ? 1.0 : -1.0) / sqrt((double)n) * 30.0;
+        assert_near((loss[1] - loss[0]) / (2 * h), slope, 0.02 * fabs(slope) + 2e-3);
+    }
+    free(keep);
+    free(other);
+    free(grad);
+    ggn_lstm_destroy(l);
+}
+
+static void learns(void **state)
+{
+    (void)state;
+    enum { IN = 4, STEPS = 1, N = 64 }; /* logistic cells learn slowly: one step only */
+    static double x[N][STEPS * IN];
+    const double *sequences[N];
+    unsigned char label[N];
+    for (uint32_t i = 0; i < N; i++) {
+        for (uint32_t k = 0; k < STEPS * IN; k++)
+            x[i][k] = ggn_noise_gauss(k, i + 10);
+        label[i] = x[i][(STEPS - 1) * IN] > 0.0;
+        sequences[i] = x[i];
+    }
+    struct ggn_lstm *a = ggn_lstm_create(IN, STEPS, 2, NULL), *b = ggn_lstm_create(IN, STEPS, 2, NULL);
+    double first = ggn_lstm_epoch(a, sequences, label, N, 0), last = first;
+    ggn_lstm_epoch(b, sequences, label, N, 0);
+    assert_memory_equal(ggn_lstm_weights(a), ggn_lstm_weights(b), ggn_lstm_parameters(a) * sizeof(float));
+    for (uint32_t e = 1; e < 260; e++)
+        last = ggn_lstm_epoch(a, sequences, label, N, e);
+    assert_true(first > 0.5 && last < 0.5 * first);
+    ggn_lstm_destroy(a);
+    ggn_lstm_destroy(b);
+}
+
+static void svm(void **state)
+{
+    (void)state;
+    enum { N = 200, D = 3 };
+    static double x[N * D], fresh[D];
+    unsigned char label[N];
+    double scratch[D];
+    struct ggn_err err = {0};
+    int right = 0;
+    for (uint32_t i = 0; i < N; i++) { /* inside or outside a circle; the third feature is constant */
+        x[i * D] = 1000.0 * ggn_noise_gauss(i, 1);
+        x[i * D + 1] = 0.01 * ggn_noise_gauss(i, 2);
+        x[i * D + 2] = 5.0;
+        label[i] = hypot(x[i * D] / 1000.0, x[i * D + 1] / 0.01) > 1.5;
+    }
+    struct ggn_svm *s = ggn_svm_train(x, label, N, D, 1.0, 1.0, &err);
+    assert_non_null(s);
+    for (uint32_t i = 0; i < N; i++) {
+        fresh[0] = 1000.0 * ggn_noise_gauss(i, 3);
+        fresh[1] = 0.01 * ggn_noise_gauss(i, 4);
+        fresh[2] = 5.0;
+        right += (ggn_svm_score(s, fresh, scratch) > 0.0) == (hypot(fresh[0] / 1000.0, fresh[1] / 0.01) > 1.5);
+    }
+    assert_true(right > 0.9 * N);
+    ggn_svm_destroy(s);
+    memset(label, 1, sizeof label);
+    assert_null(ggn_svm_train(x, label, N, D, 1.0, 1.0, &err));
+    assert_non_null(strstr(err.text, "are the same"));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(size), cmocka_unit_test(gradients), cmocka_unit_test(learns), cmocka_unit_test(svm)};
+    return cmocka_run_group_tests_name("baseline_models", tests, NULL, NULL);
+}
