@@ -358,7 +358,7 @@ static int record_sequence(struct session *s, int *status, struct pt_err *err)
 {
     struct pt_sequence_config config = {.directory = s->cli.sequence, .levels = s->cli.levels, .blocks = s->cli.sequence_blocks,
                                         .reference_spp = s->cli.reference_spp, .scene_path = s->cli.scene,
-                                        .name = s->cli.name, .quiet = s->cli.quiet};
+                                        .name = s->cli.name, .quiet = s->cli.quiet, .slice = after_slice};
     int rc = make_config(s, &config.render, err);
     if (rc == PT_OK)
         rc = scene_crc(s->cli.scene, &config.scene_crc, err);
@@ -368,6 +368,7 @@ static int record_sequence(struct session *s, int *status, struct pt_err *err)
         return rc;
     int was_interrupted = 0;
     rc = pt_sequence_record(&config, s->scene, s->kernel, s->threads, s->criterion, interrupted, say, s, &was_interrupted, err);
+    pt_progress_clear(&s->progress);
     *status = was_interrupted ? EXIT_INTERRUPTED : 0;
     return rc;
 }

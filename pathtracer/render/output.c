@@ -111,6 +111,8 @@ int pt_output_exr(const char *path, const struct pt_render *r, const struct pt_o
     size_t used = 0;
     for (int i = 0; i < PT_REASON_COUNT; i++)
         used += (size_t)snprintf(reasons + used, sizeof reasons - used, "%s%d=%s", i ? " " : "", i, pt_block_reason_name(i));
+    char block[48];
+    snprintf(block, sizeof block, "%dx%d", r->config.block_width, r->config.block_height);
     effect_names(info->effects, effects, sizeof effects);
     criterion_text(r, info, criterion, sizeof criterion);
     const struct pt_exr_attribute attributes[] = {
@@ -118,6 +120,7 @@ int pt_output_exr(const char *path, const struct pt_render *r, const struct pt_o
         {"lull:criterion", criterion, 0.0},
         {"lull:effects", effects, 0.0},
         {"lull:reasons", reasons, 0.0},
+        {"lull:block", block, 0.0},
         {"lull:seed", NULL, (double)r->config.integrator.seed},
         {"lull:samples", NULL, (double)r->totals.samples},
         {"software", "lull pathtracer 1.0", 0.0},

@@ -461,7 +461,7 @@ int pt_sequence_record(const struct pt_sequence_config *config, const struct pt_
                        void (*say)(void *data, const char *line), void *data, int *was_interrupted, struct pt_err *err)
 {
     struct recorder r = {.config = config, .scene = scene, .kernel = kernel, .threads = threads, .criterion = criterion,
-                         .hooks = {.interrupted = interrupted, .warn = say, .data = data}};
+                         .hooks = {.slice = config->slice, .interrupted = interrupted, .warn = say, .data = data}};
     *was_interrupted = 0;
     int rc = prepare(&r, err);
     if (rc == PT_OK)

@@ -20,6 +20,7 @@ struct pt_sequence_config {
     const char *scene_path;
     uint32_t scene_crc;
     int quiet;
+    int (*slice)(void *data, struct pt_render *render, struct pt_err *err); /* as in pt_render_hooks; may be NULL */
     struct pt_render_config render; /* size, block, integrator; the rest is set here */
 };
 

@@ -110,6 +110,8 @@ static void exr_holds_every_layer(void **state)
     assert_string_equal(text, "fake 1 at=32");
     assert_int_equal(exr_attr_get_string(file, 0, "lull:effects", &length, &text), EXR_ERR_SUCCESS);
     assert_string_equal(text, "alpha,motion");
+    assert_int_equal(exr_attr_get_string(file, 0, "lull:block", &length, &text), EXR_ERR_SUCCESS);
+    assert_string_equal(text, "16x16");
     static const char *const names[] = {"R", "lull.spp", "lull.reason", "lull.p_noisy", "lull.error", "albedo.G", "normal.Z", "depth.Z"};
     for (int k = 0; k < 8; k++) {
         read_channel(file, names[k], pixels);
