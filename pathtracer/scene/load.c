@@ -1,6 +1,7 @@
 #include "scene/load.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -19,6 +20,19 @@ void pt_scene_destroy(struct pt_scene *scene)
     pt_accel_release(scene);
     pt_arena_release(&scene->arena);
     free(scene);
+}
+
+/* Says where the time went when a person would have noticed it. */
+static void note_slow_load(const char *path, const struct pt_load_options *options, const struct pt_scene_stats *stats)
+{
+    const double noticeable_s = 3;
+    double total_s = stats->parse_s + stats->texture_s + stats->build_s + stats->accel_s;
+    char line[512];
+    if (options == NULL || options->quiet || options->warn == NULL || total_s < noticeable_s)
+        return;
+    snprintf(line, sizeof line, "%.200s: loaded in %.1f s: text and meshes %.1f, textures %.1f, acceleration structure %.1f, the rest %.1f",
+             path, total_s, stats->parse_s, stats->texture_s, stats->accel_s, stats->build_s);
+    options->warn(options->warn_data, line);
 }
 
 int pt_scene_load_source(const char *path, const struct pt_source *source, const struct pt_load_options *options,
@@ -49,6 +63,7 @@ int pt_scene_load_source(const char *path, const struct pt_source *source, const
         rc = pt_builder_finish(b);
     scene->stats.build_s = pt_clock_wall_s() - start_s - scene->stats.accel_s;
     if (rc == PT_OK) {
+        note_slow_load(path, options, &scene->stats);
         *out = scene;
         *defaults = found;
         scene = NULL;

@@ -4,33 +4,12 @@
 #include <string.h>
 
 #include "scene/number.h"
+#include "scene/pbrt_parser.h"
 #include "scene/spectra.h"
-
-enum { NAME_MAX_BYTES = 1024, STATE_DEPTH = 1024 };
-
-struct frame {
-    struct pt_state state;
-    char kind;           /* 'A'ttribute, 'T'ransform, 'O'bject, 'I'mport */
-    struct pt_loc loc;
-};
-
-struct parser {
-    struct pt_builder *b;
-    struct pt_lexer lexer;
-    struct pt_state state;
-    struct pt_list frames;       /* struct frame */
-    struct pt_list systems;      /* struct pt_xform[2]: named coordinate systems */
-    struct pt_names system_names;
-    struct pt_params params;     /* of the current directive */
-    struct pt_list attributes;   /* struct pt_params *: owns what states point to */
-    int in_world, ended;
-};
-
-typedef int directive(struct parser *p, struct pt_loc loc);
 
 /* --- pieces of directives --------------------------------------------------------------------------------------------- */
 
-static int read_string(struct parser *p, const char *what, char *out, size_t room)
+int pt_parser_read_string(struct parser *p, const char *what, char *out, size_t room)
 {
     struct pt_token t = pt_lexer_next(&p->lexer);
     if (t.kind == PT_TOKEN_BAD)
@@ -49,7 +28,7 @@ static int read_string(struct parser *p, const char *what, char *out, size_t roo
     return p->b->diag.rc;
 }
 
-static int read_numbers(struct parser *p, const char *directive_name, double *out, int count)
+int pt_parser_read_numbers(struct parser *p, const char *directive_name, double *out, int count)
 {
     int bracket = pt_lexer_peek(&p->lexer).kind == PT_TOKEN_OPEN;
     if (bracket)
@@ -76,7 +55,7 @@ static int read_entity(struct parser *p, struct pt_loc loc, int target)
     char kind[NAME_MAX_BYTES];
     struct pt_params *params = &p->params;
     pt_params_clear(params, &p->b->diag, loc);
-    int rc = read_string(p, "name of what follows", kind, sizeof kind);
+    int rc = pt_parser_read_string(p, "name of what follows", kind, sizeof kind);
     if (rc != PT_OK)
         return rc;
     params->kind = pt_params_keep(params, kind, strlen(kind));
@@ -91,150 +70,6 @@ static int check_world(struct parser *p, struct pt_loc loc, const char *name)
     if (p->in_world)
         return PT_OK;
     return pt_diag_fail(&p->b->diag, loc, "%s before WorldBegin", name);
-}
-
-/* --- transforms ------------------------------------------------------------------------------------------------------- */
-
-static int concat(struct parser *p, struct pt_loc loc, const struct pt_xform *t, int replace)
-{
-    struct pt_xform inverse;
-    for (int i = 0; i < 2; i++) {
-        if ((p->state.active >> i & 1) == 0)
-            continue;
-        struct pt_xform next = replace ? *t : pt_xform_mul(&p->state.ctm[i], t);
-        if (!pt_xform_invert(&next, &inverse))
-            return pt_diag_fail(&p->b->diag, loc, "singular transform (expected one that can be inverted)");
-        p->state.ctm[i] = next;
-    }
-    return PT_OK;
-}
-
-static int do_identity(struct parser *p, struct pt_loc loc)
-{
-    struct pt_xform t = pt_xform_identity();
-    return concat(p, loc, &t, 1);
-}
-
-static int do_translate(struct parser *p, struct pt_loc loc)
-{
-    double v[3] = {0};
-    int rc = read_numbers(p, "Translate", v, 3);
-    struct pt_xform t = pt_xform_translate(v[0], v[1], v[2]);
-    return rc != PT_OK ? rc : concat(p, loc, &t, 0);
-}
-
-static int do_scale(struct parser *p, struct pt_loc loc)
-{
-    double v[3] = {0};
-    int rc = read_numbers(p, "Scale", v, 3);
-    struct pt_xform t = pt_xform_scale(v[0], v[1], v[2]);
-    return rc != PT_OK ? rc : concat(p, loc, &t, 0);
-}
-
-static int do_rotate(struct parser *p, struct pt_loc loc)
-{
-    double v[4] = {0};
-    int rc = read_numbers(p, "Rotate", v, 4);
-    if (rc != PT_OK)
-        return rc;
-    if (v[1] == 0 && v[2] == 0 && v[3] == 0)
-        return pt_diag_fail(&p->b->diag, loc, "Rotate about the axis 0 0 0 (expected a direction)");
-    struct pt_xform t = pt_xform_rotate(v[0], v[1], v[2], v[3]);
-    return concat(p, loc, &t, 0);
-}
-
-static int do_look_at(struct parser *p, struct pt_loc loc)
-{
-    double v[9] = {0};
-    struct pt_xform t;
-    int rc = read_numbers(p, "LookAt", v, 9);
-    if (rc != PT_OK)
-        return rc;
-    if (!pt_xform_look_at(v, v + 3, v + 6, &t))
-        return pt_diag_fail(&p->b->diag, loc, "LookAt is degenerate (expected eye and target apart, up not along the view)");
-    return concat(p, loc, &t, 0);
-}
-
-static int do_matrix(struct parser *p, struct pt_loc loc, const char *name, int replace)
-{
-    double v[16] = {0};
-    struct pt_xform t;
-    int rc = read_numbers(p, name, v, 16);
-    if (rc != PT_OK)
-        return rc;
-    if (!pt_xform_from16(v, &t))
-        return pt_diag_fail(&p->b->diag, loc, "%s is not affine (expected 0 0 0 1 as every fourth number)", name);
-    return concat(p, loc, &t, replace);
-}
-
-static int do_transform(struct parser *p, struct pt_loc loc)
-{
-    return do_matrix(p, loc, "Transform", 1);
-}
-
-static int do_concat_transform(struct parser *p, struct pt_loc loc)
-{
-    return do_matrix(p, loc, "ConcatTransform", 0);
-}
-
-static int save_system(struct parser *p, const char *name, const struct pt_xform ctm[2])
-{
-    int32_t id = pt_list_add(p->b, &p->systems, ctm);
-    if (id < 0 || pt_names_set(&p->system_names, name, id) != PT_OK)
-        return pt_diag_nomem(&p->b->diag, "coordinate systems");
-    return PT_OK;
-}
-
-static int do_coordinate_system(struct parser *p, struct pt_loc loc)
-{
-    char name[NAME_MAX_BYTES];
-    (void)loc;
-    int rc = read_string(p, "name", name, sizeof name);
-    return rc != PT_OK ? rc : save_system(p, name, p->state.ctm);
-}
-
-static int do_coord_sys_transform(struct parser *p, struct pt_loc loc)
-{
-    char name[NAME_MAX_BYTES];
-    int rc = read_string(p, "name", name, sizeof name);
-    if (rc != PT_OK)
-        return rc;
-    int32_t id = pt_names_get(&p->system_names, name);
-    if (id < 0)
-        return pt_diag_fail(&p->b->diag, loc, "unknown coordinate system \"%s\"", name);
-    const struct pt_xform(*systems)[2] = p->systems.items;
-    for (int i = 0; i < 2; i++)
-        if (p->state.active >> i & 1)
-            p->state.ctm[i] = systems[id][i];
-    return PT_OK;
-}
-
-static int do_active_transform(struct parser *p, struct pt_loc loc)
-{
-    struct pt_token t = pt_lexer_next(&p->lexer);
-    (void)loc;
-    if (t.length == 9 && memcmp(t.text, "StartTime", 9) == 0)
-        p->state.active = 1;
-    else if (t.length == 7 && memcmp(t.text, "EndTime", 7) == 0)
-        p->state.active = 2;
-    else if (t.length == 3 && memcmp(t.text, "All", 3) == 0)
-        p->state.active = 3;
-    else
-        return pt_diag_fail(&p->b->diag, t.loc, "ActiveTransform needs StartTime, EndTime or All");
-    return PT_OK;
-}
-
-static int do_transform_times(struct parser *p, struct pt_loc loc)
-{
-    double v[2] = {0, 1};
-    int rc = read_numbers(p, "TransformTimes", v, 2);
-    if (rc != PT_OK)
-        return rc;
-    if (p->in_world || !(v[1] >= v[0]))
-        return pt_diag_fail(&p->b->diag, loc, "TransformTimes must come before WorldBegin, start before end");
-    p->b->transform_times[0] = v[0];
-    p->b->transform_times[1] = v[1];
-    return PT_OK;
 }
 
 /* --- blocks ----------------------------------------------------------------------------------------------------------- */
@@ -296,7 +131,7 @@ static int do_object_begin(struct parser *p, struct pt_loc loc)
 {
     char name[NAME_MAX_BYTES];
     int rc = check_world(p, loc, "ObjectBegin");
-    if (rc == PT_OK && (rc = read_string(p, "object name", name, sizeof name)) == PT_OK &&
+    if (rc == PT_OK && (rc = pt_parser_read_string(p, "object name", name, sizeof name)) == PT_OK &&
         (rc = pt_build_object_begin(p->b, name, loc)) == PT_OK)
         rc = push(p, 'O', loc);
     return rc;
@@ -312,7 +147,7 @@ static int do_object_instance(struct parser *p, struct pt_loc loc)
 {
     char name[NAME_MAX_BYTES];
     int rc = check_world(p, loc, "ObjectInstance");
-    if (rc == PT_OK && (rc = read_string(p, "object name", name, sizeof name)) == PT_OK)
+    if (rc == PT_OK && (rc = pt_parser_read_string(p, "object name", name, sizeof name)) == PT_OK)
         rc = pt_build_instance(p->b, &p->state, name, loc);
     return rc;
 }
@@ -358,7 +193,7 @@ static int do_camera(struct parser *p, struct pt_loc loc)
     for (int i = 0; i < 2; i++)
         if (!pt_xform_invert(&p->state.ctm[i], &inverse[i]))
             return pt_diag_fail(&p->b->diag, loc, "the camera's transform is singular");
-    return save_system(p, "camera", inverse);
+    return pt_parser_save_system(p, "camera", inverse);
 }
 
 static int do_sampler(struct parser *p, struct pt_loc loc)
@@ -392,7 +227,7 @@ static int do_world_begin(struct parser *p, struct pt_loc loc)
     p->in_world = 1;
     p->state.ctm[0] = p->state.ctm[1] = pt_xform_identity();
     p->state.active = 3;
-    int rc = save_system(p, "world", p->state.ctm);
+    int rc = pt_parser_save_system(p, "world", p->state.ctm);
     return rc != PT_OK ? rc : pt_build_header(p->b);
 }
 
@@ -465,7 +300,7 @@ static int do_named_material(struct parser *p, struct pt_loc loc)
 {
     char name[NAME_MAX_BYTES];
     int rc = check_world(p, loc, "NamedMaterial");
-    if (rc == PT_OK && (rc = read_string(p, "material name", name, sizeof name)) == PT_OK) {
+    if (rc == PT_OK && (rc = pt_parser_read_string(p, "material name", name, sizeof name)) == PT_OK) {
         p->state.material = pt_build_material_named(p->b, loc, name);
         rc = p->b->diag.rc;
     }
@@ -476,8 +311,8 @@ static int do_texture(struct parser *p, struct pt_loc loc)
 {
     char name[NAME_MAX_BYTES], type[64];
     int rc = check_world(p, loc, "Texture");
-    if (rc == PT_OK && (rc = read_string(p, "texture name", name, sizeof name)) == PT_OK &&
-        (rc = read_string(p, "texture type", type, sizeof type)) == PT_OK &&
+    if (rc == PT_OK && (rc = pt_parser_read_string(p, "texture name", name, sizeof name)) == PT_OK &&
+        (rc = pt_parser_read_string(p, "texture type", type, sizeof type)) == PT_OK &&
         (rc = read_entity(p, loc, PT_ATTR_TEXTURE)) == PT_OK)
         rc = pt_build_texture(p->b, &p->state, name, type, &p->params);
     return rc;
@@ -496,11 +331,11 @@ static int do_make_named_medium(struct parser *p, struct pt_loc loc)
 static int do_medium_interface(struct parser *p, struct pt_loc loc)
 {
     char inside[NAME_MAX_BYTES], outside[NAME_MAX_BYTES];
-    int rc = read_string(p, "medium name", inside, sizeof inside);
+    int rc = pt_parser_read_string(p, "medium name", inside, sizeof inside);
     if (rc != PT_OK)
         return rc;
     strcpy(outside, inside);
-    if (pt_lexer_peek(&p->lexer).kind == PT_TOKEN_STRING && (rc = read_string(p, "medium name", outside, sizeof outside)) != PT_OK)
+    if (pt_lexer_peek(&p->lexer).kind == PT_TOKEN_STRING && (rc = pt_parser_read_string(p, "medium name", outside, sizeof outside)) != PT_OK)
         return rc;
     p->state.medium_in = pt_build_medium_ref(p->b, inside, loc);
     p->state.medium_out = pt_build_medium_ref(p->b, outside, loc);
@@ -535,7 +370,7 @@ static int do_attribute(struct parser *p, struct pt_loc loc)
 static int do_color_space(struct parser *p, struct pt_loc loc)
 {
     char name[64];
-    int rc = read_string(p, "colour space", name, sizeof name);
+    int rc = pt_parser_read_string(p, "colour space", name, sizeof name);
     if (rc != PT_OK)
         return rc;
     int space = pt_colour_space_named(name);
@@ -563,7 +398,7 @@ static int do_option(struct parser *p, struct pt_loc loc)
 static int include(struct parser *p, struct pt_loc loc, int scoped)
 {
     char name[NAME_MAX_BYTES], path[2 * NAME_MAX_BYTES];
-    int rc = read_string(p, "file name", name, sizeof name);
+    int rc = pt_parser_read_string(p, "file name", name, sizeof name);
     if (rc != PT_OK)
         return rc;
     pt_builder_path(p->b, name, path, sizeof path);
@@ -593,12 +428,7 @@ static const struct {
     {"AttributeBegin", do_attribute_begin},
     {"AttributeEnd", do_attribute_end},
     {"ObjectInstance", do_object_instance},
-    {"Transform", do_transform},
-    {"ConcatTransform", do_concat_transform},
     {"NamedMaterial", do_named_material},
-    {"Translate", do_translate},
-    {"Rotate", do_rotate},
-    {"Scale", do_scale},
     {"Material", do_material},
     {"MakeNamedMaterial", do_make_named_material},
     {"Texture", do_texture},
@@ -611,12 +441,6 @@ static const struct {
     {"TransformBegin", do_transform_begin},
     {"TransformEnd", do_transform_end},
     {"ReverseOrientation", do_reverse_orientation},
-    {"Identity", do_identity},
-    {"LookAt", do_look_at},
-    {"CoordinateSystem", do_coordinate_system},
-    {"CoordSysTransform", do_coord_sys_transform},
-    {"ActiveTransform", do_active_transform},
-    {"TransformTimes", do_transform_times},
     {"MakeNamedMedium", do_make_named_medium},
     {"MediumInterface", do_medium_interface},
     {"Attribute", do_attribute},
@@ -640,7 +464,7 @@ static directive *find_directive(const struct pt_token *t)
     for (size_t i = 0; i < sizeof directives / sizeof directives[0]; i++)
         if (strlen(directives[i].name) == t->length && memcmp(directives[i].name, t->text, t->length) == 0)
             return directives[i].run;
-    return NULL;
+    return pt_parser_transform_directive(t->text, t->length);
 }
 
 static int finish(struct parser *p, struct pt_loc loc)
