@@ -5,6 +5,8 @@
 #ifndef GGN_NN_TYPED_H
 #define GGN_NN_TYPED_H
 
+#include <stddef.h>
+
 #define GGN_TYPED_JOIN(name, suffix) name##_##suffix
 #define GGN_TYPED(name, suffix) GGN_TYPED_JOIN(name, suffix)
 
