@@ -227,7 +227,7 @@ static uint32_t steps_with_value(struct lc *c, float value, int every)
     for (uint32_t i = 0; i < s.film.block_count && i < 16; i++)
         ids[i] = i;
     uint32_t count = s.film.block_count < 16 ? s.film.block_count : 16;
-    for (int step = 0; step < LC_STEPS; step++, s.spp *= 2) {
+    for (int step = 0; step < 4; step++, s.spp *= 4) {
         struct lc_image image;
         for (uint32_t i = 0; i < count; i++)
             lc_film_advance(&s.film, i, s.spp);

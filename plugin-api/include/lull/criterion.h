@@ -230,12 +230,13 @@ struct lull_frame {
 #define LULL_TYPE_F64 2
 #define LULL_TYPE_U32 3
 
-/* estimate = stored * scale / N. Blocks stop at different spp, hence N is the block's (or the pixel's) and never global. */
+/* estimate = stored * scale / N. Blocks stop at different spp, hence N is the block's (or the pixel's) and never global.
+ * WEIGHT is supplied whenever a plane uses it, also if the criterion did not ask for it; it is of LULL_NORM_ONE itself and
+ * may share its memory with SPP. */
 #define LULL_NORM_ONE 0      /* N = 1: the estimate itself is stored */
 #define LULL_NORM_SPP 1      /* N = spp of the block that the pixel belongs to: a sum is stored */
 #define LULL_NORM_HALF_SPP 2 /* N = half_spp of that block */
-#define LULL_NORM_WEIGHT 3   /* N = WEIGHT at that pixel, which is then supplied whether a criterion asked for it or not, uses
-                              * ONE itself, and may share its memory with SPP */
+#define LULL_NORM_WEIGHT 3   /* N = WEIGHT at that pixel */
 
 /* Where one plane lies. Element (x, y, channel) is at
  *     (const char *)data + (x - view.x0) * stride_x + (y - view.y0) * stride_y + channel * stride_c
