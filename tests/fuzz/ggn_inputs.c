@@ -1,0 +1,61 @@
+/* The other things ggn reads from people: threshold tables, labels, rawls images. The first byte chooses. */
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "data/labels.h"
+#include "data/rawls.h"
+#include "data/thresholds.h"
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+static void try_csv(char *text)
+{
+    struct ggn_thresholds t;
+    struct ggn_err err = {0};
+    if (ggn_thresholds_parse_csv("fuzz", text, &t, &err) == GGN_OK)
+        ggn_thresholds_release(&t);
+    else if (err.text[0] == '\0')
+        abort();
+}
+
+static void try_labels(const char *text, size_t size)
+{
+    struct ggn_labels l;
+    struct ggn_err err = {0};
+    if (ggn_labels_parse("fuzz", text, size, &l, &err) == GGN_OK) {
+        for (uint32_t i = 0; i < l.n; i++)
+            ggn_label_p_noisy(&l.labels[i], 100.0, l.spread);
+        ggn_labels_release(&l);
+    } else if (err.text[0] == '\0') {
+        abort();
+    }
+}
+
+static void try_rawls(const char *bytes, size_t size)
+{
+    struct ggn_imagef image;
+    struct ggn_err err = {0};
+    if (ggn_rawls_parse("fuzz", bytes, size, &image, &err) == GGN_OK)
+        ggn_imagef_release(&image);
+    else if (err.text[0] == '\0')
+        abort();
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    /* A copy of its own, so that the sanitizer sees any step beyond the end. */
+    char *text = malloc(size + 1);
+    if (text == NULL)
+        return 0;
+    memcpy(text, data, size);
+    text[size] = '\0';
+    if (size > 0 && text[0] == '{')
+        try_labels(text, size);
+    else if (size > 0 && text[0] == 'I')
+        try_rawls(text, size);
+    else
+        try_csv(text);
+    free(text);
+    return 0;
+}
