@@ -14,13 +14,12 @@
 #include "eval/network.h"
 #include "eval/report.h"
 
-enum { MAX_MODELS = 8, MAX_METHODS = 8 + MAX_MODELS, KEY_EARLY = 256, KEY_NO_QUALITY, KEY_PRECISION, KEY_RETUNE, KEY_RECORDED, KEY_RATIO, KEY_BASELINES, KEY_EPOCHS };
+enum { MAX_MODELS = 8, MAX_METHODS = 8 + MAX_MODELS, KEY_EARLY = 256, KEY_NO_QUALITY, KEY_RETUNE, KEY_RECORDED, KEY_RATIO, KEY_BASELINES, KEY_EPOCHS };
 
 struct options {
     const char *data, *out, *models[MAX_MODELS];
     int n_models, json, quality, threads, window, retune, recorded, baselines, epochs;
     double early, ratio;
-    enum ggn_precision precision;
 };
 
 static const struct argp_option option_table[] = {
@@ -36,7 +35,6 @@ static const struct argp_option option_table[] = {
     {"recorded", KEY_RECORDED, NULL, 0, "stop at the last recorded level instead of going on with the samples of the reference", 3},
     {"ratio", KEY_RATIO, "R", 0, "thin the levels to this ratio of samples (SIN3D: 1.15); default: keep all", 3},
     {"window", 'w', "S", 0, "levels that a window has when no model says so (default 6)", 3},
-    {"precision", KEY_PRECISION, "f32|bf16", 0, "arithmetic of the models", 3},
     {"threads", 't', "N", 0, "worker threads (default: all processors)", 4},
     {0},
 };
@@ -68,11 +66,6 @@ static error_t parse(int key, char *arg, struct argp_state *state)
         o->early = strtod(arg, &end);
         if (end == arg || *end != '\0' || !(o->early >= 0.0 && o->early <= 1.0))
             argp_error(state, "--early %s: expected 0 … 1", arg);
-        return 0;
-    case KEY_PRECISION:
-        if (strcmp(arg, "f32") != 0 && strcmp(arg, "bf16") != 0)
-            argp_error(state, "--precision %s: expected f32 or bf16", arg);
-        o->precision = arg[0] == 'b' ? GGN_PRECISION_BF16 : GGN_PRECISION_F32;
         return 0;
     case KEY_EPOCHS:
     case 'w':
@@ -157,7 +150,7 @@ static int add_models(struct job *j, struct ggn_threads *threads, struct ggn_err
     int rc = GGN_OK;
     for (int i = 0; i < j->o->n_models && rc == GGN_OK; i++) {
         const char *slash = strrchr(j->o->models[i], '/');
-        rc = ggn_eval_network(&j->methods[j->n], &j->set, j->models[i], slash != NULL ? slash + 1 : j->o->models[i], j->o->precision, threads, err);
+        rc = ggn_eval_network(&j->methods[j->n], &j->set, j->models[i], slash != NULL ? slash + 1 : j->o->models[i], threads, err);
         if (rc != GGN_OK)
             return rc;
         struct ggn_method *m = &j->methods[j->n++];
@@ -174,7 +167,9 @@ static int pictures(const struct job *j, enum ggn_split split, struct ggn_err *e
     if (rc != GGN_OK || j->o->n_models == 0 || split == GGN_SPLIT_TRAIN)
         return rc;
     snprintf(path, sizeof path, "%.3900s/%s-denoiser.png", j->o->out, ggn_split_names[split]);
-    return ggn_eval_denoiser_picture(path, &j->set, j->models[0], split, err);
+    rc = ggn_eval_denoiser_picture(path, &j->set, j->models[0], split, err);
+    snprintf(path, sizeof path, "%.3900s/%s-features.png", j->o->out, ggn_split_names[split]);
+    return rc == GGN_OK ? ggn_eval_feature_picture(path, &j->set, j->models[0], split, err) : rc;
 }
 
 static int write_json(const struct options *o, const char *text, struct ggn_err *err)

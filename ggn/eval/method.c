@@ -8,6 +8,7 @@
 void ggn_method_release(struct ggn_method *m)
 {
     free(m->score);
+    free(m->own_guard);
     free(m->stop);
     *m = (struct ggn_method){0};
 }

@@ -15,7 +15,8 @@ enum { GGN_METHOD_NAME = 48 };
 struct ggn_method {
     char name[GGN_METHOD_NAME];
     double *score;       /* owns; [cases]; NaN: not judged there. NULL: fixed stops only */
-    const double *guard; /* borrows from the set; [cases]; the block is held back while it exceeds guard_limit; NULL: none */
+    double *own_guard;   /* owns; NULL unless guard is it */
+    const double *guard; /* own_guard or borrowed from the set; [cases]; the block is held back while it exceeds guard_limit; NULL: none */
     double guard_limit;
     int passes;          /* cases in a row below the cut that stop a block, >= 1 */
     double cut;          /* the block goes on while score >= cut */

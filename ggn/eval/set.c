@@ -227,7 +227,8 @@ static int fill_statistics(struct ggn_eval_set *s, const struct ggn_eval_block *
         s->rse[i] = ggn_seq_stat(r, "rse");
         s->rse_unsettled[i] = ggn_seq_stat(r, "rse_unsettled");
     }
-    if (i < block->end)
+    const struct ggn_seq_record *last = &p.levels[p.n_levels - 1];
+    if (i < block->end && (ggn_seq_has(last, GGN_PLANE_HALF_LOG) || ggn_seq_has(last, GGN_PLANE_HALF_F16)))
         rc = extrapolate(s, block, i, &p, err);
     ggn_seq_block_release(&p);
     return rc;

@@ -12,7 +12,8 @@
 #include "support/ggn_near.h"
 #include "support/ggn_noise.h"
 
-#include "eval/method.h"
+#include "eval/network.h"
+#include "model/policy.h"
 
 static const uint32_t levels[] = {20, 40, 80, 160, 320, 640, 1280};
 enum { LEVELS = 7, WINDOW = 2, BLOCKS = 5 };
@@ -195,6 +196,49 @@ static void continued(void **state)
     ggn_eval_set_release(&again);
 }
 
+/* A model without weights says sigmoid(shift) of every window; its policy decides which levels it looks at and what holds a block back. */
+static void network(void **state)
+{
+    (void)state;
+    struct ggn_hyper hyper = {GGN_PRESET_LULL, 20, 24, WINDOW, 2, 2, 2};
+    struct ggn_err err = {0};
+    struct ggn_method m;
+    struct ggn_model *model = ggn_model_create(&hyper, &err);
+    if (model == NULL)
+        fail_msg("%s", err.text);
+    struct ggn_policy policy = ggn_policy_default();
+    policy.first_spp = 20;
+    policy.ratio = 2;
+    policy.scale = 1;
+    policy.shift = -1;
+    policy.threshold = 0.5;
+    policy.passes = 2;
+    policy.gate_noise = policy.tail999 = policy.gini = 0;
+    if (ggn_policy_set(model, &policy, &err) != GGN_OK || ggn_eval_network(&m, &set, model, "empty", threads, &err) != GGN_OK)
+        fail_msg("%s", err.text);
+    for (size_t i = 0; i < set.n; i++)
+        assert_near(m.score[i], 1.0 / (1.0 + exp(1.0)), 1e-6);
+    assert_near(m.stop[3], 80, 0); /* two passes: 40 and 80 */
+    ggn_method_release(&m);
+    policy.ratio = 4; /* 20, 80, 320, 1280 */
+    ggn_policy_set(model, &policy, &err);
+    assert_int_equal(ggn_eval_network(&m, &set, model, "empty", threads, &err), GGN_OK);
+    const struct ggn_eval_block *b = &set.blocks[0];
+    for (size_t i = b->first; i < b->end; i++)
+        assert_int_equal(isnan(m.score[i]), !(set.spp[i] == 80 || set.spp[i] == 320 || set.spp[i] == 1280));
+    assert_near(m.stop[3], 320, 0);
+    ggn_method_release(&m);
+    policy.ratio = 2;
+    policy.passes = 1;
+    policy.gate_noise = 0.04; /* grey noise of sigma 0.74/sqrt(n) in block 3 of the first scene, 0.22/sqrt(n) in block 0 */
+    ggn_policy_set(model, &policy, &err);
+    assert_int_equal(ggn_eval_network(&m, &set, model, "empty", threads, &err), GGN_OK);
+    assert_true(m.stop[0] < m.stop[3] && m.stop[3] > 80);
+    assert_near(m.score[set.blocks[3].first], 1.0 / (1.0 + exp(1.0)), 1e-6); /* asked all the same */
+    ggn_method_release(&m);
+    ggn_model_destroy(model);
+}
+
 static void one_class(void **state)
 {
     (void)state;
@@ -222,7 +266,7 @@ static void one_class(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(cases), cmocka_unit_test(informed_scores), cmocka_unit_test(fixed_stops), cmocka_unit_test(decisions), cmocka_unit_test(continued),
+        cmocka_unit_test(cases), cmocka_unit_test(informed_scores), cmocka_unit_test(fixed_stops), cmocka_unit_test(decisions), cmocka_unit_test(continued), cmocka_unit_test(network),
         cmocka_unit_test(one_class),
     };
     return cmocka_run_group_tests_name("eval_method", tests, setup, teardown);
