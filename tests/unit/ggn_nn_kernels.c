@@ -130,6 +130,47 @@ static void test_convolutions(void **state)
     (void)state;
 }
 
+/* What lies beyond the right border in memory is the next row's left end: it must not touch the outputs there, not even by its
+ * rounding. Same bytes with and without enormous values in the two leftmost columns. */
+static void test_row_ends(void **state)
+{
+    enum { C = 8, H = 21, W = 50, ROW = W + 1 };
+    static struct ggn_graph g;
+    static float kept[C][H][W];
+
+    ggn_graph_begin(&g, "rows", C, H, W);
+    ggn_graph_stage(&g, "a");
+    ggn_graph_conv(&g, 0, -1, C, 3, 0, 1);
+    assert_int_equal(ggn_graph_end(&g, NULL), GGN_OK);
+    for (int isa = 0; isa < GGN_ISA_COUNT; isa++) {
+        const struct ggn_kernels_f32 *k = ggn_kernels_for_f32((enum ggn_isa)isa);
+        if (!k)
+            continue;
+        struct ggn_weights_f32 *w = ggn_weights_create_f32(&g, k, 0, NULL);
+        struct ggn_exec_f32 *e = ggn_exec_create_f32(&g, k, 1, 0, NULL, NULL);
+        assert_true(w && e);
+        ggn_weights_init_f32(w, GGN_INIT_HASH, 8);
+        ggn_weights_pack_f32(w);
+        for (int pass = 0; pass < 2; pass++) {
+            for (int i = 0; i < C * H * W; i++)
+                ggn_exec_plane_f32(e, 0, 0, i / (H * W))[i / W % H * ROW + i % W] =
+                    i % W < 2 ? (pass ? 1e20f : 0) : (float)rnd((uint32_t)i, 6);
+            ggn_exec_forward_f32(e, w, 1, GGN_EVAL);
+            for (int c = 0; c < C; c++)
+                for (int y = 0; y < H; y++) {
+                    const float *row = ggn_exec_plane_f32(e, 1, 0, c) + y * ROW;
+                    if (pass)
+                        assert_memory_equal(row + 4, kept[c][y] + 4, (W - 4) * sizeof *row);
+                    else
+                        memcpy(kept[c][y], row, sizeof kept[c][y]);
+                }
+        }
+        ggn_weights_destroy_f32(w);
+        ggn_exec_destroy_f32(e);
+    }
+    (void)state;
+}
+
 /* Output and parameter gradient of a whole small network, as doubles. */
 struct result {
     double *y, *grad;
@@ -286,7 +327,7 @@ static void test_batch_same_bytes(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_convolutions), cmocka_unit_test(test_instruction_sets),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_convolutions), cmocka_unit_test(test_row_ends), cmocka_unit_test(test_instruction_sets),
                                        cmocka_unit_test(test_threads_same_bytes), cmocka_unit_test(test_batch_same_bytes)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
