@@ -161,7 +161,8 @@ static double sgemm_gflops(const struct bench *b, float *memory)
 
     openblas_set_num_threads(b->o.threads);
     double start = ggn_clock_wall_s();
-    cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, SGEMM_N, SGEMM_N, SGEMM_N, 1, x, SGEMM_N, y, SGEMM_N, 0, z, SGEMM_N);
+    cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, SGEMM_N, SGEMM_N, SGEMM_N, 1, x, SGEMM_N, y, SGEMM_N, 0, z,
+                SGEMM_N);
     double elapsed = ggn_clock_wall_s() - start;
     openblas_set_num_threads(1);
     return 2e-9 * SGEMM_N * SGEMM_N * SGEMM_N / elapsed;
@@ -191,8 +192,8 @@ static int measure(struct bench *b, double figure[N_FIGURES], struct ggn_err *er
         sample[DENOISER][k] = forward_ms(b, b->r, GGN_NET_R);
         sample[GENERATOR][k] = forward_ms(b, b->m, GGN_NET_M);
         sample[DISCRIMINATOR][k] = forward_ms(b, b->d, GGN_NET_D);
-        sample[DECISION][k] = forward_ms(b, b->r, GGN_NET_R) + forward_ms(b, b->m, GGN_NET_M) + forward_ms(b, b->m, GGN_NET_M) +
-                              forward_ms(b, b->d, GGN_NET_D);
+        sample[DECISION][k] = forward_ms(b, b->r, GGN_NET_R) + forward_ms(b, b->m, GGN_NET_M) +
+                              forward_ms(b, b->m, GGN_NET_M) + forward_ms(b, b->d, GGN_NET_D);
         sample[SGEMM][k] = sgemm_gflops(b, gemm);
     }
     for (int i = -1; i < (b->o.rounds + 2) / 3; i++) {
@@ -209,8 +210,8 @@ static int measure(struct bench *b, double figure[N_FIGURES], struct ggn_err *er
 
 static int print_layers(struct bench *b, struct ggn_exec_f32 *e, int net, struct ggn_err *err)
 {
-    static const char *const op_name[] = {"conv", "im2col", "batch norm", "leaky relu", "sigmoid",
-                                          "max pool", "upsample", "flatten", "linear", "dropout"};
+    static const char *const op_name[] = {"conv",     "im2col",   "batch norm", "leaky relu", "sigmoid",
+                                          "max pool", "upsample", "flatten",    "linear",     "dropout"};
     const struct ggn_graph *g = e->graph;
     double s[GGN_MAX_LAYERS] = {0}, total = 0;
 
@@ -228,7 +229,8 @@ static int print_layers(struct bench *b, struct ggn_exec_f32 *e, int net, struct
         snprintf(shape, sizeof shape, "%dx%dx%d", v->c, v->h, v->w);
         total += ms;
         if (ms > 0)
-            printf("%-7s %-11s %14s %9.4f %9.3f %9.1f\n", l->stage, op_name[l->op], shape, 1e-9 * flop, ms, 1e-6 * flop / ms);
+            printf("%-7s %-11s %14s %9.4f %9.3f %9.1f\n", l->stage, op_name[l->op], shape, 1e-9 * flop, ms,
+                   1e-6 * flop / ms);
     }
     printf("%-7s %-11s %14s %9.4f %9.3f %9.1f\n\n", "all", "", "", 2e-9 * ggn_graph_mac(g), total,
            2e-6 * ggn_graph_mac(g) / total);
@@ -243,8 +245,8 @@ static void print_figures(const struct bench *b, const double figure[N_FIGURES])
             printf("%-26s %9.3f\n", figure_name[f], figure[f]);
         return;
     }
-    printf("{\"threads\": %d, \"isa\": \"%s\", \"precision\": \"%s\", \"batch\": %d", b->o.threads, ggn_isa_name(b->r->kernels->isa),
-           b->o.bf16 && b->trainer->weights[0]->bf16 ? "bf16" : "f32", b->o.batch);
+    printf("{\"threads\": %d, \"isa\": \"%s\", \"precision\": \"%s\", \"batch\": %d", b->o.threads,
+           ggn_isa_name(b->r->kernels->isa), b->o.bf16 && b->trainer->weights[0]->bf16 ? "bf16" : "f32", b->o.batch);
     for (int f = 0; f < N_FIGURES; f++)
         printf(", \"%s\": %.3f", figure_name[f], figure[f]);
     printf("}\n");
@@ -255,7 +257,8 @@ int ggn_cmd_bench(int argc, char **argv)
     static const struct argp_option list[] = {
         {"json", KEY_JSON, NULL, 0, "One JSON object of medians instead of tables", 0},
         {"threads", KEY_THREADS, "N", 0, "Threads (all processors)", 0},
-        {"precision", KEY_PRECISION, "f32|bf16", 0, "Of inference (f32); bf16 is f32 where the processor has no bfloat16", 0},
+        {"precision", KEY_PRECISION, "f32|bf16", 0, "Of inference (f32); bf16 is f32 where the processor has no bfloat16",
+         0},
         {"rounds", KEY_ROUNDS, "N", 0, "Measurements per figure (9)", 0},
         {"batch", KEY_BATCH, "N", 0, "Batch of the training figures, which are per image or sample (4)", 0},
         {0}};

@@ -1,4 +1,5 @@
-/* `ggn golden`: what the published networks give for weights that a hash defines; the same figures from any implementation. */
+/* `ggn golden`: what the published networks give for weights that a hash defines; the same figures from any implementation.
+ */
 #include <argp.h>
 #include <cjson/cJSON.h>
 #include <stdio.h>
@@ -125,7 +126,8 @@ int ggn_cmd_golden(int argc, char **argv)
         {"base-m", KEY_BASE_M, "N", 0, "Seed of the generator's weights (300)", 0},
         {"base-d", KEY_BASE_D, "N", 0, "Seed of the discriminator's weights (500)", 0},
         {"train-step", KEY_TRAIN, NULL, 0, "Also make one published training iteration and report it", 0},
-        {"float", KEY_FLOAT, NULL, 0, "The single-precision networks that inference and training use, not the double ones", 0},
+        {"float", KEY_FLOAT, NULL, 0, "The single-precision networks that inference and training use, not the double ones",
+         0},
         {"bf16", KEY_BF16, NULL, 0, "As --float, with bfloat16 products where the processor has them", 0},
         {"threads", KEY_THREADS, "N", 0, "Threads (all processors); the figures do not depend on it", 0},
         {0}};

@@ -57,12 +57,14 @@ static void print_model(const struct ggn_model *m, const struct ggn_container *c
     printf("block        %d x %d pixels, window of %d images\n", h->width, h->height, h->window);
     printf("widths       denoiser %d, generator %d, discriminator %d\n", h->k_r, h->k_m, h->k_d);
     for (int net = 0; net < GGN_NETS; net++)
-        printf("%-12s %zu parameters, %.0f MAC\n", m->graph[net].name, m->graph[net].n_params, ggn_graph_mac(&m->graph[net]));
+        printf("%-12s %zu parameters, %.0f MAC\n", m->graph[net].name, m->graph[net].n_params,
+               ggn_graph_mac(&m->graph[net]));
     printf("decision     %.3f GMAC, history %.2f MB per block, workspace %.1f MB per thread\n",
            1e-9 * (ggn_graph_mac(&m->graph[0]) + 2 * ggn_graph_mac(&m->graph[1]) + ggn_graph_mac(&m->graph[2])),
            1e-6 * (double)ggn_history_bytes(h), 1e-6 * (double)ggn_infer_bytes(m, GGN_PRECISION_F32, 1));
-    printf("calibration  p = sigmoid(%g * logit + %g), stops below %g in %d checks in a row, spacing %g\n", m->calibration.scale,
-           m->calibration.shift, m->calibration.threshold, m->calibration.consecutive, m->calibration.spacing);
+    printf("calibration  p = sigmoid(%g * logit + %g), stops below %g in %d checks in a row, spacing %g\n",
+           m->calibration.scale, m->calibration.shift, m->calibration.threshold, m->calibration.consecutive,
+           m->calibration.spacing);
     printf("file         %zu bytes, version %d, %d tensors\n", c->size, GGN_CONTAINER_VERSION, c->n_entries);
     printf("provenance   %s\n", provenance ? provenance : "");
     cJSON_free(provenance);

@@ -10,8 +10,8 @@ static const char *const array_name[] = {"params", "mean", "var", "m", "v"};
 
 static int same_networks(const struct ggn_hyper *a, const struct ggn_hyper *b, struct ggn_err *err)
 {
-    if (a->preset == b->preset && a->height == b->height && a->width == b->width && a->window == b->window && a->k_r == b->k_r &&
-        a->k_m == b->k_m && a->k_d == b->k_d)
+    if (a->preset == b->preset && a->height == b->height && a->width == b->width && a->window == b->window &&
+        a->k_r == b->k_r && a->k_m == b->k_m && a->k_d == b->k_d)
         return GGN_OK;
     return ggn_fail(err, GGN_EINVAL, "the networks differ in size or preset");
 }
@@ -84,9 +84,11 @@ static int number_at(const cJSON *item, double *out, struct ggn_err *err)
 }
 
 /* Counters and the check that the file belongs to these networks. */
-static int read_description(const struct ggn_trainer_f32 *t, const cJSON *root, double counter[1 + GGN_NETS], struct ggn_err *err)
+static int read_description(const struct ggn_trainer_f32 *t, const cJSON *root, double counter[1 + GGN_NETS],
+                            struct ggn_err *err)
 {
-    const cJSON *kind = cJSON_GetObjectItemCaseSensitive(root, "kind"), *hyper = cJSON_GetObjectItemCaseSensitive(root, "hyper");
+    const cJSON *kind = cJSON_GetObjectItemCaseSensitive(root, "kind"),
+                *hyper = cJSON_GetObjectItemCaseSensitive(root, "hyper");
     struct ggn_hyper read = {0};
     int *const field[] = {&read.height, &read.width, &read.window, &read.k_r, &read.k_m, &read.k_d};
 

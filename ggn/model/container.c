@@ -326,7 +326,9 @@ int ggn_container_get(const struct ggn_container *c, const char *name, int rank,
     const unsigned char *p = (const unsigned char *)c->data + e->offset;
     for (size_t i = 0; i < e->count; i++) {
         uint16_t half = (uint16_t)(p[i * type_size[e->type]] | p[i * type_size[e->type] + 1] << 8);
-        out[i] = e->type == GGN_F32 ? float_of(get32(p + 4 * i)) : e->type == GGN_F16 ? ggn_f16_to_f32(half) : ggn_bf16_to_f32(half);
+        out[i] = e->type == GGN_F32   ? float_of(get32(p + 4 * i))
+                 : e->type == GGN_F16 ? ggn_f16_to_f32(half)
+                                      : ggn_bf16_to_f32(half);
         if (!isfinite(out[i]))
             return ggn_fail(err, GGN_EINVAL, "tensor '%s' holds a value that is not finite", name);
     }

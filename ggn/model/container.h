@@ -8,12 +8,12 @@
  *  24   8  offset of the JSON text     32  8  its size (no terminating zero)
  *  40   8  offset of the tensor table  48  8  checksum: FNV-1a (64 bit) of the file with these 8 bytes as zero
  *  56   8  zero
- *  64      table, one entry of 88 bytes per tensor: name[48] (zero-padded), u32 type (0 f32, 1 f16, 2 bf16), u32 rank (1..4),
- *          u32 dim[4] (unused ones 1), u64 offset (multiple of 64), u64 size in bytes
- *          then JSON and data in any order, without overlap being required or relied on.
+ *  64      table, one entry of 88 bytes per tensor: name[48] (zero-padded), u32 type (0 f32, 1 f16, 2 bf16), u32 rank
+ * (1..4), u32 dim[4] (unused ones 1), u64 offset (multiple of 64), u64 size in bytes then JSON and data in any order,
+ * without overlap being required or relied on.
  *
- * A reader checks sizes, offsets and checksum before it looks at anything else, and never allocates from a size in a file that the
- * file itself is too short for. Unknown versions and types are refused. Thread-safe (no globals).
+ * A reader checks sizes, offsets and checksum before it looks at anything else, and never allocates from a size in a file
+ * that the file itself is too short for. Unknown versions and types are refused. Thread-safe (no globals).
  */
 #ifndef GGN_MODEL_CONTAINER_H
 #define GGN_MODEL_CONTAINER_H
@@ -48,8 +48,8 @@ struct ggn_entry {
 struct ggn_container {
     struct ggn_entry *entry; /* owns */
     int n_entries;
-    char *json;              /* owns; NUL-terminated */
-    char *data;              /* reader: the whole file; owns */
+    char *json; /* owns; NUL-terminated */
+    char *data; /* reader: the whole file; owns */
     size_t size;
 };
 

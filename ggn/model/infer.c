@@ -11,8 +11,8 @@
 enum { MAX_WINDOW = 16 };
 
 struct history_head {
-    uint32_t count;   /* images held */
-    uint32_t next;    /* ring position of the next image */
+    uint32_t count; /* images held */
+    uint32_t next;  /* ring position of the next image */
     uint32_t window, area;
     uint64_t spp[MAX_WINDOW];
 };

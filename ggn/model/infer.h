@@ -1,13 +1,13 @@
 /*
  * Decisions: per-block histories of images and the workspace that turns a history into a probability.
  *
- * A new image costs one pass of the denoiser, a decision two of the generator and one of the discriminator (3.885 GMAC at the
- * published size); the older denoised images are kept in the history, 16 bits per value. Numbers depend on the images
+ * A new image costs one pass of the denoiser, a decision two of the generator and one of the discriminator (3.885 GMAC at
+ * the published size); the older denoised images are kept in the history, 16 bits per value. Numbers depend on the images
  * pushed and on nothing else: not on threads, other blocks or earlier calls.
  *
- * A history is plain memory of the caller (ggn_history_bytes, ≤ 2.2 MB at the published size), one block's, one call at a time. An
- * infer object is one thread's workspace (ggn_infer_bytes, ≤ 64 MB at the published size); create one per worker; after create
- * nothing is allocated. The model is shared and only read.
+ * A history is plain memory of the caller (ggn_history_bytes, ≤ 2.2 MB at the published size), one block's, one call at a
+ * time. An infer object is one thread's workspace (ggn_infer_bytes, ≤ 64 MB at the published size); create one per worker;
+ * after create nothing is allocated. The model is shared and only read.
  */
 #ifndef GGN_MODEL_INFER_H
 #define GGN_MODEL_INFER_H
@@ -36,8 +36,8 @@ struct ggn_infer *ggn_infer_create(const struct ggn_model *model, enum ggn_preci
 void ggn_infer_destroy(struct ggn_infer *infer);
 int ggn_infer_has_bf16(void);
 
-/* Appends the image (3 planes of height × width bytes, see model/preprocess.h) at `spp`, dropping the oldest when the window is
- * full. A history that already ends at this spp stays as it is, so that asking twice changes nothing. */
+/* Appends the image (3 planes of height × width bytes, see model/preprocess.h) at `spp`, dropping the oldest when the window
+ * is full. A history that already ends at this spp stays as it is, so that asking twice changes nothing. */
 void ggn_infer_push(struct ggn_infer *infer, void *history, const uint8_t *rgb, uint64_t spp);
 
 /* Probability that the last image is still noisy, calibrated; *logit (may be NULL) before calibration. GGN_EINVAL while the

@@ -60,18 +60,19 @@ void ggn_judge_denoise(struct ggn_judge *j, const uint8_t *noisy, uint16_t *deno
         ggn_tile_load_u8(noisy, width, height, x0, y0, in->w, in->h, 1.0F / 255, ggn_exec_plane_f32(j->r, 0, 0, 0),
                          (size_t)in->row, in->plane);
         ggn_exec_forward_f32(j->r, j->model->weights[GGN_NET_R], 1, GGN_EVAL);
-        ggn_tile_store_u16(denoised, width, height, x0, y0, in->w, in->h, output_plane(j->r, 0), (size_t)out->row, out->plane);
+        ggn_tile_store_u16(denoised, width, height, x0, y0, in->w, in->h, output_plane(j->r, 0), (size_t)out->row,
+                           out->plane);
     }
 }
 
-static double tile_logit(struct ggn_judge *j, const uint8_t *const *noisy, const uint16_t *const *denoised, int width, int height,
-                         int x0, int y0)
+static double tile_logit(struct ggn_judge *j, const uint8_t *const *noisy, const uint16_t *const *denoised, int width,
+                         int height, int x0, int y0)
 {
     const struct ggn_value *in = &j->m->graph->value[0], *map = output(j->m), *to = &j->d->graph->value[0];
 
     for (int k = 0; k < j->model->hyper.window; k++) {
-        ggn_tile_load_u16(denoised[k], width, height, x0, y0, in->w, in->h, 1.0F / 65535, ggn_exec_plane_f32(j->m, 0, 0, 3 * k),
-                          (size_t)in->row, in->plane);
+        ggn_tile_load_u16(denoised[k], width, height, x0, y0, in->w, in->h, 1.0F / 65535,
+                          ggn_exec_plane_f32(j->m, 0, 0, 3 * k), (size_t)in->row, in->plane);
         ggn_tile_load_u8(noisy[k], width, height, x0, y0, in->w, in->h, 1.0F / 255, ggn_exec_plane_f32(j->m, 0, 1, 3 * k),
                          (size_t)in->row, in->plane);
     }
@@ -84,7 +85,8 @@ static double tile_logit(struct ggn_judge *j, const uint8_t *const *noisy, const
     return (double)*output_plane(j->d, 0);
 }
 
-double ggn_judge_logit(struct ggn_judge *j, const uint8_t *const *noisy, const uint16_t *const *denoised, int width, int height)
+double ggn_judge_logit(struct ggn_judge *j, const uint8_t *const *noisy, const uint16_t *const *denoised, int width,
+                       int height)
 {
     const struct ggn_value *in = &j->m->graph->value[0];
     const int nx = ggn_tile_count(width, in->w), ny = ggn_tile_count(height, in->h);

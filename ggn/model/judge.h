@@ -1,8 +1,8 @@
 /*
  * The three networks at work on one block: noisy image → denoised image, window of both → logit of "still noisy".
  *
- * A judge owns activations for one image and one window and borrows the model; nothing is allocated after create. One call at
- * a time per judge; any number of judges on one model. The result depends on the window alone, never on other blocks.
+ * A judge owns activations for one image and one window and borrows the model; nothing is allocated after create. One call
+ * at a time per judge; any number of judges on one model. The result depends on the window alone, never on other blocks.
  * Images are planar (see model/window.h), of any size: blocks unlike the network's size are cut into tiles or continued by
  * reflection, and the noisiest tile speaks for the block.
  */
@@ -23,8 +23,8 @@ void ggn_judge_denoise(struct ggn_judge *judge, const uint8_t *noisy, uint16_t *
 /* noisy, denoised: S images each, noisiest first. The raw logit of the discriminator; calibrate it with ggn_policy_p. */
 double ggn_judge_logit(struct ggn_judge *judge, const uint8_t *const *noisy, const uint16_t *const *denoised, int width,
                        int height);
-/* The noise feature map of the last tile that was judged, for pictures: 0 of the denoised window, 1 of the noisy one. Rows are
- * *row apart. Borrowed until the next call. */
+/* The noise feature map of the last tile that was judged, for pictures: 0 of the denoised window, 1 of the noisy one. Rows
+ * are *row apart. Borrowed until the next call. */
 const float *ggn_judge_feature_map(const struct ggn_judge *judge, int which, int *row);
 
 #endif

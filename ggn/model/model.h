@@ -1,6 +1,6 @@
 /*
- * A trained criterion: the three networks, their hyper-parameters, the calibration of the probability, and where it all comes
- * from. Stored as a .ggn file (model/container.h) with the JSON object
+ * A trained criterion: the three networks, their hyper-parameters, the calibration of the probability, and where it all
+ * comes from. Stored as a .ggn file (model/container.h) with the JSON object
  *
  *   {"kind": "model", "preset": "paper"|"lull", "height", "width", "window", "k_r", "k_m", "k_d",
  *    "calibration": {"scale", "shift", "threshold", "consecutive", "spacing"}, "provenance": {...}}

@@ -105,7 +105,8 @@ int ggn_model_json_parse(const char *json, struct ggn_model_description *out, st
 /* cJSON's adders return NULL without memory; nothing may be left out silently. */
 static int fill(cJSON *root, const struct ggn_model *m)
 {
-    int ok = cJSON_AddStringToObject(root, "kind", "model") && cJSON_AddStringToObject(root, "preset", preset_name[m->hyper.preset]);
+    int ok = cJSON_AddStringToObject(root, "kind", "model") &&
+             cJSON_AddStringToObject(root, "preset", preset_name[m->hyper.preset]);
 
     for (size_t i = 0; i < N_HYPER; i++)
         ok = ok && cJSON_AddNumberToObject(root, hyper_field[i].name,

@@ -4,8 +4,7 @@ static const double SLOPE = 0.2; /* LeakyReLU */
 
 struct ggn_hyper ggn_hyper_default(enum ggn_preset preset)
 {
-    return (struct ggn_hyper){
-        .preset = preset, .height = 200, .width = 200, .window = 6, .k_r = 16, .k_m = 20, .k_d = 64};
+    return (struct ggn_hyper){.preset = preset, .height = 200, .width = 200, .window = 6, .k_r = 16, .k_m = 20, .k_d = 64};
 }
 
 int ggn_hyper_check(const struct ggn_hyper *p, struct ggn_err *err)

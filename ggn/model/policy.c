@@ -43,7 +43,8 @@ int ggn_policy_check(const struct ggn_policy *p, struct ggn_err *err)
     for (int i = 0; i < N_FIELDS; i++) {
         double v = get(p, i);
         if (!(v >= fields[i].min && v <= fields[i].max))
-            return ggn_fail(err, GGN_EINVAL, "policy: %s = %g is not in %g..%g", fields[i].name, v, fields[i].min, fields[i].max);
+            return ggn_fail(err, GGN_EINVAL, "policy: %s = %g is not in %g..%g", fields[i].name, v, fields[i].min,
+                            fields[i].max);
     }
     if (p->passes < 1 || p->passes > PASSES_MAX)
         return ggn_fail(err, GGN_EINVAL, "policy: passes = %d is not in 1..%d", p->passes, PASSES_MAX);

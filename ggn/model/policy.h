@@ -10,12 +10,12 @@
 #include "model/model.h"
 
 struct ggn_policy {
-    double first_spp;  /* samples of the first image of a window */
-    double ratio;      /* samples of one image to those of the one before, > 1; 0: levels are step_spp apart */
+    double first_spp; /* samples of the first image of a window */
+    double ratio;     /* samples of one image to those of the one before, > 1; 0: levels are step_spp apart */
     double step_spp;
     double scale, shift; /* calibration (Platt): p_noisy = sigmoid(scale · logit + shift) */
-    double threshold;  /* stop when p_noisy < threshold ... */
-    int passes;        /* ... in so many checks in a row */
+    double threshold;    /* stop when p_noisy < threshold ... */
+    int passes;          /* ... in so many checks in a row */
     double gate_noise; /* above this window noise (ggn_window_noise) a block is plainly noisy: no network needed; 0: never */
     double slope;      /* by how much the calibrated logit falls when the samples double; for predictions; 0: not known */
     double tail999, gini; /* a block whose half buffer exceeds either is held back, see the criterion; 0: no guard */

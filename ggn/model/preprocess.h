@@ -1,10 +1,10 @@
 /*
  * From linear radiance to what the networks see: the one conversion that training data and inference share.
  *
- * Linear RGB, times exposure, cleaned, sRGB transfer curve (IEC 61966-2-1), rounded to 8 bits. Network inputs are these bytes
- * divided by 255. Cleaning: NaN and −∞ and negative → 0, +∞ and values above GGN_PIXEL_HUGE → white, denormal → 0; each kind is
- * counted, so that a block with broken pixels can be reported and is never called converged silently. Bits decide, so flush-to-zero
- * modes change nothing. Thread-safe.
+ * Linear RGB, times exposure, cleaned, sRGB transfer curve (IEC 61966-2-1), rounded to 8 bits. Network inputs are these
+ * bytes divided by 255. Cleaning: NaN and −∞ and negative → 0, +∞ and values above GGN_PIXEL_HUGE → white, denormal → 0;
+ * each kind is counted, so that a block with broken pixels can be reported and is never called converged silently. Bits
+ * decide, so flush-to-zero modes change nothing. Thread-safe.
  */
 #ifndef GGN_MODEL_PREPROCESS_H
 #define GGN_MODEL_PREPROCESS_H
@@ -23,7 +23,7 @@ struct ggn_linear_view {
     const float *data; /* channel 0 of pixel (0,0) */
     ptrdiff_t channel, pixel, row;
     int h, w;
-    float exposure;    /* factor on the linear values */
+    float exposure; /* factor on the linear values */
 };
 
 /* out: 3 planes of h × w bytes. *counts (may be NULL) is added to. */

@@ -34,21 +34,21 @@ static int reflect(int i, int size)
     return k < size ? k : 2 * size - 1 - k;
 }
 
-#define TILE_LOAD(NAME, TYPE)                                                                                         \
-    void NAME(const TYPE *src, int width, int height, int x0, int y0, int tile_w, int tile_h, float scale, float *dst, \
-              size_t dst_row, size_t dst_plane)                                                                       \
-    {                                                                                                                 \
-        int inside = width - x0 < tile_w ? width - x0 : tile_w;                                                       \
-                                                                                                                      \
-        for (int c = 0; c < 3; c++)                                                                                   \
-            for (int y = 0; y < tile_h; y++) {                                                                        \
-                const TYPE *from = src + ((size_t)c * (size_t)height + (size_t)reflect(y0 + y, height)) * (size_t)width; \
-                float *to = dst + (size_t)c * dst_plane + (size_t)y * dst_row;                                        \
-                for (int x = 0; x < inside; x++)                                                                      \
-                    to[x] = (float)from[x0 + x] * scale;                                                              \
-                for (int x = inside; x < tile_w; x++)                                                                 \
-                    to[x] = (float)from[reflect(x0 + x, width)] * scale;                                              \
-            }                                                                                                         \
+#define TILE_LOAD(NAME, TYPE)                                                                                               \
+    void NAME(const TYPE *src, int width, int height, int x0, int y0, int tile_w, int tile_h, float scale, float *dst,      \
+              size_t dst_row, size_t dst_plane)                                                                             \
+    {                                                                                                                       \
+        int inside = width - x0 < tile_w ? width - x0 : tile_w;                                                             \
+                                                                                                                            \
+        for (int c = 0; c < 3; c++)                                                                                         \
+            for (int y = 0; y < tile_h; y++) {                                                                              \
+                const TYPE *from = src + ((size_t)c * (size_t)height + (size_t)reflect(y0 + y, height)) * (size_t)width;    \
+                float *to = dst + (size_t)c * dst_plane + (size_t)y * dst_row;                                              \
+                for (int x = 0; x < inside; x++)                                                                            \
+                    to[x] = (float)from[x0 + x] * scale;                                                                    \
+                for (int x = inside; x < tile_w; x++)                                                                       \
+                    to[x] = (float)from[reflect(x0 + x, width)] * scale;                                                    \
+            }                                                                                                               \
     }
 TILE_LOAD(ggn_tile_load_u8, uint8_t)
 TILE_LOAD(ggn_tile_load_u16, uint16_t)

@@ -21,8 +21,8 @@ double ggn_window_noise(const uint8_t *first, const uint8_t *last, size_t count,
 int ggn_tile_count(int size, int tile);
 int ggn_tile_start(int size, int tile, int index);
 
-/* Copies the tile at (x0, y0) of a planar image into a planar float tile, dst(c, y, x) = src · scale. dst_row and dst_plane are
- * the distances in floats between rows and planes of dst. Beyond the edge the image is reflected (… c b a | a b c …). */
+/* Copies the tile at (x0, y0) of a planar image into a planar float tile, dst(c, y, x) = src · scale. dst_row and dst_plane
+ * are the distances in floats between rows and planes of dst. Beyond the edge the image is reflected (… c b a | a b c …). */
 void ggn_tile_load_u8(const uint8_t *src, int width, int height, int x0, int y0, int tile_w, int tile_h, float scale,
                       float *dst, size_t dst_row, size_t dst_plane);
 void ggn_tile_load_u16(const uint16_t *src, int width, int height, int x0, int y0, int tile_w, int tile_h, float scale,

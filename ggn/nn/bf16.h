@@ -1,7 +1,8 @@
 /*
  * 3×3 convolution with bfloat16 products and float sums (VDPBF16PS), for inference on processors that have it.
  *
- * Weights and inputs are rounded to bfloat16 (8 bits of significand) as they enter a product; activations stay float in memory.
+ * Weights and inputs are rounded to bfloat16 (8 bits of significand) as they enter a product; activations stay float in
+ * memory.
  */
 #ifndef GGN_NN_BF16_H
 #define GGN_NN_BF16_H

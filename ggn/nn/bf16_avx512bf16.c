@@ -12,9 +12,8 @@ typedef __m512 vf;
 /* Pairs of channels side by side: out[p] = bf16(x0[p]) | bf16(x1[p]) << 16. */
 static void pair_channels(uint32_t *out, const float *x0, const float *x1, long n)
 {
-    const __m512i interleave =
-        _mm512_set_epi16(31, 15, 30, 14, 29, 13, 28, 12, 27, 11, 26, 10, 25, 9, 24, 8, 23, 7, 22, 6, 21, 5, 20, 4, 19, 3, 18, 2,
-                         17, 1, 16, 0);
+    const __m512i interleave = _mm512_set_epi16(31, 15, 30, 14, 29, 13, 28, 12, 27, 11, 26, 10, 25, 9, 24, 8, 23, 7, 22, 6,
+                                                21, 5, 20, 4, 19, 3, 18, 2, 17, 1, 16, 0);
 
     for (long p = 0; p < n; p += L) {
         vf low = _mm512_loadu_ps(x0 + p), high = x1 ? _mm512_loadu_ps(x1 + p) : _mm512_setzero_ps();
@@ -23,8 +22,8 @@ static void pair_channels(uint32_t *out, const float *x0, const float *x1, long 
     }
 }
 
-INLINE void tile(const struct ggn_conv_f32 *a, const uint32_t *w, const uint32_t *x, long x_stride, int oc, long p, const int ot,
-                 const int nv)
+INLINE void tile(const struct ggn_conv_f32 *a, const uint32_t *w, const uint32_t *x, long x_stride, int oc, long p,
+                 const int ot, const int nv)
 {
     vf acc[8][TILE_V];
 
@@ -55,10 +54,11 @@ INLINE void tile(const struct ggn_conv_f32 *a, const uint32_t *w, const uint32_t
         }
 }
 
-#define TILE(OT, NV) \
-    static void tile_##OT##_##NV(const struct ggn_conv_f32 *a, const uint32_t *w, const uint32_t *x, long x_stride, int oc, long p) \
-    { \
-        tile(a, w, x, x_stride, oc, p, OT, NV); \
+#define TILE(OT, NV)                                                                                                        \
+    static void tile_##OT##_##NV(const struct ggn_conv_f32 *a, const uint32_t *w, const uint32_t *x, long x_stride, int oc, \
+                                 long p)                                                                                    \
+    {                                                                                                                       \
+        tile(a, w, x, x_stride, oc, p, OT, NV);                                                                             \
     }
 TILE(1, 1)
 TILE(1, 3)

@@ -13,7 +13,8 @@ static int add_value(struct ggn_graph *g, int c, int h, int w, int flat)
     if (g->err.code)
         return 0;
     if (c < 1 || c > GGN_MAX_CHANNELS || h < 1 || w < 1 || h > GGN_MAX_SIDE || w > GGN_MAX_SIDE) {
-        ggn_fail(&g->err, GGN_EINVAL, "network %s, stage %s: a tensor of %d×%d×%d is out of range", g->name, g->stage, c, h, w);
+        ggn_fail(&g->err, GGN_EINVAL, "network %s, stage %s: a tensor of %d×%d×%d is out of range", g->name, g->stage, c, h,
+                 w);
         return 0;
     }
     if (g->n_values > GGN_MAX_LAYERS) {
@@ -61,8 +62,8 @@ static size_t add_tensor(struct ggn_graph *g, const char *suffix, int is_bias, i
         return 0;
     }
     struct ggn_tensor *t = &g->tensor[g->n_tensors++];
-    *t = (struct ggn_tensor){.ndim = ndim, .offset = g->n_params, .count = 1, .layer = g->n_layers - 1, .is_bias = is_bias,
-                             .is_bn = is_bn};
+    *t = (struct ggn_tensor){
+        .ndim = ndim, .offset = g->n_params, .count = 1, .layer = g->n_layers - 1, .is_bias = is_bias, .is_bn = is_bn};
     for (int i = 0; i < ndim; i++) {
         t->dim[i] = dim[i];
         t->count *= (size_t)dim[i];
@@ -100,7 +101,8 @@ int ggn_graph_conv(struct ggn_graph *g, int in, int in2, int c_out, int kernel, 
     l->transposed = transposed;
     l->slope = slope;
     l->pack = g->n_pack;
-    l->weight = add_tensor(g, "weight", 0, 0, (int[4]){transposed ? c_in : c_out, transposed ? c_out : c_in, kernel, kernel}, 4);
+    l->weight =
+        add_tensor(g, "weight", 0, 0, (int[4]){transposed ? c_in : c_out, transposed ? c_out : c_in, kernel, kernel}, 4);
     l->bias = add_tensor(g, "bias", 1, 0, (int[4]){c_out}, 1);
     g->n_stage_layers++;
     /* even, so that pairs of input channels fit as well (nn/bf16.h) */

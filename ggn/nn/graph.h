@@ -27,19 +27,19 @@ enum {
 struct ggn_value {
     int c, h, w;
     int flat;
-    int row;         /* elements from one row to the next */
-    size_t origin;   /* elements before (0,0) of plane 0 */
-    size_t plane;    /* elements from one plane to the next */
-    size_t size;     /* elements of all planes */
-    size_t offset;   /* where the value starts among the activations of one image */
-    int uses;        /* layers that read it */
+    int row;           /* elements from one row to the next */
+    size_t origin;     /* elements before (0,0) of plane 0 */
+    size_t plane;      /* elements from one plane to the next */
+    size_t size;       /* elements of all planes */
+    size_t offset;     /* where the value starts among the activations of one image */
+    int uses;          /* layers that read it */
     const char *stage; /* name under which `ggn golden` reports its rms, or NULL; static */
 };
 
 enum ggn_op {
-    GGN_OP_CONV,    /* 3×3 stride 1 pad 1 or 1×1, bias, then LeakyReLU when slope != 1; reads `in` and `in2` as one */
-    GGN_OP_IM2COL,  /* C planes → C·9 planes of the windows of a strided 3×3 convolution */
-    GGN_OP_BN,      /* batch normalisation per channel */
+    GGN_OP_CONV,   /* 3×3 stride 1 pad 1 or 1×1, bias, then LeakyReLU when slope != 1; reads `in` and `in2` as one */
+    GGN_OP_IM2COL, /* C planes → C·9 planes of the windows of a strided 3×3 convolution */
+    GGN_OP_BN,     /* batch normalisation per channel */
     GGN_OP_LRELU,
     GGN_OP_SIGMOID,
     GGN_OP_MAXPOOL, /* kernel 2 stride 2, or kernel 3 stride 2 pad 1 */
@@ -51,18 +51,18 @@ enum ggn_op {
 
 struct ggn_layer {
     enum ggn_op op;
-    int in, in2, out;   /* values; in2 = -1 without */
-    int kernel;         /* CONV 3 or 1, MAXPOOL 2 or 3 */
-    int stride, pad;    /* IM2COL */
-    int transposed;     /* CONV: weights are [in, out, k, k] and flipped */
-    int pad_y, pad_x;   /* UP */
-    double slope;       /* CONV, LRELU */
-    double drop;        /* DROPOUT: probability of a zero */
+    int in, in2, out;    /* values; in2 = -1 without */
+    int kernel;          /* CONV 3 or 1, MAXPOOL 2 or 3 */
+    int stride, pad;     /* IM2COL */
+    int transposed;      /* CONV: weights are [in, out, k, k] and flipped */
+    int pad_y, pad_x;    /* UP */
+    double slope;        /* CONV, LRELU */
+    double drop;         /* DROPOUT: probability of a zero */
     size_t weight, bias; /* offsets into the parameters */
-    size_t pack;        /* CONV: offset into the packed weights */
-    size_t stats;       /* BN: offset into running means and variances */
+    size_t pack;         /* CONV: offset into the packed weights */
+    size_t stats;        /* BN: offset into running means and variances */
     int add_in, add_in2; /* backward adds to the gradient of in / in2, because a later layer wrote it already */
-    const char *stage;  /* name of the stage the layer belongs to; static */
+    const char *stage;   /* name of the stage the layer belongs to; static */
 };
 
 /* One named parameter tensor; the order is the layer order, weight before bias. */
@@ -82,7 +82,7 @@ struct ggn_graph {
     struct ggn_tensor tensor[GGN_MAX_TENSORS];
     int n_values, n_layers, n_tensors;
     size_t n_params, n_stats, n_pack;
-    size_t n_acts;  /* elements of all values of one image */
+    size_t n_acts;      /* elements of all values of one image */
     int n_stage_layers; /* parameter layers since the stage began; for names */
     const char *stage;
     struct ggn_err err; /* first failure while building */

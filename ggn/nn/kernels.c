@@ -22,8 +22,8 @@ int ggn_isa_available(enum ggn_isa isa)
     if (isa == GGN_ISA_AVX2)
         return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
     if (isa == GGN_ISA_AVX512)
-        return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bw") &&
-               __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("fma");
+        return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
+               __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("fma");
 #endif
     return 0;
 }
@@ -42,9 +42,15 @@ enum ggn_isa ggn_isa_best(void)
 }
 
 #if defined(__x86_64__)
-#define TABLES(type) {&ggn_kernels_##type##_base, &ggn_kernels_##type##_avx2, &ggn_kernels_##type##_avx512}
+#define TABLES(type)                                                                                                        \
+    {                                                                                                                       \
+        &ggn_kernels_##type##_base, &ggn_kernels_##type##_avx2, &ggn_kernels_##type##_avx512                                \
+    }
 #else
-#define TABLES(type) {&ggn_kernels_##type##_base, NULL, NULL}
+#define TABLES(type)                                                                                                        \
+    {                                                                                                                       \
+        &ggn_kernels_##type##_base, NULL, NULL                                                                              \
+    }
 #endif
 
 const struct ggn_kernels_f32 *ggn_kernels_for_f32(enum ggn_isa isa)

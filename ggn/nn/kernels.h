@@ -11,8 +11,8 @@
 #include "nn/typed.h"
 
 enum {
-    GGN_TILE_MAX = 8,   /* most output channels of a register tile */
-    GGN_GRAD_IC = 16,   /* input channels whose weight gradient one task accumulates */
+    GGN_TILE_MAX = 8, /* most output channels of a register tile */
+    GGN_GRAD_IC = 16, /* input channels whose weight gradient one task accumulates */
     GGN_SSIM_RADIUS = 5
 };
 

@@ -1,8 +1,8 @@
 /*
  * The numbers of a network: parameters, running statistics, and the packed form that the kernels read.
  *
- * Declared in weights_decl.inc for float (_f32) and double (_f64). After ggn_weights_pack an object may be read by any number
- * of executors and threads until params, mean or var change.
+ * Declared in weights_decl.inc for float (_f32) and double (_f64). After ggn_weights_pack an object may be read by any
+ * number of executors and threads until params, mean or var change.
  */
 #ifndef GGN_NN_WEIGHTS_H
 #define GGN_NN_WEIGHTS_H

@@ -23,8 +23,8 @@ typedef __m512 vf;
 
 /* Where the tiles of one task lie. */
 struct block {
-    int t0, n;     /* first tile, number of tiles */
-    int lanes;     /* n rounded up to whole vectors */
+    int t0, n; /* first tile, number of tiles */
+    int lanes; /* n rounded up to whole vectors */
     int tiles_x;
     long v_stride; /* elements between two of the 36 matrices; not a multiple of 4 KiB, so that stores do not collide */
 };
@@ -72,9 +72,9 @@ INLINE void split_phases(float *to, const float *row)
     _mm512_storeu_ps(to + 3 * ROOM, _mm512_shuffle_f32x4(ab2, cd2, 0xee));
     /* phases 4 and 5 of a tile are 0 and 1 of the next */
     _mm512_storeu_ps(to + 4 * ROOM, _mm512_castsi512_ps(_mm512_alignr_epi32(_mm512_castps_si512(_mm512_set1_ps(row[64])),
-                                                                             _mm512_castps_si512(p0), 1)));
+                                                                            _mm512_castps_si512(p0), 1)));
     _mm512_storeu_ps(to + 5 * ROOM, _mm512_castsi512_ps(_mm512_alignr_epi32(_mm512_castps_si512(_mm512_set1_ps(row[65])),
-                                                                             _mm512_castps_si512(p1), 1)));
+                                                                            _mm512_castps_si512(p1), 1)));
 }
 
 /* d[(6i + j)·ROOM + lane] = input (4ty − 1 + i, 4tx − 1 + j) of the lane's tile, 0 outside of the picture. */
@@ -146,10 +146,10 @@ INLINE void multiply_tile(float *m, const float *u, const float *v, int n_in, in
             _mm512_storeu_ps(m + (long)o * XI * GGN_WINO_TILES + k * L, acc[o][k]);
 }
 
-#define TILE(OT, NV) \
-    static void multiply_##OT##_##NV(float *m, const float *u, const float *v, int n_in, int lanes) \
-    { \
-        multiply_tile(m, u, v, n_in, lanes, OT, NV); \
+#define TILE(OT, NV)                                                                                                        \
+    static void multiply_##OT##_##NV(float *m, const float *u, const float *v, int n_in, int lanes)                         \
+    {                                                                                                                       \
+        multiply_tile(m, u, v, n_in, lanes, OT, NV);                                                                        \
     }
 TILE(1, 1)
 TILE(1, 2)
@@ -225,11 +225,14 @@ INLINE void join_phases(float *row, const float *from, int n, int add)
     /* pairs of phases, then pairs of pairs; each 128-bit part holds one tile */
     const __m512i first = _mm512_set_epi32(23, 7, 22, 6, 21, 5, 20, 4, 19, 3, 18, 2, 17, 1, 16, 0);
     const __m512i second = _mm512_set_epi32(31, 15, 30, 14, 29, 13, 28, 12, 27, 11, 26, 10, 25, 9, 24, 8);
-    __m512d a01 = _mm512_castps_pd(_mm512_permutex2var_ps(p0, first, p1)), b01 = _mm512_castps_pd(_mm512_permutex2var_ps(p0, second, p1));
-    __m512d a23 = _mm512_castps_pd(_mm512_permutex2var_ps(p2, first, p3)), b23 = _mm512_castps_pd(_mm512_permutex2var_ps(p2, second, p3));
+    __m512d a01 = _mm512_castps_pd(_mm512_permutex2var_ps(p0, first, p1)),
+            b01 = _mm512_castps_pd(_mm512_permutex2var_ps(p0, second, p1));
+    __m512d a23 = _mm512_castps_pd(_mm512_permutex2var_ps(p2, first, p3)),
+            b23 = _mm512_castps_pd(_mm512_permutex2var_ps(p2, second, p3));
     const __m512i low = _mm512_set_epi64(11, 3, 10, 2, 9, 1, 8, 0), high = _mm512_set_epi64(15, 7, 14, 6, 13, 5, 12, 4);
-    vf out[4] = {_mm512_castpd_ps(_mm512_permutex2var_pd(a01, low, a23)), _mm512_castpd_ps(_mm512_permutex2var_pd(a01, high, a23)),
-                 _mm512_castpd_ps(_mm512_permutex2var_pd(b01, low, b23)), _mm512_castpd_ps(_mm512_permutex2var_pd(b01, high, b23))};
+    vf out[4] = {
+        _mm512_castpd_ps(_mm512_permutex2var_pd(a01, low, a23)), _mm512_castpd_ps(_mm512_permutex2var_pd(a01, high, a23)),
+        _mm512_castpd_ps(_mm512_permutex2var_pd(b01, low, b23)), _mm512_castpd_ps(_mm512_permutex2var_pd(b01, high, b23))};
 
     for (int k = 0; k < 4 && n > 0; k++, n -= L) {
         unsigned bits = n >= L ? 0xffffu : (1u << n) - 1;
@@ -249,7 +252,8 @@ static void scatter(float *y, const float *o, const struct ggn_conv_f32 *a, cons
             float *row = y + (long)(4 * ty + i) * a->row + 4 * tx;
             const int end = 4 * (tx + n) < a->w_px ? 4 * (tx + n) : a->w_px;
             for (int k = 0; k < n; k += L)
-                join_phases(row + 4 * k, o + 4 * i * ROOM + lane + k, end - 4 * (tx + k) < 64 ? end - 4 * (tx + k) : 64, add);
+                join_phases(row + 4 * k, o + 4 * i * ROOM + lane + k, end - 4 * (tx + k) < 64 ? end - 4 * (tx + k) : 64,
+                            add);
         }
     }
 }

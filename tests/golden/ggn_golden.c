@@ -1,5 +1,5 @@
-/* The golden values of the design (double 1e-6, float 1e-4 relative) and one published training iteration, whose figures were
- * checked against PyTorch 1.13 in double precision (scripts/bench-ggn --check). */
+/* The golden values of the design (double 1e-6, float 1e-4 relative) and one published training iteration, whose figures
+ * were checked against PyTorch 1.13 in double precision (scripts/bench-ggn --check). */
 #include "support/ggn_cmocka.h"
 
 #include <math.h>
@@ -23,10 +23,11 @@ static void check_values(const struct ggn_golden *g)
     static const struct {
         const char *name;
         double rms;
-    } stage[] = {{"enc0", .556872310},  {"enc1", .830844706},  {"enc2", .788503493},  {"enc3", .985084621},  {"enc4", 1.004145069},
-                 {"dec0", 1.213926126}, {"dec1", .721034384},  {"dec2", .697705386},  {"dec3", .465891190},  {"conv1", .702611302},
-                 {"pool1", .529484262}, {"conv2", .725524097}, {"pool2", .617077407}, {"conv3", .611682443}, {"pool3", .732168326},
-                 {"fc1", .993858154},   {"fc2", .986990673},   {"fc3", 1.103226966}};
+    } stage[] = {{"enc0", .556872310},  {"enc1", .830844706},  {"enc2", .788503493},  {"enc3", .985084621},
+                 {"enc4", 1.004145069}, {"dec0", 1.213926126}, {"dec1", .721034384},  {"dec2", .697705386},
+                 {"dec3", .465891190},  {"conv1", .702611302}, {"pool1", .529484262}, {"conv2", .725524097},
+                 {"pool2", .617077407}, {"conv3", .611682443}, {"pool3", .732168326}, {"fc1", .993858154},
+                 {"fc2", .986990673},   {"fc3", 1.103226966}};
     static const double p[4] = {.786932669062, .773263945936, .773324065289, .783187939314};
     static const double ssim[4] = {.090206966, .339405721, .648177038, .276608930};
 
@@ -71,7 +72,8 @@ static void run(int single, int train_step, struct ggn_golden *g)
 
 static void test_double(void **state)
 {
-    static const double loss[6] = {0.809551860298, 0.641433609298, 0.539072436747, 0.451018026472, 0.373216579153, 0.316327256502};
+    static const double loss[6] = {0.809551860298, 0.641433609298, 0.539072436747,
+                                   0.451018026472, 0.373216579153, 0.316327256502};
     static const double before[4] = {0.919448282118, 0.533631415128, 0.437554262785, 0.497948811965};
     static const double after[4] = {0.948373972558, 0.440280053944, 0.480566945338, 0.490151559571};
     struct ggn_golden g;
@@ -131,6 +133,7 @@ static void test_sizes(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_sizes), cmocka_unit_test(test_double), cmocka_unit_test(test_float)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_sizes), cmocka_unit_test(test_double),
+                                       cmocka_unit_test(test_float)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -111,7 +111,8 @@ static void check(const char *what, int images, uint32_t seed)
     loss(1, seed);
     const struct ggn_value *v = &graph.value[0];
     for (int i = 0; i < SAMPLES; i++) {
-        int n = (int)(ggn_hash((uint32_t)i, seed + 1) % (uint32_t)images), c = (int)(ggn_hash((uint32_t)i, seed + 2) % (uint32_t)v->c);
+        int n = (int)(ggn_hash((uint32_t)i, seed + 1) % (uint32_t)images),
+            c = (int)(ggn_hash((uint32_t)i, seed + 2) % (uint32_t)v->c);
         int k = (int)(ggn_hash((uint32_t)i, seed + 3) % (uint32_t)(v->h * v->w));
         long at = (long)(k / v->w) * v->row + k % v->w;
         compare(what, ggn_exec_plane_f64(e, 0, n, c) + at, ggn_exec_grad_f64(e, 0, n, c)[at], seed);
@@ -122,17 +123,17 @@ static void check(const char *what, int images, uint32_t seed)
 enum { SHAPES = 6 };
 static const int shape[SHAPES][3] = {{1, 1, 1}, {3, 1, 7}, {2, 5, 3}, {9, 4, 4}, {5, 13, 9}, {17, 3, 26}};
 
-#define FOR_SHAPES(name, build) \
-    static void name(void **state) \
-    { \
-        for (int s = 0; s < SHAPES; s++) { \
-            const int c = shape[s][0], h = shape[s][1], w = shape[s][2]; \
-            ggn_graph_begin(&graph, #name, c, h, w); \
-            ggn_graph_stage(&graph, "a"); \
-            build; \
-            check(#name, 1 + s % 3, (uint32_t)(100 * s + 1)); \
-        } \
-        (void)state; \
+#define FOR_SHAPES(name, build)                                                                                             \
+    static void name(void **state)                                                                                          \
+    {                                                                                                                       \
+        for (int s = 0; s < SHAPES; s++) {                                                                                  \
+            const int c = shape[s][0], h = shape[s][1], w = shape[s][2];                                                    \
+            ggn_graph_begin(&graph, #name, c, h, w);                                                                        \
+            ggn_graph_stage(&graph, "a");                                                                                   \
+            build;                                                                                                          \
+            check(#name, 1 + s % 3, (uint32_t)(100 * s + 1));                                                               \
+        }                                                                                                                   \
+        (void)state;                                                                                                        \
     }
 
 /* A layer that is read twice, so that gradients are added up, and one that joins. */
@@ -223,7 +224,8 @@ static void test_ssim(void **state)
     ggn_ssim_mean_f64(s, px, py, pd, 2, ROW, 1);
     for (int i = 0; i < 80; i++) {
         uint32_t k = ggn_hash((uint32_t)i, 7);
-        double *p = &x[k & 1][(k >> 1) % H * ROW + (k >> 8) % W], grad = dx[k & 1][(k >> 1) % H * ROW + (k >> 8) % W], old = *p;
+        double *p = &x[k & 1][(k >> 1) % H * ROW + (k >> 8) % W], grad = dx[k & 1][(k >> 1) % H * ROW + (k >> 8) % W],
+               old = *p;
         *p = old + 1e-6;
         double high = ggn_ssim_mean_f64(s, px, py, NULL, 2, ROW, 1);
         *p = old - 1e-6;
@@ -249,10 +251,10 @@ static void test_bce(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_conv3),   cmocka_unit_test(test_conv1),        cmocka_unit_test(test_conv_transposed),
-        cmocka_unit_test(test_joined),  cmocka_unit_test(test_conv_strided), cmocka_unit_test(test_batch_norm),
-        cmocka_unit_test(test_lrelu),   cmocka_unit_test(test_sigmoid),      cmocka_unit_test(test_pool2),
-        cmocka_unit_test(test_pool3),   cmocka_unit_test(test_up),           cmocka_unit_test(test_linear),
-        cmocka_unit_test(test_networks), cmocka_unit_test(test_ssim),        cmocka_unit_test(test_bce)};
+        cmocka_unit_test(test_conv3),    cmocka_unit_test(test_conv1),        cmocka_unit_test(test_conv_transposed),
+        cmocka_unit_test(test_joined),   cmocka_unit_test(test_conv_strided), cmocka_unit_test(test_batch_norm),
+        cmocka_unit_test(test_lrelu),    cmocka_unit_test(test_sigmoid),      cmocka_unit_test(test_pool2),
+        cmocka_unit_test(test_pool3),    cmocka_unit_test(test_up),           cmocka_unit_test(test_linear),
+        cmocka_unit_test(test_networks), cmocka_unit_test(test_ssim),         cmocka_unit_test(test_bce)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

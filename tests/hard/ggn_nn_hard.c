@@ -137,7 +137,8 @@ static void test_bce_extremes(void **state)
 {
     for (int i = -4; i <= 4; i++)
         for (int y = 0; y <= 2; y++) {
-            double z = (i < 0 ? -1 : 1) * pow(10, abs(i)) * (i != 0), loss = ggn_bce(z, y / 2.0), grad = ggn_bce_grad(z, y / 2.0);
+            double z = (i < 0 ? -1 : 1) * pow(10, abs(i)) * (i != 0), loss = ggn_bce(z, y / 2.0),
+                   grad = ggn_bce_grad(z, y / 2.0);
             assert_true(isfinite(loss) && loss >= 0);
             assert_true(grad >= -1 && grad <= 1);
         }
@@ -317,7 +318,8 @@ static void test_nan_data(void **state)
     (void)state;
 }
 
-/* 1/(1 − β^t) stays exact for many steps: a constant gradient moves a parameter by lr each step (Kingma & Ba 2015, section 2.1). */
+/* 1/(1 − β^t) stays exact for many steps: a constant gradient moves a parameter by lr each step (Kingma & Ba 2015,
+ * section 2.1). */
 static void test_many_adam_steps(void **state)
 {
     enum { STEPS = 100000 };
@@ -342,8 +344,8 @@ static void test_many_adam_steps(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_blocks),        cmocka_unit_test(test_flush_to_zero), cmocka_unit_test(test_bce_extremes),
-        cmocka_unit_test(test_ssim_flat),     cmocka_unit_test(test_zero_variance), cmocka_unit_test(test_equal_labels),
-        cmocka_unit_test(test_divergence),    cmocka_unit_test(test_nan_data),      cmocka_unit_test(test_many_adam_steps)};
+        cmocka_unit_test(test_blocks),     cmocka_unit_test(test_flush_to_zero), cmocka_unit_test(test_bce_extremes),
+        cmocka_unit_test(test_ssim_flat),  cmocka_unit_test(test_zero_variance), cmocka_unit_test(test_equal_labels),
+        cmocka_unit_test(test_divergence), cmocka_unit_test(test_nan_data),      cmocka_unit_test(test_many_adam_steps)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

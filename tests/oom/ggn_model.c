@@ -103,6 +103,7 @@ static void test_train(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_files), cmocka_unit_test(test_infer), cmocka_unit_test(test_train)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_files), cmocka_unit_test(test_infer),
+                                       cmocka_unit_test(test_train)};
     return cmocka_run_group_tests(tests, setup, teardown);
 }

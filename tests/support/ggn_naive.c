@@ -14,8 +14,8 @@ static int source(const struct ggn_naive_conv *c, int i, int y, int x, int ky, i
     return yy >= 0 && yy < c->h && xx >= 0 && xx < c->w ? (i * c->h + yy) * c->w + xx : -1;
 }
 
-void ggn_naive_forward(const struct ggn_naive_conv *c, const double *x, const double *weight, const double *bias, double slope,
-                       double *y)
+void ggn_naive_forward(const struct ggn_naive_conv *c, const double *x, const double *weight, const double *bias,
+                       double slope, double *y)
 {
     for (int o = 0; o < c->c_out; o++)
         for (int p = 0; p < c->h * c->w; p++) {

@@ -8,8 +8,8 @@ struct ggn_naive_conv {
 };
 
 /* y[c_out][h][w] = leaky(b + w * x) */
-void ggn_naive_forward(const struct ggn_naive_conv *c, const double *x, const double *weight, const double *bias, double slope,
-                       double *y);
+void ggn_naive_forward(const struct ggn_naive_conv *c, const double *x, const double *weight, const double *bias,
+                       double slope, double *y);
 /* Adds the gradients for dz = gradient before the activation. */
 void ggn_naive_backward(const struct ggn_naive_conv *c, const double *x, const double *weight, const double *dz, double *dx,
                         double *dweight, double *dbias);

@@ -234,7 +234,7 @@ static void test_half_floats(void **state)
         else
             assert_true(isnan(ggn_bf16_to_f32(ggn_f32_to_bf16(b))));
     }
-    assert_true(ggn_f16_to_f32(ggn_f32_to_f16(1.0f + 1.0f / 2048)) == 1.0f);           /* tie to even */
+    assert_true(ggn_f16_to_f32(ggn_f32_to_f16(1.0f + 1.0f / 2048)) == 1.0f); /* tie to even */
     assert_true(ggn_f16_to_f32(ggn_f32_to_f16(1.0f + 3.0f / 2048)) == 1.0f + 1.0f / 512);
     assert_true(isinf(ggn_f16_to_f32(ggn_f32_to_f16(65520.0f))));
     assert_true(ggn_bf16_to_f32(ggn_f32_to_bf16(1.0f + 1.0f / 256)) == 1.0f);

@@ -49,7 +49,8 @@ static double decide(struct ggn_infer *f, void *history, uint32_t first, int ima
 static void test_history(void **state)
 {
     struct ggn_model *m = make();
-    struct ggn_infer *f = ggn_infer_create(m, GGN_PRECISION_F32, NULL, NULL), *g = ggn_infer_create(m, GGN_PRECISION_F32, NULL, NULL);
+    struct ggn_infer *f = ggn_infer_create(m, GGN_PRECISION_F32, NULL, NULL),
+                     *g = ggn_infer_create(m, GGN_PRECISION_F32, NULL, NULL);
     void *a = calloc(1, ggn_history_bytes(&hyper)), *b = calloc(1, ggn_history_bytes(&hyper));
     double p, logit;
 
@@ -104,7 +105,8 @@ static void test_against_networks(void **state)
     ggn_exec_forward_f32(gen, m->weights[GGN_NET_M], 2, GGN_EVAL);
     for (int c = 0; c < 2; c++)
         for (int y = 0; y < 24; y++)
-            memcpy(ggn_exec_plane_f32(dis, 0, 0, c) + y * 34, ggn_exec_plane_f32(gen, out, c, 0) + y * 34, 33 * sizeof(float));
+            memcpy(ggn_exec_plane_f32(dis, 0, 0, c) + y * 34, ggn_exec_plane_f32(gen, out, c, 0) + y * 34,
+                   33 * sizeof(float));
     ggn_exec_forward_f32(dis, m->weights[GGN_NET_D], 1, GGN_EVAL);
     double want = (double)*ggn_exec_plane_f32(dis, m->graph[GGN_NET_D].n_values - 1, 0, 0);
     if (!(fabs(got - want) < 1e-4 * fmax(1, fabs(want))))
@@ -123,7 +125,8 @@ static void test_against_networks(void **state)
 static void test_bf16(void **state)
 {
     struct ggn_model *m = make();
-    struct ggn_infer *f = ggn_infer_create(m, GGN_PRECISION_F32, NULL, NULL), *b = ggn_infer_create(m, GGN_PRECISION_BF16, NULL, NULL);
+    struct ggn_infer *f = ggn_infer_create(m, GGN_PRECISION_F32, NULL, NULL),
+                     *b = ggn_infer_create(m, GGN_PRECISION_BF16, NULL, NULL);
     void *history = calloc(1, ggn_history_bytes(&hyper));
     double exact, rounded, again;
 
@@ -203,7 +206,7 @@ static void test_cleaning(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_history),       cmocka_unit_test(test_against_networks),
-                                       cmocka_unit_test(test_memory_bounds), cmocka_unit_test(test_bf16), cmocka_unit_test(test_srgb),
-                                       cmocka_unit_test(test_cleaning)};
+                                       cmocka_unit_test(test_memory_bounds), cmocka_unit_test(test_bf16),
+                                       cmocka_unit_test(test_srgb),          cmocka_unit_test(test_cleaning)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -72,46 +72,47 @@ static void near(const char *what, enum ggn_isa isa, uint32_t seed, double got, 
 }
 
 /* One convolution through an executor whose kernels are those of `isa`. */
-#define DEFINE_CHECK(REAL, suffix, tolerance) \
-    static void check_##suffix(const struct oracle *o, enum ggn_isa isa, uint32_t seed) \
-    { \
-        static struct ggn_graph g; \
-        const struct ggn_kernels_##suffix *k = ggn_kernels_for_##suffix(isa); \
-        ggn_graph_begin(&g, "conv", o->c.c_in, o->c.h, o->c.w); \
-        ggn_graph_stage(&g, "a"); \
-        ggn_graph_conv(&g, 0, -1, o->c.c_out, o->c.kernel, o->c.transposed, o->slope); \
-        assert_int_equal(ggn_graph_end(&g, NULL), GGN_OK); \
-        struct ggn_weights_##suffix *w = ggn_weights_create_##suffix(&g, k, 1, NULL); \
+#define DEFINE_CHECK(REAL, suffix, tolerance)                                                                               \
+    static void check_##suffix(const struct oracle *o, enum ggn_isa isa, uint32_t seed)                                     \
+    {                                                                                                                       \
+        static struct ggn_graph g;                                                                                          \
+        const struct ggn_kernels_##suffix *k = ggn_kernels_for_##suffix(isa);                                               \
+        ggn_graph_begin(&g, "conv", o->c.c_in, o->c.h, o->c.w);                                                             \
+        ggn_graph_stage(&g, "a");                                                                                           \
+        ggn_graph_conv(&g, 0, -1, o->c.c_out, o->c.kernel, o->c.transposed, o->slope);                                      \
+        assert_int_equal(ggn_graph_end(&g, NULL), GGN_OK);                                                                  \
+        struct ggn_weights_##suffix *w = ggn_weights_create_##suffix(&g, k, 1, NULL);                                       \
         struct ggn_exec_##suffix *e = ggn_exec_create_##suffix(&g, k, 1, GGN_EXEC_GRADS | GGN_EXEC_INPUT_GRAD, NULL, NULL); \
-        REAL *grad = calloc(g.n_params, sizeof *grad); \
-        const int area = o->c.h * o->c.w, row = o->c.w + 1, n_w = (int)g.tensor[0].count; \
-        assert_true(w && e && grad); \
-        for (int i = 0; i < n_w; i++) \
-            w->params[i] = (REAL)o->weight[i]; \
-        for (int i = 0; i < o->c.c_out; i++) \
-            w->params[n_w + i] = (REAL)o->bias[i]; \
-        ggn_weights_pack_##suffix(w); \
-        for (int i = 0; i < o->c.c_in * area; i++) \
-            ggn_exec_plane_##suffix(e, 0, 0, i / area)[i % area / o->c.w * row + i % area % o->c.w] = (REAL)o->x[i]; \
-        ggn_exec_forward_##suffix(e, w, 1, GGN_TRAIN); \
-        for (int i = 0; i < o->c.c_out * area; i++) { \
-            int at = i % area / o->c.w * row + i % area % o->c.w; \
-            near("forward", isa, seed, (double)ggn_exec_plane_##suffix(e, 1, 0, i / area)[at], o->y[i], o->c.c_in, tolerance); \
-            double dy = o->y[i] > 0 ? o->dz[i] : o->dz[i] / o->slope; \
-            ggn_exec_grad_##suffix(e, 1, 0, i / area)[at] = (REAL)dy; \
-        } \
-        ggn_exec_backward_##suffix(e, w, grad); \
-        for (int i = 0; i < o->c.c_in * area; i++) \
-            near("input gradient", isa, seed, \
-                 (double)ggn_exec_grad_##suffix(e, 0, 0, i / area)[i % area / o->c.w * row + i % area % o->c.w], o->dx[i], \
-                 o->c.c_out, tolerance); \
-        for (int i = 0; i < n_w; i++) \
-            near("weight gradient", isa, seed, (double)grad[i], o->dweight[i], area, tolerance); \
-        for (int i = 0; i < o->c.c_out; i++) \
-            near("bias gradient", isa, seed, (double)grad[n_w + i], o->dbias[i], area, tolerance); \
-        ggn_weights_destroy_##suffix(w); \
-        ggn_exec_destroy_##suffix(e); \
-        free(grad); \
+        REAL *grad = calloc(g.n_params, sizeof *grad);                                                                      \
+        const int area = o->c.h * o->c.w, row = o->c.w + 1, n_w = (int)g.tensor[0].count;                                   \
+        assert_true(w &&e &&grad);                                                                                          \
+        for (int i = 0; i < n_w; i++)                                                                                       \
+            w->params[i] = (REAL)o->weight[i];                                                                              \
+        for (int i = 0; i < o->c.c_out; i++)                                                                                \
+            w->params[n_w + i] = (REAL)o->bias[i];                                                                          \
+        ggn_weights_pack_##suffix(w);                                                                                       \
+        for (int i = 0; i < o->c.c_in * area; i++)                                                                          \
+            ggn_exec_plane_##suffix(e, 0, 0, i / area)[i % area / o->c.w * row + i % area % o->c.w] = (REAL)o->x[i];        \
+        ggn_exec_forward_##suffix(e, w, 1, GGN_TRAIN);                                                                      \
+        for (int i = 0; i < o->c.c_out * area; i++) {                                                                       \
+            int at = i % area / o->c.w * row + i % area % o->c.w;                                                           \
+            near("forward", isa, seed, (double)ggn_exec_plane_##suffix(e, 1, 0, i / area)[at], o->y[i], o->c.c_in,          \
+                 tolerance);                                                                                                \
+            double dy = o->y[i] > 0 ? o->dz[i] : o->dz[i] / o->slope;                                                       \
+            ggn_exec_grad_##suffix(e, 1, 0, i / area)[at] = (REAL)dy;                                                       \
+        }                                                                                                                   \
+        ggn_exec_backward_##suffix(e, w, grad);                                                                             \
+        for (int i = 0; i < o->c.c_in * area; i++)                                                                          \
+            near("input gradient", isa, seed,                                                                               \
+                 (double)ggn_exec_grad_##suffix(e, 0, 0, i / area)[i % area / o->c.w * row + i % area % o->c.w], o->dx[i],  \
+                 o->c.c_out, tolerance);                                                                                    \
+        for (int i = 0; i < n_w; i++)                                                                                       \
+            near("weight gradient", isa, seed, (double)grad[i], o->dweight[i], area, tolerance);                            \
+        for (int i = 0; i < o->c.c_out; i++)                                                                                \
+            near("bias gradient", isa, seed, (double)grad[n_w + i], o->dbias[i], area, tolerance);                          \
+        ggn_weights_destroy_##suffix(w);                                                                                    \
+        ggn_exec_destroy_##suffix(e);                                                                                       \
+        free(grad);                                                                                                         \
     }
 DEFINE_CHECK(float, f32, F32_TOLERANCE)
 DEFINE_CHECK(double, f64, F64_TOLERANCE)
@@ -130,8 +131,8 @@ static void test_convolutions(void **state)
     (void)state;
 }
 
-/* What lies beyond the right border in memory is the next row's left end: it must not touch the outputs there, not even by its
- * rounding. Same bytes with and without enormous values in the two leftmost columns. */
+/* What lies beyond the right border in memory is the next row's left end: it must not touch the outputs there, not even by
+ * its rounding. Same bytes with and without enormous values in the two leftmost columns. */
 static void test_row_ends(void **state)
 {
     enum { C = 8, H = 21, W = 50, ROW = W + 1 };
@@ -177,39 +178,40 @@ struct result {
     size_t n_y, n_grad;
 };
 
-#define DEFINE_RUN(REAL, suffix) \
-    static struct result run_##suffix(const struct ggn_graph *g, enum ggn_isa isa, int batch, struct ggn_threads *threads) \
-    { \
-        const struct ggn_kernels_##suffix *k = ggn_kernels_for_##suffix(isa); \
-        struct ggn_weights_##suffix *w = ggn_weights_create_##suffix(g, k, 1, NULL); \
-        struct ggn_exec_##suffix *e = ggn_exec_create_##suffix(g, k, batch, GGN_EXEC_GRADS, threads, NULL); \
-        const struct ggn_value *in = &g->value[0], *out = &g->value[g->n_values - 1]; \
-        const int area = out->h * out->w; \
-        struct result r = {.n_y = (size_t)(batch * out->c * area), .n_grad = g->n_params}; \
-        REAL *grad = calloc(g->n_params, sizeof *grad); \
-        r.y = calloc(r.n_y, sizeof *r.y); \
-        r.grad = calloc(r.n_grad, sizeof *r.grad); \
-        assert_true(w && e && grad && r.y && r.grad); \
-        ggn_weights_init_##suffix(w, GGN_INIT_HASH, 12); \
-        ggn_weights_pack_##suffix(w); \
-        for (int i = 0; i < batch * in->c * in->h * in->w; i++) { \
-            int p = i % (in->h * in->w), c = i / (in->h * in->w); \
-            ggn_exec_plane_##suffix(e, 0, c / in->c, c % in->c)[(long)(p / in->w) * in->row + p % in->w] = \
-                (REAL)ggn_hash_unit((uint32_t)i, 3); \
-        } \
-        ggn_exec_forward_##suffix(e, w, batch, GGN_TRAIN); \
-        for (int i = 0; i < (int)r.n_y; i++) { \
-            long at = (long)(i % area / out->w) * out->row + i % area % out->w; \
-            r.y[i] = (double)ggn_exec_plane_##suffix(e, g->n_values - 1, i / area / out->c, i / area % out->c)[at]; \
-            ggn_exec_grad_##suffix(e, g->n_values - 1, i / area / out->c, i / area % out->c)[at] = (REAL)rnd((uint32_t)i, 5); \
-        } \
-        ggn_exec_backward_##suffix(e, w, grad); \
-        for (size_t i = 0; i < r.n_grad; i++) \
-            r.grad[i] = (double)grad[i]; \
-        ggn_weights_destroy_##suffix(w); \
-        ggn_exec_destroy_##suffix(e); \
-        free(grad); \
-        return r; \
+#define DEFINE_RUN(REAL, suffix)                                                                                            \
+    static struct result run_##suffix(const struct ggn_graph *g, enum ggn_isa isa, int batch, struct ggn_threads *threads)  \
+    {                                                                                                                       \
+        const struct ggn_kernels_##suffix *k = ggn_kernels_for_##suffix(isa);                                               \
+        struct ggn_weights_##suffix *w = ggn_weights_create_##suffix(g, k, 1, NULL);                                        \
+        struct ggn_exec_##suffix *e = ggn_exec_create_##suffix(g, k, batch, GGN_EXEC_GRADS, threads, NULL);                 \
+        const struct ggn_value *in = &g->value[0], *out = &g->value[g->n_values - 1];                                       \
+        const int area = out->h * out->w;                                                                                   \
+        struct result r = {.n_y = (size_t)(batch * out->c * area), .n_grad = g->n_params};                                  \
+        REAL *grad = calloc(g->n_params, sizeof *grad);                                                                     \
+        r.y = calloc(r.n_y, sizeof *r.y);                                                                                   \
+        r.grad = calloc(r.n_grad, sizeof *r.grad);                                                                          \
+        assert_true(w &&e &&grad &&r.y &&r.grad);                                                                           \
+        ggn_weights_init_##suffix(w, GGN_INIT_HASH, 12);                                                                    \
+        ggn_weights_pack_##suffix(w);                                                                                       \
+        for (int i = 0; i < batch * in->c * in->h * in->w; i++) {                                                           \
+            int p = i % (in->h * in->w), c = i / (in->h * in->w);                                                           \
+            ggn_exec_plane_##suffix(e, 0, c / in->c, c % in->c)[(long)(p / in->w) * in->row + p % in->w] =                  \
+                (REAL)ggn_hash_unit((uint32_t)i, 3);                                                                        \
+        }                                                                                                                   \
+        ggn_exec_forward_##suffix(e, w, batch, GGN_TRAIN);                                                                  \
+        for (int i = 0; i < (int)r.n_y; i++) {                                                                              \
+            long at = (long)(i % area / out->w) * out->row + i % area % out->w;                                             \
+            r.y[i] = (double)ggn_exec_plane_##suffix(e, g->n_values - 1, i / area / out->c, i / area % out->c)[at];         \
+            ggn_exec_grad_##suffix(e, g->n_values - 1, i / area / out->c, i / area % out->c)[at] =                          \
+                (REAL)rnd((uint32_t)i, 5);                                                                                  \
+        }                                                                                                                   \
+        ggn_exec_backward_##suffix(e, w, grad);                                                                             \
+        for (size_t i = 0; i < r.n_grad; i++)                                                                               \
+            r.grad[i] = (double)grad[i];                                                                                    \
+        ggn_weights_destroy_##suffix(w);                                                                                    \
+        ggn_exec_destroy_##suffix(e);                                                                                       \
+        free(grad);                                                                                                         \
+        return r;                                                                                                           \
     }
 DEFINE_RUN(float, f32)
 DEFINE_RUN(double, f64)
@@ -327,7 +329,8 @@ static void test_batch_same_bytes(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_convolutions), cmocka_unit_test(test_row_ends), cmocka_unit_test(test_instruction_sets),
-                                       cmocka_unit_test(test_threads_same_bytes), cmocka_unit_test(test_batch_same_bytes)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_convolutions), cmocka_unit_test(test_row_ends),
+                                       cmocka_unit_test(test_instruction_sets), cmocka_unit_test(test_threads_same_bytes),
+                                       cmocka_unit_test(test_batch_same_bytes)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
