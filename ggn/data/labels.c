@@ -120,6 +120,27 @@ int ggn_labels_read(const char *dir, struct ggn_labels *labels, struct ggn_err *
     return rc;
 }
 
+/* cJSON says by NULL that a member could not be added; *ok gathers it. */
+static cJSON *to_json(const struct ggn_labels *labels, int *ok)
+{
+    cJSON *root = cJSON_CreateObject(), *blocks = NULL;
+    *ok = cJSON_AddStringToObject(root, "format", "lull-labels") != NULL && cJSON_AddNumberToObject(root, "version", 1) != NULL &&
+          cJSON_AddStringToObject(root, "source", labels->source) != NULL && cJSON_AddStringToObject(root, "detail", labels->detail) != NULL &&
+          cJSON_AddNumberToObject(root, "cap", labels->cap) != NULL && cJSON_AddNumberToObject(root, "spread", labels->spread) != NULL &&
+          (blocks = cJSON_AddArrayToObject(root, "blocks")) != NULL;
+    for (uint32_t i = 0; i < labels->n && *ok; i++) {
+        cJSON *o = cJSON_CreateObject();
+        *ok = cJSON_AddNumberToObject(o, "id", labels->labels[i].id) != NULL &&
+              cJSON_AddNumberToObject(o, "threshold", labels->labels[i].threshold) != NULL &&
+              cJSON_AddBoolToObject(o, "censored", labels->labels[i].censored) != NULL;
+        if (*ok)
+            cJSON_AddItemToArray(blocks, o);
+        else
+            cJSON_Delete(o);
+    }
+    return root;
+}
+
 int ggn_labels_write(const char *dir, const struct ggn_labels *labels, struct ggn_err *err)
 {
     char path[4096];
@@ -127,22 +148,9 @@ int ggn_labels_write(const char *dir, const struct ggn_labels *labels, struct gg
     int rc = path_of(dir, path, sizeof path, err);
     if (rc != GGN_OK)
         return rc;
-    cJSON *root = cJSON_CreateObject();
-    cJSON_AddStringToObject(root, "format", "lull-labels");
-    cJSON_AddNumberToObject(root, "version", 1);
-    cJSON_AddStringToObject(root, "source", labels->source);
-    cJSON_AddStringToObject(root, "detail", labels->detail);
-    cJSON_AddNumberToObject(root, "cap", labels->cap);
-    cJSON_AddNumberToObject(root, "spread", labels->spread);
-    cJSON *blocks = cJSON_AddArrayToObject(root, "blocks");
-    for (uint32_t i = 0; i < labels->n; i++) {
-        cJSON *o = cJSON_CreateObject();
-        cJSON_AddNumberToObject(o, "id", labels->labels[i].id);
-        cJSON_AddNumberToObject(o, "threshold", labels->labels[i].threshold);
-        cJSON_AddBoolToObject(o, "censored", labels->labels[i].censored);
-        cJSON_AddItemToArray(blocks, o);
-    }
-    char *text = cJSON_Print(root);
+    int ok = 1;
+    cJSON *root = to_json(labels, &ok);
+    char *text = ok ? cJSON_Print(root) : NULL;
     cJSON_Delete(root);
     if (text == NULL)
         return ggn_fail_nomem(err, path);

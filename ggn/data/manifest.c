@@ -160,41 +160,65 @@ int ggn_manifest_read(const char *dir, struct ggn_manifest *m, struct ggn_err *e
     return rc;
 }
 
-static cJSON *to_json(const struct ggn_manifest *m)
+/* cJSON says by NULL that a member could not be added; *ok gathers it. */
+static void add_text(cJSON *o, const char *name, const char *text, int *ok)
 {
-    cJSON *root = cJSON_CreateObject(), *levels, *blocks;
-    cJSON_AddStringToObject(root, "format", "lull-sequence");
-    cJSON_AddNumberToObject(root, "version", 1);
-    cJSON_AddStringToObject(root, "scene", m->scene);
-    cJSON_AddStringToObject(root, "source", m->source);
-    cJSON_AddStringToObject(root, "camera", m->camera);
-    cJSON_AddStringToObject(root, "renderer", m->renderer);
-    cJSON_AddNumberToObject(root, "width", m->width);
-    cJSON_AddNumberToObject(root, "height", m->height);
-    cJSON_AddNumberToObject(root, "block", m->block);
-    cJSON_AddNumberToObject(root, "seed", (double)m->seed);
-    cJSON_AddNumberToObject(root, "reference_seed", (double)m->reference_seed);
-    cJSON_AddNumberToObject(root, "reference_spp", m->reference_spp);
-    cJSON_AddBoolToObject(root, "reference_independent", m->reference_independent);
-    levels = cJSON_AddArrayToObject(root, "levels");
+    *ok &= cJSON_AddStringToObject(o, name, text) != NULL;
+}
+
+static void add_number(cJSON *o, const char *name, double v, int *ok)
+{
+    *ok &= cJSON_AddNumberToObject(o, name, v) != NULL;
+}
+
+static cJSON *block_json(const struct ggn_manifest_block *b, int *ok)
+{
+    char crc[16];
+    cJSON *o = cJSON_CreateObject();
+    snprintf(crc, sizeof crc, "%08x", b->crc32);
+    add_number(o, "id", b->id, ok);
+    add_number(o, "x0", b->x0, ok);
+    add_number(o, "y0", b->y0, ok);
+    add_number(o, "x1", b->x1, ok);
+    add_number(o, "y1", b->y1, ok);
+    add_text(o, "file", b->file, ok);
+    add_number(o, "bytes", (double)b->bytes, ok);
+    add_text(o, "crc32", crc, ok);
+    return o;
+}
+
+/* Adds item to the array; frees it when that fails. */
+static void append(cJSON *array, cJSON *item, int *ok)
+{
+    if (item != NULL && cJSON_AddItemToArray(array, item))
+        return;
+    cJSON_Delete(item);
+    *ok = 0;
+}
+
+static cJSON *to_json(const struct ggn_manifest *m, int *ok)
+{
+    cJSON *root = cJSON_CreateObject();
+    add_text(root, "format", "lull-sequence", ok);
+    add_number(root, "version", 1, ok);
+    add_text(root, "scene", m->scene, ok);
+    add_text(root, "source", m->source, ok);
+    add_text(root, "camera", m->camera, ok);
+    add_text(root, "renderer", m->renderer, ok);
+    add_number(root, "width", m->width, ok);
+    add_number(root, "height", m->height, ok);
+    add_number(root, "block", m->block, ok);
+    add_number(root, "seed", (double)m->seed, ok);
+    add_number(root, "reference_seed", (double)m->reference_seed, ok);
+    add_number(root, "reference_spp", m->reference_spp, ok);
+    *ok &= cJSON_AddBoolToObject(root, "reference_independent", m->reference_independent) != NULL;
+    cJSON *levels = cJSON_AddArrayToObject(root, "levels");
     for (uint32_t i = 0; i < m->n_levels; i++)
-        cJSON_AddItemToArray(levels, cJSON_CreateNumber(m->levels[i]));
-    blocks = cJSON_AddArrayToObject(root, "blocks");
-    for (uint32_t i = 0; i < m->n_blocks; i++) {
-        const struct ggn_manifest_block *b = &m->blocks[i];
-        char crc[16];
-        cJSON *o = cJSON_CreateObject();
-        snprintf(crc, sizeof crc, "%08x", b->crc32);
-        cJSON_AddNumberToObject(o, "id", b->id);
-        cJSON_AddNumberToObject(o, "x0", b->x0);
-        cJSON_AddNumberToObject(o, "y0", b->y0);
-        cJSON_AddNumberToObject(o, "x1", b->x1);
-        cJSON_AddNumberToObject(o, "y1", b->y1);
-        cJSON_AddStringToObject(o, "file", b->file);
-        cJSON_AddNumberToObject(o, "bytes", (double)b->bytes);
-        cJSON_AddStringToObject(o, "crc32", crc);
-        cJSON_AddItemToArray(blocks, o);
-    }
+        append(levels, cJSON_CreateNumber(m->levels[i]), ok);
+    cJSON *blocks = cJSON_AddArrayToObject(root, "blocks");
+    for (uint32_t i = 0; i < m->n_blocks; i++)
+        append(blocks, block_json(&m->blocks[i], ok), ok);
+    *ok &= levels != NULL && blocks != NULL;
     return root;
 }
 
@@ -205,8 +229,9 @@ int ggn_manifest_write(const char *dir, const struct ggn_manifest *m, struct ggn
     int rc = path_in(dir, "manifest.json", path, sizeof path, err);
     if (rc != GGN_OK)
         return rc;
-    cJSON *root = to_json(m);
-    char *text = cJSON_Print(root);
+    int ok = 1;
+    cJSON *root = to_json(m, &ok);
+    char *text = ok ? cJSON_Print(root) : NULL;
     cJSON_Delete(root);
     if (text == NULL)
         return ggn_fail_nomem(err, path);
