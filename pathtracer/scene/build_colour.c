@@ -98,7 +98,7 @@ static int check_colour(struct pt_builder *b, const struct pt_param *param, enum
         return pt_diag_fail(&b->diag, param->loc, "a colour that is not finite");
     if (use == PT_USE_REFLECTANCE && (fminf(rgb->x, fminf(rgb->y, rgb->z)) < -1e-3f || v3_max(*rgb) > 1.001f) &&
         param->type == PT_PARAM_RGB)
-        pt_diag_warn(&b->diag, param->loc, "reflectance %g %g %g is clamped to 0 … 1", (double)rgb->x, (double)rgb->y, (double)rgb->z);
+        pt_diag_warn(&b->diag, param->loc, "reflectances beyond 0 … 1 are clamped");
     if (use == PT_USE_REFLECTANCE)
         *rgb = v3(fminf(rgb->x, 1), fminf(rgb->y, 1), fminf(rgb->z, 1));
     /* Spectral colours may leave Rec.709; negative light does not exist. */
@@ -153,6 +153,12 @@ int pt_build_colour(struct pt_builder *b, const struct pt_state *s, struct pt_pa
     return 1;
 }
 
+/* A spectrum, or its name written as a string. */
+static int is_spectrum(const struct pt_param *param)
+{
+    return param != NULL && (param->type == PT_PARAM_SPECTRUM || param->type == PT_PARAM_STRING);
+}
+
 void pt_build_conductor(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const char *eta_name,
                         const char *k_name, pt_vec3 *eta_rgb, pt_vec3 *k_rgb)
 {
@@ -164,14 +170,14 @@ void pt_build_conductor(struct pt_builder *b, const struct pt_state *s, struct p
         eta->used = 1;
     if (k != NULL)
         k->used = 1;
-    if (eta != NULL && eta->type == PT_PARAM_SPECTRUM)
+    if (is_spectrum(eta))
         read_spectrum(b, p, eta, 1, &eta_spd);
-    if (k != NULL && k->type == PT_PARAM_SPECTRUM)
+    if (is_spectrum(k))
         read_spectrum(b, p, k, 1, &k_spd);
     pt_spd_conductor_rgb(&eta_spd, &k_spd, eta_rgb, k_rgb);
-    if (eta != NULL && eta->type != PT_PARAM_SPECTRUM)
+    if (eta != NULL && !is_spectrum(eta))
         pt_build_colour(b, s, p, eta_name, PT_USE_UNBOUNDED, eta_rgb);
-    if (k != NULL && k->type != PT_PARAM_SPECTRUM)
+    if (k != NULL && !is_spectrum(k))
         pt_build_colour(b, s, p, k_name, PT_USE_UNBOUNDED, k_rgb);
     /* An index of 0 divides by zero in Fresnel's equations. */
     *eta_rgb = v3(fmaxf(eta_rgb->x, 1e-3f), fmaxf(eta_rgb->y, 1e-3f), fmaxf(eta_rgb->z, 1e-3f));
@@ -185,7 +191,7 @@ double pt_build_index(struct pt_builder *b, struct pt_params *p, const char *nam
     if (param == NULL)
         return fallback;
     param->used = 1;
-    if (param->type == PT_PARAM_SPECTRUM) {
+    if (is_spectrum(param)) {
         if (read_spectrum(b, p, param, 1, &spd) != PT_OK)
             return fallback;
         eta = pt_spd_luminous_mean(&spd);

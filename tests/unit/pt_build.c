@@ -137,7 +137,7 @@ static void materials_of_both_versions(void **state)
         "MakeNamedMaterial \"f\" \"string type\" \"mix\" \"string namedmaterial1\" \"a\" \"string namedmaterial2\" \"d\" \"rgb amount\" [ .2 .2 .2 ]\n"
         "MakeNamedMaterial \"g\" \"string type\" \"mix\" \"string materials\" [ \"a\" \"d\" ] \"float amount\" 0.2\n"
         "Material \"coateddiffuse\" \"float roughness\" 0.25 Shape \"sphere\"\n"
-        "Material \"conductor\" \"spectrum eta\" \"metal-Au-eta\" \"spectrum k\" \"metal-Au-k\" Shape \"sphere\"\n"
+        "Material \"conductor\" \"spectrum eta\" \"metal-Au-eta\" \"string k\" [ \"metal-Au-k\" ] Shape \"sphere\"\n"
         "Material \"\" Shape \"sphere\" NamedMaterial \"e\" Shape \"sphere\"");
     const struct pt_material *m = s->materials;
     assert_true(m[0].kind == PT_MATERIAL_DIFFUSE && m[0].reflectance.value.z == 0.3f);

@@ -1,0 +1,59 @@
+/* Files of scenes: packed ones are unpacked, damaged ones refused. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include <zlib.h>
+
+#include <cmocka.h>
+
+#include "scene/source.h"
+
+static void packed_files(void **state)
+{
+    (void)state;
+    enum { SIZE = 9 << 20 }; /* more than the first guess at the unpacked size */
+    char folder[] = "/tmp/pt_source_XXXXXX", path[64], *text = malloc(SIZE), *bytes = NULL;
+    size_t size = 0;
+    struct pt_err err = {0};
+    assert_true(mkdtemp(folder) != NULL && text != NULL);
+    snprintf(path, sizeof path, "%s/a.gz", folder);
+    for (int i = 0; i < SIZE; i++)
+        text[i] = (char)('a' + i % 7 + (i >> 12) % 11);
+    gzFile gz = gzopen(path, "wb");
+    assert_non_null(gz);
+    assert_int_equal(gzwrite(gz, text, SIZE), SIZE);
+    assert_int_equal(gzclose(gz), Z_OK);
+    assert_int_equal(pt_source_files.read(NULL, path, &bytes, &size, &err), PT_OK);
+    assert_int_equal(size, SIZE);
+    assert_memory_equal(bytes, text, SIZE);
+    assert_int_equal(bytes[size], 0);
+    free(bytes);
+    assert_int_equal(truncate(path, 4096), 0);
+    assert_int_equal(pt_source_files.read(NULL, path, &bytes, &size, &err), PT_EINVAL);
+    assert_null(strchr(err.text, '\n'));
+    unlink(path);
+    rmdir(folder);
+    free(text);
+}
+
+static void what_is_no_file(void **state)
+{
+    (void)state;
+    char *bytes = NULL;
+    size_t size = 0;
+    struct pt_err err = {0};
+    assert_int_equal(pt_source_files.read(NULL, "/nonexistent", &bytes, &size, &err), PT_EIO);
+    assert_int_equal(pt_source_files.read(NULL, "/tmp", &bytes, &size, &err), PT_EINVAL);
+    assert_null(bytes);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(packed_files), cmocka_unit_test(what_is_no_file)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
