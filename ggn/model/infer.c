@@ -15,6 +15,7 @@ struct history_head {
     uint32_t next;  /* ring position of the next image */
     uint32_t window, area;
     uint64_t spp[MAX_WINDOW];
+    uint8_t broken[MAX_WINDOW]; /* the denoiser did not give numbers: a model whose weights overflow */
 };
 
 struct ggn_infer {
@@ -180,11 +181,15 @@ void ggn_infer_push(struct ggn_infer *f, void *history, const uint8_t *rgb, uint
     denoise(f, rgb);
     memcpy(noisy_of(history, h, (int)head->next), rgb, 3 * area_of(h));
     uint16_t *image = denoised_of(history, h, (int)head->next);
+    head->broken[head->next] = 0;
     for (int c = 0; c < 3; c++)
         for (int y = 0; y < v->h; y++, image += v->w) {
             const float *row = ggn_exec_plane_f32(f->r, out, 0, c) + (long)y * v->row;
-            for (int x = 0; x < v->w; x++)
-                image[x] = (uint16_t)(int)(row[x] * 65535.0f + 0.5f); /* a sigmoid: 0..1 */
+            for (int x = 0; x < v->w; x++) {
+                int number = row[x] >= 0; /* a sigmoid: 0..1 unless it is NaN */
+                head->broken[head->next] |= (uint8_t)!number;
+                image[x] = (uint16_t)(int)((number ? row[x] : 0) * 65535.0f + 0.5f);
+            }
         }
     head->spp[head->next] = spp;
     head->next = (head->next + 1) % (uint32_t)h->window;
@@ -210,6 +215,9 @@ int ggn_infer_decide(struct ggn_infer *f, const void *history, double *p_noisy, 
 
     if (head->count < (uint32_t)h->window)
         return GGN_EINVAL;
+    int broken = 0;
+    for (int i = 0; i < h->window; i++)
+        broken |= head->broken[i];
     for (int i = 0; i < h->window; i++)
         set_denoised(f->m, 3 * i, denoised_of(history, h, ring_of(head, h, i)));
     map_into(f, 0);
@@ -217,10 +225,11 @@ int ggn_infer_decide(struct ggn_infer *f, const void *history, double *p_noisy, 
         set_bytes(f, f->m, 3 * i, noisy_of(history, h, ring_of(head, h, i)));
     map_into(f, 1);
     ggn_exec_forward_f32(f->d, f->model->weights[GGN_NET_D], 1, GGN_EVAL);
-    double z = (double)*ggn_exec_plane_f32(f->d, f->d->graph->n_values - 1, 0, 0);
+    double z = broken ? NAN : (double)*ggn_exec_plane_f32(f->d, f->d->graph->n_values - 1, 0, 0);
     if (logit)
         *logit = z;
-    *p_noisy = ggn_sigmoid(f->model->calibration.scale * z + f->model->calibration.shift);
+    /* an error costs time, never quality */
+    *p_noisy = isfinite(z) ? ggn_sigmoid(f->model->calibration.scale * z + f->model->calibration.shift) : 1;
     return GGN_OK;
 }
 

@@ -41,7 +41,7 @@ int ggn_infer_has_bf16(void);
 void ggn_infer_push(struct ggn_infer *infer, void *history, const uint8_t *rgb, uint64_t spp);
 
 /* Probability that the last image is still noisy, calibrated; *logit (may be NULL) before calibration. GGN_EINVAL while the
- * window is not full. */
+ * window is not full. Weights that overflow give p = 1 and a logit that is not finite. */
 int ggn_infer_decide(struct ggn_infer *infer, const void *history, double *p_noisy, double *logit);
 
 /* One denoised image, for caching windows during training: float planes without gaps, 0..1. */

@@ -107,6 +107,21 @@ static void test_blocks(void **state)
     (void)state;
 }
 
+/* Finite weights that overflow on the way must not look converged. */
+static void test_overflowing_weights(void **state)
+{
+    for (int net = 0; net < GGN_NETS; net++) {
+        struct ggn_model *m = make();
+        struct ggn_pixel_counts counts = {0};
+        for (size_t i = 0; i < m->graph[net].n_params; i++)
+            m->weights[net]->params[i] *= 1e36f;
+        ggn_weights_pack_f32(m->weights[net]);
+        assert_true(decide(m, equal_images, &counts) == 1);
+        ggn_model_destroy(m);
+    }
+    (void)state;
+}
+
 /* Flush-to-zero and denormals-are-zero must not change a decision, even with activations in the denormal range. */
 static void test_flush_to_zero(void **state)
 {
@@ -344,7 +359,8 @@ static void test_many_adam_steps(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_blocks),     cmocka_unit_test(test_flush_to_zero), cmocka_unit_test(test_bce_extremes),
+        cmocka_unit_test(test_blocks),     cmocka_unit_test(test_flush_to_zero),
+        cmocka_unit_test(test_overflowing_weights), cmocka_unit_test(test_bce_extremes),
         cmocka_unit_test(test_ssim_flat),  cmocka_unit_test(test_zero_variance), cmocka_unit_test(test_equal_labels),
         cmocka_unit_test(test_divergence), cmocka_unit_test(test_nan_data),      cmocka_unit_test(test_many_adam_steps)};
     return cmocka_run_group_tests(tests, NULL, NULL);
