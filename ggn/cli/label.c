@@ -131,41 +131,60 @@ struct work {
     int both;                /* rendered and halves */
     enum ggn_observer_source source;
     struct ggn_label *labels, *cheap; /* [n_blocks] */
+    double *shift;           /* [n_blocks], with `both`: octaves between the curves, see curve_shift */
     double *caps;            /* [n_blocks]; the last sample count that was judged; may be NULL */
     int *rc;
     struct ggn_err *errs;
 };
 
-static int judge(const struct work *w, const struct ggn_seq_block *b, enum ggn_observer_source source, struct ggn_label *out, double *cap,
-                 struct ggn_err *err)
+static int judge(const struct work *w, const struct ggn_seq_block *b, enum ggn_observer_source source, struct ggn_label *out,
+                 struct ggn_curve *curve, struct ggn_err *err)
 {
-    struct ggn_curve curve;
-    int rc = ggn_observer_curve(w->observer, b, source, w->view->manifest.reference_independent, &curve, err);
+    int rc = ggn_observer_curve(w->observer, b, source, w->view->manifest.reference_independent, curve, err);
     if (rc != GGN_OK)
         return rc;
     out->id = b->id;
-    out->threshold = ggn_curve_threshold(&curve, w->observer->tau, &out->censored);
-    *cap = curve.spp[curve.n - 1];
-    ggn_curve_release(&curve);
+    out->threshold = ggn_curve_threshold(curve, w->observer->tau, &out->censored);
     return GGN_OK;
+}
+
+/* Median over the recorded levels of log2(cheap / rendered threshold) when tau is what the level shows: says how well the cheap curve fits wherever
+ * the observer's own tau lies. NaN if there is nothing to compare. */
+static double curve_shift(const struct ggn_curve *rendered, const struct ggn_curve *cheap)
+{
+    double *shifts = malloc((size_t)rendered->n * sizeof *shifts), median;
+    size_t n = 0;
+    for (int i = 0; i < rendered->n && shifts != NULL; i++) {
+        int end[2];
+        double a = ggn_curve_threshold(rendered, rendered->score[i], &end[0]), b = ggn_curve_threshold(cheap, rendered->score[i], &end[1]);
+        if (!end[0] && !end[1] && b > cheap->spp[0])
+            shifts[n++] = log2(b / a);
+    }
+    median = shifts != NULL ? ggn_stats_quantile(shifts, n, 0.5) : (double)NAN;
+    free(shifts);
+    return median;
 }
 
 static void work_block(void *data, long i, int worker)
 {
     struct work *w = data;
     struct ggn_seq_block b;
+    struct ggn_curve rendered = {0}, cheap = {0};
     (void)worker;
     if (ggn_cmd_interrupted)
         return;
     w->rc[i] = ggn_manifest_read_block(w->view->dir, &w->view->manifest, (uint32_t)i, &b, &w->errs[i]);
     if (w->rc[i] != GGN_OK)
         return;
-    double cap = 0.0;
-    w->rc[i] = judge(w, &b, w->both ? GGN_SOURCE_RENDERED : w->source, &w->labels[i], &cap, &w->errs[i]);
+    w->rc[i] = judge(w, &b, w->both ? GGN_SOURCE_RENDERED : w->source, &w->labels[i], &rendered, &w->errs[i]);
     if (w->rc[i] == GGN_OK && w->caps != NULL)
-        w->caps[i] = cap;
+        w->caps[i] = rendered.spp[rendered.n - 1];
     if (w->rc[i] == GGN_OK && w->both)
-        w->rc[i] = judge(w, &b, GGN_SOURCE_HALVES, &w->cheap[i], &cap, &w->errs[i]);
+        w->rc[i] = judge(w, &b, GGN_SOURCE_HALVES, &w->cheap[i], &cheap, &w->errs[i]);
+    if (w->rc[i] == GGN_OK && w->both)
+        w->shift[i] = curve_shift(&rendered, &cheap);
+    ggn_curve_release(&rendered);
+    ggn_curve_release(&cheap);
     ggn_seq_block_release(&b);
 }
 
@@ -221,17 +240,17 @@ static int check_view(const struct ggn_observer *observer, struct ggn_threads *t
 {
     size_t n = v->manifest.n_blocks;
     struct ggn_label *labels = calloc(2 * (n > 0 ? n : 1), sizeof *labels);
-    if (labels == NULL)
-        return ggn_fail_nomem(err, v->dir);
-    struct work w = {.view = v, .observer = observer, .both = 1, .labels = labels, .cheap = labels + n};
-    int rc = run_work(&w, threads, err);
+    double *shift = calloc(n > 0 ? n : 1, sizeof *shift);
+    struct work w = {.view = v, .observer = observer, .both = 1, .labels = labels, .cheap = labels + n, .shift = shift};
+    int rc = labels == NULL || shift == NULL ? ggn_fail_nomem(err, v->dir) : run_work(&w, threads, err);
     for (size_t i = 0; i < n && rc == GGN_OK && !ggn_cmd_interrupted; i++) {
         const struct ggn_label *a = &labels[i], *b = &labels[n + i];
-        double e = log2(b->threshold / a->threshold);
-        printf("%-24.24s %5u %9.0f%s %9.0f%s %8.3f\n", v->name, a->id, a->threshold, a->censored ? "+" : " ", b->threshold, b->censored ? "+" : " ", e);
-        if (!a->censored && !b->censored)
-            errors[(*count)++] = fabs(e);
+        printf("%-24.24s %5u %9.0f%s %9.0f%s %8.3f %8.3f\n", v->name, a->id, a->threshold, a->censored ? "+" : " ", b->threshold,
+               b->censored ? "+" : " ", log2(b->threshold / a->threshold), shift[i]);
+        if (!isnan(shift[i]))
+            errors[(*count)++] = fabs(shift[i]);
     }
+    free(shift);
     free(labels);
     return rc;
 }
@@ -331,7 +350,7 @@ static int run_dataset(const struct options *o, const struct ggn_dataset *d, con
     if (errors == NULL)
         return ggn_fail_nomem(err, "check");
     if (o->check)
-        printf("%-24s %5s %10s %10s %8s\n", "view", "block", "rendered", "halves", "log2");
+        printf("%-24s %5s %10s %10s %8s %8s\n", "view", "block", "rendered", "halves", "log2", "curve");
     for (int i = 0; i < d->n && rc == GGN_OK && !ggn_cmd_interrupted; i++) {
         if (d->views[i].manifest.n_blocks == 0)
             fprintf(stderr, "ggn label: %s: no finished block yet, left out\n", d->views[i].dir);
@@ -343,7 +362,7 @@ static int run_dataset(const struct options *o, const struct ggn_dataset *d, con
             rc = label_observer(o, observer, threads, &d->views[i], err);
     }
     if (rc == GGN_OK && o->check && count > 0)
-        printf("%zu blocks not censored (+): |log2| median %.3f, 90th percentile %.3f\n", count, ggn_stats_quantile(errors, count, 0.5),
+        printf("%zu blocks (+: beyond the last level): |curve| median %.3f, 90th percentile %.3f octaves\n", count, ggn_stats_quantile(errors, count, 0.5),
                ggn_stats_quantile(errors, count, 0.9));
     free(errors);
     return rc;
