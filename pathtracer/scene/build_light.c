@@ -116,17 +116,19 @@ static int light_space(struct context *c)
     return PT_OK;
 }
 
-/* The image as three floats per pixel, which light selection and lookup expect. */
-static int32_t float_rgb(struct pt_builder *b, struct pt_loc loc, int32_t id)
+/* The image as three floats >= 0 per pixel, which light selection and lookup expect. */
+static int32_t float_rgb(struct pt_builder *b, int32_t id)
 {
-    static const char *const what = "an environment map";
     struct pt_image_map map = ((struct pt_image_map *)b->images.items)[id];
     size_t n = (size_t)map.width * (size_t)map.height;
-    if (map.type == PT_PIXEL_FLOAT && map.channels == 3)
+    int ready = map.type == PT_PIXEL_FLOAT && map.channels == 3;
+    for (size_t i = 0; ready && i < 3 * n; i++)
+        ready = ((const float *)map.pixels)[i] >= 0;
+    if (ready)
         return id;
     float *pixels = pt_arena_alloc(&b->scene->arena, n, 3 * sizeof *pixels);
     if (pixels == NULL) {
-        pt_diag_nomem(&b->diag, what);
+        pt_diag_nomem(&b->diag, "an environment map");
         return -1;
     }
     for (size_t i = 0; i < n; i++)
@@ -136,12 +138,11 @@ static int32_t float_rgb(struct pt_builder *b, struct pt_loc loc, int32_t id)
                                                  : (float)((const uint8_t *)map.pixels)[at] / 255.0f;
             if (map.type == PT_PIXEL_U8_SRGB)
                 v = v <= 0.04045f ? v / 12.92f : powf((v + 0.055f) / 1.055f, 2.4f);
-            pixels[3 * i + (size_t)k] = v;
+            pixels[3 * i + (size_t)k] = fmaxf(v, 0);
         }
     map.type = PT_PIXEL_FLOAT;
     map.channels = 3;
     map.pixels = pixels;
-    (void)loc;
     return pt_list_add(b, &b->images, &map);
 }
 
@@ -164,7 +165,7 @@ static void make_infinite(struct context *c)
     }
     struct pt_loc loc = pt_params_find(p, key)->loc;
     int32_t id = pt_build_image_map(c->b, loc, file, NULL);
-    if (id < 0 || (id = float_rgb(c->b, loc, id)) < 0)
+    if (id < 0 || (id = float_rgb(c->b, id)) < 0)
         return;
     const struct pt_image_map *map = &((struct pt_image_map *)c->b->images.items)[id];
     c->light->kind = PT_LIGHT_ENV_IMAGE;

@@ -79,7 +79,8 @@ static int convert(struct pt_builder *b, const struct pt_oiio_image *image, doub
                 float v = image->f32[i * c + (size_t)from[j]];
                 if (!image->is_float_file && j < 3 && encoding != 1)
                     v = encoding == 0 ? decode_srgb(v) : powf(v, (float)encoding);
-                pixels[i * k + j] = isfinite(v) ? v : 0;
+                /* An infinite pixel is a half float that overflowed: the largest half. */
+                pixels[i * k + j] = isfinite(v) ? v : v > 0 ? 65504.0f : 0;
             }
         out->pixels = pixels;
     }
