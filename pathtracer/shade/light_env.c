@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "shade/warp.h"
+
 /* The importance table has at most this many columns: it only steers sampling, and its reads miss the cache when it is large.
  * A smaller one is taken while the variance that it adds stays small (see squared_weight). */
 enum { TABLE_MAX = 1024, TABLE_MIN = 128 };
@@ -113,9 +115,10 @@ int pt_light_env_image_sample(const struct pt_scene *scene, const struct pt_ligh
     if (light->mapping == PT_ENV_EQUAL_AREA) {
         l = square_to_sphere(s, t);
     } else {
-        float theta = t * PT_PI, phi = 2.0f * PT_PI * s;
-        sin_theta = sinf(theta);
-        l = v3(sin_theta * cosf(phi), sin_theta * sinf(phi), cosf(theta));
+        float cos_theta, sin_phi, cos_phi;
+        pt_sincos_turn(0.5f * t, &sin_theta, &cos_theta);
+        pt_sincos_turn(s, &sin_phi, &cos_phi);
+        l = v3(sin_theta * cos_phi, sin_theta * sin_phi, cos_theta);
     }
     float pdf = (columns[x + 1] - columns[x]) * (float)d->width * ((d->rows[y + 1] - d->rows[y]) * (float)d->height);
     /* from_render is a rotation (perhaps mirrored): its transpose is its inverse */
