@@ -122,11 +122,11 @@ PT_KERNEL_INLINE float pt_mis_weight(float p, float q)
     return 1.0f / (1.0f + r * r);
 }
 
-PT_KERNEL_INLINE int pt_path_sample_light(pt_effects fx, const struct pt_path *path, pt_vec3 p, struct pt_light_sample *light)
+PT_KERNEL_INLINE int pt_path_sample_light(pt_effects fx, const struct pt_path *path, pt_vec3 p, struct pt_sample2 u,
+                                          struct pt_light_sample *light)
 {
     if (path->scene->emitter_count == 0 || path->settings->strategy != PT_STRATEGY_MIS)
         return 0;
-    struct pt_sample2 u = pt_sampler_2d(&path->sampler, PT_DIM_LIGHT);
     return pt_light_sample(fx, path->scene, p, pt_sampler_1d(&path->sampler, PT_DIM_LIGHT_PICK), u.x, u.y, light);
 }
 
@@ -249,7 +249,7 @@ PT_KERNEL_INLINE int pt_path_cross_medium(pt_effects fx, struct pt_path *path, f
     if (path->trace)
         pt_trace_scatter(path->trace, path->medium, p, path->throughput);
     struct pt_light_plan plan;
-    if (pt_path_sample_light(fx, path, p, &plan.light)) {
+    if (pt_path_sample_light(fx, path, p, pt_sampler_2d(&path->sampler, PT_DIM_LIGHT), &plan.light)) {
         float phase = pt_phase_eval(medium->g, wo, plan.light.wi);
         pt_path_plan_light(fx, path, v3_splat(phase), phase, p, path->medium, &plan);
         pt_path_resolve_light(fx, path, &plan);
@@ -275,10 +275,9 @@ PT_KERNEL_INLINE void pt_path_aux(pt_effects fx, const struct pt_path *path, con
 
 /* The next direction: its ray replaces the path's. 0: the path ends. */
 PT_KERNEL_INLINE int pt_path_scatter(pt_effects fx, struct pt_path *path, const struct pt_place *at, const struct pt_frame *frame,
-                                     const struct pt_bsdf *bsdf, pt_vec3 wo)
+                                     const struct pt_bsdf *bsdf, pt_vec3 wo, struct pt_sample2 u)
 {
     struct pt_bsdf_sample next;
-    struct pt_sample2 u = pt_sampler_2d(&path->sampler, PT_DIM_BSDF);
     float u_lobe = fx & PT_FX_BSDF ? pt_sampler_1d(&path->sampler, PT_DIM_BSDF_LOBE) : 0.0f;
     if (!pt_bsdf_sample(fx, bsdf, wo, u_lobe, u.x, u.y, &next))
         return 0;
@@ -302,6 +301,8 @@ PT_KERNEL_INLINE int pt_path_scatter(pt_effects fx, struct pt_path *path, const 
 PT_KERNEL_INLINE int pt_path_bounce(pt_effects fx, struct pt_path *path, const struct pt_place *at, float t,
                                     struct pt_path_result *out)
 {
+    /* these need nothing of the hit: asked for first, they are worked out while its data arrive */
+    struct pt_sample2 u_bsdf = pt_sampler_2d(&path->sampler, PT_DIM_BSDF), u_light = pt_sampler_2d(&path->sampler, PT_DIM_LIGHT);
     float u_mix = fx & PT_FX_MIX ? pt_sampler_1d(&path->sampler, PT_DIM_MIX) : 0.0f;
     const struct pt_material *material = pt_material_resolve(fx, path->scene, at->shape->material, &at->s, u_mix);
     struct pt_frame frame = pt_material_frame(fx, path->scene, material, &at->s);
@@ -315,14 +316,15 @@ PT_KERNEL_INLINE int pt_path_bounce(pt_effects fx, struct pt_path *path, const s
     if (path->trace)
         pt_trace_surface(path->trace, at, &bsdf, path->throughput);
 
-    struct pt_light_plan plan = {.add = {0.0f, 0.0f, 0.0f}};
-    if (pt_bsdf_has_smooth(fx, &bsdf) && pt_path_sample_light(fx, path, at->p, &plan.light)) {
+    struct pt_light_plan plan; /* no initialiser: it would clear all of it at each bounce */
+    plan.add = v3_splat(0.0f);
+    if (pt_bsdf_has_smooth(fx, &bsdf) && pt_path_sample_light(fx, path, at->p, u_light, &plan.light)) {
         float pdf;
         pt_vec3 wi = plan.light.wi, f = pt_bsdf_eval(fx, &bsdf, wo, pt_frame_to_local(&frame, wi), &pdf);
         pt_path_plan_light(fx, path, f, pdf, pt_offset_point(at->p, at->s.n_geometric, at->error, wi),
                            fx & PT_FX_MEDIA ? pt_medium_towards(at, wi, path->medium) : -1, &plan);
     }
-    int alive = pt_path_scatter(fx, path, at, &frame, &bsdf, wo);
+    int alive = pt_path_scatter(fx, path, at, &frame, &bsdf, wo, u_bsdf);
     pt_path_resolve_light(fx, path, &plan);
     return alive;
 }

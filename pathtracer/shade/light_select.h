@@ -17,7 +17,8 @@ static inline int pt_light_sample(pt_effects fx, const struct pt_scene *scene, p
     const struct pt_emitter *e = &scene->emitters[i];
     if (!(x - (float)i < e->alias_q))
         e = &scene->emitters[e->alias];
-    out->pixel = NULL;
+    if (fx & PT_FX_ENVIRONMENT)
+        out->pixel = NULL;
     if (fx & (PT_FX_ENVIRONMENT | PT_FX_DELTA_LIGHT | PT_FX_QUADRIC)) {
         const struct pt_light *light = &scene->lights[e->light];
         if ((fx & PT_FX_QUADRIC) && light->kind == PT_LIGHT_AREA && e->primitive < 0)
