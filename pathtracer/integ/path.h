@@ -317,7 +317,7 @@ PT_KERNEL_INLINE int pt_path_bounce(pt_effects fx, struct pt_path *path, const s
         pt_trace_surface(path->trace, at, &bsdf, path->throughput);
 
     struct pt_light_plan plan; /* no initialiser: it would clear all of it at each bounce */
-    plan.add = v3_splat(0.0f);
+    plan.add = plan.light.target = v3_splat(0.0f);
     if (pt_bsdf_has_smooth(fx, &bsdf) && pt_path_sample_light(fx, path, at->p, u_light, &plan.light)) {
         float pdf;
         pt_vec3 wi = plan.light.wi, f = pt_bsdf_eval(fx, &bsdf, wo, pt_frame_to_local(&frame, wi), &pdf);
