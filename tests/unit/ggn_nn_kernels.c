@@ -135,7 +135,7 @@ static void test_convolutions(void **state)
  * its rounding. Same bytes with and without enormous values in the two leftmost columns. */
 static void test_row_ends(void **state)
 {
-    enum { C = 8, H = 21, W = 50, ROW = W + 1 };
+    enum { C = 16, H = 21, W = 50, ROW = W + 1 };
     static struct ggn_graph g;
     static float kept[C][H][W];
 
