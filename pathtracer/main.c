@@ -11,6 +11,7 @@
 #include "base/clock.h"
 #include "base/fio.h"
 #include "cli.h"
+#include "explain.h"
 #include "render/checkpoint.h"
 #include "render/output.h"
 #include "render/progress.h"
@@ -314,28 +315,9 @@ static int render_image(struct session *s, int *status, struct pt_err *err)
 
 static void explain(struct session *s)
 {
-    pt_effects covers = 0;
-    const char *name = "";
-    struct pt_scene_stats stats = {0};
-    pt_kernel_select(pt_scene_effects(s->scene), &covers, &name);
-    pt_scene_get_stats(s->scene, &stats);
-    printf("effects of %s:\n", s->cli.scene);
-    for (int i = 0; i < PT_FX_COUNT; i++) {
-        const struct pt_effect_reason *why = pt_scene_effect_reason(s->scene, i);
-        if (!(pt_scene_effects(s->scene) >> i & 1))
-            continue;
-        if (why != NULL && why->line > 0)
-            printf("  %-14s %s:%d\n", pt_effects_name(i), why->file, why->line);
-        else
-            printf("  %-14s %s\n", pt_effects_name(i), s->cli.all_effects ? "--effects=all" : "the scene as a whole");
-    }
-    printf("kernel: %s, compiled for", name);
-    for (int i = 0; i < PT_FX_COUNT; i++)
-        if (covers >> i & 1)
-            printf(" %s", pt_effects_name(i));
-    printf("%s\nscene: %lld triangles, %lld quadrics, %lld instances, %lld lights, %lld materials, %lld textures, %.1f MB\n",
-           covers == 0 ? " no effect" : "", stats.triangles, stats.quadrics, stats.instances, stats.lights, stats.materials,
-           stats.textures, (double)stats.bytes * 1e-6);
+    struct pt_integrator integrator = s->defaults.integrator;
+    override_integrator(&s->cli, &integrator);
+    pt_explain(s->scene, &s->defaults, &integrator, s->cli.scene);
 }
 
 static void print_line(void *data, const char *text)

@@ -37,5 +37,7 @@ enum {
 
 /* Short name ("texture", "alpha", …) of bit i in [0, PT_FX_COUNT). Static text. */
 const char *pt_effects_name(int i);
+/* What the effect costs a kernel that has it, in words. Static text. */
+const char *pt_effects_cost(int i);
 
 #endif

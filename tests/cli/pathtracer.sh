@@ -157,7 +157,9 @@ t "--max-check-overhead" "$P" "$scene" -q -c halfbuf --max-check-overhead 0.01 -
 
 # --- looking inside ---
 t "--explain tells effects and kernel" sh -c "$P $scene --explain | grep -q '^kernel: '"
-t "--explain names the line" sh -c "$P $scene --explain | grep -q 'quadric.*room.pbrt:'"
+t "--explain names the line" sh -c "$P $scene --explain | grep -q 'quadric *on .*room.pbrt:'"
+t "--explain lists what is off" sh -c "$P $scene --explain | grep -q 'grid-medium *off'"
+t "--explain measures a path" sh -c "$P $scene --explain | grep -q '^time: [0-9.]* us per path'"
 t "--debug-path tells the path" sh -c "test \$($P $scene --debug-path 30,20,1 | wc -l) -ge 2"
 
 # --- time, interrupt, checkpoint ---
