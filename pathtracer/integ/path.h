@@ -25,6 +25,11 @@
 /* Shadow rays end this share before their target, which is already off its surface. */
 #define PT_SHADOW_END 0.9999f
 
+/* A path between perfect mirrors loses nothing and would never end when the depth is unlimited: beyond this many bounces roulette
+ * takes some of them whatever they carry. */
+#define PT_PATH_LONG 1000
+#define PT_KEEP_LONG 0.99f
+
 struct pt_path {
     const struct pt_scene *scene;
     const struct pt_integrator *settings;
@@ -215,6 +220,8 @@ PT_KERNEL_INLINE int pt_path_survives(struct pt_path *path)
     if (path->depth < path->settings->rr_depth)
         return 1;
     float keep = v3_max(path->throughput) * path->eta_scale;
+    if (path->depth > PT_PATH_LONG && keep > PT_KEEP_LONG)
+        keep = PT_KEEP_LONG;
     if (keep >= 1.0f)
         return 1;
     if (!(pt_bits_to_float(pt_sampler_bits(&path->sampler, PT_DIM_ROULETTE)) < keep))

@@ -279,6 +279,23 @@ static void matched_and_total(void **state)
     test_scene_end(&scene);
 }
 
+/* Inside perfect mirrors with unlimited depth a path loses nothing, and must end all the same. */
+static void endless_mirrors(void **state)
+{
+    (void)state;
+    struct pt_scene scene;
+    test_scene_begin(&scene);
+    test_camera(&scene, v3(0.1f, 0.2f, 0.3f), v3(0, 0, -1), v3(0, 1, 0), 90.0f, 4);
+    int32_t mirror = test_add_material(&scene, PT_MATERIAL_DIELECTRIC);
+    scene.materials[mirror].eta = 1e4f; /* reflects all but 4e-4 at normal incidence, and all from within */
+    test_add_box(&scene, mirror, v3(-1, -1, -1), v3(1, 1, 1), 0);
+    test_scene_finish(&scene);
+    struct pt_integrator settings = test_integrator(-1);
+    pt_vec3 l = mean_of(&scene, &settings, 4, NULL);
+    assert_true(l.x == 0.0f && l.y == 0.0f && l.z == 0.0f);
+    test_scene_end(&scene);
+}
+
 /* A light whose emission is NaN, another that is infinite: paths that meet them are not finite, all others are. */
 static void bad_emission(void **state)
 {
@@ -310,7 +327,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(closed_furnace), cmocka_unit_test(sphere_light), cmocka_unit_test(point_light),
         cmocka_unit_test(lights_of_extreme_size), cmocka_unit_test(scale_and_shift), cmocka_unit_test(duplicated_and_degenerate),
-        cmocka_unit_test(coplanar_light), cmocka_unit_test(grazing), cmocka_unit_test(matched_and_total), cmocka_unit_test(bad_emission),
+        cmocka_unit_test(coplanar_light), cmocka_unit_test(grazing), cmocka_unit_test(matched_and_total), cmocka_unit_test(bad_emission), cmocka_unit_test(endless_mirrors),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
