@@ -495,7 +495,7 @@ int pt_cli_parse(struct pt_cli *cli, int argc, char **argv, struct pt_err *err)
         .parser = parse_option,
         .args_doc = "SCENE.pbrt",
         .doc = "Renders a scene block by block and stops each block when its noise can no longer be seen.\v"
-               "Exit status: 0 done, 1 an output could not be written or memory ran out, 2 bad input, 130 interrupted "
+               "Exit status: 0 done, 1 memory ran out, 2 bad input or an output could not be written, 130 interrupted "
                "(everything is written all the same).",
     };
     *cli = (struct pt_cli){.block_width = 200, .block_height = 200, .spp_min = 32, .spp_max = 10000, .checkpoint_every_s = 60.0,

@@ -398,7 +398,7 @@ int main(int argc, char **argv)
     if (rc != PT_OK) {
         pt_progress_clear(&s.progress);
         fprintf(stderr, "pathtracer: %s\n", err.text);
-        status = rc == PT_EINVAL ? EXIT_BAD_INPUT : EXIT_FAILED;
+        status = rc == PT_EINVAL || rc == PT_EIO ? EXIT_BAD_INPUT : EXIT_FAILED;
     }
     pt_render_destroy(s.render);
     pt_criterion_destroy(s.criterion);

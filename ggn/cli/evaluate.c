@@ -1,6 +1,7 @@
 /* `ggn evaluate --data DATA [--model MODEL]`: every metric of every method, on scenes that were kept apart. */
 #include <argp.h>
 #include <errno.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,11 +15,12 @@
 #include "eval/network.h"
 #include "eval/report.h"
 
-enum { MAX_MODELS = 8, MAX_METHODS = 8 + MAX_MODELS, KEY_EARLY = 256, KEY_NO_QUALITY, KEY_RETUNE, KEY_RECORDED, KEY_RATIO, KEY_BASELINES, KEY_EPOCHS };
+enum { MAX_MODELS = 8, MAX_METHODS = 8 + 2 * MAX_MODELS };
+enum { KEY_EARLY = 256, KEY_NO_QUALITY, KEY_RETUNE, KEY_RECORDED, KEY_RATIO, KEY_BASELINES, KEY_EPOCHS, KEY_BF16 };
 
 struct options {
     const char *data, *out, *models[MAX_MODELS];
-    int n_models, json, quality, threads, window, retune, recorded, baselines, epochs;
+    int n_models, json, quality, threads, window, retune, recorded, baselines, epochs, bf16;
     double early, ratio;
 };
 
@@ -29,6 +31,7 @@ static const struct argp_option option_table[] = {
     {"output", 'o', "DIR", 0, "write figures.json and pictures there", 2},
     {"early", KEY_EARLY, "RATE", 0, "early-stop rate that cuts are tuned for on the training scenes (default 0.05)", 3},
     {"retune", KEY_RETUNE, NULL, 0, "tune the models' thresholds too, on the validation scenes, instead of taking the stored ones", 3},
+    {"bf16", KEY_BF16, NULL, 0, "judge with bfloat16 products too and count the decisions that this changes", 3},
     {"no-quality", KEY_NO_QUALITY, NULL, 0, "skip FLIP and SSIM at the stop", 3},
     {"baselines", KEY_BASELINES, NULL, 0, "train the published baselines on the training scenes and measure them too (minutes)", 3},
     {"epochs", KEY_EPOCHS, "N", 0, "epochs of the LSTM baseline (default 15)", 3},
@@ -49,6 +52,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
     case 'o': o->out = arg; return 0;
     case 'j': o->json = 1; return 0;
     case KEY_NO_QUALITY: o->quality = 0; return 0;
+    case KEY_BF16: o->bf16 = 1; return 0;
     case KEY_RETUNE: o->retune = 1; return 0;
     case KEY_RECORDED: o->recorded = 1; return 0;
     case KEY_BASELINES: o->baselines = 1; return 0;
@@ -92,6 +96,7 @@ struct job {
     struct ggn_model *models[MAX_MODELS];
     struct ggn_method methods[MAX_METHODS];
     int n;
+    int exact[MAX_METHODS]; /* of a method in bfloat16: the same in float; else -1 */
     enum ggn_split tuning, tuning_models;
 };
 
@@ -147,17 +152,57 @@ static int add_baselines(struct job *j, struct ggn_threads *threads, struct ggn_
 
 static int add_models(struct job *j, struct ggn_threads *threads, struct ggn_err *err)
 {
-    int rc = GGN_OK;
-    for (int i = 0; i < j->o->n_models && rc == GGN_OK; i++) {
-        const char *slash = strrchr(j->o->models[i], '/');
-        rc = ggn_eval_network(&j->methods[j->n], &j->set, j->models[i], slash != NULL ? slash + 1 : j->o->models[i], threads, err);
+    int rc = GGN_OK, precisions = j->o->bf16 ? 2 : 1;
+    for (int i = 0; i < precisions * j->o->n_models && rc == GGN_OK; i++) {
+        const char *path = j->o->models[i / precisions], *slash = strrchr(path, '/');
+        enum ggn_precision precision = i % precisions ? GGN_PRECISION_BF16 : GGN_PRECISION_F32;
+        char name[GGN_METHOD_NAME];
+        snprintf(name, sizeof name, "%.40s%s", slash != NULL ? slash + 1 : path, precision == GGN_PRECISION_BF16 ? " bf16" : "");
+        rc = ggn_eval_network(&j->methods[j->n], &j->set, j->models[i / precisions], name, precision, threads, err);
         if (rc != GGN_OK)
             return rc;
+        if (precision == GGN_PRECISION_BF16)
+            j->exact[j->n] = j->n - 1;
         struct ggn_method *m = &j->methods[j->n++];
         if (j->o->retune)
             rc = ggn_method_tune(m, &j->set, j->tuning_models, j->o->early, err);
     }
     return rc;
+}
+
+/* What bfloat16 changes on a split: verdicts on windows ("below the cut"), and where blocks stop. */
+static void report_bf16(const struct job *j, enum ggn_split split, cJSON *to)
+{
+    for (int i = 0; i < j->n; i++) {
+        if (j->exact[i] < 0)
+            continue;
+        const struct ggn_method *rounded = &j->methods[i], *exact = &j->methods[j->exact[i]];
+        int windows = 0, verdicts = 0, blocks = 0, stops = 0;
+        double furthest = 0.0;
+        for (int b = 0; b < j->set.n_blocks; b++) {
+            const struct ggn_eval_block *block = &j->set.blocks[b];
+            if (block->split != split)
+                continue;
+            blocks++;
+            stops += rounded->stop[b] != exact->stop[b];
+            for (size_t k = block->first; k < block->end; k++) {
+                if (isnan(exact->score[k]))
+                    continue;
+                windows++;
+                verdicts += (rounded->score[k] < rounded->cut) != (exact->score[k] < exact->cut);
+                furthest = fmax(furthest, fabs(rounded->score[k] - exact->score[k]));
+            }
+        }
+        if (!j->o->json)
+            printf("%s: %d of %d verdicts and %d of %d stops differ from float; p moves by at most %.2g%s\n\n", rounded->name, verdicts, windows,
+                   stops, blocks, furthest, ggn_precision_has_bf16() ? "" : " (this processor has no bfloat16 products)");
+        cJSON *o = cJSON_AddObjectToObject(to, rounded->name);
+        cJSON_AddNumberToObject(o, "windows", windows);
+        cJSON_AddNumberToObject(o, "verdicts_changed", verdicts);
+        cJSON_AddNumberToObject(o, "blocks", blocks);
+        cJSON_AddNumberToObject(o, "stops_changed", stops);
+        cJSON_AddNumberToObject(o, "p_moved_at_most", furthest);
+    }
 }
 
 static int pictures(const struct job *j, enum ggn_split split, struct ggn_err *err)
@@ -203,7 +248,7 @@ static int report(struct job *j, int skipped, struct ggn_err *err)
     cJSON_AddNumberToObject(root, "window", j->set.window);
     cJSON_AddNumberToObject(root, "early_rate_tuned_for", j->o->early);
     cJSON_AddStringToObject(root, "tuned_on", ggn_split_names[j->tuning]);
-    cJSON *splits = cJSON_AddObjectToObject(root, "splits");
+    cJSON *splits = cJSON_AddObjectToObject(root, "splits"), *bf16 = j->o->bf16 ? cJSON_AddObjectToObject(root, "bf16") : NULL;
     int rc = GGN_OK;
     if (!j->o->json)
         printf("labels: %s; cuts tuned on %s for %.1f %% early stops%s\n", label_source(&j->set.chains.data), ggn_split_names[j->tuning], 100.0 * j->o->early,
@@ -218,6 +263,8 @@ static int report(struct job *j, int skipped, struct ggn_err *err)
         if (!j->o->json)
             ggn_report_table(stdout, &j->set, (enum ggn_split)split, j->methods, metrics, j->n);
         cJSON_AddItemToObject(splits, ggn_split_names[split], ggn_report_json(j->methods, metrics, j->n));
+        if (j->o->bf16)
+            report_bf16(j, (enum ggn_split)split, cJSON_AddObjectToObject(bf16, ggn_split_names[split]));
         if (j->o->out != NULL)
             rc = pictures(j, (enum ggn_split)split, err);
     }
@@ -247,6 +294,8 @@ int ggn_cmd_evaluate(int argc, char **argv)
     int window, skipped = 0;
 
     argp_parse(&argp, argc, argv, 0, NULL, &o);
+    for (int i = 0; i < MAX_METHODS; i++)
+        j.exact[i] = -1;
     struct ggn_threads *threads = ggn_threads_create(o.threads, &err);
     int rc = threads == NULL ? err.code : GGN_OK;
     if (rc == GGN_OK && o.out != NULL && mkdir(o.out, 0777) != 0 && errno != EEXIST)

@@ -35,12 +35,12 @@ static void viewer_release(struct viewer *v)
     *v = (struct viewer){0};
 }
 
-static int viewer_init(struct viewer *v, const struct ggn_model *model, size_t values, struct ggn_err *err)
+static int viewer_init(struct viewer *v, const struct ggn_model *model, enum ggn_precision precision, size_t values, struct ggn_err *err)
 {
     *v = (struct viewer){.window = model->hyper.window};
     if (v->window > WINDOW_MAX)
         return ggn_fail(err, GGN_EINVAL, "the model looks at windows of %d images, more than %d", v->window, WINDOW_MAX);
-    v->judge = ggn_judge_create(model, NULL, err);
+    v->judge = ggn_judge_create(model, precision, NULL, err);
     if (v->judge == NULL)
         return err->code;
     v->room = malloc((size_t)v->window * values * sizeof *v->room);
@@ -153,7 +153,7 @@ static int init_method(struct ggn_method *m, const struct ggn_eval_set *s, const
 }
 
 int ggn_eval_network(struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_model *model, const char *name,
-                     struct ggn_threads *threads, struct ggn_err *err)
+                     enum ggn_precision precision, struct ggn_threads *threads, struct ggn_err *err)
 {
     int workers = ggn_threads_count(threads), made = 0;
     struct run r = {.set = s, .method = m, .viewers = calloc((size_t)workers, sizeof *r.viewers)};
@@ -165,7 +165,7 @@ int ggn_eval_network(struct ggn_method *m, const struct ggn_eval_set *s, const s
         return rc;
     }
     for (; made < workers && rc == GGN_OK; made += rc == GGN_OK)
-        rc = viewer_init(&r.viewers[made], model, ggn_chains_values(&s->chains), err);
+        rc = viewer_init(&r.viewers[made], model, precision, ggn_chains_values(&s->chains), err);
     if (rc == GGN_OK)
         rc = ggn_eval_each_block(s, threads, judge_block, &r, err);
     for (int i = 0; i < made; i++)
@@ -270,7 +270,7 @@ int ggn_eval_denoiser_picture(const char *path, const struct ggn_eval_set *s, co
 {
     struct strips strips = {0};
     struct viewer v;
-    int last_view = -1, rc = viewer_init(&v, model, ggn_chains_values(&s->chains), err);
+    int last_view = -1, rc = viewer_init(&v, model, GGN_PRECISION_F32, ggn_chains_values(&s->chains), err);
     if (rc != GGN_OK)
         return rc;
     for (int b = 0; b < s->n_blocks && strips.n < STRIPS && rc == GGN_OK; b++) {
@@ -356,7 +356,7 @@ int ggn_eval_feature_picture(const char *path, const struct ggn_eval_set *s, con
     }
     int rc = ggn_policy_of(model, &policy, err);
     if (rc == GGN_OK)
-        rc = viewer_init(&v, model, ggn_chains_values(&s->chains), err);
+        rc = viewer_init(&v, model, GGN_PRECISION_F32, ggn_chains_values(&s->chains), err);
     if (rc != GGN_OK || block == NULL) {
         if (rc == GGN_OK)
             viewer_release(&v);

@@ -5,7 +5,7 @@
 #define GGN_EVAL_NETWORK_H
 
 #include "eval/method.h"
-#include "model/model.h"
+#include "model/judge.h"
 
 /*
  * Scores are p_noisy; cut and passes are those of the model's policy, its gate and its tail guard hold blocks back as in the criterion (the network is
@@ -13,7 +13,7 @@
  * score. Beyond the recording the guard's statistics are scaled from the last recorded level.
  */
 int ggn_eval_network(struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_model *model, const char *name,
-                     struct ggn_threads *threads, struct ggn_err *err);
+                     enum ggn_precision precision, struct ggn_threads *threads, struct ggn_err *err);
 
 /* Up to four blocks of the split: the first level, what the denoiser makes of it, and the reference, with their SSIM. */
 int ggn_eval_denoiser_picture(const char *path, const struct ggn_eval_set *s, const struct ggn_model *model, enum ggn_split split,

@@ -1,17 +1,39 @@
 #include "model/judge.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "model/window.h"
+#include "nn/bf16.h"
 #include "nn/exec.h"
 
 struct ggn_judge {
-    const struct ggn_model *model;
-    struct ggn_exec_f32 *r, *m, *d;
+    const struct ggn_model *model; /* borrows */
+    struct ggn_exec_f32 *exec[GGN_NETS];
 };
 
-struct ggn_judge *ggn_judge_create(const struct ggn_model *model, struct ggn_threads *threads, struct ggn_err *err)
+int ggn_precision_has_bf16(void)
+{
+    return ggn_bf16_available();
+}
+
+static int exec_flags(enum ggn_precision precision)
+{
+    return precision == GGN_PRECISION_BF16 ? GGN_EXEC_BF16 : 0;
+}
+
+size_t ggn_judge_bytes(const struct ggn_model *model, enum ggn_precision precision, int threads)
+{
+    size_t bytes = sizeof(struct ggn_judge);
+
+    for (int net = 0; net < GGN_NETS; net++)
+        bytes += ggn_exec_bytes_f32(&model->graph[net], 1, exec_flags(precision), threads);
+    return bytes;
+}
+
+struct ggn_judge *ggn_judge_create(const struct ggn_model *model, enum ggn_precision precision, struct ggn_threads *threads,
+                                   struct ggn_err *err)
 {
     struct ggn_judge *j = calloc(1, sizeof *j);
 
@@ -20,81 +42,103 @@ struct ggn_judge *ggn_judge_create(const struct ggn_model *model, struct ggn_thr
         return NULL;
     }
     j->model = model;
-    /* the generator's two windows, denoised and noisy, are a batch of two */
-    j->r = ggn_exec_create_f32(&model->graph[GGN_NET_R], NULL, 1, 0, threads, err);
-    j->m = j->r ? ggn_exec_create_f32(&model->graph[GGN_NET_M], NULL, 2, 0, threads, err) : NULL;
-    j->d = j->m ? ggn_exec_create_f32(&model->graph[GGN_NET_D], NULL, 1, 0, threads, err) : NULL;
-    if (j->d)
-        return j;
-    ggn_judge_destroy(j);
-    return NULL;
+    for (int net = 0; net < GGN_NETS; net++) {
+        j->exec[net] = ggn_exec_create_f32(&model->graph[net], NULL, 1, exec_flags(precision), threads, err);
+        if (!j->exec[net]) {
+            ggn_judge_destroy(j);
+            return NULL;
+        }
+    }
+    return j;
 }
 
 void ggn_judge_destroy(struct ggn_judge *j)
 {
     if (!j)
         return;
-    ggn_exec_destroy_f32(j->r);
-    ggn_exec_destroy_f32(j->m);
-    ggn_exec_destroy_f32(j->d);
+    for (int net = 0; net < GGN_NETS; net++)
+        ggn_exec_destroy_f32(j->exec[net]);
     free(j);
 }
 
-static const struct ggn_value *output(const struct ggn_exec_f32 *e)
+static const struct ggn_value *input(const struct ggn_judge *j, int net)
 {
-    return &e->graph->value[e->graph->n_values - 1];
+    return &j->model->graph[net].value[0];
 }
 
-static float *output_plane(const struct ggn_exec_f32 *e, int image)
+static const struct ggn_value *output(const struct ggn_judge *j, int net)
 {
-    return ggn_exec_plane_f32(e, e->graph->n_values - 1, image, 0);
+    return &j->model->graph[net].value[j->model->graph[net].n_values - 1];
+}
+
+static float *output_plane(const struct ggn_judge *j, int net)
+{
+    return ggn_exec_plane_f32(j->exec[net], j->model->graph[net].n_values - 1, 0, 0);
+}
+
+static void forward(struct ggn_judge *j, int net)
+{
+    ggn_exec_forward_f32(j->exec[net], j->model->weights[net], 1, GGN_EVAL);
 }
 
 void ggn_judge_denoise(struct ggn_judge *j, const uint8_t *noisy, uint16_t *denoised, int width, int height)
 {
-    const struct ggn_value *in = &j->r->graph->value[0], *out = output(j->r);
+    const struct ggn_value *in = input(j, GGN_NET_R), *out = output(j, GGN_NET_R);
     const int nx = ggn_tile_count(width, in->w), ny = ggn_tile_count(height, in->h);
 
     for (int t = 0; t < nx * ny; t++) {
         int x0 = ggn_tile_start(width, in->w, t % nx), y0 = ggn_tile_start(height, in->h, t / nx);
-        ggn_tile_load_u8(noisy, width, height, x0, y0, in->w, in->h, 1.0F / 255, ggn_exec_plane_f32(j->r, 0, 0, 0),
-                         (size_t)in->row, in->plane);
-        ggn_exec_forward_f32(j->r, j->model->weights[GGN_NET_R], 1, GGN_EVAL);
-        ggn_tile_store_u16(denoised, width, height, x0, y0, in->w, in->h, output_plane(j->r, 0), (size_t)out->row,
+        ggn_tile_load_u8(noisy, width, height, x0, y0, in->w, in->h, 1.0F / 255,
+                         ggn_exec_plane_f32(j->exec[GGN_NET_R], 0, 0, 0), (size_t)in->row, in->plane);
+        forward(j, GGN_NET_R);
+        ggn_tile_store_u16(denoised, width, height, x0, y0, in->w, in->h, output_plane(j, GGN_NET_R), (size_t)out->row,
                            out->plane);
     }
+}
+
+/* The generator's map of its present input, into plane `which` of the discriminator's input. */
+static void map_into(struct ggn_judge *j, int which)
+{
+    const struct ggn_value *map = output(j, GGN_NET_M), *to = input(j, GGN_NET_D);
+
+    forward(j, GGN_NET_M);
+    for (int y = 0; y < map->h; y++)
+        memcpy(ggn_exec_plane_f32(j->exec[GGN_NET_D], 0, 0, which) + (long)y * to->row,
+               output_plane(j, GGN_NET_M) + (long)y * map->row, (size_t)map->w * sizeof(float));
 }
 
 static double tile_logit(struct ggn_judge *j, const uint8_t *const *noisy, const uint16_t *const *denoised, int width,
                          int height, int x0, int y0)
 {
-    const struct ggn_value *in = &j->m->graph->value[0], *map = output(j->m), *to = &j->d->graph->value[0];
+    const struct ggn_value *in = input(j, GGN_NET_M);
 
-    for (int k = 0; k < j->model->hyper.window; k++) {
+    for (int k = 0; k < j->model->hyper.window; k++)
         ggn_tile_load_u16(denoised[k], width, height, x0, y0, in->w, in->h, 1.0F / 65535,
-                          ggn_exec_plane_f32(j->m, 0, 0, 3 * k), (size_t)in->row, in->plane);
-        ggn_tile_load_u8(noisy[k], width, height, x0, y0, in->w, in->h, 1.0F / 255, ggn_exec_plane_f32(j->m, 0, 1, 3 * k),
-                         (size_t)in->row, in->plane);
-    }
-    ggn_exec_forward_f32(j->m, j->model->weights[GGN_NET_M], 2, GGN_EVAL);
-    for (int which = 0; which < 2; which++)
-        for (int y = 0; y < map->h; y++)
-            memcpy(ggn_exec_plane_f32(j->d, 0, 0, which) + (long)y * to->row, output_plane(j->m, which) + (long)y * map->row,
-                   (size_t)map->w * sizeof(float));
-    ggn_exec_forward_f32(j->d, j->model->weights[GGN_NET_D], 1, GGN_EVAL);
-    return (double)*output_plane(j->d, 0);
+                          ggn_exec_plane_f32(j->exec[GGN_NET_M], 0, 0, 3 * k), (size_t)in->row, in->plane);
+    map_into(j, 0);
+    for (int k = 0; k < j->model->hyper.window; k++)
+        ggn_tile_load_u8(noisy[k], width, height, x0, y0, in->w, in->h, 1.0F / 255,
+                         ggn_exec_plane_f32(j->exec[GGN_NET_M], 0, 0, 3 * k), (size_t)in->row, in->plane);
+    map_into(j, 1);
+    forward(j, GGN_NET_D);
+    return (double)*output_plane(j, GGN_NET_D);
 }
 
 double ggn_judge_logit(struct ggn_judge *j, const uint8_t *const *noisy, const uint16_t *const *denoised, int width,
                        int height)
 {
-    const struct ggn_value *in = &j->m->graph->value[0];
+    const struct ggn_value *in = input(j, GGN_NET_M);
     const int nx = ggn_tile_count(width, in->w), ny = ggn_tile_count(height, in->h);
     double highest = 0;
 
+    for (int k = 0; k < j->model->hyper.window; k++)
+        if (!ggn_fixed_is_finite(denoised[k], 3 * (size_t)width * (size_t)height))
+            return (double)NAN;
     for (int t = 0; t < nx * ny; t++) {
         double z = tile_logit(j, noisy, denoised, width, height, ggn_tile_start(width, in->w, t % nx),
                               ggn_tile_start(height, in->h, t / nx));
+        if (!isfinite(z))
+            return z;
         highest = t == 0 || z > highest ? z : highest;
     }
     return highest;
@@ -102,6 +146,6 @@ double ggn_judge_logit(struct ggn_judge *j, const uint8_t *const *noisy, const u
 
 const float *ggn_judge_feature_map(const struct ggn_judge *j, int which, int *row)
 {
-    *row = output(j->m)->row;
-    return output_plane(j->m, which);
+    *row = input(j, GGN_NET_D)->row;
+    return ggn_exec_plane_f32(j->exec[GGN_NET_D], 0, 0, which);
 }

@@ -55,7 +55,8 @@ int ggn_policy_check(const struct ggn_policy *p, struct ggn_err *err)
 
 double ggn_policy_p(const struct ggn_policy *p, double logit)
 {
-    return ggn_sigmoid(p->scale * logit + p->shift);
+    /* an error costs time, never quality */
+    return isfinite(logit) ? ggn_sigmoid(p->scale * logit + p->shift) : 1;
 }
 
 double ggn_policy_next(const struct ggn_policy *p, double spp)

@@ -25,6 +25,7 @@ struct ggn_policy ggn_policy_default(void);
 /* GGN_EINVAL naming the field that is out of range. */
 int ggn_policy_check(const struct ggn_policy *policy, struct ggn_err *err);
 
+/* Calibrated probability; 1 for a logit that is not finite. */
 double ggn_policy_p(const struct ggn_policy *policy, double logit);
 /* Samples at which a block last judged at `spp` is to be judged again; > spp. */
 double ggn_policy_next(const struct ggn_policy *policy, double spp);

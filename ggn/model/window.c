@@ -34,6 +34,15 @@ static int reflect(int i, int size)
     return k < size ? k : 2 * size - 1 - k;
 }
 
+int ggn_fixed_is_finite(const uint16_t *values, size_t count)
+{
+    uint16_t highest = 0;
+
+    for (size_t i = 0; i < count; i++)
+        highest = values[i] > highest ? values[i] : highest;
+    return highest < GGN_FIXED_NAN;
+}
+
 #define TILE_LOAD(NAME, TYPE)                                                                                               \
     void NAME(const TYPE *src, int width, int height, int x0, int y0, int tile_w, int tile_h, float scale, float *dst,      \
               size_t dst_row, size_t dst_plane)                                                                             \
@@ -63,8 +72,8 @@ void ggn_tile_store_u16(uint16_t *dst, int width, int height, int x0, int y0, in
             const float *from = src + (size_t)c * src_plane + (size_t)y * src_row;
             uint16_t *to = dst + ((size_t)c * (size_t)height + (size_t)(y0 + y)) * (size_t)width + x0;
             for (int x = 0; x < w; x++) {
-                float v = from[x] > 0 ? from[x] : 0;
-                to[x] = (uint16_t)((v < 1 ? v : 1) * 65535 + 0.5F);
+                float v = from[x] > 0 ? from[x] : 0, code = v * GGN_FIXED_ONE + 0.5F;
+                to[x] = isnan(from[x]) ? GGN_FIXED_NAN : (uint16_t)(code < GGN_FIXED_NAN ? code : GGN_FIXED_NAN - 1);
             }
         }
 }

@@ -3,7 +3,7 @@
  * statistic that spares the network, tiles of blocks that have another size than the network. Pure functions, any thread.
  *
  * A block's image is planar here: [3][height][width], all of R, then G, then B; display code 0..255 (noisy) or 16-bit
- * fixed point, 65535 = 1 (denoised).
+ * fixed point (denoised): code/65535, where 65534 stands for everything up to 1 and 65535 is no number.
  */
 #ifndef GGN_MODEL_WINDOW_H
 #define GGN_MODEL_WINDOW_H
@@ -21,13 +21,18 @@ double ggn_window_noise(const uint8_t *first, const uint8_t *last, size_t count,
 int ggn_tile_count(int size, int tile);
 int ggn_tile_start(int size, int tile, int index);
 
+enum { GGN_FIXED_ONE = 65535, GGN_FIXED_NAN = 65535 };
+/* Whether none of the values is GGN_FIXED_NAN: a denoiser whose weights overflow must not look converged. */
+int ggn_fixed_is_finite(const uint16_t *values, size_t count);
+
 /* Copies the tile at (x0, y0) of a planar image into a planar float tile, dst(c, y, x) = src · scale. dst_row and dst_plane
  * are the distances in floats between rows and planes of dst. Beyond the edge the image is reflected (… c b a | a b c …). */
 void ggn_tile_load_u8(const uint8_t *src, int width, int height, int x0, int y0, int tile_w, int tile_h, float scale,
                       float *dst, size_t dst_row, size_t dst_plane);
 void ggn_tile_load_u16(const uint16_t *src, int width, int height, int x0, int y0, int tile_w, int tile_h, float scale,
                        float *dst, size_t dst_row, size_t dst_plane);
-/* Stores the part of a float tile in [0, 1] that lies inside the image, rounded to 16-bit fixed point; NaN is 0. */
+/* Stores the part of a float tile in [0, 1] that lies inside the image, rounded to 16-bit fixed point; NaN becomes
+ * GGN_FIXED_NAN. */
 void ggn_tile_store_u16(uint16_t *dst, int width, int height, int x0, int y0, int tile_w, int tile_h, const float *src,
                         size_t src_row, size_t src_plane);
 

@@ -21,7 +21,7 @@
 #include "plugin/text.h"
 #include "plugin/view.h"
 
-enum { P_MODEL, P_THRESHOLD, P_PASSES, P_GATE, P_TAIL, P_GINI, P_FIRST_SPP, P_COUNT };
+enum { P_MODEL, P_THRESHOLD, P_PASSES, P_GATE, P_TAIL, P_GINI, P_FIRST_SPP, P_PRECISION, P_COUNT };
 
 static const struct lull_param params[P_COUNT] = {
     [P_MODEL] = {.name = "model", .type = LULL_PARAM_FILE,
@@ -40,6 +40,8 @@ static const struct lull_param params[P_COUNT] = {
                         "without it the model's own"},
     [P_FIRST_SPP] = {.name = "first-spp", .type = LULL_PARAM_INT, .min = 1, .max = 1e9,
                      .help = "samples per pixel of the first image of a window; without it the model's own"},
+    [P_PRECISION] = {.name = "precision", .type = LULL_PARAM_CHOICE, .choices = "f32|bf16", .default_value = "f32",
+                     .help = "of the products in the networks; bf16 is f32 on processors without the instructions"},
 };
 
 struct worker {
@@ -52,6 +54,7 @@ struct lull_instance {
     struct ggn_model *model;
     struct ggn_policy policy; /* the model's, with the parameters over it */
     int gate, window;
+    enum ggn_precision precision;
     uint32_t key; /* of saved state: a hash of model and policy */
     int open;
     struct gp_display display;
@@ -64,8 +67,15 @@ struct lull_instance {
 
 /* --- instance ---------------------------------------------------------------------------------------------------------- */
 
-static int32_t set_pair(struct ggn_policy *policy, int *gate, const char **model, int given[P_COUNT], const struct lull_pair *pair,
-                        struct lull_error *err)
+/* What create was given. */
+struct given {
+    struct ggn_policy policy;
+    const char *model;
+    int gate, precision;
+    int is[P_COUNT]; /* by parameter: whether it was */
+};
+
+static int32_t set_pair(struct given *g, const struct lull_pair *pair, struct lull_error *err)
 {
     double value = 0;
 
@@ -74,43 +84,46 @@ static int32_t set_pair(struct ggn_policy *policy, int *gate, const char **model
     int32_t index = gp_param(params, P_COUNT, pair->key, pair->value, &value, err);
     if (index < 0)
         return index;
-    given[index] = 1;
+    g->is[index] = 1;
     switch (index) {
     case P_MODEL:
-        *model = pair->value;
+        g->model = pair->value;
         break;
     case P_THRESHOLD:
-        policy->threshold = value;
+        g->policy.threshold = value;
         break;
     case P_PASSES:
-        policy->passes = (int)value;
+        g->policy.passes = (int)value;
         break;
     case P_GATE:
-        *gate = value != 0;
+        g->gate = value != 0;
         break;
     case P_TAIL:
-        policy->tail999 = value;
+        g->policy.tail999 = value;
         break;
     case P_GINI:
-        policy->gini = value;
+        g->policy.gini = value;
+        break;
+    case P_PRECISION:
+        g->precision = (int)value;
         break;
     default:
-        policy->first_spp = value;
+        g->policy.first_spp = value;
     }
     return LULL_OK;
 }
 
 /* The model's own policy where no parameter was given. */
-static void policy_merge(struct ggn_policy *policy, const struct ggn_policy *own, const int given[P_COUNT])
+static struct ggn_policy policy_merge(const struct ggn_policy *own, const struct given *g)
 {
     struct ggn_policy merged = *own;
 
-    merged.threshold = given[P_THRESHOLD] ? policy->threshold : own->threshold;
-    merged.passes = given[P_PASSES] ? policy->passes : own->passes;
-    merged.tail999 = given[P_TAIL] ? policy->tail999 : own->tail999;
-    merged.gini = given[P_GINI] ? policy->gini : own->gini;
-    merged.first_spp = given[P_FIRST_SPP] ? policy->first_spp : own->first_spp;
-    *policy = merged;
+    merged.threshold = g->is[P_THRESHOLD] ? g->policy.threshold : own->threshold;
+    merged.passes = g->is[P_PASSES] ? g->policy.passes : own->passes;
+    merged.tail999 = g->is[P_TAIL] ? g->policy.tail999 : own->tail999;
+    merged.gini = g->is[P_GINI] ? g->policy.gini : own->gini;
+    merged.first_spp = g->is[P_FIRST_SPP] ? g->policy.first_spp : own->first_spp;
+    return merged;
 }
 
 static uint32_t hash_bytes(uint32_t h, const void *data, size_t size)
@@ -124,10 +137,11 @@ static uint32_t hash_bytes(uint32_t h, const void *data, size_t size)
 
 static void destroy(struct lull_instance *in);
 
-static int32_t load_model(struct lull_instance *in, const char *path, const int given[P_COUNT], struct lull_error *err)
+static int32_t load_model(struct lull_instance *in, const struct given *given, struct lull_error *err)
 {
     struct ggn_err error = {0};
     char found[5000];
+    const char *path = given->model;
 
     if (!path) {
         if (!gp_model_find(found, sizeof found))
@@ -140,8 +154,9 @@ static int32_t load_model(struct lull_instance *in, const char *path, const int 
     in->window = in->model->hyper.window;
     if (in->window < 2 || in->window > GP_WINDOW_MAX)
         return gp_fail(err, LULL_E_IO, "model: %.200s: windows of %d images", path, in->window);
-    policy_merge(&in->policy, &own, given);
-    in->key = hash_bytes(UINT32_C(2166136261), &in->gate, sizeof in->gate);
+    in->policy = policy_merge(&own, given);
+    const int32_t choices[] = {in->gate, (int32_t)in->precision};
+    in->key = hash_bytes(UINT32_C(2166136261), choices, sizeof choices);
     for (int net = 0; net < GGN_NETS; net++)
         in->key = hash_bytes(in->key, in->model->weights[net]->params, in->model->graph[net].n_params * sizeof(float));
     const double numbers[] = {in->policy.threshold, in->policy.passes, in->policy.tail999, in->policy.gini, in->policy.first_spp};
@@ -152,9 +167,7 @@ static int32_t load_model(struct lull_instance *in, const char *path, const int 
 static int32_t create(const struct lull_host *host, const struct lull_pair *pairs, uint32_t pair_count, uint32_t pair_stride,
                       struct lull_instance **instance, struct lull_error *err)
 {
-    struct ggn_policy policy = ggn_policy_default();
-    const char *path = NULL;
-    int given[P_COUNT] = {0}, gate = 1;
+    struct given given = {.gate = 1, .precision = GGN_PRECISION_F32};
 
     if (!instance || (pair_count && !pairs))
         return gp_fail(err, LULL_E_INVALID, "create: an argument is missing");
@@ -162,7 +175,7 @@ static int32_t create(const struct lull_host *host, const struct lull_pair *pair
         return gp_fail(err, LULL_E_VERSION, "create: the host's structs are older than version 1.0");
     for (uint32_t i = 0; i < pair_count; i++) {
         const void *at = (const char *)pairs + (size_t)i * pair_stride;
-        int32_t status = set_pair(&policy, &gate, &path, given, at, err);
+        int32_t status = set_pair(&given, at, err);
         if (status)
             return status;
     }
@@ -170,9 +183,9 @@ static int32_t create(const struct lull_host *host, const struct lull_pair *pair
     if (!in)
         return gp_fail(err, LULL_E_MEMORY, "create: out of memory");
     in->host = host;
-    in->gate = gate;
-    in->policy = policy;
-    int32_t status = load_model(in, path, given, err);
+    in->gate = given.gate;
+    in->precision = (enum ggn_precision)given.precision;
+    int32_t status = load_model(in, &given, err);
     if (status) {
         destroy(in);
         return status;
@@ -221,7 +234,7 @@ static struct worker *workers_create(const struct lull_instance *in, uint32_t co
         return NULL;
     }
     for (uint32_t i = 0; i < count; i++) {
-        worker[i].judge = ggn_judge_create(in->model, NULL, &error);
+        worker[i].judge = ggn_judge_create(in->model, in->precision, NULL, &error);
         if (!worker[i].judge) {
             gp_fail_from(err, "begin_frame", &error);
             workers_release(worker, count);

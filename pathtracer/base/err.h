@@ -12,7 +12,7 @@ enum {
     PT_OK = 0,
     PT_EINVAL = -1, /* bad input or argument: exit status 2 */
     PT_ENOMEM = -2, /* out of memory: exit status 1 */
-    PT_EIO = -3     /* a file could not be read or written: exit status 2 when it is an input, 1 when an output */
+    PT_EIO = -3     /* a file could not be read or written: exit status 2 */
 };
 
 struct pt_err {

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "model/infer.h"
+#include "model/judge.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
@@ -22,18 +22,26 @@ static void mend(uint8_t *p, size_t size)
 
 static void decide(const struct ggn_model *m)
 {
-    struct ggn_infer *f = ggn_infer_create(m, GGN_PRECISION_F32, NULL, NULL);
-    void *history = calloc(1, ggn_history_bytes(&m->hyper));
-    uint8_t *rgb = calloc(3, (size_t)m->hyper.height * (size_t)m->hyper.width);
-    double p;
+    struct ggn_judge *j = ggn_judge_create(m, GGN_PRECISION_F32, NULL, NULL);
+    size_t values = 3 * (size_t)m->hyper.height * (size_t)m->hyper.width, images = (size_t)m->hyper.window;
+    uint8_t *noisy = calloc(values, 1);
+    uint16_t *denoised = calloc(values, sizeof *denoised);
+    const uint8_t **n = calloc(images, sizeof *n);
+    const uint16_t **d = calloc(images, sizeof *d);
 
-    for (int i = 0; f && history && rgb && i < m->hyper.window; i++)
-        ggn_infer_push(f, history, rgb, (uint64_t)i + 1);
-    if (f && history && rgb)
-        ggn_infer_decide(f, history, &p, NULL);
-    ggn_infer_destroy(f);
-    free(history);
-    free(rgb);
+    if (j && noisy && denoised && n && d) {
+        ggn_judge_denoise(j, noisy, denoised, m->hyper.width, m->hyper.height);
+        for (size_t i = 0; i < images; i++) {
+            n[i] = noisy;
+            d[i] = denoised;
+        }
+        ggn_judge_logit(j, n, d, m->hyper.width, m->hyper.height);
+    }
+    ggn_judge_destroy(j);
+    free(noisy);
+    free(denoised);
+    free(n);
+    free(d);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)

@@ -6,7 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "model/infer.h"
+#include "model/judge.h"
+#include "model/policy.h"
 #include "model/preprocess.h"
 #include "model/trainer.h"
 #include "nn/loss.h"
@@ -33,23 +34,24 @@ static struct ggn_model *make(void)
 /* The decision on a window whose images are the given linear blocks, cleaned by the shared function. */
 static double decide(const struct ggn_model *m, float (*block)(int image, int k), struct ggn_pixel_counts *counts)
 {
-    struct ggn_infer *f = ggn_infer_create(m, GGN_PRECISION_F32, NULL, NULL);
-    void *history = calloc(1, ggn_history_bytes(&hyper));
+    const struct ggn_policy policy = ggn_policy_default();
+    struct ggn_judge *j = ggn_judge_create(m, GGN_PRECISION_F32, NULL, NULL);
     static float linear[BYTES];
-    static uint8_t rgb[BYTES];
-    double p = NAN;
+    static uint8_t noisy[3][BYTES];
+    static uint16_t denoised[3][BYTES];
+    const uint8_t *const n[3] = {noisy[0], noisy[1], noisy[2]};
+    const uint16_t *const d[3] = {denoised[0], denoised[1], denoised[2]};
 
-    assert_true(f && history);
-    for (int i = 0; i < hyper.window; i++) {
+    assert_non_null(j);
+    for (int i = 0; i < 3; i++) {
         struct ggn_linear_view view = {linear, AREA, 1, SIDE, SIDE, SIDE, 1};
         for (int k = 0; k < BYTES; k++)
             linear[k] = block(i, k);
-        ggn_preprocess(&view, rgb, counts);
-        ggn_infer_push(f, history, rgb, (uint64_t)i + 1);
+        ggn_preprocess(&view, noisy[i], counts);
+        ggn_judge_denoise(j, noisy[i], denoised[i], SIDE, SIDE);
     }
-    assert_int_equal(ggn_infer_decide(f, history, &p, NULL), GGN_OK);
-    ggn_infer_destroy(f);
-    free(history);
+    double p = ggn_policy_p(&policy, ggn_judge_logit(j, n, d, SIDE, SIDE));
+    ggn_judge_destroy(j);
     return p;
 }
 

@@ -6,7 +6,7 @@
 #include <unistd.h>
 
 #include "model/checkpoint.h"
-#include "model/infer.h"
+#include "model/judge.h"
 #include "support/fail_alloc.h"
 
 static const struct ggn_hyper hyper = {GGN_PRESET_LULL, 16, 16, 2, 1, 1, 1};
@@ -37,13 +37,13 @@ static int save_and_load(struct ggn_err *err)
     return rc;
 }
 
-static int infer(struct ggn_err *err)
+static int judge(struct ggn_err *err)
 {
     struct ggn_model *m = ggn_model_create(&hyper, err);
-    struct ggn_infer *f = m ? ggn_infer_create(m, GGN_PRECISION_F32, NULL, err) : NULL;
-    int rc = f ? GGN_OK : GGN_ENOMEM;
+    struct ggn_judge *j = m ? ggn_judge_create(m, GGN_PRECISION_F32, NULL, err) : NULL;
+    int rc = j ? GGN_OK : GGN_ENOMEM;
 
-    ggn_infer_destroy(f);
+    ggn_judge_destroy(j);
     ggn_model_destroy(m);
     return rc;
 }
@@ -89,10 +89,10 @@ static void test_files(void **state)
     fail_each(save_and_load, 30);
 }
 
-static void test_infer(void **state)
+static void test_judge(void **state)
 {
     (void)state;
-    fail_each(infer, 10);
+    fail_each(judge, 10);
 }
 
 static void test_train(void **state)
@@ -103,7 +103,7 @@ static void test_train(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_files), cmocka_unit_test(test_infer),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_files), cmocka_unit_test(test_judge),
                                        cmocka_unit_test(test_train)};
     return cmocka_run_group_tests(tests, setup, teardown);
 }

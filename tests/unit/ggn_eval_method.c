@@ -214,7 +214,7 @@ static void network(void **state)
     policy.threshold = 0.5;
     policy.passes = 2;
     policy.gate_noise = policy.tail999 = policy.gini = 0;
-    if (ggn_policy_set(model, &policy, &err) != GGN_OK || ggn_eval_network(&m, &set, model, "empty", threads, &err) != GGN_OK)
+    if (ggn_policy_set(model, &policy, &err) != GGN_OK || ggn_eval_network(&m, &set, model, "empty", GGN_PRECISION_F32, threads, &err) != GGN_OK)
         fail_msg("%s", err.text);
     for (size_t i = 0; i < set.n; i++)
         assert_near(m.score[i], 1.0 / (1.0 + exp(1.0)), 1e-6);
@@ -222,7 +222,7 @@ static void network(void **state)
     ggn_method_release(&m);
     policy.ratio = 4; /* 20, 80, 320, 1280 */
     ggn_policy_set(model, &policy, &err);
-    assert_int_equal(ggn_eval_network(&m, &set, model, "empty", threads, &err), GGN_OK);
+    assert_int_equal(ggn_eval_network(&m, &set, model, "empty", GGN_PRECISION_F32, threads, &err), GGN_OK);
     const struct ggn_eval_block *b = &set.blocks[0];
     for (size_t i = b->first; i < b->end; i++)
         assert_int_equal(isnan(m.score[i]), !(set.spp[i] == 80 || set.spp[i] == 320 || set.spp[i] == 1280));
@@ -232,7 +232,7 @@ static void network(void **state)
     policy.passes = 1;
     policy.gate_noise = 0.04; /* grey noise of sigma 0.74/sqrt(n) in block 3 of the first scene, 0.22/sqrt(n) in block 0 */
     ggn_policy_set(model, &policy, &err);
-    assert_int_equal(ggn_eval_network(&m, &set, model, "empty", threads, &err), GGN_OK);
+    assert_int_equal(ggn_eval_network(&m, &set, model, "empty", GGN_PRECISION_F32, threads, &err), GGN_OK);
     assert_true(m.stop[0] < m.stop[3] && m.stop[3] > 80);
     assert_near(m.score[set.blocks[3].first], 1.0 / (1.0 + exp(1.0)), 1e-6); /* asked all the same */
     ggn_method_release(&m);

@@ -61,8 +61,14 @@ static void tiles_cover_and_reflect(void **state)
     for (int i = 0; i < 120; i++)
         tile[i] = i % 8 == 0 ? (float)NAN : (float)i / 119;
     ggn_tile_store_u16(back, 3, 2, 0, 0, 8, 5, tile, 8, 40);
-    assert_int_equal(back[0], 0);
+    assert_int_equal(back[0], GGN_FIXED_NAN);
+    assert_false(ggn_fixed_is_finite(back, 18));
     assert_int_equal(back[4], (int)(9.0 / 119 * 65535 + 0.5));
+    for (int i = 0; i < 120; i++)
+        tile[i] = 1;
+    ggn_tile_store_u16(back, 3, 2, 0, 0, 8, 5, tile, 8, 40);
+    assert_int_equal(back[0], GGN_FIXED_NAN - 1);
+    assert_true(ggn_fixed_is_finite(back, 18));
     (void)state;
 }
 

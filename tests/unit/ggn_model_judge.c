@@ -1,4 +1,4 @@
-/* Preprocessing, histories and decisions. */
+/* Preprocessing and the judge. */
 #include "support/ggn_cmocka.h"
 
 #include <fenv.h>
@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "model/infer.h"
+#include "model/judge.h"
 #include "model/preprocess.h"
 #include "nn/exec.h"
 
@@ -31,74 +31,60 @@ static void image(uint8_t *rgb, uint32_t seed)
         rgb[k] = (uint8_t)(ggn_hash(k, seed) >> 24);
 }
 
-static double decide(struct ggn_infer *f, void *history, uint32_t first, int images)
+/* The logit of the window of images `first` and the next two. */
+static double window_logit(struct ggn_judge *j, uint32_t first)
 {
-    static uint8_t rgb[BYTES];
-    double p = NAN, logit = NAN;
+    static uint8_t noisy[3][BYTES];
+    static uint16_t denoised[3][BYTES];
+    const uint8_t *const n[3] = {noisy[0], noisy[1], noisy[2]};
+    const uint16_t *const d[3] = {denoised[0], denoised[1], denoised[2]};
 
-    for (int i = 0; i < images; i++) {
-        image(rgb, first + (uint32_t)i);
-        ggn_infer_push(f, history, rgb, 10 * (first + (uint32_t)i));
+    for (uint32_t i = 0; i < 3; i++) {
+        image(noisy[i], first + i);
+        ggn_judge_denoise(j, noisy[i], denoised[i], 33, 24);
     }
-    assert_int_equal(ggn_infer_decide(f, history, &p, &logit), GGN_OK);
-    assert_true(p > 0 && p < 1 && isfinite(logit));
+    double logit = ggn_judge_logit(j, n, d, 33, 24);
+    assert_true(isfinite(logit));
     return logit;
 }
 
-/* A window that slid into place and the same window in a fresh history; asking twice; two workers. */
-static void test_history(void **state)
+/* The answer depends on the window alone: not on the judge, nor on what it judged before. */
+static void test_no_memory(void **state)
 {
     struct ggn_model *m = make();
-    struct ggn_infer *f = ggn_infer_create(m, GGN_PRECISION_F32, NULL, NULL),
-                     *g = ggn_infer_create(m, GGN_PRECISION_F32, NULL, NULL);
-    void *a = calloc(1, ggn_history_bytes(&hyper)), *b = calloc(1, ggn_history_bytes(&hyper));
-    double p, logit;
+    struct ggn_judge *a = ggn_judge_create(m, GGN_PRECISION_F32, NULL, NULL), *b = ggn_judge_create(m, GGN_PRECISION_F32, NULL, NULL);
 
-    assert_true(f && g && a && b);
-    ggn_history_clear(a);
-    ggn_history_clear(b);
-    assert_int_equal(ggn_infer_decide(f, a, &p, &logit), GGN_EINVAL);
-    double slid = decide(f, a, 1, 7);
-    assert_int_equal(ggn_history_count(a), 3);
-    assert_int_equal(ggn_history_spp(a, &hyper, 0), 50);
-    assert_int_equal(ggn_history_spp(a, &hyper, 2), 70);
-    double fresh = decide(g, b, 5, 3);
-    assert_memory_equal(&slid, &fresh, sizeof slid);
-    double again = decide(f, a, 7, 1); /* same spp: nothing added */
-    assert_memory_equal(&slid, &again, sizeof slid);
-    assert_true(decide(f, a, 8, 1) != slid);
-    assert_true(ggn_history_valid(a, ggn_history_bytes(&hyper), &hyper));
-    assert_false(ggn_history_valid(a, ggn_history_bytes(&hyper) - 1, &hyper));
-    ((uint32_t *)a)[1] = 77;
-    assert_false(ggn_history_valid(a, ggn_history_bytes(&hyper), &hyper));
-    ggn_infer_destroy(f);
-    ggn_infer_destroy(g);
-    free(a);
-    free(b);
+    assert_true(a && b);
+    double before = window_logit(a, 1), used = window_logit(a, 5), fresh = window_logit(b, 5);
+    assert_true(before != used);
+    assert_memory_equal(&used, &fresh, sizeof used);
+    ggn_judge_destroy(a);
+    ggn_judge_destroy(b);
     ggn_model_destroy(m);
     (void)state;
 }
 
-/* The decision is the three networks run plainly, but for the 16-bit storage of denoised images. */
+/* The judge is the three networks run plainly, but for the 16-bit storage of denoised images. */
 static void test_against_networks(void **state)
 {
     struct ggn_model *m = make();
-    struct ggn_infer *f = ggn_infer_create(m, GGN_PRECISION_F32, NULL, NULL);
-    void *history = calloc(1, ggn_history_bytes(&hyper));
+    struct ggn_judge *j = ggn_judge_create(m, GGN_PRECISION_F32, NULL, NULL);
+    struct ggn_exec_f32 *den = ggn_exec_create_f32(&m->graph[GGN_NET_R], NULL, 1, GGN_EXEC_NO_FUSE, NULL, NULL);
     struct ggn_exec_f32 *gen = ggn_exec_create_f32(&m->graph[GGN_NET_M], NULL, 2, GGN_EXEC_NO_FUSE, NULL, NULL);
     struct ggn_exec_f32 *dis = ggn_exec_create_f32(&m->graph[GGN_NET_D], NULL, 1, GGN_EXEC_NO_FUSE, NULL, NULL);
-    float *denoised = malloc(BYTES * sizeof *denoised);
     uint8_t *rgb = malloc(BYTES);
-    const int out = m->graph[GGN_NET_M].n_values - 1;
+    const int denoised = m->graph[GGN_NET_R].n_values - 1, out = m->graph[GGN_NET_M].n_values - 1;
 
-    assert_true(f && history && gen && dis && denoised && rgb);
-    double got = decide(f, history, 1, 3);
+    assert_true(j && den && gen && dis && rgb);
+    double got = window_logit(j, 1);
     for (int i = 0; i < 3; i++) {
         image(rgb, 1 + (uint32_t)i);
-        ggn_infer_denoise(f, rgb, denoised);
+        for (int k = 0; k < BYTES; k++)
+            ggn_exec_plane_f32(den, 0, 0, k / AREA)[k % AREA / 33 * 34 + k % AREA % 33] = (float)rgb[k] / 255;
+        ggn_exec_forward_f32(den, m->weights[GGN_NET_R], 1, GGN_EVAL);
         for (int k = 0; k < BYTES; k++) {
             int c = 3 * i + k / AREA, at = k % AREA / 33 * 34 + k % AREA % 33;
-            ggn_exec_plane_f32(gen, 0, 0, c)[at] = denoised[k];
+            ggn_exec_plane_f32(gen, 0, 0, c)[at] = ggn_exec_plane_f32(den, denoised, 0, k / AREA)[at];
             ggn_exec_plane_f32(gen, 0, 1, c)[at] = (float)rgb[k] / 255;
         }
     }
@@ -110,13 +96,12 @@ static void test_against_networks(void **state)
     ggn_exec_forward_f32(dis, m->weights[GGN_NET_D], 1, GGN_EVAL);
     double want = (double)*ggn_exec_plane_f32(dis, m->graph[GGN_NET_D].n_values - 1, 0, 0);
     if (!(fabs(got - want) < 1e-4 * fmax(1, fabs(want))))
-        fail_msg("decision %.9g, networks %.9g", got, want);
+        fail_msg("judge %.9g, networks %.9g", got, want);
+    ggn_exec_destroy_f32(den);
     ggn_exec_destroy_f32(gen);
     ggn_exec_destroy_f32(dis);
-    ggn_infer_destroy(f);
+    ggn_judge_destroy(j);
     ggn_model_destroy(m);
-    free(history);
-    free(denoised);
     free(rgb);
     (void)state;
 }
@@ -125,23 +110,15 @@ static void test_against_networks(void **state)
 static void test_bf16(void **state)
 {
     struct ggn_model *m = make();
-    struct ggn_infer *f = ggn_infer_create(m, GGN_PRECISION_F32, NULL, NULL),
-                     *b = ggn_infer_create(m, GGN_PRECISION_BF16, NULL, NULL);
-    void *history = calloc(1, ggn_history_bytes(&hyper));
-    double exact, rounded, again;
+    struct ggn_judge *f = ggn_judge_create(m, GGN_PRECISION_F32, NULL, NULL), *b = ggn_judge_create(m, GGN_PRECISION_BF16, NULL, NULL);
 
-    assert_true(f && b && history);
-    exact = decide(f, history, 1, 3);
-    ggn_history_clear(history);
-    rounded = decide(b, history, 1, 3);
-    ggn_history_clear(history);
-    again = decide(b, history, 1, 3);
+    assert_true(f && b);
+    double exact = window_logit(f, 1), rounded = window_logit(b, 1), again = window_logit(b, 1);
     assert_memory_equal(&rounded, &again, sizeof again);
     assert_true(fabs(rounded - exact) < 0.1);
-    assert_int_equal(rounded != exact, ggn_infer_has_bf16());
-    ggn_infer_destroy(f);
-    ggn_infer_destroy(b);
-    free(history);
+    assert_int_equal(rounded != exact, ggn_precision_has_bf16());
+    ggn_judge_destroy(f);
+    ggn_judge_destroy(b);
     ggn_model_destroy(m);
     (void)state;
 }
@@ -152,9 +129,8 @@ static void test_memory_bounds(void **state)
     struct ggn_model *m = ggn_model_create(&full, NULL);
 
     assert_non_null(m);
-    assert_true(ggn_history_bytes(&full) <= (size_t)3 << 20);
-    assert_true(ggn_infer_bytes(m, GGN_PRECISION_F32, 1) <= 64000000);
-    assert_true(ggn_infer_bytes(m, GGN_PRECISION_BF16, 1) <= 64000000);
+    assert_true(ggn_judge_bytes(m, GGN_PRECISION_F32, 1) <= 64000000);
+    assert_true(ggn_judge_bytes(m, GGN_PRECISION_BF16, 1) <= 64000000);
     ggn_model_destroy(m);
     (void)state;
 }
@@ -205,7 +181,7 @@ static void test_cleaning(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_history),       cmocka_unit_test(test_against_networks),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_no_memory),     cmocka_unit_test(test_against_networks),
                                        cmocka_unit_test(test_memory_bounds), cmocka_unit_test(test_bf16),
                                        cmocka_unit_test(test_srgb),          cmocka_unit_test(test_cleaning)};
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,0 +1,44 @@
+#!/bin/sh
+# A disk that fills up while a file is written: one line, exit status 2, nothing half-written, what was there unchanged. A limit on
+# the size of files stands in for the full disk: the same failed write, without the privilege to mount one.
+set -u
+cd "$(dirname "$0")/../.." || exit 2
+build=${BUILD:-build}
+ggn=$build/bin/ggn pathtracer=$build/bin/pathtracer
+n=0 failed=0
+tmp=$(mktemp -d) || exit 2
+trap 'rm -rf "$tmp"' EXIT
+data=$tmp/data
+cp -r tests/data/train-demo "$data"
+mkdir "$tmp/out" "$tmp/sequence"
+
+sums() { find "$data" -type f -exec cksum {} + | sort; }
+full() { # full NAME BLOCKS TARGET COMMAND…: fails when no file may exceed so many blocks of 512 bytes, and leaves no TARGET
+    name=$1 blocks=$2 target=$3
+    shift 3
+    before=$(sums)
+    # through a pipe: the limit would hold for a log file too
+    message=$( (trap '' XFSZ && ulimit -f "$blocks" && { "$@" 2>&1 >/dev/null; echo "exit $?"; }) | cat)
+    n=$((n + 1))
+    if [ "$(echo "$message" | tail -n 1)" = "exit 2" ] && [ "$(echo "$message" | wc -l)" -eq 2 ] && echo "$message" | grep -qi 'writ\|large' &&
+        [ ! -e "$target" ] && [ -z "$(find "$tmp" -name '*.tmp*')" ] && [ "$before" = "$(sums)" ]; then
+        echo "ok $n - $name"
+    else
+        echo "not ok $n - $name"
+        echo "$message" | sed 's/^/# /'
+        find "$tmp" -name '*.tmp*' | sed 's/^/# left: /'
+        failed=1
+    fi
+}
+
+full "label" 0 "$data/none" "$ggn" label "$data"
+full "train" 1 "$tmp/out/model.ggn" "$ggn" train --data "$data" --kr 3 --km 3 --kd 4 --crop 32 --ratio 0 --batch 8 --steps-denoiser 4 \
+    --steps 4 --epoch-steps 2 --out "$tmp/out/model.ggn" -q
+full "flip" 0 "$tmp/out/map.png" "$ggn" flip scenes/textures/bricks.png scenes/textures/bricks.png -o "$tmp/out/map.png"
+full "evaluate" 1 "$tmp/out/figures.json" "$ggn" evaluate --data "$data" --no-quality -o "$tmp/out"
+full "pathtracer: an image" 8 "$tmp/out/room.exr" "$pathtracer" -q tests/cli/room.pbrt --size 64x64 --spp 4 --criterion null \
+    -o "$tmp/out/room.exr"
+full "pathtracer: a sequence" 8 "$tmp/sequence/block-00000.lseq" "$pathtracer" -q tests/cli/room.pbrt --size 64x64 --block 64 \
+    --levels linear:4:8:4 --reference-spp 8 --sequence "$tmp/sequence"
+echo "1..$n"
+exit $failed
