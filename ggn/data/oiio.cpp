@@ -14,6 +14,7 @@ extern "C" {
 #include <string>
 #include <vector>
 
+#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
 namespace {
@@ -198,31 +199,28 @@ extern "C" int ggn_imagef_read_channel(const char *path, const char *channel, st
     return guarded(path, err, [&] { return read_channel(path, channel, image, err); });
 }
 
+/* Encoded in memory and then written by us: OpenImageIO's PNG writer does not notice a disk that is full. */
 extern "C" int ggn_image8_write_png(const char *path, const uint8_t *data, int width, int height, struct ggn_err *err)
 {
-    char tmp[4128];
-    int rc = ggn_fio_tmp_name(path, tmp, sizeof tmp, err);
-    if (rc != GGN_OK)
-        return rc;
     size_t length = strlen(path);
     if (length < 4 || strcmp(path + length - 4, ".png") != 0)
         return ggn_fail(err, GGN_EINVAL, "%s: a picture's name must end in .png", path);
-    bool ok = false;
-    std::string why;
-    try {
+    return guarded(path, err, [&] {
+        std::vector<unsigned char> bytes;
+        OIIO::Filesystem::IOVecOutput memory(bytes);
         std::unique_ptr<OIIO::ImageOutput> out = OIIO::ImageOutput::create("png");
-        if (out) {
-            ImageSpec spec(width, height, 3, TypeDesc::UINT8);
-            ok = out->open(tmp, spec) && out->write_image(TypeDesc::UINT8, data);
-            ok = out->close() && ok;
-            why = out->geterror();
+        bool ok = out && out->set_ioproxy(&memory) && out->open(path, ImageSpec(width, height, 3, TypeDesc::UINT8)) &&
+                  out->write_image(TypeDesc::UINT8, data);
+        ok = out && out->close() && ok;
+        if (!ok) {
+            std::string why = out ? out->geterror() : "OpenImageIO was built without PNG";
+            return ggn_fail(err, GGN_EIO, "%s: %s", path, why.substr(0, why.find('\n')).c_str());
         }
-    } catch (...) {
-        ok = false;
-    }
-    if (!ok) {
-        remove(tmp);
-        return ggn_fail(err, GGN_EIO, "%s: cannot be written%s%s", path, why.empty() ? "" : ": ", why.substr(0, why.find('\n')).c_str());
-    }
-    return ggn_fio_rename(tmp, path, err);
+        struct ggn_fio_out file;
+        int rc = ggn_fio_begin(&file, path, err);
+        if (rc != GGN_OK)
+            return rc;
+        fwrite(bytes.data(), 1, bytes.size(), file.file);
+        return ggn_fio_commit(&file, err);
+    });
 }

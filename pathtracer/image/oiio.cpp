@@ -13,7 +13,6 @@
 #include <string>
 
 #include <strings.h>
-#include <unistd.h>
 #include <zlib.h>
 
 extern "C" {
@@ -172,17 +171,16 @@ extern "C" void pt_oiio_release(struct pt_oiio_image *image)
     *image = pt_oiio_image{};
 }
 
+/* Encoded in memory and then written by us: OpenImageIO's PNG writer does not notice a disk that is full. */
 extern "C" int pt_oiio_write_png(const char *path, int32_t width, int32_t height, int32_t channels, const uint8_t *pixels,
                                  struct pt_err *err)
 {
-    char tmp_path[4128];
     if (width < 1 || height < 1 || channels < 1 || channels > 4)
         return pt_fail(err, PT_EINVAL, "%s: cannot write %dx%d pixels of %d channels as PNG", path, width, height, channels);
-    int rc = pt_fio_tmp_name(path, tmp_path, sizeof tmp_path, err);
-    if (rc != PT_OK)
-        return rc;
     try {
         configure_once();
+        std::vector<unsigned char> bytes;
+        OIIO::Filesystem::IOVecOutput memory(bytes);
         std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create("png");
         if (!output)
             return pt_fail(err, PT_EIO, "%s: OpenImageIO was built without PNG", path);
@@ -190,17 +188,16 @@ extern "C" int pt_oiio_write_png(const char *path, int32_t width, int32_t height
         spec.attribute("oiio:ColorSpace", "sRGB");
         if (channels == 4)
             spec.attribute("oiio:UnassociatedAlpha", 1);
-        if (!output->open(tmp_path, spec))
+        if (!output->set_ioproxy(&memory) || !output->open(path, spec) || !output->write_image(OIIO::TypeDesc::UINT8, pixels) ||
+            !output->close())
             return pt_fail(err, PT_EIO, "%s: %s", path, one_line(output->geterror()).c_str());
-        const bool written = output->write_image(OIIO::TypeDesc::UINT8, pixels) && output->close();
-        if (!written) {
-            rc = pt_fail(err, PT_EIO, "%s: %s", path, one_line(output->geterror()).c_str());
-            unlink(tmp_path);
+        struct pt_fio_out file;
+        int rc = pt_fio_begin(&file, path, err);
+        if (rc != PT_OK)
             return rc;
-        }
+        fwrite(bytes.data(), 1, bytes.size(), file.file);
+        return pt_fio_commit(&file, err);
     } catch (const std::exception &e) {
-        unlink(tmp_path);
         return pt_fail(err, PT_EIO, "%s: %s", path, one_line(e.what()).c_str());
     }
-    return pt_fio_rename(tmp_path, path, err);
 }

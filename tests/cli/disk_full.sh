@@ -38,6 +38,8 @@ full "flip" 0 "$tmp/out/map.png" "$ggn" flip scenes/textures/bricks.png scenes/t
 full "evaluate" 1 "$tmp/out/figures.json" "$ggn" evaluate --data "$data" --no-quality -o "$tmp/out"
 full "pathtracer: an image" 8 "$tmp/out/room.exr" "$pathtracer" -q tests/cli/room.pbrt --size 64x64 --spp 4 --criterion null \
     -o "$tmp/out/room.exr"
+full "pathtracer: a preview" 0 "$tmp/out/room.png" "$pathtracer" -q tests/cli/room.pbrt --size 64x64 --spp 4 --criterion null \
+    --preview "$tmp/out/room.png"
 full "pathtracer: a sequence" 8 "$tmp/sequence/block-00000.lseq" "$pathtracer" -q tests/cli/room.pbrt --size 64x64 --block 64 \
     --levels linear:4:8:4 --reference-spp 8 --sequence "$tmp/sequence"
 echo "1..$n"
