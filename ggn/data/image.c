@@ -26,15 +26,6 @@ double ggn_srgb_eotf(double encoded)
     return encoded <= 0.04045 ? encoded / 12.92 : pow((encoded + 0.055) / 1.055, 2.4);
 }
 
-uint8_t ggn_srgb_code(double linear)
-{
-    if (!(linear > 0.0))
-        return 0;
-    if (linear >= 1.0)
-        return 255;
-    return (uint8_t)floor(255.0 * ggn_srgb_oetf(linear) + 0.5);
-}
-
 static float decode_table[256];
 
 static void fill_table(void)

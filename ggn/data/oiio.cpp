@@ -4,6 +4,7 @@ extern "C" {
 }
 
 #include "data/image.h"
+#include "model/preprocess.h"
 
 #include <algorithm>
 #include <cstdio>
@@ -179,7 +180,7 @@ extern "C" int ggn_image8_read(const char *path, struct ggn_image8 *image, struc
         rc = read_float(path, &linear, err);
         if (rc == GGN_OK) {
             for (size_t i = 0, n = (size_t)out.width * (size_t)out.height * 3; i < n; i++)
-                out.data[i] = ggn_srgb_code(linear.data[i]);
+                out.data[i] = ggn_preprocess(linear.data[i], nullptr, nullptr);
             ggn_imagef_release(&linear);
             *image = out;
         } else {

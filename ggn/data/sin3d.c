@@ -12,6 +12,7 @@
 #include "data/labels.h"
 #include "data/manifest.h"
 #include "data/rawls.h"
+#include "model/preprocess.h"
 
 struct level {
     uint32_t spp;
@@ -147,7 +148,7 @@ static int read_picture(const struct view *v, const struct level *level, struct 
         return ggn_fail_nomem(err, path);
     }
     for (size_t i = 0; i < n; i++)
-        p->display.data[i] = ggn_srgb_code((double)p->linear.data[i]);
+        p->display.data[i] = ggn_preprocess((double)p->linear.data[i], NULL, NULL);
     return GGN_OK;
 }
 

@@ -45,33 +45,30 @@ static uint32_t clean(uint32_t bits, struct ggn_pixel_counts *counts)
     return bits == magnitude && magnitude >= 0x00800000u ? 0x3f800000u : 0;
 }
 
-void ggn_preprocess(const struct ggn_linear_view *view, uint8_t *out, struct ggn_pixel_counts *counts)
+static unsigned code_by_formula(double value, const struct ggn_display *display)
 {
-    struct ggn_pixel_counts local = {0};
+    double encoded = display->transfer == GGN_TRANSFER_GAMMA ? pow(value, 1 / display->gamma) : value;
 
-    for (int c = 0; c < 3; c++)
-        for (int y = 0; y < view->h; y++) {
-            const float *p = view->data + c * view->channel + y * view->row;
-            for (int x = 0; x < view->w; x++, p += view->pixel) {
-                uint32_t bits;
-                memcpy(&bits, p, sizeof bits);
-                bits = clean(bits, &local);
-                if (bits && view->exposure != 1) {
-                    float value;
-                    memcpy(&value, &bits, sizeof value);
-                    value *= view->exposure;
-                    memcpy(&bits, &value, sizeof bits);
-                }
-                *out++ = (uint8_t)code_of(bits);
-            }
-        }
-    if (counts) {
-        counts->nan += local.nan;
-        counts->infinite += local.infinite;
-        counts->negative += local.negative;
-        counts->huge += local.huge;
-        counts->denormal += local.denormal;
-    }
+    return (unsigned)(255 * (encoded < 1 ? encoded : 1) + 0.5);
+}
+
+uint8_t ggn_preprocess(double linear, const struct ggn_display *display, struct ggn_pixel_counts *counts)
+{
+    struct ggn_pixel_counts uncounted = {0};
+    float value = (float)linear;
+    uint32_t bits;
+
+    memcpy(&bits, &value, sizeof bits);
+    bits = clean(bits, counts ? counts : &uncounted);
+    if (!display || !bits)
+        return (uint8_t)code_of(bits);
+    memcpy(&value, &bits, sizeof value);
+    double exposed = (double)value * display->exposure;
+    if (display->transfer != GGN_TRANSFER_SRGB)
+        return (uint8_t)code_by_formula(exposed, display);
+    value = (float)exposed;
+    memcpy(&bits, &value, sizeof bits);
+    return (uint8_t)code_of(bits);
 }
 
 long ggn_pixel_counts_bad(const struct ggn_pixel_counts *counts)

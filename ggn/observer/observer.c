@@ -9,6 +9,7 @@
 
 #include "base/fio.h"
 #include "data/image.h"
+#include "model/preprocess.h"
 #include "observer/flip.h"
 
 const struct ggn_observer ggn_observer_default = {
@@ -235,7 +236,7 @@ static void encode(const float *linear, size_t pixels, uint8_t *rgb)
 {
     for (size_t i = 0; i < pixels; i++)
         for (size_t c = 0; c < 3; c++)
-            rgb[3 * i + c] = ggn_srgb_code((double)linear[c * pixels + i]);
+            rgb[3 * i + c] = ggn_preprocess((double)linear[c * pixels + i], NULL, NULL);
 }
 
 /* Sample counts above `beyond` that halves stand for. spp may be NULL; returns their number. */

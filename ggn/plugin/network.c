@@ -12,14 +12,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "model/judge.h"
-#include "model/policy.h"
-#include "model/window.h"
 #include "plugin/criteria.h"
-#include "plugin/history.h"
 #include "plugin/model_path.h"
+#include "plugin/network.h"
 #include "plugin/text.h"
-#include "plugin/view.h"
 
 enum { P_MODEL, P_THRESHOLD, P_PASSES, P_GATE, P_TAIL, P_GINI, P_FIRST_SPP, P_PRECISION, P_COUNT };
 
@@ -42,27 +38,6 @@ static const struct lull_param params[P_COUNT] = {
                      .help = "samples per pixel of the first image of a window; without it the model's own"},
     [P_PRECISION] = {.name = "precision", .type = LULL_PARAM_CHOICE, .choices = "f32|bf16", .default_value = "f32",
                      .help = "of the products in the networks; bf16 is f32 on processors without the instructions"},
-};
-
-struct worker {
-    struct ggn_judge *judge;
-    struct ggn_tail tail;
-};
-
-struct lull_instance {
-    const struct lull_host *host; /* borrows until destroy */
-    struct ggn_model *model;
-    struct ggn_policy policy; /* the model's, with the parameters over it */
-    int gate, window;
-    enum ggn_precision precision;
-    uint32_t key; /* of saved state: a hash of model and policy */
-    int open;
-    struct gp_display display;
-    double luminance[3];
-    uint64_t spp_max;
-    struct gp_history history; /* of the open frame */
-    uint32_t workers;
-    struct worker *worker;
 };
 
 /* --- instance ---------------------------------------------------------------------------------------------------------- */
@@ -216,7 +191,7 @@ static int32_t requirements(const struct lull_instance *in, struct lull_requirem
     return LULL_OK;
 }
 
-static void workers_release(struct worker *worker, uint32_t count)
+static void workers_release(struct gp_worker *worker, uint32_t count)
 {
     for (uint32_t i = 0; worker && i < count; i++)
         ggn_judge_destroy(worker[i].judge);
@@ -224,10 +199,10 @@ static void workers_release(struct worker *worker, uint32_t count)
 }
 
 /* Scratch for as many workers as can be busy. */
-static struct worker *workers_create(const struct lull_instance *in, uint32_t count, struct lull_error *err)
+static struct gp_worker *workers_create(const struct lull_instance *in, uint32_t count, struct lull_error *err)
 {
     struct ggn_err error = {0};
-    struct worker *worker = calloc(count, sizeof *worker);
+    struct gp_worker *worker = calloc(count, sizeof *worker);
 
     if (!worker) {
         gp_fail(err, LULL_E_MEMORY, "begin_frame: out of memory");
@@ -256,7 +231,7 @@ static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *fr
     if (in->open && !(frame->flags & LULL_FRAME_RESTART))
         return gp_fail(err, LULL_E_STATE, "begin_frame: a frame is open");
     uint32_t count = in->host && in->host->parallel_for && in->host->max_workers > 1 ? in->host->max_workers : 1;
-    struct worker *worker = in->worker ? NULL : workers_create(in, count, err);
+    struct gp_worker *worker = in->worker ? NULL : workers_create(in, count, err);
     if (!worker && !in->worker)
         return err && LULL_HAS(struct lull_error, err, message) ? err->code : LULL_E_MEMORY;
     status = gp_history_create(&history, in->window, frame, err);
@@ -298,9 +273,7 @@ static void destroy(struct lull_instance *in)
     free(in);
 }
 
-/* --- one block --------------------------------------------------------------------------------------------------------- */
-
-enum { SPAN = 128 };
+/* --- evaluate ---------------------------------------------------------------------------------------------------------- */
 
 struct batch {
     struct lull_instance *in;
@@ -316,191 +289,12 @@ static const struct lull_block *batch_block(const struct batch *b, uint64_t i)
     return at;
 }
 
-/* Display codes of the block. A pixel without a usable value takes its left neighbour's, so that it adds no contrast of its
- * own; returns whether there was one. */
-static int read_display(const struct lull_instance *in, const struct lull_view *view, const struct lull_block *b, uint8_t *out)
-{
-    const struct lull_plane *color = gp_view_plane(view, LULL_PLANE_COLOR);
-    const size_t w = (size_t)(b->x1 - b->x0), plane = w * (size_t)(b->y1 - b->y0);
-    uint8_t before[3] = {0, 0, 0};
-    int bad = 0;
-
-    for (int32_t y = b->y0; y < b->y1; y++)
-        for (int32_t x = b->x0; x < b->x1;) {
-            int32_t n = b->x1 - x < SPAN ? b->x1 - x : SPAN;
-            double rgb[SPAN][3];
-            gp_view_span(view, color, b, x, y, n, 3, rgb[0]);
-            for (int32_t i = 0; i < n; i++) {
-                size_t at = (size_t)(y - b->y0) * w + (size_t)(x + i - b->x0);
-                int usable = isfinite(rgb[i][0]) && isfinite(rgb[i][1]) && isfinite(rgb[i][2]);
-                for (int c = 0; c < 3; c++) {
-                    if (usable)
-                        before[c] = (uint8_t)(255 * gp_display_encode(&in->display, rgb[i][c]) + 0.5);
-                    out[(size_t)c * plane + at] = before[c];
-                }
-                bad |= !usable;
-            }
-            x += n;
-        }
-    return bad;
-}
-
-static double luminance_of(const struct lull_instance *in, const double rgb[3])
-{
-    return in->luminance[0] * rgb[0] + in->luminance[1] * rgb[1] + in->luminance[2] * rgb[2];
-}
-
-/* Whether the noise sits in too few pixels for a judgement. D = (A − I)·√(h/(n − h)): noise of the variance of the mean. */
-static int tail_holds(const struct lull_instance *in, const struct lull_view *view, const struct lull_block *b, struct ggn_tail *tail)
-{
-    const struct lull_plane *color = gp_view_plane(view, LULL_PLANE_COLOR), *half = gp_view_plane(view, LULL_PLANE_HALF);
-    const double n = (double)b->spp, h = (double)b->half_spp;
-
-    if ((in->policy.tail999 <= 0 && in->policy.gini <= 0) || !half || h <= 0 || h >= n)
-        return 0;
-    const double split = sqrt(h / (n - h));
-    ggn_tail_clear(tail);
-    for (int32_t y = b->y0; y < b->y1; y++)
-        for (int32_t x = b->x0; x < b->x1;) {
-            int32_t count = b->x1 - x < SPAN ? b->x1 - x : SPAN;
-            double mean[SPAN][3], a[SPAN][3];
-            gp_view_span(view, color, b, x, y, count, 3, mean[0]);
-            gp_view_span(view, half, b, x, y, count, 3, a[0]);
-            for (int32_t i = 0; i < count; i++) {
-                double luminance = luminance_of(in, mean[i]), d = split * (luminance_of(in, a[i]) - luminance);
-                if (isfinite(luminance) && isfinite(d))
-                    ggn_tail_add(tail, luminance, d);
-            }
-            x += count;
-        }
-    return (in->policy.tail999 > 0 && ggn_tail_999(tail) > in->policy.tail999) ||
-           (in->policy.gini > 0 && ggn_tail_gini(tail) > in->policy.gini);
-}
-
-/* Logit of the newest window; denoises the images that have not been denoised yet. */
-static double window_logit(const struct lull_instance *in, const struct lull_block *b, struct gp_head *head, struct ggn_judge *judge)
-{
-    const uint8_t *noisy[GP_WINDOW_MAX];
-    const uint16_t *denoised[GP_WINDOW_MAX];
-    int w = b->x1 - b->x0, h = b->y1 - b->y0;
-
-    for (int i = 0; i < in->window; i++) {
-        uint32_t slot = head->order[(int)head->used - in->window + i];
-        noisy[i] = gp_history_noisy(&in->history, b->id, slot);
-        denoised[i] = gp_history_denoised(&in->history, b->id, slot);
-        if (!(head->denoised >> slot & 1))
-            ggn_judge_denoise(judge, noisy[i], gp_history_denoised(&in->history, b->id, slot), w, h);
-        head->denoised |= UINT32_C(1) << slot;
-    }
-    return ggn_judge_logit(judge, noisy, denoised, w, h);
-}
-
-static uint64_t to_spp(double spp)
-{
-    return spp >= 1e18 ? UINT64_C(1000000000000000000) : (uint64_t)spp;
-}
-
-/* CONTINUE, at the next level or, while the gate says that the block is plainly noisy, at the first level of the window that
- * will end where it expects to open: half of that, because the estimate is noisy itself, and at most fourfold. */
-static void schedule(const struct lull_instance *in, const struct lull_block *b, struct gp_head *head, double gate_opens)
-{
-    double spp = (double)b->spp, next = ggn_policy_next(&in->policy, spp);
-
-    if (gate_opens > 0 && in->policy.ratio > 1.001) {
-        double jump = fmin(0.5 * gate_opens / pow(in->policy.ratio, in->window - 1), 4 * spp);
-        head->jumped = jump > 1.5 * next;
-        next = head->jumped ? jump : next;
-    }
-    if (next < in->policy.first_spp)
-        next = in->policy.first_spp;
-    head->answer.action = LULL_CONTINUE;
-    head->answer.next_spp = to_spp(ceil(next));
-    if (in->spp_max > b->spp && head->answer.next_spp > in->spp_max)
-        head->answer.next_spp = in->spp_max;
-}
-
-/* The verdict on a head whose newest image has just been pushed. */
-static void judge_window(const struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
-                         struct gp_head *head, struct worker *worker)
-{
-    struct gp_answer *a = &head->answer;
-    size_t values = 3 * (size_t)(b->x1 - b->x0) * (size_t)(b->y1 - b->y0);
-
-    if (head->used < 2) {
-        a->flags |= LULL_DECISION_TOO_EARLY;
-        schedule(in, b, head, 0);
-        return;
-    }
-    uint32_t oldest = head->order[head->used < (uint32_t)in->window ? 0 : head->used - (uint32_t)in->window];
-    uint32_t newest = head->order[head->used - 1];
-    a->error = ggn_window_noise(gp_history_noisy(&in->history, b->id, oldest), gp_history_noisy(&in->history, b->id, newest), values,
-                                (double)head->spp[oldest], (double)head->spp[newest]);
-    if (in->gate && in->policy.gate_noise > 0 && a->error > in->policy.gate_noise) {
-        double ratio = a->error / in->policy.gate_noise;
-        head->passes = 0;
-        a->predicted_spp = (double)b->spp * ratio * ratio; /* the error of a mean falls as 1/√spp */
-        schedule(in, b, head, a->predicted_spp);
-        return;
-    }
-    if (head->regular < (uint32_t)in->window) {
-        a->flags |= LULL_DECISION_TOO_EARLY;
-        schedule(in, b, head, 0);
-        return;
-    }
-    a->p_noisy = ggn_policy_p(&in->policy, window_logit(in, b, head, worker->judge));
-    head->passes = a->p_noisy < in->policy.threshold ? head->passes + 1 : 0;
-    if (head->passes >= (uint32_t)in->policy.passes && !tail_holds(in, view, b, &worker->tail)) {
-        a->action = LULL_STOP;
-        a->predicted_spp = (double)b->spp;
-        return;
-    }
-    schedule(in, b, head, 0);
-    a->predicted_spp = fmax(ggn_policy_predict(&in->policy, a->p_noisy, in->policy.threshold, (double)b->spp),
-                            (double)a->next_spp);
-}
-
-/* Whether an image at spp belongs into the history: not before the first level, and not so soon after the newest image that
- * the two would hardly differ (hosts may ask at any time). */
-static int due(const struct lull_instance *in, const struct gp_head *head, uint64_t spp)
-{
-    if ((double)spp < in->policy.first_spp)
-        return 0;
-    if (!head->used)
-        return 1;
-    double last = (double)head->spp[head->order[head->used - 1]];
-    return (double)spp >= last + 0.5 * (ggn_policy_next(&in->policy, last) - last);
-}
-
 static void judge_block(void *arg, uint64_t task, uint32_t worker)
 {
     const struct batch *batch = arg;
-    struct lull_instance *in = batch->in;
-    const struct lull_block *b = batch_block(batch, task);
-    struct gp_head *head = &in->history.pending[b->id];
 
-    *head = in->history.head[b->id];
-    if (head->asked_spp == b->spp && b->spp)
-        return;
-    head->asked_spp = b->spp;
-    if (!due(in, head, b->spp)) {
-        /* the last verdict stands; its next check may have to move */
-        if (!head->used) {
-            head->answer = (struct gp_answer){.flags = LULL_DECISION_TOO_EARLY, .p_noisy = (double)NAN,
-                                              .predicted_spp = (double)NAN, .error = (double)NAN,
-                                              .next_spp = to_spp(fmax(in->policy.first_spp, (double)b->spp + 1))};
-        } else if (head->answer.action == LULL_CONTINUE && head->answer.next_spp <= b->spp) {
-            head->answer.next_spp = b->spp + 1;
-        }
-        return;
-    }
-    head->answer = (struct gp_answer){.p_noisy = (double)NAN, .predicted_spp = (double)NAN, .error = (double)NAN};
-    uint32_t slot = gp_head_push(head, in->window, b->spp);
-    if (read_display(in, batch->view, b, gp_history_noisy(&in->history, b->id, slot)))
-        head->answer.flags |= LULL_DECISION_BAD_INPUT;
-    judge_window(in, batch->view, b, head, &in->worker[worker < in->workers ? worker : 0]);
+    gp_verdict(batch->in, batch->view, batch_block(batch, task), worker);
 }
-
-/* --- evaluate ---------------------------------------------------------------------------------------------------------- */
 
 static int32_t check_blocks(const struct batch *batch, uint32_t count, struct lull_error *err)
 {

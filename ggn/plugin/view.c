@@ -9,33 +9,17 @@ static const char *const plane_names[LULL_PLANE_COUNT] = {"COLOR", "WEIGHT", "SP
                                                           "HALF",  "ALBEDO", "NORMAL", "DEPTH"};
 static const uint32_t plane_channels[LULL_PLANE_COUNT] = {3, 1, 1, 1, 3, 3, 3, 1};
 
-struct gp_display gp_display_of(const struct lull_frame *frame)
+struct ggn_display gp_display_of(const struct lull_frame *frame)
 {
-    struct gp_display d = {frame->transfer, frame->gamma, frame->exposure};
+    struct ggn_display d = {GGN_TRANSFER_SRGB, frame->gamma, frame->exposure};
 
     if (!isfinite(d.exposure) || d.exposure <= 0)
         d.exposure = 1;
-    if (d.transfer == LULL_TRANSFER_GAMMA && (!isfinite(d.gamma) || d.gamma <= 0))
-        d.transfer = LULL_TRANSFER_SRGB;
+    if (frame->transfer == LULL_TRANSFER_LINEAR)
+        d.transfer = GGN_TRANSFER_LINEAR;
+    else if (frame->transfer == LULL_TRANSFER_GAMMA && isfinite(d.gamma) && d.gamma > 0)
+        d.transfer = GGN_TRANSFER_GAMMA;
     return d;
-}
-
-double gp_display_encode(const struct gp_display *display, double linear)
-{
-    double x = linear * display->exposure;
-
-    if (!(x > 0))
-        return 0;
-    if (x >= 1)
-        return 1;
-    switch (display->transfer) {
-    case LULL_TRANSFER_LINEAR:
-        return x;
-    case LULL_TRANSFER_GAMMA:
-        return pow(x, 1 / display->gamma);
-    default: /* IEC 61966-2-1 */
-        return x <= 0.0031308 ? 12.92 * x : 1.055 * pow(x, 1 / 2.4) - 0.055;
-    }
 }
 
 const struct lull_rect *gp_frame_block(const struct lull_frame *frame, uint32_t id)

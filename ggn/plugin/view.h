@@ -7,15 +7,10 @@
 
 #include <lull/criterion.h>
 
-/* How linear radiance becomes what is seen, from a frame. */
-struct gp_display {
-    int32_t transfer;
-    double gamma, exposure;
-};
+#include "model/preprocess.h"
 
-struct gp_display gp_display_of(const struct lull_frame *frame);
-/* transfer(exposure · value) in [0, 1]; NaN becomes 0. */
-double gp_display_encode(const struct gp_display *display, double linear);
+/* How the host shows the picture; sRGB at exposure 1 where it does not say. */
+struct ggn_display gp_display_of(const struct lull_frame *frame);
 
 /* begin_frame's arguments: sizes, blocks inside the picture, required planes present. */
 int32_t gp_frame_check(const struct lull_frame *frame, uint32_t planes_required, struct lull_error *err);

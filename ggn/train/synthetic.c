@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "data/image.h"
+#include "model/preprocess.h"
 #include "nn/weights.h"
 #include "train/chains.h"
 
@@ -58,7 +59,7 @@ static void fill_levels(struct ggn_chain *c, const struct source *s, size_t pixe
         uint8_t *out = c->noisy + 3 * pixels * (size_t)k;
         step_down(s, pixels, c->spp[k], k + 1 < c->n_levels ? c->spp[k + 1] : s->n_reference, ggn_hash((uint32_t)k, seed), noise);
         for (size_t i = 0; i < 3 * pixels; i++)
-            out[i] = ggn_srgb_code((double)(s->base[i] + noise[i]));
+            out[i] = ggn_preprocess((double)(s->base[i] + noise[i]), NULL, NULL);
     }
 }
 
@@ -189,7 +190,7 @@ static int extend_chain(const struct ggn_chains *set, struct ggn_chain *c, const
         uint8_t *out = c->noisy + values * (size_t)(first + k);
         step_down(s, values / 3, m, k + 1 < n ? spp[k + 1] - n0 : s->n_reference, ggn_hash((uint32_t)k, seed), noise);
         for (size_t i = 0; i < values; i++)
-            out[i] = ggn_srgb_code((n0 * (double)s->last[i] + m * (double)(s->base[i] + noise[i])) / spp[k]);
+            out[i] = ggn_preprocess((n0 * (double)s->last[i] + m * (double)(s->base[i] + noise[i])) / spp[k], NULL, NULL);
         c->spp[first + k] = spp[k];
     }
     free(noise);

@@ -36,7 +36,6 @@ static double decide(const struct ggn_model *m, float (*block)(int image, int k)
 {
     const struct ggn_policy policy = ggn_policy_default();
     struct ggn_judge *j = ggn_judge_create(m, GGN_PRECISION_F32, NULL, NULL);
-    static float linear[BYTES];
     static uint8_t noisy[3][BYTES];
     static uint16_t denoised[3][BYTES];
     const uint8_t *const n[3] = {noisy[0], noisy[1], noisy[2]};
@@ -44,10 +43,8 @@ static double decide(const struct ggn_model *m, float (*block)(int image, int k)
 
     assert_non_null(j);
     for (int i = 0; i < 3; i++) {
-        struct ggn_linear_view view = {linear, AREA, 1, SIDE, SIDE, SIDE, 1};
         for (int k = 0; k < BYTES; k++)
-            linear[k] = block(i, k);
-        ggn_preprocess(&view, noisy[i], counts);
+            noisy[i][k] = ggn_preprocess((double)block(i, k), NULL, counts);
         ggn_judge_denoise(j, noisy[i], denoised[i], SIDE, SIDE);
     }
     double p = ggn_policy_p(&policy, ggn_judge_logit(j, n, d, SIDE, SIDE));

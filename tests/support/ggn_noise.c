@@ -15,6 +15,7 @@
 #include "data/image.h"
 #include "data/labels.h"
 #include "data/manifest.h"
+#include "model/preprocess.h"
 
 uint32_t ggn_noise_hash(uint32_t k, uint32_t s)
 {
@@ -67,7 +68,7 @@ static void add_frame(struct ggn_seq_builder *w, const struct film *f, const str
     for (uint32_t i = 0; i < values; i++) {
         mean[i] = (float)((f->sum[0][i] + f->sum[1][i]) / f->spp);
         half[i] = (float)((f->sum[0][i] - f->sum[1][i]) / f->spp);
-        display[i] = ggn_srgb_code((double)mean[i]);
+        display[i] = ggn_preprocess((double)mean[i], NULL, NULL);
     }
     for (uint32_t p = 0; p < pixels; p++) {
         double total = (double)mean[p] + (double)mean[pixels + p] + (double)mean[2 * pixels + p];

@@ -10,6 +10,7 @@
 #include "data/image.h"
 #include "data/labels.h"
 #include "data/manifest.h"
+#include "model/preprocess.h"
 #include "nn/weights.h"
 
 enum { MAX_LEVELS = 64 };
@@ -95,7 +96,7 @@ static void develop(struct pixels *p, double spp)
     for (size_t i = 0; i < p->n; i++) {
         p->mean[i] = (float)((double)p->sum[i] / spp);
         p->difference[i] = (float)((double)p->half[i] / (0.5 * spp) - (double)p->mean[i]);
-        p->display[i] = ggn_srgb_code((double)p->mean[i]);
+        p->display[i] = ggn_preprocess((double)p->mean[i], NULL, NULL);
     }
 }
 

@@ -17,6 +17,7 @@
 #include "data/image.h"
 #include "data/manifest.h"
 #include "data/sequence.h"
+#include "model/preprocess.h"
 
 enum { W = 37, H = 21, P = W * H };
 
@@ -41,11 +42,11 @@ static void codings(void **state)
     (void)state;
     double worst = 0.0;
     for (double x = 1e-6; x < 5e4; x *= 1.0007) {
-        uint8_t d = ggn_srgb_code(x);
+        uint8_t d = ggn_preprocess(x, NULL, NULL);
         double back = ggn_fine_decode(d, ggn_fine_encode(d, x));
         double room = d < 255 ? (ggn_srgb_eotf((d + 0.5) / 255) - ggn_srgb_eotf(d == 0 ? 0 : (d - 0.5) / 255)) / 16 : x * 0.0219;
         worst = fmax(worst, fabs(back - x) / room);
-        if (d < 255 && ggn_srgb_code(back) != d)
+        if (d < 255 && ggn_preprocess(back, NULL, NULL) != d)
             fail_msg("%g: the refined value has another display code", x);
     }
     assert_true(worst <= 1.001);
@@ -87,7 +88,7 @@ static void fill(int seed)
     for (int i = 0; i < 3 * P; i++) {
         mean[i] = (float)fabs(0.6 + 0.7 * sin(0.1 * i + seed));
         half[i] = (float)(0.05 * cos(1.7 * i + seed));
-        display[i] = ggn_srgb_code((double)mean[i]);
+        display[i] = ggn_preprocess((double)mean[i], NULL, NULL);
     }
 }
 

@@ -142,13 +142,17 @@ static double srgb(double v)
 
 static void test_srgb(void **state)
 {
+    const struct ggn_display brighter = {GGN_TRANSFER_SRGB, 0, 1.5}, gamma = {GGN_TRANSFER_GAMMA, 2.2, 1}, linear = {GGN_TRANSFER_LINEAR, 0, 2};
+
     for (int i = 0; i < 20000; i++) {
         float v[3] = {(float)(i / 19000.0), (float)pow(2, -20 + i / 900.0), (float)ggn_hash_unit((uint32_t)i, 1)};
-        uint8_t out[3];
-        struct ggn_linear_view view = {v, 1, 1, 1, 1, 1, 1};
-        ggn_preprocess(&view, out, NULL);
-        for (int c = 0; c < 3; c++)
-            assert_int_equal(out[c], (int)fmin(255, floor(255 * srgb((double)v[c]) + 0.5)));
+        for (int c = 0; c < 3; c++) {
+            double x = (double)v[c];
+            assert_int_equal(ggn_preprocess(x, NULL, NULL), (int)fmin(255, floor(255 * srgb(x) + 0.5)));
+            assert_int_equal(ggn_preprocess(x, &brighter, NULL), (int)fmin(255, floor(255 * srgb((double)(float)(1.5 * x)) + 0.5)));
+            assert_int_equal(ggn_preprocess(x, &gamma, NULL), (int)fmin(255, floor(255 * pow(x, 1 / 2.2) + 0.5)));
+            assert_int_equal(ggn_preprocess(x, &linear, NULL), (int)fmin(255, floor(255 * 2 * x + 0.5)));
+        }
     }
     (void)state;
 }
@@ -157,19 +161,12 @@ static void test_cleaning(void **state)
 {
     const float bad[8] = {NAN, INFINITY, -INFINITY, -1, 1e30f, 1e-40f, -1e-40f, -0.0f};
     static const uint8_t want[8] = {0, 255, 0, 0, 255, 0, 0, 0};
-    float view_data[24];
-    uint8_t out[24];
     struct ggn_pixel_counts counts = {0};
-    /* bottom-up, interleaved */
-    struct ggn_linear_view view = {view_data + 12, 1, 3, -12, 2, 4, 1};
 
-    for (int i = 0; i < 24; i++)
-        view_data[i] = 0.5f;
     for (int i = 0; i < 8; i++)
-        view_data[(i < 4 ? 12 : 0) + 3 * (i % 4)] = bad[i];
-    ggn_preprocess(&view, out, &counts);
-    for (int i = 0; i < 24; i++)
-        assert_int_equal(out[i], i < 8 ? want[i] : 188);
+        assert_int_equal(ggn_preprocess((double)bad[i], NULL, &counts), want[i]);
+    assert_int_equal(ggn_preprocess(0.5, NULL, &counts), 188);
+    assert_int_equal(ggn_preprocess(1e300, NULL, NULL), 255);
     assert_int_equal(counts.nan, 1);
     assert_int_equal(counts.infinite, 2);
     assert_int_equal(counts.negative, 1);

@@ -1,0 +1,40 @@
+/*
+ * The criterion "ggn" between its contract with the host (network.c) and its verdict on one block (verdict.c). Private to both.
+ */
+#ifndef GGN_PLUGIN_NETWORK_H
+#define GGN_PLUGIN_NETWORK_H
+
+#include <lull/criterion.h>
+
+#include "model/judge.h"
+#include "model/policy.h"
+#include "model/window.h"
+#include "plugin/history.h"
+#include "plugin/view.h"
+
+struct gp_worker {
+    struct ggn_judge *judge;
+    struct ggn_tail tail;
+};
+
+struct lull_instance {
+    const struct lull_host *host; /* borrows until destroy */
+    struct ggn_model *model;
+    struct ggn_policy policy; /* the model's, with the parameters over it */
+    int gate, window;
+    enum ggn_precision precision;
+    uint32_t key; /* of saved state: a hash of model and policy */
+    int open;
+    struct ggn_display display;
+    double luminance[3];
+    uint64_t spp_max;
+    struct gp_history history; /* of the open frame */
+    uint32_t workers;
+    struct gp_worker *worker;
+};
+
+/* Fills in->history.pending[b->id] with the answer for a checked block; the same block at the same spp again keeps its answer.
+ * Tasks on different blocks may run at the same time, each with its own worker < in->workers. */
+void gp_verdict(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b, uint32_t worker);
+
+#endif
