@@ -50,7 +50,7 @@ enum key {
 
 static const struct argp_option options[] = {
     {0, 0, 0, 0, "When to stop:", 1},
-    {"criterion", 'c', "NAME|PATH[:ID]", 0, "Stopping criterion: a name (see --list-criteria) or a shared object", 0},
+    {"criterion", 'c', "NAME|PATH[:ID]", 0, "Stopping criterion: a name (see --list-criteria) or a shared object; default ggn", 0},
     {"param", 'p', "KEY=VALUE", 0, "Parameter of the criterion; may be repeated", 0},
     {"list-criteria", KEY_LIST_CRITERIA, 0, 0, "List the criteria that are found and their parameters, and exit", 0},
     {"spp-min", KEY_SPP_MIN, "N", 0, "Samples per pixel before the first check (default 32)", 0},

@@ -20,7 +20,7 @@
 #include "scene/load.h"
 
 /* The criterion when none is named. */
-static const char DEFAULT_CRITERION[] = "halfbuf";
+static const char DEFAULT_CRITERION[] = "ggn";
 
 enum { EXIT_FAILED = 1, EXIT_BAD_INPUT = 2, EXIT_INTERRUPTED = 130 };
 
