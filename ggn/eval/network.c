@@ -101,7 +101,7 @@ static int tail_holds(const struct ggn_policy *p, const struct ggn_chain *c, int
         k--;
     if (c->tail999 == NULL || isnan(c->tail999[k]))
         return 0;
-    return (p->tail999 > 0.0 && c->tail999[k] * sqrt(c->spp[k] / c->spp[i]) > p->tail999) || (p->gini > 0.0 && c->gini[k] > p->gini);
+    return ggn_policy_tail_holds(p, c->tail999[k] * sqrt(c->spp[k] / c->spp[i]), c->gini[k]);
 }
 
 static int judge_block(void *data, int index, int worker, struct ggn_err *err)

@@ -53,6 +53,14 @@ int ggn_policy_check(const struct ggn_policy *p, struct ggn_err *err)
     return GGN_OK;
 }
 
+/* Noise of the noisiest thousandth of the pixels, in mean luminances, below which nothing sparkles. */
+static const double CALM_TAIL = 0.2;
+
+int ggn_policy_tail_holds(const struct ggn_policy *p, double tail999, double gini)
+{
+    return (p->tail999 > 0 && tail999 > p->tail999) || (p->gini > 0 && gini > p->gini && tail999 > CALM_TAIL);
+}
+
 double ggn_policy_p(const struct ggn_policy *p, double logit)
 {
     /* an error costs time, never quality */

@@ -32,7 +32,7 @@ static const struct lull_param params[P_COUNT] = {
                 .help = "do not stop while the 99.9th percentile of the half-buffer difference exceeds this many times the mean "
                         "luminance, 0 = no such guard; without it the model's own"},
     [P_GINI] = {.name = "gini", .type = LULL_PARAM_FLOAT, .min = 0, .max = 2,
-                .help = "do not stop while the Gini coefficient of the half-buffer difference exceeds this, 0 = no such guard; "
+                .help = "do not stop while the Gini coefficient of the half-buffer difference exceeds this and its tail 0.2, 0 = no such guard; "
                         "without it the model's own"},
     [P_FIRST_SPP] = {.name = "first-spp", .type = LULL_PARAM_INT, .min = 1, .max = 1e9,
                      .help = "samples per pixel of the first image of a window; without it the model's own"},

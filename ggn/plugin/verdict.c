@@ -54,8 +54,7 @@ static int tail_holds(const struct lull_instance *in, const struct lull_view *vi
             }
             x += count;
         }
-    return (in->policy.tail999 > 0 && ggn_tail_999(tail) > in->policy.tail999) ||
-           (in->policy.gini > 0 && ggn_tail_gini(tail) > in->policy.gini);
+    return ggn_policy_tail_holds(&in->policy, ggn_tail_999(tail), ggn_tail_gini(tail));
 }
 
 /* Logit of the newest window; denoises the images that have not been denoised yet. */

@@ -132,9 +132,24 @@ static void policy_travels_with_the_model(void **state)
     (void)state;
 }
 
+/* Sparks hold a block; an uneven spread of noise that nobody sees does not. */
+static void tail_guard(void **state)
+{
+    struct ggn_policy p = ggn_policy_default();
+
+    assert_false(ggn_policy_tail_holds(&p, 1e9, 1));
+    p.tail999 = 2;
+    p.gini = 0.8;
+    assert_true(ggn_policy_tail_holds(&p, 2.1, 0.1));
+    assert_true(ggn_policy_tail_holds(&p, 0.5, 0.9));
+    assert_false(ggn_policy_tail_holds(&p, 0.5, 0.7));
+    assert_false(ggn_policy_tail_holds(&p, 0.1, 0.99));
+    (void)state;
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(tail_guard), 
         cmocka_unit_test(noise_is_that_of_the_newest_image),
         cmocka_unit_test(tiles_cover_and_reflect),
         cmocka_unit_test(tail_statistics_match_their_definition),
