@@ -17,28 +17,31 @@ within() { stats "$1" "$2" | tee "$dir/log2" | awk -v l="$3" -v h="$4" 'NF == 3 
 # mean CHANNEL RECTANGLE LOW HIGH: the average is
 mean() { stats "$1" "$2" | tee "$dir/log2" | awk -v l="$3" -v h="$4" 'NF == 3 {ok = $3 >= l && $3 <= h} END {exit !ok}'; }
 
-args="--criterion halfbuf -p threshold=0.05 --size 240x160 --block 40 --spp-min 16 --spp-max 150 --seed 3 -q"
+args="--criterion halfbuf -p threshold=0.05 --size 240x240 --block 40 --spp-min 16 --spp-max 150 --seed 3 -q"
 t "the demo runs" env DEMO_DIR="$dir" DEMO_ARGS="$args" scripts/demo
 for f in demo.exr demo.png stop-map.png stop-map.csv report.json; do t "it leaves $f" test -s "$dir/$f"; done
 t "nothing temporary is left" test -z "$(ls "$dir" | grep tmp)"
-t "the image has 240x160 pixels and all layers" sh -c "oiiotool --info -v $dir/demo.exr | tr -d ' ' | grep -q '240x160,14channel'"
+t "the image has 240x240 pixels and all layers" sh -c "oiiotool --info -v $dir/demo.exr | tr -d ' ' | grep -q '240x240,14channel'"
 t "no pixel is negative, NaN or infinite" sh -c "oiiotool $dir/demo.exr --ch R,G,B --printstats | awk '/Min/{if (\$3 < 0 || \$4 < 0 || \$5 < 0) bad=1} /NanCount/{if (\$3+\$4+\$5) bad=1} /InfCount/{if (\$3+\$4+\$5) bad=1} END{exit bad}'"
-t "samples lie between the limits" within lull.spp 240x160+0+0 16 150
-t "reasons are criterion or spp-max" within lull.reason 240x160+0+0 1 2
-t "outside of the room it is black" within G 240x8+0+152 0 0
-t "the lamp is white" within G 14x3+110+7 1 1000
-t "the window is bluish and bright: red" within R 10x24+39+48 1.55 2.2
-t "the window is bluish and bright: blue" within B 10x24+39+48 3.15 4
-t "the back wall is lit: every pixel" within G 60x20+80+30 0.05 3
-t "the back wall is grey: mean" mean G 60x20+80+30 0.2 0.9
-t "the right wall is ochre: blue" mean B 15x50+200+50 0.02 0.25
-t "the right wall is ochre: red" mean R 15x50+200+50 0.1 1
-t "albedo lies in [0, 1]" within albedo.G 240x160+0+0 0 1.0001
-t "normals are at most unit" within normal.Y 240x160+0+0 -1.0001 1.0001
-t "depth is that of the room" within depth.Z 60x20+80+30 3 12
-t "24 numbers in the table" test "$(tr -cd ';' <"$dir/stop-map.csv" | wc -c)" -eq 25
+t "samples lie between the limits" within lull.spp 240x240+0+0 16 150
+t "reasons are criterion or spp-max" within lull.reason 240x240+0+0 1 2
+t "the sky is the light's colour: red" within R 240x40+0+0 0.4499 0.4501
+t "the sky is the light's colour: green" within G 240x40+0+0 0.5999 0.6001
+t "the sky is the light's colour: blue" within B 240x40+0+0 0.8999 0.9001
+t "the sky has no depth" within depth.Z 240x40+0+0 0 0
+# a flag of reflectance r far from the balls reflects r (L_sky + E_sun cos / pi), the sun's cosine being 5 / sqrt(38)
+t "the terrace is as bright as sky and sun make it: red" mean R 30x30+205+120 0.418 0.4295
+t "the terrace is as bright as sky and sun make it: blue" mean B 30x30+205+120 0.452 0.466
+t "the terrace is flat" within normal.Y 30x30+205+120 0.9999 1.0001
+t "depth is that of the terrace" within depth.Z 30x30+205+120 8 12
+t "the large ball is reddish: red" mean R 30x30+50+90 0.3 1
+t "the large ball is reddish: blue" mean B 30x30+50+90 0.1 0.29
+t "the large ball's albedo" within albedo.R 30x30+50+90 0.6999 0.7001
+t "albedo lies in [0, 1]" within albedo.G 240x240+0+0 0 1.0001
+t "normals are at most unit" within normal.Y 240x240+0+0 -1.0001 1.0001
+t "36 numbers in the table" test "$(tr -cd ';' <"$dir/stop-map.csv" | wc -c)" -eq 37
 t "blocks stop at different samples" test "$(tr ';' '\n' <"$dir/stop-map.csv" | sed 1d | grep . | sort -u | wc -l)" -gt 2
-t "the report tells 24 blocks" test "$(grep -c '"reason"' "$dir/report.json")" -eq 24
+t "the report tells 36 blocks" test "$(grep -c '"reason"' "$dir/report.json")" -eq 36
 t "preview is the image" sh -c "oiiotool $dir/demo.exr --ch R,G,B --clamp:min=0:max=1 --colorconvert linear sRGB -d uint8 -o $dir/x.png && oiiotool --fail 0.005 --failpercent 0 --hardfail 0.01 $dir/x.png $dir/demo.png --diff"
 echo "1..$n"
 exit $bad
