@@ -269,6 +269,8 @@ static int method_pictures(const char *dir, const struct ggn_eval_set *s, enum g
         rc = ggn_plot_errors(path, pairing.truth, pairing.model, pairing.n, m->name, err);
     if (rc == GGN_OK && (rc = picture_path(path, dir, split, "heatmaps", m, ".png", err)) == GGN_OK)
         rc = ggn_plot_heatmaps(path, &pairing, "thresholds", m->name, err);
+    if (rc == GGN_OK && m->score != NULL && (rc = picture_path(path, dir, split, "score", m, ".png", err)) == GGN_OK)
+        rc = plot_scores(path, s, split, m, err);
     struct ggn_fio_out out;
     if (rc == GGN_OK && (rc = picture_path(path, dir, split, "stops", m, ".csv", err)) == GGN_OK && (rc = ggn_fio_begin(&out, path, err)) == GGN_OK) {
         fputs("view;block;threshold;censored;stop\n", out.file);
@@ -288,15 +290,10 @@ static int method_pictures(const char *dir, const struct ggn_eval_set *s, enum g
 int ggn_report_pictures(const char *dir, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *methods, int n, struct ggn_err *err)
 {
     char path[4096];
-    const struct ggn_method *last = NULL;
     int rc = picture_path(path, dir, split, "roc", NULL, ".png", err);
     if (rc == GGN_OK)
         rc = plot_roc(path, s, split, methods, n, err);
-    for (int i = 0; i < n && rc == GGN_OK; i++) {
-        last = methods[i].score != NULL ? &methods[i] : last;
+    for (int i = 0; i < n && rc == GGN_OK; i++)
         rc = method_pictures(dir, s, split, &methods[i], err);
-    }
-    if (rc == GGN_OK && last != NULL && (rc = picture_path(path, dir, split, "score", NULL, ".png", err)) == GGN_OK)
-        rc = plot_scores(path, s, split, last, err);
     return rc;
 }

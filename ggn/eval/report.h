@@ -13,8 +13,8 @@ void ggn_report_table(FILE *f, const struct ggn_eval_set *s, enum ggn_split spli
 /* An object with one member per method; NULL: out of memory. */
 struct cJSON *ggn_report_json(const struct ggn_method *methods, const struct ggn_method_metrics *metrics, int n);
 
-/* Pictures of one split into DIR: SPLIT-roc.png, SPLIT-score.png (score against spp with thresholds, for the last method that has
- * scores), and for each method SPLIT-errors-K.png, SPLIT-scatter-K.png, SPLIT-heatmaps-K.png; stops-K.csv of all views. */
+/* Pictures of one split into DIR: SPLIT-roc.png, and for each method SPLIT-errors-K.png, SPLIT-scatter-K.png, SPLIT-heatmaps-K.png,
+ * SPLIT-score-K.png where it has scores (against spp, with the thresholds), and its stops as SPLIT-stops-K.csv. */
 int ggn_report_pictures(const char *dir, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *methods, int n,
                         struct ggn_err *err);
 

@@ -169,9 +169,10 @@ t "--time-budget" "$P" "$scene" -q -c null --spp-max 100000000 --time-budget 1 -
 t "  …ends in time" test $(($(date +%s) - start)) -le 5
 t "  …and says so" grep -q '"reason":[[:space:]]*"time"' time.json
 "$P" $long -o full.exr
-"$P" $long --spp-max 1000000 -o int.exr --report int.json --preview int.png --stop-map int.csv 2>int.err &
+"$P" $(echo "$long" | sed 's/ -q//') --spp-max 1000000 --time-budget 60 -o int.exr --report int.json --preview int.png \
+    --stop-map int.csv 2>int.err &
 pid=$!
-sleep 1
+until [ -s int.err ] || ! kill -0 $pid; do sleep 0.1; done # its progress: from here on it listens
 kill -INT $pid
 wait $pid
 t "SIGINT: exit status 130" test $? -eq 130

@@ -6,7 +6,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "model/container.h"
 #include "model/networks.h"
+#include "nn/bf16.h"
 #include "nn/exec.h"
 #include "support/ggn_naive.h"
 
@@ -126,6 +128,54 @@ static void test_convolutions(void **state)
                 check_f32(&o, (enum ggn_isa)isa, seed);
                 check_f64(&o, (enum ggn_isa)isa, seed);
             }
+        free_oracle(&o);
+    }
+    (void)state;
+}
+
+/* bfloat16 products: the oracle on weights and pixels that were rounded beforehand. */
+static void check_bf16(struct oracle *o, uint32_t seed)
+{
+    static struct ggn_graph g;
+    const int area = o->c.h * o->c.w, row = o->c.w + 1, n_x = o->c.c_in * area;
+
+    ggn_graph_begin(&g, "conv", o->c.c_in, o->c.h, o->c.w);
+    ggn_graph_stage(&g, "a");
+    ggn_graph_conv(&g, 0, -1, o->c.c_out, 3, o->c.transposed, o->slope);
+    assert_int_equal(ggn_graph_end(&g, NULL), GGN_OK);
+    struct ggn_weights_f32 *w = ggn_weights_create_f32(&g, NULL, GGN_WEIGHTS_BF16, NULL);
+    struct ggn_exec_f32 *e = ggn_exec_create_f32(&g, NULL, 1, GGN_EXEC_BF16, NULL, NULL);
+    const int n_w = (int)g.tensor[0].count;
+    assert_true(w && e);
+    for (int i = 0; i < n_w; i++) {
+        w->params[i] = (float)o->weight[i];
+        o->weight[i] = (double)ggn_bf16_to_f32(ggn_f32_to_bf16((float)o->weight[i]));
+    }
+    for (int i = 0; i < o->c.c_out; i++)
+        w->params[n_w + i] = (float)o->bias[i];
+    ggn_weights_pack_f32(w);
+    for (int i = 0; i < n_x; i++) {
+        ggn_exec_plane_f32(e, 0, 0, i / area)[i % area / o->c.w * row + i % area % o->c.w] = (float)o->x[i];
+        o->x[i] = (double)ggn_bf16_to_f32(ggn_f32_to_bf16((float)o->x[i]));
+    }
+    ggn_naive_forward(&o->c, o->x, o->weight, o->bias, o->slope, o->y);
+    ggn_exec_forward_f32(e, w, 1, GGN_EVAL);
+    for (int i = 0; i < o->c.c_out * area; i++)
+        near("bfloat16 forward", GGN_ISA_AVX512, seed,
+             (double)ggn_exec_plane_f32(e, 1, 0, i / area)[i % area / o->c.w * row + i % area % o->c.w], o->y[i], o->c.c_in,
+             F32_TOLERANCE);
+    ggn_weights_destroy_f32(w);
+    ggn_exec_destroy_f32(e);
+}
+
+static void test_bf16(void **state)
+{
+    if (!ggn_bf16_available())
+        skip();
+    for (uint32_t seed = 10; seed < 28; seed++) {
+        struct oracle o = make_oracle(seed);
+        if (o.c.kernel == 3)
+            check_bf16(&o, seed);
         free_oracle(&o);
     }
     (void)state;
@@ -329,8 +379,8 @@ static void test_batch_same_bytes(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_convolutions), cmocka_unit_test(test_row_ends),
-                                       cmocka_unit_test(test_instruction_sets), cmocka_unit_test(test_threads_same_bytes),
-                                       cmocka_unit_test(test_batch_same_bytes)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_convolutions),       cmocka_unit_test(test_bf16),
+                                       cmocka_unit_test(test_row_ends),           cmocka_unit_test(test_instruction_sets),
+                                       cmocka_unit_test(test_threads_same_bytes), cmocka_unit_test(test_batch_same_bytes)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
