@@ -31,7 +31,7 @@ static const struct field fields[] = {
     {"steps", INTEGER, AT(steps), 1, 1e8, "steps of the generator and discriminator phase (lull 2000; paper: by epochs)"},
     {"epochs", INTEGER, AT(epochs), 1, 1e6, "passes over all windows, preset paper only (30)"},
     {"epoch-steps", INTEGER, AT(epoch_steps), 1, 1e8, "steps between validations and checkpoints (lull 100; paper: one pass)"},
-    {"patience", INTEGER, AT(patience), 0, 1e6, "end after so many validations without a better AUC, 0 = never (lull 8)"},
+    {"patience", INTEGER, AT(patience), 0, 1e6, "end after so many validations without a lower loss, 0 = never (lull 8)"},
     {"lr-denoiser", REAL, AT(lr_r), 1e-9, 1, "learning rate of the denoiser (lull 1e-3, paper 2e-4)"},
     {"lr", REAL, AT(lr), 1e-9, 1, "learning rate of generator and discriminator (lull 1e-3, paper 2e-4)"},
     {"difference", REAL, AT(difference), 0, 1000, "train on gain * (image - newest image), folded away on saving; 0 = off (lull 8)"},

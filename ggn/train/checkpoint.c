@@ -73,7 +73,7 @@ static char *describe(struct ggn_session *s)
         const char *name;
         double value;
     } numbers[] = {{"key", ggn_session_key(s)}, {"phase", p->phase}, {"step", (double)p->step}, {"stale", p->stale}, {"divergences", p->divergences},
-                   {"best_auc", p->best_auc}, {"best_loss", p->best_loss}, {"best_step", (double)p->best_step},
+                   {"best_loss", p->best_loss}, {"best_step", (double)p->best_step},
                    {"seconds0", p->seconds[0]}, {"seconds1", p->seconds[1]},
                    {"steps", (double)s->trainer->steps}, {"t0", (double)s->trainer->adam_t[0]},
                    {"t1", (double)s->trainer->adam_t[1]}, {"t2", (double)s->trainer->adam_t[2]}};
@@ -114,7 +114,6 @@ static int restore(struct ggn_session *s, const cJSON *root, const char *path, s
     p->step = (uint64_t)step;
     p->stale = (int)fmax(field(root, "stale"), 0);
     p->divergences = (int)fmax(field(root, "divergences"), 0);
-    p->best_auc = field(root, "best_auc");
     p->best_loss = field(root, "best_loss");
     p->best_step = (uint64_t)fmax(field(root, "best_step"), 0);
     p->seconds[0] = field(root, "seconds0");

@@ -19,7 +19,7 @@ struct ggn_progress {
     uint64_t step;        /* of the phase */
     int stale;            /* epochs since the best one */
     int divergences;      /* each one halves the learning rates and changes the draws */
-    double best_auc, best_loss;
+    double best_loss;
     uint64_t best_step;
     double seconds[2];    /* spent in the phases */
 };

@@ -268,7 +268,7 @@ static int begin_judge(struct ggn_session *s, struct ggn_err *err)
     const int paper = s->plan->preset == GGN_PRESET_PAPER;
     struct ggn_train_options o = trainer_options(s, paper ? GGN_TRAIN_ALL : GGN_TRAIN_MD, s->plan->batch);
 
-    s->progress = (struct ggn_progress){.phase = GGN_PHASE_JUDGE, .best_auc = -1, .best_loss = HUGE_VAL,
+    s->progress = (struct ggn_progress){.phase = GGN_PHASE_JUDGE, .best_loss = HUGE_VAL,
                                         .seconds = {s->progress.seconds[0], 0}};
     s->trainer = ggn_trainer_create_f32(&s->hyper, &o, s->threads, err);
     if (!s->trainer)

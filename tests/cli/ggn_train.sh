@@ -32,6 +32,9 @@ $ggn inspect "$tmp/a.ggn" >"$tmp/out" 2>"$tmp/err" && grep -q "stops below" "$tm
 check "inspect reads it" $?
 [ "$(wc -l <"$tmp/a.ggn.csv")" -eq 5 ] && [ -s "$tmp/a.ggn.png" ] && grep -q '"labels":.*"observer"' "$tmp/a.ggn.card.json"
 check "curves, picture and card" $?
+best=$(awk -F, '$1 == "judge" && (low == "" || $5 < low) { low = $5; step = $2 } END { print step }' "$tmp/a.ggn.csv")
+grep -q "\"best_step\":[[:space:]]*$best," "$tmp/a.ggn.card.json"
+check "the epoch with the lowest validation loss is kept" $?
 
 $ggn train $tiny --out "$tmp/b.ggn" --threads 1 -q 2>"$tmp/err" && cmp "$tmp/a.ggn" "$tmp/b.ggn" 2>"$tmp/err"
 check "the same bytes with one thread" $?
