@@ -149,7 +149,8 @@ static void tail_guard(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(tail_guard), 
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(tail_guard),
         cmocka_unit_test(noise_is_that_of_the_newest_image),
         cmocka_unit_test(tiles_cover_and_reflect),
         cmocka_unit_test(tail_statistics_match_their_definition),
