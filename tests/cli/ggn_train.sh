@@ -32,14 +32,16 @@ $ggn inspect "$tmp/a.ggn" >"$tmp/out" 2>"$tmp/err" && grep -q "stops below" "$tm
 check "inspect reads it" $?
 [ "$(wc -l <"$tmp/a.ggn.csv")" -eq 5 ] && [ -s "$tmp/a.ggn.png" ] && grep -q '"labels":.*"observer"' "$tmp/a.ggn.card.json"
 check "curves, picture and card" $?
-best=$(awk -F, '$1 == "judge" && (low == "" || $5 < low) { low = $5; step = $2 } END { print step }' "$tmp/a.ggn.csv")
-grep -q "\"best_step\":[[:space:]]*$best," "$tmp/a.ggn.card.json"
-check "the epoch with the lowest validation loss is kept" $?
-
 $ggn train $tiny --out "$tmp/b.ggn" --threads 1 -q 2>"$tmp/err" && cmp "$tmp/a.ggn" "$tmp/b.ggn" 2>"$tmp/err"
 check "the same bytes with one thread" $?
 $ggn train $tiny --out "$tmp/c.ggn" --seed 2 -q 2>"$tmp/err" && ! cmp -s "$tmp/a.ggn" "$tmp/c.ggn"
 check "other bytes with another seed" $?
+# Settings chosen so that the epochs disagree: the first has the lower loss, the last the higher AUC.
+$ggn train $tiny --lr 0.02 --seed 2 --out "$tmp/f.ggn" -q 2>"$tmp/err" &&
+    awk -F, '$1 == "judge" && (low == "" || $5 < low) { low = $5; best = $2 } $1 == "judge" && $7 > high { high = $7; other = $2 }
+        END { if (best == other) exit 1; print best }' "$tmp/f.ggn.csv" >"$tmp/best" 2>"$tmp/err" &&
+    grep -q "\"best_step\":[[:space:]]*$(cat "$tmp/best")," "$tmp/f.ggn.card.json"
+check "the epoch with the lowest validation loss is kept, not the last, not the one with the best AUC" $?
 
 # interrupted once in each phase: as soon as the curves have so many rows
 for rows in 2 4; do
