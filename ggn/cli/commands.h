@@ -17,6 +17,7 @@
     X(bench, "measure inference and training speed") \
     X(golden, "print the golden values of the published networks as JSON") \
     X(inspect, "print what a model file holds") \
+    X(convert, "store a model's weights in another type") \
     X(flip, "visible difference of two images (LDR-FLIP)") \
     X(compare, "stop maps or thresholds against (human) thresholds") \
     X(import_sin3d, "SIN3D images into block sequences") \

@@ -26,12 +26,12 @@ struct options {
 
 static const struct argp_option option_table[] = {
     {"data", 'd', "DATA", 0, "labelled data set: a folder of sequences with split.json (required)", 1},
-    {"model", 'm', "FILE", 0, "trained model (.ggn); may be repeated", 1},
+    {"model", 'm', "FILE", 0, "trained model (.ggn); may be repeated: decisions that differ from the first one's are counted", 1},
     {"json", 'j', NULL, 0, "print the figures as JSON", 2},
     {"output", 'o', "DIR", 0, "write figures.json and pictures there", 2},
     {"early", KEY_EARLY, "RATE", 0, "early-stop rate that cuts are tuned for on the training scenes (default 0.05)", 3},
     {"retune", KEY_RETUNE, NULL, 0, "tune the models' thresholds too, on the validation scenes, instead of taking the stored ones", 3},
-    {"bf16", KEY_BF16, NULL, 0, "judge with bfloat16 products too and count the decisions that this changes", 3},
+    {"bf16", KEY_BF16, NULL, 0, "judge with bfloat16 products too: one more method per model, whose changed decisions are counted", 3},
     {"no-quality", KEY_NO_QUALITY, NULL, 0, "skip FLIP and SSIM at the stop", 3},
     {"baselines", KEY_BASELINES, NULL, 0, "train the published baselines on the training scenes and measure them too (minutes)", 3},
     {"epochs", KEY_EPOCHS, "N", 0, "epochs of the LSTM baseline (default 15)", 3},
@@ -96,7 +96,7 @@ struct job {
     struct ggn_model *models[MAX_MODELS];
     struct ggn_method methods[MAX_METHODS];
     int n;
-    int exact[MAX_METHODS]; /* of a method in bfloat16: the same in float; else -1 */
+    int likened[MAX_METHODS]; /* whose decisions a method's are compared with: the same model in float, for a model the first; else -1 */
     enum ggn_split tuning, tuning_models;
 };
 
@@ -161,8 +161,7 @@ static int add_models(struct job *j, struct ggn_threads *threads, struct ggn_err
         rc = ggn_eval_network(&j->methods[j->n], &j->set, j->models[i / precisions], name, precision, threads, err);
         if (rc != GGN_OK)
             return rc;
-        if (precision == GGN_PRECISION_BF16)
-            j->exact[j->n] = j->n - 1;
+        j->likened[j->n] = precision == GGN_PRECISION_BF16 ? j->n - 1 : i > 0 ? j->n - i : -1;
         struct ggn_method *m = &j->methods[j->n++];
         if (j->o->retune)
             rc = ggn_method_tune(m, &j->set, j->tuning_models, j->o->early, err);
@@ -170,13 +169,13 @@ static int add_models(struct job *j, struct ggn_threads *threads, struct ggn_err
     return rc;
 }
 
-/* What bfloat16 changes on a split: verdicts on windows ("below the cut"), and where blocks stop. */
-static void report_bf16(const struct job *j, enum ggn_split split, cJSON *to)
+/* What other precisions and models change on a split: verdicts on windows that both judged, and where blocks stop. */
+static void report_changes(const struct job *j, enum ggn_split split, cJSON *to)
 {
     for (int i = 0; i < j->n; i++) {
-        if (j->exact[i] < 0)
+        if (j->likened[i] < 0)
             continue;
-        const struct ggn_method *rounded = &j->methods[i], *exact = &j->methods[j->exact[i]];
+        const struct ggn_method *other = &j->methods[i], *first = &j->methods[j->likened[i]];
         int windows = 0, verdicts = 0, blocks = 0, stops = 0;
         double furthest = 0.0;
         for (int b = 0; b < j->set.n_blocks; b++) {
@@ -184,19 +183,20 @@ static void report_bf16(const struct job *j, enum ggn_split split, cJSON *to)
             if (block->split != split)
                 continue;
             blocks++;
-            stops += rounded->stop[b] != exact->stop[b];
+            stops += other->stop[b] != first->stop[b];
             for (size_t k = block->first; k < block->end; k++) {
-                if (isnan(exact->score[k]))
+                if (isnan(first->score[k]) || isnan(other->score[k]))
                     continue;
                 windows++;
-                verdicts += (rounded->score[k] < rounded->cut) != (exact->score[k] < exact->cut);
-                furthest = fmax(furthest, fabs(rounded->score[k] - exact->score[k]));
+                verdicts += ggn_method_passes(other, k) != ggn_method_passes(first, k);
+                furthest = fmax(furthest, fabs(other->score[k] - first->score[k]));
             }
         }
         if (!j->o->json)
-            printf("%s: %d of %d verdicts and %d of %d stops differ from float; p moves by at most %.2g%s\n\n", rounded->name, verdicts, windows,
-                   stops, blocks, furthest, ggn_precision_has_bf16() ? "" : " (this processor has no bfloat16 products)");
-        cJSON *o = cJSON_AddObjectToObject(to, rounded->name);
+            printf("%s: %d of %d verdicts and %d of %d stops differ from %s; p moves by at most %.2g\n\n", other->name, verdicts, windows, stops, blocks,
+                   first->name, furthest);
+        cJSON *o = cJSON_AddObjectToObject(to, other->name);
+        cJSON_AddStringToObject(o, "from", first->name);
         cJSON_AddNumberToObject(o, "windows", windows);
         cJSON_AddNumberToObject(o, "verdicts_changed", verdicts);
         cJSON_AddNumberToObject(o, "blocks", blocks);
@@ -248,7 +248,7 @@ static int report(struct job *j, int skipped, struct ggn_err *err)
     cJSON_AddNumberToObject(root, "window", j->set.window);
     cJSON_AddNumberToObject(root, "early_rate_tuned_for", j->o->early);
     cJSON_AddStringToObject(root, "tuned_on", ggn_split_names[j->tuning]);
-    cJSON *splits = cJSON_AddObjectToObject(root, "splits"), *bf16 = j->o->bf16 ? cJSON_AddObjectToObject(root, "bf16") : NULL;
+    cJSON *splits = cJSON_AddObjectToObject(root, "splits"), *changes = cJSON_AddObjectToObject(root, "changes");
     int rc = GGN_OK;
     if (!j->o->json)
         printf("labels: %s; cuts tuned on %s for %.1f %% early stops%s\n", label_source(&j->set.chains.data), ggn_split_names[j->tuning], 100.0 * j->o->early,
@@ -263,8 +263,7 @@ static int report(struct job *j, int skipped, struct ggn_err *err)
         if (!j->o->json)
             ggn_report_table(stdout, &j->set, (enum ggn_split)split, j->methods, metrics, j->n);
         cJSON_AddItemToObject(splits, ggn_split_names[split], ggn_report_json(j->methods, metrics, j->n));
-        if (j->o->bf16)
-            report_bf16(j, (enum ggn_split)split, cJSON_AddObjectToObject(bf16, ggn_split_names[split]));
+        report_changes(j, (enum ggn_split)split, cJSON_AddObjectToObject(changes, ggn_split_names[split]));
         if (j->o->out != NULL)
             rc = pictures(j, (enum ggn_split)split, err);
     }
@@ -294,8 +293,10 @@ int ggn_cmd_evaluate(int argc, char **argv)
     int window, skipped = 0;
 
     argp_parse(&argp, argc, argv, 0, NULL, &o);
+    if (o.bf16 && !ggn_precision_has_bf16())
+        fprintf(stderr, "%s: this processor has no bfloat16 products: --bf16 judges in float\n", argv[0]);
     for (int i = 0; i < MAX_METHODS; i++)
-        j.exact[i] = -1;
+        j.likened[i] = -1;
     struct ggn_threads *threads = ggn_threads_create(o.threads, &err);
     int rc = threads == NULL ? err.code : GGN_OK;
     if (rc == GGN_OK && o.out != NULL && mkdir(o.out, 0777) != 0 && errno != EEXIST)

@@ -117,14 +117,23 @@ int ggn_method_scores(struct ggn_method *m, const struct ggn_eval_set *s, const 
     return rc;
 }
 
+static int passes(const struct ggn_method *m, size_t i, double cut, double limit)
+{
+    return m->score[i] < cut && !(m->guard != NULL && m->guard[i] > limit);
+}
+
+int ggn_method_passes(const struct ggn_method *m, size_t i)
+{
+    return passes(m, i, m->cut, m->guard_limit);
+}
+
 static double stop_of(const struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_eval_block *b, double cut, double limit)
 {
     int below = 0;
     for (size_t i = b->first; i < b->end; i++) {
         if (isnan(m->score[i]))
             continue; /* not judged there: neither a pass nor a failure */
-        int pass = m->score[i] < cut && !(m->guard != NULL && m->guard[i] > limit);
-        below = pass ? below + 1 : 0;
+        below = passes(m, i, cut, limit) ? below + 1 : 0;
         if (below >= m->passes)
             return s->spp[i];
     }

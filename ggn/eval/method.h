@@ -60,6 +60,9 @@ struct ggn_method_metrics {
 int ggn_method_measure(const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, struct ggn_method_metrics *out,
                        struct ggn_err *err);
 
+/* Whether case i says that its block may stop: below the cut and not held back. */
+int ggn_method_passes(const struct ggn_method *m, size_t i);
+
 /* The case of block b at which it stops (spp >= stop), the last if none. */
 size_t ggn_method_stop_case(const struct ggn_method *m, const struct ggn_eval_set *s, int b);
 int ggn_eval_count(const struct ggn_eval_set *s, enum ggn_split split);

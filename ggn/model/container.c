@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/fio.h"
+#include "nn/half.h"
 
 static const char MAGIC[8] = {'L', 'U', 'L', 'L', 'G', 'G', 'N', '\n'};
 
@@ -22,62 +23,6 @@ const char *ggn_type_name(enum ggn_type type)
 
 /* --- numbers ----------------------------------------------------------------------------------------------------------- */
 
-static uint32_t bits_of(float x)
-{
-    uint32_t u;
-    memcpy(&u, &x, sizeof u);
-    return u;
-}
-
-static float float_of(uint32_t u)
-{
-    float x;
-    memcpy(&x, &u, sizeof x);
-    return x;
-}
-
-uint16_t ggn_f32_to_bf16(float x)
-{
-    uint32_t u = bits_of(x);
-    if ((u & 0x7fffffffu) > 0x7f800000u)
-        return (uint16_t)(u >> 16 | 0x40);
-    return (uint16_t)((u + 0x7fff + (u >> 16 & 1)) >> 16);
-}
-
-float ggn_bf16_to_f32(uint16_t x)
-{
-    return float_of((uint32_t)x << 16);
-}
-
-uint16_t ggn_f32_to_f16(float x)
-{
-    uint32_t u = bits_of(x), sign = u >> 16 & 0x8000, a = u & 0x7fffffff;
-
-    if (a > 0x7f800000u)
-        return (uint16_t)(sign | 0x7e00);
-    if (a >= 0x477ff000u) /* 65520 and more round to infinity */
-        return (uint16_t)(sign | 0x7c00);
-    if (a < 0x38800000u) { /* subnormal: units of 2^-24 */
-        float scaled = float_of(a) * 16777216.0f;
-        return (uint16_t)(sign | (uint32_t)lrintf(scaled));
-    }
-    a += 0xfff + (a >> 13 & 1);
-    return (uint16_t)(sign | (a - 0x38000000u) >> 13);
-}
-
-float ggn_f16_to_f32(uint16_t x)
-{
-    uint32_t sign = (uint32_t)(x & 0x8000) << 16, e = x >> 10 & 31, m = x & 0x3ff;
-
-    if (e == 31)
-        return float_of(sign | 0x7f800000u | m << 13);
-    if (e == 0) {
-        float magnitude = (float)m / 16777216.0f;
-        return sign ? -magnitude : magnitude;
-    }
-    return float_of(sign | (e + 112) << 23 | m << 13);
-}
-
 static void put32(unsigned char *p, uint32_t v)
 {
     for (int i = 0; i < 4; i++)
@@ -93,6 +38,21 @@ static void put64(unsigned char *p, uint64_t v)
 static uint32_t get32(const unsigned char *p)
 {
     return p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
+}
+
+static void put_float(unsigned char *p, float x)
+{
+    uint32_t u;
+    memcpy(&u, &x, sizeof u);
+    put32(p, u);
+}
+
+static float get_float(const unsigned char *p)
+{
+    uint32_t u = get32(p);
+    float x;
+    memcpy(&x, &u, sizeof x);
+    return x;
 }
 
 static uint64_t get64(const unsigned char *p)
@@ -143,7 +103,7 @@ static void encode(unsigned char *p, const struct ggn_entry *e)
 {
     for (size_t i = 0; i < e->count; i++) {
         if (e->type == GGN_F32) {
-            put32(p + 4 * i, bits_of(e->write[i]));
+            put_float(p + 4 * i, e->write[i]);
         } else {
             uint16_t v = e->type == GGN_F16 ? ggn_f32_to_f16(e->write[i]) : ggn_f32_to_bf16(e->write[i]);
             p[2 * i] = (unsigned char)v;
@@ -326,7 +286,7 @@ int ggn_container_get(const struct ggn_container *c, const char *name, int rank,
     const unsigned char *p = (const unsigned char *)c->data + e->offset;
     for (size_t i = 0; i < e->count; i++) {
         uint16_t half = (uint16_t)(p[i * type_size[e->type]] | p[i * type_size[e->type] + 1] << 8);
-        out[i] = e->type == GGN_F32   ? float_of(get32(p + 4 * i))
+        out[i] = e->type == GGN_F32   ? get_float(p + 4 * i)
                  : e->type == GGN_F16 ? ggn_f16_to_f32(half)
                                       : ggn_bf16_to_f32(half);
         if (!isfinite(out[i]))

@@ -29,12 +29,6 @@ enum { GGN_CONTAINER_VERSION = 1, GGN_CONTAINER_NAME = 48, GGN_CONTAINER_TENSORS
 
 const char *ggn_type_name(enum ggn_type type);
 
-/* Rounds to nearest even; NaN stays NaN. */
-uint16_t ggn_f32_to_bf16(float x);
-float ggn_bf16_to_f32(uint16_t x);
-uint16_t ggn_f32_to_f16(float x);
-float ggn_f16_to_f32(uint16_t x);
-
 struct ggn_entry {
     char name[GGN_CONTAINER_NAME]; /* at most 47 characters */
     enum ggn_type type;

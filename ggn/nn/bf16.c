@@ -1,6 +1,6 @@
 #include "nn/bf16.h"
 
-#include <string.h>
+#include "nn/half.h"
 
 int ggn_bf16_available(void)
 {
@@ -16,14 +16,6 @@ size_t ggn_bf16_pack_size(int n_in, int n_out)
     return (size_t)((n_in + 1) / 2) * (size_t)n_out * 9;
 }
 
-/* Round to nearest even; weights are finite. */
-static uint32_t round_bf16(float x)
-{
-    uint32_t u;
-    memcpy(&u, &x, sizeof u);
-    return (u + 0x7fff + (u >> 16 & 1)) >> 16;
-}
-
 void ggn_bf16_pack(uint32_t *out, const float *packed, int n_in, int n_out, int tile_oc)
 {
     for (int oc = 0, tile; oc < n_out; oc += tile) {
@@ -31,7 +23,8 @@ void ggn_bf16_pack(uint32_t *out, const float *packed, int n_in, int n_out, int 
             tile /= 2;
         for (int i = 0; i < n_in; i += 2) {
             for (int k = 0; k < 9 * tile; k++)
-                *out++ = round_bf16(packed[k]) | (i + 1 < n_in ? round_bf16(packed[9 * tile + k]) << 16 : 0);
+                *out++ =
+                    ggn_f32_to_bf16(packed[k]) | (i + 1 < n_in ? (uint32_t)ggn_f32_to_bf16(packed[9 * tile + k]) << 16 : 0);
             packed += (i + 1 < n_in ? 18 : 9) * tile;
         }
     }

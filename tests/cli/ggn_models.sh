@@ -1,5 +1,5 @@
 #!/bin/sh
-# ggn golden, inspect, bench: what they print and how they fail.
+# ggn golden, inspect, convert, bench: what they print and how they fail.
 ggn=${BUILD:-build}/bin/ggn
 corpus=tests/fuzz/corpus/ggn_model
 tmp=$(mktemp -d) || exit 2
@@ -29,6 +29,17 @@ check "a damaged file is one line and exit 2" $([ $rc = 2 ] && one_line && grep 
 { head -c 8 "$corpus/f16.ggn"; printf '\003'; tail -c +10 "$corpus/f16.ggn"; } >"$tmp/future.ggn"
 run inspect "$tmp/future.ggn"
 check "a future version is named, exit 2" $([ $rc = 2 ] && one_line && grep -q 'version 3' "$tmp/err" && echo 1)
+run convert --type f32 "$corpus/paper-bf16.ggn" "$tmp/wide.ggn" && run convert --type bf16 "$tmp/wide.ggn" "$tmp/back.ggn"
+check "convert to more bits and back is the same file" $([ $rc = 0 ] && cmp -s "$corpus/paper-bf16.ggn" "$tmp/back.ggn" &&
+    [ "$(wc -c <"$tmp/wide.ggn")" -gt "$(wc -c <"$tmp/back.ggn")" ] && echo 1)
+run convert "$tmp/wide.ggn" "$tmp/half.ggn" && run inspect --tensors "$tmp/half.ggn"
+check "convert stores f16 when nothing is said" $([ $rc = 0 ] && grep -q 'denoiser/enc0.0.weight .*f16 ' "$tmp/out" && echo 1)
+run convert "$tmp/short.ggn" "$tmp/none.ggn"
+check "convert of a truncated file is one line and exit 2" $([ $rc = 2 ] && one_line && [ ! -e "$tmp/none.ggn" ] && echo 1)
+run convert "$tmp/wide.ggn" /nonexistent/out.ggn
+check "convert into no folder is one line and exit 2" $([ $rc = 2 ] && one_line && echo 1)
+run convert --type f64 "$tmp/wide.ggn" "$tmp/none.ggn"
+check "convert to no type is exit 2" $([ $rc = 2 ] && grep -q f64 "$tmp/err" && [ ! -e "$tmp/none.ggn" ] && echo 1)
 run golden --base-r=-1
 check "a bad seed is exit 2" $([ $rc = 2 ] && echo 1)
 run golden --float --base-r=1 --base-m=2 --base-d=3

@@ -43,6 +43,12 @@ $ggn train $tiny --lr 0.02 --seed 2 --out "$tmp/f.ggn" -q 2>"$tmp/err" &&
     grep -q "\"best_step\":[[:space:]]*$(cat "$tmp/best")," "$tmp/f.ggn.card.json"
 check "the epoch with the lowest validation loss is kept, not the last, not the one with the best AUC" $?
 
+# the changed stops that are counted are those in which the tables of stops differ
+$ggn evaluate -d $data -m "$tmp/a.ggn" -m "$tmp/f.ggn" --retune --no-quality -o "$tmp/report" >"$tmp/out" 2>"$tmp/err" &&
+    changed=$(diff "$tmp/report/train-stops-aggn.csv" "$tmp/report/train-stops-fggn.csv" | grep -c '^>') && [ "$changed" -gt 0 ] &&
+    grep -q "^f.ggn: [1-9][0-9]* of [0-9]* verdicts and $changed of 9 stops differ from a.ggn" "$tmp/out"
+check "evaluate counts what another model decides differently" $?
+
 # interrupted once in each phase: as soon as the curves have so many rows
 for rows in 2 4; do
     $ggn train $tiny --out "$tmp/d.ggn" --resume -q 2>"$tmp/err" &

@@ -10,6 +10,7 @@
 
 #include "base/fio.h"
 #include "model/model.h"
+#include "nn/half.h"
 
 static char path[] = "/tmp/ggn_model.XXXXXX";
 static const struct ggn_hyper small = {GGN_PRESET_LULL, 16, 17, 2, 1, 2, 1};

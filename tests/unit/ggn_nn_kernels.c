@@ -6,10 +6,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "model/container.h"
 #include "model/networks.h"
 #include "nn/bf16.h"
 #include "nn/exec.h"
+#include "nn/half.h"
 #include "support/ggn_naive.h"
 
 static const double F32_TOLERANCE = 2e-5, F64_TOLERANCE = 1e-12; /* of sums of up to some thousand products of order 1 */
