@@ -26,7 +26,7 @@ struct options {
 
 static const struct argp_option option_table[] = {
     {"data", 'd', "DATA", 0, "labelled data set: a folder of sequences with split.json (required)", 1},
-    {"model", 'm', "FILE", 0, "trained model (.ggn); may be repeated: decisions that differ from the first one's are counted", 1},
+    {"model", 'm', "FILE", 0, "trained model (.ggn); may be repeated", 1},
     {"json", 'j', NULL, 0, "print the figures as JSON", 2},
     {"output", 'o', "DIR", 0, "write figures.json and pictures there", 2},
     {"early", KEY_EARLY, "RATE", 0, "early-stop rate that cuts are tuned for on the training scenes (default 0.05)", 3},
