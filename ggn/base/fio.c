@@ -63,6 +63,12 @@ int ggn_fio_rename(const char *tmp_path, const char *path, struct ggn_err *err)
     return GGN_OK;
 }
 
+int ggn_fio_join(char *path, const char *dir, const char *name, struct ggn_err *err)
+{
+    int n = snprintf(path, 4096, "%s/%s", dir, name);
+    return n > 0 && n < 4096 ? GGN_OK : ggn_fail(err, GGN_EINVAL, "%.64s...: the path is too long", dir);
+}
+
 int ggn_fio_begin(struct ggn_fio_out *out, const char *path, struct ggn_err *err)
 {
     memset(out, 0, sizeof *out);
@@ -92,6 +98,16 @@ int ggn_fio_commit(struct ggn_fio_out *out, struct ggn_err *err)
         return ggn_fail(err, GGN_EIO, "%s: write failed: %s", out->path, strerror(saved != 0 ? saved : EIO));
     }
     return ggn_fio_rename(out->tmp_path, out->path, err);
+}
+
+int ggn_fio_write_line(const char *path, const char *text, struct ggn_err *err)
+{
+    struct ggn_fio_out out;
+    int rc = ggn_fio_begin(&out, path, err);
+    if (rc != GGN_OK)
+        return rc;
+    fprintf(out.file, "%s\n", text);
+    return ggn_fio_commit(&out, err);
 }
 
 void ggn_fio_abort(struct ggn_fio_out *out)

@@ -16,6 +16,9 @@
  * and anything but regular files are refused (GGN_EINVAL). */
 int ggn_fio_read(const char *path, size_t max_size, char **data, size_t *size, struct ggn_err *err);
 
+/* DIR/NAME; path has room for 4096 bytes. */
+int ggn_fio_join(char *path, const char *dir, const char *name, struct ggn_err *err);
+
 struct ggn_fio_out {
     FILE *file;         /* open for writing between begin and commit/abort */
     char path[4096];    /* the final name */
@@ -26,6 +29,8 @@ struct ggn_fio_out {
 int ggn_fio_begin(struct ggn_fio_out *out, const char *path, struct ggn_err *err);
 /* Flushes, syncs, closes and renames; on failure removes the temporary and keeps the old file. */
 int ggn_fio_commit(struct ggn_fio_out *out, struct ggn_err *err);
+/* All of that for a text, which gets a newline at its end. */
+int ggn_fio_write_line(const char *path, const char *text, struct ggn_err *err);
 /* Closes and removes the temporary. Safe after commit and on a zeroed object. */
 void ggn_fio_abort(struct ggn_fio_out *out);
 

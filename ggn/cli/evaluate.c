@@ -220,23 +220,8 @@ static int pictures(const struct job *j, enum ggn_split split, struct ggn_err *e
 static int write_json(const struct options *o, const char *text, struct ggn_err *err)
 {
     char path[4096];
-    struct ggn_fio_out out;
-    snprintf(path, sizeof path, "%.3900s/figures.json", o->out);
-    int rc = ggn_fio_begin(&out, path, err);
-    if (rc != GGN_OK)
-        return rc;
-    fprintf(out.file, "%s\n", text);
-    return ggn_fio_commit(&out, err);
-}
-
-/* "human", "observer" or "mixed" */
-static const char *label_source(const struct ggn_dataset *d)
-{
-    const char *source = NULL;
-    for (int i = 0; i < d->n; i++)
-        if (d->views[i].has_labels)
-            source = source == NULL || strcmp(source, d->views[i].labels.source) == 0 ? d->views[i].labels.source : "mixed";
-    return source != NULL ? source : "none";
+    int rc = ggn_fio_join(path, o->out, "figures.json", err);
+    return rc == GGN_OK ? ggn_fio_write_line(path, text, err) : rc;
 }
 
 static int report(struct job *j, int skipped, struct ggn_err *err)
@@ -244,14 +229,14 @@ static int report(struct job *j, int skipped, struct ggn_err *err)
     struct ggn_method_metrics metrics[MAX_METHODS];
     cJSON *root = cJSON_CreateObject();
     cJSON_AddStringToObject(root, "data", j->o->data);
-    cJSON_AddStringToObject(root, "labels", label_source(&j->set.chains.data));
+    cJSON_AddStringToObject(root, "labels", ggn_dataset_label_source(&j->set.chains.data));
     cJSON_AddNumberToObject(root, "window", j->set.window);
     cJSON_AddNumberToObject(root, "early_rate_tuned_for", j->o->early);
     cJSON_AddStringToObject(root, "tuned_on", ggn_split_names[j->tuning]);
     cJSON *splits = cJSON_AddObjectToObject(root, "splits"), *changes = cJSON_AddObjectToObject(root, "changes");
     int rc = GGN_OK;
     if (!j->o->json)
-        printf("labels: %s; cuts tuned on %s for %.1f %% early stops%s\n", label_source(&j->set.chains.data), ggn_split_names[j->tuning], 100.0 * j->o->early,
+        printf("labels: %s; cuts tuned on %s for %.1f %% early stops%s\n", ggn_dataset_label_source(&j->set.chains.data), ggn_split_names[j->tuning], 100.0 * j->o->early,
                skipped > 0 ? "; views without labels are left out" : "");
     for (int split = 0; split < GGN_SPLITS && rc == GGN_OK; split++) {
         if (ggn_eval_count(&j->set, (enum ggn_split)split) == 0)

@@ -153,3 +153,12 @@ int ggn_dataset_open(const char *path, struct ggn_dataset *data, struct ggn_err 
     *data = d;
     return GGN_OK;
 }
+
+const char *ggn_dataset_label_source(const struct ggn_dataset *data)
+{
+    const char *source = NULL;
+    for (int i = 0; i < data->n; i++)
+        if (data->views[i].has_labels)
+            source = source == NULL || strcmp(source, data->views[i].labels.source) == 0 ? data->views[i].labels.source : "mixed";
+    return source != NULL ? source : "none";
+}

@@ -33,4 +33,7 @@ struct ggn_dataset {
 int ggn_dataset_open(const char *path, struct ggn_dataset *data, struct ggn_err *err);
 void ggn_dataset_release(struct ggn_dataset *data);
 
+/* Whose thresholds they are: "human", "observer", "mixed" or "none". */
+const char *ggn_dataset_label_source(const struct ggn_dataset *data);
+
 #endif

@@ -98,19 +98,11 @@ int ggn_labels_parse(const char *path, const char *text, size_t size, struct ggn
     return rc;
 }
 
-static int path_of(const char *dir, char *path, size_t room, struct ggn_err *err)
-{
-    int n = snprintf(path, room, "%s/labels.json", dir);
-    if (n < 0 || (size_t)n >= room)
-        return ggn_fail(err, GGN_EINVAL, "%.64s...: the path is too long", dir);
-    return GGN_OK;
-}
-
 int ggn_labels_read(const char *dir, struct ggn_labels *labels, struct ggn_err *err)
 {
     char path[4096], *text;
     size_t size;
-    int rc = path_of(dir, path, sizeof path, err);
+    int rc = ggn_fio_join(path, dir, "labels.json", err);
     if (rc == GGN_OK)
         rc = ggn_fio_read(path, MAX_TEXT, &text, &size, err);
     if (rc != GGN_OK)
@@ -144,8 +136,7 @@ static cJSON *to_json(const struct ggn_labels *labels, int *ok)
 int ggn_labels_write(const char *dir, const struct ggn_labels *labels, struct ggn_err *err)
 {
     char path[4096];
-    struct ggn_fio_out out;
-    int rc = path_of(dir, path, sizeof path, err);
+    int rc = ggn_fio_join(path, dir, "labels.json", err);
     if (rc != GGN_OK)
         return rc;
     int ok = 1;
@@ -154,11 +145,7 @@ int ggn_labels_write(const char *dir, const struct ggn_labels *labels, struct gg
     cJSON_Delete(root);
     if (text == NULL)
         return ggn_fail_nomem(err, path);
-    rc = ggn_fio_begin(&out, path, err);
-    if (rc == GGN_OK) {
-        fprintf(out.file, "%s\n", text);
-        rc = ggn_fio_commit(&out, err);
-    }
+    rc = ggn_fio_write_line(path, text, err);
     cJSON_free(text);
     return rc;
 }

@@ -138,19 +138,11 @@ out:
     return rc;
 }
 
-static int path_in(const char *dir, const char *name, char *path, size_t room, struct ggn_err *err)
-{
-    int n = snprintf(path, room, "%s/%s", dir, name);
-    if (n < 0 || (size_t)n >= room)
-        return ggn_fail(err, GGN_EINVAL, "%.64s...: the path is too long", dir);
-    return GGN_OK;
-}
-
 int ggn_manifest_read(const char *dir, struct ggn_manifest *m, struct ggn_err *err)
 {
     char path[4096], *text;
     size_t size;
-    int rc = path_in(dir, "manifest.json", path, sizeof path, err);
+    int rc = ggn_fio_join(path, dir, "manifest.json", err);
     if (rc == GGN_OK)
         rc = ggn_fio_read(path, MAX_TEXT, &text, &size, err);
     if (rc != GGN_OK)
@@ -225,8 +217,7 @@ static cJSON *to_json(const struct ggn_manifest *m, int *ok)
 int ggn_manifest_write(const char *dir, const struct ggn_manifest *m, struct ggn_err *err)
 {
     char path[4096];
-    struct ggn_fio_out out;
-    int rc = path_in(dir, "manifest.json", path, sizeof path, err);
+    int rc = ggn_fio_join(path, dir, "manifest.json", err);
     if (rc != GGN_OK)
         return rc;
     int ok = 1;
@@ -235,11 +226,7 @@ int ggn_manifest_write(const char *dir, const struct ggn_manifest *m, struct ggn
     cJSON_Delete(root);
     if (text == NULL)
         return ggn_fail_nomem(err, path);
-    rc = ggn_fio_begin(&out, path, err);
-    if (rc == GGN_OK) {
-        fprintf(out.file, "%s\n", text);
-        rc = ggn_fio_commit(&out, err);
-    }
+    rc = ggn_fio_write_line(path, text, err);
     cJSON_free(text);
     return rc;
 }
@@ -249,7 +236,7 @@ int ggn_manifest_read_block(const char *dir, const struct ggn_manifest *m, uint3
     const struct ggn_manifest_block *e = &m->blocks[index];
     struct ggn_seq_block b;
     char path[4096];
-    int rc = path_in(dir, e->file, path, sizeof path, err);
+    int rc = ggn_fio_join(path, dir, e->file, err);
     if (rc == GGN_OK)
         rc = ggn_seq_block_read(path, &b, err);
     if (rc != GGN_OK)

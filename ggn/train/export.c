@@ -55,12 +55,7 @@ static cJSON *describe_data(const struct ggn_session *s)
     cJSON_AddNumberToObject(o, "validation_blocks", ggn_chains_count(&s->set, GGN_SPLIT_VALIDATION, 1));
     cJSON_AddNumberToObject(o, "training_windows", s->train.n);
     cJSON_AddNumberToObject(o, "validation_windows", s->validation.n);
-    const char *source = "none";
-    for (int i = 0; i < s->set.data.n; i++)
-        if (s->set.data.views[i].has_labels)
-            source = !strcmp(source, "none") || !strcmp(source, s->set.data.views[i].labels.source) ? s->set.data.views[i].labels.source
-                                                                                                    : "mixed";
-    cJSON_AddStringToObject(o, "labels", source);
+    cJSON_AddStringToObject(o, "labels", ggn_dataset_label_source(&s->set.data));
     return o;
 }
 
@@ -78,7 +73,6 @@ static cJSON *describe_validation(const struct ggn_stopping *st, double auc, dou
 
 static int write_card(const struct ggn_session *s, const struct ggn_model *model, struct ggn_err *err)
 {
-    struct ggn_fio_out out;
     char path[4096];
     cJSON *card = cJSON_Duplicate(model->provenance, 1);
 
@@ -94,11 +88,7 @@ static int write_card(const struct ggn_session *s, const struct ggn_model *model
     char *text = cJSON_Print(card);
     cJSON_Delete(card);
     snprintf(path, sizeof path, "%s.card.json", s->plan->out);
-    int rc = text ? ggn_fio_begin(&out, path, err) : ggn_fail_nomem(err, "card");
-    if (!rc) {
-        fprintf(out.file, "%s\n", text);
-        rc = ggn_fio_commit(&out, err);
-    }
+    int rc = text ? ggn_fio_write_line(path, text, err) : ggn_fail_nomem(err, "card");
     free(text);
     return rc;
 }
