@@ -1,5 +1,6 @@
 #include "model/container.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -156,15 +157,31 @@ static unsigned char *assemble(struct ggn_container *c, size_t *size)
     return file;
 }
 
+/* Whether every finite value stays finite in the type that it is stored in. */
+static int fits(const struct ggn_container *c, struct ggn_err *err)
+{
+    static const float most[GGN_TYPES] = {FLT_MAX, 65504.0f, 3.3895314e38f};
+
+    for (int i = 0; i < c->n_entries; i++)
+        for (size_t k = 0; k < c->entry[i].count; k++)
+            if (fabsf(c->entry[i].write[k]) > most[c->entry[i].type] && isfinite(c->entry[i].write[k]))
+                return ggn_fail(err, GGN_EINVAL, "tensor '%s' has a value of %g, too large for %s", c->entry[i].name,
+                                (double)c->entry[i].write[k], type_name[c->entry[i].type]);
+    return GGN_OK;
+}
+
 int ggn_container_write(struct ggn_container *c, const char *path, struct ggn_err *err)
 {
     struct ggn_fio_out out = {0};
     size_t size;
+    int rc = fits(c, err);
+    if (rc)
+        return rc;
     unsigned char *file = assemble(c, &size);
 
     if (!file)
         return ggn_fail_nomem(err, "model file");
-    int rc = ggn_fio_begin(&out, path, err);
+    rc = ggn_fio_begin(&out, path, err);
     if (!rc && fwrite(file, 1, size, out.file) != size)
         rc = ggn_fail(err, GGN_EIO, "%s: cannot write", path);
     if (!rc)

@@ -209,6 +209,29 @@ static void test_not_finite(void **state)
     (void)state;
 }
 
+/* What a narrower type cannot hold is refused, and the old file stays. */
+static void test_too_large(void **state)
+{
+    struct ggn_model *m = make(), *got = NULL;
+    struct ggn_err err = {0};
+
+    assert_int_equal(ggn_model_save(m, path, GGN_F32, &err), GGN_OK);
+    m->weights[GGN_NET_M]->params[3] = 65504.0f;
+    assert_int_equal(ggn_model_save(m, path, GGN_F16, &err), GGN_OK);
+    assert_int_equal(ggn_model_load(path, &got, &err), GGN_OK);
+    ggn_model_destroy(got);
+    m->weights[GGN_NET_M]->params[3] = -7e4f;
+    assert_int_equal(ggn_model_save(m, path, GGN_F16, &err), GGN_EINVAL);
+    assert_non_null(strstr(err.text, "too large for f16"));
+    assert_int_equal(ggn_model_load(path, &got, &err), GGN_OK);
+    ggn_model_destroy(got);
+    m->weights[GGN_NET_M]->params[3] = 3.4e38f;
+    assert_int_equal(ggn_model_save(m, path, GGN_BF16, &err), GGN_EINVAL);
+    assert_int_equal(ggn_model_save(m, path, GGN_F32, &err), GGN_OK);
+    ggn_model_destroy(m);
+    (void)state;
+}
+
 /* A failed write keeps the old file; a missing file is named. */
 static void test_paths(void **state)
 {
@@ -246,7 +269,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_round_trip), cmocka_unit_test(test_truncated),
                                        cmocka_unit_test(test_bit_flips),  cmocka_unit_test(test_forged),
-                                       cmocka_unit_test(test_not_finite), cmocka_unit_test(test_paths),
-                                       cmocka_unit_test(test_half_floats)};
+                                       cmocka_unit_test(test_not_finite), cmocka_unit_test(test_too_large),
+                                       cmocka_unit_test(test_paths),      cmocka_unit_test(test_half_floats)};
     return cmocka_run_group_tests(tests, setup, teardown);
 }
