@@ -6,6 +6,7 @@
 #include "base/clock.h"
 #include "eval/stats.h"
 #include "model/window.h"
+#include "train/calibrate.h"
 #include "train/session.h"
 
 static size_t window_values(const struct ggn_session *s)
@@ -240,31 +241,40 @@ static int choose_validation(const struct ggn_session *s, int *index)
     return n;
 }
 
+/* Loss and accuracy are those of the calibrated probability, as the model will be used: from epoch to epoch the logits of all
+ * windows shift together, which says nothing about the model (loss 0.18 and 0.41 at an AUC of 0.992 and 0.995). */
 static int validate(struct ggn_session *s, struct ggn_log_row *row, struct ggn_err *err)
 {
     size_t room = (size_t)s->plan->validation_windows + 1;
     int *index = malloc(room * sizeof *index), right = 0;
-    double *logit = malloc(room * sizeof *logit);
+    double *logit = malloc(room * sizeof *logit), *label = malloc(room * sizeof *label);
     unsigned char *noisy = malloc(room);
-    int rc = index && logit && noisy ? GGN_OK : ggn_fail_nomem(err, "validation");
+    int rc = index && logit && label && noisy ? GGN_OK : ggn_fail_nomem(err, "validation");
 
     row->validation_loss = row->validation_accuracy = row->validation_auc = (double)NAN;
     int n = rc ? 0 : choose_validation(s, index);
     if (n)
         rc = ggn_session_logits(s, &s->validation, index, n, logit, err);
     if (n && !rc) {
-        row->validation_loss = 0;
+        struct ggn_policy calibrated = ggn_policy_default();
         for (int i = 0; i < n; i++) {
             const struct ggn_window *w = &s->validation.list[index[i]];
             noisy[i] = (unsigned char)w->noisy;
-            right += (logit[i] > 0) == w->noisy;
-            row->validation_loss += ggn_bce(logit[i], w->label) / n;
+            label[i] = w->label;
+        }
+        ggn_calibrate_platt(logit, label, n, &calibrated);
+        row->validation_loss = 0;
+        for (int i = 0; i < n; i++) {
+            double z = calibrated.scale * logit[i] + calibrated.shift;
+            right += (z > 0) == noisy[i];
+            row->validation_loss += ggn_bce(z, label[i]) / n;
         }
         row->validation_accuracy = (double)right / n;
         rc = ggn_stats_auc(logit, noisy, (size_t)n, &row->validation_auc, err);
     }
     free(index);
     free(logit);
+    free(label);
     free(noisy);
     return rc;
 }

@@ -31,7 +31,7 @@ struct ggn_train_plan {
     int steps_r, steps;          /* steps of the two phases; preset paper: of its one phase, 0 = epochs · windows / batch */
     int epochs;                  /* preset paper */
     int epoch_steps;             /* steps between validations and checkpoints */
-    int patience;                /* epochs without a lower validation loss before the end; 0 = never */
+    int patience;                /* epochs without a lower calibrated validation loss before the end; 0 = never */
     double lr_r, lr;
     double difference;           /* preset lull: see ggn_train_fold */
     int soft_labels;
