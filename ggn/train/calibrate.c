@@ -57,7 +57,7 @@ int ggn_calibrate_stopping(const struct ggn_windows *w, const double *logit, con
                            struct ggn_stopping *out, struct ggn_err *err)
 {
     double *error = malloc(((size_t)w->set->n + 1) * sizeof *error), spent = 0, needed = 0;
-    int early = 0;
+    int early = 0, unsure = 0;
 
     if (!error)
         return ggn_fail_nomem(err, "thresholds");
@@ -70,6 +70,7 @@ int ggn_calibrate_stopping(const struct ggn_windows *w, const double *logit, con
         if (stop == 0) /* nothing is known after the end of the chain: right if the noise is seen until there */
             stop = fmax(chain->spp[chain->n_levels - 1], truth);
         early += stop < 0.8 * truth;
+        unsure += stop < 0.8 * truth * exp2(chain->spread);
         spent += stop;
         needed += truth;
         error[out->blocks] = fabs(log2(stop / truth));
@@ -77,6 +78,7 @@ int ggn_calibrate_stopping(const struct ggn_windows *w, const double *logit, con
     }
     if (out->blocks) {
         out->early_rate = (double)early / out->blocks;
+        out->unsure_rate = (double)unsure / out->blocks;
         out->samples_ratio = spent / needed;
         out->mean_abs_log2 /= out->blocks;
         out->median_abs_log2 = ggn_stats_quantile(error, (size_t)out->blocks, 0.5);
@@ -96,7 +98,7 @@ int ggn_calibrate_threshold(const struct ggn_windows *w, const double *logit, do
         int rc = ggn_calibrate_stopping(w, logit, policy, percent / 100.0, &now, err);
         if (rc)
             return rc;
-        if (threshold > 0 && (now.early_rate > early_rate || now.mean_abs_log2 >= best.mean_abs_log2))
+        if (threshold > 0 && (now.unsure_rate > early_rate || now.mean_abs_log2 >= best.mean_abs_log2))
             continue;
         best = now;
         threshold = percent / 100.0;

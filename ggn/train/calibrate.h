@@ -13,6 +13,7 @@ void ggn_calibrate_platt(const double *logit, const double *label, int n, struct
 struct ggn_stopping {
     int blocks;
     double early_rate;    /* share stopped below 0.8 of the true threshold */
+    double unsure_rate;   /* share stopped below 0.8 of what that may be: one spread (labels.h) above the label */
     double samples_ratio; /* samples spent / samples at the true thresholds */
     double median_abs_log2, mean_abs_log2; /* of stop / true threshold */
 };
@@ -20,8 +21,9 @@ struct ggn_stopping {
 int ggn_calibrate_stopping(const struct ggn_windows *windows, const double *logit, const struct ggn_policy *policy, double t,
                            struct ggn_stopping *out, struct ggn_err *err);
 
-/* The threshold, in steps of 0.01, with the smallest mean |log2(stop / true)| of those that keep the early rate at or below
- * `early_rate`; 0.01 if none does. (The largest that keeps the rate would be 0.99 whenever the few blocks are easy.) */
+/* The threshold, in steps of 0.01, with the smallest mean |log2(stop / true)| of those that keep the unsure rate at or below
+ * `early_rate`; 0.01 if none does. (The largest that keeps the rate would be 0.99 whenever the few blocks are easy. The margin
+ * of one spread: none of ten blocks stopped early says little about the next ten, whose labels are no surer.) */
 int ggn_calibrate_threshold(const struct ggn_windows *windows, const double *logit, double early_rate, struct ggn_policy *policy,
                             struct ggn_stopping *out, struct ggn_err *err);
 

@@ -280,8 +280,8 @@ static void platt_recovers_the_scale(void **state)
     (void)state;
 }
 
-/* A judge whose logit crosses 0 one check after the true threshold: no early stop at t = 0.5, and the chosen t is at least as
- * near without stopping early. */
+/* A judge whose logit crosses 0 one check after the true threshold: no early stop at t = 0.5, and the chosen t stops
+ * none early even if the labels are one spread too low. */
 static void the_threshold_respects_the_early_rate(void **state)
 {
     struct ggn_chains set;
@@ -301,10 +301,16 @@ static void the_threshold_respects_the_early_rate(void **state)
     assert_int_equal(at.blocks, 9);
     assert_true(at.early_rate == 0 && at.samples_ratio >= 1);
     assert_int_equal(ggn_calibrate_threshold(&w, logit, 0, &policy, &chosen, &err), 0);
-    assert_true(chosen.early_rate == 0 && chosen.mean_abs_log2 <= at.mean_abs_log2);
+    assert_true(chosen.early_rate == 0 && chosen.unsure_rate == 0);
     assert_true(policy.threshold > 0.05 && policy.threshold < 0.9);
     double slope = ggn_calibrate_slope(&w, logit, &policy);
     assert_true(fabs(slope - 6) < 1e-6);
+    /* labels that are not sure by an octave: every stop keeps that distance */
+    double near = chosen.mean_abs_log2;
+    for (int c = 0; c < set.n; c++)
+        set.chains[c].spread = 1;
+    assert_int_equal(ggn_calibrate_threshold(&w, logit, 0, &policy, &chosen, &err), 0);
+    assert_true(chosen.unsure_rate == 0 && chosen.mean_abs_log2 > near + 0.5);
     free(logit);
     ggn_windows_release(&w);
     ggn_chains_release(&set);
