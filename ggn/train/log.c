@@ -94,7 +94,7 @@ int ggn_log_draw(const struct ggn_log *log, const char *path, struct ggn_err *er
               "$phase0 using 1:3 with linespoints lw 2 pt 7 ps 0.4 lc '#cc5522' title 'validation'\n", f);
     if (judge)
         fputs("set title 'Generator and discriminator: cross-entropy'\nplot $phase1 using 1:2 with linespoints lw 2 pt 7 ps 0.4 lc '#3366aa' title "
-              "'training', $phase1 using 1:3 with linespoints lw 2 pt 7 ps 0.4 lc '#cc5522' title 'validation'\n"
+              "'training', $phase1 using 1:3 with linespoints lw 2 pt 7 ps 0.4 lc '#cc5522' title 'validation, calibrated'\n"
               "set title 'Accuracy and AUC'\nset yrange [0.5:1]\nset key bottom right\n"
               "plot $phase1 using 1:4 with linespoints lw 2 pt 7 ps 0.4 lc '#3366aa' title 'training accuracy', $phase1 using 1:5 with linespoints lw 2 pt 7 ps 0.4 "
               "lc '#cc5522' title 'validation accuracy', $phase1 using 1:6 with linespoints lw 2 pt 7 ps 0.4 lc '#228833' title 'validation AUC'\n", f);
