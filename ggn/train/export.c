@@ -109,7 +109,7 @@ int ggn_session_export(struct ggn_session *s, const struct ggn_policy *policy, c
     cJSON_AddItemToObject(model->provenance, "data", describe_data(s));
     cJSON_AddItemToObject(model->provenance, "validation", describe_validation(stopping, auc, accuracy));
     int rc = ggn_policy_set(model, policy, err);
-    /* f32: folding makes the newest image's weight a difference of large numbers, which half floats would not keep */
+    /* f32: half floats change a verdict now and then (counted in ggn/models/README.md); `ggn convert` is for who takes that */
     if (!rc)
         rc = ggn_model_save(model, s->plan->out, GGN_F32, err);
     if (!rc)
