@@ -1,6 +1,5 @@
 /* `ggn convert MODEL OUT`: a model with its weights stored in another type. */
 #include <argp.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "cli/commands.h"

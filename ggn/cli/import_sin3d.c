@@ -8,6 +8,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/fio.h"
 #include "cli/commands.h"
 #include "data/sin3d.h"
 
@@ -66,16 +67,15 @@ static void show_progress(void *data, const char *view, int done, int of)
 
 static int import_one(const struct options *o, const struct ggn_sin3d_options *so, const char *dir, struct ggn_err *err)
 {
-    char copy[4096], out[4200];
+    char copy[4096], out[4096];
     int labelled = 0;
     snprintf(copy, sizeof copy, "%s", dir);
     for (size_t n = strlen(copy); n > 1 && copy[n - 1] == '/';)
         copy[--n] = '\0';
     const char *slash = strrchr(copy, '/');
-    int n = snprintf(out, sizeof out, "%s/%s", o->out, slash != NULL ? slash + 1 : copy);
-    if (n < 0 || (size_t)n >= 4096)
-        return ggn_fail(err, GGN_EINVAL, "%.64s...: the path is too long", o->out);
-    int rc = ggn_sin3d_import_view(copy, out, so, &labelled, err);
+    int rc = ggn_fio_join(out, o->out, slash != NULL ? slash + 1 : copy, err);
+    if (rc == GGN_OK)
+        rc = ggn_sin3d_import_view(copy, out, so, &labelled, err);
     if (rc == GGN_OK)
         printf("%s: %s\n", out, labelled ? "imported with thresholds" : "imported, no thresholds for it");
     return rc;

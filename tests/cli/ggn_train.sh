@@ -36,7 +36,8 @@ $ggn train $tiny --out "$tmp/b.ggn" --threads 1 -q 2>"$tmp/err" && cmp "$tmp/a.g
 check "the same bytes with one thread" $?
 $ggn train $tiny --out "$tmp/c.ggn" --seed 2 -q 2>"$tmp/err" && ! cmp -s "$tmp/a.ggn" "$tmp/c.ggn"
 check "other bytes with another seed" $?
-# Settings chosen so that three rules choose three epochs: the first has the best AUC, the second the lowest loss, the third is the last.
+# Settings chosen so that three rules choose three epochs: the first has the best AUC, the second the lowest
+# loss of the calibrated probability (uncalibrated: the first again), the third is the last.
 $ggn train $tiny --steps-denoiser 10 --steps 30 --lr 0.02 --out "$tmp/f.ggn" -q 2>"$tmp/err" &&
     awk -F, '$1 == "judge" && (low == "" || $5 < low) { low = $5; best = $2 } $1 == "judge" && $7 > high { high = $7; other = $2 }
         END { if (best == other || best == $2) exit 1; print best }' "$tmp/f.ggn.csv" >"$tmp/best" 2>"$tmp/err" &&
