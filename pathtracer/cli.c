@@ -11,6 +11,7 @@
 #include "integ/integrator.h"
 #include "render/film.h"
 #include "render/output.h"
+#include "scene/xform.h"
 
 enum key {
     KEY_BLOCK = 256,
@@ -22,6 +23,8 @@ enum key {
     KEY_MAX_SEAM,
     KEY_SIZE,
     KEY_CROP,
+    KEY_LOOK_AT,
+    KEY_FOV,
     KEY_LIST_CRITERIA,
     KEY_SEED,
     KEY_PREVIEW,
@@ -67,6 +70,9 @@ static const struct argp_option options[] = {
     {"size", KEY_SIZE, "WxH", 0, "Image size, instead of the scene's", 0},
     {"crop", KEY_CROP, "X0,Y0,X1,Y1", 0,
      "Keep only these pixels. Blocks that the crop touches are rendered whole, so that they stop as in the full image", 0},
+    {"look-at", KEY_LOOK_AT, "\"EX EY EZ AX AY AZ UX UY UZ\"", 0,
+     "Look from E at A with U up, in the scene's world, instead of through the scene's camera", 0},
+    {"fov", KEY_FOV, "DEGREES", 0, "Field of view over the image's short side, instead of the scene's", 0},
     {"sampler", KEY_SAMPLER, "independent|sobol", 0, "Instead of the scene's", 0},
     {"integrator", KEY_INTEGRATOR, "path|bsdf-only", 0,
      "path: next-event estimation with multiple importance sampling (default); bsdf-only: brute force, for checking", 0},
@@ -209,6 +215,26 @@ static int get_crop(struct parse *p, const char *arg)
     return PT_OK;
 }
 
+static int get_look_at(struct parse *p, const char *arg)
+{
+    static const double far = 1e9; /* what single precision can still tell apart from the scene */
+    double *v = p->cli->view.look_at_world;
+    const char *at = arg;
+    struct pt_xform unused;
+    int count = 0;
+    for (char *end; count < 9; count++, at = end) {
+        v[count] = strtod(at, &end);
+        if (end == at || !(fabs(v[count]) <= far) || (*end != ' ' && *end != '\0'))
+            break;
+    }
+    if (count != 9 || at[strspn(at, " ")] != '\0')
+        return bad_value(p->err, "look-at", arg, "nine numbers with spaces between them: eye, point looked at, up");
+    if (!pt_xform_look_at(v, v + 3, v + 6, &unused))
+        return bad_value(p->err, "look-at", arg, "eye and point looked at apart, and up not along the view");
+    p->cli->view.has_look_at = 1;
+    return PT_OK;
+}
+
 static int get_param(struct parse *p, const char *arg)
 {
     struct pt_cli *cli = p->cli;
@@ -348,6 +374,10 @@ static int option_what(struct parse *p, int key, const char *arg)
         return get_size(p, arg);
     case KEY_CROP:
         return get_crop(p, arg);
+    case KEY_LOOK_AT:
+        return get_look_at(p, arg);
+    case KEY_FOV:
+        return get_real(p->err, "fov", arg, 1e-3, 179.9, &cli->view.fov_deg);
     case KEY_SAMPLER:
         return get_word(p, "sampler", arg, strlen(arg), "independent|sobol", &cli->sampler);
     case KEY_INTEGRATOR:

@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 #include "base/err.h"
+#include "scene/load.h"
 
 enum { PT_CLI_MAX_PARAMS = 64, PT_CLI_MAX_STOP_MAPS = 4 };
 
@@ -22,6 +23,7 @@ struct pt_cli {
     double time_budget_s, max_check_overhead, max_seam;
     int width, height;          /* 0 = the scene's */
     int crop[4], has_crop;
+    struct pt_view view;        /* instead of the scene's camera */
     const char *criterion;      /* NULL = not given */
     struct lull_pair params[PT_CLI_MAX_PARAMS];
     char *param_text[PT_CLI_MAX_PARAMS]; /* owns; what the keys and values point into */

@@ -75,7 +75,7 @@ static void note(void *data, const char *line)
 static int load_scene(struct session *s, struct pt_err *err)
 {
     struct pt_load_options options = {.strict = s->cli.strict, .width = s->cli.width, .height = s->cli.height,
-                                      .forced = s->cli.all_effects ? PT_FX_ALL : 0, .quiet = s->cli.quiet, .warn = note,
+                                      .view = s->cli.view, .forced = s->cli.all_effects ? PT_FX_ALL : 0, .quiet = s->cli.quiet, .warn = note,
                                       .warn_data = s};
     int rc = pt_scene_load(s->cli.scene, &options, &s->scene, &s->defaults, err);
     if (rc != PT_OK)
@@ -203,8 +203,12 @@ static int describe_settings(struct session *s, const struct pt_render_config *c
         (unsigned long long)c->spp_min, (unsigned long long)c->spp_max, c->uniform, c->max_seam, c->planes, i->seed, i->sampler,
         i->strategy, i->filter, (double)i->filter_x, (double)i->filter_y, (double)i->filter_sigma, i->max_depth, i->rr_depth,
         (double)i->max_component);
+    const struct pt_view *view = &s->cli.view;
+    used += (size_t)snprintf(s->settings + used, room - used, "fov=%.17g\nlook-at=", view->fov_deg);
+    for (int k = 0; view->has_look_at && k < 9; k++)
+        used += (size_t)snprintf(s->settings + used, room - used, "%.17g ", view->look_at_world[k]);
     const struct lull_criterion *t = s->criterion != NULL ? pt_criterion_table(s->criterion) : NULL;
-    used += (size_t)snprintf(s->settings + used, room - used, "criterion=%s %s\n", t ? t->id : "none", t ? t->version : "");
+    used += (size_t)snprintf(s->settings + used, room - used, "\ncriterion=%s %s\n", t ? t->id : "none", t ? t->version : "");
     for (uint32_t k = 0; k < s->cli.param_count && used < room; k++)
         used += (size_t)snprintf(s->settings + used, room - used, "param=%s=%s\n", s->cli.params[k].key, s->cli.params[k].value);
     return used < room ? PT_OK : pt_fail(err, PT_EINVAL, "the criterion's parameters are too long");
@@ -340,7 +344,7 @@ static int record_sequence(struct session *s, int *status, struct pt_err *err)
 {
     struct pt_sequence_config config = {.directory = s->cli.sequence, .levels = s->cli.levels, .blocks = s->cli.sequence_blocks,
                                         .reference_spp = s->cli.reference_spp, .scene_path = s->cli.scene,
-                                        .name = s->cli.name, .quiet = s->cli.quiet, .slice = after_slice};
+                                        .name = s->cli.name, .view = s->cli.view, .quiet = s->cli.quiet, .slice = after_slice};
     int rc = make_config(s, &config.render, err);
     if (rc == PT_OK)
         rc = scene_crc(s->cli.scene, &config.scene_crc, err);

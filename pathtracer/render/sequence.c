@@ -133,6 +133,13 @@ static cJSON *new_manifest(const struct recorder *r)
     pt_json_text(m, "source", c->scene_path, &failed);
     pt_json_text(m, "source_crc32", crc, &failed);
     pt_json_text(m, "camera", view, &failed);
+    if (c->view.has_look_at) {
+        cJSON *look_at = pt_json_array(m, "look_at", &failed);
+        for (int k = 0; k < 9; k++)
+            pt_json_number(look_at, NULL, c->view.look_at_world[k], &failed);
+    }
+    if (c->view.fov_deg > 0)
+        pt_json_number(m, "fov", c->view.fov_deg, &failed);
     pt_json_text(m, "renderer", renderer, &failed);
     pt_json_number(m, "width", c->render.width, &failed);
     pt_json_number(m, "height", c->render.height, &failed);
@@ -164,14 +171,23 @@ static int write_manifest(const struct recorder *r, struct pt_err *err)
     return rc == PT_OK ? pt_json_write(path, r->manifest, 0, err) : rc;
 }
 
+static int begun_with_another(const char *path, const char *member, struct pt_err *err)
+{
+    return pt_fail(err, PT_EINVAL, "%s: this sequence was begun with another %s; use another folder", path, member);
+}
+
 /* The members up to `levels` must be those of this run; `source` may differ, its CRC decides. */
 static int same_settings(const struct recorder *r, const char *path, const cJSON *old, struct pt_err *err)
 {
+    static const char *const optional[] = {"look_at", "fov"};
+    for (size_t i = 0; i < sizeof optional / sizeof optional[0]; i++)
+        if (cJSON_HasObjectItem(old, optional[i]) && !cJSON_HasObjectItem(r->manifest, optional[i]))
+            return begun_with_another(path, optional[i], err);
     for (const cJSON *m = r->manifest->child; m != NULL; m = m->next) {
         if (strcmp(m->string, "blocks") == 0 || strcmp(m->string, "source") == 0)
             continue;
         if (!cJSON_Compare(m, cJSON_GetObjectItemCaseSensitive(old, m->string), 1))
-            return pt_fail(err, PT_EINVAL, "%s: this sequence was begun with another %s; use another folder", path, m->string);
+            return begun_with_another(path, m->string, err);
     }
     return PT_OK;
 }

@@ -182,10 +182,24 @@ static void set_screen(struct pt_builder *b, struct pt_params *p, struct pt_came
         c->screen[i] = (float)(given != NULL ? given[i] : window[i]);
 }
 
+/* The options' camera instead of the file's; mirrored where that is, so that lettering stays legible. */
+static void override_camera(struct pt_builder *b, struct pt_xform world_to_camera[2])
+{
+    const double *v = b->options->view.look_at_world;
+    const struct pt_xform mirror = pt_xform_scale(-1, 1, 1);
+    struct pt_xform t;
+    if (!b->options->view.has_look_at || !pt_xform_look_at(v, v + 3, v + 6, &t))
+        return;
+    if (pt_xform_det(&world_to_camera[0]) < 0)
+        t = pt_xform_mul(&mirror, &t);
+    world_to_camera[0] = world_to_camera[1] = t;
+}
+
 static void place_camera(struct pt_builder *b, struct pt_params *p, struct pt_camera *c)
 {
     struct pt_xform world_to_camera[2], to_world;
     pt_builder_at_shutter(b, b->camera_ctm, world_to_camera);
+    override_camera(b, world_to_camera);
     c->animated = !pt_xform_equal(&world_to_camera[0], &world_to_camera[1]);
     for (int i = 0; i < 2; i++) {
         if (!pt_xform_invert(&world_to_camera[i], &to_world)) {
@@ -215,6 +229,11 @@ static void build_camera(struct pt_builder *b)
         pt_diag_fail(&b->diag, p->loc, "unknown camera \"%s\" (expected perspective or orthographic)", kind);
     }
     c->fov_deg = c->kind == PT_CAMERA_PERSPECTIVE ? (float)pt_params_float_in(p, "fov", 90, 1e-3, 179.9) : 0;
+    if (b->options->view.fov_deg > 0) {
+        if (c->kind == PT_CAMERA_ORTHOGRAPHIC)
+            pt_diag_fail(&b->diag, p->loc, "the camera is orthographic, which --fov cannot change");
+        c->fov_deg = (float)b->options->view.fov_deg;
+    }
     set_screen(b, p, c);
     c->lens_radius = (float)pt_params_float_in(p, "lensradius", 0, 0, 1e9);
     c->focal_distance = (float)pt_params_float_in(p, "focaldistance", 1e6, 1e-9, 1e30);
