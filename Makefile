@@ -47,16 +47,19 @@ GGN_LIBS := -lopenblas -llapacke -lsvm -lOpenImageIO -lOpenImageIO_Util -lcjson 
 
 # --- include paths: the dependency arrows --------------------------------------------------------------------------------
 API := -Iplugin-api/include
+BASE := -Iplugin-api# "base/…" and "sequence/…": what both programs stand on; no part of the ABI
 INC_plugin-api         := $(API)
-INC_pathtracer         := -Ipathtracer $(EXR_CFLAGS)
+INC_plugin-api_base    := $(BASE)
+INC_pathtracer         := -Ipathtracer $(BASE) $(EXR_CFLAGS)
 INC_pathtracer_host    := $(INC_pathtracer) $(API)# pathtracer/render and the command: the only hosts of criteria
-INC_ggn                := -Iggn $(BLAS_CFLAGS)
+INC_ggn                := -Iggn $(BASE) $(BLAS_CFLAGS)
 INC_ggn_plugin         := $(INC_ggn) $(API)# ggn/plugin: the only folder of ggn that knows the ABI
 INC_tests_pt           := -Itests -Itests/support $(INC_pathtracer_host)
 INC_tests_ggn          := -Itests -Itests/support $(INC_ggn_plugin)
 INC_tests_api          := -Itests -Itests/support $(API)
 
 # --- sources -------------------------------------------------------------------------------------------------------------
+BASE_SRC    := $(wildcard plugin-api/base/*.c plugin-api/sequence/*.c)
 LOADER_SRC  := $(wildcard plugin-api/src/*.c)
 EXAMPLE_SRC := $(wildcard plugin-api/examples/*.c)
 TOOL_SRC    := $(wildcard plugin-api/tools/*.c)
@@ -73,9 +76,10 @@ SCRIPT_TEST := $(wildcard tests/cli/*.sh tests/e2e/*.sh)
 FUZZ_SRC    := $(filter-out tests/fuzz/replay.c,$(wildcard tests/fuzz/*.c))
 
 o = $(addprefix $(OBJ)/,$(addsuffix .o,$(1)))
-PT_OBJ      := $(call o,$(PT_SRC))
+BASE_OBJ    := $(call o,$(BASE_SRC))
+PT_OBJ      := $(call o,$(PT_SRC)) $(BASE_OBJ)
 LOADER_OBJ  := $(call o,$(LOADER_SRC))
-GGN_OBJ     := $(call o,$(GGN_SRC))
+GGN_OBJ     := $(call o,$(GGN_SRC)) $(BASE_OBJ)
 GGN_PLUGIN_OBJ := $(call o,$(GGN_PLUGIN))
 
 PROGRAMS := $(if $(PT_MAIN),$(BIN)/pathtracer) $(if $(GGN_CLI),$(BIN)/ggn) $(if $(TOOL_SRC),$(BIN)/lull-check)
@@ -93,7 +97,7 @@ all: $(PROGRAMS) $(CRITERIA) ## build the programs and the criteria
 
 # --- compiling: one rule, flags by folder --------------------------------------------------------------------------------
 inc = $(or $(strip \
-  $(if $(filter plugin-api/%,$(1)),$(INC_plugin-api)) \
+  $(if $(filter plugin-api/%,$(1)),$(if $(filter plugin-api/base/% plugin-api/sequence/%,$(1)),$(INC_plugin-api_base),$(INC_plugin-api))) \
   $(if $(filter pathtracer/%,$(1)),$(if $(filter pathtracer/render/% $(PT_MAIN) $(PT_MAIN:.c=.h),$(1)),$(INC_pathtracer_host),$(INC_pathtracer))) \
   $(if $(filter ggn/%,$(1)),$(if $(filter ggn/plugin/%,$(1)),$(INC_ggn_plugin),$(INC_ggn))) \
   $(if $(filter tests/%,$(1)),$(if $(filter pt_%,$(notdir $(1))),$(INC_tests_pt),$(if $(filter ggn_%,$(notdir $(1))),$(INC_tests_ggn),$(INC_tests_api))))),)
@@ -214,7 +218,7 @@ install: all ## install under $(DESTDIR)$(PREFIX)
 	sed 's|@PREFIX@|$(PREFIX)|g' plugin-api/lull-criterion.pc.in > $(DESTDIR)$(PREFIX)/lib/pkgconfig/lull-criterion.pc
 
 compdb: ## write compile_commands.json
-	@{ echo '['; sep=; for f in $(PT_SRC) $(PT_MAIN) $(GGN_SRC) $(GGN_PLUGIN) $(GGN_CLI) $(LOADER_SRC) $(EXAMPLE_SRC) $(TOOL_SRC); do \
+	@{ echo '['; sep=; for f in $(BASE_SRC) $(PT_SRC) $(PT_MAIN) $(GGN_SRC) $(GGN_PLUGIN) $(GGN_CLI) $(LOADER_SRC) $(EXAMPLE_SRC) $(TOOL_SRC); do \
 	  printf '%s' "$$sep"; $(MAKE) --no-print-directory -s compdb-one F=$$f; sep=,; done; echo ']'; } > compile_commands.json
 .PHONY: compdb-one
 compdb-one:

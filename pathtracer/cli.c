@@ -11,7 +11,7 @@
 #include "integ/integrator.h"
 #include "render/film.h"
 #include "render/output.h"
-#include "scene/xform.h"
+#include "pbrt/xform.h"
 
 enum key {
     KEY_BLOCK = 256,
@@ -108,15 +108,15 @@ static const struct argp_option options[] = {
 
 struct parse {
     struct pt_cli *cli;
-    struct pt_err *err;
+    struct base_err *err;
     int has_spp_bounds, has_levels_option;
 };
 
 /* --- values --------------------------------------------------------------------------------------------------------- */
 
-static int bad_value(struct pt_err *err, const char *option, const char *value, const char *expected)
+static int bad_value(struct base_err *err, const char *option, const char *value, const char *expected)
 {
-    return pt_fail(err, PT_EINVAL, "--%s %s: expected %s", option, value, expected);
+    return base_fail(err, BASE_EINVAL, "--%s %s: expected %s", option, value, expected);
 }
 
 /* The whole text is one integer in [low, high]. */
@@ -131,38 +131,38 @@ static int integer(const char *text, long long low, long long high, long long *o
     return 1;
 }
 
-static int get_integer(struct pt_err *err, const char *option, const char *text, long long low, long long high, long long *out)
+static int get_integer(struct base_err *err, const char *option, const char *text, long long low, long long high, long long *out)
 {
     char expected[96];
     snprintf(expected, sizeof expected, "an integer from %lld to %lld", low, high);
-    return integer(text, low, high, out) ? PT_OK : bad_value(err, option, text, expected);
+    return integer(text, low, high, out) ? 0 : bad_value(err, option, text, expected);
 }
 
-static int get_u64(struct pt_err *err, const char *option, const char *text, long long low, long long high, uint64_t *out)
+static int get_u64(struct base_err *err, const char *option, const char *text, long long low, long long high, uint64_t *out)
 {
     long long v = 0;
     int rc = get_integer(err, option, text, low, high, &v);
-    if (rc == PT_OK)
+    if (!rc)
         *out = (uint64_t)v;
     return rc;
 }
 
-static int get_int(struct pt_err *err, const char *option, const char *text, long long low, long long high, int *out)
+static int get_int(struct base_err *err, const char *option, const char *text, long long low, long long high, int *out)
 {
     long long v = 0;
     int rc = get_integer(err, option, text, low, high, &v);
-    if (rc == PT_OK)
+    if (!rc)
         *out = (int)v;
     return rc;
 }
 
-static int get_real(struct pt_err *err, const char *option, const char *text, double low, double high, double *out)
+static int get_real(struct base_err *err, const char *option, const char *text, double low, double high, double *out)
 {
     char *end, expected[96];
     double v = strtod(text, &end);
     if (end != text && *end == '\0' && v >= low && v <= high) {
         *out = v;
-        return PT_OK;
+        return 0;
     }
     snprintf(expected, sizeof expected, "a number from %g to %g", low, high);
     return bad_value(err, option, text, expected);
@@ -191,7 +191,7 @@ static int get_block(struct parse *p, const char *arg)
         return bad_value(p->err, "block", arg, "N or WxH, each from 1 to 4096");
     p->cli->block_width = (int)v[0];
     p->cli->block_height = (int)v[1];
-    return PT_OK;
+    return 0;
 }
 
 static int get_size(struct parse *p, const char *arg)
@@ -201,7 +201,7 @@ static int get_size(struct parse *p, const char *arg)
         return bad_value(p->err, "size", arg, "WxH, each from 1 to 32768");
     p->cli->width = (int)v[0];
     p->cli->height = (int)v[1];
-    return PT_OK;
+    return 0;
 }
 
 static int get_crop(struct parse *p, const char *arg)
@@ -212,7 +212,7 @@ static int get_crop(struct parse *p, const char *arg)
     for (int i = 0; i < 4; i++)
         p->cli->crop[i] = (int)v[i];
     p->cli->has_crop = 1;
-    return PT_OK;
+    return 0;
 }
 
 static int get_look_at(struct parse *p, const char *arg)
@@ -232,7 +232,7 @@ static int get_look_at(struct parse *p, const char *arg)
     if (!pt_xform_look_at(v, v + 3, v + 6, &unused))
         return bad_value(p->err, "look-at", arg, "eye and point looked at apart, and up not along the view");
     p->cli->view.has_look_at = 1;
-    return PT_OK;
+    return 0;
 }
 
 static int get_param(struct parse *p, const char *arg)
@@ -240,16 +240,16 @@ static int get_param(struct parse *p, const char *arg)
     struct pt_cli *cli = p->cli;
     const char *equals = strchr(arg, '=');
     if (equals == NULL || equals == arg)
-        return pt_fail(p->err, PT_EINVAL, "-p %s: expected KEY=VALUE", arg);
+        return base_fail(p->err, BASE_EINVAL, "-p %s: expected KEY=VALUE", arg);
     if (cli->param_count == PT_CLI_MAX_PARAMS)
-        return pt_fail(p->err, PT_EINVAL, "-p %s: more than %d parameters", arg, PT_CLI_MAX_PARAMS);
+        return base_fail(p->err, BASE_EINVAL, "-p %s: more than %d parameters", arg, PT_CLI_MAX_PARAMS);
     char *text = strdup(arg);
     if (text == NULL)
-        return pt_fail_nomem(p->err, "parameters");
+        return base_fail_nomem(p->err, "parameters");
     text[equals - arg] = '\0';
     cli->param_text[cli->param_count] = text;
     cli->params[cli->param_count++] = (struct lull_pair){text, text + (equals - arg) + 1};
-    return PT_OK;
+    return 0;
 }
 
 /* Index of arg among the words of a '|'-separated list. */
@@ -260,7 +260,7 @@ static int get_word(struct parse *p, const char *option, const char *arg, size_t
         size_t n = strcspn(w, "|");
         if (n == length && memcmp(w, arg, n) == 0) {
             *out = i;
-            return PT_OK;
+            return 0;
         }
         if (w[n] == '\0')
             return bad_value(p->err, option, arg, words);
@@ -272,7 +272,7 @@ static int get_filter(struct parse *p, const char *arg)
 {
     size_t n = strcspn(arg, ":");
     int rc = get_word(p, "filter", arg, n, "box|triangle|gaussian", &p->cli->filter);
-    if (rc == PT_OK && arg[n] == ':') {
+    if (!rc && arg[n] == ':') {
         double radius = 0.0;
         rc = get_real(p->err, "filter", arg + n + 1, 0.01, 16.0, &radius);
         p->cli->filter_radius = (float)radius;
@@ -286,11 +286,11 @@ static int get_aov(struct parse *p, const char *arg)
     for (const char *w = arg;;) {
         size_t n = strcspn(w, ",");
         int i = 0;
-        if (get_word(p, "aov", w, n, "albedo|normal|depth", &i) != PT_OK)
+        if (get_word(p, "aov", w, n, "albedo|normal|depth", &i) != 0)
             return bad_value(p->err, "aov", arg, "a list of albedo, normal, depth");
         p->cli->aov |= planes[i];
         if (w[n] == '\0')
-            return PT_OK;
+            return 0;
         w += n + 1;
     }
 }
@@ -300,9 +300,9 @@ static int get_stop_map(struct parse *p, const char *arg)
     if (!pt_output_has_ending(arg, "png") && !pt_output_has_ending(arg, "csv"))
         return bad_value(p->err, "stop-map", arg, "a name that ends in .png or .csv");
     if (p->cli->stop_map_count == PT_CLI_MAX_STOP_MAPS)
-        return pt_fail(p->err, PT_EINVAL, "--stop-map %s: more than %d stop maps", arg, PT_CLI_MAX_STOP_MAPS);
+        return base_fail(p->err, BASE_EINVAL, "--stop-map %s: more than %d stop maps", arg, PT_CLI_MAX_STOP_MAPS);
     p->cli->stop_maps[p->cli->stop_map_count++] = arg;
-    return PT_OK;
+    return 0;
 }
 
 static int get_file(struct parse *p, const char *option, const char *ending, const char *arg, const char **out)
@@ -312,7 +312,7 @@ static int get_file(struct parse *p, const char *option, const char *ending, con
     if (!pt_output_has_ending(arg, ending))
         return bad_value(p->err, option, arg, expected);
     *out = arg;
-    return PT_OK;
+    return 0;
 }
 
 static int get_debug_path(struct parse *p, const char *arg)
@@ -324,7 +324,7 @@ static int get_debug_path(struct parse *p, const char *arg)
     p->cli->debug_y = (uint32_t)v[1];
     p->cli->debug_sample = (uint32_t)v[2];
     p->cli->action = PT_CLI_DEBUG_PATH;
-    return PT_OK;
+    return 0;
 }
 
 /* --- options -------------------------------------------------------------------------------------------------------- */
@@ -335,12 +335,12 @@ static int option_when(struct parse *p, int key, const char *arg)
     switch (key) {
     case 'c':
         cli->criterion = arg;
-        return PT_OK;
+        return 0;
     case 'p':
         return get_param(p, arg);
     case KEY_LIST_CRITERIA:
         cli->action = PT_CLI_LIST_CRITERIA;
-        return PT_OK;
+        return 0;
     case KEY_SPP_MIN:
         p->has_spp_bounds = 1;
         return get_u64(p->err, "spp-min", arg, 1, INT32_MAX, &cli->spp_min);
@@ -357,7 +357,7 @@ static int option_when(struct parse *p, int key, const char *arg)
         return get_real(p->err, "max-check-overhead", arg, 0.0, 1.0, &cli->max_check_overhead);
     case KEY_MAX_SEAM:
         if (strcmp(arg, "0") == 0)
-            return PT_OK;
+            return 0;
         return get_real(p->err, "max-seam", arg, 1.0, 1e6, &cli->max_seam);
     default:
         return ARGP_ERR_UNKNOWN;
@@ -395,7 +395,7 @@ static int option_what(struct parse *p, int key, const char *arg)
         return get_word(p, "effects", arg, strlen(arg), "auto|all", &cli->all_effects);
     case KEY_STRICT:
         cli->strict = 1;
-        return PT_OK;
+        return 0;
     case 't':
         return get_int(p->err, "threads", arg, 1, 1024, &cli->threads);
     case KEY_ORDER:
@@ -423,42 +423,42 @@ static int option_output(struct parse *p, int key, const char *arg)
         return get_aov(p, arg);
     case KEY_REPRODUCIBLE:
         cli->reproducible = 1;
-        return PT_OK;
+        return 0;
     case 'q':
         cli->quiet = 1;
-        return PT_OK;
+        return 0;
     case KEY_CHECKPOINT:
         cli->checkpoint = arg;
-        return PT_OK;
+        return 0;
     case KEY_CHECKPOINT_EVERY:
         return get_real(p->err, "checkpoint-every", arg, 0.0, 1e9, &cli->checkpoint_every_s);
     case KEY_RESUME:
         cli->resume = 1;
-        return PT_OK;
+        return 0;
     case KEY_EXPLAIN:
         cli->action = PT_CLI_EXPLAIN;
-        return PT_OK;
+        return 0;
     case KEY_DEBUG_PATH:
         return get_debug_path(p, arg);
     case KEY_SEQUENCE:
         cli->sequence = arg;
         cli->action = PT_CLI_SEQUENCE;
-        return PT_OK;
+        return 0;
     case KEY_LEVELS:
         p->has_levels_option = 1;
         cli->levels = arg;
-        return PT_OK;
+        return 0;
     case KEY_BLOCKS:
         p->has_levels_option = 1;
         cli->sequence_blocks = arg;
-        return PT_OK;
+        return 0;
     case KEY_REFERENCE_SPP:
         p->has_levels_option = 1;
         return get_u64(p->err, "reference-spp", arg, 0, INT32_MAX, &cli->reference_spp);
     case KEY_NAME:
         p->has_levels_option = 1;
         cli->name = arg;
-        return PT_OK;
+        return 0;
     default:
         return ARGP_ERR_UNKNOWN;
     }
@@ -469,7 +469,7 @@ static error_t parse_option(int key, char *arg, struct argp_state *state)
     struct parse *p = state->input;
     if (key == ARGP_KEY_ARG) {
         if (p->cli->scene != NULL) {
-            pt_fail(p->err, PT_EINVAL, "%s: one scene at a time, and %s was given already", arg, p->cli->scene);
+            base_fail(p->err, BASE_EINVAL, "%s: one scene at a time, and %s was given already", arg, p->cli->scene);
             return EINVAL;
         }
         p->cli->scene = arg;
@@ -480,7 +480,7 @@ static error_t parse_option(int key, char *arg, struct argp_state *state)
         rc = option_what(p, key, arg);
     if (rc == ARGP_ERR_UNKNOWN)
         rc = option_output(p, key, arg);
-    return rc == ARGP_ERR_UNKNOWN ? ARGP_ERR_UNKNOWN : rc == PT_OK ? 0 : EINVAL;
+    return rc == ARGP_ERR_UNKNOWN ? ARGP_ERR_UNKNOWN : !rc ? 0 : EINVAL;
 }
 
 /* --- the whole ------------------------------------------------------------------------------------------------------ */
@@ -489,23 +489,23 @@ static int check_together(const struct parse *p)
 {
     const struct pt_cli *cli = p->cli;
     if (cli->action == PT_CLI_LIST_CRITERIA)
-        return PT_OK;
+        return 0;
     if (cli->scene == NULL)
-        return pt_fail(p->err, PT_EINVAL, "a scene file is needed (--help says more)");
+        return base_fail(p->err, BASE_EINVAL, "a scene file is needed (--help says more)");
     if (cli->spp > 0 && p->has_spp_bounds)
-        return pt_fail(p->err, PT_EINVAL, "--spp takes the same samples everywhere: leave out --spp-min and --spp-max");
+        return base_fail(p->err, BASE_EINVAL, "--spp takes the same samples everywhere: leave out --spp-min and --spp-max");
     if (cli->spp_min > cli->spp_max)
-        return pt_fail(p->err, PT_EINVAL, "--spp-min %llu is above --spp-max %llu", (unsigned long long)cli->spp_min,
+        return base_fail(p->err, BASE_EINVAL, "--spp-min %llu is above --spp-max %llu", (unsigned long long)cli->spp_min,
                        (unsigned long long)cli->spp_max);
     if (cli->resume && cli->checkpoint == NULL)
-        return pt_fail(p->err, PT_EINVAL, "--resume needs --checkpoint FILE");
+        return base_fail(p->err, BASE_EINVAL, "--resume needs --checkpoint FILE");
     if (cli->sequence == NULL && p->has_levels_option)
-        return pt_fail(p->err, PT_EINVAL, "--levels, --blocks, --reference-spp and --name belong to --sequence DIR");
+        return base_fail(p->err, BASE_EINVAL, "--levels, --blocks, --reference-spp and --name belong to --sequence DIR");
     if (cli->sequence != NULL && (cli->spp > 0 || cli->checkpoint != NULL || cli->has_crop))
-        return pt_fail(p->err, PT_EINVAL, "--sequence goes with neither --spp, --checkpoint nor --crop");
+        return base_fail(p->err, BASE_EINVAL, "--sequence goes with neither --spp, --checkpoint nor --crop");
     if (cli->param_count > 0 && cli->spp > 0 && cli->criterion == NULL)
-        return pt_fail(p->err, PT_EINVAL, "-p %s=%s: no criterion is used", cli->params[0].key, cli->params[0].value);
-    return PT_OK;
+        return base_fail(p->err, BASE_EINVAL, "-p %s=%s: no criterion is used", cli->params[0].key, cli->params[0].value);
+    return 0;
 }
 
 /* argp prints help only when it may print its own errors, too. */
@@ -518,7 +518,7 @@ static int asks_for_help(int argc, char **argv)
     return 0;
 }
 
-int pt_cli_parse(struct pt_cli *cli, int argc, char **argv, struct pt_err *err)
+int pt_cli_parse(struct pt_cli *cli, int argc, char **argv, struct base_err *err)
 {
     static const struct argp argp = {
         .options = options,
@@ -533,20 +533,20 @@ int pt_cli_parse(struct pt_cli *cli, int argc, char **argv, struct pt_err *err)
     /* Assigned, not defined: a definition of ours would be hidden from libc. */
     argp_program_version = "pathtracer (Lull) 1.0";
     argp_err_exit_status = 2;
-    struct pt_err first = {0};
+    struct base_err first = {0};
     struct parse p = {.cli = cli, .err = &first};
     int index = 0;
     int rc = argp_parse(&argp, argc, argv, asks_for_help(argc, argv) ? 0 : ARGP_NO_ERRS, &index, &p);
     if (rc != 0 && first.text[0] == '\0')
-        pt_fail(&first, PT_EINVAL, "%s: unknown option, or its value is missing (--help lists the options)",
+        base_fail(&first, BASE_EINVAL, "%s: unknown option, or its value is missing (--help lists the options)",
                 index > 1 && index <= argc ? argv[index - 1] : argv[argc - 1]);
     if (rc == 0)
         rc = check_together(&p);
     if (rc != 0) {
         pt_cli_release(cli);
-        return pt_fail(err, first.code, "%s", first.text);
+        return base_fail(err, first.code, "%s", first.text);
     }
-    return PT_OK;
+    return 0;
 }
 
 void pt_cli_release(struct pt_cli *cli)

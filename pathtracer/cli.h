@@ -7,7 +7,7 @@
 #include <stdint.h>
 
 #include "base/err.h"
-#include "scene/load.h"
+#include "pbrt/load.h"
 
 enum { PT_CLI_MAX_PARAMS = 64, PT_CLI_MAX_STOP_MAPS = 4 };
 
@@ -50,8 +50,8 @@ struct pt_cli {
     const char *name;           /* of the scene in the manifest, "SCENE" or "SCENE/VIEW" */
 };
 
-/* Fills *cli (zeroed first). --help, --version and --usage print and exit. PT_EINVAL with one line in err otherwise. */
-int pt_cli_parse(struct pt_cli *cli, int argc, char **argv, struct pt_err *err);
+/* Fills *cli (zeroed first). --help, --version and --usage print and exit. BASE_EINVAL with one line in err otherwise. */
+int pt_cli_parse(struct pt_cli *cli, int argc, char **argv, struct base_err *err);
 void pt_cli_release(struct pt_cli *cli);
 
 #endif

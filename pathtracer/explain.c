@@ -11,13 +11,13 @@ static double time_grid(pt_kernel *kernel, const struct pt_scene *scene, const s
                         const struct pt_integrator *integrator, uint32_t sample)
 {
     struct pt_path_result result;
-    double start = pt_clock_thread_s();
+    double start = base_clock_thread_s();
     for (uint32_t i = 0; i < GRID * GRID; i++) {
         uint32_t x = (uint32_t)((i % GRID) * (uint32_t)defaults->width / GRID);
         uint32_t y = (uint32_t)((i / GRID) * (uint32_t)defaults->height / GRID);
         kernel(scene, integrator, x, y, sample, &result);
     }
-    return pt_clock_thread_s() - start;
+    return base_clock_thread_s() - start;
 }
 
 /* Interleaved, and the least of the rounds, because other programs may be running. */

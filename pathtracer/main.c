@@ -9,7 +9,7 @@
 #include <zlib.h>
 
 #include "base/clock.h"
-#include "base/fio.h"
+#include "base/files.h"
 #include "cli.h"
 #include "explain.h"
 #include "render/checkpoint.h"
@@ -17,7 +17,7 @@
 #include "render/progress.h"
 #include "render/render.h"
 #include "render/sequence.h"
-#include "scene/load.h"
+#include "pbrt/load.h"
 
 /* The criterion when none is named. */
 static const char DEFAULT_CRITERION[] = "ggn";
@@ -42,7 +42,7 @@ static void catch_interrupt(void)
 
 struct session {
     struct pt_cli cli;
-    struct pt_threads *threads;
+    struct base_threads *threads;
     struct pt_scene *scene;
     struct pt_scene_defaults defaults;
     struct pt_criterion *criterion;
@@ -72,16 +72,16 @@ static void note(void *data, const char *line)
 
 /* --- setting up ----------------------------------------------------------------------------------------------------- */
 
-static int load_scene(struct session *s, struct pt_err *err)
+static int load_scene(struct session *s, struct base_err *err)
 {
     struct pt_load_options options = {.strict = s->cli.strict, .width = s->cli.width, .height = s->cli.height,
                                       .view = s->cli.view, .forced = s->cli.all_effects ? PT_FX_ALL : 0, .quiet = s->cli.quiet, .warn = note,
                                       .warn_data = s};
     int rc = pt_scene_load(s->cli.scene, &options, &s->scene, &s->defaults, err);
-    if (rc != PT_OK)
+    if (rc)
         return rc;
     s->kernel = pt_kernel_select(pt_scene_effects(s->scene), NULL, &s->kernel_name);
-    return PT_OK;
+    return 0;
 }
 
 static void override_integrator(const struct pt_cli *cli, struct pt_integrator *i)
@@ -101,7 +101,7 @@ static void override_integrator(const struct pt_cli *cli, struct pt_integrator *
     }
 }
 
-static int make_config(const struct session *s, struct pt_render_config *config, struct pt_err *err)
+static int make_config(const struct session *s, struct pt_render_config *config, struct base_err *err)
 {
     const struct pt_cli *cli = &s->cli;
     *config = (struct pt_render_config){
@@ -122,38 +122,38 @@ static int make_config(const struct session *s, struct pt_render_config *config,
     memcpy(config->crop, cli->has_crop ? cli->crop : s->defaults.crop, sizeof config->crop);
     override_integrator(cli, &config->integrator);
     if (config->crop[2] > config->width || config->crop[3] > config->height)
-        return pt_fail(err, PT_EINVAL, "--crop %d,%d,%d,%d: the image has %dx%d pixels", config->crop[0], config->crop[1],
+        return base_fail(err, BASE_EINVAL, "--crop %d,%d,%d,%d: the image has %dx%d pixels", config->crop[0], config->crop[1],
                        config->crop[2], config->crop[3], config->width, config->height);
-    return PT_OK;
+    return 0;
 }
 
-static int open_criterion(struct session *s, struct pt_err *err)
+static int open_criterion(struct session *s, struct base_err *err)
 {
     const struct pt_cli *cli = &s->cli;
     const char *spec = cli->criterion != NULL ? cli->criterion : DEFAULT_CRITERION;
     if (cli->criterion == NULL && cli->spp > 0)
-        return PT_OK;
+        return 0;
     return pt_criterion_create(spec, cli->params, cli->param_count, s->threads, note, s, &s->criterion, err);
 }
 
 /* An output that cannot be written should not be found out after hours: its folder is looked at now. */
-static int check_folder(const char *path, struct pt_err *err)
+static int check_folder(const char *path, struct base_err *err)
 {
     char folder[4096];
     const char *slash = path != NULL ? strrchr(path, '/') : NULL;
     if (path == NULL)
-        return PT_OK;
+        return 0;
     size_t n = slash == NULL ? 0 : slash == path ? 1 : (size_t)(slash - path);
     if (n >= sizeof folder)
-        return pt_fail(err, PT_EINVAL, "%.64s...: the path is too long", path);
+        return base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", path);
     memcpy(folder, path, n);
     folder[n] = '\0';
     if (access(n > 0 ? folder : ".", W_OK | X_OK) != 0)
-        return pt_fail(err, PT_EINVAL, "%s: cannot write there: %s", path, strerror(errno));
-    return PT_OK;
+        return base_fail(err, BASE_EINVAL, "%s: cannot write there: %s", path, strerror(errno));
+    return 0;
 }
 
-static int check_outputs(struct session *s, struct pt_err *err)
+static int check_outputs(struct session *s, struct base_err *err)
 {
     struct pt_cli *cli = &s->cli;
     if (cli->output == NULL && cli->preview == NULL && cli->report == NULL && cli->stop_map_count == 0) {
@@ -161,38 +161,38 @@ static int check_outputs(struct session *s, struct pt_err *err)
         const char *dot = strrchr(name, '.');
         int n = dot != NULL ? (int)(dot - name) : (int)strlen(name);
         if (n > (int)sizeof s->default_output - 8)
-            return pt_fail(err, PT_EINVAL, "%.64s...: the path is too long", cli->scene);
+            return base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", cli->scene);
         snprintf(s->default_output, sizeof s->default_output, "%.*s.exr", n, name);
         cli->output = s->default_output;
     }
     const char *paths[] = {cli->output, cli->preview, cli->report, cli->checkpoint};
     for (size_t i = 0; i < sizeof paths / sizeof paths[0]; i++)
-        if (check_folder(paths[i], err) != PT_OK)
-            return PT_EINVAL;
+        if (check_folder(paths[i], err) != 0)
+            return BASE_EINVAL;
     for (int i = 0; i < cli->stop_map_count; i++)
-        if (check_folder(cli->stop_maps[i], err) != PT_OK)
-            return PT_EINVAL;
-    return PT_OK;
+        if (check_folder(cli->stop_maps[i], err) != 0)
+            return BASE_EINVAL;
+    return 0;
 }
 
 /* CRC of the scene file itself; included files are not followed. */
-static int scene_crc(const char *path, uint32_t *crc, struct pt_err *err)
+static int scene_crc(const char *path, uint32_t *crc, struct base_err *err)
 {
     char *data = NULL;
     size_t size = 0;
-    int rc = pt_fio_read(path, (size_t)1 << 32, &data, &size, err);
-    if (rc == PT_OK)
+    int rc = base_file_read(path, (size_t)1 << 32, &data, &size, err);
+    if (!rc)
         *crc = (uint32_t)crc32_z(0, (const unsigned char *)data, size);
     free(data);
     return rc;
 }
 
 /* Everything that decides the bytes of the image, and nothing else. */
-static int describe_settings(struct session *s, const struct pt_render_config *c, struct pt_err *err)
+static int describe_settings(struct session *s, const struct pt_render_config *c, struct base_err *err)
 {
     uint32_t crc = 0;
     int rc = scene_crc(s->cli.scene, &crc, err);
-    if (rc != PT_OK)
+    if (rc)
         return rc;
     const struct pt_integrator *i = &c->integrator;
     size_t room = sizeof s->settings, used = (size_t)snprintf(
@@ -211,26 +211,26 @@ static int describe_settings(struct session *s, const struct pt_render_config *c
     used += (size_t)snprintf(s->settings + used, room - used, "\ncriterion=%s %s\n", t ? t->id : "none", t ? t->version : "");
     for (uint32_t k = 0; k < s->cli.param_count && used < room; k++)
         used += (size_t)snprintf(s->settings + used, room - used, "param=%s=%s\n", s->cli.params[k].key, s->cli.params[k].value);
-    return used < room ? PT_OK : pt_fail(err, PT_EINVAL, "the criterion's parameters are too long");
+    return used < room ? 0 : base_fail(err, BASE_EINVAL, "the criterion's parameters are too long");
 }
 
 /* --- rendering ------------------------------------------------------------------------------------------------------ */
 
-static int after_slice(void *data, struct pt_render *render, struct pt_err *err)
+static int after_slice(void *data, struct pt_render *render, struct base_err *err)
 {
     struct session *s = data;
     pt_progress_update(&s->progress, render);
-    if (s->cli.checkpoint == NULL || pt_clock_wall_s() < s->checkpoint_at_s)
-        return PT_OK;
+    if (s->cli.checkpoint == NULL || base_clock_wall_s() < s->checkpoint_at_s)
+        return 0;
     int rc = pt_checkpoint_save(s->cli.checkpoint, render, s->settings, err);
-    s->checkpoint_at_s = pt_clock_wall_s() + s->cli.checkpoint_every_s;
+    s->checkpoint_at_s = base_clock_wall_s() + s->cli.checkpoint_every_s;
     return rc;
 }
 
-static int on_suspend(void *data, struct pt_render *render, struct pt_err *err)
+static int on_suspend(void *data, struct pt_render *render, struct base_err *err)
 {
     struct session *s = data;
-    return s->cli.checkpoint != NULL ? pt_checkpoint_save(s->cli.checkpoint, render, s->settings, err) : PT_OK;
+    return s->cli.checkpoint != NULL ? pt_checkpoint_save(s->cli.checkpoint, render, s->settings, err) : 0;
 }
 
 static int interrupted(void *data)
@@ -240,24 +240,24 @@ static int interrupted(void *data)
 }
 
 /* Writes what was asked for; goes on after a failure so that one full disk does not cost the other files. */
-static int write_outputs(struct session *s, int was_interrupted, struct pt_err *err)
+static int write_outputs(struct session *s, int was_interrupted, struct base_err *err)
 {
     const struct pt_cli *cli = &s->cli;
     struct pt_scene_stats stats = {0};
     pt_scene_get_stats(s->scene, &stats);
     struct pt_output_info info = {.scene = cli->scene, .params = cli->params, .param_count = cli->param_count,
                                   .effects = pt_scene_effects(s->scene), .kernel = s->kernel_name,
-                                  .threads = pt_threads_count(s->threads), .reproducible = cli->reproducible, .aov = cli->aov,
+                                  .threads = base_threads_count(s->threads), .reproducible = cli->reproducible, .aov = cli->aov,
                                   .scene_bytes = stats.bytes, .interrupted = was_interrupted};
-    struct pt_err e = {0};
-    if (cli->output != NULL && pt_output_exr(cli->output, s->render, &info, &e) != PT_OK)
+    struct base_err e = {0};
+    if (cli->output != NULL && pt_output_exr(cli->output, s->render, &info, &e) != 0)
         *err = e;
-    if (cli->preview != NULL && pt_output_preview(cli->preview, s->render, &e) != PT_OK)
+    if (cli->preview != NULL && pt_output_preview(cli->preview, s->render, &e) != 0)
         *err = e;
     for (int i = 0; i < cli->stop_map_count; i++)
-        if (pt_output_stop_map(cli->stop_maps[i], s->render, &info, &e) != PT_OK)
+        if (pt_output_stop_map(cli->stop_maps[i], s->render, &info, &e) != 0)
             *err = e;
-    if (cli->report != NULL && pt_output_report(cli->report, s->render, &info, &e) != PT_OK)
+    if (cli->report != NULL && pt_output_report(cli->report, s->render, &info, &e) != 0)
         *err = e;
     return err->code;
 }
@@ -285,28 +285,28 @@ static void tell_summary(struct session *s)
     }
 }
 
-static int render_image(struct session *s, int *status, struct pt_err *err)
+static int render_image(struct session *s, int *status, struct base_err *err)
 {
     struct pt_render_config config;
     enum pt_render_outcome outcome;
     int rc = make_config(s, &config, err);
-    if (rc != PT_OK || (rc = check_outputs(s, err)) != PT_OK || (rc = open_criterion(s, err)) != PT_OK ||
-        (rc = describe_settings(s, &config, err)) != PT_OK)
+    if (rc || (rc = check_outputs(s, err)) != 0 || (rc = open_criterion(s, err)) != 0 ||
+        (rc = describe_settings(s, &config, err)) != 0)
         return rc;
     rc = pt_render_create(&config, s->scene, s->kernel, s->threads, s->criterion, &s->render, err);
-    if (rc == PT_OK && s->cli.resume)
+    if (!rc && s->cli.resume)
         rc = pt_checkpoint_load(s->cli.checkpoint, s->render, s->settings, err);
-    if (rc != PT_OK) {
-        if (rc == PT_EIO)
-            rc = err->code = PT_EINVAL; /* the checkpoint is an input */
+    if (rc) {
+        if (rc == BASE_EIO)
+            rc = err->code = BASE_EINVAL; /* the checkpoint is an input */
         return rc;
     }
     struct pt_render_hooks hooks = {.slice = after_slice, .interrupted = interrupted, .suspend = on_suspend, .warn = say, .data = s};
-    s->checkpoint_at_s = pt_clock_wall_s() + s->cli.checkpoint_every_s;
+    s->checkpoint_at_s = base_clock_wall_s() + s->cli.checkpoint_every_s;
     rc = pt_render_run(s->render, &hooks, &outcome, err);
     pt_progress_clear(&s->progress);
-    struct pt_err write_err = {0};
-    if (write_outputs(s, outcome == PT_RENDER_INTERRUPTED, &write_err) != PT_OK && rc == PT_OK) {
+    struct base_err write_err = {0};
+    if (write_outputs(s, outcome == PT_RENDER_INTERRUPTED, &write_err) != 0 && !rc) {
         *err = write_err;
         return err->code;
     }
@@ -330,27 +330,27 @@ static void print_line(void *data, const char *text)
     puts(text);
 }
 
-static int debug_path(struct session *s, struct pt_err *err)
+static int debug_path(struct session *s, struct base_err *err)
 {
     struct pt_integrator integrator = s->defaults.integrator;
     override_integrator(&s->cli, &integrator);
     if (s->cli.debug_x >= (uint32_t)s->defaults.width || s->cli.debug_y >= (uint32_t)s->defaults.height)
-        return pt_fail(err, PT_EINVAL, "--debug-path %u,%u,%u: the image has %dx%d pixels", s->cli.debug_x, s->cli.debug_y,
+        return base_fail(err, BASE_EINVAL, "--debug-path %u,%u,%u: the image has %dx%d pixels", s->cli.debug_x, s->cli.debug_y,
                        s->cli.debug_sample, s->defaults.width, s->defaults.height);
     return pt_kernel_trace(s->scene, &integrator, s->cli.debug_x, s->cli.debug_y, s->cli.debug_sample, print_line, NULL);
 }
 
-static int record_sequence(struct session *s, int *status, struct pt_err *err)
+static int record_sequence(struct session *s, int *status, struct base_err *err)
 {
     struct pt_sequence_config config = {.directory = s->cli.sequence, .levels = s->cli.levels, .blocks = s->cli.sequence_blocks,
                                         .reference_spp = s->cli.reference_spp, .scene_path = s->cli.scene,
                                         .name = s->cli.name, .view = s->cli.view, .quiet = s->cli.quiet, .slice = after_slice};
     int rc = make_config(s, &config.render, err);
-    if (rc == PT_OK)
+    if (!rc)
         rc = scene_crc(s->cli.scene, &config.scene_crc, err);
-    if (rc == PT_OK && s->cli.criterion != NULL)
+    if (!rc && s->cli.criterion != NULL)
         rc = open_criterion(s, err);
-    if (rc != PT_OK)
+    if (rc)
         return rc;
     int was_interrupted = 0;
     rc = pt_sequence_record(&config, s->scene, s->kernel, s->threads, s->criterion, interrupted, say, s, &was_interrupted, err);
@@ -359,27 +359,27 @@ static int record_sequence(struct session *s, int *status, struct pt_err *err)
     return rc;
 }
 
-static int run(struct session *s, int *status, struct pt_err *err)
+static int run(struct session *s, int *status, struct base_err *err)
 {
     if (s->cli.action == PT_CLI_LIST_CRITERIA) {
         if (pt_criterion_list(stdout, note, s) == 0)
-            return pt_fail(err, PT_EINVAL, "no criterion was found (LULL_PLUGIN_PATH names more folders to look in)");
-        return PT_OK;
+            return base_fail(err, BASE_EINVAL, "no criterion was found (LULL_PLUGIN_PATH names more folders to look in)");
+        return 0;
     }
-    s->threads = pt_threads_create(s->cli.threads > 0 ? s->cli.threads : pt_threads_available(), err);
+    s->threads = base_threads_create(s->cli.threads > 0 ? s->cli.threads : base_threads_available(), err);
     if (s->threads == NULL)
-        return PT_ENOMEM;
+        return BASE_ENOMEM;
     int rc = load_scene(s, err);
-    if (rc != PT_OK) {
-        if (rc == PT_EIO)
-            rc = err->code = PT_EINVAL; /* the scene and its files are inputs */
+    if (rc) {
+        if (rc == BASE_EIO)
+            rc = err->code = BASE_EINVAL; /* the scene and its files are inputs */
         return rc;
     }
     catch_interrupt();
     switch (s->cli.action) {
     case PT_CLI_EXPLAIN:
         explain(s);
-        return PT_OK;
+        return 0;
     case PT_CLI_DEBUG_PATH:
         return debug_path(s, err);
     case PT_CLI_SEQUENCE:
@@ -392,22 +392,22 @@ static int run(struct session *s, int *status, struct pt_err *err)
 int main(int argc, char **argv)
 {
     static struct session s;
-    struct pt_err err = {0};
+    struct base_err err = {0};
     int status = 0;
     int rc = pt_cli_parse(&s.cli, argc, argv, &err);
-    if (rc == PT_OK) {
+    if (!rc) {
         pt_progress_init(&s.progress, s.cli.quiet ? NULL : stderr);
         rc = run(&s, &status, &err);
     }
-    if (rc != PT_OK) {
+    if (rc) {
         pt_progress_clear(&s.progress);
         fprintf(stderr, "pathtracer: %s\n", err.text);
-        status = rc == PT_EINVAL || rc == PT_EIO ? EXIT_BAD_INPUT : EXIT_FAILED;
+        status = rc == BASE_EINVAL || rc == BASE_EIO ? EXIT_BAD_INPUT : EXIT_FAILED;
     }
     pt_render_destroy(s.render);
     pt_criterion_destroy(s.criterion);
     pt_scene_destroy(s.scene);
-    pt_threads_destroy(s.threads);
+    base_threads_destroy(s.threads);
     pt_cli_release(&s.cli);
     if ((fflush(stdout) != 0 || ferror(stdout)) && status == 0) {
         fprintf(stderr, "pathtracer: cannot write standard output\n");

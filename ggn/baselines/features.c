@@ -41,12 +41,12 @@ static double entropy(const double *s, int first, int last)
     return h / log(last - first);
 }
 
-int ggn_svd_entropy(const double *l, int w, int h, int first, int last, double *out, struct ggn_err *err)
+int ggn_svd_entropy(const double *l, int w, int h, int first, int last, double *out, struct base_err *err)
 {
     enum { N = GGN_SUB_BLOCK };
     double a[N * N], s[N], superb[N];
     if (first < 0 || last > N || last - first < 2 || w < N || h < N)
-        return ggn_fail(err, GGN_EINVAL, "SVD-entropy of singular values %d to %d of a %dx%d block", first, last, w, h);
+        return base_fail(err, BASE_EINVAL, "SVD-entropy of singular values %d to %d of a %dx%d block", first, last, w, h);
     for (int by = 0; by < h / N; by++)
         for (int bx = 0; bx < w / N; bx++) {
             double largest = 0.0;
@@ -54,13 +54,13 @@ int ggn_svd_entropy(const double *l, int w, int h, int first, int last, double *
                 for (int x = 0; x < N; x++)
                     a[y * N + x] = floor(l[(size_t)(by * N + y) * (size_t)w + (size_t)(bx * N + x)]);
             if (LAPACKE_dgesvd(LAPACK_ROW_MAJOR, 'N', 'N', N, N, a, N, s, NULL, 1, NULL, 1, superb) != 0)
-                return ggn_fail(err, GGN_EINVAL, "SVD-entropy: the singular values do not converge");
+                return base_fail(err, BASE_EINVAL, "SVD-entropy: the singular values do not converge");
             largest = s[0];
             for (int i = 0; i < N; i++) /* rounding errors of a rank-deficient sub-block are no noise */
                 s[i] = s[i] > 1e-12 * largest ? s[i] : 0.0;
             *out++ = entropy(s, first, last);
         }
-    return GGN_OK;
+    return 0;
 }
 
 /* --- filters --- */
@@ -202,15 +202,15 @@ static void residual(const double *l, const double *filtered, size_t n, double *
     out[1] = sqrt(fmax(square / (double)n - out[0] * out[0], 0.0));
 }
 
-int ggn_attributes(const double *l, int w, int h, double out[GGN_ATTRIBUTES], struct ggn_err *err)
+int ggn_attributes(const double *l, int w, int h, double out[GGN_ATTRIBUTES], struct base_err *err)
 {
     static const double sigmas[3] = {0.5, 1.0, 1.5};
     if (w < 3 || h < 3)
-        return ggn_fail(err, GGN_EINVAL, "attributes of a %dx%d block", w, h);
+        return base_fail(err, BASE_EINVAL, "attributes of a %dx%d block", w, h);
     size_t n = (size_t)w * (size_t)h;
     double *tmp = malloc(4 * n * sizeof *tmp);
     if (tmp == NULL)
-        return ggn_fail_nomem(err, "attributes");
+        return base_fail_nomem(err, "attributes");
     double *f = tmp + n, *scratch = tmp + 2 * n;
     for (int r = 1; r <= 2; r++) {
         box(l, tmp, f, w, h, r, BORDER_MIRROR);
@@ -227,7 +227,7 @@ int ggn_attributes(const double *l, int w, int h, double out[GGN_ATTRIBUTES], st
     haar(l, f, tmp, w, h);
     residual(l, f, n, out + 24);
     free(tmp);
-    return GGN_OK;
+    return 0;
 }
 
 /* Means over an 8x8 grid of |image - Gaussian(image)|. */
@@ -247,17 +247,17 @@ static void reduce_mask(const double *image, double *tmp, double *smooth, int w,
         }
 }
 
-int ggn_noise_mask(const double *l, int w, int h, double out[GGN_MASK_FEATURES], struct ggn_err *err)
+int ggn_noise_mask(const double *l, int w, int h, double out[GGN_MASK_FEATURES], struct base_err *err)
 {
     if (w < GGN_MASK_GRID || h < GGN_MASK_GRID)
-        return ggn_fail(err, GGN_EINVAL, "noise mask of a %dx%d block", w, h);
+        return base_fail(err, BASE_EINVAL, "noise mask of a %dx%d block", w, h);
     size_t n = (size_t)w * (size_t)h;
     double *tmp = malloc(5 * n * sizeof *tmp);
     if (tmp == NULL)
-        return ggn_fail_nomem(err, "noise mask");
+        return base_fail_nomem(err, "noise mask");
     reduce_mask(l, tmp, tmp + n, w, h, out);
     wiener(l, tmp, tmp + n, tmp + 2 * n, w, h, 2);
     reduce_mask(tmp + n, tmp, tmp + 2 * n, w, h, out + GGN_MASK_FEATURES / 2);
     free(tmp);
-    return GGN_OK;
+    return 0;
 }

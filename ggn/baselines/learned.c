@@ -19,7 +19,7 @@ struct table {
 struct job {
     const struct ggn_eval_set *set;
     struct table *table;
-    int (*make)(const double *l, int w, int h, int parameter, double *out, struct ggn_err *err);
+    int (*make)(const double *l, int w, int h, int parameter, double *out, struct base_err *err);
     int parameter;
 };
 
@@ -29,35 +29,35 @@ static void release_table(struct table *t)
     free(t->x);
 }
 
-static int make_attributes(const double *l, int w, int h, int parameter, double *out, struct ggn_err *err)
+static int make_attributes(const double *l, int w, int h, int parameter, double *out, struct base_err *err)
 {
     (void)parameter;
     return ggn_attributes(l, w, h, out, err);
 }
 
-static int make_mask(const double *l, int w, int h, int parameter, double *out, struct ggn_err *err)
+static int make_mask(const double *l, int w, int h, int parameter, double *out, struct base_err *err)
 {
     (void)parameter;
     return ggn_noise_mask(l, w, h, out, err);
 }
 
-static int make_entropy(const double *l, int w, int h, int parameter, double *out, struct ggn_err *err)
+static int make_entropy(const double *l, int w, int h, int parameter, double *out, struct base_err *err)
 {
     return ggn_svd_entropy(l, w, h, parameter, GGN_SUB_BLOCK, out, err);
 }
 
-static int fill_block(void *data, int index, int worker, struct ggn_err *err)
+static int fill_block(void *data, int index, int worker, struct base_err *err)
 {
     const struct job *j = data;
     const struct ggn_eval_block *b = &j->set->blocks[index];
     const struct ggn_chain *c = &j->set->chains.chains[b->chain];
-    int w = j->set->chains.width, h = j->set->chains.height, rc = GGN_OK;
+    int w = j->set->chains.width, h = j->set->chains.height, rc = 0;
     size_t pixels = (size_t)w * (size_t)h;
     double *l = malloc(pixels * sizeof *l);
     (void)worker;
     if (l == NULL)
-        return ggn_fail_nomem(err, "features");
-    for (int i = 0; i < c->n_levels && rc == GGN_OK; i++) {
+        return base_fail_nomem(err, "features");
+    for (int i = 0; i < c->n_levels && !rc; i++) {
         ggn_lightness(c->noisy + 3 * pixels * (size_t)i, pixels, l);
         rc = j->make(l, w, h, j->parameter, j->table->x + (j->table->first[index] + (size_t)i) * (size_t)j->table->n, err);
     }
@@ -66,20 +66,20 @@ static int fill_block(void *data, int index, int worker, struct ggn_err *err)
 }
 
 static int make_table(struct table *t, const struct ggn_eval_set *s, int n,
-                      int (*make)(const double *, int, int, int, double *, struct ggn_err *), int parameter, struct ggn_threads *threads,
-                      struct ggn_err *err)
+                      int (*make)(const double *, int, int, int, double *, struct base_err *), int parameter, struct base_threads *threads,
+                      struct base_err *err)
 {
     struct job j = {s, t, make, parameter};
     *t = (struct table){.n = n, .first = malloc((size_t)s->n_blocks * sizeof *t->first)};
     if (t->first == NULL)
-        return ggn_fail_nomem(err, "features");
+        return base_fail_nomem(err, "features");
     for (int b = 0; b < s->n_blocks; b++) {
         t->first[b] = t->rows;
         t->rows += (size_t)s->chains.chains[s->blocks[b].chain].n_levels;
     }
     t->x = malloc(t->rows * (size_t)n * sizeof *t->x);
-    int rc = t->x == NULL ? ggn_fail_nomem(err, "features") : ggn_eval_each_block(s, threads, fill_block, &j, err);
-    if (rc != GGN_OK)
+    int rc = t->x == NULL ? base_fail_nomem(err, "features") : ggn_eval_each_block(s, threads, fill_block, &j, err);
+    if (rc)
         release_table(t);
     return rc;
 }
@@ -92,14 +92,14 @@ static const double *row_of(const struct table *t, const struct ggn_eval_set *s,
 
 /* --- SVMs --- */
 
-static struct ggn_svm *train_svm(const struct table *t, const struct ggn_eval_set *s, enum ggn_split split, struct ggn_err *err)
+static struct ggn_svm *train_svm(const struct table *t, const struct ggn_eval_set *s, enum ggn_split split, struct base_err *err)
 {
     double *x = malloc((s->n > 0 ? s->n : 1) * (size_t)t->n * sizeof *x);
     unsigned char *label = malloc(s->n > 0 ? s->n : 1);
     struct ggn_svm *svm = NULL;
     size_t n = 0;
     if (x == NULL || label == NULL) {
-        ggn_fail_nomem(err, "SVM");
+        base_fail_nomem(err, "SVM");
         goto out;
     }
     for (int b = 0; b < s->n_blocks; b++)
@@ -111,24 +111,24 @@ static struct ggn_svm *train_svm(const struct table *t, const struct ggn_eval_se
     /* C and gamma as the library's users start from; a grid search on a few scenes fits their quirks. */
     svm = n > 0 ? ggn_svm_train(x, label, n, t->n, 1.0, 1.0, err) : NULL;
     if (n == 0)
-        ggn_fail(err, GGN_EINVAL, "SVM: nothing to train on in the split '%s'", ggn_split_names[split]);
+        base_fail(err, BASE_EINVAL, "SVM: nothing to train on in the split '%s'", ggn_split_names[split]);
 out:
     free(label);
     free(x);
     return svm;
 }
 
-static int svm_method(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, const char *name, const struct table *t, struct ggn_err *err)
+static int svm_method(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, const char *name, const struct table *t, struct base_err *err)
 {
     struct ggn_svm *svm = train_svm(t, s, split, err);
     if (svm == NULL)
         return err->code;
     double *score = malloc(s->n * sizeof *score), *scratch = malloc((size_t)t->n * sizeof *scratch);
-    int rc = score == NULL || scratch == NULL ? ggn_fail_nomem(err, name) : GGN_OK;
-    for (int b = 0; b < s->n_blocks && rc == GGN_OK; b++)
+    int rc = score == NULL || scratch == NULL ? base_fail_nomem(err, name) : 0;
+    for (int b = 0; b < s->n_blocks && !rc; b++)
         for (size_t i = s->blocks[b].first; i < s->blocks[b].end; i++)
             score[i] = ggn_svm_score(svm, row_of(t, s, b, i), scratch);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = ggn_method_scores(m, s, name, score, err);
     free(scratch);
     free(score);
@@ -136,22 +136,22 @@ static int svm_method(struct ggn_method *m, const struct ggn_eval_set *s, enum g
     return rc;
 }
 
-int ggn_method_attributes_svm(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, struct ggn_threads *threads, struct ggn_err *err)
+int ggn_method_attributes_svm(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, struct base_threads *threads, struct base_err *err)
 {
     struct table t;
     int rc = make_table(&t, s, GGN_ATTRIBUTES, make_attributes, 0, threads, err);
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
     rc = svm_method(m, s, split, "26 attributes + SVM", &t, err);
     release_table(&t);
     return rc;
 }
 
-int ggn_method_mask_svm(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, struct ggn_threads *threads, struct ggn_err *err)
+int ggn_method_mask_svm(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, struct base_threads *threads, struct base_err *err)
 {
     struct table t;
     int rc = make_table(&t, s, GGN_MASK_FEATURES, make_mask, 0, threads, err);
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
     rc = svm_method(m, s, split, "noise mask + SVM", &t, err);
     release_table(&t);
@@ -166,14 +166,14 @@ static const double *window_of(const struct table *t, const struct ggn_eval_set 
     return t->x + (t->first[b] + (i - s->blocks[b].first)) * (size_t)t->n;
 }
 
-static int train_lstm(struct ggn_lstm *lstm, const struct table *t, const struct ggn_eval_set *s, enum ggn_split split, int epochs, struct ggn_err *err)
+static int train_lstm(struct ggn_lstm *lstm, const struct table *t, const struct ggn_eval_set *s, enum ggn_split split, int epochs, struct base_err *err)
 {
     const double **windows = malloc((s->n > 0 ? s->n : 1) * sizeof *windows);
     unsigned char *label = malloc(s->n > 0 ? s->n : 1);
     size_t n = 0, positive = 0;
-    int rc = GGN_OK;
+    int rc = 0;
     if (windows == NULL || label == NULL) {
-        rc = ggn_fail_nomem(err, "LSTM");
+        rc = base_fail_nomem(err, "LSTM");
         goto out;
     }
     for (int b = 0; b < s->n_blocks; b++)
@@ -184,8 +184,8 @@ static int train_lstm(struct ggn_lstm *lstm, const struct table *t, const struct
                 positive += label[n++];
             }
     if (positive == 0 || positive == n)
-        rc = ggn_fail(err, GGN_EINVAL, "LSTM: the split '%s' lacks one of the classes", ggn_split_names[split]);
-    for (int e = 0; e < epochs && rc == GGN_OK; e++)
+        rc = base_fail(err, BASE_EINVAL, "LSTM: the split '%s' lacks one of the classes", ggn_split_names[split]);
+    for (int e = 0; e < epochs && !rc; e++)
         ggn_lstm_epoch(lstm, windows, label, n, (uint32_t)e);
 out:
     free(label);
@@ -193,23 +193,23 @@ out:
     return rc;
 }
 
-int ggn_method_svd_lstm(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, int first, int epochs, struct ggn_threads *threads,
-                        struct ggn_err *err)
+int ggn_method_svd_lstm(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, int first, int epochs, struct base_threads *threads,
+                        struct base_err *err)
 {
     struct table t;
     int count = ggn_svd_entropy_count(s->chains.width, s->chains.height), rc;
     if (count == 0)
-        return ggn_fail(err, GGN_EINVAL, "SVD-entropy needs blocks of at least 20x20 pixels");
+        return base_fail(err, BASE_EINVAL, "SVD-entropy needs blocks of at least 20x20 pixels");
     rc = make_table(&t, s, count, make_entropy, first, threads, err);
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
     struct ggn_lstm *lstm = ggn_lstm_create(count, s->window, 7, err);
     double *score = malloc(s->n * sizeof *score);
-    rc = lstm == NULL ? err->code : score == NULL ? ggn_fail_nomem(err, "LSTM") : train_lstm(lstm, &t, s, split, epochs, err);
-    for (int b = 0; b < s->n_blocks && rc == GGN_OK; b++)
+    rc = lstm == NULL ? err->code : score == NULL ? base_fail_nomem(err, "LSTM") : train_lstm(lstm, &t, s, split, epochs, err);
+    for (int b = 0; b < s->n_blocks && !rc; b++)
         for (size_t i = s->blocks[b].first; i < s->blocks[b].end; i++)
             score[i] = ggn_lstm_predict(lstm, window_of(&t, s, b, i));
-    if (rc == GGN_OK)
+    if (!rc)
         rc = ggn_method_scores(m, s, "SVD-entropy + LSTM", score, err);
     free(score);
     ggn_lstm_destroy(lstm);

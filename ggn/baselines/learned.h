@@ -9,12 +9,12 @@
 
 #include "eval/method.h"
 
-/* Each trains on the blocks of `split` and gives every case a score. GGN_EINVAL when that split lacks one of the classes. The cut is to be tuned
+/* Each trains on the blocks of `split` and gives every case a score. BASE_EINVAL when that split lacks one of the classes. The cut is to be tuned
  * afterwards. */
-int ggn_method_attributes_svm(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, struct ggn_threads *threads, struct ggn_err *err);
-int ggn_method_mask_svm(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, struct ggn_threads *threads, struct ggn_err *err);
+int ggn_method_attributes_svm(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, struct base_threads *threads, struct base_err *err);
+int ggn_method_mask_svm(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, struct base_threads *threads, struct base_err *err);
 /* epochs: passes over the training cases (published: 30). interval [first, 20) of the singular values: 0 or 5. */
-int ggn_method_svd_lstm(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, int first, int epochs, struct ggn_threads *threads,
-                        struct ggn_err *err);
+int ggn_method_svd_lstm(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, int first, int epochs, struct base_threads *threads,
+                        struct base_err *err);
 
 #endif

@@ -86,11 +86,11 @@ void ggn_lstm_destroy(struct ggn_lstm *l)
     free(l);
 }
 
-struct ggn_lstm *ggn_lstm_create(int inputs, int steps, uint32_t seed, struct ggn_err *err)
+struct ggn_lstm *ggn_lstm_create(int inputs, int steps, uint32_t seed, struct base_err *err)
 {
     struct ggn_lstm *l = calloc(1, sizeof *l);
     if (l == NULL) {
-        ggn_fail_nomem(err, "LSTM");
+        base_fail_nomem(err, "LSTM");
         return NULL;
     }
     l->inputs = inputs;
@@ -112,7 +112,7 @@ struct ggn_lstm *ggn_lstm_create(int inputs, int steps, uint32_t seed, struct gg
     l->p = malloc(4 * l->n * sizeof *l->p);
     l->activations = calloc(floats, sizeof *l->activations);
     if (l->p == NULL || l->activations == NULL) {
-        ggn_fail_nomem(err, "LSTM");
+        base_fail_nomem(err, "LSTM");
         ggn_lstm_destroy(l);
         return NULL;
     }

@@ -15,7 +15,7 @@
 struct ggn_lstm;
 
 /* inputs per time step, steps per sequence. NULL on failure. */
-struct ggn_lstm *ggn_lstm_create(int inputs, int steps, uint32_t seed, struct ggn_err *err);
+struct ggn_lstm *ggn_lstm_create(int inputs, int steps, uint32_t seed, struct base_err *err);
 void ggn_lstm_destroy(struct ggn_lstm *lstm);
 size_t ggn_lstm_parameters(const struct ggn_lstm *lstm);
 

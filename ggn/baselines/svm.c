@@ -47,13 +47,13 @@ static void fit_scale(struct ggn_svm *svm, const double *x, size_t n)
 }
 
 /* Keeps what scoring needs and nothing of libsvm's own. */
-static int take_over(struct ggn_svm *svm, const struct svm_model *model, const double *x, struct ggn_err *err)
+static int take_over(struct ggn_svm *svm, const struct svm_model *model, const double *x, struct base_err *err)
 {
     size_t n = (size_t)model->l, d = (size_t)svm->features;
     svm->support = malloc((n > 0 ? n : 1) * d * sizeof *svm->support);
     svm->coefficient = malloc((n > 0 ? n : 1) * sizeof *svm->coefficient);
     if (svm->support == NULL || svm->coefficient == NULL)
-        return ggn_fail_nomem(err, "SVM");
+        return base_fail_nomem(err, "SVM");
     svm->n_support = n;
     svm->rho = model->rho[0];
     svm->sign = model->label[0] == 1 ? 1.0 : -1.0;
@@ -63,20 +63,20 @@ static int take_over(struct ggn_svm *svm, const struct svm_model *model, const d
         for (size_t k = 0; k < d; k++)
             svm->support[i * d + k] = (x[from * d + k] - svm->mean[k]) * svm->scale[k];
     }
-    return GGN_OK;
+    return 0;
 }
 
-struct ggn_svm *ggn_svm_train(const double *x, const unsigned char *label, size_t n, int features, double c, double gamma, struct ggn_err *err)
+struct ggn_svm *ggn_svm_train(const double *x, const unsigned char *label, size_t n, int features, double c, double gamma, struct base_err *err)
 {
     size_t d = (size_t)features, positive = 0;
     struct ggn_svm *svm = calloc(1, sizeof *svm);
     struct svm_node *nodes = malloc(n * (d + 1) * sizeof *nodes), **rows = malloc((n > 0 ? n : 1) * sizeof *rows);
     double *y = malloc((n > 0 ? n : 1) * sizeof *y);
-    int rc = GGN_OK;
+    int rc = 0;
     if (svm != NULL)
         svm->mean = malloc(2 * d * sizeof *svm->mean);
     if (svm == NULL || nodes == NULL || rows == NULL || y == NULL || svm->mean == NULL) {
-        rc = ggn_fail_nomem(err, "SVM");
+        rc = base_fail_nomem(err, "SVM");
         goto out;
     }
     svm->scale = svm->mean + d;
@@ -92,7 +92,7 @@ struct ggn_svm *ggn_svm_train(const double *x, const unsigned char *label, size_
         rows[i][d].index = -1;
     }
     if (positive == 0 || positive == n) {
-        rc = ggn_fail(err, GGN_EINVAL, "SVM: all %zu labels are the same", n);
+        rc = base_fail(err, BASE_EINVAL, "SVM: all %zu labels are the same", n);
         goto out;
     }
     int labels[2] = {1, 0};
@@ -102,14 +102,14 @@ struct ggn_svm *ggn_svm_train(const double *x, const unsigned char *label, size_
                                       .nr_weight = 2, .weight_label = labels, .weight = weights};
     svm_set_print_string_function(be_quiet);
     struct svm_model *model = svm_train(&problem, &parameter);
-    rc = model == NULL ? ggn_fail_nomem(err, "SVM") : take_over(svm, model, x, err);
+    rc = model == NULL ? base_fail_nomem(err, "SVM") : take_over(svm, model, x, err);
     if (model != NULL)
         svm_free_and_destroy_model(&model);
 out:
     free(y);
     free(rows);
     free(nodes);
-    if (rc != GGN_OK) {
+    if (rc) {
         ggn_svm_destroy(svm);
         return NULL;
     }

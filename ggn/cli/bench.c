@@ -18,7 +18,7 @@ struct options {
 
 struct bench {
     struct options o;
-    struct ggn_threads *threads;
+    struct base_threads *threads;
     struct ggn_trainer_f32 *trainer;
     struct ggn_exec_f32 *r, *m, *d; /* inference */
     float *planes;                  /* random pictures */
@@ -66,7 +66,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
     }
 }
 
-static int setup(struct bench *b, struct ggn_err *err)
+static int setup(struct bench *b, struct base_err *err)
 {
     struct ggn_hyper hyper = ggn_hyper_default(GGN_PRESET_LULL);
     struct ggn_train_options options = ggn_train_options_default(GGN_PRESET_LULL);
@@ -75,16 +75,16 @@ static int setup(struct bench *b, struct ggn_err *err)
 
     options.batch = b->o.batch;
     options.bf16 = b->o.bf16;
-    b->threads = ggn_threads_create(b->o.threads, err);
+    b->threads = base_threads_create(b->o.threads, err);
     b->trainer = b->threads ? ggn_trainer_create_f32(&hyper, &options, b->threads, err) : NULL;
     if (!b->trainer)
-        return GGN_ENOMEM;
+        return BASE_ENOMEM;
     b->r = ggn_exec_create_f32(&b->trainer->graph[GGN_NET_R], NULL, 1, flags, b->threads, err);
     b->m = ggn_exec_create_f32(&b->trainer->graph[GGN_NET_M], NULL, 1, flags, b->threads, err);
     b->d = ggn_exec_create_f32(&b->trainer->graph[GGN_NET_D], NULL, 1, flags, b->threads, err);
     b->planes = malloc((size_t)b->o.batch * PLANES * AREA * sizeof *b->planes);
     if (!b->r || !b->m || !b->d || !b->planes)
-        return ggn_fail_nomem(err, "bench");
+        return base_fail_nomem(err, "bench");
     for (int i = 0; i < b->o.batch; i++)
         for (int c = 0; c < PLANES; c++) {
             float *plane = b->planes + (size_t)(i * PLANES + c) * AREA;
@@ -100,7 +100,7 @@ static int setup(struct bench *b, struct ggn_err *err)
             if (c < 2)
                 memcpy(ggn_exec_plane_f32(b->d, 0, 0, c) + (long)y * 201, b->noisy[c] + y * 200, 200 * sizeof(float));
         }
-    return GGN_OK;
+    return 0;
 }
 
 static void release(struct bench *b)
@@ -109,50 +109,50 @@ static void release(struct bench *b)
     ggn_exec_destroy_f32(b->m);
     ggn_exec_destroy_f32(b->d);
     ggn_trainer_destroy_f32(b->trainer);
-    ggn_threads_destroy(b->threads);
+    base_threads_destroy(b->threads);
     free(b->planes);
 }
 
 static double forward_ms(struct bench *b, struct ggn_exec_f32 *e, int net)
 {
-    double start = ggn_clock_wall_s();
+    double start = base_clock_wall_s();
     ggn_exec_forward_f32(e, b->trainer->weights[net], 1, GGN_EVAL);
-    return 1e3 * (ggn_clock_wall_s() - start);
+    return 1e3 * (base_clock_wall_s() - start);
 }
 
-static double denoiser_train_ms(struct bench *b, struct ggn_err *err)
+static double denoiser_train_ms(struct bench *b, struct base_err *err)
 {
-    double loss, start = ggn_clock_wall_s();
+    double loss, start = base_clock_wall_s();
     const float *x[64 * 3];
 
     for (int i = 0; i < 3 * b->o.batch; i++)
         x[i] = b->noisy[i / 3 * 18 + i % 3];
     if (ggn_trainer_denoiser_step_f32(b->trainer, x, b->reference, b->o.batch, &loss, err))
         return 0;
-    return 1e3 * (ggn_clock_wall_s() - start) / b->o.batch;
+    return 1e3 * (base_clock_wall_s() - start) / b->o.batch;
 }
 
 /* Generator and discriminator on both windows of each sample. */
-static double judge_train_ms(struct bench *b, struct ggn_err *err)
+static double judge_train_ms(struct bench *b, struct base_err *err)
 {
-    double label[64], bce, start = ggn_clock_wall_s();
+    double label[64], bce, start = base_clock_wall_s();
     struct ggn_batch_f32 batch = {.count = b->o.batch, .noisy = b->noisy, .denoised = b->noisy, .label = label};
 
     for (int i = 0; i < b->o.batch; i++)
         label[i] = i & 1;
     if (ggn_trainer_judge_step_f32(b->trainer, &batch, &bce, NULL, err))
         return 0;
-    return 1e3 * (ggn_clock_wall_s() - start) / b->o.batch;
+    return 1e3 * (base_clock_wall_s() - start) / b->o.batch;
 }
 
 static double generator_train_ms(struct bench *b)
 {
     struct ggn_exec_f32 *m = b->trainer->m;
-    double start = ggn_clock_wall_s();
+    double start = base_clock_wall_s();
 
     ggn_exec_forward_f32(m, b->trainer->weights[GGN_NET_M], b->o.batch, GGN_TRAIN);
     ggn_exec_backward_f32(m, b->trainer->weights[GGN_NET_M], b->trainer->grad[GGN_NET_M]);
-    return 1e3 * (ggn_clock_wall_s() - start) / b->o.batch;
+    return 1e3 * (base_clock_wall_s() - start) / b->o.batch;
 }
 
 static double sgemm_gflops(const struct bench *b, float *memory)
@@ -160,10 +160,10 @@ static double sgemm_gflops(const struct bench *b, float *memory)
     float *x = memory, *y = x + SGEMM_N * SGEMM_N, *z = y + SGEMM_N * SGEMM_N;
 
     openblas_set_num_threads(b->o.threads);
-    double start = ggn_clock_wall_s();
+    double start = base_clock_wall_s();
     cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, SGEMM_N, SGEMM_N, SGEMM_N, 1, x, SGEMM_N, y, SGEMM_N, 0, z,
                 SGEMM_N);
-    double elapsed = ggn_clock_wall_s() - start;
+    double elapsed = base_clock_wall_s() - start;
     openblas_set_num_threads(1);
     return 2e-9 * SGEMM_N * SGEMM_N * SGEMM_N / elapsed;
 }
@@ -180,13 +180,13 @@ static double median(double *value, int n)
     return n % 2 ? value[n / 2] : (value[n / 2 - 1] + value[n / 2]) / 2;
 }
 
-static int measure(struct bench *b, double figure[N_FIGURES], struct ggn_err *err)
+static int measure(struct bench *b, double figure[N_FIGURES], struct base_err *err)
 {
     double sample[N_FIGURES][MAX_ROUNDS];
     float *gemm = calloc((size_t)3 * SGEMM_N * SGEMM_N, sizeof *gemm);
 
     if (!gemm)
-        return ggn_fail_nomem(err, "sgemm");
+        return base_fail_nomem(err, "sgemm");
     for (int i = -1; i < b->o.rounds; i++) { /* round −1 warms up */
         int k = i < 0 ? 0 : i;
         sample[DENOISER][k] = forward_ms(b, b->r, GGN_NET_R);
@@ -208,7 +208,7 @@ static int measure(struct bench *b, double figure[N_FIGURES], struct ggn_err *er
     return err->code;
 }
 
-static int print_layers(struct bench *b, struct ggn_exec_f32 *e, int net, struct ggn_err *err)
+static int print_layers(struct bench *b, struct ggn_exec_f32 *e, int net, struct base_err *err)
 {
     static const char *const op_name[] = {"conv",     "im2col",   "batch norm", "leaky relu", "sigmoid",
                                           "max pool", "upsample", "flatten",    "linear",     "dropout"};
@@ -235,7 +235,7 @@ static int print_layers(struct bench *b, struct ggn_exec_f32 *e, int net, struct
     printf("%-7s %-11s %14s %9.4f %9.3f %9.1f\n\n", "all", "", "", 2e-9 * ggn_graph_mac(g), total,
            2e-6 * ggn_graph_mac(g) / total);
     (void)err;
-    return GGN_OK;
+    return 0;
 }
 
 static void print_figures(const struct bench *b, const double figure[N_FIGURES])
@@ -264,9 +264,9 @@ int ggn_cmd_bench(int argc, char **argv)
         {0}};
     static const struct argp argp = {
         .options = list, .parser = parse, .doc = "Measures inference and training of the networks at the published size."};
-    struct bench b = {.o = {.threads = ggn_threads_available(), .rounds = 9, .batch = 4}};
+    struct bench b = {.o = {.threads = base_threads_available(), .rounds = 9, .batch = 4}};
     double figure[N_FIGURES];
-    struct ggn_err err = {0};
+    struct base_err err = {0};
 
     argp_parse(&argp, argc, argv, 0, NULL, &b.o);
     int rc = setup(&b, &err);

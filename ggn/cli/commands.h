@@ -33,7 +33,7 @@ GGN_COMMANDS(GGN_DECLARE_COMMAND)
 enum { GGN_EXIT_OK = 0, GGN_EXIT_FAILED = 1, GGN_EXIT_BAD_INPUT = 2, GGN_EXIT_INTERRUPTED = 130 };
 
 /* Prints "COMMAND: text" on stderr and returns the exit status that err->code stands for (`command` is argv[0]). */
-int ggn_cmd_fail(const char *command, const struct ggn_err *err);
+int ggn_cmd_fail(const char *command, const struct base_err *err);
 
 /* After ggn_cmd_catch_interrupt(), SIGINT and SIGTERM set the flag instead of ending the process; a second one ends it. The
  * command polls the flag, leaves its outputs whole and returns GGN_EXIT_INTERRUPTED. */

@@ -7,7 +7,7 @@
 #include <sys/stat.h>
 
 #include "cli/commands.h"
-#include "base/fio.h"
+#include "base/files.h"
 #include "eval/compare.h"
 
 struct options {
@@ -66,12 +66,12 @@ static error_t parse(int key, char *arg, struct argp_state *state)
     }
 }
 
-static int write_outputs(const struct options *o, const struct ggn_pairing *p, const struct ggn_agreement *a, struct ggn_err *err)
+static int write_outputs(const struct options *o, const struct ggn_pairing *p, const struct ggn_agreement *a, struct base_err *err)
 {
     char path[4096];
-    struct ggn_fio_out out;
+    struct base_file_out out;
     if (mkdir(o->dir, 0777) != 0 && errno != EEXIST)
-        return ggn_fail(err, GGN_EIO, "%s: %s", o->dir, strerror(errno));
+        return base_fail(err, BASE_EIO, "%s: %s", o->dir, strerror(errno));
     const char *names[2];
     for (int i = 0; i < 2; i++) {
         const char *slash = strrchr(o->paths[i], '/');
@@ -79,13 +79,13 @@ static int write_outputs(const struct options *o, const struct ggn_pairing *p, c
     }
     int rc = ggn_compare_pictures(o->dir, p, names[0], names[1], err);
     snprintf(path, sizeof path, "%s/summary.json", o->dir);
-    if (rc == GGN_OK)
-        rc = ggn_fio_begin(&out, path, err);
-    if (rc != GGN_OK)
+    if (!rc)
+        rc = base_file_begin(&out, path, err);
+    if (rc)
         return rc;
     ggn_agreement_print_json(out.file, a);
     putc('\n', out.file);
-    return ggn_fio_commit(&out, err);
+    return base_file_commit(&out, err);
 }
 
 int ggn_cmd_compare(int argc, char **argv)
@@ -101,27 +101,27 @@ int ggn_cmd_compare(int argc, char **argv)
     struct ggn_thresholds sides[2] = {{0}, {0}};
     struct ggn_pairing pairing = {0};
     struct ggn_agreement figures;
-    struct ggn_err err = {0};
+    struct base_err err = {0};
 
     argp_parse(&argp, argc, argv, 0, NULL, &o);
-    int rc = GGN_OK;
-    for (int i = 0; i < 2 && rc == GGN_OK; i++)
+    int rc = 0;
+    for (int i = 0; i < 2 && !rc; i++)
         rc = ggn_thresholds_read(o.paths[i], o.block, &sides[i], &err);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = ggn_pairing_init(&pairing, &sides[0], &sides[1], o.view, &err);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = ggn_stats_agreement(pairing.truth, pairing.model, pairing.n, o.cap, &figures, &err);
-    if (rc == GGN_OK && o.dir != NULL)
+    if (!rc && o.dir != NULL)
         rc = write_outputs(&o, &pairing, &figures, &err);
-    if (rc == GGN_OK && o.json) {
+    if (!rc && o.json) {
         ggn_agreement_print_json(stdout, &figures);
         putchar('\n');
-    } else if (rc == GGN_OK) {
+    } else if (!rc) {
         printf("%d view%s in common\n", pairing.n_views, pairing.n_views == 1 ? "" : "s");
         ggn_agreement_print_table(stdout, &figures);
     }
     ggn_pairing_release(&pairing);
     ggn_thresholds_release(&sides[0]);
     ggn_thresholds_release(&sides[1]);
-    return rc == GGN_OK ? GGN_EXIT_OK : ggn_cmd_fail(argv[0], &err);
+    return !rc ? GGN_EXIT_OK : ggn_cmd_fail(argv[0], &err);
 }

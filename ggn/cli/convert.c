@@ -51,7 +51,7 @@ int ggn_cmd_convert(int argc, char **argv)
                "`ggn evaluate -m MODEL -m OUT` says which."};
     struct options o = {.type = GGN_F16};
     struct ggn_model *model = NULL;
-    struct ggn_err err = {0};
+    struct base_err err = {0};
 
     argp_parse(&argp, argc, argv, 0, NULL, &o);
     int rc = ggn_model_load(o.paths[0], &model, &err);

@@ -9,7 +9,7 @@
 
 #include <cjson/cJSON.h>
 
-#include "base/fio.h"
+#include "base/files.h"
 #include "baselines/learned.h"
 #include "cli/commands.h"
 #include "eval/network.h"
@@ -100,43 +100,43 @@ struct job {
     enum ggn_split tuning, tuning_models;
 };
 
-static int load_models(struct job *j, int *window, struct ggn_err *err)
+static int load_models(struct job *j, int *window, struct base_err *err)
 {
     *window = j->o->window;
     for (int i = 0; i < j->o->n_models; i++) {
         int rc = ggn_model_load(j->o->models[i], &j->models[i], err);
-        if (rc != GGN_OK)
+        if (rc)
             return rc;
         *window = i == 0 || j->models[i]->hyper.window > *window ? j->models[i]->hyper.window : *window;
     }
-    return GGN_OK;
+    return 0;
 }
 
 /* A method that could be made takes its place in the list; one that lacks its data does not. */
-static int add_trivial(struct job *j, struct ggn_err *err)
+static int add_trivial(struct job *j, struct base_err *err)
 {
     int available, rc = ggn_method_spp(&j->methods[j->n], &j->set, err);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = ggn_method_tune(&j->methods[j->n++], &j->set, j->tuning, j->o->early, err);
-    if (rc == GGN_OK && (rc = ggn_method_constant(&j->methods[j->n], &j->set, err)) == GGN_OK)
+    if (!rc && (rc = ggn_method_constant(&j->methods[j->n], &j->set, err)) == 0)
         j->n++;
-    if (rc == GGN_OK && (rc = ggn_method_scene_mean(&j->methods[j->n], &j->set, err)) == GGN_OK)
+    if (!rc && (rc = ggn_method_scene_mean(&j->methods[j->n], &j->set, err)) == 0)
         j->n++;
-    for (int k = 0; k < 2 && rc == GGN_OK; k++) {
+    for (int k = 0; k < 2 && !rc; k++) {
         struct ggn_method *m = &j->methods[j->n];
         rc = k == 0 ? ggn_method_halfbuf(m, &j->set, &available, err) : ggn_method_variance(m, &j->set, &available, err);
-        if (rc == GGN_OK && !available)
+        if (!rc && !available)
             ggn_method_release(m);
-        else if (rc == GGN_OK)
+        else if (!rc)
             rc = ggn_method_tune(&j->methods[j->n++], &j->set, j->tuning, j->o->early, err);
     }
     return rc;
 }
 
-static int add_baselines(struct job *j, struct ggn_threads *threads, struct ggn_err *err)
+static int add_baselines(struct job *j, struct base_threads *threads, struct base_err *err)
 {
-    int rc = GGN_OK;
-    for (int k = 0; k < 3 && rc == GGN_OK; k++) {
+    int rc = 0;
+    for (int k = 0; k < 3 && !rc; k++) {
         struct ggn_method *m = &j->methods[j->n];
         if (k == 0)
             rc = ggn_method_attributes_svm(m, &j->set, j->tuning, threads, err);
@@ -144,22 +144,22 @@ static int add_baselines(struct job *j, struct ggn_threads *threads, struct ggn_
             rc = ggn_method_mask_svm(m, &j->set, j->tuning, threads, err);
         else
             rc = ggn_method_svd_lstm(m, &j->set, j->tuning, 0, j->o->epochs, threads, err);
-        if (rc == GGN_OK)
+        if (!rc)
             rc = ggn_method_tune(&j->methods[j->n++], &j->set, j->tuning, j->o->early, err);
     }
     return rc;
 }
 
-static int add_models(struct job *j, struct ggn_threads *threads, struct ggn_err *err)
+static int add_models(struct job *j, struct base_threads *threads, struct base_err *err)
 {
-    int rc = GGN_OK, precisions = j->o->bf16 ? 2 : 1;
-    for (int i = 0; i < precisions * j->o->n_models && rc == GGN_OK; i++) {
+    int rc = 0, precisions = j->o->bf16 ? 2 : 1;
+    for (int i = 0; i < precisions * j->o->n_models && !rc; i++) {
         const char *path = j->o->models[i / precisions], *slash = strrchr(path, '/');
         enum ggn_precision precision = i % precisions ? GGN_PRECISION_BF16 : GGN_PRECISION_F32;
         char name[GGN_METHOD_NAME];
         snprintf(name, sizeof name, "%.40s%s", slash != NULL ? slash + 1 : path, precision == GGN_PRECISION_BF16 ? " bf16" : "");
         rc = ggn_eval_network(&j->methods[j->n], &j->set, j->models[i / precisions], name, precision, threads, err);
-        if (rc != GGN_OK)
+        if (rc)
             return rc;
         j->likened[j->n] = precision == GGN_PRECISION_BF16 ? j->n - 1 : i > 0 ? j->n - i : -1;
         struct ggn_method *m = &j->methods[j->n++];
@@ -205,26 +205,26 @@ static void report_changes(const struct job *j, enum ggn_split split, cJSON *to)
     }
 }
 
-static int pictures(const struct job *j, enum ggn_split split, struct ggn_err *err)
+static int pictures(const struct job *j, enum ggn_split split, struct base_err *err)
 {
     char path[4096];
     int rc = ggn_report_pictures(j->o->out, &j->set, split, j->methods, j->n, err);
-    if (rc != GGN_OK || j->o->n_models == 0 || split == GGN_SPLIT_TRAIN)
+    if (rc || j->o->n_models == 0 || split == GGN_SPLIT_TRAIN)
         return rc;
     snprintf(path, sizeof path, "%.3900s/%s-denoiser.png", j->o->out, ggn_split_names[split]);
     rc = ggn_eval_denoiser_picture(path, &j->set, j->models[0], split, err);
     snprintf(path, sizeof path, "%.3900s/%s-features.png", j->o->out, ggn_split_names[split]);
-    return rc == GGN_OK ? ggn_eval_feature_picture(path, &j->set, j->models[0], split, err) : rc;
+    return !rc ? ggn_eval_feature_picture(path, &j->set, j->models[0], split, err) : rc;
 }
 
-static int write_json(const struct options *o, const char *text, struct ggn_err *err)
+static int write_json(const struct options *o, const char *text, struct base_err *err)
 {
     char path[4096];
-    int rc = ggn_fio_join(path, o->out, "figures.json", err);
-    return rc == GGN_OK ? ggn_fio_write_line(path, text, err) : rc;
+    int rc = base_file_join(path, o->out, "figures.json", err);
+    return !rc ? base_file_write_line(path, text, err) : rc;
 }
 
-static int report(struct job *j, int skipped, struct ggn_err *err)
+static int report(struct job *j, int skipped, struct base_err *err)
 {
     struct ggn_method_metrics metrics[MAX_METHODS];
     cJSON *root = cJSON_CreateObject();
@@ -234,16 +234,16 @@ static int report(struct job *j, int skipped, struct ggn_err *err)
     cJSON_AddNumberToObject(root, "early_rate_tuned_for", j->o->early);
     cJSON_AddStringToObject(root, "tuned_on", ggn_split_names[j->tuning]);
     cJSON *splits = cJSON_AddObjectToObject(root, "splits"), *changes = cJSON_AddObjectToObject(root, "changes");
-    int rc = GGN_OK;
+    int rc = 0;
     if (!j->o->json)
         printf("labels: %s; cuts tuned on %s for %.1f %% early stops%s\n", ggn_dataset_label_source(&j->set.chains.data), ggn_split_names[j->tuning], 100.0 * j->o->early,
                skipped > 0 ? "; views without labels are left out" : "");
-    for (int split = 0; split < GGN_SPLITS && rc == GGN_OK; split++) {
+    for (int split = 0; split < GGN_SPLITS && !rc; split++) {
         if (ggn_eval_count(&j->set, (enum ggn_split)split) == 0)
             continue;
-        for (int i = 0; i < j->n && rc == GGN_OK; i++)
+        for (int i = 0; i < j->n && !rc; i++)
             rc = ggn_method_measure(&j->methods[i], &j->set, (enum ggn_split)split, &metrics[i], err);
-        if (rc != GGN_OK)
+        if (rc)
             break;
         if (!j->o->json)
             ggn_report_table(stdout, &j->set, (enum ggn_split)split, j->methods, metrics, j->n);
@@ -252,13 +252,13 @@ static int report(struct job *j, int skipped, struct ggn_err *err)
         if (j->o->out != NULL)
             rc = pictures(j, (enum ggn_split)split, err);
     }
-    char *text = rc == GGN_OK ? cJSON_Print(root) : NULL;
+    char *text = !rc ? cJSON_Print(root) : NULL;
     cJSON_Delete(root);
-    if (rc == GGN_OK && text == NULL)
-        rc = ggn_fail_nomem(err, "report");
-    if (rc == GGN_OK && j->o->json)
+    if (!rc && text == NULL)
+        rc = base_fail_nomem(err, "report");
+    if (!rc && j->o->json)
         puts(text);
-    if (rc == GGN_OK && j->o->out != NULL)
+    if (!rc && j->o->out != NULL)
         rc = write_json(j->o, text, err);
     cJSON_free(text);
     return rc;
@@ -272,9 +272,9 @@ int ggn_cmd_evaluate(int argc, char **argv)
         .doc = "Measures models, the trivial baselines and the criteria halfbuf and variance on the same recorded sequences, separately for training, "
                "validation and test scenes.",
     };
-    struct options o = {.early = 0.05, .quality = 1, .threads = ggn_threads_available(), .window = 6, .epochs = 15};
+    struct options o = {.early = 0.05, .quality = 1, .threads = base_threads_available(), .window = 6, .epochs = 15};
     struct job j = {.o = &o};
-    struct ggn_err err = {0};
+    struct base_err err = {0};
     int window, skipped = 0;
 
     argp_parse(&argp, argc, argv, 0, NULL, &o);
@@ -282,32 +282,32 @@ int ggn_cmd_evaluate(int argc, char **argv)
         fprintf(stderr, "%s: this processor has no bfloat16 products: --bf16 judges in float\n", argv[0]);
     for (int i = 0; i < MAX_METHODS; i++)
         j.likened[i] = -1;
-    struct ggn_threads *threads = ggn_threads_create(o.threads, &err);
-    int rc = threads == NULL ? err.code : GGN_OK;
-    if (rc == GGN_OK && o.out != NULL && mkdir(o.out, 0777) != 0 && errno != EEXIST)
-        rc = ggn_fail(&err, GGN_EIO, "%s: %s", o.out, strerror(errno));
-    if (rc == GGN_OK)
+    struct base_threads *threads = base_threads_create(o.threads, &err);
+    int rc = threads == NULL ? err.code : 0;
+    if (!rc && o.out != NULL && mkdir(o.out, 0777) != 0 && errno != EEXIST)
+        rc = base_fail(&err, BASE_EIO, "%s: %s", o.out, strerror(errno));
+    if (!rc)
         rc = load_models(&j, &window, &err);
-    if (rc == GGN_OK) {
+    if (!rc) {
         struct ggn_eval_options eo = {.dir = o.data, .window = window, .quality = o.quality, .recorded = o.recorded, .ratio = o.ratio, .seed = 1};
         rc = ggn_eval_set_load(&j.set, &eo, threads, &skipped, &err);
     }
-    if (rc == GGN_OK) {
+    if (!rc) {
         j.tuning = ggn_eval_count(&j.set, GGN_SPLIT_TRAIN) > 0 ? GGN_SPLIT_TRAIN : j.set.blocks[0].split;
         j.tuning_models = ggn_eval_count(&j.set, GGN_SPLIT_VALIDATION) > 0 ? GGN_SPLIT_VALIDATION : j.tuning;
         rc = add_trivial(&j, &err);
     }
-    if (rc == GGN_OK && o.baselines)
+    if (!rc && o.baselines)
         rc = add_baselines(&j, threads, &err);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = add_models(&j, threads, &err);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = report(&j, skipped, &err);
     for (int i = 0; i < j.n; i++)
         ggn_method_release(&j.methods[i]);
     ggn_eval_set_release(&j.set);
     for (int i = 0; i < o.n_models; i++)
         ggn_model_destroy(j.models[i]);
-    ggn_threads_destroy(threads);
-    return rc == GGN_OK ? GGN_EXIT_OK : ggn_cmd_fail(argv[0], &err);
+    base_threads_destroy(threads);
+    return !rc ? GGN_EXIT_OK : ggn_cmd_fail(argv[0], &err);
 }

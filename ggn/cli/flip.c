@@ -52,12 +52,12 @@ static error_t parse(int key, char *arg, struct argp_state *state)
     }
 }
 
-static int write_map(const char *path, const float *map, int width, int height, struct ggn_err *err)
+static int write_map(const char *path, const float *map, int width, int height, struct base_err *err)
 {
     size_t n = (size_t)width * (size_t)height;
     uint8_t *rgb = malloc(3 * n);
     if (rgb == NULL)
-        return ggn_fail_nomem(err, path);
+        return base_fail_nomem(err, path);
     for (size_t i = 0; i < n; i++)
         ggn_colormap_rgb(GGN_MAGMA, (double)map[i], rgb + 3 * i);
     int rc = ggn_image8_write_png(path, rgb, width, height, err);
@@ -76,35 +76,35 @@ int ggn_cmd_flip(int argc, char **argv)
     struct options o = {.ppd = GGN_FLIP_PPD};
     struct ggn_image8 images[2] = {{0}, {0}};
     struct ggn_flip_stats stats;
-    struct ggn_err err = {0};
+    struct base_err err = {0};
     float *map = NULL;
 
     argp_parse(&argp, argc, argv, 0, NULL, &o);
-    int rc = GGN_OK;
-    for (int i = 0; i < 2 && rc == GGN_OK; i++)
+    int rc = 0;
+    for (int i = 0; i < 2 && !rc; i++)
         rc = ggn_image8_read(o.paths[i], &images[i], &err);
-    if (rc != GGN_OK)
+    if (rc)
         goto out;
     if (images[0].width != images[1].width || images[0].height != images[1].height) {
-        rc = ggn_fail(&err, GGN_EINVAL, "%s is %dx%d, %s is %dx%d: the sizes must be equal", o.paths[0], images[0].width,
+        rc = base_fail(&err, BASE_EINVAL, "%s is %dx%d, %s is %dx%d: the sizes must be equal", o.paths[0], images[0].width,
                       images[0].height, o.paths[1], images[1].width, images[1].height);
         goto out;
     }
     if (o.map_path != NULL) {
         map = malloc((size_t)images[0].width * (size_t)images[0].height * sizeof *map);
         if (map == NULL) {
-            rc = ggn_fail_nomem(&err, "error map");
+            rc = base_fail_nomem(&err, "error map");
             goto out;
         }
     }
     rc = ggn_flip(images[0].data, images[1].data, images[0].width, images[0].height, o.ppd, map, &stats, &err);
-    if (rc == GGN_OK && map != NULL)
+    if (!rc && map != NULL)
         rc = write_map(o.map_path, map, images[0].width, images[0].height, &err);
-    if (rc == GGN_OK)
+    if (!rc)
         printf(o.json ? "{\"mean\": %.6f, \"max\": %.6f}\n" : "mean %.6f\nmax  %.6f\n", stats.mean, stats.max);
 out:
     free(map);
     ggn_image8_release(&images[0]);
     ggn_image8_release(&images[1]);
-    return rc == GGN_OK ? GGN_EXIT_OK : ggn_cmd_fail(argv[0], &err);
+    return !rc ? GGN_EXIT_OK : ggn_cmd_fail(argv[0], &err);
 }

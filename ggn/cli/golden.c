@@ -133,16 +133,16 @@ int ggn_cmd_golden(int argc, char **argv)
         {0}};
     static const struct argp argp = {
         .options = list, .parser = parse, .doc = "Prints the golden values of the published networks as one JSON object."};
-    struct options o = {.seeds = {{100, 300, 500}}, .threads = ggn_threads_available()};
+    struct options o = {.seeds = {{100, 300, 500}}, .threads = base_threads_available()};
     struct ggn_golden golden;
-    struct ggn_err err = {0};
+    struct base_err err = {0};
 
     argp_parse(&argp, argc, argv, 0, NULL, &o);
-    struct ggn_threads *threads = ggn_threads_create(o.threads, &err);
+    struct base_threads *threads = base_threads_create(o.threads, &err);
     if (!threads)
         return ggn_cmd_fail(argv[0], &err);
     int rc = (o.single ? ggn_golden_run_f32 : ggn_golden_run_f64)(&o.seeds, o.train_step, o.bf16, threads, &golden, &err);
-    ggn_threads_destroy(threads);
+    base_threads_destroy(threads);
     if (rc)
         return ggn_cmd_fail(argv[0], &err);
 
@@ -150,7 +150,7 @@ int ggn_cmd_golden(int argc, char **argv)
     char *text = cJSON_Print(json);
     cJSON_Delete(json);
     if (!text) {
-        ggn_fail_nomem(&err, "JSON");
+        base_fail_nomem(&err, "JSON");
         return ggn_cmd_fail(argv[0], &err);
     }
     puts(text);

@@ -8,7 +8,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "base/fio.h"
+#include "base/files.h"
 #include "cli/commands.h"
 #include "data/sin3d.h"
 
@@ -65,7 +65,7 @@ static void show_progress(void *data, const char *view, int done, int of)
     fprintf(stderr, "\r%s: %d of %d images%s", view, done, of, done == of ? "\n" : "");
 }
 
-static int import_one(const struct options *o, const struct ggn_sin3d_options *so, const char *dir, struct ggn_err *err)
+static int import_one(const struct options *o, const struct ggn_sin3d_options *so, const char *dir, struct base_err *err)
 {
     char copy[4096], out[4096];
     int labelled = 0;
@@ -73,10 +73,10 @@ static int import_one(const struct options *o, const struct ggn_sin3d_options *s
     for (size_t n = strlen(copy); n > 1 && copy[n - 1] == '/';)
         copy[--n] = '\0';
     const char *slash = strrchr(copy, '/');
-    int rc = ggn_fio_join(out, o->out, slash != NULL ? slash + 1 : copy, err);
-    if (rc == GGN_OK)
+    int rc = base_file_join(out, o->out, slash != NULL ? slash + 1 : copy, err);
+    if (!rc)
         rc = ggn_sin3d_import_view(copy, out, so, &labelled, err);
-    if (rc == GGN_OK)
+    if (!rc)
         printf("%s: %s\n", out, labelled ? "imported with thresholds" : "imported, no thresholds for it");
     return rc;
 }
@@ -87,15 +87,15 @@ static int compare_names(const void *a, const void *b)
 }
 
 /* Every view folder in the root, in order of name. */
-static int import_all(const struct options *o, const struct ggn_sin3d_options *so, struct ggn_err *err)
+static int import_all(const struct options *o, const struct ggn_sin3d_options *so, struct base_err *err)
 {
     DIR *d = opendir(o->dir);
     char **names = NULL;
     size_t n = 0;
-    int rc = GGN_OK, found = 0;
+    int rc = 0, found = 0;
     if (d == NULL)
-        return ggn_fail(err, GGN_EIO, "%s: %s", o->dir, strerror(errno));
-    for (const struct dirent *e; rc == GGN_OK && (e = readdir(d)) != NULL;) {
+        return base_fail(err, BASE_EIO, "%s: %s", o->dir, strerror(errno));
+    for (const struct dirent *e; !rc && (e = readdir(d)) != NULL;) {
         char **more = e->d_name[0] == '.' ? names : realloc(names, (n + 1) * sizeof *names);
         if (e->d_name[0] == '.')
             continue;
@@ -104,12 +104,12 @@ static int import_all(const struct options *o, const struct ggn_sin3d_options *s
             names[n] = strdup(e->d_name);
         }
         if (more == NULL || names[n++] == NULL)
-            rc = ggn_fail_nomem(err, o->dir);
+            rc = base_fail_nomem(err, o->dir);
     }
     closedir(d);
-    if (rc == GGN_OK && n > 0)
+    if (!rc && n > 0)
         qsort(names, n, sizeof *names, compare_names);
-    for (size_t i = 0; i < n && rc == GGN_OK && !ggn_cmd_interrupted; i++) {
+    for (size_t i = 0; i < n && !rc && !ggn_cmd_interrupted; i++) {
         char path[4096];
         int length = snprintf(path, sizeof path, "%s/%s", o->dir, names[i]);
         struct stat st;
@@ -121,8 +121,8 @@ static int import_all(const struct options *o, const struct ggn_sin3d_options *s
     for (size_t i = 0; i < n; i++)
         free(names[i]);
     free(names);
-    if (rc == GGN_OK && !found)
-        rc = ggn_fail(err, GGN_EINVAL, "%s: no NAME_00020.png … in it or in its folders", o->dir);
+    if (!rc && !found)
+        rc = base_fail(err, BASE_EINVAL, "%s: no NAME_00020.png … in it or in its folders", o->dir);
     return rc;
 }
 
@@ -137,22 +137,22 @@ int ggn_cmd_import_sin3d(int argc, char **argv)
     };
     struct options o = {.block = 200};
     struct ggn_thresholds thresholds = {0};
-    struct ggn_err err = {0};
+    struct base_err err = {0};
 
     argp_parse(&argp, argc, argv, 0, NULL, &o);
     ggn_cmd_catch_interrupt();
     struct ggn_sin3d_options so = {.block = o.block, .allow_gaps = o.allow_gaps, .progress = isatty(2) ? show_progress : NULL};
-    int rc = GGN_OK;
+    int rc = 0;
     if (o.thresholds != NULL) {
         rc = ggn_thresholds_read(o.thresholds, o.block, &thresholds, &err);
         so.thresholds = &thresholds;
     }
-    if (rc == GGN_OK && mkdir(o.out, 0777) != 0 && errno != EEXIST)
-        rc = ggn_fail(&err, GGN_EIO, "%s: %s", o.out, strerror(errno));
-    if (rc == GGN_OK)
+    if (!rc && mkdir(o.out, 0777) != 0 && errno != EEXIST)
+        rc = base_fail(&err, BASE_EIO, "%s: %s", o.out, strerror(errno));
+    if (!rc)
         rc = ggn_sin3d_is_view(o.dir) ? import_one(&o, &so, o.dir, &err) : import_all(&o, &so, &err);
     ggn_thresholds_release(&thresholds);
-    if (rc != GGN_OK)
+    if (rc)
         return ggn_cmd_fail(argv[0], &err);
     return ggn_cmd_interrupted ? GGN_EXIT_INTERRUPTED : GGN_EXIT_OK;
 }

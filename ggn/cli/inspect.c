@@ -81,7 +81,7 @@ int ggn_cmd_inspect(int argc, char **argv)
     struct options o = {0};
     struct ggn_container c;
     struct ggn_model *model = NULL;
-    struct ggn_err err = {0};
+    struct base_err err = {0};
 
     argp_parse(&argp, argc, argv, 0, NULL, &o);
     if (ggn_container_read(&c, o.path, &err))

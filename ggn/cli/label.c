@@ -9,7 +9,7 @@
 #include "cli/commands.h"
 #include "data/dataset.h"
 #include "data/thresholds.h"
-#include "eval/stats.h"
+#include "figures/stats.h"
 #include "observer/calibrate.h"
 
 enum { MAX_INPUTS = 256, KEY_HUMAN = 256, KEY_VIEW, KEY_CALIBRATE, KEY_SOURCE, KEY_CHECK, KEY_TRIALS, KEY_SPREAD };
@@ -90,34 +90,34 @@ static const struct ggn_view *find_row(const struct options *o, const struct ggn
     return ggn_thresholds_find(t, with_part);
 }
 
-static int start_labels(struct ggn_labels *l, const char *source, const struct ggn_dataset_view *v, double spread, struct ggn_err *err)
+static int start_labels(struct ggn_labels *l, const char *source, const struct ggn_dataset_view *v, double spread, struct base_err *err)
 {
     *l = (struct ggn_labels){.cap = v->manifest.levels[v->manifest.n_levels - 1], .spread = spread};
     snprintf(l->source, sizeof l->source, "%s", source);
     l->labels = malloc(v->manifest.n_blocks * sizeof *l->labels);
-    return l->labels != NULL ? GGN_OK : ggn_fail_nomem(err, v->dir);
+    return l->labels != NULL ? 0 : base_fail_nomem(err, v->dir);
 }
 
 /* --- human labels --- */
 
-static int label_human(const struct options *o, const struct ggn_thresholds *t, const struct ggn_dataset_view *v, struct ggn_err *err)
+static int label_human(const struct options *o, const struct ggn_thresholds *t, const struct ggn_dataset_view *v, struct base_err *err)
 {
     const struct ggn_view *row = find_row(o, t, v);
     struct ggn_labels l;
     if (row == NULL)
-        return ggn_fail(err, GGN_EINVAL, "%s: no thresholds for '%s'", o->human, o->view != NULL ? o->view : v->name);
+        return base_fail(err, BASE_EINVAL, "%s: no thresholds for '%s'", o->human, o->view != NULL ? o->view : v->name);
     int rc = start_labels(&l, "human", v, o->spread > 0 ? o->spread : GGN_LABELS_SPREAD, err);
-    for (uint32_t i = 0; i < v->manifest.n_blocks && rc == GGN_OK; i++) {
+    for (uint32_t i = 0; i < v->manifest.n_blocks && !rc; i++) {
         uint32_t id = v->manifest.blocks[i].id;
         if (id >= (uint32_t)row->n)
-            rc = ggn_fail(err, GGN_EINVAL, "%s: block %u has no threshold: '%s' has %d", v->dir, id, row->name, row->n);
+            rc = base_fail(err, BASE_EINVAL, "%s: block %u has no threshold: '%s' has %d", v->dir, id, row->name, row->n);
         else
             l.labels[l.n++] = (struct ggn_label){id, fmin(row->spp[id], l.cap), row->spp[id] >= l.cap};
     }
     snprintf(l.detail, sizeof l.detail, "thresholds of '%.200s'", row->name);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = ggn_labels_write(v->dir, &l, err);
-    if (rc == GGN_OK)
+    if (!rc)
         printf("%s: %u blocks labelled with human thresholds\n", v->dir, l.n);
     ggn_labels_release(&l);
     return rc;
@@ -134,18 +134,18 @@ struct work {
     double *shift;           /* [n_blocks], with `both`: octaves between the curves, see curve_shift */
     double *caps;            /* [n_blocks]; the last sample count that was judged; may be NULL */
     int *rc;
-    struct ggn_err *errs;
+    struct base_err *errs;
 };
 
 static int judge(const struct work *w, const struct ggn_seq_block *b, enum ggn_observer_source source, struct ggn_label *out,
-                 struct ggn_curve *curve, struct ggn_err *err)
+                 struct ggn_curve *curve, struct base_err *err)
 {
     int rc = ggn_observer_curve(w->observer, b, source, w->view->manifest.reference_independent, curve, err);
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
     out->id = b->id;
     out->threshold = ggn_curve_threshold(curve, w->observer->tau, &out->censored);
-    return GGN_OK;
+    return 0;
 }
 
 /* Median over the recorded levels of log2(cheap / rendered threshold) when tau is what the level shows: says how well the cheap curve fits wherever
@@ -174,60 +174,60 @@ static void work_block(void *data, long i, int worker)
     if (ggn_cmd_interrupted)
         return;
     w->rc[i] = ggn_manifest_read_block(w->view->dir, &w->view->manifest, (uint32_t)i, &b, &w->errs[i]);
-    if (w->rc[i] != GGN_OK)
+    if (w->rc[i] != 0)
         return;
     w->rc[i] = judge(w, &b, w->both ? GGN_SOURCE_RENDERED : w->source, &w->labels[i], &rendered, &w->errs[i]);
-    if (w->rc[i] == GGN_OK && w->caps != NULL)
+    if (w->rc[i] == 0 && w->caps != NULL)
         w->caps[i] = rendered.spp[rendered.n - 1];
-    if (w->rc[i] == GGN_OK && w->both)
+    if (w->rc[i] == 0 && w->both)
         w->rc[i] = judge(w, &b, GGN_SOURCE_HALVES, &w->cheap[i], &cheap, &w->errs[i]);
-    if (w->rc[i] == GGN_OK && w->both)
+    if (w->rc[i] == 0 && w->both)
         w->shift[i] = curve_shift(&rendered, &cheap);
     ggn_curve_release(&rendered);
     ggn_curve_release(&cheap);
     ggn_seq_block_release(&b);
 }
 
-static int run_work(struct work *w, struct ggn_threads *threads, struct ggn_err *err)
+static int run_work(struct work *w, struct base_threads *threads, struct base_err *err)
 {
     size_t n = w->view->manifest.n_blocks;
-    int rc = GGN_OK;
+    int rc = 0;
     w->rc = calloc(n, sizeof *w->rc);
     w->errs = calloc(n, sizeof *w->errs);
     if (w->rc == NULL || w->errs == NULL)
-        rc = ggn_fail_nomem(err, w->view->dir);
+        rc = base_fail_nomem(err, w->view->dir);
     else
-        ggn_threads_for(threads, (long)n, work_block, w);
-    for (size_t i = 0; i < n && rc == GGN_OK; i++)
-        if (w->rc[i] != GGN_OK)
-            rc = ggn_fail(err, w->rc[i], "%s: %s", w->view->name, w->errs[i].text);
+        base_threads_for(threads, (long)n, work_block, w);
+    for (size_t i = 0; i < n && !rc; i++)
+        if (w->rc[i] != 0)
+            rc = base_fail(err, w->rc[i], "%s: %s", w->view->name, w->errs[i].text);
     free(w->rc);
     free(w->errs);
     return rc;
 }
 
-static int label_observer(const struct options *o, const struct ggn_observer *observer, struct ggn_threads *threads,
-                          const struct ggn_dataset_view *v, struct ggn_err *err)
+static int label_observer(const struct options *o, const struct ggn_observer *observer, struct base_threads *threads,
+                          const struct ggn_dataset_view *v, struct base_err *err)
 {
     struct ggn_labels l;
     int rc = start_labels(&l, "observer", v, observer->spread, err);
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
     double *caps = calloc(v->manifest.n_blocks, sizeof *caps);
     struct work w = {.view = v, .observer = observer, .source = o->source, .labels = l.labels, .caps = caps};
-    rc = caps != NULL ? run_work(&w, threads, err) : ggn_fail_nomem(err, v->dir);
+    rc = caps != NULL ? run_work(&w, threads, err) : base_fail_nomem(err, v->dir);
     l.n = v->manifest.n_blocks;
-    for (uint32_t i = 0; i < l.n && rc == GGN_OK; i++)
+    for (uint32_t i = 0; i < l.n && !rc; i++)
         l.cap = fmax(l.cap, caps[i]);
     free(caps);
     ggn_observer_describe(observer, l.detail, sizeof l.detail - 64);
     strcat(l.detail, o->source == GGN_SOURCE_HALVES ? ", from two halves" : o->source == GGN_SOURCE_AUTO ? ", recorded levels, beyond them two halves" : ", recorded levels");
-    if (rc == GGN_OK && !ggn_cmd_interrupted)
+    if (!rc && !ggn_cmd_interrupted)
         rc = ggn_labels_write(v->dir, &l, err);
     uint32_t censored = 0;
     for (uint32_t i = 0; i < l.n; i++)
         censored += l.labels[i].censored != 0;
-    if (rc == GGN_OK && !ggn_cmd_interrupted)
+    if (!rc && !ggn_cmd_interrupted)
         printf("%s: %u blocks labelled by the model observer, %u censored at %.0f spp\n", v->dir, l.n, censored, l.cap);
     ggn_labels_release(&l);
     return rc;
@@ -235,15 +235,15 @@ static int label_observer(const struct options *o, const struct ggn_observer *ob
 
 /* --- checking the cheap labels --- */
 
-static int check_view(const struct ggn_observer *observer, struct ggn_threads *threads, const struct ggn_dataset_view *v, double *errors,
-                      size_t *count, struct ggn_err *err)
+static int check_view(const struct ggn_observer *observer, struct base_threads *threads, const struct ggn_dataset_view *v, double *errors,
+                      size_t *count, struct base_err *err)
 {
     size_t n = v->manifest.n_blocks;
     struct ggn_label *labels = calloc(2 * (n > 0 ? n : 1), sizeof *labels);
     double *shift = calloc(n > 0 ? n : 1, sizeof *shift);
     struct work w = {.view = v, .observer = observer, .both = 1, .labels = labels, .cheap = labels + n, .shift = shift};
-    int rc = labels == NULL || shift == NULL ? ggn_fail_nomem(err, v->dir) : run_work(&w, threads, err);
-    for (size_t i = 0; i < n && rc == GGN_OK && !ggn_cmd_interrupted; i++) {
+    int rc = labels == NULL || shift == NULL ? base_fail_nomem(err, v->dir) : run_work(&w, threads, err);
+    for (size_t i = 0; i < n && !rc && !ggn_cmd_interrupted; i++) {
         const struct ggn_label *a = &labels[i], *b = &labels[n + i];
         printf("%-24.24s %5u %9.0f%s %9.0f%s %8.3f %8.3f\n", v->name, a->id, a->threshold, a->censored ? "+" : " ", b->threshold,
                b->censored ? "+" : " ", log2(b->threshold / a->threshold), shift[i]);
@@ -258,19 +258,19 @@ static int check_view(const struct ggn_observer *observer, struct ggn_threads *t
 /* --- calibration --- */
 
 static int collect(const struct options *o, const struct ggn_thresholds *t, const struct ggn_dataset *d, struct ggn_calibration_block *blocks,
-                   struct ggn_seq_block *pixels, int *n, struct ggn_err *err)
+                   struct ggn_seq_block *pixels, int *n, struct base_err *err)
 {
-    int rc = GGN_OK;
-    for (int i = 0; i < d->n && rc == GGN_OK; i++) {
+    int rc = 0;
+    for (int i = 0; i < d->n && !rc; i++) {
         const struct ggn_dataset_view *v = &d->views[i];
         const struct ggn_view *row = find_row(o, t, v);
         double cap = o->source != GGN_SOURCE_RENDERED ? GGN_SIMULATED_CAP : v->manifest.levels[v->manifest.n_levels - 1];
-        for (uint32_t b = 0; row != NULL && b < v->manifest.n_blocks && rc == GGN_OK; b++) {
+        for (uint32_t b = 0; row != NULL && b < v->manifest.n_blocks && !rc; b++) {
             uint32_t id = v->manifest.blocks[b].id;
             if (id >= (uint32_t)row->n || row->spp[id] >= cap)
                 continue;
             rc = ggn_manifest_read_block(v->dir, &v->manifest, b, &pixels[*n], err);
-            if (rc == GGN_OK) {
+            if (!rc) {
                 blocks[*n] = (struct ggn_calibration_block){&pixels[*n], v->manifest.reference_independent, row->spp[id]};
                 ++*n;
             }
@@ -279,7 +279,7 @@ static int collect(const struct options *o, const struct ggn_thresholds *t, cons
     return rc;
 }
 
-static int report_calibration(const struct options *o, const struct ggn_calibration *c, const struct ggn_calibration_block *blocks, struct ggn_err *err)
+static int report_calibration(const struct options *o, const struct ggn_calibration *c, const struct ggn_calibration_block *blocks, struct base_err *err)
 {
     char text[512], json[512];
     double spread = o->spread > 0 ? o->spread : c->observer.spread;
@@ -294,10 +294,10 @@ static int report_calibration(const struct options *o, const struct ggn_calibrat
     snprintf(json, sizeof json, "{\"blocks\": %d, \"median_abs_log2\": %.4f, \"loo_median_abs_log2\": %.4f, \"loo_mean_abs_log2\": %.4f, "
              "\"nested_loo_median_abs_log2\": %.4f, \"nested_loo_mean_abs_log2\": %.4f}", c->n, c->median_abs_log2, c->loo_median_abs_log2,
              c->loo_mean_abs_log2, c->nested_median_abs_log2, c->nested_mean_abs_log2);
-    return o->out != NULL ? ggn_observer_write(o->out, &observer, json, err) : GGN_OK;
+    return o->out != NULL ? ggn_observer_write(o->out, &observer, json, err) : 0;
 }
 
-static int calibrate(const struct options *o, const struct ggn_dataset *d, struct ggn_threads *threads, struct ggn_err *err)
+static int calibrate(const struct options *o, const struct ggn_dataset *d, struct base_threads *threads, struct base_err *err)
 {
     struct ggn_thresholds t = {0};
     struct ggn_calibration c = {0};
@@ -307,12 +307,12 @@ static int calibrate(const struct options *o, const struct ggn_dataset *d, struc
         room += d->views[i].manifest.n_blocks;
     struct ggn_calibration_block *blocks = calloc(room, sizeof *blocks);
     struct ggn_seq_block *pixels = calloc(room, sizeof *pixels);
-    int rc = blocks == NULL || pixels == NULL ? ggn_fail_nomem(err, "calibration") : ggn_thresholds_read(o->calibrate, 200, &t, err);
-    if (rc == GGN_OK)
+    int rc = blocks == NULL || pixels == NULL ? base_fail_nomem(err, "calibration") : ggn_thresholds_read(o->calibrate, 200, &t, err);
+    if (!rc)
         rc = collect(o, &t, d, blocks, pixels, &n, err);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = ggn_observer_calibrate(blocks, n, o->source, threads, &c, err);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = report_calibration(o, &c, blocks, err);
     ggn_calibration_release(&c);
     for (int i = 0; i < n; i++)
@@ -323,35 +323,35 @@ static int calibrate(const struct options *o, const struct ggn_dataset *d, struc
     return rc;
 }
 
-static int fit_trials(const struct options *o, struct ggn_err *err)
+static int fit_trials(const struct options *o, struct base_err *err)
 {
     double log_sum = 0.0;
     for (int i = 0; i < o->n_inputs; i++) {
         double spread;
         int blocks, trials, skipped;
         int rc = ggn_trials_spread(o->inputs[i], &spread, &blocks, &trials, &skipped, err);
-        if (rc != GGN_OK)
+        if (rc)
             return rc;
         printf("%s: spread %.2f octaves (%d trials, %d blocks, %d lines left out)\n", o->inputs[i], spread, trials, blocks, skipped);
         log_sum += log(spread);
     }
     printf("geometric mean %.2f octaves\n", exp(log_sum / o->n_inputs));
-    return GGN_OK;
+    return 0;
 }
 
 static int run_dataset(const struct options *o, const struct ggn_dataset *d, const struct ggn_observer *observer, const struct ggn_thresholds *human,
-                       struct ggn_threads *threads, struct ggn_err *err)
+                       struct base_threads *threads, struct base_err *err)
 {
     size_t count = 0, room = 1;
-    int rc = GGN_OK;
+    int rc = 0;
     for (int i = 0; i < d->n; i++)
         room += d->views[i].manifest.n_blocks;
     double *errors = malloc(room * sizeof *errors);
     if (errors == NULL)
-        return ggn_fail_nomem(err, "check");
+        return base_fail_nomem(err, "check");
     if (o->check)
         printf("%-24s %5s %10s %10s %8s %8s\n", "view", "block", "rendered", "halves", "log2", "curve");
-    for (int i = 0; i < d->n && rc == GGN_OK && !ggn_cmd_interrupted; i++) {
+    for (int i = 0; i < d->n && !rc && !ggn_cmd_interrupted; i++) {
         if (d->views[i].manifest.n_blocks == 0)
             fprintf(stderr, "ggn label: %s: no finished block yet, left out\n", d->views[i].dir);
         else if (o->check)
@@ -361,7 +361,7 @@ static int run_dataset(const struct options *o, const struct ggn_dataset *d, con
         else
             rc = label_observer(o, observer, threads, &d->views[i], err);
     }
-    if (rc == GGN_OK && o->check && count > 0)
+    if (!rc && o->check && count > 0)
         printf("%zu blocks (+: beyond the last level): |curve| median %.3f, 90th percentile %.3f octaves\n", count, ggn_stats_quantile(errors, count, 0.5),
                ggn_stats_quantile(errors, count, 0.9));
     free(errors);
@@ -377,39 +377,39 @@ int ggn_cmd_label(int argc, char **argv)
         .doc = "Attaches thresholds to recorded sequences (DATA: a sequence or a folder of them): those of people, or those of the model "
                "observer, which are never called human.",
     };
-    struct options o = {.source = GGN_SOURCE_AUTO, .threads = ggn_threads_available()};
+    struct options o = {.source = GGN_SOURCE_AUTO, .threads = base_threads_available()};
     struct ggn_observer observer = ggn_observer_default;
     struct ggn_thresholds human = {0};
-    struct ggn_threads *threads = NULL;
-    struct ggn_err err = {0};
+    struct base_threads *threads = NULL;
+    struct base_err err = {0};
 
     argp_parse(&argp, argc, argv, 0, NULL, &o);
     ggn_cmd_catch_interrupt();
-    int rc = o.observer_path != NULL ? ggn_observer_read(o.observer_path, &observer, &err) : GGN_OK;
+    int rc = o.observer_path != NULL ? ggn_observer_read(o.observer_path, &observer, &err) : 0;
     if (o.spread > 0)
         observer.spread = o.spread;
-    if (rc == GGN_OK && o.trials) {
+    if (!rc && o.trials) {
         rc = fit_trials(&o, &err);
         goto out;
     }
-    if (rc == GGN_OK && o.human != NULL)
+    if (!rc && o.human != NULL)
         rc = ggn_thresholds_read(o.human, 200, &human, &err);
-    if (rc == GGN_OK) {
-        threads = ggn_threads_create(o.threads, &err);
-        rc = threads == NULL ? err.code : GGN_OK;
+    if (!rc) {
+        threads = base_threads_create(o.threads, &err);
+        rc = threads == NULL ? err.code : 0;
     }
-    for (int i = 0; i < o.n_inputs && rc == GGN_OK && !ggn_cmd_interrupted; i++) {
+    for (int i = 0; i < o.n_inputs && !rc && !ggn_cmd_interrupted; i++) {
         struct ggn_dataset d;
         rc = ggn_dataset_open(o.inputs[i], &d, &err);
-        if (rc != GGN_OK)
+        if (rc)
             break;
         rc = o.calibrate != NULL ? calibrate(&o, &d, threads, &err) : run_dataset(&o, &d, &observer, &human, threads, &err);
         ggn_dataset_release(&d);
     }
 out:
-    ggn_threads_destroy(threads);
+    base_threads_destroy(threads);
     ggn_thresholds_release(&human);
-    if (rc != GGN_OK)
+    if (rc)
         return ggn_cmd_fail(argv[0], &err);
     return ggn_cmd_interrupted ? GGN_EXIT_INTERRUPTED : GGN_EXIT_OK;
 }

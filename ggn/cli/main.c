@@ -39,10 +39,10 @@ void ggn_cmd_catch_interrupt(void)
     sigaction(SIGTERM, &action, NULL);
 }
 
-int ggn_cmd_fail(const char *command, const struct ggn_err *err)
+int ggn_cmd_fail(const char *command, const struct base_err *err)
 {
     fprintf(stderr, "%s: %s\n", command, err->text);
-    return err->code == GGN_EINVAL || err->code == GGN_EIO ? GGN_EXIT_BAD_INPUT : GGN_EXIT_FAILED;
+    return err->code == BASE_EINVAL || err->code == BASE_EIO ? GGN_EXIT_BAD_INPUT : GGN_EXIT_FAILED;
 }
 
 /* import_sin3d is typed as import-sin3d. */

@@ -73,22 +73,22 @@ static void paste(uint8_t *image, const struct ggn_manifest *m, const struct ggn
         memcpy(image + 3 * (((size_t)b->y0 + y) * m->width + (size_t)b->x0), rgb + 3 * (size_t)y * b->width, 3 * (size_t)b->width);
 }
 
-static int take_block(struct picture *p, const struct ggn_manifest *m, const struct ggn_seq_block *b, double spp, struct ggn_err *err)
+static int take_block(struct picture *p, const struct ggn_manifest *m, const struct ggn_seq_block *b, double spp, struct base_err *err)
 {
     size_t pixels = (size_t)b->width * b->height;
     uint8_t *rgb = malloc(6 * pixels);
     struct ggn_flip_stats flip;
     if (rgb == NULL)
-        return ggn_fail_nomem(err, "picture");
+        return base_fail_nomem(err, "picture");
     const struct ggn_seq_record *r = level_at(b, spp, &p->beyond);
     int rc = ggn_seq_display(b, r, rgb, err);
-    if (rc == GGN_OK)
+    if (!rc)
         paste(p->taken, m, b, rgb);
-    if (rc == GGN_OK && b->reference != NULL) {
+    if (!rc && b->reference != NULL) {
         rc = ggn_seq_display(b, b->reference, rgb + 3 * pixels, err);
-        if (rc == GGN_OK)
+        if (!rc)
             rc = ggn_flip(rgb + 3 * pixels, rgb, (int)b->width, (int)b->height, GGN_FLIP_PPD, NULL, &flip, err);
-        if (rc == GGN_OK) {
+        if (!rc) {
             paste(p->reference, m, b, rgb + 3 * pixels);
             if (flip.mean > p->worst_flip) {
                 p->worst_flip = flip.mean;
@@ -112,41 +112,41 @@ static double stop_of(const struct ggn_view *stops, const struct ggn_labels *lab
 }
 
 static int build(const struct options *o, const struct ggn_manifest *m, const struct ggn_view *stops, const struct ggn_labels *labels,
-                 struct picture *p, struct ggn_err *err)
+                 struct picture *p, struct base_err *err)
 {
     size_t pixels = (size_t)m->width * m->height;
-    int rc = GGN_OK;
+    int rc = 0;
     if (pixels > GGN_IMAGE_MAX_PIXELS)
-        return ggn_fail(err, GGN_EINVAL, "%s: %ux%u is too large", o->dir, m->width, m->height);
+        return base_fail(err, BASE_EINVAL, "%s: %ux%u is too large", o->dir, m->width, m->height);
     p->taken = calloc(3, pixels);
     p->reference = calloc(3, pixels);
     if (p->taken == NULL || p->reference == NULL)
-        return ggn_fail_nomem(err, "picture");
-    for (uint32_t i = 0; i < m->n_blocks && rc == GGN_OK; i++) {
+        return base_fail_nomem(err, "picture");
+    for (uint32_t i = 0; i < m->n_blocks && !rc; i++) {
         struct ggn_seq_block b;
         double spp = stop_of(stops, labels, m->blocks[i].id);
         if (isnan(spp))
-            return ggn_fail(err, GGN_EINVAL, "%s: block %u has no stop", o->dir, m->blocks[i].id);
+            return base_fail(err, BASE_EINVAL, "%s: block %u has no stop", o->dir, m->blocks[i].id);
         rc = ggn_manifest_read_block(o->dir, m, i, &b, err);
-        if (rc != GGN_OK)
+        if (rc)
             break;
         rc = take_block(p, m, &b, spp, err);
         ggn_seq_block_release(&b);
     }
-    if (rc == GGN_OK && m->n_blocks == 0)
-        rc = ggn_fail(err, GGN_EINVAL, "%s: no finished block in it", o->dir);
-    if (rc == GGN_OK)
+    if (!rc && m->n_blocks == 0)
+        rc = base_fail(err, BASE_EINVAL, "%s: no finished block in it", o->dir);
+    if (!rc)
         rc = ggn_image8_write_png(o->out, p->taken, (int)m->width, (int)m->height, err);
-    if (rc == GGN_OK && o->reference != NULL)
+    if (!rc && o->reference != NULL)
         rc = ggn_image8_write_png(o->reference, p->reference, (int)m->width, (int)m->height, err);
     return rc;
 }
 
-static int report(const struct options *o, const struct ggn_manifest *m, const struct picture *p, struct ggn_err *err)
+static int report(const struct options *o, const struct ggn_manifest *m, const struct picture *p, struct base_err *err)
 {
     struct ggn_flip_stats flip;
     int rc = ggn_flip(p->reference, p->taken, (int)m->width, (int)m->height, GGN_FLIP_PPD, NULL, &flip, err);
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
     double mean_spp = p->samples / p->blocks;
     if (o->json)
@@ -155,7 +155,7 @@ static int report(const struct options *o, const struct ggn_manifest *m, const s
     else
         printf("%d blocks, %.1f samples per pixel on average; FLIP mean %.4f, worst block %u with %.4f%s\n", p->blocks, mean_spp, flip.mean,
                p->worst_block, p->worst_flip, p->beyond > 0 ? "; some stops lie beyond the last level" : "");
-    return GGN_OK;
+    return 0;
 }
 
 int ggn_cmd_reconstruct(int argc, char **argv)
@@ -172,27 +172,27 @@ int ggn_cmd_reconstruct(int argc, char **argv)
     struct ggn_labels labels = {0};
     struct ggn_thresholds stops = {0};
     struct picture p = {0};
-    struct ggn_err err = {0};
+    struct base_err err = {0};
     const struct ggn_view *view = NULL;
 
     argp_parse(&argp, argc, argv, 0, NULL, &o);
     int rc = ggn_manifest_read(o.dir, &m, &err);
-    if (rc == GGN_OK && o.stops == NULL)
+    if (!rc && o.stops == NULL)
         rc = ggn_labels_read(o.dir, &labels, &err);
-    if (rc == GGN_OK && o.stops != NULL) {
+    if (!rc && o.stops != NULL) {
         rc = ggn_thresholds_read(o.stops, (int)m.block, &stops, &err);
-        view = rc != GGN_OK ? NULL : o.view != NULL ? ggn_thresholds_find(&stops, o.view) : stops.n == 1 ? &stops.views[0] : NULL;
-        if (rc == GGN_OK && view == NULL)
-            rc = ggn_fail(&err, GGN_EINVAL, "%s: %s", o.stops, o.view != NULL ? "no such view" : "several views: --view NAME chooses one");
+        view = rc ? NULL : o.view != NULL ? ggn_thresholds_find(&stops, o.view) : stops.n == 1 ? &stops.views[0] : NULL;
+        if (!rc && view == NULL)
+            rc = base_fail(&err, BASE_EINVAL, "%s: %s", o.stops, o.view != NULL ? "no such view" : "several views: --view NAME chooses one");
     }
-    if (rc == GGN_OK)
+    if (!rc)
         rc = build(&o, &m, view, &labels, &p, &err);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = report(&o, &m, &p, &err);
     free(p.taken);
     free(p.reference);
     ggn_thresholds_release(&stops);
     ggn_labels_release(&labels);
     ggn_manifest_release(&m);
-    return rc == GGN_OK ? GGN_EXIT_OK : ggn_cmd_fail(argv[0], &err);
+    return !rc ? GGN_EXIT_OK : ggn_cmd_fail(argv[0], &err);
 }

@@ -155,13 +155,13 @@ int ggn_cmd_train(int argc, char **argv)
                                      "seed give the same model bytes, also after an interruption and --resume."};
     struct arguments a = {0};
     enum ggn_preset preset = GGN_PRESET_LULL;
-    struct ggn_err err = {0};
+    struct base_err err = {0};
 
     memcpy(options, fixed_options, sizeof fixed_options);
     for (int i = 0; i < N_FIELDS; i++)
         options[N_FIXED + i] = (struct argp_option){.name = fields[i].name, .key = KEY_FIELD + i, .arg = "N", .doc = fields[i].help, .group = 1};
     if (!find_preset(argc, argv, &preset)) {
-        ggn_fail(&err, GGN_EINVAL, "--preset is lull or paper");
+        base_fail(&err, BASE_EINVAL, "--preset is lull or paper");
         return ggn_cmd_fail(argv[0], &err);
     }
     a.plan = ggn_train_plan_default(preset);

@@ -9,7 +9,7 @@
 
 #include <cjson/cJSON.h>
 
-#include "base/fio.h"
+#include "base/files.h"
 
 const char *const ggn_split_names[GGN_SPLITS] = {"train", "validation", "test", "none"};
 
@@ -31,24 +31,24 @@ void ggn_dataset_release(struct ggn_dataset *data)
     *data = (struct ggn_dataset){0};
 }
 
-static int add_view(struct ggn_dataset *d, const char *dir, struct ggn_err *err)
+static int add_view(struct ggn_dataset *d, const char *dir, struct base_err *err)
 {
     struct ggn_dataset_view *views = realloc(d->views, (size_t)(d->n + 1) * sizeof *views);
     if (views == NULL)
-        return ggn_fail_nomem(err, dir);
+        return base_fail_nomem(err, dir);
     d->views = views;
     struct ggn_dataset_view *v = &views[d->n];
     *v = (struct ggn_dataset_view){.split = GGN_SPLIT_NONE};
     if (strlen(dir) >= sizeof v->dir)
-        return ggn_fail(err, GGN_EINVAL, "%.64s...: the path is too long", dir);
+        return base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", dir);
     strcpy(v->dir, dir);
     int rc = ggn_manifest_read(dir, &v->manifest, err);
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
     d->n++;
     if (exists(dir, "labels.json")) {
         rc = ggn_labels_read(dir, &v->labels, err);
-        v->has_labels = rc == GGN_OK;
+        v->has_labels = !rc;
     }
     return rc;
 }
@@ -59,89 +59,89 @@ static int compare_views(const void *a, const void *b)
 }
 
 /* Adds the sequences that are folders of `path` itself. */
-static int scan(const char *path, enum ggn_split split, struct ggn_dataset *d, struct ggn_err *err)
+static int scan(const char *path, enum ggn_split split, struct ggn_dataset *d, struct base_err *err)
 {
     DIR *dir = opendir(path);
     if (dir == NULL)
-        return ggn_fail(err, GGN_EIO, "%s: %s", path, strerror(errno));
-    int rc = GGN_OK;
-    for (const struct dirent *e; rc == GGN_OK && (e = readdir(dir)) != NULL;) {
+        return base_fail(err, BASE_EIO, "%s: %s", path, strerror(errno));
+    int rc = 0;
+    for (const struct dirent *e; !rc && (e = readdir(dir)) != NULL;) {
         char sub[4096];
         int n = snprintf(sub, sizeof sub, "%s/%s", path, e->d_name);
         if (e->d_name[0] == '.' || n < 0 || (size_t)n >= sizeof sub || !exists(sub, "manifest.json"))
             continue;
         rc = add_view(d, sub, err);
-        if (rc == GGN_OK)
+        if (!rc)
             d->views[d->n - 1].split = split;
     }
     closedir(dir);
     return rc;
 }
 
-static int scan_all(const char *path, struct ggn_dataset *d, struct ggn_err *err)
+static int scan_all(const char *path, struct ggn_dataset *d, struct base_err *err)
 {
     int rc = scan(path, GGN_SPLIT_NONE, d, err);
-    for (int s = 0; s < GGN_SPLIT_NONE && rc == GGN_OK; s++) {
+    for (int s = 0; s < GGN_SPLIT_NONE && !rc; s++) {
         char sub[4096];
         int n = snprintf(sub, sizeof sub, "%s/%s", path, ggn_split_names[s]);
         if (n > 0 && (size_t)n < sizeof sub && exists(path, ggn_split_names[s]))
             rc = scan(sub, (enum ggn_split)s, d, err);
     }
-    for (int i = 0; i < d->n && rc == GGN_OK; i++)
+    for (int i = 0; i < d->n && !rc; i++)
         for (int k = 0; k < i; k++)
             if (strcmp(d->views[i].manifest.scene, d->views[k].manifest.scene) == 0 && d->views[i].split != d->views[k].split)
-                rc = ggn_fail(err, GGN_EINVAL, "%s: scene '%s' is in %s and in %s", path, d->views[i].manifest.scene,
+                rc = base_fail(err, BASE_EINVAL, "%s: scene '%s' is in %s and in %s", path, d->views[i].manifest.scene,
                               ggn_split_names[d->views[k].split], ggn_split_names[d->views[i].split]);
-    if (rc == GGN_OK && d->n == 0)
-        rc = ggn_fail(err, GGN_EINVAL, "%s: no recorded sequence in it (no manifest.json)", path);
+    if (!rc && d->n == 0)
+        rc = base_fail(err, BASE_EINVAL, "%s: no recorded sequence in it (no manifest.json)", path);
     return rc;
 }
 
-static int apply_split(const char *path, const cJSON *root, struct ggn_dataset *d, struct ggn_err *err)
+static int apply_split(const char *path, const cJSON *root, struct ggn_dataset *d, struct base_err *err)
 {
     for (int s = 0; s < GGN_SPLIT_NONE; s++) {
         const cJSON *list = cJSON_GetObjectItemCaseSensitive(root, ggn_split_names[s]), *v;
         cJSON_ArrayForEach(v, list) {
             if (!cJSON_IsString(v))
-                return ggn_fail(err, GGN_EINVAL, "%s: %s: a scene is a string", path, ggn_split_names[s]);
+                return base_fail(err, BASE_EINVAL, "%s: %s: a scene is a string", path, ggn_split_names[s]);
             for (int i = 0; i < d->n; i++) {
                 struct ggn_dataset_view *view = &d->views[i];
                 if (strcmp(view->manifest.scene, v->valuestring) != 0)
                     continue;
                 if (view->split != GGN_SPLIT_NONE && view->split != (enum ggn_split)s)
-                    return ggn_fail(err, GGN_EINVAL, "%s: scene '%s' is in %s and in %s", path, v->valuestring,
+                    return base_fail(err, BASE_EINVAL, "%s: scene '%s' is in %s and in %s", path, v->valuestring,
                                     ggn_split_names[view->split], ggn_split_names[s]);
                 view->split = (enum ggn_split)s;
             }
         }
     }
-    return GGN_OK;
+    return 0;
 }
 
-static int read_split(const char *dir, struct ggn_dataset *d, struct ggn_err *err)
+static int read_split(const char *dir, struct ggn_dataset *d, struct base_err *err)
 {
     char path[4096], *text;
     size_t size;
     int n = snprintf(path, sizeof path, "%s/split.json", dir);
     if (n < 0 || (size_t)n >= sizeof path || !exists(dir, "split.json"))
-        return GGN_OK;
-    int rc = ggn_fio_read(path, 1 << 24, &text, &size, err);
-    if (rc != GGN_OK)
+        return 0;
+    int rc = base_file_read(path, 1 << 24, &text, &size, err);
+    if (rc)
         return rc;
     cJSON *root = cJSON_ParseWithLength(text, size);
-    rc = cJSON_IsObject(root) ? apply_split(path, root, d, err) : ggn_fail(err, GGN_EINVAL, "%s: not JSON", path);
+    rc = cJSON_IsObject(root) ? apply_split(path, root, d, err) : base_fail(err, BASE_EINVAL, "%s: not JSON", path);
     cJSON_Delete(root);
     free(text);
     return rc;
 }
 
-int ggn_dataset_open(const char *path, struct ggn_dataset *data, struct ggn_err *err)
+int ggn_dataset_open(const char *path, struct ggn_dataset *data, struct base_err *err)
 {
     struct ggn_dataset d = {0};
     int rc = exists(path, "manifest.json") ? add_view(&d, path, err) : scan_all(path, &d, err);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = read_split(path, &d, err);
-    if (rc != GGN_OK) {
+    if (rc) {
         ggn_dataset_release(&d);
         return rc;
     }
@@ -151,7 +151,7 @@ int ggn_dataset_open(const char *path, struct ggn_dataset *data, struct ggn_err 
         d.views[i].name = slash != NULL ? slash + 1 : d.views[i].dir;
     }
     *data = d;
-    return GGN_OK;
+    return 0;
 }
 
 const char *ggn_dataset_label_source(const struct ggn_dataset *data)

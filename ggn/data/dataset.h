@@ -30,7 +30,7 @@ struct ggn_dataset {
 };
 
 /* Reads manifests, labels and split (no pixels). Without a split all views are in GGN_SPLIT_NONE. */
-int ggn_dataset_open(const char *path, struct ggn_dataset *data, struct ggn_err *err);
+int ggn_dataset_open(const char *path, struct ggn_dataset *data, struct base_err *err);
 void ggn_dataset_release(struct ggn_dataset *data);
 
 /* Whose thresholds they are: "human", "observer", "mixed" or "none". */

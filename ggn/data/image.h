@@ -32,16 +32,16 @@ void ggn_image8_release(struct ggn_image8 *image);
 void ggn_imagef_release(struct ggn_imagef *image);
 
 /* Reads a display image. 8-bit files come through unchanged; float files (EXR, HDR) are clamped and sRGB-encoded. */
-int ggn_image8_read(const char *path, struct ggn_image8 *image, struct ggn_err *err);
+int ggn_image8_read(const char *path, struct ggn_image8 *image, struct base_err *err);
 
 /* Reads linear RGB. Integer files are taken as sRGB and decoded. Non-finite values are kept for the caller to judge. */
-int ggn_imagef_read(const char *path, struct ggn_imagef *image, struct ggn_err *err);
+int ggn_imagef_read(const char *path, struct ggn_imagef *image, struct base_err *err);
 
-/* Reads one named channel ("lull.spp") of any part of an EXR into a one-channel image. GGN_EINVAL if there is none. */
-int ggn_imagef_read_channel(const char *path, const char *channel, struct ggn_imagef *image, struct ggn_err *err);
+/* Reads one named channel ("lull.spp") of any part of an EXR into a one-channel image. BASE_EINVAL if there is none. */
+int ggn_imagef_read_channel(const char *path, const char *channel, struct ggn_imagef *image, struct base_err *err);
 
 /* Writes an 8-bit RGB PNG atomically. data [height][width][3]. */
-int ggn_image8_write_png(const char *path, const uint8_t *data, int width, int height, struct ggn_err *err);
+int ggn_image8_write_png(const char *path, const uint8_t *data, int width, int height, struct base_err *err);
 
 /* The sRGB transfer functions (IEC 61966-2-1). Codes of linear values come from ggn_preprocess. */
 double ggn_srgb_oetf(double linear);

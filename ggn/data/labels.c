@@ -7,7 +7,7 @@
 
 #include <cjson/cJSON.h>
 
-#include "base/fio.h"
+#include "base/files.h"
 
 enum { MAX_TEXT = 1 << 26, MAX_LABELS = 1 << 20 };
 
@@ -49,30 +49,30 @@ static int get_positive(const cJSON *o, const char *name, double *out)
     return 1;
 }
 
-static int parse_entries(const char *path, const cJSON *blocks, struct ggn_labels *l, struct ggn_err *err)
+static int parse_entries(const char *path, const cJSON *blocks, struct ggn_labels *l, struct base_err *err)
 {
     int n = cJSON_GetArraySize(blocks);
     const cJSON *v;
     if (!cJSON_IsArray(blocks) || n < 1 || n > MAX_LABELS)
-        return ggn_fail(err, GGN_EINVAL, "%s: no list of blocks", path);
+        return base_fail(err, BASE_EINVAL, "%s: no list of blocks", path);
     l->labels = malloc((size_t)n * sizeof *l->labels);
     if (l->labels == NULL)
-        return ggn_fail_nomem(err, path);
+        return base_fail_nomem(err, path);
     cJSON_ArrayForEach(v, blocks) {
         const cJSON *id = cJSON_GetObjectItemCaseSensitive(v, "id");
         struct ggn_label *label = &l->labels[l->n];
         if (!cJSON_IsNumber(id) || !(id->valuedouble >= 0 && id->valuedouble < UINT32_MAX) || !get_positive(v, "threshold", &label->threshold))
-            return ggn_fail(err, GGN_EINVAL, "%s: entry %u of blocks has no id or no threshold", path, l->n);
+            return base_fail(err, BASE_EINVAL, "%s: entry %u of blocks has no id or no threshold", path, l->n);
         label->id = (uint32_t)id->valuedouble;
         label->censored = cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(v, "censored"));
         if (ggn_labels_find(l, label->id) != NULL)
-            return ggn_fail(err, GGN_EINVAL, "%s: block %u is labelled twice", path, label->id);
+            return base_fail(err, BASE_EINVAL, "%s: block %u is labelled twice", path, label->id);
         l->n++;
     }
-    return GGN_OK;
+    return 0;
 }
 
-int ggn_labels_parse(const char *path, const char *text, size_t size, struct ggn_labels *out, struct ggn_err *err)
+int ggn_labels_parse(const char *path, const char *text, size_t size, struct ggn_labels *out, struct base_err *err)
 {
     struct ggn_labels l = {0};
     cJSON *root = cJSON_ParseWithLength(text, size);
@@ -80,14 +80,14 @@ int ggn_labels_parse(const char *path, const char *text, size_t size, struct ggn
     const cJSON *detail = cJSON_GetObjectItemCaseSensitive(root, "detail");
     int rc;
     if (!cJSON_IsString(format) || strcmp(format->valuestring, "lull-labels") != 0)
-        rc = ggn_fail(err, GGN_EINVAL, "%s: not a file of labels", path);
+        rc = base_fail(err, BASE_EINVAL, "%s: not a file of labels", path);
     else if (!cJSON_IsString(source) || (strcmp(source->valuestring, "human") != 0 && strcmp(source->valuestring, "observer") != 0))
-        rc = ggn_fail(err, GGN_EINVAL, "%s: source must be \"human\" or \"observer\"", path);
+        rc = base_fail(err, BASE_EINVAL, "%s: source must be \"human\" or \"observer\"", path);
     else if (!get_positive(root, "cap", &l.cap) || !get_positive(root, "spread", &l.spread))
-        rc = ggn_fail(err, GGN_EINVAL, "%s: cap or spread is missing", path);
+        rc = base_fail(err, BASE_EINVAL, "%s: cap or spread is missing", path);
     else
         rc = parse_entries(path, cJSON_GetObjectItemCaseSensitive(root, "blocks"), &l, err);
-    if (rc == GGN_OK) {
+    if (!rc) {
         snprintf(l.source, sizeof l.source, "%s", source->valuestring);
         snprintf(l.detail, sizeof l.detail, "%s", cJSON_IsString(detail) ? detail->valuestring : "");
         *out = l;
@@ -98,14 +98,14 @@ int ggn_labels_parse(const char *path, const char *text, size_t size, struct ggn
     return rc;
 }
 
-int ggn_labels_read(const char *dir, struct ggn_labels *labels, struct ggn_err *err)
+int ggn_labels_read(const char *dir, struct ggn_labels *labels, struct base_err *err)
 {
     char path[4096], *text;
     size_t size;
-    int rc = ggn_fio_join(path, dir, "labels.json", err);
-    if (rc == GGN_OK)
-        rc = ggn_fio_read(path, MAX_TEXT, &text, &size, err);
-    if (rc != GGN_OK)
+    int rc = base_file_join(path, dir, "labels.json", err);
+    if (!rc)
+        rc = base_file_read(path, MAX_TEXT, &text, &size, err);
+    if (rc)
         return rc;
     rc = ggn_labels_parse(path, text, size, labels, err);
     free(text);
@@ -133,19 +133,19 @@ static cJSON *to_json(const struct ggn_labels *labels, int *ok)
     return root;
 }
 
-int ggn_labels_write(const char *dir, const struct ggn_labels *labels, struct ggn_err *err)
+int ggn_labels_write(const char *dir, const struct ggn_labels *labels, struct base_err *err)
 {
     char path[4096];
-    int rc = ggn_fio_join(path, dir, "labels.json", err);
-    if (rc != GGN_OK)
+    int rc = base_file_join(path, dir, "labels.json", err);
+    if (rc)
         return rc;
     int ok = 1;
     cJSON *root = to_json(labels, &ok);
     char *text = ok ? cJSON_Print(root) : NULL;
     cJSON_Delete(root);
     if (text == NULL)
-        return ggn_fail_nomem(err, path);
-    rc = ggn_fio_write_line(path, text, err);
+        return base_fail_nomem(err, path);
+    rc = base_file_write_line(path, text, err);
     cJSON_free(text);
     return rc;
 }

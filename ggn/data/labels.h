@@ -31,9 +31,9 @@ struct ggn_labels {
 /* GGN_LABELS_SPREAD octaves: labels average about three people, errors below +-0.25 octave are noise. */
 #define GGN_LABELS_SPREAD 0.25
 
-int ggn_labels_parse(const char *path, const char *text, size_t size, struct ggn_labels *labels, struct ggn_err *err);
-int ggn_labels_read(const char *dir, struct ggn_labels *labels, struct ggn_err *err);
-int ggn_labels_write(const char *dir, const struct ggn_labels *labels, struct ggn_err *err);
+int ggn_labels_parse(const char *path, const char *text, size_t size, struct ggn_labels *labels, struct base_err *err);
+int ggn_labels_read(const char *dir, struct ggn_labels *labels, struct base_err *err);
+int ggn_labels_write(const char *dir, const struct ggn_labels *labels, struct base_err *err);
 void ggn_labels_release(struct ggn_labels *labels);
 /* NULL if the block has none. */
 const struct ggn_label *ggn_labels_find(const struct ggn_labels *labels, uint32_t id);

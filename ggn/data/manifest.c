@@ -8,7 +8,7 @@
 #include <cjson/cJSON.h>
 #include <zlib.h>
 
-#include "base/fio.h"
+#include "base/files.h"
 
 enum { MAX_TEXT = 1 << 26, MAX_BLOCKS = 1 << 20, MAX_SPP = 1 << 30 };
 
@@ -36,22 +36,22 @@ static int get_number(const cJSON *o, const char *name, double lo, double hi, do
     return 1;
 }
 
-static int get_levels(const char *path, const cJSON *root, struct ggn_manifest *m, struct ggn_err *err)
+static int get_levels(const char *path, const cJSON *root, struct ggn_manifest *m, struct base_err *err)
 {
     const cJSON *levels = cJSON_GetObjectItemCaseSensitive(root, "levels"), *v;
     int n = cJSON_GetArraySize(levels);
     if (!cJSON_IsArray(levels) || n < 1 || n > GGN_SEQ_MAX_RECORDS)
-        return ggn_fail(err, GGN_EINVAL, "%s: no list of levels", path);
+        return base_fail(err, BASE_EINVAL, "%s: no list of levels", path);
     m->levels = malloc((size_t)n * sizeof *m->levels);
     if (m->levels == NULL)
-        return ggn_fail_nomem(err, path);
+        return base_fail_nomem(err, path);
     cJSON_ArrayForEach(v, levels) {
         if (!cJSON_IsNumber(v) || !(v->valuedouble >= 1 && v->valuedouble <= MAX_SPP) ||
             (m->n_levels > 0 && v->valuedouble <= m->levels[m->n_levels - 1]))
-            return ggn_fail(err, GGN_EINVAL, "%s: level %u does not rise", path, m->n_levels);
+            return base_fail(err, BASE_EINVAL, "%s: level %u does not rise", path, m->n_levels);
         m->levels[m->n_levels++] = (uint32_t)v->valuedouble;
     }
-    return GGN_OK;
+    return 0;
 }
 
 static int get_block(const cJSON *o, const struct ggn_manifest *m, struct ggn_manifest_block *b)
@@ -72,41 +72,41 @@ static int get_block(const cJSON *o, const struct ggn_manifest *m, struct ggn_ma
     return 1;
 }
 
-static int get_blocks(const char *path, const cJSON *root, struct ggn_manifest *m, struct ggn_err *err)
+static int get_blocks(const char *path, const cJSON *root, struct ggn_manifest *m, struct base_err *err)
 {
     const cJSON *blocks = cJSON_GetObjectItemCaseSensitive(root, "blocks"), *v;
     int n = cJSON_GetArraySize(blocks);
     if (!cJSON_IsArray(blocks) || n > MAX_BLOCKS)
-        return ggn_fail(err, GGN_EINVAL, "%s: no list of blocks", path);
+        return base_fail(err, BASE_EINVAL, "%s: no list of blocks", path);
     m->blocks = malloc((n > 0 ? (size_t)n : 1) * sizeof *m->blocks);
     if (m->blocks == NULL)
-        return ggn_fail_nomem(err, path);
+        return base_fail_nomem(err, path);
     cJSON_ArrayForEach(v, blocks) {
         if (!get_block(v, m, &m->blocks[m->n_blocks]))
-            return ggn_fail(err, GGN_EINVAL, "%s: entry %u of blocks is not usable", path, m->n_blocks);
+            return base_fail(err, BASE_EINVAL, "%s: entry %u of blocks is not usable", path, m->n_blocks);
         for (uint32_t i = 0; i < m->n_blocks; i++)
             if (m->blocks[i].id == m->blocks[m->n_blocks].id)
-                return ggn_fail(err, GGN_EINVAL, "%s: block %u is listed twice", path, m->blocks[i].id);
+                return base_fail(err, BASE_EINVAL, "%s: block %u is listed twice", path, m->blocks[i].id);
         m->n_blocks++;
     }
-    return GGN_OK;
+    return 0;
 }
 
-int ggn_manifest_parse(const char *path, const char *text, size_t size, struct ggn_manifest *out, struct ggn_err *err)
+int ggn_manifest_parse(const char *path, const char *text, size_t size, struct ggn_manifest *out, struct base_err *err)
 {
     struct ggn_manifest m = {.reference_independent = 1};
     cJSON *root = cJSON_ParseWithLength(text, size);
     double version, width = 0, height = 0, block = 0, spp = 0, seed = 0, reference_seed = 0;
     const cJSON *format = cJSON_GetObjectItemCaseSensitive(root, "format");
-    int rc = GGN_OK;
+    int rc = 0;
     if (!cJSON_IsString(format) || strcmp(format->valuestring, "lull-sequence") != 0)
-        rc = ggn_fail(err, GGN_EINVAL, "%s: not the manifest of a sequence", path);
+        rc = base_fail(err, BASE_EINVAL, "%s: not the manifest of a sequence", path);
     else if (!get_number(root, "version", 1, 1, &version))
-        rc = ggn_fail(err, GGN_EINVAL, "%s: this version of the format is not known", path);
+        rc = base_fail(err, BASE_EINVAL, "%s: this version of the format is not known", path);
     else if (!get_number(root, "width", 1, 1 << 20, &width) || !get_number(root, "height", 1, 1 << 20, &height) ||
              !get_number(root, "block", 1, GGN_SEQ_MAX_SIDE, &block))
-        rc = ggn_fail(err, GGN_EINVAL, "%s: width, height or block is missing or out of range", path);
-    if (rc != GGN_OK)
+        rc = base_fail(err, BASE_EINVAL, "%s: width, height or block is missing or out of range", path);
+    if (rc)
         goto out;
     get_number(root, "reference_spp", 0, MAX_SPP, &spp);
     get_number(root, "seed", 0, 9007199254740992.0, &seed);
@@ -124,28 +124,28 @@ int ggn_manifest_parse(const char *path, const char *text, size_t size, struct g
     get_text(root, "camera", m.camera);
     get_text(root, "renderer", m.renderer);
     if (m.scene[0] == '\0')
-        rc = ggn_fail(err, GGN_EINVAL, "%s: the scene has no name", path);
-    if (rc == GGN_OK)
+        rc = base_fail(err, BASE_EINVAL, "%s: the scene has no name", path);
+    if (!rc)
         rc = get_levels(path, root, &m, err);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = get_blocks(path, root, &m, err);
 out:
     cJSON_Delete(root);
-    if (rc != GGN_OK)
+    if (rc)
         ggn_manifest_release(&m);
     else
         *out = m;
     return rc;
 }
 
-int ggn_manifest_read(const char *dir, struct ggn_manifest *m, struct ggn_err *err)
+int ggn_manifest_read(const char *dir, struct ggn_manifest *m, struct base_err *err)
 {
     char path[4096], *text;
     size_t size;
-    int rc = ggn_fio_join(path, dir, "manifest.json", err);
-    if (rc == GGN_OK)
-        rc = ggn_fio_read(path, MAX_TEXT, &text, &size, err);
-    if (rc != GGN_OK)
+    int rc = base_file_join(path, dir, "manifest.json", err);
+    if (!rc)
+        rc = base_file_read(path, MAX_TEXT, &text, &size, err);
+    if (rc)
         return rc;
     rc = ggn_manifest_parse(path, text, size, m, err);
     free(text);
@@ -214,46 +214,46 @@ static cJSON *to_json(const struct ggn_manifest *m, int *ok)
     return root;
 }
 
-int ggn_manifest_write(const char *dir, const struct ggn_manifest *m, struct ggn_err *err)
+int ggn_manifest_write(const char *dir, const struct ggn_manifest *m, struct base_err *err)
 {
     char path[4096];
-    int rc = ggn_fio_join(path, dir, "manifest.json", err);
-    if (rc != GGN_OK)
+    int rc = base_file_join(path, dir, "manifest.json", err);
+    if (rc)
         return rc;
     int ok = 1;
     cJSON *root = to_json(m, &ok);
     char *text = ok ? cJSON_Print(root) : NULL;
     cJSON_Delete(root);
     if (text == NULL)
-        return ggn_fail_nomem(err, path);
-    rc = ggn_fio_write_line(path, text, err);
+        return base_fail_nomem(err, path);
+    rc = base_file_write_line(path, text, err);
     cJSON_free(text);
     return rc;
 }
 
-int ggn_manifest_read_block(const char *dir, const struct ggn_manifest *m, uint32_t index, struct ggn_seq_block *block, struct ggn_err *err)
+int ggn_manifest_read_block(const char *dir, const struct ggn_manifest *m, uint32_t index, struct ggn_seq_block *block, struct base_err *err)
 {
     const struct ggn_manifest_block *e = &m->blocks[index];
     struct ggn_seq_block b;
     char path[4096];
-    int rc = ggn_fio_join(path, dir, e->file, err);
-    if (rc == GGN_OK)
+    int rc = base_file_join(path, dir, e->file, err);
+    if (!rc)
         rc = ggn_seq_block_read(path, &b, err);
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
     if (b.size != e->bytes || (uint32_t)crc32_z(0, b.bytes, b.size) != e->crc32)
-        rc = ggn_fail(err, GGN_EINVAL, "%s: not the file that the manifest lists (size or CRC)", path);
+        rc = base_fail(err, BASE_EINVAL, "%s: not the file that the manifest lists (size or CRC)", path);
     else if (b.id != e->id || b.x0 != (int32_t)e->x0 || b.y0 != (int32_t)e->y0 || b.width != e->x1 - e->x0 || b.height != e->y1 - e->y0)
-        rc = ggn_fail(err, GGN_EINVAL, "%s: block %u is %ux%u at %d,%d, the manifest says otherwise", path, b.id, b.width, b.height, b.x0, b.y0);
+        rc = base_fail(err, BASE_EINVAL, "%s: block %u is %ux%u at %d,%d, the manifest says otherwise", path, b.id, b.width, b.height, b.x0, b.y0);
     else if (m->reference_spp > 0 && b.reference == NULL)
-        rc = ggn_fail(err, GGN_EINVAL, "%s: the reference is missing", path);
-    for (uint32_t i = 0; i < m->n_levels && rc == GGN_OK; i++)
+        rc = base_fail(err, BASE_EINVAL, "%s: the reference is missing", path);
+    for (uint32_t i = 0; i < m->n_levels && !rc; i++)
         if (ggn_seq_level(&b, m->levels[i]) == NULL)
-            rc = ggn_fail(err, GGN_EINVAL, "%s: the level at %u spp is missing", path, m->levels[i]);
-    if (rc != GGN_OK) {
+            rc = base_fail(err, BASE_EINVAL, "%s: the level at %u spp is missing", path, m->levels[i]);
+    if (rc) {
         ggn_seq_block_release(&b);
         return rc;
     }
     *block = b;
-    return GGN_OK;
+    return 0;
 }

@@ -31,13 +31,13 @@ struct ggn_manifest {
 };
 
 /* Reads DIR/manifest.json and checks it. */
-int ggn_manifest_read(const char *dir, struct ggn_manifest *m, struct ggn_err *err);
-int ggn_manifest_parse(const char *path, const char *text, size_t size, struct ggn_manifest *m, struct ggn_err *err);
+int ggn_manifest_read(const char *dir, struct ggn_manifest *m, struct base_err *err);
+int ggn_manifest_parse(const char *path, const char *text, size_t size, struct ggn_manifest *m, struct base_err *err);
 /* Writes DIR/manifest.json atomically. */
-int ggn_manifest_write(const char *dir, const struct ggn_manifest *m, struct ggn_err *err);
+int ggn_manifest_write(const char *dir, const struct ggn_manifest *m, struct base_err *err);
 void ggn_manifest_release(struct ggn_manifest *m);
 
 /* Reads a block that the manifest lists and holds it against the manifest: size, CRC, rectangle, no level missing. */
-int ggn_manifest_read_block(const char *dir, const struct ggn_manifest *m, uint32_t index, struct ggn_seq_block *block, struct ggn_err *err);
+int ggn_manifest_read_block(const char *dir, const struct ggn_manifest *m, uint32_t index, struct ggn_seq_block *block, struct base_err *err);
 
 #endif

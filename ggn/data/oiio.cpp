@@ -1,6 +1,6 @@
 // OpenImageIO behind ggn/data/image.h: the only C++ in ggn. Exceptions end here.
 extern "C" {
-#include "base/fio.h"
+#include "base/files.h"
 }
 
 #include "data/image.h"
@@ -24,7 +24,7 @@ using OIIO::ImageInput;
 using OIIO::ImageSpec;
 using OIIO::TypeDesc;
 
-int complain(const char *path, struct ggn_err *err)
+int complain(const char *path, struct base_err *err)
 {
     std::string why = OIIO::geterror();
     if (why.empty())
@@ -33,14 +33,14 @@ int complain(const char *path, struct ggn_err *err)
     if (line != std::string::npos)
         why.resize(line);
     if (why.compare(0, strlen(path), path) == 0)
-        return ggn_fail(err, GGN_EINVAL, "%s", why.c_str());
-    return ggn_fail(err, GGN_EINVAL, "%s: %s", path, why.c_str());
+        return base_fail(err, BASE_EINVAL, "%s", why.c_str());
+    return base_fail(err, BASE_EINVAL, "%s: %s", path, why.c_str());
 }
 
-int complain(const char *path, ImageInput &in, struct ggn_err *err)
+int complain(const char *path, ImageInput &in, struct base_err *err)
 {
     std::string why = in.geterror();
-    return ggn_fail(err, GGN_EINVAL, "%s: %s", path, why.empty() ? "cannot be decoded" : why.substr(0, why.find('\n')).c_str());
+    return base_fail(err, BASE_EINVAL, "%s: %s", path, why.empty() ? "cannot be decoded" : why.substr(0, why.find('\n')).c_str());
 }
 
 bool sane(const ImageSpec &spec)
@@ -52,7 +52,7 @@ bool sane(const ImageSpec &spec)
 
 // Reads the channels [begin, end) of a subimage as T.
 template <class T>
-int read_pixels(ImageInput &in, const char *path, int subimage, int begin, int end, std::vector<T> &pixels, struct ggn_err *err)
+int read_pixels(ImageInput &in, const char *path, int subimage, int begin, int end, std::vector<T> &pixels, struct base_err *err)
 {
     ImageSpec spec = in.spec_dimensions(subimage, 0);
     size_t n = (size_t)spec.width * (size_t)spec.height * (size_t)(end - begin);
@@ -60,7 +60,7 @@ int read_pixels(ImageInput &in, const char *path, int subimage, int begin, int e
     TypeDesc type(sizeof(T) == 1 ? TypeDesc::UINT8 : TypeDesc::FLOAT);
     if (!in.read_image(subimage, 0, begin, end, type, pixels.data()))
         return complain(path, in, err);
-    return GGN_OK;
+    return 0;
 }
 
 // Where R, G, B are among the channels: by name, else the first three, else the first one repeated.
@@ -80,7 +80,7 @@ void find_rgb(const ImageSpec &spec, int rgb[3])
             rgb[c] = spec.nchannels >= 3 ? c : 0;
 }
 
-template <class T, class Image> int read_rgb(const char *path, Image *image, bool *is_float, struct ggn_err *err)
+template <class T, class Image> int read_rgb(const char *path, Image *image, bool *is_float, struct base_err *err)
 {
     OIIO::ImageSpec config;
     config["oiio:UnassociatedAlpha"] = 1;
@@ -89,54 +89,54 @@ template <class T, class Image> int read_rgb(const char *path, Image *image, boo
         return complain(path, err);
     ImageSpec spec = in->spec();
     if (!sane(spec))
-        return ggn_fail(err, GGN_EINVAL, "%s: %dx%d is not a size that can be used", path, spec.width, spec.height);
+        return base_fail(err, BASE_EINVAL, "%s: %dx%d is not a size that can be used", path, spec.width, spec.height);
     *is_float = spec.format.is_floating_point();
     int rgb[3];
     find_rgb(spec, rgb);
     int lo = std::min(rgb[0], std::min(rgb[1], rgb[2])), hi = std::max(rgb[0], std::max(rgb[1], rgb[2])) + 1;
     std::vector<T> pixels;
     int rc = read_pixels(*in, path, 0, lo, hi, pixels, err);
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
     size_t count = (size_t)spec.width * (size_t)spec.height, step = (size_t)(hi - lo);
     T *data = static_cast<T *>(malloc(count * 3 * sizeof(T)));
     if (!data)
-        return ggn_fail_nomem(err, path);
+        return base_fail_nomem(err, path);
     for (size_t i = 0; i < count; i++)
         for (int c = 0; c < 3; c++)
             data[3 * i + (size_t)c] = pixels[i * step + (size_t)(rgb[c] - lo)];
     image->width = spec.width;
     image->height = spec.height;
     image->data = data;
-    return GGN_OK;
+    return 0;
 }
 
-template <class F> int guarded(const char *path, struct ggn_err *err, F body)
+template <class F> int guarded(const char *path, struct base_err *err, F body)
 {
     try {
         return body();
     } catch (const std::bad_alloc &) {
-        return ggn_fail_nomem(err, path);
+        return base_fail_nomem(err, path);
     } catch (...) {
-        return ggn_fail(err, GGN_EINVAL, "%s: cannot be read", path);
+        return base_fail(err, BASE_EINVAL, "%s: cannot be read", path);
     }
 }
 
-int read_float(const char *path, struct ggn_imagef *image, struct ggn_err *err)
+int read_float(const char *path, struct ggn_imagef *image, struct base_err *err)
 {
     bool is_float = false;
     struct ggn_imagef out = {0, 0, 3, nullptr};
     int rc = read_rgb<float>(path, &out, &is_float, err);
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
     if (!is_float)
         for (size_t i = 0, n = (size_t)out.width * (size_t)out.height * 3; i < n; i++)
             out.data[i] = (float)ggn_srgb_eotf(out.data[i]);
     *image = out;
-    return GGN_OK;
+    return 0;
 }
 
-int read_channel(const char *path, const char *channel, struct ggn_imagef *image, struct ggn_err *err)
+int read_channel(const char *path, const char *channel, struct ggn_imagef *image, struct base_err *err)
 {
     std::unique_ptr<ImageInput> in = ImageInput::open(path);
     if (!in)
@@ -147,38 +147,38 @@ int read_channel(const char *path, const char *channel, struct ggn_imagef *image
             if (spec.channelnames[(size_t)c] != channel)
                 continue;
             if (!sane(spec))
-                return ggn_fail(err, GGN_EINVAL, "%s: %dx%d is not a size that can be used", path, spec.width, spec.height);
+                return base_fail(err, BASE_EINVAL, "%s: %dx%d is not a size that can be used", path, spec.width, spec.height);
             std::vector<float> pixels;
             int rc = read_pixels(*in, path, part, c, c + 1, pixels, err);
-            if (rc != GGN_OK)
+            if (rc)
                 return rc;
             float *data = static_cast<float *>(malloc(pixels.size() * sizeof(float)));
             if (!data)
-                return ggn_fail_nomem(err, path);
+                return base_fail_nomem(err, path);
             memcpy(data, pixels.data(), pixels.size() * sizeof(float));
             *image = {spec.width, spec.height, 1, data};
-            return GGN_OK;
+            return 0;
         }
     }
-    return ggn_fail(err, GGN_EINVAL, "%s: has no channel '%s'", path, channel);
+    return base_fail(err, BASE_EINVAL, "%s: has no channel '%s'", path, channel);
 }
 
 } // namespace
 
-extern "C" int ggn_image8_read(const char *path, struct ggn_image8 *image, struct ggn_err *err)
+extern "C" int ggn_image8_read(const char *path, struct ggn_image8 *image, struct base_err *err)
 {
     return guarded(path, err, [&] {
         bool is_float = false;
         struct ggn_image8 out = {0, 0, nullptr};
         int rc = read_rgb<uint8_t>(path, &out, &is_float, err);
-        if (rc != GGN_OK || !is_float) {
-            if (rc == GGN_OK)
+        if (rc || !is_float) {
+            if (!rc)
                 *image = out;
             return rc;
         }
         struct ggn_imagef linear = {0, 0, 0, nullptr};
         rc = read_float(path, &linear, err);
-        if (rc == GGN_OK) {
+        if (!rc) {
             for (size_t i = 0, n = (size_t)out.width * (size_t)out.height * 3; i < n; i++)
                 out.data[i] = ggn_preprocess(linear.data[i], nullptr, nullptr);
             ggn_imagef_release(&linear);
@@ -190,22 +190,22 @@ extern "C" int ggn_image8_read(const char *path, struct ggn_image8 *image, struc
     });
 }
 
-extern "C" int ggn_imagef_read(const char *path, struct ggn_imagef *image, struct ggn_err *err)
+extern "C" int ggn_imagef_read(const char *path, struct ggn_imagef *image, struct base_err *err)
 {
     return guarded(path, err, [&] { return read_float(path, image, err); });
 }
 
-extern "C" int ggn_imagef_read_channel(const char *path, const char *channel, struct ggn_imagef *image, struct ggn_err *err)
+extern "C" int ggn_imagef_read_channel(const char *path, const char *channel, struct ggn_imagef *image, struct base_err *err)
 {
     return guarded(path, err, [&] { return read_channel(path, channel, image, err); });
 }
 
 /* Encoded in memory and then written by us: OpenImageIO's PNG writer does not notice a disk that is full. */
-extern "C" int ggn_image8_write_png(const char *path, const uint8_t *data, int width, int height, struct ggn_err *err)
+extern "C" int ggn_image8_write_png(const char *path, const uint8_t *data, int width, int height, struct base_err *err)
 {
     size_t length = strlen(path);
     if (length < 4 || strcmp(path + length - 4, ".png") != 0)
-        return ggn_fail(err, GGN_EINVAL, "%s: a picture's name must end in .png", path);
+        return base_fail(err, BASE_EINVAL, "%s: a picture's name must end in .png", path);
     return guarded(path, err, [&] {
         std::vector<unsigned char> bytes;
         OIIO::Filesystem::IOVecOutput memory(bytes);
@@ -215,13 +215,13 @@ extern "C" int ggn_image8_write_png(const char *path, const uint8_t *data, int w
         ok = out && out->close() && ok;
         if (!ok) {
             std::string why = out ? out->geterror() : "OpenImageIO was built without PNG";
-            return ggn_fail(err, GGN_EIO, "%s: %s", path, why.substr(0, why.find('\n')).c_str());
+            return base_fail(err, BASE_EIO, "%s: %s", path, why.substr(0, why.find('\n')).c_str());
         }
-        struct ggn_fio_out file;
-        int rc = ggn_fio_begin(&file, path, err);
-        if (rc != GGN_OK)
+        struct base_file_out file;
+        int rc = base_file_begin(&file, path, err);
+        if (rc)
             return rc;
         fwrite(bytes.data(), 1, bytes.size(), file.file);
-        return ggn_fio_commit(&file, err);
+        return base_file_commit(&file, err);
     });
 }

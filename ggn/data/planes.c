@@ -38,11 +38,11 @@ uint32_t ggn_plane_filters(uint32_t plane)
 }
 
 /* Little-endian 16-bit values <-> all low bytes, then all high bytes. */
-static int shuffle(uint8_t *data, size_t bytes, int forward, struct ggn_err *err)
+static int shuffle(uint8_t *data, size_t bytes, int forward, struct base_err *err)
 {
     uint8_t *copy = malloc(bytes);
     if (copy == NULL)
-        return ggn_fail_nomem(err, "plane");
+        return base_fail_nomem(err, "plane");
     memcpy(copy, data, bytes);
     size_t n = bytes / 2;
     for (size_t i = 0; i < n; i++)
@@ -53,7 +53,7 @@ static int shuffle(uint8_t *data, size_t bytes, int forward, struct ggn_err *err
                 data[2 * i + k] = copy[k * n + i];
         }
     free(copy);
-    return GGN_OK;
+    return 0;
 }
 
 static uint8_t predict(const uint8_t *at, size_t x, size_t y, size_t width)
@@ -82,11 +82,11 @@ static void green(uint8_t *data, size_t pixels, int undo)
         }
 }
 
-int ggn_plane_unfilter(uint32_t plane, uint32_t filter, uint8_t *data, uint32_t width, uint32_t height, struct ggn_err *err)
+int ggn_plane_unfilter(uint32_t plane, uint32_t filter, uint8_t *data, uint32_t width, uint32_t height, struct base_err *err)
 {
     size_t pixels = (size_t)width * height;
     if ((filter & ~ggn_plane_filters(plane)) != 0)
-        return ggn_fail(err, GGN_EINVAL, "filter %u does not fit plane %u", filter, plane);
+        return base_fail(err, BASE_EINVAL, "filter %u does not fit plane %u", filter, plane);
     if (filter & GGN_FILTER_SHUFFLE)
         return shuffle(data, ggn_plane_raw_bytes(plane, width, height), 0, err);
     if (filter & GGN_FILTER_AVERAGE)
@@ -94,14 +94,14 @@ int ggn_plane_unfilter(uint32_t plane, uint32_t filter, uint8_t *data, uint32_t 
             average(data + c * pixels, width, height, 1);
     if (filter & GGN_FILTER_GREEN)
         green(data, pixels, 1);
-    return GGN_OK;
+    return 0;
 }
 
-int ggn_plane_filter(uint32_t plane, uint32_t filter, uint8_t *data, uint32_t width, uint32_t height, struct ggn_err *err)
+int ggn_plane_filter(uint32_t plane, uint32_t filter, uint8_t *data, uint32_t width, uint32_t height, struct base_err *err)
 {
     size_t pixels = (size_t)width * height;
     if ((filter & ~ggn_plane_filters(plane)) != 0)
-        return ggn_fail(err, GGN_EINVAL, "filter %u does not fit plane %u", filter, plane);
+        return base_fail(err, BASE_EINVAL, "filter %u does not fit plane %u", filter, plane);
     if (filter & GGN_FILTER_SHUFFLE)
         return shuffle(data, ggn_plane_raw_bytes(plane, width, height), 1, err);
     if (filter & GGN_FILTER_GREEN)
@@ -109,7 +109,7 @@ int ggn_plane_filter(uint32_t plane, uint32_t filter, uint8_t *data, uint32_t wi
     if (filter & GGN_FILTER_AVERAGE)
         for (size_t c = 0; c < 3; c++)
             average(data + c * pixels, width, height, 0);
-    return GGN_OK;
+    return 0;
 }
 
 float ggn_half_to_float(uint16_t half)

@@ -25,9 +25,9 @@ size_t ggn_plane_raw_bytes(uint32_t plane, uint32_t width, uint32_t height);
 /* Which filters may be on a plane. */
 uint32_t ggn_plane_filters(uint32_t plane);
 
-/* Undo or apply a filter set in place. data: the plane's raw bytes. GGN_ENOMEM only. */
-int ggn_plane_unfilter(uint32_t plane, uint32_t filter, uint8_t *data, uint32_t width, uint32_t height, struct ggn_err *err);
-int ggn_plane_filter(uint32_t plane, uint32_t filter, uint8_t *data, uint32_t width, uint32_t height, struct ggn_err *err);
+/* Undo or apply a filter set in place. data: the plane's raw bytes. BASE_ENOMEM only. */
+int ggn_plane_unfilter(uint32_t plane, uint32_t filter, uint8_t *data, uint32_t width, uint32_t height, struct base_err *err);
+int ggn_plane_filter(uint32_t plane, uint32_t filter, uint8_t *data, uint32_t width, uint32_t height, struct base_err *err);
 
 float ggn_half_to_float(uint16_t half);
 /* Round to nearest even; finite values are clamped to +-65504, NaN becomes 0. */

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/fio.h"
+#include "base/files.h"
 
 static uint32_t get32(const char *p)
 {
@@ -28,7 +28,7 @@ static const char *find_data(const char *p, const char *end)
     return NULL;
 }
 
-static int read_rows(const char *path, const char *p, uint32_t width, uint32_t height, uint32_t channels, float *out, struct ggn_err *err)
+static int read_rows(const char *path, const char *p, uint32_t width, uint32_t height, uint32_t channels, float *out, struct base_err *err)
 {
     for (uint32_t y = 0; y < height; y++, p++)
         for (uint32_t x = 0; x < width; x++) {
@@ -36,46 +36,46 @@ static int read_rows(const char *path, const char *p, uint32_t width, uint32_t h
                 uint32_t bits = get32(p + 4 * (channels == 3 ? c : 0));
                 memcpy(out, &bits, sizeof *out);
                 if (!isfinite(*out++))
-                    return ggn_fail(err, GGN_EINVAL, "%s: pixel %u,%u is not finite", path, x, y);
+                    return base_fail(err, BASE_EINVAL, "%s: pixel %u,%u is not finite", path, x, y);
             }
             p += 4 * channels;
         }
-    return GGN_OK;
+    return 0;
 }
 
-int ggn_rawls_parse(const char *path, const char *data, size_t size, struct ggn_imagef *image, struct ggn_err *err)
+int ggn_rawls_parse(const char *path, const char *data, size_t size, struct ggn_imagef *image, struct base_err *err)
 {
     static const char head[] = "IHDR\n12\n", comments[] = "\nCOMMENTS\n";
     const size_t fixed = sizeof head - 1 + 12 + sizeof comments - 1;
     if (size < fixed || memcmp(data, head, sizeof head - 1) != 0 || memcmp(data + 20, comments, sizeof comments - 1) != 0)
-        return ggn_fail(err, GGN_EINVAL, "%s: not a rawls image", path);
+        return base_fail(err, BASE_EINVAL, "%s: not a rawls image", path);
     uint32_t width = get32(data + 8), height = get32(data + 12), channels = get32(data + 16);
     if (width < 1 || height < 1 || width > GGN_IMAGE_MAX_SIDE || height > GGN_IMAGE_MAX_SIDE ||
         (size_t)width * height > GGN_IMAGE_MAX_PIXELS || (channels != 1 && channels != 3))
-        return ggn_fail(err, GGN_EINVAL, "%s: %ux%u with %u channels cannot be used", path, width, height, channels);
+        return base_fail(err, BASE_EINVAL, "%s: %ux%u with %u channels cannot be used", path, width, height, channels);
     const char *end = data + size, *p = find_data(data + fixed, end);
     p = p != NULL ? memchr(p, '\n', (size_t)(end - p)) : NULL; /* the line with the size says nothing new */
     size_t row = (size_t)width * channels * 4 + 1;
     if (p == NULL || (size_t)(end - (p + 1)) < row * height - 1)
-        return ggn_fail(err, GGN_EINVAL, "%s: truncated", path);
+        return base_fail(err, BASE_EINVAL, "%s: truncated", path);
     float *out = malloc((size_t)width * height * 3 * sizeof *out);
     if (out == NULL)
-        return ggn_fail_nomem(err, path);
+        return base_fail_nomem(err, path);
     int rc = read_rows(path, p + 1, width, height, channels, out, err);
-    if (rc != GGN_OK) {
+    if (rc) {
         free(out);
         return rc;
     }
     *image = (struct ggn_imagef){(int)width, (int)height, 3, out};
-    return GGN_OK;
+    return 0;
 }
 
-int ggn_rawls_read(const char *path, struct ggn_imagef *image, struct ggn_err *err)
+int ggn_rawls_read(const char *path, struct ggn_imagef *image, struct base_err *err)
 {
     char *data;
     size_t size;
-    int rc = ggn_fio_read(path, (size_t)1 << 31, &data, &size, err);
-    if (rc != GGN_OK)
+    int rc = base_file_read(path, (size_t)1 << 31, &data, &size, err);
+    if (rc)
         return rc;
     rc = ggn_rawls_parse(path, data, size, image, err);
     free(data);

@@ -6,7 +6,7 @@
 
 /* Little endian: "IHDR\n12\n" u32 width u32 height u32 channels "\nCOMMENTS\n" lines "DATA\n" size "\n", then rows of
  * width*channels float32, a newline after each. One or three channels; grey is repeated. Values must be finite. */
-int ggn_rawls_parse(const char *path, const char *data, size_t size, struct ggn_imagef *image, struct ggn_err *err);
-int ggn_rawls_read(const char *path, struct ggn_imagef *image, struct ggn_err *err);
+int ggn_rawls_parse(const char *path, const char *data, size_t size, struct ggn_imagef *image, struct base_err *err);
+int ggn_rawls_read(const char *path, struct ggn_imagef *image, struct base_err *err);
 
 #endif

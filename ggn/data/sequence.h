@@ -44,18 +44,18 @@ struct ggn_seq_block {
 };
 
 /* Takes ownership of bytes (malloc) on success only. `path` is for messages. */
-int ggn_seq_block_parse(const char *path, uint8_t *bytes, size_t size, struct ggn_seq_block *block, struct ggn_err *err);
-int ggn_seq_block_read(const char *path, struct ggn_seq_block *block, struct ggn_err *err);
+int ggn_seq_block_parse(const char *path, uint8_t *bytes, size_t size, struct ggn_seq_block *block, struct base_err *err);
+int ggn_seq_block_read(const char *path, struct ggn_seq_block *block, struct base_err *err);
 void ggn_seq_block_release(struct ggn_seq_block *block);
 
-/* Pixels of one record. P = width*height. Errors: GGN_EINVAL when the plane is missing or does not inflate to its size. */
-int ggn_seq_display_planar(const struct ggn_seq_block *b, const struct ggn_seq_record *r, uint8_t *rgb /* [3][P] */, struct ggn_err *err);
-int ggn_seq_display(const struct ggn_seq_block *b, const struct ggn_seq_record *r, uint8_t *rgb /* [P][3] */, struct ggn_err *err);
+/* Pixels of one record. P = width*height. Errors: BASE_EINVAL when the plane is missing or does not inflate to its size. */
+int ggn_seq_display_planar(const struct ggn_seq_block *b, const struct ggn_seq_record *r, uint8_t *rgb /* [3][P] */, struct base_err *err);
+int ggn_seq_display(const struct ggn_seq_block *b, const struct ggn_seq_record *r, uint8_t *rgb /* [P][3] */, struct base_err *err);
 /* Linear mean, finite. From MEAN_F16, else DISPLAY + FINE, else DISPLAY alone (then within half a code, and at most 1). */
-int ggn_seq_mean(const struct ggn_seq_block *b, const struct ggn_seq_record *r, float *rgb /* [3][P] */, struct ggn_err *err);
+int ggn_seq_mean(const struct ggn_seq_block *b, const struct ggn_seq_record *r, float *rgb /* [3][P] */, struct base_err *err);
 /* Linear half-buffer difference D: luminance from HALF_F16 or HALF_LOG; all channels from HALF_F16 only. */
-int ggn_seq_half_luminance(const struct ggn_seq_block *b, const struct ggn_seq_record *r, float *y /* [P] */, struct ggn_err *err);
-int ggn_seq_half(const struct ggn_seq_block *b, const struct ggn_seq_record *r, float *rgb /* [3][P] */, struct ggn_err *err);
+int ggn_seq_half_luminance(const struct ggn_seq_block *b, const struct ggn_seq_record *r, float *y /* [P] */, struct base_err *err);
+int ggn_seq_half(const struct ggn_seq_block *b, const struct ggn_seq_record *r, float *rgb /* [3][P] */, struct base_err *err);
 int ggn_seq_has(const struct ggn_seq_record *r, enum ggn_plane plane);
 /* NaN when the record does not have the statistic. */
 double ggn_seq_stat(const struct ggn_seq_record *r, const char *name);
@@ -79,11 +79,11 @@ struct ggn_seq_frame { /* what to add; NULL planes are left out; all borrowed du
 };
 
 int ggn_seq_builder_init(struct ggn_seq_builder *w, uint32_t width, uint32_t height, int32_t x0, int32_t y0, uint32_t id,
-                         uint64_t seed, struct ggn_err *err);
+                         uint64_t seed, struct base_err *err);
 /* Levels in rising spp, the reference last. */
-int ggn_seq_builder_add(struct ggn_seq_builder *w, const struct ggn_seq_frame *frame, struct ggn_err *err);
+int ggn_seq_builder_add(struct ggn_seq_builder *w, const struct ggn_seq_frame *frame, struct base_err *err);
 /* Writes the file atomically; *crc gets the CRC of the whole file. */
-int ggn_seq_builder_write(struct ggn_seq_builder *w, const char *path, uint32_t *crc, struct ggn_err *err);
+int ggn_seq_builder_write(struct ggn_seq_builder *w, const char *path, uint32_t *crc, struct base_err *err);
 void ggn_seq_builder_release(struct ggn_seq_builder *w);
 
 #endif

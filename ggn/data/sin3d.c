@@ -47,38 +47,38 @@ static int compare_levels(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-static int add_level(struct view *v, const char *name, struct ggn_err *err)
+static int add_level(struct view *v, const char *name, struct base_err *err)
 {
     uint32_t spp;
     int is_rawls;
     size_t length = split_name(name, &spp, &is_rawls);
     if (length == 0)
-        return GGN_OK;
+        return 0;
     if (length >= sizeof v->prefix || strlen(name) >= sizeof v->levels->file)
-        return ggn_fail(err, GGN_EINVAL, "%s/%s: the name is too long", v->dir, name);
+        return base_fail(err, BASE_EINVAL, "%s/%s: the name is too long", v->dir, name);
     if (v->n == 0) {
         memcpy(v->prefix, name, length);
         v->is_rawls = is_rawls;
     } else if (strncmp(v->prefix, name, length) != 0 || v->prefix[length] != '\0' || v->is_rawls != is_rawls) {
-        return ggn_fail(err, GGN_EINVAL, "%s: '%s' does not belong to the sequence '%s'", v->dir, name, v->prefix);
+        return base_fail(err, BASE_EINVAL, "%s: '%s' does not belong to the sequence '%s'", v->dir, name, v->prefix);
     }
     struct level *levels = realloc(v->levels, (size_t)(v->n + 1) * sizeof *levels);
     if (levels == NULL)
-        return ggn_fail_nomem(err, v->dir);
+        return base_fail_nomem(err, v->dir);
     v->levels = levels;
     levels[v->n].spp = spp;
     strcpy(levels[v->n++].file, name);
-    return GGN_OK;
+    return 0;
 }
 
-static int scan(const char *dir, struct view *v, struct ggn_err *err)
+static int scan(const char *dir, struct view *v, struct base_err *err)
 {
     snprintf(v->dir, sizeof v->dir, "%s", dir);
     DIR *d = opendir(dir);
     if (d == NULL)
-        return ggn_fail(err, GGN_EIO, "%s: %s", dir, strerror(errno));
-    int rc = GGN_OK;
-    for (const struct dirent *e; rc == GGN_OK && (e = readdir(d)) != NULL;)
+        return base_fail(err, BASE_EIO, "%s: %s", dir, strerror(errno));
+    int rc = 0;
+    for (const struct dirent *e; !rc && (e = readdir(d)) != NULL;)
         rc = add_level(v, e->d_name, err);
     closedir(d);
     if (v->n > 0)
@@ -86,26 +86,26 @@ static int scan(const char *dir, struct view *v, struct ggn_err *err)
     return rc;
 }
 
-static int check_levels(const struct view *v, int allow_gaps, struct ggn_err *err)
+static int check_levels(const struct view *v, int allow_gaps, struct base_err *err)
 {
     if (v->n < 2 || v->n > GGN_SEQ_MAX_RECORDS - 1)
-        return ggn_fail(err, GGN_EINVAL, "%s: %d levels (at least 2 are needed)", v->dir, v->n);
+        return base_fail(err, BASE_EINVAL, "%s: %d levels (at least 2 are needed)", v->dir, v->n);
     uint32_t step = v->levels[1].spp - v->levels[0].spp;
     for (int i = 1; i < v->n; i++) {
         uint32_t want = v->levels[i - 1].spp + step;
         if (v->levels[i].spp == v->levels[i - 1].spp)
-            return ggn_fail(err, GGN_EINVAL, "%s: two images for %u spp", v->dir, v->levels[i].spp);
+            return base_fail(err, BASE_EINVAL, "%s: two images for %u spp", v->dir, v->levels[i].spp);
         if (v->levels[i].spp != want && !allow_gaps)
-            return ggn_fail(err, GGN_EINVAL, "%s: the level at %u spp is missing (--allow-gaps takes what is there)", v->dir,
+            return base_fail(err, BASE_EINVAL, "%s: the level at %u spp is missing (--allow-gaps takes what is there)", v->dir,
                             v->levels[i].spp < want ? v->levels[i].spp : want);
     }
-    return GGN_OK;
+    return 0;
 }
 
 int ggn_sin3d_is_view(const char *dir)
 {
     struct view v = {0};
-    int ok = scan(dir, &v, NULL) == GGN_OK && v.n > 0;
+    int ok = scan(dir, &v, NULL) == 0 && v.n > 0;
     free(v.levels);
     return ok;
 }
@@ -131,7 +131,7 @@ static void release_picture(struct picture *p)
     ggn_imagef_release(&p->linear);
 }
 
-static int read_picture(const struct view *v, const struct level *level, struct picture *p, struct ggn_err *err)
+static int read_picture(const struct view *v, const struct level *level, struct picture *p, struct base_err *err)
 {
     char path[4400];
     snprintf(path, sizeof path, "%s/%s", v->dir, level->file);
@@ -139,17 +139,17 @@ static int read_picture(const struct view *v, const struct level *level, struct 
     if (!v->is_rawls)
         return ggn_image8_read(path, &p->display, err);
     int rc = ggn_rawls_read(path, &p->linear, err);
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
     size_t n = 3 * (size_t)p->linear.width * (size_t)p->linear.height;
     p->display = (struct ggn_image8){p->linear.width, p->linear.height, malloc(n)};
     if (p->display.data == NULL) {
         release_picture(p);
-        return ggn_fail_nomem(err, path);
+        return base_fail_nomem(err, path);
     }
     for (size_t i = 0; i < n; i++)
         p->display.data[i] = ggn_preprocess((double)p->linear.data[i], NULL, NULL);
-    return GGN_OK;
+    return 0;
 }
 
 /* Work on one row of blocks: all its builders fill level by level, so that each image is read once per row. */
@@ -174,10 +174,10 @@ static void cut_block(const struct picture *p, int x0, int y0, int block, uint8_
             }
 }
 
-static int add_picture(struct row *row, const struct picture *p, uint32_t spp, int is_reference, struct ggn_err *err)
+static int add_picture(struct row *row, const struct picture *p, uint32_t spp, int is_reference, struct base_err *err)
 {
-    int rc = GGN_OK;
-    for (int c = 0; c < row->columns && rc == GGN_OK; c++) {
+    int rc = 0;
+    for (int c = 0; c < row->columns && !rc; c++) {
         cut_block(p, c * row->block, row->y0, row->block, row->display, row->mean);
         struct ggn_seq_frame f = {.spp = spp, .is_reference = is_reference, .display = row->display,
                                   .mean = p->linear.data != NULL ? row->mean : NULL};
@@ -186,20 +186,20 @@ static int add_picture(struct row *row, const struct picture *p, uint32_t spp, i
     return rc;
 }
 
-static int fill_row(const struct view *v, const struct ggn_manifest *m, struct row *row, const struct ggn_sin3d_options *o, int base, struct ggn_err *err)
+static int fill_row(const struct view *v, const struct ggn_manifest *m, struct row *row, const struct ggn_sin3d_options *o, int base, struct base_err *err)
 {
-    int rc = GGN_OK;
-    for (int i = 0; i < v->n && rc == GGN_OK; i++) {
+    int rc = 0;
+    for (int i = 0; i < v->n && !rc; i++) {
         struct picture p;
         rc = read_picture(v, &v->levels[i], &p, err);
-        if (rc != GGN_OK)
+        if (rc)
             return rc;
         if ((uint32_t)p.display.width != m->width || (uint32_t)p.display.height != m->height)
-            rc = ggn_fail(err, GGN_EINVAL, "%s/%s: %dx%d, the other levels are %ux%u", v->dir, v->levels[i].file, p.display.width,
+            rc = base_fail(err, BASE_EINVAL, "%s/%s: %dx%d, the other levels are %ux%u", v->dir, v->levels[i].file, p.display.width,
                           p.display.height, m->width, m->height);
-        if (rc == GGN_OK)
+        if (!rc)
             rc = add_picture(row, &p, v->levels[i].spp, 0, err);
-        if (rc == GGN_OK && i + 1 == v->n)
+        if (!rc && i + 1 == v->n)
             rc = add_picture(row, &p, v->levels[i].spp, 1, err);
         release_picture(&p);
         if (o->progress != NULL)
@@ -208,22 +208,22 @@ static int fill_row(const struct view *v, const struct ggn_manifest *m, struct r
     return rc;
 }
 
-static int import_row(const struct view *v, const char *out, struct ggn_manifest *m, int index, const struct ggn_sin3d_options *o, struct ggn_err *err)
+static int import_row(const struct view *v, const char *out, struct ggn_manifest *m, int index, const struct ggn_sin3d_options *o, struct base_err *err)
 {
     uint32_t block = m->block;
     struct row row = {.columns = (int)(m->width / block), .block = (int)block, .y0 = index * (int)block};
     size_t pixels = (size_t)block * block;
-    int rc = GGN_OK;
+    int rc = 0;
     row.builders = calloc((size_t)row.columns, sizeof *row.builders);
     row.display = malloc(3 * pixels);
     row.mean = malloc(3 * pixels * sizeof *row.mean);
     if (row.builders == NULL || row.display == NULL || row.mean == NULL)
-        rc = ggn_fail_nomem(err, v->dir);
-    for (int c = 0; c < row.columns && rc == GGN_OK; c++)
+        rc = base_fail_nomem(err, v->dir);
+    for (int c = 0; c < row.columns && !rc; c++)
         rc = ggn_seq_builder_init(&row.builders[c], block, block, c * (int)block, row.y0, (uint32_t)(index * row.columns + c), 0, err);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = fill_row(v, m, &row, o, index * v->n, err);
-    for (int c = 0; c < row.columns && rc == GGN_OK; c++) {
+    for (int c = 0; c < row.columns && !rc; c++) {
         uint32_t x0 = (uint32_t)c * block, y0 = (uint32_t)row.y0;
         struct ggn_manifest_block *b = &m->blocks[m->n_blocks];
         char path[4200];
@@ -232,7 +232,7 @@ static int import_row(const struct view *v, const char *out, struct ggn_manifest
         snprintf(path, sizeof path, "%s/%s", out, b->file);
         rc = ggn_seq_builder_write(&row.builders[c], path, &b->crc32, err);
         b->bytes = row.builders[c].size;
-        m->n_blocks += rc == GGN_OK;
+        m->n_blocks += !rc;
     }
     for (int c = 0; c < row.columns && row.builders != NULL; c++)
         ggn_seq_builder_release(&row.builders[c]);
@@ -242,11 +242,11 @@ static int import_row(const struct view *v, const char *out, struct ggn_manifest
     return rc;
 }
 
-static int init_manifest(const struct view *v, const struct ggn_sin3d_options *o, struct ggn_manifest *m, struct ggn_err *err)
+static int init_manifest(const struct view *v, const struct ggn_sin3d_options *o, struct ggn_manifest *m, struct base_err *err)
 {
     struct picture first;
     int rc = read_picture(v, &v->levels[0], &first, err);
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
     *m = (struct ggn_manifest){.width = (uint32_t)first.display.width, .height = (uint32_t)first.display.height,
                                .block = (uint32_t)o->block, .reference_spp = v->levels[v->n - 1].spp, .reference_independent = 0,
@@ -256,33 +256,33 @@ static int init_manifest(const struct view *v, const struct ggn_sin3d_options *o
     snprintf(m->source, sizeof m->source, "%.255s", v->prefix);
     snprintf(m->renderer, sizeof m->renderer, "SIN3D (imported)");
     if (m->width % m->block != 0 || m->height % m->block != 0)
-        return ggn_fail(err, GGN_EINVAL, "%s: %ux%u is not a multiple of the block of %u", v->dir, m->width, m->height, m->block);
+        return base_fail(err, BASE_EINVAL, "%s: %ux%u is not a multiple of the block of %u", v->dir, m->width, m->height, m->block);
     size_t blocks = (size_t)(m->width / m->block) * (m->height / m->block);
     m->levels = malloc((size_t)v->n * sizeof *m->levels);
     m->blocks = malloc(blocks * sizeof *m->blocks);
     if (m->levels == NULL || m->blocks == NULL)
-        return ggn_fail_nomem(err, v->dir);
+        return base_fail_nomem(err, v->dir);
     for (int i = 0; i < v->n; i++)
         m->levels[i] = v->levels[i].spp;
-    return GGN_OK;
+    return 0;
 }
 
 /* Takes over the blocks of an earlier run with the same images. Whole rows only. */
-static int take_over(const char *out, struct ggn_manifest *m, struct ggn_err *err)
+static int take_over(const char *out, struct ggn_manifest *m, struct base_err *err)
 {
     struct ggn_manifest old;
     char path[4200];
     struct stat st;
     snprintf(path, sizeof path, "%s/manifest.json", out);
     if (stat(path, &st) != 0)
-        return GGN_OK;
+        return 0;
     int rc = ggn_manifest_read(out, &old, err);
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
     uint32_t columns = m->width / m->block, most = columns * (m->height / m->block);
     if (old.width != m->width || old.height != m->height || old.block != m->block || strcmp(old.source, m->source) != 0 ||
         old.n_levels != m->n_levels || memcmp(old.levels, m->levels, m->n_levels * sizeof *m->levels) != 0)
-        rc = ggn_fail(err, GGN_EINVAL, "%s: holds another sequence already", out);
+        rc = base_fail(err, BASE_EINVAL, "%s: holds another sequence already", out);
     else if (old.n_blocks <= most) {
         m->n_blocks = old.n_blocks / columns * columns;
         memcpy(m->blocks, old.blocks, m->n_blocks * sizeof *m->blocks);
@@ -292,7 +292,7 @@ static int take_over(const char *out, struct ggn_manifest *m, struct ggn_err *er
 }
 
 static int attach_thresholds(const struct view *v, const char *out, const struct ggn_manifest *m, const struct ggn_thresholds *t,
-                             int *labelled, struct ggn_err *err)
+                             int *labelled, struct base_err *err)
 {
     char with_part[GGN_VIEW_NAME + 8];
     const char *slash = strrchr(v->dir, '/');
@@ -304,15 +304,15 @@ static int attach_thresholds(const struct view *v, const char *out, const struct
         row = ggn_thresholds_find(t, slash != NULL ? slash + 1 : v->dir);
     *labelled = row != NULL;
     if (row == NULL)
-        return GGN_OK;
+        return 0;
     uint32_t n = m->width / m->block * (m->height / m->block);
     if ((uint32_t)row->n != n)
-        return ggn_fail(err, GGN_EINVAL, "%s: %u blocks, but %d thresholds for '%s'", v->dir, n, row->n, row->name);
+        return base_fail(err, BASE_EINVAL, "%s: %u blocks, but %d thresholds for '%s'", v->dir, n, row->n, row->name);
     struct ggn_labels labels = {.source = "human", .cap = m->levels[m->n_levels - 1], .spread = GGN_LABELS_SPREAD, .n = n};
     snprintf(labels.detail, sizeof labels.detail, "thresholds of '%s'", row->name);
     labels.labels = malloc(n * sizeof *labels.labels);
     if (labels.labels == NULL)
-        return ggn_fail_nomem(err, out);
+        return base_fail_nomem(err, out);
     for (uint32_t i = 0; i < n; i++)
         labels.labels[i] = (struct ggn_label){i, row->spp[i], row->spp[i] >= labels.cap};
     int rc = ggn_labels_write(out, &labels, err);
@@ -320,25 +320,25 @@ static int attach_thresholds(const struct view *v, const char *out, const struct
     return rc;
 }
 
-int ggn_sin3d_import_view(const char *dir, const char *out, const struct ggn_sin3d_options *o, int *labelled, struct ggn_err *err)
+int ggn_sin3d_import_view(const char *dir, const char *out, const struct ggn_sin3d_options *o, int *labelled, struct base_err *err)
 {
     struct view v = {0};
     struct ggn_manifest m = {0};
-    int rc = strlen(dir) < sizeof v.dir && strlen(out) < 4096 ? scan(dir, &v, err) : ggn_fail(err, GGN_EINVAL, "%.64s...: the path is too long", dir);
-    if (rc == GGN_OK)
+    int rc = strlen(dir) < sizeof v.dir && strlen(out) < 4096 ? scan(dir, &v, err) : base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", dir);
+    if (!rc)
         rc = check_levels(&v, o->allow_gaps, err);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = init_manifest(&v, o, &m, err);
-    if (rc == GGN_OK && mkdir(out, 0777) != 0 && errno != EEXIST)
-        rc = ggn_fail(err, GGN_EIO, "%s: %s", out, strerror(errno));
-    if (rc == GGN_OK)
+    if (!rc && mkdir(out, 0777) != 0 && errno != EEXIST)
+        rc = base_fail(err, BASE_EIO, "%s: %s", out, strerror(errno));
+    if (!rc)
         rc = take_over(out, &m, err);
-    for (uint32_t row = rc == GGN_OK ? m.n_blocks / (m.width / m.block) : 0; rc == GGN_OK && row < m.height / m.block; row++) {
+    for (uint32_t row = !rc ? m.n_blocks / (m.width / m.block) : 0; !rc && row < m.height / m.block; row++) {
         rc = import_row(&v, out, &m, (int)row, o, err);
-        if (rc == GGN_OK)
+        if (!rc)
             rc = ggn_manifest_write(out, &m, err);
     }
-    if (rc == GGN_OK)
+    if (!rc)
         rc = attach_thresholds(&v, out, &m, o->thresholds, labelled, err);
     ggn_manifest_release(&m);
     free(v.levels);

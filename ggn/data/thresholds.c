@@ -7,7 +7,7 @@
 
 #include <cjson/cJSON.h>
 
-#include "base/fio.h"
+#include "base/files.h"
 #include "data/image.h"
 
 enum { MAX_TEXT = 1 << 26, MAX_VIEWS = 1 << 20 };
@@ -49,40 +49,40 @@ static struct ggn_view *add_view(struct ggn_thresholds *t, const char *name, int
     return v;
 }
 
-static int parse_line(const char *path, int number, char *line, struct ggn_thresholds *t, struct ggn_err *err)
+static int parse_line(const char *path, int number, char *line, struct ggn_thresholds *t, struct base_err *err)
 {
     char *sep = strchr(line, ';');
     if (sep == NULL || sep == line || sep - line >= GGN_VIEW_NAME)
-        return ggn_fail(err, GGN_EINVAL, "%s:%d: expected NAME;T0;T1;…", path, number);
+        return base_fail(err, BASE_EINVAL, "%s:%d: expected NAME;T0;T1;…", path, number);
     *sep = '\0';
     int n = 0;
     for (const char *p = sep + 1; *p != '\0'; p++)
         n += *p == ';';
     n += sep[1] != '\0' && sep[strlen(sep + 1)] != ';'; /* a last value without its ';' */
     if (n < 1 || n > GGN_VIEW_BLOCKS)
-        return ggn_fail(err, GGN_EINVAL, "%s:%d: %d thresholds", path, number, n);
+        return base_fail(err, BASE_EINVAL, "%s:%d: %d thresholds", path, number, n);
     if (ggn_thresholds_find(t, line) != NULL)
-        return ggn_fail(err, GGN_EINVAL, "%s:%d: view '%s' appears twice", path, number, line);
+        return base_fail(err, BASE_EINVAL, "%s:%d: view '%s' appears twice", path, number, line);
     struct ggn_view *v = add_view(t, line, n);
     if (v == NULL)
-        return ggn_fail_nomem(err, path);
+        return base_fail_nomem(err, path);
     char *at = sep + 1;
     for (int i = 0; i < n; i++) {
         char *end;
         double value = strtod(at, &end);
         if (end == at || !(value > 0.0 && value < 1e12) || (*end != ';' && *end != '\0'))
-            return ggn_fail(err, GGN_EINVAL, "%s:%d: threshold %d is not a positive number", path, number, i);
+            return base_fail(err, BASE_EINVAL, "%s:%d: threshold %d is not a positive number", path, number, i);
         v->spp[i] = value;
         at = end + 1;
     }
-    return GGN_OK;
+    return 0;
 }
 
-int ggn_thresholds_parse_csv(const char *path, char *text, struct ggn_thresholds *out, struct ggn_err *err)
+int ggn_thresholds_parse_csv(const char *path, char *text, struct ggn_thresholds *out, struct base_err *err)
 {
     struct ggn_thresholds t = {0};
-    int rc = GGN_OK, number = 0;
-    for (char *line = text, *next; line != NULL && rc == GGN_OK; line = next) {
+    int rc = 0, number = 0;
+    for (char *line = text, *next; line != NULL && !rc; line = next) {
         next = strchr(line, '\n');
         if (next != NULL)
             *next++ = '\0';
@@ -90,28 +90,28 @@ int ggn_thresholds_parse_csv(const char *path, char *text, struct ggn_thresholds
         line[strcspn(line, "\r")] = '\0';
         if (line[0] == '\0' || line[0] == '#')
             continue;
-        rc = t.n < MAX_VIEWS ? parse_line(path, number, line, &t, err) : ggn_fail(err, GGN_EINVAL, "%s: too many lines", path);
+        rc = t.n < MAX_VIEWS ? parse_line(path, number, line, &t, err) : base_fail(err, BASE_EINVAL, "%s: too many lines", path);
     }
-    if (rc == GGN_OK && t.n == 0)
-        rc = ggn_fail(err, GGN_EINVAL, "%s: no thresholds in it", path);
-    if (rc != GGN_OK) {
+    if (!rc && t.n == 0)
+        rc = base_fail(err, BASE_EINVAL, "%s: no thresholds in it", path);
+    if (rc) {
         ggn_thresholds_release(&t);
         return rc;
     }
     *out = t;
-    return GGN_OK;
+    return 0;
 }
 
 /* Reports name their blocks by id; ids may be any subset of the grid. */
-static int parse_json(const char *path, const char *text, size_t size, struct ggn_thresholds *out, struct ggn_err *err)
+static int parse_json(const char *path, const char *text, size_t size, struct ggn_thresholds *out, struct base_err *err)
 {
     struct ggn_thresholds t = {0};
     cJSON *root = cJSON_ParseWithLength(text, size);
     const cJSON *blocks = cJSON_GetObjectItemCaseSensitive(root, "blocks");
     const cJSON *scene = cJSON_GetObjectItemCaseSensitive(root, "scene");
-    int rc = GGN_OK, last = -1, columns = 0;
+    int rc = 0, last = -1, columns = 0;
     if (!cJSON_IsArray(blocks)) {
-        rc = ggn_fail(err, GGN_EINVAL, "%s: not a report: no list of blocks", path);
+        rc = base_fail(err, BASE_EINVAL, "%s: not a report: no list of blocks", path);
         goto out;
     }
     const cJSON *block;
@@ -119,7 +119,7 @@ static int parse_json(const char *path, const char *text, size_t size, struct gg
         const cJSON *id = cJSON_GetObjectItemCaseSensitive(block, "id");
         const cJSON *y0 = cJSON_GetObjectItemCaseSensitive(block, "y0");
         if (!cJSON_IsNumber(id) || !(id->valuedouble >= 0 && id->valuedouble < GGN_VIEW_BLOCKS)) {
-            rc = ggn_fail(err, GGN_EINVAL, "%s: a block without a usable id", path);
+            rc = base_fail(err, BASE_EINVAL, "%s: a block without a usable id", path);
             goto out;
         }
         last = id->valueint > last ? id->valueint : last;
@@ -127,7 +127,7 @@ static int parse_json(const char *path, const char *text, size_t size, struct gg
     }
     struct ggn_view *v = last < 0 ? NULL : add_view(&t, cJSON_IsString(scene) ? scene->valuestring : path, last + 1);
     if (v == NULL) {
-        rc = last < 0 ? ggn_fail(err, GGN_EINVAL, "%s: no blocks in it", path) : ggn_fail_nomem(err, path);
+        rc = last < 0 ? base_fail(err, BASE_EINVAL, "%s: no blocks in it", path) : base_fail_nomem(err, path);
         goto out;
     }
     v->columns = columns;
@@ -137,7 +137,7 @@ static int parse_json(const char *path, const char *text, size_t size, struct gg
         if (spp == NULL)
             spp = cJSON_GetObjectItemCaseSensitive(block, "spp");
         if (!cJSON_IsNumber(spp) || !(spp->valuedouble > 0.0 && spp->valuedouble < 1e12)) {
-            rc = ggn_fail(err, GGN_EINVAL, "%s: block %d has no positive spp", path, id->valueint);
+            rc = base_fail(err, BASE_EINVAL, "%s: block %d has no positive spp", path, id->valueint);
             goto out;
         }
         v->spp[id->valueint] = spp->valuedouble;
@@ -151,22 +151,22 @@ out:
 }
 
 /* One value per block: the largest in the block (a block is one value; the largest forgives borders that are filtered). */
-static int read_exr(const char *path, int block, struct ggn_thresholds *out, struct ggn_err *err)
+static int read_exr(const char *path, int block, struct ggn_thresholds *out, struct base_err *err)
 {
     struct ggn_imagef image;
     struct ggn_thresholds t = {0};
     int rc = ggn_imagef_read_channel(path, "lull.spp", &image, err);
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
     long columns = (image.width + block - 1) / block, rows = (image.height + block - 1) / block;
     const char *slash = strrchr(path, '/');
     if (columns * rows > GGN_VIEW_BLOCKS) {
-        rc = ggn_fail(err, GGN_EINVAL, "%s: %ld blocks of %d pixels", path, columns * rows, block);
+        rc = base_fail(err, BASE_EINVAL, "%s: %ld blocks of %d pixels", path, columns * rows, block);
         goto out;
     }
     struct ggn_view *v = add_view(&t, slash != NULL ? slash + 1 : path, (int)(columns * rows));
     if (v == NULL) {
-        rc = ggn_fail_nomem(err, path);
+        rc = base_fail_nomem(err, path);
         goto out;
     }
     v->columns = (int)columns;
@@ -177,10 +177,10 @@ static int read_exr(const char *path, int block, struct ggn_thresholds *out, str
             if (!(*s >= value))
                 *s = value;
         }
-    for (int i = 0; i < v->n && rc == GGN_OK; i++)
+    for (int i = 0; i < v->n && !rc; i++)
         if (!(v->spp[i] > 0.0 && v->spp[i] < 1e12))
-            rc = ggn_fail(err, GGN_EINVAL, "%s: block %d has no positive spp", path, i);
-    if (rc == GGN_OK) {
+            rc = base_fail(err, BASE_EINVAL, "%s: block %d has no positive spp", path, i);
+    if (!rc) {
         *out = t;
         t = (struct ggn_thresholds){0};
     }
@@ -190,15 +190,15 @@ out:
     return rc;
 }
 
-int ggn_thresholds_read(const char *path, int block, struct ggn_thresholds *out, struct ggn_err *err)
+int ggn_thresholds_read(const char *path, int block, struct ggn_thresholds *out, struct base_err *err)
 {
     const char *dot = strrchr(path, '.');
     char *text = NULL;
     size_t size;
     if (dot != NULL && strcmp(dot, ".exr") == 0)
         return read_exr(path, block, out, err);
-    int rc = ggn_fio_read(path, MAX_TEXT, &text, &size, err);
-    if (rc != GGN_OK)
+    int rc = base_file_read(path, MAX_TEXT, &text, &size, err);
+    if (rc)
         return rc;
     if (dot != NULL && strcmp(dot, ".json") == 0)
         rc = parse_json(path, text, size, out, err);

@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/fio.h"
-#include "eval/plot.h"
+#include "base/files.h"
+#include "figures/plot.h"
 
 void ggn_pairing_release(struct ggn_pairing *p)
 {
@@ -29,18 +29,18 @@ static const struct ggn_view *partner(const struct ggn_thresholds *truth, int i,
 }
 
 int ggn_pairing_init(struct ggn_pairing *out, const struct ggn_thresholds *truth, const struct ggn_thresholds *model,
-                     const char *view, struct ggn_err *err)
+                     const char *view, struct base_err *err)
 {
     struct ggn_pairing p = {0};
     size_t room = 0;
-    int rc = GGN_OK;
+    int rc = 0;
     for (int i = 0; i < truth->n; i++)
         room += (size_t)truth->views[i].n;
     p.views = malloc((size_t)(truth->n > 0 ? truth->n : 1) * sizeof *p.views);
     p.truth = malloc((room > 0 ? room : 1) * sizeof *p.truth);
     p.model = malloc((room > 0 ? room : 1) * sizeof *p.model);
     if (p.views == NULL || p.truth == NULL || p.model == NULL) {
-        rc = ggn_fail_nomem(err, "pairs");
+        rc = base_fail_nomem(err, "pairs");
         goto out;
     }
     for (int i = 0; i < truth->n; i++) {
@@ -48,7 +48,7 @@ int ggn_pairing_init(struct ggn_pairing *out, const struct ggn_thresholds *truth
         if (m == NULL)
             continue;
         if (m->n != t->n) {
-            rc = ggn_fail(err, GGN_EINVAL, "view '%s': %d blocks against %d", t->name, t->n, m->n);
+            rc = base_fail(err, BASE_EINVAL, "view '%s': %d blocks against %d", t->name, t->n, m->n);
             goto out;
         }
         p.views[p.n_views++] = (struct ggn_pair){t, m, p.n};
@@ -59,15 +59,15 @@ int ggn_pairing_init(struct ggn_pairing *out, const struct ggn_thresholds *truth
             }
     }
     if (p.n == 0)
-        rc = ggn_fail(err, GGN_EINVAL, view != NULL ? "no view called '%s' to compare" : "no view has the same name on both sides%s",
+        rc = base_fail(err, BASE_EINVAL, view != NULL ? "no view called '%s' to compare" : "no view has the same name on both sides%s",
                       view != NULL ? view : " (--view NAME names the partner of a single view)");
 out:
-    if (rc != GGN_OK) {
+    if (rc) {
         ggn_pairing_release(&p);
         return rc;
     }
     *out = p;
-    return GGN_OK;
+    return 0;
 }
 
 /* The figures in the order they are shown. */
@@ -115,12 +115,12 @@ void ggn_agreement_print_json(FILE *f, const struct ggn_agreement *a)
 }
 
 int ggn_plot_scatter(const char *path, const double *truth, const double *model, size_t n, const char *truth_name,
-                     const char *model_name, struct ggn_err *err)
+                     const char *model_name, struct base_err *err)
 {
     struct ggn_plot plot;
     double *logs = malloc(2 * n * sizeof *logs), a, b;
     if (logs == NULL)
-        return ggn_fail_nomem(err, path);
+        return base_fail_nomem(err, path);
     for (size_t i = 0; i < n; i++) {
         logs[i] = log2(truth[i]);
         logs[n + i] = log2(model[i]);
@@ -129,7 +129,7 @@ int ggn_plot_scatter(const char *path, const double *truth, const double *model,
     double r = ggn_stats_pearson(logs, logs + n, n);
     free(logs);
     int rc = ggn_plot_begin(&plot, path, 760, 720, err);
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
     FILE *s = plot.script;
     fputs("set logscale xy 2\nset size square\nset key top left\nset xlabel ", s);
@@ -150,11 +150,11 @@ int ggn_plot_scatter(const char *path, const double *truth, const double *model,
     return ggn_plot_end(&plot, 1, err);
 }
 
-int ggn_plot_errors(const char *path, const double *truth, const double *model, size_t n, const char *title, struct ggn_err *err)
+int ggn_plot_errors(const char *path, const double *truth, const double *model, size_t n, const char *title, struct base_err *err)
 {
     struct ggn_plot plot;
     int rc = ggn_plot_begin(&plot, path, 760, 480, err);
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
     FILE *s = plot.script;
     fputs("set title ", s);
@@ -177,7 +177,7 @@ static int columns_of(const struct ggn_pair *p)
     return c > 0 ? c : (int)lround(ceil(sqrt((double)p->truth->n)));
 }
 
-int ggn_plot_heatmaps(const char *path, const struct ggn_pairing *p, const char *truth_name, const char *model_name, struct ggn_err *err)
+int ggn_plot_heatmaps(const char *path, const struct ggn_pairing *p, const char *truth_name, const char *model_name, struct base_err *err)
 {
     enum { MOST = 100 };
     struct ggn_plot plot;
@@ -185,7 +185,7 @@ int ggn_plot_heatmaps(const char *path, const struct ggn_pairing *p, const char 
     int across = shown < 5 ? shown : 5, down = (shown + across - 1) / across;
     int labels = shown <= 6, cell = shown == 1 ? 900 : 360;
     int rc = ggn_plot_begin(&plot, path, across * cell + 60, down * (cell * 6 / 10) + 60, err);
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
     FILE *s = plot.script;
     double lo = INFINITY, hi = 0.0;
@@ -227,11 +227,11 @@ int ggn_plot_heatmaps(const char *path, const struct ggn_pairing *p, const char 
     return ggn_plot_end(&plot, 1, err);
 }
 
-static int write_blocks(const char *path, const struct ggn_pairing *p, struct ggn_err *err)
+static int write_blocks(const char *path, const struct ggn_pairing *p, struct base_err *err)
 {
-    struct ggn_fio_out out;
-    int rc = ggn_fio_begin(&out, path, err);
-    if (rc != GGN_OK)
+    struct base_file_out out;
+    int rc = base_file_begin(&out, path, err);
+    if (rc)
         return rc;
     fputs("view;block;true_spp;model_spp;log2_error\n", out.file);
     for (int v = 0; v < p->n_views; v++) {
@@ -240,24 +240,24 @@ static int write_blocks(const char *path, const struct ggn_pairing *p, struct gg
             if (!isnan(t->spp[b]) && !isnan(m->spp[b]))
                 fprintf(out.file, "%s;%d;%.10g;%.10g;%.4f\n", t->name, b, t->spp[b], m->spp[b], log2(m->spp[b] / t->spp[b]));
     }
-    return ggn_fio_commit(&out, err);
+    return base_file_commit(&out, err);
 }
 
-int ggn_compare_pictures(const char *dir, const struct ggn_pairing *p, const char *truth_name, const char *model_name, struct ggn_err *err)
+int ggn_compare_pictures(const char *dir, const struct ggn_pairing *p, const char *truth_name, const char *model_name, struct base_err *err)
 {
     char path[4096];
     int n = snprintf(path, sizeof path, "%s/blocks.csv", dir);
     if (n < 0 || (size_t)n + 16 >= sizeof path)
-        return ggn_fail(err, GGN_EINVAL, "%.64s...: the path is too long", dir);
+        return base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", dir);
     int rc = write_blocks(path, p, err);
     snprintf(path, sizeof path, "%s/scatter.png", dir);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = ggn_plot_scatter(path, p->truth, p->model, p->n, truth_name, model_name, err);
     snprintf(path, sizeof path, "%s/errors.png", dir);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = ggn_plot_errors(path, p->truth, p->model, p->n, model_name, err);
     snprintf(path, sizeof path, "%s/heatmaps.png", dir);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = ggn_plot_heatmaps(path, p, truth_name, model_name, err);
     return rc;
 }

@@ -7,7 +7,7 @@
 #include <stdio.h>
 
 #include "data/thresholds.h"
-#include "eval/stats.h"
+#include "figures/stats.h"
 
 struct ggn_pair { /* one view that both sides have; borrows from the two thresholds */
     const struct ggn_view *truth, *model;
@@ -24,7 +24,7 @@ struct ggn_pairing {
 /* Pairs views of equal name; when the model has a single view, `view` (may be NULL) names its partner, and two single views
  * are partners whatever they are called. Borrows from both until released. */
 int ggn_pairing_init(struct ggn_pairing *p, const struct ggn_thresholds *truth, const struct ggn_thresholds *model,
-                     const char *view, struct ggn_err *err);
+                     const char *view, struct base_err *err);
 void ggn_pairing_release(struct ggn_pairing *p);
 
 void ggn_agreement_print_table(FILE *f, const struct ggn_agreement *a);
@@ -33,13 +33,13 @@ void ggn_agreement_print_json(FILE *f, const struct ggn_agreement *a);
 
 /* DIR/scatter.png, errors.png, heatmaps.png and blocks.csv. The names are the labels of the two sides. */
 int ggn_compare_pictures(const char *dir, const struct ggn_pairing *p, const char *truth_name, const char *model_name,
-                         struct ggn_err *err);
+                         struct base_err *err);
 /* The scatter and histogram alone, for any paired values. */
 int ggn_plot_scatter(const char *path, const double *truth, const double *model, size_t n, const char *truth_name,
-                     const char *model_name, struct ggn_err *err);
-int ggn_plot_errors(const char *path, const double *truth, const double *model, size_t n, const char *title, struct ggn_err *err);
+                     const char *model_name, struct base_err *err);
+int ggn_plot_errors(const char *path, const double *truth, const double *model, size_t n, const char *title, struct base_err *err);
 
 /* One small picture per view: the true map left, the model's right, one colour scale for all. At most 100 views. */
-int ggn_plot_heatmaps(const char *path, const struct ggn_pairing *p, const char *truth_name, const char *model_name, struct ggn_err *err);
+int ggn_plot_heatmaps(const char *path, const struct ggn_pairing *p, const char *truth_name, const char *model_name, struct base_err *err);
 
 #endif

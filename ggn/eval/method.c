@@ -21,7 +21,7 @@ int ggn_eval_count(const struct ggn_eval_set *s, enum ggn_split split)
     return n;
 }
 
-static int init(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, int with_scores, struct ggn_err *err)
+static int init(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, int with_scores, struct base_err *err)
 {
     *m = (struct ggn_method){.passes = 1, .cut = (double)NAN};
     snprintf(m->name, sizeof m->name, "%s", name);
@@ -30,41 +30,41 @@ static int init(struct ggn_method *m, const struct ggn_eval_set *s, const char *
         m->score = malloc(s->n * sizeof *m->score);
     if (m->stop == NULL || (with_scores && m->score == NULL)) {
         ggn_method_release(m);
-        return ggn_fail_nomem(err, name);
+        return base_fail_nomem(err, name);
     }
-    return GGN_OK;
+    return 0;
 }
 
-int ggn_method_spp(struct ggn_method *m, const struct ggn_eval_set *s, struct ggn_err *err)
+int ggn_method_spp(struct ggn_method *m, const struct ggn_eval_set *s, struct base_err *err)
 {
     int rc = init(m, s, "-spp", 1, err);
-    for (size_t i = 0; i < s->n && rc == GGN_OK; i++)
+    for (size_t i = 0; i < s->n && !rc; i++)
         m->score[i] = -s->spp[i];
     return rc;
 }
 
-int ggn_method_constant(struct ggn_method *m, const struct ggn_eval_set *s, struct ggn_err *err)
+int ggn_method_constant(struct ggn_method *m, const struct ggn_eval_set *s, struct base_err *err)
 {
     enum ggn_split split = ggn_eval_count(s, GGN_SPLIT_TRAIN) > 0 ? GGN_SPLIT_TRAIN : GGN_SPLIT_NONE;
     size_t n = 0;
     double *t = malloc((size_t)s->n_blocks * sizeof *t);
     if (t == NULL)
-        return ggn_fail_nomem(err, "constant");
+        return base_fail_nomem(err, "constant");
     int rc = init(m, s, "constant (training median)", 0, err);
     for (int b = 0; b < s->n_blocks; b++)
         if (s->blocks[b].split == split)
             t[n++] = s->blocks[b].label.threshold;
     double median = ggn_stats_quantile(t, n, 0.5);
     free(t);
-    for (int b = 0; b < s->n_blocks && rc == GGN_OK; b++)
+    for (int b = 0; b < s->n_blocks && !rc; b++)
         m->stop[b] = isnan(median) ? s->blocks[b].cap : fmin(median, s->blocks[b].cap);
     return rc;
 }
 
-int ggn_method_scene_mean(struct ggn_method *m, const struct ggn_eval_set *s, struct ggn_err *err)
+int ggn_method_scene_mean(struct ggn_method *m, const struct ggn_eval_set *s, struct base_err *err)
 {
     int rc = init(m, s, "scene's mean (oracle)", 0, err);
-    for (int b = 0; b < s->n_blocks && rc == GGN_OK; b++) {
+    for (int b = 0; b < s->n_blocks && !rc; b++) {
         double sum = 0.0, n = 0.0;
         for (int k = 0; k < s->n_blocks; k++)
             if (s->blocks[k].scene == s->blocks[b].scene) {
@@ -78,11 +78,11 @@ int ggn_method_scene_mean(struct ggn_method *m, const struct ggn_eval_set *s, st
 }
 
 static int from_columns(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, const double *score, const double *unsettled,
-                        int *available, struct ggn_err *err)
+                        int *available, struct base_err *err)
 {
     int rc = init(m, s, name, 1, err);
     *available = 1;
-    for (size_t i = 0; i < s->n && rc == GGN_OK; i++) {
+    for (size_t i = 0; i < s->n && !rc; i++) {
         m->score[i] = score[i];
         *available &= !isnan(score[i]);
     }
@@ -90,10 +90,10 @@ static int from_columns(struct ggn_method *m, const struct ggn_eval_set *s, cons
     return rc;
 }
 
-int ggn_method_halfbuf(struct ggn_method *m, const struct ggn_eval_set *s, int *available, struct ggn_err *err)
+int ggn_method_halfbuf(struct ggn_method *m, const struct ggn_eval_set *s, int *available, struct base_err *err)
 {
     int rc = from_columns(m, s, "halfbuf", s->dammertz, s->half_unsettled, available, err);
-    for (int b = 0; b < s->n_blocks && rc == GGN_OK; b++) {
+    for (int b = 0; b < s->n_blocks && !rc; b++) {
         const struct ggn_manifest *v = &s->chains.data.views[s->blocks[b].view].manifest;
         const struct ggn_manifest_block *r = &v->blocks[s->blocks[b].index];
         /* the paper's r = sqrt(area of the block / area of the picture), which the criterion applies */
@@ -104,15 +104,15 @@ int ggn_method_halfbuf(struct ggn_method *m, const struct ggn_eval_set *s, int *
     return rc;
 }
 
-int ggn_method_variance(struct ggn_method *m, const struct ggn_eval_set *s, int *available, struct ggn_err *err)
+int ggn_method_variance(struct ggn_method *m, const struct ggn_eval_set *s, int *available, struct base_err *err)
 {
     return from_columns(m, s, "variance", s->rse, s->rse_unsettled, available, err);
 }
 
-int ggn_method_scores(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, const double *score, struct ggn_err *err)
+int ggn_method_scores(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, const double *score, struct base_err *err)
 {
     int rc = init(m, s, name, 1, err);
-    if (rc == GGN_OK)
+    if (!rc)
         memcpy(m->score, score, s->n * sizeof *score);
     return rc;
 }
@@ -169,20 +169,20 @@ static void cost_of(const struct ggn_method *m, const struct ggn_eval_set *s, en
     *early /= n;
 }
 
-int ggn_method_tune(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, double early_rate, struct ggn_err *err)
+int ggn_method_tune(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, double early_rate, struct base_err *err)
 {
     enum { TRIES = 400 };
     size_t n = 0;
     double *scores = malloc((s->n > 0 ? s->n : 1) * sizeof *scores);
     if (scores == NULL)
-        return ggn_fail_nomem(err, m->name);
+        return base_fail_nomem(err, m->name);
     for (int b = 0; b < s->n_blocks; b++)
         for (size_t i = s->blocks[b].first; i < s->blocks[b].end; i++)
             if (s->blocks[b].split == split && !isnan(m->score[i]))
                 scores[n++] = m->score[i];
     if (n == 0) {
         free(scores);
-        return ggn_fail(err, GGN_EINVAL, "%s: nothing to tune on in the split '%s'", m->name, ggn_split_names[split]);
+        return base_fail(err, BASE_EINVAL, "%s: nothing to tune on in the split '%s'", m->name, ggn_split_names[split]);
     }
     qsort(scores, n, sizeof *scores, compare_doubles);
     static const double limits[] = {0.0, 1e-4, 1e-3, 1e-2, INFINITY};
@@ -201,7 +201,7 @@ int ggn_method_tune(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn
         }
     free(scores);
     ggn_method_run(m, s);
-    return GGN_OK;
+    return 0;
 }
 
 size_t ggn_method_stop_case(const struct ggn_method *m, const struct ggn_eval_set *s, int b)
@@ -215,13 +215,13 @@ size_t ggn_method_stop_case(const struct ggn_method *m, const struct ggn_eval_se
 
 /* --- figures --- */
 
-static int score_figures(const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, struct ggn_method_metrics *out, struct ggn_err *err)
+static int score_figures(const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, struct ggn_method_metrics *out, struct base_err *err)
 {
     double *score = malloc((s->n > 0 ? s->n : 1) * sizeof *score), sum = 0.0, cut;
     unsigned char *label = malloc(s->n > 0 ? s->n : 1);
-    int rc = score == NULL || label == NULL ? ggn_fail_nomem(err, m->name) : GGN_OK, scenes = 0;
+    int rc = score == NULL || label == NULL ? base_fail_nomem(err, m->name) : 0, scenes = 0;
     size_t right = 0;
-    for (int scene = -1; scene < s->n_scenes && rc == GGN_OK; scene++) { /* -1: all together */
+    for (int scene = -1; scene < s->n_scenes && !rc; scene++) { /* -1: all together */
         size_t n = 0;
         double auc;
         for (int b = 0; b < s->n_blocks; b++)
@@ -231,7 +231,7 @@ static int score_figures(const struct ggn_method *m, const struct ggn_eval_set *
                     score[n++] = m->score[i];
                 }
         rc = ggn_stats_auc(score, label, n, &auc, err);
-        if (scene < 0 && rc == GGN_OK) {
+        if (scene < 0 && !rc) {
             out->cases = n;
             out->auc = auc;
             rc = ggn_stats_best_cut(score, label, n, &cut, &out->best_accuracy, err);
@@ -249,12 +249,12 @@ static int score_figures(const struct ggn_method *m, const struct ggn_eval_set *
     return rc;
 }
 
-static int threshold_figures(const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, struct ggn_method_metrics *out, struct ggn_err *err)
+static int threshold_figures(const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, struct ggn_method_metrics *out, struct base_err *err)
 {
     double *t = malloc(2 * (size_t)s->n_blocks * sizeof *t), early = 0.0, spent = 0.0, needed = 0.0;
     size_t n = 0;
     if (t == NULL)
-        return ggn_fail_nomem(err, m->name);
+        return base_fail_nomem(err, m->name);
     for (int b = 0; b < s->n_blocks; b++) {
         const struct ggn_eval_block *block = &s->blocks[b];
         if (block->split != split)
@@ -269,7 +269,7 @@ static int threshold_figures(const struct ggn_method *m, const struct ggn_eval_s
     }
     out->early_stop_rate = early / out->blocks;
     out->samples_ratio = spent / needed;
-    int rc = GGN_OK;
+    int rc = 0;
     if (n > 0)
         rc = ggn_stats_agreement(t, t + s->n_blocks, n, INFINITY, &out->agreement, err);
     free(t);
@@ -329,7 +329,7 @@ static void quality_figures(const struct ggn_method *m, const struct ggn_eval_se
 }
 
 int ggn_method_measure(const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, struct ggn_method_metrics *out,
-                       struct ggn_err *err)
+                       struct base_err *err)
 {
     const double nan = (double)NAN;
     struct ggn_method_metrics r = {.auc = nan, .auc_scene_mean = nan, .accuracy = nan, .best_accuracy = nan, .uniform_spp = nan,
@@ -339,7 +339,7 @@ int ggn_method_measure(const struct ggn_method *m, const struct ggn_eval_set *s,
                                          .median_abs_log2 = nan, .median_log2 = nan, .iqr_log2 = nan, .within_half = nan, .within_one = nan};
     r.blocks = ggn_eval_count(s, split);
     if (r.blocks == 0)
-        return ggn_fail(err, GGN_EINVAL, "no labelled block in the split '%s'", ggn_split_names[split]);
+        return base_fail(err, BASE_EINVAL, "no labelled block in the split '%s'", ggn_split_names[split]);
     for (int b = 0; b < s->n_blocks; b++)
         r.censored += s->blocks[b].split == split && s->blocks[b].label.censored;
     for (int scene = 0; scene < s->n_scenes; scene++) {
@@ -348,12 +348,12 @@ int ggn_method_measure(const struct ggn_method *m, const struct ggn_eval_set *s,
             in |= s->blocks[b].split == split && s->blocks[b].scene == scene;
         r.scenes += in;
     }
-    int rc = m->score != NULL ? score_figures(m, s, split, &r, err) : GGN_OK;
-    if (rc == GGN_OK)
+    int rc = m->score != NULL ? score_figures(m, s, split, &r, err) : 0;
+    if (!rc)
         rc = threshold_figures(m, s, split, &r, err);
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
     quality_figures(m, s, split, &r);
     *out = r;
-    return GGN_OK;
+    return 0;
 }

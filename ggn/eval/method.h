@@ -8,7 +8,7 @@
 #define GGN_EVAL_METHOD_H
 
 #include "eval/set.h"
-#include "eval/stats.h"
+#include "figures/stats.h"
 
 enum { GGN_METHOD_NAME = 48 };
 
@@ -28,20 +28,20 @@ void ggn_method_release(struct ggn_method *m);
 
 /* Trivial baselines. score = -spp (looks at no pixel); the median threshold of the training blocks; the mean threshold of the
  * block's own scene (an oracle). GGN_SPLIT_NONE stands for training when there are no training blocks. */
-int ggn_method_spp(struct ggn_method *m, const struct ggn_eval_set *s, struct ggn_err *err);
-int ggn_method_constant(struct ggn_method *m, const struct ggn_eval_set *s, struct ggn_err *err);
-int ggn_method_scene_mean(struct ggn_method *m, const struct ggn_eval_set *s, struct ggn_err *err);
+int ggn_method_spp(struct ggn_method *m, const struct ggn_eval_set *s, struct base_err *err);
+int ggn_method_constant(struct ggn_method *m, const struct ggn_eval_set *s, struct base_err *err);
+int ggn_method_scene_mean(struct ggn_method *m, const struct ggn_eval_set *s, struct base_err *err);
 /* The criteria of plugin-api/examples from their recorded errors; *available: whether every case has them. */
-int ggn_method_halfbuf(struct ggn_method *m, const struct ggn_eval_set *s, int *available, struct ggn_err *err);
-int ggn_method_variance(struct ggn_method *m, const struct ggn_eval_set *s, int *available, struct ggn_err *err);
+int ggn_method_halfbuf(struct ggn_method *m, const struct ggn_eval_set *s, int *available, struct base_err *err);
+int ggn_method_variance(struct ggn_method *m, const struct ggn_eval_set *s, int *available, struct base_err *err);
 /* Any other scores: copies score [cases]. */
-int ggn_method_scores(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, const double *score, struct ggn_err *err);
+int ggn_method_scores(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, const double *score, struct base_err *err);
 
 /* Sets stop from score, guard, passes and cut. */
 void ggn_method_run(struct ggn_method *m, const struct ggn_eval_set *s);
 /* Chooses the cut on the blocks of `split`: the one that spends fewest samples with at most `early_rate` of the blocks stopped below
  * 0.8 of their threshold; if none does, the smallest early rate. The limit of a guard is chosen with it. Then runs. */
-int ggn_method_tune(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, double early_rate, struct ggn_err *err);
+int ggn_method_tune(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, double early_rate, struct base_err *err);
 
 struct ggn_method_metrics {
     int blocks, censored, scenes;
@@ -56,9 +56,9 @@ struct ggn_method_metrics {
     double uniform_spp, time_vs_uniform, samples_vs_uniform; /* uniform sampling whose worst block is as good (FLIP) */
 };
 
-/* GGN_EINVAL when the split has no blocks. Undefined figures are NaN. */
+/* BASE_EINVAL when the split has no blocks. Undefined figures are NaN. */
 int ggn_method_measure(const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, struct ggn_method_metrics *out,
-                       struct ggn_err *err);
+                       struct base_err *err);
 
 /* Whether case i says that its block may stop: below the cut and not held back. */
 int ggn_method_passes(const struct ggn_method *m, size_t i);

@@ -6,9 +6,9 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "base/fio.h"
+#include "base/files.h"
 #include "data/image.h"
-#include "eval/plot.h"
+#include "figures/plot.h"
 #include "model/judge.h"
 #include "model/policy.h"
 #include "model/window.h"
@@ -35,22 +35,22 @@ static void viewer_release(struct viewer *v)
     *v = (struct viewer){0};
 }
 
-static int viewer_init(struct viewer *v, const struct ggn_model *model, enum ggn_precision precision, size_t values, struct ggn_err *err)
+static int viewer_init(struct viewer *v, const struct ggn_model *model, enum ggn_precision precision, size_t values, struct base_err *err)
 {
     *v = (struct viewer){.window = model->hyper.window};
     if (v->window > WINDOW_MAX)
-        return ggn_fail(err, GGN_EINVAL, "the model looks at windows of %d images, more than %d", v->window, WINDOW_MAX);
+        return base_fail(err, BASE_EINVAL, "the model looks at windows of %d images, more than %d", v->window, WINDOW_MAX);
     v->judge = ggn_judge_create(model, precision, NULL, err);
     if (v->judge == NULL)
         return err->code;
     v->room = malloc((size_t)v->window * values * sizeof *v->room);
     if (v->room == NULL) {
         viewer_release(v);
-        return ggn_fail_nomem(err, "evaluation");
+        return base_fail_nomem(err, "evaluation");
     }
     for (int i = 0; i < v->window; i++)
         v->denoised[i] = v->room + (size_t)i * values;
-    return GGN_OK;
+    return 0;
 }
 
 /* Appends a level, dropping the oldest when the window is full. */
@@ -104,7 +104,7 @@ static int tail_holds(const struct ggn_policy *p, const struct ggn_chain *c, int
     return ggn_policy_tail_holds(p, c->tail999[k] * sqrt(c->spp[k] / c->spp[i]), c->gini[k]);
 }
 
-static int judge_block(void *data, int index, int worker, struct ggn_err *err)
+static int judge_block(void *data, int index, int worker, struct base_err *err)
 {
     struct run *r = data;
     const struct ggn_eval_block *b = &r->set->blocks[index];
@@ -127,51 +127,51 @@ static int judge_block(void *data, int index, int worker, struct ggn_err *err)
         r->method->score[at] = ggn_policy_p(&r->policy, viewer_logit(v, w, h));
         r->method->own_guard[at] = (r->policy.gate_noise > 0.0 && noise > r->policy.gate_noise) || tail_holds(&r->policy, c, i);
     }
-    return GGN_OK;
+    return 0;
 }
 
-static int init_method(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, const struct ggn_policy *p, struct ggn_err *err)
+static int init_method(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, const struct ggn_policy *p, struct base_err *err)
 {
     double *nothing = malloc((s->n > 0 ? s->n : 1) * sizeof *nothing);
-    int rc = nothing == NULL ? ggn_fail_nomem(err, name) : GGN_OK;
-    for (size_t i = 0; i < s->n && rc == GGN_OK; i++)
+    int rc = nothing == NULL ? base_fail_nomem(err, name) : 0;
+    for (size_t i = 0; i < s->n && !rc; i++)
         nothing[i] = (double)NAN;
-    if (rc == GGN_OK)
+    if (!rc)
         rc = ggn_method_scores(m, s, name, nothing, err);
     free(nothing);
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
     m->own_guard = calloc(s->n > 0 ? s->n : 1, sizeof *m->own_guard);
     if (m->own_guard == NULL) {
         ggn_method_release(m);
-        return ggn_fail_nomem(err, name);
+        return base_fail_nomem(err, name);
     }
     m->guard = m->own_guard;
     m->cut = p->threshold;
     m->passes = p->passes > 0 ? p->passes : 1;
-    return GGN_OK;
+    return 0;
 }
 
 int ggn_eval_network(struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_model *model, const char *name,
-                     enum ggn_precision precision, struct ggn_threads *threads, struct ggn_err *err)
+                     enum ggn_precision precision, struct base_threads *threads, struct base_err *err)
 {
-    int workers = ggn_threads_count(threads), made = 0;
+    int workers = base_threads_count(threads), made = 0;
     struct run r = {.set = s, .method = m, .viewers = calloc((size_t)workers, sizeof *r.viewers)};
-    int rc = r.viewers == NULL ? ggn_fail_nomem(err, name) : ggn_policy_of(model, &r.policy, err);
-    if (rc == GGN_OK)
+    int rc = r.viewers == NULL ? base_fail_nomem(err, name) : ggn_policy_of(model, &r.policy, err);
+    if (!rc)
         rc = init_method(m, s, name, &r.policy, err);
-    if (rc != GGN_OK) {
+    if (rc) {
         free(r.viewers);
         return rc;
     }
-    for (; made < workers && rc == GGN_OK; made += rc == GGN_OK)
+    for (; made < workers && !rc; made += !rc)
         rc = viewer_init(&r.viewers[made], model, precision, ggn_chains_values(&s->chains), err);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = ggn_eval_each_block(s, threads, judge_block, &r, err);
     for (int i = 0; i < made; i++)
         viewer_release(&r.viewers[i]);
     free(r.viewers);
-    if (rc == GGN_OK)
+    if (!rc)
         ggn_method_run(m, s);
     else
         ggn_method_release(m);
@@ -187,21 +187,21 @@ struct strips {
     char title[STRIPS][256];
 };
 
-static int add_strip(struct strips *s, const char *path, const uint8_t *rgb, int w, int h, struct ggn_err *err)
+static int add_strip(struct strips *s, const char *path, const uint8_t *rgb, int w, int h, struct base_err *err)
 {
     snprintf(s->file[s->n], sizeof s->file[0], "%.4000s.part%d.png", path, s->n);
     int rc = ggn_image8_write_png(s->file[s->n], rgb, w, h, err);
-    s->n += rc == GGN_OK;
+    s->n += !rc;
     return rc;
 }
 
 /* Draws the strips if rc says so; removes their files. */
-static int finish_strips(struct strips *s, const char *path, int width, int height_each, int rc, struct ggn_err *err)
+static int finish_strips(struct strips *s, const char *path, int width, int height_each, int rc, struct base_err *err)
 {
     struct ggn_plot plot;
-    if (rc == GGN_OK && s->n > 0)
+    if (!rc && s->n > 0)
         rc = ggn_plot_begin(&plot, path, width, height_each * s->n + 20, err);
-    if (rc == GGN_OK && s->n > 0) {
+    if (!rc && s->n > 0) {
         fprintf(plot.script, "unset tics\nunset border\nset size ratio -1\nset yrange [] reverse\nset multiplot layout %d,1\n", s->n);
         for (int i = 0; i < s->n; i++) {
             fputs("set title ", plot.script);
@@ -236,7 +236,7 @@ static double ssim_of(struct ggn_ssim_f32 *ssim, const float *a, const float *b,
 }
 
 static int denoiser_strip(const struct ggn_eval_set *s, const struct ggn_eval_block *b, struct viewer *v, const char *path, struct strips *strips,
-                          struct ggn_err *err)
+                          struct base_err *err)
 {
     const struct ggn_chain *c = &s->chains.chains[b->chain];
     int w = s->chains.width, h = s->chains.height;
@@ -244,8 +244,8 @@ static int denoiser_strip(const struct ggn_eval_set *s, const struct ggn_eval_bl
     uint8_t *strip = malloc(3 * values);
     float *planes = malloc(3 * values * sizeof *planes);
     struct ggn_ssim_f32 *ssim = ggn_ssim_create_f32(h, w, NULL, err);
-    int rc = strip == NULL || planes == NULL || ssim == NULL ? ggn_fail_nomem(err, path) : GGN_OK;
-    if (rc == GGN_OK) {
+    int rc = strip == NULL || planes == NULL || ssim == NULL ? base_fail_nomem(err, path) : 0;
+    if (!rc) {
         v->n = 0;
         viewer_push(v, c->noisy, c->spp[0], w, h);
         for (size_t i = 0; i < values; i++) {
@@ -266,14 +266,14 @@ static int denoiser_strip(const struct ggn_eval_set *s, const struct ggn_eval_bl
     return rc;
 }
 
-int ggn_eval_denoiser_picture(const char *path, const struct ggn_eval_set *s, const struct ggn_model *model, enum ggn_split split, struct ggn_err *err)
+int ggn_eval_denoiser_picture(const char *path, const struct ggn_eval_set *s, const struct ggn_model *model, enum ggn_split split, struct base_err *err)
 {
     struct strips strips = {0};
     struct viewer v;
     int last_view = -1, rc = viewer_init(&v, model, GGN_PRECISION_F32, ggn_chains_values(&s->chains), err);
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
-    for (int b = 0; b < s->n_blocks && strips.n < STRIPS && rc == GGN_OK; b++) {
+    for (int b = 0; b < s->n_blocks && strips.n < STRIPS && !rc; b++) {
         const struct ggn_eval_block *block = &s->blocks[b];
         if (block->split != split || block->view == last_view || s->chains.chains[block->chain].reference == NULL)
             continue;
@@ -302,15 +302,15 @@ static void put_map(uint8_t *strip, int tiles, int k, const float *a, const floa
 
 /* The window that ends at `level` of a block, as a strip. */
 static int feature_strip(const struct ggn_eval_set *s, const struct ggn_eval_block *b, int level, const struct ggn_policy *policy, struct viewer *v,
-                         const char *path, struct strips *strips, struct ggn_err *err)
+                         const char *path, struct strips *strips, struct base_err *err)
 {
     const struct ggn_chain *c = &s->chains.chains[b->chain];
     int w = s->chains.width, h = s->chains.height, row;
     size_t pixels = (size_t)w * (size_t)h, values = 3 * pixels;
     uint8_t *strip = malloc(4 * values);
     float *planes = malloc((values + 2 * pixels) * sizeof *planes);
-    int rc = strip == NULL || planes == NULL ? ggn_fail_nomem(err, path) : GGN_OK;
-    if (rc == GGN_OK) {
+    int rc = strip == NULL || planes == NULL ? base_fail_nomem(err, path) : 0;
+    if (!rc) {
         v->n = 0;
         for (int i = level - v->window + 1; i <= level; i++)
             viewer_push(v, c->noisy + values * (size_t)i, c->spp[i], w, h);
@@ -335,7 +335,7 @@ static int feature_strip(const struct ggn_eval_set *s, const struct ggn_eval_blo
     return rc;
 }
 
-int ggn_eval_feature_picture(const char *path, const struct ggn_eval_set *s, const struct ggn_model *model, enum ggn_split split, struct ggn_err *err)
+int ggn_eval_feature_picture(const char *path, const struct ggn_eval_set *s, const struct ggn_model *model, enum ggn_split split, struct base_err *err)
 {
     struct strips strips = {0};
     struct ggn_policy policy;
@@ -343,7 +343,7 @@ int ggn_eval_feature_picture(const char *path, const struct ggn_eval_set *s, con
     const struct ggn_eval_block *block = NULL;
     /* Tiles would not fit together into one map. */
     if (s->chains.width != model->hyper.width || s->chains.height != model->hyper.height)
-        return GGN_OK;
+        return 0;
     for (int b = 0; b < s->n_blocks; b++) {
         const struct ggn_chain *c = &s->chains.chains[s->blocks[b].chain];
         if (s->blocks[b].split != split || c->n_levels < model->hyper.window)
@@ -355,10 +355,10 @@ int ggn_eval_feature_picture(const char *path, const struct ggn_eval_set *s, con
             break;
     }
     int rc = ggn_policy_of(model, &policy, err);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = viewer_init(&v, model, GGN_PRECISION_F32, ggn_chains_values(&s->chains), err);
-    if (rc != GGN_OK || block == NULL) {
-        if (rc == GGN_OK)
+    if (rc || block == NULL) {
+        if (!rc)
             viewer_release(&v);
         return rc;
     }
@@ -366,7 +366,7 @@ int ggn_eval_feature_picture(const char *path, const struct ggn_eval_set *s, con
     int at[3] = {model->hyper.window - 1, model->hyper.window - 1, c->n_levels - 1};
     while (at[1] + 1 < c->n_levels && c->spp[at[1]] < block->label.threshold)
         at[1]++;
-    for (int k = 0; k < 3 && rc == GGN_OK; k++)
+    for (int k = 0; k < 3 && !rc; k++)
         rc = feature_strip(s, block, at[k], &policy, &v, path, &strips, err);
     viewer_release(&v);
     return finish_strips(&strips, path, 1100, 320, rc, err);

@@ -13,14 +13,14 @@
  * score. Beyond the recording the guard's statistics are scaled from the last recorded level.
  */
 int ggn_eval_network(struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_model *model, const char *name,
-                     enum ggn_precision precision, struct ggn_threads *threads, struct ggn_err *err);
+                     enum ggn_precision precision, struct base_threads *threads, struct base_err *err);
 
 /* Up to four blocks of the split: the first level, what the denoiser makes of it, and the reference, with their SSIM. */
 int ggn_eval_denoiser_picture(const char *path, const struct ggn_eval_set *s, const struct ggn_model *model, enum ggn_split split,
-                              struct ggn_err *err);
+                              struct base_err *err);
 /* One block of the split at its first window, the one at its threshold, and its last: the image, the noise feature maps of the denoised and of the noisy
  * window, and how they differ; the probability above each. */
 int ggn_eval_feature_picture(const char *path, const struct ggn_eval_set *s, const struct ggn_model *model, enum ggn_split split,
-                             struct ggn_err *err);
+                             struct base_err *err);
 
 #endif

@@ -7,9 +7,9 @@
 
 #include <cjson/cJSON.h>
 
-#include "base/fio.h"
+#include "base/files.h"
 #include "eval/compare.h"
-#include "eval/plot.h"
+#include "figures/plot.h"
 
 /* key, column head, format, value */
 #define COLUMNS(X) \
@@ -99,7 +99,7 @@ struct cJSON *ggn_report_json(const struct ggn_method *methods, const struct ggn
 /* --- pictures --- */
 
 static int picture_path(char path[4096], const char *dir, enum ggn_split split, const char *kind, const struct ggn_method *method, const char *end,
-                        struct ggn_err *err)
+                        struct base_err *err)
 {
     char word[GGN_METHOD_NAME] = "";
     size_t n = 0;
@@ -108,7 +108,7 @@ static int picture_path(char path[4096], const char *dir, enum ggn_split split, 
             word[n++] = *p;
     word[n] = '\0';
     int length = snprintf(path, 4096, "%s/%s-%s%s%s%s", dir, ggn_split_names[split], kind, n > 0 ? "-" : "", word, end);
-    return length > 0 && length < 4096 ? GGN_OK : ggn_fail(err, GGN_EINVAL, "%.64s...: the path is too long", dir);
+    return length > 0 && length < 4096 ? 0 : base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", dir);
 }
 
 struct point {
@@ -122,12 +122,12 @@ static int by_score_falling(const void *a, const void *b)
     return (x < y) - (x > y);
 }
 
-static int write_roc(FILE *f, const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, struct ggn_err *err)
+static int write_roc(FILE *f, const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, struct base_err *err)
 {
     struct point *p = malloc((s->n > 0 ? s->n : 1) * sizeof *p);
     size_t n = 0, positive = 0, hit = 0, step;
     if (p == NULL)
-        return ggn_fail_nomem(err, m->name);
+        return base_fail_nomem(err, m->name);
     for (int b = 0; b < s->n_blocks; b++)
         for (size_t i = s->blocks[b].first; i < s->blocks[b].end; i++)
             if (s->blocks[b].split == split && s->noisy[i] >= 0 && !isnan(m->score[i])) {
@@ -143,16 +143,16 @@ static int write_roc(FILE *f, const struct ggn_method *m, const struct ggn_eval_
             fprintf(f, "%.5f %.5f\n", n > positive ? (double)(i + 1 - hit) / (double)(n - positive) : 0.0, positive > 0 ? (double)hit / (double)positive : 0.0);
     }
     free(p);
-    return GGN_OK;
+    return 0;
 }
 
-static int plot_roc(const char *path, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *methods, int n, struct ggn_err *err)
+static int plot_roc(const char *path, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *methods, int n, struct base_err *err)
 {
     struct ggn_plot plot;
     int rc = ggn_plot_begin(&plot, path, 720, 680, err), first = 1;
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
-    for (int i = 0; i < n && rc == GGN_OK; i++) {
+    for (int i = 0; i < n && !rc; i++) {
         if (methods[i].score == NULL)
             continue;
         fprintf(plot.script, "$m%d << EOD\n", i);
@@ -168,7 +168,7 @@ static int plot_roc(const char *path, const struct ggn_eval_set *s, enum ggn_spl
             first = 0;
         }
     fputs(", x dt 2 lc '#999999' notitle\n", plot.script);
-    if (rc != GGN_OK) {
+    if (rc) {
         ggn_plot_end(&plot, 0, NULL);
         return rc;
     }
@@ -176,7 +176,7 @@ static int plot_roc(const char *path, const struct ggn_eval_set *s, enum ggn_spl
 }
 
 /* Score against spp for six blocks spread over the split by threshold; dashed: the threshold. */
-static int plot_scores(const char *path, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *m, struct ggn_err *err)
+static int plot_scores(const char *path, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *m, struct base_err *err)
 {
     enum { SHOWN = 6 };
     struct ggn_plot plot;
@@ -186,7 +186,7 @@ static int plot_scores(const char *path, const struct ggn_eval_set *s, enum ggn_
         if (s->blocks[b].split == split && seen++ * SHOWN >= n * total)
             chosen[n++] = b;
     int rc = ggn_plot_begin(&plot, path, 900, 560, err);
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
     FILE *f = plot.script;
     for (int k = 0; k < n; k++) {
@@ -227,11 +227,11 @@ static void fill_view(struct ggn_view *v, const struct ggn_eval_set *s, int view
 }
 
 /* Thresholds (stop NULL) or stops of the split's views, for the heat maps. */
-static int make_maps(struct ggn_thresholds *t, const struct ggn_eval_set *s, enum ggn_split split, const double *stop, struct ggn_err *err)
+static int make_maps(struct ggn_thresholds *t, const struct ggn_eval_set *s, enum ggn_split split, const double *stop, struct base_err *err)
 {
     *t = (struct ggn_thresholds){.views = calloc((size_t)s->chains.data.n, sizeof *t->views)};
     if (t->views == NULL)
-        return ggn_fail_nomem(err, "maps");
+        return base_fail_nomem(err, "maps");
     for (int v = 0; v < s->chains.data.n; v++) {
         const struct ggn_manifest *m = &s->chains.data.views[v].manifest;
         uint32_t blocks = (m->width + m->block - 1) / m->block * ((m->height + m->block - 1) / m->block);
@@ -245,41 +245,41 @@ static int make_maps(struct ggn_thresholds *t, const struct ggn_eval_set *s, enu
         view->spp = malloc(blocks * sizeof *view->spp);
         if (view->spp == NULL) {
             ggn_thresholds_release(t);
-            return ggn_fail_nomem(err, "maps");
+            return base_fail_nomem(err, "maps");
         }
         t->n++;
         fill_view(view, s, v, stop);
     }
-    return GGN_OK;
+    return 0;
 }
 
-static int method_pictures(const char *dir, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *m, struct ggn_err *err)
+static int method_pictures(const char *dir, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *m, struct base_err *err)
 {
     char path[4096];
     struct ggn_thresholds truth = {0}, stops = {0};
     struct ggn_pairing pairing = {0};
     int rc = make_maps(&truth, s, split, NULL, err);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = make_maps(&stops, s, split, m->stop, err);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = ggn_pairing_init(&pairing, &truth, &stops, NULL, err);
-    if (rc == GGN_OK && (rc = picture_path(path, dir, split, "scatter", m, ".png", err)) == GGN_OK)
+    if (!rc && (rc = picture_path(path, dir, split, "scatter", m, ".png", err)) == 0)
         rc = ggn_plot_scatter(path, pairing.truth, pairing.model, pairing.n, "threshold", m->name, err);
-    if (rc == GGN_OK && (rc = picture_path(path, dir, split, "errors", m, ".png", err)) == GGN_OK)
+    if (!rc && (rc = picture_path(path, dir, split, "errors", m, ".png", err)) == 0)
         rc = ggn_plot_errors(path, pairing.truth, pairing.model, pairing.n, m->name, err);
-    if (rc == GGN_OK && (rc = picture_path(path, dir, split, "heatmaps", m, ".png", err)) == GGN_OK)
+    if (!rc && (rc = picture_path(path, dir, split, "heatmaps", m, ".png", err)) == 0)
         rc = ggn_plot_heatmaps(path, &pairing, "thresholds", m->name, err);
-    if (rc == GGN_OK && m->score != NULL && (rc = picture_path(path, dir, split, "score", m, ".png", err)) == GGN_OK)
+    if (!rc && m->score != NULL && (rc = picture_path(path, dir, split, "score", m, ".png", err)) == 0)
         rc = plot_scores(path, s, split, m, err);
-    struct ggn_fio_out out;
-    if (rc == GGN_OK && (rc = picture_path(path, dir, split, "stops", m, ".csv", err)) == GGN_OK && (rc = ggn_fio_begin(&out, path, err)) == GGN_OK) {
+    struct base_file_out out;
+    if (!rc && (rc = picture_path(path, dir, split, "stops", m, ".csv", err)) == 0 && (rc = base_file_begin(&out, path, err)) == 0) {
         fputs("view;block;threshold;censored;stop\n", out.file);
         for (int b = 0; b < s->n_blocks; b++) {
             const struct ggn_eval_block *e = &s->blocks[b];
             if (e->split == split)
                 fprintf(out.file, "%s;%u;%.6g;%d;%.6g\n", s->chains.data.views[e->view].name, e->label.id, e->label.threshold, e->label.censored, m->stop[b]);
         }
-        rc = ggn_fio_commit(&out, err);
+        rc = base_file_commit(&out, err);
     }
     ggn_pairing_release(&pairing);
     ggn_thresholds_release(&truth);
@@ -287,13 +287,13 @@ static int method_pictures(const char *dir, const struct ggn_eval_set *s, enum g
     return rc;
 }
 
-int ggn_report_pictures(const char *dir, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *methods, int n, struct ggn_err *err)
+int ggn_report_pictures(const char *dir, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *methods, int n, struct base_err *err)
 {
     char path[4096];
     int rc = picture_path(path, dir, split, "roc", NULL, ".png", err);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = plot_roc(path, s, split, methods, n, err);
-    for (int i = 0; i < n && rc == GGN_OK; i++)
+    for (int i = 0; i < n && !rc; i++)
         rc = method_pictures(dir, s, split, &methods[i], err);
     return rc;
 }

@@ -16,6 +16,6 @@ struct cJSON *ggn_report_json(const struct ggn_method *methods, const struct ggn
 /* Pictures of one split into DIR: SPLIT-roc.png, and for each method SPLIT-errors-K.png, SPLIT-scatter-K.png, SPLIT-heatmaps-K.png,
  * SPLIT-score-K.png where it has scores (against spp, with the thresholds), and its stops as SPLIT-stops-K.csv. */
 int ggn_report_pictures(const char *dir, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *methods, int n,
-                        struct ggn_err *err);
+                        struct base_err *err);
 
 #endif

@@ -33,13 +33,13 @@ static uint32_t manifest_index(const struct ggn_manifest *m, uint32_t id)
 }
 
 /* Lists the labelled blocks and counts the cases. */
-static int list_blocks(struct ggn_eval_set *s, int *skipped, struct ggn_err *err)
+static int list_blocks(struct ggn_eval_set *s, int *skipped, struct base_err *err)
 {
     const struct ggn_dataset *d = &s->chains.data;
     s->n_scenes = d->n;
     s->blocks = malloc((size_t)(s->chains.n > 0 ? s->chains.n : 1) * sizeof *s->blocks);
     if (s->blocks == NULL)
-        return ggn_fail_nomem(err, "evaluation");
+        return base_fail_nomem(err, "evaluation");
     *skipped = 0;
     for (int v = 0; v < d->n; v++)
         *skipped += !d->views[v].has_labels;
@@ -49,7 +49,7 @@ static int list_blocks(struct ggn_eval_set *s, int *skipped, struct ggn_err *err
         if (!c->has_label)
             continue;
         if (c->n_levels < s->window)
-            return ggn_fail(err, GGN_EINVAL, "%s: %d level%s, a window needs %d", view->dir, c->n_levels, c->n_levels == 1 ? "" : "s", s->window);
+            return base_fail(err, BASE_EINVAL, "%s: %d level%s, a window needs %d", view->dir, c->n_levels, c->n_levels == 1 ? "" : "s", s->window);
         size_t cases = (size_t)(c->n_levels - s->window + 1);
         struct ggn_eval_block b = {.chain = i, .view = c->view, .scene = scene_index(d, c->view), .index = manifest_index(&view->manifest, c->block),
                                    .split = view->split, .label = c->label, .cap = c->spp[c->n_levels - 1], .first = s->n, .end = s->n + cases};
@@ -61,11 +61,11 @@ static int list_blocks(struct ggn_eval_set *s, int *skipped, struct ggn_err *err
         s->n += cases;
     }
     if (s->n_blocks == 0)
-        return ggn_fail(err, GGN_EINVAL, "no labelled block in the data (run ggn label first)");
-    return GGN_OK;
+        return base_fail(err, BASE_EINVAL, "no labelled block in the data (run ggn label first)");
+    return 0;
 }
 
-static int make_columns(struct ggn_eval_set *s, struct ggn_err *err)
+static int make_columns(struct ggn_eval_set *s, struct base_err *err)
 {
     enum { COLUMNS = 8 };
     double **columns[COLUMNS] = {&s->spp, &s->seconds, &s->dammertz, &s->half_unsettled, &s->rse, &s->rse_unsettled, &s->flip, &s->ssim};
@@ -73,7 +73,7 @@ static int make_columns(struct ggn_eval_set *s, struct ggn_err *err)
     s->noisy = malloc(s->n);
     s->spp = all;
     if (all == NULL || s->noisy == NULL)
-        return ggn_fail_nomem(err, "evaluation");
+        return base_fail_nomem(err, "evaluation");
     for (size_t c = 0; c < COLUMNS; c++) {
         *columns[c] = all + c * s->n;
         for (size_t i = 0; i < s->n; i++)
@@ -87,16 +87,16 @@ static int make_columns(struct ggn_eval_set *s, struct ggn_err *err)
             s->noisy[i] = (signed char)ggn_label_noisy(&block->label, s->spp[i]);
         }
     }
-    return GGN_OK;
+    return 0;
 }
 
 /* --- blocks in parallel --- */
 
 struct each {
-    int (*fn)(void *, int, int, struct ggn_err *);
+    int (*fn)(void *, int, int, struct base_err *);
     void *data;
     int *rc;
-    struct ggn_err *errs;
+    struct base_err *errs;
 };
 
 static void each_block(void *data, long i, int worker)
@@ -105,18 +105,18 @@ static void each_block(void *data, long i, int worker)
     e->rc[i] = e->fn(e->data, (int)i, worker, &e->errs[i]);
 }
 
-int ggn_eval_each_block(const struct ggn_eval_set *set, struct ggn_threads *threads,
-                        int (*fn)(void *data, int block, int worker, struct ggn_err *err), void *data, struct ggn_err *err)
+int ggn_eval_each_block(const struct ggn_eval_set *set, struct base_threads *threads,
+                        int (*fn)(void *data, int block, int worker, struct base_err *err), void *data, struct base_err *err)
 {
-    int n = set->n_blocks, rc = GGN_OK;
-    struct each e = {.fn = fn, .data = data, .rc = calloc((size_t)n, sizeof(int)), .errs = calloc((size_t)n, sizeof(struct ggn_err))};
+    int n = set->n_blocks, rc = 0;
+    struct each e = {.fn = fn, .data = data, .rc = calloc((size_t)n, sizeof(int)), .errs = calloc((size_t)n, sizeof(struct base_err))};
     if (e.rc == NULL || e.errs == NULL)
-        rc = ggn_fail_nomem(err, "evaluation");
+        rc = base_fail_nomem(err, "evaluation");
     else
-        ggn_threads_for(threads, n, each_block, &e);
-    for (int i = 0; i < n && rc == GGN_OK; i++)
-        if (e.rc[i] != GGN_OK)
-            rc = ggn_fail(err, e.rc[i], "%s", e.errs[i].text);
+        base_threads_for(threads, n, each_block, &e);
+    for (int i = 0; i < n && !rc; i++)
+        if (e.rc[i] != 0)
+            rc = base_fail(err, e.rc[i], "%s", e.errs[i].text);
     free(e.rc);
     free(e.errs);
     return rc;
@@ -151,20 +151,20 @@ static void interleave(const uint8_t *planar, size_t pixels, uint8_t *rgb)
             rgb[3 * i + c] = planar[c * pixels + i];
 }
 
-static int measure_quality(struct ggn_eval_set *s, const struct ggn_eval_block *block, struct ggn_err *err)
+static int measure_quality(struct ggn_eval_set *s, const struct ggn_eval_block *block, struct base_err *err)
 {
     const struct ggn_chain *c = &s->chains.chains[block->chain];
-    int w = s->chains.width, h = s->chains.height, rc = GGN_OK;
+    int w = s->chains.width, h = s->chains.height, rc = 0;
     size_t pixels = (size_t)w * (size_t)h, values = 3 * pixels;
     uint8_t *rgb = malloc(2 * values);
     float *work = malloc(2 * values * sizeof *work);
     struct ggn_ssim_f32 *ssim = ggn_ssim_create_f32(h, w, NULL, err);
     if (rgb == NULL || work == NULL || ssim == NULL) {
-        rc = ggn_fail_nomem(err, "quality");
+        rc = base_fail_nomem(err, "quality");
         goto out;
     }
     interleave(c->reference, pixels, rgb);
-    for (size_t i = block->first; i < block->end && rc == GGN_OK; i++) {
+    for (size_t i = block->first; i < block->end && !rc; i++) {
         const uint8_t *level = c->noisy + (i - block->first + (size_t)s->window - 1) * values;
         struct ggn_flip_stats flip;
         interleave(level, pixels, rgb + values);
@@ -189,18 +189,18 @@ static double unsettled_share(const float *y, const float *d, size_t pixels, dou
 }
 
 /* The criteria's figures beyond the recording, from its last level. */
-static int extrapolate(struct ggn_eval_set *s, const struct ggn_eval_block *block, size_t from, const struct ggn_seq_block *p, struct ggn_err *err)
+static int extrapolate(struct ggn_eval_set *s, const struct ggn_eval_block *block, size_t from, const struct ggn_seq_block *p, struct base_err *err)
 {
     const struct ggn_seq_record *last = &p->levels[p->n_levels - 1];
     size_t pixels = (size_t)p->width * p->height;
     double half = ggn_seq_stat(last, "half_unsettled");
     float *planes = malloc(4 * pixels * sizeof *planes);
-    int rc = planes == NULL ? ggn_fail_nomem(err, "evaluation") : ggn_seq_mean(p, last, planes, err);
-    if (rc == GGN_OK)
+    int rc = planes == NULL ? base_fail_nomem(err, "evaluation") : ggn_seq_mean(p, last, planes, err);
+    if (!rc)
         rc = ggn_seq_half_luminance(p, last, planes + 3 * pixels, err);
-    for (size_t i = 0; i < pixels && rc == GGN_OK; i++)
+    for (size_t i = 0; i < pixels && !rc; i++)
         planes[i] = (float)ggn_luminance((double)planes[i], (double)planes[pixels + i], (double)planes[2 * pixels + i]);
-    for (size_t i = from; i < block->end && rc == GGN_OK; i++) {
+    for (size_t i = from; i < block->end && !rc; i++) {
         double scale = sqrt(last->spp / s->spp[i]);
         s->seconds[i] = ggn_seq_stat(last, "seconds") * s->spp[i] / last->spp;
         s->dammertz[i] = scale * ggn_seq_stat(last, "dammertz");
@@ -212,13 +212,13 @@ static int extrapolate(struct ggn_eval_set *s, const struct ggn_eval_block *bloc
     return rc;
 }
 
-static int fill_statistics(struct ggn_eval_set *s, const struct ggn_eval_block *block, struct ggn_err *err)
+static int fill_statistics(struct ggn_eval_set *s, const struct ggn_eval_block *block, struct base_err *err)
 {
     const struct ggn_dataset_view *v = &s->chains.data.views[block->view];
     struct ggn_seq_block p;
     size_t i = block->first;
     int rc = ggn_manifest_read_block(v->dir, &v->manifest, block->index, &p, err);
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
     for (const struct ggn_seq_record *r; i < block->end && (r = ggn_seq_level(&p, (uint32_t)s->spp[i])) != NULL; i++) {
         s->seconds[i] = ggn_seq_stat(r, "seconds");
@@ -234,21 +234,21 @@ static int fill_statistics(struct ggn_eval_set *s, const struct ggn_eval_block *
     return rc;
 }
 
-static int fill_block(void *data, int index, int worker, struct ggn_err *err)
+static int fill_block(void *data, int index, int worker, struct base_err *err)
 {
     struct fill *f = data;
     const struct ggn_eval_block *block = &f->set->blocks[index];
     (void)worker;
     int rc = fill_statistics(f->set, block, err);
-    return rc == GGN_OK && f->quality && f->set->chains.chains[block->chain].reference != NULL ? measure_quality(f->set, block, err) : rc;
+    return !rc && f->quality && f->set->chains.chains[block->chain].reference != NULL ? measure_quality(f->set, block, err) : rc;
 }
 
 /* Continues every labelled chain, also those that training has no use for: a method that does not stop in time must be seen to. */
-static int extend(struct ggn_chains *chains, uint32_t seed, struct ggn_err *err)
+static int extend(struct ggn_chains *chains, uint32_t seed, struct base_err *err)
 {
     struct ggn_label *labels = malloc((size_t)(chains->n > 0 ? chains->n : 1) * sizeof *labels);
     if (labels == NULL)
-        return ggn_fail_nomem(err, "evaluation");
+        return base_fail_nomem(err, "evaluation");
     for (int i = 0; i < chains->n; i++) {
         labels[i] = chains->chains[i].label;
         chains->chains[i].label = (struct ggn_label){labels[i].id, INFINITY, 0};
@@ -266,23 +266,23 @@ static int extend(struct ggn_chains *chains, uint32_t seed, struct ggn_err *err)
     return rc;
 }
 
-int ggn_eval_set_load(struct ggn_eval_set *out, const struct ggn_eval_options *o, struct ggn_threads *threads, int *skipped, struct ggn_err *err)
+int ggn_eval_set_load(struct ggn_eval_set *out, const struct ggn_eval_options *o, struct base_threads *threads, int *skipped, struct base_err *err)
 {
     struct ggn_eval_set s = {.window = o->window};
     struct ggn_chains_options co = {.dir = o->dir, .ratio = o->ratio, .with_test = 1};
     struct fill f = {&s, o->quality};
     int rc = ggn_chains_load(&s.chains, &co, err);
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
     if (!o->recorded)
         rc = extend(&s.chains, o->seed, err);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = list_blocks(&s, skipped, err);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = make_columns(&s, err);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = ggn_eval_each_block(&s, threads, fill_block, &f, err);
-    if (rc != GGN_OK)
+    if (rc)
         ggn_eval_set_release(&s);
     else
         *out = s;

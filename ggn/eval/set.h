@@ -6,7 +6,7 @@
 #define GGN_EVAL_SET_H
 
 #include "base/threads.h"
-#include "train/chains.h"
+#include "data/chains.h"
 
 struct ggn_eval_block {
     int chain;         /* index into chains.chains */
@@ -40,14 +40,14 @@ struct ggn_eval_options {
     uint32_t seed;    /* of the continuation */
 };
 
-/* Blocks without a label are left out; *skipped counts the views without any. GGN_EINVAL if nothing is left. Errors of the criteria at levels beyond
+/* Blocks without a label are left out; *skipped counts the views without any. BASE_EINVAL if nothing is left. Errors of the criteria at levels beyond
  * the recording are scaled from the last recorded one (by the square root of the samples). The same result for any number of threads. */
-int ggn_eval_set_load(struct ggn_eval_set *set, const struct ggn_eval_options *options, struct ggn_threads *threads, int *skipped,
-                      struct ggn_err *err);
+int ggn_eval_set_load(struct ggn_eval_set *set, const struct ggn_eval_options *options, struct base_threads *threads, int *skipped,
+                      struct base_err *err);
 void ggn_eval_set_release(struct ggn_eval_set *set);
 
 /* Calls fn for each block, in parallel; returns the first error (in order of blocks). */
-int ggn_eval_each_block(const struct ggn_eval_set *set, struct ggn_threads *threads,
-                        int (*fn)(void *data, int block, int worker, struct ggn_err *err), void *data, struct ggn_err *err);
+int ggn_eval_each_block(const struct ggn_eval_set *set, struct base_threads *threads,
+                        int (*fn)(void *data, int block, int worker, struct base_err *err), void *data, struct base_err *err);
 
 #endif

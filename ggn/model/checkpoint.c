@@ -8,12 +8,12 @@
 static const char *const net_name[GGN_NETS] = {"denoiser", "generator", "discriminator"};
 static const char *const array_name[] = {"params", "mean", "var", "m", "v"};
 
-static int same_networks(const struct ggn_hyper *a, const struct ggn_hyper *b, struct ggn_err *err)
+static int same_networks(const struct ggn_hyper *a, const struct ggn_hyper *b, struct base_err *err)
 {
     if (a->preset == b->preset && a->height == b->height && a->width == b->width && a->window == b->window &&
         a->k_r == b->k_r && a->k_m == b->k_m && a->k_d == b->k_d)
-        return GGN_OK;
-    return ggn_fail(err, GGN_EINVAL, "the networks differ in size or preset");
+        return 0;
+    return base_fail(err, BASE_EINVAL, "the networks differ in size or preset");
 }
 
 static void array_title(char name[GGN_CONTAINER_NAME], int net, int i)
@@ -21,7 +21,7 @@ static void array_title(char name[GGN_CONTAINER_NAME], int net, int i)
     snprintf(name, GGN_CONTAINER_NAME, "%s/%s", net_name[net], array_name[i]);
 }
 
-static int add_arrays(struct ggn_trainer_f32 *t, struct ggn_container *c, struct ggn_err *err)
+static int add_arrays(struct ggn_trainer_f32 *t, struct ggn_container *c, struct base_err *err)
 {
     char name[GGN_CONTAINER_NAME];
     size_t count;
@@ -35,7 +35,7 @@ static int add_arrays(struct ggn_trainer_f32 *t, struct ggn_container *c, struct
             if (rc)
                 return rc;
         }
-    return GGN_OK;
+    return 0;
 }
 
 static int add_item(cJSON *to, const char *name, cJSON *item)
@@ -62,30 +62,30 @@ static char *describe(const struct ggn_trainer_f32 *t, const cJSON *loop)
     return text;
 }
 
-int ggn_checkpoint_save(struct ggn_trainer_f32 *t, const cJSON *loop, const char *path, struct ggn_err *err)
+int ggn_checkpoint_save(struct ggn_trainer_f32 *t, const cJSON *loop, const char *path, struct base_err *err)
 {
     struct ggn_container c = {0};
     int rc = add_arrays(t, &c, err);
 
     if (!rc && !(c.json = describe(t, loop)))
-        rc = ggn_fail_nomem(err, "checkpoint");
+        rc = base_fail_nomem(err, "checkpoint");
     if (!rc)
         rc = ggn_container_write(&c, path, err);
     ggn_container_release(&c);
     return rc;
 }
 
-static int number_at(const cJSON *item, double *out, struct ggn_err *err)
+static int number_at(const cJSON *item, double *out, struct base_err *err)
 {
     if (!cJSON_IsNumber(item) || !(item->valuedouble >= 0 && item->valuedouble < 9e15))
-        return ggn_fail(err, GGN_EINVAL, "not a checkpoint of this program (counters)");
+        return base_fail(err, BASE_EINVAL, "not a checkpoint of this program (counters)");
     *out = item->valuedouble;
-    return GGN_OK;
+    return 0;
 }
 
 /* Counters and the check that the file belongs to these networks. */
 static int read_description(const struct ggn_trainer_f32 *t, const cJSON *root, double counter[1 + GGN_NETS],
-                            struct ggn_err *err)
+                            struct base_err *err)
 {
     const cJSON *kind = cJSON_GetObjectItemCaseSensitive(root, "kind"),
                 *hyper = cJSON_GetObjectItemCaseSensitive(root, "hyper");
@@ -93,7 +93,7 @@ static int read_description(const struct ggn_trainer_f32 *t, const cJSON *root, 
     int *const field[] = {&read.height, &read.width, &read.window, &read.k_r, &read.k_m, &read.k_d};
 
     if (!cJSON_IsString(kind) || strcmp(kind->valuestring, "checkpoint") != 0)
-        return ggn_fail(err, GGN_EINVAL, "not a training checkpoint");
+        return base_fail(err, BASE_EINVAL, "not a training checkpoint");
     for (int i = -1; i < 6; i++) {
         double value = 0;
         int rc = number_at(cJSON_GetArrayItem(hyper, i + 1), &value, err);
@@ -113,32 +113,32 @@ static int read_description(const struct ggn_trainer_f32 *t, const cJSON *root, 
 }
 
 /* Decodes into the trainer; `trial` only checks, into scratch memory. */
-static int read_arrays(struct ggn_trainer_f32 *t, const struct ggn_container *c, int trial, struct ggn_err *err)
+static int read_arrays(struct ggn_trainer_f32 *t, const struct ggn_container *c, int trial, struct base_err *err)
 {
     char name[GGN_CONTAINER_NAME];
     size_t count;
     float *array;
-    int rc = GGN_OK, entries = 0;
+    int rc = 0, entries = 0;
 
     for (int net = 0; net < GGN_NETS && !rc; net++)
         for (int i = 0; !rc && (array = ggn_trainer_state_f32(t, net, i, &count)); i++, entries++) {
             int dim = (int)count;
             float *scratch = trial ? malloc((count + 1) * sizeof *scratch) : NULL;
             array_title(name, net, i);
-            rc = trial && !scratch ? ggn_fail_nomem(err, "checkpoint")
+            rc = trial && !scratch ? base_fail_nomem(err, "checkpoint")
                                    : ggn_container_get(c, name, 1, &dim, trial ? scratch : array, err);
             free(scratch);
         }
     if (!rc && entries != c->n_entries)
-        rc = ggn_fail(err, GGN_EINVAL, "made by a run that trained other parts");
+        rc = base_fail(err, BASE_EINVAL, "made by a run that trained other parts");
     return rc;
 }
 
-static int load(struct ggn_trainer_f32 *t, cJSON **loop, const struct ggn_container *c, struct ggn_err *err)
+static int load(struct ggn_trainer_f32 *t, cJSON **loop, const struct ggn_container *c, struct base_err *err)
 {
     double counter[1 + GGN_NETS];
     cJSON *root = cJSON_Parse(c->json);
-    int rc = root ? read_description(t, root, counter, err) : ggn_fail(err, GGN_EINVAL, "the description is not JSON");
+    int rc = root ? read_description(t, root, counter, err) : base_fail(err, BASE_EINVAL, "the description is not JSON");
 
     if (!rc)
         rc = read_arrays(t, c, 1, err);
@@ -158,17 +158,17 @@ static int load(struct ggn_trainer_f32 *t, cJSON **loop, const struct ggn_contai
     return rc;
 }
 
-int ggn_checkpoint_load(struct ggn_trainer_f32 *t, cJSON **loop, const char *path, struct ggn_err *err)
+int ggn_checkpoint_load(struct ggn_trainer_f32 *t, cJSON **loop, const char *path, struct base_err *err)
 {
     struct ggn_container c;
-    struct ggn_err inner = {0};
+    struct base_err inner = {0};
     int rc = ggn_container_read(&c, path, err);
 
     if (rc)
         return rc;
     rc = load(t, loop, &c, &inner);
     ggn_container_release(&c);
-    return rc ? ggn_fail(err, rc, "%s: %s", path, inner.text) : GGN_OK;
+    return rc ? base_fail(err, rc, "%s: %s", path, inner.text) : 0;
 }
 
 static void copy_weights(struct ggn_weights_f32 *to, const struct ggn_weights_f32 *from)
@@ -184,7 +184,7 @@ static int in_parts(int net, int parts)
     return (parts & (net == GGN_NET_R ? GGN_TRAIN_R : GGN_TRAIN_MD)) != 0;
 }
 
-int ggn_model_from_trainer(struct ggn_model *model, const struct ggn_trainer_f32 *t, int parts, struct ggn_err *err)
+int ggn_model_from_trainer(struct ggn_model *model, const struct ggn_trainer_f32 *t, int parts, struct base_err *err)
 {
     int rc = same_networks(&model->hyper, &t->hyper, err);
 
@@ -194,7 +194,7 @@ int ggn_model_from_trainer(struct ggn_model *model, const struct ggn_trainer_f32
     return rc;
 }
 
-int ggn_trainer_from_model(struct ggn_trainer_f32 *t, const struct ggn_model *model, int parts, struct ggn_err *err)
+int ggn_trainer_from_model(struct ggn_trainer_f32 *t, const struct ggn_model *model, int parts, struct base_err *err)
 {
     int rc = same_networks(&model->hyper, &t->hyper, err);
 

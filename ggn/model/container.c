@@ -6,8 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/fio.h"
-#include "nn/half.h"
+#include "base/files.h"
+#include "base/half.h"
 
 static const char MAGIC[8] = {'L', 'U', 'L', 'L', 'G', 'G', 'N', '\n'};
 
@@ -83,12 +83,12 @@ void ggn_container_release(struct ggn_container *c)
 }
 
 int ggn_container_add(struct ggn_container *c, const char *name, enum ggn_type type, int rank, const int *dim,
-                      const float *values, struct ggn_err *err)
+                      const float *values, struct base_err *err)
 {
     struct ggn_entry *grown = realloc(c->entry, ((size_t)c->n_entries + 1) * sizeof *grown);
 
     if (!grown)
-        return ggn_fail_nomem(err, "tensor table");
+        return base_fail_nomem(err, "tensor table");
     c->entry = grown;
     struct ggn_entry *e = &grown[c->n_entries++];
     *e = (struct ggn_entry){.type = type, .rank = rank, .count = 1, .write = values};
@@ -97,7 +97,7 @@ int ggn_container_add(struct ggn_container *c, const char *name, enum ggn_type t
         e->dim[i] = i < rank ? (uint32_t)dim[i] : 1;
         e->count *= e->dim[i];
     }
-    return GGN_OK;
+    return 0;
 }
 
 static void encode(unsigned char *p, const struct ggn_entry *e)
@@ -106,7 +106,7 @@ static void encode(unsigned char *p, const struct ggn_entry *e)
         if (e->type == GGN_F32) {
             put_float(p + 4 * i, e->write[i]);
         } else {
-            uint16_t v = e->type == GGN_F16 ? ggn_f32_to_f16(e->write[i]) : ggn_f32_to_bf16(e->write[i]);
+            uint16_t v = e->type == GGN_F16 ? base_f32_to_f16(e->write[i]) : base_f32_to_bf16(e->write[i]);
             p[2 * i] = (unsigned char)v;
             p[2 * i + 1] = (unsigned char)(v >> 8);
         }
@@ -158,21 +158,21 @@ static unsigned char *assemble(struct ggn_container *c, size_t *size)
 }
 
 /* Whether every finite value stays finite in the type that it is stored in. */
-static int fits(const struct ggn_container *c, struct ggn_err *err)
+static int fits(const struct ggn_container *c, struct base_err *err)
 {
     static const float most[GGN_TYPES] = {FLT_MAX, 65504.0f, 3.3895314e38f};
 
     for (int i = 0; i < c->n_entries; i++)
         for (size_t k = 0; k < c->entry[i].count; k++)
             if (fabsf(c->entry[i].write[k]) > most[c->entry[i].type] && isfinite(c->entry[i].write[k]))
-                return ggn_fail(err, GGN_EINVAL, "tensor '%s' has a value of %g, too large for %s", c->entry[i].name,
+                return base_fail(err, BASE_EINVAL, "tensor '%s' has a value of %g, too large for %s", c->entry[i].name,
                                 (double)c->entry[i].write[k], type_name[c->entry[i].type]);
-    return GGN_OK;
+    return 0;
 }
 
-int ggn_container_write(struct ggn_container *c, const char *path, struct ggn_err *err)
+int ggn_container_write(struct ggn_container *c, const char *path, struct base_err *err)
 {
-    struct ggn_fio_out out = {0};
+    struct base_file_out out = {0};
     size_t size;
     int rc = fits(c, err);
     if (rc)
@@ -180,40 +180,40 @@ int ggn_container_write(struct ggn_container *c, const char *path, struct ggn_er
     unsigned char *file = assemble(c, &size);
 
     if (!file)
-        return ggn_fail_nomem(err, "model file");
-    rc = ggn_fio_begin(&out, path, err);
+        return base_fail_nomem(err, "model file");
+    rc = base_file_begin(&out, path, err);
     if (!rc && fwrite(file, 1, size, out.file) != size)
-        rc = ggn_fail(err, GGN_EIO, "%s: cannot write", path);
+        rc = base_fail(err, BASE_EIO, "%s: cannot write", path);
     if (!rc)
-        rc = ggn_fio_commit(&out, err);
-    ggn_fio_abort(&out);
+        rc = base_file_commit(&out, err);
+    base_file_abort(&out);
     free(file);
     return rc;
 }
 
 /* --- reading ----------------------------------------------------------------------------------------------------------- */
 
-static int check_header(const unsigned char *p, size_t size, const char *name, struct ggn_err *err)
+static int check_header(const unsigned char *p, size_t size, const char *name, struct base_err *err)
 {
     if (size < HEADER || memcmp(p, MAGIC, sizeof MAGIC) != 0)
-        return ggn_fail(err, GGN_EINVAL, "%s: not a .ggn file", name);
+        return base_fail(err, BASE_EINVAL, "%s: not a .ggn file", name);
     if (get32(p + 8) != GGN_CONTAINER_VERSION)
-        return ggn_fail(err, GGN_EINVAL, "%s: .ggn version %u; this program reads version %d", name, get32(p + 8),
+        return base_fail(err, BASE_EINVAL, "%s: .ggn version %u; this program reads version %d", name, get32(p + 8),
                         GGN_CONTAINER_VERSION);
     if (get64(p + 16) != size)
-        return ggn_fail(err, GGN_EINVAL, "%s: %s: the header says %llu bytes, the file has %zu", name,
+        return base_fail(err, BASE_EINVAL, "%s: %s: the header says %llu bytes, the file has %zu", name,
                         get64(p + 16) > size ? "truncated" : "too long", (unsigned long long)get64(p + 16), size);
     if (get64(p + AT_CHECKSUM) != checksum(p, size))
-        return ggn_fail(err, GGN_EINVAL, "%s: damaged (checksum does not match)", name);
+        return base_fail(err, BASE_EINVAL, "%s: damaged (checksum does not match)", name);
     uint64_t json_at = get64(p + 24), json_size = get64(p + 32), table = get64(p + 40), entries = get32(p + 12);
     if (json_at > size || json_size > size - json_at || json_size > MAX_JSON)
-        return ggn_fail(err, GGN_EINVAL, "%s: the description lies outside of the file", name);
+        return base_fail(err, BASE_EINVAL, "%s: the description lies outside of the file", name);
     if (entries > GGN_CONTAINER_TENSORS || table > size || entries * ENTRY > size - table)
-        return ggn_fail(err, GGN_EINVAL, "%s: the tensor table lies outside of the file", name);
-    return GGN_OK;
+        return base_fail(err, BASE_EINVAL, "%s: the tensor table lies outside of the file", name);
+    return 0;
 }
 
-static int read_entry(struct ggn_entry *e, const unsigned char *p, size_t size, const char *name, struct ggn_err *err)
+static int read_entry(struct ggn_entry *e, const unsigned char *p, size_t size, const char *name, struct base_err *err)
 {
     uint32_t type = get32(p + 48), rank = get32(p + 52);
     uint64_t count = 1;
@@ -224,11 +224,11 @@ static int read_entry(struct ggn_entry *e, const unsigned char *p, size_t size, 
         if ((unsigned char)*s < 0x20 || (unsigned char)*s > 0x7e)
             *s = '?';
     if (type >= GGN_TYPES || rank < 1 || rank > 4)
-        return ggn_fail(err, GGN_EINVAL, "%s: tensor '%s' has an unknown type or rank", name, e->name);
+        return base_fail(err, BASE_EINVAL, "%s: tensor '%s' has an unknown type or rank", name, e->name);
     for (int d = 0; d < 4; d++) {
         e->dim[d] = get32(p + 56 + 4 * d);
         if (e->dim[d] < 1 || (d >= (int)rank && e->dim[d] != 1) || count > MAX_FILE / e->dim[d])
-            return ggn_fail(err, GGN_EINVAL, "%s: tensor '%s' has an impossible shape", name, e->name);
+            return base_fail(err, BASE_EINVAL, "%s: tensor '%s' has an impossible shape", name, e->name);
         count *= e->dim[d];
     }
     e->type = (enum ggn_type)type;
@@ -237,12 +237,12 @@ static int read_entry(struct ggn_entry *e, const unsigned char *p, size_t size, 
     e->offset = get64(p + 72);
     e->size = get64(p + 80);
     if (e->size != count * type_size[type] || e->offset % ALIGN || e->offset > size || e->size > size - e->offset)
-        return ggn_fail(err, GGN_EINVAL, "%s: tensor '%s' lies outside of the file", name, e->name);
-    return GGN_OK;
+        return base_fail(err, BASE_EINVAL, "%s: tensor '%s' lies outside of the file", name, e->name);
+    return 0;
 }
 
 /* Takes over c->data, c->size. */
-static int parse_owned(struct ggn_container *c, const char *name, struct ggn_err *err)
+static int parse_owned(struct ggn_container *c, const char *name, struct base_err *err)
 {
     const unsigned char *p = (const unsigned char *)c->data;
     int rc = check_header(p, c->size, name, err);
@@ -254,7 +254,7 @@ static int parse_owned(struct ggn_container *c, const char *name, struct ggn_err
     c->entry = calloc((size_t)c->n_entries + 1, sizeof *c->entry);
     c->json = malloc(json_size + 1);
     if (!c->entry || !c->json)
-        return ggn_fail_nomem(err, "model file");
+        return base_fail_nomem(err, "model file");
     memcpy(c->json, p + get64(p + 24), json_size);
     c->json[json_size] = 0;
     for (int i = 0; i < c->n_entries && !rc; i++)
@@ -262,12 +262,12 @@ static int parse_owned(struct ggn_container *c, const char *name, struct ggn_err
     return rc;
 }
 
-int ggn_container_parse(struct ggn_container *c, const char *name, const void *data, size_t size, struct ggn_err *err)
+int ggn_container_parse(struct ggn_container *c, const char *name, const void *data, size_t size, struct base_err *err)
 {
     memset(c, 0, sizeof *c);
     c->data = malloc(size + 1);
     if (!c->data)
-        return ggn_fail_nomem(err, "model file");
+        return base_fail_nomem(err, "model file");
     memcpy(c->data, data, size);
     c->size = size;
     int rc = parse_owned(c, name, err);
@@ -276,10 +276,10 @@ int ggn_container_parse(struct ggn_container *c, const char *name, const void *d
     return rc;
 }
 
-int ggn_container_read(struct ggn_container *c, const char *path, struct ggn_err *err)
+int ggn_container_read(struct ggn_container *c, const char *path, struct base_err *err)
 {
     memset(c, 0, sizeof *c);
-    int rc = ggn_fio_read(path, (size_t)MAX_FILE, &c->data, &c->size, err);
+    int rc = base_file_read(path, (size_t)MAX_FILE, &c->data, &c->size, err);
     if (!rc)
         rc = parse_owned(c, path, err);
     if (rc)
@@ -288,7 +288,7 @@ int ggn_container_read(struct ggn_container *c, const char *path, struct ggn_err
 }
 
 int ggn_container_get(const struct ggn_container *c, const char *name, int rank, const int *dim, float *out,
-                      struct ggn_err *err)
+                      struct base_err *err)
 {
     const struct ggn_entry *e = NULL;
 
@@ -296,18 +296,18 @@ int ggn_container_get(const struct ggn_container *c, const char *name, int rank,
         if (!strcmp(c->entry[i].name, name))
             e = &c->entry[i];
     if (!e)
-        return ggn_fail(err, GGN_EINVAL, "tensor '%s' is missing", name);
+        return base_fail(err, BASE_EINVAL, "tensor '%s' is missing", name);
     for (int d = 0; d < 4; d++)
         if (e->rank != rank || e->dim[d] != (d < rank ? (uint32_t)dim[d] : 1))
-            return ggn_fail(err, GGN_EINVAL, "tensor '%s' does not have the shape that the network asks for", name);
+            return base_fail(err, BASE_EINVAL, "tensor '%s' does not have the shape that the network asks for", name);
     const unsigned char *p = (const unsigned char *)c->data + e->offset;
     for (size_t i = 0; i < e->count; i++) {
         uint16_t half = (uint16_t)(p[i * type_size[e->type]] | p[i * type_size[e->type] + 1] << 8);
         out[i] = e->type == GGN_F32   ? get_float(p + 4 * i)
-                 : e->type == GGN_F16 ? ggn_f16_to_f32(half)
-                                      : ggn_bf16_to_f32(half);
+                 : e->type == GGN_F16 ? base_f16_to_f32(half)
+                                      : base_bf16_to_f32(half);
         if (!isfinite(out[i]))
-            return ggn_fail(err, GGN_EINVAL, "tensor '%s' holds a value that is not finite", name);
+            return base_fail(err, BASE_EINVAL, "tensor '%s' holds a value that is not finite", name);
     }
-    return GGN_OK;
+    return 0;
 }

@@ -51,16 +51,16 @@ void ggn_container_release(struct ggn_container *c);
 
 /* Appends a tensor to be written. */
 int ggn_container_add(struct ggn_container *c, const char *name, enum ggn_type type, int rank, const int *dim,
-                      const float *values, struct ggn_err *err);
+                      const float *values, struct base_err *err);
 /* Writes entries and json atomically. */
-int ggn_container_write(struct ggn_container *c, const char *path, struct ggn_err *err);
+int ggn_container_write(struct ggn_container *c, const char *path, struct base_err *err);
 
 /* Reads and checks a file. On failure *c is empty and err names the file. */
-int ggn_container_read(struct ggn_container *c, const char *path, struct ggn_err *err);
+int ggn_container_read(struct ggn_container *c, const char *path, struct base_err *err);
 /* The same from memory (copied). `name` is for messages. */
-int ggn_container_parse(struct ggn_container *c, const char *name, const void *data, size_t size, struct ggn_err *err);
-/* Decodes the named tensor of exactly this shape into out; GGN_EINVAL when it is missing, shaped otherwise or not finite. */
+int ggn_container_parse(struct ggn_container *c, const char *name, const void *data, size_t size, struct base_err *err);
+/* Decodes the named tensor of exactly this shape into out; BASE_EINVAL when it is missing, shaped otherwise or not finite. */
 int ggn_container_get(const struct ggn_container *c, const char *name, int rank, const int *dim, float *out,
-                      struct ggn_err *err);
+                      struct base_err *err);
 
 #endif

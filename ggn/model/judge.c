@@ -32,13 +32,13 @@ size_t ggn_judge_bytes(const struct ggn_model *model, enum ggn_precision precisi
     return bytes;
 }
 
-struct ggn_judge *ggn_judge_create(const struct ggn_model *model, enum ggn_precision precision, struct ggn_threads *threads,
-                                   struct ggn_err *err)
+struct ggn_judge *ggn_judge_create(const struct ggn_model *model, enum ggn_precision precision, struct base_threads *threads,
+                                   struct base_err *err)
 {
     struct ggn_judge *j = calloc(1, sizeof *j);
 
     if (!j) {
-        ggn_fail_nomem(err, "judge");
+        base_fail_nomem(err, "judge");
         return NULL;
     }
     j->model = model;

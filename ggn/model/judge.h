@@ -23,8 +23,8 @@ struct ggn_judge;
 
 size_t ggn_judge_bytes(const struct ggn_model *model, enum ggn_precision precision, int threads);
 /* `threads` may be NULL: the calling thread alone. NULL on failure. */
-struct ggn_judge *ggn_judge_create(const struct ggn_model *model, enum ggn_precision precision, struct ggn_threads *threads,
-                                   struct ggn_err *err);
+struct ggn_judge *ggn_judge_create(const struct ggn_model *model, enum ggn_precision precision, struct base_threads *threads,
+                                   struct base_err *err);
 void ggn_judge_destroy(struct ggn_judge *judge);
 
 /* noisy [3][height][width] display codes → denoised, 16-bit fixed point. */

@@ -8,22 +8,22 @@
 
 #include "model/model_json.h"
 
-struct ggn_model *ggn_model_create(const struct ggn_hyper *hyper, struct ggn_err *err)
+struct ggn_model *ggn_model_create(const struct ggn_hyper *hyper, struct base_err *err)
 {
     struct ggn_model *m = calloc(1, sizeof *m);
 
     if (!m) {
-        ggn_fail_nomem(err, "model");
+        base_fail_nomem(err, "model");
         return NULL;
     }
     m->hyper = *hyper;
     m->calibration = (struct ggn_calibration){.scale = 1, .threshold = 0.5, .consecutive = 2, .spacing = 1.2};
     m->provenance = cJSON_CreateObject();
-    int rc = m->provenance ? GGN_OK : ggn_fail_nomem(err, "model");
+    int rc = m->provenance ? 0 : base_fail_nomem(err, "model");
     for (int net = 0; net < GGN_NETS && !rc; net++) {
         rc = ggn_network_build(&m->graph[net], net, hyper, err);
         if (!rc && !(m->weights[net] = ggn_weights_create_f32(&m->graph[net], NULL, GGN_WEIGHTS_BF16, err)))
-            rc = GGN_ENOMEM;
+            rc = BASE_ENOMEM;
     }
     if (!rc)
         return m;
@@ -49,14 +49,14 @@ struct visit {
 };
 
 static int visit(const struct visit *v, const char *name, int is_weight, int rank, const int *dim, float *values,
-                 struct ggn_err *err)
+                 struct base_err *err)
 {
     if (v->from)
         return ggn_container_get(v->from, name, rank, dim, values, err);
     return ggn_container_add(v->to, name, is_weight ? v->type : GGN_F32, rank, dim, values, err);
 }
 
-static int visit_all(const struct visit *v, const struct ggn_model *m, int *count, struct ggn_err *err)
+static int visit_all(const struct visit *v, const struct ggn_model *m, int *count, struct base_err *err)
 {
     char name[GGN_CONTAINER_NAME];
 
@@ -78,38 +78,38 @@ static int visit_all(const struct visit *v, const struct ggn_model *m, int *coun
                 return rc;
         }
     }
-    return GGN_OK;
+    return 0;
 }
 
-static int check_statistics(const struct ggn_model *m, struct ggn_err *err)
+static int check_statistics(const struct ggn_model *m, struct base_err *err)
 {
     for (int net = 0; net < GGN_NETS; net++)
         for (size_t i = 0; i < m->graph[net].n_stats; i++)
             if (m->weights[net]->var[i] < 0)
-                return ggn_fail(err, GGN_EINVAL, "a running variance of the %s is negative", m->graph[net].name);
-    return GGN_OK;
+                return base_fail(err, BASE_EINVAL, "a running variance of the %s is negative", m->graph[net].name);
+    return 0;
 }
 
 /* The parameters must fit into the file before memory is asked for them. */
-static int check_size(const struct ggn_hyper *hyper, const struct ggn_container *c, struct ggn_err *err)
+static int check_size(const struct ggn_hyper *hyper, const struct ggn_container *c, struct base_err *err)
 {
     struct ggn_graph *g = malloc(sizeof *g);
     size_t params = 0;
 
     if (!g)
-        return ggn_fail_nomem(err, "model");
-    int rc = GGN_OK;
+        return base_fail_nomem(err, "model");
+    int rc = 0;
     for (int net = 0; net < GGN_NETS && !rc; net++) {
         rc = ggn_network_build(g, net, hyper, err);
         params += g->n_params;
     }
     free(g);
     if (!rc && params * 2 > c->size)
-        rc = ggn_fail(err, GGN_EINVAL, "the file is too small for networks of this size");
+        rc = base_fail(err, BASE_EINVAL, "the file is too small for networks of this size");
     return rc;
 }
 
-static int from_container(const struct ggn_container *c, struct ggn_model **model, struct ggn_err *err)
+static int from_container(const struct ggn_container *c, struct ggn_model **model, struct base_err *err)
 {
     struct ggn_model_description d = {0};
     struct ggn_model *m = NULL;
@@ -121,11 +121,11 @@ static int from_container(const struct ggn_container *c, struct ggn_model **mode
     if (!rc)
         rc = check_size(&d.hyper, c, err);
     if (!rc && !(m = ggn_model_create(&d.hyper, err)))
-        rc = GGN_ENOMEM;
+        rc = BASE_ENOMEM;
     if (!rc)
         rc = visit_all(&(struct visit){.from = c}, m, &count, err);
     if (!rc && count != c->n_entries)
-        rc = ggn_fail(err, GGN_EINVAL, "%d tensors where the networks have %d", c->n_entries, count);
+        rc = base_fail(err, BASE_EINVAL, "%d tensors where the networks have %d", c->n_entries, count);
     if (!rc)
         rc = check_statistics(m, err);
     if (rc) {
@@ -139,33 +139,33 @@ static int from_container(const struct ggn_container *c, struct ggn_model **mode
     for (int net = 0; net < GGN_NETS; net++)
         ggn_weights_pack_f32(m->weights[net]);
     *model = m;
-    return GGN_OK;
+    return 0;
 }
 
-static int finish_load(struct ggn_container *c, const char *name, struct ggn_model **model, struct ggn_err *err)
+static int finish_load(struct ggn_container *c, const char *name, struct ggn_model **model, struct base_err *err)
 {
-    struct ggn_err inner = {0};
+    struct base_err inner = {0};
     int rc = from_container(c, model, &inner);
 
     ggn_container_release(c);
-    return rc ? ggn_fail(err, rc, "%s: %s", name, inner.text) : GGN_OK;
+    return rc ? base_fail(err, rc, "%s: %s", name, inner.text) : 0;
 }
 
-int ggn_model_load(const char *path, struct ggn_model **model, struct ggn_err *err)
+int ggn_model_load(const char *path, struct ggn_model **model, struct base_err *err)
 {
     struct ggn_container c;
     int rc = ggn_container_read(&c, path, err);
     return rc ? rc : finish_load(&c, path, model, err);
 }
 
-int ggn_model_load_memory(const char *name, const void *data, size_t size, struct ggn_model **model, struct ggn_err *err)
+int ggn_model_load_memory(const char *name, const void *data, size_t size, struct ggn_model **model, struct base_err *err)
 {
     struct ggn_container c;
     int rc = ggn_container_parse(&c, name, data, size, err);
     return rc ? rc : finish_load(&c, name, model, err);
 }
 
-int ggn_model_save(const struct ggn_model *m, const char *path, enum ggn_type type, struct ggn_err *err)
+int ggn_model_save(const struct ggn_model *m, const char *path, enum ggn_type type, struct base_err *err)
 {
     struct ggn_container c = {0};
     int count = 0;
@@ -174,7 +174,7 @@ int ggn_model_save(const struct ggn_model *m, const char *path, enum ggn_type ty
     if (!rc)
         c.json = ggn_model_json_print(m);
     if (!rc && !c.json)
-        rc = ggn_fail_nomem(err, "model file");
+        rc = base_fail_nomem(err, "model file");
     if (!rc)
         rc = ggn_container_write(&c, path, err);
     ggn_container_release(&c);

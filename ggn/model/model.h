@@ -33,13 +33,13 @@ struct ggn_model {
 };
 
 /* A model with zero weights. NULL on failure. */
-struct ggn_model *ggn_model_create(const struct ggn_hyper *hyper, struct ggn_err *err);
+struct ggn_model *ggn_model_create(const struct ggn_hyper *hyper, struct base_err *err);
 void ggn_model_destroy(struct ggn_model *model);
 
-/* GGN_EINVAL with one line that names the file for anything that is not a model this program can run. */
-int ggn_model_load(const char *path, struct ggn_model **model, struct ggn_err *err);
-int ggn_model_load_memory(const char *name, const void *data, size_t size, struct ggn_model **model, struct ggn_err *err);
+/* BASE_EINVAL with one line that names the file for anything that is not a model this program can run. */
+int ggn_model_load(const char *path, struct ggn_model **model, struct base_err *err);
+int ggn_model_load_memory(const char *name, const void *data, size_t size, struct ggn_model **model, struct base_err *err);
 /* Atomic. `type` is that of the convolution and linear weights; biases, batch norm and statistics are always f32. */
-int ggn_model_save(const struct ggn_model *model, const char *path, enum ggn_type type, struct ggn_err *err);
+int ggn_model_save(const struct ggn_model *model, const char *path, enum ggn_type type, struct base_err *err);
 
 #endif

@@ -28,47 +28,47 @@ enum {
     N_CALIBRATION = sizeof calibration_field / sizeof calibration_field[0]
 };
 
-static int get_number(const cJSON *object, const char *name, double min, double max, double *out, struct ggn_err *err)
+static int get_number(const cJSON *object, const char *name, double min, double max, double *out, struct base_err *err)
 {
     const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, name);
 
     if (!cJSON_IsNumber(item) || !(item->valuedouble >= min && item->valuedouble <= max))
-        return ggn_fail(err, GGN_EINVAL, "'%s' is missing or not a number in %g..%g", name, min, max);
+        return base_fail(err, BASE_EINVAL, "'%s' is missing or not a number in %g..%g", name, min, max);
     *out = item->valuedouble;
-    return GGN_OK;
+    return 0;
 }
 
-static int get_int(const cJSON *object, const char *name, int min, int max, int *out, struct ggn_err *err)
+static int get_int(const cJSON *object, const char *name, int min, int max, int *out, struct base_err *err)
 {
     double value = 0;
     int rc = get_number(object, name, min, max, &value, err);
 
     if (!rc && value != (double)(int)value)
-        rc = ggn_fail(err, GGN_EINVAL, "'%s' is not a whole number", name);
+        rc = base_fail(err, BASE_EINVAL, "'%s' is not a whole number", name);
     if (!rc)
         *out = (int)value;
     return rc;
 }
 
-static int get_preset(const cJSON *root, enum ggn_preset *out, struct ggn_err *err)
+static int get_preset(const cJSON *root, enum ggn_preset *out, struct base_err *err)
 {
     const cJSON *item = cJSON_GetObjectItemCaseSensitive(root, "preset");
 
     for (int i = 0; cJSON_IsString(item) && i < 2; i++)
         if (!strcmp(item->valuestring, preset_name[i])) {
             *out = (enum ggn_preset)i;
-            return GGN_OK;
+            return 0;
         }
-    return ggn_fail(err, GGN_EINVAL, "'preset' is neither \"paper\" nor \"lull\"");
+    return base_fail(err, BASE_EINVAL, "'preset' is neither \"paper\" nor \"lull\"");
 }
 
-static int parse_root(const cJSON *root, struct ggn_model_description *d, struct ggn_err *err)
+static int parse_root(const cJSON *root, struct ggn_model_description *d, struct base_err *err)
 {
     const cJSON *kind = cJSON_GetObjectItemCaseSensitive(root, "kind");
     const cJSON *calibration = cJSON_GetObjectItemCaseSensitive(root, "calibration");
 
     if (!cJSON_IsString(kind) || strcmp(kind->valuestring, "model") != 0)
-        return ggn_fail(err, GGN_EINVAL, "not a model (its description has no \"kind\": \"model\")");
+        return base_fail(err, BASE_EINVAL, "not a model (its description has no \"kind\": \"model\")");
     int rc = get_preset(root, &d->hyper.preset, err);
     for (size_t i = 0; i < N_HYPER && !rc; i++)
         rc = get_int(root, hyper_field[i].name, 1, 1 << 20, (int *)(void *)((char *)&d->hyper + hyper_field[i].at), err);
@@ -80,19 +80,19 @@ static int parse_root(const cJSON *root, struct ggn_model_description *d, struct
     return rc;
 }
 
-int ggn_model_json_parse(const char *json, struct ggn_model_description *out, struct ggn_err *err)
+int ggn_model_json_parse(const char *json, struct ggn_model_description *out, struct base_err *err)
 {
     cJSON *root = cJSON_Parse(json);
     struct ggn_model_description d = {0};
 
     if (!root)
-        return ggn_fail(err, GGN_EINVAL, "the description is not JSON");
+        return base_fail(err, BASE_EINVAL, "the description is not JSON");
     int rc = parse_root(root, &d, err);
     if (!rc) {
         cJSON *provenance = cJSON_DetachItemFromObjectCaseSensitive(root, "provenance");
         if (provenance && !cJSON_IsObject(provenance)) {
             cJSON_Delete(provenance);
-            rc = ggn_fail(err, GGN_EINVAL, "'provenance' is not an object");
+            rc = base_fail(err, BASE_EINVAL, "'provenance' is not an object");
         } else {
             d.provenance = provenance ? provenance : cJSON_CreateObject();
             *out = d;

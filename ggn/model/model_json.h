@@ -10,7 +10,7 @@ struct ggn_model_description {
     struct cJSON *provenance; /* caller owns */
 };
 
-int ggn_model_json_parse(const char *json, struct ggn_model_description *out, struct ggn_err *err);
+int ggn_model_json_parse(const char *json, struct ggn_model_description *out, struct base_err *err);
 /* malloc'ed text, NULL without memory. */
 char *ggn_model_json_print(const struct ggn_model *model);
 

@@ -7,7 +7,7 @@ struct ggn_hyper ggn_hyper_default(enum ggn_preset preset)
     return (struct ggn_hyper){.preset = preset, .height = 200, .width = 200, .window = 6, .k_r = 16, .k_m = 20, .k_d = 64};
 }
 
-int ggn_hyper_check(const struct ggn_hyper *p, struct ggn_err *err)
+int ggn_hyper_check(const struct ggn_hyper *p, struct base_err *err)
 {
     const struct {
         const char *name;
@@ -22,9 +22,9 @@ int ggn_hyper_check(const struct ggn_hyper *p, struct ggn_err *err)
 
     for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++)
         if (fields[i].value < fields[i].min || fields[i].value > fields[i].max)
-            return ggn_fail(err, GGN_EINVAL, "hyper-parameter %s = %d is not in %d..%d", fields[i].name, fields[i].value,
+            return base_fail(err, BASE_EINVAL, "hyper-parameter %s = %d is not in %d..%d", fields[i].name, fields[i].value,
                             fields[i].min, fields[i].max);
-    return GGN_OK;
+    return 0;
 }
 
 static const char *const enc_name[5] = {"enc0", "enc1", "enc2", "enc3", "enc4"};
@@ -144,7 +144,7 @@ static void build_discriminator(struct ggn_graph *g, const struct ggn_hyper *p)
     }
 }
 
-int ggn_network_build(struct ggn_graph *graph, int net, const struct ggn_hyper *hyper, struct ggn_err *err)
+int ggn_network_build(struct ggn_graph *graph, int net, const struct ggn_hyper *hyper, struct base_err *err)
 {
     static void (*const build[GGN_NETS])(struct ggn_graph *, const struct ggn_hyper *) = {build_denoiser, build_generator,
                                                                                           build_discriminator};

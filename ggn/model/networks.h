@@ -25,10 +25,10 @@ struct ggn_hyper {
 
 /* The paper's sizes: 200×200, S = 6, K = 16, 20, 64. */
 struct ggn_hyper ggn_hyper_default(enum ggn_preset preset);
-/* GGN_EINVAL naming the field that is out of range. */
-int ggn_hyper_check(const struct ggn_hyper *hyper, struct ggn_err *err);
+/* BASE_EINVAL naming the field that is out of range. */
+int ggn_hyper_check(const struct ggn_hyper *hyper, struct base_err *err);
 
 /* R: 3×H×W → 3×H×W (sigmoid). M: 3S×H×W → 1×H×W (sigmoid). D: 2×H×W → logit (flat, 1). */
-int ggn_network_build(struct ggn_graph *graph, int net, const struct ggn_hyper *hyper, struct ggn_err *err);
+int ggn_network_build(struct ggn_graph *graph, int net, const struct ggn_hyper *hyper, struct base_err *err);
 
 #endif

@@ -38,19 +38,19 @@ struct ggn_policy ggn_policy_default(void)
     return (struct ggn_policy){.first_spp = 20, .ratio = 1.15, .scale = 1, .threshold = 0.5, .passes = 2};
 }
 
-int ggn_policy_check(const struct ggn_policy *p, struct ggn_err *err)
+int ggn_policy_check(const struct ggn_policy *p, struct base_err *err)
 {
     for (int i = 0; i < N_FIELDS; i++) {
         double v = get(p, i);
         if (!(v >= fields[i].min && v <= fields[i].max))
-            return ggn_fail(err, GGN_EINVAL, "policy: %s = %g is not in %g..%g", fields[i].name, v, fields[i].min,
+            return base_fail(err, BASE_EINVAL, "policy: %s = %g is not in %g..%g", fields[i].name, v, fields[i].min,
                             fields[i].max);
     }
     if (p->passes < 1 || p->passes > PASSES_MAX)
-        return ggn_fail(err, GGN_EINVAL, "policy: passes = %d is not in 1..%d", p->passes, PASSES_MAX);
+        return base_fail(err, BASE_EINVAL, "policy: passes = %d is not in 1..%d", p->passes, PASSES_MAX);
     if (p->ratio <= 1.001 && p->step_spp < 1)
-        return ggn_fail(err, GGN_EINVAL, "policy: neither a ratio above 1 nor a step says how levels are spaced");
-    return GGN_OK;
+        return base_fail(err, BASE_EINVAL, "policy: neither a ratio above 1 nor a step says how levels are spaced");
+    return 0;
 }
 
 /* Noise of the noisiest thousandth of the pixels, in mean luminances, below which nothing sparkles. */
@@ -83,7 +83,7 @@ double ggn_policy_predict(const struct ggn_policy *policy, double p, double thre
     return above > 0 ? spp * exp2(fmin(above / policy->slope, 20)) : spp;
 }
 
-int ggn_policy_set(struct ggn_model *model, const struct ggn_policy *policy, struct ggn_err *err)
+int ggn_policy_set(struct ggn_model *model, const struct ggn_policy *policy, struct base_err *err)
 {
     cJSON *object = cJSON_CreateObject();
     int rc = ggn_policy_check(policy, err), ok = object != NULL;
@@ -92,7 +92,7 @@ int ggn_policy_set(struct ggn_model *model, const struct ggn_policy *policy, str
         if (fields[i].own)
             ok = ok && cJSON_AddNumberToObject(object, fields[i].name, get(policy, i));
     if (!rc && !ok)
-        rc = ggn_fail_nomem(err, "model policy");
+        rc = base_fail_nomem(err, "model policy");
     if (rc) {
         cJSON_Delete(object);
         return rc;
@@ -106,10 +106,10 @@ int ggn_policy_set(struct ggn_model *model, const struct ggn_policy *policy, str
         .consecutive = policy->passes,
         .spacing = policy->ratio > 1 ? policy->ratio : 1,
     };
-    return GGN_OK;
+    return 0;
 }
 
-int ggn_policy_of(const struct ggn_model *model, struct ggn_policy *policy, struct ggn_err *err)
+int ggn_policy_of(const struct ggn_model *model, struct ggn_policy *policy, struct base_err *err)
 {
     struct ggn_policy p = ggn_policy_default();
     const struct ggn_calibration *c = &model->calibration;
@@ -123,7 +123,7 @@ int ggn_policy_of(const struct ggn_model *model, struct ggn_policy *policy, stru
     for (int i = 0; i < N_FIELDS; i++) {
         const cJSON *item = fields[i].own ? cJSON_GetObjectItemCaseSensitive(object, fields[i].name) : NULL;
         if (item && !cJSON_IsNumber(item))
-            return ggn_fail(err, GGN_EINVAL, "policy: %s is not a number", fields[i].name);
+            return base_fail(err, BASE_EINVAL, "policy: %s is not a number", fields[i].name);
         if (item)
             memcpy((char *)&p + fields[i].offset, &item->valuedouble, sizeof item->valuedouble);
     }

@@ -22,8 +22,8 @@ struct ggn_policy {
 };
 
 struct ggn_policy ggn_policy_default(void);
-/* GGN_EINVAL naming the field that is out of range. */
-int ggn_policy_check(const struct ggn_policy *policy, struct ggn_err *err);
+/* BASE_EINVAL naming the field that is out of range. */
+int ggn_policy_check(const struct ggn_policy *policy, struct base_err *err);
 
 /* Calibrated probability; 1 for a logit that is not finite. */
 double ggn_policy_p(const struct ggn_policy *policy, double logit);
@@ -36,9 +36,9 @@ double ggn_policy_predict(const struct ggn_policy *policy, double p, double thre
  * says nothing where even the noisiest pixels are calm: a block that is half sky has a large Gini coefficient for ever. */
 int ggn_policy_tail_holds(const struct ggn_policy *policy, double tail999, double gini);
 
-/* What the model says, defaults elsewhere. GGN_EINVAL when a field is out of range. */
-int ggn_policy_of(const struct ggn_model *model, struct ggn_policy *policy, struct ggn_err *err);
+/* What the model says, defaults elsewhere. BASE_EINVAL when a field is out of range. */
+int ggn_policy_of(const struct ggn_model *model, struct ggn_policy *policy, struct base_err *err);
 /* Puts the policy into the model. */
-int ggn_policy_set(struct ggn_model *model, const struct ggn_policy *policy, struct ggn_err *err);
+int ggn_policy_set(struct ggn_model *model, const struct ggn_policy *policy, struct base_err *err);
 
 #endif

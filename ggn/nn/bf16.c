@@ -1,6 +1,6 @@
 #include "nn/bf16.h"
 
-#include "nn/half.h"
+#include "base/half.h"
 
 int ggn_bf16_available(void)
 {
@@ -24,7 +24,7 @@ void ggn_bf16_pack(uint32_t *out, const float *packed, int n_in, int n_out, int 
         for (int i = 0; i < n_in; i += 2) {
             for (int k = 0; k < 9 * tile; k++)
                 *out++ =
-                    ggn_f32_to_bf16(packed[k]) | (i + 1 < n_in ? (uint32_t)ggn_f32_to_bf16(packed[9 * tile + k]) << 16 : 0);
+                    base_f32_to_bf16(packed[k]) | (i + 1 < n_in ? (uint32_t)base_f32_to_bf16(packed[9 * tile + k]) << 16 : 0);
             packed += (i + 1 < n_in ? 18 : 9) * tile;
         }
     }

@@ -13,12 +13,12 @@ static int add_value(struct ggn_graph *g, int c, int h, int w, int flat)
     if (g->err.code)
         return 0;
     if (c < 1 || c > GGN_MAX_CHANNELS || h < 1 || w < 1 || h > GGN_MAX_SIDE || w > GGN_MAX_SIDE) {
-        ggn_fail(&g->err, GGN_EINVAL, "network %s, stage %s: a tensor of %d×%d×%d is out of range", g->name, g->stage, c, h,
+        base_fail(&g->err, BASE_EINVAL, "network %s, stage %s: a tensor of %d×%d×%d is out of range", g->name, g->stage, c, h,
                  w);
         return 0;
     }
     if (g->n_values > GGN_MAX_LAYERS) {
-        ggn_fail(&g->err, GGN_EINVAL, "network %s: more than %d layers", g->name, GGN_MAX_LAYERS);
+        base_fail(&g->err, BASE_EINVAL, "network %s: more than %d layers", g->name, GGN_MAX_LAYERS);
         return 0;
     }
     struct ggn_value *v = &g->value[g->n_values];
@@ -43,7 +43,7 @@ static struct ggn_layer *add_layer(struct ggn_graph *g, enum ggn_op op, int in, 
 {
     if (g->err.code || g->n_layers >= GGN_MAX_LAYERS) {
         if (!g->err.code)
-            ggn_fail(&g->err, GGN_EINVAL, "network %s: more than %d layers", g->name, GGN_MAX_LAYERS);
+            base_fail(&g->err, BASE_EINVAL, "network %s: more than %d layers", g->name, GGN_MAX_LAYERS);
         return NULL;
     }
     struct ggn_layer *l = &g->layer[g->n_layers++];
@@ -58,7 +58,7 @@ static size_t add_tensor(struct ggn_graph *g, const char *suffix, int is_bias, i
 {
     if (g->err.code || g->n_tensors >= GGN_MAX_TENSORS) {
         if (!g->err.code)
-            ggn_fail(&g->err, GGN_EINVAL, "network %s: more than %d tensors", g->name, GGN_MAX_TENSORS);
+            base_fail(&g->err, BASE_EINVAL, "network %s: more than %d tensors", g->name, GGN_MAX_TENSORS);
         return 0;
     }
     struct ggn_tensor *t = &g->tensor[g->n_tensors++];
@@ -96,7 +96,7 @@ int ggn_graph_conv(struct ggn_graph *g, int in, int in2, int c_out, int kernel, 
     int c_in = a->c + (in2 >= 0 ? g->value[in2].c : 0);
 
     if (in2 >= 0 && (g->value[in2].h != a->h || g->value[in2].w != a->w))
-        ggn_fail(&g->err, GGN_EINVAL, "network %s, stage %s: joined tensors differ in size", g->name, g->stage);
+        base_fail(&g->err, BASE_EINVAL, "network %s, stage %s: joined tensors differ in size", g->name, g->stage);
     l->kernel = kernel;
     l->transposed = transposed;
     l->slope = slope;
@@ -210,12 +210,12 @@ void ggn_graph_mark(struct ggn_graph *g, int value, const char *stage)
     g->value[value].stage = stage;
 }
 
-int ggn_graph_end(struct ggn_graph *g, struct ggn_err *err)
+int ggn_graph_end(struct ggn_graph *g, struct base_err *err)
 {
     unsigned char written[GGN_MAX_LAYERS + 1] = {0};
 
     if (g->err.code)
-        return ggn_fail(err, g->err.code, "%s", g->err.text);
+        return base_fail(err, g->err.code, "%s", g->err.text);
     for (int i = g->n_layers - 1; i >= 0; i--) {
         struct ggn_layer *l = &g->layer[i];
         l->add_in = written[l->in];
@@ -225,7 +225,7 @@ int ggn_graph_end(struct ggn_graph *g, struct ggn_err *err)
             written[l->in2] = 1;
         }
     }
-    return GGN_OK;
+    return 0;
 }
 
 static int same_geometry(const struct ggn_value *a, const struct ggn_value *b)

@@ -85,7 +85,7 @@ struct ggn_graph {
     size_t n_acts;      /* elements of all values of one image */
     int n_stage_layers; /* parameter layers since the stage began; for names */
     const char *stage;
-    struct ggn_err err; /* first failure while building */
+    struct base_err err; /* first failure while building */
 };
 
 /* Starts a graph whose input is c × h × w. */
@@ -106,8 +106,8 @@ int ggn_graph_linear(struct ggn_graph *g, int in, int c_out);
 int ggn_graph_dropout(struct ggn_graph *g, int in, double p);
 /* Names the value for `ggn golden`. */
 void ggn_graph_mark(struct ggn_graph *g, int value, const char *stage);
-/* Plans the backward pass; the last value is the output. GGN_EINVAL with the first failure. */
-int ggn_graph_end(struct ggn_graph *g, struct ggn_err *err);
+/* Plans the backward pass; the last value is the output. BASE_EINVAL with the first failure. */
+int ggn_graph_end(struct ggn_graph *g, struct base_err *err);
 
 /* Memory for inference: offset[value] such that values alive at the same time do not overlap, and memory is only handed on
  * between values of equal height and width, whose zero padding lies at the same places. Returns the elements per image. */

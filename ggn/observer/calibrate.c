@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/fio.h"
-#include "eval/stats.h"
+#include "base/files.h"
+#include "figures/stats.h"
 
 /* The forms that are tried: every map with every masking and percentile. */
 static const struct {
@@ -29,7 +29,7 @@ struct job {
     enum ggn_observer_source source;
     struct ggn_curve *curves; /* [n][FORMS]; spp and score own */
     int *rc;                  /* [n] */
-    struct ggn_err *errs;     /* [n] */
+    struct base_err *errs;     /* [n] */
 };
 
 static void pool_level(struct ggn_curve *curves, int level, const float *map, int map_index, const float *deviations, size_t n, float *scratch)
@@ -40,34 +40,34 @@ static void pool_level(struct ggn_curve *curves, int level, const float *map, in
                 ggn_observer_pool(map, deviations + (size_t)m * n, n, maskings[m].k, percentiles[p], scratch);
 }
 
-static int block_curves(const struct ggn_calibration_block *b, enum ggn_observer_source source, struct ggn_curve *curves, struct ggn_err *err)
+static int block_curves(const struct ggn_calibration_block *b, enum ggn_observer_source source, struct ggn_curve *curves, struct base_err *err)
 {
     const struct ggn_seq_block *block = b->block;
     int w = (int)block->width, h = (int)block->height;
     size_t n = (size_t)w * (size_t)h;
     struct ggn_stimuli s;
     int rc = ggn_stimuli_init(&s, block, source, b->reference_independent, err);
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
     float *planes = malloc((MASKINGS + 2) * n * sizeof *planes);
     uint8_t *test = malloc(3 * n);
     if (planes == NULL || test == NULL)
-        rc = ggn_fail_nomem(err, "calibration");
+        rc = base_fail_nomem(err, "calibration");
     float *map = planes + MASKINGS * n, *scratch = map + n;
-    for (int m = 0; m < MASKINGS && rc == GGN_OK; m++)
+    for (int m = 0; m < MASKINGS && !rc; m++)
         rc = ggn_stimuli_deviation(&s, maskings[m].window_px, planes + (size_t)m * n, err);
-    for (int f = 0; f < FORMS && rc == GGN_OK; f++) {
+    for (int f = 0; f < FORMS && !rc; f++) {
         curves[f] = (struct ggn_curve){.n = s.n, .spp = malloc((size_t)s.n * sizeof(double)), .score = malloc((size_t)s.n * sizeof(double))};
         if (curves[f].spp == NULL || curves[f].score == NULL)
-            rc = ggn_fail_nomem(err, "calibration");
-        for (int i = 0; i < s.n && rc == GGN_OK; i++)
+            rc = base_fail_nomem(err, "calibration");
+        for (int i = 0; i < s.n && !rc; i++)
             curves[f].spp[i] = s.spp[i];
     }
-    for (int i = 0; i < s.n && rc == GGN_OK; i++) {
+    for (int i = 0; i < s.n && !rc; i++) {
         rc = ggn_stimuli_make(&s, i, test, err);
-        for (int k = 0; k < MAPS && rc == GGN_OK; k++) {
+        for (int k = 0; k < MAPS && !rc; k++) {
             rc = ggn_observer_error_map(maps[k].map, maps[k].blur_px, s.converged, test, w, h, map, err);
-            if (rc == GGN_OK)
+            if (!rc)
                 pool_level(curves, i, map, k, planes, n, scratch);
         }
     }
@@ -129,11 +129,11 @@ static int best_form(const struct ggn_curve *curves, const struct ggn_calibratio
     return best;
 }
 
-static int summarise(const struct ggn_curve *curves, const struct ggn_calibration_block *blocks, int n, struct ggn_calibration *c, struct ggn_err *err)
+static int summarise(const struct ggn_curve *curves, const struct ggn_calibration_block *blocks, int n, struct ggn_calibration *c, struct base_err *err)
 {
     double *room = malloc(3 * (size_t)n * sizeof *room);
     if (room == NULL)
-        return ggn_fail_nomem(err, "calibration");
+        return base_fail_nomem(err, "calibration");
     double *errors = room, *scratch = room + n, *human = room + 2 * n;
     int form = best_form(curves, blocks, n, -1, errors, scratch);
     double tau = fit_tau(curves, blocks, n, form, -1, scratch);
@@ -168,26 +168,26 @@ void ggn_calibration_release(struct ggn_calibration *c)
 }
 
 int ggn_observer_calibrate(const struct ggn_calibration_block *blocks, int n, enum ggn_observer_source source,
-                           struct ggn_threads *threads, struct ggn_calibration *out, struct ggn_err *err)
+                           struct base_threads *threads, struct ggn_calibration *out, struct base_err *err)
 {
     struct ggn_calibration c = {0};
-    int rc = GGN_OK;
+    int rc = 0;
     if (n < 3)
-        return ggn_fail(err, GGN_EINVAL, "calibration needs at least 3 blocks with a human threshold below the cap, there are %d", n);
+        return base_fail(err, BASE_EINVAL, "calibration needs at least 3 blocks with a human threshold below the cap, there are %d", n);
     struct job job = {.blocks = blocks, .source = source};
     job.curves = calloc((size_t)n * FORMS, sizeof *job.curves);
     job.rc = calloc((size_t)n, sizeof *job.rc);
     job.errs = calloc((size_t)n, sizeof *job.errs);
     c.predicted = malloc((size_t)n * sizeof *c.predicted);
     if (job.curves == NULL || job.rc == NULL || job.errs == NULL || c.predicted == NULL) {
-        rc = ggn_fail_nomem(err, "calibration");
+        rc = base_fail_nomem(err, "calibration");
         goto out;
     }
-    ggn_threads_for(threads, n, run_block, &job);
-    for (int i = 0; i < n && rc == GGN_OK; i++)
-        if (job.rc[i] != GGN_OK)
-            rc = ggn_fail(err, job.rc[i], "%s", job.errs[i].text);
-    if (rc == GGN_OK)
+    base_threads_for(threads, n, run_block, &job);
+    for (int i = 0; i < n && !rc; i++)
+        if (job.rc[i] != 0)
+            rc = base_fail(err, job.rc[i], "%s", job.errs[i].text);
+    if (!rc)
         rc = summarise(job.curves, blocks, n, &c, err);
 out:
     for (int i = 0; i < n * FORMS && job.curves != NULL; i++)
@@ -195,7 +195,7 @@ out:
     free(job.curves);
     free(job.rc);
     free(job.errs);
-    if (rc != GGN_OK)
+    if (rc)
         ggn_calibration_release(&c);
     else
         *out = c;
@@ -212,7 +212,7 @@ struct trial {
 };
 
 /* Lines that are no trial (two that ran into one another, level 0) are left out and counted. */
-static int parse_trials(const char *path, char *text, struct trial **out, int *count, int *skipped, struct ggn_err *err)
+static int parse_trials(const char *path, char *text, struct trial **out, int *count, int *skipped, struct base_err *err)
 {
     size_t room = 1;
     for (const char *p = text; *p != '\0'; p++)
@@ -221,7 +221,7 @@ static int parse_trials(const char *path, char *text, struct trial **out, int *c
     int n = 0;
     *skipped = 0;
     if (t == NULL)
-        return ggn_fail_nomem(err, path);
+        return base_fail_nomem(err, path);
     for (char *line = text, *next; line != NULL && *line != '\0'; line = next) {
         char *end = line;
         next = strchr(line, '\n');
@@ -236,7 +236,7 @@ static int parse_trials(const char *path, char *text, struct trial **out, int *c
     }
     *out = t;
     *count = n;
-    return GGN_OK;
+    return 0;
 }
 
 /* Log-likelihood of one block's trials for threshold x (log2) and spread s. A lapse rate of 2 % keeps one slip from ruling. */
@@ -251,18 +251,18 @@ static double likelihood(const struct trial *t, int n, int block, double x, doub
     return sum;
 }
 
-int ggn_trials_spread(const char *path, double *spread, int *blocks, int *trials, int *skipped, struct ggn_err *err)
+int ggn_trials_spread(const char *path, double *spread, int *blocks, int *trials, int *skipped, struct base_err *err)
 {
     char *text;
     size_t size;
     struct trial *t = NULL;
     int n = 0, present[TRIAL_BLOCKS] = {0};
-    int rc = ggn_fio_read(path, 1 << 26, &text, &size, err);
-    if (rc != GGN_OK)
+    int rc = base_file_read(path, 1 << 26, &text, &size, err);
+    if (rc)
         return rc;
     rc = parse_trials(path, text, &t, &n, skipped, err);
     free(text);
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
     *blocks = 0;
     for (int i = 0; i < n; i++)
@@ -283,5 +283,5 @@ int ggn_trials_spread(const char *path, double *spread, int *blocks, int *trials
     }
     free(t);
     *trials = n;
-    return n > 0 ? GGN_OK : ggn_fail(err, GGN_EINVAL, "%s: no trials in it", path);
+    return n > 0 ? 0 : base_fail(err, BASE_EINVAL, "%s: no trials in it", path);
 }

@@ -28,13 +28,13 @@ struct ggn_calibration {
 /* Tries maps, blurs, masking and percentiles on a fixed grid. tau of a form is the geometric median of the pooled values at the human
  * thresholds. n >= 3 blocks. progress may be NULL. */
 int ggn_observer_calibrate(const struct ggn_calibration_block *blocks, int n, enum ggn_observer_source source,
-                           struct ggn_threads *threads, struct ggn_calibration *out, struct ggn_err *err);
+                           struct base_threads *threads, struct ggn_calibration *out, struct base_err *err);
 void ggn_calibration_release(struct ggn_calibration *c);
 
 /*
  * Slope of the psychometric curve from raw yes/no trials `block;level;seen` (level times 20 is spp): P(seen) = Phi(log2(T_b/n)/s) with
  * a threshold T_b per block and one s for the file, by maximum likelihood. *spread gets s in octaves. Lines that are no trial are left out; *skipped counts them.
  */
-int ggn_trials_spread(const char *path, double *spread, int *blocks, int *trials, int *skipped, struct ggn_err *err);
+int ggn_trials_spread(const char *path, double *spread, int *blocks, int *trials, int *skipped, struct base_err *err);
 
 #endif

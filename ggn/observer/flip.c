@@ -151,13 +151,13 @@ struct csf {
     float *a, *rg, *by1, *by2; /* 2r+1 taps each; by = by1 (x) by1 + by2 (x) by2 */
 };
 
-static int csf_init(struct csf *f, double ppd, struct ggn_err *err)
+static int csf_init(struct csf *f, double ppd, struct base_err *err)
 {
     f->radius = (int)ceil(3.0 * sqrt(0.04 / (2.0 * pi * pi)) * ppd);
     size_t n = 2 * (size_t)f->radius + 1;
     float *all = malloc(4 * n * sizeof *all);
     if (all == NULL)
-        return ggn_fail_nomem(err, "FLIP filters");
+        return base_fail_nomem(err, "FLIP filters");
     f->a = all;
     f->rg = all + n;
     f->by1 = all + 2 * n;
@@ -174,7 +174,7 @@ static int csf_init(struct csf *f, double ppd, struct ggn_err *err)
         f->by1[i] = (float)((double)f->by1[i] * sqrt(k1 / total));
         f->by2[i] = (float)((double)f->by2[i] * sqrt(k2 / total));
     }
-    return GGN_OK;
+    return 0;
 }
 
 /* Filters the planes and turns them into Hunt-adjusted Lab in place. tmp, tmp2: one plane each. */
@@ -206,7 +206,7 @@ struct features {
     float *g, *edge, *point;
 };
 
-static int features_init(struct features *f, double ppd, struct ggn_err *err)
+static int features_init(struct features *f, double ppd, struct base_err *err)
 {
     double sd = 0.5 * 0.082 * ppd;
     f->radius = (int)ceil(3.0 * sd);
@@ -214,7 +214,7 @@ static int features_init(struct features *f, double ppd, struct ggn_err *err)
     size_t n = 2 * (size_t)r + 1;
     float *all = malloc(3 * n * sizeof *all);
     if (all == NULL)
-        return ggn_fail_nomem(err, "FLIP filters");
+        return base_fail_nomem(err, "FLIP filters");
     f->g = all;
     f->edge = all + n;
     f->point = all + 2 * n;
@@ -233,7 +233,7 @@ static int features_init(struct features *f, double ppd, struct ggn_err *err)
                 f->point[x + r] = (float)(p / (p > 0.0 ? plus : minus));
             }
         }
-    return GGN_OK;
+    return 0;
 }
 
 /* magnitude[i] = |(detector along x, detector along y)| of the lightness plane. */
@@ -273,22 +273,22 @@ static double largest_difference(const struct colour *c)
 }
 
 int ggn_flip(const uint8_t *reference, const uint8_t *test, int width, int height, double pixels_per_degree, float *map,
-             struct ggn_flip_stats *stats, struct ggn_err *err)
+             struct ggn_flip_stats *stats, struct base_err *err)
 {
     if (width < 1 || height < 1 || !(pixels_per_degree >= 1.0 && pixels_per_degree <= 1000.0))
-        return ggn_fail(err, GGN_EINVAL, "FLIP: %dx%d at %g pixels per degree", width, height, pixels_per_degree);
+        return base_fail(err, BASE_EINVAL, "FLIP: %dx%d at %g pixels per degree", width, height, pixels_per_degree);
     enum { PLANES = 14 };
     size_t n = (size_t)width * (size_t)height;
     struct colour c;
     struct csf csf = {0};
     struct features features = {0};
     float *buffer = malloc(PLANES * n * sizeof *buffer);
-    int rc = buffer == NULL ? ggn_fail_nomem(err, "FLIP") : GGN_OK;
-    if (rc == GGN_OK)
+    int rc = buffer == NULL ? base_fail_nomem(err, "FLIP") : 0;
+    if (!rc)
         rc = csf_init(&csf, pixels_per_degree, err);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = features_init(&features, pixels_per_degree, err);
-    if (rc != GGN_OK)
+    if (rc)
         goto out;
 
     float *p[PLANES];

@@ -21,6 +21,6 @@ struct ggn_flip_stats {
 
 /* reference, test: [height][width][3], sRGB 8 bit. map (may be NULL): [height][width] gets the error per pixel. */
 int ggn_flip(const uint8_t *reference, const uint8_t *test, int width, int height, double pixels_per_degree, float *map,
-             struct ggn_flip_stats *stats, struct ggn_err *err);
+             struct ggn_flip_stats *stats, struct base_err *err);
 
 #endif

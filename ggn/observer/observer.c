@@ -7,7 +7,7 @@
 
 #include <cjson/cJSON.h>
 
-#include "base/fio.h"
+#include "base/files.h"
 #include "data/image.h"
 #include "model/preprocess.h"
 #include "observer/flip.h"
@@ -33,26 +33,26 @@ static int get(const cJSON *root, const char *name, double lo, double hi, double
     return 1;
 }
 
-int ggn_observer_read(const char *path, struct ggn_observer *out, struct ggn_err *err)
+int ggn_observer_read(const char *path, struct ggn_observer *out, struct base_err *err)
 {
     struct ggn_observer o = {0};
     char *text;
     size_t size;
     double window = 1;
-    int rc = ggn_fio_read(path, 1 << 24, &text, &size, err);
-    if (rc != GGN_OK)
+    int rc = base_file_read(path, 1 << 24, &text, &size, err);
+    if (rc)
         return rc;
     cJSON *root = cJSON_ParseWithLength(text, size);
     const cJSON *map = cJSON_GetObjectItemCaseSensitive(root, "map");
     if (cJSON_IsString(map) && strcmp(map->valuestring, map_names[GGN_MAP_LIGHTNESS]) == 0)
         o.map = GGN_MAP_LIGHTNESS;
     else if (!cJSON_IsString(map) || strcmp(map->valuestring, map_names[GGN_MAP_FLIP]) != 0)
-        rc = ggn_fail(err, GGN_EINVAL, "%s: map must be \"flip\" or \"lightness\"", path);
-    if (rc == GGN_OK && !(get(root, "blur_px", 0, 50, &o.blur_px) && get(root, "masking", 0, 100, &o.masking) &&
+        rc = base_fail(err, BASE_EINVAL, "%s: map must be \"flip\" or \"lightness\"", path);
+    if (!rc && !(get(root, "blur_px", 0, 50, &o.blur_px) && get(root, "masking", 0, 100, &o.masking) &&
                           get(root, "window_px", 1, 99, &window) && get(root, "percentile", 0.1, 100, &o.percentile) &&
                           get(root, "tau", 1e-9, 1e9, &o.tau) && get(root, "spread", 1e-3, 10, &o.spread)))
-        rc = ggn_fail(err, GGN_EINVAL, "%s: blur_px, masking, window_px, percentile, tau or spread is missing or out of range", path);
-    if (rc == GGN_OK) {
+        rc = base_fail(err, BASE_EINVAL, "%s: blur_px, masking, window_px, percentile, tau or spread is missing or out of range", path);
+    if (!rc) {
         o.window_px = (int)window | 1;
         *out = o;
     }
@@ -61,18 +61,18 @@ int ggn_observer_read(const char *path, struct ggn_observer *out, struct ggn_err
     return rc;
 }
 
-int ggn_observer_write(const char *path, const struct ggn_observer *o, const char *calibration, struct ggn_err *err)
+int ggn_observer_write(const char *path, const struct ggn_observer *o, const char *calibration, struct base_err *err)
 {
-    struct ggn_fio_out out;
-    int rc = ggn_fio_begin(&out, path, err);
-    if (rc != GGN_OK)
+    struct base_file_out out;
+    int rc = base_file_begin(&out, path, err);
+    if (rc)
         return rc;
     fprintf(out.file, "{\n  \"map\": \"%s\", \"blur_px\": %.6g, \"masking\": %.6g, \"window_px\": %d, \"percentile\": %.6g, \"tau\": %.8g, \"spread\": %.6g",
             map_names[o->map], o->blur_px, o->masking, o->window_px, o->percentile, o->tau, o->spread);
     if (calibration != NULL)
         fprintf(out.file, ",\n  \"calibration\": %s", calibration);
     fputs("\n}\n", out.file);
-    return ggn_fio_commit(&out, err);
+    return base_file_commit(&out, err);
 }
 
 /* --- pictures of visibility --- */
@@ -116,13 +116,13 @@ static void filter(float *image, float *tmp, int w, int h, const float *taps, in
     filter_transpose(tmp, image, h, w, taps, r);
 }
 
-static int lightness_map(double blur_px, const uint8_t *reference, const uint8_t *test, int w, int h, float *map, struct ggn_err *err)
+static int lightness_map(double blur_px, const uint8_t *reference, const uint8_t *test, int w, int h, float *map, struct base_err *err)
 {
     enum { MAX_RADIUS = 200 };
     size_t n = (size_t)w * (size_t)h;
     float *other = malloc(n * sizeof *other), taps[2 * MAX_RADIUS + 1];
     if (other == NULL)
-        return ggn_fail_nomem(err, "observer");
+        return base_fail_nomem(err, "observer");
     lightness(reference, n, other);
     lightness(test, n, map);
     for (size_t i = 0; i < n; i++)
@@ -140,11 +140,11 @@ static int lightness_map(double blur_px, const uint8_t *reference, const uint8_t
     for (size_t i = 0; i < n; i++)
         map[i] = fabsf(map[i]);
     free(other);
-    return GGN_OK;
+    return 0;
 }
 
 int ggn_observer_error_map(enum ggn_observer_map kind, double blur_px, const uint8_t *reference, const uint8_t *test, int w, int h,
-                           float *map, struct ggn_err *err)
+                           float *map, struct base_err *err)
 {
     struct ggn_flip_stats stats;
     if (kind == GGN_MAP_LIGHTNESS)
@@ -170,18 +170,18 @@ static void local_variance(float *plane, float *room, int w, int h, int window_p
         plane[i] = fmaxf(plane[i] - mean[i] * mean[i], 0.0f);
 }
 
-int ggn_observer_deviation(const uint8_t *reference, int w, int h, int window_px, float *deviation, struct ggn_err *err)
+int ggn_observer_deviation(const uint8_t *reference, int w, int h, int window_px, float *deviation, struct base_err *err)
 {
     size_t n = (size_t)w * (size_t)h;
     float *room = malloc(2 * n * sizeof *room);
     if (room == NULL)
-        return ggn_fail_nomem(err, "observer");
+        return base_fail_nomem(err, "observer");
     lightness(reference, n, deviation);
     local_variance(deviation, room, w, h, window_px);
     for (size_t i = 0; i < n; i++)
         deviation[i] = sqrtf(deviation[i]);
     free(room);
-    return GGN_OK;
+    return 0;
 }
 
 /* The k-th smallest value; x is reordered (Hoare's FIND). */
@@ -270,39 +270,39 @@ int ggn_stimuli_extend(const struct ggn_seq_block *b, int reference_independent)
            ggn_seq_has(b->reference, GGN_PLANE_MEAN_F16);
 }
 
-static int init_halves(struct ggn_stimuli *s, int reference_independent, struct ggn_err *err)
+static int init_halves(struct ggn_stimuli *s, int reference_independent, struct base_err *err)
 {
     const struct ggn_seq_block *b = s->block;
     const struct ggn_seq_record *full = full_level(b);
     if (full == NULL)
-        return ggn_fail(err, GGN_EINVAL, "block %u has no full level with a half-buffer difference", b->id);
+        return base_fail(err, BASE_EINVAL, "block %u has no full level with a half-buffer difference", b->id);
     const struct ggn_seq_record *base = b->reference != NULL && reference_independent && b->reference->spp >= full->spp ? b->reference : full;
     s->spp0 = full->spp;
     s->noisy_base = base == full;
     int rc = ggn_seq_half(b, full, s->difference, err);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = ggn_seq_mean(b, base, s->base, err);
-    if (rc == GGN_OK)
+    if (!rc)
         encode(s->base, (size_t)b->width * b->height, s->converged);
     return rc;
 }
 
-static int init_rendered(struct ggn_stimuli *s, int reference_independent, int extend, struct ggn_err *err)
+static int init_rendered(struct ggn_stimuli *s, int reference_independent, int extend, struct base_err *err)
 {
     const struct ggn_seq_block *b = s->block;
     if (b->reference == NULL)
-        return ggn_fail(err, GGN_EINVAL, "block %u has no reference", b->id);
+        return base_fail(err, BASE_EINVAL, "block %u has no reference", b->id);
     s->scale = reference_independent && ggn_seq_has(b->reference, GGN_PLANE_MEAN_F16);
-    int rc = s->scale ? ggn_seq_mean(b, b->reference, s->base, err) : GGN_OK;
-    if (rc == GGN_OK && extend) {
+    int rc = s->scale ? ggn_seq_mean(b, b->reference, s->base, err) : 0;
+    if (!rc && extend) {
         s->spp0 = full_level(b)->spp;
         rc = ggn_seq_half(b, full_level(b), s->difference, err);
     }
-    return rc == GGN_OK ? ggn_seq_display(b, b->reference, s->converged, err) : rc;
+    return !rc ? ggn_seq_display(b, b->reference, s->converged, err) : rc;
 }
 
 int ggn_stimuli_init(struct ggn_stimuli *out, const struct ggn_seq_block *block, enum ggn_observer_source source,
-                     int reference_independent, struct ggn_err *err)
+                     int reference_independent, struct base_err *err)
 {
     size_t pixels = (size_t)block->width * block->height;
     if (source == GGN_SOURCE_AUTO && block->reference == NULL)
@@ -316,14 +316,14 @@ int ggn_stimuli_init(struct ggn_stimuli *out, const struct ggn_seq_block *block,
     s.difference = malloc(3 * pixels * sizeof(float));
     s.work = malloc(3 * pixels * sizeof(float));
     s.converged = malloc(3 * pixels);
-    int rc = GGN_OK;
+    int rc = 0;
     if (s.spp == NULL || s.base == NULL || s.difference == NULL || s.work == NULL || s.converged == NULL)
-        rc = ggn_fail_nomem(err, "observer");
+        rc = base_fail_nomem(err, "observer");
     else if (source == GGN_SOURCE_HALVES)
         rc = init_halves(&s, reference_independent, err);
     else
         rc = init_rendered(&s, reference_independent, extend, err);
-    if (rc != GGN_OK) {
+    if (rc) {
         ggn_stimuli_release(&s);
         return rc;
     }
@@ -332,10 +332,10 @@ int ggn_stimuli_init(struct ggn_stimuli *out, const struct ggn_seq_block *block,
     if (s.n > s.recorded)
         simulated_levels(beyond, s.spp + s.recorded);
     *out = s;
-    return GGN_OK;
+    return 0;
 }
 
-int ggn_stimuli_deviation(struct ggn_stimuli *s, int window_px, float *deviation, struct ggn_err *err)
+int ggn_stimuli_deviation(struct ggn_stimuli *s, int window_px, float *deviation, struct base_err *err)
 {
     int w = (int)s->block->width, h = (int)s->block->height;
     size_t n = (size_t)w * (size_t)h;
@@ -343,8 +343,8 @@ int ggn_stimuli_deviation(struct ggn_stimuli *s, int window_px, float *deviation
         return ggn_observer_deviation(s->converged, w, h, window_px, deviation, err);
     uint8_t *rgb = malloc(3 * n);
     float *room = malloc(4 * n * sizeof *room);
-    int rc = rgb == NULL || room == NULL ? ggn_fail_nomem(err, "observer") : GGN_OK;
-    if (rc == GGN_OK) {
+    int rc = rgb == NULL || room == NULL ? base_fail_nomem(err, "observer") : 0;
+    if (!rc) {
         float *noise = room + 2 * n, *other = room + 3 * n;
         for (int side = 0; side < 2; side++) { /* M + D and M - D: half of their difference is noise as strong as M's own */
             for (size_t i = 0; i < 3 * n; i++)
@@ -365,7 +365,7 @@ int ggn_stimuli_deviation(struct ggn_stimuli *s, int window_px, float *deviation
     return rc;
 }
 
-int ggn_stimuli_make(struct ggn_stimuli *s, int level, uint8_t *test, struct ggn_err *err)
+int ggn_stimuli_make(struct ggn_stimuli *s, int level, uint8_t *test, struct base_err *err)
 {
     const struct ggn_seq_block *b = s->block;
     size_t pixels = (size_t)b->width * b->height;
@@ -374,13 +374,13 @@ int ggn_stimuli_make(struct ggn_stimuli *s, int level, uint8_t *test, struct ggn
         for (size_t i = 0; i < 3 * pixels; i++)
             s->work[i] = s->base[i] + scale * s->difference[i];
         encode(s->work, pixels, test);
-        return GGN_OK;
+        return 0;
     }
     const struct ggn_seq_record *r = &b->levels[level];
     if (s->scale && (ggn_seq_has(r, GGN_PLANE_MEAN_F16) || ggn_seq_has(r, GGN_PLANE_FINE))) {
         float scale = (float)sqrt((double)b->reference->spp / ((double)b->reference->spp + r->spp));
         int rc = ggn_seq_mean(b, r, s->work, err);
-        if (rc != GGN_OK)
+        if (rc)
             return rc;
         for (size_t i = 0; i < 3 * pixels; i++)
             s->work[i] = s->base[i] + scale * (s->work[i] - s->base[i]);
@@ -388,7 +388,7 @@ int ggn_stimuli_make(struct ggn_stimuli *s, int level, uint8_t *test, struct ggn
         return ggn_seq_display(b, r, test, err);
     }
     encode(s->work, pixels, test);
-    return GGN_OK;
+    return 0;
 }
 
 /* --- curves --- */
@@ -401,13 +401,13 @@ void ggn_curve_release(struct ggn_curve *c)
 }
 
 int ggn_observer_curve(const struct ggn_observer *o, const struct ggn_seq_block *block, enum ggn_observer_source source,
-                       int reference_independent, struct ggn_curve *curve, struct ggn_err *err)
+                       int reference_independent, struct ggn_curve *curve, struct base_err *err)
 {
     struct ggn_stimuli s;
     int w = (int)block->width, h = (int)block->height;
     size_t n = (size_t)w * (size_t)h;
     int rc = ggn_stimuli_init(&s, block, source, reference_independent, err);
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
     struct ggn_curve c = {.n = s.n};
     c.spp = malloc((size_t)s.n * sizeof *c.spp);
@@ -415,14 +415,14 @@ int ggn_observer_curve(const struct ggn_observer *o, const struct ggn_seq_block 
     uint8_t *test = malloc(3 * n);
     float *map = malloc(3 * n * sizeof *map);
     if (c.spp == NULL || c.score == NULL || test == NULL || map == NULL)
-        rc = ggn_fail_nomem(err, "observer");
+        rc = base_fail_nomem(err, "observer");
     else
         rc = ggn_stimuli_deviation(&s, o->window_px, map + n, err);
-    for (int i = 0; i < s.n && rc == GGN_OK; i++) {
+    for (int i = 0; i < s.n && !rc; i++) {
         rc = ggn_stimuli_make(&s, i, test, err);
-        if (rc == GGN_OK)
+        if (!rc)
             rc = ggn_observer_error_map(o->map, o->blur_px, s.converged, test, w, h, map, err);
-        if (rc == GGN_OK) {
+        if (!rc) {
             c.spp[i] = s.spp[i];
             c.score[i] = ggn_observer_pool(map, map + n, n, o->masking, o->percentile, map + 2 * n);
         }
@@ -430,7 +430,7 @@ int ggn_observer_curve(const struct ggn_observer *o, const struct ggn_seq_block 
     free(map);
     free(test);
     ggn_stimuli_release(&s);
-    if (rc != GGN_OK)
+    if (rc)
         ggn_curve_release(&c);
     else
         *curve = c;

@@ -33,16 +33,16 @@ struct ggn_observer {
 extern const struct ggn_observer ggn_observer_default;
 
 /* Parameters from and to a JSON file. calibration (may be NULL): a JSON object text that is kept in the file as is. */
-int ggn_observer_read(const char *path, struct ggn_observer *observer, struct ggn_err *err);
-int ggn_observer_write(const char *path, const struct ggn_observer *observer, const char *calibration, struct ggn_err *err);
+int ggn_observer_read(const char *path, struct ggn_observer *observer, struct base_err *err);
+int ggn_observer_write(const char *path, const struct ggn_observer *observer, const char *calibration, struct base_err *err);
 /* One line for people and for the card. */
 void ggn_observer_describe(const struct ggn_observer *observer, char *text, size_t room);
 
 /* reference, test: [h][w][3] sRGB 8 bit. map: [h][w], without masking. */
 int ggn_observer_error_map(enum ggn_observer_map kind, double blur_px, const uint8_t *reference, const uint8_t *test, int w, int h,
-                           float *map, struct ggn_err *err);
+                           float *map, struct base_err *err);
 /* Local standard deviation of L* in a box of side window_px (odd); borders repeat. deviation: [h][w]. */
-int ggn_observer_deviation(const uint8_t *reference, int w, int h, int window_px, float *deviation, struct ggn_err *err);
+int ggn_observer_deviation(const uint8_t *reference, int w, int h, int window_px, float *deviation, struct base_err *err);
 /* The percentile of map / (1 + masking * deviation). scratch: [n]. */
 double ggn_observer_pool(const float *map, const float *deviation, size_t n, double masking, double percentile, float *scratch);
 
@@ -84,12 +84,12 @@ struct ggn_stimuli {
     uint8_t *converged;                /* owns; [P][3] */
 };
 int ggn_stimuli_init(struct ggn_stimuli *s, const struct ggn_seq_block *block, enum ggn_observer_source source,
-                     int reference_independent, struct ggn_err *err);
+                     int reference_independent, struct base_err *err);
 void ggn_stimuli_release(struct ggn_stimuli *s);
 /* test: [P][3], the picture at spp[i]. */
-int ggn_stimuli_make(struct ggn_stimuli *s, int i, uint8_t *test, struct ggn_err *err);
+int ggn_stimuli_make(struct ggn_stimuli *s, int i, uint8_t *test, struct base_err *err);
 /* Local deviation of the converged image, [P], without its noise where that is known. */
-int ggn_stimuli_deviation(struct ggn_stimuli *s, int window_px, float *deviation, struct ggn_err *err);
+int ggn_stimuli_deviation(struct ggn_stimuli *s, int window_px, float *deviation, struct base_err *err);
 
 /* Whether GGN_SOURCE_AUTO goes beyond the last level of this block. */
 int ggn_stimuli_extend(const struct ggn_seq_block *block, int reference_independent);
@@ -98,7 +98,7 @@ enum { GGN_SIMULATED_CAP = 10000 };
 
 /* The curve of one block as the observer sees it. */
 int ggn_observer_curve(const struct ggn_observer *o, const struct ggn_seq_block *block, enum ggn_observer_source source,
-                       int reference_independent, struct ggn_curve *curve, struct ggn_err *err);
+                       int reference_independent, struct ggn_curve *curve, struct base_err *err);
 
 /* Smallest spp from which the score stays at or below tau, interpolated between levels in log-log. censored: still above at the last
  * level, which is then returned. A curve that starts below gives its first level. */

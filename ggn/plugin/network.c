@@ -114,7 +114,7 @@ static void destroy(struct lull_instance *in);
 
 static int32_t load_model(struct lull_instance *in, const struct given *given, struct lull_error *err)
 {
-    struct ggn_err error = {0};
+    struct base_err error = {0};
     char found[5000];
     const char *path = given->model;
 
@@ -201,7 +201,7 @@ static void workers_release(struct gp_worker *worker, uint32_t count)
 /* Scratch for as many workers as can be busy. */
 static struct gp_worker *workers_create(const struct lull_instance *in, uint32_t count, struct lull_error *err)
 {
-    struct ggn_err error = {0};
+    struct base_err error = {0};
     struct gp_worker *worker = calloc(count, sizeof *worker);
 
     if (!worker) {

@@ -18,9 +18,9 @@ int32_t gp_fail(struct lull_error *err, int32_t code, const char *format, ...)
     return code;
 }
 
-int32_t gp_fail_from(struct lull_error *err, const char *what, const struct ggn_err *from)
+int32_t gp_fail_from(struct lull_error *err, const char *what, const struct base_err *from)
 {
-    int32_t code = from->code == GGN_ENOMEM ? LULL_E_MEMORY : LULL_E_IO;
+    int32_t code = from->code == BASE_ENOMEM ? LULL_E_MEMORY : LULL_E_IO;
 
     return gp_fail(err, code, "%s: %.400s", what, from->text);
 }

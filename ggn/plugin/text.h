@@ -11,7 +11,7 @@
 /* Fills *err (may be NULL or too small) and returns code. */
 int32_t gp_fail(struct lull_error *err, int32_t code, const char *format, ...) __attribute__((format(printf, 3, 4)));
 /* The same from an error of ggn's own functions, `what` before its text. */
-int32_t gp_fail_from(struct lull_error *err, const char *what, const struct ggn_err *from);
+int32_t gp_fail_from(struct lull_error *err, const char *what, const struct base_err *from);
 
 /* A decimal number that fills the whole text, in the C locale whatever the process has set. Returns 0 if it is none. */
 int gp_number(const char *text, double *out);

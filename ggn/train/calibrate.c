@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "eval/stats.h"
+#include "figures/stats.h"
 #include "model/window.h"
 #include "nn/loss.h"
 
@@ -54,13 +54,13 @@ static double stop_of(const struct ggn_windows *w, int first, int end, const dou
 }
 
 int ggn_calibrate_stopping(const struct ggn_windows *w, const double *logit, const struct ggn_policy *policy, double t,
-                           struct ggn_stopping *out, struct ggn_err *err)
+                           struct ggn_stopping *out, struct base_err *err)
 {
     double *error = malloc(((size_t)w->set->n + 1) * sizeof *error), spent = 0, needed = 0;
     int early = 0, unsure = 0;
 
     if (!error)
-        return ggn_fail_nomem(err, "thresholds");
+        return base_fail_nomem(err, "thresholds");
     *out = (struct ggn_stopping){0};
     for (int c = 0; c < w->set->n; c++) {
         const struct ggn_chain *chain = &w->set->chains[c];
@@ -84,11 +84,11 @@ int ggn_calibrate_stopping(const struct ggn_windows *w, const double *logit, con
         out->median_abs_log2 = ggn_stats_quantile(error, (size_t)out->blocks, 0.5);
     }
     free(error);
-    return GGN_OK;
+    return 0;
 }
 
 int ggn_calibrate_threshold(const struct ggn_windows *w, const double *logit, double early_rate, struct ggn_policy *policy,
-                            struct ggn_stopping *out, struct ggn_err *err)
+                            struct ggn_stopping *out, struct base_err *err)
 {
     struct ggn_stopping best = {0};
     double threshold = 0;
@@ -105,7 +105,7 @@ int ggn_calibrate_threshold(const struct ggn_windows *w, const double *logit, do
     }
     policy->threshold = threshold;
     *out = best;
-    return GGN_OK;
+    return 0;
 }
 
 double ggn_calibrate_slope(const struct ggn_windows *w, const double *logit, const struct ggn_policy *policy)

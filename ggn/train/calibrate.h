@@ -3,7 +3,7 @@
 #define GGN_TRAIN_CALIBRATE_H
 
 #include "model/policy.h"
-#include "train/windows.h"
+#include "data/windows.h"
 
 /* Platt 1999: scale, shift that maximise the likelihood of `label` under sigmoid(scale·logit + shift); a weak prior keeps
  * scale positive and finite when the classes are separable. Without both classes the policy keeps what it has. */
@@ -19,13 +19,13 @@ struct ggn_stopping {
 };
 /* logit: of each window of `windows`. */
 int ggn_calibrate_stopping(const struct ggn_windows *windows, const double *logit, const struct ggn_policy *policy, double t,
-                           struct ggn_stopping *out, struct ggn_err *err);
+                           struct ggn_stopping *out, struct base_err *err);
 
 /* The threshold, in steps of 0.01, with the smallest mean |log2(stop / true)| of those that keep the unsure rate at or below
  * `early_rate`; 0.01 if none does. (The largest that keeps the rate would be 0.99 whenever the few blocks are easy. The margin
  * of one spread: none of ten blocks stopped early says little about the next ten, whose labels are no surer.) */
 int ggn_calibrate_threshold(const struct ggn_windows *windows, const double *logit, double early_rate, struct ggn_policy *policy,
-                            struct ggn_stopping *out, struct ggn_err *err);
+                            struct ggn_stopping *out, struct base_err *err);
 
 /* Mean fall of the calibrated logit per octave of samples near the threshold. */
 double ggn_calibrate_slope(const struct ggn_windows *windows, const double *logit, const struct ggn_policy *policy);

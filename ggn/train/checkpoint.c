@@ -103,14 +103,14 @@ static double field(const cJSON *root, const char *name)
     return number(cJSON_GetObjectItemCaseSensitive(root, name));
 }
 
-static int restore(struct ggn_session *s, const cJSON *root, const char *path, struct ggn_err *err)
+static int restore(struct ggn_session *s, const cJSON *root, const char *path, struct base_err *err)
 {
     struct ggn_progress *p = &s->progress;
     const cJSON *row;
     double step = field(root, "step"), steps = field(root, "steps");
 
     if (!(step >= 0) || !(steps >= 0) || !(field(root, "t0") >= 0) || !(field(root, "t1") >= 0) || !(field(root, "t2") >= 0))
-        return ggn_fail(err, GGN_EINVAL, "%s: progress is missing", path);
+        return base_fail(err, BASE_EINVAL, "%s: progress is missing", path);
     p->step = (uint64_t)step;
     p->stale = (int)fmax(field(root, "stale"), 0);
     p->divergences = (int)fmax(field(root, "divergences"), 0);
@@ -131,17 +131,17 @@ static int restore(struct ggn_session *s, const cJSON *root, const char *path, s
         if (rc)
             return rc;
     }
-    return GGN_OK;
+    return 0;
 }
 
 /* --- file ---------------------------------------------------------------------------------------------------------------- */
 
-int ggn_session_save(struct ggn_session *s, const char *path, struct ggn_err *err)
+int ggn_session_save(struct ggn_session *s, const char *path, struct base_err *err)
 {
     struct ggn_container c = {.json = describe(s)};
     size_t count;
     float *array;
-    int rc = c.json ? GGN_OK : ggn_fail_nomem(err, "checkpoint");
+    int rc = c.json ? 0 : base_fail_nomem(err, "checkpoint");
 
     for (int i = 0; !rc && (array = ggn_session_array(s, i, &count)); i++) {
         char name[16];
@@ -155,7 +155,7 @@ int ggn_session_save(struct ggn_session *s, const char *path, struct ggn_err *er
     return rc;
 }
 
-static int read_file(const char *path, struct ggn_container *c, cJSON **root, struct ggn_err *err)
+static int read_file(const char *path, struct ggn_container *c, cJSON **root, struct base_err *err)
 {
     int rc = ggn_container_read(c, path, err);
 
@@ -164,13 +164,13 @@ static int read_file(const char *path, struct ggn_container *c, cJSON **root, st
     *root = cJSON_Parse(c->json);
     const cJSON *kind = cJSON_GetObjectItemCaseSensitive(*root, "kind");
     if (cJSON_IsString(kind) && !strcmp(kind->valuestring, "training"))
-        return GGN_OK;
+        return 0;
     cJSON_Delete(*root);
     ggn_container_release(c);
-    return ggn_fail(err, GGN_EINVAL, "%s: not a checkpoint of a training", path);
+    return base_fail(err, BASE_EINVAL, "%s: not a checkpoint of a training", path);
 }
 
-int ggn_session_saved_phase(const char *path, int *phase, struct ggn_err *err)
+int ggn_session_saved_phase(const char *path, int *phase, struct base_err *err)
 {
     struct ggn_container c = {0};
     cJSON *root = NULL;
@@ -182,12 +182,12 @@ int ggn_session_saved_phase(const char *path, int *phase, struct ggn_err *err)
     cJSON_Delete(root);
     ggn_container_release(&c);
     if (v != GGN_PHASE_DENOISER && v != GGN_PHASE_JUDGE)
-        return ggn_fail(err, GGN_EINVAL, "%s: of an unknown phase", path);
+        return base_fail(err, BASE_EINVAL, "%s: of an unknown phase", path);
     *phase = (int)v;
-    return GGN_OK;
+    return 0;
 }
 
-int ggn_session_restore(struct ggn_session *s, const char *path, struct ggn_err *err)
+int ggn_session_restore(struct ggn_session *s, const char *path, struct base_err *err)
 {
     struct ggn_container c = {0};
     cJSON *root = NULL;
@@ -198,7 +198,7 @@ int ggn_session_restore(struct ggn_session *s, const char *path, struct ggn_err 
     if (rc)
         return rc;
     if (field(root, "key") != ggn_session_key(s))
-        rc = ggn_fail(err, GGN_EINVAL, "%s: made with other data or options", path);
+        rc = base_fail(err, BASE_EINVAL, "%s: made with other data or options", path);
     for (int i = 0; !rc && (array = ggn_session_array(s, i, &count)); i++) {
         char name[16];
         int dim = (int)count;

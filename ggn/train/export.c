@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/fio.h"
+#include "base/files.h"
 #include "train/session.h"
 #include "train/start.h"
 
@@ -71,7 +71,7 @@ static cJSON *describe_validation(const struct ggn_stopping *st, double auc, dou
     return o;
 }
 
-static int write_card(const struct ggn_session *s, const struct ggn_model *model, struct ggn_err *err)
+static int write_card(const struct ggn_session *s, const struct ggn_model *model, struct base_err *err)
 {
     char path[4096];
     cJSON *card = cJSON_Duplicate(model->provenance, 1);
@@ -88,18 +88,18 @@ static int write_card(const struct ggn_session *s, const struct ggn_model *model
     char *text = cJSON_Print(card);
     cJSON_Delete(card);
     snprintf(path, sizeof path, "%s.card.json", s->plan->out);
-    int rc = text ? ggn_fio_write_line(path, text, err) : ggn_fail_nomem(err, "card");
+    int rc = text ? base_file_write_line(path, text, err) : base_fail_nomem(err, "card");
     free(text);
     return rc;
 }
 
 int ggn_session_export(struct ggn_session *s, const struct ggn_policy *policy, const struct ggn_stopping *stopping, double auc,
-                       double accuracy, struct ggn_err *err)
+                       double accuracy, struct base_err *err)
 {
     struct ggn_model *model = ggn_model_create(&s->hyper, err);
 
     if (!model)
-        return GGN_ENOMEM;
+        return BASE_ENOMEM;
     copy_weights(model->weights[GGN_NET_R], s->r);
     copy_weights(model->weights[GGN_NET_M], s->trainer->weights[GGN_NET_M]);
     copy_weights(model->weights[GGN_NET_D], s->trainer->weights[GGN_NET_D]);
@@ -123,7 +123,7 @@ int ggn_session_export(struct ggn_session *s, const struct ggn_policy *policy, c
     return rc;
 }
 
-int ggn_session_import(struct ggn_session *s, const char *path, struct ggn_err *err)
+int ggn_session_import(struct ggn_session *s, const char *path, struct base_err *err)
 {
     struct ggn_model *model = NULL;
     int rc = ggn_model_load(path, &model, err);
@@ -134,7 +134,7 @@ int ggn_session_import(struct ggn_session *s, const char *path, struct ggn_err *
     if (a->preset != b->preset || a->height != b->height || a->width != b->width || a->window != b->window || a->k_r != b->k_r ||
         a->k_m != b->k_m || a->k_d != b->k_d) {
         ggn_model_destroy(model);
-        return ggn_fail(err, GGN_EINVAL, "%s: networks of another size or preset", path);
+        return base_fail(err, BASE_EINVAL, "%s: networks of another size or preset", path);
     }
     if (!s->trainer) {
         copy_weights(s->r, model->weights[GGN_NET_R]);
@@ -148,5 +148,5 @@ int ggn_session_import(struct ggn_session *s, const char *path, struct ggn_err *
         ggn_weights_pack_f32(s->trainer->weights[GGN_NET_M]);
     }
     ggn_model_destroy(model);
-    return GGN_OK;
+    return 0;
 }

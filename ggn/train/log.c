@@ -5,19 +5,19 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/fio.h"
-#include "eval/plot.h"
+#include "base/files.h"
+#include "figures/plot.h"
 
-int ggn_log_add(struct ggn_log *log, const struct ggn_log_row *row, struct ggn_err *err)
+int ggn_log_add(struct ggn_log *log, const struct ggn_log_row *row, struct base_err *err)
 {
     if ((log->n & (log->n - 1)) == 0) {
         struct ggn_log_row *more = realloc(log->rows, (log->n ? 2 * (size_t)log->n : 1) * sizeof *more);
         if (!more)
-            return ggn_fail_nomem(err, "learning curves");
+            return base_fail_nomem(err, "learning curves");
         log->rows = more;
     }
     log->rows[log->n++] = *row;
-    return GGN_OK;
+    return 0;
 }
 
 void ggn_log_release(struct ggn_log *log)
@@ -34,10 +34,10 @@ static void put(FILE *f, double v, char after)
         fprintf(f, "%.9g%c", v, after);
 }
 
-int ggn_log_write_csv(const struct ggn_log *log, const char *path, struct ggn_err *err)
+int ggn_log_write_csv(const struct ggn_log *log, const char *path, struct base_err *err)
 {
-    struct ggn_fio_out out;
-    int rc = ggn_fio_begin(&out, path, err);
+    struct base_file_out out;
+    int rc = base_file_begin(&out, path, err);
 
     if (rc)
         return rc;
@@ -54,7 +54,7 @@ int ggn_log_write_csv(const struct ggn_log *log, const char *path, struct ggn_er
         put(out.file, r->lr, ',');
         fprintf(out.file, "%.1f\n", r->seconds);
     }
-    return ggn_fio_commit(&out, err);
+    return base_file_commit(&out, err);
 }
 
 static void data_block(FILE *f, const struct ggn_log *log, int phase)
@@ -77,7 +77,7 @@ static int has_phase(const struct ggn_log *log, int phase)
     return 0;
 }
 
-int ggn_log_draw(const struct ggn_log *log, const char *path, struct ggn_err *err)
+int ggn_log_draw(const struct ggn_log *log, const char *path, struct base_err *err)
 {
     struct ggn_plot plot;
     int denoiser = has_phase(log, 0), judge = has_phase(log, 1);

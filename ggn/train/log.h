@@ -15,10 +15,10 @@ struct ggn_log {
     struct ggn_log_row *rows; /* owns */
 };
 
-int ggn_log_add(struct ggn_log *log, const struct ggn_log_row *row, struct ggn_err *err);
+int ggn_log_add(struct ggn_log *log, const struct ggn_log_row *row, struct base_err *err);
 void ggn_log_release(struct ggn_log *log);
-int ggn_log_write_csv(const struct ggn_log *log, const char *path, struct ggn_err *err);
+int ggn_log_write_csv(const struct ggn_log *log, const char *path, struct base_err *err);
 /* Needs gnuplot. */
-int ggn_log_draw(const struct ggn_log *log, const char *path, struct ggn_err *err);
+int ggn_log_draw(const struct ggn_log *log, const char *path, struct base_err *err);
 
 #endif

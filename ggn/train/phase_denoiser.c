@@ -70,10 +70,10 @@ static void fill_batch(struct ggn_session *s, enum ggn_split split, uint64_t ste
 {
     struct fill f = {s, split, step, seed, first};
 
-    ggn_threads_for(s->threads, count, fill_sample, &f);
+    base_threads_for(s->threads, count, fill_sample, &f);
 }
 
-static int train_step(struct ggn_session *s, uint64_t step, double *loss, struct ggn_err *err)
+static int train_step(struct ggn_session *s, uint64_t step, double *loss, struct base_err *err)
 {
     const int n = s->plan->batch_r;
     const size_t plane = (size_t)s->plan->crop * (size_t)s->plan->crop;
@@ -125,12 +125,12 @@ static double validate(struct ggn_session *s)
 }
 
 /* One epoch; on divergence the trainer is back at the epoch's start and so is the step. */
-static int epoch(struct ggn_session *s, uint64_t end, struct ggn_err *err)
+static int epoch(struct ggn_session *s, uint64_t end, struct base_err *err)
 {
     struct ggn_log_row row = {.phase = GGN_PHASE_DENOISER, .accuracy = (double)NAN, .validation_accuracy = (double)NAN,
                               .validation_auc = (double)NAN};
     const uint64_t begin = s->progress.step;
-    double start = ggn_clock_wall_s(), loss;
+    double start = base_clock_wall_s(), loss;
 
     while (s->progress.step < end) {
         if (ggn_session_interrupted(s))
@@ -143,31 +143,31 @@ static int epoch(struct ggn_session *s, uint64_t end, struct ggn_err *err)
         row.loss += loss / (double)(end - begin);
         s->progress.step++;
     }
-    double seconds = ggn_clock_wall_s() - start;
+    double seconds = base_clock_wall_s() - start;
     row.lr = s->trainer->options.lr[GGN_NET_R];
     row.validation_loss = validate(s);
-    s->progress.seconds[0] += ggn_clock_wall_s() - start;
+    s->progress.seconds[0] += base_clock_wall_s() - start;
     ggn_trainer_keep_f32(s->trainer);
     return ggn_session_epoch(s, &row, (uint64_t)s->plan->steps_r, (double)(end - begin) * s->plan->batch_r, seconds, err);
 }
 
-int ggn_phase_denoiser(struct ggn_session *s, struct ggn_err *err)
+int ggn_phase_denoiser(struct ggn_session *s, struct base_err *err)
 {
     const uint64_t steps = (uint64_t)s->plan->steps_r;
 
     if (!nth_chain(s, GGN_SPLIT_TRAIN, -1) && steps)
-        return ggn_fail(err, GGN_EINVAL, "%s: no training block has a reference for the denoiser", s->plan->data.dir);
+        return base_fail(err, BASE_EINVAL, "%s: no training block has a reference for the denoiser", s->plan->data.dir);
     while (s->progress.step < steps) {
         uint64_t end = s->progress.step + (uint64_t)s->plan->epoch_steps;
         int rc = epoch(s, end < steps ? end : steps, err);
         if (rc == GGN_EDIVERGED && ++s->progress.divergences <= 8) {
             if (s->plan->progress)
                 fprintf(s->plan->progress, "%s; learning rates halved\n", err->text);
-            err->code = GGN_OK;
+            err->code = 0;
             continue;
         }
         if (rc)
             return rc;
     }
-    return GGN_OK;
+    return 0;
 }

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "base/clock.h"
-#include "eval/stats.h"
+#include "figures/stats.h"
 #include "model/window.h"
 #include "train/calibrate.h"
 #include "train/session.h"
@@ -60,7 +60,7 @@ static struct ggn_batch_f32 fill_batch(struct ggn_session *s, const struct fill 
     const size_t planes = 3 * (size_t)s->hyper.window;
     const float **noisy = s->planes, **second = s->planes + planes * (size_t)s->plan->batch;
 
-    ggn_threads_for(s->threads, count, fill_window, (void *)(size_t)f);
+    base_threads_for(s->threads, count, fill_window, (void *)(size_t)f);
     for (size_t i = 0; i < (size_t)count; i++)
         for (size_t k = 0; k < planes; k++) {
             noisy[i * planes + k] = s->buffer + 2 * i * window_values(s) + k * plane;
@@ -98,7 +98,7 @@ static void generate(struct ggn_session *s, const float *const *planes, int coun
 }
 
 int ggn_session_logits(struct ggn_session *s, const struct ggn_windows *windows, const int *index, int n, double *logit,
-                       struct ggn_err *err)
+                       struct base_err *err)
 {
     struct ggn_trainer_f32 *t = s->trainer;
     const int out = t->d->graph->n_values - 1;
@@ -116,7 +116,7 @@ int ggn_session_logits(struct ggn_session *s, const struct ggn_windows *windows,
         for (int i = 0; i < count; i++)
             logit[first + i] = (double)*ggn_exec_plane_f32(t->d, out, i, 0);
     }
-    return GGN_OK;
+    return 0;
 }
 
 struct denoise {
@@ -140,13 +140,13 @@ static void denoise_images(const struct denoise *d, struct ggn_chain *c, int fir
                            d->exec->graph->value[out].plane);
 }
 
-int ggn_session_denoise(struct ggn_session *s, enum ggn_split split, struct ggn_err *err)
+int ggn_session_denoise(struct ggn_session *s, enum ggn_split split, struct base_err *err)
 {
     enum { AT_ONCE = 4 };
     struct denoise d = {s, ggn_exec_create_f32(&s->r_graph, NULL, AT_ONCE, 0, s->threads, err)};
 
     if (!d.exec)
-        return GGN_ENOMEM;
+        return BASE_ENOMEM;
     ggn_weights_pack_f32(s->r);
     for (int i = 0; i < s->set.n; i++) {
         struct ggn_chain *c = &s->set.chains[i];
@@ -156,13 +156,13 @@ int ggn_session_denoise(struct ggn_session *s, enum ggn_split split, struct ggn_
             c->denoised = malloc((size_t)(c->n_levels ? c->n_levels : 1) * ggn_chains_values(&s->set) * sizeof *c->denoised);
         if (!c->denoised) {
             ggn_exec_destroy_f32(d.exec);
-            return ggn_fail_nomem(err, "denoised images");
+            return base_fail_nomem(err, "denoised images");
         }
         for (int k = 0; k < c->n_levels; k += AT_ONCE)
             denoise_images(&d, c, k, c->n_levels - k < AT_ONCE ? c->n_levels - k : AT_ONCE);
     }
     ggn_exec_destroy_f32(d.exec);
-    return GGN_OK;
+    return 0;
 }
 
 /* --- one step ------------------------------------------------------------------------------------------------------------ */
@@ -197,7 +197,7 @@ static int paper_window(const struct ggn_session *s, uint64_t step, int i)
     return (int)k;
 }
 
-static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, double *loss, double *right, struct ggn_err *err)
+static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, double *loss, double *right, struct base_err *err)
 {
     const int paper = s->hyper.preset == GGN_PRESET_PAPER, n = s->plan->batch;
     int index[1024];
@@ -226,7 +226,7 @@ static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, doub
         *right += (z > 0) == s->train.list[index[i]].noisy;
     }
     *right /= n;
-    return GGN_OK;
+    return 0;
 }
 
 /* --- validation ---------------------------------------------------------------------------------------------------------- */
@@ -243,13 +243,13 @@ static int choose_validation(const struct ggn_session *s, int *index)
 
 /* Loss and accuracy are those of the calibrated probability, as the model will be used: from epoch to epoch the logits of all
  * windows shift together, which says nothing about the model (loss 0.18 and 0.41 at an AUC of 0.992 and 0.995). */
-static int validate(struct ggn_session *s, struct ggn_log_row *row, struct ggn_err *err)
+static int validate(struct ggn_session *s, struct ggn_log_row *row, struct base_err *err)
 {
     size_t room = (size_t)s->plan->validation_windows + 1;
     int *index = malloc(room * sizeof *index), right = 0;
     double *logit = malloc(room * sizeof *logit), *label = malloc(room * sizeof *label);
     unsigned char *noisy = malloc(room);
-    int rc = index && logit && label && noisy ? GGN_OK : ggn_fail_nomem(err, "validation");
+    int rc = index && logit && label && noisy ? 0 : base_fail_nomem(err, "validation");
 
     row->validation_loss = row->validation_accuracy = row->validation_auc = (double)NAN;
     int n = rc ? 0 : choose_validation(s, index);
@@ -280,7 +280,7 @@ static int validate(struct ggn_session *s, struct ggn_log_row *row, struct ggn_e
 }
 
 /* Preset paper: the denoiser has moved on; its copy and the denoised validation images follow. */
-static int renew_denoiser(struct ggn_session *s, struct ggn_err *err)
+static int renew_denoiser(struct ggn_session *s, struct base_err *err)
 {
     const struct ggn_weights_f32 *from = s->trainer->weights[GGN_NET_R];
 
@@ -292,7 +292,7 @@ static int renew_denoiser(struct ggn_session *s, struct ggn_err *err)
 
 /* The loss on the validation scenes chooses the epoch. The AUC does not: with few blocks it saturates within a hundred steps, and
  * the networks of that time are far from what they learn later (they stopped 18 % of the training blocks early). */
-static int note_best(struct ggn_session *s, const struct ggn_log_row *row, struct ggn_err *err)
+static int note_best(struct ggn_session *s, const struct ggn_log_row *row, struct base_err *err)
 {
     struct ggn_progress *p = &s->progress;
     /* without validation windows (or with one class only) the last epoch counts; a checkpoint knows no infinity, only NaN */
@@ -300,17 +300,17 @@ static int note_best(struct ggn_session *s, const struct ggn_log_row *row, struc
 
     p->stale = better ? 0 : p->stale + 1;
     if (!better)
-        return GGN_OK;
+        return 0;
     p->best_loss = row->validation_loss;
     p->best_step = p->step;
     return ggn_session_keep_best(s, err);
 }
 
-static int epoch(struct ggn_session *s, uint64_t end, uint64_t steps, struct ggn_err *err)
+static int epoch(struct ggn_session *s, uint64_t end, uint64_t steps, struct base_err *err)
 {
     struct ggn_log_row row = {.phase = GGN_PHASE_JUDGE};
     const uint64_t begin = s->progress.step;
-    double start = ggn_clock_wall_s(), loss, right;
+    double start = base_clock_wall_s(), loss, right;
 
     while (s->progress.step < end) {
         if (ggn_session_interrupted(s))
@@ -324,8 +324,8 @@ static int epoch(struct ggn_session *s, uint64_t end, uint64_t steps, struct ggn
         row.accuracy += right / (double)(end - begin);
         s->progress.step++;
     }
-    double seconds = ggn_clock_wall_s() - start;
-    int rc = s->hyper.preset == GGN_PRESET_PAPER ? renew_denoiser(s, err) : GGN_OK;
+    double seconds = base_clock_wall_s() - start;
+    int rc = s->hyper.preset == GGN_PRESET_PAPER ? renew_denoiser(s, err) : 0;
     if (!rc)
         rc = validate(s, &row, err);
     if (!rc)
@@ -333,12 +333,12 @@ static int epoch(struct ggn_session *s, uint64_t end, uint64_t steps, struct ggn
     if (rc)
         return rc;
     row.lr = s->trainer->options.lr[GGN_NET_M];
-    s->progress.seconds[1] += ggn_clock_wall_s() - start;
+    s->progress.seconds[1] += base_clock_wall_s() - start;
     ggn_trainer_keep_f32(s->trainer);
     return ggn_session_epoch(s, &row, steps, (double)(end - begin) * s->plan->batch, seconds, err);
 }
 
-int ggn_phase_judge(struct ggn_session *s, struct ggn_err *err)
+int ggn_phase_judge(struct ggn_session *s, struct base_err *err)
 {
     const uint64_t steps = s->plan->steps ? (uint64_t)s->plan->steps : (uint64_t)s->plan->epochs * epoch_length(s);
     const uint64_t length = s->plan->epoch_steps ? (uint64_t)s->plan->epoch_steps : epoch_length(s);
@@ -349,7 +349,7 @@ int ggn_phase_judge(struct ggn_session *s, struct ggn_err *err)
         if (rc == GGN_EDIVERGED && ++s->progress.divergences <= 8) {
             if (s->plan->progress)
                 fprintf(s->plan->progress, "%s; learning rates halved\n", err->text);
-            err->code = GGN_OK;
+            err->code = 0;
             continue;
         }
         if (rc)
@@ -357,5 +357,5 @@ int ggn_phase_judge(struct ggn_session *s, struct ggn_err *err)
         if (s->plan->patience && s->progress.stale >= s->plan->patience)
             break;
     }
-    return GGN_OK;
+    return 0;
 }

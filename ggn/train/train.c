@@ -5,7 +5,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-#include "eval/stats.h"
+#include "figures/stats.h"
 #include "train/session.h"
 #include "train/start.h"
 
@@ -87,7 +87,7 @@ static void say(const struct ggn_session *s, const struct ggn_log_row *row, uint
 }
 
 int ggn_session_epoch(struct ggn_session *s, struct ggn_log_row *row, uint64_t steps, double samples, double seconds,
-                      struct ggn_err *err)
+                      struct base_err *err)
 {
     char path[4096];
 
@@ -117,14 +117,14 @@ static void copy_net(float *flat, struct ggn_weights_f32 *w, int store)
         ggn_weights_pack_f32(w);
 }
 
-int ggn_session_keep_best(struct ggn_session *s, struct ggn_err *err)
+int ggn_session_keep_best(struct ggn_session *s, struct base_err *err)
 {
     (void)err;
     copy_net(s->best[0], s->trainer->weights[GGN_NET_M], 1);
     copy_net(s->best[1], s->trainer->weights[GGN_NET_D], 1);
     if (s->best_r)
         copy_net(s->best_r, s->trainer->weights[GGN_NET_R], 1);
-    return GGN_OK;
+    return 0;
 }
 
 void ggn_session_load_best(struct ggn_session *s)
@@ -137,33 +137,33 @@ void ggn_session_load_best(struct ggn_session *s)
 
 /* --- set-up --------------------------------------------------------------------------------------------------------------- */
 
-static int check_plan(const struct ggn_session *s, struct ggn_err *err)
+static int check_plan(const struct ggn_session *s, struct base_err *err)
 {
     const struct ggn_train_plan *p = s->plan;
     const int paper = p->preset == GGN_PRESET_PAPER;
 
     if (p->batch < 1 || p->batch > 1024 || p->batch_r < 1 || p->batch_r > 1024)
-        return ggn_fail(err, GGN_EINVAL, "a batch has 1 to 1024 samples");
+        return base_fail(err, BASE_EINVAL, "a batch has 1 to 1024 samples");
     if (!paper && (p->crop < 16 || p->crop > s->set.width || p->crop > s->set.height))
-        return ggn_fail(err, GGN_EINVAL, "crop %d is not in 16..%d, the side of the blocks", p->crop,
+        return base_fail(err, BASE_EINVAL, "crop %d is not in 16..%d, the side of the blocks", p->crop,
                         s->set.width < s->set.height ? s->set.width : s->set.height);
     if (p->k_r < 3)
-        return ggn_fail(err, GGN_EINVAL, "the denoiser needs a width of at least 3");
+        return base_fail(err, BASE_EINVAL, "the denoiser needs a width of at least 3");
     if (!s->train.n)
-        return ggn_fail(err, GGN_EINVAL, "%s: no training block has a label and %d levels; run `ggn label` first", p->data.dir, p->window);
+        return base_fail(err, BASE_EINVAL, "%s: no training block has a label and %d levels; run `ggn label` first", p->data.dir, p->window);
     int noisy = 0;
     for (int i = 0; i < s->train.n; i++) {
         noisy += s->train.list[i].noisy;
         if (paper && !s->set.chains[s->train.list[i].chain].reference)
-            return ggn_fail(err, GGN_EINVAL, "%s: preset paper needs a reference for each training block", p->data.dir);
+            return base_fail(err, BASE_EINVAL, "%s: preset paper needs a reference for each training block", p->data.dir);
     }
     if (noisy == 0 || noisy == s->train.n)
-        return ggn_fail(err, GGN_EINVAL, "%s: all %d training windows are %s: nothing to tell apart", p->data.dir, s->train.n,
+        return base_fail(err, BASE_EINVAL, "%s: all %d training windows are %s: nothing to tell apart", p->data.dir, s->train.n,
                         noisy ? "noisy" : "free of noise");
-    return GGN_OK;
+    return 0;
 }
 
-static int prepare(struct ggn_session *s, struct ggn_err *err)
+static int prepare(struct ggn_session *s, struct base_err *err)
 {
     const struct ggn_train_plan *p = s->plan;
     const int paper = p->preset == GGN_PRESET_PAPER;
@@ -190,13 +190,13 @@ static int prepare(struct ggn_session *s, struct ggn_err *err)
     rc = ggn_network_build(&s->r_graph, GGN_NET_R, &s->hyper, err);
     s->r = rc ? NULL : ggn_weights_create_f32(&s->r_graph, NULL, 0, err);
     if (!s->r)
-        return rc ? rc : GGN_ENOMEM;
+        return rc ? rc : BASE_ENOMEM;
     size_t crops = 6 * (size_t)p->batch_r * (size_t)p->crop * (size_t)p->crop;
     size_t windows = 2 * (size_t)p->batch * (size_t)p->window * ggn_chains_values(&s->set);
     size_t pointers = 6 * (size_t)p->batch_r + 6 * (size_t)p->batch * (size_t)p->window;
     s->buffer = malloc((crops > windows ? crops : windows) * sizeof *s->buffer);
     s->planes = malloc(pointers * sizeof *s->planes);
-    return s->buffer && s->planes ? GGN_OK : ggn_fail_nomem(err, "a batch");
+    return s->buffer && s->planes ? 0 : base_fail_nomem(err, "a batch");
 }
 
 static void session_release(struct ggn_session *s)
@@ -212,7 +212,7 @@ static void session_release(struct ggn_session *s)
     ggn_windows_release(&s->train);
     ggn_windows_release(&s->validation);
     ggn_chains_release(&s->set);
-    ggn_threads_destroy(s->threads);
+    base_threads_destroy(s->threads);
 }
 
 static struct ggn_train_options trainer_options(const struct ggn_session *s, int parts, int batch)
@@ -227,7 +227,7 @@ static struct ggn_train_options trainer_options(const struct ggn_session *s, int
     return o;
 }
 
-static int begin_denoiser(struct ggn_session *s, struct ggn_err *err)
+static int begin_denoiser(struct ggn_session *s, struct base_err *err)
 {
     struct ggn_hyper crop = s->hyper;
     struct ggn_train_options o = trainer_options(s, GGN_TRAIN_R, s->plan->batch_r);
@@ -236,7 +236,7 @@ static int begin_denoiser(struct ggn_session *s, struct ggn_err *err)
     s->progress.phase = GGN_PHASE_DENOISER;
     s->trainer = ggn_trainer_create_f32(&crop, &o, s->threads, err);
     if (!s->trainer)
-        return GGN_ENOMEM;
+        return BASE_ENOMEM;
     struct ggn_weights_f32 *w = s->trainer->weights[GGN_NET_R];
     if (s->plan->init) {
         memcpy(w->params, s->r->params, s->r_graph.n_params * sizeof *w->params);
@@ -247,7 +247,7 @@ static int begin_denoiser(struct ggn_session *s, struct ggn_err *err)
     }
     ggn_weights_pack_f32(w);
     ggn_trainer_keep_f32(s->trainer);
-    return GGN_OK;
+    return 0;
 }
 
 /* The denoiser's weights leave the trainer of crops for good. */
@@ -263,7 +263,7 @@ static void end_denoiser(struct ggn_session *s)
     s->trainer = NULL;
 }
 
-static int begin_judge(struct ggn_session *s, struct ggn_err *err)
+static int begin_judge(struct ggn_session *s, struct base_err *err)
 {
     const int paper = s->plan->preset == GGN_PRESET_PAPER;
     struct ggn_train_options o = trainer_options(s, paper ? GGN_TRAIN_ALL : GGN_TRAIN_MD, s->plan->batch);
@@ -272,21 +272,21 @@ static int begin_judge(struct ggn_session *s, struct ggn_err *err)
                                         .seconds = {s->progress.seconds[0], 0}};
     s->trainer = ggn_trainer_create_f32(&s->hyper, &o, s->threads, err);
     if (!s->trainer)
-        return GGN_ENOMEM;
+        return BASE_ENOMEM;
     for (int i = 0; i < 2; i++) {
         const struct ggn_graph *g = &s->trainer->graph[i ? GGN_NET_D : GGN_NET_M];
         s->best[i] = calloc(g->n_params + 2 * g->n_stats, sizeof *s->best[i]);
     }
     s->best_r = paper ? calloc(s->r_graph.n_params + 2 * s->r_graph.n_stats, sizeof *s->best_r) : NULL;
     if (!s->best[0] || !s->best[1] || (paper && !s->best_r))
-        return ggn_fail_nomem(err, "the best epoch");
-    return GGN_OK;
+        return base_fail_nomem(err, "the best epoch");
+    return 0;
 }
 
 /* --- the end -------------------------------------------------------------------------------------------------------------- */
 
 /* Calibration and policy from all validation windows (real levels only). */
-static int finish(struct ggn_session *s, struct ggn_err *err)
+static int finish(struct ggn_session *s, struct base_err *err)
 {
     struct ggn_policy policy = ggn_policy_default();
     struct ggn_stopping stopping = {0};
@@ -296,7 +296,7 @@ static int finish(struct ggn_session *s, struct ggn_err *err)
     double *logit = malloc(room * sizeof *logit), *label = malloc(room * sizeof *label);
     double auc = (double)NAN, slope = 0;
     unsigned char *noisy = malloc(room);
-    int rc = index && logit && label && noisy ? GGN_OK : ggn_fail_nomem(err, "calibration");
+    int rc = index && logit && label && noisy ? 0 : base_fail_nomem(err, "calibration");
 
     ggn_session_load_best(s);
     for (int i = 0; !rc && i < n; i++) {
@@ -333,16 +333,16 @@ static int finish(struct ggn_session *s, struct ggn_err *err)
     return rc;
 }
 
-static int draw_curves(const struct ggn_session *s, struct ggn_err *err)
+static int draw_curves(const struct ggn_session *s, struct base_err *err)
 {
     char path[4096];
 
     path_of(s, ".png", path, sizeof path);
-    struct ggn_err picture = {0};
+    struct base_err picture = {0};
     if (ggn_log_draw(&s->log, path, &picture) && s->plan->progress)
         fprintf(s->plan->progress, "no picture of the learning curves: %s\n", picture.text); /* gnuplot is optional */
     (void)err;
-    return GGN_OK;
+    return 0;
 }
 
 static void announce(const struct ggn_session *s)
@@ -359,10 +359,10 @@ static void announce(const struct ggn_session *s)
 }
 
 /* Runs the phases from `phase` on. */
-static int run(struct ggn_session *s, int phase, int resume, const char *checkpoint, struct ggn_err *err)
+static int run(struct ggn_session *s, int phase, int resume, const char *checkpoint, struct base_err *err)
 {
     const int paper = s->plan->preset == GGN_PRESET_PAPER;
-    int rc = GGN_OK;
+    int rc = 0;
 
     if (phase == GGN_PHASE_DENOISER) {
         rc = begin_denoiser(s, err);
@@ -395,7 +395,7 @@ static int run(struct ggn_session *s, int phase, int resume, const char *checkpo
     return rc ? rc : ggn_phase_judge(s, err);
 }
 
-int ggn_train(const struct ggn_train_plan *plan, struct ggn_err *err)
+int ggn_train(const struct ggn_train_plan *plan, struct base_err *err)
 {
     struct ggn_session s = {.plan = plan};
     char checkpoint[4096];
@@ -404,10 +404,10 @@ int ggn_train(const struct ggn_train_plan *plan, struct ggn_err *err)
 
     path_of(&s, ".ckpt", checkpoint, sizeof checkpoint);
     int resume = plan->resume && stat(checkpoint, &st) == 0;
-    int rc = resume ? ggn_session_saved_phase(checkpoint, &phase, err) : GGN_OK;
-    s.threads = rc ? NULL : ggn_threads_create(plan->threads > 0 ? plan->threads : ggn_threads_available(), err);
+    int rc = resume ? ggn_session_saved_phase(checkpoint, &phase, err) : 0;
+    s.threads = rc ? NULL : base_threads_create(plan->threads > 0 ? plan->threads : base_threads_available(), err);
     if (!rc && !s.threads)
-        rc = GGN_ENOMEM;
+        rc = BASE_ENOMEM;
     if (!rc)
         rc = prepare(&s, err);
     if (!rc) {

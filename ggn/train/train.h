@@ -16,9 +16,9 @@
 #include <stdio.h>
 
 #include "model/networks.h"
-#include "train/chains.h"
+#include "data/chains.h"
 
-enum { GGN_TRAIN_INTERRUPTED = 1 }; /* returned by ggn_train beside GGN_OK and errors */
+enum { GGN_TRAIN_INTERRUPTED = 1 }; /* returned by ggn_train beside 0 and errors */
 
 struct ggn_train_plan {
     struct ggn_chains_options data;
@@ -49,6 +49,6 @@ struct ggn_train_plan {
 struct ggn_train_plan ggn_train_plan_default(enum ggn_preset preset);
 
 /* Runs the plan. GGN_TRAIN_INTERRUPTED: the checkpoint of the last finished epoch is there. */
-int ggn_train(const struct ggn_train_plan *plan, struct ggn_err *err);
+int ggn_train(const struct ggn_train_plan *plan, struct base_err *err);
 
 #endif

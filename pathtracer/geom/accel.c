@@ -228,14 +228,14 @@ static int build(struct pt_scene *scene, struct pt_accel *accel)
     return rtcGetDeviceError(accel->device) == RTC_ERROR_NONE;
 }
 
-int pt_accel_build(struct pt_scene *scene, struct pt_err *err)
+int pt_accel_build(struct pt_scene *scene, struct base_err *err)
 {
     struct pt_accel *accel = calloc(1, sizeof *accel);
     if (!accel)
-        return pt_fail_nomem(err, "the acceleration structure");
+        return base_fail_nomem(err, "the acceleration structure");
     if (!build(scene, accel)) {
         destroy(accel);
-        return pt_fail_nomem(err, "the acceleration structure");
+        return base_fail_nomem(err, "the acceleration structure");
     }
     struct RTCBounds b;
     rtcGetSceneBounds(accel->world, &b);
@@ -246,7 +246,7 @@ int pt_accel_build(struct pt_scene *scene, struct pt_err *err)
         scene->bounds_min = scene->bounds_max = v3_splat(0.0f);
     }
     scene->accel = accel;
-    return PT_OK;
+    return 0;
 }
 
 void pt_accel_release(struct pt_scene *scene)

@@ -11,7 +11,7 @@
 #include "scene/scene.h"
 
 /* Builds scene->accel and the bounds from shapes, objects and instances. On failure the scene is unchanged. */
-int pt_accel_build(struct pt_scene *scene, struct pt_err *err);
+int pt_accel_build(struct pt_scene *scene, struct base_err *err);
 /* Frees scene->accel; safe when there is none. */
 void pt_accel_release(struct pt_scene *scene);
 /* Bytes that the structure holds. */

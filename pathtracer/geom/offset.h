@@ -6,7 +6,7 @@
 #ifndef PT_GEOM_OFFSET_H
 #define PT_GEOM_OFFSET_H
 
-#include "base/vec.h"
+#include "scene/vec.h"
 
 /* Per-axis error of a point interpolated from corners, relative to the largest corner coordinate: γ(7) for the point itself,
  * and as much again for the intersection's own distance, whose rounding is relative to the corners too. */

@@ -6,7 +6,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "base/fio.h"
+#include "base/files.h"
 
 enum { MAX_CHANNELS = 64 };
 
@@ -105,14 +105,14 @@ static exr_result_t write_pixels(exr_context_t file, const struct pt_exr_image *
     return rc;
 }
 
-int pt_exr_write(const char *path, const struct pt_exr_image *image, struct pt_err *err)
+int pt_exr_write(const char *path, const struct pt_exr_image *image, struct base_err *err)
 {
     char tmp_path[4200];
-    int rc = pt_fio_tmp_name(path, tmp_path, sizeof tmp_path, err);
-    if (rc != PT_OK)
+    int rc = base_file_tmp_name(path, tmp_path, sizeof tmp_path, err);
+    if (rc)
         return rc;
     if (image->channel_count < 1 || image->channel_count > MAX_CHANNELS)
-        return pt_fail(err, PT_EINVAL, "%s: %d channels, at most %d can be written", path, image->channel_count, MAX_CHANNELS);
+        return base_fail(err, BASE_EINVAL, "%s: %d channels, at most %d can be written", path, image->channel_count, MAX_CHANNELS);
     exr_context_t file = NULL;
     exr_context_initializer_t init = EXR_DEFAULT_CONTEXT_INITIALIZER;
     init.error_handler_fn = ignore_message;
@@ -125,9 +125,9 @@ int pt_exr_write(const char *path, const struct pt_exr_image *image, struct pt_e
     if (code == EXR_ERR_SUCCESS)
         code = finish;
     if (code == EXR_ERR_SUCCESS)
-        return pt_fio_rename(tmp_path, path, err);
+        return base_file_rename(tmp_path, path, err);
     unlink(tmp_path);
     if (code == EXR_ERR_OUT_OF_MEMORY)
-        return pt_fail_nomem(err, path);
-    return pt_fail(err, PT_EIO, "%s: cannot write EXR: %s", path, exr_get_default_error_message(code));
+        return base_fail_nomem(err, path);
+    return base_fail(err, BASE_EIO, "%s: cannot write EXR: %s", path, exr_get_default_error_message(code));
 }

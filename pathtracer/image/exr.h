@@ -25,6 +25,6 @@ struct pt_exr_image {
     void *data;
 };
 
-int pt_exr_write(const char *path, const struct pt_exr_image *image, struct pt_err *err);
+int pt_exr_write(const char *path, const struct pt_exr_image *image, struct base_err *err);
 
 #endif

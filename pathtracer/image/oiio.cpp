@@ -16,7 +16,7 @@
 #include <zlib.h>
 
 extern "C" {
-#include "base/fio.h"
+#include "base/files.h"
 }
 
 namespace {
@@ -40,15 +40,15 @@ std::string one_line(const std::string &text)
     return line.empty() ? std::string("unknown reason") : line;
 }
 
-int read_pixels(OIIO::ImageInput &input, const char *name, pt_oiio_image *out, pt_err *err)
+int read_pixels(OIIO::ImageInput &input, const char *name, pt_oiio_image *out, base_err *err)
 {
     const OIIO::ImageSpec &spec = input.spec();
     const int channels = std::min(spec.nchannels, 4);
     if (spec.width <= 0 || spec.height <= 0 || channels <= 0 || spec.depth > 1)
-        return pt_fail(err, PT_EINVAL, "%s: not a 2-D image (%dx%dx%d, %d channels)", name, spec.width, spec.height, spec.depth,
+        return base_fail(err, BASE_EINVAL, "%s: not a 2-D image (%dx%dx%d, %d channels)", name, spec.width, spec.height, spec.depth,
                        spec.nchannels);
     if (static_cast<long long>(spec.width) * spec.height > max_pixels)
-        return pt_fail(err, PT_EINVAL, "%s: %dx%d pixels, more than the 2^28 an image may have", name, spec.width, spec.height);
+        return base_fail(err, BASE_EINVAL, "%s: %dx%d pixels, more than the 2^28 an image may have", name, spec.width, spec.height);
     const bool bytes = spec.format == OIIO::TypeDesc::UINT8;
     const OIIO::TypeDesc type = bytes ? OIIO::TypeDesc::UINT8 : OIIO::TypeDesc::FLOAT;
     const bool is_float = spec.format.is_floating_point();
@@ -56,14 +56,14 @@ int read_pixels(OIIO::ImageInput &input, const char *name, pt_oiio_image *out, p
     const size_t count = static_cast<size_t>(width) * static_cast<size_t>(height) * static_cast<size_t>(channels);
     void *pixels = std::calloc(count, bytes ? 1 : sizeof(float));
     if (pixels == nullptr)
-        return pt_fail_nomem(err, name);
+        return base_fail_nomem(err, name);
     if (!input.read_image(0, 0, 0, channels, type, pixels)) {
         std::free(pixels);
-        return pt_fail(err, PT_EINVAL, "%s: %s", name, one_line(input.geterror()).c_str());
+        return base_fail(err, BASE_EINVAL, "%s: %s", name, one_line(input.geterror()).c_str());
     }
     *out = pt_oiio_image{width, height, channels, is_float, bytes ? static_cast<uint8_t *>(pixels) : nullptr,
                          bytes ? nullptr : static_cast<float *>(pixels)};
-    return PT_OK;
+    return 0;
 }
 
 /* Keeps alpha as stored: pbrt never premultiplies. */
@@ -82,41 +82,41 @@ bool is_png(const char *name)
 
 /* libpng prints on stderr when a file is damaged (and OpenImageIO then leaks), so damage is found before it sees the data:
  * signature, chunk lengths, checksums, end marker (PNG specification, §5). */
-int check_png(const char *name, const unsigned char *data, size_t size, pt_err *err)
+int check_png(const char *name, const unsigned char *data, size_t size, base_err *err)
 {
     static const unsigned char signature[8] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
     if (size < sizeof signature || std::memcmp(data, signature, sizeof signature) != 0)
-        return pt_fail(err, PT_EINVAL, "%s: not a PNG file", name);
+        return base_fail(err, BASE_EINVAL, "%s: not a PNG file", name);
     const auto be32 = [data](size_t at) {
         return static_cast<uint32_t>(data[at]) << 24 | static_cast<uint32_t>(data[at + 1]) << 16 |
                static_cast<uint32_t>(data[at + 2]) << 8 | static_cast<uint32_t>(data[at + 3]);
     };
     for (size_t at = sizeof signature; at < size;) {
         if (size - at < 12 || be32(at) > size - at - 12)
-            return pt_fail(err, PT_EINVAL, "%s: truncated PNG file", name);
+            return base_fail(err, BASE_EINVAL, "%s: truncated PNG file", name);
         const size_t length = be32(at);
         if (crc32(0, data + at + 4, static_cast<uInt>(length + 4)) != be32(at + 8 + length))
-            return pt_fail(err, PT_EINVAL, "%s: damaged PNG file (checksum at byte %zu)", name, at);
+            return base_fail(err, BASE_EINVAL, "%s: damaged PNG file (checksum at byte %zu)", name, at);
         if (std::memcmp(data + at + 4, "IEND", 4) == 0)
-            return PT_OK;
+            return 0;
         at += length + 12;
     }
-    return pt_fail(err, PT_EINVAL, "%s: truncated PNG file", name);
+    return base_fail(err, BASE_EINVAL, "%s: truncated PNG file", name);
 }
 
 } // namespace
 
-extern "C" int pt_oiio_read(const char *path, struct pt_oiio_image *out, struct pt_err *err)
+extern "C" int pt_oiio_read(const char *path, struct pt_oiio_image *out, struct base_err *err)
 {
     try {
         configure_once();
         if (access(path, R_OK) != 0)
-            return pt_fail(err, PT_EIO, "%s: %s", path, std::strerror(errno));
+            return base_fail(err, BASE_EIO, "%s: %s", path, std::strerror(errno));
         if (is_png(path)) {
             char *data = nullptr;
             size_t size = 0;
-            int rc = pt_fio_read(path, 1u << 30, &data, &size, err);
-            if (rc == PT_OK)
+            int rc = base_file_read(path, 1u << 30, &data, &size, err);
+            if (!rc)
                 rc = pt_oiio_read_memory(path, data, size, out, err);
             std::free(data);
             return rc;
@@ -124,23 +124,23 @@ extern "C" int pt_oiio_read(const char *path, struct pt_oiio_image *out, struct 
         const OIIO::ImageSpec config = raw_config();
         std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::open(path, &config);
         if (!input)
-            return pt_fail(err, PT_EINVAL, "%s: not an image that can be read: %s", path, one_line(OIIO::geterror()).c_str());
+            return base_fail(err, BASE_EINVAL, "%s: not an image that can be read: %s", path, one_line(OIIO::geterror()).c_str());
         return read_pixels(*input, path, out, err);
     } catch (const std::bad_alloc &) {
-        return pt_fail_nomem(err, path);
+        return base_fail_nomem(err, path);
     } catch (const std::exception &e) {
-        return pt_fail(err, PT_EINVAL, "%s: %s", path, one_line(e.what()).c_str());
+        return base_fail(err, BASE_EINVAL, "%s: %s", path, one_line(e.what()).c_str());
     }
 }
 
 extern "C" int pt_oiio_read_memory(const char *name, const void *data, size_t size, struct pt_oiio_image *out,
-                                   struct pt_err *err)
+                                   struct base_err *err)
 {
     try {
         configure_once();
         if (is_png(name)) {
             const int rc = check_png(name, static_cast<const unsigned char *>(data), size, err);
-            if (rc != PT_OK)
+            if (rc)
                 return rc;
         }
         OIIO::Filesystem::IOMemReader reader(data, size);
@@ -149,18 +149,18 @@ extern "C" int pt_oiio_read_memory(const char *name, const void *data, size_t si
         std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(extension, false);
         if (!input || input->supports("ioproxy") == 0) {
             OIIO::geterror();
-            return pt_fail(err, PT_EINVAL, "%s: this format cannot be read from memory", name);
+            return base_fail(err, BASE_EINVAL, "%s: this format cannot be read from memory", name);
         }
         OIIO::ImageSpec config = raw_config(), spec;
         OIIO::Filesystem::IOProxy *proxy = &reader;
         config.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &proxy);
         if (!input->open(name, spec, config))
-            return pt_fail(err, PT_EINVAL, "%s: not an image that can be read: %s", name, one_line(input->geterror()).c_str());
+            return base_fail(err, BASE_EINVAL, "%s: not an image that can be read: %s", name, one_line(input->geterror()).c_str());
         return read_pixels(*input, name, out, err);
     } catch (const std::bad_alloc &) {
-        return pt_fail_nomem(err, name);
+        return base_fail_nomem(err, name);
     } catch (const std::exception &e) {
-        return pt_fail(err, PT_EINVAL, "%s: %s", name, one_line(e.what()).c_str());
+        return base_fail(err, BASE_EINVAL, "%s: %s", name, one_line(e.what()).c_str());
     }
 }
 
@@ -173,31 +173,31 @@ extern "C" void pt_oiio_release(struct pt_oiio_image *image)
 
 /* Encoded in memory and then written by us: OpenImageIO's PNG writer does not notice a disk that is full. */
 extern "C" int pt_oiio_write_png(const char *path, int32_t width, int32_t height, int32_t channels, const uint8_t *pixels,
-                                 struct pt_err *err)
+                                 struct base_err *err)
 {
     if (width < 1 || height < 1 || channels < 1 || channels > 4)
-        return pt_fail(err, PT_EINVAL, "%s: cannot write %dx%d pixels of %d channels as PNG", path, width, height, channels);
+        return base_fail(err, BASE_EINVAL, "%s: cannot write %dx%d pixels of %d channels as PNG", path, width, height, channels);
     try {
         configure_once();
         std::vector<unsigned char> bytes;
         OIIO::Filesystem::IOVecOutput memory(bytes);
         std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create("png");
         if (!output)
-            return pt_fail(err, PT_EIO, "%s: OpenImageIO was built without PNG", path);
+            return base_fail(err, BASE_EIO, "%s: OpenImageIO was built without PNG", path);
         OIIO::ImageSpec spec(width, height, channels, OIIO::TypeDesc::UINT8);
         spec.attribute("oiio:ColorSpace", "sRGB");
         if (channels == 4)
             spec.attribute("oiio:UnassociatedAlpha", 1);
         if (!output->set_ioproxy(&memory) || !output->open(path, spec) || !output->write_image(OIIO::TypeDesc::UINT8, pixels) ||
             !output->close())
-            return pt_fail(err, PT_EIO, "%s: %s", path, one_line(output->geterror()).c_str());
-        struct pt_fio_out file;
-        int rc = pt_fio_begin(&file, path, err);
-        if (rc != PT_OK)
+            return base_fail(err, BASE_EIO, "%s: %s", path, one_line(output->geterror()).c_str());
+        struct base_file_out file;
+        int rc = base_file_begin(&file, path, err);
+        if (rc)
             return rc;
         fwrite(bytes.data(), 1, bytes.size(), file.file);
-        return pt_fio_commit(&file, err);
+        return base_file_commit(&file, err);
     } catch (const std::exception &e) {
-        return pt_fail(err, PT_EIO, "%s: %s", path, one_line(e.what()).c_str());
+        return base_fail(err, BASE_EIO, "%s: %s", path, one_line(e.what()).c_str());
     }
 }

@@ -23,20 +23,20 @@ struct pt_oiio_image {
 };
 
 /* Reads the first sub-image of `path`. EXR, HDR, PFM, PNG, JPEG, TGA, TIFF … whatever OpenImageIO reads; more than four
- * channels are cut to the first four. PT_EIO when it cannot be opened, PT_EINVAL when it is no image, damaged, or larger than
+ * channels are cut to the first four. BASE_EIO when it cannot be opened, BASE_EINVAL when it is no image, damaged, or larger than
  * 2^28 pixels. On success the caller releases *out. */
-int pt_oiio_read(const char *path, struct pt_oiio_image *out, struct pt_err *err);
+int pt_oiio_read(const char *path, struct pt_oiio_image *out, struct base_err *err);
 
 /* The same from memory; `name` only tells the format by its extension and names the image in errors. Formats that
- * OpenImageIO reads from files alone are refused (PT_EINVAL). */
-int pt_oiio_read_memory(const char *name, const void *data, size_t size, struct pt_oiio_image *out, struct pt_err *err);
+ * OpenImageIO reads from files alone are refused (BASE_EINVAL). */
+int pt_oiio_read_memory(const char *name, const void *data, size_t size, struct pt_oiio_image *out, struct base_err *err);
 
 /* Frees the pixels and zeroes *image. */
 void pt_oiio_release(struct pt_oiio_image *image);
 
 /* Writes sRGB-encoded 8-bit pixels, channels in [1, 4], as PNG to a temporary beside `path` and renames it. */
 int pt_oiio_write_png(const char *path, int32_t width, int32_t height, int32_t channels, const uint8_t *pixels,
-                      struct pt_err *err);
+                      struct base_err *err);
 
 #ifdef __cplusplus
 }

@@ -89,7 +89,7 @@ static void paint_legend(const struct pt_canvas *canvas, int top, uint64_t low, 
 }
 
 int pt_stopmap_draw(int x0, int y0, int x1, int y1, const struct pt_stopmap_block *blocks, uint32_t count,
-                    struct pt_stopmap *out, struct pt_err *err)
+                    struct pt_stopmap *out, struct base_err *err)
 {
     uint64_t low = UINT64_MAX, high = 0;
     int widest = 1;
@@ -107,7 +107,7 @@ int pt_stopmap_draw(int x0, int y0, int x1, int y1, const struct pt_stopmap_bloc
     struct pt_stopmap map = {.width = (x1 - x0) * enlarge, .height = (y1 - y0) * enlarge + LEGEND_HEIGHT};
     map.rgb = calloc((size_t)map.width * (size_t)map.height, 3);
     if (map.rgb == NULL)
-        return pt_fail_nomem(err, "stop map");
+        return base_fail_nomem(err, "stop map");
     char longest[24];
     int digits = snprintf(longest, sizeof longest, "%llu", (unsigned long long)high);
     struct pt_canvas canvas = {.width = map.width, .height = map.height, .rgb = map.rgb};
@@ -118,7 +118,7 @@ int pt_stopmap_draw(int x0, int y0, int x1, int y1, const struct pt_stopmap_bloc
     }
     paint_legend(&canvas, (y1 - y0) * enlarge, low, high);
     *out = map;
-    return PT_OK;
+    return 0;
 }
 
 void pt_stopmap_release(struct pt_stopmap *map)

@@ -21,7 +21,7 @@ struct pt_stopmap {
 
 /* Paints blocks of the area [x0, x1) x [y0, y1); small blocks are enlarged until their numbers fit. */
 int pt_stopmap_draw(int x0, int y0, int x1, int y1, const struct pt_stopmap_block *blocks, uint32_t count,
-                    struct pt_stopmap *out, struct pt_err *err);
+                    struct pt_stopmap *out, struct base_err *err);
 void pt_stopmap_release(struct pt_stopmap *map);
 
 /* Colour of t in [0, 1] (clamped), dark blue to yellow, perceptually uniform. */

@@ -9,8 +9,8 @@
 
 #include <stdint.h>
 
-#include "base/vec.h"
-#include "integ/effects.h"
+#include "scene/vec.h"
+#include "scene/effects.h"
 
 struct pt_scene;
 

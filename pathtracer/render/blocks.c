@@ -17,7 +17,7 @@ static int imin(int a, int b) { return a < b ? a : b; }
 static int imax(int a, int b) { return a > b ? a : b; }
 
 int pt_blocks_init(struct pt_blocks *blocks, int width, int height, int block_width, int block_height, const int crop[4],
-                   int clip, struct pt_err *err)
+                   int clip, struct base_err *err)
 {
     struct pt_blocks b = {.block_width = block_width, .block_height = block_height};
     b.columns = (uint32_t)((width - 1) / block_width + 1);
@@ -28,7 +28,7 @@ int pt_blocks_init(struct pt_blocks *blocks, int width, int height, int block_wi
     b.count = b.list_columns * (uint32_t)(r1 - r0);
     b.list = calloc(b.count, sizeof *b.list);
     if (b.list == NULL)
-        return pt_fail_nomem(err, "blocks");
+        return base_fail_nomem(err, "blocks");
 
     struct pt_block *out = b.list;
     for (int r = r0; r < r1; r++) {
@@ -52,7 +52,7 @@ int pt_blocks_init(struct pt_blocks *blocks, int width, int height, int block_wi
     b.x1 = b.list[b.count - 1].x1;
     b.y1 = b.list[b.count - 1].y1;
     *blocks = b;
-    return PT_OK;
+    return 0;
 }
 
 void pt_blocks_release(struct pt_blocks *blocks)

@@ -50,7 +50,7 @@ struct pt_blocks {
 
 /* crop = {x0, y0, x1, y1} inside the image, not empty. clip: cut blocks to the crop (when nobody judges them). */
 int pt_blocks_init(struct pt_blocks *blocks, int width, int height, int block_width, int block_height, const int crop[4],
-                   int clip, struct pt_err *err);
+                   int clip, struct base_err *err);
 void pt_blocks_release(struct pt_blocks *blocks);
 
 /* The sample count of the check after one at spp: `asked` when the criterion named one, else a geometric step. */

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/fio.h"
+#include "base/files.h"
 
 /*
  * magic[8], settings bytes, settings; film bytes, film arrays; blocks, block records; totals; dropped samples; criterion
@@ -28,7 +28,7 @@ struct sink {
     uint32_t crc;
 };
 
-/* Write errors stay in the FILE and are found by pt_fio_commit. */
+/* Write errors stay in the FILE and are found by base_file_commit. */
 static void put(struct sink *s, const void *data, size_t size)
 {
     const unsigned char *p = data;
@@ -57,16 +57,16 @@ static void put_blocks(struct sink *s, const struct pt_blocks *blocks)
     }
 }
 
-int pt_checkpoint_save(const char *path, const struct pt_render *r, const char *settings, struct pt_err *err)
+int pt_checkpoint_save(const char *path, const struct pt_render *r, const char *settings, struct base_err *err)
 {
     unsigned char *state = NULL;
     size_t state_size = 0;
-    struct pt_fio_out out;
-    int rc = r->criterion != NULL ? pt_criterion_save(r->criterion, &state, &state_size, err) : PT_OK;
-    if (rc != PT_OK)
+    struct base_file_out out;
+    int rc = r->criterion != NULL ? pt_criterion_save(r->criterion, &state, &state_size, err) : 0;
+    if (rc)
         return rc;
-    rc = pt_fio_begin(&out, path, err);
-    if (rc != PT_OK) {
+    rc = base_file_begin(&out, path, err);
+    if (rc) {
         free(state);
         return rc;
     }
@@ -87,7 +87,7 @@ int pt_checkpoint_save(const char *path, const struct pt_render *r, const char *
     put(&s, state, state_size);
     fwrite(&s.crc, 1, sizeof s.crc, out.file);
     free(state);
-    return pt_fio_commit(&out, err);
+    return base_file_commit(&out, err);
 }
 
 /* --- loading -------------------------------------------------------------------------------------------------------- */
@@ -98,66 +98,66 @@ struct source {
     size_t at, size;
 };
 
-static int take(struct source *s, void *data, size_t size, struct pt_err *err)
+static int take(struct source *s, void *data, size_t size, struct base_err *err)
 {
     if (size > s->size - s->at)
-        return pt_fail(err, PT_EINVAL, "%s: the checkpoint is too short", s->path);
+        return base_fail(err, BASE_EINVAL, "%s: the checkpoint is too short", s->path);
     memcpy(data, s->data + s->at, size);
     s->at += size;
-    return PT_OK;
+    return 0;
 }
 
-static int expect_count(struct source *s, uint64_t n, const char *what, struct pt_err *err)
+static int expect_count(struct source *s, uint64_t n, const char *what, struct base_err *err)
 {
     uint64_t found = 0;
     int rc = take(s, &found, sizeof found, err);
-    if (rc == PT_OK && found != n)
-        rc = pt_fail(err, PT_EINVAL, "%s: the checkpoint has another number of %s", s->path, what);
+    if (!rc && found != n)
+        rc = base_fail(err, BASE_EINVAL, "%s: the checkpoint has another number of %s", s->path, what);
     return rc;
 }
 
 /* Names the first line of key=value that differs. */
-static int refuse_settings(const struct source *s, const char *theirs, size_t n, const char *ours, struct pt_err *err)
+static int refuse_settings(const struct source *s, const char *theirs, size_t n, const char *ours, struct base_err *err)
 {
     const char *a = theirs, *end = theirs + n, *b = ours;
     while (a < end && *b != '\0') {
         int la = (int)strcspn(a, "\n"), lb = (int)strcspn(b, "\n");
         if (la != lb || memcmp(a, b, (size_t)la) != 0)
-            return pt_fail(err, PT_EINVAL, "%s: made with %.*s, but this render has %.*s", s->path, la, a, lb, b);
+            return base_fail(err, BASE_EINVAL, "%s: made with %.*s, but this render has %.*s", s->path, la, a, lb, b);
         a += la + (a[la] == '\n');
         b += lb + (b[lb] == '\n');
     }
-    return pt_fail(err, PT_EINVAL, "%s: made with other settings", s->path);
+    return base_fail(err, BASE_EINVAL, "%s: made with other settings", s->path);
 }
 
-static int take_settings(struct source *s, const char *settings, struct pt_err *err)
+static int take_settings(struct source *s, const char *settings, struct base_err *err)
 {
     uint64_t n = 0;
     int rc = take(s, &n, sizeof n, err);
-    if (rc != PT_OK)
+    if (rc)
         return rc;
     if (n > s->size - s->at)
-        return pt_fail(err, PT_EINVAL, "%s: the checkpoint is too short", s->path);
+        return base_fail(err, BASE_EINVAL, "%s: the checkpoint is too short", s->path);
     if (n != strlen(settings) || memcmp(s->data + s->at, settings, (size_t)n) != 0) {
         char *copy = strndup((const char *)s->data + s->at, (size_t)n);
-        rc = copy == NULL ? pt_fail_nomem(err, s->path) : refuse_settings(s, copy, strlen(copy), settings, err);
+        rc = copy == NULL ? base_fail_nomem(err, s->path) : refuse_settings(s, copy, strlen(copy), settings, err);
         free(copy);
         return rc;
     }
     s->at += (size_t)n;
-    return PT_OK;
+    return 0;
 }
 
-static int take_blocks(struct source *s, struct pt_blocks *blocks, uint64_t spp_max, struct pt_err *err)
+static int take_blocks(struct source *s, struct pt_blocks *blocks, uint64_t spp_max, struct base_err *err)
 {
     int rc = expect_count(s, blocks->count, "blocks", err);
-    for (uint32_t i = 0; i < blocks->count && rc == PT_OK; i++) {
+    for (uint32_t i = 0; i < blocks->count && !rc; i++) {
         struct block_record record = {0};
         struct pt_block *b = &blocks->list[i];
-        if ((rc = take(s, &record, sizeof record, err)) != PT_OK)
+        if ((rc = take(s, &record, sizeof record, err)) != 0)
             break;
         if (record.spp > spp_max || record.next_spp > spp_max || record.reason < 0 || record.reason >= PT_REASON_COUNT)
-            return pt_fail(err, PT_EINVAL, "%s: block %u of the checkpoint makes no sense", s->path, b->id);
+            return base_fail(err, BASE_EINVAL, "%s: block %u of the checkpoint makes no sense", s->path, b->id);
         b->spp = record.spp;
         b->next_spp = record.next_spp;
         b->asked_spp = record.asked_spp;
@@ -175,63 +175,63 @@ static int take_blocks(struct source *s, struct pt_blocks *blocks, uint64_t spp_
     return rc;
 }
 
-static int take_film(struct source *s, const struct pt_film *film, struct pt_err *err)
+static int take_film(struct source *s, const struct pt_film *film, struct base_err *err)
 {
     int rc = expect_count(s, film->bytes, "bytes of pixels", err);
     struct pt_film_array arrays[PT_FILM_ARRAYS];
     int n = pt_film_list_arrays(film, arrays);
-    for (int i = 0; i < n && rc == PT_OK; i++)
+    for (int i = 0; i < n && !rc; i++)
         rc = take(s, arrays[i].data, arrays[i].bytes, err);
     return rc;
 }
 
-static int take_criterion(struct source *s, struct pt_criterion *criterion, struct pt_err *err)
+static int take_criterion(struct source *s, struct pt_criterion *criterion, struct base_err *err)
 {
     uint64_t n = 0;
     int rc = take(s, &n, sizeof n, err);
-    if (rc != PT_OK)
+    if (rc)
         return rc;
     if (n != s->size - s->at || (criterion == NULL && n > 0))
-        return pt_fail(err, PT_EINVAL, "%s: the checkpoint has a wrong length", s->path);
-    return criterion != NULL ? pt_criterion_load(criterion, s->data + s->at, (size_t)n, err) : PT_OK;
+        return base_fail(err, BASE_EINVAL, "%s: the checkpoint has a wrong length", s->path);
+    return criterion != NULL ? pt_criterion_load(criterion, s->data + s->at, (size_t)n, err) : 0;
 }
 
-static int take_all(struct source *s, struct pt_render *r, const char *settings, struct pt_err *err)
+static int take_all(struct source *s, struct pt_render *r, const char *settings, struct base_err *err)
 {
     uint64_t dropped = 0;
     int rc = take_settings(s, settings, err);
-    if (rc == PT_OK)
+    if (!rc)
         rc = take_film(s, &r->film, err);
-    if (rc == PT_OK)
+    if (!rc)
         rc = take_blocks(s, &r->blocks, r->config.spp_max, err);
-    if (rc == PT_OK)
+    if (!rc)
         rc = take(s, &r->totals, sizeof r->totals, err);
-    if (rc == PT_OK)
+    if (!rc)
         rc = take(s, &dropped, sizeof dropped, err);
-    if (rc == PT_OK && dropped > PT_DROPPED_KEPT)
-        rc = pt_fail(err, PT_EINVAL, "%s: the checkpoint makes no sense", s->path);
-    if (rc == PT_OK)
+    if (!rc && dropped > PT_DROPPED_KEPT)
+        rc = base_fail(err, BASE_EINVAL, "%s: the checkpoint makes no sense", s->path);
+    if (!rc)
         rc = take(s, r->dropped, sizeof r->dropped, err);
     r->dropped_count = (uint32_t)dropped;
-    return rc == PT_OK ? take_criterion(s, r->criterion, err) : rc;
+    return !rc ? take_criterion(s, r->criterion, err) : rc;
 }
 
-int pt_checkpoint_load(const char *path, struct pt_render *r, const char *settings, struct pt_err *err)
+int pt_checkpoint_load(const char *path, struct pt_render *r, const char *settings, struct base_err *err)
 {
     char *data = NULL;
     size_t size = 0;
     size_t room = r->film.bytes + (size_t)r->blocks.count * sizeof(struct block_record) + (size_t)MAX_CRITERION_BYTES;
-    int rc = pt_fio_read(path, room, &data, &size, err);
-    if (rc != PT_OK)
+    int rc = base_file_read(path, room, &data, &size, err);
+    if (rc)
         return rc;
     uint32_t crc = 0;
     if (size < sizeof MAGIC + sizeof crc || memcmp(data, MAGIC, sizeof MAGIC) != 0) {
-        rc = pt_fail(err, PT_EINVAL, "%s: not a checkpoint", path);
+        rc = base_fail(err, BASE_EINVAL, "%s: not a checkpoint", path);
         goto out;
     }
     memcpy(&crc, data + size - sizeof crc, sizeof crc);
     if ((uint32_t)crc32_z(0, (const unsigned char *)data, size - sizeof crc) != crc) {
-        rc = pt_fail(err, PT_EINVAL, "%s: the checkpoint is damaged or cut off", path);
+        rc = base_fail(err, BASE_EINVAL, "%s: the checkpoint is damaged or cut off", path);
         goto out;
     }
     struct source s = {.path = path, .data = (const unsigned char *)data, .at = sizeof MAGIC, .size = size - sizeof crc};

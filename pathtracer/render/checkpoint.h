@@ -1,7 +1,7 @@
 /*
  * A render in the middle, as a file: film, blocks, totals and the criterion's history. Continued from it, the image is byte
  * for byte that of a render that was never interrupted. The file is replaced atomically, guarded by a CRC, and holds the
- * settings as text: it is refused (PT_EINVAL, saying which setting) by a render that would make another image. Byte order and
+ * settings as text: it is refused (BASE_EINVAL, saying which setting) by a render that would make another image. Byte order and
  * number formats are those of the machine: a checkpoint is not for exchange.
  */
 #ifndef PT_RENDER_CHECKPOINT_H
@@ -11,8 +11,8 @@
 #include "render/render.h"
 
 /* settings: lines of key=value that decide the image, made by the caller; compared when loading. */
-int pt_checkpoint_save(const char *path, const struct pt_render *render, const char *settings, struct pt_err *err);
+int pt_checkpoint_save(const char *path, const struct pt_render *render, const char *settings, struct base_err *err);
 /* Into a freshly created render of the same settings; on failure it must not be run. */
-int pt_checkpoint_load(const char *path, struct pt_render *render, const char *settings, struct pt_err *err);
+int pt_checkpoint_load(const char *path, struct pt_render *render, const char *settings, struct base_err *err);
 
 #endif

@@ -15,7 +15,7 @@ struct pt_criterion {
     struct lull_instance *instance; /* owns */
     struct lull_host host;
     struct lull_requirements needs;
-    struct pt_threads *threads;
+    struct base_threads *threads;
     void (*warn)(void *data, const char *line);
     void *warn_data;
     struct lull_plane planes[LULL_PLANE_COUNT];
@@ -58,7 +58,7 @@ static int32_t host_parallel_for(const struct lull_host *host, uint64_t count, l
     for (; job.first < count;) {
         uint64_t n = count - job.first < LONG_MAX / 2 ? count - job.first : LONG_MAX / 2;
         if (c->threads != NULL)
-            pt_threads_for(c->threads, (long)n, run_task, &job);
+            base_threads_for(c->threads, (long)n, run_task, &job);
         else
             for (uint64_t i = 0; i < n; i++)
                 run_task(&job, (long)i, 0);
@@ -101,12 +101,12 @@ static void own_folder(char *path, size_t room)
 
 static int from_lull(int32_t code)
 {
-    return code == LULL_E_MEMORY ? PT_ENOMEM : PT_EINVAL;
+    return code == LULL_E_MEMORY ? BASE_ENOMEM : BASE_EINVAL;
 }
 
-int pt_criterion_create(const char *spec, const struct lull_pair *pairs, uint32_t pair_count, struct pt_threads *threads,
+int pt_criterion_create(const char *spec, const struct lull_pair *pairs, uint32_t pair_count, struct base_threads *threads,
                         void (*warn)(void *data, const char *line), void *warn_data, struct pt_criterion **out,
-                        struct pt_err *err)
+                        struct base_err *err)
 {
     char own[LULL_PATH_MAX + 16];
     own_folder(own, sizeof own);
@@ -116,30 +116,30 @@ int pt_criterion_create(const char *spec, const struct lull_pair *pairs, uint32_
     struct lull_error e = {.struct_size = sizeof e};
     struct lull_found *found = malloc(sizeof *found);
     if (found == NULL)
-        return pt_fail_nomem(err, "criterion");
+        return base_fail_nomem(err, "criterion");
     int32_t code = lull_open(&search, spec, found, &e);
     const struct lull_criterion *table = found->criterion;
     free(found);
     if (code != LULL_OK)
-        return pt_fail(err, from_lull(code), "%s", e.message);
+        return base_fail(err, from_lull(code), "%s", e.message);
     return pt_criterion_create_table(table, pairs, pair_count, threads, warn, warn_data, out, err);
 }
 
 int pt_criterion_create_table(const struct lull_criterion *table, const struct lull_pair *pairs, uint32_t pair_count,
-                              struct pt_threads *threads, void (*warn)(void *data, const char *line), void *warn_data,
-                              struct pt_criterion **out, struct pt_err *err)
+                              struct base_threads *threads, void (*warn)(void *data, const char *line), void *warn_data,
+                              struct pt_criterion **out, struct base_err *err)
 {
     struct lull_error e = {.struct_size = sizeof e};
     struct pt_criterion *c = calloc(1, sizeof *c);
     if (c == NULL)
-        return pt_fail_nomem(err, "criterion");
+        return base_fail_nomem(err, "criterion");
     c->table = table;
     c->threads = threads;
     c->warn = warn;
     c->warn_data = warn_data;
     c->host = (struct lull_host){.struct_size = sizeof c->host, .api_minor = LULL_API_MINOR, .context = c,
                                  .name = "lull pathtracer 1.0",
-                                 .max_workers = threads != NULL ? (uint32_t)pt_threads_count(threads) : 1,
+                                 .max_workers = threads != NULL ? (uint32_t)base_threads_count(threads) : 1,
                                  .log = host_log, .parallel_for = host_parallel_for};
     int32_t code = table->create(&c->host, pairs, pair_count, sizeof *pairs, &c->instance, &e);
     if (code == LULL_OK) {
@@ -147,12 +147,12 @@ int pt_criterion_create_table(const struct lull_criterion *table, const struct l
         code = table->requirements(c->instance, &c->needs, &e);
     }
     if (code != LULL_OK) {
-        pt_fail(err, from_lull(code), "criterion %s: %s", table->id, e.message);
+        base_fail(err, from_lull(code), "criterion %s: %s", table->id, e.message);
         pt_criterion_destroy(c);
         return from_lull(code);
     }
     *out = c;
-    return PT_OK;
+    return 0;
 }
 
 void pt_criterion_destroy(struct pt_criterion *c)
@@ -235,7 +235,7 @@ static uint32_t describe_planes(struct pt_criterion *c, const struct pt_film *fi
 }
 
 static int allocate_frame(struct pt_criterion *c, const struct pt_blocks *blocks, const struct pt_film *film,
-                          struct pt_err *err)
+                          struct base_err *err)
 {
     free(c->all);
     free(c->due);
@@ -249,20 +249,20 @@ static int allocate_frame(struct pt_criterion *c, const struct pt_blocks *blocks
     if (counts)
         c->spp = calloc(film->pixels, sizeof *c->spp);
     if (c->all == NULL || c->due == NULL || c->rects == NULL || (counts && c->spp == NULL))
-        return pt_fail_nomem(err, "blocks of the criterion");
-    return PT_OK;
+        return base_fail_nomem(err, "blocks of the criterion");
+    return 0;
 }
 
 int pt_criterion_begin(struct pt_criterion *c, const struct pt_criterion_frame *frame, const struct pt_blocks *blocks,
-                       const struct pt_film *film, struct pt_err *err)
+                       const struct pt_film *film, struct base_err *err)
 {
     const struct lull_requirements *needs = &c->needs;
     if (!(needs->flags & LULL_REQ_FLEXIBLE) && needs->block_width > 0 && needs->block_height > 0 &&
         ((int)needs->block_width != blocks->block_width || (int)needs->block_height != blocks->block_height))
-        return pt_fail(err, PT_EINVAL, "criterion %s judges blocks of %ux%u pixels only: use --block %ux%u", c->table->id,
+        return base_fail(err, BASE_EINVAL, "criterion %s judges blocks of %ux%u pixels only: use --block %ux%u", c->table->id,
                        needs->block_width, needs->block_height, needs->block_width, needs->block_height);
     int rc = allocate_frame(c, blocks, film, err);
-    if (rc != PT_OK)
+    if (rc)
         return rc;
     for (uint32_t i = 0; i < blocks->count; i++) {
         const struct pt_block *b = &blocks->list[i];
@@ -291,10 +291,10 @@ int pt_criterion_begin(struct pt_criterion *c, const struct pt_criterion_frame *
     struct lull_error e = {.struct_size = sizeof e};
     int32_t code = c->table->begin_frame(c->instance, &f, &e);
     if (code != LULL_OK)
-        return pt_fail(err, from_lull(code), "criterion %s: %s", c->table->id, e.message);
+        return base_fail(err, from_lull(code), "criterion %s: %s", c->table->id, e.message);
     c->open = 1;
-    c->begin_s = pt_clock_wall_s();
-    return PT_OK;
+    c->begin_s = base_clock_wall_s();
+    return 0;
 }
 
 static void fill_counts(struct pt_criterion *c, const struct pt_film *film, const struct pt_blocks *blocks)
@@ -315,9 +315,9 @@ static struct lull_block block_state(const struct pt_block *b, uint32_t index, i
 }
 
 int pt_criterion_evaluate(struct pt_criterion *c, struct pt_film *film, const struct pt_blocks *blocks, const uint32_t *due,
-                          uint32_t count, const uint8_t *final, struct lull_decision *decisions, struct pt_err *err)
+                          uint32_t count, const uint8_t *final, struct lull_decision *decisions, struct base_err *err)
 {
-    int rc = PT_OK, has_half = film->half != NULL;
+    int rc = 0, has_half = film->half != NULL;
     struct pt_film_patch patch = {0};
     const struct lull_decision preset = {.action = LULL_CONTINUE, .p_noisy = NAN, .predicted_spp = NAN, .error = NAN};
 
@@ -329,25 +329,25 @@ int pt_criterion_evaluate(struct pt_criterion *c, struct pt_film *film, const st
         if (final[k])
             c->due[k].flags |= LULL_BLOCK_FINAL;
     }
-    for (uint32_t i = 0; i < blocks->count && rc == PT_OK; i++) {
+    for (uint32_t i = 0; i < blocks->count && !rc; i++) {
         const struct pt_block *b = &blocks->list[i];
         if (b->dropped > 0)
             rc = pt_film_patch(film, b->x0, b->y0, b->x1, b->y1, b->spp, &patch, err);
     }
-    if (rc != PT_OK)
+    if (rc)
         goto out;
     if (c->spp != NULL)
         fill_counts(c, film, blocks);
     struct lull_view view = {.struct_size = sizeof view, .x0 = film->x0, .y0 = film->y0, .x1 = film->x1, .y1 = film->y1,
                              .planes = c->planes, .plane_count = LULL_PLANE_COUNT, .plane_stride = sizeof c->planes[0],
                              .all = c->all, .all_count = blocks->count, .all_stride = sizeof c->all[0],
-                             .elapsed_s = pt_clock_wall_s() - c->begin_s};
+                             .elapsed_s = base_clock_wall_s() - c->begin_s};
     struct lull_error e = {.struct_size = sizeof e};
     int32_t code = c->table->evaluate(c->instance, &view, c->due, sizeof c->due[0], decisions, sizeof *decisions, count, &e);
     if (code != LULL_OK) {
         for (uint32_t k = 0; k < count; k++)
             decisions[k] = preset;
-        rc = pt_fail(err, from_lull(code), "criterion %s: %s", c->table->id, e.message);
+        rc = base_fail(err, from_lull(code), "criterion %s: %s", c->table->id, e.message);
     }
 out:
     pt_film_unpatch(film, &patch);
@@ -401,7 +401,7 @@ static const struct lull_state *state_extension(const struct pt_criterion *c)
     return c->table->get_extension != NULL ? c->table->get_extension(LULL_EXT_STATE) : NULL;
 }
 
-int pt_criterion_save(const struct pt_criterion *c, unsigned char **data, size_t *size, struct pt_err *err)
+int pt_criterion_save(const struct pt_criterion *c, unsigned char **data, size_t *size, struct base_err *err)
 {
     const struct lull_state *state = state_extension(c);
     struct bytes b = {0};
@@ -411,28 +411,28 @@ int pt_criterion_save(const struct pt_criterion *c, unsigned char **data, size_t
         int32_t code = state->save(c->instance, &writer, &e);
         if (code != LULL_OK) {
             free(b.data);
-            return pt_fail(err, from_lull(code), "criterion %s: cannot save its state: %s", c->table->id, e.message);
+            return base_fail(err, from_lull(code), "criterion %s: cannot save its state: %s", c->table->id, e.message);
         }
     }
     *data = b.data;
     *size = b.used;
-    return PT_OK;
+    return 0;
 }
 
-int pt_criterion_load(struct pt_criterion *c, const unsigned char *data, size_t size, struct pt_err *err)
+int pt_criterion_load(struct pt_criterion *c, const unsigned char *data, size_t size, struct base_err *err)
 {
     const struct lull_state *state = state_extension(c);
     if (state == NULL)
-        return size == 0 ? PT_OK : pt_fail(err, PT_EINVAL, "criterion %s keeps no state, but the checkpoint has one", c->table->id);
+        return size == 0 ? 0 : base_fail(err, BASE_EINVAL, "criterion %s keeps no state, but the checkpoint has one", c->table->id);
     struct const_bytes b = {.data = data, .size = size};
     struct lull_reader reader = {.struct_size = sizeof reader, .context = &b, .read = read_bytes};
     struct lull_error e = {.struct_size = sizeof e};
     int32_t code = state->load(c->instance, &reader, &e);
     if (code != LULL_OK)
-        return pt_fail(err, from_lull(code), "criterion %s: cannot load its state: %s", c->table->id, e.message);
+        return base_fail(err, from_lull(code), "criterion %s: cannot load its state: %s", c->table->id, e.message);
     if (b.at != size)
-        return pt_fail(err, PT_EINVAL, "criterion %s: %zu bytes of its state were left over", c->table->id, size - b.at);
-    return PT_OK;
+        return base_fail(err, BASE_EINVAL, "criterion %s: %zu bytes of its state were left over", c->table->id, size - b.at);
+    return 0;
 }
 
 /* --- listing -------------------------------------------------------------------------------------------------------- */

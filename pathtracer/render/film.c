@@ -41,7 +41,7 @@ size_t pt_film_pixel_bytes(uint32_t planes)
     return bytes;
 }
 
-int pt_film_init(struct pt_film *film, int x0, int y0, int x1, int y1, uint32_t planes, struct pt_err *err)
+int pt_film_init(struct pt_film *film, int x0, int y0, int x1, int y1, uint32_t planes, struct base_err *err)
 {
     struct pt_film f = {.x0 = x0, .y0 = y0, .x1 = x1, .y1 = y1, .planes = planes | PT_FILM_COLOR};
     f.pixels = (size_t)(x1 - x0) * (size_t)(y1 - y0);
@@ -51,13 +51,13 @@ int pt_film_init(struct pt_film *film, int x0, int y0, int x1, int y1, uint32_t 
         void *p = calloc(f.pixels, arrays[i].bytes);
         if (p == NULL) {
             pt_film_release(&f);
-            return pt_fail_nomem(err, "film");
+            return base_fail_nomem(err, "film");
         }
         memcpy((char *)&f + arrays[i].offset, &p, sizeof p);
         f.bytes += f.pixels * arrays[i].bytes;
     }
     *film = f;
-    return PT_OK;
+    return 0;
 }
 
 void pt_film_release(struct pt_film *film)
@@ -106,7 +106,7 @@ static void scale(double *sum, int n, uint64_t spp, uint32_t dropped)
 }
 
 int pt_film_patch(struct pt_film *f, int x0, int y0, int x1, int y1, uint64_t spp, struct pt_film_patch *patch,
-                  struct pt_err *err)
+                  struct base_err *err)
 {
     uint64_t half_spp = pt_film_half_spp(spp);
     for (int y = y0; y < y1; y++) {
@@ -118,7 +118,7 @@ int pt_film_patch(struct pt_film *f, int x0, int y0, int x1, int y1, uint64_t sp
                 size_t room = patch->room ? 2 * patch->room : 64;
                 struct pt_film_patch_pixel *grown = realloc(patch->pixels, room * sizeof *grown);
                 if (grown == NULL)
-                    return pt_fail_nomem(err, "pixels with dropped samples");
+                    return base_fail_nomem(err, "pixels with dropped samples");
                 patch->pixels = grown;
                 patch->room = room;
             }
@@ -136,7 +136,7 @@ int pt_film_patch(struct pt_film *f, int x0, int y0, int x1, int y1, uint64_t sp
             }
         }
     }
-    return PT_OK;
+    return 0;
 }
 
 void pt_film_unpatch(struct pt_film *f, struct pt_film_patch *patch)

@@ -13,7 +13,7 @@
 #include <string.h>
 
 #include "base/err.h"
-#include "base/vec.h"
+#include "scene/vec.h"
 #include "integ/integrator.h"
 
 enum {
@@ -50,7 +50,7 @@ struct pt_film_pixel {
 };
 
 /* Zeroed planes for the pixels of [x0, x1) x [y0, y1), which must not be empty. On failure *film is untouched. */
-int pt_film_init(struct pt_film *film, int x0, int y0, int x1, int y1, uint32_t planes, struct pt_err *err);
+int pt_film_init(struct pt_film *film, int x0, int y0, int x1, int y1, uint32_t planes, struct base_err *err);
 void pt_film_release(struct pt_film *film);
 /* Bytes per pixel that these planes cost. */
 size_t pt_film_pixel_bytes(uint32_t planes);
@@ -183,7 +183,7 @@ struct pt_film_patch {
     size_t count, room;
 };
 int pt_film_patch(struct pt_film *film, int x0, int y0, int x1, int y1, uint64_t spp, struct pt_film_patch *patch,
-                  struct pt_err *err);
+                  struct base_err *err);
 void pt_film_unpatch(struct pt_film *film, struct pt_film_patch *patch);
 
 #endif

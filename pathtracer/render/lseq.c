@@ -76,23 +76,23 @@ static uint32_t crc_of(const unsigned char *data, size_t n)
     return (uint32_t)crc32_z(crc32_z(0, NULL, 0), data, n);
 }
 
-static int put_bytes(struct pt_lseq *f, const unsigned char *data, size_t n, struct pt_err *err)
+static int put_bytes(struct pt_lseq *f, const unsigned char *data, size_t n, struct base_err *err)
 {
     f->crc = (uint32_t)crc32_z(f->crc, data, n);
     f->bytes += n;
     if (fwrite(data, 1, n, f->out.file) != n)
-        return pt_fail(err, PT_EIO, "%s: write failed", f->out.path);
-    return PT_OK;
+        return base_fail(err, BASE_EIO, "%s: write failed", f->out.path);
+    return 0;
 }
 
 /* Room for n more bytes of payload. */
-static unsigned char *payload_room(struct pt_lseq *f, size_t n, struct pt_err *err)
+static unsigned char *payload_room(struct pt_lseq *f, size_t n, struct base_err *err)
 {
     if (f->payload_used + n > f->payload_room) {
         size_t room = 2 * (f->payload_used + n);
         unsigned char *grown = realloc(f->payload, room);
         if (grown == NULL) {
-            pt_fail_nomem(err, f->out.path);
+            base_fail_nomem(err, f->out.path);
             return NULL;
         }
         f->payload = grown;
@@ -124,23 +124,23 @@ static void subtract_average(unsigned char *p, uint32_t width, uint32_t height)
 }
 
 /* Deflates raw bytes of f->plane into the payload. */
-static int put_plane(struct pt_lseq *f, uint32_t plane, uint32_t filter, size_t raw, struct pt_err *err)
+static int put_plane(struct pt_lseq *f, uint32_t plane, uint32_t filter, size_t raw, struct base_err *err)
 {
     uLong bound = compressBound((uLong)raw);
     unsigned char *p = payload_room(f, PLANE_HEADER_BYTES + bound, err);
     if (p == NULL)
-        return PT_ENOMEM;
+        return BASE_ENOMEM;
     if (compress2(p + PLANE_HEADER_BYTES, &bound, f->plane, (uLong)raw, 6) != Z_OK)
-        return pt_fail_nomem(err, f->out.path);
+        return base_fail_nomem(err, f->out.path);
     u32le(p, plane);
     u32le(p + 4, filter);
     u32le(p + 8, (uint32_t)raw);
     u32le(p + 12, (uint32_t)bound);
     f->payload_used += PLANE_HEADER_BYTES + bound;
-    return PT_OK;
+    return 0;
 }
 
-static int put_display(struct pt_lseq *f, const double *mean, struct pt_err *err)
+static int put_display(struct pt_lseq *f, const double *mean, struct base_err *err)
 {
     size_t pixels = (size_t)f->width * f->height;
     for (size_t i = 0; i < pixels; i++)
@@ -152,7 +152,7 @@ static int put_display(struct pt_lseq *f, const double *mean, struct pt_err *err
     return put_plane(f, DISPLAY, FILTER_AVERAGE | FILTER_SUBTRACT_GREEN, 3 * pixels, err);
 }
 
-static int put_fine(struct pt_lseq *f, const double *mean, struct pt_err *err)
+static int put_fine(struct pt_lseq *f, const double *mean, struct base_err *err)
 {
     size_t pixels = (size_t)f->width * f->height;
     for (size_t i = 0; i < pixels; i++)
@@ -161,7 +161,7 @@ static int put_fine(struct pt_lseq *f, const double *mean, struct pt_err *err)
     return put_plane(f, FINE, 0, 3 * pixels, err);
 }
 
-static int put_half_log(struct pt_lseq *f, const double *difference, struct pt_err *err)
+static int put_half_log(struct pt_lseq *f, const double *difference, struct base_err *err)
 {
     size_t pixels = (size_t)f->width * f->height;
     for (size_t i = 0; i < pixels; i++)
@@ -169,7 +169,7 @@ static int put_half_log(struct pt_lseq *f, const double *difference, struct pt_e
     return put_plane(f, HALF_LOG, 0, pixels, err);
 }
 
-static int put_f16(struct pt_lseq *f, uint32_t plane, const double *rgb, struct pt_err *err)
+static int put_f16(struct pt_lseq *f, uint32_t plane, const double *rgb, struct base_err *err)
 {
     size_t pixels = (size_t)f->width * f->height, values = 3 * pixels;
     for (size_t i = 0; i < pixels; i++) {
@@ -185,7 +185,7 @@ static int put_f16(struct pt_lseq *f, uint32_t plane, const double *rgb, struct 
 /* --- the file ------------------------------------------------------------------------------------------------------- */
 
 int pt_lseq_begin(struct pt_lseq *f, const char *path, uint32_t width, uint32_t height, int32_t x0, int32_t y0, uint32_t id,
-                  uint32_t records, uint64_t seed, struct pt_err *err)
+                  uint32_t records, uint64_t seed, struct base_err *err)
 {
     unsigned char h[HEADER_BYTES] = {'L', 'U', 'L', 'L', 'S', 'E', 'Q', '1'};
     memset(f, 0, sizeof *f);
@@ -194,9 +194,9 @@ int pt_lseq_begin(struct pt_lseq *f, const char *path, uint32_t width, uint32_t 
     f->crc = (uint32_t)crc32_z(0, NULL, 0);
     f->plane = malloc((size_t)width * height * 6);
     if (f->plane == NULL)
-        return pt_fail_nomem(err, path);
-    int rc = pt_fio_begin(&f->out, path, err);
-    if (rc == PT_OK) {
+        return base_fail_nomem(err, path);
+    int rc = base_file_begin(&f->out, path, err);
+    if (!rc) {
         u32le(h + 8, 1);
         u32le(h + 12, HEADER_BYTES);
         u32le(h + 16, width);
@@ -209,32 +209,32 @@ int pt_lseq_begin(struct pt_lseq *f, const char *path, uint32_t width, uint32_t 
         u32le(h + 60, crc_of(h, 60));
         rc = put_bytes(f, h, sizeof h, err);
     }
-    if (rc != PT_OK)
+    if (rc)
         pt_lseq_abort(f);
     return rc;
 }
 
-static int put_planes(struct pt_lseq *f, const struct pt_lseq_record *r, struct pt_err *err)
+static int put_planes(struct pt_lseq *f, const struct pt_lseq_record *r, struct base_err *err)
 {
     int rc = put_display(f, r->mean, err);
     if (r->form == PT_LSEQ_FULL) {
-        if (rc == PT_OK)
+        if (!rc)
             rc = put_f16(f, MEAN_F16, r->mean, err);
-        return rc == PT_OK ? put_f16(f, HALF_F16, r->difference, err) : rc;
+        return !rc ? put_f16(f, HALF_F16, r->difference, err) : rc;
     }
-    if (rc == PT_OK)
+    if (!rc)
         rc = put_fine(f, r->mean, err);
-    return rc == PT_OK ? put_half_log(f, r->difference, err) : rc;
+    return !rc ? put_half_log(f, r->difference, err) : rc;
 }
 
-int pt_lseq_put(struct pt_lseq *f, const struct pt_lseq_record *r, struct pt_err *err)
+int pt_lseq_put(struct pt_lseq *f, const struct pt_lseq_record *r, struct base_err *err)
 {
     unsigned char h[RECORD_BYTES] = {0};
     f->payload_used = 0;
     for (uint32_t i = 0; i < r->statistic_count; i++) {
         unsigned char *p = payload_room(f, 32, err);
         if (p == NULL)
-            return PT_ENOMEM;
+            return BASE_ENOMEM;
         uint64_t bits;
         memcpy(&bits, &r->statistics[i].value, sizeof bits);
         memcpy(p, r->statistics[i].name, 24);
@@ -242,7 +242,7 @@ int pt_lseq_put(struct pt_lseq *f, const struct pt_lseq_record *r, struct pt_err
         f->payload_used += 32;
     }
     int rc = put_planes(f, r, err);
-    if (rc != PT_OK)
+    if (rc)
         return rc;
     u32le(h, r->kind);
     u32le(h + 4, r->spp);
@@ -253,7 +253,7 @@ int pt_lseq_put(struct pt_lseq *f, const struct pt_lseq_record *r, struct pt_err
     u32le(h + 24, crc_of(f->payload, f->payload_used));
     u32le(h + 28, crc_of(h, 28));
     rc = put_bytes(f, h, sizeof h, err);
-    return rc == PT_OK ? put_bytes(f, f->payload, f->payload_used, err) : rc;
+    return !rc ? put_bytes(f, f->payload, f->payload_used, err) : rc;
 }
 
 static void release(struct pt_lseq *f)
@@ -263,14 +263,14 @@ static void release(struct pt_lseq *f)
     f->payload = f->plane = NULL;
 }
 
-int pt_lseq_commit(struct pt_lseq *f, struct pt_err *err)
+int pt_lseq_commit(struct pt_lseq *f, struct base_err *err)
 {
     release(f);
-    return pt_fio_commit(&f->out, err);
+    return base_file_commit(&f->out, err);
 }
 
 void pt_lseq_abort(struct pt_lseq *f)
 {
     release(f);
-    pt_fio_abort(&f->out);
+    base_file_abort(&f->out);
 }

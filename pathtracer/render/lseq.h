@@ -8,13 +8,13 @@
 #include <stdint.h>
 
 #include "base/err.h"
-#include "base/fio.h"
+#include "base/files.h"
 
 enum { PT_LSEQ_LEVEL = 1, PT_LSEQ_REFERENCE = 2 };
 enum { PT_LSEQ_COMPACT, PT_LSEQ_FULL }; /* DISPLAY + FINE + HALF_LOG, or DISPLAY + MEAN_F16 + HALF_F16 */
 
 struct pt_lseq {
-    struct pt_fio_out out;
+    struct base_file_out out;
     uint32_t crc;          /* of everything written */
     uint64_t bytes;
     uint32_t width, height;
@@ -39,10 +39,10 @@ struct pt_lseq_record {
 
 /* Opens a temporary beside path and writes the header. width, height in [1, 4096]. */
 int pt_lseq_begin(struct pt_lseq *file, const char *path, uint32_t width, uint32_t height, int32_t x0, int32_t y0,
-                  uint32_t id, uint32_t records, uint64_t seed, struct pt_err *err);
-int pt_lseq_put(struct pt_lseq *file, const struct pt_lseq_record *record, struct pt_err *err);
+                  uint32_t id, uint32_t records, uint64_t seed, struct base_err *err);
+int pt_lseq_put(struct pt_lseq *file, const struct pt_lseq_record *record, struct base_err *err);
 /* file->bytes and file->crc hold what the manifest says about it. */
-int pt_lseq_commit(struct pt_lseq *file, struct pt_err *err);
+int pt_lseq_commit(struct pt_lseq *file, struct base_err *err);
 void pt_lseq_abort(struct pt_lseq *file);
 
 /* The codes of the format, for tests. */

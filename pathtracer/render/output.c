@@ -6,7 +6,7 @@
 #include <string.h>
 #include <strings.h>
 
-#include "base/fio.h"
+#include "base/files.h"
 #include "image/exr.h"
 #include "image/oiio.h"
 #include "image/stopmap.h"
@@ -88,7 +88,7 @@ static void criterion_text(const struct pt_render *r, const struct pt_output_inf
         used += (size_t)snprintf(text + used, room - used, " %s=%s", info->params[i].key, info->params[i].value);
 }
 
-int pt_output_exr(const char *path, const struct pt_render *r, const struct pt_output_info *info, struct pt_err *err)
+int pt_output_exr(const char *path, const struct pt_render *r, const struct pt_output_info *info, struct base_err *err)
 {
     static const char *const base[FIRST_AOV] = {"R", "G", "B", "lull.spp", "lull.p_noisy", "lull.error", "lull.reason"};
     const char *channels[CHANNELS_MAX];
@@ -147,13 +147,13 @@ int pt_output_exr(const char *path, const struct pt_render *r, const struct pt_o
 
 /* --- pictures ------------------------------------------------------------------------------------------------------- */
 
-int pt_output_preview(const char *path, const struct pt_render *r, struct pt_err *err)
+int pt_output_preview(const char *path, const struct pt_render *r, struct base_err *err)
 {
     const int *crop = r->config.crop;
     int width = crop[2] - crop[0], height = crop[3] - crop[1];
     uint8_t *pixels = malloc((size_t)width * (size_t)height * 3);
     if (pixels == NULL)
-        return pt_fail_nomem(err, "preview");
+        return base_fail_nomem(err, "preview");
     uint8_t *out = pixels;
     for (int y = crop[1]; y < crop[3]; y++) {
         for (int x = crop[0]; x < crop[2]; x++, out += 3) {
@@ -168,17 +168,17 @@ int pt_output_preview(const char *path, const struct pt_render *r, struct pt_err
     return rc;
 }
 
-static int stop_map_png(const char *path, const struct pt_render *r, struct pt_err *err)
+static int stop_map_png(const char *path, const struct pt_render *r, struct base_err *err)
 {
     const struct pt_blocks *b = &r->blocks;
     struct pt_stopmap_block *list = calloc(b->count, sizeof *list);
     if (list == NULL)
-        return pt_fail_nomem(err, "stop map");
+        return base_fail_nomem(err, "stop map");
     for (uint32_t i = 0; i < b->count; i++)
         list[i] = (struct pt_stopmap_block){b->list[i].x0, b->list[i].y0, b->list[i].x1, b->list[i].y1, b->list[i].spp};
     struct pt_stopmap map = {0};
     int rc = pt_stopmap_draw(b->x0, b->y0, b->x1, b->y1, list, b->count, &map, err);
-    if (rc == PT_OK)
+    if (!rc)
         rc = pt_oiio_write_png(path, map.width, map.height, 3, map.rgb, err);
     pt_stopmap_release(&map);
     free(list);
@@ -186,11 +186,11 @@ static int stop_map_png(const char *path, const struct pt_render *r, struct pt_e
 }
 
 /* name;t0;…;t15; with the scene file's name without folder and ending. */
-static int stop_map_csv(const char *path, const struct pt_render *r, const char *scene, struct pt_err *err)
+static int stop_map_csv(const char *path, const struct pt_render *r, const char *scene, struct base_err *err)
 {
-    struct pt_fio_out out;
-    int rc = pt_fio_begin(&out, path, err);
-    if (rc != PT_OK)
+    struct base_file_out out;
+    int rc = base_file_begin(&out, path, err);
+    if (rc)
         return rc;
     const char *slash = strrchr(scene, '/');
     const char *name = slash != NULL ? slash + 1 : scene;
@@ -199,10 +199,10 @@ static int stop_map_csv(const char *path, const struct pt_render *r, const char 
     for (uint32_t i = 0; i < r->blocks.count; i++)
         fprintf(out.file, "%llu;", (unsigned long long)r->blocks.list[i].spp);
     fprintf(out.file, "\n");
-    return pt_fio_commit(&out, err);
+    return base_file_commit(&out, err);
 }
 
-int pt_output_stop_map(const char *path, const struct pt_render *r, const struct pt_output_info *info, struct pt_err *err)
+int pt_output_stop_map(const char *path, const struct pt_render *r, const struct pt_output_info *info, struct base_err *err)
 {
     return pt_output_has_ending(path, "csv") ? stop_map_csv(path, r, info->scene, err) : stop_map_png(path, r, err);
 }

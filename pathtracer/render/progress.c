@@ -14,7 +14,7 @@ void pt_progress_init(struct pt_progress *p, FILE *out)
     if (out == NULL)
         return;
     p->terminal = isatty(fileno(out)) == 1;
-    p->next_s = pt_clock_wall_s() + (p->terminal ? 0.0 : FIRST_PLAIN_S);
+    p->next_s = base_clock_wall_s() + (p->terminal ? 0.0 : FIRST_PLAIN_S);
 }
 
 static void format_time(double s, char *text, size_t room)
@@ -79,7 +79,7 @@ void pt_progress_text(const struct pt_render *r, char *text, size_t room)
 
 void pt_progress_update(struct pt_progress *p, const struct pt_render *r)
 {
-    double now_s = pt_clock_wall_s();
+    double now_s = base_clock_wall_s();
     if (p->out == NULL || now_s < p->next_s)
         return;
     char text[256];

@@ -70,7 +70,7 @@ static void work_destroy(struct pt_render_work *w)
     free(w);
 }
 
-static int open_frame(struct pt_render *r, struct pt_err *err)
+static int open_frame(struct pt_render *r, struct base_err *err)
 {
     const struct pt_render_config *c = &r->config;
     struct pt_criterion_frame frame = {
@@ -100,11 +100,11 @@ static uint64_t first_check(const struct pt_render *r)
 }
 
 int pt_render_create(const struct pt_render_config *config, const struct pt_scene *scene, pt_kernel *kernel,
-                     struct pt_threads *threads, struct pt_criterion *criterion, struct pt_render **out, struct pt_err *err)
+                     struct base_threads *threads, struct pt_criterion *criterion, struct pt_render **out, struct base_err *err)
 {
     struct pt_render *r = calloc(1, sizeof *r);
     if (r == NULL)
-        return pt_fail_nomem(err, "renderer");
+        return base_fail_nomem(err, "renderer");
     r->config = *config;
     r->scene = scene;
     r->kernel = kernel;
@@ -116,23 +116,23 @@ int pt_render_create(const struct pt_render_config *config, const struct pt_scen
     int clip = criterion == NULL;
     int rc = pt_blocks_init(&r->blocks, config->width, config->height, config->block_width, config->block_height,
                             config->crop, clip, err);
-    if (rc == PT_OK)
+    if (!rc)
         rc = pt_film_init(&r->film, r->blocks.x0, r->blocks.y0, r->blocks.x1, r->blocks.y1, planes, err);
-    if (rc == PT_OK) {
+    if (!rc) {
         struct pt_render_work *w = r->work = work_create(&r->blocks);
         if (w == NULL || !w->items || !w->order || !w->due || !w->final || !w->decisions)
-            rc = pt_fail_nomem(err, "work list");
+            rc = base_fail_nomem(err, "work list");
     }
-    if (rc == PT_OK && criterion != NULL)
+    if (!rc && criterion != NULL)
         rc = open_frame(r, err);
-    if (rc != PT_OK) {
+    if (rc) {
         pt_render_destroy(r);
         return rc;
     }
     for (uint32_t i = 0; i < r->blocks.count; i++)
         r->blocks.list[i].next_spp = first_check(r);
     *out = r;
-    return PT_OK;
+    return 0;
 }
 
 void pt_render_destroy(struct pt_render *r)
@@ -153,7 +153,7 @@ static void sample_row(void *data, long n, int worker)
     struct item *item = &r->work->items[r->work->order[n]];
     const struct pt_block *block = &r->blocks.list[item->block];
     uint32_t planes = r->film.planes;
-    double start_s = pt_clock_thread_s();
+    double start_s = base_clock_thread_s();
     (void)worker;
     for (int x = block->x0; x < block->x1; x++) {
         size_t index = pt_film_index(&r->film, x, item->y);
@@ -170,7 +170,7 @@ static void sample_row(void *data, long n, int worker)
         }
         pt_film_store(&r->film, index, &pixel);
     }
-    item->thread_s = pt_clock_thread_s() - start_s;
+    item->thread_s = base_clock_thread_s() - start_s;
 }
 
 /* Lists the rows of every active block that has not reached its next check, at most `step` samples further. */
@@ -246,9 +246,9 @@ static int slice(struct pt_render *r)
     double step = r->samples_per_s * span_s / (double)pixels;
     list_items(r, step > 1.0 ? (uint64_t)fmin(step, 1e9) : 1);
     uint64_t before = r->totals.samples;
-    double start_s = pt_clock_wall_s();
-    pt_threads_for(r->threads, (long)r->work->count, sample_row, r);
-    double wall_s = pt_clock_wall_s() - start_s;
+    double start_s = base_clock_wall_s();
+    base_threads_for(r->threads, (long)r->work->count, sample_row, r);
+    double wall_s = base_clock_wall_s() - start_s;
     gather(r);
     r->totals.render_s += wall_s;
     double rate = (double)(r->totals.samples - before) / fmax(wall_s, 1e-6);
@@ -297,11 +297,11 @@ static void warn_once(struct pt_render *r, const struct pt_render_hooks *hooks, 
 static void ask(struct pt_render *r, uint32_t count, const struct pt_render_hooks *hooks)
 {
     struct pt_render_work *w = r->work;
-    struct pt_err err = {0};
-    double start_s = pt_clock_wall_s();
-    if (pt_criterion_evaluate(r->criterion, &r->film, &r->blocks, w->due, count, w->final, w->decisions, &err) != PT_OK)
+    struct base_err err = {0};
+    double start_s = base_clock_wall_s();
+    if (pt_criterion_evaluate(r->criterion, &r->film, &r->blocks, w->due, count, w->final, w->decisions, &err) != 0)
         warn_once(r, hooks, err.text);
-    r->totals.criterion_s += pt_clock_wall_s() - start_s;
+    r->totals.criterion_s += base_clock_wall_s() - start_s;
     r->totals.checks += count;
 }
 
@@ -374,16 +374,16 @@ static void close_blocks(struct pt_render *r, int reason, const struct pt_render
     }
 }
 
-static int suspend(struct pt_render *r, const struct pt_render_hooks *hooks, int reason, struct pt_err *err)
+static int suspend(struct pt_render *r, const struct pt_render_hooks *hooks, int reason, struct base_err *err)
 {
-    int rc = hooks->suspend != NULL ? hooks->suspend(hooks->data, r, err) : PT_OK;
+    int rc = hooks->suspend != NULL ? hooks->suspend(hooks->data, r, err) : 0;
     close_blocks(r, reason, hooks);
     return rc;
 }
 
-int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum pt_render_outcome *outcome, struct pt_err *err)
+int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum pt_render_outcome *outcome, struct base_err *err)
 {
-    int rc = PT_OK;
+    int rc = 0;
     *outcome = PT_RENDER_DONE;
     while (pt_render_active(r) > 0) {
         if (!slice(r)) {
@@ -392,7 +392,7 @@ int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum
                 pt_blocks_reopen(&r->blocks, r->config.max_seam);
             continue;
         }
-        if (hooks->slice != NULL && (rc = hooks->slice(hooks->data, r, err)) != PT_OK)
+        if (hooks->slice != NULL && (rc = hooks->slice(hooks->data, r, err)) != 0)
             break;
         if (hooks->interrupted != NULL && hooks->interrupted(hooks->data)) {
             *outcome = PT_RENDER_INTERRUPTED;
@@ -408,20 +408,20 @@ int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum
     return rc;
 }
 
-int pt_render_advance(struct pt_render *r, uint64_t spp, const struct pt_render_hooks *hooks, int *stopped, struct pt_err *err)
+int pt_render_advance(struct pt_render *r, uint64_t spp, const struct pt_render_hooks *hooks, int *stopped, struct base_err *err)
 {
     for (uint32_t i = 0; i < r->blocks.count; i++)
         r->blocks.list[i].next_spp = spp;
     while (slice(r)) {
-        int rc = hooks->slice != NULL ? hooks->slice(hooks->data, r, err) : PT_OK;
-        if (rc != PT_OK)
+        int rc = hooks->slice != NULL ? hooks->slice(hooks->data, r, err) : 0;
+        if (rc)
             return rc;
         if (hooks->interrupted != NULL && hooks->interrupted(hooks->data)) {
             *stopped = 1;
             break;
         }
     }
-    return PT_OK;
+    return 0;
 }
 
 void pt_render_judge(struct pt_render *r, const struct pt_render_hooks *hooks)

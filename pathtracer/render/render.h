@@ -48,7 +48,7 @@ struct pt_render {
     struct pt_render_config config;
     const struct pt_scene *scene;     /* borrows */
     pt_kernel *kernel;
-    struct pt_threads *threads;       /* borrows */
+    struct base_threads *threads;       /* borrows */
     struct pt_criterion *criterion;   /* borrows; NULL only with config.uniform */
     struct pt_film film;
     struct pt_blocks blocks;
@@ -63,12 +63,12 @@ enum pt_render_outcome { PT_RENDER_DONE, PT_RENDER_OUT_OF_TIME, PT_RENDER_INTERR
 
 struct pt_render_hooks {
     /* After every slice; a negative code ends pt_render_run with it. May be NULL. */
-    int (*slice)(void *data, struct pt_render *render, struct pt_err *err);
+    int (*slice)(void *data, struct pt_render *render, struct base_err *err);
     /* Not 0: end after this slice. May be NULL. */
     int (*interrupted)(void *data);
     /* Called once before the blocks still active are closed for time or interrupt, while everything is as a later run needs
      * it to go on. May be NULL. */
-    int (*suspend)(void *data, struct pt_render *render, struct pt_err *err);
+    int (*suspend)(void *data, struct pt_render *render, struct base_err *err);
     void (*warn)(void *data, const char *line); /* may be NULL */
     void *data;
 };
@@ -76,16 +76,16 @@ struct pt_render_hooks {
 /* Allocates film and blocks and opens the criterion's frame. The config is copied; scene, threads and criterion are borrowed
  * until destroy. */
 int pt_render_create(const struct pt_render_config *config, const struct pt_scene *scene, pt_kernel *kernel,
-                     struct pt_threads *threads, struct pt_criterion *criterion, struct pt_render **out, struct pt_err *err);
+                     struct base_threads *threads, struct pt_criterion *criterion, struct pt_render **out, struct base_err *err);
 void pt_render_destroy(struct pt_render *render);
 
 /* Renders until all blocks are stopped, time is up, or interrupted() says so. */
 int pt_render_run(struct pt_render *render, const struct pt_render_hooks *hooks, enum pt_render_outcome *outcome,
-                  struct pt_err *err);
+                  struct base_err *err);
 
 /* For recording: samples every block up to spp, without checks; *stopped is set when interrupted() said so before. */
 int pt_render_advance(struct pt_render *render, uint64_t spp, const struct pt_render_hooks *hooks, int *stopped,
-                      struct pt_err *err);
+                      struct base_err *err);
 /* Asks the criterion, if there is one, about every block as it is and notes the answers; nothing is stopped. */
 void pt_render_judge(struct pt_render *render, const struct pt_render_hooks *hooks);
 

@@ -3,117 +3,117 @@
 #include <math.h>
 #include <string.h>
 
-#include "render/json.h"
+#include "base/json.h"
 
 /* One number for square blocks, [width, height] for others. */
 static void add_block_size(cJSON *root, int width, int height, int *failed)
 {
     if (width == height) {
-        pt_json_number(root, "block", width, failed);
+        base_json_number(root, "block", width, failed);
         return;
     }
-    cJSON *block = pt_json_array(root, "block", failed);
-    pt_json_number(block, NULL, width, failed);
-    pt_json_number(block, NULL, height, failed);
+    cJSON *block = base_json_array(root, "block", failed);
+    base_json_number(block, NULL, width, failed);
+    base_json_number(block, NULL, height, failed);
 }
 
 static void add_criterion(cJSON *root, const struct pt_render *r, const struct pt_output_info *info, int *failed)
 {
     if (r->criterion == NULL) {
-        pt_json_text(root, "criterion", NULL, failed);
+        base_json_text(root, "criterion", NULL, failed);
         return;
     }
     const struct lull_criterion *t = pt_criterion_table(r->criterion);
-    cJSON *c = pt_json_object(root, "criterion", failed);
-    pt_json_text(c, "id", t->id, failed);
-    pt_json_text(c, "version", t->version, failed);
-    cJSON *params = pt_json_object(c, "params", failed);
+    cJSON *c = base_json_object(root, "criterion", failed);
+    base_json_text(c, "id", t->id, failed);
+    base_json_text(c, "version", t->version, failed);
+    cJSON *params = base_json_object(c, "params", failed);
     for (uint32_t i = 0; i < t->param_count; i++) {
         const struct lull_param *p = (const void *)((const char *)t->params + (size_t)i * t->param_stride);
         const char *value = p->default_value;
         for (uint32_t k = 0; k < info->param_count; k++)
             if (strcmp(info->params[k].key, p->name) == 0)
                 value = info->params[k].value;
-        pt_json_text(params, p->name, value, failed);
+        base_json_text(params, p->name, value, failed);
     }
 }
 
 static void add_blocks(cJSON *root, const struct pt_render *r, int *failed)
 {
-    cJSON *list = pt_json_array(root, "blocks", failed);
+    cJSON *list = base_json_array(root, "blocks", failed);
     for (uint32_t i = 0; i < r->blocks.count; i++) {
         const struct pt_block *b = &r->blocks.list[i];
-        cJSON *o = pt_json_object(list, NULL, failed);
-        pt_json_number(o, "id", b->id, failed);
-        pt_json_number(o, "x0", b->x0, failed);
-        pt_json_number(o, "y0", b->y0, failed);
-        pt_json_number(o, "x1", b->x1, failed);
-        pt_json_number(o, "y1", b->y1, failed);
-        pt_json_number(o, "spp", (double)b->spp, failed);
-        pt_json_text(o, "reason", pt_block_reason_name(b->reason), failed);
-        pt_json_number(o, "p_noisy", b->p_noisy, failed);
-        pt_json_number(o, "error", b->error, failed);
-        pt_json_number(o, "checks", b->checks, failed);
-        pt_json_number(o, "thread_s", b->thread_s, failed);
+        cJSON *o = base_json_object(list, NULL, failed);
+        base_json_number(o, "id", b->id, failed);
+        base_json_number(o, "x0", b->x0, failed);
+        base_json_number(o, "y0", b->y0, failed);
+        base_json_number(o, "x1", b->x1, failed);
+        base_json_number(o, "y1", b->y1, failed);
+        base_json_number(o, "spp", (double)b->spp, failed);
+        base_json_text(o, "reason", pt_block_reason_name(b->reason), failed);
+        base_json_number(o, "p_noisy", b->p_noisy, failed);
+        base_json_number(o, "error", b->error, failed);
+        base_json_number(o, "checks", b->checks, failed);
+        base_json_number(o, "thread_s", b->thread_s, failed);
     }
 }
 
 static void add_totals(cJSON *root, const struct pt_render *r, int *failed)
 {
     const struct pt_render_totals *t = &r->totals;
-    cJSON *o = pt_json_object(root, "totals", failed);
-    pt_json_number(o, "samples", (double)t->samples, failed);
-    pt_json_number(o, "render_s", t->render_s, failed);
-    pt_json_number(o, "criterion_s", t->criterion_s, failed);
-    pt_json_number(o, "paths", (double)t->paths, failed);
-    pt_json_number(o, "rays", (double)t->rays, failed);
-    pt_json_number(o, "paths_per_s", t->render_s > 0.0 ? (double)t->paths / t->render_s : NAN, failed);
-    pt_json_number(o, "rays_per_s", t->render_s > 0.0 ? (double)t->rays / t->render_s : NAN, failed);
-    pt_json_number(o, "dropped_samples", (double)t->dropped, failed);
+    cJSON *o = base_json_object(root, "totals", failed);
+    base_json_number(o, "samples", (double)t->samples, failed);
+    base_json_number(o, "render_s", t->render_s, failed);
+    base_json_number(o, "criterion_s", t->criterion_s, failed);
+    base_json_number(o, "paths", (double)t->paths, failed);
+    base_json_number(o, "rays", (double)t->rays, failed);
+    base_json_number(o, "paths_per_s", t->render_s > 0.0 ? (double)t->paths / t->render_s : NAN, failed);
+    base_json_number(o, "rays_per_s", t->render_s > 0.0 ? (double)t->rays / t->render_s : NAN, failed);
+    base_json_number(o, "dropped_samples", (double)t->dropped, failed);
 }
 
 /* The first few dropped samples, for --debug-path. */
 static void add_dropped(cJSON *root, const struct pt_render *r, int *failed)
 {
-    cJSON *list = pt_json_array(root, "dropped", failed);
+    cJSON *list = base_json_array(root, "dropped", failed);
     for (uint32_t i = 0; i < r->dropped_count; i++) {
-        cJSON *o = pt_json_object(list, NULL, failed);
-        pt_json_number(o, "x", r->dropped[i].x, failed);
-        pt_json_number(o, "y", r->dropped[i].y, failed);
-        pt_json_number(o, "sample", r->dropped[i].sample, failed);
+        cJSON *o = base_json_object(list, NULL, failed);
+        base_json_number(o, "x", r->dropped[i].x, failed);
+        base_json_number(o, "y", r->dropped[i].y, failed);
+        base_json_number(o, "sample", r->dropped[i].sample, failed);
     }
 }
 
 static void add_memory(cJSON *root, const struct pt_render *r, const struct pt_output_info *info, int *failed)
 {
-    cJSON *o = pt_json_object(root, "memory", failed);
-    pt_json_number(o, "film_bytes", (double)r->film.bytes, failed);
-    pt_json_number(o, "film_bytes_per_pixel", (double)r->film.bytes / (double)r->film.pixels, failed);
-    pt_json_number(o, "scene_bytes", info->scene_bytes >= 0 ? (double)info->scene_bytes : NAN, failed);
+    cJSON *o = base_json_object(root, "memory", failed);
+    base_json_number(o, "film_bytes", (double)r->film.bytes, failed);
+    base_json_number(o, "film_bytes_per_pixel", (double)r->film.bytes / (double)r->film.pixels, failed);
+    base_json_number(o, "scene_bytes", info->scene_bytes >= 0 ? (double)info->scene_bytes : NAN, failed);
 }
 
-int pt_output_report(const char *path, const struct pt_render *r, const struct pt_output_info *info, struct pt_err *err)
+int pt_output_report(const char *path, const struct pt_render *r, const struct pt_output_info *info, struct base_err *err)
 {
     int failed = 0;
     cJSON *root = cJSON_CreateObject();
-    pt_json_text(root, "scene", info->scene, &failed);
-    pt_json_number(root, "width", r->config.width, &failed);
-    pt_json_number(root, "height", r->config.height, &failed);
+    base_json_text(root, "scene", info->scene, &failed);
+    base_json_number(root, "width", r->config.width, &failed);
+    base_json_number(root, "height", r->config.height, &failed);
     add_block_size(root, r->config.block_width, r->config.block_height, &failed);
-    pt_json_number(root, "seed", r->config.integrator.seed, &failed);
-    pt_json_number(root, "threads", info->threads, &failed);
+    base_json_number(root, "seed", r->config.integrator.seed, &failed);
+    base_json_number(root, "threads", info->threads, &failed);
     add_criterion(root, r, info, &failed);
-    cJSON *effects = pt_json_array(root, "effects", &failed);
+    cJSON *effects = base_json_array(root, "effects", &failed);
     for (int i = 0; i < PT_FX_COUNT; i++)
         if (info->effects >> i & 1)
-            pt_json_text(effects, NULL, pt_effects_name(i), &failed);
+            base_json_text(effects, NULL, pt_effects_name(i), &failed);
     add_blocks(root, r, &failed);
     add_totals(root, r, &failed);
-    pt_json_bool(root, "interrupted", info->interrupted, &failed);
-    pt_json_text(root, "kernel", info->kernel, &failed);
+    base_json_bool(root, "interrupted", info->interrupted, &failed);
+    base_json_text(root, "kernel", info->kernel, &failed);
     add_dropped(root, r, &failed);
     add_memory(root, r, info, &failed);
-    int rc = pt_json_write(path, root, failed, err);
+    int rc = base_json_write(path, root, failed, err);
     cJSON_Delete(root);
     return rc;
 }

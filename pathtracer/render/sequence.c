@@ -9,9 +9,9 @@
 #include <sys/stat.h>
 
 #include "base/clock.h"
-#include "base/fio.h"
+#include "base/files.h"
 #include "render/blockstats.h"
-#include "render/json.h"
+#include "base/json.h"
 #include "render/lseq.h"
 
 /* Seeds of levels and reference differ in these bits: no sample is shared, and the reference of one seed is not the input of
@@ -22,22 +22,22 @@ enum { FULL_LEVEL_SPP = 320 };
 
 /* --- settings ------------------------------------------------------------------------------------------------------- */
 
-int pt_sequence_levels(const char *text, uint32_t spp[PT_SEQUENCE_MAX_LEVELS], struct pt_err *err)
+int pt_sequence_levels(const char *text, uint32_t spp[PT_SEQUENCE_MAX_LEVELS], struct base_err *err)
 {
     char kind[16], end;
     double first, last, step;
     int geometric, n = 0;
     if (sscanf(text, "%15[a-z]:%lf:%lf:%lf%c", kind, &first, &last, &step, &end) != 4 ||
         (!(geometric = strcmp(kind, "geometric") == 0) && strcmp(kind, "linear") != 0))
-        return pt_fail(err, PT_EINVAL, "--levels %s: expected geometric:FIRST:LAST:RATIO or linear:FIRST:LAST:STEP", text);
+        return base_fail(err, BASE_EINVAL, "--levels %s: expected geometric:FIRST:LAST:RATIO or linear:FIRST:LAST:STEP", text);
     if (!(first >= 1.0 && last >= first && last <= 1e9) || !(geometric ? step >= 1.001 : step >= 1.0))
-        return pt_fail(err, PT_EINVAL, "--levels %s: expected 1 <= FIRST <= LAST, RATIO >= 1.001, STEP >= 1", text);
+        return base_fail(err, BASE_EINVAL, "--levels %s: expected 1 <= FIRST <= LAST, RATIO >= 1.001, STEP >= 1", text);
     for (double at = first; at <= last * (1.0 + 1e-9); at = geometric ? at * step : at + step) {
         uint32_t level = (uint32_t)lround(at);
         if (n > 0 && level <= spp[n - 1])
             continue;
         if (n >= PT_SEQUENCE_MAX_LEVELS - 1)
-            return pt_fail(err, PT_EINVAL, "--levels %s: more than %d levels", text, PT_SEQUENCE_MAX_LEVELS - 1);
+            return base_fail(err, BASE_EINVAL, "--levels %s: more than %d levels", text, PT_SEQUENCE_MAX_LEVELS - 1);
         spp[n++] = level;
     }
     if (spp[n - 1] < (uint32_t)last)
@@ -45,7 +45,7 @@ int pt_sequence_levels(const char *text, uint32_t spp[PT_SEQUENCE_MAX_LEVELS], s
     return n;
 }
 
-int pt_sequence_choose(const char *text, uint8_t *chosen, uint32_t count, struct pt_err *err)
+int pt_sequence_choose(const char *text, uint8_t *chosen, uint32_t count, struct base_err *err)
 {
     for (const char *p = text;;) {
         char *end;
@@ -59,22 +59,22 @@ int pt_sequence_choose(const char *text, uint8_t *chosen, uint32_t count, struct
                 break;
         }
         if (first > last || last >= count)
-            return pt_fail(err, PT_EINVAL, "--blocks %s: blocks are 0 to %u here", text, count - 1);
+            return base_fail(err, BASE_EINVAL, "--blocks %s: blocks are 0 to %u here", text, count - 1);
         memset(chosen + first, 1, last - first + 1);
         if (*end == '\0')
-            return PT_OK;
+            return 0;
         if (*end != ',')
             break;
         p = end + 1;
     }
-    return pt_fail(err, PT_EINVAL, "--blocks %s: expected a list like 0,3,8-11", text);
+    return base_fail(err, BASE_EINVAL, "--blocks %s: expected a list like 0,3,8-11", text);
 }
 
 struct recorder {
     const struct pt_sequence_config *config;
     const struct pt_scene *scene;
     pt_kernel *kernel;
-    struct pt_threads *threads;
+    struct base_threads *threads;
     struct pt_criterion *criterion;
     struct pt_render_hooks hooks;
     cJSON *manifest;            /* owns */
@@ -127,30 +127,30 @@ static cJSON *new_manifest(const struct recorder *r)
              (double)i->filter_x, i->max_depth, (double)i->max_component);
     int failed = 0;
     cJSON *m = cJSON_CreateObject();
-    pt_json_text(m, "format", "lull-sequence", &failed);
-    pt_json_number(m, "version", 1, &failed);
-    pt_json_text(m, "scene", scene, &failed);
-    pt_json_text(m, "source", c->scene_path, &failed);
-    pt_json_text(m, "source_crc32", crc, &failed);
-    pt_json_text(m, "camera", view, &failed);
+    base_json_text(m, "format", "lull-sequence", &failed);
+    base_json_number(m, "version", 1, &failed);
+    base_json_text(m, "scene", scene, &failed);
+    base_json_text(m, "source", c->scene_path, &failed);
+    base_json_text(m, "source_crc32", crc, &failed);
+    base_json_text(m, "camera", view, &failed);
     if (c->view.has_look_at) {
-        cJSON *look_at = pt_json_array(m, "look_at", &failed);
+        cJSON *look_at = base_json_array(m, "look_at", &failed);
         for (int k = 0; k < 9; k++)
-            pt_json_number(look_at, NULL, c->view.look_at_world[k], &failed);
+            base_json_number(look_at, NULL, c->view.look_at_world[k], &failed);
     }
     if (c->view.fov_deg > 0)
-        pt_json_number(m, "fov", c->view.fov_deg, &failed);
-    pt_json_text(m, "renderer", renderer, &failed);
-    pt_json_number(m, "width", c->render.width, &failed);
-    pt_json_number(m, "height", c->render.height, &failed);
-    pt_json_number(m, "block", c->render.block_width, &failed);
-    pt_json_number(m, "seed", r->seed, &failed);
-    pt_json_number(m, "reference_seed", r->reference_seed, &failed);
-    pt_json_number(m, "reference_spp", (double)c->reference_spp, &failed);
-    cJSON *levels = pt_json_array(m, "levels", &failed);
+        base_json_number(m, "fov", c->view.fov_deg, &failed);
+    base_json_text(m, "renderer", renderer, &failed);
+    base_json_number(m, "width", c->render.width, &failed);
+    base_json_number(m, "height", c->render.height, &failed);
+    base_json_number(m, "block", c->render.block_width, &failed);
+    base_json_number(m, "seed", r->seed, &failed);
+    base_json_number(m, "reference_seed", r->reference_seed, &failed);
+    base_json_number(m, "reference_spp", (double)c->reference_spp, &failed);
+    cJSON *levels = base_json_array(m, "levels", &failed);
     for (int k = 0; k < r->level_count; k++)
-        pt_json_number(levels, NULL, r->levels[k], &failed);
-    pt_json_array(m, "blocks", &failed);
+        base_json_number(levels, NULL, r->levels[k], &failed);
+    base_json_array(m, "blocks", &failed);
     if (failed) {
         cJSON_Delete(m);
         m = NULL;
@@ -158,26 +158,26 @@ static cJSON *new_manifest(const struct recorder *r)
     return m;
 }
 
-static int path_in(const struct recorder *r, const char *name, char *path, size_t room, struct pt_err *err)
+static int path_in(const struct recorder *r, const char *name, char *path, size_t room, struct base_err *err)
 {
     int n = snprintf(path, room, "%s/%s", r->config->directory, name);
-    return n > 0 && (size_t)n < room ? PT_OK : pt_fail(err, PT_EINVAL, "%.64s...: the path is too long", r->config->directory);
+    return n > 0 && (size_t)n < room ? 0 : base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", r->config->directory);
 }
 
-static int write_manifest(const struct recorder *r, struct pt_err *err)
+static int write_manifest(const struct recorder *r, struct base_err *err)
 {
     char path[4096];
     int rc = path_in(r, "manifest.json", path, sizeof path, err);
-    return rc == PT_OK ? pt_json_write(path, r->manifest, 0, err) : rc;
+    return !rc ? base_json_write(path, r->manifest, 0, err) : rc;
 }
 
-static int begun_with_another(const char *path, const char *member, struct pt_err *err)
+static int begun_with_another(const char *path, const char *member, struct base_err *err)
 {
-    return pt_fail(err, PT_EINVAL, "%s: this sequence was begun with another %s; use another folder", path, member);
+    return base_fail(err, BASE_EINVAL, "%s: this sequence was begun with another %s; use another folder", path, member);
 }
 
 /* The members up to `levels` must be those of this run; `source` may differ, its CRC decides. */
-static int same_settings(const struct recorder *r, const char *path, const cJSON *old, struct pt_err *err)
+static int same_settings(const struct recorder *r, const char *path, const cJSON *old, struct base_err *err)
 {
     static const char *const optional[] = {"look_at", "fov"};
     for (size_t i = 0; i < sizeof optional / sizeof optional[0]; i++)
@@ -189,7 +189,7 @@ static int same_settings(const struct recorder *r, const char *path, const cJSON
         if (!cJSON_Compare(m, cJSON_GetObjectItemCaseSensitive(old, m->string), 1))
             return begun_with_another(path, m->string, err);
     }
-    return PT_OK;
+    return 0;
 }
 
 /* Is the listed file there, as long and with the CRC that the manifest says? */
@@ -200,8 +200,8 @@ static int file_is_whole(const struct recorder *r, const cJSON *entry)
     char *data = NULL;
     size_t size = 0;
     if (!cJSON_IsString(name) || !cJSON_IsString(crc) || strchr(name->valuestring, '/') != NULL ||
-        path_in(r, name->valuestring, path, sizeof path, NULL) != PT_OK ||
-        pt_fio_read(path, (size_t)1 << 30, &data, &size, NULL) != PT_OK)
+        path_in(r, name->valuestring, path, sizeof path, NULL) != 0 ||
+        base_file_read(path, (size_t)1 << 30, &data, &size, NULL) != 0)
         return 0;
     snprintf(found, sizeof found, "%08x", (unsigned)crc32_z(crc32_z(0, NULL, 0), (const unsigned char *)data, size));
     free(data);
@@ -209,25 +209,25 @@ static int file_is_whole(const struct recorder *r, const cJSON *entry)
 }
 
 /* Takes over the finished blocks of an earlier run and unmarks them. */
-static int resume(struct recorder *r, struct pt_err *err)
+static int resume(struct recorder *r, struct base_err *err)
 {
     char path[4096];
     char *text = NULL;
     size_t size = 0;
     struct stat st;
     int rc = path_in(r, "manifest.json", path, sizeof path, err);
-    if (rc != PT_OK || (stat(path, &st) != 0 && errno == ENOENT))
+    if (rc || (stat(path, &st) != 0 && errno == ENOENT))
         return rc;
-    if ((rc = pt_fio_read(path, (size_t)1 << 26, &text, &size, err)) != PT_OK)
+    if ((rc = base_file_read(path, (size_t)1 << 26, &text, &size, err)) != 0)
         return rc;
     cJSON *old = cJSON_Parse(text);
     free(text);
     if (old == NULL)
-        return pt_fail(err, PT_EINVAL, "%s: not a manifest (JSON expected)", path);
+        return base_fail(err, BASE_EINVAL, "%s: not a manifest (JSON expected)", path);
     rc = same_settings(r, path, old, err);
     const cJSON *entry;
     cJSON *blocks = cJSON_GetObjectItemCaseSensitive(r->manifest, "blocks");
-    if (rc == PT_OK) {
+    if (!rc) {
         cJSON_ArrayForEach(entry, cJSON_GetObjectItemCaseSensitive(old, "blocks"))
         {
             const cJSON *id = cJSON_GetObjectItemCaseSensitive(entry, "id");
@@ -235,7 +235,7 @@ static int resume(struct recorder *r, struct pt_err *err)
                 continue;
             cJSON *copy = cJSON_Duplicate(entry, 1);
             if (copy == NULL) {
-                rc = pt_fail_nomem(err, path);
+                rc = base_fail_nomem(err, path);
                 break;
             }
             cJSON_AddItemToArray(blocks, copy);
@@ -247,28 +247,28 @@ static int resume(struct recorder *r, struct pt_err *err)
 }
 
 static int add_to_manifest(struct recorder *r, const struct pt_block *b, const char *file, uint64_t bytes, uint32_t crc,
-                           double seconds, struct pt_err *err)
+                           double seconds, struct base_err *err)
 {
     char text[16];
     int failed = 0;
     snprintf(text, sizeof text, "%08x", crc);
-    cJSON *o = pt_json_object(cJSON_GetObjectItemCaseSensitive(r->manifest, "blocks"), NULL, &failed);
-    pt_json_number(o, "id", b->id, &failed);
-    pt_json_number(o, "x0", b->x0, &failed);
-    pt_json_number(o, "y0", b->y0, &failed);
-    pt_json_number(o, "x1", b->x1, &failed);
-    pt_json_number(o, "y1", b->y1, &failed);
-    pt_json_text(o, "file", file, &failed);
-    pt_json_number(o, "bytes", (double)bytes, &failed);
-    pt_json_text(o, "crc32", text, &failed);
-    pt_json_number(o, "seconds", seconds, &failed);
-    return failed ? pt_fail_nomem(err, file) : write_manifest(r, err);
+    cJSON *o = base_json_object(cJSON_GetObjectItemCaseSensitive(r->manifest, "blocks"), NULL, &failed);
+    base_json_number(o, "id", b->id, &failed);
+    base_json_number(o, "x0", b->x0, &failed);
+    base_json_number(o, "y0", b->y0, &failed);
+    base_json_number(o, "x1", b->x1, &failed);
+    base_json_number(o, "y1", b->y1, &failed);
+    base_json_text(o, "file", file, &failed);
+    base_json_number(o, "bytes", (double)bytes, &failed);
+    base_json_text(o, "crc32", text, &failed);
+    base_json_number(o, "seconds", seconds, &failed);
+    return failed ? base_fail_nomem(err, file) : write_manifest(r, err);
 }
 
 /* --- one block ------------------------------------------------------------------------------------------------------ */
 
 static int open_block(const struct recorder *r, const struct pt_block *b, int reference, struct pt_render **out,
-                      struct pt_err *err)
+                      struct base_err *err)
 {
     struct pt_render_config c = r->config->render;
     int crop[4] = {b->x0, b->y0, b->x1, b->y1};
@@ -312,7 +312,7 @@ static void add_statistic(struct pt_lseq_statistic *list, uint32_t *count, const
 }
 
 static int put_level(struct recorder *r, struct pt_lseq *file, const struct pt_render *render, uint32_t kind, int full,
-                     struct pt_err *err)
+                     struct base_err *err)
 {
     const struct pt_block *b = &render->blocks.list[0];
     struct pt_lseq_statistic statistics[8];
@@ -340,15 +340,15 @@ static int put_level(struct recorder *r, struct pt_lseq *file, const struct pt_r
     return pt_lseq_put(file, &record, err);
 }
 
-static int record_levels(struct recorder *r, struct pt_lseq *file, const struct pt_block *b, int *stopped, struct pt_err *err)
+static int record_levels(struct recorder *r, struct pt_lseq *file, const struct pt_block *b, int *stopped, struct base_err *err)
 {
     struct pt_render *render = NULL;
     int full_done = 0;
     int rc = open_block(r, b, 0, &render, err);
-    for (int k = 0; k < r->level_count && rc == PT_OK; k++) {
+    for (int k = 0; k < r->level_count && !rc; k++) {
         int full = !full_done && (r->levels[k] >= FULL_LEVEL_SPP || k == r->level_count - 1);
         rc = pt_render_advance(render, r->levels[k], &r->hooks, stopped, err);
-        if (rc != PT_OK || *stopped)
+        if (rc || *stopped)
             break;
         pt_render_judge(render, &r->hooks);
         rc = put_level(r, file, render, PT_LSEQ_LEVEL, full, err);
@@ -358,62 +358,62 @@ static int record_levels(struct recorder *r, struct pt_lseq *file, const struct 
     return rc;
 }
 
-static int record_reference(struct recorder *r, struct pt_lseq *file, const struct pt_block *b, int *stopped, struct pt_err *err)
+static int record_reference(struct recorder *r, struct pt_lseq *file, const struct pt_block *b, int *stopped, struct base_err *err)
 {
     struct pt_render *render = NULL;
     if (r->config->reference_spp == 0)
-        return PT_OK;
+        return 0;
     int rc = open_block(r, b, 1, &render, err);
-    if (rc == PT_OK)
+    if (!rc)
         rc = pt_render_advance(render, r->config->reference_spp, &r->hooks, stopped, err);
-    if (rc == PT_OK && !*stopped)
+    if (!rc && !*stopped)
         rc = put_level(r, file, render, PT_LSEQ_REFERENCE, 1, err);
     pt_render_destroy(render);
     return rc;
 }
 
-static int record_block(struct recorder *r, const struct pt_block *b, int *stopped, struct pt_err *err)
+static int record_block(struct recorder *r, const struct pt_block *b, int *stopped, struct base_err *err)
 {
     char name[64], path[4096];
     struct pt_lseq file;
-    double start_s = pt_clock_wall_s();
+    double start_s = base_clock_wall_s();
     snprintf(name, sizeof name, "block-%05u.lseq", b->id);
     int rc = path_in(r, name, path, sizeof path, err);
-    if (rc != PT_OK)
+    if (rc)
         return rc;
     uint32_t records = (uint32_t)r->level_count + (r->config->reference_spp > 0 ? 1 : 0);
     rc = pt_lseq_begin(&file, path, (uint32_t)(b->x1 - b->x0), (uint32_t)(b->y1 - b->y0), b->x0, b->y0, b->id, records, r->seed,
                        err);
-    if (rc != PT_OK)
+    if (rc)
         return rc;
     rc = record_levels(r, &file, b, stopped, err);
-    if (rc == PT_OK && !*stopped)
+    if (!rc && !*stopped)
         rc = record_reference(r, &file, b, stopped, err);
-    if (rc != PT_OK || *stopped) {
+    if (rc || *stopped) {
         pt_lseq_abort(&file);
         return rc;
     }
-    if ((rc = pt_lseq_commit(&file, err)) != PT_OK)
+    if ((rc = pt_lseq_commit(&file, err)) != 0)
         return rc;
-    return add_to_manifest(r, b, name, file.bytes, file.crc, pt_clock_wall_s() - start_s, err);
+    return add_to_manifest(r, b, name, file.bytes, file.crc, base_clock_wall_s() - start_s, err);
 }
 
 /* --- all blocks ----------------------------------------------------------------------------------------------------- */
 
-static int prepare(struct recorder *r, struct pt_err *err)
+static int prepare(struct recorder *r, struct base_err *err)
 {
     const struct pt_render_config *c = &r->config->render;
     const int whole[4] = {0, 0, c->width, c->height};
     if (c->block_width != c->block_height)
-        return pt_fail(err, PT_EINVAL, "--sequence records square blocks: --block N");
+        return base_fail(err, BASE_EINVAL, "--sequence records square blocks: --block N");
     r->levels = calloc(PT_SEQUENCE_MAX_LEVELS, sizeof *r->levels);
     if (r->levels == NULL)
-        return pt_fail_nomem(err, "levels");
+        return base_fail_nomem(err, "levels");
     r->level_count = pt_sequence_levels(r->config->levels != NULL ? r->config->levels : "geometric:20:10000:1.15", r->levels, err);
     if (r->level_count < 0)
         return r->level_count;
     int rc = pt_blocks_init(&r->grid, c->width, c->height, c->block_width, c->block_height, whole, 0, err);
-    if (rc != PT_OK)
+    if (rc)
         return rc;
     size_t pixels = (size_t)c->block_width * (size_t)c->block_height;
     r->chosen = calloc(r->grid.count, 1);
@@ -423,17 +423,17 @@ static int prepare(struct recorder *r, struct pt_err *err)
     r->moment2 = calloc(pixels, sizeof(double));
     r->scratch = calloc(pixels, sizeof(double));
     if (!r->chosen || !r->mean || !r->half || !r->difference || !r->moment2 || !r->scratch)
-        return pt_fail_nomem(err, "sequence");
+        return base_fail_nomem(err, "sequence");
     if (r->config->blocks == NULL)
         memset(r->chosen, 1, r->grid.count);
-    else if ((rc = pt_sequence_choose(r->config->blocks, r->chosen, r->grid.count, err)) != PT_OK)
+    else if ((rc = pt_sequence_choose(r->config->blocks, r->chosen, r->grid.count, err)) != 0)
         return rc;
     r->seed = c->integrator.seed;
     r->reference_seed = r->seed ^ REFERENCE_SEED_BITS;
     if ((r->manifest = new_manifest(r)) == NULL)
-        return pt_fail_nomem(err, "manifest");
+        return base_fail_nomem(err, "manifest");
     if (mkdir(r->config->directory, 0777) != 0 && errno != EEXIST)
-        return pt_fail(err, PT_EINVAL, "%s: %s", r->config->directory, strerror(errno));
+        return base_fail(err, BASE_EINVAL, "%s: %s", r->config->directory, strerror(errno));
     return resume(r, err);
 }
 
@@ -450,21 +450,21 @@ static void recorder_release(struct recorder *r)
     free(r->scratch);
 }
 
-static int record_chosen(struct recorder *r, int *stopped, struct pt_err *err)
+static int record_chosen(struct recorder *r, int *stopped, struct base_err *err)
 {
     uint32_t todo = 0, done = 0;
-    double start_s = pt_clock_wall_s();
+    double start_s = base_clock_wall_s();
     for (uint32_t i = 0; i < r->grid.count; i++)
         todo += r->chosen[i];
     int rc = write_manifest(r, err);
-    for (uint32_t i = 0; i < r->grid.count && rc == PT_OK && !*stopped; i++) {
+    for (uint32_t i = 0; i < r->grid.count && !rc && !*stopped; i++) {
         if (!r->chosen[i])
             continue;
         rc = record_block(r, &r->grid.list[i], stopped, err);
-        if (rc != PT_OK || *stopped || r->config->quiet)
+        if (rc || *stopped || r->config->quiet)
             continue;
         char line[128];
-        double each_s = (pt_clock_wall_s() - start_s) / ++done;
+        double each_s = (base_clock_wall_s() - start_s) / ++done;
         snprintf(line, sizeof line, "block %u recorded, %u of %u, %.1f s each, %.0f s left", i, done, todo, each_s,
                  each_s * (todo - done));
         r->hooks.warn(r->hooks.data, line);
@@ -473,14 +473,14 @@ static int record_chosen(struct recorder *r, int *stopped, struct pt_err *err)
 }
 
 int pt_sequence_record(const struct pt_sequence_config *config, const struct pt_scene *scene, pt_kernel *kernel,
-                       struct pt_threads *threads, struct pt_criterion *criterion, int (*interrupted)(void *data),
-                       void (*say)(void *data, const char *line), void *data, int *was_interrupted, struct pt_err *err)
+                       struct base_threads *threads, struct pt_criterion *criterion, int (*interrupted)(void *data),
+                       void (*say)(void *data, const char *line), void *data, int *was_interrupted, struct base_err *err)
 {
     struct recorder r = {.config = config, .scene = scene, .kernel = kernel, .threads = threads, .criterion = criterion,
                          .hooks = {.slice = config->slice, .interrupted = interrupted, .warn = say, .data = data}};
     *was_interrupted = 0;
     int rc = prepare(&r, err);
-    if (rc == PT_OK)
+    if (!rc)
         rc = record_chosen(&r, was_interrupted, err);
     recorder_release(&r);
     return rc;

@@ -8,7 +8,7 @@
 
 #include "base/err.h"
 #include "render/render.h"
-#include "scene/load.h"
+#include "pbrt/load.h"
 
 enum { PT_SEQUENCE_MAX_LEVELS = 4000 };
 
@@ -22,19 +22,19 @@ struct pt_sequence_config {
     const char *scene_path;
     uint32_t scene_crc;
     int quiet;
-    int (*slice)(void *data, struct pt_render *render, struct pt_err *err); /* as in pt_render_hooks; may be NULL */
+    int (*slice)(void *data, struct pt_render *render, struct base_err *err); /* as in pt_render_hooks; may be NULL */
     struct pt_render_config render; /* size, block, integrator; the rest is set here */
 };
 
-/* Parses levels into spp[]; returns their number or PT_EINVAL. */
-int pt_sequence_levels(const char *text, uint32_t spp[PT_SEQUENCE_MAX_LEVELS], struct pt_err *err);
+/* Parses levels into spp[]; returns their number or BASE_EINVAL. */
+int pt_sequence_levels(const char *text, uint32_t spp[PT_SEQUENCE_MAX_LEVELS], struct base_err *err);
 /* Marks the listed ids in chosen[0 … count). */
-int pt_sequence_choose(const char *text, uint8_t *chosen, uint32_t count, struct pt_err *err);
+int pt_sequence_choose(const char *text, uint8_t *chosen, uint32_t count, struct base_err *err);
 
 /* criterion may be NULL; else its `error` is recorded at every level. *interrupted is set when interrupted() said so: the
  * block being recorded is lost, all before it are safe. say gets a line per block. */
 int pt_sequence_record(const struct pt_sequence_config *config, const struct pt_scene *scene, pt_kernel *kernel,
-                       struct pt_threads *threads, struct pt_criterion *criterion, int (*interrupted)(void *data),
-                       void (*say)(void *data, const char *line), void *data, int *was_interrupted, struct pt_err *err);
+                       struct base_threads *threads, struct pt_criterion *criterion, int (*interrupted)(void *data),
+                       void (*say)(void *data, const char *line), void *data, int *was_interrupted, struct base_err *err);
 
 #endif

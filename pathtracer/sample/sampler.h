@@ -14,7 +14,7 @@
 
 #include <stdint.h>
 
-#include "base/rng.h"
+#include "sample/rng.h"
 #include "integ/integrator.h"
 
 enum {

@@ -18,10 +18,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "base/arena.h"
-#include "base/vec.h"
-#include "integ/effects.h"
-#include "scene/load.h"
+#include "scene/arena.h"
+#include "scene/vec.h"
+#include "scene/effects.h"
+#include "pbrt/load.h"
 
 /* Affine transform: three rows of four, applied to column vectors (x, y, z, 1). */
 struct pt_mat34 {

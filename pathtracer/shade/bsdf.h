@@ -13,8 +13,8 @@
 
 #include <stdint.h>
 
-#include "base/vec.h"
-#include "integ/effects.h"
+#include "scene/vec.h"
+#include "scene/effects.h"
 
 enum pt_bsdf_kind {
     PT_BSDF_DIFFUSE,

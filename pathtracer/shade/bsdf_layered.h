@@ -9,7 +9,7 @@
 #ifndef PT_SHADE_BSDF_LAYERED_H
 #define PT_SHADE_BSDF_LAYERED_H
 
-#include "base/rng.h"
+#include "sample/rng.h"
 #include "shade/bsdf.h"
 #include "shade/bsdf_conductor.h"
 #include "shade/bsdf_dielectric.h"

@@ -10,7 +10,7 @@
 
 #include <stddef.h>
 
-#include "base/vec.h"
+#include "scene/vec.h"
 
 enum {
     PT_COAT_NODES = 32,

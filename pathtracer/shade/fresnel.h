@@ -4,7 +4,7 @@
 #ifndef PT_SHADE_FRESNEL_H
 #define PT_SHADE_FRESNEL_H
 
-#include "base/vec.h"
+#include "scene/vec.h"
 
 /*
  * Reflectance in [0, 1] seen by a ray whose cosine with the normal is cos_i (> 0 outside, < 0 inside); eta = inside / outside.

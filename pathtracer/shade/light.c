@@ -162,7 +162,7 @@ static int build_environments(struct pt_scene *scene)
     return 1;
 }
 
-int pt_lights_build(struct pt_scene *scene, struct pt_err *err)
+int pt_lights_build(struct pt_scene *scene, struct base_err *err)
 {
     int64_t count = 0;
     for (int32_t i = 0; i < scene->light_count; i++)
@@ -170,9 +170,9 @@ int pt_lights_build(struct pt_scene *scene, struct pt_err *err)
     scene->emitter_count = 0;
     scene->env_light_count = 0;
     if (scene->light_count == 0)
-        return PT_OK;
+        return 0;
     if (count > INT32_MAX / 2)
-        return pt_fail(err, PT_EINVAL, "too many emitting triangles (%lld)", (long long)count);
+        return base_fail(err, BASE_EINVAL, "too many emitting triangles (%lld)", (long long)count);
     struct pt_arena scratch = {0};
     int ok = 1;
     size_t lights = (size_t)scene->light_count;
@@ -191,5 +191,5 @@ int pt_lights_build(struct pt_scene *scene, struct pt_err *err)
         }
     }
     pt_arena_release(&scratch);
-    return ok ? PT_OK : pt_fail_nomem(err, "the lights");
+    return ok ? 0 : base_fail_nomem(err, "the lights");
 }

@@ -12,7 +12,7 @@
 #include "scene/scene.h"
 
 /* Makes emitters, env_lights and env_distributions in the scene's arena, after pt_accel_build (it needs the bounds). */
-int pt_lights_build(struct pt_scene *scene, struct pt_err *err);
+int pt_lights_build(struct pt_scene *scene, struct base_err *err);
 
 struct pt_light_sample {
     pt_vec3 wi;          /* unit, from the reference point to the light */

@@ -116,7 +116,7 @@ static const float *find_table(const struct pt_scene *scene, int32_t before, con
     return NULL;
 }
 
-int pt_materials_build(struct pt_scene *scene, struct pt_err *err)
+int pt_materials_build(struct pt_scene *scene, struct base_err *err)
 {
     for (int32_t i = 0; i < scene->material_count; i++) {
         struct pt_material *m = &scene->materials[i];
@@ -132,7 +132,7 @@ int pt_materials_build(struct pt_scene *scene, struct pt_err *err)
             continue;
         float *table = pt_arena_alloc(&scene->arena, pt_coat_table_floats(key.rows), sizeof(float));
         if (!table)
-            return pt_fail_nomem(err, "the table of a coating");
+            return base_fail_nomem(err, "the table of a coating");
         pt_coat_table_build(table, key.rows, key.eta, key.thickness, key.alpha_min, key.alpha_max);
         m->coat_table = table;
     }

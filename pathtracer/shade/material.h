@@ -25,7 +25,7 @@ struct pt_surface {
  * Makes what materials need before rendering: tables of the coatings, in the scene's arena; constant colours are clamped to
  * what their model allows. Call once, after textures and materials are filled and before effects are final.
  */
-int pt_materials_build(struct pt_scene *scene, struct pt_err *err);
+int pt_materials_build(struct pt_scene *scene, struct base_err *err);
 
 /* Effects that material `id` needs, those of its textures and of mixed materials included. */
 pt_effects pt_material_effects(const struct pt_scene *scene, int32_t id);

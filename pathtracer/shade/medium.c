@@ -12,7 +12,7 @@ static float mean(pt_vec3 a) { return (a.x + a.y + a.z) * (1.0f / 3.0f); }
 /* ∫ exp(-σ t) dt over [0, t] */
 static float optical_mean(float sigma, float t) { return sigma > 0.0f ? -expm1f(-sigma * t) / sigma : t; }
 
-int pt_media_build(struct pt_scene *scene, struct pt_err *err)
+int pt_media_build(struct pt_scene *scene, struct base_err *err)
 {
     for (int32_t i = 0; i < scene->medium_count; i++) {
         struct pt_medium *m = &scene->media[i];

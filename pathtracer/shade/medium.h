@@ -8,7 +8,7 @@
 #define PT_SHADE_MEDIUM_H
 
 #include "base/err.h"
-#include "base/rng.h"
+#include "sample/rng.h"
 #include "scene/scene.h"
 
 /* Number of calls of this thread into medium code so far: lets tests prove that scenes without media make none. */
@@ -22,7 +22,7 @@ struct pt_medium_event {
 };
 
 /* Makes the majorants of grid media in the scene's arena. Call once after media are filled. */
-int pt_media_build(struct pt_scene *scene, struct pt_err *err);
+int pt_media_build(struct pt_scene *scene, struct base_err *err);
 
 /* Effects that medium `id` needs. */
 pt_effects pt_medium_effects(const struct pt_scene *scene, int32_t id);
@@ -44,6 +44,6 @@ void pt_medium_grid_sample(const struct pt_medium *medium, pt_vec3 origin, pt_ve
                            struct pt_rng *rng, struct pt_medium_event *event);
 pt_vec3 pt_medium_grid_transmittance(const struct pt_medium *medium, pt_vec3 origin, pt_vec3 direction, float t_max,
                                      struct pt_rng *rng);
-int pt_medium_grid_build(struct pt_medium *medium, struct pt_arena *arena, struct pt_err *err);
+int pt_medium_grid_build(struct pt_medium *medium, struct pt_arena *arena, struct base_err *err);
 
 #endif

@@ -58,13 +58,13 @@ static float largest(const struct pt_medium *m, int x, int y, int z)
     return best;
 }
 
-int pt_medium_grid_build(struct pt_medium *m, struct pt_arena *arena, struct pt_err *err)
+int pt_medium_grid_build(struct pt_medium *m, struct pt_arena *arena, struct base_err *err)
 {
     int mx = m->nx < MAJORANT_CELLS ? m->nx : MAJORANT_CELLS, my = m->ny < MAJORANT_CELLS ? m->ny : MAJORANT_CELLS;
     int mz = m->nz < MAJORANT_CELLS ? m->nz : MAJORANT_CELLS;
     float *majorant = pt_arena_alloc(arena, (size_t)mx * (size_t)my * (size_t)mz, sizeof(float));
     if (!majorant)
-        return pt_fail_nomem(err, "the majorants of a grid medium");
+        return base_fail_nomem(err, "the majorants of a grid medium");
     m->mx = mx;
     m->my = my;
     m->mz = mz;

@@ -5,7 +5,7 @@
 #ifndef PT_SHADE_MICROFACET_H
 #define PT_SHADE_MICROFACET_H
 
-#include "base/vec.h"
+#include "scene/vec.h"
 #include "shade/warp.h"
 
 /* Below this roughness an interface is treated as a mirror. */

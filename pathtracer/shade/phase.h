@@ -5,7 +5,7 @@
 #ifndef PT_SHADE_PHASE_H
 #define PT_SHADE_PHASE_H
 
-#include "base/vec.h"
+#include "scene/vec.h"
 #include "shade/warp.h"
 
 /* Stronger asymmetry is beyond what float resolves. */

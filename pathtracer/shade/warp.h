@@ -7,7 +7,7 @@
 #ifndef PT_SHADE_WARP_H
 #define PT_SHADE_WARP_H
 
-#include "base/vec.h"
+#include "scene/vec.h"
 
 /* |x| <= π/4; absolute error below 1e-7. Taylor series. */
 static inline void pt_sincos_quarter(float x, float *s, float *c)

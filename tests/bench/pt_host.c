@@ -12,7 +12,7 @@
 
 #include "base/clock.h"
 #include "render/film.h"
-#include "scene/load.h"
+#include "pbrt/load.h"
 
 enum { ROUNDS_MAX = 101, ROWS = 8 };
 
@@ -27,7 +27,7 @@ struct bench {
 
 static double run_kernel(struct bench *b, uint32_t first)
 {
-    double start_s = pt_clock_thread_s();
+    double start_s = base_clock_thread_s();
     for (int y = b->y0; y < b->y0 + ROWS; y++)
         for (int x = 0; x < b->width; x++)
             for (uint32_t s = first; s < first + b->spp; s++) {
@@ -35,12 +35,12 @@ static double run_kernel(struct bench *b, uint32_t first)
                 b->kernel(b->scene, &b->integrator, (uint32_t)x, (uint32_t)y, s, &r);
                 b->sink += (double)r.radiance.x;
             }
-    return pt_clock_thread_s() - start_s;
+    return base_clock_thread_s() - start_s;
 }
 
 static double run_film(struct bench *b, struct pt_film *film, uint32_t first)
 {
-    double start_s = pt_clock_thread_s();
+    double start_s = base_clock_thread_s();
     for (int y = b->y0; y < b->y0 + ROWS; y++)
         for (int x = 0; x < b->width; x++) {
             struct pt_film_pixel p;
@@ -53,7 +53,7 @@ static double run_film(struct bench *b, struct pt_film *film, uint32_t first)
             }
             pt_film_store(film, i, &p);
         }
-    return pt_clock_thread_s() - start_s;
+    return base_clock_thread_s() - start_s;
 }
 
 static int ascending(const void *a, const void *b)
@@ -70,7 +70,7 @@ static double median(double *v, int n)
 
 int main(int argc, char **argv)
 {
-    struct pt_err err = {0};
+    struct base_err err = {0};
     struct pt_load_options options = {.quiet = 1};
     struct pt_scene_defaults d;
     struct bench b = {0};
@@ -78,7 +78,7 @@ int main(int argc, char **argv)
     static double ratio_half[ROUNDS_MAX], ratio_all[ROUNDS_MAX];
     int rounds = argc > 2 ? atoi(argv[2]) : 15;
     b.spp = argc > 3 ? (uint32_t)atoi(argv[3]) : 8;
-    if (argc < 2 || rounds < 1 || rounds > ROUNDS_MAX || pt_scene_load(argv[1], &options, &b.scene, &d, &err) != PT_OK) {
+    if (argc < 2 || rounds < 1 || rounds > ROUNDS_MAX || pt_scene_load(argv[1], &options, &b.scene, &d, &err) != 0) {
         fprintf(stderr, "pt_host: %s\n", argc < 2 ? "usage: pt_host SCENE.pbrt [ROUNDS] [SPP]" : err.text);
         return 2;
     }
@@ -86,8 +86,8 @@ int main(int argc, char **argv)
     b.kernel = pt_kernel_select(pt_scene_effects(b.scene), NULL, NULL);
     b.width = d.width;
     b.y0 = d.height / 2;
-    if (pt_film_init(&half, 0, 0, d.width, d.height, PT_FILM_HALF, &err) != PT_OK ||
-        pt_film_init(&all, 0, 0, d.width, d.height, PT_FILM_ALL, &err) != PT_OK)
+    if (pt_film_init(&half, 0, 0, d.width, d.height, PT_FILM_HALF, &err) != 0 ||
+        pt_film_init(&all, 0, 0, d.width, d.height, PT_FILM_ALL, &err) != 0)
         return 1;
     for (int k = -1; k < rounds; k++) { /* the first round warms up */
         uint32_t first = (uint32_t)(k + 1) * b.spp;

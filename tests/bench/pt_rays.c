@@ -13,7 +13,7 @@
 #include "base/clock.h"
 #include "geom/accel.h"
 #include "integ/integrator.h"
-#include "scene/load.h"
+#include "pbrt/load.h"
 #include "support/pt_scenes.h"
 
 enum { RAYS_MAX = 4000000, ROUNDS_MAX = 64 };
@@ -111,11 +111,11 @@ static void measure(const struct pt_scene *scene, const struct pt_integrator *se
     unsigned long long sink = 0;
     for (int i = 0; i < rounds; i++) {
         unsigned long long paths = 0;
-        double t0 = pt_clock_thread_s();
+        double t0 = base_clock_thread_s();
         unsigned long long traced = run_kernel(scene, settings, kernel, w, (uint32_t)i, &paths);
-        double t1 = pt_clock_thread_s();
+        double t1 = base_clock_thread_s();
         sink += replay(scene);
-        double t2 = pt_clock_thread_s();
+        double t2 = base_clock_thread_s();
         paths_s[i] = (double)paths / (t1 - t0);
         rays_s[i] = (double)traced / (t1 - t0);
         only_s[i] = (double)ray_count / (t2 - t1);
@@ -142,9 +142,9 @@ int main(int argc, char **argv)
         test_cornell(&cornell, (int)w.width, 1.0f, v3_splat(0.0f));
     } else {
         struct pt_scene_defaults defaults;
-        struct pt_err err = {0};
+        struct base_err err = {0};
         struct pt_load_options options = {.width = (int)w.width, .height = (int)w.height, .quiet = 1};
-        if (pt_scene_load(argv[1], &options, &scene, &defaults, &err) != PT_OK) {
+        if (pt_scene_load(argv[1], &options, &scene, &defaults, &err) != 0) {
             fprintf(stderr, "%s\n", err.text);
             return 2;
         }

@@ -12,8 +12,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 static void try_csv(char *text)
 {
     struct ggn_thresholds t;
-    struct ggn_err err = {0};
-    if (ggn_thresholds_parse_csv("fuzz", text, &t, &err) == GGN_OK)
+    struct base_err err = {0};
+    if (ggn_thresholds_parse_csv("fuzz", text, &t, &err) == 0)
         ggn_thresholds_release(&t);
     else if (err.text[0] == '\0')
         abort();
@@ -22,8 +22,8 @@ static void try_csv(char *text)
 static void try_labels(const char *text, size_t size)
 {
     struct ggn_labels l;
-    struct ggn_err err = {0};
-    if (ggn_labels_parse("fuzz", text, size, &l, &err) == GGN_OK) {
+    struct base_err err = {0};
+    if (ggn_labels_parse("fuzz", text, size, &l, &err) == 0) {
         for (uint32_t i = 0; i < l.n; i++)
             ggn_label_p_noisy(&l.labels[i], 100.0, l.spread);
         ggn_labels_release(&l);
@@ -35,8 +35,8 @@ static void try_labels(const char *text, size_t size)
 static void try_rawls(const char *bytes, size_t size)
 {
     struct ggn_imagef image;
-    struct ggn_err err = {0};
-    if (ggn_rawls_parse("fuzz", bytes, size, &image, &err) == GGN_OK)
+    struct base_err err = {0};
+    if (ggn_rawls_parse("fuzz", bytes, size, &image, &err) == 0)
         ggn_imagef_release(&image);
     else if (err.text[0] == '\0')
         abort();

@@ -57,7 +57,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
             mend(copy, size);
             mend(copy, size); /* the size is part of what the checksum covers */
         }
-        if (ggn_model_load_memory("fuzz", copy, size, &m, NULL) == GGN_OK) {
+        if (ggn_model_load_memory("fuzz", copy, size, &m, NULL) == 0) {
             if (m->hyper.height * m->hyper.width <= 64 * 64)
                 decide(m);
             ggn_model_destroy(m);

@@ -50,14 +50,14 @@ static void decode(const struct ggn_seq_block *b, const struct ggn_seq_record *r
 static void try_block(const uint8_t *data, size_t size, int mended)
 {
     struct ggn_seq_block b;
-    struct ggn_err err = {0};
+    struct base_err err = {0};
     uint8_t *copy = malloc(size > 0 ? size : 1);
     if (copy == NULL)
         return;
     memcpy(copy, data, size);
     if (mended)
         mend(copy, size);
-    if (ggn_seq_block_parse("fuzz", copy, size, &b, &err) != GGN_OK) {
+    if (ggn_seq_block_parse("fuzz", copy, size, &b, &err) != 0) {
         if (err.text[0] == '\0')
             abort();
         free(copy);
@@ -81,7 +81,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     struct ggn_manifest m;
     if (size > 0 && data[0] == '{') {
-        if (ggn_manifest_parse("fuzz", (const char *)data, size, &m, NULL) == GGN_OK)
+        if (ggn_manifest_parse("fuzz", (const char *)data, size, &m, NULL) == 0)
             ggn_manifest_release(&m);
         return 0;
     }

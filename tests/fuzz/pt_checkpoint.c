@@ -38,22 +38,22 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     struct pt_render_config config = {.width = 4, .height = 3, .crop = {0, 0, 4, 3}, .block_width = 2, .block_height = 2,
                                       .spp_min = 4, .spp_max = 4, .uniform = 1, .planes = PT_FILM_HALF};
     struct pt_render *render = NULL;
-    struct pt_err err = {0};
-    struct pt_threads *threads = pt_threads_create(1, &err);
-    if (threads == NULL || pt_render_create(&config, NULL, no_kernel, threads, NULL, &render, &err) != PT_OK)
+    struct base_err err = {0};
+    struct base_threads *threads = base_threads_create(1, &err);
+    if (threads == NULL || pt_render_create(&config, NULL, no_kernel, threads, NULL, &render, &err) != 0)
         abort();
     const char *path = write_file(data, size);
     int rc = pt_checkpoint_load(path, render, "seed=1\n", &err);
-    if (rc == PT_OK) { /* whatever was accepted can be finished */
+    if (!rc) { /* whatever was accepted can be finished */
         struct pt_render_hooks hooks = {0};
         enum pt_render_outcome outcome;
-        if (pt_render_run(render, &hooks, &outcome, &err) != PT_OK)
+        if (pt_render_run(render, &hooks, &outcome, &err) != 0)
             abort();
     } else if (err.text[0] == '\0' || strchr(err.text, '\n') != NULL) {
         abort();
     }
     unlink(path);
     pt_render_destroy(render);
-    pt_threads_destroy(threads);
+    base_threads_destroy(threads);
     return 0;
 }

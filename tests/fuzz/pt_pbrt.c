@@ -3,8 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "scene/build.h"
-#include "scene/pbrt.h"
+#include "pbrt/build.h"
+#include "pbrt/pbrt.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
@@ -29,7 +29,7 @@ static int ends_with(const char *text, const char *end)
     return n >= m && strcmp(text + n - m, end) == 0;
 }
 
-static int read_memory(void *data, const char *path, char **bytes, size_t *size, struct pt_err *err)
+static int read_memory(void *data, const char *path, char **bytes, size_t *size, struct base_err *err)
 {
     const struct input *in = data;
     const void *from = NULL;
@@ -43,14 +43,14 @@ static int read_memory(void *data, const char *path, char **bytes, size_t *size,
             *size = strlen(others[i].text);
         }
     if (from == NULL && strcmp(path, "main") != 0)
-        return pt_fail(err, PT_EIO, "%s: no such file", path);
+        return base_fail(err, BASE_EIO, "%s: no such file", path);
     *bytes = malloc(*size + 1);
     if (*bytes == NULL)
-        return pt_fail_nomem(err, path);
+        return base_fail_nomem(err, path);
     if (*size > 0)
         memcpy(*bytes, from, *size);
     (*bytes)[*size] = '\0';
-    return PT_OK;
+    return 0;
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
@@ -59,13 +59,13 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     struct input in = {data, size};
     struct pt_source source = {read_memory, &in, 0};
     struct pt_scene_defaults defaults = {0};
-    struct pt_err err = {0};
+    struct base_err err = {0};
     struct pt_scene *scene = calloc(1, sizeof *scene);
     struct pt_builder *b = calloc(1, sizeof *b);
-    if (scene == NULL || b == NULL || pt_builder_init(b, scene, &defaults, &options, &source, &err) != PT_OK)
+    if (scene == NULL || b == NULL || pt_builder_init(b, scene, &defaults, &options, &source, &err) != 0)
         abort();
     int rc = pt_pbrt_read(b, "main");
-    if ((rc != PT_OK) != (err.text[0] != '\0') || strchr(err.text, '\n') != NULL)
+    if ((rc) != (err.text[0] != '\0') || strchr(err.text, '\n') != NULL)
         abort();
     pt_builder_release(b);
     pt_arena_release(&scene->arena);

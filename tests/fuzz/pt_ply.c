@@ -4,15 +4,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "scene/ply.h"
+#include "pbrt/ply.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     struct pt_ply ply;
-    struct pt_err err = {0};
-    if (pt_ply_parse("f.ply", (const char *)data, size, &ply, &err) != PT_OK) {
+    struct base_err err = {0};
+    if (pt_ply_parse("f.ply", (const char *)data, size, &ply, &err) != 0) {
         if (err.text[0] == '\0')
             abort();
         return 0;

@@ -14,10 +14,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     static const char *const names[] = {"t.png", "t.tga", "t.hdr", "t.jpg"};
     struct pt_oiio_image image = {0};
-    struct pt_err err = {0};
+    struct base_err err = {0};
     if (size == 0)
         return 0;
-    if (pt_oiio_read_memory(names[data[0] % 4], data + 1, size - 1, &image, &err) != PT_OK) {
+    if (pt_oiio_read_memory(names[data[0] % 4], data + 1, size - 1, &image, &err) != 0) {
         if (err.text[0] == '\0' || strchr(err.text, '\n') != NULL)
             abort();
         return 0;

@@ -88,7 +88,7 @@ static void svm(void **state)
     static double x[N * D], fresh[D];
     unsigned char label[N];
     double scratch[D];
-    struct ggn_err err = {0};
+    struct base_err err = {0};
     int right = 0;
     for (uint32_t i = 0; i < N; i++) { /* inside or outside a circle; the third feature is constant */
         x[i * D] = 1000.0 * ggn_noise_gauss(i, 1);

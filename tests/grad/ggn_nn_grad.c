@@ -52,7 +52,7 @@ static double loss(int backward, uint32_t seed)
 
 static void start(int images, uint32_t seed)
 {
-    struct ggn_err err = {0};
+    struct base_err err = {0};
 
     if (ggn_graph_end(&graph, &err))
         fail_msg("%s", err.text);
@@ -172,7 +172,7 @@ static void test_pool2(void **state)
 static void check_network(int net, enum ggn_preset preset, int side, int images)
 {
     struct ggn_hyper hyper = {preset, side, side + 5, 2, 2, 3, 4};
-    struct ggn_err err = {0};
+    struct base_err err = {0};
 
     if (ggn_network_build(&graph, net, &hyper, &err))
         fail_msg("%s", err.text);

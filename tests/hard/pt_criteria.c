@@ -45,7 +45,7 @@ static void four_blocks(const struct pt_scene *scene, const struct pt_integrator
         out->radiance = v3(0.1f, 0.2f, 0.3f);
 }
 
-static struct pt_render *render(const char *criterion_id, struct pt_criterion **criterion, struct pt_threads *pool)
+static struct pt_render *render(const char *criterion_id, struct pt_criterion **criterion, struct base_threads *pool)
 {
     struct pt_render_config config = {.width = 4 * BLOCK, .height = BLOCK, .crop = {0, 0, 4 * BLOCK, BLOCK}, .block_width = BLOCK,
                                       .block_height = BLOCK, .spp_min = FIRST_CHECK, .spp_max = 2000,
@@ -53,11 +53,11 @@ static struct pt_render *render(const char *criterion_id, struct pt_criterion **
     struct pt_render *r = NULL;
     struct pt_render_hooks hooks = {0};
     enum pt_render_outcome outcome;
-    struct pt_err err = {0};
-    if (pt_criterion_create(criterion_id, NULL, 0, pool, NULL, NULL, criterion, &err) != PT_OK)
+    struct base_err err = {0};
+    if (pt_criterion_create(criterion_id, NULL, 0, pool, NULL, NULL, criterion, &err) != 0)
         fail_msg("%s", err.text);
-    assert_int_equal(pt_render_create(&config, NULL, four_blocks, pool, *criterion, &r, &err), PT_OK);
-    assert_int_equal(pt_render_run(r, &hooks, &outcome, &err), PT_OK);
+    assert_int_equal(pt_render_create(&config, NULL, four_blocks, pool, *criterion, &r, &err), 0);
+    assert_int_equal(pt_render_run(r, &hooks, &outcome, &err), 0);
     assert_int_equal(r->totals.failed_checks, 0);
     return r;
 }
@@ -65,8 +65,8 @@ static struct pt_render *render(const char *criterion_id, struct pt_criterion **
 static void special_blocks(void **state)
 {
     static const char *const ids[] = {"halfbuf", "variance"};
-    struct pt_err err = {0};
-    struct pt_threads *pool = pt_threads_create(2, &err);
+    struct base_err err = {0};
+    struct base_threads *pool = base_threads_create(2, &err);
     (void)state;
     for (int i = 0; i < 2; i++) {
         struct pt_criterion *criterion = NULL;
@@ -86,7 +86,7 @@ static void special_blocks(void **state)
         pt_render_destroy(r);
         pt_criterion_destroy(criterion);
     }
-    pt_threads_destroy(pool);
+    base_threads_destroy(pool);
 }
 
 /* 10^6 samples per pixel through the whole loop: the mean is exact to 10^-6. */
@@ -98,18 +98,18 @@ static void million_samples(void **state)
     struct pt_render *r = NULL;
     struct pt_render_hooks hooks = {0};
     enum pt_render_outcome outcome;
-    struct pt_err err = {0};
-    struct pt_threads *pool = pt_threads_create(2, &err);
+    struct base_err err = {0};
+    struct base_threads *pool = base_threads_create(2, &err);
     double rgb[3];
     (void)state;
-    assert_int_equal(pt_render_create(&config, NULL, pt_fake_constant, pool, NULL, &r, &err), PT_OK);
-    assert_int_equal(pt_render_run(r, &hooks, &outcome, &err), PT_OK);
+    assert_int_equal(pt_render_create(&config, NULL, pt_fake_constant, pool, NULL, &r, &err), 0);
+    assert_int_equal(pt_render_run(r, &hooks, &outcome, &err), 0);
     pt_film_mean(&r->film, 1, 1000000, rgb);
     assert_true(fabs(rgb[0] / (double)0.1f - 1.0) < 1e-6);
     assert_true(fabs(rgb[2] / (double)0.3f - 1.0) < 1e-6);
     assert_true(fabs(r->film.depth[1] - 2.0) < 1e-6);
     pt_render_destroy(r);
-    pt_threads_destroy(pool);
+    base_threads_destroy(pool);
 }
 
 int main(void)

@@ -26,8 +26,8 @@ static struct pt_scene *load(const char *path)
 {
     struct pt_scene *scene = NULL;
     struct pt_scene_defaults defaults;
-    struct pt_err err = {0};
-    if (pt_scene_load(path, NULL, &scene, &defaults, &err) != PT_OK)
+    struct base_err err = {0};
+    if (pt_scene_load(path, NULL, &scene, &defaults, &err) != 0)
         print_error("%s\n", err.text);
     return scene;
 }

@@ -13,7 +13,7 @@
 #include "data/manifest.h"
 #include "data/rawls.h"
 #include "data/thresholds.h"
-#include "eval/stats.h"
+#include "figures/stats.h"
 #include "observer/flip.h"
 #include "observer/observer.h"
 #include "support/fail_alloc.h"
@@ -48,40 +48,40 @@ static int teardown(void **state)
     return system(command);
 }
 
-static int write_block(struct ggn_err *err)
+static int write_block(struct base_err *err)
 {
     struct ggn_seq_builder w = {0};
     uint32_t crc;
     int rc = ggn_seq_builder_init(&w, W, H, 0, 0, 0, 1, err);
-    for (uint32_t i = 0; i < 3 && rc == GGN_OK; i++) {
+    for (uint32_t i = 0; i < 3 && !rc; i++) {
         struct ggn_seq_frame f = {.spp = 100u << i, .half_spp = 50, .is_reference = i == 2, .full = i == 1, .display = display, .mean = mean, .half = half};
         rc = ggn_seq_builder_add(&w, &f, err);
     }
-    if (rc == GGN_OK)
+    if (!rc)
         rc = ggn_seq_builder_write(&w, block_path, &crc, err);
     ggn_seq_builder_release(&w);
     return rc;
 }
 
-static int read_block(struct ggn_err *err)
+static int read_block(struct base_err *err)
 {
     struct ggn_seq_block b;
     static float out[3 * P];
     static uint8_t bytes[3 * P];
     int rc = ggn_seq_block_read(block_path, &b, err);
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
-    for (uint32_t i = 0; i < b.n_levels && rc == GGN_OK; i++)
+    for (uint32_t i = 0; i < b.n_levels && !rc; i++)
         rc = ggn_seq_mean(&b, &b.levels[i], out, err);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = ggn_seq_half_luminance(&b, &b.levels[1], out, err);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = ggn_seq_display(&b, b.reference, bytes, err);
     ggn_seq_block_release(&b);
     return rc;
 }
 
-static int texts(struct ggn_err *err)
+static int texts(struct base_err *err)
 {
     uint32_t levels[] = {100, 200};
     struct ggn_manifest_block entries[] = {{.id = 0, .x1 = W, .y1 = H, .file = "block-00000.lseq", .bytes = 10}, {.id = 1, .x0 = W, .x1 = 2 * W, .y1 = H, .file = "b", .bytes = 10}};
@@ -89,20 +89,20 @@ static int texts(struct ggn_err *err)
     struct ggn_manifest m = {.scene = "s", .width = 2 * W, .height = H, .block = W, .n_levels = 2, .levels = levels, .n_blocks = 2, .blocks = entries}, m2;
     struct ggn_labels l = {.source = "observer", .cap = 200, .spread = 0.25, .n = 2, .labels = list}, l2;
     int rc = ggn_manifest_write(dir, &m, err);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = ggn_labels_write(dir, &l, err);
-    if (rc == GGN_OK && (rc = ggn_manifest_read(dir, &m2, err)) == GGN_OK) {
+    if (!rc && (rc = ggn_manifest_read(dir, &m2, err)) == 0) {
         assert_true(m2.n_blocks == 2 && m2.n_levels == 2); /* what was written is whole */
         ggn_manifest_release(&m2);
     }
-    if (rc == GGN_OK && (rc = ggn_labels_read(dir, &l2, err)) == GGN_OK) {
+    if (!rc && (rc = ggn_labels_read(dir, &l2, err)) == 0) {
         assert_true(l2.n == 2 && l2.labels[1].censored && l2.cap == 200);
         ggn_labels_release(&l2);
     }
     return rc;
 }
 
-static int tables(struct ggn_err *err)
+static int tables(struct base_err *err)
 {
     char text[] = "a;1;2;\nb;3;4;\nc;5;6;\n";
     static const char rawls_image[] = "IHDR\n12\n\1\0\0\0\1\0\0\0\1\0\0\0\nCOMMENTS\nDATA\n4\n\0\0\0\0\n";
@@ -111,52 +111,52 @@ static int tables(struct ggn_err *err)
     struct ggn_agreement a;
     const double x[] = {1, 2, 3}, y[] = {2, 1, 4};
     int rc = ggn_thresholds_parse_csv("t.csv", text, &t, err);
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
     ggn_thresholds_release(&t);
     rc = ggn_rawls_parse("r", rawls_image, sizeof rawls_image - 1, &image, err);
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
     ggn_imagef_release(&image);
     return ggn_stats_agreement(x, y, 3, 10, &a, err);
 }
 
-static int look(struct ggn_err *err)
+static int look(struct base_err *err)
 {
     struct ggn_flip_stats flip;
     struct ggn_seq_block b;
     struct ggn_curve curve;
     static const struct ggn_observer lightness = {GGN_MAP_LIGHTNESS, 1.0, 0.2, 5, 99.0, 1.5, 0.25};
     int rc = ggn_flip(display, other, W, H, GGN_FLIP_PPD, NULL, &flip, err);
-    if (rc == GGN_OK)
+    if (!rc)
         rc = ggn_seq_block_read(block_path, &b, err);
-    if (rc != GGN_OK)
+    if (rc)
         return rc;
-    for (int source = GGN_SOURCE_RENDERED; source <= GGN_SOURCE_AUTO && rc == GGN_OK; source++) {
+    for (int source = GGN_SOURCE_RENDERED; source <= GGN_SOURCE_AUTO && !rc; source++) {
         rc = ggn_observer_curve(&lightness, &b, (enum ggn_observer_source)source, 1, &curve, err);
-        if (rc == GGN_OK)
+        if (!rc)
             ggn_curve_release(&curve);
     }
     ggn_seq_block_release(&b);
     return rc;
 }
 
-static void fail_each(int (*body)(struct ggn_err *))
+static void fail_each(int (*body)(struct base_err *))
 {
     enum { MANY = 5000 };
     long k = 1;
-    assert_int_equal(body(NULL), GGN_OK);
+    assert_int_equal(body(NULL), 0);
     for (; k < MANY; k++) {
-        struct ggn_err err = {0};
+        struct base_err err = {0};
         fail_arm(k);
         int rc = body(&err), failed = fail_disarm();
         if (!failed)
             break;
-        if (rc == GGN_OK || err.text[0] == '\0')
+        if (!rc || err.text[0] == '\0')
             fail_msg("allocation %ld failed and nothing was said", k);
     }
     assert_true(k > 2 && k < MANY);
-    assert_int_equal(body(NULL), GGN_OK);
+    assert_int_equal(body(NULL), 0);
 }
 
 static void blocks(void **state)
@@ -181,7 +181,7 @@ static void small_inputs(void **state)
 static void observer(void **state)
 {
     (void)state;
-    assert_int_equal(write_block(NULL), GGN_OK);
+    assert_int_equal(write_block(NULL), 0);
     fail_each(look);
 }
 

@@ -1,4 +1,4 @@
-/* Every allocation while scene text is read fails once: PT_ENOMEM, no crash, no leak. */
+/* Every allocation while scene text is read fails once: BASE_ENOMEM, no crash, no leak. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -8,9 +8,9 @@
 
 #include <cmocka.h>
 
-#include "scene/build.h"
-#include "scene/pbrt.h"
-#include "scene/ply.h"
+#include "pbrt/build.h"
+#include "pbrt/pbrt.h"
+#include "pbrt/ply.h"
 #include "support/fail_alloc.h"
 
 static const char text[] =
@@ -27,7 +27,7 @@ static const char text[] =
 
 enum { MORE_THAN_IT_TAKES = 20000 };
 
-static int read_once(struct pt_err *err)
+static int read_once(struct base_err *err)
 {
     static const struct pt_load_options options;
     struct pt_source_single single = {"t.pbrt", text, sizeof text - 1};
@@ -36,7 +36,7 @@ static int read_once(struct pt_err *err)
     struct pt_scene scene = {0};
     struct pt_builder b;
     int rc = pt_builder_init(&b, &scene, &defaults, &options, &source, err);
-    if (rc == PT_OK)
+    if (!rc)
         rc = pt_pbrt_read(&b, "t.pbrt");
     pt_builder_release(&b);
     pt_arena_release(&scene.arena);
@@ -47,19 +47,19 @@ static void reading(void **state)
 {
     (void)state;
     int failures = 0;
-    struct pt_err err = {0};
-    assert_int_equal(read_once(&err), PT_OK);
+    struct base_err err = {0};
+    assert_int_equal(read_once(&err), 0);
     for (long k = 1; k < MORE_THAN_IT_TAKES; k++) {
-        err = (struct pt_err){0};
+        err = (struct base_err){0};
         fail_arm(k);
         int rc = read_once(&err);
         int reached = fail_disarm();
         if (!reached) {
-            assert_int_equal(rc, PT_OK);
+            assert_int_equal(rc, 0);
             break;
         }
         failures++;
-        if (rc != PT_ENOMEM)
+        if (rc != BASE_ENOMEM)
             fail_msg("allocation %ld: code %d, \"%s\"", k, rc, err.text);
     }
     assert_true(failures > 50);
@@ -72,17 +72,17 @@ static void ply(void **state)
                                 "property float ny\nproperty float nz\nproperty float u\nproperty float v\nelement face 1\n"
                                 "property list uchar int vertex_indices\nend_header\n0 0 0 0 0 1 0 0\n1 0 0 0 0 1 0 0\n0 1 0 0 0 1 0 0\n3 0 1 2\n";
     struct pt_ply out;
-    struct pt_err err = {0};
+    struct base_err err = {0};
     int failures = 0;
     for (long k = 1; k < 100; k++) {
         fail_arm(k);
         int rc = pt_ply_parse("a.ply", bytes, sizeof bytes - 1, &out, &err);
         if (!fail_disarm()) {
-            assert_int_equal(rc, PT_OK);
+            assert_int_equal(rc, 0);
             pt_ply_release(&out);
             break;
         }
-        assert_int_equal(rc, PT_ENOMEM);
+        assert_int_equal(rc, BASE_ENOMEM);
         failures++;
     }
     assert_true(failures >= 5);

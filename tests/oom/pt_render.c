@@ -16,13 +16,13 @@
 #include "support/pt_fake.h"
 
 static char folder[] = "/tmp/pt_oom_XXXXXX";
-static struct pt_threads *pool;
+static struct base_threads *pool;
 
 static int setup(void **state)
 {
-    struct pt_err err;
+    struct base_err err;
     (void)state;
-    pool = pt_threads_create(1, &err);
+    pool = base_threads_create(1, &err);
     return mkdtemp(folder) != NULL && pool != NULL ? 0 : -1;
 }
 
@@ -30,7 +30,7 @@ static int teardown(void **state)
 {
     char command[64];
     (void)state;
-    pt_threads_destroy(pool);
+    base_threads_destroy(pool);
     snprintf(command, sizeof command, "rm -r %s", folder);
     return system(command);
 }
@@ -42,12 +42,12 @@ static const char *in_folder(const char *name)
     return path;
 }
 
-static int open_render(struct pt_render **render, struct pt_criterion **criterion, struct pt_err *err)
+static int open_render(struct pt_render **render, struct pt_criterion **criterion, struct base_err *err)
 {
     struct pt_render_config config = pt_fake_config();
     int rc = pt_criterion_create_table(pt_fake_criterion(), NULL, 0, pool, NULL, NULL, criterion, err);
     config.planes = PT_FILM_ALL;
-    return rc == PT_OK ? pt_render_create(&config, NULL, pt_fake_nan, pool, *criterion, render, err) : rc;
+    return !rc ? pt_render_create(&config, NULL, pt_fake_nan, pool, *criterion, render, err) : rc;
 }
 
 static void creating(void **state)
@@ -57,12 +57,12 @@ static void creating(void **state)
     for (long k = 1; k < 1000; k++) {
         struct pt_render *render = NULL;
         struct pt_criterion *criterion = NULL;
-        struct pt_err err = {0};
+        struct base_err err = {0};
         fail_arm(k);
         int rc = open_render(&render, &criterion, &err);
         int happened = fail_disarm();
         if (happened) {
-            assert_int_equal(rc, PT_ENOMEM);
+            assert_int_equal(rc, BASE_ENOMEM);
             assert_null(render);
             assert_true(err.text[0] != '\0');
             failures++;
@@ -80,13 +80,13 @@ static void checking(void **state)
 {
     struct pt_render *render = NULL;
     struct pt_criterion *criterion = NULL;
-    struct pt_err err = {0};
+    struct base_err err = {0};
     struct pt_render_hooks hooks = {0};
     enum pt_render_outcome outcome;
     (void)state;
-    assert_int_equal(open_render(&render, &criterion, &err), PT_OK);
+    assert_int_equal(open_render(&render, &criterion, &err), 0);
     fail_arm(1); /* the first allocation of a running render is the list of patched pixels */
-    assert_int_equal(pt_render_run(render, &hooks, &outcome, &err), PT_OK);
+    assert_int_equal(pt_render_run(render, &hooks, &outcome, &err), 0);
     assert_true(fail_disarm());
     assert_int_equal(render->totals.failed_checks, 1);
     for (uint32_t i = 0; i < render->blocks.count; i++)
@@ -97,50 +97,50 @@ static void checking(void **state)
 
 static struct pt_output_info info = {.scene = "a.pbrt", .kernel = "k", .aov = PT_FILM_AUX, .effects = PT_FX_ALL};
 
-static int write_report(struct pt_render *r, struct pt_err *err)
+static int write_report(struct pt_render *r, struct base_err *err)
 {
     return pt_output_report(in_folder("r.json"), r, &info, err);
 }
-static int write_exr(struct pt_render *r, struct pt_err *err)
+static int write_exr(struct pt_render *r, struct base_err *err)
 {
     return pt_output_exr(in_folder("a.exr"), r, &info, err);
 }
-static int write_csv(struct pt_render *r, struct pt_err *err)
+static int write_csv(struct pt_render *r, struct base_err *err)
 {
     return pt_output_stop_map(in_folder("s.csv"), r, &info, err);
 }
-static int save_checkpoint(struct pt_render *r, struct pt_err *err)
+static int save_checkpoint(struct pt_render *r, struct base_err *err)
 {
     return pt_checkpoint_save(in_folder("c.ckp"), r, "a=1\n", err);
 }
-static int load_checkpoint(struct pt_render *r, struct pt_err *err)
+static int load_checkpoint(struct pt_render *r, struct base_err *err)
 {
     return pt_checkpoint_load(in_folder("c.ckp"), r, "a=1\n", err);
 }
 
 static void writing(void **state)
 {
-    int (*const jobs[])(struct pt_render *, struct pt_err *) = {write_report, write_exr, write_csv, save_checkpoint, load_checkpoint};
+    int (*const jobs[])(struct pt_render *, struct base_err *) = {write_report, write_exr, write_csv, save_checkpoint, load_checkpoint};
     struct pt_render *render = NULL;
     struct pt_criterion *criterion = NULL;
-    struct pt_err err = {0};
+    struct base_err err = {0};
     struct pt_render_hooks hooks = {0};
     enum pt_render_outcome outcome;
     (void)state;
-    assert_int_equal(open_render(&render, &criterion, &err), PT_OK);
-    assert_int_equal(pt_render_run(render, &hooks, &outcome, &err), PT_OK);
+    assert_int_equal(open_render(&render, &criterion, &err), 0);
+    assert_int_equal(pt_render_run(render, &hooks, &outcome, &err), 0);
     for (int j = 0; j < 5; j++) {
         for (long k = 1;; k++) {
             fail_arm(k);
             int rc = jobs[j](render, &err);
             int happened = fail_disarm();
             if (!happened) {
-                assert_int_equal(rc, PT_OK);
+                assert_int_equal(rc, 0);
                 break;
             }
-            if (rc == PT_OK) /* a library did without */
+            if (!rc) /* a library did without */
                 continue;
-            assert_true(rc == PT_ENOMEM || rc == PT_EIO);
+            assert_true(rc == BASE_ENOMEM || rc == BASE_EIO);
         }
     }
     pt_render_destroy(render);
@@ -162,7 +162,7 @@ static void recording(void **state)
     snprintf(directory, sizeof directory, "%s", config.directory);
     config.directory = directory;
     for (long k = 1;; k++) {
-        struct pt_err err = {0};
+        struct base_err err = {0};
         int stopped;
         config.reference_spp = (uint64_t)k + 1; /* never to be resumed */
         char manifest[160];
@@ -172,10 +172,10 @@ static void recording(void **state)
         int rc = pt_sequence_record(&config, NULL, pt_fake_noise, pool, NULL, NULL, say, NULL, &stopped, &err);
         int happened = fail_disarm();
         if (!happened) {
-            assert_int_equal(rc, PT_OK);
+            assert_int_equal(rc, 0);
             break;
         }
-        assert_true(rc == PT_OK || rc == PT_ENOMEM || rc == PT_EIO);
+        assert_true(!rc || rc == BASE_ENOMEM || rc == BASE_EIO);
         if (k > 5000)
             fail();
     }

@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "base/rng.h"
+#include "sample/rng.h"
 #include "geom/accel.h"
 #include "integ/surface.h"
 #include "shade/bsdf_dispatch.h"

@@ -10,7 +10,7 @@
 #include <string.h>
 
 #include "integ/kernels.h"
-#include "scene/load.h"
+#include "pbrt/load.h"
 #include "shade/medium.h"
 #include "shade/texture.h"
 
@@ -26,9 +26,9 @@ static void check_scene(const char *path)
 {
     struct pt_scene *scene;
     struct pt_scene_defaults defaults;
-    struct pt_err err = {0};
+    struct base_err err = {0};
     const struct pt_load_options options = {.width = SIZE, .height = SIZE, .quiet = 1};
-    if (pt_scene_load(path, &options, &scene, &defaults, &err) != PT_OK)
+    if (pt_scene_load(path, &options, &scene, &defaults, &err) != 0)
         fail_msg("%s", err.text);
     const char *name;
     pt_effects effects = pt_scene_effects(scene);

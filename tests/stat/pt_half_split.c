@@ -30,8 +30,8 @@ static int ascending(const void *a, const void *b)
 static void sample(const struct pt_scene *scene, const struct pt_integrator *settings, pt_kernel *kernel, uint32_t spp,
                    struct pt_film *film)
 {
-    struct pt_err err = {0};
-    assert_int_equal(pt_film_init(film, 0, 0, SIZE, SIZE, PT_FILM_HALF, &err), PT_OK);
+    struct base_err err = {0};
+    assert_int_equal(pt_film_init(film, 0, 0, SIZE, SIZE, PT_FILM_HALF, &err), 0);
     for (int y = 0; y < SIZE; y++)
         for (int x = 0; x < SIZE; x++) {
             struct pt_film_pixel p;

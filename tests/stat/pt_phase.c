@@ -5,7 +5,7 @@
 
 #include <cmocka.h>
 
-#include "base/rng.h"
+#include "sample/rng.h"
 #include "pt_chi2.h"
 #include "shade/phase.h"
 

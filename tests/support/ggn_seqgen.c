@@ -6,7 +6,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-#include "base/fio.h"
+#include "base/files.h"
 #include "data/image.h"
 #include "data/labels.h"
 #include "data/manifest.h"
@@ -113,7 +113,7 @@ static double threshold_of(const struct seqgen *g, const struct pixels *p)
 }
 
 static int write_block(const struct seqgen *g, struct pixels *p, const char *dir, int scene, int block, struct ggn_manifest_block *b,
-                       const uint32_t *levels, struct ggn_err *err)
+                       const uint32_t *levels, struct base_err *err)
 {
     struct ggn_seq_builder w;
     char path[4200];
@@ -149,7 +149,7 @@ static int write_block(const struct seqgen *g, struct pixels *p, const char *dir
     return rc;
 }
 
-static int write_scene(const struct seqgen *g, struct pixels *p, const char *dir, int scene, struct ggn_err *err)
+static int write_scene(const struct seqgen *g, struct pixels *p, const char *dir, int scene, struct base_err *err)
 {
     uint32_t levels[MAX_LEVELS];
     struct ggn_manifest_block blocks[64];
@@ -160,7 +160,7 @@ static int write_scene(const struct seqgen *g, struct pixels *p, const char *dir
                              .levels = levels, .blocks = blocks};
     struct ggn_labels labels = {.source = "observer", .detail = "generated: noise below a fixed rms", .cap = 0, .spread = 0.15,
                                 .n = (uint32_t)g->blocks, .labels = label};
-    int rc = GGN_OK;
+    int rc = 0;
 
     snprintf(m.scene, sizeof m.scene, "scene%d", scene);
     snprintf(m.source, sizeof m.source, "generated");
@@ -180,12 +180,12 @@ static int write_scene(const struct seqgen *g, struct pixels *p, const char *dir
     return rc ? rc : ggn_manifest_write(dir, &m, err);
 }
 
-int seqgen_write(const char *dir, const struct seqgen *g, struct ggn_err *err)
+int seqgen_write(const char *dir, const struct seqgen *g, struct base_err *err)
 {
     struct pixels p = {0};
-    struct ggn_fio_out out;
+    struct base_file_out out;
     char path[4096];
-    int rc = pixels_init(&p, g->side) && g->levels <= MAX_LEVELS && g->blocks <= 64 ? GGN_OK : ggn_fail_nomem(err, dir);
+    int rc = pixels_init(&p, g->side) && g->levels <= MAX_LEVELS && g->blocks <= 64 ? 0 : base_fail_nomem(err, dir);
 
     mkdir(dir, 0777);
     for (int s = 0; !rc && s < g->scenes; s++) {
@@ -197,7 +197,7 @@ int seqgen_write(const char *dir, const struct seqgen *g, struct ggn_err *err)
     if (rc)
         return rc;
     snprintf(path, sizeof path, "%s/split.json", dir);
-    rc = ggn_fio_begin(&out, path, err);
+    rc = base_file_begin(&out, path, err);
     if (rc)
         return rc;
     static const char *const names[] = {"train", "validation", "test"};
@@ -209,5 +209,5 @@ int seqgen_write(const char *dir, const struct seqgen *g, struct ggn_err *err)
         fputs("]", out.file);
     }
     fputs(" }\n", out.file);
-    return ggn_fio_commit(&out, err);
+    return base_file_commit(&out, err);
 }

@@ -22,6 +22,6 @@ struct seqgen {
 
 struct seqgen seqgen_default(void);
 /* Makes DIR/sceneN/… and DIR/split.json. */
-int seqgen_write(const char *dir, const struct seqgen *g, struct ggn_err *err);
+int seqgen_write(const char *dir, const struct seqgen *g, struct base_err *err);
 
 #endif

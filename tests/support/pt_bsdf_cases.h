@@ -4,7 +4,7 @@
 #ifndef PT_BSDF_CASES_H
 #define PT_BSDF_CASES_H
 
-#include "base/rng.h"
+#include "sample/rng.h"
 #include "shade/bsdf_dispatch.h"
 
 struct bsdf_case {

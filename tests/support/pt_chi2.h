@@ -7,7 +7,7 @@
 #include <math.h>
 #include <stdio.h>
 
-#include "base/vec.h"
+#include "scene/vec.h"
 
 enum { CHI2_Z = 32, CHI2_PHI = 32, CHI2_CELLS = CHI2_Z * CHI2_PHI };
 

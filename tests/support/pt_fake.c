@@ -171,18 +171,18 @@ struct pt_render_config pt_fake_config(void)
 }
 
 int pt_fake_render(const struct pt_render_config *config, pt_kernel *kernel, int threads, const char *at,
-                   struct pt_render **render, struct pt_criterion **criterion, struct pt_threads **pool)
+                   struct pt_render **render, struct pt_criterion **criterion, struct base_threads **pool)
 {
     struct lull_pair pair = {"at", at};
     struct pt_render_hooks hooks = {0};
     enum pt_render_outcome outcome;
-    struct pt_err err = {0};
+    struct base_err err = {0};
     *criterion = NULL;
-    *pool = pt_threads_create(threads, &err);
-    int rc = *pool != NULL ? PT_OK : PT_ENOMEM;
-    if (rc == PT_OK && at != NULL)
+    *pool = base_threads_create(threads, &err);
+    int rc = *pool != NULL ? 0 : BASE_ENOMEM;
+    if (!rc && at != NULL)
         rc = pt_criterion_create_table(pt_fake_criterion(), &pair, 1, *pool, NULL, NULL, criterion, &err);
-    if (rc == PT_OK)
+    if (!rc)
         rc = pt_render_create(config, NULL, kernel, *pool, *criterion, render, &err);
-    return rc == PT_OK ? pt_render_run(*render, &hooks, &outcome, &err) : rc;
+    return !rc ? pt_render_run(*render, &hooks, &outcome, &err) : rc;
 }

@@ -36,18 +36,18 @@ void test_scene_begin(struct pt_scene *scene)
 
 void test_scene_finish(struct pt_scene *scene)
 {
-    struct pt_err err = {0};
+    struct base_err err = {0};
     if (scene->object_count == 0)
         scene->world_shape_count = scene->shape_count;
     int code = pt_materials_build(scene, &err);
-    assert(code == PT_OK);
+    assert(!code);
     code = pt_media_build(scene, &err);
-    assert(code == PT_OK);
+    assert(!code);
     pt_camera_init(&scene->camera);
     code = pt_accel_build(scene, &err);
-    assert(code == PT_OK);
+    assert(!code);
     code = pt_lights_build(scene, &err);
-    assert(code == PT_OK);
+    assert(!code);
     (void)code;
     for (int32_t i = 0; i < scene->shape_count; i++)
         scene->effects |= pt_material_effects(scene, scene->shapes[i].material) |

@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-#include "scene/load_source.h"
+#include "pbrt/load_source.h"
 
 static void count_warning(void *data, const char *line)
 {
@@ -19,7 +19,7 @@ static void count_warning(void *data, const char *line)
 }
 
 static int load(const char *text, int strict, int *warnings, struct pt_scene **scene, struct pt_scene_defaults *defaults,
-                struct pt_err *err)
+                struct base_err *err)
 {
     int ignored = 0;
     struct pt_source_single single = {"t.pbrt", text, strlen(text)};
@@ -32,21 +32,21 @@ struct pt_scene *text_scene(const char *text, struct pt_scene_defaults *defaults
 {
     struct pt_scene *scene = NULL;
     struct pt_scene_defaults found;
-    struct pt_err err = {0};
-    if (load(text, 0, warnings, &scene, &found, &err) != PT_OK)
+    struct base_err err = {0};
+    if (load(text, 0, warnings, &scene, &found, &err) != 0)
         fail_msg("%s", err.text);
     if (defaults != NULL)
         *defaults = found;
     return scene;
 }
 
-int text_scene_error(const char *text, int strict, struct pt_err *err)
+int text_scene_error(const char *text, int strict, struct base_err *err)
 {
     struct pt_scene *scene = NULL;
     struct pt_scene_defaults found;
-    *err = (struct pt_err){0};
+    *err = (struct base_err){0};
     int rc = load(text, strict, NULL, &scene, &found, err);
-    if (rc == PT_OK)
+    if (!rc)
         pt_scene_destroy(scene);
     else
         assert_null(strchr(err->text, '\n'));

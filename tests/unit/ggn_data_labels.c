@@ -51,9 +51,9 @@ static void round_trip(void **state)
     (void)state;
     struct ggn_label entries[] = {{3, 120.5, 0}, {7, 10000, 1}};
     struct ggn_labels l = {.source = "observer", .detail = "tau \"x\"", .cap = 10000, .spread = 0.3, .n = 2, .labels = entries}, back;
-    struct ggn_err err = {0};
-    assert_int_equal(ggn_labels_write(root, &l, &err), GGN_OK);
-    if (ggn_labels_read(root, &back, &err) != GGN_OK)
+    struct base_err err = {0};
+    assert_int_equal(ggn_labels_write(root, &l, &err), 0);
+    if (ggn_labels_read(root, &back, &err) != 0)
         fail_msg("%s", err.text);
     assert_string_equal(back.source, "observer");
     assert_string_equal(back.detail, l.detail);
@@ -69,7 +69,7 @@ static void round_trip(void **state)
         "{\"format\":\"lull-labels\",\"source\":\"human\",\"cap\":1,\"spread\":1,\"blocks\":[{\"id\":0,\"threshold\":1},{\"id\":0,\"threshold\":1}]}",
     };
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
-        if (ggn_labels_parse("l.json", bad[i], strlen(bad[i]), &back, &err) != GGN_EINVAL)
+        if (ggn_labels_parse("l.json", bad[i], strlen(bad[i]), &back, &err) != BASE_EINVAL)
             fail_msg("%s was accepted", bad[i]);
 }
 
@@ -81,7 +81,7 @@ static void add_view(const char *name, const char *scene)
     snprintf(m.scene, sizeof m.scene, "%s", scene);
     snprintf(dir, sizeof dir, "%s/%s", root, name);
     mkdir(dir, 0777);
-    assert_int_equal(ggn_manifest_write(dir, &m, NULL), GGN_OK);
+    assert_int_equal(ggn_manifest_write(dir, &m, NULL), 0);
 }
 
 static void write_split(const char *text)
@@ -97,13 +97,13 @@ static void splits(void **state)
 {
     (void)state;
     struct ggn_dataset d;
-    struct ggn_err err = {0};
+    struct base_err err = {0};
     add_view("b-view0", "b");
     add_view("a-view1", "a");
     add_view("a-view0", "a");
     add_view("c", "c");
     write_split("{\"train\": [\"a\"], \"test\": [\"b\", \"unknown\"]}");
-    if (ggn_dataset_open(root, &d, &err) != GGN_OK)
+    if (ggn_dataset_open(root, &d, &err) != 0)
         fail_msg("%s", err.text);
     assert_int_equal(d.n, 4);
     assert_string_equal(d.views[0].name, "a-view0");
@@ -111,18 +111,18 @@ static void splits(void **state)
                 d.views[3].split == GGN_SPLIT_NONE);
     ggn_dataset_release(&d);
     write_split("{\"train\": [\"a\"], \"test\": [\"a\"]}");
-    assert_int_equal(ggn_dataset_open(root, &d, &err), GGN_EINVAL);
+    assert_int_equal(ggn_dataset_open(root, &d, &err), BASE_EINVAL);
     assert_non_null(strstr(err.text, "in train and in test"));
     write_split("nonsense");
-    assert_int_equal(ggn_dataset_open(root, &d, &err), GGN_EINVAL);
-    assert_int_equal(ggn_dataset_open("/tmp/does/not/exist", &d, &err), GGN_EIO);
+    assert_int_equal(ggn_dataset_open(root, &d, &err), BASE_EINVAL);
+    assert_int_equal(ggn_dataset_open("/tmp/does/not/exist", &d, &err), BASE_EIO);
 }
 
 static void split_folders(void **state)
 {
     (void)state;
     struct ggn_dataset d;
-    struct ggn_err err = {0};
+    struct base_err err = {0};
     char command[300];
     snprintf(command, sizeof command, "rm -r %s/*", root);
     assert_int_equal(system(command), 0);
@@ -131,14 +131,14 @@ static void split_folders(void **state)
     add_view("train/x", "x");
     add_view("test/y-view0", "y");
     add_view("z", "z");
-    if (ggn_dataset_open(root, &d, &err) != GGN_OK)
+    if (ggn_dataset_open(root, &d, &err) != 0)
         fail_msg("%s", err.text);
     assert_int_equal(d.n, 3);
     for (int i = 0; i < 3; i++)
         assert_int_equal(d.views[i].split, d.views[i].name[0] == 'x' ? GGN_SPLIT_TRAIN : d.views[i].name[0] == 'y' ? GGN_SPLIT_TEST : GGN_SPLIT_NONE);
     ggn_dataset_release(&d);
     add_view("test/x-view1", "x");
-    assert_int_equal(ggn_dataset_open(root, &d, &err), GGN_EINVAL);
+    assert_int_equal(ggn_dataset_open(root, &d, &err), BASE_EINVAL);
     assert_non_null(strstr(err.text, "scene 'x' is in"));
 }
 

@@ -13,7 +13,7 @@
 
 #include "support/ggn_near.h"
 
-#include "base/fio.h"
+#include "base/files.h"
 #include "data/image.h"
 #include "data/manifest.h"
 #include "data/sequence.h"
@@ -67,7 +67,7 @@ static void filters(void **state)
         for (uint32_t f = 0; f < 8; f++) {
             static uint8_t a[6 * P], b[6 * P];
             if ((f & ~ggn_plane_filters(planes[k])) != 0) {
-                assert_int_equal(ggn_plane_filter(planes[k], f, a, W, H, NULL), GGN_EINVAL);
+                assert_int_equal(ggn_plane_filter(planes[k], f, a, W, H, NULL), BASE_EINVAL);
                 continue;
             }
             for (size_t i = 0; i < sizeof a; i++)
@@ -96,12 +96,12 @@ static void fill(int seed)
 static void build(struct ggn_seq_builder *w)
 {
     struct ggn_seq_stat stats[2] = {{"dammertz", 0.25}, {"seconds", 3.5}};
-    assert_int_equal(ggn_seq_builder_init(w, W, H, 400, 200, 9, 77, NULL), GGN_OK);
+    assert_int_equal(ggn_seq_builder_init(w, W, H, 400, 200, 9, 77, NULL), 0);
     for (uint32_t i = 0; i < 4; i++) {
         fill((int)i);
         struct ggn_seq_frame f = {.spp = i < 3 ? 20u << i : 4096u, .half_spp = 10, .is_reference = i == 3, .full = i == 1,
                                   .display = display, .mean = mean, .half = half, .stats = stats, .n_stats = 2};
-        assert_int_equal(ggn_seq_builder_add(w, &f, NULL), GGN_OK);
+        assert_int_equal(ggn_seq_builder_add(w, &f, NULL), 0);
     }
 }
 
@@ -132,13 +132,13 @@ static void round_trip(void **state)
     (void)state;
     struct ggn_seq_builder w;
     struct ggn_seq_block b;
-    struct ggn_err err = {0};
+    struct base_err err = {0};
     uint32_t crc;
     static uint8_t bytes[3 * P];
     static float floats[3 * P];
     build(&w);
-    assert_int_equal(ggn_seq_builder_write(&w, block_path, &crc, &err), GGN_OK);
-    if (ggn_seq_block_read(block_path, &b, &err) != GGN_OK)
+    assert_int_equal(ggn_seq_builder_write(&w, block_path, &crc, &err), 0);
+    if (ggn_seq_block_read(block_path, &b, &err) != 0)
         fail_msg("%s", err.text);
     assert_int_equal(b.n_levels, 3);
     assert_true(b.width == W && b.height == H && b.x0 == 400 && b.y0 == 200 && b.id == 9 && b.seed == 77);
@@ -163,7 +163,7 @@ static void round_trip(void **state)
             double y = ggn_luminance((double)half[k], (double)half[P + k], (double)half[2 * P + k]);
             assert_near((double)floats[k], y, 0.0906 * fabs(y) + 3e-5);
         }
-        assert_int_equal(ggn_seq_half(&b, r, floats, &err), i == 1 || i == 3 ? GGN_OK : GGN_EINVAL);
+        assert_int_equal(ggn_seq_half(&b, r, floats, &err), i == 1 || i == 3 ? 0 : BASE_EINVAL);
     }
     ggn_seq_block_release(&b);
     ggn_seq_builder_release(&w);
@@ -176,16 +176,16 @@ static void damage(void **state)
     char *bytes;
     size_t size;
     struct ggn_seq_block b;
-    struct ggn_err err = {0};
-    assert_int_equal(ggn_fio_read(block_path, 1 << 24, &bytes, &size, &err), GGN_OK);
+    struct base_err err = {0};
+    assert_int_equal(base_file_read(block_path, 1 << 24, &bytes, &size, &err), 0);
     for (size_t i = 0; i < size; i += i < 400 ? 1 : 97) {
         uint8_t *cut = malloc(i + 1), *bad = malloc(size);
         memcpy(cut, bytes, i);
         memcpy(bad, bytes, size);
         bad[i] ^= 0x10;
-        if (ggn_seq_block_parse("cut", cut, i, &b, &err) != GGN_EINVAL)
+        if (ggn_seq_block_parse("cut", cut, i, &b, &err) != BASE_EINVAL)
             fail_msg("%zu of %zu bytes were believed", i, size);
-        if (ggn_seq_block_parse("bad", bad, size, &b, &err) != GGN_EINVAL)
+        if (ggn_seq_block_parse("bad", bad, size, &b, &err) != BASE_EINVAL)
             fail_msg("damage at byte %zu was believed", i);
         free(cut);
         free(bad);
@@ -199,9 +199,9 @@ static void builder_limits(void **state)
     struct ggn_seq_builder w;
     build(&w);
     struct ggn_seq_frame more = {.spp = 5000, .display = display};
-    assert_int_equal(ggn_seq_builder_add(&w, &more, NULL), GGN_EINVAL); /* nothing after the reference */
+    assert_int_equal(ggn_seq_builder_add(&w, &more, NULL), BASE_EINVAL); /* nothing after the reference */
     ggn_seq_builder_release(&w);
-    assert_int_equal(ggn_seq_builder_init(&w, 0, 5, 0, 0, 0, 0, NULL), GGN_EINVAL);
+    assert_int_equal(ggn_seq_builder_init(&w, 0, 5, 0, 0, 0, 0, NULL), BASE_EINVAL);
 }
 
 static void manifest(void **state)
@@ -213,15 +213,15 @@ static void manifest(void **state)
                              .reference_independent = 1, .n_levels = 3, .levels = levels, .n_blocks = 1, .blocks = &entry}, back;
     struct ggn_seq_builder w;
     struct ggn_seq_block b;
-    struct ggn_err err = {0};
+    struct base_err err = {0};
     struct stat st;
     build(&w);
-    assert_int_equal(ggn_seq_builder_write(&w, block_path, &entry.crc32, &err), GGN_OK);
+    assert_int_equal(ggn_seq_builder_write(&w, block_path, &entry.crc32, &err), 0);
     ggn_seq_builder_release(&w);
     stat(block_path, &st);
     entry.bytes = (uint64_t)st.st_size;
-    assert_int_equal(ggn_manifest_write(dir, &m, &err), GGN_OK);
-    if (ggn_manifest_read(dir, &back, &err) != GGN_OK || ggn_manifest_read_block(dir, &back, 0, &b, &err) != GGN_OK)
+    assert_int_equal(ggn_manifest_write(dir, &m, &err), 0);
+    if (ggn_manifest_read(dir, &back, &err) != 0 || ggn_manifest_read_block(dir, &back, 0, &b, &err) != 0)
         fail_msg("%s", err.text);
     assert_string_equal(back.scene, m.scene);
     assert_int_equal(back.n_levels, 3);
@@ -229,15 +229,15 @@ static void manifest(void **state)
     ggn_seq_block_release(&b);
 
     back.blocks[0].crc32 ^= 1;
-    assert_int_equal(ggn_manifest_read_block(dir, &back, 0, &b, &err), GGN_EINVAL);
+    assert_int_equal(ggn_manifest_read_block(dir, &back, 0, &b, &err), BASE_EINVAL);
     back.blocks[0].crc32 ^= 1;
     back.blocks[0].x1++; /* mixed sizes */
-    assert_int_equal(ggn_manifest_read_block(dir, &back, 0, &b, &err), GGN_EINVAL);
+    assert_int_equal(ggn_manifest_read_block(dir, &back, 0, &b, &err), BASE_EINVAL);
     ggn_manifest_release(&back);
     m.n_levels = 4; /* a level that the block does not have */
     ggn_manifest_write(dir, &m, &err);
     ggn_manifest_read(dir, &back, &err);
-    assert_int_equal(ggn_manifest_read_block(dir, &back, 0, &b, &err), GGN_EINVAL);
+    assert_int_equal(ggn_manifest_read_block(dir, &back, 0, &b, &err), BASE_EINVAL);
     assert_non_null(strstr(err.text, "160 spp is missing"));
     ggn_manifest_release(&back);
 }
@@ -258,8 +258,8 @@ static void bad_manifests(void **state)
     };
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
         struct ggn_manifest m;
-        struct ggn_err err = {0};
-        if (ggn_manifest_parse("m.json", bad[i], strlen(bad[i]), &m, &err) != GGN_EINVAL || err.text[0] == '\0')
+        struct base_err err = {0};
+        if (ggn_manifest_parse("m.json", bad[i], strlen(bad[i]), &m, &err) != BASE_EINVAL || err.text[0] == '\0')
             fail_msg("%s was accepted", bad[i]);
     }
 }

@@ -20,7 +20,7 @@ enum { LEVELS = 7, WINDOW = 2, BLOCKS = 5 };
 
 static char root[] = "/tmp/ggn_eval.XXXXXX";
 static struct ggn_eval_set set;
-static struct ggn_threads *threads;
+static struct base_threads *threads;
 
 static void shell(const char *command)
 {
@@ -35,7 +35,7 @@ static int setup(void **state)
     (void)state;
     static const char *const names[] = {"a", "b", "c"};
     char dir[128], path[128];
-    struct ggn_err err = {0};
+    struct base_err err = {0};
     int skipped;
     if (mkdtemp(root) == NULL)
         return -1;
@@ -52,9 +52,9 @@ static int setup(void **state)
     FILE *f = fopen(path, "w");
     fputs("{\"train\": [\"a\"], \"validation\": [\"b\"], \"test\": [\"c\"]}", f);
     fclose(f);
-    threads = ggn_threads_create(2, &err);
+    threads = base_threads_create(2, &err);
     struct ggn_eval_options o = {.dir = root, .window = WINDOW, .quality = 1, .recorded = 1};
-    if (threads == NULL || ggn_eval_set_load(&set, &o, threads, &skipped, &err) != GGN_OK)
+    if (threads == NULL || ggn_eval_set_load(&set, &o, threads, &skipped, &err) != 0)
         fail_msg("%s", err.text);
     return 0;
 }
@@ -63,7 +63,7 @@ static int teardown(void **state)
 {
     (void)state;
     ggn_eval_set_release(&set);
-    ggn_threads_destroy(threads);
+    base_threads_destroy(threads);
     shell("rm -rf");
     return 0;
 }
@@ -92,10 +92,10 @@ static void informed_scores(void **state)
     struct ggn_method spp, halfbuf, variance;
     struct ggn_method_metrics a, b, c;
     int available;
-    assert_int_equal(ggn_method_spp(&spp, &set, NULL), GGN_OK);
-    assert_int_equal(ggn_method_halfbuf(&halfbuf, &set, &available, NULL), GGN_OK);
+    assert_int_equal(ggn_method_spp(&spp, &set, NULL), 0);
+    assert_int_equal(ggn_method_halfbuf(&halfbuf, &set, &available, NULL), 0);
     assert_true(available);
-    assert_int_equal(ggn_method_variance(&variance, &set, &available, NULL), GGN_OK);
+    assert_int_equal(ggn_method_variance(&variance, &set, &available, NULL), 0);
     ggn_method_tune(&spp, &set, GGN_SPLIT_TRAIN, 0.0, NULL);
     ggn_method_tune(&halfbuf, &set, GGN_SPLIT_TRAIN, 0.0, NULL);
     ggn_method_tune(&variance, &set, GGN_SPLIT_TRAIN, 0.0, NULL);
@@ -150,7 +150,7 @@ static void decisions(void **state)
     score[b->first + 2] = 0.1;
     score[b->first + 3] = (double)NAN;
     score[b->first + 4] = 0.1;
-    assert_int_equal(ggn_method_scores(&m, &set, "made up", score, NULL), GGN_OK);
+    assert_int_equal(ggn_method_scores(&m, &set, "made up", score, NULL), 0);
     m.cut = 0.5;
     ggn_method_run(&m, &set);
     assert_near(m.stop[0], 40, 0);
@@ -174,9 +174,9 @@ static void continued(void **state)
     (void)state;
     struct ggn_eval_options o = {.dir = root, .window = WINDOW, .quality = 1, .seed = 3};
     struct ggn_eval_set more, again;
-    struct ggn_err err = {0};
+    struct base_err err = {0};
     int skipped;
-    if (ggn_eval_set_load(&more, &o, threads, &skipped, &err) != GGN_OK || ggn_eval_set_load(&again, &o, threads, &skipped, &err) != GGN_OK)
+    if (ggn_eval_set_load(&more, &o, threads, &skipped, &err) != 0 || ggn_eval_set_load(&again, &o, threads, &skipped, &err) != 0)
         fail_msg("%s", err.text);
     assert_int_equal(more.n_blocks, set.n_blocks);
     assert_near(more.blocks[4].cap, 1280, 0);
@@ -201,7 +201,7 @@ static void network(void **state)
 {
     (void)state;
     struct ggn_hyper hyper = {GGN_PRESET_LULL, 20, 24, WINDOW, 2, 2, 2};
-    struct ggn_err err = {0};
+    struct base_err err = {0};
     struct ggn_method m;
     struct ggn_model *model = ggn_model_create(&hyper, &err);
     if (model == NULL)
@@ -214,7 +214,7 @@ static void network(void **state)
     policy.threshold = 0.5;
     policy.passes = 2;
     policy.gate_noise = policy.tail999 = policy.gini = 0;
-    if (ggn_policy_set(model, &policy, &err) != GGN_OK || ggn_eval_network(&m, &set, model, "empty", GGN_PRECISION_F32, threads, &err) != GGN_OK)
+    if (ggn_policy_set(model, &policy, &err) != 0 || ggn_eval_network(&m, &set, model, "empty", GGN_PRECISION_F32, threads, &err) != 0)
         fail_msg("%s", err.text);
     for (size_t i = 0; i < set.n; i++)
         assert_near(m.score[i], 1.0 / (1.0 + exp(1.0)), 1e-6);
@@ -222,7 +222,7 @@ static void network(void **state)
     ggn_method_release(&m);
     policy.ratio = 4; /* 20, 80, 320, 1280 */
     ggn_policy_set(model, &policy, &err);
-    assert_int_equal(ggn_eval_network(&m, &set, model, "empty", GGN_PRECISION_F32, threads, &err), GGN_OK);
+    assert_int_equal(ggn_eval_network(&m, &set, model, "empty", GGN_PRECISION_F32, threads, &err), 0);
     const struct ggn_eval_block *b = &set.blocks[0];
     for (size_t i = b->first; i < b->end; i++)
         assert_int_equal(isnan(m.score[i]), !(set.spp[i] == 80 || set.spp[i] == 320 || set.spp[i] == 1280));
@@ -232,7 +232,7 @@ static void network(void **state)
     policy.passes = 1;
     policy.gate_noise = 0.04; /* grey noise of sigma 0.74/sqrt(n) in block 3 of the first scene, 0.22/sqrt(n) in block 0 */
     ggn_policy_set(model, &policy, &err);
-    assert_int_equal(ggn_eval_network(&m, &set, model, "empty", GGN_PRECISION_F32, threads, &err), GGN_OK);
+    assert_int_equal(ggn_eval_network(&m, &set, model, "empty", GGN_PRECISION_F32, threads, &err), 0);
     assert_true(m.stop[0] < m.stop[3] && m.stop[3] > 80);
     assert_near(m.score[set.blocks[3].first], 1.0 / (1.0 + exp(1.0)), 1e-6); /* asked all the same */
     ggn_method_release(&m);
@@ -245,21 +245,21 @@ static void one_class(void **state)
     signed char keep[3 * BLOCKS * (LEVELS - WINDOW + 1)];
     struct ggn_method m;
     struct ggn_method_metrics metrics;
-    struct ggn_err err = {0};
+    struct base_err err = {0};
     memcpy(keep, set.noisy, set.n);
     for (size_t i = 0; i < set.n; i++)
         set.noisy[i] = 1; /* no negative label at all */
     ggn_method_spp(&m, &set, NULL);
-    assert_int_equal(ggn_method_tune(&m, &set, GGN_SPLIT_TRAIN, 0.05, &err), GGN_OK);
-    assert_int_equal(ggn_method_measure(&m, &set, GGN_SPLIT_TEST, &metrics, &err), GGN_OK);
+    assert_int_equal(ggn_method_tune(&m, &set, GGN_SPLIT_TRAIN, 0.05, &err), 0);
+    assert_int_equal(ggn_method_measure(&m, &set, GGN_SPLIT_TEST, &metrics, &err), 0);
     assert_true(isnan(metrics.auc) && isnan(metrics.auc_scene_mean) && !isnan(metrics.samples_ratio));
     memcpy(set.noisy, keep, set.n);
-    assert_int_equal(ggn_method_measure(&m, &set, GGN_SPLIT_NONE, &metrics, &err), GGN_EINVAL);
+    assert_int_equal(ggn_method_measure(&m, &set, GGN_SPLIT_NONE, &metrics, &err), BASE_EINVAL);
     ggn_method_release(&m);
     struct ggn_eval_options o = {.dir = root, .window = LEVELS + 1, .recorded = 1};
     struct ggn_eval_set none;
     int skipped;
-    assert_int_equal(ggn_eval_set_load(&none, &o, threads, &skipped, &err), GGN_EINVAL);
+    assert_int_equal(ggn_eval_set_load(&none, &o, threads, &skipped, &err), BASE_EINVAL);
     assert_non_null(strstr(err.text, "a window needs 8"));
 }
 

@@ -20,7 +20,7 @@ static void correlations(void **state)
     assert_near(ggn_stats_pearson(x, y, 4), 11.5 / sqrt(5.0 * 26.75), 1e-12);
     assert_near(ggn_stats_pearson(x, down, 4), -1.0, 1e-12);
     assert_true(isnan(ggn_stats_pearson(x, flat, 4)));
-    assert_int_equal(ggn_stats_spearman(x, y, 4, &rho, NULL), GGN_OK);
+    assert_int_equal(ggn_stats_spearman(x, y, 4, &rho, NULL), 0);
     assert_near(rho, 1.0, 1e-12);
     ggn_stats_spearman(x, ties, 4, &rho, NULL); /* ranks 1.5 1.5 3 4 */
     assert_near(rho, 4.5 / sqrt(5.0 * 4.5), 1e-12);
@@ -63,8 +63,8 @@ static void agreement(void **state)
     (void)state;
     const double truth[] = {100, 1000, 10000, 2000}, model[] = {200, 790, 10000, 1700};
     struct ggn_agreement a;
-    struct ggn_err err = {0};
-    assert_int_equal(ggn_stats_agreement(truth, model, 4, 10000, &a, &err), GGN_OK);
+    struct base_err err = {0};
+    assert_int_equal(ggn_stats_agreement(truth, model, 4, 10000, &a, &err), 0);
     assert_int_equal(a.below_cap, 3);
     assert_near(a.mae, 610.0 / 4, 1e-9);
     assert_near(a.mae_below_cap, 610.0 / 3, 1e-9);
@@ -73,7 +73,7 @@ static void agreement(void **state)
     assert_near(a.samples_ratio, 12690.0 / 13100.0, 1e-12);
     assert_near(a.within_half, 0.75, 0);
     assert_near(a.within_one, 1.0, 0);
-    assert_int_equal(ggn_stats_agreement(truth, model, 0, 10000, &a, &err), GGN_EINVAL);
+    assert_int_equal(ggn_stats_agreement(truth, model, 0, 10000, &a, &err), BASE_EINVAL);
 }
 
 static void check_model(const char *path, const double want[9])
@@ -81,14 +81,14 @@ static void check_model(const char *path, const double want[9])
     struct ggn_thresholds people = {0}, model = {0};
     struct ggn_pairing p;
     struct ggn_agreement a;
-    struct ggn_err err = {0};
-    if (ggn_thresholds_read("../shared/human/human-thresholds.csv", 200, &people, &err) != GGN_OK ||
-        ggn_thresholds_read(path, 200, &model, &err) != GGN_OK)
+    struct base_err err = {0};
+    if (ggn_thresholds_read("../shared/human/human-thresholds.csv", 200, &people, &err) != 0 ||
+        ggn_thresholds_read(path, 200, &model, &err) != 0)
         fail_msg("%s", err.text);
-    assert_int_equal(ggn_pairing_init(&p, &people, &model, NULL, &err), GGN_OK);
+    assert_int_equal(ggn_pairing_init(&p, &people, &model, NULL, &err), 0);
     assert_int_equal(p.n_views, 40);
     assert_int_equal(p.n, 640);
-    assert_int_equal(ggn_stats_agreement(p.truth, p.model, p.n, 10000, &a, &err), GGN_OK);
+    assert_int_equal(ggn_stats_agreement(p.truth, p.model, p.n, 10000, &a, &err), 0);
     const double got[9] = {a.pearson_r_below_cap, a.pearson_r, a.spearman, a.mae, a.mae_below_cap, a.rmse, a.share_below, a.samples_ratio, 0};
     for (int i = 0; i < 8; i++)
         assert_near(got[i], want[i], i >= 3 && i <= 5 ? 0.0501 : 0.0000501);
@@ -110,7 +110,7 @@ static void published_table(void **state)
     check_model("../shared/human/26-attributes-thresholds.csv", (double[9]){0.6187, 0.6862, 0.6995, 1875.3, 1907.4, 2522.4, 0.3750, 1.0667, 0});
 }
 
-static int parse(const char *text, struct ggn_thresholds *t, struct ggn_err *err)
+static int parse(const char *text, struct ggn_thresholds *t, struct base_err *err)
 {
     char *copy = malloc(strlen(text) + 1);
     strcpy(copy, text);
@@ -123,8 +123,8 @@ static void csv(void **state)
 {
     (void)state;
     struct ggn_thresholds t = {0};
-    struct ggn_err err = {0};
-    assert_int_equal(parse("# note\na;1;2.5;3;\r\n\nb;7\n", &t, &err), GGN_OK);
+    struct base_err err = {0};
+    assert_int_equal(parse("# note\na;1;2.5;3;\r\n\nb;7\n", &t, &err), 0);
     assert_int_equal(t.n, 2);
     assert_int_equal(t.views[0].n, 3);
     assert_near(ggn_thresholds_find(&t, "a")->spp[1], 2.5, 0);
@@ -133,8 +133,8 @@ static void csv(void **state)
     ggn_thresholds_release(&t);
     static const char *const bad[] = {"", "a", "a;", ";1;", "a;x;", "a;1;;", "a;-1;", "a;nan;", "a;inf;", "a;1 2;", "a;1;\na;2;", "a;0;"};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
-        err = (struct ggn_err){0};
-        if (parse(bad[i], &t, &err) != GGN_EINVAL || err.text[0] == '\0')
+        err = (struct base_err){0};
+        if (parse(bad[i], &t, &err) != BASE_EINVAL || err.text[0] == '\0')
             fail_msg("'%s' was accepted", bad[i]);
         assert_int_equal(t.n, 0);
     }

@@ -20,9 +20,9 @@ static struct ggn_image8 read_level(int spp)
 {
     char path[128];
     struct ggn_image8 image;
-    struct ggn_err err = {0};
+    struct base_err err = {0};
     snprintf(path, sizeof path, sequence, spp);
-    if (ggn_image8_read(path, &image, &err) != GGN_OK)
+    if (ggn_image8_read(path, &image, &err) != 0)
         fail_msg("%s", err.text);
     return image;
 }
@@ -43,7 +43,7 @@ static void published_figures(void **state)
     for (size_t i = 0; i < sizeof golden / sizeof golden[0]; i++) {
         struct ggn_image8 test = read_level(golden[i].spp);
         struct ggn_flip_stats s;
-        assert_int_equal(ggn_flip(reference.data, test.data, 800, 800, GGN_FLIP_PPD, NULL, &s, NULL), GGN_OK);
+        assert_int_equal(ggn_flip(reference.data, test.data, 800, 800, GGN_FLIP_PPD, NULL, &s, NULL), 0);
         assert_near(s.mean, golden[i].mean, 1e-6);
         if (golden[i].spp == 500)
             assert_near(s.max, 0.570340, 1e-6);
@@ -73,7 +73,7 @@ static void frozen_figures(void **state)
     static uint8_t a[W * H * 3], b[W * H * 3];
     struct ggn_flip_stats s;
     make_pair(a, b, W, H, 24);
-    assert_int_equal(ggn_flip(a, b, W, H, GGN_FLIP_PPD, NULL, &s, NULL), GGN_OK);
+    assert_int_equal(ggn_flip(a, b, W, H, GGN_FLIP_PPD, NULL, &s, NULL), 0);
     assert_near(s.mean, 0.121811, 1e-6);
     assert_near(s.max, 0.377908, 1e-6);
 }
@@ -102,7 +102,7 @@ static void properties(void **state)
     for (int side = 1; side <= 30; side += 29) {
         memset(a, 0, sizeof a);
         memset(b, 255, sizeof b);
-        assert_int_equal(ggn_flip(a, b, side, side, GGN_FLIP_PPD, NULL, &one, NULL), GGN_OK);
+        assert_int_equal(ggn_flip(a, b, side, side, GGN_FLIP_PPD, NULL, &one, NULL), 0);
         assert_true(one.mean > 0.9 && one.max <= 1.0);
     }
 }
@@ -112,9 +112,9 @@ static void bad_arguments(void **state)
     (void)state;
     uint8_t p[3] = {0};
     struct ggn_flip_stats s;
-    struct ggn_err err = {0};
-    assert_int_equal(ggn_flip(p, p, 0, 1, GGN_FLIP_PPD, NULL, &s, &err), GGN_EINVAL);
-    assert_int_equal(ggn_flip(p, p, 1, 1, (double)NAN, NULL, &s, &err), GGN_EINVAL);
+    struct base_err err = {0};
+    assert_int_equal(ggn_flip(p, p, 0, 1, GGN_FLIP_PPD, NULL, &s, &err), BASE_EINVAL);
+    assert_int_equal(ggn_flip(p, p, 1, 1, (double)NAN, NULL, &s, &err), BASE_EINVAL);
 }
 
 int main(void)

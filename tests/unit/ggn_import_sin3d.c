@@ -54,7 +54,7 @@ static void write_level(const char *dir, int spp, int side)
     for (int i = 0; i < side * side * 3; i++)
         rgb[i] = value_at(spp, i / 3 % side, i / 3 / side, i % 3);
     snprintf(path, sizeof path, "%s/p3d_toy-view2_%05d.png", dir, spp);
-    assert_int_equal(ggn_image8_write_png(path, rgb, side, side, NULL), GGN_OK);
+    assert_int_equal(ggn_image8_write_png(path, rgb, side, side, NULL), 0);
 }
 
 static const char *make_view(const char *name)
@@ -76,21 +76,21 @@ static void layout(void **state)
     struct ggn_thresholds t;
     struct ggn_dataset d;
     struct ggn_seq_block b;
-    struct ggn_err err = {0};
+    struct base_err err = {0};
     static uint8_t rgb[3 * BLOCK * BLOCK];
     int labelled = 0;
     const char *dir = make_view("p3d_toy-view2_part6");
     snprintf(out, sizeof out, "%s/out", root);
     mkdir(out, 0777);
     snprintf(out, sizeof out, "%s/out/toy", root);
-    assert_int_equal(ggn_thresholds_parse_csv("t.csv", text, &t, NULL), GGN_OK);
+    assert_int_equal(ggn_thresholds_parse_csv("t.csv", text, &t, NULL), 0);
     struct ggn_sin3d_options o = plain;
     o.thresholds = &t;
-    if (ggn_sin3d_import_view(dir, out, &o, &labelled, &err) != GGN_OK)
+    if (ggn_sin3d_import_view(dir, out, &o, &labelled, &err) != 0)
         fail_msg("%s", err.text);
     assert_true(labelled);
     snprintf(out, sizeof out, "%s/out", root);
-    if (ggn_dataset_open(out, &d, &err) != GGN_OK)
+    if (ggn_dataset_open(out, &d, &err) != 0)
         fail_msg("%s", err.text);
     assert_int_equal(d.n, 1);
     assert_string_equal(d.views[0].manifest.scene, "p3d_toy");
@@ -101,13 +101,13 @@ static void layout(void **state)
     assert_true(l->threshold == 100 && l->censored); /* the cap is the last level */
     assert_int_equal(ggn_labels_find(&d.views[0].labels, 1)->censored, 0);
     for (uint32_t i = 0; i < 4; i++) { /* row-major blocks, the right pixels at each level */
-        if (ggn_manifest_read_block(d.views[0].dir, &d.views[0].manifest, i, &b, &err) != GGN_OK)
+        if (ggn_manifest_read_block(d.views[0].dir, &d.views[0].manifest, i, &b, &err) != 0)
             fail_msg("%s", err.text);
         assert_int_equal(b.n_levels, LEVELS);
         assert_true(b.id == i && b.x0 == (int)(i % 2) * BLOCK && b.y0 == (int)(i / 2) * BLOCK);
         for (uint32_t k = 0; k <= LEVELS; k++) {
             const struct ggn_seq_record *r = k < LEVELS ? &b.levels[k] : b.reference;
-            assert_int_equal(ggn_seq_display(&b, r, rgb, &err), GGN_OK);
+            assert_int_equal(ggn_seq_display(&b, r, rgb, &err), 0);
             for (int p = 0; p < BLOCK * BLOCK * 3; p++)
                 assert_int_equal(rgb[p], value_at((int)r->spp, b.x0 + p / 3 % BLOCK, b.y0 + p / 3 / BLOCK, p % 3));
         }
@@ -122,7 +122,7 @@ static void resume(void **state)
     (void)state;
     char dir[600], out[600], path[700];
     struct ggn_manifest m;
-    struct ggn_err err = {0};
+    struct base_err err = {0};
     struct stat before, after;
     int labelled;
     snprintf(dir, sizeof dir, "%s/p3d_toy-view2_part6", root);
@@ -133,7 +133,7 @@ static void resume(void **state)
     m.n_blocks = 3; /* as if the run had stopped inside the second row */
     ggn_manifest_write(out, &m, NULL);
     ggn_manifest_release(&m);
-    if (ggn_sin3d_import_view(dir, out, &plain, &labelled, &err) != GGN_OK)
+    if (ggn_sin3d_import_view(dir, out, &plain, &labelled, &err) != 0)
         fail_msg("%s", err.text);
     stat(path, &after);
     assert_true(before.st_ino == after.st_ino); /* the first row was not written again */
@@ -142,7 +142,7 @@ static void resume(void **state)
     ggn_manifest_release(&m);
     struct ggn_sin3d_options other = plain;
     other.block = SIDE;
-    assert_int_equal(ggn_sin3d_import_view(dir, out, &other, &labelled, &err), GGN_EINVAL);
+    assert_int_equal(ggn_sin3d_import_view(dir, out, &other, &labelled, &err), BASE_EINVAL);
     assert_non_null(strstr(err.text, "another sequence"));
 }
 
@@ -150,12 +150,12 @@ static void resume(void **state)
 static void refuse(const char *name, void (*spoil)(const char *dir), const char *why)
 {
     char out[600];
-    struct ggn_err err = {0};
+    struct base_err err = {0};
     int labelled;
     const char *dir = make_view(name);
     spoil(dir);
     snprintf(out, sizeof out, "%s/refused", root);
-    if (ggn_sin3d_import_view(dir, out, &plain, &labelled, &err) != GGN_EINVAL)
+    if (ggn_sin3d_import_view(dir, out, &plain, &labelled, &err) != BASE_EINVAL)
         fail_msg("%s was accepted", name);
     if (strstr(err.text, why) == NULL)
         fail_msg("%s: '%s' does not say '%s'", name, err.text, why);
@@ -193,7 +193,7 @@ static void bad_layouts(void **state)
     o.allow_gaps = 1;
     snprintf(dir, sizeof dir, "%s/gap", root);
     snprintf(out, sizeof out, "%s/gapped", root);
-    assert_int_equal(ggn_sin3d_import_view(dir, out, &o, &labelled, NULL), GGN_OK);
+    assert_int_equal(ggn_sin3d_import_view(dir, out, &o, &labelled, NULL), 0);
 }
 
 static void scene_names(void **state)
@@ -229,31 +229,31 @@ static void rawls(void **state)
     float v[12] = {0, 0.5f, 1, 2, -1, 3.25f, 7, 8, 9, 10, 11, 1e-3f};
     char file[512];
     struct ggn_imagef image;
-    struct ggn_err err = {0};
+    struct base_err err = {0};
     size_t n = make_rawls(file, 2, 2, 3, v);
-    assert_int_equal(ggn_rawls_parse("x", file, n, &image, &err), GGN_OK);
+    assert_int_equal(ggn_rawls_parse("x", file, n, &image, &err), 0);
     assert_true(image.width == 2 && image.height == 2 && image.channels == 3);
     assert_memory_equal(image.data, v, sizeof v);
     ggn_imagef_release(&image);
-    assert_int_equal(ggn_rawls_parse("x", file, n - 1, &image, &err), GGN_OK); /* the last newline may be missing */
+    assert_int_equal(ggn_rawls_parse("x", file, n - 1, &image, &err), 0); /* the last newline may be missing */
     ggn_imagef_release(&image);
     for (size_t i = 0; i < n - 1; i++) {
         char *cut = malloc(i + 1);
         memcpy(cut, file, i);
-        if (ggn_rawls_parse("x", cut, i, &image, &err) != GGN_EINVAL)
+        if (ggn_rawls_parse("x", cut, i, &image, &err) != BASE_EINVAL)
             fail_msg("%zu of %zu bytes were believed", i, n);
         free(cut);
     }
     n = make_rawls(file, 3, 2, 1, v);
-    assert_int_equal(ggn_rawls_parse("x", file, n, &image, &err), GGN_OK);
+    assert_int_equal(ggn_rawls_parse("x", file, n, &image, &err), 0);
     assert_near((double)image.data[3 * 5 + 2], 3.25, 0);
     ggn_imagef_release(&image);
     v[7] = NAN;
     n = make_rawls(file, 2, 2, 3, v);
-    assert_int_equal(ggn_rawls_parse("x", file, n, &image, &err), GGN_EINVAL);
+    assert_int_equal(ggn_rawls_parse("x", file, n, &image, &err), BASE_EINVAL);
     assert_non_null(strstr(err.text, "0,1 is not finite"));
     n = make_rawls(file, 0x40000000, 0, 3, v);
-    assert_int_equal(ggn_rawls_parse("x", file, n, &image, &err), GGN_EINVAL);
+    assert_int_equal(ggn_rawls_parse("x", file, n, &image, &err), BASE_EINVAL);
 }
 
 static void rawls_layout(void **state)
@@ -263,7 +263,7 @@ static void rawls_layout(void **state)
     static float v[SIDE * SIDE * 3], back[3 * BLOCK * BLOCK];
     struct ggn_manifest m;
     struct ggn_seq_block b;
-    struct ggn_err err = {0};
+    struct base_err err = {0};
     int labelled;
     snprintf(dir, sizeof dir, "%s/float", root);
     snprintf(out, sizeof out, "%s/float-out", root);
@@ -277,10 +277,10 @@ static void rawls_layout(void **state)
         assert_int_equal(fwrite(file, 1, n, f), n);
         fclose(f);
     }
-    if (ggn_sin3d_import_view(dir, out, &plain, &labelled, &err) != GGN_OK || ggn_manifest_read(out, &m, &err) != GGN_OK ||
-        ggn_manifest_read_block(out, &m, 1, &b, &err) != GGN_OK)
+    if (ggn_sin3d_import_view(dir, out, &plain, &labelled, &err) != 0 || ggn_manifest_read(out, &m, &err) != 0 ||
+        ggn_manifest_read_block(out, &m, 1, &b, &err) != 0)
         fail_msg("%s", err.text);
-    assert_int_equal(ggn_seq_mean(&b, &b.levels[0], back, &err), GGN_OK);
+    assert_int_equal(ggn_seq_mean(&b, &b.levels[0], back, &err), 0);
     assert_near((double)back[0], (double)v[BLOCK * 3], 0.02 * (double)v[BLOCK * 3]);
     ggn_seq_block_release(&b);
     ggn_manifest_release(&m);
@@ -297,7 +297,7 @@ static void real_sequence(void **state)
     }
     /* Two of its levels: reading all twenty four times over takes too long for a unit test. */
     struct ggn_manifest m;
-    struct ggn_err err = {0};
+    struct base_err err = {0};
     int labelled;
     snprintf(copy, sizeof copy, "%s/real", root);
     snprintf(out, sizeof out, "%s/real-out", root);
@@ -305,7 +305,7 @@ static void real_sequence(void **state)
     shell("cp %s/*_05000.png %s/", dir, copy);
     shell("cp %s/*_10000.png %s/", dir, copy);
     struct ggn_sin3d_options o = {.block = 200, .allow_gaps = 1};
-    if (ggn_sin3d_import_view(copy, out, &o, &labelled, &err) != GGN_OK || ggn_manifest_read(out, &m, &err) != GGN_OK)
+    if (ggn_sin3d_import_view(copy, out, &o, &labelled, &err) != 0 || ggn_manifest_read(out, &m, &err) != 0)
         fail_msg("%s", err.text);
     assert_int_equal(m.n_blocks, 16);
     assert_string_equal(m.scene, "p3d_cornel-box");

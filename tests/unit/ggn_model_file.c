@@ -1,4 +1,4 @@
-/* Model files: what is written is read back, in every type; damage of every kind is one line and GGN_EINVAL. */
+/* Model files: what is written is read back, in every type; damage of every kind is one line and BASE_EINVAL. */
 #include "support/ggn_cmocka.h"
 
 #include <cjson/cJSON.h>
@@ -8,9 +8,9 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "base/fio.h"
+#include "base/files.h"
 #include "model/model.h"
-#include "nn/half.h"
+#include "base/half.h"
 
 static char path[] = "/tmp/ggn_model.XXXXXX";
 static const struct ggn_hyper small = {GGN_PRESET_LULL, 16, 17, 2, 1, 2, 1};
@@ -43,7 +43,7 @@ static struct ggn_model *make(void)
 static void save(enum ggn_type type)
 {
     struct ggn_model *m = make();
-    struct ggn_err err = {0};
+    struct base_err err = {0};
 
     if (ggn_model_save(m, path, type, &err))
         fail_msg("%s", err.text);
@@ -56,7 +56,7 @@ static void test_round_trip(void **state)
 
     for (int type = 0; type < GGN_TYPES; type++) {
         struct ggn_model *want = make(), *got = NULL;
-        struct ggn_err err = {0};
+        struct base_err err = {0};
         save((enum ggn_type)type);
         if (ggn_model_load(path, &got, &err))
             fail_msg("%s", err.text);
@@ -80,10 +80,10 @@ static void test_round_trip(void **state)
 static void refuse(const char *data, size_t size, const char *expected)
 {
     struct ggn_model *m = NULL;
-    struct ggn_err err = {0};
+    struct base_err err = {0};
     int rc = ggn_model_load_memory("m.ggn", data, size, &m, &err);
 
-    assert_int_equal(rc, GGN_EINVAL);
+    assert_int_equal(rc, BASE_EINVAL);
     assert_null(m);
     assert_null(strchr(err.text, '\n'));
     if (!strstr(err.text, "m.ggn: ") || !strstr(err.text, expected))
@@ -93,7 +93,7 @@ static void refuse(const char *data, size_t size, const char *expected)
 static void read_all(char **data, size_t *size)
 {
     save(GGN_F32);
-    assert_int_equal(ggn_fio_read(path, 1 << 24, data, size, NULL), GGN_OK);
+    assert_int_equal(base_file_read(path, 1 << 24, data, size, NULL), 0);
 }
 
 static uint64_t fnv(const char *p, size_t size)
@@ -194,16 +194,16 @@ static void test_forged(void **state)
 static void test_not_finite(void **state)
 {
     struct ggn_model *m = make(), *got = NULL;
-    struct ggn_err err = {0};
+    struct base_err err = {0};
 
     m->weights[GGN_NET_M]->params[3] = NAN;
-    assert_int_equal(ggn_model_save(m, path, GGN_F32, &err), GGN_OK);
-    assert_int_equal(ggn_model_load(path, &got, &err), GGN_EINVAL);
+    assert_int_equal(ggn_model_save(m, path, GGN_F32, &err), 0);
+    assert_int_equal(ggn_model_load(path, &got, &err), BASE_EINVAL);
     assert_non_null(strstr(err.text, "not finite"));
     m->weights[GGN_NET_M]->params[3] = 0;
     m->weights[GGN_NET_M]->var[0] = -1;
-    assert_int_equal(ggn_model_save(m, path, GGN_F32, &err), GGN_OK);
-    assert_int_equal(ggn_model_load(path, &got, &err), GGN_EINVAL);
+    assert_int_equal(ggn_model_save(m, path, GGN_F32, &err), 0);
+    assert_int_equal(ggn_model_load(path, &got, &err), BASE_EINVAL);
     assert_non_null(strstr(err.text, "negative"));
     ggn_model_destroy(m);
     (void)state;
@@ -213,21 +213,21 @@ static void test_not_finite(void **state)
 static void test_too_large(void **state)
 {
     struct ggn_model *m = make(), *got = NULL;
-    struct ggn_err err = {0};
+    struct base_err err = {0};
 
-    assert_int_equal(ggn_model_save(m, path, GGN_F32, &err), GGN_OK);
+    assert_int_equal(ggn_model_save(m, path, GGN_F32, &err), 0);
     m->weights[GGN_NET_M]->params[3] = 65504.0f;
-    assert_int_equal(ggn_model_save(m, path, GGN_F16, &err), GGN_OK);
-    assert_int_equal(ggn_model_load(path, &got, &err), GGN_OK);
+    assert_int_equal(ggn_model_save(m, path, GGN_F16, &err), 0);
+    assert_int_equal(ggn_model_load(path, &got, &err), 0);
     ggn_model_destroy(got);
     m->weights[GGN_NET_M]->params[3] = -7e4f;
-    assert_int_equal(ggn_model_save(m, path, GGN_F16, &err), GGN_EINVAL);
+    assert_int_equal(ggn_model_save(m, path, GGN_F16, &err), BASE_EINVAL);
     assert_non_null(strstr(err.text, "too large for f16"));
-    assert_int_equal(ggn_model_load(path, &got, &err), GGN_OK);
+    assert_int_equal(ggn_model_load(path, &got, &err), 0);
     ggn_model_destroy(got);
     m->weights[GGN_NET_M]->params[3] = 3.4e38f;
-    assert_int_equal(ggn_model_save(m, path, GGN_BF16, &err), GGN_EINVAL);
-    assert_int_equal(ggn_model_save(m, path, GGN_F32, &err), GGN_OK);
+    assert_int_equal(ggn_model_save(m, path, GGN_BF16, &err), BASE_EINVAL);
+    assert_int_equal(ggn_model_save(m, path, GGN_F32, &err), 0);
     ggn_model_destroy(m);
     (void)state;
 }
@@ -236,7 +236,7 @@ static void test_too_large(void **state)
 static void test_paths(void **state)
 {
     struct ggn_model *m = make(), *got = NULL;
-    struct ggn_err err = {0};
+    struct base_err err = {0};
 
     assert_true(ggn_model_save(m, "/nonexistent/m.ggn", GGN_F32, &err) < 0);
     assert_true(ggn_model_load("/nonexistent/m.ggn", &got, &err) < 0);
@@ -248,20 +248,20 @@ static void test_paths(void **state)
 static void test_half_floats(void **state)
 {
     for (uint32_t h = 0; h < 65536; h++) {
-        float f = ggn_f16_to_f32((uint16_t)h), b = ggn_bf16_to_f32((uint16_t)h);
+        float f = base_f16_to_f32((uint16_t)h), b = base_bf16_to_f32((uint16_t)h);
         if (!isnan(f))
-            assert_int_equal(ggn_f32_to_f16(f), h);
+            assert_int_equal(base_f32_to_f16(f), h);
         else
-            assert_true(isnan(ggn_f16_to_f32(ggn_f32_to_f16(f))));
+            assert_true(isnan(base_f16_to_f32(base_f32_to_f16(f))));
         if (!isnan(b))
-            assert_int_equal(ggn_f32_to_bf16(b), h);
+            assert_int_equal(base_f32_to_bf16(b), h);
         else
-            assert_true(isnan(ggn_bf16_to_f32(ggn_f32_to_bf16(b))));
+            assert_true(isnan(base_bf16_to_f32(base_f32_to_bf16(b))));
     }
-    assert_true(ggn_f16_to_f32(ggn_f32_to_f16(1.0f + 1.0f / 2048)) == 1.0f); /* tie to even */
-    assert_true(ggn_f16_to_f32(ggn_f32_to_f16(1.0f + 3.0f / 2048)) == 1.0f + 1.0f / 512);
-    assert_true(isinf(ggn_f16_to_f32(ggn_f32_to_f16(65520.0f))));
-    assert_true(ggn_bf16_to_f32(ggn_f32_to_bf16(1.0f + 1.0f / 256)) == 1.0f);
+    assert_true(base_f16_to_f32(base_f32_to_f16(1.0f + 1.0f / 2048)) == 1.0f); /* tie to even */
+    assert_true(base_f16_to_f32(base_f32_to_f16(1.0f + 3.0f / 2048)) == 1.0f + 1.0f / 512);
+    assert_true(isinf(base_f16_to_f32(base_f32_to_f16(65520.0f))));
+    assert_true(base_bf16_to_f32(base_f32_to_bf16(1.0f + 1.0f / 256)) == 1.0f);
     (void)state;
 }
 

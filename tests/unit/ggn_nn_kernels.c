@@ -9,7 +9,7 @@
 #include "model/networks.h"
 #include "nn/bf16.h"
 #include "nn/exec.h"
-#include "nn/half.h"
+#include "base/half.h"
 #include "support/ggn_naive.h"
 
 static const double F32_TOLERANCE = 2e-5, F64_TOLERANCE = 1e-12; /* of sums of up to some thousand products of order 1 */
@@ -82,7 +82,7 @@ static void near(const char *what, enum ggn_isa isa, uint32_t seed, double got, 
         ggn_graph_begin(&g, "conv", o->c.c_in, o->c.h, o->c.w);                                                             \
         ggn_graph_stage(&g, "a");                                                                                           \
         ggn_graph_conv(&g, 0, -1, o->c.c_out, o->c.kernel, o->c.transposed, o->slope);                                      \
-        assert_int_equal(ggn_graph_end(&g, NULL), GGN_OK);                                                                  \
+        assert_int_equal(ggn_graph_end(&g, NULL), 0);                                                                  \
         struct ggn_weights_##suffix *w = ggn_weights_create_##suffix(&g, k, 1, NULL);                                       \
         struct ggn_exec_##suffix *e = ggn_exec_create_##suffix(&g, k, 1, GGN_EXEC_GRADS | GGN_EXEC_INPUT_GRAD, NULL, NULL); \
         REAL *grad = calloc(g.n_params, sizeof *grad);                                                                      \
@@ -142,21 +142,21 @@ static void check_bf16(struct oracle *o, uint32_t seed)
     ggn_graph_begin(&g, "conv", o->c.c_in, o->c.h, o->c.w);
     ggn_graph_stage(&g, "a");
     ggn_graph_conv(&g, 0, -1, o->c.c_out, 3, o->c.transposed, o->slope);
-    assert_int_equal(ggn_graph_end(&g, NULL), GGN_OK);
+    assert_int_equal(ggn_graph_end(&g, NULL), 0);
     struct ggn_weights_f32 *w = ggn_weights_create_f32(&g, NULL, GGN_WEIGHTS_BF16, NULL);
     struct ggn_exec_f32 *e = ggn_exec_create_f32(&g, NULL, 1, GGN_EXEC_BF16, NULL, NULL);
     const int n_w = (int)g.tensor[0].count;
     assert_true(w && e);
     for (int i = 0; i < n_w; i++) {
         w->params[i] = (float)o->weight[i];
-        o->weight[i] = (double)ggn_bf16_to_f32(ggn_f32_to_bf16((float)o->weight[i]));
+        o->weight[i] = (double)base_bf16_to_f32(base_f32_to_bf16((float)o->weight[i]));
     }
     for (int i = 0; i < o->c.c_out; i++)
         w->params[n_w + i] = (float)o->bias[i];
     ggn_weights_pack_f32(w);
     for (int i = 0; i < n_x; i++) {
         ggn_exec_plane_f32(e, 0, 0, i / area)[i % area / o->c.w * row + i % area % o->c.w] = (float)o->x[i];
-        o->x[i] = (double)ggn_bf16_to_f32(ggn_f32_to_bf16((float)o->x[i]));
+        o->x[i] = (double)base_bf16_to_f32(base_f32_to_bf16((float)o->x[i]));
     }
     ggn_naive_forward(&o->c, o->x, o->weight, o->bias, o->slope, o->y);
     ggn_exec_forward_f32(e, w, 1, GGN_EVAL);
@@ -192,7 +192,7 @@ static void test_row_ends(void **state)
     ggn_graph_begin(&g, "rows", C, H, W);
     ggn_graph_stage(&g, "a");
     ggn_graph_conv(&g, 0, -1, C, 3, 0, 1);
-    assert_int_equal(ggn_graph_end(&g, NULL), GGN_OK);
+    assert_int_equal(ggn_graph_end(&g, NULL), 0);
     for (int isa = 0; isa < GGN_ISA_COUNT; isa++) {
         const struct ggn_kernels_f32 *k = ggn_kernels_for_f32((enum ggn_isa)isa);
         if (!k)
@@ -229,7 +229,7 @@ struct result {
 };
 
 #define DEFINE_RUN(REAL, suffix)                                                                                            \
-    static struct result run_##suffix(const struct ggn_graph *g, enum ggn_isa isa, int batch, struct ggn_threads *threads)  \
+    static struct result run_##suffix(const struct ggn_graph *g, enum ggn_isa isa, int batch, struct base_threads *threads)  \
     {                                                                                                                       \
         const struct ggn_kernels_##suffix *k = ggn_kernels_for_##suffix(isa);                                               \
         struct ggn_weights_##suffix *w = ggn_weights_create_##suffix(g, k, 1, NULL);                                        \
@@ -275,7 +275,7 @@ static void free_result(struct result *r)
 static void build(struct ggn_graph *g, int net)
 {
     struct ggn_hyper hyper = {GGN_PRESET_LULL, 40, 51, 2, 3, 5, 4};
-    assert_int_equal(ggn_network_build(g, net, &hyper, NULL), GGN_OK);
+    assert_int_equal(ggn_network_build(g, net, &hyper, NULL), 0);
 }
 
 static double norm(const double *x, size_t n)
@@ -325,12 +325,12 @@ static void test_threads_same_bytes(void **state)
         build(&g, net);
         struct result want = run_f32(&g, ggn_isa_best(), 3, NULL);
         for (int count = 1; count <= 3; count++) {
-            struct ggn_threads *threads = ggn_threads_create(count, NULL);
+            struct base_threads *threads = base_threads_create(count, NULL);
             struct result got = run_f32(&g, ggn_isa_best(), 3, threads);
             assert_memory_equal(got.y, want.y, want.n_y * sizeof *want.y);
             assert_memory_equal(got.grad, want.grad, want.n_grad * sizeof *want.grad);
             free_result(&got);
-            ggn_threads_destroy(threads);
+            base_threads_destroy(threads);
         }
         free_result(&want);
     }

@@ -103,9 +103,9 @@ static void thresholds(void **state)
 static double threshold_of(const struct ggn_seq_block *b, const struct ggn_observer *o, enum ggn_observer_source source)
 {
     struct ggn_curve c;
-    struct ggn_err err = {0};
+    struct base_err err = {0};
     int censored;
-    if (ggn_observer_curve(o, b, source, 1, &c, &err) != GGN_OK)
+    if (ggn_observer_curve(o, b, source, 1, &c, &err) != 0)
         fail_msg("%s", err.text);
     double t = ggn_curve_threshold(&c, o->tau, &censored);
     assert_false(censored);
@@ -194,15 +194,15 @@ static void calibration(void **state)
     struct ggn_seq_block pixels[N];
     struct ggn_calibration_block blocks[N];
     struct ggn_calibration c;
-    struct ggn_err err = {0};
+    struct base_err err = {0};
     /* Made-up people: an observer of the family with a tau of its own. */
     struct ggn_observer person = {GGN_MAP_LIGHTNESS, 1.0, 0.3, 5, 99.0, 2.0, 0.25};
     for (int i = 0; i < N; i++) {
         pixels[i] = make_block(0.2 + 0.08 * i, i % 2 ? 0.06 : 0.0, 20 + (uint32_t)i, 4096);
         blocks[i] = (struct ggn_calibration_block){&pixels[i], 1, threshold_of(&pixels[i], &person, GGN_SOURCE_RENDERED)};
     }
-    struct ggn_threads *threads = ggn_threads_create(2, NULL);
-    if (ggn_observer_calibrate(blocks, N, GGN_SOURCE_RENDERED, threads, &c, &err) != GGN_OK)
+    struct base_threads *threads = base_threads_create(2, NULL);
+    if (ggn_observer_calibrate(blocks, N, GGN_SOURCE_RENDERED, threads, &c, &err) != 0)
         fail_msg("%s", err.text);
     assert_true(c.n == N && c.median_abs_log2 < 0.05 && c.nested_mean_abs_log2 < 0.25 && c.loo_mean_abs_log2 < 0.1);
     assert_true(c.observer.masking > 0.0); /* without masking the textured blocks would be wrong */
@@ -211,8 +211,8 @@ static void calibration(void **state)
     assert_near(log2(threshold_of(&fresh, &c.observer, GGN_SOURCE_RENDERED) / threshold_of(&fresh, &person, GGN_SOURCE_RENDERED)), 0.0, 0.3);
     ggn_seq_block_release(&fresh);
     ggn_calibration_release(&c);
-    assert_int_equal(ggn_observer_calibrate(blocks, 2, GGN_SOURCE_RENDERED, threads, &c, &err), GGN_EINVAL);
-    ggn_threads_destroy(threads);
+    assert_int_equal(ggn_observer_calibrate(blocks, 2, GGN_SOURCE_RENDERED, threads, &c, &err), BASE_EINVAL);
+    base_threads_destroy(threads);
     for (int i = 0; i < N; i++)
         ggn_seq_block_release(&pixels[i]);
 }
@@ -222,10 +222,10 @@ static void parameters(void **state)
     (void)state;
     char path[] = "/tmp/ggn_observer.XXXXXX";
     struct ggn_observer o = {GGN_MAP_FLIP, 0.7, 0.1, 9, 95, 0.031, 0.4}, back;
-    struct ggn_err err = {0};
+    struct base_err err = {0};
     close(mkstemp(path));
-    assert_int_equal(ggn_observer_write(path, &o, "{\"blocks\": 3}", &err), GGN_OK);
-    if (ggn_observer_read(path, &back, &err) != GGN_OK)
+    assert_int_equal(ggn_observer_write(path, &o, "{\"blocks\": 3}", &err), 0);
+    if (ggn_observer_read(path, &back, &err) != 0)
         fail_msg("%s", err.text);
     assert_true(back.map == o.map && back.window_px == 9);
     assert_near(back.tau, o.tau, 1e-9);
@@ -233,7 +233,7 @@ static void parameters(void **state)
     FILE *f = fopen(path, "w");
     fputs("{\"map\": \"eye\"}", f);
     fclose(f);
-    assert_int_equal(ggn_observer_read(path, &back, &err), GGN_EINVAL);
+    assert_int_equal(ggn_observer_read(path, &back, &err), BASE_EINVAL);
     unlink(path);
 }
 
@@ -242,8 +242,8 @@ static void built_in(void **state)
 {
     (void)state;
     struct ggn_observer o;
-    struct ggn_err err = {0};
-    if (ggn_observer_read("ggn/observer/observer.json", &o, &err) != GGN_OK)
+    struct base_err err = {0};
+    if (ggn_observer_read("ggn/observer/observer.json", &o, &err) != 0)
         fail_msg("%s", err.text);
     assert_true(o.map == ggn_observer_default.map && o.window_px == ggn_observer_default.window_px);
     assert_near(o.tau, ggn_observer_default.tau, 1e-6);
@@ -266,7 +266,7 @@ static void trials(void **state)
     fclose(f);
     double spread;
     int blocks, n, skipped;
-    assert_int_equal(ggn_trials_spread(path, &spread, &blocks, &n, &skipped, NULL), GGN_OK);
+    assert_int_equal(ggn_trials_spread(path, &spread, &blocks, &n, &skipped, NULL), 0);
     assert_true(blocks == 4 && n == 800 && skipped == 2);
     assert_near(spread, 0.5, 0.12);
     unlink(path);

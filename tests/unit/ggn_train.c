@@ -17,14 +17,14 @@
 #include "nn/exec.h"
 #include "train/calibrate.h"
 #include "train/start.h"
-#include "train/windows.h"
+#include "data/windows.h"
 
 static char dir[64];
 
 static void load(struct ggn_chains *set, double ratio)
 {
     struct ggn_chains_options o = {.dir = dir, .ratio = ratio};
-    struct ggn_err err = {0};
+    struct base_err err = {0};
 
     if (ggn_chains_load(set, &o, &err))
         fail_msg("%s", err.text);
@@ -52,7 +52,7 @@ static void splits_and_levels(void **state)
 static void synthetic_noise_has_the_variance_of_rendered_noise(void **state)
 {
     struct ggn_chains set;
-    struct ggn_err err = {0};
+    struct base_err err = {0};
     double ratio_sum = 0;
     int compared = 0;
 
@@ -85,7 +85,7 @@ static void synthetic_noise_has_the_variance_of_rendered_noise(void **state)
 static void extended_levels_continue_the_recording(void **state)
 {
     struct ggn_chains set;
-    struct ggn_err err = {0};
+    struct base_err err = {0};
     double sum = 0;
     int extended = 0;
 
@@ -119,7 +119,7 @@ static void windows_are_labelled_by_their_last_image(void **state)
     struct ggn_chains set;
     struct ggn_windows w, published;
     struct ggn_window_options o = {.split = GGN_SPLIT_TRAIN, .length = 6, .soft = 1};
-    struct ggn_err err = {0};
+    struct base_err err = {0};
     int drawn[2] = {0, 0};
 
     load(&set, 0);
@@ -190,7 +190,7 @@ static void folding_keeps_the_function(void **state)
 {
     struct ggn_hyper hyper = {.preset = GGN_PRESET_LULL, .height = 32, .width = 32, .window = 3, .k_r = 3, .k_m = 3, .k_d = 2};
     struct ggn_graph *g = malloc(sizeof *g);
-    struct ggn_err err = {0};
+    struct base_err err = {0};
     float out[2][32 * 32], before[1];
 
     assert_int_equal(ggn_network_build(g, GGN_NET_M, &hyper, &err), 0);
@@ -228,7 +228,7 @@ static void the_denoiser_begins_near_its_input(void **state)
 {
     struct ggn_hyper hyper = {.preset = GGN_PRESET_LULL, .height = 32, .width = 32, .window = 6, .k_r = 8, .k_m = 3, .k_d = 2};
     struct ggn_graph *g = malloc(sizeof *g);
-    struct ggn_err err = {0};
+    struct base_err err = {0};
     double error = 0;
 
     assert_int_equal(ggn_network_build(g, GGN_NET_R, &hyper, &err), 0);
@@ -289,7 +289,7 @@ static void the_threshold_respects_the_early_rate(void **state)
     struct ggn_window_options o = {.split = GGN_SPLIT_TRAIN, .length = 6};
     struct ggn_policy policy = ggn_policy_default();
     struct ggn_stopping at, chosen;
-    struct ggn_err err = {0};
+    struct base_err err = {0};
 
     load(&set, 0);
     assert_int_equal(ggn_windows_create(&w, &set, &o, &err), 0);
@@ -320,7 +320,7 @@ static void the_threshold_respects_the_early_rate(void **state)
 static int make_data(void **state)
 {
     struct seqgen g = seqgen_default();
-    struct ggn_err err = {0};
+    struct base_err err = {0};
 
     snprintf(dir, sizeof dir, "/tmp/ggn_train.%ld", (long)getpid());
     (void)state;
@@ -352,7 +352,7 @@ int main(int argc, char **argv)
 
     if (argc == 3 && !strcmp(argv[1], "--write-demo")) {
         struct seqgen g = seqgen_default();
-        struct ggn_err err = {0};
+        struct base_err err = {0};
         if (seqgen_write(argv[2], &g, &err))
             fprintf(stderr, "%s\n", err.text);
         return err.code != 0;

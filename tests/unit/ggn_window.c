@@ -111,7 +111,7 @@ static void tail_statistics_match_their_definition(void **state)
 static void policy_travels_with_the_model(void **state)
 {
     struct ggn_hyper hyper = {.preset = GGN_PRESET_LULL, .height = 16, .width = 16, .window = 2, .k_r = 1, .k_m = 1, .k_d = 1};
-    struct ggn_err err = {0};
+    struct base_err err = {0};
     struct ggn_model *model = ggn_model_create(&hyper, &err);
     struct ggn_policy p = {.first_spp = 12, .ratio = 1.25, .scale = 0.7, .shift = -0.3, .threshold = 0.4, .passes = 3,
                            .gate_noise = 0.02, .slope = 5, .tail999 = 2, .gini = 0.9}, q;
@@ -121,7 +121,7 @@ static void policy_travels_with_the_model(void **state)
     assert_int_equal(ggn_policy_of(model, &q, &err), 0);
     assert_memory_equal(&p, &q, sizeof p);
     p.threshold = 1.5;
-    assert_int_equal(ggn_policy_set(model, &p, &err), GGN_EINVAL);
+    assert_int_equal(ggn_policy_set(model, &p, &err), BASE_EINVAL);
     assert_non_null(strstr(err.text, "threshold"));
     assert_true(ggn_policy_next(&q, 100) == 125 && ggn_policy_next(&q, 1) == 2);
     assert_true(ggn_policy_predict(&q, 0.3, 0.4, 100) == 100);

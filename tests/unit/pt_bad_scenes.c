@@ -11,8 +11,8 @@
 
 #include <cmocka.h>
 
-#include "base/fio.h"
-#include "scene/load.h"
+#include "base/files.h"
+#include "pbrt/load.h"
 
 static const char folder[] = "tests/bad-input";
 enum { LEAST = 100 };
@@ -46,15 +46,15 @@ static void each_gives_its_line(void **state)
         char path[512], place[600], *bytes;
         int line;
         size_t size;
-        struct pt_err err = {0};
+        struct base_err err = {0};
         struct pt_scene *scene = NULL;
         struct pt_scene_defaults defaults;
         snprintf(path, sizeof path, "%s/%s", folder, entries[i]->d_name);
-        assert_int_equal(pt_fio_read(path, 1 << 20, &bytes, &size, &err), PT_OK);
+        assert_int_equal(base_file_read(path, 1 << 20, &bytes, &size, &err), 0);
         const char *words = expectation(bytes, &line);
         snprintf(place, sizeof place, line > 0 ? "%s:%d:" : "%s", path, line);
         int rc = pt_scene_load(path, NULL, &scene, &defaults, &err);
-        if (rc != PT_EINVAL || scene != NULL || strncmp(err.text, place, line > 0 ? strlen(place) : 0) != 0 ||
+        if (rc != BASE_EINVAL || scene != NULL || strncmp(err.text, place, line > 0 ? strlen(place) : 0) != 0 ||
             strstr(err.text, words) == NULL || strchr(err.text, '\n') != NULL) {
             print_error("%s: expected %s … %s, got %d \"%s\"\n", path, place, words, rc, err.text);
             wrong++;

@@ -254,10 +254,10 @@ static void warnings_come_once_and_strict_refuses(void **state)
     (void)state;
     static const char text[] = "WorldBegin\nMaterial \"hair\" Material \"hair\"\nMaterial \"measured\" \"string filename\" \"x\"";
     int warnings = 0;
-    struct pt_err err;
+    struct base_err err;
     pt_scene_destroy(text_scene(text, NULL, &warnings));
     assert_int_equal(warnings, 2);
-    assert_int_equal(text_scene_error(text, 1, &err), PT_EINVAL);
+    assert_int_equal(text_scene_error(text, 1, &err), BASE_EINVAL);
     assert_memory_equal(err.text, "t.pbrt:2:1: material \"hair\"", 27);
 }
 

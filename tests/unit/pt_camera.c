@@ -6,7 +6,7 @@
 #include <cmocka.h>
 #include <math.h>
 
-#include "base/rng.h"
+#include "sample/rng.h"
 #include "shade/camera.h"
 #include "support/pt_scenes.h"
 

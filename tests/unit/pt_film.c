@@ -49,8 +49,8 @@ static void planes_on_demand(void **state)
 {
     (void)state;
     struct pt_film film;
-    struct pt_err err = {0};
-    assert_int_equal(pt_film_init(&film, 0, 0, 10, 10, PT_FILM_COLOR, &err), PT_OK);
+    struct base_err err = {0};
+    assert_int_equal(pt_film_init(&film, 0, 0, 10, 10, PT_FILM_COLOR, &err), 0);
     assert_null(film.half);
     assert_null(film.moment2);
     assert_null(film.albedo);
@@ -64,9 +64,9 @@ static void sums_survive_load_and_store(void **state)
     (void)state;
     struct pt_film film;
     struct pt_film_pixel p;
-    struct pt_err err = {0};
+    struct base_err err = {0};
     double mean[3];
-    assert_int_equal(pt_film_init(&film, 5, 6, 9, 9, PT_FILM_ALL, &err), PT_OK);
+    assert_int_equal(pt_film_init(&film, 5, 6, 9, 9, PT_FILM_ALL, &err), 0);
     size_t i = pt_film_index(&film, 7, 8);
     for (uint32_t s = 0; s < 64; s++) {
         struct pt_path_result r = sample_of((float)s, 1.0f, 2.0f);
@@ -106,9 +106,9 @@ static void non_finite_samples_are_dropped(void **state)
     (void)state;
     struct pt_film film;
     struct pt_film_pixel p;
-    struct pt_err err = {0};
+    struct base_err err = {0};
     double mean[3];
-    assert_int_equal(pt_film_init(&film, 0, 0, 2, 1, PT_FILM_ALL, &err), PT_OK);
+    assert_int_equal(pt_film_init(&film, 0, 0, 2, 1, PT_FILM_ALL, &err), 0);
     pt_film_load(&film, 1, &p);
     for (uint32_t s = 0; s < 32; s++) {
         struct pt_path_result r = sample_of(s % 4 == 1 ? NAN : 2.0f, s % 8 == 3 ? -INFINITY : 2.0f, 2.0f);
@@ -123,7 +123,7 @@ static void non_finite_samples_are_dropped(void **state)
     double color[3];
     memcpy(color, film.color + 3, sizeof color);
     struct pt_film_patch patch = {0};
-    assert_int_equal(pt_film_patch(&film, 0, 0, 2, 1, 32, &patch, &err), PT_OK);
+    assert_int_equal(pt_film_patch(&film, 0, 0, 2, 1, 32, &patch, &err), 0);
     assert_int_equal(patch.count, 1);
     assert_true(fabs(film.color[3] / 32.0 - 2.0) < 1e-12);
     assert_true(fabs(film.half[3] / 16.0 - 2.0) < 1e-12);

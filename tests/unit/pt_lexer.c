@@ -12,30 +12,30 @@
 
 #include <cmocka.h>
 
-#include "scene/number.h"
-#include "scene/params.h"
+#include "pbrt/number.h"
+#include "pbrt/params.h"
 
 /* Several files in memory. */
 struct files {
     const char *names[4], *texts[4];
 };
 
-static int read_files(void *data, const char *path, char **bytes, size_t *size, struct pt_err *err)
+static int read_files(void *data, const char *path, char **bytes, size_t *size, struct base_err *err)
 {
     const struct files *f = data;
     for (int i = 0; i < 4 && f->names[i] != NULL; i++)
         if (strcmp(f->names[i], path) == 0) {
             *bytes = strdup(f->texts[i]);
             *size = strlen(f->texts[i]);
-            return *bytes != NULL ? PT_OK : pt_fail_nomem(err, path);
+            return *bytes != NULL ? 0 : base_fail_nomem(err, path);
         }
-    return pt_fail(err, PT_EIO, "%s: no such file", path);
+    return base_fail(err, BASE_EIO, "%s: no such file", path);
 }
 
 struct fixture {
     struct pt_source source;
     struct pt_arena arena;
-    struct pt_err err;
+    struct base_err err;
     struct pt_diag diag;
     struct pt_lexer lexer;
 };
@@ -46,7 +46,7 @@ static void open_files(struct fixture *x, struct files *files)
     x->source = (struct pt_source){read_files, files, 0};
     x->diag.err = &x->err;
     x->lexer = (struct pt_lexer){.source = &x->source, .diag = &x->diag, .arena = &x->arena};
-    assert_int_equal(pt_lexer_include(&x->lexer, files->names[0], (struct pt_loc){0}, 0), PT_OK);
+    assert_int_equal(pt_lexer_include(&x->lexer, files->names[0], (struct pt_loc){0}, 0), 0);
 }
 
 static void close_files(struct fixture *x)
@@ -93,10 +93,10 @@ static void list_across_files(void **state)
     size_t n;
     open_files(&x, &files);
     expect(&x, PT_TOKEN_WORD, "Include", 1, 1);
-    assert_int_equal(pt_lexer_include(&x.lexer, "b", (struct pt_loc){"a", 1, 1}, 0), PT_OK);
+    assert_int_equal(pt_lexer_include(&x.lexer, "b", (struct pt_loc){"a", 1, 1}, 0), 0);
     expect(&x, PT_TOKEN_WORD, "Medium", 1, 1);
     pt_params_clear(&params, &x.diag, (struct pt_loc){0});
-    assert_int_equal(pt_params_read(&params, &x.lexer), PT_OK);
+    assert_int_equal(pt_params_read(&params, &x.lexer), 0);
     assert_int_equal(params.count, 2);
     assert_true(pt_params_float(&params, "x", 0) == 4);
     assert_string_equal(params.items[1].loc.file, "a");
@@ -113,8 +113,8 @@ static void include_loops(void **state)
     struct files files = {{"a", "b"}, {"x", "y"}};
     struct fixture x;
     open_files(&x, &files);
-    assert_int_equal(pt_lexer_include(&x.lexer, "b", (struct pt_loc){"a", 3, 4}, 0), PT_OK);
-    assert_int_equal(pt_lexer_include(&x.lexer, "a", (struct pt_loc){"b", 3, 4}, 0), PT_EINVAL);
+    assert_int_equal(pt_lexer_include(&x.lexer, "b", (struct pt_loc){"a", 3, 4}, 0), 0);
+    assert_int_equal(pt_lexer_include(&x.lexer, "a", (struct pt_loc){"b", 3, 4}, 0), BASE_EINVAL);
     assert_string_equal(x.err.text, "b:3:4: \"a\" includes itself");
     close_files(&x);
 }
@@ -132,7 +132,7 @@ static void parameter_spellings(void **state)
     size_t n;
     open_files(&x, &files);
     pt_params_clear(&p, &x.diag, (struct pt_loc){0});
-    assert_int_equal(pt_params_read(&p, &x.lexer), PT_OK);
+    assert_int_equal(pt_params_read(&p, &x.lexer), 0);
     assert_int_equal(p.count, 10);
     assert_true(pt_params_float(&p, "a", 0) == 2 && pt_params_float(&p, "b", 0) == 3);
     assert_true(pt_params_bool(&p, "c", 0) == 1 && pt_params_bool(&p, "d", 1) == 0);
@@ -143,9 +143,9 @@ static void parameter_spellings(void **state)
     assert_non_null(pt_params_floats(&p, "uv", 2, &n));
     assert_int_equal(n, 2);
     assert_true(pt_params_ints(&p, "i", &n)[1] == -2);
-    assert_int_equal(x.diag.rc, PT_OK);
+    assert_int_equal(x.diag.rc, 0);
     pt_params_check_used(&p); /* f and s were not asked for: unknown names fail */
-    assert_int_equal(x.diag.rc, PT_EINVAL);
+    assert_int_equal(x.diag.rc, BASE_EINVAL);
     assert_string_equal(x.err.text, "a:1:79: unknown parameter \"f\" of \"\"");
     pt_params_release(&p);
     close_files(&x);

@@ -7,7 +7,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "base/rng.h"
+#include "sample/rng.h"
 #include "geom/accel.h"
 #include "geom/quadric.h"
 #include "integ/surface.h"

@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-#include "base/fio.h"
+#include "base/files.h"
 #include "image/oiio.h"
 
 static char dir[] = "/tmp/pt_oiio_XXXXXX";
@@ -41,10 +41,10 @@ static void png_round_trip(void **state)
     pixels[3] = 0; /* colour under zero alpha must survive: no premultiplication */
     char path[64];
     snprintf(path, sizeof path, "%s/a.png", dir);
-    struct pt_err err = {0};
-    assert_int_equal(pt_oiio_write_png(path, W, H, C, pixels, &err), PT_OK);
+    struct base_err err = {0};
+    assert_int_equal(pt_oiio_write_png(path, W, H, C, pixels, &err), 0);
     struct pt_oiio_image image = {0};
-    assert_int_equal(pt_oiio_read(path, &image, &err), PT_OK);
+    assert_int_equal(pt_oiio_read(path, &image, &err), 0);
     assert_int_equal(image.width, W);
     assert_int_equal(image.height, H);
     assert_int_equal(image.channels, C);
@@ -55,15 +55,15 @@ static void png_round_trip(void **state)
 
     char *data;
     size_t size;
-    assert_int_equal(pt_fio_read(path, 1 << 20, &data, &size, &err), PT_OK);
+    assert_int_equal(base_file_read(path, 1 << 20, &data, &size, &err), 0);
     int rc = pt_oiio_read_memory("a.png", data, size, &image, &err);
-    if (rc != PT_OK)
+    if (rc)
         print_error("%s\n", err.text);
-    assert_int_equal(rc, PT_OK);
+    assert_int_equal(rc, 0);
     assert_memory_equal(image.u8, pixels, sizeof pixels);
     pt_oiio_release(&image);
     assert_null(image.u8);
-    assert_int_equal(pt_oiio_read_memory("a.png", data, size / 3, &image, &err), PT_EINVAL);
+    assert_int_equal(pt_oiio_read_memory("a.png", data, size / 3, &image, &err), BASE_EINVAL);
     assert_null(strchr(err.text, '\n'));
     free(data);
 }
@@ -71,21 +71,21 @@ static void png_round_trip(void **state)
 static void refusals(void **state)
 {
     (void)state;
-    struct pt_err err = {0};
+    struct base_err err = {0};
     struct pt_oiio_image image = {0};
-    assert_int_equal(pt_oiio_read("/nonexistent/x.png", &image, &err), PT_EIO);
+    assert_int_equal(pt_oiio_read("/nonexistent/x.png", &image, &err), BASE_EIO);
     char path[64];
     snprintf(path, sizeof path, "%s/bad.png", dir);
     FILE *f = fopen(path, "wb");
     assert_non_null(f);
     fputs("not a png", f);
     fclose(f);
-    err = (struct pt_err){0};
-    assert_int_equal(pt_oiio_read(path, &image, &err), PT_EINVAL);
+    err = (struct base_err){0};
+    assert_int_equal(pt_oiio_read(path, &image, &err), BASE_EINVAL);
     assert_null(strchr(err.text, '\n'));
     uint8_t pixel[3] = {1, 2, 3};
-    assert_int_equal(pt_oiio_write_png("/nonexistent/x.png", 1, 1, 3, pixel, &err), PT_EIO);
-    assert_int_equal(pt_oiio_write_png(path, 0, 1, 3, pixel, &err), PT_EINVAL);
+    assert_int_equal(pt_oiio_write_png("/nonexistent/x.png", 1, 1, 3, pixel, &err), BASE_EIO);
+    assert_int_equal(pt_oiio_write_png(path, 0, 1, 3, pixel, &err), BASE_EINVAL);
 }
 
 int main(void)

@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-#include "scene/ply.h"
+#include "pbrt/ply.h"
 
 static const char ascii[] = "ply\nformat ascii 1.0\ncomment two faces\nelement vertex 4\nproperty float x\nproperty float y\n"
                             "property float z\nproperty uchar red\nproperty float s\nproperty float t\nelement face 2\n"
@@ -31,8 +31,8 @@ static void reads_ascii(void **state)
 {
     (void)state;
     struct pt_ply ply;
-    struct pt_err err = {0};
-    assert_int_equal(pt_ply_parse("a.ply", ascii, sizeof ascii - 1, &ply, &err), PT_OK);
+    struct base_err err = {0};
+    assert_int_equal(pt_ply_parse("a.ply", ascii, sizeof ascii - 1, &ply, &err), 0);
     check(&ply);
     pt_ply_release(&ply);
 }
@@ -77,14 +77,14 @@ static void reads_binary(void **state)
     for (int big = 0; big < 2; big++) {
         size_t n = binary(bytes, big);
         struct pt_ply ply;
-        struct pt_err err = {0};
-        if (pt_ply_parse("b.ply", bytes, n, &ply, &err) != PT_OK)
+        struct base_err err = {0};
+        if (pt_ply_parse("b.ply", bytes, n, &ply, &err) != 0)
             fail_msg("%s", err.text);
         check(&ply);
         pt_ply_release(&ply);
         /* Any cut is noticed. */
         for (size_t cut = 0; cut < n; cut++)
-            assert_int_equal(pt_ply_parse("b.ply", bytes, cut, &ply, &err), PT_EINVAL);
+            assert_int_equal(pt_ply_parse("b.ply", bytes, cut, &ply, &err), BASE_EINVAL);
     }
 }
 

@@ -15,13 +15,13 @@
 struct result {
     struct pt_render *render;
     struct pt_criterion *criterion;
-    struct pt_threads *pool;
+    struct base_threads *pool;
 };
 
 static struct result render(const struct pt_render_config *config, pt_kernel *kernel, int threads, const char *at)
 {
     struct result r = {0};
-    assert_int_equal(pt_fake_render(config, kernel, threads, at, &r.render, &r.criterion, &r.pool), PT_OK);
+    assert_int_equal(pt_fake_render(config, kernel, threads, at, &r.render, &r.criterion, &r.pool), 0);
     return r;
 }
 
@@ -29,7 +29,7 @@ static void release(struct result *r)
 {
     pt_render_destroy(r->render);
     pt_criterion_destroy(r->criterion);
-    pt_threads_destroy(r->pool);
+    base_threads_destroy(r->pool);
     *r = (struct result){0};
 }
 
@@ -190,7 +190,7 @@ static int count_down(void *data)
     return --s->slices <= 0;
 }
 
-static int save(void *data, struct pt_render *r, struct pt_err *err)
+static int save(void *data, struct pt_render *r, struct base_err *err)
 {
     const struct stop_after *s = data;
     return pt_checkpoint_save(s->checkpoint, r, "a=1\nb=2\n", err);
@@ -225,8 +225,8 @@ static void resumed_render_is_identical(void **state)
         struct stop_after stop = {.slices = slices, .checkpoint = path};
         struct pt_render_hooks hooks = {.interrupted = count_down, .suspend = save, .data = &stop}, none = {0};
         enum pt_render_outcome outcome;
-        struct pt_err err = {0};
-        struct result r = {.pool = pt_threads_create(2, &err)};
+        struct base_err err = {0};
+        struct result r = {.pool = base_threads_create(2, &err)};
         struct lull_pair pair = {"at", "32"};
         for (int part = 0; part < 2; part++) {
             assert_int_equal(pt_criterion_create_table(pt_fake_criterion(), &pair, 1, r.pool, NULL, NULL, &r.criterion, &err), 0);
@@ -254,9 +254,9 @@ static void bad_checkpoints_are_refused(void **state)
     close(mkstemp(path));
     struct pt_render_config config = pt_fake_config();
     struct result r = render(&config, pt_fake_noise, 1, "16");
-    struct pt_err err = {0};
-    assert_int_equal(pt_checkpoint_save(path, r.render, "seed=1\n", &err), PT_OK);
-    assert_int_equal(pt_checkpoint_load(path, r.render, "seed=2\n", &err), PT_EINVAL);
+    struct base_err err = {0};
+    assert_int_equal(pt_checkpoint_save(path, r.render, "seed=1\n", &err), 0);
+    assert_int_equal(pt_checkpoint_load(path, r.render, "seed=2\n", &err), BASE_EINVAL);
     assert_non_null(strstr(err.text, "made with seed=1, but this render has seed=2"));
     FILE *f = fopen(path, "rb");
     static unsigned char data[1 << 20];
@@ -266,14 +266,14 @@ static void bad_checkpoints_are_refused(void **state)
         f = fopen(path, "wb");
         fwrite(data, 1, cut, f);
         fclose(f);
-        assert_int_equal(pt_checkpoint_load(path, r.render, "seed=1\n", &err), PT_EINVAL);
+        assert_int_equal(pt_checkpoint_load(path, r.render, "seed=1\n", &err), BASE_EINVAL);
     }
     for (size_t at = 0; at < n; at += n / 13 + 1) {
         data[at] ^= 0x10;
         f = fopen(path, "wb");
         fwrite(data, 1, n, f);
         fclose(f);
-        assert_int_equal(pt_checkpoint_load(path, r.render, "seed=1\n", &err), PT_EINVAL);
+        assert_int_equal(pt_checkpoint_load(path, r.render, "seed=1\n", &err), BASE_EINVAL);
         data[at] ^= 0x10;
     }
     release(&r);

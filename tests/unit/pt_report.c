@@ -13,7 +13,7 @@
 #include <cjson/cJSON.h>
 #include <openexr.h>
 
-#include "base/fio.h"
+#include "base/files.h"
 #include "image/oiio.h"
 #include "image/stopmap.h"
 #include "image/tonemap.h"
@@ -23,7 +23,7 @@
 
 static struct pt_render *render;
 static struct pt_criterion *criterion;
-static struct pt_threads *pool;
+static struct base_threads *pool;
 static char folder[] = "/tmp/pt_report_XXXXXX";
 static struct lull_pair param = {"at", "32"};
 static struct pt_output_info info;
@@ -55,7 +55,7 @@ static int teardown(void **state)
     (void)state;
     pt_render_destroy(render);
     pt_criterion_destroy(criterion);
-    pt_threads_destroy(pool);
+    base_threads_destroy(pool);
     static const char *const names[] = {"a.exr", "a.png", "s.png", "s.csv", "r.json"};
     for (int i = 0; i < 5; i++)
         unlink(in_folder(names[i]));
@@ -94,13 +94,13 @@ static void read_channel(exr_context_t file, const char *name, float *out)
 static void exr_holds_every_layer(void **state)
 {
     (void)state;
-    struct pt_err err = {0};
+    struct base_err err = {0};
     static float pixels[57 * 35];
     exr_context_t file = NULL;
     exr_attr_box2i_t window;
     int32_t length;
     const char *text;
-    assert_int_equal(pt_output_exr(in_folder("a.exr"), render, &info, &err), PT_OK);
+    assert_int_equal(pt_output_exr(in_folder("a.exr"), render, &info, &err), 0);
     assert_int_equal(exr_start_read(&file, in_folder("a.exr"), NULL), EXR_ERR_SUCCESS);
     assert_int_equal(exr_get_data_window(file, 0, &window), EXR_ERR_SUCCESS);
     assert_true(window.min.x == 3 && window.min.y == 5 && window.max.x == 59 && window.max.y == 39);
@@ -133,15 +133,15 @@ static void exr_holds_every_layer(void **state)
 static void exr_of_equal_renders_are_equal(void **state)
 {
     (void)state;
-    struct pt_err err = {0};
+    struct base_err err = {0};
     char *a, *b;
     size_t na, nb;
     info.reproducible = 1;
-    assert_int_equal(pt_output_exr(in_folder("a.exr"), render, &info, &err), PT_OK);
-    assert_int_equal(pt_fio_read(in_folder("a.exr"), 1 << 24, &a, &na, &err), PT_OK);
+    assert_int_equal(pt_output_exr(in_folder("a.exr"), render, &info, &err), 0);
+    assert_int_equal(base_file_read(in_folder("a.exr"), 1 << 24, &a, &na, &err), 0);
     render->totals.render_s += 1.0;
-    assert_int_equal(pt_output_exr(in_folder("a.exr"), render, &info, &err), PT_OK);
-    assert_int_equal(pt_fio_read(in_folder("a.exr"), 1 << 24, &b, &nb, &err), PT_OK);
+    assert_int_equal(pt_output_exr(in_folder("a.exr"), render, &info, &err), 0);
+    assert_int_equal(base_file_read(in_folder("a.exr"), 1 << 24, &b, &nb, &err), 0);
     info.reproducible = 0;
     assert_int_equal(na, nb);
     assert_memory_equal(a, b, na);
@@ -152,13 +152,13 @@ static void exr_of_equal_renders_are_equal(void **state)
 static void unwritable_folder_is_one_line(void **state)
 {
     (void)state;
-    struct pt_err err = {0};
-    assert_int_equal(pt_output_exr("/nowhere/a.exr", render, &info, &err), PT_EIO);
+    struct base_err err = {0};
+    assert_int_equal(pt_output_exr("/nowhere/a.exr", render, &info, &err), BASE_EIO);
     assert_non_null(strstr(err.text, "/nowhere/a.exr"));
     assert_null(strchr(err.text, '\n'));
-    assert_int_equal(pt_output_report("/nowhere/a.json", render, &info, &err), PT_EIO);
-    assert_int_not_equal(pt_output_preview("/nowhere/a.png", render, &err), PT_OK);
-    assert_int_equal(pt_output_stop_map("/nowhere/a.csv", render, &info, &err), PT_EIO);
+    assert_int_equal(pt_output_report("/nowhere/a.json", render, &info, &err), BASE_EIO);
+    assert_int_not_equal(pt_output_preview("/nowhere/a.png", render, &err), 0);
+    assert_int_equal(pt_output_stop_map("/nowhere/a.csv", render, &info, &err), BASE_EIO);
 }
 
 /* --- pictures ------------------------------------------------------------------------------------------------------- */
@@ -166,11 +166,11 @@ static void unwritable_folder_is_one_line(void **state)
 static void preview_is_srgb(void **state)
 {
     (void)state;
-    struct pt_err err = {0};
+    struct base_err err = {0};
     struct pt_oiio_image image;
     double rgb[3];
-    assert_int_equal(pt_output_preview(in_folder("a.png"), render, &err), PT_OK);
-    assert_int_equal(pt_oiio_read(in_folder("a.png"), &image, &err), PT_OK);
+    assert_int_equal(pt_output_preview(in_folder("a.png"), render, &err), 0);
+    assert_int_equal(pt_oiio_read(in_folder("a.png"), &image, &err), 0);
     assert_true(image.width == 57 && image.height == 35 && image.channels == 3 && image.u8 != NULL);
     pt_film_mean(&render->film, pt_film_index(&render->film, 13, 15), render->blocks.list[0].spp, rgb);
     for (int c = 0; c < 3; c++)
@@ -196,11 +196,11 @@ static void srgb_codes(void **state)
 static void stop_map_picture(void **state)
 {
     (void)state;
-    struct pt_err err = {0};
+    struct base_err err = {0};
     struct pt_stopmap map;
     const struct pt_stopmap_block blocks[2] = {{0, 0, 200, 100, 32}, {200, 0, 400, 100, 10000}};
     uint8_t low[3], high[3];
-    assert_int_equal(pt_stopmap_draw(0, 0, 400, 100, blocks, 2, &map, &err), PT_OK);
+    assert_int_equal(pt_stopmap_draw(0, 0, 400, 100, blocks, 2, &map, &err), 0);
     assert_int_equal(map.width, 400);
     assert_true(map.height > 100);
     pt_viridis(0.0, low);
@@ -213,17 +213,17 @@ static void stop_map_picture(void **state)
             ink += map.rgb[3 * (y * 400 + x)] == 255;
     assert_in_range(ink, 100, 2000);
     pt_stopmap_release(&map);
-    assert_int_equal(pt_output_stop_map(in_folder("s.png"), render, &info, &err), PT_OK);
+    assert_int_equal(pt_output_stop_map(in_folder("s.png"), render, &info, &err), 0);
 }
 
 static void stop_map_table(void **state)
 {
     (void)state;
-    struct pt_err err = {0};
+    struct base_err err = {0};
     char *text, expected[512];
     size_t n;
-    assert_int_equal(pt_output_stop_map(in_folder("s.csv"), render, &info, &err), PT_OK);
-    assert_int_equal(pt_fio_read(in_folder("s.csv"), 4096, &text, &n, &err), PT_OK);
+    assert_int_equal(pt_output_stop_map(in_folder("s.csv"), render, &info, &err), 0);
+    assert_int_equal(base_file_read(in_folder("s.csv"), 4096, &text, &n, &err), 0);
     int used = snprintf(expected, sizeof expected, "fake-view1;");
     for (uint32_t i = 0; i < render->blocks.count; i++)
         used += snprintf(expected + used, sizeof expected - (size_t)used, "%llu;", (unsigned long long)render->blocks.list[i].spp);
@@ -248,11 +248,11 @@ static void report_has_every_key(void **state)
     static const char *const block[] = {"id", "x0", "y0", "x1", "y1", "spp", "reason", "p_noisy", "error", "checks", "thread_s", NULL};
     static const char *const totals[] = {"samples", "render_s", "criterion_s", "paths", "rays", "paths_per_s", "rays_per_s", "dropped_samples", NULL};
     static const char *const by[] = {"id", "version", "params", NULL};
-    struct pt_err err = {0};
+    struct base_err err = {0};
     char *text;
     size_t n;
-    assert_int_equal(pt_output_report(in_folder("r.json"), render, &info, &err), PT_OK);
-    assert_int_equal(pt_fio_read(in_folder("r.json"), 1 << 20, &text, &n, &err), PT_OK);
+    assert_int_equal(pt_output_report(in_folder("r.json"), render, &info, &err), 0);
+    assert_int_equal(base_file_read(in_folder("r.json"), 1 << 20, &text, &n, &err), 0);
     cJSON *root = cJSON_Parse(text);
     assert_non_null(root);
     has_keys(root, top);

@@ -14,7 +14,7 @@
 #include <cjson/cJSON.h>
 #include <zlib.h>
 
-#include "base/fio.h"
+#include "base/files.h"
 #include "image/tonemap.h"
 #include "render/blockstats.h"
 #include "render/lseq.h"
@@ -69,7 +69,7 @@ static void levels(void **state)
 {
     (void)state;
     static uint32_t spp[PT_SEQUENCE_MAX_LEVELS];
-    struct pt_err err = {0};
+    struct base_err err = {0};
     assert_int_equal(pt_sequence_levels("linear:20:100:20", spp, &err), 5);
     assert_int_equal(spp[4], 100);
     int n = pt_sequence_levels("geometric:20:10000:1.15", spp, &err);
@@ -83,20 +83,20 @@ static void levels(void **state)
     static const char *const bad[] = {"", "linear", "linear:1:2", "cubic:1:2:3", "linear:0:5:1", "linear:5:1:1", "geometric:1:9:1",
                                       "linear:1:9:1:2", "linear:1:9:nan", "linear:1:100000:1", "geometric:1:inf:2"};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
-        assert_int_equal(pt_sequence_levels(bad[i], spp, &err), PT_EINVAL);
+        assert_int_equal(pt_sequence_levels(bad[i], spp, &err), BASE_EINVAL);
 }
 
 static void block_lists(void **state)
 {
     (void)state;
-    struct pt_err err = {0};
+    struct base_err err = {0};
     uint8_t chosen[12] = {0};
-    assert_int_equal(pt_sequence_choose("0,3,8-10", chosen, 12, &err), PT_OK);
+    assert_int_equal(pt_sequence_choose("0,3,8-10", chosen, 12, &err), 0);
     static const uint8_t expected[12] = {1, 0, 0, 1, 0, 0, 0, 0, 1, 1, 1, 0};
     assert_memory_equal(chosen, expected, 12);
     static const char *const bad[] = {"", "12", "1-", "3-1", "-1", "a", "1,", "1;2", "0-12"};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
-        assert_int_equal(pt_sequence_choose(bad[i], chosen, 12, &err), PT_EINVAL);
+        assert_int_equal(pt_sequence_choose(bad[i], chosen, 12, &err), BASE_EINVAL);
 }
 
 static void statistics(void **state)
@@ -119,14 +119,14 @@ static void statistics(void **state)
 /* --- a recorded folder ---------------------------------------------------------------------------------------------- */
 
 static char folder[64];
-static struct pt_threads *pool;
+static struct base_threads *pool;
 
 static int setup(void **state)
 {
     (void)state;
-    struct pt_err err = {0};
+    struct base_err err = {0};
     strcpy(folder, "/tmp/pt_sequence_XXXXXX");
-    pool = pt_threads_create(2, &err);
+    pool = base_threads_create(2, &err);
     return mkdtemp(folder) != NULL && pool != NULL ? 0 : -1;
 }
 
@@ -134,7 +134,7 @@ static int teardown(void **state)
 {
     (void)state;
     char command[128];
-    pt_threads_destroy(pool);
+    base_threads_destroy(pool);
     snprintf(command, sizeof command, "rm -r %s", folder);
     return system(command);
 }
@@ -153,7 +153,7 @@ static void say(void *data, const char *line)
     lines_said++;
 }
 
-static int record(const struct pt_sequence_config *config, struct pt_criterion *criterion, struct pt_err *err)
+static int record(const struct pt_sequence_config *config, struct pt_criterion *criterion, struct base_err *err)
 {
     int stopped;
     return pt_sequence_record(config, NULL, pt_fake_noise, pool, criterion, NULL, say, NULL, &stopped, err);
@@ -174,9 +174,9 @@ static double f64(const unsigned char *p)
 static unsigned char *read_all(const char *name, size_t *size)
 {
     char path[128], *data;
-    struct pt_err err = {0};
+    struct base_err err = {0};
     snprintf(path, sizeof path, "%s/%s", folder, name);
-    assert_int_equal(pt_fio_read(path, 1 << 26, &data, size, &err), PT_OK);
+    assert_int_equal(base_file_read(path, 1 << 26, &data, size, &err), 0);
     return (unsigned char *)data;
 }
 
@@ -204,14 +204,14 @@ static struct pt_render *render_block(int x0, int y0, int x1, int y1, uint32_t s
     struct pt_render *r;
     struct pt_render_hooks none = {0};
     enum pt_render_outcome outcome;
-    struct pt_err err = {0};
+    struct base_err err = {0};
     memcpy(c.crop, crop, sizeof crop);
     c.spp_min = c.spp_max = spp;
     c.uniform = 1;
     c.planes = PT_FILM_HALF;
     c.integrator.seed = seed;
-    assert_int_equal(pt_render_create(&c, NULL, pt_fake_noise, pool, NULL, &r, &err), PT_OK);
-    assert_int_equal(pt_render_run(r, &none, &outcome, &err), PT_OK);
+    assert_int_equal(pt_render_create(&c, NULL, pt_fake_noise, pool, NULL, &r, &err), 0);
+    assert_int_equal(pt_render_run(r, &none, &outcome, &err), 0);
     return r;
 }
 
@@ -302,9 +302,9 @@ static void recorded_folder(void **state)
     (void)state;
     struct pt_sequence_config config = make_config();
     struct pt_criterion *criterion = NULL;
-    struct pt_err err = {0};
-    assert_int_equal(pt_criterion_create_table(pt_fake_criterion(), NULL, 0, pool, NULL, NULL, &criterion, &err), PT_OK);
-    assert_int_equal(record(&config, criterion, &err), PT_OK);
+    struct base_err err = {0};
+    assert_int_equal(pt_criterion_create_table(pt_fake_criterion(), NULL, 0, pool, NULL, NULL, &criterion, &err), 0);
+    assert_int_equal(record(&config, criterion, &err), 0);
     pt_criterion_destroy(criterion);
     check_block("block-00001.lseq", 16, 0, 32, 16, 1);
     check_block("block-00011.lseq", 48, 32, 60, 44, 1);
@@ -329,14 +329,14 @@ static void going_on(void **state)
 {
     (void)state;
     struct pt_sequence_config config = make_config();
-    struct pt_err err = {0};
+    struct base_err err = {0};
     struct stat before, after;
     char path[128];
     snprintf(path, sizeof path, "%s/block-00001.lseq", folder);
     stat(path, &before);
     lines_said = 0;
     config.blocks = "1,2,11";
-    assert_int_equal(record(&config, NULL, &err), PT_OK);
+    assert_int_equal(record(&config, NULL, &err), 0);
     assert_int_equal(lines_said, 1);
     stat(path, &after);
     assert_true(before.st_ino == after.st_ino);
@@ -347,7 +347,7 @@ static void going_on(void **state)
     fputc('x', f);
     fclose(f);
     lines_said = 0;
-    assert_int_equal(record(&config, NULL, &err), PT_OK);
+    assert_int_equal(record(&config, NULL, &err), 0);
     assert_int_equal(lines_said, 1);
     check_block("block-00001.lseq", 16, 0, 32, 16, 0);
     cJSON *m = read_manifest();
@@ -355,15 +355,15 @@ static void going_on(void **state)
     cJSON_Delete(m);
 
     config.reference_spp = 65;
-    assert_int_equal(record(&config, NULL, &err), PT_EINVAL);
+    assert_int_equal(record(&config, NULL, &err), BASE_EINVAL);
     assert_non_null(strstr(err.text, "another reference_spp"));
     config = make_config();
     config.render.integrator.max_depth = 3;
-    assert_int_equal(record(&config, NULL, &err), PT_EINVAL);
+    assert_int_equal(record(&config, NULL, &err), BASE_EINVAL);
     assert_non_null(strstr(err.text, "another renderer"));
     config = make_config();
     config.directory = "/proc/nope/deep";
-    assert_int_equal(record(&config, NULL, &err), PT_EINVAL);
+    assert_int_equal(record(&config, NULL, &err), BASE_EINVAL);
 }
 
 int main(void)

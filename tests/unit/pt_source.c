@@ -11,7 +11,7 @@
 
 #include <cmocka.h>
 
-#include "scene/source.h"
+#include "pbrt/source.h"
 
 static void packed_files(void **state)
 {
@@ -19,7 +19,7 @@ static void packed_files(void **state)
     enum { SIZE = 9 << 20 }; /* more than the first guess at the unpacked size */
     char folder[] = "/tmp/pt_source_XXXXXX", path[64], *text = malloc(SIZE), *bytes = NULL;
     size_t size = 0;
-    struct pt_err err = {0};
+    struct base_err err = {0};
     assert_true(mkdtemp(folder) != NULL && text != NULL);
     snprintf(path, sizeof path, "%s/a.gz", folder);
     for (int i = 0; i < SIZE; i++)
@@ -28,13 +28,13 @@ static void packed_files(void **state)
     assert_non_null(gz);
     assert_int_equal(gzwrite(gz, text, SIZE), SIZE);
     assert_int_equal(gzclose(gz), Z_OK);
-    assert_int_equal(pt_source_files.read(NULL, path, &bytes, &size, &err), PT_OK);
+    assert_int_equal(pt_source_files.read(NULL, path, &bytes, &size, &err), 0);
     assert_int_equal(size, SIZE);
     assert_memory_equal(bytes, text, SIZE);
     assert_int_equal(bytes[size], 0);
     free(bytes);
     assert_int_equal(truncate(path, 4096), 0);
-    assert_int_equal(pt_source_files.read(NULL, path, &bytes, &size, &err), PT_EINVAL);
+    assert_int_equal(pt_source_files.read(NULL, path, &bytes, &size, &err), BASE_EINVAL);
     assert_null(strchr(err.text, '\n'));
     unlink(path);
     rmdir(folder);
@@ -46,9 +46,9 @@ static void what_is_no_file(void **state)
     (void)state;
     char *bytes = NULL;
     size_t size = 0;
-    struct pt_err err = {0};
-    assert_int_equal(pt_source_files.read(NULL, "/nonexistent", &bytes, &size, &err), PT_EIO);
-    assert_int_equal(pt_source_files.read(NULL, "/tmp", &bytes, &size, &err), PT_EINVAL);
+    struct base_err err = {0};
+    assert_int_equal(pt_source_files.read(NULL, "/nonexistent", &bytes, &size, &err), BASE_EIO);
+    assert_int_equal(pt_source_files.read(NULL, "/tmp", &bytes, &size, &err), BASE_EINVAL);
     assert_null(bytes);
 }
 

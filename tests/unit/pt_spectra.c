@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-#include "scene/spectra.h"
+#include "pbrt/spectra.h"
 
 /* The analytic curves are within 1 % of the tabulated ones in chromaticity (Wyman et al. 2013, table 1). */
 static const double curve_tolerance = 0.006;

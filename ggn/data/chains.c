@@ -1,0 +1,244 @@
+#include "data/chains.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MAX_CHAINS = 1 << 16 };
+
+size_t ggn_chains_values(const struct ggn_chains *set)
+{
+    return 3 * (size_t)set->width * (size_t)set->height;
+}
+
+void ggn_chains_release(struct ggn_chains *set)
+{
+    for (int i = 0; i < set->n; i++) {
+        struct ggn_chain *c = &set->chains[i];
+        free(c->spp);
+        free(c->noisy);
+        free(c->denoised);
+        if (!c->synthetic)
+            free(c->reference);
+        free(c->tail999);
+        free(c->gini);
+    }
+    free(set->chains);
+    ggn_dataset_release(&set->data);
+    *set = (struct ggn_chains){0};
+}
+
+int ggn_chains_count(const struct ggn_chains *set, enum ggn_split split, int real_only)
+{
+    int n = 0;
+
+    for (int i = 0; i < set->n; i++)
+        n += set->chains[i].split == split && !(real_only && set->chains[i].synthetic);
+    return n;
+}
+
+struct ggn_chain *ggn_chains_append(struct ggn_chains *set, struct base_err *err)
+{
+    if (set->n == MAX_CHAINS) {
+        base_fail(err, BASE_EINVAL, "more than %d blocks", MAX_CHAINS);
+        return NULL;
+    }
+    if ((set->n & (set->n - 1)) == 0) {
+        struct ggn_chain *more = realloc(set->chains, (set->n ? 2 * (size_t)set->n : 1) * sizeof *more);
+        if (!more) {
+            base_fail_nomem(err, "blocks");
+            return NULL;
+        }
+        set->chains = more;
+    }
+    struct ggn_chain *c = &set->chains[set->n++];
+    *c = (struct ggn_chain){0};
+    return c;
+}
+
+/* --- split -------------------------------------------------------------------------------------------------------------- */
+
+/* Number of the scene among all, in order of first appearance. */
+static int scene_of(const struct ggn_dataset *data, int view)
+{
+    int n = 0;
+
+    for (int i = 0; i < view; i++) {
+        int first = 1;
+        for (int k = 0; k < i && first; k++)
+            first = strcmp(data->views[k].manifest.scene, data->views[i].manifest.scene) != 0;
+        if (!strcmp(data->views[i].manifest.scene, data->views[view].manifest.scene))
+            return n;
+        n += first;
+    }
+    return n;
+}
+
+static int split_list(struct ggn_dataset *data, const char *list, enum ggn_split split, struct base_err *err)
+{
+    while (*list) {
+        size_t n = strcspn(list, ",");
+        int found = 0;
+        for (int i = 0; i < data->n; i++) {
+            const char *scene = data->views[i].manifest.scene;
+            if (strlen(scene) == n && !memcmp(scene, list, n)) {
+                data->views[i].split = split;
+                found = 1;
+            }
+        }
+        if (!found)
+            return base_fail(err, BASE_EINVAL, "no scene '%.*s' in the data", (int)(n < 200 ? n : 200), list);
+        list += n + (list[n] == ',');
+    }
+    return 0;
+}
+
+static int choose_split(struct ggn_chains *set, const struct ggn_chains_options *o, struct base_err *err)
+{
+    struct ggn_dataset *data = &set->data;
+    int any = 0, rc = 0;
+
+    for (int i = 0; i < data->n; i++) {
+        any |= data->views[i].split != GGN_SPLIT_NONE;
+        int scene = scene_of(data, i);
+        set->n_scenes = scene + 1 > set->n_scenes ? scene + 1 : set->n_scenes;
+    }
+    for (int i = 0; i < data->n && !any; i++) {
+        int held_out = scene_of(data, i) % 5 == (set->n_scenes < 3 ? 1 : 2);
+        data->views[i].split = held_out && !o->validation ? GGN_SPLIT_VALIDATION : GGN_SPLIT_TRAIN;
+    }
+    if (o->validation)
+        rc = split_list(data, o->validation, GGN_SPLIT_VALIDATION, err);
+    if (!rc && o->test)
+        rc = split_list(data, o->test, GGN_SPLIT_TEST, err);
+    return rc;
+}
+
+/* --- chains ------------------------------------------------------------------------------------------------------------- */
+
+static int chain_alloc(const struct ggn_chains *set, struct ggn_chain *c, int levels, int reference, struct base_err *err)
+{
+    size_t n = (size_t)levels, values = ggn_chains_values(set);
+
+    c->spp = malloc(n * sizeof *c->spp);
+    c->noisy = malloc(n * values);
+    c->tail999 = malloc(n * sizeof *c->tail999);
+    c->gini = malloc(n * sizeof *c->gini);
+    c->reference = reference ? malloc(values) : NULL;
+    return c->spp && c->noisy && c->tail999 && c->gini && (c->reference || !reference)
+               ? 0 : base_fail_nomem(err, "images of the data set");
+}
+
+static int fill_chain(const struct ggn_chains *set, struct ggn_chain *c, const struct ggn_seq_block *b, double ratio,
+                      struct base_err *err)
+{
+    double wanted = 0;
+    int rc = chain_alloc(set, c, (int)b->n_levels, b->reference != NULL, err);
+
+    for (uint32_t i = 0; !rc && i < b->n_levels; i++) {
+        const struct ggn_seq_record *r = &b->levels[i];
+        if (ratio > 1 && c->n_levels && r->spp < wanted - 0.5)
+            continue;
+        wanted = 0.999 * ratio * r->spp; /* recorded levels are rounded to whole samples */
+        c->spp[c->n_levels] = r->spp;
+        c->tail999[c->n_levels] = ggn_seq_stat(r, "tail999");
+        c->gini[c->n_levels] = ggn_seq_stat(r, "gini");
+        rc = ggn_seq_display_planar(b, r, c->noisy + (size_t)c->n_levels * ggn_chains_values(set), err);
+        c->n_levels++;
+    }
+    if (!rc && b->reference)
+        rc = ggn_seq_display_planar(b, b->reference, c->reference, err);
+    return rc;
+}
+
+static int load_block(struct ggn_chains *set, int view, uint32_t index, const struct ggn_chains_options *o, struct base_err *err)
+{
+    const struct ggn_dataset_view *v = &set->data.views[view];
+    struct ggn_seq_block b;
+    int rc = ggn_manifest_read_block(v->dir, &v->manifest, index, &b, err);
+
+    if (rc)
+        return rc;
+    if (!set->width) {
+        set->width = (int)b.width;
+        set->height = (int)b.height;
+    }
+    struct ggn_chain *c = NULL;
+    if ((int)b.width != set->width || (int)b.height != set->height)
+        rc = base_fail(err, BASE_EINVAL, "%s/%s: a block of %ux%u pixels among blocks of %dx%d", v->dir, v->manifest.blocks[index].file,
+                      b.width, b.height, set->width, set->height);
+    else if (!(c = ggn_chains_append(set, err)))
+        rc = BASE_ENOMEM;
+    if (!rc) {
+        const struct ggn_label *label = v->has_labels ? ggn_labels_find(&v->labels, b.id) : NULL;
+        c->view = view;
+        c->scene = scene_of(&set->data, view);
+        c->split = v->split;
+        c->block = b.id;
+        c->has_label = label != NULL;
+        if (label)
+            c->label = *label;
+        c->spread = v->has_labels ? v->labels.spread : 0;
+        rc = fill_chain(set, c, &b, o->ratio, err);
+    }
+    ggn_seq_block_release(&b);
+    return rc;
+}
+
+static int by_value(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+
+    return (x > y) - (x < y);
+}
+
+/* The spacing of the longest chain: equal steps when its first step is its last, else the median ratio of its upper half,
+ * where rounding to whole samples matters least. */
+static void find_spacing(struct ggn_chains *set)
+{
+    const struct ggn_chain *longest = &set->chains[0];
+    double ratio[GGN_SEQ_MAX_RECORDS];
+    int n = 0;
+
+    for (int i = 1; i < set->n; i++)
+        if (set->chains[i].n_levels > longest->n_levels)
+            longest = &set->chains[i];
+    set->first_spp = longest->spp[0];
+    if (longest->n_levels < 2)
+        return;
+    const double *spp = longest->spp;
+    int count = longest->n_levels;
+    if (count > 2 && spp[1] - spp[0] == spp[count - 1] - spp[count - 2]) {
+        set->step_spp = spp[1] - spp[0];
+        return;
+    }
+    for (int i = count / 2 > 0 ? count / 2 : 1; i < count; i++)
+        ratio[n++] = spp[i] / spp[i - 1];
+    qsort(ratio, (size_t)n, sizeof ratio[0], by_value);
+    set->ratio = ratio[n / 2];
+}
+
+int ggn_chains_load(struct ggn_chains *set, const struct ggn_chains_options *o, struct base_err *err)
+{
+    struct ggn_chains made = {0};
+    int rc = ggn_dataset_open(o->dir, &made.data, err);
+
+    if (rc)
+        return rc;
+    rc = choose_split(&made, o, err);
+    for (int i = 0; !rc && i < made.data.n; i++) {
+        const struct ggn_dataset_view *v = &made.data.views[i];
+        int wanted = v->split == GGN_SPLIT_TRAIN || v->split == GGN_SPLIT_VALIDATION || (v->split == GGN_SPLIT_TEST && o->with_test);
+        for (uint32_t k = 0; !rc && wanted && k < v->manifest.n_blocks; k++)
+            rc = load_block(&made, i, k, o, err);
+    }
+    if (!rc && !made.n)
+        rc = base_fail(err, BASE_EINVAL, "%s: no blocks to learn from", o->dir);
+    if (rc) {
+        ggn_chains_release(&made);
+        return rc;
+    }
+    find_spacing(&made);
+    *set = made;
+    return 0;
+}

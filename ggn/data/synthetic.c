@@ -1,0 +1,220 @@
+/* Levels that were never rendered, from one pair of half buffers and a reference: whole chains, and the end of recorded ones. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "data/image.h"
+#include "model/preprocess.h"
+#include "nn/weights.h"
+#include "data/chains.h"
+
+enum { MAX_LEVELS = 128 };
+static const double HIGHEST_SHARE = 0.7; /* of the reference's samples: nearer than that nothing but the reference is left */
+static const double JITTER = 0.04;       /* of the ratio between levels */
+static const double CLEAN_END = 0.4;     /* a threshold below this share of the last level needs no further levels */
+
+/* One block's source. */
+struct source {
+    float *base, *d, *last; /* [3][P] linear: the converged image, the half-buffer difference, the last recorded level */
+    double n_full, n_reference;
+};
+
+static const struct ggn_seq_record *full_level(const struct ggn_seq_block *b)
+{
+    for (uint32_t i = 0; i < b->n_levels; i++)
+        if (ggn_seq_has(&b->levels[i], GGN_PLANE_HALF_F16))
+            return &b->levels[i];
+    return NULL;
+}
+
+static int choose_levels(double *spp, double first, double ratio, double highest, uint32_t seed)
+{
+    int n = 0;
+
+    for (double s = floor(first * (1 + 0.1 * ggn_hash_unit(0, seed)) + 0.5); n < MAX_LEVELS && s <= highest; n++) {
+        spp[n] = s;
+        s = fmax(s + 1, floor(s * ratio * (1 + JITTER * (2 * ggn_hash_unit((uint32_t)n + 1, seed) - 1)) + 0.5));
+    }
+    return n;
+}
+
+/* The running mean X_n of independent samples is, backwards, a walk: X_n − X_N has variance σ²·(1/n − 1/N), with independent
+ * increments in 1/n. From the reference down to the fewest samples each step adds ±D·√(n_full·Δ(1/n)), the sign drawn per
+ * pixel: D² estimates σ²/n_full there and keeps the colour of the noise. `noise` takes one step from `above` to n samples. */
+static void step_down(const struct source *s, size_t pixels, double n, double above, uint32_t seed, float *noise)
+{
+    const float step = (float)sqrt(s->n_full * (1 / n - 1 / above));
+
+    for (size_t p = 0; p < pixels; p++) {
+        float signed_step = ggn_hash((uint32_t)p, seed) & 1 ? step : -step;
+        for (size_t i = p; i < 3 * pixels; i += pixels)
+            noise[i] += signed_step * s->d[i];
+    }
+}
+
+static void fill_levels(struct ggn_chain *c, const struct source *s, size_t pixels, float *noise, uint32_t seed)
+{
+    memset(noise, 0, 3 * pixels * sizeof *noise);
+    for (int k = c->n_levels - 1; k >= 0; k--) {
+        uint8_t *out = c->noisy + 3 * pixels * (size_t)k;
+        step_down(s, pixels, c->spp[k], k + 1 < c->n_levels ? c->spp[k + 1] : s->n_reference, ggn_hash((uint32_t)k, seed), noise);
+        for (size_t i = 0; i < 3 * pixels; i++)
+            out[i] = ggn_preprocess((double)(s->base[i] + noise[i]), NULL, NULL);
+    }
+}
+
+static int make_chain(struct ggn_chains *set, const struct ggn_chain *real, struct ggn_chain *c, const struct source *s,
+                      uint32_t seed, struct base_err *err)
+{
+    size_t pixels = (size_t)set->width * (size_t)set->height;
+    double spp[MAX_LEVELS];
+    float *noise = malloc(3 * pixels * sizeof *noise);
+    int n = choose_levels(spp, set->first_spp, set->ratio > 1.01 ? set->ratio : 1.15, HIGHEST_SHARE * s->n_reference, seed);
+
+    *c = *real;
+    c->synthetic = 1;
+    c->tail999 = c->gini = NULL;
+    c->denoised = NULL;
+    c->n_levels = n;
+    c->spp = malloc((size_t)(n ? n : 1) * sizeof *c->spp);
+    c->noisy = malloc((size_t)(n ? n : 1) * 3 * pixels);
+    if (!noise || !c->spp || !c->noisy) {
+        free(noise);
+        return base_fail_nomem(err, "synthetic images");
+    }
+    memcpy(c->spp, spp, (size_t)n * sizeof *spp);
+    fill_levels(c, s, pixels, noise, seed);
+    free(noise);
+    return 0;
+}
+
+static int read_source(const struct ggn_chains *set, const struct ggn_chain *c, struct source *s, int *usable, struct base_err *err)
+{
+    const struct ggn_dataset_view *v = &set->data.views[c->view];
+    struct ggn_seq_block b = {0};
+    uint32_t index = 0;
+    int rc = 0;
+
+    *usable = 0;
+    while (index < v->manifest.n_blocks && v->manifest.blocks[index].id != c->block)
+        index++;
+    if (index == v->manifest.n_blocks || !v->manifest.reference_spp || !v->manifest.reference_independent)
+        return 0;
+    rc = ggn_manifest_read_block(v->dir, &v->manifest, index, &b, err);
+    if (rc)
+        return rc;
+    const struct ggn_seq_record *full = full_level(&b);
+    if (full && b.reference) {
+        s->n_full = full->spp;
+        s->n_reference = b.reference->spp;
+        rc = ggn_seq_mean(&b, b.reference, s->base, err);
+        if (!rc)
+            rc = ggn_seq_half(&b, full, s->d, err);
+        if (!rc)
+            rc = ggn_seq_mean(&b, &b.levels[b.n_levels - 1], s->last, err);
+        *usable = !rc;
+    }
+    ggn_seq_block_release(&b);
+    return rc;
+}
+
+static int source_init(struct source *s, const struct ggn_chains *set, struct base_err *err)
+{
+    size_t values = ggn_chains_values(set);
+    float *memory = malloc(3 * values * sizeof *memory);
+
+    if (!memory)
+        return base_fail_nomem(err, "synthetic images");
+    *s = (struct source){.base = memory, .d = memory + values, .last = memory + 2 * values};
+    return 0;
+}
+
+int ggn_chains_add_synthetic(struct ggn_chains *set, int per_chain, uint32_t seed, struct base_err *err)
+{
+    struct source s = {0};
+    int rc = source_init(&s, set, err), real = set->n;
+
+    for (int i = 0; !rc && i < real; i++) {
+        int usable = 0;
+        if (set->chains[i].split != GGN_SPLIT_TRAIN)
+            continue;
+        rc = read_source(set, &set->chains[i], &s, &usable, err);
+        for (int k = 0; !rc && usable && k < per_chain; k++) {
+            struct ggn_chain *c = ggn_chains_append(set, err);
+            rc = c ? make_chain(set, &set->chains[i], c, &s, ggn_hash((uint32_t)(i * 64 + k), seed), err) : BASE_ENOMEM;
+        }
+    }
+    free(s.base);
+    return rc;
+}
+
+/* Room for `more` further levels; NaN statistics. */
+static int chain_grow(const struct ggn_chains *set, struct ggn_chain *c, int more, struct base_err *err)
+{
+    size_t n = (size_t)(c->n_levels + more);
+    void *noisy = realloc(c->noisy, n * ggn_chains_values(set));
+    double **const arrays[] = {&c->spp, &c->tail999, &c->gini};
+
+    if (!noisy)
+        return base_fail_nomem(err, "synthetic images");
+    c->noisy = noisy;
+    for (size_t k = 0; k < 3; k++) {
+        double *grown = realloc(*arrays[k], n * sizeof *grown);
+        if (!grown)
+            return base_fail_nomem(err, "synthetic images");
+        *arrays[k] = grown;
+        for (size_t i = (size_t)c->n_levels; i < n; i++)
+            grown[i] = (double)NAN;
+    }
+    return 0;
+}
+
+/* X_n = (n₀·X + m·Y_m)/n with m = n − n₀: the last recorded level X, continued with the first m samples of the reference, whose
+ * running mean Y_m is the same walk as above. */
+static int extend_chain(const struct ggn_chains *set, struct ggn_chain *c, const struct source *s, uint32_t seed, struct base_err *err)
+{
+    size_t values = ggn_chains_values(set);
+    const int first = c->n_levels;
+    const double n0 = c->spp[first - 1], ratio = set->ratio > 1.01 ? set->ratio : 1.15;
+    double spp[MAX_LEVELS];
+    int n = 0;
+
+    for (double next = floor(n0 * ratio + 0.5); n < MAX_LEVELS && next - n0 <= HIGHEST_SHARE * s->n_reference; n++) {
+        spp[n] = next;
+        next = floor(next * ratio + 0.5);
+    }
+    float *noise = calloc(values, sizeof *noise);
+    int rc = noise ? chain_grow(set, c, n, err) : base_fail_nomem(err, "synthetic images");
+    for (int k = n - 1; !rc && k >= 0; k--) {
+        double m = spp[k] - n0;
+        uint8_t *out = c->noisy + values * (size_t)(first + k);
+        step_down(s, values / 3, m, k + 1 < n ? spp[k + 1] - n0 : s->n_reference, ggn_hash((uint32_t)k, seed), noise);
+        for (size_t i = 0; i < values; i++)
+            out[i] = ggn_preprocess((n0 * (double)s->last[i] + m * (double)(s->base[i] + noise[i])) / spp[k], NULL, NULL);
+        c->spp[first + k] = spp[k];
+    }
+    free(noise);
+    if (!rc)
+        c->n_levels += n;
+    return rc;
+}
+
+int ggn_chains_extend(struct ggn_chains *set, uint32_t seed, struct base_err *err)
+{
+    struct source s = {0};
+    int rc = source_init(&s, set, err);
+
+    for (int i = 0; !rc && i < set->n; i++) {
+        struct ggn_chain *c = &set->chains[i];
+        int usable = 0;
+        double last = c->n_levels ? c->spp[c->n_levels - 1] : 0;
+        /* not where a clean end is recorded already, nor where nothing is known beyond it */
+        if (c->synthetic || !c->has_label || c->label.threshold < CLEAN_END * last || (c->label.censored && c->label.threshold <= last))
+            continue;
+        rc = read_source(set, c, &s, &usable, err);
+        if (!rc && usable)
+            rc = extend_chain(set, c, &s, ggn_hash((uint32_t)i, seed + 1), err);
+    }
+    free(s.base);
+    return rc;
+}

@@ -1,0 +1,236 @@
+#include "data/windows.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "data/image.h"
+#include "nn/weights.h"
+
+void ggn_windows_release(struct ggn_windows *w)
+{
+    free(w->list);
+    free(w->first);
+    *w = (struct ggn_windows){0};
+}
+
+/* Whether the window that ends at `last` has a label, and which. */
+static int label_window(const struct ggn_chain *c, int chain, int last, const struct ggn_window_options *o, struct ggn_window *out)
+{
+    double spp = c->spp[o->label_first ? last - o->length + 1 : last];
+    int noisy = c->has_label ? ggn_label_noisy(&c->label, spp) : -1;
+
+    if (noisy < 0)
+        return 0;
+    *out = (struct ggn_window){.chain = chain, .last = last, .noisy = noisy, .octave = log2(spp / c->label.threshold)};
+    double p = o->soft && c->spread > 0 ? ggn_label_p_noisy(&c->label, spp, c->spread) : (double)NAN;
+    out->label = p >= 0 && p <= 1 ? p : noisy;
+    return 1;
+}
+
+int ggn_windows_create(struct ggn_windows *w, const struct ggn_chains *set, const struct ggn_window_options *o, struct base_err *err)
+{
+    size_t room = 1;
+
+    *w = (struct ggn_windows){.set = set, .length = o->length};
+    for (int i = 0; i < set->n; i++)
+        room += (size_t)set->chains[i].n_levels;
+    w->list = malloc(room * sizeof *w->list);
+    w->first = malloc(((size_t)set->n + 1) * sizeof *w->first);
+    if (!w->list || !w->first) {
+        ggn_windows_release(w);
+        return base_fail_nomem(err, "windows");
+    }
+    for (int i = 0; i < set->n; i++) {
+        const struct ggn_chain *c = &set->chains[i];
+        w->first[i] = w->n;
+        if (c->split != o->split || (c->synthetic && !o->synthetic))
+            continue;
+        for (int last = o->length - 1; last < c->n_levels; last++)
+            w->n += label_window(c, i, last, o, &w->list[w->n]);
+    }
+    w->first[set->n] = w->n;
+    return 0;
+}
+
+static double draw(uint32_t what, uint64_t step, int i, uint32_t seed)
+{
+    return ggn_hash_unit(what, ggn_hash((uint32_t)i, ggn_hash((uint32_t)(step >> 32), ggn_hash((uint32_t)step, seed))));
+}
+
+static int below(double unit, int n)
+{
+    int k = (int)(unit * n);
+
+    return k < n ? k : n - 1;
+}
+
+/* The k-th of the scenes (or, within `scene`, of the chains) that have windows; their number when k < 0. */
+static int nth_scene(const struct ggn_windows *w, int k)
+{
+    int n = 0;
+
+    for (int s = 0; s < w->set->n_scenes; s++)
+        for (int i = 0; i < w->set->n; i++)
+            if (w->set->chains[i].scene == s && w->first[i + 1] > w->first[i]) {
+                if (n++ == k)
+                    return s;
+                break;
+            }
+    return n;
+}
+
+static int nth_chain(const struct ggn_windows *w, int scene, int k)
+{
+    int n = 0;
+
+    for (int i = 0; i < w->set->n; i++)
+        if (w->set->chains[i].scene == scene && w->first[i + 1] > w->first[i] && n++ == k)
+            return i;
+    return n;
+}
+
+/* Octaves over which the chance of a window falls by e with its distance from the threshold. */
+static const double NEAR = 1.5;
+
+int ggn_windows_draw(const struct ggn_windows *w, uint64_t step, int i, uint32_t seed)
+{
+    int scene = nth_scene(w, below(draw(1, step, i, seed), nth_scene(w, -1)));
+    int chain = nth_chain(w, scene, below(draw(2, step, i, seed), nth_chain(w, scene, -1)));
+    const struct ggn_window *list = w->list + w->first[chain];
+    int n = w->first[chain + 1] - w->first[chain], any[2] = {0, 0};
+
+    for (int k = 0; k < n; k++)
+        any[list[k].noisy]++;
+    int wanted = any[0] && any[1] ? draw(3, step, i, seed) < 0.5 : any[1] > 0;
+    double total = 0;
+    for (int k = 0; k < n; k++)
+        total += list[k].noisy == wanted ? exp(-fabs(list[k].octave) / NEAR) : 0;
+    double target = draw(4, step, i, seed) * total, sum = 0;
+    int chosen = 0;
+    for (int k = 0; k < n; k++) {
+        if (list[k].noisy != wanted)
+            continue;
+        chosen = k;
+        sum += exp(-fabs(list[k].octave) / NEAR);
+        if (sum > target)
+            break;
+    }
+    return w->first[chain] + chosen;
+}
+
+/* --- pixels -------------------------------------------------------------------------------------------------------------- */
+
+struct ggn_augment ggn_augment_none(void)
+{
+    return (struct ggn_augment){.gain = {1, 1, 1}};
+}
+
+struct ggn_augment ggn_augment_draw(uint64_t step, int i, uint32_t seed, int square, double jitter)
+{
+    struct ggn_augment a = {.flip_x = draw(11, step, i, seed) < 0.5,
+                            .flip_y = draw(12, step, i, seed) < 0.5,
+                            .transpose = square && draw(13, step, i, seed) < 0.5};
+    double exposure = jitter * (draw(14, step, i, seed) - 0.5);
+
+    for (uint32_t c = 0; c < 3; c++)
+        a.gain[c] = (float)exp2(exposure + 0.25 * jitter * (draw(15 + c, step, i, seed) - 0.5));
+    return a;
+}
+
+/* Display value (0..1) of each 8-bit code after the gain. */
+static void gain_table(float gain, float table[256])
+{
+    for (int i = 0; i < 256; i++)
+        table[i] = gain == 1 ? (float)i / 255
+                             : (float)ggn_srgb_oetf(fmin((double)gain * ggn_srgb_eotf(i / 255.0), 1));
+}
+
+/* Where the pixel of row y of the result comes from: src[start + x · step]. */
+struct row_map {
+    ptrdiff_t start, step;
+};
+
+static struct row_map map_row(const struct ggn_augment *a, int width, int height, int y)
+{
+    struct row_map m;
+
+    if (a->transpose) {
+        int column = a->flip_x ? width - 1 - y : y;
+        m.step = a->flip_y ? -width : width;
+        m.start = column + (a->flip_y ? (ptrdiff_t)(height - 1) * width : 0);
+    } else {
+        int row = a->flip_y ? height - 1 - y : y;
+        m.step = a->flip_x ? -1 : 1;
+        m.start = (ptrdiff_t)row * width + (a->flip_x ? width - 1 : 0);
+    }
+    return m;
+}
+
+static void plane_u8(const uint8_t *src, int width, int height, const struct ggn_augment *a, const float table[256], float *out)
+{
+    for (int y = 0; y < height; y++) {
+        struct row_map m = map_row(a, width, height, y);
+        for (int x = 0; x < width; x++)
+            out[(ptrdiff_t)y * width + x] = table[src[m.start + x * m.step]];
+    }
+}
+
+/* A denoised value between two codes is interpolated between what the gain makes of them. */
+static void plane_u16(const uint16_t *src, int width, int height, const struct ggn_augment *a, const float table[256], float *out)
+{
+    for (int y = 0; y < height; y++) {
+        struct row_map m = map_row(a, width, height, y);
+        for (int x = 0; x < width; x++) {
+            float v = (float)src[m.start + x * m.step] * (1 / 257.0F);
+            int code = v < 254 ? (int)v : 254;
+            out[(ptrdiff_t)y * width + x] = table[code] + (v - (float)code) * (table[code + 1] - table[code]);
+        }
+    }
+}
+
+void ggn_window_planes(const struct ggn_chain *chain, int last, int length, int width, int height, int denoised,
+                       const struct ggn_augment *augment, float difference, float *planes)
+{
+    const size_t pixels = (size_t)width * (size_t)height;
+    float table[3][256];
+
+    for (int c = 0; c < 3; c++)
+        gain_table(augment->gain[c], table[c]);
+    for (int k = 0; k < length; k++)
+        for (size_t c = 0; c < 3; c++) {
+            size_t at = (3 * (size_t)(last - length + 1 + k) + c) * pixels;
+            float *out = planes + (3 * (size_t)k + c) * pixels;
+            if (denoised)
+                plane_u16(chain->denoised + at, width, height, augment, table[c], out);
+            else
+                plane_u8(chain->noisy + at, width, height, augment, table[c], out);
+        }
+    const float *newest = planes + 3 * (size_t)(length - 1) * pixels;
+    for (int k = 0; k < length - 1 && difference > 0; k++) {
+        float *image = planes + 3 * (size_t)k * pixels;
+        for (size_t i = 0; i < 3 * pixels; i++)
+            image[i] = difference * (image[i] - newest[i]);
+    }
+}
+
+void ggn_crop_planes(const struct ggn_chain *chain, int level, int width, int height, int x0, int y0, int crop_w, int crop_h,
+                     const struct ggn_augment *augment, float *noisy, float *reference)
+{
+    const size_t pixels = (size_t)width * (size_t)height;
+    float table[256];
+
+    for (size_t c = 0; c < 3; c++) {
+        const uint8_t *x = chain->noisy + (3 * (size_t)level + c) * pixels, *y = chain->reference + c * pixels;
+        gain_table(augment->gain[c], table);
+        for (int r = 0; r < crop_h; r++)
+            for (int s = 0; s < crop_w; s++) {
+                int u = augment->transpose ? r : s, v = augment->transpose ? s : r;
+                size_t at = (size_t)(y0 + (augment->flip_y ? crop_h - 1 - v : v)) * (size_t)width +
+                            (size_t)(x0 + (augment->flip_x ? crop_w - 1 - u : u));
+                size_t to = (c * (size_t)crop_h + (size_t)r) * (size_t)crop_w + (size_t)s;
+                noisy[to] = table[x[at]];
+                reference[to] = table[y[at]];
+            }
+    }
+}

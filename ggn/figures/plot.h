@@ -1,0 +1,30 @@
+/*
+ * Pictures through gnuplot: the caller writes a gnuplot script, data included, to plot->script; `end` runs gnuplot on it.
+ *
+ * The script starts with the terminal (pngcairo), output and house style set. The picture appears under its name only when
+ * gnuplot succeeded. One thread per plot.
+ */
+#ifndef GGN_FIGURES_PLOT_H
+#define GGN_FIGURES_PLOT_H
+
+#include <stdio.h>
+
+#include "base/err.h"
+#include "data/image.h"
+
+struct ggn_plot {
+    FILE *script; /* write here between begin and end */
+    char path[4096], tmp_picture[4128], tmp_script[4160];
+};
+
+/* path ends in .png; width, height in pixels. On failure nothing is left behind. */
+int ggn_plot_begin(struct ggn_plot *plot, const char *path, int width, int height, struct base_err *err);
+/* Closes the script and, when run != 0, draws it. Always removes the temporaries. BASE_EIO: gnuplot is missing or refused. */
+int ggn_plot_end(struct ggn_plot *plot, int run, struct base_err *err);
+
+/* Writes text as a single-quoted gnuplot string without enhanced-text surprises (quotes doubled, underscores kept). */
+void ggn_plot_quote(FILE *script, const char *text);
+/* Sets the palette to GGN_VIRIDIS or GGN_MAGMA of data/image.h. */
+void ggn_plot_palette(FILE *script, enum ggn_colormap map);
+
+#endif

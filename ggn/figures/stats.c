@@ -1,0 +1,216 @@
+#include "figures/stats.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+double ggn_stats_mean(const double *x, size_t n)
+{
+    double sum = 0.0;
+    for (size_t i = 0; i < n; i++)
+        sum += x[i];
+    return n > 0 ? sum / (double)n : (double)NAN;
+}
+
+static int compare_doubles(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+double ggn_stats_quantile(double *x, size_t n, double q)
+{
+    if (n == 0)
+        return (double)NAN;
+    qsort(x, n, sizeof *x, compare_doubles);
+    double at = q * (double)(n - 1);
+    size_t i = (size_t)at;
+    if (i + 1 >= n)
+        return x[n - 1];
+    return x[i] + (at - (double)i) * (x[i + 1] - x[i]);
+}
+
+double ggn_stats_pearson(const double *x, const double *y, size_t n)
+{
+    double mx = ggn_stats_mean(x, n), my = ggn_stats_mean(y, n), xy = 0.0, xx = 0.0, yy = 0.0;
+    for (size_t i = 0; i < n; i++) {
+        xy += (x[i] - mx) * (y[i] - my);
+        xx += (x[i] - mx) * (x[i] - mx);
+        yy += (y[i] - my) * (y[i] - my);
+    }
+    return xx > 0.0 && yy > 0.0 ? xy / sqrt(xx * yy) : (double)NAN;
+}
+
+struct keyed {
+    double key;
+    size_t index;
+};
+
+static int compare_keyed(const void *a, const void *b)
+{
+    const struct keyed *x = a, *y = b;
+    if (x->key != y->key)
+        return x->key > y->key ? 1 : -1;
+    return (x->index > y->index) - (x->index < y->index);
+}
+
+static struct keyed *sorted(const double *x, size_t n)
+{
+    struct keyed *k = malloc((n > 0 ? n : 1) * sizeof *k);
+    if (k == NULL)
+        return NULL;
+    for (size_t i = 0; i < n; i++)
+        k[i] = (struct keyed){x[i], i};
+    qsort(k, n, sizeof *k, compare_keyed);
+    return k;
+}
+
+/* rank[i] in 1..n; equal values share the mean of their ranks. */
+static int ranks(const double *x, size_t n, double *rank, struct base_err *err)
+{
+    struct keyed *k = sorted(x, n);
+    if (k == NULL)
+        return base_fail_nomem(err, "ranks");
+    for (size_t i = 0, j; i < n; i = j) {
+        for (j = i + 1; j < n && k[j].key == k[i].key;)
+            j++;
+        for (size_t m = i; m < j; m++)
+            rank[k[m].index] = 0.5 * (double)(i + j + 1);
+    }
+    free(k);
+    return 0;
+}
+
+int ggn_stats_spearman(const double *x, const double *y, size_t n, double *rho, struct base_err *err)
+{
+    double *r = malloc((n > 0 ? 2 * n : 1) * sizeof *r);
+    if (r == NULL)
+        return base_fail_nomem(err, "ranks");
+    int rc = ranks(x, n, r, err);
+    if (!rc)
+        rc = ranks(y, n, r + n, err);
+    if (!rc)
+        *rho = ggn_stats_pearson(r, r + n, n);
+    free(r);
+    return rc;
+}
+
+void ggn_stats_line(const double *x, const double *y, size_t n, double *a, double *b)
+{
+    double mx = ggn_stats_mean(x, n), my = ggn_stats_mean(y, n), xy = 0.0, xx = 0.0;
+    for (size_t i = 0; i < n; i++) {
+        xy += (x[i] - mx) * (y[i] - my);
+        xx += (x[i] - mx) * (x[i] - mx);
+    }
+    *b = xx > 0.0 ? xy / xx : (double)NAN;
+    *a = my - *b * mx;
+}
+
+int ggn_stats_auc(const double *score, const unsigned char *label, size_t n, double *auc, struct base_err *err)
+{
+    double *rank = malloc((n > 0 ? n : 1) * sizeof *rank), sum = 0.0;
+    size_t positive = 0;
+    if (rank == NULL)
+        return base_fail_nomem(err, "ranks");
+    int rc = ranks(score, n, rank, err);
+    for (size_t i = 0; i < n && !rc; i++)
+        if (label[i]) {
+            sum += rank[i];
+            positive++;
+        }
+    free(rank);
+    if (rc)
+        return rc;
+    double p = (double)positive, q = (double)(n - positive);
+    *auc = p > 0.0 && q > 0.0 ? (sum - 0.5 * p * (p + 1.0)) / (p * q) : (double)NAN;
+    return 0;
+}
+
+int ggn_stats_best_cut(const double *score, const unsigned char *label, size_t n, double *cut, double *accuracy, struct base_err *err)
+{
+    struct keyed *k = sorted(score, n);
+    if (k == NULL)
+        return base_fail_nomem(err, "cut");
+    size_t right = 0, best;
+    for (size_t i = 0; i < n; i++)
+        right += label[i] != 0; /* the cut below all scores: everything is called 1 */
+    best = right;
+    double at = n > 0 ? k[0].key : (double)NAN;
+    for (size_t i = 0, j; i < n; i = j) {
+        for (j = i; j < n && k[j].key == k[i].key; j++) {
+            if (label[k[j].index])
+                right--;
+            else
+                right++;
+        }
+        if (right > best) {
+            best = right;
+            at = j < n ? 0.5 * (k[i].key + k[j].key) : nextafter(k[i].key, INFINITY);
+        }
+    }
+    free(k);
+    *cut = at;
+    *accuracy = n > 0 ? (double)best / (double)n : (double)NAN;
+    return 0;
+}
+
+static void log_figures(const double *truth, const double *predicted, size_t n, double *scratch, struct ggn_agreement *a)
+{
+    size_t half = 0, one = 0;
+    for (size_t i = 0; i < n; i++) {
+        scratch[i] = log2(predicted[i] / truth[i]);
+        half += fabs(scratch[i]) <= 0.5;
+        one += fabs(scratch[i]) <= 1.0;
+    }
+    a->within_half = (double)half / (double)n;
+    a->within_one = (double)one / (double)n;
+    a->median_log2 = ggn_stats_quantile(scratch, n, 0.5);
+    a->iqr_log2 = ggn_stats_quantile(scratch, n, 0.75) - ggn_stats_quantile(scratch, n, 0.25);
+    for (size_t i = 0; i < n; i++)
+        scratch[i] = fabs(scratch[i]);
+    a->median_abs_log2 = ggn_stats_quantile(scratch, n, 0.5);
+}
+
+int ggn_stats_agreement(const double *truth, const double *predicted, size_t n, double cap, struct ggn_agreement *out,
+                        struct base_err *err)
+{
+    struct ggn_agreement a = {.blocks = n};
+    if (n == 0)
+        return base_fail(err, BASE_EINVAL, "no blocks to compare");
+    double *t = malloc(2 * n * sizeof *t);
+    if (t == NULL)
+        return base_fail_nomem(err, "statistics");
+    double *p = t + n, sum_t = 0.0, sum_p = 0.0, absolute = 0.0, square = 0.0, absolute_below = 0.0;
+    size_t below = 0, early = 0;
+    for (size_t i = 0; i < n; i++) {
+        double d = predicted[i] - truth[i];
+        absolute += fabs(d);
+        square += d * d;
+        below += d < 0.0;
+        early += predicted[i] < 0.8 * truth[i];
+        sum_t += truth[i];
+        sum_p += predicted[i];
+        if (truth[i] < cap) {
+            absolute_below += fabs(d);
+            t[a.below_cap] = truth[i];
+            p[a.below_cap++] = predicted[i];
+        }
+    }
+    a.mae = absolute / (double)n;
+    a.mae_below_cap = a.below_cap > 0 ? absolute_below / (double)a.below_cap : (double)NAN;
+    a.rmse = sqrt(square / (double)n);
+    a.share_below = (double)below / (double)n;
+    a.early_stop_rate = (double)early / (double)n;
+    a.samples_ratio = sum_p / sum_t;
+    a.pearson_r = ggn_stats_pearson(truth, predicted, n);
+    a.pearson_r_below_cap = ggn_stats_pearson(t, p, a.below_cap);
+    int rc = ggn_stats_spearman(t, p, a.below_cap, &a.spearman_below_cap, err);
+    if (!rc)
+        rc = ggn_stats_spearman(truth, predicted, n, &a.spearman, err);
+    if (!rc) {
+        log_figures(truth, predicted, n, t, &a);
+        *out = a;
+    }
+    free(t);
+    return rc;
+}

@@ -1,0 +1,229 @@
+#include "pbrt/build.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "geom/accel.h"
+#include "shade/camera.h"
+#include "shade/light.h"
+#include "shade/material.h"
+#include "shade/medium.h"
+
+int pt_builder_init(struct pt_builder *b, struct pt_scene *scene, struct pt_scene_defaults *defaults,
+                    const struct pt_load_options *options, const struct pt_source *source, struct base_err *err)
+{
+    *b = (struct pt_builder){.scene = scene, .defaults = defaults, .options = options, .source = source};
+    b->diag = (struct pt_diag){.err = err, .strict = options->strict, .warn = options->warn, .warn_data = options->warn_data};
+    b->camera_medium = b->open_object = b->default_material = -1;
+    b->transform_times[1] = b->shutter[1] = 1;
+    b->camera_ctm[0] = b->camera_ctm[1] = pt_xform_identity();
+    b->images.size = sizeof(struct pt_image_map);
+    b->textures.size = sizeof(struct pt_texture);
+    b->materials.size = sizeof(struct pt_material);
+    b->material_infos.size = sizeof(struct pt_material_info);
+    b->meshes.size = sizeof(struct pt_mesh);
+    b->quadrics.size = sizeof(struct pt_quadric);
+    b->world_shapes.size = b->object_shapes.size = sizeof(struct pt_shape);
+    b->objects.size = sizeof(struct pt_object);
+    b->instances.size = sizeof(struct pt_instance);
+    b->lights.size = sizeof(struct pt_light);
+    b->media.size = sizeof(struct pt_medium);
+    b->medium_infos.size = sizeof(struct pt_medium_info);
+    return 0;
+}
+
+void pt_builder_release(struct pt_builder *b)
+{
+    struct pt_list *lists[] = {&b->images,  &b->textures,      &b->materials,     &b->material_infos, &b->meshes,
+                               &b->quadrics, &b->world_shapes, &b->object_shapes, &b->objects,        &b->instances,
+                               &b->lights,  &b->media,         &b->medium_infos};
+    struct pt_names *names[] = {&b->float_textures, &b->colour_textures, &b->named_materials,
+                                &b->media_names,    &b->object_names,    &b->image_names};
+    for (size_t i = 0; i < sizeof lists / sizeof lists[0]; i++)
+        free(lists[i]->items);
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++)
+        pt_names_release(names[i]);
+    for (int i = 0; i < PT_HEADER_COUNT; i++)
+        pt_params_release(&b->header[i]);
+    free(b->object_offsets);
+    pt_diag_release(&b->diag);
+}
+
+int32_t pt_list_add(struct pt_builder *b, struct pt_list *list, const void *item)
+{
+    if (list->count >= INT32_MAX || !pt_grow(&list->items, &list->room, list->count, list->size)) {
+        pt_diag_nomem(&b->diag, "the scene");
+        return -1;
+    }
+    memcpy((char *)list->items + list->count * list->size, item, list->size);
+    return (int32_t)list->count++;
+}
+
+void *pt_builder_keep(struct pt_builder *b, const void *data, size_t count, size_t size)
+{
+    void *copy = pt_arena_alloc(&b->scene->arena, count, size);
+    if (copy == NULL)
+        pt_diag_nomem(&b->diag, "the scene");
+    else
+        memcpy(copy, data, count * size);
+    return copy;
+}
+
+void pt_builder_path(struct pt_builder *b, const char *name, char *path, size_t room)
+{
+    snprintf(path, room, "%s%s", name[0] == '/' ? "" : b->directory, name);
+}
+
+void pt_builder_effect(struct pt_builder *b, pt_effects bits, struct pt_loc loc)
+{
+    for (int i = 0; i < PT_FX_COUNT; i++) {
+        struct pt_effect_reason *r = &b->scene->effect_reasons[i];
+        if ((bits >> i & 1u) == 0 || r->line > 0)
+            continue;
+        r->on = 1;
+        r->line = loc.line;
+        snprintf(r->file, sizeof r->file, "%s", loc.file != NULL ? loc.file : "");
+    }
+    b->scene->effects |= bits;
+}
+
+void pt_builder_at_shutter(const struct pt_builder *b, const struct pt_xform ctm[2], struct pt_xform out[2])
+{
+    double t0 = b->transform_times[0], length = b->transform_times[1] - t0;
+    for (int i = 0; i < 2; i++) {
+        double s = length > 0 ? (b->shutter[i] - t0) / length : 0;
+        s = fmin(fmax(s, 0), 1);
+        if (pt_xform_equal(&ctm[0], &ctm[1]) || s <= 0)
+            out[i] = ctm[0];
+        else if (s >= 1)
+            out[i] = ctm[1];
+        else
+            out[i] = pt_xform_interpolate(&ctm[0], &ctm[1], s);
+    }
+}
+
+struct pt_xform pt_builder_to_render(const struct pt_builder *b, const struct pt_xform *world)
+{
+    struct pt_xform r = *world;
+    for (int i = 0; i < 3; i++)
+        r.m[i][3] -= b->origin[i];
+    return r;
+}
+
+/* --- finishing -------------------------------------------------------------------------------------------------------- */
+
+/* Array of a list in the arena; leaves NULL for empty lists. */
+static void *move(struct pt_builder *b, struct pt_list *list, int32_t *count)
+{
+    *count = (int32_t)list->count;
+    void *kept = list->count > 0 ? pt_builder_keep(b, list->items, list->count, list->size) : NULL;
+    free(list->items);
+    *list = (struct pt_list){.size = list->size};
+    return kept;
+}
+
+static void move_shapes(struct pt_builder *b)
+{
+    struct pt_scene *scene = b->scene;
+    size_t world = b->world_shapes.count, objects = b->object_shapes.count;
+    scene->world_shape_count = (int32_t)world;
+    scene->shape_count = (int32_t)(world + objects);
+    if (world + objects == 0)
+        return;
+    scene->shapes = pt_arena_alloc(&scene->arena, world + objects, sizeof *scene->shapes);
+    if (scene->shapes == NULL) {
+        pt_diag_nomem(&b->diag, "shapes");
+        return;
+    }
+    if (world > 0)
+        memcpy(scene->shapes, b->world_shapes.items, world * sizeof *scene->shapes);
+    if (objects > 0)
+        memcpy(scene->shapes + world, b->object_shapes.items, objects * sizeof *scene->shapes);
+    for (int32_t i = 0; i < scene->object_count; i++)
+        scene->objects[i].first_shape += (int32_t)world;
+}
+
+static void add_medium_effects(struct pt_builder *b, int32_t id)
+{
+    if (id < 0)
+        return;
+    const struct pt_medium *m = &b->scene->media[id];
+    struct pt_loc loc = ((struct pt_medium_info *)b->medium_infos.items)[id].defined;
+    if (!v3_is_black(m->sigma_a) || !v3_is_black(m->emission))
+        pt_builder_effect(b, PT_FX_ABSORPTION, loc);
+    if (!v3_is_black(m->sigma_s))
+        pt_builder_effect(b, PT_FX_SCATTERING, loc);
+    if (m->kind == PT_MEDIUM_GRID)
+        pt_builder_effect(b, PT_FX_GRID_MEDIUM, loc);
+}
+
+/* What the shapes in use ask for: materials and media nobody uses ask for nothing. */
+static void add_shape_effects(struct pt_builder *b)
+{
+    const struct pt_scene *scene = b->scene;
+    struct pt_material_info *infos = b->material_infos.items;
+    for (int32_t i = 0; i < scene->shape_count; i++) {
+        const struct pt_shape *s = &scene->shapes[i];
+        struct pt_material_info *info = &infos[s->material];
+        if (!info->used)
+            pt_builder_effect(b, pt_material_effects(scene, s->material), info->loc);
+        info->used = 1;
+        if (s->medium_in != s->medium_out) {
+            add_medium_effects(b, s->medium_in);
+            add_medium_effects(b, s->medium_out);
+        }
+    }
+    add_medium_effects(b, scene->camera.medium);
+}
+
+static void add_stats(struct pt_scene *scene)
+{
+    struct pt_scene_stats *stats = &scene->stats;
+    for (int32_t i = 0; i < scene->mesh_count; i++)
+        stats->triangles += scene->meshes[i].triangle_count;
+    stats->quadrics = scene->quadric_count;
+    stats->instances = scene->instance_count;
+    stats->lights = scene->light_count;
+    stats->materials = scene->material_count;
+    stats->textures = scene->texture_count;
+    stats->bytes = (long long)scene->arena.bytes + pt_accel_bytes(scene);
+}
+
+int pt_builder_finish(struct pt_builder *b)
+{
+    struct pt_scene *scene = b->scene;
+    struct base_err *err = b->diag.err;
+    scene->images = move(b, &b->images, &scene->image_count);
+    scene->textures = move(b, &b->textures, &scene->texture_count);
+    scene->materials = move(b, &b->materials, &scene->material_count);
+    scene->meshes = move(b, &b->meshes, &scene->mesh_count);
+    scene->quadrics = move(b, &b->quadrics, &scene->quadric_count);
+    scene->objects = move(b, &b->objects, &scene->object_count);
+    scene->instances = move(b, &b->instances, &scene->instance_count);
+    scene->lights = move(b, &b->lights, &scene->light_count);
+    scene->media = move(b, &b->media, &scene->medium_count);
+    move_shapes(b);
+    int rc = b->diag.rc;
+    if (!rc)
+        rc = pt_materials_build(scene, err);
+    if (!rc)
+        rc = pt_media_build(scene, err);
+    if (rc)
+        return rc;
+    add_shape_effects(b);
+    scene->effects |= b->options->forced;
+    for (int i = 0; i < PT_FX_COUNT; i++)
+        scene->effect_reasons[i].on = scene->effects >> i & 1;
+    pt_camera_init(&scene->camera);
+    double start_s = base_clock_wall_s();
+    rc = pt_accel_build(scene, err);
+    scene->stats.accel_s = base_clock_wall_s() - start_s;
+    if (!rc)
+        rc = pt_lights_build(scene, err);
+    if (!rc)
+        add_stats(scene);
+    return rc;
+}

@@ -1,0 +1,183 @@
+/*
+ * From descriptions (a directive's kind, parameters, transform and graphics state) to the renderable, piece by piece while
+ * the text is read: nothing large is kept twice.
+ *
+ * Everything is private to pathtracer/scene. A pt_builder fails through its diag; functions return its code or go on with
+ * defaults until the directive ends. Not thread-safe.
+ */
+#ifndef PT_PBRT_BUILD_H
+#define PT_PBRT_BUILD_H
+
+#include "pbrt/diag.h"
+#include "pbrt/names.h"
+#include "pbrt/params.h"
+#include "scene/scene.h"
+#include "pbrt/source.h"
+#include "pbrt/xform.h"
+
+/* Growing array; items owned. */
+struct pt_list {
+    void *items;
+    size_t count, room, size;
+};
+
+/* What an AreaLightSource asks for, until shapes carry it. */
+struct pt_area_light {
+    int on, two_sided;
+    pt_vec3 emission;
+    double power;        /* lumens over the whole shape; <= 0: emission stands as it is */
+    struct pt_loc loc;
+};
+
+enum pt_attribute { PT_ATTR_SHAPE, PT_ATTR_LIGHT, PT_ATTR_MATERIAL, PT_ATTR_MEDIUM, PT_ATTR_TEXTURE, PT_ATTR_COUNT };
+
+/* The graphics state of pbrt. */
+struct pt_state {
+    struct pt_xform ctm[2];      /* at the start and end time */
+    unsigned active;             /* bit 0: start, bit 1: end */
+    int32_t material;
+    struct pt_area_light area;
+    int reverse_orientation;
+    int32_t medium_in, medium_out;
+    int colour_space;            /* enum pt_colour_space */
+    const struct pt_params *attributes[PT_ATTR_COUNT]; /* borrows, NULL = none */
+};
+
+/* Header directives, kept until WorldBegin. */
+enum pt_header { PT_HEADER_FILM, PT_HEADER_CAMERA, PT_HEADER_SAMPLER, PT_HEADER_INTEGRATOR, PT_HEADER_FILTER, PT_HEADER_COUNT };
+
+struct pt_material_info {
+    struct pt_loc loc;
+    int has_opacity;             /* of v3's uber: becomes the alpha of shapes */
+    struct pt_input opacity;
+    int used;
+};
+struct pt_medium_info {
+    struct pt_loc defined, first_use; /* line 0: not yet */
+    const char *name;                 /* in the scene's arena */
+};
+
+struct pt_builder {
+    struct pt_scene *scene;                  /* being made; its arena is in use from the start */
+    struct pt_scene_defaults *defaults;
+    const struct pt_load_options *options;
+    const struct pt_source *source;
+    struct pt_diag diag;
+    char directory[1024];                    /* of the main file, "" or ending in '/' */
+    int is_v3;                               /* Film "image": v3 meanings of defaults and lights */
+
+    struct pt_params header[PT_HEADER_COUNT]; /* kind "" = not given */
+    struct pt_xform camera_ctm[2];
+    int32_t camera_medium;
+    double transform_times[2], shutter[2];
+    double origin[3];                        /* of render space, in the world */
+
+    struct pt_list images, textures, materials, material_infos, meshes, quadrics, world_shapes, object_shapes, objects,
+        instances, lights, media, medium_infos;
+    struct pt_names float_textures, colour_textures, named_materials, media_names, object_names, image_names;
+
+    int32_t open_object;                     /* between ObjectBegin and ObjectEnd, else -1 */
+    double (*object_offsets)[3];             /* owns: origin of each object's space in the space it was defined in */
+    size_t object_offset_room;
+    int32_t default_material;                /* grey diffuse, made on first use; -1 before */
+    int32_t mix_depth;
+};
+
+int pt_builder_init(struct pt_builder *b, struct pt_scene *scene, struct pt_scene_defaults *defaults,
+                    const struct pt_load_options *options, const struct pt_source *source, struct base_err *err);
+void pt_builder_release(struct pt_builder *b);
+/* Moves the arrays into the scene's arena and derives everything: effects, camera, acceleration structure, lights. */
+int pt_builder_finish(struct pt_builder *b);
+
+/* Appends a copy of *item; index, or -1 (the diag has failed). */
+int32_t pt_list_add(struct pt_builder *b, struct pt_list *list, const void *item);
+/* Copies into the scene's arena; NULL only after a failure. */
+void *pt_builder_keep(struct pt_builder *b, const void *data, size_t count, size_t size);
+/* Joins a scene-relative file name to the main file's folder. */
+void pt_builder_path(struct pt_builder *b, const char *name, char *path, size_t room);
+/* Turns on an effect; the first caller's place is the reason. */
+void pt_builder_effect(struct pt_builder *b, pt_effects bits, struct pt_loc loc);
+/* Transforms at shutter open and close. */
+void pt_builder_at_shutter(const struct pt_builder *b, const struct pt_xform ctm[2], struct pt_xform out[2]);
+/* World → render. */
+struct pt_xform pt_builder_to_render(const struct pt_builder *b, const struct pt_xform *world);
+
+/* build_image.c: film, filter, sampler, integrator, camera; at WorldBegin. */
+int pt_build_header(struct pt_builder *b);
+
+/* build_colour.c */
+enum pt_colour_use { PT_USE_REFLECTANCE, PT_USE_UNBOUNDED, PT_USE_LIGHT };
+/* Colour parameter: 1 when given, 0 and *out untouched when not. LIGHT follows pbrt-v4 (spectra other than rgb have
+ * luminance 1) or v3 (absolute). */
+int pt_build_colour(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const char *name,
+                    enum pt_colour_use use, pt_vec3 *out);
+/* eta and k of a conductor, each by rgb, name, list or file; what is not given is copper. */
+void pt_build_conductor(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const char *eta_name,
+                        const char *k_name, pt_vec3 *eta_rgb, pt_vec3 *k_rgb);
+/* Index of refraction of a dielectric: float, spectrum, or a glass's name. */
+double pt_build_index(struct pt_builder *b, struct pt_params *p, const char *name, double fallback);
+
+/* build_texture.c */
+int pt_build_texture(struct pt_builder *b, const struct pt_state *s, const char *name, const char *class_name, struct pt_params *p);
+/* Float or colour parameter that may be textured; the fallback when absent. */
+struct pt_input pt_build_float_input(struct pt_builder *b, struct pt_params *p, const char *name, double fallback);
+struct pt_input pt_build_colour_input(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const char *name,
+                                      enum pt_colour_use use, pt_vec3 fallback);
+struct pt_input pt_input_constant(double r, double g, double b);
+/* Image map by file name; encoding: NULL = by file kind, "sRGB", "linear", "gamma X". -1 on failure. */
+int32_t pt_build_image_map(struct pt_builder *b, struct pt_loc loc, const char *name, const char *encoding);
+/* A colour image as texture (normal maps). */
+int32_t pt_build_image_texture(struct pt_builder *b, struct pt_loc loc, const char *name, const char *encoding);
+/* Product of two inputs; constants fold. */
+struct pt_input pt_input_product(struct pt_builder *b, struct pt_input x, struct pt_input y);
+
+/* build_material.c, build_material_v3.c: id, or -1. */
+int32_t pt_build_material(struct pt_builder *b, const struct pt_state *s, const char *kind, struct pt_params *p);
+int32_t pt_build_default_material(struct pt_builder *b);
+/* v3 kinds; 0 when `kind` is none of them. */
+int pt_build_material_v3(struct pt_builder *b, const struct pt_state *s, const char *kind, struct pt_params *p,
+                         struct pt_material *m, struct pt_material_info *info);
+struct pt_material pt_material_blank(int32_t kind);
+void pt_build_roughness(struct pt_builder *b, struct pt_params *p, double fallback, int v3_rule, struct pt_material *m);
+int32_t pt_build_bump(struct pt_builder *b, struct pt_params *p, const char *name);
+/* Material by the name that string i of a parameter gives; -1 after a failure. */
+int32_t pt_build_material_named(struct pt_builder *b, struct pt_loc loc, const char *name);
+
+/* build_light.c */
+int pt_build_light(struct pt_builder *b, const struct pt_state *s, struct pt_params *p);
+int pt_build_area_light(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, struct pt_area_light *out);
+/* Light of one shape with `area` scene units² of surface; id. */
+int32_t pt_build_shape_light(struct pt_builder *b, const struct pt_area_light *source, double area);
+
+/* build_medium.c */
+int pt_build_medium(struct pt_builder *b, const struct pt_state *s, const char *name, struct pt_params *p);
+/* Id of a medium by name, defined or not yet; -1 for "". */
+int32_t pt_build_medium_ref(struct pt_builder *b, const char *name, struct pt_loc loc);
+/* Fails for names that were used and never defined. */
+int pt_build_media_check(struct pt_builder *b);
+
+/* build_shape.c */
+int pt_build_shape(struct pt_builder *b, const struct pt_state *s, struct pt_params *p);
+int pt_build_object_begin(struct pt_builder *b, const char *name, struct pt_loc loc);
+int pt_build_object_end(struct pt_builder *b);
+int pt_build_instance(struct pt_builder *b, const struct pt_state *s, const char *name, struct pt_loc loc);
+
+/* Triangles before they are placed. Positions: pd or pf; the rest may be NULL. */
+struct pt_soup {
+    size_t vertex_count, triangle_count;
+    const double *pd;
+    const float *pf;
+    const double *nd, *uvd;
+    const float *nf, *uvf;
+    const uint32_t *indices;
+};
+int pt_build_mesh(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const struct pt_soup *soup);
+/* build_tessellate.c: shapes that become triangles. */
+int pt_build_bilinear(struct pt_builder *b, const struct pt_state *s, struct pt_params *p);
+int pt_build_curve(struct pt_builder *b, const struct pt_state *s, struct pt_params *p);
+int pt_build_height_field(struct pt_builder *b, const struct pt_state *s, struct pt_params *p);
+int pt_build_revolved(struct pt_builder *b, const struct pt_state *s, struct pt_params *p);
+/* subdiv.c */
+int pt_build_loop_subdiv(struct pt_builder *b, const struct pt_state *s, struct pt_params *p);
+
+#endif

@@ -1,0 +1,212 @@
+/* Colours and indices of refraction from parameters: rgb, xyz, spectra by list, name or file, black bodies. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "pbrt/build.h"
+#include "pbrt/number.h"
+#include "pbrt/spectra.h"
+
+/* Pairs of a .spd file: numbers separated by blanks, # to the end of the line is a comment. */
+static int read_spd_file(struct pt_builder *b, const struct pt_param *param, const char *name, struct pt_spd *out)
+{
+    char path[2048];
+    char *bytes = NULL;
+    size_t size = 0, room = 0, n = 0;
+    double *numbers = NULL;
+    struct base_err err = {0};
+    pt_builder_path(b, name, path, sizeof path);
+    if (b->source->read(b->source->data, path, &bytes, &size, &err) != 0)
+        return pt_diag_fail(&b->diag, param->loc, "spectrum \"%s\" is neither a known name nor a readable file", name);
+    for (char *at = bytes, *end = bytes + size; at < end && !b->diag.rc;) {
+        if (*at == '#') {
+            while (at < end && *at != '\n')
+                at++;
+        } else if (strchr(" \t\r\n,", *at) != NULL) {
+            at++;
+        } else {
+            char *start = at;
+            while (at < end && *at != '#' && strchr(" \t\r\n,", *at) == NULL)
+                at++;
+            if (!pt_grow((void **)&numbers, &room, n, sizeof *numbers))
+                pt_diag_nomem(&b->diag, "spectrum");
+            else if (!pt_number_parse(start, (size_t)(at - start), &numbers[n++]))
+                pt_diag_fail(&b->diag, param->loc, "%s: \"%.*s\" (expected a number)", path, at - start < 30 ? (int)(at - start) : 30,
+                             start);
+        }
+    }
+    if (!b->diag.rc && (n < 2 || n % 2 != 0))
+        pt_diag_fail(&b->diag, param->loc, "%s: %zu numbers (expected pairs of wavelength and value)", path, n);
+    if (!b->diag.rc)
+        pt_spd_from_pairs(numbers, n / 2, 1, out);
+    free(numbers);
+    free(bytes);
+    return b->diag.rc;
+}
+
+static const double *values_of(const struct pt_params *p, const struct pt_param *param)
+{
+    return param->count > 0 && !param->is_text ? p->numbers + param->first : NULL;
+}
+
+/* SPECTRUM and BLACKBODY parameters. `extend`: see pt_spd_from_pairs. */
+static int read_spectrum(struct pt_builder *b, struct pt_params *p, struct pt_param *param, int extend, struct pt_spd *out)
+{
+    const double *v = values_of(p, param);
+    pt_spd_constant(0, out);
+    if (param->type == PT_PARAM_BLACKBODY) {
+        if (param->count < 1 || param->count > 2 || !(v[0] >= 100 && v[0] <= 1e6))
+            return pt_diag_fail(&b->diag, param->loc, "blackbody needs a temperature from 100 to 1e6 kelvin");
+        pt_spd_blackbody(v[0], out);
+        for (int i = 0; i < PT_SPD_COUNT && param->count == 2; i++)
+            out->v[i] *= v[1];
+        return 0;
+    }
+    if (param->is_text) {
+        const char *name = pt_params_string_at(p, param, 0);
+        if (param->count != 1)
+            return pt_diag_fail(&b->diag, param->loc, "spectrum has %zu names (expected 1)", param->count);
+        return pt_spd_named(name, out) ? 0 : read_spd_file(b, param, name, out);
+    }
+    if (param->count == 1) { /* pbrt-v4: a constant */
+        pt_spd_constant(v[0], out);
+        return 0;
+    }
+    if (param->count == 0 || param->count % 2 != 0)
+        return pt_diag_fail(&b->diag, param->loc, "spectrum has %zu numbers (expected pairs of wavelength and value)", param->count);
+    for (size_t i = 2; i < param->count; i += 2)
+        if (!(v[i] > v[i - 2]))
+            return pt_diag_fail(&b->diag, param->loc, "wavelength %g after %g (expected rising ones)", v[i], v[i - 2]);
+    pt_spd_from_pairs(v, param->count / 2, extend, out);
+    return 0;
+}
+
+static pt_vec3 light_colour(struct pt_builder *b, const struct pt_param *param, const struct pt_spd *spd)
+{
+    pt_vec3 rgb = pt_spd_emission_rgb(spd);
+    float y = v3_luminance(rgb);
+    int v3_pair = param->type == PT_PARAM_BLACKBODY && param->count == 2;
+    /* pbrt-v4 scales lights so that a spectrum of any strength emits luminance 1; "scale" then sets it. */
+    if (!b->is_v3 && !v3_pair && y > 0)
+        rgb = v3_scale(rgb, 1 / y);
+    return rgb;
+}
+
+static int check_colour(struct pt_builder *b, const struct pt_param *param, enum pt_colour_use use, pt_vec3 *rgb)
+{
+    if (!v3_is_finite(*rgb))
+        return pt_diag_fail(&b->diag, param->loc, "a colour that is not finite");
+    if (use == PT_USE_REFLECTANCE && (fminf(rgb->x, fminf(rgb->y, rgb->z)) < -1e-3f || v3_max(*rgb) > 1.001f) &&
+        param->type == PT_PARAM_RGB)
+        pt_diag_warn(&b->diag, param->loc, "reflectances beyond 0 … 1 are clamped");
+    if (use == PT_USE_REFLECTANCE)
+        *rgb = v3(fminf(rgb->x, 1), fminf(rgb->y, 1), fminf(rgb->z, 1));
+    /* Spectral colours may leave Rec.709; negative light does not exist. */
+    *rgb = v3(fmaxf(rgb->x, 0), fmaxf(rgb->y, 0), fmaxf(rgb->z, 0));
+    return 0;
+}
+
+int pt_build_colour(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const char *name,
+                    enum pt_colour_use use, pt_vec3 *out)
+{
+    struct pt_param *param = pt_params_find(p, name);
+    struct pt_spd spd;
+    pt_vec3 rgb = {0, 0, 0};
+    if (param == NULL)
+        return 0;
+    param->used = 1;
+    const double *v = values_of(p, param);
+    switch (param->type) {
+    case PT_PARAM_RGB:
+    case PT_PARAM_XYZ:
+        if (param->count != 3) {
+            pt_diag_fail(&b->diag, param->loc, "parameter \"%s\" has %zu values (expected 3)", name, param->count);
+            return 0;
+        }
+        rgb = param->type == PT_PARAM_XYZ ? pt_xyz_to_rgb(v[0], v[1], v[2])
+                                          : pt_colour_to_rec709(s->colour_space, v3((float)v[0], (float)v[1], (float)v[2]));
+        break;
+    case PT_PARAM_FLOAT: /* a grey, as v2 files and quick tests have it */
+        if (param->count != 1) {
+            pt_diag_fail(&b->diag, param->loc, "parameter \"%s\" has %zu values (expected 1)", name, param->count);
+            return 0;
+        }
+        rgb = v3_splat((float)v[0]);
+        break;
+    case PT_PARAM_SPECTRUM:
+        if (use == PT_USE_LIGHT && param->is_text && param->count == 1 &&
+            pt_illuminant_named(pt_params_string_at(p, param, 0), &rgb))
+            break;
+        /* fall through */
+    case PT_PARAM_BLACKBODY:
+        if (read_spectrum(b, p, param, b->is_v3, &spd) != 0)
+            return 0;
+        rgb = use == PT_USE_LIGHT ? light_colour(b, param, &spd) : pt_spd_reflectance_rgb(&spd);
+        break;
+    default:
+        pt_diag_fail(&b->diag, param->loc, "parameter \"%s\" is not a colour (expected rgb, spectrum or blackbody)", name);
+        return 0;
+    }
+    if (check_colour(b, param, use, &rgb) != 0)
+        return 0;
+    *out = rgb;
+    return 1;
+}
+
+/* A spectrum, or its name written as a string. */
+static int is_spectrum(const struct pt_param *param)
+{
+    return param != NULL && (param->type == PT_PARAM_SPECTRUM || param->type == PT_PARAM_STRING);
+}
+
+void pt_build_conductor(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const char *eta_name,
+                        const char *k_name, pt_vec3 *eta_rgb, pt_vec3 *k_rgb)
+{
+    struct pt_param *eta = pt_params_find(p, eta_name), *k = pt_params_find(p, k_name);
+    struct pt_spd eta_spd, k_spd;
+    pt_spd_named("metal-Cu-eta", &eta_spd);
+    pt_spd_named("metal-Cu-k", &k_spd);
+    if (eta != NULL)
+        eta->used = 1;
+    if (k != NULL)
+        k->used = 1;
+    if (is_spectrum(eta))
+        read_spectrum(b, p, eta, 1, &eta_spd);
+    if (is_spectrum(k))
+        read_spectrum(b, p, k, 1, &k_spd);
+    pt_spd_conductor_rgb(&eta_spd, &k_spd, eta_rgb, k_rgb);
+    if (eta != NULL && !is_spectrum(eta))
+        pt_build_colour(b, s, p, eta_name, PT_USE_UNBOUNDED, eta_rgb);
+    if (k != NULL && !is_spectrum(k))
+        pt_build_colour(b, s, p, k_name, PT_USE_UNBOUNDED, k_rgb);
+    /* An index of 0 divides by zero in Fresnel's equations. */
+    *eta_rgb = v3(fmaxf(eta_rgb->x, 1e-3f), fmaxf(eta_rgb->y, 1e-3f), fmaxf(eta_rgb->z, 1e-3f));
+}
+
+double pt_build_index(struct pt_builder *b, struct pt_params *p, const char *name, double fallback)
+{
+    struct pt_param *param = pt_params_find(p, name);
+    struct pt_spd spd;
+    double eta = fallback;
+    if (param == NULL)
+        return fallback;
+    param->used = 1;
+    if (is_spectrum(param)) {
+        if (read_spectrum(b, p, param, 1, &spd) != 0)
+            return fallback;
+        eta = pt_spd_luminous_mean(&spd);
+        if (param->count > 1 || (param->is_text && pt_glass_index(pt_params_string_at(p, param, 0)) > 0))
+            pt_diag_warn(&b->diag, param->loc, "dispersion is not simulated: one index of refraction for all wavelengths");
+    } else if (param->type == PT_PARAM_TEXTURE) {
+        pt_diag_warn(&b->diag, param->loc, "a textured index of refraction is replaced by %g", fallback);
+    } else if (param->type == PT_PARAM_RGB && param->count == 3) {
+        eta = p->numbers[param->first + 1];
+    } else {
+        eta = pt_params_float(p, name, fallback);
+    }
+    if (!(eta >= 0.1 && eta <= 10)) {
+        pt_diag_fail(&b->diag, param->loc, "index of refraction %g (expected 0.1 to 10)", eta);
+        return fallback;
+    }
+    return eta;
+}

@@ -1,0 +1,263 @@
+/* Film, filter, sampler, integrator and camera: what the image is, before anything is in it. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "pbrt/build.h"
+
+enum { MAX_SIDE = 65536 };
+static const double max_pixels = 268435456.0; /* 2^28: 200 bytes a pixel are 50 GiB */
+
+static int is_one_of(const char *kind, const char *const *names)
+{
+    for (; *names != NULL; names++)
+        if (strcmp(kind, *names) == 0)
+            return 1;
+    return 0;
+}
+
+static struct pt_params *begin(struct pt_builder *b, enum pt_header which, const char *fallback)
+{
+    struct pt_params *p = &b->header[which];
+    if (p->text == NULL) {
+        pt_params_clear(p, &b->diag, (struct pt_loc){NULL, 0, 0});
+        p->kind = pt_params_keep(p, fallback, strlen(fallback));
+    }
+    return p;
+}
+
+/* --- film ------------------------------------------------------------------------------------------------------------- */
+
+static void set_crop(struct pt_builder *b, struct pt_params *p, const int file_size[2])
+{
+    struct pt_scene_defaults *d = b->defaults;
+    const int size[2] = {d->width, d->height};
+    size_t n;
+    const double *window = pt_params_floats(p, "cropwindow", 1, &n);
+    double edges[4] = {0, 1, 0, 1};
+    if (window != NULL && n == 4) {
+        memcpy(edges, window, sizeof edges);
+    } else if (window != NULL) {
+        pt_diag_fail(&b->diag, pt_params_find(p, "cropwindow")->loc, "cropwindow has %zu values (expected 4)", n);
+    }
+    const double *bounds = pt_params_ints(p, "pixelbounds", &n);
+    if (bounds != NULL && n == 4)
+        for (int i = 0; i < 4; i++)
+            edges[i] = bounds[i] / file_size[i / 2];
+    else if (bounds != NULL)
+        pt_diag_fail(&b->diag, pt_params_find(p, "pixelbounds")->loc, "pixelbounds has %zu values (expected 4)", n);
+    int at[4];
+    for (int i = 0; i < 4; i++)
+        at[i] = (int)ceil(fmin(fmax(edges[i], 0), 1) * size[i / 2] - 1e-6);
+    d->crop[0] = at[0];
+    d->crop[1] = at[2];
+    d->crop[2] = at[1];
+    d->crop[3] = at[3];
+    if (at[0] >= at[1] || at[2] >= at[3])
+        pt_diag_fail(&b->diag, p->loc, "the crop window holds no pixel (expected x0 < x1 and y0 < y1 in it)");
+}
+
+static void build_film(struct pt_builder *b)
+{
+    static const char *const kinds[] = {"rgb", "image", "gbuffer", "spectral", NULL};
+    struct pt_params *p = begin(b, PT_HEADER_FILM, "rgb");
+    struct pt_scene_defaults *d = b->defaults;
+    if (!is_one_of(pt_params_kind(p), kinds))
+        pt_diag_fail(&b->diag, p->loc, "unknown film \"%s\" (expected rgb, image, gbuffer or spectral)", pt_params_kind(p));
+    int file_size[2] = {pt_params_int_in(p, "xresolution", b->is_v3 ? 640 : 1280, 1, MAX_SIDE),
+                        pt_params_int_in(p, "yresolution", b->is_v3 ? 480 : 720, 1, MAX_SIDE)};
+    d->width = b->options->width > 0 ? b->options->width : file_size[0];
+    d->height = b->options->height > 0 ? b->options->height : file_size[1];
+    if ((double)d->width * d->height > max_pixels)
+        pt_diag_fail(&b->diag, p->loc, "%d x %d pixels (expected at most 2^28 in all)", d->width, d->height);
+    set_crop(b, p, file_size);
+    snprintf(d->film_path, sizeof d->film_path, "%s", pt_params_string(p, "filename", ""));
+    double exposure = pt_params_float_in(p, "exposuretime", 1, 0, 1e6), iso = pt_params_float_in(p, "iso", 100, 0, 1e9);
+    double scale = pt_params_float_in(p, "scale", 1, 0, 1e12);
+    b->scene->radiance_scale = (float)(b->is_v3 ? scale : exposure * iso / 100);
+    const char *sensor = pt_params_string(p, "sensor", "cie1931");
+    if (strcmp(sensor, "cie1931") != 0)
+        pt_diag_warn(&b->diag, pt_params_find(p, "sensor")->loc, "sensor \"%s\" is rendered as an ideal one", sensor);
+    if (pt_params_find(p, "whitebalance") != NULL && pt_params_float(p, "whitebalance", 0) != 0)
+        pt_diag_warn(&b->diag, pt_params_find(p, "whitebalance")->loc, "white balance is ignored");
+    double limit = pt_params_float_in(p, "maxcomponentvalue", INFINITY, 1e-30, 1e30);
+    if (pt_params_find(p, "maxsampleluminance") != NULL)
+        limit = pt_params_float_in(p, "maxsampleluminance", limit, 1e-30, 1e30);
+    d->integrator.max_component = (float)limit;
+    pt_params_ignore(p, "diagonal savefp16 writeframe type coordinatesystem nbuckets lambdamin lambdamax");
+    pt_params_check_used(p);
+}
+
+/* --- filter ----------------------------------------------------------------------------------------------------------- */
+
+static void build_filter(struct pt_builder *b)
+{
+    struct pt_params *p = begin(b, PT_HEADER_FILTER, b->is_v3 ? "box" : "gaussian");
+    struct pt_integrator *it = &b->defaults->integrator;
+    const char *kind = pt_params_kind(p);
+    double fallback = 0.5, sigma = 0.5;
+    if (strcmp(kind, "box") == 0) {
+        it->filter = PT_FILTER_BOX;
+    } else if (strcmp(kind, "triangle") == 0) {
+        it->filter = PT_FILTER_TRIANGLE;
+        fallback = 2;
+    } else if (strcmp(kind, "gaussian") == 0) {
+        it->filter = PT_FILTER_GAUSSIAN;
+        fallback = b->is_v3 ? 2 : 1.5;
+        /* v3 writes exp(-alpha x²). */
+        double alpha = pt_params_float_in(p, "alpha", 2, 1e-6, 1e6);
+        sigma = pt_params_float_in(p, "sigma", b->is_v3 ? sqrt(0.5 / alpha) : 0.5, 1e-3, 1e3);
+    } else if (strcmp(kind, "mitchell") == 0 || strcmp(kind, "sinc") == 0) {
+        pt_diag_warn(&b->diag, p->loc, "filter \"%s\" has negative lobes: a Gaussian of the same main lobe is used", kind);
+        it->filter = PT_FILTER_GAUSSIAN;
+        fallback = 2;
+        pt_params_ignore(p, "B C tau");
+    } else {
+        pt_diag_fail(&b->diag, p->loc, "unknown filter \"%s\" (expected box, triangle, gaussian, mitchell or sinc)", kind);
+    }
+    double x = pt_params_float_in(p, "xradius", fallback, 1e-3, 100), y = pt_params_float_in(p, "yradius", fallback, 1e-3, 100);
+    it->filter_x = (float)pt_params_float_in(p, "xwidth", x, 1e-3, 100);
+    it->filter_y = (float)pt_params_float_in(p, "ywidth", y, 1e-3, 100);
+    it->filter_sigma = (float)sigma;
+    pt_params_check_used(p);
+}
+
+/* --- sampler and integrator ------------------------------------------------------------------------------------------- */
+
+static void build_sampler(struct pt_builder *b)
+{
+    static const char *const low_discrepancy[] = {"sobol", "zsobol", "paddedsobol", "halton", "pmj02bn", "02sequence",
+                                                  "lowdiscrepancy", "stratified", "maxmindist", NULL};
+    static const char *const random[] = {"independent", "random", "mlt", NULL};
+    struct pt_params *p = begin(b, PT_HEADER_SAMPLER, "zsobol");
+    const char *kind = pt_params_kind(p);
+    b->defaults->integrator.sampler = is_one_of(kind, random) ? PT_SAMPLER_INDEPENDENT : PT_SAMPLER_SOBOL;
+    if (!is_one_of(kind, random) && !is_one_of(kind, low_discrepancy))
+        pt_diag_fail(&b->diag, p->loc, "unknown sampler \"%s\" (expected independent, sobol, zsobol, halton, stratified …)", kind);
+    int xs = pt_params_int_in(p, "xsamples", 4, 1, 65536), ys = pt_params_int_in(p, "ysamples", 4, 1, 16384);
+    b->defaults->spp = pt_params_int_in(p, "pixelsamples", strcmp(kind, "stratified") == 0 ? xs * ys : 16, 1, 1 << 30);
+    b->defaults->integrator.seed = (uint32_t)pt_params_int_in(p, "seed", (int)b->defaults->integrator.seed, 0, 2147483647);
+    pt_params_ignore(p, "randomization dimensions jitter");
+    pt_params_check_used(p);
+}
+
+static void build_integrator(struct pt_builder *b)
+{
+    static const char *const same[] = {"path", "volpath", "simplepath", "simplevolpath", NULL};
+    static const char *const other[] = {"bdpt", "mlt", "sppm", "lightpath", "randomwalk", "ao", "function", "whitted",
+                                        "directlighting", "ambientocclusion", NULL};
+    struct pt_params *p = begin(b, PT_HEADER_INTEGRATOR, b->is_v3 ? "path" : "volpath");
+    struct pt_integrator *it = &b->defaults->integrator;
+    const char *kind = pt_params_kind(p);
+    if (is_one_of(kind, other))
+        pt_diag_warn(&b->diag, p->loc, "integrator \"%s\" is replaced by path tracing", kind);
+    else if (!is_one_of(kind, same))
+        pt_diag_fail(&b->diag, p->loc, "unknown integrator \"%s\" (expected path, volpath …)", kind);
+    it->max_depth = pt_params_int_in(p, "maxdepth", 5, -1, 1 << 20);
+    it->rr_depth = 3;
+    it->strategy = PT_STRATEGY_MIS;
+    if (pt_params_bool(p, "regularize", 0))
+        pt_diag_warn(&b->diag, pt_params_find(p, "regularize")->loc, "regularize is ignored: the image is the unbiased one");
+    pt_params_ignore(p, "lightsampler lightsamplestrategy rrthreshold sampledirect samplelights samplebsdf iterations "
+                        "numiterations photonsperiteration radius mutationsperpixel bootstrapsamples chains sigma "
+                        "largestepprobability imagewritefrequency visualizestrategies visualizeweights pixelbounds seed "
+                        "cossample maxdistance nsamples strategy illuminant");
+    pt_params_check_used(p);
+}
+
+/* --- camera ----------------------------------------------------------------------------------------------------------- */
+
+static void set_screen(struct pt_builder *b, struct pt_params *p, struct pt_camera *c)
+{
+    double aspect = pt_params_float_in(p, "frameaspectratio", (double)c->width / c->height, 1e-4, 1e4);
+    double x = aspect > 1 ? aspect : 1, y = aspect > 1 ? 1 : 1 / aspect;
+    const double window[4] = {-x, x, -y, y};
+    size_t n;
+    const double *given = pt_params_floats(p, "screenwindow", 1, &n);
+    if (given != NULL && (n != 4 || given[0] == given[1] || given[2] == given[3])) {
+        pt_diag_fail(&b->diag, pt_params_find(p, "screenwindow")->loc, "screenwindow needs x0 x1 y0 y1 that span an area");
+        given = NULL;
+    }
+    for (int i = 0; i < 4; i++)
+        c->screen[i] = (float)(given != NULL ? given[i] : window[i]);
+}
+
+/* The options' camera instead of the file's; mirrored where that is, so that lettering stays legible. */
+static void override_camera(struct pt_builder *b, struct pt_xform world_to_camera[2])
+{
+    const double *v = b->options->view.look_at_world;
+    const struct pt_xform mirror = pt_xform_scale(-1, 1, 1);
+    struct pt_xform t;
+    if (!b->options->view.has_look_at || !pt_xform_look_at(v, v + 3, v + 6, &t))
+        return;
+    if (pt_xform_det(&world_to_camera[0]) < 0)
+        t = pt_xform_mul(&mirror, &t);
+    world_to_camera[0] = world_to_camera[1] = t;
+}
+
+static void place_camera(struct pt_builder *b, struct pt_params *p, struct pt_camera *c)
+{
+    struct pt_xform world_to_camera[2], to_world;
+    pt_builder_at_shutter(b, b->camera_ctm, world_to_camera);
+    override_camera(b, world_to_camera);
+    c->animated = !pt_xform_equal(&world_to_camera[0], &world_to_camera[1]);
+    for (int i = 0; i < 2; i++) {
+        if (!pt_xform_invert(&world_to_camera[i], &to_world)) {
+            pt_diag_fail(&b->diag, p->loc, "the camera's transform is singular");
+            return;
+        }
+        if (i == 0)
+            for (int k = 0; k < 3; k++)
+                b->origin[k] = to_world.m[k][3];
+        to_world = pt_builder_to_render(b, &to_world);
+        c->to_render[i] = pt_xform_to_mat34(&to_world);
+    }
+}
+
+static void build_camera(struct pt_builder *b)
+{
+    struct pt_params *p = begin(b, PT_HEADER_CAMERA, "perspective");
+    struct pt_camera *c = &b->scene->camera;
+    const char *kind = pt_params_kind(p);
+    c->width = b->defaults->width;
+    c->height = b->defaults->height;
+    c->kind = strcmp(kind, "orthographic") == 0 ? PT_CAMERA_ORTHOGRAPHIC : PT_CAMERA_PERSPECTIVE;
+    if (strcmp(kind, "realistic") == 0 || strcmp(kind, "spherical") == 0 || strcmp(kind, "environment") == 0) {
+        pt_diag_warn(&b->diag, p->loc, "camera \"%s\" is replaced by a perspective one", kind);
+        pt_params_ignore(p, "lensfile aperturediameter focusdistance aperture mapping simpleweighting");
+    } else if (c->kind == PT_CAMERA_PERSPECTIVE && strcmp(kind, "perspective") != 0) {
+        pt_diag_fail(&b->diag, p->loc, "unknown camera \"%s\" (expected perspective or orthographic)", kind);
+    }
+    c->fov_deg = c->kind == PT_CAMERA_PERSPECTIVE ? (float)pt_params_float_in(p, "fov", 90, 1e-3, 179.9) : 0;
+    if (b->options->view.fov_deg > 0) {
+        if (c->kind == PT_CAMERA_ORTHOGRAPHIC)
+            pt_diag_fail(&b->diag, p->loc, "the camera is orthographic, which --fov cannot change");
+        c->fov_deg = (float)b->options->view.fov_deg;
+    }
+    set_screen(b, p, c);
+    c->lens_radius = (float)pt_params_float_in(p, "lensradius", 0, 0, 1e9);
+    c->focal_distance = (float)pt_params_float_in(p, "focaldistance", 1e6, 1e-9, 1e30);
+    b->shutter[0] = pt_params_float(p, "shutteropen", 0);
+    b->shutter[1] = pt_params_float(p, "shutterclose", 1);
+    if (!(b->shutter[1] >= b->shutter[0]))
+        pt_diag_fail(&b->diag, p->loc, "the shutter closes at %g, before it opens at %g", b->shutter[1], b->shutter[0]);
+    place_camera(b, p, c);
+    c->medium = b->camera_medium;
+    if (c->lens_radius > 0)
+        pt_builder_effect(b, PT_FX_DEFOCUS, p->loc);
+    if (c->animated)
+        pt_builder_effect(b, PT_FX_MOTION, p->loc);
+    pt_params_check_used(p);
+}
+
+int pt_build_header(struct pt_builder *b)
+{
+    build_film(b);
+    if (b->diag.rc)
+        return b->diag.rc;
+    build_filter(b);
+    build_sampler(b);
+    build_integrator(b);
+    build_camera(b);
+    return b->diag.rc;
+}

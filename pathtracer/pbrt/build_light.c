@@ -1,0 +1,256 @@
+/* Lights. pbrt-v4's meaning of "scale", "power" and "illuminance" is that of its lights.cpp. */
+#include <math.h>
+#include <string.h>
+
+#include "pbrt/build.h"
+
+static const double pi = 3.14159265358979323846;
+
+/* "L" or "I" with both kinds of scale (v4: float, v3: colour), as RGB. */
+static pt_vec3 scaled_colour(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const char *name)
+{
+    pt_vec3 value = v3_splat(1), by = v3_splat(1);
+    struct pt_param *scale = pt_params_find(p, "scale");
+    pt_build_colour(b, s, p, name, PT_USE_LIGHT, &value);
+    if (scale != NULL && scale->type != PT_PARAM_FLOAT && scale->type != PT_PARAM_INTEGER)
+        pt_build_colour(b, s, p, "scale", PT_USE_UNBOUNDED, &by);
+    else
+        by = v3_splat((float)pt_params_float_in(p, "scale", 1, 0, 3e38));
+    return v3_mul(value, by);
+}
+
+/* Luminance of a colour, never 0. */
+static double luminance(pt_vec3 c)
+{
+    return fmax((double)v3_luminance(c), 1e-30);
+}
+
+static void place(struct pt_builder *b, const struct pt_xform *ctm, const double p[3], pt_vec3 *out)
+{
+    double q[3];
+    struct pt_xform t = pt_builder_to_render(b, ctm);
+    pt_xform_point(&t, p, q);
+    *out = v3((float)q[0], (float)q[1], (float)q[2]);
+}
+
+/* ctm · (to - from), unit. */
+static int aim(struct pt_builder *b, struct pt_loc loc, const struct pt_xform *ctm, const double from[3], const double to[3],
+               pt_vec3 *out)
+{
+    double d[3] = {to[0] - from[0], to[1] - from[1], to[2] - from[2]}, w[3];
+    pt_xform_vector(ctm, d, w);
+    double len = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
+    if (!(len > 0) || !isfinite(len))
+        return pt_diag_fail(&b->diag, loc, "the light points nowhere (expected \"from\" and \"to\" apart)");
+    *out = v3((float)(w[0] / len), (float)(w[1] / len), (float)(w[2] / len));
+    return 0;
+}
+
+/* --- kinds ------------------------------------------------------------------------------------------------------------ */
+
+struct context {
+    struct pt_builder *b;
+    const struct pt_state *s;
+    struct pt_params *p;
+    struct pt_xform ctm;    /* at shutter open */
+    struct pt_light *light;
+};
+
+static void make_point(struct context *c)
+{
+    double from[3] = {0, 0, 0}, power = pt_params_float(c->p, "power", -1);
+    c->light->kind = PT_LIGHT_POINT;
+    c->light->emission = scaled_colour(c->b, c->s, c->p, "I");
+    if (power > 0)
+        c->light->emission = v3_scale(c->light->emission, (float)(power / (4 * pi)));
+    pt_params_point(c->p, "from", from);
+    place(c->b, &c->ctm, from, &c->light->position);
+    pt_builder_effect(c->b, PT_FX_DELTA_LIGHT, c->p->loc);
+}
+
+static void make_spot(struct context *c)
+{
+    double from[3] = {0, 0, 0}, to[3] = {0, 0, 1}, power = pt_params_float(c->p, "power", -1);
+    double cone = pt_params_float_in(c->p, "coneangle", 30, 1e-3, 180), delta = pt_params_float_in(c->p, "conedeltaangle", 5, 0, 180);
+    double cos_total = cos(cone * pi / 180), cos_start = cos(fmax(cone - delta, 0) * pi / 180);
+    c->light->kind = PT_LIGHT_SPOT;
+    c->light->emission = scaled_colour(c->b, c->s, c->p, "I");
+    if (power > 0) /* flux of the smooth fall-off: 2π ((1 - cos start) + (cos start - cos total) / 2) */
+        c->light->emission =
+            v3_scale(c->light->emission, (float)(power / (2 * pi * ((1 - cos_start) + (cos_start - cos_total) / 2))));
+    pt_params_point(c->p, "from", from);
+    pt_params_point(c->p, "to", to);
+    place(c->b, &c->ctm, from, &c->light->position);
+    aim(c->b, c->p->loc, &c->ctm, from, to, &c->light->direction);
+    c->light->cos_total = (float)cos_total;
+    c->light->cos_start = (float)cos_start;
+    pt_builder_effect(c->b, PT_FX_DELTA_LIGHT, c->p->loc);
+}
+
+static void make_distant(struct context *c)
+{
+    double from[3] = {0, 0, 0}, to[3] = {0, 0, 1}, illuminance = pt_params_float(c->p, "illuminance", -1);
+    c->light->kind = PT_LIGHT_DISTANT;
+    c->light->emission = scaled_colour(c->b, c->s, c->p, "L");
+    if (illuminance > 0)
+        c->light->emission = v3_scale(c->light->emission, (float)illuminance);
+    pt_params_point(c->p, "from", from);
+    pt_params_point(c->p, "to", to);
+    aim(c->b, c->p->loc, &c->ctm, from, to, &c->light->direction);
+    pt_builder_effect(c->b, PT_FX_DELTA_LIGHT, c->p->loc);
+}
+
+/* Render → light: the inverse without translation and uniform scale. */
+static int light_space(struct context *c)
+{
+    struct pt_xform inverse;
+    if (!pt_xform_invert(&c->ctm, &inverse))
+        return pt_diag_fail(&c->b->diag, c->p->loc, "singular transform of a light");
+    double size = cbrt(fabs(pt_xform_det(&inverse)));
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++)
+            inverse.m[i][j] /= size;
+        inverse.m[i][3] = 0;
+    }
+    c->light->from_render = pt_xform_to_mat34(&inverse);
+    return 0;
+}
+
+/* The image as three floats >= 0 per pixel, which light selection and lookup expect. */
+static int32_t float_rgb(struct pt_builder *b, int32_t id)
+{
+    struct pt_image_map map = ((struct pt_image_map *)b->images.items)[id];
+    size_t n = (size_t)map.width * (size_t)map.height;
+    int ready = map.type == PT_PIXEL_FLOAT && map.channels == 3;
+    for (size_t i = 0; ready && i < 3 * n; i++)
+        ready = ((const float *)map.pixels)[i] >= 0;
+    if (ready)
+        return id;
+    float *pixels = pt_arena_alloc(&b->scene->arena, n, 3 * sizeof *pixels);
+    if (pixels == NULL) {
+        pt_diag_nomem(&b->diag, "an environment map");
+        return -1;
+    }
+    for (size_t i = 0; i < n; i++)
+        for (int k = 0; k < 3; k++) {
+            size_t at = i * (size_t)map.channels + (size_t)(map.channels >= 3 ? k : 0);
+            float v = map.type == PT_PIXEL_FLOAT ? ((const float *)map.pixels)[at]
+                                                 : (float)((const uint8_t *)map.pixels)[at] / 255.0f;
+            if (map.type == PT_PIXEL_U8_SRGB)
+                v = v <= 0.04045f ? v / 12.92f : powf((v + 0.055f) / 1.055f, 2.4f);
+            pixels[3 * i + (size_t)k] = fmaxf(v, 0);
+        }
+    map.type = PT_PIXEL_FLOAT;
+    map.channels = 3;
+    map.pixels = pixels;
+    return pt_list_add(b, &b->images, &map);
+}
+
+static void make_infinite(struct context *c)
+{
+    struct pt_params *p = c->p;
+    const char *key = pt_params_find(p, "mapname") != NULL ? "mapname" : "filename", *file = pt_params_string(p, key, "");
+    double illuminance = pt_params_float(p, "illuminance", -1);
+    c->light->emission = scaled_colour(c->b, c->s, p, "L");
+    c->light->kind = PT_LIGHT_ENV_CONSTANT;
+    if (pt_params_find(p, "portal") != NULL) {
+        pt_diag_warn(&c->b->diag, pt_params_find(p, "portal")->loc, "the portal of an infinite light only guides sampling: ignored");
+        pt_params_ignore(p, "portal");
+    }
+    pt_builder_effect(c->b, PT_FX_ENVIRONMENT, p->loc);
+    if (file[0] == '\0') {
+        if (illuminance > 0) /* of an upward patch under the whole sky: π L */
+            c->light->emission = v3_scale(c->light->emission, (float)(illuminance / pi / luminance(c->light->emission)));
+        return;
+    }
+    struct pt_loc loc = pt_params_find(p, key)->loc;
+    int32_t id = pt_build_image_map(c->b, loc, file, NULL);
+    if (id < 0 || (id = float_rgb(c->b, id)) < 0)
+        return;
+    const struct pt_image_map *map = &((struct pt_image_map *)c->b->images.items)[id];
+    c->light->kind = PT_LIGHT_ENV_IMAGE;
+    c->light->image = id;
+    /* v4 maps are square and equal-area, v3 maps twice as wide as high; v4 files with a v3 map exist. */
+    c->light->mapping = map->width == map->height ? PT_ENV_EQUAL_AREA : PT_ENV_LATLONG;
+    if (map->width != map->height && map->width != 2 * map->height)
+        pt_diag_warn(&c->b->diag, loc, "environment map of %d x %d pixels is taken as latitude and longitude", map->width, map->height);
+    if (illuminance > 0)
+        pt_diag_warn(&c->b->diag, p->loc, "illuminance of an image light is ignored");
+    light_space(c);
+}
+
+static void make_projection(struct context *c)
+{
+    pt_diag_warn(&c->b->diag, c->p->loc, "light \"%s\" is replaced by a spot light without its image", pt_params_kind(c->p));
+    pt_params_ignore(c->p, "fov mapname filename");
+    make_spot(c);
+}
+
+static void make_goniometric(struct context *c)
+{
+    pt_diag_warn(&c->b->diag, c->p->loc, "light \"%s\" is replaced by a point light without its image", pt_params_kind(c->p));
+    pt_params_ignore(c->p, "mapname filename");
+    make_point(c);
+}
+
+static int add_light(struct pt_builder *b, const struct pt_light *light, struct pt_loc loc)
+{
+    if (b->lights.count == 1)
+        pt_builder_effect(b, PT_FX_MANY_LIGHTS, loc);
+    return pt_list_add(b, &b->lights, light);
+}
+
+int pt_build_light(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
+{
+    static const struct {
+        const char *kind;
+        void (*make)(struct context *c);
+    } kinds[] = {{"point", make_point},           {"spot", make_spot},         {"distant", make_distant},
+                 {"infinite", make_infinite},     {"exinfinite", make_infinite}, {"projection", make_projection},
+                 {"goniometric", make_goniometric}};
+    struct pt_light light = {.kind = -1, .shape = -1, .image = -1};
+    struct pt_xform at[2];
+    pt_builder_at_shutter(b, s->ctm, at);
+    if (!pt_xform_equal(&at[0], &at[1]))
+        pt_diag_warn(&b->diag, p->loc, "lights do not move: the transform at shutter open is used");
+    struct context c = {b, s, p, at[0], &light};
+    for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
+        if (strcmp(kinds[i].kind, pt_params_kind(p)) == 0)
+            kinds[i].make(&c);
+    if (light.kind < 0)
+        return pt_diag_fail(&b->diag, p->loc, "unknown light \"%s\" (expected point, spot, distant, infinite …)", pt_params_kind(p));
+    pt_params_ignore(p, "nsamples samples");
+    pt_params_check_used(p);
+    if (!b->diag.rc && !v3_is_black(light.emission))
+        add_light(b, &light, p->loc);
+    return b->diag.rc;
+}
+
+int pt_build_area_light(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, struct pt_area_light *out)
+{
+    const char *kind = pt_params_kind(p);
+    struct pt_area_light light = {.on = 1, .loc = p->loc};
+    if (strcmp(kind, "diffuse") != 0 && strcmp(kind, "area") != 0)
+        return pt_diag_fail(&b->diag, p->loc, "unknown area light \"%s\" (expected diffuse)", kind);
+    light.emission = scaled_colour(b, s, p, "L");
+    light.two_sided = pt_params_bool(p, "twosided", 0);
+    light.power = pt_params_float(p, "power", -1);
+    if (pt_params_find(p, "filename") != NULL) {
+        pt_diag_warn(&b->diag, pt_params_find(p, "filename")->loc, "the image of an area light is replaced by even light");
+        pt_params_ignore(p, "filename");
+    }
+    pt_params_ignore(p, "nsamples samples");
+    pt_params_check_used(p);
+    if (!b->diag.rc)
+        *out = light;
+    return b->diag.rc;
+}
+
+int32_t pt_build_shape_light(struct pt_builder *b, const struct pt_area_light *source, double area)
+{
+    struct pt_light light = {.kind = PT_LIGHT_AREA, .two_sided = source->two_sided, .image = -1, .emission = source->emission};
+    light.shape = (int32_t)b->world_shapes.count;
+    if (source->power > 0 && area > 0)
+        light.emission = v3_scale(light.emission, (float)(source->power / ((source->two_sided ? 2 : 1) * area * pi)));
+    return add_light(b, &light, source->loc);
+}

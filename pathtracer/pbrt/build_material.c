@@ -1,0 +1,283 @@
+/* Materials of pbrt-v4, and what stands in for those that are not simulated. */
+#include <math.h>
+#include <string.h>
+
+#include "pbrt/build.h"
+
+struct pt_material pt_material_blank(int32_t kind)
+{
+    struct pt_material m = {.kind = kind, .bump = -1, .normal_map = -1, .mix_a = -1, .mix_b = -1, .eta = 1.5f};
+    struct pt_input *inputs[] = {&m.mix_amount, &m.reflectance, &m.transmittance, &m.roughness_u, &m.roughness_v,
+                                 &m.base_roughness_u, &m.base_roughness_v, &m.eta_rgb, &m.k_rgb, &m.thickness, &m.g, &m.albedo};
+    for (size_t i = 0; i < sizeof inputs / sizeof inputs[0]; i++)
+        *inputs[i] = pt_input_constant(0, 0, 0);
+    return m;
+}
+
+/* pbrt-v3's fit from perceived roughness to GGX alpha (TrowbridgeReitzDistribution::RoughnessToAlpha). */
+static double v3_alpha(double roughness)
+{
+    double x = log(fmax(roughness, 1e-3));
+    return 1.62142 + x * (0.819955 + x * (0.1734 + x * (0.0171201 + x * 0.000640711)));
+}
+
+static void read_roughness(struct pt_builder *b, struct pt_params *p, const char *prefix, double fallback, struct pt_input *u,
+                           struct pt_input *v)
+{
+    char name[48];
+    const char *const suffix[3] = {"roughness", "uroughness", "vroughness"};
+    struct pt_input values[3];
+    for (int i = 0; i < 3; i++) {
+        size_t n = strlen(prefix);
+        memcpy(name, prefix, n);
+        strcpy(name + n, suffix[i]);
+        const struct pt_param *given = pt_params_find(p, name);
+        values[i] = i > 0 && given == NULL ? values[0] : pt_build_float_input(b, p, name, fallback);
+        if (given != NULL && values[i].texture < 0 && values[i].value.x < 0)
+            pt_diag_fail(&b->diag, given->loc, "\"%s\" is %g (expected 0 or more)", name, (double)values[i].value.x);
+    }
+    *u = values[1];
+    *v = values[2];
+}
+
+void pt_build_roughness(struct pt_builder *b, struct pt_params *p, double fallback, int v3_rule, struct pt_material *m)
+{
+    read_roughness(b, p, "", fallback, &m->roughness_u, &m->roughness_v);
+    m->remap_roughness = pt_params_bool(p, "remaproughness", 1);
+    if (!v3_rule || !m->remap_roughness)
+        return;
+    if (m->roughness_u.texture >= 0 || m->roughness_v.texture >= 0) {
+        pt_diag_warn(&b->diag, p->loc, "textured roughness is remapped by pbrt-v4's rule");
+        return;
+    }
+    /* v3 keeps 0 as a smooth surface. */
+    double u = (double)m->roughness_u.value.x, v = (double)m->roughness_v.value.x;
+    u = u > 0 ? v3_alpha(u) : 0;
+    v = v > 0 ? v3_alpha(v) : 0;
+    m->roughness_u = pt_input_constant(u, u, u);
+    m->roughness_v = pt_input_constant(v, v, v);
+    m->remap_roughness = 0;
+}
+
+int32_t pt_build_bump(struct pt_builder *b, struct pt_params *p, const char *name)
+{
+    if (pt_params_find(p, name) == NULL)
+        return -1;
+    return pt_build_float_input(b, p, name, 0).texture; /* a constant displaces nothing */
+}
+
+int32_t pt_build_material_named(struct pt_builder *b, struct pt_loc loc, const char *name)
+{
+    int32_t id = pt_names_get(&b->named_materials, name);
+    if (id < 0)
+        pt_diag_fail(&b->diag, loc, "unknown material \"%s\" (expected one made by MakeNamedMaterial before)", name);
+    return id;
+}
+
+/* --- kinds ------------------------------------------------------------------------------------------------------------ */
+
+struct context {
+    struct pt_builder *b;
+    const struct pt_state *s;
+    struct pt_params *p;
+    const char *kind;
+    struct pt_material *m;
+};
+
+static struct pt_input colour(struct context *c, const char *name, float fallback)
+{
+    return pt_build_colour_input(c->b, c->s, c->p, name, PT_USE_REFLECTANCE, v3_splat(fallback));
+}
+
+static void read_coating(struct context *c)
+{
+    c->m->thickness = pt_build_float_input(c->b, c->p, "thickness", 0.01);
+    c->m->g = pt_build_float_input(c->b, c->p, "g", 0);
+    c->m->albedo = colour(c, "albedo", 0);
+    pt_params_ignore(c->p, "maxdepth nsamples");
+}
+
+static void make_diffuse(struct context *c)
+{
+    c->m->reflectance = colour(c, "reflectance", 0.5f);
+    if (pt_params_find(c->p, "sigma") != NULL && pt_params_float(c->p, "sigma", 0) != 0)
+        pt_diag_warn(&c->b->diag, c->p->loc, "sigma of a diffuse material is ignored");
+}
+
+static void make_coated_diffuse(struct context *c)
+{
+    c->m->reflectance = colour(c, "reflectance", 0.5f);
+    pt_build_roughness(c->b, c->p, 0, 0, c->m);
+    c->m->eta = (float)pt_build_index(c->b, c->p, "eta", 1.5);
+    read_coating(c);
+}
+
+static void make_conductor(struct context *c)
+{
+    pt_build_roughness(c->b, c->p, 0, 0, c->m);
+    c->m->conductor_by_colour = pt_params_find(c->p, "reflectance") != NULL;
+    if (c->m->conductor_by_colour) {
+        c->m->reflectance = colour(c, "reflectance", 0.5f);
+    } else {
+        pt_build_conductor(c->b, c->s, c->p, "eta", "k", &c->m->eta_rgb.value, &c->m->k_rgb.value);
+    }
+}
+
+static void make_coated_conductor(struct context *c)
+{
+    read_roughness(c->b, c->p, "interface.", 0, &c->m->roughness_u, &c->m->roughness_v);
+    read_roughness(c->b, c->p, "conductor.", 0, &c->m->base_roughness_u, &c->m->base_roughness_v);
+    c->m->remap_roughness = pt_params_bool(c->p, "remaproughness", 1);
+    c->m->eta = (float)pt_build_index(c->b, c->p, "interface.eta", 1.5);
+    c->m->conductor_by_colour = pt_params_find(c->p, "reflectance") != NULL;
+    if (c->m->conductor_by_colour)
+        c->m->reflectance = colour(c, "reflectance", 0.5f);
+    else
+        pt_build_conductor(c->b, c->s, c->p, "conductor.eta", "conductor.k", &c->m->eta_rgb.value, &c->m->k_rgb.value);
+    read_coating(c);
+}
+
+static void make_dielectric(struct context *c)
+{
+    pt_build_roughness(c->b, c->p, 0, 0, c->m);
+    c->m->eta = (float)pt_build_index(c->b, c->p, "eta", 1.5);
+    /* Index-matched: nothing is bent or reflected, and light sampling may look through it. */
+    if (c->m->eta == 1)
+        c->m->kind = PT_MATERIAL_INTERFACE;
+}
+
+static void make_thin_dielectric(struct context *c)
+{
+    c->m->eta = (float)pt_build_index(c->b, c->p, "eta", 1.5);
+    pt_params_ignore(c->p, "roughness uroughness vroughness remaproughness");
+}
+
+static void make_diffuse_transmission(struct context *c)
+{
+    float scale = (float)pt_params_float_in(c->p, "scale", 1, 0, 1e6);
+    struct pt_input by = pt_input_constant((double)scale, (double)scale, (double)scale);
+    c->m->reflectance = pt_input_product(c->b, colour(c, "reflectance", 0.25f), by);
+    c->m->transmittance = pt_input_product(c->b, colour(c, "transmittance", 0.25f), by);
+}
+
+static void make_mix(struct context *c)
+{
+    struct pt_param *list = pt_params_find(c->p, "materials");
+    if (list == NULL || list->type != PT_PARAM_STRING || list->count != 2) {
+        pt_diag_fail(&c->b->diag, list != NULL ? list->loc : c->p->loc, "mix needs \"string materials\" with two names");
+        return;
+    }
+    list->used = 1;
+    c->m->mix_a = pt_build_material_named(c->b, list->loc, pt_params_string_at(c->p, list, 0));
+    c->m->mix_b = pt_build_material_named(c->b, list->loc, pt_params_string_at(c->p, list, 1));
+    c->m->mix_amount = pt_build_float_input(c->b, c->p, "amount", 0.5);
+}
+
+static void make_interface(struct context *c)
+{
+    (void)c;
+}
+
+/* Not simulated: a coated diffuse surface of about its colour. */
+static void make_subsurface(struct context *c)
+{
+    pt_diag_warn(&c->b->diag, c->p->loc, "material \"%s\" is replaced by a coated diffuse one", c->kind);
+    c->m->reflectance = colour(c, "reflectance", 0.6f);
+    pt_build_roughness(c->b, c->p, 0, 0, c->m);
+    c->m->eta = (float)pt_build_index(c->b, c->p, "eta", 1.33);
+    pt_params_ignore(c->p, "mfp sigma_a sigma_s scale g name filename");
+    c->m->thickness = pt_input_constant(0.01, 0.01, 0.01);
+}
+
+static void make_hair(struct context *c)
+{
+    pt_diag_warn(&c->b->diag, c->p->loc, "material \"hair\" is replaced by a diffuse one");
+    c->m->reflectance = colour(c, "color", 0.2f);
+    if (pt_params_find(c->p, "reflectance") != NULL)
+        c->m->reflectance = colour(c, "reflectance", 0.2f);
+    pt_params_ignore(c->p, "sigma_a eumelanin pheomelanin eta beta_m beta_n alpha");
+}
+
+static void make_measured(struct context *c)
+{
+    pt_diag_warn(&c->b->diag, c->p->loc, "material \"measured\" is replaced by a coated diffuse one");
+    c->m->reflectance = pt_input_constant(0.5, 0.5, 0.5);
+    c->m->roughness_u = c->m->roughness_v = pt_input_constant(0.1, 0.1, 0.1);
+    c->m->thickness = pt_input_constant(0.01, 0.01, 0.01);
+    pt_params_ignore(c->p, "filename");
+}
+
+static const struct {
+    const char *name;
+    int32_t kind;
+    void (*make)(struct context *c);
+} kinds[] = {
+    {"diffuse", PT_MATERIAL_DIFFUSE, make_diffuse},
+    {"coateddiffuse", PT_MATERIAL_COATED_DIFFUSE, make_coated_diffuse},
+    {"conductor", PT_MATERIAL_CONDUCTOR, make_conductor},
+    {"coatedconductor", PT_MATERIAL_COATED_CONDUCTOR, make_coated_conductor},
+    {"dielectric", PT_MATERIAL_DIELECTRIC, make_dielectric},
+    {"thindielectric", PT_MATERIAL_THIN_DIELECTRIC, make_thin_dielectric},
+    {"diffusetransmission", PT_MATERIAL_DIFFUSE_TRANSMISSION, make_diffuse_transmission},
+    {"interface", PT_MATERIAL_INTERFACE, make_interface},
+    {"none", PT_MATERIAL_INTERFACE, make_interface},
+    {"", PT_MATERIAL_INTERFACE, make_interface},
+    {"subsurface", PT_MATERIAL_COATED_DIFFUSE, make_subsurface},
+    {"hair", PT_MATERIAL_DIFFUSE, make_hair},
+    {"measured", PT_MATERIAL_COATED_DIFFUSE, make_measured},
+};
+
+static int build_v4(struct context *c)
+{
+    if (strcmp(c->kind, "mix") == 0 && pt_params_find(c->p, "namedmaterial1") == NULL) {
+        *c->m = pt_material_blank(PT_MATERIAL_MIX);
+        make_mix(c);
+        return 1;
+    }
+    for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
+        if (strcmp(kinds[i].name, c->kind) == 0) {
+            *c->m = pt_material_blank(kinds[i].kind);
+            kinds[i].make(c);
+            return 1;
+        }
+    return 0;
+}
+
+static int32_t add(struct pt_builder *b, const struct pt_material *m, const struct pt_material_info *info)
+{
+    if (pt_list_add(b, &b->material_infos, info) < 0)
+        return -1;
+    return pt_list_add(b, &b->materials, m);
+}
+
+int32_t pt_build_material(struct pt_builder *b, const struct pt_state *s, const char *kind, struct pt_params *p)
+{
+    struct pt_material m = pt_material_blank(PT_MATERIAL_DIFFUSE);
+    struct pt_material_info info = {.loc = p->loc, .opacity = pt_input_constant(1, 1, 1)};
+    struct context c = {b, s, p, kind, &m};
+    pt_params_ignore(p, "type");
+    if (!build_v4(&c) && !pt_build_material_v3(b, s, kind, p, &m, &info)) {
+        pt_diag_fail(&b->diag, p->loc, "unknown material \"%s\" (expected diffuse, coateddiffuse, conductor, dielectric, mix …)", kind);
+        return -1;
+    }
+    if (m.bump < 0)
+        m.bump = pt_build_bump(b, p, "displacement");
+    struct pt_param *map = pt_params_find(p, "normalmap");
+    if (map != NULL && map->type == PT_PARAM_TEXTURE)
+        m.normal_map = pt_build_colour_input(b, s, p, "normalmap", PT_USE_UNBOUNDED, v3_splat(0)).texture;
+    else if (map != NULL)
+        m.normal_map = pt_build_image_texture(b, map->loc, pt_params_string(p, "normalmap", ""), "linear");
+    pt_params_check_used(p);
+    return !b->diag.rc ? add(b, &m, &info) : -1;
+}
+
+int32_t pt_build_default_material(struct pt_builder *b)
+{
+    if (b->default_material < 0) {
+        struct pt_material m = pt_material_blank(PT_MATERIAL_DIFFUSE);
+        struct pt_material_info info = {.opacity = pt_input_constant(1, 1, 1)};
+        m.reflectance = pt_input_constant(0.5, 0.5, 0.5);
+        b->default_material = add(b, &m, &info);
+    }
+    return b->default_material;
+}

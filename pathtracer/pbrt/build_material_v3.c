@@ -1,0 +1,200 @@
+/* pbrt-v3's materials in terms of v4's. */
+#include <math.h>
+#include <string.h>
+
+#include "pbrt/build.h"
+
+struct context {
+    struct pt_builder *b;
+    const struct pt_state *s;
+    struct pt_params *p;
+    const char *kind;
+    struct pt_material *m;
+    struct pt_material_info *info;
+};
+
+static struct pt_input colour(struct context *c, const char *name, float fallback)
+{
+    return pt_build_colour_input(c->b, c->s, c->p, name, PT_USE_REFLECTANCE, v3_splat(fallback));
+}
+
+static int is_black(struct pt_input in)
+{
+    return in.texture < 0 && v3_is_black(in.value);
+}
+
+static void clear_coat(struct context *c)
+{
+    c->m->kind = PT_MATERIAL_COATED_DIFFUSE;
+    c->m->thickness = pt_input_constant(0.01, 0.01, 0.01);
+}
+
+static double index_of(struct context *c, double fallback)
+{
+    return pt_build_index(c->b, c->p, pt_params_find(c->p, "index") != NULL ? "index" : "eta", fallback);
+}
+
+static void make_matte(struct context *c)
+{
+    c->m->reflectance = colour(c, "Kd", 0.5f);
+    struct pt_input sigma = pt_build_float_input(c->b, c->p, "sigma", 0);
+    if (sigma.texture >= 0 || sigma.value.x != 0)
+        pt_diag_warn(&c->b->diag, c->p->loc, "sigma of a matte material is ignored: plain diffuse");
+}
+
+/* Ks of these v3 models is the strength of the coat; the coat here is glass of index 1.5 (as pbrt-v4's own upgrade does). */
+static void make_plastic(struct context *c)
+{
+    int substrate = strcmp(c->kind, "substrate") == 0;
+    c->m->reflectance = colour(c, "Kd", substrate ? 0.5f : 0.25f);
+    struct pt_input ks = colour(c, "Ks", substrate ? 0.5f : 0.25f);
+    pt_build_roughness(c->b, c->p, 0.1, 1, c->m);
+    if (is_black(ks))
+        return;
+    clear_coat(c);
+}
+
+static void make_uber(struct context *c)
+{
+    struct pt_input kd = colour(c, "Kd", 0.25f), ks = colour(c, "Ks", 0.25f), kr = colour(c, "Kr", 0), kt = colour(c, "Kt", 0);
+    double eta = index_of(c, 1.5);
+    pt_build_roughness(c->b, c->p, 0.1, 1, c->m);
+    c->m->eta = (float)eta;
+    struct pt_param *opacity = pt_params_find(c->p, "opacity");
+    if (opacity != NULL) {
+        struct pt_input o = colour(c, "opacity", 1);
+        c->info->has_opacity = o.texture >= 0 || v3_luminance(o.value) < 1;
+        c->info->opacity = o.texture >= 0 ? o : pt_input_constant((double)v3_luminance(o.value), (double)v3_luminance(o.value),
+                                                                  (double)v3_luminance(o.value));
+    }
+    if (!is_black(kt) && is_black(kd)) {
+        c->m->kind = PT_MATERIAL_DIELECTRIC;
+        c->m->roughness_u = c->m->roughness_v = pt_input_constant(0, 0, 0);
+    } else if (!is_black(kr) && is_black(kd) && is_black(ks)) {
+        c->m->kind = PT_MATERIAL_CONDUCTOR;
+        c->m->conductor_by_colour = 1;
+        c->m->reflectance = kr;
+        c->m->roughness_u = c->m->roughness_v = pt_input_constant(0, 0, 0);
+    } else {
+        if (!is_black(kr) || !is_black(kt))
+            pt_diag_warn(&c->b->diag, c->p->loc, "Kr and Kt of an uber material with Kd are ignored");
+        c->m->reflectance = kd;
+        if (!is_black(ks) || !is_black(kr))
+            clear_coat(c);
+    }
+}
+
+static void make_metal(struct context *c)
+{
+    c->m->kind = PT_MATERIAL_CONDUCTOR;
+    pt_build_roughness(c->b, c->p, 0.01, 1, c->m);
+    pt_build_conductor(c->b, c->s, c->p, "eta", "k", &c->m->eta_rgb.value, &c->m->k_rgb.value);
+}
+
+static void make_mirror(struct context *c)
+{
+    c->m->kind = PT_MATERIAL_CONDUCTOR;
+    c->m->conductor_by_colour = 1;
+    c->m->reflectance = colour(c, "Kr", 0.9f);
+    pt_params_ignore(c->p, "remaproughness roughness");
+}
+
+static void make_shiny_metal(struct context *c)
+{
+    c->m->kind = PT_MATERIAL_CONDUCTOR;
+    c->m->conductor_by_colour = 1;
+    c->m->reflectance = colour(c, "Kr", 1);
+    pt_params_ignore(c->p, "Ks");
+    pt_build_roughness(c->b, c->p, 0.1, 1, c->m);
+}
+
+static void make_glass(struct context *c)
+{
+    struct pt_input kr = colour(c, "Kr", 1), kt = colour(c, "Kt", 1);
+    c->m->kind = PT_MATERIAL_DIELECTRIC;
+    pt_build_roughness(c->b, c->p, 0, 1, c->m);
+    c->m->eta = (float)index_of(c, 1.5);
+    if (kr.texture >= 0 || kt.texture >= 0 || v3_luminance(kr.value) < 0.999f || v3_luminance(kt.value) < 0.999f)
+        pt_diag_warn(&c->b->diag, c->p->loc, "Kr and Kt of glass are taken as 1");
+}
+
+static void make_translucent(struct context *c)
+{
+    struct pt_input kd = colour(c, "Kd", 0.25f), ks = colour(c, "Ks", 0.25f);
+    c->m->kind = PT_MATERIAL_DIFFUSE_TRANSMISSION;
+    c->m->reflectance = pt_input_product(c->b, kd, colour(c, "reflect", 0.5f));
+    c->m->transmittance = pt_input_product(c->b, kd, colour(c, "transmit", 0.5f));
+    pt_build_roughness(c->b, c->p, 0.1, 1, c->m);
+    if (!is_black(ks))
+        pt_diag_warn(&c->b->diag, c->p->loc, "Ks of a translucent material is ignored");
+}
+
+/* v3 gives the share of the first material, v4 that of the second. */
+static void make_mix(struct context *c)
+{
+    struct pt_param *first = pt_params_find(c->p, "namedmaterial1"), *second = pt_params_find(c->p, "namedmaterial2");
+    c->m->kind = PT_MATERIAL_MIX;
+    if (first == NULL || second == NULL || first->type != PT_PARAM_STRING || second->type != PT_PARAM_STRING) {
+        pt_diag_fail(&c->b->diag, c->p->loc, "mix needs \"string namedmaterial1\" and \"string namedmaterial2\"");
+        return;
+    }
+    c->m->mix_b = pt_build_material_named(c->b, first->loc, pt_params_string(c->p, "namedmaterial1", ""));
+    c->m->mix_a = pt_build_material_named(c->b, second->loc, pt_params_string(c->p, "namedmaterial2", ""));
+    struct pt_param *amount = pt_params_find(c->p, "amount");
+    if (amount != NULL && amount->type == PT_PARAM_FLOAT) {
+        c->m->mix_amount = pt_build_float_input(c->b, c->p, "amount", 0.5);
+        return;
+    }
+    c->m->mix_amount = colour(c, "amount", 0.5f);
+    float grey = v3_luminance(c->m->mix_amount.value);
+    c->m->mix_amount.value = v3_splat(grey);
+}
+
+static void make_kd_subsurface(struct context *c)
+{
+    pt_diag_warn(&c->b->diag, c->p->loc, "material \"%s\" is replaced by a diffuse one", c->kind);
+    c->m->reflectance = colour(c, "Kd", 0.5f);
+    pt_params_ignore(c->p, "Kr Kt mfp eta scale uroughness vroughness roughness remaproughness g sigma_a sigma_s name");
+}
+
+static void make_disney(struct context *c)
+{
+    pt_diag_warn(&c->b->diag, c->p->loc, "material \"%s\" is replaced by a coated diffuse one", c->kind);
+    c->m->reflectance = colour(c, "color", 0.5f);
+    pt_build_roughness(c->b, c->p, 0.5, 0, c->m);
+    c->m->eta = (float)pt_build_index(c->b, c->p, "eta", 1.5);
+    pt_params_ignore(c->p, "metallic speculartint anisotropic sheen sheentint clearcoat clearcoatgloss spectrans scatterdistance "
+                           "thin flatness difftrans");
+    clear_coat(c);
+}
+
+static void make_fourier(struct context *c)
+{
+    pt_diag_warn(&c->b->diag, c->p->loc, "material \"%s\" (a measured table) is replaced by a coated diffuse one", c->kind);
+    c->m->reflectance = pt_input_constant(0.5, 0.5, 0.5);
+    c->m->roughness_u = c->m->roughness_v = pt_input_constant(0.05, 0.05, 0.05);
+    pt_params_ignore(c->p, "bsdffile");
+    clear_coat(c);
+}
+
+int pt_build_material_v3(struct pt_builder *b, const struct pt_state *s, const char *kind, struct pt_params *p,
+                         struct pt_material *m, struct pt_material_info *info)
+{
+    static const struct {
+        const char *name;
+        void (*make)(struct context *c);
+    } kinds[] = {{"matte", make_matte},       {"plastic", make_plastic},         {"substrate", make_plastic},
+                 {"uber", make_uber},         {"metal", make_metal},             {"mirror", make_mirror},
+                 {"glass", make_glass},       {"translucent", make_translucent}, {"mix", make_mix},
+                 {"shinymetal", make_shiny_metal}, {"kdsubsurface", make_kd_subsurface},
+                 {"disney", make_disney},     {"fourier", make_fourier}};
+    struct context c = {b, s, p, kind, m, info};
+    for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
+        if (strcmp(kinds[i].name, kind) == 0) {
+            *m = pt_material_blank(PT_MATERIAL_DIFFUSE);
+            kinds[i].make(&c);
+            m->bump = pt_build_bump(b, p, "bumpmap");
+            return 1;
+        }
+    return 0;
+}

@@ -1,0 +1,160 @@
+/* Participating media. */
+#include <math.h>
+#include <string.h>
+
+#include "pbrt/build.h"
+
+int32_t pt_build_medium_ref(struct pt_builder *b, const char *name, struct pt_loc loc)
+{
+    if (name[0] == '\0')
+        return -1;
+    int32_t id = pt_names_get(&b->media_names, name);
+    if (id >= 0) {
+        struct pt_medium_info *info = &((struct pt_medium_info *)b->medium_infos.items)[id];
+        if (info->first_use.line == 0)
+            info->first_use = loc;
+        return id;
+    }
+    struct pt_medium medium = {.kind = PT_MEDIUM_HOMOGENEOUS};
+    struct pt_medium_info info = {.first_use = loc, .name = pt_arena_strndup(&b->scene->arena, name, strlen(name))};
+    if (info.name == NULL || pt_list_add(b, &b->medium_infos, &info) < 0 || (id = pt_list_add(b, &b->media, &medium)) < 0 ||
+        pt_names_set(&b->media_names, name, id) != 0)
+        pt_diag_nomem(&b->diag, "media");
+    return id;
+}
+
+int pt_build_media_check(struct pt_builder *b)
+{
+    const struct pt_medium_info *infos = b->medium_infos.items;
+    for (size_t i = 0; i < b->medium_infos.count; i++)
+        if (infos[i].defined.line == 0)
+            return pt_diag_fail(&b->diag, infos[i].first_use, "unknown medium \"%s\" (expected one made by MakeNamedMedium)",
+                                infos[i].name);
+    return 0;
+}
+
+/* Jensen, Marschner, Levoy and Hanrahan 2001, "A Practical Model for Subsurface Light Transport", table 1; 1/mm. */
+static const struct {
+    const char *name;
+    float sigma_s[3], sigma_a[3];
+} presets[] = {{"Apple", {2.29f, 2.39f, 1.97f}, {0.0030f, 0.0034f, 0.046f}},
+               {"Chicken1", {0.15f, 0.21f, 0.38f}, {0.015f, 0.077f, 0.19f}},
+               {"Chicken2", {0.19f, 0.25f, 0.32f}, {0.018f, 0.088f, 0.20f}},
+               {"Cream", {7.38f, 5.47f, 3.15f}, {0.0002f, 0.0028f, 0.0163f}},
+               {"Ketchup", {0.18f, 0.07f, 0.03f}, {0.061f, 0.97f, 1.45f}},
+               {"Marble", {2.19f, 2.62f, 3.00f}, {0.0021f, 0.0041f, 0.0071f}},
+               {"Potato", {0.68f, 0.70f, 0.55f}, {0.0024f, 0.0090f, 0.12f}},
+               {"Skimmilk", {0.70f, 1.22f, 1.90f}, {0.0014f, 0.0025f, 0.0142f}},
+               {"Skin1", {0.74f, 0.88f, 1.01f}, {0.032f, 0.17f, 0.48f}},
+               {"Skin2", {1.09f, 1.59f, 1.79f}, {0.013f, 0.070f, 0.145f}},
+               {"Spectralon", {11.6f, 20.4f, 14.9f}, {0, 0, 0}},
+               {"Wholemilk", {2.55f, 3.21f, 3.77f}, {0.0011f, 0.0024f, 0.014f}}};
+
+static void read_coefficients(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, int is_grid, struct pt_medium *m)
+{
+    const char *preset = pt_params_string(p, "preset", "");
+    /* pbrt's defaults: whole milk in a homogeneous medium, 1 in a grid. */
+    m->sigma_a = is_grid && !b->is_v3 ? v3_splat(1) : v3(0.0011f, 0.0024f, 0.014f);
+    m->sigma_s = is_grid && !b->is_v3 ? v3_splat(1) : v3(2.55f, 3.21f, 3.77f);
+    int known = preset[0] == '\0';
+    for (size_t i = 0; i < sizeof presets / sizeof presets[0] && !known; i++)
+        if (strcmp(presets[i].name, preset) == 0) {
+            const float *ss = presets[i].sigma_s, *sa = presets[i].sigma_a;
+            m->sigma_s = v3(ss[0], ss[1], ss[2]);
+            m->sigma_a = v3(sa[0], sa[1], sa[2]);
+            known = 1;
+        }
+    if (!known)
+        pt_diag_warn(&b->diag, pt_params_find(p, "preset")->loc, "unknown medium preset \"%s\": whole milk is used", preset);
+    pt_build_colour(b, s, p, "sigma_a", PT_USE_UNBOUNDED, &m->sigma_a);
+    pt_build_colour(b, s, p, "sigma_s", PT_USE_UNBOUNDED, &m->sigma_s);
+    m->g = (float)pt_params_float_in(p, "g", 0, -0.9999, 0.9999);
+    pt_vec3 emission = v3_splat(0);
+    if (pt_build_colour(b, s, p, "Le", PT_USE_LIGHT, &emission))
+        emission = v3_scale(emission, (float)pt_params_float_in(p, "Lescale", 1, 0, 1e12));
+    pt_params_ignore(p, "Lescale");
+    float scale = (float)pt_params_float_in(p, "scale", 1, 0, 1e12);
+    m->sigma_a = v3_scale(m->sigma_a, scale);
+    m->sigma_s = v3_scale(m->sigma_s, scale);
+    m->emission = v3_mul(m->sigma_a, emission);
+}
+
+/* World → unit box of [p0, p1] → render's inverse. */
+static int place_grid(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, struct pt_medium *m)
+{
+    double p0[3] = {0, 0, 0}, p1[3] = {1, 1, 1};
+    struct pt_xform at[2], inverse;
+    pt_params_point(p, "p0", p0);
+    pt_params_point(p, "p1", p1);
+    pt_builder_at_shutter(b, s->ctm, at);
+    if (!(p0[0] != p1[0] && p0[1] != p1[1] && p0[2] != p1[2]))
+        return pt_diag_fail(&b->diag, p->loc, "the box of a grid medium is empty (expected p0 and p1 apart in all axes)");
+    struct pt_xform box = pt_xform_translate(p0[0], p0[1], p0[2]);
+    struct pt_xform size = pt_xform_scale(p1[0] - p0[0], p1[1] - p0[1], p1[2] - p0[2]);
+    box = pt_xform_mul(&box, &size);
+    box = pt_xform_mul(&at[0], &box);
+    box = pt_builder_to_render(b, &box);
+    if (!pt_xform_invert(&box, &inverse))
+        return pt_diag_fail(&b->diag, p->loc, "singular transform of a medium");
+    m->from_render = pt_xform_to_mat34(&inverse);
+    return 0;
+}
+
+static int read_grid(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, struct pt_medium *m)
+{
+    size_t n = 0;
+    m->kind = PT_MEDIUM_GRID;
+    m->nx = pt_params_int_in(p, "nx", 1, 1, 4096);
+    m->ny = pt_params_int_in(p, "ny", 1, 1, 4096);
+    m->nz = pt_params_int_in(p, "nz", 1, 1, 4096);
+    const double *density = pt_params_floats(p, "density", 1, &n);
+    size_t expected = (size_t)m->nx * (size_t)m->ny * (size_t)m->nz;
+    if (b->diag.rc)
+        return b->diag.rc;
+    if (density == NULL)
+        return pt_diag_fail(&b->diag, p->loc, "a grid medium needs \"float density\"");
+    if (n != expected)
+        return pt_diag_fail(&b->diag, pt_params_find(p, "density")->loc, "density has %zu values (expected nx·ny·nz = %zu)", n, expected);
+    float *kept = pt_arena_alloc(&b->scene->arena, n, sizeof *kept);
+    if (kept == NULL)
+        return pt_diag_nomem(&b->diag, "a grid medium");
+    for (size_t i = 0; i < n; i++) {
+        if (density[i] < 0)
+            return pt_diag_fail(&b->diag, pt_params_find(p, "density")->loc, "density %zu is %g (expected 0 or more)", i, density[i]);
+        kept[i] = (float)density[i];
+    }
+    m->density = kept;
+    pt_params_ignore(p, "temperature temperaturecutoff temperatureoffset temperaturescale");
+    return place_grid(b, s, p, m);
+}
+
+int pt_build_medium(struct pt_builder *b, const struct pt_state *s, const char *name, struct pt_params *p)
+{
+    char type[64];
+    struct pt_medium m = {.kind = PT_MEDIUM_HOMOGENEOUS};
+    const char *given = pt_params_string(p, "type", "homogeneous");
+    if (name[0] == '\0')
+        return pt_diag_fail(&b->diag, p->loc, "MakeNamedMedium with an empty name");
+    strncpy(type, given, sizeof type - 1);
+    type[sizeof type - 1] = '\0';
+    int is_grid = strcmp(type, "uniformgrid") == 0 || strcmp(type, "heterogeneous") == 0;
+    int stand_in = strcmp(type, "rgbgrid") == 0 || strcmp(type, "cloud") == 0 || strcmp(type, "nanovdb") == 0;
+    if (!is_grid && !stand_in && strcmp(type, "homogeneous") != 0)
+        return pt_diag_fail(&b->diag, p->loc, "unknown medium type \"%s\" (expected homogeneous or uniformgrid)", type);
+    if (stand_in) {
+        pt_diag_warn(&b->diag, p->loc, "medium type \"%s\" is replaced by empty space", type);
+        for (size_t i = 0; i < p->count; i++)
+            p->items[i].used = 1;
+    } else {
+        read_coefficients(b, s, p, is_grid, &m);
+        if (is_grid)
+            read_grid(b, s, p, &m);
+    }
+    pt_params_check_used(p);
+    int32_t id = pt_build_medium_ref(b, name, p->loc);
+    if (b->diag.rc)
+        return b->diag.rc;
+    ((struct pt_medium *)b->media.items)[id] = m;
+    ((struct pt_medium_info *)b->medium_infos.items)[id].defined = p->loc;
+    return 0;
+}

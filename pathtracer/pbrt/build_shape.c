@@ -1,0 +1,435 @@
+/* Shapes, objects and instances. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "pbrt/build.h"
+#include "pbrt/ply.h"
+
+static const double pi = 3.14159265358979323846;
+
+/* Coordinates beyond this lose visible precision in float: an object defined out there gets an origin of its own. */
+static const double far_away = 1e4;
+
+struct placement {
+    struct pt_xform xform;  /* the shape's own space → where its vertices are stored */
+    int animated;           /* stored as it is; `at` places it */
+    struct pt_xform at[2];  /* own → world at shutter open and close */
+};
+
+/* --- where a shape goes ------------------------------------------------------------------------------------------------ */
+
+static struct placement place(struct pt_builder *b, const struct pt_state *s, const struct pt_params *p, const double probe[3])
+{
+    struct placement pl = {.animated = 0};
+    pt_builder_at_shutter(b, s->ctm, pl.at);
+    pl.animated = !pt_xform_equal(&pl.at[0], &pl.at[1]);
+    if (b->open_object >= 0) {
+        double *offset = b->object_offsets[b->open_object], first[3];
+        const struct pt_object *o = &((struct pt_object *)b->objects.items)[b->open_object];
+        if (pl.animated)
+            pt_diag_warn(&b->diag, p->loc, "a moving shape within an object stays at its place at shutter open");
+        pl.animated = 0;
+        pt_xform_point(&pl.at[0], probe, first);
+        if (o->shape_count == 0 && fmax(fabs(first[0]), fmax(fabs(first[1]), fabs(first[2]))) > far_away)
+            memcpy(offset, first, sizeof first);
+        pl.xform = pl.at[0];
+        for (int i = 0; i < 3; i++)
+            pl.xform.m[i][3] -= offset[i];
+    } else if (pl.animated) {
+        pl.xform = pt_xform_identity();
+    } else {
+        pl.xform = pt_builder_to_render(b, &pl.at[0]);
+    }
+    return pl;
+}
+
+/* What every shape has: material, alpha, media, side, light. */
+static struct pt_shape common(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const struct placement *pl)
+{
+    struct pt_shape shape = {.light = -1, .medium_in = s->medium_in, .medium_out = s->medium_out};
+    shape.material = s->material >= 0 ? s->material : pt_build_default_material(b);
+    shape.flip_normal = (s->reverse_orientation != 0) != (pt_xform_det(&pl->xform) < 0);
+    shape.alpha = pt_build_float_input(b, p, "alpha", 1);
+    if (shape.alpha.texture < 0 && shape.alpha.value.x == 1 && shape.material >= 0) {
+        const struct pt_material_info *info = &((struct pt_material_info *)b->material_infos.items)[shape.material];
+        if (info->has_opacity)
+            shape.alpha = info->opacity;
+    }
+    shape.has_alpha = shape.alpha.texture >= 0 || shape.alpha.value.x < 1;
+    if (shape.has_alpha)
+        pt_builder_effect(b, PT_FX_ALPHA | (shape.alpha.texture >= 0 ? PT_FX_TEXTURE : 0u), p->loc);
+    if (pt_params_find(p, "shadowalpha") != NULL)
+        pt_diag_warn(&b->diag, pt_params_find(p, "shadowalpha")->loc, "shadowalpha is ignored: shadows follow alpha");
+    pt_params_ignore(p, "shadowalpha");
+    return shape;
+}
+
+static int is_interface(const struct pt_builder *b, int32_t material)
+{
+    return material >= 0 && ((struct pt_material *)b->materials.items)[material].kind == PT_MATERIAL_INTERFACE;
+}
+
+/* Stores a finished shape with its light, or as a moving object of its own. */
+static int add_shape(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const struct placement *pl,
+                     struct pt_shape *shape, double area)
+{
+    pt_params_check_used(p);
+    if (b->diag.rc)
+        return b->diag.rc;
+    if (s->area.on && (b->open_object >= 0 || pl->animated))
+        pt_diag_warn(&b->diag, s->area.loc, "area lights in objects and on moving shapes do not emit");
+    else if (s->area.on && !v3_is_black(s->area.emission))
+        shape->light = pt_build_shape_light(b, &s->area, area);
+    if (is_interface(b, shape->material))
+        pt_builder_effect(b, PT_FX_INTERFACE, p->loc);
+    if (b->open_object >= 0) {
+        struct pt_object *o = &((struct pt_object *)b->objects.items)[b->open_object];
+        o->shape_count++;
+        pt_list_add(b, &b->object_shapes, shape);
+    } else if (pl->animated) {
+        struct pt_object object = {(int32_t)b->object_shapes.count, 1};
+        struct pt_instance instance = {.animated = 1};
+        instance.object = pt_list_add(b, &b->objects, &object);
+        pt_list_add(b, &b->object_shapes, shape);
+        for (int i = 0; i < 2; i++) {
+            struct pt_xform t = pt_builder_to_render(b, &pl->at[i]);
+            instance.to_render[i] = pt_xform_to_mat34(&t);
+        }
+        pt_list_add(b, &b->instances, &instance);
+        pt_builder_effect(b, PT_FX_MOTION | PT_FX_INSTANCES, p->loc);
+    } else {
+        pt_list_add(b, &b->world_shapes, shape);
+    }
+    return b->diag.rc;
+}
+
+/* --- meshes ------------------------------------------------------------------------------------------------------------ */
+
+static double value(const double *d, const float *f, size_t i)
+{
+    return d != NULL ? d[i] : (double)f[i];
+}
+
+/* Vertices in double, stored in float. 0 when one is not finite there. */
+static int store_positions(const struct pt_soup *soup, const struct pt_xform *t, float *out)
+{
+    for (size_t i = 0; i < soup->vertex_count; i++) {
+        double p[3], q[3];
+        for (size_t k = 0; k < 3; k++)
+            p[k] = value(soup->pd, soup->pf, 3 * i + k);
+        pt_xform_point(t, p, q);
+        for (size_t k = 0; k < 3; k++) {
+            out[3 * i + k] = (float)q[k];
+            if (!isfinite(out[3 * i + k]))
+                return 0;
+        }
+    }
+    return 1;
+}
+
+static void store_normals(const struct pt_soup *soup, const struct pt_xform *inverse, int negate, float *out)
+{
+    for (size_t i = 0; i < soup->vertex_count; i++) {
+        double n[3];
+        for (size_t k = 0; k < 3; k++)
+            n[k] = value(soup->nd, soup->nf, 3 * i + k);
+        for (size_t k = 0; k < 3; k++) {
+            double v = inverse->m[0][k] * n[0] + inverse->m[1][k] * n[1] + inverse->m[2][k] * n[2];
+            out[3 * i + k] = (float)(negate ? -v : v);
+        }
+        /* Scenes scaled by 1e±6 must not leave float's range when the length is squared. */
+        float *o = out + 3 * i, big = fmaxf(fabsf(o[0]), fmaxf(fabsf(o[1]), fabsf(o[2])));
+        if (big > 0 && isfinite(big)) {
+            for (size_t k = 0; k < 3; k++)
+                o[k] /= big;
+        } else {
+            o[0] = o[1] = o[2] = 0;
+        }
+    }
+}
+
+static double mesh_area(const struct pt_mesh *m)
+{
+    double area = 0;
+    for (size_t i = 0; i < m->triangle_count; i++) {
+        const float *v[3];
+        double e1[3], e2[3];
+        for (size_t k = 0; k < 3; k++)
+            v[k] = m->positions + 3 * (size_t)m->indices[3 * i + k];
+        for (int k = 0; k < 3; k++) {
+            e1[k] = (double)v[1][k] - (double)v[0][k];
+            e2[k] = (double)v[2][k] - (double)v[0][k];
+        }
+        double c[3] = {e1[1] * e2[2] - e1[2] * e2[1], e1[2] * e2[0] - e1[0] * e2[2], e1[0] * e2[1] - e1[1] * e2[0]};
+        area += 0.5 * sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]);
+    }
+    return area;
+}
+
+static int store_mesh(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const struct pt_soup *soup,
+                      const struct pt_xform *t, struct pt_mesh *m)
+{
+    struct pt_arena *arena = &b->scene->arena;
+    struct pt_xform inverse;
+    size_t n = soup->vertex_count;
+    float *positions = pt_arena_alloc(arena, 3 * n + 1, sizeof *positions);
+    uint32_t *indices = pt_arena_alloc(arena, soup->triangle_count, 3 * sizeof *indices);
+    int has_n = soup->nd != NULL || soup->nf != NULL, has_uv = soup->uvd != NULL || soup->uvf != NULL;
+    float *normals = has_n ? pt_arena_alloc(arena, n, 3 * sizeof *normals) : NULL;
+    float *uvs = has_uv ? pt_arena_alloc(arena, n, 2 * sizeof *uvs) : NULL;
+    if (positions == NULL || indices == NULL || (has_n && normals == NULL) || (has_uv && uvs == NULL))
+        return pt_diag_nomem(&b->diag, "a mesh");
+    if (!store_positions(soup, t, positions))
+        return pt_diag_fail(&b->diag, p->loc, "a vertex is not finite after its transform");
+    if (!pt_xform_invert(t, &inverse))
+        return pt_diag_fail(&b->diag, p->loc, "singular transform of a shape");
+    if (has_n)
+        store_normals(soup, &inverse, s->reverse_orientation, normals);
+    for (size_t i = 0; has_uv && i < 2 * n; i++)
+        uvs[i] = (float)value(soup->uvd, soup->uvf, i);
+    memcpy(indices, soup->indices, soup->triangle_count * 3 * sizeof *indices);
+    *m = (struct pt_mesh){(uint32_t)n, (uint32_t)soup->triangle_count, positions, indices, normals, uvs};
+    return 0;
+}
+
+int pt_build_mesh(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const struct pt_soup *soup)
+{
+    struct pt_mesh mesh;
+    double probe[3] = {0, 0, 0};
+    if (soup->triangle_count == 0 || soup->vertex_count == 0) {
+        pt_diag_warn(&b->diag, p->loc, "a mesh without triangles is left out");
+        pt_params_ignore(p, "alpha shadowalpha");
+        pt_params_check_used(p);
+        return b->diag.rc;
+    }
+    if (soup->vertex_count > INT32_MAX || soup->triangle_count > INT32_MAX)
+        return pt_diag_fail(&b->diag, p->loc, "a mesh of %zu triangles is too large", soup->triangle_count);
+    for (size_t k = 0; k < 3; k++)
+        probe[k] = value(soup->pd, soup->pf, k);
+    struct placement pl = place(b, s, p, probe);
+    struct pt_shape shape = common(b, s, p, &pl);
+    if (b->diag.rc || store_mesh(b, s, p, soup, &pl.xform, &mesh) != 0)
+        return b->diag.rc;
+    shape.kind = PT_SHAPE_MESH;
+    shape.data = pt_list_add(b, &b->meshes, &mesh);
+    return add_shape(b, s, p, &pl, &shape, s->area.on && s->area.power > 0 ? mesh_area(&mesh) : 0);
+}
+
+/* Whole numbers of a list as vertex indices in [0, vertex_count); malloc'ed, NULL on failure. */
+static uint32_t *read_indices(struct pt_builder *b, struct pt_params *p, size_t vertex_count, size_t *count)
+{
+    const double *given = pt_params_ints(p, "indices", count);
+    size_t n = given != NULL ? *count : 3;
+    if (b->diag.rc)
+        return NULL;
+    if (given == NULL && vertex_count != 3) {
+        pt_diag_fail(&b->diag, p->loc, "a trianglemesh of %zu vertices needs \"integer indices\"", vertex_count);
+        return NULL;
+    }
+    if (n % 3 != 0) {
+        pt_diag_fail(&b->diag, pt_params_find(p, "indices")->loc, "%zu indices (expected a multiple of 3)", n);
+        return NULL;
+    }
+    uint32_t *indices = malloc((n > 0 ? n : 1) * sizeof *indices);
+    if (indices == NULL) {
+        pt_diag_nomem(&b->diag, "a mesh");
+        return NULL;
+    }
+    for (size_t i = 0; i < n; i++) {
+        double v = given != NULL ? given[i] : (double)i;
+        if (!(v >= 0 && v < (double)vertex_count)) {
+            pt_diag_fail(&b->diag, pt_params_find(p, "indices")->loc, "index %.0f out of range (expected 0 to %zu)", v,
+                         vertex_count > 0 ? vertex_count - 1 : 0);
+            free(indices);
+            return NULL;
+        }
+        indices[i] = (uint32_t)v;
+    }
+    *count = n;
+    return indices;
+}
+
+static int make_triangle_mesh(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
+{
+    struct pt_soup soup = {0};
+    size_t n_count, uv_count, index_count;
+    soup.pd = pt_params_floats(p, "P", 3, &soup.vertex_count);
+    if (soup.pd == NULL)
+        return pt_diag_fail(&b->diag, p->loc, "a trianglemesh needs \"point3 P\"");
+    soup.nd = pt_params_floats(p, "N", 3, &n_count);
+    const char *uv_name = pt_params_find(p, "uv") != NULL ? "uv" : pt_params_find(p, "st") != NULL ? "st" : "UV";
+    soup.uvd = pt_params_floats(p, uv_name, 2, &uv_count);
+    if (soup.nd != NULL && n_count != soup.vertex_count)
+        return pt_diag_fail(&b->diag, pt_params_find(p, "N")->loc, "%zu normals for %zu vertices", n_count, soup.vertex_count);
+    if (soup.uvd != NULL && uv_count != soup.vertex_count)
+        return pt_diag_fail(&b->diag, pt_params_find(p, uv_name)->loc, "%zu texture coordinates for %zu vertices", uv_count,
+                            soup.vertex_count);
+    uint32_t *indices = read_indices(b, p, soup.vertex_count, &index_count);
+    if (indices == NULL)
+        return b->diag.rc;
+    soup.indices = indices;
+    soup.triangle_count = index_count / 3;
+    pt_params_ignore(p, "S faceIndices discarddegenerateUVs");
+    pt_build_mesh(b, s, p, &soup);
+    free(indices);
+    return b->diag.rc;
+}
+
+static int make_ply_mesh(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
+{
+    char path[2048];
+    char *bytes = NULL;
+    size_t size = 0;
+    struct pt_ply ply = {0};
+    struct base_err err = {0};
+    const char *name = pt_params_string(p, "filename", NULL);
+    if (name == NULL)
+        return pt_diag_fail(&b->diag, p->loc, "a plymesh needs \"string filename\"");
+    struct pt_loc loc = pt_params_find(p, "filename")->loc;
+    pt_builder_path(b, name, path, sizeof path);
+    int rc = b->source->read(b->source->data, path, &bytes, &size, &err);
+    if (!rc)
+        rc = pt_ply_parse(path, bytes, size, &ply, &err);
+    free(bytes);
+    if (rc)
+        return pt_diag_fail_code(&b->diag, rc == BASE_ENOMEM ? rc : BASE_EINVAL, loc, "cannot read %s", err.text);
+    if (pt_params_find(p, "displacement") != NULL) {
+        pt_diag_warn(&b->diag, pt_params_find(p, "displacement")->loc, "displacement of a plymesh's vertices is ignored");
+        pt_params_ignore(p, "displacement edgelength");
+    }
+    struct pt_soup soup = {.vertex_count = ply.vertex_count, .triangle_count = ply.triangle_count, .pf = ply.positions,
+                           .nf = ply.normals, .uvf = ply.uvs, .indices = ply.indices};
+    pt_build_mesh(b, s, p, &soup);
+    pt_ply_release(&ply);
+    return b->diag.rc;
+}
+
+/* --- quadrics ---------------------------------------------------------------------------------------------------------- */
+
+static double quadric_area(const struct pt_quadric *q, const struct pt_xform *t)
+{
+    double r = (double)q->radius, phi = (double)q->phi_max, height = (double)q->z_max - (double)q->z_min;
+    double own = q->kind == PT_QUADRIC_DISK ? 0.5 * phi * (r * r - (double)q->inner_radius * (double)q->inner_radius) : phi * r * height;
+    return own * pow(fabs(pt_xform_det(t)), 2.0 / 3.0); /* exact for uniform scales */
+}
+
+static int add_quadric(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, struct pt_quadric *q)
+{
+    const double probe[3] = {0, 0, 0};
+    struct pt_xform inverse;
+    struct placement pl = place(b, s, p, probe);
+    struct pt_shape shape = common(b, s, p, &pl);
+    if (!pt_xform_invert(&pl.xform, &inverse))
+        return pt_diag_fail(&b->diag, p->loc, "singular transform of a shape");
+    q->phi_max = (float)(pt_params_float_in(p, "phimax", 360, 1e-3, 360) * pi / 180);
+    q->to_render = pt_xform_to_mat34(&pl.xform);
+    q->from_render = pt_xform_to_mat34(&inverse);
+    if (b->diag.rc)
+        return b->diag.rc;
+    shape.kind = PT_SHAPE_QUADRIC;
+    shape.data = pt_list_add(b, &b->quadrics, q);
+    pt_builder_effect(b, PT_FX_QUADRIC, p->loc);
+    return add_shape(b, s, p, &pl, &shape, quadric_area(q, &pl.xform));
+}
+
+static int make_sphere(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
+{
+    double r = pt_params_float_in(p, "radius", 1, 1e-30, 1e30);
+    double z0 = fmax(pt_params_float(p, "zmin", -r), -r), z1 = fmin(pt_params_float(p, "zmax", r), r);
+    if (!(z0 < z1))
+        return pt_diag_fail(&b->diag, p->loc, "zmin %g is not below zmax %g", z0, z1);
+    struct pt_quadric q = {.kind = PT_QUADRIC_SPHERE, .radius = (float)r, .z_min = (float)z0, .z_max = (float)z1};
+    return add_quadric(b, s, p, &q);
+}
+
+static int make_disk(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
+{
+    double r = pt_params_float_in(p, "radius", 1, 1e-30, 1e30), h = pt_params_float(p, "height", 0);
+    double inner = pt_params_float_in(p, "innerradius", 0, 0, 1e30);
+    if (!(inner < r))
+        return pt_diag_fail(&b->diag, p->loc, "innerradius %g is not below radius %g", inner, r);
+    struct pt_quadric q = {.kind = PT_QUADRIC_DISK, .radius = (float)r, .inner_radius = (float)inner, .z_min = (float)h, .z_max = (float)h};
+    return add_quadric(b, s, p, &q);
+}
+
+static int make_cylinder(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
+{
+    double r = pt_params_float_in(p, "radius", 1, 1e-30, 1e30);
+    double z0 = pt_params_float(p, "zmin", -1), z1 = pt_params_float(p, "zmax", 1);
+    if (z0 == z1)
+        return pt_diag_fail(&b->diag, p->loc, "zmin and zmax are both %g", z0);
+    struct pt_quadric q = {.kind = PT_QUADRIC_CYLINDER, .radius = (float)r, .z_min = (float)fmin(z0, z1), .z_max = (float)fmax(z0, z1)};
+    return add_quadric(b, s, p, &q);
+}
+
+/* --- dispatch, objects -------------------------------------------------------------------------------------------------- */
+
+static int make_nurbs(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
+{
+    (void)s;
+    pt_diag_warn(&b->diag, p->loc, "shape \"%s\" is left out", pt_params_kind(p));
+    return b->diag.rc;
+}
+
+int pt_build_shape(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
+{
+    static const struct {
+        const char *kind;
+        int (*make)(struct pt_builder *b, const struct pt_state *s, struct pt_params *p);
+    } kinds[] = {{"plymesh", make_ply_mesh},   {"trianglemesh", make_triangle_mesh}, {"sphere", make_sphere},
+                 {"disk", make_disk},          {"cylinder", make_cylinder},          {"loopsubdiv", pt_build_loop_subdiv},
+                 {"bilinearmesh", pt_build_bilinear}, {"curve", pt_build_curve},     {"heightfield", pt_build_height_field},
+                 {"cone", pt_build_revolved},  {"paraboloid", pt_build_revolved},    {"hyperboloid", pt_build_revolved},
+                 {"nurbs", make_nurbs}};
+    for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
+        if (strcmp(kinds[i].kind, pt_params_kind(p)) == 0)
+            return kinds[i].make(b, s, p);
+    return pt_diag_fail(&b->diag, p->loc, "unknown shape \"%s\" (expected trianglemesh, plymesh, sphere, disk …)", pt_params_kind(p));
+}
+
+int pt_build_object_begin(struct pt_builder *b, const char *name, struct pt_loc loc)
+{
+    struct pt_object object = {(int32_t)b->object_shapes.count, 0};
+    if (b->open_object >= 0)
+        return pt_diag_fail(&b->diag, loc, "ObjectBegin within an object");
+    int32_t id = pt_list_add(b, &b->objects, &object);
+    while (id >= 0 && (size_t)id >= b->object_offset_room)
+        if (!pt_grow((void **)&b->object_offsets, &b->object_offset_room, b->object_offset_room, sizeof *b->object_offsets))
+            return pt_diag_nomem(&b->diag, "objects");
+    if (id < 0 || pt_names_set(&b->object_names, name, id) != 0)
+        return pt_diag_nomem(&b->diag, "objects");
+    memset(b->object_offsets[id], 0, sizeof b->object_offsets[id]);
+    b->open_object = id;
+    return 0;
+}
+
+int pt_build_object_end(struct pt_builder *b)
+{
+    b->open_object = -1;
+    return 0;
+}
+
+int pt_build_instance(struct pt_builder *b, const struct pt_state *s, const char *name, struct pt_loc loc)
+{
+    struct pt_instance instance = {.object = pt_names_get(&b->object_names, name)};
+    struct pt_xform at[2];
+    if (instance.object < 0)
+        return pt_diag_fail(&b->diag, loc, "unknown object \"%s\" (expected one made by ObjectBegin before)", name);
+    if (b->open_object >= 0)
+        return pt_diag_fail(&b->diag, loc, "ObjectInstance within an object");
+    if (((struct pt_object *)b->objects.items)[instance.object].shape_count == 0)
+        return 0;
+    const double *offset = b->object_offsets[instance.object];
+    struct pt_xform shift = pt_xform_translate(offset[0], offset[1], offset[2]);
+    pt_builder_at_shutter(b, s->ctm, at);
+    instance.animated = !pt_xform_equal(&at[0], &at[1]);
+    for (int i = 0; i < 2; i++) {
+        struct pt_xform t = pt_builder_to_render(b, &at[i]);
+        t = pt_xform_mul(&t, &shift);
+        instance.to_render[i] = pt_xform_to_mat34(&t);
+    }
+    pt_builder_effect(b, PT_FX_INSTANCES | (instance.animated ? PT_FX_MOTION : 0u), loc);
+    return pt_list_add(b, &b->instances, &instance) < 0 ? b->diag.rc : 0;
+}

@@ -1,0 +1,300 @@
+/* Shapes that are turned into triangles: bilinear patches, curves, height fields, cones and the like. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "pbrt/build.h"
+
+static const double pi = 3.14159265358979323846;
+
+/* Vertices and triangles under construction. */
+struct grower {
+    double *p, *n, *uv;        /* owns */
+    uint32_t *indices;         /* owns */
+    size_t vertices, p_room, n_room, uv_room, corners, index_room;
+};
+
+static int push(double **array, size_t *room, size_t at, const double *v, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        if (!pt_grow((void **)array, room, at + i, sizeof **array))
+            return 0;
+        (*array)[at + i] = v[i];
+    }
+    return 1;
+}
+
+static int add_vertex(struct grower *g, const double p[3], const double *n, double u, double v)
+{
+    const double uv[2] = {u, v};
+    if (g->vertices >= INT32_MAX || !push(&g->p, &g->p_room, 3 * g->vertices, p, 3) ||
+        (n != NULL && !push(&g->n, &g->n_room, 3 * g->vertices, n, 3)) || !push(&g->uv, &g->uv_room, 2 * g->vertices, uv, 2))
+        return 0;
+    g->vertices++;
+    return 1;
+}
+
+/* Quad a b / c d as two triangles of one orientation. */
+static int add_quad(struct grower *g, size_t a, size_t b, size_t c, size_t d)
+{
+    const size_t corners[6] = {a, b, d, a, d, c};
+    for (int i = 0; i < 6; i++) {
+        if (!pt_grow((void **)&g->indices, &g->index_room, g->corners, sizeof *g->indices))
+            return 0;
+        g->indices[g->corners++] = (uint32_t)corners[i];
+    }
+    return 1;
+}
+
+static int finish(struct grower *g, int ok, struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
+{
+    struct pt_soup soup = {.vertex_count = g->vertices, .triangle_count = g->corners / 3, .pd = g->p, .nd = g->n, .uvd = g->uv,
+                           .indices = g->indices};
+    if (!ok)
+        pt_diag_nomem(&b->diag, "a shape");
+    else
+        pt_build_mesh(b, s, p, &soup);
+    free(g->p);
+    free(g->n);
+    free(g->uv);
+    free(g->indices);
+    return b->diag.rc;
+}
+
+/* --- bilinear patches --------------------------------------------------------------------------------------------------- */
+
+static double lerp2(const double *c00, const double *c10, const double *c01, const double *c11, double u, double v, size_t k)
+{
+    return (1 - v) * ((1 - u) * c00[k] + u * c10[k]) + v * ((1 - u) * c01[k] + u * c11[k]);
+}
+
+static int is_planar(const double *a, const double *b, const double *c, const double *d)
+{
+    double e1[3], e2[3], e3[3], size = 0;
+    for (int k = 0; k < 3; k++) {
+        e1[k] = b[k] - a[k];
+        e2[k] = c[k] - a[k];
+        e3[k] = d[k] - a[k];
+        size = fmax(size, fmax(fabs(e1[k]), fmax(fabs(e2[k]), fabs(e3[k]))));
+    }
+    double volume = e1[0] * (e2[1] * e3[2] - e2[2] * e3[1]) - e1[1] * (e2[0] * e3[2] - e2[2] * e3[0]) +
+                    e1[2] * (e2[0] * e3[1] - e2[1] * e3[0]);
+    return fabs(volume) <= 1e-6 * size * size * size;
+}
+
+int pt_build_bilinear(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
+{
+    static const double identity[4] = {0, 1, 2, 3}, square[8] = {0, 0, 1, 0, 0, 1, 1, 1};
+    size_t vertices, count, uv_count, n_count;
+    const double *P = pt_params_floats(p, "P", 3, &vertices), *indices = pt_params_ints(p, "indices", &count);
+    const double *uv = pt_params_floats(p, "uv", 2, &uv_count), *N = pt_params_floats(p, "N", 3, &n_count);
+    struct grower g = {0};
+    int ok = 1;
+    if (b->diag.rc)
+        return b->diag.rc;
+    if (P == NULL || (indices == NULL && vertices != 4) || (indices != NULL && count % 4 != 0) ||
+        (uv != NULL && uv_count != vertices) || (N != NULL && n_count != vertices))
+        return pt_diag_fail(&b->diag, p->loc, "a bilinearmesh needs \"point3 P\", four indices per patch, uv and N per vertex");
+    if (indices == NULL) {
+        indices = identity;
+        count = 4;
+    }
+    for (size_t i = 0; i < count && ok; i += 4) {
+        const double *c[4], *t[4], *n[4] = {NULL, NULL, NULL, NULL};
+        for (size_t k = 0; k < 4; k++) {
+            double v = indices[i + k];
+            if (!(v >= 0 && v < (double)vertices)) {
+                pt_diag_fail(&b->diag, pt_params_find(p, "indices")->loc, "index %.0f out of range (expected 0 to %zu)", v,
+                             vertices > 0 ? vertices - 1 : 0);
+                return finish(&g, 1, b, s, p);
+            }
+            c[k] = P + 3 * (size_t)v;
+            t[k] = uv != NULL ? uv + 2 * (size_t)v : square + 2 * k;
+            n[k] = N != NULL ? N + 3 * (size_t)v : NULL;
+        }
+        /* A flat patch is two triangles exactly; a twisted one gets a grid. */
+        size_t cuts = is_planar(c[0], c[1], c[2], c[3]) ? 1 : 8, first = g.vertices;
+        for (size_t y = 0; y <= cuts && ok; y++)
+            for (size_t x = 0; x <= cuts && ok; x++) {
+                double u = (double)x / (double)cuts, v = (double)y / (double)cuts, q[3], m[3] = {0, 0, 0};
+                for (size_t k = 0; k < 3; k++) {
+                    q[k] = lerp2(c[0], c[1], c[2], c[3], u, v, k);
+                    m[k] = N != NULL ? lerp2(n[0], n[1], n[2], n[3], u, v, k) : 0;
+                }
+                ok = add_vertex(&g, q, N != NULL ? m : NULL, lerp2(t[0], t[1], t[2], t[3], u, v, 0),
+                                lerp2(t[0], t[1], t[2], t[3], u, v, 1));
+            }
+        for (size_t y = 0; y < cuts && ok; y++)
+            for (size_t x = 0; x < cuts && ok; x++) {
+                size_t a = first + y * (cuts + 1) + x;
+                ok = add_quad(&g, a, a + 1, a + cuts + 1, a + cuts + 2);
+            }
+    }
+    if (pt_params_find(p, "emissionfilename") != NULL)
+        pt_diag_warn(&b->diag, pt_params_find(p, "emissionfilename")->loc, "the image of an emitting patch is ignored");
+    pt_params_ignore(p, "emissionfilename faceIndices");
+    return finish(&g, ok, b, s, p);
+}
+
+/* --- curves: tubes of six sides ------------------------------------------------------------------------------------------ */
+
+enum { CURVE_SIDES = 6, CURVE_CUTS = 8 };
+
+static void bezier(const double *c, int degree, double t, double p[3], double d[3])
+{
+    double q[4][3] = {{0}};
+    for (int i = 0; i <= degree; i++)
+        memcpy(q[i], c + 3 * i, sizeof q[i]);
+    for (int level = degree; level > 0; level--) {
+        if (level == 1)
+            for (int k = 0; k < 3; k++)
+                d[k] = q[1][k] - q[0][k];
+        for (int i = 0; i < level; i++)
+            for (int k = 0; k < 3; k++)
+                q[i][k] = (1 - t) * q[i][k] + t * q[i + 1][k];
+    }
+    memcpy(p, q[0], sizeof q[0]);
+}
+
+/* Uniform b-spline segment to Bézier control points. */
+static void spline_to_bezier(const double *c, int degree, double out[12])
+{
+    for (int k = 0; k < 3; k++) {
+        double a = c[k], b = c[3 + k], d = c[6 + k];
+        if (degree == 2) {
+            out[k] = (a + b) / 2;
+            out[3 + k] = b;
+            out[6 + k] = (b + d) / 2;
+        } else {
+            double e = c[9 + k];
+            out[k] = (a + 4 * b + d) / 6;
+            out[3 + k] = (2 * b + d) / 3;
+            out[6 + k] = (b + 2 * d) / 3;
+            out[9 + k] = (b + 4 * d + e) / 6;
+        }
+    }
+}
+
+static int add_ring(struct grower *g, const double p[3], const double d[3], double width, double v)
+{
+    pt_vec3 axis = v3_norm(v3((float)d[0], (float)d[1], (float)d[2]));
+    if (v3_is_black(axis))
+        axis = v3(0, 0, 1);
+    struct pt_frame f = pt_frame_from_normal(axis);
+    for (int i = 0; i < CURVE_SIDES; i++) {
+        double a = 2 * pi * i / CURVE_SIDES;
+        pt_vec3 out = v3_add(v3_scale(f.s, (float)cos(a)), v3_scale(f.t, (float)sin(a)));
+        const double n[3] = {(double)out.x, (double)out.y, (double)out.z};
+        const double q[3] = {p[0] + width / 2 * n[0], p[1] + width / 2 * n[1], p[2] + width / 2 * n[2]};
+        if (!add_vertex(g, q, n, (double)i / CURVE_SIDES, v))
+            return 0;
+    }
+    return 1;
+}
+
+int pt_build_curve(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
+{
+    size_t count;
+    const char *basis = pt_params_string(p, "basis", "bezier");
+    int degree = pt_params_int_in(p, "degree", 3, 2, 3), spline = strcmp(basis, "bspline") == 0, ok = 1;
+    const double *P = pt_params_floats(p, "P", 3, &count);
+    double width = pt_params_float_in(p, "width", 1, 0, 1e30), w0 = pt_params_float_in(p, "width0", width, 0, 1e30),
+           w1 = pt_params_float_in(p, "width1", width, 0, 1e30);
+    size_t corners = (size_t)degree + 1, step = spline ? 1 : (size_t)degree;
+    struct grower g = {0};
+    pt_params_ignore(p, "type N splitdepth");
+    if (b->diag.rc)
+        return b->diag.rc;
+    if (!spline && strcmp(basis, "bezier") != 0)
+        return pt_diag_fail(&b->diag, p->loc, "unknown curve basis \"%.40s\" (expected bezier or bspline)", basis);
+    if (P == NULL || count < corners || (count - corners) % step != 0)
+        return pt_diag_fail(&b->diag, p->loc, "a curve of degree %d needs %zu points and %zu more per segment", degree, corners, step);
+    pt_diag_warn(&b->diag, p->loc, "curves are rendered as tubes of %d sides", (int)CURVE_SIDES);
+    size_t segments = (count - corners) / step + 1;
+    for (size_t i = 0; i < segments && ok; i++) {
+        double c[12];
+        if (spline)
+            spline_to_bezier(P + 3 * i, degree, c);
+        else
+            memcpy(c, P + 3 * i * step, corners * 3 * sizeof *c);
+        for (int k = i > 0; k <= CURVE_CUTS && ok; k++) {
+            double t = (double)k / CURVE_CUTS, v = ((double)i + t) / (double)segments, q[3], d[3] = {0, 0, 0};
+            bezier(c, degree, t, q, d);
+            ok = add_ring(&g, q, d, (1 - v) * w0 + v * w1, v);
+        }
+    }
+    for (size_t ring = 0; ok && (ring + 1) * CURVE_SIDES < g.vertices; ring++)
+        for (size_t i = 0; i < CURVE_SIDES && ok; i++) {
+            size_t a = ring * CURVE_SIDES + i, next = ring * CURVE_SIDES + (i + 1) % CURVE_SIDES;
+            ok = add_quad(&g, a, next, a + CURVE_SIDES, next + CURVE_SIDES);
+        }
+    return finish(&g, ok, b, s, p);
+}
+
+/* --- height fields and surfaces of revolution (v3) ------------------------------------------------------------------------ */
+
+static int add_grid(struct grower *g, size_t first, size_t nx, size_t ny)
+{
+    for (size_t y = 0; y + 1 < ny; y++)
+        for (size_t x = 0; x + 1 < nx; x++) {
+            size_t a = first + y * nx + x;
+            if (!add_quad(g, a, a + 1, a + nx, a + nx + 1))
+                return 0;
+        }
+    return 1;
+}
+
+int pt_build_height_field(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
+{
+    size_t count;
+    int nu = pt_params_int_in(p, "nu", 0, 2, 1 << 14), nv = pt_params_int_in(p, "nv", 0, 2, 1 << 14), ok = 1;
+    const double *z = pt_params_floats(p, pt_params_find(p, "Pz") != NULL ? "Pz" : "P", 1, &count);
+    struct grower g = {0};
+    if (b->diag.rc)
+        return b->diag.rc;
+    if (z == NULL || nu < 2 || nv < 2 || count != (size_t)nu * (size_t)nv)
+        return pt_diag_fail(&b->diag, p->loc, "a heightfield needs nu, nv and nu·nv heights");
+    for (int y = 0; y < nv && ok; y++)
+        for (int x = 0; x < nu && ok; x++) {
+            const double q[3] = {x / (double)(nu - 1), y / (double)(nv - 1), z[(size_t)y * (size_t)nu + (size_t)x]};
+            ok = add_vertex(&g, q, NULL, q[0], q[1]);
+        }
+    ok = ok && add_grid(&g, 0, (size_t)nu, (size_t)nv);
+    return finish(&g, ok, b, s, p);
+}
+
+enum { AROUND = 64, ALONG = 16 };
+
+/* Cone, paraboloid, hyperboloid: radius and height along v, turned about z. */
+int pt_build_revolved(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
+{
+    const char *kind = pt_params_kind(p);
+    double radius = pt_params_float_in(p, "radius", 1, 1e-30, 1e30), phi = pt_params_float_in(p, "phimax", 360, 1e-3, 360) * pi / 180;
+    double height = pt_params_float(p, "height", 1), z0 = pt_params_float(p, "zmin", 0), z1 = pt_params_float(p, "zmax", 1);
+    double p1[3] = {0, 0, 0}, p2[3] = {1, 1, 1};
+    struct grower g = {0};
+    int ok = 1;
+    pt_params_point(p, "p1", p1);
+    pt_params_point(p, "p2", p2);
+    if (!b->diag.rc)
+        pt_diag_warn(&b->diag, p->loc, "shape \"%s\" is rendered as %d triangles", kind, (int)(2 * AROUND * ALONG));
+    for (int j = 0; j <= ALONG && ok; j++)
+        for (int i = 0; i <= AROUND && ok; i++) {
+            double v = (double)j / ALONG, u = (double)i / AROUND, a = u * phi, q[3];
+            if (kind[0] == 'h') {
+                double x = (1 - v) * p1[0] + v * p2[0], y = (1 - v) * p1[1] + v * p2[1];
+                q[0] = x * cos(a) - y * sin(a);
+                q[1] = x * sin(a) + y * cos(a);
+                q[2] = (1 - v) * p1[2] + v * p2[2];
+            } else {
+                double z = kind[0] == 'c' ? v * height : z0 + v * (z1 - z0);
+                double r = kind[0] == 'c' ? radius * (1 - v) : radius * sqrt(fmax(z / z1, 0));
+                q[0] = r * cos(a);
+                q[1] = r * sin(a);
+                q[2] = z;
+            }
+            ok = add_vertex(&g, q, NULL, u, v);
+        }
+    ok = ok && add_grid(&g, 0, AROUND + 1, ALONG + 1);
+    return finish(&g, ok, b, s, p);
+}

@@ -1,0 +1,373 @@
+/* Textures, the images they read, and parameters that may be textured. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "image/oiio.h"
+#include "pbrt/build.h"
+#include "pbrt/number.h"
+
+struct pt_input pt_input_constant(double r, double g, double b)
+{
+    return (struct pt_input){-1, v3((float)r, (float)g, (float)b)};
+}
+
+static struct pt_input input_of(int32_t texture)
+{
+    return (struct pt_input){texture, v3_splat(0)};
+}
+
+/* --- images ----------------------------------------------------------------------------------------------------------- */
+
+/* Encoding of an 8- or 16-bit file: 0 sRGB, 1 linear, else the exponent. -1 when not understood. */
+static double parse_encoding(const char *encoding)
+{
+    double gamma;
+    if (encoding == NULL || strcmp(encoding, "sRGB") == 0 || strcmp(encoding, "srgb") == 0)
+        return 0;
+    if (strcmp(encoding, "linear") == 0)
+        return 1;
+    if (strncmp(encoding, "gamma ", 6) == 0 && pt_number_parse(encoding + 6, strlen(encoding + 6), &gamma) && gamma > 0.05 && gamma < 20)
+        return gamma;
+    return -1;
+}
+
+static float decode_srgb(float v)
+{
+    return v <= 0.04045f ? v / 12.92f : powf((v + 0.055f) / 1.055f, 2.4f);
+}
+
+/* Two channels (grey and alpha) become four, alpha that is 1 everywhere goes: the renderer knows 1, 3 and 4 channels.
+ * Returns the channels to keep per pixel; `from` maps them. */
+static int choose_channels(const struct pt_oiio_image *image, int from[4])
+{
+    size_t n = (size_t)image->width * (size_t)image->height, c = (size_t)image->channels;
+    for (int k = 0; k < 4; k++)
+        from[k] = k < image->channels ? k : 0;
+    if (image->channels == 1 || image->channels == 3)
+        return image->channels;
+    int opaque = 1;
+    for (size_t i = 0; i < n && opaque; i++)
+        opaque = image->u8 != NULL ? image->u8[i * c + c - 1] == 255 : image->f32[i * c + c - 1] >= 1;
+    if (image->channels == 2) {
+        from[1] = from[2] = 0;
+        from[3] = 1;
+        return opaque ? 1 : 4;
+    }
+    return opaque ? 3 : 4;
+}
+
+static int convert(struct pt_builder *b, const struct pt_oiio_image *image, double encoding, struct pt_image_map *out)
+{
+    int from[4], channels = choose_channels(image, from);
+    size_t n = (size_t)image->width * (size_t)image->height, c = (size_t)image->channels, k = (size_t)channels;
+    *out = (struct pt_image_map){image->width, image->height, channels, PT_PIXEL_FLOAT, 1, NULL};
+    if (image->u8 != NULL) {
+        uint8_t *pixels = pt_arena_alloc(&b->scene->arena, n, k);
+        for (size_t i = 0; pixels != NULL && i < n; i++)
+            for (size_t j = 0; j < k; j++)
+                pixels[i * k + j] = image->u8[i * c + (size_t)from[j]];
+        out->type = encoding == 0 ? PT_PIXEL_U8_SRGB : PT_PIXEL_U8_LINEAR;
+        out->gamma = encoding > 0 ? (float)encoding : 1;
+        out->pixels = pixels;
+    } else {
+        float *pixels = pt_arena_alloc(&b->scene->arena, n, k * sizeof *pixels);
+        for (size_t i = 0; pixels != NULL && i < n; i++)
+            for (size_t j = 0; j < k; j++) {
+                float v = image->f32[i * c + (size_t)from[j]];
+                if (!image->is_float_file && j < 3 && encoding != 1)
+                    v = encoding == 0 ? decode_srgb(v) : powf(v, (float)encoding);
+                /* An infinite pixel is a half float that overflowed: the largest half. */
+                pixels[i * k + j] = isfinite(v) ? v : v > 0 ? 65504.0f : 0;
+            }
+        out->pixels = pixels;
+    }
+    return out->pixels != NULL ? 0 : pt_diag_nomem(&b->diag, "a texture");
+}
+
+int32_t pt_build_image_map(struct pt_builder *b, struct pt_loc loc, const char *name, const char *encoding)
+{
+    char path[2048], key[2200];
+    double code = parse_encoding(encoding), start_s = base_clock_wall_s();
+    struct pt_oiio_image image = {0};
+    struct pt_image_map map;
+    struct base_err err = {0};
+    int32_t id = -1;
+    if (code < 0) {
+        pt_diag_fail(&b->diag, loc, "unknown encoding \"%.40s\" (expected sRGB, linear or gamma X)", encoding);
+        return -1;
+    }
+    if (name[0] == '\0') {
+        pt_diag_fail(&b->diag, loc, "an image without a file name");
+        return -1;
+    }
+    pt_builder_path(b, name, path, sizeof path);
+    snprintf(key, sizeof key, "%g %s", code, path);
+    if ((id = pt_names_get(&b->image_names, key)) >= 0)
+        return id;
+    int rc;
+    if (b->source->files) {
+        rc = pt_oiio_read(path, &image, &err);
+    } else {
+        char *bytes = NULL;
+        size_t size = 0;
+        rc = b->source->read(b->source->data, path, &bytes, &size, &err);
+        if (!rc)
+            rc = pt_oiio_read_memory(path, bytes, size, &image, &err);
+        free(bytes);
+    }
+    if (rc)
+        pt_diag_fail_code(&b->diag, rc == BASE_ENOMEM ? rc : BASE_EINVAL, loc, "cannot read %s", err.text);
+    else if (convert(b, &image, code, &map) == 0 && (id = pt_list_add(b, &b->images, &map)) >= 0 &&
+             pt_names_set(&b->image_names, key, id) != 0)
+        pt_diag_nomem(&b->diag, "a texture");
+    pt_oiio_release(&image);
+    b->scene->stats.texture_s += base_clock_wall_s() - start_s;
+    return !b->diag.rc ? id : -1;
+}
+
+int32_t pt_build_image_texture(struct pt_builder *b, struct pt_loc loc, const char *name, const char *encoding)
+{
+    struct pt_texture t = {.kind = PT_TEXTURE_IMAGE, .scale = 1, .su = 1, .sv = 1};
+    t.image = pt_build_image_map(b, loc, name, encoding);
+    return t.image < 0 ? -1 : pt_list_add(b, &b->textures, &t);
+}
+
+/* --- inputs ----------------------------------------------------------------------------------------------------------- */
+
+static struct pt_input named_texture(struct pt_builder *b, struct pt_params *p, struct pt_param *param, int is_float)
+{
+    param->used = 1;
+    if (param->count != 1) {
+        pt_diag_fail(&b->diag, param->loc, "\"%s\" names %zu textures (expected 1)", pt_param_name(p, param), param->count);
+        return pt_input_constant(0, 0, 0);
+    }
+    const char *name = pt_params_string_at(p, param, 0);
+    int32_t id = pt_names_get(is_float ? &b->float_textures : &b->colour_textures, name);
+    if (id < 0) {
+        int other = pt_names_get(is_float ? &b->colour_textures : &b->float_textures, name) >= 0;
+        pt_diag_fail(&b->diag, param->loc, other ? "texture \"%s\" is a %s texture (expected %s)" : "unknown texture \"%s\"", name,
+                     is_float ? "spectrum" : "float", is_float ? "float" : "spectrum");
+        return pt_input_constant(0, 0, 0);
+    }
+    const struct pt_texture *t = &((struct pt_texture *)b->textures.items)[id];
+    /* A constant is its value: nothing is looked up while rendering. */
+    return t->kind == PT_TEXTURE_CONSTANT ? t->in[0] : input_of(id);
+}
+
+struct pt_input pt_build_float_input(struct pt_builder *b, struct pt_params *p, const char *name, double fallback)
+{
+    struct pt_param *param = pt_params_find(p, name);
+    if (param != NULL && param->type == PT_PARAM_TEXTURE)
+        return named_texture(b, p, param, 1);
+    double v = pt_params_float(p, name, fallback);
+    return pt_input_constant(v, v, v);
+}
+
+struct pt_input pt_build_colour_input(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const char *name,
+                                      enum pt_colour_use use, pt_vec3 fallback)
+{
+    struct pt_param *param = pt_params_find(p, name);
+    if (param != NULL && param->type == PT_PARAM_TEXTURE)
+        return named_texture(b, p, param, 0);
+    pt_build_colour(b, s, p, name, use, &fallback);
+    return (struct pt_input){-1, fallback};
+}
+
+static int32_t add_texture(struct pt_builder *b, const struct pt_texture *t)
+{
+    return pt_list_add(b, &b->textures, t);
+}
+
+struct pt_input pt_input_product(struct pt_builder *b, struct pt_input x, struct pt_input y)
+{
+    if (x.texture < 0 && y.texture < 0)
+        return (struct pt_input){-1, v3_mul(x.value, y.value)};
+    if (x.texture < 0 && x.value.x == 1 && x.value.y == 1 && x.value.z == 1)
+        return y;
+    if (y.texture < 0 && y.value.x == 1 && y.value.y == 1 && y.value.z == 1)
+        return x;
+    struct pt_texture t = {.kind = PT_TEXTURE_SCALE, .scale = 1, .su = 1, .sv = 1, .in = {x, y}};
+    int32_t id = add_texture(b, &t);
+    return id < 0 ? pt_input_constant(0, 0, 0) : input_of(id);
+}
+
+/* --- classes ---------------------------------------------------------------------------------------------------------- */
+
+struct context {
+    struct pt_builder *b;
+    const struct pt_state *s;
+    struct pt_params *p;
+    int is_float;
+};
+
+static struct pt_input input(struct context *c, const char *name, double fallback)
+{
+    if (c->is_float)
+        return pt_build_float_input(c->b, c->p, name, fallback);
+    return pt_build_colour_input(c->b, c->s, c->p, name, PT_USE_UNBOUNDED, v3_splat((float)fallback));
+}
+
+static void read_mapping(struct context *c, struct pt_texture *t)
+{
+    struct pt_params *p = c->p;
+    const char *mapping = pt_params_string(p, "mapping", "uv");
+    if (strcmp(mapping, "uv") != 0) {
+        static const char *const known[] = {"spherical", "cylindrical", "planar"};
+        int found = 0;
+        for (int i = 0; i < 3; i++)
+            found |= strcmp(mapping, known[i]) == 0;
+        if (!found)
+            pt_diag_fail(&c->b->diag, pt_params_find(p, "mapping")->loc,
+                         "unknown mapping \"%.40s\" (expected uv, spherical, cylindrical or planar)", mapping);
+        else
+            pt_diag_warn(&c->b->diag, pt_params_find(p, "mapping")->loc, "mapping \"%s\" is replaced by the shape's own uv", mapping);
+    }
+    t->su = (float)pt_params_float(p, "uscale", 1);
+    t->sv = (float)pt_params_float(p, "vscale", 1);
+    t->du = (float)pt_params_float(p, "udelta", 0);
+    t->dv = (float)pt_params_float(p, "vdelta", 0);
+    pt_params_ignore(p, "v1 v2");
+}
+
+static void make_constant(struct context *c, struct pt_texture *t)
+{
+    t->kind = PT_TEXTURE_CONSTANT;
+    t->in[0] = input(c, "value", 1);
+}
+
+static void make_scale(struct context *c, struct pt_texture *t)
+{
+    struct pt_input x, y;
+    t->kind = PT_TEXTURE_SCALE;
+    if (pt_params_find(c->p, "tex") != NULL || pt_params_find(c->p, "scale") != NULL) { /* v4 */
+        x = input(c, "tex", 1);
+        y = pt_build_float_input(c->b, c->p, "scale", 1);
+    } else {
+        x = input(c, "tex1", 1);
+        y = input(c, "tex2", 1);
+    }
+    t->in[0] = x;
+    t->in[1] = y;
+    if (x.texture < 0 && y.texture < 0) {
+        t->kind = PT_TEXTURE_CONSTANT;
+        t->in[0].value = v3_mul(x.value, y.value);
+    }
+}
+
+static void make_mix(struct context *c, struct pt_texture *t)
+{
+    t->kind = PT_TEXTURE_MIX;
+    t->in[0] = input(c, "tex1", 0);
+    t->in[1] = input(c, "tex2", 1);
+    t->in[2] = pt_build_float_input(c->b, c->p, "amount", 0.5);
+    if (t->in[0].texture < 0 && t->in[1].texture < 0 && t->in[2].texture < 0) {
+        float a = t->in[2].value.x;
+        t->kind = PT_TEXTURE_CONSTANT;
+        t->in[0].value = v3_add(v3_scale(t->in[0].value, 1 - a), v3_scale(t->in[1].value, a));
+    }
+}
+
+static void make_direction_mix(struct context *c, struct pt_texture *t)
+{
+    pt_diag_warn(&c->b->diag, c->p->loc, "texture \"directionmix\" is replaced by an even mix");
+    pt_params_ignore(c->p, "dir");
+    make_mix(c, t);
+}
+
+static void make_checkerboard(struct context *c, struct pt_texture *t)
+{
+    t->kind = PT_TEXTURE_CHECKERBOARD;
+    t->in[0] = input(c, "tex1", 1);
+    t->in[1] = input(c, "tex2", 0);
+    read_mapping(c, t);
+    if (pt_params_int_in(c->p, "dimension", 2, 2, 3) == 3)
+        pt_diag_warn(&c->b->diag, c->p->loc, "a checkerboard of dimension 3 is drawn on the shape's uv instead");
+    pt_params_ignore(c->p, "aamode");
+}
+
+static void make_bilerp(struct context *c, struct pt_texture *t)
+{
+    static const char *const corners[4] = {"v00", "v01", "v10", "v11"};
+    t->kind = PT_TEXTURE_BILERP;
+    for (int i = 0; i < 4; i++)
+        t->in[i] = input(c, corners[i], i % 2);
+    read_mapping(c, t);
+}
+
+static void make_imagemap(struct context *c, struct pt_texture *t)
+{
+    struct pt_params *p = c->p;
+    const char *file = pt_params_string(p, "filename", ""), *encoding = pt_params_string(p, "encoding", NULL);
+    const char *wrap = pt_params_string(p, "wrap", "repeat");
+    struct pt_param *gamma = pt_params_find(p, "gamma");
+    t->kind = PT_TEXTURE_IMAGE;
+    if (gamma != NULL && gamma->type == PT_PARAM_BOOL) /* v3 */
+        encoding = pt_params_bool(p, "gamma", 1) ? "sRGB" : "linear";
+    else
+        pt_params_ignore(p, "gamma");
+    t->wrap = strcmp(wrap, "repeat") == 0               ? PT_WRAP_REPEAT
+              : strcmp(wrap, "black") == 0              ? PT_WRAP_BLACK
+              : strcmp(wrap, "clamp") == 0              ? PT_WRAP_CLAMP
+              : strcmp(wrap, "octahedralsphere") == 0   ? PT_WRAP_OCTAHEDRAL
+                                                        : -1;
+    if (t->wrap < 0)
+        pt_diag_fail(&c->b->diag, pt_params_find(p, "wrap")->loc, "unknown wrap \"%.40s\" (expected repeat, black or clamp)", wrap);
+    t->scale = (float)pt_params_float(p, "scale", 1);
+    t->invert = pt_params_bool(p, "invert", 0);
+    read_mapping(c, t);
+    pt_params_ignore(p, "filter maxanisotropy trilinear");
+    struct pt_param *named = pt_params_find(p, "filename");
+    t->image = !c->b->diag.rc ? pt_build_image_map(c->b, named != NULL ? named->loc : p->loc, file, encoding) : -1;
+    if (t->image >= 0 && c->is_float) {
+        const struct pt_image_map *m = &((struct pt_image_map *)c->b->images.items)[t->image];
+        t->channel = m->channels == 4 ? 3 : m->channels == 3 ? -1 : 0;
+    }
+}
+
+/* Patterns that are not simulated: their mean keeps the brightness of the picture about right. */
+static void make_stand_in(struct context *c, struct pt_texture *t)
+{
+    const char *kind = pt_params_kind(c->p);
+    struct pt_input inside = input(c, "inside", 1), outside = input(c, "outside", 0);
+    pt_diag_warn(&c->b->diag, c->p->loc, "texture \"%s\" is replaced by a constant", kind);
+    t->kind = PT_TEXTURE_CONSTANT;
+    t->in[0] = strcmp(kind, "dots") == 0 && inside.texture < 0 && outside.texture < 0
+                   ? (struct pt_input){-1, v3_scale(v3_add(inside.value, outside.value), 0.5f)}
+                   : pt_input_constant(0.5, 0.5, 0.5);
+    read_mapping(c, t);
+    pt_params_ignore(c->p, "octaves roughness scale variation filename encoding gamma invert");
+}
+
+int pt_build_texture(struct pt_builder *b, const struct pt_state *s, const char *name, const char *class_name, struct pt_params *p)
+{
+    static const struct {
+        const char *kind;
+        void (*make)(struct context *c, struct pt_texture *t);
+    } kinds[] = {{"imagemap", make_imagemap}, {"scale", make_scale},   {"mix", make_mix},       {"constant", make_constant},
+                 {"checkerboard", make_checkerboard}, {"bilerp", make_bilerp}, {"directionmix", make_direction_mix},
+                 {"dots", make_stand_in}, {"fbm", make_stand_in},      {"wrinkled", make_stand_in}, {"windy", make_stand_in},
+                 {"marble", make_stand_in}, {"ptex", make_stand_in},   {"uv", make_stand_in}};
+    int is_float = strcmp(class_name, "float") == 0;
+    if (!is_float && strcmp(class_name, "spectrum") != 0 && strcmp(class_name, "color") != 0 && strcmp(class_name, "rgb") != 0)
+        return pt_diag_fail(&b->diag, p->loc, "texture \"%s\" of type \"%s\" (expected float or spectrum)", name, class_name);
+    struct context c = {b, s, p, is_float};
+    struct pt_texture t = {.kind = -1, .scale = 1, .su = 1, .sv = 1, .channel = 0};
+    for (int i = 0; i < 4; i++)
+        t.in[i] = pt_input_constant(0, 0, 0);
+    for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
+        if (strcmp(kinds[i].kind, pt_params_kind(p)) == 0)
+            kinds[i].make(&c, &t);
+    if (t.kind < 0)
+        return pt_diag_fail(&b->diag, p->loc, "unknown texture class \"%s\" (expected imagemap, scale, mix, constant, checkerboard …)",
+                            pt_params_kind(p));
+    pt_params_check_used(p);
+    if (b->diag.rc)
+        return b->diag.rc;
+    int32_t id = add_texture(b, &t);
+    if (id < 0 || pt_names_set(is_float ? &b->float_textures : &b->colour_textures, name, id) != 0)
+        return pt_diag_nomem(&b->diag, "textures");
+    return b->diag.rc;
+}

@@ -1,0 +1,94 @@
+#include "pbrt/diag.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { TEXT_MAX = 400 };
+
+/* Input text may hold anything; a message is one printable line. */
+static void make_one_line(char *text)
+{
+    for (unsigned char *c = (unsigned char *)text; *c != '\0'; c++)
+        if (*c < 0x20 || *c == 0x7f)
+            *c = '?';
+}
+
+static int fail_v(struct pt_diag *diag, int code, struct pt_loc loc, const char *format, va_list args)
+{
+    if (diag->rc)
+        return diag->rc;
+    char text[TEXT_MAX];
+    vsnprintf(text, sizeof text, format, args);
+    make_one_line(text);
+    char file[160];
+    snprintf(file, sizeof file, "%s", loc.file != NULL ? loc.file : "");
+    make_one_line(file);
+    diag->rc = code;
+    if (loc.line > 0)
+        base_fail(diag->err, code, "%s:%d:%d: %s", file, loc.line, loc.column, text);
+    else if (loc.file != NULL)
+        base_fail(diag->err, code, "%s: %s", file, text);
+    else
+        base_fail(diag->err, code, "%s", text);
+    return code;
+}
+
+int pt_diag_fail(struct pt_diag *diag, struct pt_loc loc, const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    int rc = fail_v(diag, BASE_EINVAL, loc, format, args);
+    va_end(args);
+    return rc;
+}
+
+int pt_diag_fail_code(struct pt_diag *diag, int code, struct pt_loc loc, const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    int rc = fail_v(diag, code, loc, format, args);
+    va_end(args);
+    return rc;
+}
+
+int pt_diag_nomem(struct pt_diag *diag, const char *what)
+{
+    if (!diag->rc)
+        diag->rc = base_fail_nomem(diag->err, what);
+    return diag->rc;
+}
+
+void pt_diag_warn(struct pt_diag *diag, struct pt_loc loc, const char *format, ...)
+{
+    char text[TEXT_MAX], line[TEXT_MAX + 256];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(text, sizeof text, format, args);
+    va_end(args);
+    make_one_line(text);
+    if (diag->strict) {
+        pt_diag_fail(diag, loc, "%s (an error because of --strict)", text);
+        return;
+    }
+    if (pt_names_get(&diag->said, text) >= 0)
+        return;
+    if (pt_names_set(&diag->said, text, 0) != 0) {
+        pt_diag_nomem(diag, "warnings");
+        return;
+    }
+    char file[200];
+    snprintf(file, sizeof file, "%s", loc.file != NULL ? loc.file : "scene");
+    make_one_line(file);
+    if (loc.line > 0)
+        snprintf(line, sizeof line, "%s:%d: warning: %s", file, loc.line, text);
+    else
+        snprintf(line, sizeof line, "%s: warning: %s", file, text);
+    if (diag->warn != NULL)
+        diag->warn(diag->warn_data, line);
+}
+
+void pt_diag_release(struct pt_diag *diag)
+{
+    pt_names_release(&diag->said);
+}

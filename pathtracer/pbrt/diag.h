@@ -1,0 +1,42 @@
+/*
+ * Where in a scene file something is, and what is said about it.
+ *
+ * A pt_diag is the one place where building a scene fails or warns. The first failure sticks (rc, err); later ones are
+ * dropped, so that code may go on with default values until its directive ends. Not thread-safe; one per load.
+ */
+#ifndef PT_PBRT_DIAG_H
+#define PT_PBRT_DIAG_H
+
+#include <stdint.h>
+
+#include "base/err.h"
+#include "pbrt/names.h"
+
+/* A place in a text file, 1-based; line 0 = the file as a whole, file NULL = no place. */
+struct pt_loc {
+    const char *file; /* borrows: lives as long as the lexer's arena */
+    int32_t line, column;
+};
+
+struct pt_diag {
+    struct base_err *err;  /* may be NULL */
+    int rc;              /* 0 until the first failure */
+    int strict;          /* warnings are failures */
+    void (*warn)(void *data, const char *line); /* may be NULL */
+    void *warn_data;
+    struct pt_names said; /* owns: texts of the warnings given, each once */
+};
+
+/* Records `file:line:column: text` with BASE_EINVAL unless something failed before. Control characters become '?', so the text
+ * is one line. Returns the sticky code. */
+int pt_diag_fail(struct pt_diag *diag, struct pt_loc loc, const char *format, ...) __attribute__((format(printf, 3, 4)));
+/* The same with another code (BASE_ENOMEM, BASE_EIO). */
+int pt_diag_fail_code(struct pt_diag *diag, int code, struct pt_loc loc, const char *format, ...)
+    __attribute__((format(printf, 4, 5)));
+/* Out of memory while making `what`. */
+int pt_diag_nomem(struct pt_diag *diag, const char *what);
+/* Something is approximated or ignored: `file:line: warning: text`, each text once. A failure when strict. */
+void pt_diag_warn(struct pt_diag *diag, struct pt_loc loc, const char *format, ...) __attribute__((format(printf, 3, 4)));
+void pt_diag_release(struct pt_diag *diag);
+
+#endif

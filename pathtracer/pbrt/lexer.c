@@ -1,0 +1,158 @@
+#include "pbrt/lexer.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+int pt_lexer_include(struct pt_lexer *lexer, const char *path, struct pt_loc from, int scoped)
+{
+    if (lexer->depth >= PT_LEXER_DEPTH)
+        return pt_diag_fail(lexer->diag, from, "files include each other more than %d levels deep", PT_LEXER_DEPTH);
+    for (int i = 0; i < lexer->depth; i++)
+        if (strcmp(lexer->stack[i].loc.file, path) == 0)
+            return pt_diag_fail(lexer->diag, from, "\"%s\" includes itself", path);
+    struct pt_lexer_file file = {.from = from, .scoped = scoped};
+    struct base_err err = {0};
+    size_t size = 0;
+    int rc = lexer->source->read(lexer->source->data, path, &file.bytes, &size, &err);
+    if (rc && from.line == 0)
+        return pt_diag_fail_code(lexer->diag, rc, from, "%s", err.text);
+    if (rc)
+        return pt_diag_fail_code(lexer->diag, rc == BASE_ENOMEM ? rc : BASE_EINVAL, from, "cannot read %s", err.text);
+    file.loc = (struct pt_loc){pt_arena_strndup(lexer->arena, path, strlen(path)), 1, 1};
+    if (file.loc.file == NULL) {
+        free(file.bytes);
+        return pt_diag_nomem(lexer->diag, "file names");
+    }
+    file.at = file.line_start = file.bytes;
+    file.end = file.bytes + size;
+    if (size >= 3 && memcmp(file.bytes, "\xef\xbb\xbf", 3) == 0)
+        file.at = file.line_start = file.bytes + 3;
+    lexer->stack[lexer->depth++] = file;
+    return 0;
+}
+
+static void skip_blanks(struct pt_lexer_file *f)
+{
+    char *at = f->at, *end = f->end;
+    while (at < end) {
+        char c = *at;
+        if (c == '\n') {
+            f->loc.line++;
+            f->line_start = ++at;
+        } else if (c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f') {
+            at++;
+        } else if (c == '#') {
+            while (at < end && *at != '\n')
+                at++;
+        } else {
+            break;
+        }
+    }
+    f->at = at;
+}
+
+static struct pt_token bad(const struct pt_token *t)
+{
+    return (struct pt_token){.kind = PT_TOKEN_BAD, .text = "", .loc = t->loc};
+}
+
+/* f->at is behind the opening quote. Escapes are resolved in place. */
+static struct pt_token read_string(struct pt_lexer *lexer, struct pt_lexer_file *f, struct pt_token t)
+{
+    char *out = f->at, *start = f->at;
+    for (; f->at < f->end && *f->at != '"' && *f->at != '\n'; f->at++) {
+        char c = *f->at;
+        if (c == '\\' && f->at + 1 < f->end) {
+            c = *++f->at;
+            static const char letters[] = "nrtbf\\'\"", meanings[] = "\n\r\t\b\f\\'\"";
+            const char *known = memchr(letters, c, sizeof letters - 1);
+            if (known == NULL) {
+                pt_diag_fail(lexer->diag, t.loc, "unknown escape \\%c in a string", c);
+                return bad(&t);
+            }
+            c = meanings[known - letters];
+        }
+        if (c == '\0') {
+            pt_diag_fail(lexer->diag, t.loc, "a zero byte in a string");
+            return bad(&t);
+        }
+        *out++ = c;
+    }
+    if (f->at >= f->end || *f->at != '"') {
+        pt_diag_fail(lexer->diag, t.loc, "string without a closing quote on its line");
+        return bad(&t);
+    }
+    f->at++;
+    t.kind = PT_TOKEN_STRING;
+    t.text = start;
+    t.length = (size_t)(out - start);
+    return t;
+}
+
+static int ends_word(char c)
+{
+    return c == ' ' || c == '\n' || c == '\t' || c == '\r' || c == '\v' || c == '\f' || c == '[' || c == ']' || c == '"' ||
+           c == '#';
+}
+
+static struct pt_token read_token(struct pt_lexer *lexer)
+{
+    for (;;) {
+        struct pt_lexer_file *f = &lexer->stack[lexer->depth - 1];
+        skip_blanks(f);
+        struct pt_token t = {.kind = PT_TOKEN_END, .text = "", .loc = f->loc};
+        t.loc.column = (int32_t)(f->at - f->line_start) + 1;
+        if (f->at == f->end) {
+            if (lexer->depth == 1)
+                return t;
+            int scoped = f->scoped;
+            free(f->bytes);
+            lexer->depth--;
+            t.kind = PT_TOKEN_FILE_END;
+            if (scoped)
+                return t;
+            continue;
+        }
+        char c = *f->at;
+        if (c == '[' || c == ']') {
+            t.kind = c == '[' ? PT_TOKEN_OPEN : PT_TOKEN_CLOSE;
+            t.text = f->at++;
+            t.length = 1;
+            return t;
+        }
+        if (c == '"') {
+            f->at++;
+            return read_string(lexer, f, t);
+        }
+        t.kind = PT_TOKEN_WORD;
+        t.text = f->at;
+        while (f->at < f->end && !ends_word(*f->at))
+            f->at++;
+        t.length = (size_t)(f->at - t.text);
+        return t;
+    }
+}
+
+struct pt_token pt_lexer_next(struct pt_lexer *lexer)
+{
+    if (lexer->has_ahead) {
+        lexer->has_ahead = 0;
+        return lexer->ahead;
+    }
+    return read_token(lexer);
+}
+
+struct pt_token pt_lexer_peek(struct pt_lexer *lexer)
+{
+    if (!lexer->has_ahead) {
+        lexer->ahead = read_token(lexer);
+        lexer->has_ahead = 1;
+    }
+    return lexer->ahead;
+}
+
+void pt_lexer_release(struct pt_lexer *lexer)
+{
+    while (lexer->depth > 0)
+        free(lexer->stack[--lexer->depth].bytes);
+}

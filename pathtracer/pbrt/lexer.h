@@ -1,0 +1,60 @@
+/*
+ * Scene text to tokens, across included files, each with its place.
+ *
+ * Files form a stack: pt_lexer_include pushes one, tokens come from the top, its end pops it. A parameter list may therefore
+ * go on in the including file. Token texts point into file buffers and are valid until the next call.
+ */
+#ifndef PT_PBRT_LEXER_H
+#define PT_PBRT_LEXER_H
+
+#include <stddef.h>
+
+#include "scene/arena.h"
+#include "pbrt/diag.h"
+#include "pbrt/source.h"
+
+enum pt_token_kind {
+    PT_TOKEN_END,        /* of the outermost file */
+    PT_TOKEN_FILE_END,   /* of a file included with `scoped` */
+    PT_TOKEN_WORD,       /* directive, number, true, false … */
+    PT_TOKEN_STRING,     /* quotes removed, escapes resolved */
+    PT_TOKEN_OPEN,       /* [ */
+    PT_TOKEN_CLOSE,      /* ] */
+    PT_TOKEN_BAD         /* the diag has failed */
+};
+struct pt_token {
+    int kind;
+    const char *text;
+    size_t length;
+    struct pt_loc loc;
+};
+
+struct pt_lexer_file {
+    char *bytes;         /* owns */
+    char *at, *end, *line_start;
+    struct pt_loc loc;   /* file and the current line */
+    struct pt_loc from;  /* where it was included */
+    int scoped;
+};
+
+enum { PT_LEXER_DEPTH = 32 };
+
+struct pt_lexer {
+    const struct pt_source *source;   /* borrows */
+    struct pt_diag *diag;             /* borrows */
+    struct pt_arena *arena;           /* borrows; file names in places outlive the lexer there */
+    struct pt_lexer_file stack[PT_LEXER_DEPTH];
+    int depth;
+    struct pt_token ahead;            /* looked at, not yet taken */
+    int has_ahead;
+};
+
+/* Opens `path` on top of the stack; `from` is where it is asked for. Refuses loops and more than PT_LEXER_DEPTH levels. */
+int pt_lexer_include(struct pt_lexer *lexer, const char *path, struct pt_loc from, int scoped);
+/* Takes the next token. */
+struct pt_token pt_lexer_next(struct pt_lexer *lexer);
+/* Looks at it. */
+struct pt_token pt_lexer_peek(struct pt_lexer *lexer);
+void pt_lexer_release(struct pt_lexer *lexer);
+
+#endif

@@ -1,0 +1,98 @@
+#include "pbrt/load.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "geom/accel.h"
+#include "pbrt/build.h"
+#include "pbrt/load_source.h"
+#include "pbrt/pbrt.h"
+
+static const struct pt_load_options no_options;
+
+void pt_scene_destroy(struct pt_scene *scene)
+{
+    if (scene == NULL)
+        return;
+    pt_accel_release(scene);
+    pt_arena_release(&scene->arena);
+    free(scene);
+}
+
+/* Says where the time went when a person would have noticed it. */
+static void note_slow_load(const char *path, const struct pt_load_options *options, const struct pt_scene_stats *stats)
+{
+    const double noticeable_s = 3;
+    double total_s = stats->parse_s + stats->texture_s + stats->build_s + stats->accel_s;
+    char line[512];
+    if (options == NULL || options->quiet || options->warn == NULL || total_s < noticeable_s)
+        return;
+    snprintf(line, sizeof line, "%.200s: loaded in %.1f s: text and meshes %.1f, textures %.1f, acceleration structure %.1f, the rest %.1f",
+             path, total_s, stats->parse_s, stats->texture_s, stats->accel_s, stats->build_s);
+    options->warn(options->warn_data, line);
+}
+
+int pt_scene_load_source(const char *path, const struct pt_source *source, const struct pt_load_options *options,
+                         struct pt_scene **out, struct pt_scene_defaults *defaults, struct base_err *err)
+{
+    struct pt_scene_defaults found = {0};
+    struct pt_scene *scene = calloc(1, sizeof *scene);
+    struct pt_builder *b = calloc(1, sizeof *b);
+    int rc = 0;
+    double start_s = base_clock_wall_s();
+    if (scene == NULL || b == NULL) {
+        rc = base_fail_nomem(err, "the scene");
+        goto out;
+    }
+    rc = pt_builder_init(b, scene, &found, options != NULL ? options : &no_options, source, err);
+    const char *slash = strrchr(path, '/');
+    size_t length = slash != NULL ? (size_t)(slash - path) + 1 : 0;
+    if (length >= sizeof b->directory) {
+        rc = base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", path);
+        goto out;
+    }
+    memcpy(b->directory, path, length);
+    if (!rc)
+        rc = pt_pbrt_read(b, path);
+    scene->stats.parse_s = base_clock_wall_s() - start_s - scene->stats.texture_s;
+    start_s = base_clock_wall_s();
+    if (!rc)
+        rc = pt_builder_finish(b);
+    scene->stats.build_s = base_clock_wall_s() - start_s - scene->stats.accel_s;
+    if (!rc) {
+        note_slow_load(path, options, &scene->stats);
+        *out = scene;
+        *defaults = found;
+        scene = NULL;
+    }
+out:
+    if (b != NULL)
+        pt_builder_release(b);
+    free(b);
+    pt_scene_destroy(scene);
+    return rc;
+}
+
+int pt_scene_load(const char *path, const struct pt_load_options *options, struct pt_scene **out,
+                  struct pt_scene_defaults *defaults, struct base_err *err)
+{
+    return pt_scene_load_source(path, &pt_source_files, options, out, defaults, err);
+}
+
+pt_effects pt_scene_effects(const struct pt_scene *scene)
+{
+    return scene->effects;
+}
+
+const struct pt_effect_reason *pt_scene_effect_reason(const struct pt_scene *scene, int i)
+{
+    return &scene->effect_reasons[i];
+}
+
+void pt_scene_get_stats(const struct pt_scene *scene, struct pt_scene_stats *stats)
+{
+    *stats = scene->stats;
+}

@@ -1,0 +1,26 @@
+/*
+ * A map from names to small numbers. Zero-initialise; owns copies of the names until release. Not thread-safe.
+ */
+#ifndef PT_PBRT_NAMES_H
+#define PT_PBRT_NAMES_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+struct pt_names_entry {
+    char *name; /* owns; NULL = free slot */
+    uint32_t hash;
+    int32_t value;
+};
+struct pt_names {
+    struct pt_names_entry *entries; /* owns; open addressing, a power of two of slots, at most 3/4 full */
+    size_t count, room;
+};
+
+/* The number of `name`, -1 when there is none. */
+int32_t pt_names_get(const struct pt_names *names, const char *name);
+/* Sets or replaces; value >= 0. BASE_ENOMEM on failure, *names then as before. */
+int pt_names_set(struct pt_names *names, const char *name, int32_t value);
+void pt_names_release(struct pt_names *names);
+
+#endif

@@ -1,0 +1,464 @@
+#include "pbrt/params.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "pbrt/number.h"
+
+static const struct {
+    const char *name;
+    int type;
+} type_names[] = {
+    {"integer", PT_PARAM_INTEGER},   {"float", PT_PARAM_FLOAT},       {"point2", PT_PARAM_POINT2},
+    {"vector2", PT_PARAM_VECTOR2},   {"point3", PT_PARAM_POINT3},     {"vector3", PT_PARAM_VECTOR3},
+    {"point", PT_PARAM_POINT3},      {"vector", PT_PARAM_VECTOR3},    {"normal", PT_PARAM_NORMAL},
+    {"normal3", PT_PARAM_NORMAL},    {"bool", PT_PARAM_BOOL},         {"string", PT_PARAM_STRING},
+    {"texture", PT_PARAM_TEXTURE},   {"rgb", PT_PARAM_RGB},           {"color", PT_PARAM_RGB},
+    {"xyz", PT_PARAM_XYZ},           {"spectrum", PT_PARAM_SPECTRUM}, {"blackbody", PT_PARAM_BLACKBODY},
+};
+
+/* Names that pbrt gives a meaning somewhere: out of place they change nothing, so they warn; any other name is a mistake. */
+static const char known_names[] =
+    " accelerator alpha amount angle B C Kd Ks Kr Kt L I Le Lescale N P Pw S T albedo alphatexture amplitude anisotropy aperture "
+    "aperturediameter basis bsdffile bssrdf bumpmap camera conductor.eta conductor.k conductor.roughness conductor.uroughness "
+    "conductor.vroughness coneangle conedeltaangle crop cropwindow ctm degree density detaillevel diagonal dimension "
+    "displacement displayserver edgelength emissionfilename encoding eta eumelanin eta.eta exposuretime faceIndices "
+    "filename filter filteradius filtertype flatness focaldistance focallength fov frameaspectratio from g gamma height "
+    "illuminance imagefile index indices inside innerradius interface.eta interface.roughness interface.uroughness "
+    "interface.vroughness invert iso k lensfile lensradius levels lightsamplestrategy lightsampler mapname mapping "
+    "materials maxanisotropy maxcomponentvalue maxdepth maxnodeprims maxprims maxsampleluminance mediumname mfp minsamples "
+    "namedmaterial1 namedmaterial2 nlevels nsamples normalmap normals nu nv nx ny nz octaves offset omega opacity order outside "
+    "outsidesamples p p0 p1 phimax pheomelanin photonsperiteration pixelbounds pixelsamples portal power preset radius "
+    "randomization randomize reflect reflectance regularize remaproughness rgbfilename roughness rrthreshold samples "
+    "saturation scale screenwindow seed sensor shadowalpha shutterclose shutteropen sigma sigma_a sigma_s sigma_t "
+    "simpleaperture specialfloats spectrum splitdepth splitmethod st strategy tau temperature tex tex1 tex2 texture "
+    "textures thickness to tolerance toneMap transmit transmittance trilinear twosided type u0 u1 udelta umax umin uorder "
+    "uroughness uscale uv uvs uknots v0 v00 v01 v1 v10 v11 v2 value variation vdelta vertices vmax vmin vorder vroughness "
+    "vscale vknots vtx whitebalance width width0 width1 wrap xradius xresolution xsamples xwidth yradius yresolution ysamples "
+    "ywidth zmax zmin Pz color metallic speculartint sheen sheentint clearcoat clearcoatgloss spectrans scatterdistance "
+    "difftrans flatness specTrans beta_m beta_n eccentricity visualizevoxels multiscatter Lemitted temperaturecutoff "
+    "temperatureoffset temperaturescale numiterations iterations imagewritefrequency mutationsperpixel bootstrapsamples "
+    "chains largestepprobability initialsamples savefp16 crease nointerior maxwavelength jitter dichromatic writeframe "
+    "infinitelights lights shadow dispersion ";
+
+int pt_grow(void **items, size_t *room, size_t count, size_t size)
+{
+    if (count < *room)
+        return 1;
+    size_t bigger = *room > 0 ? *room * 2 : 16;
+    if (bigger > SIZE_MAX / size)
+        return 0;
+    void *grown = realloc(*items, bigger * size);
+    if (grown == NULL)
+        return 0;
+    *items = grown;
+    *room = bigger;
+    return 1;
+}
+
+void pt_params_clear(struct pt_params *params, struct pt_diag *diag, struct pt_loc loc)
+{
+    params->diag = diag;
+    params->loc = loc;
+    params->count = params->number_count = params->string_count = params->text_count = 0;
+    params->kind = pt_params_keep(params, "", 0);
+}
+
+void pt_params_release(struct pt_params *params)
+{
+    free(params->items);
+    free(params->numbers);
+    free(params->strings);
+    free(params->text);
+    *params = (struct pt_params){0};
+}
+
+size_t pt_params_keep(struct pt_params *params, const char *text, size_t length)
+{
+    while (params->text_room - params->text_count <= length)
+        if (!pt_grow((void **)&params->text, &params->text_room, params->text_room, 1)) {
+            pt_diag_nomem(params->diag, "parameters");
+            return 0;
+        }
+    size_t at = params->text_count;
+    if (length > 0)
+        memcpy(params->text + at, text, length);
+    params->text[at + length] = '\0';
+    params->text_count += length + 1;
+    return at;
+}
+
+const char *pt_params_kind(const struct pt_params *params)
+{
+    return params->text != NULL ? params->text + params->kind : "";
+}
+
+const char *pt_param_name(const struct pt_params *params, const struct pt_param *param)
+{
+    return params->text + param->name;
+}
+
+const char *pt_params_string_at(const struct pt_params *params, const struct pt_param *param, size_t i)
+{
+    return params->text + params->strings[param->first + i];
+}
+
+/* Tokens are quoted in messages up to this length. */
+static int clip(size_t length)
+{
+    return length < 40 ? (int)length : 40;
+}
+
+/* --- reading ---------------------------------------------------------------------------------------------------------- */
+
+/* `"type name"` to type and name. */
+static int read_declaration(struct pt_params *params, const struct pt_token *t, struct pt_param *out)
+{
+    size_t at = 0, type_end;
+    while (at < t->length && (t->text[at] == ' ' || t->text[at] == '\t'))
+        at++;
+    for (type_end = at; type_end < t->length && t->text[type_end] != ' ' && t->text[type_end] != '\t';)
+        type_end++;
+    size_t name = type_end, end = t->length;
+    while (name < end && (t->text[name] == ' ' || t->text[name] == '\t'))
+        name++;
+    while (end > name && (t->text[end - 1] == ' ' || t->text[end - 1] == '\t'))
+        end--;
+    if (name == end)
+        return pt_diag_fail(params->diag, t->loc, "parameter \"%.*s\" (expected \"type name\")", clip(t->length), t->text);
+    out->type = -1;
+    for (size_t i = 0; i < sizeof type_names / sizeof type_names[0]; i++)
+        if (strlen(type_names[i].name) == type_end - at && memcmp(type_names[i].name, t->text + at, type_end - at) == 0)
+            out->type = type_names[i].type;
+    if (out->type < 0)
+        return pt_diag_fail(params->diag, t->loc,
+                            "unknown parameter type \"%.*s\" (expected integer, float, point2, vector2, point3, vector3, "
+                            "normal, bool, string, texture, rgb, spectrum or blackbody)",
+                            clip(type_end - at), t->text + at);
+    out->loc = t->loc;
+    out->name = pt_params_keep(params, t->text + name, end - name);
+    return params->diag->rc;
+}
+
+static int wants_text(int type)
+{
+    return type == PT_PARAM_STRING || type == PT_PARAM_TEXTURE;
+}
+
+static int add_number(struct pt_params *params, struct pt_param *p, double value)
+{
+    if (!pt_grow((void **)&params->numbers, &params->number_room, params->number_count, sizeof *params->numbers))
+        return pt_diag_nomem(params->diag, "parameters");
+    params->numbers[params->number_count++] = value;
+    p->count++;
+    return 0;
+}
+
+static int add_string(struct pt_params *params, struct pt_param *p, const struct pt_token *t)
+{
+    if (!pt_grow((void **)&params->strings, &params->string_room, params->string_count, sizeof *params->strings))
+        return pt_diag_nomem(params->diag, "parameters");
+    params->strings[params->string_count++] = pt_params_keep(params, t->text, t->length);
+    p->is_text = 1;
+    p->count++;
+    return params->diag->rc;
+}
+
+static int is_word(const struct pt_token *t, const char *word)
+{
+    return t->length == strlen(word) && memcmp(t->text, word, t->length) == 0;
+}
+
+static int add_value(struct pt_params *params, struct pt_param *p, const struct pt_token *t)
+{
+    const char *name = pt_param_name(params, p);
+    int text = t->kind == PT_TOKEN_STRING;
+    if (p->type == PT_PARAM_BOOL) {
+        if (is_word(t, "true") || is_word(t, "false"))
+            return add_number(params, p, t->text[0] == 't');
+        return pt_diag_fail(params->diag, t->loc, "value of \"bool %s\" is \"%.*s\" (expected true or false)", name,
+                            clip(t->length), t->text);
+    }
+    if (wants_text(p->type) != text && !(p->type == PT_PARAM_SPECTRUM && text))
+        return pt_diag_fail(params->diag, t->loc, "value of \"%s\" is %s (expected %s)", name,
+                            text ? "a string" : "not a string", text ? "a number" : "a quoted string");
+    if (p->type == PT_PARAM_SPECTRUM && p->count > 0 && p->is_text != text)
+        return pt_diag_fail(params->diag, t->loc, "\"spectrum %s\" mixes names and numbers", name);
+    if (text)
+        return add_string(params, p, t);
+    double value;
+    if (!pt_number_parse(t->text, t->length, &value))
+        return pt_diag_fail(params->diag, t->loc, "value of \"%s\" is \"%.*s\" (expected a finite number)", name,
+                            clip(t->length), t->text);
+    return add_number(params, p, value);
+}
+
+static int read_values(struct pt_params *params, struct pt_lexer *lexer, struct pt_param *p)
+{
+    struct pt_token t = pt_lexer_next(lexer);
+    p->first = wants_text(p->type) ? params->string_count : params->number_count;
+    if (t.kind == PT_TOKEN_WORD || t.kind == PT_TOKEN_STRING) {
+        if (t.kind == PT_TOKEN_STRING)
+            p->first = p->type == PT_PARAM_BOOL ? p->first : params->string_count;
+        return add_value(params, p, &t);
+    }
+    if (t.kind != PT_TOKEN_OPEN)
+        return t.kind == PT_TOKEN_BAD ? params->diag->rc
+                                      : pt_diag_fail(params->diag, t.loc, "parameter \"%s\" has no value",
+                                                     pt_param_name(params, p));
+    struct pt_loc open = t.loc;
+    if (pt_lexer_peek(lexer).kind == PT_TOKEN_STRING && p->type == PT_PARAM_SPECTRUM)
+        p->first = params->string_count;
+    for (;;) {
+        t = pt_lexer_next(lexer);
+        if (t.kind == PT_TOKEN_CLOSE)
+            return 0;
+        if (t.kind == PT_TOKEN_BAD)
+            return params->diag->rc;
+        if (t.kind != PT_TOKEN_WORD && t.kind != PT_TOKEN_STRING)
+            return pt_diag_fail(params->diag, open, "values of \"%s\" have no closing ]", pt_param_name(params, p));
+        int rc = add_value(params, p, &t);
+        if (rc)
+            return rc;
+    }
+}
+
+int pt_params_read(struct pt_params *params, struct pt_lexer *lexer)
+{
+    while (pt_lexer_peek(lexer).kind == PT_TOKEN_STRING) {
+        struct pt_token t = pt_lexer_next(lexer);
+        struct pt_param p = {0};
+        int rc = read_declaration(params, &t, &p);
+        if (!rc)
+            rc = read_values(params, lexer, &p);
+        if (rc)
+            return rc;
+        struct pt_param *old = pt_params_find(params, pt_param_name(params, &p));
+        if (old != NULL)
+            return pt_diag_fail(params->diag, p.loc, "parameter \"%s\" is given twice", pt_param_name(params, &p));
+        if (!pt_grow((void **)&params->items, &params->room, params->count, sizeof *params->items))
+            return pt_diag_nomem(params->diag, "parameters");
+        params->items[params->count++] = p;
+    }
+    return params->diag->rc;
+}
+
+int pt_params_append(struct pt_params *params, const struct pt_params *from)
+{
+    for (size_t i = 0; i < from->count && !params->diag->rc; i++) {
+        const struct pt_param *src = &from->items[i];
+        const char *name = pt_param_name(from, src);
+        if (pt_params_find(params, name) != NULL)
+            continue;
+        struct pt_param p = *src;
+        p.name = pt_params_keep(params, name, strlen(name));
+        p.inherited = 1;
+        p.used = 0;
+        p.count = 0;
+        p.first = src->is_text ? params->string_count : params->number_count;
+        for (size_t k = 0; k < src->count && !params->diag->rc; k++) {
+            if (src->is_text) {
+                const char *s = pt_params_string_at(from, src, k);
+                struct pt_token t = {.text = s, .length = strlen(s)};
+                add_string(params, &p, &t);
+            } else {
+                add_number(params, &p, from->numbers[src->first + k]);
+            }
+        }
+        if (!pt_grow((void **)&params->items, &params->room, params->count, sizeof *params->items))
+            return pt_diag_nomem(params->diag, "parameters");
+        params->items[params->count++] = p;
+    }
+    return params->diag->rc;
+}
+
+/* --- use -------------------------------------------------------------------------------------------------------------- */
+
+static int in_list(const char *names, const char *name)
+{
+    size_t n = strlen(name);
+    for (const char *at = strstr(names, name); n > 0 && at != NULL; at = strstr(at + 1, name))
+        if ((at == names || at[-1] == ' ') && (at[n] == ' ' || at[n] == '\0'))
+            return 1;
+    return 0;
+}
+
+void pt_params_ignore(struct pt_params *params, const char *names)
+{
+    for (size_t i = 0; i < params->count; i++)
+        if (in_list(names, pt_param_name(params, &params->items[i])))
+            params->items[i].used = 1;
+}
+
+void pt_params_check_used(struct pt_params *params)
+{
+    for (size_t i = 0; i < params->count && !params->diag->rc; i++) {
+        const struct pt_param *p = &params->items[i];
+        const char *name = pt_param_name(params, p);
+        if (p->used || p->inherited)
+            continue;
+        if (in_list(known_names, name))
+            pt_diag_warn(params->diag, p->loc, "parameter \"%s\" has no effect on \"%s\"", name, pt_params_kind(params));
+        else
+            pt_diag_fail(params->diag, p->loc, "unknown parameter \"%s\" of \"%s\"", name, pt_params_kind(params));
+    }
+}
+
+struct pt_param *pt_params_find(const struct pt_params *params, const char *name)
+{
+    for (size_t i = 0; i < params->count; i++)
+        if (strcmp(params->text + params->items[i].name, name) == 0)
+            return &params->items[i];
+    return NULL;
+}
+
+static const char *type_name(int type)
+{
+    for (size_t i = 0; i < sizeof type_names / sizeof type_names[0]; i++)
+        if (type_names[i].type == type)
+            return type_names[i].name;
+    return "?";
+}
+
+/* Finds, marks, and checks the type against a bit set; NULL when absent or wrong. */
+static struct pt_param *take(struct pt_params *params, const char *name, unsigned types, const char *expected)
+{
+    struct pt_param *p = pt_params_find(params, name);
+    if (p == NULL)
+        return NULL;
+    p->used = 1;
+    if ((types >> p->type & 1u) == 0) {
+        pt_diag_fail(params->diag, p->loc, "parameter \"%s\" has type %s (expected %s)", name, type_name(p->type), expected);
+        return NULL;
+    }
+    return p;
+}
+
+static struct pt_param *take_one(struct pt_params *params, const char *name, unsigned types, const char *expected)
+{
+    struct pt_param *p = take(params, name, types, expected);
+    if (p != NULL && p->count != 1) {
+        pt_diag_fail(params->diag, p->loc, "parameter \"%s\" has %zu values (expected 1)", name, p->count);
+        return NULL;
+    }
+    return p;
+}
+
+enum {
+    NUMBERS = 1u << PT_PARAM_FLOAT | 1u << PT_PARAM_INTEGER,
+    TRIPLES = 1u << PT_PARAM_POINT3 | 1u << PT_PARAM_VECTOR3 | 1u << PT_PARAM_NORMAL,
+    PAIRS = 1u << PT_PARAM_POINT2 | 1u << PT_PARAM_VECTOR2
+};
+
+/* The scene is stored in float. */
+static int fits_float(struct pt_params *params, const struct pt_param *p, double v)
+{
+    if (fabs(v) <= FLT_MAX)
+        return 1;
+    pt_diag_fail(params->diag, p->loc, "parameter \"%s\" has the value %g, too large for a float", pt_param_name(params, p), v);
+    return 0;
+}
+
+double pt_params_float(struct pt_params *params, const char *name, double fallback)
+{
+    const struct pt_param *p = take_one(params, name, NUMBERS, "float");
+    if (p == NULL || !fits_float(params, p, params->numbers[p->first]))
+        return fallback;
+    return params->numbers[p->first];
+}
+
+double pt_params_float_in(struct pt_params *params, const char *name, double fallback, double low, double high)
+{
+    double v = pt_params_float(params, name, fallback);
+    if (pt_params_find(params, name) == NULL || (v >= low && v <= high))
+        return v;
+    pt_diag_fail(params->diag, pt_params_find(params, name)->loc, "parameter \"%s\" is %g (expected %g to %g)", name, v, low, high);
+    return fallback;
+}
+
+int pt_params_int_in(struct pt_params *params, const char *name, int fallback, int low, int high)
+{
+    const struct pt_param *p = take_one(params, name, NUMBERS, "integer");
+    if (p == NULL)
+        return fallback;
+    double v = params->numbers[p->first];
+    if (v == floor(v) && v >= low && v <= high)
+        return (int)v;
+    pt_diag_fail(params->diag, p->loc, "parameter \"%s\" is %g (expected a whole number from %d to %d)", name, v, low, high);
+    return fallback;
+}
+
+int pt_params_bool(struct pt_params *params, const char *name, int fallback)
+{
+    const struct pt_param *p = take_one(params, name, 1u << PT_PARAM_BOOL | 1u << PT_PARAM_STRING, "bool");
+    if (p == NULL)
+        return fallback;
+    if (!p->is_text)
+        return params->numbers[p->first] != 0;
+    const char *s = pt_params_string_at(params, p, 0);
+    if (strcmp(s, "true") == 0 || strcmp(s, "false") == 0)
+        return s[0] == 't';
+    pt_diag_fail(params->diag, p->loc, "parameter \"%s\" is \"%.40s\" (expected true or false)", name, s);
+    return fallback;
+}
+
+const char *pt_params_string(struct pt_params *params, const char *name, const char *fallback)
+{
+    const struct pt_param *p = take_one(params, name, 1u << PT_PARAM_STRING, "string");
+    return p != NULL ? pt_params_string_at(params, p, 0) : fallback;
+}
+
+int pt_params_point(struct pt_params *params, const char *name, double xyz[3])
+{
+    const struct pt_param *p = take(params, name, TRIPLES, "point3 or vector3");
+    if (p == NULL)
+        return 0;
+    if (p->count != 3) {
+        pt_diag_fail(params->diag, p->loc, "parameter \"%s\" has %zu values (expected 3)", name, p->count);
+        return 0;
+    }
+    for (int i = 0; i < 3; i++) {
+        xyz[i] = params->numbers[p->first + (size_t)i];
+        fits_float(params, p, xyz[i]);
+    }
+    return 1;
+}
+
+const double *pt_params_floats(struct pt_params *params, const char *name, size_t components, size_t *count)
+{
+    static const char *const expected[] = {"", "float", "point2 or float", "point3, vector3 or normal"};
+    unsigned types = components == 1 ? NUMBERS : components == 2 ? PAIRS | NUMBERS : TRIPLES;
+    const struct pt_param *p = take(params, name, types, expected[components]);
+    *count = 0;
+    if (p == NULL || p->count == 0)
+        return NULL;
+    if (p->count % components != 0) {
+        pt_diag_fail(params->diag, p->loc, "parameter \"%s\" has %zu values (expected a multiple of %zu)", name, p->count,
+                     components);
+        return NULL;
+    }
+    for (size_t i = 0; i < p->count; i++)
+        if (!fits_float(params, p, params->numbers[p->first + i]))
+            return NULL;
+    *count = p->count / components;
+    return params->numbers + p->first;
+}
+
+const double *pt_params_ints(struct pt_params *params, const char *name, size_t *count)
+{
+    const struct pt_param *p = take(params, name, NUMBERS, "integer");
+    *count = 0;
+    if (p == NULL || p->count == 0)
+        return NULL;
+    for (size_t i = 0; i < p->count; i++) {
+        double v = params->numbers[p->first + i];
+        if (v != floor(v) || v < -2147483648.0 || v > 2147483647.0) {
+            pt_diag_fail(params->diag, p->loc, "value %zu of \"%s\" is %g (expected a whole number)", i, name, v);
+            return NULL;
+        }
+    }
+    *count = p->count;
+    return params->numbers + p->first;
+}

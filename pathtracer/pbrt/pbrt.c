@@ -1,0 +1,544 @@
+#include "pbrt/pbrt.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "pbrt/number.h"
+#include "pbrt/pbrt_parser.h"
+#include "pbrt/spectra.h"
+
+/* --- pieces of directives --------------------------------------------------------------------------------------------- */
+
+int pt_parser_read_string(struct parser *p, const char *what, char *out, size_t room)
+{
+    struct pt_token t = pt_lexer_next(&p->lexer);
+    if (t.kind == PT_TOKEN_BAD)
+        return p->b->diag.rc;
+    int bracket = t.kind == PT_TOKEN_OPEN;
+    if (bracket)
+        t = pt_lexer_next(&p->lexer);
+    if (t.kind != PT_TOKEN_STRING)
+        return pt_diag_fail(&p->b->diag, t.loc, "expected a quoted %s", what);
+    if (t.length >= room)
+        return pt_diag_fail(&p->b->diag, t.loc, "%s of %zu characters (expected less than %zu)", what, t.length, room);
+    memcpy(out, t.text, t.length);
+    out[t.length] = '\0';
+    if (bracket && (t = pt_lexer_next(&p->lexer)).kind != PT_TOKEN_CLOSE)
+        return pt_diag_fail(&p->b->diag, t.loc, "expected ] after the %s", what);
+    return p->b->diag.rc;
+}
+
+int pt_parser_read_numbers(struct parser *p, const char *directive_name, double *out, int count)
+{
+    int bracket = pt_lexer_peek(&p->lexer).kind == PT_TOKEN_OPEN;
+    if (bracket)
+        pt_lexer_next(&p->lexer);
+    for (int i = 0; i < count; i++) {
+        struct pt_token t = pt_lexer_next(&p->lexer);
+        if (t.kind == PT_TOKEN_BAD)
+            return p->b->diag.rc;
+        if (t.kind != PT_TOKEN_WORD || !pt_number_parse(t.text, t.length, &out[i]))
+            return pt_diag_fail(&p->b->diag, t.loc, "%s: \"%.*s\" (expected %d numbers)", directive_name,
+                                t.length < 40 ? (int)t.length : 40, t.text, count);
+    }
+    if (bracket) {
+        struct pt_token t = pt_lexer_next(&p->lexer);
+        if (t.kind != PT_TOKEN_CLOSE)
+            return pt_diag_fail(&p->b->diag, t.loc, "%s: expected ] after %d numbers", directive_name, count);
+    }
+    return 0;
+}
+
+/* Kind and parameter list into p->params, with those of Attribute `target` added (-1: none). */
+static int read_entity(struct parser *p, struct pt_loc loc, int target)
+{
+    char kind[NAME_MAX_BYTES];
+    struct pt_params *params = &p->params;
+    pt_params_clear(params, &p->b->diag, loc);
+    int rc = pt_parser_read_string(p, "name of what follows", kind, sizeof kind);
+    if (rc)
+        return rc;
+    params->kind = pt_params_keep(params, kind, strlen(kind));
+    rc = pt_params_read(params, &p->lexer);
+    if (!rc && target >= 0 && p->state.attributes[target] != NULL)
+        rc = pt_params_append(params, p->state.attributes[target]);
+    return rc;
+}
+
+static int check_world(struct parser *p, struct pt_loc loc, const char *name)
+{
+    if (p->in_world)
+        return 0;
+    return pt_diag_fail(&p->b->diag, loc, "%s before WorldBegin", name);
+}
+
+/* --- blocks ----------------------------------------------------------------------------------------------------------- */
+
+static int push(struct parser *p, char kind, struct pt_loc loc)
+{
+    struct frame f = {p->state, kind, loc};
+    if (p->frames.count >= STATE_DEPTH)
+        return pt_diag_fail(&p->b->diag, loc, "blocks nested more than %d deep", STATE_DEPTH);
+    return pt_list_add(p->b, &p->frames, &f) < 0 ? p->b->diag.rc : 0;
+}
+
+static const char *begin_name(char kind)
+{
+    return kind == 'A' ? "AttributeBegin" : kind == 'T' ? "TransformBegin" : kind == 'O' ? "ObjectBegin" : "Import";
+}
+
+static int pop(struct parser *p, char kind, struct pt_loc loc, const char *end_name)
+{
+    struct frame *frames = p->frames.items;
+    if (p->frames.count == 0 || frames[p->frames.count - 1].kind == 'I')
+        return pt_diag_fail(&p->b->diag, loc, "%s without %s", end_name, begin_name(kind));
+    struct frame *top = &frames[p->frames.count - 1];
+    if (top->kind != kind)
+        return pt_diag_fail(&p->b->diag, loc, "%s where the %s of line %d is still open", end_name, begin_name(top->kind),
+                            top->loc.line);
+    if (kind == 'T') {
+        memcpy(p->state.ctm, top->state.ctm, sizeof p->state.ctm);
+        p->state.active = top->state.active;
+    } else {
+        p->state = top->state;
+    }
+    p->frames.count--;
+    return 0;
+}
+
+static int do_attribute_begin(struct parser *p, struct pt_loc loc)
+{
+    int rc = check_world(p, loc, "AttributeBegin");
+    return rc ? rc : push(p, 'A', loc);
+}
+
+static int do_attribute_end(struct parser *p, struct pt_loc loc)
+{
+    return pop(p, 'A', loc, "AttributeEnd");
+}
+
+static int do_transform_begin(struct parser *p, struct pt_loc loc)
+{
+    return push(p, 'T', loc);
+}
+
+static int do_transform_end(struct parser *p, struct pt_loc loc)
+{
+    return pop(p, 'T', loc, "TransformEnd");
+}
+
+static int do_object_begin(struct parser *p, struct pt_loc loc)
+{
+    char name[NAME_MAX_BYTES];
+    int rc = check_world(p, loc, "ObjectBegin");
+    if (!rc && (rc = pt_parser_read_string(p, "object name", name, sizeof name)) == 0 &&
+        (rc = pt_build_object_begin(p->b, name, loc)) == 0)
+        rc = push(p, 'O', loc);
+    return rc;
+}
+
+static int do_object_end(struct parser *p, struct pt_loc loc)
+{
+    int rc = pop(p, 'O', loc, "ObjectEnd");
+    return rc ? rc : pt_build_object_end(p->b);
+}
+
+static int do_object_instance(struct parser *p, struct pt_loc loc)
+{
+    char name[NAME_MAX_BYTES];
+    int rc = check_world(p, loc, "ObjectInstance");
+    if (!rc && (rc = pt_parser_read_string(p, "object name", name, sizeof name)) == 0)
+        rc = pt_build_instance(p->b, &p->state, name, loc);
+    return rc;
+}
+
+static int do_reverse_orientation(struct parser *p, struct pt_loc loc)
+{
+    (void)loc;
+    p->state.reverse_orientation = !p->state.reverse_orientation;
+    return 0;
+}
+
+/* --- header ----------------------------------------------------------------------------------------------------------- */
+
+static int read_header(struct parser *p, struct pt_loc loc, enum pt_header which, const char *name)
+{
+    if (p->in_world)
+        return pt_diag_fail(&p->b->diag, loc, "%s after WorldBegin", name);
+    int rc = read_entity(p, loc, -1);
+    if (rc)
+        return rc;
+    struct pt_params old = p->b->header[which];
+    p->b->header[which] = p->params;
+    p->params = old;
+    return 0;
+}
+
+static int do_film(struct parser *p, struct pt_loc loc)
+{
+    int rc = read_header(p, loc, PT_HEADER_FILM, "Film");
+    if (!rc && strcmp(pt_params_kind(&p->b->header[PT_HEADER_FILM]), "image") == 0)
+        p->b->is_v3 = 1;
+    return rc;
+}
+
+static int do_camera(struct parser *p, struct pt_loc loc)
+{
+    struct pt_xform inverse[2];
+    int rc = read_header(p, loc, PT_HEADER_CAMERA, "Camera");
+    if (rc)
+        return rc;
+    memcpy(p->b->camera_ctm, p->state.ctm, sizeof p->state.ctm);
+    p->b->camera_medium = p->state.medium_out;
+    for (int i = 0; i < 2; i++)
+        if (!pt_xform_invert(&p->state.ctm[i], &inverse[i]))
+            return pt_diag_fail(&p->b->diag, loc, "the camera's transform is singular");
+    return pt_parser_save_system(p, "camera", inverse);
+}
+
+static int do_sampler(struct parser *p, struct pt_loc loc)
+{
+    return read_header(p, loc, PT_HEADER_SAMPLER, "Sampler");
+}
+
+static int do_integrator(struct parser *p, struct pt_loc loc)
+{
+    return read_header(p, loc, PT_HEADER_INTEGRATOR, "Integrator");
+}
+
+static int do_pixel_filter(struct parser *p, struct pt_loc loc)
+{
+    return read_header(p, loc, PT_HEADER_FILTER, "PixelFilter");
+}
+
+static int do_accelerator(struct parser *p, struct pt_loc loc)
+{
+    return read_entity(p, loc, -1); /* the choice is ours */
+}
+
+static int do_world_begin(struct parser *p, struct pt_loc loc)
+{
+    if (p->in_world)
+        return pt_diag_fail(&p->b->diag, loc, "WorldBegin occurs twice");
+    if (p->frames.count > 0)
+        return pt_diag_fail(&p->b->diag, loc, "WorldBegin where the %s of line %d is still open",
+                            begin_name(((struct frame *)p->frames.items)[p->frames.count - 1].kind),
+                            ((struct frame *)p->frames.items)[p->frames.count - 1].loc.line);
+    p->in_world = 1;
+    p->state.ctm[0] = p->state.ctm[1] = pt_xform_identity();
+    p->state.active = 3;
+    int rc = pt_parser_save_system(p, "world", p->state.ctm);
+    return rc ? rc : pt_build_header(p->b);
+}
+
+static int do_world_end(struct parser *p, struct pt_loc loc)
+{
+    int rc = check_world(p, loc, "WorldEnd");
+    if (!rc && p->frames.count > 0)
+        rc = pt_diag_fail(&p->b->diag, loc, "WorldEnd where the %s of line %d is still open",
+                          begin_name(((struct frame *)p->frames.items)[p->frames.count - 1].kind),
+                          ((struct frame *)p->frames.items)[p->frames.count - 1].loc.line);
+    p->ended = 1;
+    return rc;
+}
+
+/* --- world ------------------------------------------------------------------------------------------------------------ */
+
+static int do_shape(struct parser *p, struct pt_loc loc)
+{
+    int rc = check_world(p, loc, "Shape");
+    if (!rc && (rc = read_entity(p, loc, PT_ATTR_SHAPE)) == 0)
+        rc = pt_build_shape(p->b, &p->state, &p->params);
+    return rc;
+}
+
+static int do_light_source(struct parser *p, struct pt_loc loc)
+{
+    int rc = check_world(p, loc, "LightSource");
+    if (!rc && (rc = read_entity(p, loc, PT_ATTR_LIGHT)) == 0)
+        rc = pt_build_light(p->b, &p->state, &p->params);
+    return rc;
+}
+
+static int do_area_light_source(struct parser *p, struct pt_loc loc)
+{
+    int rc = check_world(p, loc, "AreaLightSource");
+    if (!rc && (rc = read_entity(p, loc, PT_ATTR_LIGHT)) == 0)
+        rc = pt_build_area_light(p->b, &p->state, &p->params, &p->state.area);
+    return rc;
+}
+
+static int do_material(struct parser *p, struct pt_loc loc)
+{
+    int rc = check_world(p, loc, "Material");
+    if (!rc && (rc = read_entity(p, loc, PT_ATTR_MATERIAL)) == 0) {
+        p->state.material = pt_build_material(p->b, &p->state, pt_params_kind(&p->params), &p->params);
+        rc = p->b->diag.rc;
+    }
+    return rc;
+}
+
+static int do_make_named_material(struct parser *p, struct pt_loc loc)
+{
+    char kind[NAME_MAX_BYTES], name[NAME_MAX_BYTES];
+    int rc = check_world(p, loc, "MakeNamedMaterial");
+    if (rc || (rc = read_entity(p, loc, PT_ATTR_MATERIAL)) != 0)
+        return rc;
+    const char *type = pt_params_string(&p->params, "type", NULL);
+    if (type == NULL)
+        return pt_diag_fail(&p->b->diag, loc, "MakeNamedMaterial \"%s\" without \"string type\"", pt_params_kind(&p->params));
+    strncpy(kind, type, sizeof kind - 1);
+    kind[sizeof kind - 1] = '\0';
+    strcpy(name, pt_params_kind(&p->params));
+    int32_t id = pt_build_material(p->b, &p->state, kind, &p->params);
+    if (id >= 0 && pt_names_set(&p->b->named_materials, name, id) != 0)
+        return pt_diag_nomem(&p->b->diag, "materials");
+    return p->b->diag.rc;
+}
+
+static int do_named_material(struct parser *p, struct pt_loc loc)
+{
+    char name[NAME_MAX_BYTES];
+    int rc = check_world(p, loc, "NamedMaterial");
+    if (!rc && (rc = pt_parser_read_string(p, "material name", name, sizeof name)) == 0) {
+        p->state.material = pt_build_material_named(p->b, loc, name);
+        rc = p->b->diag.rc;
+    }
+    return rc;
+}
+
+static int do_texture(struct parser *p, struct pt_loc loc)
+{
+    char name[NAME_MAX_BYTES], type[64];
+    int rc = check_world(p, loc, "Texture");
+    if (!rc && (rc = pt_parser_read_string(p, "texture name", name, sizeof name)) == 0 &&
+        (rc = pt_parser_read_string(p, "texture type", type, sizeof type)) == 0 &&
+        (rc = read_entity(p, loc, PT_ATTR_TEXTURE)) == 0)
+        rc = pt_build_texture(p->b, &p->state, name, type, &p->params);
+    return rc;
+}
+
+static int do_make_named_medium(struct parser *p, struct pt_loc loc)
+{
+    char name[NAME_MAX_BYTES];
+    int rc = read_entity(p, loc, PT_ATTR_MEDIUM);
+    if (rc)
+        return rc;
+    strcpy(name, pt_params_kind(&p->params));
+    return pt_build_medium(p->b, &p->state, name, &p->params);
+}
+
+static int do_medium_interface(struct parser *p, struct pt_loc loc)
+{
+    char inside[NAME_MAX_BYTES], outside[NAME_MAX_BYTES];
+    int rc = pt_parser_read_string(p, "medium name", inside, sizeof inside);
+    if (rc)
+        return rc;
+    strcpy(outside, inside);
+    if (pt_lexer_peek(&p->lexer).kind == PT_TOKEN_STRING && (rc = pt_parser_read_string(p, "medium name", outside, sizeof outside)) != 0)
+        return rc;
+    p->state.medium_in = pt_build_medium_ref(p->b, inside, loc);
+    p->state.medium_out = pt_build_medium_ref(p->b, outside, loc);
+    return p->b->diag.rc;
+}
+
+static int do_attribute(struct parser *p, struct pt_loc loc)
+{
+    static const char *const targets[] = {"shape", "light", "material", "medium", "texture"};
+    int rc = read_entity(p, loc, -1), target = -1;
+    if (rc)
+        return rc;
+    for (int i = 0; i < PT_ATTR_COUNT; i++)
+        if (strcmp(pt_params_kind(&p->params), targets[i]) == 0)
+            target = i;
+    if (target < 0)
+        return pt_diag_fail(&p->b->diag, loc, "Attribute \"%s\" (expected shape, light, material, medium or texture)",
+                            pt_params_kind(&p->params));
+    /* New values win over those set before. */
+    if (p->state.attributes[target] != NULL && (rc = pt_params_append(&p->params, p->state.attributes[target])) != 0)
+        return rc;
+    struct pt_params *copy = calloc(1, sizeof *copy);
+    if (copy == NULL || pt_list_add(p->b, &p->attributes, &copy) < 0) {
+        free(copy);
+        return pt_diag_nomem(&p->b->diag, "attributes");
+    }
+    pt_params_clear(copy, &p->b->diag, loc);
+    p->state.attributes[target] = copy;
+    return pt_params_append(copy, &p->params);
+}
+
+static int do_color_space(struct parser *p, struct pt_loc loc)
+{
+    char name[64];
+    int rc = pt_parser_read_string(p, "colour space", name, sizeof name);
+    if (rc)
+        return rc;
+    int space = pt_colour_space_named(name);
+    if (space < 0)
+        return pt_diag_fail(&p->b->diag, loc, "unknown colour space \"%s\" (expected srgb, dci-p3, rec2020 or aces2065-1)", name);
+    p->state.colour_space = space;
+    return 0;
+}
+
+static int do_option(struct parser *p, struct pt_loc loc)
+{
+    pt_params_clear(&p->params, &p->b->diag, loc);
+    int rc = pt_params_read(&p->params, &p->lexer);
+    for (size_t i = 0; i < p->params.count && !rc; i++) {
+        const char *name = pt_param_name(&p->params, &p->params.items[i]);
+        if (strcmp(name, "seed") == 0)
+            p->b->defaults->integrator.seed = (uint32_t)pt_params_int_in(&p->params, "seed", 0, 0, 2147483647);
+        else
+            pt_diag_warn(&p->b->diag, p->params.items[i].loc, "Option \"%s\" is ignored", name);
+        rc = p->b->diag.rc;
+    }
+    return rc;
+}
+
+static int include(struct parser *p, struct pt_loc loc, int scoped)
+{
+    char name[NAME_MAX_BYTES], path[2 * NAME_MAX_BYTES];
+    int rc = pt_parser_read_string(p, "file name", name, sizeof name);
+    if (rc)
+        return rc;
+    pt_builder_path(p->b, name, path, sizeof path);
+    if (scoped && (rc = push(p, 'I', loc)) != 0)
+        return rc;
+    return pt_lexer_include(&p->lexer, path, loc, scoped);
+}
+
+static int do_include(struct parser *p, struct pt_loc loc)
+{
+    return include(p, loc, 0);
+}
+
+static int do_import(struct parser *p, struct pt_loc loc)
+{
+    int rc = check_world(p, loc, "Import");
+    return rc ? rc : include(p, loc, 1);
+}
+
+/* --- the loop --------------------------------------------------------------------------------------------------------- */
+
+static const struct {
+    const char *name;
+    directive *run;
+} directives[] = {
+    {"Shape", do_shape},
+    {"AttributeBegin", do_attribute_begin},
+    {"AttributeEnd", do_attribute_end},
+    {"ObjectInstance", do_object_instance},
+    {"NamedMaterial", do_named_material},
+    {"Material", do_material},
+    {"MakeNamedMaterial", do_make_named_material},
+    {"Texture", do_texture},
+    {"ObjectBegin", do_object_begin},
+    {"ObjectEnd", do_object_end},
+    {"Include", do_include},
+    {"Import", do_import},
+    {"LightSource", do_light_source},
+    {"AreaLightSource", do_area_light_source},
+    {"TransformBegin", do_transform_begin},
+    {"TransformEnd", do_transform_end},
+    {"ReverseOrientation", do_reverse_orientation},
+    {"MakeNamedMedium", do_make_named_medium},
+    {"MediumInterface", do_medium_interface},
+    {"Attribute", do_attribute},
+    {"ColorSpace", do_color_space},
+    {"Option", do_option},
+    {"Film", do_film},
+    {"Camera", do_camera},
+    {"Sampler", do_sampler},
+    {"Integrator", do_integrator},
+    {"SurfaceIntegrator", do_integrator},
+    {"VolumeIntegrator", do_accelerator},
+    {"Renderer", do_accelerator},
+    {"PixelFilter", do_pixel_filter},
+    {"Accelerator", do_accelerator},
+    {"WorldBegin", do_world_begin},
+    {"WorldEnd", do_world_end},
+};
+
+static directive *find_directive(const struct pt_token *t)
+{
+    for (size_t i = 0; i < sizeof directives / sizeof directives[0]; i++)
+        if (strlen(directives[i].name) == t->length && memcmp(directives[i].name, t->text, t->length) == 0)
+            return directives[i].run;
+    return pt_parser_transform_directive(t->text, t->length);
+}
+
+static int finish(struct parser *p, struct pt_loc loc)
+{
+    if (p->frames.count > 0) {
+        const struct frame *top = &((struct frame *)p->frames.items)[p->frames.count - 1];
+        return pt_diag_fail(&p->b->diag, top->loc, "%s is never closed", begin_name(top->kind));
+    }
+    if (!p->in_world)
+        return pt_diag_fail(&p->b->diag, loc, "the file ends without WorldBegin");
+    return pt_build_media_check(p->b);
+}
+
+static int run(struct parser *p)
+{
+    for (;;) {
+        struct pt_token t = pt_lexer_next(&p->lexer);
+        int rc = 0;
+        if (t.kind == PT_TOKEN_END)
+            return finish(p, t.loc);
+        if (t.kind == PT_TOKEN_BAD)
+            return p->b->diag.rc;
+        if (t.kind == PT_TOKEN_FILE_END) {
+            struct frame *top = &((struct frame *)p->frames.items)[p->frames.count - 1];
+            if (top->kind != 'I')
+                return pt_diag_fail(&p->b->diag, top->loc, "%s is never closed in its file", begin_name(top->kind));
+            p->state = top->state;
+            p->frames.count--;
+            continue;
+        }
+        if (p->ended) {
+            pt_diag_warn(&p->b->diag, t.loc, "text after WorldEnd is ignored");
+            return finish(p, t.loc);
+        }
+        directive *d = t.kind == PT_TOKEN_WORD ? find_directive(&t) : NULL;
+        if (d == NULL)
+            return pt_diag_fail(&p->b->diag, t.loc, "unknown directive \"%.*s\" (expected Shape, Material, AttributeBegin …)",
+                                t.length < 40 ? (int)t.length : 40, t.text);
+        rc = d(p, t.loc);
+        if (rc)
+            return rc;
+        if (p->b->diag.rc)
+            return p->b->diag.rc;
+    }
+}
+
+int pt_pbrt_read(struct pt_builder *b, const char *path)
+{
+    struct parser *p = calloc(1, sizeof *p);
+    if (p == NULL)
+        return pt_diag_nomem(&b->diag, "parser");
+    p->b = b;
+    p->lexer.source = b->source;
+    p->lexer.diag = &b->diag;
+    p->lexer.arena = &b->scene->arena;
+    p->frames.size = sizeof(struct frame);
+    p->systems.size = sizeof(struct pt_xform[2]);
+    p->attributes.size = sizeof(struct pt_params *);
+    p->state = (struct pt_state){.ctm = {pt_xform_identity(), pt_xform_identity()},
+                                 .active = 3, .material = -1, .medium_in = -1, .medium_out = -1};
+    int rc = pt_lexer_include(&p->lexer, path, (struct pt_loc){NULL, 0, 0}, 0);
+    if (!rc)
+        rc = run(p);
+    struct pt_params **attributes = p->attributes.items;
+    for (size_t i = 0; i < p->attributes.count; i++) {
+        pt_params_release(attributes[i]);
+        free(attributes[i]);
+    }
+    free(p->attributes.items);
+    free(p->frames.items);
+    free(p->systems.items);
+    pt_names_release(&p->system_names);
+    pt_params_release(&p->params);
+    pt_lexer_release(&p->lexer);
+    free(p);
+    return rc;
+}

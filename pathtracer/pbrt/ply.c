@@ -1,0 +1,381 @@
+#include "pbrt/ply.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "pbrt/number.h"
+
+enum ply_type { T_NONE, T_I8, T_U8, T_I16, T_U16, T_I32, T_U32, T_F32, T_F64 };
+static const uint8_t type_bytes[] = {0, 1, 1, 2, 2, 4, 4, 4, 8};
+static const struct {
+    const char *name;
+    enum ply_type type;
+} type_names[] = {{"char", T_I8},    {"int8", T_I8},    {"uchar", T_U8},  {"uint8", T_U8},    {"short", T_I16}, {"int16", T_I16},
+                  {"ushort", T_U16}, {"uint16", T_U16}, {"int", T_I32},   {"int32", T_I32},   {"uint", T_U32},  {"uint32", T_U32},
+                  {"float", T_F32},  {"float32", T_F32}, {"double", T_F64}, {"float64", T_F64}};
+
+/* What a property means to us. */
+enum role { R_SKIP, R_X, R_Y, R_Z, R_NX, R_NY, R_NZ, R_U, R_V, R_INDICES };
+
+enum { MAX_PROPERTIES = 32, MAX_ELEMENTS = 16, MAX_CORNERS = 1 << 16 };
+
+struct property {
+    enum ply_type type, count_type; /* count_type: T_NONE unless a list */
+    enum role role;
+};
+struct element {
+    char name[32];
+    uint64_t count;
+    int property_count;
+    struct property properties[MAX_PROPERTIES];
+};
+
+struct reader {
+    const char *name;
+    const char *at, *end;
+    struct base_err *err;
+    int ascii, swap;
+    int element_count;
+    struct element elements[MAX_ELEMENTS];
+    struct pt_ply *ply;
+    size_t index_room;
+    int has[R_INDICES + 1];
+};
+
+/* --- header ----------------------------------------------------------------------------------------------------------- */
+
+/* Next line of the header without its end; 0 at the end of the file. */
+static int next_line(struct reader *r, char *line, size_t room)
+{
+    size_t n = 0;
+    if (r->at >= r->end)
+        return 0;
+    while (r->at < r->end && *r->at != '\n') {
+        if (n + 1 < room)
+            line[n++] = *r->at;
+        r->at++;
+    }
+    if (r->at < r->end)
+        r->at++;
+    while (n > 0 && (line[n - 1] == '\r' || line[n - 1] == ' '))
+        n--;
+    line[n] = '\0';
+    return 1;
+}
+
+/* Splits in place; returns the number of words. */
+static int split(char *line, char *words[], int max)
+{
+    int n = 0;
+    for (char *save = NULL, *w = strtok_r(line, " \t", &save); w != NULL && n < max; w = strtok_r(NULL, " \t", &save))
+        words[n++] = w;
+    return n;
+}
+
+static enum ply_type type_of(const char *name)
+{
+    for (size_t i = 0; i < sizeof type_names / sizeof type_names[0]; i++)
+        if (strcmp(type_names[i].name, name) == 0)
+            return type_names[i].type;
+    return T_NONE;
+}
+
+static enum role role_of(const struct element *e, const char *name, int is_list)
+{
+    static const struct {
+        const char *name;
+        enum role role;
+    } roles[] = {{"x", R_X},   {"y", R_Y},   {"z", R_Z},   {"nx", R_NX}, {"ny", R_NY},        {"nz", R_NZ},       {"u", R_U},
+                 {"v", R_V},   {"s", R_U},   {"t", R_V},   {"texture_u", R_U}, {"texture_v", R_V}, {"texture_s", R_U}, {"texture_t", R_V}};
+    if (strcmp(e->name, "face") == 0 && is_list)
+        return strcmp(name, "vertex_indices") == 0 || strcmp(name, "vertex_index") == 0 ? R_INDICES : R_SKIP;
+    if (strcmp(e->name, "vertex") == 0 && !is_list)
+        for (size_t i = 0; i < sizeof roles / sizeof roles[0]; i++)
+            if (strcmp(roles[i].name, name) == 0)
+                return roles[i].role;
+    return R_SKIP;
+}
+
+static int read_property(struct reader *r, struct element *e, char *words[], int n)
+{
+    int is_list = n == 5 && strcmp(words[1], "list") == 0;
+    if (e == NULL || (n != 3 && !is_list))
+        return base_fail(r->err, BASE_EINVAL, "%s: malformed PLY property", r->name);
+    if (e->property_count == MAX_PROPERTIES)
+        return base_fail(r->err, BASE_EINVAL, "%s: more than %d PLY properties", r->name, MAX_PROPERTIES);
+    struct property p = {.type = type_of(words[is_list ? 3 : 1]), .count_type = is_list ? type_of(words[2]) : T_NONE};
+    if (p.type == T_NONE || (is_list && (p.count_type == T_NONE || p.count_type >= T_F32)))
+        return base_fail(r->err, BASE_EINVAL, "%s: unknown PLY type \"%.20s\"", r->name, words[is_list ? 3 : 1]);
+    p.role = role_of(e, words[n - 1], is_list);
+    if (p.role == R_INDICES && p.type >= T_F32)
+        return base_fail(r->err, BASE_EINVAL, "%s: PLY indices of type \"%.20s\" (expected integers)", r->name, words[3]);
+    if (p.role != R_SKIP && r->has[p.role]++)
+        return base_fail(r->err, BASE_EINVAL, "%s: PLY property \"%.20s\" occurs twice", r->name, words[n - 1]);
+    e->properties[e->property_count++] = p;
+    return 0;
+}
+
+static int read_element(struct reader *r, char *words[], int n)
+{
+    double count = -1;
+    if (n != 3 || !pt_number_parse(words[2], strlen(words[2]), &count) || count < 0 || count != floor(count))
+        return base_fail(r->err, BASE_EINVAL, "%s: malformed PLY element", r->name);
+    if (count > 4294967295.0 || r->element_count == MAX_ELEMENTS)
+        return base_fail(r->err, BASE_EINVAL, "%s: PLY element count %.20s is too large", r->name, words[2]);
+    struct element *e = &r->elements[r->element_count++];
+    strncpy(e->name, words[1], sizeof e->name - 1);
+    e->count = (uint64_t)count;
+    return 0;
+}
+
+static int read_header(struct reader *r)
+{
+    char line[512], *words[6];
+    struct element *e = NULL;
+    int has_format = 0;
+    const uint16_t probe = 1;
+    const int little = *(const uint8_t *)&probe == 1;
+    if (!next_line(r, line, sizeof line) || strcmp(line, "ply") != 0)
+        return base_fail(r->err, BASE_EINVAL, "%s: not a PLY file", r->name);
+    while (next_line(r, line, sizeof line)) {
+        int n = split(line, words, 6), rc = 0;
+        if (n == 0 || strcmp(words[0], "comment") == 0 || strcmp(words[0], "obj_info") == 0)
+            continue;
+        if (strcmp(words[0], "end_header") == 0)
+            return has_format ? 0 : base_fail(r->err, BASE_EINVAL, "%s: PLY header without a format", r->name);
+        if (strcmp(words[0], "format") == 0 && n >= 2) {
+            has_format = 1;
+            r->ascii = strcmp(words[1], "ascii") == 0;
+            r->swap = strcmp(words[1], little ? "binary_big_endian" : "binary_little_endian") == 0;
+            if (!r->ascii && !r->swap && strcmp(words[1], little ? "binary_little_endian" : "binary_big_endian") != 0)
+                rc = base_fail(r->err, BASE_EINVAL, "%s: unknown PLY format \"%.30s\"", r->name, words[1]);
+        } else if (strcmp(words[0], "element") == 0) {
+            rc = read_element(r, words, n);
+            e = r->element_count > 0 ? &r->elements[r->element_count - 1] : NULL;
+        } else if (strcmp(words[0], "property") == 0) {
+            rc = read_property(r, e, words, n);
+        } else {
+            rc = base_fail(r->err, BASE_EINVAL, "%s: unknown PLY header line \"%.30s\"", r->name, words[0]);
+        }
+        if (rc)
+            return rc;
+    }
+    return base_fail(r->err, BASE_EINVAL, "%s: truncated PLY header", r->name);
+}
+
+/* --- values ----------------------------------------------------------------------------------------------------------- */
+
+static int truncated(struct reader *r)
+{
+    return base_fail(r->err, BASE_EINVAL, "%s: truncated PLY file", r->name);
+}
+
+static int ascii_value(struct reader *r, double *out)
+{
+    while (r->at < r->end && (*r->at == ' ' || *r->at == '\n' || *r->at == '\t' || *r->at == '\r'))
+        r->at++;
+    const char *start = r->at;
+    while (r->at < r->end && *r->at != ' ' && *r->at != '\n' && *r->at != '\t' && *r->at != '\r')
+        r->at++;
+    if (start == r->at)
+        return truncated(r);
+    size_t n = (size_t)(r->at - start);
+    if (!pt_number_parse(start, n, out))
+        return base_fail(r->err, BASE_EINVAL, "%s: \"%.*s\" in PLY data (expected a finite number)", r->name, n < 30 ? (int)n : 30, start);
+    return 0;
+}
+
+static double decode(const char *at, enum ply_type type, int swap)
+{
+    unsigned char b[8];
+    int n = type_bytes[type];
+    for (int i = 0; i < n; i++)
+        b[i] = (unsigned char)at[swap ? n - 1 - i : i];
+    union {
+        int8_t i8; uint8_t u8; int16_t i16; uint16_t u16; int32_t i32; uint32_t u32; float f32; double f64;
+    } v;
+    memcpy(&v, b, (size_t)n);
+    switch (type) {
+    case T_I8: return v.i8;
+    case T_U8: return v.u8;
+    case T_I16: return v.i16;
+    case T_U16: return v.u16;
+    case T_I32: return v.i32;
+    case T_U32: return v.u32;
+    case T_F32: return (double)v.f32;
+    default: return v.f64;
+    }
+}
+
+static int read_value(struct reader *r, enum ply_type type, double *out)
+{
+    if (r->ascii)
+        return ascii_value(r, out);
+    if ((size_t)(r->end - r->at) < type_bytes[type])
+        return truncated(r);
+    *out = decode(r->at, type, r->swap);
+    r->at += type_bytes[type];
+    return 0;
+}
+
+/* --- elements --------------------------------------------------------------------------------------------------------- */
+
+static int store_vertex_value(struct reader *r, uint64_t i, enum role role, double v)
+{
+    struct pt_ply *p = r->ply;
+    switch (role) {
+    case R_X: case R_Y: case R_Z:
+        if (!isfinite((float)v))
+            return base_fail(r->err, BASE_EINVAL, "%s: vertex %llu is not finite", r->name, (unsigned long long)i);
+        p->positions[3 * i + (uint64_t)(role - R_X)] = (float)v;
+        break;
+    case R_NX: case R_NY: case R_NZ:
+        if (p->normals != NULL)
+            p->normals[3 * i + (uint64_t)(role - R_NX)] = isfinite((float)v) ? (float)v : 0.0f;
+        break;
+    case R_U: case R_V:
+        if (p->uvs != NULL)
+            p->uvs[2 * i + (uint64_t)(role - R_U)] = isfinite((float)v) ? (float)v : 0.0f;
+        break;
+    default: break;
+    }
+    return 0;
+}
+
+static int add_triangle(struct reader *r, uint32_t a, uint32_t b, uint32_t c)
+{
+    struct pt_ply *p = r->ply;
+    if (p->triangle_count == UINT32_MAX / 3)
+        return base_fail(r->err, BASE_EINVAL, "%s: too many triangles", r->name);
+    if (p->triangle_count == r->index_room) {
+        size_t room = r->index_room > 0 ? r->index_room * 2 : 64;
+        uint32_t *grown = realloc(p->indices, room * 3 * sizeof *grown);
+        if (grown == NULL)
+            return base_fail_nomem(r->err, r->name);
+        p->indices = grown;
+        r->index_room = room;
+    }
+    uint32_t *t = p->indices + 3 * (size_t)p->triangle_count++;
+    t[0] = a;
+    t[1] = b;
+    t[2] = c;
+    return 0;
+}
+
+static int read_list(struct reader *r, const struct property *p)
+{
+    double count, value;
+    uint32_t first = 0, previous = 0;
+    int rc = read_value(r, p->count_type, &count);
+    if (rc)
+        return rc;
+    if (count < 0 || count > MAX_CORNERS || count != floor(count))
+        return base_fail(r->err, BASE_EINVAL, "%s: PLY list of %g values", r->name, count);
+    if (p->role == R_INDICES && count > 4)
+        r->ply->polygons++;
+    for (int k = 0; k < (int)count; k++) {
+        rc = read_value(r, p->type, &value);
+        if (rc)
+            return rc;
+        if (p->role != R_INDICES)
+            continue;
+        if (!(value >= 0 && value < (double)r->ply->vertex_count) || value != floor(value))
+            return base_fail(r->err, BASE_EINVAL, "%s: vertex index %.0f out of range (expected 0 to %lld)", r->name, value,
+                           (long long)r->ply->vertex_count - 1);
+        uint32_t index = (uint32_t)value;
+        if (k == 0)
+            first = index;
+        else if (k >= 2 && (rc = add_triangle(r, first, previous, index)) != 0)
+            return rc;
+        previous = index;
+    }
+    return 0;
+}
+
+/* Fewest bytes that one item of the element can take: what the file holds bounds what is allocated. */
+static size_t least_bytes(const struct reader *r, const struct element *e)
+{
+    size_t n = 0;
+    for (int i = 0; i < e->property_count; i++) {
+        const struct property *p = &e->properties[i];
+        n += r->ascii ? 2 : type_bytes[p->count_type != T_NONE ? p->count_type : p->type];
+    }
+    return n;
+}
+
+static int begin_vertices(struct reader *r, const struct element *e)
+{
+    struct pt_ply *p = r->ply;
+    if (p->positions != NULL)
+        return base_fail(r->err, BASE_EINVAL, "%s: PLY element \"vertex\" occurs twice", r->name);
+    if (!r->has[R_X] || !r->has[R_Y] || !r->has[R_Z])
+        return base_fail(r->err, BASE_EINVAL, "%s: PLY vertices without x, y and z", r->name);
+    if (e->count > INT32_MAX)
+        return base_fail(r->err, BASE_EINVAL, "%s: %llu vertices are too many", r->name, (unsigned long long)e->count);
+    size_t n = e->count > 0 ? (size_t)e->count : 1;
+    p->positions = calloc(n, 3 * sizeof(float));
+    if (r->has[R_NX] && r->has[R_NY] && r->has[R_NZ])
+        p->normals = calloc(n, 3 * sizeof(float));
+    if (r->has[R_U] && r->has[R_V])
+        p->uvs = calloc(n, 2 * sizeof(float));
+    if (p->positions == NULL || (r->has[R_NX] && r->has[R_NY] && r->has[R_NZ] && p->normals == NULL) ||
+        (r->has[R_U] && r->has[R_V] && p->uvs == NULL))
+        return base_fail_nomem(r->err, r->name);
+    p->vertex_count = (uint32_t)e->count;
+    return 0;
+}
+
+static int read_items(struct reader *r, const struct element *e)
+{
+    int is_vertex = strcmp(e->name, "vertex") == 0, rc = 0;
+    size_t least = least_bytes(r, e), left = (size_t)(r->end - r->at);
+    if (e->count > 0 && (least == 0 || e->count > (left + 1) / least))
+        return least == 0 ? 0 : truncated(r);
+    if (is_vertex && (rc = begin_vertices(r, e)) != 0)
+        return rc;
+    for (uint64_t i = 0; i < e->count; i++)
+        for (int k = 0; k < e->property_count; k++) {
+            const struct property *p = &e->properties[k];
+            double v;
+            if (p->count_type != T_NONE)
+                rc = read_list(r, p);
+            else if ((rc = read_value(r, p->type, &v)) == 0 && is_vertex)
+                rc = store_vertex_value(r, i, p->role, v);
+            if (rc)
+                return rc;
+        }
+    return 0;
+}
+
+int pt_ply_parse(const char *name, const char *bytes, size_t size, struct pt_ply *out, struct base_err *err)
+{
+    struct pt_ply ply = {0};
+    struct reader *r = calloc(1, sizeof *r);
+    if (r == NULL)
+        return base_fail_nomem(err, name);
+    *r = (struct reader){.name = name, .at = bytes, .end = bytes + size, .err = err, .ply = &ply};
+    int rc = read_header(r);
+    for (int i = 0; i < r->element_count && !rc; i++)
+        rc = read_items(r, &r->elements[i]);
+    if (!rc && ply.positions == NULL)
+        rc = base_fail(err, BASE_EINVAL, "%s: PLY file without vertices", name);
+    if (!rc && !r->has[R_INDICES])
+        rc = base_fail(err, BASE_EINVAL, "%s: PLY file without faces", name);
+    free(r);
+    if (rc) {
+        pt_ply_release(&ply);
+        return rc;
+    }
+    *out = ply;
+    return 0;
+}
+
+void pt_ply_release(struct pt_ply *ply)
+{
+    free(ply->positions);
+    free(ply->normals);
+    free(ply->uvs);
+    free(ply->indices);
+    *ply = (struct pt_ply){0};
+}

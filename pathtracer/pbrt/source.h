@@ -1,0 +1,28 @@
+/*
+ * Where the bytes of scene files come from: the disk, or memory in tests and fuzzers.
+ */
+#ifndef PT_PBRT_SOURCE_H
+#define PT_PBRT_SOURCE_H
+
+#include <stddef.h>
+
+#include "base/err.h"
+
+struct pt_source {
+    /* Reads all of `path`; *bytes is malloc'ed (caller frees) and NUL-terminated one past *size. Must be thread-safe. */
+    int (*read)(void *data, const char *path, char **bytes, size_t *size, struct base_err *err);
+    void *data;
+    int files; /* 1: paths are real files that other libraries may open */
+};
+
+/* The file system. Names that end in .gz are unpacked. Files above 2 GiB are refused. */
+extern const struct pt_source pt_source_files;
+
+/* A file system of one file, `path` with text[0, size), that it borrows; every other path does not exist. */
+struct pt_source_single {
+    const char *path, *text;
+    size_t size;
+};
+struct pt_source pt_source_from_memory(const struct pt_source_single *single);
+
+#endif

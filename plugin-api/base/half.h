@@ -1,0 +1,13 @@
+/* Floats of 16 bits: IEEE 754 binary16 (f16) and bfloat16, the upper half of a float. */
+#ifndef BASE_HALF_H
+#define BASE_HALF_H
+
+#include <stdint.h>
+
+/* Rounds to nearest even; NaN stays NaN. */
+uint16_t base_f32_to_bf16(float x);
+float base_bf16_to_f32(uint16_t x);
+uint16_t base_f32_to_f16(float x);
+float base_f16_to_f32(uint16_t x);
+
+#endif

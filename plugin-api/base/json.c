@@ -1,0 +1,56 @@
+#include "base/json.h"
+
+#include <math.h>
+#include <stdio.h>
+
+#include "base/files.h"
+
+/* Owns item from here on. Returns it, or NULL when it could not be added. */
+static cJSON *add(cJSON *to, const char *key, cJSON *item, int *failed)
+{
+    if (item != NULL && (key != NULL ? cJSON_AddItemToObject(to, key, item) : cJSON_AddItemToArray(to, item)))
+        return item;
+    cJSON_Delete(item);
+    *failed = 1;
+    return NULL;
+}
+
+void base_json_number(cJSON *to, const char *key, double value, int *failed)
+{
+    add(to, key, isfinite(value) ? cJSON_CreateNumber(value) : cJSON_CreateNull(), failed);
+}
+
+void base_json_text(cJSON *to, const char *key, const char *text, int *failed)
+{
+    add(to, key, text != NULL ? cJSON_CreateString(text) : cJSON_CreateNull(), failed);
+}
+
+void base_json_bool(cJSON *to, const char *key, int value, int *failed)
+{
+    add(to, key, cJSON_CreateBool(value), failed);
+}
+
+cJSON *base_json_object(cJSON *to, const char *key, int *failed)
+{
+    return add(to, key, cJSON_CreateObject(), failed);
+}
+
+cJSON *base_json_array(cJSON *to, const char *key, int *failed)
+{
+    return add(to, key, cJSON_CreateArray(), failed);
+}
+
+int base_json_write(const char *path, const cJSON *root, int failed, struct base_err *err)
+{
+    struct base_file_out out;
+    char *text = failed ? NULL : cJSON_Print(root);
+    if (text == NULL)
+        return base_fail_nomem(err, path);
+    int rc = base_file_begin(&out, path, err);
+    if (!rc) {
+        fprintf(out.file, "%s\n", text);
+        rc = base_file_commit(&out, err);
+    }
+    cJSON_free(text);
+    return rc;
+}

@@ -1,0 +1,24 @@
+/*
+ * Building JSON so that running out of memory is noticed: a failed addition sets *failed and is looked at once, at the end.
+ * Objects passed in may be NULL (an earlier failure). Not thread-safe.
+ */
+#ifndef BASE_JSON_H
+#define BASE_JSON_H
+
+#include <cjson/cJSON.h>
+
+#include "base/err.h"
+
+/* NaN and infinity have no form in JSON: null says "not known". key NULL: appends to an array. */
+void base_json_number(cJSON *to, const char *key, double value, int *failed);
+/* text NULL: null */
+void base_json_text(cJSON *to, const char *key, const char *text, int *failed);
+void base_json_bool(cJSON *to, const char *key, int value, int *failed);
+/* New member or element; borrowed from `to`. */
+cJSON *base_json_object(cJSON *to, const char *key, int *failed);
+cJSON *base_json_array(cJSON *to, const char *key, int *failed);
+
+/* Writes root as text, atomically, unless failed. root stays the caller's. */
+int base_json_write(const char *path, const cJSON *root, int failed, struct base_err *err);
+
+#endif

@@ -1,0 +1,25 @@
+/*
+ * A fixed pool of worker threads that runs index ranges.
+ *
+ * Results must not depend on which worker runs which index or in what order: `worker` selects scratch memory and nothing
+ * else. One parallel_for at a time per pool; a body must not call parallel_for of the same pool.
+ */
+#ifndef BASE_THREADS_H
+#define BASE_THREADS_H
+
+#include "base/err.h"
+
+struct base_threads;
+
+/* Number of processors this process may use, at least 1. */
+int base_threads_available(void);
+
+/* count >= 1 workers including the caller; owns count-1 threads until destroy. NULL on failure (err says why). */
+struct base_threads *base_threads_create(int count, struct base_err *err);
+void base_threads_destroy(struct base_threads *threads);
+int base_threads_count(const struct base_threads *threads);
+
+/* Calls fn(data, i, worker) once for each i in [0, n), worker in [0, count); returns when all are done. */
+void base_threads_for(struct base_threads *threads, long n, void (*fn)(void *data, long i, int worker), void *data);
+
+#endif
