@@ -239,12 +239,12 @@ static int get_param(struct parse *p, const char *arg)
 {
     struct pt_cli *cli = p->cli;
     const char *equals = strchr(arg, '=');
-    if (equals == NULL || equals == arg)
+    if (!equals || equals == arg)
         return base_fail(p->err, BASE_EINVAL, "-p %s: expected KEY=VALUE", arg);
     if (cli->param_count == PT_CLI_MAX_PARAMS)
         return base_fail(p->err, BASE_EINVAL, "-p %s: more than %d parameters", arg, PT_CLI_MAX_PARAMS);
     char *text = strdup(arg);
-    if (text == NULL)
+    if (!text)
         return base_fail_nomem(p->err, "parameters");
     text[equals - arg] = '\0';
     cli->param_text[cli->param_count] = text;
@@ -468,7 +468,7 @@ static error_t parse_option(int key, char *arg, struct argp_state *state)
 {
     struct parse *p = state->input;
     if (key == ARGP_KEY_ARG) {
-        if (p->cli->scene != NULL) {
+        if (p->cli->scene) {
             base_fail(p->err, BASE_EINVAL, "%s: one scene at a time, and %s was given already", arg, p->cli->scene);
             return EINVAL;
         }
@@ -490,20 +490,20 @@ static int check_together(const struct parse *p)
     const struct pt_cli *cli = p->cli;
     if (cli->action == PT_CLI_LIST_CRITERIA)
         return 0;
-    if (cli->scene == NULL)
+    if (!cli->scene)
         return base_fail(p->err, BASE_EINVAL, "a scene file is needed (--help says more)");
     if (cli->spp > 0 && p->has_spp_bounds)
         return base_fail(p->err, BASE_EINVAL, "--spp takes the same samples everywhere: leave out --spp-min and --spp-max");
     if (cli->spp_min > cli->spp_max)
         return base_fail(p->err, BASE_EINVAL, "--spp-min %llu is above --spp-max %llu", (unsigned long long)cli->spp_min,
                        (unsigned long long)cli->spp_max);
-    if (cli->resume && cli->checkpoint == NULL)
+    if (cli->resume && !cli->checkpoint)
         return base_fail(p->err, BASE_EINVAL, "--resume needs --checkpoint FILE");
-    if (cli->sequence == NULL && p->has_levels_option)
+    if (!cli->sequence && p->has_levels_option)
         return base_fail(p->err, BASE_EINVAL, "--levels, --blocks, --reference-spp and --name belong to --sequence DIR");
-    if (cli->sequence != NULL && (cli->spp > 0 || cli->checkpoint != NULL || cli->has_crop))
+    if (cli->sequence && (cli->spp > 0 || cli->checkpoint || cli->has_crop))
         return base_fail(p->err, BASE_EINVAL, "--sequence goes with neither --spp, --checkpoint nor --crop");
-    if (cli->param_count > 0 && cli->spp > 0 && cli->criterion == NULL)
+    if (cli->param_count > 0 && cli->spp > 0 && !cli->criterion)
         return base_fail(p->err, BASE_EINVAL, "-p %s=%s: no criterion is used", cli->params[0].key, cli->params[0].value);
     return 0;
 }

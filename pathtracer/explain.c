@@ -49,7 +49,7 @@ void pt_explain(const struct pt_scene *scene, const struct pt_scene_defaults *de
     for (int i = 0; i < PT_FX_COUNT; i++) {
         const struct pt_effect_reason *why = pt_scene_effect_reason(scene, i);
         char where[300] = "-";
-        if (why != NULL && why->line > 0)
+        if (why && why->line > 0)
             snprintf(where, sizeof where, "%s:%d", why->file, why->line);
         else if (effects >> i & 1)
             snprintf(where, sizeof where, "the scene as a whole, or --effects");

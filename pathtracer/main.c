@@ -130,8 +130,8 @@ static int make_config(const struct session *s, struct pt_render_config *config,
 static int open_criterion(struct session *s, struct base_err *err)
 {
     const struct pt_cli *cli = &s->cli;
-    const char *spec = cli->criterion != NULL ? cli->criterion : DEFAULT_CRITERION;
-    if (cli->criterion == NULL && cli->spp > 0)
+    const char *spec = cli->criterion ? cli->criterion : DEFAULT_CRITERION;
+    if (!cli->criterion && cli->spp > 0)
         return 0;
     return pt_criterion_create(spec, cli->params, cli->param_count, s->threads, note, s, &s->criterion, err);
 }
@@ -140,10 +140,10 @@ static int open_criterion(struct session *s, struct base_err *err)
 static int check_folder(const char *path, struct base_err *err)
 {
     char folder[4096];
-    const char *slash = path != NULL ? strrchr(path, '/') : NULL;
-    if (path == NULL)
+    const char *slash = path ? strrchr(path, '/') : NULL;
+    if (!path)
         return 0;
-    size_t n = slash == NULL ? 0 : slash == path ? 1 : (size_t)(slash - path);
+    size_t n = !slash ? 0 : slash == path ? 1 : (size_t)(slash - path);
     if (n >= sizeof folder)
         return base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", path);
     memcpy(folder, path, n);
@@ -156,10 +156,10 @@ static int check_folder(const char *path, struct base_err *err)
 static int check_outputs(struct session *s, struct base_err *err)
 {
     struct pt_cli *cli = &s->cli;
-    if (cli->output == NULL && cli->preview == NULL && cli->report == NULL && cli->stop_map_count == 0) {
-        const char *slash = strrchr(cli->scene, '/'), *name = slash != NULL ? slash + 1 : cli->scene;
+    if (!cli->output && !cli->preview && !cli->report && cli->stop_map_count == 0) {
+        const char *slash = strrchr(cli->scene, '/'), *name = slash ? slash + 1 : cli->scene;
         const char *dot = strrchr(name, '.');
-        int n = dot != NULL ? (int)(dot - name) : (int)strlen(name);
+        int n = dot ? (int)(dot - name) : (int)strlen(name);
         if (n > (int)sizeof s->default_output - 8)
             return base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", cli->scene);
         snprintf(s->default_output, sizeof s->default_output, "%.*s.exr", n, name);
@@ -207,7 +207,7 @@ static int describe_settings(struct session *s, const struct pt_render_config *c
     used += (size_t)snprintf(s->settings + used, room - used, "fov=%.17g\nlook-at=", view->fov_deg);
     for (int k = 0; view->has_look_at && k < 9; k++)
         used += (size_t)snprintf(s->settings + used, room - used, "%.17g ", view->look_at_world[k]);
-    const struct lull_criterion *t = s->criterion != NULL ? pt_criterion_table(s->criterion) : NULL;
+    const struct lull_criterion *t = s->criterion ? pt_criterion_table(s->criterion) : NULL;
     used += (size_t)snprintf(s->settings + used, room - used, "\ncriterion=%s %s\n", t ? t->id : "none", t ? t->version : "");
     for (uint32_t k = 0; k < s->cli.param_count && used < room; k++)
         used += (size_t)snprintf(s->settings + used, room - used, "param=%s=%s\n", s->cli.params[k].key, s->cli.params[k].value);
@@ -220,7 +220,7 @@ static int after_slice(void *data, struct pt_render *render, struct base_err *er
 {
     struct session *s = data;
     pt_progress_update(&s->progress, render);
-    if (s->cli.checkpoint == NULL || base_clock_wall_s() < s->checkpoint_at_s)
+    if (!s->cli.checkpoint || base_clock_wall_s() < s->checkpoint_at_s)
         return 0;
     int rc = pt_checkpoint_save(s->cli.checkpoint, render, s->settings, err);
     s->checkpoint_at_s = base_clock_wall_s() + s->cli.checkpoint_every_s;
@@ -230,7 +230,7 @@ static int after_slice(void *data, struct pt_render *render, struct base_err *er
 static int on_suspend(void *data, struct pt_render *render, struct base_err *err)
 {
     struct session *s = data;
-    return s->cli.checkpoint != NULL ? pt_checkpoint_save(s->cli.checkpoint, render, s->settings, err) : 0;
+    return s->cli.checkpoint ? pt_checkpoint_save(s->cli.checkpoint, render, s->settings, err) : 0;
 }
 
 static int interrupted(void *data)
@@ -250,14 +250,14 @@ static int write_outputs(struct session *s, int was_interrupted, struct base_err
                                   .threads = base_threads_count(s->threads), .reproducible = cli->reproducible, .aov = cli->aov,
                                   .scene_bytes = stats.bytes, .interrupted = was_interrupted};
     struct base_err e = {0};
-    if (cli->output != NULL && pt_output_exr(cli->output, s->render, &info, &e) != 0)
+    if (cli->output && pt_output_exr(cli->output, s->render, &info, &e) != 0)
         *err = e;
-    if (cli->preview != NULL && pt_output_preview(cli->preview, s->render, &e) != 0)
+    if (cli->preview && pt_output_preview(cli->preview, s->render, &e) != 0)
         *err = e;
     for (int i = 0; i < cli->stop_map_count; i++)
         if (pt_output_stop_map(cli->stop_maps[i], s->render, &info, &e) != 0)
             *err = e;
-    if (cli->report != NULL && pt_output_report(cli->report, s->render, &info, &e) != 0)
+    if (cli->report && pt_output_report(cli->report, s->render, &info, &e) != 0)
         *err = e;
     return err->code;
 }
@@ -348,7 +348,7 @@ static int record_sequence(struct session *s, int *status, struct base_err *err)
     int rc = make_config(s, &config.render, err);
     if (!rc)
         rc = scene_crc(s->cli.scene, &config.scene_crc, err);
-    if (!rc && s->cli.criterion != NULL)
+    if (!rc && s->cli.criterion)
         rc = open_criterion(s, err);
     if (rc)
         return rc;
@@ -367,7 +367,7 @@ static int run(struct session *s, int *status, struct base_err *err)
         return 0;
     }
     s->threads = base_threads_create(s->cli.threads > 0 ? s->cli.threads : base_threads_available(), err);
-    if (s->threads == NULL)
+    if (!s->threads)
         return BASE_ENOMEM;
     int rc = load_scene(s, err);
     if (rc) {

@@ -209,7 +209,7 @@ int ggn_attributes(const double *l, int w, int h, double out[GGN_ATTRIBUTES], st
         return base_fail(err, BASE_EINVAL, "attributes of a %dx%d block", w, h);
     size_t n = (size_t)w * (size_t)h;
     double *tmp = malloc(4 * n * sizeof *tmp);
-    if (tmp == NULL)
+    if (!tmp)
         return base_fail_nomem(err, "attributes");
     double *f = tmp + n, *scratch = tmp + 2 * n;
     for (int r = 1; r <= 2; r++) {
@@ -253,7 +253,7 @@ int ggn_noise_mask(const double *l, int w, int h, double out[GGN_MASK_FEATURES],
         return base_fail(err, BASE_EINVAL, "noise mask of a %dx%d block", w, h);
     size_t n = (size_t)w * (size_t)h;
     double *tmp = malloc(5 * n * sizeof *tmp);
-    if (tmp == NULL)
+    if (!tmp)
         return base_fail_nomem(err, "noise mask");
     reduce_mask(l, tmp, tmp + n, w, h, out);
     wiener(l, tmp, tmp + n, tmp + 2 * n, w, h, 2);

@@ -55,7 +55,7 @@ static int fill_block(void *data, int index, int worker, struct base_err *err)
     size_t pixels = (size_t)w * (size_t)h;
     double *l = malloc(pixels * sizeof *l);
     (void)worker;
-    if (l == NULL)
+    if (!l)
         return base_fail_nomem(err, "features");
     for (int i = 0; i < c->n_levels && !rc; i++) {
         ggn_lightness(c->noisy + 3 * pixels * (size_t)i, pixels, l);
@@ -71,14 +71,14 @@ static int make_table(struct table *t, const struct ggn_eval_set *s, int n,
 {
     struct job j = {s, t, make, parameter};
     *t = (struct table){.n = n, .first = malloc((size_t)s->n_blocks * sizeof *t->first)};
-    if (t->first == NULL)
+    if (!t->first)
         return base_fail_nomem(err, "features");
     for (int b = 0; b < s->n_blocks; b++) {
         t->first[b] = t->rows;
         t->rows += (size_t)s->chains.chains[s->blocks[b].chain].n_levels;
     }
     t->x = malloc(t->rows * (size_t)n * sizeof *t->x);
-    int rc = t->x == NULL ? base_fail_nomem(err, "features") : ggn_eval_each_block(s, threads, fill_block, &j, err);
+    int rc = !t->x ? base_fail_nomem(err, "features") : ggn_eval_each_block(s, threads, fill_block, &j, err);
     if (rc)
         release_table(t);
     return rc;
@@ -98,7 +98,7 @@ static struct ggn_svm *train_svm(const struct table *t, const struct ggn_eval_se
     unsigned char *label = malloc(s->n > 0 ? s->n : 1);
     struct ggn_svm *svm = NULL;
     size_t n = 0;
-    if (x == NULL || label == NULL) {
+    if (!x || !label) {
         base_fail_nomem(err, "SVM");
         goto out;
     }
@@ -121,10 +121,10 @@ out:
 static int svm_method(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, const char *name, const struct table *t, struct base_err *err)
 {
     struct ggn_svm *svm = train_svm(t, s, split, err);
-    if (svm == NULL)
+    if (!svm)
         return err->code;
     double *score = malloc(s->n * sizeof *score), *scratch = malloc((size_t)t->n * sizeof *scratch);
-    int rc = score == NULL || scratch == NULL ? base_fail_nomem(err, name) : 0;
+    int rc = !score || !scratch ? base_fail_nomem(err, name) : 0;
     for (int b = 0; b < s->n_blocks && !rc; b++)
         for (size_t i = s->blocks[b].first; i < s->blocks[b].end; i++)
             score[i] = ggn_svm_score(svm, row_of(t, s, b, i), scratch);
@@ -172,7 +172,7 @@ static int train_lstm(struct ggn_lstm *lstm, const struct table *t, const struct
     unsigned char *label = malloc(s->n > 0 ? s->n : 1);
     size_t n = 0, positive = 0;
     int rc = 0;
-    if (windows == NULL || label == NULL) {
+    if (!windows || !label) {
         rc = base_fail_nomem(err, "LSTM");
         goto out;
     }
@@ -205,7 +205,7 @@ int ggn_method_svd_lstm(struct ggn_method *m, const struct ggn_eval_set *s, enum
         return rc;
     struct ggn_lstm *lstm = ggn_lstm_create(count, s->window, 7, err);
     double *score = malloc(s->n * sizeof *score);
-    rc = lstm == NULL ? err->code : score == NULL ? base_fail_nomem(err, "LSTM") : train_lstm(lstm, &t, s, split, epochs, err);
+    rc = !lstm ? err->code : !score ? base_fail_nomem(err, "LSTM") : train_lstm(lstm, &t, s, split, epochs, err);
     for (int b = 0; b < s->n_blocks && !rc; b++)
         for (size_t i = s->blocks[b].first; i < s->blocks[b].end; i++)
             score[i] = ggn_lstm_predict(lstm, window_of(&t, s, b, i));

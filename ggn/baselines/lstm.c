@@ -79,7 +79,7 @@ static void init_weights(struct ggn_lstm *l, uint32_t seed)
 
 void ggn_lstm_destroy(struct ggn_lstm *l)
 {
-    if (l == NULL)
+    if (!l)
         return;
     free(l->p);
     free(l->activations);
@@ -89,7 +89,7 @@ void ggn_lstm_destroy(struct ggn_lstm *l)
 struct ggn_lstm *ggn_lstm_create(int inputs, int steps, uint32_t seed, struct base_err *err)
 {
     struct ggn_lstm *l = calloc(1, sizeof *l);
-    if (l == NULL) {
+    if (!l) {
         base_fail_nomem(err, "LSTM");
         return NULL;
     }
@@ -111,7 +111,7 @@ struct ggn_lstm *ggn_lstm_create(int inputs, int steps, uint32_t seed, struct ba
     l->n += (size_t)widths[LAYERS - 1] + 1;
     l->p = malloc(4 * l->n * sizeof *l->p);
     l->activations = calloc(floats, sizeof *l->activations);
-    if (l->p == NULL || l->activations == NULL) {
+    if (!l->p || !l->activations) {
         base_fail_nomem(err, "LSTM");
         ggn_lstm_destroy(l);
         return NULL;
@@ -299,7 +299,7 @@ double ggn_lstm_epoch(struct ggn_lstm *l, const double *const *sequences, const 
     float logit[BATCH], d[BATCH];
     double loss = 0.0, positive = 0.0;
     size_t *order = malloc((n > 0 ? n : 1) * sizeof *order);
-    if (order == NULL)
+    if (!order)
         return (double)NAN;
     for (size_t i = 0; i < n; i++) {
         positive += label[i];

@@ -17,7 +17,7 @@ struct ggn_svm {
 
 void ggn_svm_destroy(struct ggn_svm *svm)
 {
-    if (svm == NULL)
+    if (!svm)
         return;
     free(svm->support);
     free(svm->coefficient);
@@ -52,7 +52,7 @@ static int take_over(struct ggn_svm *svm, const struct svm_model *model, const d
     size_t n = (size_t)model->l, d = (size_t)svm->features;
     svm->support = malloc((n > 0 ? n : 1) * d * sizeof *svm->support);
     svm->coefficient = malloc((n > 0 ? n : 1) * sizeof *svm->coefficient);
-    if (svm->support == NULL || svm->coefficient == NULL)
+    if (!svm->support || !svm->coefficient)
         return base_fail_nomem(err, "SVM");
     svm->n_support = n;
     svm->rho = model->rho[0];
@@ -73,9 +73,9 @@ struct ggn_svm *ggn_svm_train(const double *x, const unsigned char *label, size_
     struct svm_node *nodes = malloc(n * (d + 1) * sizeof *nodes), **rows = malloc((n > 0 ? n : 1) * sizeof *rows);
     double *y = malloc((n > 0 ? n : 1) * sizeof *y);
     int rc = 0;
-    if (svm != NULL)
+    if (svm)
         svm->mean = malloc(2 * d * sizeof *svm->mean);
-    if (svm == NULL || nodes == NULL || rows == NULL || y == NULL || svm->mean == NULL) {
+    if (!svm || !nodes || !rows || !y || !svm->mean) {
         rc = base_fail_nomem(err, "SVM");
         goto out;
     }
@@ -102,8 +102,8 @@ struct ggn_svm *ggn_svm_train(const double *x, const unsigned char *label, size_
                                       .nr_weight = 2, .weight_label = labels, .weight = weights};
     svm_set_print_string_function(be_quiet);
     struct svm_model *model = svm_train(&problem, &parameter);
-    rc = model == NULL ? base_fail_nomem(err, "SVM") : take_over(svm, model, x, err);
-    if (model != NULL)
+    rc = !model ? base_fail_nomem(err, "SVM") : take_over(svm, model, x, err);
+    if (model)
         svm_free_and_destroy_model(&model);
 out:
     free(y);

@@ -30,7 +30,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 {
     struct options *o = state->input;
     char *end;
-    double number = arg != NULL ? strtod(arg, &end) : 0.0;
+    double number = arg ? strtod(arg, &end) : 0.0;
 
     switch (key) {
     case 'j':
@@ -75,7 +75,7 @@ static int write_outputs(const struct options *o, const struct ggn_pairing *p, c
     const char *names[2];
     for (int i = 0; i < 2; i++) {
         const char *slash = strrchr(o->paths[i], '/');
-        names[i] = slash != NULL ? slash + 1 : o->paths[i];
+        names[i] = slash ? slash + 1 : o->paths[i];
     }
     int rc = ggn_compare_pictures(o->dir, p, names[0], names[1], err);
     snprintf(path, sizeof path, "%s/summary.json", o->dir);
@@ -111,7 +111,7 @@ int ggn_cmd_compare(int argc, char **argv)
         rc = ggn_pairing_init(&pairing, &sides[0], &sides[1], o.view, &err);
     if (!rc)
         rc = ggn_stats_agreement(pairing.truth, pairing.model, pairing.n, o.cap, &figures, &err);
-    if (!rc && o.dir != NULL)
+    if (!rc && o.dir)
         rc = write_outputs(&o, &pairing, &figures, &err);
     if (!rc && o.json) {
         ggn_agreement_print_json(stdout, &figures);

@@ -82,7 +82,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
         return 0;
     }
     case ARGP_KEY_END:
-        if (o->data == NULL)
+        if (!o->data)
             argp_error(state, "--data is needed");
         return 0;
     default:
@@ -157,7 +157,7 @@ static int add_models(struct job *j, struct base_threads *threads, struct base_e
         const char *path = j->o->models[i / precisions], *slash = strrchr(path, '/');
         enum ggn_precision precision = i % precisions ? GGN_PRECISION_BF16 : GGN_PRECISION_F32;
         char name[GGN_METHOD_NAME];
-        snprintf(name, sizeof name, "%.40s%s", slash != NULL ? slash + 1 : path, precision == GGN_PRECISION_BF16 ? " bf16" : "");
+        snprintf(name, sizeof name, "%.40s%s", slash ? slash + 1 : path, precision == GGN_PRECISION_BF16 ? " bf16" : "");
         rc = ggn_eval_network(&j->methods[j->n], &j->set, j->models[i / precisions], name, precision, threads, err);
         if (rc)
             return rc;
@@ -249,16 +249,16 @@ static int report(struct job *j, int skipped, struct base_err *err)
             ggn_report_table(stdout, &j->set, (enum ggn_split)split, j->methods, metrics, j->n);
         cJSON_AddItemToObject(splits, ggn_split_names[split], ggn_report_json(j->methods, metrics, j->n));
         report_changes(j, (enum ggn_split)split, cJSON_AddObjectToObject(changes, ggn_split_names[split]));
-        if (j->o->out != NULL)
+        if (j->o->out)
             rc = pictures(j, (enum ggn_split)split, err);
     }
     char *text = !rc ? cJSON_Print(root) : NULL;
     cJSON_Delete(root);
-    if (!rc && text == NULL)
+    if (!rc && !text)
         rc = base_fail_nomem(err, "report");
     if (!rc && j->o->json)
         puts(text);
-    if (!rc && j->o->out != NULL)
+    if (!rc && j->o->out)
         rc = write_json(j->o, text, err);
     cJSON_free(text);
     return rc;
@@ -283,8 +283,8 @@ int ggn_cmd_evaluate(int argc, char **argv)
     for (int i = 0; i < MAX_METHODS; i++)
         j.likened[i] = -1;
     struct base_threads *threads = base_threads_create(o.threads, &err);
-    int rc = threads == NULL ? err.code : 0;
-    if (!rc && o.out != NULL && mkdir(o.out, 0777) != 0 && errno != EEXIST)
+    int rc = !threads ? err.code : 0;
+    if (!rc && o.out && mkdir(o.out, 0777) != 0 && errno != EEXIST)
         rc = base_fail(&err, BASE_EIO, "%s: %s", o.out, strerror(errno));
     if (!rc)
         rc = load_models(&j, &window, &err);

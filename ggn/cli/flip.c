@@ -56,7 +56,7 @@ static int write_map(const char *path, const float *map, int width, int height, 
 {
     size_t n = (size_t)width * (size_t)height;
     uint8_t *rgb = malloc(3 * n);
-    if (rgb == NULL)
+    if (!rgb)
         return base_fail_nomem(err, path);
     for (size_t i = 0; i < n; i++)
         ggn_colormap_rgb(GGN_MAGMA, (double)map[i], rgb + 3 * i);
@@ -90,15 +90,15 @@ int ggn_cmd_flip(int argc, char **argv)
                       images[0].height, o.paths[1], images[1].width, images[1].height);
         goto out;
     }
-    if (o.map_path != NULL) {
+    if (o.map_path) {
         map = malloc((size_t)images[0].width * (size_t)images[0].height * sizeof *map);
-        if (map == NULL) {
+        if (!map) {
             rc = base_fail_nomem(&err, "error map");
             goto out;
         }
     }
     rc = ggn_flip(images[0].data, images[1].data, images[0].width, images[0].height, o.ppd, map, &stats, &err);
-    if (!rc && map != NULL)
+    if (!rc && map)
         rc = write_map(o.map_path, map, images[0].width, images[0].height, &err);
     if (!rc)
         printf(o.json ? "{\"mean\": %.6f, \"max\": %.6f}\n" : "mean %.6f\nmax  %.6f\n", stats.mean, stats.max);

@@ -51,7 +51,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
         o->dir = arg;
         return 0;
     case ARGP_KEY_END:
-        if (o->dir == NULL || o->out == NULL)
+        if (!o->dir || !o->out)
             argp_error(state, "DIR and --output are needed");
         return 0;
     default:
@@ -73,7 +73,7 @@ static int import_one(const struct options *o, const struct ggn_sin3d_options *s
     for (size_t n = strlen(copy); n > 1 && copy[n - 1] == '/';)
         copy[--n] = '\0';
     const char *slash = strrchr(copy, '/');
-    int rc = base_file_join(out, o->out, slash != NULL ? slash + 1 : copy, err);
+    int rc = base_file_join(out, o->out, slash ? slash + 1 : copy, err);
     if (!rc)
         rc = ggn_sin3d_import_view(copy, out, so, &labelled, err);
     if (!rc)
@@ -93,17 +93,17 @@ static int import_all(const struct options *o, const struct ggn_sin3d_options *s
     char **names = NULL;
     size_t n = 0;
     int rc = 0, found = 0;
-    if (d == NULL)
+    if (!d)
         return base_fail(err, BASE_EIO, "%s: %s", o->dir, strerror(errno));
-    for (const struct dirent *e; !rc && (e = readdir(d)) != NULL;) {
+    for (const struct dirent *e; !rc && (e = readdir(d));) {
         char **more = e->d_name[0] == '.' ? names : realloc(names, (n + 1) * sizeof *names);
         if (e->d_name[0] == '.')
             continue;
-        if (more != NULL) {
+        if (more) {
             names = more;
             names[n] = strdup(e->d_name);
         }
-        if (more == NULL || names[n++] == NULL)
+        if (!more || !names[n++])
             rc = base_fail_nomem(err, o->dir);
     }
     closedir(d);
@@ -143,7 +143,7 @@ int ggn_cmd_import_sin3d(int argc, char **argv)
     ggn_cmd_catch_interrupt();
     struct ggn_sin3d_options so = {.block = o.block, .allow_gaps = o.allow_gaps, .progress = isatty(2) ? show_progress : NULL};
     int rc = 0;
-    if (o.thresholds != NULL) {
+    if (o.thresholds) {
         rc = ggn_thresholds_read(o.thresholds, o.block, &thresholds, &err);
         so.thresholds = &thresholds;
     }

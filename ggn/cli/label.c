@@ -82,9 +82,9 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 /* The row of human thresholds of a view. */
 static const struct ggn_view *find_row(const struct options *o, const struct ggn_thresholds *t, const struct ggn_dataset_view *v)
 {
-    const struct ggn_view *row = ggn_thresholds_find(t, o->view != NULL ? o->view : v->name);
+    const struct ggn_view *row = ggn_thresholds_find(t, o->view ? o->view : v->name);
     char with_part[4200];
-    if (row != NULL || o->view != NULL)
+    if (row || o->view)
         return row;
     snprintf(with_part, sizeof with_part, "%s_part6", v->name);
     return ggn_thresholds_find(t, with_part);
@@ -95,7 +95,7 @@ static int start_labels(struct ggn_labels *l, const char *source, const struct g
     *l = (struct ggn_labels){.cap = v->manifest.levels[v->manifest.n_levels - 1], .spread = spread};
     snprintf(l->source, sizeof l->source, "%s", source);
     l->labels = malloc(v->manifest.n_blocks * sizeof *l->labels);
-    return l->labels != NULL ? 0 : base_fail_nomem(err, v->dir);
+    return l->labels ? 0 : base_fail_nomem(err, v->dir);
 }
 
 /* --- human labels --- */
@@ -104,8 +104,8 @@ static int label_human(const struct options *o, const struct ggn_thresholds *t, 
 {
     const struct ggn_view *row = find_row(o, t, v);
     struct ggn_labels l;
-    if (row == NULL)
-        return base_fail(err, BASE_EINVAL, "%s: no thresholds for '%s'", o->human, o->view != NULL ? o->view : v->name);
+    if (!row)
+        return base_fail(err, BASE_EINVAL, "%s: no thresholds for '%s'", o->human, o->view ? o->view : v->name);
     int rc = start_labels(&l, "human", v, o->spread > 0 ? o->spread : GGN_LABELS_SPREAD, err);
     for (uint32_t i = 0; i < v->manifest.n_blocks && !rc; i++) {
         uint32_t id = v->manifest.blocks[i].id;
@@ -154,13 +154,13 @@ static double curve_shift(const struct ggn_curve *rendered, const struct ggn_cur
 {
     double *shifts = malloc((size_t)rendered->n * sizeof *shifts), median;
     size_t n = 0;
-    for (int i = 0; i < rendered->n && shifts != NULL; i++) {
+    for (int i = 0; i < rendered->n && shifts; i++) {
         int end[2];
         double a = ggn_curve_threshold(rendered, rendered->score[i], &end[0]), b = ggn_curve_threshold(cheap, rendered->score[i], &end[1]);
         if (!end[0] && !end[1] && b > cheap->spp[0])
             shifts[n++] = log2(b / a);
     }
-    median = shifts != NULL ? ggn_stats_quantile(shifts, n, 0.5) : (double)NAN;
+    median = shifts ? ggn_stats_quantile(shifts, n, 0.5) : (double)NAN;
     free(shifts);
     return median;
 }
@@ -177,7 +177,7 @@ static void work_block(void *data, long i, int worker)
     if (w->rc[i] != 0)
         return;
     w->rc[i] = judge(w, &b, w->both ? GGN_SOURCE_RENDERED : w->source, &w->labels[i], &rendered, &w->errs[i]);
-    if (w->rc[i] == 0 && w->caps != NULL)
+    if (w->rc[i] == 0 && w->caps)
         w->caps[i] = rendered.spp[rendered.n - 1];
     if (w->rc[i] == 0 && w->both)
         w->rc[i] = judge(w, &b, GGN_SOURCE_HALVES, &w->cheap[i], &cheap, &w->errs[i]);
@@ -194,7 +194,7 @@ static int run_work(struct work *w, struct base_threads *threads, struct base_er
     int rc = 0;
     w->rc = calloc(n, sizeof *w->rc);
     w->errs = calloc(n, sizeof *w->errs);
-    if (w->rc == NULL || w->errs == NULL)
+    if (!w->rc || !w->errs)
         rc = base_fail_nomem(err, w->view->dir);
     else
         base_threads_for(threads, (long)n, work_block, w);
@@ -215,7 +215,7 @@ static int label_observer(const struct options *o, const struct ggn_observer *ob
         return rc;
     double *caps = calloc(v->manifest.n_blocks, sizeof *caps);
     struct work w = {.view = v, .observer = observer, .source = o->source, .labels = l.labels, .caps = caps};
-    rc = caps != NULL ? run_work(&w, threads, err) : base_fail_nomem(err, v->dir);
+    rc = caps ? run_work(&w, threads, err) : base_fail_nomem(err, v->dir);
     l.n = v->manifest.n_blocks;
     for (uint32_t i = 0; i < l.n && !rc; i++)
         l.cap = fmax(l.cap, caps[i]);
@@ -242,7 +242,7 @@ static int check_view(const struct ggn_observer *observer, struct base_threads *
     struct ggn_label *labels = calloc(2 * (n > 0 ? n : 1), sizeof *labels);
     double *shift = calloc(n > 0 ? n : 1, sizeof *shift);
     struct work w = {.view = v, .observer = observer, .both = 1, .labels = labels, .cheap = labels + n, .shift = shift};
-    int rc = labels == NULL || shift == NULL ? base_fail_nomem(err, v->dir) : run_work(&w, threads, err);
+    int rc = !labels || !shift ? base_fail_nomem(err, v->dir) : run_work(&w, threads, err);
     for (size_t i = 0; i < n && !rc && !ggn_cmd_interrupted; i++) {
         const struct ggn_label *a = &labels[i], *b = &labels[n + i];
         printf("%-24.24s %5u %9.0f%s %9.0f%s %8.3f %8.3f\n", v->name, a->id, a->threshold, a->censored ? "+" : " ", b->threshold,
@@ -265,7 +265,7 @@ static int collect(const struct options *o, const struct ggn_thresholds *t, cons
         const struct ggn_dataset_view *v = &d->views[i];
         const struct ggn_view *row = find_row(o, t, v);
         double cap = o->source != GGN_SOURCE_RENDERED ? GGN_SIMULATED_CAP : v->manifest.levels[v->manifest.n_levels - 1];
-        for (uint32_t b = 0; row != NULL && b < v->manifest.n_blocks && !rc; b++) {
+        for (uint32_t b = 0; row && b < v->manifest.n_blocks && !rc; b++) {
             uint32_t id = v->manifest.blocks[b].id;
             if (id >= (uint32_t)row->n || row->spp[id] >= cap)
                 continue;
@@ -294,7 +294,7 @@ static int report_calibration(const struct options *o, const struct ggn_calibrat
     snprintf(json, sizeof json, "{\"blocks\": %d, \"median_abs_log2\": %.4f, \"loo_median_abs_log2\": %.4f, \"loo_mean_abs_log2\": %.4f, "
              "\"nested_loo_median_abs_log2\": %.4f, \"nested_loo_mean_abs_log2\": %.4f}", c->n, c->median_abs_log2, c->loo_median_abs_log2,
              c->loo_mean_abs_log2, c->nested_median_abs_log2, c->nested_mean_abs_log2);
-    return o->out != NULL ? ggn_observer_write(o->out, &observer, json, err) : 0;
+    return o->out ? ggn_observer_write(o->out, &observer, json, err) : 0;
 }
 
 static int calibrate(const struct options *o, const struct ggn_dataset *d, struct base_threads *threads, struct base_err *err)
@@ -307,7 +307,7 @@ static int calibrate(const struct options *o, const struct ggn_dataset *d, struc
         room += d->views[i].manifest.n_blocks;
     struct ggn_calibration_block *blocks = calloc(room, sizeof *blocks);
     struct ggn_seq_block *pixels = calloc(room, sizeof *pixels);
-    int rc = blocks == NULL || pixels == NULL ? base_fail_nomem(err, "calibration") : ggn_thresholds_read(o->calibrate, 200, &t, err);
+    int rc = !blocks || !pixels ? base_fail_nomem(err, "calibration") : ggn_thresholds_read(o->calibrate, 200, &t, err);
     if (!rc)
         rc = collect(o, &t, d, blocks, pixels, &n, err);
     if (!rc)
@@ -347,7 +347,7 @@ static int run_dataset(const struct options *o, const struct ggn_dataset *d, con
     for (int i = 0; i < d->n; i++)
         room += d->views[i].manifest.n_blocks;
     double *errors = malloc(room * sizeof *errors);
-    if (errors == NULL)
+    if (!errors)
         return base_fail_nomem(err, "check");
     if (o->check)
         printf("%-24s %5s %10s %10s %8s %8s\n", "view", "block", "rendered", "halves", "log2", "curve");
@@ -356,7 +356,7 @@ static int run_dataset(const struct options *o, const struct ggn_dataset *d, con
             fprintf(stderr, "ggn label: %s: no finished block yet, left out\n", d->views[i].dir);
         else if (o->check)
             rc = check_view(observer, threads, &d->views[i], errors, &count, err);
-        else if (o->human != NULL)
+        else if (o->human)
             rc = label_human(o, human, &d->views[i], err);
         else
             rc = label_observer(o, observer, threads, &d->views[i], err);
@@ -385,25 +385,25 @@ int ggn_cmd_label(int argc, char **argv)
 
     argp_parse(&argp, argc, argv, 0, NULL, &o);
     ggn_cmd_catch_interrupt();
-    int rc = o.observer_path != NULL ? ggn_observer_read(o.observer_path, &observer, &err) : 0;
+    int rc = o.observer_path ? ggn_observer_read(o.observer_path, &observer, &err) : 0;
     if (o.spread > 0)
         observer.spread = o.spread;
     if (!rc && o.trials) {
         rc = fit_trials(&o, &err);
         goto out;
     }
-    if (!rc && o.human != NULL)
+    if (!rc && o.human)
         rc = ggn_thresholds_read(o.human, 200, &human, &err);
     if (!rc) {
         threads = base_threads_create(o.threads, &err);
-        rc = threads == NULL ? err.code : 0;
+        rc = !threads ? err.code : 0;
     }
     for (int i = 0; i < o.n_inputs && !rc && !ggn_cmd_interrupted; i++) {
         struct ggn_dataset d;
         rc = ggn_dataset_open(o.inputs[i], &d, &err);
         if (rc)
             break;
-        rc = o.calibrate != NULL ? calibrate(&o, &d, threads, &err) : run_dataset(&o, &d, &observer, &human, threads, &err);
+        rc = o.calibrate ? calibrate(&o, &d, threads, &err) : run_dataset(&o, &d, &observer, &human, threads, &err);
         ggn_dataset_release(&d);
     }
 out:

@@ -42,7 +42,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
         o->dir = arg;
         return 0;
     case ARGP_KEY_END:
-        if (o->dir == NULL || o->out == NULL)
+        if (!o->dir || !o->out)
             argp_error(state, "SEQUENCE and --output are needed");
         return 0;
     default:
@@ -78,13 +78,13 @@ static int take_block(struct picture *p, const struct ggn_manifest *m, const str
     size_t pixels = (size_t)b->width * b->height;
     uint8_t *rgb = malloc(6 * pixels);
     struct ggn_flip_stats flip;
-    if (rgb == NULL)
+    if (!rgb)
         return base_fail_nomem(err, "picture");
     const struct ggn_seq_record *r = level_at(b, spp, &p->beyond);
     int rc = ggn_seq_display(b, r, rgb, err);
     if (!rc)
         paste(p->taken, m, b, rgb);
-    if (!rc && b->reference != NULL) {
+    if (!rc && b->reference) {
         rc = ggn_seq_display(b, b->reference, rgb + 3 * pixels, err);
         if (!rc)
             rc = ggn_flip(rgb + 3 * pixels, rgb, (int)b->width, (int)b->height, GGN_FLIP_PPD, NULL, &flip, err);
@@ -105,10 +105,10 @@ static int take_block(struct picture *p, const struct ggn_manifest *m, const str
 /* Where block `id` stops: from the file of stops or from the labels; NaN if neither knows. */
 static double stop_of(const struct ggn_view *stops, const struct ggn_labels *labels, uint32_t id)
 {
-    if (stops != NULL)
+    if (stops)
         return id < (uint32_t)stops->n ? stops->spp[id] : (double)NAN;
     const struct ggn_label *l = ggn_labels_find(labels, id);
-    return l != NULL ? l->threshold : (double)NAN;
+    return l ? l->threshold : (double)NAN;
 }
 
 static int build(const struct options *o, const struct ggn_manifest *m, const struct ggn_view *stops, const struct ggn_labels *labels,
@@ -120,7 +120,7 @@ static int build(const struct options *o, const struct ggn_manifest *m, const st
         return base_fail(err, BASE_EINVAL, "%s: %ux%u is too large", o->dir, m->width, m->height);
     p->taken = calloc(3, pixels);
     p->reference = calloc(3, pixels);
-    if (p->taken == NULL || p->reference == NULL)
+    if (!p->taken || !p->reference)
         return base_fail_nomem(err, "picture");
     for (uint32_t i = 0; i < m->n_blocks && !rc; i++) {
         struct ggn_seq_block b;
@@ -137,7 +137,7 @@ static int build(const struct options *o, const struct ggn_manifest *m, const st
         rc = base_fail(err, BASE_EINVAL, "%s: no finished block in it", o->dir);
     if (!rc)
         rc = ggn_image8_write_png(o->out, p->taken, (int)m->width, (int)m->height, err);
-    if (!rc && o->reference != NULL)
+    if (!rc && o->reference)
         rc = ggn_image8_write_png(o->reference, p->reference, (int)m->width, (int)m->height, err);
     return rc;
 }
@@ -177,13 +177,13 @@ int ggn_cmd_reconstruct(int argc, char **argv)
 
     argp_parse(&argp, argc, argv, 0, NULL, &o);
     int rc = ggn_manifest_read(o.dir, &m, &err);
-    if (!rc && o.stops == NULL)
+    if (!rc && !o.stops)
         rc = ggn_labels_read(o.dir, &labels, &err);
-    if (!rc && o.stops != NULL) {
+    if (!rc && o.stops) {
         rc = ggn_thresholds_read(o.stops, (int)m.block, &stops, &err);
-        view = rc ? NULL : o.view != NULL ? ggn_thresholds_find(&stops, o.view) : stops.n == 1 ? &stops.views[0] : NULL;
-        if (!rc && view == NULL)
-            rc = base_fail(&err, BASE_EINVAL, "%s: %s", o.stops, o.view != NULL ? "no such view" : "several views: --view NAME chooses one");
+        view = rc ? NULL : o.view ? ggn_thresholds_find(&stops, o.view) : stops.n == 1 ? &stops.views[0] : NULL;
+        if (!rc && !view)
+            rc = base_fail(&err, BASE_EINVAL, "%s: %s", o.stops, o.view ? "no such view" : "several views: --view NAME chooses one");
     }
     if (!rc)
         rc = build(&o, &m, view, &labels, &p, &err);

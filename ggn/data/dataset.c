@@ -34,7 +34,7 @@ void ggn_dataset_release(struct ggn_dataset *data)
 static int add_view(struct ggn_dataset *d, const char *dir, struct base_err *err)
 {
     struct ggn_dataset_view *views = realloc(d->views, (size_t)(d->n + 1) * sizeof *views);
-    if (views == NULL)
+    if (!views)
         return base_fail_nomem(err, dir);
     d->views = views;
     struct ggn_dataset_view *v = &views[d->n];
@@ -62,10 +62,10 @@ static int compare_views(const void *a, const void *b)
 static int scan(const char *path, enum ggn_split split, struct ggn_dataset *d, struct base_err *err)
 {
     DIR *dir = opendir(path);
-    if (dir == NULL)
+    if (!dir)
         return base_fail(err, BASE_EIO, "%s: %s", path, strerror(errno));
     int rc = 0;
-    for (const struct dirent *e; !rc && (e = readdir(dir)) != NULL;) {
+    for (const struct dirent *e; !rc && (e = readdir(dir));) {
         char sub[4096];
         int n = snprintf(sub, sizeof sub, "%s/%s", path, e->d_name);
         if (e->d_name[0] == '.' || n < 0 || (size_t)n >= sizeof sub || !exists(sub, "manifest.json"))
@@ -148,7 +148,7 @@ int ggn_dataset_open(const char *path, struct ggn_dataset *data, struct base_err
     qsort(d.views, (size_t)d.n, sizeof *d.views, compare_views);
     for (int i = 0; i < d.n; i++) {
         const char *slash = strrchr(d.views[i].dir, '/');
-        d.views[i].name = slash != NULL ? slash + 1 : d.views[i].dir;
+        d.views[i].name = slash ? slash + 1 : d.views[i].dir;
     }
     *data = d;
     return 0;
@@ -159,6 +159,6 @@ const char *ggn_dataset_label_source(const struct ggn_dataset *data)
     const char *source = NULL;
     for (int i = 0; i < data->n; i++)
         if (data->views[i].has_labels)
-            source = source == NULL || strcmp(source, data->views[i].labels.source) == 0 ? data->views[i].labels.source : "mixed";
-    return source != NULL ? source : "none";
+            source = !source || strcmp(source, data->views[i].labels.source) == 0 ? data->views[i].labels.source : "mixed";
+    return source ? source : "none";
 }

@@ -56,7 +56,7 @@ static int parse_entries(const char *path, const cJSON *blocks, struct ggn_label
     if (!cJSON_IsArray(blocks) || n < 1 || n > MAX_LABELS)
         return base_fail(err, BASE_EINVAL, "%s: no list of blocks", path);
     l->labels = malloc((size_t)n * sizeof *l->labels);
-    if (l->labels == NULL)
+    if (!l->labels)
         return base_fail_nomem(err, path);
     cJSON_ArrayForEach(v, blocks) {
         const cJSON *id = cJSON_GetObjectItemCaseSensitive(v, "id");
@@ -65,7 +65,7 @@ static int parse_entries(const char *path, const cJSON *blocks, struct ggn_label
             return base_fail(err, BASE_EINVAL, "%s: entry %u of blocks has no id or no threshold", path, l->n);
         label->id = (uint32_t)id->valuedouble;
         label->censored = cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(v, "censored"));
-        if (ggn_labels_find(l, label->id) != NULL)
+        if (ggn_labels_find(l, label->id))
             return base_fail(err, BASE_EINVAL, "%s: block %u is labelled twice", path, label->id);
         l->n++;
     }
@@ -117,14 +117,14 @@ static cJSON *to_json(const struct ggn_labels *labels, int *ok)
 {
     cJSON *root = cJSON_CreateObject(), *blocks = NULL;
     *ok = cJSON_AddStringToObject(root, "format", "lull-labels") != NULL && cJSON_AddNumberToObject(root, "version", 1) != NULL &&
-          cJSON_AddStringToObject(root, "source", labels->source) != NULL && cJSON_AddStringToObject(root, "detail", labels->detail) != NULL &&
-          cJSON_AddNumberToObject(root, "cap", labels->cap) != NULL && cJSON_AddNumberToObject(root, "spread", labels->spread) != NULL &&
-          (blocks = cJSON_AddArrayToObject(root, "blocks")) != NULL;
+          cJSON_AddStringToObject(root, "source", labels->source) && cJSON_AddStringToObject(root, "detail", labels->detail) &&
+          cJSON_AddNumberToObject(root, "cap", labels->cap) && cJSON_AddNumberToObject(root, "spread", labels->spread) &&
+          (blocks = cJSON_AddArrayToObject(root, "blocks"));
     for (uint32_t i = 0; i < labels->n && *ok; i++) {
         cJSON *o = cJSON_CreateObject();
         *ok = cJSON_AddNumberToObject(o, "id", labels->labels[i].id) != NULL &&
-              cJSON_AddNumberToObject(o, "threshold", labels->labels[i].threshold) != NULL &&
-              cJSON_AddBoolToObject(o, "censored", labels->labels[i].censored) != NULL;
+              cJSON_AddNumberToObject(o, "threshold", labels->labels[i].threshold) &&
+              cJSON_AddBoolToObject(o, "censored", labels->labels[i].censored);
         if (*ok)
             cJSON_AddItemToArray(blocks, o);
         else
@@ -143,7 +143,7 @@ int ggn_labels_write(const char *dir, const struct ggn_labels *labels, struct ba
     cJSON *root = to_json(labels, &ok);
     char *text = ok ? cJSON_Print(root) : NULL;
     cJSON_Delete(root);
-    if (text == NULL)
+    if (!text)
         return base_fail_nomem(err, path);
     rc = base_file_write_line(path, text, err);
     cJSON_free(text);

@@ -43,7 +43,7 @@ static int get_levels(const char *path, const cJSON *root, struct ggn_manifest *
     if (!cJSON_IsArray(levels) || n < 1 || n > GGN_SEQ_MAX_RECORDS)
         return base_fail(err, BASE_EINVAL, "%s: no list of levels", path);
     m->levels = malloc((size_t)n * sizeof *m->levels);
-    if (m->levels == NULL)
+    if (!m->levels)
         return base_fail_nomem(err, path);
     cJSON_ArrayForEach(v, levels) {
         if (!cJSON_IsNumber(v) || !(v->valuedouble >= 1 && v->valuedouble <= MAX_SPP) ||
@@ -63,7 +63,7 @@ static int get_block(const cJSON *o, const struct ggn_manifest *m, struct ggn_ma
     if (!get_number(o, "id", 0, UINT32_MAX, &id) || !get_number(o, "x0", 0, m->width - 1.0, &x0) ||
         !get_number(o, "y0", 0, m->height - 1.0, &y0) || !get_number(o, "x1", x0 + 1, m->width, &x1) ||
         !get_number(o, "y1", y0 + 1, m->height, &y1) || !get_number(o, "bytes", 1, 1 << 30, &bytes) || !cJSON_IsString(file) ||
-        strlen(file->valuestring) >= sizeof b->file || strchr(file->valuestring, '/') != NULL || file->valuestring[0] == '.' ||
+        strlen(file->valuestring) >= sizeof b->file || strchr(file->valuestring, '/') || file->valuestring[0] == '.' ||
         file->valuestring[0] == '\0' || !cJSON_IsString(crc) || sscanf(crc->valuestring, "%8x%c", &value, &after) != 1)
         return 0;
     *b = (struct ggn_manifest_block){.id = (uint32_t)id, .x0 = (uint32_t)x0, .y0 = (uint32_t)y0, .x1 = (uint32_t)x1,
@@ -79,7 +79,7 @@ static int get_blocks(const char *path, const cJSON *root, struct ggn_manifest *
     if (!cJSON_IsArray(blocks) || n > MAX_BLOCKS)
         return base_fail(err, BASE_EINVAL, "%s: no list of blocks", path);
     m->blocks = malloc((n > 0 ? (size_t)n : 1) * sizeof *m->blocks);
-    if (m->blocks == NULL)
+    if (!m->blocks)
         return base_fail_nomem(err, path);
     cJSON_ArrayForEach(v, blocks) {
         if (!get_block(v, m, &m->blocks[m->n_blocks]))
@@ -182,7 +182,7 @@ static cJSON *block_json(const struct ggn_manifest_block *b, int *ok)
 /* Adds item to the array; frees it when that fails. */
 static void append(cJSON *array, cJSON *item, int *ok)
 {
-    if (item != NULL && cJSON_AddItemToArray(array, item))
+    if (item && cJSON_AddItemToArray(array, item))
         return;
     cJSON_Delete(item);
     *ok = 0;
@@ -224,7 +224,7 @@ int ggn_manifest_write(const char *dir, const struct ggn_manifest *m, struct bas
     cJSON *root = to_json(m, &ok);
     char *text = ok ? cJSON_Print(root) : NULL;
     cJSON_Delete(root);
-    if (text == NULL)
+    if (!text)
         return base_fail_nomem(err, path);
     rc = base_file_write_line(path, text, err);
     cJSON_free(text);
@@ -245,10 +245,10 @@ int ggn_manifest_read_block(const char *dir, const struct ggn_manifest *m, uint3
         rc = base_fail(err, BASE_EINVAL, "%s: not the file that the manifest lists (size or CRC)", path);
     else if (b.id != e->id || b.x0 != (int32_t)e->x0 || b.y0 != (int32_t)e->y0 || b.width != e->x1 - e->x0 || b.height != e->y1 - e->y0)
         rc = base_fail(err, BASE_EINVAL, "%s: block %u is %ux%u at %d,%d, the manifest says otherwise", path, b.id, b.width, b.height, b.x0, b.y0);
-    else if (m->reference_spp > 0 && b.reference == NULL)
+    else if (m->reference_spp > 0 && !b.reference)
         rc = base_fail(err, BASE_EINVAL, "%s: the reference is missing", path);
     for (uint32_t i = 0; i < m->n_levels && !rc; i++)
-        if (ggn_seq_level(&b, m->levels[i]) == NULL)
+        if (!ggn_seq_level(&b, m->levels[i]))
             rc = base_fail(err, BASE_EINVAL, "%s: the level at %u spp is missing", path, m->levels[i]);
     if (rc) {
         ggn_seq_block_release(&b);

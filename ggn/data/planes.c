@@ -41,7 +41,7 @@ uint32_t ggn_plane_filters(uint32_t plane)
 static int shuffle(uint8_t *data, size_t bytes, int forward, struct base_err *err)
 {
     uint8_t *copy = malloc(bytes);
-    if (copy == NULL)
+    if (!copy)
         return base_fail_nomem(err, "plane");
     memcpy(copy, data, bytes);
     size_t n = bytes / 2;

@@ -19,7 +19,7 @@ static const char *find_data(const char *p, const char *end)
 {
     while (p < end) {
         const char *eol = memchr(p, '\n', (size_t)(end - p));
-        if (eol == NULL)
+        if (!eol)
             return NULL;
         if (eol - p == 4 && memcmp(p, "DATA", 4) == 0)
             return eol + 1;
@@ -54,12 +54,12 @@ int ggn_rawls_parse(const char *path, const char *data, size_t size, struct ggn_
         (size_t)width * height > GGN_IMAGE_MAX_PIXELS || (channels != 1 && channels != 3))
         return base_fail(err, BASE_EINVAL, "%s: %ux%u with %u channels cannot be used", path, width, height, channels);
     const char *end = data + size, *p = find_data(data + fixed, end);
-    p = p != NULL ? memchr(p, '\n', (size_t)(end - p)) : NULL; /* the line with the size says nothing new */
+    p = p ? memchr(p, '\n', (size_t)(end - p)) : NULL; /* the line with the size says nothing new */
     size_t row = (size_t)width * channels * 4 + 1;
-    if (p == NULL || (size_t)(end - (p + 1)) < row * height - 1)
+    if (!p || (size_t)(end - (p + 1)) < row * height - 1)
         return base_fail(err, BASE_EINVAL, "%s: truncated", path);
     float *out = malloc((size_t)width * height * 3 * sizeof *out);
-    if (out == NULL)
+    if (!out)
         return base_fail_nomem(err, path);
     int rc = read_rows(path, p + 1, width, height, channels, out, err);
     if (rc) {

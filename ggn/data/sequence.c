@@ -49,7 +49,7 @@ static int parse_stats(const char *path, const uint8_t *p, struct ggn_seq_record
         uint64_t bits = get64(p + GGN_SEQ_NAME);
         memcpy(s->name, p, GGN_SEQ_NAME);
         memcpy(&s->value, &bits, sizeof s->value);
-        if (memchr(s->name, 0, GGN_SEQ_NAME) == NULL || !isfinite(s->value))
+        if (!memchr(s->name, 0, GGN_SEQ_NAME) || !isfinite(s->value))
             return base_fail(err, BASE_EINVAL, "%s: %u spp: statistic %u is not usable", path, r->spp, i);
     }
     return 0;
@@ -108,7 +108,7 @@ static int parse_record(const char *path, struct ggn_seq_block *b, uint32_t inde
         return base_fail(err, BASE_EINVAL, "%s: levels do not rise: %u spp after %u", path, r->spp, b->levels[index - 1].spp);
     if (r->n_stats > 0) {
         r->stats = malloc(r->n_stats * sizeof *r->stats);
-        if (r->stats == NULL)
+        if (!r->stats)
             return base_fail_nomem(err, path);
     }
     int rc = parse_stats(path, p, r, err);
@@ -150,12 +150,12 @@ int ggn_seq_block_parse(const char *path, uint8_t *bytes, size_t size, struct gg
     b.bytes = bytes;
     b.size = size;
     b.levels = calloc(count, sizeof *b.levels);
-    if (b.levels == NULL)
+    if (!b.levels)
         return base_fail_nomem(err, path);
     size_t at = FILE_HEADER;
     for (uint32_t i = 0; i < count && !rc; i++)
         rc = parse_record(path, &b, i, count, &at, err);
-    b.n_levels = b.reference != NULL ? count - 1 : count;
+    b.n_levels = b.reference ? count - 1 : count;
     if (!rc && at != size)
         rc = base_fail(err, BASE_EINVAL, "%s: bytes after the last image", path);
     if (!rc && b.n_levels == 0)
@@ -227,7 +227,7 @@ const struct ggn_seq_record *ggn_seq_level(const struct ggn_seq_block *b, uint32
 static int load_plane(const struct ggn_seq_block *b, const struct ggn_seq_record *r, enum ggn_plane plane, uint8_t *raw, struct base_err *err)
 {
     const struct ggn_seq_plane *s = find_plane(r, plane);
-    if (s == NULL)
+    if (!s)
         return base_fail(err, BASE_EINVAL, "block %u at %u spp: plane %d is missing", b->id, r->spp, (int)plane);
     uLongf got = s->raw_bytes;
     uLong used = s->stored_bytes;
@@ -257,7 +257,7 @@ int ggn_seq_display(const struct ggn_seq_block *b, const struct ggn_seq_record *
     int rc;
     size_t pixels = (size_t)b->width * b->height;
     uint8_t *planar = load_plane_new(b, r, GGN_PLANE_DISPLAY, &rc, err);
-    if (planar == NULL)
+    if (!planar)
         return rc;
     for (size_t i = 0; i < pixels; i++)
         for (size_t c = 0; c < 3; c++)
@@ -271,7 +271,7 @@ static int load_f16(const struct ggn_seq_block *b, const struct ggn_seq_record *
     int rc;
     size_t n = 3 * (size_t)b->width * b->height;
     uint8_t *raw = load_plane_new(b, r, plane, &rc, err);
-    if (raw == NULL)
+    if (!raw)
         return rc;
     for (size_t i = 0; i < n && !rc; i++) {
         out[i] = ggn_half_to_float((uint16_t)(raw[2 * i] | raw[2 * i + 1] << 8));
@@ -289,19 +289,19 @@ int ggn_seq_mean(const struct ggn_seq_block *b, const struct ggn_seq_record *r, 
     if (ggn_seq_has(r, GGN_PLANE_MEAN_F16))
         return load_f16(b, r, GGN_PLANE_MEAN_F16, rgb, err);
     uint8_t *fine = NULL, *display = load_plane_new(b, r, GGN_PLANE_DISPLAY, &rc, err);
-    if (display == NULL)
+    if (!display)
         return rc;
     if (ggn_seq_has(r, GGN_PLANE_FINE)) {
         fine = load_plane_new(b, r, GGN_PLANE_FINE, &rc, err);
-        if (fine == NULL)
+        if (!fine)
             goto out;
     }
     float table[256][8];
     for (int d = 0; d < 256; d++)
         for (int q = 0; q < 8; q++)
-            table[d][q] = fine != NULL ? (float)ggn_fine_decode((uint8_t)d, (uint8_t)q) : ggn_srgb_table()[d];
+            table[d][q] = fine ? (float)ggn_fine_decode((uint8_t)d, (uint8_t)q) : ggn_srgb_table()[d];
     for (size_t i = 0; i < n; i++) {
-        uint8_t q = fine != NULL ? fine[i] : 0;
+        uint8_t q = fine ? fine[i] : 0;
         rgb[i] = q < 8 ? table[display[i]][q] : (float)ggn_fine_decode(display[i], q);
     }
 out:
@@ -321,7 +321,7 @@ int ggn_seq_half_luminance(const struct ggn_seq_block *b, const struct ggn_seq_r
     size_t pixels = (size_t)b->width * b->height;
     if (!ggn_seq_has(r, GGN_PLANE_HALF_F16)) {
         uint8_t *code = load_plane_new(b, r, GGN_PLANE_HALF_LOG, &rc, err);
-        if (code == NULL)
+        if (!code)
             return rc;
         float table[256];
         for (int i = 0; i < 256; i++)
@@ -332,7 +332,7 @@ int ggn_seq_half_luminance(const struct ggn_seq_block *b, const struct ggn_seq_r
         return 0;
     }
     float *rgb = malloc(3 * pixels * sizeof *rgb);
-    if (rgb == NULL)
+    if (!rgb)
         return base_fail_nomem(err, "half buffer");
     rc = load_f16(b, r, GGN_PLANE_HALF_F16, rgb, err);
     for (size_t i = 0; i < pixels && !rc; i++)
@@ -349,7 +349,7 @@ static int make_room(struct ggn_seq_builder *w, size_t more, struct base_err *er
         return 0;
     size_t room = 2 * w->room + more;
     uint8_t *bytes = realloc(w->bytes, room);
-    if (bytes == NULL)
+    if (!bytes)
         return base_fail_nomem(err, "block sequence");
     w->bytes = bytes;
     w->room = room;
@@ -436,7 +436,7 @@ static int add_planes(struct ggn_seq_builder *w, const struct ggn_seq_frame *f, 
     memcpy(raw, f->display, 3 * pixels);
     int rc = add_plane(w, GGN_PLANE_DISPLAY, GGN_FILTER_AVERAGE | GGN_FILTER_GREEN, raw, err);
     *count = 1;
-    if (!rc && f->mean != NULL) {
+    if (!rc && f->mean) {
         if (full)
             code_f16(f->mean, 3 * pixels, raw);
         else
@@ -444,7 +444,7 @@ static int add_planes(struct ggn_seq_builder *w, const struct ggn_seq_frame *f, 
         rc = add_plane(w, full ? GGN_PLANE_MEAN_F16 : GGN_PLANE_FINE, full ? GGN_FILTER_SHUFFLE : 0, raw, err);
         ++*count;
     }
-    if (!rc && f->half != NULL) {
+    if (!rc && f->half) {
         if (full)
             code_f16(f->half, 3 * pixels, raw);
         else
@@ -461,7 +461,7 @@ int ggn_seq_builder_add(struct ggn_seq_builder *w, const struct ggn_seq_frame *f
         return base_fail(err, BASE_EINVAL, "image at %u spp cannot be added to the sequence", f->spp);
     size_t start = w->size, stats = (size_t)f->n_stats * STAT_BYTES;
     uint8_t *raw = malloc(6 * (size_t)w->width * w->height);
-    if (raw == NULL)
+    if (!raw)
         return base_fail_nomem(err, "plane");
     int rc = make_room(w, RECORD_HEADER + stats, err);
     if (rc)

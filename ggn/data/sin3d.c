@@ -29,7 +29,7 @@ struct view {
 static size_t split_name(const char *name, uint32_t *spp, int *is_rawls)
 {
     const char *dot = strrchr(name, '.');
-    if (dot == NULL || (strcmp(dot, ".png") != 0 && strcmp(dot, ".rawls") != 0))
+    if (!dot || (strcmp(dot, ".png") != 0 && strcmp(dot, ".rawls") != 0))
         return 0;
     const char *digits = dot;
     while (digits > name && isdigit((unsigned char)digits[-1]))
@@ -63,7 +63,7 @@ static int add_level(struct view *v, const char *name, struct base_err *err)
         return base_fail(err, BASE_EINVAL, "%s: '%s' does not belong to the sequence '%s'", v->dir, name, v->prefix);
     }
     struct level *levels = realloc(v->levels, (size_t)(v->n + 1) * sizeof *levels);
-    if (levels == NULL)
+    if (!levels)
         return base_fail_nomem(err, v->dir);
     v->levels = levels;
     levels[v->n].spp = spp;
@@ -75,10 +75,10 @@ static int scan(const char *dir, struct view *v, struct base_err *err)
 {
     snprintf(v->dir, sizeof v->dir, "%s", dir);
     DIR *d = opendir(dir);
-    if (d == NULL)
+    if (!d)
         return base_fail(err, BASE_EIO, "%s: %s", dir, strerror(errno));
     int rc = 0;
-    for (const struct dirent *e; !rc && (e = readdir(d)) != NULL;)
+    for (const struct dirent *e; !rc && (e = readdir(d));)
         rc = add_level(v, e->d_name, err);
     closedir(d);
     if (v->n > 0)
@@ -116,7 +116,7 @@ void ggn_sin3d_scene(const char *view, char *scene, size_t room)
     for (const char *p = view; (p = strstr(p, "view")) != NULL; p++)
         if (p > view && (p[-1] == '-' || p[-1] == '_') && isdigit((unsigned char)p[4]))
             cut = p - 1;
-    snprintf(scene, room, "%.*s", cut != NULL ? (int)(cut - view) : (int)strlen(view), view);
+    snprintf(scene, room, "%.*s", cut ? (int)(cut - view) : (int)strlen(view), view);
 }
 
 /* One level as display image and, from float files, linear values. */
@@ -143,7 +143,7 @@ static int read_picture(const struct view *v, const struct level *level, struct 
         return rc;
     size_t n = 3 * (size_t)p->linear.width * (size_t)p->linear.height;
     p->display = (struct ggn_image8){p->linear.width, p->linear.height, malloc(n)};
-    if (p->display.data == NULL) {
+    if (!p->display.data) {
         release_picture(p);
         return base_fail_nomem(err, path);
     }
@@ -169,7 +169,7 @@ static void cut_block(const struct picture *p, int x0, int y0, int block, uint8_
                 size_t from = ((size_t)(y0 + y) * (size_t)p->display.width + (size_t)(x0 + x)) * 3 + c;
                 size_t to = c * pixels + (size_t)y * (size_t)block + (size_t)x;
                 display[to] = p->display.data[from];
-                if (p->linear.data != NULL)
+                if (p->linear.data)
                     mean[to] = p->linear.data[from];
             }
 }
@@ -180,7 +180,7 @@ static int add_picture(struct row *row, const struct picture *p, uint32_t spp, i
     for (int c = 0; c < row->columns && !rc; c++) {
         cut_block(p, c * row->block, row->y0, row->block, row->display, row->mean);
         struct ggn_seq_frame f = {.spp = spp, .is_reference = is_reference, .display = row->display,
-                                  .mean = p->linear.data != NULL ? row->mean : NULL};
+                                  .mean = p->linear.data ? row->mean : NULL};
         rc = ggn_seq_builder_add(&row->builders[c], &f, err);
     }
     return rc;
@@ -202,7 +202,7 @@ static int fill_row(const struct view *v, const struct ggn_manifest *m, struct r
         if (!rc && i + 1 == v->n)
             rc = add_picture(row, &p, v->levels[i].spp, 1, err);
         release_picture(&p);
-        if (o->progress != NULL)
+        if (o->progress)
             o->progress(o->data, v->prefix, base + i + 1, (int)(m->height / m->block) * v->n);
     }
     return rc;
@@ -217,7 +217,7 @@ static int import_row(const struct view *v, const char *out, struct ggn_manifest
     row.builders = calloc((size_t)row.columns, sizeof *row.builders);
     row.display = malloc(3 * pixels);
     row.mean = malloc(3 * pixels * sizeof *row.mean);
-    if (row.builders == NULL || row.display == NULL || row.mean == NULL)
+    if (!row.builders || !row.display || !row.mean)
         rc = base_fail_nomem(err, v->dir);
     for (int c = 0; c < row.columns && !rc; c++)
         rc = ggn_seq_builder_init(&row.builders[c], block, block, c * (int)block, row.y0, (uint32_t)(index * row.columns + c), 0, err);
@@ -234,7 +234,7 @@ static int import_row(const struct view *v, const char *out, struct ggn_manifest
         b->bytes = row.builders[c].size;
         m->n_blocks += !rc;
     }
-    for (int c = 0; c < row.columns && row.builders != NULL; c++)
+    for (int c = 0; c < row.columns && row.builders; c++)
         ggn_seq_builder_release(&row.builders[c]);
     free(row.mean);
     free(row.display);
@@ -260,7 +260,7 @@ static int init_manifest(const struct view *v, const struct ggn_sin3d_options *o
     size_t blocks = (size_t)(m->width / m->block) * (m->height / m->block);
     m->levels = malloc((size_t)v->n * sizeof *m->levels);
     m->blocks = malloc(blocks * sizeof *m->blocks);
-    if (m->levels == NULL || m->blocks == NULL)
+    if (!m->levels || !m->blocks)
         return base_fail_nomem(err, v->dir);
     for (int i = 0; i < v->n; i++)
         m->levels[i] = v->levels[i].spp;
@@ -297,13 +297,13 @@ static int attach_thresholds(const struct view *v, const char *out, const struct
     char with_part[GGN_VIEW_NAME + 8];
     const char *slash = strrchr(v->dir, '/');
     snprintf(with_part, sizeof with_part, "%s_part6", v->prefix);
-    const struct ggn_view *row = t == NULL ? NULL : ggn_thresholds_find(t, with_part);
-    if (t != NULL && row == NULL)
+    const struct ggn_view *row = !t ? NULL : ggn_thresholds_find(t, with_part);
+    if (t && !row)
         row = ggn_thresholds_find(t, v->prefix);
-    if (t != NULL && row == NULL)
-        row = ggn_thresholds_find(t, slash != NULL ? slash + 1 : v->dir);
+    if (t && !row)
+        row = ggn_thresholds_find(t, slash ? slash + 1 : v->dir);
     *labelled = row != NULL;
-    if (row == NULL)
+    if (!row)
         return 0;
     uint32_t n = m->width / m->block * (m->height / m->block);
     if ((uint32_t)row->n != n)
@@ -311,7 +311,7 @@ static int attach_thresholds(const struct view *v, const char *out, const struct
     struct ggn_labels labels = {.source = "human", .cap = m->levels[m->n_levels - 1], .spread = GGN_LABELS_SPREAD, .n = n};
     snprintf(labels.detail, sizeof labels.detail, "thresholds of '%s'", row->name);
     labels.labels = malloc(n * sizeof *labels.labels);
-    if (labels.labels == NULL)
+    if (!labels.labels)
         return base_fail_nomem(err, out);
     for (uint32_t i = 0; i < n; i++)
         labels.labels[i] = (struct ggn_label){i, row->spp[i], row->spp[i] >= labels.cap};

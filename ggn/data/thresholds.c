@@ -34,13 +34,13 @@ static struct ggn_view *add_view(struct ggn_thresholds *t, const char *name, int
     if ((t->n & (t->n - 1)) == 0) {
         size_t room = t->n == 0 ? 1 : 2 * (size_t)t->n;
         struct ggn_view *views = realloc(t->views, room * sizeof *views);
-        if (views == NULL)
+        if (!views)
             return NULL;
         t->views = views;
     }
     struct ggn_view *v = &t->views[t->n];
     *v = (struct ggn_view){.n = n, .spp = malloc((size_t)n * sizeof *v->spp)};
-    if (v->spp == NULL)
+    if (!v->spp)
         return NULL;
     snprintf(v->name, sizeof v->name, "%s", name);
     for (int i = 0; i < n; i++)
@@ -52,7 +52,7 @@ static struct ggn_view *add_view(struct ggn_thresholds *t, const char *name, int
 static int parse_line(const char *path, int number, char *line, struct ggn_thresholds *t, struct base_err *err)
 {
     char *sep = strchr(line, ';');
-    if (sep == NULL || sep == line || sep - line >= GGN_VIEW_NAME)
+    if (!sep || sep == line || sep - line >= GGN_VIEW_NAME)
         return base_fail(err, BASE_EINVAL, "%s:%d: expected NAME;T0;T1;…", path, number);
     *sep = '\0';
     int n = 0;
@@ -61,10 +61,10 @@ static int parse_line(const char *path, int number, char *line, struct ggn_thres
     n += sep[1] != '\0' && sep[strlen(sep + 1)] != ';'; /* a last value without its ';' */
     if (n < 1 || n > GGN_VIEW_BLOCKS)
         return base_fail(err, BASE_EINVAL, "%s:%d: %d thresholds", path, number, n);
-    if (ggn_thresholds_find(t, line) != NULL)
+    if (ggn_thresholds_find(t, line))
         return base_fail(err, BASE_EINVAL, "%s:%d: view '%s' appears twice", path, number, line);
     struct ggn_view *v = add_view(t, line, n);
-    if (v == NULL)
+    if (!v)
         return base_fail_nomem(err, path);
     char *at = sep + 1;
     for (int i = 0; i < n; i++) {
@@ -82,9 +82,9 @@ int ggn_thresholds_parse_csv(const char *path, char *text, struct ggn_thresholds
 {
     struct ggn_thresholds t = {0};
     int rc = 0, number = 0;
-    for (char *line = text, *next; line != NULL && !rc; line = next) {
+    for (char *line = text, *next; line && !rc; line = next) {
         next = strchr(line, '\n');
-        if (next != NULL)
+        if (next)
             *next++ = '\0';
         number++;
         line[strcspn(line, "\r")] = '\0';
@@ -126,7 +126,7 @@ static int parse_json(const char *path, const char *text, size_t size, struct gg
         columns += cJSON_IsNumber(y0) && y0->valuedouble == 0.0;
     }
     struct ggn_view *v = last < 0 ? NULL : add_view(&t, cJSON_IsString(scene) ? scene->valuestring : path, last + 1);
-    if (v == NULL) {
+    if (!v) {
         rc = last < 0 ? base_fail(err, BASE_EINVAL, "%s: no blocks in it", path) : base_fail_nomem(err, path);
         goto out;
     }
@@ -134,7 +134,7 @@ static int parse_json(const char *path, const char *text, size_t size, struct gg
     cJSON_ArrayForEach(block, blocks) {
         const cJSON *id = cJSON_GetObjectItemCaseSensitive(block, "id");
         const cJSON *spp = cJSON_GetObjectItemCaseSensitive(block, "threshold");
-        if (spp == NULL)
+        if (!spp)
             spp = cJSON_GetObjectItemCaseSensitive(block, "spp");
         if (!cJSON_IsNumber(spp) || !(spp->valuedouble > 0.0 && spp->valuedouble < 1e12)) {
             rc = base_fail(err, BASE_EINVAL, "%s: block %d has no positive spp", path, id->valueint);
@@ -164,8 +164,8 @@ static int read_exr(const char *path, int block, struct ggn_thresholds *out, str
         rc = base_fail(err, BASE_EINVAL, "%s: %ld blocks of %d pixels", path, columns * rows, block);
         goto out;
     }
-    struct ggn_view *v = add_view(&t, slash != NULL ? slash + 1 : path, (int)(columns * rows));
-    if (v == NULL) {
+    struct ggn_view *v = add_view(&t, slash ? slash + 1 : path, (int)(columns * rows));
+    if (!v) {
         rc = base_fail_nomem(err, path);
         goto out;
     }
@@ -195,12 +195,12 @@ int ggn_thresholds_read(const char *path, int block, struct ggn_thresholds *out,
     const char *dot = strrchr(path, '.');
     char *text = NULL;
     size_t size;
-    if (dot != NULL && strcmp(dot, ".exr") == 0)
+    if (dot && strcmp(dot, ".exr") == 0)
         return read_exr(path, block, out, err);
     int rc = base_file_read(path, MAX_TEXT, &text, &size, err);
     if (rc)
         return rc;
-    if (dot != NULL && strcmp(dot, ".json") == 0)
+    if (dot && strcmp(dot, ".json") == 0)
         rc = parse_json(path, text, size, out, err);
     else
         rc = ggn_thresholds_parse_csv(path, text, out, err);

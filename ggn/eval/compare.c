@@ -19,9 +19,9 @@ void ggn_pairing_release(struct ggn_pairing *p)
 static const struct ggn_view *partner(const struct ggn_thresholds *truth, int i, const struct ggn_thresholds *model, const char *view)
 {
     const struct ggn_view *t = &truth->views[i];
-    if (view != NULL && model->n == 1)
+    if (view && model->n == 1)
         return strcmp(t->name, view) == 0 ? &model->views[0] : NULL;
-    if (view != NULL && strcmp(t->name, view) != 0)
+    if (view && strcmp(t->name, view) != 0)
         return NULL;
     if (truth->n == 1 && model->n == 1)
         return &model->views[0];
@@ -39,13 +39,13 @@ int ggn_pairing_init(struct ggn_pairing *out, const struct ggn_thresholds *truth
     p.views = malloc((size_t)(truth->n > 0 ? truth->n : 1) * sizeof *p.views);
     p.truth = malloc((room > 0 ? room : 1) * sizeof *p.truth);
     p.model = malloc((room > 0 ? room : 1) * sizeof *p.model);
-    if (p.views == NULL || p.truth == NULL || p.model == NULL) {
+    if (!p.views || !p.truth || !p.model) {
         rc = base_fail_nomem(err, "pairs");
         goto out;
     }
     for (int i = 0; i < truth->n; i++) {
         const struct ggn_view *t = &truth->views[i], *m = partner(truth, i, model, view);
-        if (m == NULL)
+        if (!m)
             continue;
         if (m->n != t->n) {
             rc = base_fail(err, BASE_EINVAL, "view '%s': %d blocks against %d", t->name, t->n, m->n);
@@ -59,8 +59,8 @@ int ggn_pairing_init(struct ggn_pairing *out, const struct ggn_thresholds *truth
             }
     }
     if (p.n == 0)
-        rc = base_fail(err, BASE_EINVAL, view != NULL ? "no view called '%s' to compare" : "no view has the same name on both sides%s",
-                      view != NULL ? view : " (--view NAME names the partner of a single view)");
+        rc = base_fail(err, BASE_EINVAL, view ? "no view called '%s' to compare" : "no view has the same name on both sides%s",
+                      view ? view : " (--view NAME names the partner of a single view)");
 out:
     if (rc) {
         ggn_pairing_release(&p);
@@ -119,7 +119,7 @@ int ggn_plot_scatter(const char *path, const double *truth, const double *model,
 {
     struct ggn_plot plot;
     double *logs = malloc(2 * n * sizeof *logs), a, b;
-    if (logs == NULL)
+    if (!logs)
         return base_fail_nomem(err, path);
     for (size_t i = 0; i < n; i++) {
         logs[i] = log2(truth[i]);

@@ -28,7 +28,7 @@ static int init(struct ggn_method *m, const struct ggn_eval_set *s, const char *
     m->stop = malloc((size_t)s->n_blocks * sizeof *m->stop);
     if (with_scores)
         m->score = malloc(s->n * sizeof *m->score);
-    if (m->stop == NULL || (with_scores && m->score == NULL)) {
+    if (!m->stop || (with_scores && !m->score)) {
         ggn_method_release(m);
         return base_fail_nomem(err, name);
     }
@@ -48,7 +48,7 @@ int ggn_method_constant(struct ggn_method *m, const struct ggn_eval_set *s, stru
     enum ggn_split split = ggn_eval_count(s, GGN_SPLIT_TRAIN) > 0 ? GGN_SPLIT_TRAIN : GGN_SPLIT_NONE;
     size_t n = 0;
     double *t = malloc((size_t)s->n_blocks * sizeof *t);
-    if (t == NULL)
+    if (!t)
         return base_fail_nomem(err, "constant");
     int rc = init(m, s, "constant (training median)", 0, err);
     for (int b = 0; b < s->n_blocks; b++)
@@ -119,7 +119,7 @@ int ggn_method_scores(struct ggn_method *m, const struct ggn_eval_set *s, const 
 
 static int passes(const struct ggn_method *m, size_t i, double cut, double limit)
 {
-    return m->score[i] < cut && !(m->guard != NULL && m->guard[i] > limit);
+    return m->score[i] < cut && !(m->guard && m->guard[i] > limit);
 }
 
 int ggn_method_passes(const struct ggn_method *m, size_t i)
@@ -142,7 +142,7 @@ static double stop_of(const struct ggn_method *m, const struct ggn_eval_set *s, 
 
 void ggn_method_run(struct ggn_method *m, const struct ggn_eval_set *s)
 {
-    for (int b = 0; b < s->n_blocks && m->score != NULL; b++)
+    for (int b = 0; b < s->n_blocks && m->score; b++)
         m->stop[b] = stop_of(m, s, &s->blocks[b], m->cut, m->guard_limit);
 }
 
@@ -174,7 +174,7 @@ int ggn_method_tune(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn
     enum { TRIES = 400 };
     size_t n = 0;
     double *scores = malloc((s->n > 0 ? s->n : 1) * sizeof *scores);
-    if (scores == NULL)
+    if (!scores)
         return base_fail_nomem(err, m->name);
     for (int b = 0; b < s->n_blocks; b++)
         for (size_t i = s->blocks[b].first; i < s->blocks[b].end; i++)
@@ -188,7 +188,7 @@ int ggn_method_tune(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn
     static const double limits[] = {0.0, 1e-4, 1e-3, 1e-2, INFINITY};
     double best_early = INFINITY, best_samples = INFINITY;
     for (int k = 0; k <= TRIES; k++)
-        for (size_t g = m->guard != NULL ? 0 : 4; g < 5; g++) {
+        for (size_t g = m->guard ? 0 : 4; g < 5; g++) {
             double cut = k == TRIES ? nextafter(scores[n - 1], INFINITY) : scores[(size_t)k * n / TRIES], early, samples;
             cost_of(m, s, split, cut, limits[g], &early, &samples);
             int fits = early <= early_rate, fitted = best_early <= early_rate;
@@ -219,7 +219,7 @@ static int score_figures(const struct ggn_method *m, const struct ggn_eval_set *
 {
     double *score = malloc((s->n > 0 ? s->n : 1) * sizeof *score), sum = 0.0, cut;
     unsigned char *label = malloc(s->n > 0 ? s->n : 1);
-    int rc = score == NULL || label == NULL ? base_fail_nomem(err, m->name) : 0, scenes = 0;
+    int rc = !score || !label ? base_fail_nomem(err, m->name) : 0, scenes = 0;
     size_t right = 0;
     for (int scene = -1; scene < s->n_scenes && !rc; scene++) { /* -1: all together */
         size_t n = 0;
@@ -253,7 +253,7 @@ static int threshold_figures(const struct ggn_method *m, const struct ggn_eval_s
 {
     double *t = malloc(2 * (size_t)s->n_blocks * sizeof *t), early = 0.0, spent = 0.0, needed = 0.0;
     size_t n = 0;
-    if (t == NULL)
+    if (!t)
         return base_fail_nomem(err, m->name);
     for (int b = 0; b < s->n_blocks; b++) {
         const struct ggn_eval_block *block = &s->blocks[b];
@@ -348,7 +348,7 @@ int ggn_method_measure(const struct ggn_method *m, const struct ggn_eval_set *s,
             in |= s->blocks[b].split == split && s->blocks[b].scene == scene;
         r.scenes += in;
     }
-    int rc = m->score != NULL ? score_figures(m, s, split, &r, err) : 0;
+    int rc = m->score ? score_figures(m, s, split, &r, err) : 0;
     if (!rc)
         rc = threshold_figures(m, s, split, &r, err);
     if (rc)

@@ -41,10 +41,10 @@ static int viewer_init(struct viewer *v, const struct ggn_model *model, enum ggn
     if (v->window > WINDOW_MAX)
         return base_fail(err, BASE_EINVAL, "the model looks at windows of %d images, more than %d", v->window, WINDOW_MAX);
     v->judge = ggn_judge_create(model, precision, NULL, err);
-    if (v->judge == NULL)
+    if (!v->judge)
         return err->code;
     v->room = malloc((size_t)v->window * values * sizeof *v->room);
-    if (v->room == NULL) {
+    if (!v->room) {
         viewer_release(v);
         return base_fail_nomem(err, "evaluation");
     }
@@ -97,9 +97,9 @@ struct run {
 static int tail_holds(const struct ggn_policy *p, const struct ggn_chain *c, int i)
 {
     int k = i;
-    while (k > 0 && (c->tail999 == NULL || isnan(c->tail999[k])))
+    while (k > 0 && (!c->tail999 || isnan(c->tail999[k])))
         k--;
-    if (c->tail999 == NULL || isnan(c->tail999[k]))
+    if (!c->tail999 || isnan(c->tail999[k]))
         return 0;
     return ggn_policy_tail_holds(p, c->tail999[k] * sqrt(c->spp[k] / c->spp[i]), c->gini[k]);
 }
@@ -133,7 +133,7 @@ static int judge_block(void *data, int index, int worker, struct base_err *err)
 static int init_method(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, const struct ggn_policy *p, struct base_err *err)
 {
     double *nothing = malloc((s->n > 0 ? s->n : 1) * sizeof *nothing);
-    int rc = nothing == NULL ? base_fail_nomem(err, name) : 0;
+    int rc = !nothing ? base_fail_nomem(err, name) : 0;
     for (size_t i = 0; i < s->n && !rc; i++)
         nothing[i] = (double)NAN;
     if (!rc)
@@ -142,7 +142,7 @@ static int init_method(struct ggn_method *m, const struct ggn_eval_set *s, const
     if (rc)
         return rc;
     m->own_guard = calloc(s->n > 0 ? s->n : 1, sizeof *m->own_guard);
-    if (m->own_guard == NULL) {
+    if (!m->own_guard) {
         ggn_method_release(m);
         return base_fail_nomem(err, name);
     }
@@ -157,7 +157,7 @@ int ggn_eval_network(struct ggn_method *m, const struct ggn_eval_set *s, const s
 {
     int workers = base_threads_count(threads), made = 0;
     struct run r = {.set = s, .method = m, .viewers = calloc((size_t)workers, sizeof *r.viewers)};
-    int rc = r.viewers == NULL ? base_fail_nomem(err, name) : ggn_policy_of(model, &r.policy, err);
+    int rc = !r.viewers ? base_fail_nomem(err, name) : ggn_policy_of(model, &r.policy, err);
     if (!rc)
         rc = init_method(m, s, name, &r.policy, err);
     if (rc) {
@@ -244,7 +244,7 @@ static int denoiser_strip(const struct ggn_eval_set *s, const struct ggn_eval_bl
     uint8_t *strip = malloc(3 * values);
     float *planes = malloc(3 * values * sizeof *planes);
     struct ggn_ssim_f32 *ssim = ggn_ssim_create_f32(h, w, NULL, err);
-    int rc = strip == NULL || planes == NULL || ssim == NULL ? base_fail_nomem(err, path) : 0;
+    int rc = !strip || !planes || !ssim ? base_fail_nomem(err, path) : 0;
     if (!rc) {
         v->n = 0;
         viewer_push(v, c->noisy, c->spp[0], w, h);
@@ -275,7 +275,7 @@ int ggn_eval_denoiser_picture(const char *path, const struct ggn_eval_set *s, co
         return rc;
     for (int b = 0; b < s->n_blocks && strips.n < STRIPS && !rc; b++) {
         const struct ggn_eval_block *block = &s->blocks[b];
-        if (block->split != split || block->view == last_view || s->chains.chains[block->chain].reference == NULL)
+        if (block->split != split || block->view == last_view || !s->chains.chains[block->chain].reference)
             continue;
         last_view = block->view;
         rc = denoiser_strip(s, block, &v, path, &strips, err);
@@ -289,14 +289,14 @@ static void put_map(uint8_t *strip, int tiles, int k, const float *a, const floa
 {
     float lo = INFINITY, hi = -INFINITY;
     for (size_t i = 0; i < w * h; i++) {
-        float v = b != NULL ? fabsf(a[i] - b[i]) : a[i];
+        float v = b ? fabsf(a[i] - b[i]) : a[i];
         lo = fminf(lo, v);
         hi = fmaxf(hi, v);
     }
     for (size_t i = 0; i < w * h; i++) {
-        float v = b != NULL ? fabsf(a[i] - b[i]) : a[i];
+        float v = b ? fabsf(a[i] - b[i]) : a[i];
         uint8_t *at = strip + 3 * (i / w * (size_t)tiles * w + (size_t)k * w + i % w);
-        ggn_colormap_rgb(b != NULL ? GGN_MAGMA : GGN_VIRIDIS, hi > lo ? (double)((v - lo) / (hi - lo)) : 0.0, at);
+        ggn_colormap_rgb(b ? GGN_MAGMA : GGN_VIRIDIS, hi > lo ? (double)((v - lo) / (hi - lo)) : 0.0, at);
     }
 }
 
@@ -309,7 +309,7 @@ static int feature_strip(const struct ggn_eval_set *s, const struct ggn_eval_blo
     size_t pixels = (size_t)w * (size_t)h, values = 3 * pixels;
     uint8_t *strip = malloc(4 * values);
     float *planes = malloc((values + 2 * pixels) * sizeof *planes);
-    int rc = strip == NULL || planes == NULL ? base_fail_nomem(err, path) : 0;
+    int rc = !strip || !planes ? base_fail_nomem(err, path) : 0;
     if (!rc) {
         v->n = 0;
         for (int i = level - v->window + 1; i <= level; i++)
@@ -350,14 +350,14 @@ int ggn_eval_feature_picture(const char *path, const struct ggn_eval_set *s, con
             continue;
         /* one whose threshold lies well inside what was recorded, if there is one */
         int inside = s->blocks[b].label.threshold > 1.5 * c->spp[model->hyper.window - 1] && !s->blocks[b].label.censored;
-        block = block == NULL || inside ? &s->blocks[b] : block;
+        block = !block || inside ? &s->blocks[b] : block;
         if (inside)
             break;
     }
     int rc = ggn_policy_of(model, &policy, err);
     if (!rc)
         rc = viewer_init(&v, model, GGN_PRECISION_F32, ggn_chains_values(&s->chains), err);
-    if (rc || block == NULL) {
+    if (rc || !block) {
         if (!rc)
             viewer_release(&v);
         return rc;

@@ -76,7 +76,7 @@ void ggn_report_table(FILE *f, const struct ggn_eval_set *s, enum ggn_split spli
 struct cJSON *ggn_report_json(const struct ggn_method *methods, const struct ggn_method_metrics *metrics, int n)
 {
     cJSON *root = cJSON_CreateObject();
-    for (int i = 0; i < n && root != NULL; i++) {
+    for (int i = 0; i < n && root; i++) {
         const struct ggn_method_metrics *m = &metrics[i];
         cJSON *o = cJSON_AddObjectToObject(root, methods[i].name);
         cJSON_AddNumberToObject(o, "blocks", m->blocks);
@@ -103,7 +103,7 @@ static int picture_path(char path[4096], const char *dir, enum ggn_split split, 
 {
     char word[GGN_METHOD_NAME] = "";
     size_t n = 0;
-    for (const char *p = method != NULL ? method->name : ""; *p != '\0' && *p != '(' && n + 2 < sizeof word; p++)
+    for (const char *p = method ? method->name : ""; *p != '\0' && *p != '(' && n + 2 < sizeof word; p++)
         if (isalnum((unsigned char)*p))
             word[n++] = *p;
     word[n] = '\0';
@@ -126,7 +126,7 @@ static int write_roc(FILE *f, const struct ggn_method *m, const struct ggn_eval_
 {
     struct point *p = malloc((s->n > 0 ? s->n : 1) * sizeof *p);
     size_t n = 0, positive = 0, hit = 0, step;
-    if (p == NULL)
+    if (!p)
         return base_fail_nomem(err, m->name);
     for (int b = 0; b < s->n_blocks; b++)
         for (size_t i = s->blocks[b].first; i < s->blocks[b].end; i++)
@@ -153,7 +153,7 @@ static int plot_roc(const char *path, const struct ggn_eval_set *s, enum ggn_spl
     if (rc)
         return rc;
     for (int i = 0; i < n && !rc; i++) {
-        if (methods[i].score == NULL)
+        if (!methods[i].score)
             continue;
         fprintf(plot.script, "$m%d << EOD\n", i);
         rc = write_roc(plot.script, &methods[i], s, split, err);
@@ -162,7 +162,7 @@ static int plot_roc(const char *path, const struct ggn_eval_set *s, enum ggn_spl
     fprintf(plot.script, "set size square\nset xrange [0:1]\nset yrange [0:1]\nset grid\nset key bottom right\nset title 'all windows of the %s scenes pooled'\n"
                          "set xlabel 'share of converged images called noisy'\nset ylabel 'share of noisy images called noisy'\nplot ", ggn_split_names[split]);
     for (int i = 0; i < n; i++)
-        if (methods[i].score != NULL) {
+        if (methods[i].score) {
             fprintf(plot.script, "%s$m%d with lines lw 2 title ", first ? "" : ", ", i);
             ggn_plot_quote(plot.script, methods[i].name);
             first = 0;
@@ -222,7 +222,7 @@ static void fill_view(struct ggn_view *v, const struct ggn_eval_set *s, int view
     for (int b = 0; b < s->n_blocks; b++) {
         uint32_t id = m->blocks[s->blocks[b].index < m->n_blocks ? s->blocks[b].index : 0].id;
         if (s->blocks[b].view == view && id < (uint32_t)v->n)
-            v->spp[id] = stop != NULL ? stop[b] : s->blocks[b].label.threshold;
+            v->spp[id] = stop ? stop[b] : s->blocks[b].label.threshold;
     }
 }
 
@@ -230,7 +230,7 @@ static void fill_view(struct ggn_view *v, const struct ggn_eval_set *s, int view
 static int make_maps(struct ggn_thresholds *t, const struct ggn_eval_set *s, enum ggn_split split, const double *stop, struct base_err *err)
 {
     *t = (struct ggn_thresholds){.views = calloc((size_t)s->chains.data.n, sizeof *t->views)};
-    if (t->views == NULL)
+    if (!t->views)
         return base_fail_nomem(err, "maps");
     for (int v = 0; v < s->chains.data.n; v++) {
         const struct ggn_manifest *m = &s->chains.data.views[v].manifest;
@@ -243,7 +243,7 @@ static int make_maps(struct ggn_thresholds *t, const struct ggn_eval_set *s, enu
         struct ggn_view *view = &t->views[t->n];
         view->n = (int)blocks;
         view->spp = malloc(blocks * sizeof *view->spp);
-        if (view->spp == NULL) {
+        if (!view->spp) {
             ggn_thresholds_release(t);
             return base_fail_nomem(err, "maps");
         }
@@ -269,7 +269,7 @@ static int method_pictures(const char *dir, const struct ggn_eval_set *s, enum g
         rc = ggn_plot_errors(path, pairing.truth, pairing.model, pairing.n, m->name, err);
     if (!rc && (rc = picture_path(path, dir, split, "heatmaps", m, ".png", err)) == 0)
         rc = ggn_plot_heatmaps(path, &pairing, "thresholds", m->name, err);
-    if (!rc && m->score != NULL && (rc = picture_path(path, dir, split, "score", m, ".png", err)) == 0)
+    if (!rc && m->score && (rc = picture_path(path, dir, split, "score", m, ".png", err)) == 0)
         rc = plot_scores(path, s, split, m, err);
     struct base_file_out out;
     if (!rc && (rc = picture_path(path, dir, split, "stops", m, ".csv", err)) == 0 && (rc = base_file_begin(&out, path, err)) == 0) {

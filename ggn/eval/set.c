@@ -38,7 +38,7 @@ static int list_blocks(struct ggn_eval_set *s, int *skipped, struct base_err *er
     const struct ggn_dataset *d = &s->chains.data;
     s->n_scenes = d->n;
     s->blocks = malloc((size_t)(s->chains.n > 0 ? s->chains.n : 1) * sizeof *s->blocks);
-    if (s->blocks == NULL)
+    if (!s->blocks)
         return base_fail_nomem(err, "evaluation");
     *skipped = 0;
     for (int v = 0; v < d->n; v++)
@@ -72,7 +72,7 @@ static int make_columns(struct ggn_eval_set *s, struct base_err *err)
     double *all = malloc(COLUMNS * s->n * sizeof *all);
     s->noisy = malloc(s->n);
     s->spp = all;
-    if (all == NULL || s->noisy == NULL)
+    if (!all || !s->noisy)
         return base_fail_nomem(err, "evaluation");
     for (size_t c = 0; c < COLUMNS; c++) {
         *columns[c] = all + c * s->n;
@@ -110,7 +110,7 @@ int ggn_eval_each_block(const struct ggn_eval_set *set, struct base_threads *thr
 {
     int n = set->n_blocks, rc = 0;
     struct each e = {.fn = fn, .data = data, .rc = calloc((size_t)n, sizeof(int)), .errs = calloc((size_t)n, sizeof(struct base_err))};
-    if (e.rc == NULL || e.errs == NULL)
+    if (!e.rc || !e.errs)
         rc = base_fail_nomem(err, "evaluation");
     else
         base_threads_for(threads, n, each_block, &e);
@@ -159,7 +159,7 @@ static int measure_quality(struct ggn_eval_set *s, const struct ggn_eval_block *
     uint8_t *rgb = malloc(2 * values);
     float *work = malloc(2 * values * sizeof *work);
     struct ggn_ssim_f32 *ssim = ggn_ssim_create_f32(h, w, NULL, err);
-    if (rgb == NULL || work == NULL || ssim == NULL) {
+    if (!rgb || !work || !ssim) {
         rc = base_fail_nomem(err, "quality");
         goto out;
     }
@@ -195,7 +195,7 @@ static int extrapolate(struct ggn_eval_set *s, const struct ggn_eval_block *bloc
     size_t pixels = (size_t)p->width * p->height;
     double half = ggn_seq_stat(last, "half_unsettled");
     float *planes = malloc(4 * pixels * sizeof *planes);
-    int rc = planes == NULL ? base_fail_nomem(err, "evaluation") : ggn_seq_mean(p, last, planes, err);
+    int rc = !planes ? base_fail_nomem(err, "evaluation") : ggn_seq_mean(p, last, planes, err);
     if (!rc)
         rc = ggn_seq_half_luminance(p, last, planes + 3 * pixels, err);
     for (size_t i = 0; i < pixels && !rc; i++)
@@ -220,7 +220,7 @@ static int fill_statistics(struct ggn_eval_set *s, const struct ggn_eval_block *
     int rc = ggn_manifest_read_block(v->dir, &v->manifest, block->index, &p, err);
     if (rc)
         return rc;
-    for (const struct ggn_seq_record *r; i < block->end && (r = ggn_seq_level(&p, (uint32_t)s->spp[i])) != NULL; i++) {
+    for (const struct ggn_seq_record *r; i < block->end && (r = ggn_seq_level(&p, (uint32_t)s->spp[i])); i++) {
         s->seconds[i] = ggn_seq_stat(r, "seconds");
         s->dammertz[i] = ggn_seq_stat(r, "dammertz");
         s->half_unsettled[i] = ggn_seq_stat(r, "half_unsettled");
@@ -240,14 +240,14 @@ static int fill_block(void *data, int index, int worker, struct base_err *err)
     const struct ggn_eval_block *block = &f->set->blocks[index];
     (void)worker;
     int rc = fill_statistics(f->set, block, err);
-    return !rc && f->quality && f->set->chains.chains[block->chain].reference != NULL ? measure_quality(f->set, block, err) : rc;
+    return !rc && f->quality && f->set->chains.chains[block->chain].reference ? measure_quality(f->set, block, err) : rc;
 }
 
 /* Continues every labelled chain, also those that training has no use for: a method that does not stop in time must be seen to. */
 static int extend(struct ggn_chains *chains, uint32_t seed, struct base_err *err)
 {
     struct ggn_label *labels = malloc((size_t)(chains->n > 0 ? chains->n : 1) * sizeof *labels);
-    if (labels == NULL)
+    if (!labels)
         return base_fail_nomem(err, "evaluation");
     for (int i = 0; i < chains->n; i++) {
         labels[i] = chains->chains[i].label;

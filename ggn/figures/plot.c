@@ -43,7 +43,7 @@ int ggn_plot_begin(struct ggn_plot *plot, const char *path, int width, int heigh
         return rc;
     snprintf(plot->tmp_script, sizeof plot->tmp_script, "%s.gp", plot->tmp_picture);
     plot->script = fopen(plot->tmp_script, "w");
-    if (plot->script == NULL)
+    if (!plot->script)
         return base_fail(err, BASE_EIO, "%s: %s", path, strerror(errno));
     fprintf(plot->script, "set encoding utf8\nset terminal pngcairo size %d,%d noenhanced font 'sans,11' background '#ffffff'\nset output ", width, height);
     ggn_plot_quote(plot->script, plot->tmp_picture);

@@ -57,7 +57,7 @@ static int compare_keyed(const void *a, const void *b)
 static struct keyed *sorted(const double *x, size_t n)
 {
     struct keyed *k = malloc((n > 0 ? n : 1) * sizeof *k);
-    if (k == NULL)
+    if (!k)
         return NULL;
     for (size_t i = 0; i < n; i++)
         k[i] = (struct keyed){x[i], i};
@@ -69,7 +69,7 @@ static struct keyed *sorted(const double *x, size_t n)
 static int ranks(const double *x, size_t n, double *rank, struct base_err *err)
 {
     struct keyed *k = sorted(x, n);
-    if (k == NULL)
+    if (!k)
         return base_fail_nomem(err, "ranks");
     for (size_t i = 0, j; i < n; i = j) {
         for (j = i + 1; j < n && k[j].key == k[i].key;)
@@ -84,7 +84,7 @@ static int ranks(const double *x, size_t n, double *rank, struct base_err *err)
 int ggn_stats_spearman(const double *x, const double *y, size_t n, double *rho, struct base_err *err)
 {
     double *r = malloc((n > 0 ? 2 * n : 1) * sizeof *r);
-    if (r == NULL)
+    if (!r)
         return base_fail_nomem(err, "ranks");
     int rc = ranks(x, n, r, err);
     if (!rc)
@@ -110,7 +110,7 @@ int ggn_stats_auc(const double *score, const unsigned char *label, size_t n, dou
 {
     double *rank = malloc((n > 0 ? n : 1) * sizeof *rank), sum = 0.0;
     size_t positive = 0;
-    if (rank == NULL)
+    if (!rank)
         return base_fail_nomem(err, "ranks");
     int rc = ranks(score, n, rank, err);
     for (size_t i = 0; i < n && !rc; i++)
@@ -129,7 +129,7 @@ int ggn_stats_auc(const double *score, const unsigned char *label, size_t n, dou
 int ggn_stats_best_cut(const double *score, const unsigned char *label, size_t n, double *cut, double *accuracy, struct base_err *err)
 {
     struct keyed *k = sorted(score, n);
-    if (k == NULL)
+    if (!k)
         return base_fail_nomem(err, "cut");
     size_t right = 0, best;
     for (size_t i = 0; i < n; i++)
@@ -178,7 +178,7 @@ int ggn_stats_agreement(const double *truth, const double *predicted, size_t n, 
     if (n == 0)
         return base_fail(err, BASE_EINVAL, "no blocks to compare");
     double *t = malloc(2 * n * sizeof *t);
-    if (t == NULL)
+    if (!t)
         return base_fail_nomem(err, "statistics");
     double *p = t + n, sum_t = 0.0, sum_p = 0.0, absolute = 0.0, square = 0.0, absolute_below = 0.0;
     size_t below = 0, early = 0;

@@ -51,14 +51,14 @@ static int block_curves(const struct ggn_calibration_block *b, enum ggn_observer
         return rc;
     float *planes = malloc((MASKINGS + 2) * n * sizeof *planes);
     uint8_t *test = malloc(3 * n);
-    if (planes == NULL || test == NULL)
+    if (!planes || !test)
         rc = base_fail_nomem(err, "calibration");
     float *map = planes + MASKINGS * n, *scratch = map + n;
     for (int m = 0; m < MASKINGS && !rc; m++)
         rc = ggn_stimuli_deviation(&s, maskings[m].window_px, planes + (size_t)m * n, err);
     for (int f = 0; f < FORMS && !rc; f++) {
         curves[f] = (struct ggn_curve){.n = s.n, .spp = malloc((size_t)s.n * sizeof(double)), .score = malloc((size_t)s.n * sizeof(double))};
-        if (curves[f].spp == NULL || curves[f].score == NULL)
+        if (!curves[f].spp || !curves[f].score)
             rc = base_fail_nomem(err, "calibration");
         for (int i = 0; i < s.n && !rc; i++)
             curves[f].spp[i] = s.spp[i];
@@ -132,7 +132,7 @@ static int best_form(const struct ggn_curve *curves, const struct ggn_calibratio
 static int summarise(const struct ggn_curve *curves, const struct ggn_calibration_block *blocks, int n, struct ggn_calibration *c, struct base_err *err)
 {
     double *room = malloc(3 * (size_t)n * sizeof *room);
-    if (room == NULL)
+    if (!room)
         return base_fail_nomem(err, "calibration");
     double *errors = room, *scratch = room + n, *human = room + 2 * n;
     int form = best_form(curves, blocks, n, -1, errors, scratch);
@@ -179,7 +179,7 @@ int ggn_observer_calibrate(const struct ggn_calibration_block *blocks, int n, en
     job.rc = calloc((size_t)n, sizeof *job.rc);
     job.errs = calloc((size_t)n, sizeof *job.errs);
     c.predicted = malloc((size_t)n * sizeof *c.predicted);
-    if (job.curves == NULL || job.rc == NULL || job.errs == NULL || c.predicted == NULL) {
+    if (!job.curves || !job.rc || !job.errs || !c.predicted) {
         rc = base_fail_nomem(err, "calibration");
         goto out;
     }
@@ -190,7 +190,7 @@ int ggn_observer_calibrate(const struct ggn_calibration_block *blocks, int n, en
     if (!rc)
         rc = summarise(job.curves, blocks, n, &c, err);
 out:
-    for (int i = 0; i < n * FORMS && job.curves != NULL; i++)
+    for (int i = 0; i < n * FORMS && job.curves; i++)
         ggn_curve_release(&job.curves[i]);
     free(job.curves);
     free(job.rc);
@@ -220,12 +220,12 @@ static int parse_trials(const char *path, char *text, struct trial **out, int *c
     struct trial *t = malloc(room * sizeof *t);
     int n = 0;
     *skipped = 0;
-    if (t == NULL)
+    if (!t)
         return base_fail_nomem(err, path);
-    for (char *line = text, *next; line != NULL && *line != '\0'; line = next) {
+    for (char *line = text, *next; line && *line != '\0'; line = next) {
         char *end = line;
         next = strchr(line, '\n');
-        if (next != NULL)
+        if (next)
             *next++ = '\0';
         double block = strtod(line, &end), level = *end == ';' ? strtod(end + 1, &end) : -1.0, seen = *end == ';' ? strtod(end + 1, &end) : -1.0;
         if (!(block >= 0 && block < TRIAL_BLOCKS) || !(level > 0 && level < 1e6) || (seen != 0.0 && seen != 1.0) ||

@@ -156,7 +156,7 @@ static int csf_init(struct csf *f, double ppd, struct base_err *err)
     f->radius = (int)ceil(3.0 * sqrt(0.04 / (2.0 * pi * pi)) * ppd);
     size_t n = 2 * (size_t)f->radius + 1;
     float *all = malloc(4 * n * sizeof *all);
-    if (all == NULL)
+    if (!all)
         return base_fail_nomem(err, "FLIP filters");
     f->a = all;
     f->rg = all + n;
@@ -213,7 +213,7 @@ static int features_init(struct features *f, double ppd, struct base_err *err)
     int r = f->radius;
     size_t n = 2 * (size_t)r + 1;
     float *all = malloc(3 * n * sizeof *all);
-    if (all == NULL)
+    if (!all)
         return base_fail_nomem(err, "FLIP filters");
     f->g = all;
     f->edge = all + n;
@@ -283,7 +283,7 @@ int ggn_flip(const uint8_t *reference, const uint8_t *test, int width, int heigh
     struct csf csf = {0};
     struct features features = {0};
     float *buffer = malloc(PLANES * n * sizeof *buffer);
-    int rc = buffer == NULL ? base_fail_nomem(err, "FLIP") : 0;
+    int rc = !buffer ? base_fail_nomem(err, "FLIP") : 0;
     if (!rc)
         rc = csf_init(&csf, pixels_per_degree, err);
     if (!rc)
@@ -311,7 +311,7 @@ int ggn_flip(const uint8_t *reference, const uint8_t *test, int width, int heigh
         double e = pow(redistribute(hyab_power(a, b), e_max), 1.0 - (double)feature[i]);
         sum += e;
         max = e > max ? e : max;
-        if (map != NULL)
+        if (map)
             map[i] = (float)e;
     }
     *stats = (struct ggn_flip_stats){.mean = sum / (double)n, .max = max};

@@ -69,7 +69,7 @@ int ggn_observer_write(const char *path, const struct ggn_observer *o, const cha
         return rc;
     fprintf(out.file, "{\n  \"map\": \"%s\", \"blur_px\": %.6g, \"masking\": %.6g, \"window_px\": %d, \"percentile\": %.6g, \"tau\": %.8g, \"spread\": %.6g",
             map_names[o->map], o->blur_px, o->masking, o->window_px, o->percentile, o->tau, o->spread);
-    if (calibration != NULL)
+    if (calibration)
         fprintf(out.file, ",\n  \"calibration\": %s", calibration);
     fputs("\n}\n", out.file);
     return base_file_commit(&out, err);
@@ -121,7 +121,7 @@ static int lightness_map(double blur_px, const uint8_t *reference, const uint8_t
     enum { MAX_RADIUS = 200 };
     size_t n = (size_t)w * (size_t)h;
     float *other = malloc(n * sizeof *other), taps[2 * MAX_RADIUS + 1];
-    if (other == NULL)
+    if (!other)
         return base_fail_nomem(err, "observer");
     lightness(reference, n, other);
     lightness(test, n, map);
@@ -174,7 +174,7 @@ int ggn_observer_deviation(const uint8_t *reference, int w, int h, int window_px
 {
     size_t n = (size_t)w * (size_t)h;
     float *room = malloc(2 * n * sizeof *room);
-    if (room == NULL)
+    if (!room)
         return base_fail_nomem(err, "observer");
     lightness(reference, n, deviation);
     local_variance(deviation, room, w, h, window_px);
@@ -245,11 +245,11 @@ static int simulated_levels(double beyond, double *spp)
     int n = 0;
     for (double v = 20.0; v < GGN_SIMULATED_CAP; v *= 1.15)
         if (round(v) > beyond) {
-            if (spp != NULL)
+            if (spp)
                 spp[n] = round(v);
             n++;
         }
-    if (spp != NULL)
+    if (spp)
         spp[n] = GGN_SIMULATED_CAP;
     return n + 1;
 }
@@ -266,7 +266,7 @@ static const struct ggn_seq_record *full_level(const struct ggn_seq_block *b)
 int ggn_stimuli_extend(const struct ggn_seq_block *b, int reference_independent)
 {
     /* Up to a tenth of an octave is not worth simulating. */
-    return reference_independent && b->reference != NULL && full_level(b) != NULL && 1.07 * b->levels[b->n_levels - 1].spp < GGN_SIMULATED_CAP &&
+    return reference_independent && b->reference && full_level(b) && 1.07 * b->levels[b->n_levels - 1].spp < GGN_SIMULATED_CAP &&
            ggn_seq_has(b->reference, GGN_PLANE_MEAN_F16);
 }
 
@@ -274,9 +274,9 @@ static int init_halves(struct ggn_stimuli *s, int reference_independent, struct 
 {
     const struct ggn_seq_block *b = s->block;
     const struct ggn_seq_record *full = full_level(b);
-    if (full == NULL)
+    if (!full)
         return base_fail(err, BASE_EINVAL, "block %u has no full level with a half-buffer difference", b->id);
-    const struct ggn_seq_record *base = b->reference != NULL && reference_independent && b->reference->spp >= full->spp ? b->reference : full;
+    const struct ggn_seq_record *base = b->reference && reference_independent && b->reference->spp >= full->spp ? b->reference : full;
     s->spp0 = full->spp;
     s->noisy_base = base == full;
     int rc = ggn_seq_half(b, full, s->difference, err);
@@ -290,7 +290,7 @@ static int init_halves(struct ggn_stimuli *s, int reference_independent, struct 
 static int init_rendered(struct ggn_stimuli *s, int reference_independent, int extend, struct base_err *err)
 {
     const struct ggn_seq_block *b = s->block;
-    if (b->reference == NULL)
+    if (!b->reference)
         return base_fail(err, BASE_EINVAL, "block %u has no reference", b->id);
     s->scale = reference_independent && ggn_seq_has(b->reference, GGN_PLANE_MEAN_F16);
     int rc = s->scale ? ggn_seq_mean(b, b->reference, s->base, err) : 0;
@@ -305,7 +305,7 @@ int ggn_stimuli_init(struct ggn_stimuli *out, const struct ggn_seq_block *block,
                      int reference_independent, struct base_err *err)
 {
     size_t pixels = (size_t)block->width * block->height;
-    if (source == GGN_SOURCE_AUTO && block->reference == NULL)
+    if (source == GGN_SOURCE_AUTO && !block->reference)
         source = GGN_SOURCE_HALVES;
     struct ggn_stimuli s = {.block = block, .recorded = source == GGN_SOURCE_HALVES ? 0 : (int)block->n_levels};
     int extend = source == GGN_SOURCE_AUTO && ggn_stimuli_extend(block, reference_independent);
@@ -317,7 +317,7 @@ int ggn_stimuli_init(struct ggn_stimuli *out, const struct ggn_seq_block *block,
     s.work = malloc(3 * pixels * sizeof(float));
     s.converged = malloc(3 * pixels);
     int rc = 0;
-    if (s.spp == NULL || s.base == NULL || s.difference == NULL || s.work == NULL || s.converged == NULL)
+    if (!s.spp || !s.base || !s.difference || !s.work || !s.converged)
         rc = base_fail_nomem(err, "observer");
     else if (source == GGN_SOURCE_HALVES)
         rc = init_halves(&s, reference_independent, err);
@@ -343,7 +343,7 @@ int ggn_stimuli_deviation(struct ggn_stimuli *s, int window_px, float *deviation
         return ggn_observer_deviation(s->converged, w, h, window_px, deviation, err);
     uint8_t *rgb = malloc(3 * n);
     float *room = malloc(4 * n * sizeof *room);
-    int rc = rgb == NULL || room == NULL ? base_fail_nomem(err, "observer") : 0;
+    int rc = !rgb || !room ? base_fail_nomem(err, "observer") : 0;
     if (!rc) {
         float *noise = room + 2 * n, *other = room + 3 * n;
         for (int side = 0; side < 2; side++) { /* M + D and M - D: half of their difference is noise as strong as M's own */
@@ -414,7 +414,7 @@ int ggn_observer_curve(const struct ggn_observer *o, const struct ggn_seq_block 
     c.score = malloc((size_t)s.n * sizeof *c.score);
     uint8_t *test = malloc(3 * n);
     float *map = malloc(3 * n * sizeof *map);
-    if (c.spp == NULL || c.score == NULL || test == NULL || map == NULL)
+    if (!c.spp || !c.score || !test || !map)
         rc = base_fail_nomem(err, "observer");
     else
         rc = ggn_stimuli_deviation(&s, o->window_px, map + n, err);

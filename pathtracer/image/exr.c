@@ -42,7 +42,7 @@ static exr_result_t write_header(exr_context_t file, const struct pt_exr_image *
         rc = exr_add_channel(file, part, image->channels[c], EXR_PIXEL_FLOAT, EXR_PERCEPTUALLY_LINEAR, 1, 1);
     for (int i = 0; i < image->attribute_count && rc == EXR_ERR_SUCCESS; i++) {
         const struct pt_exr_attribute *a = &image->attributes[i];
-        rc = a->text != NULL ? exr_attr_set_string(file, part, a->name, a->text)
+        rc = a->text ? exr_attr_set_string(file, part, a->name, a->text)
                              : exr_attr_set_double(file, part, a->name, a->number);
     }
     return rc == EXR_ERR_SUCCESS ? exr_write_header(file) : rc;
@@ -96,7 +96,7 @@ static exr_result_t write_pixels(exr_context_t file, const struct pt_exr_image *
     if (rc != EXR_ERR_SUCCESS)
         return rc;
     float *pixels = calloc((size_t)image->channel_count * (size_t)(image->x1 - image->x0) * (size_t)lines, sizeof *pixels);
-    if (pixels == NULL)
+    if (!pixels)
         return EXR_ERR_OUT_OF_MEMORY;
     for (int y = image->y0; y < image->y1 && rc == EXR_ERR_SUCCESS; y += lines)
         rc = write_chunk(file, image, &pipe, y, lines, pixels);
@@ -121,7 +121,7 @@ int pt_exr_write(const char *path, const struct pt_exr_image *image, struct base
         code = write_header(file, image);
     if (code == EXR_ERR_SUCCESS)
         code = write_pixels(file, image);
-    exr_result_t finish = file != NULL ? exr_finish(&file) : EXR_ERR_SUCCESS;
+    exr_result_t finish = file ? exr_finish(&file) : EXR_ERR_SUCCESS;
     if (code == EXR_ERR_SUCCESS)
         code = finish;
     if (code == EXR_ERR_SUCCESS)

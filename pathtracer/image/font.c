@@ -39,7 +39,7 @@ void pt_font_draw(const struct pt_canvas *canvas, int x, int y, int scale, const
 {
     for (; *text != '\0'; text++, x += PT_FONT_WIDTH * scale) {
         const uint8_t *rows = find(*text);
-        if (rows == NULL)
+        if (!rows)
             continue;
         for (int row = 0; row < PT_FONT_HEIGHT; row++)
             for (int column = 0; column < PT_FONT_WIDTH - 1; column++)

@@ -106,7 +106,7 @@ int pt_stopmap_draw(int x0, int y0, int x1, int y1, const struct pt_stopmap_bloc
     enlarge = enlarge > MAX_ENLARGE ? MAX_ENLARGE : enlarge;
     struct pt_stopmap map = {.width = (x1 - x0) * enlarge, .height = (y1 - y0) * enlarge + LEGEND_HEIGHT};
     map.rgb = calloc((size_t)map.width * (size_t)map.height, 3);
-    if (map.rgb == NULL)
+    if (!map.rgb)
         return base_fail_nomem(err, "stop map");
     char longest[24];
     int digits = snprintf(longest, sizeof longest, "%llu", (unsigned long long)high);

@@ -65,7 +65,7 @@ int32_t pt_list_add(struct pt_builder *b, struct pt_list *list, const void *item
 void *pt_builder_keep(struct pt_builder *b, const void *data, size_t count, size_t size)
 {
     void *copy = pt_arena_alloc(&b->scene->arena, count, size);
-    if (copy == NULL)
+    if (!copy)
         pt_diag_nomem(&b->diag, "the scene");
     else
         memcpy(copy, data, count * size);
@@ -85,7 +85,7 @@ void pt_builder_effect(struct pt_builder *b, pt_effects bits, struct pt_loc loc)
             continue;
         r->on = 1;
         r->line = loc.line;
-        snprintf(r->file, sizeof r->file, "%s", loc.file != NULL ? loc.file : "");
+        snprintf(r->file, sizeof r->file, "%s", loc.file ? loc.file : "");
     }
     b->scene->effects |= bits;
 }
@@ -134,7 +134,7 @@ static void move_shapes(struct pt_builder *b)
     if (world + objects == 0)
         return;
     scene->shapes = pt_arena_alloc(&scene->arena, world + objects, sizeof *scene->shapes);
-    if (scene->shapes == NULL) {
+    if (!scene->shapes) {
         pt_diag_nomem(&b->diag, "shapes");
         return;
     }

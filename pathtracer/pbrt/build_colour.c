@@ -22,11 +22,11 @@ static int read_spd_file(struct pt_builder *b, const struct pt_param *param, con
         if (*at == '#') {
             while (at < end && *at != '\n')
                 at++;
-        } else if (strchr(" \t\r\n,", *at) != NULL) {
+        } else if (strchr(" \t\r\n,", *at)) {
             at++;
         } else {
             char *start = at;
-            while (at < end && *at != '#' && strchr(" \t\r\n,", *at) == NULL)
+            while (at < end && *at != '#' && !strchr(" \t\r\n,", *at))
                 at++;
             if (!pt_grow((void **)&numbers, &room, n, sizeof *numbers))
                 pt_diag_nomem(&b->diag, "spectrum");
@@ -112,7 +112,7 @@ int pt_build_colour(struct pt_builder *b, const struct pt_state *s, struct pt_pa
     struct pt_param *param = pt_params_find(p, name);
     struct pt_spd spd;
     pt_vec3 rgb = {0, 0, 0};
-    if (param == NULL)
+    if (!param)
         return 0;
     param->used = 1;
     const double *v = values_of(p, param);
@@ -156,7 +156,7 @@ int pt_build_colour(struct pt_builder *b, const struct pt_state *s, struct pt_pa
 /* A spectrum, or its name written as a string. */
 static int is_spectrum(const struct pt_param *param)
 {
-    return param != NULL && (param->type == PT_PARAM_SPECTRUM || param->type == PT_PARAM_STRING);
+    return param && (param->type == PT_PARAM_SPECTRUM || param->type == PT_PARAM_STRING);
 }
 
 void pt_build_conductor(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const char *eta_name,
@@ -166,18 +166,18 @@ void pt_build_conductor(struct pt_builder *b, const struct pt_state *s, struct p
     struct pt_spd eta_spd, k_spd;
     pt_spd_named("metal-Cu-eta", &eta_spd);
     pt_spd_named("metal-Cu-k", &k_spd);
-    if (eta != NULL)
+    if (eta)
         eta->used = 1;
-    if (k != NULL)
+    if (k)
         k->used = 1;
     if (is_spectrum(eta))
         read_spectrum(b, p, eta, 1, &eta_spd);
     if (is_spectrum(k))
         read_spectrum(b, p, k, 1, &k_spd);
     pt_spd_conductor_rgb(&eta_spd, &k_spd, eta_rgb, k_rgb);
-    if (eta != NULL && !is_spectrum(eta))
+    if (eta && !is_spectrum(eta))
         pt_build_colour(b, s, p, eta_name, PT_USE_UNBOUNDED, eta_rgb);
-    if (k != NULL && !is_spectrum(k))
+    if (k && !is_spectrum(k))
         pt_build_colour(b, s, p, k_name, PT_USE_UNBOUNDED, k_rgb);
     /* An index of 0 divides by zero in Fresnel's equations. */
     *eta_rgb = v3(fmaxf(eta_rgb->x, 1e-3f), fmaxf(eta_rgb->y, 1e-3f), fmaxf(eta_rgb->z, 1e-3f));
@@ -188,7 +188,7 @@ double pt_build_index(struct pt_builder *b, struct pt_params *p, const char *nam
     struct pt_param *param = pt_params_find(p, name);
     struct pt_spd spd;
     double eta = fallback;
-    if (param == NULL)
+    if (!param)
         return fallback;
     param->used = 1;
     if (is_spectrum(param)) {

@@ -19,7 +19,7 @@ static int is_one_of(const char *kind, const char *const *names)
 static struct pt_params *begin(struct pt_builder *b, enum pt_header which, const char *fallback)
 {
     struct pt_params *p = &b->header[which];
-    if (p->text == NULL) {
+    if (!p->text) {
         pt_params_clear(p, &b->diag, (struct pt_loc){NULL, 0, 0});
         p->kind = pt_params_keep(p, fallback, strlen(fallback));
     }
@@ -35,16 +35,16 @@ static void set_crop(struct pt_builder *b, struct pt_params *p, const int file_s
     size_t n;
     const double *window = pt_params_floats(p, "cropwindow", 1, &n);
     double edges[4] = {0, 1, 0, 1};
-    if (window != NULL && n == 4) {
+    if (window && n == 4) {
         memcpy(edges, window, sizeof edges);
-    } else if (window != NULL) {
+    } else if (window) {
         pt_diag_fail(&b->diag, pt_params_find(p, "cropwindow")->loc, "cropwindow has %zu values (expected 4)", n);
     }
     const double *bounds = pt_params_ints(p, "pixelbounds", &n);
-    if (bounds != NULL && n == 4)
+    if (bounds && n == 4)
         for (int i = 0; i < 4; i++)
             edges[i] = bounds[i] / file_size[i / 2];
-    else if (bounds != NULL)
+    else if (bounds)
         pt_diag_fail(&b->diag, pt_params_find(p, "pixelbounds")->loc, "pixelbounds has %zu values (expected 4)", n);
     int at[4];
     for (int i = 0; i < 4; i++)
@@ -78,10 +78,10 @@ static void build_film(struct pt_builder *b)
     const char *sensor = pt_params_string(p, "sensor", "cie1931");
     if (strcmp(sensor, "cie1931") != 0)
         pt_diag_warn(&b->diag, pt_params_find(p, "sensor")->loc, "sensor \"%s\" is rendered as an ideal one", sensor);
-    if (pt_params_find(p, "whitebalance") != NULL && pt_params_float(p, "whitebalance", 0) != 0)
+    if (pt_params_find(p, "whitebalance") && pt_params_float(p, "whitebalance", 0) != 0)
         pt_diag_warn(&b->diag, pt_params_find(p, "whitebalance")->loc, "white balance is ignored");
     double limit = pt_params_float_in(p, "maxcomponentvalue", INFINITY, 1e-30, 1e30);
-    if (pt_params_find(p, "maxsampleluminance") != NULL)
+    if (pt_params_find(p, "maxsampleluminance"))
         limit = pt_params_float_in(p, "maxsampleluminance", limit, 1e-30, 1e30);
     d->integrator.max_component = (float)limit;
     pt_params_ignore(p, "diagonal savefp16 writeframe type coordinatesystem nbuckets lambdamin lambdamax");
@@ -174,12 +174,12 @@ static void set_screen(struct pt_builder *b, struct pt_params *p, struct pt_came
     const double window[4] = {-x, x, -y, y};
     size_t n;
     const double *given = pt_params_floats(p, "screenwindow", 1, &n);
-    if (given != NULL && (n != 4 || given[0] == given[1] || given[2] == given[3])) {
+    if (given && (n != 4 || given[0] == given[1] || given[2] == given[3])) {
         pt_diag_fail(&b->diag, pt_params_find(p, "screenwindow")->loc, "screenwindow needs x0 x1 y0 y1 that span an area");
         given = NULL;
     }
     for (int i = 0; i < 4; i++)
-        c->screen[i] = (float)(given != NULL ? given[i] : window[i]);
+        c->screen[i] = (float)(given ? given[i] : window[i]);
 }
 
 /* The options' camera instead of the file's; mirrored where that is, so that lettering stays legible. */

@@ -12,7 +12,7 @@ static pt_vec3 scaled_colour(struct pt_builder *b, const struct pt_state *s, str
     pt_vec3 value = v3_splat(1), by = v3_splat(1);
     struct pt_param *scale = pt_params_find(p, "scale");
     pt_build_colour(b, s, p, name, PT_USE_LIGHT, &value);
-    if (scale != NULL && scale->type != PT_PARAM_FLOAT && scale->type != PT_PARAM_INTEGER)
+    if (scale && scale->type != PT_PARAM_FLOAT && scale->type != PT_PARAM_INTEGER)
         pt_build_colour(b, s, p, "scale", PT_USE_UNBOUNDED, &by);
     else
         by = v3_splat((float)pt_params_float_in(p, "scale", 1, 0, 3e38));
@@ -127,7 +127,7 @@ static int32_t float_rgb(struct pt_builder *b, int32_t id)
     if (ready)
         return id;
     float *pixels = pt_arena_alloc(&b->scene->arena, n, 3 * sizeof *pixels);
-    if (pixels == NULL) {
+    if (!pixels) {
         pt_diag_nomem(&b->diag, "an environment map");
         return -1;
     }
@@ -149,11 +149,11 @@ static int32_t float_rgb(struct pt_builder *b, int32_t id)
 static void make_infinite(struct context *c)
 {
     struct pt_params *p = c->p;
-    const char *key = pt_params_find(p, "mapname") != NULL ? "mapname" : "filename", *file = pt_params_string(p, key, "");
+    const char *key = pt_params_find(p, "mapname") ? "mapname" : "filename", *file = pt_params_string(p, key, "");
     double illuminance = pt_params_float(p, "illuminance", -1);
     c->light->emission = scaled_colour(c->b, c->s, p, "L");
     c->light->kind = PT_LIGHT_ENV_CONSTANT;
-    if (pt_params_find(p, "portal") != NULL) {
+    if (pt_params_find(p, "portal")) {
         pt_diag_warn(&c->b->diag, pt_params_find(p, "portal")->loc, "the portal of an infinite light only guides sampling: ignored");
         pt_params_ignore(p, "portal");
     }
@@ -235,7 +235,7 @@ int pt_build_area_light(struct pt_builder *b, const struct pt_state *s, struct p
     light.emission = scaled_colour(b, s, p, "L");
     light.two_sided = pt_params_bool(p, "twosided", 0);
     light.power = pt_params_float(p, "power", -1);
-    if (pt_params_find(p, "filename") != NULL) {
+    if (pt_params_find(p, "filename")) {
         pt_diag_warn(&b->diag, pt_params_find(p, "filename")->loc, "the image of an area light is replaced by even light");
         pt_params_ignore(p, "filename");
     }

@@ -32,8 +32,8 @@ static void read_roughness(struct pt_builder *b, struct pt_params *p, const char
         memcpy(name, prefix, n);
         strcpy(name + n, suffix[i]);
         const struct pt_param *given = pt_params_find(p, name);
-        values[i] = i > 0 && given == NULL ? values[0] : pt_build_float_input(b, p, name, fallback);
-        if (given != NULL && values[i].texture < 0 && values[i].value.x < 0)
+        values[i] = i > 0 && !given ? values[0] : pt_build_float_input(b, p, name, fallback);
+        if (given && values[i].texture < 0 && values[i].value.x < 0)
             pt_diag_fail(&b->diag, given->loc, "\"%s\" is %g (expected 0 or more)", name, (double)values[i].value.x);
     }
     *u = values[1];
@@ -61,7 +61,7 @@ void pt_build_roughness(struct pt_builder *b, struct pt_params *p, double fallba
 
 int32_t pt_build_bump(struct pt_builder *b, struct pt_params *p, const char *name)
 {
-    if (pt_params_find(p, name) == NULL)
+    if (!pt_params_find(p, name))
         return -1;
     return pt_build_float_input(b, p, name, 0).texture; /* a constant displaces nothing */
 }
@@ -100,7 +100,7 @@ static void read_coating(struct context *c)
 static void make_diffuse(struct context *c)
 {
     c->m->reflectance = colour(c, "reflectance", 0.5f);
-    if (pt_params_find(c->p, "sigma") != NULL && pt_params_float(c->p, "sigma", 0) != 0)
+    if (pt_params_find(c->p, "sigma") && pt_params_float(c->p, "sigma", 0) != 0)
         pt_diag_warn(&c->b->diag, c->p->loc, "sigma of a diffuse material is ignored");
 }
 
@@ -163,8 +163,8 @@ static void make_diffuse_transmission(struct context *c)
 static void make_mix(struct context *c)
 {
     struct pt_param *list = pt_params_find(c->p, "materials");
-    if (list == NULL || list->type != PT_PARAM_STRING || list->count != 2) {
-        pt_diag_fail(&c->b->diag, list != NULL ? list->loc : c->p->loc, "mix needs \"string materials\" with two names");
+    if (!list || list->type != PT_PARAM_STRING || list->count != 2) {
+        pt_diag_fail(&c->b->diag, list ? list->loc : c->p->loc, "mix needs \"string materials\" with two names");
         return;
     }
     list->used = 1;
@@ -193,7 +193,7 @@ static void make_hair(struct context *c)
 {
     pt_diag_warn(&c->b->diag, c->p->loc, "material \"hair\" is replaced by a diffuse one");
     c->m->reflectance = colour(c, "color", 0.2f);
-    if (pt_params_find(c->p, "reflectance") != NULL)
+    if (pt_params_find(c->p, "reflectance"))
         c->m->reflectance = colour(c, "reflectance", 0.2f);
     pt_params_ignore(c->p, "sigma_a eumelanin pheomelanin eta beta_m beta_n alpha");
 }
@@ -229,7 +229,7 @@ static const struct {
 
 static int build_v4(struct context *c)
 {
-    if (strcmp(c->kind, "mix") == 0 && pt_params_find(c->p, "namedmaterial1") == NULL) {
+    if (strcmp(c->kind, "mix") == 0 && !pt_params_find(c->p, "namedmaterial1")) {
         *c->m = pt_material_blank(PT_MATERIAL_MIX);
         make_mix(c);
         return 1;
@@ -263,9 +263,9 @@ int32_t pt_build_material(struct pt_builder *b, const struct pt_state *s, const 
     if (m.bump < 0)
         m.bump = pt_build_bump(b, p, "displacement");
     struct pt_param *map = pt_params_find(p, "normalmap");
-    if (map != NULL && map->type == PT_PARAM_TEXTURE)
+    if (map && map->type == PT_PARAM_TEXTURE)
         m.normal_map = pt_build_colour_input(b, s, p, "normalmap", PT_USE_UNBOUNDED, v3_splat(0)).texture;
-    else if (map != NULL)
+    else if (map)
         m.normal_map = pt_build_image_texture(b, map->loc, pt_params_string(p, "normalmap", ""), "linear");
     pt_params_check_used(p);
     return !b->diag.rc ? add(b, &m, &info) : -1;

@@ -31,7 +31,7 @@ static void clear_coat(struct context *c)
 
 static double index_of(struct context *c, double fallback)
 {
-    return pt_build_index(c->b, c->p, pt_params_find(c->p, "index") != NULL ? "index" : "eta", fallback);
+    return pt_build_index(c->b, c->p, pt_params_find(c->p, "index") ? "index" : "eta", fallback);
 }
 
 static void make_matte(struct context *c)
@@ -61,7 +61,7 @@ static void make_uber(struct context *c)
     pt_build_roughness(c->b, c->p, 0.1, 1, c->m);
     c->m->eta = (float)eta;
     struct pt_param *opacity = pt_params_find(c->p, "opacity");
-    if (opacity != NULL) {
+    if (opacity) {
         struct pt_input o = colour(c, "opacity", 1);
         c->info->has_opacity = o.texture >= 0 || v3_luminance(o.value) < 1;
         c->info->opacity = o.texture >= 0 ? o : pt_input_constant((double)v3_luminance(o.value), (double)v3_luminance(o.value),
@@ -134,14 +134,14 @@ static void make_mix(struct context *c)
 {
     struct pt_param *first = pt_params_find(c->p, "namedmaterial1"), *second = pt_params_find(c->p, "namedmaterial2");
     c->m->kind = PT_MATERIAL_MIX;
-    if (first == NULL || second == NULL || first->type != PT_PARAM_STRING || second->type != PT_PARAM_STRING) {
+    if (!first || !second || first->type != PT_PARAM_STRING || second->type != PT_PARAM_STRING) {
         pt_diag_fail(&c->b->diag, c->p->loc, "mix needs \"string namedmaterial1\" and \"string namedmaterial2\"");
         return;
     }
     c->m->mix_b = pt_build_material_named(c->b, first->loc, pt_params_string(c->p, "namedmaterial1", ""));
     c->m->mix_a = pt_build_material_named(c->b, second->loc, pt_params_string(c->p, "namedmaterial2", ""));
     struct pt_param *amount = pt_params_find(c->p, "amount");
-    if (amount != NULL && amount->type == PT_PARAM_FLOAT) {
+    if (amount && amount->type == PT_PARAM_FLOAT) {
         c->m->mix_amount = pt_build_float_input(c->b, c->p, "amount", 0.5);
         return;
     }

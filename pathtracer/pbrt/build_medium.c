@@ -17,7 +17,7 @@ int32_t pt_build_medium_ref(struct pt_builder *b, const char *name, struct pt_lo
     }
     struct pt_medium medium = {.kind = PT_MEDIUM_HOMOGENEOUS};
     struct pt_medium_info info = {.first_use = loc, .name = pt_arena_strndup(&b->scene->arena, name, strlen(name))};
-    if (info.name == NULL || pt_list_add(b, &b->medium_infos, &info) < 0 || (id = pt_list_add(b, &b->media, &medium)) < 0 ||
+    if (!info.name || pt_list_add(b, &b->medium_infos, &info) < 0 || (id = pt_list_add(b, &b->media, &medium)) < 0 ||
         pt_names_set(&b->media_names, name, id) != 0)
         pt_diag_nomem(&b->diag, "media");
     return id;
@@ -111,12 +111,12 @@ static int read_grid(struct pt_builder *b, const struct pt_state *s, struct pt_p
     size_t expected = (size_t)m->nx * (size_t)m->ny * (size_t)m->nz;
     if (b->diag.rc)
         return b->diag.rc;
-    if (density == NULL)
+    if (!density)
         return pt_diag_fail(&b->diag, p->loc, "a grid medium needs \"float density\"");
     if (n != expected)
         return pt_diag_fail(&b->diag, pt_params_find(p, "density")->loc, "density has %zu values (expected nx·ny·nz = %zu)", n, expected);
     float *kept = pt_arena_alloc(&b->scene->arena, n, sizeof *kept);
-    if (kept == NULL)
+    if (!kept)
         return pt_diag_nomem(&b->diag, "a grid medium");
     for (size_t i = 0; i < n; i++) {
         if (density[i] < 0)

@@ -60,7 +60,7 @@ static struct pt_shape common(struct pt_builder *b, const struct pt_state *s, st
     shape.has_alpha = shape.alpha.texture >= 0 || shape.alpha.value.x < 1;
     if (shape.has_alpha)
         pt_builder_effect(b, PT_FX_ALPHA | (shape.alpha.texture >= 0 ? PT_FX_TEXTURE : 0u), p->loc);
-    if (pt_params_find(p, "shadowalpha") != NULL)
+    if (pt_params_find(p, "shadowalpha"))
         pt_diag_warn(&b->diag, pt_params_find(p, "shadowalpha")->loc, "shadowalpha is ignored: shadows follow alpha");
     pt_params_ignore(p, "shadowalpha");
     return shape;
@@ -109,7 +109,7 @@ static int add_shape(struct pt_builder *b, const struct pt_state *s, struct pt_p
 
 static double value(const double *d, const float *f, size_t i)
 {
-    return d != NULL ? d[i] : (double)f[i];
+    return d ? d[i] : (double)f[i];
 }
 
 /* Vertices in double, stored in float. 0 when one is not finite there. */
@@ -176,10 +176,10 @@ static int store_mesh(struct pt_builder *b, const struct pt_state *s, struct pt_
     size_t n = soup->vertex_count;
     float *positions = pt_arena_alloc(arena, 3 * n + 1, sizeof *positions);
     uint32_t *indices = pt_arena_alloc(arena, soup->triangle_count, 3 * sizeof *indices);
-    int has_n = soup->nd != NULL || soup->nf != NULL, has_uv = soup->uvd != NULL || soup->uvf != NULL;
+    int has_n = soup->nd || soup->nf, has_uv = soup->uvd || soup->uvf;
     float *normals = has_n ? pt_arena_alloc(arena, n, 3 * sizeof *normals) : NULL;
     float *uvs = has_uv ? pt_arena_alloc(arena, n, 2 * sizeof *uvs) : NULL;
-    if (positions == NULL || indices == NULL || (has_n && normals == NULL) || (has_uv && uvs == NULL))
+    if (!positions || !indices || (has_n && !normals) || (has_uv && !uvs))
         return pt_diag_nomem(&b->diag, "a mesh");
     if (!store_positions(soup, t, positions))
         return pt_diag_fail(&b->diag, p->loc, "a vertex is not finite after its transform");
@@ -221,10 +221,10 @@ int pt_build_mesh(struct pt_builder *b, const struct pt_state *s, struct pt_para
 static uint32_t *read_indices(struct pt_builder *b, struct pt_params *p, size_t vertex_count, size_t *count)
 {
     const double *given = pt_params_ints(p, "indices", count);
-    size_t n = given != NULL ? *count : 3;
+    size_t n = given ? *count : 3;
     if (b->diag.rc)
         return NULL;
-    if (given == NULL && vertex_count != 3) {
+    if (!given && vertex_count != 3) {
         pt_diag_fail(&b->diag, p->loc, "a trianglemesh of %zu vertices needs \"integer indices\"", vertex_count);
         return NULL;
     }
@@ -233,12 +233,12 @@ static uint32_t *read_indices(struct pt_builder *b, struct pt_params *p, size_t 
         return NULL;
     }
     uint32_t *indices = malloc((n > 0 ? n : 1) * sizeof *indices);
-    if (indices == NULL) {
+    if (!indices) {
         pt_diag_nomem(&b->diag, "a mesh");
         return NULL;
     }
     for (size_t i = 0; i < n; i++) {
-        double v = given != NULL ? given[i] : (double)i;
+        double v = given ? given[i] : (double)i;
         if (!(v >= 0 && v < (double)vertex_count)) {
             pt_diag_fail(&b->diag, pt_params_find(p, "indices")->loc, "index %.0f out of range (expected 0 to %zu)", v,
                          vertex_count > 0 ? vertex_count - 1 : 0);
@@ -256,18 +256,18 @@ static int make_triangle_mesh(struct pt_builder *b, const struct pt_state *s, st
     struct pt_soup soup = {0};
     size_t n_count, uv_count, index_count;
     soup.pd = pt_params_floats(p, "P", 3, &soup.vertex_count);
-    if (soup.pd == NULL)
+    if (!soup.pd)
         return pt_diag_fail(&b->diag, p->loc, "a trianglemesh needs \"point3 P\"");
     soup.nd = pt_params_floats(p, "N", 3, &n_count);
-    const char *uv_name = pt_params_find(p, "uv") != NULL ? "uv" : pt_params_find(p, "st") != NULL ? "st" : "UV";
+    const char *uv_name = pt_params_find(p, "uv") ? "uv" : pt_params_find(p, "st") ? "st" : "UV";
     soup.uvd = pt_params_floats(p, uv_name, 2, &uv_count);
-    if (soup.nd != NULL && n_count != soup.vertex_count)
+    if (soup.nd && n_count != soup.vertex_count)
         return pt_diag_fail(&b->diag, pt_params_find(p, "N")->loc, "%zu normals for %zu vertices", n_count, soup.vertex_count);
-    if (soup.uvd != NULL && uv_count != soup.vertex_count)
+    if (soup.uvd && uv_count != soup.vertex_count)
         return pt_diag_fail(&b->diag, pt_params_find(p, uv_name)->loc, "%zu texture coordinates for %zu vertices", uv_count,
                             soup.vertex_count);
     uint32_t *indices = read_indices(b, p, soup.vertex_count, &index_count);
-    if (indices == NULL)
+    if (!indices)
         return b->diag.rc;
     soup.indices = indices;
     soup.triangle_count = index_count / 3;
@@ -285,7 +285,7 @@ static int make_ply_mesh(struct pt_builder *b, const struct pt_state *s, struct 
     struct pt_ply ply = {0};
     struct base_err err = {0};
     const char *name = pt_params_string(p, "filename", NULL);
-    if (name == NULL)
+    if (!name)
         return pt_diag_fail(&b->diag, p->loc, "a plymesh needs \"string filename\"");
     struct pt_loc loc = pt_params_find(p, "filename")->loc;
     pt_builder_path(b, name, path, sizeof path);
@@ -295,7 +295,7 @@ static int make_ply_mesh(struct pt_builder *b, const struct pt_state *s, struct 
     free(bytes);
     if (rc)
         return pt_diag_fail_code(&b->diag, rc == BASE_ENOMEM ? rc : BASE_EINVAL, loc, "cannot read %s", err.text);
-    if (pt_params_find(p, "displacement") != NULL) {
+    if (pt_params_find(p, "displacement")) {
         pt_diag_warn(&b->diag, pt_params_find(p, "displacement")->loc, "displacement of a plymesh's vertices is ignored");
         pt_params_ignore(p, "displacement edgelength");
     }

@@ -28,7 +28,7 @@ static int add_vertex(struct grower *g, const double p[3], const double *n, doub
 {
     const double uv[2] = {u, v};
     if (g->vertices >= INT32_MAX || !push(&g->p, &g->p_room, 3 * g->vertices, p, 3) ||
-        (n != NULL && !push(&g->n, &g->n_room, 3 * g->vertices, n, 3)) || !push(&g->uv, &g->uv_room, 2 * g->vertices, uv, 2))
+        (n && !push(&g->n, &g->n_room, 3 * g->vertices, n, 3)) || !push(&g->uv, &g->uv_room, 2 * g->vertices, uv, 2))
         return 0;
     g->vertices++;
     return 1;
@@ -92,10 +92,10 @@ int pt_build_bilinear(struct pt_builder *b, const struct pt_state *s, struct pt_
     int ok = 1;
     if (b->diag.rc)
         return b->diag.rc;
-    if (P == NULL || (indices == NULL && vertices != 4) || (indices != NULL && count % 4 != 0) ||
-        (uv != NULL && uv_count != vertices) || (N != NULL && n_count != vertices))
+    if (!P || (!indices && vertices != 4) || (indices && count % 4 != 0) ||
+        (uv && uv_count != vertices) || (N && n_count != vertices))
         return pt_diag_fail(&b->diag, p->loc, "a bilinearmesh needs \"point3 P\", four indices per patch, uv and N per vertex");
-    if (indices == NULL) {
+    if (!indices) {
         indices = identity;
         count = 4;
     }
@@ -109,8 +109,8 @@ int pt_build_bilinear(struct pt_builder *b, const struct pt_state *s, struct pt_
                 return finish(&g, 1, b, s, p);
             }
             c[k] = P + 3 * (size_t)v;
-            t[k] = uv != NULL ? uv + 2 * (size_t)v : square + 2 * k;
-            n[k] = N != NULL ? N + 3 * (size_t)v : NULL;
+            t[k] = uv ? uv + 2 * (size_t)v : square + 2 * k;
+            n[k] = N ? N + 3 * (size_t)v : NULL;
         }
         /* A flat patch is two triangles exactly; a twisted one gets a grid. */
         size_t cuts = is_planar(c[0], c[1], c[2], c[3]) ? 1 : 8, first = g.vertices;
@@ -119,9 +119,9 @@ int pt_build_bilinear(struct pt_builder *b, const struct pt_state *s, struct pt_
                 double u = (double)x / (double)cuts, v = (double)y / (double)cuts, q[3], m[3] = {0, 0, 0};
                 for (size_t k = 0; k < 3; k++) {
                     q[k] = lerp2(c[0], c[1], c[2], c[3], u, v, k);
-                    m[k] = N != NULL ? lerp2(n[0], n[1], n[2], n[3], u, v, k) : 0;
+                    m[k] = N ? lerp2(n[0], n[1], n[2], n[3], u, v, k) : 0;
                 }
-                ok = add_vertex(&g, q, N != NULL ? m : NULL, lerp2(t[0], t[1], t[2], t[3], u, v, 0),
+                ok = add_vertex(&g, q, N ? m : NULL, lerp2(t[0], t[1], t[2], t[3], u, v, 0),
                                 lerp2(t[0], t[1], t[2], t[3], u, v, 1));
             }
         for (size_t y = 0; y < cuts && ok; y++)
@@ -130,7 +130,7 @@ int pt_build_bilinear(struct pt_builder *b, const struct pt_state *s, struct pt_
                 ok = add_quad(&g, a, a + 1, a + cuts + 1, a + cuts + 2);
             }
     }
-    if (pt_params_find(p, "emissionfilename") != NULL)
+    if (pt_params_find(p, "emissionfilename"))
         pt_diag_warn(&b->diag, pt_params_find(p, "emissionfilename")->loc, "the image of an emitting patch is ignored");
     pt_params_ignore(p, "emissionfilename faceIndices");
     return finish(&g, ok, b, s, p);
@@ -207,7 +207,7 @@ int pt_build_curve(struct pt_builder *b, const struct pt_state *s, struct pt_par
         return b->diag.rc;
     if (!spline && strcmp(basis, "bezier") != 0)
         return pt_diag_fail(&b->diag, p->loc, "unknown curve basis \"%.40s\" (expected bezier or bspline)", basis);
-    if (P == NULL || count < corners || (count - corners) % step != 0)
+    if (!P || count < corners || (count - corners) % step != 0)
         return pt_diag_fail(&b->diag, p->loc, "a curve of degree %d needs %zu points and %zu more per segment", degree, corners, step);
     pt_diag_warn(&b->diag, p->loc, "curves are rendered as tubes of %d sides", (int)CURVE_SIDES);
     size_t segments = (count - corners) / step + 1;
@@ -248,11 +248,11 @@ int pt_build_height_field(struct pt_builder *b, const struct pt_state *s, struct
 {
     size_t count;
     int nu = pt_params_int_in(p, "nu", 0, 2, 1 << 14), nv = pt_params_int_in(p, "nv", 0, 2, 1 << 14), ok = 1;
-    const double *z = pt_params_floats(p, pt_params_find(p, "Pz") != NULL ? "Pz" : "P", 1, &count);
+    const double *z = pt_params_floats(p, pt_params_find(p, "Pz") ? "Pz" : "P", 1, &count);
     struct grower g = {0};
     if (b->diag.rc)
         return b->diag.rc;
-    if (z == NULL || nu < 2 || nv < 2 || count != (size_t)nu * (size_t)nv)
+    if (!z || nu < 2 || nv < 2 || count != (size_t)nu * (size_t)nv)
         return pt_diag_fail(&b->diag, p->loc, "a heightfield needs nu, nv and nu·nv heights");
     for (int y = 0; y < nv && ok; y++)
         for (int x = 0; x < nu && ok; x++) {

@@ -25,7 +25,7 @@ static struct pt_input input_of(int32_t texture)
 static double parse_encoding(const char *encoding)
 {
     double gamma;
-    if (encoding == NULL || strcmp(encoding, "sRGB") == 0 || strcmp(encoding, "srgb") == 0)
+    if (!encoding || strcmp(encoding, "sRGB") == 0 || strcmp(encoding, "srgb") == 0)
         return 0;
     if (strcmp(encoding, "linear") == 0)
         return 1;
@@ -50,7 +50,7 @@ static int choose_channels(const struct pt_oiio_image *image, int from[4])
         return image->channels;
     int opaque = 1;
     for (size_t i = 0; i < n && opaque; i++)
-        opaque = image->u8 != NULL ? image->u8[i * c + c - 1] == 255 : image->f32[i * c + c - 1] >= 1;
+        opaque = image->u8 ? image->u8[i * c + c - 1] == 255 : image->f32[i * c + c - 1] >= 1;
     if (image->channels == 2) {
         from[1] = from[2] = 0;
         from[3] = 1;
@@ -64,9 +64,9 @@ static int convert(struct pt_builder *b, const struct pt_oiio_image *image, doub
     int from[4], channels = choose_channels(image, from);
     size_t n = (size_t)image->width * (size_t)image->height, c = (size_t)image->channels, k = (size_t)channels;
     *out = (struct pt_image_map){image->width, image->height, channels, PT_PIXEL_FLOAT, 1, NULL};
-    if (image->u8 != NULL) {
+    if (image->u8) {
         uint8_t *pixels = pt_arena_alloc(&b->scene->arena, n, k);
-        for (size_t i = 0; pixels != NULL && i < n; i++)
+        for (size_t i = 0; pixels && i < n; i++)
             for (size_t j = 0; j < k; j++)
                 pixels[i * k + j] = image->u8[i * c + (size_t)from[j]];
         out->type = encoding == 0 ? PT_PIXEL_U8_SRGB : PT_PIXEL_U8_LINEAR;
@@ -74,7 +74,7 @@ static int convert(struct pt_builder *b, const struct pt_oiio_image *image, doub
         out->pixels = pixels;
     } else {
         float *pixels = pt_arena_alloc(&b->scene->arena, n, k * sizeof *pixels);
-        for (size_t i = 0; pixels != NULL && i < n; i++)
+        for (size_t i = 0; pixels && i < n; i++)
             for (size_t j = 0; j < k; j++) {
                 float v = image->f32[i * c + (size_t)from[j]];
                 if (!image->is_float_file && j < 3 && encoding != 1)
@@ -84,7 +84,7 @@ static int convert(struct pt_builder *b, const struct pt_oiio_image *image, doub
             }
         out->pixels = pixels;
     }
-    return out->pixels != NULL ? 0 : pt_diag_nomem(&b->diag, "a texture");
+    return out->pixels ? 0 : pt_diag_nomem(&b->diag, "a texture");
 }
 
 int32_t pt_build_image_map(struct pt_builder *b, struct pt_loc loc, const char *name, const char *encoding)
@@ -160,7 +160,7 @@ static struct pt_input named_texture(struct pt_builder *b, struct pt_params *p, 
 struct pt_input pt_build_float_input(struct pt_builder *b, struct pt_params *p, const char *name, double fallback)
 {
     struct pt_param *param = pt_params_find(p, name);
-    if (param != NULL && param->type == PT_PARAM_TEXTURE)
+    if (param && param->type == PT_PARAM_TEXTURE)
         return named_texture(b, p, param, 1);
     double v = pt_params_float(p, name, fallback);
     return pt_input_constant(v, v, v);
@@ -170,7 +170,7 @@ struct pt_input pt_build_colour_input(struct pt_builder *b, const struct pt_stat
                                       enum pt_colour_use use, pt_vec3 fallback)
 {
     struct pt_param *param = pt_params_find(p, name);
-    if (param != NULL && param->type == PT_PARAM_TEXTURE)
+    if (param && param->type == PT_PARAM_TEXTURE)
         return named_texture(b, p, param, 0);
     pt_build_colour(b, s, p, name, use, &fallback);
     return (struct pt_input){-1, fallback};
@@ -242,7 +242,7 @@ static void make_scale(struct context *c, struct pt_texture *t)
 {
     struct pt_input x, y;
     t->kind = PT_TEXTURE_SCALE;
-    if (pt_params_find(c->p, "tex") != NULL || pt_params_find(c->p, "scale") != NULL) { /* v4 */
+    if (pt_params_find(c->p, "tex") || pt_params_find(c->p, "scale")) { /* v4 */
         x = input(c, "tex", 1);
         y = pt_build_float_input(c->b, c->p, "scale", 1);
     } else {
@@ -304,7 +304,7 @@ static void make_imagemap(struct context *c, struct pt_texture *t)
     const char *wrap = pt_params_string(p, "wrap", "repeat");
     struct pt_param *gamma = pt_params_find(p, "gamma");
     t->kind = PT_TEXTURE_IMAGE;
-    if (gamma != NULL && gamma->type == PT_PARAM_BOOL) /* v3 */
+    if (gamma && gamma->type == PT_PARAM_BOOL) /* v3 */
         encoding = pt_params_bool(p, "gamma", 1) ? "sRGB" : "linear";
     else
         pt_params_ignore(p, "gamma");
@@ -320,7 +320,7 @@ static void make_imagemap(struct context *c, struct pt_texture *t)
     read_mapping(c, t);
     pt_params_ignore(p, "filter maxanisotropy trilinear");
     struct pt_param *named = pt_params_find(p, "filename");
-    t->image = !c->b->diag.rc ? pt_build_image_map(c->b, named != NULL ? named->loc : p->loc, file, encoding) : -1;
+    t->image = !c->b->diag.rc ? pt_build_image_map(c->b, named ? named->loc : p->loc, file, encoding) : -1;
     if (t->image >= 0 && c->is_float) {
         const struct pt_image_map *m = &((struct pt_image_map *)c->b->images.items)[t->image];
         t->channel = m->channels == 4 ? 3 : m->channels == 3 ? -1 : 0;

@@ -22,12 +22,12 @@ static int fail_v(struct pt_diag *diag, int code, struct pt_loc loc, const char 
     vsnprintf(text, sizeof text, format, args);
     make_one_line(text);
     char file[160];
-    snprintf(file, sizeof file, "%s", loc.file != NULL ? loc.file : "");
+    snprintf(file, sizeof file, "%s", loc.file ? loc.file : "");
     make_one_line(file);
     diag->rc = code;
     if (loc.line > 0)
         base_fail(diag->err, code, "%s:%d:%d: %s", file, loc.line, loc.column, text);
-    else if (loc.file != NULL)
+    else if (loc.file)
         base_fail(diag->err, code, "%s: %s", file, text);
     else
         base_fail(diag->err, code, "%s", text);
@@ -78,13 +78,13 @@ void pt_diag_warn(struct pt_diag *diag, struct pt_loc loc, const char *format, .
         return;
     }
     char file[200];
-    snprintf(file, sizeof file, "%s", loc.file != NULL ? loc.file : "scene");
+    snprintf(file, sizeof file, "%s", loc.file ? loc.file : "scene");
     make_one_line(file);
     if (loc.line > 0)
         snprintf(line, sizeof line, "%s:%d: warning: %s", file, loc.line, text);
     else
         snprintf(line, sizeof line, "%s: warning: %s", file, text);
-    if (diag->warn != NULL)
+    if (diag->warn)
         diag->warn(diag->warn_data, line);
 }
 

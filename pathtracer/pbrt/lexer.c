@@ -19,7 +19,7 @@ int pt_lexer_include(struct pt_lexer *lexer, const char *path, struct pt_loc fro
     if (rc)
         return pt_diag_fail_code(lexer->diag, rc == BASE_ENOMEM ? rc : BASE_EINVAL, from, "cannot read %s", err.text);
     file.loc = (struct pt_loc){pt_arena_strndup(lexer->arena, path, strlen(path)), 1, 1};
-    if (file.loc.file == NULL) {
+    if (!file.loc.file) {
         free(file.bytes);
         return pt_diag_nomem(lexer->diag, "file names");
     }
@@ -66,7 +66,7 @@ static struct pt_token read_string(struct pt_lexer *lexer, struct pt_lexer_file 
             c = *++f->at;
             static const char letters[] = "nrtbf\\'\"", meanings[] = "\n\r\t\b\f\\'\"";
             const char *known = memchr(letters, c, sizeof letters - 1);
-            if (known == NULL) {
+            if (!known) {
                 pt_diag_fail(lexer->diag, t.loc, "unknown escape \\%c in a string", c);
                 return bad(&t);
             }

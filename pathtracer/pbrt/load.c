@@ -15,7 +15,7 @@ static const struct pt_load_options no_options;
 
 void pt_scene_destroy(struct pt_scene *scene)
 {
-    if (scene == NULL)
+    if (!scene)
         return;
     pt_accel_release(scene);
     pt_arena_release(&scene->arena);
@@ -28,7 +28,7 @@ static void note_slow_load(const char *path, const struct pt_load_options *optio
     const double noticeable_s = 3;
     double total_s = stats->parse_s + stats->texture_s + stats->build_s + stats->accel_s;
     char line[512];
-    if (options == NULL || options->quiet || options->warn == NULL || total_s < noticeable_s)
+    if (!options || options->quiet || !options->warn || total_s < noticeable_s)
         return;
     snprintf(line, sizeof line, "%.200s: loaded in %.1f s: text and meshes %.1f, textures %.1f, acceleration structure %.1f, the rest %.1f",
              path, total_s, stats->parse_s, stats->texture_s, stats->accel_s, stats->build_s);
@@ -43,13 +43,13 @@ int pt_scene_load_source(const char *path, const struct pt_source *source, const
     struct pt_builder *b = calloc(1, sizeof *b);
     int rc = 0;
     double start_s = base_clock_wall_s();
-    if (scene == NULL || b == NULL) {
+    if (!scene || !b) {
         rc = base_fail_nomem(err, "the scene");
         goto out;
     }
-    rc = pt_builder_init(b, scene, &found, options != NULL ? options : &no_options, source, err);
+    rc = pt_builder_init(b, scene, &found, options ? options : &no_options, source, err);
     const char *slash = strrchr(path, '/');
-    size_t length = slash != NULL ? (size_t)(slash - path) + 1 : 0;
+    size_t length = slash ? (size_t)(slash - path) + 1 : 0;
     if (length >= sizeof b->directory) {
         rc = base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", path);
         goto out;
@@ -69,7 +69,7 @@ int pt_scene_load_source(const char *path, const struct pt_source *source, const
         scene = NULL;
     }
 out:
-    if (b != NULL)
+    if (b)
         pt_builder_release(b);
     free(b);
     pt_scene_destroy(scene);

@@ -17,7 +17,7 @@ static uint32_t hash_of(const char *name)
 static struct pt_names_entry *slot_of(struct pt_names_entry *entries, size_t room, const char *name, uint32_t hash)
 {
     size_t i = hash & (room - 1);
-    while (entries[i].name != NULL && (entries[i].hash != hash || strcmp(entries[i].name, name) != 0))
+    while (entries[i].name && (entries[i].hash != hash || strcmp(entries[i].name, name) != 0))
         i = (i + 1) & (room - 1);
     return &entries[i];
 }
@@ -27,17 +27,17 @@ int32_t pt_names_get(const struct pt_names *names, const char *name)
     if (names->room == 0)
         return -1;
     const struct pt_names_entry *e = slot_of(names->entries, names->room, name, hash_of(name));
-    return e->name != NULL ? e->value : -1;
+    return e->name ? e->value : -1;
 }
 
 static int grow(struct pt_names *names)
 {
     size_t room = names->room > 0 ? names->room * 2 : 32;
     struct pt_names_entry *entries = calloc(room, sizeof *entries);
-    if (entries == NULL)
+    if (!entries)
         return BASE_ENOMEM;
     for (size_t i = 0; i < names->room; i++)
-        if (names->entries[i].name != NULL)
+        if (names->entries[i].name)
             *slot_of(entries, room, names->entries[i].name, names->entries[i].hash) = names->entries[i];
     free(names->entries);
     names->entries = entries;
@@ -51,9 +51,9 @@ int pt_names_set(struct pt_names *names, const char *name, int32_t value)
         return BASE_ENOMEM;
     uint32_t hash = hash_of(name);
     struct pt_names_entry *e = slot_of(names->entries, names->room, name, hash);
-    if (e->name == NULL) {
+    if (!e->name) {
         char *copy = strdup(name);
-        if (copy == NULL)
+        if (!copy)
             return BASE_ENOMEM;
         *e = (struct pt_names_entry){copy, hash, value};
         names->count++;

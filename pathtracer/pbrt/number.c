@@ -70,7 +70,7 @@ static int parse_slowly(const char *text, size_t n, double *out)
     buffer[n] = '\0';
     char *point = strchr(buffer, '.');
     const struct lconv *conv = localeconv();
-    if (point != NULL && conv->decimal_point[0] != '\0' && conv->decimal_point[1] == '\0')
+    if (point && conv->decimal_point[0] != '\0' && conv->decimal_point[1] == '\0')
         *point = conv->decimal_point[0];
     *out = strtod(buffer, NULL);
     return isfinite(*out);

@@ -51,7 +51,7 @@ int pt_grow(void **items, size_t *room, size_t count, size_t size)
     if (bigger > SIZE_MAX / size)
         return 0;
     void *grown = realloc(*items, bigger * size);
-    if (grown == NULL)
+    if (!grown)
         return 0;
     *items = grown;
     *room = bigger;
@@ -92,7 +92,7 @@ size_t pt_params_keep(struct pt_params *params, const char *text, size_t length)
 
 const char *pt_params_kind(const struct pt_params *params)
 {
-    return params->text != NULL ? params->text + params->kind : "";
+    return params->text ? params->text + params->kind : "";
 }
 
 const char *pt_param_name(const struct pt_params *params, const struct pt_param *param)
@@ -236,7 +236,7 @@ int pt_params_read(struct pt_params *params, struct pt_lexer *lexer)
         if (rc)
             return rc;
         struct pt_param *old = pt_params_find(params, pt_param_name(params, &p));
-        if (old != NULL)
+        if (old)
             return pt_diag_fail(params->diag, p.loc, "parameter \"%s\" is given twice", pt_param_name(params, &p));
         if (!pt_grow((void **)&params->items, &params->room, params->count, sizeof *params->items))
             return pt_diag_nomem(params->diag, "parameters");
@@ -250,7 +250,7 @@ int pt_params_append(struct pt_params *params, const struct pt_params *from)
     for (size_t i = 0; i < from->count && !params->diag->rc; i++) {
         const struct pt_param *src = &from->items[i];
         const char *name = pt_param_name(from, src);
-        if (pt_params_find(params, name) != NULL)
+        if (pt_params_find(params, name))
             continue;
         struct pt_param p = *src;
         p.name = pt_params_keep(params, name, strlen(name));
@@ -279,7 +279,7 @@ int pt_params_append(struct pt_params *params, const struct pt_params *from)
 static int in_list(const char *names, const char *name)
 {
     size_t n = strlen(name);
-    for (const char *at = strstr(names, name); n > 0 && at != NULL; at = strstr(at + 1, name))
+    for (const char *at = strstr(names, name); n > 0 && at; at = strstr(at + 1, name))
         if ((at == names || at[-1] == ' ') && (at[n] == ' ' || at[n] == '\0'))
             return 1;
     return 0;
@@ -326,7 +326,7 @@ static const char *type_name(int type)
 static struct pt_param *take(struct pt_params *params, const char *name, unsigned types, const char *expected)
 {
     struct pt_param *p = pt_params_find(params, name);
-    if (p == NULL)
+    if (!p)
         return NULL;
     p->used = 1;
     if ((types >> p->type & 1u) == 0) {
@@ -339,7 +339,7 @@ static struct pt_param *take(struct pt_params *params, const char *name, unsigne
 static struct pt_param *take_one(struct pt_params *params, const char *name, unsigned types, const char *expected)
 {
     struct pt_param *p = take(params, name, types, expected);
-    if (p != NULL && p->count != 1) {
+    if (p && p->count != 1) {
         pt_diag_fail(params->diag, p->loc, "parameter \"%s\" has %zu values (expected 1)", name, p->count);
         return NULL;
     }
@@ -364,7 +364,7 @@ static int fits_float(struct pt_params *params, const struct pt_param *p, double
 double pt_params_float(struct pt_params *params, const char *name, double fallback)
 {
     const struct pt_param *p = take_one(params, name, NUMBERS, "float");
-    if (p == NULL || !fits_float(params, p, params->numbers[p->first]))
+    if (!p || !fits_float(params, p, params->numbers[p->first]))
         return fallback;
     return params->numbers[p->first];
 }
@@ -372,7 +372,7 @@ double pt_params_float(struct pt_params *params, const char *name, double fallba
 double pt_params_float_in(struct pt_params *params, const char *name, double fallback, double low, double high)
 {
     double v = pt_params_float(params, name, fallback);
-    if (pt_params_find(params, name) == NULL || (v >= low && v <= high))
+    if (!pt_params_find(params, name) || (v >= low && v <= high))
         return v;
     pt_diag_fail(params->diag, pt_params_find(params, name)->loc, "parameter \"%s\" is %g (expected %g to %g)", name, v, low, high);
     return fallback;
@@ -381,7 +381,7 @@ double pt_params_float_in(struct pt_params *params, const char *name, double fal
 int pt_params_int_in(struct pt_params *params, const char *name, int fallback, int low, int high)
 {
     const struct pt_param *p = take_one(params, name, NUMBERS, "integer");
-    if (p == NULL)
+    if (!p)
         return fallback;
     double v = params->numbers[p->first];
     if (v == floor(v) && v >= low && v <= high)
@@ -393,7 +393,7 @@ int pt_params_int_in(struct pt_params *params, const char *name, int fallback, i
 int pt_params_bool(struct pt_params *params, const char *name, int fallback)
 {
     const struct pt_param *p = take_one(params, name, 1u << PT_PARAM_BOOL | 1u << PT_PARAM_STRING, "bool");
-    if (p == NULL)
+    if (!p)
         return fallback;
     if (!p->is_text)
         return params->numbers[p->first] != 0;
@@ -407,13 +407,13 @@ int pt_params_bool(struct pt_params *params, const char *name, int fallback)
 const char *pt_params_string(struct pt_params *params, const char *name, const char *fallback)
 {
     const struct pt_param *p = take_one(params, name, 1u << PT_PARAM_STRING, "string");
-    return p != NULL ? pt_params_string_at(params, p, 0) : fallback;
+    return p ? pt_params_string_at(params, p, 0) : fallback;
 }
 
 int pt_params_point(struct pt_params *params, const char *name, double xyz[3])
 {
     const struct pt_param *p = take(params, name, TRIPLES, "point3 or vector3");
-    if (p == NULL)
+    if (!p)
         return 0;
     if (p->count != 3) {
         pt_diag_fail(params->diag, p->loc, "parameter \"%s\" has %zu values (expected 3)", name, p->count);
@@ -432,7 +432,7 @@ const double *pt_params_floats(struct pt_params *params, const char *name, size_
     unsigned types = components == 1 ? NUMBERS : components == 2 ? PAIRS | NUMBERS : TRIPLES;
     const struct pt_param *p = take(params, name, types, expected[components]);
     *count = 0;
-    if (p == NULL || p->count == 0)
+    if (!p || p->count == 0)
         return NULL;
     if (p->count % components != 0) {
         pt_diag_fail(params->diag, p->loc, "parameter \"%s\" has %zu values (expected a multiple of %zu)", name, p->count,
@@ -450,7 +450,7 @@ const double *pt_params_ints(struct pt_params *params, const char *name, size_t 
 {
     const struct pt_param *p = take(params, name, NUMBERS, "integer");
     *count = 0;
-    if (p == NULL || p->count == 0)
+    if (!p || p->count == 0)
         return NULL;
     for (size_t i = 0; i < p->count; i++) {
         double v = params->numbers[p->first + i];

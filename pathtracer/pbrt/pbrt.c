@@ -60,7 +60,7 @@ static int read_entity(struct parser *p, struct pt_loc loc, int target)
         return rc;
     params->kind = pt_params_keep(params, kind, strlen(kind));
     rc = pt_params_read(params, &p->lexer);
-    if (!rc && target >= 0 && p->state.attributes[target] != NULL)
+    if (!rc && target >= 0 && p->state.attributes[target])
         rc = pt_params_append(params, p->state.attributes[target]);
     return rc;
 }
@@ -285,7 +285,7 @@ static int do_make_named_material(struct parser *p, struct pt_loc loc)
     if (rc || (rc = read_entity(p, loc, PT_ATTR_MATERIAL)) != 0)
         return rc;
     const char *type = pt_params_string(&p->params, "type", NULL);
-    if (type == NULL)
+    if (!type)
         return pt_diag_fail(&p->b->diag, loc, "MakeNamedMaterial \"%s\" without \"string type\"", pt_params_kind(&p->params));
     strncpy(kind, type, sizeof kind - 1);
     kind[sizeof kind - 1] = '\0';
@@ -355,10 +355,10 @@ static int do_attribute(struct parser *p, struct pt_loc loc)
         return pt_diag_fail(&p->b->diag, loc, "Attribute \"%s\" (expected shape, light, material, medium or texture)",
                             pt_params_kind(&p->params));
     /* New values win over those set before. */
-    if (p->state.attributes[target] != NULL && (rc = pt_params_append(&p->params, p->state.attributes[target])) != 0)
+    if (p->state.attributes[target] && (rc = pt_params_append(&p->params, p->state.attributes[target])) != 0)
         return rc;
     struct pt_params *copy = calloc(1, sizeof *copy);
-    if (copy == NULL || pt_list_add(p->b, &p->attributes, &copy) < 0) {
+    if (!copy || pt_list_add(p->b, &p->attributes, &copy) < 0) {
         free(copy);
         return pt_diag_nomem(&p->b->diag, "attributes");
     }
@@ -500,7 +500,7 @@ static int run(struct parser *p)
             return finish(p, t.loc);
         }
         directive *d = t.kind == PT_TOKEN_WORD ? find_directive(&t) : NULL;
-        if (d == NULL)
+        if (!d)
             return pt_diag_fail(&p->b->diag, t.loc, "unknown directive \"%.*s\" (expected Shape, Material, AttributeBegin …)",
                                 t.length < 40 ? (int)t.length : 40, t.text);
         rc = d(p, t.loc);
@@ -514,7 +514,7 @@ static int run(struct parser *p)
 int pt_pbrt_read(struct pt_builder *b, const char *path)
 {
     struct parser *p = calloc(1, sizeof *p);
-    if (p == NULL)
+    if (!p)
         return pt_diag_nomem(&b->diag, "parser");
     p->b = b;
     p->lexer.source = b->source;

@@ -68,7 +68,7 @@ static int next_line(struct reader *r, char *line, size_t room)
 static int split(char *line, char *words[], int max)
 {
     int n = 0;
-    for (char *save = NULL, *w = strtok_r(line, " \t", &save); w != NULL && n < max; w = strtok_r(NULL, " \t", &save))
+    for (char *save = NULL, *w = strtok_r(line, " \t", &save); w && n < max; w = strtok_r(NULL, " \t", &save))
         words[n++] = w;
     return n;
 }
@@ -100,7 +100,7 @@ static enum role role_of(const struct element *e, const char *name, int is_list)
 static int read_property(struct reader *r, struct element *e, char *words[], int n)
 {
     int is_list = n == 5 && strcmp(words[1], "list") == 0;
-    if (e == NULL || (n != 3 && !is_list))
+    if (!e || (n != 3 && !is_list))
         return base_fail(r->err, BASE_EINVAL, "%s: malformed PLY property", r->name);
     if (e->property_count == MAX_PROPERTIES)
         return base_fail(r->err, BASE_EINVAL, "%s: more than %d PLY properties", r->name, MAX_PROPERTIES);
@@ -231,11 +231,11 @@ static int store_vertex_value(struct reader *r, uint64_t i, enum role role, doub
         p->positions[3 * i + (uint64_t)(role - R_X)] = (float)v;
         break;
     case R_NX: case R_NY: case R_NZ:
-        if (p->normals != NULL)
+        if (p->normals)
             p->normals[3 * i + (uint64_t)(role - R_NX)] = isfinite((float)v) ? (float)v : 0.0f;
         break;
     case R_U: case R_V:
-        if (p->uvs != NULL)
+        if (p->uvs)
             p->uvs[2 * i + (uint64_t)(role - R_U)] = isfinite((float)v) ? (float)v : 0.0f;
         break;
     default: break;
@@ -251,7 +251,7 @@ static int add_triangle(struct reader *r, uint32_t a, uint32_t b, uint32_t c)
     if (p->triangle_count == r->index_room) {
         size_t room = r->index_room > 0 ? r->index_room * 2 : 64;
         uint32_t *grown = realloc(p->indices, room * 3 * sizeof *grown);
-        if (grown == NULL)
+        if (!grown)
             return base_fail_nomem(r->err, r->name);
         p->indices = grown;
         r->index_room = room;
@@ -307,7 +307,7 @@ static size_t least_bytes(const struct reader *r, const struct element *e)
 static int begin_vertices(struct reader *r, const struct element *e)
 {
     struct pt_ply *p = r->ply;
-    if (p->positions != NULL)
+    if (p->positions)
         return base_fail(r->err, BASE_EINVAL, "%s: PLY element \"vertex\" occurs twice", r->name);
     if (!r->has[R_X] || !r->has[R_Y] || !r->has[R_Z])
         return base_fail(r->err, BASE_EINVAL, "%s: PLY vertices without x, y and z", r->name);
@@ -319,8 +319,8 @@ static int begin_vertices(struct reader *r, const struct element *e)
         p->normals = calloc(n, 3 * sizeof(float));
     if (r->has[R_U] && r->has[R_V])
         p->uvs = calloc(n, 2 * sizeof(float));
-    if (p->positions == NULL || (r->has[R_NX] && r->has[R_NY] && r->has[R_NZ] && p->normals == NULL) ||
-        (r->has[R_U] && r->has[R_V] && p->uvs == NULL))
+    if (!p->positions || (r->has[R_NX] && r->has[R_NY] && r->has[R_NZ] && !p->normals) ||
+        (r->has[R_U] && r->has[R_V] && !p->uvs))
         return base_fail_nomem(r->err, r->name);
     p->vertex_count = (uint32_t)e->count;
     return 0;
@@ -352,13 +352,13 @@ int pt_ply_parse(const char *name, const char *bytes, size_t size, struct pt_ply
 {
     struct pt_ply ply = {0};
     struct reader *r = calloc(1, sizeof *r);
-    if (r == NULL)
+    if (!r)
         return base_fail_nomem(err, name);
     *r = (struct reader){.name = name, .at = bytes, .end = bytes + size, .err = err, .ply = &ply};
     int rc = read_header(r);
     for (int i = 0; i < r->element_count && !rc; i++)
         rc = read_items(r, &r->elements[i]);
-    if (!rc && ply.positions == NULL)
+    if (!rc && !ply.positions)
         rc = base_fail(err, BASE_EINVAL, "%s: PLY file without vertices", name);
     if (!rc && !r->has[R_INDICES])
         rc = base_fail(err, BASE_EINVAL, "%s: PLY file without faces", name);

@@ -16,7 +16,7 @@ static int unpack(const char *path, char *packed, size_t packed_size, char **byt
     size_t room = packed_size < 1u << 20 ? 4u << 20 : packed_size * 4, n = 0;
     char *out = malloc(room + 1);
     z_stream z = {.next_in = (Bytef *)packed};
-    if (out == NULL)
+    if (!out)
         return base_fail_nomem(err, path);
     if (inflateInit2(&z, 15 + 16) != Z_OK) { /* 16: gzip framing */
         free(out);
@@ -25,7 +25,7 @@ static int unpack(const char *path, char *packed, size_t packed_size, char **byt
     for (int status = Z_OK; status != Z_STREAM_END;) {
         if (n == room) {
             char *bigger = room < max_file_bytes ? realloc(out, room * 2 + 1) : NULL;
-            if (bigger == NULL) {
+            if (!bigger) {
                 rc = base_fail(err, BASE_EINVAL, "%s: unpacks to more than %zu bytes", path, room);
                 break;
             }
@@ -83,7 +83,7 @@ static int read_single(void *data, const char *path, char **bytes, size_t *size,
     if (strcmp(path, single->path) != 0)
         return base_fail(err, BASE_EIO, "%s: No such file or directory", path);
     char *copy = malloc(single->size + 1);
-    if (copy == NULL)
+    if (!copy)
         return base_fail_nomem(err, path);
     if (single->size > 0)
         memcpy(copy, single->text, single->size);

@@ -102,7 +102,7 @@ static int noble_metal(const char *metal, int is_k, struct pt_spd *out)
                            : strcmp(metal, "Ag") == 0 ? noble_metals[i].ag
                            : strcmp(metal, "Au") == 0 ? noble_metals[i].au
                                                       : NULL;
-        if (nk == NULL)
+        if (!nk)
             return 0;
         pairs[2 * i] = 1239.84198 / noble_metals[i].ev;
         pairs[2 * i + 1] = nk[is_k];
@@ -130,7 +130,7 @@ int pt_spd_named(const char *name, struct pt_spd *out)
         pt_spd_constant(glass, out);
         return 1;
     }
-    if (strncmp(name, "metal-", 6) != 0 || dash == NULL || dash < name + 6 || (size_t)(dash - name - 6) >= sizeof metal)
+    if (strncmp(name, "metal-", 6) != 0 || !dash || dash < name + 6 || (size_t)(dash - name - 6) >= sizeof metal)
         return 0;
     int is_k = strcmp(dash, "-k") == 0;
     if (!is_k && strcmp(dash, "-eta") != 0)
@@ -209,7 +209,7 @@ static void integrate(const struct pt_spd *spd, int under_d65, double xyz[3], do
 {
     xyz[0] = xyz[1] = xyz[2] = *y_of_light = 0;
     for (int i = 0; i < PT_SPD_COUNT; i++) {
-        double nm = PT_SPD_FIRST_NM + i * PT_SPD_STEP_NM, light = under_d65 ? d65_at(i) : 1, v = spd != NULL ? spd->v[i] : 1;
+        double nm = PT_SPD_FIRST_NM + i * PT_SPD_STEP_NM, light = under_d65 ? d65_at(i) : 1, v = spd ? spd->v[i] : 1;
         xyz[0] += v * light * cie_x(nm);
         xyz[1] += v * light * cie_y(nm);
         xyz[2] += v * light * cie_z(nm);

@@ -51,7 +51,7 @@ static int build_topology(const struct mesh *m, struct topology *t)
     struct edge *edges = malloc(n * sizeof *edges);
     t->twin = malloc(n * sizeof *t->twin);
     t->start = malloc(m->vertices * sizeof *t->start);
-    if (edges == NULL || t->twin == NULL || t->start == NULL) {
+    if (!edges || !t->twin || !t->start) {
         free(edges);
         return 0;
     }
@@ -152,14 +152,14 @@ static int subdivide(struct mesh *m)
     struct mesh r = {.triangles = 4 * m->triangles};
     size_t halves = 3 * m->triangles, edges = 0;
     uint32_t *middle = malloc(halves * sizeof *middle);
-    int ok = middle != NULL && build_topology(m, &t);
+    int ok = middle && build_topology(m, &t);
     for (size_t h = 0; ok && h < halves; h++)
         edges += t.twin[h] < (int32_t)h;
     r.vertices = m->vertices + edges;
     if (ok) {
         r.p = malloc(r.vertices * 3 * sizeof *r.p);
         r.v = malloc(r.triangles * 3 * sizeof *r.v);
-        ok = r.p != NULL && r.v != NULL;
+        ok = r.p && r.v;
     }
     for (size_t i = 0; ok && i < m->vertices; i++)
         even_vertex(m, &t, i, r.p + 3 * i);
@@ -220,7 +220,7 @@ static double *to_limit(struct mesh *m)
 {
     struct topology t = {0};
     double *normals = calloc(m->vertices, 3 * sizeof *normals), *p = malloc(m->vertices * 3 * sizeof *p);
-    int ok = normals != NULL && p != NULL && build_topology(m, &t);
+    int ok = normals && p && build_topology(m, &t);
     for (size_t v = 0; ok && v < m->vertices; v++) {
         uint32_t ring[RING_MAX];
         int boundary, count = ring_of(m, &t, v, ring, &boundary);
@@ -254,18 +254,18 @@ int pt_build_loop_subdiv(struct pt_builder *b, const struct pt_state *s, struct 
 {
     size_t vertices, corners;
     const double *P = pt_params_floats(p, "P", 3, &vertices), *indices = pt_params_ints(p, "indices", &corners);
-    int levels = pt_params_int_in(p, pt_params_find(p, "nlevels") != NULL ? "nlevels" : "levels", 3, 0, MAX_LEVELS);
+    int levels = pt_params_int_in(p, pt_params_find(p, "nlevels") ? "nlevels" : "levels", 3, 0, MAX_LEVELS);
     struct mesh m = {0};
     double *normals = NULL;
     pt_params_ignore(p, "scheme");
     if (b->diag.rc)
         return b->diag.rc;
-    if (P == NULL || indices == NULL || corners == 0 || corners % 3 != 0)
+    if (!P || !indices || corners == 0 || corners % 3 != 0)
         return pt_diag_fail(&b->diag, p->loc, "a loopsubdiv needs \"point3 P\" and three \"integer indices\" per triangle");
     if (corners / 3 > max_triangles >> (2 * levels))
         return pt_diag_fail(&b->diag, p->loc, "%zu triangles subdivided %d times are too many", corners / 3, levels);
     m = (struct mesh){vertices, corners / 3, malloc(vertices * 3 * sizeof *m.p), malloc(corners * sizeof *m.v)};
-    if (m.p == NULL || m.v == NULL) {
+    if (!m.p || !m.v) {
         pt_diag_nomem(&b->diag, "a subdivision surface");
         goto out;
     }
@@ -282,7 +282,7 @@ int pt_build_loop_subdiv(struct pt_builder *b, const struct pt_state *s, struct 
     for (int i = 0; i < levels && ok; i++)
         ok = subdivide(&m);
     normals = ok ? to_limit(&m) : NULL;
-    if (normals == NULL) {
+    if (!normals) {
         pt_diag_nomem(&b->diag, "a subdivision surface");
         goto out;
     }

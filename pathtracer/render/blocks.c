@@ -27,7 +27,7 @@ int pt_blocks_init(struct pt_blocks *blocks, int width, int height, int block_wi
     b.list_columns = (uint32_t)(c1 - c0);
     b.count = b.list_columns * (uint32_t)(r1 - r0);
     b.list = calloc(b.count, sizeof *b.list);
-    if (b.list == NULL)
+    if (!b.list)
         return base_fail_nomem(err, "blocks");
 
     struct pt_block *out = b.list;

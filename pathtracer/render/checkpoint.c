@@ -62,7 +62,7 @@ int pt_checkpoint_save(const char *path, const struct pt_render *r, const char *
     unsigned char *state = NULL;
     size_t state_size = 0;
     struct base_file_out out;
-    int rc = r->criterion != NULL ? pt_criterion_save(r->criterion, &state, &state_size, err) : 0;
+    int rc = r->criterion ? pt_criterion_save(r->criterion, &state, &state_size, err) : 0;
     if (rc)
         return rc;
     rc = base_file_begin(&out, path, err);
@@ -140,7 +140,7 @@ static int take_settings(struct source *s, const char *settings, struct base_err
         return base_fail(err, BASE_EINVAL, "%s: the checkpoint is too short", s->path);
     if (n != strlen(settings) || memcmp(s->data + s->at, settings, (size_t)n) != 0) {
         char *copy = strndup((const char *)s->data + s->at, (size_t)n);
-        rc = copy == NULL ? base_fail_nomem(err, s->path) : refuse_settings(s, copy, strlen(copy), settings, err);
+        rc = !copy ? base_fail_nomem(err, s->path) : refuse_settings(s, copy, strlen(copy), settings, err);
         free(copy);
         return rc;
     }
@@ -191,9 +191,9 @@ static int take_criterion(struct source *s, struct pt_criterion *criterion, stru
     int rc = take(s, &n, sizeof n, err);
     if (rc)
         return rc;
-    if (n != s->size - s->at || (criterion == NULL && n > 0))
+    if (n != s->size - s->at || (!criterion && n > 0))
         return base_fail(err, BASE_EINVAL, "%s: the checkpoint has a wrong length", s->path);
-    return criterion != NULL ? pt_criterion_load(criterion, s->data + s->at, (size_t)n, err) : 0;
+    return criterion ? pt_criterion_load(criterion, s->data + s->at, (size_t)n, err) : 0;
 }
 
 static int take_all(struct source *s, struct pt_render *r, const char *settings, struct base_err *err)

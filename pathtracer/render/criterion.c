@@ -32,7 +32,7 @@ struct pt_criterion {
 static void host_log(const struct lull_host *host, int32_t level, const char *text)
 {
     const struct pt_criterion *c = host->context;
-    if (c->warn == NULL || level > LULL_LOG_WARNING)
+    if (!c->warn || level > LULL_LOG_WARNING)
         return;
     char line[600];
     snprintf(line, sizeof line, "criterion %s: %s", c->table->id, text);
@@ -57,7 +57,7 @@ static int32_t host_parallel_for(const struct lull_host *host, uint64_t count, l
     struct job job = {.fn = fn, .arg = arg};
     for (; job.first < count;) {
         uint64_t n = count - job.first < LONG_MAX / 2 ? count - job.first : LONG_MAX / 2;
-        if (c->threads != NULL)
+        if (c->threads)
             base_threads_for(c->threads, (long)n, run_task, &job);
         else
             for (uint64_t i = 0; i < n; i++)
@@ -77,7 +77,7 @@ struct teller {
 static void tell(void *context, int32_t level, const char *text)
 {
     const struct teller *t = context;
-    if (t->warn != NULL && level <= LULL_LOG_WARNING)
+    if (t->warn && level <= LULL_LOG_WARNING)
         t->warn(t->data, text);
 }
 
@@ -91,7 +91,7 @@ static void own_folder(char *path, size_t room)
         return;
     exe[n] = '\0';
     char *slash = strrchr(exe, '/');
-    if (slash == NULL)
+    if (!slash)
         return;
     *slash = '\0';
     int length = snprintf(path, room, "%s/../lib/lull", exe);
@@ -115,7 +115,7 @@ int pt_criterion_create(const char *spec, const struct lull_pair *pairs, uint32_
     struct lull_search search = {.dirs = dirs, .dir_count = 2, .log = tell, .log_context = &teller};
     struct lull_error e = {.struct_size = sizeof e};
     struct lull_found *found = malloc(sizeof *found);
-    if (found == NULL)
+    if (!found)
         return base_fail_nomem(err, "criterion");
     int32_t code = lull_open(&search, spec, found, &e);
     const struct lull_criterion *table = found->criterion;
@@ -131,7 +131,7 @@ int pt_criterion_create_table(const struct lull_criterion *table, const struct l
 {
     struct lull_error e = {.struct_size = sizeof e};
     struct pt_criterion *c = calloc(1, sizeof *c);
-    if (c == NULL)
+    if (!c)
         return base_fail_nomem(err, "criterion");
     c->table = table;
     c->threads = threads;
@@ -139,7 +139,7 @@ int pt_criterion_create_table(const struct lull_criterion *table, const struct l
     c->warn_data = warn_data;
     c->host = (struct lull_host){.struct_size = sizeof c->host, .api_minor = LULL_API_MINOR, .context = c,
                                  .name = "lull pathtracer 1.0",
-                                 .max_workers = threads != NULL ? (uint32_t)base_threads_count(threads) : 1,
+                                 .max_workers = threads ? (uint32_t)base_threads_count(threads) : 1,
                                  .log = host_log, .parallel_for = host_parallel_for};
     int32_t code = table->create(&c->host, pairs, pair_count, sizeof *pairs, &c->instance, &e);
     if (code == LULL_OK) {
@@ -157,9 +157,9 @@ int pt_criterion_create_table(const struct lull_criterion *table, const struct l
 
 void pt_criterion_destroy(struct pt_criterion *c)
 {
-    if (c == NULL)
+    if (!c)
         return;
-    if (c->instance != NULL) {
+    if (c->instance) {
         if (c->open)
             c->table->end_frame(c->instance);
         c->table->destroy(c->instance);
@@ -217,7 +217,7 @@ static uint32_t describe_planes(struct pt_criterion *c, const struct pt_film *fi
     p[LULL_PLANE_ALBEDO] = plane_f64(film->albedo, film, 3, LULL_NORM_SPP);
     p[LULL_PLANE_NORMAL] = plane_f64(film->normal, film, 3, LULL_NORM_SPP);
     p[LULL_PLANE_DEPTH] = plane_f64(film->depth, film, 1, LULL_NORM_ONE);
-    if (c->spp != NULL) {
+    if (c->spp) {
         struct lull_plane counts = {.data = c->spp, .stride_x = sizeof *c->spp,
                                     .stride_y = (int64_t)sizeof *c->spp * (film->x1 - film->x0), .stride_c = sizeof *c->spp,
                                     .scale = 1.0, .type = LULL_TYPE_U32, .normaliser = LULL_NORM_ONE, .channels = 1};
@@ -226,7 +226,7 @@ static uint32_t describe_planes(struct pt_criterion *c, const struct pt_film *fi
     }
     uint32_t mask = 0;
     for (int i = 0; i < LULL_PLANE_COUNT; i++) {
-        if (p[i].data != NULL)
+        if (p[i].data)
             mask |= LULL_PLANE_BIT(i);
         else
             p[i] = (struct lull_plane){0};
@@ -248,7 +248,7 @@ static int allocate_frame(struct pt_criterion *c, const struct pt_blocks *blocks
     int counts = (c->needs.planes_required & (LULL_PLANE_BIT(LULL_PLANE_SPP) | LULL_PLANE_BIT(LULL_PLANE_WEIGHT))) != 0;
     if (counts)
         c->spp = calloc(film->pixels, sizeof *c->spp);
-    if (c->all == NULL || c->due == NULL || c->rects == NULL || (counts && c->spp == NULL))
+    if (!c->all || !c->due || !c->rects || (counts && !c->spp))
         return base_fail_nomem(err, "blocks of the criterion");
     return 0;
 }
@@ -336,7 +336,7 @@ int pt_criterion_evaluate(struct pt_criterion *c, struct pt_film *film, const st
     }
     if (rc)
         goto out;
-    if (c->spp != NULL)
+    if (c->spp)
         fill_counts(c, film, blocks);
     struct lull_view view = {.struct_size = sizeof view, .x0 = film->x0, .y0 = film->y0, .x1 = film->x1, .y1 = film->y1,
                              .planes = c->planes, .plane_count = LULL_PLANE_COUNT, .plane_stride = sizeof c->planes[0],
@@ -369,7 +369,7 @@ static int32_t write_bytes(const struct lull_writer *writer, const void *data, u
     if (b->used + size > b->room) {
         size_t room = (b->used + (size_t)size) * 2;
         unsigned char *grown = realloc(b->data, room);
-        if (grown == NULL)
+        if (!grown)
             return LULL_E_MEMORY;
         b->data = grown;
         b->room = room;
@@ -398,14 +398,14 @@ static int32_t read_bytes(const struct lull_reader *reader, void *data, uint64_t
 
 static const struct lull_state *state_extension(const struct pt_criterion *c)
 {
-    return c->table->get_extension != NULL ? c->table->get_extension(LULL_EXT_STATE) : NULL;
+    return c->table->get_extension ? c->table->get_extension(LULL_EXT_STATE) : NULL;
 }
 
 int pt_criterion_save(const struct pt_criterion *c, unsigned char **data, size_t *size, struct base_err *err)
 {
     const struct lull_state *state = state_extension(c);
     struct bytes b = {0};
-    if (state != NULL) {
+    if (state) {
         struct lull_writer writer = {.struct_size = sizeof writer, .context = &b, .write = write_bytes};
         struct lull_error e = {.struct_size = sizeof e};
         int32_t code = state->save(c->instance, &writer, &e);
@@ -422,7 +422,7 @@ int pt_criterion_save(const struct pt_criterion *c, unsigned char **data, size_t
 int pt_criterion_load(struct pt_criterion *c, const unsigned char *data, size_t size, struct base_err *err)
 {
     const struct lull_state *state = state_extension(c);
-    if (state == NULL)
+    if (!state)
         return size == 0 ? 0 : base_fail(err, BASE_EINVAL, "criterion %s keeps no state, but the checkpoint has one", c->table->id);
     struct const_bytes b = {.data = data, .size = size};
     struct lull_reader reader = {.struct_size = sizeof reader, .context = &b, .read = read_bytes};
@@ -455,7 +455,7 @@ static int32_t list_one(void *context, const struct lull_found *found)
     fprintf(l->out, "    from %s\n", found->path);
     for (uint32_t i = 0; i < t->param_count; i++) {
         const struct lull_param *p = (const void *)((const char *)t->params + (size_t)i * t->param_stride);
-        fprintf(l->out, "    -p %s=%s  %s", p->name, p->default_value != NULL ? p->default_value : "?", p->help);
+        fprintf(l->out, "    -p %s=%s  %s", p->name, p->default_value ? p->default_value : "?", p->help);
         if (p->type == LULL_PARAM_INT || p->type == LULL_PARAM_FLOAT)
             fprintf(l->out, " [%g to %g]", p->min, p->max);
         else if (p->type == LULL_PARAM_CHOICE)

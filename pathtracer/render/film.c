@@ -49,7 +49,7 @@ int pt_film_init(struct pt_film *film, int x0, int y0, int x1, int y1, uint32_t 
         if (!wanted(planes, i))
             continue;
         void *p = calloc(f.pixels, arrays[i].bytes);
-        if (p == NULL) {
+        if (!p) {
             pt_film_release(&f);
             return base_fail_nomem(err, "film");
         }
@@ -117,7 +117,7 @@ int pt_film_patch(struct pt_film *f, int x0, int y0, int x1, int y1, uint64_t sp
             if (patch->count == patch->room) {
                 size_t room = patch->room ? 2 * patch->room : 64;
                 struct pt_film_patch_pixel *grown = realloc(patch->pixels, room * sizeof *grown);
-                if (grown == NULL)
+                if (!grown)
                     return base_fail_nomem(err, "pixels with dropped samples");
                 patch->pixels = grown;
                 patch->room = room;
@@ -126,11 +126,11 @@ int pt_film_patch(struct pt_film *f, int x0, int y0, int x1, int y1, uint64_t sp
             *p = (struct pt_film_patch_pixel){.index = i};
             memcpy(p->color, f->color + 3 * i, sizeof p->color);
             scale(f->color + 3 * i, 3, spp, f->dropped[i]);
-            if (f->half != NULL) {
+            if (f->half) {
                 memcpy(p->half, f->half + 3 * i, sizeof p->half);
                 scale(f->half + 3 * i, 3, half_spp, f->dropped_half[i]);
             }
-            if (f->moment2 != NULL) {
+            if (f->moment2) {
                 p->moment2 = f->moment2[i];
                 scale(f->moment2 + i, 1, spp, f->dropped[i]);
             }
@@ -144,9 +144,9 @@ void pt_film_unpatch(struct pt_film *f, struct pt_film_patch *patch)
     for (size_t k = 0; k < patch->count; k++) {
         const struct pt_film_patch_pixel *p = &patch->pixels[k];
         memcpy(f->color + 3 * p->index, p->color, sizeof p->color);
-        if (f->half != NULL)
+        if (f->half)
             memcpy(f->half + 3 * p->index, p->half, sizeof p->half);
-        if (f->moment2 != NULL)
+        if (f->moment2)
             f->moment2[p->index] = p->moment2;
     }
     free(patch->pixels);

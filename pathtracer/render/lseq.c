@@ -91,7 +91,7 @@ static unsigned char *payload_room(struct pt_lseq *f, size_t n, struct base_err 
     if (f->payload_used + n > f->payload_room) {
         size_t room = 2 * (f->payload_used + n);
         unsigned char *grown = realloc(f->payload, room);
-        if (grown == NULL) {
+        if (!grown) {
             base_fail_nomem(err, f->out.path);
             return NULL;
         }
@@ -128,7 +128,7 @@ static int put_plane(struct pt_lseq *f, uint32_t plane, uint32_t filter, size_t 
 {
     uLong bound = compressBound((uLong)raw);
     unsigned char *p = payload_room(f, PLANE_HEADER_BYTES + bound, err);
-    if (p == NULL)
+    if (!p)
         return BASE_ENOMEM;
     if (compress2(p + PLANE_HEADER_BYTES, &bound, f->plane, (uLong)raw, 6) != Z_OK)
         return base_fail_nomem(err, f->out.path);
@@ -193,7 +193,7 @@ int pt_lseq_begin(struct pt_lseq *f, const char *path, uint32_t width, uint32_t 
     f->height = height;
     f->crc = (uint32_t)crc32_z(0, NULL, 0);
     f->plane = malloc((size_t)width * height * 6);
-    if (f->plane == NULL)
+    if (!f->plane)
         return base_fail_nomem(err, path);
     int rc = base_file_begin(&f->out, path, err);
     if (!rc) {
@@ -233,7 +233,7 @@ int pt_lseq_put(struct pt_lseq *f, const struct pt_lseq_record *r, struct base_e
     f->payload_used = 0;
     for (uint32_t i = 0; i < r->statistic_count; i++) {
         unsigned char *p = payload_room(f, 32, err);
-        if (p == NULL)
+        if (!p)
             return BASE_ENOMEM;
         uint64_t bits;
         memcpy(&bits, &r->statistics[i].value, sizeof bits);

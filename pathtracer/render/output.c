@@ -15,7 +15,7 @@
 int pt_output_has_ending(const char *path, const char *ending)
 {
     const char *dot = strrchr(path, '.');
-    return dot != NULL && strcasecmp(dot + 1, ending) == 0;
+    return dot && strcasecmp(dot + 1, ending) == 0;
 }
 
 /* The block that a pixel is in. Blocks of the list form a full rectangle of grid cells. */
@@ -78,7 +78,7 @@ static void effect_names(pt_effects effects, char *text, size_t room)
 
 static void criterion_text(const struct pt_render *r, const struct pt_output_info *info, char *text, size_t room)
 {
-    if (r->criterion == NULL) {
+    if (!r->criterion) {
         snprintf(text, room, "none");
         return;
     }
@@ -152,7 +152,7 @@ int pt_output_preview(const char *path, const struct pt_render *r, struct base_e
     const int *crop = r->config.crop;
     int width = crop[2] - crop[0], height = crop[3] - crop[1];
     uint8_t *pixels = malloc((size_t)width * (size_t)height * 3);
-    if (pixels == NULL)
+    if (!pixels)
         return base_fail_nomem(err, "preview");
     uint8_t *out = pixels;
     for (int y = crop[1]; y < crop[3]; y++) {
@@ -172,7 +172,7 @@ static int stop_map_png(const char *path, const struct pt_render *r, struct base
 {
     const struct pt_blocks *b = &r->blocks;
     struct pt_stopmap_block *list = calloc(b->count, sizeof *list);
-    if (list == NULL)
+    if (!list)
         return base_fail_nomem(err, "stop map");
     for (uint32_t i = 0; i < b->count; i++)
         list[i] = (struct pt_stopmap_block){b->list[i].x0, b->list[i].y0, b->list[i].x1, b->list[i].y1, b->list[i].spp};
@@ -193,9 +193,9 @@ static int stop_map_csv(const char *path, const struct pt_render *r, const char 
     if (rc)
         return rc;
     const char *slash = strrchr(scene, '/');
-    const char *name = slash != NULL ? slash + 1 : scene;
+    const char *name = slash ? slash + 1 : scene;
     const char *dot = strrchr(name, '.');
-    fprintf(out.file, "%.*s;", dot != NULL ? (int)(dot - name) : (int)strlen(name), name);
+    fprintf(out.file, "%.*s;", dot ? (int)(dot - name) : (int)strlen(name), name);
     for (uint32_t i = 0; i < r->blocks.count; i++)
         fprintf(out.file, "%llu;", (unsigned long long)r->blocks.list[i].spp);
     fprintf(out.file, "\n");

@@ -11,7 +11,7 @@ static const double LIVE_S = 0.2, FIRST_PLAIN_S = 2.0, PLAIN_S = 10.0;
 void pt_progress_init(struct pt_progress *p, FILE *out)
 {
     *p = (struct pt_progress){.out = out};
-    if (out == NULL)
+    if (!out)
         return;
     p->terminal = isatty(fileno(out)) == 1;
     p->next_s = base_clock_wall_s() + (p->terminal ? 0.0 : FIRST_PLAIN_S);
@@ -80,7 +80,7 @@ void pt_progress_text(const struct pt_render *r, char *text, size_t room)
 void pt_progress_update(struct pt_progress *p, const struct pt_render *r)
 {
     double now_s = base_clock_wall_s();
-    if (p->out == NULL || now_s < p->next_s)
+    if (!p->out || now_s < p->next_s)
         return;
     char text[256];
     pt_progress_text(r, text, sizeof text);
@@ -95,7 +95,7 @@ void pt_progress_update(struct pt_progress *p, const struct pt_render *r)
 
 void pt_progress_clear(struct pt_progress *p)
 {
-    if (p->out != NULL && p->shown) {
+    if (p->out && p->shown) {
         fputs("\r\033[K", p->out);
         fflush(p->out);
     }

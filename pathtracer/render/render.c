@@ -48,7 +48,7 @@ static struct pt_render_work *work_create(const struct pt_blocks *blocks)
     for (uint32_t i = 0; i < n; i++)
         rows += (size_t)(blocks->list[i].y1 - blocks->list[i].y0);
     struct pt_render_work *w = calloc(1, sizeof *w);
-    if (w == NULL)
+    if (!w)
         return NULL;
     w->items = calloc(rows, sizeof *w->items);
     w->order = calloc(rows, sizeof *w->order);
@@ -60,7 +60,7 @@ static struct pt_render_work *work_create(const struct pt_blocks *blocks)
 
 static void work_destroy(struct pt_render_work *w)
 {
-    if (w == NULL)
+    if (!w)
         return;
     free(w->items);
     free(w->order);
@@ -103,27 +103,27 @@ int pt_render_create(const struct pt_render_config *config, const struct pt_scen
                      struct base_threads *threads, struct pt_criterion *criterion, struct pt_render **out, struct base_err *err)
 {
     struct pt_render *r = calloc(1, sizeof *r);
-    if (r == NULL)
+    if (!r)
         return base_fail_nomem(err, "renderer");
     r->config = *config;
     r->scene = scene;
     r->kernel = kernel;
     r->threads = threads;
     r->criterion = criterion;
-    uint32_t planes = config->planes | (criterion != NULL ? pt_criterion_film_planes(criterion) : 0);
+    uint32_t planes = config->planes | (criterion ? pt_criterion_film_planes(criterion) : 0);
     r->config.integrator.want_aux = (planes & PT_FILM_AUX) != 0;
     /* Without a judge nobody needs whole blocks. */
-    int clip = criterion == NULL;
+    int clip = !criterion;
     int rc = pt_blocks_init(&r->blocks, config->width, config->height, config->block_width, config->block_height,
                             config->crop, clip, err);
     if (!rc)
         rc = pt_film_init(&r->film, r->blocks.x0, r->blocks.y0, r->blocks.x1, r->blocks.y1, planes, err);
     if (!rc) {
         struct pt_render_work *w = r->work = work_create(&r->blocks);
-        if (w == NULL || !w->items || !w->order || !w->due || !w->final || !w->decisions)
+        if (!w || !w->items || !w->order || !w->due || !w->final || !w->decisions)
             rc = base_fail_nomem(err, "work list");
     }
-    if (!rc && criterion != NULL)
+    if (!rc && criterion)
         rc = open_frame(r, err);
     if (rc) {
         pt_render_destroy(r);
@@ -137,7 +137,7 @@ int pt_render_create(const struct pt_render_config *config, const struct pt_scen
 
 void pt_render_destroy(struct pt_render *r)
 {
-    if (r == NULL)
+    if (!r)
         return;
     work_destroy(r->work);
     pt_blocks_release(&r->blocks);
@@ -289,7 +289,7 @@ static void settle(struct pt_render *r, struct pt_block *b, const struct lull_de
 
 static void warn_once(struct pt_render *r, const struct pt_render_hooks *hooks, const char *line)
 {
-    if (r->totals.failed_checks++ == 0 && hooks->warn != NULL)
+    if (r->totals.failed_checks++ == 0 && hooks->warn)
         hooks->warn(hooks->data, line);
 }
 
@@ -317,9 +317,9 @@ static void check(struct pt_render *r, const struct pt_render_hooks *hooks)
 {
     struct pt_render_work *w = r->work;
     static const struct lull_decision keep_on = {.action = LULL_CONTINUE, .p_noisy = NAN, .predicted_spp = NAN, .error = NAN};
-    int reopens = r->criterion != NULL && !r->config.uniform &&
+    int reopens = r->criterion && !r->config.uniform &&
                   (pt_criterion_table(r->criterion)->capabilities & LULL_CAP_REOPENS);
-    int skip = r->criterion == NULL || too_expensive(r);
+    int skip = !r->criterion || too_expensive(r);
     uint32_t n = 0, active = 0;
     for (uint32_t i = 0; i < r->blocks.count; i++) {
         struct pt_block *b = &r->blocks.list[i];
@@ -328,7 +328,7 @@ static void check(struct pt_render *r, const struct pt_render_hooks *hooks)
         if (!is_active && !again)
             continue;
         int final = is_active && b->spp >= r->config.spp_max;
-        if (skip && !(final && r->criterion != NULL)) {
+        if (skip && !(final && r->criterion)) {
             if (is_active)
                 settle(r, b, &keep_on);
             r->totals.skipped_checks += r->criterion != NULL;
@@ -363,7 +363,7 @@ static void close_blocks(struct pt_render *r, int reason, const struct pt_render
         w->due[n] = i;
         w->final[n++] = 1;
     }
-    if (r->criterion == NULL || n == 0)
+    if (!r->criterion || n == 0)
         return;
     for (uint32_t k = 0; k < n; k++)
         r->blocks.list[w->due[k]].reason = PT_REASON_NONE;
@@ -376,7 +376,7 @@ static void close_blocks(struct pt_render *r, int reason, const struct pt_render
 
 static int suspend(struct pt_render *r, const struct pt_render_hooks *hooks, int reason, struct base_err *err)
 {
-    int rc = hooks->suspend != NULL ? hooks->suspend(hooks->data, r, err) : 0;
+    int rc = hooks->suspend ? hooks->suspend(hooks->data, r, err) : 0;
     close_blocks(r, reason, hooks);
     return rc;
 }
@@ -392,9 +392,9 @@ int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum
                 pt_blocks_reopen(&r->blocks, r->config.max_seam);
             continue;
         }
-        if (hooks->slice != NULL && (rc = hooks->slice(hooks->data, r, err)) != 0)
+        if (hooks->slice && (rc = hooks->slice(hooks->data, r, err)) != 0)
             break;
-        if (hooks->interrupted != NULL && hooks->interrupted(hooks->data)) {
+        if (hooks->interrupted && hooks->interrupted(hooks->data)) {
             *outcome = PT_RENDER_INTERRUPTED;
             rc = suspend(r, hooks, PT_REASON_INTERRUPT, err);
             break;
@@ -413,10 +413,10 @@ int pt_render_advance(struct pt_render *r, uint64_t spp, const struct pt_render_
     for (uint32_t i = 0; i < r->blocks.count; i++)
         r->blocks.list[i].next_spp = spp;
     while (slice(r)) {
-        int rc = hooks->slice != NULL ? hooks->slice(hooks->data, r, err) : 0;
+        int rc = hooks->slice ? hooks->slice(hooks->data, r, err) : 0;
         if (rc)
             return rc;
-        if (hooks->interrupted != NULL && hooks->interrupted(hooks->data)) {
+        if (hooks->interrupted && hooks->interrupted(hooks->data)) {
             *stopped = 1;
             break;
         }
@@ -426,7 +426,7 @@ int pt_render_advance(struct pt_render *r, uint64_t spp, const struct pt_render_
 
 void pt_render_judge(struct pt_render *r, const struct pt_render_hooks *hooks)
 {
-    if (r->criterion == NULL)
+    if (!r->criterion)
         return;
     for (uint32_t i = 0; i < r->blocks.count; i++) {
         r->work->due[i] = i;

@@ -19,7 +19,7 @@ static void add_block_size(cJSON *root, int width, int height, int *failed)
 
 static void add_criterion(cJSON *root, const struct pt_render *r, const struct pt_output_info *info, int *failed)
 {
-    if (r->criterion == NULL) {
+    if (!r->criterion) {
         base_json_text(root, "criterion", NULL, failed);
         return;
     }

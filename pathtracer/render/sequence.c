@@ -93,21 +93,21 @@ static void name_view(const struct pt_sequence_config *c, char *scene, char *vie
 {
     const char *text = c->name, *slash;
     snprintf(view, room, "view0");
-    if (text != NULL) {
+    if (text) {
         slash = strchr(text, '/');
-        if (slash != NULL)
+        if (slash)
             snprintf(view, room, "%s", slash + 1);
-        snprintf(scene, room, "%.*s", slash != NULL ? (int)(slash - text) : (int)strlen(text), text);
+        snprintf(scene, room, "%.*s", slash ? (int)(slash - text) : (int)strlen(text), text);
         return;
     }
     slash = strrchr(c->scene_path, '/');
-    text = slash != NULL ? slash + 1 : c->scene_path;
+    text = slash ? slash + 1 : c->scene_path;
     snprintf(scene, room, "%s", text);
     char *dot = strrchr(scene, '.');
-    if (dot != NULL && dot != scene)
+    if (dot && dot != scene)
         *dot = '\0';
     char *dash = strstr(scene, "-view");
-    if (dash != NULL && dash != scene) {
+    if (dash && dash != scene) {
         snprintf(view, room, "%s", dash + 1);
         *dash = '\0';
     }
@@ -199,7 +199,7 @@ static int file_is_whole(const struct recorder *r, const cJSON *entry)
     char path[4096], found[16];
     char *data = NULL;
     size_t size = 0;
-    if (!cJSON_IsString(name) || !cJSON_IsString(crc) || strchr(name->valuestring, '/') != NULL ||
+    if (!cJSON_IsString(name) || !cJSON_IsString(crc) || strchr(name->valuestring, '/') ||
         path_in(r, name->valuestring, path, sizeof path, NULL) != 0 ||
         base_file_read(path, (size_t)1 << 30, &data, &size, NULL) != 0)
         return 0;
@@ -222,7 +222,7 @@ static int resume(struct recorder *r, struct base_err *err)
         return rc;
     cJSON *old = cJSON_Parse(text);
     free(text);
-    if (old == NULL)
+    if (!old)
         return base_fail(err, BASE_EINVAL, "%s: not a manifest (JSON expected)", path);
     rc = same_settings(r, path, old, err);
     const cJSON *entry;
@@ -234,7 +234,7 @@ static int resume(struct recorder *r, struct base_err *err)
             if (!cJSON_IsNumber(id) || id->valuedouble < 0.0 || id->valuedouble >= r->grid.count || !file_is_whole(r, entry))
                 continue;
             cJSON *copy = cJSON_Duplicate(entry, 1);
-            if (copy == NULL) {
+            if (!copy) {
                 rc = base_fail_nomem(err, path);
                 break;
             }
@@ -329,7 +329,7 @@ static int put_level(struct recorder *r, struct pt_lseq *file, const struct pt_r
         add_statistic(statistics, &n, "gini", s.gini);
     }
     add_statistic(statistics, &n, "seconds", b->thread_s);
-    if (render->criterion != NULL) {
+    if (render->criterion) {
         char name[64];
         snprintf(name, sizeof name, "%.50s.error", pt_criterion_table(render->criterion)->id);
         add_statistic(statistics, &n, name, b->error);
@@ -407,9 +407,9 @@ static int prepare(struct recorder *r, struct base_err *err)
     if (c->block_width != c->block_height)
         return base_fail(err, BASE_EINVAL, "--sequence records square blocks: --block N");
     r->levels = calloc(PT_SEQUENCE_MAX_LEVELS, sizeof *r->levels);
-    if (r->levels == NULL)
+    if (!r->levels)
         return base_fail_nomem(err, "levels");
-    r->level_count = pt_sequence_levels(r->config->levels != NULL ? r->config->levels : "geometric:20:10000:1.15", r->levels, err);
+    r->level_count = pt_sequence_levels(r->config->levels ? r->config->levels : "geometric:20:10000:1.15", r->levels, err);
     if (r->level_count < 0)
         return r->level_count;
     int rc = pt_blocks_init(&r->grid, c->width, c->height, c->block_width, c->block_height, whole, 0, err);
@@ -424,13 +424,13 @@ static int prepare(struct recorder *r, struct base_err *err)
     r->scratch = calloc(pixels, sizeof(double));
     if (!r->chosen || !r->mean || !r->half || !r->difference || !r->moment2 || !r->scratch)
         return base_fail_nomem(err, "sequence");
-    if (r->config->blocks == NULL)
+    if (!r->config->blocks)
         memset(r->chosen, 1, r->grid.count);
     else if ((rc = pt_sequence_choose(r->config->blocks, r->chosen, r->grid.count, err)) != 0)
         return rc;
     r->seed = c->integrator.seed;
     r->reference_seed = r->seed ^ REFERENCE_SEED_BITS;
-    if ((r->manifest = new_manifest(r)) == NULL)
+    if (!(r->manifest = new_manifest(r)))
         return base_fail_nomem(err, "manifest");
     if (mkdir(r->config->directory, 0777) != 0 && errno != EEXIST)
         return base_fail(err, BASE_EINVAL, "%s: %s", r->config->directory, strerror(errno));

@@ -18,14 +18,14 @@ void *pt_arena_alloc(struct pt_arena *arena, size_t count, size_t size)
         return NULL;
     size_t bytes = (count * size + ALIGNMENT - 1) & ~(size_t)(ALIGNMENT - 1);
     struct pt_arena_chunk *c = arena->chunks;
-    if (c == NULL || c->size - c->used < bytes) {
+    if (!c || c->size - c->used < bytes) {
         size_t room = bytes > CHUNK_BYTES ? bytes : CHUNK_BYTES;
         c = calloc(1, sizeof *c + room);
-        if (c == NULL)
+        if (!c)
             return NULL;
         c->size = room;
         /* A block larger than a chunk goes behind the open chunk, which keeps being filled. */
-        if (arena->chunks != NULL && bytes > CHUNK_BYTES) {
+        if (arena->chunks && bytes > CHUNK_BYTES) {
             c->next = arena->chunks->next;
             arena->chunks->next = c;
         } else {
@@ -42,7 +42,7 @@ void *pt_arena_alloc(struct pt_arena *arena, size_t count, size_t size)
 char *pt_arena_strndup(struct pt_arena *arena, const char *text, size_t n)
 {
     char *copy = pt_arena_alloc(arena, n + 1, 1);
-    if (copy != NULL)
+    if (copy)
         memcpy(copy, text, n);
     return copy;
 }

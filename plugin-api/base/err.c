@@ -5,7 +5,7 @@
 
 int base_fail(struct base_err *err, int code, const char *format, ...)
 {
-    if (err != NULL) {
+    if (err) {
         va_list args;
         va_start(args, format);
         vsnprintf(err->text, sizeof err->text, format, args);

@@ -12,7 +12,7 @@ int base_file_read(const char *path, size_t max_size, char **data, size_t *size,
     char *buffer = NULL;
     int rc = 0;
     FILE *f = fopen(path, "rb");
-    if (f == NULL)
+    if (!f)
         return base_fail(err, BASE_EIO, "%s: %s", path, strerror(errno));
     if (fstat(fileno(f), &st) != 0 || !S_ISREG(st.st_mode)) {
         rc = base_fail(err, BASE_EINVAL, "%s: not a regular file", path);
@@ -25,7 +25,7 @@ int base_file_read(const char *path, size_t max_size, char **data, size_t *size,
     }
     size_t n = (size_t)st.st_size;
     buffer = malloc(n + 1);
-    if (buffer == NULL) {
+    if (!buffer) {
         rc = base_fail_nomem(err, path);
         goto out;
     }
@@ -46,7 +46,7 @@ out:
 int base_file_tmp_name(const char *path, char *tmp_path, size_t room, struct base_err *err)
 {
     const char *slash = strrchr(path, '/');
-    const char *base = slash != NULL ? slash + 1 : path;
+    const char *base = slash ? slash + 1 : path;
     int n = snprintf(tmp_path, room, "%.*s.tmp%ld.%s", (int)(base - path), path, (long)getpid(), base);
     if (n < 0 || (size_t)n >= room)
         return base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", path);
@@ -79,7 +79,7 @@ int base_file_begin(struct base_file_out *out, const char *path, struct base_err
     if (rc)
         return rc;
     out->file = fopen(out->tmp_path, "wb");
-    if (out->file == NULL)
+    if (!out->file)
         return base_fail(err, BASE_EIO, "%s: %s", path, strerror(errno));
     return 0;
 }
@@ -112,7 +112,7 @@ int base_file_write_line(const char *path, const char *text, struct base_err *er
 
 void base_file_abort(struct base_file_out *out)
 {
-    if (out->file == NULL)
+    if (!out->file)
         return;
     fclose(out->file);
     out->file = NULL;

@@ -8,7 +8,7 @@
 /* Owns item from here on. Returns it, or NULL when it could not be added. */
 static cJSON *add(cJSON *to, const char *key, cJSON *item, int *failed)
 {
-    if (item != NULL && (key != NULL ? cJSON_AddItemToObject(to, key, item) : cJSON_AddItemToArray(to, item)))
+    if (item && (key ? cJSON_AddItemToObject(to, key, item) : cJSON_AddItemToArray(to, item)))
         return item;
     cJSON_Delete(item);
     *failed = 1;
@@ -22,7 +22,7 @@ void base_json_number(cJSON *to, const char *key, double value, int *failed)
 
 void base_json_text(cJSON *to, const char *key, const char *text, int *failed)
 {
-    add(to, key, text != NULL ? cJSON_CreateString(text) : cJSON_CreateNull(), failed);
+    add(to, key, text ? cJSON_CreateString(text) : cJSON_CreateNull(), failed);
 }
 
 void base_json_bool(cJSON *to, const char *key, int value, int *failed)
@@ -44,7 +44,7 @@ int base_json_write(const char *path, const cJSON *root, int failed, struct base
 {
     struct base_file_out out;
     char *text = failed ? NULL : cJSON_Print(root);
-    if (text == NULL)
+    if (!text)
         return base_fail_nomem(err, path);
     int rc = base_file_begin(&out, path, err);
     if (!rc) {

@@ -65,7 +65,7 @@ static void *worker_main(void *arg)
 struct base_threads *base_threads_create(int count, struct base_err *err)
 {
     struct base_threads *t = calloc(1, sizeof *t + (size_t)count * sizeof t->workers[0]);
-    if (t == NULL) {
+    if (!t) {
         base_fail_nomem(err, "thread pool");
         return NULL;
     }
@@ -87,7 +87,7 @@ struct base_threads *base_threads_create(int count, struct base_err *err)
 
 void base_threads_destroy(struct base_threads *t)
 {
-    if (t == NULL)
+    if (!t)
         return;
     pthread_mutex_lock(&t->lock);
     t->quit = 1;

@@ -16,7 +16,7 @@ struct lull_instance {
 
 static int32_t fail(struct lull_error *err, int32_t code, const char *message)
 {
-    if (err != NULL && LULL_HAS(struct lull_error, err, message)) {
+    if (err && LULL_HAS(struct lull_error, err, message)) {
         err->code = code;
         snprintf(err->message, sizeof err->message, "%s", message);
     }
@@ -27,17 +27,17 @@ static int32_t null_create(const struct lull_host *host, const struct lull_pair 
                            uint32_t pair_stride, struct lull_instance **instance, struct lull_error *err)
 {
     (void)pairs, (void)pair_stride;
-    if (instance == NULL)
+    if (!instance)
         return fail(err, LULL_E_INVALID, "create: no place for the instance");
-    if (host != NULL && !LULL_HAS(struct lull_host, host, get_extension))
+    if (host && !LULL_HAS(struct lull_host, host, get_extension))
         return fail(err, LULL_E_VERSION, "the host's struct is older than version 1.0");
     if (pair_count > 0) { /* name the key, so that the user sees what was mistyped */
         char message[200];
-        snprintf(message, sizeof message, "no parameter '%s': null has none", pairs != NULL && pairs->key ? pairs->key : "");
+        snprintf(message, sizeof message, "no parameter '%s': null has none", pairs && pairs->key ? pairs->key : "");
         return fail(err, LULL_E_KEY, message);
     }
     struct lull_instance *made = calloc(1, sizeof *made);
-    if (made == NULL)
+    if (!made)
         return fail(err, LULL_E_MEMORY, "out of memory");
     *instance = made;
     return LULL_OK;
@@ -45,7 +45,7 @@ static int32_t null_create(const struct lull_host *host, const struct lull_pair 
 
 static int32_t null_requirements(const struct lull_instance *instance, struct lull_requirements *req, struct lull_error *err)
 {
-    if (instance == NULL || req == NULL)
+    if (!instance || !req)
         return fail(err, LULL_E_INVALID, "requirements: an argument is missing");
     if (!LULL_HAS(struct lull_requirements, req, bytes_per_block))
         return fail(err, LULL_E_VERSION, "the host's requirements struct is older than version 1.0");
@@ -63,13 +63,13 @@ static int32_t null_requirements(const struct lull_instance *instance, struct lu
 
 static int32_t null_begin_frame(struct lull_instance *instance, const struct lull_frame *frame, struct lull_error *err)
 {
-    if (instance == NULL || frame == NULL)
+    if (!instance || !frame)
         return fail(err, LULL_E_INVALID, "begin_frame: an argument is missing");
     if (!LULL_HAS(struct lull_frame, frame, rgb_to_xyz))
         return fail(err, LULL_E_VERSION, "the host's frame struct is older than version 1.0");
     if (instance->block_count > 0 && !(frame->flags & LULL_FRAME_RESTART))
         return fail(err, LULL_E_STATE, "begin_frame: a frame is open");
-    if (frame->blocks == NULL || frame->block_count == 0)
+    if (!frame->blocks || frame->block_count == 0)
         return fail(err, LULL_E_INVALID, "begin_frame: the frame has no blocks");
     instance->block_count = frame->block_count;
     return LULL_OK;
@@ -79,7 +79,7 @@ static int32_t null_evaluate(struct lull_instance *instance, const struct lull_v
                              uint32_t block_stride, struct lull_decision *decisions, uint32_t decision_stride,
                              uint32_t count, struct lull_error *err)
 {
-    if (instance == NULL || view == NULL || (count > 0 && (blocks == NULL || decisions == NULL)))
+    if (!instance || !view || (count > 0 && (!blocks || !decisions)))
         return fail(err, LULL_E_INVALID, "evaluate: an argument is missing");
     if (!LULL_HAS(struct lull_view, view, elapsed_s) || block_stride < sizeof *blocks || decision_stride < sizeof *decisions)
         return fail(err, LULL_E_VERSION, "evaluate: the host's structs are older than version 1.0");
@@ -100,7 +100,7 @@ static int32_t null_evaluate(struct lull_instance *instance, const struct lull_v
 
 static void null_end_frame(struct lull_instance *instance)
 {
-    if (instance != NULL)
+    if (instance)
         instance->block_count = 0;
 }
 

@@ -45,7 +45,7 @@ static const struct ex_rule ex_rule;
 __attribute__((format(printf, 3, 4))) static inline int32_t ex_fail(struct lull_error *err, int32_t code, const char *format,
                                                                     ...)
 {
-    if (err != NULL && LULL_HAS(struct lull_error, err, message)) {
+    if (err && LULL_HAS(struct lull_error, err, message)) {
         err->code = code;
         va_list args;
         va_start(args, format);
@@ -112,9 +112,9 @@ static inline int32_t ex_set(double value[EX_PARAM_MAX], const char *key, const 
 static inline int32_t ex_create(const struct lull_host *host, const struct lull_pair *pairs, uint32_t pair_count,
                                 uint32_t pair_stride, struct lull_instance **instance, struct lull_error *err)
 {
-    if (instance == NULL || (pair_count > 0 && pairs == NULL))
+    if (!instance || (pair_count > 0 && !pairs))
         return ex_fail(err, LULL_E_INVALID, "create: an argument is missing");
-    if ((host != NULL && !LULL_HAS(struct lull_host, host, get_extension)) ||
+    if ((host && !LULL_HAS(struct lull_host, host, get_extension)) ||
         (pair_count > 0 && pair_stride < sizeof *pairs))
         return ex_fail(err, LULL_E_VERSION, "create: the host's structs are older than version 1.0");
     struct lull_instance made = {.host = host};
@@ -124,14 +124,14 @@ static inline int32_t ex_create(const struct lull_host *host, const struct lull_
     for (uint32_t i = 0; i < pair_count; i++) {
         const void *at = (const char *)pairs + (size_t)i * pair_stride;
         const struct lull_pair *pair = at;
-        if (pair->key == NULL || pair->value == NULL)
+        if (!pair->key || !pair->value)
             return ex_fail(err, LULL_E_INVALID, "create: a key or value is missing");
         int32_t status = ex_set(made.value, pair->key, pair->value, err);
         if (status != LULL_OK)
             return status;
     }
     struct lull_instance *copy = malloc(sizeof *copy);
-    if (copy == NULL)
+    if (!copy)
         return ex_fail(err, LULL_E_MEMORY, "out of memory");
     *copy = made;
     *instance = copy;
@@ -150,7 +150,7 @@ static inline uint64_t ex_first_spp(const struct lull_instance *in)
 
 static inline int32_t ex_requirements(const struct lull_instance *in, struct lull_requirements *req, struct lull_error *err)
 {
-    if (in == NULL || req == NULL)
+    if (!in || !req)
         return ex_fail(err, LULL_E_INVALID, "requirements: an argument is missing");
     if (!LULL_HAS(struct lull_requirements, req, bytes_per_block))
         return ex_fail(err, LULL_E_VERSION, "requirements: the host's struct is older than version 1.0");
@@ -170,7 +170,7 @@ static const char *const ex_plane_names[LULL_PLANE_COUNT] = {"COLOR", "WEIGHT", 
 
 static inline int32_t ex_blocks_check(const struct lull_frame *frame, struct lull_error *err)
 {
-    if (frame->blocks == NULL || frame->block_count == 0 || frame->block_stride < sizeof(struct lull_rect))
+    if (!frame->blocks || frame->block_count == 0 || frame->block_stride < sizeof(struct lull_rect))
         return ex_fail(err, LULL_E_INVALID, "begin_frame: the frame has no blocks");
     for (uint32_t i = 0; i < frame->block_count; i++) {
         const void *at = (const char *)frame->blocks + (size_t)i * frame->block_stride;
@@ -184,7 +184,7 @@ static inline int32_t ex_blocks_check(const struct lull_frame *frame, struct lul
 
 static inline int32_t ex_begin_frame(struct lull_instance *in, const struct lull_frame *frame, struct lull_error *err)
 {
-    if (in == NULL || frame == NULL)
+    if (!in || !frame)
         return ex_fail(err, LULL_E_INVALID, "begin_frame: an argument is missing");
     if (!LULL_HAS(struct lull_frame, frame, rgb_to_xyz))
         return ex_fail(err, LULL_E_VERSION, "begin_frame: the host's struct is older than version 1.0");
@@ -209,7 +209,7 @@ static inline int32_t ex_begin_frame(struct lull_instance *in, const struct lull
 
 static inline void ex_end_frame(struct lull_instance *in)
 {
-    if (in != NULL)
+    if (in)
         in->block_count = 0;
 }
 
@@ -221,7 +221,7 @@ static inline const struct lull_plane *ex_plane(const struct lull_view *view, un
         return NULL;
     const void *at = (const char *)view->planes + (size_t)index * view->plane_stride;
     const struct lull_plane *plane = at;
-    return plane->data != NULL ? plane : NULL;
+    return plane->data ? plane : NULL;
 }
 
 static inline double ex_half_float(uint16_t h)
@@ -274,7 +274,7 @@ static inline void ex_span(const struct lull_view *view, const struct lull_plane
                                                          : 1;
     const char *at = ex_address(view, plane, x, y);
     for (int32_t i = 0; i < count; i++, at += plane->stride_x) {
-        if (weight != NULL)
+        if (weight)
             n = ex_stored(ex_address(view, weight, x + i, y), weight->type) * weight->scale;
         double factor = n != 0 ? plane->scale / n : (double)NAN;
         for (int c = 0; c < channels; c++)
@@ -300,15 +300,15 @@ static inline int32_t ex_plane_check(const struct lull_view *view, unsigned inde
     static const uint32_t channels[LULL_PLANE_COUNT] = {3, 1, 1, 1, 3, 3, 3, 1};
     const char *name = ex_plane_names[index];
     const struct lull_plane *p = ex_plane(view, index);
-    if (p == NULL && (ex_rule.planes_required & LULL_PLANE_BIT(index)))
+    if (!p && (ex_rule.planes_required & LULL_PLANE_BIT(index)))
         return ex_fail(err, LULL_E_PLANE, "evaluate: the plane %s is missing", name);
-    if (p == NULL)
+    if (!p)
         return LULL_OK;
     if (p->type < LULL_TYPE_F32 || p->type > LULL_TYPE_U32 || p->normaliser < LULL_NORM_ONE ||
         p->normaliser > LULL_NORM_WEIGHT || p->channels < channels[index] || !isfinite(p->scale) || p->scale == 0)
         return ex_fail(err, LULL_E_PLANE, "evaluate: the plane %s has an unknown form", name);
     if (p->normaliser == LULL_NORM_WEIGHT && index != LULL_PLANE_WEIGHT)
-        return ex_plane(view, LULL_PLANE_WEIGHT) != NULL
+        return ex_plane(view, LULL_PLANE_WEIGHT)
                    ? ex_plane_check(view, LULL_PLANE_WEIGHT, err)
                    : ex_fail(err, LULL_E_PLANE, "evaluate: the plane %s needs WEIGHT, which is missing", name);
     return LULL_OK;
@@ -341,7 +341,7 @@ static inline int32_t ex_batch_check(const struct ex_batch *batch, uint32_t coun
 {
     const struct lull_view *view = batch->view;
     if (ex_rule.planes_used != 0 && view->plane_count > 0 &&
-        (view->planes == NULL || view->plane_stride < sizeof(struct lull_plane)))
+        (!view->planes || view->plane_stride < sizeof(struct lull_plane)))
         return ex_fail(err, LULL_E_INVALID, "evaluate: the view has no planes");
     for (unsigned i = 0; i < LULL_PLANE_COUNT; i++) {
         int32_t status = ex_rule.planes_used & LULL_PLANE_BIT(i) ? ex_plane_check(view, i, err) : LULL_OK;
@@ -361,7 +361,7 @@ static inline int32_t ex_evaluate(struct lull_instance *in, const struct lull_vi
                                   uint32_t block_stride, struct lull_decision *decisions, uint32_t decision_stride,
                                   uint32_t count, struct lull_error *err)
 {
-    if (in == NULL || view == NULL || (count > 0 && (blocks == NULL || decisions == NULL)))
+    if (!in || !view || (count > 0 && (!blocks || !decisions)))
         return ex_fail(err, LULL_E_INVALID, "evaluate: an argument is missing");
     if (!LULL_HAS(struct lull_view, view, elapsed_s) || block_stride < sizeof *blocks || decision_stride < sizeof *decisions)
         return ex_fail(err, LULL_E_VERSION, "evaluate: the host's structs are older than version 1.0");
@@ -371,7 +371,7 @@ static inline int32_t ex_evaluate(struct lull_instance *in, const struct lull_vi
     int32_t status = ex_batch_check(&batch, count, err);
     if (status != LULL_OK)
         return status;
-    if (in->host != NULL && in->host->parallel_for != NULL && count > 1) {
+    if (in->host && in->host->parallel_for && count > 1) {
         status = in->host->parallel_for(in->host, count, ex_judge_task, &batch);
         return status == LULL_OK ? LULL_OK : ex_fail(err, status, "evaluate: the host left out blocks");
     }

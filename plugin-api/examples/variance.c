@@ -85,10 +85,10 @@ static void judge(const struct lull_instance *in, const struct lull_view *view, 
                 double rgb[CHUNK][3], m2[CHUNK], n[CHUNK];
                 ex_span(view, color, block, x, y, count, 3, rgb[0]);
                 ex_span(view, moment2, block, x, y, count, 1, m2);
-                if (spp != NULL)
+                if (spp)
                     ex_span(view, spp, block, x, y, count, 1, n);
                 for (int32_t i = 0; i < count; i++)
-                    tally_pixel(in, rgb[i], m2[i], spp != NULL ? n[i] : (double)block->spp, &tally);
+                    tally_pixel(in, rgb[i], m2[i], spp ? n[i] : (double)block->spp, &tally);
                 x += count;
             }
     double error = tally.valid > 0 ? sqrt(tally.sum / tally.valid) : (double)NAN;

@@ -53,7 +53,7 @@ const char *lull_elf_file_fault(const char *path)
         fault = "not a shared object";
     else
         fault = header_fault(&header);
-    if (fault == NULL)
+    if (!fault)
         fault = segments_fault(fd, &header, (uint64_t)st.st_size);
     close(fd);
     return fault;

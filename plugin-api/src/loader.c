@@ -18,7 +18,7 @@
 
 int32_t lull_error_set(struct lull_error *err, int32_t code, const char *format, ...)
 {
-    if (err == NULL || err->struct_size <= offsetof(struct lull_error, message))
+    if (!err || err->struct_size <= offsetof(struct lull_error, message))
         return code;
     size_t room = err->struct_size - offsetof(struct lull_error, message);
     if (room > sizeof err->message)
@@ -34,7 +34,7 @@ int32_t lull_error_set(struct lull_error *err, int32_t code, const char *format,
 __attribute__((format(printf, 3, 4))) static void say(const struct lull_search *search, int32_t level, const char *format,
                                                       ...)
 {
-    if (search == NULL || search->log == NULL)
+    if (!search || !search->log)
         return;
     char text[LULL_PATH_MAX + 600];
     va_list args;
@@ -64,19 +64,19 @@ static void compare_process(const struct lull_search *search, const char *path, 
 static int32_t load_entry(const struct lull_search *search, const char *path, lull_entry_fn *entry, struct lull_error *err)
 {
     const char *fault = lull_elf_file_fault(path);
-    if (fault != NULL)
+    if (fault)
         return lull_error_set(err, LULL_E_IO, "%s: %s", path, fault);
 
     struct lull_process_state before;
     lull_process_state_read(&before);
     void *library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
-    const char *why = library == NULL ? dlerror() : NULL;
+    const char *why = !library ? dlerror() : NULL;
     compare_process(search, path, &before);
-    if (library == NULL) /* dlerror's text begins with the path */
-        return lull_error_set(err, LULL_E_IO, "cannot load: %s", why != NULL ? why : path);
+    if (!library) /* dlerror's text begins with the path */
+        return lull_error_set(err, LULL_E_IO, "cannot load: %s", why ? why : path);
 
     void *symbol = dlsym(library, LULL_ENTRY_NAME);
-    if (symbol == NULL)
+    if (!symbol)
         return lull_error_set(err, LULL_E_VERSION, "%s: not a criterion of ABI %d (no symbol %s)", path, LULL_API_MAJOR,
                               LULL_ENTRY_NAME);
     memcpy(entry, &symbol, sizeof symbol); /* ISO C knows no conversion from object to function pointer */
@@ -90,7 +90,7 @@ static int32_t entry_check(const char *path, lull_entry_fn entry, uint32_t *coun
 {
     for (*count = 0; *count < ENTRY_MAX; ++*count) {
         const struct lull_criterion *c = entry(*count);
-        if (c == NULL)
+        if (!c)
             break;
         struct lull_error why = {.struct_size = sizeof why};
         int32_t status = lull_table_check(c, &why);
@@ -134,8 +134,8 @@ struct dir_walk {
 static int next_dir(struct dir_walk *walk, char dir[LULL_PATH_MAX])
 {
     for (;;) {
-        while (walk->rest == NULL || *walk->rest == '\0') {
-            if (walk->search == NULL || walk->index >= walk->search->dir_count)
+        while (!walk->rest || *walk->rest == '\0') {
+            if (!walk->search || walk->index >= walk->search->dir_count)
                 return 0;
             walk->rest = walk->search->dirs[walk->index++];
         }
@@ -187,14 +187,14 @@ static int32_t library_list_add(struct library_list *list, const char *dir, cons
     if (list->count == list->room) {
         size_t room = list->room == 0 ? 16 : 2 * list->room;
         struct library_name *items = realloc(list->items, room * sizeof *items);
-        if (items == NULL)
+        if (!items)
             return LULL_E_MEMORY;
         list->items = items;
         list->room = room;
     }
     size_t size = strlen(dir) + 1 + strlen(name) + 1;
     char *path = malloc(size);
-    if (path == NULL)
+    if (!path)
         return LULL_E_MEMORY;
     snprintf(path, size, "%s/%s", dir, name);
     if (size > LULL_PATH_MAX || !is_file(path)) {
@@ -219,10 +219,10 @@ static int32_t library_list_scan(const struct lull_search *search, struct librar
     int32_t status = LULL_OK;
     for (struct dir_walk walk = {.search = search}; status == LULL_OK && next_dir(&walk, dir);) {
         DIR *d = opendir(dir);
-        if (d == NULL)
+        if (!d)
             continue; /* a directory that does not exist holds no criterion */
         size_t first = list->count;
-        for (struct dirent *e; status == LULL_OK && (e = readdir(d)) != NULL;)
+        for (struct dirent *e; status == LULL_OK && (e = readdir(d));)
             if (e->d_name[0] != '.' && has_suffix(e->d_name, ".so"))
                 status = library_list_add(list, dir, e->d_name);
         closedir(d);
@@ -240,7 +240,7 @@ int32_t lull_list(const struct lull_search *search, int32_t (*visit)(void *conte
     struct library_list list = {0};
     int32_t status = library_list_scan(search, &list);
     struct lull_found *found = status == LULL_OK ? malloc(sizeof *found) : NULL;
-    if (found == NULL)
+    if (!found)
         status = LULL_E_MEMORY;
     for (size_t i = 0; status == LULL_OK && i < list.count; i++) {
         lull_entry_fn entry;
@@ -270,8 +270,8 @@ static int32_t open_path(const struct lull_search *search, const char *path, con
     int32_t status = load_library(search, path, &entry, &count, err);
     if (status != LULL_OK)
         return status;
-    const struct lull_criterion *c = id == NULL ? entry(0) : find_id(entry, count, id);
-    if (c == NULL)
+    const struct lull_criterion *c = !id ? entry(0) : find_id(entry, count, id);
+    if (!c)
         return lull_error_set(err, LULL_E_KEY, "%s: holds no criterion with the id %s", path, id);
     found->criterion = c;
     snprintf(found->path, sizeof found->path, "%s", path);
@@ -301,12 +301,12 @@ static int32_t open_name(const struct lull_search *search, const char *name, con
         snprintf(path, sizeof path, "%s/%s.so", dir, name);
         if (strlen(path) >= LULL_PATH_MAX || !is_file(path))
             continue;
-        if (id != NULL)
+        if (id)
             return open_path(search, path, id, found, err);
         int32_t status = open_path(search, path, name, found, err);
         return status == LULL_E_KEY ? open_path(search, path, NULL, found, err) : status;
     }
-    if (id == NULL) {
+    if (!id) {
         struct name_query query = {.id = name, .found = found};
         int32_t status = lull_list(search, take_if_named, &query);
         if (status == 1)
@@ -319,7 +319,7 @@ static int32_t open_name(const struct lull_search *search, const char *name, con
 
 int32_t lull_open(const struct lull_search *search, const char *spec, struct lull_found *found, struct lull_error *err)
 {
-    if (spec == NULL || *spec == '\0' || found == NULL || strlen(spec) > LULL_PATH_MAX - 8)
+    if (!spec || *spec == '\0' || !found || strlen(spec) > LULL_PATH_MAX - 8)
         return lull_error_set(err, LULL_E_INVALID, "a criterion is named NAME, PATH or PATH:ID");
 
     char base[LULL_PATH_MAX];
@@ -327,16 +327,16 @@ int32_t lull_open(const struct lull_search *search, const char *spec, struct lul
     char *id = NULL;
     if (!is_file(spec)) { /* a path may contain ':' itself */
         char *colon = strrchr(base, ':');
-        if (colon != NULL && strchr(colon, '/') == NULL) {
+        if (colon && !strchr(colon, '/')) {
             *colon = '\0';
             id = colon + 1;
         }
     }
-    if (id != NULL && (*id == '\0' || *base == '\0'))
+    if (id && (*id == '\0' || *base == '\0'))
         return lull_error_set(err, LULL_E_INVALID, "%s: a criterion is named NAME, PATH or PATH:ID", spec);
-    if (strchr(base, '/') == NULL && !has_suffix(base, ".so"))
+    if (!strchr(base, '/') && !has_suffix(base, ".so"))
         return open_name(search, base, id, found, err);
-    if (strchr(base, '/') != NULL)
+    if (strchr(base, '/'))
         return open_path(search, base, id, found, err);
 
     char path[LULL_PATH_MAX + 2]; /* without a '/' dlopen would search the system's directories */

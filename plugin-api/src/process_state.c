@@ -47,7 +47,7 @@ void lull_process_state_read(struct lull_process_state *state)
     state->fp_control = fp_control_get();
     state->thread_count = 0;
     DIR *tasks = opendir("/proc/self/task");
-    if (tasks == NULL)
+    if (!tasks)
         return;
     for (struct dirent *e; (e = readdir(tasks)) != NULL;)
         state->thread_count += e->d_name[0] != '.';

@@ -76,7 +76,7 @@ INTERPOSE void *memalign(size_t alignment, size_t size)
 INTERPOSE int posix_memalign(void **memory, size_t alignment, size_t size)
 {
     void *made = refused() ? NULL : __libc_memalign(alignment, size);
-    if (made == NULL)
+    if (!made)
         return ENOMEM;
     *memory = made;
     return 0;

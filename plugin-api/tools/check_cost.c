@@ -20,9 +20,9 @@ static long descriptors(void)
 {
     long count = 0;
     DIR *d = opendir("/proc/self/fd");
-    if (d == NULL)
+    if (!d)
         return 0;
-    while (readdir(d) != NULL)
+    while (readdir(d))
         count++;
     closedir(d);
     return count;
@@ -61,7 +61,7 @@ static void repeat(struct lc *c, void (*once)(struct lc *), const char *what)
 static void create_destroy(struct lc *c)
 {
     struct lull_instance *instance = lc_create(c, NULL);
-    if (instance != NULL)
+    if (instance)
         c->criterion->destroy(instance);
 }
 
@@ -119,7 +119,7 @@ static void check_out_of_memory(struct lc *c)
         if (created)
             status = c->criterion->begin_frame(instance, &frame, &err);
         lc_alloc_fail_after(-1);
-        LC_EXPECT(c, created || instance == NULL, "create ran out of memory and touched the instance");
+        LC_EXPECT(c, created || !instance, "create ran out of memory and touched the instance");
         LC_EXPECT(c, status <= 0, "create or begin_frame returned %d", status);
         done = status == LULL_OK;
         if (created && !done) /* the instance is as before: it can still do it */

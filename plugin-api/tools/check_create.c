@@ -97,7 +97,7 @@ static void check_params(struct lc *c)
                                               "nan", "inf", "1e", "0x10", "1,5", "1e99999"};
     for (uint32_t i = 0; i < c->criterion->param_count; i++) {
         const struct lull_param *p = param(c, i);
-        if (p->default_value != NULL)
+        if (p->default_value)
             expect_status(c, p->name, p->default_value, LULL_OK);
         if (p->type <= LULL_PARAM_BOOL)
             for (size_t k = 0; k < sizeof not_numbers / sizeof *not_numbers; k++)
@@ -131,7 +131,7 @@ static void check_null(struct lc *c)
     LC_EXPECT(c, t->create(NULL, &bad, 1, sizeof bad, &instance, NULL) == LULL_E_KEY,
               "unknown key, NULL error: not refused");
     LC_EXPECT(c, t->create(NULL, &hole, 1, sizeof hole, &instance, NULL) != LULL_OK, "a pair of NULLs is accepted");
-    LC_EXPECT(c, instance == NULL, "a failed create touched the instance");
+    LC_EXPECT(c, !instance, "a failed create touched the instance");
     LC_EXPECT(c, t->create(NULL, c->pairs, c->pair_count, sizeof bad, NULL, NULL) == LULL_E_INVALID,
               "create without a place for the instance is not refused");
     if (c->pair_count == 0) {
@@ -154,7 +154,7 @@ static void check_null(struct lc *c)
 static void check_requirements(struct lc *c)
 {
     struct lull_instance *instance = lc_create(c, NULL);
-    if (instance == NULL)
+    if (!instance)
         return;
     struct lull_requirements r[2];
     for (int i = 0; i < 2; i++) {

@@ -48,7 +48,7 @@ static void check_order(struct lc *c)
     finish_and_compare(c, &s, "second frame against a first");
 
     struct lull_instance *fresh = lc_create(c, NULL);
-    if (fresh == NULL)
+    if (!fresh)
         return;
     struct lc_film film;
     if (lc_film_init_for(&film, &c->req, 1, 0) == 0) {
@@ -119,7 +119,7 @@ static void check_block_size(struct lc *c)
     struct lull_instance *instance = lc_create(c, NULL);
     struct lc_film film;
     int32_t w = (int32_t)c->req.block_width, h = (int32_t)c->req.block_height;
-    if (instance != NULL && lc_film_init(&film, 2 * w + 10, 2 * h + 10, w + 5, h + 5, 1) == 0) {
+    if (instance && lc_film_init(&film, 2 * w + 10, 2 * h + 10, w + 5, h + 5, 1) == 0) {
         struct lull_frame frame;
         lc_film_frame(&film, &frame, c->req.planes_used);
         int32_t status = lc_begin(c, instance, &frame, NULL);

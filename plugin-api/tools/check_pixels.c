@@ -96,12 +96,12 @@ static void check_window(struct lc *c)
         image.view.x0 += DX, image.view.x1 += DX, image.view.y0 += DY, image.view.y1 += DY;
         struct lull_decision *d = calloc(s.film.block_count, sizeof *d);
         uint32_t *ids = calloc(s.film.block_count, sizeof *ids);
-        for (uint32_t i = 0; i < s.film.block_count && ids != NULL; i++) {
+        for (uint32_t i = 0; i < s.film.block_count && ids; i++) {
             struct lull_block *b = &s.film.blocks[i];
             b->x0 += DX, b->x1 += DX, b->y0 += DY, b->y1 += DY;
             ids[i] = i;
         }
-        if (d != NULL && ids != NULL) {
+        if (d && ids) {
             status = lc_session_ask(&s, &image, ids, s.film.block_count, d, &err);
             LC_EXPECT(c, status == LULL_OK, "evaluate of a crop: %d, %s", status, err.message);
             for (uint32_t i = 0; i < s.film.block_count && status == LULL_OK; i++)
@@ -166,7 +166,7 @@ static void check_missing(struct lc *c)
 {
     struct lull_instance *instance = lc_create(c, NULL);
     struct lc_film film;
-    if (instance == NULL || lc_film_init_for(&film, &c->req, 1, 0) != 0)
+    if (!instance || lc_film_init_for(&film, &c->req, 1, 0) != 0)
         return;
     for (unsigned p = 0; p < LULL_PLANE_COUNT; p++) {
         if (!(c->req.planes_required & LULL_PLANE_BIT(p)))

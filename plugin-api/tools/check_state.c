@@ -19,7 +19,7 @@ static int32_t buffer_write(const struct lull_writer *writer, const void *data, 
     if (size > b->limit - b->size)
         return LULL_E_IO;
     char *grown = realloc(b->data, (size_t)(b->size + size + 1));
-    if (grown == NULL)
+    if (!grown)
         return LULL_E_MEMORY;
     b->data = grown;
     if (size > 0)
@@ -58,7 +58,7 @@ static int replace_instance(struct lc *c, const struct lull_state *state, struct
     c->criterion->end_frame(s->instance);
     c->criterion->destroy(s->instance);
     s->instance = lc_create(c, NULL);
-    if (s->instance == NULL)
+    if (!s->instance)
         return -1;
     struct lull_frame frame;
     lc_film_frame(&s->film, &frame, s->planes);
@@ -83,7 +83,7 @@ static void damage(struct lc *c, const struct lull_state *state, struct lc_sessi
     }
     for (uint64_t at = 0; at < whole->size; at += stride) {
         struct buffer bad = {.data = malloc((size_t)whole->size), .size = whole->size};
-        if (bad.data == NULL)
+        if (!bad.data)
             return;
         memcpy(bad.data, whole->data, (size_t)whole->size);
         bad.data[at] = (char)~bad.data[at];
@@ -154,11 +154,11 @@ static void run_refused(struct lc *c, const struct lull_state *state)
 static void check_state(struct lc *c)
 {
     const struct lull_state *state = c->criterion->get_extension(LULL_EXT_STATE);
-    if (state == NULL) {
+    if (!state) {
         lc_skip(c, "it does not offer lull.state/1");
         return;
     }
-    if (!LC_EXPECT(c, LULL_HAS(struct lull_state, state, load) && state->save != NULL && state->load != NULL,
+    if (!LC_EXPECT(c, LULL_HAS(struct lull_state, state, load) && state->save && state->load,
                    "lull.state/1 is incomplete"))
         return;
     run_state(c, state);

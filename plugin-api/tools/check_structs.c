@@ -17,7 +17,7 @@ struct guarded {
 static int guarded_init(struct lc *c, struct guarded *g, const void *from, size_t size)
 {
     g->at = lc_guard_alloc(size, &g->mapped);
-    if (g->at == NULL) {
+    if (!g->at) {
         lc_fail(c, "out of memory");
         return -1;
     }
@@ -56,7 +56,7 @@ static int short_evaluate(struct lc *c, const struct short_structs *cut, struct 
     planes_array.at = lc_guard_alloc(sizeof(struct lull_plane) * LULL_PLANE_COUNT, &planes_array.mapped);
     blocks.at = lc_guard_alloc(blocks_size, &blocks.mapped);
     decisions.at = lc_guard_alloc(decisions_size, &decisions.mapped);
-    if (planes_array.at != NULL && blocks.at != NULL && decisions.at != NULL) {
+    if (planes_array.at && blocks.at && decisions.at) {
         memcpy(planes_array.at, v->planes, sizeof(struct lull_plane) * LULL_PLANE_COUNT);
         memcpy(blocks.at, film->blocks, blocks_size);
         v->planes = planes_array.at;
@@ -91,7 +91,7 @@ static void short_frame(struct lc *c, const struct short_structs *cut, struct lu
     lc_film_frame(&film, &frame, c->req.planes_used);
     struct guarded rects, g;
     rects.at = lc_guard_alloc(film.block_count * sizeof *film.rects, &rects.mapped);
-    if (rects.at != NULL) {
+    if (rects.at) {
         memcpy(rects.at, film.rects, film.block_count * sizeof *film.rects);
         frame.blocks = rects.at;
         if (guarded_init(c, &g, &frame, sizeof frame - cut->frame) == 0) {
@@ -201,7 +201,7 @@ static void check_tails(struct lc *c)
     r.req.struct_size = sizeof r;
     e.err = (struct lull_error){.struct_size = sizeof e};
     struct lull_instance *instance = lc_create(c, NULL);
-    if (instance == NULL)
+    if (!instance)
         return;
     int32_t status = c->criterion->requirements(instance, &r.req, &e.err);
     LC_EXPECT(c, status == LULL_OK && r.req.struct_size == sizeof r, "requirements into a longer struct: %d, size %u",

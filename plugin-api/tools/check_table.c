@@ -63,7 +63,7 @@ static void check_load(struct lc *c)
     struct lull_search search = {.log = note_log, .log_context = c};
     struct lull_found *found = malloc(sizeof *found);
     struct lull_error err = {.struct_size = sizeof err};
-    if (found == NULL || lull_open(&search, c->path, found, &err) != LULL_OK)
+    if (!found || lull_open(&search, c->path, found, &err) != LULL_OK)
         lc_fail(c, "%s", err.message);
     free(found);
     for (int i = 0; i < SIGNALS; i++) {
@@ -79,11 +79,11 @@ static void check_entry(struct lc *c)
 {
     lull_entry_fn entry = lc_entry(c->path);
     uint32_t count = 0;
-    for (; count < 1000 && entry(count) != NULL; count++)
+    for (; count < 1000 && entry(count); count++)
         LC_EXPECT(c, entry(count) == entry(count), "entry(%u) is another pointer each time", count);
-    LC_EXPECT(c, entry(count) == NULL && entry(count + 1) == NULL, "entry is not NULL past the last criterion");
-    LC_EXPECT(c, entry(UINT32_MAX) == NULL, "entry(4294967295) is not NULL");
-    LC_EXPECT(c, entry(UINT32_C(0x80000000)) == NULL, "entry(2147483648) is not NULL");
+    LC_EXPECT(c, !entry(count) && !entry(count + 1), "entry is not NULL past the last criterion");
+    LC_EXPECT(c, !entry(UINT32_MAX), "entry(4294967295) is not NULL");
+    LC_EXPECT(c, !entry(UINT32_C(0x80000000)), "entry(2147483648) is not NULL");
     LC_EXPECT(c, entry(0) != NULL, "entry(0) is NULL");
     lc_note(c, "%u criteria in the library", count);
 }
@@ -98,7 +98,7 @@ static void check_table(struct lc *c)
         LC_EXPECT(c, (t->capabilities & ~known) == 0, "unknown capabilities %#x", t->capabilities);
     LC_EXPECT(c, *t->name != '\0' && *t->version != '\0' && *t->description != '\0',
               "name, version or description is empty");
-    LC_EXPECT(c, t->get_extension("no.such/1") == NULL, "it claims the extension no.such/1");
+    LC_EXPECT(c, !t->get_extension("no.such/1"), "it claims the extension no.such/1");
     static const char *const levels[] = {"NONE", "INSTANCE", "FULL"};
     lc_note(c, "%s %s: %s; threads %s%s%s%s", t->id, t->version, t->name, levels[t->thread_level],
             t->capabilities & LULL_CAP_DETERMINISTIC ? ", deterministic" : "",

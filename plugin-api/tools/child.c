@@ -51,7 +51,7 @@ REPORT_FUNCTION(lc_skip, 'S')
 _Noreturn static void child_main(struct lc *c, void (*fn)(struct lc *c, const void *arg), const void *arg)
 {
     fn(c, arg);
-    if (__lsan_do_recoverable_leak_check != NULL && __lsan_do_recoverable_leak_check() != 0)
+    if (__lsan_do_recoverable_leak_check && __lsan_do_recoverable_leak_check() != 0)
         lc_fail(c, "LeakSanitizer found leaks");
     if (write(c->report_fd, "D\n", 2) != 2)
         _exit(1);
@@ -129,7 +129,7 @@ static void keep_output(FILE *output, struct lc_report *report)
     char text[LC_LINE_SIZE];
     int lines = 0;
     rewind(output);
-    while (lines < 12 && fgets(text, sizeof text, output) != NULL) {
+    while (lines < 12 && fgets(text, sizeof text, output)) {
         text[strcspn(text, "\n")] = '\0';
         if (text[0] == '\0' || text[0] == '=')
             continue;
@@ -153,8 +153,8 @@ int lc_child_run(struct lc *c, void (*fn)(struct lc *c, const void *arg), const 
     int ends[2];
     *report = (struct lc_report){0};
     FILE *output = tmpfile();
-    if (output == NULL || pipe(ends) != 0) {
-        if (output != NULL)
+    if (!output || pipe(ends) != 0) {
+        if (output)
             fclose(output);
         return -1;
     }

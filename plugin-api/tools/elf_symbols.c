@@ -35,7 +35,7 @@ static int visit_table(const struct bytes *file, const ElfW(Shdr) * table, const
 {
     const ElfW(Sym) *symbols = within(file, table->sh_offset, table->sh_size);
     const char *text = within(file, strings->sh_offset, strings->sh_size);
-    if (symbols == NULL || text == NULL || strings->sh_size == 0 || text[strings->sh_size - 1] != '\0')
+    if (!symbols || !text || strings->sh_size == 0 || text[strings->sh_size - 1] != '\0')
         return -1;
     for (uint64_t i = 0; i < table->sh_size / sizeof *symbols; i++)
         if (is_export(&symbols[i]) && symbols[i].st_name < strings->sh_size)
@@ -46,10 +46,10 @@ static int visit_table(const struct bytes *file, const ElfW(Shdr) * table, const
 static int visit_file(const struct bytes *file, void (*visit)(void *context, const char *name), void *context)
 {
     const ElfW(Ehdr) *header = within(file, 0, sizeof *header);
-    if (header == NULL || memcmp(header->e_ident, ELFMAG, SELFMAG) != 0 || header->e_shentsize != sizeof(ElfW(Shdr)))
+    if (!header || memcmp(header->e_ident, ELFMAG, SELFMAG) != 0 || header->e_shentsize != sizeof(ElfW(Shdr)))
         return -1;
     const ElfW(Shdr) *sections = within(file, header->e_shoff, (uint64_t)header->e_shnum * sizeof *sections);
-    if (sections == NULL)
+    if (!sections)
         return -1;
     for (unsigned i = 0; i < header->e_shnum; i++)
         if (sections[i].sh_type == SHT_DYNSYM && sections[i].sh_link < header->e_shnum)

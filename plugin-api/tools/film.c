@@ -24,10 +24,10 @@ static int film_alloc(struct lc_film *f)
     f->rects = calloc(f->block_count, sizeof *f->rects);
     f->blocks = calloc(f->block_count, sizeof *f->blocks);
     f->half_sum = calloc(pixels * 3, sizeof(double));
-    int ok = f->rects != NULL && f->blocks != NULL && f->half_sum != NULL;
+    int ok = f->rects && f->blocks && f->half_sum;
     for (unsigned p = 0; p < LULL_PLANE_COUNT; p++) {
         f->sum[p] = calloc(pixels * lc_plane_channels[p], sizeof(double));
-        ok = ok && f->sum[p] != NULL;
+        ok = ok && f->sum[p];
     }
     return ok ? 0 : -1;
 }
@@ -101,7 +101,7 @@ static void add_samples(struct lc_film *f, int32_t x, int32_t y, uint64_t from, 
 {
     size_t at = (size_t)y * (size_t)f->width + (size_t)x;
     double rgb[3], sigma, mean_y = 0, n = (double)count;
-    (f->paint != NULL ? f->paint : paint_default)(rgb, &sigma, x, y);
+    (f->paint ? f->paint : paint_default)(rgb, &sigma, x, y);
     for (uint32_t c = 0; c < 3; c++) {
         double noise = sigma == 0 ? 0 : normal(f->seed * 7919u + c * 3u, (uint32_t)at, (uint32_t)from, (uint32_t)half);
         double sum = rgb[c] * (n + sigma * sqrt(n) * noise);
@@ -198,7 +198,7 @@ void *lc_guard_alloc(size_t size, size_t *mapped)
 
 void lc_guard_free(void *memory, size_t mapped)
 {
-    if (memory == NULL)
+    if (!memory)
         return;
     size_t page = (size_t)sysconf(_SC_PAGESIZE); /* the block begins in the first page after the guard */
     munmap((char *)memory - (uintptr_t)memory % page - page, mapped);
@@ -295,7 +295,7 @@ static int build_plane(struct lc_image *image, const struct lc_film *f, unsigned
     int64_t pixels = (int64_t)f->width * f->height;
     size_t bytes = (size_t)(size * channels * pixels);
     char *memory = l.guard ? lc_guard_alloc(bytes, &image->mapped[plane]) : malloc(bytes);
-    if (memory == NULL)
+    if (!memory)
         return -1;
     image->memory[plane] = memory;
     struct lull_plane *p = lc_image_plane(image, plane);
@@ -327,7 +327,7 @@ int lc_image_build(struct lc_image *image, const struct lc_film *f, const struct
     if (layout->normaliser == LULL_NORM_WEIGHT)
         planes |= LULL_PLANE_BIT(LULL_PLANE_WEIGHT);
     *image = (struct lc_image){.descriptors = malloc((size_t)count * stride)};
-    if (image->descriptors == NULL)
+    if (!image->descriptors)
         return -1;
     memset(image->descriptors, 0xa5, (size_t)count * stride); /* garbage between, and in planes from the future */
     image->view = (struct lull_view){.struct_size = sizeof image->view,
@@ -373,7 +373,7 @@ void lc_image_poke(struct lc_image *image, int32_t x, int32_t y, float value)
                                       LULL_PLANE_ALBEDO, LULL_PLANE_NORMAL,  LULL_PLANE_DEPTH};
     for (size_t i = 0; i < sizeof planes / sizeof *planes; i++) {
         const struct lull_plane *p = lc_image_plane(image, planes[i]);
-        if (p->data == NULL)
+        if (!p->data)
             continue;
         char *at = (char *)(uintptr_t)p->data + x * p->stride_x + y * p->stride_y;
         for (uint32_t c = 0; c < lc_plane_channels[planes[i]]; c++)

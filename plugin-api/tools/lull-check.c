@@ -73,11 +73,11 @@ static void add_only(struct argp_state *state, struct arguments *a, const char *
 static void add_pair(struct argp_state *state, struct arguments *a, char *text)
 {
     char *equals = strchr(text, '=');
-    if (equals == NULL || equals == text)
+    if (!equals || equals == text)
         argp_error(state, "'%s' is not KEY=VALUE", text);
     if (a->pair_count == PAIRS_MAX)
         argp_error(state, "too many parameters");
-    if (equals != NULL)
+    if (equals)
         *equals++ = '\0';
     a->pairs[a->pair_count++] = (struct lull_pair){text, equals};
 }
@@ -132,7 +132,7 @@ static void own_directory(char dir[LULL_PATH_MAX])
         return;
     exe[length] = '\0';
     char *slash = strrchr(exe, '/');
-    if (slash != NULL && (size_t)(slash - exe) + sizeof "/../lib/lull" < LULL_PATH_MAX)
+    if (slash && (size_t)(slash - exe) + sizeof "/../lib/lull" < LULL_PATH_MAX)
         snprintf(dir, LULL_PATH_MAX, "%.*s/../lib/lull", (int)(slash - exe), exe);
 }
 
@@ -146,7 +146,7 @@ static void find(struct lc *c, const void *arg)
     struct lull_search search = {.dirs = dirs, .dir_count = 2};
     struct lull_found *found = malloc(sizeof *found);
     struct lull_error err = {.struct_size = sizeof err, .message = "out of memory"};
-    if (found == NULL || lull_open(&search, spec, found, &err) != LULL_OK) {
+    if (!found || lull_open(&search, spec, found, &err) != LULL_OK) {
         size_t last = strlen(spec) > 0 ? strlen(spec) - 1 : 0;
         int senseless = spec[0] == '\0' || spec[0] == ':' || spec[last] == ':';
         if (senseless || err.code == LULL_E_KEY || (err.code == LULL_E_IO && access(spec, R_OK) != 0))
@@ -159,7 +159,7 @@ static void find(struct lc *c, const void *arg)
     lc_note(c, "%s", found->path);
     const char *id = found->criterion->id;
     size_t length = strlen(spec), id_length = strlen(id);
-    int is_path = strchr(spec, '/') != NULL || (length > 3 && strcmp(spec + length - 3, ".so") == 0);
+    int is_path = strchr(spec, '/') || (length > 3 && strcmp(spec + length - 3, ".so") == 0);
     int names_id = length > id_length && spec[length - id_length - 1] == ':' && strcmp(spec + length - id_length, id) == 0;
     lull_entry_fn entry = lc_entry(found->path);
     if (!is_path || names_id)
@@ -175,7 +175,7 @@ static int find_table(struct lc *c, const char *id)
 {
     lull_entry_fn entry = lc_entry(c->path);
     c->criterion = NULL;
-    for (uint32_t i = 0; entry != NULL && c->criterion == NULL && entry(i) != NULL; i++)
+    for (uint32_t i = 0; entry && !c->criterion && entry(i); i++)
         if (strcmp(entry(i)->id, id) == 0)
             c->criterion = entry(i);
     return LC_EXPECT(c, c->criterion != NULL, "no criterion %s", id) ? 0 : -1;
@@ -191,7 +191,7 @@ static int prepare(struct lc *c)
         lc_skip(c, "%s", err.message);
         return -1;
     }
-    if (!LC_EXPECT(c, status == LULL_OK && instance != NULL, "create failed (%d): %s", status, err.message))
+    if (!LC_EXPECT(c, status == LULL_OK && instance, "create failed (%d): %s", status, err.message))
         return -1;
     c->req = (struct lull_requirements){.struct_size = sizeof c->req};
     status = c->criterion->requirements(instance, &c->req, &err);
@@ -211,7 +211,7 @@ struct task {
 static void run_task(struct lc *c, const void *arg)
 {
     const struct task *task = arg;
-    if (find_table(c, task->id) == 0 && (!task->needs_instance || prepare(c) == 0) && task->check != NULL)
+    if (find_table(c, task->id) == 0 && (!task->needs_instance || prepare(c) == 0) && task->check)
         task->check->run(c);
 }
 
@@ -275,7 +275,7 @@ static int check_criterion(const struct arguments *a, struct lc *c, const char *
     struct lc_report *r = malloc(sizeof *r), *made = malloc(sizeof *made);
     const struct task make_one = {id, NULL, 1};
     int result = LC_EXIT_OK;
-    if (r == NULL || made == NULL || lc_child_run(c, run_task, &make_one, a->limit_s, made) != 0) {
+    if (!r || !made || lc_child_run(c, run_task, &make_one, a->limit_s, made) != 0) {
         result = no_process();
     } else if (made->skipped) { /* the command line's parameters are wrong */
         fprintf(stderr, "lull-check: %s: %s\n", id, made->lines[0]);
@@ -298,7 +298,7 @@ static int check_spec(const struct arguments *a, const char *spec, struct totals
 {
     struct lc c = {.pairs = a->pairs, .pair_count = a->pair_count, .workers = a->workers};
     struct lc_report *r = malloc(sizeof *r);
-    if (r == NULL || lc_child_run(&c, find, spec, a->limit_s, r) != 0) {
+    if (!r || lc_child_run(&c, find, spec, a->limit_s, r) != 0) {
         free(r);
         return no_process();
     }

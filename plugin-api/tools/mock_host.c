@@ -60,7 +60,7 @@ static void *job_run(void *arg)
 static int32_t parallel_for(const struct lull_host *host, uint64_t count, lull_task_fn fn, void *arg)
 {
     struct lc_host *h = host->context;
-    if (fn == NULL) {
+    if (!fn) {
         lc_fail(h->check, "parallel_for was called without a function");
         return LULL_E_INVALID;
     }
@@ -85,7 +85,7 @@ static int32_t parallel_for(const struct lull_host *host, uint64_t count, lull_t
 static void log_line(const struct lull_host *host, int32_t level, const char *text)
 {
     struct lc_host *h = host->context;
-    if (text == NULL || level < LULL_LOG_ERROR || level > LULL_LOG_DEBUG || strchr(text, '\n') != NULL)
+    if (!text || level < LULL_LOG_ERROR || level > LULL_LOG_DEBUG || strchr(text, '\n'))
         lc_fail(h->check, "log: not one line of a known level");
 }
 
@@ -97,7 +97,7 @@ static int32_t cancelled(const struct lull_host *host)
 static const void *get_extension(const struct lull_host *host, const char *id)
 {
     struct lc_host *h = host->context;
-    if (id == NULL)
+    if (!id)
         lc_fail(h->check, "the host's get_extension was called without an id");
     return NULL;
 }
@@ -106,7 +106,7 @@ int lc_host_init(struct lc_host *h, struct lc *c, uint32_t threads)
 {
     uint32_t workers = 2 * threads < WORKERS_MAX ? 2 * threads : WORKERS_MAX;
     *h = (struct lc_host){.threads = (workers + 1) / 2, .check = c, .workers = calloc(1, sizeof *h->workers)};
-    if (h->workers == NULL) {
+    if (!h->workers) {
         lc_fail(c, "out of memory");
         return -1;
     }
@@ -127,7 +127,7 @@ int lc_host_init(struct lc_host *h, struct lc *c, uint32_t threads)
 
 void lc_host_release(struct lc_host *h)
 {
-    if (h->workers != NULL) {
+    if (h->workers) {
         pthread_mutex_destroy(&h->workers->mutex);
         pthread_cond_destroy(&h->workers->freed);
     }

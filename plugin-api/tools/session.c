@@ -127,7 +127,7 @@ static int log_add(struct lc_log *log, const struct lc_answer *answer)
     if (log->count == log->room) {
         size_t room = log->room == 0 ? 64 : 2 * log->room;
         struct lc_answer *items = realloc(log->items, room * sizeof *items);
-        if (items == NULL)
+        if (!items)
             return -1;
         log->items = items;
         log->room = room;
@@ -154,7 +154,7 @@ static int ask_arrays_init(struct ask_arrays *a, const struct lc_session *s, con
     a->blocks = malloc((size_t)count * a->block_stride + 1);
     a->decisions = malloc((size_t)count * a->decision_stride + 1);
     a->view = malloc(sizeof image->view + s->manner.slack);
-    if (a->blocks == NULL || a->decisions == NULL || a->view == NULL)
+    if (!a->blocks || !a->decisions || !a->view)
         return -1;
     struct lull_view view = image->view;
     view.struct_size += s->manner.slack;
@@ -258,7 +258,7 @@ int32_t lc_session_ask(struct lc_session *s, const struct lc_image *image, const
     double start = now_s();
     int32_t status = LULL_OK;
     uint32_t *order = malloc((count + 1) * sizeof *order);
-    if (order == NULL)
+    if (!order)
         return LULL_E_MEMORY;
     for (uint32_t i = 0; i < count; i++)
         order[i] = s->manner.ask == LC_ASK_REVERSED ? ids[count - 1 - i] : ids[i];
@@ -286,7 +286,7 @@ static int32_t begin_with_slack(struct lc_session *s, uint32_t flags, struct lul
     char *frame_memory = malloc(sizeof(struct lull_frame) + slack);
     char *rects = malloc((size_t)s->film.block_count * stride);
     int32_t status = LULL_E_MEMORY;
-    if (frame_memory != NULL && rects != NULL) {
+    if (frame_memory && rects) {
         memset(frame_memory, GARBAGE, sizeof(struct lull_frame) + slack);
         memset(rects, GARBAGE, (size_t)s->film.block_count * stride);
         for (uint32_t i = 0; i < s->film.block_count; i++)
@@ -328,7 +328,7 @@ int lc_session_open_film(struct lc_session *s, struct lc *c, const struct lc_man
     *film = (struct lc_film){0};
     s->planes = manner->required_only ? c->req.planes_required : c->req.planes_used;
     s->instance = lc_create(c, manner->host);
-    if (s->instance != NULL && begin(s, 0) == 0)
+    if (s->instance && begin(s, 0) == 0)
         return 0;
     lc_session_close(s);
     return -1;
@@ -418,7 +418,7 @@ int lc_session_step(struct lc_session *s)
     struct lull_decision *decisions = calloc(s->film.block_count, sizeof *decisions);
     uint32_t count = 0;
     int result = -1;
-    if (ids == NULL || decisions == NULL) {
+    if (!ids || !decisions) {
         lc_fail(s->check, "out of memory");
         goto out;
     }
@@ -444,9 +444,9 @@ int lc_session_steps(struct lc_session *s, int steps)
 
 void lc_session_close(struct lc_session *s)
 {
-    if (s->instance != NULL && s->open)
+    if (s->instance && s->open)
         s->check->criterion->end_frame(s->instance);
-    if (s->instance != NULL)
+    if (s->instance)
         s->check->criterion->destroy(s->instance);
     lc_film_release(&s->film);
     lc_log_release(&s->log);

@@ -103,7 +103,7 @@ static void layout_is_the_frozen_one(void **state)
     fclose(out);
     char line[200];
     const char *at = present;
-    while (fgets(line, sizeof line, in) != NULL) {
+    while (fgets(line, sizeof line, in)) {
         if (line[0] == '#')
             continue;
         size_t length = strcspn(at, "\n") + 1;

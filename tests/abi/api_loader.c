@@ -71,7 +71,7 @@ static void assert_refused(const char *dirs, const char *spec, int32_t status, c
     struct lull_found found;
     struct lull_error err;
     int32_t got = open_in(dirs, spec, &found, &err);
-    if (got != status || err.code != status || strstr(err.message, part) == NULL)
+    if (got != status || err.code != status || !strstr(err.message, part))
         fail_msg("%s: status %d (expected %d), message '%s' (expected '%s')", spec, got, status, err.message, part);
     assert_null(found.criterion);
     assert_int_equal(found.path[0], '\0');
@@ -155,7 +155,7 @@ static int32_t collect(void *context, const struct lull_found *found)
 {
     char *text = context;
     snprintf(text + strlen(text), 4000 - strlen(text), "%s ", found->criterion->id);
-    return strcmp(found->criterion->id, "first-of-pair") == 0 && strstr(text, "stop!") != NULL ? 42 : 0;
+    return strcmp(found->criterion->id, "first-of-pair") == 0 && strstr(text, "stop!") ? 42 : 0;
 }
 
 static void lists_what_is_good(void **state)
@@ -340,8 +340,8 @@ static int find_directories(void)
     snprintf(plugins, sizeof plugins, "%s/plugins", exe);
     snprintf(criteria, sizeof criteria, "%s/../../lib/lull", exe);
     const char *tmp = getenv("TMPDIR");
-    snprintf(scratch, sizeof scratch, "%s/lull-loader-XXXXXX", tmp != NULL ? tmp : "/tmp");
-    return mkdtemp(scratch) != NULL ? 0 : -1;
+    snprintf(scratch, sizeof scratch, "%s/lull-loader-XXXXXX", tmp ? tmp : "/tmp");
+    return mkdtemp(scratch) ? 0 : -1;
 }
 
 int main(void)

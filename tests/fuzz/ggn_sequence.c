@@ -52,7 +52,7 @@ static void try_block(const uint8_t *data, size_t size, int mended)
     struct ggn_seq_block b;
     struct base_err err = {0};
     uint8_t *copy = malloc(size > 0 ? size : 1);
-    if (copy == NULL)
+    if (!copy)
         return;
     memcpy(copy, data, size);
     if (mended)
@@ -67,9 +67,9 @@ static void try_block(const uint8_t *data, size_t size, int mended)
     if (pixels <= 1 << 16) {
         uint8_t *bytes = malloc(3 * pixels);
         float *floats = malloc(3 * pixels * sizeof *floats);
-        for (uint32_t i = 0; i < b.n_levels && bytes != NULL && floats != NULL; i++)
+        for (uint32_t i = 0; i < b.n_levels && bytes && floats; i++)
             decode(&b, &b.levels[i], bytes, floats);
-        if (b.reference != NULL && bytes != NULL && floats != NULL)
+        if (b.reference && bytes && floats)
             decode(&b, b.reference, bytes, floats);
         free(floats);
         free(bytes);

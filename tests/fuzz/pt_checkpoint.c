@@ -25,7 +25,7 @@ static const char *write_file(const uint8_t *data, size_t size)
     snprintf(path, sizeof path, "/tmp/pt_checkpoint_%ld.ckp", (long)getpid());
     uint32_t crc = (uint32_t)crc32_z(0, data, size);
     FILE *f = fopen(path, "wb");
-    if (f == NULL)
+    if (!f)
         abort();
     fwrite(data, 1, size, f);
     fwrite(&crc, 1, sizeof crc, f);
@@ -40,7 +40,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     struct pt_render *render = NULL;
     struct base_err err = {0};
     struct base_threads *threads = base_threads_create(1, &err);
-    if (threads == NULL || pt_render_create(&config, NULL, no_kernel, threads, NULL, &render, &err) != 0)
+    if (!threads || pt_render_create(&config, NULL, no_kernel, threads, NULL, &render, &err) != 0)
         abort();
     const char *path = write_file(data, size);
     int rc = pt_checkpoint_load(path, render, "seed=1\n", &err);
@@ -49,7 +49,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         enum pt_render_outcome outcome;
         if (pt_render_run(render, &hooks, &outcome, &err) != 0)
             abort();
-    } else if (err.text[0] == '\0' || strchr(err.text, '\n') != NULL) {
+    } else if (err.text[0] == '\0' || strchr(err.text, '\n')) {
         abort();
     }
     unlink(path);

@@ -37,15 +37,15 @@ static int read_memory(void *data, const char *path, char **bytes, size_t *size,
         from = in->data;
         *size = in->size;
     }
-    for (size_t i = 0; i < sizeof others / sizeof others[0] && from == NULL; i++)
+    for (size_t i = 0; i < sizeof others / sizeof others[0] && !from; i++)
         if (ends_with(path, others[i].end)) {
             from = others[i].text;
             *size = strlen(others[i].text);
         }
-    if (from == NULL && strcmp(path, "main") != 0)
+    if (!from && strcmp(path, "main") != 0)
         return base_fail(err, BASE_EIO, "%s: no such file", path);
     *bytes = malloc(*size + 1);
-    if (*bytes == NULL)
+    if (!*bytes)
         return base_fail_nomem(err, path);
     if (*size > 0)
         memcpy(*bytes, from, *size);
@@ -62,10 +62,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     struct base_err err = {0};
     struct pt_scene *scene = calloc(1, sizeof *scene);
     struct pt_builder *b = calloc(1, sizeof *b);
-    if (scene == NULL || b == NULL || pt_builder_init(b, scene, &defaults, &options, &source, &err) != 0)
+    if (!scene || !b || pt_builder_init(b, scene, &defaults, &options, &source, &err) != 0)
         abort();
     int rc = pt_pbrt_read(b, "main");
-    if ((rc) != (err.text[0] != '\0') || strchr(err.text, '\n') != NULL)
+    if ((rc) != (err.text[0] != '\0') || strchr(err.text, '\n'))
         abort();
     pt_builder_release(b);
     pt_arena_release(&scene->arena);

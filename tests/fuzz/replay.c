@@ -8,14 +8,14 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 static int replay(const char *path)
 {
     FILE *f = fopen(path, "rb");
-    if (f == NULL || fseek(f, 0, SEEK_END) != 0) {
+    if (!f || fseek(f, 0, SEEK_END) != 0) {
         fprintf(stderr, "replay: cannot read %s\n", path);
         return 1;
     }
     long size = ftell(f);
     rewind(f);
     uint8_t *data = malloc(size > 0 ? (size_t)size : 1);
-    if (data == NULL || size < 0 || fread(data, 1, (size_t)size, f) != (size_t)size) {
+    if (!data || size < 0 || fread(data, 1, (size_t)size, f) != (size_t)size) {
         fprintf(stderr, "replay: cannot read %s\n", path);
         free(data);
         fclose(f);

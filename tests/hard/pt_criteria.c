@@ -116,7 +116,7 @@ int main(void)
 {
     char path[4096];
     const char *build = getenv("BUILD");
-    snprintf(path, sizeof path, "%s/lib/lull", build != NULL ? build : "build");
+    snprintf(path, sizeof path, "%s/lib/lull", build ? build : "build");
     setenv("LULL_PLUGIN_PATH", path, 1);
     const struct CMUnitTest tests[] = {cmocka_unit_test(special_blocks), cmocka_unit_test(million_samples)};
     return cmocka_run_group_tests(tests, NULL, NULL);

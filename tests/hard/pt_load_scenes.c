@@ -45,9 +45,9 @@ static int load_folder(const char *folder, pt_effects *effects, int *count)
         /* parts of another scene, without a world of their own */
         if (strcmp(entries[i]->d_name, "geometry.pbrt") != 0 && strcmp(entries[i]->d_name, "materials.pbrt") != 0) {
             struct pt_scene *scene = load(path);
-            bad += scene == NULL;
+            bad += !scene;
             ++*count;
-            if (scene != NULL)
+            if (scene)
                 *effects |= pt_scene_effects(scene);
             pt_scene_destroy(scene);
         }
@@ -76,7 +76,7 @@ static void other_peoples(void **state)
     DIR *dir = opendir(root);
     pt_effects effects = 0;
     int count = 0, bad = 0;
-    if (dir == NULL) {
+    if (!dir) {
         print_message("no ../shared/scenes here\n");
         skip();
     }

@@ -34,7 +34,7 @@ static int setup(void **state)
         display[i] = (uint8_t)(120 + i % 9);
         other[i] = (uint8_t)(118 + i % 13);
     }
-    if (mkdtemp(dir) == NULL)
+    if (!mkdtemp(dir))
         return -1;
     snprintf(block_path, sizeof block_path, "%s/block-00000.lseq", dir);
     return 0;

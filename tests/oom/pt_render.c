@@ -23,7 +23,7 @@ static int setup(void **state)
     struct base_err err;
     (void)state;
     pool = base_threads_create(1, &err);
-    return mkdtemp(folder) != NULL && pool != NULL ? 0 : -1;
+    return mkdtemp(folder) && pool ? 0 : -1;
 }
 
 static int teardown(void **state)

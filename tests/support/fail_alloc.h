@@ -48,7 +48,7 @@ void *realloc(void *old, size_t size);
 void *malloc(size_t size)
 {
     static void *(*next)(size_t);
-    if (next == NULL)
+    if (!next)
         fail_find("malloc", &next);
     return fail_now() ? NULL : next(size);
 }
@@ -59,7 +59,7 @@ void *calloc(size_t count, size_t size)
     static int finding;
     static _Alignas(16) char early[4096]; /* dlsym itself may ask for memory */
     static size_t early_used;
-    if (next == NULL) {
+    if (!next) {
         size_t bytes = (count * size + 15) & ~(size_t)15;
         if (finding)
             return early_used + bytes <= sizeof early ? early + (early_used += bytes) - bytes : NULL;
@@ -72,7 +72,7 @@ void *calloc(size_t count, size_t size)
 void *realloc(void *old, size_t size)
 {
     static void *(*next)(void *, size_t);
-    if (next == NULL)
+    if (!next)
         fail_find("realloc", &next);
     return fail_now() ? NULL : next(old, size);
 }

@@ -64,7 +64,7 @@ static void add_frame(struct ggn_seq_builder *w, const struct film *f, const str
     float *mean = malloc(values * sizeof *mean), *half = malloc(values * sizeof *half);
     uint8_t *display = malloc(values);
     double dammertz = 0.0, rse = 0.0;
-    assert_true(mean != NULL && half != NULL && display != NULL);
+    assert_true(mean && half && display);
     for (uint32_t i = 0; i < values; i++) {
         mean[i] = (float)((f->sum[0][i] + f->sum[1][i]) / f->spp);
         half[i] = (float)((f->sum[0][i] - f->sum[1][i]) / f->spp);
@@ -89,7 +89,7 @@ static void build(struct ggn_seq_builder *w, const struct ggn_noise *n, int32_t 
     uint32_t values = 3 * n->width * n->height;
     struct film film = {.sum = {calloc(values, sizeof(double)), calloc(values, sizeof(double))}};
     int full_done = 0;
-    assert_true(film.sum[0] != NULL && film.sum[1] != NULL);
+    assert_true(film.sum[0] && film.sum[1]);
     assert_int_equal(ggn_seq_builder_init(w, n->width, n->height, x0, 0, id, n->seed, NULL), 0);
     for (uint32_t i = 0; i < n->n_levels; i++) {
         int full = !full_done && (n->levels[i] >= 320 || i + 1 == n->n_levels);
@@ -130,7 +130,7 @@ void ggn_noise_view(const char *dir, const char *scene, const struct ggn_noise *
     struct ggn_noise one = *noise;
     char path[1024];
     uint32_t *levels = malloc(noise->n_levels * sizeof *levels);
-    assert_true(entries != NULL && labels != NULL && levels != NULL);
+    assert_true(entries && labels && levels);
     memcpy(levels, noise->levels, noise->n_levels * sizeof *levels);
     struct ggn_manifest m = {.width = noise->width * (uint32_t)n, .height = noise->height, .block = noise->width, .reference_spp = noise->reference_spp,
                              .reference_independent = 1, .n_levels = noise->n_levels, .levels = levels, .n_blocks = (uint32_t)n, .blocks = entries};

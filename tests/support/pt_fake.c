@@ -60,7 +60,7 @@ static int32_t create(const struct lull_host *host, const struct lull_pair *pair
     (void)host;
     (void)err;
     struct lull_instance *i = calloc(1, sizeof *i);
-    if (i == NULL)
+    if (!i)
         return LULL_E_MEMORY;
     i->at = 32;
     for (uint32_t k = 0; k < count; k++)
@@ -179,8 +179,8 @@ int pt_fake_render(const struct pt_render_config *config, pt_kernel *kernel, int
     struct base_err err = {0};
     *criterion = NULL;
     *pool = base_threads_create(threads, &err);
-    int rc = *pool != NULL ? 0 : BASE_ENOMEM;
-    if (!rc && at != NULL)
+    int rc = *pool ? 0 : BASE_ENOMEM;
+    if (!rc && at)
         rc = pt_criterion_create_table(pt_fake_criterion(), &pair, 1, *pool, NULL, NULL, criterion, &err);
     if (!rc)
         rc = pt_render_create(config, NULL, kernel, *pool, *criterion, render, &err);

@@ -24,7 +24,7 @@ static int load(const char *text, int strict, int *warnings, struct pt_scene **s
     int ignored = 0;
     struct pt_source_single single = {"t.pbrt", text, strlen(text)};
     struct pt_source source = pt_source_from_memory(&single);
-    struct pt_load_options options = {.strict = strict, .warn = count_warning, .warn_data = warnings != NULL ? warnings : &ignored};
+    struct pt_load_options options = {.strict = strict, .warn = count_warning, .warn_data = warnings ? warnings : &ignored};
     return pt_scene_load_source("t.pbrt", &source, &options, scene, defaults, err);
 }
 
@@ -35,7 +35,7 @@ struct pt_scene *text_scene(const char *text, struct pt_scene_defaults *defaults
     struct base_err err = {0};
     if (load(text, 0, warnings, &scene, &found, &err) != 0)
         fail_msg("%s", err.text);
-    if (defaults != NULL)
+    if (defaults)
         *defaults = found;
     return scene;
 }

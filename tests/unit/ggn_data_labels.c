@@ -19,7 +19,7 @@ static char root[] = "/tmp/ggn_labels.XXXXXX";
 static int setup(void **state)
 {
     (void)state;
-    return mkdtemp(root) == NULL ? -1 : 0;
+    return !mkdtemp(root) ? -1 : 0;
 }
 
 static int teardown(void **state)

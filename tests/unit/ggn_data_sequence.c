@@ -111,7 +111,7 @@ static char block_path[64];
 static int setup(void **state)
 {
     (void)state;
-    if (mkdtemp(dir) == NULL)
+    if (!mkdtemp(dir))
         return -1;
     snprintf(block_path, sizeof block_path, "%s/block-00009.lseq", dir);
     return 0;

@@ -37,7 +37,7 @@ static int setup(void **state)
     char dir[128], path[128];
     struct base_err err = {0};
     int skipped;
-    if (mkdtemp(root) == NULL)
+    if (!mkdtemp(root))
         return -1;
     for (int v = 0; v < 3; v++) {
         double sigma[BLOCKS];
@@ -54,7 +54,7 @@ static int setup(void **state)
     fclose(f);
     threads = base_threads_create(2, &err);
     struct ggn_eval_options o = {.dir = root, .window = WINDOW, .quality = 1, .recorded = 1};
-    if (threads == NULL || ggn_eval_set_load(&set, &o, threads, &skipped, &err) != 0)
+    if (!threads || ggn_eval_set_load(&set, &o, threads, &skipped, &err) != 0)
         fail_msg("%s", err.text);
     return 0;
 }
@@ -204,7 +204,7 @@ static void network(void **state)
     struct base_err err = {0};
     struct ggn_method m;
     struct ggn_model *model = ggn_model_create(&hyper, &err);
-    if (model == NULL)
+    if (!model)
         fail_msg("%s", err.text);
     struct ggn_policy policy = ggn_policy_default();
     policy.first_spp = 20;

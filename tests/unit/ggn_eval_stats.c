@@ -101,7 +101,7 @@ static void published_table(void **state)
 {
     (void)state;
     FILE *f = fopen("../shared/human/human-thresholds.csv", "r");
-    if (f == NULL) {
+    if (!f) {
         print_message("# SKIP ../shared is absent\n");
         skip();
     }

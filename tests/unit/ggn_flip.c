@@ -34,7 +34,7 @@ static void published_figures(void **state)
     char path[128];
     snprintf(path, sizeof path, sequence, 10000);
     FILE *f = fopen(path, "rb");
-    if (f == NULL) {
+    if (!f) {
         print_message("# SKIP ../shared is absent\n");
         skip();
     }

@@ -32,7 +32,7 @@ static void shell(const char *format, const char *a, const char *b)
 static int setup(void **state)
 {
     (void)state;
-    return mkdtemp(root) == NULL ? -1 : 0;
+    return !mkdtemp(root) ? -1 : 0;
 }
 
 static int teardown(void **state)
@@ -157,7 +157,7 @@ static void refuse(const char *name, void (*spoil)(const char *dir), const char 
     snprintf(out, sizeof out, "%s/refused", root);
     if (ggn_sin3d_import_view(dir, out, &plain, &labelled, &err) != BASE_EINVAL)
         fail_msg("%s was accepted", name);
-    if (strstr(err.text, why) == NULL)
+    if (!strstr(err.text, why))
         fail_msg("%s: '%s' does not say '%s'", name, err.text, why);
     shell("rm -rf %s%s", out, "");
 }

@@ -23,11 +23,11 @@ struct files {
 static int read_files(void *data, const char *path, char **bytes, size_t *size, struct base_err *err)
 {
     const struct files *f = data;
-    for (int i = 0; i < 4 && f->names[i] != NULL; i++)
+    for (int i = 0; i < 4 && f->names[i]; i++)
         if (strcmp(f->names[i], path) == 0) {
             *bytes = strdup(f->texts[i]);
             *size = strlen(f->texts[i]);
-            return *bytes != NULL ? 0 : base_fail_nomem(err, path);
+            return *bytes ? 0 : base_fail_nomem(err, path);
         }
     return base_fail(err, BASE_EIO, "%s: no such file", path);
 }

@@ -17,7 +17,7 @@ static char dir[] = "/tmp/pt_oiio_XXXXXX";
 static int make_dir(void **state)
 {
     (void)state;
-    return mkdtemp(dir) == NULL;
+    return !mkdtemp(dir);
 }
 
 static int remove_dir(void **state)

@@ -45,7 +45,7 @@ static int setup(void **state)
     info = (struct pt_output_info){.scene = "dir/fake-view1.pbrt", .params = &param, .param_count = 1,
                                    .effects = PT_FX_ALPHA | PT_FX_MOTION, .kernel = "fake", .threads = 2, .aov = PT_FILM_AUX,
                                    .scene_bytes = 1000};
-    if (mkdtemp(folder) == NULL)
+    if (!mkdtemp(folder))
         return -1;
     return pt_fake_render(&config, pt_fake_nan, 2, "32", &render, &criterion, &pool);
 }
@@ -171,7 +171,7 @@ static void preview_is_srgb(void **state)
     double rgb[3];
     assert_int_equal(pt_output_preview(in_folder("a.png"), render, &err), 0);
     assert_int_equal(pt_oiio_read(in_folder("a.png"), &image, &err), 0);
-    assert_true(image.width == 57 && image.height == 35 && image.channels == 3 && image.u8 != NULL);
+    assert_true(image.width == 57 && image.height == 35 && image.channels == 3 && image.u8);
     pt_film_mean(&render->film, pt_film_index(&render->film, 13, 15), render->blocks.list[0].spp, rgb);
     for (int c = 0; c < 3; c++)
         assert_int_equal(image.u8[3 * (10 * 57 + 10) + c], pt_srgb_u8(rgb[c]));

@@ -127,7 +127,7 @@ static int setup(void **state)
     struct base_err err = {0};
     strcpy(folder, "/tmp/pt_sequence_XXXXXX");
     pool = base_threads_create(2, &err);
-    return mkdtemp(folder) != NULL && pool != NULL ? 0 : -1;
+    return mkdtemp(folder) && pool ? 0 : -1;
 }
 
 static int teardown(void **state)

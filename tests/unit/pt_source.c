@@ -20,7 +20,7 @@ static void packed_files(void **state)
     char folder[] = "/tmp/pt_source_XXXXXX", path[64], *text = malloc(SIZE), *bytes = NULL;
     size_t size = 0;
     struct base_err err = {0};
-    assert_true(mkdtemp(folder) != NULL && text != NULL);
+    assert_true(mkdtemp(folder) && text);
     snprintf(path, sizeof path, "%s/a.gz", folder);
     for (int i = 0; i < SIZE; i++)
         text[i] = (char)('a' + i % 7 + (i >> 12) % 11);

@@ -128,7 +128,7 @@ static double pixel(const struct lull_instance *in, const struct lull_view *view
     }
     if (fault_of(in) == ONLY_F32)
         color.type = LULL_TYPE_F32;
-    if (fault_of(in) == GLOBAL_SPP && view->all != NULL)
+    if (fault_of(in) == GLOBAL_SPP && view->all)
         b = view->all;
     double rgb[3];
     ex_span(view, &color, b, x, y, 1, 3, rgb);
@@ -137,15 +137,15 @@ static double pixel(const struct lull_instance *in, const struct lull_view *view
 
 static double mean_of(const struct lull_instance *in, const struct lull_view *view, const struct lull_block *block, int *bad)
 {
-    int32_t halo = view->all != NULL ? 1 : 0;
+    int32_t halo = view->all ? 1 : 0;
     double sum = 0, count = 0;
     for (int32_t y = block->y0 - halo; y < block->y1 + halo; y++)
         for (int32_t x = block->x0 - halo; x < block->x1 + halo; x++) {
             int inside = x >= view->x0 && y >= view->y0 && x < view->x1 && y < view->y1;
             if (!inside && fault_of(in) != READS_BEYOND)
                 continue;
-            const struct lull_block *b = inside && view->all != NULL ? owner(view, x, y) : block;
-            if (b == NULL)
+            const struct lull_block *b = inside && view->all ? owner(view, x, y) : block;
+            if (!b)
                 continue;
             double v = pixel(in, view, b, x, y);
             if (isfinite(v)) {
@@ -286,17 +286,17 @@ static void create_faults(struct faulty *f)
 static int chosen(const struct lull_pair *pairs, uint32_t count, enum fault fault)
 {
     double number;
-    return count > 0 && pairs != NULL && pairs->key != NULL && strcmp(pairs->key, "fault") == 0 &&
+    return count > 0 && pairs && pairs->key && strcmp(pairs->key, "fault") == 0 &&
            ex_number(pairs->value, &number) && number == (double)fault;
 }
 
 static int32_t create(const struct lull_host *host, const struct lull_pair *pairs, uint32_t pair_count, uint32_t pair_stride,
                       struct lull_instance **instance, struct lull_error *err)
 {
-    if (instance == NULL)
+    if (!instance)
         return ex_fail(err, LULL_E_INVALID, "create: no place for the instance");
     struct lull_host whole = {.struct_size = sizeof whole};
-    if (chosen(pairs, pair_count, SHORT_STRUCT) && host != NULL) {
+    if (chosen(pairs, pair_count, SHORT_STRUCT) && host) {
         whole = *host;
         whole.struct_size = sizeof whole;
         host = &whole;
@@ -309,12 +309,12 @@ static int32_t create(const struct lull_host *host, const struct lull_pair *pair
     if (status != LULL_OK) {
         if (chosen(pairs, pair_count, TOUCHES_INSTANCE))
             *instance = NULL;
-        if (chosen(pairs, pair_count, ANONYMOUS_KEY) && err != NULL)
+        if (chosen(pairs, pair_count, ANONYMOUS_KEY) && err)
             ex_fail(err, status, "cannot");
         return status;
     }
     struct faulty *f = calloc(1, sizeof *f);
-    if (f == NULL && fault_of(base) != UNCHECKED_MALLOC) {
+    if (!f && fault_of(base) != UNCHECKED_MALLOC) {
         ex_destroy(base);
         return ex_fail(err, LULL_E_MEMORY, "out of memory");
     }
@@ -342,7 +342,7 @@ static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *fr
     struct faulty *f = faulty(in);
     struct lull_instance before = *in;
     struct lull_frame lenient;
-    if (frame != NULL && LULL_HAS(struct lull_frame, frame, rgb_to_xyz)) {
+    if (frame && LULL_HAS(struct lull_frame, frame, rgb_to_xyz)) {
         lenient = *frame;
         if (fault_of(in) == TWO_FRAMES)
             lenient.flags |= LULL_FRAME_RESTART;
@@ -354,11 +354,11 @@ static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *fr
     if (status != LULL_OK)
         return status;
     struct history *history = calloc(frame->block_count, sizeof *history);
-    if (history == NULL) {
+    if (!history) {
         *in = before;
         return ex_fail(err, LULL_E_MEMORY, "out of memory");
     }
-    if (fault_of(in) == NO_RESTART && f->history != NULL && f->history_count == frame->block_count)
+    if (fault_of(in) == NO_RESTART && f->history && f->history_count == frame->block_count)
         memcpy(history, f->history, f->history_count * sizeof *history);
     free(f->history);
     f->history = history;
@@ -372,7 +372,7 @@ static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, 
                         uint32_t block_stride, struct lull_decision *decisions, uint32_t decision_stride, uint32_t count,
                         struct lull_error *err)
 {
-    if (fault_of(in) == ANY_ID && count > 0 && blocks != NULL && blocks->id >= in->block_count)
+    if (fault_of(in) == ANY_ID && count > 0 && blocks && blocks->id >= in->block_count)
         return LULL_OK;
     int32_t status = ex_evaluate(in, view, blocks, block_stride, decisions, decision_stride, count, err);
     if (status == LULL_OK && fault_of(in) == WIDE_WRITE && count > 0 && decision_stride >= sizeof *decisions + 8)
@@ -398,7 +398,7 @@ static void end_frame(struct lull_instance *in)
 
 static void destroy(struct lull_instance *in)
 {
-    if (in != NULL)
+    if (in)
         free(faulty(in)->history);
     free(in);
 }
@@ -422,7 +422,7 @@ static int32_t load(struct lull_instance *in, const struct lull_reader *reader, 
     if (in->block_count == 0)
         return ex_fail(err, LULL_E_STATE, "load: no frame is open");
     struct history *fresh = calloc(in->block_count, sizeof *fresh);
-    if (fresh == NULL)
+    if (!fresh)
         return ex_fail(err, LULL_E_MEMORY, "out of memory");
     if (fault_of(in) == LOAD_DIRTY)
         memset(faulty(in)->history, 0, in->block_count * sizeof *fresh);
