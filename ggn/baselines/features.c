@@ -6,13 +6,13 @@
 
 #include <lapacke.h>
 
-#include "data/image.h"
+#include "base/colour.h"
 
 void ggn_lightness(const uint8_t *rgb, size_t pixels, double *l)
 {
     double linear[256];
     for (int i = 0; i < 256; i++)
-        linear[i] = ggn_srgb_eotf(i / 255.0);
+        linear[i] = base_srgb_eotf(i / 255.0);
     for (size_t i = 0; i < pixels; i++) {
         /* Y row of the sRGB matrix with the digits that the published code's library has */
         double y = 0.212671 * linear[rgb[i]] + 0.715160 * linear[rgb[pixels + i]] + 0.072169 * linear[rgb[2 * pixels + i]];

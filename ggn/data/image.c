@@ -1,8 +1,9 @@
 #include "data/image.h"
 
-#include <math.h>
 #include <pthread.h>
 #include <stdlib.h>
+
+#include "base/colour.h"
 
 void ggn_image8_release(struct ggn_image8 *image)
 {
@@ -16,22 +17,12 @@ void ggn_imagef_release(struct ggn_imagef *image)
     *image = (struct ggn_imagef){0};
 }
 
-double ggn_srgb_oetf(double linear)
-{
-    return linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1.0 / 2.4) - 0.055;
-}
-
-double ggn_srgb_eotf(double encoded)
-{
-    return encoded <= 0.04045 ? encoded / 12.92 : pow((encoded + 0.055) / 1.055, 2.4);
-}
-
 static float decode_table[256];
 
 static void fill_table(void)
 {
     for (int i = 0; i < 256; i++)
-        decode_table[i] = (float)ggn_srgb_eotf(i / 255.0);
+        decode_table[i] = (float)base_srgb_eotf(i / 255.0);
 }
 
 const float *ggn_srgb_table(void)

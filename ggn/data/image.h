@@ -43,11 +43,7 @@ int ggn_imagef_read_channel(const char *path, const char *channel, struct ggn_im
 /* Writes an 8-bit RGB PNG atomically. data [height][width][3]. */
 int ggn_image8_write_png(const char *path, const uint8_t *data, int width, int height, struct base_err *err);
 
-/* The sRGB transfer functions (IEC 61966-2-1). Codes of linear values come from ggn_preprocess. */
-double ggn_srgb_oetf(double linear);
-double ggn_srgb_eotf(double encoded);
-
-/* 256-entry table code -> linear. Borrowed for ever. */
+/* 256-entry table: display code -> linear. Borrowed for ever. Codes of linear values come from ggn_preprocess. */
 const float *ggn_srgb_table(void);
 
 enum ggn_colormap { GGN_MAGMA, GGN_VIRIDIS };

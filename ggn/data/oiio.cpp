@@ -1,5 +1,6 @@
 // OpenImageIO behind ggn/data/image.h: the only C++ in ggn. Exceptions end here.
 extern "C" {
+#include "base/colour.h"
 #include "base/files.h"
 }
 
@@ -131,7 +132,7 @@ int read_float(const char *path, struct ggn_imagef *image, struct base_err *err)
         return rc;
     if (!is_float)
         for (size_t i = 0, n = (size_t)out.width * (size_t)out.height * 3; i < n; i++)
-            out.data[i] = (float)ggn_srgb_eotf(out.data[i]);
+            out.data[i] = (float)base_srgb_eotf(out.data[i]);
     *image = out;
     return 0;
 }

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "data/image.h"
+#include "base/colour.h"
 
 size_t ggn_plane_raw_bytes(uint32_t plane, uint32_t width, uint32_t height)
 {
@@ -141,7 +141,7 @@ uint16_t ggn_half_from_float(float value)
 /* Linear bounds of the display codes: code d stands for [edge[d], edge[d+1]). */
 static double code_edge(int d)
 {
-    return d <= 0 ? 0.0 : ggn_srgb_eotf((d - 0.5) / 255.0);
+    return d <= 0 ? 0.0 : base_srgb_eotf((d - 0.5) / 255.0);
 }
 
 uint8_t ggn_fine_encode(uint8_t display, double x)

@@ -40,10 +40,4 @@ double ggn_fine_decode(uint8_t display, uint8_t fine);
 uint8_t ggn_halflog_encode(double value);
 double ggn_halflog_decode(uint8_t code);
 
-/* Luminance weights of Rec. 709. */
-static inline double ggn_luminance(double r, double g, double b)
-{
-    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
-}
-
 #endif

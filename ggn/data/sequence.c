@@ -6,6 +6,7 @@
 
 #include <zlib.h>
 
+#include "base/colour.h"
 #include "base/files.h"
 #include "data/image.h"
 
@@ -336,7 +337,7 @@ int ggn_seq_half_luminance(const struct ggn_seq_block *b, const struct ggn_seq_r
         return base_fail_nomem(err, "half buffer");
     rc = load_f16(b, r, GGN_PLANE_HALF_F16, rgb, err);
     for (size_t i = 0; i < pixels && !rc; i++)
-        y[i] = (float)ggn_luminance((double)rgb[i], (double)rgb[pixels + i], (double)rgb[2 * pixels + i]);
+        y[i] = (float)base_luminance((double)rgb[i], (double)rgb[pixels + i], (double)rgb[2 * pixels + i]);
     free(rgb);
     return rc;
 }
@@ -426,7 +427,7 @@ static void code_fine(const struct ggn_seq_frame *f, size_t n, uint8_t *raw)
 static void code_halflog(const float *half, size_t pixels, uint8_t *raw)
 {
     for (size_t i = 0; i < pixels; i++)
-        raw[i] = ggn_halflog_encode(ggn_luminance((double)half[i], (double)half[pixels + i], (double)half[2 * pixels + i]));
+        raw[i] = ggn_halflog_encode(base_luminance((double)half[i], (double)half[pixels + i], (double)half[2 * pixels + i]));
 }
 
 static int add_planes(struct ggn_seq_builder *w, const struct ggn_seq_frame *f, uint8_t *raw, uint32_t *count, struct base_err *err)

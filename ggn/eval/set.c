@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/colour.h"
 #include "nn/loss.h"
 #include "observer/flip.h"
 
@@ -199,7 +200,7 @@ static int extrapolate(struct ggn_eval_set *s, const struct ggn_eval_block *bloc
     if (!rc)
         rc = ggn_seq_half_luminance(p, last, planes + 3 * pixels, err);
     for (size_t i = 0; i < pixels && !rc; i++)
-        planes[i] = (float)ggn_luminance((double)planes[i], (double)planes[pixels + i], (double)planes[2 * pixels + i]);
+        planes[i] = (float)base_luminance((double)planes[i], (double)planes[pixels + i], (double)planes[2 * pixels + i]);
     for (size_t i = from; i < block->end && !rc; i++) {
         double scale = sqrt(last->spp / s->spp[i]);
         s->seconds[i] = ggn_seq_stat(last, "seconds") * s->spp[i] / last->spp;

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "data/image.h"
+#include "base/colour.h"
 
 static const double pi = 3.14159265358979323846;
 
@@ -135,7 +135,7 @@ static void to_ycxcz(const struct colour *c, const uint8_t *image, size_t n, flo
 {
     double linear[256];
     for (int i = 0; i < 256; i++)
-        linear[i] = ggn_srgb_eotf(i / 255.0);
+        linear[i] = base_srgb_eotf(i / 255.0);
     for (size_t i = 0; i < n; i++) {
         double rgb[3] = {linear[image[3 * i]], linear[image[3 * i + 1]], linear[image[3 * i + 2]]}, xyz[3];
         rgb_to_relative_xyz(c, rgb, xyz);

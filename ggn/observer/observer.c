@@ -7,6 +7,7 @@
 
 #include <cjson/cJSON.h>
 
+#include "base/colour.h"
 #include "base/files.h"
 #include "data/image.h"
 #include "model/preprocess.h"
@@ -82,7 +83,7 @@ static void lightness(const uint8_t *rgb, size_t n, float *out)
 {
     const float *linear = ggn_srgb_table();
     for (size_t i = 0; i < n; i++) {
-        double y = ggn_luminance((double)linear[rgb[3 * i]], (double)linear[rgb[3 * i + 1]], (double)linear[rgb[3 * i + 2]]);
+        double y = base_luminance((double)linear[rgb[3 * i]], (double)linear[rgb[3 * i + 1]], (double)linear[rgb[3 * i + 2]]);
         out[i] = (float)(y > 216.0 / 24389.0 ? 116.0 * cbrt(y) - 16.0 : y * 24389.0 / 27.0);
     }
 }

@@ -2,6 +2,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/colour.h"
 #include "pbrt/build.h"
 
 static const double pi = 3.14159265358979323846;
@@ -137,7 +138,7 @@ static int32_t float_rgb(struct pt_builder *b, int32_t id)
             float v = map.type == PT_PIXEL_FLOAT ? ((const float *)map.pixels)[at]
                                                  : (float)((const uint8_t *)map.pixels)[at] / 255.0f;
             if (map.type == PT_PIXEL_U8_SRGB)
-                v = v <= 0.04045f ? v / 12.92f : powf((v + 0.055f) / 1.055f, 2.4f);
+                v = base_srgb_eotf_f32(v);
             pixels[3 * i + (size_t)k] = fmaxf(v, 0);
         }
     map.type = PT_PIXEL_FLOAT;

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/clock.h"
+#include "base/colour.h"
 #include "image/oiio.h"
 #include "pbrt/build.h"
 #include "pbrt/number.h"
@@ -32,11 +33,6 @@ static double parse_encoding(const char *encoding)
     if (strncmp(encoding, "gamma ", 6) == 0 && pt_number_parse(encoding + 6, strlen(encoding + 6), &gamma) && gamma > 0.05 && gamma < 20)
         return gamma;
     return -1;
-}
-
-static float decode_srgb(float v)
-{
-    return v <= 0.04045f ? v / 12.92f : powf((v + 0.055f) / 1.055f, 2.4f);
 }
 
 /* Two channels (grey and alpha) become four, alpha that is 1 everywhere goes: the renderer knows 1, 3 and 4 channels.
@@ -78,7 +74,7 @@ static int convert(struct pt_builder *b, const struct pt_oiio_image *image, doub
             for (size_t j = 0; j < k; j++) {
                 float v = image->f32[i * c + (size_t)from[j]];
                 if (!image->is_float_file && j < 3 && encoding != 1)
-                    v = encoding == 0 ? decode_srgb(v) : powf(v, (float)encoding);
+                    v = encoding == 0 ? base_srgb_eotf_f32(v) : powf(v, (float)encoding);
                 /* An infinite pixel is a half float that overflowed: the largest half. */
                 pixels[i * k + j] = isfinite(v) ? v : v > 0 ? 65504.0f : 0;
             }

@@ -3,12 +3,14 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "base/colour.h"
+
 /* What the criteria halfbuf and variance call a settled pixel by default. */
 static const double tail_error = 0.5, floor_y = 0.02;
 
 static double luminance(const double *rgb)
 {
-    return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
+    return base_luminance(rgb[0], rgb[1], rgb[2]);
 }
 
 static int ascending(const void *a, const void *b)

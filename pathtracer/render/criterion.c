@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "base/colour.h"
 
 struct pt_criterion {
     const struct lull_criterion *table;
@@ -285,8 +286,7 @@ int pt_criterion_begin(struct pt_criterion *c, const struct pt_criterion_frame *
         .spp_min = frame->spp_min,
         .spp_max = frame->spp_max,
         .seed = frame->seed,
-        /* IEC 61966-2-1 primaries and white; row 2 as in v3_luminance */
-        .rgb_to_xyz = {0.4124564, 0.3575761, 0.1804375, 0.2126729, 0.7151522, 0.0721750, 0.0193339, 0.1191920, 0.9503041},
+        .rgb_to_xyz = BASE_RGB_TO_XYZ,
     };
     struct lull_error e = {.struct_size = sizeof e};
     int32_t code = c->table->begin_frame(c->instance, &f, &e);

@@ -12,6 +12,7 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "base/colour.h"
 #include "base/err.h"
 #include "scene/vec.h"
 #include "integ/integrator.h"
@@ -157,7 +158,7 @@ static inline int pt_film_add(struct pt_film_pixel *p, uint32_t planes, uint32_t
         for (int c = 0; c < 3; c++)
             p->half[c] += rgb[c];
     if (planes & PT_FILM_MOMENT2) {
-        double luminance = 0.2126729 * rgb[0] + 0.7151522 * rgb[1] + 0.0721750 * rgb[2];
+        double luminance = base_luminance(rgb[0], rgb[1], rgb[2]);
         p->moment2 += luminance * luminance;
     }
     return 1;

@@ -6,7 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "image/tonemap.h"
+#include "base/colour.h"
+
 
 enum { DISPLAY = 1, FINE = 2, HALF_LOG = 3, MEAN_F16 = 4, HALF_F16 = 5 };
 enum { FILTER_SHUFFLE = 1, FILTER_AVERAGE = 2, FILTER_SUBTRACT_GREEN = 4 };
@@ -32,10 +33,10 @@ uint16_t pt_lseq_half_float(double x)
 
 uint8_t pt_lseq_fine(double x, uint8_t d)
 {
-    double lo = d > 0 ? pt_srgb_decode((d - 0.5) / 255.0) : 0.0;
+    double lo = d > 0 ? base_srgb_eotf((d - 0.5) / 255.0) : 0.0;
     double q;
     if (d < 255) {
-        double hi = pt_srgb_decode((d + 0.5) / 255.0);
+        double hi = base_srgb_eotf((d + 0.5) / 255.0);
         q = floor(8.0 * (x - lo) / (hi - lo));
         return (uint8_t)fmin(fmax(q, 0.0), 7.0);
     }
@@ -54,7 +55,7 @@ uint8_t pt_lseq_half_log(double y)
 
 static double luminance(const double *rgb)
 {
-    return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
+    return base_luminance(rgb[0], rgb[1], rgb[2]);
 }
 
 /* --- bytes ---------------------------------------------------------------------------------------------------------- */
@@ -145,7 +146,7 @@ static int put_display(struct pt_lseq *f, const double *mean, struct base_err *e
     size_t pixels = (size_t)f->width * f->height;
     for (size_t i = 0; i < pixels; i++)
         for (size_t c = 0; c < 3; c++)
-            f->plane[c * pixels + i] = pt_srgb_u8(mean[3 * i + c]);
+            f->plane[c * pixels + i] = base_srgb_code(mean[3 * i + c]);
     subtract_green(f->plane, pixels);
     for (size_t c = 0; c < 3; c++)
         subtract_average(f->plane + c * pixels, f->width, f->height);
@@ -157,7 +158,7 @@ static int put_fine(struct pt_lseq *f, const double *mean, struct base_err *err)
     size_t pixels = (size_t)f->width * f->height;
     for (size_t i = 0; i < pixels; i++)
         for (size_t c = 0; c < 3; c++)
-            f->plane[c * pixels + i] = pt_lseq_fine(mean[3 * i + c], pt_srgb_u8(mean[3 * i + c]));
+            f->plane[c * pixels + i] = pt_lseq_fine(mean[3 * i + c], base_srgb_code(mean[3 * i + c]));
     return put_plane(f, FINE, 0, 3 * pixels, err);
 }
 

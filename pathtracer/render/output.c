@@ -6,11 +6,11 @@
 #include <string.h>
 #include <strings.h>
 
+#include "base/colour.h"
 #include "base/files.h"
 #include "image/exr.h"
 #include "image/oiio.h"
 #include "image/stopmap.h"
-#include "image/tonemap.h"
 
 int pt_output_has_ending(const char *path, const char *ending)
 {
@@ -160,7 +160,7 @@ int pt_output_preview(const char *path, const struct pt_render *r, struct base_e
             double rgb[3];
             pt_film_mean(&r->film, pt_film_index(&r->film, x, y), block_at(&r->blocks, x, y)->spp, rgb);
             for (int c = 0; c < 3; c++)
-                out[c] = pt_srgb_u8(rgb[c]);
+                out[c] = base_srgb_code(rgb[c]);
         }
     }
     int rc = pt_oiio_write_png(path, width, height, 3, pixels, err);

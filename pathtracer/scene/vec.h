@@ -7,6 +7,8 @@
 
 #include <math.h>
 
+#include "base/colour.h"
+
 #define PT_PI 3.14159265358979323846f
 #define PT_INV_PI 0.31830988618379067154f
 
@@ -44,7 +46,10 @@ static inline float v3_max(pt_vec3 a)
 static inline int v3_is_black(pt_vec3 a) { return a.x == 0.0f && a.y == 0.0f && a.z == 0.0f; }
 static inline int v3_is_finite(pt_vec3 a) { return isfinite(a.x) && isfinite(a.y) && isfinite(a.z); }
 /* Relative luminance Y of linear sRGB/Rec.709 primaries. */
-static inline float v3_luminance(pt_vec3 a) { return 0.2126729f * a.x + 0.7151522f * a.y + 0.0721750f * a.z; }
+static inline float v3_luminance(pt_vec3 a)
+{
+    return (float)BASE_LUMINANCE_R * a.x + (float)BASE_LUMINANCE_G * a.y + (float)BASE_LUMINANCE_B * a.z;
+}
 
 /* Orthonormal basis (s, t, n). Duff et al. 2017, "Building an Orthonormal Basis, Revisited". */
 struct pt_frame {

@@ -1,3 +1,4 @@
+#include "base/colour.h"
 #include "ggn_seqgen.h"
 
 #include <math.h>
@@ -106,7 +107,7 @@ static double threshold_of(const struct seqgen *g, const struct pixels *p)
     double sum = 0;
 
     for (size_t i = 0; i < p->n; i++) {
-        double x = (double)p->clean[i], slope = (ggn_srgb_oetf(x + 1e-4) - ggn_srgb_oetf(x - 1e-4)) / 2e-4;
+        double x = (double)p->clean[i], slope = (base_srgb_oetf(x + 1e-4) - base_srgb_oetf(x - 1e-4)) / 2e-4;
         sum += (double)p->sigma[i] * (double)p->sigma[i] * slope * slope;
     }
     return fmax(sum / (double)p->n / (g->tau * g->tau), 1);

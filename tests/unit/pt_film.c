@@ -79,9 +79,9 @@ static void sums_survive_load_and_store(void **state)
     assert_true(film.half[3 * i + 1] == 32.0);
     assert_true(film.albedo[3 * i] == 32.0 && film.normal[3 * i + 1] == 64.0 && film.depth[i] == 3.0);
     assert_int_equal(film.depth_hits[i], 64);
-    double y = 0.2126729 * 0 + 0.7151522 + 0.0721750 * 2, all = 0.0;
+    double y = base_luminance(0, 1, 2), all = 0.0;
     for (int s = 0; s < 64; s++)
-        all += (y + 0.2126729 * s) * (y + 0.2126729 * s);
+        all += (y + BASE_LUMINANCE_R * s) * (y + BASE_LUMINANCE_R * s);
     assert_true(fabs(film.moment2[i] - all) < 1e-9 * all);
     pt_film_release(&film);
 }

@@ -13,10 +13,10 @@
 #include <cjson/cJSON.h>
 #include <openexr.h>
 
+#include "base/colour.h"
 #include "base/files.h"
 #include "image/oiio.h"
 #include "image/stopmap.h"
-#include "image/tonemap.h"
 #include "render/output.h"
 #include "render/progress.h"
 #include "support/pt_fake.h"
@@ -174,22 +174,22 @@ static void preview_is_srgb(void **state)
     assert_true(image.width == 57 && image.height == 35 && image.channels == 3 && image.u8);
     pt_film_mean(&render->film, pt_film_index(&render->film, 13, 15), render->blocks.list[0].spp, rgb);
     for (int c = 0; c < 3; c++)
-        assert_int_equal(image.u8[3 * (10 * 57 + 10) + c], pt_srgb_u8(rgb[c]));
+        assert_int_equal(image.u8[3 * (10 * 57 + 10) + c], base_srgb_code(rgb[c]));
     pt_oiio_release(&image);
 }
 
 static void srgb_codes(void **state)
 {
     (void)state;
-    assert_int_equal(pt_srgb_u8(0.0), 0);
-    assert_int_equal(pt_srgb_u8(1.0), 255);
-    assert_int_equal(pt_srgb_u8(7.0), 255);
-    assert_int_equal(pt_srgb_u8(-1.0), 0);
-    assert_int_equal(pt_srgb_u8((double)NAN), 0);
-    assert_int_equal(pt_srgb_u8(0.18), 118);
-    assert_int_equal(pt_srgb_u8(0.5), 188);
+    assert_int_equal(base_srgb_code(0.0), 0);
+    assert_int_equal(base_srgb_code(1.0), 255);
+    assert_int_equal(base_srgb_code(7.0), 255);
+    assert_int_equal(base_srgb_code(-1.0), 0);
+    assert_int_equal(base_srgb_code((double)NAN), 0);
+    assert_int_equal(base_srgb_code(0.18), 118);
+    assert_int_equal(base_srgb_code(0.5), 188);
     for (int i = 0; i < 256; i++)
-        assert_int_equal(pt_srgb_u8(pt_srgb_decode(i / 255.0)), i);
+        assert_int_equal(base_srgb_code(base_srgb_eotf(i / 255.0)), i);
 }
 
 /* Colours lie between the ends of the scale, numbers are drawn, the legend is below. */

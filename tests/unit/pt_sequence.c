@@ -14,8 +14,8 @@
 #include <cjson/cJSON.h>
 #include <zlib.h>
 
+#include "base/colour.h"
 #include "base/files.h"
-#include "image/tonemap.h"
 #include "render/blockstats.h"
 #include "render/lseq.h"
 #include "render/sequence.h"
@@ -40,15 +40,15 @@ static void fine_codes(void **state)
     (void)state;
     for (int k = 0; k < 20000; k++) {
         double x = pow(10.0, -5.0 + k * 5.0 / 20000.0), lo, hi;
-        uint8_t d = pt_srgb_u8(x), q = pt_lseq_fine(x, d);
+        uint8_t d = base_srgb_code(x), q = pt_lseq_fine(x, d);
         if (d == 255)
             continue;
-        lo = d > 0 ? pt_srgb_decode((d - 0.5) / 255.0) : 0.0;
-        hi = pt_srgb_decode((d + 0.5) / 255.0);
+        lo = d > 0 ? base_srgb_eotf((d - 0.5) / 255.0) : 0.0;
+        hi = base_srgb_eotf((d + 0.5) / 255.0);
         assert_in_range(q, 0, 7);
         assert_true(fabs(lo + (q + 0.5) / 8.0 * (hi - lo) - x) <= (hi - lo) / 16.0 * 1.0001 + 1e-12);
     }
-    double lo = pt_srgb_decode(254.5 / 255.0);
+    double lo = base_srgb_eotf(254.5 / 255.0);
     assert_int_equal(pt_lseq_fine(lo * 16.0, 255), 64);
     assert_int_equal(pt_lseq_fine(1e30, 255), 255);
 }
@@ -108,12 +108,34 @@ static void statistics(void **state)
     struct pt_block_stats s;
     pt_block_stats(mean, half, d, m2, 4, 5, scratch, &s);
     assert_true(fabs(s.dammertz - 0.5 / 2.0 / 4.0) < 1e-12);
-    double y0 = 0.2126 + 0.7152 + 0.0722 * 2, mean_y = (y0 + 2.0) / 4.0;
+    double y0 = base_luminance(1, 1, 2), white = base_luminance(1, 1, 1), mean_y = (y0 + 2.0 * white) / 4.0;
     /* Pixel 0: variance of the mean (2 - y0^2)/4; pixel 1 is black with moment 1, so its error counts against the floor 0.02. */
     assert_true(fabs(s.rse - sqrt(((2 - y0 * y0) / 4.0 / (y0 * y0) + 0.25 / (0.02 * 0.02)) / 4.0)) < 1e-12);
     assert_true(s.rse_unsettled == 0.25 && s.half_unsettled == 0.25);
-    assert_true(fabs(s.tail999 - 0.3 / mean_y) < 1e-12);
+    assert_true(fabs(s.tail999 - 0.3 * white / mean_y) < 1e-12);
     assert_true(fabs(s.gini - (1 * 0.1 + 3 * 0.3) / (4 * 0.4)) < 1e-12);
+}
+
+/* The film's second moment and the statistics must weigh colours alike: a pixel whose samples are all the same has no error,
+ * whatever its colour. The bound is the rounding of a sum of 64 squares: sqrt(64 * 2^-53 / 63). */
+static void noise_free_colours_have_no_error(void **state)
+{
+    (void)state;
+    static const float colours[4][3] = {{0.7f, 0, 0}, {0, 0.7f, 0}, {0, 0, 0.7f}, {0.1f, 3.0f, 0.4f}};
+    for (int k = 0; k < 4; k++) {
+        struct pt_film_pixel p = {0};
+        struct pt_path_result sample = {.radiance = v3(colours[k][0], colours[k][1], colours[k][2])};
+        for (uint32_t s = 0; s < 64; s++)
+            assert_true(pt_film_add(&p, PT_FILM_HALF | PT_FILM_MOMENT2, s, &sample));
+        double mean[3], half[3], none[3] = {0}, m2 = p.moment2 / 64, scratch;
+        for (int c = 0; c < 3; c++) {
+            mean[c] = p.color[c] / 64;
+            half[c] = p.half[c] / 32;
+        }
+        struct pt_block_stats s;
+        pt_block_stats(mean, half, none, &m2, 1, 64, &scratch, &s);
+        assert_true(s.rse <= 1.1e-8 && s.rse_unsettled == 0.0 && s.half_unsettled == 0.0);
+    }
 }
 
 /* --- a recorded folder ---------------------------------------------------------------------------------------------- */
@@ -236,14 +258,14 @@ static const unsigned char *check_plane(const unsigned char *p, uint32_t id, con
         for (size_t c = 0; c < 3; c++) {
             uint16_t h = (uint16_t)(raw[c * pixels + i] | raw[(id > 3 ? 3 * pixels : 0) + c * pixels + i] << 8);
             if (id == 1)
-                assert_int_equal(raw[c * pixels + i], pt_srgb_u8(mean[c]));
+                assert_int_equal(raw[c * pixels + i], base_srgb_code(mean[c]));
             else if (id == 2)
-                assert_int_equal(raw[c * pixels + i], pt_lseq_fine(mean[c], pt_srgb_u8(mean[c])));
+                assert_int_equal(raw[c * pixels + i], pt_lseq_fine(mean[c], base_srgb_code(mean[c])));
             else if (id >= 4)
                 assert_int_equal(h, pt_lseq_half_float(id == 4 ? mean[c] : d[c]));
         }
         if (id == 3)
-            assert_int_equal(raw[i], pt_lseq_half_log(0.2126 * d[0] + 0.7152 * d[1] + 0.0722 * d[2]));
+            assert_int_equal(raw[i], pt_lseq_half_log(base_luminance(d[0], d[1], d[2])));
     }
     return p + 16 + u32(p + 12);
 }
@@ -370,7 +392,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(half_floats),   cmocka_unit_test(fine_codes), cmocka_unit_test(half_log_codes), cmocka_unit_test(levels),
-        cmocka_unit_test(block_lists),   cmocka_unit_test(statistics), cmocka_unit_test(recorded_folder), cmocka_unit_test(going_on),
+        cmocka_unit_test(block_lists),   cmocka_unit_test(statistics), cmocka_unit_test(noise_free_colours_have_no_error),
+        cmocka_unit_test(recorded_folder), cmocka_unit_test(going_on),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }
