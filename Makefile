@@ -90,7 +90,7 @@ REPLAY   := $(patsubst tests/fuzz/%.c,$(OUT)/fuzz/replay-%,$(FUZZ_SRC))
 FUZZERS  := $(patsubst tests/fuzz/%.c,build/fuzz/%,$(FUZZ_SRC))
 
 .DEFAULT_GOAL := all
-.PHONY: all demo test bench asan tsan fuzz hdr-check abi-check install compdb clean help setup tests replay train-demo
+.PHONY: all demo test bench asan tsan fuzz mutants hdr-check abi-check install compdb clean help setup tests replay train-demo
 .SECONDARY:
 
 all: $(PROGRAMS) $(CRITERIA) ## build the programs and the criteria
@@ -187,6 +187,9 @@ build/fuzz/pt_%: $(OBJ)/tests/fuzz/pt_%.c.o $(PT_OBJ) $(LOADER_OBJ)
 	$(link) -fsanitize=fuzzer $^ $(LDFLAGS_ALL) $(PT_LIBS) -o $@
 build/fuzz/ggn_%: $(OBJ)/tests/fuzz/ggn_%.c.o $(GGN_OBJ)
 	$(link) -fsanitize=fuzzer $^ $(LDFLAGS_ALL) $(GGN_LIBS) -o $@
+
+mutants: ## plant single-line faults and see that the tests notice (hours; resumes)
+	@scripts/mutants $(MUTANTS_FLAGS) $(TEST_SRC) $(SCRIPT_TEST)
 
 # Every header compiles alone; the ABI header also as C99 and C++11.
 HEADERS := $(shell find pathtracer ggn plugin-api tests -name '*.h' 2>/dev/null)
