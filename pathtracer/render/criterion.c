@@ -6,7 +6,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "base/clock.h"
 #include "base/colour.h"
@@ -82,24 +81,6 @@ static void tell(void *context, int32_t level, const char *text)
         t->warn(t->data, text);
 }
 
-/* ../lib/lull beside the program's own folder; the build tree and the installed tree have the same shape. */
-static void own_folder(char *path, size_t room)
-{
-    char exe[LULL_PATH_MAX];
-    ssize_t n = readlink("/proc/self/exe", exe, sizeof exe - 1);
-    path[0] = '\0';
-    if (n <= 0)
-        return;
-    exe[n] = '\0';
-    char *slash = strrchr(exe, '/');
-    if (!slash)
-        return;
-    *slash = '\0';
-    int length = snprintf(path, room, "%s/../lib/lull", exe);
-    if (length < 0 || (size_t)length >= room)
-        path[0] = '\0';
-}
-
 static int from_lull(int32_t code)
 {
     return code == LULL_E_MEMORY ? BASE_ENOMEM : BASE_EINVAL;
@@ -109,11 +90,8 @@ int pt_criterion_create(const char *spec, const struct lull_pair *pairs, uint32_
                         void (*warn)(void *data, const char *line), void *warn_data, struct pt_criterion **out,
                         struct base_err *err)
 {
-    char own[LULL_PATH_MAX + 16];
-    own_folder(own, sizeof own);
-    const char *dirs[] = {getenv("LULL_PLUGIN_PATH"), own};
     struct teller teller = {warn, warn_data};
-    struct lull_search search = {.dirs = dirs, .dir_count = 2, .log = tell, .log_context = &teller};
+    struct lull_search search = {.log = tell, .log_context = &teller};
     struct lull_error e = {.struct_size = sizeof e};
     struct lull_found *found = malloc(sizeof *found);
     if (!found)
@@ -468,11 +446,8 @@ static int32_t list_one(void *context, const struct lull_found *found)
 
 int pt_criterion_list(FILE *out, void (*warn)(void *data, const char *line), void *warn_data)
 {
-    char own[LULL_PATH_MAX + 16];
-    own_folder(own, sizeof own);
-    const char *dirs[] = {getenv("LULL_PLUGIN_PATH"), own};
     struct teller teller = {warn, warn_data};
-    struct lull_search search = {.dirs = dirs, .dir_count = 2, .log = tell, .log_context = &teller};
+    struct lull_search search = {.log = tell, .log_context = &teller};
     struct listing listing = {.out = out};
     lull_list(&search, list_one, &listing);
     return listing.count;

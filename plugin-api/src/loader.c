@@ -12,6 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "elf_file.h"
 #include "process_state.h"
@@ -124,20 +125,41 @@ static const struct lull_criterion *find_id(lull_entry_fn entry, uint32_t count,
 
 /* --- directories ----------------------------------------------------------------------------------------------------- */
 
+/* lib/lull beside the running program's own folder: the build tree and the installed tree have the same shape. */
+static const char *beside_program(char path[LULL_PATH_MAX])
+{
+    static const char tail[] = "/../lib/lull";
+    ssize_t n = readlink("/proc/self/exe", path, LULL_PATH_MAX - 1);
+    path[n > 0 ? n : 0] = '\0';
+    char *slash = strrchr(path, '/');
+    if (!slash || (size_t)(slash - path) + sizeof tail > LULL_PATH_MAX)
+        return NULL;
+    memcpy(slash, tail, sizeof tail);
+    return path;
+}
+
 /* Walks the directories of a search, entries joined by ':' one by one. */
 struct dir_walk {
     const struct lull_search *search;
     size_t index;
     const char *rest;
+    char own[LULL_PATH_MAX];
 };
+
+static const char *usual_entry(struct dir_walk *walk, size_t index)
+{
+    return index == 0 ? getenv("LULL_PLUGIN_PATH") : beside_program(walk->own);
+}
 
 static int next_dir(struct dir_walk *walk, char dir[LULL_PATH_MAX])
 {
+    const struct lull_search *s = walk->search;
     for (;;) {
         while (!walk->rest || *walk->rest == '\0') {
-            if (!walk->search || walk->index >= walk->search->dir_count)
+            if (!s || walk->index >= (s->dirs ? s->dir_count : 2))
                 return 0;
-            walk->rest = walk->search->dirs[walk->index++];
+            walk->rest = s->dirs ? s->dirs[walk->index] : usual_entry(walk, walk->index);
+            walk->index++;
         }
         size_t length = strcspn(walk->rest, ":");
         const char *start = walk->rest;

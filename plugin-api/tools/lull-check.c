@@ -122,28 +122,11 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 /* --- finding -------------------------------------------------------------------------------------------------------------
  */
 
-/* PREFIX/lib/lull for a program in PREFIX/bin. */
-static void own_directory(char dir[LULL_PATH_MAX])
-{
-    char exe[LULL_PATH_MAX];
-    ssize_t length = readlink("/proc/self/exe", exe, sizeof exe - 1);
-    dir[0] = '\0';
-    if (length <= 0)
-        return;
-    exe[length] = '\0';
-    char *slash = strrchr(exe, '/');
-    if (slash && (size_t)(slash - exe) + sizeof "/../lib/lull" < LULL_PATH_MAX)
-        snprintf(dir, LULL_PATH_MAX, "%.*s/../lib/lull", (int)(slash - exe), exe);
-}
-
 /* In a child: reports the path and then the ids to check as notes; skipped means that there is no such criterion. */
 static void find(struct lc *c, const void *arg)
 {
     const char *spec = arg;
-    char own[LULL_PATH_MAX];
-    own_directory(own);
-    const char *dirs[] = {getenv("LULL_PLUGIN_PATH"), own};
-    struct lull_search search = {.dirs = dirs, .dir_count = 2};
+    struct lull_search search = {0};
     struct lull_found *found = malloc(sizeof *found);
     struct lull_error err = {.struct_size = sizeof err, .message = "out of memory"};
     if (!found || lull_open(&search, spec, found, &err) != LULL_OK) {

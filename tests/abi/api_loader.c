@@ -131,6 +131,20 @@ static void directories_are_joined_and_ordered(void **state)
     unlink(hidden);
 }
 
+static void without_directories_the_usual_ones_are_searched(void **state)
+{
+    (void)state;
+    struct lull_search usual = {.log = take_log};
+    struct lull_found found;
+    struct lull_error err = {.struct_size = sizeof err};
+    unsetenv("LULL_PLUGIN_PATH"); /* no lib/lull beside the tests */
+    assert_int_equal(lull_open(&usual, "pair", &found, &err), LULL_E_IO);
+    assert_int_equal(setenv("LULL_PLUGIN_PATH", plugins, 1), 0);
+    assert_int_equal(lull_open(&usual, "pair", &found, &err), LULL_OK);
+    assert_string_equal(found.criterion->id, "first-of-pair");
+    unsetenv("LULL_PLUGIN_PATH");
+}
+
 static void bad_specs_are_refused(void **state)
 {
     (void)state;
@@ -353,6 +367,7 @@ int main(void)
         cmocka_unit_test(opens_by_name),
         cmocka_unit_test(opens_an_id_of_a_library_with_another_name),
         cmocka_unit_test(directories_are_joined_and_ordered),
+        cmocka_unit_test(without_directories_the_usual_ones_are_searched),
         cmocka_unit_test(bad_specs_are_refused),
         cmocka_unit_test(lists_what_is_good),
         cmocka_unit_test(broken_libraries_are_refused),
