@@ -193,10 +193,10 @@ mutants: ## plant single-line faults and see that the tests notice (hours; resum
 
 # Every header compiles alone; the ABI header also as C99 and C++11.
 HEADERS := $(shell find pathtracer ggn plugin-api tests -name '*.h' 2>/dev/null)
-hdr-check: ## each header compiles alone; the ABI header as C99 and C++11
+hdr-check: ## each header compiles alone; the ABI header and the kit as C99 and C++11
 	@$(foreach h,$(HEADERS),$(CC) -std=c17 -D_POSIX_C_SOURCE=200809L $(WARNC) -Wno-unused-const-variable $(call inc,$(h)) -x c -fsyntax-only $(h) &&) true
-	@$(CC) -std=c99 $(WARNC) $(API) -x c -fsyntax-only plugin-api/include/lull/criterion.h
-	@$(CXX) -std=c++11 $(WARN) $(API) -x c++ -fsyntax-only plugin-api/include/lull/criterion.h
+	@$(foreach h,criterion.h criterion_kit.h,$(CC) -std=c99 $(WARNC) $(API) -x c -fsyntax-only plugin-api/include/lull/$(h) &&) true
+	@$(foreach h,criterion.h criterion_kit.h,$(CXX) -std=c++11 $(WARN) $(API) -x c++ -fsyntax-only plugin-api/include/lull/$(h) &&) true
 abi-check: $(OUT)/tests/abi/api_layout ## the ABI's layout is the frozen one (plugin-api/layout-1.txt)
 	@$<
 

@@ -9,6 +9,6 @@
 
 #include <lull/criterion.h>
 
-extern const struct lull_criterion ggn_plugin_network; /* id "ggn" */
+extern const struct lull_criterion ggn_plugin_ggn; /* id "ggn" */
 
 #endif

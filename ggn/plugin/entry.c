@@ -1,7 +1,7 @@
 #include "plugin/criteria.h"
 
 static const struct lull_criterion *const criteria[] = {
-    &ggn_plugin_network,
+    &ggn_plugin_ggn,
 };
 
 LULL_EXPORT const struct lull_criterion *lull_criterion_entry_v1(uint32_t index)

@@ -1,10 +1,6 @@
 #include "plugin/history.h"
 
-#include <stdlib.h>
-#include <string.h>
-
-#include "plugin/text.h"
-#include "plugin/view.h"
+#include <lull/criterion_kit.h>
 
 static size_t pixels_of(const struct lull_rect *r)
 {
@@ -35,13 +31,13 @@ int32_t gp_history_create(struct gp_history *history, int window, const struct l
     size_t n = frame->block_count;
 
     for (uint32_t i = 0; i < frame->block_count; i++)
-        pixels += (uint64_t)(window + 1) * slot_bytes(pixels_of(gp_frame_block(frame, i)));
+        pixels += (uint64_t)(window + 1) * slot_bytes(pixels_of(lull_kit_rect(frame, i)));
     uint64_t heads = 2 * n * sizeof(struct gp_head) + n * (sizeof(struct lull_rect) + sizeof(size_t)) + 256;
     if (pixels > PTRDIFF_MAX - heads)
-        return gp_fail(err, LULL_E_MEMORY, "begin_frame: the blocks are too large for memory");
+        return lull_kit_fail(err, LULL_E_MEMORY, "begin_frame: the blocks are too large for memory");
     unsigned char *memory = aligned_alloc(64, (size_t)((pixels + heads + 63) & ~(uint64_t)63));
     if (!memory)
-        return gp_fail(err, LULL_E_MEMORY, "begin_frame: no memory for the history of %u blocks", frame->block_count);
+        return lull_kit_fail(err, LULL_E_MEMORY, "begin_frame: no memory for the history of %u blocks", frame->block_count);
 
     struct gp_history h = {.window = window, .count = frame->block_count, .memory = memory, .pixels = memory};
     void *p = memory + pixels;
@@ -53,7 +49,7 @@ int32_t gp_history_create(struct gp_history *history, int window, const struct l
     h.rect = p;
     size_t at = 0;
     for (uint32_t i = 0; i < frame->block_count; i++) {
-        h.rect[i] = *gp_frame_block(frame, i);
+        h.rect[i] = *lull_kit_rect(frame, i);
         h.at[i] = at;
         at += (size_t)(window + 1) * slot_bytes(pixels_of(&h.rect[i]));
         head_clear(&h.head[i], window);
@@ -131,7 +127,7 @@ int32_t gp_history_save(const struct gp_history *h, uint32_t key, const struct l
         for (uint32_t i = 0; !status && i < head.used; i++)
             status = writer->write(writer, gp_history_noisy(h, id, head.order[i]), image);
     }
-    return status ? gp_fail(err, status, "state: the host could not write it") : LULL_OK;
+    return status ? lull_kit_fail(err, status, "state: the host could not write it") : LULL_OK;
 }
 
 /* Whether a head from a file may be trusted as an index into memory. */
@@ -159,12 +155,12 @@ static int32_t load_blocks(struct gp_history *h, const struct lull_reader *reade
         size_t image = 3 * pixels_of(&h->rect[id]);
 
         if (reader->read(reader, &rect, sizeof rect) || reader->read(reader, &head, sizeof head))
-            return gp_fail(err, LULL_E_IO, "state: it ends early, at block %u", id);
+            return lull_kit_fail(err, LULL_E_IO, "state: it ends early, at block %u", id);
         if (memcmp(&rect, &h->rect[id], sizeof rect) || !head_valid(&head, h->window))
-            return gp_fail(err, LULL_E_IO, "state: block %u does not fit the frame", id);
+            return lull_kit_fail(err, LULL_E_IO, "state: block %u does not fit the frame", id);
         for (uint32_t i = 0; i < head.used; i++)
             if (reader->read(reader, gp_history_noisy(h, id, head.order[i]), image))
-                return gp_fail(err, LULL_E_IO, "state: it ends early, at block %u", id);
+                return lull_kit_fail(err, LULL_E_IO, "state: it ends early, at block %u", id);
         h->head[id] = head;
     }
     return LULL_OK;
@@ -175,8 +171,8 @@ int32_t gp_history_load(struct gp_history *h, uint32_t key, const struct lull_re
     struct state_header header, wanted = header_of(h, key);
 
     if (reader->read(reader, &header, sizeof header))
-        return gp_fail(err, LULL_E_IO, "state: it ends early");
+        return lull_kit_fail(err, LULL_E_IO, "state: it ends early");
     if (memcmp(&header, &wanted, sizeof header))
-        return gp_fail(err, LULL_E_IO, "state: saved by another criterion, model, parameter set or frame");
+        return lull_kit_fail(err, LULL_E_IO, "state: saved by another criterion, model, parameter set or frame");
     return load_blocks(h, reader, err);
 }

@@ -1,58 +1,37 @@
-#include "plugin/network.h"
-
-#include <math.h>
-#include <stdlib.h>
-
-enum { SPAN = 128 };
+#include "plugin/ggn.h"
 
 /* Display codes of the block; returns how many values were broken. */
 static long read_display(const struct lull_instance *in, const struct lull_view *view, const struct lull_block *b, uint8_t *out)
 {
-    const struct lull_plane *color = gp_view_plane(view, LULL_PLANE_COLOR);
     const size_t w = (size_t)(b->x1 - b->x0), plane = w * (size_t)(b->y1 - b->y0);
     struct ggn_pixel_counts counts = {0};
+    struct lull_kit_span s;
 
-    for (int32_t y = b->y0; y < b->y1; y++)
-        for (int32_t x = b->x0; x < b->x1;) {
-            int32_t n = b->x1 - x < SPAN ? b->x1 - x : SPAN;
-            double rgb[SPAN][3];
-            gp_view_span(view, color, b, x, y, n, 3, rgb[0]);
-            uint8_t *to = out + (size_t)(y - b->y0) * w + (size_t)(x - b->x0);
-            for (int32_t i = 0; i < n; i++)
-                for (int c = 0; c < 3; c++)
-                    to[(size_t)c * plane + (size_t)i] = ggn_preprocess(rgb[i][c], &in->display, &counts);
-            x += n;
-        }
+    for (lull_kit_span_begin(&s, view, b, LULL_PLANE_BIT(LULL_PLANE_COLOR)); lull_kit_span_next(&s);) {
+        uint8_t *to = out + (size_t)(s.y - b->y0) * w + (size_t)(s.x - b->x0);
+        for (int32_t i = 0; i < s.count; i++)
+            for (int c = 0; c < 3; c++)
+                to[(size_t)c * plane + (size_t)i] = ggn_preprocess(s.value[LULL_PLANE_COLOR][i][c], &in->display, &counts);
+    }
     return ggn_pixel_counts_bad(&counts);
-}
-
-static double luminance_of(const struct lull_instance *in, const double rgb[3])
-{
-    return in->luminance[0] * rgb[0] + in->luminance[1] * rgb[1] + in->luminance[2] * rgb[2];
 }
 
 /* Whether the noise sits in too few pixels for a judgement. D = (A − I)·√(h/(n − h)): noise of the variance of the mean. */
 static int tail_holds(const struct lull_instance *in, const struct lull_view *view, const struct lull_block *b, struct ggn_tail *tail)
 {
-    const struct lull_plane *color = gp_view_plane(view, LULL_PLANE_COLOR), *half = gp_view_plane(view, LULL_PLANE_HALF);
-    const double n = (double)b->spp, h = (double)b->half_spp;
+    const uint32_t planes = LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_HALF);
+    const double n = (double)b->spp, h = (double)b->half_spp, split = sqrt(h / (n - h));
+    struct lull_kit_span s;
 
-    if ((in->policy.tail999 <= 0 && in->policy.gini <= 0) || !half || h <= 0 || h >= n)
+    if ((in->policy.tail999 <= 0 && in->policy.gini <= 0) || !lull_kit_plane(view, LULL_PLANE_HALF) || h <= 0 || h >= n)
         return 0;
-    const double split = sqrt(h / (n - h));
     ggn_tail_clear(tail);
-    for (int32_t y = b->y0; y < b->y1; y++)
-        for (int32_t x = b->x0; x < b->x1;) {
-            int32_t count = b->x1 - x < SPAN ? b->x1 - x : SPAN;
-            double mean[SPAN][3], a[SPAN][3];
-            gp_view_span(view, color, b, x, y, count, 3, mean[0]);
-            gp_view_span(view, half, b, x, y, count, 3, a[0]);
-            for (int32_t i = 0; i < count; i++) {
-                double luminance = luminance_of(in, mean[i]), d = split * (luminance_of(in, a[i]) - luminance);
-                if (isfinite(luminance) && isfinite(d))
-                    ggn_tail_add(tail, luminance, d);
-            }
-            x += count;
+    for (lull_kit_span_begin(&s, view, b, planes); lull_kit_span_next(&s);)
+        for (int32_t i = 0; i < s.count; i++) {
+            double luminance = lull_kit_luminance(&in->kit, s.value[LULL_PLANE_COLOR][i]);
+            double d = split * (lull_kit_luminance(&in->kit, s.value[LULL_PLANE_HALF][i]) - luminance);
+            if (isfinite(luminance) && isfinite(d))
+                ggn_tail_add(tail, luminance, d);
         }
     return ggn_policy_tail_holds(&in->policy, ggn_tail_999(tail), ggn_tail_gini(tail));
 }
@@ -75,11 +54,6 @@ static double window_logit(const struct lull_instance *in, const struct lull_blo
     return ggn_judge_logit(judge, noisy, denoised, w, h);
 }
 
-static uint64_t to_spp(double spp)
-{
-    return spp >= 1e18 ? UINT64_C(1000000000000000000) : (uint64_t)spp;
-}
-
 /* CONTINUE, at the next level or, while the gate says that the block is plainly noisy, at the first level of the window that
  * will end where it expects to open: half of that, because the estimate is noisy itself, and at most fourfold. */
 static void schedule(const struct lull_instance *in, const struct lull_block *b, struct gp_head *head, double gate_opens)
@@ -94,9 +68,9 @@ static void schedule(const struct lull_instance *in, const struct lull_block *b,
     if (next < in->policy.first_spp)
         next = in->policy.first_spp;
     head->answer.action = LULL_CONTINUE;
-    head->answer.next_spp = to_spp(ceil(next));
-    if (in->spp_max > b->spp && head->answer.next_spp > in->spp_max)
-        head->answer.next_spp = in->spp_max;
+    head->answer.next_spp = lull_kit_spp(ceil(next));
+    if (in->kit.spp_max > b->spp && head->answer.next_spp > in->kit.spp_max)
+        head->answer.next_spp = in->kit.spp_max;
 }
 
 /* The verdict on a head whose newest image has just been pushed. */
@@ -164,7 +138,7 @@ void gp_verdict(struct lull_instance *in, const struct lull_view *view, const st
         if (!head->used) {
             head->answer = (struct gp_answer){.flags = LULL_DECISION_TOO_EARLY, .p_noisy = (double)NAN,
                                               .predicted_spp = (double)NAN, .error = (double)NAN,
-                                              .next_spp = to_spp(fmax(in->policy.first_spp, (double)b->spp + 1))};
+                                              .next_spp = lull_kit_spp(fmax(in->policy.first_spp, (double)b->spp + 1))};
         } else if (head->answer.action == LULL_CONTINUE && head->answer.next_spp <= b->spp) {
             head->answer.next_spp = b->spp + 1;
         }

@@ -2,47 +2,25 @@
  *
  * Stops every block at a given number of samples: what a renderer without adaptive sampling does.
  */
-#include "support.h"
+#include <lull/criterion_kit.h>
 
-enum { SPP };
+enum { SPP, PARAM_COUNT };
 
-static const struct lull_param params[] = {
-    [SPP] = {.name = "spp",
-             .help = "samples per pixel at which every block stops",
-             .default_value = "64",
-             .min = 1,
-             .max = 1e15,
-             .type = LULL_PARAM_INT},
+static const struct lull_param params[PARAM_COUNT] = {
+    [SPP] = LULL_KIT_INT("spp", "64", 1, 1e15, "samples per pixel at which every block stops"),
 };
 
-static void judge(const struct lull_instance *in, const struct lull_view *view, const struct lull_block *block,
-                  struct lull_decision *decision)
+static void judge(struct lull_instance *in, const struct lull_view *view, const struct lull_block *block,
+                  struct lull_decision *decision, uint32_t worker)
 {
-    (void)view;
-    uint64_t spp = (uint64_t)in->value[SPP];
+    (void)view, (void)worker;
+    uint64_t spp = (uint64_t)lull_kit_of(in)->value[SPP];
     decision->action = block->spp >= spp ? LULL_STOP : LULL_CONTINUE;
     decision->next_spp = block->spp >= spp ? 0 : spp;
-    decision->predicted_spp = in->value[SPP];
+    decision->predicted_spp = (double)spp;
 }
 
-static const struct ex_rule ex_rule = {.params = params, .param_count = 1, .first_spp_param = SPP, .judge = judge};
+static const struct lull_kit_rule rule = {.first_spp = "spp", .judge = judge};
 
-static const struct lull_criterion fixed_criterion = {
-    .struct_size = sizeof(struct lull_criterion),
-    .api_minor = LULL_API_MINOR,
-    .id = "fixed",
-    .name = "Fixed number of samples",
-    .version = "1.0",
-    .description = "Stops every block at the same number of samples per pixel, whatever the image looks like.",
-    .params = params,
-    .param_count = 1,
-    .param_stride = sizeof(struct lull_param),
-    .thread_level = LULL_THREADS_FULL,
-    .capabilities = LULL_CAP_DETERMINISTIC | LULL_CAP_BATCH_INVARIANT,
-    EX_FUNCTIONS,
-};
-
-const struct lull_criterion *lull_criterion_entry_v1(uint32_t index)
-{
-    return index == 0 ? &fixed_criterion : NULL;
-}
+LULL_KIT_CRITERION(rule, params, PARAM_COUNT, "fixed", "Fixed number of samples", "1.0",
+                   "Stops every block at the same number of samples per pixel, whatever the image looks like.");

@@ -10,61 +10,28 @@
  * against rare bright paths, which a mean over 40,000 pixels cannot see: in a pixel that one sample dominates, I and A
  * differ by about I itself, so a block stops only if (almost) no pixel differs by as much as tail-error of its luminance.
  */
-#include "support.h"
+#include <lull/criterion_kit.h>
+
+enum { THRESHOLD, AREA, FLOOR, TAIL_ERROR, TAIL_SHARE, FIRST_SPP, GROWTH, PARAM_COUNT };
+enum { PLANES = LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_HALF) };
 
 /* The default threshold: in a picture of 5 x 5 blocks it is a standard error of about 3 % at a grey of 0.2. */
-enum { THRESHOLD, AREA, FLOOR, TAIL_ERROR, TAIL_SHARE, FIRST_SPP, GROWTH, PARAM_COUNT };
-
 static const struct lull_param params[PARAM_COUNT] = {
-    [THRESHOLD] = {.name = "threshold",
-                   .help = "stop when the block's error is at most this",
-                   .default_value = "0.004",
-                   .min = 0,
-                   .max = 1e6,
-                   .type = LULL_PARAM_FLOAT},
-    [AREA] = {.name = "area",
-              .help = "weigh the error by sqrt(block pixels / picture pixels), as the paper does",
-              .default_value = "1",
-              .max = 1,
-              .type = LULL_PARAM_BOOL},
-    [FLOOR] = {.name = "floor",
-               .help = "luminance (1 = display white) below which the tail guard counts differences as absolute",
-               .default_value = "0.02",
-               .min = 1e-6,
-               .max = 1e6,
-               .type = LULL_PARAM_FLOAT},
-    [TAIL_ERROR] = {.name = "tail-error",
-                    .help = "a pixel whose buffers differ by more than this share is not settled",
-                    .default_value = "0.5",
-                    .min = 1e-6,
-                    .max = 1e30,
-                    .type = LULL_PARAM_FLOAT},
-    [TAIL_SHARE] = {.name = "tail-share",
-                    .help = "share of pixels that need not be settled when the block stops",
-                    .default_value = "0",
-                    .min = 0,
-                    .max = 1,
-                    .type = LULL_PARAM_FLOAT},
-    [FIRST_SPP] = {.name = "first-spp",
-                   .help = "samples per pixel before the first judgement",
-                   .default_value = "16",
-                   .min = 2,
-                   .max = 1e15,
-                   .type = LULL_PARAM_INT},
-    [GROWTH] = {.name = "growth",
-                .help = "largest ratio of samples between two checks of a block",
-                .default_value = "1.5",
-                .min = 1.01,
-                .max = 100,
-                .type = LULL_PARAM_FLOAT},
+    [THRESHOLD] = LULL_KIT_FLOAT("threshold", "0.004", 0, 1e6, "stop when the block's error is at most this"),
+    [AREA] = LULL_KIT_BOOL("area", "1", "weigh the error by sqrt(block pixels / picture pixels), as the paper does"),
+    [FLOOR] = LULL_KIT_FLOAT("floor", "0.02", 1e-6, 1e6,
+                             "luminance (1 = display white) below which the tail guard counts differences as absolute"),
+    [TAIL_ERROR] = LULL_KIT_FLOAT("tail-error", "0.5", 1e-6, 1e30,
+                                  "a pixel whose buffers differ by more than this share is not settled"),
+    [TAIL_SHARE] = LULL_KIT_FLOAT("tail-share", "0", 0, 1, "share of pixels that need not be settled when the block stops"),
+    [FIRST_SPP] = LULL_KIT_INT("first-spp", "16", 2, 1e15, "samples per pixel before the first judgement"),
+    [GROWTH] = LULL_KIT_FLOAT("growth", "1.5", 1.01, 100, "largest ratio of samples between two checks of a block"),
 };
 
-enum { CHUNK = 128 };
-
-static void tally_pixel(const struct lull_instance *in, const double full[3], const double half[3], double split,
-                        struct ex_tally *t)
+static void tally_pixel(const struct lull_kit *kit, const double full[3], const double half[3], double split,
+                        struct lull_kit_tally *t)
 {
-    double y = ex_luminance(in, full), y_half = ex_luminance(in, half);
+    double y = kit->exposure * lull_kit_luminance(kit, full), y_half = kit->exposure * lull_kit_luminance(kit, half);
     double sum = fabs(full[0] + full[1] + full[2]);
     double difference = fabs(full[0] - half[0]) + fabs(full[1] - half[1]) + fabs(full[2] - half[2]);
     if (!isfinite(y) || !isfinite(y_half) || !isfinite(sum) || !isfinite(difference)) {
@@ -72,65 +39,34 @@ static void tally_pixel(const struct lull_instance *in, const double full[3], co
         return;
     }
     /* A sum of 0 with a difference is possible with negative values only; any positive denominator serves it. */
-    double e = difference == 0 ? 0 : split * sqrt(in->exposure) * difference / sqrt(fmax(sum, 1e-3 * difference));
-    t->sum += e;
+    t->sum += difference == 0 ? 0 : split * sqrt(kit->exposure) * difference / sqrt(fmax(sum, 1e-3 * difference));
     t->valid++;
-    t->unsettled += split * fabs(y - y_half) > in->value[TAIL_ERROR] * fmax(fabs(y), in->value[FLOOR]);
+    t->unsettled += split * fabs(y - y_half) > kit->value[TAIL_ERROR] * fmax(fabs(y), kit->value[FLOOR]);
 }
 
-static void judge(const struct lull_instance *in, const struct lull_view *view, const struct lull_block *block,
-                  struct lull_decision *decision)
+static void judge(struct lull_instance *in, const struct lull_view *view, const struct lull_block *block,
+                  struct lull_decision *decision, uint32_t worker)
 {
-    const struct lull_plane *color = ex_plane(view, LULL_PLANE_COLOR), *half = ex_plane(view, LULL_PLANE_HALF);
-    struct ex_tally tally = {0};
-    double spp = (double)block->spp, half_spp = (double)block->half_spp;
-    if (half_spp <= 0 || half_spp >= spp)
+    (void)worker;
+    const struct lull_kit *kit = lull_kit_of(in);
+    const double *value = kit->value, n = (double)block->spp, h = (double)block->half_spp;
+    struct lull_kit_tally tally = {0};
+    struct lull_kit_span s;
+    if (h <= 0 || h >= n)
         tally.early = 1; /* two buffers with the same samples would never differ */
-    else if (block->spp >= ex_first_spp(in)) {
-        double split = sqrt(half_spp / (spp - half_spp));
-        for (int32_t y = block->y0; y < block->y1; y++)
-            for (int32_t x = block->x0; x < block->x1;) {
-                int32_t count = block->x1 - x < CHUNK ? block->x1 - x : CHUNK;
-                double a[CHUNK][3], b[CHUNK][3];
-                ex_span(view, color, block, x, y, count, 3, a[0]);
-                ex_span(view, half, block, x, y, count, 3, b[0]);
-                for (int32_t i = 0; i < count; i++)
-                    tally_pixel(in, a[i], b[i], split, &tally);
-                x += count;
-            }
-    }
-    double area = in->value[AREA] != 0 ? sqrt(fmin(ex_block_pixels(block) / in->picture_pixels, 1)) : 1;
+    else if (block->spp >= kit->need.first_spp)
+        for (lull_kit_span_begin(&s, view, block, PLANES); lull_kit_span_next(&s);)
+            for (int32_t i = 0; i < s.count; i++)
+                tally_pixel(kit, s.value[LULL_PLANE_COLOR][i], s.value[LULL_PLANE_HALF][i], sqrt(h / (n - h)), &tally);
+    double area = value[AREA] != 0 ? sqrt(fmin(lull_kit_pixels(block) / kit->picture_pixels, 1)) : 1;
     double error = tally.valid > 0 ? area * tally.sum / tally.valid : (double)NAN;
-    ex_verdict(in, block, &tally, error, in->value[THRESHOLD], in->value[TAIL_SHARE], in->value[GROWTH], decision);
+    lull_kit_verdict(kit, block, &tally, error, value[THRESHOLD], value[TAIL_SHARE], value[GROWTH], decision);
 }
 
-static const struct ex_rule ex_rule = {
-    .params = params,
-    .param_count = PARAM_COUNT,
-    .planes_required = LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_HALF),
-    .planes_used = LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_HALF),
-    .first_spp_param = FIRST_SPP,
-    .judge = judge,
-};
+static const struct lull_kit_rule rule = {
+    .planes_required = PLANES, .planes_used = PLANES, .first_spp = "first-spp", .judge = judge};
 
-static const struct lull_criterion halfbuf_criterion = {
-    .struct_size = sizeof(struct lull_criterion),
-    .api_minor = LULL_API_MINOR,
-    .id = "halfbuf",
-    .name = "Two-buffer error",
-    .version = "1.0",
-    .description = "Mean over the block of the scaled difference between the image of all samples and that of half of them\n"
+LULL_KIT_CRITERION(rule, params, PARAM_COUNT, "halfbuf", "Two-buffer error", "1.0",
+                   "Mean over the block of the scaled difference between the image of all samples and that of half of them\n"
                    "(Dammertz et al. 2010), with a guard against rare bright paths: a block with a pixel that hangs on one\n"
-                   "sample is not stopped.",
-    .params = params,
-    .param_count = PARAM_COUNT,
-    .param_stride = sizeof(struct lull_param),
-    .thread_level = LULL_THREADS_FULL,
-    .capabilities = LULL_CAP_DETERMINISTIC | LULL_CAP_BATCH_INVARIANT,
-    EX_FUNCTIONS,
-};
-
-const struct lull_criterion *lull_criterion_entry_v1(uint32_t index)
-{
-    return index == 0 ? &halfbuf_criterion : NULL;
-}
+                   "sample is not stopped.");

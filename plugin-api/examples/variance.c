@@ -8,54 +8,23 @@
  * and per block the root mean square of e. It overestimates the error of stratified or low-discrepancy samples, and a
  * source of light that no sample has found yet does not show in it.
  */
-#include "support.h"
+#include <lull/criterion_kit.h>
 
 enum { THRESHOLD, FLOOR, TAIL_ERROR, TAIL_SHARE, FIRST_SPP, GROWTH, PARAM_COUNT };
+enum { PLANES = LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_MOMENT2) };
 
 static const struct lull_param params[PARAM_COUNT] = {
-    [THRESHOLD] = {.name = "threshold",
-                   .help = "stop when the block's relative standard error is at most this",
-                   .default_value = "0.03",
-                   .min = 0,
-                   .max = 1e6,
-                   .type = LULL_PARAM_FLOAT},
-    [FLOOR] = {.name = "floor",
-               .help = "luminance (1 = display white) below which errors count as absolute",
-               .default_value = "0.02",
-               .min = 1e-6,
-               .max = 1e6,
-               .type = LULL_PARAM_FLOAT},
-    [TAIL_ERROR] = {.name = "tail-error",
-                    .help = "a pixel with a larger relative standard error is not settled",
-                    .default_value = "0.5",
-                    .min = 1e-6,
-                    .max = 1e30,
-                    .type = LULL_PARAM_FLOAT},
-    [TAIL_SHARE] = {.name = "tail-share",
-                    .help = "share of pixels that need not be settled when the block stops",
-                    .default_value = "0",
-                    .min = 0,
-                    .max = 1,
-                    .type = LULL_PARAM_FLOAT},
-    [FIRST_SPP] = {.name = "first-spp",
-                   .help = "samples per pixel before the first judgement",
-                   .default_value = "16",
-                   .min = 2,
-                   .max = 1e15,
-                   .type = LULL_PARAM_INT},
-    [GROWTH] = {.name = "growth",
-                .help = "largest ratio of samples between two checks of a block",
-                .default_value = "1.5",
-                .min = 1.01,
-                .max = 100,
-                .type = LULL_PARAM_FLOAT},
+    [THRESHOLD] = LULL_KIT_FLOAT("threshold", "0.03", 0, 1e6, "stop when the block's relative standard error is at most this"),
+    [FLOOR] = LULL_KIT_FLOAT("floor", "0.02", 1e-6, 1e6, "luminance (1 = display white) below which errors count as absolute"),
+    [TAIL_ERROR] = LULL_KIT_FLOAT("tail-error", "0.5", 1e-6, 1e30, "a pixel with a larger relative standard error is not settled"),
+    [TAIL_SHARE] = LULL_KIT_FLOAT("tail-share", "0", 0, 1, "share of pixels that need not be settled when the block stops"),
+    [FIRST_SPP] = LULL_KIT_INT("first-spp", "16", 2, 1e15, "samples per pixel before the first judgement"),
+    [GROWTH] = LULL_KIT_FLOAT("growth", "1.5", 1.01, 100, "largest ratio of samples between two checks of a block"),
 };
 
-enum { CHUNK = 128 };
-
-static void tally_pixel(const struct lull_instance *in, const double rgb[3], double moment2, double n, struct ex_tally *t)
+static void tally_pixel(const struct lull_kit *kit, const double rgb[3], double moment2, double n, struct lull_kit_tally *t)
 {
-    double y = ex_luminance(in, rgb), y2 = in->exposure * in->exposure * moment2;
+    double y = kit->exposure * lull_kit_luminance(kit, rgb), y2 = kit->exposure * kit->exposure * moment2;
     if (!isfinite(y) || !isfinite(y2) || !isfinite(n)) {
         t->bad++;
         return;
@@ -65,62 +34,35 @@ static void tally_pixel(const struct lull_instance *in, const double rgb[3], dou
         return;
     }
     double variance_of_mean = fmax(y2 - y * y, 0) / (n - 1);
-    double level = fmax(fabs(y), in->value[FLOOR]);
-    double e = sqrt(variance_of_mean) / level;
+    double e = sqrt(variance_of_mean) / fmax(fabs(y), kit->value[FLOOR]);
     t->sum += e * e;
     t->valid++;
-    t->unsettled += e > in->value[TAIL_ERROR];
+    t->unsettled += e > kit->value[TAIL_ERROR];
 }
 
-static void judge(const struct lull_instance *in, const struct lull_view *view, const struct lull_block *block,
-                  struct lull_decision *decision)
+static void judge(struct lull_instance *in, const struct lull_view *view, const struct lull_block *block,
+                  struct lull_decision *decision, uint32_t worker)
 {
-    const struct lull_plane *color = ex_plane(view, LULL_PLANE_COLOR), *moment2 = ex_plane(view, LULL_PLANE_MOMENT2);
-    const struct lull_plane *spp = ex_plane(view, LULL_PLANE_SPP);
-    struct ex_tally tally = {0};
-    if (block->spp >= ex_first_spp(in))
-        for (int32_t y = block->y0; y < block->y1; y++)
-            for (int32_t x = block->x0; x < block->x1;) {
-                int32_t count = block->x1 - x < CHUNK ? block->x1 - x : CHUNK;
-                double rgb[CHUNK][3], m2[CHUNK], n[CHUNK];
-                ex_span(view, color, block, x, y, count, 3, rgb[0]);
-                ex_span(view, moment2, block, x, y, count, 1, m2);
-                if (spp)
-                    ex_span(view, spp, block, x, y, count, 1, n);
-                for (int32_t i = 0; i < count; i++)
-                    tally_pixel(in, rgb[i], m2[i], spp ? n[i] : (double)block->spp, &tally);
-                x += count;
+    (void)worker;
+    const struct lull_kit *kit = lull_kit_of(in);
+    const double *value = kit->value;
+    struct lull_kit_tally tally = {0};
+    struct lull_kit_span s;
+    if (block->spp >= kit->need.first_spp)
+        for (lull_kit_span_begin(&s, view, block, kit->need.planes_used); lull_kit_span_next(&s);)
+            for (int32_t i = 0; i < s.count; i++) {
+                double n = s.planes & LULL_PLANE_BIT(LULL_PLANE_SPP) ? s.value[LULL_PLANE_SPP][i][0] : (double)block->spp;
+                tally_pixel(kit, s.value[LULL_PLANE_COLOR][i], s.value[LULL_PLANE_MOMENT2][i][0], n, &tally);
             }
     double error = tally.valid > 0 ? sqrt(tally.sum / tally.valid) : (double)NAN;
-    ex_verdict(in, block, &tally, error, in->value[THRESHOLD], in->value[TAIL_SHARE], in->value[GROWTH], decision);
+    lull_kit_verdict(kit, block, &tally, error, value[THRESHOLD], value[TAIL_SHARE], value[GROWTH], decision);
 }
 
-static const struct ex_rule ex_rule = {
-    .params = params,
-    .param_count = PARAM_COUNT,
-    .planes_required = LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_MOMENT2),
-    .planes_used = LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_MOMENT2) | LULL_PLANE_BIT(LULL_PLANE_SPP),
-    .first_spp_param = FIRST_SPP,
-    .judge = judge,
-};
+static const struct lull_kit_rule rule = {.planes_required = PLANES,
+                                          .planes_used = PLANES | LULL_PLANE_BIT(LULL_PLANE_SPP),
+                                          .first_spp = "first-spp",
+                                          .judge = judge};
 
-static const struct lull_criterion variance_criterion = {
-    .struct_size = sizeof(struct lull_criterion),
-    .api_minor = LULL_API_MINOR,
-    .id = "variance",
-    .name = "Relative standard error",
-    .version = "1.0",
-    .description = "Root mean square over the block of each pixel's standard error of the mean luminance, relative to that\n"
-                   "luminance. A block with a pixel that hangs on one rare bright sample is not stopped.",
-    .params = params,
-    .param_count = PARAM_COUNT,
-    .param_stride = sizeof(struct lull_param),
-    .thread_level = LULL_THREADS_FULL,
-    .capabilities = LULL_CAP_DETERMINISTIC | LULL_CAP_BATCH_INVARIANT,
-    EX_FUNCTIONS,
-};
-
-const struct lull_criterion *lull_criterion_entry_v1(uint32_t index)
-{
-    return index == 0 ? &variance_criterion : NULL;
-}
+LULL_KIT_CRITERION(rule, params, PARAM_COUNT, "variance", "Relative standard error", "1.0",
+                   "Root mean square over the block of each pixel's standard error of the mean luminance, relative to that\n"
+                   "luminance. A block with a pixel that hangs on one rare bright sample is not stopped.");

@@ -1,6 +1,6 @@
 #!/bin/sh
 # The ABI's header is clean C99 and C++11 with every compiler there is, has no padding, needs only stddef.h and stdint.h, and
-# makes a working criterion with nothing else; the version script leaves one symbol.
+# makes a working criterion with nothing else; the version script leaves one symbol. The kit is clean C99 and C++11 too.
 tmp=$(mktemp -d) || exit 2
 trap 'rm -rf "$tmp"' EXIT
 n=0
@@ -26,10 +26,21 @@ for cxx in g++ clang++; do
     # shellcheck disable=SC2086
     t "$cxx, C++11, no padding" $cxx -std=c++11 $flags -Wold-style-cast -Wpadded -xc++ $header
 done
+echo '#include <lull/criterion_kit.h>' >"$tmp/kit.h"
+for cc in gcc clang; do
+    command -v $cc >/dev/null 2>&1 || continue
+    # shellcheck disable=SC2086
+    t "the kit: $cc, C99" $cc -std=c99 $flags -Wconversion -Iplugin-api/include -xc "$tmp/kit.h"
+done
+for cxx in g++ clang++; do
+    command -v $cxx >/dev/null 2>&1 || continue
+    # shellcheck disable=SC2086
+    t "the kit: $cxx, C++11" $cxx -std=c++11 $flags -Wconversion -Iplugin-api/include -xc++ "$tmp/kit.h"
+done
 t "includes stddef.h and stdint.h only" sh -c "[ \"\$(grep -c '^#include' $header)\" = 2 ]"
 t "declares one function" sh -c "[ \"\$(grep -c '^LULL_EXPORT' $header)\" = 1 ]"
 t "null.c builds as its comment says" sh -c "\${CC:-cc} -shared -fPIC -fvisibility=hidden -Wl,--version-script=plugin-api/plugin.map \
-    -Iplugin-api/include plugin-api/examples/null.c -o $tmp/null.so && nm -D --defined-only $tmp/null.so | awk '\$2 != \"A\"' | \
+    -Iplugin-api/include plugin-api/examples/null.c -o $tmp/null.so -lm && nm -D --defined-only $tmp/null.so | awk '\$2 != \"A\"' | \
     awk 'END { exit !(NR == 1 && \$3 == \"lull_criterion_entry_v1\") }'"
 t "and keeps the contract" "${BUILD:-build}/bin/lull-check" -q "$tmp/null.so"
 # a criterion in C++ against the same header
@@ -50,6 +61,20 @@ const lull_criterion *lull_criterion_entry_v1(uint32_t index) { return index == 
 CXX
 t "a criterion in C++" sh -c "\${CXX:-c++} -std=c++11 -Wall -Wextra -Werror -shared -fPIC -fvisibility=hidden -Iplugin-api/include \
     $tmp/cxx.cc -o $tmp/cxx.so && ${BUILD:-build}/bin/lull-check -q -o entry -o table -o symbols $tmp/cxx.so"
+# the README's recipe, as it stands there
+sed -n '/^#include <lull.criterion_kit.h>/,/^```$/p' plugin-api/README.md | sed '$d' >"$tmp/recipe.c"
+t "the README's recipe keeps the contract" sh -c "\${CC:-cc} -std=c99 -Wall -Wextra -Werror -shared -fPIC -fvisibility=hidden \
+    -Wl,--version-script=plugin-api/plugin.map -Iplugin-api/include $tmp/recipe.c -o $tmp/recipe.so -lm && ${BUILD:-build}/bin/lull-check -q $tmp/recipe.so"
+# and a criterion of the kit in C++
+cat >"$tmp/kit.cc" <<'CXX'
+#include <lull/criterion_kit.h>
+static void judge(lull_instance *, const lull_view *, const lull_block *block, lull_decision *decision, uint32_t)
+{ decision->action = block->spp >= 64 ? LULL_STOP : LULL_CONTINUE; }
+static const lull_kit_rule rule = {0, 0, nullptr, judge, nullptr};
+LULL_KIT_CRITERION(rule, nullptr, 0, "kit", "kit", "1", "kit");
+CXX
+t "a criterion of the kit in C++ keeps the contract" sh -c "\${CXX:-c++} -std=c++11 -Wall -Wextra -Werror -shared -fPIC -fvisibility=hidden \
+    -Wl,--version-script=plugin-api/plugin.map -Iplugin-api/include $tmp/kit.cc -o $tmp/kit.so && ${BUILD:-build}/bin/lull-check -q $tmp/kit.so"
 # pkg-config, installed elsewhere
 t "pkg-config names the include and the criterion directory" sh -c "sed 's|@PREFIX@|/opt/x|g' plugin-api/lull-criterion.pc.in >$tmp/lull-criterion.pc &&
     PKG_CONFIG_PATH=$tmp pkg-config --cflags lull-criterion | grep -qF -e -I/opt/x/include &&

@@ -4,7 +4,7 @@
  *
  * Rule: mean luminance of the block and a halo of one pixel at each check; stops when the last three means are close.
  */
-#include "../../../plugin-api/examples/support.h"
+#include <lull/criterion_kit.h>
 
 #include <fcntl.h>
 #include <pthread.h>
@@ -60,22 +60,9 @@ enum { THRESHOLD, FIRST_SPP, FAULT, PARAM_COUNT };
 enum { KEPT = 3 };
 
 static const struct lull_param params[PARAM_COUNT] = {
-    [THRESHOLD] = {.name = "threshold",
-                   .help = "largest relative change of the mean",
-                   .default_value = "0.01",
-                   .max = 1,
-                   .type = LULL_PARAM_FLOAT},
-    [FIRST_SPP] = {.name = "first-spp",
-                   .help = "samples before the first check",
-                   .default_value = "4",
-                   .min = 2,
-                   .max = 1e6,
-                   .type = LULL_PARAM_INT},
-    [FAULT] = {.name = "fault",
-               .help = "the rule to break, 0 for none",
-               .default_value = "0",
-               .max = FAULT_COUNT - 1,
-               .type = LULL_PARAM_INT},
+    [THRESHOLD] = LULL_KIT_FLOAT("threshold", "0.01", 0, 1, "largest relative change of the mean"),
+    [FIRST_SPP] = LULL_KIT_INT("first-spp", "4", 2, 1e6, "samples before the first check"),
+    [FAULT] = LULL_KIT_INT("fault", "0", 0, FAULT_COUNT - 1, "the rule to break, 0 for none"),
 };
 
 /* What a block answered, by spp: the last KEPT checks. */
@@ -85,9 +72,9 @@ struct history {
     uint64_t count; /* checks so far */
 };
 
-struct faulty {
-    struct lull_instance base; /* first */
-    struct history *history;   /* owns, [base.block_count] */
+struct lull_instance {
+    struct lull_kit kit;
+    struct history *history; /* owns, [kit.block_count] */
     uint32_t history_count;
     const struct lull_rect *rects; /* KEEPS_POINTER */
 };
@@ -95,14 +82,9 @@ struct faulty {
 static struct history global_history[1024];
 static double shared_scratch[2];
 
-static struct faulty *faulty(const struct lull_instance *in)
-{
-    return (struct faulty *)(uintptr_t)in;
-}
-
 static enum fault fault_of(const struct lull_instance *in)
 {
-    return (enum fault)(int)in->value[FAULT];
+    return (enum fault)(int)in->kit.value[FAULT];
 }
 
 /* --- pixels ---------------------------------------------------------------------------------------------------------- */
@@ -121,7 +103,7 @@ static const struct lull_block *owner(const struct lull_view *view, int32_t x, i
 static double pixel(const struct lull_instance *in, const struct lull_view *view, const struct lull_block *b, int32_t x,
                     int32_t y)
 {
-    struct lull_plane color = *ex_plane(view, LULL_PLANE_COLOR);
+    struct lull_plane color = *lull_kit_plane(view, LULL_PLANE_COLOR);
     if (fault_of(in) == TIGHT_STRIDES) {
         color.stride_c = 4, color.stride_x = 12;
         color.stride_y = 12 * ((int64_t)view->x1 - view->x0);
@@ -130,9 +112,9 @@ static double pixel(const struct lull_instance *in, const struct lull_view *view
         color.type = LULL_TYPE_F32;
     if (fault_of(in) == GLOBAL_SPP && view->all)
         b = view->all;
-    double rgb[3];
-    ex_span(view, &color, b, x, y, 1, 3, rgb);
-    return ex_luminance(in, rgb);
+    double rgb[1][3];
+    lull_kit_read(view, &color, b, x, y, 1, 3, rgb);
+    return in->kit.exposure * lull_kit_luminance(&in->kit, rgb[0]);
 }
 
 static double mean_of(const struct lull_instance *in, const struct lull_view *view, const struct lull_block *block, int *bad)
@@ -205,7 +187,7 @@ static double change(const struct history *h)
 
 static struct history *history_of(const struct lull_instance *in, uint32_t id)
 {
-    return fault_of(in) == GLOBAL_STATE ? &global_history[id % 1024] : &faulty(in)->history[id];
+    return fault_of(in) == GLOBAL_STATE ? &global_history[id % 1024] : &in->history[id];
 }
 
 static void remember(const struct lull_instance *in, const struct lull_view *view, const struct lull_block *block,
@@ -216,7 +198,7 @@ static void remember(const struct lull_instance *in, const struct lull_view *vie
     uint64_t last = h->count > 0 ? h->spp[(h->count - 1) % KEPT] : UINT64_MAX;
     double mean = mean_of(in, view, block, &bad);
     if (fault_of(in) == KEEPS_POINTER)
-        mean += faulty(in)->rects[block->id].x0;
+        mean += in->rects[block->id].x0;
     if (block->spp != last || fault_of(in) == REPEAT) { /* the same question leaves no trace */
         h->spp[h->count % KEPT] = block->spp;
         h->mean[h->count % KEPT] = mean;
@@ -225,9 +207,10 @@ static void remember(const struct lull_instance *in, const struct lull_view *vie
     d->flags |= bad ? LULL_DECISION_BAD_INPUT : 0;
 }
 
-static void judge(const struct lull_instance *in, const struct lull_view *view, const struct lull_block *block,
-                  struct lull_decision *d)
+static void judge(struct lull_instance *in, const struct lull_view *view, const struct lull_block *block,
+                  struct lull_decision *d, uint32_t worker)
 {
+    (void)worker;
     misbehave(in, block);
     d->flags = 0;
     d->action = LULL_CONTINUE;
@@ -239,7 +222,7 @@ static void judge(const struct lull_instance *in, const struct lull_view *view, 
     if (fault_of(in) == EXITS && (d->flags & LULL_DECISION_BAD_INPUT))
         exit(3);
     const struct history *h = history_of(in, block->id);
-    if (h->count < KEPT || block->spp < ex_first_spp(in)) {
+    if (h->count < KEPT || block->spp < in->kit.need.first_spp) {
         d->flags |= LULL_DECISION_TOO_EARLY;
         d->next_spp = block->spp + block->spp / 2 + 2;
         return;
@@ -249,16 +232,14 @@ static void judge(const struct lull_instance *in, const struct lull_view *view, 
         static unsigned calls;
         d->error += 1e-6 * calls++;
     }
-    d->action = d->error <= in->value[THRESHOLD] ? LULL_STOP : LULL_CONTINUE;
+    d->action = d->error <= in->kit.value[THRESHOLD] ? LULL_STOP : LULL_CONTINUE;
     d->next_spp = fault_of(in) == NEXT_IN_PAST ? block->spp : block->spp + block->spp / 2 + 2;
 }
 
-static const struct ex_rule ex_rule = {
-    .params = params,
-    .param_count = PARAM_COUNT,
+static const struct lull_kit_rule rule = {
     .planes_required = LULL_PLANE_BIT(LULL_PLANE_COLOR),
     .planes_used = LULL_PLANE_BIT(LULL_PLANE_COLOR),
-    .first_spp_param = FIRST_SPP,
+    .first_spp = "first-spp",
     .judge = judge,
 };
 
@@ -271,14 +252,14 @@ static void *sleeper(void *arg)
     return arg;
 }
 
-static void create_faults(struct faulty *f)
+static void create_faults(struct lull_instance *in)
 {
     pthread_t thread;
-    if (fault_of(&f->base) == LEAK)
-        f->rects = malloc(40);
-    if (fault_of(&f->base) == FILE_LEAK)
+    if (fault_of(in) == LEAK)
+        in->rects = malloc(40);
+    if (fault_of(in) == FILE_LEAK)
         (void)!open("/dev/null", O_RDONLY);
-    if (fault_of(&f->base) == THREAD && pthread_create(&thread, NULL, sleeper, NULL) == 0)
+    if (fault_of(in) == THREAD && pthread_create(&thread, NULL, sleeper, NULL) == 0)
         pthread_detach(thread);
 }
 
@@ -287,60 +268,47 @@ static int chosen(const struct lull_pair *pairs, uint32_t count, enum fault faul
 {
     double number;
     return count > 0 && pairs && pairs->key && strcmp(pairs->key, "fault") == 0 &&
-           ex_number(pairs->value, &number) && number == (double)fault;
+           lull_kit_number(pairs->value, &number) && number == (double)fault;
 }
+
+static const struct lull_criterion criterion;
 
 static int32_t create(const struct lull_host *host, const struct lull_pair *pairs, uint32_t pair_count, uint32_t pair_stride,
                       struct lull_instance **instance, struct lull_error *err)
 {
     if (!instance)
-        return ex_fail(err, LULL_E_INVALID, "create: no place for the instance");
+        return lull_kit_fail(err, LULL_E_INVALID, "create: no place for the instance");
     struct lull_host whole = {.struct_size = sizeof whole};
     if (chosen(pairs, pair_count, SHORT_STRUCT) && host) {
         whole = *host;
         whole.struct_size = sizeof whole;
         host = &whole;
     }
-    struct lull_instance *base = NULL;
-    int32_t status = ex_create(host, pairs, pair_count, pair_stride, &base, err);
+    struct lull_instance *in = NULL;
+    int32_t status = lull_kit_create(&rule, &criterion, sizeof *in, host, pairs, pair_count, pair_stride, NULL, &in, err);
     if ((status == LULL_E_KEY && chosen(pairs, pair_count, ANY_KEY)) ||
         (status == LULL_E_VALUE && chosen(pairs, pair_count, ANY_VALUE)))
-        status = ex_create(host, pairs, 1, pair_stride, &base, NULL);
+        status = lull_kit_create(&rule, &criterion, sizeof *in, host, pairs, 1, pair_stride, NULL, &in, NULL);
+    if (status == LULL_E_MEMORY && chosen(pairs, pair_count, UNCHECKED_MALLOC))
+        create_faults(in);
     if (status != LULL_OK) {
         if (chosen(pairs, pair_count, TOUCHES_INSTANCE))
             *instance = NULL;
         if (chosen(pairs, pair_count, ANONYMOUS_KEY) && err)
-            ex_fail(err, status, "cannot");
+            lull_kit_fail(err, status, "cannot");
         return status;
     }
-    struct faulty *f = calloc(1, sizeof *f);
-    if (!f && fault_of(base) != UNCHECKED_MALLOC) {
-        ex_destroy(base);
-        return ex_fail(err, LULL_E_MEMORY, "out of memory");
-    }
-    f->base = *base;
     if (host == &whole)
-        f->base.host = NULL;
-    ex_destroy(base);
-    create_faults(f);
-    *instance = &f->base;
+        in->kit.host = NULL;
+    in->kit.need.halo = 1;
+    in->kit.need.bytes_per_block = sizeof(struct history);
+    create_faults(in);
+    *instance = in;
     return LULL_OK;
-}
-
-static int32_t requirements(const struct lull_instance *in, struct lull_requirements *req, struct lull_error *err)
-{
-    int32_t status = ex_requirements(in, req, err);
-    if (status == LULL_OK) {
-        req->halo = 1;
-        req->bytes_per_block = sizeof(struct history);
-    }
-    return status;
 }
 
 static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *frame, struct lull_error *err)
 {
-    struct faulty *f = faulty(in);
-    struct lull_instance before = *in;
     struct lull_frame lenient;
     if (frame && LULL_HAS(struct lull_frame, frame, rgb_to_xyz)) {
         lenient = *frame;
@@ -350,21 +318,20 @@ static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *fr
             lenient.planes = ~UINT32_C(0);
         frame = &lenient;
     }
-    int32_t status = ex_begin_frame(in, frame, err);
+    int32_t status = lull_kit_frame_check(in, frame, err);
     if (status != LULL_OK)
         return status;
     struct history *history = calloc(frame->block_count, sizeof *history);
-    if (!history) {
-        *in = before;
-        return ex_fail(err, LULL_E_MEMORY, "out of memory");
-    }
-    if (fault_of(in) == NO_RESTART && f->history && f->history_count == frame->block_count)
-        memcpy(history, f->history, f->history_count * sizeof *history);
-    free(f->history);
-    f->history = history;
-    f->history_count = frame->block_count;
+    if (!history)
+        return lull_kit_fail(err, LULL_E_MEMORY, "out of memory");
+    lull_kit_frame_open(in, frame);
+    if (fault_of(in) == NO_RESTART && in->history && in->history_count == frame->block_count)
+        memcpy(history, in->history, in->history_count * sizeof *history);
+    free(in->history);
+    in->history = history;
+    in->history_count = frame->block_count;
     if (fault_of(in) == KEEPS_POINTER)
-        f->rects = frame->blocks;
+        in->rects = frame->blocks;
     return LULL_OK;
 }
 
@@ -372,9 +339,9 @@ static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, 
                         uint32_t block_stride, struct lull_decision *decisions, uint32_t decision_stride, uint32_t count,
                         struct lull_error *err)
 {
-    if (fault_of(in) == ANY_ID && count > 0 && blocks && blocks->id >= in->block_count)
+    if (fault_of(in) == ANY_ID && count > 0 && blocks && blocks->id >= in->kit.block_count)
         return LULL_OK;
-    int32_t status = ex_evaluate(in, view, blocks, block_stride, decisions, decision_stride, count, err);
+    int32_t status = lull_kit_evaluate(in, view, blocks, block_stride, decisions, decision_stride, count, err);
     if (status == LULL_OK && fault_of(in) == WIDE_WRITE && count > 0 && decision_stride >= sizeof *decisions + 8)
         memset(decisions + 1, 0, 8);
     if (status == LULL_OK && fault_of(in) == READS_LATER_FIELD)
@@ -389,17 +356,17 @@ static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, 
 
 static void end_frame(struct lull_instance *in)
 {
-    ex_end_frame(in);
+    lull_kit_end_frame(in);
     if (fault_of(in) == NO_RESTART)
         return;
-    free(faulty(in)->history);
-    faulty(in)->history = NULL;
+    free(in->history);
+    in->history = NULL;
 }
 
 static void destroy(struct lull_instance *in)
 {
     if (in)
-        free(faulty(in)->history);
+        free(in->history);
     free(in);
 }
 
@@ -407,36 +374,36 @@ static void destroy(struct lull_instance *in)
 
 static int32_t save(const struct lull_instance *in, const struct lull_writer *writer, struct lull_error *err)
 {
-    uint32_t count = in->block_count;
+    uint32_t count = in->kit.block_count;
     int32_t status = writer->write(writer, &count, sizeof count);
     if (status == LULL_OK)
-        status = writer->write(writer, faulty(in)->history, count * sizeof(struct history));
+        status = writer->write(writer, in->history, count * sizeof(struct history));
     if (fault_of(in) == SAVE_IGNORES)
         return LULL_OK;
-    return status == LULL_OK ? LULL_OK : ex_fail(err, status, "the history cannot be written");
+    return status == LULL_OK ? LULL_OK : lull_kit_fail(err, status, "the history cannot be written");
 }
 
 static int32_t load(struct lull_instance *in, const struct lull_reader *reader, struct lull_error *err)
 {
     uint32_t count;
-    if (in->block_count == 0)
-        return ex_fail(err, LULL_E_STATE, "load: no frame is open");
-    struct history *fresh = calloc(in->block_count, sizeof *fresh);
+    if (in->kit.block_count == 0)
+        return lull_kit_fail(err, LULL_E_STATE, "load: no frame is open");
+    struct history *fresh = calloc(in->kit.block_count, sizeof *fresh);
     if (!fresh)
-        return ex_fail(err, LULL_E_MEMORY, "out of memory");
+        return lull_kit_fail(err, LULL_E_MEMORY, "out of memory");
     if (fault_of(in) == LOAD_DIRTY)
-        memset(faulty(in)->history, 0, in->block_count * sizeof *fresh);
+        memset(in->history, 0, in->kit.block_count * sizeof *fresh);
     int32_t status = reader->read(reader, &count, sizeof count);
-    if (status == LULL_OK && count != in->block_count)
+    if (status == LULL_OK && count != in->kit.block_count)
         status = LULL_E_IO;
     if (status == LULL_OK)
-        status = reader->read(reader, fresh, in->block_count * sizeof *fresh);
+        status = reader->read(reader, fresh, in->kit.block_count * sizeof *fresh);
     if (status != LULL_OK) {
         free(fresh);
-        return fault_of(in) == LOAD_SHORT ? LULL_OK : ex_fail(err, LULL_E_IO, "the state does not fit the frame");
+        return fault_of(in) == LOAD_SHORT ? LULL_OK : lull_kit_fail(err, LULL_E_IO, "the state does not fit the frame");
     }
-    free(faulty(in)->history);
-    faulty(in)->history = fresh;
+    free(in->history);
+    in->history = fresh;
     return LULL_OK;
 }
 
@@ -460,7 +427,7 @@ static const struct lull_criterion criterion = {
     .thread_level = LULL_THREADS_FULL,
     .capabilities = LULL_CAP_DETERMINISTIC | LULL_CAP_BATCH_INVARIANT,
     .create = create,
-    .requirements = requirements,
+    .requirements = lull_kit_requirements,
     .begin_frame = begin_frame,
     .evaluate = evaluate,
     .end_frame = end_frame,

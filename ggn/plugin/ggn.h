@@ -1,16 +1,16 @@
 /*
- * The criterion "ggn" between its contract with the host (network.c) and its verdict on one block (verdict.c). Private to both.
+ * The criterion "ggn" between its contract with the host (ggn.c) and its verdict on one block (verdict.c). Private to both.
  */
-#ifndef GGN_PLUGIN_NETWORK_H
-#define GGN_PLUGIN_NETWORK_H
+#ifndef GGN_PLUGIN_GGN_H
+#define GGN_PLUGIN_GGN_H
 
-#include <lull/criterion.h>
+#include <lull/criterion_kit.h>
 
 #include "model/judge.h"
 #include "model/policy.h"
+#include "model/preprocess.h"
 #include "model/window.h"
 #include "plugin/history.h"
-#include "plugin/view.h"
 
 struct gp_worker {
     struct ggn_judge *judge;
@@ -18,16 +18,13 @@ struct gp_worker {
 };
 
 struct lull_instance {
-    const struct lull_host *host; /* borrows until destroy */
+    struct lull_kit kit;
     struct ggn_model *model;
     struct ggn_policy policy; /* the model's, with the parameters over it */
     int gate, window;
     enum ggn_precision precision;
     uint32_t key; /* of saved state: a hash of model and policy */
-    int open;
     struct ggn_display display;
-    double luminance[3];
-    uint64_t spp_max;
     struct gp_history history; /* of the open frame */
     uint32_t workers;
     struct gp_worker *worker;

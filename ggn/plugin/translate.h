@@ -1,0 +1,16 @@
+/* What the ABI says, in ggn's own terms, and the other way round. Pure functions, any thread. */
+#ifndef GGN_PLUGIN_TRANSLATE_H
+#define GGN_PLUGIN_TRANSLATE_H
+
+#include <lull/criterion_kit.h>
+
+#include "base/err.h"
+#include "model/preprocess.h"
+
+/* Fills *err (may be NULL) from an error of ggn's own functions, `what` before its text; returns the LULL_E_ code. */
+int32_t gp_fail_from(struct lull_error *err, const char *what, const struct base_err *from);
+
+/* How the host of the open frame shows the picture; sRGB where it does not say. */
+struct ggn_display gp_display_of(const struct lull_kit *kit);
+
+#endif
