@@ -66,6 +66,8 @@ TOOL_SRC    := $(wildcard plugin-api/tools/*.c)
 PT_SRC      := $(wildcard pathtracer/*/*.c pathtracer/*/*.cpp)
 PT_MAIN     := $(wildcard pathtracer/*.c)
 GGN_SRC     := $(filter-out ggn/plugin/% ggn/cli/%,$(wildcard ggn/*/*.c ggn/*/*.cpp))
+# What includes nn/real.h itself is compiled for float and, with GGN_DOUBLE, for double.
+GGN_TWICE   := $(shell grep -ls '"nn/real.h"' ggn/nn/*.c ggn/model/*.c tests/support/*.c)
 GGN_PLUGIN  := $(wildcard ggn/plugin/*.c)
 GGN_CLI     := $(wildcard ggn/cli/*.c)
 # Tests name what they test by prefix: pt_ (path tracer), ggn_, api_ (plugin-api).
@@ -75,7 +77,7 @@ SANE_SRC    := $(wildcard tests/unit/*.c tests/abi/*.c tests/oom/*.c)
 SCRIPT_TEST := $(wildcard tests/cli/*.sh tests/e2e/*.sh)
 FUZZ_SRC    := $(filter-out tests/fuzz/replay.c,$(wildcard tests/fuzz/*.c))
 
-o = $(addprefix $(OBJ)/,$(addsuffix .o,$(1)))
+o = $(addprefix $(OBJ)/,$(addsuffix .o,$(1)) $(addsuffix .double.o,$(filter $(GGN_TWICE),$(1))))
 BASE_OBJ    := $(call o,$(BASE_SRC))
 PT_OBJ      := $(call o,$(PT_SRC)) $(BASE_OBJ)
 LOADER_OBJ  := $(call o,$(LOADER_SRC))
@@ -110,6 +112,11 @@ $(OBJ)/%.c.o: %.c
 	@mkdir -p $(@D)
 	@echo "  CC   $<"
 	@$(CC) $(CFLAGS_ALL) $(call inc,$<) $(call isa,$<) -c $< -o $@
+
+$(OBJ)/%.c.double.o: %.c
+	@mkdir -p $(@D)
+	@echo "  CC   $< (double)"
+	@$(CC) $(CFLAGS_ALL) -DGGN_DOUBLE $(call inc,$<) $(call isa,$<) -c $< -o $@
 
 $(OBJ)/%.cpp.o: %.cpp
 	@mkdir -p $(@D)

@@ -9,6 +9,7 @@
 #include "base/clock.h"
 #include "cli/commands.h"
 #include "model/trainer.h"
+#include "nn/hash.h"
 
 enum { KEY_JSON = 256, KEY_THREADS, KEY_ROUNDS, KEY_BATCH, KEY_PRECISION, MAX_ROUNDS = 101, SGEMM_N = 768 };
 
@@ -19,8 +20,8 @@ struct options {
 struct bench {
     struct options o;
     struct base_threads *threads;
-    struct ggn_trainer_f32 *trainer;
-    struct ggn_exec_f32 *r, *m, *d; /* inference */
+    struct ggn_trainer *trainer;
+    struct ggn_exec *r, *m, *d; /* inference */
     float *planes;                  /* random pictures */
     const float *noisy[64 * 18], *reference[64 * 3];
 };
@@ -76,12 +77,12 @@ static int setup(struct bench *b, struct base_err *err)
     options.batch = b->o.batch;
     options.bf16 = b->o.bf16;
     b->threads = base_threads_create(b->o.threads, err);
-    b->trainer = b->threads ? ggn_trainer_create_f32(&hyper, &options, b->threads, err) : NULL;
+    b->trainer = b->threads ? ggn_trainer_create(&hyper, &options, b->threads, err) : NULL;
     if (!b->trainer)
         return BASE_ENOMEM;
-    b->r = ggn_exec_create_f32(&b->trainer->graph[GGN_NET_R], NULL, 1, flags, b->threads, err);
-    b->m = ggn_exec_create_f32(&b->trainer->graph[GGN_NET_M], NULL, 1, flags, b->threads, err);
-    b->d = ggn_exec_create_f32(&b->trainer->graph[GGN_NET_D], NULL, 1, flags, b->threads, err);
+    b->r = ggn_exec_create(&b->trainer->graph[GGN_NET_R], NULL, 1, flags, b->threads, err);
+    b->m = ggn_exec_create(&b->trainer->graph[GGN_NET_M], NULL, 1, flags, b->threads, err);
+    b->d = ggn_exec_create(&b->trainer->graph[GGN_NET_D], NULL, 1, flags, b->threads, err);
     b->planes = malloc((size_t)b->o.batch * PLANES * AREA * sizeof *b->planes);
     if (!b->r || !b->m || !b->d || !b->planes)
         return base_fail_nomem(err, "bench");
@@ -94,29 +95,29 @@ static int setup(struct bench *b, struct base_err *err)
         }
     for (int c = 0; c < 18; c++)
         for (int y = 0; y < 200; y++) {
-            memcpy(ggn_exec_plane_f32(b->m, 0, 0, c) + (long)y * 201, b->noisy[c] + y * 200, 200 * sizeof(float));
+            memcpy(ggn_exec_plane(b->m, 0, 0, c) + (long)y * 201, b->noisy[c] + y * 200, 200 * sizeof(float));
             if (c < 3)
-                memcpy(ggn_exec_plane_f32(b->r, 0, 0, c) + (long)y * 201, b->noisy[c] + y * 200, 200 * sizeof(float));
+                memcpy(ggn_exec_plane(b->r, 0, 0, c) + (long)y * 201, b->noisy[c] + y * 200, 200 * sizeof(float));
             if (c < 2)
-                memcpy(ggn_exec_plane_f32(b->d, 0, 0, c) + (long)y * 201, b->noisy[c] + y * 200, 200 * sizeof(float));
+                memcpy(ggn_exec_plane(b->d, 0, 0, c) + (long)y * 201, b->noisy[c] + y * 200, 200 * sizeof(float));
         }
     return 0;
 }
 
 static void release(struct bench *b)
 {
-    ggn_exec_destroy_f32(b->r);
-    ggn_exec_destroy_f32(b->m);
-    ggn_exec_destroy_f32(b->d);
-    ggn_trainer_destroy_f32(b->trainer);
+    ggn_exec_destroy(b->r);
+    ggn_exec_destroy(b->m);
+    ggn_exec_destroy(b->d);
+    ggn_trainer_destroy(b->trainer);
     base_threads_destroy(b->threads);
     free(b->planes);
 }
 
-static double forward_ms(struct bench *b, struct ggn_exec_f32 *e, int net)
+static double forward_ms(struct bench *b, struct ggn_exec *e, int net)
 {
     double start = base_clock_wall_s();
-    ggn_exec_forward_f32(e, b->trainer->weights[net], 1, GGN_EVAL);
+    ggn_exec_forward(e, b->trainer->weights[net], 1, GGN_EVAL);
     return 1e3 * (base_clock_wall_s() - start);
 }
 
@@ -127,7 +128,7 @@ static double denoiser_train_ms(struct bench *b, struct base_err *err)
 
     for (int i = 0; i < 3 * b->o.batch; i++)
         x[i] = b->noisy[i / 3 * 18 + i % 3];
-    if (ggn_trainer_denoiser_step_f32(b->trainer, x, b->reference, b->o.batch, &loss, err))
+    if (ggn_trainer_denoiser_step(b->trainer, x, b->reference, b->o.batch, &loss, err))
         return 0;
     return 1e3 * (base_clock_wall_s() - start) / b->o.batch;
 }
@@ -136,22 +137,22 @@ static double denoiser_train_ms(struct bench *b, struct base_err *err)
 static double judge_train_ms(struct bench *b, struct base_err *err)
 {
     double label[64], bce, start = base_clock_wall_s();
-    struct ggn_batch_f32 batch = {.count = b->o.batch, .noisy = b->noisy, .denoised = b->noisy, .label = label};
+    struct ggn_batch batch = {.count = b->o.batch, .noisy = b->noisy, .denoised = b->noisy, .label = label};
 
     for (int i = 0; i < b->o.batch; i++)
         label[i] = i & 1;
-    if (ggn_trainer_judge_step_f32(b->trainer, &batch, &bce, NULL, err))
+    if (ggn_trainer_judge_step(b->trainer, &batch, &bce, NULL, err))
         return 0;
     return 1e3 * (base_clock_wall_s() - start) / b->o.batch;
 }
 
 static double generator_train_ms(struct bench *b)
 {
-    struct ggn_exec_f32 *m = b->trainer->m;
+    struct ggn_exec *m = b->trainer->m;
     double start = base_clock_wall_s();
 
-    ggn_exec_forward_f32(m, b->trainer->weights[GGN_NET_M], b->o.batch, GGN_TRAIN);
-    ggn_exec_backward_f32(m, b->trainer->weights[GGN_NET_M], b->trainer->grad[GGN_NET_M]);
+    ggn_exec_forward(m, b->trainer->weights[GGN_NET_M], b->o.batch, GGN_TRAIN);
+    ggn_exec_backward(m, b->trainer->weights[GGN_NET_M], b->trainer->grad[GGN_NET_M]);
     return 1e3 * (base_clock_wall_s() - start) / b->o.batch;
 }
 
@@ -208,16 +209,14 @@ static int measure(struct bench *b, double figure[N_FIGURES], struct base_err *e
     return err->code;
 }
 
-static int print_layers(struct bench *b, struct ggn_exec_f32 *e, int net, struct base_err *err)
+static int print_layers(struct bench *b, struct ggn_exec *e, int net, struct base_err *err)
 {
-    static const char *const op_name[] = {"conv",     "im2col",   "batch norm", "leaky relu", "sigmoid",
-                                          "max pool", "upsample", "flatten",    "linear",     "dropout"};
     const struct ggn_graph *g = e->graph;
     double s[GGN_MAX_LAYERS] = {0}, total = 0;
 
     e->layer_s = s;
     for (int i = 0; i < b->o.rounds; i++)
-        ggn_exec_forward_f32(e, b->trainer->weights[net], 1, GGN_EVAL);
+        ggn_exec_forward(e, b->trainer->weights[net], 1, GGN_EVAL);
     e->layer_s = NULL;
     printf("%s: %.3f GFLOP\n%-7s %-11s %14s %9s %9s %9s\n", g->name, 2e-9 * ggn_graph_mac(g), "stage", "layer", "output",
            "GFLOP", "ms", "GFLOP/s");
@@ -229,7 +228,7 @@ static int print_layers(struct bench *b, struct ggn_exec_f32 *e, int net, struct
         snprintf(shape, sizeof shape, "%dx%dx%d", v->c, v->h, v->w);
         total += ms;
         if (ms > 0)
-            printf("%-7s %-11s %14s %9.4f %9.3f %9.1f\n", l->stage, op_name[l->op], shape, 1e-9 * flop, ms,
+            printf("%-7s %-11s %14s %9.4f %9.3f %9.1f\n", l->stage, ggn_op_name(l->op), shape, 1e-9 * flop, ms,
                    1e-6 * flop / ms);
     }
     printf("%-7s %-11s %14s %9.4f %9.3f %9.1f\n\n", "all", "", "", 2e-9 * ggn_graph_mac(g), total,

@@ -141,7 +141,7 @@ int ggn_cmd_golden(int argc, char **argv)
     struct base_threads *threads = base_threads_create(o.threads, &err);
     if (!threads)
         return ggn_cmd_fail(argv[0], &err);
-    int rc = (o.single ? ggn_golden_run_f32 : ggn_golden_run_f64)(&o.seeds, o.train_step, o.bf16, threads, &golden, &err);
+    int rc = (o.single ? ggn_golden_run : ggn_golden_run_f64)(&o.seeds, o.train_step, o.bf16, threads, &golden, &err);
     base_threads_destroy(threads);
     if (rc)
         return ggn_cmd_fail(argv[0], &err);

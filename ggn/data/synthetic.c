@@ -5,7 +5,7 @@
 
 #include "data/image.h"
 #include "model/preprocess.h"
-#include "nn/weights.h"
+#include "nn/hash.h"
 #include "data/chains.h"
 
 enum { MAX_LEVELS = 128 };

@@ -6,7 +6,7 @@
 
 #include "base/colour.h"
 #include "data/image.h"
-#include "nn/weights.h"
+#include "nn/hash.h"
 
 void ggn_windows_release(struct ggn_windows *w)
 {

@@ -12,7 +12,7 @@
 #include "model/judge.h"
 #include "model/policy.h"
 #include "model/window.h"
-#include "nn/loss.h"
+#include "nn/ssim.h"
 
 /* Recorded levels are rounded, unevenly so when they are low: a step may be short of the policy's by this share (in octaves). */
 static const double spacing_slack = 0.75;
@@ -229,10 +229,10 @@ static void put_tile(uint8_t *strip, int tiles, int k, const float *planes, size
         }
 }
 
-static double ssim_of(struct ggn_ssim_f32 *ssim, const float *a, const float *b, size_t pixels, int width)
+static double ssim_of(struct ggn_ssim *ssim, const float *a, const float *b, size_t pixels, int width)
 {
     const float *x[3] = {a, a + pixels, a + 2 * pixels}, *y[3] = {b, b + pixels, b + 2 * pixels};
-    return ggn_ssim_mean_f32(ssim, x, y, NULL, 3, width, 0.0);
+    return ggn_ssim_mean(ssim, x, y, NULL, 3, width, 0.0);
 }
 
 static int denoiser_strip(const struct ggn_eval_set *s, const struct ggn_eval_block *b, struct viewer *v, const char *path, struct strips *strips,
@@ -243,7 +243,7 @@ static int denoiser_strip(const struct ggn_eval_set *s, const struct ggn_eval_bl
     size_t pixels = (size_t)w * (size_t)h, values = 3 * pixels;
     uint8_t *strip = malloc(3 * values);
     float *planes = malloc(3 * values * sizeof *planes);
-    struct ggn_ssim_f32 *ssim = ggn_ssim_create_f32(h, w, NULL, err);
+    struct ggn_ssim *ssim = ggn_ssim_create(h, w, NULL, err);
     int rc = !strip || !planes || !ssim ? base_fail_nomem(err, path) : 0;
     if (!rc) {
         v->n = 0;
@@ -260,7 +260,7 @@ static int denoiser_strip(const struct ggn_eval_set *s, const struct ggn_eval_bl
                  ssim_of(ssim, planes + values, planes + 2 * values, pixels, w));
         rc = add_strip(strips, path, strip, 3 * w, h, err);
     }
-    ggn_ssim_destroy_f32(ssim);
+    ggn_ssim_destroy(ssim);
     free(planes);
     free(strip);
     return rc;

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "base/colour.h"
-#include "nn/loss.h"
+#include "nn/ssim.h"
 #include "observer/flip.h"
 
 void ggn_eval_set_release(struct ggn_eval_set *s)
@@ -131,7 +131,7 @@ struct fill {
 };
 
 /* SSIM of two display images on [0,1], mean over the channels. */
-static double ssim_of(struct ggn_ssim_f32 *ssim, const uint8_t *a, const uint8_t *b, size_t pixels, int width, float *work)
+static double ssim_of(struct ggn_ssim *ssim, const uint8_t *a, const uint8_t *b, size_t pixels, int width, float *work)
 {
     const float *x[3], *y[3];
     for (size_t i = 0; i < 3 * pixels; i++) {
@@ -142,7 +142,7 @@ static double ssim_of(struct ggn_ssim_f32 *ssim, const uint8_t *a, const uint8_t
         x[c] = work + c * pixels;
         y[c] = work + (3 + c) * pixels;
     }
-    return ggn_ssim_mean_f32(ssim, x, y, NULL, 3, width, 0.0);
+    return ggn_ssim_mean(ssim, x, y, NULL, 3, width, 0.0);
 }
 
 static void interleave(const uint8_t *planar, size_t pixels, uint8_t *rgb)
@@ -159,7 +159,7 @@ static int measure_quality(struct ggn_eval_set *s, const struct ggn_eval_block *
     size_t pixels = (size_t)w * (size_t)h, values = 3 * pixels;
     uint8_t *rgb = malloc(2 * values);
     float *work = malloc(2 * values * sizeof *work);
-    struct ggn_ssim_f32 *ssim = ggn_ssim_create_f32(h, w, NULL, err);
+    struct ggn_ssim *ssim = ggn_ssim_create(h, w, NULL, err);
     if (!rgb || !work || !ssim) {
         rc = base_fail_nomem(err, "quality");
         goto out;
@@ -174,7 +174,7 @@ static int measure_quality(struct ggn_eval_set *s, const struct ggn_eval_block *
         s->ssim[i] = ssim_of(ssim, level, c->reference, pixels, w, work);
     }
 out:
-    ggn_ssim_destroy_f32(ssim);
+    ggn_ssim_destroy(ssim);
     free(work);
     free(rgb);
     return rc;

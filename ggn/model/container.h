@@ -8,9 +8,10 @@
  *  24   8  offset of the JSON text     32  8  its size (no terminating zero)
  *  40   8  offset of the tensor table  48  8  checksum: FNV-1a (64 bit) of the file with these 8 bytes as zero
  *  56   8  zero
- *  64      table, one entry of 88 bytes per tensor: name[48] (zero-padded), u32 type (0 f32, 1 f16, 2 bf16), u32 rank
- * (1..4), u32 dim[4] (unused ones 1), u64 offset (multiple of 64), u64 size in bytes then JSON and data in any order,
- * without overlap being required or relied on.
+ *  64      table, one entry of 88 bytes per tensor: name[48] (zero-padded), u32 type (0 f32, 1 f16, 2 bf16),
+ *          u32 rank (1..4), u32 dim[4] (unused ones 1), u64 offset (multiple of 64), u64 size in bytes
+ *
+ * then JSON and data in any order, without overlap being required or relied on.
  *
  * A reader checks sizes, offsets and checksum before it looks at anything else, and never allocates from a size in a file
  * that the file itself is too short for. Unknown versions and types are refused. Thread-safe (no globals).
@@ -59,7 +60,7 @@ int ggn_container_write(struct ggn_container *c, const char *path, struct base_e
 int ggn_container_read(struct ggn_container *c, const char *path, struct base_err *err);
 /* The same from memory (copied). `name` is for messages. */
 int ggn_container_parse(struct ggn_container *c, const char *name, const void *data, size_t size, struct base_err *err);
-/* Decodes the named tensor of exactly this shape into out; BASE_EINVAL when it is missing, shaped otherwise or not finite. */
+/* Decodes the named tensor of exactly this shape into out; BASE_EINVAL when it is missing, shaped otherwise, not finite. */
 int ggn_container_get(const struct ggn_container *c, const char *name, int rank, const int *dim, float *out,
                       struct base_err *err);
 

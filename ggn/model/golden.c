@@ -1,16 +1,256 @@
 #include "model/golden.h"
 
 #include <math.h>
+#include <stdlib.h>
+#include <string.h>
 
-#include "nn/weights.h"
+#include "model/trainer.h"
+#include "nn/loss.h"
+#include "nn/ssim.h"
+#include "nn/ssim.h"
+#include "nn/real.h"
 
-double ggn_golden_pixel(int w, int i, int c, int y, int x)
+enum { SIDE = 200, AREA = SIDE * SIDE, IMAGES = 6, PLANES = 3 * IMAGES, W_COUNT = GGN_GOLDEN_WINDOWS };
+
+struct state {
+    struct ggn_trainer *t;
+    struct ggn_exec *r, *m, *d; /* evaluation, every value kept */
+    real *noisy, *reference;    /* [W][18][AREA], [W][3][AREA] */
+    const real *noisy_plane[W_COUNT * PLANES], *reference_plane[W_COUNT * 3];
+};
+
+struct moments {
+    double sum, sum_sq, count;
+};
+
+static void add_plane(struct moments *m, const real *x, const struct ggn_value *v)
 {
-    double v = 0.5 + 0.4 * sin((0.02 + 0.01 * w) * x + (0.03 + 0.02 * w) * y + c + w);
+    for (int y = 0; y < v->h; y++)
+        for (int i = 0; i < v->w; i++) {
+            double p = (double)x[(long)y * v->row + i];
+            m->sum += p;
+            m->sum_sq += p * p;
+            m->count++;
+        }
+}
 
-    if (i >= 0) {
-        double u = ggn_hash_unit((uint32_t)(c * 40000 + 200 * y + x), (uint32_t)(1000 * (w + 1) + i));
-        v += 0.3 / ((1 + w) * (i + 1)) * (2 * u - 1);
+static double mean_of(const struct moments *m)
+{
+    return m->sum / m->count;
+}
+
+static double std_of(const struct moments *m)
+{
+    return sqrt(m->sum_sq / m->count - mean_of(m) * mean_of(m));
+}
+
+static void fill_windows(struct state *s)
+{
+    for (int w = 0; w < W_COUNT; w++)
+        for (int c = 0; c < PLANES + 3; c++) {
+            int reference = c >= PLANES;
+            real *plane =
+                reference ? s->reference + (size_t)(w * 3 + c - PLANES) * AREA : s->noisy + (size_t)(w * PLANES + c) * AREA;
+            for (int k = 0; k < AREA; k++)
+                plane[k] =
+                    (real)ggn_golden_pixel(w, reference ? -1 : c / 3, reference ? c - PLANES : c % 3, k / SIDE, k % SIDE);
+            *(reference ? &s->reference_plane[w * 3 + c - PLANES] : &s->noisy_plane[w * PLANES + c]) = plane;
+        }
+}
+
+static int setup(struct state *s, const struct ggn_golden_seeds *seeds, int train_step, int bf16,
+                 struct base_threads *threads, struct base_err *err)
+{
+    struct ggn_hyper hyper = ggn_hyper_default(GGN_PRESET_PAPER);
+    struct ggn_train_options options = ggn_train_options_default(GGN_PRESET_PAPER);
+
+    options.parts = train_step ? GGN_TRAIN_ALL : 0;
+    options.batch = W_COUNT;
+    options.dropout = 0;
+    options.bf16 = bf16;
+    s->noisy = malloc((size_t)W_COUNT * PLANES * AREA * sizeof *s->noisy);
+    s->reference = malloc((size_t)W_COUNT * 3 * AREA * sizeof *s->reference);
+    if (!s->noisy || !s->reference)
+        return base_fail_nomem(err, "golden windows");
+    s->t = ggn_trainer_create(&hyper, &options, threads, err);
+    if (!s->t)
+        return BASE_ENOMEM;
+    for (int net = 0; net < GGN_NETS; net++) {
+        ggn_weights_init(s->t->weights[net], GGN_INIT_HASH, seeds->base[net]);
+        ggn_weights_pack(s->t->weights[net], NULL);
     }
-    return fmin(fmax(v, 0), 1);
+    s->r =
+        ggn_exec_create(&s->t->graph[GGN_NET_R], NULL, IMAGES, GGN_EXEC_NO_FUSE | (bf16 ? GGN_EXEC_BF16 : 0), threads, err);
+    s->m = ggn_exec_create(&s->t->graph[GGN_NET_M], NULL, 2, GGN_EXEC_NO_FUSE | (bf16 ? GGN_EXEC_BF16 : 0), threads, err);
+    s->d = ggn_exec_create(&s->t->graph[GGN_NET_D], NULL, 1, GGN_EXEC_NO_FUSE | (bf16 ? GGN_EXEC_BF16 : 0), threads, err);
+    return s->r && s->m && s->d ? 0 : BASE_ENOMEM;
+}
+
+static void release(struct state *s)
+{
+    ggn_trainer_destroy(s->t);
+    ggn_exec_destroy(s->r);
+    ggn_exec_destroy(s->m);
+    ggn_exec_destroy(s->d);
+    free(s->noisy);
+    free(s->reference);
+}
+
+static void copy_in(const struct ggn_exec *e, int n, int c, const real *from, int from_row)
+{
+    const struct ggn_value *v = &e->graph->value[0];
+    for (int y = 0; y < v->h; y++)
+        memcpy(ggn_exec_plane(e, 0, n, c) + (long)y * v->row, from + (long)y * from_row, (size_t)v->w * sizeof(real));
+}
+
+static double value_at(const struct ggn_exec *e, int n, int c, int y, int x)
+{
+    int out = e->graph->n_values - 1;
+    return (double)ggn_exec_plane(e, out, n, c)[(long)y * e->graph->value[out].row + x];
+}
+
+static void record_stages(const struct ggn_exec *e, struct ggn_golden *out)
+{
+    for (int i = 0; i < e->graph->n_values; i++) {
+        const struct ggn_value *v = &e->graph->value[i];
+        struct moments m = {0};
+        for (int c = 0; v->stage && c < v->c; c++)
+            add_plane(&m, ggn_exec_plane(e, i, 0, c), v);
+        if (v->stage && out->n_stages < GGN_GOLDEN_STAGES) {
+            out->stage[out->n_stages].name = v->stage;
+            out->stage[out->n_stages++].rms = sqrt(m.sum_sq / m.count);
+        }
+    }
+}
+
+/* All three networks on window w, as one decision without a history. */
+static void evaluate_window(struct state *s, int w)
+{
+    const int r_out = s->r->graph->n_values - 1, m_out = s->m->graph->n_values - 1;
+
+    for (int i = 0; i < IMAGES; i++)
+        for (int c = 0; c < 3; c++)
+            copy_in(s->r, i, c, s->noisy_plane[w * PLANES + 3 * i + c], SIDE);
+    ggn_exec_forward(s->r, s->t->weights[GGN_NET_R], IMAGES, GGN_EVAL);
+    for (int k = 0; k < PLANES; k++) {
+        copy_in(s->m, 0, k, ggn_exec_plane(s->r, r_out, k / 3, k % 3), s->r->graph->value[r_out].row);
+        copy_in(s->m, 1, k, s->noisy_plane[w * PLANES + k], SIDE);
+    }
+    ggn_exec_forward(s->m, s->t->weights[GGN_NET_M], 2, GGN_EVAL);
+    for (int k = 0; k < 2; k++)
+        copy_in(s->d, 0, k, ggn_exec_plane(s->m, m_out, k, 0), s->m->graph->value[m_out].row);
+    ggn_exec_forward(s->d, s->t->weights[GGN_NET_D], 1, GGN_EVAL);
+}
+
+/* Everything that is reported about window 0. */
+static int record_window0(struct state *s, struct ggn_golden *out, struct base_err *err)
+{
+    const struct ggn_value *r = &s->r->graph->value[s->r->graph->n_values - 1];
+    const struct ggn_value *m = &s->m->graph->value[s->m->graph->n_values - 1];
+    const struct ggn_value plain = {.h = SIDE, .w = SIDE, .row = SIDE};
+    struct moments x = {0}, denoised = {0}, noisy_map = {0}, denoised_map = {0};
+    struct ggn_ssim *ssim = ggn_ssim_create(SIDE, SIDE, NULL, err);
+    static const int image[3] = {0, 2, 5};
+
+    if (!ssim)
+        return BASE_ENOMEM;
+    for (int k = 0; k < PLANES; k++) {
+        add_plane(&x, s->noisy_plane[k], &plain);
+        add_plane(&denoised, ggn_exec_plane(s->r, s->r->graph->n_values - 1, k / 3, k % 3), r);
+    }
+    add_plane(&denoised_map, ggn_exec_plane(s->m, s->m->graph->n_values - 1, 0, 0), m);
+    add_plane(&noisy_map, ggn_exec_plane(s->m, s->m->graph->n_values - 1, 1, 0), m);
+    out->x_first = (double)s->noisy_plane[0][0];
+    out->x_last = (double)s->noisy_plane[PLANES - 1][AREA - 1];
+    out->x_mean = mean_of(&x);
+    out->denoiser_mean = mean_of(&denoised);
+    out->denoiser_std = std_of(&denoised);
+    out->denoiser_at[0] = value_at(s->r, 0, 0, 0, 0);
+    out->denoiser_at[1] = value_at(s->r, 0, 0, 100, 100);
+    out->denoiser_at[2] = value_at(s->r, IMAGES - 1, 2, SIDE - 1, SIDE - 1);
+    out->generator_noisy_mean = mean_of(&noisy_map);
+    out->generator_noisy_std = std_of(&noisy_map);
+    for (int i = 0; i < 3; i++)
+        out->generator_noisy_at[i] = value_at(s->m, 1, 0, i * 100 - (i == 2), i * 100 - (i == 2));
+    out->generator_denoised_mean = mean_of(&denoised_map);
+    out->generator_denoised_std = std_of(&denoised_map);
+    out->generator_denoised_at = value_at(s->m, 0, 0, 0, 0);
+    record_stages(s->r, out);
+    record_stages(s->d, out);
+    for (int i = 0; i < 3; i++)
+        out->ssim[i] = ggn_ssim_mean(ssim, s->noisy_plane + 3 * image[i], s->reference_plane, NULL, 3, SIDE, 0);
+    real *padded = calloc((size_t)3 * SIDE * (size_t)r->row, sizeof *padded);
+    if (padded) {
+        const real *reference[3], *denoised0[3];
+        for (int c = 0; c < 3; c++) {
+            for (int y = 0; y < SIDE; y++)
+                memcpy(padded + ((size_t)c * SIDE + (size_t)y) * (size_t)r->row, s->reference_plane[c] + y * SIDE,
+                       SIDE * sizeof *padded);
+            reference[c] = padded + (size_t)c * SIDE * (size_t)r->row;
+            denoised0[c] = ggn_exec_plane(s->r, s->r->graph->n_values - 1, 0, c);
+        }
+        out->ssim[3] = ggn_ssim_mean(ssim, denoised0, reference, NULL, 3, r->row, 0);
+    }
+    ggn_ssim_destroy(ssim);
+    free(padded);
+    return padded ? 0 : base_fail_nomem(err, "golden SSIM");
+}
+
+static double sum_of(const real *x, size_t n)
+{
+    double sum = 0;
+    for (size_t i = 0; i < n; i++)
+        sum += (double)x[i];
+    return sum;
+}
+
+static int train(struct state *s, struct ggn_golden_train *out, struct base_err *err)
+{
+    static const double label[W_COUNT] = {1, 0, 1, 0};
+    struct ggn_batch batch = {.count = W_COUNT, .noisy = s->noisy_plane, .reference = s->reference_plane, .label = label};
+    struct ggn_paper_record record;
+    int rc = ggn_trainer_paper_step(s->t, &batch, &record, err);
+
+    if (rc)
+        return rc;
+    memcpy(out->denoiser_loss, record.denoiser_loss, sizeof out->denoiser_loss);
+    out->denoiser_grad_l2 = record.denoiser_grad_l2;
+    out->bce_before = record.bce_before;
+    out->bce_after = record.bce_after;
+    out->d_grad_l2 = record.d_grad_l2;
+    out->m_grad_l2 = record.m_grad_l2;
+    out->m_grad_l2_accumulated = record.m_grad_l2_accumulated;
+    for (int i = 0; i < W_COUNT; i++) {
+        out->d_prob_before[i] = ggn_sigmoid(record.logit_before[i]);
+        out->d_prob_after[i] = ggn_sigmoid(record.logit_after[i]);
+    }
+    for (int net = 0; net < GGN_NETS; net++) {
+        const struct ggn_weights *w = s->t->weights[net];
+        out->sum_params[net] = sum_of(w->params, w->graph->n_params);
+        out->sum_running_mean[net] = sum_of(w->mean, w->graph->n_stats);
+        out->sum_running_var[net] = sum_of(w->var, w->graph->n_stats);
+    }
+    return 0;
+}
+
+int ggn_golden_run(const struct ggn_golden_seeds *seeds, int train_step, int bf16, struct base_threads *threads,
+                   struct ggn_golden *out, struct base_err *err)
+{
+    struct state s = {0};
+    int rc = setup(&s, seeds, train_step, bf16, threads, err);
+
+    memset(out, 0, sizeof *out);
+    if (!rc)
+        fill_windows(&s);
+    for (int w = 0; w < W_COUNT && !rc; w++) {
+        evaluate_window(&s, w);
+        out->logit[w] = value_at(s.d, 0, 0, 0, 0);
+        out->p[w] = ggn_sigmoid(out->logit[w]);
+        if (w == 0)
+            rc = record_window0(&s, out, err);
+    }
+    if (!rc && train_step)
+        rc = train(&s, &out->train, err);
+    release(&s);
+    return rc;
 }

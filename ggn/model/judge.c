@@ -10,7 +10,7 @@
 
 struct ggn_judge {
     const struct ggn_model *model; /* borrows */
-    struct ggn_exec_f32 *exec[GGN_NETS];
+    struct ggn_exec *exec[GGN_NETS];
 };
 
 int ggn_precision_has_bf16(void)
@@ -28,7 +28,7 @@ size_t ggn_judge_bytes(const struct ggn_model *model, enum ggn_precision precisi
     size_t bytes = sizeof(struct ggn_judge);
 
     for (int net = 0; net < GGN_NETS; net++)
-        bytes += ggn_exec_bytes_f32(&model->graph[net], 1, exec_flags(precision), threads);
+        bytes += ggn_exec_bytes(&model->graph[net], 1, exec_flags(precision), threads);
     return bytes;
 }
 
@@ -43,7 +43,7 @@ struct ggn_judge *ggn_judge_create(const struct ggn_model *model, enum ggn_preci
     }
     j->model = model;
     for (int net = 0; net < GGN_NETS; net++) {
-        j->exec[net] = ggn_exec_create_f32(&model->graph[net], NULL, 1, exec_flags(precision), threads, err);
+        j->exec[net] = ggn_exec_create(&model->graph[net], NULL, 1, exec_flags(precision), threads, err);
         if (!j->exec[net]) {
             ggn_judge_destroy(j);
             return NULL;
@@ -57,7 +57,7 @@ void ggn_judge_destroy(struct ggn_judge *j)
     if (!j)
         return;
     for (int net = 0; net < GGN_NETS; net++)
-        ggn_exec_destroy_f32(j->exec[net]);
+        ggn_exec_destroy(j->exec[net]);
     free(j);
 }
 
@@ -73,12 +73,12 @@ static const struct ggn_value *output(const struct ggn_judge *j, int net)
 
 static float *output_plane(const struct ggn_judge *j, int net)
 {
-    return ggn_exec_plane_f32(j->exec[net], j->model->graph[net].n_values - 1, 0, 0);
+    return ggn_exec_plane(j->exec[net], j->model->graph[net].n_values - 1, 0, 0);
 }
 
 static void forward(struct ggn_judge *j, int net)
 {
-    ggn_exec_forward_f32(j->exec[net], j->model->weights[net], 1, GGN_EVAL);
+    ggn_exec_forward(j->exec[net], j->model->weights[net], 1, GGN_EVAL);
 }
 
 void ggn_judge_denoise(struct ggn_judge *j, const uint8_t *noisy, uint16_t *denoised, int width, int height)
@@ -89,7 +89,7 @@ void ggn_judge_denoise(struct ggn_judge *j, const uint8_t *noisy, uint16_t *deno
     for (int t = 0; t < nx * ny; t++) {
         int x0 = ggn_tile_start(width, in->w, t % nx), y0 = ggn_tile_start(height, in->h, t / nx);
         ggn_tile_load_u8(noisy, width, height, x0, y0, in->w, in->h, 1.0F / 255,
-                         ggn_exec_plane_f32(j->exec[GGN_NET_R], 0, 0, 0), (size_t)in->row, in->plane);
+                         ggn_exec_plane(j->exec[GGN_NET_R], 0, 0, 0), (size_t)in->row, in->plane);
         forward(j, GGN_NET_R);
         ggn_tile_store_u16(denoised, width, height, x0, y0, in->w, in->h, output_plane(j, GGN_NET_R), (size_t)out->row,
                            out->plane);
@@ -103,7 +103,7 @@ static void map_into(struct ggn_judge *j, int which)
 
     forward(j, GGN_NET_M);
     for (int y = 0; y < map->h; y++)
-        memcpy(ggn_exec_plane_f32(j->exec[GGN_NET_D], 0, 0, which) + (long)y * to->row,
+        memcpy(ggn_exec_plane(j->exec[GGN_NET_D], 0, 0, which) + (long)y * to->row,
                output_plane(j, GGN_NET_M) + (long)y * map->row, (size_t)map->w * sizeof(float));
 }
 
@@ -114,11 +114,11 @@ static double tile_logit(struct ggn_judge *j, const uint8_t *const *noisy, const
 
     for (int k = 0; k < j->model->hyper.window; k++)
         ggn_tile_load_u16(denoised[k], width, height, x0, y0, in->w, in->h, 1.0F / 65535,
-                          ggn_exec_plane_f32(j->exec[GGN_NET_M], 0, 0, 3 * k), (size_t)in->row, in->plane);
+                          ggn_exec_plane(j->exec[GGN_NET_M], 0, 0, 3 * k), (size_t)in->row, in->plane);
     map_into(j, 0);
     for (int k = 0; k < j->model->hyper.window; k++)
         ggn_tile_load_u8(noisy[k], width, height, x0, y0, in->w, in->h, 1.0F / 255,
-                         ggn_exec_plane_f32(j->exec[GGN_NET_M], 0, 0, 3 * k), (size_t)in->row, in->plane);
+                         ggn_exec_plane(j->exec[GGN_NET_M], 0, 0, 3 * k), (size_t)in->row, in->plane);
     map_into(j, 1);
     forward(j, GGN_NET_D);
     return (double)*output_plane(j, GGN_NET_D);
@@ -147,5 +147,5 @@ double ggn_judge_logit(struct ggn_judge *j, const uint8_t *const *noisy, const u
 const float *ggn_judge_feature_map(const struct ggn_judge *j, int which, int *row)
 {
     *row = input(j, GGN_NET_D)->row;
-    return ggn_exec_plane_f32(j->exec[GGN_NET_D], 0, 0, which);
+    return ggn_exec_plane(j->exec[GGN_NET_D], 0, 0, which);
 }

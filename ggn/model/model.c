@@ -22,7 +22,7 @@ struct ggn_model *ggn_model_create(const struct ggn_hyper *hyper, struct base_er
     int rc = m->provenance ? 0 : base_fail_nomem(err, "model");
     for (int net = 0; net < GGN_NETS && !rc; net++) {
         rc = ggn_network_build(&m->graph[net], net, hyper, err);
-        if (!rc && !(m->weights[net] = ggn_weights_create_f32(&m->graph[net], NULL, GGN_WEIGHTS_BF16, err)))
+        if (!rc && !(m->weights[net] = ggn_weights_create(&m->graph[net], NULL, GGN_WEIGHTS_BF16, err)))
             rc = BASE_ENOMEM;
     }
     if (!rc)
@@ -36,7 +36,7 @@ void ggn_model_destroy(struct ggn_model *m)
     if (!m)
         return;
     for (int net = 0; net < GGN_NETS; net++)
-        ggn_weights_destroy_f32(m->weights[net]);
+        ggn_weights_destroy(m->weights[net]);
     cJSON_Delete(m->provenance);
     free(m);
 }
@@ -137,7 +137,7 @@ static int from_container(const struct ggn_container *c, struct ggn_model **mode
     cJSON_Delete(m->provenance);
     m->provenance = d.provenance;
     for (int net = 0; net < GGN_NETS; net++)
-        ggn_weights_pack_f32(m->weights[net]);
+        ggn_weights_pack(m->weights[net], NULL);
     *model = m;
     return 0;
 }

@@ -28,7 +28,7 @@ struct ggn_model {
     struct ggn_hyper hyper;
     struct ggn_calibration calibration;
     struct ggn_graph graph[GGN_NETS];
-    struct ggn_weights_f32 *weights[GGN_NETS]; /* owns */
+    struct ggn_weights *weights[GGN_NETS]; /* owns */
     struct cJSON *provenance;                  /* owns; a JSON object: data-set hash, code version, seed, metrics … */
 };
 

@@ -1,22 +1,453 @@
 #include "model/trainer.h"
 
-struct ggn_train_options ggn_train_options_default(enum ggn_preset preset)
-{
-    int lull = preset == GGN_PRESET_LULL;
-    enum ggn_init plain = lull ? GGN_INIT_HE : GGN_INIT_PAPER;
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
 
-    return (struct ggn_train_options){
-        .parts = GGN_TRAIN_ALL,
-        .batch = lull ? 16 : 64,
-        .lr = {2e-4, 2e-4, 2e-4},
-        .beta1 = 0.5,
-        .beta2 = 0.999,
-        .eps = 1e-8,
-        .clip = lull ? 1 : 0,
-        .explode = 1e6,
-        .keep_every = 100,
-        .dropout = 1,
-        .init = {plain, plain, lull ? GGN_INIT_HE : GGN_INIT_GAN},
-        .seed = 1,
-    };
+#include "nn/hash.h"
+#include "nn/loss.h"
+#include "nn/ssim.h"
+#include "nn/ssim.h"
+#include "nn/real.h"
+
+enum { N_STATE = 5 };
+
+static int part_of(int net)
+{
+    return net == GGN_NET_R ? GGN_TRAIN_R : GGN_TRAIN_MD;
+}
+
+real *ggn_trainer_state(struct ggn_trainer *t, int net, int i, size_t *count)
+{
+    struct ggn_weights *w = t->weights[net];
+    real *const array[N_STATE] = {w->params, w->mean, w->var, t->adam_m[net], t->adam_v[net]};
+
+    if (i < 0 || i >= N_STATE || !array[i])
+        return NULL;
+    *count = i == 1 || i == 2 ? t->graph[net].n_stats : t->graph[net].n_params;
+    return array[i];
+}
+
+/* Copies the state of a network to (or from) its last good one. */
+static void copy_state(struct ggn_trainer *t, int net, int keep)
+{
+    real *good = t->good[net], *now;
+    size_t count;
+
+    for (int i = 0; good && (now = ggn_trainer_state(t, net, i, &count)); i++, good += count)
+        memcpy(keep ? good : now, keep ? now : good, count * sizeof *now);
+}
+
+void ggn_trainer_keep(struct ggn_trainer *t)
+{
+    for (int net = 0; net < GGN_NETS; net++) {
+        copy_state(t, net, 1);
+        t->good_t[net] = t->adam_t[net];
+    }
+    t->good_steps = t->steps;
+}
+
+static void roll_back(struct ggn_trainer *t)
+{
+    for (int net = 0; net < GGN_NETS; net++)
+        if (t->good[net]) {
+            copy_state(t, net, 0);
+            t->adam_t[net] = t->good_t[net];
+            ggn_weights_pack(t->weights[net], NULL);
+        }
+    t->steps = t->good_steps;
+}
+
+static int create_net(struct ggn_trainer *t, int net, struct base_err *err)
+{
+    int trained = (t->options.parts & part_of(net)) != 0;
+    int rc = ggn_network_build(&t->graph[net], net, &t->hyper, err);
+
+    if (rc)
+        return rc;
+    t->weights[net] = ggn_weights_create(
+        &t->graph[net], NULL, (trained ? GGN_WEIGHTS_BACKWARD : 0) | (t->options.bf16 ? GGN_WEIGHTS_BF16 : 0), err);
+    if (!t->weights[net])
+        return BASE_ENOMEM;
+    ggn_weights_init(t->weights[net], t->options.init[net], t->options.seed + 1000u * (uint32_t)net);
+    ggn_weights_pack(t->weights[net], NULL);
+    if (!trained)
+        return 0;
+    size_t n = t->graph[net].n_params;
+    t->grad[net] = calloc(n, sizeof(real));
+    t->adam_m[net] = calloc(n, sizeof(real));
+    t->adam_v[net] = calloc(n, sizeof(real));
+    t->good[net] = calloc(3 * n + 2 * t->graph[net].n_stats, sizeof(real));
+    return t->grad[net] && t->adam_m[net] && t->adam_v[net] && t->good[net] ? 0 : base_fail_nomem(err, "optimiser");
+}
+
+static int create_execs(struct ggn_trainer *t, struct base_err *err)
+{
+    const int batch = t->options.batch, paper = t->hyper.preset == GGN_PRESET_PAPER;
+    const int drop = t->options.dropout ? 0 : GGN_EXEC_NO_DROPOUT;
+
+    if (t->options.parts & GGN_TRAIN_R) {
+        t->r = ggn_exec_create(&t->graph[GGN_NET_R], NULL, batch, GGN_EXEC_GRADS, t->threads, err);
+        t->ssim = t->r ? ggn_ssim_create(t->hyper.height, t->hyper.width, t->threads, err) : NULL;
+        if (!t->ssim)
+            return BASE_ENOMEM;
+    }
+    if (t->options.parts & GGN_TRAIN_MD) {
+        const struct ggn_graph *m = &t->graph[GGN_NET_M];
+        t->m = ggn_exec_create(m, NULL, paper ? batch : 2 * batch, GGN_EXEC_GRADS, t->threads, err);
+        t->d =
+            ggn_exec_create(&t->graph[GGN_NET_D], NULL, batch, GGN_EXEC_GRADS | GGN_EXEC_INPUT_GRAD | drop, t->threads, err);
+        if (!t->m || !t->d)
+            return BASE_ENOMEM;
+        if (paper && !(t->m2 = ggn_exec_create(m, NULL, batch, GGN_EXEC_GRADS, t->threads, err)))
+            return BASE_ENOMEM;
+    }
+    return 0;
+}
+
+struct ggn_trainer *ggn_trainer_create(const struct ggn_hyper *hyper, const struct ggn_train_options *options,
+                                       struct base_threads *threads, struct base_err *err)
+{
+    if (ggn_hyper_check(hyper, err))
+        return NULL;
+    if (options->batch < 1 || options->batch > 1024) {
+        base_fail(err, BASE_EINVAL, "batch size %d is not in 1..1024", options->batch);
+        return NULL;
+    }
+    struct ggn_trainer *t = calloc(1, sizeof *t);
+    if (!t) {
+        base_fail_nomem(err, "trainer");
+        return NULL;
+    }
+    t->hyper = *hyper;
+    t->options = *options;
+    t->threads = threads;
+    int rc = 0;
+    for (int net = 0; net < GGN_NETS && !rc; net++)
+        rc = create_net(t, net, err);
+    if (!rc)
+        rc = create_execs(t, err);
+    if (rc) {
+        ggn_trainer_destroy(t);
+        return NULL;
+    }
+    ggn_trainer_keep(t);
+    return t;
+}
+
+void ggn_trainer_destroy(struct ggn_trainer *t)
+{
+    if (!t)
+        return;
+    for (int net = 0; net < GGN_NETS; net++) {
+        ggn_weights_destroy(t->weights[net]);
+        free(t->grad[net]);
+        free(t->adam_m[net]);
+        free(t->adam_v[net]);
+        free(t->good[net]);
+    }
+    ggn_exec_destroy(t->r);
+    ggn_exec_destroy(t->m);
+    ggn_exec_destroy(t->m2);
+    ggn_exec_destroy(t->d);
+    ggn_ssim_destroy(t->ssim);
+    free(t);
+}
+
+static double grad_l2(const struct ggn_trainer *t, int net, size_t n)
+{
+    double sum = 0;
+    for (size_t i = 0; i < n; i++)
+        sum += (double)t->grad[net][i] * (double)t->grad[net][i];
+    return sqrt(sum);
+}
+
+static void zero_grad(struct ggn_trainer *t, int net)
+{
+    memset(t->grad[net], 0, t->graph[net].n_params * sizeof(real));
+}
+
+/* After a divergence: back to the last good state, and say which tensor went wrong first. */
+static int diverged(struct ggn_trainer *t, int net, double value, const char *what, struct base_err *err)
+{
+    const struct ggn_graph *g = &t->graph[net];
+    const char *name = "none";
+    double worst = -1;
+
+    for (int i = g->n_tensors - 1; i >= 0; i--) {
+        const struct ggn_tensor *p = &g->tensor[i];
+        double sum = 0;
+        for (size_t k = 0; k < p->count; k++) {
+            double v = (double)t->grad[net][p->offset + k];
+            sum += v * v;
+        }
+        if (!(sum <= worst)) { /* also takes a NaN */
+            worst = isnan(sum) ? INFINITY : sum;
+            name = p->name;
+        }
+    }
+    roll_back(t);
+    return base_fail(err, GGN_EDIVERGED, "training diverged: %s of the %s is %g, worst in %s; returned to step %llu", what,
+                     g->name, value, name, (unsigned long long)t->steps);
+}
+
+static int check(struct ggn_trainer *t, int net, double value, const char *what, struct base_err *err)
+{
+    if (value <= t->options.explode)
+        return 0;
+    return diverged(t, net, value, what, err);
+}
+
+/* Clips, takes one Adam step of the first n parameters (Kingma & Ba 2015, algorithm 1) and packs. */
+static int update(struct ggn_trainer *t, int net, size_t n, struct base_err *err)
+{
+    const struct ggn_train_options *o = &t->options;
+    double norm = grad_l2(t, net, n);
+    int rc = check(t, net, norm, "gradient norm", err);
+
+    if (rc)
+        return rc;
+    if (o->clip > 0 && norm > o->clip)
+        for (size_t i = 0; i < n; i++)
+            t->grad[net][i] *= (real)(o->clip / norm);
+    double step = (double)++t->adam_t[net];
+    double c1 = 1 / -expm1(step * log(o->beta1)), c2 = 1 / -expm1(step * log(o->beta2));
+    t->weights[net]->kernels->adam(t->weights[net]->params, t->grad[net], t->adam_m[net], t->adam_v[net], (long)n,
+                                   (real)o->lr[net], (real)o->beta1, (real)o->beta2, (real)c1, (real)c2, (real)o->eps);
+    ggn_weights_pack(t->weights[net], t->threads);
+    return 0;
+}
+
+static void finish_step(struct ggn_trainer *t)
+{
+    t->steps++;
+    if (t->options.keep_every > 0 && t->steps % (uint64_t)t->options.keep_every == 0)
+        ggn_trainer_keep(t);
+}
+
+/* Copies `n` gap-free planes into channels c.. of image i of the executor's input. */
+static void set_input(const struct ggn_exec *e, int i, int c, const real *const *planes, int n)
+{
+    const struct ggn_value *v = &e->graph->value[0];
+
+    for (int k = 0; k < n; k++)
+        for (int y = 0; y < v->h; y++)
+            memcpy(ggn_exec_plane(e, 0, i, c + k) + (long)y * v->row, planes[k] + (long)y * v->w,
+                   (size_t)v->w * sizeof(real));
+}
+
+/* Copies one plane with the layout of a value. */
+static void copy_plane(real *to, const real *from, const struct ggn_value *v)
+{
+    for (int y = 0; y < v->h; y++)
+        memcpy(to + (long)y * v->row, from + (long)y * v->row, (size_t)v->w * sizeof *to);
+}
+
+/* 1 − SSIM of the denoised images to the references, its gradient into R's output. */
+static double denoiser_loss(struct ggn_trainer *t, const real *const *reference, int count)
+{
+    const int out = t->graph[GGN_NET_R].n_values - 1;
+    const struct ggn_value *v = &t->graph[GGN_NET_R].value[out], *in = &t->graph[GGN_NET_R].value[0];
+    double total = 0;
+
+    for (int i = 0; i < count; i++) {
+        const real *x[3], *y[3];
+        real *dx[3];
+        for (int c = 0; c < 3; c++) {
+            /* the input's gradient is not needed: its planes hold the reference in the layout of the output */
+            real *copy = ggn_exec_grad(t->r, 0, i, c);
+            for (int r = 0; r < v->h; r++)
+                memcpy(copy + (long)r * in->row, reference[3 * i + c] + (long)r * v->w, (size_t)v->w * sizeof *copy);
+            x[c] = ggn_exec_plane(t->r, out, i, c);
+            dx[c] = ggn_exec_grad(t->r, out, i, c);
+            y[c] = copy;
+        }
+        total += ggn_ssim_mean(t->ssim, x, y, dx, 3, v->row, -1.0 / count);
+    }
+    return 1 - total / count;
+}
+
+/* Forward and backward of R; its gradient is left in grad. */
+static int denoiser_gradient(struct ggn_trainer *t, const real *const *x, int x_stride, const real *const *reference,
+                             int count, double *loss, struct base_err *err)
+{
+    for (int i = 0; i < count; i++)
+        set_input(t->r, i, 0, x + (size_t)i * (size_t)x_stride, 3);
+    zero_grad(t, GGN_NET_R);
+    ggn_exec_forward(t->r, t->weights[GGN_NET_R], count, GGN_TRAIN);
+    *loss = denoiser_loss(t, reference, count);
+    ggn_exec_backward(t->r, t->weights[GGN_NET_R], t->grad[GGN_NET_R]);
+    return check(t, GGN_NET_R, *loss, "loss", err);
+}
+
+static int check_batch(const struct ggn_trainer *t, int count, int parts, struct base_err *err)
+{
+    if (count < 1 || count > t->options.batch)
+        return base_fail(err, BASE_EINVAL, "a batch of %d is not in 1..%d", count, t->options.batch);
+    if ((t->options.parts & parts) != parts)
+        return base_fail(err, BASE_EINVAL, "this trainer was made without the networks of the step");
+    return 0;
+}
+
+int ggn_trainer_denoiser_step(struct ggn_trainer *t, const real *const *x, const real *const *reference, int count,
+                              double *loss, struct base_err *err)
+{
+    int rc = check_batch(t, count, GGN_TRAIN_R, err);
+
+    if (!rc)
+        rc = denoiser_gradient(t, x, 3, reference, count, loss, err);
+    if (!rc)
+        rc = update(t, GGN_NET_R, t->graph[GGN_NET_R].n_params, err);
+    if (!rc)
+        finish_step(t);
+    return rc;
+}
+
+/* D's input (NFM of denoised, NFM of noisy) from two generator outputs, or back for the gradients. */
+static void exchange_maps(struct ggn_trainer *t, const struct ggn_exec *ref, int ref0, const struct ggn_exec *noisy,
+                          int noisy0, int count, int back)
+{
+    const int out = t->graph[GGN_NET_M].n_values - 1;
+    const struct ggn_value *v = &t->graph[GGN_NET_M].value[out];
+
+    for (int i = 0; i < count; i++) {
+        if (back) {
+            copy_plane(ggn_exec_grad(ref, out, ref0 + i, 0), ggn_exec_grad(t->d, 0, i, 0), v);
+            copy_plane(ggn_exec_grad(noisy, out, noisy0 + i, 0), ggn_exec_grad(t->d, 0, i, 1), v);
+        } else {
+            copy_plane(ggn_exec_plane(t->d, 0, i, 0), ggn_exec_plane(ref, out, ref0 + i, 0), v);
+            copy_plane(ggn_exec_plane(t->d, 0, i, 1), ggn_exec_plane(noisy, out, noisy0 + i, 0), v);
+        }
+    }
+}
+
+/* D forward, weighted BCE, D backward (its own gradient is added to grad, that of the maps stays in d). */
+static double judge(struct ggn_trainer *t, const struct ggn_batch *b, double *logits)
+{
+    const int out = t->graph[GGN_NET_D].n_values - 1;
+    double total = 0, weights = 0;
+
+    t->d->dropout_seed = ggn_hash((uint32_t)t->steps, ggn_hash((uint32_t)t->adam_t[GGN_NET_D], t->options.seed));
+    ggn_exec_forward(t->d, t->weights[GGN_NET_D], b->count, GGN_TRAIN);
+    for (int i = 0; i < b->count; i++)
+        weights += b->weight ? b->weight[i] : 1;
+    if (weights <= 0)
+        weights = 1;
+    for (int i = 0; i < b->count; i++) {
+        double z = (double)*ggn_exec_plane(t->d, out, i, 0), share = (b->weight ? b->weight[i] : 1) / weights;
+        total += share * ggn_bce(z, b->label[i]);
+        *ggn_exec_grad(t->d, out, i, 0) = (real)(share * ggn_bce_grad(z, b->label[i]));
+        if (logits)
+            logits[i] = z;
+    }
+    ggn_exec_backward(t->d, t->weights[GGN_NET_D], t->grad[GGN_NET_D]);
+    return total;
+}
+
+int ggn_trainer_judge_step(struct ggn_trainer *t, const struct ggn_batch *b, double *bce, double *logits,
+                           struct base_err *err)
+{
+    const int planes = 3 * t->hyper.window;
+    int rc = check_batch(t, b->count, GGN_TRAIN_MD, err);
+
+    if (rc)
+        return rc;
+    if (t->hyper.preset == GGN_PRESET_PAPER)
+        return base_fail(err, BASE_EINVAL, "the published preset trains in its own order");
+    for (int i = 0; i < b->count; i++) {
+        set_input(t->m, i, 0, b->denoised + (size_t)i * (size_t)planes, planes);
+        set_input(t->m, b->count + i, 0, b->noisy + (size_t)i * (size_t)planes, planes);
+    }
+    zero_grad(t, GGN_NET_M);
+    zero_grad(t, GGN_NET_D);
+    ggn_exec_forward(t->m, t->weights[GGN_NET_M], 2 * b->count, GGN_TRAIN);
+    exchange_maps(t, t->m, 0, t->m, b->count, b->count, 0);
+    *bce = judge(t, b, logits);
+    rc = check(t, GGN_NET_D, *bce, "loss", err);
+    if (rc)
+        return rc;
+    exchange_maps(t, t->m, 0, t->m, b->count, b->count, 1);
+    ggn_exec_backward(t->m, t->weights[GGN_NET_M], t->grad[GGN_NET_M]);
+    rc = update(t, GGN_NET_D, t->graph[GGN_NET_D].n_params, err);
+    if (!rc)
+        rc = update(t, GGN_NET_M, t->graph[GGN_NET_M].n_params, err);
+    if (!rc)
+        finish_step(t);
+    return rc;
+}
+
+/* Step 1 of the published order: R on each image of the window, its output kept as the generator's denoised input. */
+static int paper_denoise(struct ggn_trainer *t, const struct ggn_batch *b, struct ggn_paper_record *record,
+                         struct base_err *err)
+{
+    const int planes = 3 * t->hyper.window, out = t->graph[GGN_NET_R].n_values - 1;
+    const struct ggn_value *v = &t->graph[GGN_NET_R].value[out];
+
+    for (int k = 0; k < t->hyper.window; k++) {
+        int rc = denoiser_gradient(t, b->noisy + 3 * k, planes, b->reference, b->count, &record->denoiser_loss[k], err);
+        if (rc)
+            return rc;
+        if (k == 0)
+            record->denoiser_grad_l2 = grad_l2(t, GGN_NET_R, t->graph[GGN_NET_R].n_params);
+        rc = update(t, GGN_NET_R, t->graph[GGN_NET_R].n_params, err);
+        if (rc)
+            return rc;
+        for (int i = 0; i < b->count; i++)
+            for (int c = 0; c < 3; c++)
+                copy_plane(ggn_exec_plane(t->m, 0, i, 3 * k + c), ggn_exec_plane(t->r, out, i, c), v);
+    }
+    return 0;
+}
+
+/* Backward through both generator passes from D's input gradient. */
+static void paper_generator_backward(struct ggn_trainer *t, int count)
+{
+    exchange_maps(t, t->m, 0, t->m2, 0, count, 1);
+    ggn_exec_backward(t->m, t->weights[GGN_NET_M], t->grad[GGN_NET_M]);
+    ggn_exec_backward(t->m2, t->weights[GGN_NET_M], t->grad[GGN_NET_M]);
+}
+
+int ggn_trainer_paper_step(struct ggn_trainer *t, const struct ggn_batch *b, struct ggn_paper_record *record,
+                           struct base_err *err)
+{
+    const struct ggn_graph *m = &t->graph[GGN_NET_M], *d = &t->graph[GGN_NET_D];
+    const size_t m_trained = m->tensor[m->n_tensors - 2].offset; /* all but the last convolution's weight and bias */
+    const int planes = 3 * t->hyper.window, record_all = b->count <= 64;
+    int rc = check_batch(t, b->count, GGN_TRAIN_ALL, err);
+
+    if (rc)
+        return rc;
+    if (t->hyper.preset != GGN_PRESET_PAPER)
+        return base_fail(err, BASE_EINVAL, "the published order needs the preset paper");
+    rc = paper_denoise(t, b, record, err);
+    if (rc)
+        return rc;
+
+    zero_grad(t, GGN_NET_M);
+    zero_grad(t, GGN_NET_D);
+    for (int i = 0; i < b->count; i++)
+        set_input(t->m2, i, 0, b->noisy + (size_t)i * (size_t)planes, planes);
+    ggn_exec_forward(t->m, t->weights[GGN_NET_M], b->count, GGN_TRAIN);
+    ggn_exec_forward(t->m2, t->weights[GGN_NET_M], b->count, GGN_TRAIN);
+    exchange_maps(t, t->m, 0, t->m2, 0, b->count, 0);
+
+    record->bce_before = judge(t, b, record_all ? record->logit_before : NULL);
+    rc = check(t, GGN_NET_D, record->bce_before, "loss", err);
+    if (rc)
+        return rc;
+    paper_generator_backward(t, b->count);
+    record->d_grad_l2 = grad_l2(t, GGN_NET_D, d->n_params);
+    record->m_grad_l2 = grad_l2(t, GGN_NET_M, m->n_params);
+    rc = update(t, GGN_NET_D, d->n_params, err);
+    if (rc)
+        return rc;
+
+    zero_grad(t, GGN_NET_D);
+    record->bce_after = judge(t, b, record_all ? record->logit_after : NULL);
+    paper_generator_backward(t, b->count);
+    record->m_grad_l2_accumulated = grad_l2(t, GGN_NET_M, m_trained);
+    rc = update(t, GGN_NET_M, m_trained, err);
+    if (!rc)
+        finish_step(t);
+    return rc;
 }

@@ -13,7 +13,7 @@
 
 #include "model/networks.h"
 #include "nn/exec.h"
-#include "nn/loss.h"
+#include "nn/ssim.h"
 
 enum { GGN_EDIVERGED = -10 };
 
@@ -36,16 +36,65 @@ struct ggn_train_options {
 /* Published: lr 2e-4, betas (0.5, 0.999), dropout. LULL adds He initialisation and clipping at 1. */
 struct ggn_train_options ggn_train_options_default(enum ggn_preset preset);
 
-#define REAL float
-#define TYPED(name) GGN_TYPED(name, f32)
-#include "model/trainer_decl.inc"
-#undef REAL
-#undef TYPED
+/* A batch. Pictures are planes of height × width elements without gaps, values 0..1. */
+struct ggn_batch {
+    int count;
+    const real *const *noisy;     /* [count][3S] windows, noisiest image first (M's input order: image, channel) */
+    const real *const *denoised;  /* [count][3S] for ggn_trainer_judge_step */
+    const real *const *reference; /* [count][3] for ggn_trainer_paper_step */
+    const double *label;          /* [count] 1 = still noisy, 0 = not, between = uncertain */
+    const double *weight;         /* [count] of each sample in the loss, or NULL = 1 */
+};
 
-#define REAL double
-#define TYPED(name) GGN_TYPED(name, f64)
-#include "model/trainer_decl.inc"
-#undef REAL
-#undef TYPED
+struct ggn_trainer {
+    struct ggn_hyper hyper;
+    struct ggn_train_options options;
+    struct base_threads *threads; /* borrows */
+    struct ggn_graph graph[GGN_NETS];
+    struct ggn_weights *weights[GGN_NETS];     /* owns */
+    real *grad[GGN_NETS];                      /* [n_params] of the last step */
+    real *adam_m[GGN_NETS], *adam_v[GGN_NETS]; /* [n_params] */
+    uint64_t adam_t[GGN_NETS];                 /* updates made */
+    uint64_t steps;                            /* steps made; seeds dropout */
+    struct ggn_exec *r, *m, *m2, *d;           /* m2: second generator pass of the published order */
+    struct ggn_ssim *ssim;
+    real *good[GGN_NETS]; /* the last good state, as ggn_trainer_state lists it */
+    uint64_t good_t[GGN_NETS], good_steps;
+};
+
+/* NULL on failure. Weights are initialised and packed. */
+struct ggn_trainer *ggn_trainer_create(const struct ggn_hyper *hyper, const struct ggn_train_options *options,
+                                       struct base_threads *threads, struct base_err *err);
+void ggn_trainer_destroy(struct ggn_trainer *trainer);
+
+/* Remembers the present state as the one to return to after a divergence (create does so too). */
+void ggn_trainer_keep(struct ggn_trainer *trainer);
+
+/* The arrays that a checkpoint of network `net` holds beside adam_t and steps, i = 0..4: params, mean, var, m, v. NULL past
+ * the end. After writing into them call ggn_weights_pack on weights[net]. */
+real *ggn_trainer_state(struct ggn_trainer *trainer, int net, int i, size_t *count);
+
+/* One Adam step of R on `count` images (x and reference: [count][3] planes). *loss = mean of 1 − SSIM before it. The
+ * denoised images stay in trainer->r (value n_values − 1) until the next step. */
+int ggn_trainer_denoiser_step(struct ggn_trainer *trainer, const real *const *x, const real *const *reference, int count,
+                              double *loss, struct base_err *err);
+
+/* One Adam step of M and D on given denoised windows, mended form: both windows pass M in one batch (shared statistics), one
+ * backward pass, all of M is trained. *bce = weighted mean before it; logits (may be NULL) [count]. */
+int ggn_trainer_judge_step(struct ggn_trainer *trainer, const struct ggn_batch *batch, double *bce, double *logits,
+                           struct base_err *err);
+
+/* One published iteration: six steps of R, one of D, one of M on the sum of two gradients without its last convolution. */
+struct ggn_paper_record {
+    double denoiser_loss[16];                 /* [S] */
+    double denoiser_grad_l2;                  /* of the first image */
+    double logit_before[64], logit_after[64]; /* [count], counts above 64 are not recorded */
+    double bce_before, bce_after;
+    double d_grad_l2;
+    double m_grad_l2;             /* after the first backward pass, all parameters */
+    double m_grad_l2_accumulated; /* the sum, last convolution excluded */
+};
+int ggn_trainer_paper_step(struct ggn_trainer *trainer, const struct ggn_batch *batch, struct ggn_paper_record *record,
+                           struct base_err *err);
 
 #endif

@@ -22,10 +22,10 @@ void ggn_bf16_pack(uint32_t *out, const float *packed, int n_in, int n_out, int 
         for (tile = tile_oc; tile > n_out - oc;)
             tile /= 2;
         for (int i = 0; i < n_in; i += 2) {
+            const int pair = i + 1 < n_in;
             for (int k = 0; k < 9 * tile; k++)
-                *out++ =
-                    base_f32_to_bf16(packed[k]) | (i + 1 < n_in ? (uint32_t)base_f32_to_bf16(packed[9 * tile + k]) << 16 : 0);
-            packed += (i + 1 < n_in ? 18 : 9) * tile;
+                *out++ = base_f32_to_bf16(packed[k]) | (pair ? (uint32_t)base_f32_to_bf16(packed[9 * tile + k]) << 16 : 0);
+            packed += (pair ? 18 : 9) * tile;
         }
     }
 }

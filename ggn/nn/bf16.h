@@ -23,7 +23,7 @@ void ggn_bf16_pack(uint32_t *out, const float *packed, int n_in, int n_out, int 
 /* Elements of scratch for ggn_bf16_conv on up to `pixels` of a plane. */
 size_t ggn_bf16_scratch(int n_in, int row, long pixels);
 /* As ggn_kernels.conv without a->add, for a 3×3 convolution and all output channels [oc0, oc1). */
-void ggn_bf16_conv_avx512(const struct ggn_conv_f32 *a, const uint32_t *w, long p0, long p1, int oc0, int oc1,
+void ggn_bf16_conv_avx512(const struct ggn_conv *a, const uint32_t *w, long p0, long p1, int oc0, int oc1,
                           uint32_t *scratch);
 
 #endif

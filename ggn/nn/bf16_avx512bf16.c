@@ -22,7 +22,7 @@ static void pair_channels(uint32_t *out, const float *x0, const float *x1, long 
     }
 }
 
-INLINE void tile(const struct ggn_conv_f32 *a, const uint32_t *w, const uint32_t *x, long x_stride, int oc, long p,
+INLINE void tile(const struct ggn_conv *a, const uint32_t *w, const uint32_t *x, long x_stride, int oc, long p,
                  const int ot, const int nv)
 {
     vf acc[8][TILE_V];
@@ -55,7 +55,7 @@ INLINE void tile(const struct ggn_conv_f32 *a, const uint32_t *w, const uint32_t
 }
 
 #define TILE(OT, NV)                                                                                                        \
-    static void tile_##OT##_##NV(const struct ggn_conv_f32 *a, const uint32_t *w, const uint32_t *x, long x_stride, int oc, \
+    static void tile_##OT##_##NV(const struct ggn_conv *a, const uint32_t *w, const uint32_t *x, long x_stride, int oc, \
                                  long p)                                                                                    \
     {                                                                                                                       \
         tile(a, w, x, x_stride, oc, p, OT, NV);                                                                             \
@@ -69,10 +69,10 @@ TILE(4, 3)
 TILE(8, 1)
 TILE(8, 3)
 
-void ggn_bf16_conv_avx512(const struct ggn_conv_f32 *a, const uint32_t *w, long p0, long p1, int oc0, int oc1,
+void ggn_bf16_conv_avx512(const struct ggn_conv *a, const uint32_t *w, long p0, long p1, int oc0, int oc1,
                           uint32_t *scratch)
 {
-    typedef void tile_fn(const struct ggn_conv_f32 *, const uint32_t *, const uint32_t *, long, int, long);
+    typedef void tile_fn(const struct ggn_conv *, const uint32_t *, const uint32_t *, long, int, long);
     static tile_fn *const tiles[2][4] = {{tile_1_3, tile_2_3, tile_4_3, tile_8_3}, {tile_1_1, tile_2_1, tile_4_1, tile_8_1}};
     const long end = (long)a->h * a->row, pairs = (a->n_in + 1) / 2;
 

@@ -27,16 +27,38 @@ enum {
     GGN_EXEC_BF16 = 16    /* bfloat16 products in GGN_EVAL, if the weights hold them; float otherwise */
 };
 
-#define REAL float
-#define TYPED(name) GGN_TYPED(name, f32)
-#include "nn/exec_decl.inc"
-#undef REAL
-#undef TYPED
+struct ggn_exec {
+    const struct ggn_graph *graph;
+    const struct ggn_kernels *kernels;
+    struct base_threads *threads; /* NULL: the calling thread alone */
+    int capacity, batch, flags;
+    enum ggn_mode mode;                        /* of the last forward pass */
+    uint32_t dropout_seed;                     /* masks are a function of it; change it between passes */
+    size_t offset[GGN_MAX_LAYERS + 1], n_acts; /* where each value starts in one image's activations; their total */
+    real *acts, *grads;                        /* [capacity][n_acts] */
+    real *bn_mean, *bn_inv;                    /* [n_stats] of the last training-mode pass */
+    real *scratch;                             /* [workers][scratch_size] */
+    size_t scratch_size;
+    void *memory;    /* owns */
+    double *layer_s; /* [n_layers] or NULL; when set, forward adds the seconds of each layer */
+};
 
-#define REAL double
-#define TYPED(name) GGN_TYPED(name, f64)
-#include "nn/exec_decl.inc"
-#undef REAL
-#undef TYPED
+/* Bytes that an executor allocates. */
+size_t ggn_exec_bytes(const struct ggn_graph *graph, int capacity, int flags, int workers);
+/* `kernels` must be those of the weights (NULL = the best). NULL on failure. */
+struct ggn_exec *ggn_exec_create(const struct ggn_graph *graph, const struct ggn_kernels *kernels, int capacity, int flags,
+                                 struct base_threads *threads, struct base_err *err);
+void ggn_exec_destroy(struct ggn_exec *exec);
+
+/* Element (0,0) of plane `c` of value `value` of image `n`; rows are graph->value[value].row apart. Value 0 is the input,
+ * which the caller writes (h × w elements of each plane and nothing else); n_values − 1 is the output. */
+real *ggn_exec_plane(const struct ggn_exec *exec, int value, int n, int c);
+/* The same for the gradient; the caller writes that of the output before backward and may read that of the input after. */
+real *ggn_exec_grad(const struct ggn_exec *exec, int value, int n, int c);
+
+/* Images 0..batch−1. GGN_TRAIN updates the running statistics in `weights` (not the packed ones: pack before evaluating). */
+void ggn_exec_forward(struct ggn_exec *exec, struct ggn_weights *weights, int batch, enum ggn_mode mode);
+/* Adds to params_grad [n_params]. Activations stay, so that it may be called again for another gradient of the output. */
+void ggn_exec_backward(struct ggn_exec *exec, const struct ggn_weights *weights, real *params_grad);
 
 #endif

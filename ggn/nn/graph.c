@@ -13,8 +13,8 @@ static int add_value(struct ggn_graph *g, int c, int h, int w, int flat)
     if (g->err.code)
         return 0;
     if (c < 1 || c > GGN_MAX_CHANNELS || h < 1 || w < 1 || h > GGN_MAX_SIDE || w > GGN_MAX_SIDE) {
-        base_fail(&g->err, BASE_EINVAL, "network %s, stage %s: a tensor of %d×%d×%d is out of range", g->name, g->stage, c, h,
-                 w);
+        base_fail(&g->err, BASE_EINVAL, "network %s, stage %s: a tensor of %d×%d×%d is out of range", g->name, g->stage, c,
+                  h, w);
         return 0;
     }
     if (g->n_values > GGN_MAX_LAYERS) {
@@ -225,6 +225,7 @@ int ggn_graph_end(struct ggn_graph *g, struct base_err *err)
             written[l->in2] = 1;
         }
     }
+    g->n_learned = g->n_params + 2 * g->n_stats;
     return 0;
 }
 
@@ -280,11 +281,23 @@ size_t ggn_graph_place(const struct ggn_graph *g, size_t offset[GGN_MAX_LAYERS +
     return total;
 }
 
+const char *ggn_op_name(enum ggn_op op)
+{
+#define NAME(op, name, text) text,
+    static const char *const names[] = {GGN_OPS(NAME)};
+    return names[op];
+}
+
+int ggn_layer_c_in(const struct ggn_graph *g, const struct ggn_layer *l)
+{
+    return g->value[l->in].c + (l->in2 >= 0 ? g->value[l->in2].c : 0);
+}
+
 double ggn_layer_mac(const struct ggn_graph *g, int layer)
 {
     const struct ggn_layer *l = &g->layer[layer];
     const struct ggn_value *out = &g->value[l->out];
-    double c_in = g->value[l->in].c + (l->in2 >= 0 ? g->value[l->in2].c : 0);
+    double c_in = ggn_layer_c_in(g, l);
 
     if (l->op == GGN_OP_LINEAR)
         return c_in * out->c;

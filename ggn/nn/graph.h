@@ -36,18 +36,25 @@ struct ggn_value {
     const char *stage; /* name under which `ggn golden` reports its rms, or NULL; static */
 };
 
-enum ggn_op {
-    GGN_OP_CONV,   /* 3×3 stride 1 pad 1 or 1×1, bias, then LeakyReLU when slope != 1; reads `in` and `in2` as one */
-    GGN_OP_IM2COL, /* C planes → C·9 planes of the windows of a strided 3×3 convolution */
-    GGN_OP_BN,     /* batch normalisation per channel */
-    GGN_OP_LRELU,
-    GGN_OP_SIGMOID,
-    GGN_OP_MAXPOOL, /* kernel 2 stride 2, or kernel 3 stride 2 pad 1 */
-    GGN_OP_UP,      /* bilinear ×2, half-pixel centres, then pad_y zero rows on top and pad_x zero columns on the left */
-    GGN_OP_FLATTEN, /* planes → vector in (C, H, W) order */
-    GGN_OP_LINEAR,
-    GGN_OP_DROPOUT
-};
+/* The layers: OP(enumerator, name of its passes in nn/layers.h, name for people).
+ * CONV: 3×3 stride 1 pad 1 or 1×1, bias, then LeakyReLU when slope != 1; reads `in` and `in2` as one. IM2COL: C planes → C·9
+ * planes of the windows of a strided 3×3 convolution. BN: batch normalisation per channel. MAXPOOL: kernel 2 stride 2, or
+ * kernel 3 stride 2 pad 1. UP: bilinear ×2, half-pixel centres, then pad_y zero rows on top and pad_x zero columns on the
+ * left. FLATTEN: planes → vector in (C, H, W) order. */
+#define GGN_OPS(OP)                                                                                                         \
+    OP(CONV, conv, "conv")                                                                                                  \
+    OP(IM2COL, im2col, "im2col")                                                                                            \
+    OP(BN, bn, "batch norm")                                                                                                \
+    OP(LRELU, lrelu, "leaky relu")                                                                                          \
+    OP(SIGMOID, sigmoid, "sigmoid")                                                                                         \
+    OP(MAXPOOL, maxpool, "max pool")                                                                                        \
+    OP(UP, up, "upsample")                                                                                                  \
+    OP(FLATTEN, flatten, "flatten")                                                                                         \
+    OP(LINEAR, linear, "linear")                                                                                            \
+    OP(DROPOUT, dropout, "dropout")
+
+#define GGN_OP_ENUMERATE(op, name, text) GGN_OP_##op,
+enum ggn_op { GGN_OPS(GGN_OP_ENUMERATE) };
 
 struct ggn_layer {
     enum ggn_op op;
@@ -82,6 +89,7 @@ struct ggn_graph {
     struct ggn_tensor tensor[GGN_MAX_TENSORS];
     int n_values, n_layers, n_tensors;
     size_t n_params, n_stats, n_pack;
+    size_t n_learned;   /* n_params + 2·n_stats: parameters and running statistics */
     size_t n_acts;      /* elements of all values of one image */
     int n_stage_layers; /* parameter layers since the stage began; for names */
     const char *stage;
@@ -113,6 +121,10 @@ int ggn_graph_end(struct ggn_graph *g, struct base_err *err);
  * between values of equal height and width, whose zero padding lies at the same places. Returns the elements per image. */
 size_t ggn_graph_place(const struct ggn_graph *g, size_t offset[GGN_MAX_LAYERS + 1]);
 
+/* "conv" … */
+const char *ggn_op_name(enum ggn_op op);
+/* Channels of `in` and `in2` together. */
+int ggn_layer_c_in(const struct ggn_graph *g, const struct ggn_layer *layer);
 /* Multiply-accumulates of one layer for one image, and of all. */
 double ggn_layer_mac(const struct ggn_graph *g, int layer);
 double ggn_graph_mac(const struct ggn_graph *g);

@@ -1,4 +1,4 @@
-#include "nn/weights.h"
+#include "nn/hash.h"
 
 uint32_t ggn_hash(uint32_t k, uint32_t s)
 {

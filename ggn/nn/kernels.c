@@ -1,76 +1,22 @@
-/* Run-time choice of the instruction set. */
 #include "nn/kernels.h"
 
-#include <stdlib.h>
-#include <string.h>
+#include <stddef.h>
 
-#include "nn/kernels_tables.h"
+#include "nn/real.h"
 
-static const char *const names[GGN_ISA_COUNT] = {"base", "avx2", "avx512"};
-
-const char *ggn_isa_name(enum ggn_isa isa)
+const struct ggn_kernels *ggn_kernels_for(enum ggn_isa isa)
 {
-    return names[isa];
-}
-
-int ggn_isa_available(enum ggn_isa isa)
-{
-    if (isa == GGN_ISA_BASE)
-        return 1;
+    static const struct ggn_kernels *const table[GGN_ISA_COUNT] = {
+        [GGN_ISA_BASE] = &ggn_kernels_base,
 #if defined(__x86_64__)
-    __builtin_cpu_init();
-    if (isa == GGN_ISA_AVX2)
-        return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-    if (isa == GGN_ISA_AVX512)
-        return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
-               __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("fma");
+        [GGN_ISA_AVX2] = &ggn_kernels_avx2,
+        [GGN_ISA_AVX512] = &ggn_kernels_avx512,
 #endif
-    return 0;
+    };
+    return ggn_isa_available(isa) ? table[isa] : NULL;
 }
 
-enum ggn_isa ggn_isa_best(void)
+const struct ggn_kernels *ggn_kernels_best(void)
 {
-    const char *wish = getenv("GGN_ISA");
-    int top = GGN_ISA_COUNT - 1;
-
-    for (int i = 0; wish && i < GGN_ISA_COUNT; i++)
-        if (!strcmp(wish, names[i]))
-            top = i;
-    while (!ggn_isa_available((enum ggn_isa)top))
-        top--;
-    return (enum ggn_isa)top;
-}
-
-#if defined(__x86_64__)
-#define TABLES(type)                                                                                                        \
-    {                                                                                                                       \
-        &ggn_kernels_##type##_base, &ggn_kernels_##type##_avx2, &ggn_kernels_##type##_avx512                                \
-    }
-#else
-#define TABLES(type)                                                                                                        \
-    {                                                                                                                       \
-        &ggn_kernels_##type##_base, NULL, NULL                                                                              \
-    }
-#endif
-
-const struct ggn_kernels_f32 *ggn_kernels_for_f32(enum ggn_isa isa)
-{
-    static const struct ggn_kernels_f32 *const tables[GGN_ISA_COUNT] = TABLES(f32);
-    return ggn_isa_available(isa) ? tables[isa] : NULL;
-}
-
-const struct ggn_kernels_f64 *ggn_kernels_for_f64(enum ggn_isa isa)
-{
-    static const struct ggn_kernels_f64 *const tables[GGN_ISA_COUNT] = TABLES(f64);
-    return ggn_isa_available(isa) ? tables[isa] : NULL;
-}
-
-const struct ggn_kernels_f32 *ggn_kernels_best_f32(void)
-{
-    return ggn_kernels_for_f32(ggn_isa_best());
-}
-
-const struct ggn_kernels_f64 *ggn_kernels_best_f64(void)
-{
-    return ggn_kernels_for_f64(ggn_isa_best());
+    return ggn_kernels_for(ggn_isa_best());
 }

@@ -1,8 +1,7 @@
 /*
  * The numbers of a network: parameters, running statistics, and the packed form that the kernels read.
  *
- * Declared in weights_decl.inc for float (_f32) and double (_f64). After ggn_weights_pack an object may be read by any
- * number of executors and threads until params, mean or var change.
+ * After ggn_weights_pack an object may be read by any number of executors and threads until params, mean or var change.
  */
 #ifndef GGN_NN_WEIGHTS_H
 #define GGN_NN_WEIGHTS_H
@@ -10,10 +9,6 @@
 #include "base/threads.h"
 #include "nn/graph.h"
 #include "nn/kernels.h"
-
-/* The hash of the golden values, also the library's random numbers: h(k, s) and u(k, s) = h / 2^32 in [0, 1). */
-uint32_t ggn_hash(uint32_t k, uint32_t s);
-double ggn_hash_unit(uint32_t k, uint32_t s);
 
 enum {
     GGN_WEIGHTS_BACKWARD = 1, /* also packed for the backward pass */
@@ -27,16 +22,32 @@ enum ggn_init {
     GGN_INIT_HE     /* N(0, √(2/((1 + 0.2²)·fan_in))), biases 0: keeps the variance through LeakyReLU(0.2) */
 };
 
-#define REAL float
-#define TYPED(name) GGN_TYPED(name, f32)
-#include "nn/weights_decl.inc"
-#undef REAL
-#undef TYPED
+struct ggn_weights {
+    const struct ggn_graph *graph;     /* borrows until destroy */
+    const struct ggn_kernels *kernels; /* static */
+    void *memory;                      /* of all arrays; owns */
+    real *params;                      /* [n_learned]: parameters, then mean, then var */
+    real *mean, *var;                  /* [n_stats] running statistics; inside params */
+    real *pack, *pack_back;            /* [n_pack] for the forward and the backward pass; pack_back may be NULL */
+    real *wino, *wino_back;            /* [4·n_pack] transformed for nn/winograd.h; NULL where it is not used */
+    uint32_t *bf16;                    /* [n_pack] pairs for nn/bf16.h; NULL where it is not used */
+    real *scale, *shift;               /* [n_stats] batch norm with running statistics as y = x·scale + shift */
+};
 
-#define REAL double
-#define TYPED(name) GGN_TYPED(name, f64)
-#include "nn/weights_decl.inc"
-#undef REAL
-#undef TYPED
+/* Zero parameters, running mean 0 and variance 1. `flags`: GGN_WEIGHTS_*.
+ * `kernels` NULL = the best ones. NULL on failure. */
+struct ggn_weights *ggn_weights_create(const struct ggn_graph *graph, const struct ggn_kernels *kernels, int flags,
+                                       struct base_err *err);
+void ggn_weights_destroy(struct ggn_weights *weights);
+
+/* Fills params; the same seed gives the same numbers everywhere. Resets the running statistics. */
+void ggn_weights_init(struct ggn_weights *weights, enum ggn_init init, uint32_t seed);
+
+/* Takes over parameters and running statistics, [n_learned] as in params, and packs. */
+void ggn_weights_copy(struct ggn_weights *weights, const real *learned);
+
+/* Brings the packed form up to date, on a pool of threads (NULL: the calling one): call after params, mean or var have
+ * changed, before the next forward pass. */
+void ggn_weights_pack(struct ggn_weights *weights, struct base_threads *threads);
 
 #endif

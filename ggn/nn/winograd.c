@@ -69,13 +69,3 @@ void ggn_wino_pack(float *u, const float *packed, int n_in, int n_out, int tile_
         }
     }
 }
-
-ggn_wino_fn *ggn_wino_for(enum ggn_isa isa)
-{
-#if defined(__x86_64__)
-    return isa == GGN_ISA_AVX512 ? ggn_wino_conv_avx512 : NULL;
-#else
-    (void)isa;
-    return NULL;
-#endif
-}

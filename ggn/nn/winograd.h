@@ -26,10 +26,6 @@ size_t ggn_wino_scratch(int n_in);
 void ggn_wino_pack(float *u, const float *packed, int n_in, int n_out, int tile_oc);
 
 /* Tiles [t0, t1) of the convolution `a` (a->w is not read), at most GGN_WINO_TILES. */
-typedef void ggn_wino_fn(const struct ggn_conv_f32 *a, const float *u, int t0, int t1, float *scratch);
-ggn_wino_fn ggn_wino_conv_avx512;
-
-/* The implementation for `isa`, NULL where the direct convolution is to be used. */
-ggn_wino_fn *ggn_wino_for(enum ggn_isa isa);
+void ggn_wino_conv_avx512(const struct ggn_conv *a, const float *u, int t0, int t1, float *scratch);
 
 #endif

@@ -78,7 +78,7 @@ INLINE void split_phases(float *to, const float *row)
 }
 
 /* d[(6i + j)·ROOM + lane] = input (4ty − 1 + i, 4tx − 1 + j) of the lane's tile, 0 outside of the picture. */
-static void gather(float *d, const float *x, const struct ggn_conv_f32 *a, const struct block *b)
+static void gather(float *d, const float *x, const struct ggn_conv *a, const struct block *b)
 {
     for (int lane = 0, n; lane < b->n; lane += n) {
         const int tile = b->t0 + lane, ty = tile / b->tiles_x, tx = tile % b->tiles_x;
@@ -165,7 +165,7 @@ TILE(8, 2)
 TILE(8, 3)
 
 /* All 36 products for output channels [oc0, oc1). */
-static void multiply(float *m, const float *u, const float *v, const struct ggn_conv_f32 *a, const struct block *b, int oc0,
+static void multiply(float *m, const float *u, const float *v, const struct ggn_conv *a, const struct block *b, int oc0,
                      int oc1)
 {
     typedef void tile_fn(float *, const float *, const float *, int, int);
@@ -188,7 +188,7 @@ static void multiply(float *m, const float *u, const float *v, const struct ggn_
 }
 
 /* Aᵀ m A and the epilogue of one output channel into o[(4i + j)·ROOM + lane]. */
-static void inverse_channel(float *o, const float *m, const struct ggn_conv_f32 *a, int oc, const struct block *b)
+static void inverse_channel(float *o, const float *m, const struct ggn_conv *a, int oc, const struct block *b)
 {
     const vf bias = _mm512_set1_ps(a->bias ? a->bias[oc] : 0), slope = _mm512_set1_ps(a->slope);
 
@@ -243,7 +243,7 @@ INLINE void join_phases(float *row, const float *from, int n, int add)
     }
 }
 
-static void scatter(float *y, const float *o, const struct ggn_conv_f32 *a, const struct block *b, int add)
+static void scatter(float *y, const float *o, const struct ggn_conv *a, const struct block *b, int add)
 {
     for (int lane = 0, n; lane < b->n; lane += n) {
         const int tile = b->t0 + lane, ty = tile / b->tiles_x, tx = tile % b->tiles_x;
@@ -258,7 +258,7 @@ static void scatter(float *y, const float *o, const struct ggn_conv_f32 *a, cons
     }
 }
 
-void ggn_wino_conv_avx512(const struct ggn_conv_f32 *a, const float *u, int t0, int t1, float *scratch)
+void ggn_wino_conv_avx512(const struct ggn_conv *a, const float *u, int t0, int t1, float *scratch)
 {
     struct block b = {.t0 = t0, .n = t1 - t0, .lanes = (t1 - t0 + L - 1) / L * L, .tiles_x = (a->w_px + 3) / 4};
     float *d = scratch, *o = d + XI * ROOM, *m = o + 16 * ROOM, *v = m + GGN_WINO_OC * XI * GGN_WINO_TILES;

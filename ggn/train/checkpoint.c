@@ -38,16 +38,16 @@ float *ggn_session_array(struct ggn_session *s, int i, size_t *count)
     const struct ggn_graph *g;
 
     if (s->progress.phase == GGN_PHASE_DENOISER)
-        return ggn_trainer_state_f32(s->trainer, GGN_NET_R, i, count);
+        return ggn_trainer_state(s->trainer, GGN_NET_R, i, count);
     if (i < 5 && s->hyper.preset == GGN_PRESET_PAPER)
-        return ggn_trainer_state_f32(s->trainer, GGN_NET_R, i, count);
+        return ggn_trainer_state(s->trainer, GGN_NET_R, i, count);
     if (i < 3) {
         *count = i == 0 ? s->r_graph.n_params : s->r_graph.n_stats;
         return i == 0 ? s->r->params : i == 1 ? s->r->mean : s->r->var;
     }
     i -= s->hyper.preset == GGN_PRESET_PAPER ? 5 : 3;
     if (i < 10)
-        return ggn_trainer_state_f32(s->trainer, i < 5 ? GGN_NET_M : GGN_NET_D, i % 5, count);
+        return ggn_trainer_state(s->trainer, i < 5 ? GGN_NET_M : GGN_NET_D, i % 5, count);
     i -= 10;
     if (i > 1 && !(i == 2 && s->best_r))
         return NULL;

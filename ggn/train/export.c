@@ -8,12 +8,12 @@
 #include "train/session.h"
 #include "train/start.h"
 
-static void copy_weights(struct ggn_weights_f32 *to, const struct ggn_weights_f32 *from)
+static void copy_weights(struct ggn_weights *to, const struct ggn_weights *from)
 {
     memcpy(to->params, from->params, from->graph->n_params * sizeof *to->params);
     memcpy(to->mean, from->mean, from->graph->n_stats * sizeof *to->mean);
     memcpy(to->var, from->var, from->graph->n_stats * sizeof *to->var);
-    ggn_weights_pack_f32(to);
+    ggn_weights_pack(to, NULL);
 }
 
 /* What a run is made of. The same data, options and seed give the same bytes, so nothing of time or place is in it. */
@@ -145,7 +145,7 @@ int ggn_session_import(struct ggn_session *s, const char *path, struct base_err 
         copy_weights(s->trainer->weights[GGN_NET_D], model->weights[GGN_NET_D]);
         if (s->hyper.preset == GGN_PRESET_LULL)
             ggn_train_unfold(&s->trainer->graph[GGN_NET_M], s->trainer->weights[GGN_NET_M]->params, s->hyper.window, s->plan->difference);
-        ggn_weights_pack_f32(s->trainer->weights[GGN_NET_M]);
+        ggn_weights_pack(s->trainer->weights[GGN_NET_M], NULL);
     }
     ggn_model_destroy(model);
     return 0;

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "base/clock.h"
-#include "nn/weights.h"
+#include "nn/hash.h"
 #include "train/session.h"
 
 enum { VALIDATION_CROPS = 32 };
@@ -85,13 +85,13 @@ static int train_step(struct ggn_session *s, uint64_t step, double *loss, struct
         y[i] = x[i] + 3 * plane;
     }
     s->trainer->options.lr[GGN_NET_R] = ggn_session_lr(s, s->plan->lr_r, step, (uint64_t)s->plan->steps_r);
-    return ggn_trainer_denoiser_step_f32(s->trainer, x, y, n, loss, err);
+    return ggn_trainer_denoiser_step(s->trainer, x, y, n, loss, err);
 }
 
 /* Mean of 1 − SSIM over fixed crops of the validation scenes; NaN without any. */
 static double validate(struct ggn_session *s)
 {
-    struct ggn_trainer_f32 *t = s->trainer;
+    struct ggn_trainer *t = s->trainer;
     const struct ggn_value *in = &t->r->graph->value[0];
     const int out = t->r->graph->n_values - 1, n = s->plan->batch_r;
     const size_t plane = (size_t)s->plan->crop * (size_t)s->plan->crop;
@@ -99,7 +99,7 @@ static double validate(struct ggn_session *s)
 
     if (!nth_chain(s, GGN_SPLIT_VALIDATION, -1))
         return (double)NAN;
-    ggn_weights_pack_f32(t->weights[GGN_NET_R]);
+    ggn_weights_pack(t->weights[GGN_NET_R], NULL);
     for (int first = 0; first < VALIDATION_CROPS; first += n) {
         int count = VALIDATION_CROPS - first < n ? VALIDATION_CROPS - first : n;
         fill_batch(s, GGN_SPLIT_VALIDATION, 0, VALIDATION_SEED, first, count);
@@ -107,18 +107,18 @@ static double validate(struct ggn_session *s)
             for (int c = 0; c < 3; c++)
                 for (int row = 0; row < in->h; row++) {
                     const float *x = s->buffer + ((size_t)i * 6 + (size_t)c) * plane + (size_t)row * (size_t)in->w;
-                    memcpy(ggn_exec_plane_f32(t->r, 0, i, c) + (long)row * in->row, x, (size_t)in->w * sizeof *x);
+                    memcpy(ggn_exec_plane(t->r, 0, i, c) + (long)row * in->row, x, (size_t)in->w * sizeof *x);
                     /* the input's gradient is not used here: its planes hold the reference in the output's layout */
-                    memcpy(ggn_exec_grad_f32(t->r, 0, i, c) + (long)row * in->row, x + 3 * plane, (size_t)in->w * sizeof *x);
+                    memcpy(ggn_exec_grad(t->r, 0, i, c) + (long)row * in->row, x + 3 * plane, (size_t)in->w * sizeof *x);
                 }
-        ggn_exec_forward_f32(t->r, t->weights[GGN_NET_R], count, GGN_EVAL);
+        ggn_exec_forward(t->r, t->weights[GGN_NET_R], count, GGN_EVAL);
         for (int i = 0; i < count; i++) {
             const float *x[3], *y[3];
             for (int c = 0; c < 3; c++) {
-                x[c] = ggn_exec_plane_f32(t->r, out, i, c);
-                y[c] = ggn_exec_grad_f32(t->r, 0, i, c);
+                x[c] = ggn_exec_plane(t->r, out, i, c);
+                y[c] = ggn_exec_grad(t->r, 0, i, c);
             }
-            total += 1 - ggn_ssim_mean_f32(t->ssim, x, y, NULL, 3, in->row, 0);
+            total += 1 - ggn_ssim_mean(t->ssim, x, y, NULL, 3, in->row, 0);
         }
     }
     return total / VALIDATION_CROPS;
@@ -147,7 +147,7 @@ static int epoch(struct ggn_session *s, uint64_t end, struct base_err *err)
     row.lr = s->trainer->options.lr[GGN_NET_R];
     row.validation_loss = validate(s);
     s->progress.seconds[0] += base_clock_wall_s() - start;
-    ggn_trainer_keep_f32(s->trainer);
+    ggn_trainer_keep(s->trainer);
     return ggn_session_epoch(s, &row, (uint64_t)s->plan->steps_r, (double)(end - begin) * s->plan->batch_r, seconds, err);
 }
 

@@ -7,6 +7,8 @@
 #include "figures/stats.h"
 #include "model/window.h"
 #include "train/calibrate.h"
+#include "nn/hash.h"
+#include "nn/loss.h"
 #include "train/session.h"
 
 static size_t window_values(const struct ggn_session *s)
@@ -54,7 +56,7 @@ static void fill_window(void *data, long i, int worker)
 }
 
 /* Fills the buffer and the plane pointers: noisy windows first, then denoised ones (or references). */
-static struct ggn_batch_f32 fill_batch(struct ggn_session *s, const struct fill *f, int count)
+static struct ggn_batch fill_batch(struct ggn_session *s, const struct fill *f, int count)
 {
     const size_t plane = (size_t)s->set.width * (size_t)s->set.height;
     const size_t planes = 3 * (size_t)s->hyper.window;
@@ -69,59 +71,59 @@ static struct ggn_batch_f32 fill_batch(struct ggn_session *s, const struct fill 
             else if (k < 3)
                 second[3 * i + k] = noisy[i * planes + k] + window_values(s);
         }
-    return (struct ggn_batch_f32){.count = count, .noisy = noisy, .denoised = f->denoised ? second : NULL,
+    return (struct ggn_batch){.count = count, .noisy = noisy, .denoised = f->denoised ? second : NULL,
                                   .reference = f->denoised ? NULL : second};
 }
 
 /* --- evaluation mode ----------------------------------------------------------------------------------------------------- */
 
-static void copy_planes(const struct ggn_exec_f32 *e, int value, int image, int c, const float *src, int row)
+static void copy_planes(const struct ggn_exec *e, int value, int image, int c, const float *src, int row)
 {
     const struct ggn_value *v = &e->graph->value[value];
 
     for (int y = 0; y < v->h; y++)
-        memcpy(ggn_exec_plane_f32(e, value, image, c) + (long)y * v->row, src + (long)y * row, (size_t)v->w * sizeof *src);
+        memcpy(ggn_exec_plane(e, value, image, c) + (long)y * v->row, src + (long)y * row, (size_t)v->w * sizeof *src);
 }
 
 /* NFM of `count` windows whose planes are given, into channel `channel` of D's input. */
 static void generate(struct ggn_session *s, const float *const *planes, int count, int channel)
 {
-    struct ggn_trainer_f32 *t = s->trainer;
+    struct ggn_trainer *t = s->trainer;
     const int n = 3 * s->hyper.window, out = t->m->graph->n_values - 1;
 
     for (int i = 0; i < count; i++)
         for (int k = 0; k < n; k++)
             copy_planes(t->m, 0, i, k, planes[i * n + k], s->set.width);
-    ggn_exec_forward_f32(t->m, t->weights[GGN_NET_M], count, GGN_EVAL);
+    ggn_exec_forward(t->m, t->weights[GGN_NET_M], count, GGN_EVAL);
     for (int i = 0; i < count; i++)
-        copy_planes(t->d, 0, i, channel, ggn_exec_plane_f32(t->m, out, i, 0), t->m->graph->value[out].row);
+        copy_planes(t->d, 0, i, channel, ggn_exec_plane(t->m, out, i, 0), t->m->graph->value[out].row);
 }
 
 int ggn_session_logits(struct ggn_session *s, const struct ggn_windows *windows, const int *index, int n, double *logit,
                        struct base_err *err)
 {
-    struct ggn_trainer_f32 *t = s->trainer;
+    struct ggn_trainer *t = s->trainer;
     const int out = t->d->graph->n_values - 1;
 
     (void)err;
-    ggn_weights_pack_f32(t->weights[GGN_NET_M]);
-    ggn_weights_pack_f32(t->weights[GGN_NET_D]);
+    ggn_weights_pack(t->weights[GGN_NET_M], NULL);
+    ggn_weights_pack(t->weights[GGN_NET_D], NULL);
     for (int first = 0; first < n; first += s->plan->batch) {
         int count = n - first < s->plan->batch ? n - first : s->plan->batch;
         struct fill f = {.s = s, .windows = windows, .index = index + first, .denoised = 1};
-        struct ggn_batch_f32 b = fill_batch(s, &f, count);
+        struct ggn_batch b = fill_batch(s, &f, count);
         generate(s, b.denoised, count, 0);
         generate(s, b.noisy, count, 1);
-        ggn_exec_forward_f32(t->d, t->weights[GGN_NET_D], count, GGN_EVAL);
+        ggn_exec_forward(t->d, t->weights[GGN_NET_D], count, GGN_EVAL);
         for (int i = 0; i < count; i++)
-            logit[first + i] = (double)*ggn_exec_plane_f32(t->d, out, i, 0);
+            logit[first + i] = (double)*ggn_exec_plane(t->d, out, i, 0);
     }
     return 0;
 }
 
 struct denoise {
     struct ggn_session *s;
-    struct ggn_exec_f32 *exec;
+    struct ggn_exec *exec;
 };
 
 static void denoise_images(const struct denoise *d, struct ggn_chain *c, int first, int count)
@@ -132,22 +134,22 @@ static void denoise_images(const struct denoise *d, struct ggn_chain *c, int fir
 
     for (int i = 0; i < count; i++)
         ggn_tile_load_u8(c->noisy + (size_t)(first + i) * values, width, height, 0, 0, width, height, 1.0F / 255,
-                         ggn_exec_plane_f32(d->exec, 0, i, 0), (size_t)in->row, in->plane);
-    ggn_exec_forward_f32(d->exec, d->s->r, count, GGN_EVAL);
+                         ggn_exec_plane(d->exec, 0, i, 0), (size_t)in->row, in->plane);
+    ggn_exec_forward(d->exec, d->s->r, count, GGN_EVAL);
     for (int i = 0; i < count; i++)
         ggn_tile_store_u16(c->denoised + (size_t)(first + i) * values, width, height, 0, 0, width, height,
-                           ggn_exec_plane_f32(d->exec, out, i, 0), (size_t)d->exec->graph->value[out].row,
+                           ggn_exec_plane(d->exec, out, i, 0), (size_t)d->exec->graph->value[out].row,
                            d->exec->graph->value[out].plane);
 }
 
 int ggn_session_denoise(struct ggn_session *s, enum ggn_split split, struct base_err *err)
 {
     enum { AT_ONCE = 4 };
-    struct denoise d = {s, ggn_exec_create_f32(&s->r_graph, NULL, AT_ONCE, 0, s->threads, err)};
+    struct denoise d = {s, ggn_exec_create(&s->r_graph, NULL, AT_ONCE, 0, s->threads, err)};
 
     if (!d.exec)
         return BASE_ENOMEM;
-    ggn_weights_pack_f32(s->r);
+    ggn_weights_pack(s->r, NULL);
     for (int i = 0; i < s->set.n; i++) {
         struct ggn_chain *c = &s->set.chains[i];
         if (split != GGN_SPLITS && c->split != split)
@@ -155,13 +157,13 @@ int ggn_session_denoise(struct ggn_session *s, enum ggn_split split, struct base
         if (!c->denoised)
             c->denoised = malloc((size_t)(c->n_levels ? c->n_levels : 1) * ggn_chains_values(&s->set) * sizeof *c->denoised);
         if (!c->denoised) {
-            ggn_exec_destroy_f32(d.exec);
+            ggn_exec_destroy(d.exec);
             return base_fail_nomem(err, "denoised images");
         }
         for (int k = 0; k < c->n_levels; k += AT_ONCE)
             denoise_images(&d, c, k, c->n_levels - k < AT_ONCE ? c->n_levels - k : AT_ONCE);
     }
-    ggn_exec_destroy_f32(d.exec);
+    ggn_exec_destroy(d.exec);
     return 0;
 }
 
@@ -202,20 +204,20 @@ static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, doub
     const int paper = s->hyper.preset == GGN_PRESET_PAPER, n = s->plan->batch;
     int index[1024];
     double label[1024], logit[1024];
-    struct ggn_paper_record_f32 record;
+    struct ggn_paper_record record;
 
     for (int i = 0; i < n; i++) {
         index[i] = paper ? paper_window(s, step, i) : ggn_windows_draw(&s->train, step, i, ggn_session_seed(s));
         label[i] = s->train.list[index[i]].label;
     }
     struct fill f = {.s = s, .windows = &s->train, .index = index, .step = step, .augment = !paper, .denoised = !paper};
-    struct ggn_batch_f32 b = fill_batch(s, &f, n);
+    struct ggn_batch b = fill_batch(s, &f, n);
     b.label = label;
     double scale = paper ? 1 : ggn_session_lr(s, 1, step, steps);
     s->trainer->options.lr[GGN_NET_M] = s->trainer->options.lr[GGN_NET_D] = s->plan->lr * scale;
     s->trainer->options.lr[GGN_NET_R] = s->plan->lr_r * scale;
-    int rc = paper ? ggn_trainer_paper_step_f32(s->trainer, &b, &record, err)
-                   : ggn_trainer_judge_step_f32(s->trainer, &b, loss, logit, err);
+    int rc = paper ? ggn_trainer_paper_step(s->trainer, &b, &record, err)
+                   : ggn_trainer_judge_step(s->trainer, &b, loss, logit, err);
     if (rc)
         return rc;
     if (paper)
@@ -282,7 +284,7 @@ static int validate(struct ggn_session *s, struct ggn_log_row *row, struct base_
 /* Preset paper: the denoiser has moved on; its copy and the denoised validation images follow. */
 static int renew_denoiser(struct ggn_session *s, struct base_err *err)
 {
-    const struct ggn_weights_f32 *from = s->trainer->weights[GGN_NET_R];
+    const struct ggn_weights *from = s->trainer->weights[GGN_NET_R];
 
     memcpy(s->r->params, from->params, s->r_graph.n_params * sizeof *from->params);
     memcpy(s->r->mean, from->mean, s->r_graph.n_stats * sizeof *from->mean);
@@ -334,7 +336,7 @@ static int epoch(struct ggn_session *s, uint64_t end, uint64_t steps, struct bas
         return rc;
     row.lr = s->trainer->options.lr[GGN_NET_M];
     s->progress.seconds[1] += base_clock_wall_s() - start;
-    ggn_trainer_keep_f32(s->trainer);
+    ggn_trainer_keep(s->trainer);
     return ggn_session_epoch(s, &row, steps, (double)(end - begin) * s->plan->batch, seconds, err);
 }
 

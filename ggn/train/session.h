@@ -31,8 +31,8 @@ struct ggn_session {
     struct ggn_windows train, validation;
     struct ggn_hyper hyper;       /* of the model */
     struct ggn_graph r_graph;     /* the denoiser at full size */
-    struct ggn_weights_f32 *r;    /* its weights once phase 0 is over (preset paper: a copy, renewed each epoch) */
-    struct ggn_trainer_f32 *trainer; /* of the present phase */
+    struct ggn_weights *r;    /* its weights once phase 0 is over (preset paper: a copy, renewed each epoch) */
+    struct ggn_trainer *trainer; /* of the present phase */
     float *best[2];               /* [GGN_NET_M − 1], [GGN_NET_D − 1]: params, mean, var of the best epoch, one after the other */
     float *best_r;                /* preset paper: the denoiser of that epoch */
     struct ggn_progress progress;

@@ -6,6 +6,7 @@
 #include <sys/stat.h>
 
 #include "figures/stats.h"
+#include "nn/hash.h"
 #include "train/session.h"
 #include "train/start.h"
 
@@ -106,7 +107,7 @@ int ggn_session_epoch(struct ggn_session *s, struct ggn_log_row *row, uint64_t s
 }
 
 /* Copies params, mean and var of a network into one array, or back. */
-static void copy_net(float *flat, struct ggn_weights_f32 *w, int store)
+static void copy_net(float *flat, struct ggn_weights *w, int store)
 {
     float *const part[3] = {w->params, w->mean, w->var};
     const size_t count[3] = {w->graph->n_params, w->graph->n_stats, w->graph->n_stats};
@@ -114,7 +115,7 @@ static void copy_net(float *flat, struct ggn_weights_f32 *w, int store)
     for (int i = 0; i < 3; flat += count[i++])
         memcpy(store ? flat : part[i], store ? part[i] : flat, count[i] * sizeof *flat);
     if (!store)
-        ggn_weights_pack_f32(w);
+        ggn_weights_pack(w, NULL);
 }
 
 int ggn_session_keep_best(struct ggn_session *s, struct base_err *err)
@@ -188,7 +189,7 @@ static int prepare(struct ggn_session *s, struct base_err *err)
     s->hyper = (struct ggn_hyper){.preset = p->preset, .height = s->set.height, .width = s->set.width, .window = p->window,
                                   .k_r = p->k_r, .k_m = p->k_m, .k_d = p->k_d};
     rc = ggn_network_build(&s->r_graph, GGN_NET_R, &s->hyper, err);
-    s->r = rc ? NULL : ggn_weights_create_f32(&s->r_graph, NULL, 0, err);
+    s->r = rc ? NULL : ggn_weights_create(&s->r_graph, NULL, 0, err);
     if (!s->r)
         return rc ? rc : BASE_ENOMEM;
     size_t crops = 6 * (size_t)p->batch_r * (size_t)p->crop * (size_t)p->crop;
@@ -201,8 +202,8 @@ static int prepare(struct ggn_session *s, struct base_err *err)
 
 static void session_release(struct ggn_session *s)
 {
-    ggn_trainer_destroy_f32(s->trainer);
-    ggn_weights_destroy_f32(s->r);
+    ggn_trainer_destroy(s->trainer);
+    ggn_weights_destroy(s->r);
     free(s->best[0]);
     free(s->best[1]);
     free(s->best_r);
@@ -234,10 +235,10 @@ static int begin_denoiser(struct ggn_session *s, struct base_err *err)
 
     crop.height = crop.width = s->plan->crop;
     s->progress.phase = GGN_PHASE_DENOISER;
-    s->trainer = ggn_trainer_create_f32(&crop, &o, s->threads, err);
+    s->trainer = ggn_trainer_create(&crop, &o, s->threads, err);
     if (!s->trainer)
         return BASE_ENOMEM;
-    struct ggn_weights_f32 *w = s->trainer->weights[GGN_NET_R];
+    struct ggn_weights *w = s->trainer->weights[GGN_NET_R];
     if (s->plan->init) {
         memcpy(w->params, s->r->params, s->r_graph.n_params * sizeof *w->params);
         memcpy(w->mean, s->r->mean, s->r_graph.n_stats * sizeof *w->mean);
@@ -245,21 +246,21 @@ static int begin_denoiser(struct ggn_session *s, struct base_err *err)
     } else {
         ggn_train_identity(&s->trainer->graph[GGN_NET_R], w->params);
     }
-    ggn_weights_pack_f32(w);
-    ggn_trainer_keep_f32(s->trainer);
+    ggn_weights_pack(w, NULL);
+    ggn_trainer_keep(s->trainer);
     return 0;
 }
 
 /* The denoiser's weights leave the trainer of crops for good. */
 static void end_denoiser(struct ggn_session *s)
 {
-    const struct ggn_weights_f32 *from = s->trainer->weights[GGN_NET_R];
+    const struct ggn_weights *from = s->trainer->weights[GGN_NET_R];
 
     memcpy(s->r->params, from->params, s->r_graph.n_params * sizeof *from->params);
     memcpy(s->r->mean, from->mean, s->r_graph.n_stats * sizeof *from->mean);
     memcpy(s->r->var, from->var, s->r_graph.n_stats * sizeof *from->var);
-    ggn_weights_pack_f32(s->r);
-    ggn_trainer_destroy_f32(s->trainer);
+    ggn_weights_pack(s->r, NULL);
+    ggn_trainer_destroy(s->trainer);
     s->trainer = NULL;
 }
 
@@ -270,7 +271,7 @@ static int begin_judge(struct ggn_session *s, struct base_err *err)
 
     s->progress = (struct ggn_progress){.phase = GGN_PHASE_JUDGE, .best_loss = HUGE_VAL,
                                         .seconds = {s->progress.seconds[0], 0}};
-    s->trainer = ggn_trainer_create_f32(&s->hyper, &o, s->threads, err);
+    s->trainer = ggn_trainer_create(&s->hyper, &o, s->threads, err);
     if (!s->trainer)
         return BASE_ENOMEM;
     for (int i = 0; i < 2; i++) {
@@ -369,8 +370,8 @@ static int run(struct ggn_session *s, int phase, int resume, const char *checkpo
         if (!rc && resume) {
             rc = ggn_session_restore(s, checkpoint, err);
             if (!rc) {
-                ggn_weights_pack_f32(s->trainer->weights[GGN_NET_R]);
-                ggn_trainer_keep_f32(s->trainer);
+                ggn_weights_pack(s->trainer->weights[GGN_NET_R], NULL);
+                ggn_trainer_keep(s->trainer);
             }
         }
         if (!rc)
@@ -388,8 +389,8 @@ static int run(struct ggn_session *s, int phase, int resume, const char *checkpo
     if (rc)
         return rc;
     for (int net = 0; net < GGN_NETS; net++)
-        ggn_weights_pack_f32(s->trainer->weights[net]);
-    ggn_trainer_keep_f32(s->trainer);
+        ggn_weights_pack(s->trainer->weights[net], NULL);
+    ggn_trainer_keep(s->trainer);
     if (!paper)
         rc = ggn_session_denoise(s, GGN_SPLITS, err);
     return rc ? rc : ggn_phase_judge(s, err);

@@ -1,4 +1,5 @@
 /* Central differences in double for every layer on several shapes, and along random directions for the whole networks. */
+#define GGN_DOUBLE
 #include "support/ggn_cmocka.h"
 
 #include <math.h>
@@ -8,14 +9,17 @@
 
 #include "model/networks.h"
 #include "nn/exec.h"
+#include "nn/hash.h"
 #include "nn/loss.h"
+#include "nn/ssim.h"
+#include "nn/ssim.h"
 
 /* (L(x+h) − L(x−h)) / 2h has a truncation error of order h² and a rounding error of order 1e-16/h. */
 static const double STEP = 1e-5, TOLERANCE = 2e-7;
 
 static struct ggn_graph graph;
-static struct ggn_weights_f64 *weights;
-static struct ggn_exec_f64 *e;
+static struct ggn_weights *weights;
+static struct ggn_exec *e;
 static double *params_grad, mean0[4096], var0[4096];
 static int batch, out;
 
@@ -32,20 +36,20 @@ static double loss(int backward, uint32_t seed)
 
     memcpy(weights->mean, mean0, graph.n_stats * sizeof(double));
     memcpy(weights->var, var0, graph.n_stats * sizeof(double));
-    ggn_weights_pack_f64(weights);
-    ggn_exec_forward_f64(e, weights, batch, GGN_TRAIN);
+    ggn_weights_pack(weights, NULL);
+    ggn_exec_forward(e, weights, batch, GGN_TRAIN);
     for (int n = 0; n < batch; n++)
         for (int c = 0; c < v->c; c++)
             for (int k = 0; k < v->h * v->w; k++) {
                 long at = (long)(k / v->w) * v->row + k % v->w;
                 double r = rnd((uint32_t)((n * v->c + c) * v->h * v->w + k), seed + 77);
-                total += r * ggn_exec_plane_f64(e, out, n, c)[at];
+                total += r * ggn_exec_plane(e, out, n, c)[at];
                 if (backward)
-                    ggn_exec_grad_f64(e, out, n, c)[at] = r;
+                    ggn_exec_grad(e, out, n, c)[at] = r;
             }
     if (backward) {
         memset(params_grad, 0, graph.n_params * sizeof *params_grad);
-        ggn_exec_backward_f64(e, weights, params_grad);
+        ggn_exec_backward(e, weights, params_grad);
     }
     return total;
 }
@@ -58,27 +62,27 @@ static void start(int images, uint32_t seed)
         fail_msg("%s", err.text);
     batch = images;
     out = graph.n_values - 1;
-    weights = ggn_weights_create_f64(&graph, NULL, 1, &err);
-    e = ggn_exec_create_f64(&graph, NULL, batch, GGN_EXEC_GRADS | GGN_EXEC_INPUT_GRAD, NULL, &err);
+    weights = ggn_weights_create(&graph, NULL, 1, &err);
+    e = ggn_exec_create(&graph, NULL, batch, GGN_EXEC_GRADS | GGN_EXEC_INPUT_GRAD, NULL, &err);
     params_grad = calloc(graph.n_params + 1, sizeof *params_grad);
     assert_non_null(weights);
     assert_non_null(e);
     assert_non_null(params_grad);
-    ggn_weights_init_f64(weights, GGN_INIT_HASH, seed);
+    ggn_weights_init(weights, GGN_INIT_HASH, seed);
     memcpy(mean0, weights->mean, graph.n_stats * sizeof(double));
     memcpy(var0, weights->var, graph.n_stats * sizeof(double));
     const struct ggn_value *v = &graph.value[0];
     for (int n = 0; n < batch; n++)
         for (int c = 0; c < v->c; c++)
             for (int k = 0; k < v->h * v->w; k++)
-                ggn_exec_plane_f64(e, 0, n, c)[(long)(k / v->w) * v->row + k % v->w] =
+                ggn_exec_plane(e, 0, n, c)[(long)(k / v->w) * v->row + k % v->w] =
                     rnd((uint32_t)((n * v->c + c) * v->h * v->w + k), seed + 5);
 }
 
 static void finish(void)
 {
-    ggn_weights_destroy_f64(weights);
-    ggn_exec_destroy_f64(e);
+    ggn_weights_destroy(weights);
+    ggn_exec_destroy(e);
     free(params_grad);
 }
 
@@ -115,7 +119,7 @@ static void check(const char *what, int images, uint32_t seed)
             c = (int)(ggn_hash((uint32_t)i, seed + 2) % (uint32_t)v->c);
         int k = (int)(ggn_hash((uint32_t)i, seed + 3) % (uint32_t)(v->h * v->w));
         long at = (long)(k / v->w) * v->row + k % v->w;
-        compare(what, ggn_exec_plane_f64(e, 0, n, c) + at, ggn_exec_grad_f64(e, 0, n, c)[at], seed);
+        compare(what, ggn_exec_plane(e, 0, n, c) + at, ggn_exec_grad(e, 0, n, c)[at], seed);
     }
     finish();
 }
@@ -213,7 +217,7 @@ static void test_ssim(void **state)
     static double x[2][H * ROW], y[2][H * ROW], dx[2][H * ROW];
     const double *px[2] = {x[0], x[1]}, *py[2] = {y[0], y[1]};
     double *pd[2] = {dx[0], dx[1]};
-    struct ggn_ssim_f64 *s = ggn_ssim_create_f64(H, W, NULL, NULL);
+    struct ggn_ssim *s = ggn_ssim_create(H, W, NULL, NULL);
 
     assert_non_null(s);
     for (int c = 0; c < 2; c++)
@@ -221,19 +225,19 @@ static void test_ssim(void **state)
             x[c][i] = ggn_hash_unit((uint32_t)i, (uint32_t)c + 1);
             y[c][i] = 0.5 * x[c][i] + 0.5 * ggn_hash_unit((uint32_t)i, (uint32_t)c + 3);
         }
-    ggn_ssim_mean_f64(s, px, py, pd, 2, ROW, 1);
+    ggn_ssim_mean(s, px, py, pd, 2, ROW, 1);
     for (int i = 0; i < 80; i++) {
         uint32_t k = ggn_hash((uint32_t)i, 7);
         double *p = &x[k & 1][(k >> 1) % H * ROW + (k >> 8) % W], grad = dx[k & 1][(k >> 1) % H * ROW + (k >> 8) % W],
                old = *p;
         *p = old + 1e-6;
-        double high = ggn_ssim_mean_f64(s, px, py, NULL, 2, ROW, 1);
+        double high = ggn_ssim_mean(s, px, py, NULL, 2, ROW, 1);
         *p = old - 1e-6;
-        double low = ggn_ssim_mean_f64(s, px, py, NULL, 2, ROW, 1);
+        double low = ggn_ssim_mean(s, px, py, NULL, 2, ROW, 1);
         *p = old;
         assert_true(fabs((high - low) / 2e-6 - grad) < 1e-8);
     }
-    ggn_ssim_destroy_f64(s);
+    ggn_ssim_destroy(s);
     (void)state;
 }
 

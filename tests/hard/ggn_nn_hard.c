@@ -10,7 +10,10 @@
 #include "model/policy.h"
 #include "model/preprocess.h"
 #include "model/trainer.h"
+#include "nn/hash.h"
 #include "nn/loss.h"
+#include "nn/ssim.h"
+#include "nn/ssim.h"
 
 #if defined(__x86_64__)
 #include <xmmintrin.h>
@@ -25,8 +28,8 @@ static struct ggn_model *make(void)
 
     assert_non_null(m);
     for (int net = 0; net < GGN_NETS; net++) {
-        ggn_weights_init_f32(m->weights[net], GGN_INIT_HASH, 70 + (uint32_t)net);
-        ggn_weights_pack_f32(m->weights[net]);
+        ggn_weights_init(m->weights[net], GGN_INIT_HASH, 70 + (uint32_t)net);
+        ggn_weights_pack(m->weights[net], NULL);
     }
     return m;
 }
@@ -114,7 +117,7 @@ static void test_overflowing_weights(void **state)
         struct ggn_pixel_counts counts = {0};
         for (size_t i = 0; i < m->graph[net].n_params; i++)
             m->weights[net]->params[i] *= 1e36f;
-        ggn_weights_pack_f32(m->weights[net]);
+        ggn_weights_pack(m->weights[net], NULL);
         assert_true(decide(m, equal_images, &counts) == 1);
         ggn_model_destroy(m);
     }
@@ -137,7 +140,7 @@ static void test_flush_to_zero(void **state)
         _mm_setcsr(mode);
         for (size_t i = 0; i < m->graph[GGN_NET_M].n_params; i++) /* now tiny weights */
             m->weights[GGN_NET_M]->params[i] *= 1e-18f;
-        ggn_weights_pack_f32(m->weights[GGN_NET_M]);
+        ggn_weights_pack(m->weights[GGN_NET_M], NULL);
     }
     for (int pass = 0; pass < 2; pass++)
         assert_true(fabs(before[pass] - after[pass]) < 1e-6);
@@ -169,7 +172,7 @@ static void test_ssim_flat(void **state)
     const float *px[1] = {x}, *py[1] = {y};
     float *pd[1] = {dx};
     static const float level[4] = {0, 0.25f, 0.5f, 1};
-    struct ggn_ssim_f32 *s = ggn_ssim_create_f32(SIDE, SIDE, NULL, NULL);
+    struct ggn_ssim *s = ggn_ssim_create(SIDE, SIDE, NULL, NULL);
 
     assert_non_null(s);
     for (int i = 0; i < 4; i++)
@@ -178,14 +181,14 @@ static void test_ssim_flat(void **state)
                 x[k] = level[i];
                 y[k] = level[j];
             }
-            double mean = ggn_ssim_mean_f32(s, px, py, pd, 1, SIDE, 1);
+            double mean = ggn_ssim_mean(s, px, py, pd, 1, SIDE, 1);
             assert_true(mean <= 1 + 1e-6 && mean >= -1);
             if (i == j)
                 assert_true(fabs(mean - 1) < 1e-5);
             for (int k = 0; k < AREA; k++)
                 assert_true(isfinite(dx[k]));
         }
-    ggn_ssim_destroy_f32(s);
+    ggn_ssim_destroy(s);
     (void)state;
 }
 
@@ -196,28 +199,28 @@ static void test_zero_variance(void **state)
 
     for (int net = 0; net < GGN_NETS; net++) {
         assert_int_equal(ggn_network_build(&g, net, &hyper, NULL), 0);
-        struct ggn_weights_f32 *w = ggn_weights_create_f32(&g, NULL, 1, NULL);
-        struct ggn_exec_f32 *e = ggn_exec_create_f32(&g, NULL, 1, GGN_EXEC_GRADS | GGN_EXEC_INPUT_GRAD, NULL, NULL);
+        struct ggn_weights *w = ggn_weights_create(&g, NULL, 1, NULL);
+        struct ggn_exec *e = ggn_exec_create(&g, NULL, 1, GGN_EXEC_GRADS | GGN_EXEC_INPUT_GRAD, NULL, NULL);
         float *grad = calloc(g.n_params, sizeof *grad);
         const struct ggn_value *out = &g.value[g.n_values - 1];
         assert_true(w && e && grad);
-        ggn_weights_init_f32(w, GGN_INIT_HE, 3);
+        ggn_weights_init(w, GGN_INIT_HE, 3);
         memset(w->params, 0, g.tensor[0].count * sizeof(float)); /* the first layer is constant too */
-        ggn_weights_pack_f32(w);
-        ggn_exec_forward_f32(e, w, 1, GGN_TRAIN);
+        ggn_weights_pack(w, NULL);
+        ggn_exec_forward(e, w, 1, GGN_TRAIN);
         for (int c = 0; c < out->c; c++)
             for (int y = 0; y < out->h; y++)
                 for (int x = 0; x < out->w; x++) {
-                    assert_true(isfinite(ggn_exec_plane_f32(e, g.n_values - 1, 0, c)[y * out->row + x]));
-                    ggn_exec_grad_f32(e, g.n_values - 1, 0, c)[y * out->row + x] = 1;
+                    assert_true(isfinite(ggn_exec_plane(e, g.n_values - 1, 0, c)[y * out->row + x]));
+                    ggn_exec_grad(e, g.n_values - 1, 0, c)[y * out->row + x] = 1;
                 }
-        ggn_exec_backward_f32(e, w, grad);
+        ggn_exec_backward(e, w, grad);
         for (size_t i = 0; i < g.n_params; i++)
             assert_true(isfinite(grad[i]));
         for (size_t i = 0; i < g.n_stats; i++)
             assert_true(isfinite(w->mean[i]) && w->var[i] >= 0);
-        ggn_weights_destroy_f32(w);
-        ggn_exec_destroy_f32(e);
+        ggn_weights_destroy(w);
+        ggn_exec_destroy(e);
         free(grad);
     }
     (void)state;
@@ -242,7 +245,7 @@ static void fill_training(void)
     }
 }
 
-static struct ggn_trainer_f32 *trainer(double lr, double clip)
+static struct ggn_trainer *trainer(double lr, double clip)
 {
     struct ggn_train_options o = ggn_train_options_default(GGN_PRESET_LULL);
 
@@ -250,18 +253,18 @@ static struct ggn_trainer_f32 *trainer(double lr, double clip)
     o.clip = clip;
     for (int net = 0; net < GGN_NETS; net++)
         o.lr[net] = lr;
-    struct ggn_trainer_f32 *t = ggn_trainer_create_f32(&hyper, &o, NULL, NULL);
+    struct ggn_trainer *t = ggn_trainer_create(&hyper, &o, NULL, NULL);
     assert_non_null(t);
     return t;
 }
 
-static int all_finite(struct ggn_trainer_f32 *t)
+static int all_finite(struct ggn_trainer *t)
 {
     size_t count;
     float *x;
 
     for (int net = 0; net < GGN_NETS; net++)
-        for (int i = 0; (x = ggn_trainer_state_f32(t, net, i, &count)) != NULL; i++)
+        for (int i = 0; (x = ggn_trainer_state(t, net, i, &count)) != NULL; i++)
             for (size_t k = 0; k < count; k++)
                 if (!isfinite(x[k]))
                     return 0;
@@ -271,25 +274,25 @@ static int all_finite(struct ggn_trainer_f32 *t)
 static void test_equal_labels(void **state)
 {
     static const double label[2][BATCH] = {{0, 0}, {1, 1}};
-    struct ggn_trainer_f32 *t = trainer(2e-4, 1);
+    struct ggn_trainer *t = trainer(2e-4, 1);
     struct base_err err = {0};
     double bce;
 
     fill_training();
     for (int i = 0; i < 6; i++) {
-        struct ggn_batch_f32 b = {.count = BATCH, .noisy = p_noisy, .denoised = p_noisy, .label = label[i & 1]};
-        assert_int_equal(ggn_trainer_judge_step_f32(t, &b, &bce, NULL, &err), 0);
+        struct ggn_batch b = {.count = BATCH, .noisy = p_noisy, .denoised = p_noisy, .label = label[i & 1]};
+        assert_int_equal(ggn_trainer_judge_step(t, &b, &bce, NULL, &err), 0);
         assert_true(isfinite(bce));
     }
     assert_true(all_finite(t));
-    ggn_trainer_destroy_f32(t);
+    ggn_trainer_destroy(t);
     (void)state;
 }
 
 /* An absurd learning rate is noticed, named, and leaves the last good weights. */
 static void test_divergence(void **state)
 {
-    struct ggn_trainer_f32 *t = trainer(1e37, 0);
+    struct ggn_trainer *t = trainer(1e37, 0);
     struct base_err err = {0};
     int rc = 0, steps = 0;
     double loss;
@@ -299,7 +302,7 @@ static void test_divergence(void **state)
     fill_training();
     memcpy(good, t->weights[0]->params, t->graph[0].n_params * sizeof *good);
     while (!rc && steps++ < 50)
-        rc = ggn_trainer_denoiser_step_f32(t, p_image, p_reference, BATCH, &loss, &err);
+        rc = ggn_trainer_denoiser_step(t, p_image, p_reference, BATCH, &loss, &err);
     assert_int_equal(rc, GGN_EDIVERGED);
     assert_non_null(strstr(err.text, "denoiser"));
     assert_non_null(strstr(err.text, ".weight") ? strstr(err.text, ".weight") : strstr(err.text, ".bias"));
@@ -307,28 +310,28 @@ static void test_divergence(void **state)
     assert_memory_equal(good, t->weights[0]->params, t->graph[0].n_params * sizeof *good);
     assert_int_equal(t->steps, 0);
     t->options.lr[0] = 1e-4; /* and training can go on */
-    assert_int_equal(ggn_trainer_denoiser_step_f32(t, p_image, p_reference, BATCH, &loss, &err), 0);
+    assert_int_equal(ggn_trainer_denoiser_step(t, p_image, p_reference, BATCH, &loss, &err), 0);
     free(good);
-    ggn_trainer_destroy_f32(t);
+    ggn_trainer_destroy(t);
     (void)state;
 }
 
 /* A NaN in the data is divergence as well, not a NaN in the weights. */
 static void test_nan_data(void **state)
 {
-    struct ggn_trainer_f32 *t = trainer(2e-4, 1);
+    struct ggn_trainer *t = trainer(2e-4, 1);
     static const double label[BATCH] = {0, 1};
-    struct ggn_batch_f32 b = {.count = BATCH, .noisy = p_noisy, .denoised = p_noisy, .label = label};
+    struct ggn_batch b = {.count = BATCH, .noisy = p_noisy, .denoised = p_noisy, .label = label};
     struct base_err err = {0};
     double bce;
 
     fill_training();
     noisy[4][77] = NAN;
-    assert_int_equal(ggn_trainer_judge_step_f32(t, &b, &bce, NULL, &err), GGN_EDIVERGED);
+    assert_int_equal(ggn_trainer_judge_step(t, &b, &bce, NULL, &err), GGN_EDIVERGED);
     assert_true(all_finite(t));
     noisy[4][77] = 0.5f;
-    assert_int_equal(ggn_trainer_judge_step_f32(t, &b, &bce, NULL, &err), 0);
-    ggn_trainer_destroy_f32(t);
+    assert_int_equal(ggn_trainer_judge_step(t, &b, &bce, NULL, &err), 0);
+    ggn_trainer_destroy(t);
     (void)state;
 }
 
@@ -337,7 +340,7 @@ static void test_nan_data(void **state)
 static void test_many_adam_steps(void **state)
 {
     enum { STEPS = 100000 };
-    const struct ggn_kernels_f32 *k = ggn_kernels_best_f32();
+    const struct ggn_kernels *k = ggn_kernels_best();
     float param[16] = {0}, grad[16], m[16] = {0}, v[16] = {0};
     double sum = 0;
 

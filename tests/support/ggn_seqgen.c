@@ -12,7 +12,7 @@
 #include "data/labels.h"
 #include "data/manifest.h"
 #include "model/preprocess.h"
-#include "nn/weights.h"
+#include "nn/hash.h"
 
 enum { MAX_LEVELS = 64 };
 

@@ -34,7 +34,7 @@ static struct ggn_model *make(void)
 
     assert_non_null(m);
     for (int net = 0; net < GGN_NETS; net++)
-        ggn_weights_init_f32(m->weights[net], GGN_INIT_HASH, 5);
+        ggn_weights_init(m->weights[net], GGN_INIT_HASH, 5);
     m->calibration = (struct ggn_calibration){1.5, -0.25, 0.3, 3, 1.25};
     assert_non_null(cJSON_AddStringToObject(m->provenance, "data", "0123abcd"));
     return m;

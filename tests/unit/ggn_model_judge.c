@@ -9,6 +9,7 @@
 #include "model/judge.h"
 #include "model/preprocess.h"
 #include "nn/exec.h"
+#include "nn/hash.h"
 
 static const struct ggn_hyper hyper = {GGN_PRESET_LULL, 24, 33, 3, 4, 6, 3};
 enum { AREA = 24 * 33, BYTES = 3 * AREA };
@@ -19,8 +20,8 @@ static struct ggn_model *make(void)
 
     assert_non_null(m);
     for (int net = 0; net < GGN_NETS; net++) {
-        ggn_weights_init_f32(m->weights[net], GGN_INIT_HASH, 50 + (uint32_t)net);
-        ggn_weights_pack_f32(m->weights[net]);
+        ggn_weights_init(m->weights[net], GGN_INIT_HASH, 50 + (uint32_t)net);
+        ggn_weights_pack(m->weights[net], NULL);
     }
     return m;
 }
@@ -69,9 +70,9 @@ static void test_against_networks(void **state)
 {
     struct ggn_model *m = make();
     struct ggn_judge *j = ggn_judge_create(m, GGN_PRECISION_F32, NULL, NULL);
-    struct ggn_exec_f32 *den = ggn_exec_create_f32(&m->graph[GGN_NET_R], NULL, 1, GGN_EXEC_NO_FUSE, NULL, NULL);
-    struct ggn_exec_f32 *gen = ggn_exec_create_f32(&m->graph[GGN_NET_M], NULL, 2, GGN_EXEC_NO_FUSE, NULL, NULL);
-    struct ggn_exec_f32 *dis = ggn_exec_create_f32(&m->graph[GGN_NET_D], NULL, 1, GGN_EXEC_NO_FUSE, NULL, NULL);
+    struct ggn_exec *den = ggn_exec_create(&m->graph[GGN_NET_R], NULL, 1, GGN_EXEC_NO_FUSE, NULL, NULL);
+    struct ggn_exec *gen = ggn_exec_create(&m->graph[GGN_NET_M], NULL, 2, GGN_EXEC_NO_FUSE, NULL, NULL);
+    struct ggn_exec *dis = ggn_exec_create(&m->graph[GGN_NET_D], NULL, 1, GGN_EXEC_NO_FUSE, NULL, NULL);
     uint8_t *rgb = malloc(BYTES);
     const int denoised = m->graph[GGN_NET_R].n_values - 1, out = m->graph[GGN_NET_M].n_values - 1;
 
@@ -80,26 +81,26 @@ static void test_against_networks(void **state)
     for (int i = 0; i < 3; i++) {
         image(rgb, 1 + (uint32_t)i);
         for (int k = 0; k < BYTES; k++)
-            ggn_exec_plane_f32(den, 0, 0, k / AREA)[k % AREA / 33 * 34 + k % AREA % 33] = (float)rgb[k] / 255;
-        ggn_exec_forward_f32(den, m->weights[GGN_NET_R], 1, GGN_EVAL);
+            ggn_exec_plane(den, 0, 0, k / AREA)[k % AREA / 33 * 34 + k % AREA % 33] = (float)rgb[k] / 255;
+        ggn_exec_forward(den, m->weights[GGN_NET_R], 1, GGN_EVAL);
         for (int k = 0; k < BYTES; k++) {
             int c = 3 * i + k / AREA, at = k % AREA / 33 * 34 + k % AREA % 33;
-            ggn_exec_plane_f32(gen, 0, 0, c)[at] = ggn_exec_plane_f32(den, denoised, 0, k / AREA)[at];
-            ggn_exec_plane_f32(gen, 0, 1, c)[at] = (float)rgb[k] / 255;
+            ggn_exec_plane(gen, 0, 0, c)[at] = ggn_exec_plane(den, denoised, 0, k / AREA)[at];
+            ggn_exec_plane(gen, 0, 1, c)[at] = (float)rgb[k] / 255;
         }
     }
-    ggn_exec_forward_f32(gen, m->weights[GGN_NET_M], 2, GGN_EVAL);
+    ggn_exec_forward(gen, m->weights[GGN_NET_M], 2, GGN_EVAL);
     for (int c = 0; c < 2; c++)
         for (int y = 0; y < 24; y++)
-            memcpy(ggn_exec_plane_f32(dis, 0, 0, c) + y * 34, ggn_exec_plane_f32(gen, out, c, 0) + y * 34,
+            memcpy(ggn_exec_plane(dis, 0, 0, c) + y * 34, ggn_exec_plane(gen, out, c, 0) + y * 34,
                    33 * sizeof(float));
-    ggn_exec_forward_f32(dis, m->weights[GGN_NET_D], 1, GGN_EVAL);
-    double want = (double)*ggn_exec_plane_f32(dis, m->graph[GGN_NET_D].n_values - 1, 0, 0);
+    ggn_exec_forward(dis, m->weights[GGN_NET_D], 1, GGN_EVAL);
+    double want = (double)*ggn_exec_plane(dis, m->graph[GGN_NET_D].n_values - 1, 0, 0);
     if (!(fabs(got - want) < 1e-4 * fmax(1, fabs(want))))
         fail_msg("judge %.9g, networks %.9g", got, want);
-    ggn_exec_destroy_f32(den);
-    ggn_exec_destroy_f32(gen);
-    ggn_exec_destroy_f32(dis);
+    ggn_exec_destroy(den);
+    ggn_exec_destroy(gen);
+    ggn_exec_destroy(dis);
     ggn_judge_destroy(j);
     ggn_model_destroy(m);
     free(rgb);

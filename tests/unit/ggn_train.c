@@ -18,6 +18,7 @@
 #include "train/calibrate.h"
 #include "train/start.h"
 #include "data/windows.h"
+#include "nn/hash.h"
 
 static char dir[64];
 
@@ -61,16 +62,16 @@ static void synthetic_noise_has_the_variance_of_rendered_noise(void **state)
     assert_int_equal(set.n, 21);
     size_t values = ggn_chains_values(&set);
     for (int i = 12; i < set.n; i++) {
-        const struct ggn_chain *c = &set.chains[i], *real = NULL;
+        const struct ggn_chain *c = &set.chains[i], *measured = NULL;
         for (int k = 0; k < 12; k++)
             if (set.chains[k].view == c->view && set.chains[k].block == c->block)
-                real = &set.chains[k];
-        assert_non_null(real);
-        assert_true(c->synthetic && c->label.threshold == real->label.threshold);
+                measured = &set.chains[k];
+        assert_non_null(measured);
+        assert_true(c->synthetic && c->label.threshold == measured->label.threshold);
         double e[2] = {0, 0};
         for (size_t v = 0; v < values; v++) {
-            double r = real->noisy[4 * values + v] - c->reference[v], s = c->noisy[4 * values + v] - c->reference[v];
-            e[0] += r * r * real->spp[4];
+            double r = measured->noisy[4 * values + v] - c->reference[v], s = c->noisy[4 * values + v] - c->reference[v];
+            e[0] += r * r * measured->spp[4];
             e[1] += s * s * c->spp[4];
         }
         ratio_sum += e[1] / e[0];
@@ -194,31 +195,31 @@ static void folding_keeps_the_function(void **state)
     float out[2][32 * 32], before[1];
 
     assert_int_equal(ggn_network_build(g, GGN_NET_M, &hyper, &err), 0);
-    struct ggn_weights_f32 *w = ggn_weights_create_f32(g, NULL, 0, &err);
-    struct ggn_exec_f32 *e = ggn_exec_create_f32(g, NULL, 1, 0, NULL, &err);
-    ggn_weights_init_f32(w, GGN_INIT_HE, 5);
+    struct ggn_weights *w = ggn_weights_create(g, NULL, 0, &err);
+    struct ggn_exec *e = ggn_exec_create(g, NULL, 1, 0, NULL, &err);
+    ggn_weights_init(w, GGN_INIT_HE, 5);
     before[0] = w->params[10];
     for (int fold = 0; fold < 2; fold++) {
         if (fold)
             ggn_train_fold(g, w->params, 3, 8);
-        ggn_weights_pack_f32(w);
+        ggn_weights_pack(w, NULL);
         for (int k = 0; k < 9; k++)
             for (int y = 0; y < 32; y++)
                 for (int x = 0; x < 32; x++) {
                     double v = ggn_hash_unit((uint32_t)(y * 32 + x), (uint32_t)k);
                     double newest = ggn_hash_unit((uint32_t)(y * 32 + x), (uint32_t)(6 + k % 3));
-                    ggn_exec_plane_f32(e, 0, 0, k)[y * g->value[0].row + x] = (float)(fold || k > 5 ? v : 8 * (v - newest));
+                    ggn_exec_plane(e, 0, 0, k)[y * g->value[0].row + x] = (float)(fold || k > 5 ? v : 8 * (v - newest));
                 }
-        ggn_exec_forward_f32(e, w, 1, GGN_EVAL);
+        ggn_exec_forward(e, w, 1, GGN_EVAL);
         for (int y = 0; y < 32; y++)
-            memcpy(out[fold] + 32 * y, ggn_exec_plane_f32(e, g->n_values - 1, 0, 0) + y * g->value[g->n_values - 1].row, 32 * sizeof(float));
+            memcpy(out[fold] + 32 * y, ggn_exec_plane(e, g->n_values - 1, 0, 0) + y * g->value[g->n_values - 1].row, 32 * sizeof(float));
     }
     for (int i = 0; i < 32 * 32; i++)
         assert_float_equal(out[0][i], out[1][i], 1e-4);
     ggn_train_unfold(g, w->params, 3, 8);
     assert_float_equal(w->params[10], before[0], 1e-5);
-    ggn_exec_destroy_f32(e);
-    ggn_weights_destroy_f32(w);
+    ggn_exec_destroy(e);
+    ggn_weights_destroy(w);
     free(g);
     (void)state;
 }
@@ -232,28 +233,28 @@ static void the_denoiser_begins_near_its_input(void **state)
     double error = 0;
 
     assert_int_equal(ggn_network_build(g, GGN_NET_R, &hyper, &err), 0);
-    struct ggn_weights_f32 *w = ggn_weights_create_f32(g, NULL, 0, &err);
-    struct ggn_exec_f32 *e = ggn_exec_create_f32(g, NULL, 1, 0, NULL, &err);
-    ggn_weights_init_f32(w, GGN_INIT_HE, 5);
+    struct ggn_weights *w = ggn_weights_create(g, NULL, 0, &err);
+    struct ggn_exec *e = ggn_exec_create(g, NULL, 1, 0, NULL, &err);
+    ggn_weights_init(w, GGN_INIT_HE, 5);
     ggn_train_identity(g, w->params);
-    ggn_weights_pack_f32(w);
+    ggn_weights_pack(w, NULL);
     for (int pass = 0; pass < 2; pass++) {
         for (int k = 0; k < 3; k++)
             for (int y = 0; y < 32; y++)
                 for (int x = 0; x < 32; x++) {
                     double v = ggn_hash_unit((uint32_t)(y * 32 + x), (uint32_t)k);
                     if (!pass)
-                        ggn_exec_plane_f32(e, 0, 0, k)[y * g->value[0].row + x] = (float)v;
+                        ggn_exec_plane(e, 0, 0, k)[y * g->value[0].row + x] = (float)v;
                     else
-                        error += fabs((double)ggn_exec_plane_f32(e, g->n_values - 1, 0, k)[y * g->value[g->n_values - 1].row + x] -
+                        error += fabs((double)ggn_exec_plane(e, g->n_values - 1, 0, k)[y * g->value[g->n_values - 1].row + x] -
                                       1 / (1 + exp(2 - 4 * v))) / (3 * 32 * 32);
                 }
         if (!pass)
-            ggn_exec_forward_f32(e, w, 1, GGN_EVAL);
+            ggn_exec_forward(e, w, 1, GGN_EVAL);
     }
     assert_true(error < 0.06);
-    ggn_exec_destroy_f32(e);
-    ggn_weights_destroy_f32(w);
+    ggn_exec_destroy(e);
+    ggn_weights_destroy(w);
     free(g);
     (void)state;
 }

@@ -10,7 +10,7 @@
 
 #include "model/policy.h"
 #include "model/window.h"
-#include "nn/weights.h"
+#include "nn/hash.h"
 
 /* Nested images with noise σ/√n: the statistic of any pair estimates what is left in the later one. */
 static void noise_is_that_of_the_newest_image(void **state)

@@ -1,16 +1,53 @@
 /*
- * The kernels, for one precision and one instruction set. The includer defines REAL, TYPED, VW (lanes), vf (vector type),
- * SET1, FMA, KEEP, VSUM (sum of the lanes), TILE_OC (8 or 4), ISA, TABLE (name of the table), and REAL_IS_FLOAT. KEEP(v)
- * makes the compiler hold v in a register: left alone it folds a load that feeds three multiply-adds into each of them, and
- * loads become the bottleneck.
+ * The kernels, once per precision and instruction set. Without anything defined they are those of any processor; a file for
+ * an instruction set defines ISA, TABLE (the name of its table), VECTOR_BYTES, TILE_OC (8 or 4 output channels in a register
+ * tile), SET1, FMA, VSUM (sum of the lanes), KEEP and, where there are any, FASTER_FORMS. KEEP(v) makes the compiler hold v
+ * in a register: left alone it folds a load that feeds three multiply-adds into each of them, and loads become the
+ * bottleneck.
  */
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
 
-#define TILE_V 3 /* vectors of pixels in a register tile: 8·3 or 4·3 accumulators */
+#include "nn/graph.h"
+#include "nn/kernels.h"
 
-typedef vf vfu __attribute__((aligned(sizeof(REAL)), may_alias));
+#ifndef VECTOR_BYTES
+#define ISA GGN_ISA_BASE
+#define VECTOR_BYTES 16
+#define TILE_OC 4
+#define FMA(a, b, c) ((a) * (b) + (c))
+#define KEEP(v) ((void)(v))
+#ifdef GGN_DOUBLE
+#define SET1(s) ((vf){(s), (s)})
+#define VSUM(v) ((v)[0] + (v)[1])
+#else
+#define SET1(s) ((vf){(s), (s), (s), (s)})
+#define VSUM(v) (((v)[0] + (v)[2]) + ((v)[1] + (v)[3]))
+#endif
+#endif
+#ifndef TABLE
+#define TABLE ggn_kernels_base
+#endif
+#ifndef FASTER_FORMS
+#define FASTER_FORMS
+#endif
+
+#ifdef GGN_DOUBLE
+typedef int64_t lane_mask;
+#define SQRT sqrt
+#else
+typedef int32_t lane_mask;
+#define SQRT sqrtf
+#endif
+typedef real vf __attribute__((vector_size(VECTOR_BYTES)));
+typedef lane_mask vi __attribute__((vector_size(VECTOR_BYTES)));
+typedef vf vfu __attribute__((aligned(sizeof(real)), may_alias));
+
+enum {
+    VW = VECTOR_BYTES / (int)sizeof(real), /* lanes */
+    TILE_V = 3                             /* vectors of pixels in a register tile: 8·3 or 4·3 accumulators */
+};
 
 #define LOAD(p) ((vf) * (const vfu *)(p))
 #define STORE(p, v) (*(vfu *)(p) = (vfu)(v))
@@ -22,7 +59,7 @@ INLINE vf vmax(vf a, vf b)
     return (vf)(((vi)a & m) | ((vi)b & ~m));
 }
 
-INLINE REAL vsum(vf a)
+INLINE real vsum(vf a)
 {
     return VSUM(a);
 }
@@ -31,8 +68,8 @@ INLINE REAL vsum(vf a)
 
 /* Register tile: `ot` channels × `nv` vectors of pixels; input channels [i0, i1). A weight is broadcast, a vector of pixels
  * is loaded at each tap's offset. */
-INLINE void conv_tile(const struct TYPED(ggn_conv) * a, const REAL *w, int oc, int i0, int i1, long p, const int ot,
-                      const int nv, const int taps)
+INLINE void conv_tile(const struct ggn_conv *a, const real *w, int oc, int i0, int i1, long p, const int ot, const int nv,
+                      const int taps)
 {
     vf acc[8][TILE_V];
 
@@ -43,7 +80,7 @@ INLINE void conv_tile(const struct TYPED(ggn_conv) * a, const REAL *w, int oc, i
     }
     const int side = taps == 9 ? 3 : 1;
     for (int i = i0; i < i1; i++) {
-        const REAL *row = a->x[i] + p - (taps == 9 ? a->row + 1 : 0);
+        const real *row = a->x[i] + p - (taps == 9 ? a->row + 1 : 0);
         for (int ky = 0; ky < side; ky++, row += a->row)
             for (int kx = 0; kx < side; kx++, w += ot) {
                 vf x[TILE_V];
@@ -70,8 +107,7 @@ INLINE void conv_tile(const struct TYPED(ggn_conv) * a, const REAL *w, int oc, i
 }
 
 #define CONV_TILE(OT, NV, TAPS)                                                                                             \
-    static void conv_tile_##OT##_##NV##_##TAPS(const struct TYPED(ggn_conv) * a, const REAL *w, int oc, int i0, int i1,     \
-                                               long p)                                                                      \
+    static void conv_tile_##OT##_##NV##_##TAPS(const struct ggn_conv *a, const real *w, int oc, int i0, int i1, long p)     \
     {                                                                                                                       \
         conv_tile(a, w, oc, i0, i1, p, OT, NV, TAPS);                                                                       \
     }
@@ -83,7 +119,7 @@ CONV_TILES(4)
 CONV_TILES(8)
 #endif
 
-typedef void conv_tile_fn(const struct TYPED(ggn_conv) * a, const REAL *w, int oc, int i0, int i1, long p);
+typedef void conv_tile_fn(const struct ggn_conv *a, const real *w, int oc, int i0, int i1, long p);
 
 /* The largest tile of 8, 4, 2, 1 channels that fits n; as a base-2 logarithm. */
 INLINE int tile_log(int n)
@@ -92,7 +128,7 @@ INLINE int tile_log(int n)
 }
 
 /* Writes the zeros that the layout asks for after the tile [p, p + n) has been computed as if the plane had no row ends. */
-static void restore_padding(const struct TYPED(ggn_conv) * a, int oc0, int oc1, long p, long n)
+static void restore_padding(const struct ggn_conv *a, int oc0, int oc1, long p, long n)
 {
     long end = (long)a->h * a->row;
     long first = p + (a->w_px - p % a->row);
@@ -105,7 +141,7 @@ static void restore_padding(const struct TYPED(ggn_conv) * a, int oc0, int oc1, 
     }
 }
 
-static void conv(const struct TYPED(ggn_conv) * a, long p0, long p1, int oc0, int oc1)
+static void conv(const struct ggn_conv *a, long p0, long p1, int oc0, int oc1)
 {
     static conv_tile_fn *const tiles[2][2][4] = {
 #if TILE_OC == 8
@@ -132,7 +168,7 @@ static void conv(const struct TYPED(ggn_conv) * a, long p0, long p1, int oc0, in
             n = (wide ? TILE_V : 1) * VW;
             for (int oc = oc0, lg; oc < oc1; oc += 1 << lg) {
                 lg = tile_log(oc1 - oc);
-                const REAL *w = a->w + ((long)oc * a->n_in + ((long)i0 << lg)) * a->taps;
+                const real *w = a->w + ((long)oc * a->n_in + ((long)i0 << lg)) * a->taps;
                 tiles[a->taps != 9][!wide][lg](a, w, oc, i0, i1, p);
             }
             if (i1 == a->n_in)
@@ -142,7 +178,7 @@ static void conv(const struct TYPED(ggn_conv) * a, long p0, long p1, int oc0, in
 }
 
 /* dW[o][i][t] = Σ_p dY[o][p] · X[i][p + t], in lanes; one row of three taps (or the one tap) at a time. */
-INLINE void grad_tile(REAL *acc, const REAL *x, const REAL *const *dy, long p0, long p1, const int ot, const int nt)
+INLINE void grad_tile(real *acc, const real *x, const real *const *dy, long p0, long p1, const int ot, const int nt)
 {
     vf sum[3][8];
 
@@ -166,7 +202,7 @@ INLINE void grad_tile(REAL *acc, const REAL *x, const REAL *const *dy, long p0, 
 }
 
 #define GRAD_TILE(OT, NT)                                                                                                   \
-    static void grad_tile_##OT##_##NT(REAL *acc, const REAL *x, const REAL *const *dy, long p0, long p1)                    \
+    static void grad_tile_##OT##_##NT(real *acc, const real *x, const real *const *dy, long p0, long p1)                    \
     {                                                                                                                       \
         grad_tile(acc, x, dy, p0, p1, OT, NT);                                                                              \
     }
@@ -181,10 +217,10 @@ GRAD_TILE(8, 3)
 GRAD_TILE(8, 1)
 #endif
 
-static void conv_grad(REAL *acc, const REAL *const *x, int n_in, const REAL *const *dy, int ot, int taps, int row, long p0,
+static void conv_grad(real *acc, const real *const *x, int n_in, const real *const *dy, int ot, int taps, int row, long p0,
                       long p1)
 {
-    typedef void grad_tile_fn(REAL *, const REAL *, const REAL *const *, long, long);
+    typedef void grad_tile_fn(real *, const real *, const real *const *, long, long);
     static grad_tile_fn *const tiles[2][4] = {
 #if TILE_OC == 8
         {grad_tile_1_3, grad_tile_2_3, grad_tile_4_3, grad_tile_8_3},
@@ -201,7 +237,7 @@ static void conv_grad(REAL *acc, const REAL *const *x, int n_in, const REAL *con
             fn(acc, x[i] + (taps == 9 ? (ky - 1) * row - 1 : 0), dy, p0, p1);
 }
 
-static void lane_sums(REAL *out, const REAL *acc, int n)
+static void lane_sums(real *out, const real *acc, int n)
 {
     for (int k = 0; k < n; k++)
         out[k] = vsum(LOAD(acc + (long)k * VW));
@@ -209,7 +245,7 @@ static void lane_sums(REAL *out, const REAL *acc, int n)
 
 /* --- per plane --------------------------------------------------------------------------------------------------------- */
 
-static double sum(const REAL *x, int h, int w, int row)
+static double sum(const real *x, int h, int w, int row)
 {
     double total = 0;
 
@@ -218,7 +254,7 @@ static double sum(const REAL *x, int h, int w, int row)
         int i = 0;
         for (; i + VW <= w; i += VW)
             s += LOAD(x + i);
-        REAL tail = 0;
+        real tail = 0;
         for (; i < w; i++)
             tail += x[i];
         total += (double)(vsum(s) + tail);
@@ -226,9 +262,9 @@ static double sum(const REAL *x, int h, int w, int row)
     return total;
 }
 
-static double sum_sq(const REAL *x, double mean, int h, int w, int row)
+static double sum_sq(const real *x, double mean, int h, int w, int row)
 {
-    const REAL m = (REAL)mean;
+    const real m = (real)mean;
     double total = 0;
 
     for (int y = 0; y < h; y++, x += row) {
@@ -238,7 +274,7 @@ static double sum_sq(const REAL *x, double mean, int h, int w, int row)
             vf d = LOAD(x + i) - SET1(m);
             s = FMA(d, d, s);
         }
-        REAL tail = 0;
+        real tail = 0;
         for (; i < w; i++)
             tail += (x[i] - m) * (x[i] - m);
         total += (double)(vsum(s) + tail);
@@ -246,14 +282,14 @@ static double sum_sq(const REAL *x, double mean, int h, int w, int row)
     return total;
 }
 
-static void affine(REAL *restrict y, const REAL *restrict x, REAL scale, REAL shift, int h, int w, int row)
+static void affine(real *restrict y, const real *restrict x, real scale, real shift, int h, int w, int row)
 {
     for (int r = 0; r < h; r++, x += row, y += row)
         for (int i = 0; i < w; i++)
             y[i] = x[i] * scale + shift;
 }
 
-static void bn_sums(double out[2], const REAL *dy, const REAL *x, REAL mean, int h, int w, int row)
+static void bn_sums(double out[2], const real *dy, const real *x, real mean, int h, int w, int row)
 {
     double total[2] = {0, 0};
 
@@ -265,7 +301,7 @@ static void bn_sums(double out[2], const REAL *dy, const REAL *x, REAL mean, int
             s0 += d;
             s1 = FMA(d, LOAD(x + i) - SET1(mean), s1);
         }
-        REAL t0 = 0, t1 = 0;
+        real t0 = 0, t1 = 0;
         for (; i < w; i++) {
             t0 += dy[i];
             t1 += dy[i] * (x[i] - mean);
@@ -277,7 +313,7 @@ static void bn_sums(double out[2], const REAL *dy, const REAL *x, REAL mean, int
     out[1] = total[1];
 }
 
-static void bn_grad(REAL *restrict dx, const REAL *restrict dy, const REAL *restrict x, REAL a, REAL b, REAL c, int add,
+static void bn_grad(real *restrict dx, const real *restrict dy, const real *restrict x, real a, real b, real c, int add,
                     int h, int w, int row)
 {
     for (int r = 0; r < h; r++, x += row, dx += row, dy += row) {
@@ -290,14 +326,14 @@ static void bn_grad(REAL *restrict dx, const REAL *restrict dy, const REAL *rest
     }
 }
 
-static void lrelu(REAL *restrict y, const REAL *restrict x, REAL slope, int h, int w, int row)
+static void lrelu(real *restrict y, const real *restrict x, real slope, int h, int w, int row)
 {
     for (int r = 0; r < h; r++, x += row, y += row)
         for (int i = 0; i < w; i++)
             y[i] = x[i] > 0 ? x[i] : slope * x[i];
 }
 
-static void lrelu_grad(REAL *restrict dx, const REAL *restrict dy, const REAL *restrict y, REAL slope, int add, int h, int w,
+static void lrelu_grad(real *restrict dx, const real *restrict dy, const real *restrict y, real slope, int add, int h, int w,
                        int row)
 {
     for (int r = 0; r < h; r++, y += row, dx += row, dy += row)
@@ -305,7 +341,7 @@ static void lrelu_grad(REAL *restrict dx, const REAL *restrict dy, const REAL *r
             dx[i] = (add ? dx[i] : 0) + (y[i] > 0 ? dy[i] : slope * dy[i]);
 }
 
-static double act_grad(REAL *dy, const REAL *y, REAL slope, int h, int w, int row)
+static double act_grad(real *dy, const real *y, real slope, int h, int w, int row)
 {
     double total = 0;
 
@@ -319,7 +355,7 @@ static double act_grad(REAL *dy, const REAL *y, REAL slope, int h, int w, int ro
             s += d;
             STORE(dy + i, d);
         }
-        REAL tail = 0;
+        real tail = 0;
         for (; i < w; i++) {
             dy[i] = y[i] > 0 ? dy[i] : slope * dy[i];
             tail += dy[i];
@@ -329,7 +365,7 @@ static double act_grad(REAL *dy, const REAL *y, REAL slope, int h, int w, int ro
     return total;
 }
 
-#if REAL_IS_FLOAT
+#ifndef GGN_DOUBLE
 /* e^x for |x| ≤ 87: 2^n · p(r), x = n ln 2 + r, p of degree 6 (Taylor on |r| ≤ ln 2 / 2: relative error below 2e-7). */
 INLINE float exp_real(float x)
 {
@@ -360,50 +396,50 @@ INLINE double exp_real(double x)
 }
 #endif
 
-static void sigmoid(REAL *restrict y, const REAL *restrict x, int h, int w, int row)
+static void sigmoid(real *restrict y, const real *restrict x, int h, int w, int row)
 {
     for (int r = 0; r < h; r++, x += row, y += row)
         for (int i = 0; i < w; i++)
             y[i] = 1 / (1 + exp_real(-x[i]));
 }
 
-static void sigmoid_grad(REAL *restrict dx, const REAL *restrict dy, const REAL *restrict y, int add, int h, int w, int row)
+static void sigmoid_grad(real *restrict dx, const real *restrict dy, const real *restrict y, int add, int h, int w, int row)
 {
     for (int r = 0; r < h; r++, y += row, dx += row, dy += row)
         for (int i = 0; i < w; i++)
             dx[i] = (add ? dx[i] : 0) + dy[i] * y[i] * (1 - y[i]);
 }
 
-static void maxpool2(REAL *restrict y, const REAL *restrict x, int h, int w, int row_y, int row_x)
+static void maxpool2(real *restrict y, const real *restrict x, int h, int w, int row_y, int row_x)
 {
     for (int r = 0; r < h; r++, y += row_y, x += 2 * row_x) {
-        const REAL *restrict b = x + row_x;
+        const real *restrict b = x + row_x;
         for (int i = 0; i < w; i++) {
-            REAL top = x[2 * i] > x[2 * i + 1] ? x[2 * i] : x[2 * i + 1];
-            REAL low = b[2 * i] > b[2 * i + 1] ? b[2 * i] : b[2 * i + 1];
+            real top = x[2 * i] > x[2 * i + 1] ? x[2 * i] : x[2 * i + 1];
+            real low = b[2 * i] > b[2 * i + 1] ? b[2 * i] : b[2 * i + 1];
             y[i] = top > low ? top : low;
         }
     }
 }
 
-static void maxpool2_grad(REAL *restrict dx, const REAL *restrict dy, const REAL *restrict x, const REAL *restrict y,
+static void maxpool2_grad(real *restrict dx, const real *restrict dy, const real *restrict x, const real *restrict y,
                           int add, int hx, int wx, int row_y, int row_x)
 {
     if (!add)
         for (int r = 0; r < hx; r++)
             memset(dx + (long)r * row_x, 0, (size_t)wx * sizeof *dx);
     for (int r = 0; r < hx / 2; r++) {
-        const REAL *restrict x0 = x + 2L * r * row_x, *restrict x1 = x0 + row_x;
-        REAL *restrict d0 = dx + 2L * r * row_x, *restrict d1 = d0 + row_x;
+        const real *restrict x0 = x + 2L * r * row_x, *restrict x1 = x0 + row_x;
+        real *restrict d0 = dx + 2L * r * row_x, *restrict d1 = d0 + row_x;
         for (int i = 0; i < wx / 2; i++) {
-            REAL top = y[i], d = dy[i];
-            REAL a = x0[2 * i] == top ? d : 0;
-            REAL left = x0[2 * i] == top ? 0 : d;
-            REAL b = x0[2 * i + 1] == top ? left : 0;
+            real top = y[i], d = dy[i];
+            real a = x0[2 * i] == top ? d : 0;
+            real left = x0[2 * i] == top ? 0 : d;
+            real b = x0[2 * i + 1] == top ? left : 0;
             left = x0[2 * i + 1] == top ? 0 : left;
-            REAL c = x1[2 * i] == top ? left : 0;
+            real c = x1[2 * i] == top ? left : 0;
             left = x1[2 * i] == top ? 0 : left;
-            REAL e = x1[2 * i + 1] == top ? left : 0;
+            real e = x1[2 * i + 1] == top ? left : 0;
             d0[2 * i] += a;
             d0[2 * i + 1] += b;
             d1[2 * i] += c;
@@ -415,13 +451,13 @@ static void maxpool2_grad(REAL *restrict dx, const REAL *restrict dy, const REAL
 }
 
 /* Output 2i = ¼ x[i−1] + ¾ x[i], output 2i+1 = ¾ x[i] + ¼ x[i+1], indices clamped, in y and in x. */
-INLINE void up_row(REAL *restrict y, const REAL *restrict near, const REAL *restrict far, int w)
+INLINE void up_row(real *restrict y, const real *restrict near, const real *restrict far, int w)
 {
-    const REAL q = (REAL)0.25, t = (REAL)0.75;
-    REAL first = t * near[0] + q * far[0], last = t * near[w - 1] + q * far[w - 1];
+    const real q = (real)0.25, t = (real)0.75;
+    real first = t * near[0] + q * far[0], last = t * near[w - 1] + q * far[w - 1];
 
     for (int i = 0; i + 1 < w; i++) {
-        REAL a = t * near[i] + q * far[i], b = t * near[i + 1] + q * far[i + 1];
+        real a = t * near[i] + q * far[i], b = t * near[i + 1] + q * far[i + 1];
         y[2 * i + 1] = t * a + q * b;
         y[2 * i + 2] = q * a + t * b;
     }
@@ -429,34 +465,34 @@ INLINE void up_row(REAL *restrict y, const REAL *restrict near, const REAL *rest
     y[2 * w - 1] = last;
 }
 
-static void up(REAL *restrict y, const REAL *restrict x, int h, int w, int row_y, int row_x)
+static void up(real *restrict y, const real *restrict x, int h, int w, int row_y, int row_x)
 {
     for (int r = 0; r < h; r++) {
-        const REAL *mid = x + (long)r * row_x;
+        const real *mid = x + (long)r * row_x;
         up_row(y + 2L * r * row_y, mid, r > 0 ? mid - row_x : mid, w);
         up_row(y + (2L * r + 1) * row_y, mid, r + 1 < h ? mid + row_x : mid, w);
     }
 }
 
 /* Column i of x gathers from y: ¾ (y[2i] + y[2i+1]) + ¼ (y[2i−1] + y[2i+2]), the clamped ends keep their own share. */
-INLINE REAL up_gather(const REAL *v, int i, int w)
+INLINE real up_gather(const real *v, int i, int w)
 {
-    REAL s = (REAL)0.75 * (v[2 * i] + v[2 * i + 1]);
-    s += (REAL)0.25 * (i > 0 ? v[2 * i - 1] : v[0]);
-    return s + (REAL)0.25 * (i + 1 < w ? v[2 * i + 2] : v[2 * w - 1]);
+    real s = (real)0.75 * (v[2 * i] + v[2 * i + 1]);
+    s += (real)0.25 * (i > 0 ? v[2 * i - 1] : v[0]);
+    return s + (real)0.25 * (i + 1 < w ? v[2 * i + 2] : v[2 * w - 1]);
 }
 
-static void up_grad(REAL *restrict dx, const REAL *restrict dy, int add, int h, int w, int row_y, int row_x)
+static void up_grad(real *restrict dx, const real *restrict dy, int add, int h, int w, int row_y, int row_x)
 {
-    const REAL q = (REAL)0.25, t = (REAL)0.75;
-    REAL column[2 * GGN_MAX_SIDE];
+    const real q = (real)0.25, t = (real)0.75;
+    real column[2 * GGN_MAX_SIDE];
 
     for (int r = 0; r < h; r++, dx += row_x) {
-        const REAL *restrict b = dy + 2L * r * row_y, *restrict c = b + row_y;
-        const REAL *restrict a = r > 0 ? b - row_y : b, *restrict d = r + 1 < h ? c + row_y : c;
+        const real *restrict b = dy + 2L * r * row_y, *restrict c = b + row_y;
+        const real *restrict a = r > 0 ? b - row_y : b, *restrict d = r + 1 < h ? c + row_y : c;
         for (int i = 0; i < 2 * w; i++)
             column[i] = t * (b[i] + c[i]) + q * (a[i] + d[i]);
-        REAL first = up_gather(column, 0, w), last = up_gather(column, w - 1, w);
+        real first = up_gather(column, 0, w), last = up_gather(column, w - 1, w);
         dx[0] = (add ? dx[0] : 0) + first;
         for (int i = 1; i + 1 < w; i++)
             dx[i] =
@@ -468,7 +504,7 @@ static void up_grad(REAL *restrict dx, const REAL *restrict dy, int add, int h, 
 
 /* --- vectors ----------------------------------------------------------------------------------------------------------- */
 
-static REAL dot(const REAL *a, const REAL *b, long n)
+static real dot(const real *a, const real *b, long n)
 {
     vf s0 = SET1(0), s1 = SET1(0);
     long i = 0;
@@ -477,25 +513,25 @@ static REAL dot(const REAL *a, const REAL *b, long n)
         s0 = FMA(LOAD(a + i), LOAD(b + i), s0);
         s1 = FMA(LOAD(a + i + VW), LOAD(b + i + VW), s1);
     }
-    REAL tail = 0;
+    real tail = 0;
     for (; i < n; i++)
         tail += a[i] * b[i];
     return vsum(s0 + s1) + tail;
 }
 
-static void axpy(REAL *restrict y, REAL a, const REAL *restrict x, long n)
+static void axpy(real *restrict y, real a, const real *restrict x, long n)
 {
     for (long i = 0; i < n; i++)
         y[i] += a * x[i];
 }
 
-static void blur(REAL *dst, const REAL *x, REAL *tmp, const REAL taps[2 * GGN_SSIM_RADIUS + 1], int h, int w, int row)
+static void blur(real *dst, const real *x, real *tmp, const real taps[2 * GGN_SSIM_RADIUS + 1], int h, int w, int row)
 {
     const int n = 2 * GGN_SSIM_RADIUS + 1;
 
     for (int r = 0; r < h; r++)
         for (int i = -GGN_SSIM_RADIUS; i < w + GGN_SSIM_RADIUS; i += VW) {
-            const REAL *column = x + (long)(r - GGN_SSIM_RADIUS) * row + i;
+            const real *column = x + (long)(r - GGN_SSIM_RADIUS) * row + i;
             vf s = SET1(0);
             for (int k = 0; k < n; k++, column += row)
                 s = FMA(SET1(taps[k]), LOAD(column), s);
@@ -503,7 +539,7 @@ static void blur(REAL *dst, const REAL *x, REAL *tmp, const REAL taps[2 * GGN_SS
         }
     for (int r = 0; r < h; r++)
         for (int i = 0; i < w; i += VW) {
-            const REAL *p = tmp + (long)r * row + i - GGN_SSIM_RADIUS;
+            const real *p = tmp + (long)r * row + i - GGN_SSIM_RADIUS;
             vf s = SET1(0);
             for (int k = 0; k < n; k++)
                 s = FMA(SET1(taps[k]), LOAD(p + k), s);
@@ -511,8 +547,8 @@ static void blur(REAL *dst, const REAL *x, REAL *tmp, const REAL taps[2 * GGN_SS
         }
 }
 
-static void adam(REAL *restrict param, const REAL *restrict grad, REAL *restrict m, REAL *restrict v, long n, REAL lr,
-                 REAL beta1, REAL beta2, REAL c1, REAL c2, REAL eps)
+static void adam(real *restrict param, const real *restrict grad, real *restrict m, real *restrict v, long n, real lr,
+                 real beta1, real beta2, real c1, real c2, real eps)
 {
     for (long i = 0; i < n; i++) {
         m[i] = beta1 * m[i] + (1 - beta1) * grad[i];
@@ -521,13 +557,13 @@ static void adam(REAL *restrict param, const REAL *restrict grad, REAL *restrict
     }
 }
 
-const struct TYPED(ggn_kernels) TABLE = {
+const struct ggn_kernels TABLE = {
     .isa = ISA,
     .lanes = VW,
     .tile_oc = TILE_OC,
     .tile_px = TILE_V * VW,
     .conv = conv,
-    .conv_grad = conv_grad,
+    FASTER_FORMS.conv_grad = conv_grad,
     .lane_sums = lane_sums,
     .sum = sum,
     .sum_sq = sum_sq,

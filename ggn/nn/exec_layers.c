@@ -1,9 +1,15 @@
-/* The layers beside convolutions. Included by nn/exec.inc. */
+/* The layers beside convolutions. */
+#include <math.h>
+#include <string.h>
+
+#include "nn/hash.h"
+#include "nn/layers.h"
+#include "nn/real.h"
 
 /* --- batch norm -------------------------------------------------------------------------------------------------------- */
 
 /* Batch statistics of channel c: biased variance to normalise, unbiased for the running estimate. */
-static void bn_statistics(const struct task *t, long c)
+static void bn_statistics(const struct ggn_task *t, long c)
 {
     const struct ggn_graph *g = t->e->graph;
     const struct ggn_value *v = &g->value[t->l->out];
@@ -12,25 +18,25 @@ static void bn_statistics(const struct task *t, long c)
     double mean = 0, var = 0;
 
     for (int n = 0; n < t->e->batch; n++)
-        mean += t->e->kernels->sum(plane(t->e, t->e->acts, t->l->in, n, (int)c), v->h, v->w, v->row);
+        mean += t->e->kernels->sum(ggn_act(t, t->l->in, n, (int)c), v->h, v->w, v->row);
     mean /= count;
     for (int n = 0; n < t->e->batch; n++)
-        var += t->e->kernels->sum_sq(plane(t->e, t->e->acts, t->l->in, n, (int)c), mean, v->h, v->w, v->row);
+        var += t->e->kernels->sum_sq(ggn_act(t, t->l->in, n, (int)c), mean, v->h, v->w, v->row);
     var /= count;
-    t->e->bn_mean[s] = (REAL)mean;
-    t->e->bn_inv[s] = (REAL)(1 / sqrt(var + GGN_BN_EPS));
+    t->e->bn_mean[s] = (real)mean;
+    t->e->bn_inv[s] = (real)(1 / sqrt(var + GGN_BN_EPS));
     double unbiased = count > 1 ? var * count / (count - 1) : var;
-    t->w->mean[s] = (REAL)((1 - GGN_BN_MOMENTUM) * (double)t->w->mean[s] + GGN_BN_MOMENTUM * mean);
-    t->w->var[s] = (REAL)((1 - GGN_BN_MOMENTUM) * (double)t->w->var[s] + GGN_BN_MOMENTUM * unbiased);
+    t->w->mean[s] = (real)((1 - GGN_BN_MOMENTUM) * (double)t->w->mean[s] + GGN_BN_MOMENTUM * mean);
+    t->w->var[s] = (real)((1 - GGN_BN_MOMENTUM) * (double)t->w->var[s] + GGN_BN_MOMENTUM * unbiased);
 }
 
 static void bn_channel(void *data, long c, int worker)
 {
-    const struct task *t = data;
+    const struct ggn_task *t = data;
     const struct ggn_graph *g = t->e->graph;
     const struct ggn_value *v = &g->value[t->l->out];
     const size_t s = t->l->stats + (size_t)c;
-    REAL scale = t->w->scale[s], shift = t->w->shift[s];
+    real scale = t->w->scale[s], shift = t->w->shift[s];
 
     if (t->e->mode == GGN_TRAIN) {
         bn_statistics(t, c);
@@ -38,24 +44,24 @@ static void bn_channel(void *data, long c, int worker)
         shift = t->w->params[t->l->bias + (size_t)c] - t->e->bn_mean[s] * scale;
     } else {
         t->e->bn_mean[s] = t->w->mean[s];
-        t->e->bn_inv[s] = (REAL)(1 / sqrt((double)t->w->var[s] + GGN_BN_EPS));
+        t->e->bn_inv[s] = (real)(1 / sqrt((double)t->w->var[s] + GGN_BN_EPS));
     }
     for (int n = 0; n < t->e->batch; n++)
-        t->e->kernels->affine(plane(t->e, t->e->acts, t->l->out, n, (int)c), plane(t->e, t->e->acts, t->l->in, n, (int)c),
-                              scale, shift, v->h, v->w, v->row);
+        t->e->kernels->affine(ggn_act(t, t->l->out, n, (int)c), ggn_act(t, t->l->in, n, (int)c), scale, shift, v->h, v->w,
+                              v->row);
     (void)worker;
 }
 
-static void bn_forward(struct task *t)
+static void bn_forward(struct ggn_task *t)
 {
-    run(t, t->e->graph->value[t->l->out].c, bn_channel);
+    ggn_task_run(t, t->e->graph->value[t->l->out].c, bn_channel);
 }
 
 /* x̂ = (x − μ)·inv. dγ = Σ dY·x̂, dβ = Σ dY, dX = γ·inv·(dY − mean(dY) − x̂·mean(dY·x̂)); with running statistics the two
  * means are constants of the pass and dX = γ·inv·dY. */
 static void bn_back_channel(void *data, long c, int worker)
 {
-    const struct task *t = data;
+    const struct ggn_task *t = data;
     const struct ggn_graph *g = t->e->graph;
     const struct ggn_value *v = &g->value[t->l->out];
     const size_t s = t->l->stats + (size_t)c;
@@ -66,44 +72,40 @@ static void bn_back_channel(void *data, long c, int worker)
 
     for (int n = 0; n < t->e->batch; n++) {
         double part[2];
-        t->e->kernels->bn_sums(part, plane(t->e, t->e->grads, t->l->out, n, (int)c),
-                               plane(t->e, t->e->acts, t->l->in, n, (int)c), t->e->bn_mean[s], v->h, v->w, v->row);
+        t->e->kernels->bn_sums(part, ggn_grad(t, t->l->out, n, (int)c), ggn_act(t, t->l->in, n, (int)c), t->e->bn_mean[s],
+                               v->h, v->w, v->row);
         sum[0] += part[0];
         sum[1] += part[1];
     }
-    t->g[t->l->weight + (size_t)c] += (REAL)(sum[1] * inv);
-    t->g[t->l->bias + (size_t)c] += (REAL)sum[0];
+    t->g[t->l->weight + (size_t)c] += (real)(sum[1] * inv);
+    t->g[t->l->bias + (size_t)c] += (real)sum[0];
     double b = t->e->mode == GGN_TRAIN ? -gamma * inv * inv * inv * sum[1] / count : 0;
     double shift = t->e->mode == GGN_TRAIN ? -gamma * inv * sum[0] / count - b * mean : 0;
     for (int n = 0; n < t->e->batch; n++)
-        t->e->kernels->bn_grad(plane(t->e, t->e->grads, t->l->in, n, (int)c), plane(t->e, t->e->grads, t->l->out, n, (int)c),
-                               plane(t->e, t->e->acts, t->l->in, n, (int)c), (REAL)(gamma * inv), (REAL)b, (REAL)shift,
-                               t->l->add_in, v->h, v->w, v->row);
+        t->e->kernels->bn_grad(ggn_grad(t, t->l->in, n, (int)c), ggn_grad(t, t->l->out, n, (int)c),
+                               ggn_act(t, t->l->in, n, (int)c), (real)(gamma * inv), (real)b, (real)shift, t->l->add_in,
+                               v->h, v->w, v->row);
     (void)worker;
 }
 
-static void bn_backward(struct task *t)
+static void bn_backward(struct ggn_task *t)
 {
-    run(t, t->e->graph->value[t->l->out].c, bn_back_channel);
+    ggn_task_run(t, t->e->graph->value[t->l->out].c, bn_back_channel);
 }
+
+const struct ggn_layer_passes GGN_LAYER(bn) = {bn_forward, bn_backward};
 
 /* --- plane by plane ---------------------------------------------------------------------------------------------------- */
-
-/* One task per image and channel of the input. */
-static void run_planes(struct task *t, void (*fn)(void *, long, int))
-{
-    run(t, (long)t->e->batch * t->e->graph->value[t->l->in].c, fn);
-}
 
 /* The planes of task i. */
 struct pair {
     const struct ggn_value *in, *out;
-    REAL *x, *y, *dx, *dy;
+    real *x, *y, *dx, *dy;
     long n;
     int c;
 };
 
-static struct pair pair_of(const struct task *t, long i)
+static struct pair pair_of(const struct ggn_task *t, long i)
 {
     const struct ggn_graph *g = t->e->graph;
     struct pair p = {.in = &g->value[t->l->in], .out = &g->value[t->l->out]};
@@ -111,35 +113,41 @@ static struct pair pair_of(const struct task *t, long i)
     p.n = i / p.in->c;
     p.c = (int)(i % p.in->c);
     int c_out = p.c % p.out->c; /* FLATTEN has its own loop */
-    p.x = plane(t->e, t->e->acts, t->l->in, p.n, p.c);
-    p.y = plane(t->e, t->e->acts, t->l->out, p.n, c_out);
+    p.x = ggn_act(t, t->l->in, p.n, p.c);
+    p.y = ggn_act(t, t->l->out, p.n, c_out);
     if (t->e->grads) {
-        p.dx = plane(t->e, t->e->grads, t->l->in, p.n, p.c);
-        p.dy = plane(t->e, t->e->grads, t->l->out, p.n, c_out);
+        p.dx = ggn_grad(t, t->l->in, p.n, p.c);
+        p.dy = ggn_grad(t, t->l->out, p.n, c_out);
     }
     return p;
 }
 
-#define PLANE_OP(name, body)                                                                                                \
+/* A layer of one task per image and channel of the input. */
+#define PLANE_LAYER(name, forward, backward)                                                                                \
+    PLANE_PASS(name##_forward, forward)                                                                                     \
+    PLANE_PASS(name##_backward, backward)                                                                                   \
+    const struct ggn_layer_passes GGN_LAYER(name) = {name##_forward, name##_backward};
+
+#define PLANE_PASS(name, body)                                                                                              \
     static void name##_plane(void *data, long i, int worker)                                                                \
     {                                                                                                                       \
-        const struct task *t = data;                                                                                        \
-        const struct TYPED(ggn_kernels) *k = t->e->kernels;                                                                 \
+        const struct ggn_task *t = data;                                                                                    \
+        const struct ggn_kernels *k = t->e->kernels;                                                                        \
         struct pair p = pair_of(t, i);                                                                                      \
         body;                                                                                                               \
         (void)worker;                                                                                                       \
         (void)k;                                                                                                            \
     }                                                                                                                       \
-    static void name(struct task *t)                                                                                        \
+    static void name(struct ggn_task *t)                                                                                    \
     {                                                                                                                       \
-        run_planes(t, name##_plane);                                                                                        \
+        ggn_task_run(t, (long)t->e->batch * t->e->graph->value[t->l->in].c, name##_plane);                                  \
     }
 
-PLANE_OP(lrelu_forward, k->lrelu(p.y, p.x, (REAL)t->l->slope, p.in->h, p.in->w, p.in->row))
-PLANE_OP(lrelu_backward, k->lrelu_grad(p.dx, p.dy, p.y, (REAL)t->l->slope, t->l->add_in, p.in->h, p.in->w, p.in->row))
-PLANE_OP(sigmoid_forward, k->sigmoid(p.y, p.x, p.in->h, p.in->w, p.in->row))
-PLANE_OP(sigmoid_backward, k->sigmoid_grad(p.dx, p.dy, p.y, t->l->add_in, p.in->h, p.in->w, p.in->row))
-static void up_plane(const struct task *t, const struct pair *p)
+PLANE_LAYER(lrelu, k->lrelu(p.y, p.x, (real)t->l->slope, p.in->h, p.in->w, p.in->row),
+            k->lrelu_grad(p.dx, p.dy, p.y, (real)t->l->slope, t->l->add_in, p.in->h, p.in->w, p.in->row))
+PLANE_LAYER(sigmoid, k->sigmoid(p.y, p.x, p.in->h, p.in->w, p.in->row),
+            k->sigmoid_grad(p.dx, p.dy, p.y, t->l->add_in, p.in->h, p.in->w, p.in->row))
+static void up_plane(const struct ggn_task *t, const struct pair *p)
 {
     if (t->l->pad_y)
         memset(p->y, 0, (size_t)p->out->w * sizeof *p->y);
@@ -148,13 +156,13 @@ static void up_plane(const struct task *t, const struct pair *p)
     t->e->kernels->up(p->y + t->l->pad_y * p->out->row + t->l->pad_x, p->x, p->in->h, p->in->w, p->out->row, p->in->row);
 }
 
-PLANE_OP(up_forward, up_plane(t, &p))
-PLANE_OP(up_backward, k->up_grad(p.dx, p.dy + t->l->pad_y * p.out->row + t->l->pad_x, t->l->add_in, p.in->h, p.in->w,
-                                 p.out->row, p.in->row))
+PLANE_LAYER(up, up_plane(t, &p),
+            k->up_grad(p.dx, p.dy + t->l->pad_y * p.out->row + t->l->pad_x, t->l->add_in, p.in->h, p.in->w, p.out->row,
+                       p.in->row))
 
 /* Window of output (r, s) of the 3×3 stride 2 pad 1 pool: rows [2r−1, 2r+1] inside the picture. The first largest element in
  * row order counts. */
-static long pool3_argmax(const struct ggn_value *in, const REAL *x, int r, int s)
+static long pool3_argmax(const struct ggn_value *in, const real *x, int r, int s)
 {
     long best = -1;
 
@@ -171,22 +179,22 @@ static long pool3_argmax(const struct ggn_value *in, const REAL *x, int r, int s
 static void pool3_row(const struct pair *p, int r)
 {
     const struct ggn_value *in = p->in;
-    const REAL *b = p->x + 2L * r * in->row, *a = r > 0 ? b - in->row : b, *c = 2 * r + 1 < in->h ? b + in->row : b;
-    REAL column[GGN_MAX_SIDE], *y = p->y + (long)r * p->out->row;
+    const real *b = p->x + 2L * r * in->row, *a = r > 0 ? b - in->row : b, *c = 2 * r + 1 < in->h ? b + in->row : b;
+    real column[GGN_MAX_SIDE], *y = p->y + (long)r * p->out->row;
 
     for (int i = 0; i < in->w; i++) {
-        REAL m = a[i] > b[i] ? a[i] : b[i];
+        real m = a[i] > b[i] ? a[i] : b[i];
         column[i] = m > c[i] ? m : c[i];
     }
     for (int s = 0; s < p->out->w; s++) {
-        REAL left = column[s > 0 ? 2 * s - 1 : 0], mid = column[2 * s],
+        real left = column[s > 0 ? 2 * s - 1 : 0], mid = column[2 * s],
              right = column[2 * s + 1 < in->w ? 2 * s + 1 : 2 * s];
-        REAL m = left > mid ? left : mid;
+        real m = left > mid ? left : mid;
         y[s] = m > right ? m : right;
     }
 }
 
-static void pool_plane(const struct task *t, const struct pair *p)
+static void pool_plane(const struct ggn_task *t, const struct pair *p)
 {
     if (t->l->kernel == 2) {
         t->e->kernels->maxpool2(p->y, p->x, p->out->h, p->out->w, p->out->row, p->in->row);
@@ -196,7 +204,7 @@ static void pool_plane(const struct task *t, const struct pair *p)
         pool3_row(p, r);
 }
 
-static void pool_back_plane(const struct task *t, const struct pair *p)
+static void pool_back_plane(const struct ggn_task *t, const struct pair *p)
 {
     if (t->l->kernel == 2) {
         t->e->kernels->maxpool2_grad(p->dx, p->dy, p->x, p->y, t->l->add_in, p->in->h, p->in->w, p->out->row, p->in->row);
@@ -209,12 +217,11 @@ static void pool_back_plane(const struct task *t, const struct pair *p)
             p->dx[pool3_argmax(p->in, p->x, r, s)] += p->dy[r * p->out->row + s];
 }
 
-PLANE_OP(pool_forward, pool_plane(t, &p))
-PLANE_OP(pool_backward, pool_back_plane(t, &p))
+PLANE_LAYER(maxpool, pool_plane(t, &p), pool_back_plane(t, &p))
 
-static void flatten_plane(const struct task *t, const struct pair *p, int back)
+static void flatten_plane(const struct ggn_task *t, const struct pair *p, int back)
 {
-    REAL *flat = plane(t->e, back ? t->e->grads : t->e->acts, t->l->out, p->n, p->c * p->in->h * p->in->w);
+    real *flat = ggn_plane_in(t->e, back ? t->e->grads : t->e->acts, t->l->out, p->n, p->c * p->in->h * p->in->w);
 
     for (int r = 0; r < p->in->h; r++, flat += p->in->w)
         for (int s = 0; s < p->in->w; s++) {
@@ -225,52 +232,50 @@ static void flatten_plane(const struct task *t, const struct pair *p, int back)
         }
 }
 
-PLANE_OP(flatten_forward, flatten_plane(t, &p, 0))
-PLANE_OP(flatten_backward, flatten_plane(t, &p, 1))
+PLANE_LAYER(flatten, flatten_plane(t, &p, 0), flatten_plane(t, &p, 1))
 
 /* 0 or 1/(1 − drop), a function of the seed, the layer, the image and the element. */
-static REAL dropout_factor(const struct task *t, long i)
+static real dropout_factor(const struct ggn_task *t, long i)
 {
     if (t->e->mode == GGN_EVAL || (t->e->flags & GGN_EXEC_NO_DROPOUT))
         return 1;
     uint32_t layer = (uint32_t)(t->l - t->e->graph->layer);
-    return ggn_hash_unit((uint32_t)i, ggn_hash(layer, t->e->dropout_seed)) < t->l->drop ? 0 : (REAL)(1 / (1 - t->l->drop));
+    return ggn_hash_unit((uint32_t)i, ggn_hash(layer, t->e->dropout_seed)) < t->l->drop ? 0 : (real)(1 / (1 - t->l->drop));
 }
 
-PLANE_OP(dropout_forward, *p.y = *p.x * dropout_factor(t, i))
-PLANE_OP(dropout_backward, *p.dx = (t->l->add_in ? *p.dx : 0) + *p.dy * dropout_factor(t, i))
+PLANE_LAYER(dropout, *p.y = *p.x * dropout_factor(t, i), *p.dx = (t->l->add_in ? *p.dx : 0) + *p.dy * dropout_factor(t, i))
 
 /* --- linear: Y = W·X + b ------------------------------------------------------------------------------------------------
  */
 
 static void linear_unit(void *data, long o, int worker)
 {
-    const struct task *t = data;
+    const struct ggn_task *t = data;
     const struct ggn_graph *g = t->e->graph;
     const long c_in = g->value[t->l->in].c;
-    const REAL *w = t->w->params + t->l->weight + (size_t)(o * c_in);
+    const real *w = t->w->params + t->l->weight + (size_t)(o * c_in);
 
     for (int n = 0; n < t->e->batch; n++)
-        plane(t->e, t->e->acts, t->l->out, n, 0)[o] =
-            t->w->params[t->l->bias + (size_t)o] + t->e->kernels->dot(w, plane(t->e, t->e->acts, t->l->in, n, 0), c_in);
+        ggn_act(t, t->l->out, n, 0)[o] =
+            t->w->params[t->l->bias + (size_t)o] + t->e->kernels->dot(w, ggn_act(t, t->l->in, n, 0), c_in);
     (void)worker;
 }
 
-static void linear_forward(struct task *t)
+static void linear_forward(struct ggn_task *t)
 {
-    run(t, t->e->graph->value[t->l->out].c, linear_unit);
+    ggn_task_run(t, t->e->graph->value[t->l->out].c, linear_unit);
 }
 
 /* dW[o] += Σ_n dY[n][o]·X[n], db[o] += Σ_n dY[n][o] */
 static void linear_weight_back(void *data, long o, int worker)
 {
-    const struct task *t = data;
+    const struct ggn_task *t = data;
     const struct ggn_graph *g = t->e->graph;
     const long c_in = g->value[t->l->in].c;
 
     for (int n = 0; n < t->e->batch; n++) {
-        REAL d = plane(t->e, t->e->grads, t->l->out, n, 0)[o];
-        t->e->kernels->axpy(t->g + t->l->weight + (size_t)(o * c_in), d, plane(t->e, t->e->acts, t->l->in, n, 0), c_in);
+        real d = ggn_grad(t, t->l->out, n, 0)[o];
+        t->e->kernels->axpy(t->g + t->l->weight + (size_t)(o * c_in), d, ggn_act(t, t->l->in, n, 0), c_in);
         t->g[t->l->bias + (size_t)o] += d;
     }
     (void)worker;
@@ -279,21 +284,22 @@ static void linear_weight_back(void *data, long o, int worker)
 /* dX = Wᵀ·dY */
 static void linear_input_back(void *data, long n, int worker)
 {
-    const struct task *t = data;
+    const struct ggn_task *t = data;
     const struct ggn_graph *g = t->e->graph;
     const long c_in = g->value[t->l->in].c;
-    REAL *dx = plane(t->e, t->e->grads, t->l->in, n, 0);
+    real *dx = ggn_grad(t, t->l->in, n, 0);
 
     if (!t->l->add_in)
         memset(dx, 0, (size_t)c_in * sizeof *dx);
     for (int o = 0; o < g->value[t->l->out].c; o++)
-        t->e->kernels->axpy(dx, plane(t->e, t->e->grads, t->l->out, n, 0)[o],
-                            t->w->params + t->l->weight + (size_t)(o * c_in), c_in);
+        t->e->kernels->axpy(dx, ggn_grad(t, t->l->out, n, 0)[o], t->w->params + t->l->weight + (size_t)(o * c_in), c_in);
     (void)worker;
 }
 
-static void linear_backward(struct task *t)
+static void linear_backward(struct ggn_task *t)
 {
-    run(t, t->e->graph->value[t->l->out].c, linear_weight_back);
-    run(t, t->e->batch, linear_input_back);
+    ggn_task_run(t, t->e->graph->value[t->l->out].c, linear_weight_back);
+    ggn_task_run(t, t->e->batch, linear_input_back);
 }
+
+const struct ggn_layer_passes GGN_LAYER(linear) = {linear_forward, linear_backward};

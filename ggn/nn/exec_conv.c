@@ -1,14 +1,34 @@
-/* Convolutions, direct, by Winograd or in bfloat16, and their gradients. Included by nn/exec.inc. */
+/* Convolutions, direct, by Winograd or in bfloat16, and their gradients. */
+#include <string.h>
+
+#include "nn/layers.h"
+#include "nn/real.h"
+#include "nn/winograd.h"
+
+enum { GRAD_CHUNK = 512 /* pixels whose gradients stay in the first-level cache */ };
+
+/* Pointers to all planes of a layer's input(s); returns their number. */
+static int input_planes(real **out, const struct ggn_task *t, real *base, long n)
+{
+    const struct ggn_graph *g = t->e->graph;
+    const struct ggn_layer *l = t->l;
+    int k = 0;
+    for (int c = 0; c < g->value[l->in].c; c++)
+        out[k++] = ggn_plane_in(t->e, base, l->in, n, c);
+    for (int c = 0; l->in2 >= 0 && c < g->value[l->in2].c; c++)
+        out[k++] = ggn_plane_in(t->e, base, l->in2, n, c);
+    return k;
+}
 
 /* The Winograd form of the layer's weights, or NULL where the direct convolution is used. */
-static const REAL *wino_weights(const struct task *t, int c_in, int c_out, const REAL *all)
+static const real *wino_weights(const struct ggn_task *t, int c_in, int c_out, const real *all)
 {
     const struct ggn_value *v = &t->e->graph->value[t->l->out];
     return all && t->l->kernel == 3 && ggn_wino_suits(c_in, c_out, v->h, v->w) ? all + 4 * t->l->pack : NULL;
 }
 
 /* Cuts the work into pieces that depend on the shape only. `wino`: all Winograd weights of this direction or NULL. */
-static long cut_conv(struct task *t, int c_in, int c_out, const REAL *wino)
+static long cut_conv(struct ggn_task *t, int c_in, int c_out, const real *wino)
 {
     const struct ggn_value *v = &t->e->graph->value[t->l->out];
 
@@ -27,41 +47,34 @@ static long cut_conv(struct task *t, int c_in, int c_out, const REAL *wino)
     return (long)t->e->batch * t->px_blocks * t->oc_groups;
 }
 
-static void run_conv_piece(const struct task *t, const struct TYPED(ggn_conv) * conv, long i, int worker)
+static void run_conv_piece(const struct ggn_task *t, const struct ggn_conv *conv, long i, int worker)
 {
-#if REAL_IS_FLOAT
-    if (t->wino) {
-        const int tiles = ggn_wino_tiles(conv->h, conv->w_px), k = (int)(i % t->px_blocks);
-        ggn_wino_for(t->e->kernels->isa)(conv, t->wino, (int)((long)tiles * k / t->px_blocks),
-                                         (int)((long)tiles * (k + 1) / t->px_blocks),
-                                         t->e->scratch + (size_t)worker * t->e->scratch_size);
-        return;
-    }
-#endif
-    long px = i / t->oc_groups % t->px_blocks;
-    int oc0 = (int)(i % t->oc_groups) * t->oc_group, oc1 = oc0 + t->oc_group;
+    const struct ggn_kernels *k = t->e->kernels;
+    real *scratch = t->e->scratch + (size_t)worker * t->e->scratch_size;
 
-#if REAL_IS_FLOAT && defined(__x86_64__)
-    if (t->bf16) {
-        ggn_bf16_conv_avx512(conv, t->bf16, px * t->px_block, (px + 1) * t->px_block, oc0,
-                             oc1 < conv->n_out ? oc1 : conv->n_out,
-                             (uint32_t *)(void *)(t->e->scratch + (size_t)worker * t->e->scratch_size));
+    if (t->wino) {
+        const int tiles = ggn_wino_tiles(conv->h, conv->w_px), part = (int)(i % t->px_blocks);
+        k->wino(conv, t->wino, (int)((long)tiles * part / t->px_blocks), (int)((long)tiles * (part + 1) / t->px_blocks),
+                scratch);
         return;
     }
-#endif
-    (void)worker;
-    t->e->kernels->conv(conv, px * t->px_block, (px + 1) * t->px_block, oc0, oc1 < conv->n_out ? oc1 : conv->n_out);
+    long p0 = i / t->oc_groups % t->px_blocks * t->px_block, p1 = p0 + t->px_block;
+    int oc0 = (int)(i % t->oc_groups) * t->oc_group, oc1 = oc0 + t->oc_group < conv->n_out ? oc0 + t->oc_group : conv->n_out;
+    if (t->bf16)
+        k->bf16(conv, t->bf16, p0, p1, oc0, oc1, (uint32_t *)(void *)scratch);
+    else
+        k->conv(conv, p0, p1, oc0, oc1);
 }
 
 static void conv_piece(void *data, long i, int worker)
 {
-    const struct task *t = data;
+    const struct ggn_task *t = data;
     const struct ggn_graph *g = t->e->graph;
     const struct ggn_value *v = &g->value[t->l->out];
     long n = i / ((long)t->px_blocks * t->oc_groups);
-    REAL *x[GGN_MAX_CHANNELS], *y[GGN_MAX_CHANNELS];
-    struct TYPED(ggn_conv) conv = {
-        .x = (const REAL *const *)x,
+    real *x[GGN_MAX_CHANNELS], *y[GGN_MAX_CHANNELS];
+    struct ggn_conv conv = {
+        .x = (const real *const *)x,
         .y = y,
         .w = t->w->pack + t->l->pack,
         .bias = t->w->params + t->l->bias,
@@ -72,36 +85,35 @@ static void conv_piece(void *data, long i, int worker)
         .h = v->h,
         .w_px = v->w,
         .row = v->row,
-        .slope = (REAL)t->l->slope,
+        .slope = (real)t->l->slope,
     };
 
-    conv.n_in = input_planes(x, t->e, t->e->acts, t->l, n);
+    conv.n_in = input_planes(x, t, t->e->acts, n);
     for (int c = 0; c < v->c; c++)
-        y[c] = plane(t->e, t->e->acts, t->bn ? t->bn->out : t->l->out, n, c);
+        y[c] = ggn_act(t, t->bn ? t->bn->out : t->l->out, n, c);
     run_conv_piece(t, &conv, i, worker);
 }
 
-static void conv_forward(struct task *t)
+static void conv_forward(struct ggn_task *t)
 {
     const struct ggn_graph *g = t->e->graph;
-    int c_in = g->value[t->l->in].c + (t->l->in2 >= 0 ? g->value[t->l->in2].c : 0);
 
     if (t->e->flags & GGN_EXEC_BF16 && t->e->mode == GGN_EVAL && t->w->bf16 && t->l->kernel == 3)
         t->bf16 = t->w->bf16 + t->l->pack;
-    run(t, cut_conv(t, c_in, g->value[t->l->out].c, t->w->wino), conv_piece);
+    ggn_task_run(t, cut_conv(t, ggn_layer_c_in(g, t->l), g->value[t->l->out].c, t->w->wino), conv_piece);
 }
 
 /* dX = the same convolution with inputs and outputs swapped and taps mirrored. */
 static void conv_back_piece(void *data, long i, int worker)
 {
-    const struct task *t = data;
+    const struct ggn_task *t = data;
     const struct ggn_graph *g = t->e->graph;
     const struct ggn_value *v = &g->value[t->l->out];
     long n = i / ((long)t->px_blocks * t->oc_groups);
-    REAL *dy[GGN_MAX_CHANNELS], *dx[GGN_MAX_CHANNELS];
+    real *dy[GGN_MAX_CHANNELS], *dx[GGN_MAX_CHANNELS];
     unsigned char add[GGN_MAX_CHANNELS];
-    struct TYPED(ggn_conv) conv = {
-        .x = (const REAL *const *)dy,
+    struct ggn_conv conv = {
+        .x = (const real *const *)dy,
         .y = dx,
         .w = t->w->pack_back + t->l->pack,
         .add = add,
@@ -113,60 +125,60 @@ static void conv_back_piece(void *data, long i, int worker)
         .slope = 1,
     };
 
-    conv.n_out = input_planes(dx, t->e, t->e->grads, t->l, n);
+    conv.n_out = input_planes(dx, t, t->e->grads, n);
     for (int c = 0; c < conv.n_out; c++)
         add[c] = (unsigned char)(c < g->value[t->l->in].c ? t->l->add_in : t->l->add_in2);
     for (int c = 0; c < v->c; c++)
-        dy[c] = plane(t->e, t->e->grads, t->l->out, n, c);
+        dy[c] = ggn_grad(t, t->l->out, n, c);
     run_conv_piece(t, &conv, i, worker);
 }
 
 /* Through the activation, in place, and db[c] += Σ dY[c]. */
 static void conv_act_back(void *data, long c, int worker)
 {
-    const struct task *t = data;
+    const struct ggn_task *t = data;
     const struct ggn_graph *g = t->e->graph;
     const struct ggn_value *v = &g->value[t->l->out];
     double sum = 0;
 
     for (int n = 0; n < t->e->batch; n++) {
-        REAL *dy = plane(t->e, t->e->grads, t->l->out, n, (int)c);
-        sum += t->l->slope == 1 ? t->e->kernels->sum(dy, v->h, v->w, v->row)
-                                : t->e->kernels->act_grad(dy, plane(t->e, t->e->acts, t->l->out, n, (int)c),
-                                                          (REAL)t->l->slope, v->h, v->w, v->row);
+        real *dy = ggn_grad(t, t->l->out, n, (int)c);
+        sum += t->l->slope == 1
+                   ? t->e->kernels->sum(dy, v->h, v->w, v->row)
+                   : t->e->kernels->act_grad(dy, ggn_act(t, t->l->out, n, (int)c), (real)t->l->slope, v->h, v->w, v->row);
     }
-    t->g[t->l->bias + (size_t)c] += (REAL)sum;
+    t->g[t->l->bias + (size_t)c] += (real)sum;
     (void)worker;
 }
 
 /* dW of one tile of output channels and up to GGN_GRAD_IC input channels, over all images. */
 static void conv_weight_back(void *data, long i, int worker)
 {
-    const struct task *t = data;
+    const struct ggn_task *t = data;
     const struct ggn_graph *g = t->e->graph;
     const struct ggn_value *v = &g->value[t->l->out];
-    const struct TYPED(ggn_kernels) *k = t->e->kernels;
+    const struct ggn_kernels *k = t->e->kernels;
     const int n_in = t->oc_group, taps = t->l->kernel * t->l->kernel; /* oc_group: input channels here, see conv_backward */
     const int groups = (n_in + GGN_GRAD_IC - 1) / GGN_GRAD_IC;
     const int ic0 = (int)(i % groups) * GGN_GRAD_IC, nic = n_in - ic0 < GGN_GRAD_IC ? n_in - ic0 : GGN_GRAD_IC;
     const long px = (long)v->h * v->row;
     int oc = (int)(i / groups) * k->tile_oc;
     const int oc_end = oc + k->tile_oc < v->c ? oc + k->tile_oc : v->c;
-    REAL *acc = t->e->scratch + (size_t)worker * t->e->scratch_size;
-    REAL sums[GGN_TILE_MAX * GGN_GRAD_IC * 9];
-    REAL *x[GGN_MAX_CHANNELS];
-    const REAL *dy[GGN_TILE_MAX];
+    real *acc = t->e->scratch + (size_t)worker * t->e->scratch_size;
+    real sums[GGN_TILE_MAX * GGN_GRAD_IC * 9];
+    real *x[GGN_MAX_CHANNELS];
+    const real *dy[GGN_TILE_MAX];
 
     for (int ot; oc < oc_end; oc += ot) {
         for (ot = k->tile_oc; ot > oc_end - oc;)
             ot /= 2;
         memset(acc, 0, (size_t)(ot * nic * taps * k->lanes) * sizeof *acc);
         for (int n = 0; n < t->e->batch; n++) {
-            input_planes(x, t->e, t->e->acts, t->l, n);
+            input_planes(x, t, t->e->acts, n);
             for (int o = 0; o < ot; o++)
-                dy[o] = plane(t->e, t->e->grads, t->l->out, n, oc + o);
+                dy[o] = ggn_grad(t, t->l->out, n, oc + o);
             for (long p = 0; p < px; p += GRAD_CHUNK)
-                k->conv_grad(acc, (const REAL *const *)x + ic0, nic, dy, ot, taps, v->row, p,
+                k->conv_grad(acc, (const real *const *)x + ic0, nic, dy, ot, taps, v->row, p,
                              p + GRAD_CHUNK < px ? p + GRAD_CHUNK : px);
         }
         k->lane_sums(sums, acc, ot * nic * taps);
@@ -181,35 +193,37 @@ static void conv_weight_back(void *data, long i, int worker)
     }
 }
 
-static int needs_input_grad(const struct task *t)
+static int needs_input_grad(const struct ggn_task *t)
 {
     return t->l->in != 0 || (t->e->flags & GGN_EXEC_INPUT_GRAD);
 }
 
-static void conv_backward(struct task *t)
+static void conv_backward(struct ggn_task *t)
 {
     const struct ggn_graph *g = t->e->graph;
     const int c_out = g->value[t->l->out].c;
-    const int c_in = g->value[t->l->in].c + (t->l->in2 >= 0 ? g->value[t->l->in2].c : 0);
+    const int c_in = ggn_layer_c_in(g, t->l);
     const int tile = t->e->kernels->tile_oc;
 
-    run(t, c_out, conv_act_back);
+    ggn_task_run(t, c_out, conv_act_back);
     t->oc_group = c_in;
-    run(t, (long)((c_out + tile - 1) / tile) * ((c_in + GGN_GRAD_IC - 1) / GGN_GRAD_IC), conv_weight_back);
+    ggn_task_run(t, (long)((c_out + tile - 1) / tile) * ((c_in + GGN_GRAD_IC - 1) / GGN_GRAD_IC), conv_weight_back);
     if (needs_input_grad(t))
-        run(t, cut_conv(t, c_out, c_in, t->w->wino_back), conv_back_piece);
+        ggn_task_run(t, cut_conv(t, c_out, c_in, t->w->wino_back), conv_back_piece);
 }
+
+const struct ggn_layer_passes GGN_LAYER(conv) = {conv_forward, conv_backward};
 
 /* Columns of a strided 3×3 convolution: plane 9c + tap holds channel c at that tap, 0 outside. */
 static void im2col_piece(void *data, long i, int worker)
 {
-    const struct task *t = data;
+    const struct ggn_task *t = data;
     const struct ggn_graph *g = t->e->graph;
     const struct ggn_value *in = &g->value[t->l->in], *out = &g->value[t->l->out];
     long n = i / out->c;
     int c = (int)(i % out->c), dy = c % 9 / 3 - t->l->pad, dx = c % 3 - t->l->pad;
-    const REAL *x = plane(t->e, t->e->acts, t->l->in, n, c / 9);
-    REAL *y = plane(t->e, t->e->acts, t->l->out, n, c);
+    const real *x = ggn_act(t, t->l->in, n, c / 9);
+    real *y = ggn_act(t, t->l->out, n, c);
 
     for (int r = 0; r < out->h; r++)
         for (int s = 0; s < out->w; s++) {
@@ -219,24 +233,24 @@ static void im2col_piece(void *data, long i, int worker)
     (void)worker;
 }
 
-static void im2col_forward(struct task *t)
+static void im2col_forward(struct ggn_task *t)
 {
-    run(t, (long)t->e->batch * t->e->graph->value[t->l->out].c, im2col_piece);
+    ggn_task_run(t, (long)t->e->batch * t->e->graph->value[t->l->out].c, im2col_piece);
 }
 
 static void im2col_back_piece(void *data, long i, int worker)
 {
-    const struct task *t = data;
+    const struct ggn_task *t = data;
     const struct ggn_graph *g = t->e->graph;
     const struct ggn_value *in = &g->value[t->l->in], *out = &g->value[t->l->out];
     long n = i / in->c;
     int c = (int)(i % in->c);
-    REAL *dx = plane(t->e, t->e->grads, t->l->in, n, c);
+    real *dx = ggn_grad(t, t->l->in, n, c);
 
     for (int r = 0; r < in->h && !t->l->add_in; r++)
         memset(dx + (long)r * in->row, 0, (size_t)in->w * sizeof *dx);
     for (int tap = 0; tap < 9; tap++) {
-        const REAL *d = plane(t->e, t->e->grads, t->l->out, n, 9 * c + tap);
+        const real *d = ggn_grad(t, t->l->out, n, 9 * c + tap);
         for (int r = 0; r < out->h; r++)
             for (int s = 0; s < out->w; s++) {
                 int yy = r * t->l->stride + tap / 3 - t->l->pad, xx = s * t->l->stride + tap % 3 - t->l->pad;
@@ -247,8 +261,10 @@ static void im2col_back_piece(void *data, long i, int worker)
     (void)worker;
 }
 
-static void im2col_backward(struct task *t)
+static void im2col_backward(struct ggn_task *t)
 {
     if (needs_input_grad(t))
-        run(t, (long)t->e->batch * t->e->graph->value[t->l->in].c, im2col_back_piece);
+        ggn_task_run(t, (long)t->e->batch * t->e->graph->value[t->l->in].c, im2col_back_piece);
 }
+
+const struct ggn_layer_passes GGN_LAYER(im2col) = {im2col_forward, im2col_backward};

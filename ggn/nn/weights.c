@@ -1,52 +1,32 @@
-/* Weights of one precision; see nn/weights.h. */
+#include "nn/weights.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "nn/bf16.h"
+#include "nn/exec.h"
+#include "nn/hash.h"
+#include "nn/real.h"
+#include "nn/winograd.h"
 
 enum { ALIGN = 64 };
 
 static size_t padded(size_t n)
 {
-    const size_t unit = ALIGN / sizeof(REAL);
+    const size_t unit = ALIGN / sizeof(real);
     return (n + unit - 1) / unit * unit + unit;
 }
 
-#if REAL_IS_FLOAT
-#define WINOGRAD(isa) (ggn_wino_for(isa) != NULL)
-
-static void pack_forms(struct TYPED(ggn_weights) * w, const struct ggn_layer *l)
+struct ggn_weights *ggn_weights_create(const struct ggn_graph *graph, const struct ggn_kernels *kernels, int flags,
+                                       struct base_err *err)
 {
-    const struct ggn_value *v = &w->graph->value[l->out];
-    int c_in = w->graph->value[l->in].c + (l->in2 >= 0 ? w->graph->value[l->in2].c : 0);
-
-    if (w->bf16 && l->kernel == 3)
-        ggn_bf16_pack(w->bf16 + l->pack, w->pack + l->pack, c_in, v->c, w->kernels->tile_oc);
-    if (!w->wino || l->kernel != 3 || !ggn_wino_suits(c_in, v->c, v->h, v->w))
-        return;
-    ggn_wino_pack(w->wino + 4 * l->pack, w->pack + l->pack, c_in, v->c, w->kernels->tile_oc);
-    if (w->wino_back)
-        ggn_wino_pack(w->wino_back + 4 * l->pack, w->pack_back + l->pack, v->c, c_in, w->kernels->tile_oc);
-}
-#else
-#define WINOGRAD(isa) ((void)(isa), 0)
-
-static void pack_forms(struct TYPED(ggn_weights) * w, const struct ggn_layer *l)
-{
-    (void)w;
-    (void)l;
-}
-#endif
-
-struct TYPED(ggn_weights) * TYPED(ggn_weights_create)(const struct ggn_graph *graph,
-                                                      const struct TYPED(ggn_kernels) * kernels, int flags,
-                                                      struct base_err *err)
-{
-    struct TYPED(ggn_weights) *w = calloc(1, sizeof *w);
-    size_t params = padded(graph->n_params), stats = padded(graph->n_stats), pack = padded(graph->n_pack);
-    const struct TYPED(ggn_kernels) *k = kernels ? kernels : TYPED(ggn_kernels_best)();
-    size_t wino = WINOGRAD(k->isa) ? 4 * pack : 0;
-    size_t bytes = (params + 4 * stats + (flags & GGN_WEIGHTS_BACKWARD ? 2 : 1) * (pack + wino)) * sizeof(REAL);
-    size_t bf16 = flags & GGN_WEIGHTS_BF16 && REAL_IS_FLOAT && ggn_bf16_available() ? pack * sizeof(uint32_t) : 0;
+    struct ggn_weights *w = calloc(1, sizeof *w);
+    size_t learned = padded(graph->n_learned), stats = padded(graph->n_stats), pack = padded(graph->n_pack);
+    const struct ggn_kernels *k = kernels ? kernels : ggn_kernels_best();
+    size_t wino = k->wino ? 4 * pack : 0;
+    size_t bytes = (learned + 2 * stats + (flags & GGN_WEIGHTS_BACKWARD ? 2 : 1) * (pack + wino)) * sizeof(real);
+    size_t bf16 = flags & GGN_WEIGHTS_BF16 && k->bf16 && ggn_bf16_available() ? pack * sizeof(uint32_t) : 0;
     char *memory = w ? calloc(1, bytes + bf16 + ALIGN) : NULL;
 
     if (!memory) {
@@ -57,10 +37,10 @@ struct TYPED(ggn_weights) * TYPED(ggn_weights_create)(const struct ggn_graph *gr
     w->memory = memory;
     w->graph = graph;
     w->kernels = k;
-    w->params = (REAL *)(void *)(memory + (ALIGN - (size_t)memory % ALIGN) % ALIGN);
-    w->mean = w->params + params;
-    w->var = w->mean + stats;
-    w->scale = w->var + stats;
+    w->params = (real *)(void *)(memory + (ALIGN - (size_t)memory % ALIGN) % ALIGN);
+    w->mean = w->params + graph->n_params;
+    w->var = w->mean + graph->n_stats;
+    w->scale = w->params + learned;
     w->shift = w->scale + stats;
     w->pack = w->shift + stats;
     w->wino = wino ? w->pack + pack : NULL;
@@ -72,7 +52,7 @@ struct TYPED(ggn_weights) * TYPED(ggn_weights_create)(const struct ggn_graph *gr
     return w;
 }
 
-void TYPED(ggn_weights_destroy)(struct TYPED(ggn_weights) * w)
+void ggn_weights_destroy(struct ggn_weights *w)
 {
     if (w)
         free(w->memory);
@@ -101,7 +81,7 @@ static double initial(const struct ggn_tensor *t, enum ggn_init init, double fan
     return u / sqrt(fan_in);
 }
 
-void TYPED(ggn_weights_init)(struct TYPED(ggn_weights) * w, enum ggn_init init, uint32_t seed)
+void ggn_weights_init(struct ggn_weights *w, enum ggn_init init, uint32_t seed)
 {
     const struct ggn_graph *g = w->graph;
 
@@ -110,7 +90,7 @@ void TYPED(ggn_weights_init)(struct TYPED(ggn_weights) * w, enum ggn_init init, 
         int transposed = g->layer[t->layer].transposed;
         double fan_in = weight->ndim >= 2 ? (double)(weight->count / (size_t)weight->dim[transposed ? 1 : 0]) : 1;
         for (size_t k = 0; k < t->count; k++)
-            w->params[t->offset + k] = (REAL)initial(t, init, fan_in, (uint32_t)k, seed + (uint32_t)i);
+            w->params[t->offset + k] = (real)initial(t, init, fan_in, (uint32_t)k, seed + (uint32_t)i);
     }
     for (size_t i = 0; i < g->n_stats; i++) {
         w->mean[i] = 0;
@@ -120,10 +100,10 @@ void TYPED(ggn_weights_init)(struct TYPED(ggn_weights) * w, enum ggn_init init, 
 
 /* Tiles of 8, 4, 2, 1 output channels; inside a tile [n_in][taps][tile]. `back` packs the convolution of the backward pass:
  * inputs and outputs swapped, taps mirrored. */
-static void pack_conv(REAL *out, const struct TYPED(ggn_weights) * w, const struct ggn_layer *l, int back)
+static void pack_conv(real *out, const struct ggn_weights *w, const struct ggn_layer *l, int back)
 {
     const struct ggn_graph *g = w->graph;
-    const int c_in = g->value[l->in].c + (l->in2 >= 0 ? g->value[l->in2].c : 0), c_out = g->value[l->out].c;
+    const int c_in = ggn_layer_c_in(g, l), c_out = g->value[l->out].c;
     const int n_in = back ? c_out : c_in, n_out = back ? c_in : c_out, taps = l->kernel * l->kernel;
     /* the stored tensor is [out][in] or [in][out]; its first index is the packed output or the packed input */
     const int o_first = l->transposed == back, flip = l->transposed != back;
@@ -135,7 +115,7 @@ static void pack_conv(REAL *out, const struct TYPED(ggn_weights) * w, const stru
             tile /= 2;
         for (int i = 0; i < n_in; i++)
             for (int t = 0; t < taps; t++) {
-                const REAL *from =
+                const real *from =
                     w->params + l->weight + (size_t)oc * o_step + (size_t)i * i_step + (size_t)(flip ? taps - 1 - t : t);
                 for (int o = 0; o < tile; o++, from += o_step)
                     *out++ = *from;
@@ -143,9 +123,27 @@ static void pack_conv(REAL *out, const struct TYPED(ggn_weights) * w, const stru
     }
 }
 
+/* The faster forms, from the packed one. */
+static void pack_forms(struct ggn_weights *w, const struct ggn_layer *l)
+{
+    const struct ggn_kernels *k = w->kernels;
+    const struct ggn_value *v = &w->graph->value[l->out];
+    const int c_in = ggn_layer_c_in(w->graph, l);
+
+    if (l->kernel != 3)
+        return;
+    if (w->bf16)
+        k->bf16_pack(w->bf16 + l->pack, w->pack + l->pack, c_in, v->c, k->tile_oc);
+    if (!w->wino || !ggn_wino_suits(c_in, v->c, v->h, v->w))
+        return;
+    k->wino_pack(w->wino + 4 * l->pack, w->pack + l->pack, c_in, v->c, k->tile_oc);
+    if (w->wino_back)
+        k->wino_pack(w->wino_back + 4 * l->pack, w->pack_back + l->pack, v->c, c_in, k->tile_oc);
+}
+
 static void pack_layer(void *data, long i, int worker)
 {
-    struct TYPED(ggn_weights) *w = data;
+    struct ggn_weights *w = data;
     const struct ggn_graph *g = w->graph;
     const struct ggn_layer *l = &g->layer[i];
 
@@ -158,22 +156,23 @@ static void pack_layer(void *data, long i, int worker)
     for (int c = 0; l->op == GGN_OP_BN && c < g->value[l->out].c; c++) {
         size_t s = l->stats + (size_t)c;
         double scale = (double)w->params[l->weight + (size_t)c] / sqrt((double)w->var[s] + GGN_BN_EPS);
-        w->scale[s] = (REAL)scale;
-        w->shift[s] = (REAL)((double)w->params[l->bias + (size_t)c] - (double)w->mean[s] * scale);
+        w->scale[s] = (real)scale;
+        w->shift[s] = (real)((double)w->params[l->bias + (size_t)c] - (double)w->mean[s] * scale);
     }
     (void)worker;
 }
 
-void TYPED(ggn_weights_pack_on)(struct TYPED(ggn_weights) * w, struct base_threads *threads)
+void ggn_weights_pack(struct ggn_weights *w, struct base_threads *threads)
 {
     if (threads)
         base_threads_for(threads, w->graph->n_layers, pack_layer, w);
     else
-        TYPED(ggn_weights_pack)(w);
+        for (int i = 0; i < w->graph->n_layers; i++)
+            pack_layer(w, i, 0);
 }
 
-void TYPED(ggn_weights_pack)(struct TYPED(ggn_weights) * w)
+void ggn_weights_copy(struct ggn_weights *w, const real *learned)
 {
-    for (int i = 0; i < w->graph->n_layers; i++)
-        pack_layer(w, i, 0);
+    memcpy(w->params, learned, w->graph->n_learned * sizeof *w->params);
+    ggn_weights_pack(w, NULL);
 }

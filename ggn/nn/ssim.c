@@ -1,23 +1,27 @@
-/* SSIM and its gradient for one precision; see nn/loss.h. */
+#include "nn/ssim.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "nn/kernels.h"
+#include "nn/real.h"
 
 enum { N_TAPS = 2 * GGN_SSIM_RADIUS + 1, N_MAPS = 9, BORDER = 16 };
 
 static const double C1 = 1e-4, C2 = 9e-4, SIGMA = 1.5;
 
-struct TYPED(ggn_ssim) {
-    const struct TYPED(ggn_kernels) * kernels;
+struct ggn_ssim {
+    const struct ggn_kernels *kernels;
     struct base_threads *threads;
     int h, w, row; /* of the zero-bordered maps */
     size_t map;    /* elements of one map */
-    REAL taps[N_TAPS];
+    real taps[N_TAPS];
     float taps_2d[N_TAPS * N_TAPS];
-    REAL *maps; /* [workers][N_MAPS][map]; owns */
+    real *maps; /* [workers][N_MAPS][map]; owns */
     /* of the call in progress */
-    const REAL *const *x, *const *y;
-    REAL *const *dx;
+    const real *const *x, *const *y;
+    real *const *dx;
     int in_row;
     double grad_scale; /* per pixel */
     double *plane_sum; /* [n] */
@@ -26,7 +30,7 @@ struct TYPED(ggn_ssim) {
 /* The published window is an 11×11 array of single-precision products whose sum is 1 − 7e-8. Since σ² = E[x²] − μ² is a
  * small difference, that shows in the fifth digit of SSIM. Double precision, which golden values are compared in, filters
  * with that very array; single precision with separable taps of the same sum. */
-static void make_taps(struct TYPED(ggn_ssim) * s)
+static void make_taps(struct ggn_ssim *s)
 {
     float single[N_TAPS];
     double total = 0, sum = 0, sum_2d = 0;
@@ -40,19 +44,19 @@ static void make_taps(struct TYPED(ggn_ssim) * s)
         sum_2d += (double)s->taps_2d[k];
     }
     for (int k = 0; k < N_TAPS; k++)
-        s->taps[k] = (REAL)((double)single[k] * sqrt(sum_2d) / sum);
+        s->taps[k] = (real)((double)single[k] * sqrt(sum_2d) / sum);
 }
 
-struct TYPED(ggn_ssim) * TYPED(ggn_ssim_create)(int h, int w, struct base_threads *threads, struct base_err *err)
+struct ggn_ssim *ggn_ssim_create(int h, int w, struct base_threads *threads, struct base_err *err)
 {
-    struct TYPED(ggn_ssim) *s = calloc(1, sizeof *s);
+    struct ggn_ssim *s = calloc(1, sizeof *s);
     size_t workers = threads ? (size_t)base_threads_count(threads) : 1;
 
     if (!s) {
         base_fail_nomem(err, "SSIM");
         return NULL;
     }
-    s->kernels = TYPED(ggn_kernels_best)();
+    s->kernels = ggn_kernels_best();
     s->threads = threads;
     s->h = h;
     s->w = w;
@@ -68,7 +72,7 @@ struct TYPED(ggn_ssim) * TYPED(ggn_ssim_create)(int h, int w, struct base_thread
     return s;
 }
 
-void TYPED(ggn_ssim_destroy)(struct TYPED(ggn_ssim) * s)
+void ggn_ssim_destroy(struct ggn_ssim *s)
 {
     if (s)
         free(s->maps);
@@ -78,29 +82,29 @@ void TYPED(ggn_ssim_destroy)(struct TYPED(ggn_ssim) * s)
 enum { X, Y, XX, YY, XY, TMP, MAP_A, MAP_B, MAP_C };
 
 /* Element (0,0) of map m of a worker. */
-static REAL *map_of(const struct TYPED(ggn_ssim) * s, int worker, int m)
+static real *map_of(const struct ggn_ssim *s, int worker, int m)
 {
     return s->maps + ((size_t)worker * N_MAPS + (size_t)m) * s->map + (size_t)(GGN_SSIM_RADIUS * s->row) + BORDER;
 }
 
-static void blur_2d(const struct TYPED(ggn_ssim) * s, REAL *map, REAL *tmp)
+static void blur_2d(const struct ggn_ssim *s, real *map, real *tmp)
 {
     for (int r = 0; r < s->h; r++) {
-        REAL *out = tmp + (long)r * s->row;
+        real *out = tmp + (long)r * s->row;
         memset(out, 0, (size_t)s->w * sizeof *out);
         for (int k = 0; k < N_TAPS * N_TAPS; k++)
-            s->kernels->axpy(out, (REAL)s->taps_2d[k],
+            s->kernels->axpy(out, (real)s->taps_2d[k],
                              map + (long)(r + k / N_TAPS - GGN_SSIM_RADIUS) * s->row + k % N_TAPS - GGN_SSIM_RADIUS, s->w);
     }
     for (int r = 0; r < s->h; r++)
         memcpy(map + (long)r * s->row, tmp + (long)r * s->row, (size_t)s->w * sizeof *map);
 }
 
-static void blur_in_place(const struct TYPED(ggn_ssim) * s, int worker, REAL *map)
+static void blur_in_place(const struct ggn_ssim *s, int worker, real *map)
 {
-    REAL *tmp = map_of(s, worker, TMP);
+    real *tmp = map_of(s, worker, TMP);
 
-    if (sizeof(REAL) == sizeof(double)) {
+    if (sizeof(real) == sizeof(double)) {
         blur_2d(s, map, tmp);
         return;
     }
@@ -111,19 +115,19 @@ static void blur_in_place(const struct TYPED(ggn_ssim) * s, int worker, REAL *ma
 }
 
 /* One row: the SSIM of each pixel is A1·A2 / (B1·B2); the maps become ∂S/∂μx, ∂S/∂E[x²], ∂S/∂E[xy]. */
-static double ssim_row(const struct TYPED(ggn_ssim) * s, int worker, long at)
+static double ssim_row(const struct ggn_ssim *s, int worker, long at)
 {
-    REAL *mx = map_of(s, worker, X) + at, *my = map_of(s, worker, Y) + at, *exx = map_of(s, worker, XX) + at;
-    REAL *eyy = map_of(s, worker, YY) + at, *exy = map_of(s, worker, XY) + at;
-    const REAL c1 = (REAL)C1, c2 = (REAL)C2;
+    real *mx = map_of(s, worker, X) + at, *my = map_of(s, worker, Y) + at, *exx = map_of(s, worker, XX) + at;
+    real *eyy = map_of(s, worker, YY) + at, *exy = map_of(s, worker, XY) + at;
+    const real c1 = (real)C1, c2 = (real)C2;
     double total = 0;
 
     for (int i = 0; i < s->w; i++) {
-        REAL a1 = 2 * mx[i] * my[i] + c1, a2 = 2 * (exy[i] - mx[i] * my[i]) + c2;
-        REAL b1 = mx[i] * mx[i] + my[i] * my[i] + c1;
-        REAL b2 = (exx[i] - mx[i] * mx[i]) + (eyy[i] - my[i] * my[i]) + c2;
-        REAL inv = 1 / (b1 * b2), q = a1 * a2 * inv;
-        REAL d_mean = 2 * my[i] * (a2 - a1) * inv + 2 * mx[i] * q * (1 / b2 - 1 / b1);
+        real a1 = 2 * mx[i] * my[i] + c1, a2 = 2 * (exy[i] - mx[i] * my[i]) + c2;
+        real b1 = mx[i] * mx[i] + my[i] * my[i] + c1;
+        real b2 = (exx[i] - mx[i] * mx[i]) + (eyy[i] - my[i] * my[i]) + c2;
+        real inv = 1 / (b1 * b2), q = a1 * a2 * inv;
+        real d_mean = 2 * my[i] * (a2 - a1) * inv + 2 * mx[i] * q * (1 / b2 - 1 / b1);
         exx[i] = -q / b2;
         exy[i] = 2 * a1 * inv;
         mx[i] = d_mean;
@@ -136,13 +140,13 @@ static double ssim_row(const struct TYPED(ggn_ssim) * s, int worker, long at)
 
 static void ssim_plane(void *data, long i, int worker)
 {
-    const struct TYPED(ggn_ssim) *s = data;
-    REAL *mx = map_of(s, worker, X), *my = map_of(s, worker, Y), *exx = map_of(s, worker, XX), *eyy = map_of(s, worker, YY);
-    REAL *exy = map_of(s, worker, XY);
+    const struct ggn_ssim *s = data;
+    real *mx = map_of(s, worker, X), *my = map_of(s, worker, Y), *exx = map_of(s, worker, XX), *eyy = map_of(s, worker, YY);
+    real *exy = map_of(s, worker, XY);
     double total = 0;
 
     for (int r = 0; r < s->h; r++) {
-        const REAL *x = s->x[i] + (long)r * s->in_row, *y = s->y[i] + (long)r * s->in_row;
+        const real *x = s->x[i] + (long)r * s->in_row, *y = s->y[i] + (long)r * s->in_row;
         long at = (long)r * s->row;
         for (int c = 0; c < s->w; c++) {
             mx[at + c] = x[c];
@@ -166,18 +170,18 @@ static void ssim_plane(void *data, long i, int worker)
     blur_in_place(s, worker, mx);
     blur_in_place(s, worker, exx);
     blur_in_place(s, worker, exy);
-    const REAL scale = (REAL)s->grad_scale;
+    const real scale = (real)s->grad_scale;
     for (int r = 0; r < s->h; r++) {
-        const REAL *x = s->x[i] + (long)r * s->in_row, *y = s->y[i] + (long)r * s->in_row;
-        REAL *dx = s->dx[i] + (long)r * s->in_row;
+        const real *x = s->x[i] + (long)r * s->in_row, *y = s->y[i] + (long)r * s->in_row;
+        real *dx = s->dx[i] + (long)r * s->in_row;
         long at = (long)r * s->row;
         for (int c = 0; c < s->w; c++)
             dx[c] = scale * (mx[at + c] + 2 * x[c] * exx[at + c] + y[c] * exy[at + c]);
     }
 }
 
-double TYPED(ggn_ssim_mean)(struct TYPED(ggn_ssim) * s, const REAL *const *x, const REAL *const *y, REAL *const *dx, int n,
-                            int row, double grad_scale)
+double ggn_ssim_mean(struct ggn_ssim *s, const real *const *x, const real *const *y, real *const *dx, int n, int row,
+                     double grad_scale)
 {
     enum { BATCH = 64 }; /* planes whose sums are kept at a time */
     double sums[BATCH], total = 0, pixels = (double)n * s->h * s->w;

@@ -1,0 +1,143 @@
+#include "nn/exec.h"
+
+#include <stdlib.h>
+
+#include "base/clock.h"
+#include "nn/bf16.h"
+#include "nn/layers.h"
+#include "nn/real.h"
+#include "nn/winograd.h"
+
+enum { ALIGN_BYTES = 64, MAX_TILE_PX = 48 };
+
+/* Elements per worker: the lane sums of one weight gradient task, or one task of a faster form. Vectors have ≤ 64 bytes. */
+static size_t scratch_size(const struct ggn_graph *g, const struct ggn_kernels *k, int flags)
+{
+    size_t need = (size_t)GGN_TILE_MAX * GGN_GRAD_IC * 9 * (64 / sizeof(real)) + 256;
+
+    for (int i = 0; i < g->n_layers; i++) {
+        const struct ggn_layer *l = &g->layer[i];
+        const struct ggn_value *v = &g->value[l->out];
+        const int c_in = ggn_layer_c_in(g, l);
+        const size_t bf16 = ggn_bf16_scratch(c_in, v->row, 16 * MAX_TILE_PX);
+        const size_t wino = ggn_wino_scratch(flags & GGN_EXEC_GRADS && v->c > c_in ? v->c : c_in);
+        if (l->op != GGN_OP_CONV || l->kernel != 3)
+            continue;
+        if (k->bf16 && flags & GGN_EXEC_BF16 && bf16 > need)
+            need = bf16;
+        if (k->wino && ggn_wino_suits(c_in, v->c, v->h, v->w) && wino > need)
+            need = wino;
+    }
+    return (need + 15) / 16 * 16;
+}
+
+/* Where values start among the activations of one image; returns their total. */
+static size_t place_values(const struct ggn_graph *g, int flags, size_t offset[GGN_MAX_LAYERS + 1])
+{
+    if (!(flags & (GGN_EXEC_GRADS | GGN_EXEC_NO_FUSE)))
+        return ggn_graph_place(g, offset);
+    for (int i = 0; i < g->n_values; i++)
+        offset[i] = g->value[i].offset;
+    return g->n_acts;
+}
+
+static size_t total_size(const struct ggn_graph *g, const struct ggn_kernels *k, int capacity, int flags, int workers)
+{
+    size_t offset[GGN_MAX_LAYERS + 1];
+    size_t acts = place_values(g, flags, offset) * (size_t)capacity;
+    return acts * (flags & GGN_EXEC_GRADS ? 2 : 1) + 2 * (g->n_stats + 16) + scratch_size(g, k, flags) * (size_t)workers;
+}
+
+size_t ggn_exec_bytes(const struct ggn_graph *g, int capacity, int flags, int workers)
+{
+    return total_size(g, ggn_kernels_best(), capacity, flags, workers) * sizeof(real) + sizeof(struct ggn_exec);
+}
+
+struct ggn_exec *ggn_exec_create(const struct ggn_graph *graph, const struct ggn_kernels *kernels, int capacity, int flags,
+                                 struct base_threads *threads, struct base_err *err)
+{
+    int workers = threads ? base_threads_count(threads) : 1;
+    const struct ggn_kernels *k = kernels ? kernels : ggn_kernels_best();
+    size_t bytes = total_size(graph, k, capacity, flags, workers) * sizeof(real);
+    struct ggn_exec *e = calloc(1, sizeof *e);
+    /* calloc: fresh pages are zero already, and the zero padding of the layout is never written with anything else */
+    char *memory = e ? calloc(1, bytes + ALIGN_BYTES) : NULL;
+
+    if (!memory) {
+        free(e);
+        base_fail_nomem(err, "network activations");
+        return NULL;
+    }
+    e->graph = graph;
+    e->kernels = k;
+    e->threads = threads;
+    e->capacity = capacity;
+    e->flags = flags;
+    e->memory = memory;
+    e->acts = (real *)(void *)(memory + (ALIGN_BYTES - (size_t)memory % ALIGN_BYTES) % ALIGN_BYTES);
+    e->n_acts = place_values(graph, flags, e->offset);
+    size_t acts = e->n_acts * (size_t)capacity;
+    real *next = e->acts + acts;
+    if (flags & GGN_EXEC_GRADS) {
+        e->grads = next;
+        next += acts;
+    }
+    e->scratch = next;
+    e->scratch_size = scratch_size(graph, k, flags);
+    e->bn_mean = e->scratch + e->scratch_size * (size_t)workers;
+    e->bn_inv = e->bn_mean + graph->n_stats + 16;
+    return e;
+}
+
+void ggn_exec_destroy(struct ggn_exec *e)
+{
+    if (e)
+        free(e->memory);
+    free(e);
+}
+
+real *ggn_exec_plane(const struct ggn_exec *e, int value, int n, int c)
+{
+    return ggn_plane_in(e, e->acts, value, n, c);
+}
+
+real *ggn_exec_grad(const struct ggn_exec *e, int value, int n, int c)
+{
+    return ggn_plane_in(e, e->grads, value, n, c);
+}
+
+#define PASSES(op, name, text) [GGN_OP_##op] = &GGN_LAYER(name),
+static const struct ggn_layer_passes *const passes[] = {GGN_OPS(PASSES)};
+
+/* The batch norm that layer i, a convolution, can apply itself when nobody else reads its output. */
+static const struct ggn_layer *fusible_bn(const struct ggn_exec *e, int i)
+{
+    const struct ggn_layer *l = &e->graph->layer[i];
+
+    if (e->mode != GGN_EVAL || (e->flags & (GGN_EXEC_GRADS | GGN_EXEC_NO_FUSE)) || l->op != GGN_OP_CONV ||
+        i + 1 >= e->graph->n_layers || l[1].op != GGN_OP_BN || l[1].in != l->out || e->graph->value[l->out].uses != 1)
+        return NULL;
+    return l + 1;
+}
+
+void ggn_exec_forward(struct ggn_exec *e, struct ggn_weights *weights, int batch, enum ggn_mode mode)
+{
+    e->batch = batch;
+    e->mode = mode;
+    for (int i = 0; i < e->graph->n_layers; i++) {
+        struct ggn_task t = {.e = e, .w = weights, .l = &e->graph->layer[i], .bn = fusible_bn(e, i)};
+        double start = e->layer_s ? base_clock_wall_s() : 0;
+        passes[t.l->op]->forward(&t);
+        if (e->layer_s)
+            e->layer_s[i] += base_clock_wall_s() - start;
+        i += t.bn != NULL;
+    }
+}
+
+void ggn_exec_backward(struct ggn_exec *e, const struct ggn_weights *weights, real *params_grad)
+{
+    for (int i = e->graph->n_layers - 1; i >= 0; i--) {
+        struct ggn_task t = {.e = e, .w = (struct ggn_weights *)(size_t)weights, .l = &e->graph->layer[i], .g = params_grad};
+        passes[t.l->op]->backward(&t);
+    }
+}

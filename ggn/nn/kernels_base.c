@@ -1,0 +1,5 @@
+/* The kernels for any processor: vectors of 16 bytes through the compiler's vector extension. */
+#include "nn/real.h"
+
+#define TABLE ggn_kernels_base
+#include "nn/kernels_body.h"

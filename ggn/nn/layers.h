@@ -1,0 +1,59 @@
+/*
+ * What the layers are made of; private to nn/exec*.c. Each layer of GGN_OPS defines GGN_LAYER(its name): a forward and a
+ * backward pass over the batch of an executor, cut into tasks by shape only.
+ */
+#ifndef GGN_NN_LAYERS_H
+#define GGN_NN_LAYERS_H
+
+#include "nn/exec.h"
+
+/* What the tasks of one layer share. */
+struct ggn_task {
+    struct ggn_exec *e;
+    struct ggn_weights *w;
+    const struct ggn_layer *l;
+    const struct ggn_layer *bn;         /* CONV: the batch norm that follows and is applied on the way, or NULL */
+    real *g;                            /* gradient of the parameters */
+    int px_blocks, oc_groups, oc_group; /* how a convolution is cut */
+    long px_block;
+    const real *wino;     /* CONV: transformed weights when Winograd's algorithm is used */
+    const uint32_t *bf16; /* CONV: pairs of weights when bfloat16 is used */
+};
+
+struct ggn_layer_passes {
+    void (*forward)(struct ggn_task *task);
+    void (*backward)(struct ggn_task *task);
+};
+#define GGN_LAYER(name) GGN_TYPED(ggn_layer_##name)
+#define GGN_LAYER_DECLARE(op, name, text) extern const struct ggn_layer_passes GGN_LAYER(name);
+GGN_OPS(GGN_LAYER_DECLARE)
+
+/* Runs fn(task, i, worker) for i < n. */
+static inline void ggn_task_run(const struct ggn_task *t, long n, void (*fn)(void *task, long i, int worker))
+{
+    if (t->e->threads) {
+        base_threads_for(t->e->threads, n, fn, (void *)(size_t)t);
+        return;
+    }
+    for (long i = 0; i < n; i++)
+        fn((void *)(size_t)t, i, 0);
+}
+
+/* Element (0,0) of plane c of a value of image n, among the activations or their gradients. */
+static inline real *ggn_plane_in(const struct ggn_exec *e, real *base, int value, long n, int c)
+{
+    const struct ggn_value *v = &e->graph->value[value];
+    return base + (size_t)n * e->n_acts + e->offset[value] + v->origin + (size_t)c * v->plane;
+}
+
+static inline real *ggn_act(const struct ggn_task *t, int value, long n, int c)
+{
+    return ggn_plane_in(t->e, t->e->acts, value, n, c);
+}
+
+static inline real *ggn_grad(const struct ggn_task *t, int value, long n, int c)
+{
+    return ggn_plane_in(t->e, t->e->grads, value, n, c);
+}
+
+#endif
