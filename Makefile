@@ -43,6 +43,7 @@ LDFLAGS_ALL  = -pthread $(SAN_$(MODE)) $(LDFLAGS)
 EXR_CFLAGS  := $(shell $(PKG) --cflags OpenEXR 2>/dev/null)
 BLAS_CFLAGS := $(shell $(PKG) --cflags openblas 2>/dev/null)
 PT_LIBS  := -lembree3 -lOpenEXRCore-3_1 -lOpenImageIO -lOpenImageIO_Util -lcjson -lz -ldl -lstdc++ -lm
+STUDY_LIBS := -lmicrohttpd -lsqlite3
 GGN_LIBS := -lopenblas -llapacke -lsvm -lOpenImageIO -lOpenImageIO_Util -lcjson -lz -lstdc++ -lm
 
 # --- include paths: the dependency arrows --------------------------------------------------------------------------------
@@ -65,10 +66,11 @@ EXAMPLE_SRC := $(wildcard plugin-api/examples/*.c)
 TOOL_SRC    := $(wildcard plugin-api/tools/*.c)
 PT_SRC      := $(wildcard pathtracer/*/*.c pathtracer/*/*.cpp)
 PT_MAIN     := $(wildcard pathtracer/*.c)
-GGN_SRC     := $(filter-out ggn/plugin/% ggn/cli/%,$(wildcard ggn/*/*.c ggn/*/*.cpp))
+GGN_SRC     := $(filter-out ggn/plugin/% ggn/study/% ggn/cli/%,$(wildcard ggn/*/*.c ggn/*/*.cpp))
 # What includes nn/real.h itself is compiled for float and, with GGN_DOUBLE, for double.
 GGN_TWICE   := $(shell grep -ls '"nn/real.h"' ggn/nn/*.c ggn/model/*.c tests/support/*.c)
 GGN_PLUGIN  := $(wildcard ggn/plugin/*.c)
+GGN_STUDY   := $(wildcard ggn/study/*.c)# the only user of STUDY_LIBS: not in ggn.so
 GGN_CLI     := $(wildcard ggn/cli/*.c)
 # Tests name what they test by prefix: pt_ (path tracer), ggn_, api_ (plugin-api).
 TEST_SRC    := $(wildcard tests/unit/*.c tests/grad/*.c tests/golden/*.c tests/stat/*.c tests/abi/*.c tests/hard/*.c tests/oom/*.c)
@@ -83,6 +85,7 @@ PT_OBJ      := $(call o,$(PT_SRC)) $(BASE_OBJ)
 LOADER_OBJ  := $(call o,$(LOADER_SRC))
 GGN_OBJ     := $(call o,$(GGN_SRC)) $(BASE_OBJ)
 GGN_PLUGIN_OBJ := $(call o,$(GGN_PLUGIN))
+GGN_STUDY_OBJ := $(call o,$(GGN_STUDY))
 
 PROGRAMS := $(if $(PT_MAIN),$(BIN)/pathtracer) $(if $(GGN_CLI),$(BIN)/ggn) $(if $(TOOL_SRC),$(BIN)/lull-check)
 CRITERIA := $(EXAMPLE_SRC:plugin-api/examples/%.c=$(LIB)/%.so) $(if $(GGN_PLUGIN),$(LIB)/ggn.so)
@@ -128,8 +131,8 @@ so   = @mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--version-script=plu
 
 $(BIN)/pathtracer: $(call o,$(PT_MAIN)) $(PT_OBJ) $(LOADER_OBJ)
 	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) -o $@
-$(BIN)/ggn: $(call o,$(GGN_CLI)) $(GGN_OBJ)
-	$(link) $^ $(LDFLAGS_ALL) $(GGN_LIBS) -o $@
+$(BIN)/ggn: $(call o,$(GGN_CLI)) $(GGN_STUDY_OBJ) $(GGN_OBJ)
+	$(link) $^ $(LDFLAGS_ALL) $(STUDY_LIBS) $(GGN_LIBS) -o $@
 $(BIN)/lull-check: $(call o,$(TOOL_SRC)) $(LOADER_OBJ)
 	$(link) $^ $(LDFLAGS_ALL) -ldl -lm -o $@
 $(LIB)/ggn.so: $(GGN_PLUGIN_OBJ) $(GGN_OBJ) plugin-api/plugin.map
@@ -147,6 +150,8 @@ $(OUT)/tests/$(1)/pt_%: $(OBJ)/tests/$(1)/pt_%.c.o $(PT_OBJ) $(LOADER_OBJ) $(SUP
 	$$(link) $$^ $$(LDFLAGS_ALL) $(PT_LIBS) -lcmocka -o $$@
 $(OUT)/tests/$(1)/ggn_%: $(OBJ)/tests/$(1)/ggn_%.c.o $(GGN_OBJ) $(SUPPORT_ggn)
 	$$(link) $$^ $$(LDFLAGS_ALL) $(GGN_LIBS) -lcmocka -o $$@
+$(OUT)/tests/$(1)/ggn_study%: $(OBJ)/tests/$(1)/ggn_study%.c.o $(GGN_STUDY_OBJ) $(GGN_OBJ) $(SUPPORT_ggn)
+	$$(link) $$^ $$(LDFLAGS_ALL) $(STUDY_LIBS) $(GGN_LIBS) -lcmocka -o $$@
 $(OUT)/tests/$(1)/api_%: $(OBJ)/tests/$(1)/api_%.c.o $(LOADER_OBJ) $(SUPPORT_api)
 	$$(link) $$^ $$(LDFLAGS_ALL) -ldl -lm -lcmocka -o $$@
 endef
@@ -158,6 +163,8 @@ $(OUT)/tests/abi/plugins/%.so: $(OBJ)/tests/abi/plugins/%.c.o
 $(patsubst tests/%.c,$(OUT)/tests/%,$(wildcard tests/abi/api_*.c)): | $(ABI_PLUGINS) $(CRITERIA)
 $(OUT)/fuzz/replay-pt_%: $(OBJ)/tests/fuzz/pt_%.c.o $(OBJ)/tests/fuzz/replay.c.o $(PT_OBJ) $(LOADER_OBJ)
 	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) -o $@
+$(OUT)/fuzz/replay-ggn_study%: $(OBJ)/tests/fuzz/ggn_study%.c.o $(OBJ)/tests/fuzz/replay.c.o $(GGN_STUDY_OBJ) $(GGN_OBJ)
+	$(link) $^ $(LDFLAGS_ALL) $(STUDY_LIBS) $(GGN_LIBS) -o $@
 $(OUT)/fuzz/replay-ggn_%: $(OBJ)/tests/fuzz/ggn_%.c.o $(OBJ)/tests/fuzz/replay.c.o $(GGN_OBJ)
 	$(link) $^ $(LDFLAGS_ALL) $(GGN_LIBS) -o $@
 
@@ -192,6 +199,8 @@ fuzz: ## fuzz each target for FUZZ_SECONDS (default 60) under ASan+UBSan; needs 
 fuzzers: $(FUZZERS)
 build/fuzz/pt_%: $(OBJ)/tests/fuzz/pt_%.c.o $(PT_OBJ) $(LOADER_OBJ)
 	$(link) -fsanitize=fuzzer $^ $(LDFLAGS_ALL) $(PT_LIBS) -o $@
+build/fuzz/ggn_study%: $(OBJ)/tests/fuzz/ggn_study%.c.o $(GGN_STUDY_OBJ) $(GGN_OBJ)
+	$(link) -fsanitize=fuzzer $^ $(LDFLAGS_ALL) $(STUDY_LIBS) $(GGN_LIBS) -o $@
 build/fuzz/ggn_%: $(OBJ)/tests/fuzz/ggn_%.c.o $(GGN_OBJ)
 	$(link) -fsanitize=fuzzer $^ $(LDFLAGS_ALL) $(GGN_LIBS) -o $@
 
@@ -225,10 +234,13 @@ install: all ## install under $(DESTDIR)$(PREFIX)
 	install -m 644 $(wildcard docs/man/*.1) $(DESTDIR)$(PREFIX)/share/man/man1
 	install -m 644 $(wildcard docs/man/*.7) $(DESTDIR)$(PREFIX)/share/man/man7
 	$(if $(wildcard ggn/models/*.ggn),install -d $(DESTDIR)$(PREFIX)/share/lull && install -m 644 $(wildcard ggn/models/*.ggn) $(DESTDIR)$(PREFIX)/share/lull)
+	install -d $(DESTDIR)$(PREFIX)/share/lull/study/vendor
+	install -m 644 $(wildcard ggn/study/page/*.*) $(DESTDIR)$(PREFIX)/share/lull/study
+	install -m 644 $(wildcard ggn/study/page/vendor/*) $(DESTDIR)$(PREFIX)/share/lull/study/vendor
 	sed 's|@PREFIX@|$(PREFIX)|g' plugin-api/lull-criterion.pc.in > $(DESTDIR)$(PREFIX)/lib/pkgconfig/lull-criterion.pc
 
 compdb: ## write compile_commands.json
-	@{ echo '['; sep=; for f in $(BASE_SRC) $(PT_SRC) $(PT_MAIN) $(GGN_SRC) $(GGN_PLUGIN) $(GGN_CLI) $(LOADER_SRC) $(EXAMPLE_SRC) $(TOOL_SRC); do \
+	@{ echo '['; sep=; for f in $(BASE_SRC) $(PT_SRC) $(PT_MAIN) $(GGN_SRC) $(GGN_PLUGIN) $(GGN_STUDY) $(GGN_CLI) $(LOADER_SRC) $(EXAMPLE_SRC) $(TOOL_SRC); do \
 	  printf '%s' "$$sep"; $(MAKE) --no-print-directory -s compdb-one F=$$f; sep=,; done; echo ']'; } > compile_commands.json
 .PHONY: compdb-one
 compdb-one:

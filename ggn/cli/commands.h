@@ -24,7 +24,8 @@
     X(label, "thresholds for recorded sequences: human, or a model observer's") \
     X(train, "train a stopping criterion on block sequences") \
     X(evaluate, "figures of models and baselines on recorded sequences") \
-    X(reconstruct, "the picture with each block at its threshold")
+    X(reconstruct, "the picture with each block at its threshold") \
+    X(study, "ask people for thresholds and judgements, on a local page")
 
 #define GGN_DECLARE_COMMAND(name, help) int ggn_cmd_##name(int argc, char **argv);
 GGN_COMMANDS(GGN_DECLARE_COMMAND)

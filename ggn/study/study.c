@@ -1,0 +1,341 @@
+#include "study/study.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/files.h"
+#include "base/json.h"
+
+enum { MAX_TEXT = 1 << 26 };
+
+const char *const ggn_study_task_names[3] = {"adjustment", "2ifc", "validation"};
+
+void ggn_study_release(struct ggn_study *s)
+{
+    for (int v = 0; v < s->n_views && s->views; v++) {
+        for (int b = 0; b < s->views[v].n_blocks && s->views[v].blocks; b++)
+            free(s->views[v].blocks[b].levels);
+        free(s->views[v].blocks);
+    }
+    free(s->views);
+    free(s->conditions);
+    *s = (struct ggn_study){0};
+}
+
+int ggn_study_plain_name(const char *name)
+{
+    size_t n = strlen(name);
+    if (n == 0 || n >= GGN_STUDY_NAME || name[0] == '.')
+        return 0;
+    return strspn(name, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._-") == n;
+}
+
+int ggn_study_level(const struct ggn_study_block *block, uint32_t spp)
+{
+    for (int i = 0; i < block->n_levels; i++)
+        if (block->levels[i] == spp)
+            return i;
+    return -1;
+}
+
+int ggn_study_find_view(const struct ggn_study *study, const char *name)
+{
+    for (int i = 0; i < study->n_views; i++)
+        if (strcmp(study->views[i].name, name) == 0)
+            return i;
+    return -1;
+}
+
+int ggn_study_find_block(const struct ggn_study_view *view, uint32_t id)
+{
+    for (int i = 0; i < view->n_blocks; i++)
+        if (view->blocks[i].id == id)
+            return i;
+    return -1;
+}
+
+/* --- reading --- */
+
+struct reader {
+    const char *path;
+    struct base_err *err;
+};
+
+/* A number in [lo, hi]; whole: it must be one. */
+static int number(const struct reader *r, const cJSON *o, const char *name, double lo, double hi, int whole, double *out)
+{
+    const cJSON *v = cJSON_GetObjectItemCaseSensitive(o, name);
+    if (!cJSON_IsNumber(v) || !(v->valuedouble >= lo && v->valuedouble <= hi) || (whole && floor(v->valuedouble) != v->valuedouble))
+        return base_fail(r->err, BASE_EINVAL, "%s: '%s' must be a %snumber in %g … %g", r->path, name, whole ? "whole " : "", lo, hi);
+    *out = v->valuedouble;
+    return 0;
+}
+
+static int whole(const struct reader *r, const cJSON *o, const char *name, double lo, double hi, int *out)
+{
+    double value = 0.0;
+    int rc = number(r, o, name, lo, hi, 1, &value);
+    *out = (int)value;
+    return rc;
+}
+
+static int pixels(const struct reader *r, const cJSON *o, const char *name, double lo, uint32_t *out)
+{
+    double value = 0.0;
+    int rc = number(r, o, name, lo, 32768.0, 1, &value);
+    *out = (uint32_t)value;
+    return rc;
+}
+
+static int plain_name(const struct reader *r, const cJSON *v, char out[GGN_STUDY_NAME])
+{
+    if (!cJSON_IsString(v) || !ggn_study_plain_name(v->valuestring))
+        return base_fail(r->err, BASE_EINVAL, "%s: a name must be 1 … %d letters, digits, '.', '_' or '-'", r->path, GGN_STUDY_NAME - 1);
+    strcpy(out, v->valuestring);
+    return 0;
+}
+
+/* The array `name` of o, with 1 … max entries; NULL and an error otherwise. */
+static const cJSON *list(const struct reader *r, const cJSON *o, const char *name, int max)
+{
+    const cJSON *v = cJSON_GetObjectItemCaseSensitive(o, name);
+    int n = cJSON_IsArray(v) ? cJSON_GetArraySize(v) : 0;
+    if (n >= 1 && n <= max)
+        return v;
+    base_fail(r->err, BASE_EINVAL, "%s: '%s' must be a list of 1 … %d", r->path, name, max);
+    return NULL;
+}
+
+static int read_block(const struct reader *r, const cJSON *o, const struct ggn_study_view *view, struct ggn_study_block *b)
+{
+    const cJSON *levels = list(r, o, "levels", GGN_STUDY_MAX_LEVELS), *level;
+    int rc = levels ? pixels(r, o, "id", 0, &b->id) : BASE_EINVAL;
+    if (!rc)
+        rc = pixels(r, o, "x0", 0, &b->x0);
+    if (!rc)
+        rc = pixels(r, o, "y0", 0, &b->y0);
+    if (!rc)
+        rc = pixels(r, o, "x1", 1, &b->x1);
+    if (!rc)
+        rc = pixels(r, o, "y1", 1, &b->y1);
+    if (rc)
+        return rc;
+    if (b->x1 <= b->x0 || b->y1 <= b->y0 || b->x1 > view->width || b->y1 > view->height)
+        return base_fail(r->err, BASE_EINVAL, "%s: block %u does not lie inside %s", r->path, b->id, view->name);
+    b->levels = malloc((size_t)cJSON_GetArraySize(levels) * sizeof *b->levels);
+    if (!b->levels)
+        return base_fail_nomem(r->err, r->path);
+    cJSON_ArrayForEach(level, levels) {
+        double spp = cJSON_IsNumber(level) ? level->valuedouble : 0.0;
+        if (!(spp >= 1.0 && spp <= 1e9) || floor(spp) != spp || (b->n_levels > 0 && spp <= b->levels[b->n_levels - 1]))
+            return base_fail(r->err, BASE_EINVAL, "%s: levels of block %u must be rising whole numbers from 1", r->path, b->id);
+        b->levels[b->n_levels++] = (uint32_t)spp;
+    }
+    return 0;
+}
+
+static int read_view(const struct reader *r, const cJSON *o, enum ggn_study_task task, struct ggn_study_view *view)
+{
+    int rc = plain_name(r, cJSON_GetObjectItemCaseSensitive(o, "name"), view->name);
+    if (!rc)
+        rc = pixels(r, o, "width", 1, &view->width);
+    if (!rc)
+        rc = pixels(r, o, "height", 1, &view->height);
+    if (rc || task == GGN_STUDY_VALIDATION)
+        return rc;
+    const cJSON *blocks = list(r, o, "blocks", GGN_STUDY_MAX_BLOCKS), *block;
+    if (!blocks)
+        return BASE_EINVAL;
+    view->blocks = calloc((size_t)cJSON_GetArraySize(blocks), sizeof *view->blocks);
+    if (!view->blocks)
+        return base_fail_nomem(r->err, r->path);
+    cJSON_ArrayForEach(block, blocks) {
+        struct ggn_study_block *b = &view->blocks[view->n_blocks++];
+        rc = read_block(r, block, view, b);
+        if (!rc && view->n_blocks > 1 && b->id <= b[-1].id)
+            rc = base_fail(r->err, BASE_EINVAL, "%s: ids of blocks must rise", r->path);
+        if (rc)
+            return rc;
+    }
+    return 0;
+}
+
+static int read_views(const struct reader *r, const cJSON *root, struct ggn_study *s)
+{
+    const cJSON *views = list(r, root, "views", GGN_STUDY_MAX_VIEWS), *view;
+    if (!views)
+        return BASE_EINVAL;
+    s->views = calloc((size_t)cJSON_GetArraySize(views), sizeof *s->views);
+    if (!s->views)
+        return base_fail_nomem(r->err, r->path);
+    cJSON_ArrayForEach(view, views) {
+        struct ggn_study_view *v = &s->views[s->n_views++];
+        int rc = read_view(r, view, s->task, v);
+        if (!rc && ggn_study_find_view(s, v->name) != s->n_views - 1)
+            rc = base_fail(r->err, BASE_EINVAL, "%s: two views are called %s", r->path, v->name);
+        if (rc)
+            return rc;
+    }
+    return 0;
+}
+
+static int read_conditions(const struct reader *r, const cJSON *root, struct ggn_study *s)
+{
+    const cJSON *conditions = list(r, root, "conditions", GGN_STUDY_MAX_CONDITIONS), *condition;
+    if (!conditions)
+        return BASE_EINVAL;
+    s->conditions = calloc((size_t)cJSON_GetArraySize(conditions), sizeof *s->conditions);
+    if (!s->conditions)
+        return base_fail_nomem(r->err, r->path);
+    cJSON_ArrayForEach(condition, conditions) {
+        int rc = plain_name(r, condition, s->conditions[s->n_conditions]);
+        if (rc)
+            return rc;
+        s->n_conditions++;
+    }
+    return 0;
+}
+
+static int read_head(const struct reader *r, const cJSON *root, struct ggn_study *s)
+{
+    const cJSON *format = cJSON_GetObjectItemCaseSensitive(root, "format"), *id = cJSON_GetObjectItemCaseSensitive(root, "id");
+    const cJSON *task = cJSON_GetObjectItemCaseSensitive(root, "task");
+    int version, found = 0;
+    double seed = 0.0;
+    if (!cJSON_IsString(format) || strcmp(format->valuestring, "lull-study") != 0)
+        return base_fail(r->err, BASE_EINVAL, "%s: not a study file", r->path);
+    if (!cJSON_IsString(id) || strlen(id->valuestring) != 32 || strspn(id->valuestring, "0123456789abcdef") != 32)
+        return base_fail(r->err, BASE_EINVAL, "%s: 'id' must be 32 hex digits", r->path);
+    strcpy(s->id, id->valuestring);
+    for (int i = 0; i < 3 && cJSON_IsString(task) && !found; i++) {
+        found = strcmp(task->valuestring, ggn_study_task_names[i]) == 0;
+        s->task = (enum ggn_study_task)i;
+    }
+    if (!found)
+        return base_fail(r->err, BASE_EINVAL, "%s: 'task' must be adjustment, 2ifc or validation", r->path);
+    int rc = whole(r, root, "version", 1, 1, &version);
+    if (!rc)
+        rc = number(r, root, "seed", 0, 9007199254740991.0, 1, &seed);
+    s->seed = (uint64_t)seed;
+    return rc;
+}
+
+static int read_numbers(const struct reader *r, const cJSON *root, struct ggn_study *s)
+{
+    int rc = whole(r, root, "trials", 1, 1000, &s->trials);
+    if (!rc)
+        rc = whole(r, root, "repeats", 1, 100, &s->repeats);
+    if (!rc)
+        rc = number(r, root, "catch_share", 0, 0.5, 0, &s->catch_share);
+    if (!rc)
+        rc = whole(r, root, "show_ms", 1, 60000, &s->show_ms);
+    if (!rc)
+        rc = whole(r, root, "gap_ms", 1, 60000, &s->gap_ms);
+    if (!rc)
+        rc = whole(r, root, "break_every", 0, 100000, &s->break_every);
+    if (!rc)
+        rc = number(r, root, "min_catch_passed", 0, 1, 0, &s->min_catch_passed);
+    if (!rc)
+        rc = number(r, root, "max_untouched", 0, 1, 0, &s->max_untouched);
+    return rc;
+}
+
+int ggn_study_parse(const char *path, const char *text, size_t size, struct ggn_study *study, struct base_err *err)
+{
+    struct ggn_study s = {0};
+    struct reader r = {path, err};
+    cJSON *root = cJSON_ParseWithLength(text, size);
+    int rc = cJSON_IsObject(root) ? 0 : base_fail(err, BASE_EINVAL, "%s: not a JSON object", path);
+    if (!rc)
+        rc = read_head(&r, root, &s);
+    if (!rc)
+        rc = read_numbers(&r, root, &s);
+    if (!rc)
+        rc = read_views(&r, root, &s);
+    if (!rc && s.task == GGN_STUDY_VALIDATION)
+        rc = read_conditions(&r, root, &s);
+    cJSON_Delete(root);
+    if (!rc)
+        *study = s;
+    else
+        ggn_study_release(&s);
+    return rc;
+}
+
+int ggn_study_read(const char *dir, struct ggn_study *study, struct base_err *err)
+{
+    char path[4096], *text = NULL;
+    size_t size;
+    int rc = base_file_join(path, dir, "study.json", err);
+    if (!rc)
+        rc = base_file_read(path, MAX_TEXT, &text, &size, err);
+    if (!rc)
+        rc = ggn_study_parse(path, text, size, study, err);
+    free(text);
+    return rc;
+}
+
+/* --- writing --- */
+
+static void add_view(cJSON *views, const struct ggn_study *s, const struct ggn_study_view *v, int *failed)
+{
+    cJSON *o = base_json_object(views, NULL, failed), *blocks = NULL;
+    base_json_text(o, "name", v->name, failed);
+    base_json_number(o, "width", v->width, failed);
+    base_json_number(o, "height", v->height, failed);
+    if (s->task != GGN_STUDY_VALIDATION)
+        blocks = base_json_array(o, "blocks", failed);
+    for (int i = 0; i < v->n_blocks; i++) {
+        const struct ggn_study_block *b = &v->blocks[i];
+        cJSON *block = base_json_object(blocks, NULL, failed);
+        base_json_number(block, "id", b->id, failed);
+        base_json_number(block, "x0", b->x0, failed);
+        base_json_number(block, "y0", b->y0, failed);
+        base_json_number(block, "x1", b->x1, failed);
+        base_json_number(block, "y1", b->y1, failed);
+        cJSON *levels = base_json_array(block, "levels", failed);
+        for (int l = 0; l < b->n_levels; l++)
+            base_json_number(levels, NULL, b->levels[l], failed);
+    }
+}
+
+char *ggn_study_print(const struct ggn_study *s)
+{
+    int failed = 0;
+    cJSON *root = cJSON_CreateObject(), *conditions = NULL;
+    base_json_text(root, "format", "lull-study", &failed);
+    base_json_number(root, "version", 1, &failed);
+    base_json_text(root, "id", s->id, &failed);
+    base_json_text(root, "task", ggn_study_task_names[s->task], &failed);
+    base_json_number(root, "seed", (double)s->seed, &failed);
+    base_json_number(root, "trials", s->trials, &failed);
+    base_json_number(root, "repeats", s->repeats, &failed);
+    base_json_number(root, "catch_share", s->catch_share, &failed);
+    base_json_number(root, "show_ms", s->show_ms, &failed);
+    base_json_number(root, "gap_ms", s->gap_ms, &failed);
+    base_json_number(root, "break_every", s->break_every, &failed);
+    base_json_number(root, "min_catch_passed", s->min_catch_passed, &failed);
+    base_json_number(root, "max_untouched", s->max_untouched, &failed);
+    if (s->task == GGN_STUDY_VALIDATION)
+        conditions = base_json_array(root, "conditions", &failed);
+    for (int i = 0; i < s->n_conditions; i++)
+        base_json_text(conditions, NULL, s->conditions[i], &failed);
+    cJSON *views = base_json_array(root, "views", &failed);
+    for (int i = 0; i < s->n_views; i++)
+        add_view(views, s, &s->views[i], &failed);
+    char *text = root && !failed ? cJSON_Print(root) : NULL;
+    cJSON_Delete(root);
+    return text;
+}
+
+int ggn_study_write(const char *dir, const struct ggn_study *s, struct base_err *err)
+{
+    char path[4096], *text = ggn_study_print(s);
+    int rc = text ? base_file_join(path, dir, "study.json", err) : base_fail_nomem(err, dir);
+    if (!rc)
+        rc = base_file_write_line(path, text, err);
+    free(text);
+    return rc;
+}

@@ -1,0 +1,79 @@
+/*
+ * The definition of one study: what is shown, how often, and what counts. DIR/study.json; its form is ggn/study/FORMAT.md.
+ *
+ * A study is written once by `ggn study init` and read by everything else. Beside it lie DIR/texts.json (what the page says),
+ * DIR/stimuli (lossless pictures) and DIR/study.db (people and trials, ggn/study/store.h). Immutable after reading, so any
+ * number of threads may read one object.
+ */
+#ifndef GGN_STUDY_STUDY_H
+#define GGN_STUDY_STUDY_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "base/err.h"
+
+enum {
+    GGN_STUDY_NAME = 96,          /* bytes of a name, the NUL included */
+    GGN_STUDY_MAX_VIEWS = 1024,
+    GGN_STUDY_MAX_BLOCKS = 4096,  /* of one view */
+    GGN_STUDY_MAX_LEVELS = 1024,  /* of one block */
+    GGN_STUDY_MAX_CONDITIONS = 64,
+    GGN_STUDY_MAX_TRIALS = 200000 /* of one person */
+};
+
+enum ggn_study_task {
+    GGN_STUDY_ADJUSTMENT,   /* whole picture: the samples of the block under the pointer are set until it looks the same */
+    GGN_STUDY_TWO_INTERVAL, /* one block: which of two intervals has the noise; QUEST+ chooses the samples */
+    GGN_STUDY_VALIDATION    /* whole picture against its reference: same or different, and how disturbing */
+};
+
+struct ggn_study_block {
+    uint32_t id, x0, y0, x1, y1; /* pixels; x1, y1 exclusive */
+    int n_levels;
+    uint32_t *levels; /* owns; samples per pixel, strictly rising */
+};
+
+struct ggn_study_view {
+    char name[GGN_STUDY_NAME];
+    uint32_t width, height; /* pixels */
+    int n_blocks;           /* 0 in a validation */
+    struct ggn_study_block *blocks; /* owns; ids strictly rising */
+};
+
+struct ggn_study {
+    char id[33]; /* 32 hex digits, made at init: trials are imported into their own study only */
+    enum ggn_study_task task;
+    uint64_t seed;   /* below 2^53, so that JSON keeps it: the order of every person follows from it and from their number */
+    int trials;      /* per block, catch trials included (two-interval) */
+    int repeats;     /* settings per block (adjustment), judgements per picture (validation) */
+    double catch_share;
+    int show_ms, gap_ms; /* two-interval: each interval, and the blank between them */
+    int break_every;     /* trials between offered breaks; 0: none */
+    double min_catch_passed, max_untouched; /* exclusion rules, shares: see FORMAT.md */
+    int n_views;
+    struct ggn_study_view *views; /* owns */
+    int n_conditions;             /* validation; each view has a picture of each */
+    char (*conditions)[GGN_STUDY_NAME]; /* owns */
+};
+
+extern const char *const ggn_study_task_names[3]; /* "adjustment", "2ifc", "validation" */
+
+/* Reads and checks DIR/study.json. */
+int ggn_study_read(const char *dir, struct ggn_study *study, struct base_err *err);
+int ggn_study_parse(const char *path, const char *text, size_t size, struct ggn_study *study, struct base_err *err);
+/* Writes DIR/study.json atomically. */
+int ggn_study_write(const char *dir, const struct ggn_study *study, struct base_err *err);
+/* The same as text (malloc, caller frees); NULL when out of memory. */
+char *ggn_study_print(const struct ggn_study *study);
+void ggn_study_release(struct ggn_study *study);
+
+/* Letters, digits, '.', '_', '-', not starting with '.': what may stand in a file name or an address. */
+int ggn_study_plain_name(const char *name);
+/* Index of a level in the block, or -1. */
+int ggn_study_level(const struct ggn_study_block *block, uint32_t spp);
+/* Index of a view by name, of a block by id, or -1. */
+int ggn_study_find_view(const struct ggn_study *study, const char *name);
+int ggn_study_find_block(const struct ggn_study_view *view, uint32_t id);
+
+#endif
