@@ -1,40 +1,51 @@
 /*
- * Fitting the model observer to human thresholds, with errors that were not fitted.
+ * Fitting the observer to human thresholds, judged on views that had no part in the fit.
+ *
+ * At a human threshold noise is just not visible: log(visible noise there) = log(level) + exponent * log(texture + 2), least squares
+ * over the blocks of all views, those at the cap left out (nothing is known but that people still saw noise). Every figure of the
+ * table is of a view that was left out of its own fit.
  */
 #ifndef GGN_OBSERVER_CALIBRATE_H
 #define GGN_OBSERVER_CALIBRATE_H
 
 #include "base/threads.h"
+#include "data/dataset.h"
+#include "data/thresholds.h"
+#include "observer/curve.h"
 #include "observer/observer.h"
 
+struct ggn_calibration_input {
+    const struct ggn_dataset_view *view; /* borrows */
+    const struct ggn_view *human;        /* borrows; as many thresholds as the view has blocks when it is whole */
+};
+
 struct ggn_calibration_block {
-    const struct ggn_seq_block *block; /* borrows */
-    int reference_independent;
-    double human; /* threshold, spp; blocks whose human threshold is at the cap are to be left out */
+    int view;
+    uint32_t id;
+    double human, predicted; /* spp, at most GGN_CURVE_CAP; predicted without this view */
+};
+
+struct ggn_calibration_row { /* of e = log2(predicted / human) */
+    const char *name;        /* of the view; borrows */
+    int blocks;
+    double level, exponent;  /* fitted without this view */
+    double median_abs_log2, median_log2, share_below; /* share_below: e < log2(0.8), noise left to be seen */
+    double spearman;
 };
 
 struct ggn_calibration {
-    struct ggn_observer observer; /* the best form, tau from all blocks */
-    int n;
-    double median_abs_log2;        /* of log2(predicted/human), tau fitted to all blocks */
-    double loo_median_abs_log2;    /* tau from the other blocks, the form chosen on all */
-    double loo_mean_abs_log2;
-    double nested_median_abs_log2; /* tau and form from the other blocks: the honest figure */
-    double nested_mean_abs_log2;
-    double spearman;
-    double *predicted;             /* owns; [n]; with tau and form from the other blocks */
+    struct ggn_observer observer; /* from all views; spread is half the way from the 16th to the 84th percentile of e */
+    int n_views, n_blocks;
+    struct ggn_calibration_row *views, all; /* owns; [n_views]; each view left out */
+    struct ggn_calibration_block *blocks;   /* owns; [n_blocks], view by view */
 };
 
-/* Tries maps, blurs, masking and percentiles on a fixed grid. tau of a form is the geometric median of the pooled values at the human
- * thresholds. n >= 3 blocks. progress may be NULL. */
-int ggn_observer_calibrate(const struct ggn_calibration_block *blocks, int n, enum ggn_observer_source source,
-                           struct base_threads *threads, struct ggn_calibration *out, struct base_err *err);
+/* At least two views. BASE_EINVAL also where thresholds are for another number of blocks. */
+int ggn_calibrate(const struct ggn_calibration_input *inputs, int n, enum ggn_curve_source source, struct base_threads *threads,
+                  struct ggn_calibration *out, struct base_err *err);
 void ggn_calibration_release(struct ggn_calibration *c);
 
-/*
- * Slope of the psychometric curve from raw yes/no trials `block;level;seen` (level times 20 is spp): P(seen) = Phi(log2(T_b/n)/s) with
- * a threshold T_b per block and one s for the file, by maximum likelihood. *spread gets s in octaves. Lines that are no trial are left out; *skipped counts them.
- */
-int ggn_trials_spread(const char *path, double *spread, int *blocks, int *trials, int *skipped, struct base_err *err);
+/* The observer's parameters as JSON, with the table; ggn_observer_read reads it. */
+int ggn_calibration_write(const char *path, const struct ggn_calibration *c, struct base_err *err);
 
 #endif

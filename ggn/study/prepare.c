@@ -12,8 +12,8 @@
 #include "base/files.h"
 #include "data/image.h"
 #include "data/manifest.h"
-#include "observer/observer.h"
 #include "study/plan.h"
+#include "study/stimuli.h"
 #include "study/token.h"
 
 static int make_dir(const char *path, struct base_err *err)
@@ -101,7 +101,7 @@ static void work_block(void *data, long i, int worker)
     if (w->rc[i] != 0)
         return;
     uint8_t *rgb = malloc(3 * (size_t)block.width * block.height);
-    w->rc[i] = rgb ? ggn_stimuli_init(&stimuli, &block, GGN_SOURCE_AUTO, w->manifest->reference_independent, err) :
+    w->rc[i] = rgb ? ggn_stimuli_init(&stimuli, &block, w->manifest->reference_independent, err) :
                      base_fail_nomem(err, w->folder);
     if (w->rc[i] == 0) {
         w->rc[i] = make_levels(w, b, &stimuli, rgb, err);

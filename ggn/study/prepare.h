@@ -2,7 +2,7 @@
  * Makes a study: chooses blocks and levels, writes every picture it shows as a lossless PNG, then texts.json and study.json.
  *
  * A view is a folder. With a manifest.json it is a recorded sequence: its levels, and where a block has independent halves also
- * simulated ones up to GGN_SIMULATED_CAP (observer/observer.h). Without one it holds pictures of one size: `reference.png` (or
+ * simulated ones up to GGN_SIMULATED_CAP (study/stimuli.h). Without one it holds pictures of one size: `reference.png` (or
  * any extension that is read), and for thresholds one picture per level whose name ends in its samples per pixel
  * (`view-00256.png`), for a validation one picture per condition, named like it.
  */

@@ -48,7 +48,7 @@ fails "evaluate: window longer than the levels" 'a window needs 9' $ggn evaluate
 fails "evaluate: no model file" 'No such file' $ggn evaluate -d "$tmp/data" -m "$tmp/none.ggn"
 fails "evaluate: not a model" 'human.csv' $ggn evaluate -d "$tmp/data" -m "$tmp/human.csv"
 
-$ggn label "$tmp/data" >"$tmp/out" 2>"$tmp/err" && grep -q 'model observer' "$tmp/out" && grep -q '"source":.*"observer"' "$d/labels.json" &&
+$ggn label --source levels "$tmp/data" >"$tmp/out" 2>"$tmp/err" && grep -q 'model observer' "$tmp/out" && grep -q '"source":.*"observer"' "$d/labels.json" &&
     ! grep -q human "$d/labels.json"
 check "observer labels are not called human" $?
 $ggn label "$tmp/data" --human "$tmp/human.csv" >"$tmp/out" 2>"$tmp/err" && grep -q '"threshold":.*90' "$d/labels.json"
@@ -58,8 +58,9 @@ $ggn label "$tmp/data" --human "$tmp/human.csv" -t 1 >"$tmp/out" 2>"$tmp/err" &&
 check "labels are the same bytes again" $?
 fails "label --human: unknown view" 'no thresholds for' $ggn label "$tmp/data" --human "$tmp/human.csv" --view other
 fails "label --check without half buffers" 'no full level' $ggn label "$tmp/data" --check
-fails "label --calibrate with too few blocks" 'at least 3 blocks' $ggn label "$tmp/data" --calibrate "$tmp/human.csv"
-fails "label: bad observer" 'map must be' sh -c "echo '{}' >$tmp/o.json; $ggn label $tmp/data -O $tmp/o.json"
+fails "label without half buffers" 'use --source levels' $ggn label "$tmp/data"
+fails "label --calibrate with one view" 'at least 2 views' $ggn label "$tmp/data" --calibrate "$tmp/human.csv"
+fails "label: bad observer" 'level, exponent or spread' sh -c "echo '{}' >$tmp/o.json; $ggn label $tmp/data -O $tmp/o.json"
 
 $ggn reconstruct "$d" -o "$tmp/r.png" -r "$tmp/ref.png" --json >"$tmp/out" 2>"$tmp/err" && grep -q '"mean_spp": 130.00' "$tmp/out" && [ -s "$tmp/r.png" ]
 check "reconstruct at the labels (100 and 160)" $?

@@ -14,8 +14,8 @@
 #include "data/rawls.h"
 #include "data/thresholds.h"
 #include "figures/stats.h"
+#include "observer/curve.h"
 #include "observer/flip.h"
-#include "observer/observer.h"
 #include "support/fail_alloc.h"
 
 enum { W = 12, H = 10, P = W * H };
@@ -126,14 +126,13 @@ static int look(struct base_err *err)
     struct ggn_flip_stats flip;
     struct ggn_seq_block b;
     struct ggn_curve curve;
-    static const struct ggn_observer lightness = {GGN_MAP_LIGHTNESS, 1.0, 0.2, 5, 99.0, 1.5, 0.25};
     int rc = ggn_flip(display, other, W, H, GGN_FLIP_PPD, NULL, &flip, err);
     if (!rc)
         rc = ggn_seq_block_read(block_path, &b, err);
     if (rc)
         return rc;
-    for (int source = GGN_SOURCE_RENDERED; source <= GGN_SOURCE_AUTO && !rc; source++) {
-        rc = ggn_observer_curve(&lightness, &b, (enum ggn_observer_source)source, 1, &curve, err);
+    for (int source = GGN_FROM_HALVES; source <= GGN_FROM_LEVELS && !rc; source++) {
+        rc = ggn_curve_make(&b, (enum ggn_curve_source)source, 1, &curve, err);
         if (!rc)
             ggn_curve_release(&curve);
     }

@@ -1,8 +1,9 @@
-/* The model observer: pooling, masking, thresholds from curves, halves against rendered levels, calibration on made-up people. */
+/* The model observer: its kernel against naive ones, thresholds from curves, halves against recorded levels, calibration on made-up people. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <setjmp.h>
@@ -14,8 +15,11 @@
 #include "support/ggn_noise.h"
 
 #include "observer/calibrate.h"
+#include "observer/judge.h"
+#include "observer/trials.h"
+#include "observer/visibility.h"
 
-enum { W = 48, H = 40, P = W * H };
+enum { W = 96, H = 80, P = W * H };
 
 static const uint32_t levels[] = {20, 30, 45, 68, 101, 152, 228, 342, 513, 769, 1153, 1730, 2595, 3892, 5839, 8758};
 enum { LEVELS = sizeof levels / sizeof levels[0] };
@@ -26,62 +30,140 @@ static struct ggn_seq_block make_block(double sigma, double texture, uint32_t se
     return ggn_noise_block(&n);
 }
 
-static const struct ggn_observer lightness = {GGN_MAP_LIGHTNESS, 1.0, 0.2, 5, 99.0, 1.5, 0.25};
+/* --- the kernel --- */
 
-static int ascending(const void *a, const void *b)
+static double naive_lightness(double y)
 {
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
+    return y > 216.0 / 24389.0 ? 116.0 * cbrt(y) - 16.0 : y * 24389.0 / 27.0;
 }
 
-static void pooling(void **state)
+static void lightness(void **state)
 {
     (void)state;
-    static float map[P], deviation[P], scratch[P], sorted[P];
-    for (uint32_t seed = 0; seed < 40; seed++) {
-        for (uint32_t i = 0; i < P; i++) {
-            map[i] = (float)(ggn_noise_hash(i, seed) % (seed % 4 == 0 ? 3 : 100000));
-            deviation[i] = (float)(ggn_noise_hash(i, seed + 1000) % 10);
-            sorted[i] = map[i] / (1.0f + 0.25f * deviation[i]);
+    enum { N = 4000 };
+    static float rgb[3 * N], out[N];
+    for (int i = 0; i < N; i++)
+        rgb[i] = rgb[N + i] = rgb[2 * N + i] = (float)i / (N - 1);
+    ggn_visible_lightness(rgb, N, out);
+    for (int i = 0; i < N; i++)
+        assert_near((double)out[i], naive_lightness((double)i / (N - 1)), 2e-4);
+    /* one channel at a time, clamped; what is not a number is black */
+    const float odd[3][4] = {{5.0f, 0.0f, -1.0f, NAN}, {0.0f, INFINITY, -INFINITY, NAN}, {-3.0f, 0.0f, 1.0f, 1e-30f}};
+    ggn_visible_lightness(odd[0], 4, out);
+    assert_near((double)out[0], naive_lightness(0.2126729), 1e-3);
+    assert_near((double)out[1], naive_lightness(0.7151522), 1e-3);
+    assert_near((double)out[2], naive_lightness(0.0721750), 1e-3);
+    assert_near((double)out[3], 0.0, 1e-20);
+}
+
+static float pixel(const float *image, int w, int h, int x, int y)
+{
+    x = x < 0 ? 0 : x >= w ? w - 1 : x;
+    y = y < 0 ? 0 : y >= h ? h - 1 : y;
+    return image[y * w + x];
+}
+
+static double naive_noise(const float *noise, int w, int h)
+{
+    double sum = 0.0;
+    for (int y = 0; y < h; y++)
+        for (int x = 0; x < w; x++) {
+            double seen = 0.0, weights = 0.0;
+            for (int j = -2; j <= 2; j++)
+                for (int i = -2; i <= 2; i++) {
+                    double g = exp(-0.5 * (i * i + j * j) / (0.7 * 0.7));
+                    seen += g * (double)pixel(noise, w, h, x + i, y + j);
+                    weights += g;
+                }
+            sum += pow(seen / weights, 4.0);
         }
-        qsort(sorted, P, sizeof *sorted, ascending);
-        for (double q = 1.0; q <= 100.0; q += 16.5)
-            assert_near(ggn_observer_pool(map, deviation, P, 0.25, q, scratch), (double)sorted[(int)ceil(q / 100 * P) - 1], 0);
-    }
-    assert_near(ggn_observer_pool(map, deviation, 1, 0, 50, scratch), (double)map[0], 0);
+    return pow(sum / (w * h), 0.25);
 }
 
-static void masking(void **state)
+static double naive_texture(const float *a, const float *b, int w, int h)
+{
+    double sum = 0.0;
+    for (int y = 0; y < h; y++)
+        for (int x = 0; x < w; x++) {
+            double u = 0.0, v = 0.0, uv = 0.0, nn = 0.0;
+            for (int k = 0; k < 25; k++) {
+                double p = (double)pixel(a, w, h, x + k % 5 - 2, y + k / 5 - 2), q = (double)pixel(b, w, h, x + k % 5 - 2, y + k / 5 - 2);
+                u += p / 25.0;
+                v += q / 25.0;
+                uv += p * q / 25.0;
+                nn += (p - q) * (p - q) / 100.0;
+            }
+            sum += sqrt(fmax(uv - u * v - nn / 5.0, 0.0));
+        }
+    return sum / (w * h);
+}
+
+static void kernel(void **state)
 {
     (void)state;
-    static uint8_t flat[3 * P], checks[3 * P], noisy[3 * P];
-    static float map[P], deviation[P];
-    memset(flat, 128, sizeof flat);
-    ggn_observer_deviation(flat, W, H, 5, deviation, NULL);
-    for (int i = 0; i < P; i++)
-        assert_near((double)deviation[i], 0, 0.02);
-    for (int i = 0; i < P; i++)
-        memset(checks + 3 * i, (i % W + i / W) % 2 ? 0 : 255, 3);
-    ggn_observer_deviation(checks, W, H, 3, deviation, NULL);
-    assert_near((double)deviation[10 * W + 10], 100.0 * sqrt(20.0 / 81.0), 0.1); /* 4 or 5 of 9 pixels at L* = 100 */
-    /* A lightness difference of one pixel is spread by the blur, its sum kept. */
-    memcpy(noisy, flat, sizeof flat);
-    memset(noisy + 3 * (20 * W + 24), 148, 3);
-    for (double blur = 0.0; blur < 2.0; blur += 1.0) {
-        double sum = 0.0;
-        ggn_observer_error_map(GGN_MAP_LIGHTNESS, blur, flat, noisy, W, H, map, NULL);
-        for (int i = 0; i < P; i++)
-            sum += (double)map[i];
-        assert_near(sum, 7.735, 0.01); /* L* of grey 148 less that of 128 */
-        assert_true(blur == 0.0 ? sum == (double)map[20 * W + 24] : (double)map[20 * W + 24] < 0.2 * sum);
+    static const int sizes[][2] = {{W, H}, {1, 1}, {1, 7}, {3, 2}, {5, 5}, {200, 1}, {41, 17}};
+    static float a[P], b[P], noise[P];
+    static double scratch[5 * 300];
+    for (size_t k = 0; k < sizeof sizes / sizeof sizes[0]; k++) {
+        int w = sizes[k][0], h = sizes[k][1];
+        assert_true(ggn_visibility_scratch(w) <= sizeof scratch / sizeof scratch[0]);
+        for (int i = 0; i < w * h; i++) {
+            a[i] = 50.0f + 20.0f * (float)ggn_noise_gauss((uint32_t)i, 1);
+            b[i] = a[i] + 10.0f * (float)ggn_noise_gauss((uint32_t)i, 2);
+            noise[i] = (a[i] - b[i]) / 2;
+        }
+        double expected = naive_noise(noise, w, h);
+        assert_near(ggn_visible_noise(noise, w, h, scratch) / expected, 1.0, 1e-6);
+        assert_near(ggn_visible_texture(a, b, w, h, scratch), naive_texture(a, b, w, h), 1e-9);
     }
+    /* a bright pixel in a quiet block counts */
+    memset(noise, 0, sizeof noise);
+    noise[20 * W + 24] = 60.0f;
+    assert_true(ggn_visible_noise(noise, W, H, scratch) > 1.0);
+    /* a constant picture has neither */
+    for (int i = 0; i < P; i++)
+        a[i] = 95.0f;
+    assert_near(ggn_visible_texture(a, a, W, H, scratch), 0.0, 1e-6);
 }
+
+/* Two noisy means of one picture: the noise must not count as texture, nor the texture as noise. */
+static void apart(void **state)
+{
+    (void)state;
+    static float a[P], b[P], flat[2][P];
+    static double scratch[5 * 300];
+    for (int i = 0; i < P; i++) {
+        float picture = (ggn_noise_hash((uint32_t)i, 9) & 1) ? 3.0f : -3.0f;
+        float n = 2.0f * (float)ggn_noise_gauss((uint32_t)i, 3), m = 2.0f * (float)ggn_noise_gauss((uint32_t)i, 4);
+        flat[0][i] = 50.0f + n;
+        flat[1][i] = 50.0f + m;
+        a[i] = flat[0][i] + picture;
+        b[i] = flat[1][i] + picture;
+    }
+    assert_near(ggn_visible_texture(a, b, W, H, scratch), 3.0, 0.2);       /* one picture alone would show sqrt(9 + 4) */
+    assert_true(ggn_visible_texture(flat[0], flat[1], W, H, scratch) < 0.4); /* and sqrt(4) here */
+}
+
+static void people(void **state)
+{
+    (void)state;
+    const struct ggn_observer o = {0.3, 0.5, 0.4};
+    assert_near(ggn_observer_limit(&o, 0.0), 0.3 * sqrt(2.0), 1e-12);
+    assert_near(ggn_observer_limit(&o, 2.0), 0.6, 1e-12);
+    assert_near(ggn_observer_p_noisy(&o, 1.0), 0.5, 1e-12);
+    assert_near(ggn_observer_p_noisy(&o, exp2(0.2)), 0.8413447, 1e-6); /* one deviation, 0.4 octaves of samples */
+    assert_near(ggn_observer_p_noisy(&o, 0.0), 0.0, 0);
+    for (double p = 0.02; p < 1.0; p += 0.07)
+        assert_near(ggn_observer_p_noisy(&o, ggn_observer_error_at(&o, p)), p, 1e-6);
+}
+
+/* --- thresholds --- */
 
 static void thresholds(void **state)
 {
     (void)state;
     double spp[] = {100, 200, 400, 800}, falling[] = {8, 4, 2, 1}, bumpy[] = {1, 0.5, 4, 1}, zero[] = {8, 0, 0, 0};
-    struct ggn_curve c = {4, spp, falling};
+    struct ggn_curve c = {4, 4, spp, falling, 0.0};
     int censored;
     assert_near(ggn_curve_threshold(&c, 2.0, &censored), 400, 1e-9);
     assert_near(ggn_curve_threshold(&c, sqrt(8.0), &censored), 200 * sqrt(2.0), 1e-9);
@@ -90,150 +172,183 @@ static void thresholds(void **state)
     assert_true(censored);
     assert_near(ggn_curve_threshold(&c, 10, &censored), 100, 0);
     assert_false(censored);
-    c.score = bumpy; /* below at first, visible again at 400: it must stay below */
+    c.visible = bumpy; /* below at first, visible again at 400: it must stay below */
     assert_near(ggn_curve_threshold(&c, 2.0, &censored), 400 * sqrt(2.0), 1e-9);
-    c.score = zero;
-    assert_near(ggn_curve_threshold(&c, 2.0, &censored), 100 * sqrt(2.0), 1e-9);
-    c.score = falling;
-    assert_near(ggn_curve_at(&c, 283), 4 * pow(0.5, log2(283.0 / 200)), 1e-9);
-    assert_near(ggn_curve_at(&c, 1), 8, 0);
-    assert_near(ggn_curve_at(&c, 1e9), 1, 0);
+    c.visible = zero;
+    assert_near(ggn_curve_threshold(&c, 2.0, &censored), 100 * sqrt(2.0), 1e-9); /* half way where no line can be drawn */
+    c.visible = falling;
+    assert_near(ggn_curve_at(&c, 400), 2, 1e-12);
+    assert_near(ggn_curve_at(&c, 10), 8, 0);
+    assert_near(ggn_curve_at(&c, 283), sqrt(8.0), 3e-3);
 }
 
-static double threshold_of(const struct ggn_seq_block *b, const struct ggn_observer *o, enum ggn_observer_source source)
+static double threshold_of(const struct ggn_seq_block *b, const struct ggn_observer *o, enum ggn_curve_source source)
 {
     struct ggn_curve c;
     struct base_err err = {0};
     int censored;
-    if (ggn_observer_curve(o, b, source, 1, &c, &err) != 0)
+    if (ggn_curve_make(b, source, 1, &c, &err) != 0)
         fail_msg("%s", err.text);
-    double t = ggn_curve_threshold(&c, o->tau, &censored);
+    double t = ggn_curve_threshold(&c, ggn_observer_limit(o, c.texture), &censored);
     assert_false(censored);
     ggn_curve_release(&c);
     return t;
 }
 
-/* Noise that is sigma/sqrt(n) crosses a fixed visibility at n ~ sigma^2, from either source; masking lowers it. */
+/* Noise that is sigma/sqrt(n) crosses a fixed visibility at n ~ sigma^2, from either source; texture lowers it. */
 static void scaling(void **state)
 {
     (void)state;
-    struct ggn_observer o = lightness;
-    o.percentile = 80; /* a high one rests on a handful of pixels of so small a block */
-    o.tau = 0.8;
+    struct ggn_observer o = {0.35, 0.4, 0.4};
     double last = 0.0;
     for (int i = 0; i < 3; i++) {
-        double sigma = 0.4 * pow(2.0, i);
-        struct ggn_seq_block b = make_block(sigma, 0.0, (uint32_t)i + 1, 2048);
-        double rendered = threshold_of(&b, &o, GGN_SOURCE_RENDERED), halves = threshold_of(&b, &o, GGN_SOURCE_HALVES);
-        assert_near(log2(halves / rendered), 0.0, 0.4); /* one realisation of noise each, some 150 independent spots */
+        double sigma = 0.2 * pow(2.0, i);
+        struct ggn_seq_block b = make_block(sigma, 0.0, (uint32_t)i + 1, 4096);
+        double recorded = threshold_of(&b, &o, GGN_FROM_LEVELS), halves = threshold_of(&b, &o, GGN_FROM_HALVES);
+        assert_near(log2(halves / recorded), 0.0, 0.25); /* far above the limit, noise scatters into the texture of a smooth block */
         if (i > 0)
-            assert_near(log2(rendered / last), 2.0, 0.6); /* twice the noise: four times the samples */
-        last = rendered;
+            assert_near(log2(recorded / last), 2.0, 0.2); /* twice the noise: four times the samples */
+        last = recorded;
         ggn_seq_block_release(&b);
     }
-    struct ggn_seq_block busy = make_block(1.6, 0.1, 3, 2048);
-    assert_true(threshold_of(&busy, &o, GGN_SOURCE_RENDERED) < 0.5 * last);
+    struct ggn_seq_block busy = make_block(0.8, 0.1, 3, 4096);
+    assert_true(threshold_of(&busy, &o, GGN_FROM_LEVELS) < 0.5 * last);
     ggn_seq_block_release(&busy);
 }
 
-/* A reference of few samples must not raise the threshold: its own noise is taken out of the difference. */
+/* A reference of few samples must not raise the threshold: its own noise is taken out of the difference, and is no texture. */
 static void noisy_reference(void **state)
 {
     (void)state;
-    struct ggn_observer o = lightness;
-    o.masking = 0.0;
-    o.percentile = 80;
-    o.tau = 0.4;
-    struct ggn_seq_block good = make_block(0.9, 0.0, 5, 1000000), poor = make_block(0.9, 0.0, 5, 1024);
-    double a = threshold_of(&good, &o, GGN_SOURCE_RENDERED), b = threshold_of(&poor, &o, GGN_SOURCE_RENDERED);
+    struct ggn_observer o = {0.25, 0.5, 0.4};
+    struct ggn_seq_block good = make_block(0.6, 0.0, 5, 1000000), poor = make_block(0.6, 0.0, 5, 1024);
+    double a = threshold_of(&good, &o, GGN_FROM_LEVELS), b = threshold_of(&poor, &o, GGN_FROM_LEVELS);
     assert_true(a > 1024);
     assert_near(log2(b / a), 0.0, 0.15);
     ggn_seq_block_release(&good);
     ggn_seq_block_release(&poor);
 }
 
-/* Halves without a reference: the mean's own noise must not mask, texture must. */
-static void halves_alone(void **state)
-{
-    (void)state;
-    struct ggn_observer o = lightness;
-    o.percentile = 80;
-    o.tau = 0.6;
-    o.masking = 0.3;
-    for (int i = 0; i < 2; i++) {
-        double texture = 0.06 * i;
-        struct ggn_seq_block with = make_block(0.9, texture, 8, 1000000), without = make_block(0.9, texture, 8, 0);
-        double a = threshold_of(&with, &o, GGN_SOURCE_HALVES), b = threshold_of(&without, &o, GGN_SOURCE_HALVES);
-        assert_near(log2(b / a), 0.0, 0.25); /* 1.4 octaves too low when the noise is left in */
-        ggn_seq_block_release(&with);
-        ggn_seq_block_release(&without);
-    }
-}
-
 /* Recorded to 342 spp only, a threshold beyond is found where the full recording puts it. */
 static void beyond_the_last_level(void **state)
 {
     (void)state;
-    struct ggn_observer o = lightness;
-    o.percentile = 80;
-    o.tau = 0.5;
-    struct ggn_noise n = {W, H, levels, LEVELS, 4096, 0.9, 0.0, 6}, few = {W, H, levels, 8, 4096, 0.9, 0.0, 6};
+    struct ggn_observer o = {0.35, 0.4, 0.4};
+    struct ggn_noise n = {W, H, levels, LEVELS, 4096, 0.6, 0.0, 6}, few = {W, H, levels, 8, 4096, 0.6, 0.0, 6};
     struct ggn_seq_block all = ggn_noise_block(&n), head = ggn_noise_block(&few);
-    double a = threshold_of(&all, &o, GGN_SOURCE_RENDERED), b = threshold_of(&head, &o, GGN_SOURCE_AUTO);
+    double a = threshold_of(&all, &o, GGN_FROM_LEVELS), b = threshold_of(&head, &o, GGN_FROM_LEVELS);
     assert_true(a > 500);
-    assert_near(log2(b / a), 0.0, 0.4);
-    assert_true(ggn_stimuli_extend(&head, 1) && !ggn_stimuli_extend(&head, 0));
+    assert_near(log2(b / a), 0.0, 0.15);
     ggn_seq_block_release(&all);
     ggn_seq_block_release(&head);
+}
+
+static void needs(void **state)
+{
+    (void)state;
+    struct ggn_curve c;
+    struct base_err err = {0};
+    struct ggn_seq_block b = make_block(0.3, 0.0, 7, 0);
+    assert_int_equal(ggn_curve_make(&b, GGN_FROM_LEVELS, 1, &c, &err), BASE_EINVAL);
+    assert_non_null(strstr(err.text, "no reference"));
+    for (uint32_t l = 0; l < b.n_levels; l++)
+        for (uint32_t p = 0; p < b.levels[l].n_planes; p++)
+            if (b.levels[l].planes[p].plane == GGN_PLANE_HALF_F16)
+                b.levels[l].n_planes = p;
+    assert_int_equal(ggn_curve_make(&b, GGN_FROM_HALVES, 1, &c, &err), BASE_EINVAL);
+    assert_non_null(strstr(err.text, "no full level"));
+    ggn_seq_block_release(&b);
+}
+
+/* --- calibration --- */
+
+enum { VIEWS = 3, BLOCKS = 6 };
+
+/* Views of made-up blocks, quiet and busy ones, and people who are an observer of the family. */
+static void make_views(const char *dir, const struct ggn_observer *person, struct ggn_dataset *data, struct ggn_view *human)
+{
+    static const uint32_t few[] = {64, 384};
+    for (int v = 0; v < VIEWS; v++) {
+        char view[128], scene[16];
+        double sigma[BLOCKS];
+        struct ggn_noise n = {W, H, few, 2, 0, 0.0, 0.05 * v, (uint32_t)v + 1};
+        for (int i = 0; i < BLOCKS; i++)
+            sigma[i] = (0.2 + 0.08 * i) * (1.0 + v);
+        snprintf(view, sizeof view, "%s/view%d", dir, v);
+        snprintf(scene, sizeof scene, "scene%d", v);
+        ggn_noise_view(view, scene, &n, sigma, BLOCKS, 1.0);
+    }
+    assert_int_equal(ggn_dataset_open(dir, data, NULL), 0);
+    assert_int_equal(data->n, VIEWS);
+    struct base_threads *threads = base_threads_create(2, NULL);
+    for (int v = 0; v < VIEWS; v++) {
+        struct ggn_labels l;
+        assert_int_equal(ggn_view_label(person, &data->views[v], GGN_FROM_HALVES, threads, &l, NULL), 0);
+        human[v] = (struct ggn_view){.n = BLOCKS, .spp = malloc(BLOCKS * sizeof(double))};
+        for (int i = 0; i < BLOCKS; i++)
+            human[v].spp[i] = l.labels[i].threshold;
+        ggn_labels_release(&l);
+    }
+    base_threads_destroy(threads);
 }
 
 static void calibration(void **state)
 {
     (void)state;
-    enum { N = 6 };
-    struct ggn_seq_block pixels[N];
-    struct ggn_calibration_block blocks[N];
+    char dir[] = "/tmp/ggn_observer.XXXXXX", path[64], command[80];
+    const struct ggn_observer person = {0.4, 0.5, 0.3};
+    struct ggn_dataset data;
+    struct ggn_view human[VIEWS];
+    struct ggn_calibration_input inputs[VIEWS];
     struct ggn_calibration c;
+    struct ggn_observer back;
     struct base_err err = {0};
-    /* Made-up people: an observer of the family with a tau of its own. */
-    struct ggn_observer person = {GGN_MAP_LIGHTNESS, 1.0, 0.3, 5, 99.0, 2.0, 0.25};
-    for (int i = 0; i < N; i++) {
-        pixels[i] = make_block(0.2 + 0.08 * i, i % 2 ? 0.06 : 0.0, 20 + (uint32_t)i, 4096);
-        blocks[i] = (struct ggn_calibration_block){&pixels[i], 1, threshold_of(&pixels[i], &person, GGN_SOURCE_RENDERED)};
-    }
+    assert_non_null(mkdtemp(dir));
+    make_views(dir, &person, &data, human);
+    for (int v = 0; v < VIEWS; v++)
+        inputs[v] = (struct ggn_calibration_input){&data.views[v], &human[v]};
     struct base_threads *threads = base_threads_create(2, NULL);
-    if (ggn_observer_calibrate(blocks, N, GGN_SOURCE_RENDERED, threads, &c, &err) != 0)
+    if (ggn_calibrate(inputs, VIEWS, GGN_FROM_HALVES, threads, &c, &err) != 0)
         fail_msg("%s", err.text);
-    assert_true(c.n == N && c.median_abs_log2 < 0.05 && c.nested_mean_abs_log2 < 0.25 && c.loo_mean_abs_log2 < 0.1);
-    assert_true(c.observer.masking > 0.0); /* without masking the textured blocks would be wrong */
-    /* What was found predicts a block it has not seen. */
-    struct ggn_seq_block fresh = make_block(0.45, 0.06, 31, 4096);
-    assert_near(log2(threshold_of(&fresh, &c.observer, GGN_SOURCE_RENDERED) / threshold_of(&fresh, &person, GGN_SOURCE_RENDERED)), 0.0, 0.3);
-    ggn_seq_block_release(&fresh);
+    assert_true(c.n_views == VIEWS && c.n_blocks == VIEWS * BLOCKS && c.views[1].blocks == BLOCKS);
+    assert_near(c.observer.level, person.level, 0.01);
+    assert_near(c.observer.exponent, person.exponent, 0.02);
+    for (int v = 0; v < VIEWS; v++)
+        assert_true(c.views[v].median_abs_log2 < 0.05 && c.views[v].spearman > 0.9 && c.views[v].share_below == 0.0);
+    /* A view whose people see more than the others' is wrong by what they see more, and the others are no worse for it. */
     ggn_calibration_release(&c);
-    assert_int_equal(ggn_observer_calibrate(blocks, 2, GGN_SOURCE_RENDERED, threads, &c, &err), BASE_EINVAL);
+    for (int i = 0; i < BLOCKS; i++)
+        human[2].spp[i] *= 2.0;
+    assert_int_equal(ggn_calibrate(inputs, VIEWS, GGN_FROM_HALVES, threads, &c, &err), 0);
+    assert_near(c.views[2].median_log2, -1.0, 0.1);
+    snprintf(path, sizeof path, "%s/observer.json", dir);
+    assert_int_equal(ggn_calibration_write(path, &c, &err), 0);
+    assert_int_equal(ggn_observer_read(path, &back, &err), 0);
+    assert_near(back.level, c.observer.level, 1e-9);
+    assert_near(back.spread, c.observer.spread, 1e-9);
+    ggn_calibration_release(&c);
+    assert_int_equal(ggn_calibrate(inputs, 1, GGN_FROM_HALVES, threads, &c, &err), BASE_EINVAL);
+    human[1].n = BLOCKS - 1;
+    assert_int_equal(ggn_calibrate(inputs, VIEWS, GGN_FROM_HALVES, threads, &c, &err), BASE_EINVAL);
+    assert_non_null(strstr(err.text, "5 thresholds"));
     base_threads_destroy(threads);
-    for (int i = 0; i < N; i++)
-        ggn_seq_block_release(&pixels[i]);
+    for (int v = 0; v < VIEWS; v++)
+        free(human[v].spp);
+    ggn_dataset_release(&data);
+    snprintf(command, sizeof command, "rm -r %s", dir);
+    assert_int_equal(system(command), 0);
 }
 
 static void parameters(void **state)
 {
     (void)state;
     char path[] = "/tmp/ggn_observer.XXXXXX";
-    struct ggn_observer o = {GGN_MAP_FLIP, 0.7, 0.1, 9, 95, 0.031, 0.4}, back;
+    struct ggn_observer o;
     struct base_err err = {0};
-    close(mkstemp(path));
-    assert_int_equal(ggn_observer_write(path, &o, "{\"blocks\": 3}", &err), 0);
-    if (ggn_observer_read(path, &back, &err) != 0)
-        fail_msg("%s", err.text);
-    assert_true(back.map == o.map && back.window_px == 9);
-    assert_near(back.tau, o.tau, 1e-9);
-    assert_near(back.spread, o.spread, 1e-9);
-    FILE *f = fopen(path, "w");
-    fputs("{\"map\": \"eye\"}", f);
+    FILE *f = fdopen(mkstemp(path), "w");
+    fputs("{\"level\": 0.3, \"exponent\": 0.4}", f);
     fclose(f);
-    assert_int_equal(ggn_observer_read(path, &back, &err), BASE_EINVAL);
+    assert_int_equal(ggn_observer_read(path, &o, &err), BASE_EINVAL);
     unlink(path);
 }
 
@@ -245,10 +360,8 @@ static void built_in(void **state)
     struct base_err err = {0};
     if (ggn_observer_read("ggn/observer/observer.json", &o, &err) != 0)
         fail_msg("%s", err.text);
-    assert_true(o.map == ggn_observer_default.map && o.window_px == ggn_observer_default.window_px);
-    assert_near(o.tau, ggn_observer_default.tau, 1e-6);
-    assert_near(o.masking, ggn_observer_default.masking, 1e-6);
-    assert_near(o.percentile, ggn_observer_default.percentile, 1e-6);
+    assert_near(o.level, ggn_observer_default.level, 1e-6);
+    assert_near(o.exponent, ggn_observer_default.exponent, 1e-6);
     assert_near(o.spread, ggn_observer_default.spread, 1e-6);
 }
 
@@ -275,8 +388,9 @@ static void trials(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(pooling), cmocka_unit_test(masking), cmocka_unit_test(thresholds), cmocka_unit_test(scaling),
-        cmocka_unit_test(noisy_reference), cmocka_unit_test(halves_alone), cmocka_unit_test(beyond_the_last_level), cmocka_unit_test(calibration), cmocka_unit_test(parameters), cmocka_unit_test(built_in), cmocka_unit_test(trials),
+        cmocka_unit_test(lightness), cmocka_unit_test(kernel), cmocka_unit_test(apart), cmocka_unit_test(people), cmocka_unit_test(thresholds),
+        cmocka_unit_test(scaling), cmocka_unit_test(noisy_reference), cmocka_unit_test(beyond_the_last_level), cmocka_unit_test(needs),
+        cmocka_unit_test(calibration), cmocka_unit_test(parameters), cmocka_unit_test(built_in), cmocka_unit_test(trials),
     };
     return cmocka_run_group_tests_name("observer", tests, NULL, NULL);
 }

@@ -1,0 +1,196 @@
+#include "observer/curve.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "observer/visibility.h"
+
+/* Simulated levels: GGN_CURVE_CAP and quarter octaves below it, down to about 5 spp. */
+enum { SIMULATED = 45 };
+
+static double simulated_spp(int i)
+{
+    return GGN_CURVE_CAP * exp2(0.25 * (i - (SIMULATED - 1)));
+}
+
+/* Planes of one block. */
+struct planes {
+    const struct ggn_seq_block *block; /* borrows */
+    size_t pixels;
+    float *mean, *difference, *work;  /* [3][P], linear; one allocation, `mean` owns it */
+    float *lightness[3];              /* [P] */
+    double *scratch;                  /* owns */
+};
+
+static void planes_release(struct planes *p)
+{
+    free(p->mean);
+    free(p->scratch);
+    *p = (struct planes){0};
+}
+
+static int planes_init(struct planes *p, const struct ggn_seq_block *block, struct base_err *err)
+{
+    size_t n = (size_t)block->width * block->height;
+    *p = (struct planes){.block = block, .pixels = n, .mean = malloc(12 * n * sizeof *p->mean),
+                         .scratch = malloc(ggn_visibility_scratch((int)block->width) * sizeof *p->scratch)};
+    if (!p->mean || !p->scratch) {
+        planes_release(p);
+        return base_fail_nomem(err, "observer");
+    }
+    p->difference = p->mean + 3 * n;
+    p->work = p->mean + 6 * n;
+    for (int i = 0; i < 3; i++)
+        p->lightness[i] = p->mean + (9 + (size_t)i) * n;
+    return 0;
+}
+
+/* L* of mean + scale * difference. */
+static void look(struct planes *p, double scale, float *lightness)
+{
+    for (size_t i = 0; i < 3 * p->pixels; i++)
+        p->work[i] = p->mean[i] + (float)scale * p->difference[i];
+    ggn_visible_lightness(p->work, p->pixels, lightness);
+}
+
+/* Visible noise of factor * (L*[0] - L*[1]), which ends up in place of L*[0]. */
+static double visible(struct planes *p, float factor)
+{
+    for (size_t i = 0; i < p->pixels; i++)
+        p->lightness[0][i] = factor * (p->lightness[0][i] - p->lightness[1][i]);
+    return ggn_visible_noise(p->lightness[0], (int)p->block->width, (int)p->block->height, p->scratch);
+}
+
+static double texture(struct planes *p)
+{
+    return ggn_visible_texture(p->lightness[0], p->lightness[1], (int)p->block->width, (int)p->block->height, p->scratch);
+}
+
+/* The level whose half-buffer difference is kept in full. */
+static const struct ggn_seq_record *full_level(const struct ggn_seq_block *b)
+{
+    for (uint32_t i = 0; i < b->n_levels; i++)
+        if (ggn_seq_has(&b->levels[i], GGN_PLANE_HALF_F16))
+            return &b->levels[i];
+    return NULL;
+}
+
+/* Appends the levels that halves stand for above `beyond` spp. */
+static int add_halves(struct ggn_curve *c, struct planes *p, double beyond, struct base_err *err)
+{
+    const struct ggn_seq_record *full = full_level(p->block);
+    int rc = ggn_seq_mean(p->block, full, p->mean, err);
+    if (!rc)
+        rc = ggn_seq_half(p->block, full, p->difference, err);
+    if (rc)
+        return rc;
+    if (c->n == 0) {
+        look(p, 1.0, p->lightness[0]);
+        look(p, -1.0, p->lightness[1]);
+        c->texture = texture(p);
+    }
+    for (int i = 0; i < SIMULATED; i++) {
+        double spp = simulated_spp(i), scale = sqrt(full->spp / spp);
+        if (spp <= beyond)
+            continue;
+        look(p, scale, p->lightness[0]);
+        look(p, -scale, p->lightness[1]);
+        c->spp[c->n] = spp;
+        c->visible[c->n++] = visible(p, 0.5f);
+    }
+    return 0;
+}
+
+static int add_levels(struct ggn_curve *c, struct planes *p, int independent, struct base_err *err)
+{
+    const struct ggn_seq_block *b = p->block;
+    double n_r = b->reference->spp;
+    int rc = ggn_seq_mean(b, b->reference, p->mean, err);
+    if (rc)
+        return rc;
+    ggn_visible_lightness(p->mean, p->pixels, p->lightness[2]);
+    for (uint32_t level = 0; level < b->n_levels; level++) {
+        const struct ggn_seq_record *r = &b->levels[level];
+        rc = ggn_seq_mean(b, r, p->difference, err);
+        if (rc)
+            return rc;
+        if (level + 1 == b->n_levels) {
+            ggn_visible_lightness(independent ? p->difference : p->mean, p->pixels, p->lightness[0]);
+            ggn_visible_lightness(p->mean, p->pixels, p->lightness[1]);
+            c->texture = texture(p);
+        }
+        for (size_t i = 0; i < 3 * p->pixels; i++)
+            p->difference[i] -= p->mean[i];
+        look(p, independent ? sqrt(n_r / (n_r + r->spp)) : 1.0, p->lightness[0]);
+        for (size_t i = 0; i < p->pixels; i++)
+            p->lightness[1][i] = p->lightness[2][i];
+        c->spp[c->n] = r->spp;
+        c->visible[c->n++] = visible(p, 1.0f);
+    }
+    c->recorded = c->n;
+    return 0;
+}
+
+int ggn_curve_make(const struct ggn_seq_block *block, enum ggn_curve_source source, int reference_independent, struct ggn_curve *curve,
+                   struct base_err *err)
+{
+    if (source == GGN_FROM_HALVES && !full_level(block))
+        return base_fail(err, BASE_EINVAL, "block %u has no full level with a half-buffer difference: record one, or use --source levels", block->id);
+    if (source == GGN_FROM_LEVELS && !block->reference)
+        return base_fail(err, BASE_EINVAL, "block %u has no reference: record one, or use --source halves", block->id);
+    size_t room = SIMULATED + block->n_levels;
+    struct ggn_curve c = {.spp = malloc(room * sizeof *c.spp), .visible = malloc(room * sizeof *c.visible)};
+    struct planes p = {0};
+    int rc = !c.spp || !c.visible ? base_fail_nomem(err, "observer") : planes_init(&p, block, err);
+    if (!rc && source == GGN_FROM_LEVELS)
+        rc = add_levels(&c, &p, reference_independent, err);
+    if (!rc && (source == GGN_FROM_HALVES || (reference_independent && full_level(block))))
+        rc = add_halves(&c, &p, c.n > 0 ? 1.07 * c.spp[c.n - 1] : 0.0, err);
+    if (rc)
+        ggn_curve_release(&c);
+    else
+        *curve = c;
+    planes_release(&p);
+    return rc;
+}
+
+void ggn_curve_release(struct ggn_curve *c)
+{
+    free(c->spp);
+    free(c->visible);
+    *c = (struct ggn_curve){0};
+}
+
+/* Where the line through two points crosses y in log-log; half way where a point cannot be drawn. */
+static double log_cross(double x0, double y0, double x1, double y1, double y)
+{
+    double t = y0 > 0.0 && y1 > 0.0 && y0 != y1 ? log(y / y0) / log(y1 / y0) : 0.5;
+    t = t > 0.0 ? (t < 1.0 ? t : 1.0) : 0.0;
+    return x0 * pow(x1 / x0, t);
+}
+
+double ggn_curve_threshold(const struct ggn_curve *c, double limit, int *censored)
+{
+    int last = c->n - 1;
+    while (last >= 0 && !(c->visible[last] > limit))
+        last--;
+    *censored = last == c->n - 1;
+    if (last < 0)
+        return c->spp[0];
+    if (*censored)
+        return c->spp[last];
+    return log_cross(c->spp[last], c->visible[last], c->spp[last + 1], c->visible[last + 1], limit);
+}
+
+double ggn_curve_at(const struct ggn_curve *c, double spp)
+{
+    int i = 0;
+    if (spp <= c->spp[0])
+        return c->visible[0];
+    if (spp >= c->spp[c->n - 1])
+        return c->visible[c->n - 1];
+    while (c->spp[i + 1] < spp)
+        i++;
+    double t = log(spp / c->spp[i]) / log(c->spp[i + 1] / c->spp[i]), a = c->visible[i], b = c->visible[i + 1];
+    return a > 0.0 && b > 0.0 ? a * pow(b / a, t) : a + t * (b - a);
+}

@@ -1,0 +1,38 @@
+/*
+ * How visible the noise of a recorded block is at any number of samples.
+ *
+ * From two halves: M and D of the block's full level, recorded at n0 spp, give the look at n spp as M + sqrt(n0/n) D and its twin with
+ * the other sign. Nothing else is needed, and every n up to GGN_CURVE_CAP can be asked about; it errs where rare bright paths make the
+ * noise far from Gaussian (ggn/observer/README.md).
+ * From recorded levels: the picture I at n spp against a reference R of n_r independent samples. I - R has the variance
+ * s^2 (1/n + 1/n_r), so it is scaled by sqrt(n_r / (n_r + n)); texture is what the last level and R share. Where the block has halves
+ * too they go on beyond the last level.
+ */
+#ifndef GGN_OBSERVER_CURVE_H
+#define GGN_OBSERVER_CURVE_H
+
+#include "base/err.h"
+#include "data/sequence.h"
+
+enum { GGN_CURVE_CAP = 10000 }; /* spp; where the people of SIN3D stopped looking */
+
+enum ggn_curve_source { GGN_FROM_HALVES, GGN_FROM_LEVELS };
+
+struct ggn_curve {
+    int n, recorded;       /* levels; the first so many are recorded ones */
+    double *spp, *visible; /* own; [n]; spp rising; ggn_visible_noise at each */
+    double texture;
+};
+
+/* BASE_EINVAL: GGN_FROM_HALVES without a full level, GGN_FROM_LEVELS without a reference. */
+int ggn_curve_make(const struct ggn_seq_block *block, enum ggn_curve_source source, int reference_independent, struct ggn_curve *curve,
+                   struct base_err *err);
+void ggn_curve_release(struct ggn_curve *curve);
+
+/* Smallest spp from which the noise stays at or below `limit`, interpolated between levels in log-log. censored: still above at the
+ * last level, which is then returned. A curve that starts below gives its first level. */
+double ggn_curve_threshold(const struct ggn_curve *curve, double limit, int *censored);
+/* Visible noise at spp, interpolated in log-log and clamped to the ends. */
+double ggn_curve_at(const struct ggn_curve *curve, double spp);
+
+#endif

@@ -1,0 +1,116 @@
+#include "observer/judge.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "figures/stats.h"
+
+struct work {
+    const struct ggn_dataset_view *view;
+    enum ggn_curve_source source;
+    struct ggn_curve *curves;
+    struct base_err *errs; /* [n_blocks] */
+};
+
+static void make_curve(void *data, long i, int worker)
+{
+    const struct work *w = data;
+    const struct ggn_manifest *m = &w->view->manifest;
+    struct ggn_seq_block b;
+    (void)worker;
+    if (ggn_manifest_read_block(w->view->dir, m, (uint32_t)i, &b, &w->errs[i]))
+        return;
+    ggn_curve_make(&b, w->source, m->reference_independent, &w->curves[i], &w->errs[i]);
+    ggn_seq_block_release(&b);
+}
+
+int ggn_view_curves(const struct ggn_dataset_view *view, enum ggn_curve_source source, struct base_threads *threads,
+                    struct ggn_curve *curves, struct base_err *err)
+{
+    uint32_t n = view->manifest.n_blocks;
+    int rc = 0;
+    struct work w = {view, source, curves, calloc(n, sizeof(struct base_err))};
+    if (!w.errs)
+        return base_fail_nomem(err, view->dir);
+    for (uint32_t i = 0; i < n; i++)
+        curves[i] = (struct ggn_curve){0};
+    base_threads_for(threads, n, make_curve, &w);
+    for (uint32_t i = 0; i < n && !rc; i++)
+        if (w.errs[i].code)
+            rc = base_fail(err, w.errs[i].code, "%s: %s", view->name, w.errs[i].text);
+    for (uint32_t i = 0; i < n && rc; i++)
+        ggn_curve_release(&curves[i]);
+    free(w.errs);
+    return rc;
+}
+
+int ggn_view_label(const struct ggn_observer *observer, const struct ggn_dataset_view *view, enum ggn_curve_source source,
+                   struct base_threads *threads, struct ggn_labels *out, struct base_err *err)
+{
+    uint32_t n = view->manifest.n_blocks;
+    struct ggn_labels l = {.source = "observer", .spread = observer->spread, .n = n, .labels = malloc(n * sizeof *l.labels)};
+    struct ggn_curve *curves = malloc(n * sizeof *curves);
+    int rc = !l.labels || !curves ? base_fail_nomem(err, view->dir) : ggn_view_curves(view, source, threads, curves, err);
+    for (uint32_t i = 0; i < n && !rc; i++) {
+        const struct ggn_curve *c = &curves[i];
+        struct ggn_label *label = &l.labels[i];
+        label->id = view->manifest.blocks[i].id;
+        label->threshold = ggn_curve_threshold(c, ggn_observer_limit(observer, c->texture), &label->censored);
+        l.cap = fmax(l.cap, c->spp[c->n - 1]);
+        ggn_curve_release(&curves[i]);
+    }
+    free(curves);
+    ggn_observer_describe(observer, l.detail, sizeof l.detail);
+    size_t used = strlen(l.detail);
+    snprintf(l.detail + used, sizeof l.detail - used, source == GGN_FROM_HALVES ? "; from two halves" : "; from recorded levels, beyond them two halves");
+    if (rc)
+        ggn_labels_release(&l);
+    else
+        *out = l;
+    return rc;
+}
+
+/* Visible noise falls as 1/sqrt(spp): twice the logarithm of the ratio is a shift in octaves of samples. */
+static double curve_shift(const struct ggn_curve *recorded, const struct ggn_curve *halves, double *room)
+{
+    size_t n = 0;
+    for (int i = 0; i < recorded->recorded; i++)
+        if (recorded->visible[i] > 0.0)
+            room[n++] = 2.0 * log2(ggn_curve_at(halves, recorded->spp[i]) / recorded->visible[i]);
+    return ggn_stats_quantile(room, n, 0.5);
+}
+
+static int check_block(const struct ggn_observer *o, struct ggn_curve *recorded, const struct ggn_curve *halves, struct ggn_check *out,
+                       struct base_err *err)
+{
+    int censored;
+    double *room = malloc((size_t)recorded->n * sizeof *room);
+    if (!room)
+        return base_fail_nomem(err, "check");
+    out->halves = ggn_curve_threshold(halves, ggn_observer_limit(o, halves->texture), &censored);
+    recorded->n = recorded->recorded;
+    out->recorded = ggn_curve_threshold(recorded, ggn_observer_limit(o, recorded->texture), &out->beyond);
+    out->curve = curve_shift(recorded, halves, room);
+    free(room);
+    return 0;
+}
+
+int ggn_view_check(const struct ggn_observer *observer, const struct ggn_dataset_view *view, struct base_threads *threads,
+                   struct ggn_check *checks, struct base_err *err)
+{
+    uint32_t n = view->manifest.n_blocks;
+    struct ggn_curve *recorded = calloc(2 * n, sizeof *recorded), *halves = recorded + n;
+    int rc = !recorded ? base_fail_nomem(err, view->dir) : ggn_view_curves(view, GGN_FROM_LEVELS, threads, recorded, err);
+    if (!rc)
+        rc = ggn_view_curves(view, GGN_FROM_HALVES, threads, halves, err);
+    for (uint32_t i = 0; i < n && !rc; i++) {
+        checks[i].id = view->manifest.blocks[i].id;
+        rc = check_block(observer, &recorded[i], &halves[i], &checks[i], err);
+    }
+    for (uint32_t i = 0; recorded && i < 2 * n; i++)
+        ggn_curve_release(&recorded[i]);
+    free(recorded);
+    return rc;
+}

@@ -1,0 +1,138 @@
+#include "observer/visibility.h"
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "base/colour.h"
+
+enum { RADIUS = 2, TAPS = 2 * RADIUS + 1, SUMS = 4 };
+
+/* exp(-k^2 / (2 * 0.7^2)) over the sum of all five taps, k = 0, 1, 2: a Gaussian of 0.7 px. */
+static const double blur[RADIUS + 1] = {0.569912492, 0.205423697, 0.009620057};
+
+/* y in [0.008, 1], relative error below 1e-6: a first guess from the exponent, then two steps of Halley's method. */
+static inline float cube_root(float y)
+{
+    uint32_t bits;
+    float r;
+    memcpy(&bits, &y, sizeof bits);
+    bits = bits / 3 + 709921077u;
+    memcpy(&r, &bits, sizeof r);
+    for (int i = 0; i < 2; i++) {
+        float cube = r * r * r;
+        r *= (cube + 2.0f * y) / (2.0f * cube + y);
+    }
+    return r;
+}
+
+static inline float clamp01(float v)
+{
+    return v > 0.0f ? (v < 1.0f ? v : 1.0f) : 0.0f;
+}
+
+void ggn_visible_lightness(const float *rgb, size_t n, float *lightness)
+{
+    const float *red = rgb, *green = rgb + n, *blue = rgb + 2 * n;
+    const float knee = 216.0f / 24389.0f, slope = 24389.0f / 27.0f;
+    for (size_t i = 0; i < n; i++) {
+        float y = (float)BASE_LUMINANCE_R * clamp01(red[i]) + (float)BASE_LUMINANCE_G * clamp01(green[i]) +
+                  (float)BASE_LUMINANCE_B * clamp01(blue[i]);
+        float root = 116.0f * cube_root(y > knee ? y : knee) - 16.0f;
+        lightness[i] = y > knee ? root : slope * y;
+    }
+}
+
+size_t ggn_visibility_scratch(int width)
+{
+    return (SUMS + 1) * ((size_t)width + 2 * RADIUS);
+}
+
+/* The row that stands at y + k - RADIUS; beyond the block its first or last. */
+static const float *row_at(const float *image, int width, int height, int y)
+{
+    y = y < 0 ? 0 : y < height ? y : height - 1;
+    return image + (size_t)y * (size_t)width;
+}
+
+/* column: [RADIUS + width + RADIUS], the middle is filled; repeats its ends outwards. */
+static void extend(double *column, int width)
+{
+    for (int k = 0; k < RADIUS; k++) {
+        column[k] = column[RADIUS];
+        column[RADIUS + width + k] = column[RADIUS + width - 1];
+    }
+}
+
+double ggn_visible_noise(const float *noise, int width, int height, double *scratch)
+{
+    double *column = scratch, *fourth = scratch + width + 2 * RADIUS, sum = 0.0;
+    memset(fourth, 0, (size_t)width * sizeof *fourth);
+    for (int y = 0; y < height; y++) {
+        const float *row[TAPS];
+        for (int k = 0; k < TAPS; k++)
+            row[k] = row_at(noise, width, height, y + k - RADIUS);
+        for (int x = 0; x < width; x++)
+            column[RADIUS + x] = blur[2] * (double)(row[0][x] + row[4][x]) + blur[1] * (double)(row[1][x] + row[3][x]) +
+                                 blur[0] * (double)row[2][x];
+        extend(column, width);
+        for (int x = 0; x < width; x++) {
+            const double *c = column + x;
+            double seen = blur[2] * (c[0] + c[4]) + blur[1] * (c[1] + c[3]) + blur[0] * c[2];
+            fourth[x] += seen * seen * seen * seen;
+        }
+    }
+    for (int x = 0; x < width; x++)
+        sum += fourth[x];
+    return sqrt(sqrt(sum / ((double)width * height)));
+}
+
+/* Sums over five rows of a, b, a b and ((a - b) / 2)^2, each [RADIUS + width + RADIUS]. */
+static void sum_rows(const float *a, const float *b, int width, int height, int y, double *const columns[SUMS])
+{
+    const float *p[TAPS], *q[TAPS];
+    for (int k = 0; k < TAPS; k++) {
+        p[k] = row_at(a, width, height, y + k - RADIUS);
+        q[k] = row_at(b, width, height, y + k - RADIUS);
+    }
+    for (int x = 0; x < width; x++) {
+        double u = 0.0, v = 0.0, uv = 0.0, nn = 0.0;
+        for (int k = 0; k < TAPS; k++) {
+            double s = (double)p[k][x], t = (double)q[k][x], n = 0.5 * (s - t);
+            u += s;
+            v += t;
+            uv += s * t;
+            nn += n * n;
+        }
+        columns[0][RADIUS + x] = u;
+        columns[1][RADIUS + x] = v;
+        columns[2][RADIUS + x] = uv;
+        columns[3][RADIUS + x] = nn;
+    }
+    for (int c = 0; c < SUMS; c++)
+        extend(columns[c], width);
+}
+
+static inline double mean_of_window(const double *c)
+{
+    return (c[0] + c[1] + c[2] + c[3] + c[4]) * (1.0 / (TAPS * TAPS));
+}
+
+double ggn_visible_texture(const float *a, const float *b, int width, int height, double *scratch)
+{
+    const size_t stride = (size_t)width + 2 * RADIUS;
+    double *const columns[SUMS] = {scratch, scratch + stride, scratch + 2 * stride, scratch + 3 * stride};
+    double *deviation = scratch + SUMS * stride, sum = 0.0;
+    memset(deviation, 0, (size_t)width * sizeof *deviation);
+    for (int y = 0; y < height; y++) {
+        sum_rows(a, b, width, height, y, columns);
+        for (int x = 0; x < width; x++) {
+            double covariance = mean_of_window(columns[2] + x) - mean_of_window(columns[0] + x) * mean_of_window(columns[1] + x);
+            double texture = covariance - (1.0 / TAPS) * mean_of_window(columns[3] + x);
+            deviation[x] += sqrt(texture > 0.0 ? texture : 0.0);
+        }
+    }
+    for (int x = 0; x < width; x++)
+        sum += deviation[x];
+    return sum / ((double)width * height);
+}

@@ -1,0 +1,139 @@
+#include "study/stimuli.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "model/preprocess.h"
+
+void ggn_stimuli_release(struct ggn_stimuli *s)
+{
+    free(s->spp);
+    free(s->base);
+    free(s->difference);
+    free(s->work);
+    free(s->converged);
+    *s = (struct ggn_stimuli){0};
+}
+
+static void encode(const float *linear, size_t pixels, uint8_t *rgb)
+{
+    for (size_t i = 0; i < pixels; i++)
+        for (size_t c = 0; c < 3; c++)
+            rgb[3 * i + c] = ggn_preprocess((double)linear[c * pixels + i], NULL, NULL);
+}
+
+/* Sample counts above `beyond` that halves stand for. spp may be NULL; returns their number. */
+static int simulated_levels(double beyond, double *spp)
+{
+    int n = 0;
+    for (double v = 20.0; v < GGN_SIMULATED_CAP; v *= 1.15)
+        if (round(v) > beyond) {
+            if (spp)
+                spp[n] = round(v);
+            n++;
+        }
+    if (spp)
+        spp[n] = GGN_SIMULATED_CAP;
+    return n + 1;
+}
+
+/* The level whose half-buffer difference is kept in full. */
+static const struct ggn_seq_record *full_level(const struct ggn_seq_block *b)
+{
+    for (uint32_t i = 0; i < b->n_levels; i++)
+        if (ggn_seq_has(&b->levels[i], GGN_PLANE_HALF_F16))
+            return &b->levels[i];
+    return NULL;
+}
+
+/* Whether halves stand for levels beyond the last recorded one; up to a tenth of an octave is not worth simulating. */
+static int extends(const struct ggn_seq_block *b, int reference_independent)
+{
+    return reference_independent && b->reference && full_level(b) && 1.07 * b->levels[b->n_levels - 1].spp < GGN_SIMULATED_CAP &&
+           ggn_seq_has(b->reference, GGN_PLANE_MEAN_F16);
+}
+
+/* Without a reference: the mean of the full level stands for the converged image. */
+static int init_halves(struct ggn_stimuli *s, struct base_err *err)
+{
+    const struct ggn_seq_block *b = s->block;
+    const struct ggn_seq_record *full = full_level(b);
+    if (!full)
+        return base_fail(err, BASE_EINVAL, "block %u has neither a reference nor a full level with a half-buffer difference", b->id);
+    s->spp0 = full->spp;
+    int rc = ggn_seq_half(b, full, s->difference, err);
+    if (!rc)
+        rc = ggn_seq_mean(b, full, s->base, err);
+    if (!rc)
+        encode(s->base, (size_t)b->width * b->height, s->converged);
+    return rc;
+}
+
+static int init_recorded(struct ggn_stimuli *s, int reference_independent, int extend, struct base_err *err)
+{
+    const struct ggn_seq_block *b = s->block;
+    s->scale = reference_independent && ggn_seq_has(b->reference, GGN_PLANE_MEAN_F16);
+    int rc = s->scale ? ggn_seq_mean(b, b->reference, s->base, err) : 0;
+    if (!rc && extend) {
+        s->spp0 = full_level(b)->spp;
+        rc = ggn_seq_half(b, full_level(b), s->difference, err);
+    }
+    return !rc ? ggn_seq_display(b, b->reference, s->converged, err) : rc;
+}
+
+int ggn_stimuli_init(struct ggn_stimuli *out, const struct ggn_seq_block *block, int reference_independent, struct base_err *err)
+{
+    size_t pixels = (size_t)block->width * block->height;
+    struct ggn_stimuli s = {.block = block, .recorded = block->reference ? (int)block->n_levels : 0};
+    int extend = extends(block, reference_independent);
+    double beyond = s.recorded > 0 ? 1.07 * block->levels[s.recorded - 1].spp : 0.0;
+    s.n = s.recorded + (extend || s.recorded == 0 ? simulated_levels(beyond, NULL) : 0);
+    s.spp = malloc((size_t)s.n * sizeof *s.spp);
+    s.base = malloc(3 * pixels * sizeof(float));
+    s.difference = malloc(3 * pixels * sizeof(float));
+    s.work = malloc(3 * pixels * sizeof(float));
+    s.converged = malloc(3 * pixels);
+    int rc = 0;
+    if (!s.spp || !s.base || !s.difference || !s.work || !s.converged)
+        rc = base_fail_nomem(err, "observer");
+    else if (!block->reference)
+        rc = init_halves(&s, err);
+    else
+        rc = init_recorded(&s, reference_independent, extend, err);
+    if (rc) {
+        ggn_stimuli_release(&s);
+        return rc;
+    }
+    for (int i = 0; i < s.recorded; i++)
+        s.spp[i] = block->levels[i].spp;
+    if (s.n > s.recorded)
+        simulated_levels(beyond, s.spp + s.recorded);
+    *out = s;
+    return 0;
+}
+
+int ggn_stimuli_make(struct ggn_stimuli *s, int level, uint8_t *test, struct base_err *err)
+{
+    const struct ggn_seq_block *b = s->block;
+    size_t pixels = (size_t)b->width * b->height;
+    if (level >= s->recorded) {
+        float scale = (float)sqrt(s->spp0 / s->spp[level]);
+        for (size_t i = 0; i < 3 * pixels; i++)
+            s->work[i] = s->base[i] + scale * s->difference[i];
+        encode(s->work, pixels, test);
+        return 0;
+    }
+    const struct ggn_seq_record *r = &b->levels[level];
+    if (s->scale && (ggn_seq_has(r, GGN_PLANE_MEAN_F16) || ggn_seq_has(r, GGN_PLANE_FINE))) {
+        float scale = (float)sqrt((double)b->reference->spp / ((double)b->reference->spp + r->spp));
+        int rc = ggn_seq_mean(b, r, s->work, err);
+        if (rc)
+            return rc;
+        for (size_t i = 0; i < 3 * pixels; i++)
+            s->work[i] = s->base[i] + scale * (s->work[i] - s->base[i]);
+    } else {
+        return ggn_seq_display(b, r, test, err);
+    }
+    encode(s->work, pixels, test);
+    return 0;
+}
