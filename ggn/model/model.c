@@ -1,12 +1,9 @@
 #include "model/model.h"
 
 #include <cjson/cJSON.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include "model/model_json.h"
 
 struct ggn_model *ggn_model_create(const struct ggn_hyper *hyper, struct base_err *err)
 {
@@ -111,10 +108,10 @@ static int check_size(const struct ggn_hyper *hyper, const struct ggn_container 
 
 static int from_container(const struct ggn_container *c, struct ggn_model **model, struct base_err *err)
 {
-    struct ggn_model_description d = {0};
+    struct ggn_description d = {0};
     struct ggn_model *m = NULL;
     int count = 0;
-    int rc = ggn_model_json_parse(c->json, &d, err);
+    int rc = ggn_description_parse(c->json, &d, err);
 
     if (!rc)
         rc = ggn_hyper_check(&d.hyper, err);
@@ -172,7 +169,7 @@ int ggn_model_save(const struct ggn_model *m, const char *path, enum ggn_type ty
     int rc = visit_all(&(struct visit){.to = &c, .type = type}, m, &count, err);
 
     if (!rc)
-        c.json = ggn_model_json_print(m);
+        c.json = ggn_description_print(&(struct ggn_description){m->hyper, m->calibration, m->provenance});
     if (!rc && !c.json)
         rc = base_fail_nomem(err, "model file");
     if (!rc)

@@ -1,35 +1,22 @@
 /*
  * A trained criterion: the three networks, their hyper-parameters, the calibration of the probability, and where it all
- * comes from. Stored as a .ggn file (model/container.h) with the JSON object
- *
- *   {"kind": "model", "preset": "paper"|"lull", "height", "width", "window", "k_r", "k_m", "k_d",
- *    "calibration": {"scale", "shift", "threshold", "consecutive", "spacing"}, "provenance": {...}}
- *
- * and the tensors NETWORK/STAGE.INDEX.weight|bias|mean|var, NETWORK = denoiser, generator, discriminator.
+ * comes from. Stored as a .ggn file (model/container.h) with the JSON object of model/description.h and the tensors
+ * NETWORK/STAGE.INDEX.weight|bias|mean|var, NETWORK = denoiser, generator, discriminator.
  * Read-only after loading: any number of threads and criteria may share one model.
  */
 #ifndef GGN_MODEL_MODEL_H
 #define GGN_MODEL_MODEL_H
 
 #include "model/container.h"
-#include "model/networks.h"
+#include "model/description.h"
 #include "nn/weights.h"
-
-struct cJSON;
-
-struct ggn_calibration {
-    double scale, shift; /* p = sigmoid(scale·logit + shift); 1 and 0 = not calibrated (Platt 1999) */
-    double threshold;    /* a check votes for stopping when p < threshold; in (0, 1) */
-    int consecutive;     /* checks in a row that must vote so; 1..16 */
-    double spacing;      /* ratio of spp between consecutive images the model was trained on; 1..16 */
-};
 
 struct ggn_model {
     struct ggn_hyper hyper;
     struct ggn_calibration calibration;
     struct ggn_graph graph[GGN_NETS];
     struct ggn_weights *weights[GGN_NETS]; /* owns */
-    struct cJSON *provenance;                  /* owns; a JSON object: data-set hash, code version, seed, metrics … */
+    struct cJSON *provenance;              /* owns; a JSON object: data-set hash, code version, seed, metrics … */
 };
 
 /* A model with zero weights. NULL on failure. */

@@ -90,14 +90,20 @@ int ggn_log_draw(const struct ggn_log *log, const char *path, struct base_err *e
     data_block(f, log, 1);
     fprintf(f, "set multiplot layout 1,%d\nset grid\nset xrange [0:*]\nset xlabel 'step'\n", denoiser + 2 * judge);
     if (denoiser)
-        fputs("set title 'Denoiser: 1 - SSIM'\nplot $phase0 using 1:2 with linespoints lw 2 pt 7 ps 0.4 lc '#3366aa' title 'training', "
-              "$phase0 using 1:3 with linespoints lw 2 pt 7 ps 0.4 lc '#cc5522' title 'validation'\n", f);
+        fputs("set title 'Denoiser: 1 - SSIM'\nplot $phase0 using 1:2 with linespoints lw 2 pt 7 ps 0.4 lc '#3366aa' title "
+              "'training', "
+              "$phase0 using 1:3 with linespoints lw 2 pt 7 ps 0.4 lc '#cc5522' title 'validation'\n",
+              f);
     if (judge)
-        fputs("set title 'Generator and discriminator: cross-entropy'\nplot $phase1 using 1:2 with linespoints lw 2 pt 7 ps 0.4 lc '#3366aa' title "
+        fputs("set title 'Generator and discriminator: cross-entropy'\nplot $phase1 using 1:2 with linespoints lw 2 pt 7 ps "
+              "0.4 lc '#3366aa' title "
               "'training', $phase1 using 1:3 with linespoints lw 2 pt 7 ps 0.4 lc '#cc5522' title 'validation, calibrated'\n"
               "set title 'Accuracy and AUC'\nset yrange [0.5:1]\nset key bottom right\n"
-              "plot $phase1 using 1:4 with linespoints lw 2 pt 7 ps 0.4 lc '#3366aa' title 'training accuracy', $phase1 using 1:5 with linespoints lw 2 pt 7 ps 0.4 "
-              "lc '#cc5522' title 'validation accuracy', $phase1 using 1:6 with linespoints lw 2 pt 7 ps 0.4 lc '#228833' title 'validation AUC'\n", f);
+              "plot $phase1 using 1:4 with linespoints lw 2 pt 7 ps 0.4 lc '#3366aa' title 'training accuracy', $phase1 "
+              "using 1:5 with linespoints lw 2 pt 7 ps 0.4 "
+              "lc '#cc5522' title 'validation accuracy', $phase1 using 1:6 with linespoints lw 2 pt 7 ps 0.4 lc '#228833' "
+              "title 'validation AUC'\n",
+              f);
     fputs("unset multiplot\n", f);
     return ggn_plot_end(&plot, 1, err);
 }

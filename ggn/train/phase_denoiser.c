@@ -1,11 +1,13 @@
-/* Phase 0 of preset lull: the denoiser on crops of noisy images and their references. */
+#include "train/phase_denoiser.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/clock.h"
 #include "nn/hash.h"
-#include "train/session.h"
+#include "train/phase.h"
+#include "train/resume.h"
+#include "train/start.h"
 
 enum { VALIDATION_CROPS = 32 };
 static const uint32_t VALIDATION_SEED = 77;
@@ -61,8 +63,8 @@ static void fill_sample(void *data, long i, int worker)
     struct crop c = draw_crop(f->s, f->split, f->step, f->first + (int)i, f->seed);
     float *noisy = f->s->buffer + 2 * (size_t)i * values;
 
-    ggn_crop_planes(&f->s->set.chains[c.chain], c.level, f->s->set.width, f->s->set.height, c.x0, c.y0, size, size, &c.augment,
-                    noisy, noisy + values);
+    ggn_crop_planes(&f->s->set.chains[c.chain], c.level, f->s->set.width, f->s->set.height, c.x0, c.y0, size, size,
+                    &c.augment, noisy, noisy + values);
     (void)worker;
 }
 
@@ -73,7 +75,8 @@ static void fill_batch(struct ggn_session *s, enum ggn_split split, uint64_t ste
     base_threads_for(s->threads, count, fill_sample, &f);
 }
 
-static int train_step(struct ggn_session *s, uint64_t step, double *loss, struct base_err *err)
+static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, double *loss, double *right,
+                      struct base_err *err)
 {
     const int n = s->plan->batch_r;
     const size_t plane = (size_t)s->plan->crop * (size_t)s->plan->crop;
@@ -84,90 +87,94 @@ static int train_step(struct ggn_session *s, uint64_t step, double *loss, struct
         x[i] = s->buffer + ((size_t)(i / 3) * 6 + (size_t)(i % 3)) * plane;
         y[i] = x[i] + 3 * plane;
     }
-    s->trainer->options.lr[GGN_NET_R] = ggn_session_lr(s, s->plan->lr_r, step, (uint64_t)s->plan->steps_r);
+    *right = (double)NAN;
+    s->trainer->options.lr[GGN_NET_R] = ggn_session_lr(s, s->plan->lr_r, step, steps);
     return ggn_trainer_denoiser_step(s->trainer, x, y, n, loss, err);
 }
 
-/* Mean of 1 − SSIM over fixed crops of the validation scenes; NaN without any. */
-static double validate(struct ggn_session *s)
+/* Σ of 1 − SSIM over `count` crops in the buffer. */
+static double evaluate(struct ggn_session *s, int count)
 {
     struct ggn_trainer *t = s->trainer;
     const struct ggn_value *in = &t->r->graph->value[0];
-    const int out = t->r->graph->n_values - 1, n = s->plan->batch_r;
+    const int out = t->r->graph->n_values - 1;
     const size_t plane = (size_t)s->plan->crop * (size_t)s->plan->crop;
     double total = 0;
 
-    if (!nth_chain(s, GGN_SPLIT_VALIDATION, -1))
-        return (double)NAN;
-    ggn_weights_pack(t->weights[GGN_NET_R], NULL);
-    for (int first = 0; first < VALIDATION_CROPS; first += n) {
+    for (int i = 0; i < count; i++)
+        for (int c = 0; c < 3; c++)
+            for (int row = 0; row < in->h; row++) {
+                const float *x = s->buffer + ((size_t)i * 6 + (size_t)c) * plane + (size_t)row * (size_t)in->w;
+                memcpy(ggn_exec_plane(t->r, 0, i, c) + (long)row * in->row, x, (size_t)in->w * sizeof *x);
+                /* the input's gradient is not used here: its planes hold the reference in the output's layout */
+                memcpy(ggn_exec_grad(t->r, 0, i, c) + (long)row * in->row, x + 3 * plane, (size_t)in->w * sizeof *x);
+            }
+    ggn_exec_forward(t->r, t->weights[GGN_NET_R], count, GGN_EVAL);
+    for (int i = 0; i < count; i++) {
+        const float *x[3], *y[3];
+        for (int c = 0; c < 3; c++) {
+            x[c] = ggn_exec_plane(t->r, out, i, c);
+            y[c] = ggn_exec_grad(t->r, 0, i, c);
+        }
+        total += 1 - ggn_ssim_mean(t->ssim, x, y, NULL, 3, in->row, 0);
+    }
+    return total;
+}
+
+/* Mean of 1 − SSIM over fixed crops of the validation scenes; NaN without any. */
+static int validate(struct ggn_session *s, struct ggn_log_row *row, struct base_err *err)
+{
+    const int n = s->plan->batch_r, any = nth_chain(s, GGN_SPLIT_VALIDATION, -1);
+    double total = 0;
+
+    ggn_weights_pack(s->trainer->weights[GGN_NET_R], NULL);
+    for (int first = 0; any && first < VALIDATION_CROPS; first += n) {
         int count = VALIDATION_CROPS - first < n ? VALIDATION_CROPS - first : n;
         fill_batch(s, GGN_SPLIT_VALIDATION, 0, VALIDATION_SEED, first, count);
-        for (int i = 0; i < count; i++)
-            for (int c = 0; c < 3; c++)
-                for (int row = 0; row < in->h; row++) {
-                    const float *x = s->buffer + ((size_t)i * 6 + (size_t)c) * plane + (size_t)row * (size_t)in->w;
-                    memcpy(ggn_exec_plane(t->r, 0, i, c) + (long)row * in->row, x, (size_t)in->w * sizeof *x);
-                    /* the input's gradient is not used here: its planes hold the reference in the output's layout */
-                    memcpy(ggn_exec_grad(t->r, 0, i, c) + (long)row * in->row, x + 3 * plane, (size_t)in->w * sizeof *x);
-                }
-        ggn_exec_forward(t->r, t->weights[GGN_NET_R], count, GGN_EVAL);
-        for (int i = 0; i < count; i++) {
-            const float *x[3], *y[3];
-            for (int c = 0; c < 3; c++) {
-                x[c] = ggn_exec_plane(t->r, out, i, c);
-                y[c] = ggn_exec_grad(t->r, 0, i, c);
-            }
-            total += 1 - ggn_ssim_mean(t->ssim, x, y, NULL, 3, in->row, 0);
-        }
+        total += evaluate(s, count);
     }
-    return total / VALIDATION_CROPS;
+    row->validation_loss = any ? total / VALIDATION_CROPS : (double)NAN;
+    row->validation_accuracy = row->validation_auc = (double)NAN;
+    (void)err;
+    return 0;
 }
 
-/* One epoch; on divergence the trainer is back at the epoch's start and so is the step. */
-static int epoch(struct ggn_session *s, uint64_t end, struct base_err *err)
+static int begin(struct ggn_session *s, struct base_err *err)
 {
-    struct ggn_log_row row = {.phase = GGN_PHASE_DENOISER, .accuracy = (double)NAN, .validation_accuracy = (double)NAN,
-                              .validation_auc = (double)NAN};
-    const uint64_t begin = s->progress.step;
-    double start = base_clock_wall_s(), loss;
-
-    while (s->progress.step < end) {
-        if (ggn_session_interrupted(s))
-            return GGN_TRAIN_INTERRUPTED;
-        int rc = train_step(s, s->progress.step, &loss, err);
-        if (rc) {
-            s->progress.step = begin;
-            return rc;
-        }
-        row.loss += loss / (double)(end - begin);
-        s->progress.step++;
-    }
-    double seconds = base_clock_wall_s() - start;
-    row.lr = s->trainer->options.lr[GGN_NET_R];
-    row.validation_loss = validate(s);
-    s->progress.seconds[0] += base_clock_wall_s() - start;
+    s->progress.phase = GGN_PHASE_DENOISER;
+    int rc = ggn_session_begin(s, GGN_TRAIN_R, s->plan->batch_r, s->plan->crop, s->plan->crop, err);
+    if (rc)
+        return rc;
+    struct ggn_weights *w = s->trainer->weights[GGN_NET_R];
+    if (s->init)
+        ggn_weights_copy(w, s->init->weights[GGN_NET_R]->params);
+    else
+        ggn_train_identity(w->graph, w->params);
+    ggn_weights_pack(w, NULL);
     ggn_trainer_keep(s->trainer);
-    return ggn_session_epoch(s, &row, (uint64_t)s->plan->steps_r, (double)(end - begin) * s->plan->batch_r, seconds, err);
+    return 0;
 }
 
-int ggn_phase_denoiser(struct ggn_session *s, struct base_err *err)
+int ggn_phase_denoiser(struct ggn_session *s, const char *checkpoint, struct base_err *err)
 {
-    const uint64_t steps = (uint64_t)s->plan->steps_r;
+    const struct ggn_phase phase = {.steps = (uint64_t)s->plan->steps_r,
+                                    .epoch_steps = (uint64_t)s->plan->epoch_steps,
+                                    .batch = s->plan->batch_r,
+                                    .net = GGN_NET_R,
+                                    .step = train_step,
+                                    .validate = validate};
 
-    if (!nth_chain(s, GGN_SPLIT_TRAIN, -1) && steps)
+    if (!nth_chain(s, GGN_SPLIT_TRAIN, -1) && phase.steps)
         return base_fail(err, BASE_EINVAL, "%s: no training block has a reference for the denoiser", s->plan->data.dir);
-    while (s->progress.step < steps) {
-        uint64_t end = s->progress.step + (uint64_t)s->plan->epoch_steps;
-        int rc = epoch(s, end < steps ? end : steps, err);
-        if (rc == GGN_EDIVERGED && ++s->progress.divergences <= 8) {
-            if (s->plan->progress)
-                fprintf(s->plan->progress, "%s; learning rates halved\n", err->text);
-            err->code = 0;
-            continue;
-        }
-        if (rc)
-            return rc;
-    }
+    int rc = begin(s, err);
+    if (!rc && checkpoint)
+        rc = ggn_resume_load(s, checkpoint, err);
+    if (!rc)
+        rc = ggn_phase_run(s, &phase, err);
+    if (rc)
+        return rc;
+    ggn_weights_copy(s->r, s->trainer->weights[GGN_NET_R]->params);
+    ggn_trainer_destroy(s->trainer);
+    s->trainer = NULL;
     return 0;
 }

@@ -1,15 +1,17 @@
-/* Phase 1: generator and discriminator on windows with cached denoised images; in preset paper all three networks at once. */
+#include "train/phase_judge.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/clock.h"
 #include "figures/stats.h"
 #include "model/window.h"
-#include "train/calibrate.h"
 #include "nn/hash.h"
 #include "nn/loss.h"
-#include "train/session.h"
+#include "train/calibrate.h"
+#include "train/phase.h"
+#include "train/resume.h"
+#include "train/start.h"
 
 static size_t window_values(const struct ggn_session *s)
 {
@@ -21,12 +23,13 @@ static float difference(const struct ggn_session *s)
     return s->hyper.preset == GGN_PRESET_LULL ? (float)s->plan->difference : 0;
 }
 
-/* --- pixels of a batch --------------------------------------------------------------------------------------------------- */
+/* --- pixels of a batch ---------------------------------------------------------------------------------------------------
+ */
 
 struct fill {
     struct ggn_session *s;
     const struct ggn_windows *windows;
-    const int *index;  /* of the windows */
+    const int *index; /* of the windows */
     uint64_t step;
     int augment, denoised;
 };
@@ -71,11 +74,12 @@ static struct ggn_batch fill_batch(struct ggn_session *s, const struct fill *f, 
             else if (k < 3)
                 second[3 * i + k] = noisy[i * planes + k] + window_values(s);
         }
-    return (struct ggn_batch){.count = count, .noisy = noisy, .denoised = f->denoised ? second : NULL,
-                                  .reference = f->denoised ? NULL : second};
+    return (struct ggn_batch){
+        .count = count, .noisy = noisy, .denoised = f->denoised ? second : NULL, .reference = f->denoised ? NULL : second};
 }
 
-/* --- evaluation mode ----------------------------------------------------------------------------------------------------- */
+/* --- evaluation mode -----------------------------------------------------------------------------------------------------
+ */
 
 static void copy_planes(const struct ggn_exec *e, int value, int image, int c, const float *src, int row)
 {
@@ -99,13 +103,12 @@ static void generate(struct ggn_session *s, const float *const *planes, int coun
         copy_planes(t->d, 0, i, channel, ggn_exec_plane(t->m, out, i, 0), t->m->graph->value[out].row);
 }
 
-int ggn_session_logits(struct ggn_session *s, const struct ggn_windows *windows, const int *index, int n, double *logit,
-                       struct base_err *err)
+/* Raw logits of windows list[index[i]], i < n, with the weights as they are. */
+static void logits(struct ggn_session *s, const struct ggn_windows *windows, const int *index, int n, double *logit)
 {
     struct ggn_trainer *t = s->trainer;
     const int out = t->d->graph->n_values - 1;
 
-    (void)err;
     ggn_weights_pack(t->weights[GGN_NET_M], NULL);
     ggn_weights_pack(t->weights[GGN_NET_D], NULL);
     for (int first = 0; first < n; first += s->plan->batch) {
@@ -118,7 +121,6 @@ int ggn_session_logits(struct ggn_session *s, const struct ggn_windows *windows,
         for (int i = 0; i < count; i++)
             logit[first + i] = (double)*ggn_exec_plane(t->d, out, i, 0);
     }
-    return 0;
 }
 
 struct denoise {
@@ -142,7 +144,8 @@ static void denoise_images(const struct denoise *d, struct ggn_chain *c, int fir
                            d->exec->graph->value[out].plane);
 }
 
-int ggn_session_denoise(struct ggn_session *s, enum ggn_split split, struct base_err *err)
+/* Denoises the chains of one split (GGN_SPLITS: all) with s->r, in evaluation mode. */
+static int denoise(struct ggn_session *s, enum ggn_split split, struct base_err *err)
 {
     enum { AT_ONCE = 4 };
     struct denoise d = {s, ggn_exec_create(&s->r_graph, NULL, AT_ONCE, 0, s->threads, err)};
@@ -167,7 +170,8 @@ int ggn_session_denoise(struct ggn_session *s, enum ggn_split split, struct base
     return 0;
 }
 
-/* --- one step ------------------------------------------------------------------------------------------------------------ */
+/* --- one step ------------------------------------------------------------------------------------------------------------
+ */
 
 /* Steps of an epoch over all windows (preset paper). */
 static uint64_t epoch_length(const struct ggn_session *s)
@@ -199,7 +203,8 @@ static int paper_window(const struct ggn_session *s, uint64_t step, int i)
     return (int)k;
 }
 
-static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, double *loss, double *right, struct base_err *err)
+static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, double *loss, double *right,
+                      struct base_err *err)
 {
     const int paper = s->hyper.preset == GGN_PRESET_PAPER, n = s->plan->batch;
     int index[1024];
@@ -231,70 +236,77 @@ static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, doub
     return 0;
 }
 
-/* --- validation ---------------------------------------------------------------------------------------------------------- */
+/* --- validation ----------------------------------------------------------------------------------------------------------
+ */
 
-/* Evenly strided windows, at most as many as the plan says. */
-static int choose_validation(const struct ggn_session *s, int *index)
+void ggn_judged_release(struct ggn_judged *o)
 {
-    int n = s->validation.n < s->plan->validation_windows ? s->validation.n : s->plan->validation_windows;
-
-    for (int i = 0; i < n; i++)
-        index[i] = (int)((long)i * s->validation.n / n);
-    return n;
+    free(o->logit);
+    free(o->label);
+    free(o->noisy);
+    *o = (struct ggn_judged){0};
 }
 
-/* Loss and accuracy are those of the calibrated probability, as the model will be used: from epoch to epoch the logits of all
- * windows shift together, which says nothing about the model (loss 0.18 and 0.41 at an AUC of 0.992 and 0.995). */
-static int validate(struct ggn_session *s, struct ggn_log_row *row, struct base_err *err)
+int ggn_judge_validation(struct ggn_session *s, int most, struct ggn_judged *o, struct base_err *err)
 {
-    size_t room = (size_t)s->plan->validation_windows + 1;
-    int *index = malloc(room * sizeof *index), right = 0;
-    double *logit = malloc(room * sizeof *logit), *label = malloc(room * sizeof *label);
-    unsigned char *noisy = malloc(room);
-    int rc = index && logit && label && noisy ? 0 : base_fail_nomem(err, "validation");
+    const int n = s->validation.n < most ? s->validation.n : most;
+    const size_t room = (size_t)n + 1;
+    int *index = malloc(room * sizeof *index), rc = 0;
 
-    row->validation_loss = row->validation_accuracy = row->validation_auc = (double)NAN;
-    int n = rc ? 0 : choose_validation(s, index);
-    if (n)
-        rc = ggn_session_logits(s, &s->validation, index, n, logit, err);
-    if (n && !rc) {
-        struct ggn_policy calibrated = ggn_policy_default();
-        for (int i = 0; i < n; i++) {
-            const struct ggn_window *w = &s->validation.list[index[i]];
-            noisy[i] = (unsigned char)w->noisy;
-            label[i] = w->label;
-        }
-        ggn_calibrate_platt(logit, label, n, &calibrated);
-        row->validation_loss = 0;
-        for (int i = 0; i < n; i++) {
-            double z = calibrated.scale * logit[i] + calibrated.shift;
-            right += (z > 0) == noisy[i];
-            row->validation_loss += ggn_bce(z, label[i]) / n;
-        }
-        row->validation_accuracy = (double)right / n;
-        rc = ggn_stats_auc(logit, noisy, (size_t)n, &row->validation_auc, err);
+    *o = (struct ggn_judged){.n = n,
+                             .logit = malloc(room * sizeof *o->logit),
+                             .label = malloc(room * sizeof *o->label),
+                             .noisy = malloc(room),
+                             .auc = (double)NAN};
+    if (!index || !o->logit || !o->label || !o->noisy)
+        rc = base_fail_nomem(err, "validation");
+    for (int i = 0; !rc && i < n; i++) {
+        index[i] = (int)((long)i * s->validation.n / n);
+        o->label[i] = s->validation.list[index[i]].label;
+        o->noisy[i] = (unsigned char)s->validation.list[index[i]].noisy;
+    }
+    if (!rc && n) {
+        logits(s, &s->validation, index, n, o->logit);
+        rc = ggn_stats_auc(o->logit, o->noisy, (size_t)n, &o->auc, err);
     }
     free(index);
-    free(logit);
-    free(label);
-    free(noisy);
+    return rc;
+}
+
+/* Loss and accuracy are those of the calibrated probability, as the model will be used: from epoch to epoch the logits of
+ * all windows shift together, which says nothing about the model (loss 0.18 and 0.41 at an AUC of 0.992 and 0.995). */
+static int measure(struct ggn_session *s, struct ggn_log_row *row, struct base_err *err)
+{
+    struct ggn_policy calibrated = ggn_policy_default();
+    struct ggn_judged v;
+    int rc = ggn_judge_validation(s, s->plan->validation_windows, &v, err), right = 0;
+
+    row->validation_auc = v.auc;
+    row->validation_loss = row->validation_accuracy = v.n ? 0 : (double)NAN;
+    if (!rc)
+        ggn_calibrate_platt(v.logit, v.label, v.n, &calibrated);
+    for (int i = 0; !rc && i < v.n; i++) {
+        double z = calibrated.scale * v.logit[i] + calibrated.shift;
+        right += (z > 0) == v.noisy[i];
+        row->validation_loss += ggn_bce(z, v.label[i]) / v.n;
+    }
+    if (v.n)
+        row->validation_accuracy = (double)right / v.n;
+    ggn_judged_release(&v);
     return rc;
 }
 
 /* Preset paper: the denoiser has moved on; its copy and the denoised validation images follow. */
 static int renew_denoiser(struct ggn_session *s, struct base_err *err)
 {
-    const struct ggn_weights *from = s->trainer->weights[GGN_NET_R];
-
-    memcpy(s->r->params, from->params, s->r_graph.n_params * sizeof *from->params);
-    memcpy(s->r->mean, from->mean, s->r_graph.n_stats * sizeof *from->mean);
-    memcpy(s->r->var, from->var, s->r_graph.n_stats * sizeof *from->var);
-    return ggn_session_denoise(s, GGN_SPLIT_VALIDATION, err);
+    ggn_weights_copy(s->r, s->trainer->weights[GGN_NET_R]->params);
+    return denoise(s, GGN_SPLIT_VALIDATION, err);
 }
 
-/* The loss on the validation scenes chooses the epoch. The AUC does not: with few blocks it saturates within a hundred steps, and
- * the networks of that time are far from what they learn later (they stopped 18 % of the training blocks early). */
-static int note_best(struct ggn_session *s, const struct ggn_log_row *row, struct base_err *err)
+/* The loss on the validation scenes chooses the epoch. The AUC does not: with few blocks it saturates within a hundred
+ * steps, and the networks of that time are far from what they learn later (they stopped 18 % of the training blocks early).
+ */
+static void note_best(struct ggn_session *s, const struct ggn_log_row *row)
 {
     struct ggn_progress *p = &s->progress;
     /* without validation windows (or with one class only) the last epoch counts; a checkpoint knows no infinity, only NaN */
@@ -302,62 +314,71 @@ static int note_best(struct ggn_session *s, const struct ggn_log_row *row, struc
 
     p->stale = better ? 0 : p->stale + 1;
     if (!better)
-        return 0;
+        return;
     p->best_loss = row->validation_loss;
     p->best_step = p->step;
-    return ggn_session_keep_best(s, err);
+    ggn_session_keep_best(s);
 }
 
-static int epoch(struct ggn_session *s, uint64_t end, uint64_t steps, struct base_err *err)
+static int validate(struct ggn_session *s, struct ggn_log_row *row, struct base_err *err)
 {
-    struct ggn_log_row row = {.phase = GGN_PHASE_JUDGE};
-    const uint64_t begin = s->progress.step;
-    double start = base_clock_wall_s(), loss, right;
-
-    while (s->progress.step < end) {
-        if (ggn_session_interrupted(s))
-            return GGN_TRAIN_INTERRUPTED;
-        int rc = train_step(s, s->progress.step, steps, &loss, &right, err);
-        if (rc) {
-            s->progress.step = begin;
-            return rc;
-        }
-        row.loss += loss / (double)(end - begin);
-        row.accuracy += right / (double)(end - begin);
-        s->progress.step++;
-    }
-    double seconds = base_clock_wall_s() - start;
     int rc = s->hyper.preset == GGN_PRESET_PAPER ? renew_denoiser(s, err) : 0;
+
     if (!rc)
-        rc = validate(s, &row, err);
+        rc = measure(s, row, err);
     if (!rc)
-        rc = note_best(s, &row, err);
+        note_best(s, row);
+    return rc;
+}
+
+/* --- the phase -----------------------------------------------------------------------------------------------------------
+ */
+
+static int begin(struct ggn_session *s, struct base_err *err)
+{
+    const int paper = s->hyper.preset == GGN_PRESET_PAPER;
+
+    s->progress =
+        (struct ggn_progress){.phase = GGN_PHASE_JUDGE, .best_loss = HUGE_VAL, .seconds = {s->progress.seconds[0], 0}};
+    int rc =
+        ggn_session_begin(s, paper ? GGN_TRAIN_ALL : GGN_TRAIN_MD, s->plan->batch, s->hyper.height, s->hyper.width, err);
+    for (int net = paper ? GGN_NET_R : GGN_NET_M; net < GGN_NETS && !rc; net++) {
+        s->best[net] = calloc(s->trainer->graph[net].n_learned, sizeof *s->best[net]);
+        if (!s->best[net])
+            return base_fail_nomem(err, "the best epoch");
+        struct ggn_weights *w = s->trainer->weights[net];
+        if (!s->init)
+            continue;
+        ggn_weights_copy(w, s->init->weights[net]->params);
+        if (net == GGN_NET_M && !paper)
+            ggn_train_unfold(w->graph, w->params, s->hyper.window, s->plan->difference);
+        ggn_weights_pack(w, NULL);
+    }
+    if (!rc)
+        ggn_trainer_keep(s->trainer);
+    return rc;
+}
+
+int ggn_phase_judge(struct ggn_session *s, const char *checkpoint, struct base_err *err)
+{
+    const struct ggn_train_plan *p = s->plan;
+    const int paper = p->preset == GGN_PRESET_PAPER;
+    const struct ggn_phase phase = {.steps = p->steps ? (uint64_t)p->steps : (uint64_t)p->epochs * epoch_length(s),
+                                    .epoch_steps = p->epoch_steps ? (uint64_t)p->epoch_steps : epoch_length(s),
+                                    .batch = p->batch,
+                                    .net = GGN_NET_M,
+                                    .step = train_step,
+                                    .validate = validate};
+    int rc = begin(s, err);
+
+    if (!rc && checkpoint)
+        rc = ggn_resume_load(s, checkpoint, err);
+    if (!rc && !paper)
+        rc = denoise(s, GGN_SPLITS, err);
+    if (!rc)
+        rc = ggn_phase_run(s, &phase, err);
     if (rc)
         return rc;
-    row.lr = s->trainer->options.lr[GGN_NET_M];
-    s->progress.seconds[1] += base_clock_wall_s() - start;
-    ggn_trainer_keep(s->trainer);
-    return ggn_session_epoch(s, &row, steps, (double)(end - begin) * s->plan->batch, seconds, err);
-}
-
-int ggn_phase_judge(struct ggn_session *s, struct base_err *err)
-{
-    const uint64_t steps = s->plan->steps ? (uint64_t)s->plan->steps : (uint64_t)s->plan->epochs * epoch_length(s);
-    const uint64_t length = s->plan->epoch_steps ? (uint64_t)s->plan->epoch_steps : epoch_length(s);
-
-    while (s->progress.step < steps) {
-        uint64_t end = s->progress.step + length;
-        int rc = epoch(s, end < steps ? end : steps, steps, err);
-        if (rc == GGN_EDIVERGED && ++s->progress.divergences <= 8) {
-            if (s->plan->progress)
-                fprintf(s->plan->progress, "%s; learning rates halved\n", err->text);
-            err->code = 0;
-            continue;
-        }
-        if (rc)
-            return rc;
-        if (s->plan->patience && s->progress.stale >= s->plan->patience)
-            break;
-    }
-    return 0;
+    ggn_session_load_best(s);
+    return paper ? denoise(s, GGN_SPLIT_VALIDATION, err) : 0;
 }

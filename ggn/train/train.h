@@ -2,51 +2,17 @@
  * Training from recorded sequences to a model file.
  *
  * Preset lull trains in two phases, because no gradient crosses between them: first the denoiser R on crops (1 − SSIM to the
- * reference), then generator M and discriminator D (cross-entropy) on windows whose denoised images are computed once. Preset
- * paper follows the published iteration. Both end with the best epoch on the validation scenes, a calibration and the choice
- * of the stopping threshold there.
+ * reference), then generator M and discriminator D (cross-entropy) on windows whose denoised images are computed once.
+ * Preset paper follows the published iteration. Both end with the best epoch on the validation scenes, a calibration and the
+ * choice of the stopping threshold there.
  *
- * Everything drawn is a function of (seed, step), sums have a fixed order: the same data, options and seed give the same model
- * bytes for any number of threads, also when a run is interrupted and resumed.
+ * Everything drawn is a function of (seed, step), sums have a fixed order: the same data, options and seed give the same
+ * model bytes for any number of threads, also when a run is interrupted and resumed.
  */
 #ifndef GGN_TRAIN_TRAIN_H
 #define GGN_TRAIN_TRAIN_H
 
-#include <signal.h>
-#include <stdio.h>
-
-#include "model/networks.h"
-#include "data/chains.h"
-
-enum { GGN_TRAIN_INTERRUPTED = 1 }; /* returned by ggn_train beside 0 and errors */
-
-struct ggn_train_plan {
-    struct ggn_chains_options data;
-    const char *out;             /* model file; OUT.ckpt, OUT.csv, OUT.png and OUT.card.json lie beside it */
-    const char *init;            /* model file to start from, or NULL */
-    int resume;                  /* continue from OUT.ckpt if it is there */
-    enum ggn_preset preset;
-    int window, k_r, k_m, k_d;   /* network sizes; the block size comes from the data */
-    int crop, batch_r, batch;    /* crop side of the denoiser's samples; samples per step */
-    int steps_r, steps;          /* steps of the two phases; preset paper: of its one phase, 0 = epochs · windows / batch */
-    int epochs;                  /* preset paper */
-    int epoch_steps;             /* steps between validations and checkpoints */
-    int patience;                /* epochs without a lower calibrated validation loss before the end; 0 = never */
-    double lr_r, lr;
-    double difference;           /* preset lull: see ggn_train_fold */
-    int soft_labels;
-    double jitter;               /* octaves of exposure; see ggn_augment_draw */
-    int synthetic;               /* synthetic chains per block */
-    int extend;                  /* continue recorded chains beyond their last level, see ggn_chains_extend */
-    int validation_windows;      /* most windows per validation */
-    double early_rate;           /* share of validation blocks that may be stopped early (ggn_stopping.unsure_rate) */
-    uint32_t seed;
-    int threads;
-    FILE *progress;              /* lines for people, or NULL */
-    const volatile sig_atomic_t *interrupted; /* checked between steps, or NULL */
-};
-
-struct ggn_train_plan ggn_train_plan_default(enum ggn_preset preset);
+#include "train/plan.h"
 
 /* Runs the plan. GGN_TRAIN_INTERRUPTED: the checkpoint of the last finished epoch is there. */
 int ggn_train(const struct ggn_train_plan *plan, struct base_err *err);

@@ -1,20 +1,16 @@
-/* The end of a training: the model file and the card that says how it was made; and the way back for --init. */
+#include "train/finish.h"
+
 #include <cjson/cJSON.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/files.h"
-#include "train/session.h"
+#include "model/policy.h"
+#include "train/calibrate.h"
+#include "train/phase_judge.h"
+#include "train/resume.h"
 #include "train/start.h"
-
-static void copy_weights(struct ggn_weights *to, const struct ggn_weights *from)
-{
-    memcpy(to->params, from->params, from->graph->n_params * sizeof *to->params);
-    memcpy(to->mean, from->mean, from->graph->n_stats * sizeof *to->mean);
-    memcpy(to->var, from->var, from->graph->n_stats * sizeof *to->var);
-    ggn_weights_pack(to, NULL);
-}
 
 /* What a run is made of. The same data, options and seed give the same bytes, so nothing of time or place is in it. */
 static cJSON *describe_run(const struct ggn_session *s)
@@ -24,11 +20,23 @@ static cJSON *describe_run(const struct ggn_session *s)
     const struct {
         const char *name;
         double value;
-    } numbers[] = {{"seed", p->seed}, {"steps_denoiser", p->steps_r}, {"steps", p->steps}, {"epochs", p->epochs},
-                   {"batch_denoiser", p->batch_r}, {"batch", p->batch}, {"crop", p->crop}, {"lr_denoiser", p->lr_r}, {"lr", p->lr},
-                   {"difference", p->difference}, {"soft_labels", p->soft_labels}, {"jitter", p->jitter},
-                   {"synthetic_per_block", p->synthetic}, {"extended", p->extend}, {"best_step", (double)s->progress.best_step},
-                   {"divergences", s->progress.divergences}, {"data_key", ggn_session_key(s)}};
+    } numbers[] = {{"seed", p->seed},
+                   {"steps_denoiser", p->steps_r},
+                   {"steps", p->steps},
+                   {"epochs", p->epochs},
+                   {"batch_denoiser", p->batch_r},
+                   {"batch", p->batch},
+                   {"crop", p->crop},
+                   {"lr_denoiser", p->lr_r},
+                   {"lr", p->lr},
+                   {"difference", p->difference},
+                   {"soft_labels", p->soft_labels},
+                   {"jitter", p->jitter},
+                   {"synthetic_per_block", p->synthetic},
+                   {"extended", p->extend},
+                   {"best_step", (double)s->progress.best_step},
+                   {"divergences", s->progress.divergences},
+                   {"data_key", ggn_resume_key(s)}};
 
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)
         cJSON_AddNumberToObject(o, numbers[i].name, numbers[i].value);
@@ -50,8 +58,8 @@ static cJSON *describe_data(const struct ggn_session *s)
         }
     }
     cJSON_AddNumberToObject(o, "training_blocks", ggn_chains_count(&s->set, GGN_SPLIT_TRAIN, 1));
-    cJSON_AddNumberToObject(o, "synthetic_chains", ggn_chains_count(&s->set, GGN_SPLIT_TRAIN, 0) -
-                                                       ggn_chains_count(&s->set, GGN_SPLIT_TRAIN, 1));
+    cJSON_AddNumberToObject(o, "synthetic_chains",
+                            ggn_chains_count(&s->set, GGN_SPLIT_TRAIN, 0) - ggn_chains_count(&s->set, GGN_SPLIT_TRAIN, 1));
     cJSON_AddNumberToObject(o, "validation_blocks", ggn_chains_count(&s->set, GGN_SPLIT_VALIDATION, 1));
     cJSON_AddNumberToObject(o, "training_windows", s->train.n);
     cJSON_AddNumberToObject(o, "validation_windows", s->validation.n);
@@ -93,60 +101,69 @@ static int write_card(const struct ggn_session *s, const struct ggn_model *model
     return rc;
 }
 
-int ggn_session_export(struct ggn_session *s, const struct ggn_policy *policy, const struct ggn_stopping *stopping, double auc,
-                       double accuracy, struct base_err *err)
+static void say(const struct ggn_session *s, const struct ggn_policy *policy, const struct ggn_stopping *st, double auc,
+                double accuracy)
+{
+    if (s->plan->progress)
+        fprintf(
+            s->plan->progress,
+            "%s: validation AUC %.4f, accuracy %.3f; threshold %.2f stops %.1f %% of %d blocks early, %.2f of the samples "
+            "needed, median |log2| %.2f\n",
+            s->plan->out, auc, accuracy, policy->threshold, 100 * st->early_rate, st->blocks, st->samples_ratio,
+            st->median_abs_log2);
+}
+
+static int export(struct ggn_session *s, const struct ggn_policy *policy, const struct ggn_stopping *stopping, double auc,
+                  double accuracy, struct base_err *err)
 {
     struct ggn_model *model = ggn_model_create(&s->hyper, err);
 
     if (!model)
         return BASE_ENOMEM;
-    copy_weights(model->weights[GGN_NET_R], s->r);
-    copy_weights(model->weights[GGN_NET_M], s->trainer->weights[GGN_NET_M]);
-    copy_weights(model->weights[GGN_NET_D], s->trainer->weights[GGN_NET_D]);
+    for (int net = 0; net < GGN_NETS; net++)
+        ggn_weights_copy(model->weights[net], net == GGN_NET_R ? s->r->params : s->trainer->weights[net]->params);
     if (s->hyper.preset == GGN_PRESET_LULL)
         ggn_train_fold(&model->graph[GGN_NET_M], model->weights[GGN_NET_M]->params, s->hyper.window, s->plan->difference);
     cJSON_AddItemToObject(model->provenance, "training", describe_run(s));
     cJSON_AddItemToObject(model->provenance, "data", describe_data(s));
     cJSON_AddItemToObject(model->provenance, "validation", describe_validation(stopping, auc, accuracy));
     int rc = ggn_policy_set(model, policy, err);
-    /* f32: half floats change a verdict now and then (counted in ggn/models/README.md); `ggn convert` is for who takes that */
+    /* f32: half floats change a verdict now and then (counted in ggn/models/README.md); `ggn convert` is for who takes that
+     */
     if (!rc)
         rc = ggn_model_save(model, s->plan->out, GGN_F32, err);
     if (!rc)
         rc = write_card(s, model, err);
     ggn_model_destroy(model);
-    if (!rc && s->plan->progress)
-        fprintf(s->plan->progress,
-                "%s: validation AUC %.4f, accuracy %.3f; threshold %.2f stops %.1f %% of %d blocks early, %.2f of the samples needed, "
-                "median |log2| %.2f\n", s->plan->out, auc, accuracy, policy->threshold, 100 * stopping->early_rate, stopping->blocks,
-                stopping->samples_ratio, stopping->median_abs_log2);
     return rc;
 }
 
-int ggn_session_import(struct ggn_session *s, const char *path, struct base_err *err)
+int ggn_session_finish(struct ggn_session *s, struct base_err *err)
 {
-    struct ggn_model *model = NULL;
-    int rc = ggn_model_load(path, &model, err);
+    struct ggn_policy policy = ggn_policy_default();
+    struct ggn_stopping stopping = {0};
+    struct ggn_judged v;
+    double accuracy = (double)NAN;
+    int rc = ggn_judge_validation(s, s->validation.n, &v, err), right = 0;
 
-    if (rc)
-        return rc;
-    const struct ggn_hyper *a = &model->hyper, *b = &s->hyper;
-    if (a->preset != b->preset || a->height != b->height || a->width != b->width || a->window != b->window || a->k_r != b->k_r ||
-        a->k_m != b->k_m || a->k_d != b->k_d) {
-        ggn_model_destroy(model);
-        return base_fail(err, BASE_EINVAL, "%s: networks of another size or preset", path);
+    if (!rc && v.n) {
+        ggn_calibrate_platt(v.logit, v.label, v.n, &policy);
+        for (int i = 0; i < v.n; i++)
+            right += (ggn_policy_p(&policy, v.logit[i]) >= 0.5) == v.noisy[i];
+        accuracy = (double)right / v.n;
+        policy.slope = ggn_calibrate_slope(&s->validation, v.logit, &policy);
+        rc = ggn_calibrate_threshold(&s->validation, v.logit, s->plan->early_rate, &policy, &stopping, err);
     }
-    if (!s->trainer) {
-        copy_weights(s->r, model->weights[GGN_NET_R]);
-    } else {
-        if (s->hyper.preset == GGN_PRESET_PAPER)
-            copy_weights(s->trainer->weights[GGN_NET_R], model->weights[GGN_NET_R]);
-        copy_weights(s->trainer->weights[GGN_NET_M], model->weights[GGN_NET_M]);
-        copy_weights(s->trainer->weights[GGN_NET_D], model->weights[GGN_NET_D]);
-        if (s->hyper.preset == GGN_PRESET_LULL)
-            ggn_train_unfold(&s->trainer->graph[GGN_NET_M], s->trainer->weights[GGN_NET_M]->params, s->hyper.window, s->plan->difference);
-        ggn_weights_pack(s->trainer->weights[GGN_NET_M], NULL);
+    if (!rc) {
+        policy.first_spp = s->set.first_spp;
+        policy.ratio = s->set.ratio > 1.001 ? s->set.ratio : 0;
+        policy.step_spp = s->set.step_spp;
+        ggn_calibrate_limits(&s->train, &policy);
+        ggn_calibrate_limits(&s->validation, &policy);
+        rc = export(s, &policy, &stopping, v.auc, accuracy, err);
     }
-    ggn_model_destroy(model);
-    return 0;
+    if (!rc)
+        say(s, &policy, &stopping, v.auc, accuracy);
+    ggn_judged_release(&v);
+    return rc;
 }

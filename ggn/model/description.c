@@ -1,4 +1,4 @@
-#include "model/model_json.h"
+#include "model/description.h"
 
 #include <cjson/cJSON.h>
 #include <stddef.h>
@@ -62,7 +62,7 @@ static int get_preset(const cJSON *root, enum ggn_preset *out, struct base_err *
     return base_fail(err, BASE_EINVAL, "'preset' is neither \"paper\" nor \"lull\"");
 }
 
-static int parse_root(const cJSON *root, struct ggn_model_description *d, struct base_err *err)
+static int parse_root(const cJSON *root, struct ggn_description *d, struct base_err *err)
 {
     const cJSON *kind = cJSON_GetObjectItemCaseSensitive(root, "kind");
     const cJSON *calibration = cJSON_GetObjectItemCaseSensitive(root, "calibration");
@@ -80,10 +80,10 @@ static int parse_root(const cJSON *root, struct ggn_model_description *d, struct
     return rc;
 }
 
-int ggn_model_json_parse(const char *json, struct ggn_model_description *out, struct base_err *err)
+int ggn_description_parse(const char *json, struct ggn_description *out, struct base_err *err)
 {
     cJSON *root = cJSON_Parse(json);
-    struct ggn_model_description d = {0};
+    struct ggn_description d = {0};
 
     if (!root)
         return base_fail(err, BASE_EINVAL, "the description is not JSON");
@@ -103,29 +103,29 @@ int ggn_model_json_parse(const char *json, struct ggn_model_description *out, st
 }
 
 /* cJSON's adders return NULL without memory; nothing may be left out silently. */
-static int fill(cJSON *root, const struct ggn_model *m)
+static int fill(cJSON *root, const struct ggn_description *d)
 {
     int ok = cJSON_AddStringToObject(root, "kind", "model") &&
-             cJSON_AddStringToObject(root, "preset", preset_name[m->hyper.preset]);
+             cJSON_AddStringToObject(root, "preset", preset_name[d->hyper.preset]);
 
     for (size_t i = 0; i < N_HYPER; i++)
         ok = ok && cJSON_AddNumberToObject(root, hyper_field[i].name,
-                                           *(const int *)(const void *)((const char *)&m->hyper + hyper_field[i].at));
+                                           *(const int *)(const void *)((const char *)&d->hyper + hyper_field[i].at));
     cJSON *calibration = ok ? cJSON_AddObjectToObject(root, "calibration") : NULL;
     ok = calibration != NULL;
     for (size_t i = 0; i < N_CALIBRATION; i++)
         ok = ok && cJSON_AddNumberToObject(
                        calibration, calibration_field[i].name,
-                       *(const double *)(const void *)((const char *)&m->calibration + calibration_field[i].at));
-    ok = ok && cJSON_AddNumberToObject(calibration, "consecutive", m->calibration.consecutive);
-    cJSON *provenance = ok ? cJSON_Duplicate(m->provenance, 1) : NULL;
+                       *(const double *)(const void *)((const char *)&d->calibration + calibration_field[i].at));
+    ok = ok && cJSON_AddNumberToObject(calibration, "consecutive", d->calibration.consecutive);
+    cJSON *provenance = ok ? cJSON_Duplicate(d->provenance, 1) : NULL;
     return provenance && cJSON_AddItemToObject(root, "provenance", provenance);
 }
 
-char *ggn_model_json_print(const struct ggn_model *m)
+char *ggn_description_print(const struct ggn_description *d)
 {
     cJSON *root = cJSON_CreateObject();
-    char *text = root && fill(root, m) ? cJSON_Print(root) : NULL;
+    char *text = root && fill(root, d) ? cJSON_Print(root) : NULL;
 
     cJSON_Delete(root);
     return text;

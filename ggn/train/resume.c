@@ -1,7 +1,5 @@
-/*
- * OUT.ckpt: everything that continuing a run bit-exactly needs, as a .ggn file (model/container.h): the arrays of
- * ggn_session_array as tensors "0", "1", …, progress, optimiser counts and learning curves as JSON of "kind": "training".
- */
+#include "train/resume.h"
+
 #include <cjson/cJSON.h>
 #include <math.h>
 #include <stdlib.h>
@@ -9,16 +7,37 @@
 #include <zlib.h>
 
 #include "model/container.h"
-#include "train/session.h"
 
 enum { N_ROW = 9 };
 
-uint32_t ggn_session_key(const struct ggn_session *s)
+uint32_t ggn_resume_key(const struct ggn_session *s)
 {
     const struct ggn_train_plan *p = s->plan;
-    const double numbers[] = {(double)p->preset, p->window, p->k_r, p->k_m, p->k_d, p->crop, p->batch_r, p->batch, p->steps_r, p->steps,
-                              p->epochs, p->epoch_steps, p->patience, p->lr_r, p->lr, p->difference, p->soft_labels, p->jitter,
-                              p->synthetic, p->extend, p->validation_windows, p->seed, s->set.width, s->set.height, s->set.n};
+    const double numbers[] = {(double)p->preset,
+                              p->window,
+                              p->k_r,
+                              p->k_m,
+                              p->k_d,
+                              p->crop,
+                              p->batch_r,
+                              p->batch,
+                              p->steps_r,
+                              p->steps,
+                              p->epochs,
+                              p->epoch_steps,
+                              p->patience,
+                              p->lr_r,
+                              p->lr,
+                              p->difference,
+                              p->soft_labels,
+                              p->jitter,
+                              p->synthetic,
+                              p->extend,
+                              p->validation_windows,
+                              p->seed,
+                              s->set.width,
+                              s->set.height,
+                              s->set.n};
     uLong crc = crc32(0, (const Bytef *)numbers, sizeof numbers);
 
     for (int i = 0; i < s->set.n; i++) {
@@ -33,10 +52,9 @@ uint32_t ggn_session_key(const struct ggn_session *s)
     return (uint32_t)crc;
 }
 
-float *ggn_session_array(struct ggn_session *s, int i, size_t *count)
+/* What the phase changes, as arrays in a fixed order; NULL past the end. */
+static float *state_array(struct ggn_session *s, int i, size_t *count)
 {
-    const struct ggn_graph *g;
-
     if (s->progress.phase == GGN_PHASE_DENOISER)
         return ggn_trainer_state(s->trainer, GGN_NET_R, i, count);
     if (i < 5 && s->hyper.preset == GGN_PRESET_PAPER)
@@ -48,20 +66,22 @@ float *ggn_session_array(struct ggn_session *s, int i, size_t *count)
     i -= s->hyper.preset == GGN_PRESET_PAPER ? 5 : 3;
     if (i < 10)
         return ggn_trainer_state(s->trainer, i < 5 ? GGN_NET_M : GGN_NET_D, i % 5, count);
+    static const int net_of[] = {GGN_NET_M, GGN_NET_D, GGN_NET_R};
     i -= 10;
-    if (i > 1 && !(i == 2 && s->best_r))
+    if (i > 2 || !s->best[net_of[i]])
         return NULL;
-    g = &s->trainer->graph[i == 0 ? GGN_NET_M : i == 1 ? GGN_NET_D : GGN_NET_R];
-    *count = g->n_params + 2 * g->n_stats;
-    return i == 2 ? s->best_r : s->best[i];
+    *count = s->trainer->graph[net_of[i]].n_learned;
+    return s->best[net_of[i]];
 }
 
-/* --- JSON ---------------------------------------------------------------------------------------------------------------- */
+/* --- JSON ----------------------------------------------------------------------------------------------------------------
+ */
 
 static double *row_field(struct ggn_log_row *r, int i)
 {
-    double *const fields[N_ROW] = {NULL, &r->step, &r->loss, &r->accuracy, &r->validation_loss, &r->validation_accuracy,
-                                   &r->validation_auc, &r->lr, &r->seconds};
+    double *const fields[N_ROW] = {
+        NULL,   &r->step,   &r->loss, &r->accuracy, &r->validation_loss, &r->validation_accuracy, &r->validation_auc,
+        &r->lr, &r->seconds};
     return fields[i];
 }
 
@@ -72,11 +92,19 @@ static char *describe(struct ggn_session *s)
     const struct {
         const char *name;
         double value;
-    } numbers[] = {{"key", ggn_session_key(s)}, {"phase", p->phase}, {"step", (double)p->step}, {"stale", p->stale}, {"divergences", p->divergences},
-                   {"best_loss", p->best_loss}, {"best_step", (double)p->best_step},
-                   {"seconds0", p->seconds[0]}, {"seconds1", p->seconds[1]},
-                   {"steps", (double)s->trainer->steps}, {"t0", (double)s->trainer->adam_t[0]},
-                   {"t1", (double)s->trainer->adam_t[1]}, {"t2", (double)s->trainer->adam_t[2]}};
+    } numbers[] = {{"key", ggn_resume_key(s)},
+                   {"phase", p->phase},
+                   {"step", (double)p->step},
+                   {"stale", p->stale},
+                   {"divergences", p->divergences},
+                   {"best_loss", p->best_loss},
+                   {"best_step", (double)p->best_step},
+                   {"seconds0", p->seconds[0]},
+                   {"seconds1", p->seconds[1]},
+                   {"steps", (double)s->trainer->steps},
+                   {"t0", (double)s->trainer->adam_t[0]},
+                   {"t1", (double)s->trainer->adam_t[1]},
+                   {"t2", (double)s->trainer->adam_t[2]}};
 
     cJSON_AddStringToObject(root, "kind", "training");
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)
@@ -123,7 +151,8 @@ static int restore(struct ggn_session *s, const cJSON *root, const char *path, s
     s->trainer->adam_t[1] = (uint64_t)field(root, "t1");
     s->trainer->adam_t[2] = (uint64_t)field(root, "t2");
     ggn_log_release(&s->log);
-    cJSON_ArrayForEach(row, cJSON_GetObjectItemCaseSensitive(root, "log")) {
+    cJSON_ArrayForEach(row, cJSON_GetObjectItemCaseSensitive(root, "log"))
+    {
         struct ggn_log_row r = {.phase = (int)number(cJSON_GetArrayItem(row, 0)) != 0};
         for (int k = 1; k < N_ROW; k++)
             *row_field(&r, k) = number(cJSON_GetArrayItem(row, k));
@@ -134,16 +163,17 @@ static int restore(struct ggn_session *s, const cJSON *root, const char *path, s
     return 0;
 }
 
-/* --- file ---------------------------------------------------------------------------------------------------------------- */
+/* --- file ----------------------------------------------------------------------------------------------------------------
+ */
 
-int ggn_session_save(struct ggn_session *s, const char *path, struct base_err *err)
+int ggn_resume_save(struct ggn_session *s, const char *path, struct base_err *err)
 {
     struct ggn_container c = {.json = describe(s)};
     size_t count;
     float *array;
     int rc = c.json ? 0 : base_fail_nomem(err, "checkpoint");
 
-    for (int i = 0; !rc && (array = ggn_session_array(s, i, &count)); i++) {
+    for (int i = 0; !rc && (array = state_array(s, i, &count)); i++) {
         char name[16];
         int dim = (int)count;
         snprintf(name, sizeof name, "%d", i);
@@ -170,7 +200,7 @@ static int read_file(const char *path, struct ggn_container *c, cJSON **root, st
     return base_fail(err, BASE_EINVAL, "%s: not a checkpoint of a training", path);
 }
 
-int ggn_session_saved_phase(const char *path, int *phase, struct base_err *err)
+int ggn_resume_phase(const char *path, int *phase, struct base_err *err)
 {
     struct ggn_container c = {0};
     cJSON *root = NULL;
@@ -187,7 +217,7 @@ int ggn_session_saved_phase(const char *path, int *phase, struct base_err *err)
     return 0;
 }
 
-int ggn_session_restore(struct ggn_session *s, const char *path, struct base_err *err)
+int ggn_resume_load(struct ggn_session *s, const char *path, struct base_err *err)
 {
     struct ggn_container c = {0};
     cJSON *root = NULL;
@@ -197,9 +227,9 @@ int ggn_session_restore(struct ggn_session *s, const char *path, struct base_err
 
     if (rc)
         return rc;
-    if (field(root, "key") != ggn_session_key(s))
+    if (field(root, "key") != ggn_resume_key(s))
         rc = base_fail(err, BASE_EINVAL, "%s: made with other data or options", path);
-    for (int i = 0; !rc && (array = ggn_session_array(s, i, &count)); i++) {
+    for (int i = 0; !rc && (array = state_array(s, i, &count)); i++) {
         char name[16];
         int dim = (int)count;
         snprintf(name, sizeof name, "%d", i);
@@ -207,6 +237,10 @@ int ggn_session_restore(struct ggn_session *s, const char *path, struct base_err
     }
     if (!rc)
         rc = restore(s, root, path, err);
+    for (int net = 0; net < GGN_NETS && !rc; net++)
+        ggn_weights_pack(s->trainer->weights[net], NULL);
+    if (!rc)
+        ggn_trainer_keep(s->trainer);
     cJSON_Delete(root);
     ggn_container_release(&c);
     return rc;

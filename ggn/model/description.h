@@ -1,0 +1,31 @@
+/*
+ * What a model file says about its networks, as one JSON object:
+ *
+ *   {"kind": "model", "preset": "paper"|"lull", "height", "width", "window", "k_r", "k_m", "k_d",
+ *    "calibration": {"scale", "shift", "threshold", "consecutive", "spacing"}, "provenance": {...}}
+ */
+#ifndef GGN_MODEL_DESCRIPTION_H
+#define GGN_MODEL_DESCRIPTION_H
+
+#include "model/networks.h"
+
+struct cJSON;
+
+struct ggn_calibration {
+    double scale, shift; /* p = sigmoid(scale·logit + shift); 1 and 0 = not calibrated (Platt 1999) */
+    double threshold;    /* a check votes for stopping when p < threshold; in (0, 1) */
+    int consecutive;     /* checks in a row that must vote so; 1..16 */
+    double spacing;      /* ratio of spp between consecutive images the model was trained on; 1..16 */
+};
+
+struct ggn_description {
+    struct ggn_hyper hyper;
+    struct ggn_calibration calibration;
+    struct cJSON *provenance; /* parse: the caller's to delete; print: borrows */
+};
+
+int ggn_description_parse(const char *json, struct ggn_description *out, struct base_err *err);
+/* malloc'ed text, NULL without memory. */
+char *ggn_description_print(const struct ggn_description *description);
+
+#endif

@@ -1,0 +1,95 @@
+#include "train/phase.h"
+
+#include <math.h>
+
+#include "base/clock.h"
+#include "train/resume.h"
+
+enum { MOST_DIVERGENCES = 8 };
+
+static void say(const struct ggn_session *s, const struct ggn_log_row *row, const struct ggn_phase *phase, double rate)
+{
+    FILE *f = s->plan->progress;
+    double left = (double)(phase->steps - s->progress.step) / fmax(rate, 1e-9) * phase->batch;
+
+    if (!f)
+        return;
+    fprintf(f, "%-8s %6.0f/%llu  loss %.4f", row->phase ? "judge" : "denoiser", row->step, (unsigned long long)phase->steps,
+            row->loss);
+    if (row->phase)
+        fprintf(f, "  accuracy %.3f", row->accuracy);
+    if (!isnan(row->validation_loss))
+        fprintf(f, "  | validation loss %.4f", row->validation_loss);
+    if (row->phase && !isnan(row->validation_auc))
+        fprintf(f, "  accuracy %.3f  AUC %.4f", row->validation_accuracy, row->validation_auc);
+    fprintf(f, "  | %.1f %s/s  ETA %d:%02d\n", rate, row->phase ? "windows" : "crops", (int)(left / 60),
+            (int)fmod(left, 60));
+    fflush(f);
+}
+
+/* The learning curves and the checkpoint. */
+static int write_files(struct ggn_session *s, struct base_err *err)
+{
+    char path[4096];
+
+    ggn_session_path(s, ".csv", path, sizeof path);
+    int rc = ggn_log_write_csv(&s->log, path, err);
+    if (rc)
+        return rc;
+    ggn_session_path(s, ".ckpt", path, sizeof path);
+    return ggn_resume_save(s, path, err);
+}
+
+/* One epoch; on divergence the trainer is back at the epoch's start and so is the step. */
+static int epoch(struct ggn_session *s, const struct ggn_phase *phase, struct base_err *err)
+{
+    const uint64_t begin = s->progress.step, left = phase->steps - begin;
+    const uint64_t n = left < phase->epoch_steps ? left : phase->epoch_steps;
+    struct ggn_log_row row = {.phase = s->progress.phase};
+    double start = base_clock_wall_s(), loss, right;
+
+    while (s->progress.step < begin + n) {
+        if (s->plan->interrupted && *s->plan->interrupted)
+            return GGN_TRAIN_INTERRUPTED;
+        int rc = phase->step(s, s->progress.step, phase->steps, &loss, &right, err);
+        if (rc) {
+            s->progress.step = begin;
+            return rc;
+        }
+        row.loss += loss / (double)n;
+        row.accuracy += right / (double)n;
+        s->progress.step++;
+    }
+    double seconds = base_clock_wall_s() - start;
+    int rc = phase->validate(s, &row, err);
+    if (rc)
+        return rc;
+    s->progress.seconds[row.phase] += base_clock_wall_s() - start;
+    ggn_trainer_keep(s->trainer);
+    row.lr = s->trainer->options.lr[phase->net];
+    row.step = (double)s->progress.step;
+    row.seconds = s->progress.seconds[row.phase];
+    rc = ggn_log_add(&s->log, &row, err);
+    if (rc)
+        return rc;
+    say(s, &row, phase, (double)n * phase->batch / fmax(seconds, 1e-9));
+    return write_files(s, err);
+}
+
+int ggn_phase_run(struct ggn_session *s, const struct ggn_phase *phase, struct base_err *err)
+{
+    while (s->progress.step < phase->steps) {
+        int rc = epoch(s, phase, err);
+        if (rc == GGN_EDIVERGED && ++s->progress.divergences <= MOST_DIVERGENCES) {
+            if (s->plan->progress)
+                fprintf(s->plan->progress, "%s; learning rates halved\n", err->text);
+            err->code = 0;
+            continue;
+        }
+        if (rc)
+            return rc;
+        if (s->plan->patience && s->progress.stale >= s->plan->patience)
+            break;
+    }
+    return 0;
+}

@@ -1,0 +1,41 @@
+/* What a training run is to do. */
+#ifndef GGN_TRAIN_PLAN_H
+#define GGN_TRAIN_PLAN_H
+
+#include <signal.h>
+#include <stdio.h>
+
+#include "data/chains.h"
+#include "model/networks.h"
+
+enum { GGN_TRAIN_INTERRUPTED = 1 }; /* returned by ggn_train and its phases beside 0 and errors */
+
+struct ggn_train_plan {
+    struct ggn_chains_options data;
+    const char *out;  /* model file; OUT.ckpt, OUT.csv, OUT.png and OUT.card.json lie beside it */
+    const char *init; /* model file to start from, or NULL */
+    int resume;       /* continue from OUT.ckpt if it is there */
+    enum ggn_preset preset;
+    int window, k_r, k_m, k_d; /* network sizes; the block size comes from the data */
+    int crop, batch_r, batch;  /* crop side of the denoiser's samples; samples per step */
+    int steps_r, steps;        /* steps of the two phases; preset paper: of its one phase, 0 = epochs · windows / batch */
+    int epochs;                /* preset paper */
+    int epoch_steps;           /* steps between validations and checkpoints */
+    int patience;              /* epochs without a lower calibrated validation loss before the end; 0 = never */
+    double lr_r, lr;
+    double difference; /* preset lull: see ggn_train_fold */
+    int soft_labels;
+    double jitter;          /* octaves of exposure; see ggn_augment_draw */
+    int synthetic;          /* synthetic chains per block */
+    int extend;             /* continue recorded chains beyond their last level, see ggn_chains_extend */
+    int validation_windows; /* most windows per validation */
+    double early_rate;      /* share of validation blocks that may be stopped early (ggn_stopping.unsure_rate) */
+    uint32_t seed;
+    int threads;
+    FILE *progress;                           /* lines for people, or NULL */
+    const volatile sig_atomic_t *interrupted; /* checked between steps, or NULL */
+};
+
+struct ggn_train_plan ggn_train_plan_default(enum ggn_preset preset);
+
+#endif

@@ -1,0 +1,154 @@
+#include "train/session.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "nn/hash.h"
+
+double ggn_session_lr(const struct ggn_session *s, double lr, uint64_t step, uint64_t steps)
+{
+    static const double LOWEST = 0.02, PI = 3.14159265358979323846;
+    double t = steps ? (double)step / (double)steps : 0, warm = fmin(1, ((double)step + 1) / fmax(20, 0.02 * (double)steps));
+
+    return lr * warm * (LOWEST + (1 - LOWEST) * 0.5 * (1 + cos(PI * t))) * ldexp(1, -s->progress.divergences);
+}
+
+uint32_t ggn_session_seed(const struct ggn_session *s)
+{
+    return ggn_hash(s->plan->seed, 1000 + (uint32_t)(10 * s->progress.divergences + s->progress.phase));
+}
+
+void ggn_session_path(const struct ggn_session *s, const char *suffix, char *path, size_t room)
+{
+    snprintf(path, room, "%s%s", s->plan->out, suffix);
+}
+
+void ggn_session_keep_best(struct ggn_session *s)
+{
+    for (int net = 0; net < GGN_NETS; net++)
+        if (s->best[net])
+            memcpy(s->best[net], s->trainer->weights[net]->params, s->trainer->graph[net].n_learned * sizeof *s->best[net]);
+}
+
+void ggn_session_load_best(struct ggn_session *s)
+{
+    for (int net = 0; net < GGN_NETS; net++)
+        if (s->best[net])
+            ggn_weights_copy(net == GGN_NET_R ? s->r : s->trainer->weights[net], s->best[net]);
+}
+
+static int check_plan(const struct ggn_session *s, struct base_err *err)
+{
+    const struct ggn_train_plan *p = s->plan;
+    const int paper = p->preset == GGN_PRESET_PAPER;
+
+    if (p->batch < 1 || p->batch > 1024 || p->batch_r < 1 || p->batch_r > 1024)
+        return base_fail(err, BASE_EINVAL, "a batch has 1 to 1024 samples");
+    if (!paper && (p->crop < 16 || p->crop > s->set.width || p->crop > s->set.height))
+        return base_fail(err, BASE_EINVAL, "crop %d is not in 16..%d, the side of the blocks", p->crop,
+                         s->set.width < s->set.height ? s->set.width : s->set.height);
+    if (p->k_r < 3)
+        return base_fail(err, BASE_EINVAL, "the denoiser needs a width of at least 3");
+    if (!s->train.n)
+        return base_fail(err, BASE_EINVAL, "%s: no training block has a label and %d levels; run `ggn label` first",
+                         p->data.dir, p->window);
+    int noisy = 0;
+    for (int i = 0; i < s->train.n; i++) {
+        noisy += s->train.list[i].noisy;
+        if (paper && !s->set.chains[s->train.list[i].chain].reference)
+            return base_fail(err, BASE_EINVAL, "%s: preset paper needs a reference for each training block", p->data.dir);
+    }
+    if (noisy == 0 || noisy == s->train.n)
+        return base_fail(err, BASE_EINVAL, "%s: all %d training windows are %s: nothing to tell apart", p->data.dir,
+                         s->train.n, noisy ? "noisy" : "free of noise");
+    return 0;
+}
+
+int ggn_session_init(struct ggn_session *s, struct base_err *err)
+{
+    const struct ggn_train_plan *p = s->plan;
+    const int paper = p->preset == GGN_PRESET_PAPER;
+
+    s->threads = base_threads_create(p->threads > 0 ? p->threads : base_threads_available(), err);
+    int rc = s->threads ? ggn_chains_load(&s->set, &p->data, err) : BASE_ENOMEM;
+
+    if (!rc && p->synthetic > 0)
+        rc = ggn_chains_add_synthetic(&s->set, p->synthetic, p->seed, err);
+    if (!rc && p->extend)
+        rc = ggn_chains_extend(&s->set, p->seed, err);
+    if (rc)
+        return rc;
+    struct ggn_window_options train = {
+        .split = GGN_SPLIT_TRAIN, .length = p->window, .synthetic = 1, .label_first = paper, .soft = p->soft_labels};
+    struct ggn_window_options validation = {.split = GGN_SPLIT_VALIDATION, .length = p->window, .soft = p->soft_labels};
+    rc = ggn_windows_create(&s->train, &s->set, &train, err);
+    if (!rc)
+        rc = ggn_windows_create(&s->validation, &s->set, &validation, err);
+    if (!rc)
+        rc = check_plan(s, err);
+    if (rc)
+        return rc;
+    s->hyper = (struct ggn_hyper){.preset = p->preset,
+                                  .height = s->set.height,
+                                  .width = s->set.width,
+                                  .window = p->window,
+                                  .k_r = p->k_r,
+                                  .k_m = p->k_m,
+                                  .k_d = p->k_d};
+    rc = ggn_network_build(&s->r_graph, GGN_NET_R, &s->hyper, err);
+    s->r = rc ? NULL : ggn_weights_create(&s->r_graph, NULL, 0, err);
+    if (!s->r)
+        return rc ? rc : BASE_ENOMEM;
+    size_t crops = 6 * (size_t)p->batch_r * (size_t)p->crop * (size_t)p->crop;
+    size_t windows = 2 * (size_t)p->batch * (size_t)p->window * ggn_chains_values(&s->set);
+    size_t pointers = 6 * (size_t)p->batch_r + 6 * (size_t)p->batch * (size_t)p->window;
+    s->buffer = malloc((crops > windows ? crops : windows) * sizeof *s->buffer);
+    s->planes = malloc(pointers * sizeof *s->planes);
+    return s->buffer && s->planes ? 0 : base_fail_nomem(err, "a batch");
+}
+
+void ggn_session_release(struct ggn_session *s)
+{
+    ggn_trainer_destroy(s->trainer);
+    ggn_weights_destroy(s->r);
+    ggn_model_destroy(s->init);
+    for (int net = 0; net < GGN_NETS; net++)
+        free(s->best[net]);
+    free(s->buffer);
+    free((void *)s->planes);
+    ggn_log_release(&s->log);
+    ggn_windows_release(&s->train);
+    ggn_windows_release(&s->validation);
+    ggn_chains_release(&s->set);
+    base_threads_destroy(s->threads);
+}
+
+int ggn_session_load_init(struct ggn_session *s, struct base_err *err)
+{
+    int rc = ggn_model_load(s->plan->init, &s->init, err);
+
+    if (rc)
+        return rc;
+    const struct ggn_hyper *a = &s->init->hyper, *b = &s->hyper;
+    if (a->preset == b->preset && a->height == b->height && a->width == b->width && a->window == b->window &&
+        a->k_r == b->k_r && a->k_m == b->k_m && a->k_d == b->k_d)
+        return 0;
+    return base_fail(err, BASE_EINVAL, "%s: networks of another size or preset", s->plan->init);
+}
+
+int ggn_session_begin(struct ggn_session *s, int parts, int batch, int height, int width, struct base_err *err)
+{
+    struct ggn_train_options o = ggn_train_options_default(s->plan->preset);
+    struct ggn_hyper hyper = s->hyper;
+
+    hyper.height = height;
+    hyper.width = width;
+    o.parts = parts;
+    o.batch = batch;
+    o.seed = s->plan->seed;
+    o.lr[GGN_NET_R] = s->plan->lr_r;
+    o.lr[GGN_NET_M] = o.lr[GGN_NET_D] = s->plan->lr;
+    s->trainer = ggn_trainer_create(&hyper, &o, s->threads, err);
+    return s->trainer ? 0 : BASE_ENOMEM;
+}
