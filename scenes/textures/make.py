@@ -179,3 +179,122 @@ def revolve(name, profile, around):
 outer = [(0.0, 0.0), (0.3, 0.0)] + [(0.34 + 0.14 * math.sin(math.pi * t * 1.25 - 0.2), 0.02 + 0.98 * t) for t in [i / 16 for i in range(17)]]
 inner = [(r - 0.03, max(y, 0.05)) for r, y in reversed(outer[2:])] + [(0.0, 0.05)]
 revolve('vase.ply', outer + inner, 32)
+
+# --- more textures: drawn after the others, whose random numbers stay what they are ---
+
+
+def marble(x, y):
+    vein = abs(math.sin(math.pi * (4 * x / 128 + 3 * noise(x / 128, y / 128)))) ** 0.35
+    return (0.55 + 0.38 * vein, 0.54 + 0.38 * vein, 0.52 + 0.38 * vein)
+
+
+def concrete(x, y):
+    tone = 0.42 + 0.2 * noise(x / 128, y / 128) + 0.06 * (random.random() - 0.5)
+    return (tone, tone, 0.97 * tone) if x % 64 and y % 64 else (0.7 * tone,) * 3
+
+
+def wallpaper(x, y):
+    u, v = (x + 16 * (y // 32 % 2)) % 32 - 15.5, y % 32 - 15.5
+    r, a = math.hypot(u, v), math.atan2(v, u)
+    petal = r < 6 + 4 * math.cos(5 * a)
+    return (0.72, 0.55, 0.3) if r < 2.5 else (0.62, 0.68, 0.6) if petal else (0.8, 0.79, 0.7)
+
+
+def rug(x, y):
+    u, v = abs(x - 63.5), abs(y - 63.5)
+    ring = int(max(u, v) / 9) if max(u, v) > 27 else 7 + int((u + v) / 9)
+    tone = 0.85 + 0.3 * random.random()
+    return tuple(tone * c for c in ((0.5, 0.1, 0.09), (0.65, 0.52, 0.3), (0.1, 0.14, 0.3), (0.55, 0.24, 0.1))[ring % 4])
+
+
+def grass(x, y):
+    tone = 0.5 + 0.6 * noise(x / 128, y / 128) + 0.35 * (random.random() - 0.5)
+    return (0.22 * tone, 0.36 * tone, 0.11 * tone)
+
+
+def paving(x, y):
+    row = y // 32
+    u, v = (x + 32 * (row % 2)) % 128, y % 32
+    key = ('s', row, u // 64)
+    tone = shade.setdefault(key, random.uniform(0.8, 1.05)) * (0.75 + 0.4 * noise(x / 128, y / 128))
+    return (0.3, 0.28, 0.25) if min(u % 64, v) < 1 else (0.62 * tone, 0.58 * tone, 0.5 * tone)
+
+
+def picture(x, y):
+    """A landscape to hang on a wall."""
+    u, v = x / 128, y / 128
+    hill = 0.62 + 0.12 * math.sin(5 * u + 1) + 0.05 * math.sin(17 * u)
+    if math.hypot(u - 0.7, v - 0.3) < 0.08:
+        return (0.95, 0.8, 0.45)
+    if v < hill:
+        return (0.75 - 0.3 * v, 0.55 + 0.1 * noise(u, v), 0.45 + 0.35 * v)
+    return (0.2 + 0.15 * noise(u, v), 0.3 - 0.2 * (v - hill), 0.15)
+
+
+for name, pixel in (('marble', marble), ('concrete', concrete), ('wallpaper', wallpaper), ('rug', rug), ('grass', grass),
+                    ('paving', paving), ('picture', picture)):
+    png(name + '.png', 128, 128, 3, pixel)
+
+
+def evening(x, y, w=64, h=32):
+    """A low red sun behind haze, z up."""
+    phi, theta = 2 * math.pi * (x + 0.5) / w, math.pi * (y + 0.5) / h
+    d = (math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta))
+    if d[2] < 0:
+        return (0.04, 0.035, 0.04)
+    c = sum(p * q for p, q in zip(d, (0.3, 0.94, 0.16)))
+    t = d[2] ** 0.4
+    base = (0.75 - 0.6 * t, 0.42 - 0.25 * t, 0.38 - 0.08 * t)
+    return tuple(b + g * (math.exp((c - 1) * 25) * 1.5 + (60 if c > 0.99 else 0)) for b, g in zip(base, (1, 0.55, 0.25)))
+
+
+pfm('evening.pfm', 64, 32, evening)
+
+# --- more meshes ---
+
+
+def sheet(name, n, m, point):
+    """A grid of quads over [0, 1]² with normals by differences."""
+    points, normals_, faces = [], [], []
+    for i in range(n + 1):
+        for j in range(m + 1):
+            p, q, r = point(i / n, j / m), point(i / n + 1e-4, j / m), point(i / n, j / m + 1e-4)
+            a, b = [s - t for s, t in zip(q, p)], [s - t for s, t in zip(r, p)]
+            c = (b[1] * a[2] - b[2] * a[1], b[2] * a[0] - b[0] * a[2], b[0] * a[1] - b[1] * a[0])
+            s = math.sqrt(sum(v * v for v in c)) or 1
+            points.append(p)
+            normals_.append([v / s for v in c])
+    for i in range(n):
+        for j in range(m):
+            k = i * (m + 1) + j
+            faces.append([k, k + 1, k + m + 2, k + m + 1])
+    ply(name, points, normals_, faces)
+
+
+# Hills of 40 x 40 units around the origin, flat in the middle.
+def hills(u, v):
+    x, z = 40 * u - 20, 40 * v - 20
+    far = min(max((math.hypot(x, z) - 4) / 14, 0), 1)
+    return (x, far * far * (1.2 + 5 * (noise(u % 1 * 0.999, v % 1 * 0.999) - 0.5)), z)
+
+
+sheet('hills.ply', 40, 40, hills)
+# A curtain 1 wide, 1 high.
+sheet('curtain.ply', 64, 4, lambda u, v: (u - 0.5, v, (0.05 + 0.02 * (1 - v)) * math.sin(14 * math.pi * u + 2 * math.sin(7 * u))))
+
+
+def stone(u, v):
+    a, b = 2 * math.pi * u, math.pi * v
+    d = (math.sin(b) * math.cos(a), math.cos(b), math.sin(b) * math.sin(a))
+    r = 0.5 + 0.09 * math.sin(3 * d[0] + 2 * d[1]) * math.cos(4 * d[2] + 1) + 0.05 * math.sin(7 * d[1] + 5 * d[0]) + 0.03 * math.cos(11 * d[2] - 6 * d[0])
+    return tuple(r * c for c in d)
+
+
+sheet('stone.ply', 32, 20, stone)
+# Turned pieces: a cup (open), a bottle, a chess pawn, a fir as stacked cones.
+revolve('cup.ply', [(0.0, 0.0), (0.25, 0.0), (0.27, 0.03), (0.34, 0.25), (0.38, 0.6), (0.36, 0.6), (0.32, 0.25), (0.24, 0.05), (0.0, 0.05)], 32)
+revolve('bottle.ply', [(0.0, 0.0), (0.2, 0.0), (0.22, 0.02)] + [(0.22, 0.02 + 0.06 * i) for i in range(1, 10)]
+        + [(0.22 - 0.14 * math.sin(math.pi / 2 * i / 5) ** 2, 0.56 + 0.04 * i) for i in range(1, 6)] + [(0.08, 0.95), (0.1, 0.96), (0.1, 1.0), (0.0, 1.0)], 32)
+revolve('pawn.ply', [(0.0, 0.0), (0.3, 0.0), (0.31, 0.06), (0.26, 0.12), (0.16, 0.22), (0.11, 0.4), (0.1, 0.5), (0.17, 0.53), (0.17, 0.56), (0.1, 0.58)]
+        + [(0.17 * math.sin(math.pi * t / 8), 0.73 - 0.17 * math.cos(math.pi * t / 8)) for t in range(2, 9)], 28)
+revolve('fir.ply', [(0.0, 0.0), (0.05, 0.0), (0.05, 0.2), (0.42, 0.2), (0.2, 0.5), (0.33, 0.48), (0.15, 0.76), (0.23, 0.74), (0.0, 1.1)], 14)
