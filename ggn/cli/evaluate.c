@@ -12,21 +12,28 @@
 #include "base/files.h"
 #include "baselines/learned.h"
 #include "cli/commands.h"
-#include "eval/network.h"
 #include "eval/report.h"
+#include "eval/strips.h"
+#include "eval/trained.h"
 
-enum { MAX_MODELS = 8, MAX_METHODS = 8 + 2 * MAX_MODELS };
+enum { MAX_MODELS = 8, MAX_METHODS = 8 + 2 * MAX_MODELS, MAX_ADJUSTED = 8 };
 enum { KEY_EARLY = 256, KEY_NO_QUALITY, KEY_RETUNE, KEY_RECORDED, KEY_RATIO, KEY_BASELINES, KEY_EPOCHS, KEY_BF16 };
 
 struct options {
     const char *data, *out, *models[MAX_MODELS];
     int n_models, json, quality, threads, window, retune, recorded, baselines, epochs, bf16;
     double early, ratio;
+    int n_adjusted;
+    struct {
+        char name[16];
+        double value;
+    } adjusted[MAX_ADJUSTED]; /* of the models' policies */
 };
 
 static const struct argp_option option_table[] = {
     {"data", 'd', "DATA", 0, "labelled data set: a folder of sequences with split.json (required)", 1},
     {"model", 'm', "FILE", 0, "trained model (.ggn); may be repeated", 1},
+    {"param", 'p', "KEY=NUMBER", 0, "judge as the criterion does with this parameter: threshold, passes, gate, tail, gini, first-spp", 1},
     {"json", 'j', NULL, 0, "print the figures as JSON", 2},
     {"output", 'o', "DIR", 0, "write figures.json and pictures there", 2},
     {"early", KEY_EARLY, "RATE", 0, "early-stop rate that cuts are tuned for on the training scenes (default 0.05)", 3},
@@ -42,6 +49,22 @@ static const struct argp_option option_table[] = {
     {0},
 };
 
+static void parse_adjusted(struct options *o, const char *arg, struct argp_state *state)
+{
+    struct ggn_policy any = ggn_policy_default();
+    const char *equals = strchr(arg, '=');
+    char *end = NULL;
+
+    if (!equals || equals == arg || (size_t)(equals - arg) >= sizeof o->adjusted[0].name || o->n_adjusted == MAX_ADJUSTED)
+        argp_error(state, "-p %s: expected KEY=NUMBER, at most %d times", arg, MAX_ADJUSTED);
+    int i = o->n_adjusted++;
+    snprintf(o->adjusted[i].name, sizeof o->adjusted[i].name, "%.*s", (int)(equals - arg), arg);
+    o->adjusted[i].value = strtod(equals + 1, &end);
+    if (end == equals + 1 || *end || !ggn_policy_adjust(&any, o->adjusted[i].name, o->adjusted[i].value) ||
+        ggn_policy_check(&any, NULL))
+        argp_error(state, "-p %s: expected threshold, passes, gate, tail, gini or first-spp and a number in its range", arg);
+}
+
 static error_t parse(int key, char *arg, struct argp_state *state)
 {
     struct options *o = state->input;
@@ -50,6 +73,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
     switch (key) {
     case 'd': o->data = arg; return 0;
     case 'o': o->out = arg; return 0;
+    case 'p': parse_adjusted(o, arg, state); return 0;
     case 'j': o->json = 1; return 0;
     case KEY_NO_QUALITY: o->quality = 0; return 0;
     case KEY_BF16: o->bf16 = 1; return 0;
@@ -150,6 +174,14 @@ static int add_baselines(struct job *j, struct base_threads *threads, struct bas
     return rc;
 }
 
+static int policy_of(const struct options *o, const struct ggn_model *model, struct ggn_policy *policy, struct base_err *err)
+{
+    int rc = ggn_policy_of(model, policy, err);
+    for (int i = 0; i < o->n_adjusted && !rc; i++)
+        ggn_policy_adjust(policy, o->adjusted[i].name, o->adjusted[i].value);
+    return rc;
+}
+
 static int add_models(struct job *j, struct base_threads *threads, struct base_err *err)
 {
     int rc = 0, precisions = j->o->bf16 ? 2 : 1;
@@ -158,7 +190,10 @@ static int add_models(struct job *j, struct base_threads *threads, struct base_e
         enum ggn_precision precision = i % precisions ? GGN_PRECISION_BF16 : GGN_PRECISION_F32;
         char name[GGN_METHOD_NAME];
         snprintf(name, sizeof name, "%.40s%s", slash ? slash + 1 : path, precision == GGN_PRECISION_BF16 ? " bf16" : "");
-        rc = ggn_eval_network(&j->methods[j->n], &j->set, j->models[i / precisions], name, precision, threads, err);
+        struct ggn_policy policy;
+        rc = policy_of(j->o, j->models[i / precisions], &policy, err);
+        if (!rc)
+            rc = ggn_eval_trained(&j->methods[j->n], &j->set, j->models[i / precisions], &policy, name, precision, threads, err);
         if (rc)
             return rc;
         j->likened[j->n] = precision == GGN_PRECISION_BF16 ? j->n - 1 : i > 0 ? j->n - i : -1;

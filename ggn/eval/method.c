@@ -5,9 +5,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "model/stopper.h"
+
 void ggn_method_release(struct ggn_method *m)
 {
     free(m->score);
+    free(m->verdict);
     free(m->own_guard);
     free(m->stop);
     *m = (struct ggn_method){0};
@@ -21,7 +24,7 @@ int ggn_eval_count(const struct ggn_eval_set *s, enum ggn_split split)
     return n;
 }
 
-static int init(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, int with_scores, struct base_err *err)
+int ggn_method_init(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, int with_scores, struct base_err *err)
 {
     *m = (struct ggn_method){.passes = 1, .cut = (double)NAN};
     snprintf(m->name, sizeof m->name, "%s", name);
@@ -37,7 +40,7 @@ static int init(struct ggn_method *m, const struct ggn_eval_set *s, const char *
 
 int ggn_method_spp(struct ggn_method *m, const struct ggn_eval_set *s, struct base_err *err)
 {
-    int rc = init(m, s, "-spp", 1, err);
+    int rc = ggn_method_init(m, s, "-spp", 1, err);
     for (size_t i = 0; i < s->n && !rc; i++)
         m->score[i] = -s->spp[i];
     return rc;
@@ -50,7 +53,7 @@ int ggn_method_constant(struct ggn_method *m, const struct ggn_eval_set *s, stru
     double *t = malloc((size_t)s->n_blocks * sizeof *t);
     if (!t)
         return base_fail_nomem(err, "constant");
-    int rc = init(m, s, "constant (training median)", 0, err);
+    int rc = ggn_method_init(m, s, "constant (training median)", 0, err);
     for (int b = 0; b < s->n_blocks; b++)
         if (s->blocks[b].split == split)
             t[n++] = s->blocks[b].label.threshold;
@@ -63,7 +66,7 @@ int ggn_method_constant(struct ggn_method *m, const struct ggn_eval_set *s, stru
 
 int ggn_method_scene_mean(struct ggn_method *m, const struct ggn_eval_set *s, struct base_err *err)
 {
-    int rc = init(m, s, "scene's mean (oracle)", 0, err);
+    int rc = ggn_method_init(m, s, "scene's mean (oracle)", 0, err);
     for (int b = 0; b < s->n_blocks && !rc; b++) {
         double sum = 0.0, n = 0.0;
         for (int k = 0; k < s->n_blocks; k++)
@@ -80,7 +83,7 @@ int ggn_method_scene_mean(struct ggn_method *m, const struct ggn_eval_set *s, st
 static int from_columns(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, const double *score, const double *unsettled,
                         int *available, struct base_err *err)
 {
-    int rc = init(m, s, name, 1, err);
+    int rc = ggn_method_init(m, s, name, 1, err);
     *available = 1;
     for (size_t i = 0; i < s->n && !rc; i++) {
         m->score[i] = score[i];
@@ -111,32 +114,34 @@ int ggn_method_variance(struct ggn_method *m, const struct ggn_eval_set *s, int 
 
 int ggn_method_scores(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, const double *score, struct base_err *err)
 {
-    int rc = init(m, s, name, 1, err);
+    int rc = ggn_method_init(m, s, name, 1, err);
     if (!rc)
         memcpy(m->score, score, s->n * sizeof *score);
     return rc;
 }
 
-static int passes(const struct ggn_method *m, size_t i, double cut, double limit)
+static double verdict(const struct ggn_method *m, size_t i)
 {
-    return m->score[i] < cut && !(m->guard && m->guard[i] > limit);
+    return m->verdict ? m->verdict[i] : m->score[i];
+}
+
+static int is_held(const struct ggn_method *m, size_t i, double limit)
+{
+    return m->guard && m->guard[i] > limit;
 }
 
 int ggn_method_passes(const struct ggn_method *m, size_t i)
 {
-    return passes(m, i, m->cut, m->guard_limit);
+    return verdict(m, i) < m->cut && !is_held(m, i, m->guard_limit);
 }
 
-static double stop_of(const struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_eval_block *b, double cut, double limit)
+static double stop_of(const struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_eval_block *b, double cut,
+                      double limit)
 {
-    int below = 0;
-    for (size_t i = b->first; i < b->end; i++) {
-        if (isnan(m->score[i]))
-            continue; /* not judged there: neither a pass nor a failure */
-        below = passes(m, i, cut, limit) ? below + 1 : 0;
-        if (below >= m->passes)
+    struct ggn_stopper row = {0};
+    for (size_t i = b->first; i < b->end; i++)
+        if (!isnan(verdict(m, i)) && ggn_stopper_pass(&row, m->passes, verdict(m, i) < cut) && !is_held(m, i, limit))
             return s->spp[i];
-    }
     return b->cap;
 }
 

@@ -1,8 +1,8 @@
 /*
  * Methods that say from an image whether its noise is still seen, and what their decisions are worth.
  *
- * A method gives every case a score (higher: noisier). A block stops at the first case whose score is below the cut and that no guard
- * holds back; it never stops earlier, and never later than its last level. Methods without scores give a stop per block directly.
+ * A method gives every case a score (higher: noisier). A block stops at the first case that ends a row of `passes` scores below
+ * the cut and that no guard holds back, and never later than its last level. Methods without scores give a stop per block directly.
  */
 #ifndef GGN_EVAL_METHOD_H
 #define GGN_EVAL_METHOD_H
@@ -15,6 +15,7 @@ enum { GGN_METHOD_NAME = 48 };
 struct ggn_method {
     char name[GGN_METHOD_NAME];
     double *score;       /* owns; [cases]; NaN: not judged there. NULL: fixed stops only */
+    double *verdict;     /* owns; [cases]: the scores that stop a block, where those are not all (see data/replay.h); NULL: score */
     double *own_guard;   /* owns; NULL unless guard is it */
     const double *guard; /* own_guard or borrowed from the set; [cases]; the block is held back while it exceeds guard_limit; NULL: none */
     double guard_limit;
@@ -34,10 +35,12 @@ int ggn_method_scene_mean(struct ggn_method *m, const struct ggn_eval_set *s, st
 /* The criteria of plugin-api/examples from their recorded errors; *available: whether every case has them. */
 int ggn_method_halfbuf(struct ggn_method *m, const struct ggn_eval_set *s, int *available, struct base_err *err);
 int ggn_method_variance(struct ggn_method *m, const struct ggn_eval_set *s, int *available, struct base_err *err);
+/* An empty method with room for stops and, if asked, scores. */
+int ggn_method_init(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, int with_scores, struct base_err *err);
 /* Any other scores: copies score [cases]. */
 int ggn_method_scores(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, const double *score, struct base_err *err);
 
-/* Sets stop from score, guard, passes and cut. */
+/* Sets stop from verdict, guard, passes and cut, as the stopping rule ends (ggn_stopper_pass). */
 void ggn_method_run(struct ggn_method *m, const struct ggn_eval_set *s);
 /* Chooses the cut on the blocks of `split`: the one that spends fewest samples with at most `early_rate` of the blocks stopped below
  * 0.8 of their threshold; if none does, the smallest early rate. The limit of a guard is chosen with it. Then runs. */

@@ -53,6 +53,28 @@ int ggn_policy_check(const struct ggn_policy *p, struct base_err *err)
     return 0;
 }
 
+int ggn_policy_adjust(struct ggn_policy *p, const char *name, double value)
+{
+    const struct {
+        const char *name;
+        double *field;
+    } adjustable[] = {{"threshold", &p->threshold}, {"tail", &p->tail999}, {"gini", &p->gini}, {"first-spp", &p->first_spp}};
+
+    for (size_t i = 0; i < sizeof adjustable / sizeof adjustable[0]; i++)
+        if (!strcmp(name, adjustable[i].name)) {
+            *adjustable[i].field = value;
+            return 1;
+        }
+    if (!strcmp(name, "passes")) {
+        p->passes = (int)value;
+        return 1;
+    }
+    if (strcmp(name, "gate"))
+        return 0;
+    p->gate_noise = value != 0 ? p->gate_noise : 0;
+    return 1;
+}
+
 /* Noise of the noisiest thousandth of the pixels, in mean luminances, below which nothing sparkles. */
 static const double CALM_TAIL = 0.2;
 

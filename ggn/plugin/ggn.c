@@ -37,24 +37,6 @@ static const struct lull_param params[P_COUNT] = {
 
 /* --- instance ---------------------------------------------------------------------------------------------------------- */
 
-static double given(double value, double otherwise)
-{
-    return isnan(value) ? otherwise : value;
-}
-
-/* The model's own policy where no parameter was given. */
-static struct ggn_policy policy_of(const double *value, const struct ggn_policy *own)
-{
-    struct ggn_policy p = *own;
-
-    p.threshold = given(value[P_THRESHOLD], own->threshold);
-    p.passes = (int)given(value[P_PASSES], own->passes);
-    p.tail999 = given(value[P_TAIL], own->tail999);
-    p.gini = given(value[P_GINI], own->gini);
-    p.first_spp = given(value[P_FIRST_SPP], own->first_spp);
-    return p;
-}
-
 static uint32_t hash_bytes(uint32_t h, const void *data, size_t size)
 {
     const unsigned char *p = data;
@@ -67,7 +49,7 @@ static uint32_t hash_bytes(uint32_t h, const void *data, size_t size)
 static int32_t load_model(struct lull_instance *in, const char *path, struct lull_error *err)
 {
     struct base_err error = {0};
-    struct ggn_policy own;
+    struct ggn_policy *policy = &in->rule.policy;
     char found[5000];
 
     if (!path) {
@@ -75,17 +57,19 @@ static int32_t load_model(struct lull_instance *in, const char *path, struct lul
             return lull_kit_fail(err, LULL_E_IO, "model: %.480s", found);
         path = found;
     }
-    if (ggn_model_load(path, &in->model, &error) || ggn_policy_of(in->model, &own, &error))
+    if (ggn_model_load(path, &in->model, &error) || ggn_policy_of(in->model, policy, &error))
         return gp_fail_from(err, "model", &error);
-    in->window = in->model->hyper.window;
-    if (in->window < 2 || in->window > GP_WINDOW_MAX)
-        return lull_kit_fail(err, LULL_E_IO, "model: %.200s: windows of %d images", path, in->window);
-    in->policy = policy_of(in->kit.value, &own);
-    const int32_t choices[] = {in->gate, (int32_t)in->precision};
-    in->key = hash_bytes(UINT32_C(2166136261), choices, sizeof choices);
+    in->rule.window = in->model->hyper.window;
+    if (in->rule.window < 2 || in->rule.window > GGN_WINDOW_MAX)
+        return lull_kit_fail(err, LULL_E_IO, "model: %.200s: windows of %d images", path, in->rule.window);
+    for (int i = 0; i < P_COUNT; i++)
+        if (!isnan(in->kit.value[i]))
+            ggn_policy_adjust(policy, params[i].name, in->kit.value[i]);
+    in->key = hash_bytes(UINT32_C(2166136261), &in->precision, sizeof in->precision);
     for (int net = 0; net < GGN_NETS; net++)
         in->key = hash_bytes(in->key, in->model->weights[net]->params, in->model->graph[net].n_params * sizeof(float));
-    const double numbers[] = {in->policy.threshold, in->policy.passes, in->policy.tail999, in->policy.gini, in->policy.first_spp};
+    const double numbers[] = {policy->threshold, policy->passes,  policy->gate_noise,
+                              policy->tail999,   policy->gini,    policy->first_spp};
     in->key = hash_bytes(in->key, numbers, sizeof numbers);
     return LULL_OK;
 }
@@ -94,14 +78,15 @@ static int32_t load_model(struct lull_instance *in, const char *path, struct lul
 static void refine_need(const struct lull_instance *in, struct lull_requirements *need)
 {
     const struct ggn_hyper *hyper = &in->model->hyper;
+    const struct ggn_policy *policy = &in->rule.policy;
 
-    if (in->policy.tail999 > 0 || in->policy.gini > 0)
+    if (policy->tail999 > 0 || policy->gini > 0)
         need->planes_used |= LULL_PLANE_BIT(LULL_PLANE_HALF);
     need->block_width = (uint32_t)hyper->width;
     need->block_height = (uint32_t)hyper->height;
-    need->checks_hint = in->policy.ratio > 1.001 ? (uint32_t)(log(200) / log(in->policy.ratio)) : 100;
-    need->first_spp = (uint64_t)in->policy.first_spp;
-    need->bytes_per_block = gp_history_block_bytes(in->window, hyper->width, hyper->height);
+    need->checks_hint = policy->ratio > 1.001 ? (uint32_t)(log(200) / log(policy->ratio)) : 100;
+    need->first_spp = (uint64_t)policy->first_spp;
+    need->bytes_per_block = gp_history_block_bytes(in->rule.window, hyper->width, hyper->height);
 }
 
 static const struct lull_kit_rule rule;
@@ -117,7 +102,6 @@ static int32_t create(const struct lull_host *host, const struct lull_pair *pair
 
     if (status)
         return status;
-    in->gate = in->kit.value[P_GATE] != 0;
     in->precision = (enum ggn_precision)in->kit.value[P_PRECISION];
     status = load_model(in, text[P_MODEL], err);
     if (status) {
@@ -168,7 +152,7 @@ static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *fr
     struct gp_worker *worker = in->worker ? NULL : workers_create(in, count, err);
     if (!worker && !in->worker)
         return err && LULL_HAS(struct lull_error, err, message) ? err->code : LULL_E_MEMORY;
-    status = gp_history_create(&history, in->window, frame, err);
+    status = gp_history_create(&history, in->rule.window, frame, err);
     if (status) {
         workers_release(worker, count);
         return status;
@@ -180,6 +164,7 @@ static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *fr
         in->workers = count;
     }
     lull_kit_frame_open(in, frame);
+    in->rule.spp_max = frame->spp_max;
     in->display = gp_display_of(&in->kit);
     return LULL_OK;
 }
@@ -212,7 +197,7 @@ static int32_t check_block(const struct lull_instance *in, const struct lull_blo
 
     if (b->x0 != r->x0 || b->y0 != r->y0 || b->x1 != r->x1 || b->y1 != r->y1)
         return lull_kit_fail(err, LULL_E_INVALID, "evaluate: block %u is none of the frame's", b->id);
-    if (b->spp < in->history.head[b->id].asked_spp)
+    if (b->spp < in->history.head[b->id].stopper.asked_spp)
         return lull_kit_fail(err, LULL_E_INVALID, "evaluate: block %u has fewer samples than before", b->id);
     return LULL_OK;
 }
@@ -220,15 +205,16 @@ static int32_t check_block(const struct lull_instance *in, const struct lull_blo
 static void judge(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b, struct lull_decision *d,
                   uint32_t worker)
 {
-    const struct gp_answer *a = &in->history.pending[b->id].answer;
+    const struct gp_head *head = &in->history.pending[b->id];
+    const struct ggn_verdict *v = &head->stopper.verdict;
 
     gp_verdict(in, view, b, worker);
-    d->action = a->action;
-    d->flags = a->flags;
-    d->next_spp = a->next_spp;
-    d->p_noisy = a->p_noisy;
-    d->predicted_spp = a->predicted_spp;
-    d->error = a->error;
+    d->action = v->stop ? LULL_STOP : LULL_CONTINUE;
+    d->flags = (v->too_early ? LULL_DECISION_TOO_EARLY : 0) | (head->bad ? LULL_DECISION_BAD_INPUT : 0);
+    d->next_spp = v->next_spp;
+    d->p_noisy = v->p;
+    d->predicted_spp = v->predicted_spp;
+    d->error = v->noise;
 }
 
 static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, const struct lull_block *blocks,
@@ -272,9 +258,9 @@ static int32_t state_load(struct lull_instance *in, const struct lull_reader *re
         return lull_kit_fail(err, LULL_E_STATE, "load: no frame is open");
     struct lull_frame frame = {
         .blocks = in->history.rect, .block_count = in->history.count, .block_stride = sizeof(struct lull_rect)};
-    int32_t status = gp_history_create(&history, in->window, &frame, err);
+    int32_t status = gp_history_create(&history, in->rule.window, &frame, err);
     if (!status)
-        status = gp_history_load(&history, in->key, reader, err);
+        status = gp_history_load(&history, &in->rule, in->key, reader, err);
     if (status) {
         gp_history_release(&history);
         return status;

@@ -7,7 +7,6 @@
 #include <lull/criterion_kit.h>
 
 #include "model/judge.h"
-#include "model/policy.h"
 #include "model/preprocess.h"
 #include "model/window.h"
 #include "plugin/history.h"
@@ -20,8 +19,7 @@ struct gp_worker {
 struct lull_instance {
     struct lull_kit kit;
     struct ggn_model *model;
-    struct ggn_policy policy; /* the model's, with the parameters over it */
-    int gate, window;
+    struct ggn_stop_rule rule; /* the model's policy, with the parameters over it */
     enum ggn_precision precision;
     uint32_t key; /* of saved state: a hash of model and policy */
     struct ggn_display display;
@@ -30,7 +28,7 @@ struct lull_instance {
     struct gp_worker *worker;
 };
 
-/* Fills in->history.pending[b->id] with the answer for a checked block; the same block at the same spp again keeps its answer.
+/* Fills in->history.pending[b->id] with the verdict on a checked block; the same block at the same spp again keeps its verdict.
  * Tasks on different blocks may run at the same time, each with its own worker < in->workers. */
 void gp_verdict(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b, uint32_t worker);
 

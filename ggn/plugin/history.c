@@ -75,28 +75,23 @@ uint16_t *gp_history_denoised(const struct gp_history *h, uint32_t id, uint32_t 
     return p;
 }
 
-uint32_t gp_head_push(struct gp_head *head, int window, uint64_t spp)
+uint32_t gp_head_push(struct gp_head *head, int window, uint32_t before)
 {
-    uint32_t slot = head->order[head->used];
+    uint32_t slot = head->order[before];
 
-    if (head->used < (uint32_t)window) {
-        head->used++;
-    } else {
+    if (before == (uint32_t)window) {
         /* the oldest image leaves; its slot is the next spare one */
         uint32_t oldest = head->order[0];
         memmove(head->order, head->order + 1, (size_t)window * sizeof head->order[0]);
         head->order[window] = oldest;
     }
-    head->spp[slot] = spp;
     head->denoised &= ~(UINT32_C(1) << slot);
-    head->regular = head->jumped ? 1 : head->regular < head->used ? head->regular + 1 : head->used;
-    head->jumped = 0;
     return slot;
 }
 
 /* --- lull.state/1 ------------------------------------------------------------------------------------------------------ */
 
-static const char MAGIC[8] = {'G', 'G', 'N', 'S', 'T', 'A', 'T', '1'};
+static const char MAGIC[8] = {'G', 'G', 'N', 'S', 'T', 'A', 'T', '2'};
 
 struct state_header {
     char magic[8];
@@ -124,30 +119,27 @@ int32_t gp_history_save(const struct gp_history *h, uint32_t key, const struct l
         status = writer->write(writer, &h->rect[id], sizeof h->rect[id]);
         if (!status)
             status = writer->write(writer, &head, sizeof head);
-        for (uint32_t i = 0; !status && i < head.used; i++)
+        for (uint32_t i = 0; !status && i < head.stopper.used; i++)
             status = writer->write(writer, gp_history_noisy(h, id, head.order[i]), image);
     }
     return status ? lull_kit_fail(err, status, "state: the host could not write it") : LULL_OK;
 }
 
 /* Whether a head from a file may be trusted as an index into memory. */
-static int head_valid(const struct gp_head *head, int window)
+static int head_valid(const struct gp_head *head, const struct ggn_stop_rule *rule)
 {
     uint32_t seen = 0;
 
-    for (int i = 0; i <= window; i++) {
-        if (head->order[i] > (uint32_t)window || (seen >> head->order[i] & 1))
+    for (int i = 0; i <= rule->window; i++) {
+        if (head->order[i] > (uint32_t)rule->window || (seen >> head->order[i] & 1))
             return 0;
         seen |= UINT32_C(1) << head->order[i];
     }
-    for (uint32_t i = 0; i < head->used && i < (uint32_t)window; i++)
-        if (!head->spp[head->order[i]] || (i && head->spp[head->order[i]] <= head->spp[head->order[i - 1]]))
-            return 0;
-    return head->used <= (uint32_t)window && head->regular <= head->used && head->denoised == 0 && head->jumped <= 1 &&
-           (head->answer.action == LULL_CONTINUE || head->answer.action == LULL_STOP);
+    return !head->denoised && head->bad <= 1 && ggn_stopper_valid(rule, &head->stopper);
 }
 
-static int32_t load_blocks(struct gp_history *h, const struct lull_reader *reader, struct lull_error *err)
+static int32_t load_blocks(struct gp_history *h, const struct ggn_stop_rule *rule, const struct lull_reader *reader,
+                           struct lull_error *err)
 {
     for (uint32_t id = 0; id < h->count; id++) {
         struct lull_rect rect;
@@ -156,9 +148,9 @@ static int32_t load_blocks(struct gp_history *h, const struct lull_reader *reade
 
         if (reader->read(reader, &rect, sizeof rect) || reader->read(reader, &head, sizeof head))
             return lull_kit_fail(err, LULL_E_IO, "state: it ends early, at block %u", id);
-        if (memcmp(&rect, &h->rect[id], sizeof rect) || !head_valid(&head, h->window))
+        if (memcmp(&rect, &h->rect[id], sizeof rect) || !head_valid(&head, rule))
             return lull_kit_fail(err, LULL_E_IO, "state: block %u does not fit the frame", id);
-        for (uint32_t i = 0; i < head.used; i++)
+        for (uint32_t i = 0; i < head.stopper.used; i++)
             if (reader->read(reader, gp_history_noisy(h, id, head.order[i]), image))
                 return lull_kit_fail(err, LULL_E_IO, "state: it ends early, at block %u", id);
         h->head[id] = head;
@@ -166,7 +158,8 @@ static int32_t load_blocks(struct gp_history *h, const struct lull_reader *reade
     return LULL_OK;
 }
 
-int32_t gp_history_load(struct gp_history *h, uint32_t key, const struct lull_reader *reader, struct lull_error *err)
+int32_t gp_history_load(struct gp_history *h, const struct ggn_stop_rule *rule, uint32_t key, const struct lull_reader *reader,
+                        struct lull_error *err)
 {
     struct state_header header, wanted = header_of(h, key);
 
@@ -174,5 +167,5 @@ int32_t gp_history_load(struct gp_history *h, uint32_t key, const struct lull_re
         return lull_kit_fail(err, LULL_E_IO, "state: it ends early");
     if (memcmp(&header, &wanted, sizeof header))
         return lull_kit_fail(err, LULL_E_IO, "state: saved by another criterion, model, parameter set or frame");
-    return load_blocks(h, reader, err);
+    return load_blocks(h, rule, reader, err);
 }

@@ -13,27 +13,17 @@
 
 #include <lull/criterion.h>
 
-enum { GP_WINDOW_MAX = 16, GP_SLOTS_MAX = GP_WINDOW_MAX + 1 };
+#include "model/stopper.h"
 
-/* The answer kept for a block that is asked again. */
-struct gp_answer {
-    int32_t action;
-    uint32_t flags;
-    uint64_t next_spp;
-    double p_noisy, predicted_spp, error;
-};
+enum { GP_SLOTS_MAX = GGN_WINDOW_MAX + 1 };
 
-/* Fixed-size part of a block's history. Copied as a whole between pending and current. */
+/* Fixed-size part of a block's history. Copied as a whole between pending and current; without padding. */
 struct gp_head {
-    uint64_t asked_spp;            /* of `answer`; 0 = never asked */
-    uint64_t spp[GP_SLOTS_MAX];    /* by slot */
-    uint32_t order[GP_SLOTS_MAX];  /* slots, oldest image first; order[used] is the spare one */
-    uint32_t used;                 /* images kept, 0..S */
-    uint32_t regular;              /* of those the newest that are spaced as the network learned them */
-    uint32_t denoised;             /* bit per slot: its denoised image is there */
-    uint32_t passes;               /* checks in a row below the threshold */
-    uint32_t jumped;               /* the last answer asked for a larger step than the network learned */
-    struct gp_answer answer;
+    struct ggn_stopper stopper;   /* its window's images are order[0 .. used − 1] */
+    uint32_t order[GP_SLOTS_MAX]; /* slots, oldest image first; order[used] is the spare one */
+    uint32_t denoised;            /* bit per slot: its denoised image is there */
+    uint32_t bad;                 /* the last image had broken pixels */
+    uint32_t zero;
 };
 
 struct gp_history {
@@ -55,11 +45,13 @@ void gp_history_release(struct gp_history *history);
 uint8_t *gp_history_noisy(const struct gp_history *h, uint32_t id, uint32_t slot);      /* [3][height][width] */
 uint16_t *gp_history_denoised(const struct gp_history *h, uint32_t id, uint32_t slot);  /* [3][height][width] */
 
-/* Makes the spare slot the newest image of `head` (a pending one); returns the slot. */
-uint32_t gp_head_push(struct gp_head *head, int window, uint64_t spp);
+/* Makes the spare slot that of the image which head->stopper has just accepted; returns the slot. `before`: images in the window
+ * until then. */
+uint32_t gp_head_push(struct gp_head *head, int window, uint32_t before);
 
 /* lull.state/1: everything above, checked on the way in. `key` identifies model and parameters. */
 int32_t gp_history_save(const struct gp_history *h, uint32_t key, const struct lull_writer *writer, struct lull_error *err);
-int32_t gp_history_load(struct gp_history *h, uint32_t key, const struct lull_reader *reader, struct lull_error *err);
+int32_t gp_history_load(struct gp_history *h, const struct ggn_stop_rule *rule, uint32_t key, const struct lull_reader *reader,
+                        struct lull_error *err);
 
 #endif

@@ -40,22 +40,54 @@ void ggn_calibrate_platt(const double *logit, const double *label, int n, struct
     policy->shift = b;
 }
 
-/* Where the block of list entries first … end − 1 stops; 0 if it does not. */
-static double stop_of(const struct ggn_windows *w, int first, int end, const double *logit, const struct ggn_policy *policy, double t)
-{
-    int passes = 0;
+/* The logits of a chain's windows, which end at consecutive levels; unlabelled ones are not among them and never stop. */
+struct known {
+    const struct ggn_windows *windows;
+    const double *logit;
+    int first, end; /* list entries */
+};
 
-    for (int i = first; i < end; i++) {
-        passes = ggn_policy_p(policy, logit[i]) < t ? passes + 1 : 0;
-        if (passes >= policy->passes)
-            return w->set->chains[w->list[i].chain].spp[w->list[i].last];
+static double known_logit(void *data, const int *levels)
+{
+    const struct known *k = data;
+
+    for (int i = k->first; i < k->end; i++)
+        if (k->windows->list[i].last == levels[k->windows->length - 1])
+            return k->logit[i];
+    return (double)NAN;
+}
+
+int ggn_checks_create(struct ggn_checks *checks, const struct ggn_windows *w, const double *logit, const struct ggn_policy *policy,
+                      struct base_err *err)
+{
+    const struct ggn_stop_rule rule = {.policy = *policy, .window = w->length};
+    size_t levels = 1;
+
+    for (int c = 0; c < w->set->n; c++)
+        levels += (size_t)w->set->chains[c].n_levels;
+    *checks = (struct ggn_checks){.windows = w, .policy = *policy, .seen = malloc(levels * sizeof *checks->seen)};
+    if (!checks->seen)
+        return base_fail_nomem(err, "thresholds");
+    struct ggn_seen *seen = checks->seen;
+    for (int c = 0; c < w->set->n; c++) {
+        struct known known = {w, logit, w->first[c], w->first[c + 1]};
+        if (known.end > known.first)
+            ggn_replay(w->set, &w->set->chains[c], &rule, known_logit, &known, seen);
+        seen += w->set->chains[c].n_levels;
     }
     return 0;
 }
 
-int ggn_calibrate_stopping(const struct ggn_windows *w, const double *logit, const struct ggn_policy *policy, double t,
-                           struct ggn_stopping *out, struct base_err *err)
+void ggn_checks_release(struct ggn_checks *checks)
 {
+    free(checks->seen);
+    *checks = (struct ggn_checks){0};
+}
+
+int ggn_calibrate_stopping(const struct ggn_checks *checks, double t, struct ggn_stopping *out, struct base_err *err)
+{
+    const struct ggn_windows *w = checks->windows;
+    const struct ggn_seen *seen = checks->seen;
     double *error = malloc(((size_t)w->set->n + 1) * sizeof *error), spent = 0, needed = 0;
     int early = 0, unsure = 0;
 
@@ -64,11 +96,14 @@ int ggn_calibrate_stopping(const struct ggn_windows *w, const double *logit, con
     *out = (struct ggn_stopping){0};
     for (int c = 0; c < w->set->n; c++) {
         const struct ggn_chain *chain = &w->set->chains[c];
+        const struct ggn_seen *own = seen;
+        seen += chain->n_levels;
         if (w->first[c + 1] == w->first[c])
             continue;
-        double stop = stop_of(w, w->first[c], w->first[c + 1], logit, policy, t), truth = chain->label.threshold;
-        if (stop == 0) /* nothing is known after the end of the chain: right if the noise is seen until there */
-            stop = fmax(chain->spp[chain->n_levels - 1], truth);
+        int level = ggn_replay_stop(own, chain->n_levels, &checks->policy, t);
+        double truth = chain->label.threshold;
+        /* nothing is known after the end of the chain: right if the noise is seen until there */
+        double stop = level < 0 ? fmax(chain->spp[chain->n_levels - 1], truth) : chain->spp[level];
         early += stop < 0.8 * truth;
         unsure += stop < 0.8 * truth * exp2(chain->spread);
         spent += stop;
@@ -87,23 +122,23 @@ int ggn_calibrate_stopping(const struct ggn_windows *w, const double *logit, con
     return 0;
 }
 
-int ggn_calibrate_threshold(const struct ggn_windows *w, const double *logit, double early_rate, struct ggn_policy *policy,
-                            struct ggn_stopping *out, struct base_err *err)
+int ggn_calibrate_threshold(const struct ggn_checks *checks, double early_rate, double *threshold, struct ggn_stopping *out,
+                            struct base_err *err)
 {
     struct ggn_stopping best = {0};
-    double threshold = 0;
+    double chosen = 0;
 
     for (int percent = 1; percent <= 99; percent++) {
         struct ggn_stopping now;
-        int rc = ggn_calibrate_stopping(w, logit, policy, percent / 100.0, &now, err);
+        int rc = ggn_calibrate_stopping(checks, percent / 100.0, &now, err);
         if (rc)
             return rc;
-        if (threshold > 0 && (now.unsure_rate > early_rate || now.mean_abs_log2 >= best.mean_abs_log2))
+        if (chosen > 0 && (now.unsure_rate > early_rate || now.mean_abs_log2 >= best.mean_abs_log2))
             continue;
         best = now;
-        threshold = percent / 100.0;
+        chosen = percent / 100.0;
     }
-    policy->threshold = threshold;
+    *threshold = chosen;
     *out = best;
     return 0;
 }

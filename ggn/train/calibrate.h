@@ -2,14 +2,26 @@
 #ifndef GGN_TRAIN_CALIBRATE_H
 #define GGN_TRAIN_CALIBRATE_H
 
-#include "model/policy.h"
+#include "data/replay.h"
 #include "data/windows.h"
+#include "model/policy.h"
 
 /* Platt 1999: scale, shift that maximise the likelihood of `label` under sigmoid(scale·logit + shift); a weak prior keeps
  * scale positive and finite when the classes are separable. Without both classes the policy keeps what it has. */
 void ggn_calibrate_platt(const double *logit, const double *label, int n, struct ggn_policy *policy);
 
-/* What a threshold t does to the blocks of a window list. */
+/* What the stopping rule sees of the blocks of a window list under a policy, whatever its threshold: gate, guard, cadence. */
+struct ggn_checks {
+    const struct ggn_windows *windows; /* borrows */
+    struct ggn_policy policy;
+    struct ggn_seen *seen; /* owns; the levels of every chain, one after the other */
+};
+/* logit: of each window of `windows`. */
+int ggn_checks_create(struct ggn_checks *checks, const struct ggn_windows *windows, const double *logit,
+                      const struct ggn_policy *policy, struct base_err *err);
+void ggn_checks_release(struct ggn_checks *checks);
+
+/* What a threshold t does to these blocks. */
 struct ggn_stopping {
     int blocks;
     double early_rate;    /* share stopped below 0.8 of the true threshold */
@@ -17,15 +29,13 @@ struct ggn_stopping {
     double samples_ratio; /* samples spent / samples at the true thresholds */
     double median_abs_log2, mean_abs_log2; /* of stop / true threshold */
 };
-/* logit: of each window of `windows`. */
-int ggn_calibrate_stopping(const struct ggn_windows *windows, const double *logit, const struct ggn_policy *policy, double t,
-                           struct ggn_stopping *out, struct base_err *err);
+int ggn_calibrate_stopping(const struct ggn_checks *checks, double t, struct ggn_stopping *out, struct base_err *err);
 
 /* The threshold, in steps of 0.01, with the smallest mean |log2(stop / true)| of those that keep the unsure rate at or below
  * `early_rate`; 0.01 if none does. (The largest that keeps the rate would be 0.99 whenever the few blocks are easy. The margin
  * of one spread: none of ten blocks stopped early says little about the next ten, whose labels are no surer.) */
-int ggn_calibrate_threshold(const struct ggn_windows *windows, const double *logit, double early_rate, struct ggn_policy *policy,
-                            struct ggn_stopping *out, struct base_err *err);
+int ggn_calibrate_threshold(const struct ggn_checks *checks, double early_rate, double *threshold, struct ggn_stopping *out,
+                            struct base_err *err);
 
 /* Mean fall of the calibrated logit per octave of samples near the threshold. */
 double ggn_calibrate_slope(const struct ggn_windows *windows, const double *logit, const struct ggn_policy *policy);

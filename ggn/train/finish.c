@@ -138,6 +138,21 @@ static int export(struct ggn_session *s, const struct ggn_policy *policy, const 
     return rc;
 }
 
+static int choose_threshold(const struct ggn_session *s, const struct ggn_judged *v, struct ggn_policy *policy,
+                            struct ggn_stopping *stopping, struct base_err *err)
+{
+    struct ggn_checks checks;
+
+    if (!v->n)
+        return 0;
+    int rc = ggn_checks_create(&checks, &s->validation, v->logit, policy, err);
+    if (rc)
+        return rc;
+    rc = ggn_calibrate_threshold(&checks, s->plan->early_rate, &policy->threshold, stopping, err);
+    ggn_checks_release(&checks);
+    return rc;
+}
+
 int ggn_session_finish(struct ggn_session *s, struct base_err *err)
 {
     struct ggn_policy policy = ggn_policy_default();
@@ -152,16 +167,17 @@ int ggn_session_finish(struct ggn_session *s, struct base_err *err)
             right += (ggn_policy_p(&policy, v.logit[i]) >= 0.5) == v.noisy[i];
         accuracy = (double)right / v.n;
         policy.slope = ggn_calibrate_slope(&s->validation, v.logit, &policy);
-        rc = ggn_calibrate_threshold(&s->validation, v.logit, s->plan->early_rate, &policy, &stopping, err);
     }
-    if (!rc) {
+    if (!rc) { /* the threshold last: it is chosen for the cadence, the gate and the guard that will stand beside it */
         policy.first_spp = s->set.first_spp;
         policy.ratio = s->set.ratio > 1.001 ? s->set.ratio : 0;
         policy.step_spp = s->set.step_spp;
         ggn_calibrate_limits(&s->train, &policy);
         ggn_calibrate_limits(&s->validation, &policy);
-        rc = export(s, &policy, &stopping, v.auc, accuracy, err);
+        rc = choose_threshold(s, &v, &policy, &stopping, err);
     }
+    if (!rc)
+        rc = export(s, &policy, &stopping, v.auc, accuracy, err);
     if (!rc)
         say(s, &policy, &stopping, v.auc, accuracy);
     ggn_judged_release(&v);

@@ -12,7 +12,7 @@
 #include "support/ggn_near.h"
 #include "support/ggn_noise.h"
 
-#include "eval/network.h"
+#include "eval/trained.h"
 #include "model/policy.h"
 
 static const uint32_t levels[] = {20, 40, 80, 160, 320, 640, 1280};
@@ -158,8 +158,11 @@ static void decisions(void **state)
     m.passes = 2;
     ggn_method_run(&m, &set);
     assert_near(m.stop[0], 640, 0); /* 160, (320 not judged), 640 */
-    guard[b->first + 2] = 0.01;
     m.guard = guard;
+    guard[b->first + 2] = 0.01; /* a guard leaves the passes counted so far */
+    ggn_method_run(&m, &set);
+    assert_near(m.stop[0], 640, 0);
+    guard[b->first + 4] = 0.01;
     ggn_method_run(&m, &set);
     assert_near(m.stop[0], 1280, 0);
     m.guard_limit = 0.01;
@@ -214,15 +217,14 @@ static void network(void **state)
     policy.threshold = 0.5;
     policy.passes = 2;
     policy.gate_noise = policy.tail999 = policy.gini = 0;
-    if (ggn_policy_set(model, &policy, &err) != 0 || ggn_eval_network(&m, &set, model, "empty", GGN_PRECISION_F32, threads, &err) != 0)
+    if (ggn_eval_trained(&m, &set, model, &policy, "empty", GGN_PRECISION_F32, threads, &err) != 0)
         fail_msg("%s", err.text);
     for (size_t i = 0; i < set.n; i++)
         assert_near(m.score[i], 1.0 / (1.0 + exp(1.0)), 1e-6);
     assert_near(m.stop[3], 80, 0); /* two passes: 40 and 80 */
     ggn_method_release(&m);
     policy.ratio = 4; /* 20, 80, 320, 1280 */
-    ggn_policy_set(model, &policy, &err);
-    assert_int_equal(ggn_eval_network(&m, &set, model, "empty", GGN_PRECISION_F32, threads, &err), 0);
+    assert_int_equal(ggn_eval_trained(&m, &set, model, &policy, "empty", GGN_PRECISION_F32, threads, &err), 0);
     const struct ggn_eval_block *b = &set.blocks[0];
     for (size_t i = b->first; i < b->end; i++)
         assert_int_equal(isnan(m.score[i]), !(set.spp[i] == 80 || set.spp[i] == 320 || set.spp[i] == 1280));
@@ -231,10 +233,10 @@ static void network(void **state)
     policy.ratio = 2;
     policy.passes = 1;
     policy.gate_noise = 0.04; /* grey noise of sigma 0.74/sqrt(n) in block 3 of the first scene, 0.22/sqrt(n) in block 0 */
-    ggn_policy_set(model, &policy, &err);
-    assert_int_equal(ggn_eval_network(&m, &set, model, "empty", GGN_PRECISION_F32, threads, &err), 0);
+    assert_int_equal(ggn_eval_trained(&m, &set, model, &policy, "empty", GGN_PRECISION_F32, threads, &err), 0);
     assert_true(m.stop[0] < m.stop[3] && m.stop[3] > 80);
     assert_near(m.score[set.blocks[3].first], 1.0 / (1.0 + exp(1.0)), 1e-6); /* asked all the same */
+    assert_true(isinf(m.verdict[set.blocks[3].first]));                      /* but not believed */
     ggn_method_release(&m);
     ggn_model_destroy(model);
 }

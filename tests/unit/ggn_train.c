@@ -298,10 +298,14 @@ static void the_threshold_respects_the_early_rate(void **state)
     for (int i = 0; i < w.n; i++)
         logit[i] = -6 * w.list[i].octave;
     policy.passes = 1;
-    assert_int_equal(ggn_calibrate_stopping(&w, logit, &policy, 0.5, &at, &err), 0);
+    policy.first_spp = set.first_spp;
+    policy.ratio = set.ratio;
+    struct ggn_checks checks;
+    assert_int_equal(ggn_checks_create(&checks, &w, logit, &policy, &err), 0);
+    assert_int_equal(ggn_calibrate_stopping(&checks, 0.5, &at, &err), 0);
     assert_int_equal(at.blocks, 9);
     assert_true(at.early_rate == 0 && at.samples_ratio >= 1);
-    assert_int_equal(ggn_calibrate_threshold(&w, logit, 0, &policy, &chosen, &err), 0);
+    assert_int_equal(ggn_calibrate_threshold(&checks, 0, &policy.threshold, &chosen, &err), 0);
     assert_true(chosen.early_rate == 0 && chosen.unsure_rate == 0);
     assert_true(policy.threshold > 0.05 && policy.threshold < 0.9);
     double slope = ggn_calibrate_slope(&w, logit, &policy);
@@ -310,8 +314,22 @@ static void the_threshold_respects_the_early_rate(void **state)
     double near = chosen.mean_abs_log2;
     for (int c = 0; c < set.n; c++)
         set.chains[c].spread = 1;
-    assert_int_equal(ggn_calibrate_threshold(&w, logit, 0, &policy, &chosen, &err), 0);
+    assert_int_equal(ggn_calibrate_threshold(&checks, 0, &policy.threshold, &chosen, &err), 0);
     assert_true(chosen.unsure_rate == 0 && chosen.mean_abs_log2 > near + 0.5);
+    ggn_checks_release(&checks);
+    /* a guard that no level satisfies lets nothing stop, a gate that spares the network everywhere neither */
+    for (int c = 0; c < set.n; c++)
+        for (int i = 0; i < set.chains[c].n_levels; i++)
+            set.chains[c].tail999[i] = set.chains[c].gini[i] = 0.5;
+    for (int k = 0; k < 2; k++) {
+        struct ggn_policy held = policy;
+        *(k ? &held.gate_noise : &held.tail999) = 1e-12;
+        assert_int_equal(ggn_checks_create(&checks, &w, logit, &held, &err), 0);
+        struct ggn_stopping none;
+        assert_int_equal(ggn_calibrate_stopping(&checks, 0.99, &none, &err), 0);
+        assert_true(none.samples_ratio > at.samples_ratio && none.early_rate == 0);
+        ggn_checks_release(&checks);
+    }
     free(logit);
     ggn_windows_release(&w);
     ggn_chains_release(&set);

@@ -1,0 +1,24 @@
+/*
+ * Recorded levels asked about as a renderer would ask: what the stopping rule (model/stopper.h) sees of a block. A check falls on
+ * the recorded level nearest to where the rule wants it, and on the last one. Pure functions but for the callback.
+ */
+#ifndef GGN_DATA_REPLAY_H
+#define GGN_DATA_REPLAY_H
+
+#include "data/chains.h"
+#include "model/stopper.h"
+
+struct ggn_seen {
+    double p;    /* NaN: no check fell on this level, or one too early for the network; INFINITY: the gate spared the network */
+    int is_held; /* by the tail guard, should it pass; from the last recorded level (scaled) where the statistics are missing */
+};
+
+/* Fills seen [c->n_levels], as if nothing stopped the block: where it stops depends on the threshold, what is seen does not.
+ * logit: of the window of these levels (indices, noisiest first). */
+void ggn_replay(const struct ggn_chains *set, const struct ggn_chain *c, const struct ggn_stop_rule *rule,
+                double (*logit)(void *data, const int *levels), void *data, struct ggn_seen *seen);
+
+/* The level at which these checks stop the block, -1 if none does. */
+int ggn_replay_stop(const struct ggn_seen *seen, int n_levels, const struct ggn_policy *policy, double threshold);
+
+#endif

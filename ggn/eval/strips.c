@@ -1,0 +1,212 @@
+/* Strips of equal tiles, one under the other. */
+#include "eval/strips.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "data/image.h"
+#include "eval/viewer.h"
+#include "figures/plot.h"
+#include "model/policy.h"
+#include "nn/ssim.h"
+
+enum { STRIPS = 4 };
+struct strips {
+    int n;
+    char file[STRIPS][4128]; /* removed at the end */
+    char title[STRIPS][256];
+};
+
+static int add_strip(struct strips *s, const char *path, const uint8_t *rgb, int w, int h, struct base_err *err)
+{
+    snprintf(s->file[s->n], sizeof s->file[0], "%.4000s.part%d.png", path, s->n);
+    int rc = ggn_image8_write_png(s->file[s->n], rgb, w, h, err);
+    s->n += !rc;
+    return rc;
+}
+
+/* Draws the strips if rc says so; removes their files. */
+static int finish_strips(struct strips *s, const char *path, int width, int height_each, int rc, struct base_err *err)
+{
+    struct ggn_plot plot;
+    if (!rc && s->n > 0)
+        rc = ggn_plot_begin(&plot, path, width, height_each * s->n + 20, err);
+    if (!rc && s->n > 0) {
+        fprintf(plot.script, "unset tics\nunset border\nset size ratio -1\nset yrange [] reverse\nset multiplot layout %d,1\n", s->n);
+        for (int i = 0; i < s->n; i++) {
+            fputs("set title ", plot.script);
+            ggn_plot_quote(plot.script, s->title[i]);
+            fputs("\nplot ", plot.script);
+            ggn_plot_quote(plot.script, s->file[i]);
+            fputs(" binary filetype=png with rgbimage notitle\n", plot.script);
+        }
+        fputs("unset multiplot\n", plot.script);
+        rc = ggn_plot_end(&plot, 1, err);
+    }
+    for (int i = 0; i < s->n; i++)
+        unlink(s->file[i]);
+    return rc;
+}
+
+/* Puts a planar float image in 0..1 into tile k of a strip of `tiles`. */
+static void put_tile(uint8_t *strip, int tiles, int k, const float *planes, size_t w, size_t h)
+{
+    size_t pixels = w * h;
+    for (size_t i = 0; i < pixels; i++)
+        for (size_t c = 0; c < 3; c++) {
+            float v = fminf(fmaxf(planes[c * pixels + i], 0.0f), 1.0f);
+            strip[3 * (i / w * (size_t)tiles * w + (size_t)k * w + i % w) + c] = (uint8_t)(255.0f * v + 0.5f);
+        }
+}
+
+static double ssim_of(struct ggn_ssim *ssim, const float *a, const float *b, size_t pixels, int width)
+{
+    const float *x[3] = {a, a + pixels, a + 2 * pixels}, *y[3] = {b, b + pixels, b + 2 * pixels};
+    return ggn_ssim_mean(ssim, x, y, NULL, 3, width, 0.0);
+}
+
+static int denoiser_strip(const struct ggn_eval_set *s, const struct ggn_eval_block *b, struct ggn_viewer *v, const char *path,
+                          struct strips *strips, struct base_err *err)
+{
+    const struct ggn_chain *c = &s->chains.chains[b->chain];
+    int w = s->chains.width, h = s->chains.height;
+    size_t pixels = (size_t)w * (size_t)h, values = 3 * pixels;
+    uint8_t *strip = malloc(3 * values);
+    float *planes = malloc(3 * values * sizeof *planes);
+    struct ggn_ssim *ssim = ggn_ssim_create(h, w, NULL, err);
+    int rc = !strip || !planes || !ssim ? base_fail_nomem(err, path) : 0;
+    if (!rc) {
+        ggn_viewer_turn(v, c);
+        const uint16_t *denoised = ggn_viewer_denoise(v, 0);
+        for (size_t i = 0; i < values; i++) {
+            planes[i] = (float)c->noisy[i] / 255.0f;
+            planes[values + i] = (float)denoised[i] / 65535.0f;
+            planes[2 * values + i] = (float)c->reference[i] / 255.0f;
+        }
+        for (int k = 0; k < 3; k++)
+            put_tile(strip, 3, k, planes + (size_t)k * values, (size_t)w, (size_t)h);
+        snprintf(strips->title[strips->n], sizeof strips->title[0],
+                 "%.80s block %u at %.0f spp: SSIM %.3f     denoised: SSIM %.3f     reference",
+                 s->chains.data.views[b->view].name, b->label.id, c->spp[0], ssim_of(ssim, planes, planes + 2 * values, pixels, w),
+                 ssim_of(ssim, planes + values, planes + 2 * values, pixels, w));
+        rc = add_strip(strips, path, strip, 3 * w, h, err);
+    }
+    ggn_ssim_destroy(ssim);
+    free(planes);
+    free(strip);
+    return rc;
+}
+
+int ggn_eval_denoiser_picture(const char *path, const struct ggn_eval_set *s, const struct ggn_model *model, enum ggn_split split,
+                              struct base_err *err)
+{
+    struct strips strips = {0};
+    struct ggn_viewer v;
+    int last_view = -1, rc = ggn_viewer_init(&v, model, GGN_PRECISION_F32, &s->chains, err);
+    if (rc)
+        return rc;
+    for (int b = 0; b < s->n_blocks && strips.n < STRIPS && !rc; b++) {
+        const struct ggn_eval_block *block = &s->blocks[b];
+        if (block->split != split || block->view == last_view || !s->chains.chains[block->chain].reference)
+            continue;
+        last_view = block->view;
+        rc = denoiser_strip(s, block, &v, path, &strips, err);
+    }
+    ggn_viewer_release(&v);
+    return finish_strips(&strips, path, 960, 360, rc, err);
+}
+
+/* Grey tile of a feature map, or of the difference of two (black 0), stretched to what it spans. */
+static void put_map(uint8_t *strip, int tiles, int k, const float *a, const float *b, size_t w, size_t h)
+{
+    float lo = INFINITY, hi = -INFINITY;
+    for (size_t i = 0; i < w * h; i++) {
+        float v = b ? fabsf(a[i] - b[i]) : a[i];
+        lo = fminf(lo, v);
+        hi = fmaxf(hi, v);
+    }
+    for (size_t i = 0; i < w * h; i++) {
+        float v = b ? fabsf(a[i] - b[i]) : a[i];
+        uint8_t *at = strip + 3 * (i / w * (size_t)tiles * w + (size_t)k * w + i % w);
+        ggn_colormap_rgb(b ? GGN_MAGMA : GGN_VIRIDIS, hi > lo ? (double)((v - lo) / (hi - lo)) : 0.0, at);
+    }
+}
+
+/* The window that ends at `level` of a block, as a strip. */
+static int feature_strip(const struct ggn_eval_set *s, const struct ggn_eval_block *b, int level, const struct ggn_policy *policy,
+                         struct ggn_viewer *v, const char *path, struct strips *strips, struct base_err *err)
+{
+    const struct ggn_chain *c = &s->chains.chains[b->chain];
+    int w = s->chains.width, h = s->chains.height, row;
+    size_t pixels = (size_t)w * (size_t)h, values = 3 * pixels;
+    uint8_t *strip = malloc(4 * values);
+    float *planes = malloc((values + 2 * pixels) * sizeof *planes);
+    int rc = !strip || !planes ? base_fail_nomem(err, path) : 0;
+    if (!rc) {
+        int levels[GGN_WINDOW_MAX];
+        for (int i = 0; i < v->window; i++)
+            levels[i] = level - v->window + 1 + i;
+        ggn_viewer_turn(v, c);
+        double p = ggn_policy_p(policy, ggn_viewer_logit(v, levels));
+        for (size_t i = 0; i < values; i++)
+            planes[i] = (float)c->noisy[values * (size_t)level + i] / 255.0f;
+        for (int which = 0; which < 2; which++) {
+            const float *map = ggn_judge_feature_map(v->judge, which, &row);
+            for (int y = 0; y < h; y++)
+                memcpy(planes + values + (size_t)which * pixels + (size_t)y * (size_t)w, map + (size_t)y * (size_t)row,
+                       (size_t)w * sizeof *map);
+        }
+        put_tile(strip, 4, 0, planes, (size_t)w, (size_t)h);
+        put_map(strip, 4, 1, planes + values, NULL, (size_t)w, (size_t)h);
+        put_map(strip, 4, 2, planes + values + pixels, NULL, (size_t)w, (size_t)h);
+        put_map(strip, 4, 3, planes + values, planes + values + pixels, (size_t)w, (size_t)h);
+        snprintf(strips->title[strips->n], sizeof strips->title[0],
+                 "%.60s block %u, threshold %.0f: %.0f spp, p(noisy) %.3f   NFM of denoised   NFM of noisy   difference",
+                 s->chains.data.views[b->view].name, b->label.id, b->label.threshold, c->spp[level], p);
+        rc = add_strip(strips, path, strip, 4 * w, h, err);
+    }
+    free(planes);
+    free(strip);
+    return rc;
+}
+
+int ggn_eval_feature_picture(const char *path, const struct ggn_eval_set *s, const struct ggn_model *model, enum ggn_split split,
+                             struct base_err *err)
+{
+    struct strips strips = {0};
+    struct ggn_policy policy;
+    struct ggn_viewer v;
+    const struct ggn_eval_block *block = NULL;
+    /* Tiles would not fit together into one map. */
+    if (s->chains.width != model->hyper.width || s->chains.height != model->hyper.height)
+        return 0;
+    for (int b = 0; b < s->n_blocks; b++) {
+        const struct ggn_chain *c = &s->chains.chains[s->blocks[b].chain];
+        if (s->blocks[b].split != split || c->n_levels < model->hyper.window)
+            continue;
+        /* one whose threshold lies well inside what was recorded, if there is one */
+        int inside = s->blocks[b].label.threshold > 1.5 * c->spp[model->hyper.window - 1] && !s->blocks[b].label.censored;
+        block = !block || inside ? &s->blocks[b] : block;
+        if (inside)
+            break;
+    }
+    int rc = ggn_policy_of(model, &policy, err);
+    if (!rc)
+        rc = ggn_viewer_init(&v, model, GGN_PRECISION_F32, &s->chains, err);
+    if (rc || !block) {
+        if (!rc)
+            ggn_viewer_release(&v);
+        return rc;
+    }
+    const struct ggn_chain *c = &s->chains.chains[block->chain];
+    int at[3] = {model->hyper.window - 1, model->hyper.window - 1, c->n_levels - 1};
+    while (at[1] + 1 < c->n_levels && c->spp[at[1]] < block->label.threshold)
+        at[1]++;
+    for (int k = 0; k < 3 && !rc; k++)
+        rc = feature_strip(s, block, at[k], &policy, &v, path, &strips, err);
+    ggn_viewer_release(&v);
+    return finish_strips(&strips, path, 1100, 320, rc, err);
+}

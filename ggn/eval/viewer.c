@@ -1,0 +1,93 @@
+#include "eval/viewer.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+void ggn_viewer_release(struct ggn_viewer *v)
+{
+    ggn_judge_destroy(v->judge);
+    free(v->denoised[0]);
+    free(v->known);
+    *v = (struct ggn_viewer){0};
+}
+
+int ggn_viewer_init(struct ggn_viewer *v, const struct ggn_model *model, enum ggn_precision precision, const struct ggn_chains *set,
+                    struct base_err *err)
+{
+    size_t values = ggn_chains_values(set);
+    int levels = 1;
+
+    *v = (struct ggn_viewer){.set = set, .window = model->hyper.window};
+    for (int i = 0; i < set->n; i++)
+        levels = set->chains[i].n_levels > levels ? set->chains[i].n_levels : levels;
+    v->judge = ggn_judge_create(model, precision, NULL, err);
+    if (!v->judge)
+        return err->code;
+    v->denoised[0] = malloc((size_t)v->window * values * sizeof *v->denoised[0]);
+    v->known = malloc((size_t)levels * sizeof *v->known);
+    if (!v->denoised[0] || !v->known) {
+        ggn_viewer_release(v);
+        return base_fail_nomem(err, "evaluation");
+    }
+    for (int i = 1; i < v->window; i++)
+        v->denoised[i] = v->denoised[0] + (size_t)i * values;
+    return 0;
+}
+
+void ggn_viewer_turn(struct ggn_viewer *v, const struct ggn_chain *chain)
+{
+    v->chain = chain;
+    for (int i = 0; i < v->window; i++)
+        v->holds[i] = -1;
+    for (int i = 0; i < chain->n_levels; i++)
+        v->known[i].level[0] = -1;
+}
+
+static int is_in(int level, const int *levels, int n)
+{
+    for (int i = 0; i < n; i++)
+        if (levels[i] == level)
+            return 1;
+    return 0;
+}
+
+/* Where a level's denoised image is; one that is not among the n that are needed makes room. */
+static uint16_t *denoised(struct ggn_viewer *v, int level, const int *needed, int n)
+{
+    const uint8_t *noisy = v->chain->noisy + ggn_chains_values(v->set) * (size_t)level;
+    int spare = 0;
+
+    for (int i = 0; i < v->window; i++) {
+        if (v->holds[i] == level)
+            return v->denoised[i];
+        if (!is_in(v->holds[i], needed, n))
+            spare = i;
+    }
+    ggn_judge_denoise(v->judge, noisy, v->denoised[spare], v->set->width, v->set->height);
+    v->holds[spare] = level;
+    return v->denoised[spare];
+}
+
+const uint16_t *ggn_viewer_denoise(struct ggn_viewer *v, int level)
+{
+    return denoised(v, level, &level, 1);
+}
+
+double ggn_viewer_logit(void *viewer, const int *levels)
+{
+    struct ggn_viewer *v = viewer;
+    struct ggn_viewed *known = &v->known[levels[v->window - 1]];
+    const size_t bytes = (size_t)v->window * sizeof *levels;
+    const uint8_t *noisy[GGN_WINDOW_MAX];
+    const uint16_t *clean[GGN_WINDOW_MAX];
+
+    if (!memcmp(known->level, levels, bytes))
+        return known->logit;
+    for (int i = 0; i < v->window; i++) {
+        noisy[i] = v->chain->noisy + ggn_chains_values(v->set) * (size_t)levels[i];
+        clean[i] = denoised(v, levels[i], levels, v->window);
+    }
+    memcpy(known->level, levels, bytes);
+    known->logit = ggn_judge_logit(v->judge, noisy, clean, v->set->width, v->set->height);
+    return known->logit;
+}

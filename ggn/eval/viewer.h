@@ -1,0 +1,35 @@
+/* A trained model's view of the windows of recorded blocks. One thread at a time. */
+#ifndef GGN_EVAL_VIEWER_H
+#define GGN_EVAL_VIEWER_H
+
+#include "data/chains.h"
+#include "model/judge.h"
+#include "model/stopper.h"
+
+struct ggn_viewed {
+    int level[GGN_WINDOW_MAX];
+    double logit;
+};
+
+struct ggn_viewer {
+    struct ggn_judge *judge;       /* owns */
+    const struct ggn_chains *set;  /* borrows */
+    const struct ggn_chain *chain; /* borrows; the block */
+    int window;
+    uint16_t *denoised[GGN_WINDOW_MAX]; /* [3][H][W] each; one allocation, owned */
+    int holds[GGN_WINDOW_MAX];          /* the level that is in it, -1: none */
+    struct ggn_viewed *known;           /* owns; [levels]: the last window that ended there */
+};
+
+int ggn_viewer_init(struct ggn_viewer *v, const struct ggn_model *model, enum ggn_precision precision, const struct ggn_chains *set,
+                    struct base_err *err);
+void ggn_viewer_release(struct ggn_viewer *v);
+
+/* Turns to a block; what was known of the one before is forgotten. */
+void ggn_viewer_turn(struct ggn_viewer *v, const struct ggn_chain *chain);
+/* viewer: a struct ggn_viewer. Logit of the window of these levels, noisiest first. */
+double ggn_viewer_logit(void *viewer, const int *levels);
+/* One denoised level, borrowed until the next call. */
+const uint16_t *ggn_viewer_denoise(struct ggn_viewer *v, int level);
+
+#endif

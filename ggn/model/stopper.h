@@ -1,0 +1,72 @@
+/*
+ * When a block stops: the one rule, for the criterion in a renderer and for everything that replays recorded levels.
+ *
+ * Whoever watches a block asks about its sample counts as they come. If the image belongs into the window, it is added to the
+ * window and judged by what it shows, which is computed only as far as the rule needs it:
+ *
+ * - The first image and those after it, until a window is full, are too early for the network.
+ * - The gate: while the window's noise exceeds policy.gate_noise, the block is plainly noisy, passes are forgotten, and the next
+ *   image is wanted where the first window can begin that might end below it.
+ * - Then the network: p = ggn_policy_p(logit). `passes` checks in a row with p below the threshold stop the block, unless the
+ *   tail guard (ggn_policy_tail_holds) holds it back, which leaves the passes counted so far.
+ *
+ * Nothing here looks at pixels or keeps more than the plain values below. Pure functions, any thread.
+ */
+#ifndef GGN_MODEL_STOPPER_H
+#define GGN_MODEL_STOPPER_H
+
+#include <stdint.h>
+
+#include "model/policy.h"
+
+enum { GGN_WINDOW_MAX = 16 };
+
+struct ggn_stop_rule {
+    struct ggn_policy policy; /* gate_noise 0: no gate; tail999, gini 0: no guard */
+    int window;               /* images per window, S; 2 .. GGN_WINDOW_MAX */
+    uint64_t spp_max;         /* nobody asks beyond; 0: no limit */
+};
+
+struct ggn_verdict {
+    uint32_t stop;
+    uint32_t too_early;
+    uint64_t next_spp;    /* samples at which to ask again, where it goes on */
+    double p;             /* probability that the noise is still seen; NaN: the network was not asked */
+    double predicted_spp; /* where it expects to stop; NaN: not known */
+    double noise;         /* of the window, see ggn_window_noise; NaN: one image only */
+};
+
+/* One block. All zero: never asked. */
+struct ggn_stopper {
+    uint64_t asked_spp;
+    uint64_t spp[GGN_WINDOW_MAX]; /* of the window's images, oldest first */
+    uint32_t used;                /* images in the window */
+    uint32_t regular;             /* of those the newest that are spaced as the network learned them */
+    uint32_t passes;              /* checks in a row below the threshold */
+    uint32_t leapt;               /* the last verdict asked for a larger step than the network learned */
+    struct ggn_verdict verdict;   /* the last one */
+};
+
+/* What the window shows whose newest image is the one asked about. */
+struct ggn_evidence {
+    void *data;
+    double (*noise)(void *data); /* ggn_window_noise of oldest and newest image */
+    double (*logit)(void *data); /* the network's, of a full window */
+    int (*tail)(void *data, double *tail999, double *gini); /* of the newest image's half buffer; 0: not known */
+};
+
+/* The block now has `spp` samples. 1: its image is the newest of the window (the oldest leaves when there are more than
+ * rule->window), to be judged next. 0: the verdict stands: the same question again, before the first level, or so soon after
+ * the newest image that the two would hardly differ. */
+int ggn_stopper_ask(const struct ggn_stop_rule *rule, struct ggn_stopper *s, uint64_t spp);
+/* Sets s->verdict on the image that ggn_stopper_ask has just accepted. */
+void ggn_stopper_judge(const struct ggn_stop_rule *rule, struct ggn_stopper *s, const struct ggn_evidence *evidence);
+
+/* The end of the rule, also of those criteria that have a score and a cut and no network: counts a check. 1: so many checks in a
+ * row were below; the block stops unless a guard holds it back. */
+int ggn_stopper_pass(struct ggn_stopper *s, int passes, int below);
+
+/* Whether a stopper from a file can be that of this rule. */
+int ggn_stopper_valid(const struct ggn_stop_rule *rule, const struct ggn_stopper *s);
+
+#endif
