@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "integ/integrator.h"
+#include "scene/settings.h"
 #include "render/film.h"
 #include "render/output.h"
 #include "pbrt/xform.h"

@@ -3,6 +3,7 @@
 #include <stdio.h>
 
 #include "base/clock.h"
+#include "integ/integrator.h"
 
 enum { ROUNDS = 5, GRID = 32 };
 
@@ -39,17 +40,16 @@ static void print_times(const struct pt_scene *scene, const struct pt_scene_defa
 void pt_explain(const struct pt_scene *scene, const struct pt_scene_defaults *defaults, const struct pt_integrator *integrator,
                 const char *scene_path)
 {
-    pt_effects effects = pt_scene_effects(scene), covers = 0;
+    pt_effects effects = scene->effects, covers = 0;
     const char *name = "";
-    struct pt_scene_stats stats = {0};
+    const struct pt_scene_stats *stats = &scene->stats;
     pt_kernel *kernel = pt_kernel_select(effects, &covers, &name);
-    pt_scene_get_stats(scene, &stats);
     printf("effects of %s:\n  %-13s %-3s %-6s  %-32s  %s\n", scene_path, "effect", "on", "kernel", "first asked for by",
            "costs, where it is compiled in");
     for (int i = 0; i < PT_FX_COUNT; i++) {
-        const struct pt_effect_reason *why = pt_scene_effect_reason(scene, i);
+        const struct pt_effect_reason *why = &scene->effect_reasons[i];
         char where[300] = "-";
-        if (why && why->line > 0)
+        if (why->line > 0)
             snprintf(where, sizeof where, "%s:%d", why->file, why->line);
         else if (effects >> i & 1)
             snprintf(where, sizeof where, "the scene as a whole, or --effects");
@@ -59,5 +59,5 @@ void pt_explain(const struct pt_scene *scene, const struct pt_scene_defaults *de
     printf("kernel: %s\n", name);
     print_times(scene, defaults, integrator, kernel);
     printf("scene: %lld triangles, %lld quadrics, %lld instances, %lld lights, %lld materials, %lld textures, %.1f MB\n",
-           stats.triangles, stats.quadrics, stats.instances, stats.lights, stats.materials, stats.textures, (double)stats.bytes * 1e-6);
+           stats->triangles, stats->quadrics, stats->instances, stats->lights, stats->materials, stats->textures, (double)stats->bytes * 1e-6);
 }

@@ -2,7 +2,8 @@
 #ifndef PT_EXPLAIN_H
 #define PT_EXPLAIN_H
 
-#include "pbrt/load.h"
+#include "pbrt/load_options.h"
+#include "scene/scene.h"
 
 /* Prints the table to stdout. Times a few thousand paths (about a second) with the chosen kernel and with the general one;
  * scene_path is for the heading. Not reentrant with other output to stdout. */

@@ -12,12 +12,13 @@
 #include "base/files.h"
 #include "cli.h"
 #include "explain.h"
+#include "pbrt/load.h"
 #include "render/checkpoint.h"
+#include "render/host_find.h"
 #include "render/output.h"
 #include "render/progress.h"
 #include "render/render.h"
 #include "render/sequence.h"
-#include "pbrt/load.h"
 
 /* The criterion when none is named. */
 static const char DEFAULT_CRITERION[] = "ggn";
@@ -80,7 +81,7 @@ static int load_scene(struct session *s, struct base_err *err)
     int rc = pt_scene_load(s->cli.scene, &options, &s->scene, &s->defaults, err);
     if (rc)
         return rc;
-    s->kernel = pt_kernel_select(pt_scene_effects(s->scene), NULL, &s->kernel_name);
+    s->kernel = pt_kernel_select(s->scene->effects, NULL, &s->kernel_name);
     return 0;
 }
 
@@ -133,7 +134,9 @@ static int open_criterion(struct session *s, struct base_err *err)
     const char *spec = cli->criterion ? cli->criterion : DEFAULT_CRITERION;
     if (!cli->criterion && cli->spp > 0)
         return 0;
-    return pt_criterion_create(spec, cli->params, cli->param_count, s->threads, note, s, &s->criterion, err);
+    const struct lull_criterion *table;
+    int rc = pt_criterion_find(spec, note, s, &table, err);
+    return rc ? rc : pt_criterion_create(table, cli->params, cli->param_count, s->threads, note, s, &s->criterion, err);
 }
 
 /* An output that cannot be written should not be found out after hours: its folder is looked at now. */
@@ -207,7 +210,7 @@ static int describe_settings(struct session *s, const struct pt_render_config *c
     used += (size_t)snprintf(s->settings + used, room - used, "fov=%.17g\nlook-at=", view->fov_deg);
     for (int k = 0; view->has_look_at && k < 9; k++)
         used += (size_t)snprintf(s->settings + used, room - used, "%.17g ", view->look_at_world[k]);
-    const struct lull_criterion *t = s->criterion ? pt_criterion_table(s->criterion) : NULL;
+    const struct lull_criterion *t = s->criterion ? s->criterion->table : NULL;
     used += (size_t)snprintf(s->settings + used, room - used, "\ncriterion=%s %s\n", t ? t->id : "none", t ? t->version : "");
     for (uint32_t k = 0; k < s->cli.param_count && used < room; k++)
         used += (size_t)snprintf(s->settings + used, room - used, "param=%s=%s\n", s->cli.params[k].key, s->cli.params[k].value);
@@ -243,12 +246,10 @@ static int interrupted(void *data)
 static int write_outputs(struct session *s, int was_interrupted, struct base_err *err)
 {
     const struct pt_cli *cli = &s->cli;
-    struct pt_scene_stats stats = {0};
-    pt_scene_get_stats(s->scene, &stats);
     struct pt_output_info info = {.scene = cli->scene, .params = cli->params, .param_count = cli->param_count,
-                                  .effects = pt_scene_effects(s->scene), .kernel = s->kernel_name,
+                                  .effects = s->scene->effects, .kernel = s->kernel_name,
                                   .threads = base_threads_count(s->threads), .reproducible = cli->reproducible, .aov = cli->aov,
-                                  .scene_bytes = stats.bytes, .interrupted = was_interrupted};
+                                  .scene_bytes = s->scene->stats.bytes, .interrupted = was_interrupted};
     struct base_err e = {0};
     if (cli->output && pt_output_exr(cli->output, s->render, &info, &e) != 0)
         *err = e;

@@ -9,30 +9,11 @@
 
 #include <stdint.h>
 
-#include "scene/vec.h"
 #include "scene/effects.h"
+#include "scene/settings.h"
+#include "scene/vec.h"
 
 struct pt_scene;
-
-enum pt_sampler_kind { PT_SAMPLER_INDEPENDENT, PT_SAMPLER_SOBOL };
-enum pt_strategy {
-    PT_STRATEGY_MIS,      /* next-event estimation and BSDF sampling, balance or power heuristic */
-    PT_STRATEGY_BSDF_ONLY /* brute force: emission is met by BSDF sampling only; the oracle of tests */
-};
-enum pt_filter_kind { PT_FILTER_BOX, PT_FILTER_TRIANGLE, PT_FILTER_GAUSSIAN };
-
-struct pt_integrator {
-    int32_t max_depth;      /* most surface/medium bounces; < 0 = unlimited */
-    int32_t rr_depth;       /* Russian roulette from this bounce on */
-    int32_t sampler;        /* enum pt_sampler_kind */
-    int32_t strategy;       /* enum pt_strategy */
-    int32_t filter;         /* enum pt_filter_kind: sampled by importance, so no sample touches a neighbouring pixel */
-    float filter_x, filter_y; /* radii in pixels; 0.5 = box of one pixel */
-    float filter_sigma;     /* Gaussian only, pixels */
-    float max_component;    /* radiance clamp of one sample (pbrt maxcomponentvalue); INFINITY = none */
-    uint32_t seed;
-    int32_t want_aux;       /* fill albedo, normal_world, depth */
-};
 
 struct pt_path_result {
     pt_vec3 radiance;      /* linear Rec.709 RGB after the film's exposure scale; may be non-finite: the film decides */

@@ -362,7 +362,7 @@ PT_KERNEL_INLINE void pt_path_sample(pt_effects fx, const struct pt_scene *scene
                                      uint32_t y, uint32_t sample, struct pt_trace *trace, struct pt_path_result *out)
 {
     struct pt_path path = {.scene = scene, .settings = settings, .trace = trace, .throughput = {1.0f, 1.0f, 1.0f}, .eta_scale = 1.0f};
-    path.sampler = pt_sampler_make(settings->sampler, settings->seed, x, y, sample);
+    path.sampler = pt_sampler_make(settings->sampler == PT_SAMPLER_SOBOL, settings->seed, x, y, sample);
     *out = (struct pt_path_result){.depth = INFINITY};
     pt_path_start(fx, &path, x, y);
     if (trace)

@@ -2,8 +2,6 @@
 
 #include <stdio.h>
 
-#include "integ/path.h"
-
 static const char *const bsdf_names[] = {"diffuse", "conductor", "dielectric", "thin dielectric", "diffuse transmission",
                                          "coated diffuse", "coated conductor"};
 
@@ -56,13 +54,4 @@ void pt_trace_end(struct pt_trace *trace, pt_vec3 radiance)
     char text[256];
     snprintf(text, sizeof text, "end: pixel value (%g, %g, %g)", (double)radiance.x, (double)radiance.y, (double)radiance.z);
     trace->line(trace->data, text);
-}
-
-int pt_kernel_trace(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y, uint32_t sample,
-                    void (*line)(void *data, const char *text), void *data)
-{
-    struct pt_trace trace = {line, data, 0};
-    struct pt_path_result result;
-    pt_path_sample(PT_FX_ALL, scene, settings, x, y, sample, &trace, &result);
-    return 0;
 }

@@ -8,7 +8,7 @@
 #include "base/clock.h"
 #include "geom/accel.h"
 #include "shade/camera.h"
-#include "shade/light.h"
+#include "shade/light_build.h"
 #include "shade/material.h"
 #include "shade/medium.h"
 

@@ -2,18 +2,19 @@
  * From descriptions (a directive's kind, parameters, transform and graphics state) to the renderable, piece by piece while
  * the text is read: nothing large is kept twice.
  *
- * Everything is private to pathtracer/scene. A pt_builder fails through its diag; functions return its code or go on with
+ * Everything is private to pathtracer/pbrt. A pt_builder fails through its diag; functions return its code or go on with
  * defaults until the directive ends. Not thread-safe.
  */
 #ifndef PT_PBRT_BUILD_H
 #define PT_PBRT_BUILD_H
 
 #include "pbrt/diag.h"
+#include "pbrt/load_options.h"
 #include "pbrt/names.h"
 #include "pbrt/params.h"
-#include "scene/scene.h"
 #include "pbrt/source.h"
 #include "pbrt/xform.h"
+#include "scene/scene.h"
 
 /* Growing array; items owned. */
 struct pt_list {

@@ -8,7 +8,6 @@
 #include "base/clock.h"
 #include "geom/accel.h"
 #include "pbrt/build.h"
-#include "pbrt/load_source.h"
 #include "pbrt/pbrt.h"
 
 static const struct pt_load_options no_options;
@@ -80,19 +79,4 @@ int pt_scene_load(const char *path, const struct pt_load_options *options, struc
                   struct pt_scene_defaults *defaults, struct base_err *err)
 {
     return pt_scene_load_source(path, &pt_source_files, options, out, defaults, err);
-}
-
-pt_effects pt_scene_effects(const struct pt_scene *scene)
-{
-    return scene->effects;
-}
-
-const struct pt_effect_reason *pt_scene_effect_reason(const struct pt_scene *scene, int i)
-{
-    return &scene->effect_reasons[i];
-}
-
-void pt_scene_get_stats(const struct pt_scene *scene, struct pt_scene_stats *stats)
-{
-    *stats = scene->stats;
 }

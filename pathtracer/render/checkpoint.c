@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/files.h"
+#include "render/host_state.h"
 
 /*
  * magic[8], settings bytes, settings; film bytes, film arrays; blocks, block records; totals; dropped samples; criterion

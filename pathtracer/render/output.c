@@ -82,7 +82,7 @@ static void criterion_text(const struct pt_render *r, const struct pt_output_inf
         snprintf(text, room, "none");
         return;
     }
-    const struct lull_criterion *t = pt_criterion_table(r->criterion);
+    const struct lull_criterion *t = r->criterion->table;
     size_t used = (size_t)snprintf(text, room, "%s %s", t->id, t->version);
     for (uint32_t i = 0; i < info->param_count && used < room; i++)
         used += (size_t)snprintf(text + used, room - used, " %s=%s", info->params[i].key, info->params[i].value);

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/clock.h"
+#include "render/host_planes.h"
 
 /* Length of a slice: short enough for a live line, an interrupt and a time budget, long enough that its barrier costs
  * nothing. */
@@ -93,7 +94,7 @@ static uint64_t first_check(const struct pt_render *r)
     uint64_t spp = r->config.spp_min;
     if (r->config.uniform)
         return r->config.spp_max;
-    uint64_t useful = pt_criterion_requirements(r->criterion)->first_spp;
+    uint64_t useful = r->criterion->needs.first_spp;
     if (useful > spp)
         spp = useful;
     return spp < r->config.spp_max ? spp : r->config.spp_max;
@@ -110,7 +111,7 @@ int pt_render_create(const struct pt_render_config *config, const struct pt_scen
     r->kernel = kernel;
     r->threads = threads;
     r->criterion = criterion;
-    uint32_t planes = config->planes | (criterion ? pt_criterion_film_planes(criterion) : 0);
+    uint32_t planes = config->planes | (criterion ? pt_host_film_planes(&criterion->needs) : 0);
     r->config.integrator.want_aux = (planes & PT_FILM_AUX) != 0;
     /* Without a judge nobody needs whole blocks. */
     int clip = !criterion;
@@ -318,7 +319,7 @@ static void check(struct pt_render *r, const struct pt_render_hooks *hooks)
     struct pt_render_work *w = r->work;
     static const struct lull_decision keep_on = {.action = LULL_CONTINUE, .p_noisy = NAN, .predicted_spp = NAN, .error = NAN};
     int reopens = r->criterion && !r->config.uniform &&
-                  (pt_criterion_table(r->criterion)->capabilities & LULL_CAP_REOPENS);
+                  (r->criterion->table->capabilities & LULL_CAP_REOPENS);
     int skip = !r->criterion || too_expensive(r);
     uint32_t n = 0, active = 0;
     for (uint32_t i = 0; i < r->blocks.count; i++) {

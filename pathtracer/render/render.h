@@ -15,7 +15,7 @@
 #include "base/threads.h"
 #include "integ/integrator.h"
 #include "render/blocks.h"
-#include "render/criterion.h"
+#include "render/host.h"
 #include "render/film.h"
 
 struct pt_render_config {

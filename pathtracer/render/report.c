@@ -23,7 +23,7 @@ static void add_criterion(cJSON *root, const struct pt_render *r, const struct p
         base_json_text(root, "criterion", NULL, failed);
         return;
     }
-    const struct lull_criterion *t = pt_criterion_table(r->criterion);
+    const struct lull_criterion *t = r->criterion->table;
     cJSON *c = base_json_object(root, "criterion", failed);
     base_json_text(c, "id", t->id, failed);
     base_json_text(c, "version", t->version, failed);

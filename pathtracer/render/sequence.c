@@ -331,7 +331,7 @@ static int put_level(struct recorder *r, struct pt_lseq *file, const struct pt_r
     add_statistic(statistics, &n, "seconds", b->thread_s);
     if (render->criterion) {
         char name[64];
-        snprintf(name, sizeof name, "%.50s.error", pt_criterion_table(render->criterion)->id);
+        snprintf(name, sizeof name, "%.50s.error", render->criterion->table->id);
         add_statistic(statistics, &n, name, b->error);
     }
     struct pt_lseq_record record = {.kind = kind, .form = full ? PT_LSEQ_FULL : PT_LSEQ_COMPACT, .spp = (uint32_t)b->spp,

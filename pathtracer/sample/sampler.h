@@ -15,7 +15,6 @@
 #include <stdint.h>
 
 #include "sample/rng.h"
-#include "integ/integrator.h"
 
 enum {
     PT_DIMS_PER_VERTEX = 16,
@@ -77,11 +76,12 @@ static inline uint32_t pt_sobol_second(uint32_t first)
     return first;
 }
 
-static inline struct pt_sampler pt_sampler_make(int32_t kind, uint32_t seed, uint32_t x, uint32_t y, uint32_t sample)
+/* sobol: 0 = independent. */
+static inline struct pt_sampler pt_sampler_make(int sobol, uint32_t seed, uint32_t x, uint32_t y, uint32_t sample)
 {
     uint64_t pixel_key = pt_hash64(((uint64_t)y << 32 | x) + 0x9e3779b97f4a7c15u * ((uint64_t)seed + 1));
     uint32_t path_key = (uint32_t)(pt_hash64(pixel_key + 0xd1342543de82ef95u * ((uint64_t)sample + 1)) >> 16);
-    return (struct pt_sampler){pt_reverse_bits(sample), kind == PT_SAMPLER_SOBOL, 0, (uint32_t)(pixel_key >> 32), path_key};
+    return (struct pt_sampler){pt_reverse_bits(sample), sobol != 0, 0, (uint32_t)(pixel_key >> 32), path_key};
 }
 
 /* Moves to block `block` (0 = camera, k + 1 = vertex k). */

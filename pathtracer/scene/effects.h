@@ -9,35 +9,46 @@
 
 typedef uint32_t pt_effects;
 
-enum {
-    PT_FX_TEXTURE = 1 << 0,       /* any texture that is not constant */
-    PT_FX_ALPHA = 1 << 1,         /* alpha masks: hits that may be passed through */
-    PT_FX_BUMP = 1 << 2,          /* bump (displacement) and normal maps */
-    PT_FX_SPECULAR = 1 << 3,      /* delta reflection */
-    PT_FX_GLOSSY = 1 << 4,        /* rough (microfacet) reflection */
-    PT_FX_TRANSMISSION = 1 << 5,  /* dielectric, thin dielectric, diffuse transmission */
-    PT_FX_COATED = 1 << 6,        /* layered coatings */
-    PT_FX_MIX = 1 << 7,           /* mix materials */
-    PT_FX_ENVIRONMENT = 1 << 8,   /* infinite lights, constant or image */
-    PT_FX_DELTA_LIGHT = 1 << 9,   /* point, spot, distant lights */
-    PT_FX_MANY_LIGHTS = 1 << 10,  /* more than one light: selection needed */
-    PT_FX_QUADRIC = 1 << 11,      /* spheres, disks, cylinders kept analytic */
-    PT_FX_ABSORPTION = 1 << 12,   /* participating media without scattering */
-    PT_FX_SCATTERING = 1 << 13,   /* media that scatter */
-    PT_FX_GRID_MEDIUM = 1 << 14,  /* media of varying density */
-    PT_FX_DEFOCUS = 1 << 15,      /* depth of field */
-    PT_FX_MOTION = 1 << 16,       /* motion blur */
-    PT_FX_INSTANCES = 1 << 17,    /* object instances */
-    PT_FX_INTERFACE = 1 << 18,    /* surfaces that only bound media */
-    PT_FX_COUNT = 19,
-    PT_FX_ALL = (1 << PT_FX_COUNT) - 1
-};
+/* X(ID, name, what it costs a kernel that has it): the name and the cost are for --explain. */
+#define PT_EFFECTS(X) \
+    X(TEXTURE, "texture", "a lookup per textured input at each hit") /* any texture that is not constant */ \
+    /* alpha masks: hits that may be passed through */ \
+    X(ALPHA, "alpha", "the ray goes on behind a hit that is let through; shadow rays become closest-hit queries") \
+    X(BUMP, "bump", "two or three more lookups at each hit, a new frame") /* bump (displacement) and normal maps */ \
+    X(SPECULAR, "specular", "a test at each hit: no light sampling, no density there") /* delta reflection */ \
+    X(GLOSSY, "glossy", "a microfacet normal, its density for each light sample") /* rough (microfacet) reflection */ \
+    /* dielectric, thin dielectric, diffuse transmission */ \
+    X(TRANSMISSION, "transmission", "a Fresnel choice, refraction; more bounces until a path ends") \
+    X(COATED, "coated", "two lobes or a walk through the layer, also for each light sample") /* layered coatings */ \
+    X(MIX, "mix", "a lookup and a random choice at each hit") /* mix materials */ \
+    /* infinite lights, constant or image */ \
+    X(ENVIRONMENT, "environment", "a table search per light sample, a lookup per escaping ray") \
+    X(DELTA_LIGHT, "delta-light", "no density to weigh by; cheap") /* point, spot, distant lights */ \
+    /* more than one light: selection needed */ \
+    X(MANY_LIGHTS, "many-lights", "a choice by power per light sample, its probability per emitter hit") \
+    /* spheres, disks, cylinders kept analytic */ \
+    X(QUADRIC, "quadric", "double-precision intersection, in a callback of the ray query") \
+    /* participating media without scattering */ \
+    X(ABSORPTION, "absorption", "an exponential per segment, a stack of media") \
+    /* media that scatter */ \
+    X(SCATTERING, "scattering", "a distance sample per segment, a light sample per collision; many more bounces") \
+    X(GRID_MEDIUM, "grid-medium", "tracking by many small steps, three lookups each") /* media of varying density */ \
+    X(DEFOCUS, "defocus", "two random numbers per camera ray") /* depth of field */ \
+    X(MOTION, "motion", "one random number per path, interpolation in each ray query") /* motion blur */ \
+    X(INSTANCES, "instances", "a change of space per ray and hit") /* object instances */ \
+    X(INTERFACE, "interface", "shadow rays cross surfaces one by one") /* surfaces that only bound media */
+
+/* PT_FX_ID is a bit, PT_FX_INDEX_ID its number. */
+#define PT_FX_INDEX(id, name, cost) PT_FX_INDEX_##id,
+enum { PT_EFFECTS(PT_FX_INDEX) PT_FX_COUNT };
+#define PT_FX_BIT(id, name, cost) PT_FX_##id = 1 << PT_FX_INDEX_##id,
+enum { PT_EFFECTS(PT_FX_BIT) PT_FX_ALL = (1 << PT_FX_COUNT) - 1 };
 
 #define PT_FX_MEDIA (PT_FX_ABSORPTION | PT_FX_SCATTERING | PT_FX_GRID_MEDIUM)
 
 /* Short name ("texture", "alpha", …) of bit i in [0, PT_FX_COUNT). Static text. */
 const char *pt_effects_name(int i);
-/* What the effect costs a kernel that has it, in words. Static text. */
+/* In words. Static text. */
 const char *pt_effects_cost(int i);
 
 #endif

@@ -9,7 +9,7 @@
  * Ownership. All arrays live in the scene's arena unless a field says otherwise.
  *
  * How a scene is made: zero the struct, fill camera … media, radiance_scale and effects, then call in this order
- * pt_camera_init (shade/camera.h), pt_accel_build (geom/accel.h), pt_lights_build (shade/light.h).
+ * pt_camera_init (shade/camera.h), pt_accel_build (geom/accel.h), pt_lights_build (shade/light_build.h).
  * pt_accel_release, then pt_arena_release give everything back.
  */
 #ifndef PT_SCENE_SCENE_H
@@ -19,35 +19,9 @@
 #include <stdint.h>
 
 #include "scene/arena.h"
-#include "scene/vec.h"
 #include "scene/effects.h"
-#include "pbrt/load.h"
-
-/* Affine transform: three rows of four, applied to column vectors (x, y, z, 1). */
-struct pt_mat34 {
-    float m[12];
-};
-static inline pt_vec3 pt_mat34_point(const struct pt_mat34 *t, pt_vec3 p)
-{
-    const float *m = t->m;
-    return v3(m[0] * p.x + m[1] * p.y + m[2] * p.z + m[3], m[4] * p.x + m[5] * p.y + m[6] * p.z + m[7],
-              m[8] * p.x + m[9] * p.y + m[10] * p.z + m[11]);
-}
-static inline pt_vec3 pt_mat34_vector(const struct pt_mat34 *t, pt_vec3 v)
-{
-    const float *m = t->m;
-    return v3(m[0] * v.x + m[1] * v.y + m[2] * v.z, m[4] * v.x + m[5] * v.y + m[6] * v.z,
-              m[8] * v.x + m[9] * v.y + m[10] * v.z);
-}
-/* Normal by the inverse transform `inv` (its transpose is applied); not normalised. */
-static inline pt_vec3 pt_mat34_normal(const struct pt_mat34 *inv, pt_vec3 n)
-{
-    const float *m = inv->m;
-    return v3(m[0] * n.x + m[4] * n.y + m[8] * n.z, m[1] * n.x + m[5] * n.y + m[9] * n.z,
-              m[2] * n.x + m[6] * n.y + m[10] * n.z);
-}
-/* Inverse in double; 0 and *inv untouched when singular, else 1. In geom/mat34.c. */
-int pt_mat34_invert(const struct pt_mat34 *t, struct pt_mat34 *inv);
+#include "scene/mat34.h"
+#include "scene/vec.h"
 
 /* --- camera -------------------------------------------------------------------------------------------------------------- */
 
@@ -256,6 +230,19 @@ struct pt_medium {
 
 /* --- the scene ----------------------------------------------------------------------------------------------------------- */
 
+/* Why an effect is in the scene's set, for --explain. */
+struct pt_effect_reason {
+    int on;           /* in the set */
+    int line;         /* first scene line that asks for it, 0 if forced or none */
+    char file[256];
+};
+
+struct pt_scene_stats {
+    long long triangles, quadrics, instances, lights, materials, textures;
+    long long bytes;          /* memory of the scene, acceleration structure included */
+    double parse_s, build_s, accel_s, texture_s;
+};
+
 struct pt_accel;
 
 struct pt_scene {
@@ -287,7 +274,7 @@ struct pt_scene {
     struct pt_env_distribution *env_distributions; /* [light_count] or NULL; used for ENV_IMAGE */
 
     struct pt_arena arena;
-    struct pt_effect_reason effect_reasons[PT_FX_COUNT]; /* for --explain */
+    struct pt_effect_reason effect_reasons[PT_FX_COUNT];
     struct pt_scene_stats stats;
 };
 

@@ -6,8 +6,8 @@
 #define PT_SHADE_CAMERA_H
 
 #include "geom/accel.h"
-#include "integ/integrator.h"
 #include "scene/scene.h"
+#include "scene/settings.h"
 
 /* Derives the camera's ray constants from its kind, size, fov and screen window. */
 void pt_camera_init(struct pt_camera *camera);

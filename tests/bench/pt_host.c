@@ -83,7 +83,7 @@ int main(int argc, char **argv)
         return 2;
     }
     b.integrator = d.integrator;
-    b.kernel = pt_kernel_select(pt_scene_effects(b.scene), NULL, NULL);
+    b.kernel = pt_kernel_select(b.scene->effects, NULL, NULL);
     b.width = d.width;
     b.y0 = d.height / 2;
     if (pt_film_init(&half, 0, 0, d.width, d.height, PT_FILM_HALF, &err) != 0 ||

@@ -14,7 +14,7 @@
 
 #include <cmocka.h>
 
-#include "scene/scene.h"
+#include "pbrt/load.h"
 
 static int is_scene(const struct dirent *entry)
 {
@@ -48,7 +48,7 @@ static int load_folder(const char *folder, pt_effects *effects, int *count)
             bad += !scene;
             ++*count;
             if (scene)
-                *effects |= pt_scene_effects(scene);
+                *effects |= scene->effects;
             pt_scene_destroy(scene);
         }
         free(entries[i]);

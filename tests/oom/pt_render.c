@@ -45,7 +45,7 @@ static const char *in_folder(const char *name)
 static int open_render(struct pt_render **render, struct pt_criterion **criterion, struct base_err *err)
 {
     struct pt_render_config config = pt_fake_config();
-    int rc = pt_criterion_create_table(pt_fake_criterion(), NULL, 0, pool, NULL, NULL, criterion, err);
+    int rc = pt_criterion_create(pt_fake_criterion(), NULL, 0, pool, NULL, NULL, criterion, err);
     config.planes = PT_FILM_ALL;
     return !rc ? pt_render_create(&config, NULL, pt_fake_nan, pool, *criterion, render, err) : rc;
 }

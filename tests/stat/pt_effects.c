@@ -31,7 +31,7 @@ static void check_scene(const char *path)
     if (pt_scene_load(path, &options, &scene, &defaults, &err) != 0)
         fail_msg("%s", err.text);
     const char *name;
-    pt_effects effects = pt_scene_effects(scene);
+    pt_effects effects = scene->effects;
     pt_kernel *kernel = pt_kernel_select(effects, NULL, &name);
     unsigned long long media = pt_medium_queries, textures = pt_texture_lookups;
     for (int32_t sampler = 0; sampler < 2; sampler++) {

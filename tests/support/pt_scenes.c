@@ -6,7 +6,7 @@
 
 #include "geom/accel.h"
 #include "shade/camera.h"
-#include "shade/light.h"
+#include "shade/light_build.h"
 #include "shade/material.h"
 #include "shade/medium.h"
 

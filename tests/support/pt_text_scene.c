@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-#include "pbrt/load_source.h"
+#include "pbrt/load.h"
 
 static void count_warning(void *data, const char *line)
 {

@@ -2,7 +2,7 @@
 #ifndef PT_TEXT_SCENE_H
 #define PT_TEXT_SCENE_H
 
-#include "scene/scene.h"
+#include "pbrt/load.h"
 
 /* Loads scene text as the file "t.pbrt"; fails the test when that fails. Warnings go to *warnings (may be NULL). */
 struct pt_scene *text_scene(const char *text, struct pt_scene_defaults *defaults, int *warnings);

@@ -41,8 +41,8 @@ static void film_and_camera(void **state)
     near(s->camera.screen[3], 1, 1e-6);
     near(s->camera.to_render[0].m[3], 0, 0); /* the camera is the origin */
     near(s->camera.to_render[0].m[10], 1, 1e-6);
-    assert_true(pt_scene_effects(s) == PT_FX_DEFOCUS);
-    assert_int_equal(pt_scene_effect_reason(s, 15)->line, 4);
+    assert_true(s->effects == PT_FX_DEFOCUS);
+    assert_int_equal(s->effect_reasons[15].line, 4);
     pt_scene_destroy(s);
     s = text_scene("Film \"image\" \"float scale\" 4 PixelFilter \"triangle\" \"float xwidth\" 1 WorldBegin", &d, NULL);
     near(s->radiance_scale, 4, 0);
@@ -117,7 +117,7 @@ static void lights(void **state)
     near(v3_luminance(s->lights[3].emission), 10, 0.01); /* v4: a black body of any heat has luminance 1 before its scale */
     near(s->lights[4].emission.x, 2, 1e-5);
     near(s->lights[5].emission.x, 10 / (4 * 3.14159265 * 3.14159265), 1e-5); /* Φ / (π area) */
-    assert_true(pt_scene_effects(s) == (PT_FX_DELTA_LIGHT | PT_FX_ENVIRONMENT | PT_FX_MANY_LIGHTS | PT_FX_QUADRIC));
+    assert_true(s->effects == (PT_FX_DELTA_LIGHT | PT_FX_ENVIRONMENT | PT_FX_MANY_LIGHTS | PT_FX_QUADRIC));
     pt_scene_destroy(s);
     /* v3: [T scale], absolute */
     s = text_scene("Film \"image\" WorldBegin LightSource \"infinite\" \"blackbody L\" [ 5000 3 ] \"rgb scale\" [ 2 2 2 ]", NULL, NULL);
@@ -154,7 +154,7 @@ static void materials_of_both_versions(void **state)
     assert_true(m[7].remap_roughness && m[7].kind == PT_MATERIAL_COATED_DIFFUSE);
     assert_true(m[8].eta_rgb.value.z > 1.2f && m[9].kind == PT_MATERIAL_INTERFACE);
     /* only materials in use ask for effects: no mix, no transmission, no mirror */
-    pt_effects fx = pt_scene_effects(s);
+    pt_effects fx = s->effects;
     assert_true((fx & PT_FX_COATED) && (fx & PT_FX_GLOSSY) && (fx & PT_FX_INTERFACE) && (fx & PT_FX_SPECULAR));
     assert_false(fx & (PT_FX_MIX | PT_FX_TRANSMISSION | PT_FX_MEDIA));
     pt_scene_destroy(s);
@@ -176,7 +176,7 @@ static void textures(void **state)
     const struct pt_texture *t = &s->textures[s->materials[1].reflectance.texture];
     assert_true(t->kind == PT_TEXTURE_CHECKERBOARD && t->su == 8 && t->in[0].texture == -1 && t->in[0].value.x == 0.1f);
     assert_true(s->shapes[1].has_alpha && !s->shapes[0].has_alpha);
-    assert_int_equal(pt_scene_effects(s), PT_FX_TEXTURE | PT_FX_ALPHA | PT_FX_QUADRIC);
+    assert_int_equal(s->effects, PT_FX_TEXTURE | PT_FX_ALPHA | PT_FX_QUADRIC);
     pt_scene_destroy(s);
 }
 
@@ -198,7 +198,7 @@ static void media(void **state)
     near(corner.x, 1, 1e-6);
     near(corner.y, 0, 1e-6);
     near(corner.z, 0.5, 1e-6);
-    pt_effects fx = pt_scene_effects(s);
+    pt_effects fx = s->effects;
     assert_true((fx & PT_FX_ABSORPTION) && (fx & PT_FX_SCATTERING) && (fx & PT_FX_GRID_MEDIUM) && (fx & PT_FX_INTERFACE));
     pt_scene_destroy(s);
 }
@@ -215,7 +215,7 @@ static void instances_and_motion(void **state)
     assert_true(!s->instances[0].animated && s->instances[1].animated && s->instances[2].animated && s->instances[2].object == 1);
     near(s->instances[0].to_render[0].m[7], 5, 0);
     near(s->instances[1].to_render[1].m[7], 7, 0);
-    assert_true((pt_scene_effects(s) & (PT_FX_MOTION | PT_FX_INSTANCES)) == (PT_FX_MOTION | PT_FX_INSTANCES));
+    assert_true((s->effects & (PT_FX_MOTION | PT_FX_INSTANCES)) == (PT_FX_MOTION | PT_FX_INSTANCES));
     pt_scene_destroy(s);
 }
 

@@ -229,7 +229,7 @@ static void resumed_render_is_identical(void **state)
         struct result r = {.pool = base_threads_create(2, &err)};
         struct lull_pair pair = {"at", "32"};
         for (int part = 0; part < 2; part++) {
-            assert_int_equal(pt_criterion_create_table(pt_fake_criterion(), &pair, 1, r.pool, NULL, NULL, &r.criterion, &err), 0);
+            assert_int_equal(pt_criterion_create(pt_fake_criterion(), &pair, 1, r.pool, NULL, NULL, &r.criterion, &err), 0);
             assert_int_equal(pt_render_create(&config, NULL, pt_fake_nan, r.pool, r.criterion, &r.render, &err), 0);
             if (part == 1)
                 assert_int_equal(pt_checkpoint_load(path, r.render, "a=1\nb=2\n", &err), 0);

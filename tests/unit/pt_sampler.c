@@ -29,7 +29,7 @@ static void pairs_are_nets(void **state)
             for (int split = 0; split <= M; split++) {
                 unsigned char seen[N] = {0};
                 for (uint32_t i = 0; i < N; i++) {
-                    struct pt_sampler s = pt_sampler_make(PT_SAMPLER_SOBOL, 7, pixel, 3, i);
+                    struct pt_sampler s = pt_sampler_make(1, 7, pixel, 3, i);
                     pt_sampler_block(&s, 2);
                     struct pt_sample2 p = pt_sampler_2d(&s, dim);
                     assert_true(p.x >= 0.0f && p.x < 1.0f && p.y >= 0.0f && p.y < 1.0f);

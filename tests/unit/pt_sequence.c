@@ -325,7 +325,7 @@ static void recorded_folder(void **state)
     struct pt_sequence_config config = make_config();
     struct pt_criterion *criterion = NULL;
     struct base_err err = {0};
-    assert_int_equal(pt_criterion_create_table(pt_fake_criterion(), NULL, 0, pool, NULL, NULL, &criterion, &err), 0);
+    assert_int_equal(pt_criterion_create(pt_fake_criterion(), NULL, 0, pool, NULL, NULL, &criterion, &err), 0);
     assert_int_equal(record(&config, criterion, &err), 0);
     pt_criterion_destroy(criterion);
     check_block("block-00001.lseq", 16, 0, 32, 16, 1);

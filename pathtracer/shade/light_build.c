@@ -1,4 +1,4 @@
-#include "shade/light.h"
+#include "shade/light_build.h"
 
 #include <math.h>
 

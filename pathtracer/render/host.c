@@ -1,0 +1,167 @@
+#include "render/host.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "base/clock.h"
+#include "base/colour.h"
+#include "render/host_planes.h"
+
+int pt_criterion_fail(const struct pt_criterion *c, const char *what, int32_t code, const struct lull_error *said,
+                      struct base_err *err)
+{
+    return base_fail(err, code == LULL_E_MEMORY ? BASE_ENOMEM : BASE_EINVAL, "criterion %s: %s%s", c->table->id, what,
+                     said->message);
+}
+
+int pt_criterion_create(const struct lull_criterion *table, const struct lull_pair *pairs, uint32_t pair_count,
+                        struct base_threads *threads, void (*warn)(void *data, const char *line), void *warn_data,
+                        struct pt_criterion **out, struct base_err *err)
+{
+    struct lull_error e = {.struct_size = sizeof e};
+    struct pt_criterion *c = calloc(1, sizeof *c);
+    if (!c)
+        return base_fail_nomem(err, "criterion");
+    c->table = table;
+    c->services = (struct pt_host_services){table->id, threads, warn, warn_data};
+    c->host = pt_host_services_table(&c->services);
+    int32_t code = table->create(&c->host, pairs, pair_count, sizeof *pairs, &c->instance, &e);
+    if (code == LULL_OK) {
+        c->needs.struct_size = sizeof c->needs;
+        code = table->requirements(c->instance, &c->needs, &e);
+    }
+    if (code != LULL_OK) {
+        int rc = pt_criterion_fail(c, "", code, &e, err);
+        pt_criterion_destroy(c);
+        return rc;
+    }
+    *out = c;
+    return 0;
+}
+
+static void release_frame(struct pt_criterion *c)
+{
+    free(c->all);
+    free(c->due);
+    free(c->rects);
+    free(c->spp);
+    c->spp = NULL;
+}
+
+void pt_criterion_destroy(struct pt_criterion *c)
+{
+    if (!c)
+        return;
+    if (c->instance) {
+        if (c->open)
+            c->table->end_frame(c->instance);
+        c->table->destroy(c->instance);
+    }
+    release_frame(c);
+    free(c);
+}
+
+static int allocate_frame(struct pt_criterion *c, const struct pt_blocks *blocks, const struct pt_film *film,
+                          struct base_err *err)
+{
+    release_frame(c);
+    c->all = calloc(blocks->count, sizeof *c->all);
+    c->due = calloc(blocks->count, sizeof *c->due);
+    c->rects = calloc(blocks->count, sizeof *c->rects);
+    int counts = (c->needs.planes_required & (LULL_PLANE_BIT(LULL_PLANE_SPP) | LULL_PLANE_BIT(LULL_PLANE_WEIGHT))) != 0;
+    if (counts)
+        c->spp = calloc(film->pixels, sizeof *c->spp);
+    if (!c->all || !c->due || !c->rects || (counts && !c->spp))
+        return base_fail_nomem(err, "blocks of the criterion");
+    return 0;
+}
+
+int pt_criterion_begin(struct pt_criterion *c, const struct pt_criterion_frame *frame, const struct pt_blocks *blocks,
+                       const struct pt_film *film, struct base_err *err)
+{
+    const struct lull_requirements *needs = &c->needs;
+    if (!(needs->flags & LULL_REQ_FLEXIBLE) && needs->block_width > 0 && needs->block_height > 0 &&
+        ((int)needs->block_width != blocks->block_width || (int)needs->block_height != blocks->block_height))
+        return base_fail(err, BASE_EINVAL, "criterion %s judges blocks of %ux%u pixels only: use --block %ux%u", c->table->id,
+                       needs->block_width, needs->block_height, needs->block_width, needs->block_height);
+    int rc = allocate_frame(c, blocks, film, err);
+    if (rc)
+        return rc;
+    for (uint32_t i = 0; i < blocks->count; i++) {
+        const struct pt_block *b = &blocks->list[i];
+        c->rects[i] = (struct lull_rect){b->x0, b->y0, b->x1, b->y1};
+    }
+    struct lull_frame f = {
+        .struct_size = sizeof f,
+        .flags = (frame->deterministic ? LULL_FRAME_DETERMINISTIC : 0) | (frame->independent ? LULL_FRAME_INDEPENDENT : 0) |
+                 (c->open ? LULL_FRAME_RESTART : 0),
+        .width = (uint32_t)frame->width,
+        .height = (uint32_t)frame->height,
+        .blocks = c->rects,
+        .block_count = blocks->count,
+        .block_stride = sizeof c->rects[0],
+        .planes = pt_host_planes(film, c->spp, c->planes),
+        .transfer = LULL_TRANSFER_SRGB,
+        .exposure = 1.0,
+        .sample_clamp = frame->sample_clamp,
+        .time_budget_s = frame->time_budget_s,
+        .spp_min = frame->spp_min,
+        .spp_max = frame->spp_max,
+        .seed = frame->seed,
+        .rgb_to_xyz = BASE_RGB_TO_XYZ,
+    };
+    struct lull_error e = {.struct_size = sizeof e};
+    int32_t code = c->table->begin_frame(c->instance, &f, &e);
+    if (code != LULL_OK)
+        return pt_criterion_fail(c, "", code, &e, err);
+    c->open = 1;
+    c->begin_s = base_clock_wall_s();
+    return 0;
+}
+
+static struct lull_block block_state(const struct pt_block *b, uint32_t index, int has_half)
+{
+    return (struct lull_block){.id = index, .flags = b->reason != PT_REASON_NONE ? LULL_BLOCK_STOPPED : 0, .x0 = b->x0,
+                               .y0 = b->y0, .x1 = b->x1, .y1 = b->y1, .spp = b->spp,
+                               .half_spp = has_half ? pt_film_half_spp(b->spp) : 0, .thread_s = b->thread_s};
+}
+
+int pt_criterion_evaluate(struct pt_criterion *c, struct pt_film *film, const struct pt_blocks *blocks, const uint32_t *due,
+                          uint32_t count, const uint8_t *final, struct lull_decision *decisions, struct base_err *err)
+{
+    int rc = 0, has_half = film->half != NULL;
+    struct pt_film_patch patch = {0};
+    const struct lull_decision preset = {.action = LULL_CONTINUE, .p_noisy = NAN, .predicted_spp = NAN, .error = NAN};
+
+    for (uint32_t i = 0; i < blocks->count; i++)
+        c->all[i] = block_state(&blocks->list[i], i, has_half);
+    for (uint32_t k = 0; k < count; k++) {
+        decisions[k] = preset;
+        c->due[k] = c->all[due[k]];
+        if (final[k])
+            c->due[k].flags |= LULL_BLOCK_FINAL;
+    }
+    for (uint32_t i = 0; i < blocks->count && !rc; i++) {
+        const struct pt_block *b = &blocks->list[i];
+        if (b->dropped > 0)
+            rc = pt_film_patch(film, b->x0, b->y0, b->x1, b->y1, b->spp, &patch, err);
+    }
+    if (rc)
+        goto out;
+    if (c->spp)
+        pt_host_fill_spp(film, blocks, c->spp);
+    struct lull_view view = {.struct_size = sizeof view, .x0 = film->x0, .y0 = film->y0, .x1 = film->x1, .y1 = film->y1,
+                             .planes = c->planes, .plane_count = LULL_PLANE_COUNT, .plane_stride = sizeof c->planes[0],
+                             .all = c->all, .all_count = blocks->count, .all_stride = sizeof c->all[0],
+                             .elapsed_s = base_clock_wall_s() - c->begin_s};
+    struct lull_error e = {.struct_size = sizeof e};
+    int32_t code = c->table->evaluate(c->instance, &view, c->due, sizeof c->due[0], decisions, sizeof *decisions, count, &e);
+    if (code != LULL_OK) {
+        for (uint32_t k = 0; k < count; k++)
+            decisions[k] = preset;
+        rc = pt_criterion_fail(c, "", code, &e, err);
+    }
+out:
+    pt_film_unpatch(film, &patch);
+    return rc;
+}

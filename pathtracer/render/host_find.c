@@ -1,0 +1,69 @@
+#include "render/host_find.h"
+
+#include <lull/loader.h>
+
+#include <string.h>
+
+struct teller {
+    void (*warn)(void *data, const char *line);
+    void *data;
+};
+
+static void tell(void *context, int32_t level, const char *text)
+{
+    const struct teller *t = context;
+    if (t->warn && level <= LULL_LOG_WARNING)
+        t->warn(t->data, text);
+}
+
+int pt_criterion_find(const char *spec, void (*warn)(void *data, const char *line), void *warn_data,
+                      const struct lull_criterion **out, struct base_err *err)
+{
+    struct teller teller = {warn, warn_data};
+    struct lull_search search = {.log = tell, .log_context = &teller};
+    struct lull_error e = {.struct_size = sizeof e};
+    struct lull_found found;
+    int32_t code = lull_open(&search, spec, &found, &e);
+    if (code != LULL_OK)
+        return base_fail(err, code == LULL_E_MEMORY ? BASE_ENOMEM : BASE_EINVAL, "%s", e.message);
+    *out = found.criterion;
+    return 0;
+}
+
+struct listing {
+    FILE *out;
+    int count;
+};
+
+static int32_t list_one(void *context, const struct lull_found *found)
+{
+    struct listing *l = context;
+    const struct lull_criterion *t = found->criterion;
+    fprintf(l->out, "%s %s - %s\n", t->id, t->version, t->name);
+    for (const char *line = t->description; *line != '\0';) {
+        int n = (int)strcspn(line, "\n");
+        fprintf(l->out, "    %.*s\n", n, line);
+        line += n + (line[n] != '\0');
+    }
+    fprintf(l->out, "    from %s\n", found->path);
+    for (uint32_t i = 0; i < t->param_count; i++) {
+        const struct lull_param *p = (const void *)((const char *)t->params + (size_t)i * t->param_stride);
+        fprintf(l->out, "    -p %s=%s  %s", p->name, p->default_value ? p->default_value : "?", p->help);
+        if (p->type == LULL_PARAM_INT || p->type == LULL_PARAM_FLOAT)
+            fprintf(l->out, " [%g to %g]", p->min, p->max);
+        else if (p->type == LULL_PARAM_CHOICE)
+            fprintf(l->out, " [%s]", p->choices);
+        fprintf(l->out, "\n");
+    }
+    l->count++;
+    return LULL_OK;
+}
+
+int pt_criterion_list(FILE *out, void (*warn)(void *data, const char *line), void *warn_data)
+{
+    struct teller teller = {warn, warn_data};
+    struct lull_search search = {.log = tell, .log_context = &teller};
+    struct listing listing = {.out = out};
+    lull_list(&search, list_one, &listing);
+    return listing.count;
+}
