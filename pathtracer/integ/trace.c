@@ -2,8 +2,7 @@
 
 #include <stdio.h>
 
-static const char *const bsdf_names[] = {"diffuse", "conductor", "dielectric", "thin dielectric", "diffuse transmission",
-                                         "coated diffuse", "coated conductor"};
+#include "shade/bsdf_models.h"
 
 void pt_trace_camera(struct pt_trace *trace, const struct pt_ray *ray)
 {
@@ -19,7 +18,7 @@ void pt_trace_surface(struct pt_trace *trace, const struct pt_place *at, const s
     char text[384];
     pt_vec3 p = at->p, n = at->s.n_geometric, t = throughput;
     snprintf(text, sizeof text, "%d: %s at (%g, %g, %g) normal (%g, %g, %g) material %d primitive %d throughput (%g, %g, %g)",
-             ++trace->vertex, bsdf_names[bsdf->kind], (double)p.x, (double)p.y, (double)p.z, (double)n.x, (double)n.y,
+             ++trace->vertex, pt_bsdf_models[bsdf->kind].words, (double)p.x, (double)p.y, (double)p.z, (double)n.x, (double)n.y,
              (double)n.z, (int)at->shape->material, (int)at->primitive, (double)t.x, (double)t.y, (double)t.z);
     trace->line(trace->data, text);
 }

@@ -127,7 +127,7 @@ struct pt_input pt_build_colour_input(struct pt_builder *b, const struct pt_stat
 struct pt_input pt_input_constant(double r, double g, double b);
 /* Image map by file name; encoding: NULL = by file kind, "sRGB", "linear", "gamma X". -1 on failure. */
 int32_t pt_build_image_map(struct pt_builder *b, struct pt_loc loc, const char *name, const char *encoding);
-/* A colour image as texture (normal maps). */
+/* A colour image as texture (normal maps): its number, or 0 after a failure. */
 int32_t pt_build_image_texture(struct pt_builder *b, struct pt_loc loc, const char *name, const char *encoding);
 /* Product of two inputs; constants fold. */
 struct pt_input pt_input_product(struct pt_builder *b, struct pt_input x, struct pt_input y);
@@ -138,8 +138,8 @@ int32_t pt_build_default_material(struct pt_builder *b);
 /* v3 kinds; 0 when `kind` is none of them. */
 int pt_build_material_v3(struct pt_builder *b, const struct pt_state *s, const char *kind, struct pt_params *p,
                          struct pt_material *m, struct pt_material_info *info);
-struct pt_material pt_material_blank(int32_t kind);
 void pt_build_roughness(struct pt_builder *b, struct pt_params *p, double fallback, int v3_rule, struct pt_material *m);
+/* Number of the displacement texture, 0 = none. */
 int32_t pt_build_bump(struct pt_builder *b, struct pt_params *p, const char *name);
 /* Material by the name that string i of a parameter gives; -1 after a failure. */
 int32_t pt_build_material_named(struct pt_builder *b, struct pt_loc loc, const char *name);

@@ -1,18 +1,11 @@
-/* Materials of pbrt-v4, and what stands in for those that are not simulated. */
+/* Materials of pbrt-v4: the scattering models by their tables, mix and interface, and what stands in for those that are not
+ * simulated. */
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "pbrt/build.h"
-
-struct pt_material pt_material_blank(int32_t kind)
-{
-    struct pt_material m = {.kind = kind, .bump = -1, .normal_map = -1, .mix_a = -1, .mix_b = -1, .eta = 1.5f};
-    struct pt_input *inputs[] = {&m.mix_amount, &m.reflectance, &m.transmittance, &m.roughness_u, &m.roughness_v,
-                                 &m.base_roughness_u, &m.base_roughness_v, &m.eta_rgb, &m.k_rgb, &m.thickness, &m.g, &m.albedo};
-    for (size_t i = 0; i < sizeof inputs / sizeof inputs[0]; i++)
-        *inputs[i] = pt_input_constant(0, 0, 0);
-    return m;
-}
+#include "shade/bsdf_models.h"
 
 /* pbrt-v3's fit from perceived roughness to GGX alpha (TrowbridgeReitzDistribution::RoughnessToAlpha). */
 static double v3_alpha(double roughness)
@@ -28,12 +21,10 @@ static void read_roughness(struct pt_builder *b, struct pt_params *p, const char
     const char *const suffix[3] = {"roughness", "uroughness", "vroughness"};
     struct pt_input values[3];
     for (int i = 0; i < 3; i++) {
-        size_t n = strlen(prefix);
-        memcpy(name, prefix, n);
-        strcpy(name + n, suffix[i]);
+        snprintf(name, sizeof name, "%s%s", prefix, suffix[i]);
         const struct pt_param *given = pt_params_find(p, name);
         values[i] = i > 0 && !given ? values[0] : pt_build_float_input(b, p, name, fallback);
-        if (given && values[i].texture < 0 && values[i].value.x < 0)
+        if (given && !values[i].texture && values[i].value.x < 0)
             pt_diag_fail(&b->diag, given->loc, "\"%s\" is %g (expected 0 or more)", name, (double)values[i].value.x);
     }
     *u = values[1];
@@ -46,7 +37,7 @@ void pt_build_roughness(struct pt_builder *b, struct pt_params *p, double fallba
     m->remap_roughness = pt_params_bool(p, "remaproughness", 1);
     if (!v3_rule || !m->remap_roughness)
         return;
-    if (m->roughness_u.texture >= 0 || m->roughness_v.texture >= 0) {
+    if (m->roughness_u.texture || m->roughness_v.texture) {
         pt_diag_warn(&b->diag, p->loc, "textured roughness is remapped by pbrt-v4's rule");
         return;
     }
@@ -62,7 +53,7 @@ void pt_build_roughness(struct pt_builder *b, struct pt_params *p, double fallba
 int32_t pt_build_bump(struct pt_builder *b, struct pt_params *p, const char *name)
 {
     if (!pt_params_find(p, name))
-        return -1;
+        return 0;
     return pt_build_float_input(b, p, name, 0).texture; /* a constant displaces nothing */
 }
 
@@ -89,75 +80,65 @@ static struct pt_input colour(struct context *c, const char *name, float fallbac
     return pt_build_colour_input(c->b, c->s, c->p, name, PT_USE_REFLECTANCE, v3_splat(fallback));
 }
 
-static void read_coating(struct context *c)
+static void read_metal(struct context *c, const char *prefix)
 {
-    c->m->thickness = pt_build_float_input(c->b, c->p, "thickness", 0.01);
-    c->m->g = pt_build_float_input(c->b, c->p, "g", 0);
-    c->m->albedo = colour(c, "albedo", 0);
-    pt_params_ignore(c->p, "maxdepth nsamples");
-}
-
-static void make_diffuse(struct context *c)
-{
-    c->m->reflectance = colour(c, "reflectance", 0.5f);
-    if (pt_params_find(c->p, "sigma") && pt_params_float(c->p, "sigma", 0) != 0)
-        pt_diag_warn(&c->b->diag, c->p->loc, "sigma of a diffuse material is ignored");
-}
-
-static void make_coated_diffuse(struct context *c)
-{
-    c->m->reflectance = colour(c, "reflectance", 0.5f);
-    pt_build_roughness(c->b, c->p, 0, 0, c->m);
-    c->m->eta = (float)pt_build_index(c->b, c->p, "eta", 1.5);
-    read_coating(c);
-}
-
-static void make_conductor(struct context *c)
-{
-    pt_build_roughness(c->b, c->p, 0, 0, c->m);
-    c->m->conductor_by_colour = pt_params_find(c->p, "reflectance") != NULL;
-    if (c->m->conductor_by_colour) {
-        c->m->reflectance = colour(c, "reflectance", 0.5f);
-    } else {
-        pt_build_conductor(c->b, c->s, c->p, "eta", "k", &c->m->eta_rgb.value, &c->m->k_rgb.value);
-    }
-}
-
-static void make_coated_conductor(struct context *c)
-{
-    read_roughness(c->b, c->p, "interface.", 0, &c->m->roughness_u, &c->m->roughness_v);
-    read_roughness(c->b, c->p, "conductor.", 0, &c->m->base_roughness_u, &c->m->base_roughness_v);
-    c->m->remap_roughness = pt_params_bool(c->p, "remaproughness", 1);
-    c->m->eta = (float)pt_build_index(c->b, c->p, "interface.eta", 1.5);
+    char eta[32], k[32];
+    snprintf(eta, sizeof eta, "%seta", prefix);
+    snprintf(k, sizeof k, "%sk", prefix);
     c->m->conductor_by_colour = pt_params_find(c->p, "reflectance") != NULL;
     if (c->m->conductor_by_colour)
         c->m->reflectance = colour(c, "reflectance", 0.5f);
     else
-        pt_build_conductor(c->b, c->s, c->p, "conductor.eta", "conductor.k", &c->m->eta_rgb.value, &c->m->k_rgb.value);
-    read_coating(c);
+        pt_build_conductor(c->b, c->s, c->p, eta, k, &c->m->eta_rgb.value, &c->m->k_rgb.value);
 }
 
-static void make_dielectric(struct context *c)
+static void scale_colours(struct context *c, const struct pt_bsdf_read *reads, double scale)
 {
-    pt_build_roughness(c->b, c->p, 0, 0, c->m);
-    c->m->eta = (float)pt_build_index(c->b, c->p, "eta", 1.5);
+    for (const struct pt_bsdf_read *r = reads; r->kind != PT_READ_END; r++) {
+        struct pt_input *in = (struct pt_input *)((char *)c->m + r->field);
+        if (r->kind == PT_READ_COLOUR)
+            *in = pt_input_product(c->b, *in, pt_input_constant(scale, scale, scale));
+    }
+}
+
+static void read_model(struct context *c, const struct pt_bsdf_model *model)
+{
+    for (const struct pt_bsdf_read *r = model->reads; r->kind != PT_READ_END; r++) {
+        struct pt_input *in = (struct pt_input *)((char *)c->m + r->field);
+        switch (r->kind) {
+        case PT_READ_COLOUR:
+            *in = colour(c, r->name, (float)r->fallback);
+            break;
+        case PT_READ_NUMBER:
+            *in = pt_build_float_input(c->b, c->p, r->name, r->fallback);
+            break;
+        case PT_READ_ROUGHNESS:
+            read_roughness(c->b, c->p, r->name, r->fallback, &c->m->roughness_u, &c->m->roughness_v);
+            c->m->remap_roughness = pt_params_bool(c->p, "remaproughness", 1);
+            break;
+        case PT_READ_BASE_ROUGHNESS:
+            read_roughness(c->b, c->p, r->name, r->fallback, &c->m->base_roughness_u, &c->m->base_roughness_v);
+            break;
+        case PT_READ_INDEX:
+            c->m->eta = (float)pt_build_index(c->b, c->p, r->name, r->fallback);
+            break;
+        case PT_READ_METAL:
+            read_metal(c, r->name);
+            break;
+        case PT_READ_SCALE:
+            scale_colours(c, model->reads, (double)(float)pt_params_float_in(c->p, r->name, r->fallback, 0, 1e6));
+            break;
+        case PT_READ_UNSUPPORTED:
+            if (pt_params_find(c->p, r->name) && pt_params_float(c->p, r->name, 0) != 0)
+                pt_diag_warn(&c->b->diag, c->p->loc, "%s of a %s material is ignored", r->name, model->words);
+            break;
+        default:
+            pt_params_ignore(c->p, r->name);
+        }
+    }
     /* Index-matched: nothing is bent or reflected, and light sampling may look through it. */
-    if (c->m->eta == 1)
+    if (c->m->kind == PT_BSDF_DIELECTRIC && c->m->eta == 1)
         c->m->kind = PT_MATERIAL_INTERFACE;
-}
-
-static void make_thin_dielectric(struct context *c)
-{
-    c->m->eta = (float)pt_build_index(c->b, c->p, "eta", 1.5);
-    pt_params_ignore(c->p, "roughness uroughness vroughness remaproughness");
-}
-
-static void make_diffuse_transmission(struct context *c)
-{
-    float scale = (float)pt_params_float_in(c->p, "scale", 1, 0, 1e6);
-    struct pt_input by = pt_input_constant((double)scale, (double)scale, (double)scale);
-    c->m->reflectance = pt_input_product(c->b, colour(c, "reflectance", 0.25f), by);
-    c->m->transmittance = pt_input_product(c->b, colour(c, "transmittance", 0.25f), by);
 }
 
 static void make_mix(struct context *c)
@@ -207,37 +188,33 @@ static void make_measured(struct context *c)
     pt_params_ignore(c->p, "filename");
 }
 
-static const struct {
-    const char *name;
-    int32_t kind;
-    void (*make)(struct context *c);
-} kinds[] = {
-    {"diffuse", PT_MATERIAL_DIFFUSE, make_diffuse},
-    {"coateddiffuse", PT_MATERIAL_COATED_DIFFUSE, make_coated_diffuse},
-    {"conductor", PT_MATERIAL_CONDUCTOR, make_conductor},
-    {"coatedconductor", PT_MATERIAL_COATED_CONDUCTOR, make_coated_conductor},
-    {"dielectric", PT_MATERIAL_DIELECTRIC, make_dielectric},
-    {"thindielectric", PT_MATERIAL_THIN_DIELECTRIC, make_thin_dielectric},
-    {"diffusetransmission", PT_MATERIAL_DIFFUSE_TRANSMISSION, make_diffuse_transmission},
-    {"interface", PT_MATERIAL_INTERFACE, make_interface},
-    {"none", PT_MATERIAL_INTERFACE, make_interface},
-    {"", PT_MATERIAL_INTERFACE, make_interface},
-    {"subsurface", PT_MATERIAL_COATED_DIFFUSE, make_subsurface},
-    {"hair", PT_MATERIAL_DIFFUSE, make_hair},
-    {"measured", PT_MATERIAL_COATED_DIFFUSE, make_measured},
-};
-
 static int build_v4(struct context *c)
 {
-    if (strcmp(c->kind, "mix") == 0 && !pt_params_find(c->p, "namedmaterial1")) {
-        *c->m = pt_material_blank(PT_MATERIAL_MIX);
-        make_mix(c);
-        return 1;
-    }
-    for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
-        if (strcmp(kinds[i].name, c->kind) == 0) {
-            *c->m = pt_material_blank(kinds[i].kind);
-            kinds[i].make(c);
+    static const struct {
+        const char *name;
+        int32_t kind;
+        void (*make)(struct context *c);
+    } others[] = {
+        {"mix", PT_MATERIAL_MIX, make_mix},
+        {"interface", PT_MATERIAL_INTERFACE, make_interface},
+        {"none", PT_MATERIAL_INTERFACE, make_interface},
+        {"", PT_MATERIAL_INTERFACE, make_interface},
+        {"subsurface", PT_BSDF_COATED_DIFFUSE, make_subsurface},
+        {"hair", PT_BSDF_DIFFUSE, make_hair},
+        {"measured", PT_BSDF_COATED_DIFFUSE, make_measured},
+    };
+    if (strcmp(c->kind, "mix") == 0 && pt_params_find(c->p, "namedmaterial1"))
+        return 0; /* v3's */
+    for (int32_t i = 0; i < PT_BSDF_COUNT; i++)
+        if (strcmp(pt_bsdf_models[i].file_name, c->kind) == 0) {
+            c->m->kind = i;
+            read_model(c, &pt_bsdf_models[i]);
+            return 1;
+        }
+    for (size_t i = 0; i < sizeof others / sizeof others[0]; i++)
+        if (strcmp(others[i].name, c->kind) == 0) {
+            c->m->kind = others[i].kind;
+            others[i].make(c);
             return 1;
         }
     return 0;
@@ -252,7 +229,7 @@ static int32_t add(struct pt_builder *b, const struct pt_material *m, const stru
 
 int32_t pt_build_material(struct pt_builder *b, const struct pt_state *s, const char *kind, struct pt_params *p)
 {
-    struct pt_material m = pt_material_blank(PT_MATERIAL_DIFFUSE);
+    struct pt_material m = {.kind = PT_BSDF_DIFFUSE, .eta = 1.5f};
     struct pt_material_info info = {.loc = p->loc, .opacity = pt_input_constant(1, 1, 1)};
     struct context c = {b, s, p, kind, &m};
     pt_params_ignore(p, "type");
@@ -260,7 +237,7 @@ int32_t pt_build_material(struct pt_builder *b, const struct pt_state *s, const 
         pt_diag_fail(&b->diag, p->loc, "unknown material \"%s\" (expected diffuse, coateddiffuse, conductor, dielectric, mix …)", kind);
         return -1;
     }
-    if (m.bump < 0)
+    if (!m.bump)
         m.bump = pt_build_bump(b, p, "displacement");
     struct pt_param *map = pt_params_find(p, "normalmap");
     if (map && map->type == PT_PARAM_TEXTURE)
@@ -274,7 +251,7 @@ int32_t pt_build_material(struct pt_builder *b, const struct pt_state *s, const 
 int32_t pt_build_default_material(struct pt_builder *b)
 {
     if (b->default_material < 0) {
-        struct pt_material m = pt_material_blank(PT_MATERIAL_DIFFUSE);
+        struct pt_material m = {.kind = PT_BSDF_DIFFUSE, .eta = 1.5f};
         struct pt_material_info info = {.opacity = pt_input_constant(1, 1, 1)};
         m.reflectance = pt_input_constant(0.5, 0.5, 0.5);
         b->default_material = add(b, &m, &info);

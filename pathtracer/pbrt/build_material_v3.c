@@ -20,12 +20,12 @@ static struct pt_input colour(struct context *c, const char *name, float fallbac
 
 static int is_black(struct pt_input in)
 {
-    return in.texture < 0 && v3_is_black(in.value);
+    return !in.texture && v3_is_black(in.value);
 }
 
 static void clear_coat(struct context *c)
 {
-    c->m->kind = PT_MATERIAL_COATED_DIFFUSE;
+    c->m->kind = PT_BSDF_COATED_DIFFUSE;
     c->m->thickness = pt_input_constant(0.01, 0.01, 0.01);
 }
 
@@ -38,7 +38,7 @@ static void make_matte(struct context *c)
 {
     c->m->reflectance = colour(c, "Kd", 0.5f);
     struct pt_input sigma = pt_build_float_input(c->b, c->p, "sigma", 0);
-    if (sigma.texture >= 0 || sigma.value.x != 0)
+    if (sigma.texture || sigma.value.x != 0)
         pt_diag_warn(&c->b->diag, c->p->loc, "sigma of a matte material is ignored: plain diffuse");
 }
 
@@ -63,15 +63,15 @@ static void make_uber(struct context *c)
     struct pt_param *opacity = pt_params_find(c->p, "opacity");
     if (opacity) {
         struct pt_input o = colour(c, "opacity", 1);
-        c->info->has_opacity = o.texture >= 0 || v3_luminance(o.value) < 1;
-        c->info->opacity = o.texture >= 0 ? o : pt_input_constant((double)v3_luminance(o.value), (double)v3_luminance(o.value),
+        c->info->has_opacity = o.texture || v3_luminance(o.value) < 1;
+        c->info->opacity = o.texture ? o : pt_input_constant((double)v3_luminance(o.value), (double)v3_luminance(o.value),
                                                                   (double)v3_luminance(o.value));
     }
     if (!is_black(kt) && is_black(kd)) {
-        c->m->kind = PT_MATERIAL_DIELECTRIC;
+        c->m->kind = PT_BSDF_DIELECTRIC;
         c->m->roughness_u = c->m->roughness_v = pt_input_constant(0, 0, 0);
     } else if (!is_black(kr) && is_black(kd) && is_black(ks)) {
-        c->m->kind = PT_MATERIAL_CONDUCTOR;
+        c->m->kind = PT_BSDF_CONDUCTOR;
         c->m->conductor_by_colour = 1;
         c->m->reflectance = kr;
         c->m->roughness_u = c->m->roughness_v = pt_input_constant(0, 0, 0);
@@ -86,14 +86,14 @@ static void make_uber(struct context *c)
 
 static void make_metal(struct context *c)
 {
-    c->m->kind = PT_MATERIAL_CONDUCTOR;
+    c->m->kind = PT_BSDF_CONDUCTOR;
     pt_build_roughness(c->b, c->p, 0.01, 1, c->m);
     pt_build_conductor(c->b, c->s, c->p, "eta", "k", &c->m->eta_rgb.value, &c->m->k_rgb.value);
 }
 
 static void make_mirror(struct context *c)
 {
-    c->m->kind = PT_MATERIAL_CONDUCTOR;
+    c->m->kind = PT_BSDF_CONDUCTOR;
     c->m->conductor_by_colour = 1;
     c->m->reflectance = colour(c, "Kr", 0.9f);
     pt_params_ignore(c->p, "remaproughness roughness");
@@ -101,7 +101,7 @@ static void make_mirror(struct context *c)
 
 static void make_shiny_metal(struct context *c)
 {
-    c->m->kind = PT_MATERIAL_CONDUCTOR;
+    c->m->kind = PT_BSDF_CONDUCTOR;
     c->m->conductor_by_colour = 1;
     c->m->reflectance = colour(c, "Kr", 1);
     pt_params_ignore(c->p, "Ks");
@@ -111,17 +111,17 @@ static void make_shiny_metal(struct context *c)
 static void make_glass(struct context *c)
 {
     struct pt_input kr = colour(c, "Kr", 1), kt = colour(c, "Kt", 1);
-    c->m->kind = PT_MATERIAL_DIELECTRIC;
+    c->m->kind = PT_BSDF_DIELECTRIC;
     pt_build_roughness(c->b, c->p, 0, 1, c->m);
     c->m->eta = (float)index_of(c, 1.5);
-    if (kr.texture >= 0 || kt.texture >= 0 || v3_luminance(kr.value) < 0.999f || v3_luminance(kt.value) < 0.999f)
+    if (kr.texture || kt.texture || v3_luminance(kr.value) < 0.999f || v3_luminance(kt.value) < 0.999f)
         pt_diag_warn(&c->b->diag, c->p->loc, "Kr and Kt of glass are taken as 1");
 }
 
 static void make_translucent(struct context *c)
 {
     struct pt_input kd = colour(c, "Kd", 0.25f), ks = colour(c, "Ks", 0.25f);
-    c->m->kind = PT_MATERIAL_DIFFUSE_TRANSMISSION;
+    c->m->kind = PT_BSDF_DIFFUSE_TRANSMISSION;
     c->m->reflectance = pt_input_product(c->b, kd, colour(c, "reflect", 0.5f));
     c->m->transmittance = pt_input_product(c->b, kd, colour(c, "transmit", 0.5f));
     pt_build_roughness(c->b, c->p, 0.1, 1, c->m);
@@ -191,7 +191,6 @@ int pt_build_material_v3(struct pt_builder *b, const struct pt_state *s, const c
     struct context c = {b, s, p, kind, m, info};
     for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
         if (strcmp(kinds[i].name, kind) == 0) {
-            *m = pt_material_blank(PT_MATERIAL_DIFFUSE);
             kinds[i].make(&c);
             m->bump = pt_build_bump(b, p, "bumpmap");
             return 1;

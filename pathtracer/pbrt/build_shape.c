@@ -52,14 +52,14 @@ static struct pt_shape common(struct pt_builder *b, const struct pt_state *s, st
     shape.material = s->material >= 0 ? s->material : pt_build_default_material(b);
     shape.flip_normal = (s->reverse_orientation != 0) != (pt_xform_det(&pl->xform) < 0);
     shape.alpha = pt_build_float_input(b, p, "alpha", 1);
-    if (shape.alpha.texture < 0 && shape.alpha.value.x == 1 && shape.material >= 0) {
+    if (!shape.alpha.texture && shape.alpha.value.x == 1 && shape.material >= 0) {
         const struct pt_material_info *info = &((struct pt_material_info *)b->material_infos.items)[shape.material];
         if (info->has_opacity)
             shape.alpha = info->opacity;
     }
-    shape.has_alpha = shape.alpha.texture >= 0 || shape.alpha.value.x < 1;
+    shape.has_alpha = shape.alpha.texture || shape.alpha.value.x < 1;
     if (shape.has_alpha)
-        pt_builder_effect(b, PT_FX_ALPHA | (shape.alpha.texture >= 0 ? PT_FX_TEXTURE : 0u), p->loc);
+        pt_builder_effect(b, PT_FX_ALPHA | (shape.alpha.texture ? PT_FX_TEXTURE : 0u), p->loc);
     if (pt_params_find(p, "shadowalpha"))
         pt_diag_warn(&b->diag, pt_params_find(p, "shadowalpha")->loc, "shadowalpha is ignored: shadows follow alpha");
     pt_params_ignore(p, "shadowalpha");

@@ -12,12 +12,13 @@
 
 struct pt_input pt_input_constant(double r, double g, double b)
 {
-    return (struct pt_input){-1, v3((float)r, (float)g, (float)b)};
+    return (struct pt_input){0, v3((float)r, (float)g, (float)b)};
 }
 
-static struct pt_input input_of(int32_t texture)
+/* Of the texture with this id; black after a failure (-1). */
+static struct pt_input input_of(int32_t id)
 {
-    return (struct pt_input){texture, v3_splat(0)};
+    return (struct pt_input){.texture = id + 1};
 }
 
 /* --- images ----------------------------------------------------------------------------------------------------------- */
@@ -128,7 +129,7 @@ int32_t pt_build_image_texture(struct pt_builder *b, struct pt_loc loc, const ch
 {
     struct pt_texture t = {.kind = PT_TEXTURE_IMAGE, .scale = 1, .su = 1, .sv = 1};
     t.image = pt_build_image_map(b, loc, name, encoding);
-    return t.image < 0 ? -1 : pt_list_add(b, &b->textures, &t);
+    return t.image < 0 ? 0 : pt_list_add(b, &b->textures, &t) + 1;
 }
 
 /* --- inputs ----------------------------------------------------------------------------------------------------------- */
@@ -169,7 +170,7 @@ struct pt_input pt_build_colour_input(struct pt_builder *b, const struct pt_stat
     if (param && param->type == PT_PARAM_TEXTURE)
         return named_texture(b, p, param, 0);
     pt_build_colour(b, s, p, name, use, &fallback);
-    return (struct pt_input){-1, fallback};
+    return (struct pt_input){0, fallback};
 }
 
 static int32_t add_texture(struct pt_builder *b, const struct pt_texture *t)
@@ -179,15 +180,14 @@ static int32_t add_texture(struct pt_builder *b, const struct pt_texture *t)
 
 struct pt_input pt_input_product(struct pt_builder *b, struct pt_input x, struct pt_input y)
 {
-    if (x.texture < 0 && y.texture < 0)
-        return (struct pt_input){-1, v3_mul(x.value, y.value)};
-    if (x.texture < 0 && x.value.x == 1 && x.value.y == 1 && x.value.z == 1)
+    if (!x.texture && !y.texture)
+        return (struct pt_input){0, v3_mul(x.value, y.value)};
+    if (!x.texture && x.value.x == 1 && x.value.y == 1 && x.value.z == 1)
         return y;
-    if (y.texture < 0 && y.value.x == 1 && y.value.y == 1 && y.value.z == 1)
+    if (!y.texture && y.value.x == 1 && y.value.y == 1 && y.value.z == 1)
         return x;
     struct pt_texture t = {.kind = PT_TEXTURE_SCALE, .scale = 1, .su = 1, .sv = 1, .in = {x, y}};
-    int32_t id = add_texture(b, &t);
-    return id < 0 ? pt_input_constant(0, 0, 0) : input_of(id);
+    return input_of(add_texture(b, &t));
 }
 
 /* --- classes ---------------------------------------------------------------------------------------------------------- */
@@ -247,7 +247,7 @@ static void make_scale(struct context *c, struct pt_texture *t)
     }
     t->in[0] = x;
     t->in[1] = y;
-    if (x.texture < 0 && y.texture < 0) {
+    if (!x.texture && !y.texture) {
         t->kind = PT_TEXTURE_CONSTANT;
         t->in[0].value = v3_mul(x.value, y.value);
     }
@@ -259,7 +259,7 @@ static void make_mix(struct context *c, struct pt_texture *t)
     t->in[0] = input(c, "tex1", 0);
     t->in[1] = input(c, "tex2", 1);
     t->in[2] = pt_build_float_input(c->b, c->p, "amount", 0.5);
-    if (t->in[0].texture < 0 && t->in[1].texture < 0 && t->in[2].texture < 0) {
+    if (!t->in[0].texture && !t->in[1].texture && !t->in[2].texture) {
         float a = t->in[2].value.x;
         t->kind = PT_TEXTURE_CONSTANT;
         t->in[0].value = v3_add(v3_scale(t->in[0].value, 1 - a), v3_scale(t->in[1].value, a));
@@ -330,8 +330,8 @@ static void make_stand_in(struct context *c, struct pt_texture *t)
     struct pt_input inside = input(c, "inside", 1), outside = input(c, "outside", 0);
     pt_diag_warn(&c->b->diag, c->p->loc, "texture \"%s\" is replaced by a constant", kind);
     t->kind = PT_TEXTURE_CONSTANT;
-    t->in[0] = strcmp(kind, "dots") == 0 && inside.texture < 0 && outside.texture < 0
-                   ? (struct pt_input){-1, v3_scale(v3_add(inside.value, outside.value), 0.5f)}
+    t->in[0] = strcmp(kind, "dots") == 0 && !inside.texture && !outside.texture
+                   ? (struct pt_input){0, v3_scale(v3_add(inside.value, outside.value), 0.5f)}
                    : pt_input_constant(0.5, 0.5, 0.5);
     read_mapping(c, t);
     pt_params_ignore(c->p, "octaves roughness scale variation filename encoding gamma invert");
@@ -351,8 +351,6 @@ int pt_build_texture(struct pt_builder *b, const struct pt_state *s, const char 
         return pt_diag_fail(&b->diag, p->loc, "texture \"%s\" of type \"%s\" (expected float or spectrum)", name, class_name);
     struct context c = {b, s, p, is_float};
     struct pt_texture t = {.kind = -1, .scale = 1, .su = 1, .sv = 1, .channel = 0};
-    for (int i = 0; i < 4; i++)
-        t.in[i] = pt_input_constant(0, 0, 0);
     for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
         if (strcmp(kinds[i].kind, pt_params_kind(p)) == 0)
             kinds[i].make(&c, &t);

@@ -4,7 +4,8 @@
  * Spaces. *Render space* is world space translated so that the camera (at shutter open) sits at the origin; the translation
  * is applied in double before anything becomes float, so that a scene far from the world's origin keeps its precision.
  * Everything here is in render space and scene units, but for the shapes of an object (see pt_object), which are in the
- * space of their object. Colours are linear Rec.709 RGB. Ids are indices into the arrays of pt_scene, -1 = none.
+ * space of their object. Colours are linear Rec.709 RGB. Ids are indices into the arrays of pt_scene, -1 = none; textures have
+ * numbers, id + 1, 0 = none.
  *
  * Ownership. All arrays live in the scene's arena unless a field says otherwise.
  *
@@ -21,6 +22,7 @@
 #include "scene/arena.h"
 #include "scene/effects.h"
 #include "scene/mat34.h"
+#include "scene/material.h"
 #include "scene/vec.h"
 
 /* --- camera -------------------------------------------------------------------------------------------------------------- */
@@ -65,12 +67,6 @@ enum pt_texture_kind {
     PT_TEXTURE_BILERP        /* corners in[0] (0,0), in[1] (0,1), in[2] (1,0), in[3] (1,1) */
 };
 
-/* A number or colour that may be textured. */
-struct pt_input {
-    int32_t texture;         /* -1: `value`; else id of the texture, always greater-or-equal 0 and acyclic */
-    pt_vec3 value;           /* a float input has it in x (and y, z equal to x) */
-};
-
 struct pt_texture {
     int32_t kind;            /* enum pt_texture_kind */
     int32_t image;           /* id, IMAGE only */
@@ -79,38 +75,7 @@ struct pt_texture {
     int32_t channel;         /* IMAGE: 0 = colour (rgb or grey); read as a float: -1 = average of rgb, 3 = alpha */
     float scale;             /* IMAGE only */
     float su, sv, du, dv;    /* s = su·u + du, t = sv·v + dv */
-    struct pt_input in[4];   /* ids smaller than this texture's own: the array is in dependency order */
-};
-
-/* --- materials ----------------------------------------------------------------------------------------------------------- */
-
-enum pt_material_kind { /* the first seven equal enum pt_bsdf_kind */
-    PT_MATERIAL_DIFFUSE,
-    PT_MATERIAL_CONDUCTOR,
-    PT_MATERIAL_DIELECTRIC,
-    PT_MATERIAL_THIN_DIELECTRIC,
-    PT_MATERIAL_DIFFUSE_TRANSMISSION,
-    PT_MATERIAL_COATED_DIFFUSE,
-    PT_MATERIAL_COATED_CONDUCTOR,
-    PT_MATERIAL_MIX,
-    PT_MATERIAL_INTERFACE    /* bounds media only: light passes */
-};
-
-struct pt_material {
-    int32_t kind;                 /* enum pt_material_kind */
-    int32_t remap_roughness;      /* GGX alpha = sqrt(roughness) as in pbrt-v4; 0: alpha = roughness */
-    int32_t conductor_by_colour;  /* conductor (or base of a coated one) given by reflectance instead of eta and k */
-    int32_t bump;                 /* displacement texture (scene units), -1 = none */
-    int32_t normal_map;           /* texture with rgb = (n + 1)/2 in tangent space, -1 = none */
-    int32_t mix_a, mix_b;         /* materials, MIX only; smaller ids than this one's */
-    struct pt_input mix_amount;   /* float: share of mix_b */
-    struct pt_input reflectance, transmittance;
-    struct pt_input roughness_u, roughness_v;
-    struct pt_input base_roughness_u, base_roughness_v; /* coated conductor: the metal */
-    struct pt_input eta_rgb, k_rgb;                     /* conductor */
-    struct pt_input thickness, g, albedo;               /* coatings */
-    float eta;                    /* dielectric interface, inside / outside */
-    const float *coat_table;      /* see pt_bsdf.coat_table; made by shade/, in the arena or static; NULL = none */
+    struct pt_input in[4];   /* numbers below this texture's own: the array is in dependency order */
 };
 
 /* --- shapes -------------------------------------------------------------------------------------------------------------- */

@@ -5,26 +5,22 @@
  * next; both point away from the surface. Radiance is transported towards the camera, so refraction carries the factor
  * (eta_i/eta_t)² of radiance compression (Veach 1997, §5.2). Pure functions, thread-safe, no allocation.
  *
- * One header per model (bsdf_diffuse.h …) with inline functions; the dispatchers here take the effect set `fx` as first
- * argument, which the kernel passes as a compile-time constant, so that models the scene does not use vanish from its code.
+ * A model NAME of the list PT_BSDFS (scene/material.h) is the header bsdf_NAME.h with these inline functions and a table; `fx`
+ * is the kernel's compile-time effect set, so that models the scene does not use vanish from its code:
+ *   void pt_NAME_closure(fx, scene, material, surface, b)       fills the fields of *b that the model uses
+ *   int pt_NAME_has_smooth(b)                                   whether any part of it is not a delta distribution
+ *   pt_vec3 pt_NAME_eval(fx, b, wo, wi, pdf_solid)              as pt_bsdf_eval (bsdf_dispatch.h)
+ *   int pt_NAME_sample(fx, b, wo, u_lobe, u0, u1, out)          as pt_bsdf_sample
+ *   pt_vec3 pt_NAME_albedo(b, wo)                               as pt_bsdf_albedo
+ *   const struct pt_bsdf_read pt_NAME_reads[]                   what it reads of a scene file
  */
 #ifndef PT_SHADE_BSDF_H
 #define PT_SHADE_BSDF_H
 
+#include <stddef.h>
 #include <stdint.h>
 
-#include "scene/vec.h"
-#include "scene/effects.h"
-
-enum pt_bsdf_kind {
-    PT_BSDF_DIFFUSE,
-    PT_BSDF_CONDUCTOR,            /* smooth when alpha_x and alpha_y are 0, GGX otherwise */
-    PT_BSDF_DIELECTRIC,           /* likewise */
-    PT_BSDF_THIN_DIELECTRIC,
-    PT_BSDF_DIFFUSE_TRANSMISSION,
-    PT_BSDF_COATED_DIFFUSE,
-    PT_BSDF_COATED_CONDUCTOR
-};
+#include "scene/material.h"
 
 /* Which fields count depends on kind; the others may hold anything. */
 struct pt_bsdf {
@@ -49,9 +45,31 @@ enum {
 struct pt_bsdf_sample {
     pt_vec3 wi;
     pt_vec3 weight;  /* f |cos θi| / pdf */
-    float pdf_solid; /* 1/sr; for DELTA the probability of the choice; see bsdf_coated_walk.h for walked coatings */
+    float pdf_solid; /* 1/sr; for DELTA the probability of the choice; see coat_walk.h for walked coatings */
     float eta_scale; /* (eta_i/eta_t)² removed by refraction, for Russian roulette; 1 otherwise */
     uint32_t flags;  /* PT_SCATTER_* */
 };
+
+/* A parameter of a model in scene files. Reading and the effects that a material needs both follow from the table. */
+enum pt_bsdf_read_kind {
+    PT_READ_END,
+    PT_READ_COLOUR,         /* a reflectance, into `field` */
+    PT_READ_NUMBER,         /* into `field` */
+    PT_READ_ROUGHNESS,      /* NAMEroughness, NAMEuroughness, NAMEvroughness, remaproughness: roughness_u and _v */
+    PT_READ_BASE_ROUGHNESS, /* the same: base_roughness_u and _v */
+    PT_READ_INDEX,          /* index of refraction, or a glass's name: eta */
+    PT_READ_METAL,          /* reflectance, or NAMEeta and NAMEk: conductor_by_colour … k_rgb */
+    PT_READ_SCALE,          /* factor on all colours before it */
+    PT_READ_UNSUPPORTED,    /* warns when it is not 0 */
+    PT_READ_IGNORED         /* changes nothing here; several names with spaces between them */
+};
+struct pt_bsdf_read {
+    int kind;             /* enum pt_bsdf_read_kind */
+    const char *name;
+    double fallback;      /* when the file does not say */
+    size_t field;         /* offset of a pt_input in pt_material */
+};
+#define PT_READ(kind, name, fallback) {PT_READ_##kind, name, fallback, 0}
+#define PT_READ_INTO(field, kind, name, fallback) {PT_READ_##kind, name, fallback, offsetof(struct pt_material, field)}
 
 #endif

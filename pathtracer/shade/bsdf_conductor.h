@@ -4,15 +4,29 @@
 #ifndef PT_SHADE_BSDF_CONDUCTOR_H
 #define PT_SHADE_BSDF_CONDUCTOR_H
 
-#include "shade/bsdf.h"
-#include "shade/fresnel.h"
-#include "shade/microfacet.h"
+#include "shade/inputs.h"
 
-static inline pt_vec3 pt_conductor_eval(const struct pt_bsdf *b, pt_vec3 wo, pt_vec3 wi, float *pdf_solid)
+static const struct pt_bsdf_read pt_conductor_reads[] = {PT_READ(ROUGHNESS, "", 0), PT_READ(METAL, "", 0), {0}};
+
+static inline void pt_conductor_closure(pt_effects fx, const struct pt_scene *scene, const struct pt_material *m,
+                                        const struct pt_surface *s, struct pt_bsdf *b)
+{
+    pt_material_alpha(fx, scene, m, &m->roughness_u, &m->roughness_v, s, &b->alpha_x, &b->alpha_y);
+    pt_material_metal(fx, scene, m, s, 1.0f, b);
+}
+
+static inline int pt_conductor_has_smooth(const struct pt_bsdf *b) { return b->alpha_x > 0.0f; }
+
+static inline pt_vec3 pt_conductor_albedo(const struct pt_bsdf *b, pt_vec3 wo)
+{
+    return pt_fresnel_conductor_rgb(fabsf(wo.z), b->eta_rgb, b->k_rgb);
+}
+
+static inline pt_vec3 pt_conductor_eval(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, pt_vec3 wi, float *pdf_solid)
 {
     *pdf_solid = 0.0f;
     float ax = b->alpha_x, ay = b->alpha_y;
-    if (ax == 0.0f || !(wo.z * wi.z > 0.0f))
+    if (!(fx & PT_FX_GLOSSY) || ax == 0.0f || !(wo.z * wi.z > 0.0f))
         return v3_splat(0.0f);
     pt_vec3 m = v3_add(wo, wi);
     float len2 = v3_dot(m, m);
@@ -52,6 +66,15 @@ static inline int pt_conductor_sample_rough(const struct pt_bsdf *b, pt_vec3 wo,
     out->eta_scale = 1.0f;
     out->flags = 0;
     return 1;
+}
+
+static inline int pt_conductor_sample(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, float u_lobe, float u0, float u1,
+                                      struct pt_bsdf_sample *out)
+{
+    (void)u_lobe;
+    if ((fx & PT_FX_GLOSSY) && b->alpha_x > 0.0f)
+        return pt_conductor_sample_rough(b, wo, u0, u1, out);
+    return pt_conductor_sample_smooth(b, wo, out);
 }
 
 #endif

@@ -1,13 +1,10 @@
 /*
- * Glass-like interfaces: a single boundary between two media (smooth or GGX, Walter et al. 2007) and the thin slab that
- * neither bends nor shifts a ray. wo.z > 0 is outside; b->eta = inside / outside.
+ * A boundary between two media: smooth, or GGX microfacets (Walter et al. 2007). wo.z > 0 is outside; b->eta = inside / outside.
  */
 #ifndef PT_SHADE_BSDF_DIELECTRIC_H
 #define PT_SHADE_BSDF_DIELECTRIC_H
 
-#include "shade/bsdf.h"
-#include "shade/fresnel.h"
-#include "shade/microfacet.h"
+#include "shade/inputs.h"
 
 /* Indices closer than this bend light by less than float resolves at the roughness of a lobe: passed straight on. */
 #define PT_ETA_MATCHED 5e-4f
@@ -15,6 +12,24 @@
 static inline int pt_dielectric_is_smooth(const struct pt_bsdf *b)
 {
     return b->alpha_x == 0.0f || fabsf(b->eta - 1.0f) < PT_ETA_MATCHED;
+}
+
+static const struct pt_bsdf_read pt_dielectric_reads[] = {PT_READ(ROUGHNESS, "", 0), PT_READ(INDEX, "eta", 1.5), {0}};
+
+static inline void pt_dielectric_closure(pt_effects fx, const struct pt_scene *scene, const struct pt_material *m,
+                                         const struct pt_surface *s, struct pt_bsdf *b)
+{
+    pt_material_alpha(fx, scene, m, &m->roughness_u, &m->roughness_v, s, &b->alpha_x, &b->alpha_y);
+    b->eta = m->eta;
+}
+
+static inline int pt_dielectric_has_smooth(const struct pt_bsdf *b) { return !pt_dielectric_is_smooth(b); }
+
+static inline pt_vec3 pt_dielectric_albedo(const struct pt_bsdf *b, pt_vec3 wo)
+{
+    (void)b;
+    (void)wo;
+    return v3_splat(1.0f);
 }
 
 static inline int pt_dielectric_sample_smooth(const struct pt_bsdf *b, pt_vec3 wo, float u_lobe, struct pt_bsdf_sample *out)
@@ -40,10 +55,10 @@ static inline int pt_dielectric_sample_smooth(const struct pt_bsdf *b, pt_vec3 w
 }
 
 /* f |cos θi| and pdf of the rough interface; the visible normals are sampled, then F chooses reflection or refraction. */
-static inline pt_vec3 pt_dielectric_eval(const struct pt_bsdf *b, pt_vec3 wo, pt_vec3 wi, float *pdf_solid)
+static inline pt_vec3 pt_dielectric_eval(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, pt_vec3 wi, float *pdf_solid)
 {
     *pdf_solid = 0.0f;
-    if (pt_dielectric_is_smooth(b) || wo.z == 0.0f || wi.z == 0.0f)
+    if (!(fx & PT_FX_GLOSSY) || pt_dielectric_is_smooth(b) || wo.z == 0.0f || wi.z == 0.0f)
         return v3_splat(0.0f);
     float ax = b->alpha_x, ay = b->alpha_y;
     int reflected = wo.z * wi.z > 0.0f;
@@ -102,19 +117,12 @@ static inline int pt_dielectric_sample_rough(const struct pt_bsdf *b, pt_vec3 wo
     return out->pdf_solid > 0.0f;
 }
 
-/* Slab of two parallel faces: reflections between them summed, R' = R + T²R/(1 - R²). */
-static inline int pt_thin_dielectric_sample(const struct pt_bsdf *b, pt_vec3 wo, float u_lobe, struct pt_bsdf_sample *out)
+static inline int pt_dielectric_sample(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, float u_lobe, float u0, float u1,
+                                       struct pt_bsdf_sample *out)
 {
-    float r = pt_fresnel_dielectric(fabsf(wo.z), b->eta);
-    if (r < 1.0f)
-        r = 2.0f * r / (1.0f + r);
-    int reflected = u_lobe < r;
-    out->wi = reflected ? v3(-wo.x, -wo.y, wo.z) : v3_neg(wo);
-    out->weight = v3_splat(1.0f);
-    out->pdf_solid = reflected ? r : 1.0f - r;
-    out->eta_scale = 1.0f;
-    out->flags = reflected ? PT_SCATTER_DELTA : PT_SCATTER_DELTA | PT_SCATTER_TRANSMIT;
-    return wo.z != 0.0f;
+    if ((fx & PT_FX_GLOSSY) && !pt_dielectric_is_smooth(b))
+        return pt_dielectric_sample_rough(b, wo, u_lobe, u0, u1, out);
+    return pt_dielectric_sample_smooth(b, wo, u_lobe, out);
 }
 
 #endif

@@ -1,21 +1,48 @@
 /*
- * Lambertian reflection, and diffuse reflection + transmission. Both sides of a surface behave alike.
+ * Lambertian reflection. Both sides of a surface behave alike.
  */
 #ifndef PT_SHADE_BSDF_DIFFUSE_H
 #define PT_SHADE_BSDF_DIFFUSE_H
 
-#include "shade/bsdf.h"
+#include "shade/inputs.h"
 #include "shade/warp.h"
 
-static inline pt_vec3 pt_diffuse_eval(const struct pt_bsdf *b, pt_vec3 wo, pt_vec3 wi, float *pdf_solid)
+static const struct pt_bsdf_read pt_diffuse_reads[] = {
+    PT_READ_INTO(reflectance, COLOUR, "reflectance", 0.5),
+    PT_READ(UNSUPPORTED, "sigma", 0),
+    {0}};
+
+static inline void pt_diffuse_closure(pt_effects fx, const struct pt_scene *scene, const struct pt_material *m,
+                                      const struct pt_surface *s, struct pt_bsdf *b)
 {
+    b->reflectance = pt_material_colour(fx, scene, &m->reflectance, s);
+}
+
+static inline int pt_diffuse_has_smooth(const struct pt_bsdf *b)
+{
+    (void)b;
+    return 1;
+}
+
+static inline pt_vec3 pt_diffuse_albedo(const struct pt_bsdf *b, pt_vec3 wo)
+{
+    (void)wo;
+    return b->reflectance;
+}
+
+static inline pt_vec3 pt_diffuse_eval(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, pt_vec3 wi, float *pdf_solid)
+{
+    (void)fx;
     float pdf = wo.z * wi.z > 0.0f ? fabsf(wi.z) * PT_INV_PI : 0.0f;
     *pdf_solid = pdf;
     return v3_scale(b->reflectance, pdf);
 }
 
-static inline int pt_diffuse_sample(const struct pt_bsdf *b, pt_vec3 wo, float u0, float u1, struct pt_bsdf_sample *out)
+static inline int pt_diffuse_sample(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, float u_lobe, float u0, float u1,
+                                    struct pt_bsdf_sample *out)
 {
+    (void)fx;
+    (void)u_lobe;
     pt_vec3 wi = pt_sample_cosine(u0, u1);
     out->pdf_solid = wi.z * PT_INV_PI;
     wi.z = copysignf(wi.z, wo.z);
@@ -23,39 +50,6 @@ static inline int pt_diffuse_sample(const struct pt_bsdf *b, pt_vec3 wo, float u
     out->weight = b->reflectance;
     out->eta_scale = 1.0f;
     out->flags = 0;
-    return 1;
-}
-
-/* Chance of reflecting rather than transmitting; 0 for a black surface. */
-static inline float pt_diffuse_transmission_choice(const struct pt_bsdf *b)
-{
-    float r = v3_max(b->reflectance), t = v3_max(b->transmittance);
-    return r + t > 0.0f ? r / (r + t) : 0.0f;
-}
-
-static inline pt_vec3 pt_diffuse_transmission_eval(const struct pt_bsdf *b, pt_vec3 wo, pt_vec3 wi, float *pdf_solid)
-{
-    float pr = pt_diffuse_transmission_choice(b), cosine = fabsf(wi.z) * PT_INV_PI;
-    int reflected = wo.z * wi.z > 0.0f;
-    *pdf_solid = cosine * (reflected ? pr : 1.0f - pr);
-    return v3_scale(reflected ? b->reflectance : b->transmittance, cosine);
-}
-
-static inline int pt_diffuse_transmission_sample(const struct pt_bsdf *b, pt_vec3 wo, float u_lobe, float u0, float u1,
-                                                 struct pt_bsdf_sample *out)
-{
-    float pr = pt_diffuse_transmission_choice(b);
-    int reflected = u_lobe < pr;
-    float p = reflected ? pr : 1.0f - pr;
-    pt_vec3 wi = pt_sample_cosine(u0, u1), colour = reflected ? b->reflectance : b->transmittance;
-    if (v3_is_black(colour))
-        return 0;
-    out->pdf_solid = wi.z * PT_INV_PI * p;
-    wi.z = copysignf(wi.z, reflected ? wo.z : -wo.z);
-    out->wi = wi;
-    out->weight = v3_scale(colour, 1.0f / p);
-    out->eta_scale = 1.0f;
-    out->flags = reflected ? 0 : PT_SCATTER_TRANSMIT;
     return 1;
 }
 

@@ -1,5 +1,5 @@
 /*
- * Directional albedos of a dielectric coating, as the coated materials need them (bsdf_coated.h).
+ * Directional albedos of a dielectric coating, as the coated materials need them (bsdf_coated_diffuse.h).
  *
  * A table is one block of floats made when the scene is built: rows for one or several roughnesses (one when the material's
  * roughness is constant), each with the internal diffuse reflectance, then A(μ), then the interface's own reflection albedo,

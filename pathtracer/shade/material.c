@@ -1,5 +1,6 @@
 #include "shade/material.h"
 
+#include "shade/bsdf_models.h"
 #include "shade/coat_table.h"
 
 /* Unit, on the side of the geometric normal; `fallback` when there is no direction left. */
@@ -21,7 +22,7 @@ static pt_vec3 normal_from_map(const struct pt_scene *scene, const struct pt_mat
 
 pt_vec3 pt_material_bumped_normal(const struct pt_scene *scene, const struct pt_material *m, const struct pt_surface *s)
 {
-    if (m->normal_map >= 0)
+    if (m->normal_map)
         return normal_from_map(scene, m, s);
     float du, dv;
     pt_texture_step(scene, m->bump, &du, &dv);
@@ -33,48 +34,46 @@ pt_vec3 pt_material_bumped_normal(const struct pt_scene *scene, const struct pt_
     return keep_side(v3_cross(tangent_u, tangent_v), s->n_geometric, s->n_shading);
 }
 
-static pt_effects input_effects(const struct pt_input *in) { return in->texture >= 0 ? PT_FX_TEXTURE : 0; }
+static pt_effects input_effects(const struct pt_input *in) { return in->texture ? PT_FX_TEXTURE : 0; }
 
 /* Whether a roughness can be smooth, can be rough, as effects. */
 static pt_effects roughness_effects(const struct pt_material *m, const struct pt_input *u, const struct pt_input *v)
 {
-    if (u->texture >= 0 || v->texture >= 0)
-        return PT_FX_SPECULAR | PT_FX_GLOSSY;
+    if (u->texture || v->texture)
+        return PT_FX_SPECULAR | PT_FX_GLOSSY | PT_FX_TEXTURE;
     float x = fmaxf(u->value.x, v->value.x);
     return (m->remap_roughness ? pt_roughness_to_alpha(x) : x) >= PT_ALPHA_SMOOTH ? PT_FX_GLOSSY : PT_FX_SPECULAR;
+}
+
+static pt_effects read_effects(const struct pt_material *m, const struct pt_bsdf_read *read)
+{
+    switch (read->kind) {
+    case PT_READ_COLOUR:
+    case PT_READ_NUMBER:
+        return input_effects((const struct pt_input *)((const char *)m + read->field));
+    case PT_READ_ROUGHNESS:
+        return roughness_effects(m, &m->roughness_u, &m->roughness_v);
+    case PT_READ_BASE_ROUGHNESS:
+        return roughness_effects(m, &m->base_roughness_u, &m->base_roughness_v);
+    case PT_READ_METAL:
+        return m->conductor_by_colour ? input_effects(&m->reflectance) : input_effects(&m->eta_rgb) | input_effects(&m->k_rgb);
+    default:
+        return 0;
+    }
 }
 
 pt_effects pt_material_effects(const struct pt_scene *scene, int32_t id)
 {
     const struct pt_material *m = &scene->materials[id];
-    pt_effects surface = input_effects(&m->roughness_u) | input_effects(&m->roughness_v) |
-                         roughness_effects(m, &m->roughness_u, &m->roughness_v);
-    pt_effects fx = m->bump >= 0 || m->normal_map >= 0 ? PT_FX_BUMP | PT_FX_TEXTURE : 0;
-    pt_effects colour = input_effects(&m->reflectance);
-    pt_effects metal = input_effects(&m->eta_rgb) | input_effects(&m->k_rgb) | (m->conductor_by_colour ? colour : 0);
-    pt_effects layer = PT_FX_COATED | input_effects(&m->thickness) | input_effects(&m->g) | input_effects(&m->albedo);
-    switch (m->kind) {
-    case PT_MATERIAL_DIFFUSE:
-        return fx | colour;
-    case PT_MATERIAL_CONDUCTOR:
-        return fx | surface | metal;
-    case PT_MATERIAL_DIELECTRIC:
-        return fx | PT_FX_TRANSMISSION | surface;
-    case PT_MATERIAL_THIN_DIELECTRIC:
-        return fx | PT_FX_TRANSMISSION | PT_FX_SPECULAR;
-    case PT_MATERIAL_DIFFUSE_TRANSMISSION:
-        return fx | PT_FX_TRANSMISSION | colour | input_effects(&m->transmittance);
-    case PT_MATERIAL_COATED_DIFFUSE:
-        return fx | layer | surface | colour;
-    case PT_MATERIAL_COATED_CONDUCTOR:
-        return fx | layer | surface | metal | input_effects(&m->base_roughness_u) | input_effects(&m->base_roughness_v) |
-               roughness_effects(m, &m->base_roughness_u, &m->base_roughness_v);
-    case PT_MATERIAL_MIX: /* smaller ids: the recursion ends */
+    if (m->kind == PT_MATERIAL_INTERFACE)
+        return PT_FX_INTERFACE;
+    if (m->kind == PT_MATERIAL_MIX) /* smaller ids: the recursion ends */
         return PT_FX_MIX | input_effects(&m->mix_amount) | pt_material_effects(scene, m->mix_a) |
                pt_material_effects(scene, m->mix_b);
-    default:
-        return PT_FX_INTERFACE;
-    }
+    pt_effects fx = pt_bsdf_models[m->kind].needs | (m->bump || m->normal_map ? PT_FX_BUMP | PT_FX_TEXTURE : 0);
+    for (const struct pt_bsdf_read *read = pt_bsdf_models[m->kind].reads; read->kind != PT_READ_END; read++)
+        fx |= read_effects(m, read);
+    return fx;
 }
 
 struct coat_key {
@@ -86,7 +85,7 @@ static struct coat_key coat_key(const struct pt_scene *scene, const struct pt_ma
 {
     struct pt_surface s = {0};
     struct coat_key key = {.eta = m->eta, .thickness = fmaxf(0.0f, m->thickness.value.x), .rows = 1};
-    if (m->roughness_u.texture >= 0 || m->roughness_v.texture >= 0) {
+    if (m->roughness_u.texture || m->roughness_v.texture) {
         key.rows = PT_COAT_TEXTURED_ROWS;
         key.alpha_max = 1.0f;
         return key;
@@ -107,7 +106,7 @@ static const float *find_table(const struct pt_scene *scene, int32_t before, con
 {
     for (int32_t i = 0; i < before; i++) {
         const struct pt_material *m = &scene->materials[i];
-        if (m->kind == PT_MATERIAL_COATED_DIFFUSE && m->coat_table) {
+        if (m->kind == PT_BSDF_COATED_DIFFUSE && m->coat_table) {
             struct coat_key other = coat_key(scene, m);
             if (same_key(key, &other))
                 return m->coat_table;
@@ -124,7 +123,7 @@ int pt_materials_build(struct pt_scene *scene, struct base_err *err)
         m->transmittance.value = pt_clamp_unit(m->transmittance.value);
         m->albedo.value = pt_clamp_unit(m->albedo.value);
         m->coat_table = NULL;
-        if (m->kind != PT_MATERIAL_COATED_DIFFUSE)
+        if (m->kind != PT_BSDF_COATED_DIFFUSE)
             continue;
         struct coat_key key = coat_key(scene, m);
         m->coat_table = find_table(scene, i, &key);

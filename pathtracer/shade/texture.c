@@ -99,15 +99,15 @@ static pt_vec3 eval_image(const struct pt_scene *scene, const struct pt_texture 
     return v3(fmaxf(value.x, 0.0f), fmaxf(value.y, 0.0f), fmaxf(value.z, 0.0f));
 }
 
-/* Recursion ends: inputs of a texture have smaller ids. The loader bounds the depth. */
+/* Recursion ends: inputs of a texture have smaller numbers. The loader bounds the depth. */
 static pt_vec3 eval_input(const struct pt_scene *scene, const struct pt_input *in, float u, float v)
 {
-    return in->texture >= 0 ? pt_texture_eval(scene, in->texture, u, v) : in->value;
+    return in->texture ? pt_texture_eval(scene, in->texture, u, v) : in->value;
 }
 
-pt_vec3 pt_texture_eval(const struct pt_scene *scene, int32_t id, float u, float v)
+pt_vec3 pt_texture_eval(const struct pt_scene *scene, int32_t number, float u, float v)
 {
-    const struct pt_texture *t = &scene->textures[id];
+    const struct pt_texture *t = &scene->textures[number - 1];
     float s = t->su * u + t->du, w = t->sv * v + t->dv;
     pt_texture_lookups++;
     switch (t->kind) {
@@ -135,9 +135,9 @@ pt_vec3 pt_texture_eval(const struct pt_scene *scene, int32_t id, float u, float
     }
 }
 
-void pt_texture_step(const struct pt_scene *scene, int32_t id, float *step_u, float *step_v)
+void pt_texture_step(const struct pt_scene *scene, int32_t number, float *step_u, float *step_v)
 {
-    const struct pt_texture *t = &scene->textures[id];
+    const struct pt_texture *t = &scene->textures[number - 1];
     *step_u = *step_v = 5e-4f; /* for textures without texels */
     if (t->kind == PT_TEXTURE_IMAGE) {
         const struct pt_image_map *image = &scene->images[t->image];
@@ -148,7 +148,7 @@ void pt_texture_step(const struct pt_scene *scene, int32_t id, float *step_u, fl
     }
     float finest_u = INFINITY, finest_v = INFINITY;
     for (int i = 0; i < 4; i++) {
-        if (t->in[i].texture >= 0 && t->in[i].texture < id) {
+        if (t->in[i].texture && t->in[i].texture < number) {
             float du, dv;
             pt_texture_step(scene, t->in[i].texture, &du, &dv);
             finest_u = fminf(finest_u, du);

@@ -12,11 +12,11 @@
 /* Number of texture evaluations of this thread so far: lets tests prove that untextured scenes make none. */
 extern _Thread_local unsigned long long pt_texture_lookups;
 
-/* Value of texture `id` at surface parameters (u, v). A float texture is the same in x, y, z. Finite for finite images. */
-pt_vec3 pt_texture_eval(const struct pt_scene *scene, int32_t id, float u, float v);
+/* Value of texture `number` at surface parameters (u, v). A float texture is the same in x, y, z. Finite for finite images. */
+pt_vec3 pt_texture_eval(const struct pt_scene *scene, int32_t number, float u, float v);
 
-/* Step in u and v over which texture `id` is to be differenced: about one texel of the finest image in it. */
-void pt_texture_step(const struct pt_scene *scene, int32_t id, float *step_u, float *step_v);
+/* Step in u and v over which texture `number` is to be differenced: about one texel of the finest image in it. */
+void pt_texture_step(const struct pt_scene *scene, int32_t number, float *step_u, float *step_v);
 
 /* Texel (x, y), wrapped, as linear RGB (grey and float images: in x, y, z alike); alpha when channel is 3, the mean of RGB
  * when it is -1. */
@@ -29,14 +29,14 @@ pt_vec3 pt_image_bilinear(const struct pt_image_map *image, int32_t wrap, int32_
 
 static inline pt_vec3 pt_input_rgb(pt_effects fx, const struct pt_scene *scene, const struct pt_input *in, float u, float v)
 {
-    if ((fx & PT_FX_TEXTURE) && in->texture >= 0)
+    if ((fx & PT_FX_TEXTURE) && in->texture)
         return pt_texture_eval(scene, in->texture, u, v);
     return in->value;
 }
 
 static inline float pt_input_float(pt_effects fx, const struct pt_scene *scene, const struct pt_input *in, float u, float v)
 {
-    if ((fx & PT_FX_TEXTURE) && in->texture >= 0)
+    if ((fx & PT_FX_TEXTURE) && in->texture)
         return pt_texture_eval(scene, in->texture, u, v).x;
     return in->value.x;
 }

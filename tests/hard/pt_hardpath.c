@@ -224,8 +224,8 @@ static void grazing(void **state)
         struct pt_scene scene;
         test_scene_begin(&scene);
         test_camera(&scene, v3(0, 1e-3f, 0), v3(0, 0, 10), v3(0, 1, 0), 1e-3f, 8);
-        int32_t id = test_add_material(&scene, kind ? PT_MATERIAL_CONDUCTOR : PT_MATERIAL_DIFFUSE);
-        scene.materials[id].roughness_u = scene.materials[id].roughness_v = (struct pt_input){-1, {0.1f, 0.1f, 0.1f}};
+        int32_t id = test_add_material(&scene, kind ? PT_BSDF_CONDUCTOR : PT_BSDF_DIFFUSE);
+        scene.materials[id].roughness_u = scene.materials[id].roughness_v = (struct pt_input){0, {0.1f, 0.1f, 0.1f}};
         test_add_quad(&scene, id, v3(-1000, 0, -1000), v3(0, 0, 2000), v3(2000, 0, 0));
         struct pt_light sky = {.kind = PT_LIGHT_ENV_CONSTANT, .shape = -1, .image = -1, .emission = {1, 1, 1}};
         test_add_light(&scene, &sky);
@@ -253,7 +253,7 @@ static void matched_and_total(void **state)
     double base_error, error;
     pt_vec3 base = mean_of(&scene, &settings, 128, &base_error);
     pt_accel_release(&scene);
-    int32_t glass = test_add_material(&scene, PT_MATERIAL_DIELECTRIC);
+    int32_t glass = test_add_material(&scene, PT_BSDF_DIELECTRIC);
     scene.materials[glass].eta = 1.0f;
     test_add_sphere(&scene, glass, v3(0, 1, 0.2f), 0.5f);
     test_scene_finish(&scene);
@@ -266,7 +266,7 @@ static void matched_and_total(void **state)
      * seen, the emitting wall inside (radiance 2) must. */
     test_scene_begin(&scene);
     test_camera(&scene, v3(0, -0.5f, -3), v3(0, 0, 0), v3(0, 1, 0), 0.01f, 4);
-    glass = test_add_material(&scene, PT_MATERIAL_DIELECTRIC);
+    glass = test_add_material(&scene, PT_BSDF_DIELECTRIC);
     int32_t black = test_add_diffuse(&scene, v3_splat(0.0f));
     test_add_quad(&scene, glass, v3(-50, 0, -50), v3(0, 0, 100), v3(100, 0, 0));
     test_add_area_light(&scene, test_add_quad(&scene, black, v3(-50, -20, 6), v3(0, 20, 0), v3(100, 0, 0)), v3_splat(2.0f), 1);
@@ -286,7 +286,7 @@ static void endless_mirrors(void **state)
     struct pt_scene scene;
     test_scene_begin(&scene);
     test_camera(&scene, v3(0.1f, 0.2f, 0.3f), v3(0, 0, -1), v3(0, 1, 0), 90.0f, 4);
-    int32_t mirror = test_add_material(&scene, PT_MATERIAL_DIELECTRIC);
+    int32_t mirror = test_add_material(&scene, PT_BSDF_DIELECTRIC);
     scene.materials[mirror].eta = 1e4f; /* reflects all but 4e-4 at normal incidence, and all from within */
     test_add_box(&scene, mirror, v3(-1, -1, -1), v3(1, 1, 1), 0);
     test_scene_finish(&scene);

@@ -73,7 +73,7 @@ static void samples_follow_the_density(void **state)
     static struct chi2 c;
     for (int i = 0; i < n; i++) {
         for (int k = 0; k < COSINES; k++) {
-            if (pt_bsdf_is_walked(&cases[i].b) && !pt_coated_walk_is_delta(&cases[i].b))
+            if (bsdf_is_walked(&cases[i].b) && !pt_coat_walk_is_delta(&cases[i].b))
                 continue; /* their pdf is a fit: walked_samples_follow_the_value */
             struct pdf_of data = {&cases[i].b, case_direction(cosines[k])};
             struct pt_rng rng = pt_rng_make((uint64_t)(SEED + 100 * i + k));
@@ -161,7 +161,7 @@ static void weights_are_f_cos_over_pdf(void **state)
     const float tolerance = 5e-3f;
     struct bsdf_case cases[CASES_MAX];
     for (int i = 0, n = all_cases(cases); i < n; i++) {
-        if (pt_bsdf_is_walked(&cases[i].b))
+        if (bsdf_is_walked(&cases[i].b))
             continue;
         struct pt_rng rng = pt_rng_make((uint64_t)(SEED + i));
         for (int s = 0; s < 4000; s++) {
@@ -188,7 +188,7 @@ static void scattering_is_reciprocal(void **state)
     for (int i = 0, n = all_cases(cases); i < n; i++) {
         struct pt_bsdf b = cases[i].b;
         struct pt_rng rng = pt_rng_make((uint64_t)(SEED + i));
-        int walked = pt_bsdf_is_walked(&b), keys = walked ? 20000 : 1;
+        int walked = bsdf_is_walked(&b), keys = walked ? 20000 : 1;
         for (int s = 0; s < (walked ? 4 : 2000); s++) {
             pt_vec3 wo = pt_sample_sphere(pt_rng_float(&rng), pt_rng_float(&rng));
             pt_vec3 wi = pt_sample_sphere(pt_rng_float(&rng), pt_rng_float(&rng));

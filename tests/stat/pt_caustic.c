@@ -30,10 +30,10 @@ static void begin(struct bench *b, float alpha, float eta)
     test_scene_begin(s);
     test_camera(s, v3(0, 0, 4), v3(0, 0, 0), v3(0, 1, 0), 30.0f, SIZE);
     s->camera.kind = PT_CAMERA_ORTHOGRAPHIC; /* sees the square [-1, 1]² of the screen */
-    int32_t film = test_add_material(s, PT_MATERIAL_DIFFUSE_TRANSMISSION);
+    int32_t film = test_add_material(s, PT_BSDF_DIFFUSE_TRANSMISSION);
     s->materials[film].reflectance.value = v3_splat(0.0f);
     s->materials[film].transmittance.value = v3_splat(1.0f);
-    int32_t glass = test_add_material(s, PT_MATERIAL_DIELECTRIC), black = test_add_diffuse(s, v3_splat(0.0f));
+    int32_t glass = test_add_material(s, PT_BSDF_DIELECTRIC), black = test_add_diffuse(s, v3_splat(0.0f));
     s->materials[glass].eta = eta;
     s->materials[glass].roughness_u.value = s->materials[glass].roughness_v.value = v3_splat(alpha);
     b->screen = test_add_quad(s, film, v3(-1, -1, 0), v3(2, 0, 0), v3(0, 2, 0));

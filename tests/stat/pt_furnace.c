@@ -29,7 +29,7 @@ static void sphere_scene(struct pt_scene *scene)
     add_environment(scene, 1.0f);
 }
 
-static struct pt_input grey(float x) { return (struct pt_input){-1, {x, x, x}}; }
+static struct pt_input grey(float x) { return (struct pt_input){0, {x, x, x}}; }
 
 struct furnace {
     const char *name;
@@ -43,30 +43,30 @@ static void every_bsdf(void **state)
 {
     (void)state;
     static const struct furnace cases[] = {
-        {"diffuse", PT_MATERIAL_DIFFUSE, 0.0f, 1.5f, 0.9999, 1.0001},
-        {"mirror", PT_MATERIAL_CONDUCTOR, 0.0f, 1.5f, 0.999, 1.0001},
-        {"rough metal 1e-4", PT_MATERIAL_CONDUCTOR, 1e-4f, 1.5f, 0.999, 1.001},
-        {"rough metal 0.01", PT_MATERIAL_CONDUCTOR, 0.01f, 1.5f, 0.99, 1.001},
-        {"rough metal 0.1", PT_MATERIAL_CONDUCTOR, 0.1f, 1.5f, 0.97, 1.001},
-        {"rough metal 1", PT_MATERIAL_CONDUCTOR, 1.0f, 1.5f, 0.3, 1.001},
-        {"glass", PT_MATERIAL_DIELECTRIC, 0.0f, 1.5f, 0.995, 1.005},
-        {"matched glass", PT_MATERIAL_DIELECTRIC, 0.0f, 1.0f, 0.9999, 1.0001},
-        {"bubble", PT_MATERIAL_DIELECTRIC, 0.0f, 0.667f, 0.995, 1.005},
-        {"rough glass 1e-4", PT_MATERIAL_DIELECTRIC, 1e-4f, 1.5f, 0.99, 1.005},
-        {"rough glass 0.1", PT_MATERIAL_DIELECTRIC, 0.1f, 1.5f, 0.95, 1.005},
-        {"rough glass 1", PT_MATERIAL_DIELECTRIC, 1.0f, 1.5f, 0.3, 1.005},
-        {"thin glass", PT_MATERIAL_THIN_DIELECTRIC, 0.0f, 1.5f, 0.995, 1.005},
-        {"diffuse transmission", PT_MATERIAL_DIFFUSE_TRANSMISSION, 0.0f, 1.5f, 0.995, 1.005},
-        {"coated diffuse", PT_MATERIAL_COATED_DIFFUSE, 0.0f, 1.5f, 0.8, 1.01},
-        {"coated diffuse rough", PT_MATERIAL_COATED_DIFFUSE, 0.3f, 1.5f, 0.6, 1.01},
-        {"coated metal", PT_MATERIAL_COATED_CONDUCTOR, 0.0f, 1.5f, 0.6, 1.01},
+        {"diffuse", PT_BSDF_DIFFUSE, 0.0f, 1.5f, 0.9999, 1.0001},
+        {"mirror", PT_BSDF_CONDUCTOR, 0.0f, 1.5f, 0.999, 1.0001},
+        {"rough metal 1e-4", PT_BSDF_CONDUCTOR, 1e-4f, 1.5f, 0.999, 1.001},
+        {"rough metal 0.01", PT_BSDF_CONDUCTOR, 0.01f, 1.5f, 0.99, 1.001},
+        {"rough metal 0.1", PT_BSDF_CONDUCTOR, 0.1f, 1.5f, 0.97, 1.001},
+        {"rough metal 1", PT_BSDF_CONDUCTOR, 1.0f, 1.5f, 0.3, 1.001},
+        {"glass", PT_BSDF_DIELECTRIC, 0.0f, 1.5f, 0.995, 1.005},
+        {"matched glass", PT_BSDF_DIELECTRIC, 0.0f, 1.0f, 0.9999, 1.0001},
+        {"bubble", PT_BSDF_DIELECTRIC, 0.0f, 0.667f, 0.995, 1.005},
+        {"rough glass 1e-4", PT_BSDF_DIELECTRIC, 1e-4f, 1.5f, 0.99, 1.005},
+        {"rough glass 0.1", PT_BSDF_DIELECTRIC, 0.1f, 1.5f, 0.95, 1.005},
+        {"rough glass 1", PT_BSDF_DIELECTRIC, 1.0f, 1.5f, 0.3, 1.005},
+        {"thin glass", PT_BSDF_THIN_DIELECTRIC, 0.0f, 1.5f, 0.995, 1.005},
+        {"diffuse transmission", PT_BSDF_DIFFUSE_TRANSMISSION, 0.0f, 1.5f, 0.995, 1.005},
+        {"coated diffuse", PT_BSDF_COATED_DIFFUSE, 0.0f, 1.5f, 0.8, 1.01},
+        {"coated diffuse rough", PT_BSDF_COATED_DIFFUSE, 0.3f, 1.5f, 0.6, 1.01},
+        {"coated metal", PT_BSDF_COATED_CONDUCTOR, 0.0f, 1.5f, 0.6, 1.01},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         struct pt_scene scene;
         sphere_scene(&scene);
         int32_t id = test_add_material(&scene, cases[i].kind);
         struct pt_material *m = &scene.materials[id];
-        m->reflectance = grey(cases[i].kind == PT_MATERIAL_DIFFUSE_TRANSMISSION ? 0.4f : 1.0f);
+        m->reflectance = grey(cases[i].kind == PT_BSDF_DIFFUSE_TRANSMISSION ? 0.4f : 1.0f);
         m->transmittance = grey(0.6f);
         m->roughness_u = m->roughness_v = m->base_roughness_u = m->base_roughness_v = grey(cases[i].roughness);
         m->conductor_by_colour = 1;

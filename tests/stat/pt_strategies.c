@@ -46,7 +46,7 @@ static void lossless_media_vanish(void **state)
     for (int i = 0; i < 4; i++) {
         struct pt_scene scene;
         begin(&scene, 25.0f);
-        int32_t id = test_add_material(&scene, i == 2 ? PT_MATERIAL_DIELECTRIC : PT_MATERIAL_INTERFACE);
+        int32_t id = test_add_material(&scene, i == 2 ? PT_BSDF_DIELECTRIC : PT_MATERIAL_INTERFACE);
         int32_t shape = test_add_sphere(&scene, id, v3(0, 0, 0), 1.0f);
         int32_t medium = test_add_medium(&scene, v3_splat(0.0f), i == 1 ? v3(0.5f, 2.0f, 1.0f) : v3_splat(2.0f), i == 1 ? 0.7f : -0.3f);
         if (i == 3) {
@@ -76,15 +76,15 @@ static void light_sampling_changes_no_mean(void **state)
         int32_t kind;
         float alpha, base_alpha, albedo;
     } cases[] = {
-        {"diffuse", PT_MATERIAL_DIFFUSE, 0.0f, 0.0f, 0.0f},
-        {"conductor", PT_MATERIAL_CONDUCTOR, 0.3f, 0.0f, 0.0f},
-        {"dielectric", PT_MATERIAL_DIELECTRIC, 0.3f, 0.0f, 0.0f},
-        {"diffuse transmission", PT_MATERIAL_DIFFUSE_TRANSMISSION, 0.0f, 0.0f, 0.0f},
-        {"coated diffuse, smooth", PT_MATERIAL_COATED_DIFFUSE, 0.0f, 0.0f, 0.0f},
-        {"coated diffuse", PT_MATERIAL_COATED_DIFFUSE, 0.2f, 0.0f, 0.0f},
-        {"coated diffuse, cloudy", PT_MATERIAL_COATED_DIFFUSE, 0.2f, 0.0f, 0.8f},
-        {"coated conductor", PT_MATERIAL_COATED_CONDUCTOR, 0.2f, 0.15f, 0.0f},
-        {"coated conductor, smooth", PT_MATERIAL_COATED_CONDUCTOR, 0.0f, 0.25f, 0.0f},
+        {"diffuse", PT_BSDF_DIFFUSE, 0.0f, 0.0f, 0.0f},
+        {"conductor", PT_BSDF_CONDUCTOR, 0.3f, 0.0f, 0.0f},
+        {"dielectric", PT_BSDF_DIELECTRIC, 0.3f, 0.0f, 0.0f},
+        {"diffuse transmission", PT_BSDF_DIFFUSE_TRANSMISSION, 0.0f, 0.0f, 0.0f},
+        {"coated diffuse, smooth", PT_BSDF_COATED_DIFFUSE, 0.0f, 0.0f, 0.0f},
+        {"coated diffuse", PT_BSDF_COATED_DIFFUSE, 0.2f, 0.0f, 0.0f},
+        {"coated diffuse, cloudy", PT_BSDF_COATED_DIFFUSE, 0.2f, 0.0f, 0.8f},
+        {"coated conductor", PT_BSDF_COATED_CONDUCTOR, 0.2f, 0.15f, 0.0f},
+        {"coated conductor, smooth", PT_BSDF_COATED_CONDUCTOR, 0.0f, 0.25f, 0.0f},
     };
     enum { N = sizeof cases / sizeof cases[0] };
     for (int i = 0; i < N; i++) {

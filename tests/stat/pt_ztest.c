@@ -86,15 +86,15 @@ static void cornell(void **state)
     test_scene_end(&scene);
 }
 
-static struct pt_input grey(float x) { return (struct pt_input){-1, {x, x, x}}; }
+static struct pt_input grey(float x) { return (struct pt_input){0, {x, x, x}}; }
 
 /* Spheres as lights of two sizes, over rough metal and coated floors, an image environment above. */
 static void glossy_scene(struct pt_scene *scene)
 {
     test_scene_begin(scene);
     test_camera(scene, v3(0, 2, -6), v3(0, 0.5f, 0), v3(0, 1, 0), 40.0f, 32);
-    int32_t metal = test_add_material(scene, PT_MATERIAL_CONDUCTOR), coat = test_add_material(scene, PT_MATERIAL_COATED_DIFFUSE);
-    int32_t glass = test_add_material(scene, PT_MATERIAL_DIELECTRIC), black = test_add_diffuse(scene, v3_splat(0.0f));
+    int32_t metal = test_add_material(scene, PT_BSDF_CONDUCTOR), coat = test_add_material(scene, PT_BSDF_COATED_DIFFUSE);
+    int32_t glass = test_add_material(scene, PT_BSDF_DIELECTRIC), black = test_add_diffuse(scene, v3_splat(0.0f));
     scene->materials[metal].roughness_u = grey(0.2f);
     scene->materials[metal].roughness_v = grey(0.3f);
     scene->materials[coat].roughness_u = scene->materials[coat].roughness_v = grey(0.25f);

@@ -82,6 +82,12 @@ static inline struct pt_bsdf bsdf_scattering_coat(float alpha, float albedo, flo
     return b;
 }
 
+/* Coatings that only the walk can evaluate: their value is one estimate of many. */
+static inline int bsdf_is_walked(const struct pt_bsdf *b)
+{
+    return b->kind == PT_BSDF_COATED_CONDUCTOR || (b->kind == PT_BSDF_COATED_DIFFUSE && !v3_is_black(b->albedo));
+}
+
 /* Unit vector with cosine mu, not in a coordinate plane. */
 static inline pt_vec3 case_direction(float mu)
 {

@@ -89,24 +89,22 @@ void test_camera(struct pt_scene *scene, pt_vec3 eye, pt_vec3 at, pt_vec3 up, fl
     c->medium = -1;
 }
 
-static struct pt_input constant(float x, float y, float z) { return (struct pt_input){-1, {x, y, z}}; }
+static struct pt_input constant(float x, float y, float z) { return (struct pt_input){.value = {x, y, z}}; }
 
 int32_t test_add_material(struct pt_scene *scene, int32_t kind)
 {
     assert(scene->material_count < TEST_ROOM);
     struct pt_material *m = &scene->materials[scene->material_count];
-    struct pt_input zero = constant(0, 0, 0);
-    *m = (struct pt_material){.kind = kind, .bump = -1, .normal_map = -1, .mix_a = -1, .mix_b = -1, .mix_amount = constant(0.5f, 0.5f, 0.5f),
+    *m = (struct pt_material){.kind = kind, .mix_amount = constant(0.5f, 0.5f, 0.5f),
                               .reflectance = constant(0.5f, 0.5f, 0.5f), .transmittance = constant(0.25f, 0.25f, 0.25f),
-                              .roughness_u = zero, .roughness_v = zero, .base_roughness_u = zero, .base_roughness_v = zero,
                               .eta_rgb = constant(0.2f, 0.9f, 1.1f), .k_rgb = constant(3.9f, 2.4f, 2.2f),
-                              .thickness = constant(0.01f, 0.01f, 0.01f), .g = zero, .albedo = zero, .eta = 1.5f};
+                              .thickness = constant(0.01f, 0.01f, 0.01f), .eta = 1.5f};
     return scene->material_count++;
 }
 
 int32_t test_add_diffuse(struct pt_scene *scene, pt_vec3 reflectance)
 {
-    int32_t id = test_add_material(scene, PT_MATERIAL_DIFFUSE);
+    int32_t id = test_add_material(scene, PT_BSDF_DIFFUSE);
     scene->materials[id].reflectance = constant(reflectance.x, reflectance.y, reflectance.z);
     return id;
 }

@@ -11,11 +11,10 @@
 
 static int near(float a, float b) { return fabsf(a - b) < 1e-5f; }
 
-#define CONST(v) {.texture = -1, .value = {v, v, v}}
+#define CONST(v) {.value = {v, v, v}}
 #define ROUGH(r) .roughness_u = CONST(r), .roughness_v = CONST(r)
-#define PLAIN .bump = -1, .normal_map = -1, .reflectance = CONST(0.5f), .transmittance = CONST(0.25f), .albedo = CONST(0.0f), \
-        .thickness = CONST(0.01f), .g = CONST(0.0f), .eta_rgb = CONST(0.2f), .k_rgb = CONST(3.0f), \
-        .base_roughness_u = CONST(0.0f), .base_roughness_v = CONST(0.0f), .eta = 1.5f
+#define PLAIN .reflectance = CONST(0.5f), .transmittance = CONST(0.25f), .thickness = CONST(0.01f), .eta_rgb = CONST(0.2f), \
+        .k_rgb = CONST(3.0f), .eta = 1.5f
 
 static void fresnel_of_glass(void **state)
 {
@@ -95,7 +94,7 @@ static void roughness_is_remapped_as_in_pbrt(void **state)
         float alpha;
     } cases[] = {{0.25f, 1, 0.5f}, {0.25f, 0, 0.25f}, {0.0f, 1, 0.0f}, {5e-4f, 0, 0.0f}, {2e-3f, 0, 2e-3f}, {4.0f, 0, 1.0f}, {-1.0f, 1, 0.0f}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        struct pt_material m = {.kind = PT_MATERIAL_CONDUCTOR, .remap_roughness = cases[i].remap, PLAIN, ROUGH(cases[i].roughness)};
+        struct pt_material m = {.kind = PT_BSDF_CONDUCTOR, .remap_roughness = cases[i].remap, PLAIN, ROUGH(cases[i].roughness)};
         struct pt_bsdf b;
         pt_material_bsdf(PT_FX_ALL, &scene, &m, &s, &b);
         assert_int_equal(b.kind, PT_BSDF_CONDUCTOR);
@@ -107,12 +106,12 @@ static void effects_are_those_the_closure_needs(void **state)
 {
     (void)state;
     struct pt_material materials[] = {
-        {.kind = PT_MATERIAL_DIFFUSE, PLAIN, ROUGH(0.0f)},
-        {.kind = PT_MATERIAL_CONDUCTOR, PLAIN, ROUGH(0.0f)},
-        {.kind = PT_MATERIAL_CONDUCTOR, PLAIN, ROUGH(0.3f)},
-        {.kind = PT_MATERIAL_DIELECTRIC, PLAIN, ROUGH(0.0f)},
-        {.kind = PT_MATERIAL_COATED_DIFFUSE, PLAIN, ROUGH(0.1f)},
-        {.kind = PT_MATERIAL_MIX, .mix_a = 0, .mix_b = 4, .mix_amount = {.texture = 0}, .bump = -1, .normal_map = -1},
+        {.kind = PT_BSDF_DIFFUSE, PLAIN, ROUGH(0.0f)},
+        {.kind = PT_BSDF_CONDUCTOR, PLAIN, ROUGH(0.0f)},
+        {.kind = PT_BSDF_CONDUCTOR, PLAIN, ROUGH(0.3f)},
+        {.kind = PT_BSDF_DIELECTRIC, PLAIN, ROUGH(0.0f)},
+        {.kind = PT_BSDF_COATED_DIFFUSE, PLAIN, ROUGH(0.1f)},
+        {.kind = PT_MATERIAL_MIX, .mix_a = 0, .mix_b = 4, .mix_amount = {.texture = 1}},
         {.kind = PT_MATERIAL_INTERFACE, PLAIN},
     };
     struct pt_scene scene = {.materials = materials, .material_count = 7};
@@ -128,7 +127,6 @@ static void effects_are_those_the_closure_needs(void **state)
         struct pt_bsdf_sample a, b;
         pt_material_bsdf(expected[i], &scene, &materials[i], &s, &narrow);
         pt_material_bsdf(PT_FX_ALL, &scene, &materials[i], &s, &wide);
-        assert_int_equal(pt_bsdf_effects(&wide), expected[i]);
         for (float u = 0.0f; u < 1.0f; u += 0.09f) {
             pt_vec3 wo = v3_norm(v3(0.3f, 0.1f, u - 0.5f));
             int ra = pt_bsdf_sample(expected[i], &narrow, wo, u, 0.3f, u, &a), rb = pt_bsdf_sample(PT_FX_ALL, &wide, wo, u, 0.3f, u, &b);
@@ -145,9 +143,9 @@ static void coatings_share_tables(void **state)
 {
     (void)state;
     struct pt_material materials[] = {
-        {.kind = PT_MATERIAL_COATED_DIFFUSE, PLAIN, ROUGH(0.1f)},
-        {.kind = PT_MATERIAL_COATED_DIFFUSE, PLAIN, ROUGH(0.1f)},
-        {.kind = PT_MATERIAL_COATED_DIFFUSE, PLAIN, ROUGH(0.2f)},
+        {.kind = PT_BSDF_COATED_DIFFUSE, PLAIN, ROUGH(0.1f)},
+        {.kind = PT_BSDF_COATED_DIFFUSE, PLAIN, ROUGH(0.1f)},
+        {.kind = PT_BSDF_COATED_DIFFUSE, PLAIN, ROUGH(0.2f)},
     };
     materials[1].reflectance.value = v3(2.0f, -1.0f, 0.5f);
     struct pt_scene scene = {.materials = materials, .material_count = 3};
@@ -162,8 +160,8 @@ static void mixes_choose_by_amount(void **state)
 {
     (void)state;
     struct pt_material materials[] = {
-        {.kind = PT_MATERIAL_DIFFUSE, PLAIN, ROUGH(0.0f)},
-        {.kind = PT_MATERIAL_CONDUCTOR, PLAIN, ROUGH(0.0f)},
+        {.kind = PT_BSDF_DIFFUSE, PLAIN, ROUGH(0.0f)},
+        {.kind = PT_BSDF_CONDUCTOR, PLAIN, ROUGH(0.0f)},
         {.kind = PT_MATERIAL_MIX, .mix_a = 0, .mix_b = 1, .mix_amount = CONST(0.25f)},
         {.kind = PT_MATERIAL_MIX, .mix_a = 2, .mix_b = 1, .mix_amount = CONST(0.5f)},
         {.kind = PT_MATERIAL_MIX, .mix_a = 0, .mix_b = 1, .mix_amount = CONST(1.0f)},
@@ -191,8 +189,8 @@ static void bump_tips_the_normal(void **state)
     struct pt_image_map image = {.width = 2, .height = 1, .channels = 1, .type = PT_PIXEL_FLOAT, .gamma = 1, .pixels = slope};
     struct pt_texture texture = {.kind = PT_TEXTURE_IMAGE, .wrap = PT_WRAP_CLAMP, .scale = 1, .su = 0.1f, .sv = 0.1f, .du = 0.4f};
     struct pt_scene scene = {.images = &image, .textures = &texture, .image_count = 1, .texture_count = 1};
-    struct pt_material m = {.kind = PT_MATERIAL_DIFFUSE, PLAIN, ROUGH(0.0f)};
-    m.bump = 0;
+    struct pt_material m = {.kind = PT_BSDF_DIFFUSE, PLAIN, ROUGH(0.0f)};
+    m.bump = 1;
     /* height = 0.5 · (2 · (0.1 u + 0.4) - 0.5) between the texel centres: slope 0.1 per u; 2 scene units per u */
     for (int side = -1; side <= 1; side += 2) {
         struct pt_surface s = {.u = 0.0f, .v = 0.0f, .n_geometric = {0, 0, (float)side}, .n_shading = {0, 0, (float)side},
@@ -213,8 +211,8 @@ static void normal_maps_are_in_tangent_space(void **state)
     struct pt_image_map image = {.width = 1, .height = 1, .channels = 3, .type = PT_PIXEL_FLOAT, .gamma = 1, .pixels = texel};
     struct pt_texture texture = {.kind = PT_TEXTURE_IMAGE, .wrap = PT_WRAP_REPEAT, .scale = 1, .su = 1, .sv = 1};
     struct pt_scene scene = {.images = &image, .textures = &texture, .image_count = 1, .texture_count = 1};
-    struct pt_material m = {.kind = PT_MATERIAL_DIFFUSE, PLAIN, ROUGH(0.0f)};
-    m.normal_map = 0;
+    struct pt_material m = {.kind = PT_BSDF_DIFFUSE, PLAIN, ROUGH(0.0f)};
+    m.normal_map = 1;
     struct pt_surface s = {.n_geometric = {0, 1, 0}, .n_shading = {0, 1, 0}, .dpdu = {0, 0, 3}, .dpdv = {3, 0, 0}};
     pt_vec3 n = pt_material_frame(PT_FX_ALL, &scene, &m, &s).n;
     assert_true(near(n.x, 0.0f) && near(n.y, 0.8f) && near(n.z, 0.6f));

@@ -140,18 +140,18 @@ static void materials_of_both_versions(void **state)
         "Material \"conductor\" \"spectrum eta\" \"metal-Au-eta\" \"string k\" [ \"metal-Au-k\" ] Shape \"sphere\"\n"
         "Material \"\" Shape \"sphere\" NamedMaterial \"e\" Shape \"sphere\"");
     const struct pt_material *m = s->materials;
-    assert_true(m[0].kind == PT_MATERIAL_DIFFUSE && m[0].reflectance.value.z == 0.3f);
-    assert_true(m[1].kind == PT_MATERIAL_COATED_DIFFUSE && m[1].roughness_u.value.x == 0.1f && !m[1].remap_roughness);
-    assert_true(m[2].kind == PT_MATERIAL_DIELECTRIC && m[2].eta == 1.3f);
-    assert_true(m[3].kind == PT_MATERIAL_CONDUCTOR && m[3].conductor_by_colour);
+    assert_true(m[0].kind == PT_BSDF_DIFFUSE && m[0].reflectance.value.z == 0.3f);
+    assert_true(m[1].kind == PT_BSDF_COATED_DIFFUSE && m[1].roughness_u.value.x == 0.1f && !m[1].remap_roughness);
+    assert_true(m[2].kind == PT_BSDF_DIELECTRIC && m[2].eta == 1.3f);
+    assert_true(m[3].kind == PT_BSDF_CONDUCTOR && m[3].conductor_by_colour);
     /* v3 remaps roughness by a polynomial: 0.1 is alpha 0.4618 */
-    assert_true(m[4].kind == PT_MATERIAL_CONDUCTOR && !m[4].remap_roughness);
+    assert_true(m[4].kind == PT_BSDF_CONDUCTOR && !m[4].remap_roughness);
     near(m[4].roughness_u.value.x, 0.4618, 1e-3);
     /* v3 mixes by the share of the first, v4 by that of the second */
     assert_true(m[5].mix_b == 0 && m[5].mix_a == 3);
     near(m[5].mix_amount.value.x, 0.2, 1e-6);
     assert_true(m[6].mix_a == 0 && m[6].mix_b == 3);
-    assert_true(m[7].remap_roughness && m[7].kind == PT_MATERIAL_COATED_DIFFUSE);
+    assert_true(m[7].remap_roughness && m[7].kind == PT_BSDF_COATED_DIFFUSE);
     assert_true(m[8].eta_rgb.value.z > 1.2f && m[9].kind == PT_MATERIAL_INTERFACE);
     /* only materials in use ask for effects: no mix, no transmission, no mirror */
     pt_effects fx = s->effects;
@@ -171,10 +171,10 @@ static void textures(void **state)
         "Material \"diffuse\" \"texture reflectance\" \"half\" Shape \"sphere\"\n"
         "Material \"diffuse\" \"texture reflectance\" \"check\" Shape \"sphere\" \"texture alpha\" \"mask\"");
     /* constants fold: nothing is looked up for them */
-    assert_int_equal(s->materials[0].reflectance.texture, -1);
+    assert_int_equal(s->materials[0].reflectance.texture, 0);
     near(s->materials[0].reflectance.value.z, 0.3, 1e-6);
-    const struct pt_texture *t = &s->textures[s->materials[1].reflectance.texture];
-    assert_true(t->kind == PT_TEXTURE_CHECKERBOARD && t->su == 8 && t->in[0].texture == -1 && t->in[0].value.x == 0.1f);
+    const struct pt_texture *t = &s->textures[s->materials[1].reflectance.texture - 1];
+    assert_true(t->kind == PT_TEXTURE_CHECKERBOARD && t->su == 8 && !t->in[0].texture && t->in[0].value.x == 0.1f);
     assert_true(s->shapes[1].has_alpha && !s->shapes[0].has_alpha);
     assert_int_equal(s->effects, PT_FX_TEXTURE | PT_FX_ALPHA | PT_FX_QUADRIC);
     pt_scene_destroy(s);

@@ -15,7 +15,7 @@
 #include "shade/texture.h"
 #include "support/pt_scenes.h"
 
-static struct pt_input grey(float x) { return (struct pt_input){-1, {x, x, x}}; }
+static struct pt_input grey(float x) { return (struct pt_input){0, {x, x, x}}; }
 
 /* All but media: glass, metal, coating, a texture with alpha, lens, point light. */
 static void rich_scene(struct pt_scene *scene, int media)
@@ -28,10 +28,10 @@ static void rich_scene(struct pt_scene *scene, int media)
     scene->images[scene->image_count++] = (struct pt_image_map){2, 2, 1, PT_PIXEL_U8_LINEAR, 1.0f, checks};
     scene->textures[scene->texture_count++] =
         (struct pt_texture){.kind = PT_TEXTURE_IMAGE, .image = 0, .scale = 1.0f, .su = 3.0f, .sv = 3.0f};
-    int32_t metal = test_add_material(scene, PT_MATERIAL_CONDUCTOR), coat = test_add_material(scene, PT_MATERIAL_COATED_DIFFUSE);
-    int32_t glass = test_add_material(scene, PT_MATERIAL_DIELECTRIC), black = test_add_diffuse(scene, v3_splat(0.0f));
+    int32_t metal = test_add_material(scene, PT_BSDF_CONDUCTOR), coat = test_add_material(scene, PT_BSDF_COATED_DIFFUSE);
+    int32_t glass = test_add_material(scene, PT_BSDF_DIELECTRIC), black = test_add_diffuse(scene, v3_splat(0.0f));
     int32_t textured = test_add_diffuse(scene, v3_splat(0.5f));
-    scene->materials[textured].reflectance.texture = 0;
+    scene->materials[textured].reflectance.texture = 1;
     scene->materials[metal].roughness_u = grey(0.2f);
     scene->materials[metal].roughness_v = grey(0.3f);
     scene->materials[coat].roughness_u = scene->materials[coat].roughness_v = grey(0.25f);
@@ -41,7 +41,7 @@ static void rich_scene(struct pt_scene *scene, int media)
     test_add_sphere(scene, coat, v3(1.4f, 0.6f, 0), 0.5f);
     int32_t leaf = test_add_quad(scene, textured, v3(-2, 0, 2), v3(4, 0, 0), v3(0, 2, 0));
     scene->shapes[leaf].has_alpha = 1;
-    scene->shapes[leaf].alpha.texture = 0;
+    scene->shapes[leaf].alpha.texture = 1;
     test_add_area_light(scene, test_add_sphere(scene, black, v3(-1.5f, 2.5f, 0.5f), 0.5f), v3(8, 6, 4), 0);
     struct pt_light point = {.kind = PT_LIGHT_POINT, .shape = -1, .image = -1, .emission = {6, 6, 9}, .position = {2, 2, 4}};
     test_add_light(scene, &point);
@@ -106,7 +106,7 @@ static void media_kernel_is_exact(void **state)
     test_cornell(&scene, 24, 1.0f, v3_splat(0.0f));
     pt_accel_release(&scene);
     scene.camera.medium = test_add_medium(&scene, v3(0.1f, 0.2f, 0.3f), v3(0.1f, 0.05f, 0.0f), 0.3f);
-    int32_t glass = test_add_material(&scene, PT_MATERIAL_DIELECTRIC);
+    int32_t glass = test_add_material(&scene, PT_BSDF_DIELECTRIC);
     int32_t ball = test_add_sphere(&scene, glass, v3(0, 1, 0.2f), 0.4f);
     scene.shapes[ball].medium_out = scene.camera.medium;
     scene.shapes[ball].medium_in = test_add_medium(&scene, v3(2, 1, 0), v3_splat(0.0f), 0.0f);

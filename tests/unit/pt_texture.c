@@ -62,7 +62,7 @@ static void bilinear_interpolates_between_centres(void **state)
         assert_true(v3_is_finite(pt_image_bilinear(r, PT_WRAP_REPEAT, 0, odd[i], odd[i])));
 }
 
-#define CONST(v) {.texture = -1, .value = {v, v, v}}
+#define CONST(v) {.value = {v, v, v}}
 
 static void kinds_of_texture(void **state)
 {
@@ -70,7 +70,7 @@ static void kinds_of_texture(void **state)
     struct pt_texture textures[] = {
         {.kind = PT_TEXTURE_IMAGE, .image = 0, .wrap = PT_WRAP_CLAMP, .scale = 1, .su = 1, .sv = 1},
         {.kind = PT_TEXTURE_IMAGE, .image = 0, .wrap = PT_WRAP_CLAMP, .scale = 0.5f, .invert = 1, .su = 1, .sv = 1},
-        {.kind = PT_TEXTURE_SCALE, .su = 1, .sv = 1, .in = {{.texture = 0}, CONST(0.5f)}},
+        {.kind = PT_TEXTURE_SCALE, .su = 1, .sv = 1, .in = {{.texture = 1}, CONST(0.5f)}},
         {.kind = PT_TEXTURE_MIX, .su = 1, .sv = 1, .in = {CONST(0.0f), CONST(8.0f), CONST(0.25f)}},
         {.kind = PT_TEXTURE_CHECKERBOARD, .su = 4, .sv = 2, .du = 0.5f, .in = {CONST(1.0f), CONST(2.0f)}},
         {.kind = PT_TEXTURE_BILERP, .su = 1, .sv = 1, .in = {CONST(0.0f), CONST(1.0f), CONST(2.0f), CONST(3.0f)}},
@@ -78,24 +78,24 @@ static void kinds_of_texture(void **state)
     };
     struct pt_scene scene = {.images = images, .textures = textures, .image_count = 4, .texture_count = 7};
     /* v runs upwards: the upper left texel is at (0, 1) */
-    assert_true(near3(pt_texture_eval(&scene, 0, 0.0f, 1.0f), 1, 0, 0));
-    assert_true(near3(pt_texture_eval(&scene, 0, 1.0f, 0.0f), 1, 1, 1));
-    assert_true(near3(pt_texture_eval(&scene, 0, 0.0f, 0.0f), 0, 0, 1));
-    assert_true(near3(pt_texture_eval(&scene, 1, 0.0f, 1.0f), 0.5f, 1, 1)); /* scaled, then inverted, as pbrt-v4 does */
-    assert_true(near3(pt_texture_eval(&scene, 2, 0.0f, 1.0f), 0.5f, 0, 0));
-    assert_true(near(pt_texture_eval(&scene, 3, 0.3f, 0.3f).x, 2.0f));
-    assert_true(near(pt_texture_eval(&scene, 4, 0.0f, 0.0f).x, 1.0f));
-    assert_true(near(pt_texture_eval(&scene, 4, 0.2f, 0.0f).x, 2.0f));
-    assert_true(near(pt_texture_eval(&scene, 4, 0.2f, 0.6f).x, 1.0f));
-    assert_true(near(pt_texture_eval(&scene, 4, -0.2f, 0.0f).x, 2.0f));
-    assert_true(near(pt_texture_eval(&scene, 5, 0.5f, 0.25f).x, 1.25f));
-    assert_true(near(pt_texture_eval(&scene, 6, 0.5f, 0.25f).x, 0.7f));
+    assert_true(near3(pt_texture_eval(&scene, 1, 0.0f, 1.0f), 1, 0, 0));
+    assert_true(near3(pt_texture_eval(&scene, 1, 1.0f, 0.0f), 1, 1, 1));
+    assert_true(near3(pt_texture_eval(&scene, 1, 0.0f, 0.0f), 0, 0, 1));
+    assert_true(near3(pt_texture_eval(&scene, 2, 0.0f, 1.0f), 0.5f, 1, 1)); /* scaled, then inverted, as pbrt-v4 does */
+    assert_true(near3(pt_texture_eval(&scene, 3, 0.0f, 1.0f), 0.5f, 0, 0));
+    assert_true(near(pt_texture_eval(&scene, 4, 0.3f, 0.3f).x, 2.0f));
+    assert_true(near(pt_texture_eval(&scene, 5, 0.0f, 0.0f).x, 1.0f));
+    assert_true(near(pt_texture_eval(&scene, 5, 0.2f, 0.0f).x, 2.0f));
+    assert_true(near(pt_texture_eval(&scene, 5, 0.2f, 0.6f).x, 1.0f));
+    assert_true(near(pt_texture_eval(&scene, 5, -0.2f, 0.0f).x, 2.0f));
+    assert_true(near(pt_texture_eval(&scene, 6, 0.5f, 0.25f).x, 1.25f));
+    assert_true(near(pt_texture_eval(&scene, 7, 0.5f, 0.25f).x, 0.7f));
 }
 
 static void constants_never_enter_texture_code(void **state)
 {
     (void)state;
-    struct pt_input in = CONST(0.3f), textured = {.texture = 0};
+    struct pt_input in = CONST(0.3f), textured = {.texture = 1};
     struct pt_texture t = {.kind = PT_TEXTURE_CONSTANT, .in = {CONST(0.9f)}};
     struct pt_scene scene = {.textures = &t, .texture_count = 1};
     unsigned long long before = pt_texture_lookups;

@@ -1,7 +1,6 @@
 /*
- * Base under a dielectric coating.
- *
- * Diffuse base. Because the base forgets directions, the layered solution factors exactly:
+ * Diffuse base under a dielectric coating. A layer that scatters light is left to the walk (coat_walk.h); for a clear one,
+ * because the base forgets directions, the layered solution factors exactly:
  *     f = f_interface + A(μo) A(μi) R S / (π η²),   S = Σ_{n<5} (R Fi)^n
  * with A(μ) the flux that reaches the base from direction cosine μ (refraction and the layer's extinction exp(-t/|cos|), unit
  * coefficient, on the way) and Fi the flux that the interface returns to the base from diffuse light below it. Rough
@@ -12,14 +11,27 @@
  * given outside, and the reverse), which sum to more than 1 and brighten light at grazing incidence: 2 % at 25°, 9 % at 72°
  * for alpha 0.1, not reciprocally. This model is the unbiased, reciprocal solution (tests/stat/pt_coat.c).
  */
-#ifndef PT_SHADE_BSDF_COATED_H
-#define PT_SHADE_BSDF_COATED_H
+#ifndef PT_SHADE_BSDF_COATED_DIFFUSE_H
+#define PT_SHADE_BSDF_COATED_DIFFUSE_H
 
-#include "shade/bsdf.h"
-#include "shade/bsdf_conductor.h"
-#include "shade/bsdf_dielectric.h"
-#include "shade/bsdf_diffuse.h"
 #include "shade/coat_table.h"
+#include "shade/coat_walk.h"
+
+static const struct pt_bsdf_read pt_coated_diffuse_reads[] = {
+    PT_READ_INTO(reflectance, COLOUR, "reflectance", 0.5), PT_READ(ROUGHNESS, "", 0), PT_READ(INDEX, "eta", 1.5), PT_COAT_READS, {0}};
+
+static inline void pt_coated_diffuse_closure(pt_effects fx, const struct pt_scene *scene, const struct pt_material *m,
+                                             const struct pt_surface *s, struct pt_bsdf *b)
+{
+    pt_coat_closure(fx, scene, m, s, b);
+    b->reflectance = pt_material_colour(fx, scene, &m->reflectance, s);
+}
+
+static inline int pt_coated_diffuse_has_smooth(const struct pt_bsdf *b)
+{
+    (void)b;
+    return 1;
+}
 
 /* What the coating does to light of cosine mu > 0: *base gets A(mu), *spec the albedo of the interface's reflection. */
 static inline void pt_coat_split(const struct pt_bsdf *b, float mu, float *base, float *spec)
@@ -53,8 +65,7 @@ static inline float pt_coat_choice(float spec, float base, pt_vec3 factor)
     return spec + d > 0.0f ? spec / (spec + d) : 0.0f;
 }
 
-static inline pt_vec3 pt_coated_diffuse_eval(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, pt_vec3 wi,
-                                             float *pdf_solid)
+static inline pt_vec3 pt_coat_clear_eval(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, pt_vec3 wi, float *pdf_solid)
 {
     *pdf_solid = 0.0f;
     if (!(wo.z * wi.z > 0.0f))
@@ -80,8 +91,8 @@ static inline pt_vec3 pt_coated_diffuse_eval(pt_effects fx, const struct pt_bsdf
     return f;
 }
 
-static inline int pt_coated_diffuse_sample(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, float u_lobe, float u0,
-                                           float u1, struct pt_bsdf_sample *out)
+static inline int pt_coat_clear_sample(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, float u_lobe, float u0, float u1,
+                                       struct pt_bsdf_sample *out)
 {
     if (wo.z == 0.0f)
         return 0;
@@ -107,10 +118,29 @@ static inline int pt_coated_diffuse_sample(pt_effects fx, const struct pt_bsdf *
     } else {
         wi = pt_sample_cosine(u0, u1);
     }
-    pt_vec3 f = pt_coated_diffuse_eval(fx, b, w, wi, &out->pdf_solid);
+    pt_vec3 f = pt_coat_clear_eval(fx, b, w, wi, &out->pdf_solid);
     out->wi = v3_scale(wi, side);
     out->weight = v3_scale(f, 1.0f / out->pdf_solid);
     return out->pdf_solid > 0.0f;
+}
+
+static inline pt_vec3 pt_coated_diffuse_albedo(const struct pt_bsdf *b, pt_vec3 wo)
+{
+    float base, spec;
+    pt_coat_split(b, fabsf(wo.z), &base, &spec);
+    return v3_madd(v3_splat(spec), 0.95f * PT_PI * base, pt_coat_base_factor(b));
+}
+
+static inline pt_vec3 pt_coated_diffuse_eval(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, pt_vec3 wi, float *pdf_solid)
+{
+    return v3_is_black(b->albedo) ? pt_coat_clear_eval(fx, b, wo, wi, pdf_solid) : pt_coat_walk_eval(b, wo, wi, pdf_solid);
+}
+
+static inline int pt_coated_diffuse_sample(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, float u_lobe, float u0, float u1,
+                                           struct pt_bsdf_sample *out)
+{
+    return v3_is_black(b->albedo) ? pt_coat_clear_sample(fx, b, wo, u_lobe, u0, u1, out)
+                                  : pt_coat_walk_sample(b, wo, u_lobe, u0, u1, out);
 }
 
 #endif

@@ -1,6 +1,6 @@
 /*
  * Coatings without a factored solution: over metal, or scattering light inside the layer. The value is one estimate by the
- * walk of bsdf_layered.h from a stream keyed by (walk_key, wo, wi): a function of its arguments whose mean over walk_key is
+ * walk of coat_layer.h from a stream keyed by (walk_key, wo, wi): a function of its arguments whose mean over walk_key is
  * the layered BSDF. A direction is drawn by following light through the layer, so its weight has no peaks; the density of
  * such a walk has no closed form, and pdf_solid is that of lobes fitted to it: the interface's reflection, the metal seen
  * through the interface, a cosine lobe for what bounced in between. Weights of multiple importance sampling need only that
@@ -8,12 +8,29 @@
  *
  * Mirror-like interface over mirror-like metal is a delta whose weight is summed in closed form.
  */
-#ifndef PT_SHADE_BSDF_COATED_WALK_H
-#define PT_SHADE_BSDF_COATED_WALK_H
+#ifndef PT_SHADE_COAT_WALK_H
+#define PT_SHADE_COAT_WALK_H
 
 #include <string.h>
 
-#include "shade/bsdf_layered.h"
+#include "shade/coat_layer.h"
+
+/* What both coated models read of the layer between interface and base. */
+#define PT_COAT_READS                                                                                                          \
+    PT_READ_INTO(thickness, NUMBER, "thickness", 0.01), PT_READ_INTO(g, NUMBER, "g", 0),                                       \
+        PT_READ_INTO(albedo, COLOUR, "albedo", 0), PT_READ(IGNORED, "maxdepth nsamples", 0)
+
+static inline void pt_coat_closure(pt_effects fx, const struct pt_scene *scene, const struct pt_material *m,
+                                   const struct pt_surface *s, struct pt_bsdf *b)
+{
+    pt_material_alpha(fx, scene, m, &m->roughness_u, &m->roughness_v, s, &b->alpha_x, &b->alpha_y);
+    b->eta = m->eta;
+    b->thickness = fmaxf(0.0f, pt_input_float(fx, scene, &m->thickness, s->u, s->v));
+    b->g = pt_input_float(fx, scene, &m->g, s->u, s->v);
+    b->albedo = pt_material_colour(fx, scene, &m->albedo, s);
+    b->coat_table = m->coat_table;
+    b->walk_key = 0; /* for the caller to set */
+}
 
 /* Probabilities and roughness of the three lobes. */
 struct pt_coat_lobes {
@@ -55,14 +72,14 @@ static inline struct pt_rng pt_coat_stream(const struct pt_bsdf *b, pt_vec3 wo, 
     return pt_rng_make(key);
 }
 
-static inline int pt_coated_walk_is_delta(const struct pt_bsdf *b)
+static inline int pt_coat_walk_is_delta(const struct pt_bsdf *b)
 {
     return b->kind == PT_BSDF_COATED_CONDUCTOR && pt_dielectric_is_smooth(b) && b->base_alpha_x == 0.0f &&
            v3_is_black(b->albedo);
 }
 
 /* wo.z, wi.z > 0 */
-static inline float pt_coated_walk_pdf(const struct pt_bsdf *b, const struct pt_coat_lobes *l, pt_vec3 wo, pt_vec3 wi,
+static inline float pt_coat_walk_pdf(const struct pt_bsdf *b, const struct pt_coat_lobes *l, pt_vec3 wo, pt_vec3 wi,
                                        pt_vec3 m)
 {
     float pdf = l->cosine * wi.z * PT_INV_PI;
@@ -74,11 +91,11 @@ static inline float pt_coated_walk_pdf(const struct pt_bsdf *b, const struct pt_
     return pdf;
 }
 
-__attribute__((noinline, unused)) static pt_vec3 pt_coated_walk_eval(const struct pt_bsdf *b, pt_vec3 wo, pt_vec3 wi,
+__attribute__((noinline, unused)) static pt_vec3 pt_coat_walk_eval(const struct pt_bsdf *b, pt_vec3 wo, pt_vec3 wi,
                                                                       float *pdf_solid)
 {
     *pdf_solid = 0.0f;
-    if (!(wo.z * wi.z > 0.0f) || pt_coated_walk_is_delta(b))
+    if (!(wo.z * wi.z > 0.0f) || pt_coat_walk_is_delta(b))
         return v3_splat(0.0f);
     struct pt_rng rng = pt_coat_stream(b, wo, wi);
     if (wo.z < 0.0f) {
@@ -87,7 +104,7 @@ __attribute__((noinline, unused)) static pt_vec3 pt_coated_walk_eval(const struc
     }
     struct pt_coat_lobes l = pt_coat_lobes(b, wo.z);
     pt_vec3 m = v3_norm(v3_add(wo, wi)), f = pt_layer_walk_eval(b, wo, wi, &rng);
-    *pdf_solid = pt_coated_walk_pdf(b, &l, wo, wi, m);
+    *pdf_solid = pt_coat_walk_pdf(b, &l, wo, wi, m);
     if (!pt_dielectric_is_smooth(b)) {
         float d = pt_ggx_d(m, b->alpha_x, b->alpha_y), fresnel = pt_fresnel_dielectric(v3_dot(wo, m), b->eta);
         f = v3_add(f, v3_splat(0.25f * d * fresnel * pt_ggx_g2_over_cos(wo, wi, b->alpha_x, b->alpha_y)));
@@ -110,7 +127,7 @@ static inline pt_vec3 pt_coated_mirror(const struct pt_bsdf *b, float mu)
     return v3_madd(v3_splat(r), t2, sum);
 }
 
-__attribute__((noinline, unused)) static int pt_coated_walk_sample(const struct pt_bsdf *b, pt_vec3 wo, float u_lobe,
+__attribute__((noinline, unused)) static int pt_coat_walk_sample(const struct pt_bsdf *b, pt_vec3 wo, float u_lobe,
                                                                     float u0, float u1, struct pt_bsdf_sample *out)
 {
     if (wo.z == 0.0f)
@@ -120,7 +137,7 @@ __attribute__((noinline, unused)) static int pt_coated_walk_sample(const struct 
     out->eta_scale = 1.0f;
     out->flags = PT_SCATTER_DELTA;
     out->wi = v3(-wo.x, -wo.y, wo.z);
-    if (pt_coated_walk_is_delta(b)) {
+    if (pt_coat_walk_is_delta(b)) {
         out->weight = pt_coated_mirror(b, w.z);
         out->pdf_solid = 1.0f;
         return 1;
@@ -136,7 +153,7 @@ __attribute__((noinline, unused)) static int pt_coated_walk_sample(const struct 
     struct pt_coat_lobes l = pt_coat_lobes(b, w.z);
     out->flags = 0;
     out->wi = v3_scale(wi, side);
-    out->pdf_solid = pt_coated_walk_pdf(b, &l, w, wi, v3_norm(v3_add(w, wi)));
+    out->pdf_solid = pt_coat_walk_pdf(b, &l, w, wi, v3_norm(v3_add(w, wi)));
     return out->pdf_solid > 0.0f;
 }
 

@@ -6,11 +6,10 @@
  * The path tracer uses it where no factored solution exists (coated metals, coatings that scatter inside); tests use it as
  * the oracle of the others.
  */
-#ifndef PT_SHADE_BSDF_LAYERED_H
-#define PT_SHADE_BSDF_LAYERED_H
+#ifndef PT_SHADE_COAT_LAYER_H
+#define PT_SHADE_COAT_LAYER_H
 
 #include "sample/rng.h"
-#include "shade/bsdf.h"
 #include "shade/bsdf_conductor.h"
 #include "shade/bsdf_dielectric.h"
 #include "shade/bsdf_diffuse.h"
@@ -131,7 +130,7 @@ static inline void pt_layer_connect(struct pt_layer_walk *k, pt_vec3 scattered, 
 static inline void pt_layer_escape(struct pt_layer_walk *k, float pdf)
 {
     float ignored;
-    pt_vec3 f = pt_dielectric_eval(k->top, v3_neg(k->w), k->wi, &ignored);
+    pt_vec3 f = pt_dielectric_eval(PT_FX_ALL, k->top, v3_neg(k->w), k->wi, &ignored);
     if (v3_is_black(f))
         return;
     float weight = pdf > 0.0f ? pt_layer_mis(pdf, pt_layer_transmit_pdf(k->top, k->wi, v3_neg(k->w))) : 1.0f;
@@ -179,9 +178,11 @@ static inline int pt_layer_at_base(struct pt_layer_walk *k, struct pt_rng *rng)
     int metal = k->base.kind == PT_BSDF_CONDUCTOR, ok;
     if (!k->base_delta) {
         pt_vec3 to_exit = v3_neg(k->exit.wi);
-        pt_vec3 f = metal ? pt_conductor_eval(&k->base, wo, to_exit, &pdf) : pt_diffuse_eval(&k->base, wo, to_exit, &pdf);
+        pt_vec3 f = metal ? pt_conductor_eval(PT_FX_ALL, &k->base, wo, to_exit, &pdf)
+                          : pt_diffuse_eval(PT_FX_ALL, &k->base, wo, to_exit, &pdf);
         pt_layer_connect(k, f, pdf);
-        ok = metal ? pt_conductor_sample_rough(&k->base, wo, u0, u1, &s) : pt_diffuse_sample(&k->base, wo, u0, u1, &s);
+        ok = metal ? pt_conductor_sample_rough(&k->base, wo, u0, u1, &s)
+                   : pt_diffuse_sample(PT_FX_ALL, &k->base, wo, 0.0f, u0, u1, &s);
     } else {
         ok = pt_conductor_sample_smooth(&k->base, wo, &s);
     }
@@ -265,7 +266,7 @@ static inline int pt_layer_bounce(const struct pt_bsdf *base, pt_vec3 wo, struct
 {
     float u0 = pt_rng_float(rng), u1 = pt_rng_float(rng);
     if (base->kind != PT_BSDF_CONDUCTOR)
-        return pt_diffuse_sample(base, wo, u0, u1, s);
+        return pt_diffuse_sample(PT_FX_ALL, base, wo, 0.0f, u0, u1, s);
     return base->alpha_x > 0.0f ? pt_conductor_sample_rough(base, wo, u0, u1, s) : pt_conductor_sample_smooth(base, wo, s);
 }
 
