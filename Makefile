@@ -42,6 +42,7 @@ LDFLAGS_ALL  = -pthread $(SAN_$(MODE)) $(LDFLAGS)
 # --- libraries -----------------------------------------------------------------------------------------------------------
 EXR_CFLAGS  := $(shell $(PKG) --cflags OpenEXR 2>/dev/null)
 BLAS_CFLAGS := $(shell $(PKG) --cflags openblas 2>/dev/null)
+BASE_LIBS := -lcjson -lz -lm
 PT_LIBS  := -lembree3 -lOpenEXRCore-3_1 -lOpenImageIO -lOpenImageIO_Util -lcjson -lz -ldl -lstdc++ -lm
 STUDY_LIBS := -lmicrohttpd -lsqlite3
 GGN_LIBS := -lopenblas -llapacke -lsvm -lOpenImageIO -lOpenImageIO_Util -lcjson -lz -lstdc++ -lm
@@ -51,12 +52,14 @@ API := -Iplugin-api/include
 BASE := -Iplugin-api# "base/…" and "sequence/…": what both programs stand on; no part of the ABI
 INC_plugin-api         := $(API)
 INC_plugin-api_base    := $(BASE)
+INC_plugin-api_tools   := $(API) $(BASE)
 INC_pathtracer         := -Ipathtracer $(BASE) $(EXR_CFLAGS)
 INC_pathtracer_host    := $(INC_pathtracer) $(API)# pathtracer/render and the command: the only hosts of criteria
 INC_ggn                := -Iggn $(BASE) $(BLAS_CFLAGS)
 INC_ggn_plugin         := $(INC_ggn) $(API)# ggn/plugin: the only folder of ggn that knows the ABI
 INC_tests_pt           := -Itests -Itests/support $(INC_pathtracer_host)
 INC_tests_ggn          := -Itests -Itests/support $(INC_ggn_plugin)
+INC_tests_base         := -Itests -Itests/support $(BASE)
 INC_tests_api          := -Itests -Itests/support $(API)
 
 # --- sources -------------------------------------------------------------------------------------------------------------
@@ -72,7 +75,7 @@ GGN_TWICE   := $(shell grep -ls '"nn/real.h"' ggn/nn/*.c ggn/model/*.c tests/sup
 GGN_PLUGIN  := $(wildcard ggn/plugin/*.c)
 GGN_STUDY   := $(wildcard ggn/study/*.c)# the only user of STUDY_LIBS: not in ggn.so
 GGN_CLI     := $(wildcard ggn/cli/*.c)
-# Tests name what they test by prefix: pt_ (path tracer), ggn_, api_ (plugin-api).
+# Tests name what they test by prefix: pt_ (path tracer), ggn_, api_ (plugin-api), base_ (plugin-api/base and sequence).
 TEST_SRC    := $(wildcard tests/unit/*.c tests/grad/*.c tests/golden/*.c tests/stat/*.c tests/abi/*.c tests/hard/*.c tests/oom/*.c)
 # The subset that also runs under ASan+UBSan in `make test`.
 SANE_SRC    := $(wildcard tests/unit/*.c tests/abi/*.c tests/oom/*.c)
@@ -102,10 +105,10 @@ all: $(PROGRAMS) $(CRITERIA) ## build the programs and the criteria
 
 # --- compiling: one rule, flags by folder --------------------------------------------------------------------------------
 inc = $(or $(strip \
-  $(if $(filter plugin-api/%,$(1)),$(if $(filter plugin-api/base/% plugin-api/sequence/%,$(1)),$(INC_plugin-api_base),$(INC_plugin-api))) \
+  $(if $(filter plugin-api/%,$(1)),$(if $(filter plugin-api/base/% plugin-api/sequence/%,$(1)),$(INC_plugin-api_base),$(if $(filter plugin-api/tools/%,$(1)),$(INC_plugin-api_tools),$(INC_plugin-api)))) \
   $(if $(filter pathtracer/%,$(1)),$(if $(filter pathtracer/render/% $(PT_MAIN) $(PT_MAIN:.c=.h),$(1)),$(INC_pathtracer_host),$(INC_pathtracer))) \
   $(if $(filter ggn/%,$(1)),$(if $(filter ggn/plugin/%,$(1)),$(INC_ggn_plugin),$(INC_ggn))) \
-  $(if $(filter tests/%,$(1)),$(if $(filter pt_%,$(notdir $(1))),$(INC_tests_pt),$(if $(filter ggn_%,$(notdir $(1))),$(INC_tests_ggn),$(INC_tests_api))))),)
+  $(if $(filter tests/%,$(1)),$(if $(filter pt_%,$(notdir $(1))),$(INC_tests_pt),$(if $(filter ggn_%,$(notdir $(1))),$(INC_tests_ggn),$(if $(filter base_%,$(notdir $(1))),$(INC_tests_base),$(INC_tests_api)))))),)
 # Kernels for one instruction set carry it in their name (x_avx2.c, x_avx512.c); they are reached by run-time dispatch only.
 ifneq ($(filter x86_64%,$(shell $(CC) -dumpmachine)),)
 isa = $(if $(filter %_avx2.c,$(1)),-mavx2 -mfma)$(if $(filter %_avx512.c,$(1)),-mavx512f -mavx512vl -mavx512bw -mavx512dq -mfma -mprefer-vector-width=512)$(if $(filter %_avx512bf16.c,$(1)),-mavx512f -mavx512vl -mavx512bw -mavx512dq -mavx512bf16 -mfma)
@@ -133,7 +136,10 @@ $(BIN)/pathtracer: $(call o,$(PT_MAIN)) $(PT_OBJ) $(LOADER_OBJ)
 	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) -o $@
 $(BIN)/ggn: $(call o,$(GGN_CLI)) $(GGN_STUDY_OBJ) $(GGN_OBJ)
 	$(link) $^ $(LDFLAGS_ALL) $(STUDY_LIBS) $(GGN_LIBS) -o $@
-$(BIN)/lull-check: $(call o,$(TOOL_SRC)) $(LOADER_OBJ)
+# Of what both programs stand on the checker takes what it names.
+$(OBJ)/base.a: $(BASE_OBJ)
+	@rm -f $@; echo "  AR   $@"; $(AR) rcs $@ $^
+$(BIN)/lull-check: $(call o,$(TOOL_SRC)) $(LOADER_OBJ) $(OBJ)/base.a
 	$(link) $^ $(LDFLAGS_ALL) -ldl -lm -o $@
 $(LIB)/ggn.so: $(GGN_PLUGIN_OBJ) $(GGN_OBJ) plugin-api/plugin.map
 	$(so) $(filter %.o,$^) $(LDFLAGS_ALL) $(GGN_LIBS) -o $@
@@ -154,6 +160,8 @@ $(OUT)/tests/$(1)/ggn_study%: $(OBJ)/tests/$(1)/ggn_study%.c.o $(GGN_STUDY_OBJ) 
 	$$(link) $$^ $$(LDFLAGS_ALL) $(STUDY_LIBS) $(GGN_LIBS) -lcmocka -o $$@
 $(OUT)/tests/$(1)/api_%: $(OBJ)/tests/$(1)/api_%.c.o $(LOADER_OBJ) $(SUPPORT_api)
 	$$(link) $$^ $$(LDFLAGS_ALL) -ldl -lm -lcmocka -o $$@
+$(OUT)/tests/$(1)/base_%: $(OBJ)/tests/$(1)/base_%.c.o $(BASE_OBJ)
+	$$(link) $$^ $$(LDFLAGS_ALL) $(BASE_LIBS) -lcmocka -o $$@
 endef
 $(foreach d,unit grad golden stat abi hard oom,$(eval $(call test_rules,$(d))))
 # Criteria for the tests of the loader and of lull-check, most of them broken on purpose.

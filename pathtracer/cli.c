@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/version.h"
 #include "scene/settings.h"
 #include "render/film.h"
 #include "render/output.h"
@@ -531,7 +532,7 @@ int pt_cli_parse(struct pt_cli *cli, int argc, char **argv, struct base_err *err
     *cli = (struct pt_cli){.block_width = 200, .block_height = 200, .spp_min = 32, .spp_max = 10000, .checkpoint_every_s = 60.0,
                            .sampler = -1, .strategy = -1, .filter = -1};
     /* Assigned, not defined: a definition of ours would be hidden from libc. */
-    argp_program_version = "pathtracer (Lull) 1.0";
+    argp_program_version = "pathtracer (Lull) " BASE_VERSION;
     argp_err_exit_status = 2;
     struct base_err first = {0};
     struct parse p = {.cli = cli, .err = &first};

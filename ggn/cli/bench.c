@@ -1,5 +1,4 @@
 /* `ggn bench`: how fast the networks run on this machine, per layer and as medians. */
-#include <argp.h>
 #include <cblas.h>
 #include <cjson/cJSON.h>
 #include <stdio.h>
@@ -7,15 +6,26 @@
 #include <string.h>
 
 #include "base/clock.h"
+#include "base/options.h"
 #include "cli/commands.h"
+#include "model/judge.h"
 #include "model/trainer.h"
 #include "nn/hash.h"
 
-enum { KEY_JSON = 256, KEY_THREADS, KEY_ROUNDS, KEY_BATCH, KEY_PRECISION, MAX_ROUNDS = 101, SGEMM_N = 768 };
+enum { MAX_ROUNDS = 101, SGEMM_N = 768 };
 
 struct options {
-    int json, threads, rounds, batch, bf16;
+    int json, threads, rounds, batch, precision;
 };
+#define TO(member) BASE_TO(struct options, member)
+static const struct base_option list[] = {
+    {"json", 0, NULL, TO(json), .help = "one JSON object of medians instead of tables"},
+    {"threads", 0, "N", TO(threads), 1, 1024, .help = "threads (all processors)"},
+    {"precision", 0, NULL, TO(precision), .words = ggn_precision_names,
+     .help = "of inference (f32); bf16 is f32 where the processor has no bfloat16"},
+    {"rounds", 0, "N", TO(rounds), 1, MAX_ROUNDS, .help = "measurements per figure (9)"},
+    {"batch", 0, "N", TO(batch), 1, 64, .help = "batch of the training figures, which are per image or sample (4)"},
+    {0}};
 
 struct bench {
     struct options o;
@@ -33,49 +43,15 @@ static const char *const figure_name[N_FIGURES] = {
     "denoiser_train_ms",   "generator_train_ms",   "train_sample_ms",          "sgemm_gflops",
 };
 
-static error_t parse(int key, char *arg, struct argp_state *state)
-{
-    struct options *o = state->input;
-    int value = arg ? atoi(arg) : 0;
-
-    switch (key) {
-    case KEY_JSON:
-        o->json = 1;
-        return 0;
-    case KEY_THREADS:
-        if (value < 1 || value > 1024)
-            argp_error(state, "--threads must be in 1..1024");
-        o->threads = value;
-        return 0;
-    case KEY_ROUNDS:
-        if (value < 1 || value > MAX_ROUNDS)
-            argp_error(state, "--rounds must be in 1..%d", MAX_ROUNDS);
-        o->rounds = value;
-        return 0;
-    case KEY_BATCH:
-        if (value < 1 || value > 64)
-            argp_error(state, "--batch must be in 1..64");
-        o->batch = value;
-        return 0;
-    case KEY_PRECISION:
-        o->bf16 = !strcmp(arg, "bf16");
-        if (!o->bf16 && strcmp(arg, "f32") != 0)
-            argp_error(state, "--precision is f32 or bf16");
-        return 0;
-    default:
-        return ARGP_ERR_UNKNOWN;
-    }
-}
-
 static int setup(struct bench *b, struct base_err *err)
 {
     struct ggn_hyper hyper = ggn_hyper_default(GGN_PRESET_LULL);
     struct ggn_train_options options = ggn_train_options_default(GGN_PRESET_LULL);
     enum { AREA = 200 * 200, PLANES = 21 };
-    const int flags = b->o.bf16 ? GGN_EXEC_BF16 : 0;
+    const int flags = b->o.precision ? GGN_EXEC_BF16 : 0;
 
     options.batch = b->o.batch;
-    options.bf16 = b->o.bf16;
+    options.bf16 = b->o.precision;
     b->threads = base_threads_create(b->o.threads, err);
     b->trainer = b->threads ? ggn_trainer_create(&hyper, &options, b->threads, err) : NULL;
     if (!b->trainer)
@@ -245,7 +221,7 @@ static void print_figures(const struct bench *b, const double figure[N_FIGURES])
         return;
     }
     printf("{\"threads\": %d, \"isa\": \"%s\", \"precision\": \"%s\", \"batch\": %d", b->o.threads,
-           ggn_isa_name(b->r->kernels->isa), b->o.bf16 && b->trainer->weights[0]->bf16 ? "bf16" : "f32", b->o.batch);
+           ggn_isa_name(b->r->kernels->isa), ggn_precision_names[b->o.precision && b->trainer->weights[0]->bf16], b->o.batch);
     for (int f = 0; f < N_FIGURES; f++)
         printf(", \"%s\": %.3f", figure_name[f], figure[f]);
     printf("}\n");
@@ -253,22 +229,15 @@ static void print_figures(const struct bench *b, const double figure[N_FIGURES])
 
 int ggn_cmd_bench(int argc, char **argv)
 {
-    static const struct argp_option list[] = {
-        {"json", KEY_JSON, NULL, 0, "One JSON object of medians instead of tables", 0},
-        {"threads", KEY_THREADS, "N", 0, "Threads (all processors)", 0},
-        {"precision", KEY_PRECISION, "f32|bf16", 0, "Of inference (f32); bf16 is f32 where the processor has no bfloat16",
-         0},
-        {"rounds", KEY_ROUNDS, "N", 0, "Measurements per figure (9)", 0},
-        {"batch", KEY_BATCH, "N", 0, "Batch of the training figures, which are per image or sample (4)", 0},
-        {0}};
-    static const struct argp argp = {
-        .options = list, .parser = parse, .doc = "Measures inference and training of the networks at the published size."};
+    static const struct base_options options = {
+        .list = list, .doc = "Measures inference and training of the networks at the published size."};
     struct bench b = {.o = {.threads = base_threads_available(), .rounds = 9, .batch = 4}};
     double figure[N_FIGURES];
     struct base_err err = {0};
 
-    argp_parse(&argp, argc, argv, 0, NULL, &b.o);
-    int rc = setup(&b, &err);
+    int rc = base_options_parse(&options, argc, argv, &b.o, &err);
+    if (!rc)
+        rc = setup(&b, &err);
     if (!rc && !b.o.json) {
         printf("instruction set %s, %d threads\n\n", ggn_isa_name(b.r->kernels->isa), b.o.threads);
         print_layers(&b, b.r, GGN_NET_R, &err);

@@ -1,7 +1,7 @@
 /*
  * The subcommands of `ggn`: one file each, ggn/cli/NAME.c, with `int ggn_cmd_NAME(int argc, char **argv)`.
  *
- * A subcommand parses its own argv with argp (argv[0] is "ggn NAME" already, so usage lines read right) and returns the exit
+ * A subcommand parses its own argv by a table of options (base/options.h; argv[0] is "ggn NAME" already) and returns the exit
  * status: 0 done, 1 failed (out of memory), 2 bad usage, bad input, or an output could not be written, 130 interrupted.
  * To add one: write the file and add its line to GGN_COMMANDS. An underscore in the name is a hyphen on the command line.
  */

@@ -1,13 +1,13 @@
 /* `ggn compare REFERENCE MODEL`: stop maps against (human) thresholds. */
-#include <argp.h>
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 
-#include "cli/commands.h"
 #include "base/files.h"
+#include "base/options.h"
+#include "cli/commands.h"
 #include "eval/compare.h"
 
 struct options {
@@ -17,54 +17,14 @@ struct options {
     int block, json;
 };
 
-static const struct argp_option option_table[] = {
-    {"json", 'j', NULL, 0, "print the statistics as one JSON object", 0},
-    {"output", 'o', "DIR", 0, "write scatter.png, errors.png, heatmaps.png, blocks.csv and summary.json there", 0},
-    {"view", 'v', "NAME", 0, "compare with this view of REFERENCE only", 0},
-    {"cap", 'c', "SPP", 0, "thresholds at the cap are censored (default 10000)", 0},
-    {"block", 'b', "PIXELS", 0, "side of a block in an EXR stop map (default 200)", 0},
-    {0},
-};
-
-static error_t parse(int key, char *arg, struct argp_state *state)
-{
-    struct options *o = state->input;
-    char *end;
-    double number = arg ? strtod(arg, &end) : 0.0;
-
-    switch (key) {
-    case 'j':
-        o->json = 1;
-        return 0;
-    case 'o':
-        o->dir = arg;
-        return 0;
-    case 'v':
-        o->view = arg;
-        return 0;
-    case 'c':
-        if (*end != '\0' || !(number > 0.0))
-            argp_error(state, "--cap %s: expected a positive number", arg);
-        o->cap = number;
-        return 0;
-    case 'b':
-        if (*end != '\0' || !(number >= 1.0 && number <= 32768.0))
-            argp_error(state, "--block %s: expected 1 … 32768", arg);
-        o->block = (int)number;
-        return 0;
-    case ARGP_KEY_ARG:
-        if (state->arg_num >= 2)
-            return ARGP_ERR_UNKNOWN;
-        o->paths[state->arg_num] = arg;
-        return 0;
-    case ARGP_KEY_END:
-        if (state->arg_num < 2)
-            argp_error(state, "REFERENCE and MODEL are needed");
-        return 0;
-    default:
-        return ARGP_ERR_UNKNOWN;
-    }
-}
+#define TO(member) BASE_TO(struct options, member)
+static const struct base_option list[] = {
+    {"json", 'j', NULL, TO(json), .help = "print the statistics as one JSON object"},
+    {"output", 'o', "DIR", TO(dir), .help = "write scatter.png, errors.png, heatmaps.png, blocks.csv and summary.json there"},
+    {"view", 'v', "NAME", TO(view), .help = "compare with this view of REFERENCE only"},
+    {"cap", 'c', "SPP", TO(cap), 1e-9, 1e12, .help = "thresholds at the cap are censored (10000)"},
+    {"block", 'b', "PIXELS", TO(block), 1, 32768, .help = "side of a block in an EXR stop map (200)"},
+    {0}};
 
 static int write_outputs(const struct options *o, const struct ggn_pairing *p, const struct ggn_agreement *a, struct base_err *err)
 {
@@ -90,21 +50,21 @@ static int write_outputs(const struct options *o, const struct ggn_pairing *p, c
 
 int ggn_cmd_compare(int argc, char **argv)
 {
-    static const struct argp argp = {
-        .options = option_table,
-        .parser = parse,
+    static const struct base_options options = {
+        .list = list,
         .args_doc = "REFERENCE MODEL",
+        .args_min = 2,
+        .args_max = 2,
+        .args = offsetof(struct options, paths),
         .doc = "How well the stops or thresholds in MODEL agree with those in REFERENCE (people first). Both may be CSV "
-               "(name;t0;…), a render's report JSON, or an EXR with the channel lull.spp.",
-    };
+               "(name;t0;…), a render's report JSON, or an EXR with the channel lull.spp."};
     struct options o = {.cap = 10000.0, .block = 200};
     struct ggn_thresholds sides[2] = {{0}, {0}};
     struct ggn_pairing pairing = {0};
     struct ggn_agreement figures;
     struct base_err err = {0};
 
-    argp_parse(&argp, argc, argv, 0, NULL, &o);
-    int rc = 0;
+    int rc = base_options_parse(&options, argc, argv, &o, &err);
     for (int i = 0; i < 2 && !rc; i++)
         rc = ggn_thresholds_read(o.paths[i], o.block, &sides[i], &err);
     if (!rc)

@@ -1,5 +1,4 @@
 /* `ggn evaluate --data DATA [--model MODEL]`: every metric of every method, on scenes that were kept apart. */
-#include <argp.h>
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
@@ -10,6 +9,7 @@
 #include <cjson/cJSON.h>
 
 #include "base/files.h"
+#include "base/options.h"
 #include "baselines/learned.h"
 #include "cli/commands.h"
 #include "eval/report.h"
@@ -17,11 +17,10 @@
 #include "eval/trained.h"
 
 enum { MAX_MODELS = 8, MAX_METHODS = 8 + 2 * MAX_MODELS, MAX_ADJUSTED = 8 };
-enum { KEY_EARLY = 256, KEY_NO_QUALITY, KEY_RETUNE, KEY_RECORDED, KEY_RATIO, KEY_BASELINES, KEY_EPOCHS, KEY_BF16 };
 
 struct options {
     const char *data, *out, *models[MAX_MODELS];
-    int n_models, json, quality, threads, window, retune, recorded, baselines, epochs, bf16;
+    int n_models, json, no_quality, threads, window, retune, recorded, baselines, epochs, bf16;
     double early, ratio;
     int n_adjusted;
     struct {
@@ -30,89 +29,57 @@ struct options {
     } adjusted[MAX_ADJUSTED]; /* of the models' policies */
 };
 
-static const struct argp_option option_table[] = {
-    {"data", 'd', "DATA", 0, "labelled data set: a folder of sequences with split.json (required)", 1},
-    {"model", 'm', "FILE", 0, "trained model (.ggn); may be repeated", 1},
-    {"param", 'p', "KEY=NUMBER", 0, "judge as the criterion does with this parameter: threshold, passes, gate, tail, gini, first-spp", 1},
-    {"json", 'j', NULL, 0, "print the figures as JSON", 2},
-    {"output", 'o', "DIR", 0, "write figures.json and pictures there", 2},
-    {"early", KEY_EARLY, "RATE", 0, "early-stop rate that cuts are tuned for on the training scenes (default 0.05)", 3},
-    {"retune", KEY_RETUNE, NULL, 0, "tune the models' thresholds too, on the validation scenes, instead of taking the stored ones", 3},
-    {"bf16", KEY_BF16, NULL, 0, "judge with bfloat16 products too: one more method per model, whose changed decisions are counted", 3},
-    {"no-quality", KEY_NO_QUALITY, NULL, 0, "skip FLIP and SSIM at the stop", 3},
-    {"baselines", KEY_BASELINES, NULL, 0, "train the published baselines on the training scenes and measure them too (minutes)", 3},
-    {"epochs", KEY_EPOCHS, "N", 0, "epochs of the LSTM baseline (default 15)", 3},
-    {"recorded", KEY_RECORDED, NULL, 0, "stop at the last recorded level instead of going on with the samples of the reference", 3},
-    {"ratio", KEY_RATIO, "R", 0, "thin the levels to this ratio of samples (SIN3D: 1.15); default: keep all", 3},
-    {"window", 'w', "S", 0, "levels that a window has when no model says so (default 6)", 3},
-    {"threads", 't', "N", 0, "worker threads (default: all processors)", 4},
-    {0},
-};
-
-static void parse_adjusted(struct options *o, const char *arg, struct argp_state *state)
+static int add_model(void *into, const char *path, struct base_err *err)
 {
+    struct options *o = into;
+    if (o->n_models == MAX_MODELS)
+        return base_fail(err, BASE_EINVAL, "more than %d models", MAX_MODELS);
+    o->models[o->n_models++] = path;
+    return 0;
+}
+
+static int add_adjusted(void *into, const char *arg, struct base_err *err)
+{
+    struct options *o = into;
     struct ggn_policy any = ggn_policy_default();
     const char *equals = strchr(arg, '=');
-    char *end = NULL;
 
     if (!equals || equals == arg || (size_t)(equals - arg) >= sizeof o->adjusted[0].name || o->n_adjusted == MAX_ADJUSTED)
-        argp_error(state, "-p %s: expected KEY=NUMBER, at most %d times", arg, MAX_ADJUSTED);
+        return base_fail(err, BASE_EINVAL, "expected KEY=NUMBER, at most %d times", MAX_ADJUSTED);
     int i = o->n_adjusted++;
     snprintf(o->adjusted[i].name, sizeof o->adjusted[i].name, "%.*s", (int)(equals - arg), arg);
-    o->adjusted[i].value = strtod(equals + 1, &end);
-    if (end == equals + 1 || *end || !ggn_policy_adjust(&any, o->adjusted[i].name, o->adjusted[i].value) ||
-        ggn_policy_check(&any, NULL))
-        argp_error(state, "-p %s: expected threshold, passes, gate, tail, gini or first-spp and a number in its range", arg);
+    if (!base_parse_real(equals + 1, -1e300, 1e300, &o->adjusted[i].value) ||
+        !ggn_policy_adjust(&any, o->adjusted[i].name, o->adjusted[i].value) || ggn_policy_check(&any, NULL))
+        return base_fail(err, BASE_EINVAL, "expected threshold, passes, gate, tail, gini or first-spp and a number in its range");
+    return 0;
 }
 
-static error_t parse(int key, char *arg, struct argp_state *state)
-{
-    struct options *o = state->input;
-    char *end = NULL;
-
-    switch (key) {
-    case 'd': o->data = arg; return 0;
-    case 'o': o->out = arg; return 0;
-    case 'p': parse_adjusted(o, arg, state); return 0;
-    case 'j': o->json = 1; return 0;
-    case KEY_NO_QUALITY: o->quality = 0; return 0;
-    case KEY_BF16: o->bf16 = 1; return 0;
-    case KEY_RETUNE: o->retune = 1; return 0;
-    case KEY_RECORDED: o->recorded = 1; return 0;
-    case KEY_BASELINES: o->baselines = 1; return 0;
-    case KEY_RATIO:
-        o->ratio = strtod(arg, &end);
-        if (end == arg || *end != '\0' || !(o->ratio >= 1.0 && o->ratio <= 16.0))
-            argp_error(state, "--ratio %s: expected 1 … 16", arg);
-        return 0;
-    case 'm':
-        if (o->n_models == MAX_MODELS)
-            argp_error(state, "more than %d models", MAX_MODELS);
-        o->models[o->n_models++] = arg;
-        return 0;
-    case KEY_EARLY:
-        o->early = strtod(arg, &end);
-        if (end == arg || *end != '\0' || !(o->early >= 0.0 && o->early <= 1.0))
-            argp_error(state, "--early %s: expected 0 … 1", arg);
-        return 0;
-    case KEY_EPOCHS:
-    case 'w':
-    case 't': {
-        int most = key == 'w' ? 16 : 1024;
-        long n = strtol(arg, &end, 10);
-        if (end == arg || *end != '\0' || n < 1 || n > most)
-            argp_error(state, "%s: expected 1 … %d", arg, most);
-        *(key == 'w' ? &o->window : key == 't' ? &o->threads : &o->epochs) = (int)n;
-        return 0;
-    }
-    case ARGP_KEY_END:
-        if (!o->data)
-            argp_error(state, "--data is needed");
-        return 0;
-    default:
-        return ARGP_ERR_UNKNOWN;
-    }
-}
+#define TO(member) BASE_TO(struct options, member)
+static const struct base_option list[] = {
+    {.help = "What is measured:"},
+    {"data", 'd', "DATA", TO(data), .needed = 1, .help = "labelled data set: a folder of sequences with split.json (needed)"},
+    {"model", 'm', "FILE", .set = add_model, .help = "trained model (.ggn); may be repeated"},
+    {"param", 'p', "KEY=NUMBER", .set = add_adjusted,
+     .help = "judge as the criterion does with this parameter: threshold, passes, gate, tail, gini, first-spp"},
+    {.help = "What comes out:"},
+    {"json", 'j', NULL, TO(json), .help = "print the figures as JSON"},
+    {"output", 'o', "DIR", TO(out), .help = "write figures.json and pictures there"},
+    {.help = "How:"},
+    {"early", 0, "RATE", TO(early), 0, 1, .help = "early-stop rate that cuts are tuned for on the training scenes (0.05)"},
+    {"retune", 0, NULL, TO(retune),
+     .help = "tune the models' thresholds too, on the validation scenes, instead of taking the stored ones"},
+    {"bf16", 0, NULL, TO(bf16),
+     .help = "judge with bfloat16 products too: one more method per model, whose changed decisions are counted"},
+    {"no-quality", 0, NULL, TO(no_quality), .help = "skip FLIP and SSIM at the stop"},
+    {"baselines", 0, NULL, TO(baselines),
+     .help = "train the published baselines on the training scenes and measure them too (minutes)"},
+    {"epochs", 0, "N", TO(epochs), 1, 1024, .help = "epochs of the LSTM baseline (15)"},
+    {"recorded", 0, NULL, TO(recorded),
+     .help = "stop at the last recorded level instead of going on with the samples of the reference"},
+    {"ratio", 0, "R", TO(ratio), 1, 16, .help = "thin the levels to this ratio of samples (SIN3D: 1.15); else keep all"},
+    {"window", 'w', "S", TO(window), 1, 16, .help = "levels that a window has when no model says so (6)"},
+    {"threads", 't', "N", TO(threads), 1, 1024, .help = "worker threads (all processors)"},
+    {0}};
 
 struct job {
     const struct options *o;
@@ -301,18 +268,17 @@ static int report(struct job *j, int skipped, struct base_err *err)
 
 int ggn_cmd_evaluate(int argc, char **argv)
 {
-    static const struct argp argp = {
-        .options = option_table,
-        .parser = parse,
-        .doc = "Measures models, the trivial baselines and the criteria halfbuf and variance on the same recorded sequences, separately for training, "
-               "validation and test scenes.",
-    };
-    struct options o = {.early = 0.05, .quality = 1, .threads = base_threads_available(), .window = 6, .epochs = 15};
+    static const struct base_options options = {
+        .list = list,
+        .doc = "Measures models, the trivial baselines and the criteria halfbuf and variance on the same recorded sequences, "
+               "separately for training, validation and test scenes."};
+    struct options o = {.early = 0.05, .threads = base_threads_available(), .window = 6, .epochs = 15};
     struct job j = {.o = &o};
     struct base_err err = {0};
     int window, skipped = 0;
 
-    argp_parse(&argp, argc, argv, 0, NULL, &o);
+    if (base_options_parse(&options, argc, argv, &o, &err))
+        return ggn_cmd_fail(argv[0], &err);
     if (o.bf16 && !ggn_precision_has_bf16())
         fprintf(stderr, "%s: this processor has no bfloat16 products: --bf16 judges in float\n", argv[0]);
     for (int i = 0; i < MAX_METHODS; i++)
@@ -324,7 +290,7 @@ int ggn_cmd_evaluate(int argc, char **argv)
     if (!rc)
         rc = load_models(&j, &window, &err);
     if (!rc) {
-        struct ggn_eval_options eo = {.dir = o.data, .window = window, .quality = o.quality, .recorded = o.recorded, .ratio = o.ratio, .seed = 1};
+        struct ggn_eval_options eo = {.dir = o.data, .window = window, .quality = !o.no_quality, .recorded = o.recorded, .ratio = o.ratio, .seed = 1};
         rc = ggn_eval_set_load(&j.set, &eo, threads, &skipped, &err);
     }
     if (!rc) {

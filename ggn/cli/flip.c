@@ -1,8 +1,8 @@
 /* `ggn flip REFERENCE TEST`: LDR-FLIP of two images. */
-#include <argp.h>
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "base/options.h"
 #include "cli/commands.h"
 #include "data/image.h"
 #include "observer/flip.h"
@@ -14,43 +14,12 @@ struct options {
     int json;
 };
 
-static const struct argp_option option_table[] = {
-    {"json", 'j', NULL, 0, "print {\"mean\": …, \"max\": …}", 0},
-    {"output", 'o', "MAP.png", 0, "write the error map as a picture (magma, black 0 … white 1)", 0},
-    {"ppd", 'p', "N", 0, "pixels per degree of the viewer (default 67.02)", 0},
-    {0},
-};
-
-static error_t parse(int key, char *arg, struct argp_state *state)
-{
-    struct options *o = state->input;
-    char *end;
-
-    switch (key) {
-    case 'j':
-        o->json = 1;
-        return 0;
-    case 'o':
-        o->map_path = arg;
-        return 0;
-    case 'p':
-        o->ppd = strtod(arg, &end);
-        if (end == arg || *end != '\0' || !(o->ppd >= 1.0 && o->ppd <= 1000.0))
-            argp_error(state, "--ppd %s: expected 1 … 1000", arg);
-        return 0;
-    case ARGP_KEY_ARG:
-        if (state->arg_num >= 2)
-            return ARGP_ERR_UNKNOWN;
-        o->paths[state->arg_num] = arg;
-        return 0;
-    case ARGP_KEY_END:
-        if (state->arg_num < 2)
-            argp_error(state, "REFERENCE and TEST are needed");
-        return 0;
-    default:
-        return ARGP_ERR_UNKNOWN;
-    }
-}
+#define TO(member) BASE_TO(struct options, member)
+static const struct base_option list[] = {
+    {"json", 'j', NULL, TO(json), .help = "print {\"mean\": …, \"max\": …}"},
+    {"output", 'o', "MAP.png", TO(map_path), .help = "write the error map as a picture (magma, black 0 … white 1)"},
+    {"ppd", 'p', "N", TO(ppd), 1, 1000, .help = "pixels per degree of the viewer (67.02)"},
+    {0}};
 
 static int write_map(const char *path, const float *map, int width, int height, struct base_err *err)
 {
@@ -67,20 +36,20 @@ static int write_map(const char *path, const float *map, int width, int height, 
 
 int ggn_cmd_flip(int argc, char **argv)
 {
-    static const struct argp argp = {
-        .options = option_table,
-        .parser = parse,
+    static const struct base_options options = {
+        .list = list,
         .args_doc = "REFERENCE TEST",
-        .doc = "Visible difference of two display images: LDR-FLIP (Andersson et al. 2020), mean and maximum over the pixels.",
-    };
+        .args_min = 2,
+        .args_max = 2,
+        .args = offsetof(struct options, paths),
+        .doc = "Visible difference of two display images: LDR-FLIP (Andersson et al. 2020), mean and maximum over the pixels."};
     struct options o = {.ppd = GGN_FLIP_PPD};
     struct ggn_image8 images[2] = {{0}, {0}};
     struct ggn_flip_stats stats;
     struct base_err err = {0};
     float *map = NULL;
 
-    argp_parse(&argp, argc, argv, 0, NULL, &o);
-    int rc = 0;
+    int rc = base_options_parse(&options, argc, argv, &o, &err);
     for (int i = 0; i < 2 && !rc; i++)
         rc = ggn_image8_read(o.paths[i], &images[i], &err);
     if (rc)

@@ -1,52 +1,28 @@
 /* `ggn golden`: what the published networks give for weights that a hash defines; the same figures from any implementation.
  */
-#include <argp.h>
 #include <cjson/cJSON.h>
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "base/options.h"
 #include "cli/commands.h"
 #include "model/golden.h"
-
-enum { KEY_BASE_R = 256, KEY_BASE_M, KEY_BASE_D, KEY_TRAIN, KEY_FLOAT, KEY_BF16, KEY_THREADS };
 
 struct options {
     struct ggn_golden_seeds seeds;
     int train_step, single, bf16, threads;
 };
 
-static error_t parse(int key, char *arg, struct argp_state *state)
-{
-    struct options *o = state->input;
-    char *end = NULL;
-    unsigned long value = arg ? strtoul(arg, &end, 10) : 0;
-
-    if (arg && (*end || end == arg || *arg == '-' || value > 0xffffffffUL))
-        argp_error(state, "'%s' is not a number in 0..4294967295", arg);
-    switch (key) {
-    case KEY_BASE_R:
-    case KEY_BASE_M:
-    case KEY_BASE_D:
-        o->seeds.base[key - KEY_BASE_R] = (uint32_t)value;
-        return 0;
-    case KEY_TRAIN:
-        o->train_step = 1;
-        return 0;
-    case KEY_FLOAT:
-        o->single = 1;
-        return 0;
-    case KEY_BF16:
-        o->single = o->bf16 = 1;
-        return 0;
-    case KEY_THREADS:
-        if (value < 1 || value > 1024)
-            argp_error(state, "--threads must be in 1..1024");
-        o->threads = (int)value;
-        return 0;
-    default:
-        return ARGP_ERR_UNKNOWN;
-    }
-}
+#define TO(member) BASE_TO(struct options, member)
+static const struct base_option list[] = {
+    {"base-r", 0, "N", TO(seeds.base[GGN_NET_R]), 0, UINT32_MAX, .help = "seed of the denoiser's weights (100)"},
+    {"base-m", 0, "N", TO(seeds.base[GGN_NET_M]), 0, UINT32_MAX, .help = "seed of the generator's weights (300)"},
+    {"base-d", 0, "N", TO(seeds.base[GGN_NET_D]), 0, UINT32_MAX, .help = "seed of the discriminator's weights (500)"},
+    {"train-step", 0, NULL, TO(train_step), .help = "also make one published training iteration and report it"},
+    {"float", 0, NULL, TO(single), .help = "the single-precision networks that inference and training use, not the double ones"},
+    {"bf16", 0, NULL, TO(bf16), .help = "as --float, with bfloat16 products where the processor has them"},
+    {"threads", 0, "N", TO(threads), 1, 1024, .help = "threads (all processors); the figures do not depend on it"},
+    {0}};
 
 static void add_number(cJSON *to, const char *name, double value)
 {
@@ -121,27 +97,17 @@ static cJSON *to_json(const struct ggn_golden *g, int train_step)
 
 int ggn_cmd_golden(int argc, char **argv)
 {
-    static const struct argp_option list[] = {
-        {"base-r", KEY_BASE_R, "N", 0, "Seed of the denoiser's weights (100)", 0},
-        {"base-m", KEY_BASE_M, "N", 0, "Seed of the generator's weights (300)", 0},
-        {"base-d", KEY_BASE_D, "N", 0, "Seed of the discriminator's weights (500)", 0},
-        {"train-step", KEY_TRAIN, NULL, 0, "Also make one published training iteration and report it", 0},
-        {"float", KEY_FLOAT, NULL, 0, "The single-precision networks that inference and training use, not the double ones",
-         0},
-        {"bf16", KEY_BF16, NULL, 0, "As --float, with bfloat16 products where the processor has them", 0},
-        {"threads", KEY_THREADS, "N", 0, "Threads (all processors); the figures do not depend on it", 0},
-        {0}};
-    static const struct argp argp = {
-        .options = list, .parser = parse, .doc = "Prints the golden values of the published networks as one JSON object."};
+    static const struct base_options options = {
+        .list = list, .doc = "Prints the golden values of the published networks as one JSON object."};
     struct options o = {.seeds = {{100, 300, 500}}, .threads = base_threads_available()};
     struct ggn_golden golden;
     struct base_err err = {0};
 
-    argp_parse(&argp, argc, argv, 0, NULL, &o);
-    struct base_threads *threads = base_threads_create(o.threads, &err);
+    struct base_threads *threads =
+        base_options_parse(&options, argc, argv, &o, &err) ? NULL : base_threads_create(o.threads, &err);
     if (!threads)
         return ggn_cmd_fail(argv[0], &err);
-    int rc = (o.single ? ggn_golden_run : ggn_golden_run_f64)(&o.seeds, o.train_step, o.bf16, threads, &golden, &err);
+    int rc = (o.single || o.bf16 ? ggn_golden_run : ggn_golden_run_f64)(&o.seeds, o.train_step, o.bf16, threads, &golden, &err);
     base_threads_destroy(threads);
     if (rc)
         return ggn_cmd_fail(argv[0], &err);

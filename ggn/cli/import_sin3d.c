@@ -1,5 +1,4 @@
 /* `ggn import-sin3d DIR`: the public SIN3D layout into block sequences. */
-#include <argp.h>
 #include <dirent.h>
 #include <errno.h>
 #include <stdio.h>
@@ -9,6 +8,7 @@
 #include <unistd.h>
 
 #include "base/files.h"
+#include "base/options.h"
 #include "cli/commands.h"
 #include "data/sin3d.h"
 
@@ -17,47 +17,13 @@ struct options {
     int block, allow_gaps;
 };
 
-static const struct argp_option option_table[] = {
-    {"output", 'o', "OUT", 0, "data set to write, one folder per view (required)", 0},
-    {"thresholds", 't', "CSV", 0, "human thresholds, name;t0;…;t15; (written as labels)", 0},
-    {"block", 'b', "PIXELS", 0, "side of a block (default 200)", 0},
-    {"allow-gaps", 'g', NULL, 0, "take levels that are not evenly spaced", 0},
-    {0},
-};
-
-static error_t parse(int key, char *arg, struct argp_state *state)
-{
-    struct options *o = state->input;
-    char *end;
-
-    switch (key) {
-    case 'o':
-        o->out = arg;
-        return 0;
-    case 't':
-        o->thresholds = arg;
-        return 0;
-    case 'g':
-        o->allow_gaps = 1;
-        return 0;
-    case 'b':
-        o->block = (int)strtol(arg, &end, 10);
-        if (*end != '\0' || o->block < 1 || o->block > 4096)
-            argp_error(state, "--block %s: expected 1 … 4096", arg);
-        return 0;
-    case ARGP_KEY_ARG:
-        if (state->arg_num >= 1)
-            return ARGP_ERR_UNKNOWN;
-        o->dir = arg;
-        return 0;
-    case ARGP_KEY_END:
-        if (!o->dir || !o->out)
-            argp_error(state, "DIR and --output are needed");
-        return 0;
-    default:
-        return ARGP_ERR_UNKNOWN;
-    }
-}
+#define TO(member) BASE_TO(struct options, member)
+static const struct base_option list[] = {
+    {"output", 'o', "OUT", TO(out), .needed = 1, .help = "data set to write, one folder per view (needed)"},
+    {"thresholds", 't', "CSV", TO(thresholds), .help = "human thresholds, name;t0;…;t15; (written as labels)"},
+    {"block", 'b', "PIXELS", TO(block), 1, 4096, .help = "side of a block (200)"},
+    {"allow-gaps", 'g', NULL, TO(allow_gaps), .help = "take levels that are not evenly spaced"},
+    {0}};
 
 static void show_progress(void *data, const char *view, int done, int of)
 {
@@ -128,21 +94,23 @@ static int import_all(const struct options *o, const struct ggn_sin3d_options *s
 
 int ggn_cmd_import_sin3d(int argc, char **argv)
 {
-    static const struct argp argp = {
-        .options = option_table,
-        .parser = parse,
+    static const struct base_options options = {
+        .list = list,
         .args_doc = "DIR",
-        .doc = "Reads views in the layout of the public SIN3D data set (VIEW_part6/VIEW_00020.png … or .rawls; DIR is one view or the "
-               "folder of all) into block sequences. Running it again continues where it stopped.",
-    };
+        .args_min = 1,
+        .args_max = 1,
+        .args = offsetof(struct options, dir),
+        .doc = "Reads views in the layout of the public SIN3D data set (VIEW_part6/VIEW_00020.png … or .rawls; DIR is one view or "
+               "the folder of all) into block sequences. Running it again continues where it stopped."};
     struct options o = {.block = 200};
     struct ggn_thresholds thresholds = {0};
     struct base_err err = {0};
 
-    argp_parse(&argp, argc, argv, 0, NULL, &o);
+    int rc = base_options_parse(&options, argc, argv, &o, &err);
+    if (rc)
+        return ggn_cmd_fail(argv[0], &err);
     ggn_cmd_catch_interrupt();
     struct ggn_sin3d_options so = {.block = o.block, .allow_gaps = o.allow_gaps, .progress = isatty(2) ? show_progress : NULL};
-    int rc = 0;
     if (o.thresholds) {
         rc = ggn_thresholds_read(o.thresholds, o.block, &thresholds, &err);
         so.thresholds = &thresholds;

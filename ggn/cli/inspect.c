@@ -1,9 +1,8 @@
 /* `ggn inspect`: what is in a model file. */
-#include <argp.h>
 #include <cjson/cJSON.h>
 #include <stdio.h>
-#include <string.h>
 
+#include "base/options.h"
 #include "cli/commands.h"
 #include "model/judge.h"
 
@@ -12,29 +11,11 @@ struct options {
     int json, tensors;
 };
 
-static error_t parse(int key, char *arg, struct argp_state *state)
-{
-    struct options *o = state->input;
-
-    switch (key) {
-    case 'j':
-        o->json = 1;
-        return 0;
-    case 't':
-        o->tensors = 1;
-        return 0;
-    case ARGP_KEY_ARG:
-        if (o->path)
-            argp_error(state, "one FILE at a time");
-        o->path = arg;
-        return 0;
-    case ARGP_KEY_NO_ARGS:
-        argp_error(state, "a FILE is needed");
-        return 0;
-    default:
-        return ARGP_ERR_UNKNOWN;
-    }
-}
+#define TO(member) BASE_TO(struct options, member)
+static const struct base_option list[] = {
+    {"json", 'j', NULL, TO(json), .help = "print the description as stored (JSON)"},
+    {"tensors", 't', NULL, TO(tensors), .help = "list the tensors too"},
+    {0}};
 
 static void print_tensors(const struct ggn_container *c)
 {
@@ -44,7 +25,7 @@ static void print_tensors(const struct ggn_container *c)
         int used = 0;
         for (int d = 0; d < e->rank; d++)
             used += snprintf(shape + used, sizeof shape - (size_t)used, "%s%u", d ? "x" : "", e->dim[d]);
-        printf("  %-38s %-16s %-5s offset %llu\n", e->name, shape, ggn_type_name(e->type), (unsigned long long)e->offset);
+        printf("  %-38s %-16s %-5s offset %llu\n", e->name, shape, ggn_type_names[e->type], (unsigned long long)e->offset);
     }
 }
 
@@ -53,7 +34,7 @@ static void print_model(const struct ggn_model *m, const struct ggn_container *c
     const struct ggn_hyper *h = &m->hyper;
     char *provenance = cJSON_Print(m->provenance);
 
-    printf("preset       %s\n", h->preset == GGN_PRESET_PAPER ? "paper" : "lull");
+    printf("preset       %s\n", ggn_preset_names[h->preset]);
     printf("block        %d x %d pixels, window of %d images\n", h->width, h->height, h->window);
     printf("widths       denoiser %d, generator %d, discriminator %d\n", h->k_r, h->k_m, h->k_d);
     for (int net = 0; net < GGN_NETS; net++)
@@ -73,18 +54,19 @@ static void print_model(const struct ggn_model *m, const struct ggn_container *c
 
 int ggn_cmd_inspect(int argc, char **argv)
 {
-    static const struct argp_option list[] = {{"json", 'j', NULL, 0, "Print the description as stored (JSON)", 0},
-                                              {"tensors", 't', NULL, 0, "List the tensors too", 0},
-                                              {0}};
-    static const struct argp argp = {
-        .options = list, .parser = parse, .args_doc = "FILE", .doc = "Prints what a model file (.ggn) holds and checks it."};
+    static const struct base_options options = {
+        .list = list,
+        .args_doc = "FILE",
+        .args_min = 1,
+        .args_max = 1,
+        .args = offsetof(struct options, path),
+        .doc = "Prints what a model file (.ggn) holds and checks it."};
     struct options o = {0};
     struct ggn_container c;
     struct ggn_model *model = NULL;
     struct base_err err = {0};
 
-    argp_parse(&argp, argc, argv, 0, NULL, &o);
-    if (ggn_container_read(&c, o.path, &err))
+    if (base_options_parse(&options, argc, argv, &o, &err) || ggn_container_read(&c, o.path, &err))
         return ggn_cmd_fail(argv[0], &err);
     int rc = ggn_model_load_memory(o.path, c.data, c.size, &model, &err);
     if (!rc && o.json)

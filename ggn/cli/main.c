@@ -4,11 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/options.h"
 #include "cli/commands.h"
-
-#ifndef GGN_VERSION
-#define GGN_VERSION "0.1.0"
-#endif
 
 struct command {
     const char *name;
@@ -53,77 +50,55 @@ static int is_name(const char *typed, const char *name)
     return *name == '\0' && *typed == '\0';
 }
 
-struct choice {
-    const struct command *command;
-    int argc;
-    char **argv;
-};
-
-static error_t parse(int key, char *arg, struct argp_state *state)
+static const struct command *find(const char *typed)
 {
-    struct choice *choice = state->input;
-
-    switch (key) {
-    case ARGP_KEY_ARG:
-        for (int i = 0; i < N_COMMANDS && !choice->command; i++)
-            if (is_name(arg, commands[i].name))
-                choice->command = &commands[i];
-        if (!choice->command)
-            argp_error(state, "unknown command '%s'", arg);
-        choice->argc = state->argc - state->next + 1;
-        choice->argv = state->argv + state->next - 1;
-        state->next = state->argc;
-        return 0;
-    case ARGP_KEY_NO_ARGS:
-        argp_error(state, "a command is needed");
-        return 0;
-    default:
-        return ARGP_ERR_UNKNOWN;
-    }
+    for (int i = 0; i < N_COMMANDS; i++)
+        if (is_name(typed, commands[i].name))
+            return &commands[i];
+    return NULL;
 }
 
-/* Adds the list of commands to `ggn --help`. */
-static char *list_commands(int key, const char *text, void *input)
+static int refuse(const char *text)
 {
-    (void)input;
-    if (key != ARGP_KEY_HELP_POST_DOC)
-        return (char *)(size_t)text;
+    fprintf(stderr, "ggn: %s (ggn --help lists the commands)\n", text);
+    return GGN_EXIT_BAD_INPUT;
+}
 
-    size_t room = 128, used = 0;
-    for (int i = 0; i < N_COMMANDS; i++)
-        room += strlen(commands[i].help) + 32;
-    char *list = malloc(room);
-    if (!list)
-        return NULL;
-    used += (size_t)snprintf(list, room, "Commands:\n");
-    for (int i = 0; i < N_COMMANDS; i++) {
-        char *name = list + used + 2;
-        used += (size_t)snprintf(list + used, room - used, "  %-12s %s\n", commands[i].name, commands[i].help);
-        for (; *name != ' '; name++)
-            *name = *name == '_' ? '-' : *name;
+/* `ggn` with options only. */
+static int main_options(int argc, char **argv)
+{
+    char doc[2048], name[32];
+    size_t used = (size_t)snprintf(doc, sizeof doc, "Learned stopping criterion for path tracing: data, training, evaluation.\vCommands:\n");
+    for (int i = 0; i < N_COMMANDS && used < sizeof doc; i++) {
+        snprintf(name, sizeof name, "%s", commands[i].name);
+        for (char *p = name; *p; p++)
+            *p = *p == '_' ? '-' : *p;
+        used += (size_t)snprintf(doc + used, sizeof doc - used, "  %-12s %s\n", name, commands[i].help);
     }
-    snprintf(list + used, room - used, "\n`ggn COMMAND --help` says more.");
-    return list;
+    if (used < sizeof doc)
+        snprintf(doc + used, sizeof doc - used, "\n`ggn COMMAND --help` says more.");
+    static const struct base_option none[] = {{0}};
+    struct base_options options = {.doc = doc, .args_doc = "COMMAND [OPTION...]", .list = none};
+    struct base_err err = {0};
+    if (base_options_parse(&options, argc, argv, NULL, &err))
+        return ggn_cmd_fail("ggn", &err);
+    return refuse("a command is needed");
 }
 
 int main(int argc, char **argv)
 {
-    static const struct argp argp = {
-        .parser = parse,
-        .args_doc = "COMMAND [OPTION...]",
-        .doc = "Learned stopping criterion for path tracing: data, training, evaluation.\v",
-        .help_filter = list_commands,
-    };
-    struct choice choice = {0};
-    char name[64];
-
-    argp_program_version = "ggn " GGN_VERSION;
-    argp_err_exit_status = GGN_EXIT_BAD_INPUT;
-    argp_parse(&argp, argc, argv, ARGP_IN_ORDER, NULL, &choice);
-
-    snprintf(name, sizeof name, "ggn %s", choice.argv[0]);
-    choice.argv[0] = name;
-    int status = choice.command->run(choice.argc, choice.argv);
+    char name[64], text[128];
+    if (argc < 2 || argv[1][0] == '-')
+        return main_options(argc, argv);
+    const struct command *command = find(argv[1]);
+    if (!command) {
+        snprintf(text, sizeof text, "%.64s: unknown command", argv[1]);
+        return refuse(text);
+    }
+    snprintf(name, sizeof name, "ggn %s", argv[1]);
+    argv[1] = name;
+    argp_err_exit_status = GGN_EXIT_BAD_INPUT; /* label, study */
+    int status = command->run(argc - 1, argv + 1);
     if (fflush(stdout) || ferror(stdout)) {
         fprintf(stderr, "%s: cannot write standard output\n", name);
         return status ? status : GGN_EXIT_FAILED;

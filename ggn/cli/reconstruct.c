@@ -1,10 +1,10 @@
 /* `ggn reconstruct SEQUENCE`: the picture in which each block is taken at its threshold or stop. */
-#include <argp.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/options.h"
 #include "cli/commands.h"
 #include "data/image.h"
 #include "data/labels.h"
@@ -17,38 +17,15 @@ struct options {
     int json;
 };
 
-static const struct argp_option option_table[] = {
-    {"stops", 's', "FILE", 0, "stops or thresholds per block: CSV, report JSON or EXR stop map (default: the sequence's labels)", 0},
-    {"view", 'v', "NAME", 0, "row of the CSV", 0},
-    {"output", 'o', "OUT.png", 0, "the picture (required)", 0},
-    {"reference", 'r', "REF.png", 0, "write the reference too", 0},
-    {"json", 'j', NULL, 0, "print the figures as JSON", 0},
-    {0},
-};
-
-static error_t parse(int key, char *arg, struct argp_state *state)
-{
-    struct options *o = state->input;
-
-    switch (key) {
-    case 's': o->stops = arg; return 0;
-    case 'v': o->view = arg; return 0;
-    case 'o': o->out = arg; return 0;
-    case 'r': o->reference = arg; return 0;
-    case 'j': o->json = 1; return 0;
-    case ARGP_KEY_ARG:
-        if (state->arg_num >= 1)
-            return ARGP_ERR_UNKNOWN;
-        o->dir = arg;
-        return 0;
-    case ARGP_KEY_END:
-        if (!o->dir || !o->out)
-            argp_error(state, "SEQUENCE and --output are needed");
-        return 0;
-    default:
-        return ARGP_ERR_UNKNOWN;
-    }
-}
+#define TO(member) BASE_TO(struct options, member)
+static const struct base_option list[] = {
+    {"stops", 's', "FILE", TO(stops),
+     .help = "stops or thresholds per block: CSV, report JSON or EXR stop map (the sequence's labels)"},
+    {"view", 'v', "NAME", TO(view), .help = "row of the CSV"},
+    {"output", 'o', "OUT.png", TO(out), .needed = 1, .help = "the picture (needed)"},
+    {"reference", 'r', "REF.png", TO(reference), .help = "write the reference too"},
+    {"json", 'j', NULL, TO(json), .help = "print the figures as JSON"},
+    {0}};
 
 struct picture {
     uint8_t *taken, *reference; /* own; [height][width][3] */
@@ -160,13 +137,14 @@ static int report(const struct options *o, const struct ggn_manifest *m, const s
 
 int ggn_cmd_reconstruct(int argc, char **argv)
 {
-    static const struct argp argp = {
-        .options = option_table,
-        .parser = parse,
+    static const struct base_options options = {
+        .list = list,
         .args_doc = "SEQUENCE",
-        .doc = "Builds the picture in which each block is taken at its threshold (the first recorded level that is not below it), for looking "
-               "at and for figures of quality.",
-    };
+        .args_min = 1,
+        .args_max = 1,
+        .args = offsetof(struct options, dir),
+        .doc = "Builds the picture in which each block is taken at its threshold (the first recorded level that is not below it), "
+               "for looking at and for figures of quality."};
     struct options o = {0};
     struct ggn_manifest m = {0};
     struct ggn_labels labels = {0};
@@ -175,8 +153,9 @@ int ggn_cmd_reconstruct(int argc, char **argv)
     struct base_err err = {0};
     const struct ggn_view *view = NULL;
 
-    argp_parse(&argp, argc, argv, 0, NULL, &o);
-    int rc = ggn_manifest_read(o.dir, &m, &err);
+    int rc = base_options_parse(&options, argc, argv, &o, &err);
+    if (!rc)
+        rc = ggn_manifest_read(o.dir, &m, &err);
     if (!rc && !o.stops)
         rc = ggn_labels_read(o.dir, &labels, &err);
     if (!rc && o.stops) {

@@ -14,13 +14,8 @@ static const char MAGIC[8] = {'L', 'U', 'L', 'L', 'G', 'G', 'N', '\n'};
 enum { HEADER = 64, ENTRY = 88, ALIGN = 64, AT_CHECKSUM = 48, MAX_JSON = 1 << 20 };
 static const uint64_t MAX_FILE = (uint64_t)4 << 30;
 
-static const char *const type_name[GGN_TYPES] = {"f32", "f16", "bf16"};
+const char *const ggn_type_names[GGN_TYPES + 1] = {"f32", "f16", "bf16", NULL};
 static const unsigned type_size[GGN_TYPES] = {4, 2, 2};
-
-const char *ggn_type_name(enum ggn_type type)
-{
-    return type_name[type];
-}
 
 /* --- numbers ----------------------------------------------------------------------------------------------------------- */
 
@@ -166,7 +161,7 @@ static int fits(const struct ggn_container *c, struct base_err *err)
         for (size_t k = 0; k < c->entry[i].count; k++)
             if (fabsf(c->entry[i].write[k]) > most[c->entry[i].type] && isfinite(c->entry[i].write[k]))
                 return base_fail(err, BASE_EINVAL, "tensor '%s' has a value of %g, too large for %s", c->entry[i].name,
-                                (double)c->entry[i].write[k], type_name[c->entry[i].type]);
+                                (double)c->entry[i].write[k], ggn_type_names[c->entry[i].type]);
     return 0;
 }
 

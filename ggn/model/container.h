@@ -28,7 +28,7 @@ enum ggn_type { GGN_F32, GGN_F16, GGN_BF16, GGN_TYPES };
 
 enum { GGN_CONTAINER_VERSION = 1, GGN_CONTAINER_NAME = 48, GGN_CONTAINER_TENSORS = 4096 };
 
-const char *ggn_type_name(enum ggn_type type);
+extern const char *const ggn_type_names[GGN_TYPES + 1]; /* ends with NULL */
 
 struct ggn_entry {
     char name[GGN_CONTAINER_NAME]; /* at most 47 characters */

@@ -4,8 +4,6 @@
 #include <stddef.h>
 #include <string.h>
 
-static const char *const preset_name[] = {"paper", "lull"};
-
 /* Hyper-parameters and calibration as tables, so that reading and writing cannot disagree. */
 static const struct {
     const char *name;
@@ -55,7 +53,7 @@ static int get_preset(const cJSON *root, enum ggn_preset *out, struct base_err *
     const cJSON *item = cJSON_GetObjectItemCaseSensitive(root, "preset");
 
     for (int i = 0; cJSON_IsString(item) && i < 2; i++)
-        if (!strcmp(item->valuestring, preset_name[i])) {
+        if (!strcmp(item->valuestring, ggn_preset_names[i])) {
             *out = (enum ggn_preset)i;
             return 0;
         }
@@ -106,7 +104,7 @@ int ggn_description_parse(const char *json, struct ggn_description *out, struct 
 static int fill(cJSON *root, const struct ggn_description *d)
 {
     int ok = cJSON_AddStringToObject(root, "kind", "model") &&
-             cJSON_AddStringToObject(root, "preset", preset_name[d->hyper.preset]);
+             cJSON_AddStringToObject(root, "preset", ggn_preset_names[d->hyper.preset]);
 
     for (size_t i = 0; i < N_HYPER; i++)
         ok = ok && cJSON_AddNumberToObject(root, hyper_field[i].name,

@@ -13,6 +13,8 @@ struct ggn_judge {
     struct ggn_exec *exec[GGN_NETS];
 };
 
+const char *const ggn_precision_names[] = {"f32", "bf16", NULL};
+
 int ggn_precision_has_bf16(void)
 {
     return ggn_bf16_available();

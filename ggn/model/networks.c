@@ -1,5 +1,7 @@
 #include "model/networks.h"
 
+const char *const ggn_preset_names[] = {"paper", "lull", NULL};
+
 static const double SLOPE = 0.2; /* LeakyReLU */
 
 struct ggn_hyper ggn_hyper_default(enum ggn_preset preset)

@@ -13,6 +13,7 @@ enum ggn_preset {
     GGN_PRESET_PAPER, /* published: D's logit passes LeakyReLU and dropout */
     GGN_PRESET_LULL   /* mended: the logit is linear */
 };
+extern const char *const ggn_preset_names[]; /* "paper", "lull", NULL */
 
 enum { GGN_NET_R, GGN_NET_M, GGN_NET_D, GGN_NETS };
 

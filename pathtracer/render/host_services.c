@@ -3,6 +3,8 @@
 #include <limits.h>
 #include <stdio.h>
 
+#include "base/version.h"
+
 static void host_log(const struct lull_host *host, int32_t level, const char *text)
 {
     const struct pt_host_services *s = host->context;
@@ -44,7 +46,7 @@ static int32_t host_parallel_for(const struct lull_host *host, uint64_t count, l
 struct lull_host pt_host_services_table(struct pt_host_services *s)
 {
     return (struct lull_host){.struct_size = sizeof(struct lull_host), .api_minor = LULL_API_MINOR, .context = s,
-                              .name = "lull pathtracer 1.0",
+                              .name = "lull pathtracer " BASE_VERSION,
                               .max_workers = s->threads ? (uint32_t)base_threads_count(s->threads) : 1,
                               .log = host_log, .parallel_for = host_parallel_for};
 }

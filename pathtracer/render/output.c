@@ -8,6 +8,7 @@
 
 #include "base/colour.h"
 #include "base/files.h"
+#include "base/version.h"
 #include "image/exr.h"
 #include "image/oiio.h"
 #include "image/stopmap.h"
@@ -123,7 +124,7 @@ int pt_output_exr(const char *path, const struct pt_render *r, const struct pt_o
         {"lull:block", block, 0.0},
         {"lull:seed", NULL, (double)r->config.integrator.seed},
         {"lull:samples", NULL, (double)r->totals.samples},
-        {"software", "lull pathtracer 1.0", 0.0},
+        {"software", "lull pathtracer " BASE_VERSION, 0.0},
         {"lull:seconds", NULL, pt_render_elapsed_s(r)}, /* last: left out of reproducible files */
     };
     struct exr_source source = {r, info->aov};

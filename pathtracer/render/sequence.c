@@ -10,6 +10,7 @@
 
 #include "base/clock.h"
 #include "base/files.h"
+#include "base/version.h"
 #include "render/blockstats.h"
 #include "base/json.h"
 #include "render/lseq.h"
@@ -122,7 +123,7 @@ static cJSON *new_manifest(const struct recorder *r)
     char scene[256], view[256], crc[16], renderer[256];
     name_view(c, scene, view, sizeof scene);
     snprintf(crc, sizeof crc, "%08x", c->scene_crc);
-    snprintf(renderer, sizeof renderer, "lull pathtracer 1.0, %s sampler, %s, filter %s %g, max depth %d, clamp %g",
+    snprintf(renderer, sizeof renderer, "lull pathtracer " BASE_VERSION ", %s sampler, %s, filter %s %g, max depth %d, clamp %g",
              samplers[i->sampler], i->strategy == PT_STRATEGY_MIS ? "path" : "bsdf-only", filters[i->filter],
              (double)i->filter_x, i->max_depth, (double)i->max_component);
     int failed = 0;

@@ -19,7 +19,7 @@ struct base_err {
     char text[512];
 };
 
-/* Writes code and the formatted line into *err (if not NULL) and returns code, so that `return base_fail(...)` reads well. */
+/* Writes code and the formatted line into *err (if not NULL) and returns code: `return base_fail(...)` reads well. */
 int base_fail(struct base_err *err, int code, const char *format, ...) __attribute__((format(printf, 3, 4)));
 
 /* The usual out-of-memory failure; `what` names what was being allocated. */

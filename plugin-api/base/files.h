@@ -1,8 +1,8 @@
 /*
  * Whole-file reads and atomic writes.
  *
- * An output is written to PATH.tmp.PID and renamed onto PATH by base_file_commit, so that a reader sees the old file or the new
- * one and never a part. Not thread-safe per object.
+ * An output is written to a temporary beside PATH and renamed onto PATH by base_file_commit, so that a reader sees the old
+ * file or the new one and never a part. Not thread-safe per object.
  */
 #ifndef BASE_FILES_H
 #define BASE_FILES_H

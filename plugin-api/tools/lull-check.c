@@ -4,10 +4,11 @@
  */
 #include "child.h"
 
-#include <argp.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+
+#include "base/options.h"
 
 enum { PAIRS_MAX = 64, NAMES_MAX = 64, SPECS_MAX = 256, IDS_MAX = LC_LINES_MAX };
 
@@ -32,92 +33,54 @@ enum { GROUPS = sizeof groups / sizeof *groups };
 /* --- command line --------------------------------------------------------------------------------------------------------
  */
 
-static const struct argp_option options[] = {
-    {"param", 'p', "KEY=VALUE", 0, "Give the criterion this parameter (repeatable)", 0},
-    {"only", 'o', "CHECK", 0, "Run this check only (repeatable)", 0},
-    {"list", 'l', NULL, 0, "List the checks and exit", 0},
-    {"quiet", 'q', NULL, 0, "Print failures and the last line only", 0},
-    {"threads", 't', "N", 0, "Threads for the concurrent checks, 2 to 32 (default 4)", 0},
-    {"limit", 'L', "SECONDS", 0, "A check that takes longer has failed (default 120)", 0},
-    {0},
-};
-
-static const char doc[] =
-    "Holds stopping criteria against the whole contract of lull/criterion.h."
-    "\vCRITERION is NAME (looked for in LULL_PLUGIN_PATH and in lib/lull beside this program), PATH (every criterion of the "
-    "library) or PATH:ID. Each check runs in a process of its own; the output is TAP.\n\n"
-    "Exit status: 0 all checks passed, 1 one failed, 2 wrong usage or no such criterion.";
-
-static long number(struct argp_state *state, const char *text, long min, long max)
+static int add_only(void *into, const char *name, struct base_err *err)
 {
-    char *end;
-    long value = strtol(text, &end, 10);
-    if (end == text || *end != '\0' || value < min || value > max)
-        argp_error(state, "'%s' is not an integer in [%ld, %ld]", text, min, max);
-    return value;
-}
-
-static void add_only(struct argp_state *state, struct arguments *a, const char *name)
-{
+    struct arguments *a = into;
     int known = 0;
     for (int g = 0; g < GROUPS; g++)
         for (const struct lc_check *k = groups[g]; k->name != NULL; k++)
             known |= strcmp(k->name, name) == 0;
     if (!known)
-        argp_error(state, "no check '%s'; --list names them", name);
+        return base_fail(err, BASE_EINVAL, "no such check; --list names them");
     if (a->only_count == NAMES_MAX)
-        argp_error(state, "too many checks");
+        return base_fail(err, BASE_EINVAL, "more than %d checks", NAMES_MAX);
     a->only[a->only_count++] = name;
-}
-
-static void add_pair(struct argp_state *state, struct arguments *a, char *text)
-{
-    char *equals = strchr(text, '=');
-    if (!equals || equals == text)
-        argp_error(state, "'%s' is not KEY=VALUE", text);
-    if (a->pair_count == PAIRS_MAX)
-        argp_error(state, "too many parameters");
-    if (equals)
-        *equals++ = '\0';
-    a->pairs[a->pair_count++] = (struct lull_pair){text, equals};
-}
-
-static error_t parse(int key, char *arg, struct argp_state *state)
-{
-    struct arguments *a = state->input;
-    switch (key) {
-    case 'p':
-        add_pair(state, a, arg);
-        break;
-    case 'o':
-        add_only(state, a, arg);
-        break;
-    case 'l':
-        a->list = 1;
-        break;
-    case 'q':
-        a->quiet = 1;
-        break;
-    case 't':
-        a->workers = (uint32_t)number(state, arg, 2, 32);
-        break;
-    case 'L':
-        a->limit_s = (unsigned)number(state, arg, 1, 100000);
-        break;
-    case ARGP_KEY_ARG:
-        if (a->spec_count == SPECS_MAX)
-            argp_error(state, "too many criteria");
-        a->specs[a->spec_count++] = arg;
-        break;
-    case ARGP_KEY_END:
-        if (a->spec_count == 0 && !a->list)
-            argp_error(state, "no criterion given");
-        break;
-    default:
-        return ARGP_ERR_UNKNOWN;
-    }
     return 0;
 }
+
+/* Splits the text, which is argv's, at its first '='. */
+static int add_pair(void *into, const char *text, struct base_err *err)
+{
+    struct arguments *a = into;
+    char *equals = strchr(text, '=');
+    if (!equals || equals == text)
+        return base_fail(err, BASE_EINVAL, "expected KEY=VALUE");
+    if (a->pair_count == PAIRS_MAX)
+        return base_fail(err, BASE_EINVAL, "more than %d parameters", PAIRS_MAX);
+    *equals++ = '\0';
+    a->pairs[a->pair_count++] = (struct lull_pair){text, equals};
+    return 0;
+}
+
+#define TO(member) BASE_TO(struct arguments, member)
+static const struct base_option list[] = {
+    {"param", 'p', "KEY=VALUE", .set = add_pair, .help = "Give the criterion this parameter (repeatable)"},
+    {"only", 'o', "CHECK", .set = add_only, .help = "Run this check only (repeatable)"},
+    {"list", 'l', NULL, TO(list), .help = "List the checks and exit"},
+    {"quiet", 'q', NULL, TO(quiet), .help = "Print failures and the last line only"},
+    {"threads", 't', "N", TO(workers), 2, 32, .help = "Threads for the concurrent checks (4)"},
+    {"limit", 'L', "SECONDS", TO(limit_s), 1, 100000, .help = "A check that takes longer has failed (120)"},
+    {0}};
+static const struct base_options options = {
+    .list = list,
+    .args_doc = "CRITERION...",
+    .args_max = SPECS_MAX,
+    .args = offsetof(struct arguments, specs),
+    .arg_count = offsetof(struct arguments, spec_count),
+    .doc = "Holds stopping criteria against the whole contract of lull/criterion.h."
+           "\vCRITERION is NAME (looked for in LULL_PLUGIN_PATH and in lib/lull beside this program), PATH (every criterion of "
+           "the library) or PATH:ID. Each check runs in a process of its own; the output is TAP.\n\n"
+           "Exit status: 0 all checks passed, 1 one failed, 2 wrong usage or no such criterion."};
 
 /* --- finding -------------------------------------------------------------------------------------------------------------
  */
@@ -304,10 +267,14 @@ static int check_spec(const struct arguments *a, const char *spec, struct totals
 
 int main(int argc, char **argv)
 {
-    static const struct argp argp = {options, parse, "CRITERION...", doc, NULL, NULL, NULL};
     static struct arguments a = {.workers = 4, .limit_s = 120};
-    argp_err_exit_status = LC_EXIT_USAGE;
-    argp_parse(&argp, argc, argv, 0, NULL, &a);
+    struct base_err err = {0};
+    if (!base_options_parse(&options, argc, argv, &a, &err) && a.spec_count == 0 && !a.list)
+        base_fail(&err, BASE_EINVAL, "expected CRITERION... (--help says more)");
+    if (err.code) {
+        fprintf(stderr, "lull-check: %s\n", err.text);
+        return LC_EXIT_USAGE;
+    }
     if (a.list) {
         for (int g = 0; g < GROUPS; g++)
             for (const struct lc_check *k = groups[g]; k->name != NULL; k++)

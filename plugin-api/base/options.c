@@ -1,0 +1,264 @@
+#include "base/options.h"
+
+#include <argp.h>
+#include <errno.h>
+#include <getopt.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/version.h"
+
+enum { MAX_OPTIONS = 96, KEY_LONG = 256, KEY_USAGE = KEY_LONG + MAX_OPTIONS, KEY_HELP, KEY_VERSION };
+
+/* --- values --- */
+
+int base_parse_integer(const char *text, int64_t min, int64_t max, int64_t *out)
+{
+    char *end;
+    errno = 0;
+    long long v = strtoll(text, &end, 10);
+    if (end == text || *end || errno || v < min || v > max)
+        return 0;
+    *out = v;
+    return 1;
+}
+
+int base_parse_real(const char *text, double min, double max, double *out)
+{
+    char *end;
+    double v = strtod(text, &end);
+    if (end == text || *end || !(v >= min && v <= max))
+        return 0;
+    *out = v;
+    return 1;
+}
+
+int base_word_index(const char *const *words, const char *text, size_t length)
+{
+    for (int i = 0; words[i]; i++)
+        if (strlen(words[i]) == length && !memcmp(words[i], text, length))
+            return i;
+    return -1;
+}
+
+static int is_flag(const struct base_option *o)
+{
+    return !o->arg && !o->words;
+}
+
+/* "a, b or c", each after `before` */
+static void list_words(const struct base_option *o, const char *before, char *text, size_t room)
+{
+    size_t used = 0;
+    text[0] = '\0';
+    for (int i = 0; o->words[i] && used < room; i++)
+        used += (size_t)snprintf(text + used, room - used, "%s%s%s", i == 0 ? "" : o->words[i + 1] ? ", " : " or ", before,
+                                 o->words[i]);
+}
+
+static int has_ending(const struct base_option *o, const char *name)
+{
+    for (int i = 0; o->words[i]; i++) {
+        size_t n = strlen(name), k = strlen(o->words[i]);
+        if (n > k + 1 && name[n - k - 1] == '.' && !strcmp(name + n - k, o->words[i]))
+            return 1;
+    }
+    return 0;
+}
+
+static int store_integer(const struct base_option *o, void *at, const char *value)
+{
+    int64_t v;
+    if (is_flag(o))
+        v = o->min != 0.0 ? (int64_t)o->min : 1;
+    else if (o->words)
+        v = base_word_index(o->words, value, strlen(value));
+    else if (!base_parse_integer(value, (int64_t)o->min, (int64_t)o->max, &v))
+        return 0;
+    if (v < 0 && o->words)
+        return 0;
+    if (o->to.type == BASE_STORE_INT)
+        *(int *)at = (int)v;
+    else if (o->to.type == BASE_STORE_U32)
+        *(uint32_t *)at = (uint32_t)v;
+    else
+        *(uint64_t *)at = (uint64_t)v;
+    return 1;
+}
+
+/* 1 when the value fits. */
+static int store(const struct base_option *o, void *into, const char *value)
+{
+    void *at = (char *)into + o->to.offset;
+    if (o->to.type == BASE_STORE_REAL)
+        return base_parse_real(value, o->min, o->max, at);
+    if (o->to.type != BASE_STORE_TEXT)
+        return store_integer(o, at, value);
+    if (o->words && !has_ending(o, value))
+        return 0;
+    *(const char **)at = value;
+    return 1;
+}
+
+static int bad_value(const struct base_option *o, const char *value, struct base_err *err)
+{
+    char words[256];
+    if (o->words) {
+        list_words(o, o->to.type == BASE_STORE_TEXT ? "." : "", words, sizeof words);
+        return base_fail(err, BASE_EINVAL, "--%s %s: expected %s%s", o->name, value,
+                         o->to.type == BASE_STORE_TEXT ? "a name that ends in " : "", words);
+    }
+    if (o->to.type == BASE_STORE_REAL)
+        return base_fail(err, BASE_EINVAL, "--%s %s: expected a number from %g to %g", o->name, value, o->min, o->max);
+    return base_fail(err, BASE_EINVAL, "--%s %s: expected an integer from %.0f to %.0f", o->name, value, o->min, o->max);
+}
+
+static int take(const struct base_option *o, void *into, const char *value, struct base_err *err)
+{
+    struct base_err why = {0};
+    if (!o->set)
+        return store(o, into, value) ? 0 : bad_value(o, value, err);
+    int rc = o->set(into, value, &why);
+    if (rc == BASE_ENOMEM)
+        return base_fail(err, rc, "%s", why.text);
+    return rc ? base_fail(err, rc, "--%s%s%s: %s", o->name, value ? " " : "", value ? value : "", why.text) : 0;
+}
+
+static const struct base_option *find(const struct base_option *list, int key)
+{
+    if (key >= KEY_LONG && key < KEY_USAGE)
+        return &list[key - KEY_LONG];
+    for (; list->name || list->help; list++)
+        if (list->name && list->key == key)
+            return list;
+    return NULL;
+}
+
+/* --- help --- */
+
+/* What --help calls the value, or the words: a|b|c. */
+static const char *value_name(const struct base_option *o, char *text, size_t room)
+{
+    if (o->arg || !o->words)
+        return o->arg;
+    size_t used = 0;
+    for (int i = 0; o->words[i] && used < room; i++)
+        used += (size_t)snprintf(text + used, room - used, "%s%s", i ? "|" : "", o->words[i]);
+    return text;
+}
+
+static void print_help(const struct base_options *options, const char *program, unsigned flags)
+{
+    static struct argp_option rows[MAX_OPTIONS + 4];
+    static char names[MAX_OPTIONS][96];
+    int n = 0, group = 0;
+    for (const struct base_option *o = options->list; o->name || o->help; o++, n++) {
+        group += !o->name;
+        rows[n] = (struct argp_option){.name = o->name, .doc = o->help, .group = group,
+                                       .key = !o->name ? 0 : o->key ? o->key : KEY_LONG + n,
+                                       .arg = value_name(o, names[n], sizeof names[n]),
+                                       .flags = o->hidden ? OPTION_HIDDEN : 0};
+    }
+    rows[n++] = (struct argp_option){.name = "help", .key = '?', .doc = "Print this and exit", .group = -1};
+    rows[n++] = (struct argp_option){.name = "usage", .key = KEY_USAGE, .doc = "Print a short usage and exit", .group = -1};
+    rows[n] = (struct argp_option){.name = "version", .doc = "Print the version and exit", .group = -1,
+                                   .key = find(options->list, 'V') ? KEY_VERSION : 'V'};
+    const struct argp argp = {.options = rows, .args_doc = options->args_doc, .doc = options->doc};
+    argp_help(&argp, stdout, flags, (char *)(size_t)program);
+}
+
+_Noreturn static void answer(const struct base_options *options, const char *program, int key)
+{
+    if (key == KEY_VERSION)
+        printf("%.*s (Lull) %s\n", (int)strcspn(program, " "), program, BASE_VERSION);
+    else if (key == KEY_USAGE)
+        print_help(options, program, ARGP_HELP_USAGE);
+    else
+        print_help(options, program, ARGP_HELP_SHORT_USAGE | ARGP_HELP_LONG | ARGP_HELP_DOC);
+    exit(fflush(stdout) || ferror(stdout) ? EXIT_FAILURE : EXIT_SUCCESS);
+}
+
+/* --- parsing --- */
+
+struct getopt_form {
+    struct option longs[MAX_OPTIONS + 4];
+    char shorts[2 * MAX_OPTIONS + 4];
+};
+
+/* Every option answers with KEY_LONG + its row, or its letter. The ':' tells a missing value from an unknown option. */
+static void to_getopt(const struct base_option *list, struct getopt_form *form)
+{
+    char *s = form->shorts;
+    int n = 0;
+    *s++ = ':';
+    for (int i = 0; list[i].name || list[i].help; i++) {
+        if (!list[i].name)
+            continue;
+        int has_value = is_flag(&list[i]) ? no_argument : required_argument;
+        form->longs[n++] = (struct option){list[i].name, has_value, NULL, KEY_LONG + i};
+        if (list[i].key) {
+            *s++ = (char)list[i].key;
+            if (has_value == required_argument)
+                *s++ = ':';
+        }
+    }
+    *s = '\0';
+    form->longs[n++] = (struct option){"help", no_argument, NULL, KEY_HELP};
+    form->longs[n++] = (struct option){"usage", no_argument, NULL, KEY_USAGE};
+    form->longs[n++] = (struct option){"version", no_argument, NULL, KEY_VERSION};
+    form->longs[n] = (struct option){0};
+}
+
+/* What getopt did not like. `token` is the argument that it was at. */
+static int bad_option(int key, const char *token, struct base_err *err)
+{
+    if (key == ':')
+        return base_fail(err, BASE_EINVAL, "%s: a value is needed (--help says more)", token);
+    if (optopt >= KEY_LONG)
+        return base_fail(err, BASE_EINVAL, "%s: this option takes no value", token);
+    if (optopt)
+        return base_fail(err, BASE_EINVAL, "-%c: unknown option (--help lists the options)", optopt);
+    return base_fail(err, BASE_EINVAL, "%s: unknown option, or the beginning of several (--help lists the options)", token);
+}
+
+static int take_arguments(const struct base_options *options, int count, char **argv, void *into, struct base_err *err)
+{
+    if (count > options->args_max)
+        return base_fail(err, BASE_EINVAL, "%s: one argument too many; expected %s", argv[options->args_max],
+                         options->args_doc ? options->args_doc : "options only");
+    if (count < options->args_min)
+        return base_fail(err, BASE_EINVAL, "expected %s (--help says more)", options->args_doc);
+    for (int i = 0; i < count; i++)
+        ((const char **)(void *)((char *)into + options->args))[i] = argv[i];
+    if (options->arg_count)
+        *(int *)(void *)((char *)into + options->arg_count) = count;
+    return 0;
+}
+
+int base_options_parse(const struct base_options *options, int argc, char **argv, void *into, struct base_err *err)
+{
+    struct getopt_form form;
+    const char *slash = strrchr(argv[0], '/'), *program = slash ? slash + 1 : argv[0];
+    to_getopt(options->list, &form);
+    optind = 0;
+    opterr = 0;
+    for (int key; (optopt = 0, key = getopt_long(argc, argv, form.shorts, form.longs, NULL)) != -1;) {
+        const char *token = argv[optind - 1];
+        if (key == '?' && (optopt == '?' || optopt == 'V')) /* letters that mean this where no option has taken them */
+            key = optopt == '?' ? KEY_HELP : KEY_VERSION;
+        if (key >= KEY_USAGE)
+            answer(options, program, key);
+        if (key == ':' || key == '?')
+            return bad_option(key, token, err);
+        int rc = take(find(options->list, key), into, optarg, err);
+        if (rc)
+            return rc;
+    }
+    int rc = take_arguments(options, argc - optind, argv + optind, into, err);
+    for (const struct base_option *o = options->list; !rc && (o->name || o->help); o++)
+        if (o->needed && !*(const char **)(void *)((char *)into + o->to.offset))
+            rc = base_fail(err, BASE_EINVAL, "--%s %s is needed (--help says more)", o->name, o->arg);
+    return rc;
+}

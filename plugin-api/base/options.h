@@ -1,0 +1,66 @@
+/*
+ * A command line as a table: one row says an option's name, what it takes, where that goes and what --help says about it.
+ *
+ *   static const struct base_option list[] = {
+ *       {"window", 'w', "N", BASE_TO(struct settings, window), 2, 16, .help = "images per window (6)"},
+ *       {"preset", 0, NULL, BASE_TO(struct settings, preset), .words = preset_names, .help = "networks and defaults"},
+ *       {"json", 'j', NULL, BASE_TO(struct settings, json), .help = "print JSON"},
+ *       {0}};
+ *
+ * The type of the member decides: int, uint32_t and uint64_t take an integer from min to max, double a number, const char *
+ * the text itself (borrowed from argv). With `words` an integer member takes the index of the word; an int with neither
+ * `arg` nor words is a flag. Not thread-safe (getopt).
+ */
+#ifndef BASE_OPTIONS_H
+#define BASE_OPTIONS_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "base/err.h"
+
+enum base_store_type { BASE_STORE_NONE, BASE_STORE_INT, BASE_STORE_U32, BASE_STORE_U64, BASE_STORE_REAL, BASE_STORE_TEXT };
+
+struct base_store {
+    enum base_store_type type;
+    size_t offset; /* in the struct that base_options_parse fills */
+};
+
+#define BASE_TO(struct_type, member)                                                                                        \
+    {_Generic(((struct_type *)0)->member, int: BASE_STORE_INT, uint32_t: BASE_STORE_U32, uint64_t: BASE_STORE_U64,          \
+              double: BASE_STORE_REAL, const char *: BASE_STORE_TEXT), offsetof(struct_type, member)}
+
+struct base_option {
+    const char *name;       /* long name without dashes; NULL: `help` is the heading of the rows that follow */
+    int key;                /* short name, a letter, or 0 */
+    const char *arg;        /* what --help calls the value; NULL: a flag, or the words */
+    struct base_store to;
+    double min, max;        /* of a number, both allowed; a flag stores `min`, or 1 if that is 0 */
+    const char *help;
+    const char *const *words; /* ends with NULL. An integer: what may be said. Text: endings of a file's name */
+    /* For all else: reads value (NULL for a flag) into the struct. Its error says what was expected; the option is put
+     * before it. Out of memory is passed on as it is. */
+    int (*set)(void *into, const char *value, struct base_err *err);
+    int needed, hidden;     /* needed: text only; without it the command line is refused */
+};
+
+struct base_options {
+    const char *doc;        /* what the command does, and after "\v" what is printed below the options */
+    const char *args_doc;   /* "SCENE.pbrt", "REFERENCE TEST", NULL if there are no arguments */
+    const struct base_option *list; /* ends with {0} */
+    int args_min, args_max; /* arguments that are no options */
+    size_t args;            /* offset of their const char *[args_max], borrowed from argv */
+    size_t arg_count;       /* offset of an int that gets their number; 0: nobody asks */
+};
+
+/* Fills *into from argv (whose order it may change); what is not on the command line stays as it was. --help, --usage and
+ * --version print and exit. Otherwise 0, or BASE_EINVAL with one line that names the option. */
+int base_options_parse(const struct base_options *options, int argc, char **argv, void *into, struct base_err *err);
+
+/* The parts, for values that are made of several: the whole text must be one number in [min, max]. 1 if it is. */
+int base_parse_integer(const char *text, int64_t min, int64_t max, int64_t *out);
+int base_parse_real(const char *text, double min, double max, double *out);
+/* Index of the word that is text[0 … length), -1 if there is none. */
+int base_word_index(const char *const *words, const char *text, size_t length);
+
+#endif
