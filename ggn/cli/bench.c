@@ -69,14 +69,10 @@ static int setup(struct bench *b, struct base_err *err)
                 plane[k] = (float)ggn_hash_unit((uint32_t)k, (uint32_t)(i * PLANES + c));
             *(c < 18 ? &b->noisy[i * 18 + c] : &b->reference[i * 3 + c - 18]) = plane;
         }
-    for (int c = 0; c < 18; c++)
-        for (int y = 0; y < 200; y++) {
-            memcpy(ggn_exec_plane(b->m, 0, 0, c) + (long)y * 201, b->noisy[c] + y * 200, 200 * sizeof(float));
-            if (c < 3)
-                memcpy(ggn_exec_plane(b->r, 0, 0, c) + (long)y * 201, b->noisy[c] + y * 200, 200 * sizeof(float));
-            if (c < 2)
-                memcpy(ggn_exec_plane(b->d, 0, 0, c) + (long)y * 201, b->noisy[c] + y * 200, 200 * sizeof(float));
-        }
+    struct ggn_exec *const all[] = {b->r, b->m, b->d};
+    for (int net = 0; net < GGN_NETS; net++)
+        for (int c = 0; c < all[net]->graph->value[0].c; c++)
+            ggn_plane_copy(&all[net]->graph->value[0], ggn_exec_plane(all[net], 0, 0, c), b->noisy[c], 200);
     return 0;
 }
 

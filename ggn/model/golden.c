@@ -98,9 +98,7 @@ static void release(struct state *s)
 
 static void copy_in(const struct ggn_exec *e, int n, int c, const real *from, int from_row)
 {
-    const struct ggn_value *v = &e->graph->value[0];
-    for (int y = 0; y < v->h; y++)
-        memcpy(ggn_exec_plane(e, 0, n, c) + (long)y * v->row, from + (long)y * from_row, (size_t)v->w * sizeof(real));
+    ggn_plane_copy(&e->graph->value[0], ggn_exec_plane(e, 0, n, c), from, from_row);
 }
 
 static double value_at(const struct ggn_exec *e, int n, int c, int y, int x)
@@ -183,9 +181,7 @@ static int record_window0(struct state *s, struct ggn_golden *out, struct base_e
     if (padded) {
         const real *reference[3], *denoised0[3];
         for (int c = 0; c < 3; c++) {
-            for (int y = 0; y < SIDE; y++)
-                memcpy(padded + ((size_t)c * SIDE + (size_t)y) * (size_t)r->row, s->reference_plane[c] + y * SIDE,
-                       SIDE * sizeof *padded);
+            ggn_plane_copy(r, padded + (size_t)c * SIDE * (size_t)r->row, s->reference_plane[c], SIDE);
             reference[c] = padded + (size_t)c * SIDE * (size_t)r->row;
             denoised0[c] = ggn_exec_plane(s->r, s->r->graph->n_values - 1, 0, c);
         }

@@ -90,8 +90,8 @@ void ggn_judge_denoise(struct ggn_judge *j, const uint8_t *noisy, uint16_t *deno
 
     for (int t = 0; t < nx * ny; t++) {
         int x0 = ggn_tile_start(width, in->w, t % nx), y0 = ggn_tile_start(height, in->h, t / nx);
-        ggn_tile_load_u8(noisy, width, height, x0, y0, in->w, in->h, 1.0F / 255,
-                         ggn_exec_plane(j->exec[GGN_NET_R], 0, 0, 0), (size_t)in->row, in->plane);
+        ggn_tile_load_u8(noisy, width, height, x0, y0, in->w, in->h, 1.0F / 255, ggn_exec_plane(j->exec[GGN_NET_R], 0, 0, 0),
+                         (size_t)in->row, in->plane);
         forward(j, GGN_NET_R);
         ggn_tile_store_u16(denoised, width, height, x0, y0, in->w, in->h, output_plane(j, GGN_NET_R), (size_t)out->row,
                            out->plane);
@@ -104,9 +104,7 @@ static void map_into(struct ggn_judge *j, int which)
     const struct ggn_value *map = output(j, GGN_NET_M), *to = input(j, GGN_NET_D);
 
     forward(j, GGN_NET_M);
-    for (int y = 0; y < map->h; y++)
-        memcpy(ggn_exec_plane(j->exec[GGN_NET_D], 0, 0, which) + (long)y * to->row,
-               output_plane(j, GGN_NET_M) + (long)y * map->row, (size_t)map->w * sizeof(float));
+    ggn_plane_copy(to, ggn_exec_plane(j->exec[GGN_NET_D], 0, 0, which), output_plane(j, GGN_NET_M), map->row);
 }
 
 static double tile_logit(struct ggn_judge *j, const uint8_t *const *noisy, const uint16_t *const *denoised, int width,

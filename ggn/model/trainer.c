@@ -225,22 +225,13 @@ static void finish_step(struct ggn_trainer *t)
         ggn_trainer_keep(t);
 }
 
-/* Copies `n` gap-free planes into channels c.. of image i of the executor's input. */
-static void set_input(const struct ggn_exec *e, int i, int c, const real *const *planes, int n)
+/* Copies `n` gap-free planes into the first channels of image i of the executor's input. */
+static void set_input(const struct ggn_exec *e, int i, const real *const *planes, int n)
 {
     const struct ggn_value *v = &e->graph->value[0];
 
-    for (int k = 0; k < n; k++)
-        for (int y = 0; y < v->h; y++)
-            memcpy(ggn_exec_plane(e, 0, i, c + k) + (long)y * v->row, planes[k] + (long)y * v->w,
-                   (size_t)v->w * sizeof(real));
-}
-
-/* Copies one plane with the layout of a value. */
-static void copy_plane(real *to, const real *from, const struct ggn_value *v)
-{
-    for (int y = 0; y < v->h; y++)
-        memcpy(to + (long)y * v->row, from + (long)y * v->row, (size_t)v->w * sizeof *to);
+    for (int c = 0; c < n; c++)
+        ggn_plane_copy(v, ggn_exec_plane(e, 0, i, c), planes[c], v->w);
 }
 
 /* 1 − SSIM of the denoised images to the references, its gradient into R's output. */
@@ -256,8 +247,7 @@ static double denoiser_loss(struct ggn_trainer *t, const real *const *reference,
         for (int c = 0; c < 3; c++) {
             /* the input's gradient is not needed: its planes hold the reference in the layout of the output */
             real *copy = ggn_exec_grad(t->r, 0, i, c);
-            for (int r = 0; r < v->h; r++)
-                memcpy(copy + (long)r * in->row, reference[3 * i + c] + (long)r * v->w, (size_t)v->w * sizeof *copy);
+            ggn_plane_copy(in, copy, reference[3 * i + c], v->w);
             x[c] = ggn_exec_plane(t->r, out, i, c);
             dx[c] = ggn_exec_grad(t->r, out, i, c);
             y[c] = copy;
@@ -272,7 +262,7 @@ static int denoiser_gradient(struct ggn_trainer *t, const real *const *x, int x_
                              int count, double *loss, struct base_err *err)
 {
     for (int i = 0; i < count; i++)
-        set_input(t->r, i, 0, x + (size_t)i * (size_t)x_stride, 3);
+        set_input(t->r, i, x + (size_t)i * (size_t)x_stride, 3);
     zero_grad(t, GGN_NET_R);
     ggn_exec_forward(t->r, t->weights[GGN_NET_R], count, GGN_TRAIN);
     *loss = denoiser_loss(t, reference, count);
@@ -310,14 +300,13 @@ static void exchange_maps(struct ggn_trainer *t, const struct ggn_exec *ref, int
     const int out = t->graph[GGN_NET_M].n_values - 1;
     const struct ggn_value *v = &t->graph[GGN_NET_M].value[out];
 
-    for (int i = 0; i < count; i++) {
-        if (back) {
-            copy_plane(ggn_exec_grad(ref, out, ref0 + i, 0), ggn_exec_grad(t->d, 0, i, 0), v);
-            copy_plane(ggn_exec_grad(noisy, out, noisy0 + i, 0), ggn_exec_grad(t->d, 0, i, 1), v);
-        } else {
-            copy_plane(ggn_exec_plane(t->d, 0, i, 0), ggn_exec_plane(ref, out, ref0 + i, 0), v);
-            copy_plane(ggn_exec_plane(t->d, 0, i, 1), ggn_exec_plane(noisy, out, noisy0 + i, 0), v);
-        }
+    for (int i = 0; i < 2 * count; i++) {
+        const int channel = i % 2, image = i / 2, n = image + (channel ? noisy0 : ref0);
+        const struct ggn_exec *m = channel ? noisy : ref;
+        if (back)
+            ggn_plane_copy(v, ggn_exec_grad(m, out, n, 0), ggn_exec_grad(t->d, 0, image, channel), v->row);
+        else
+            ggn_plane_copy(v, ggn_exec_plane(t->d, 0, image, channel), ggn_exec_plane(m, out, n, 0), v->row);
     }
 }
 
@@ -355,8 +344,8 @@ int ggn_trainer_judge_step(struct ggn_trainer *t, const struct ggn_batch *b, dou
     if (t->hyper.preset == GGN_PRESET_PAPER)
         return base_fail(err, BASE_EINVAL, "the published preset trains in its own order");
     for (int i = 0; i < b->count; i++) {
-        set_input(t->m, i, 0, b->denoised + (size_t)i * (size_t)planes, planes);
-        set_input(t->m, b->count + i, 0, b->noisy + (size_t)i * (size_t)planes, planes);
+        set_input(t->m, i, b->denoised + (size_t)i * (size_t)planes, planes);
+        set_input(t->m, b->count + i, b->noisy + (size_t)i * (size_t)planes, planes);
     }
     zero_grad(t, GGN_NET_M);
     zero_grad(t, GGN_NET_D);
@@ -394,7 +383,7 @@ static int paper_denoise(struct ggn_trainer *t, const struct ggn_batch *b, struc
             return rc;
         for (int i = 0; i < b->count; i++)
             for (int c = 0; c < 3; c++)
-                copy_plane(ggn_exec_plane(t->m, 0, i, 3 * k + c), ggn_exec_plane(t->r, out, i, c), v);
+                ggn_plane_copy(v, ggn_exec_plane(t->m, 0, i, 3 * k + c), ggn_exec_plane(t->r, out, i, c), v->row);
     }
     return 0;
 }
@@ -426,7 +415,7 @@ int ggn_trainer_paper_step(struct ggn_trainer *t, const struct ggn_batch *b, str
     zero_grad(t, GGN_NET_M);
     zero_grad(t, GGN_NET_D);
     for (int i = 0; i < b->count; i++)
-        set_input(t->m2, i, 0, b->noisy + (size_t)i * (size_t)planes, planes);
+        set_input(t->m2, i, b->noisy + (size_t)i * (size_t)planes, planes);
     ggn_exec_forward(t->m, t->weights[GGN_NET_M], b->count, GGN_TRAIN);
     ggn_exec_forward(t->m2, t->weights[GGN_NET_M], b->count, GGN_TRAIN);
     exchange_maps(t, t->m, 0, t->m2, 0, b->count, 0);

@@ -1,6 +1,7 @@
 #include "nn/exec.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/clock.h"
 #include "nn/bf16.h"
@@ -104,6 +105,12 @@ real *ggn_exec_plane(const struct ggn_exec *e, int value, int n, int c)
 real *ggn_exec_grad(const struct ggn_exec *e, int value, int n, int c)
 {
     return ggn_plane_in(e, e->grads, value, n, c);
+}
+
+void ggn_plane_copy(const struct ggn_value *v, real *to, const real *from, int row)
+{
+    for (int y = 0; y < v->h; y++)
+        memcpy(to + (long)y * v->row, from + (long)y * row, (size_t)v->w * sizeof *to);
 }
 
 #define PASSES(op, name, text) [GGN_OP_##op] = &GGN_LAYER(name),

@@ -56,6 +56,9 @@ real *ggn_exec_plane(const struct ggn_exec *exec, int value, int n, int c);
 /* The same for the gradient; the caller writes that of the output before backward and may read that of the input after. */
 real *ggn_exec_grad(const struct ggn_exec *exec, int value, int n, int c);
 
+/* Copies one plane of the size of `v` from rows that lie `row` apart to rows as `v` has them. */
+void ggn_plane_copy(const struct ggn_value *v, real *to, const real *from, int row);
+
 /* Images 0..batch−1. GGN_TRAIN updates the running statistics in `weights` (not the packed ones: pack before evaluating). */
 void ggn_exec_forward(struct ggn_exec *exec, struct ggn_weights *weights, int batch, enum ggn_mode mode);
 /* Adds to params_grad [n_params]. Activations stay, so that it may be called again for another gradient of the output. */

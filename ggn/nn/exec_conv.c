@@ -158,7 +158,7 @@ static void conv_weight_back(void *data, long i, int worker)
     const struct ggn_graph *g = t->e->graph;
     const struct ggn_value *v = &g->value[t->l->out];
     const struct ggn_kernels *k = t->e->kernels;
-    const int n_in = t->oc_group, taps = t->l->kernel * t->l->kernel; /* oc_group: input channels here, see conv_backward */
+    const int n_in = ggn_layer_c_in(g, t->l), taps = t->l->kernel * t->l->kernel;
     const int groups = (n_in + GGN_GRAD_IC - 1) / GGN_GRAD_IC;
     const int ic0 = (int)(i % groups) * GGN_GRAD_IC, nic = n_in - ic0 < GGN_GRAD_IC ? n_in - ic0 : GGN_GRAD_IC;
     const long px = (long)v->h * v->row;
@@ -206,7 +206,6 @@ static void conv_backward(struct ggn_task *t)
     const int tile = t->e->kernels->tile_oc;
 
     ggn_task_run(t, c_out, conv_act_back);
-    t->oc_group = c_in;
     ggn_task_run(t, (long)((c_out + tile - 1) / tile) * ((c_in + GGN_GRAD_IC - 1) / GGN_GRAD_IC), conv_weight_back);
     if (needs_input_grad(t))
         ggn_task_run(t, cut_conv(t, c_out, c_in, t->w->wino_back), conv_back_piece);

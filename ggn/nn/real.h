@@ -36,6 +36,7 @@ typedef double real;
 #define ggn_exec_destroy GGN_TYPED(ggn_exec_destroy)
 #define ggn_exec_plane GGN_TYPED(ggn_exec_plane)
 #define ggn_exec_grad GGN_TYPED(ggn_exec_grad)
+#define ggn_plane_copy GGN_TYPED(ggn_plane_copy)
 #define ggn_exec_forward GGN_TYPED(ggn_exec_forward)
 #define ggn_exec_backward GGN_TYPED(ggn_exec_backward)
 

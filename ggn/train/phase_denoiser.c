@@ -102,13 +102,12 @@ static double evaluate(struct ggn_session *s, int count)
     double total = 0;
 
     for (int i = 0; i < count; i++)
-        for (int c = 0; c < 3; c++)
-            for (int row = 0; row < in->h; row++) {
-                const float *x = s->buffer + ((size_t)i * 6 + (size_t)c) * plane + (size_t)row * (size_t)in->w;
-                memcpy(ggn_exec_plane(t->r, 0, i, c) + (long)row * in->row, x, (size_t)in->w * sizeof *x);
-                /* the input's gradient is not used here: its planes hold the reference in the output's layout */
-                memcpy(ggn_exec_grad(t->r, 0, i, c) + (long)row * in->row, x + 3 * plane, (size_t)in->w * sizeof *x);
-            }
+        for (int c = 0; c < 3; c++) {
+            const float *x = s->buffer + ((size_t)i * 6 + (size_t)c) * plane;
+            ggn_plane_copy(in, ggn_exec_plane(t->r, 0, i, c), x, in->w);
+            /* the input's gradient is not used here: its planes hold the reference in the output's layout */
+            ggn_plane_copy(in, ggn_exec_grad(t->r, 0, i, c), x + 3 * plane, in->w);
+        }
     ggn_exec_forward(t->r, t->weights[GGN_NET_R], count, GGN_EVAL);
     for (int i = 0; i < count; i++) {
         const float *x[3], *y[3];

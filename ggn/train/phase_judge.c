@@ -81,26 +81,20 @@ static struct ggn_batch fill_batch(struct ggn_session *s, const struct fill *f, 
 /* --- evaluation mode -----------------------------------------------------------------------------------------------------
  */
 
-static void copy_planes(const struct ggn_exec *e, int value, int image, int c, const float *src, int row)
-{
-    const struct ggn_value *v = &e->graph->value[value];
-
-    for (int y = 0; y < v->h; y++)
-        memcpy(ggn_exec_plane(e, value, image, c) + (long)y * v->row, src + (long)y * row, (size_t)v->w * sizeof *src);
-}
-
 /* NFM of `count` windows whose planes are given, into channel `channel` of D's input. */
 static void generate(struct ggn_session *s, const float *const *planes, int count, int channel)
 {
     struct ggn_trainer *t = s->trainer;
     const int n = 3 * s->hyper.window, out = t->m->graph->n_values - 1;
+    const struct ggn_value *in = &t->m->graph->value[0], *map = &t->d->graph->value[0];
 
     for (int i = 0; i < count; i++)
         for (int k = 0; k < n; k++)
-            copy_planes(t->m, 0, i, k, planes[i * n + k], s->set.width);
+            ggn_plane_copy(in, ggn_exec_plane(t->m, 0, i, k), planes[i * n + k], s->set.width);
     ggn_exec_forward(t->m, t->weights[GGN_NET_M], count, GGN_EVAL);
     for (int i = 0; i < count; i++)
-        copy_planes(t->d, 0, i, channel, ggn_exec_plane(t->m, out, i, 0), t->m->graph->value[out].row);
+        ggn_plane_copy(map, ggn_exec_plane(t->d, 0, i, channel), ggn_exec_plane(t->m, out, i, 0),
+                       t->m->graph->value[out].row);
 }
 
 /* Raw logits of windows list[index[i]], i < n, with the weights as they are. */
