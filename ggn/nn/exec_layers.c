@@ -6,7 +6,7 @@
 #include "nn/layers.h"
 #include "nn/real.h"
 
-/* --- batch norm -------------------------------------------------------------------------------------------------------- */
+/* --- batch norm ------------------------------------------------------------------------------------------------------- */
 
 /* Batch statistics of channel c: biased variance to normalise, unbiased for the running estimate. */
 static void bn_statistics(const struct ggn_task *t, long c)
@@ -95,7 +95,7 @@ static void bn_backward(struct ggn_task *t)
 
 const struct ggn_layer_passes GGN_LAYER(bn) = {bn_forward, bn_backward};
 
-/* --- plane by plane ---------------------------------------------------------------------------------------------------- */
+/* --- plane by plane --------------------------------------------------------------------------------------------------- */
 
 /* The planes of task i. */
 struct pair {
@@ -245,8 +245,7 @@ static real dropout_factor(const struct ggn_task *t, long i)
 
 PLANE_LAYER(dropout, *p.y = *p.x * dropout_factor(t, i), *p.dx = (t->l->add_in ? *p.dx : 0) + *p.dy * dropout_factor(t, i))
 
-/* --- linear: Y = W·X + b ------------------------------------------------------------------------------------------------
- */
+/* --- linear: Y = W·X + b ---------------------------------------------------------------------------------------------- */
 
 static void linear_unit(void *data, long o, int worker)
 {

@@ -64,7 +64,7 @@ INLINE real vsum(vf a)
     return VSUM(a);
 }
 
-/* --- convolution ------------------------------------------------------------------------------------------------------- */
+/* --- convolution ------------------------------------------------------------------------------------------------------ */
 
 /* Register tile: `ot` channels × `nv` vectors of pixels; input channels [i0, i1). A weight is broadcast, a vector of pixels
  * is loaded at each tap's offset. */
@@ -243,7 +243,7 @@ static void lane_sums(real *out, const real *acc, int n)
         out[k] = vsum(LOAD(acc + (long)k * VW));
 }
 
-/* --- per plane --------------------------------------------------------------------------------------------------------- */
+/* --- per plane -------------------------------------------------------------------------------------------------------- */
 
 static double sum(const real *x, int h, int w, int row)
 {
@@ -502,7 +502,7 @@ static void up_grad(real *restrict dx, const real *restrict dy, int add, int h, 
     }
 }
 
-/* --- vectors ----------------------------------------------------------------------------------------------------------- */
+/* --- vectors ---------------------------------------------------------------------------------------------------------- */
 
 static real dot(const real *a, const real *b, long n)
 {

@@ -8,6 +8,8 @@
 #include "base/files.h"
 #include "figures/plot.h"
 
+const char *const ggn_log_phases[] = {"denoiser", "judge"};
+
 int ggn_log_add(struct ggn_log *log, const struct ggn_log_row *row, struct base_err *err)
 {
     if ((log->n & (log->n - 1)) == 0) {
@@ -44,7 +46,7 @@ int ggn_log_write_csv(const struct ggn_log *log, const char *path, struct base_e
     fputs("phase,step,loss,accuracy,validation_loss,validation_accuracy,validation_auc,learning_rate,seconds\n", out.file);
     for (int i = 0; i < log->n; i++) {
         const struct ggn_log_row *r = &log->rows[i];
-        fprintf(out.file, "%s,", r->phase ? "judge" : "denoiser");
+        fprintf(out.file, "%s,", ggn_log_phases[r->phase]);
         put(out.file, r->step, ',');
         put(out.file, r->loss, ',');
         put(out.file, r->accuracy, ',');

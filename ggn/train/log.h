@@ -4,8 +4,10 @@
 
 #include "base/err.h"
 
+extern const char *const ggn_log_phases[]; /* "denoiser", "judge" (generator and discriminator) */
+
 struct ggn_log_row {
-    int phase; /* 0 denoiser, 1 generator and discriminator */
+    int phase;                                                                             /* of ggn_log_phases */
     double step, loss, accuracy, validation_loss, validation_accuracy, validation_auc, lr; /* NaN = not measured */
     double seconds; /* since the phase began, on this machine; the only column that two runs may differ in */
 };

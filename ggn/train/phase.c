@@ -14,7 +14,7 @@ static void say(const struct ggn_session *s, const struct ggn_log_row *row, cons
 
     if (!f)
         return;
-    fprintf(f, "%-8s %6.0f/%llu  loss %.4f", row->phase ? "judge" : "denoiser", row->step, (unsigned long long)phase->steps,
+    fprintf(f, "%-8s %6.0f/%llu  loss %.4f", ggn_log_phases[row->phase], row->step, (unsigned long long)phase->steps,
             row->loss);
     if (row->phase)
         fprintf(f, "  accuracy %.3f", row->accuracy);

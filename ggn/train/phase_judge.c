@@ -23,8 +23,7 @@ static float difference(const struct ggn_session *s)
     return s->hyper.preset == GGN_PRESET_LULL ? (float)s->plan->difference : 0;
 }
 
-/* --- pixels of a batch ---------------------------------------------------------------------------------------------------
- */
+/* --- pixels of a batch ------------------------------------------------------------------------------------------------ */
 
 struct fill {
     struct ggn_session *s;
@@ -78,8 +77,7 @@ static struct ggn_batch fill_batch(struct ggn_session *s, const struct fill *f, 
         .count = count, .noisy = noisy, .denoised = f->denoised ? second : NULL, .reference = f->denoised ? NULL : second};
 }
 
-/* --- evaluation mode -----------------------------------------------------------------------------------------------------
- */
+/* --- evaluation mode -------------------------------------------------------------------------------------------------- */
 
 /* NFM of `count` windows whose planes are given, into channel `channel` of D's input. */
 static void generate(struct ggn_session *s, const float *const *planes, int count, int channel)
@@ -164,8 +162,7 @@ static int denoise(struct ggn_session *s, enum ggn_split split, struct base_err 
     return 0;
 }
 
-/* --- one step ------------------------------------------------------------------------------------------------------------
- */
+/* --- one step --------------------------------------------------------------------------------------------------------- */
 
 /* Steps of an epoch over all windows (preset paper). */
 static uint64_t epoch_length(const struct ggn_session *s)
@@ -230,8 +227,7 @@ static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, doub
     return 0;
 }
 
-/* --- validation ----------------------------------------------------------------------------------------------------------
- */
+/* --- validation ------------------------------------------------------------------------------------------------------- */
 
 void ggn_judged_release(struct ggn_judged *o)
 {
@@ -325,8 +321,7 @@ static int validate(struct ggn_session *s, struct ggn_log_row *row, struct base_
     return rc;
 }
 
-/* --- the phase -----------------------------------------------------------------------------------------------------------
- */
+/* --- the phase -------------------------------------------------------------------------------------------------------- */
 
 static int begin(struct ggn_session *s, struct base_err *err)
 {

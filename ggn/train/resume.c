@@ -74,8 +74,7 @@ static float *state_array(struct ggn_session *s, int i, size_t *count)
     return s->best[net_of[i]];
 }
 
-/* --- JSON ----------------------------------------------------------------------------------------------------------------
- */
+/* --- JSON ------------------------------------------------------------------------------------------------------------- */
 
 static double *row_field(struct ggn_log_row *r, int i)
 {
@@ -163,8 +162,7 @@ static int restore(struct ggn_session *s, const cJSON *root, const char *path, s
     return 0;
 }
 
-/* --- file ----------------------------------------------------------------------------------------------------------------
- */
+/* --- file ------------------------------------------------------------------------------------------------------------- */
 
 int ggn_resume_save(struct ggn_session *s, const char *path, struct base_err *err)
 {
