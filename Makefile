@@ -79,7 +79,7 @@ GGN_CLI     := $(wildcard ggn/cli/*.c)
 TEST_SRC    := $(wildcard tests/unit/*.c tests/grad/*.c tests/golden/*.c tests/stat/*.c tests/abi/*.c tests/hard/*.c tests/oom/*.c)
 # The subset that also runs under ASan+UBSan in `make test`.
 SANE_SRC    := $(wildcard tests/unit/*.c tests/abi/*.c tests/oom/*.c)
-SCRIPT_TEST := $(wildcard tests/cli/*.sh tests/e2e/*.sh)
+SCRIPT_TEST := $(wildcard tests/cli/*.sh tests/e2e/*.sh tests/hosts/*.sh)
 FUZZ_SRC    := $(filter-out tests/fuzz/replay.c,$(wildcard tests/fuzz/*.c))
 
 o = $(addprefix $(OBJ)/,$(addsuffix .o,$(1)) $(addsuffix .double.o,$(filter $(GGN_TWICE),$(1))))

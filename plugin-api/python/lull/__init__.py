@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: MIT
+"""Stops sampling each block of a path-traced image when its noise can no longer be seen: the host's side in Python.
+
+    import lull
+    criterion = lull.load("ggn")                       # an installed criterion, or a path; lull.criteria() lists them
+    frame = lull.Frame(criterion, 1920, 1080)          # blocks and buffers
+    driver = lull.Driver(frame, render)                # render(rects, first, count, half) -> a mean per rectangle
+    driver.run()
+    frame.mean(), frame.spp()                          # the picture and its samples per pixel
+
+Low level: Criterion.begin_frame and evaluate with numpy arrays as they lie in memory (Plane). Ready hosts: lull.blender for
+Blender's Cycles, lull.mitsuba for Mitsuba 3. Needs numpy and the criteria's shared objects, nothing compiled.
+"""
+from .blocks import Block, merge
+from .criterion import BlockState, Criterion, Decision, Needs, Plane, Rect, load
+from .driver import Driver, Result
+from .frame import Frame
+from .library import Info, LullError, Parameter, criteria, find
+
+__all__ = ["Block", "BlockState", "Criterion", "Decision", "Driver", "Frame", "Info", "LullError", "Needs", "Parameter",
+           "Plane", "Rect", "Result", "criteria", "find", "load", "merge"]
+__version__ = "1.0"

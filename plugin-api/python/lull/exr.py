@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: MIT
+"""OpenEXR scan-line files of float channels: ZIP-compressed ones are written, uncompressed ones are read."""
+from __future__ import annotations
+
+import struct
+import zlib
+from typing import Mapping, Optional, Sequence, Union
+
+import numpy as np
+
+from .files import replaced
+
+_MAGIC = struct.pack("<II", 20000630, 2)
+_LONG_NAMES = 0x400
+_LINES = 16  # of a ZIP chunk
+_FLOAT, _HALF = 2, 1
+
+
+def _attribute(name: str, kind: str, data: bytes) -> bytes:
+    return name.encode() + b"\0" + kind.encode() + b"\0" + struct.pack("<I", len(data)) + data
+
+
+def _zip(data: bytes) -> bytes:
+    """Even bytes then odd ones, each as its difference to the one before, deflated; as they are if that is no gain."""
+    raw = np.frombuffer(data, np.uint8)
+    split = np.concatenate((raw[::2], raw[1::2])).astype(np.int16)
+    split[1:] = split[1:] - split[:-1] + 128
+    packed = zlib.compress(split.astype(np.uint8).tobytes(), 4)
+    return packed if len(packed) < len(data) else data
+
+
+def write(path: str, channels: Mapping[str, np.ndarray], size: tuple[int, int], origin: tuple[int, int] = (0, 0),
+          attributes: Optional[Mapping[str, Union[str, float]]] = None) -> None:
+    """channels: by name ("R", "lull.spp"), each [h, w], stored as float32. size: (width, height) of the whole picture;
+    origin: where the upper left stored pixel lies in it. Attributes are text or numbers."""
+    names = sorted(channels)
+    height, width = channels[names[0]].shape
+    x0, y0 = origin
+    listed = b"".join(n.encode() + b"\0" + struct.pack("<iiii", _FLOAT, 0, 1, 1) for n in names) + b"\0"
+    head = _attribute("channels", "chlist", listed) + _attribute("compression", "compression", b"\x03")
+    head += _attribute("dataWindow", "box2i", struct.pack("<4i", x0, y0, x0 + width - 1, y0 + height - 1))
+    head += _attribute("displayWindow", "box2i", struct.pack("<4i", 0, 0, size[0] - 1, size[1] - 1))
+    head += _attribute("lineOrder", "lineOrder", b"\0") + _attribute("pixelAspectRatio", "float", struct.pack("<f", 1))
+    head += _attribute("screenWindowCenter", "v2f", struct.pack("<ff", 0, 0))
+    head += _attribute("screenWindowWidth", "float", struct.pack("<f", 1))
+    for name, value in (attributes or {}).items():
+        head += (_attribute(name, "string", value.encode()) if isinstance(value, str) else
+                 _attribute(name, "double", struct.pack("<d", value)))
+    version = 2 | (_LONG_NAMES if any(len(n) > 31 for n in [*names, *(attributes or {})]) else 0)
+    head = struct.pack("<II", 20000630, version) + head + b"\0"
+    rows = np.stack([channels[n] for n in names], 1).astype("<f4")  # [h, channels, w]
+    chunks = []
+    for y in range(0, height, _LINES):
+        data = _zip(rows[y:y + _LINES].tobytes())
+        chunks.append(struct.pack("<iI", y0 + y, len(data)) + data)
+    at = len(head) + 8 * len(chunks)
+    offsets = np.cumsum([at] + [len(c) for c in chunks[:-1]], dtype=np.uint64)
+    with replaced(path) as file:
+        file.write(head + offsets.astype("<u8").tobytes() + b"".join(chunks))
+
+
+def read(path: str, wanted: Sequence[str] = ("R", "G", "B")) -> tuple[np.ndarray, tuple[int, int]]:
+    """The wanted channels [h, w, len(wanted)] float32 of an uncompressed file, and its data window's origin (x, y)."""
+    with open(path, "rb") as file:
+        data = file.read()
+    try:
+        return _decode(data, wanted)
+    except (ValueError, struct.error, KeyError, IndexError) as error:
+        what = f"an uncompressed scan-line EXR with the channels {', '.join(wanted)}"
+        raise ValueError(f"{path}: not {what}: {error}") from None
+
+
+def _header(data: bytes) -> tuple[dict[str, bytes], int]:
+    if data[:4] != _MAGIC[:4] or data[4] != 2 or data[5] & 0x1a:  # tiled, deep or of several parts
+        raise ValueError("another kind of file")
+    attributes, at = {}, 8
+    while data[at]:
+        name_end = data.index(b"\0", at)
+        kind_end = data.index(b"\0", name_end + 1)
+        size, = struct.unpack_from("<I", data, kind_end + 1)
+        attributes[data[at:name_end].decode()] = data[kind_end + 5:kind_end + 5 + size]
+        at = kind_end + 5 + size
+    return attributes, at + 1
+
+
+def _decode(data: bytes, wanted: Sequence[str]) -> tuple[np.ndarray, tuple[int, int]]:
+    head, at = _header(data)
+    if head["compression"] != b"\0":
+        raise ValueError("it is compressed")
+    x0, y0, x1, y1 = struct.unpack("<4i", head["dataWindow"])
+    width, height = x1 - x0 + 1, y1 - y0 + 1
+    listed, places, column = head["channels"], {}, 0
+    while listed[:1] != b"\0":
+        channel, _, rest = listed.partition(b"\0")
+        kind, = struct.unpack_from("<i", rest)
+        bytes_each = 2 if kind == _HALF else 4
+        places[channel.decode()] = (column, "<f2" if kind == _HALF else "<f4" if kind == _FLOAT else "<u4")
+        column += bytes_each * width
+        listed = rest[16:]
+    # without compression every line has the same size: y, bytes, then the channels one after the other
+    lines = np.frombuffer(data, np.uint8, height * (8 + column), at + 8 * height).reshape(height, 8 + column)
+    order = np.ascontiguousarray(lines[:, :4]).view("<i4")[:, 0] - y0
+    out = np.empty((height, width, len(wanted)), np.float32)
+    for k, name in enumerate(wanted):
+        start, stored = places[name]
+        end = start + width * np.dtype(stored).itemsize
+        out[order, :, k] = np.ascontiguousarray(lines[:, 8 + start:8 + end]).view(stored)
+    return out, (x0, y0)

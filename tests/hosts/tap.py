@@ -1,0 +1,35 @@
+"""Runs functions named test_* and reports them as TAP lines; a test's docstring says what must hold."""
+import sys
+import traceback
+
+
+class Skip(Exception):
+    """Raised by a test that cannot run here; the text says why."""
+
+
+def raises(kind, text, call, *arguments, **named):
+    """The call raises this kind of exception with this text in its message, which is one line."""
+    try:
+        call(*arguments, **named)
+    except kind as error:
+        assert text in str(error) and "\n" not in str(error), f"message: {error}"
+        return
+    raise AssertionError(f"no {kind.__name__} was raised")
+
+
+def main(namespace):
+    tests = [f for name, f in namespace.items() if name.startswith("test_")]
+    wanted = sys.argv[1:]
+    for n, test in enumerate(tests, 1):
+        if wanted and test.__name__ not in wanted:
+            continue
+        text = (test.__doc__ or test.__name__).strip().rstrip(".")
+        try:
+            test()
+            print(f"ok {n} - {text}", flush=True)
+        except Skip as reason:
+            print(f"ok {n} - {text} # SKIP {reason}", flush=True)
+        except BaseException:
+            print(f"not ok {n} - {text}", flush=True)
+            print("".join("#   " + line + "\n" for line in traceback.format_exc().splitlines()), end="", flush=True)
+    print(f"1..{len(tests)}")

@@ -1,0 +1,500 @@
+"""The Python package lull: the ABI's layout, finding criteria, the driver with a renderer in numpy, the path tracer's stops,
+files, and bad input. BUILD names the build folder."""
+import ctypes
+import json
+import os
+import re
+import signal
+import subprocess
+import tempfile
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+import lull
+import tap
+from lull import abi, blocks, checkpoint, exr, outputs, png, stopmap
+from renderer import Noise, Playback
+from tap import raises
+
+BUILD = os.environ.get("BUILD", "build")
+LIB, PLUGINS, PATHTRACER = f"{BUILD}/lib/lull", f"{BUILD}/tests/abi/plugins", f"{BUILD}/bin/pathtracer"
+os.environ["LULL_PLUGIN_PATH"] = LIB
+SIGMAS = [[.01, .2], [.5, 1.]]
+TMP = tempfile.TemporaryDirectory()
+
+
+def tmp(name):
+    return os.path.join(TMP.name, name)
+
+
+def run(criterion="halfbuf", sigmas=SIGMAS, parameters=None, host=None, driver=None, **frame):
+    """A finished small render: (result, frame, driver)."""
+    host = host or Noise(sigmas)
+    size = {"width": 16 * len(sigmas[0]), "height": 16 * len(sigmas), "block": 16, "spp_max": 512, **frame}
+    c = lull.load(criterion, **(parameters if parameters is not None else {"threshold": .02}))
+    f = lull.Frame(c, **size)
+    d = lull.Driver(f, host, **(driver or {}))
+    return d.run(), f, d
+
+
+def test_layout():
+    """every struct lies as layout-1.txt says"""
+    text = Path("plugin-api/layout-1.txt").read_text()
+    seen = 0
+    for name, size, body in re.findall(r"^struct lull_(\w+) (\d+)\n((?:  .*\n?)*)", text, re.M):
+        struct = getattr(abi, "".join(part.capitalize() for part in name.split("_")))
+        assert ctypes.sizeof(struct) == int(size), name
+        for offset, length, field in re.findall(r"  (\d+) (\d+) (\w+)", body):
+            at = getattr(struct, field)
+            assert (at.offset, at.size) == (int(offset), int(length)), (name, field)
+            seen += 1
+    assert seen > 100
+
+
+def test_numbers():
+    """every constant is the header's"""
+    header = Path("plugin-api/include/lull/criterion.h").read_text()
+    found = dict(re.findall(r"#define LULL_(\w+) \(?(?:UINT32_C\()?(-?\d+)\)?", header))
+    names = {n: found[n.replace("NUMBER_", "")] for n in found if hasattr(abi, n)}
+    plane = {n[6:]: v for n, v in found.items() if n.startswith("PLANE_") and n != "PLANE_COUNT"}
+    assert len(names) > 35 and len(plane) == 8
+    for name, value in {**names, **plane}.items():
+        assert getattr(abi, name) == int(value), name
+
+
+def test_criteria():
+    """criteria() lists what is installed, with parameters"""
+    found = {c.id: c for c in lull.criteria()}
+    assert {"fixed", "halfbuf", "null", "variance", "ggn"} <= set(found)
+    threshold = found["halfbuf"].parameter("threshold")
+    assert threshold.type == "float" and threshold.min <= float(threshold.default) <= threshold.max and threshold.help
+
+
+def test_find():
+    """load() takes NAME, PATH and PATH:ID"""
+    assert lull.load("fixed", spp=100).parameters == {"spp": "100"}
+    assert lull.load(f"{LIB}/fixed.so").info.id == "fixed"
+    assert lull.load(f"{PLUGINS}/faulty.so:faulty").info.id == "faulty"
+    assert lull.find(f"{PLUGINS}/pair.so:second-of-pair").id == "second-of-pair"
+
+
+def test_refused_libraries():
+    """libraries that are none, are broken or of another version are refused in one line"""
+    Path(tmp("text.so")).write_text("no library")
+    for name, text in ((tmp("none.so"), "no such file"), (tmp("text.so"), "cannot be loaded"),
+                       (f"{PLUGINS}/no_entry.so", "not a criterion of ABI 1"), (f"{PLUGINS}/short_table.so", "version 1.0"),
+                       (f"{PLUGINS}/unresolved.so", "cannot be loaded"), (f"{PLUGINS}/empty.so", "holds no criterion"),
+                       (f"{PLUGINS}/twin_ids.so", "two criteria"), (f"{PLUGINS}/endless.so", "does not end"),
+                       (f"{LIB}/fixed.so:other", "holds no criterion 'other'"), ("nobody", "LULL_PLUGIN_PATH")):
+        raises(lull.LullError, text, lull.load, name)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        ids = [c.id for c in lull.criteria([PLUGINS.replace("plugins", "none"), TMP.name])]
+    assert ids == [] and any("text.so" in str(w.message) for w in caught)
+
+
+def test_refused_parameters():
+    """unknown parameters and values out of range are named"""
+    raises(lull.LullError, "spp: 'x'", lull.load, "fixed", spp="x")
+    raises(lull.LullError, "no-such", lull.load, "fixed", no_such=1)
+    raises(lull.LullError, "threshold", lull.load, "halfbuf", threshold=-1.)
+    try:
+        lull.load("fixed", no_such=1)
+    except lull.LullError as error:
+        assert error.name == "E_KEY"
+
+
+def test_closed():
+    """a closed criterion is told so, and closing twice is fine"""
+    c = lull.load("fixed")
+    c.close()
+    c.close()
+    raises(lull.LullError, "closed", c.begin_frame, 8, 8, [lull.Rect(0, 0, 8, 8)], ["color"])
+
+
+def test_noisier_blocks():
+    """noisier blocks get more samples, whoever judges"""
+    for name, parameters in (("halfbuf", {"threshold": .02}), ("ggn", {"threshold": .9, "passes": 1})):
+        result, f, _ = run(name, parameters=parameters)
+        spp = [b.spp for b in f.blocks]
+        assert result.outcome == "done" and spp[0] < spp[-1] and sorted(spp) == spp, (name, spp)
+    assert all(b.reason in ("criterion", "spp-max") for b in f.blocks)
+
+
+def test_moment2():
+    """a host that supplies second moments can use variance, one that does not is told"""
+    noise = Noise(SIGMAS)
+
+    def host(rects, first, count, half):
+        for r in rects:
+            samples = np.array([noise.sample(r, s) for s in range(first, first + count)])
+            yield {"color": samples.mean(0), "moment2": (samples @ abi_luminance).__pow__(2).mean(0)}
+    abi_luminance = np.array([.2126729, .7151522, .0721750])
+    _, f, _ = run("variance", parameters={"threshold": .01}, host=host, supplies=["moment2"])
+    spp = [b.spp for b in f.blocks]
+    assert spp[0] < spp[1] < spp[2] <= spp[3], spp
+    raises(lull.LullError, "MOMENT2", run, "variance")
+
+
+def test_sums():
+    """the picture is the mean of exactly the samples that were asked for, and half A is a fixed half of them"""
+    noise = Noise(SIGMAS)
+    _, f, d = run(host=noise)
+    for b in f.blocks:
+        asked = sorted((first, count, half) for rects, first, count, half in noise.calls if b.rect in rects)
+        assert [a[0] for a in asked] == [sum(c[1] for c in asked[:i]) for i in range(len(asked))]  # no gap, no overlap
+        mean = np.mean([noise.sample(b.rect, s) for s in range(b.spp)], 0)
+        part = np.s_[b.rect.y0:b.rect.y1, b.rect.x0:b.rect.x1]
+        assert abs(f.mean()[part] - mean).max() < 1e-12 and (f.spp()[part] == b.spp).all()
+        half = [s for first, count, h in asked if h for s in range(first, first + count)]
+        assert len(half) == b.half_spp and abs(b.half_spp - b.spp / 2) <= d.wave
+        assert abs(f.sums["half"][part] / b.half_spp - np.mean([noise.sample(b.rect, s) for s in half], 0)).max() < 1e-12
+
+
+def test_halves_of_pathtracer():
+    """with waves of four the halves are the path tracer's"""
+    from lull.driver import in_half
+    for sample in list(range(0, 600)) + [10007, 1 << 20, (1 << 31) - 1]:
+        assert in_half(sample // 4) == (bin(sample & 0x7D29F06C).count("1") % 2 == 0)
+
+
+def test_independence():
+    """crop, threads and slices change no decision"""
+    _, whole, _ = run()
+    _, part, _ = run(crop=lull.Rect(20, 3, 31, 9))
+    assert [b.id for b in part.blocks] == [1] and part.blocks[0].spp == whole.blocks[1].spp
+    assert part.mean().shape == (16, 16, 3) and part.cropped(part.mean()).shape == (6, 11, 3)
+    answers = []
+    for threads in (1, 3):
+        f = lull.Frame(lull.load("ggn", threads=threads, threshold=.9, passes=1), 32, 32, block=16, spp_max=200)
+        lull.Driver(f, Noise(SIGMAS)).run()
+        answers.append([(b.spp, b.p_noisy, b.error) for b in f.blocks])
+    assert repr(answers[0]) == repr(answers[1])
+
+
+def test_same_stops_as_pathtracer():
+    """on the path tracer's recorded sequences the driver stops every block where the path tracer does"""
+    for criterion, parameters in (("halfbuf", {"threshold": .01}), ("ggn", {}), ("null", {})):
+        options = ["--spp-min", "20", "--spp-max", "700"]
+        seed, scene = 5, "scenes/cornell-box.pbrt"
+        pairs = [a for k, v in parameters.items() for a in ("-p", f"{k}={v}")]
+        subprocess.run([PATHTRACER, scene, "-q", "--size", "96x80", "--block", "48", "--seed", str(seed), "-c", criterion,
+                        *pairs, *options, "--report", tmp("pt.json"), "--stop-map", tmp("pt.csv")], check=True)
+        wanted = json.loads(Path(tmp("pt.json")).read_text())
+        f = lull.Frame(lull.load(criterion, **parameters), 96, 80, block=48, seed=seed, spp_min=20, spp_max=700)
+        d = Playback(f, PATHTRACER, scene, [])
+        assert d.run().outcome == "done"
+        stops = [(b["spp"], b["reason"], b["checks"]) for b in wanted["blocks"]]
+        assert [(b.spp, b.reason, b.checks) for b in f.blocks] == stops, (criterion, stops)
+        for b, w in zip(f.blocks, wanted["blocks"]):
+            assert criterion == "null" or abs(b.error - w["error"]) <= 2e-3 * w["error"], (b.error, w["error"])
+        if criterion == "null":
+            continue  # it names no next check: the geometric schedule was compared
+        assert len({s[0] for s in stops}) > 1, stops
+        outputs.write_report(tmp("own.json"), d, scene=scene)
+        own = json.loads(Path(tmp("own.json")).read_text())
+        assert own.keys() == wanted.keys() and own["blocks"][0].keys() == wanted["blocks"][0].keys()
+        assert own["totals"].keys() == wanted["totals"].keys() and own["criterion"] == wanted["criterion"]
+        stopmap.write(tmp("own.csv"), f.blocks, scene)
+        assert Path(tmp("own.csv")).read_text() == Path(tmp("pt.csv")).read_text()
+
+
+def test_stop_map():
+    """the stop map is the path tracer's, pixel by pixel"""
+    subprocess.run([PATHTRACER, "scenes/cornell-box.pbrt", "-q", "--size", "300x180", "--block", "60", "-c", "halfbuf",
+                    "-p", "threshold=.03", "--spp-max", "300", "--stop-map", tmp("pt.png"), "--stop-map",
+                    tmp("pt.csv")], check=True)
+    grid = blocks.grid(300, 180, 60, 60)
+    for b, spp in zip(grid, Path(tmp("pt.csv")).read_text().split(";")[1:]):
+        b.spp = int(spp)
+    assert len({b.spp for b in grid}) > 2
+    stopmap.write(tmp("own.png"), grid)
+    report = subprocess.run(["oiiotool", "--fail", "0", "--hardfail", "0", "--diff", tmp("own.png"), tmp("pt.png")],
+                            text=True, capture_output=True)
+    assert report.returncode == 0, report.stdout
+
+
+def test_limits():
+    """the first limit wins: samples, time, minimum"""
+    _, f, _ = run(sigmas=[[5.]], spp_max=100)
+    assert [(b.spp, b.reason) for b in f.blocks] == [(100, "spp-max")]
+    result, f, d = run(sigmas=[[5.]], spp_max=10 ** 6, time_budget_s=.3)
+    assert result.outcome == "time" and f.blocks[0].reason == "time" and .3 <= d.totals.elapsed_s < 2
+    _, f, _ = run(sigmas=[[.001]], spp_min=128)
+    assert f.blocks[0].spp == 128
+    assert run(sigmas=[[.001]], spp_min=1)[1].blocks[0].spp == 32  # two waves: one of each half
+    _, f, _ = run(sigmas=[[.5]], spp_max=64, driver={"uniform": True})
+    assert (f.blocks[0].spp, f.blocks[0].reason, f.blocks[0].checks) == (64, "uniform", 1)
+
+
+def test_seam():
+    """a block beside one with many more samples is re-opened up to the ratio"""
+    plain = run(sigmas=[[.01, .5]])[1]
+    even = run(sigmas=[[.01, .5]], driver={"max_seam": 2.})[1]
+    assert plain.blocks[1].spp > 3 * plain.blocks[0].spp and even.blocks[1].spp <= 2 * even.blocks[0].spp
+
+
+def test_failing_criterion():
+    """a criterion that fails costs time, never quality, and is told once"""
+    said = []
+    f = lull.Frame(lull.load(f"{PLUGINS}/faulty.so"), 16, 16, block=16, spp_max=64)
+    f.evaluate = lambda *_: (_ for _ in ()).throw(lull.LullError(abi.E_INTERNAL, "broken"))
+    d = lull.Driver(f, Noise([[.1]]), warn=said.append)
+    assert d.run().outcome == "done" and f.blocks[0].spp == 64 and said == ["broken"] and d.totals.failed_checks > 1
+
+
+def test_exception():
+    """an exception in the render function ends the run and keeps the picture"""
+    for kind, outcome in ((RuntimeError, "failed"), (MemoryError, "failed"), (KeyboardInterrupt, "interrupt")):
+        noise = Noise([[.5, .6], [.7, .8]])
+
+        def host(rects, first, count, half):
+            for n, sample in enumerate(noise(rects, first, count, half)):
+                if first == 64 and n == 1:
+                    raise kind("out of paint")
+                yield sample
+        result, f, d = run(host=host, parameters={"threshold": .001})
+        assert result.outcome == outcome and (outcome == "interrupt" or str(result.exception) == "out of paint")
+        assert [b.spp for b in f.blocks] == [80, 64, 64, 64] and {b.reason for b in f.blocks} == {"interrupt"}
+        assert np.isfinite(f.mean()).all() and f.blocks[0].checks > 0 and d.totals.samples == 256 * (80 + 3 * 64)
+
+
+def test_interrupt():
+    """Ctrl-C ends after the current call, the handler is put back"""
+    before = signal.getsignal(signal.SIGINT)
+    result, f, _ = run(driver={"after_call": lambda d: os.kill(os.getpid(), signal.SIGINT)})
+    assert result.outcome == "interrupt" and f.blocks[0].spp == 16 and signal.getsignal(signal.SIGINT) == before
+
+
+def test_bad_pictures():
+    """pictures of the wrong shape, type or number are named, and nothing of them is kept"""
+    good = np.zeros((16, 16, 3))
+    for value, text in ((np.zeros((16, 15, 3)), "shape (16, 15, 3), expected [16, 16, 3]"), (np.zeros((16, 16)), "shape"),
+                        (np.zeros((16, 16, 3), int), "floating-point"), ([[0.]], "not list"), (None, "0 pictures"),
+                        ({"moment2": good}, "no plane color"), (np.zeros((16, 16, 3), object), "floating-point")):
+        result, f, _ = run(sigmas=[[.1]], host=lambda *_: [value])
+        assert result.outcome == "failed" and text in str(result.exception), result.exception
+        assert f.blocks[0].spp == 0 and not f.sums["color"].any()
+    result, f, _ = run(host=lambda rects, *_: [good.astype(np.float32)] * (len(rects) - 1))
+    assert "3 pictures for 4 rectangles" in str(result.exception) and [b.spp for b in f.blocks] == [16, 16, 16, 0]
+
+
+def test_strides():
+    """arrays of any stride and type are read as they lie: RGBA, rows from below, half floats, cut from larger ones"""
+    rng = np.random.default_rng(2)
+    rgb = rng.random((40, 50, 3)).astype(np.float32)
+    half = (rgb + .01 * rng.standard_normal(rgb.shape)).astype(np.float32)
+    rgba = np.dstack([rgb, np.ones((40, 50, 1), np.float32)])
+    rect = [lull.Rect(0, 0, 50, 40)]
+    state = [lull.BlockState(rect[0], 64, 32)]
+
+    def ask(color, other):
+        with lull.load("halfbuf") as c:
+            c.begin_frame(50, 40, rect, ["color", "half"])
+            return c.evaluate({"color": lull.Plane(color), "half": lull.Plane(other)}, state, [0])[0]._replace(p_noisy=None)
+    plain = ask(rgb, half)
+    assert plain.error > 0
+    flipped = np.ascontiguousarray(half[::-1])[::-1]
+    wide = np.zeros((40, 100, 6), np.float64)
+    wide[:, ::2, ::2] = rgb
+    assert not flipped.flags.c_contiguous and flipped.strides[0] < 0
+    assert ask(rgba, flipped) == plain and ask(wide[:, ::2, ::2], half.astype(float)) == plain
+    assert ask(np.asfortranarray(rgb), half) == plain
+    halves = ask(rgb.astype(np.float16), half.astype(np.float16))
+    assert abs(halves.error / plain.error - 1) < .05
+    with lull.load("halfbuf") as c:
+        c.begin_frame(50, 40, rect, ["color", "half"])
+        sums = c.evaluate({"color": lull.Plane(64 * rgb.astype(float), "spp"),
+                           "half": lull.Plane(32 * half.astype(float), "half_spp")}, state, [0])[0]
+    assert abs(sums.error / plain.error - 1) < 1e-6
+
+
+def test_bad_planes():
+    """planes that the ABI cannot describe are refused in Python"""
+    good = np.zeros((8, 8, 3), np.float32)
+    odd = np.zeros(8 * 8 * 3 * 4 + 1, np.uint8)[1:].view(np.float32).reshape(8, 8, 3)
+    for value, kind, text in (([1.], TypeError, "numpy array"), (good.astype(int), TypeError, "float32"),
+                              (good.astype(">f4"), TypeError, "byte order"), (good[0, 0], ValueError, "shape"),
+                              (odd, ValueError, "aligned")):
+        raises(kind, text, lull.Plane, value)
+    raises(ValueError, "normaliser", lull.Plane, good, "mean")
+    raises(ValueError, "scale", lull.Plane, good, "one", 0.)
+    c, rect = lull.load("halfbuf"), lull.Rect(0, 0, 8, 8)
+    c.begin_frame(8, 8, [rect], ["color", "half"])
+    state = [lull.BlockState(rect, 32, 16)]
+    for half in (good[:4], good[..., 0]):
+        planes = {"color": lull.Plane(good), "half": lull.Plane(half)}
+        raises(ValueError, "expected [8, 8, 3]", c.evaluate, planes, state, [0])
+    raises(ValueError, "color", c.evaluate, {"half": lull.Plane(good)}, state, [0])
+    raises(lull.LullError, "HALF", c.evaluate, {"color": lull.Plane(good)}, state, [0])
+
+
+def test_bad_frames():
+    """sizes, crops and limits that make no sense are named"""
+    c = lull.load("halfbuf")
+    raises(ValueError, "sizes of at least 1", lull.Frame, c, 0, 8)
+    for crop in ((3, 3, 3, 9), (-1, 0, 4, 4), (0, 0, 9, 4), (5, 0, 2, 4)):
+        raises(ValueError, "no block is left", lull.Frame, c, 8, 8, crop=crop)
+    raises(ValueError, "spp_min", lull.Frame, c, 8, 8, spp_min=10, spp_max=5)
+    raises(ValueError, "supplies", lull.Frame, c, 8, 8, supplies=["colour"])
+    raises(ValueError, "wave", lull.Driver, lull.Frame(c, 8, 8), None, wave=0)
+
+
+def test_not_finite():
+    """pixels that are not finite leave their samples out; such a block is not called converged"""
+    noise = Noise([[.1]])
+
+    def host(rects, first, count, half):
+        for sample in noise(rects, first, count, half):
+            if first == 16:
+                sample[3, 5, 1] = np.nan
+            if first == 32:
+                sample[7, 7] = np.inf
+            yield sample
+    _, f, _ = run(host=host, sigmas=[[.1]])
+    b = f.blocks[0]
+    assert b.reason == "dropped" and b.dropped == 32 and f.spp()[3, 5] == b.spp - 16 and f.spp()[0, 0] == b.spp
+    kept = [s for s in range(b.spp) if not 16 <= s < 32]
+    assert abs(f.mean()[3, 5] - np.mean([noise.sample(b.rect, s)[3, 5] for s in kept], 0)).max() < 1e-12
+
+
+def test_state():
+    """a criterion's saved history goes on as if there had been no break; broken bytes are refused"""
+    def frames():
+        return lull.Frame(lull.load("ggn", threads=1, threshold=.9, passes=1), 32, 32, block=16, spp_max=256)
+    f = frames()
+    d = lull.Driver(f, Noise(SIGMAS))
+    while d.totals.checks < 12:
+        assert d.step() is None
+    saved, other = f.save_state(), frames()
+    other.load_state(saved)
+    assert len(saved[0]) > 1000 and other.save_state() == saved
+    raises(lull.LullError, "state", other.load_state, [saved[0][:-1]])
+    raises(lull.LullError, "no state", lull.load("fixed").load_state, b"x")
+
+
+def test_resume():
+    """an interrupted run goes on from a checkpoint to the same picture; a finished one can be given more samples"""
+    def start(spp_max=400):
+        f = lull.Frame(lull.load("ggn", threads=1, threshold=.9, passes=1), 32, 32, block=16, spp_max=spp_max)
+        return lull.Driver(f, Noise(SIGMAS))
+    whole, first, second = start(), start(), start()
+    whole.run()
+    first.after_call = lambda d: d.totals.samples > 256 * 300 and d.interrupt()
+    first.suspend = lambda d: checkpoint.save(tmp("run.npz"), d)
+    assert first.run().outcome == "interrupt" and first.frame.blocks[3].checks > 1
+    checkpoint.load(tmp("run.npz"), second)
+    assert second.run().outcome == "done" and (second.frame.mean() == whole.frame.mean()).all()
+    assert [(b.spp, b.reason) for b in second.frame.blocks] == [(b.spp, b.reason) for b in whole.frame.blocks]
+    checkpoint.save(tmp("short.npz"), whole)
+    more = start(800)
+    checkpoint.load(tmp("short.npz"), more)
+    more.run()
+    assert max(b.spp for b in more.frame.blocks) > 400
+    other = lull.Driver(lull.Frame(lull.load("ggn", threads=1, threshold=.9, passes=1), 32, 16, block=16), None)
+    raises(ValueError, "picture", checkpoint.load, tmp("run.npz"), other)
+    Path(tmp("junk.npz")).write_bytes(b"junk")
+    raises(ValueError, "not a checkpoint", checkpoint.load, tmp("junk.npz"), start())
+
+
+def test_display():
+    """a host's own view decides: what it shows as white needs no samples"""
+    _, seen, _ = run(sigmas=[[.5]])
+    _, hidden, _ = run(sigmas=[[.5]], display=lambda x: np.ones_like(x))
+    assert hidden.blocks[0].spp < seen.blocks[0].spp
+
+
+def test_mask():
+    """painted blocks get more samples, the others the same as without a mask"""
+    mask = np.zeros((32, 32))
+    mask[2, 17] = 1
+    plain, painted = run(sigmas=[[.2, .2], [.2, .2]])[1], run(sigmas=[[.2, .2], [.2, .2]], mask=mask)[1]
+    spp = [b.spp for b in painted.blocks]
+    assert spp[1] > 3 * plain.blocks[1].spp and [spp[i] for i in (0, 2, 3)] == [plain.blocks[i].spp for i in (0, 2, 3)]
+    raises(ValueError, "no dial", run, "fixed", parameters={}, mask=mask)
+    raises(ValueError, "shape", run, mask=mask[:3])
+    raises(ValueError, "[0, 1]", run, mask=mask + 1)
+
+
+def test_exr():
+    """EXR files are read by others as written, and uncompressed ones read back"""
+    rng = np.random.default_rng(3)
+    channels = {name: rng.random((37, 23)).astype(np.float32) for name in ("R", "G", "B", "lull.spp")}
+    channels["lull.spp"][:] = 64
+    exr.write(tmp("a.exr"), channels, (100, 90), (5, 6), {"lull:block": "16x16", "lull:samples": 3.})
+    info = subprocess.run(["oiiotool", "--info", "-v", tmp("a.exr")], text=True, capture_output=True, check=True).stdout
+    assert "100 x 90" in info and "pixel data origin: x=5, y=6" in info and "lull:block" in info and "lull.spp" in info, info
+    subprocess.run(["oiiotool", tmp("a.exr"), "--compression", "none", "-d", "float", "-o", tmp("b.exr")], check=True)
+    pixels, origin = exr.read(tmp("b.exr"), ("B", "lull.spp"))
+    assert origin == (5, 6) and (pixels[..., 0] == channels["B"]).all() and (pixels[..., 1] == 64).all()
+    raises(ValueError, "compressed", exr.read, tmp("a.exr"))
+    raises(ValueError, "not an uncompressed", exr.read, tmp("b.exr"), ("X",))
+    data = Path(tmp("b.exr")).read_bytes()
+    for cut in (0, 3, 9, 100, 700, len(data) - 1):
+        Path(tmp("c.exr")).write_bytes(data[:cut])
+        raises(ValueError, "c.exr", exr.read, tmp("c.exr"))
+
+
+def test_png():
+    """masks of 8 and 16 bits, grey and colour, with every filter are read; broken ones are refused"""
+    grey = (np.add.outer(np.arange(40) * 3, np.arange(50) * 2) % 256).astype(np.uint8)
+    png.write(tmp("m.png"), np.dstack([grey] * 3))
+    assert (png.read_grey(tmp("m.png")) * 255 == grey).all()
+    for depth in ("uint8", "uint16"):
+        for channels in ("0,0,0", "0", "0,0,0,A=1", "0,A=1"):
+            subprocess.run(["oiiotool", tmp("m.png"), "--ch", channels, "-d", depth, "-o", tmp("n.png")], check=True)
+            assert abs(png.read_grey(tmp("n.png")) * 255 - grey).max() < 1e-9, (depth, channels)
+    data = bytearray(Path(tmp("m.png")).read_bytes())
+    for at in (0, 20, 60, len(data) - 20):
+        bad = bytearray(data)
+        bad[at] ^= 1
+        Path(tmp("bad.png")).write_bytes(bad)
+        raises(ValueError, "bad.png", png.read_grey, tmp("bad.png"))
+    for cut in (0, 7, 30, len(data) // 2):
+        Path(tmp("bad.png")).write_bytes(data[:cut])
+        raises(ValueError, "bad.png", png.read_grey, tmp("bad.png"))
+
+
+def test_outputs():
+    """picture, preview and report of a run; nothing is half written"""
+    _, f, d = run(sigmas=[[.01, .5]], crop=lull.Rect(4, 0, 30, 16))
+    outputs.write_exr(tmp("o.exr"), d, "scene")
+    info = subprocess.run(["oiiotool", "--info", "-v", tmp("o.exr")], text=True, capture_output=True, check=True).stdout
+    assert "26 x   16" in info and "lull.reason" in info and "halfbuf 1.0 threshold=0.02" in info, info
+    outputs.write_preview(tmp("o.png"), d)
+    assert png.read_grey(tmp("o.png")).shape == (16, 26)
+    outputs.write_report(tmp("o.json"), d)
+    raises(OSError, "no-folder", outputs.write_report, tmp("no-folder/o.json"), d)
+    before = sorted(os.listdir(TMP.name))
+    d.threads = object()
+    raises(TypeError, "JSON", outputs.write_report, tmp("o.json"), d)
+    assert sorted(os.listdir(TMP.name)) == before and json.loads(Path(tmp("o.json")).read_text())["width"] == 32
+
+
+def test_progress():
+    """the progress line has the path tracer's form"""
+    f = lull.Frame(lull.load("halfbuf", threshold=.001), 32, 32, block=16, spp_max=512)
+    d = lull.Driver(f, Noise(SIGMAS))
+    for _ in range(12):
+        d.step()
+    form = r"(>=)?\s*\d+%  \d+ of \d+ blocks active  spp \d+\.\.\d+  \d+\.\d\d Mpaths/s  ETA (at most )?(\d+:\d\d|unknown)"
+    assert re.fullmatch(form, outputs.progress_text(d)), outputs.progress_text(d)
+
+
+def test_merge():
+    """merged rectangles hold the same pixels"""
+    rng = np.random.default_rng(4)
+    for _ in range(50):
+        chosen = [b.rect for b in blocks.grid(70, 50, 16, 16) if rng.random() < .6]
+        before, after = np.zeros((50, 70), int), np.zeros((50, 70), int)
+        for r in chosen:
+            before[r.y0:r.y1, r.x0:r.x1] += 1
+        for r in blocks.merge(chosen):
+            after[r.y0:r.y1, r.x0:r.x1] += 1
+        assert (before == after).all()
+    assert blocks.merge([b.rect for b in blocks.grid(70, 50, 16, 16)]) == [lull.Rect(0, 0, 70, 50)]
+
+
+tap.main(dict(globals()))
