@@ -98,7 +98,7 @@ static int find_row(const char *csv, const char *name, const struct ggn_threshol
 
 static int label_human(const struct options *o, const struct ggn_thresholds *t, const struct ggn_dataset_view *v, struct base_err *err)
 {
-    const struct ggn_manifest *m = &v->manifest;
+    const struct seq_manifest *m = &v->manifest;
     const struct ggn_view *row;
     int rc = find_row(o->human, o->view ? o->view : v->name, t, &row, err);
     if (rc)

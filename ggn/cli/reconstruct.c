@@ -8,7 +8,7 @@
 #include "cli/commands.h"
 #include "data/image.h"
 #include "data/labels.h"
-#include "data/manifest.h"
+#include "sequence/manifest.h"
 #include "data/thresholds.h"
 #include "observer/flip.h"
 
@@ -35,7 +35,7 @@ struct picture {
 };
 
 /* The first level that is not below spp, or the last one. */
-static const struct ggn_seq_record *level_at(const struct ggn_seq_block *b, double spp, int *beyond)
+static const struct seq_record *level_at(const struct seq_block *b, double spp, int *beyond)
 {
     for (uint32_t i = 0; i < b->n_levels; i++)
         if (b->levels[i].spp >= spp)
@@ -44,25 +44,25 @@ static const struct ggn_seq_record *level_at(const struct ggn_seq_block *b, doub
     return &b->levels[b->n_levels - 1];
 }
 
-static void paste(uint8_t *image, const struct ggn_manifest *m, const struct ggn_seq_block *b, const uint8_t *rgb)
+static void paste(uint8_t *image, const struct seq_manifest *m, const struct seq_block *b, const uint8_t *rgb)
 {
     for (uint32_t y = 0; y < b->height; y++)
         memcpy(image + 3 * (((size_t)b->y0 + y) * m->width + (size_t)b->x0), rgb + 3 * (size_t)y * b->width, 3 * (size_t)b->width);
 }
 
-static int take_block(struct picture *p, const struct ggn_manifest *m, const struct ggn_seq_block *b, double spp, struct base_err *err)
+static int take_block(struct picture *p, const struct seq_manifest *m, const struct seq_block *b, double spp, struct base_err *err)
 {
     size_t pixels = (size_t)b->width * b->height;
     uint8_t *rgb = malloc(6 * pixels);
     struct ggn_flip_stats flip;
     if (!rgb)
         return base_fail_nomem(err, "picture");
-    const struct ggn_seq_record *r = level_at(b, spp, &p->beyond);
-    int rc = ggn_seq_display(b, r, rgb, err);
+    const struct seq_record *r = level_at(b, spp, &p->beyond);
+    int rc = seq_display(b, r, rgb, err);
     if (!rc)
         paste(p->taken, m, b, rgb);
     if (!rc && b->reference) {
-        rc = ggn_seq_display(b, b->reference, rgb + 3 * pixels, err);
+        rc = seq_display(b, b->reference, rgb + 3 * pixels, err);
         if (!rc)
             rc = ggn_flip(rgb + 3 * pixels, rgb, (int)b->width, (int)b->height, GGN_FLIP_PPD, NULL, &flip, err);
         if (!rc) {
@@ -88,7 +88,7 @@ static double stop_of(const struct ggn_view *stops, const struct ggn_labels *lab
     return l ? l->threshold : (double)NAN;
 }
 
-static int build(const struct options *o, const struct ggn_manifest *m, const struct ggn_view *stops, const struct ggn_labels *labels,
+static int build(const struct options *o, const struct seq_manifest *m, const struct ggn_view *stops, const struct ggn_labels *labels,
                  struct picture *p, struct base_err *err)
 {
     size_t pixels = (size_t)m->width * m->height;
@@ -100,15 +100,15 @@ static int build(const struct options *o, const struct ggn_manifest *m, const st
     if (!p->taken || !p->reference)
         return base_fail_nomem(err, "picture");
     for (uint32_t i = 0; i < m->n_blocks && !rc; i++) {
-        struct ggn_seq_block b;
+        struct seq_block b;
         double spp = stop_of(stops, labels, m->blocks[i].id);
         if (isnan(spp))
             return base_fail(err, BASE_EINVAL, "%s: block %u has no stop", o->dir, m->blocks[i].id);
-        rc = ggn_manifest_read_block(o->dir, m, i, &b, err);
+        rc = seq_manifest_read_block(o->dir, m, i, &b, err);
         if (rc)
             break;
         rc = take_block(p, m, &b, spp, err);
-        ggn_seq_block_release(&b);
+        seq_block_release(&b);
     }
     if (!rc && m->n_blocks == 0)
         rc = base_fail(err, BASE_EINVAL, "%s: no finished block in it", o->dir);
@@ -119,7 +119,7 @@ static int build(const struct options *o, const struct ggn_manifest *m, const st
     return rc;
 }
 
-static int report(const struct options *o, const struct ggn_manifest *m, const struct picture *p, struct base_err *err)
+static int report(const struct options *o, const struct seq_manifest *m, const struct picture *p, struct base_err *err)
 {
     struct ggn_flip_stats flip;
     int rc = ggn_flip(p->reference, p->taken, (int)m->width, (int)m->height, GGN_FLIP_PPD, NULL, &flip, err);
@@ -146,7 +146,7 @@ int ggn_cmd_reconstruct(int argc, char **argv)
         .doc = "Builds the picture in which each block is taken at its threshold (the first recorded level that is not below it), "
                "for looking at and for figures of quality."};
     struct options o = {0};
-    struct ggn_manifest m = {0};
+    struct seq_manifest m = {0};
     struct ggn_labels labels = {0};
     struct ggn_thresholds stops = {0};
     struct picture p = {0};
@@ -155,7 +155,7 @@ int ggn_cmd_reconstruct(int argc, char **argv)
 
     int rc = base_options_parse(&options, argc, argv, &o, &err);
     if (!rc)
-        rc = ggn_manifest_read(o.dir, &m, &err);
+        rc = seq_manifest_read(o.dir, &m, &err);
     if (!rc && !o.stops)
         rc = ggn_labels_read(o.dir, &labels, &err);
     if (!rc && o.stops) {
@@ -172,6 +172,6 @@ int ggn_cmd_reconstruct(int argc, char **argv)
     free(p.reference);
     ggn_thresholds_release(&stops);
     ggn_labels_release(&labels);
-    ggn_manifest_release(&m);
+    seq_manifest_release(&m);
     return !rc ? GGN_EXIT_OK : ggn_cmd_fail(argv[0], &err);
 }

@@ -129,33 +129,33 @@ static int chain_alloc(const struct ggn_chains *set, struct ggn_chain *c, int le
                ? 0 : base_fail_nomem(err, "images of the data set");
 }
 
-static int fill_chain(const struct ggn_chains *set, struct ggn_chain *c, const struct ggn_seq_block *b, double ratio,
+static int fill_chain(const struct ggn_chains *set, struct ggn_chain *c, const struct seq_block *b, double ratio,
                       struct base_err *err)
 {
     double wanted = 0;
     int rc = chain_alloc(set, c, (int)b->n_levels, b->reference != NULL, err);
 
     for (uint32_t i = 0; !rc && i < b->n_levels; i++) {
-        const struct ggn_seq_record *r = &b->levels[i];
+        const struct seq_record *r = &b->levels[i];
         if (ratio > 1 && c->n_levels && r->spp < wanted - 0.5)
             continue;
         wanted = 0.999 * ratio * r->spp; /* recorded levels are rounded to whole samples */
         c->spp[c->n_levels] = r->spp;
-        c->tail999[c->n_levels] = ggn_seq_stat(r, "tail999");
-        c->gini[c->n_levels] = ggn_seq_stat(r, "gini");
-        rc = ggn_seq_display_planar(b, r, c->noisy + (size_t)c->n_levels * ggn_chains_values(set), err);
+        c->tail999[c->n_levels] = seq_stat(r, "tail999");
+        c->gini[c->n_levels] = seq_stat(r, "gini");
+        rc = seq_display_planar(b, r, c->noisy + (size_t)c->n_levels * ggn_chains_values(set), err);
         c->n_levels++;
     }
     if (!rc && b->reference)
-        rc = ggn_seq_display_planar(b, b->reference, c->reference, err);
+        rc = seq_display_planar(b, b->reference, c->reference, err);
     return rc;
 }
 
 static int load_block(struct ggn_chains *set, int view, uint32_t index, const struct ggn_chains_options *o, struct base_err *err)
 {
     const struct ggn_dataset_view *v = &set->data.views[view];
-    struct ggn_seq_block b;
-    int rc = ggn_manifest_read_block(v->dir, &v->manifest, index, &b, err);
+    struct seq_block b;
+    int rc = seq_manifest_read_block(v->dir, &v->manifest, index, &b, err);
 
     if (rc)
         return rc;
@@ -181,7 +181,7 @@ static int load_block(struct ggn_chains *set, int view, uint32_t index, const st
         c->spread = v->has_labels ? v->labels.spread : 0;
         rc = fill_chain(set, c, &b, o->ratio, err);
     }
-    ggn_seq_block_release(&b);
+    seq_block_release(&b);
     return rc;
 }
 
@@ -197,7 +197,7 @@ static int by_value(const void *a, const void *b)
 static void find_spacing(struct ggn_chains *set)
 {
     const struct ggn_chain *longest = &set->chains[0];
-    double ratio[GGN_SEQ_MAX_RECORDS];
+    double ratio[SEQ_MAX_RECORDS];
     int n = 0;
 
     for (int i = 1; i < set->n; i++)

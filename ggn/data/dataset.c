@@ -24,7 +24,7 @@ static int exists(const char *dir, const char *name)
 void ggn_dataset_release(struct ggn_dataset *data)
 {
     for (int i = 0; i < data->n; i++) {
-        ggn_manifest_release(&data->views[i].manifest);
+        seq_manifest_release(&data->views[i].manifest);
         ggn_labels_release(&data->views[i].labels);
     }
     free(data->views);
@@ -42,7 +42,7 @@ static int add_view(struct ggn_dataset *d, const char *dir, struct base_err *err
     if (strlen(dir) >= sizeof v->dir)
         return base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", dir);
     strcpy(v->dir, dir);
-    int rc = ggn_manifest_read(dir, &v->manifest, err);
+    int rc = seq_manifest_read(dir, &v->manifest, err);
     if (rc)
         return rc;
     d->n++;

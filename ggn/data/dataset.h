@@ -10,7 +10,7 @@
 #define GGN_DATA_DATASET_H
 
 #include "data/labels.h"
-#include "data/manifest.h"
+#include "sequence/manifest.h"
 
 enum ggn_split { GGN_SPLIT_TRAIN, GGN_SPLIT_VALIDATION, GGN_SPLIT_TEST, GGN_SPLIT_NONE, GGN_SPLITS };
 extern const char *const ggn_split_names[GGN_SPLITS]; /* "train", "validation", "test", "none" */
@@ -18,7 +18,7 @@ extern const char *const ggn_split_names[GGN_SPLITS]; /* "train", "validation", 
 struct ggn_dataset_view {
     char dir[4096];
     const char *name; /* borrows from dir: its last component */
-    struct ggn_manifest manifest;
+    struct seq_manifest manifest;
     int has_labels;
     struct ggn_labels labels;
     enum ggn_split split;

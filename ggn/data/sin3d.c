@@ -10,7 +10,8 @@
 
 #include "data/image.h"
 #include "data/labels.h"
-#include "data/manifest.h"
+#include "sequence/builder.h"
+#include "sequence/manifest.h"
 #include "data/rawls.h"
 #include "model/preprocess.h"
 
@@ -88,7 +89,7 @@ static int scan(const char *dir, struct view *v, struct base_err *err)
 
 static int check_levels(const struct view *v, int allow_gaps, struct base_err *err)
 {
-    if (v->n < 2 || v->n > GGN_SEQ_MAX_RECORDS - 1)
+    if (v->n < 2 || v->n > SEQ_MAX_RECORDS - 1)
         return base_fail(err, BASE_EINVAL, "%s: %d levels (at least 2 are needed)", v->dir, v->n);
     uint32_t step = v->levels[1].spp - v->levels[0].spp;
     for (int i = 1; i < v->n; i++) {
@@ -155,12 +156,12 @@ static int read_picture(const struct view *v, const struct level *level, struct 
 /* Work on one row of blocks: all its builders fill level by level, so that each image is read once per row. */
 struct row {
     int columns, block, y0;
-    struct ggn_seq_builder *builders; /* [columns] */
+    struct seq_builder *builders; /* [columns] */
     uint8_t *display;                 /* [3][block^2] */
-    float *mean;
+    double *mean;
 };
 
-static void cut_block(const struct picture *p, int x0, int y0, int block, uint8_t *display, float *mean)
+static void cut_block(const struct picture *p, int x0, int y0, int block, uint8_t *display, double *mean)
 {
     size_t pixels = (size_t)block * (size_t)block;
     for (int y = 0; y < block; y++)
@@ -170,7 +171,7 @@ static void cut_block(const struct picture *p, int x0, int y0, int block, uint8_
                 size_t to = c * pixels + (size_t)y * (size_t)block + (size_t)x;
                 display[to] = p->display.data[from];
                 if (p->linear.data)
-                    mean[to] = p->linear.data[from];
+                    mean[to] = (double)p->linear.data[from];
             }
 }
 
@@ -179,14 +180,14 @@ static int add_picture(struct row *row, const struct picture *p, uint32_t spp, i
     int rc = 0;
     for (int c = 0; c < row->columns && !rc; c++) {
         cut_block(p, c * row->block, row->y0, row->block, row->display, row->mean);
-        struct ggn_seq_frame f = {.spp = spp, .is_reference = is_reference, .display = row->display,
+        struct seq_frame f = {.spp = spp, .is_reference = is_reference, .display = row->display,
                                   .mean = p->linear.data ? row->mean : NULL};
-        rc = ggn_seq_builder_add(&row->builders[c], &f, err);
+        rc = seq_builder_add(&row->builders[c], &f, err);
     }
     return rc;
 }
 
-static int fill_row(const struct view *v, const struct ggn_manifest *m, struct row *row, const struct ggn_sin3d_options *o, int base, struct base_err *err)
+static int fill_row(const struct view *v, const struct seq_manifest *m, struct row *row, const struct ggn_sin3d_options *o, int base, struct base_err *err)
 {
     int rc = 0;
     for (int i = 0; i < v->n && !rc; i++) {
@@ -208,7 +209,7 @@ static int fill_row(const struct view *v, const struct ggn_manifest *m, struct r
     return rc;
 }
 
-static int import_row(const struct view *v, const char *out, struct ggn_manifest *m, int index, const struct ggn_sin3d_options *o, struct base_err *err)
+static int import_row(const struct view *v, const char *out, struct seq_manifest *m, int index, const struct ggn_sin3d_options *o, struct base_err *err)
 {
     uint32_t block = m->block;
     struct row row = {.columns = (int)(m->width / block), .block = (int)block, .y0 = index * (int)block};
@@ -220,35 +221,35 @@ static int import_row(const struct view *v, const char *out, struct ggn_manifest
     if (!row.builders || !row.display || !row.mean)
         rc = base_fail_nomem(err, v->dir);
     for (int c = 0; c < row.columns && !rc; c++)
-        rc = ggn_seq_builder_init(&row.builders[c], block, block, c * (int)block, row.y0, (uint32_t)(index * row.columns + c), 0, err);
+        rc = seq_builder_init(&row.builders[c], block, block, c * (int)block, row.y0, (uint32_t)(index * row.columns + c), 0, err);
     if (!rc)
         rc = fill_row(v, m, &row, o, index * v->n, err);
     for (int c = 0; c < row.columns && !rc; c++) {
         uint32_t x0 = (uint32_t)c * block, y0 = (uint32_t)row.y0;
-        struct ggn_manifest_block *b = &m->blocks[m->n_blocks];
+        struct seq_manifest_block *b = &m->blocks[m->n_blocks];
         char path[4200];
-        *b = (struct ggn_manifest_block){.id = (uint32_t)(index * row.columns + c), .x0 = x0, .y0 = y0, .x1 = x0 + block, .y1 = y0 + block};
+        *b = (struct seq_manifest_block){.id = (uint32_t)(index * row.columns + c), .x0 = x0, .y0 = y0, .x1 = x0 + block, .y1 = y0 + block};
         snprintf(b->file, sizeof b->file, "block-%05u.lseq", b->id);
         snprintf(path, sizeof path, "%s/%s", out, b->file);
-        rc = ggn_seq_builder_write(&row.builders[c], path, &b->crc32, err);
+        rc = seq_builder_write(&row.builders[c], path, &b->crc32, err);
         b->bytes = row.builders[c].size;
         m->n_blocks += !rc;
     }
     for (int c = 0; c < row.columns && row.builders; c++)
-        ggn_seq_builder_release(&row.builders[c]);
+        seq_builder_release(&row.builders[c]);
     free(row.mean);
     free(row.display);
     free(row.builders);
     return rc;
 }
 
-static int init_manifest(const struct view *v, const struct ggn_sin3d_options *o, struct ggn_manifest *m, struct base_err *err)
+static int init_manifest(const struct view *v, const struct ggn_sin3d_options *o, struct seq_manifest *m, struct base_err *err)
 {
     struct picture first;
     int rc = read_picture(v, &v->levels[0], &first, err);
     if (rc)
         return rc;
-    *m = (struct ggn_manifest){.width = (uint32_t)first.display.width, .height = (uint32_t)first.display.height,
+    *m = (struct seq_manifest){.width = (uint32_t)first.display.width, .height = (uint32_t)first.display.height,
                                .block = (uint32_t)o->block, .reference_spp = v->levels[v->n - 1].spp, .reference_independent = 0,
                                .n_levels = (uint32_t)v->n};
     release_picture(&first);
@@ -268,15 +269,15 @@ static int init_manifest(const struct view *v, const struct ggn_sin3d_options *o
 }
 
 /* Takes over the blocks of an earlier run with the same images. Whole rows only. */
-static int take_over(const char *out, struct ggn_manifest *m, struct base_err *err)
+static int take_over(const char *out, struct seq_manifest *m, struct base_err *err)
 {
-    struct ggn_manifest old;
+    struct seq_manifest old;
     char path[4200];
     struct stat st;
     snprintf(path, sizeof path, "%s/manifest.json", out);
     if (stat(path, &st) != 0)
         return 0;
-    int rc = ggn_manifest_read(out, &old, err);
+    int rc = seq_manifest_read(out, &old, err);
     if (rc)
         return rc;
     uint32_t columns = m->width / m->block, most = columns * (m->height / m->block);
@@ -287,11 +288,11 @@ static int take_over(const char *out, struct ggn_manifest *m, struct base_err *e
         m->n_blocks = old.n_blocks / columns * columns;
         memcpy(m->blocks, old.blocks, m->n_blocks * sizeof *m->blocks);
     }
-    ggn_manifest_release(&old);
+    seq_manifest_release(&old);
     return rc;
 }
 
-static int attach_thresholds(const struct view *v, const char *out, const struct ggn_manifest *m, const struct ggn_thresholds *t,
+static int attach_thresholds(const struct view *v, const char *out, const struct seq_manifest *m, const struct ggn_thresholds *t,
                              int *labelled, struct base_err *err)
 {
     char with_part[GGN_VIEW_NAME + 8];
@@ -323,7 +324,7 @@ static int attach_thresholds(const struct view *v, const char *out, const struct
 int ggn_sin3d_import_view(const char *dir, const char *out, const struct ggn_sin3d_options *o, int *labelled, struct base_err *err)
 {
     struct view v = {0};
-    struct ggn_manifest m = {0};
+    struct seq_manifest m = {0};
     int rc = strlen(dir) < sizeof v.dir && strlen(out) < 4096 ? scan(dir, &v, err) : base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", dir);
     if (!rc)
         rc = check_levels(&v, o->allow_gaps, err);
@@ -336,11 +337,11 @@ int ggn_sin3d_import_view(const char *dir, const char *out, const struct ggn_sin
     for (uint32_t row = !rc ? m.n_blocks / (m.width / m.block) : 0; !rc && row < m.height / m.block; row++) {
         rc = import_row(&v, out, &m, (int)row, o, err);
         if (!rc)
-            rc = ggn_manifest_write(out, &m, err);
+            rc = seq_manifest_write(out, &m, err);
     }
     if (!rc)
         rc = attach_thresholds(&v, out, &m, o->thresholds, labelled, err);
-    ggn_manifest_release(&m);
+    seq_manifest_release(&m);
     free(v.levels);
     return rc;
 }

@@ -19,10 +19,10 @@ struct source {
     double n_full, n_reference;
 };
 
-static const struct ggn_seq_record *full_level(const struct ggn_seq_block *b)
+static const struct seq_record *full_level(const struct seq_block *b)
 {
     for (uint32_t i = 0; i < b->n_levels; i++)
-        if (ggn_seq_has(&b->levels[i], GGN_PLANE_HALF_F16))
+        if (seq_has(&b->levels[i], SEQ_PLANE_HALF_F16))
             return &b->levels[i];
     return NULL;
 }
@@ -91,7 +91,7 @@ static int make_chain(struct ggn_chains *set, const struct ggn_chain *real, stru
 static int read_source(const struct ggn_chains *set, const struct ggn_chain *c, struct source *s, int *usable, struct base_err *err)
 {
     const struct ggn_dataset_view *v = &set->data.views[c->view];
-    struct ggn_seq_block b = {0};
+    struct seq_block b = {0};
     uint32_t index = 0;
     int rc = 0;
 
@@ -100,21 +100,21 @@ static int read_source(const struct ggn_chains *set, const struct ggn_chain *c, 
         index++;
     if (index == v->manifest.n_blocks || !v->manifest.reference_spp || !v->manifest.reference_independent)
         return 0;
-    rc = ggn_manifest_read_block(v->dir, &v->manifest, index, &b, err);
+    rc = seq_manifest_read_block(v->dir, &v->manifest, index, &b, err);
     if (rc)
         return rc;
-    const struct ggn_seq_record *full = full_level(&b);
+    const struct seq_record *full = full_level(&b);
     if (full && b.reference) {
         s->n_full = full->spp;
         s->n_reference = b.reference->spp;
-        rc = ggn_seq_mean(&b, b.reference, s->base, err);
+        rc = seq_mean(&b, b.reference, s->base, err);
         if (!rc)
-            rc = ggn_seq_half(&b, full, s->d, err);
+            rc = seq_half(&b, full, s->d, err);
         if (!rc)
-            rc = ggn_seq_mean(&b, &b.levels[b.n_levels - 1], s->last, err);
+            rc = seq_mean(&b, &b.levels[b.n_levels - 1], s->last, err);
         *usable = !rc;
     }
-    ggn_seq_block_release(&b);
+    seq_block_release(&b);
     return rc;
 }
 

@@ -214,7 +214,7 @@ static int plot_scores(const char *path, const struct ggn_eval_set *s, enum ggn_
 
 static void fill_view(struct ggn_view *v, const struct ggn_eval_set *s, int view, const double *stop)
 {
-    const struct ggn_manifest *m = &s->chains.data.views[view].manifest;
+    const struct seq_manifest *m = &s->chains.data.views[view].manifest;
     snprintf(v->name, sizeof v->name, "%.100s", s->chains.data.views[view].name);
     v->columns = (int)((m->width + m->block - 1) / m->block);
     for (int i = 0; i < v->n; i++)
@@ -233,7 +233,7 @@ static int make_maps(struct ggn_thresholds *t, const struct ggn_eval_set *s, enu
     if (!t->views)
         return base_fail_nomem(err, "maps");
     for (int v = 0; v < s->chains.data.n; v++) {
-        const struct ggn_manifest *m = &s->chains.data.views[v].manifest;
+        const struct seq_manifest *m = &s->chains.data.views[v].manifest;
         uint32_t blocks = (m->width + m->block - 1) / m->block * ((m->height + m->block - 1) / m->block);
         int used = 0;
         for (int b = 0; b < s->n_blocks; b++)

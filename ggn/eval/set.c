@@ -25,7 +25,7 @@ static int scene_index(const struct ggn_dataset *d, int view)
     return view;
 }
 
-static uint32_t manifest_index(const struct ggn_manifest *m, uint32_t id)
+static uint32_t manifest_index(const struct seq_manifest *m, uint32_t id)
 {
     uint32_t i = 0;
     while (i < m->n_blocks && m->blocks[i].id != id)
@@ -190,24 +190,24 @@ static double unsettled_share(const float *y, const float *d, size_t pixels, dou
 }
 
 /* The criteria's figures beyond the recording, from its last level. */
-static int extrapolate(struct ggn_eval_set *s, const struct ggn_eval_block *block, size_t from, const struct ggn_seq_block *p, struct base_err *err)
+static int extrapolate(struct ggn_eval_set *s, const struct ggn_eval_block *block, size_t from, const struct seq_block *p, struct base_err *err)
 {
-    const struct ggn_seq_record *last = &p->levels[p->n_levels - 1];
+    const struct seq_record *last = &p->levels[p->n_levels - 1];
     size_t pixels = (size_t)p->width * p->height;
-    double half = ggn_seq_stat(last, "half_unsettled");
+    double half = seq_stat(last, "half_unsettled");
     float *planes = malloc(4 * pixels * sizeof *planes);
-    int rc = !planes ? base_fail_nomem(err, "evaluation") : ggn_seq_mean(p, last, planes, err);
+    int rc = !planes ? base_fail_nomem(err, "evaluation") : seq_mean(p, last, planes, err);
     if (!rc)
-        rc = ggn_seq_half_luminance(p, last, planes + 3 * pixels, err);
+        rc = seq_half_luminance(p, last, planes + 3 * pixels, err);
     for (size_t i = 0; i < pixels && !rc; i++)
         planes[i] = (float)base_luminance((double)planes[i], (double)planes[pixels + i], (double)planes[2 * pixels + i]);
     for (size_t i = from; i < block->end && !rc; i++) {
         double scale = sqrt(last->spp / s->spp[i]);
-        s->seconds[i] = ggn_seq_stat(last, "seconds") * s->spp[i] / last->spp;
-        s->dammertz[i] = scale * ggn_seq_stat(last, "dammertz");
-        s->rse[i] = scale * ggn_seq_stat(last, "rse");
+        s->seconds[i] = seq_stat(last, "seconds") * s->spp[i] / last->spp;
+        s->dammertz[i] = scale * seq_stat(last, "dammertz");
+        s->rse[i] = scale * seq_stat(last, "rse");
         s->half_unsettled[i] = unsettled_share(planes, planes + 3 * pixels, pixels, scale);
-        s->rse_unsettled[i] = half > 0.0 ? ggn_seq_stat(last, "rse_unsettled") * s->half_unsettled[i] / half : 0.0;
+        s->rse_unsettled[i] = half > 0.0 ? seq_stat(last, "rse_unsettled") * s->half_unsettled[i] / half : 0.0;
     }
     free(planes);
     return rc;
@@ -216,22 +216,22 @@ static int extrapolate(struct ggn_eval_set *s, const struct ggn_eval_block *bloc
 static int fill_statistics(struct ggn_eval_set *s, const struct ggn_eval_block *block, struct base_err *err)
 {
     const struct ggn_dataset_view *v = &s->chains.data.views[block->view];
-    struct ggn_seq_block p;
+    struct seq_block p;
     size_t i = block->first;
-    int rc = ggn_manifest_read_block(v->dir, &v->manifest, block->index, &p, err);
+    int rc = seq_manifest_read_block(v->dir, &v->manifest, block->index, &p, err);
     if (rc)
         return rc;
-    for (const struct ggn_seq_record *r; i < block->end && (r = ggn_seq_level(&p, (uint32_t)s->spp[i])); i++) {
-        s->seconds[i] = ggn_seq_stat(r, "seconds");
-        s->dammertz[i] = ggn_seq_stat(r, "dammertz");
-        s->half_unsettled[i] = ggn_seq_stat(r, "half_unsettled");
-        s->rse[i] = ggn_seq_stat(r, "rse");
-        s->rse_unsettled[i] = ggn_seq_stat(r, "rse_unsettled");
+    for (const struct seq_record *r; i < block->end && (r = seq_level(&p, (uint32_t)s->spp[i])); i++) {
+        s->seconds[i] = seq_stat(r, "seconds");
+        s->dammertz[i] = seq_stat(r, "dammertz");
+        s->half_unsettled[i] = seq_stat(r, "half_unsettled");
+        s->rse[i] = seq_stat(r, "rse");
+        s->rse_unsettled[i] = seq_stat(r, "rse_unsettled");
     }
-    const struct ggn_seq_record *last = &p.levels[p.n_levels - 1];
-    if (i < block->end && (ggn_seq_has(last, GGN_PLANE_HALF_LOG) || ggn_seq_has(last, GGN_PLANE_HALF_F16)))
+    const struct seq_record *last = &p.levels[p.n_levels - 1];
+    if (i < block->end && (seq_has(last, SEQ_PLANE_HALF_LOG) || seq_has(last, SEQ_PLANE_HALF_F16)))
         rc = extrapolate(s, block, i, &p, err);
-    ggn_seq_block_release(&p);
+    seq_block_release(&p);
     return rc;
 }
 

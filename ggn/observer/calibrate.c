@@ -105,7 +105,7 @@ static int leave_each_out(struct evidence *e, const struct ggn_calibration_input
 static int add_view(const struct ggn_calibration_input *in, int view, enum ggn_curve_source source, struct base_threads *threads,
                     struct evidence *e, struct ggn_calibration_block *blocks, struct base_err *err)
 {
-    const struct ggn_manifest *m = &in->view->manifest;
+    const struct seq_manifest *m = &in->view->manifest;
     uint32_t tiles = (m->width + m->block - 1) / m->block * ((m->height + m->block - 1) / m->block);
     if (m->n_blocks == 0)
         return base_fail(err, BASE_EINVAL, "%s: no finished block yet", in->view->dir);

@@ -15,7 +15,7 @@ static double simulated_spp(int i)
 
 /* Planes of one block. */
 struct planes {
-    const struct ggn_seq_block *block; /* borrows */
+    const struct seq_block *block; /* borrows */
     size_t pixels;
     float *mean, *difference, *work;  /* [3][P], linear; one allocation, `mean` owns it */
     float *lightness[3];              /* [P] */
@@ -29,7 +29,7 @@ static void planes_release(struct planes *p)
     *p = (struct planes){0};
 }
 
-static int planes_init(struct planes *p, const struct ggn_seq_block *block, struct base_err *err)
+static int planes_init(struct planes *p, const struct seq_block *block, struct base_err *err)
 {
     size_t n = (size_t)block->width * block->height;
     *p = (struct planes){.block = block, .pixels = n, .mean = malloc(12 * n * sizeof *p->mean),
@@ -67,10 +67,10 @@ static double texture(struct planes *p)
 }
 
 /* The level whose half-buffer difference is kept in full. */
-static const struct ggn_seq_record *full_level(const struct ggn_seq_block *b)
+static const struct seq_record *full_level(const struct seq_block *b)
 {
     for (uint32_t i = 0; i < b->n_levels; i++)
-        if (ggn_seq_has(&b->levels[i], GGN_PLANE_HALF_F16))
+        if (seq_has(&b->levels[i], SEQ_PLANE_HALF_F16))
             return &b->levels[i];
     return NULL;
 }
@@ -78,10 +78,10 @@ static const struct ggn_seq_record *full_level(const struct ggn_seq_block *b)
 /* Appends the levels that halves stand for above `beyond` spp. */
 static int add_halves(struct ggn_curve *c, struct planes *p, double beyond, struct base_err *err)
 {
-    const struct ggn_seq_record *full = full_level(p->block);
-    int rc = ggn_seq_mean(p->block, full, p->mean, err);
+    const struct seq_record *full = full_level(p->block);
+    int rc = seq_mean(p->block, full, p->mean, err);
     if (!rc)
-        rc = ggn_seq_half(p->block, full, p->difference, err);
+        rc = seq_half(p->block, full, p->difference, err);
     if (rc)
         return rc;
     if (c->n == 0) {
@@ -103,15 +103,15 @@ static int add_halves(struct ggn_curve *c, struct planes *p, double beyond, stru
 
 static int add_levels(struct ggn_curve *c, struct planes *p, int independent, struct base_err *err)
 {
-    const struct ggn_seq_block *b = p->block;
+    const struct seq_block *b = p->block;
     double n_r = b->reference->spp;
-    int rc = ggn_seq_mean(b, b->reference, p->mean, err);
+    int rc = seq_mean(b, b->reference, p->mean, err);
     if (rc)
         return rc;
     ggn_visible_lightness(p->mean, p->pixels, p->lightness[2]);
     for (uint32_t level = 0; level < b->n_levels; level++) {
-        const struct ggn_seq_record *r = &b->levels[level];
-        rc = ggn_seq_mean(b, r, p->difference, err);
+        const struct seq_record *r = &b->levels[level];
+        rc = seq_mean(b, r, p->difference, err);
         if (rc)
             return rc;
         if (level + 1 == b->n_levels) {
@@ -131,7 +131,7 @@ static int add_levels(struct ggn_curve *c, struct planes *p, int independent, st
     return 0;
 }
 
-int ggn_curve_make(const struct ggn_seq_block *block, enum ggn_curve_source source, int reference_independent, struct ggn_curve *curve,
+int ggn_curve_make(const struct seq_block *block, enum ggn_curve_source source, int reference_independent, struct ggn_curve *curve,
                    struct base_err *err)
 {
     if (source == GGN_FROM_HALVES && !full_level(block))

@@ -12,7 +12,7 @@
 #define GGN_OBSERVER_CURVE_H
 
 #include "base/err.h"
-#include "data/sequence.h"
+#include "sequence/block.h"
 
 enum { GGN_CURVE_CAP = 10000 }; /* spp; where the people of SIN3D stopped looking */
 
@@ -25,7 +25,7 @@ struct ggn_curve {
 };
 
 /* BASE_EINVAL: GGN_FROM_HALVES without a full level, GGN_FROM_LEVELS without a reference. */
-int ggn_curve_make(const struct ggn_seq_block *block, enum ggn_curve_source source, int reference_independent, struct ggn_curve *curve,
+int ggn_curve_make(const struct seq_block *block, enum ggn_curve_source source, int reference_independent, struct ggn_curve *curve,
                    struct base_err *err);
 void ggn_curve_release(struct ggn_curve *curve);
 

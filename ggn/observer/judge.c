@@ -17,13 +17,13 @@ struct work {
 static void make_curve(void *data, long i, int worker)
 {
     const struct work *w = data;
-    const struct ggn_manifest *m = &w->view->manifest;
-    struct ggn_seq_block b;
+    const struct seq_manifest *m = &w->view->manifest;
+    struct seq_block b;
     (void)worker;
-    if (ggn_manifest_read_block(w->view->dir, m, (uint32_t)i, &b, &w->errs[i]))
+    if (seq_manifest_read_block(w->view->dir, m, (uint32_t)i, &b, &w->errs[i]))
         return;
     ggn_curve_make(&b, w->source, m->reference_independent, &w->curves[i], &w->errs[i]);
-    ggn_seq_block_release(&b);
+    seq_block_release(&b);
 }
 
 int ggn_view_curves(const struct ggn_dataset_view *view, enum ggn_curve_source source, struct base_threads *threads,

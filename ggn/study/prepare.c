@@ -11,7 +11,7 @@
 
 #include "base/files.h"
 #include "data/image.h"
-#include "data/manifest.h"
+#include "sequence/manifest.h"
 #include "study/plan.h"
 #include "study/stimuli.h"
 #include "study/token.h"
@@ -60,7 +60,7 @@ static int enough_levels(const char *dir, const struct ggn_study_block *b, struc
 struct work {
     const struct ggn_study_request_views *request;
     const char *folder;
-    const struct ggn_manifest *manifest;
+    const struct seq_manifest *manifest;
     int view;
     struct ggn_study_block *blocks; /* [n_blocks] */
     int *rc;
@@ -90,14 +90,14 @@ static int make_levels(const struct work *w, struct ggn_study_block *b, struct g
 static void work_block(void *data, long i, int worker)
 {
     struct work *w = data;
-    const struct ggn_manifest_block *m = &w->manifest->blocks[i];
+    const struct seq_manifest_block *m = &w->manifest->blocks[i];
     struct ggn_study_block *b = &w->blocks[i];
-    struct ggn_seq_block block;
+    struct seq_block block;
     struct ggn_stimuli stimuli;
     struct base_err *err = &w->errs[i];
     (void)worker;
     *b = (struct ggn_study_block){.id = m->id, .x0 = m->x0, .y0 = m->y0, .x1 = m->x1, .y1 = m->y1};
-    w->rc[i] = ggn_manifest_read_block(w->folder, w->manifest, (uint32_t)i, &block, err);
+    w->rc[i] = seq_manifest_read_block(w->folder, w->manifest, (uint32_t)i, &block, err);
     if (w->rc[i] != 0)
         return;
     uint8_t *rgb = malloc(3 * (size_t)block.width * block.height);
@@ -108,7 +108,7 @@ static void work_block(void *data, long i, int worker)
         ggn_stimuli_release(&stimuli);
     }
     free(rgb);
-    ggn_seq_block_release(&block);
+    seq_block_release(&block);
 }
 
 static int by_id(const void *a, const void *b)
@@ -120,12 +120,12 @@ static int by_id(const void *a, const void *b)
 static int prepare_sequence(const struct ggn_study_request_views *q, int index, struct ggn_study_view *view,
                             struct base_threads *threads, struct base_err *err)
 {
-    struct ggn_manifest m = {0};
-    int rc = ggn_manifest_read(q->views[index], &m, err);
+    struct seq_manifest m = {0};
+    int rc = seq_manifest_read(q->views[index], &m, err);
     if (!rc && (m.n_blocks < 1 || m.n_blocks > GGN_STUDY_MAX_BLOCKS))
         rc = base_fail(err, BASE_EINVAL, "%s: %u finished blocks, wanted 1 … %d", q->views[index], m.n_blocks, GGN_STUDY_MAX_BLOCKS);
     if (rc) {
-        ggn_manifest_release(&m);
+        seq_manifest_release(&m);
         return rc;
     }
     view->width = m.width;
@@ -145,7 +145,7 @@ static int prepare_sequence(const struct ggn_study_request_views *q, int index, 
             rc = base_fail(err, w.rc[i], "%.400s", w.errs[i].text);
     free(w.rc);
     free(w.errs);
-    ggn_manifest_release(&m);
+    seq_manifest_release(&m);
     return rc;
 }
 

@@ -38,32 +38,32 @@ static int simulated_levels(double beyond, double *spp)
 }
 
 /* The level whose half-buffer difference is kept in full. */
-static const struct ggn_seq_record *full_level(const struct ggn_seq_block *b)
+static const struct seq_record *full_level(const struct seq_block *b)
 {
     for (uint32_t i = 0; i < b->n_levels; i++)
-        if (ggn_seq_has(&b->levels[i], GGN_PLANE_HALF_F16))
+        if (seq_has(&b->levels[i], SEQ_PLANE_HALF_F16))
             return &b->levels[i];
     return NULL;
 }
 
 /* Whether halves stand for levels beyond the last recorded one; up to a tenth of an octave is not worth simulating. */
-static int extends(const struct ggn_seq_block *b, int reference_independent)
+static int extends(const struct seq_block *b, int reference_independent)
 {
     return reference_independent && b->reference && full_level(b) && 1.07 * b->levels[b->n_levels - 1].spp < GGN_SIMULATED_CAP &&
-           ggn_seq_has(b->reference, GGN_PLANE_MEAN_F16);
+           seq_has(b->reference, SEQ_PLANE_MEAN_F16);
 }
 
 /* Without a reference: the mean of the full level stands for the converged image. */
 static int init_halves(struct ggn_stimuli *s, struct base_err *err)
 {
-    const struct ggn_seq_block *b = s->block;
-    const struct ggn_seq_record *full = full_level(b);
+    const struct seq_block *b = s->block;
+    const struct seq_record *full = full_level(b);
     if (!full)
         return base_fail(err, BASE_EINVAL, "block %u has neither a reference nor a full level with a half-buffer difference", b->id);
     s->spp0 = full->spp;
-    int rc = ggn_seq_half(b, full, s->difference, err);
+    int rc = seq_half(b, full, s->difference, err);
     if (!rc)
-        rc = ggn_seq_mean(b, full, s->base, err);
+        rc = seq_mean(b, full, s->base, err);
     if (!rc)
         encode(s->base, (size_t)b->width * b->height, s->converged);
     return rc;
@@ -71,17 +71,17 @@ static int init_halves(struct ggn_stimuli *s, struct base_err *err)
 
 static int init_recorded(struct ggn_stimuli *s, int reference_independent, int extend, struct base_err *err)
 {
-    const struct ggn_seq_block *b = s->block;
-    s->scale = reference_independent && ggn_seq_has(b->reference, GGN_PLANE_MEAN_F16);
-    int rc = s->scale ? ggn_seq_mean(b, b->reference, s->base, err) : 0;
+    const struct seq_block *b = s->block;
+    s->scale = reference_independent && seq_has(b->reference, SEQ_PLANE_MEAN_F16);
+    int rc = s->scale ? seq_mean(b, b->reference, s->base, err) : 0;
     if (!rc && extend) {
         s->spp0 = full_level(b)->spp;
-        rc = ggn_seq_half(b, full_level(b), s->difference, err);
+        rc = seq_half(b, full_level(b), s->difference, err);
     }
-    return !rc ? ggn_seq_display(b, b->reference, s->converged, err) : rc;
+    return !rc ? seq_display(b, b->reference, s->converged, err) : rc;
 }
 
-int ggn_stimuli_init(struct ggn_stimuli *out, const struct ggn_seq_block *block, int reference_independent, struct base_err *err)
+int ggn_stimuli_init(struct ggn_stimuli *out, const struct seq_block *block, int reference_independent, struct base_err *err)
 {
     size_t pixels = (size_t)block->width * block->height;
     struct ggn_stimuli s = {.block = block, .recorded = block->reference ? (int)block->n_levels : 0};
@@ -114,7 +114,7 @@ int ggn_stimuli_init(struct ggn_stimuli *out, const struct ggn_seq_block *block,
 
 int ggn_stimuli_make(struct ggn_stimuli *s, int level, uint8_t *test, struct base_err *err)
 {
-    const struct ggn_seq_block *b = s->block;
+    const struct seq_block *b = s->block;
     size_t pixels = (size_t)b->width * b->height;
     if (level >= s->recorded) {
         float scale = (float)sqrt(s->spp0 / s->spp[level]);
@@ -123,16 +123,16 @@ int ggn_stimuli_make(struct ggn_stimuli *s, int level, uint8_t *test, struct bas
         encode(s->work, pixels, test);
         return 0;
     }
-    const struct ggn_seq_record *r = &b->levels[level];
-    if (s->scale && (ggn_seq_has(r, GGN_PLANE_MEAN_F16) || ggn_seq_has(r, GGN_PLANE_FINE))) {
+    const struct seq_record *r = &b->levels[level];
+    if (s->scale && (seq_has(r, SEQ_PLANE_MEAN_F16) || seq_has(r, SEQ_PLANE_FINE))) {
         float scale = (float)sqrt((double)b->reference->spp / ((double)b->reference->spp + r->spp));
-        int rc = ggn_seq_mean(b, r, s->work, err);
+        int rc = seq_mean(b, r, s->work, err);
         if (rc)
             return rc;
         for (size_t i = 0; i < 3 * pixels; i++)
             s->work[i] = s->base[i] + scale * (s->work[i] - s->base[i]);
     } else {
-        return ggn_seq_display(b, r, test, err);
+        return seq_display(b, r, test, err);
     }
     encode(s->work, pixels, test);
     return 0;

@@ -13,12 +13,12 @@
 #include <stdint.h>
 
 #include "base/err.h"
-#include "data/sequence.h"
+#include "sequence/block.h"
 
 enum { GGN_SIMULATED_CAP = 10000 }; /* the last sample count that is simulated */
 
 struct ggn_stimuli {
-    const struct ggn_seq_block *block; /* borrows */
+    const struct seq_block *block; /* borrows */
     int recorded;                      /* the first so many are recorded levels, the others simulated */
     int scale;                         /* whether the difference to the reference is scaled */
     double spp0;                       /* of the difference */
@@ -27,7 +27,7 @@ struct ggn_stimuli {
     float *base, *difference, *work; /* own; [3][P]; linear */
     uint8_t *converged;              /* owns; [P][3] */
 };
-int ggn_stimuli_init(struct ggn_stimuli *s, const struct ggn_seq_block *block, int reference_independent, struct base_err *err);
+int ggn_stimuli_init(struct ggn_stimuli *s, const struct seq_block *block, int reference_independent, struct base_err *err);
 void ggn_stimuli_release(struct ggn_stimuli *s);
 /* test: [P][3], the picture at spp[i]. */
 int ggn_stimuli_make(struct ggn_stimuli *s, int i, uint8_t *test, struct base_err *err);

@@ -1,5 +1,5 @@
 /*
- * Records a view as a block sequence (ggn/data/FORMAT.md): block after block, each at rising sample counts, with a reference
+ * Records a view as a block sequence (plugin-api/sequence/FORMAT.md): block after block, each at rising sample counts, with a reference
  * of independent samples. A finished block is one file plus its line in the manifest; running again goes on after the last
  * finished block and refuses a folder that was begun with other settings.
  */

@@ -30,20 +30,26 @@ float base_bf16_to_f32(uint16_t x)
     return float_of((uint32_t)x << 16);
 }
 
+uint16_t base_f64_to_f16(double x)
+{
+    uint16_t sign = signbit(x) ? 0x8000 : 0;
+    double a = fabs(x);
+    int exponent;
+
+    if (isnan(x))
+        return sign | 0x7e00;
+    if (a >= 65520.0)
+        return sign | 0x7c00;
+    frexp(a, &exponent); /* a = m 2^exponent, m in [1/2, 1) */
+    if (a < 0x1p-14)
+        exponent = -13; /* subnormal: steps of 2^-24 */
+    /* nearbyint rounds to even; a carry out of the mantissa runs into the exponent as it should */
+    return (uint16_t)(sign | ((exponent + 13) * 1024 + (int)nearbyint(ldexp(a, 11 - exponent))));
+}
+
 uint16_t base_f32_to_f16(float x)
 {
-    uint32_t u = bits_of(x), sign = u >> 16 & 0x8000, a = u & 0x7fffffff;
-
-    if (a > 0x7f800000u)
-        return (uint16_t)(sign | 0x7e00);
-    if (a >= 0x477ff000u) /* 65520 and more round to infinity */
-        return (uint16_t)(sign | 0x7c00);
-    if (a < 0x38800000u) { /* subnormal: units of 2^-24 */
-        float scaled = float_of(a) * 16777216.0f;
-        return (uint16_t)(sign | (uint32_t)lrintf(scaled));
-    }
-    a += 0xfff + (a >> 13 & 1);
-    return (uint16_t)(sign | (a - 0x38000000u) >> 13);
+    return base_f64_to_f16((double)x);
 }
 
 float base_f16_to_f32(uint16_t x)

@@ -8,6 +8,7 @@
 uint16_t base_f32_to_bf16(float x);
 float base_bf16_to_f32(uint16_t x);
 uint16_t base_f32_to_f16(float x);
+uint16_t base_f64_to_f16(double x); /* rounded once */
 float base_f16_to_f32(uint16_t x);
 
 #endif

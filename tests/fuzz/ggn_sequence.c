@@ -5,8 +5,8 @@
 
 #include <zlib.h>
 
-#include "data/manifest.h"
-#include "data/sequence.h"
+#include "sequence/manifest.h"
+#include "sequence/block.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
@@ -37,19 +37,19 @@ static void mend(uint8_t *p, size_t size)
     }
 }
 
-static void decode(const struct ggn_seq_block *b, const struct ggn_seq_record *r, uint8_t *bytes, float *floats)
+static void decode(const struct seq_block *b, const struct seq_record *r, uint8_t *bytes, float *floats)
 {
-    ggn_seq_display(b, r, bytes, NULL);
-    ggn_seq_display_planar(b, r, bytes, NULL);
-    ggn_seq_mean(b, r, floats, NULL);
-    ggn_seq_half(b, r, floats, NULL);
-    ggn_seq_half_luminance(b, r, floats, NULL);
-    ggn_seq_stat(r, "seconds");
+    seq_display(b, r, bytes, NULL);
+    seq_display_planar(b, r, bytes, NULL);
+    seq_mean(b, r, floats, NULL);
+    seq_half(b, r, floats, NULL);
+    seq_half_luminance(b, r, floats, NULL);
+    seq_stat(r, "seconds");
 }
 
 static void try_block(const uint8_t *data, size_t size, int mended)
 {
-    struct ggn_seq_block b;
+    struct seq_block b;
     struct base_err err = {0};
     uint8_t *copy = malloc(size > 0 ? size : 1);
     if (!copy)
@@ -57,7 +57,7 @@ static void try_block(const uint8_t *data, size_t size, int mended)
     memcpy(copy, data, size);
     if (mended)
         mend(copy, size);
-    if (ggn_seq_block_parse("fuzz", copy, size, &b, &err) != 0) {
+    if (seq_block_parse("fuzz", copy, size, &b, &err) != 0) {
         if (err.text[0] == '\0')
             abort();
         free(copy);
@@ -74,15 +74,15 @@ static void try_block(const uint8_t *data, size_t size, int mended)
         free(floats);
         free(bytes);
     }
-    ggn_seq_block_release(&b);
+    seq_block_release(&b);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    struct ggn_manifest m;
+    struct seq_manifest m;
     if (size > 0 && data[0] == '{') {
-        if (ggn_manifest_parse("fuzz", (const char *)data, size, &m, NULL) == 0)
-            ggn_manifest_release(&m);
+        if (seq_manifest_parse("fuzz", (const char *)data, size, &m, NULL) == 0)
+            seq_manifest_release(&m);
         return 0;
     }
     try_block(data, size, 0);

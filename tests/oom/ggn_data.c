@@ -1,5 +1,6 @@
 /* Every allocation of reading and writing data, of FLIP, the observer and the statistics fails once: an error, no crash, no leak, and never a file that
  * lacks something. */
+#include "sequence/builder.h"
 #include "support/ggn_cmocka.h"
 
 #include <math.h>
@@ -10,7 +11,7 @@
 #include <unistd.h>
 
 #include "data/labels.h"
-#include "data/manifest.h"
+#include "sequence/manifest.h"
 #include "data/rawls.h"
 #include "data/thresholds.h"
 #include "figures/stats.h"
@@ -23,14 +24,14 @@ enum { W = 12, H = 10, P = W * H };
 static char dir[] = "/tmp/ggn_oom_data.XXXXXX";
 static char block_path[64];
 static uint8_t display[3 * P], other[3 * P];
-static float mean[3 * P], half[3 * P];
+static double mean[3 * P], half[3 * P];
 
 static int setup(void **state)
 {
     (void)state;
     for (int i = 0; i < 3 * P; i++) {
-        mean[i] = 0.3f + 0.001f * (float)(i % 200);
-        half[i] = 0.02f * (float)(i % 7 - 3);
+        mean[i] = 0.3 + 0.001 * (i % 200);
+        half[i] = 0.02 * (i % 7 - 3);
         display[i] = (uint8_t)(120 + i % 9);
         other[i] = (uint8_t)(118 + i % 13);
     }
@@ -50,50 +51,50 @@ static int teardown(void **state)
 
 static int write_block(struct base_err *err)
 {
-    struct ggn_seq_builder w = {0};
+    struct seq_builder w = {0};
     uint32_t crc;
-    int rc = ggn_seq_builder_init(&w, W, H, 0, 0, 0, 1, err);
+    int rc = seq_builder_init(&w, W, H, 0, 0, 0, 1, err);
     for (uint32_t i = 0; i < 3 && !rc; i++) {
-        struct ggn_seq_frame f = {.spp = 100u << i, .half_spp = 50, .is_reference = i == 2, .full = i == 1, .display = display, .mean = mean, .half = half};
-        rc = ggn_seq_builder_add(&w, &f, err);
+        struct seq_frame f = {.spp = 100u << i, .half_spp = 50, .is_reference = i == 2, .full = i == 1, .display = display, .mean = mean, .half = half};
+        rc = seq_builder_add(&w, &f, err);
     }
     if (!rc)
-        rc = ggn_seq_builder_write(&w, block_path, &crc, err);
-    ggn_seq_builder_release(&w);
+        rc = seq_builder_write(&w, block_path, &crc, err);
+    seq_builder_release(&w);
     return rc;
 }
 
 static int read_block(struct base_err *err)
 {
-    struct ggn_seq_block b;
+    struct seq_block b;
     static float out[3 * P];
     static uint8_t bytes[3 * P];
-    int rc = ggn_seq_block_read(block_path, &b, err);
+    int rc = seq_block_read(block_path, &b, err);
     if (rc)
         return rc;
     for (uint32_t i = 0; i < b.n_levels && !rc; i++)
-        rc = ggn_seq_mean(&b, &b.levels[i], out, err);
+        rc = seq_mean(&b, &b.levels[i], out, err);
     if (!rc)
-        rc = ggn_seq_half_luminance(&b, &b.levels[1], out, err);
+        rc = seq_half_luminance(&b, &b.levels[1], out, err);
     if (!rc)
-        rc = ggn_seq_display(&b, b.reference, bytes, err);
-    ggn_seq_block_release(&b);
+        rc = seq_display(&b, b.reference, bytes, err);
+    seq_block_release(&b);
     return rc;
 }
 
 static int texts(struct base_err *err)
 {
     uint32_t levels[] = {100, 200};
-    struct ggn_manifest_block entries[] = {{.id = 0, .x1 = W, .y1 = H, .file = "block-00000.lseq", .bytes = 10}, {.id = 1, .x0 = W, .x1 = 2 * W, .y1 = H, .file = "b", .bytes = 10}};
+    struct seq_manifest_block entries[] = {{.id = 0, .x1 = W, .y1 = H, .file = "block-00000.lseq", .bytes = 10}, {.id = 1, .x0 = W, .x1 = 2 * W, .y1 = H, .file = "b", .bytes = 10}};
     struct ggn_label list[] = {{0, 120, 0}, {1, 200, 1}};
-    struct ggn_manifest m = {.scene = "s", .width = 2 * W, .height = H, .block = W, .n_levels = 2, .levels = levels, .n_blocks = 2, .blocks = entries}, m2;
+    struct seq_manifest m = {.scene = "s", .width = 2 * W, .height = H, .block = W, .n_levels = 2, .levels = levels, .n_blocks = 2, .blocks = entries}, m2;
     struct ggn_labels l = {.source = "observer", .cap = 200, .spread = 0.25, .n = 2, .labels = list}, l2;
-    int rc = ggn_manifest_write(dir, &m, err);
+    int rc = seq_manifest_write(dir, &m, err);
     if (!rc)
         rc = ggn_labels_write(dir, &l, err);
-    if (!rc && (rc = ggn_manifest_read(dir, &m2, err)) == 0) {
+    if (!rc && (rc = seq_manifest_read(dir, &m2, err)) == 0) {
         assert_true(m2.n_blocks == 2 && m2.n_levels == 2); /* what was written is whole */
-        ggn_manifest_release(&m2);
+        seq_manifest_release(&m2);
     }
     if (!rc && (rc = ggn_labels_read(dir, &l2, err)) == 0) {
         assert_true(l2.n == 2 && l2.labels[1].censored && l2.cap == 200);
@@ -124,11 +125,11 @@ static int tables(struct base_err *err)
 static int look(struct base_err *err)
 {
     struct ggn_flip_stats flip;
-    struct ggn_seq_block b;
+    struct seq_block b;
     struct ggn_curve curve;
     int rc = ggn_flip(display, other, W, H, GGN_FLIP_PPD, NULL, &flip, err);
     if (!rc)
-        rc = ggn_seq_block_read(block_path, &b, err);
+        rc = seq_block_read(block_path, &b, err);
     if (rc)
         return rc;
     for (int source = GGN_FROM_HALVES; source <= GGN_FROM_LEVELS && !rc; source++) {
@@ -136,7 +137,7 @@ static int look(struct base_err *err)
         if (!rc)
             ggn_curve_release(&curve);
     }
-    ggn_seq_block_release(&b);
+    seq_block_release(&b);
     return rc;
 }
 

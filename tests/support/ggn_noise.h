@@ -7,7 +7,7 @@
 
 #include <stdint.h>
 
-#include "data/sequence.h"
+#include "sequence/block.h"
 
 struct ggn_noise {
     uint32_t width, height;
@@ -21,7 +21,7 @@ uint32_t ggn_noise_hash(uint32_t k, uint32_t s);
 double ggn_noise_gauss(uint32_t k, uint32_t s);
 
 /* Builds the block; the caller releases. Fails the running test when it cannot. */
-struct ggn_seq_block ggn_noise_block(const struct ggn_noise *noise);
+struct seq_block ggn_noise_block(const struct ggn_noise *noise);
 
 /* Writes DIR (made if missing) with one block per sigma[i], in a row, and labels where noise of sigma^2 stops being visible:
  * threshold = samples_per_variance * sigma^2, censored at the last level. */

@@ -10,7 +10,8 @@
 #include "base/files.h"
 #include "data/image.h"
 #include "data/labels.h"
-#include "data/manifest.h"
+#include "sequence/builder.h"
+#include "sequence/manifest.h"
 #include "model/preprocess.h"
 #include "nn/hash.h"
 
@@ -26,25 +27,28 @@ struct pixels {
     size_t n;               /* 3·side² */
     float *clean, *sigma;   /* linear; standard deviation of one sample */
     float *sum, *half;      /* of the samples so far, of the first half of each step */
-    float *mean, *difference;
+    double *mean, *difference;
     uint8_t *display;
 };
 
 static int pixels_init(struct pixels *p, int side)
 {
-    float **const parts[] = {&p->clean, &p->sigma, &p->sum, &p->half, &p->mean, &p->difference};
+    float **const parts[] = {&p->clean, &p->sigma, &p->sum, &p->half};
 
     p->n = 3 * (size_t)side * (size_t)side;
-    float *all = calloc(6 * p->n, sizeof *all);
+    float *all = calloc(4 * p->n, sizeof *all);
+    p->mean = calloc(2 * p->n, sizeof *p->mean);
+    p->difference = p->mean ? p->mean + p->n : NULL;
     p->display = malloc(p->n);
-    for (size_t i = 0; i < 6; i++)
+    for (size_t i = 0; i < 4; i++)
         *parts[i] = all ? all + i * p->n : NULL;
-    return all && p->display;
+    return all && p->mean && p->display;
 }
 
 static void pixels_release(struct pixels *p)
 {
     free(p->clean);
+    free(p->mean);
     free(p->display);
 }
 
@@ -95,9 +99,9 @@ static void accumulate(struct pixels *p, double count, uint32_t seed)
 static void develop(struct pixels *p, double spp)
 {
     for (size_t i = 0; i < p->n; i++) {
-        p->mean[i] = (float)((double)p->sum[i] / spp);
-        p->difference[i] = (float)((double)p->half[i] / (0.5 * spp) - (double)p->mean[i]);
-        p->display[i] = ggn_preprocess((double)p->mean[i], NULL, NULL);
+        p->mean[i] = (double)p->sum[i] / spp;
+        p->difference[i] = (double)p->half[i] / (0.5 * spp) - p->mean[i];
+        p->display[i] = ggn_preprocess(p->mean[i], NULL, NULL);
     }
 }
 
@@ -113,49 +117,49 @@ static double threshold_of(const struct seqgen *g, const struct pixels *p)
     return fmax(sum / (double)p->n / (g->tau * g->tau), 1);
 }
 
-static int write_block(const struct seqgen *g, struct pixels *p, const char *dir, int scene, int block, struct ggn_manifest_block *b,
+static int write_block(const struct seqgen *g, struct pixels *p, const char *dir, int scene, int block, struct seq_manifest_block *b,
                        const uint32_t *levels, struct base_err *err)
 {
-    struct ggn_seq_builder w;
+    struct seq_builder w;
     char path[4200];
     uint32_t seed = ggn_hash((uint32_t)(1000 * scene + block), g->seed + 1), done = 0;
-    int full = 0, rc = ggn_seq_builder_init(&w, (uint32_t)g->side, (uint32_t)g->side, block * g->side, 0, (uint32_t)block, g->seed, err);
+    int full = 0, rc = seq_builder_init(&w, (uint32_t)g->side, (uint32_t)g->side, block * g->side, 0, (uint32_t)block, g->seed, err);
 
     for (int i = 0; !rc && i < g->levels; i++) {
         accumulate(p, levels[i] - done, ggn_hash((uint32_t)i, seed));
         done = levels[i];
         develop(p, done);
         int is_full = !full && (done >= 320 || i == g->levels - 1);
-        struct ggn_seq_frame frame = {.spp = done, .half_spp = done / 2, .full = is_full, .display = p->display,
+        struct seq_frame frame = {.spp = done, .half_spp = done / 2, .full = is_full, .display = p->display,
                                       .mean = is_full ? p->mean : NULL, .half = is_full ? p->difference : NULL};
         full |= is_full;
-        rc = ggn_seq_builder_add(&w, &frame, err);
+        rc = seq_builder_add(&w, &frame, err);
     }
     if (!rc && g->reference_spp) {
         memset(p->sum, 0, p->n * sizeof *p->sum);
         memset(p->half, 0, p->n * sizeof *p->half);
         accumulate(p, g->reference_spp, ggn_hash(99, seed));
         develop(p, g->reference_spp);
-        struct ggn_seq_frame frame = {.spp = g->reference_spp, .is_reference = 1, .full = 1, .display = p->display, .mean = p->mean};
-        rc = ggn_seq_builder_add(&w, &frame, err);
+        struct seq_frame frame = {.spp = g->reference_spp, .is_reference = 1, .full = 1, .display = p->display, .mean = p->mean};
+        rc = seq_builder_add(&w, &frame, err);
     }
-    *b = (struct ggn_manifest_block){.id = (uint32_t)block, .x0 = (uint32_t)(block * g->side), .x1 = (uint32_t)((block + 1) * g->side),
+    *b = (struct seq_manifest_block){.id = (uint32_t)block, .x0 = (uint32_t)(block * g->side), .x1 = (uint32_t)((block + 1) * g->side),
                                      .y1 = (uint32_t)g->side, .bytes = w.size};
     snprintf(b->file, sizeof b->file, "block-%05d.lseq", block);
     snprintf(path, sizeof path, "%s/%s", dir, b->file);
     if (!rc)
-        rc = ggn_seq_builder_write(&w, path, &b->crc32, err);
+        rc = seq_builder_write(&w, path, &b->crc32, err);
     b->bytes = w.size;
-    ggn_seq_builder_release(&w);
+    seq_builder_release(&w);
     return rc;
 }
 
 static int write_scene(const struct seqgen *g, struct pixels *p, const char *dir, int scene, struct base_err *err)
 {
     uint32_t levels[MAX_LEVELS];
-    struct ggn_manifest_block blocks[64];
+    struct seq_manifest_block blocks[64];
     struct ggn_label label[64];
-    struct ggn_manifest m = {.width = (uint32_t)(g->side * g->blocks), .height = (uint32_t)g->side, .block = (uint32_t)g->side,
+    struct seq_manifest m = {.width = (uint32_t)(g->side * g->blocks), .height = (uint32_t)g->side, .block = (uint32_t)g->side,
                              .seed = g->seed, .reference_seed = g->seed + 1, .reference_spp = g->reference_spp,
                              .reference_independent = 1, .n_levels = (uint32_t)g->levels, .n_blocks = (uint32_t)g->blocks,
                              .levels = levels, .blocks = blocks};
@@ -178,7 +182,7 @@ static int write_scene(const struct seqgen *g, struct pixels *p, const char *dir
     labels.cap = levels[g->levels - 1];
     if (!rc)
         rc = ggn_labels_write(dir, &labels, err);
-    return rc ? rc : ggn_manifest_write(dir, &m, err);
+    return rc ? rc : seq_manifest_write(dir, &m, err);
 }
 
 int seqgen_write(const char *dir, const struct seqgen *g, struct base_err *err)

@@ -1,6 +1,6 @@
 /*
  * A small data set made from nothing: textured blocks with noise that shrinks like that of a path tracer, in the form of
- * ggn/data/FORMAT.md, labelled by a known rule. Same options, same bytes.
+ * plugin-api/sequence/FORMAT.md, labelled by a known rule. Same options, same bytes.
  *
  * `make train-demo` learns from one that is kept in tests/data/train-demo (see tests/unit/ggn_train.c, --write-demo).
  */

@@ -77,11 +77,11 @@ static void add_view(const char *name, const char *scene)
 {
     char dir[256];
     uint32_t level = 20;
-    struct ggn_manifest m = {.width = 8, .height = 8, .block = 8, .n_levels = 1, .levels = &level, .reference_independent = 1};
+    struct seq_manifest m = {.width = 8, .height = 8, .block = 8, .n_levels = 1, .levels = &level, .reference_independent = 1};
     snprintf(m.scene, sizeof m.scene, "%s", scene);
     snprintf(dir, sizeof dir, "%s/%s", root, name);
     mkdir(dir, 0777);
-    assert_int_equal(ggn_manifest_write(dir, &m, NULL), 0);
+    assert_int_equal(seq_manifest_write(dir, &m, NULL), 0);
 }
 
 static void write_split(const char *text)

@@ -75,7 +75,7 @@ static void layout(void **state)
     char text[] = "p3d_toy-view2_part6;40;60;100;90;\n", out[600];
     struct ggn_thresholds t;
     struct ggn_dataset d;
-    struct ggn_seq_block b;
+    struct seq_block b;
     struct base_err err = {0};
     static uint8_t rgb[3 * BLOCK * BLOCK];
     int labelled = 0;
@@ -101,17 +101,17 @@ static void layout(void **state)
     assert_true(l->threshold == 100 && l->censored); /* the cap is the last level */
     assert_int_equal(ggn_labels_find(&d.views[0].labels, 1)->censored, 0);
     for (uint32_t i = 0; i < 4; i++) { /* row-major blocks, the right pixels at each level */
-        if (ggn_manifest_read_block(d.views[0].dir, &d.views[0].manifest, i, &b, &err) != 0)
+        if (seq_manifest_read_block(d.views[0].dir, &d.views[0].manifest, i, &b, &err) != 0)
             fail_msg("%s", err.text);
         assert_int_equal(b.n_levels, LEVELS);
         assert_true(b.id == i && b.x0 == (int)(i % 2) * BLOCK && b.y0 == (int)(i / 2) * BLOCK);
         for (uint32_t k = 0; k <= LEVELS; k++) {
-            const struct ggn_seq_record *r = k < LEVELS ? &b.levels[k] : b.reference;
-            assert_int_equal(ggn_seq_display(&b, r, rgb, &err), 0);
+            const struct seq_record *r = k < LEVELS ? &b.levels[k] : b.reference;
+            assert_int_equal(seq_display(&b, r, rgb, &err), 0);
             for (int p = 0; p < BLOCK * BLOCK * 3; p++)
                 assert_int_equal(rgb[p], value_at((int)r->spp, b.x0 + p / 3 % BLOCK, b.y0 + p / 3 / BLOCK, p % 3));
         }
-        ggn_seq_block_release(&b);
+        seq_block_release(&b);
     }
     ggn_dataset_release(&d);
     ggn_thresholds_release(&t);
@@ -121,7 +121,7 @@ static void resume(void **state)
 {
     (void)state;
     char dir[600], out[600], path[700];
-    struct ggn_manifest m;
+    struct seq_manifest m;
     struct base_err err = {0};
     struct stat before, after;
     int labelled;
@@ -129,17 +129,17 @@ static void resume(void **state)
     snprintf(out, sizeof out, "%s/out/toy", root);
     snprintf(path, sizeof path, "%s/block-00000.lseq", out);
     stat(path, &before);
-    ggn_manifest_read(out, &m, NULL);
+    seq_manifest_read(out, &m, NULL);
     m.n_blocks = 3; /* as if the run had stopped inside the second row */
-    ggn_manifest_write(out, &m, NULL);
-    ggn_manifest_release(&m);
+    seq_manifest_write(out, &m, NULL);
+    seq_manifest_release(&m);
     if (ggn_sin3d_import_view(dir, out, &plain, &labelled, &err) != 0)
         fail_msg("%s", err.text);
     stat(path, &after);
     assert_true(before.st_ino == after.st_ino); /* the first row was not written again */
-    ggn_manifest_read(out, &m, NULL);
+    seq_manifest_read(out, &m, NULL);
     assert_int_equal(m.n_blocks, 4);
-    ggn_manifest_release(&m);
+    seq_manifest_release(&m);
     struct ggn_sin3d_options other = plain;
     other.block = SIDE;
     assert_int_equal(ggn_sin3d_import_view(dir, out, &other, &labelled, &err), BASE_EINVAL);
@@ -261,8 +261,8 @@ static void rawls_layout(void **state)
     (void)state;
     char dir[600], out[600], path[700], file[4096];
     static float v[SIDE * SIDE * 3], back[3 * BLOCK * BLOCK];
-    struct ggn_manifest m;
-    struct ggn_seq_block b;
+    struct seq_manifest m;
+    struct seq_block b;
     struct base_err err = {0};
     int labelled;
     snprintf(dir, sizeof dir, "%s/float", root);
@@ -277,13 +277,13 @@ static void rawls_layout(void **state)
         assert_int_equal(fwrite(file, 1, n, f), n);
         fclose(f);
     }
-    if (ggn_sin3d_import_view(dir, out, &plain, &labelled, &err) != 0 || ggn_manifest_read(out, &m, &err) != 0 ||
-        ggn_manifest_read_block(out, &m, 1, &b, &err) != 0)
+    if (ggn_sin3d_import_view(dir, out, &plain, &labelled, &err) != 0 || seq_manifest_read(out, &m, &err) != 0 ||
+        seq_manifest_read_block(out, &m, 1, &b, &err) != 0)
         fail_msg("%s", err.text);
-    assert_int_equal(ggn_seq_mean(&b, &b.levels[0], back, &err), 0);
+    assert_int_equal(seq_mean(&b, &b.levels[0], back, &err), 0);
     assert_near((double)back[0], (double)v[BLOCK * 3], 0.02 * (double)v[BLOCK * 3]);
-    ggn_seq_block_release(&b);
-    ggn_manifest_release(&m);
+    seq_block_release(&b);
+    seq_manifest_release(&m);
 }
 
 static void real_sequence(void **state)
@@ -296,7 +296,7 @@ static void real_sequence(void **state)
         skip();
     }
     /* Two of its levels: reading all twenty four times over takes too long for a unit test. */
-    struct ggn_manifest m;
+    struct seq_manifest m;
     struct base_err err = {0};
     int labelled;
     snprintf(copy, sizeof copy, "%s/real", root);
@@ -305,12 +305,12 @@ static void real_sequence(void **state)
     shell("cp %s/*_05000.png %s/", dir, copy);
     shell("cp %s/*_10000.png %s/", dir, copy);
     struct ggn_sin3d_options o = {.block = 200, .allow_gaps = 1};
-    if (ggn_sin3d_import_view(copy, out, &o, &labelled, &err) != 0 || ggn_manifest_read(out, &m, &err) != 0)
+    if (ggn_sin3d_import_view(copy, out, &o, &labelled, &err) != 0 || seq_manifest_read(out, &m, &err) != 0)
         fail_msg("%s", err.text);
     assert_int_equal(m.n_blocks, 16);
     assert_string_equal(m.scene, "p3d_cornel-box");
     assert_int_equal(m.levels[m.n_levels - 1], 10000);
-    ggn_manifest_release(&m);
+    seq_manifest_release(&m);
 }
 
 int main(void)

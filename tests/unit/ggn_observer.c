@@ -24,7 +24,7 @@ enum { W = 96, H = 80, P = W * H };
 static const uint32_t levels[] = {20, 30, 45, 68, 101, 152, 228, 342, 513, 769, 1153, 1730, 2595, 3892, 5839, 8758};
 enum { LEVELS = sizeof levels / sizeof levels[0] };
 
-static struct ggn_seq_block make_block(double sigma, double texture, uint32_t seed, uint32_t reference_spp)
+static struct seq_block make_block(double sigma, double texture, uint32_t seed, uint32_t reference_spp)
 {
     struct ggn_noise n = {W, H, levels, LEVELS, reference_spp, sigma, texture, seed};
     return ggn_noise_block(&n);
@@ -182,7 +182,7 @@ static void thresholds(void **state)
     assert_near(ggn_curve_at(&c, 283), sqrt(8.0), 3e-3);
 }
 
-static double threshold_of(const struct ggn_seq_block *b, const struct ggn_observer *o, enum ggn_curve_source source)
+static double threshold_of(const struct seq_block *b, const struct ggn_observer *o, enum ggn_curve_source source)
 {
     struct ggn_curve c;
     struct base_err err = {0};
@@ -203,17 +203,17 @@ static void scaling(void **state)
     double last = 0.0;
     for (int i = 0; i < 3; i++) {
         double sigma = 0.2 * pow(2.0, i);
-        struct ggn_seq_block b = make_block(sigma, 0.0, (uint32_t)i + 1, 4096);
+        struct seq_block b = make_block(sigma, 0.0, (uint32_t)i + 1, 4096);
         double recorded = threshold_of(&b, &o, GGN_FROM_LEVELS), halves = threshold_of(&b, &o, GGN_FROM_HALVES);
         assert_near(log2(halves / recorded), 0.0, 0.25); /* far above the limit, noise scatters into the texture of a smooth block */
         if (i > 0)
             assert_near(log2(recorded / last), 2.0, 0.2); /* twice the noise: four times the samples */
         last = recorded;
-        ggn_seq_block_release(&b);
+        seq_block_release(&b);
     }
-    struct ggn_seq_block busy = make_block(0.8, 0.1, 3, 4096);
+    struct seq_block busy = make_block(0.8, 0.1, 3, 4096);
     assert_true(threshold_of(&busy, &o, GGN_FROM_LEVELS) < 0.5 * last);
-    ggn_seq_block_release(&busy);
+    seq_block_release(&busy);
 }
 
 /* A reference of few samples must not raise the threshold: its own noise is taken out of the difference, and is no texture. */
@@ -221,12 +221,12 @@ static void noisy_reference(void **state)
 {
     (void)state;
     struct ggn_observer o = {0.25, 0.5, 0.4};
-    struct ggn_seq_block good = make_block(0.6, 0.0, 5, 1000000), poor = make_block(0.6, 0.0, 5, 1024);
+    struct seq_block good = make_block(0.6, 0.0, 5, 1000000), poor = make_block(0.6, 0.0, 5, 1024);
     double a = threshold_of(&good, &o, GGN_FROM_LEVELS), b = threshold_of(&poor, &o, GGN_FROM_LEVELS);
     assert_true(a > 1024);
     assert_near(log2(b / a), 0.0, 0.15);
-    ggn_seq_block_release(&good);
-    ggn_seq_block_release(&poor);
+    seq_block_release(&good);
+    seq_block_release(&poor);
 }
 
 /* Recorded to 342 spp only, a threshold beyond is found where the full recording puts it. */
@@ -235,12 +235,12 @@ static void beyond_the_last_level(void **state)
     (void)state;
     struct ggn_observer o = {0.35, 0.4, 0.4};
     struct ggn_noise n = {W, H, levels, LEVELS, 4096, 0.6, 0.0, 6}, few = {W, H, levels, 8, 4096, 0.6, 0.0, 6};
-    struct ggn_seq_block all = ggn_noise_block(&n), head = ggn_noise_block(&few);
+    struct seq_block all = ggn_noise_block(&n), head = ggn_noise_block(&few);
     double a = threshold_of(&all, &o, GGN_FROM_LEVELS), b = threshold_of(&head, &o, GGN_FROM_LEVELS);
     assert_true(a > 500);
     assert_near(log2(b / a), 0.0, 0.15);
-    ggn_seq_block_release(&all);
-    ggn_seq_block_release(&head);
+    seq_block_release(&all);
+    seq_block_release(&head);
 }
 
 static void needs(void **state)
@@ -248,16 +248,16 @@ static void needs(void **state)
     (void)state;
     struct ggn_curve c;
     struct base_err err = {0};
-    struct ggn_seq_block b = make_block(0.3, 0.0, 7, 0);
+    struct seq_block b = make_block(0.3, 0.0, 7, 0);
     assert_int_equal(ggn_curve_make(&b, GGN_FROM_LEVELS, 1, &c, &err), BASE_EINVAL);
     assert_non_null(strstr(err.text, "no reference"));
     for (uint32_t l = 0; l < b.n_levels; l++)
         for (uint32_t p = 0; p < b.levels[l].n_planes; p++)
-            if (b.levels[l].planes[p].plane == GGN_PLANE_HALF_F16)
+            if (b.levels[l].planes[p].plane == SEQ_PLANE_HALF_F16)
                 b.levels[l].n_planes = p;
     assert_int_equal(ggn_curve_make(&b, GGN_FROM_HALVES, 1, &c, &err), BASE_EINVAL);
     assert_non_null(strstr(err.text, "no full level"));
-    ggn_seq_block_release(&b);
+    seq_block_release(&b);
 }
 
 /* --- calibration --- */

@@ -78,7 +78,7 @@ static int by_value(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Against the definitions in ggn/data/FORMAT.md, by sorting. */
+/* Against the definitions in plugin-api/sequence/FORMAT.md, by sorting. */
 static void tail_statistics_match_their_definition(void **state)
 {
     enum { P = 40000 };

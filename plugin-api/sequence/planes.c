@@ -1,37 +1,38 @@
-#include "data/planes.h"
+#include "sequence/planes.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/colour.h"
+#include "base/half.h"
 
-size_t ggn_plane_raw_bytes(uint32_t plane, uint32_t width, uint32_t height)
+size_t seq_plane_raw_bytes(uint32_t plane, uint32_t width, uint32_t height)
 {
     size_t pixels = (size_t)width * height;
     switch (plane) {
-    case GGN_PLANE_DISPLAY:
-    case GGN_PLANE_FINE:
+    case SEQ_PLANE_DISPLAY:
+    case SEQ_PLANE_FINE:
         return 3 * pixels;
-    case GGN_PLANE_HALF_LOG:
+    case SEQ_PLANE_HALF_LOG:
         return pixels;
-    case GGN_PLANE_MEAN_F16:
-    case GGN_PLANE_HALF_F16:
+    case SEQ_PLANE_MEAN_F16:
+    case SEQ_PLANE_HALF_F16:
         return 6 * pixels;
     default:
         return 0;
     }
 }
 
-uint32_t ggn_plane_filters(uint32_t plane)
+uint32_t seq_plane_filters(uint32_t plane)
 {
     switch (plane) {
-    case GGN_PLANE_DISPLAY:
-    case GGN_PLANE_FINE:
-        return GGN_FILTER_AVERAGE | GGN_FILTER_GREEN;
-    case GGN_PLANE_MEAN_F16:
-    case GGN_PLANE_HALF_F16:
-        return GGN_FILTER_SHUFFLE;
+    case SEQ_PLANE_DISPLAY:
+    case SEQ_PLANE_FINE:
+        return SEQ_FILTER_AVERAGE | SEQ_FILTER_GREEN;
+    case SEQ_PLANE_MEAN_F16:
+    case SEQ_PLANE_HALF_F16:
+        return SEQ_FILTER_SHUFFLE;
     default:
         return 0;
     }
@@ -82,60 +83,40 @@ static void green(uint8_t *data, size_t pixels, int undo)
         }
 }
 
-int ggn_plane_unfilter(uint32_t plane, uint32_t filter, uint8_t *data, uint32_t width, uint32_t height, struct base_err *err)
+int seq_plane_unfilter(uint32_t plane, uint32_t filter, uint8_t *data, uint32_t width, uint32_t height,
+                       struct base_err *err)
 {
     size_t pixels = (size_t)width * height;
-    if ((filter & ~ggn_plane_filters(plane)) != 0)
+    if ((filter & ~seq_plane_filters(plane)) != 0)
         return base_fail(err, BASE_EINVAL, "filter %u does not fit plane %u", filter, plane);
-    if (filter & GGN_FILTER_SHUFFLE)
-        return shuffle(data, ggn_plane_raw_bytes(plane, width, height), 0, err);
-    if (filter & GGN_FILTER_AVERAGE)
+    if (filter & SEQ_FILTER_SHUFFLE)
+        return shuffle(data, seq_plane_raw_bytes(plane, width, height), 0, err);
+    if (filter & SEQ_FILTER_AVERAGE)
         for (size_t c = 0; c < 3; c++)
             average(data + c * pixels, width, height, 1);
-    if (filter & GGN_FILTER_GREEN)
+    if (filter & SEQ_FILTER_GREEN)
         green(data, pixels, 1);
     return 0;
 }
 
-int ggn_plane_filter(uint32_t plane, uint32_t filter, uint8_t *data, uint32_t width, uint32_t height, struct base_err *err)
+int seq_plane_filter(uint32_t plane, uint32_t filter, uint8_t *data, uint32_t width, uint32_t height, struct base_err *err)
 {
     size_t pixels = (size_t)width * height;
-    if ((filter & ~ggn_plane_filters(plane)) != 0)
+    if ((filter & ~seq_plane_filters(plane)) != 0)
         return base_fail(err, BASE_EINVAL, "filter %u does not fit plane %u", filter, plane);
-    if (filter & GGN_FILTER_SHUFFLE)
-        return shuffle(data, ggn_plane_raw_bytes(plane, width, height), 1, err);
-    if (filter & GGN_FILTER_GREEN)
+    if (filter & SEQ_FILTER_SHUFFLE)
+        return shuffle(data, seq_plane_raw_bytes(plane, width, height), 1, err);
+    if (filter & SEQ_FILTER_GREEN)
         green(data, pixels, 0);
-    if (filter & GGN_FILTER_AVERAGE)
+    if (filter & SEQ_FILTER_AVERAGE)
         for (size_t c = 0; c < 3; c++)
             average(data + c * pixels, width, height, 0);
     return 0;
 }
 
-float ggn_half_to_float(uint16_t half)
+uint16_t seq_half_float(double value)
 {
-    int exponent = half >> 10 & 31, mantissa = half & 1023;
-    double value = exponent == 0    ? ldexp(mantissa, -24)
-                   : exponent == 31 ? (mantissa == 0 ? (double)INFINITY : (double)NAN)
-                                    : ldexp(1024 + mantissa, exponent - 25);
-    return (float)(half & 0x8000 ? -value : value);
-}
-
-uint16_t ggn_half_from_float(float value)
-{
-    if (isnan(value))
-        return 0;
-    uint16_t sign = signbit(value) ? 0x8000 : 0;
-    double a = fabs((double)value);
-    if (a >= 65504.0)
-        return (uint16_t)(sign | 0x7bff);
-    if (a < ldexp(1.0, -14)) /* subnormal, or rounds up to the smallest normal, whose bits follow on */
-        return (uint16_t)(sign | (uint16_t)lrint(ldexp(a, 24)));
-    int exponent;
-    double fraction = frexp(a, &exponent); /* a = fraction 2^exponent, fraction in [1/2, 1) */
-    long mantissa = lrint(ldexp(fraction, 11)); /* 1024 .. 2048; 2048 carries into the exponent by itself */
-    long bits = ((long)(exponent + 13) << 10) + mantissa;
-    return (uint16_t)(sign | (uint16_t)(bits > 0x7bff ? 0x7bff : bits));
+    return isnan(value) ? 0 : base_f64_to_f16(fmin(fmax(value, -65504.0), 65504.0));
 }
 
 /* Linear bounds of the display codes: code d stands for [edge[d], edge[d+1]). */
@@ -144,7 +125,7 @@ static double code_edge(int d)
     return d <= 0 ? 0.0 : base_srgb_eotf((d - 0.5) / 255.0);
 }
 
-uint8_t ggn_fine_encode(uint8_t display, double x)
+uint8_t seq_fine_encode(uint8_t display, double x)
 {
     double lo = code_edge(display);
     if (display == 255) {
@@ -155,7 +136,7 @@ uint8_t ggn_fine_encode(uint8_t display, double x)
     return (uint8_t)(q > 0.0 ? (q < 7.0 ? q : 7.0) : 0.0);
 }
 
-double ggn_fine_decode(uint8_t display, uint8_t fine)
+double seq_fine_decode(uint8_t display, uint8_t fine)
 {
     double lo = code_edge(display);
     if (display == 255)
@@ -163,7 +144,7 @@ double ggn_fine_decode(uint8_t display, uint8_t fine)
     return lo + (fine + 0.5) / 8.0 * (code_edge(display + 1) - lo);
 }
 
-uint8_t ggn_halflog_encode(double value)
+uint8_t seq_half_log_encode(double value)
 {
     double a = fabs(value);
     if (!(a >= exp2(-19.875)))
@@ -172,7 +153,7 @@ uint8_t ggn_halflog_encode(double value)
     return (uint8_t)((m > 1.0 ? (m < 127.0 ? m : 127.0) : 1.0) + (value < 0.0 ? 128.0 : 0.0));
 }
 
-double ggn_halflog_decode(uint8_t code)
+double seq_half_log_decode(uint8_t code)
 {
     if ((code & 127) == 0)
         return 0.0;

@@ -1,0 +1,323 @@
+#include "sequence/block.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/bytes.h"
+#include "base/colour.h"
+#include "base/files.h"
+#include "base/half.h"
+#include "sequence/layout.h"
+
+enum { MAX_FILE = 1 << 30 };
+
+static int parse_stats(const char *path, const uint8_t *p, struct seq_record *r, struct base_err *err)
+{
+    for (uint32_t i = 0; i < r->n_stats; i++, p += SEQ_STAT_BYTES) {
+        struct seq_stat *s = &r->stats[i];
+        uint64_t bits = base_get_u64(p + SEQ_NAME);
+        memcpy(s->name, p, SEQ_NAME);
+        memcpy(&s->value, &bits, sizeof s->value);
+        if (!memchr(s->name, 0, SEQ_NAME) || !isfinite(s->value))
+            return base_fail(err, BASE_EINVAL, "%s: %u spp: statistic %u is not usable", path, r->spp, i);
+    }
+    return 0;
+}
+
+static int parse_planes(const char *path, const struct seq_block *b, const uint8_t *p, const uint8_t *end,
+                        struct seq_record *r, struct base_err *err)
+{
+    uint32_t seen = 0;
+    for (uint32_t i = 0; i < r->n_planes; i++) {
+        struct seq_plane *s = &r->planes[i];
+        if (end - p < SEQ_PLANE_HEADER)
+            return base_fail(err, BASE_EINVAL, "%s: %u spp: plane %u is cut short", path, r->spp, i);
+        *s = (struct seq_plane){.plane = base_get_u32(p), .filter = base_get_u32(p + 4), .raw_bytes = base_get_u32(p + 8),
+                                .stored_bytes = base_get_u32(p + 12), .stored = p + SEQ_PLANE_HEADER};
+        p += SEQ_PLANE_HEADER;
+        if ((size_t)(end - p) < s->stored_bytes)
+            return base_fail(err, BASE_EINVAL, "%s: %u spp: plane %u is cut short", path, r->spp, i);
+        p += s->stored_bytes;
+        size_t want = seq_plane_raw_bytes(s->plane, b->width, b->height);
+        if (want == 0)
+            continue;
+        if (s->raw_bytes != want || (s->filter & ~seq_plane_filters(s->plane)) != 0 || (seen & 1u << s->plane) != 0)
+            return base_fail(err, BASE_EINVAL, "%s: %u spp: plane %u has the wrong size, filter or number", path, r->spp, i);
+        seen |= 1u << s->plane;
+    }
+    if (p != end)
+        return base_fail(err, BASE_EINVAL, "%s: %u spp: bytes after the last plane", path, r->spp);
+    if ((seen & 1u << SEQ_PLANE_DISPLAY) == 0)
+        return base_fail(err, BASE_EINVAL, "%s: %u spp: no display image", path, r->spp);
+    return 0;
+}
+
+/* One record at *at, which is moved past it. */
+static int parse_record(const char *path, struct seq_block *b, uint32_t index, uint32_t count, size_t *at,
+                        struct base_err *err)
+{
+    const uint8_t *p = b->bytes + *at;
+    if (b->size - *at < SEQ_RECORD_HEADER)
+        return base_fail(err, BASE_EINVAL, "%s: truncated: %u of %u images", path, index, count);
+    uint32_t kind = base_get_u32(p), payload = base_get_u32(p + 20);
+    if (seq_crc(p, 28) != base_get_u32(p + 28))
+        return base_fail(err, BASE_EINVAL, "%s: header of image %u is damaged (CRC)", path, index);
+    if (b->size - *at - SEQ_RECORD_HEADER < payload)
+        return base_fail(err, BASE_EINVAL, "%s: truncated: %u of %u images", path, index, count);
+    struct seq_record *r = &b->levels[index];
+    *r = (struct seq_record){.spp = base_get_u32(p + 4), .half_spp = base_get_u32(p + 8), .n_stats = base_get_u32(p + 12),
+                             .n_planes = base_get_u32(p + 16)};
+    p += SEQ_RECORD_HEADER;
+    if (seq_crc(p, payload) != base_get_u32(p - 8))
+        return base_fail(err, BASE_EINVAL, "%s: image at %u spp is damaged (CRC)", path, r->spp);
+    if ((kind != SEQ_KIND_LEVEL && kind != SEQ_KIND_REFERENCE) || (kind == SEQ_KIND_REFERENCE && index + 1 != count) ||
+        r->spp == 0 ||
+        r->half_spp > r->spp || r->n_stats > SEQ_MAX_STATS || r->n_planes < 1 || r->n_planes > SEQ_MAX_PLANES ||
+        (size_t)r->n_stats * SEQ_STAT_BYTES > payload) {
+        r->n_stats = 0;
+        return base_fail(err, BASE_EINVAL, "%s: header of image %u makes no sense", path, index);
+    }
+    if (kind == SEQ_KIND_LEVEL && index > 0 && r->spp <= b->levels[index - 1].spp)
+        return base_fail(err, BASE_EINVAL, "%s: levels do not rise: %u spp after %u", path, r->spp,
+                         b->levels[index - 1].spp);
+    if (r->n_stats > 0) {
+        r->stats = malloc(r->n_stats * sizeof *r->stats);
+        if (!r->stats)
+            return base_fail_nomem(err, path);
+    }
+    int rc = parse_stats(path, p, r, err);
+    if (!rc)
+        rc = parse_planes(path, b, p + (size_t)r->n_stats * SEQ_STAT_BYTES, p + payload, r, err);
+    if (kind == SEQ_KIND_REFERENCE)
+        b->reference = r;
+    *at += SEQ_RECORD_HEADER + (size_t)payload;
+    return rc;
+}
+
+static int parse_header(const char *path, const uint8_t *p, size_t size, struct seq_block *b, uint32_t *count,
+                        struct base_err *err)
+{
+    if (size < SEQ_FILE_HEADER || memcmp(p, SEQ_MAGIC, 8) != 0)
+        return base_fail(err, BASE_EINVAL, "%s: not a block sequence", path);
+    if (base_get_u32(p + 8) != 1 || base_get_u32(p + 12) != SEQ_FILE_HEADER)
+        return base_fail(err, BASE_EINVAL, "%s: version %u of the format is not known", path, base_get_u32(p + 8));
+    if (seq_crc(p, 60) != base_get_u32(p + 60))
+        return base_fail(err, BASE_EINVAL, "%s: the header is damaged (CRC)", path);
+    *b = (struct seq_block){.width = base_get_u32(p + 16), .height = base_get_u32(p + 20),
+                            .x0 = (int32_t)base_get_u32(p + 24), .y0 = (int32_t)base_get_u32(p + 28),
+                            .id = base_get_u32(p + 32), .seed = base_get_u64(p + 40)};
+    *count = base_get_u32(p + 36);
+    if (b->width < 1 || b->width > SEQ_MAX_SIDE || b->height < 1 || b->height > SEQ_MAX_SIDE || *count < 1 ||
+        *count > SEQ_MAX_RECORDS)
+        return base_fail(err, BASE_EINVAL, "%s: a block of %ux%u pixels with %u images", path, b->width, b->height, *count);
+    /* Each image takes at least its header: a short file must not make a long table. */
+    if (*count > (size - SEQ_FILE_HEADER) / SEQ_RECORD_HEADER)
+        return base_fail(err, BASE_EINVAL, "%s: truncated: room for fewer than %u images", path, *count);
+    return 0;
+}
+
+int seq_block_parse(const char *path, uint8_t *bytes, size_t size, struct seq_block *block, struct base_err *err)
+{
+    struct seq_block b;
+    uint32_t count = 0;
+    int rc = parse_header(path, bytes, size, &b, &count, err);
+    if (rc)
+        return rc;
+    b.bytes = bytes;
+    b.size = size;
+    b.levels = calloc(count, sizeof *b.levels);
+    if (!b.levels)
+        return base_fail_nomem(err, path);
+    size_t at = SEQ_FILE_HEADER;
+    for (uint32_t i = 0; i < count && !rc; i++)
+        rc = parse_record(path, &b, i, count, &at, err);
+    b.n_levels = b.reference ? count - 1 : count;
+    if (!rc && at != size)
+        rc = base_fail(err, BASE_EINVAL, "%s: bytes after the last image", path);
+    if (!rc && b.n_levels == 0)
+        rc = base_fail(err, BASE_EINVAL, "%s: a reference but no level", path);
+    if (rc) {
+        b.bytes = NULL;
+        b.n_levels = count;
+        b.reference = NULL;
+        seq_block_release(&b);
+        return rc;
+    }
+    *block = b;
+    return 0;
+}
+
+int seq_block_read(const char *path, struct seq_block *block, struct base_err *err)
+{
+    char *bytes;
+    size_t size;
+    int rc = base_file_read(path, MAX_FILE, &bytes, &size, err);
+    if (rc)
+        return rc;
+    rc = seq_block_parse(path, (uint8_t *)bytes, size, block, err);
+    if (rc)
+        free(bytes);
+    return rc;
+}
+
+void seq_block_release(struct seq_block *block)
+{
+    uint32_t count = block->n_levels + (block->reference != NULL);
+    for (uint32_t i = 0; i < count; i++)
+        free(block->levels[i].stats);
+    free(block->levels);
+    free(block->bytes);
+    *block = (struct seq_block){0};
+}
+
+static const struct seq_plane *find_plane(const struct seq_record *r, enum seq_plane_number plane)
+{
+    for (uint32_t i = 0; i < r->n_planes; i++)
+        if (r->planes[i].plane == (uint32_t)plane)
+            return &r->planes[i];
+    return NULL;
+}
+
+int seq_has(const struct seq_record *r, enum seq_plane_number plane)
+{
+    return find_plane(r, plane) != NULL;
+}
+
+double seq_stat(const struct seq_record *r, const char *name)
+{
+    for (uint32_t i = 0; i < r->n_stats; i++)
+        if (strcmp(r->stats[i].name, name) == 0)
+            return r->stats[i].value;
+    return (double)NAN;
+}
+
+const struct seq_record *seq_level(const struct seq_block *b, uint32_t spp)
+{
+    for (uint32_t i = 0; i < b->n_levels; i++)
+        if (b->levels[i].spp == spp)
+            return &b->levels[i];
+    return NULL;
+}
+
+/* Inflates a plane and undoes its filters. raw has the plane's raw size. */
+static int load_plane(const struct seq_block *b, const struct seq_record *r, enum seq_plane_number plane,
+                      uint8_t *raw, struct base_err *err)
+{
+    const struct seq_plane *s = find_plane(r, plane);
+    if (!s)
+        return base_fail(err, BASE_EINVAL, "block %u at %u spp: plane %d is missing", b->id, r->spp, (int)plane);
+    uLongf got = s->raw_bytes;
+    uLong used = s->stored_bytes;
+    if (uncompress2(raw, &got, s->stored, &used) != Z_OK || got != s->raw_bytes || used != s->stored_bytes)
+        return base_fail(err, BASE_EINVAL, "block %u at %u spp: plane %d does not inflate", b->id, r->spp, (int)plane);
+    return seq_plane_unfilter(s->plane, s->filter, raw, b->width, b->height, err);
+}
+
+/* As load_plane, into memory of its own. NULL on failure. */
+static uint8_t *load_plane_new(const struct seq_block *b, const struct seq_record *r, enum seq_plane_number plane,
+                               int *rc, struct base_err *err)
+{
+    uint8_t *raw = malloc(seq_plane_raw_bytes((uint32_t)plane, b->width, b->height));
+    *rc = !raw ? base_fail_nomem(err, "plane") : load_plane(b, r, plane, raw, err);
+    if (!*rc)
+        return raw;
+    free(raw);
+    return NULL;
+}
+
+int seq_display_planar(const struct seq_block *b, const struct seq_record *r, uint8_t *rgb, struct base_err *err)
+{
+    return load_plane(b, r, SEQ_PLANE_DISPLAY, rgb, err);
+}
+
+int seq_display(const struct seq_block *b, const struct seq_record *r, uint8_t *rgb, struct base_err *err)
+{
+    int rc;
+    size_t pixels = (size_t)b->width * b->height;
+    uint8_t *planar = load_plane_new(b, r, SEQ_PLANE_DISPLAY, &rc, err);
+    if (!planar)
+        return rc;
+    for (size_t i = 0; i < pixels; i++)
+        for (size_t c = 0; c < 3; c++)
+            rgb[3 * i + c] = planar[c * pixels + i];
+    free(planar);
+    return 0;
+}
+
+static int load_f16(const struct seq_block *b, const struct seq_record *r, enum seq_plane_number plane,
+                    float *out, struct base_err *err)
+{
+    int rc;
+    size_t n = 3 * (size_t)b->width * b->height;
+    uint8_t *raw = load_plane_new(b, r, plane, &rc, err);
+    if (!raw)
+        return rc;
+    for (size_t i = 0; i < n && !rc; i++) {
+        out[i] = base_f16_to_f32((uint16_t)(raw[2 * i] | raw[2 * i + 1] << 8));
+        if (!isfinite(out[i]))
+            rc = base_fail(err, BASE_EINVAL, "block %u at %u spp: a pixel is not finite", b->id, r->spp);
+    }
+    free(raw);
+    return rc;
+}
+
+int seq_mean(const struct seq_block *b, const struct seq_record *r, float *rgb, struct base_err *err)
+{
+    int rc;
+    size_t n = 3 * (size_t)b->width * b->height;
+    if (seq_has(r, SEQ_PLANE_MEAN_F16))
+        return load_f16(b, r, SEQ_PLANE_MEAN_F16, rgb, err);
+    uint8_t *fine = NULL, *display = load_plane_new(b, r, SEQ_PLANE_DISPLAY, &rc, err);
+    if (!display)
+        return rc;
+    if (seq_has(r, SEQ_PLANE_FINE)) {
+        fine = load_plane_new(b, r, SEQ_PLANE_FINE, &rc, err);
+        if (!fine)
+            goto out;
+    }
+    float table[256][8];
+    for (int d = 0; d < 256; d++)
+        for (int q = 0; q < 8; q++)
+            table[d][q] = (float)(fine ? seq_fine_decode((uint8_t)d, (uint8_t)q) : base_srgb_eotf(d / 255.0));
+    for (size_t i = 0; i < n; i++) {
+        uint8_t q = fine ? fine[i] : 0;
+        rgb[i] = q < 8 ? table[display[i]][q] : (float)seq_fine_decode(display[i], q);
+    }
+out:
+    free(fine);
+    free(display);
+    return rc;
+}
+
+int seq_half(const struct seq_block *b, const struct seq_record *r, float *rgb, struct base_err *err)
+{
+    return load_f16(b, r, SEQ_PLANE_HALF_F16, rgb, err);
+}
+
+int seq_half_luminance(const struct seq_block *b, const struct seq_record *r, float *y, struct base_err *err)
+{
+    int rc;
+    size_t pixels = (size_t)b->width * b->height;
+    if (!seq_has(r, SEQ_PLANE_HALF_F16)) {
+        uint8_t *code = load_plane_new(b, r, SEQ_PLANE_HALF_LOG, &rc, err);
+        if (!code)
+            return rc;
+        float table[256];
+        for (int i = 0; i < 256; i++)
+            table[i] = (float)seq_half_log_decode((uint8_t)i);
+        for (size_t i = 0; i < pixels; i++)
+            y[i] = table[code[i]];
+        free(code);
+        return 0;
+    }
+    float *rgb = malloc(3 * pixels * sizeof *rgb);
+    if (!rgb)
+        return base_fail_nomem(err, "half buffer");
+    rc = load_f16(b, r, SEQ_PLANE_HALF_F16, rgb, err);
+    for (size_t i = 0; i < pixels && !rc; i++)
+        y[i] = (float)base_luminance((double)rgb[i], (double)rgb[pixels + i], (double)rgb[2 * pixels + i]);
+    free(rgb);
+    return rc;
+}
+

@@ -1,0 +1,329 @@
+#include "sequence/manifest.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cjson/cJSON.h>
+#include <zlib.h>
+
+#include "base/files.h"
+#include "base/json.h"
+
+enum { MAX_TEXT = 1 << 26, MAX_BLOCKS = 1 << 20, MAX_SPP = INT32_MAX };
+
+void seq_manifest_release(struct seq_manifest *m)
+{
+    free(m->levels);
+    free(m->blocks);
+    *m = (struct seq_manifest){0};
+}
+
+static void get_text(const cJSON *o, const char *name, char *out, size_t room)
+{
+    const cJSON *v = cJSON_GetObjectItemCaseSensitive(o, name);
+    if (cJSON_IsString(v))
+        snprintf(out, room, "%s", v->valuestring);
+}
+
+/* Eight hex digits. */
+static int get_crc(const cJSON *o, const char *name, uint32_t *crc)
+{
+    const cJSON *v = cJSON_GetObjectItemCaseSensitive(o, name);
+    unsigned value;
+    char after;
+    if (!cJSON_IsString(v) || sscanf(v->valuestring, "%8x%c", &value, &after) != 1)
+        return 0;
+    *crc = value;
+    return 1;
+}
+
+/* A whole number in [lo, hi]. */
+static int get_number(const cJSON *o, const char *name, double lo, double hi, double *out)
+{
+    const cJSON *v = cJSON_GetObjectItemCaseSensitive(o, name);
+    if (!cJSON_IsNumber(v) || !(v->valuedouble >= lo && v->valuedouble <= hi) || floor(v->valuedouble) != v->valuedouble)
+        return 0;
+    *out = v->valuedouble;
+    return 1;
+}
+
+static int get_levels(const char *path, const cJSON *root, struct seq_manifest *m, struct base_err *err)
+{
+    const cJSON *levels = cJSON_GetObjectItemCaseSensitive(root, "levels"), *v;
+    int n = cJSON_GetArraySize(levels);
+    if (!cJSON_IsArray(levels) || n < 1 || n > SEQ_MAX_RECORDS)
+        return base_fail(err, BASE_EINVAL, "%s: no list of levels", path);
+    m->levels = malloc((size_t)n * sizeof *m->levels);
+    if (!m->levels)
+        return base_fail_nomem(err, path);
+    cJSON_ArrayForEach(v, levels) {
+        if (!cJSON_IsNumber(v) || !(v->valuedouble >= 1 && v->valuedouble <= MAX_SPP) ||
+            (m->n_levels > 0 && v->valuedouble <= m->levels[m->n_levels - 1]))
+            return base_fail(err, BASE_EINVAL, "%s: level %u does not rise", path, m->n_levels);
+        m->levels[m->n_levels++] = (uint32_t)v->valuedouble;
+    }
+    return 0;
+}
+
+static int get_block(const cJSON *o, const struct seq_manifest *m, struct seq_manifest_block *b)
+{
+    const cJSON *file = cJSON_GetObjectItemCaseSensitive(o, "file");
+    const cJSON *seconds = cJSON_GetObjectItemCaseSensitive(o, "seconds");
+    double id, x0, y0, x1, y1, bytes;
+    uint32_t crc;
+    if (!get_number(o, "id", 0, UINT32_MAX, &id) || !get_number(o, "x0", 0, m->width - 1.0, &x0) ||
+        !get_number(o, "y0", 0, m->height - 1.0, &y0) || !get_number(o, "x1", x0 + 1, m->width, &x1) ||
+        !get_number(o, "y1", y0 + 1, m->height, &y1) || !get_number(o, "bytes", 1, 1 << 30, &bytes) ||
+        !get_crc(o, "crc32", &crc) || !cJSON_IsString(file) || strlen(file->valuestring) >= sizeof b->file ||
+        strchr(file->valuestring, '/') || file->valuestring[0] == '.' || file->valuestring[0] == '\0')
+        return 0;
+    *b = (struct seq_manifest_block){.id = (uint32_t)id, .x0 = (uint32_t)x0, .y0 = (uint32_t)y0, .x1 = (uint32_t)x1,
+                                     .y1 = (uint32_t)y1, .bytes = (uint64_t)bytes, .crc32 = crc,
+                                     .seconds = cJSON_IsNumber(seconds) ? seconds->valuedouble : 0.0};
+    strcpy(b->file, file->valuestring);
+    return 1;
+}
+
+static int get_blocks(const char *path, const cJSON *root, struct seq_manifest *m, struct base_err *err)
+{
+    const cJSON *blocks = cJSON_GetObjectItemCaseSensitive(root, "blocks"), *v;
+    int n = cJSON_GetArraySize(blocks);
+    if (!cJSON_IsArray(blocks) || n > MAX_BLOCKS)
+        return base_fail(err, BASE_EINVAL, "%s: no list of blocks", path);
+    m->blocks = malloc((n > 0 ? (size_t)n : 1) * sizeof *m->blocks);
+    if (!m->blocks)
+        return base_fail_nomem(err, path);
+    cJSON_ArrayForEach(v, blocks) {
+        if (!get_block(v, m, &m->blocks[m->n_blocks]))
+            return base_fail(err, BASE_EINVAL, "%s: entry %u of blocks is not usable", path, m->n_blocks);
+        for (uint32_t i = 0; i < m->n_blocks; i++)
+            if (m->blocks[i].id == m->blocks[m->n_blocks].id)
+                return base_fail(err, BASE_EINVAL, "%s: block %u is listed twice", path, m->blocks[i].id);
+        m->n_blocks++;
+    }
+    return 0;
+}
+
+/* The camera, where it is not the source's. */
+static int get_view(const char *path, const cJSON *root, struct seq_manifest *m, struct base_err *err)
+{
+    const cJSON *look_at = cJSON_GetObjectItemCaseSensitive(root, "look_at"), *v;
+    const cJSON *fov = cJSON_GetObjectItemCaseSensitive(root, "fov");
+    int n = 0;
+    if (look_at && (!cJSON_IsArray(look_at) || cJSON_GetArraySize(look_at) != 9))
+        return base_fail(err, BASE_EINVAL, "%s: look_at is not nine numbers", path);
+    cJSON_ArrayForEach(v, look_at) {
+        if (!cJSON_IsNumber(v))
+            return base_fail(err, BASE_EINVAL, "%s: look_at is not nine numbers", path);
+        m->look_at[n++] = v->valuedouble;
+    }
+    m->has_look_at = n > 0;
+    if (cJSON_IsNumber(fov))
+        m->fov_deg = fov->valuedouble;
+    return 0;
+}
+
+static int get_sizes(const char *path, const cJSON *root, struct seq_manifest *m, struct base_err *err)
+{
+    double width, height, block, spp = 0, seed = 0, reference_seed = 0;
+    if (!get_number(root, "width", 1, 1 << 20, &width) || !get_number(root, "height", 1, 1 << 20, &height) ||
+        !get_number(root, "block", 1, SEQ_MAX_SIDE, &block))
+        return base_fail(err, BASE_EINVAL, "%s: width, height or block is missing or out of range", path);
+    get_number(root, "reference_spp", 0, MAX_SPP, &spp);
+    get_number(root, "seed", 0, 9007199254740992.0, &seed);
+    get_number(root, "reference_seed", 0, 9007199254740992.0, &reference_seed);
+    m->width = (uint32_t)width;
+    m->height = (uint32_t)height;
+    m->block = (uint32_t)block;
+    m->reference_spp = (uint32_t)spp;
+    m->seed = (uint64_t)seed;
+    m->reference_seed = (uint64_t)reference_seed;
+    m->reference_independent = !cJSON_IsFalse(cJSON_GetObjectItemCaseSensitive(root, "reference_independent"));
+    return 0;
+}
+
+static int get_all(const char *path, const cJSON *root, struct seq_manifest *m, struct base_err *err)
+{
+    const cJSON *format = cJSON_GetObjectItemCaseSensitive(root, "format");
+    double version;
+    if (!cJSON_IsString(format) || strcmp(format->valuestring, "lull-sequence") != 0)
+        return base_fail(err, BASE_EINVAL, "%s: not the manifest of a sequence", path);
+    if (!get_number(root, "version", 1, 1, &version))
+        return base_fail(err, BASE_EINVAL, "%s: this version of the format is not known", path);
+    get_text(root, "scene", m->scene, sizeof m->scene);
+    get_text(root, "source", m->source, sizeof m->source);
+    get_text(root, "camera", m->camera, sizeof m->camera);
+    get_text(root, "renderer", m->renderer, sizeof m->renderer);
+    get_crc(root, "source_crc32", &m->source_crc32);
+    if (m->scene[0] == '\0')
+        return base_fail(err, BASE_EINVAL, "%s: the scene has no name", path);
+    int rc = get_sizes(path, root, m, err);
+    if (!rc)
+        rc = get_view(path, root, m, err);
+    if (!rc)
+        rc = get_levels(path, root, m, err);
+    return !rc ? get_blocks(path, root, m, err) : rc;
+}
+
+int seq_manifest_parse(const char *path, const char *text, size_t size, struct seq_manifest *out, struct base_err *err)
+{
+    struct seq_manifest m = {0};
+    cJSON *root = cJSON_ParseWithLength(text, size);
+    int rc = get_all(path, root, &m, err);
+    cJSON_Delete(root);
+    if (rc)
+        seq_manifest_release(&m);
+    else
+        *out = m;
+    return rc;
+}
+
+int seq_manifest_read(const char *dir, struct seq_manifest *m, struct base_err *err)
+{
+    char path[4096], *text;
+    size_t size;
+    int rc = base_file_join(path, dir, "manifest.json", err);
+    if (!rc)
+        rc = base_file_read(path, MAX_TEXT, &text, &size, err);
+    if (rc)
+        return rc;
+    rc = seq_manifest_parse(path, text, size, m, err);
+    free(text);
+    return rc;
+}
+
+/* --- writing --- */
+
+static void put_crc(cJSON *to, const char *name, uint32_t crc, int *failed)
+{
+    char text[16];
+    snprintf(text, sizeof text, "%08x", crc);
+    base_json_text(to, name, text, failed);
+}
+
+static void put_block(cJSON *blocks, const struct seq_manifest_block *b, int *failed)
+{
+    cJSON *o = base_json_object(blocks, NULL, failed);
+    base_json_number(o, "id", b->id, failed);
+    base_json_number(o, "x0", b->x0, failed);
+    base_json_number(o, "y0", b->y0, failed);
+    base_json_number(o, "x1", b->x1, failed);
+    base_json_number(o, "y1", b->y1, failed);
+    base_json_text(o, "file", b->file, failed);
+    base_json_number(o, "bytes", (double)b->bytes, failed);
+    put_crc(o, "crc32", b->crc32, failed);
+    if (b->seconds > 0)
+        base_json_number(o, "seconds", b->seconds, failed);
+}
+
+static void put_view(cJSON *root, const struct seq_manifest *m, int *failed)
+{
+    if (m->has_look_at) {
+        cJSON *look_at = base_json_array(root, "look_at", failed);
+        for (int i = 0; i < 9; i++)
+            base_json_number(look_at, NULL, m->look_at[i], failed);
+    }
+    if (m->fov_deg > 0)
+        base_json_number(root, "fov", m->fov_deg, failed);
+}
+
+static void put_all(cJSON *root, const struct seq_manifest *m, int *failed)
+{
+    base_json_text(root, "format", "lull-sequence", failed);
+    base_json_number(root, "version", 1, failed);
+    base_json_text(root, "scene", m->scene, failed);
+    base_json_text(root, "source", m->source, failed);
+    if (m->source_crc32)
+        put_crc(root, "source_crc32", m->source_crc32, failed);
+    base_json_text(root, "camera", m->camera, failed);
+    put_view(root, m, failed);
+    base_json_text(root, "renderer", m->renderer, failed);
+    base_json_number(root, "width", m->width, failed);
+    base_json_number(root, "height", m->height, failed);
+    base_json_number(root, "block", m->block, failed);
+    base_json_number(root, "seed", (double)m->seed, failed);
+    base_json_number(root, "reference_seed", (double)m->reference_seed, failed);
+    base_json_number(root, "reference_spp", m->reference_spp, failed);
+    if (!m->reference_independent)
+        base_json_bool(root, "reference_independent", 0, failed);
+    cJSON *levels = base_json_array(root, "levels", failed);
+    for (uint32_t i = 0; i < m->n_levels; i++)
+        base_json_number(levels, NULL, m->levels[i], failed);
+    cJSON *blocks = base_json_array(root, "blocks", failed);
+    for (uint32_t i = 0; i < m->n_blocks; i++)
+        put_block(blocks, &m->blocks[i], failed);
+}
+
+int seq_manifest_write(const char *dir, const struct seq_manifest *m, struct base_err *err)
+{
+    char path[4096];
+    int failed = 0, rc = base_file_join(path, dir, "manifest.json", err);
+    if (rc)
+        return rc;
+    cJSON *root = cJSON_CreateObject();
+    put_all(root, m, &failed);
+    rc = base_json_write(path, root, failed, err);
+    cJSON_Delete(root);
+    return rc;
+}
+
+const char *seq_manifest_difference(const struct seq_manifest *a, const struct seq_manifest *b)
+{
+    const struct {
+        const char *member;
+        int same;
+    } members[] = {
+        {"scene", !strcmp(a->scene, b->scene)},
+        {"source_crc32", a->source_crc32 == b->source_crc32},
+        {"camera", !strcmp(a->camera, b->camera)},
+        {"look_at", a->has_look_at == b->has_look_at && !memcmp(a->look_at, b->look_at, sizeof a->look_at)},
+        {"fov", a->fov_deg == b->fov_deg},
+        {"renderer", !strcmp(a->renderer, b->renderer)},
+        {"width", a->width == b->width},
+        {"height", a->height == b->height},
+        {"block", a->block == b->block},
+        {"seed", a->seed == b->seed},
+        {"reference_seed", a->reference_seed == b->reference_seed},
+        {"reference_spp", a->reference_spp == b->reference_spp},
+        {"reference_independent", a->reference_independent == b->reference_independent},
+        {"levels", a->n_levels == b->n_levels && !memcmp(a->levels, b->levels, a->n_levels * sizeof *a->levels)},
+    };
+    for (size_t i = 0; i < sizeof members / sizeof members[0]; i++)
+        if (!members[i].same)
+            return members[i].member;
+    return NULL;
+}
+
+/* --- blocks --- */
+
+int seq_manifest_read_block(const char *dir, const struct seq_manifest *m, uint32_t index, struct seq_block *block,
+                            struct base_err *err)
+{
+    const struct seq_manifest_block *e = &m->blocks[index];
+    struct seq_block b;
+    char path[4096];
+    int rc = base_file_join(path, dir, e->file, err);
+    if (!rc)
+        rc = seq_block_read(path, &b, err);
+    if (rc)
+        return rc;
+    if (b.size != e->bytes || (uint32_t)crc32_z(0, b.bytes, b.size) != e->crc32)
+        rc = base_fail(err, BASE_EINVAL, "%s: not the file that the manifest lists (size or CRC)", path);
+    else if (b.id != e->id || b.x0 != (int32_t)e->x0 || b.y0 != (int32_t)e->y0 || b.width != e->x1 - e->x0 ||
+             b.height != e->y1 - e->y0)
+        rc = base_fail(err, BASE_EINVAL, "%s: block %u is %ux%u at %d,%d, the manifest says otherwise", path, b.id, b.width,
+                       b.height, b.x0, b.y0);
+    else if (m->reference_spp > 0 && !b.reference)
+        rc = base_fail(err, BASE_EINVAL, "%s: the reference is missing", path);
+    for (uint32_t i = 0; i < m->n_levels && !rc; i++)
+        if (!seq_level(&b, m->levels[i]))
+            rc = base_fail(err, BASE_EINVAL, "%s: the level at %u spp is missing", path, m->levels[i]);
+    if (rc) {
+        seq_block_release(&b);
+        return rc;
+    }
+    *block = b;
+    return 0;
+}

@@ -1,0 +1,357 @@
+/* Block sequences: codings against an independent oracle, statistics, what is written is read back, every kind of damage is
+ * noticed, and two runs are told apart. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <cmocka.h>
+
+#include "base/colour.h"
+#include "base/files.h"
+#include "base/half.h"
+#include "sequence/builder.h"
+#include "sequence/manifest.h"
+#include "sequence/statistics.h"
+#include "support/ggn_near.h"
+#include "support/lseq_oracle.h"
+
+enum { W = 37, H = 21, P = W * H };
+
+static void half_floats(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 65536; i++) {
+        double v = (double)base_f16_to_f32((uint16_t)i);
+        if ((i >> 10 & 31) == 31)
+            continue;
+        assert_true(v == oracle_f16_value(i));
+        if (seq_half_float(v) != i || base_f32_to_f16((float)v) != i)
+            fail_msg("half %04x does not survive", (unsigned)i);
+    }
+    /* around every 37th half: its value, the middle to the next, and what a double can tell from the middle */
+    for (int i = 0; i < 0x7bff; i += 37) {
+        double v = oracle_f16_value(i), middle = (v + oracle_f16_value(i + 1)) / 2;
+        const double near[] = {v, middle, nextafter(middle, 0), nextafter(middle, 1e9), 0.3 * v + 0.7 * middle};
+        for (size_t k = 0; k < sizeof near / sizeof near[0]; k++) {
+            assert_int_equal(seq_half_float(near[k]), oracle_f16(near[k]));
+            assert_int_equal(seq_half_float(-near[k]), oracle_f16(-near[k]));
+        }
+    }
+    assert_int_equal(seq_half_float(1e9), 0x7bff);
+    assert_int_equal(seq_half_float(-HUGE_VAL), 0xfbff);
+    assert_int_equal(seq_half_float((double)NAN), 0);
+    assert_int_equal(base_f64_to_f16(65519.9), 0x7bff);
+    assert_int_equal(base_f64_to_f16(65520.0), 0x7c00);
+    assert_int_equal(base_f64_to_f16(-0.0), 0x8000);
+}
+
+static void codings(void **state)
+{
+    (void)state;
+    double worst = 0.0;
+    for (double x = 1e-6; x < 5e4; x *= 1.0007) {
+        uint8_t d = base_srgb_code(x), q = seq_fine_encode(d, x);
+        double back = seq_fine_decode(d, q);
+        double room = d < 255 ? (oracle_eotf((d + 0.5) / 255) - oracle_eotf(d == 0 ? 0 : (d - 0.5) / 255)) / 16 : x * 0.0219;
+        assert_int_equal(d, oracle_display(x));
+        assert_int_equal(q, oracle_fine(x));
+        worst = fmax(worst, fabs(back - x) / room);
+        if (d < 255 && base_srgb_code(back) != d)
+            fail_msg("%g: the refined value has another display code", x);
+    }
+    assert_true(worst <= 1.001);
+    for (double x = 2e-7; x < 3e5; x *= 1.003) {
+        uint8_t code = seq_half_log_encode(x), minus = seq_half_log_encode(-x);
+        assert_int_equal(code, oracle_half_log(x));
+        assert_int_equal(minus, oracle_half_log(-x));
+        assert_near(seq_half_log_decode(minus), -seq_half_log_decode(code), 0);
+        if (x > 2e-6 && x < 3e3)
+            assert_true(fabs(seq_half_log_decode(code) / x - 1) < 0.0906);
+    }
+    assert_int_equal(seq_half_log_encode(0), 0);
+    assert_int_equal(seq_half_log_encode(exp2(-19.875)), 1);
+    assert_int_equal(seq_half_log_encode((double)NAN), 0);
+    assert_int_equal(seq_fine_encode(255, 1e30), 255);
+}
+
+static void statistics(void **state)
+{
+    (void)state;
+    const double mean[12] = {1, 0, 1, 1, 1, 0, 1, 1, 2, 0, 1, 1}, half[12] = {1.5, 1, 1, 1, 1, 1, 1, 1, 2, 1, 1, 1};
+    const double d[12] = {0, 0.1, 0, -0.3, 0, 0.1, 0, -0.3, 0, 0.1, 0, -0.3}, m2[4] = {2, 1, 1, 1};
+    double scratch[4];
+    struct seq_stat s[SEQ_STATISTICS];
+    seq_statistics(mean, half, d, m2, 4, 5, scratch, s);
+    static const char *const names[SEQ_STATISTICS] = {"dammertz", "half_unsettled", "rse", "rse_unsettled", "tail999", "gini"};
+    for (int i = 0; i < SEQ_STATISTICS; i++)
+        assert_string_equal(s[i].name, names[i]);
+    assert_near(s[SEQ_DAMMERTZ].value, 0.5 / 2.0 / 4.0, 1e-12);
+    double y0 = 0.2126729 + 0.7151522 + 0.0721750 * 2, white = 0.2126729 + 0.7151522 + 0.0721750;
+    /* Pixel 0: variance of the mean (2 - y0^2)/4; pixel 1 is black with moment 1, so its error counts against the floor 0.02. */
+    assert_near(s[SEQ_RSE].value, sqrt(((2 - y0 * y0) / 4.0 / (y0 * y0) + 0.25 / (0.02 * 0.02)) / 4.0), 1e-12);
+    assert_true(s[SEQ_RSE_UNSETTLED].value == 0.25 && s[SEQ_HALF_UNSETTLED].value == 0.25);
+    assert_near(s[SEQ_TAIL999].value, 0.3 * white / ((y0 + 2.0 * white) / 4.0), 1e-12);
+    assert_near(s[SEQ_GINI].value, (1 * 0.1 + 3 * 0.3) / (4 * 0.4), 1e-12);
+}
+
+static void filters(void **state)
+{
+    (void)state;
+    static const uint32_t planes[] = {SEQ_PLANE_DISPLAY, SEQ_PLANE_FINE, SEQ_PLANE_MEAN_F16};
+    for (size_t k = 0; k < 3; k++)
+        for (uint32_t f = 0; f < 8; f++) {
+            static uint8_t a[6 * P], b[6 * P];
+            if ((f & ~seq_plane_filters(planes[k])) != 0) {
+                assert_int_equal(seq_plane_filter(planes[k], f, a, W, H, NULL), BASE_EINVAL);
+                continue;
+            }
+            for (size_t i = 0; i < sizeof a; i++)
+                a[i] = (uint8_t)(i * i * 31 + i / 7);
+            memcpy(b, a, sizeof a);
+            seq_plane_filter(planes[k], f, b, W, H, NULL);
+            assert_int_equal(memcmp(a, b, sizeof a) != 0, f != 0);
+            seq_plane_unfilter(planes[k], f, b, W, H, NULL);
+            assert_memory_equal(a, b, sizeof a);
+        }
+}
+
+static double mean[3 * P], half[3 * P];
+static uint8_t display[3 * P];
+
+static void fill(int seed)
+{
+    for (int i = 0; i < 3 * P; i++) {
+        mean[i] = fabs(0.6 + 0.7 * sin(0.1 * i + seed));
+        half[i] = 0.05 * cos(1.7 * i + seed);
+        display[i] = base_srgb_code(mean[i]);
+    }
+}
+
+/* Three levels (the second full) and a reference. */
+static void build(struct seq_builder *w)
+{
+    struct seq_stat stats[2] = {{"dammertz", 0.25}, {"seconds", 3.5}};
+    assert_int_equal(seq_builder_init(w, W, H, 400, 200, 9, 77, NULL), 0);
+    for (uint32_t i = 0; i < 4; i++) {
+        fill((int)i);
+        struct seq_frame f = {.spp = i < 3 ? 20u << i : 4096u, .half_spp = 10, .is_reference = i == 3, .full = i == 1,
+                                  .display = i == 2 ? NULL : display, .mean = mean, .half = half,
+                              .stats = stats, .n_stats = 2};
+        assert_int_equal(seq_builder_add(w, &f, NULL), 0);
+    }
+}
+
+static char dir[] = "/tmp/base_sequence.XXXXXX";
+static char block_path[64];
+
+static int setup(void **state)
+{
+    (void)state;
+    if (!mkdtemp(dir))
+        return -1;
+    snprintf(block_path, sizeof block_path, "%s/block-00009.lseq", dir);
+    return 0;
+}
+
+static int teardown(void **state)
+{
+    (void)state;
+    char path[64];
+    snprintf(path, sizeof path, "%s/manifest.json", dir);
+    unlink(path);
+    unlink(block_path);
+    return rmdir(dir);
+}
+
+static void round_trip(void **state)
+{
+    (void)state;
+    struct seq_builder w;
+    struct seq_block b;
+    struct base_err err = {0};
+    uint32_t crc;
+    static uint8_t bytes[3 * P];
+    static float floats[3 * P];
+    build(&w);
+    assert_int_equal(seq_builder_write(&w, block_path, &crc, &err), 0);
+    if (seq_block_read(block_path, &b, &err) != 0)
+        fail_msg("%s", err.text);
+    assert_int_equal(b.n_levels, 3);
+    assert_true(b.width == W && b.height == H && b.x0 == 400 && b.y0 == 200 && b.id == 9 && b.seed == 77);
+    assert_non_null(b.reference);
+    assert_int_equal(b.reference->spp, 4096);
+    assert_ptr_equal(seq_level(&b, 40), &b.levels[1]);
+    assert_null(seq_level(&b, 41));
+    for (int i = 0; i < 4; i++) {
+        const struct seq_record *r = i < 3 ? &b.levels[i] : b.reference;
+        fill(i);
+        assert_near(seq_stat(r, "dammertz"), 0.25, 0);
+        assert_true(isnan(seq_stat(r, "nothing")));
+        seq_display_planar(&b, r, bytes, NULL);
+        assert_memory_equal(bytes, display, sizeof display);
+        seq_display(&b, r, bytes, NULL);
+        assert_int_equal(bytes[3 * 5 + 2], display[2 * P + 5]);
+        seq_mean(&b, r, floats, NULL);
+        for (int k = 0; k < 3 * P; k++)
+            assert_near((double)floats[k], mean[k], i == 0 || i == 2 ? (display[k] == 255 ? 0.022 * mean[k] : 0.0006) : 0.0005);
+        seq_half_luminance(&b, r, floats, NULL);
+        for (int k = 0; k < P; k++) {
+            double y = base_luminance(half[k], half[P + k], half[2 * P + k]);
+            assert_near((double)floats[k], y, 0.0906 * fabs(y) + 3e-5);
+        }
+        assert_int_equal(seq_half(&b, r, floats, &err), i == 1 || i == 3 ? 0 : BASE_EINVAL);
+    }
+    seq_block_release(&b);
+    seq_builder_release(&w);
+}
+
+/* Any truncation and any single damaged byte is noticed. */
+static void damage(void **state)
+{
+    (void)state;
+    char *bytes;
+    size_t size;
+    struct seq_block b;
+    struct base_err err = {0};
+    assert_int_equal(base_file_read(block_path, 1 << 24, &bytes, &size, &err), 0);
+    for (size_t i = 0; i < size; i += i < 400 ? 1 : 97) {
+        uint8_t *cut = malloc(i + 1), *bad = malloc(size);
+        memcpy(cut, bytes, i);
+        memcpy(bad, bytes, size);
+        bad[i] ^= 0x10;
+        if (seq_block_parse("cut", cut, i, &b, &err) != BASE_EINVAL)
+            fail_msg("%zu of %zu bytes were believed", i, size);
+        if (seq_block_parse("bad", bad, size, &b, &err) != BASE_EINVAL)
+            fail_msg("damage at byte %zu was believed", i);
+        free(cut);
+        free(bad);
+    }
+    free(bytes);
+}
+
+static void builder_limits(void **state)
+{
+    (void)state;
+    struct seq_builder w;
+    build(&w);
+    struct seq_frame more = {.spp = 5000, .display = display};
+    assert_int_equal(seq_builder_add(&w, &more, NULL), BASE_EINVAL); /* nothing after the reference */
+    seq_builder_release(&w);
+    assert_int_equal(seq_builder_init(&w, 0, 5, 0, 0, 0, 0, NULL), BASE_EINVAL);
+}
+
+static void manifest(void **state)
+{
+    (void)state;
+    uint32_t levels[] = {20, 40, 80, 160};
+    struct seq_manifest_block entry = {.id = 9, .x0 = 400, .y0 = 200, .x1 = 400 + W, .y1 = 200 + H, .file = "block-00009.lseq"};
+    struct seq_manifest m = {.scene = "a \"scene\"", .width = 800, .height = 600, .block = 200, .reference_spp = 4096,
+                             .reference_independent = 1, .n_levels = 3, .levels = levels, .n_blocks = 1, .blocks = &entry}, back;
+    struct seq_builder w;
+    struct seq_block b;
+    struct base_err err = {0};
+    struct stat st;
+    build(&w);
+    assert_int_equal(seq_builder_write(&w, block_path, &entry.crc32, &err), 0);
+    seq_builder_release(&w);
+    stat(block_path, &st);
+    entry.bytes = (uint64_t)st.st_size;
+    assert_int_equal(seq_manifest_write(dir, &m, &err), 0);
+    if (seq_manifest_read(dir, &back, &err) != 0 || seq_manifest_read_block(dir, &back, 0, &b, &err) != 0)
+        fail_msg("%s", err.text);
+    assert_string_equal(back.scene, m.scene);
+    assert_int_equal(back.n_levels, 3);
+    assert_int_equal(back.blocks[0].crc32, entry.crc32);
+    seq_block_release(&b);
+
+    back.blocks[0].crc32 ^= 1;
+    assert_int_equal(seq_manifest_read_block(dir, &back, 0, &b, &err), BASE_EINVAL);
+    back.blocks[0].crc32 ^= 1;
+    back.blocks[0].x1++; /* mixed sizes */
+    assert_int_equal(seq_manifest_read_block(dir, &back, 0, &b, &err), BASE_EINVAL);
+    seq_manifest_release(&back);
+    m.n_levels = 4; /* a level that the block does not have */
+    seq_manifest_write(dir, &m, &err);
+    seq_manifest_read(dir, &back, &err);
+    assert_int_equal(seq_manifest_read_block(dir, &back, 0, &b, &err), BASE_EINVAL);
+    assert_non_null(strstr(err.text, "160 spp is missing"));
+    seq_manifest_release(&back);
+}
+
+/* What distinguishes two runs is named; the way to the source does not. */
+static void differences(void **state)
+{
+    (void)state;
+    uint32_t levels[] = {20, 40}, other[] = {20, 41};
+    const struct seq_manifest m = {.scene = "s", .source = "a/s.pbrt", .source_crc32 = 7, .camera = "view0", .renderer = "r",
+                                   .has_look_at = 1, .look_at = {0.1, 2, 3, 4, 5, 6, 7, 8, 1.0 / 3}, .fov_deg = 33.3, .width = 64,
+                                   .height = 48, .block = 16, .seed = 1, .reference_seed = 2, .reference_spp = 9,
+                                   .reference_independent = 1, .n_levels = 2, .levels = levels};
+    struct seq_manifest back;
+    struct base_err err = {0};
+    assert_int_equal(seq_manifest_write(dir, &m, &err), 0);
+    assert_int_equal(seq_manifest_read(dir, &back, &err), 0); /* every number survives the text */
+    assert_null(seq_manifest_difference(&m, &back));
+    seq_manifest_release(&back);
+    struct seq_manifest n = m;
+    strcpy(n.source, "b/s.pbrt");
+    assert_null(seq_manifest_difference(&m, &n));
+#define DIFFERS(change, member) \
+    n = m;                      \
+    change;                     \
+    assert_string_equal(seq_manifest_difference(&m, &n), member)
+    DIFFERS(n.scene[0] = 't', "scene");
+    DIFFERS(n.source_crc32++, "source_crc32");
+    DIFFERS(n.camera[4] = '1', "camera");
+    DIFFERS(n.look_at[8] = 0, "look_at");
+    DIFFERS(n.has_look_at = 0, "look_at");
+    DIFFERS(n.fov_deg = 0, "fov");
+    DIFFERS(n.renderer[0] = 'q', "renderer");
+    DIFFERS(n.width++, "width");
+    DIFFERS(n.height++, "height");
+    DIFFERS(n.block++, "block");
+    DIFFERS(n.seed++, "seed");
+    DIFFERS(n.reference_seed++, "reference_seed");
+    DIFFERS(n.reference_spp++, "reference_spp");
+    DIFFERS(n.reference_independent = 0, "reference_independent");
+    DIFFERS(n.levels = other, "levels");
+    DIFFERS(n.n_levels = 1, "levels");
+}
+
+static void bad_manifests(void **state)
+{
+    (void)state;
+    static const char *const bad[] = {
+        "", "{}", "[1]", "{\"format\":\"lull-sequence\"}",
+        "{\"format\":\"lull-sequence\",\"version\":2,\"scene\":\"s\",\"width\":8,\"height\":8,\"block\":8,\"levels\":[1],\"blocks\":[]}",
+        "{\"format\":\"lull-sequence\",\"version\":1,\"width\":8,\"height\":8,\"block\":8,\"levels\":[1],\"blocks\":[]}",
+        "{\"format\":\"lull-sequence\",\"version\":1,\"scene\":\"s\",\"width\":8,\"height\":8,\"block\":8,\"levels\":[],\"blocks\":[]}",
+        "{\"format\":\"lull-sequence\",\"version\":1,\"scene\":\"s\",\"width\":8,\"height\":8,\"block\":8,\"levels\":[2,2],\"blocks\":[]}",
+        "{\"format\":\"lull-sequence\",\"version\":1,\"scene\":\"s\",\"width\":8,\"height\":8,\"block\":8,\"levels\":[2],\"blocks\":"
+        "[{\"id\":0,\"x0\":0,\"y0\":0,\"x1\":8,\"y1\":8,\"file\":\"../x\",\"bytes\":9,\"crc32\":\"00000000\"}]}",
+        "{\"format\":\"lull-sequence\",\"version\":1,\"scene\":\"s\",\"width\":8,\"height\":8,\"block\":8,\"levels\":[2],\"blocks\":"
+        "[{\"id\":0,\"x0\":0,\"y0\":0,\"x1\":9,\"y1\":8,\"file\":\"x\",\"bytes\":9,\"crc32\":\"00000000\"}]}",
+    };
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        struct seq_manifest m;
+        struct base_err err = {0};
+        if (seq_manifest_parse("m.json", bad[i], strlen(bad[i]), &m, &err) != BASE_EINVAL || err.text[0] == '\0')
+            fail_msg("%s was accepted", bad[i]);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(half_floats), cmocka_unit_test(codings), cmocka_unit_test(statistics), cmocka_unit_test(filters),
+        cmocka_unit_test(round_trip), cmocka_unit_test(differences),
+        cmocka_unit_test(damage), cmocka_unit_test(builder_limits), cmocka_unit_test(manifest), cmocka_unit_test(bad_manifests),
+    };
+    return cmocka_run_group_tests_name("sequence", tests, setup, teardown);
+}
