@@ -9,6 +9,7 @@
 
 #include <lull/criterion.h>
 
-extern const struct lull_criterion ggn_plugin_ggn; /* id "ggn" */
+extern const struct lull_criterion ggn_plugin_ggn;      /* id "ggn" */
+extern const struct lull_criterion ggn_plugin_observer; /* id "observer" */
 
 #endif

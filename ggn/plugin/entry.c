@@ -2,6 +2,7 @@
 
 static const struct lull_criterion *const criteria[] = {
     &ggn_plugin_ggn,
+    &ggn_plugin_observer,
 };
 
 LULL_EXPORT const struct lull_criterion *lull_criterion_entry_v1(uint32_t index)
