@@ -8,7 +8,7 @@
 #include "model/model.h"
 #include "model/trainer.h"
 #include "train/log.h"
-#include "train/plan.h"
+#include "train/train_plan.h"
 
 enum { GGN_PHASE_DENOISER, GGN_PHASE_JUDGE, GGN_PHASE_DONE };
 

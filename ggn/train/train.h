@@ -12,7 +12,7 @@
 #ifndef GGN_TRAIN_TRAIN_H
 #define GGN_TRAIN_TRAIN_H
 
-#include "train/plan.h"
+#include "train/train_plan.h"
 
 /* Runs the plan. GGN_TRAIN_INTERRUPTED: the checkpoint of the last finished epoch is there. */
 int ggn_train(const struct ggn_train_plan *plan, struct base_err *err);

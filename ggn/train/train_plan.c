@@ -1,4 +1,4 @@
-#include "train/plan.h"
+#include "train/train_plan.h"
 
 struct ggn_train_plan ggn_train_plan_default(enum ggn_preset preset)
 {

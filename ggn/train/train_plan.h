@@ -1,6 +1,6 @@
 /* What a training run is to do. */
-#ifndef GGN_TRAIN_PLAN_H
-#define GGN_TRAIN_PLAN_H
+#ifndef GGN_TRAIN_TRAIN_PLAN_H
+#define GGN_TRAIN_TRAIN_PLAN_H
 
 #include <signal.h>
 #include <stdio.h>
