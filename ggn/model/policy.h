@@ -36,8 +36,9 @@ double ggn_policy_next(const struct ggn_policy *policy, double spp);
 /* Samples at which p is expected to fall below `threshold`, from p at spp; at least spp. NaN if the slope is not known. */
 double ggn_policy_predict(const struct ggn_policy *policy, double p, double threshold, double spp);
 
-/* Whether noise with these statistics (see model/window.h) sits in too few pixels for a judgement by eye. An uneven spread alone
- * says nothing where even the noisiest pixels are calm: a block that is half sky has a large Gini coefficient for ever. */
+/* Whether noise with these statistics (see model/window.h) sits in too few pixels for a judgement by eye. An uneven spread
+ * alone says nothing where even the noisiest pixels are calm: a block that is half sky has a large Gini coefficient for
+ * ever. */
 int ggn_policy_tail_holds(const struct ggn_policy *policy, double tail999, double gini);
 
 /* What the model says, defaults elsewhere. BASE_EINVAL when a field is out of range. */

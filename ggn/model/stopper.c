@@ -51,8 +51,8 @@ int ggn_stopper_ask(const struct ggn_stop_rule *rule, struct ggn_stopper *s, uin
     return 0;
 }
 
-/* Goes on at the next level or, while the gate says that the block is plainly noisy, at the first level of the window that will
- * end where it expects to open: half of that, because the estimate is noisy itself, and at most fourfold. */
+/* Goes on at the next level or, while the gate says that the block is plainly noisy, at the first level of the window that
+ * will end where it expects to open: half of that, because the estimate is noisy itself, and at most fourfold. */
 static void schedule(const struct ggn_stop_rule *rule, struct ggn_stopper *s, double gate_opens)
 {
     const struct ggn_policy *p = &rule->policy;

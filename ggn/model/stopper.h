@@ -1,14 +1,14 @@
 /*
  * When a block stops: the one rule, for the criterion in a renderer and for everything that replays recorded levels.
  *
- * Whoever watches a block asks about its sample counts as they come. If the image belongs into the window, it is added to the
- * window and judged by what it shows, which is computed only as far as the rule needs it:
+ * Whoever watches a block asks about its sample counts as they come. If the image belongs into the window, it is added to
+ * the window and judged by what it shows, which is computed only as far as the rule needs it:
  *
  * - The first image and those after it, until a window is full, are too early for the network.
- * - The gate: while the window's noise exceeds policy.gate_noise, the block is plainly noisy, passes are forgotten, and the next
- *   image is wanted where the first window can begin that might end below it.
- * - Then the network: p = ggn_policy_p(logit). `passes` checks in a row with p below the threshold stop the block, unless the
- *   tail guard (ggn_policy_tail_holds) holds it back, which leaves the passes counted so far.
+ * - The gate: while the window's noise exceeds policy.gate_noise, the block is plainly noisy, passes are forgotten, and the
+ *   next image is wanted where the first window can begin that might end below it.
+ * - Then the network: p = ggn_policy_p(logit). `passes` checks in a row with p below the threshold stop the block, unless
+ *   the tail guard (ggn_policy_tail_holds) holds it back, which leaves the passes counted so far.
  *
  * Nothing here looks at pixels or keeps more than the plain values below. Pure functions, any thread.
  */
@@ -62,8 +62,8 @@ int ggn_stopper_ask(const struct ggn_stop_rule *rule, struct ggn_stopper *s, uin
 /* Sets s->verdict on the image that ggn_stopper_ask has just accepted. */
 void ggn_stopper_judge(const struct ggn_stop_rule *rule, struct ggn_stopper *s, const struct ggn_evidence *evidence);
 
-/* The end of the rule, also of those criteria that have a score and a cut and no network: counts a check. 1: so many checks in a
- * row were below; the block stops unless a guard holds it back. */
+/* The end of the rule, also of those criteria that have a score and a cut and no network: counts a check. 1: so many checks
+ * in a row were below; the block stops unless a guard holds it back. */
 int ggn_stopper_pass(struct ggn_stopper *s, int passes, int below);
 
 /* Whether a stopper from a file can be that of this rule. */

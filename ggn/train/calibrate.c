@@ -57,8 +57,8 @@ static double known_logit(void *data, const int *levels)
     return (double)NAN;
 }
 
-int ggn_checks_create(struct ggn_checks *checks, const struct ggn_windows *w, const double *logit, const struct ggn_policy *policy,
-                      struct base_err *err)
+int ggn_checks_create(struct ggn_checks *checks, const struct ggn_windows *w, const double *logit,
+                      const struct ggn_policy *policy, struct base_err *err)
 {
     const struct ggn_stop_rule rule = {.policy = *policy, .window = w->length};
     size_t levels = 1;

@@ -10,7 +10,7 @@
  * scale positive and finite when the classes are separable. Without both classes the policy keeps what it has. */
 void ggn_calibrate_platt(const double *logit, const double *label, int n, struct ggn_policy *policy);
 
-/* What the stopping rule sees of the blocks of a window list under a policy, whatever its threshold: gate, guard, cadence. */
+/* What the stopping rule sees of the blocks of a window list under a policy, whatever its threshold. */
 struct ggn_checks {
     const struct ggn_windows *windows; /* borrows */
     struct ggn_policy policy;
@@ -32,8 +32,8 @@ struct ggn_stopping {
 int ggn_calibrate_stopping(const struct ggn_checks *checks, double t, struct ggn_stopping *out, struct base_err *err);
 
 /* The threshold, in steps of 0.01, with the smallest mean |log2(stop / true)| of those that keep the unsure rate at or below
- * `early_rate`; 0.01 if none does. (The largest that keeps the rate would be 0.99 whenever the few blocks are easy. The margin
- * of one spread: none of ten blocks stopped early says little about the next ten, whose labels are no surer.) */
+ * `early_rate`; 0.01 if none does. (The largest that keeps the rate would be 0.99 whenever the few blocks are easy. The
+ * margin of one spread: none of ten blocks stopped early says little about the next ten, whose labels are no surer.) */
 int ggn_calibrate_threshold(const struct ggn_checks *checks, double early_rate, double *threshold, struct ggn_stopping *out,
                             struct base_err *err);
 
