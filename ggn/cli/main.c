@@ -97,7 +97,7 @@ int main(int argc, char **argv)
     }
     snprintf(name, sizeof name, "ggn %s", argv[1]);
     argv[1] = name;
-    argp_err_exit_status = GGN_EXIT_BAD_INPUT; /* label, study */
+    argp_err_exit_status = GGN_EXIT_BAD_INPUT; /* label */
     int status = command->run(argc - 1, argv + 1);
     if (fflush(stdout) || ferror(stdout)) {
         fprintf(stderr, "%s: cannot write standard output\n", name);

@@ -1,163 +1,131 @@
 /* `ggn study VERB DIR`: thresholds and judgements from people, on a page served from this machine. */
-#include <argp.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
 #include "base/files.h"
+#include "base/options.h"
 #include "base/threads.h"
 #include "cli/commands.h"
 #include "study/page_path.h"
 #include "study/plan.h"
 #include "study/prepare.h"
+#include "study/report.h"
 #include "study/server.h"
 #include "study/token.h"
+#include "study/transfer.h"
 
 /* --- init --- */
 
-enum { MAX_VIEWS = GGN_STUDY_MAX_VIEWS, KEY_TASK = 256, KEY_METHOD, KEY_VIEWS, KEY_SEED, KEY_TRIALS, KEY_REPEATS, KEY_CATCH, KEY_SHOW,
-       KEY_GAP, KEY_BREAK, KEY_BLOCK, KEY_SPACING, KEY_MIN, KEY_MAX };
+enum { TASK_THRESHOLDS, TASK_VALIDATION };
 
 struct init_options {
-    const char *dir, *task, *method;
-    const char *views[MAX_VIEWS];
-    int n_views, block;
-    double spacing, spp_min, spp_max, seed;
-    struct ggn_study study;
+    const char *args[1 + GGN_STUDY_MAX_VIEWS]; /* DIR and views */
+    int n_args, n_views;
+    const char *views[GGN_STUDY_MAX_VIEWS];
+    int task, method, trials, repeats, show_ms, gap_ms, break_every, block;
+    uint32_t spp_min, spp_max;
+    uint64_t seed;
+    double catch_share, spacing;
 };
 
-static const struct argp_option init_table[] = {
-    {"task", KEY_TASK, "thresholds|validation", 0, "what people are asked (required)", 1},
-    {"method", KEY_METHOD, "adjustment|2ifc", 0, "how thresholds are measured (default adjustment)", 1},
-    {"views", KEY_VIEWS, "FOLDER", 0, "a recorded sequence, or a folder of pictures; as many as wanted may follow", 1},
-    {"trials", KEY_TRIALS, "N", 0, "2ifc: trials per block, catch trials included (default 30)", 2},
-    {"repeats", KEY_REPEATS, "N", 0, "adjustment: settings per block (default 2); validation: judgements per picture (default 1)", 2},
-    {"catch", KEY_CATCH, "SHARE", 0, "share of catch trials (default 0.1)", 2},
-    {"show", KEY_SHOW, "MS", 0, "2ifc: how long an interval is shown (default 700)", 2},
-    {"gap", KEY_GAP, "MS", 0, "2ifc: the blank between intervals (default 400)", 2},
-    {"break-every", KEY_BREAK, "N", 0, "offer a break after so many trials (default 60, 0: never)", 2},
-    {"spacing", KEY_SPACING, "OCTAVES", 0, "leave out levels that are nearer than that (default 0.15)", 3},
-    {"spp-min", KEY_MIN, "N", 0, "leave out levels below (default 1)", 3},
-    {"spp-max", KEY_MAX, "N", 0, "leave out levels above (default 1000000)", 3},
-    {"block", KEY_BLOCK, "PIXELS", 0, "side of a block when the view is a folder of pictures (default 200)", 3},
-    {"seed", KEY_SEED, "N", 0, "of all orders and sides (default 1)", 4},
-    {0},
-};
-
-static double number_option(struct argp_state *state, const char *name, const char *arg, double lo, double hi)
+static int add_view(void *into, const char *value, struct base_err *err)
 {
-    char *end;
-    double value = strtod(arg, &end);
-    if (end == arg || *end != '\0' || !(value >= lo && value <= hi))
-        argp_error(state, "--%s %s: expected %g … %g", name, arg, lo, hi);
-    return value;
+    struct init_options *o = into;
+    if (o->n_views == GGN_STUDY_MAX_VIEWS)
+        return base_fail(err, BASE_EINVAL, "at most %d views", GGN_STUDY_MAX_VIEWS);
+    o->views[o->n_views++] = value;
+    return 0;
 }
 
-static void add_view(struct argp_state *state, struct init_options *o, const char *folder)
-{
-    if (o->n_views == MAX_VIEWS)
-        argp_error(state, "more than %d views", MAX_VIEWS);
-    o->views[o->n_views++] = folder;
-}
+static const char *const task_words[] = {"thresholds", "validation", NULL};
+static const char *const method_words[] = {"adjustment", "2ifc", NULL};
 
-static void check_init(struct argp_state *state, struct init_options *o)
-{
-    if (!o->dir || !o->task || o->n_views == 0)
-        argp_error(state, "DIR, --task and --views are needed");
-    int validation = strcmp(o->task, "validation") == 0;
-    if (!validation && strcmp(o->task, "thresholds") != 0)
-        argp_error(state, "--task %s: expected thresholds or validation", o->task);
-    if (o->method && (validation || (strcmp(o->method, "adjustment") != 0 && strcmp(o->method, "2ifc") != 0)))
-        argp_error(state, "--method %s: expected adjustment or 2ifc, with --task thresholds", o->method);
-    o->study.task = validation ? GGN_STUDY_VALIDATION : o->method && o->method[0] == '2' ? GGN_STUDY_TWO_INTERVAL : GGN_STUDY_ADJUSTMENT;
-    if (o->study.repeats == 0)
-        o->study.repeats = o->study.task == GGN_STUDY_ADJUSTMENT ? 2 : 1;
-}
+#define TO(member) BASE_TO(struct init_options, member)
+static const struct base_option init_list[] = {
+    {"task", 0, NULL, TO(task), .words = task_words, .help = "what people are asked (required)"},
+    {"method", 0, NULL, TO(method), .words = method_words, .help = "how thresholds are measured (adjustment)"},
+    {"views", 0, "FOLDER", .set = add_view, .help = "a recorded sequence, or a folder of pictures; more may follow"},
+    {"trials", 0, "N", TO(trials), 1, 1000, .help = "2ifc: trials per block, catch trials included (30)"},
+    {"repeats", 0, "N", TO(repeats), 1, 100,
+     .help = "adjustment: settings per block (2); validation: judgements per picture (1)"},
+    {"catch", 0, "SHARE", TO(catch_share), 0, 0.5, .help = "share of catch trials (0.1)"},
+    {"show", 0, "MS", TO(show_ms), 1, 60000, .help = "2ifc: how long an interval is shown (700)"},
+    {"gap", 0, "MS", TO(gap_ms), 1, 60000, .help = "the blank between two pictures in the same place (400)"},
+    {"break-every", 0, "N", TO(break_every), 0, 100000, .help = "offer a break after so many trials (60; 0: never)"},
+    {"spacing", 0, "OCTAVES", TO(spacing), 0.01, 4, .help = "leave out levels that are nearer than that (0.15)"},
+    {"spp-min", 0, "N", TO(spp_min), 1, 1e9, .help = "leave out levels below (1)"},
+    {"spp-max", 0, "N", TO(spp_max), 1, 1e9, .help = "leave out levels above (1000000)"},
+    {"block", 0, "PIXELS", TO(block), 8, 4096, .help = "side of a block when the view is a folder of pictures (200)"},
+    {"seed", 0, "N", TO(seed), 0, 9007199254740991.0, .help = "of all orders and sides (1)"},
+    {0}};
+#undef TO
 
-static error_t parse_init(int key, char *arg, struct argp_state *state)
+static int init(struct init_options *o, struct ggn_study *study, struct base_err *err)
 {
-    struct init_options *o = state->input;
-    switch (key) {
-    case KEY_TASK: o->task = arg; return 0;
-    case KEY_METHOD: o->method = arg; return 0;
-    case KEY_VIEWS: add_view(state, o, arg); return 0;
-    case KEY_TRIALS: o->study.trials = (int)number_option(state, "trials", arg, 1, 1000); return 0;
-    case KEY_REPEATS: o->study.repeats = (int)number_option(state, "repeats", arg, 1, 100); return 0;
-    case KEY_CATCH: o->study.catch_share = number_option(state, "catch", arg, 0, 0.5); return 0;
-    case KEY_SHOW: o->study.show_ms = (int)number_option(state, "show", arg, 1, 60000); return 0;
-    case KEY_GAP: o->study.gap_ms = (int)number_option(state, "gap", arg, 1, 60000); return 0;
-    case KEY_BREAK: o->study.break_every = (int)number_option(state, "break-every", arg, 0, 100000); return 0;
-    case KEY_SPACING: o->spacing = number_option(state, "spacing", arg, 0.01, 4); return 0;
-    case KEY_MIN: o->spp_min = number_option(state, "spp-min", arg, 1, 1e9); return 0;
-    case KEY_MAX: o->spp_max = number_option(state, "spp-max", arg, 1, 1e9); return 0;
-    case KEY_BLOCK: o->block = (int)number_option(state, "block", arg, 8, 4096); return 0;
-    case KEY_SEED: o->seed = number_option(state, "seed", arg, 0, 9007199254740991.0); return 0;
-    case ARGP_KEY_ARG:
-        if (!o->dir)
-            o->dir = arg;
-        else
-            add_view(state, o, arg);
-        return 0;
-    case ARGP_KEY_END: check_init(state, o); return 0;
-    default: return ARGP_ERR_UNKNOWN;
-    }
+    char page[4096];
+    int validation = o->task == TASK_VALIDATION;
+    for (int i = 1; i < o->n_args; i++)
+        if (add_view(o, o->args[i], err))
+            return err->code;
+    if (o->task < 0 || o->n_views == 0)
+        return base_fail(err, BASE_EINVAL, "--task and --views are needed");
+    if (validation && o->method >= 0)
+        return base_fail(err, BASE_EINVAL, "--method goes with --task thresholds");
+    study->task = validation ? GGN_STUDY_VALIDATION : o->method == 1 ? GGN_STUDY_TWO_INTERVAL : GGN_STUDY_ADJUSTMENT;
+    study->repeats = o->repeats ? o->repeats : study->task == GGN_STUDY_ADJUSTMENT ? 2 : 1;
+    study->seed = o->seed;
+    study->trials = o->trials;
+    study->catch_share = o->catch_share;
+    study->show_ms = o->show_ms;
+    study->gap_ms = o->gap_ms;
+    study->break_every = o->break_every;
+    struct ggn_study_request_views q = {.dir = o->args[0], .page_dir = page, .views = o->views, .n_views = o->n_views, .block = o->block,
+                                        .spacing = o->spacing, .spp_min = o->spp_min, .spp_max = o->spp_max};
+    struct base_threads *threads = base_threads_create(base_threads_available(), err);
+    int rc = threads ? ggn_study_page_find(page, err) : err->code;
+    if (!rc)
+        rc = ggn_study_prepare(&q, study, threads, err);
+    base_threads_destroy(threads);
+    return rc;
 }
 
 static int run_init(int argc, char **argv)
 {
-    static const struct argp argp = {
-        .options = init_table, .parser = parse_init, .args_doc = "DIR --task TASK --views FOLDER...",
-        .doc = "Makes the study DIR: study.json, the pictures it shows, and texts.json, what the page says (edit it: who asks, whom to write to)."};
-    struct init_options o = {.block = 200, .spacing = 0.15, .spp_min = 1, .spp_max = 1e6, .seed = 1,
-                             .study = {.trials = 30, .catch_share = 0.1, .show_ms = 700, .gap_ms = 400, .break_every = 60,
-                                       .min_catch_passed = 0.75, .max_untouched = 0.5}};
-    char page[4096];
+    static const struct base_options options = {
+        .list = init_list, .args_doc = "DIR --task TASK --views FOLDER...", .args_min = 1, .args_max = 1 + GGN_STUDY_MAX_VIEWS,
+        .args = offsetof(struct init_options, args), .arg_count = offsetof(struct init_options, n_args),
+        .doc = "Makes the study DIR: study.json, the pictures it shows, and texts.json, what the page says (edit it: who asks, whom to "
+               "write to)."};
+    struct init_options *o = calloc(1, sizeof *o);
+    struct ggn_study study = {.min_catch_passed = 0.75, .max_untouched = 0.5};
     struct base_err err = {0};
-    argp_parse(&argp, argc, argv, 0, NULL, &o);
-    o.study.seed = (uint64_t)o.seed;
-    struct ggn_study_request_views q = {.dir = o.dir, .page_dir = page, .views = o.views, .n_views = o.n_views, .block = o.block,
-                                        .spacing = o.spacing, .spp_min = (uint32_t)o.spp_min, .spp_max = (uint32_t)o.spp_max};
-    struct base_threads *threads = base_threads_create(base_threads_available(), &err);
-    int rc = threads ? ggn_study_page_find(page, &err) : err.code;
+    if (!o)
+        return base_fail_nomem(&err, "options") ? ggn_cmd_fail(argv[0], &err) : 0;
+    *o = (struct init_options){.task = -1, .method = -1, .trials = 30, .show_ms = 700, .gap_ms = 400, .break_every = 60, .block = 200,
+                               .spp_min = 1, .spp_max = 1000000, .seed = 1, .catch_share = 0.1, .spacing = 0.15};
+    int rc = base_options_parse(&options, argc, argv, o, &err);
     if (!rc)
-        rc = ggn_study_prepare(&q, &o.study, threads, &err);
+        rc = init(o, &study, &err);
     if (!rc)
-        printf("%s: %d view%s, %d trials for each person; `ggn study serve %s` opens it\n", o.dir, o.study.n_views,
-               o.study.n_views == 1 ? "" : "s", ggn_study_plan_count(&o.study), o.dir);
-    base_threads_destroy(threads);
-    ggn_study_release(&o.study);
-    return !rc ? GGN_EXIT_OK : ggn_cmd_fail(argv[0], &err);
+        printf("%s: %d view%s, %d trials for each person; `ggn study serve %s` opens it\n", o->args[0], study.n_views,
+               study.n_views == 1 ? "" : "s", ggn_study_plan_count(&study), o->args[0]);
+    ggn_study_release(&study);
+    free(o);
+    return rc ? ggn_cmd_fail(argv[0], &err) : GGN_EXIT_OK;
 }
 
-/* --- the other verbs: a folder and an option or two --- */
+/* --- the other verbs: a folder, and an option or an argument more --- */
 
 struct options {
-    const char *dir, *listen, *out, *input, *person;
+    const char *args[2]; /* DIR; what is imported or deleted */
+    const char *listen, *out;
+    int no_pictures;
 };
-
-static error_t parse(int key, char *arg, struct argp_state *state)
-{
-    struct options *o = state->input;
-    switch (key) {
-    case 'l': o->listen = arg; return 0;
-    case 'o': o->out = arg; return 0;
-    case 'p': o->person = arg; return 0;
-    case ARGP_KEY_ARG:
-        if (!o->dir)
-            o->dir = arg;
-        else if (!o->input)
-            o->input = arg;
-        else
-            return ARGP_ERR_UNKNOWN;
-        return 0;
-    case ARGP_KEY_END:
-        if (!o->dir)
-            argp_error(state, "DIR is needed");
-        return 0;
-    default: return ARGP_ERR_UNKNOWN;
-    }
-}
+#define TO(member) BASE_TO(struct options, member)
+#define ARGS(n) .args_min = n, .args_max = n, .args = offsetof(struct options, args)
+static const struct base_option no_options[] = {{0}};
 
 /* DIR/token: made once, so that links stay good. */
 static int keep_token(const char *dir, char token[GGN_STUDY_KEY], struct base_err *err)
@@ -180,39 +148,158 @@ static int keep_token(const char *dir, char token[GGN_STUDY_KEY], struct base_er
     return rc;
 }
 
-static const struct argp_option serve_table[] = {
-    {"listen", 'l', "ADDRESS[:PORT]", 0, "where to listen, in numbers (default 127.0.0.1:8737; port 0: any). Beyond this machine the link has a token", 0},
-    {0},
-};
+static const struct base_option serve_list[] = {
+    {"listen", 'l', "ADDRESS[:PORT]", TO(listen),
+     .help = "where to listen, in numbers (127.0.0.1:8737; port 0: any). Beyond this machine the link has a token"},
+    {0}};
 
-static int run_serve(int argc, char **argv)
+static int serve(const struct options *o, struct base_err *err)
 {
-    static const struct argp argp = {.options = serve_table, .parser = parse, .args_doc = "DIR",
-                                     .doc = "Serves the study until interrupted and prints its link. Every trial is on the disk before it is acknowledged."};
-    struct options o = {.listen = "127.0.0.1"};
     struct ggn_study study = {0};
     struct ggn_study_store *store = NULL;
     struct ggn_study_address address;
     char page[4096], token[GGN_STUDY_KEY];
-    struct base_err err = {0};
-    argp_parse(&argp, argc, argv, 0, NULL, &o);
-    int rc = ggn_study_address_parse(o.listen, &address, &err);
+    int rc = ggn_study_address_parse(o->listen, &address, err);
     if (!rc)
-        rc = ggn_study_page_find(page, &err);
+        rc = ggn_study_page_find(page, err);
     if (!rc)
-        rc = ggn_study_read(o.dir, &study, &err);
+        rc = ggn_study_read(o->args[0], &study, err);
     if (!rc && !address.loopback)
-        rc = keep_token(o.dir, token, &err);
+        rc = keep_token(o->args[0], token, err);
     if (!rc)
-        rc = ggn_study_store_open(o.dir, study.id, 1, &store, &err);
+        rc = ggn_study_store_open(o->args[0], study.id, 1, &store, err);
     if (!rc) {
-        struct ggn_study_site site = {.dir = o.dir, .page_dir = page, .token = address.loopback ? NULL : token, .study = &study, .store = store};
+        struct ggn_study_site site = {.dir = o->args[0], .page_dir = page, .token = address.loopback ? NULL : token, .study = &study,
+                                      .store = store};
         ggn_cmd_catch_interrupt();
-        rc = ggn_study_serve(&site, &address, &ggn_cmd_interrupted, &err);
+        rc = ggn_study_serve(&site, &address, &ggn_cmd_interrupted, err);
     }
     ggn_study_store_close(store);
     ggn_study_release(&study);
-    return !rc ? GGN_EXIT_OK : ggn_cmd_fail(argv[0], &err);
+    return rc;
+}
+
+static int run_serve(int argc, char **argv)
+{
+    static const struct base_options options = {
+        .list = serve_list, .args_doc = "DIR", ARGS(1),
+        .doc = "Serves the study until interrupted and prints its link. Every trial is on the disk before it is acknowledged."};
+    struct options o = {.listen = "127.0.0.1"};
+    struct base_err err = {0};
+    int rc = base_options_parse(&options, argc, argv, &o, &err);
+    if (!rc)
+        rc = serve(&o, &err);
+    return rc ? ggn_cmd_fail(argv[0], &err) : GGN_EXIT_OK;
+}
+
+/* --- what was collected --- */
+
+typedef int work_fn(const struct options *o, const struct ggn_study *study, struct ggn_study_store *store, struct base_err *err);
+
+/* Reads the command line and runs `work` on the study of DIR and its people; create: though nobody has taken part. */
+static int with_store(const struct base_options *options, int argc, char **argv, int create, work_fn *work)
+{
+    struct options o = {0};
+    struct ggn_study study = {0};
+    struct ggn_study_store *store = NULL;
+    struct base_err err = {0};
+    int rc = base_options_parse(options, argc, argv, &o, &err);
+    if (!rc)
+        rc = ggn_study_read(o.args[0], &study, &err);
+    if (!rc)
+        rc = ggn_study_store_open(o.args[0], study.id, create, &store, &err);
+    if (!rc)
+        rc = work(&o, &study, store, &err);
+    ggn_study_store_close(store);
+    ggn_study_release(&study);
+    return rc ? ggn_cmd_fail(argv[0], &err) : GGN_EXIT_OK;
+}
+
+static int do_report(const struct options *o, const struct ggn_study *study, struct ggn_study_store *store, struct base_err *err)
+{
+    char folder[4096];
+    struct ggn_study_people people = {0};
+    struct base_threads *threads = base_threads_create(base_threads_available(), err);
+    int rc = threads ? ggn_study_people_init(&people, study, store, threads, err) : err->code;
+    if (!rc && !o->out)
+        rc = base_file_join(folder, o->args[0], "report", err);
+    if (!rc)
+        rc = ggn_study_report(o->out ? o->out : folder, &people, !o->no_pictures, err);
+    ggn_study_people_release(&people);
+    base_threads_destroy(threads);
+    return rc;
+}
+
+static const struct base_option report_list[] = {
+    {"output", 'o', "FOLDER", TO(out), .help = "where the report goes (DIR/report)"},
+    {"no-pictures", 'n', NULL, TO(no_pictures), .help = "tables only"},
+    {0}};
+
+static int run_report(int argc, char **argv)
+{
+    static const struct base_options options = {
+        .list = report_list, .args_doc = "DIR", ARGS(1),
+        .doc = "Thresholds with intervals (thresholds.csv is what `ggn label --human` and `ggn compare` read), who counts and why not, how "
+               "well people agree; or shares of judgements with intervals, and how many people a difference of 10 % takes."};
+    return with_store(&options, argc, argv, 0, do_report);
+}
+
+static int do_export(const struct options *o, const struct ggn_study *study, struct ggn_study_store *store, struct base_err *err)
+{
+    int people = 0, rc = ggn_study_export(study, store, o->out, &people, err);
+    if (!rc)
+        printf("%s: %d people\n", o->out, people);
+    return rc;
+}
+
+static const struct base_option export_list[] = {
+    {"output", 'o', "FILE", TO(out), .needed = 1, .help = "the file to write (required)"},
+    {0}};
+
+static int run_export(int argc, char **argv)
+{
+    static const struct base_options options = {
+        .list = export_list, .args_doc = "DIR -o FILE", ARGS(1),
+        .doc = "Writes all raw trials and what people told of themselves to one JSON file."};
+    return with_store(&options, argc, argv, 0, do_export);
+}
+
+static int do_import(const struct options *o, const struct ggn_study *study, struct ggn_study_store *store, struct base_err *err)
+{
+    int people = 0, rc = ggn_study_import(study, store, o->args[1], &people, err);
+    if (!rc)
+        printf("%s: %d people imported\n", o->args[0], people);
+    return rc;
+}
+
+static int run_import(int argc, char **argv)
+{
+    static const struct base_options options = {
+        .list = no_options, .args_doc = "DIR FILE", ARGS(2),
+        .doc = "Adds everybody of an exported file to a copy of the same study: all of them or, if anything is amiss, nobody."};
+    return with_store(&options, argc, argv, 1, do_import);
+}
+
+static int do_delete(const struct options *o, const struct ggn_study *study, struct ggn_study_store *store, struct base_err *err)
+{
+    struct ggn_study_person person;
+    (void)study;
+    int found = ggn_study_store_find(store, NULL, o->args[1], &person, err);
+    if (found <= 0)
+        return found ? found : base_fail(err, BASE_EINVAL, "%s: nobody has the code %.32s", o->args[0], o->args[1]);
+    int rc = ggn_study_store_delete(store, person.row, err);
+    if (!rc)
+        printf("%s: %s and all their trials are deleted; make the report again\n", o->args[0], person.id);
+    return rc;
+}
+
+static int run_delete(int argc, char **argv)
+{
+    static const struct base_options options = {
+        .list = no_options, .args_doc = "DIR PERSON", ARGS(2),
+        .doc = "Deletes a person, by the code that the page showed them, and all their trials. Exported files and reports made before still "
+               "hold them."};
+    return with_store(&options, argc, argv, 0, do_delete);
 }
 
 /* --- which verb --- */
@@ -226,39 +313,42 @@ struct verb {
 static const struct verb verbs[] = {
     {"init", run_init, "make a study from recorded sequences or pictures"},
     {"serve", run_serve, "serve its page on this machine"},
+    {"report", run_report, "thresholds, agreement, judgements: CSV, JSON, pictures"},
+    {"export", run_export, "all raw trials"},
+    {"import", run_import, "raw trials of the same study"},
+    {"delete", run_delete, "one participant and their trials"},
 };
+enum { N_VERBS = sizeof verbs / sizeof verbs[0] };
 
-static error_t parse_verb(int key, char *arg, struct argp_state *state)
+/* `ggn study` with options only. */
+static int study_options(int argc, char **argv)
 {
-    int *status = state->input;
-    if (key == ARGP_KEY_NO_ARGS)
-        argp_error(state, "a verb is needed: init, serve, report, export, import or delete");
-    if (key != ARGP_KEY_ARG)
-        return ARGP_ERR_UNKNOWN;
-    for (size_t i = 0; i < sizeof verbs / sizeof verbs[0]; i++)
-        if (strcmp(arg, verbs[i].name) == 0) {
-            char name[64];
-            char **rest = state->argv + state->next - 1;
-            snprintf(name, sizeof name, "ggn study %s", verbs[i].name);
-            rest[0] = name;
-            *status = verbs[i].run(state->argc - state->next + 1, rest);
-            state->next = state->argc;
-            return 0;
-        }
-    argp_error(state, "unknown verb '%s'", arg);
-    return 0;
+    char doc[1024];
+    size_t used = (size_t)snprintf(doc, sizeof doc, "Asks people, on a page that this machine serves: from how many samples on a block "
+                                   "looks converged, or whether a reconstructed picture looks the same as its reference.\vVerbs:\n");
+    for (int i = 0; i < N_VERBS && used < sizeof doc; i++)
+        used += (size_t)snprintf(doc + used, sizeof doc - used, "  %-8s %s\n", verbs[i].name, verbs[i].help);
+    if (used < sizeof doc)
+        snprintf(doc + used, sizeof doc - used, "\n`ggn study VERB --help` says more.");
+    struct base_options options = {.doc = doc, .args_doc = "VERB DIR [OPTION...]", .list = no_options};
+    struct base_err err = {0};
+    if (!base_options_parse(&options, argc, argv, NULL, &err))
+        base_fail(&err, BASE_EINVAL, "a verb is needed (ggn study --help lists them)");
+    return ggn_cmd_fail(argv[0], &err);
 }
 
 int ggn_cmd_study(int argc, char **argv)
 {
-    static const struct argp argp = {
-        .parser = parse_verb, .args_doc = "VERB DIR [OPTION...]",
-        .doc = "Asks people, on a page that this machine serves: from how many samples on a block looks converged, or whether a "
-               "reconstructed picture looks the same as its reference.\v"
-               "Verbs:\n  init    make a study from recorded sequences or pictures\n  serve   serve its page on this machine\n"
-               "  report  thresholds, agreement, judgements: CSV, JSON, pictures\n  export  all raw trials\n  import  raw trials of the same study\n"
-               "  delete  one participant and their trials\n\n`ggn study VERB --help` says more."};
-    int status = GGN_EXIT_OK;
-    argp_parse(&argp, argc, argv, ARGP_IN_ORDER, NULL, &status);
-    return status;
+    char name[64];
+    struct base_err err = {0};
+    if (argc < 2 || argv[1][0] == '-')
+        return study_options(argc, argv);
+    for (int i = 0; i < N_VERBS; i++)
+        if (strcmp(argv[1], verbs[i].name) == 0) {
+            snprintf(name, sizeof name, "ggn study %s", verbs[i].name);
+            argv[1] = name;
+            return verbs[i].run(argc - 1, argv + 1);
+        }
+    base_fail(&err, BASE_EINVAL, "%.64s: unknown verb (ggn study --help lists them)", argv[1]);
+    return ggn_cmd_fail(argv[0], &err);
 }

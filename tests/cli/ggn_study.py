@@ -128,7 +128,7 @@ check([b["levels"] for b in definition["views"][0]["blocks"]] == [[16, 64, 256, 
       "study.json holds blocks and levels, texts.json lies beside")
 fails("init: not over another study", "a study already", *init)
 fails("init: no views", "--views are needed", "init", os.path.join(TMP.name, "none"), "--task", "thresholds")
-fails("init: no such task", "expected thresholds or validation", "init", os.path.join(TMP.name, "none"), "--task", "taste", "--views", levels)
+fails("init: no such task", "--task taste: expected thresholds or validation", "init", os.path.join(TMP.name, "none"), "--task", "taste", "--views", levels)
 fails("init: not a view", "neither manifest.json nor a picture called reference", "init", os.path.join(TMP.name, "none"), "--task", "thresholds",
       "--views", TMP.name)
 fails("init: too few levels", "levels to show", "init", os.path.join(TMP.name, "none"), "--task", "thresholds", "--views", levels, "--spp-min", "200")
@@ -252,6 +252,56 @@ server.stop()
 server = Server(study, "0.0.0.0:0")
 check(server.prefix == link, "the token stays when it is started again")
 server.stop()
+
+# --- what was collected ---
+fails("report: nobody took part", "nobody has taken part yet", "report", (lambda d: (ggn("init", d, *init[2:]), d)[1])(os.path.join(TMP.name, "fresh")))
+adjustment = os.path.join(TMP.name, "adjustment")
+ggn("init", adjustment, "--task", "thresholds", "--views", levels, "--block", "16")
+server = Server(adjustment)
+codes = []
+for levels_set in ((64, 256), (16, 256), (1024, 1024)):
+    person = server.json("POST", "api/people", {"consent": True})[1]
+    codes.append(person["id"])
+    slots = server.json("GET", f"api/people/{person['key']}")[1]["slots"]
+    for i, s in enumerate(slots):
+        server.json("POST", f"api/people/{person['key']}/trials",
+                    {"slot": i, "revision": 0, "level": levels_set[s["block"]], "answer": 0, "rating": 0, "ms": 1500})
+check(server.json("POST", f"api/people/{person['key']}/trials", {"slot": 0, "revision": 2, "level": 16, "answer": 0, "rating": 0, "ms": 1})[0] == 409,
+      "a revision may not leave one out")
+server.json("POST", f"api/people/{person['key']}/trials", {"slot": 0, "revision": 1, "level": 256, "answer": 0, "rating": 0, "ms": 1500})
+server.stop()
+r = ggn("report", adjustment)
+report = os.path.join(adjustment, "report")
+lines = open(os.path.join(report, "blocks.csv")).read().split("\n")
+wanted = {0: (64 * 16 * (1024 if slots[0]["block"] == 1 else 512)) ** (1 / 3), 1: (256 * 256 * (1024 if slots[0]["block"] == 0 else 512)) ** (1 / 3)}
+got = {int(line.split(";")[1]): float(line.split(";")[2]) for line in lines[1:] if line}
+check(r.returncode == 0 and all(abs(got[b] / wanted[b] - 1) < 1e-3 for b in wanted), "report: thresholds are the geometric means over people and settings",
+      f"{r.stderr} {got} {wanted}")
+check(all(os.path.exists(os.path.join(report, f)) for f in
+          ("thresholds.csv", "thresholds-levels.json", "estimates.csv", "people.csv", "report.json", "thresholds.png", "people.png")), "report: all its files")
+r = subprocess.run([GGN, "compare", os.path.join(report, "thresholds.csv"), os.path.join(report, "thresholds-levels.json"), "--json"],
+                   capture_output=True, text=True)
+check(r.returncode == 0 and '"blocks": 2' in r.stdout and json.loads(r.stdout)["mae"] < 0.01, "report: ggn compare reads CSV and JSON", r.stderr)
+ceiling = json.load(open(os.path.join(report, "report.json")))["noise_ceiling"]
+check(ceiling["people"] == 0 and ceiling["pearson_lower"] is None, "report: two blocks are too few for a noise ceiling, and it says so")
+exported = os.path.join(TMP.name, "trials.json")
+r = ggn("export", adjustment, "-o", exported)
+check(r.returncode == 0 and len(json.load(open(exported))["people"]) == 3 and "key" not in json.load(open(exported))["people"][0], "export, without keys")
+copy = os.path.join(TMP.name, "copy")
+os.makedirs(copy)
+for name in ("study.json", "texts.json"):
+    with open(os.path.join(adjustment, name)) as f, open(os.path.join(copy, name), "w") as g:
+        g.write(f.read())
+check(ggn("import", copy, exported).returncode == 0, "import into a copy of the study")
+ggn("export", copy, "-o", exported + "2")
+check(open(exported).read() == open(exported + "2").read(), "and out again: the same bytes")
+fails("import: nobody twice", "is in the study already", "import", copy, exported)
+fails("import: another study", "trials of another study", "import", study, exported)
+fails("delete: nobody has that code", "nobody has the code", "delete", adjustment, "zzzzzzzz")
+check(ggn("delete", adjustment, codes[2]).returncode == 0 and ggn("report", adjustment, "-n").returncode == 0 and
+      codes[2] not in open(os.path.join(report, "people.csv")).read(), "delete: gone from the next report")
+check(len(contents(adjustment)[1]) == 8, "delete: the others' trials stay")
+check(ggn().returncode == 2 and ggn("taste", study).returncode == 2 and ggn("--help").returncode == 0, "usage")
 
 print(f"1..{count}")
 sys.exit(1 if failed else 0)

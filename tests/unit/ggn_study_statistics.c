@@ -1,0 +1,213 @@
+/* The statistics of `ggn study report` against published values, closed forms and data whose answer is known. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "study/summary.h"
+
+#define NEAR(a, b, by) assert_true(fabs((a) - (b)) <= (by))
+
+static void quantiles_are_those_of_the_tables(void **state)
+{
+    (void)state;
+    NEAR(ggn_study_normal(1.959963985), 0.975, 1e-9);
+    NEAR(ggn_study_normal_quantile(0.975), 1.959963985, 1e-8);
+    NEAR(ggn_study_normal_quantile(0.5), 0.0, 1e-12);
+    NEAR(ggn_study_t975(1), 12.7062, 1e-4);
+    NEAR(ggn_study_t975(10), 2.2281, 1e-4);
+    NEAR(ggn_study_t975(40), 2.0211, 2e-3);
+    NEAR(ggn_study_t975(1000), 1.9623, 1e-3);
+}
+
+static void wilson_is_wilson(void **state)
+{
+    double lo, hi;
+    (void)state;
+    ggn_study_wilson(8, 10, &lo, &hi); /* Agresti & Coull 1998's kind of example, by hand */
+    NEAR(lo, 0.4902, 5e-4);
+    NEAR(hi, 0.9433, 5e-4);
+    ggn_study_wilson(0, 10, &lo, &hi);
+    NEAR(lo, 0.0, 0.0);
+    NEAR(hi, 0.2775, 5e-4);
+    ggn_study_wilson(50, 100, &lo, &hi);
+    NEAR(lo + hi, 1.0, 1e-12);
+}
+
+enum { LEVELS = 13, EACH = 40 };
+
+/* EACH choices per level at exactly the expected share, half with the noise first; bias moves the shares apart. */
+static int expected_choices(struct ggn_study_choice *c, double t, double spread, double bias)
+{
+    int n = 0;
+    for (int l = 0; l < LEVELS; l++)
+        for (int first = 0; first < 2; first++) {
+            double x = 4.0 + 0.5 * l, d = ggn_study_normal_quantile(ggn_study_p_correct(x, t, spread));
+            int correct = (int)lround(EACH / 2 * ggn_study_normal(first ? d + bias : d - bias));
+            for (int i = 0; i < EACH / 2; i++)
+                c[n++] = (struct ggn_study_choice){x, first, i < correct};
+        }
+    return n;
+}
+
+static void a_curve_comes_back(void **state)
+{
+    static const struct { double t, spread, bias; } cases[] = {{7.0, 0.5, 0.0}, {6.3, 0.33, 0.0}, {8.1, 0.75, 0.0}, {7.0, 0.5, 0.8}, {7.0, 0.5, -0.4}};
+    struct ggn_study_choice c[LEVELS * EACH];
+    struct base_err err = {0};
+    (void)state;
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        struct ggn_study_curve curve = {.choices = c, .n = expected_choices(c, cases[i].t, cases[i].spread, cases[i].bias), .x_min = 4, .x_max = 10};
+        assert_int_equal(ggn_study_psychometric(&curve, 1, &err), 0);
+        const struct ggn_study_estimate *e = &curve.estimate;
+        NEAR(e->t, cases[i].t, 0.12);
+        assert_true(e->lo < cases[i].t && cases[i].t < e->hi && e->hi - e->lo < 0.8);
+        NEAR(log2(e->spread / cases[i].spread), 0.0, 0.7);
+        assert_int_equal(e->trials, LEVELS * EACH);
+    }
+}
+
+static void blocks_help_each_other(void **state)
+{
+    struct ggn_study_choice c[9][LEVELS * EACH];
+    struct ggn_study_curve curves[9], alone;
+    struct base_err err = {0};
+    (void)state;
+    for (int i = 0; i < 9; i++) {
+        int n = expected_choices(c[i], 7.0, 0.33, 0.8), kept = 0;
+        for (int k = i; k < n; k += 17)
+            c[i][kept++] = c[i][k];
+        curves[i] = (struct ggn_study_curve){.choices = c[i], .n = kept, .x_min = 4, .x_max = 10};
+    }
+    alone = curves[0];
+    assert_int_equal(ggn_study_psychometric(&alone, 1, &err) | ggn_study_psychometric(curves, 9, &err), 0);
+    assert_true(curves[0].estimate.hi - curves[0].estimate.lo < alone.estimate.hi - alone.estimate.lo);
+}
+
+static void guessing_tells_nothing(void **state)
+{
+    struct ggn_study_choice c[200];
+    struct ggn_study_curve curve = {.choices = c, .n = 200, .x_min = 4, .x_max = 10};
+    struct base_err err = {0};
+    (void)state;
+    for (int i = 0; i < 200; i++)
+        c[i] = (struct ggn_study_choice){4.0 + 0.5 * (i % LEVELS), i & 1, (i / 2) & 1};
+    assert_int_equal(ggn_study_psychometric(&curve, 1, &err), 0);
+    assert_true(curve.estimate.lo < 4.0); /* below every level: nothing was ever seen */
+}
+
+/* People over one view: settings[person][block] in octaves, one choice of words for excluded. */
+static void people_of(struct ggn_study_people *p, const struct ggn_study *s, int n, const double *settings, struct ggn_study_result *results,
+                      struct ggn_study_estimate *cells)
+{
+    static int first[2];
+    first[1] = s->views[0].n_blocks;
+    *p = (struct ggn_study_people){.study = s, .first = first, .n_cells = first[1], .n = n, .results = results};
+    for (int i = 0; i < n; i++) {
+        results[i] = (struct ggn_study_result){.cells = cells + i * first[1]};
+        for (int b = 0; b < first[1]; b++)
+            results[i].cells[b] = (struct ggn_study_estimate){.trials = 2, .t = settings[i * first[1] + b], .lo = 1, .hi = 2, .spread = 0.5};
+    }
+}
+
+static uint32_t levels[] = {16, 1024};
+static struct ggn_study_block blocks[] = {{0, 0, 0, 8, 8, 2, levels}, {1, 8, 0, 16, 8, 2, levels}, {2, 16, 0, 24, 8, 2, levels}, {3, 24, 0, 32, 8, 2, levels}};
+static struct ggn_study_view view = {.name = "v", .width = 32, .height = 8, .n_blocks = 4, .blocks = blocks};
+
+static void thresholds_are_means_over_people_that_count(void **state)
+{
+    const struct ggn_study s = {.task = GGN_STUDY_ADJUSTMENT, .n_views = 1, .views = &view};
+    static const double settings[] = {5, 6, 7, 11, 6, 7, 8, 9, 7, 8, 9, 12, 0, 0, 0, 0};
+    struct ggn_study_result results[4];
+    struct ggn_study_estimate cells[16];
+    struct ggn_study_threshold t[4];
+    struct ggn_study_people p;
+    (void)state;
+    people_of(&p, &s, 4, settings, results, cells);
+    strcpy(results[3].excluded, "because");
+    ggn_study_thresholds(&p, t);
+    NEAR(t[0].t, 6.0, 1e-12);
+    NEAR(t[0].hi - t[0].t, 4.3027 / sqrt(3.0), 1e-4); /* standard deviation 1, three people */
+    assert_int_equal(t[0].people, 3);
+    NEAR(t[3].t, (10.0 + 9.0 + 10.0) / 3.0, 1e-12); /* none beyond the highest level, 2^10 */
+    assert_int_equal(t[3].at_cap, 2);
+    p.n = 1;
+    ggn_study_thresholds(&p, t);
+    NEAR(t[0].lo, 1.0, 0.0); /* one person: their own interval */
+}
+
+static void the_noise_ceiling_is_between_people(void **state)
+{
+    const struct ggn_study s = {.task = GGN_STUDY_ADJUSTMENT, .n_views = 1, .views = &view};
+    static const double same[] = {5, 6, 7, 8, 6, 7, 8, 9, 4, 5, 6, 7}, other[] = {5, 6, 7, 8, 8, 7, 6, 5};
+    struct ggn_study_result results[3];
+    struct ggn_study_estimate cells[12];
+    struct ggn_study_ceiling c;
+    struct ggn_study_people p;
+    struct base_err err = {0};
+    (void)state;
+    people_of(&p, &s, 3, same, results, cells);
+    assert_int_equal(ggn_study_ceiling(&p, &c, &err), 0);
+    assert_true(c.people == 3 && c.blocks == 4);
+    NEAR(c.pearson_lower, 1.0, 1e-12);
+    NEAR(c.spearman_upper, 1.0, 1e-12);
+    NEAR(c.median_abs_log2_lower, (0.0 + 1.5 + 1.5) / 3.0, 1e-12); /* against the mean of the other two */
+    NEAR(c.median_abs_log2_upper, (0.0 + 1.0 + 1.0) / 3.0, 1e-12);
+    people_of(&p, &s, 2, other, results, cells);
+    assert_int_equal(ggn_study_ceiling(&p, &c, &err), 0);
+    NEAR(c.pearson_lower, -1.0, 1e-12);
+    p.n = 1;
+    assert_int_equal(ggn_study_ceiling(&p, &c, &err), 0);
+    assert_true(c.people == 0 && isnan(c.pearson_lower));
+}
+
+static void judgements_are_shares(void **state)
+{
+    char conditions[1][GGN_STUDY_NAME] = {"a"};
+    const struct ggn_study s = {.task = GGN_STUDY_VALIDATION, .n_views = 1, .views = &view, .n_conditions = 1, .conditions = conditions};
+    struct ggn_study_judgement all[2][5];
+    struct ggn_study_result results[2] = {{.judgements = all[0], .n_judgements = 5}, {.judgements = all[1], .n_judgements = 5}};
+    struct ggn_study_people p = {.study = &s, .n = 2, .results = results};
+    (void)state;
+    for (int i = 0; i < 2; i++)
+        for (int k = 0; k < 5; k++) /* the first says same always, the second never; the last is a catch trial */
+            all[i][k] = (struct ggn_study_judgement){0, k < 4 ? 0 : -1, i == 0, i == 0 ? 5 : 2};
+    struct ggn_study_share share = ggn_study_share(&p, -1, 0);
+    assert_true(share.n == 8 && share.same == 4);
+    NEAR(share.rating, 3.5, 1e-12);
+    NEAR(ggn_study_icc(&p, 0), 1.0, 1e-12); /* all of the variance is between people */
+    NEAR(ggn_study_share(&p, 0, -1).share, 0.5, 0.0);
+    strcpy(results[1].excluded, "because");
+    assert_int_equal(ggn_study_share(&p, -1, 0).n, 4);
+    assert_true(isnan(ggn_study_icc(&p, 0)));
+}
+
+static void power_is_the_textbook_formula(void **state)
+{
+    (void)state;
+    assert_int_equal(ggn_study_people_needed(0.7, 0.1, 1, 0.0), 354);  /* 7.849 · (0.21 + 0.24) / 0.01 = 353.2 */
+    assert_int_equal(ggn_study_people_needed(0.7, 0.1, 10, 0.0), 36);
+    assert_int_equal(ggn_study_people_needed(0.7, 0.1, 10, 1.0), 354); /* more of the same person tells nothing more */
+    assert_int_equal(ggn_study_people_needed(0.05, 0.1, 1, 0.0), ggn_study_people_needed(0.15, 0.1, 1, 0.0));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(quantiles_are_those_of_the_tables),
+        cmocka_unit_test(wilson_is_wilson),
+        cmocka_unit_test(a_curve_comes_back),
+        cmocka_unit_test(blocks_help_each_other),
+        cmocka_unit_test(guessing_tells_nothing),
+        cmocka_unit_test(thresholds_are_means_over_people_that_count),
+        cmocka_unit_test(the_noise_ceiling_is_between_people),
+        cmocka_unit_test(judgements_are_shares),
+        cmocka_unit_test(power_is_the_textbook_formula),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
