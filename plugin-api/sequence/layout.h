@@ -7,14 +7,12 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "sequence/block.h"
-
 #define SEQ_MAGIC "LULLSEQ1"
 
 enum {
     SEQ_FILE_HEADER = 64,
     SEQ_RECORD_HEADER = 32,
-    SEQ_STAT_BYTES = SEQ_NAME + 8,
+    SEQ_STAT_BYTES = 32, /* char name[24], f64 value */
     SEQ_PLANE_HEADER = 16,
     SEQ_KIND_LEVEL = 1,
     SEQ_KIND_REFERENCE = 2
