@@ -11,6 +11,7 @@
 #ifndef PT_INTEG_PATH_H
 #define PT_INTEG_PATH_H
 
+#include "integ/integrator.h"
 #include "integ/surface.h"
 #include "integ/trace.h"
 #include "sample/sampler.h"
