@@ -1,4 +1,4 @@
-#include "integ/kernels.h"
+#include "integ/kernel_sets.h"
 #include "integ/path.h"
 
 void pt_kernel_diffuse(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y, uint32_t sample,

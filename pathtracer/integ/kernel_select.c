@@ -1,6 +1,6 @@
 #include <stddef.h>
 
-#include "integ/kernels.h"
+#include "integ/kernel_sets.h"
 
 /* From small to large: the first that covers a scene is taken. */
 static const struct {

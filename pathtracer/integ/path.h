@@ -19,7 +19,7 @@
 #include "shade/camera.h"
 #include "shade/light_select.h"
 #include "shade/medium.h"
-#include "shade/phase.h"
+#include "shade/phase_function.h"
 
 #define PT_KERNEL_INLINE static inline __attribute__((always_inline))
 

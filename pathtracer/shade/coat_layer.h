@@ -13,7 +13,7 @@
 #include "shade/bsdf_conductor.h"
 #include "shade/bsdf_dielectric.h"
 #include "shade/bsdf_diffuse.h"
-#include "shade/phase.h"
+#include "shade/phase_function.h"
 
 enum { PT_LAYER_EVENTS = 10, PT_LAYER_ROULETTE = 4 };
 

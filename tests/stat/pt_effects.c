@@ -9,7 +9,7 @@
 #include <glob.h>
 #include <string.h>
 
-#include "integ/kernels.h"
+#include "integ/kernel_sets.h"
 #include "pbrt/load.h"
 #include "shade/medium.h"
 #include "shade/texture.h"

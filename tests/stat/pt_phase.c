@@ -7,7 +7,7 @@
 
 #include "sample/rng.h"
 #include "pt_chi2.h"
-#include "shade/phase.h"
+#include "shade/phase_function.h"
 
 enum { SEED = 77, SAMPLES = 400000 };
 

@@ -10,7 +10,7 @@
 #include <string.h>
 
 #include "geom/accel.h"
-#include "integ/kernels.h"
+#include "integ/kernel_sets.h"
 #include "shade/medium.h"
 #include "shade/texture.h"
 #include "support/pt_scenes.h"

@@ -2,8 +2,8 @@
  * Henyey–Greenstein phase function. Directions are unit; wo points back along the path, wi onwards, so that g > 0 (forward
  * scattering) prefers wi = -wo. The value is the density with which it is sampled.
  */
-#ifndef PT_SHADE_PHASE_H
-#define PT_SHADE_PHASE_H
+#ifndef PT_SHADE_PHASE_FUNCTION_H
+#define PT_SHADE_PHASE_FUNCTION_H
 
 #include "scene/vec.h"
 #include "shade/warp.h"

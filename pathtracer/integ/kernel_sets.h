@@ -1,6 +1,6 @@
 /* The compiled kernels: each kernel_NAME.c is the path kernel for one effect set. */
-#ifndef PT_INTEG_KERNELS_H
-#define PT_INTEG_KERNELS_H
+#ifndef PT_INTEG_KERNEL_SETS_H
+#define PT_INTEG_KERNEL_SETS_H
 
 #include "integ/integrator.h"
 
