@@ -9,7 +9,7 @@
 #include "base/err.h"
 #include "pbrt/load_options.h"
 
-enum { PT_CLI_MAX_PARAMS = 64, PT_CLI_MAX_STOP_MAPS = 4 };
+enum { PT_CLI_MAX_PARAMS = 64, PT_CLI_MAX_STOP_MAPS = 4, PT_CLI_SCENES_DEPTH = -2 };
 
 enum pt_cli_action { PT_CLI_RENDER, PT_CLI_LIST_CRITERIA, PT_CLI_EXPLAIN, PT_CLI_DEBUG_PATH, PT_CLI_SEQUENCE };
 
@@ -18,7 +18,7 @@ struct pt_cli {
     int action;                 /* enum pt_cli_action */
     const char *scene;          /* path; NULL only when criteria are listed */
     int block_width, block_height;
-    uint64_t spp_min, spp_max;
+    uint64_t spp_min, spp_max;  /* 0 with list-criteria only */
     uint64_t spp;               /* uniform; 0 = not given */
     double time_budget_s, max_check_overhead, max_seam;
     int width, height;          /* 0 = the scene's */
@@ -36,11 +36,11 @@ struct pt_cli {
     const char *checkpoint;
     double checkpoint_every_s;
     int resume;
-    uint32_t debug_x, debug_y, debug_sample;
+    int debug[3];               /* x, y, sample of --debug-path */
     int all_effects, strict, quiet, reproducible;
-    int sampler, strategy, filter; /* enums of integrator.h; -1 = the scene's */
-    float filter_radius;        /* <= 0: the usual one of the filter */
-    int has_max_depth, max_depth; /* max_depth < 0: unlimited */
+    int sampler, strategy, filter; /* enums of scene/settings.h; -1 = the scene's */
+    double filter_radius;       /* <= 0: the usual one of the filter */
+    int max_depth;              /* -1 = unlimited, PT_CLI_SCENES_DEPTH */
     uint32_t aov;               /* PT_FILM_* */
     uint32_t order_seed;        /* hidden: hand out work in a shuffled order */
     const char *sequence;       /* folder */

@@ -92,12 +92,12 @@ static void override_integrator(const struct pt_cli *cli, struct pt_integrator *
         i->sampler = cli->sampler;
     if (cli->strategy >= 0)
         i->strategy = cli->strategy;
-    if (cli->has_max_depth)
+    if (cli->max_depth != PT_CLI_SCENES_DEPTH)
         i->max_depth = cli->max_depth;
     if (cli->filter >= 0) {
         static const float usual_radius[3] = {0.5f, 1.0f, 1.5f};
         i->filter = cli->filter;
-        i->filter_x = i->filter_y = cli->filter_radius > 0.0f ? cli->filter_radius : usual_radius[cli->filter];
+        i->filter_x = i->filter_y = cli->filter_radius > 0.0 ? (float)cli->filter_radius : usual_radius[cli->filter];
         i->filter_sigma = 0.5f;
     }
 }
@@ -334,11 +334,13 @@ static void print_line(void *data, const char *text)
 static int debug_path(struct session *s, struct base_err *err)
 {
     struct pt_integrator integrator = s->defaults.integrator;
+    const int *at = s->cli.debug;
     override_integrator(&s->cli, &integrator);
-    if (s->cli.debug_x >= (uint32_t)s->defaults.width || s->cli.debug_y >= (uint32_t)s->defaults.height)
-        return base_fail(err, BASE_EINVAL, "--debug-path %u,%u,%u: the image has %dx%d pixels", s->cli.debug_x, s->cli.debug_y,
-                       s->cli.debug_sample, s->defaults.width, s->defaults.height);
-    return pt_kernel_trace(s->scene, &integrator, s->cli.debug_x, s->cli.debug_y, s->cli.debug_sample, print_line, NULL);
+    if (at[0] >= s->defaults.width || at[1] >= s->defaults.height)
+        return base_fail(err, BASE_EINVAL, "--debug-path %d,%d,%d: the image has %dx%d pixels", at[0], at[1], at[2],
+                         s->defaults.width, s->defaults.height);
+    pt_kernel_trace(s->scene, &integrator, (uint32_t)at[0], (uint32_t)at[1], (uint32_t)at[2], print_line, NULL);
+    return 0;
 }
 
 static int record_sequence(struct session *s, int *status, struct base_err *err)

@@ -31,7 +31,7 @@ typedef void pt_kernel(const struct pt_scene *scene, const struct pt_integrator 
 pt_kernel *pt_kernel_select(pt_effects needed, pt_effects *covers, const char **name);
 
 /* One path vertex by vertex in words on `out` (--debug-path). */
-int pt_kernel_trace(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y,
-                    uint32_t sample, void (*line)(void *data, const char *text), void *data);
+void pt_kernel_trace(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y,
+                     uint32_t sample, void (*line)(void *data, const char *text), void *data);
 
 #endif

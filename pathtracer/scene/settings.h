@@ -21,6 +21,10 @@ enum pt_strategy { PT_STRATEGIES(PT_STRATEGY_ID) };
 #define PT_FILTER_ID(id, word) PT_FILTER_##id,
 enum pt_filter_kind { PT_FILTERS(PT_FILTER_ID) };
 
+/* The words by the enumerations above, NULL after the last; and all of them as one text, "|box|triangle|gaussian". */
+extern const char *const pt_sampler_words[], *const pt_strategy_words[], *const pt_filter_words[];
+#define PT_WORD_OR(id, word) "|" word
+
 struct pt_integrator {
     int32_t max_depth;      /* most surface/medium bounces; < 0 = unlimited */
     int32_t rr_depth;       /* Russian roulette from this bounce on */

@@ -40,8 +40,8 @@ t "--list-criteria names criteria and parameters" sh -c "$P --list-criteria | gr
 refused "a scene file is needed"
 refused "No such file" nowhere.pbrt -q
 refused "unknown option" "$scene" --nonsense
-refused "its value is missing" "$scene" --seed
-refused "one scene at a time" "$scene" "$scene"
+refused "a value is needed" "$scene" --seed
+refused "one argument too many" "$scene" "$scene"
 printf 'Camera "perspective"\nWorldBegin\nShape "sphere" "float radius" [oops]\n' >broken.pbrt
 refused "broken.pbrt:3" broken.pbrt -q -o a.exr
 refused "--block 0" "$scene" --block 0
