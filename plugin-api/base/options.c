@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 #include "base/version.h"
 
@@ -62,7 +63,7 @@ static int has_ending(const struct base_option *o, const char *name)
 {
     for (int i = 0; o->words[i]; i++) {
         size_t n = strlen(name), k = strlen(o->words[i]);
-        if (n > k + 1 && name[n - k - 1] == '.' && !strcmp(name + n - k, o->words[i]))
+        if (n > k + 1 && name[n - k - 1] == '.' && !strcasecmp(name + n - k, o->words[i]))
             return 1;
     }
     return 0;
