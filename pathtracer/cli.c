@@ -199,14 +199,16 @@ static const struct base_option options[] = {
     {.help = "What to render:"},
     {"size", 0, "WxH", .set = set_size, .help = "Image size, instead of the scene's"},
     {"crop", 0, "X0,Y0,X1,Y1", .set = set_crop,
-     .help = "Keep only these pixels. Blocks that the crop touches are rendered whole, so that they stop as in the full image"},
+     .help = "Keep only these pixels. Blocks that the crop touches are rendered whole, so that they stop as in the full "
+             "image"},
     {"look-at", 0, "\"EX EY EZ AX AY AZ UX UY UZ\"", .set = set_look_at,
      .help = "Look from E at A with U up, in the scene's world, instead of through the scene's camera"},
     {"fov", 0, "DEGREES", TO(view.fov_deg), 1e-3, 179.9,
      .help = "Field of view over the image's short side, instead of the scene's"},
     {"sampler", 0, NULL, TO(sampler), .words = pt_sampler_words, .help = "Instead of the scene's"},
     {"integrator", 0, NULL, TO(strategy), .words = pt_strategy_words,
-     .help = "path: next-event estimation with multiple importance sampling (default); bsdf-only: brute force, for checking"},
+     .help = "path: next-event estimation with multiple importance sampling (default); bsdf-only: brute force, for "
+             "checking"},
     {"max-depth", 0, "N", TO(max_depth), -1, 1000000, .help = "Most bounces, instead of the scene's; -1 = unlimited"},
     {"filter", 0, PT_FILTERS(PT_WORD_OR) "[:RADIUS]" + 1, .set = set_filter,
      .help = "Pixel filter, instead of the scene's; radius in pixels"},
@@ -225,7 +227,8 @@ static const struct base_option options[] = {
     {"reproducible", 0, NULL, TO(reproducible), .help = "Leave times out of the EXR: equal renders are equal files"},
     {"quiet", 'q', NULL, TO(quiet), .help = "No progress, no notes"},
     {.help = "Interrupting and going on:"},
-    {"checkpoint", 0, "FILE", TO(checkpoint), .help = "Save the state of the render now and then, and when it is interrupted"},
+    {"checkpoint", 0, "FILE", TO(checkpoint),
+     .help = "Save the state of the render now and then, and when it is interrupted"},
     {"checkpoint-every", 0, "SECONDS", TO(checkpoint_every_s), 0, 1e9, .help = "How often (default 60)"},
     {"resume", 0, NULL, TO(resume), .help = "Go on from the checkpoint"},
     {.help = "Looking inside:"},
@@ -283,8 +286,8 @@ int pt_cli_parse(struct pt_cli *cli, int argc, char **argv, struct base_err *err
         .args_max = 1,
         .args = offsetof(struct pt_cli, scene),
     };
-    *cli = (struct pt_cli){.block_width = 200, .block_height = 200, .checkpoint_every_s = 60.0, .sampler = -1, .strategy = -1,
-                           .filter = -1, .max_depth = PT_CLI_SCENES_DEPTH};
+    *cli = (struct pt_cli){.block_width = 200, .block_height = 200, .checkpoint_every_s = 60.0, .sampler = -1,
+                           .strategy = -1, .filter = -1, .max_depth = PT_CLI_SCENES_DEPTH};
     int rc = base_options_parse(&command, argc, argv, cli, err);
     if (!rc)
         rc = check_together(cli, err);

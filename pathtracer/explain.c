@@ -37,8 +37,8 @@ static void print_times(const struct pt_scene *scene, const struct pt_scene_defa
            best_s[0] * 1e6 / (GRID * GRID), best_s[1] / best_s[0]);
 }
 
-void pt_explain(const struct pt_scene *scene, const struct pt_scene_defaults *defaults, const struct pt_integrator *integrator,
-                const char *scene_path)
+void pt_explain(const struct pt_scene *scene, const struct pt_scene_defaults *defaults,
+                const struct pt_integrator *integrator, const char *scene_path)
 {
     pt_effects effects = scene->effects, covers = 0;
     const char *name = "";
@@ -53,11 +53,12 @@ void pt_explain(const struct pt_scene *scene, const struct pt_scene_defaults *de
             snprintf(where, sizeof where, "%s:%d", why->file, why->line);
         else if (effects >> i & 1)
             snprintf(where, sizeof where, "the scene as a whole, or --effects");
-        printf("  %-13s %-3s %-6s  %-32s  %s\n", pt_effects_name(i), effects >> i & 1 ? "on" : "off", covers >> i & 1 ? "has it" : "-",
-               where, pt_effects_cost(i));
+        printf("  %-13s %-3s %-6s  %-32s  %s\n", pt_effects_name(i), effects >> i & 1 ? "on" : "off",
+               covers >> i & 1 ? "has it" : "-", where, pt_effects_cost(i));
     }
     printf("kernel: %s\n", name);
     print_times(scene, defaults, integrator, kernel);
     printf("scene: %lld triangles, %lld quadrics, %lld instances, %lld lights, %lld materials, %lld textures, %.1f MB\n",
-           stats->triangles, stats->quadrics, stats->instances, stats->lights, stats->materials, stats->textures, (double)stats->bytes * 1e-6);
+           stats->triangles, stats->quadrics, stats->instances, stats->lights, stats->materials, stats->textures,
+           (double)stats->bytes * 1e-6);
 }

@@ -76,8 +76,8 @@ static void note(void *data, const char *line)
 static int load_scene(struct session *s, struct base_err *err)
 {
     struct pt_load_options options = {.strict = s->cli.strict, .width = s->cli.width, .height = s->cli.height,
-                                      .view = s->cli.view, .forced = s->cli.all_effects ? PT_FX_ALL : 0, .quiet = s->cli.quiet, .warn = note,
-                                      .warn_data = s};
+                                      .view = s->cli.view, .forced = s->cli.all_effects ? PT_FX_ALL : 0,
+                                      .quiet = s->cli.quiet, .warn = note, .warn_data = s};
     int rc = pt_scene_load(s->cli.scene, &options, &s->scene, &s->defaults, err);
     if (rc)
         return rc;
@@ -123,7 +123,8 @@ static int make_config(const struct session *s, struct pt_render_config *config,
     memcpy(config->crop, cli->has_crop ? cli->crop : s->defaults.crop, sizeof config->crop);
     override_integrator(cli, &config->integrator);
     if (config->crop[2] > config->width || config->crop[3] > config->height)
-        return base_fail(err, BASE_EINVAL, "--crop %d,%d,%d,%d: the image has %dx%d pixels", config->crop[0], config->crop[1],
+        return base_fail(err, BASE_EINVAL, "--crop %d,%d,%d,%d: the image has %dx%d pixels", config->crop[0],
+                         config->crop[1],
                        config->crop[2], config->crop[3], config->width, config->height);
     return 0;
 }
@@ -203,7 +204,8 @@ static int describe_settings(struct session *s, const struct pt_render_config *c
         "scene-crc=%08x\nsize=%dx%d\ncrop=%d,%d,%d,%d\nblock=%dx%d\nspp-min=%llu\nspp-max=%llu\nuniform=%d\nmax-seam=%g\n"
         "aov=%u\nseed=%u\nsampler=%d\nintegrator=%d\nfilter=%d:%gx%g:%g\nmax-depth=%d\nrr-depth=%d\nclamp=%g\n",
         crc, c->width, c->height, c->crop[0], c->crop[1], c->crop[2], c->crop[3], c->block_width, c->block_height,
-        (unsigned long long)c->spp_min, (unsigned long long)c->spp_max, c->uniform, c->max_seam, c->planes, i->seed, i->sampler,
+        (unsigned long long)c->spp_min, (unsigned long long)c->spp_max, c->uniform, c->max_seam, c->planes, i->seed,
+        i->sampler,
         i->strategy, i->filter, (double)i->filter_x, (double)i->filter_y, (double)i->filter_sigma, i->max_depth, i->rr_depth,
         (double)i->max_component);
     const struct pt_view *view = &s->cli.view;
@@ -211,9 +213,11 @@ static int describe_settings(struct session *s, const struct pt_render_config *c
     for (int k = 0; view->has_look_at && k < 9; k++)
         used += (size_t)snprintf(s->settings + used, room - used, "%.17g ", view->look_at_world[k]);
     const struct lull_criterion *t = s->criterion ? s->criterion->table : NULL;
-    used += (size_t)snprintf(s->settings + used, room - used, "\ncriterion=%s %s\n", t ? t->id : "none", t ? t->version : "");
+    used += (size_t)snprintf(s->settings + used, room - used, "\ncriterion=%s %s\n", t ? t->id : "none",
+                             t ? t->version : "");
     for (uint32_t k = 0; k < s->cli.param_count && used < room; k++)
-        used += (size_t)snprintf(s->settings + used, room - used, "param=%s=%s\n", s->cli.params[k].key, s->cli.params[k].value);
+        used += (size_t)snprintf(s->settings + used, room - used, "param=%s=%s\n", s->cli.params[k].key,
+                                 s->cli.params[k].value);
     return used < room ? 0 : base_fail(err, BASE_EINVAL, "the criterion's parameters are too long");
 }
 
@@ -248,8 +252,8 @@ static int write_outputs(struct session *s, int was_interrupted, struct base_err
     const struct pt_cli *cli = &s->cli;
     struct pt_output_info info = {.scene = cli->scene, .params = cli->params, .param_count = cli->param_count,
                                   .effects = s->scene->effects, .kernel = s->kernel_name,
-                                  .threads = base_threads_count(s->threads), .reproducible = cli->reproducible, .aov = cli->aov,
-                                  .scene_bytes = s->scene->stats.bytes, .interrupted = was_interrupted};
+                                  .threads = base_threads_count(s->threads), .reproducible = cli->reproducible,
+                                  .aov = cli->aov, .scene_bytes = s->scene->stats.bytes, .interrupted = was_interrupted};
     struct base_err e = {0};
     if (cli->output && pt_output_exr(cli->output, s->render, &info, &e) != 0)
         *err = e;
@@ -271,7 +275,8 @@ static void tell_summary(struct session *s)
         by_reason[r->blocks.list[i].reason]++;
     double pixels = (double)r->film.pixels;
     char line[512];
-    size_t used = (size_t)snprintf(line, sizeof line, "%.0f spp on average, %.1f s, %.2f Mpaths/s, criterion %.1f %%; blocks:",
+    size_t used = (size_t)snprintf(line, sizeof line,
+                                   "%.0f spp on average, %.1f s, %.2f Mpaths/s, criterion %.1f %%; blocks:",
                                    (double)r->totals.samples / pixels, pt_render_elapsed_s(r),
                                    (double)r->totals.paths / fmax(r->totals.render_s, 1e-9) * 1e-6,
                                    100.0 * r->totals.criterion_s / fmax(pt_render_elapsed_s(r), 1e-9));
@@ -302,7 +307,8 @@ static int render_image(struct session *s, int *status, struct base_err *err)
             rc = err->code = BASE_EINVAL; /* the checkpoint is an input */
         return rc;
     }
-    struct pt_render_hooks hooks = {.slice = after_slice, .interrupted = interrupted, .suspend = on_suspend, .warn = say, .data = s};
+    struct pt_render_hooks hooks = {.slice = after_slice, .interrupted = interrupted, .suspend = on_suspend, .warn = say,
+                                    .data = s};
     s->checkpoint_at_s = base_clock_wall_s() + s->cli.checkpoint_every_s;
     rc = pt_render_run(s->render, &hooks, &outcome, err);
     pt_progress_clear(&s->progress);
@@ -345,9 +351,11 @@ static int debug_path(struct session *s, struct base_err *err)
 
 static int record_sequence(struct session *s, int *status, struct base_err *err)
 {
-    struct pt_sequence_config config = {.directory = s->cli.sequence, .levels = s->cli.levels, .blocks = s->cli.sequence_blocks,
+    struct pt_sequence_config config = {.directory = s->cli.sequence, .levels = s->cli.levels,
+                                        .blocks = s->cli.sequence_blocks,
                                         .reference_spp = s->cli.reference_spp, .scene_path = s->cli.scene,
-                                        .name = s->cli.name, .view = s->cli.view, .quiet = s->cli.quiet, .slice = after_slice};
+                                        .name = s->cli.name, .view = s->cli.view, .quiet = s->cli.quiet,
+                                        .slice = after_slice};
     int rc = make_config(s, &config.render, err);
     if (!rc)
         rc = scene_crc(s->cli.scene, &config.scene_crc, err);
@@ -356,7 +364,8 @@ static int record_sequence(struct session *s, int *status, struct base_err *err)
     if (rc)
         return rc;
     int was_interrupted = 0;
-    rc = pt_sequence_record(&config, s->scene, s->kernel, s->threads, s->criterion, interrupted, say, s, &was_interrupted, err);
+    rc = pt_sequence_record(&config, s->scene, s->kernel, s->threads, s->criterion, interrupted, say, s, &was_interrupted,
+                            err);
     pt_progress_clear(&s->progress);
     *status = was_interrupted ? EXIT_INTERRUPTED : 0;
     return rc;

@@ -17,7 +17,7 @@ struct pt_accel {
     atomic_llong bytes;
 };
 
-/* --- quadrics as user geometry ------------------------------------------------------------------------------------------- */
+/* --- quadrics as user geometry ---------------------------------------------------------------------------------------- */
 
 static void quadric_bounds(const struct RTCBoundsFunctionArguments *args)
 {
@@ -33,8 +33,8 @@ static void quadric_bounds(const struct RTCBoundsFunctionArguments *args)
 
 static int quadric_query(const struct pt_quadric *q, const struct RTCRay *ray, float *t, pt_vec3 *p_quadric)
 {
-    return pt_quadric_intersect(q, v3(ray->org_x, ray->org_y, ray->org_z), v3(ray->dir_x, ray->dir_y, ray->dir_z), ray->tnear,
-                                ray->tfar, t, p_quadric);
+    return pt_quadric_intersect(q, v3(ray->org_x, ray->org_y, ray->org_z), v3(ray->dir_x, ray->dir_y, ray->dir_z),
+                                ray->tnear, ray->tfar, t, p_quadric);
 }
 
 /* Only single rays are traced, so N is 1 and the argument is a plain RTCRayHit. */
@@ -64,7 +64,7 @@ static void quadric_occluded(const struct RTCOccludedFunctionNArguments *args)
         ray->tfar = -INFINITY;
 }
 
-/* --- building ------------------------------------------------------------------------------------------------------------ */
+/* --- building --------------------------------------------------------------------------------------------------------- */
 
 static bool count_bytes(void *user, ssize_t bytes, bool post)
 {
@@ -257,12 +257,14 @@ void pt_accel_release(struct pt_scene *scene)
 
 long long pt_accel_bytes(const struct pt_scene *scene) { return scene->accel ? atomic_load(&scene->accel->bytes) : 0; }
 
-/* --- queries ------------------------------------------------------------------------------------------------------------- */
+/* --- queries ---------------------------------------------------------------------------------------------------------- */
 
 static inline struct RTCRay make_ray(const struct pt_ray *ray)
 {
-    return (struct RTCRay){.org_x = ray->origin.x,    .org_y = ray->origin.y,    .org_z = ray->origin.z,    .tnear = ray->t_min,
-                           .dir_x = ray->direction.x, .dir_y = ray->direction.y, .dir_z = ray->direction.z, .time = ray->time,
+    return (struct RTCRay){.org_x = ray->origin.x,    .org_y = ray->origin.y,    .org_z = ray->origin.z,
+                           .tnear = ray->t_min,
+                           .dir_x = ray->direction.x, .dir_y = ray->direction.y, .dir_z = ray->direction.z,
+                           .time = ray->time,
                            .tfar = ray->t_max,        .mask = ~0u,               .id = 0,                   .flags = 0};
 }
 

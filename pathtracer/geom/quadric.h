@@ -1,6 +1,6 @@
 /*
- * Ray–quadric intersection in the quadric's own space, in double: origin offsets and scene scale then need no tolerance here.
- * Pure, thread-safe. Shared by the ray queries and by light sampling.
+ * Ray–quadric intersection in the quadric's own space, in double: origin offsets and scene scale then need no tolerance
+ * here. Pure, thread-safe. Shared by the ray queries and by light sampling.
  */
 #ifndef PT_GEOM_QUADRIC_H
 #define PT_GEOM_QUADRIC_H

@@ -32,7 +32,8 @@ static exr_result_t write_header(exr_context_t file, const struct pt_exr_image *
 {
     int part = 0;
     exr_result_t rc = exr_add_part(file, "lull", EXR_STORAGE_SCANLINE, &part);
-    exr_attr_box2i_t display = box(0, 0, image->width, image->height), stored = box(image->x0, image->y0, image->x1, image->y1);
+    exr_attr_box2i_t display = box(0, 0, image->width, image->height),
+        stored = box(image->x0, image->y0, image->x1, image->y1);
     exr_attr_v2f_t centre;
     centre.x = centre.y = 0.0f;
     if (rc == EXR_ERR_SUCCESS)
@@ -112,7 +113,8 @@ int pt_exr_write(const char *path, const struct pt_exr_image *image, struct base
     if (rc)
         return rc;
     if (image->channel_count < 1 || image->channel_count > MAX_CHANNELS)
-        return base_fail(err, BASE_EINVAL, "%s: %d channels, at most %d can be written", path, image->channel_count, MAX_CHANNELS);
+        return base_fail(err, BASE_EINVAL, "%s: %d channels, at most %d can be written", path, image->channel_count,
+                         MAX_CHANNELS);
     exr_context_t file = NULL;
     exr_context_initializer_t init = EXR_DEFAULT_CONTEXT_INITIALIZER;
     init.error_handler_fn = ignore_message;

@@ -45,10 +45,12 @@ int read_pixels(OIIO::ImageInput &input, const char *name, pt_oiio_image *out, b
     const OIIO::ImageSpec &spec = input.spec();
     const int channels = std::min(spec.nchannels, 4);
     if (spec.width <= 0 || spec.height <= 0 || channels <= 0 || spec.depth > 1)
-        return base_fail(err, BASE_EINVAL, "%s: not a 2-D image (%dx%dx%d, %d channels)", name, spec.width, spec.height, spec.depth,
+        return base_fail(err, BASE_EINVAL, "%s: not a 2-D image (%dx%dx%d, %d channels)", name, spec.width, spec.height,
+                         spec.depth,
                        spec.nchannels);
     if (static_cast<long long>(spec.width) * spec.height > max_pixels)
-        return base_fail(err, BASE_EINVAL, "%s: %dx%d pixels, more than the 2^28 an image may have", name, spec.width, spec.height);
+        return base_fail(err, BASE_EINVAL, "%s: %dx%d pixels, more than the 2^28 an image may have", name, spec.width,
+                         spec.height);
     const bool bytes = spec.format == OIIO::TypeDesc::UINT8;
     const OIIO::TypeDesc type = bytes ? OIIO::TypeDesc::UINT8 : OIIO::TypeDesc::FLOAT;
     const bool is_float = spec.format.is_floating_point();
@@ -124,7 +126,8 @@ extern "C" int pt_oiio_read(const char *path, struct pt_oiio_image *out, struct 
         const OIIO::ImageSpec config = raw_config();
         std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::open(path, &config);
         if (!input)
-            return base_fail(err, BASE_EINVAL, "%s: not an image that can be read: %s", path, one_line(OIIO::geterror()).c_str());
+            return base_fail(err, BASE_EINVAL, "%s: not an image that can be read: %s", path,
+                             one_line(OIIO::geterror()).c_str());
         return read_pixels(*input, path, out, err);
     } catch (const std::bad_alloc &) {
         return base_fail_nomem(err, path);
@@ -155,7 +158,8 @@ extern "C" int pt_oiio_read_memory(const char *name, const void *data, size_t si
         OIIO::Filesystem::IOProxy *proxy = &reader;
         config.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &proxy);
         if (!input->open(name, spec, config))
-            return base_fail(err, BASE_EINVAL, "%s: not an image that can be read: %s", name, one_line(input->geterror()).c_str());
+            return base_fail(err, BASE_EINVAL, "%s: not an image that can be read: %s", name,
+                             one_line(input->geterror()).c_str());
         return read_pixels(*input, name, out, err);
     } catch (const std::bad_alloc &) {
         return base_fail_nomem(err, name);
@@ -176,7 +180,8 @@ extern "C" int pt_oiio_write_png(const char *path, int32_t width, int32_t height
                                  struct base_err *err)
 {
     if (width < 1 || height < 1 || channels < 1 || channels > 4)
-        return base_fail(err, BASE_EINVAL, "%s: cannot write %dx%d pixels of %d channels as PNG", path, width, height, channels);
+        return base_fail(err, BASE_EINVAL, "%s: cannot write %dx%d pixels of %d channels as PNG", path, width, height,
+                         channels);
     try {
         configure_once();
         std::vector<unsigned char> bytes;
@@ -188,8 +193,8 @@ extern "C" int pt_oiio_write_png(const char *path, int32_t width, int32_t height
         spec.attribute("oiio:ColorSpace", "sRGB");
         if (channels == 4)
             spec.attribute("oiio:UnassociatedAlpha", 1);
-        if (!output->set_ioproxy(&memory) || !output->open(path, spec) || !output->write_image(OIIO::TypeDesc::UINT8, pixels) ||
-            !output->close())
+        if (!output->set_ioproxy(&memory) || !output->open(path, spec) ||
+            !output->write_image(OIIO::TypeDesc::UINT8, pixels) || !output->close())
             return base_fail(err, BASE_EIO, "%s: %s", path, one_line(output->geterror()).c_str());
         struct base_file_out file;
         int rc = base_file_begin(&file, path, err);

@@ -23,7 +23,8 @@ struct pt_oiio_image {
 };
 
 /* Reads the first sub-image of `path`. EXR, HDR, PFM, PNG, JPEG, TGA, TIFF … whatever OpenImageIO reads; more than four
- * channels are cut to the first four. BASE_EIO when it cannot be opened, BASE_EINVAL when it is no image, damaged, or larger than
+ * channels are cut to the first four. BASE_EIO when it cannot be opened, BASE_EINVAL when it is no image, damaged, or larger
+ * than
  * 2^28 pixels. On success the caller releases *out. */
 int pt_oiio_read(const char *path, struct pt_oiio_image *out, struct base_err *err);
 

@@ -7,8 +7,8 @@
 /* Diffuse surfaces lit by area lights: the classic Cornell box. */
 #define PT_FX_SET_DIFFUSE (PT_FX_MANY_LIGHTS)
 /* Textured interiors: all surfaces, no media, nothing moves. */
-#define PT_FX_SET_SURFACES                                                                                                        \
-    (PT_FX_MANY_LIGHTS | PT_FX_TEXTURE | PT_FX_BUMP | PT_FX_SPECULAR | PT_FX_GLOSSY | PT_FX_TRANSMISSION | PT_FX_COATED |         \
+#define PT_FX_SET_SURFACES \
+    (PT_FX_MANY_LIGHTS | PT_FX_TEXTURE | PT_FX_BUMP | PT_FX_SPECULAR | PT_FX_GLOSSY | PT_FX_TRANSMISSION | PT_FX_COATED | \
      PT_FX_ENVIRONMENT | PT_FX_DELTA_LIGHT | PT_FX_QUADRIC | PT_FX_DEFOCUS)
 /* The same with glass that absorbs, or in fog. */
 #define PT_FX_SET_MEDIA (PT_FX_SET_SURFACES | PT_FX_ABSORPTION | PT_FX_SCATTERING)

@@ -1,10 +1,10 @@
 /*
  * The path kernel: one source, compiled once per effect set by the files kernel_*.c.
  *
- * Unidirectional path tracing with next-event estimation and multiple importance sampling (power heuristic; Veach 1997, §9.2),
- * Russian roulette on the throughput without refraction's radiance scaling, participating media, interfaces and alpha.
- * Every number drawn has its own dimension (sample/sampler.h), and code for an absent effect would only have tested data that
- * is not there: so all kernels that cover a scene return the same bits.
+ * Unidirectional path tracing with next-event estimation and multiple importance sampling (power heuristic; Veach 1997,
+ * §9.2), Russian roulette on the throughput without refraction's radiance scaling, participating media, interfaces and
+ * alpha. Every number drawn has its own dimension (sample/sampler.h), and code for an absent effect would only have tested
+ * data that is not there: so all kernels that cover a scene return the same bits.
  *
  * `fx` is a compile-time constant wherever it appears; `trace` is a constant NULL but in the tracing kernel.
  */
@@ -26,8 +26,8 @@
 /* Shadow rays end this share before their target, which is already off its surface. */
 #define PT_SHADOW_END 0.9999f
 
-/* A path between perfect mirrors loses nothing and would never end when the depth is unlimited: beyond this many bounces roulette
- * takes some of them whatever they carry. */
+/* A path between perfect mirrors loses nothing and would never end when the depth is unlimited: beyond this many bounces
+ * roulette takes some of them whatever they carry. */
 #define PT_PATH_LONG 1000
 #define PT_KEEP_LONG 0.99f
 
@@ -83,14 +83,16 @@ PT_KERNEL_INLINE int pt_path_intersect(pt_effects fx, struct pt_path *path, int 
 }
 
 /* Of a medium that fills the whole shadow ray; direction unnormalised, its length in `length`. */
-PT_KERNEL_INLINE pt_vec3 pt_path_medium_transmittance(const struct pt_path *path, const struct pt_ray *ray, float length, int32_t medium)
+PT_KERNEL_INLINE pt_vec3 pt_path_medium_transmittance(const struct pt_path *path, const struct pt_ray *ray, float length,
+                                                      int32_t medium)
 {
     struct pt_rng rng = pt_sampler_stream(&path->sampler, PT_DIM_SHADOW);
     return pt_medium_transmittance(&path->scene->media[medium], ray->origin, v3_scale(ray->direction, 1.0f / length),
                                    ray->t_max * length, &rng);
 }
 
-/* What gets through a shadow ray that may cross alpha masks and interfaces; direction unnormalised, its length in `length`. */
+/* What gets through a shadow ray that may cross alpha masks and interfaces; direction unnormalised, its length in
+ * `length`. */
 PT_KERNEL_INLINE pt_vec3 pt_path_transmittance(pt_effects fx, struct pt_path *path, struct pt_ray *ray, float length,
                                                int32_t medium)
 {
@@ -108,7 +110,8 @@ PT_KERNEL_INLINE pt_vec3 pt_path_transmittance(pt_effects fx, struct pt_path *pa
             return v3_splat(0.0f);
         float end = found ? hit.t : ray->t_max;
         if ((fx & PT_FX_MEDIA) && medium >= 0)
-            through = v3_mul(through, pt_medium_transmittance(&scene->media[medium], v3_madd(ray->origin, ray->t_min, ray->direction),
+            through = v3_mul(through, pt_medium_transmittance(&scene->media[medium],
+                                                              v3_madd(ray->origin, ray->t_min, ray->direction),
                                                               unit, (end - ray->t_min) * length, &rng));
         if (!found || v3_is_black(through))
             return through;
@@ -136,8 +139,9 @@ PT_KERNEL_INLINE int pt_path_sample_light(pt_effects fx, const struct pt_path *p
     return pt_light_sample(fx, path->scene, p, pt_sampler_1d(&path->sampler, PT_DIM_LIGHT_PICK), u.x, u.y, light);
 }
 
-/* What a light adds if nothing is in between. It is worked out before the shadow ray is traced, together with the path's next
- * direction: two independent chains of arithmetic then overlap, where a query between them would make the second wait. */
+/* What a light adds if nothing is in between. It is worked out before the shadow ray is traced, together with the path's
+ * next direction: two independent chains of arithmetic then overlap, where a query between them would make the second
+ * wait. */
 struct pt_light_plan {
     struct pt_light_sample light;
     pt_vec3 add;         /* to the path's radiance; black: no shadow ray needed */
@@ -193,8 +197,8 @@ PT_KERNEL_INLINE void pt_path_add_emission(pt_effects fx, struct pt_path *path, 
         return;
     float weight = 1.0f;
     if (path->pdf_prev > 0.0f && path->settings->strategy == PT_STRATEGY_MIS)
-        weight = pt_mis_weight(path->pdf_prev, pt_light_area_pdf(fx, path->scene, at->shape, at->primitive, path->p_prev, at->p,
-                                                                 at->s.n_geometric, path->ray.direction));
+        weight = pt_mis_weight(path->pdf_prev, pt_light_area_pdf(fx, path->scene, at->shape, at->primitive, path->p_prev,
+                                                                 at->p, at->s.n_geometric, path->ray.direction));
     pt_vec3 l = v3_scale(v3_mul(path->throughput, light->emission), weight);
     path->radiance = v3_add(path->radiance, l);
     if (path->trace)
@@ -236,8 +240,8 @@ PT_KERNEL_INLINE int pt_path_at_max_depth(const struct pt_path *path)
     return path->settings->max_depth >= 0 && path->depth >= path->settings->max_depth;
 }
 
-/* The way to the next surface through the current medium, from ray.t_min to t_end. 1: the path scattered on the way (its ray is
- * the next one), 0: it reached t_end, -1: it is over. */
+/* The way to the next surface through the current medium, from ray.t_min to t_end. 1: the path scattered on the way (its ray
+ * is the next one), 0: it reached t_end, -1: it is over. */
 PT_KERNEL_INLINE int pt_path_cross_medium(pt_effects fx, struct pt_path *path, float t_end)
 {
     const struct pt_medium *medium = &path->scene->media[path->medium];
@@ -282,7 +286,8 @@ PT_KERNEL_INLINE void pt_path_aux(pt_effects fx, const struct pt_path *path, con
 }
 
 /* The next direction: its ray replaces the path's. 0: the path ends. */
-PT_KERNEL_INLINE int pt_path_scatter(pt_effects fx, struct pt_path *path, const struct pt_place *at, const struct pt_frame *frame,
+PT_KERNEL_INLINE int pt_path_scatter(pt_effects fx, struct pt_path *path, const struct pt_place *at,
+                                     const struct pt_frame *frame,
                                      const struct pt_bsdf *bsdf, pt_vec3 wo, struct pt_sample2 u)
 {
     struct pt_bsdf_sample next;
@@ -300,7 +305,8 @@ PT_KERNEL_INLINE int pt_path_scatter(pt_effects fx, struct pt_path *path, const 
     if (fx & PT_FX_MEDIA)
         path->medium = pt_medium_towards(at, wi, path->medium);
     path->p_prev = at->p;
-    path->ray = (struct pt_ray){pt_offset_point(at->p, at->s.n_geometric, at->error, wi), wi, 0.0f, INFINITY, path->ray.time};
+    path->ray = (struct pt_ray){pt_offset_point(at->p, at->s.n_geometric, at->error, wi), wi, 0.0f, INFINITY,
+                                path->ray.time};
     path->depth++;
     return pt_path_survives(path);
 }
@@ -310,7 +316,8 @@ PT_KERNEL_INLINE int pt_path_bounce(pt_effects fx, struct pt_path *path, const s
                                     struct pt_path_result *out)
 {
     /* these need nothing of the hit: asked for first, they are worked out while its data arrive */
-    struct pt_sample2 u_bsdf = pt_sampler_2d(&path->sampler, PT_DIM_BSDF), u_light = pt_sampler_2d(&path->sampler, PT_DIM_LIGHT);
+    struct pt_sample2 u_bsdf = pt_sampler_2d(&path->sampler, PT_DIM_BSDF),
+        u_light = pt_sampler_2d(&path->sampler, PT_DIM_LIGHT);
     float u_mix = fx & PT_FX_MIX ? pt_sampler_1d(&path->sampler, PT_DIM_MIX) : 0.0f;
     const struct pt_material *material = pt_material_resolve(fx, path->scene, at->shape->material, &at->s, u_mix);
     struct pt_frame frame = pt_material_frame(fx, path->scene, material, &at->s);
@@ -359,10 +366,12 @@ PT_KERNEL_INLINE pt_vec3 pt_path_exposed(const struct pt_path *path)
     return peak > limit && isfinite(peak) ? v3_scale(c, limit / peak) : c;
 }
 
-PT_KERNEL_INLINE void pt_path_sample(pt_effects fx, const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x,
+PT_KERNEL_INLINE void pt_path_sample(pt_effects fx, const struct pt_scene *scene, const struct pt_integrator *settings,
+                                     uint32_t x,
                                      uint32_t y, uint32_t sample, struct pt_trace *trace, struct pt_path_result *out)
 {
-    struct pt_path path = {.scene = scene, .settings = settings, .trace = trace, .throughput = {1.0f, 1.0f, 1.0f}, .eta_scale = 1.0f};
+    struct pt_path path = {.scene = scene, .settings = settings, .trace = trace, .throughput = {1.0f, 1.0f, 1.0f},
+                           .eta_scale = 1.0f};
     path.sampler = pt_sampler_make(settings->sampler == PT_SAMPLER_SOBOL, settings->seed, x, y, sample);
     *out = (struct pt_path_result){.depth = INFINITY};
     pt_path_start(fx, &path, x, y);

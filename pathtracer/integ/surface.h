@@ -45,13 +45,15 @@ static inline void pt_place_uv(const struct pt_mesh *mesh, const uint32_t *index
         s->v = v;
         return;
     }
-    const float *a = mesh->uvs + 2 * (size_t)index[0], *b = mesh->uvs + 2 * (size_t)index[1], *c = mesh->uvs + 2 * (size_t)index[2];
+    const float *a = mesh->uvs + 2 * (size_t)index[0], *b = mesh->uvs + 2 * (size_t)index[1],
+        *c = mesh->uvs + 2 * (size_t)index[2];
     float w = 1.0f - u - v;
     s->u = w * a[0] + u * b[0] + v * c[0];
     s->v = w * a[1] + u * b[1] + v * c[1];
 }
 
-/* Tangents from positions and texture coordinates (Pharr, Jakob & Humphreys 2016, §3.6.2); zero when those are degenerate. */
+/* Tangents from positions and texture coordinates (Pharr, Jakob & Humphreys 2016, §3.6.2); zero when those are
+ * degenerate. */
 static inline void pt_place_tangents(const struct pt_mesh *mesh, const uint32_t *index, pt_vec3 e1, pt_vec3 e2,
                                      struct pt_surface *s)
 {
@@ -84,7 +86,8 @@ static inline void pt_place_mesh(pt_effects fx, const struct pt_scene *scene, co
     pt_vec3 c = pt_vertex(mesh->positions, index[2]);
     struct pt_surface *s = &at->s;
     at->p = pt_corners_mix(a, b, c, hit->u, hit->v);
-    at->error = v3_scale(v3(pt_max3_abs(a.x, b.x, c.x), pt_max3_abs(a.y, b.y, c.y), pt_max3_abs(a.z, b.z, c.z)), PT_OFFSET_ERROR);
+    at->error = v3_scale(v3(pt_max3_abs(a.x, b.x, c.x), pt_max3_abs(a.y, b.y, c.y), pt_max3_abs(a.z, b.z, c.z)),
+                         PT_OFFSET_ERROR);
     pt_vec3 n = v3_norm(hit->geometric);
     if (mesh->normals) {
         pt_vec3 ns = v3_norm(pt_corners_mix(pt_vertex(mesh->normals, index[0]), pt_vertex(mesh->normals, index[1]),
@@ -117,8 +120,8 @@ static inline void pt_place_quadric(const struct pt_scene *scene, const struct p
 void pt_place_instance(const struct pt_scene *scene, int32_t instance, float time, struct pt_place *at);
 
 /* All of *at but for what the effect set says nobody will read. */
-static inline void pt_place_at_hit(pt_effects fx, const struct pt_scene *scene, const struct pt_ray *ray, const struct pt_hit *hit,
-                                   struct pt_place *at)
+static inline void pt_place_at_hit(pt_effects fx, const struct pt_scene *scene, const struct pt_ray *ray,
+                                   const struct pt_hit *hit, struct pt_place *at)
 {
     at->shape = &scene->shapes[hit->shape];
     at->primitive = hit->primitive;

@@ -45,7 +45,8 @@ struct pt_state {
 };
 
 /* Header directives, kept until WorldBegin. */
-enum pt_header { PT_HEADER_FILM, PT_HEADER_CAMERA, PT_HEADER_SAMPLER, PT_HEADER_INTEGRATOR, PT_HEADER_FILTER, PT_HEADER_COUNT };
+enum pt_header { PT_HEADER_FILM, PT_HEADER_CAMERA, PT_HEADER_SAMPLER, PT_HEADER_INTEGRATOR, PT_HEADER_FILTER,
+                PT_HEADER_COUNT };
 
 struct pt_material_info {
     struct pt_loc loc;
@@ -119,7 +120,8 @@ void pt_build_conductor(struct pt_builder *b, const struct pt_state *s, struct p
 double pt_build_index(struct pt_builder *b, struct pt_params *p, const char *name, double fallback);
 
 /* build_texture.c */
-int pt_build_texture(struct pt_builder *b, const struct pt_state *s, const char *name, const char *class_name, struct pt_params *p);
+int pt_build_texture(struct pt_builder *b, const struct pt_state *s, const char *name, const char *class_name,
+                     struct pt_params *p);
 /* Float or colour parameter that may be textured; the fallback when absent. */
 struct pt_input pt_build_float_input(struct pt_builder *b, struct pt_params *p, const char *name, double fallback);
 struct pt_input pt_build_colour_input(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const char *name,

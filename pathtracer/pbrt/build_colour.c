@@ -31,8 +31,8 @@ static int read_spd_file(struct pt_builder *b, const struct pt_param *param, con
             if (!pt_grow((void **)&numbers, &room, n, sizeof *numbers))
                 pt_diag_nomem(&b->diag, "spectrum");
             else if (!pt_number_parse(start, (size_t)(at - start), &numbers[n++]))
-                pt_diag_fail(&b->diag, param->loc, "%s: \"%.*s\" (expected a number)", path, at - start < 30 ? (int)(at - start) : 30,
-                             start);
+                pt_diag_fail(&b->diag, param->loc, "%s: \"%.*s\" (expected a number)", path,
+                             at - start < 30 ? (int)(at - start) : 30, start);
         }
     }
     if (!b->diag.rc && (n < 2 || n % 2 != 0))
@@ -73,7 +73,8 @@ static int read_spectrum(struct pt_builder *b, struct pt_params *p, struct pt_pa
         return 0;
     }
     if (param->count == 0 || param->count % 2 != 0)
-        return pt_diag_fail(&b->diag, param->loc, "spectrum has %zu numbers (expected pairs of wavelength and value)", param->count);
+        return pt_diag_fail(&b->diag, param->loc, "spectrum has %zu numbers (expected pairs of wavelength and value)",
+                            param->count);
     for (size_t i = 2; i < param->count; i += 2)
         if (!(v[i] > v[i - 2]))
             return pt_diag_fail(&b->diag, param->loc, "wavelength %g after %g (expected rising ones)", v[i], v[i - 2]);

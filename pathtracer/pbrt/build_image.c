@@ -115,7 +115,8 @@ static void build_filter(struct pt_builder *b)
     } else {
         pt_diag_fail(&b->diag, p->loc, "unknown filter \"%s\" (expected box, triangle, gaussian, mitchell or sinc)", kind);
     }
-    double x = pt_params_float_in(p, "xradius", fallback, 1e-3, 100), y = pt_params_float_in(p, "yradius", fallback, 1e-3, 100);
+    double x = pt_params_float_in(p, "xradius", fallback, 1e-3, 100),
+        y = pt_params_float_in(p, "yradius", fallback, 1e-3, 100);
     it->filter_x = (float)pt_params_float_in(p, "xwidth", x, 1e-3, 100);
     it->filter_y = (float)pt_params_float_in(p, "ywidth", y, 1e-3, 100);
     it->filter_sigma = (float)sigma;
@@ -133,7 +134,8 @@ static void build_sampler(struct pt_builder *b)
     const char *kind = pt_params_kind(p);
     b->defaults->integrator.sampler = is_one_of(kind, random) ? PT_SAMPLER_INDEPENDENT : PT_SAMPLER_SOBOL;
     if (!is_one_of(kind, random) && !is_one_of(kind, low_discrepancy))
-        pt_diag_fail(&b->diag, p->loc, "unknown sampler \"%s\" (expected independent, sobol, zsobol, halton, stratified …)", kind);
+        pt_diag_fail(&b->diag, p->loc, "unknown sampler \"%s\" (expected independent, sobol, zsobol, halton, stratified …)",
+                     kind);
     int xs = pt_params_int_in(p, "xsamples", 4, 1, 65536), ys = pt_params_int_in(p, "ysamples", 4, 1, 16384);
     b->defaults->spp = pt_params_int_in(p, "pixelsamples", strcmp(kind, "stratified") == 0 ? xs * ys : 16, 1, 1 << 30);
     b->defaults->integrator.seed = (uint32_t)pt_params_int_in(p, "seed", (int)b->defaults->integrator.seed, 0, 2147483647);

@@ -72,7 +72,8 @@ static void make_point(struct context *c)
 static void make_spot(struct context *c)
 {
     double from[3] = {0, 0, 0}, to[3] = {0, 0, 1}, power = pt_params_float(c->p, "power", -1);
-    double cone = pt_params_float_in(c->p, "coneangle", 30, 1e-3, 180), delta = pt_params_float_in(c->p, "conedeltaangle", 5, 0, 180);
+    double cone = pt_params_float_in(c->p, "coneangle", 30, 1e-3, 180),
+        delta = pt_params_float_in(c->p, "conedeltaangle", 5, 0, 180);
     double cos_total = cos(cone * pi / 180), cos_start = cos(fmax(cone - delta, 0) * pi / 180);
     c->light->kind = PT_LIGHT_SPOT;
     c->light->emission = scaled_colour(c->b, c->s, c->p, "I");
@@ -155,7 +156,8 @@ static void make_infinite(struct context *c)
     c->light->emission = scaled_colour(c->b, c->s, p, "L");
     c->light->kind = PT_LIGHT_ENV_CONSTANT;
     if (pt_params_find(p, "portal")) {
-        pt_diag_warn(&c->b->diag, pt_params_find(p, "portal")->loc, "the portal of an infinite light only guides sampling: ignored");
+        pt_diag_warn(&c->b->diag, pt_params_find(p, "portal")->loc,
+                     "the portal of an infinite light only guides sampling: ignored");
         pt_params_ignore(p, "portal");
     }
     pt_builder_effect(c->b, PT_FX_ENVIRONMENT, p->loc);
@@ -174,7 +176,8 @@ static void make_infinite(struct context *c)
     /* v4 maps are square and equal-area, v3 maps twice as wide as high; v4 files with a v3 map exist. */
     c->light->mapping = map->width == map->height ? PT_ENV_EQUAL_AREA : PT_ENV_LATLONG;
     if (map->width != map->height && map->width != 2 * map->height)
-        pt_diag_warn(&c->b->diag, loc, "environment map of %d x %d pixels is taken as latitude and longitude", map->width, map->height);
+        pt_diag_warn(&c->b->diag, loc, "environment map of %d x %d pixels is taken as latitude and longitude", map->width,
+                     map->height);
     if (illuminance > 0)
         pt_diag_warn(&c->b->diag, p->loc, "illuminance of an image light is ignored");
     light_space(c);
@@ -189,7 +192,8 @@ static void make_projection(struct context *c)
 
 static void make_goniometric(struct context *c)
 {
-    pt_diag_warn(&c->b->diag, c->p->loc, "light \"%s\" is replaced by a point light without its image", pt_params_kind(c->p));
+    pt_diag_warn(&c->b->diag, c->p->loc, "light \"%s\" is replaced by a point light without its image",
+                 pt_params_kind(c->p));
     pt_params_ignore(c->p, "mapname filename");
     make_point(c);
 }
@@ -219,7 +223,8 @@ int pt_build_light(struct pt_builder *b, const struct pt_state *s, struct pt_par
         if (strcmp(kinds[i].kind, pt_params_kind(p)) == 0)
             kinds[i].make(&c);
     if (light.kind < 0)
-        return pt_diag_fail(&b->diag, p->loc, "unknown light \"%s\" (expected point, spot, distant, infinite …)", pt_params_kind(p));
+        return pt_diag_fail(&b->diag, p->loc, "unknown light \"%s\" (expected point, spot, distant, infinite …)",
+                            pt_params_kind(p));
     pt_params_ignore(p, "nsamples samples");
     pt_params_check_used(p);
     if (!b->diag.rc && !v3_is_black(light.emission))
@@ -249,7 +254,8 @@ int pt_build_area_light(struct pt_builder *b, const struct pt_state *s, struct p
 
 int32_t pt_build_shape_light(struct pt_builder *b, const struct pt_area_light *source, double area)
 {
-    struct pt_light light = {.kind = PT_LIGHT_AREA, .two_sided = source->two_sided, .image = -1, .emission = source->emission};
+    struct pt_light light = {.kind = PT_LIGHT_AREA, .two_sided = source->two_sided, .image = -1,
+                             .emission = source->emission};
     light.shape = (int32_t)b->world_shapes.count;
     if (source->power > 0 && area > 0)
         light.emission = v3_scale(light.emission, (float)(source->power / ((source->two_sided ? 2 : 1) * area * pi)));

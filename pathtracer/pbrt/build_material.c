@@ -14,8 +14,8 @@ static double v3_alpha(double roughness)
     return 1.62142 + x * (0.819955 + x * (0.1734 + x * (0.0171201 + x * 0.000640711)));
 }
 
-static void read_roughness(struct pt_builder *b, struct pt_params *p, const char *prefix, double fallback, struct pt_input *u,
-                           struct pt_input *v)
+static void read_roughness(struct pt_builder *b, struct pt_params *p, const char *prefix, double fallback,
+                           struct pt_input *u, struct pt_input *v)
 {
     char name[48];
     const char *const suffix[3] = {"roughness", "uroughness", "vroughness"};
@@ -234,7 +234,8 @@ int32_t pt_build_material(struct pt_builder *b, const struct pt_state *s, const 
     struct context c = {b, s, p, kind, &m};
     pt_params_ignore(p, "type");
     if (!build_v4(&c) && !pt_build_material_v3(b, s, kind, p, &m, &info)) {
-        pt_diag_fail(&b->diag, p->loc, "unknown material \"%s\" (expected diffuse, coateddiffuse, conductor, dielectric, mix …)", kind);
+        pt_diag_fail(&b->diag, p->loc, "unknown material \"%s\" (expected diffuse, coateddiffuse, conductor, dielectric, "
+                     "mix …)", kind);
         return -1;
     }
     if (!m.bump)

@@ -56,7 +56,8 @@ static void make_plastic(struct context *c)
 
 static void make_uber(struct context *c)
 {
-    struct pt_input kd = colour(c, "Kd", 0.25f), ks = colour(c, "Ks", 0.25f), kr = colour(c, "Kr", 0), kt = colour(c, "Kt", 0);
+    struct pt_input kd = colour(c, "Kd", 0.25f), ks = colour(c, "Ks", 0.25f), kr = colour(c, "Kr", 0),
+        kt = colour(c, "Kt", 0);
     double eta = index_of(c, 1.5);
     pt_build_roughness(c->b, c->p, 0.1, 1, c->m);
     c->m->eta = (float)eta;
@@ -163,8 +164,8 @@ static void make_disney(struct context *c)
     c->m->reflectance = colour(c, "color", 0.5f);
     pt_build_roughness(c->b, c->p, 0.5, 0, c->m);
     c->m->eta = (float)pt_build_index(c->b, c->p, "eta", 1.5);
-    pt_params_ignore(c->p, "metallic speculartint anisotropic sheen sheentint clearcoat clearcoatgloss spectrans scatterdistance "
-                           "thin flatness difftrans");
+    pt_params_ignore(c->p, "metallic speculartint anisotropic sheen sheentint clearcoat clearcoatgloss spectrans "
+                           "scatterdistance thin flatness difftrans");
     clear_coat(c);
 }
 

@@ -50,7 +50,8 @@ static const struct {
                {"Spectralon", {11.6f, 20.4f, 14.9f}, {0, 0, 0}},
                {"Wholemilk", {2.55f, 3.21f, 3.77f}, {0.0011f, 0.0024f, 0.014f}}};
 
-static void read_coefficients(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, int is_grid, struct pt_medium *m)
+static void read_coefficients(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, int is_grid,
+                              struct pt_medium *m)
 {
     const char *preset = pt_params_string(p, "preset", "");
     /* pbrt's defaults: whole milk in a homogeneous medium, 1 in a grid. */
@@ -114,13 +115,15 @@ static int read_grid(struct pt_builder *b, const struct pt_state *s, struct pt_p
     if (!density)
         return pt_diag_fail(&b->diag, p->loc, "a grid medium needs \"float density\"");
     if (n != expected)
-        return pt_diag_fail(&b->diag, pt_params_find(p, "density")->loc, "density has %zu values (expected nx·ny·nz = %zu)", n, expected);
+        return pt_diag_fail(&b->diag, pt_params_find(p, "density")->loc, "density has %zu values (expected nx·ny·nz = %zu)",
+                            n, expected);
     float *kept = pt_arena_alloc(&b->scene->arena, n, sizeof *kept);
     if (!kept)
         return pt_diag_nomem(&b->diag, "a grid medium");
     for (size_t i = 0; i < n; i++) {
         if (density[i] < 0)
-            return pt_diag_fail(&b->diag, pt_params_find(p, "density")->loc, "density %zu is %g (expected 0 or more)", i, density[i]);
+            return pt_diag_fail(&b->diag, pt_params_find(p, "density")->loc, "density %zu is %g (expected 0 or more)", i,
+                                density[i]);
         kept[i] = (float)density[i];
     }
     m->density = kept;

@@ -20,7 +20,8 @@ struct placement {
 
 /* --- where a shape goes ------------------------------------------------------------------------------------------------ */
 
-static struct placement place(struct pt_builder *b, const struct pt_state *s, const struct pt_params *p, const double probe[3])
+static struct placement place(struct pt_builder *b, const struct pt_state *s, const struct pt_params *p,
+                              const double probe[3])
 {
     struct placement pl = {.animated = 0};
     pt_builder_at_shutter(b, s->ctm, pl.at);
@@ -46,7 +47,8 @@ static struct placement place(struct pt_builder *b, const struct pt_state *s, co
 }
 
 /* What every shape has: material, alpha, media, side, light. */
-static struct pt_shape common(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const struct placement *pl)
+static struct pt_shape common(struct pt_builder *b, const struct pt_state *s, struct pt_params *p,
+                              const struct placement *pl)
 {
     struct pt_shape shape = {.light = -1, .medium_in = s->medium_in, .medium_out = s->medium_out};
     shape.material = s->material >= 0 ? s->material : pt_build_default_material(b);
@@ -262,7 +264,8 @@ static int make_triangle_mesh(struct pt_builder *b, const struct pt_state *s, st
     const char *uv_name = pt_params_find(p, "uv") ? "uv" : pt_params_find(p, "st") ? "st" : "UV";
     soup.uvd = pt_params_floats(p, uv_name, 2, &uv_count);
     if (soup.nd && n_count != soup.vertex_count)
-        return pt_diag_fail(&b->diag, pt_params_find(p, "N")->loc, "%zu normals for %zu vertices", n_count, soup.vertex_count);
+        return pt_diag_fail(&b->diag, pt_params_find(p, "N")->loc, "%zu normals for %zu vertices", n_count,
+                            soup.vertex_count);
     if (soup.uvd && uv_count != soup.vertex_count)
         return pt_diag_fail(&b->diag, pt_params_find(p, uv_name)->loc, "%zu texture coordinates for %zu vertices", uv_count,
                             soup.vertex_count);
@@ -311,7 +314,8 @@ static int make_ply_mesh(struct pt_builder *b, const struct pt_state *s, struct 
 static double quadric_area(const struct pt_quadric *q, const struct pt_xform *t)
 {
     double r = (double)q->radius, phi = (double)q->phi_max, height = (double)q->z_max - (double)q->z_min;
-    double own = q->kind == PT_QUADRIC_DISK ? 0.5 * phi * (r * r - (double)q->inner_radius * (double)q->inner_radius) : phi * r * height;
+    double inner = (double)q->inner_radius;
+    double own = q->kind == PT_QUADRIC_DISK ? 0.5 * phi * (r * r - inner * inner) : phi * r * height;
     return own * pow(fabs(pt_xform_det(t)), 2.0 / 3.0); /* exact for uniform scales */
 }
 
@@ -350,7 +354,8 @@ static int make_disk(struct pt_builder *b, const struct pt_state *s, struct pt_p
     double inner = pt_params_float_in(p, "innerradius", 0, 0, 1e30);
     if (!(inner < r))
         return pt_diag_fail(&b->diag, p->loc, "innerradius %g is not below radius %g", inner, r);
-    struct pt_quadric q = {.kind = PT_QUADRIC_DISK, .radius = (float)r, .inner_radius = (float)inner, .z_min = (float)h, .z_max = (float)h};
+    struct pt_quadric q = {.kind = PT_QUADRIC_DISK, .radius = (float)r, .inner_radius = (float)inner, .z_min = (float)h,
+                           .z_max = (float)h};
     return add_quadric(b, s, p, &q);
 }
 
@@ -360,11 +365,12 @@ static int make_cylinder(struct pt_builder *b, const struct pt_state *s, struct 
     double z0 = pt_params_float(p, "zmin", -1), z1 = pt_params_float(p, "zmax", 1);
     if (z0 == z1)
         return pt_diag_fail(&b->diag, p->loc, "zmin and zmax are both %g", z0);
-    struct pt_quadric q = {.kind = PT_QUADRIC_CYLINDER, .radius = (float)r, .z_min = (float)fmin(z0, z1), .z_max = (float)fmax(z0, z1)};
+    struct pt_quadric q = {.kind = PT_QUADRIC_CYLINDER, .radius = (float)r, .z_min = (float)fmin(z0, z1),
+                           .z_max = (float)fmax(z0, z1)};
     return add_quadric(b, s, p, &q);
 }
 
-/* --- dispatch, objects -------------------------------------------------------------------------------------------------- */
+/* --- dispatch, objects ------------------------------------------------------------------------------------------------ */
 
 static int make_nurbs(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
 {
@@ -386,7 +392,8 @@ int pt_build_shape(struct pt_builder *b, const struct pt_state *s, struct pt_par
     for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
         if (strcmp(kinds[i].kind, pt_params_kind(p)) == 0)
             return kinds[i].make(b, s, p);
-    return pt_diag_fail(&b->diag, p->loc, "unknown shape \"%s\" (expected trianglemesh, plymesh, sphere, disk …)", pt_params_kind(p));
+    return pt_diag_fail(&b->diag, p->loc, "unknown shape \"%s\" (expected trianglemesh, plymesh, sphere, disk …)",
+                        pt_params_kind(p));
 }
 
 int pt_build_object_begin(struct pt_builder *b, const char *name, struct pt_loc loc)

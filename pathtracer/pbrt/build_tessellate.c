@@ -48,8 +48,8 @@ static int add_quad(struct grower *g, size_t a, size_t b, size_t c, size_t d)
 
 static int finish(struct grower *g, int ok, struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
 {
-    struct pt_soup soup = {.vertex_count = g->vertices, .triangle_count = g->corners / 3, .pd = g->p, .nd = g->n, .uvd = g->uv,
-                           .indices = g->indices};
+    struct pt_soup soup = {.vertex_count = g->vertices, .triangle_count = g->corners / 3, .pd = g->p, .nd = g->n,
+                           .uvd = g->uv, .indices = g->indices};
     if (!ok)
         pt_diag_nomem(&b->diag, "a shape");
     else
@@ -61,7 +61,7 @@ static int finish(struct grower *g, int ok, struct pt_builder *b, const struct p
     return b->diag.rc;
 }
 
-/* --- bilinear patches --------------------------------------------------------------------------------------------------- */
+/* --- bilinear patches ------------------------------------------------------------------------------------------------- */
 
 static double lerp2(const double *c00, const double *c10, const double *c01, const double *c11, double u, double v, size_t k)
 {
@@ -94,7 +94,8 @@ int pt_build_bilinear(struct pt_builder *b, const struct pt_state *s, struct pt_
         return b->diag.rc;
     if (!P || (!indices && vertices != 4) || (indices && count % 4 != 0) ||
         (uv && uv_count != vertices) || (N && n_count != vertices))
-        return pt_diag_fail(&b->diag, p->loc, "a bilinearmesh needs \"point3 P\", four indices per patch, uv and N per vertex");
+        return pt_diag_fail(&b->diag, p->loc,
+                            "a bilinearmesh needs \"point3 P\", four indices per patch, uv and N per vertex");
     if (!indices) {
         indices = identity;
         count = 4;
@@ -136,7 +137,7 @@ int pt_build_bilinear(struct pt_builder *b, const struct pt_state *s, struct pt_
     return finish(&g, ok, b, s, p);
 }
 
-/* --- curves: tubes of six sides ------------------------------------------------------------------------------------------ */
+/* --- curves: tubes of six sides --------------------------------------------------------------------------------------- */
 
 enum { CURVE_SIDES = 6, CURVE_CUTS = 8 };
 
@@ -208,7 +209,8 @@ int pt_build_curve(struct pt_builder *b, const struct pt_state *s, struct pt_par
     if (!spline && strcmp(basis, "bezier") != 0)
         return pt_diag_fail(&b->diag, p->loc, "unknown curve basis \"%.40s\" (expected bezier or bspline)", basis);
     if (!P || count < corners || (count - corners) % step != 0)
-        return pt_diag_fail(&b->diag, p->loc, "a curve of degree %d needs %zu points and %zu more per segment", degree, corners, step);
+        return pt_diag_fail(&b->diag, p->loc, "a curve of degree %d needs %zu points and %zu more per segment", degree,
+                            corners, step);
     pt_diag_warn(&b->diag, p->loc, "curves are rendered as tubes of %d sides", (int)CURVE_SIDES);
     size_t segments = (count - corners) / step + 1;
     for (size_t i = 0; i < segments && ok; i++) {
@@ -231,7 +233,7 @@ int pt_build_curve(struct pt_builder *b, const struct pt_state *s, struct pt_par
     return finish(&g, ok, b, s, p);
 }
 
-/* --- height fields and surfaces of revolution (v3) ------------------------------------------------------------------------ */
+/* --- height fields and surfaces of revolution (v3) -------------------------------------------------------------------- */
 
 static int add_grid(struct grower *g, size_t first, size_t nx, size_t ny)
 {
@@ -269,7 +271,8 @@ enum { AROUND = 64, ALONG = 16 };
 int pt_build_revolved(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
 {
     const char *kind = pt_params_kind(p);
-    double radius = pt_params_float_in(p, "radius", 1, 1e-30, 1e30), phi = pt_params_float_in(p, "phimax", 360, 1e-3, 360) * pi / 180;
+    double radius = pt_params_float_in(p, "radius", 1, 1e-30, 1e30),
+        phi = pt_params_float_in(p, "phimax", 360, 1e-3, 360) * pi / 180;
     double height = pt_params_float(p, "height", 1), z0 = pt_params_float(p, "zmin", 0), z1 = pt_params_float(p, "zmax", 1);
     double p1[3] = {0, 0, 0}, p2[3] = {1, 1, 1};
     struct grower g = {0};

@@ -31,7 +31,8 @@ static double parse_encoding(const char *encoding)
         return 0;
     if (strcmp(encoding, "linear") == 0)
         return 1;
-    if (strncmp(encoding, "gamma ", 6) == 0 && pt_number_parse(encoding + 6, strlen(encoding + 6), &gamma) && gamma > 0.05 && gamma < 20)
+    if (strncmp(encoding, "gamma ", 6) == 0 && pt_number_parse(encoding + 6, strlen(encoding + 6), &gamma) && gamma > 0.05 &&
+        gamma < 20)
         return gamma;
     return -1;
 }
@@ -145,8 +146,8 @@ static struct pt_input named_texture(struct pt_builder *b, struct pt_params *p, 
     int32_t id = pt_names_get(is_float ? &b->float_textures : &b->colour_textures, name);
     if (id < 0) {
         int other = pt_names_get(is_float ? &b->colour_textures : &b->float_textures, name) >= 0;
-        pt_diag_fail(&b->diag, param->loc, other ? "texture \"%s\" is a %s texture (expected %s)" : "unknown texture \"%s\"", name,
-                     is_float ? "spectrum" : "float", is_float ? "float" : "spectrum");
+        pt_diag_fail(&b->diag, param->loc, other ? "texture \"%s\" is a %s texture (expected %s)" : "unknown texture \"%s\"",
+                     name, is_float ? "spectrum" : "float", is_float ? "float" : "spectrum");
         return pt_input_constant(0, 0, 0);
     }
     const struct pt_texture *t = &((struct pt_texture *)b->textures.items)[id];
@@ -219,7 +220,8 @@ static void read_mapping(struct context *c, struct pt_texture *t)
             pt_diag_fail(&c->b->diag, pt_params_find(p, "mapping")->loc,
                          "unknown mapping \"%.40s\" (expected uv, spherical, cylindrical or planar)", mapping);
         else
-            pt_diag_warn(&c->b->diag, pt_params_find(p, "mapping")->loc, "mapping \"%s\" is replaced by the shape's own uv", mapping);
+            pt_diag_warn(&c->b->diag, pt_params_find(p, "mapping")->loc, "mapping \"%s\" is replaced by the shape's own uv",
+                         mapping);
     }
     t->su = (float)pt_params_float(p, "uscale", 1);
     t->sv = (float)pt_params_float(p, "vscale", 1);
@@ -310,7 +312,8 @@ static void make_imagemap(struct context *c, struct pt_texture *t)
               : strcmp(wrap, "octahedralsphere") == 0   ? PT_WRAP_OCTAHEDRAL
                                                         : -1;
     if (t->wrap < 0)
-        pt_diag_fail(&c->b->diag, pt_params_find(p, "wrap")->loc, "unknown wrap \"%.40s\" (expected repeat, black or clamp)", wrap);
+        pt_diag_fail(&c->b->diag, pt_params_find(p, "wrap")->loc, "unknown wrap \"%.40s\" (expected repeat, black or clamp)",
+                     wrap);
     t->scale = (float)pt_params_float(p, "scale", 1);
     t->invert = pt_params_bool(p, "invert", 0);
     read_mapping(c, t);
@@ -337,7 +340,8 @@ static void make_stand_in(struct context *c, struct pt_texture *t)
     pt_params_ignore(c->p, "octaves roughness scale variation filename encoding gamma invert");
 }
 
-int pt_build_texture(struct pt_builder *b, const struct pt_state *s, const char *name, const char *class_name, struct pt_params *p)
+int pt_build_texture(struct pt_builder *b, const struct pt_state *s, const char *name, const char *class_name,
+                     struct pt_params *p)
 {
     static const struct {
         const char *kind;
@@ -347,15 +351,18 @@ int pt_build_texture(struct pt_builder *b, const struct pt_state *s, const char 
                  {"dots", make_stand_in}, {"fbm", make_stand_in},      {"wrinkled", make_stand_in}, {"windy", make_stand_in},
                  {"marble", make_stand_in}, {"ptex", make_stand_in},   {"uv", make_stand_in}};
     int is_float = strcmp(class_name, "float") == 0;
-    if (!is_float && strcmp(class_name, "spectrum") != 0 && strcmp(class_name, "color") != 0 && strcmp(class_name, "rgb") != 0)
-        return pt_diag_fail(&b->diag, p->loc, "texture \"%s\" of type \"%s\" (expected float or spectrum)", name, class_name);
+    if (!is_float && strcmp(class_name, "spectrum") != 0 && strcmp(class_name, "color") != 0 &&
+        strcmp(class_name, "rgb") != 0)
+        return pt_diag_fail(&b->diag, p->loc, "texture \"%s\" of type \"%s\" (expected float or spectrum)", name,
+                            class_name);
     struct context c = {b, s, p, is_float};
     struct pt_texture t = {.kind = -1, .scale = 1, .su = 1, .sv = 1, .channel = 0};
     for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
         if (strcmp(kinds[i].kind, pt_params_kind(p)) == 0)
             kinds[i].make(&c, &t);
     if (t.kind < 0)
-        return pt_diag_fail(&b->diag, p->loc, "unknown texture class \"%s\" (expected imagemap, scale, mix, constant, checkerboard …)",
+        return pt_diag_fail(&b->diag, p->loc, "unknown texture class \"%s\" (expected imagemap, scale, mix, "
+                                              "constant, checkerboard …)",
                             pt_params_kind(p));
     pt_params_check_used(p);
     if (b->diag.rc)

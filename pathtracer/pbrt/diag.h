@@ -27,8 +27,8 @@ struct pt_diag {
     struct pt_names said; /* owns: texts of the warnings given, each once */
 };
 
-/* Records `file:line:column: text` with BASE_EINVAL unless something failed before. Control characters become '?', so the text
- * is one line. Returns the sticky code. */
+/* Records `file:line:column: text` with BASE_EINVAL unless something failed before. Control characters become '?', so the
+ * text is one line. Returns the sticky code. */
 int pt_diag_fail(struct pt_diag *diag, struct pt_loc loc, const char *format, ...) __attribute__((format(printf, 3, 4)));
 /* The same with another code (BASE_ENOMEM, BASE_EIO). */
 int pt_diag_fail_code(struct pt_diag *diag, int code, struct pt_loc loc, const char *format, ...)

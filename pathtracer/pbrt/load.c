@@ -29,7 +29,8 @@ static void note_slow_load(const char *path, const struct pt_load_options *optio
     char line[512];
     if (!options || options->quiet || !options->warn || total_s < noticeable_s)
         return;
-    snprintf(line, sizeof line, "%.200s: loaded in %.1f s: text and meshes %.1f, textures %.1f, acceleration structure %.1f, the rest %.1f",
+    snprintf(line, sizeof line,
+             "%.200s: loaded in %.1f s: text and meshes %.1f, textures %.1f, acceleration structure %.1f, the rest %.1f",
              path, total_s, stats->parse_s, stats->texture_s, stats->accel_s, stats->build_s);
     options->warn(options->warn_data, line);
 }

@@ -5,8 +5,8 @@
 #include "scene/effects.h"
 #include "scene/settings.h"
 
-/* What replaces the scene's own camera (--look-at, --fov); all zero = nothing. The camera then stands still; its lens, medium
- * and handedness stay the file's, and so does what the file places in the space of its camera. */
+/* What replaces the scene's own camera (--look-at, --fov); all zero = nothing. The camera then stands still; its lens,
+ * medium and handedness stay the file's, and so does what the file places in the space of its camera. */
 struct pt_view {
     int has_look_at;
     double look_at_world[9];  /* eye, point looked at, up, as for LookAt; not degenerate */

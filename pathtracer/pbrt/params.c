@@ -21,27 +21,28 @@ static const struct {
 
 /* Names that pbrt gives a meaning somewhere: out of place they change nothing, so they warn; any other name is a mistake. */
 static const char known_names[] =
-    " accelerator alpha amount angle B C Kd Ks Kr Kt L I Le Lescale N P Pw S T albedo alphatexture amplitude anisotropy aperture "
-    "aperturediameter basis bsdffile bssrdf bumpmap camera conductor.eta conductor.k conductor.roughness conductor.uroughness "
-    "conductor.vroughness coneangle conedeltaangle crop cropwindow ctm degree density detaillevel diagonal dimension "
-    "displacement displayserver edgelength emissionfilename encoding eta eumelanin eta.eta exposuretime faceIndices "
-    "filename filter filteradius filtertype flatness focaldistance focallength fov frameaspectratio from g gamma height "
-    "illuminance imagefile index indices inside innerradius interface.eta interface.roughness interface.uroughness "
-    "interface.vroughness invert iso k lensfile lensradius levels lightsamplestrategy lightsampler mapname mapping "
-    "materials maxanisotropy maxcomponentvalue maxdepth maxnodeprims maxprims maxsampleluminance mediumname mfp minsamples "
-    "namedmaterial1 namedmaterial2 nlevels nsamples normalmap normals nu nv nx ny nz octaves offset omega opacity order outside "
-    "outsidesamples p p0 p1 phimax pheomelanin photonsperiteration pixelbounds pixelsamples portal power preset radius "
-    "randomization randomize reflect reflectance regularize remaproughness rgbfilename roughness rrthreshold samples "
-    "saturation scale screenwindow seed sensor shadowalpha shutterclose shutteropen sigma sigma_a sigma_s sigma_t "
-    "simpleaperture specialfloats spectrum splitdepth splitmethod st strategy tau temperature tex tex1 tex2 texture "
-    "textures thickness to tolerance toneMap transmit transmittance trilinear twosided type u0 u1 udelta umax umin uorder "
-    "uroughness uscale uv uvs uknots v0 v00 v01 v1 v10 v11 v2 value variation vdelta vertices vmax vmin vorder vroughness "
-    "vscale vknots vtx whitebalance width width0 width1 wrap xradius xresolution xsamples xwidth yradius yresolution ysamples "
-    "ywidth zmax zmin Pz color metallic speculartint sheen sheentint clearcoat clearcoatgloss spectrans scatterdistance "
-    "difftrans flatness specTrans beta_m beta_n eccentricity visualizevoxels multiscatter Lemitted temperaturecutoff "
-    "temperatureoffset temperaturescale numiterations iterations imagewritefrequency mutationsperpixel bootstrapsamples "
-    "chains largestepprobability initialsamples savefp16 crease nointerior maxwavelength jitter dichromatic writeframe "
-    "infinitelights lights shadow dispersion ";
+    " accelerator alpha amount angle B C Kd Ks Kr Kt L I Le Lescale N P Pw S T albedo alphatexture amplitude anisotropy "
+    "aperture aperturediameter basis bsdffile bssrdf bumpmap camera conductor.eta conductor.k conductor.roughness "
+    "conductor.uroughness conductor.vroughness coneangle conedeltaangle crop cropwindow ctm degree density detaillevel "
+    "diagonal dimension displacement displayserver edgelength emissionfilename encoding eta eumelanin eta.eta "
+    "exposuretime faceIndices filename filter filteradius filtertype flatness focaldistance focallength fov "
+    "frameaspectratio from g gamma height illuminance imagefile index indices inside innerradius interface.eta "
+    "interface.roughness interface.uroughness interface.vroughness invert iso k lensfile lensradius levels "
+    "lightsamplestrategy lightsampler mapname mapping materials maxanisotropy maxcomponentvalue maxdepth maxnodeprims "
+    "maxprims maxsampleluminance mediumname mfp minsamples namedmaterial1 namedmaterial2 nlevels nsamples normalmap "
+    "normals nu nv nx ny nz octaves offset omega opacity order outside outsidesamples p p0 p1 phimax pheomelanin "
+    "photonsperiteration pixelbounds pixelsamples portal power preset radius randomization randomize reflect reflectance "
+    "regularize remaproughness rgbfilename roughness rrthreshold samples saturation scale screenwindow seed sensor "
+    "shadowalpha shutterclose shutteropen sigma sigma_a sigma_s sigma_t simpleaperture specialfloats spectrum splitdepth "
+    "splitmethod st strategy tau temperature tex tex1 tex2 texture textures thickness to tolerance toneMap transmit "
+    "transmittance trilinear twosided type u0 u1 udelta umax umin uorder uroughness uscale uv uvs uknots v0 v00 v01 v1 "
+    "v10 v11 v2 value variation vdelta vertices vmax vmin vorder vroughness vscale vknots vtx whitebalance width width0 "
+    "width1 wrap xradius xresolution xsamples xwidth yradius yresolution ysamples ywidth zmax zmin Pz color metallic "
+    "speculartint sheen sheentint clearcoat clearcoatgloss spectrans scatterdistance difftrans flatness specTrans beta_m "
+    "beta_n eccentricity visualizevoxels multiscatter Lemitted temperaturecutoff temperatureoffset temperaturescale "
+    "numiterations iterations imagewritefrequency mutationsperpixel bootstrapsamples chains largestepprobability "
+    "initialsamples savefp16 crease nointerior maxwavelength jitter dichromatic writeframe infinitelights lights shadow "
+    "dispersion ";
 
 int pt_grow(void **items, size_t *room, size_t count, size_t size)
 {
@@ -357,7 +358,8 @@ static int fits_float(struct pt_params *params, const struct pt_param *p, double
 {
     if (fabs(v) <= FLT_MAX)
         return 1;
-    pt_diag_fail(params->diag, p->loc, "parameter \"%s\" has the value %g, too large for a float", pt_param_name(params, p), v);
+    pt_diag_fail(params->diag, p->loc, "parameter \"%s\" has the value %g, too large for a float", pt_param_name(params, p),
+                 v);
     return 0;
 }
 
@@ -374,7 +376,8 @@ double pt_params_float_in(struct pt_params *params, const char *name, double fal
     double v = pt_params_float(params, name, fallback);
     if (!pt_params_find(params, name) || (v >= low && v <= high))
         return v;
-    pt_diag_fail(params->diag, pt_params_find(params, name)->loc, "parameter \"%s\" is %g (expected %g to %g)", name, v, low, high);
+    pt_diag_fail(params->diag, pt_params_find(params, name)->loc, "parameter \"%s\" is %g (expected %g to %g)", name, v, low,
+                 high);
     return fallback;
 }
 

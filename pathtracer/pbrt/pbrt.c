@@ -286,7 +286,8 @@ static int do_make_named_material(struct parser *p, struct pt_loc loc)
         return rc;
     const char *type = pt_params_string(&p->params, "type", NULL);
     if (!type)
-        return pt_diag_fail(&p->b->diag, loc, "MakeNamedMaterial \"%s\" without \"string type\"", pt_params_kind(&p->params));
+        return pt_diag_fail(&p->b->diag, loc, "MakeNamedMaterial \"%s\" without \"string type\"",
+                            pt_params_kind(&p->params));
     strncpy(kind, type, sizeof kind - 1);
     kind[sizeof kind - 1] = '\0';
     strcpy(name, pt_params_kind(&p->params));
@@ -335,7 +336,8 @@ static int do_medium_interface(struct parser *p, struct pt_loc loc)
     if (rc)
         return rc;
     strcpy(outside, inside);
-    if (pt_lexer_peek(&p->lexer).kind == PT_TOKEN_STRING && (rc = pt_parser_read_string(p, "medium name", outside, sizeof outside)) != 0)
+    if (pt_lexer_peek(&p->lexer).kind == PT_TOKEN_STRING && (rc = pt_parser_read_string(p, "medium name", outside,
+                                                                                        sizeof outside)) != 0)
         return rc;
     p->state.medium_in = pt_build_medium_ref(p->b, inside, loc);
     p->state.medium_out = pt_build_medium_ref(p->b, outside, loc);
@@ -375,7 +377,8 @@ static int do_color_space(struct parser *p, struct pt_loc loc)
         return rc;
     int space = pt_colour_space_named(name);
     if (space < 0)
-        return pt_diag_fail(&p->b->diag, loc, "unknown colour space \"%s\" (expected srgb, dci-p3, rec2020 or aces2065-1)", name);
+        return pt_diag_fail(&p->b->diag, loc, "unknown colour space \"%s\" (expected srgb, dci-p3, rec2020 or aces2065-1)",
+                            name);
     p->state.colour_space = space;
     return 0;
 }
@@ -501,7 +504,8 @@ static int run(struct parser *p)
         }
         directive *d = t.kind == PT_TOKEN_WORD ? find_directive(&t) : NULL;
         if (!d)
-            return pt_diag_fail(&p->b->diag, t.loc, "unknown directive \"%.*s\" (expected Shape, Material, AttributeBegin …)",
+            return pt_diag_fail(&p->b->diag, t.loc,
+                                "unknown directive \"%.*s\" (expected Shape, Material, AttributeBegin …)",
                                 t.length < 40 ? (int)t.length : 40, t.text);
         rc = d(p, t.loc);
         if (rc)

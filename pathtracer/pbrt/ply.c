@@ -11,9 +11,10 @@ static const uint8_t type_bytes[] = {0, 1, 1, 2, 2, 4, 4, 4, 8};
 static const struct {
     const char *name;
     enum ply_type type;
-} type_names[] = {{"char", T_I8},    {"int8", T_I8},    {"uchar", T_U8},  {"uint8", T_U8},    {"short", T_I16}, {"int16", T_I16},
-                  {"ushort", T_U16}, {"uint16", T_U16}, {"int", T_I32},   {"int32", T_I32},   {"uint", T_U32},  {"uint32", T_U32},
-                  {"float", T_F32},  {"float32", T_F32}, {"double", T_F64}, {"float64", T_F64}};
+} type_names[] = {{"char", T_I8},    {"int8", T_I8},    {"uchar", T_U8},  {"uint8", T_U8},    {"short", T_I16},
+                  {"int16", T_I16},
+                  {"ushort", T_U16}, {"uint16", T_U16}, {"int", T_I32},   {"int32", T_I32},   {"uint", T_U32},
+                  {"uint32", T_U32}, {"float", T_F32},  {"float32", T_F32}, {"double", T_F64}, {"float64", T_F64}};
 
 /* What a property means to us. */
 enum role { R_SKIP, R_X, R_Y, R_Z, R_NX, R_NY, R_NZ, R_U, R_V, R_INDICES };
@@ -87,7 +88,8 @@ static enum role role_of(const struct element *e, const char *name, int is_list)
         const char *name;
         enum role role;
     } roles[] = {{"x", R_X},   {"y", R_Y},   {"z", R_Z},   {"nx", R_NX}, {"ny", R_NY},        {"nz", R_NZ},       {"u", R_U},
-                 {"v", R_V},   {"s", R_U},   {"t", R_V},   {"texture_u", R_U}, {"texture_v", R_V}, {"texture_s", R_U}, {"texture_t", R_V}};
+                 {"v", R_V},   {"s", R_U},   {"t", R_V},   {"texture_u", R_U}, {"texture_v", R_V}, {"texture_s", R_U},
+                 {"texture_t", R_V}};
     if (strcmp(e->name, "face") == 0 && is_list)
         return strcmp(name, "vertex_indices") == 0 || strcmp(name, "vertex_index") == 0 ? R_INDICES : R_SKIP;
     if (strcmp(e->name, "vertex") == 0 && !is_list)
@@ -182,7 +184,8 @@ static int ascii_value(struct reader *r, double *out)
         return truncated(r);
     size_t n = (size_t)(r->at - start);
     if (!pt_number_parse(start, n, out))
-        return base_fail(r->err, BASE_EINVAL, "%s: \"%.*s\" in PLY data (expected a finite number)", r->name, n < 30 ? (int)n : 30, start);
+        return base_fail(r->err, BASE_EINVAL, "%s: \"%.*s\" in PLY data (expected a finite number)", r->name,
+                         n < 30 ? (int)n : 30, start);
     return 0;
 }
 

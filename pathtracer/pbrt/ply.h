@@ -18,8 +18,8 @@ struct pt_ply {
     uint32_t polygons;  /* faces of more than four corners, cut into fans */
 };
 
-/* Parses bytes[0, size). Faces with more than three corners become fans. Fails with BASE_EINVAL and `name: what is wrong` for
- * truncated data, indices out of range, positions that are not finite, counts that the file cannot hold. */
+/* Parses bytes[0, size). Faces with more than three corners become fans. Fails with BASE_EINVAL and `name: what is wrong`
+ * for truncated data, indices out of range, positions that are not finite, counts that the file cannot hold. */
 int pt_ply_parse(const char *name, const char *bytes, size_t size, struct pt_ply *out, struct base_err *err);
 void pt_ply_release(struct pt_ply *ply);
 

@@ -25,10 +25,12 @@ static double cie_z(double nm)
 }
 
 /* CIE standard illuminant D65 every 10 nm from 380 nm (CIE 15). */
-static const double d65_10nm[] = {49.9755, 54.6482, 82.7549, 91.486,  93.4318, 86.6823, 104.865, 117.008, 117.812, 114.861, 115.923,
-                                  108.811, 109.354, 107.802, 104.79,  107.689, 104.405, 104.046, 100.0,   96.3342, 95.788,  88.6856,
-                                  90.0062, 89.5991, 87.6987, 83.2886, 83.6992, 80.0268, 80.2146, 82.2778, 78.2842, 69.7213, 71.6091,
-                                  74.349,  61.604,  69.8856, 75.087,  63.5927, 46.4182, 66.8054, 63.3828};
+static const double d65_10nm[] = {49.9755, 54.6482, 82.7549, 91.486,  93.4318, 86.6823, 104.865, 117.008, 117.812, 114.861,
+                                  115.923,
+                                  108.811, 109.354, 107.802, 104.79,  107.689, 104.405, 104.046, 100.0,   96.3342, 95.788,
+                                  88.6856,
+                                  90.0062, 89.5991, 87.6987, 83.2886, 83.6992, 80.0268, 80.2146, 82.2778, 78.2842, 69.7213,
+                                  71.6091, 74.349,  61.604,  69.8856, 75.087,  63.5927, 46.4182, 66.8054, 63.3828};
 
 /* Lynch and Hunter 1985 in Palik's Handbook of Optical Constants of Solids: photon energy eV; n and k. */
 static const struct {
@@ -195,7 +197,8 @@ int pt_illuminant_named(const char *name, pt_vec3 *rgb)
 pt_vec3 pt_xyz_to_rgb(double x, double y, double z)
 {
     /* IEC 61966-2-1. */
-    return v3((float)(3.2404542 * x - 1.5371385 * y - 0.4985314 * z), (float)(-0.9692660 * x + 1.8760108 * y + 0.0415560 * z),
+    return v3((float)(3.2404542 * x - 1.5371385 * y - 0.4985314 * z),
+              (float)(-0.9692660 * x + 1.8760108 * y + 0.0415560 * z),
               (float)(0.0556434 * x - 0.2040259 * y + 1.0572252 * z));
 }
 
@@ -222,7 +225,8 @@ pt_vec3 pt_spd_reflectance_rgb(const struct pt_spd *spd)
     double xyz[3], white[3], y;
     integrate(spd, 1, xyz, &y);
     integrate(NULL, 1, white, &y);
-    pt_vec3 rgb = pt_xyz_to_rgb(xyz[0] / y, xyz[1] / y, xyz[2] / y), w = pt_xyz_to_rgb(white[0] / y, white[1] / y, white[2] / y);
+    pt_vec3 rgb = pt_xyz_to_rgb(xyz[0] / y, xyz[1] / y, xyz[2] / y),
+        w = pt_xyz_to_rgb(white[0] / y, white[1] / y, white[2] / y);
     /* The fitted curves put white 1 % off: scale so that white is white. */
     return v3(rgb.x / w.x, rgb.y / w.y, rgb.z / w.z);
 }
@@ -298,5 +302,6 @@ pt_vec3 pt_colour_to_rec709(int space, pt_vec3 c)
         {1.6604910f, -0.5876411f, -0.0728499f, -0.1245505f, 1.1328999f, -0.0083494f, -0.0181508f, -0.1005789f, 1.1187297f},
         {2.5216494f, -1.1368885f, -0.3849175f, -0.2752136f, 1.3697052f, -0.0943924f, -0.0159250f, -0.1478064f, 1.1638058f}};
     const float *a = m[space];
-    return v3(a[0] * c.x + a[1] * c.y + a[2] * c.z, a[3] * c.x + a[4] * c.y + a[5] * c.z, a[6] * c.x + a[7] * c.y + a[8] * c.z);
+    return v3(a[0] * c.x + a[1] * c.y + a[2] * c.z, a[3] * c.x + a[4] * c.y + a[5] * c.z,
+              a[6] * c.x + a[7] * c.y + a[8] * c.z);
 }

@@ -141,7 +141,8 @@ static void odd_vertex(const struct mesh *m, const struct topology *t, int32_t h
     int32_t twin = t->twin[h];
     for (size_t k = 0; k < 3; k++) {
         double sum = m->p[3 * a + k] + m->p[3 * b + k];
-        out[k] = twin < 0 ? sum / 2 : 3.0 / 8 * sum + (m->p[3 * c + k] + m->p[3 * (size_t)m->v[previous_half(twin)] + k]) / 8;
+        out[k] = twin < 0 ? sum / 2
+                          : 3.0 / 8 * sum + (m->p[3 * c + k] + m->p[3 * (size_t)m->v[previous_half(twin)] + k]) / 8;
     }
 }
 
@@ -272,8 +273,8 @@ int pt_build_loop_subdiv(struct pt_builder *b, const struct pt_state *s, struct 
     memcpy(m.p, P, vertices * 3 * sizeof *m.p);
     for (size_t i = 0; i < corners; i++) {
         if (!(indices[i] >= 0 && indices[i] < (double)vertices)) {
-            pt_diag_fail(&b->diag, pt_params_find(p, "indices")->loc, "index %.0f out of range (expected 0 to %zu)", indices[i],
-                         vertices > 0 ? vertices - 1 : 0);
+            pt_diag_fail(&b->diag, pt_params_find(p, "indices")->loc, "index %.0f out of range (expected 0 to %zu)",
+                         indices[i], vertices > 0 ? vertices - 1 : 0);
             goto out;
         }
         m.v[i] = (uint32_t)indices[i];
@@ -286,7 +287,8 @@ int pt_build_loop_subdiv(struct pt_builder *b, const struct pt_state *s, struct 
         pt_diag_nomem(&b->diag, "a subdivision surface");
         goto out;
     }
-    struct pt_soup soup = {.vertex_count = m.vertices, .triangle_count = m.triangles, .pd = m.p, .nd = normals, .indices = m.v};
+    struct pt_soup soup = {.vertex_count = m.vertices, .triangle_count = m.triangles, .pd = m.p, .nd = normals,
+                           .indices = m.v};
     pt_build_mesh(b, s, p, &soup);
 out:
     free(m.p);

@@ -13,7 +13,8 @@ struct pt_xform pt_xform_mul(const struct pt_xform *a, const struct pt_xform *b)
     struct pt_xform r;
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 4; j++)
-            r.m[i][j] = a->m[i][0] * b->m[0][j] + a->m[i][1] * b->m[1][j] + a->m[i][2] * b->m[2][j] + (j == 3 ? a->m[i][3] : 0);
+            r.m[i][j] = a->m[i][0] * b->m[0][j] + a->m[i][1] * b->m[1][j] + a->m[i][2] * b->m[2][j] +
+                        (j == 3 ? a->m[i][3] : 0);
     return r;
 }
 

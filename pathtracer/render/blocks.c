@@ -3,13 +3,14 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Between checks that the criterion did not place, samples grow by this factor: cost of checks stays proportional to log(spp)
- * and a block overshoots its threshold by 15 % at most. */
+/* Between checks that the criterion did not place, samples grow by this factor: cost of checks stays proportional to
+ * log(spp) and a block overshoots its threshold by 15 % at most. */
 static const double CHECK_RATIO = 1.15;
 
 const char *pt_block_reason_name(int reason)
 {
-    static const char *const names[PT_REASON_COUNT] = {"none", "criterion", "spp-max", "uniform", "time", "interrupt", "dropped"};
+    static const char *const names[PT_REASON_COUNT] = {"none", "criterion", "spp-max", "uniform", "time", "interrupt",
+                                                       "dropped"};
     return reason >= 0 && reason < PT_REASON_COUNT ? names[reason] : "unknown";
 }
 

@@ -52,7 +52,8 @@ static void put_blocks(struct sink *s, const struct pt_blocks *blocks)
     put_count(s, blocks->count);
     for (uint32_t i = 0; i < blocks->count; i++) {
         const struct pt_block *b = &blocks->list[i];
-        struct block_record record = {b->spp,           b->next_spp, b->asked_spp, b->rays,   b->dropped,    b->p_noisy, b->error,
+        struct block_record record = {b->spp,           b->next_spp, b->asked_spp, b->rays,   b->dropped,    b->p_noisy,
+                                      b->error,
                                       b->predicted_spp, b->thread_s, b->reason,    b->checks, b->stop_votes, b->asked};
         put(s, &record, sizeof record);
     }

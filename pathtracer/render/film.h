@@ -2,8 +2,9 @@
  * What has been sampled so far, per pixel: sums in double, one array per plane, planes on demand only.
  *
  * A sample with a non-finite radiance is dropped: it enters no sum of radiance, and `dropped` counts it, so that the
- * mean of a pixel is sum / (spp of its block - dropped). Half A is a fixed half of the sample indices (pt_film_in_half). Different threads may
- * work on different pixels at the same time; the bytes depend on the order of samples within a pixel only.
+ * mean of a pixel is sum / (spp of its block - dropped). Half A is a fixed half of the sample indices (pt_film_in_half).
+ * Different threads may work on different pixels at the same time; the bytes depend on the order of samples within a pixel
+ * only.
  */
 #ifndef PT_RENDER_FILM_H
 #define PT_RENDER_FILM_H
@@ -62,11 +63,11 @@ static inline size_t pt_film_index(const struct pt_film *film, int x, int y)
     return (size_t)(y - film->y0) * (size_t)(film->x1 - film->x0) + (size_t)(x - film->x0);
 }
 
-/* Is this sample in half A? Groups of four successive samples stay together, and the parity of some bits of the group's number
- * tells its half. Single samples would not do: an Owen-shuffled Sobol sequence draws at random within a pair (2k, 2k+1), so
- * that half of it would be no better than random numbers and the difference of the halves would overstate the noise (measured:
- * by 1.4 against 1.2 with groups of four). Bit 2 takes part: two successive groups are split. The mask leaves out bits, because
- * the parity of all of them is the first digit of Sobol dimension 1. */
+/* Is this sample in half A? Groups of four successive samples stay together, and the parity of some bits of the group's
+ * number tells its half. Single samples would not do: an Owen-shuffled Sobol sequence draws at random within a pair (2k,
+ * 2k+1), so that half of it would be no better than random numbers and the difference of the halves would overstate the
+ * noise (measured: by 1.4 against 1.2 with groups of four). Bit 2 takes part: two successive groups are split. The mask
+ * leaves out bits, because the parity of all of them is the first digit of Sobol dimension 1. */
 static inline int pt_film_in_half(uint32_t sample)
 {
     return !__builtin_parity(sample & UINT32_C(0x7D29F06C));

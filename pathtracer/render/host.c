@@ -82,7 +82,8 @@ int pt_criterion_begin(struct pt_criterion *c, const struct pt_criterion_frame *
     const struct lull_requirements *needs = &c->needs;
     if (!(needs->flags & LULL_REQ_FLEXIBLE) && needs->block_width > 0 && needs->block_height > 0 &&
         ((int)needs->block_width != blocks->block_width || (int)needs->block_height != blocks->block_height))
-        return base_fail(err, BASE_EINVAL, "criterion %s judges blocks of %ux%u pixels only: use --block %ux%u", c->table->id,
+        return base_fail(err, BASE_EINVAL, "criterion %s judges blocks of %ux%u pixels only: use --block %ux%u",
+                         c->table->id,
                        needs->block_width, needs->block_height, needs->block_width, needs->block_height);
     int rc = allocate_frame(c, blocks, film, err);
     if (rc)

@@ -1,7 +1,7 @@
 /*
  * Asking a criterion: the host's side of the stopping-criterion ABI, one criterion and one frame at a time. host_find finds
- * it, host_services is what it may call, host_planes shows it the film, host_state keeps its history. All calls come from one
- * thread; the criterion may use the pool through parallel_for.
+ * it, host_services is what it may call, host_planes shows it the film, host_state keeps its history. All calls come from
+ * one thread; the criterion may use the pool through parallel_for.
  */
 #ifndef PT_RENDER_HOST_H
 #define PT_RENDER_HOST_H
@@ -39,16 +39,16 @@ struct pt_criterion_frame {
     int independent;        /* samples of a pixel are independent */
 };
 
-/* Makes an instance with parameters. `threads` is borrowed until destroy and may be NULL (one worker). warn gets one line per
- * message of the criterion; may be NULL. */
+/* Makes an instance with parameters. `threads` is borrowed until destroy and may be NULL (one worker). warn gets one line
+ * per message of the criterion; may be NULL. */
 int pt_criterion_create(const struct lull_criterion *table, const struct lull_pair *pairs, uint32_t pair_count,
                         struct base_threads *threads, void (*warn)(void *data, const char *line), void *warn_data,
                         struct pt_criterion **out, struct base_err *err);
 void pt_criterion_destroy(struct pt_criterion *criterion);
 
 /* Opens the frame. Fails when the criterion judges blocks of another size only. */
-int pt_criterion_begin(struct pt_criterion *criterion, const struct pt_criterion_frame *frame, const struct pt_blocks *blocks,
-                       const struct pt_film *film, struct base_err *err);
+int pt_criterion_begin(struct pt_criterion *criterion, const struct pt_criterion_frame *frame,
+                       const struct pt_blocks *blocks, const struct pt_film *film, struct base_err *err);
 
 /* Asks about blocks->list[due[0 … count)] (rising). final: they get no more samples. decisions[i] is preset to CONTINUE and
  * stays so when the criterion fails, which is an error of this call too. */

@@ -8,8 +8,8 @@
 
 #include "base/err.h"
 
-/* The criterion that spec names (NAME, PATH.so or PATH.so:ID): a table that lives for ever. warn gets one line per message of
- * the loader; may be NULL. */
+/* The criterion that spec names (NAME, PATH.so or PATH.so:ID): a table that lives for ever. warn gets one line per message
+ * of the loader; may be NULL. */
 int pt_criterion_find(const char *spec, void (*warn)(void *data, const char *line), void *warn_data,
                       const struct lull_criterion **out, struct base_err *err);
 

@@ -10,8 +10,8 @@
 /* PT_FILM_* planes that a criterion with these needs reads. */
 uint32_t pt_host_film_planes(const struct lull_requirements *needs);
 
-/* Describes the film's arrays; `spp` ([film pixels], may be NULL) serves as SPP and WEIGHT. Borrows both. Returns the mask of
- * the planes that are there. */
+/* Describes the film's arrays; `spp` ([film pixels], may be NULL) serves as SPP and WEIGHT. Borrows both. Returns the mask
+ * of the planes that are there. */
 uint32_t pt_host_planes(const struct pt_film *film, const uint32_t *spp, struct lull_plane planes[LULL_PLANE_COUNT]);
 
 /* Samples of each pixel, those of its block, into spp[film pixels]. */

@@ -70,7 +70,8 @@ int pt_criterion_load(struct pt_criterion *c, const unsigned char *data, size_t 
 {
     const struct lull_state *state = state_extension(c);
     if (!state)
-        return size == 0 ? 0 : base_fail(err, BASE_EINVAL, "criterion %s keeps no state, but the checkpoint has one", c->table->id);
+        return size == 0 ? 0 : base_fail(err, BASE_EINVAL, "criterion %s keeps no state, but the checkpoint has one",
+                                         c->table->id);
     struct const_bytes b = {.data = data, .size = size};
     struct lull_reader reader = {.struct_size = sizeof reader, .context = &b, .read = read_bytes};
     struct lull_error e = {.struct_size = sizeof e};

@@ -26,8 +26,10 @@ int pt_output_exr(const char *path, const struct pt_render *render, const struct
 /* sRGB, 8 bits. */
 int pt_output_preview(const char *path, const struct pt_render *render, struct base_err *err);
 /* PNG or CSV by the name's ending. */
-int pt_output_stop_map(const char *path, const struct pt_render *render, const struct pt_output_info *info, struct base_err *err);
-int pt_output_report(const char *path, const struct pt_render *render, const struct pt_output_info *info, struct base_err *err);
+int pt_output_stop_map(const char *path, const struct pt_render *render, const struct pt_output_info *info,
+                       struct base_err *err);
+int pt_output_report(const char *path, const struct pt_render *render, const struct pt_output_info *info,
+                     struct base_err *err);
 
 /* `path` ends in `.ending`, whatever the case. */
 int pt_output_has_ending(const char *path, const char *ending);

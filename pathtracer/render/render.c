@@ -101,7 +101,8 @@ static uint64_t first_check(const struct pt_render *r)
 }
 
 int pt_render_create(const struct pt_render_config *config, const struct pt_scene *scene, pt_kernel *kernel,
-                     struct base_threads *threads, struct pt_criterion *criterion, struct pt_render **out, struct base_err *err)
+                     struct base_threads *threads, struct pt_criterion *criterion, struct pt_render **out,
+                     struct base_err *err)
 {
     struct pt_render *r = calloc(1, sizeof *r);
     if (!r)
@@ -317,7 +318,8 @@ static int too_expensive(const struct pt_render *r)
 static void check(struct pt_render *r, const struct pt_render_hooks *hooks)
 {
     struct pt_render_work *w = r->work;
-    static const struct lull_decision keep_on = {.action = LULL_CONTINUE, .p_noisy = NAN, .predicted_spp = NAN, .error = NAN};
+    static const struct lull_decision keep_on = {.action = LULL_CONTINUE, .p_noisy = NAN, .predicted_spp = NAN,
+                                                 .error = NAN};
     int reopens = r->criterion && !r->config.uniform &&
                   (r->criterion->table->capabilities & LULL_CAP_REOPENS);
     int skip = !r->criterion || too_expensive(r);
@@ -382,7 +384,8 @@ static int suspend(struct pt_render *r, const struct pt_render_hooks *hooks, int
     return rc;
 }
 
-int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum pt_render_outcome *outcome, struct base_err *err)
+int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum pt_render_outcome *outcome,
+                  struct base_err *err)
 {
     int rc = 0;
     *outcome = PT_RENDER_DONE;
@@ -409,7 +412,8 @@ int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum
     return rc;
 }
 
-int pt_render_advance(struct pt_render *r, uint64_t spp, const struct pt_render_hooks *hooks, int *stopped, struct base_err *err)
+int pt_render_advance(struct pt_render *r, uint64_t spp, const struct pt_render_hooks *hooks, int *stopped,
+                      struct base_err *err)
 {
     for (uint32_t i = 0; i < r->blocks.count; i++)
         r->blocks.list[i].next_spp = spp;

@@ -76,7 +76,8 @@ struct pt_render_hooks {
 /* Allocates film and blocks and opens the criterion's frame. The config is copied; scene, threads and criterion are borrowed
  * until destroy. */
 int pt_render_create(const struct pt_render_config *config, const struct pt_scene *scene, pt_kernel *kernel,
-                     struct base_threads *threads, struct pt_criterion *criterion, struct pt_render **out, struct base_err *err);
+                     struct base_threads *threads, struct pt_criterion *criterion, struct pt_render **out,
+                     struct base_err *err);
 void pt_render_destroy(struct pt_render *render);
 
 /* Renders until all blocks are stopped, time is up, or interrupted() says so. */

@@ -1,11 +1,12 @@
 /*
- * The numbers of one path. A number depends on (seed, pixel, sample, dimension) and on nothing else, so a kernel that skips an
- * effect still gives every other effect the same numbers. Plain value, inline, one per path; no allocation, no locking.
+ * The numbers of one path. A number depends on (seed, pixel, sample, dimension) and on nothing else, so a kernel that skips
+ * an effect still gives every other effect the same numbers. Plain value, inline, one per path; no allocation, no locking.
  *
  * Dimensions come in blocks of PT_DIMS_PER_VERTEX: block 0 is the camera, block k + 1 the k-th vertex.
  *
  * - Independent: a hash of (path key, dimension).
- * - Sobol: the first two Sobol' dimensions, padded: every pair of dimensions has its own Owen shuffle of the sample index and
+ * - Sobol: the first two Sobol' dimensions, padded: every pair of dimensions has its own Owen shuffle of the sample index
+ * and
  *   its own Owen scrambles (Burley 2020, "Practical Hash-based Owen Scrambling"). Blocks beyond PT_SOBOL_BLOCKS fall back to
  *   independent numbers: stratification no longer shows there and costs time.
  */
@@ -64,8 +65,8 @@ static inline uint32_t pt_owen_hash(uint32_t x, uint32_t seed)
     return x;
 }
 
-/* Second Sobol' dimension from the first, both as 32-bit fractions. Its matrix is Pascal's triangle mod 2, an entry set when the
- * bits of one index are among those of the other (Lucas), so the product is five steps of an xor over subsets. */
+/* Second Sobol' dimension from the first, both as 32-bit fractions. Its matrix is Pascal's triangle mod 2, an entry set when
+ * the bits of one index are among those of the other (Lucas), so the product is five steps of an xor over subsets. */
 static inline uint32_t pt_sobol_second(uint32_t first)
 {
     first ^= (first & 0x55555555u) << 1;

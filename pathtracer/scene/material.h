@@ -1,5 +1,6 @@
 /*
- * Materials as plain data: which model, and its parameters, each a constant or a texture. A zeroed parameter is the constant 0.
+ * Materials as plain data: which model, and its parameters, each a constant or a texture. A zeroed parameter is the constant
+ * 0.
  */
 #ifndef PT_SCENE_MATERIAL_H
 #define PT_SCENE_MATERIAL_H
@@ -10,9 +11,9 @@
 #include "scene/vec.h"
 
 /*
- * X(ID, name, scene file's name, words for --debug-path, effects that every use of it needs): the scattering models. A line here
- * and shade/bsdf_NAME.h are all of a model (README.md says what is in it): kinds, dispatch (shade/bsdf_dispatch.h), reading
- * (shade/bsdf_models.h) come from the list.
+ * X(ID, name, scene file's name, words for --debug-path, effects that every use of it needs): the scattering models. A line
+ * here and shade/bsdf_NAME.h are all of a model (README.md says what is in it): kinds, dispatch (shade/bsdf_dispatch.h),
+ * reading (shade/bsdf_models.h) come from the list.
  */
 #define PT_BSDFS(X) \
     X(DIFFUSE, diffuse, "diffuse", "diffuse", 0) \

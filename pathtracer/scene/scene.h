@@ -1,11 +1,12 @@
 /*
- * The renderable: what a loaded scene is while it is being rendered. Plain data; read-only once built, so any thread may read.
+ * The renderable: what a loaded scene is while it is being rendered. Plain data; read-only once built, so any thread may
+ * read.
  *
  * Spaces. *Render space* is world space translated so that the camera (at shutter open) sits at the origin; the translation
  * is applied in double before anything becomes float, so that a scene far from the world's origin keeps its precision.
  * Everything here is in render space and scene units, but for the shapes of an object (see pt_object), which are in the
- * space of their object. Colours are linear Rec.709 RGB. Ids are indices into the arrays of pt_scene, -1 = none; textures have
- * numbers, id + 1, 0 = none.
+ * space of their object. Colours are linear Rec.709 RGB. Ids are indices into the arrays of pt_scene, -1 = none; textures
+ * have numbers, id + 1, 0 = none.
  *
  * Ownership. All arrays live in the scene's arena unless a field says otherwise.
  *
@@ -25,7 +26,7 @@
 #include "scene/material.h"
 #include "scene/vec.h"
 
-/* --- camera -------------------------------------------------------------------------------------------------------------- */
+/* --- camera ----------------------------------------------------------------------------------------------------------- */
 
 enum pt_camera_kind { PT_CAMERA_PERSPECTIVE, PT_CAMERA_ORTHOGRAPHIC };
 
@@ -37,14 +38,15 @@ struct pt_camera {
     float screen[4];            /* x0, x1, y0, y1 of the screen window; short side is [-1, 1] by default; y up */
     float lens_radius;          /* scene units; 0 = pinhole */
     float focal_distance;       /* scene units along +z of the camera */
-    struct pt_mat34 to_render[2]; /* camera (+x right, +y up, +z forward; may be left-handed) → render, at shutter open/close */
+    struct pt_mat34 to_render[2]; /* camera (+x right, +y up, +z forward; may be left-handed) → render, at shutter open/close
+                                     */
     int32_t animated;           /* to_render[1] counts */
     int32_t medium;             /* the camera lies in it, -1 = vacuum */
     /* derived by pt_camera_init */
     float x0, dx, y0, dy;       /* z = 1 (perspective) or z = 0 (orthographic) plane: x = x0 + dx·raster_x, likewise y */
 };
 
-/* --- textures ------------------------------------------------------------------------------------------------------------ */
+/* --- textures --------------------------------------------------------------------------------------------------------- */
 
 enum pt_wrap { PT_WRAP_REPEAT, PT_WRAP_BLACK, PT_WRAP_CLAMP, PT_WRAP_OCTAHEDRAL };
 enum pt_pixel_type { PT_PIXEL_U8_SRGB, PT_PIXEL_U8_LINEAR, PT_PIXEL_FLOAT };
@@ -78,11 +80,12 @@ struct pt_texture {
     struct pt_input in[4];   /* numbers below this texture's own: the array is in dependency order */
 };
 
-/* --- shapes -------------------------------------------------------------------------------------------------------------- */
+/* --- shapes ----------------------------------------------------------------------------------------------------------- */
 
 struct pt_mesh {
     uint32_t vertex_count, triangle_count;
-    const float *positions;    /* [vertex_count][3] and one float of padding after the last (the ray kernel loads 16 bytes) */
+    const float *positions;    /* [vertex_count][3] and one float of padding after the last (the ray kernel loads 16 bytes)
+                                  */
     const uint32_t *indices;   /* [triangle_count][3], each < vertex_count */
     const float *normals;      /* [vertex_count][3] shading normals, need not be unit, already negated for a shape with
                                   reverse orientation: where present they decide the side of the geometric normal; or NULL */
@@ -120,11 +123,12 @@ struct pt_object {
 /* A shape that moves by itself is an object of one shape with one animated instance. */
 struct pt_instance {
     int32_t object;
-    int32_t animated;               /* to_render[1] counts: interpolated as translation, rotation (slerp), scale over the shutter */
+    int32_t animated;               /* to_render[1] counts: interpolated as translation, rotation (slerp), scale over the
+                                       shutter */
     struct pt_mat34 to_render[2];   /* object → render at shutter open and close */
 };
 
-/* --- lights -------------------------------------------------------------------------------------------------------------- */
+/* --- lights ----------------------------------------------------------------------------------------------------------- */
 
 enum pt_light_kind {
     PT_LIGHT_AREA,          /* every shape that names it */
@@ -176,7 +180,7 @@ struct pt_env_distribution {
     const uint16_t *column_guide; /* [height][width] */
 };
 
-/* --- media --------------------------------------------------------------------------------------------------------------- */
+/* --- media ------------------------------------------------------------------------------------------------------------ */
 
 enum pt_medium_kind { PT_MEDIUM_HOMOGENEOUS, PT_MEDIUM_GRID };
 
@@ -193,7 +197,7 @@ struct pt_medium {
     const float *majorant;      /* [mz][my][mx] largest density in each */
 };
 
-/* --- the scene ----------------------------------------------------------------------------------------------------------- */
+/* --- the scene -------------------------------------------------------------------------------------------------------- */
 
 /* Why an effect is in the scene's set, for --explain. */
 struct pt_effect_reason {

@@ -1,6 +1,6 @@
 /*
- * How paths are drawn: what the scene file says of it, as the command line overrides it. Plain data, read-only while rendering.
- * Each list below gives an enumeration and the words that the command line and manifests use for it.
+ * How paths are drawn: what the scene file says of it, as the command line overrides it. Plain data, read-only while
+ * rendering. Each list below gives an enumeration and the words that the command line and manifests use for it.
  */
 #ifndef PT_SCENE_SETTINGS_H
 #define PT_SCENE_SETTINGS_H

@@ -5,8 +5,8 @@
  * next; both point away from the surface. Radiance is transported towards the camera, so refraction carries the factor
  * (eta_i/eta_t)² of radiance compression (Veach 1997, §5.2). Pure functions, thread-safe, no allocation.
  *
- * A model NAME of the list PT_BSDFS (scene/material.h) is the header bsdf_NAME.h with these inline functions and a table; `fx`
- * is the kernel's compile-time effect set, so that models the scene does not use vanish from its code:
+ * A model NAME of the list PT_BSDFS (scene/material.h) is the header bsdf_NAME.h with these inline functions and a table;
+ * `fx` is the kernel's compile-time effect set, so that models the scene does not use vanish from its code:
  *   void pt_NAME_closure(fx, scene, material, surface, b)       fills the fields of *b that the model uses
  *   int pt_NAME_has_smooth(b)                                   whether any part of it is not a delta distribution
  *   pt_vec3 pt_NAME_eval(fx, b, wo, wi, pdf_solid)              as pt_bsdf_eval (bsdf_dispatch.h)
@@ -33,8 +33,10 @@ struct pt_bsdf {
     float base_alpha_x, base_alpha_y; /* coated conductor: roughness of the metal */
     float thickness, g;       /* coatings: thickness of the layer, Henyey–Greenstein asymmetry inside */
     pt_vec3 albedo;           /* coatings: single-scattering albedo of the layer; black = clear */
-    uint32_t walk_key;        /* coatings: any number, new for every path vertex (models that are evaluated stochastically) */
-    const float *coat_table;  /* borrows until scene release: table of the coating (coat_table.h), may be NULL but for coated diffuse */
+    uint32_t walk_key;        /* coatings: any number, new for every path vertex (models that are evaluated stochastically)
+                                 */
+    const float *coat_table;  /* borrows until scene release: table of the coating (coat_table.h), may be NULL but for coated
+                                 diffuse */
 };
 
 enum {

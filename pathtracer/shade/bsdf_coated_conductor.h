@@ -24,14 +24,15 @@ static inline pt_vec3 pt_coated_conductor_albedo(const struct pt_bsdf *b, pt_vec
     return v3_madd(v3_splat(r), (1.0f - r) * (1.0f - r), pt_fresnel_conductor_rgb(mu, b->eta_rgb, b->k_rgb));
 }
 
-static inline pt_vec3 pt_coated_conductor_eval(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, pt_vec3 wi, float *pdf_solid)
+static inline pt_vec3 pt_coated_conductor_eval(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, pt_vec3 wi,
+                                               float *pdf_solid)
 {
     (void)fx;
     return pt_coat_walk_eval(b, wo, wi, pdf_solid);
 }
 
-static inline int pt_coated_conductor_sample(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, float u_lobe, float u0, float u1,
-                                             struct pt_bsdf_sample *out)
+static inline int pt_coated_conductor_sample(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, float u_lobe, float u0,
+                                             float u1, struct pt_bsdf_sample *out)
 {
     (void)fx;
     return pt_coat_walk_sample(b, wo, u_lobe, u0, u1, out);

@@ -2,8 +2,8 @@
  * Diffuse base under a dielectric coating. A layer that scatters light is left to the walk (coat_walk.h); for a clear one,
  * because the base forgets directions, the layered solution factors exactly:
  *     f = f_interface + A(μo) A(μi) R S / (π η²),   S = Σ_{n<5} (R Fi)^n
- * with A(μ) the flux that reaches the base from direction cosine μ (refraction and the layer's extinction exp(-t/|cos|), unit
- * coefficient, on the way) and Fi the flux that the interface returns to the base from diffuse light below it. Rough
+ * with A(μ) the flux that reaches the base from direction cosine μ (refraction and the layer's extinction exp(-t/|cos|),
+ * unit coefficient, on the way) and Fi the flux that the interface returns to the base from diffuse light below it. Rough
  * interfaces have A, Fi and the albedo of f_interface tabulated (coat_table.h); smooth ones need Fi only. Five base bounces
  * is what pbrt-v4's walk of depth 10 admits.
  *
@@ -18,7 +18,8 @@
 #include "shade/coat_walk.h"
 
 static const struct pt_bsdf_read pt_coated_diffuse_reads[] = {
-    PT_READ_INTO(reflectance, COLOUR, "reflectance", 0.5), PT_READ(ROUGHNESS, "", 0), PT_READ(INDEX, "eta", 1.5), PT_COAT_READS, {0}};
+    PT_READ_INTO(reflectance, COLOUR, "reflectance", 0.5), PT_READ(ROUGHNESS, "", 0), PT_READ(INDEX, "eta", 1.5),
+        PT_COAT_READS, {0}};
 
 static inline void pt_coated_diffuse_closure(pt_effects fx, const struct pt_scene *scene, const struct pt_material *m,
                                              const struct pt_surface *s, struct pt_bsdf *b)
@@ -131,13 +132,14 @@ static inline pt_vec3 pt_coated_diffuse_albedo(const struct pt_bsdf *b, pt_vec3 
     return v3_madd(v3_splat(spec), 0.95f * PT_PI * base, pt_coat_base_factor(b));
 }
 
-static inline pt_vec3 pt_coated_diffuse_eval(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, pt_vec3 wi, float *pdf_solid)
+static inline pt_vec3 pt_coated_diffuse_eval(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, pt_vec3 wi,
+                                             float *pdf_solid)
 {
     return v3_is_black(b->albedo) ? pt_coat_clear_eval(fx, b, wo, wi, pdf_solid) : pt_coat_walk_eval(b, wo, wi, pdf_solid);
 }
 
-static inline int pt_coated_diffuse_sample(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, float u_lobe, float u0, float u1,
-                                           struct pt_bsdf_sample *out)
+static inline int pt_coated_diffuse_sample(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, float u_lobe, float u0,
+                                           float u1, struct pt_bsdf_sample *out)
 {
     return v3_is_black(b->albedo) ? pt_coat_clear_sample(fx, b, wo, u_lobe, u0, u1, out)
                                   : pt_coat_walk_sample(b, wo, u_lobe, u0, u1, out);

@@ -1,5 +1,6 @@
 /*
- * A boundary between two media: smooth, or GGX microfacets (Walter et al. 2007). wo.z > 0 is outside; b->eta = inside / outside.
+ * A boundary between two media: smooth, or GGX microfacets (Walter et al. 2007). wo.z > 0 is outside; b->eta = inside /
+ * outside.
  */
 #ifndef PT_SHADE_BSDF_DIELECTRIC_H
 #define PT_SHADE_BSDF_DIELECTRIC_H

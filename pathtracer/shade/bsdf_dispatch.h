@@ -1,7 +1,8 @@
 /*
  * The functions on struct pt_bsdf that the kernel calls, each a chain over the list of models.
  *
- * `fx` is a compile-time constant there: a model is in the code only if all effects that its line of the list names are in fx.
+ * `fx` is a compile-time constant there: a model is in the code only if all effects that its line of the list names are in
+ * fx.
  */
 #ifndef PT_SHADE_BSDF_DISPATCH_H
 #define PT_SHADE_BSDF_DISPATCH_H

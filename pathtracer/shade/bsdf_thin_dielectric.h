@@ -31,7 +31,8 @@ static inline pt_vec3 pt_thin_dielectric_albedo(const struct pt_bsdf *b, pt_vec3
     return v3_splat(1.0f);
 }
 
-static inline pt_vec3 pt_thin_dielectric_eval(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, pt_vec3 wi, float *pdf_solid)
+static inline pt_vec3 pt_thin_dielectric_eval(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, pt_vec3 wi,
+                                              float *pdf_solid)
 {
     (void)fx;
     (void)b;

@@ -111,7 +111,10 @@ void pt_camera_lens_sample(float u0, float u1, float *x, float *y)
 }
 
 /* Inverse of the tent of radius r over u in [0, 1). */
-static float tent(float u, float r) { return u < 0.5f ? r * (sqrtf(2.0f * u) - 1.0f) : r * (1.0f - sqrtf(2.0f * (1.0f - u))); }
+static float tent(float u, float r)
+{
+    return u < 0.5f ? r * (sqrtf(2.0f * u) - 1.0f) : r * (1.0f - sqrtf(2.0f * (1.0f - u)));
+}
 
 /* Inverse error function, single precision: M. Giles 2010, "Approximating the erfinv function". */
 static float erf_inverse(float x)

@@ -1,7 +1,7 @@
 /*
  * Random walk between the interface of a coating and its base: the reference solution of the layered model (Guo, Hašan and
- * Zhao 2018, "Position-Free Monte Carlo Simulation for Arbitrary Layered BSDFs", in the form of pbrt-v4: unit extinction in a
- * layer of `thickness` mean free paths, at most PT_LAYER_EVENTS interactions). One call is one unbiased estimate.
+ * Zhao 2018, "Position-Free Monte Carlo Simulation for Arbitrary Layered BSDFs", in the form of pbrt-v4: unit extinction in
+ * a layer of `thickness` mean free paths, at most PT_LAYER_EVENTS interactions). One call is one unbiased estimate.
  *
  * The path tracer uses it where no factored solution exists (coated metals, coatings that scatter inside); tests use it as
  * the oracle of the others.

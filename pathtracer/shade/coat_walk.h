@@ -16,8 +16,8 @@
 #include "shade/coat_layer.h"
 
 /* What both coated models read of the layer between interface and base. */
-#define PT_COAT_READS                                                                                                          \
-    PT_READ_INTO(thickness, NUMBER, "thickness", 0.01), PT_READ_INTO(g, NUMBER, "g", 0),                                       \
+#define PT_COAT_READS \
+    PT_READ_INTO(thickness, NUMBER, "thickness", 0.01), PT_READ_INTO(g, NUMBER, "g", 0), \
         PT_READ_INTO(albedo, COLOUR, "albedo", 0), PT_READ(IGNORED, "maxdepth nsamples", 0)
 
 static inline void pt_coat_closure(pt_effects fx, const struct pt_scene *scene, const struct pt_material *m,

@@ -7,7 +7,8 @@
 #include "scene/vec.h"
 
 /*
- * Reflectance in [0, 1] seen by a ray whose cosine with the normal is cos_i (> 0 outside, < 0 inside); eta = inside / outside.
+ * Reflectance in [0, 1] seen by a ray whose cosine with the normal is cos_i (> 0 outside, < 0 inside); eta = inside /
+ * outside.
  * *cos_t gets the magnitude of the refracted cosine, 0 in total internal reflection. Born and Wolf 1999, §1.5.2.
  */
 static inline float pt_fresnel_dielectric_t(float cos_i, float eta, float *cos_t)

@@ -12,9 +12,11 @@
 
 struct pt_light_sample {
     pt_vec3 wi;          /* unit, from the reference point to the light */
-    pt_vec3 radiance;    /* arriving along wi when nothing is in between; for a DELTA light: irradiance on a facing surface */
+    pt_vec3 radiance;    /* arriving along wi when nothing is in between; for a DELTA light: irradiance on a facing surface
+                            */
     float inv_pdf_solid; /* 1 / density: kept so that the kernel need not divide; delta: 1 / probability of the selection */
-    const float *pixel;  /* environment image: `radiance` is still to be multiplied by this RGB, which is read (a cache miss, as
+    const float *pixel;  /* environment image: `radiance` is still to be multiplied by this RGB,
+        which is read (a cache miss, as
                             a rule) only when the light turns out to be visible; else NULL */
     int delta;           /* no other strategy can find it */
     int finite;          /* `target` counts; else the light is at infinity along wi */

@@ -120,7 +120,8 @@ static void balance(const struct pt_scene *scene, double *weights)
             sum += w[k];
         for (int32_t k = 0; k < count && sum > 0.0; k++)
             w[k] = at_infinity(light) ? far_share
-                                      : near_share * (w[k] / finite * (1.0 - UNIFORM_SHARE) + w[k] / sum * UNIFORM_SHARE / finite_count);
+                                      : near_share * (w[k] / finite * (1.0 - UNIFORM_SHARE) +
+                                                      w[k] / sum * UNIFORM_SHARE / finite_count);
     }
 }
 
@@ -128,7 +129,8 @@ static int make_table(struct pt_scene *scene, double *weights, struct pt_arena *
 {
     int32_t n = scene->emitter_count;
     float *q = pt_arena_alloc(scratch, (size_t)n, sizeof *q);
-    int32_t *alias = pt_arena_alloc(scratch, (size_t)n, sizeof *alias), *work = pt_arena_alloc(scratch, (size_t)n, sizeof *work);
+    int32_t *alias = pt_arena_alloc(scratch, (size_t)n, sizeof *alias),
+        *work = pt_arena_alloc(scratch, (size_t)n, sizeof *work);
     if (!q || !alias || !work)
         return 0;
     double sum = 0.0;

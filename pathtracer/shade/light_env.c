@@ -5,8 +5,8 @@
 
 #include "shade/warp.h"
 
-/* The importance table has at most this many columns: it only steers sampling, and its reads miss the cache when it is large.
- * A smaller one is taken while the variance that it adds stays small (see squared_weight). */
+/* The importance table has at most this many columns: it only steers sampling, and its reads miss the cache when it is
+ * large. A smaller one is taken while the variance that it adds stays small (see squared_weight). */
 enum { TABLE_MAX = 1024, TABLE_MIN = 128 };
 /* E[w²]/E[w]² of the weights that a table may leave within its cells. */
 #define TABLE_SQUARED_WEIGHT 1.3
@@ -91,7 +91,8 @@ static int32_t invert_cdf(const float *cdf, const uint16_t *guide, int32_t n, fl
 static const float *pixel_at(const struct pt_scene *scene, const struct pt_light *light, float s, float t)
 {
     const struct pt_image_map *map = &scene->images[light->image];
-    return (const float *)map->pixels + 3 * ((size_t)cell(t, map->height) * (size_t)map->width + (size_t)cell(s, map->width));
+    return (const float *)map->pixels + 3 * ((size_t)cell(t, map->height) * (size_t)map->width + (size_t)cell(s,
+                                                                                                              map->width));
 }
 
 pt_vec3 pt_light_env_image_eval(const struct pt_scene *scene, const struct pt_light *light, pt_vec3 w)
@@ -195,7 +196,8 @@ static void sum_cells(const struct pt_light *light, const struct pt_image_map *m
 }
 
 /* E[(l/p)²] / E[l/p]² over samples of density p, uniform within each cell. */
-static double squared_weight(const struct pt_light *light, const struct pt_image_map *map, int32_t w, int32_t h, const double *cells)
+static double squared_weight(const struct pt_light *light, const struct pt_image_map *map, int32_t w, int32_t h,
+                             const double *cells)
 {
     const float *px = map->pixels;
     double pixels_per_cell = (double)map->width / w * ((double)map->height / h), total = 0.0, second = 0.0;

@@ -7,8 +7,8 @@
 #include "shade/light_point.h"
 
 /* Selects an emitter by u_pick and samples it towards p_ref; numbers in [0, 1). 0 when nothing arrives from it. */
-static inline int pt_light_sample(pt_effects fx, const struct pt_scene *scene, pt_vec3 p_ref, float u_pick, float u0, float u1,
-                                  struct pt_light_sample *out)
+static inline int pt_light_sample(pt_effects fx, const struct pt_scene *scene, pt_vec3 p_ref, float u_pick, float u0,
+                                  float u1, struct pt_light_sample *out)
 {
     float x = u_pick * (float)scene->emitter_count;
     int32_t i = (int32_t)x;

@@ -34,8 +34,8 @@ pt_effects pt_medium_effects(const struct pt_scene *scene, int32_t id)
     return m->kind == PT_MEDIUM_GRID ? fx | PT_FX_GRID_MEDIUM : fx;
 }
 
-/* One channel is chosen uniformly and gives the distance; the weight is the balance heuristic over the three (one-sample MIS),
- * so grey media have constant weights. */
+/* One channel is chosen uniformly and gives the distance; the weight is the balance heuristic over the three (one-sample
+ * MIS), so grey media have constant weights. */
 static void homogeneous_sample(const struct pt_medium *m, float t_max, struct pt_rng *rng, struct pt_medium_event *event)
 {
     pt_vec3 sigma_t = v3_add(m->sigma_a, m->sigma_s);

@@ -1,7 +1,7 @@
 /*
- * Media of varying density: null-collision tracking. Tentative collisions are drawn from a piecewise-constant majorant that is
- * walked cell by cell (Amanatides and Woo 1987); ratio tracking for transmittance (Novák et al. 2014), weighted delta tracking
- * for collisions (Kutz et al. 2017: colours share one majorant and absorption goes into the weight).
+ * Media of varying density: null-collision tracking. Tentative collisions are drawn from a piecewise-constant majorant that
+ * is walked cell by cell (Amanatides and Woo 1987); ratio tracking for transmittance (Novák et al. 2014), weighted delta
+ * tracking for collisions (Kutz et al. 2017: colours share one majorant and absorption goes into the weight).
  */
 #include "shade/medium.h"
 

@@ -87,7 +87,8 @@ pt_vec3 pt_image_bilinear(const struct pt_image_map *image, int32_t wrap, int32_
                       colour_at(image, (size_t)(row_b + xa) * n), colour_at(image, (size_t)(row_b + xb) * n), dx, dy);
     }
     return blend4(pt_image_texel(image, wrap, channel, x, y), pt_image_texel(image, wrap, channel, x + 1, y),
-                  pt_image_texel(image, wrap, channel, x, y + 1), pt_image_texel(image, wrap, channel, x + 1, y + 1), dx, dy);
+                  pt_image_texel(image, wrap, channel, x, y + 1), pt_image_texel(image, wrap, channel, x + 1, y + 1), dx,
+                  dy);
 }
 
 static pt_vec3 eval_image(const struct pt_scene *scene, const struct pt_texture *t, float s, float v)
@@ -127,7 +128,8 @@ pt_vec3 pt_texture_eval(const struct pt_scene *scene, int32_t number, float u, f
     }
     case PT_TEXTURE_BILERP: {
         pt_vec3 low = v3_madd(v3_scale(eval_input(scene, &t->in[0], u, v), 1.0f - w), w, eval_input(scene, &t->in[1], u, v));
-        pt_vec3 high = v3_madd(v3_scale(eval_input(scene, &t->in[2], u, v), 1.0f - w), w, eval_input(scene, &t->in[3], u, v));
+        pt_vec3 high = v3_madd(v3_scale(eval_input(scene, &t->in[2], u, v), 1.0f - w), w,
+                               eval_input(scene, &t->in[3], u, v));
         return v3_madd(v3_scale(low, 1.0f - s), s, high);
     }
     default:

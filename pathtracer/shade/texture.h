@@ -12,7 +12,8 @@
 /* Number of texture evaluations of this thread so far: lets tests prove that untextured scenes make none. */
 extern _Thread_local unsigned long long pt_texture_lookups;
 
-/* Value of texture `number` at surface parameters (u, v). A float texture is the same in x, y, z. Finite for finite images. */
+/* Value of texture `number` at surface parameters (u, v). A float texture is the same in x, y, z. Finite for finite
+ * images. */
 pt_vec3 pt_texture_eval(const struct pt_scene *scene, int32_t number, float u, float v);
 
 /* Step in u and v over which texture `number` is to be differenced: about one texel of the finest image in it. */

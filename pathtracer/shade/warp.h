@@ -29,8 +29,8 @@ static inline void pt_sincos_turn(float u, float *s, float *c)
     *c = ((q + 1) & 2) ? -cc : cc;
 }
 
-/* Cosine-weighted hemisphere around +z; pdf_solid = z/π. Malley's method. The angle is found by doubling a quarter of it twice:
- * no branch, which would be mispredicted every other time. */
+/* Cosine-weighted hemisphere around +z; pdf_solid = z/π. Malley's method. The angle is found by doubling a quarter of it
+ * twice: no branch, which would be mispredicted every other time. */
 static inline pt_vec3 pt_sample_cosine(float u0, float u1)
 {
     float s, c, r = sqrtf(u0), rest = 1.0f - u0;
