@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/bytes.h"
 #include "base/files.h"
 #include "base/half.h"
 
@@ -19,41 +20,19 @@ static const unsigned type_size[GGN_TYPES] = {4, 2, 2};
 
 /* --- numbers ----------------------------------------------------------------------------------------------------------- */
 
-static void put32(unsigned char *p, uint32_t v)
-{
-    for (int i = 0; i < 4; i++)
-        p[i] = (unsigned char)(v >> 8 * i);
-}
-
-static void put64(unsigned char *p, uint64_t v)
-{
-    for (int i = 0; i < 8; i++)
-        p[i] = (unsigned char)(v >> 8 * i);
-}
-
-static uint32_t get32(const unsigned char *p)
-{
-    return p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
-}
-
 static void put_float(unsigned char *p, float x)
 {
     uint32_t u;
     memcpy(&u, &x, sizeof u);
-    put32(p, u);
+    base_put_u32(p, u);
 }
 
 static float get_float(const unsigned char *p)
 {
-    uint32_t u = get32(p);
+    uint32_t u = base_get_u32(p);
     float x;
     memcpy(&x, &u, sizeof x);
     return x;
-}
-
-static uint64_t get64(const unsigned char *p)
-{
-    return get32(p) | (uint64_t)get32(p + 4) << 32;
 }
 
 /* FNV-1a, 64 bit (Fowler, Noll, Vo), with the checksum's own bytes as zero. */
@@ -128,26 +107,26 @@ static unsigned char *assemble(struct ggn_container *c, size_t *size)
     if (!file)
         return NULL;
     memcpy(file, MAGIC, sizeof MAGIC);
-    put32(file + 8, GGN_CONTAINER_VERSION);
-    put32(file + 12, (uint32_t)c->n_entries);
-    put64(file + 16, at);
-    put64(file + 24, json_at);
-    put64(file + 32, json_size);
-    put64(file + 40, HEADER);
+    base_put_u32(file + 8, GGN_CONTAINER_VERSION);
+    base_put_u32(file + 12, (uint32_t)c->n_entries);
+    base_put_u64(file + 16, at);
+    base_put_u64(file + 24, json_at);
+    base_put_u64(file + 32, json_size);
+    base_put_u64(file + 40, HEADER);
     memcpy(file + json_at, c->json, json_size);
     for (int i = 0; i < c->n_entries; i++) {
         const struct ggn_entry *e = &c->entry[i];
         unsigned char *p = file + HEADER + (size_t)i * ENTRY;
         memcpy(p, e->name, sizeof e->name);
-        put32(p + 48, (uint32_t)e->type);
-        put32(p + 52, (uint32_t)e->rank);
+        base_put_u32(p + 48, (uint32_t)e->type);
+        base_put_u32(p + 52, (uint32_t)e->rank);
         for (int d = 0; d < 4; d++)
-            put32(p + 56 + 4 * d, e->dim[d]);
-        put64(p + 72, e->offset);
-        put64(p + 80, e->size);
+            base_put_u32(p + 56 + 4 * d, e->dim[d]);
+        base_put_u64(p + 72, e->offset);
+        base_put_u64(p + 80, e->size);
         encode(file + e->offset, e);
     }
-    put64(file + AT_CHECKSUM, checksum(file, at));
+    base_put_u64(file + AT_CHECKSUM, checksum(file, at));
     *size = at;
     return file;
 }
@@ -161,7 +140,7 @@ static int fits(const struct ggn_container *c, struct base_err *err)
         for (size_t k = 0; k < c->entry[i].count; k++)
             if (fabsf(c->entry[i].write[k]) > most[c->entry[i].type] && isfinite(c->entry[i].write[k]))
                 return base_fail(err, BASE_EINVAL, "tensor '%s' has a value of %g, too large for %s", c->entry[i].name,
-                                (double)c->entry[i].write[k], ggn_type_names[c->entry[i].type]);
+                                 (double)c->entry[i].write[k], ggn_type_names[c->entry[i].type]);
     return 0;
 }
 
@@ -192,15 +171,17 @@ static int check_header(const unsigned char *p, size_t size, const char *name, s
 {
     if (size < HEADER || memcmp(p, MAGIC, sizeof MAGIC) != 0)
         return base_fail(err, BASE_EINVAL, "%s: not a .ggn file", name);
-    if (get32(p + 8) != GGN_CONTAINER_VERSION)
-        return base_fail(err, BASE_EINVAL, "%s: .ggn version %u; this program reads version %d", name, get32(p + 8),
-                        GGN_CONTAINER_VERSION);
-    if (get64(p + 16) != size)
+    if (base_get_u32(p + 8) != GGN_CONTAINER_VERSION)
+        return base_fail(err, BASE_EINVAL, "%s: .ggn version %u; this program reads version %d", name, base_get_u32(p + 8),
+                         GGN_CONTAINER_VERSION);
+    if (base_get_u64(p + 16) != size)
         return base_fail(err, BASE_EINVAL, "%s: %s: the header says %llu bytes, the file has %zu", name,
-                        get64(p + 16) > size ? "truncated" : "too long", (unsigned long long)get64(p + 16), size);
-    if (get64(p + AT_CHECKSUM) != checksum(p, size))
+                         base_get_u64(p + 16) > size ? "truncated" : "too long", (unsigned long long)base_get_u64(p + 16),
+                         size);
+    if (base_get_u64(p + AT_CHECKSUM) != checksum(p, size))
         return base_fail(err, BASE_EINVAL, "%s: damaged (checksum does not match)", name);
-    uint64_t json_at = get64(p + 24), json_size = get64(p + 32), table = get64(p + 40), entries = get32(p + 12);
+    uint64_t json_at = base_get_u64(p + 24), json_size = base_get_u64(p + 32), table = base_get_u64(p + 40),
+             entries = base_get_u32(p + 12);
     if (json_at > size || json_size > size - json_at || json_size > MAX_JSON)
         return base_fail(err, BASE_EINVAL, "%s: the description lies outside of the file", name);
     if (entries > GGN_CONTAINER_TENSORS || table > size || entries * ENTRY > size - table)
@@ -210,7 +191,7 @@ static int check_header(const unsigned char *p, size_t size, const char *name, s
 
 static int read_entry(struct ggn_entry *e, const unsigned char *p, size_t size, const char *name, struct base_err *err)
 {
-    uint32_t type = get32(p + 48), rank = get32(p + 52);
+    uint32_t type = base_get_u32(p + 48), rank = base_get_u32(p + 52);
     uint64_t count = 1;
 
     memcpy(e->name, p, sizeof e->name);
@@ -221,7 +202,7 @@ static int read_entry(struct ggn_entry *e, const unsigned char *p, size_t size, 
     if (type >= GGN_TYPES || rank < 1 || rank > 4)
         return base_fail(err, BASE_EINVAL, "%s: tensor '%s' has an unknown type or rank", name, e->name);
     for (int d = 0; d < 4; d++) {
-        e->dim[d] = get32(p + 56 + 4 * d);
+        e->dim[d] = base_get_u32(p + 56 + 4 * d);
         if (e->dim[d] < 1 || (d >= (int)rank && e->dim[d] != 1) || count > MAX_FILE / e->dim[d])
             return base_fail(err, BASE_EINVAL, "%s: tensor '%s' has an impossible shape", name, e->name);
         count *= e->dim[d];
@@ -229,8 +210,8 @@ static int read_entry(struct ggn_entry *e, const unsigned char *p, size_t size, 
     e->type = (enum ggn_type)type;
     e->rank = (int)rank;
     e->count = (size_t)count;
-    e->offset = get64(p + 72);
-    e->size = get64(p + 80);
+    e->offset = base_get_u64(p + 72);
+    e->size = base_get_u64(p + 80);
     if (e->size != count * type_size[type] || e->offset % ALIGN || e->offset > size || e->size > size - e->offset)
         return base_fail(err, BASE_EINVAL, "%s: tensor '%s' lies outside of the file", name, e->name);
     return 0;
@@ -244,16 +225,16 @@ static int parse_owned(struct ggn_container *c, const char *name, struct base_er
 
     if (rc)
         return rc;
-    size_t json_size = (size_t)get64(p + 32);
-    c->n_entries = (int)get32(p + 12);
+    size_t json_size = (size_t)base_get_u64(p + 32);
+    c->n_entries = (int)base_get_u32(p + 12);
     c->entry = calloc((size_t)c->n_entries + 1, sizeof *c->entry);
     c->json = malloc(json_size + 1);
     if (!c->entry || !c->json)
         return base_fail_nomem(err, "model file");
-    memcpy(c->json, p + get64(p + 24), json_size);
+    memcpy(c->json, p + base_get_u64(p + 24), json_size);
     c->json[json_size] = 0;
     for (int i = 0; i < c->n_entries && !rc; i++)
-        rc = read_entry(&c->entry[i], p + get64(p + 40) + (size_t)i * ENTRY, c->size, name, err);
+        rc = read_entry(&c->entry[i], p + base_get_u64(p + 40) + (size_t)i * ENTRY, c->size, name, err);
     return rc;
 }
 
