@@ -28,7 +28,8 @@ int pt_sequence_levels(const char *text, uint32_t spp[PT_SEQUENCE_MAX_LEVELS], s
     int geometric, n = 0;
     if (sscanf(text, "%15[a-z]:%lf:%lf:%lf%c", kind, &first, &last, &step, &end) != 4 ||
         (!(geometric = strcmp(kind, "geometric") == 0) && strcmp(kind, "linear") != 0))
-        return base_fail(err, BASE_EINVAL, "--levels %s: expected geometric:FIRST:LAST:RATIO or linear:FIRST:LAST:STEP", text);
+        return base_fail(err, BASE_EINVAL, "--levels %s: expected geometric:FIRST:LAST:RATIO or linear:FIRST:LAST:STEP",
+                         text);
     if (!(first >= 1.0 && last >= first && last <= 1e9) || !(geometric ? step >= 1.001 : step >= 1.0))
         return base_fail(err, BASE_EINVAL, "--levels %s: expected 1 <= FIRST <= LAST, RATIO >= 1.001, STEP >= 1", text);
     for (double at = first; at <= last * (1.0 + 1e-9); at = geometric ? at * step : at + step) {
@@ -111,15 +112,14 @@ static void name_view(const struct pt_sequence_config *c, char *scene, char *vie
 
 static void describe(struct recorder *r)
 {
-    static const char *const samplers[] = {"independent", "sobol"}, *const filters[] = {"box", "triangle", "gaussian"};
     const struct pt_sequence_config *c = r->config;
     const struct pt_integrator *i = &c->render.integrator;
     struct seq_manifest *m = &r->manifest;
     name_view(c, m->scene, m->camera, sizeof m->scene);
     snprintf(m->source, sizeof m->source, "%s", c->scene_path);
     snprintf(m->renderer, sizeof m->renderer,
-             "lull pathtracer " BASE_VERSION ", %s sampler, %s, filter %s %g, max depth %d, clamp %g", samplers[i->sampler],
-             i->strategy == PT_STRATEGY_MIS ? "path" : "bsdf-only", filters[i->filter],
+             "lull pathtracer " BASE_VERSION ", %s sampler, %s, filter %s %g, max depth %d, clamp %g",
+             pt_sampler_words[i->sampler], pt_strategy_words[i->strategy], pt_filter_words[i->filter],
              (double)i->filter_x, i->max_depth, (double)i->max_component);
     m->source_crc32 = c->scene_crc;
     m->has_look_at = c->view.has_look_at;
@@ -312,7 +312,8 @@ static int prepare(struct recorder *r, struct base_err *err)
     r->manifest.levels = calloc(PT_SEQUENCE_MAX_LEVELS, sizeof *r->manifest.levels);
     if (!r->manifest.levels)
         return base_fail_nomem(err, "levels");
-    int levels = pt_sequence_levels(r->config->levels ? r->config->levels : "geometric:20:10000:1.15", r->manifest.levels, err);
+    int levels = pt_sequence_levels(r->config->levels ? r->config->levels : "geometric:20:10000:1.15", r->manifest.levels,
+                                    err);
     if (levels < 0)
         return levels;
     r->manifest.n_levels = (uint32_t)levels;

@@ -1,7 +1,7 @@
 /*
- * Records a view as a block sequence (plugin-api/sequence/FORMAT.md): block after block, each at rising sample counts, with a reference
- * of independent samples. A finished block is one file plus its line in the manifest; running again goes on after the last
- * finished block and refuses a folder that was begun with other settings.
+ * Records a view as a block sequence (plugin-api/sequence/FORMAT.md): block after block, each at rising sample counts, with
+ * a reference of independent samples. A finished block is one file plus its line in the manifest; running again goes on
+ * after the last finished block and refuses a folder that was begun with other settings.
  */
 #ifndef PT_RENDER_SEQUENCE_H
 #define PT_RENDER_SEQUENCE_H

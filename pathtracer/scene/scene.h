@@ -23,7 +23,7 @@
 #include "scene/arena.h"
 #include "scene/effects.h"
 #include "scene/mat34.h"
-#include "scene/material.h"
+#include "scene/materials.h"
 #include "scene/vec.h"
 
 /* --- camera ----------------------------------------------------------------------------------------------------------- */

@@ -5,7 +5,7 @@
  * next; both point away from the surface. Radiance is transported towards the camera, so refraction carries the factor
  * (eta_i/eta_t)² of radiance compression (Veach 1997, §5.2). Pure functions, thread-safe, no allocation.
  *
- * A model NAME of the list PT_BSDFS (scene/material.h) is the header bsdf_NAME.h with these inline functions and a table;
+ * A model NAME of the list PT_BSDFS (scene/materials.h) is the header bsdf_NAME.h with these inline functions and a table;
  * `fx` is the kernel's compile-time effect set, so that models the scene does not use vanish from its code:
  *   void pt_NAME_closure(fx, scene, material, surface, b)       fills the fields of *b that the model uses
  *   int pt_NAME_has_smooth(b)                                   whether any part of it is not a delta distribution
@@ -20,7 +20,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "scene/material.h"
+#include "scene/materials.h"
 
 /* Which fields count depends on kind; the others may hold anything. */
 struct pt_bsdf {

@@ -2,8 +2,8 @@
  * Materials as plain data: which model, and its parameters, each a constant or a texture. A zeroed parameter is the constant
  * 0.
  */
-#ifndef PT_SCENE_MATERIAL_H
-#define PT_SCENE_MATERIAL_H
+#ifndef PT_SCENE_MATERIALS_H
+#define PT_SCENE_MATERIALS_H
 
 #include <stdint.h>
 
