@@ -2,19 +2,12 @@
 
 #include "integ/kernel_sets.h"
 
-/* From small to large: the first that covers a scene is taken. */
+#define PT_KERNEL_ROW(name, text, set) {set, pt_kernel_##name, text},
 static const struct {
     pt_effects covers;
     pt_kernel *kernel;
     const char *name;
-} kernels[] = {
-    {PT_FX_SET_DIFFUSE, pt_kernel_diffuse, "diffuse"},
-    {PT_FX_SET_SPECULAR, pt_kernel_specular, "specular"},
-    {PT_FX_SET_SURFACES, pt_kernel_surfaces, "surfaces"},
-    {PT_FX_SET_MEDIA, pt_kernel_media, "media"},
-    {PT_FX_SET_NO_MEDIA, pt_kernel_no_media, "no-media"},
-    {PT_FX_ALL, pt_kernel_all, "all"},
-};
+} kernels[] = {PT_KERNELS(PT_KERNEL_ROW)};
 
 pt_kernel *pt_kernel_select(pt_effects needed, pt_effects *covers, const char **name)
 {

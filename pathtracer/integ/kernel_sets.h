@@ -17,6 +17,16 @@
 /* Everything but media. */
 #define PT_FX_SET_NO_MEDIA (PT_FX_ALL & ~(pt_effects)(PT_FX_MEDIA | PT_FX_INTERFACE))
 
-pt_kernel pt_kernel_diffuse, pt_kernel_specular, pt_kernel_surfaces, pt_kernel_no_media, pt_kernel_media, pt_kernel_all;
+/* X(name, name for people, effects), from small to large: the first that covers a scene is taken. */
+#define PT_KERNELS(X) \
+    X(diffuse, "diffuse", PT_FX_SET_DIFFUSE) \
+    X(specular, "specular", PT_FX_SET_SPECULAR) \
+    X(surfaces, "surfaces", PT_FX_SET_SURFACES) \
+    X(media, "media", PT_FX_SET_MEDIA) \
+    X(no_media, "no-media", PT_FX_SET_NO_MEDIA) \
+    X(all, "all", PT_FX_ALL)
+
+#define PT_KERNEL_DECLARE(name, text, set) pt_kernel pt_kernel_##name;
+PT_KERNELS(PT_KERNEL_DECLARE)
 
 #endif

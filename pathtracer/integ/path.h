@@ -411,4 +411,12 @@ PT_KERNEL_INLINE void pt_path_sample(pt_effects fx, const struct pt_scene *scene
         pt_trace_end(trace, out->radiance);
 }
 
+/* The whole of a file kernel_NAME.c: the kernel of the list PT_KERNELS (kernel_sets.h) for its effect set. */
+#define PT_KERNEL_DEFINE(name, set)                                                                                        \
+    void pt_kernel_##name(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y,      \
+                          uint32_t sample, struct pt_path_result *out)                                                     \
+    {                                                                                                                      \
+        pt_path_sample(set, scene, settings, x, y, sample, NULL, out);                                                     \
+    }
+
 #endif
