@@ -98,7 +98,7 @@ REPLAY   := $(patsubst tests/fuzz/%.c,$(OUT)/fuzz/replay-%,$(FUZZ_SRC))
 FUZZERS  := $(patsubst tests/fuzz/%.c,build/fuzz/%,$(FUZZ_SRC))
 
 .DEFAULT_GOAL := all
-.PHONY: all demo test bench asan tsan fuzz mutants hdr-check abi-check install compdb clean help setup tests replay train-demo
+.PHONY: all demo test bench asan tsan fuzz mutants hdr-check abi-check install compdb clean help setup tests replay train-demo test-study
 .SECONDARY:
 
 all: $(PROGRAMS) $(CRITERIA) ## build the programs and the criteria
@@ -197,6 +197,10 @@ test: setup ## build everything, run every test; closes with "N passed, N failed
 asan tsan: ## run the unit and ABI tests under the sanitizer
 	@$(MAKE) --no-print-directory MODE=$@ all tests
 	@BUILD=build/$@ tests/run --$@ $(patsubst tests/%.c,build/$@/tests/%,$(SANE_SRC)) $(if $(filter tsan,$@),$(wildcard tests/tsan/*.sh))
+
+test-study: setup ## the page of ggn study in Chromium, simulated participants, load; installs what it can, skips the rest with a reason
+	@$(MAKE) --no-print-directory $(BIN)/ggn
+	@BUILD=build tests/run $(filter-out %/node.sh,$(wildcard tests/study/*.sh))
 
 FUZZ_SECONDS ?= 60
 FUZZ_FLAGS := -g -O1 -fsanitize=fuzzer-no-link,address,undefined -fno-sanitize=vptr -fno-sanitize-recover=undefined
