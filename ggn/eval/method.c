@@ -120,9 +120,9 @@ int ggn_method_scores(struct ggn_method *m, const struct ggn_eval_set *s, const 
     return rc;
 }
 
-static double verdict(const struct ggn_method *m, size_t i)
+double ggn_method_verdict(const struct ggn_method *m, size_t i)
 {
-    return m->verdict ? m->verdict[i] : m->score[i];
+    return m->verdict ? m->verdict[i] : m->score ? m->score[i] : (double)NAN;
 }
 
 static int is_held(const struct ggn_method *m, size_t i, double limit)
@@ -132,7 +132,7 @@ static int is_held(const struct ggn_method *m, size_t i, double limit)
 
 int ggn_method_passes(const struct ggn_method *m, size_t i)
 {
-    return verdict(m, i) < m->cut && !is_held(m, i, m->guard_limit);
+    return ggn_method_verdict(m, i) < m->cut && !is_held(m, i, m->guard_limit);
 }
 
 static double stop_of(const struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_eval_block *b, double cut,
@@ -140,7 +140,7 @@ static double stop_of(const struct ggn_method *m, const struct ggn_eval_set *s, 
 {
     struct ggn_stopper row = {0};
     for (size_t i = b->first; i < b->end; i++)
-        if (!isnan(verdict(m, i)) && ggn_stopper_pass(&row, m->passes, verdict(m, i) < cut) && !is_held(m, i, limit))
+        if (!isnan(ggn_method_verdict(m, i)) && ggn_stopper_pass(&row, m->passes, ggn_method_verdict(m, i) < cut) && !is_held(m, i, limit))
             return s->spp[i];
     return b->cap;
 }

@@ -63,6 +63,8 @@ struct ggn_method_metrics {
 int ggn_method_measure(const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, struct ggn_method_metrics *out,
                        struct base_err *err);
 
+/* What is held against the cut in case i; NaN: it was not judged there. */
+double ggn_method_verdict(const struct ggn_method *m, size_t i);
 /* Whether case i says that its block may stop: below the cut and not held back. */
 int ggn_method_passes(const struct ggn_method *m, size_t i);
 

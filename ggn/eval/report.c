@@ -253,6 +253,27 @@ static int make_maps(struct ggn_thresholds *t, const struct ggn_eval_set *s, enu
     return 0;
 }
 
+/* score: what the method said at the stop; empty where it did not judge. */
+static int write_stops(const char *path, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *m,
+                       struct base_err *err)
+{
+    struct base_file_out out;
+    int rc = base_file_begin(&out, path, err);
+    if (rc)
+        return rc;
+    fputs("view;block;threshold;censored;stop;score\n", out.file);
+    for (int b = 0; b < s->n_blocks; b++) {
+        const struct ggn_eval_block *e = &s->blocks[b];
+        if (e->split != split)
+            continue;
+        fprintf(out.file, "%s;%u;%.6g;%d;%.6g;", s->chains.data.views[e->view].name, e->label.id, e->label.threshold,
+                e->label.censored, m->stop[b]);
+        double score = ggn_method_verdict(m, ggn_method_stop_case(m, s, b));
+        fprintf(out.file, isfinite(score) ? "%.17g\n" : "\n", score);
+    }
+    return base_file_commit(&out, err);
+}
+
 static int method_pictures(const char *dir, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *m, struct base_err *err)
 {
     char path[4096];
@@ -271,16 +292,8 @@ static int method_pictures(const char *dir, const struct ggn_eval_set *s, enum g
         rc = ggn_plot_heatmaps(path, &pairing, "thresholds", m->name, err);
     if (!rc && m->score && (rc = picture_path(path, dir, split, "score", m, ".png", err)) == 0)
         rc = plot_scores(path, s, split, m, err);
-    struct base_file_out out;
-    if (!rc && (rc = picture_path(path, dir, split, "stops", m, ".csv", err)) == 0 && (rc = base_file_begin(&out, path, err)) == 0) {
-        fputs("view;block;threshold;censored;stop\n", out.file);
-        for (int b = 0; b < s->n_blocks; b++) {
-            const struct ggn_eval_block *e = &s->blocks[b];
-            if (e->split == split)
-                fprintf(out.file, "%s;%u;%.6g;%d;%.6g\n", s->chains.data.views[e->view].name, e->label.id, e->label.threshold, e->label.censored, m->stop[b]);
-        }
-        rc = base_file_commit(&out, err);
-    }
+    if (!rc && (rc = picture_path(path, dir, split, "stops", m, ".csv", err)) == 0)
+        rc = write_stops(path, s, split, m, err);
     ggn_pairing_release(&pairing);
     ggn_thresholds_release(&truth);
     ggn_thresholds_release(&stops);

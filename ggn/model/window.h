@@ -36,18 +36,4 @@ void ggn_tile_load_u16(const uint16_t *src, int width, int height, int x0, int y
 void ggn_tile_store_u16(uint16_t *dst, int width, int height, int x0, int y0, int tile_w, int tile_h, const float *src,
                         size_t src_row, size_t src_plane);
 
-/* The statistics `tail999` and `gini` of plugin-api/sequence/FORMAT.md from a histogram of |Y(D)| in logarithmic bins
- * (relative error below 1.5 %): no sorting, no allocation. */
-enum { GGN_TAIL_BINS = 2048 };
-struct ggn_tail {
-    uint32_t bin[GGN_TAIL_BINS]; /* bin 0: below 2^-30 */
-    double sum_y;
-    uint32_t pixels;
-};
-void ggn_tail_clear(struct ggn_tail *tail);
-/* y: luminance of the mean; d: of the half-buffer difference. Both finite. */
-void ggn_tail_add(struct ggn_tail *tail, double y, double d);
-double ggn_tail_999(const struct ggn_tail *tail);
-double ggn_tail_gini(const struct ggn_tail *tail);
-
 #endif

@@ -115,30 +115,42 @@ static int32_t create(const struct lull_host *host, const struct lull_pair *pair
 
 static void workers_release(struct gp_worker *worker, uint32_t count)
 {
-    for (uint32_t i = 0; worker && i < count; i++)
+    for (uint32_t i = 0; worker && i < count; i++) {
         ggn_judge_destroy(worker[i].judge);
+        free(worker[i].noise);
+    }
     free(worker);
 }
 
-/* Scratch for as many workers as can be busy. */
-static struct gp_worker *workers_create(const struct lull_instance *in, uint32_t count, struct lull_error *err)
+static size_t largest_block(const struct lull_frame *frame)
 {
-    struct base_err error = {0};
-    struct gp_worker *worker = calloc(count, sizeof *worker);
+    size_t most = 0;
 
-    if (!worker) {
-        lull_kit_fail(err, LULL_E_MEMORY, "begin_frame: out of memory");
-        return NULL;
+    for (uint32_t i = 0; i < frame->block_count; i++) {
+        const struct lull_rect *r = lull_kit_rect(frame, i);
+        size_t pixels = (size_t)((int64_t)r->x1 - r->x0) * (size_t)((int64_t)r->y1 - r->y0);
+        most = pixels > most ? pixels : most;
     }
-    for (uint32_t i = 0; i < count; i++) {
-        worker[i].judge = ggn_judge_create(in->model, in->precision, NULL, &error);
-        if (!worker[i].judge) {
-            gp_fail_from(err, "begin_frame", &error);
-            workers_release(worker, count);
-            return NULL;
-        }
+    return most;
+}
+
+/* Scratch for as many workers as can be busy. */
+static struct gp_worker *workers_create(const struct lull_instance *in, uint32_t count, size_t pixels, struct lull_error *err)
+{
+    struct base_err error = {.code = BASE_ENOMEM, .text = "out of memory"};
+    struct gp_worker *worker = calloc(count, sizeof *worker);
+    int rc = worker ? 0 : BASE_ENOMEM;
+
+    for (uint32_t i = 0; i < count && !rc; i++) {
+        worker[i].noise = malloc(pixels * sizeof *worker[i].noise);
+        worker[i].judge = worker[i].noise ? ggn_judge_create(in->model, in->precision, NULL, &error) : NULL;
+        rc = worker[i].judge ? 0 : error.code;
     }
-    return worker;
+    if (!rc)
+        return worker;
+    gp_fail_from(err, "begin_frame", &error);
+    workers_release(worker, count);
+    return NULL;
 }
 
 static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *frame, struct lull_error *err)
@@ -149,8 +161,8 @@ static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *fr
     if (status)
         return status;
     uint32_t count = lull_kit_workers(&in->kit);
-    struct gp_worker *worker = in->worker ? NULL : workers_create(in, count, err);
-    if (!worker && !in->worker)
+    struct gp_worker *worker = workers_create(in, count, largest_block(frame), err);
+    if (!worker)
         return err && LULL_HAS(struct lull_error, err, message) ? err->code : LULL_E_MEMORY;
     status = gp_history_create(&history, in->rule.window, frame, err);
     if (status) {
@@ -158,11 +170,10 @@ static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *fr
         return status;
     }
     gp_history_release(&in->history);
+    workers_release(in->worker, in->workers);
     in->history = history;
-    if (worker) {
-        in->worker = worker;
-        in->workers = count;
-    }
+    in->worker = worker;
+    in->workers = count;
     lull_kit_frame_open(in, frame);
     in->rule.spp_max = frame->spp_max;
     in->display = gp_display_of(&in->kit);

@@ -13,7 +13,7 @@
 
 struct gp_worker {
     struct ggn_judge *judge;
-    struct ggn_tail tail;
+    double *noise; /* [pixels of the largest block], for the tail guard */
 };
 
 struct lull_instance {

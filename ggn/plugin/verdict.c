@@ -1,5 +1,7 @@
 #include "plugin/ggn.h"
 
+#include "sequence/tail.h"
+
 /* Display codes of the block; returns how many values were broken. */
 static long read_display(const struct lull_instance *in, const struct lull_view *view, const struct lull_block *b, uint8_t *out)
 {
@@ -67,22 +69,25 @@ static int tail_statistics(void *data, double *tail999, double *gini)
     const struct lull_kit *kit = &l->in->kit;
     const uint32_t planes = LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_HALF);
     const double n = (double)l->block->spp, h = (double)l->block->half_spp;
-    struct ggn_tail *tail = &l->worker->tail;
+    double *noise = l->worker->noise, sum = 0;
     struct lull_kit_span s;
+    size_t count = 0;
 
     if (!lull_kit_plane(l->view, LULL_PLANE_HALF) || h <= 0 || h >= n)
         return 0;
     const double split = sqrt(h / (n - h));
-    ggn_tail_clear(tail);
     for (lull_kit_span_begin(&s, l->view, l->block, planes); lull_kit_span_next(&s);)
         for (int32_t i = 0; i < s.count; i++) {
             double luminance = lull_kit_luminance(kit, s.value[LULL_PLANE_COLOR][i]);
             double d = split * (lull_kit_luminance(kit, s.value[LULL_PLANE_HALF][i]) - luminance);
-            if (isfinite(luminance) && isfinite(d))
-                ggn_tail_add(tail, luminance, d);
+            if (isfinite(luminance) && isfinite(d)) {
+                sum += luminance;
+                noise[count++] = fabs(d);
+            }
         }
-    *tail999 = ggn_tail_999(tail);
-    *gini = ggn_tail_gini(tail);
+    struct seq_tail tail = seq_tail_of(noise, count, count ? sum / (double)count : 0);
+    *tail999 = tail.tail999;
+    *gini = tail.gini;
     return 1;
 }
 

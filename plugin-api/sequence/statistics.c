@@ -1,9 +1,9 @@
 #include "sequence/statistics.h"
 
 #include <math.h>
-#include <stdlib.h>
 
 #include "base/colour.h"
+#include "sequence/tail.h"
 
 /* What the criteria halfbuf and variance call a settled pixel by default. */
 static const double tail_error = 0.5, floor_y = 0.02;
@@ -12,12 +12,6 @@ static const double tail_error = 0.5, floor_y = 0.02;
 static double luminance(const double *rgb, size_t pixels, size_t i)
 {
     return base_luminance(rgb[i], rgb[pixels + i], rgb[2 * pixels + i]);
-}
-
-static int ascending(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
 }
 
 /* Dammertz et al. 2010, eq. 2, averaged over the block */
@@ -31,17 +25,6 @@ static double dammertz(const double *mean, const double *half_mean, size_t pixel
             sum += (fabs(m[0] - a[0]) + fabs(m[pixels] - a[pixels]) + fabs(m[2 * pixels] - a[2 * pixels])) / sqrt(total);
     }
     return sum / (double)pixels;
-}
-
-/* Of ascending values. */
-static double gini(const double *a, size_t n)
-{
-    double sum = 0.0, weighted = 0.0;
-    for (size_t i = 0; i < n; i++) {
-        sum += a[i];
-        weighted += (2.0 * (double)(i + 1) - (double)n - 1.0) * a[i];
-    }
-    return sum > 0.0 ? weighted / ((double)n * sum) : 0.0;
 }
 
 void seq_statistics(const double *mean, const double *half_mean, const double *half, const double *moment2, size_t pixels,
@@ -58,11 +41,11 @@ void seq_statistics(const double *mean, const double *half_mean, const double *h
         half_unsettled += fabs(y - luminance(half_mean, pixels, i)) > tail_error * level;
         scratch[i] = fabs(luminance(half, pixels, i));
     }
-    qsort(scratch, pixels, sizeof *scratch, ascending);
+    struct seq_tail tail = seq_tail_of(scratch, pixels, sum_y / n);
     out[SEQ_DAMMERTZ] = (struct seq_stat){"dammertz", dammertz(mean, half_mean, pixels)};
     out[SEQ_HALF_UNSETTLED] = (struct seq_stat){"half_unsettled", (double)half_unsettled / n};
     out[SEQ_RSE] = (struct seq_stat){"rse", sqrt(sum_e / n)};
     out[SEQ_RSE_UNSETTLED] = (struct seq_stat){"rse_unsettled", (double)rse_unsettled / n};
-    out[SEQ_TAIL999] = (struct seq_stat){"tail999", scratch[(size_t)ceil(0.999 * n) - 1] / fmax(sum_y / n, 1e-4)};
-    out[SEQ_GINI] = (struct seq_stat){"gini", gini(scratch, pixels)};
+    out[SEQ_TAIL999] = (struct seq_stat){"tail999", tail.tail999};
+    out[SEQ_GINI] = (struct seq_stat){"gini", tail.gini};
 }

@@ -46,7 +46,8 @@ check "the epoch with the lowest validation loss is kept, not the last, not the 
 
 # the changed stops that are counted are those in which the tables of stops differ
 $ggn evaluate -d $data -m "$tmp/a.ggn" -m "$tmp/f.ggn" --retune --no-quality -o "$tmp/report" >"$tmp/out" 2>"$tmp/err" &&
-    changed=$(diff "$tmp/report/train-stops-aggn.csv" "$tmp/report/train-stops-fggn.csv" | grep -c '^>') && [ "$changed" -gt 0 ] &&
+    for m in a f; do cut -d';' -f1-5 "$tmp/report/train-stops-${m}ggn.csv" >"$tmp/stops-$m"; done &&
+    changed=$(diff "$tmp/stops-a" "$tmp/stops-f" | grep -c '^>') && [ "$changed" -gt 0 ] &&
     grep -q "^f.ggn: [1-9][0-9]* of [0-9]* verdicts and $changed of 9 stops differ from a.ggn" "$tmp/out"
 check "evaluate counts what another model decides differently" $?
 

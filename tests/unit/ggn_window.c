@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sequence/tail.h"
 #include "model/policy.h"
 #include "model/window.h"
 #include "nn/hash.h"
@@ -82,29 +83,26 @@ static int by_value(const void *a, const void *b)
 static void tail_statistics_match_their_definition(void **state)
 {
     enum { P = 40000 };
-    static double a[P];
-    static struct ggn_tail tail;
+    static double a[P], sorted[P];
 
     for (int heavy = 0; heavy < 2; heavy++) {
         double sum = 0, weighted = 0;
-        ggn_tail_clear(&tail);
-        for (uint32_t i = 0; i < P; i++) {
-            a[i] = fabs(ggn_hash_unit(i, 3) - 0.5) * (heavy && i % 500 == 0 ? 300 : 0.2);
-            ggn_tail_add(&tail, 0.4, i % 2 ? a[i] : -a[i]);
-        }
-        qsort(a, P, sizeof a[0], by_value);
+        for (uint32_t i = 0; i < P; i++)
+            sorted[i] = a[i] = fabs(ggn_hash_unit(i, 3) - 0.5) * (heavy && i % 500 == 0 ? 300 : 0.2);
+        qsort(sorted, P, sizeof sorted[0], by_value);
         for (int i = 0; i < P; i++) {
-            sum += a[i];
-            weighted += (2.0 * (i + 1) - P - 1) * a[i];
+            sum += sorted[i];
+            weighted += (2.0 * (i + 1) - P - 1) * sorted[i];
         }
-        double p999 = a[(int)ceil(0.999 * P) - 1] / 0.4;
-        assert_true(fabs(ggn_tail_999(&tail) / p999 - 1) < 0.03);
-        assert_true(fabs(ggn_tail_gini(&tail) - weighted / (P * sum)) < 0.01);
+        struct seq_tail tail = seq_tail_of(a, P, 0.4);
+        assert_true(tail.tail999 == sorted[(int)ceil(0.999 * P) - 1] / 0.4);
+        assert_true(tail.gini == weighted / (P * sum));
+        assert_memory_equal(a, sorted, sizeof a);
     }
-    ggn_tail_clear(&tail);
-    for (int i = 0; i < 10; i++)
-        ggn_tail_add(&tail, 0, 0);
-    assert_true(ggn_tail_gini(&tail) == 0 && ggn_tail_999(&tail) == 0);
+    double zero[10] = {0}, one = 2;
+    struct seq_tail black = seq_tail_of(zero, 10, 0), single = seq_tail_of(&one, 1, 4), none = seq_tail_of(&one, 0, 1);
+    assert_true(black.gini == 0 && black.tail999 == 0 && none.tail999 == 0);
+    assert_true(single.gini == 0 && single.tail999 == 0.5);
     (void)state;
 }
 

@@ -1,0 +1,62 @@
+#!/bin/sh
+# One stopping rule: what `ggn evaluate` makes of a recording is what the criterion ggn does in a render, the same stop and the same
+# p for every block, with gate and guard on and off. Every sample count is recorded, hence each at which the criterion was asked; the
+# replay has to find these by itself.
+set -u
+cd "$(dirname "$0")/../.." || exit 2
+build=${BUILD:-build}
+n=0
+tmp=$(mktemp -d) || exit 2
+trap 'rm -rf "$tmp"' EXIT
+check() { # check NAME STATUS
+    n=$((n + 1))
+    if [ "$2" -eq 0 ]; then echo "ok $n - $1"; else echo "not ok $n - $1"; sed 's/^/# /' "$tmp/err" 2>/dev/null; fi
+}
+# A tiny model for blocks of 40 pixels: its windows are judged in a millisecond, its first level is 10 spp, each level 1.35 times
+# the last, and its gate opens where the noise is a few display codes.
+"$build/bin/ggn" train --data tests/data/train-demo --kr 3 --km 3 --kd 8 --crop 32 --ratio 0 --batch 8 --steps-denoiser 20 \
+    --steps 60 --epoch-steps 20 --out "$tmp/tiny.ggn" -q 2>"$tmp/err"
+check "a tiny model" $?
+
+render="$build/bin/pathtracer -q scenes/cornell-box.pbrt --size 120x80 --block 40 --sampler independent"
+mkdir "$tmp/data"
+$render --levels linear:1:250:1 --reference-spp 0 --sequence "$tmp/data/view" --name view </dev/null 2>"$tmp/err"
+check "every sample count from 1 to 250 recorded" $?
+{
+    printf '{"format": "lull-labels", "version": 1, "source": "observer", "detail": "made up", "cap": 10000, "spread": 0.15, "blocks": ['
+    for id in 0 1 2 3 4 5; do
+        printf '%s{"id": %d, "threshold": 100, "censored": false}' "$([ $id = 0 ] || echo ,)" $id
+    done
+    echo ']}'
+} >"$tmp/data/view/labels.json"
+
+# p to 14 digits: a report holds no more
+numbers='printf "%d %d %.14g\n", $1, $2, $3'
+# replay NAME PARAMETERS: blocks that a render stops, and the same from the recording, as lines of block, stop and p (0: none)
+replay() {
+    name=$1
+    shift
+    params=$(printf ' -p %s' "$@")
+    # shellcheck disable=SC2086
+    $render --spp-min 8 --spp-max 250 -c ggn -p model="$tmp/tiny.ggn" $params --report "$tmp/report.json" </dev/null 2>"$tmp/err" &&
+        "$build/bin/ggn" evaluate --data "$tmp/data" --model "$tmp/tiny.ggn" $params --recorded --no-quality -o "$tmp/out" \
+            >"$tmp/log" 2>"$tmp/err"
+    check "$name: rendered and replayed" $?
+    awk '/"id":/ { id = $2 + 0 } /"spp":/ { spp = $2 + 0 } /"p_noisy":/ { $3 = $2 + 0 == 0 ? 0 : $2; $1 = id; $2 = spp; '"$numbers"' }' "$tmp/report.json" >"$tmp/rendered"
+    awk -F';' "NR > 1 { \$1 = \$2; \$2 = \$5; \$3 = \$6 } NR > 1 { $numbers }" "$tmp"/out/*-stops-tinyggn.csv >"$tmp/replayed"
+    diff "$tmp/rendered" "$tmp/replayed" >"$tmp/err" && [ "$(wc -l <"$tmp/rendered")" -eq 6 ]
+    check "$name: the same stop and the same p for every block" $?
+}
+
+replay "gate and guard" threshold=0.6 tail=0.6
+cp "$tmp/rendered" "$tmp/both"
+replay "no gate" threshold=0.6 tail=0.6 gate=0
+cp "$tmp/rendered" "$tmp/no-gate"
+replay "no guard" threshold=0.6 tail=0 gini=0
+cp "$tmp/rendered" "$tmp/no-guard"
+replay "neither" threshold=0.6 tail=0 gini=0 gate=0
+# or the equalities above would say little
+! cmp -s "$tmp/both" "$tmp/no-guard" && ! cmp -s "$tmp/both" "$tmp/no-gate" &&
+    [ "$(awk '$2 < 250' "$tmp/both" | wc -l)" -ge 3 ] && [ "$(awk '$2 == 250' "$tmp/both" | wc -l)" -ge 1 ]
+check "gate and guard change stops, and blocks stop or do not" $?
+echo "1..$n"
