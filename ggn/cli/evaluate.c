@@ -16,12 +16,12 @@
 #include "eval/strips.h"
 #include "eval/trained.h"
 
-enum { MAX_MODELS = 8, MAX_METHODS = 8 + 2 * MAX_MODELS, MAX_ADJUSTED = 8 };
+enum { MAX_MODELS = 8, MAX_FILES = 8, MAX_METHODS = 9 + MAX_FILES + 2 * MAX_MODELS, MAX_ADJUSTED = 8 };
 
 struct options {
-    const char *data, *out, *models[MAX_MODELS];
-    int n_models, json, no_quality, threads, window, retune, recorded, baselines, epochs, bf16;
-    double early, ratio;
+    const char *data, *out, *observer, *models[MAX_MODELS], *thresholds[MAX_FILES];
+    int n_models, n_thresholds, json, no_quality, threads, window, retune, recorded, baselines, epochs, bf16;
+    double early, ratio, visible;
     int n_adjusted;
     struct {
         char name[16];
@@ -35,6 +35,15 @@ static int add_model(void *into, const char *path, struct base_err *err)
     if (o->n_models == MAX_MODELS)
         return base_fail(err, BASE_EINVAL, "more than %d models", MAX_MODELS);
     o->models[o->n_models++] = path;
+    return 0;
+}
+
+static int add_thresholds(void *into, const char *path, struct base_err *err)
+{
+    struct options *o = into;
+    if (o->n_thresholds == MAX_FILES)
+        return base_fail(err, BASE_EINVAL, "more than %d files of thresholds", MAX_FILES);
+    o->thresholds[o->n_thresholds++] = path;
     return 0;
 }
 
@@ -59,6 +68,10 @@ static const struct base_option list[] = {
     {.help = "What is measured:"},
     {"data", 'd', "DATA", TO(data), .needed = 1, .help = "labelled data set: a folder of sequences with split.json (needed)"},
     {"model", 'm', "FILE", .set = add_model, .help = "trained model (.ggn); may be repeated"},
+    {"observer", 'O', "FILE", TO(observer),
+     .help = "the observer's parameters, each view without itself (ggn label --calibrate); needed where there are people's views"},
+    {"visible", 0, "SHARE", TO(visible), 1e-4, 0.9999, .help = "share of viewers that may still see noise, for observer (0.25)"},
+    {"thresholds", 0, "CSV", .set = add_thresholds, .help = "a published model's thresholds of people's views; may be repeated"},
     {"param", 'p', "KEY=NUMBER", .set = add_adjusted,
      .help = "judge as the criterion does with this parameter: threshold, passes, gate, tail, gini, first-spp"},
     {.help = "What comes out:"},
@@ -171,6 +184,42 @@ static int add_models(struct job *j, struct base_threads *threads, struct base_e
     return rc;
 }
 
+static int check_people(const struct job *j, struct base_err *err)
+{
+    const struct ggn_dataset *d = &j->set.chains.data;
+    for (int i = 0; i < d->n; i++) {
+        const struct ggn_dataset_view *v = &d->views[i];
+        if (v->split != GGN_SPLIT_PEOPLE)
+            continue;
+        if (!v->has_labels || strcmp(v->labels.source, "human") != 0)
+            return base_fail(err, BASE_EINVAL, "%s: no human thresholds (ggn label --human CSV %s)", v->dir, v->dir);
+        if (!j->o->observer)
+            return base_fail(err, BASE_EINVAL, "%s: may have been fitted: --observer FILE says what the observer is without it", v->dir);
+    }
+    return 0;
+}
+
+static int add_observed(struct job *j, struct base_err *err)
+{
+    int available, rc = check_people(j, err);
+    if (rc)
+        return rc;
+    struct ggn_method *m = &j->methods[j->n];
+    rc = ggn_method_observer(m, &j->set, j->o->observer, j->o->visible, &available, err);
+    if (!rc && available)
+        j->n++;
+    else if (!rc)
+        ggn_method_release(m);
+    for (int i = 0; i < j->o->n_thresholds && !rc; i++) {
+        rc = ggn_method_thresholds(&j->methods[j->n], &j->set, j->o->thresholds[i], GGN_SPLIT_PEOPLE, &available, err);
+        if (!rc)
+            j->n++;
+        if (!rc && !available)
+            rc = base_fail(err, BASE_EINVAL, "%s: not all of people's views are in it", j->o->thresholds[i]);
+    }
+    return rc;
+}
+
 /* What other precisions and models change on a split: verdicts on windows that both judged, and where blocks stop. */
 static void report_changes(const struct job *j, enum ggn_split split, cJSON *to)
 {
@@ -249,6 +298,8 @@ static int report(struct job *j, int skipped, struct base_err *err)
             break;
         if (!j->o->json)
             ggn_report_table(stdout, &j->set, (enum ggn_split)split, j->methods, metrics, j->n);
+        if (!j->o->json && split == GGN_SPLIT_PEOPLE)
+            rc = ggn_report_people(stdout, &j->set, j->methods, j->n, err);
         cJSON_AddItemToObject(splits, ggn_split_names[split], ggn_report_json(j->methods, metrics, j->n));
         report_changes(j, (enum ggn_split)split, cJSON_AddObjectToObject(changes, ggn_split_names[split]));
         if (j->o->out)
@@ -271,8 +322,8 @@ int ggn_cmd_evaluate(int argc, char **argv)
     static const struct base_options options = {
         .list = list,
         .doc = "Measures models, the trivial baselines and the criteria halfbuf and variance on the same recorded sequences, "
-               "separately for training, validation and test scenes."};
-    struct options o = {.early = 0.05, .threads = base_threads_available(), .window = 6, .epochs = 15};
+               "separately for training, validation and test scenes and for views that people judged."};
+    struct options o = {.early = 0.05, .visible = 0.25, .threads = base_threads_available(), .window = 6, .epochs = 15};
     struct job j = {.o = &o};
     struct base_err err = {0};
     int window, skipped = 0;
@@ -298,6 +349,8 @@ int ggn_cmd_evaluate(int argc, char **argv)
         j.tuning_models = ggn_eval_count(&j.set, GGN_SPLIT_VALIDATION) > 0 ? GGN_SPLIT_VALIDATION : j.tuning;
         rc = add_trivial(&j, &err);
     }
+    if (!rc)
+        rc = add_observed(&j, &err);
     if (!rc && o.baselines)
         rc = add_baselines(&j, threads, &err);
     if (!rc)

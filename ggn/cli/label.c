@@ -83,14 +83,10 @@ static error_t parse(int key, char *arg, struct argp_state *state)
     }
 }
 
-/* The row of human thresholds of a view; SIN3D's own names end in _part6. */
+/* The row of human thresholds of a view. */
 static int find_row(const char *csv, const char *name, const struct ggn_thresholds *t, const struct ggn_view **row, struct base_err *err)
 {
-    char with_part[4200];
-    snprintf(with_part, sizeof with_part, "%s_part6", name);
-    *row = ggn_thresholds_find(t, name);
-    if (!*row)
-        *row = ggn_thresholds_find(t, with_part);
+    *row = ggn_thresholds_of(t, name);
     return *row ? 0 : base_fail(err, BASE_EINVAL, "%s: no thresholds for '%s'", csv, name);
 }
 
@@ -101,16 +97,18 @@ static int label_human(const struct options *o, const struct ggn_thresholds *t, 
     const struct seq_manifest *m = &v->manifest;
     const struct ggn_view *row;
     int rc = find_row(o->human, o->view ? o->view : v->name, t, &row, err);
+    if (!rc && (uint32_t)row->n != ggn_dataset_tiles(v))
+        rc = base_fail(err, BASE_EINVAL, "%s: '%s' has %d thresholds, %s has %u blocks", o->human, row->name, row->n, v->dir, ggn_dataset_tiles(v));
     if (rc)
         return rc;
-    struct ggn_labels l = {.source = "human", .cap = m->levels[m->n_levels - 1], .spread = o->spread > 0 ? o->spread : GGN_LABELS_SPREAD,
+    struct ggn_labels l = {.source = "human", .cap = GGN_CURVE_CAP, .spread = o->spread > 0 ? o->spread : GGN_LABELS_SPREAD,
                            .labels = malloc(m->n_blocks * sizeof *l.labels)};
     if (!l.labels)
         return base_fail_nomem(err, v->dir);
     for (uint32_t i = 0; i < m->n_blocks && !rc; i++) {
         uint32_t id = m->blocks[i].id;
-        if (id >= (uint32_t)row->n)
-            rc = base_fail(err, BASE_EINVAL, "%s: block %u has no threshold: '%s' has %d", v->dir, id, row->name, row->n);
+        if (!(id < (uint32_t)row->n && row->spp[id] > 0))
+            rc = base_fail(err, BASE_EINVAL, "%s: block %u has no threshold in '%s'", v->dir, id, row->name);
         else
             l.labels[l.n++] = (struct ggn_label){id, fmin(row->spp[id], l.cap), row->spp[id] >= l.cap};
     }
@@ -193,7 +191,7 @@ static int label(const struct options *o, struct base_threads *threads, struct b
 {
     struct ggn_observer observer = ggn_observer_default;
     struct ggn_thresholds human = {0};
-    int rc = o->observer_path ? ggn_observer_read(o->observer_path, &observer, err) : 0;
+    int rc = o->observer_path ? ggn_observer_read(o->observer_path, NULL, &observer, err) : 0;
     if (o->spread > 0)
         observer.spread = o->spread;
     if (!rc && o->human)

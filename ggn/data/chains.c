@@ -228,7 +228,8 @@ int ggn_chains_load(struct ggn_chains *set, const struct ggn_chains_options *o, 
     rc = choose_split(&made, o, err);
     for (int i = 0; !rc && i < made.data.n; i++) {
         const struct ggn_dataset_view *v = &made.data.views[i];
-        int wanted = v->split == GGN_SPLIT_TRAIN || v->split == GGN_SPLIT_VALIDATION || (v->split == GGN_SPLIT_TEST && o->with_test);
+        int apart = v->split == GGN_SPLIT_TEST || v->split == GGN_SPLIT_PEOPLE;
+        int wanted = v->split == GGN_SPLIT_TRAIN || v->split == GGN_SPLIT_VALIDATION || (apart && o->with_test);
         for (uint32_t k = 0; !rc && wanted && k < v->manifest.n_blocks; k++)
             rc = load_block(&made, i, k, o, err);
     }

@@ -15,6 +15,7 @@
 
 struct ggn_chain {
     int view, scene, synthetic;
+    int simulated;        /* the recording had no reference: all levels are made from its two halves */
     enum ggn_split split;
     uint32_t block;
     int n_levels;
@@ -41,7 +42,7 @@ struct ggn_chains_options {
     const char *validation; /* comma-separated scenes: over the data set's split; NULL: the split, or every fifth scene without */
     const char *test;       /* likewise; NULL: the split, or none */
     double ratio;           /* thin the levels to at least this ratio; 0: keep all */
-    int with_test;          /* read the test scenes' pixels too (training never does) */
+    int with_test;          /* read the pixels of the test scenes and of the people's views too (training never does) */
 };
 
 /* Reads and checks everything. BASE_EINVAL names the file that does not fit. */
@@ -53,7 +54,8 @@ void ggn_chains_release(struct ggn_chains *set);
 int ggn_chains_add_synthetic(struct ggn_chains *set, int per_chain, uint32_t seed, struct base_err *err);
 
 /* Continues recorded chains of all splits that end near or before their threshold, up to 0.7 of the reference's samples beyond the
- * last level: the reference's samples go on where the recording stopped, their running mean simulated from the half buffers. */
+ * last level: the reference's samples go on where the recording stopped, their running mean simulated from the half buffers. Where
+ * there is no reference but a full level, the whole chain is made anew, up to 10,000 spp: its mean stands for the converged image. */
 int ggn_chains_extend(struct ggn_chains *set, uint32_t seed, struct base_err *err);
 
 /* Chains of a split, real ones only if real_only. */

@@ -11,7 +11,7 @@
 
 #include "base/files.h"
 
-const char *const ggn_split_names[GGN_SPLITS] = {"train", "validation", "test", "none"};
+const char *const ggn_split_names[GGN_SPLITS] = {"train", "validation", "test", "people", "none"};
 
 static int exists(const char *dir, const char *name)
 {
@@ -152,6 +152,12 @@ int ggn_dataset_open(const char *path, struct ggn_dataset *data, struct base_err
     }
     *data = d;
     return 0;
+}
+
+uint32_t ggn_dataset_tiles(const struct ggn_dataset_view *view)
+{
+    const struct seq_manifest *m = &view->manifest;
+    return (m->width + m->block - 1) / m->block * ((m->height + m->block - 1) / m->block);
 }
 
 const char *ggn_dataset_label_source(const struct ggn_dataset *data)

@@ -3,7 +3,7 @@
  *
  * DATA/NAME/manifest.json (+ labels.json) for each view, and DATA/split.json:
  *     { "train": ["scene", …], "validation": ["scene", …], "test": ["scene", …] }
- * Instead of split.json the views may lie in DATA/train, DATA/validation and DATA/test (scripts/make-dataset does so). A scene is on
+ * Instead of split.json the views may lie in DATA/train, DATA/validation, DATA/test and DATA/people (scripts/make-dataset does so). A scene is on
  * one side only; scenes that are on none are used by nobody. DATA may also be one sequence itself.
  */
 #ifndef GGN_DATA_DATASET_H
@@ -12,8 +12,8 @@
 #include "data/labels.h"
 #include "sequence/manifest.h"
 
-enum ggn_split { GGN_SPLIT_TRAIN, GGN_SPLIT_VALIDATION, GGN_SPLIT_TEST, GGN_SPLIT_NONE, GGN_SPLITS };
-extern const char *const ggn_split_names[GGN_SPLITS]; /* "train", "validation", "test", "none" */
+enum ggn_split { GGN_SPLIT_TRAIN, GGN_SPLIT_VALIDATION, GGN_SPLIT_TEST, GGN_SPLIT_PEOPLE, GGN_SPLIT_NONE, GGN_SPLITS };
+extern const char *const ggn_split_names[GGN_SPLITS]; /* "train", "validation", "test", "people", "none" */
 
 struct ggn_dataset_view {
     char dir[4096];
@@ -32,6 +32,9 @@ struct ggn_dataset {
 /* Reads manifests, labels and split (no pixels). Without a split all views are in GGN_SPLIT_NONE. */
 int ggn_dataset_open(const char *path, struct ggn_dataset *data, struct base_err *err);
 void ggn_dataset_release(struct ggn_dataset *data);
+
+/* How many blocks the view has when it is whole: thresholds for it are as many. */
+uint32_t ggn_dataset_tiles(const struct ggn_dataset_view *view);
 
 /* Whose thresholds they are: "human", "observer", "mixed" or "none". */
 const char *ggn_dataset_label_source(const struct ggn_dataset *data);

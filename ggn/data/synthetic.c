@@ -11,12 +11,13 @@
 enum { MAX_LEVELS = 128 };
 static const double HIGHEST_SHARE = 0.7; /* of the reference's samples: nearer than that nothing but the reference is left */
 static const double JITTER = 0.04;       /* of the ratio between levels */
+static const double SIMULATED_END = 10000; /* spp, where there is no reference */
 static const double CLEAN_END = 0.4;     /* a threshold below this share of the last level needs no further levels */
 
 /* One block's source. */
 struct source {
     float *base, *d, *last; /* [3][P] linear: the converged image, the half-buffer difference, the last recorded level */
-    double n_full, n_reference;
+    double n_full, n_reference; /* n_reference infinite: `base` is the mean of the full level and stands for the converged image */
 };
 
 static const struct seq_record *full_level(const struct seq_block *b)
@@ -98,16 +99,16 @@ static int read_source(const struct ggn_chains *set, const struct ggn_chain *c, 
     *usable = 0;
     while (index < v->manifest.n_blocks && v->manifest.blocks[index].id != c->block)
         index++;
-    if (index == v->manifest.n_blocks || !v->manifest.reference_spp || !v->manifest.reference_independent)
+    if (index == v->manifest.n_blocks || !v->manifest.reference_independent)
         return 0;
     rc = seq_manifest_read_block(v->dir, &v->manifest, index, &b, err);
     if (rc)
         return rc;
     const struct seq_record *full = full_level(&b);
-    if (full && b.reference) {
+    if (full) {
         s->n_full = full->spp;
-        s->n_reference = b.reference->spp;
-        rc = seq_mean(&b, b.reference, s->base, err);
+        s->n_reference = b.reference ? b.reference->spp : (double)INFINITY;
+        rc = seq_mean(&b, b.reference ? b.reference : full, s->base, err);
         if (!rc)
             rc = seq_half(&b, full, s->d, err);
         if (!rc)
@@ -139,7 +140,7 @@ int ggn_chains_add_synthetic(struct ggn_chains *set, int per_chain, uint32_t see
         if (set->chains[i].split != GGN_SPLIT_TRAIN)
             continue;
         rc = read_source(set, &set->chains[i], &s, &usable, err);
-        for (int k = 0; !rc && usable && k < per_chain; k++) {
+        for (int k = 0; !rc && usable && isfinite(s.n_reference) && k < per_chain; k++) {
             struct ggn_chain *c = ggn_chains_append(set, err);
             rc = c ? make_chain(set, &set->chains[i], c, &s, ggn_hash((uint32_t)(i * 64 + k), seed), err) : BASE_ENOMEM;
         }
@@ -199,6 +200,28 @@ static int extend_chain(const struct ggn_chains *set, struct ggn_chain *c, const
     return rc;
 }
 
+/* Without a reference: levels up to SIMULATED_END in place of the recorded ones. */
+static int simulate_chain(const struct ggn_chains *set, struct ggn_chain *c, const struct source *s, uint32_t seed, struct base_err *err)
+{
+    const double ratio = set->ratio > 1.01 && set->ratio < 2 ? set->ratio : 1.2565; /* a third of an octave */
+    double spp[MAX_LEVELS];
+    int n = choose_levels(spp, set->first_spp < 16 ? set->first_spp : 16, ratio, SIMULATED_END / ratio, seed);
+
+    spp[n++] = SIMULATED_END;
+    float *noise = malloc(ggn_chains_values(set) * sizeof *noise);
+    int rc = !noise ? base_fail_nomem(err, "simulated images") : n > c->n_levels ? chain_grow(set, c, n - c->n_levels, err) : 0;
+    if (!rc) {
+        c->n_levels = n;
+        c->simulated = 1;
+        memcpy(c->spp, spp, (size_t)n * sizeof *spp);
+        for (int k = 0; k < n; k++)
+            c->tail999[k] = c->gini[k] = (double)NAN;
+        fill_levels(c, s, ggn_chains_values(set) / 3, noise, seed);
+    }
+    free(noise);
+    return rc;
+}
+
 int ggn_chains_extend(struct ggn_chains *set, uint32_t seed, struct base_err *err)
 {
     struct source s = {0};
@@ -213,7 +236,7 @@ int ggn_chains_extend(struct ggn_chains *set, uint32_t seed, struct base_err *er
             continue;
         rc = read_source(set, c, &s, &usable, err);
         if (!rc && usable)
-            rc = extend_chain(set, c, &s, ggn_hash((uint32_t)i, seed + 1), err);
+            rc = (isfinite(s.n_reference) ? extend_chain : simulate_chain)(set, c, &s, ggn_hash((uint32_t)i, seed + 1), err);
     }
     free(s.base);
     return rc;

@@ -28,6 +28,14 @@ const struct ggn_view *ggn_thresholds_find(const struct ggn_thresholds *t, const
     return NULL;
 }
 
+const struct ggn_view *ggn_thresholds_of(const struct ggn_thresholds *t, const char *view)
+{
+    char with_part[GGN_VIEW_NAME + 8];
+    const struct ggn_view *found = ggn_thresholds_find(t, view);
+    snprintf(with_part, sizeof with_part, "%.*s_part6", GGN_VIEW_NAME - 1, view);
+    return found ? found : ggn_thresholds_find(t, with_part);
+}
+
 /* Appends a view with room for n blocks, all unknown. NULL: out of memory. */
 static struct ggn_view *add_view(struct ggn_thresholds *t, const char *name, int n)
 {

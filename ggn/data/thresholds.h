@@ -28,5 +28,7 @@ int ggn_thresholds_read(const char *path, int block, struct ggn_thresholds *out,
 int ggn_thresholds_parse_csv(const char *path, char *text, struct ggn_thresholds *out, struct base_err *err);
 void ggn_thresholds_release(struct ggn_thresholds *t);
 const struct ggn_view *ggn_thresholds_find(const struct ggn_thresholds *t, const char *name);
+/* The same for a recorded view: its folder's name, or that with the ending _part6 of SIN3D's own files. */
+const struct ggn_view *ggn_thresholds_of(const struct ggn_thresholds *t, const char *view);
 
 #endif

@@ -35,6 +35,14 @@ int ggn_method_scene_mean(struct ggn_method *m, const struct ggn_eval_set *s, st
 /* The criteria of plugin-api/examples from their recorded errors; *available: whether every case has them. */
 int ggn_method_halfbuf(struct ggn_method *m, const struct ggn_eval_set *s, int *available, struct base_err *err);
 int ggn_method_variance(struct ggn_method *m, const struct ggn_eval_set *s, int *available, struct base_err *err);
+/* The criterion `observer`: stops when at most the share `visible` of viewers would still see noise. path: the observer's file, of which
+ * views that had a part in the fit get the parameters without them; NULL: built in. */
+int ggn_method_observer(struct ggn_method *m, const struct ggn_eval_set *s, const char *path, double visible, int *available,
+                        struct base_err *err);
+/* Thresholds from a file, matched by the view's name (SIN3D's own names end in _part6); available: it has every view of `split`. Views
+ * that it does not have stop at their cap. BASE_EINVAL where a view has another number of thresholds than blocks. */
+int ggn_method_thresholds(struct ggn_method *m, const struct ggn_eval_set *s, const char *path, enum ggn_split split, int *available,
+                          struct base_err *err);
 /* An empty method with room for stops and, if asked, scores. */
 int ggn_method_init(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, int with_scores, struct base_err *err);
 /* Any other scores: copies score [cases]. */

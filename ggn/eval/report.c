@@ -73,6 +73,44 @@ void ggn_report_table(FILE *f, const struct ggn_eval_set *s, enum ggn_split spli
     print_rows(f, methods, metrics, n, 14, 21);
 }
 
+static void print_view(FILE *f, const struct ggn_eval_set *s, int view, const struct ggn_method *m, double *room)
+{
+    size_t n = 0;
+    double blocks = 0.0, early = 0.0;
+    for (int b = 0; b < s->n_blocks; b++) {
+        const struct ggn_eval_block *block = &s->blocks[b];
+        if (block->view != view)
+            continue;
+        blocks += 1.0;
+        early += m->stop[b] < 0.8 * block->label.threshold;
+        if (!block->label.censored)
+            room[n++] = fabs(log2(m->stop[b] / block->label.threshold));
+    }
+    fprintf(f, "  %6.3f %6.3f     ", ggn_stats_quantile(room, n, 0.5), early / blocks);
+}
+
+int ggn_report_people(FILE *f, const struct ggn_eval_set *s, const struct ggn_method *methods, int n, struct base_err *err)
+{
+    const struct ggn_dataset *d = &s->chains.data;
+    double *room = malloc((size_t)s->n_blocks * sizeof *room);
+    if (!room)
+        return base_fail_nomem(err, "people");
+    fprintf(f, "\n%-30s", "people: |log2|, early");
+    for (int v = 0; v < d->n; v++)
+        if (d->views[v].split == GGN_SPLIT_PEOPLE)
+            fprintf(f, "  %-18.18s", d->views[v].name);
+    fputc('\n', f);
+    for (int i = 0; i < n; i++) {
+        fprintf(f, "%-30.30s", methods[i].name);
+        for (int v = 0; v < d->n; v++)
+            if (d->views[v].split == GGN_SPLIT_PEOPLE)
+                print_view(f, s, v, &methods[i], room);
+        fputc('\n', f);
+    }
+    free(room);
+    return 0;
+}
+
 struct cJSON *ggn_report_json(const struct ggn_method *methods, const struct ggn_method_metrics *metrics, int n)
 {
     cJSON *root = cJSON_CreateObject();

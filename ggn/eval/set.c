@@ -6,6 +6,7 @@
 
 #include "base/colour.h"
 #include "nn/ssim.h"
+#include "observer/curve.h"
 #include "observer/flip.h"
 
 void ggn_eval_set_release(struct ggn_eval_set *s)
@@ -68,8 +69,8 @@ static int list_blocks(struct ggn_eval_set *s, int *skipped, struct base_err *er
 
 static int make_columns(struct ggn_eval_set *s, struct base_err *err)
 {
-    enum { COLUMNS = 8 };
-    double **columns[COLUMNS] = {&s->spp, &s->seconds, &s->dammertz, &s->half_unsettled, &s->rse, &s->rse_unsettled, &s->flip, &s->ssim};
+    enum { COLUMNS = 10 };
+    double **columns[COLUMNS] = {&s->spp, &s->seconds, &s->dammertz, &s->half_unsettled, &s->rse, &s->rse_unsettled, &s->flip, &s->ssim, &s->visible, &s->texture};
     double *all = malloc(COLUMNS * s->n * sizeof *all);
     s->noisy = malloc(s->n);
     s->spp = all;
@@ -213,6 +214,33 @@ static int extrapolate(struct ggn_eval_set *s, const struct ggn_eval_block *bloc
     return rc;
 }
 
+static int has_halves(const struct seq_record *r)
+{
+    return seq_has(r, SEQ_PLANE_HALF_LOG) || seq_has(r, SEQ_PLANE_HALF_F16);
+}
+
+/* What the observer sees: at recorded levels from their own halves, at all others from the two of the full level. */
+static int fill_observed(struct ggn_eval_set *s, const struct ggn_eval_block *block, const struct seq_block *p, struct base_err *err)
+{
+    int simulated = s->chains.chains[block->chain].simulated, rc = 0, known = 0;
+    struct ggn_curve curve = {0};
+    for (uint32_t i = 0; i < p->n_levels; i++)
+        known |= seq_has(&p->levels[i], SEQ_PLANE_HALF_F16);
+    if (known)
+        rc = ggn_curve_make(p, GGN_FROM_HALVES, 1, &curve, err);
+    for (size_t i = block->first; i < block->end && !rc; i++) {
+        const struct seq_record *r = simulated ? NULL : seq_level(p, (uint32_t)s->spp[i]);
+        if (r && has_halves(r)) {
+            rc = ggn_curve_level(p, r, &s->visible[i], &s->texture[i], err);
+        } else if (known && !r) {
+            s->visible[i] = ggn_curve_at(&curve, s->spp[i]);
+            s->texture[i] = curve.texture;
+        }
+    }
+    ggn_curve_release(&curve);
+    return rc;
+}
+
 static int fill_statistics(struct ggn_eval_set *s, const struct ggn_eval_block *block, struct base_err *err)
 {
     const struct ggn_dataset_view *v = &s->chains.data.views[block->view];
@@ -229,8 +257,10 @@ static int fill_statistics(struct ggn_eval_set *s, const struct ggn_eval_block *
         s->rse_unsettled[i] = seq_stat(r, "rse_unsettled");
     }
     const struct seq_record *last = &p.levels[p.n_levels - 1];
-    if (i < block->end && (seq_has(last, SEQ_PLANE_HALF_LOG) || seq_has(last, SEQ_PLANE_HALF_F16)))
+    if (i < block->end && has_halves(last))
         rc = extrapolate(s, block, i, &p, err);
+    if (!rc)
+        rc = fill_observed(s, block, &p, err);
     seq_block_release(&p);
     return rc;
 }

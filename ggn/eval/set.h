@@ -28,6 +28,7 @@ struct ggn_eval_set {
     double *spp, *seconds;          /* own; [n]; seconds: thread time spent on the block so far, NaN if unknown */
     signed char *noisy;             /* owns; [n]: 1, 0, or -1 unknown */
     double *dammertz, *half_unsettled, *rse, *rse_unsettled; /* own; [n]; NaN where not recorded */
+    double *visible, *texture;      /* own; [n]: what the model observer sees (observer/visibility.h); NaN without half buffers */
     double *flip, *ssim;            /* own; [n]: against the block's reference; NaN unless asked for */
 };
 

@@ -106,7 +106,7 @@ static int add_view(const struct ggn_calibration_input *in, int view, enum ggn_c
                     struct evidence *e, struct ggn_calibration_block *blocks, struct base_err *err)
 {
     const struct seq_manifest *m = &in->view->manifest;
-    uint32_t tiles = (m->width + m->block - 1) / m->block * ((m->height + m->block - 1) / m->block);
+    uint32_t tiles = ggn_dataset_tiles(in->view);
     if (m->n_blocks == 0)
         return base_fail(err, BASE_EINVAL, "%s: no finished block yet", in->view->dir);
     if ((uint32_t)in->human->n != tiles)

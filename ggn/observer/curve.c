@@ -2,6 +2,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "observer/visibility.h"
 
@@ -150,6 +151,31 @@ int ggn_curve_make(const struct seq_block *block, enum ggn_curve_source source, 
         ggn_curve_release(&c);
     else
         *curve = c;
+    planes_release(&p);
+    return rc;
+}
+
+int ggn_curve_level(const struct seq_block *block, const struct seq_record *level, double *visible_out, double *texture_out,
+                    struct base_err *err)
+{
+    struct planes p;
+    int rc = planes_init(&p, block, err);
+    if (rc)
+        return rc;
+    rc = seq_mean(block, level, p.mean, err);
+    if (!rc && seq_has(level, SEQ_PLANE_HALF_F16)) {
+        rc = seq_half(block, level, p.difference, err);
+    } else if (!rc) {
+        rc = seq_half_luminance(block, level, p.difference, err);
+        memcpy(p.difference + p.pixels, p.difference, p.pixels * sizeof(float));
+        memcpy(p.difference + 2 * p.pixels, p.difference, p.pixels * sizeof(float));
+    }
+    if (!rc) {
+        look(&p, 1.0, p.lightness[0]);
+        look(&p, -1.0, p.lightness[1]);
+        *texture_out = texture(&p);
+        *visible_out = visible(&p, 0.5f);
+    }
     planes_release(&p);
     return rc;
 }

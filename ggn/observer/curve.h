@@ -29,6 +29,10 @@ int ggn_curve_make(const struct seq_block *block, enum ggn_curve_source source, 
                    struct base_err *err);
 void ggn_curve_release(struct ggn_curve *curve);
 
+/* Noise and texture of one recorded level as the criterion `observer` sees them in the renderer: from the level's own two halves (where
+ * only the luminance of their difference was recorded, that, as grey). BASE_EINVAL where it was not recorded. */
+int ggn_curve_level(const struct seq_block *block, const struct seq_record *level, double *visible, double *texture, struct base_err *err);
+
 /* Smallest spp from which the noise stays at or below `limit`, interpolated between levels in log-log. censored: still above at the
  * last level, which is then returned. A curve that starts below gives its first level. */
 double ggn_curve_threshold(const struct ggn_curve *curve, double limit, int *censored);

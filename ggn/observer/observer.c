@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include <cjson/cJSON.h>
 
@@ -47,7 +48,19 @@ static int get(const cJSON *root, const char *name, double lo, double hi, double
     return 1;
 }
 
-int ggn_observer_read(const char *path, struct ggn_observer *out, struct base_err *err)
+/* What was fitted without this view; root where it had no part in the fit. */
+static const cJSON *fit_without(const cJSON *root, const char *left_out)
+{
+    const cJSON *row;
+    cJSON_ArrayForEach(row, cJSON_GetObjectItemCaseSensitive(root, "each_view_left_out")) {
+        const cJSON *name = cJSON_GetObjectItemCaseSensitive(row, "name");
+        if (left_out && cJSON_IsString(name) && strcmp(name->valuestring, left_out) == 0)
+            return row;
+    }
+    return root;
+}
+
+int ggn_observer_read(const char *path, const char *left_out, struct ggn_observer *out, struct base_err *err)
 {
     struct ggn_observer o;
     char *text;
@@ -56,7 +69,9 @@ int ggn_observer_read(const char *path, struct ggn_observer *out, struct base_er
     if (rc)
         return rc;
     cJSON *root = cJSON_ParseWithLength(text, size);
-    if (!get(root, "level", 1e-6, 1e3, &o.level) || !get(root, "exponent", -10, 10, &o.exponent) || !get(root, "spread", 1e-3, 10, &o.spread))
+    const cJSON *from = fit_without(root, left_out);
+    if (!get(from, "level", 1e-6, 1e3, &o.level) || !get(from, "exponent", -10, 10, &o.exponent) ||
+        !get(root, "spread", 1e-3, 10, &o.spread))
         rc = base_fail(err, BASE_EINVAL, "%s: level, exponent or spread is missing or out of range (ggn label --calibrate writes them)", path);
     else
         *out = o;

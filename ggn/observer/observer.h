@@ -31,8 +31,9 @@ double ggn_observer_p_noisy(const struct ggn_observer *observer, double error);
 /* Its inverse: the error at which this share of viewers, in (0, 1), sees noise. */
 double ggn_observer_error_at(const struct ggn_observer *observer, double share);
 
-/* Parameters from a file that ggn_calibration_write made. */
-int ggn_observer_read(const char *path, struct ggn_observer *observer, struct base_err *err);
+/* Parameters from a file that ggn_calibration_write made. left_out: the name of a view that may have been fitted: the parameters without
+ * it, if it was; NULL: those fitted to all views. */
+int ggn_observer_read(const char *path, const char *left_out, struct ggn_observer *observer, struct base_err *err);
 /* One line for people and for the card. */
 void ggn_observer_describe(const struct ggn_observer *observer, char *text, size_t room);
 

@@ -323,9 +323,14 @@ static void calibration(void **state)
     assert_near(c.views[2].median_log2, -1.0, 0.1);
     snprintf(path, sizeof path, "%s/observer.json", dir);
     assert_int_equal(ggn_calibration_write(path, &c, &err), 0);
-    assert_int_equal(ggn_observer_read(path, &back, &err), 0);
+    assert_int_equal(ggn_observer_read(path, NULL, &back, &err), 0);
     assert_near(back.level, c.observer.level, 1e-9);
     assert_near(back.spread, c.observer.spread, 1e-9);
+    assert_int_equal(ggn_observer_read(path, "view2", &back, &err), 0);
+    assert_near(back.level, c.views[2].level, 1e-9);
+    assert_true(fabs(back.level - c.observer.level) > 0.01);
+    assert_int_equal(ggn_observer_read(path, "view9", &back, &err), 0); /* no part of the fit */
+    assert_near(back.level, c.observer.level, 1e-9);
     ggn_calibration_release(&c);
     assert_int_equal(ggn_calibrate(inputs, 1, GGN_FROM_HALVES, threads, &c, &err), BASE_EINVAL);
     human[1].n = BLOCKS - 1;
@@ -348,7 +353,7 @@ static void parameters(void **state)
     FILE *f = fdopen(mkstemp(path), "w");
     fputs("{\"level\": 0.3, \"exponent\": 0.4}", f);
     fclose(f);
-    assert_int_equal(ggn_observer_read(path, &o, &err), BASE_EINVAL);
+    assert_int_equal(ggn_observer_read(path, NULL, &o, &err), BASE_EINVAL);
     unlink(path);
 }
 
@@ -358,7 +363,7 @@ static void built_in(void **state)
     (void)state;
     struct ggn_observer o;
     struct base_err err = {0};
-    if (ggn_observer_read("ggn/observer/observer.json", &o, &err) != 0)
+    if (ggn_observer_read("ggn/observer/observer.json", NULL, &o, &err) != 0)
         fail_msg("%s", err.text);
     assert_near(o.level, ggn_observer_default.level, 1e-6);
     assert_near(o.exponent, ggn_observer_default.exponent, 1e-6);

@@ -1,0 +1,87 @@
+/* Methods that stand for people: the model observer, and thresholds from a file. */
+#include <math.h>
+#include <string.h>
+
+#include "data/thresholds.h"
+#include "eval/method.h"
+#include "observer/observer.h"
+
+static const double FIRST_SPP = 16.0; /* the criterion's default */
+
+/* Visible noise over its limit at spp, between cases in log-log, beyond them as at the nearest. */
+static double error_at(const struct ggn_observer *o, const struct ggn_eval_set *s, const struct ggn_eval_block *b, double spp)
+{
+    size_t i = b->first;
+    while (i + 2 < b->end && s->spp[i + 1] < spp)
+        i++;
+    size_t k = i + 1 < b->end ? i + 1 : i;
+    double one = s->visible[i] / ggn_observer_limit(o, s->texture[i]), other = s->visible[k] / ggn_observer_limit(o, s->texture[k]);
+    double t = spp <= s->spp[i] ? 0.0 : spp >= s->spp[k] ? 1.0 : log(spp / s->spp[i]) / log(s->spp[k] / s->spp[i]);
+    return one > 0.0 && other > 0.0 ? one * pow(other / one, t) : one + t * (other - one);
+}
+
+/* Where the criterion stops, which asks at sample counts of its own: where it expects to stop, but a tenth to a half more than now. */
+static double replay(const struct ggn_observer *o, const struct ggn_eval_set *s, const struct ggn_eval_block *b, double stop_error)
+{
+    double spp = fmax(FIRST_SPP, s->spp[b->first]);
+    while (spp < b->cap) {
+        double ratio = error_at(o, s, b, spp) / stop_error;
+        if (ratio <= 1.0)
+            break;
+        spp = ceil(spp * fmin(fmax(ratio * ratio, 1.1), 1.5));
+    }
+    return fmin(spp, b->cap);
+}
+
+int ggn_method_observer(struct ggn_method *m, const struct ggn_eval_set *s, const char *path, double visible, int *available,
+                        struct base_err *err)
+{
+    int rc = ggn_method_init(m, s, "observer", 1, err), view = -1;
+    struct ggn_observer o = ggn_observer_default;
+    *available = 1;
+    for (int b = 0; b < s->n_blocks && !rc; b++) {
+        const struct ggn_eval_block *block = &s->blocks[b];
+        if (path && block->view != view)
+            rc = ggn_observer_read(path, s->chains.data.views[block->view].name, &o, err);
+        view = block->view;
+        for (size_t i = block->first; i < block->end; i++) {
+            m->score[i] = isnan(s->visible[i]) ? (double)NAN : ggn_observer_p_noisy(&o, s->visible[i] / ggn_observer_limit(&o, s->texture[i]));
+            *available &= !isnan(s->visible[i]);
+        }
+        m->stop[b] = *available ? replay(&o, s, block, ggn_observer_error_at(&o, visible)) : block->cap;
+    }
+    if (rc) {
+        ggn_method_release(m);
+        return rc;
+    }
+    m->cut = visible;
+    return 0;
+}
+
+int ggn_method_thresholds(struct ggn_method *m, const struct ggn_eval_set *s, const char *path, enum ggn_split split, int *available,
+                          struct base_err *err)
+{
+    const char *slash = strrchr(path, '/');
+    struct ggn_thresholds t = {0};
+    int rc = ggn_thresholds_read(path, 200, &t, err);
+    if (!rc)
+        rc = ggn_method_init(m, s, slash ? slash + 1 : path, 0, err);
+    *available = 1;
+    for (int b = 0; b < s->n_blocks && !rc; b++) {
+        const struct ggn_eval_block *block = &s->blocks[b];
+        const struct ggn_dataset_view *v = &s->chains.data.views[block->view];
+        const struct ggn_view *row = ggn_thresholds_of(&t, v->name);
+        uint32_t id = v->manifest.blocks[block->index].id;
+        m->stop[b] = block->cap;
+        *available &= row || block->split != split;
+        if (row && (id >= (uint32_t)row->n || (uint32_t)row->n != ggn_dataset_tiles(v)))
+            rc = base_fail(err, BASE_EINVAL, "%s: '%s' has %d thresholds, %s has %u blocks", path, row->name, row->n, v->dir,
+                           ggn_dataset_tiles(v));
+        else if (row && row->spp[id] > 0)
+            m->stop[b] = fmin(row->spp[id], block->cap);
+    }
+    if (rc && m->stop)
+        ggn_method_release(m);
+    ggn_thresholds_release(&t);
+    return rc;
+}
