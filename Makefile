@@ -224,7 +224,8 @@ HEADERS := $(shell find pathtracer ggn plugin-api tests -name '*.h' 2>/dev/null)
 hdr-check: ## each header compiles alone (the ABI's as C99 and C++11), no include goes up; other findings are listed
 	@scripts/check-floors --arrows
 	@scripts/check-floors | sed 's/^/  note: /'
-	@$(foreach h,$(HEADERS),$(CC) -std=c17 -D_POSIX_C_SOURCE=200809L $(WARNC) -Wno-unused-const-variable $(call inc,$(h)) -x c -fsyntax-only $(h) &&) true
+	@$(foreach h,$(HEADERS),echo "extern int unused;" | $(CC) -std=c17 -D_POSIX_C_SOURCE=200809L $(WARNC) -Wno-unused-const-variable $(call inc,$(h)) \
+	    -include $(h) -x c -fsyntax-only - &&) true
 	@$(foreach h,criterion.h criterion_kit.h,$(CC) -std=c99 $(WARNC) $(API) -x c -fsyntax-only plugin-api/include/lull/$(h) &&) true
 	@$(foreach h,criterion.h criterion_kit.h,$(CXX) -std=c++11 $(WARN) $(API) -x c++ -fsyntax-only plugin-api/include/lull/$(h) &&) true
 abi-check: $(OUT)/tests/abi/api_layout ## the ABI's layout is the frozen one (plugin-api/layout-1.txt)

@@ -9,6 +9,7 @@
 #include <cjson/cJSON.h>
 
 #include "base/files.h"
+#include "base/json.h"
 #include "base/options.h"
 #include "baselines/learned.h"
 #include "cli/commands.h"
@@ -221,7 +222,7 @@ static int add_observed(struct job *j, struct base_err *err)
 }
 
 /* What other precisions and models change on a split: verdicts on windows that both judged, and where blocks stop. */
-static void report_changes(const struct job *j, enum ggn_split split, cJSON *to)
+static void report_changes(const struct job *j, enum ggn_split split, cJSON *to, int *failed)
 {
     for (int i = 0; i < j->n; i++) {
         if (j->likened[i] < 0)
@@ -244,15 +245,15 @@ static void report_changes(const struct job *j, enum ggn_split split, cJSON *to)
             }
         }
         if (!j->o->json)
-            printf("%s: %d of %d verdicts and %d of %d stops differ from %s; p moves by at most %.2g\n\n", other->name, verdicts, windows, stops, blocks,
-                   first->name, furthest);
-        cJSON *o = cJSON_AddObjectToObject(to, other->name);
-        cJSON_AddStringToObject(o, "from", first->name);
-        cJSON_AddNumberToObject(o, "windows", windows);
-        cJSON_AddNumberToObject(o, "verdicts_changed", verdicts);
-        cJSON_AddNumberToObject(o, "blocks", blocks);
-        cJSON_AddNumberToObject(o, "stops_changed", stops);
-        cJSON_AddNumberToObject(o, "p_moved_at_most", furthest);
+            printf("%s: %d of %d verdicts and %d of %d stops differ from %s; p moves by at most %.2g\n\n", other->name, verdicts,
+                   windows, stops, blocks, first->name, furthest);
+        cJSON *o = base_json_object(to, other->name, failed);
+        base_json_text(o, "from", first->name, failed);
+        base_json_number(o, "windows", windows, failed);
+        base_json_number(o, "verdicts_changed", verdicts, failed);
+        base_json_number(o, "blocks", blocks, failed);
+        base_json_number(o, "stops_changed", stops, failed);
+        base_json_number(o, "p_moved_at_most", furthest, failed);
     }
 }
 
@@ -279,12 +280,13 @@ static int report(struct job *j, int skipped, struct base_err *err)
 {
     struct ggn_method_metrics metrics[MAX_METHODS];
     cJSON *root = cJSON_CreateObject();
-    cJSON_AddStringToObject(root, "data", j->o->data);
-    cJSON_AddStringToObject(root, "labels", ggn_dataset_label_source(&j->set.chains.data));
-    cJSON_AddNumberToObject(root, "window", j->set.window);
-    cJSON_AddNumberToObject(root, "early_rate_tuned_for", j->o->early);
-    cJSON_AddStringToObject(root, "tuned_on", ggn_split_names[j->tuning]);
-    cJSON *splits = cJSON_AddObjectToObject(root, "splits"), *changes = cJSON_AddObjectToObject(root, "changes");
+    int failed = 0;
+    base_json_text(root, "data", j->o->data, &failed);
+    base_json_text(root, "labels", ggn_dataset_label_source(&j->set.chains.data), &failed);
+    base_json_number(root, "window", j->set.window, &failed);
+    base_json_number(root, "early_rate_tuned_for", j->o->early, &failed);
+    base_json_text(root, "tuned_on", ggn_split_names[j->tuning], &failed);
+    cJSON *splits = base_json_object(root, "splits", &failed), *changes = base_json_object(root, "changes", &failed);
     int rc = 0;
     if (!j->o->json)
         printf("labels: %s; cuts tuned on %s for %.1f %% early stops%s\n", ggn_dataset_label_source(&j->set.chains.data), ggn_split_names[j->tuning], 100.0 * j->o->early,
@@ -300,12 +302,12 @@ static int report(struct job *j, int skipped, struct base_err *err)
             ggn_report_table(stdout, &j->set, (enum ggn_split)split, j->methods, metrics, j->n);
         if (!j->o->json && split == GGN_SPLIT_PEOPLE)
             rc = ggn_report_people(stdout, &j->set, j->methods, j->n, err);
-        cJSON_AddItemToObject(splits, ggn_split_names[split], ggn_report_json(j->methods, metrics, j->n));
-        report_changes(j, (enum ggn_split)split, cJSON_AddObjectToObject(changes, ggn_split_names[split]));
+        ggn_report_json(base_json_object(splits, ggn_split_names[split], &failed), j->methods, metrics, j->n, &failed);
+        report_changes(j, (enum ggn_split)split, base_json_object(changes, ggn_split_names[split], &failed), &failed);
         if (j->o->out)
             rc = pictures(j, (enum ggn_split)split, err);
     }
-    char *text = !rc ? cJSON_Print(root) : NULL;
+    char *text = !rc && !failed ? cJSON_Print(root) : NULL;
     cJSON_Delete(root);
     if (!rc && !text)
         rc = base_fail_nomem(err, "report");

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "base/json.h"
 #include "base/options.h"
 #include "cli/commands.h"
 #include "model/golden.h"
@@ -24,74 +25,71 @@ static const struct base_option list[] = {
     {"threads", 0, "N", TO(threads), 1, 1024, .help = "threads (all processors); the figures do not depend on it"},
     {0}};
 
-static void add_number(cJSON *to, const char *name, double value)
+static void add_number(cJSON *to, const char *name, double value, int *failed)
 {
     char text[40];
     snprintf(text, sizeof text, "%.12g", value);
-    if (name)
-        cJSON_AddRawToObject(to, name, text);
-    else
-        cJSON_AddItemToArray(to, cJSON_CreateRaw(text));
+    base_json_item(to, name, cJSON_CreateRaw(text), failed);
 }
 
-static void add_array(cJSON *to, const char *name, const double *value, int n)
+static void add_array(cJSON *to, const char *name, const double *value, int n, int *failed)
 {
-    cJSON *array = cJSON_AddArrayToObject(to, name);
+    cJSON *array = base_json_array(to, name, failed);
     for (int i = 0; i < n; i++)
-        add_number(array, NULL, value[i]);
+        add_number(array, NULL, value[i], failed);
 }
 
-static void add_nets(cJSON *to, const char *name, const double value[GGN_NETS])
+static void add_nets(cJSON *to, const char *name, const double value[GGN_NETS], int *failed)
 {
     static const char *const net[GGN_NETS] = {"r", "m", "d"};
-    cJSON *object = cJSON_AddObjectToObject(to, name);
+    cJSON *object = base_json_object(to, name, failed);
     for (int i = 0; i < GGN_NETS; i++)
-        add_number(object, net[i], value[i]);
+        add_number(object, net[i], value[i], failed);
 }
 
-static void add_train(cJSON *j, const struct ggn_golden_train *t)
+static void add_train(cJSON *j, const struct ggn_golden_train *t, int *failed)
 {
-    add_array(j, "denoiser_loss", t->denoiser_loss, 6);
-    add_number(j, "denoiser_grad_l2", t->denoiser_grad_l2);
-    add_array(j, "d_prob_before", t->d_prob_before, 4);
-    add_number(j, "bce_before", t->bce_before);
-    add_number(j, "d_grad_l2", t->d_grad_l2);
-    add_number(j, "m_grad_l2", t->m_grad_l2);
-    add_array(j, "d_prob_after", t->d_prob_after, 4);
-    add_number(j, "bce_after", t->bce_after);
-    add_number(j, "m_grad_l2_accumulated", t->m_grad_l2_accumulated);
-    add_nets(j, "sum_params", t->sum_params);
-    add_nets(j, "sum_running_mean", t->sum_running_mean);
-    add_nets(j, "sum_running_var", t->sum_running_var);
+    add_array(j, "denoiser_loss", t->denoiser_loss, 6, failed);
+    add_number(j, "denoiser_grad_l2", t->denoiser_grad_l2, failed);
+    add_array(j, "d_prob_before", t->d_prob_before, 4, failed);
+    add_number(j, "bce_before", t->bce_before, failed);
+    add_number(j, "d_grad_l2", t->d_grad_l2, failed);
+    add_number(j, "m_grad_l2", t->m_grad_l2, failed);
+    add_array(j, "d_prob_after", t->d_prob_after, 4, failed);
+    add_number(j, "bce_after", t->bce_after, failed);
+    add_number(j, "m_grad_l2_accumulated", t->m_grad_l2_accumulated, failed);
+    add_nets(j, "sum_params", t->sum_params, failed);
+    add_nets(j, "sum_running_mean", t->sum_running_mean, failed);
+    add_nets(j, "sum_running_var", t->sum_running_var, failed);
 }
 
-static cJSON *to_json(const struct ggn_golden *g, int train_step)
+static cJSON *to_json(const struct ggn_golden *g, int train_step, int *failed)
 {
     static const char *const ssim_name[4] = {"x0", "x2", "x5", "denoised0"};
     cJSON *j = cJSON_CreateObject();
 
-    add_number(j, "x_first", g->x_first);
-    add_number(j, "x_last", g->x_last);
-    add_number(j, "x_mean", g->x_mean);
-    add_number(j, "denoiser_mean", g->denoiser_mean);
-    add_number(j, "denoiser_std", g->denoiser_std);
-    add_array(j, "denoiser_at", g->denoiser_at, 3);
-    add_number(j, "generator_noisy_mean", g->generator_noisy_mean);
-    add_number(j, "generator_noisy_std", g->generator_noisy_std);
-    add_array(j, "generator_noisy_at", g->generator_noisy_at, 3);
-    add_number(j, "generator_denoised_mean", g->generator_denoised_mean);
-    add_number(j, "generator_denoised_std", g->generator_denoised_std);
-    add_number(j, "generator_denoised_at", g->generator_denoised_at);
-    cJSON *stages = cJSON_AddObjectToObject(j, "stage_rms");
+    add_number(j, "x_first", g->x_first, failed);
+    add_number(j, "x_last", g->x_last, failed);
+    add_number(j, "x_mean", g->x_mean, failed);
+    add_number(j, "denoiser_mean", g->denoiser_mean, failed);
+    add_number(j, "denoiser_std", g->denoiser_std, failed);
+    add_array(j, "denoiser_at", g->denoiser_at, 3, failed);
+    add_number(j, "generator_noisy_mean", g->generator_noisy_mean, failed);
+    add_number(j, "generator_noisy_std", g->generator_noisy_std, failed);
+    add_array(j, "generator_noisy_at", g->generator_noisy_at, 3, failed);
+    add_number(j, "generator_denoised_mean", g->generator_denoised_mean, failed);
+    add_number(j, "generator_denoised_std", g->generator_denoised_std, failed);
+    add_number(j, "generator_denoised_at", g->generator_denoised_at, failed);
+    cJSON *stages = base_json_object(j, "stage_rms", failed);
     for (int i = 0; i < g->n_stages; i++)
-        add_number(stages, g->stage[i].name, g->stage[i].rms);
-    add_array(j, "logit", g->logit, 4);
-    add_array(j, "p", g->p, 4);
-    cJSON *ssim = cJSON_AddObjectToObject(j, "ssim");
+        add_number(stages, g->stage[i].name, g->stage[i].rms, failed);
+    add_array(j, "logit", g->logit, 4, failed);
+    add_array(j, "p", g->p, 4, failed);
+    cJSON *ssim = base_json_object(j, "ssim", failed);
     for (int i = 0; i < 4; i++)
-        add_number(ssim, ssim_name[i], g->ssim[i]);
+        add_number(ssim, ssim_name[i], g->ssim[i], failed);
     if (train_step)
-        add_train(j, &g->train);
+        add_train(j, &g->train, failed);
     return j;
 }
 
@@ -112,8 +110,9 @@ int ggn_cmd_golden(int argc, char **argv)
     if (rc)
         return ggn_cmd_fail(argv[0], &err);
 
-    cJSON *json = to_json(&golden, o.train_step);
-    char *text = cJSON_Print(json);
+    int failed = 0;
+    cJSON *json = to_json(&golden, o.train_step, &failed);
+    char *text = failed ? NULL : cJSON_Print(json);
     cJSON_Delete(json);
     if (!text) {
         base_fail_nomem(&err, "JSON");

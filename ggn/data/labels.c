@@ -8,6 +8,7 @@
 #include <cjson/cJSON.h>
 
 #include "base/files.h"
+#include "base/json.h"
 
 enum { MAX_TEXT = 1 << 26, MAX_LABELS = 1 << 20 };
 
@@ -112,23 +113,21 @@ int ggn_labels_read(const char *dir, struct ggn_labels *labels, struct base_err 
     return rc;
 }
 
-/* cJSON says by NULL that a member could not be added; *ok gathers it. */
-static cJSON *to_json(const struct ggn_labels *labels, int *ok)
+static cJSON *to_json(const struct ggn_labels *labels, int *failed)
 {
-    cJSON *root = cJSON_CreateObject(), *blocks = NULL;
-    *ok = cJSON_AddStringToObject(root, "format", "lull-labels") != NULL && cJSON_AddNumberToObject(root, "version", 1) != NULL &&
-          cJSON_AddStringToObject(root, "source", labels->source) && cJSON_AddStringToObject(root, "detail", labels->detail) &&
-          cJSON_AddNumberToObject(root, "cap", labels->cap) && cJSON_AddNumberToObject(root, "spread", labels->spread) &&
-          (blocks = cJSON_AddArrayToObject(root, "blocks"));
-    for (uint32_t i = 0; i < labels->n && *ok; i++) {
-        cJSON *o = cJSON_CreateObject();
-        *ok = cJSON_AddNumberToObject(o, "id", labels->labels[i].id) != NULL &&
-              cJSON_AddNumberToObject(o, "threshold", labels->labels[i].threshold) &&
-              cJSON_AddBoolToObject(o, "censored", labels->labels[i].censored);
-        if (*ok)
-            cJSON_AddItemToArray(blocks, o);
-        else
-            cJSON_Delete(o);
+    cJSON *root = cJSON_CreateObject();
+    base_json_text(root, "format", "lull-labels", failed);
+    base_json_number(root, "version", 1, failed);
+    base_json_text(root, "source", labels->source, failed);
+    base_json_text(root, "detail", labels->detail, failed);
+    base_json_number(root, "cap", labels->cap, failed);
+    base_json_number(root, "spread", labels->spread, failed);
+    cJSON *blocks = base_json_array(root, "blocks", failed);
+    for (uint32_t i = 0; i < labels->n; i++) {
+        cJSON *o = base_json_object(blocks, NULL, failed);
+        base_json_number(o, "id", labels->labels[i].id, failed);
+        base_json_number(o, "threshold", labels->labels[i].threshold, failed);
+        base_json_bool(o, "censored", labels->labels[i].censored, failed);
     }
     return root;
 }
@@ -139,13 +138,9 @@ int ggn_labels_write(const char *dir, const struct ggn_labels *labels, struct ba
     int rc = base_file_join(path, dir, "labels.json", err);
     if (rc)
         return rc;
-    int ok = 1;
-    cJSON *root = to_json(labels, &ok);
-    char *text = ok ? cJSON_Print(root) : NULL;
+    int failed = 0;
+    cJSON *root = to_json(labels, &failed);
+    rc = base_json_write(path, root, failed, err);
     cJSON_Delete(root);
-    if (!text)
-        return base_fail_nomem(err, path);
-    rc = base_file_write_line(path, text, err);
-    cJSON_free(text);
     return rc;
 }

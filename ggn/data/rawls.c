@@ -4,15 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/bytes.h"
 #include "base/files.h"
-
-static uint32_t get32(const char *p)
-{
-    uint32_t v = 0;
-    for (int i = 3; i >= 0; i--)
-        v = v << 8 | (uint8_t)p[i];
-    return v;
-}
 
 /* The start of the line after a line "DATA", or NULL. */
 static const char *find_data(const char *p, const char *end)
@@ -33,7 +26,7 @@ static int read_rows(const char *path, const char *p, uint32_t width, uint32_t h
     for (uint32_t y = 0; y < height; y++, p++)
         for (uint32_t x = 0; x < width; x++) {
             for (uint32_t c = 0; c < 3; c++) {
-                uint32_t bits = get32(p + 4 * (channels == 3 ? c : 0));
+                uint32_t bits = base_get_u32((const uint8_t *)(p + 4 * (channels == 3 ? c : 0)));
                 memcpy(out, &bits, sizeof *out);
                 if (!isfinite(*out++))
                     return base_fail(err, BASE_EINVAL, "%s: pixel %u,%u is not finite", path, x, y);
@@ -49,7 +42,8 @@ int ggn_rawls_parse(const char *path, const char *data, size_t size, struct ggn_
     const size_t fixed = sizeof head - 1 + 12 + sizeof comments - 1;
     if (size < fixed || memcmp(data, head, sizeof head - 1) != 0 || memcmp(data + 20, comments, sizeof comments - 1) != 0)
         return base_fail(err, BASE_EINVAL, "%s: not a rawls image", path);
-    uint32_t width = get32(data + 8), height = get32(data + 12), channels = get32(data + 16);
+    const uint8_t *start = (const uint8_t *)data;
+    uint32_t width = base_get_u32(start + 8), height = base_get_u32(start + 12), channels = base_get_u32(start + 16);
     if (width < 1 || height < 1 || width > GGN_IMAGE_MAX_SIDE || height > GGN_IMAGE_MAX_SIDE ||
         (size_t)width * height > GGN_IMAGE_MAX_PIXELS || (channels != 1 && channels != 3))
         return base_fail(err, BASE_EINVAL, "%s: %ux%u with %u channels cannot be used", path, width, height, channels);

@@ -8,6 +8,7 @@
 #include <cjson/cJSON.h>
 
 #include "base/files.h"
+#include "base/json.h"
 #include "eval/compare.h"
 #include "figures/plot.h"
 
@@ -111,27 +112,22 @@ int ggn_report_people(FILE *f, const struct ggn_eval_set *s, const struct ggn_me
     return 0;
 }
 
-struct cJSON *ggn_report_json(const struct ggn_method *methods, const struct ggn_method_metrics *metrics, int n)
+void ggn_report_json(struct cJSON *to, const struct ggn_method *methods, const struct ggn_method_metrics *metrics, int n,
+                     int *failed)
 {
-    cJSON *root = cJSON_CreateObject();
-    for (int i = 0; i < n && root; i++) {
+    for (int i = 0; i < n; i++) {
         const struct ggn_method_metrics *m = &metrics[i];
-        cJSON *o = cJSON_AddObjectToObject(root, methods[i].name);
-        cJSON_AddNumberToObject(o, "blocks", m->blocks);
-        cJSON_AddNumberToObject(o, "censored", m->censored);
-        cJSON_AddNumberToObject(o, "windows", (double)m->cases);
-        cJSON_AddBoolToObject(o, "oracle", methods[i].is_oracle);
+        cJSON *o = base_json_object(to, methods[i].name, failed);
+        base_json_number(o, "blocks", m->blocks, failed);
+        base_json_number(o, "censored", m->censored, failed);
+        base_json_number(o, "windows", (double)m->cases, failed);
+        base_json_bool(o, "oracle", methods[i].is_oracle, failed);
         if (!isnan(methods[i].cut))
-            cJSON_AddNumberToObject(o, "cut", methods[i].cut);
-#define MEMBER(key, head, format, value) \
-        if (isnan(value)) \
-            cJSON_AddNullToObject(o, #key); \
-        else \
-            cJSON_AddNumberToObject(o, #key, value);
+            base_json_number(o, "cut", methods[i].cut, failed);
+#define MEMBER(key, head, format, value) base_json_number(o, #key, value, failed);
         COLUMNS(MEMBER)
 #undef MEMBER
     }
-    return root;
 }
 
 /* --- pictures --- */

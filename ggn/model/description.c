@@ -4,6 +4,8 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "base/json.h"
+
 /* Hyper-parameters and calibration as tables, so that reading and writing cannot disagree. */
 static const struct {
     const char *name;
@@ -100,30 +102,29 @@ int ggn_description_parse(const char *json, struct ggn_description *out, struct 
     return rc;
 }
 
-/* cJSON's adders return NULL without memory; nothing may be left out silently. */
-static int fill(cJSON *root, const struct ggn_description *d)
+static cJSON *to_json(const struct ggn_description *d, int *failed)
 {
-    int ok = cJSON_AddStringToObject(root, "kind", "model") &&
-             cJSON_AddStringToObject(root, "preset", ggn_preset_names[d->hyper.preset]);
+    cJSON *root = cJSON_CreateObject();
 
+    base_json_text(root, "kind", "model", failed);
+    base_json_text(root, "preset", ggn_preset_names[d->hyper.preset], failed);
     for (size_t i = 0; i < N_HYPER; i++)
-        ok = ok && cJSON_AddNumberToObject(root, hyper_field[i].name,
-                                           *(const int *)(const void *)((const char *)&d->hyper + hyper_field[i].at));
-    cJSON *calibration = ok ? cJSON_AddObjectToObject(root, "calibration") : NULL;
-    ok = calibration != NULL;
+        base_json_number(root, hyper_field[i].name,
+                         *(const int *)(const void *)((const char *)&d->hyper + hyper_field[i].at), failed);
+    cJSON *calibration = base_json_object(root, "calibration", failed);
     for (size_t i = 0; i < N_CALIBRATION; i++)
-        ok = ok && cJSON_AddNumberToObject(
-                       calibration, calibration_field[i].name,
-                       *(const double *)(const void *)((const char *)&d->calibration + calibration_field[i].at));
-    ok = ok && cJSON_AddNumberToObject(calibration, "consecutive", d->calibration.consecutive);
-    cJSON *provenance = ok ? cJSON_Duplicate(d->provenance, 1) : NULL;
-    return provenance && cJSON_AddItemToObject(root, "provenance", provenance);
+        base_json_number(calibration, calibration_field[i].name,
+                         *(const double *)(const void *)((const char *)&d->calibration + calibration_field[i].at), failed);
+    base_json_number(calibration, "consecutive", d->calibration.consecutive, failed);
+    base_json_item(root, "provenance", cJSON_Duplicate(d->provenance, 1), failed);
+    return root;
 }
 
 char *ggn_description_print(const struct ggn_description *d)
 {
-    cJSON *root = cJSON_CreateObject();
-    char *text = root && fill(root, d) ? cJSON_Print(root) : NULL;
+    int failed = 0;
+    cJSON *root = to_json(d, &failed);
+    char *text = failed ? NULL : cJSON_Print(root);
 
     cJSON_Delete(root);
     return text;

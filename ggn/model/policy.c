@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/json.h"
 #include "nn/loss.h"
 
 /* Every field with its range but passes, which is an integer. `own`: a model's calibration has no place for it. */
@@ -108,19 +109,21 @@ double ggn_policy_predict(const struct ggn_policy *policy, double p, double thre
 int ggn_policy_set(struct ggn_model *model, const struct ggn_policy *policy, struct base_err *err)
 {
     cJSON *object = cJSON_CreateObject();
-    int rc = ggn_policy_check(policy, err), ok = object != NULL;
+    int rc = ggn_policy_check(policy, err), failed = !object;
 
     for (int i = 0; i < N_FIELDS && !rc; i++)
         if (fields[i].own)
-            ok = ok && cJSON_AddNumberToObject(object, fields[i].name, get(policy, i));
-    if (!rc && !ok)
+            base_json_number(object, fields[i].name, get(policy, i), &failed);
+    if (!rc && failed)
         rc = base_fail_nomem(err, "model policy");
     if (rc) {
         cJSON_Delete(object);
         return rc;
     }
     cJSON_DeleteItemFromObjectCaseSensitive(model->provenance, "policy");
-    cJSON_AddItemToObject(model->provenance, "policy", object);
+    base_json_item(model->provenance, "policy", object, &failed);
+    if (failed)
+        return base_fail_nomem(err, "model policy");
     model->calibration = (struct ggn_calibration){
         .scale = policy->scale,
         .shift = policy->shift,

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/files.h"
+#include "base/json.h"
 #include "model/policy.h"
 #include "train/calibrate.h"
 #include "train/phase_judge.h"
@@ -13,7 +13,7 @@
 #include "train/start.h"
 
 /* What a run is made of. The same data, options and seed give the same bytes, so nothing of time or place is in it. */
-static cJSON *describe_run(const struct ggn_session *s)
+static cJSON *describe_run(const struct ggn_session *s, int *failed)
 {
     const struct ggn_train_plan *p = s->plan;
     cJSON *o = cJSON_CreateObject();
@@ -39,43 +39,44 @@ static cJSON *describe_run(const struct ggn_session *s)
                    {"data_key", ggn_resume_key(s)}};
 
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)
-        cJSON_AddNumberToObject(o, numbers[i].name, numbers[i].value);
+        base_json_number(o, numbers[i].name, numbers[i].value, failed);
     return o;
 }
 
-static cJSON *describe_data(const struct ggn_session *s)
+static cJSON *describe_data(const struct ggn_session *s, int *failed)
 {
     cJSON *o = cJSON_CreateObject();
 
     for (int split = 0; split < GGN_SPLIT_NONE; split++) {
-        cJSON *list = cJSON_AddArrayToObject(o, ggn_split_names[split]);
+        cJSON *list = base_json_array(o, ggn_split_names[split], failed);
         for (int i = 0; i < s->set.data.n; i++) {
             int first = s->set.data.views[i].split == (enum ggn_split)split;
             for (int k = 0; k < i && first; k++)
                 first = strcmp(s->set.data.views[k].manifest.scene, s->set.data.views[i].manifest.scene) != 0;
             if (first)
-                cJSON_AddItemToArray(list, cJSON_CreateString(s->set.data.views[i].manifest.scene));
+                base_json_text(list, NULL, s->set.data.views[i].manifest.scene, failed);
         }
     }
-    cJSON_AddNumberToObject(o, "training_blocks", ggn_chains_count(&s->set, GGN_SPLIT_TRAIN, 1));
-    cJSON_AddNumberToObject(o, "synthetic_chains",
-                            ggn_chains_count(&s->set, GGN_SPLIT_TRAIN, 0) - ggn_chains_count(&s->set, GGN_SPLIT_TRAIN, 1));
-    cJSON_AddNumberToObject(o, "validation_blocks", ggn_chains_count(&s->set, GGN_SPLIT_VALIDATION, 1));
-    cJSON_AddNumberToObject(o, "training_windows", s->train.n);
-    cJSON_AddNumberToObject(o, "validation_windows", s->validation.n);
-    cJSON_AddStringToObject(o, "labels", ggn_dataset_label_source(&s->set.data));
+    base_json_number(o, "training_blocks", ggn_chains_count(&s->set, GGN_SPLIT_TRAIN, 1), failed);
+    base_json_number(o, "synthetic_chains",
+                     ggn_chains_count(&s->set, GGN_SPLIT_TRAIN, 0) - ggn_chains_count(&s->set, GGN_SPLIT_TRAIN, 1),
+                     failed);
+    base_json_number(o, "validation_blocks", ggn_chains_count(&s->set, GGN_SPLIT_VALIDATION, 1), failed);
+    base_json_number(o, "training_windows", s->train.n, failed);
+    base_json_number(o, "validation_windows", s->validation.n, failed);
+    base_json_text(o, "labels", ggn_dataset_label_source(&s->set.data), failed);
     return o;
 }
 
-static cJSON *describe_validation(const struct ggn_stopping *st, double auc, double accuracy)
+static cJSON *describe_validation(const struct ggn_stopping *st, double auc, double accuracy, int *failed)
 {
     cJSON *o = cJSON_CreateObject();
 
-    cJSON_AddNumberToObject(o, "auc", auc); /* NaN becomes null */
-    cJSON_AddNumberToObject(o, "accuracy", accuracy);
-    cJSON_AddNumberToObject(o, "early_stop_rate", st->early_rate);
-    cJSON_AddNumberToObject(o, "samples_ratio", st->samples_ratio);
-    cJSON_AddNumberToObject(o, "median_abs_log2", st->median_abs_log2);
+    base_json_number(o, "auc", auc, failed);
+    base_json_number(o, "accuracy", accuracy, failed);
+    base_json_number(o, "early_stop_rate", st->early_rate, failed);
+    base_json_number(o, "samples_ratio", st->samples_ratio, failed);
+    base_json_number(o, "median_abs_log2", st->median_abs_log2, failed);
     return o;
 }
 
@@ -83,21 +84,20 @@ static int write_card(const struct ggn_session *s, const struct ggn_model *model
 {
     char path[4096];
     cJSON *card = cJSON_Duplicate(model->provenance, 1);
+    int failed = 0;
 
-    cJSON_AddNumberToObject(card, "k_r", s->hyper.k_r);
-    cJSON_AddNumberToObject(card, "k_m", s->hyper.k_m);
-    cJSON_AddNumberToObject(card, "k_d", s->hyper.k_d);
-    cJSON_AddNumberToObject(card, "scale", model->calibration.scale);
-    cJSON_AddNumberToObject(card, "shift", model->calibration.shift);
-    cJSON_AddNumberToObject(card, "threshold", model->calibration.threshold);
-    cJSON_AddNumberToObject(card, "consecutive", model->calibration.consecutive);
-    cJSON_AddNumberToObject(card, "seconds_denoiser", floor(s->progress.seconds[0]));
-    cJSON_AddNumberToObject(card, "seconds_judge", floor(s->progress.seconds[1]));
-    char *text = cJSON_Print(card);
-    cJSON_Delete(card);
+    base_json_number(card, "k_r", s->hyper.k_r, &failed);
+    base_json_number(card, "k_m", s->hyper.k_m, &failed);
+    base_json_number(card, "k_d", s->hyper.k_d, &failed);
+    base_json_number(card, "scale", model->calibration.scale, &failed);
+    base_json_number(card, "shift", model->calibration.shift, &failed);
+    base_json_number(card, "threshold", model->calibration.threshold, &failed);
+    base_json_number(card, "consecutive", model->calibration.consecutive, &failed);
+    base_json_number(card, "seconds_denoiser", floor(s->progress.seconds[0]), &failed);
+    base_json_number(card, "seconds_judge", floor(s->progress.seconds[1]), &failed);
     snprintf(path, sizeof path, "%s.card.json", s->plan->out);
-    int rc = text ? base_file_write_line(path, text, err) : base_fail_nomem(err, "card");
-    free(text);
+    int rc = base_json_write(path, card, failed, err);
+    cJSON_Delete(card);
     return rc;
 }
 
@@ -124,10 +124,11 @@ static int export(struct ggn_session *s, const struct ggn_policy *policy, const 
         ggn_weights_copy(model->weights[net], net == GGN_NET_R ? s->r->params : s->trainer->weights[net]->params);
     if (s->hyper.preset == GGN_PRESET_LULL)
         ggn_train_fold(&model->graph[GGN_NET_M], model->weights[GGN_NET_M]->params, s->hyper.window, s->plan->difference);
-    cJSON_AddItemToObject(model->provenance, "training", describe_run(s));
-    cJSON_AddItemToObject(model->provenance, "data", describe_data(s));
-    cJSON_AddItemToObject(model->provenance, "validation", describe_validation(stopping, auc, accuracy));
-    int rc = ggn_policy_set(model, policy, err);
+    int failed = 0;
+    base_json_item(model->provenance, "training", describe_run(s, &failed), &failed);
+    base_json_item(model->provenance, "data", describe_data(s, &failed), &failed);
+    base_json_item(model->provenance, "validation", describe_validation(stopping, auc, accuracy, &failed), &failed);
+    int rc = failed ? base_fail_nomem(err, "description of the run") : ggn_policy_set(model, policy, err);
     /* f32: half floats change a verdict now and then (counted in ggn/models/README.md); `ggn convert` is for who takes that
      */
     if (!rc)

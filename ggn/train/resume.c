@@ -6,6 +6,7 @@
 #include <string.h>
 #include <zlib.h>
 
+#include "base/json.h"
 #include "model/container.h"
 
 enum { N_ROW = 9 };
@@ -87,7 +88,9 @@ static double *row_field(struct ggn_log_row *r, int i)
 static char *describe(struct ggn_session *s)
 {
     const struct ggn_progress *p = &s->progress;
-    cJSON *root = cJSON_CreateObject(), *rows = cJSON_AddArrayToObject(root, "log");
+    cJSON *root = cJSON_CreateObject();
+    int failed = 0;
+    cJSON *rows = base_json_array(root, "log", &failed);
     const struct {
         const char *name;
         double value;
@@ -105,17 +108,16 @@ static char *describe(struct ggn_session *s)
                    {"t1", (double)s->trainer->adam_t[1]},
                    {"t2", (double)s->trainer->adam_t[2]}};
 
-    cJSON_AddStringToObject(root, "kind", "training");
+    base_json_text(root, "kind", "training", &failed);
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)
-        cJSON_AddNumberToObject(root, numbers[i].name, numbers[i].value); /* NaN is written as null */
+        base_json_number(root, numbers[i].name, numbers[i].value, &failed);
     for (int i = 0; i < s->log.n; i++) {
-        cJSON *row = cJSON_CreateArray();
-        cJSON_AddItemToArray(row, cJSON_CreateNumber(s->log.rows[i].phase));
+        cJSON *row = base_json_array(rows, NULL, &failed);
+        base_json_number(row, NULL, s->log.rows[i].phase, &failed);
         for (int k = 1; k < N_ROW; k++)
-            cJSON_AddItemToArray(row, cJSON_CreateNumber(*row_field(&s->log.rows[i], k)));
-        cJSON_AddItemToArray(rows, row);
+            base_json_number(row, NULL, *row_field(&s->log.rows[i], k), &failed);
     }
-    char *text = cJSON_PrintUnformatted(root);
+    char *text = failed ? NULL : cJSON_PrintUnformatted(root);
     cJSON_Delete(root);
     return text;
 }

@@ -40,6 +40,11 @@ cJSON *base_json_array(cJSON *to, const char *key, int *failed)
     return add(to, key, cJSON_CreateArray(), failed);
 }
 
+void base_json_item(cJSON *to, const char *key, cJSON *item, int *failed)
+{
+    add(to, key, item, failed);
+}
+
 int base_json_write(const char *path, const cJSON *root, int failed, struct base_err *err)
 {
     struct base_file_out out;

@@ -11,10 +11,12 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include "base/colour.h"
+#include "base/half.h"
+
 const uint32_t lc_plane_channels[LULL_PLANE_COUNT] = {3, 1, 1, 1, 3, 3, 3, 1};
 const char *const lc_plane_names[LULL_PLANE_COUNT] = {"COLOR", "WEIGHT", "SPP",    "MOMENT2",
                                                       "HALF",  "ALBEDO", "NORMAL", "DEPTH"};
-static const double luminance[3] = {0.2126, 0.7152, 0.0722};
 
 /* --- film ------------------------------------------------------------------------------------------------------------ */
 
@@ -100,7 +102,7 @@ static void paint_default(double rgb[3], double *sigma, int32_t x, int32_t y)
 static void add_samples(struct lc_film *f, int32_t x, int32_t y, uint64_t from, uint64_t count, int half)
 {
     size_t at = (size_t)y * (size_t)f->width + (size_t)x;
-    double rgb[3], sigma, mean_y = 0, n = (double)count;
+    double rgb[3], sigma, mean_y, n = (double)count;
     (f->paint ? f->paint : paint_default)(rgb, &sigma, x, y);
     for (uint32_t c = 0; c < 3; c++) {
         double noise = sigma == 0 ? 0 : normal(f->seed * 7919u + c * 3u, (uint32_t)at, (uint32_t)from, (uint32_t)half);
@@ -110,8 +112,8 @@ static void add_samples(struct lc_film *f, int32_t x, int32_t y, uint64_t from, 
             f->half_sum[at * 3 + c] += sum;
         f->sum[LULL_PLANE_ALBEDO][at * 3 + c] += 0.5 * n;
         f->sum[LULL_PLANE_NORMAL][at * 3 + c] += (c == 2 ? -1 : 0) * n;
-        mean_y += luminance[c] * rgb[c];
     }
+    mean_y = base_luminance(rgb[0], rgb[1], rgb[2]);
     f->sum[LULL_PLANE_MOMENT2][at] += mean_y * mean_y * (1 + sigma * sigma) * n;
     f->sum[LULL_PLANE_DEPTH][at] += 2.5 * n;
 }
@@ -175,8 +177,7 @@ void lc_film_frame(const struct lc_film *f, struct lull_frame *frame, uint32_t p
         .spp_min = 1,
         .spp_max = 1 << 20,
         .seed = f->seed,
-        /* IEC 61966-2-1 primaries */
-        .rgb_to_xyz = {0.4124, 0.3576, 0.1805, luminance[0], luminance[1], luminance[2], 0.0193, 0.1192, 0.9505},
+        .rgb_to_xyz = BASE_RGB_TO_XYZ,
     };
 }
 
@@ -211,29 +212,11 @@ static size_t type_size(int32_t type)
     return type == LULL_TYPE_F64 ? 8 : type == LULL_TYPE_F16 ? 2 : 4;
 }
 
-/* Exact for the values of a film: multiples of 1/256 below 8. */
-static uint16_t to_half_float(double v)
-{
-    if (isnan(v))
-        return 0x7e00;
-    uint16_t sign = v < 0 ? 0x8000 : 0;
-    v = fabs(v);
-    if (v == 0)
-        return sign;
-    int exponent;
-    double mantissa = frexp(v, &exponent); /* in [0.5, 1) */
-    if (exponent > 16)
-        return (uint16_t)(sign | 0x7c00);
-    if (exponent < -13)
-        return (uint16_t)(sign | (uint16_t)lrint(ldexp(v, 24)));
-    return (uint16_t)(sign | ((exponent + 14) << 10 | ((int)lrint(ldexp(mantissa, 11)) - 1024)));
-}
-
 static void store(char *at, int32_t type, double v)
 {
     switch (type) {
     case LULL_TYPE_F16: {
-        uint16_t h = to_half_float(v);
+        uint16_t h = base_f64_to_f16(v);
         memcpy(at, &h, sizeof h);
         break;
     }
