@@ -71,6 +71,16 @@ t "  …with the view's name and camera" sh -c "tr -d '\t\n ' <data/test/t-view1
 t "  …and again: nothing to do" sh -c "tail -1 out | grep -q '6 of 6 (test t/view1 6); to go: 0:00 h'"
 t "--only" sh -c "'$M' --plan order.plan --only test data | grep -c ' of 3 ' | grep -qx 3"
 
+# --- what there is, as a list ---
+L=$here/../../scripts/list-dataset
+t "list-dataset: one line per block" test "$("$L" data | tail -n +2 | cut -d';' -f1-3,5-8 | tr '\n' ' ')" = \
+    "train;fast;view0;5;2;2;0 train;slow;view0;5;2;2;0 validation;v;view0;5;2;2;0 test;t;view0;5;2;2;0 test;t;view0;6;2;2;0 test;t;view1;6;2;2;8 "
+echo '{"source": "observer", "blocks": [{"id": 5, "threshold": 20, "censored": false}, {"id": 6, "threshold": 10000, "censored": true}]}' \
+    >data/test/t/labels.json
+t "  …with labels" sh -c "'$L' data | grep -q ';observer;20;0$'"
+t "  …and their octaves" test "$("$L" --histogram data | tail -1 | tr -s ' ')" = "test 0 1 0 0 0 0 0 0 0 0 1 2 1"
+t "  …bad arguments: one line, status 2" sh -c "'$L' nowhere 2>err; test \$? -eq 2 -a \$(wc -l <err) -eq 1 && ! '$L' --what 2>err && test \$(wc -l <err) -eq 1"
+
 # --- interrupt and go on ---
 cat >long.plan <<'EOF'
 train long scenes/cornell-box.pbrt 1 linear:200:200:1 0 4-7
