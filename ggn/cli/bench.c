@@ -217,7 +217,8 @@ static void print_figures(const struct bench *b, const double figure[N_FIGURES])
         return;
     }
     printf("{\"threads\": %d, \"isa\": \"%s\", \"precision\": \"%s\", \"batch\": %d", b->o.threads,
-           ggn_isa_name(b->r->kernels->isa), ggn_precision_names[b->o.precision && b->trainer->weights[0]->bf16], b->o.batch);
+           ggn_isa_name(b->r->kernels->isa), ggn_precision_names[b->o.precision && b->trainer->weights[0]->bf16],
+           b->o.batch);
     for (int f = 0; f < N_FIGURES; f++)
         printf(", \"%s\": %.3f", figure_name[f], figure[f]);
     printf("}\n");

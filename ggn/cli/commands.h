@@ -1,8 +1,8 @@
 /*
  * The subcommands of `ggn`: one file each, ggn/cli/NAME.c, with `int ggn_cmd_NAME(int argc, char **argv)`.
  *
- * A subcommand parses its own argv by a table of options (base/options.h; argv[0] is "ggn NAME" already) and returns the exit
- * status: 0 done, 1 failed (out of memory), 2 bad usage, bad input, or an output could not be written, 130 interrupted.
+ * A subcommand parses its own argv by a table of options (base/options.h; argv[0] is "ggn NAME" already) and returns the
+ * exit status: 0 done, 1 failed (out of memory), 2 bad usage, bad input, or an output could not be written, 130 interrupted.
  * To add one: write the file and add its line to GGN_COMMANDS. An underscore in the name is a hyphen on the command line.
  */
 #ifndef GGN_CLI_COMMANDS_H

@@ -20,13 +20,15 @@ struct options {
 #define TO(member) BASE_TO(struct options, member)
 static const struct base_option list[] = {
     {"json", 'j', NULL, TO(json), .help = "print the statistics as one JSON object"},
-    {"output", 'o', "DIR", TO(dir), .help = "write scatter.png, errors.png, heatmaps.png, blocks.csv and summary.json there"},
+    {"output", 'o', "DIR", TO(dir),
+     .help = "write scatter.png, errors.png, heatmaps.png, blocks.csv and summary.json there"},
     {"view", 'v', "NAME", TO(view), .help = "compare with this view of REFERENCE only"},
     {"cap", 'c', "SPP", TO(cap), 1e-9, 1e12, .help = "thresholds at the cap are censored (10000)"},
     {"block", 'b', "PIXELS", TO(block), 1, 32768, .help = "side of a block in an EXR stop map (200)"},
     {0}};
 
-static int write_outputs(const struct options *o, const struct ggn_pairing *p, const struct ggn_agreement *a, struct base_err *err)
+static int write_outputs(const struct options *o, const struct ggn_pairing *p, const struct ggn_agreement *a,
+                         struct base_err *err)
 {
     char path[4096];
     struct base_file_out out;

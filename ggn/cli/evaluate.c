@@ -60,19 +60,24 @@ static int add_adjusted(void *into, const char *arg, struct base_err *err)
     snprintf(o->adjusted[i].name, sizeof o->adjusted[i].name, "%.*s", (int)(equals - arg), arg);
     if (!base_parse_real(equals + 1, -1e300, 1e300, &o->adjusted[i].value) ||
         !ggn_policy_adjust(&any, o->adjusted[i].name, o->adjusted[i].value) || ggn_policy_check(&any, NULL))
-        return base_fail(err, BASE_EINVAL, "expected threshold, passes, gate, tail, gini or first-spp and a number in its range");
+        return base_fail(err, BASE_EINVAL,
+                         "expected threshold, passes, gate, tail, gini or first-spp and a number in its range");
     return 0;
 }
 
 #define TO(member) BASE_TO(struct options, member)
 static const struct base_option list[] = {
     {.help = "What is measured:"},
-    {"data", 'd', "DATA", TO(data), .needed = 1, .help = "labelled data set: a folder of sequences with split.json (needed)"},
+    {"data", 'd', "DATA", TO(data), .needed = 1,
+     .help = "labelled data set: a folder of sequences with split.json (needed)"},
     {"model", 'm', "FILE", .set = add_model, .help = "trained model (.ggn); may be repeated"},
     {"observer", 'O', "FILE", TO(observer),
-     .help = "the observer's parameters, each view without itself (ggn label --calibrate); needed where there are people's views"},
-    {"visible", 0, "SHARE", TO(visible), 1e-4, 0.9999, .help = "share of viewers that may still see noise, for observer (0.25)"},
-    {"thresholds", 0, "CSV", .set = add_thresholds, .help = "a published model's thresholds of people's views; may be repeated"},
+     .help = "the observer's parameters, each view without itself (ggn label --calibrate); needed where there are people's "
+             "views"},
+    {"visible", 0, "SHARE", TO(visible), 1e-4, 0.9999,
+     .help = "share of viewers that may still see noise, for observer (0.25)"},
+    {"thresholds", 0, "CSV", .set = add_thresholds,
+     .help = "a published model's thresholds of people's views; may be repeated"},
     {"param", 'p', "KEY=NUMBER", .set = add_adjusted,
      .help = "judge as the criterion does with this parameter: threshold, passes, gate, tail, gini, first-spp"},
     {.help = "What comes out:"},
@@ -101,7 +106,8 @@ struct job {
     struct ggn_model *models[MAX_MODELS];
     struct ggn_method methods[MAX_METHODS];
     int n;
-    int likened[MAX_METHODS]; /* whose decisions a method's are compared with: the same model in float, for a model the first; else -1 */
+    /* whose decisions a method's are compared with: the same model in float, for a model the first; else -1 */
+    int likened[MAX_METHODS];
     enum ggn_split tuning, tuning_models;
 };
 
@@ -174,7 +180,8 @@ static int add_models(struct job *j, struct base_threads *threads, struct base_e
         struct ggn_policy policy;
         rc = policy_of(j->o, j->models[i / precisions], &policy, err);
         if (!rc)
-            rc = ggn_eval_trained(&j->methods[j->n], &j->set, j->models[i / precisions], &policy, name, precision, threads, err);
+            rc = ggn_eval_trained(&j->methods[j->n], &j->set, j->models[i / precisions], &policy, name, precision, threads,
+                                  err);
         if (rc)
             return rc;
         j->likened[j->n] = precision == GGN_PRECISION_BF16 ? j->n - 1 : i > 0 ? j->n - i : -1;
@@ -195,7 +202,8 @@ static int check_people(const struct job *j, struct base_err *err)
         if (!v->has_labels || strcmp(v->labels.source, "human") != 0)
             return base_fail(err, BASE_EINVAL, "%s: no human thresholds (ggn label --human CSV %s)", v->dir, v->dir);
         if (!j->o->observer)
-            return base_fail(err, BASE_EINVAL, "%s: may have been fitted: --observer FILE says what the observer is without it", v->dir);
+            return base_fail(err, BASE_EINVAL,
+                             "%s: may have been fitted: --observer FILE says what the observer is without it", v->dir);
     }
     return 0;
 }
@@ -245,8 +253,8 @@ static void report_changes(const struct job *j, enum ggn_split split, cJSON *to,
             }
         }
         if (!j->o->json)
-            printf("%s: %d of %d verdicts and %d of %d stops differ from %s; p moves by at most %.2g\n\n", other->name, verdicts,
-                   windows, stops, blocks, first->name, furthest);
+            printf("%s: %d of %d verdicts and %d of %d stops differ from %s; p moves by at most %.2g\n\n", other->name,
+                   verdicts, windows, stops, blocks, first->name, furthest);
         cJSON *o = base_json_object(to, other->name, failed);
         base_json_text(o, "from", first->name, failed);
         base_json_number(o, "windows", windows, failed);
@@ -289,8 +297,8 @@ static int report(struct job *j, int skipped, struct base_err *err)
     cJSON *splits = base_json_object(root, "splits", &failed), *changes = base_json_object(root, "changes", &failed);
     int rc = 0;
     if (!j->o->json)
-        printf("labels: %s; cuts tuned on %s for %.1f %% early stops%s\n", ggn_dataset_label_source(&j->set.chains.data), ggn_split_names[j->tuning], 100.0 * j->o->early,
-               skipped > 0 ? "; views without labels are left out" : "");
+        printf("labels: %s; cuts tuned on %s for %.1f %% early stops%s\n", ggn_dataset_label_source(&j->set.chains.data),
+               ggn_split_names[j->tuning], 100.0 * j->o->early, skipped > 0 ? "; views without labels are left out" : "");
     for (int split = 0; split < GGN_SPLITS && !rc; split++) {
         if (ggn_eval_count(&j->set, (enum ggn_split)split) == 0)
             continue;
@@ -323,8 +331,9 @@ int ggn_cmd_evaluate(int argc, char **argv)
 {
     static const struct base_options options = {
         .list = list,
-        .doc = "Measures models, the trivial baselines and the criteria halfbuf and variance on the same recorded sequences, "
-               "separately for training, validation and test scenes and for views that people judged."};
+        .doc =
+            "Measures models, the trivial baselines and the criteria halfbuf and variance on the same recorded sequences, "
+            "separately for training, validation and test scenes and for views that people judged."};
     struct options o = {.early = 0.05, .visible = 0.25, .threads = base_threads_available(), .window = 6, .epochs = 15};
     struct job j = {.o = &o};
     struct base_err err = {0};
@@ -343,7 +352,8 @@ int ggn_cmd_evaluate(int argc, char **argv)
     if (!rc)
         rc = load_models(&j, &window, &err);
     if (!rc) {
-        struct ggn_eval_options eo = {.dir = o.data, .window = window, .quality = !o.no_quality, .recorded = o.recorded, .ratio = o.ratio, .seed = 1};
+        struct ggn_eval_options eo = {
+            .dir = o.data, .window = window, .quality = !o.no_quality, .recorded = o.recorded, .ratio = o.ratio, .seed = 1};
         rc = ggn_eval_set_load(&j.set, &eo, threads, &skipped, &err);
     }
     if (!rc) {

@@ -42,7 +42,8 @@ int ggn_cmd_flip(int argc, char **argv)
         .args_min = 2,
         .args_max = 2,
         .args = offsetof(struct options, paths),
-        .doc = "Visible difference of two display images: LDR-FLIP (Andersson et al. 2020), mean and maximum over the pixels."};
+        .doc =
+            "Visible difference of two display images: LDR-FLIP (Andersson et al. 2020), mean and maximum over the pixels."};
     struct options o = {.ppd = GGN_FLIP_PPD};
     struct ggn_image8 images[2] = {{0}, {0}};
     struct ggn_flip_stats stats;

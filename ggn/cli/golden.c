@@ -20,7 +20,8 @@ static const struct base_option list[] = {
     {"base-m", 0, "N", TO(seeds.base[GGN_NET_M]), 0, UINT32_MAX, .help = "seed of the generator's weights (300)"},
     {"base-d", 0, "N", TO(seeds.base[GGN_NET_D]), 0, UINT32_MAX, .help = "seed of the discriminator's weights (500)"},
     {"train-step", 0, NULL, TO(train_step), .help = "also make one published training iteration and report it"},
-    {"float", 0, NULL, TO(single), .help = "the single-precision networks that inference and training use, not the double ones"},
+    {"float", 0, NULL, TO(single),
+     .help = "the single-precision networks that inference and training use, not the double ones"},
     {"bf16", 0, NULL, TO(bf16), .help = "as --float, with bfloat16 products where the processor has them"},
     {"threads", 0, "N", TO(threads), 1, 1024, .help = "threads (all processors); the figures do not depend on it"},
     {0}};
@@ -105,7 +106,8 @@ int ggn_cmd_golden(int argc, char **argv)
         base_options_parse(&options, argc, argv, &o, &err) ? NULL : base_threads_create(o.threads, &err);
     if (!threads)
         return ggn_cmd_fail(argv[0], &err);
-    int rc = (o.single || o.bf16 ? ggn_golden_run : ggn_golden_run_f64)(&o.seeds, o.train_step, o.bf16, threads, &golden, &err);
+    int rc =
+        (o.single || o.bf16 ? ggn_golden_run : ggn_golden_run_f64)(&o.seeds, o.train_step, o.bf16, threads, &golden, &err);
     base_threads_destroy(threads);
     if (rc)
         return ggn_cmd_fail(argv[0], &err);

@@ -79,7 +79,8 @@ static int import_all(const struct options *o, const struct ggn_sin3d_options *s
         char path[4096];
         int length = snprintf(path, sizeof path, "%s/%s", o->dir, names[i]);
         struct stat st;
-        if (length < 0 || (size_t)length >= sizeof path || stat(path, &st) != 0 || !S_ISDIR(st.st_mode) || !ggn_sin3d_is_view(path))
+        if (length < 0 || (size_t)length >= sizeof path || stat(path, &st) != 0 || !S_ISDIR(st.st_mode) ||
+            !ggn_sin3d_is_view(path))
             continue;
         found++;
         rc = import_one(o, so, path, err);
@@ -100,7 +101,8 @@ int ggn_cmd_import_sin3d(int argc, char **argv)
         .args_min = 1,
         .args_max = 1,
         .args = offsetof(struct options, dir),
-        .doc = "Reads views in the layout of the public SIN3D data set (VIEW_part6/VIEW_00020.png … or .rawls; DIR is one view or "
+        .doc = "Reads views in the layout of the public SIN3D data set (VIEW_part6/VIEW_00020.png … or .rawls; DIR is one "
+               "view or "
                "the folder of all) into block sequences. Running it again continues where it stopped."};
     struct options o = {.block = 200};
     struct ggn_thresholds thresholds = {0};
@@ -110,7 +112,8 @@ int ggn_cmd_import_sin3d(int argc, char **argv)
     if (rc)
         return ggn_cmd_fail(argv[0], &err);
     ggn_cmd_catch_interrupt();
-    struct ggn_sin3d_options so = {.block = o.block, .allow_gaps = o.allow_gaps, .progress = isatty(2) ? show_progress : NULL};
+    struct ggn_sin3d_options so = {
+        .block = o.block, .allow_gaps = o.allow_gaps, .progress = isatty(2) ? show_progress : NULL};
     if (o.thresholds) {
         rc = ggn_thresholds_read(o.thresholds, o.block, &thresholds, &err);
         so.thresholds = &thresholds;

@@ -42,7 +42,8 @@ static void print_model(const struct ggn_model *m, const struct ggn_container *c
                ggn_graph_mac(&m->graph[net]));
     printf("decision     %.3f GMAC, history %.2f MB per block, workspace %.1f MB per thread\n",
            1e-9 * (ggn_graph_mac(&m->graph[0]) + 2 * ggn_graph_mac(&m->graph[1]) + ggn_graph_mac(&m->graph[2])),
-           1e-6 * 9.0 * (h->window + 1) * h->width * h->height, /* of 3 channels 8 bits noisy and 16 denoised, and a spare slot */
+           1e-6 * 9.0 * (h->window + 1) * h->width *
+               h->height, /* of 3 channels 8 bits noisy and 16 denoised, and a spare slot */
            1e-6 * (double)ggn_judge_bytes(m, GGN_PRECISION_F32, 1));
     printf("calibration  p = sigmoid(%g * logit + %g), stops below %g in %d checks in a row, spacing %g\n",
            m->calibration.scale, m->calibration.shift, m->calibration.threshold, m->calibration.consecutive,

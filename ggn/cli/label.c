@@ -1,10 +1,10 @@
-/* `ggn label DATA…`: attaches thresholds, from people (CSV) or from the model observer; calibrates and checks the observer. */
-#include <argp.h>
+/* `ggn label DATA…`: attaches thresholds of people (CSV) or of the model observer; calibrates and checks the observer. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/options.h"
 #include "base/threads.h"
 #include "cli/commands.h"
 #include "data/dataset.h"
@@ -14,77 +14,46 @@
 #include "observer/judge.h"
 #include "observer/trials.h"
 
-enum { MAX_INPUTS = 256, KEY_HUMAN = 256, KEY_VIEW, KEY_CALIBRATE, KEY_SOURCE, KEY_CHECK, KEY_TRIALS, KEY_SPREAD };
+enum { MAX_INPUTS = 256 };
 
 struct options {
     const char *inputs[MAX_INPUTS];
     int n_inputs;
     const char *human, *calibrate, *view, *observer_path, *out;
-    enum ggn_curve_source source;
+    int source; /* enum ggn_curve_source */
     int check, trials, threads;
     double spread;
 };
 
-static const struct argp_option option_table[] = {
-    {"human", KEY_HUMAN, "CSV", 0, "label with human thresholds, name;t0;t1;…, matched by --view or by the folder's name", 1},
-    {"observer", 'O', "FILE", 0, "parameters of the model observer (default: built in)", 2},
-    {"source", KEY_SOURCE, "halves|levels", 0, "judge two independent halves (halves, the default), or the recorded levels against their "
-     "reference and halves beyond the last one", 2},
-    {"spread", KEY_SPREAD, "OCTAVES", 0, "standard deviation of the psychometric curve, for soft labels", 2},
-    {"check", KEY_CHECK, NULL, 0, "write nothing: compare the thresholds from halves with those of the recorded levels", 3},
-    {"calibrate", KEY_CALIBRATE, "CSV", 0, "fit the observer to human thresholds of several views and print the table with each view "
-     "left out; -o FILE gets parameters and table", 4},
-    {"output", 'o', "FILE", 0, "where --calibrate writes", 4},
-    {"view", KEY_VIEW, "NAME", 0, "row of the CSV for --human (when there is one sequence)", 5},
-    {"fit-trials", KEY_TRIALS, NULL, 0, "DATA are files of raw trials block;level;seen: print the spread of the psychometric curve", 6},
-    {"threads", 't', "N", 0, "worker threads (default: all processors)", 7},
-    {0},
-};
-
-static error_t parse(int key, char *arg, struct argp_state *state)
-{
-    struct options *o = state->input;
-    char *end = NULL;
-
-    switch (key) {
-    case KEY_HUMAN: o->human = arg; return 0;
-    case KEY_VIEW: o->view = arg; return 0;
-    case KEY_CALIBRATE: o->calibrate = arg; return 0;
-    case KEY_CHECK: o->check = 1; return 0;
-    case KEY_TRIALS: o->trials = 1; return 0;
-    case 'O': o->observer_path = arg; return 0;
-    case 'o': o->out = arg; return 0;
-    case KEY_SOURCE:
-        if (strcmp(arg, "halves") != 0 && strcmp(arg, "levels") != 0)
-            argp_error(state, "--source %s: expected halves or levels", arg);
-        o->source = arg[0] == 'h' ? GGN_FROM_HALVES : GGN_FROM_LEVELS;
-        return 0;
-    case KEY_SPREAD:
-        o->spread = strtod(arg, &end);
-        if (*end != '\0' || !(o->spread > 0.0 && o->spread < 10.0))
-            argp_error(state, "--spread %s: expected octaves above 0", arg);
-        return 0;
-    case 't':
-        o->threads = (int)strtol(arg, &end, 10);
-        if (*end != '\0' || o->threads < 1 || o->threads > 1024)
-            argp_error(state, "--threads %s: expected 1 … 1024", arg);
-        return 0;
-    case ARGP_KEY_ARG:
-        if (o->n_inputs == MAX_INPUTS)
-            argp_error(state, "more than %d inputs", MAX_INPUTS);
-        o->inputs[o->n_inputs++] = arg;
-        return 0;
-    case ARGP_KEY_END:
-        if (o->n_inputs == 0)
-            argp_error(state, "DATA is needed");
-        return 0;
-    default:
-        return ARGP_ERR_UNKNOWN;
-    }
-}
+#define TO(member) BASE_TO(struct options, member)
+static const struct base_option list[] = {
+    {.help = "Thresholds of people:"},
+    {"human", 0, "CSV", TO(human),
+     .help = "label with human thresholds, name;t0;t1;…, matched by --view or by the folder's name"},
+    {"view", 0, "NAME", TO(view), .help = "row of the CSV for --human (when there is one sequence)"},
+    {.help = "Thresholds of the model observer:"},
+    {"observer", 'O', "FILE", TO(observer_path), .help = "parameters of the model observer (built in)"},
+    {"source", 0, NULL, TO(source), .words = ggn_curve_sources,
+     .help = "judge two independent halves (halves), or the recorded levels against their reference and halves beyond the "
+             "last one"},
+    {"spread", 0, "OCTAVES", TO(spread), 0.001, 10, .help = "standard deviation of the psychometric curve, for soft labels"},
+    {"check", 0, NULL, TO(check),
+     .help = "write nothing: compare the thresholds from halves with those of the recorded levels"},
+    {.help = "Fitting it:"},
+    {"calibrate", 0, "CSV", TO(calibrate),
+     .help =
+         "fit the observer to human thresholds of several views and print the table with each view left out; -o FILE gets "
+         "parameters and table"},
+    {"output", 'o', "FILE", TO(out), .help = "where --calibrate writes"},
+    {"fit-trials", 0, NULL, TO(trials),
+     .help = "DATA are files of raw trials block;level;seen: print the spread of the psychometric curve"},
+    {.help = "All:"},
+    {"threads", 't', "N", TO(threads), 1, 1024, .help = "worker threads (all processors)"},
+    {0}};
 
 /* The row of human thresholds of a view. */
-static int find_row(const char *csv, const char *name, const struct ggn_thresholds *t, const struct ggn_view **row, struct base_err *err)
+static int find_row(const char *csv, const char *name, const struct ggn_thresholds *t, const struct ggn_view **row,
+                    struct base_err *err)
 {
     *row = ggn_thresholds_of(t, name);
     return *row ? 0 : base_fail(err, BASE_EINVAL, "%s: no thresholds for '%s'", csv, name);
@@ -92,13 +61,15 @@ static int find_row(const char *csv, const char *name, const struct ggn_threshol
 
 /* --- labels --- */
 
-static int label_human(const struct options *o, const struct ggn_thresholds *t, const struct ggn_dataset_view *v, struct base_err *err)
+static int label_human(const struct options *o, const struct ggn_thresholds *t, const struct ggn_dataset_view *v,
+                       struct base_err *err)
 {
     const struct seq_manifest *m = &v->manifest;
     const struct ggn_view *row;
     int rc = find_row(o->human, o->view ? o->view : v->name, t, &row, err);
     if (!rc && (uint32_t)row->n != ggn_dataset_tiles(v))
-        rc = base_fail(err, BASE_EINVAL, "%s: '%s' has %d thresholds, %s has %u blocks", o->human, row->name, row->n, v->dir, ggn_dataset_tiles(v));
+        rc = base_fail(err, BASE_EINVAL, "%s: '%s' has %d thresholds, %s has %u blocks", o->human, row->name, row->n, v->dir,
+                       ggn_dataset_tiles(v));
     if (rc)
         return rc;
     struct ggn_labels l = {.source = "human", .cap = GGN_CURVE_CAP, .spread = o->spread > 0 ? o->spread : GGN_LABELS_SPREAD,
@@ -126,7 +97,7 @@ static int label_observer(const struct options *o, const struct ggn_observer *ob
 {
     struct ggn_labels l;
     uint32_t censored = 0;
-    int rc = ggn_view_label(observer, v, o->source, threads, &l, err);
+    int rc = ggn_view_label(observer, v, (enum ggn_curve_source)o->source, threads, &l, err);
     if (rc)
         return rc;
     for (uint32_t i = 0; i < l.n; i++)
@@ -141,8 +112,8 @@ static int label_observer(const struct options *o, const struct ggn_observer *ob
 /* --- checking labels from halves --- */
 
 /* curves: room for the view's blocks from *count on. */
-static int check_view(const struct ggn_observer *observer, struct base_threads *threads, const struct ggn_dataset_view *v, double *curves,
-                      size_t *count, struct base_err *err)
+static int check_view(const struct ggn_observer *observer, struct base_threads *threads, const struct ggn_dataset_view *v,
+                      double *curves, size_t *count, struct base_err *err)
 {
     uint32_t n = v->manifest.n_blocks;
     struct ggn_check *checks = malloc(n * sizeof *checks);
@@ -221,8 +192,10 @@ static void print_calibration(const struct ggn_calibration *c)
     char text[512];
     printf("%-26s %5s %9s %9s\n", "view", "block", "human", "left out");
     for (int i = 0; i < c->n_blocks; i++)
-        printf("%-26.26s %5u %9.0f %9.0f\n", c->views[c->blocks[i].view].name, c->blocks[i].id, c->blocks[i].human, c->blocks[i].predicted);
-    printf("\n%-26s %6s %8s %8s %10s %8s %8s %8s\n", "log2(left out / human)", "blocks", "median||", "bias", "below 0.8", "Spearman", "level", "exponent");
+        printf("%-26.26s %5u %9.0f %9.0f\n", c->views[c->blocks[i].view].name, c->blocks[i].id, c->blocks[i].human,
+               c->blocks[i].predicted);
+    printf("\n%-26s %6s %8s %8s %10s %8s %8s %8s\n", "log2(left out / human)", "blocks", "median||", "bias", "below 0.8",
+           "Spearman", "level", "exponent");
     for (int v = 0; v < c->n_views; v++)
         print_row(&c->views[v]);
     print_row(&c->all);
@@ -231,8 +204,8 @@ static void print_calibration(const struct ggn_calibration *c)
 }
 
 /* The views of all data sets, each with its thresholds. */
-static int collect(const struct options *o, const struct ggn_thresholds *t, const struct ggn_dataset *sets, struct ggn_calibration_input *inputs,
-                   int *n, struct base_err *err)
+static int collect(const struct options *o, const struct ggn_thresholds *t, const struct ggn_dataset *sets,
+                   struct ggn_calibration_input *inputs, int *n, struct base_err *err)
 {
     int rc = 0;
     for (int s = 0; s < o->n_inputs; s++)
@@ -259,7 +232,7 @@ static int calibrate(const struct options *o, struct base_threads *threads, stru
     if (!rc)
         rc = !inputs ? base_fail_nomem(err, "calibration") : collect(o, &t, sets, inputs, &n, err);
     if (!rc)
-        rc = ggn_calibrate(inputs, n, o->source, threads, &c, err);
+        rc = ggn_calibrate(inputs, n, (enum ggn_curve_source)o->source, threads, &c, err);
     if (!rc && o->spread > 0)
         c.observer.spread = o->spread;
     if (!rc)
@@ -283,7 +256,8 @@ static int fit_trials(const struct options *o, struct base_err *err)
         int rc = ggn_trials_spread(o->inputs[i], &spread, &blocks, &trials, &skipped, err);
         if (rc)
             return rc;
-        printf("%s: spread %.2f octaves (%d trials, %d blocks, %d lines left out)\n", o->inputs[i], spread, trials, blocks, skipped);
+        printf("%s: spread %.2f octaves (%d trials, %d blocks, %d lines left out)\n", o->inputs[i], spread, trials, blocks,
+               skipped);
         log_sum += log(spread);
     }
     printf("geometric mean %.2f octaves\n", exp(log_sum / o->n_inputs));
@@ -292,18 +266,21 @@ static int fit_trials(const struct options *o, struct base_err *err)
 
 int ggn_cmd_label(int argc, char **argv)
 {
-    static const struct argp argp = {
-        .options = option_table,
-        .parser = parse,
-        .args_doc = "DATA...",
-        .doc = "Attaches thresholds to recorded sequences (DATA: a sequence or a folder of them): those of people, or those of the model "
-               "observer, which are never called human.",
-    };
+    static const struct base_options options = {.list = list,
+                                                .args_doc = "DATA...",
+                                                .args_min = 1,
+                                                .args_max = MAX_INPUTS,
+                                                .args = offsetof(struct options, inputs),
+                                                .arg_count = offsetof(struct options, n_inputs),
+                                                .doc = "Attaches thresholds to recorded sequences (DATA: a sequence or a "
+                                                       "folder of them): those of people, or those of the "
+                                                       "model observer, which are never called human."};
     struct options o = {.source = GGN_FROM_HALVES, .threads = base_threads_available()};
     struct base_err err = {0};
-    int rc;
+    int rc = base_options_parse(&options, argc, argv, &o, &err);
 
-    argp_parse(&argp, argc, argv, 0, NULL, &o);
+    if (rc)
+        return ggn_cmd_fail(argv[0], &err);
     ggn_cmd_catch_interrupt();
     if (o.trials) {
         rc = fit_trials(&o, &err);

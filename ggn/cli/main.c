@@ -1,5 +1,4 @@
 /* `ggn`: looks the subcommand up and hands over. */
-#include <argp.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -68,7 +67,8 @@ static int refuse(const char *text)
 static int main_options(int argc, char **argv)
 {
     char doc[2048], name[32];
-    size_t used = (size_t)snprintf(doc, sizeof doc, "Learned stopping criterion for path tracing: data, training, evaluation.\vCommands:\n");
+    size_t used = (size_t)snprintf(doc, sizeof doc,
+                                   "Learned stopping criterion for path tracing: data, training, evaluation.\vCommands:\n");
     for (int i = 0; i < N_COMMANDS && used < sizeof doc; i++) {
         snprintf(name, sizeof name, "%s", commands[i].name);
         for (char *p = name; *p; p++)
@@ -97,7 +97,6 @@ int main(int argc, char **argv)
     }
     snprintf(name, sizeof name, "ggn %s", argv[1]);
     argv[1] = name;
-    argp_err_exit_status = GGN_EXIT_BAD_INPUT; /* label */
     int status = command->run(argc - 1, argv + 1);
     if (fflush(stdout) || ferror(stdout)) {
         fprintf(stderr, "%s: cannot write standard output\n", name);

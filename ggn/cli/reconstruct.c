@@ -47,10 +47,12 @@ static const struct seq_record *level_at(const struct seq_block *b, double spp, 
 static void paste(uint8_t *image, const struct seq_manifest *m, const struct seq_block *b, const uint8_t *rgb)
 {
     for (uint32_t y = 0; y < b->height; y++)
-        memcpy(image + 3 * (((size_t)b->y0 + y) * m->width + (size_t)b->x0), rgb + 3 * (size_t)y * b->width, 3 * (size_t)b->width);
+        memcpy(image + 3 * (((size_t)b->y0 + y) * m->width + (size_t)b->x0), rgb + 3 * (size_t)y * b->width,
+               3 * (size_t)b->width);
 }
 
-static int take_block(struct picture *p, const struct seq_manifest *m, const struct seq_block *b, double spp, struct base_err *err)
+static int take_block(struct picture *p, const struct seq_manifest *m, const struct seq_block *b, double spp,
+                      struct base_err *err)
 {
     size_t pixels = (size_t)b->width * b->height;
     uint8_t *rgb = malloc(6 * pixels);
@@ -88,8 +90,8 @@ static double stop_of(const struct ggn_view *stops, const struct ggn_labels *lab
     return l ? l->threshold : (double)NAN;
 }
 
-static int build(const struct options *o, const struct seq_manifest *m, const struct ggn_view *stops, const struct ggn_labels *labels,
-                 struct picture *p, struct base_err *err)
+static int build(const struct options *o, const struct seq_manifest *m, const struct ggn_view *stops,
+                 const struct ggn_labels *labels, struct picture *p, struct base_err *err)
 {
     size_t pixels = (size_t)m->width * m->height;
     int rc = 0;
@@ -127,24 +129,27 @@ static int report(const struct options *o, const struct seq_manifest *m, const s
         return rc;
     double mean_spp = p->samples / p->blocks;
     if (o->json)
-        printf("{\"blocks\": %d, \"mean_spp\": %.2f, \"flip_mean\": %.6f, \"flip_max\": %.6f, \"worst_block\": %u, \"worst_block_flip\": %.6f, "
-               "\"beyond_last_level\": %d}\n", p->blocks, mean_spp, flip.mean, flip.max, p->worst_block, p->worst_flip, p->beyond);
+        printf("{\"blocks\": %d, \"mean_spp\": %.2f, \"flip_mean\": %.6f, \"flip_max\": %.6f, \"worst_block\": %u, "
+               "\"worst_block_flip\": %.6f, "
+               "\"beyond_last_level\": %d}\n",
+               p->blocks, mean_spp, flip.mean, flip.max, p->worst_block, p->worst_flip, p->beyond);
     else
-        printf("%d blocks, %.1f samples per pixel on average; FLIP mean %.4f, worst block %u with %.4f%s\n", p->blocks, mean_spp, flip.mean,
-               p->worst_block, p->worst_flip, p->beyond > 0 ? "; some stops lie beyond the last level" : "");
+        printf("%d blocks, %.1f samples per pixel on average; FLIP mean %.4f, worst block %u with %.4f%s\n", p->blocks,
+               mean_spp, flip.mean, p->worst_block, p->worst_flip,
+               p->beyond > 0 ? "; some stops lie beyond the last level" : "");
     return 0;
 }
 
 int ggn_cmd_reconstruct(int argc, char **argv)
 {
-    static const struct base_options options = {
-        .list = list,
-        .args_doc = "SEQUENCE",
-        .args_min = 1,
-        .args_max = 1,
-        .args = offsetof(struct options, dir),
-        .doc = "Builds the picture in which each block is taken at its threshold (the first recorded level that is not below it), "
-               "for looking at and for figures of quality."};
+    static const struct base_options options = {.list = list,
+                                                .args_doc = "SEQUENCE",
+                                                .args_min = 1,
+                                                .args_max = 1,
+                                                .args = offsetof(struct options, dir),
+                                                .doc = "Builds the picture in which each block is taken at its threshold "
+                                                       "(the first recorded level that is not below it), "
+                                                       "for looking at and for figures of quality."};
     struct options o = {0};
     struct seq_manifest m = {0};
     struct ggn_labels labels = {0};
@@ -162,7 +167,8 @@ int ggn_cmd_reconstruct(int argc, char **argv)
         rc = ggn_thresholds_read(o.stops, (int)m.block, &stops, &err);
         view = rc ? NULL : o.view ? ggn_thresholds_find(&stops, o.view) : stops.n == 1 ? &stops.views[0] : NULL;
         if (!rc && !view)
-            rc = base_fail(&err, BASE_EINVAL, "%s: %s", o.stops, o.view ? "no such view" : "several views: --view NAME chooses one");
+            rc = base_fail(&err, BASE_EINVAL, "%s: %s", o.stops,
+                           o.view ? "no such view" : "several views: --view NAME chooses one");
     }
     if (!rc)
         rc = build(&o, &m, view, &labels, &p, &err);

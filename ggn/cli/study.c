@@ -81,8 +81,14 @@ static int init(struct init_options *o, struct ggn_study *study, struct base_err
     study->show_ms = o->show_ms;
     study->gap_ms = o->gap_ms;
     study->break_every = o->break_every;
-    struct ggn_study_request_views q = {.dir = o->args[0], .page_dir = page, .views = o->views, .n_views = o->n_views, .block = o->block,
-                                        .spacing = o->spacing, .spp_min = o->spp_min, .spp_max = o->spp_max};
+    struct ggn_study_request_views q = {.dir = o->args[0],
+                                        .page_dir = page,
+                                        .views = o->views,
+                                        .n_views = o->n_views,
+                                        .block = o->block,
+                                        .spacing = o->spacing,
+                                        .spp_min = o->spp_min,
+                                        .spp_max = o->spp_max};
     struct base_threads *threads = base_threads_create(base_threads_available(), err);
     int rc = threads ? ggn_study_page_find(page, err) : err->code;
     if (!rc)
@@ -93,18 +99,32 @@ static int init(struct init_options *o, struct ggn_study *study, struct base_err
 
 static int run_init(int argc, char **argv)
 {
-    static const struct base_options options = {
-        .list = init_list, .args_doc = "DIR --task TASK --views FOLDER...", .args_min = 1, .args_max = 1 + GGN_STUDY_MAX_VIEWS,
-        .args = offsetof(struct init_options, args), .arg_count = offsetof(struct init_options, n_args),
-        .doc = "Makes the study DIR: study.json, the pictures it shows, and texts.json, what the page says (edit it: who asks, whom to "
-               "write to)."};
+    static const struct base_options options = {.list = init_list,
+                                                .args_doc = "DIR --task TASK --views FOLDER...",
+                                                .args_min = 1,
+                                                .args_max = 1 + GGN_STUDY_MAX_VIEWS,
+                                                .args = offsetof(struct init_options, args),
+                                                .arg_count = offsetof(struct init_options, n_args),
+                                                .doc = "Makes the study DIR: study.json, the pictures it shows, and "
+                                                       "texts.json, what the page says (edit it: who asks, whom to "
+                                                       "write to)."};
     struct init_options *o = calloc(1, sizeof *o);
     struct ggn_study study = {.min_catch_passed = 0.75, .max_untouched = 0.5};
     struct base_err err = {0};
     if (!o)
         return base_fail_nomem(&err, "options") ? ggn_cmd_fail(argv[0], &err) : 0;
-    *o = (struct init_options){.task = -1, .method = -1, .trials = 30, .show_ms = 700, .gap_ms = 400, .break_every = 60, .block = 200,
-                               .spp_min = 1, .spp_max = 1000000, .seed = 1, .catch_share = 0.1, .spacing = 0.15};
+    *o = (struct init_options){.task = -1,
+                               .method = -1,
+                               .trials = 30,
+                               .show_ms = 700,
+                               .gap_ms = 400,
+                               .break_every = 60,
+                               .block = 200,
+                               .spp_min = 1,
+                               .spp_max = 1000000,
+                               .seed = 1,
+                               .catch_share = 0.1,
+                               .spacing = 0.15};
     int rc = base_options_parse(&options, argc, argv, o, &err);
     if (!rc)
         rc = init(o, &study, &err);
@@ -169,8 +189,8 @@ static int serve(const struct options *o, struct base_err *err)
     if (!rc)
         rc = ggn_study_store_open(o->args[0], study.id, 1, &store, err);
     if (!rc) {
-        struct ggn_study_site site = {.dir = o->args[0], .page_dir = page, .token = address.loopback ? NULL : token, .study = &study,
-                                      .store = store};
+        struct ggn_study_site site = {
+            .dir = o->args[0], .page_dir = page, .token = address.loopback ? NULL : token, .study = &study, .store = store};
         ggn_cmd_catch_interrupt();
         rc = ggn_study_serve(&site, &address, &ggn_cmd_interrupted, err);
     }
@@ -182,8 +202,11 @@ static int serve(const struct options *o, struct base_err *err)
 static int run_serve(int argc, char **argv)
 {
     static const struct base_options options = {
-        .list = serve_list, .args_doc = "DIR", ARGS(1),
-        .doc = "Serves the study until interrupted and prints its link. Every trial is on the disk before it is acknowledged."};
+        .list = serve_list,
+        .args_doc = "DIR",
+        ARGS(1),
+        .doc =
+            "Serves the study until interrupted and prints its link. Every trial is on the disk before it is acknowledged."};
     struct options o = {.listen = "127.0.0.1"};
     struct base_err err = {0};
     int rc = base_options_parse(&options, argc, argv, &o, &err);
@@ -194,7 +217,8 @@ static int run_serve(int argc, char **argv)
 
 /* --- what was collected --- */
 
-typedef int work_fn(const struct options *o, const struct ggn_study *study, struct ggn_study_store *store, struct base_err *err);
+typedef int work_fn(const struct options *o, const struct ggn_study *study, struct ggn_study_store *store,
+                    struct base_err *err);
 
 /* Reads the command line and runs `work` on the study of DIR and its people; create: though nobody has taken part. */
 static int with_store(const struct base_options *options, int argc, char **argv, int create, work_fn *work)
@@ -215,7 +239,8 @@ static int with_store(const struct base_options *options, int argc, char **argv,
     return rc ? ggn_cmd_fail(argv[0], &err) : GGN_EXIT_OK;
 }
 
-static int do_report(const struct options *o, const struct ggn_study *study, struct ggn_study_store *store, struct base_err *err)
+static int do_report(const struct options *o, const struct ggn_study *study, struct ggn_study_store *store,
+                     struct base_err *err)
 {
     char folder[4096];
     struct ggn_study_people people = {0};
@@ -238,13 +263,17 @@ static const struct base_option report_list[] = {
 static int run_report(int argc, char **argv)
 {
     static const struct base_options options = {
-        .list = report_list, .args_doc = "DIR", ARGS(1),
-        .doc = "Thresholds with intervals (thresholds.csv is what `ggn label --human` and `ggn compare` read), who counts and why not, how "
+        .list = report_list,
+        .args_doc = "DIR",
+        ARGS(1),
+        .doc = "Thresholds with intervals (thresholds.csv is what `ggn label --human` and `ggn compare` read), who counts "
+               "and why not, how "
                "well people agree; or shares of judgements with intervals, and how many people a difference of 10 % takes."};
     return with_store(&options, argc, argv, 0, do_report);
 }
 
-static int do_export(const struct options *o, const struct ggn_study *study, struct ggn_study_store *store, struct base_err *err)
+static int do_export(const struct options *o, const struct ggn_study *study, struct ggn_study_store *store,
+                     struct base_err *err)
 {
     int people = 0, rc = ggn_study_export(study, store, o->out, &people, err);
     if (!rc)
@@ -264,7 +293,8 @@ static int run_export(int argc, char **argv)
     return with_store(&options, argc, argv, 0, do_export);
 }
 
-static int do_import(const struct options *o, const struct ggn_study *study, struct ggn_study_store *store, struct base_err *err)
+static int do_import(const struct options *o, const struct ggn_study *study, struct ggn_study_store *store,
+                     struct base_err *err)
 {
     int people = 0, rc = ggn_study_import(study, store, o->args[1], &people, err);
     if (!rc)
@@ -275,12 +305,16 @@ static int do_import(const struct options *o, const struct ggn_study *study, str
 static int run_import(int argc, char **argv)
 {
     static const struct base_options options = {
-        .list = no_options, .args_doc = "DIR FILE", ARGS(2),
-        .doc = "Adds everybody of an exported file to a copy of the same study: all of them or, if anything is amiss, nobody."};
+        .list = no_options,
+        .args_doc = "DIR FILE",
+        ARGS(2),
+        .doc =
+            "Adds everybody of an exported file to a copy of the same study: all of them or, if anything is amiss, nobody."};
     return with_store(&options, argc, argv, 1, do_import);
 }
 
-static int do_delete(const struct options *o, const struct ggn_study *study, struct ggn_study_store *store, struct base_err *err)
+static int do_delete(const struct options *o, const struct ggn_study *study, struct ggn_study_store *store,
+                     struct base_err *err)
 {
     struct ggn_study_person person;
     (void)study;
@@ -295,10 +329,12 @@ static int do_delete(const struct options *o, const struct ggn_study *study, str
 
 static int run_delete(int argc, char **argv)
 {
-    static const struct base_options options = {
-        .list = no_options, .args_doc = "DIR PERSON", ARGS(2),
-        .doc = "Deletes a person, by the code that the page showed them, and all their trials. Exported files and reports made before still "
-               "hold them."};
+    static const struct base_options options = {.list = no_options,
+                                                .args_doc = "DIR PERSON",
+                                                ARGS(2),
+                                                .doc = "Deletes a person, by the code that the page showed them, and all "
+                                                       "their trials. Exported files and reports made before still "
+                                                       "hold them."};
     return with_store(&options, argc, argv, 0, do_delete);
 }
 
@@ -324,8 +360,10 @@ enum { N_VERBS = sizeof verbs / sizeof verbs[0] };
 static int study_options(int argc, char **argv)
 {
     char doc[1024];
-    size_t used = (size_t)snprintf(doc, sizeof doc, "Asks people, on a page that this machine serves: from how many samples on a block "
-                                   "looks converged, or whether a reconstructed picture looks the same as its reference.\vVerbs:\n");
+    size_t used =
+        (size_t)snprintf(doc, sizeof doc,
+                         "Asks people, on a page that this machine serves: from how many samples on a block "
+                         "looks converged, or whether a reconstructed picture looks the same as its reference.\vVerbs:\n");
     for (int i = 0; i < N_VERBS && used < sizeof doc; i++)
         used += (size_t)snprintf(doc + used, sizeof doc - used, "  %-8s %s\n", verbs[i].name, verbs[i].help);
     if (used < sizeof doc)

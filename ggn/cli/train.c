@@ -9,7 +9,8 @@ struct settings {
 };
 #define TO(member) BASE_TO(struct settings, member)
 static const struct base_option list[] = {
-    {"data", 'd', "DIR", TO(plan.data.dir), .needed = 1, .help = "data set: a folder of recorded, labelled sequences (needed)"},
+    {"data", 'd', "DIR", TO(plan.data.dir), .needed = 1,
+     .help = "data set: a folder of recorded, labelled sequences (needed)"},
     {"out", 'o', "FILE", TO(plan.out), .needed = 1,
      .help = "model file; FILE.ckpt, .csv, .png and .card.json lie beside it (needed)"},
     {"preset", 0, NULL, TO(preset), .words = ggn_preset_names, .help = "networks, procedure and defaults (lull)"},
@@ -57,10 +58,10 @@ static const struct base_option list[] = {
 
 int ggn_cmd_train(int argc, char **argv)
 {
-    static const struct base_options options = {
-        .list = list,
-        .doc = "Trains a stopping criterion on a data set of block sequences.\vThe same data, options and seed give the same model "
-               "bytes, also after an interruption and --resume."};
+    static const struct base_options options = {.list = list,
+                                                .doc = "Trains a stopping criterion on a data set of block sequences.\vThe "
+                                                       "same data, options and seed give the same model "
+                                                       "bytes, also after an interruption and --resume."};
     struct settings s = {.preset = GGN_PRESET_LULL};
     struct base_err err = {0};
 

@@ -56,7 +56,7 @@ struct ggn_chain *ggn_chains_append(struct ggn_chains *set, struct base_err *err
     return c;
 }
 
-/* --- split -------------------------------------------------------------------------------------------------------------- */
+/* --- split --- */
 
 /* Number of the scene among all, in order of first appearance. */
 static int scene_of(const struct ggn_dataset *data, int view)
@@ -114,7 +114,7 @@ static int choose_split(struct ggn_chains *set, const struct ggn_chains_options 
     return rc;
 }
 
-/* --- chains ------------------------------------------------------------------------------------------------------------- */
+/* --- chains --- */
 
 static int chain_alloc(const struct ggn_chains *set, struct ggn_chain *c, int levels, int reference, struct base_err *err)
 {
@@ -151,7 +151,8 @@ static int fill_chain(const struct ggn_chains *set, struct ggn_chain *c, const s
     return rc;
 }
 
-static int load_block(struct ggn_chains *set, int view, uint32_t index, const struct ggn_chains_options *o, struct base_err *err)
+static int load_block(struct ggn_chains *set, int view, uint32_t index, const struct ggn_chains_options *o,
+                      struct base_err *err)
 {
     const struct ggn_dataset_view *v = &set->data.views[view];
     struct seq_block b;
@@ -165,8 +166,8 @@ static int load_block(struct ggn_chains *set, int view, uint32_t index, const st
     }
     struct ggn_chain *c = NULL;
     if ((int)b.width != set->width || (int)b.height != set->height)
-        rc = base_fail(err, BASE_EINVAL, "%s/%s: a block of %ux%u pixels among blocks of %dx%d", v->dir, v->manifest.blocks[index].file,
-                      b.width, b.height, set->width, set->height);
+        rc = base_fail(err, BASE_EINVAL, "%s/%s: a block of %ux%u pixels among blocks of %dx%d", v->dir,
+                       v->manifest.blocks[index].file, b.width, b.height, set->width, set->height);
     else if (!(c = ggn_chains_append(set, err)))
         rc = BASE_ENOMEM;
     if (!rc) {

@@ -1,6 +1,6 @@
 /*
- * The images that training sees: chains, each one block at rising sample counts with the label that tells where its noise stops
- * being visible.
+ * The images that training sees: chains, each one block at rising sample counts with the label that tells where its noise
+ * stops being visible.
  *
  * Real chains are recorded levels. Synthetic ones are made from a recorded pair (ggn_chains_add_synthetic): levels that were
  * never rendered, with other noise each time. The set owns everything; read-only after loading except for `denoised`.
@@ -39,7 +39,8 @@ struct ggn_chains {
 
 struct ggn_chains_options {
     const char *dir;        /* a data set (data/dataset.h) */
-    const char *validation; /* comma-separated scenes: over the data set's split; NULL: the split, or every fifth scene without */
+    /* comma-separated scenes: over the data set's split; NULL: the split, or every fifth scene without */
+    const char *validation;
     const char *test;       /* likewise; NULL: the split, or none */
     double ratio;           /* thin the levels to at least this ratio; 0: keep all */
     int with_test;          /* read the pixels of the test scenes and of the people's views too (training never does) */
@@ -49,13 +50,14 @@ struct ggn_chains_options {
 int ggn_chains_load(struct ggn_chains *set, const struct ggn_chains_options *options, struct base_err *err);
 void ggn_chains_release(struct ggn_chains *set);
 
-/* Adds `per_chain` synthetic chains for each training chain whose sequence has a full level and an independent reference. The
- * same seed gives the same chains. */
+/* Adds `per_chain` synthetic chains for each training chain whose sequence has a full level and an independent reference.
+ * The same seed gives the same chains. */
 int ggn_chains_add_synthetic(struct ggn_chains *set, int per_chain, uint32_t seed, struct base_err *err);
 
-/* Continues recorded chains of all splits that end near or before their threshold, up to 0.7 of the reference's samples beyond the
- * last level: the reference's samples go on where the recording stopped, their running mean simulated from the half buffers. Where
- * there is no reference but a full level, the whole chain is made anew, up to 10,000 spp: its mean stands for the converged image. */
+/* Continues recorded chains of all splits that end near or before their threshold, up to 0.7 of the reference's samples
+ * beyond the last level: the reference's samples go on where the recording stopped, their running mean simulated from the
+ * half buffers. Where there is no reference but a full level, the whole chain is made anew, up to 10,000 spp: its mean
+ * stands for the converged image. */
 int ggn_chains_extend(struct ggn_chains *set, uint32_t seed, struct base_err *err);
 
 /* Chains of a split, real ones only if real_only. */

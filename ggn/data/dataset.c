@@ -89,7 +89,8 @@ static int scan_all(const char *path, struct ggn_dataset *d, struct base_err *er
     }
     for (int i = 0; i < d->n && !rc; i++)
         for (int k = 0; k < i; k++)
-            if (strcmp(d->views[i].manifest.scene, d->views[k].manifest.scene) == 0 && d->views[i].split != d->views[k].split)
+            if (strcmp(d->views[i].manifest.scene, d->views[k].manifest.scene) == 0 &&
+                d->views[i].split != d->views[k].split)
                 rc = base_fail(err, BASE_EINVAL, "%s: scene '%s' is in %s and in %s", path, d->views[i].manifest.scene,
                               ggn_split_names[d->views[k].split], ggn_split_names[d->views[i].split]);
     if (!rc && d->n == 0)

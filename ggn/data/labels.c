@@ -62,7 +62,8 @@ static int parse_entries(const char *path, const cJSON *blocks, struct ggn_label
     cJSON_ArrayForEach(v, blocks) {
         const cJSON *id = cJSON_GetObjectItemCaseSensitive(v, "id");
         struct ggn_label *label = &l->labels[l->n];
-        if (!cJSON_IsNumber(id) || !(id->valuedouble >= 0 && id->valuedouble < UINT32_MAX) || !get_positive(v, "threshold", &label->threshold))
+        if (!cJSON_IsNumber(id) || !(id->valuedouble >= 0 && id->valuedouble < UINT32_MAX) ||
+            !get_positive(v, "threshold", &label->threshold))
             return base_fail(err, BASE_EINVAL, "%s: entry %u of blocks has no id or no threshold", path, l->n);
         label->id = (uint32_t)id->valuedouble;
         label->censored = cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(v, "censored"));
@@ -77,12 +78,14 @@ int ggn_labels_parse(const char *path, const char *text, size_t size, struct ggn
 {
     struct ggn_labels l = {0};
     cJSON *root = cJSON_ParseWithLength(text, size);
-    const cJSON *format = cJSON_GetObjectItemCaseSensitive(root, "format"), *source = cJSON_GetObjectItemCaseSensitive(root, "source");
+    const cJSON *format = cJSON_GetObjectItemCaseSensitive(root, "format"),
+                *source = cJSON_GetObjectItemCaseSensitive(root, "source");
     const cJSON *detail = cJSON_GetObjectItemCaseSensitive(root, "detail");
     int rc;
     if (!cJSON_IsString(format) || strcmp(format->valuestring, "lull-labels") != 0)
         rc = base_fail(err, BASE_EINVAL, "%s: not a file of labels", path);
-    else if (!cJSON_IsString(source) || (strcmp(source->valuestring, "human") != 0 && strcmp(source->valuestring, "observer") != 0))
+    else if (!cJSON_IsString(source) ||
+             (strcmp(source->valuestring, "human") != 0 && strcmp(source->valuestring, "observer") != 0))
         rc = base_fail(err, BASE_EINVAL, "%s: source must be \"human\" or \"observer\"", path);
     else if (!get_positive(root, "cap", &l.cap) || !get_positive(root, "spread", &l.spread))
         rc = base_fail(err, BASE_EINVAL, "%s: cap or spread is missing", path);

@@ -1,5 +1,6 @@
 /*
- * Labels: from how many samples per pixel on a block's noise is not seen. DIR/labels.json, written by `ggn label` and the import.
+ * Labels: from how many samples per pixel on a block's noise is not seen. DIR/labels.json, written by `ggn label` and the
+ * import.
  *
  * A threshold at the cap is censored: noise was (or may have been) visible up to there, and nothing is known beyond.
  */

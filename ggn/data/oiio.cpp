@@ -41,7 +41,8 @@ int complain(const char *path, struct base_err *err)
 int complain(const char *path, ImageInput &in, struct base_err *err)
 {
     std::string why = in.geterror();
-    return base_fail(err, BASE_EINVAL, "%s: %s", path, why.empty() ? "cannot be decoded" : why.substr(0, why.find('\n')).c_str());
+    return base_fail(err, BASE_EINVAL, "%s: %s", path,
+                     why.empty() ? "cannot be decoded" : why.substr(0, why.find('\n')).c_str());
 }
 
 bool sane(const ImageSpec &spec)
@@ -53,7 +54,8 @@ bool sane(const ImageSpec &spec)
 
 // Reads the channels [begin, end) of a subimage as T.
 template <class T>
-int read_pixels(ImageInput &in, const char *path, int subimage, int begin, int end, std::vector<T> &pixels, struct base_err *err)
+int read_pixels(ImageInput &in, const char *path, int subimage, int begin, int end, std::vector<T> &pixels,
+                struct base_err *err)
 {
     ImageSpec spec = in.spec_dimensions(subimage, 0);
     size_t n = (size_t)spec.width * (size_t)spec.height * (size_t)(end - begin);
@@ -148,7 +150,8 @@ int read_channel(const char *path, const char *channel, struct ggn_imagef *image
             if (spec.channelnames[(size_t)c] != channel)
                 continue;
             if (!sane(spec))
-                return base_fail(err, BASE_EINVAL, "%s: %dx%d is not a size that can be used", path, spec.width, spec.height);
+                return base_fail(err, BASE_EINVAL, "%s: %dx%d is not a size that can be used", path, spec.width,
+                                 spec.height);
             std::vector<float> pixels;
             int rc = read_pixels(*in, path, part, c, c + 1, pixels, err);
             if (rc)

@@ -21,7 +21,8 @@ static const char *find_data(const char *p, const char *end)
     return NULL;
 }
 
-static int read_rows(const char *path, const char *p, uint32_t width, uint32_t height, uint32_t channels, float *out, struct base_err *err)
+static int read_rows(const char *path, const char *p, uint32_t width, uint32_t height, uint32_t channels, float *out,
+                     struct base_err *err)
 {
     for (uint32_t y = 0; y < height; y++, p++)
         for (uint32_t x = 0; x < width; x++) {

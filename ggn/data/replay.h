@@ -1,6 +1,6 @@
 /*
- * Recorded levels asked about as a renderer would ask: what the stopping rule (model/stopper.h) sees of a block. A check falls on
- * the recorded level nearest to where the rule wants it, and on the last one. Pure functions but for the callback.
+ * Recorded levels asked about as a renderer would ask: what the stopping rule (model/stopper.h) sees of a block. A check
+ * falls on the recorded level nearest to where the rule wants it, and on the last one. Pure functions but for the callback.
  */
 #ifndef GGN_DATA_REPLAY_H
 #define GGN_DATA_REPLAY_H
@@ -9,8 +9,10 @@
 #include "model/stopper.h"
 
 struct ggn_seen {
-    double p;    /* NaN: no check fell on this level, or one too early for the network; INFINITY: the gate spared the network */
-    int is_held; /* by the tail guard, should it pass; from the last recorded level (scaled) where the statistics are missing */
+    /* NaN: no check fell on this level, or one too early for the network; INFINITY: the gate spared the network */
+    double p;
+    /* by the tail guard, should it pass; from the last recorded level (scaled) where the statistics are missing */
+    int is_held;
 };
 
 /* Fills seen [c->n_levels], as if nothing stopped the block: where it stops depends on the threshold, what is seen does not.

@@ -97,8 +97,8 @@ static int check_levels(const struct view *v, int allow_gaps, struct base_err *e
         if (v->levels[i].spp == v->levels[i - 1].spp)
             return base_fail(err, BASE_EINVAL, "%s: two images for %u spp", v->dir, v->levels[i].spp);
         if (v->levels[i].spp != want && !allow_gaps)
-            return base_fail(err, BASE_EINVAL, "%s: the level at %u spp is missing (--allow-gaps takes what is there)", v->dir,
-                            v->levels[i].spp < want ? v->levels[i].spp : want);
+            return base_fail(err, BASE_EINVAL, "%s: the level at %u spp is missing (--allow-gaps takes what is there)",
+                             v->dir, v->levels[i].spp < want ? v->levels[i].spp : want);
     }
     return 0;
 }
@@ -187,7 +187,8 @@ static int add_picture(struct row *row, const struct picture *p, uint32_t spp, i
     return rc;
 }
 
-static int fill_row(const struct view *v, const struct seq_manifest *m, struct row *row, const struct ggn_sin3d_options *o, int base, struct base_err *err)
+static int fill_row(const struct view *v, const struct seq_manifest *m, struct row *row, const struct ggn_sin3d_options *o,
+                    int base, struct base_err *err)
 {
     int rc = 0;
     for (int i = 0; i < v->n && !rc; i++) {
@@ -196,8 +197,8 @@ static int fill_row(const struct view *v, const struct seq_manifest *m, struct r
         if (rc)
             return rc;
         if ((uint32_t)p.display.width != m->width || (uint32_t)p.display.height != m->height)
-            rc = base_fail(err, BASE_EINVAL, "%s/%s: %dx%d, the other levels are %ux%u", v->dir, v->levels[i].file, p.display.width,
-                          p.display.height, m->width, m->height);
+            rc = base_fail(err, BASE_EINVAL, "%s/%s: %dx%d, the other levels are %ux%u", v->dir, v->levels[i].file,
+                           p.display.width, p.display.height, m->width, m->height);
         if (!rc)
             rc = add_picture(row, &p, v->levels[i].spp, 0, err);
         if (!rc && i + 1 == v->n)
@@ -209,7 +210,8 @@ static int fill_row(const struct view *v, const struct seq_manifest *m, struct r
     return rc;
 }
 
-static int import_row(const struct view *v, const char *out, struct seq_manifest *m, int index, const struct ggn_sin3d_options *o, struct base_err *err)
+static int import_row(const struct view *v, const char *out, struct seq_manifest *m, int index,
+                      const struct ggn_sin3d_options *o, struct base_err *err)
 {
     uint32_t block = m->block;
     struct row row = {.columns = (int)(m->width / block), .block = (int)block, .y0 = index * (int)block};
@@ -221,14 +223,16 @@ static int import_row(const struct view *v, const char *out, struct seq_manifest
     if (!row.builders || !row.display || !row.mean)
         rc = base_fail_nomem(err, v->dir);
     for (int c = 0; c < row.columns && !rc; c++)
-        rc = seq_builder_init(&row.builders[c], block, block, c * (int)block, row.y0, (uint32_t)(index * row.columns + c), 0, err);
+        rc = seq_builder_init(&row.builders[c], block, block, c * (int)block, row.y0, (uint32_t)(index * row.columns + c), 0,
+                              err);
     if (!rc)
         rc = fill_row(v, m, &row, o, index * v->n, err);
     for (int c = 0; c < row.columns && !rc; c++) {
         uint32_t x0 = (uint32_t)c * block, y0 = (uint32_t)row.y0;
         struct seq_manifest_block *b = &m->blocks[m->n_blocks];
         char path[4200];
-        *b = (struct seq_manifest_block){.id = (uint32_t)(index * row.columns + c), .x0 = x0, .y0 = y0, .x1 = x0 + block, .y1 = y0 + block};
+        *b = (struct seq_manifest_block){
+            .id = (uint32_t)(index * row.columns + c), .x0 = x0, .y0 = y0, .x1 = x0 + block, .y1 = y0 + block};
         snprintf(b->file, sizeof b->file, "block-%05u.lseq", b->id);
         snprintf(path, sizeof path, "%s/%s", out, b->file);
         rc = seq_builder_write(&row.builders[c], path, &b->crc32, err);
@@ -243,21 +247,26 @@ static int import_row(const struct view *v, const char *out, struct seq_manifest
     return rc;
 }
 
-static int init_manifest(const struct view *v, const struct ggn_sin3d_options *o, struct seq_manifest *m, struct base_err *err)
+static int init_manifest(const struct view *v, const struct ggn_sin3d_options *o, struct seq_manifest *m,
+                         struct base_err *err)
 {
     struct picture first;
     int rc = read_picture(v, &v->levels[0], &first, err);
     if (rc)
         return rc;
-    *m = (struct seq_manifest){.width = (uint32_t)first.display.width, .height = (uint32_t)first.display.height,
-                               .block = (uint32_t)o->block, .reference_spp = v->levels[v->n - 1].spp, .reference_independent = 0,
+    *m = (struct seq_manifest){.width = (uint32_t)first.display.width,
+                               .height = (uint32_t)first.display.height,
+                               .block = (uint32_t)o->block,
+                               .reference_spp = v->levels[v->n - 1].spp,
+                               .reference_independent = 0,
                                .n_levels = (uint32_t)v->n};
     release_picture(&first);
     ggn_sin3d_scene(v->prefix, m->scene, sizeof m->scene);
     snprintf(m->source, sizeof m->source, "%.255s", v->prefix);
     snprintf(m->renderer, sizeof m->renderer, "SIN3D (imported)");
     if (m->width % m->block != 0 || m->height % m->block != 0)
-        return base_fail(err, BASE_EINVAL, "%s: %ux%u is not a multiple of the block of %u", v->dir, m->width, m->height, m->block);
+        return base_fail(err, BASE_EINVAL, "%s: %ux%u is not a multiple of the block of %u", v->dir, m->width, m->height,
+                         m->block);
     size_t blocks = (size_t)(m->width / m->block) * (m->height / m->block);
     m->levels = malloc((size_t)v->n * sizeof *m->levels);
     m->blocks = malloc(blocks * sizeof *m->blocks);
@@ -292,8 +301,8 @@ static int take_over(const char *out, struct seq_manifest *m, struct base_err *e
     return rc;
 }
 
-static int attach_thresholds(const struct view *v, const char *out, const struct seq_manifest *m, const struct ggn_thresholds *t,
-                             int *labelled, struct base_err *err)
+static int attach_thresholds(const struct view *v, const char *out, const struct seq_manifest *m,
+                             const struct ggn_thresholds *t, int *labelled, struct base_err *err)
 {
     char with_part[GGN_VIEW_NAME + 8];
     const char *slash = strrchr(v->dir, '/');
@@ -321,11 +330,14 @@ static int attach_thresholds(const struct view *v, const char *out, const struct
     return rc;
 }
 
-int ggn_sin3d_import_view(const char *dir, const char *out, const struct ggn_sin3d_options *o, int *labelled, struct base_err *err)
+int ggn_sin3d_import_view(const char *dir, const char *out, const struct ggn_sin3d_options *o, int *labelled,
+                          struct base_err *err)
 {
     struct view v = {0};
     struct seq_manifest m = {0};
-    int rc = strlen(dir) < sizeof v.dir && strlen(out) < 4096 ? scan(dir, &v, err) : base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", dir);
+    int rc = strlen(dir) < sizeof v.dir && strlen(out) < 4096
+                 ? scan(dir, &v, err)
+                 : base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", dir);
     if (!rc)
         rc = check_levels(&v, o->allow_gaps, err);
     if (!rc)

@@ -16,9 +16,10 @@ struct ggn_sin3d_options {
     void *data;
 };
 
-/* A view folder holds NAME_00020.png (or .rawls) …; the last level serves as the reference. Blocks that OUT/manifest.json lists
- * already are kept. *labelled: whether thresholds were found for it. */
-int ggn_sin3d_import_view(const char *dir, const char *out, const struct ggn_sin3d_options *options, int *labelled, struct base_err *err);
+/* A view folder holds NAME_00020.png (or .rawls) …; the last level serves as the reference. Blocks that OUT/manifest.json
+ * lists already are kept. *labelled: whether thresholds were found for it. */
+int ggn_sin3d_import_view(const char *dir, const char *out, const struct ggn_sin3d_options *options, int *labelled,
+                          struct base_err *err);
 /* Whether a folder holds such images itself. */
 int ggn_sin3d_is_view(const char *dir);
 /* The group for the split: "p3d_kitchen-view1_part6" -> "p3d_kitchen". */

@@ -1,4 +1,5 @@
-/* Levels that were never rendered, from one pair of half buffers and a reference: whole chains, and the end of recorded ones. */
+/* Levels that were never rendered, from one pair of half buffers and a reference: whole chains, and the end of recorded
+ * ones. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,7 +18,8 @@ static const double CLEAN_END = 0.4;     /* a threshold below this share of the 
 /* One block's source. */
 struct source {
     float *base, *d, *last; /* [3][P] linear: the converged image, the half-buffer difference, the last recorded level */
-    double n_full, n_reference; /* n_reference infinite: `base` is the mean of the full level and stands for the converged image */
+    /* n_reference infinite: `base` is the mean of the full level and stands for the converged image */
+    double n_full, n_reference;
 };
 
 static const struct seq_record *full_level(const struct seq_block *b)
@@ -41,7 +43,8 @@ static int choose_levels(double *spp, double first, double ratio, double highest
 
 /* The running mean X_n of independent samples is, backwards, a walk: X_n − X_N has variance σ²·(1/n − 1/N), with independent
  * increments in 1/n. From the reference down to the fewest samples each step adds ±D·√(n_full·Δ(1/n)), the sign drawn per
- * pixel: D² estimates σ²/n_full there and keeps the colour of the noise. `noise` takes one step from `above` to n samples. */
+ * pixel: D² estimates σ²/n_full there and keeps the colour of the noise. `noise` takes one step from `above` to n samples.
+ */
 static void step_down(const struct source *s, size_t pixels, double n, double above, uint32_t seed, float *noise)
 {
     const float step = (float)sqrt(s->n_full * (1 / n - 1 / above));
@@ -58,7 +61,8 @@ static void fill_levels(struct ggn_chain *c, const struct source *s, size_t pixe
     memset(noise, 0, 3 * pixels * sizeof *noise);
     for (int k = c->n_levels - 1; k >= 0; k--) {
         uint8_t *out = c->noisy + 3 * pixels * (size_t)k;
-        step_down(s, pixels, c->spp[k], k + 1 < c->n_levels ? c->spp[k + 1] : s->n_reference, ggn_hash((uint32_t)k, seed), noise);
+        step_down(s, pixels, c->spp[k], k + 1 < c->n_levels ? c->spp[k + 1] : s->n_reference, ggn_hash((uint32_t)k, seed),
+                  noise);
         for (size_t i = 0; i < 3 * pixels; i++)
             out[i] = ggn_preprocess((double)(s->base[i] + noise[i]), NULL, NULL);
     }
@@ -89,7 +93,8 @@ static int make_chain(struct ggn_chains *set, const struct ggn_chain *real, stru
     return 0;
 }
 
-static int read_source(const struct ggn_chains *set, const struct ggn_chain *c, struct source *s, int *usable, struct base_err *err)
+static int read_source(const struct ggn_chains *set, const struct ggn_chain *c, struct source *s, int *usable,
+                       struct base_err *err)
 {
     const struct ggn_dataset_view *v = &set->data.views[c->view];
     struct seq_block b = {0};
@@ -170,9 +175,10 @@ static int chain_grow(const struct ggn_chains *set, struct ggn_chain *c, int mor
     return 0;
 }
 
-/* X_n = (n₀·X + m·Y_m)/n with m = n − n₀: the last recorded level X, continued with the first m samples of the reference, whose
- * running mean Y_m is the same walk as above. */
-static int extend_chain(const struct ggn_chains *set, struct ggn_chain *c, const struct source *s, uint32_t seed, struct base_err *err)
+/* X_n = (n₀·X + m·Y_m)/n with m = n − n₀: the last recorded level X, continued with the first m samples of the reference,
+ * whose running mean Y_m is the same walk as above. */
+static int extend_chain(const struct ggn_chains *set, struct ggn_chain *c, const struct source *s, uint32_t seed,
+                        struct base_err *err)
 {
     size_t values = ggn_chains_values(set);
     const int first = c->n_levels;
@@ -201,7 +207,8 @@ static int extend_chain(const struct ggn_chains *set, struct ggn_chain *c, const
 }
 
 /* Without a reference: levels up to SIMULATED_END in place of the recorded ones. */
-static int simulate_chain(const struct ggn_chains *set, struct ggn_chain *c, const struct source *s, uint32_t seed, struct base_err *err)
+static int simulate_chain(const struct ggn_chains *set, struct ggn_chain *c, const struct source *s, uint32_t seed,
+                          struct base_err *err)
 {
     const double ratio = set->ratio > 1.01 && set->ratio < 2 ? set->ratio : 1.2565; /* a third of an octave */
     double spp[MAX_LEVELS];
@@ -209,7 +216,9 @@ static int simulate_chain(const struct ggn_chains *set, struct ggn_chain *c, con
 
     spp[n++] = SIMULATED_END;
     float *noise = malloc(ggn_chains_values(set) * sizeof *noise);
-    int rc = !noise ? base_fail_nomem(err, "simulated images") : n > c->n_levels ? chain_grow(set, c, n - c->n_levels, err) : 0;
+    int rc = !noise            ? base_fail_nomem(err, "simulated images")
+             : n > c->n_levels ? chain_grow(set, c, n - c->n_levels, err)
+                               : 0;
     if (!rc) {
         c->n_levels = n;
         c->simulated = 1;
@@ -232,7 +241,8 @@ int ggn_chains_extend(struct ggn_chains *set, uint32_t seed, struct base_err *er
         int usable = 0;
         double last = c->n_levels ? c->spp[c->n_levels - 1] : 0;
         /* not where a clean end is recorded already, nor where nothing is known beyond it */
-        if (c->synthetic || !c->has_label || c->label.threshold < CLEAN_END * last || (c->label.censored && c->label.threshold <= last))
+        if (c->synthetic || !c->has_label || c->label.threshold < CLEAN_END * last ||
+            (c->label.censored && c->label.threshold <= last))
             continue;
         rc = read_source(set, c, &s, &usable, err);
         if (!rc && usable)

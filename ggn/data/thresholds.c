@@ -98,7 +98,8 @@ int ggn_thresholds_parse_csv(const char *path, char *text, struct ggn_thresholds
         line[strcspn(line, "\r")] = '\0';
         if (line[0] == '\0' || line[0] == '#')
             continue;
-        rc = t.n < MAX_VIEWS ? parse_line(path, number, line, &t, err) : base_fail(err, BASE_EINVAL, "%s: too many lines", path);
+        rc = t.n < MAX_VIEWS ? parse_line(path, number, line, &t, err)
+                             : base_fail(err, BASE_EINVAL, "%s: too many lines", path);
     }
     if (!rc && t.n == 0)
         rc = base_fail(err, BASE_EINVAL, "%s: no thresholds in it", path);

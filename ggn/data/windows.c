@@ -16,7 +16,8 @@ void ggn_windows_release(struct ggn_windows *w)
 }
 
 /* Whether the window that ends at `last` has a label, and which. */
-static int label_window(const struct ggn_chain *c, int chain, int last, const struct ggn_window_options *o, struct ggn_window *out)
+static int label_window(const struct ggn_chain *c, int chain, int last, const struct ggn_window_options *o,
+                        struct ggn_window *out)
 {
     double spp = c->spp[o->label_first ? last - o->length + 1 : last];
     int noisy = c->has_label ? ggn_label_noisy(&c->label, spp) : -1;
@@ -29,7 +30,8 @@ static int label_window(const struct ggn_chain *c, int chain, int last, const st
     return 1;
 }
 
-int ggn_windows_create(struct ggn_windows *w, const struct ggn_chains *set, const struct ggn_window_options *o, struct base_err *err)
+int ggn_windows_create(struct ggn_windows *w, const struct ggn_chains *set, const struct ggn_window_options *o,
+                       struct base_err *err)
 {
     size_t room = 1;
 
@@ -120,7 +122,7 @@ int ggn_windows_draw(const struct ggn_windows *w, uint64_t step, int i, uint32_t
     return w->first[chain] + chosen;
 }
 
-/* --- pixels -------------------------------------------------------------------------------------------------------------- */
+/* --- pixels --- */
 
 struct ggn_augment ggn_augment_none(void)
 {
@@ -168,7 +170,8 @@ static struct row_map map_row(const struct ggn_augment *a, int width, int height
     return m;
 }
 
-static void plane_u8(const uint8_t *src, int width, int height, const struct ggn_augment *a, const float table[256], float *out)
+static void plane_u8(const uint8_t *src, int width, int height, const struct ggn_augment *a, const float table[256],
+                     float *out)
 {
     for (int y = 0; y < height; y++) {
         struct row_map m = map_row(a, width, height, y);
@@ -178,7 +181,8 @@ static void plane_u8(const uint8_t *src, int width, int height, const struct ggn
 }
 
 /* A denoised value between two codes is interpolated between what the gain makes of them. */
-static void plane_u16(const uint16_t *src, int width, int height, const struct ggn_augment *a, const float table[256], float *out)
+static void plane_u16(const uint16_t *src, int width, int height, const struct ggn_augment *a, const float table[256],
+                      float *out)
 {
     for (int y = 0; y < height; y++) {
         struct row_map m = map_row(a, width, height, y);

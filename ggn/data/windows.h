@@ -47,7 +47,8 @@ struct ggn_augment {
     float gain[3];                 /* linear light */
 };
 struct ggn_augment ggn_augment_none(void);
-/* Flips and rotations, exposure up to ±jitter/2 octaves, white balance up to ±jitter/8: little enough for the label to hold. */
+/* Flips and rotations, exposure up to ±jitter/2 octaves, white balance up to ±jitter/8: little enough for the label to hold.
+ */
 struct ggn_augment ggn_augment_draw(uint64_t step, int i, uint32_t seed, int square, double jitter);
 
 /* The input planes of M for one window, gap-free [3·S][H][W] in 0..1. `difference` > 0: the images before the last one hold

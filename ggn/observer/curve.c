@@ -6,6 +6,8 @@
 
 #include "observer/visibility.h"
 
+const char *const ggn_curve_sources[] = {"halves", "levels", NULL};
+
 /* Simulated levels: GGN_CURVE_CAP and quarter octaves below it, down to about 5 spp. */
 enum { SIMULATED = 45 };
 

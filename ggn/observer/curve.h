@@ -17,6 +17,7 @@
 enum { GGN_CURVE_CAP = 10000 }; /* spp; where the people of SIN3D stopped looking */
 
 enum ggn_curve_source { GGN_FROM_HALVES, GGN_FROM_LEVELS };
+extern const char *const ggn_curve_sources[]; /* "halves", "levels", NULL */
 
 struct ggn_curve {
     int n, recorded;       /* levels; the first so many are recorded ones */

@@ -77,10 +77,11 @@ static const struct base_options options = {
     .args_max = SPECS_MAX,
     .args = offsetof(struct arguments, specs),
     .arg_count = offsetof(struct arguments, spec_count),
-    .doc = "Holds stopping criteria against the whole contract of lull/criterion.h."
-           "\vCRITERION is NAME (looked for in LULL_PLUGIN_PATH and in lib/lull beside this program), PATH (every criterion of "
-           "the library) or PATH:ID. Each check runs in a process of its own; the output is TAP.\n\n"
-           "Exit status: 0 all checks passed, 1 one failed, 2 wrong usage or no such criterion."};
+    .doc =
+        "Holds stopping criteria against the whole contract of lull/criterion.h."
+        "\vCRITERION is NAME (looked for in LULL_PLUGIN_PATH and in lib/lull beside this program), PATH (every criterion of "
+        "the library) or PATH:ID. Each check runs in a process of its own; the output is TAP.\n\n"
+        "Exit status: 0 all checks passed, 1 one failed, 2 wrong usage or no such criterion."};
 
 /* --- finding -------------------------------------------------------------------------------------------------------------
  */
