@@ -75,7 +75,8 @@ static int mirror(int i, int n)
 }
 
 /* out = sum of taps[|x|..] products, separable, radius 1 or 2. */
-static void separable(const double *in, double *tmp, double *out, int w, int h, const double *taps, int r, enum border border)
+static void separable(const double *in, double *tmp, double *out, int w, int h, const double *taps, int r,
+                      enum border border)
 {
     size_t step = (size_t)w;
     for (int y = 0; y < h; y++)
@@ -163,8 +164,8 @@ static double shrink(double v, double threshold)
     return v > threshold ? v - threshold : v < -threshold ? v + threshold : 0.0;
 }
 
-/* One level of the orthonormal 2-D Haar transform with soft, universal thresholds (Donoho & Johnstone 1994), sigma from the median of the
- * diagonal details. An odd last row or column stays as it is. scratch: one plane. */
+/* One level of the orthonormal 2-D Haar transform with soft, universal thresholds (Donoho & Johnstone 1994), sigma from the
+ * median of the diagonal details. An odd last row or column stays as it is. scratch: one plane. */
 static void haar(const double *in, double *out, double *scratch, int w, int h)
 {
     size_t step = (size_t)w, n = 0;

@@ -66,8 +66,8 @@ static int fill_block(void *data, int index, int worker, struct base_err *err)
 }
 
 static int make_table(struct table *t, const struct ggn_eval_set *s, int n,
-                      int (*make)(const double *, int, int, int, double *, struct base_err *), int parameter, struct base_threads *threads,
-                      struct base_err *err)
+                      int (*make)(const double *, int, int, int, double *, struct base_err *), int parameter,
+                      struct base_threads *threads, struct base_err *err)
 {
     struct job j = {s, t, make, parameter};
     *t = (struct table){.n = n, .first = malloc((size_t)s->n_blocks * sizeof *t->first)};
@@ -92,7 +92,8 @@ static const double *row_of(const struct table *t, const struct ggn_eval_set *s,
 
 /* --- SVMs --- */
 
-static struct ggn_svm *train_svm(const struct table *t, const struct ggn_eval_set *s, enum ggn_split split, struct base_err *err)
+static struct ggn_svm *train_svm(const struct table *t, const struct ggn_eval_set *s, enum ggn_split split,
+                                 struct base_err *err)
 {
     double *x = malloc((s->n > 0 ? s->n : 1) * (size_t)t->n * sizeof *x);
     unsigned char *label = malloc(s->n > 0 ? s->n : 1);
@@ -118,7 +119,8 @@ out:
     return svm;
 }
 
-static int svm_method(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, const char *name, const struct table *t, struct base_err *err)
+static int svm_method(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, const char *name,
+                      const struct table *t, struct base_err *err)
 {
     struct ggn_svm *svm = train_svm(t, s, split, err);
     if (!svm)
@@ -136,7 +138,8 @@ static int svm_method(struct ggn_method *m, const struct ggn_eval_set *s, enum g
     return rc;
 }
 
-int ggn_method_attributes_svm(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, struct base_threads *threads, struct base_err *err)
+int ggn_method_attributes_svm(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split,
+                              struct base_threads *threads, struct base_err *err)
 {
     struct table t;
     int rc = make_table(&t, s, GGN_ATTRIBUTES, make_attributes, 0, threads, err);
@@ -147,7 +150,8 @@ int ggn_method_attributes_svm(struct ggn_method *m, const struct ggn_eval_set *s
     return rc;
 }
 
-int ggn_method_mask_svm(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, struct base_threads *threads, struct base_err *err)
+int ggn_method_mask_svm(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split,
+                        struct base_threads *threads, struct base_err *err)
 {
     struct table t;
     int rc = make_table(&t, s, GGN_MASK_FEATURES, make_mask, 0, threads, err);
@@ -166,7 +170,8 @@ static const double *window_of(const struct table *t, const struct ggn_eval_set 
     return t->x + (t->first[b] + (i - s->blocks[b].first)) * (size_t)t->n;
 }
 
-static int train_lstm(struct ggn_lstm *lstm, const struct table *t, const struct ggn_eval_set *s, enum ggn_split split, int epochs, struct base_err *err)
+static int train_lstm(struct ggn_lstm *lstm, const struct table *t, const struct ggn_eval_set *s, enum ggn_split split,
+                      int epochs, struct base_err *err)
 {
     const double **windows = malloc((s->n > 0 ? s->n : 1) * sizeof *windows);
     unsigned char *label = malloc(s->n > 0 ? s->n : 1);
@@ -193,8 +198,8 @@ out:
     return rc;
 }
 
-int ggn_method_svd_lstm(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, int first, int epochs, struct base_threads *threads,
-                        struct base_err *err)
+int ggn_method_svd_lstm(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, int first, int epochs,
+                        struct base_threads *threads, struct base_err *err)
 {
     struct table t;
     int count = ggn_svd_entropy_count(s->chains.width, s->chains.height), rc;

@@ -12,7 +12,8 @@ static const float dropout = 0.4f;
 
 struct layer {
     int in, out;
-    size_t w, u, b;  /* offsets of W [4·out, in], U [4·out, out], b [4·out] in the parameters; gates in the order i, f, g, o */
+    size_t w, u, b;  /* offsets of W [4·out, in], U [4·out, out], b [4·out] in the parameters; gates in the order i, f, g, o
+                        */
     float *z;        /* [steps][BATCH][4·out]: gates after their activation; then d loss / d pre-activation */
     float *c, *s, *h; /* [steps][BATCH][out]: cell, sigmoid(cell), output (before dropout) */
     float *x;        /* [steps][BATCH][in]: what came in (after dropout) */
@@ -158,10 +159,11 @@ static void forward_step(const struct ggn_lstm *l, const struct layer *y, int t,
     const float *x = y->x + (size_t)t * BATCH * (size_t)y->in;
     for (int r = 0; r < batch; r++)
         memcpy(z + (size_t)r * 4 * (size_t)out, l->p + y->b, 4 * (size_t)out * sizeof *z);
-    cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasTrans, batch, 4 * out, y->in, 1.0f, x, y->in, l->p + y->w, y->in, 1.0f, z, 4 * out);
+    cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasTrans, batch, 4 * out, y->in, 1.0f, x, y->in, l->p + y->w, y->in, 1.0f, z,
+                4 * out);
     if (t > 0)
-        cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasTrans, batch, 4 * out, out, 1.0f, y->h + (size_t)(t - 1) * BATCH * (size_t)out, out,
-                    l->p + y->u, out, 1.0f, z, 4 * out);
+        cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasTrans, batch, 4 * out, out, 1.0f,
+                    y->h + (size_t)(t - 1) * BATCH * (size_t)out, out, l->p + y->u, out, 1.0f, z, 4 * out);
     for (int r = 0; r < batch; r++)
         for (int k = 0; k < out; k++) {
             float *g = z + (size_t)r * 4 * (size_t)out + (size_t)k;
@@ -187,7 +189,8 @@ static void forward(struct ggn_lstm *l, int batch, int training, float *logit)
             forward_step(l, y, t, batch);
         l->calls += training != 0;
         for (size_t i = 0; i < n; i++)
-            y->mask[i] = !training ? 1.0f : uniform((uint32_t)i, l->seed + 1000 + l->calls) < dropout ? 0.0f : 1.0f / (1.0f - dropout);
+            y->mask[i] = !training ? 1.0f : uniform((uint32_t)i,
+                                                    l->seed + 1000 + l->calls) < dropout ? 0.0f : 1.0f / (1.0f - dropout);
         for (size_t i = 0; i < n && k + 1 < LAYERS; i++)
             l->layers[k + 1].x[i] = y->h[i] * y->mask[i];
     }
@@ -206,7 +209,8 @@ static float hard_slope(float y)
     return y > 0.0f && y < 1.0f ? 0.2f : 0.0f;
 }
 
-/* One step back: dh (in l->dh) and dc (in l->dc) come from step t+1 and leave for t-1; z becomes d loss / d pre-activation. */
+/* One step back: dh (in l->dh) and dc (in l->dc) come from step t+1 and leave for t-1; z becomes d loss / d pre-activation.
+ * */
 static void backward_step(struct ggn_lstm *l, struct layer *y, int t, int batch)
 {
     int out = y->out;
@@ -226,7 +230,8 @@ static void backward_step(struct ggn_lstm *l, struct layer *y, int t, int batch)
         }
     const float *x = y->x + (size_t)t * BATCH * (size_t)y->in;
     /* dW += dZᵀ·X, dU += dZᵀ·H₋, dX = dZ·W, dH₋ = dZ·U */
-    cblas_sgemm(CblasRowMajor, CblasTrans, CblasNoTrans, 4 * out, y->in, batch, 1.0f, z, 4 * out, x, y->in, 1.0f, l->grad + y->w, y->in);
+    cblas_sgemm(CblasRowMajor, CblasTrans, CblasNoTrans, 4 * out, y->in, batch, 1.0f, z, 4 * out, x, y->in, 1.0f,
+                l->grad + y->w, y->in);
     cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, batch, y->in, 4 * out, 1.0f, z, 4 * out, l->p + y->w, y->in, 0.0f,
                 y->dx + (size_t)t * BATCH * (size_t)y->in, y->in);
     for (int r = 0; r < batch; r++)
@@ -234,9 +239,10 @@ static void backward_step(struct ggn_lstm *l, struct layer *y, int t, int batch)
             l->grad[y->b + (size_t)k] += z[(size_t)r * 4 * (size_t)out + (size_t)k];
     if (t == 0)
         return;
-    cblas_sgemm(CblasRowMajor, CblasTrans, CblasNoTrans, 4 * out, out, batch, 1.0f, z, 4 * out, y->h + (size_t)(t - 1) * BATCH * (size_t)out, out,
-                1.0f, l->grad + y->u, out);
-    cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, batch, out, 4 * out, 1.0f, z, 4 * out, l->p + y->u, out, 0.0f, l->dh, out);
+    cblas_sgemm(CblasRowMajor, CblasTrans, CblasNoTrans, 4 * out, out, batch, 1.0f, z, 4 * out,
+                y->h + (size_t)(t - 1) * BATCH * (size_t)out, out, 1.0f, l->grad + y->u, out);
+    cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, batch, out, 4 * out, 1.0f, z, 4 * out, l->p + y->u, out, 0.0f,
+                l->dh, out);
 }
 
 /* Gradients of the sum over the batch of d[r]·logit[r]. */
@@ -294,7 +300,8 @@ static double cross_entropy(double z, int y)
     return fmax(z, 0.0) - y * z + log1p(exp(-fabs(z)));
 }
 
-double ggn_lstm_epoch(struct ggn_lstm *l, const double *const *sequences, const unsigned char *label, size_t n, uint32_t epoch)
+double ggn_lstm_epoch(struct ggn_lstm *l, const double *const *sequences, const unsigned char *label, size_t n,
+                      uint32_t epoch)
 {
     float logit[BATCH], d[BATCH];
     double loss = 0.0, positive = 0.0;
@@ -310,7 +317,8 @@ double ggn_lstm_epoch(struct ggn_lstm *l, const double *const *sequences, const 
         order[i - 1] = order[j];
         order[j] = keep;
     }
-    double weight[2] = {positive < (double)n ? 0.5 * (double)n / ((double)n - positive) : 0.0, positive > 0.0 ? 0.5 * (double)n / positive : 0.0};
+    double weight[2] = {positive < (double)n ? 0.5 * (double)n / ((double)n - positive) : 0.0,
+                        positive > 0.0 ? 0.5 * (double)n / positive : 0.0};
     for (size_t at = 0; at < n; at += BATCH) {
         int batch = n - at < BATCH ? (int)(n - at) : BATCH;
         for (int r = 0; r < batch; r++)

@@ -66,7 +66,8 @@ static int take_over(struct ggn_svm *svm, const struct svm_model *model, const d
     return 0;
 }
 
-struct ggn_svm *ggn_svm_train(const double *x, const unsigned char *label, size_t n, int features, double c, double gamma, struct base_err *err)
+struct ggn_svm *ggn_svm_train(const double *x, const unsigned char *label, size_t n, int features, double c, double gamma,
+                              struct base_err *err)
 {
     size_t d = (size_t)features, positive = 0;
     struct ggn_svm *svm = calloc(1, sizeof *svm);
@@ -98,7 +99,8 @@ struct ggn_svm *ggn_svm_train(const double *x, const unsigned char *label, size_
     int labels[2] = {1, 0};
     double weights[2] = {0.5 * (double)n / (double)positive, 0.5 * (double)n / (double)(n - positive)};
     struct svm_problem problem = {.l = (int)n, .y = y, .x = rows};
-    struct svm_parameter parameter = {.svm_type = C_SVC, .kernel_type = RBF, .gamma = svm->gamma, .C = c, .cache_size = 100, .eps = 1e-3, .shrinking = 1,
+    struct svm_parameter parameter = {.svm_type = C_SVC, .kernel_type = RBF, .gamma = svm->gamma, .C = c, .cache_size = 100,
+                                      .eps = 1e-3, .shrinking = 1,
                                       .nr_weight = 2, .weight_label = labels, .weight = weights};
     svm_set_print_string_function(be_quiet);
     struct svm_model *model = svm_train(&problem, &parameter);

@@ -16,7 +16,8 @@ void ggn_pairing_release(struct ggn_pairing *p)
 }
 
 /* The model's view that goes with truth->views[i], or NULL. */
-static const struct ggn_view *partner(const struct ggn_thresholds *truth, int i, const struct ggn_thresholds *model, const char *view)
+static const struct ggn_view *partner(const struct ggn_thresholds *truth, int i, const struct ggn_thresholds *model,
+                                      const char *view)
 {
     const struct ggn_view *t = &truth->views[i];
     if (view && model->n == 1)
@@ -59,7 +60,8 @@ int ggn_pairing_init(struct ggn_pairing *out, const struct ggn_thresholds *truth
             }
     }
     if (p.n == 0)
-        rc = base_fail(err, BASE_EINVAL, view ? "no view called '%s' to compare" : "no view has the same name on both sides%s",
+        rc = base_fail(err, BASE_EINVAL,
+                       view ? "no view called '%s' to compare" : "no view has the same name on both sides%s",
                       view ? view : " (--view NAME names the partner of a single view)");
 out:
     if (rc) {
@@ -140,17 +142,20 @@ int ggn_plot_scatter(const char *path, const double *truth, const double *model,
     for (size_t i = 0; i < n; i++)
         fprintf(s, "%.6g %.6g\n", truth[i], model[i]);
     fputs("EOD\nstats $d using (log($1)/log(2)) nooutput name 'X'\nstats $d using (log($2)/log(2)) nooutput name 'Y'\n"
-          "lo=2**(floor((X_min<Y_min?X_min:Y_min)*4)/4.0-0.05)\nhi=2**(ceil((X_max>Y_max?X_max:Y_max)*4)/4.0+0.05)\nset xrange [lo:hi]\n"
+          "lo=2**(floor((X_min<Y_min?X_min:Y_min)*4)/4.0-0.05)\nhi=2**(ceil((X_max>Y_max?X_max:Y_max)*4)/4.0+0.05)\n"
+          "set xrange [lo:hi]\n"
           "set yrange [lo:hi]\nset xtics (20,50,100,200,500,1000,2000,5000,10000,20000,50000,100000)\n"
           "set ytics (20,50,100,200,500,1000,2000,5000,10000,20000,50000,100000)\n"
-          "plot x lc '#444444' lw 1 title 'equal', 2*x dt 2 lc '#999999' title 'one octave', x/2 dt 2 lc '#999999' notitle", s);
+          "plot x lc '#444444' lw 1 title 'equal', 2*x dt 2 lc '#999999' title 'one octave', x/2 dt 2 lc '#999999' notitle",
+              s);
     if (!isnan(b))
         fprintf(s, ", 2**(%.9g + %.9g*log(x)/log(2)) lc '#d95f02' lw 2 title 'regression in log2, r = %.3f'", a, b, r);
     fputs(", $d with points pt 7 ps 0.6 lc '#801f77b4' title 'blocks'\n", s);
     return ggn_plot_end(&plot, 1, err);
 }
 
-int ggn_plot_errors(const char *path, const double *truth, const double *model, size_t n, const char *title, struct base_err *err)
+int ggn_plot_errors(const char *path, const double *truth, const double *model, size_t n, const char *title,
+                    struct base_err *err)
 {
     struct ggn_plot plot;
     int rc = ggn_plot_begin(&plot, path, 760, 480, err);
@@ -160,9 +165,11 @@ int ggn_plot_errors(const char *path, const double *truth, const double *model, 
     fputs("set title ", s);
     ggn_plot_quote(s, title);
     fputs("\nset xlabel 'log2(predicted / true): left of 0 stops early, right of 0 wastes samples'\nset ylabel 'blocks'\n"
-          "bin(x)=floor(x*4+0.5)/4.0\nset boxwidth 0.23\nset style fill solid 0.8 noborder\nset xrange [-4.1:4.1]\nset yrange [0:*]\n"
+          "bin(x)=floor(x*4+0.5)/4.0\nset boxwidth 0.23\nset style fill solid 0.8 noborder\n"
+          "set xrange [-4.1:4.1]\nset yrange [0:*]\n"
           "set arrow 1 from 0, graph 0 to 0, graph 1 nohead lc '#444444' dt 2\n"
-          "set arrow 2 from -0.3219, graph 0 to -0.3219, graph 1 nohead lc '#d62728'\nset label 1 'early stop' at -0.36, graph 0.96 right tc '#d62728'\n$d << EOD\n", s);
+          "set arrow 2 from -0.3219, graph 0 to -0.3219, graph 1 nohead lc '#d62728'\n"
+          "set label 1 'early stop' at -0.36, graph 0.96 right tc '#d62728'\n$d << EOD\n", s);
     for (size_t i = 0; i < n; i++) {
         double e = log2(model[i] / truth[i]);
         fprintf(s, "%.6g\n", e < -4.0 ? -4.0 : e > 4.0 ? 4.0 : e);
@@ -177,7 +184,8 @@ static int columns_of(const struct ggn_pair *p)
     return c > 0 ? c : (int)lround(ceil(sqrt((double)p->truth->n)));
 }
 
-int ggn_plot_heatmaps(const char *path, const struct ggn_pairing *p, const char *truth_name, const char *model_name, struct base_err *err)
+int ggn_plot_heatmaps(const char *path, const struct ggn_pairing *p, const char *truth_name, const char *model_name,
+                      struct base_err *err)
 {
     enum { MOST = 100 };
     struct ggn_plot plot;
@@ -216,7 +224,9 @@ int ggn_plot_heatmaps(const char *path, const struct ggn_pairing *p, const char 
         fprintf(s, "\nset xrange [-0.5:%d.5]\nset yrange [%d.5:-0.5]\nset size ratio %g\n%splot ", 2 * columns, rows - 1,
                 (double)rows / (2 * columns + 1), shown > 1 ? "unset colorbox\n" : "");
         for (int side = 0; side < 2; side++)
-            fprintf(s, "%s$v%d_%d using 1:2:($1-0.5):($1+0.5):($2-0.5):($2+0.5):3 with boxxyerror fs solid noborder lc palette notitle",
+            fprintf(s,
+                    "%s$v%d_%d using 1:2:($1-0.5):($1+0.5):($2-0.5):($2+0.5):3 with boxxyerror fs solid noborder lc palette "
+                    "notitle",
                     side > 0 ? ", " : "", v, side);
         for (int side = 0; side < 2 && labels && columns <= 16; side++)
             fprintf(s, ", $v%d_%d using 1:2:(sprintf('%%d',int($3))) with labels font ',%d' tc '#ffffff' notitle", v, side,
@@ -243,7 +253,8 @@ static int write_blocks(const char *path, const struct ggn_pairing *p, struct ba
     return base_file_commit(&out, err);
 }
 
-int ggn_compare_pictures(const char *dir, const struct ggn_pairing *p, const char *truth_name, const char *model_name, struct base_err *err)
+int ggn_compare_pictures(const char *dir, const struct ggn_pairing *p, const char *truth_name, const char *model_name,
+                         struct base_err *err)
 {
     char path[4096];
     int n = snprintf(path, sizeof path, "%s/blocks.csv", dir);

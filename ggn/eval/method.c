@@ -24,7 +24,8 @@ int ggn_eval_count(const struct ggn_eval_set *s, enum ggn_split split)
     return n;
 }
 
-int ggn_method_init(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, int with_scores, struct base_err *err)
+int ggn_method_init(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, int with_scores,
+                    struct base_err *err)
 {
     *m = (struct ggn_method){.passes = 1, .cut = (double)NAN};
     snprintf(m->name, sizeof m->name, "%s", name);
@@ -80,8 +81,8 @@ int ggn_method_scene_mean(struct ggn_method *m, const struct ggn_eval_set *s, st
     return rc;
 }
 
-static int from_columns(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, const double *score, const double *unsettled,
-                        int *available, struct base_err *err)
+static int from_columns(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, const double *score,
+                        const double *unsettled, int *available, struct base_err *err)
 {
     int rc = ggn_method_init(m, s, name, 1, err);
     *available = 1;
@@ -112,7 +113,8 @@ int ggn_method_variance(struct ggn_method *m, const struct ggn_eval_set *s, int 
     return from_columns(m, s, "variance", s->rse, s->rse_unsettled, available, err);
 }
 
-int ggn_method_scores(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, const double *score, struct base_err *err)
+int ggn_method_scores(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, const double *score,
+                      struct base_err *err)
 {
     int rc = ggn_method_init(m, s, name, 1, err);
     if (!rc)
@@ -140,7 +142,8 @@ static double stop_of(const struct ggn_method *m, const struct ggn_eval_set *s, 
 {
     struct ggn_stopper row = {0};
     for (size_t i = b->first; i < b->end; i++)
-        if (!isnan(ggn_method_verdict(m, i)) && ggn_stopper_pass(&row, m->passes, ggn_method_verdict(m, i) < cut) && !is_held(m, i, limit))
+        if (!isnan(ggn_method_verdict(m, i)) && ggn_stopper_pass(&row, m->passes, ggn_method_verdict(m, i) < cut) &&
+            !is_held(m, i, limit))
             return s->spp[i];
     return b->cap;
 }
@@ -158,7 +161,8 @@ static int compare_doubles(const void *a, const void *b)
 }
 
 /* Early stops and samples of one cut on a split. */
-static void cost_of(const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, double cut, double limit, double *early, double *samples)
+static void cost_of(const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, double cut, double limit,
+                    double *early, double *samples)
 {
     double n = 0.0;
     *early = *samples = 0.0;
@@ -174,7 +178,8 @@ static void cost_of(const struct ggn_method *m, const struct ggn_eval_set *s, en
     *early /= n;
 }
 
-int ggn_method_tune(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, double early_rate, struct base_err *err)
+int ggn_method_tune(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, double early_rate,
+                    struct base_err *err)
 {
     enum { TRIES = 400 };
     size_t n = 0;
@@ -197,7 +202,8 @@ int ggn_method_tune(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn
             double cut = k == TRIES ? nextafter(scores[n - 1], INFINITY) : scores[(size_t)k * n / TRIES], early, samples;
             cost_of(m, s, split, cut, limits[g], &early, &samples);
             int fits = early <= early_rate, fitted = best_early <= early_rate;
-            if (fits != fitted ? fits : (fits ? samples < best_samples : early < best_early || (early == best_early && samples < best_samples))) {
+            if (fits != fitted ? fits : (fits ? samples < best_samples : early < best_early ||
+                                         (early == best_early && samples < best_samples))) {
                 best_early = early;
                 best_samples = samples;
                 m->cut = cut;
@@ -220,7 +226,8 @@ size_t ggn_method_stop_case(const struct ggn_method *m, const struct ggn_eval_se
 
 /* --- figures --- */
 
-static int score_figures(const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, struct ggn_method_metrics *out, struct base_err *err)
+static int score_figures(const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split,
+                         struct ggn_method_metrics *out, struct base_err *err)
 {
     double *score = malloc((s->n > 0 ? s->n : 1) * sizeof *score), sum = 0.0, cut;
     unsigned char *label = malloc(s->n > 0 ? s->n : 1);
@@ -231,7 +238,8 @@ static int score_figures(const struct ggn_method *m, const struct ggn_eval_set *
         double auc;
         for (int b = 0; b < s->n_blocks; b++)
             for (size_t i = s->blocks[b].first; i < s->blocks[b].end; i++)
-                if (s->blocks[b].split == split && (scene < 0 || s->blocks[b].scene == scene) && s->noisy[i] >= 0 && !isnan(m->score[i])) {
+                if (s->blocks[b].split == split && (scene < 0 || s->blocks[b].scene == scene) && s->noisy[i] >= 0 &&
+                    !isnan(m->score[i])) {
                     label[n] = (unsigned char)s->noisy[i];
                     score[n++] = m->score[i];
                 }
@@ -254,7 +262,8 @@ static int score_figures(const struct ggn_method *m, const struct ggn_eval_set *
     return rc;
 }
 
-static int threshold_figures(const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, struct ggn_method_metrics *out, struct base_err *err)
+static int threshold_figures(const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split,
+                             struct ggn_method_metrics *out, struct base_err *err)
 {
     double *t = malloc(2 * (size_t)s->n_blocks * sizeof *t), early = 0.0, spent = 0.0, needed = 0.0;
     size_t n = 0;
@@ -282,7 +291,8 @@ static int threshold_figures(const struct ggn_method *m, const struct ggn_eval_s
 }
 
 /* Smallest number of samples everywhere at which no block of the split is worse than `worst`. */
-static void uniform_figures(const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, struct ggn_method_metrics *out)
+static void uniform_figures(const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split,
+                            struct ggn_method_metrics *out)
 {
     double need = 0.0, spent = 0.0, time = 0.0, uniform = 0.0, uniform_time = 0.0;
     for (int b = 0; b < s->n_blocks; b++) {
@@ -311,7 +321,8 @@ static void uniform_figures(const struct ggn_method *m, const struct ggn_eval_se
     out->time_vs_uniform = time / uniform_time;
 }
 
-static void quality_figures(const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, struct ggn_method_metrics *out)
+static void quality_figures(const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split,
+                            struct ggn_method_metrics *out)
 {
     double flip = 0.0, ssim = 0.0;
     out->flip_worst = -INFINITY;
@@ -333,15 +344,18 @@ static void quality_figures(const struct ggn_method *m, const struct ggn_eval_se
         uniform_figures(m, s, split, out);
 }
 
-int ggn_method_measure(const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, struct ggn_method_metrics *out,
-                       struct base_err *err)
+int ggn_method_measure(const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split,
+                       struct ggn_method_metrics *out, struct base_err *err)
 {
     const double nan = (double)NAN;
-    struct ggn_method_metrics r = {.auc = nan, .auc_scene_mean = nan, .accuracy = nan, .best_accuracy = nan, .uniform_spp = nan,
-                                   .time_vs_uniform = nan, .samples_vs_uniform = nan};
-    r.agreement = (struct ggn_agreement){.pearson_r = nan, .pearson_r_below_cap = nan, .spearman = nan, .spearman_below_cap = nan, .mae = nan,
-                                         .mae_below_cap = nan, .rmse = nan, .share_below = nan, .early_stop_rate = nan, .samples_ratio = nan,
-                                         .median_abs_log2 = nan, .median_log2 = nan, .iqr_log2 = nan, .within_half = nan, .within_one = nan};
+    struct ggn_method_metrics r = {.auc = nan, .auc_scene_mean = nan, .accuracy = nan, .best_accuracy = nan,
+                                   .uniform_spp = nan, .time_vs_uniform = nan, .samples_vs_uniform = nan};
+    r.agreement = (struct ggn_agreement){.pearson_r = nan, .pearson_r_below_cap = nan, .spearman = nan,
+                                         .spearman_below_cap = nan, .mae = nan,
+                                         .mae_below_cap = nan, .rmse = nan, .share_below = nan, .early_stop_rate = nan,
+                                         .samples_ratio = nan,
+                                         .median_abs_log2 = nan, .median_log2 = nan, .iqr_log2 = nan, .within_half = nan,
+                                         .within_one = nan};
     r.blocks = ggn_eval_count(s, split);
     if (r.blocks == 0)
         return base_fail(err, BASE_EINVAL, "no labelled block in the split '%s'", ggn_split_names[split]);

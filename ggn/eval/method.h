@@ -1,8 +1,9 @@
 /*
  * Methods that say from an image whether its noise is still seen, and what their decisions are worth.
  *
- * A method gives every case a score (higher: noisier). A block stops at the first case that ends a row of `passes` scores below
- * the cut and that no guard holds back, and never later than its last level. Methods without scores give a stop per block directly.
+ * A method gives every case a score (higher: noisier). A block stops at the first case that ends a row of `passes` scores
+ * below the cut and that no guard holds back, and never later than its last level. Methods without scores give a stop per
+ * block directly.
  */
 #ifndef GGN_EVAL_METHOD_H
 #define GGN_EVAL_METHOD_H
@@ -15,9 +16,11 @@ enum { GGN_METHOD_NAME = 48 };
 struct ggn_method {
     char name[GGN_METHOD_NAME];
     double *score;       /* owns; [cases]; NaN: not judged there. NULL: fixed stops only */
-    double *verdict;     /* owns; [cases]: the scores that stop a block, where those are not all (see data/replay.h); NULL: score */
+    double *verdict;     /* owns; [cases]: the scores that stop a block, where those are not all (see data/replay.h); NULL:
+                            score */
     double *own_guard;   /* owns; NULL unless guard is it */
-    const double *guard; /* own_guard or borrowed from the set; [cases]; the block is held back while it exceeds guard_limit; NULL: none */
+    const double *guard; /* own_guard or borrowed from the set; [cases]; the block is held back while it exceeds guard_limit;
+                            NULL: none */
     double guard_limit;
     int passes;          /* cases in a row below the cut that stop a block, >= 1 */
     double cut;          /* the block goes on while score >= cut */
@@ -27,32 +30,37 @@ struct ggn_method {
 
 void ggn_method_release(struct ggn_method *m);
 
-/* Trivial baselines. score = -spp (looks at no pixel); the median threshold of the training blocks; the mean threshold of the
- * block's own scene (an oracle). GGN_SPLIT_NONE stands for training when there are no training blocks. */
+/* Trivial baselines. score = -spp (looks at no pixel); the median threshold of the training blocks; the mean threshold of
+ * the block's own scene (an oracle). GGN_SPLIT_NONE stands for training when there are no training blocks. */
 int ggn_method_spp(struct ggn_method *m, const struct ggn_eval_set *s, struct base_err *err);
 int ggn_method_constant(struct ggn_method *m, const struct ggn_eval_set *s, struct base_err *err);
 int ggn_method_scene_mean(struct ggn_method *m, const struct ggn_eval_set *s, struct base_err *err);
 /* The criteria of plugin-api/examples from their recorded errors; *available: whether every case has them. */
 int ggn_method_halfbuf(struct ggn_method *m, const struct ggn_eval_set *s, int *available, struct base_err *err);
 int ggn_method_variance(struct ggn_method *m, const struct ggn_eval_set *s, int *available, struct base_err *err);
-/* The criterion `observer`: stops when at most the share `visible` of viewers would still see noise. path: the observer's file, of which
- * views that had a part in the fit get the parameters without them; NULL: built in. */
+/* The criterion `observer`: stops when at most the share `visible` of viewers would still see noise. path: the observer's
+ * file, of which views that had a part in the fit get the parameters without them; NULL: built in. */
 int ggn_method_observer(struct ggn_method *m, const struct ggn_eval_set *s, const char *path, double visible, int *available,
                         struct base_err *err);
-/* Thresholds from a file, matched by the view's name (SIN3D's own names end in _part6); available: it has every view of `split`. Views
- * that it does not have stop at their cap. BASE_EINVAL where a view has another number of thresholds than blocks. */
-int ggn_method_thresholds(struct ggn_method *m, const struct ggn_eval_set *s, const char *path, enum ggn_split split, int *available,
-                          struct base_err *err);
+/* Thresholds from a file, matched by the view's name (SIN3D's own names end in _part6); available: it has every view of
+ * `split`. Views that it does not have stop at their cap. BASE_EINVAL where a view has another number of thresholds than
+ * blocks. */
+int ggn_method_thresholds(struct ggn_method *m, const struct ggn_eval_set *s, const char *path, enum ggn_split split,
+                          int *available, struct base_err *err);
 /* An empty method with room for stops and, if asked, scores. */
-int ggn_method_init(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, int with_scores, struct base_err *err);
+int ggn_method_init(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, int with_scores,
+                    struct base_err *err);
 /* Any other scores: copies score [cases]. */
-int ggn_method_scores(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, const double *score, struct base_err *err);
+int ggn_method_scores(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, const double *score,
+                      struct base_err *err);
 
 /* Sets stop from verdict, guard, passes and cut, as the stopping rule ends (ggn_stopper_pass). */
 void ggn_method_run(struct ggn_method *m, const struct ggn_eval_set *s);
-/* Chooses the cut on the blocks of `split`: the one that spends fewest samples with at most `early_rate` of the blocks stopped below
+/* Chooses the cut on the blocks of `split`: the one that spends fewest samples with at most `early_rate` of the blocks
+ * stopped below
  * 0.8 of their threshold; if none does, the smallest early rate. The limit of a guard is chosen with it. Then runs. */
-int ggn_method_tune(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, double early_rate, struct base_err *err);
+int ggn_method_tune(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, double early_rate,
+                    struct base_err *err);
 
 struct ggn_method_metrics {
     int blocks, censored, scenes;
@@ -68,8 +76,8 @@ struct ggn_method_metrics {
 };
 
 /* BASE_EINVAL when the split has no blocks. Undefined figures are NaN. */
-int ggn_method_measure(const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, struct ggn_method_metrics *out,
-                       struct base_err *err);
+int ggn_method_measure(const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split,
+                       struct ggn_method_metrics *out, struct base_err *err);
 
 /* What is held against the cut in case i; NaN: it was not judged there. */
 double ggn_method_verdict(const struct ggn_method *m, size_t i);

@@ -36,7 +36,8 @@
     X(samples_vs_uniform, "smp/uni", "%.3f", m->samples_vs_uniform) \
     X(time_vs_uniform, "time/uni", "%.3f", m->time_vs_uniform)
 
-static void print_rows(FILE *f, const struct ggn_method *methods, const struct ggn_method_metrics *metrics, int n, int from, int to)
+static void print_rows(FILE *f, const struct ggn_method *methods, const struct ggn_method_metrics *metrics, int n, int from,
+                       int to)
 {
     int column = 0;
     fprintf(f, "%-30s", "");
@@ -68,8 +69,8 @@ void ggn_report_table(FILE *f, const struct ggn_eval_set *s, enum ggn_split spli
                       const struct ggn_method_metrics *metrics, int n)
 {
     (void)s;
-    fprintf(f, "\n%s: %d blocks of %d scenes (%d censored), %zu windows\n", ggn_split_names[split], metrics[0].blocks, metrics[0].scenes,
-            metrics[0].censored, metrics[0].cases);
+    fprintf(f, "\n%s: %d blocks of %d scenes (%d censored), %zu windows\n", ggn_split_names[split], metrics[0].blocks,
+            metrics[0].scenes, metrics[0].censored, metrics[0].cases);
     print_rows(f, methods, metrics, n, 0, 14);
     print_rows(f, methods, metrics, n, 14, 21);
 }
@@ -132,8 +133,8 @@ void ggn_report_json(struct cJSON *to, const struct ggn_method *methods, const s
 
 /* --- pictures --- */
 
-static int picture_path(char path[4096], const char *dir, enum ggn_split split, const char *kind, const struct ggn_method *method, const char *end,
-                        struct base_err *err)
+static int picture_path(char path[4096], const char *dir, enum ggn_split split, const char *kind,
+                        const struct ggn_method *method, const char *end, struct base_err *err)
 {
     char word[GGN_METHOD_NAME] = "";
     size_t n = 0;
@@ -156,7 +157,8 @@ static int by_score_falling(const void *a, const void *b)
     return (x < y) - (x > y);
 }
 
-static int write_roc(FILE *f, const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, struct base_err *err)
+static int write_roc(FILE *f, const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split,
+                     struct base_err *err)
 {
     struct point *p = malloc((s->n > 0 ? s->n : 1) * sizeof *p);
     size_t n = 0, positive = 0, hit = 0, step;
@@ -174,13 +176,15 @@ static int write_roc(FILE *f, const struct ggn_method *m, const struct ggn_eval_
     for (size_t i = 0; i < n; i++) {
         hit += p[i].noisy == 1;
         if (i + 1 == n || (p[i + 1].score != p[i].score && i % step == 0))
-            fprintf(f, "%.5f %.5f\n", n > positive ? (double)(i + 1 - hit) / (double)(n - positive) : 0.0, positive > 0 ? (double)hit / (double)positive : 0.0);
+            fprintf(f, "%.5f %.5f\n", n > positive ? (double)(i + 1 - hit) / (double)(n - positive) : 0.0,
+                    positive > 0 ? (double)hit / (double)positive : 0.0);
     }
     free(p);
     return 0;
 }
 
-static int plot_roc(const char *path, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *methods, int n, struct base_err *err)
+static int plot_roc(const char *path, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *methods,
+                    int n, struct base_err *err)
 {
     struct ggn_plot plot;
     int rc = ggn_plot_begin(&plot, path, 720, 680, err), first = 1;
@@ -193,8 +197,10 @@ static int plot_roc(const char *path, const struct ggn_eval_set *s, enum ggn_spl
         rc = write_roc(plot.script, &methods[i], s, split, err);
         fputs("EOD\n", plot.script);
     }
-    fprintf(plot.script, "set size square\nset xrange [0:1]\nset yrange [0:1]\nset grid\nset key bottom right\nset title 'all windows of the %s scenes pooled'\n"
-                         "set xlabel 'share of converged images called noisy'\nset ylabel 'share of noisy images called noisy'\nplot ", ggn_split_names[split]);
+    fprintf(plot.script, "set size square\nset xrange [0:1]\nset yrange [0:1]\nset grid\nset key bottom right\n"
+                         "set title 'all windows of the %s scenes pooled'\n"
+                         "set xlabel 'share of converged images called noisy'\nset ylabel 'share of noisy images called noisy'\nplot ",
+            ggn_split_names[split]);
     for (int i = 0; i < n; i++)
         if (methods[i].score) {
             fprintf(plot.script, "%s$m%d with lines lw 2 title ", first ? "" : ", ", i);
@@ -210,7 +216,8 @@ static int plot_roc(const char *path, const struct ggn_eval_set *s, enum ggn_spl
 }
 
 /* Score against spp for six blocks spread over the split by threshold; dashed: the threshold. */
-static int plot_scores(const char *path, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *m, struct base_err *err)
+static int plot_scores(const char *path, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *m,
+                       struct base_err *err)
 {
     enum { SHOWN = 6 };
     struct ggn_plot plot;
@@ -229,9 +236,11 @@ static int plot_scores(const char *path, const struct ggn_eval_set *s, enum ggn_
         for (size_t i = b->first; i < b->end; i++)
             if (!isnan(m->score[i]))
                 fprintf(f, "%.0f %.6g\n", s->spp[i], m->score[i]);
-        fprintf(f, "EOD\nset arrow from %.6g, graph 0 to %.6g, graph 1 nohead dt 2 lc '%s'\n", b->label.threshold, b->label.threshold, colours[k]);
+        fprintf(f, "EOD\nset arrow from %.6g, graph 0 to %.6g, graph 1 nohead dt 2 lc '%s'\n", b->label.threshold,
+                b->label.threshold, colours[k]);
     }
-    fputs("set logscale x\nset grid\nset key outside right\nset xlabel 'samples per pixel (dashed: threshold)'\nset ylabel ", f);
+    fputs("set logscale x\nset grid\nset key outside right\nset xlabel 'samples per pixel (dashed: threshold)'\nset ylabel ",
+          f);
     ggn_plot_quote(f, m->name);
     fputs("\nplot ", f);
     for (int k = 0; k < n; k++) {
@@ -261,7 +270,8 @@ static void fill_view(struct ggn_view *v, const struct ggn_eval_set *s, int view
 }
 
 /* Thresholds (stop NULL) or stops of the split's views, for the heat maps. */
-static int make_maps(struct ggn_thresholds *t, const struct ggn_eval_set *s, enum ggn_split split, const double *stop, struct base_err *err)
+static int make_maps(struct ggn_thresholds *t, const struct ggn_eval_set *s, enum ggn_split split, const double *stop,
+                     struct base_err *err)
 {
     *t = (struct ggn_thresholds){.views = calloc((size_t)s->chains.data.n, sizeof *t->views)};
     if (!t->views)
@@ -287,7 +297,7 @@ static int make_maps(struct ggn_thresholds *t, const struct ggn_eval_set *s, enu
     return 0;
 }
 
-/* score: what the method said at the stop; empty where it did not judge. */
+/* score: what the method last said until the stop; empty where it did not judge. */
 static int write_stops(const char *path, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *m,
                        struct base_err *err)
 {
@@ -302,13 +312,17 @@ static int write_stops(const char *path, const struct ggn_eval_set *s, enum ggn_
             continue;
         fprintf(out.file, "%s;%u;%.6g;%d;%.6g;", s->chains.data.views[e->view].name, e->label.id, e->label.threshold,
                 e->label.censored, m->stop[b]);
-        double score = ggn_method_verdict(m, ggn_method_stop_case(m, s, b));
+        size_t i = ggn_method_stop_case(m, s, b);
+        while (i > e->first && isnan(ggn_method_verdict(m, i))) /* a verdict stands until the next check */
+            i--;
+        double score = ggn_method_verdict(m, i);
         fprintf(out.file, isfinite(score) ? "%.17g\n" : "\n", score);
     }
     return base_file_commit(&out, err);
 }
 
-static int method_pictures(const char *dir, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *m, struct base_err *err)
+static int method_pictures(const char *dir, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *m,
+                           struct base_err *err)
 {
     char path[4096];
     struct ggn_thresholds truth = {0}, stops = {0};
@@ -334,7 +348,8 @@ static int method_pictures(const char *dir, const struct ggn_eval_set *s, enum g
     return rc;
 }
 
-int ggn_report_pictures(const char *dir, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *methods, int n, struct base_err *err)
+int ggn_report_pictures(const char *dir, const struct ggn_eval_set *s, enum ggn_split split,
+                        const struct ggn_method *methods, int n, struct base_err *err)
 {
     char path[4096];
     int rc = picture_path(path, dir, split, "roc", NULL, ".png", err);

@@ -10,16 +10,17 @@ struct cJSON;
 
 void ggn_report_table(FILE *f, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *methods,
                       const struct ggn_method_metrics *metrics, int n);
-/* People's views one by one: for each method the median of |log2(stop/threshold)| over blocks whose thresholds are no caps, and the
- * share of blocks stopped below 0.8 of theirs. BASE_ENOMEM only. */
+/* People's views one by one: for each method the median of |log2(stop/threshold)| over blocks whose thresholds are no caps,
+ * and the share of blocks stopped below 0.8 of theirs. BASE_ENOMEM only. */
 int ggn_report_people(FILE *f, const struct ggn_eval_set *s, const struct ggn_method *methods, int n, struct base_err *err);
 /* An object with one member per method; NULL: out of memory. */
 void ggn_report_json(struct cJSON *to, const struct ggn_method *methods, const struct ggn_method_metrics *metrics, int n,
                      int *failed);
 
-/* Pictures of one split into DIR: SPLIT-roc.png, and for each method SPLIT-errors-K.png, SPLIT-scatter-K.png, SPLIT-heatmaps-K.png,
- * SPLIT-score-K.png where it has scores (against spp, with the thresholds), and its stops as SPLIT-stops-K.csv. */
-int ggn_report_pictures(const char *dir, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *methods, int n,
-                        struct base_err *err);
+/* Pictures of one split into DIR: SPLIT-roc.png, and for each method SPLIT-errors-K.png, SPLIT-scatter-K.png,
+ * SPLIT-heatmaps-K.png, SPLIT-score-K.png where it has scores (against spp, with the thresholds), and its stops as
+ * SPLIT-stops-K.csv. */
+int ggn_report_pictures(const char *dir, const struct ggn_eval_set *s, enum ggn_split split,
+                        const struct ggn_method *methods, int n, struct base_err *err);
 
 #endif

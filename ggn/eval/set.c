@@ -51,10 +51,13 @@ static int list_blocks(struct ggn_eval_set *s, int *skipped, struct base_err *er
         if (!c->has_label)
             continue;
         if (c->n_levels < s->window)
-            return base_fail(err, BASE_EINVAL, "%s: %d level%s, a window needs %d", view->dir, c->n_levels, c->n_levels == 1 ? "" : "s", s->window);
+            return base_fail(err, BASE_EINVAL, "%s: %d level%s, a window needs %d", view->dir, c->n_levels,
+                             c->n_levels == 1 ? "" : "s", s->window);
         size_t cases = (size_t)(c->n_levels - s->window + 1);
-        struct ggn_eval_block b = {.chain = i, .view = c->view, .scene = scene_index(d, c->view), .index = manifest_index(&view->manifest, c->block),
-                                   .split = view->split, .label = c->label, .cap = c->spp[c->n_levels - 1], .first = s->n, .end = s->n + cases};
+        struct ggn_eval_block b = {.chain = i, .view = c->view, .scene = scene_index(d, c->view),
+                                   .index = manifest_index(&view->manifest, c->block),
+                                   .split = view->split, .label = c->label, .cap = c->spp[c->n_levels - 1], .first = s->n,
+                                   .end = s->n + cases};
         if (b.label.threshold >= b.cap) {
             b.label.threshold = b.cap;
             b.label.censored = 1;
@@ -70,7 +73,8 @@ static int list_blocks(struct ggn_eval_set *s, int *skipped, struct base_err *er
 static int make_columns(struct ggn_eval_set *s, struct base_err *err)
 {
     enum { COLUMNS = 10 };
-    double **columns[COLUMNS] = {&s->spp, &s->seconds, &s->dammertz, &s->half_unsettled, &s->rse, &s->rse_unsettled, &s->flip, &s->ssim, &s->visible, &s->texture};
+    double **columns[COLUMNS] = {&s->spp, &s->seconds, &s->dammertz, &s->half_unsettled, &s->rse, &s->rse_unsettled,
+                                 &s->flip, &s->ssim, &s->visible, &s->texture};
     double *all = malloc(COLUMNS * s->n * sizeof *all);
     s->noisy = malloc(s->n);
     s->spp = all;
@@ -111,7 +115,8 @@ int ggn_eval_each_block(const struct ggn_eval_set *set, struct base_threads *thr
                         int (*fn)(void *data, int block, int worker, struct base_err *err), void *data, struct base_err *err)
 {
     int n = set->n_blocks, rc = 0;
-    struct each e = {.fn = fn, .data = data, .rc = calloc((size_t)n, sizeof(int)), .errs = calloc((size_t)n, sizeof(struct base_err))};
+    struct each e = {.fn = fn, .data = data, .rc = calloc((size_t)n, sizeof(int)),
+                     .errs = calloc((size_t)n, sizeof(struct base_err))};
     if (!e.rc || !e.errs)
         rc = base_fail_nomem(err, "evaluation");
     else
@@ -181,7 +186,8 @@ out:
     return rc;
 }
 
-/* Share of pixels that the tail guard of halfbuf would call unsettled at `scale` times the last recorded half-buffer difference. */
+/* Share of pixels that the tail guard of halfbuf would call unsettled at `scale` times the last recorded half-buffer
+ * difference. */
 static double unsettled_share(const float *y, const float *d, size_t pixels, double scale)
 {
     size_t n = 0;
@@ -191,7 +197,8 @@ static double unsettled_share(const float *y, const float *d, size_t pixels, dou
 }
 
 /* The criteria's figures beyond the recording, from its last level. */
-static int extrapolate(struct ggn_eval_set *s, const struct ggn_eval_block *block, size_t from, const struct seq_block *p, struct base_err *err)
+static int extrapolate(struct ggn_eval_set *s, const struct ggn_eval_block *block, size_t from, const struct seq_block *p,
+                       struct base_err *err)
 {
     const struct seq_record *last = &p->levels[p->n_levels - 1];
     size_t pixels = (size_t)p->width * p->height;
@@ -220,7 +227,8 @@ static int has_halves(const struct seq_record *r)
 }
 
 /* What the observer sees: at recorded levels from their own halves, at all others from the two of the full level. */
-static int fill_observed(struct ggn_eval_set *s, const struct ggn_eval_block *block, const struct seq_block *p, struct base_err *err)
+static int fill_observed(struct ggn_eval_set *s, const struct ggn_eval_block *block, const struct seq_block *p,
+                         struct base_err *err)
 {
     int simulated = s->chains.chains[block->chain].simulated, rc = 0, known = 0;
     struct ggn_curve curve = {0};
@@ -274,7 +282,8 @@ static int fill_block(void *data, int index, int worker, struct base_err *err)
     return !rc && f->quality && f->set->chains.chains[block->chain].reference ? measure_quality(f->set, block, err) : rc;
 }
 
-/* Continues every labelled chain, also those that training has no use for: a method that does not stop in time must be seen to. */
+/* Continues every labelled chain, also those that training has no use for: a method that does not stop in time must be seen
+ * to. */
 static int extend(struct ggn_chains *chains, uint32_t seed, struct base_err *err)
 {
     struct ggn_label *labels = malloc((size_t)(chains->n > 0 ? chains->n : 1) * sizeof *labels);
@@ -297,7 +306,8 @@ static int extend(struct ggn_chains *chains, uint32_t seed, struct base_err *err
     return rc;
 }
 
-int ggn_eval_set_load(struct ggn_eval_set *out, const struct ggn_eval_options *o, struct base_threads *threads, int *skipped, struct base_err *err)
+int ggn_eval_set_load(struct ggn_eval_set *out, const struct ggn_eval_options *o, struct base_threads *threads, int *skipped,
+                      struct base_err *err)
 {
     struct ggn_eval_set s = {.window = o->window};
     struct ggn_chains_options co = {.dir = o->dir, .ratio = o->ratio, .with_test = 1};

@@ -1,6 +1,6 @@
 /*
- * What is evaluated: every labelled block of a data set at every level a method may judge it ("case"), and how good the image is
- * there. Cases of one block are consecutive and rise in spp.
+ * What is evaluated: every labelled block of a data set at every level a method may judge it ("case"), and how good the
+ * image is there. Cases of one block are consecutive and rise in spp.
  */
 #ifndef GGN_EVAL_SET_H
 #define GGN_EVAL_SET_H
@@ -28,7 +28,8 @@ struct ggn_eval_set {
     double *spp, *seconds;          /* own; [n]; seconds: thread time spent on the block so far, NaN if unknown */
     signed char *noisy;             /* owns; [n]: 1, 0, or -1 unknown */
     double *dammertz, *half_unsettled, *rse, *rse_unsettled; /* own; [n]; NaN where not recorded */
-    double *visible, *texture;      /* own; [n]: what the model observer sees (observer/visibility.h); NaN without half buffers */
+    double *visible, *texture;      /* own; [n]: what the model observer sees (observer/visibility.h); NaN without half
+                                       buffers */
     double *flip, *ssim;            /* own; [n]: against the block's reference; NaN unless asked for */
 };
 
@@ -36,19 +37,22 @@ struct ggn_eval_options {
     const char *dir;  /* data set */
     int window;       /* S */
     int quality;      /* also compute FLIP and SSIM of every case */
-    int recorded;     /* only recorded levels; else each block goes on to about 0.7 of its reference's samples (ggn_chains_extend) */
+    int recorded;     /* only recorded levels; else each block goes on to about 0.7 of its reference's samples
+                         (ggn_chains_extend) */
     double ratio;     /* thin the levels to at least this ratio; 0: keep all */
     uint32_t seed;    /* of the continuation */
 };
 
-/* Blocks without a label are left out; *skipped counts the views without any. BASE_EINVAL if nothing is left. Errors of the criteria at levels beyond
- * the recording are scaled from the last recorded one (by the square root of the samples). The same result for any number of threads. */
-int ggn_eval_set_load(struct ggn_eval_set *set, const struct ggn_eval_options *options, struct base_threads *threads, int *skipped,
-                      struct base_err *err);
+/* Blocks without a label are left out; *skipped counts the views without any. BASE_EINVAL if nothing is left. Errors of the
+ * criteria at levels beyond the recording are scaled from the last recorded one (by the square root of the samples). The
+ * same result for any number of threads. */
+int ggn_eval_set_load(struct ggn_eval_set *set, const struct ggn_eval_options *options, struct base_threads *threads,
+                      int *skipped, struct base_err *err);
 void ggn_eval_set_release(struct ggn_eval_set *set);
 
 /* Calls fn for each block, in parallel; returns the first error (in order of blocks). */
 int ggn_eval_each_block(const struct ggn_eval_set *set, struct base_threads *threads,
-                        int (*fn)(void *data, int block, int worker, struct base_err *err), void *data, struct base_err *err);
+                        int (*fn)(void *data, int block, int worker, struct base_err *err), void *data,
+                        struct base_err *err);
 
 #endif

@@ -35,7 +35,8 @@ static int finish_strips(struct strips *s, const char *path, int width, int heig
     if (!rc && s->n > 0)
         rc = ggn_plot_begin(&plot, path, width, height_each * s->n + 20, err);
     if (!rc && s->n > 0) {
-        fprintf(plot.script, "unset tics\nunset border\nset size ratio -1\nset yrange [] reverse\nset multiplot layout %d,1\n", s->n);
+        fprintf(plot.script, "unset tics\nunset border\nset size ratio -1\nset yrange [] reverse\nset multiplot layout %d,1\n",
+                s->n);
         for (int i = 0; i < s->n; i++) {
             fputs("set title ", plot.script);
             ggn_plot_quote(plot.script, s->title[i]);
@@ -68,8 +69,8 @@ static double ssim_of(struct ggn_ssim *ssim, const float *a, const float *b, siz
     return ggn_ssim_mean(ssim, x, y, NULL, 3, width, 0.0);
 }
 
-static int denoiser_strip(const struct ggn_eval_set *s, const struct ggn_eval_block *b, struct ggn_viewer *v, const char *path,
-                          struct strips *strips, struct base_err *err)
+static int denoiser_strip(const struct ggn_eval_set *s, const struct ggn_eval_block *b, struct ggn_viewer *v,
+                          const char *path, struct strips *strips, struct base_err *err)
 {
     const struct ggn_chain *c = &s->chains.chains[b->chain];
     int w = s->chains.width, h = s->chains.height;
@@ -90,7 +91,8 @@ static int denoiser_strip(const struct ggn_eval_set *s, const struct ggn_eval_bl
             put_tile(strip, 3, k, planes + (size_t)k * values, (size_t)w, (size_t)h);
         snprintf(strips->title[strips->n], sizeof strips->title[0],
                  "%.80s block %u at %.0f spp: SSIM %.3f     denoised: SSIM %.3f     reference",
-                 s->chains.data.views[b->view].name, b->label.id, c->spp[0], ssim_of(ssim, planes, planes + 2 * values, pixels, w),
+                 s->chains.data.views[b->view].name, b->label.id, c->spp[0],
+                 ssim_of(ssim, planes, planes + 2 * values, pixels, w),
                  ssim_of(ssim, planes + values, planes + 2 * values, pixels, w));
         rc = add_strip(strips, path, strip, 3 * w, h, err);
     }
@@ -100,8 +102,8 @@ static int denoiser_strip(const struct ggn_eval_set *s, const struct ggn_eval_bl
     return rc;
 }
 
-int ggn_eval_denoiser_picture(const char *path, const struct ggn_eval_set *s, const struct ggn_model *model, enum ggn_split split,
-                              struct base_err *err)
+int ggn_eval_denoiser_picture(const char *path, const struct ggn_eval_set *s, const struct ggn_model *model,
+                              enum ggn_split split, struct base_err *err)
 {
     struct strips strips = {0};
     struct ggn_viewer v;
@@ -136,7 +138,8 @@ static void put_map(uint8_t *strip, int tiles, int k, const float *a, const floa
 }
 
 /* The window that ends at `level` of a block, as a strip. */
-static int feature_strip(const struct ggn_eval_set *s, const struct ggn_eval_block *b, int level, const struct ggn_policy *policy,
+static int feature_strip(const struct ggn_eval_set *s, const struct ggn_eval_block *b, int level,
+                         const struct ggn_policy *policy,
                          struct ggn_viewer *v, const char *path, struct strips *strips, struct base_err *err)
 {
     const struct ggn_chain *c = &s->chains.chains[b->chain];
@@ -173,8 +176,8 @@ static int feature_strip(const struct ggn_eval_set *s, const struct ggn_eval_blo
     return rc;
 }
 
-int ggn_eval_feature_picture(const char *path, const struct ggn_eval_set *s, const struct ggn_model *model, enum ggn_split split,
-                             struct base_err *err)
+int ggn_eval_feature_picture(const char *path, const struct ggn_eval_set *s, const struct ggn_model *model,
+                             enum ggn_split split, struct base_err *err)
 {
     struct strips strips = {0};
     struct ggn_policy policy;

@@ -6,11 +6,11 @@
 #include "model/model.h"
 
 /* Up to four blocks of the split: the first level, what the denoiser makes of it, and the reference, with their SSIM. */
-int ggn_eval_denoiser_picture(const char *path, const struct ggn_eval_set *s, const struct ggn_model *model, enum ggn_split split,
-                              struct base_err *err);
-/* One block of the split at its first window, the one at its threshold, and its last: the image, the noise feature maps of the
- * denoised and of the noisy window, and how they differ; the probability above each. */
-int ggn_eval_feature_picture(const char *path, const struct ggn_eval_set *s, const struct ggn_model *model, enum ggn_split split,
-                             struct base_err *err);
+int ggn_eval_denoiser_picture(const char *path, const struct ggn_eval_set *s, const struct ggn_model *model,
+                              enum ggn_split split, struct base_err *err);
+/* One block of the split at its first window, the one at its threshold, and its last: the image, the noise feature maps of
+ * the denoised and of the noisy window, and how they differ; the probability above each. */
+int ggn_eval_feature_picture(const char *path, const struct ggn_eval_set *s, const struct ggn_model *model,
+                             enum ggn_split split, struct base_err *err);
 
 #endif

@@ -57,14 +57,16 @@ static int init_method(struct ggn_method *m, const struct ggn_eval_set *s, const
     return 0;
 }
 
-int ggn_eval_trained(struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_model *model, const struct ggn_policy *policy,
+int ggn_eval_trained(struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_model *model,
+                     const struct ggn_policy *policy,
                      const char *name, enum ggn_precision precision, struct base_threads *threads, struct base_err *err)
 {
     int workers = base_threads_count(threads), made = 0, window = model->hyper.window;
     struct run r = {.set = s, .method = m, .rule = {.policy = *policy, .window = window}};
 
     if (window < 2 || window > GGN_WINDOW_MAX)
-        return base_fail(err, BASE_EINVAL, "%s: windows of %d images; evaluation takes 2 to %d", name, window, GGN_WINDOW_MAX);
+        return base_fail(err, BASE_EINVAL, "%s: windows of %d images; evaluation takes 2 to %d", name, window,
+                         GGN_WINDOW_MAX);
     int rc = init_method(m, s, name, policy, err);
     if (rc)
         return rc;

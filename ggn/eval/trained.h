@@ -7,10 +7,11 @@
 #include "model/policy.h"
 
 /*
- * Scores are p_noisy of every window that the policy's cadence makes, for which the network is asked even where the gate would
- * spare it; stops are those of the rule (model/stopper.h, data/replay.h), with gate and guard as the policy says.
+ * Scores are p_noisy of every window that the policy's cadence makes, for which the network is asked even where the gate
+ * would spare it; stops are those of the rule (model/stopper.h, data/replay.h), with gate and guard as the policy says.
  */
-int ggn_eval_trained(struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_model *model, const struct ggn_policy *policy,
+int ggn_eval_trained(struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_model *model,
+                     const struct ggn_policy *policy,
                      const char *name, enum ggn_precision precision, struct base_threads *threads, struct base_err *err);
 
 #endif

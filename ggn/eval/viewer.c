@@ -11,8 +11,8 @@ void ggn_viewer_release(struct ggn_viewer *v)
     *v = (struct ggn_viewer){0};
 }
 
-int ggn_viewer_init(struct ggn_viewer *v, const struct ggn_model *model, enum ggn_precision precision, const struct ggn_chains *set,
-                    struct base_err *err)
+int ggn_viewer_init(struct ggn_viewer *v, const struct ggn_model *model, enum ggn_precision precision,
+                    const struct ggn_chains *set, struct base_err *err)
 {
     size_t values = ggn_chains_values(set);
     int levels = 1;

@@ -21,8 +21,8 @@ struct ggn_viewer {
     struct ggn_viewed *known;           /* owns; [levels]: the last window that ended there */
 };
 
-int ggn_viewer_init(struct ggn_viewer *v, const struct ggn_model *model, enum ggn_precision precision, const struct ggn_chains *set,
-                    struct base_err *err);
+int ggn_viewer_init(struct ggn_viewer *v, const struct ggn_model *model, enum ggn_precision precision,
+                    const struct ggn_chains *set, struct base_err *err);
 void ggn_viewer_release(struct ggn_viewer *v);
 
 /* Turns to a block; what was known of the one before is forgotten. */

@@ -1,11 +1,12 @@
 /*
- * The criterion "ggn": a window of the block's last S display images goes through the Guided-Generative Network, whose answer
- * is the probability that the newest image still looks noisy. A block stops after `passes` checks in a row below `threshold`.
+ * The criterion "ggn": a window of the block's last S display images goes through the Guided-Generative Network, whose
+ * answer is the probability that the newest image still looks noisy. A block stops after `passes` checks in a row below
+ * `threshold`.
  *
  * Two cheap statistics stand beside the network. The *gate* compares the window's oldest and newest image: while their
- * difference says that the noise is far above what the model ever called clean in training, the block is plainly noisy and the
- * network is not asked; it says when to ask again. The *tail guard* looks at the half buffer: a block whose noise sits in a few
- * pixels has not met its rare bright paths often enough for any judgement by eye, and is not stopped.
+ * difference says that the noise is far above what the model ever called clean in training, the block is plainly noisy and
+ * the network is not asked; it says when to ask again. The *tail guard* looks at the half buffer: a block whose noise sits
+ * in a few pixels has not met its rare bright paths often enough for any judgement by eye, and is not stopped.
  */
 #include "plugin/ggn.h"
 
@@ -16,19 +17,19 @@
 enum { P_MODEL, P_THRESHOLD, P_PASSES, P_GATE, P_TAIL, P_GINI, P_FIRST_SPP, P_PRECISION, P_COUNT };
 
 static const struct lull_param params[P_COUNT] = {
-    [P_MODEL] = LULL_KIT_FILE("model", NULL, "model file; without it lull-1.ggn beside the criterion, in ../share/lull or in the "
-                                             "source tree"),
+    [P_MODEL] = LULL_KIT_FILE("model", NULL,
+                              "model file; without it lull-1.ggn beside the criterion, in ../share/lull or in the source tree"),
     [P_THRESHOLD] = LULL_KIT_FLOAT("threshold", NULL, 0, 1,
                                    "stop when the probability of visible noise is below this; without it the model's own"),
     [P_PASSES] = LULL_KIT_INT("passes", NULL, 1, 16,
                               "checks in a row that must be below the threshold; without it the model's own"),
     [P_GATE] = LULL_KIT_BOOL("gate", "1", "spare the network while a block is plainly noisy (p_noisy is then not given)"),
     [P_TAIL] = LULL_KIT_FLOAT("tail", NULL, 0, 1e30,
-                              "do not stop while the 99.9th percentile of the half-buffer difference exceeds this many times the "
-                              "mean luminance, 0 = no such guard; without it the model's own"),
+                              "do not stop while the 99.9th percentile of the half-buffer difference exceeds this many times "
+                              "the mean luminance, 0 = no such guard; without it the model's own"),
     [P_GINI] = LULL_KIT_FLOAT("gini", NULL, 0, 2,
-                              "do not stop while the Gini coefficient of the half-buffer difference exceeds this and its tail 0.2, "
-                              "0 = no such guard; without it the model's own"),
+                              "do not stop while the Gini coefficient of the half-buffer difference exceeds this and its tail "
+                              "0.2, 0 = no such guard; without it the model's own"),
     [P_FIRST_SPP] = LULL_KIT_INT("first-spp", NULL, 1, 1e9,
                                  "samples per pixel of the first image of a window; without it the model's own"),
     [P_PRECISION] = LULL_KIT_CHOICE("precision", "f32", "f32|bf16",
@@ -135,7 +136,8 @@ static size_t largest_block(const struct lull_frame *frame)
 }
 
 /* Scratch for as many workers as can be busy. */
-static struct gp_worker *workers_create(const struct lull_instance *in, uint32_t count, size_t pixels, struct lull_error *err)
+static struct gp_worker *workers_create(const struct lull_instance *in, uint32_t count, size_t pixels,
+                                        struct lull_error *err)
 {
     struct base_err error = {.code = BASE_ENOMEM, .text = "out of memory"};
     struct gp_worker *worker = calloc(count, sizeof *worker);
@@ -213,8 +215,8 @@ static int32_t check_block(const struct lull_instance *in, const struct lull_blo
     return LULL_OK;
 }
 
-static void judge(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b, struct lull_decision *d,
-                  uint32_t worker)
+static void judge(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
+                  struct lull_decision *d, uint32_t worker)
 {
     const struct gp_head *head = &in->history.pending[b->id];
     const struct ggn_verdict *v = &head->stopper.verdict;

@@ -28,8 +28,8 @@ struct lull_instance {
     struct gp_worker *worker;
 };
 
-/* Fills in->history.pending[b->id] with the verdict on a checked block; the same block at the same spp again keeps its verdict.
- * Tasks on different blocks may run at the same time, each with its own worker < in->workers. */
+/* Fills in->history.pending[b->id] with the verdict on a checked block; the same block at the same spp again keeps its
+ * verdict. Tasks on different blocks may run at the same time, each with its own worker < in->workers. */
 void gp_verdict(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b, uint32_t worker);
 
 #endif

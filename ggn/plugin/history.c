@@ -158,8 +158,8 @@ static int32_t load_blocks(struct gp_history *h, const struct ggn_stop_rule *rul
     return LULL_OK;
 }
 
-int32_t gp_history_load(struct gp_history *h, const struct ggn_stop_rule *rule, uint32_t key, const struct lull_reader *reader,
-                        struct lull_error *err)
+int32_t gp_history_load(struct gp_history *h, const struct ggn_stop_rule *rule, uint32_t key,
+                        const struct lull_reader *reader, struct lull_error *err)
 {
     struct state_header header, wanted = header_of(h, key);
 

@@ -1,9 +1,9 @@
 /*
  * What the criterion remembers of a frame: for each block the last S images it judged, keyed by spp.
  *
- * One allocation per frame. A block owns S + 1 slots: a new image goes into the spare one and becomes part of the history only
- * when the whole evaluate call has succeeded (gp_history_commit), so that a failed or cancelled call leaves no trace. Tasks on
- * different blocks may run at the same time; nothing else is thread-safe.
+ * One allocation per frame. A block owns S + 1 slots: a new image goes into the spare one and becomes part of the history
+ * only when the whole evaluate call has succeeded (gp_history_commit), so that a failed or cancelled call leaves no trace.
+ * Tasks on different blocks may run at the same time; nothing else is thread-safe.
  */
 #ifndef GGN_PLUGIN_HISTORY_H
 #define GGN_PLUGIN_HISTORY_H
@@ -45,13 +45,13 @@ void gp_history_release(struct gp_history *history);
 uint8_t *gp_history_noisy(const struct gp_history *h, uint32_t id, uint32_t slot);      /* [3][height][width] */
 uint16_t *gp_history_denoised(const struct gp_history *h, uint32_t id, uint32_t slot);  /* [3][height][width] */
 
-/* Makes the spare slot that of the image which head->stopper has just accepted; returns the slot. `before`: images in the window
- * until then. */
+/* Makes the spare slot that of the image which head->stopper has just accepted; returns the slot. `before`: images in the
+ * window until then. */
 uint32_t gp_head_push(struct gp_head *head, int window, uint32_t before);
 
 /* lull.state/1: everything above, checked on the way in. `key` identifies model and parameters. */
 int32_t gp_history_save(const struct gp_history *h, uint32_t key, const struct lull_writer *writer, struct lull_error *err);
-int32_t gp_history_load(struct gp_history *h, const struct ggn_stop_rule *rule, uint32_t key, const struct lull_reader *reader,
-                        struct lull_error *err);
+int32_t gp_history_load(struct gp_history *h, const struct ggn_stop_rule *rule, uint32_t key,
+                        const struct lull_reader *reader, struct lull_error *err);
 
 #endif

@@ -12,7 +12,8 @@
 int gp_model_find(char *path, size_t room)
 {
     /* build/lib/lull and build/MODE/lib/lull lie three and four folders below the tree's root */
-    static const char *const places[] = {".", "../share/lull", "../../share/lull", "../../../ggn/models", "../../../../ggn/models"};
+    static const char *const places[] = {".", "../share/lull", "../../share/lull", "../../../ggn/models",
+                                         "../../../../ggn/models"};
     static const char anchor = 0; /* an address inside this shared object */
     const char *named = getenv("LULL_MODEL");
     char folder[4096] = ".";
@@ -32,7 +33,8 @@ int gp_model_find(char *path, size_t room)
         if (n > 0 && (size_t)n < room && access(path, R_OK) == 0)
             return 1;
     }
-    snprintf(path, room, "no " MODEL_NAME " beside %.200s, in ../share/lull, ../../share/lull or the source tree's ggn/models; "
+    snprintf(path, room, "no " MODEL_NAME " beside %.200s, in ../share/lull, ../../share/lull or the source tree's "
+                         "ggn/models; "
                          "give model=FILE or set LULL_MODEL", info.dli_fname ? info.dli_fname : "the criterion");
     return 0;
 }

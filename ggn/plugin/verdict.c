@@ -3,7 +3,8 @@
 #include "sequence/tail.h"
 
 /* Display codes of the block; returns how many values were broken. */
-static long read_display(const struct lull_instance *in, const struct lull_view *view, const struct lull_block *b, uint8_t *out)
+static long read_display(const struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
+                         uint8_t *out)
 {
     const size_t w = (size_t)(b->x1 - b->x0), plane = w * (size_t)(b->y1 - b->y0);
     struct ggn_pixel_counts counts = {0};

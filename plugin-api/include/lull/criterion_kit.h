@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
  *
- * lull/criterion_kit.h - what every criterion (lull/criterion.h) has to do besides judging: read its parameters, check what the
- * host passes, fill errors, and get estimates out of planes of any type, stride and normaliser.
+ * lull/criterion_kit.h - what every criterion (lull/criterion.h) has to do besides judging: read its parameters, check what
+ * the host passes, fill errors, and get estimates out of planes of any type, stride and normaliser.
  *
  * Not part of the ABI: functions of the criterion's own, compiled into it. C99 and C++11, nothing but the C library. Use as
  * much of it as you like:
@@ -11,8 +11,8 @@
  * - A criterion with memory of its own begins its struct lull_instance with a struct lull_kit, calls lull_kit_create,
  *   lull_kit_frame_check and lull_kit_frame_open, and lull_kit_evaluate from its own functions, and adds what it keeps.
  *
- * Functions that return int32_t return LULL_OK or a LULL_E_ code with *err (may be NULL) filled, and change nothing when they
- * fail. Nothing here has static state or takes a lock; functions on one instance may overlap as criterion.h says.
+ * Functions that return int32_t return LULL_OK or a LULL_E_ code with *err (may be NULL) filled, and change nothing when
+ * they fail. Nothing here has static state or takes a lock; functions on one instance may overlap as criterion.h says.
  */
 #ifndef LULL_CRITERION_KIT_H
 #define LULL_CRITERION_KIT_H
@@ -45,8 +45,9 @@ struct lull_kit_rule {
 struct lull_kit {
     const struct lull_kit_rule *rule;
     const struct lull_host *host;     /* borrows until destroy; may be NULL */
-    double value[LULL_KIT_PARAM_MAX]; /* of the parameters in the table's order: INT, FLOAT, BOOL the number, CHOICE the index of
-                                       * the choice; NaN where there is neither a value nor a default, and for text */
+    /* Of the parameters in the table's order: INT, FLOAT, BOOL the number, CHOICE the index of the choice; NaN where there is
+     * neither a value nor a default, and for text. */
+    double value[LULL_KIT_PARAM_MAX];
     struct lull_requirements need;    /* what requirements answers; the criterion's create may refine it */
 
     /* Of the open frame. */
@@ -211,8 +212,8 @@ static inline int32_t lull_kit_values(const struct lull_criterion *c, const stru
 
 /* --- life ---------------------------------------------------------------------------------------------------------- */
 
-/* Makes an instance of `size` bytes, zero beyond its struct lull_kit, for a criterion of this table; the caller owns it (free).
- * text: see lull_kit_values; may be NULL. */
+/* Makes an instance of `size` bytes, zero beyond its struct lull_kit, for a criterion of this table; the caller owns it
+ * (free). text: see lull_kit_values; may be NULL. */
 static inline int32_t lull_kit_create(const struct lull_kit_rule *rule, const struct lull_criterion *c, size_t size,
                                       const struct lull_host *host, const struct lull_pair *pairs, uint32_t pair_count,
                                       uint32_t pair_stride, const char **text, struct lull_instance **instance,
@@ -246,7 +247,8 @@ static inline void lull_kit_destroy(struct lull_instance *in)
     free(in);
 }
 
-static inline int32_t lull_kit_requirements(const struct lull_instance *in, struct lull_requirements *req, struct lull_error *err)
+static inline int32_t lull_kit_requirements(const struct lull_instance *in, struct lull_requirements *req,
+                                            struct lull_error *err)
 {
     if (!in || !req)
         return lull_kit_fail(err, LULL_E_INVALID, "requirements: an argument is missing");
@@ -279,7 +281,8 @@ static inline const struct lull_rect *lull_kit_rect(const struct lull_frame *fra
 }
 
 /* begin_frame's arguments: sizes, state, required planes, blocks inside the picture. */
-static inline int32_t lull_kit_frame_check(const struct lull_instance *in, const struct lull_frame *frame, struct lull_error *err)
+static inline int32_t lull_kit_frame_check(const struct lull_instance *in, const struct lull_frame *frame,
+                                           struct lull_error *err)
 {
     const struct lull_kit *kit = lull_kit_read_of(in);
     if (!in || !frame)
@@ -386,14 +389,16 @@ static inline double lull_kit_stored(const char *at, int32_t type)
     }
 }
 
-static inline const char *lull_kit_address(const struct lull_view *view, const struct lull_plane *plane, int32_t x, int32_t y)
+static inline const char *lull_kit_address(const struct lull_view *view, const struct lull_plane *plane, int32_t x,
+                                           int32_t y)
 {
     return (const char *)plane->data + ((int64_t)x - view->x0) * plane->stride_x + ((int64_t)y - view->y0) * plane->stride_y;
 }
 
 /* Estimates of `count` pixels of row y from x on, all inside the view and, for their N, of this block: out[pixel][channel].
  * Where there is no estimate (N = 0) comes NaN; where the host stored NaN or an infinity, that. */
-static inline void lull_kit_read(const struct lull_view *view, const struct lull_plane *plane, const struct lull_block *block,
+static inline void lull_kit_read(const struct lull_view *view, const struct lull_plane *plane,
+                                 const struct lull_block *block,
                                  int32_t x, int32_t y, int32_t count, uint32_t channels, double (*out)[3])
 {
     const struct lull_plane *weight = plane->normaliser == LULL_NORM_WEIGHT ? lull_kit_plane(view, LULL_PLANE_WEIGHT) : NULL;
@@ -453,7 +458,8 @@ static inline int lull_kit_span_next(struct lull_kit_span *s)
     s->count = s->block->x1 - s->x < LULL_KIT_SPAN_MAX ? s->block->x1 - s->x : LULL_KIT_SPAN_MAX;
     for (unsigned i = 0; i < LULL_PLANE_COUNT; i++)
         if (s->planes & LULL_PLANE_BIT(i))
-            lull_kit_read(s->view, lull_kit_plane(s->view, i), s->block, s->x, s->y, s->count, lull_kit_channels(i), s->value[i]);
+            lull_kit_read(s->view, lull_kit_plane(s->view, i), s->block, s->x, s->y, s->count, lull_kit_channels(i),
+                          s->value[i]);
     return 1;
 }
 
@@ -473,7 +479,8 @@ static inline double lull_kit_pixels(const struct lull_block *block)
 static inline int lull_kit_form_known(const struct lull_plane *p, unsigned plane)
 {
     return p->type >= LULL_TYPE_F32 && p->type <= LULL_TYPE_U32 && p->normaliser >= LULL_NORM_ONE &&
-           p->normaliser <= LULL_NORM_WEIGHT && p->channels >= lull_kit_channels(plane) && isfinite(p->scale) && p->scale != 0;
+           p->normaliser <= LULL_NORM_WEIGHT && p->channels >= lull_kit_channels(plane) && isfinite(p->scale) &&
+           p->scale != 0;
 }
 
 static inline int32_t lull_kit_plane_check(const struct lull_kit *kit, const struct lull_view *view, unsigned plane,
@@ -531,7 +538,8 @@ static inline int32_t lull_kit_batch_check(const struct lull_kit_batch *b, struc
         const struct lull_block *block = (const struct lull_block *)lull_kit_at(b->blocks, b->block_stride, i);
         if (block->id >= kit->block_count || block->x0 >= block->x1 || block->y0 >= block->y1 || block->x0 < view->x0 ||
             block->y0 < view->y0 || block->x1 > view->x1 || block->y1 > view->y1)
-            return lull_kit_fail(err, LULL_E_INVALID, "evaluate: block %u is not in the frame or not in the view", block->id);
+            return lull_kit_fail(err, LULL_E_INVALID, "evaluate: block %u is not in the frame or not in the view",
+                                 block->id);
         if (kit->rule->check)
             status = kit->rule->check(b->in, block, err);
     }
@@ -542,12 +550,14 @@ static inline void lull_kit_task(void *arg, uint64_t task, uint32_t worker)
 {
     const struct lull_kit_batch *b = (const struct lull_kit_batch *)arg;
     struct lull_decision *decision = (struct lull_decision *)(void *)((char *)b->decisions + task * b->decision_stride);
-    lull_kit_read_of(b->in)->rule->judge(b->in, b->view, (const struct lull_block *)lull_kit_at(b->blocks, b->block_stride, task),
+    lull_kit_read_of(b->in)->rule->judge(b->in, b->view, (const struct lull_block *)lull_kit_at(b->blocks, b->block_stride,
+                                                                                                task),
                                          decision, worker);
 }
 
 /* Checks everything, then judges block by block, on the host's workers if it has any. */
-static inline int32_t lull_kit_evaluate(struct lull_instance *in, const struct lull_view *view, const struct lull_block *blocks,
+static inline int32_t lull_kit_evaluate(struct lull_instance *in, const struct lull_view *view,
+                                        const struct lull_block *blocks,
                                         uint32_t block_stride, struct lull_decision *decisions, uint32_t decision_stride,
                                         uint32_t count, struct lull_error *err)
 {
@@ -593,10 +603,11 @@ struct lull_kit_tally {
 };
 
 /* The verdict on an error that falls as 1/sqrt(spp), as that of a mean does: stops at or below `threshold`, unless more than
- * tail_share of the pixels are unsettled (a mean over many pixels hides a few that rare bright paths have just hit). The next
- * check is where the block is expected to stop, but at least a tenth and at most `growth` times more samples than now, so that
- * the checks of a block stay a logarithmic number. */
-static inline void lull_kit_verdict(const struct lull_kit *kit, const struct lull_block *block, const struct lull_kit_tally *tally,
+ * tail_share of the pixels are unsettled (a mean over many pixels hides a few that rare bright paths have just hit). The
+ * next check is where the block is expected to stop, but at least a tenth and at most `growth` times more samples than now,
+ * so that the checks of a block stay a logarithmic number. */
+static inline void lull_kit_verdict(const struct lull_kit *kit, const struct lull_block *block,
+                                    const struct lull_kit_tally *tally,
                                     double error, double threshold, double tail_share, double growth,
                                     struct lull_decision *decision)
 {
@@ -622,7 +633,8 @@ static inline void lull_kit_verdict(const struct lull_kit *kit, const struct lul
         predicted = settled && ratio < 1e6 ? spp * ratio * ratio : (double)NAN; /* how long a tail takes cannot be told */
     }
     decision->predicted_spp = predicted;
-    lull_kit_continue(kit, block, isnan(predicted) ? spp * growth : fmin(fmax(predicted, spp * 1.1), spp * growth), decision);
+    lull_kit_continue(kit, block, isnan(predicted) ? spp * growth : fmin(fmax(predicted, spp * 1.1), spp * growth),
+                      decision);
 }
 
 /* --- a whole criterion --------------------------------------------------------------------------------------------- */
