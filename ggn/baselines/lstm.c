@@ -278,7 +278,8 @@ static void load_sequence(struct ggn_lstm *l, int r, const double *sequence)
 {
     for (int t = 0; t < l->steps; t++)
         for (int k = 0; k < l->inputs; k++)
-            l->layers[0].x[((size_t)t * BATCH + (size_t)r) * (size_t)l->inputs + (size_t)k] = (float)sequence[t * l->inputs + k];
+            l->layers[0].x[((size_t)t * BATCH + (size_t)r) * (size_t)l->inputs + (size_t)k] =
+                (float)sequence[t * l->inputs + k];
 }
 
 /* Kingma & Ba 2015, lr 1e-3. */

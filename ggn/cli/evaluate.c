@@ -13,7 +13,7 @@
 #include "base/options.h"
 #include "baselines/learned.h"
 #include "cli/commands.h"
-#include "eval/report.h"
+#include "eval/tables.h"
 #include "eval/strips.h"
 #include "eval/trained.h"
 

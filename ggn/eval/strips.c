@@ -35,7 +35,8 @@ static int finish_strips(struct strips *s, const char *path, int width, int heig
     if (!rc && s->n > 0)
         rc = ggn_plot_begin(&plot, path, width, height_each * s->n + 20, err);
     if (!rc && s->n > 0) {
-        fprintf(plot.script, "unset tics\nunset border\nset size ratio -1\nset yrange [] reverse\nset multiplot layout %d,1\n",
+        fprintf(plot.script,
+                "unset tics\nunset border\nset size ratio -1\nset yrange [] reverse\nset multiplot layout %d,1\n",
                 s->n);
         for (int i = 0; i < s->n; i++) {
             fputs("set title ", plot.script);

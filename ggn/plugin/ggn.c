@@ -18,18 +18,19 @@ enum { P_MODEL, P_THRESHOLD, P_PASSES, P_GATE, P_TAIL, P_GINI, P_FIRST_SPP, P_PR
 
 static const struct lull_param params[P_COUNT] = {
     [P_MODEL] = LULL_KIT_FILE("model", NULL,
-                              "model file; without it lull-1.ggn beside the criterion, in ../share/lull or in the source tree"),
+                              "model file; without it lull-1.ggn beside the criterion, in ../share/lull or in the source "
+                              "tree"),
     [P_THRESHOLD] = LULL_KIT_FLOAT("threshold", NULL, 0, 1,
                                    "stop when the probability of visible noise is below this; without it the model's own"),
     [P_PASSES] = LULL_KIT_INT("passes", NULL, 1, 16,
                               "checks in a row that must be below the threshold; without it the model's own"),
     [P_GATE] = LULL_KIT_BOOL("gate", "1", "spare the network while a block is plainly noisy (p_noisy is then not given)"),
     [P_TAIL] = LULL_KIT_FLOAT("tail", NULL, 0, 1e30,
-                              "do not stop while the 99.9th percentile of the half-buffer difference exceeds this many times "
-                              "the mean luminance, 0 = no such guard; without it the model's own"),
+                              "do not stop while the 99.9th percentile of the half-buffer difference exceeds this many "
+                              "times the mean luminance, 0 = no such guard; without it the model's own"),
     [P_GINI] = LULL_KIT_FLOAT("gini", NULL, 0, 2,
-                              "do not stop while the Gini coefficient of the half-buffer difference exceeds this and its tail "
-                              "0.2, 0 = no such guard; without it the model's own"),
+                              "do not stop while the Gini coefficient of the half-buffer difference exceeds this and its "
+                              "tail 0.2, 0 = no such guard; without it the model's own"),
     [P_FIRST_SPP] = LULL_KIT_INT("first-spp", NULL, 1, 1e9,
                                  "samples per pixel of the first image of a window; without it the model's own"),
     [P_PRECISION] = LULL_KIT_CHOICE("precision", "f32", "f32|bf16",

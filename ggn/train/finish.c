@@ -7,7 +7,7 @@
 
 #include "base/json.h"
 #include "model/policy.h"
-#include "train/calibrate.h"
+#include "train/fit_policy.h"
 #include "train/phase_judge.h"
 #include "train/resume.h"
 #include "train/start.h"

@@ -8,7 +8,7 @@
 #include "model/window.h"
 #include "nn/hash.h"
 #include "nn/loss.h"
-#include "train/calibrate.h"
+#include "train/fit_policy.h"
 #include "train/phase.h"
 #include "train/resume.h"
 #include "train/start.h"

@@ -15,7 +15,7 @@
 
 #include "ggn_seqgen.h"
 #include "nn/exec.h"
-#include "train/calibrate.h"
+#include "train/fit_policy.h"
 #include "train/start.h"
 #include "data/windows.h"
 #include "nn/hash.h"

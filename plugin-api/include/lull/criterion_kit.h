@@ -44,11 +44,11 @@ struct lull_kit_rule {
 /* Begins every struct lull_instance. */
 struct lull_kit {
     const struct lull_kit_rule *rule;
-    const struct lull_host *host;     /* borrows until destroy; may be NULL */
-    /* Of the parameters in the table's order: INT, FLOAT, BOOL the number, CHOICE the index of the choice; NaN where there is
-     * neither a value nor a default, and for text. */
+    const struct lull_host *host; /* borrows until destroy; may be NULL */
+    /* Of the parameters in the table's order: INT, FLOAT, BOOL the number, CHOICE the index of the choice; NaN where there
+     * is neither a value nor a default, and for text. */
     double value[LULL_KIT_PARAM_MAX];
-    struct lull_requirements need;    /* what requirements answers; the criterion's create may refine it */
+    struct lull_requirements need; /* what requirements answers; the criterion's create may refine it */
 
     /* Of the open frame. */
     uint32_t block_count; /* 0 = no frame is open */

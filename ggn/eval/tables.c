@@ -1,4 +1,4 @@
-#include "eval/report.h"
+#include "eval/tables.h"
 
 #include <ctype.h>
 #include <math.h>
@@ -197,9 +197,11 @@ static int plot_roc(const char *path, const struct ggn_eval_set *s, enum ggn_spl
         rc = write_roc(plot.script, &methods[i], s, split, err);
         fputs("EOD\n", plot.script);
     }
-    fprintf(plot.script, "set size square\nset xrange [0:1]\nset yrange [0:1]\nset grid\nset key bottom right\n"
-                         "set title 'all windows of the %s scenes pooled'\n"
-                         "set xlabel 'share of converged images called noisy'\nset ylabel 'share of noisy images called noisy'\nplot ",
+    fprintf(plot.script,
+            "set size square\nset xrange [0:1]\nset yrange [0:1]\nset grid\nset key bottom right\n"
+            "set title 'all windows of the %s scenes pooled'\n"
+            "set xlabel 'share of converged images called noisy'\n"
+            "set ylabel 'share of noisy images called noisy'\nplot ",
             ggn_split_names[split]);
     for (int i = 0; i < n; i++)
         if (methods[i].score) {

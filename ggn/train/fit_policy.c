@@ -1,4 +1,4 @@
-#include "train/calibrate.h"
+#include "train/fit_policy.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,6 +1,6 @@
 /* What an evaluation says: table, JSON, pictures. */
-#ifndef GGN_EVAL_REPORT_H
-#define GGN_EVAL_REPORT_H
+#ifndef GGN_EVAL_TABLES_H
+#define GGN_EVAL_TABLES_H
 
 #include <stdio.h>
 

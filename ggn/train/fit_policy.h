@@ -1,6 +1,6 @@
 /* From logits on the validation scenes to a policy. Pure functions but for scratch memory. */
-#ifndef GGN_TRAIN_CALIBRATE_H
-#define GGN_TRAIN_CALIBRATE_H
+#ifndef GGN_TRAIN_FIT_POLICY_H
+#define GGN_TRAIN_FIT_POLICY_H
 
 #include "data/replay.h"
 #include "data/windows.h"
