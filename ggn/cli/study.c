@@ -282,13 +282,14 @@ static int do_export(const struct options *o, const struct ggn_study *study, str
 }
 
 static const struct base_option export_list[] = {
-    {"output", 'o', "FILE", TO(out), .needed = 1, .help = "the file to write (required)"},
-    {0}};
+    {"output", 'o', "FILE", TO(out), .needed = 1, .help = "the file to write (required)"}, {0}};
 
 static int run_export(int argc, char **argv)
 {
     static const struct base_options options = {
-        .list = export_list, .args_doc = "DIR -o FILE", ARGS(1),
+        .list = export_list,
+        .args_doc = "DIR -o FILE",
+        ARGS(1),
         .doc = "Writes all raw trials and what people told of themselves to one JSON file."};
     return with_store(&options, argc, argv, 0, do_export);
 }

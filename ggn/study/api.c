@@ -40,7 +40,8 @@ static void send_json(struct ggn_study_response *r, cJSON *o, int failed)
         ggn_study_refuse(r, 500, "out of memory");
         return;
     }
-    *r = (struct ggn_study_response){.status = 200, .type = "application/json", .fd = -1, .body = text, .size = strlen(text)};
+    *r =
+        (struct ggn_study_response){.status = 200, .type = "application/json", .fd = -1, .body = text, .size = strlen(text)};
 }
 
 /* A failure of the machine, not of the request. */
@@ -53,9 +54,12 @@ static void send_failure(struct ggn_study_response *r, const struct base_err *er
 
 static const char *media_type(const char *name)
 {
-    static const char *const types[][2] = {
-        {".html", "text/html; charset=utf-8"}, {".js", "text/javascript; charset=utf-8"}, {".css", "text/css; charset=utf-8"},
-        {".json", "application/json"}, {".png", "image/png"}, {".txt", "text/plain; charset=utf-8"}};
+    static const char *const types[][2] = {{".html", "text/html; charset=utf-8"},
+                                           {".js", "text/javascript; charset=utf-8"},
+                                           {".css", "text/css; charset=utf-8"},
+                                           {".json", "application/json"},
+                                           {".png", "image/png"},
+                                           {".txt", "text/plain; charset=utf-8"}};
     const char *dot = strrchr(name, '.');
     for (size_t i = 0; i < sizeof types / sizeof types[0] && dot; i++)
         if (strcmp(dot, types[i][0]) == 0)
@@ -70,7 +74,8 @@ static void send_file(struct ggn_study_response *r, const char *root, const char
     struct stat info;
     const char *type = media_type(name);
     int n = snprintf(path, sizeof path, "%s/%s%s%s", root, folder, *folder ? "/" : "", name);
-    if (!type || !ggn_study_plain_name(name) || (*folder && !ggn_study_plain_name(folder)) || n < 0 || (size_t)n >= sizeof path) {
+    if (!type || !ggn_study_plain_name(name) || (*folder && !ggn_study_plain_name(folder)) || n < 0 ||
+        (size_t)n >= sizeof path) {
         ggn_study_refuse(r, 404, "no such file");
         return;
     }
@@ -244,10 +249,12 @@ static int get_whole(const cJSON *o, const char *name, double lo, double hi, dou
 }
 
 /* NULL, or what is wrong with the body. */
-static const char *read_trial(const struct ggn_study *s, const struct ggn_study_plan *plan, const cJSON *body, struct ggn_study_trial *t)
+static const char *read_trial(const struct ggn_study *s, const struct ggn_study_plan *plan, const cJSON *body,
+                              struct ggn_study_trial *t)
 {
     double slot, revision, level, answer, rating;
-    const cJSON *ms = cJSON_GetObjectItemCaseSensitive(body, "ms"), *layout = cJSON_GetObjectItemCaseSensitive(body, "layout");
+    const cJSON *ms = cJSON_GetObjectItemCaseSensitive(body, "ms"),
+                *layout = cJSON_GetObjectItemCaseSensitive(body, "layout");
     int adjustment = s->task == GGN_STUDY_ADJUSTMENT, validation = s->task == GGN_STUDY_VALIDATION;
     if (!get_whole(body, "slot", 0, plan->n - 1, &slot) || !cJSON_HasObjectItem(body, "slot"))
         return "no such slot";
@@ -255,16 +262,25 @@ static const char *read_trial(const struct ggn_study *s, const struct ggn_study_
         return "no such revision";
     if (!get_whole(body, "level", validation ? 0 : 1, validation ? 0 : 1e9, &level))
         return "no such level";
-    if (!get_whole(body, "answer", s->task == GGN_STUDY_TWO_INTERVAL ? 1 : 0, adjustment ? 0 : validation ? 1 : 2, &answer) ||
+    if (!get_whole(body, "answer", s->task == GGN_STUDY_TWO_INTERVAL ? 1 : 0,
+                   adjustment   ? 0
+                   : validation ? 1
+                                : 2,
+                   &answer) ||
         (validation && !cJSON_HasObjectItem(body, "answer")))
         return "no such answer";
     if (!get_whole(body, "rating", validation ? 1 : 0, validation ? 5 : 0, &rating))
         return "no such rating";
     if (!cJSON_IsNumber(ms) || !(ms->valuedouble >= 0.0 && ms->valuedouble <= MAX_MS))
         return "no time";
-    *t = (struct ggn_study_trial){.slot = (int)slot, .revision = (int)revision, .level = (uint32_t)level, .answer = (int)answer,
-                                  .rating = (int)rating, .ms = ms->valuedouble};
-    if (validation && (!cJSON_IsString(layout) || (strcmp(layout->valuestring, "beside") != 0 && strcmp(layout->valuestring, "flip") != 0)))
+    *t = (struct ggn_study_trial){.slot = (int)slot,
+                                  .revision = (int)revision,
+                                  .level = (uint32_t)level,
+                                  .answer = (int)answer,
+                                  .rating = (int)rating,
+                                  .ms = ms->valuedouble};
+    if (validation && (!cJSON_IsString(layout) ||
+                       (strcmp(layout->valuestring, "beside") != 0 && strcmp(layout->valuestring, "flip") != 0)))
         return "no layout";
     if (validation)
         snprintf(t->layout, sizeof t->layout, "%s", layout->valuestring);
@@ -338,7 +354,8 @@ static void get_study(const struct ggn_study_site *site, struct ggn_study_respon
     if (!text)
         ggn_study_refuse(r, 500, "out of memory");
     else
-        *r = (struct ggn_study_response){.status = 200, .type = "application/json", .fd = -1, .body = text, .size = strlen(text)};
+        *r = (struct ggn_study_response){
+            .status = 200, .type = "application/json", .fd = -1, .body = text, .size = strlen(text)};
 }
 
 /* KEY of "KEY" or "KEY/REST"; *rest gets what follows the slash, "" without one. NULL: no key. */
@@ -352,7 +369,8 @@ static const char *split_key(const char *path, char key[GGN_STUDY_KEY])
     return path[n] ? path + n + 1 : path + n;
 }
 
-static void answer_person(const struct ggn_study_site *site, const char *path, int post, const cJSON *body, struct ggn_study_response *r)
+static void answer_person(const struct ggn_study_site *site, const char *path, int post, const cJSON *body,
+                          struct ggn_study_response *r)
 {
     char key[GGN_STUDY_KEY];
     struct ggn_study_person person;
@@ -388,7 +406,8 @@ static const char *check_origin(const struct ggn_study_site *site, const struct 
     const char *origin = q->origin ? strstr(q->origin, "://") : NULL;
     if (q->origin && (!q->host || !origin || strcmp(origin + 3, q->host) != 0))
         return "a request from another site";
-    if (!q->content_type || strncmp(q->content_type, "application/json", 16) != 0) /* no form of another site can send this */
+    if (!q->content_type ||
+        strncmp(q->content_type, "application/json", 16) != 0) /* no form of another site can send this */
         return "Content-Type must be application/json";
     return NULL;
 }

@@ -10,8 +10,8 @@
  *     GET  api/people/KEY                  {"id", "profile", "slots": […], "trials": […]}
  *     POST api/people/KEY/profile          an object: what they told and measured
  *     POST api/people/KEY/trials           {"slot", "revision", "level", "answer", "rating", "ms", "layout"}
- * Nothing is changed unless all of the body is right. A trial that is there already is acknowledged again, so a page may repeat
- * what it did not hear about; a different one in its place is refused with 409. One thread.
+ * Nothing is changed unless all of the body is right. A trial that is there already is acknowledged again, so a page may
+ * repeat what it did not hear about; a different one in its place is refused with 409. One thread.
  */
 #ifndef GGN_STUDY_API_H
 #define GGN_STUDY_API_H
@@ -21,7 +21,7 @@
 
 enum { GGN_STUDY_BODY_MAX = 65536 };
 
-struct ggn_study_site { /* all borrowed */
+struct ggn_study_site {         /* all borrowed */
     const char *dir, *page_dir; /* the study's folder; the page's */
     const char *token;          /* first part of every address; NULL: none */
     const char *const *hosts;   /* what the Host header may say, NULL at the end; NULL: anything */
@@ -29,7 +29,7 @@ struct ggn_study_site { /* all borrowed */
     struct ggn_study_store *store;
 };
 
-struct ggn_study_request { /* headers are NULL when not sent */
+struct ggn_study_request {     /* headers are NULL when not sent */
     const char *method, *path; /* path: as sent, starts with '/', without the query */
     const char *host, *origin, *fetch_site, *content_type;
     const char *body;
@@ -47,7 +47,8 @@ struct ggn_study_response {
 };
 
 /* Always gives a response. */
-void ggn_study_answer(const struct ggn_study_site *site, const struct ggn_study_request *request, struct ggn_study_response *response);
+void ggn_study_answer(const struct ggn_study_site *site, const struct ggn_study_request *request,
+                      struct ggn_study_response *response);
 /* A refusal in the same form, for what goes wrong before a request is whole. */
 void ggn_study_refuse(struct ggn_study_response *response, int status, const char *why);
 

@@ -31,5 +31,6 @@ int ggn_study_page_find(char *path, struct base_err *err)
     for (size_t i = 0; i < sizeof places / sizeof places[0]; i++)
         if (snprintf(path, 4096, "%s/%s", program, places[i]) < 4096 && has_page(path))
             return 0;
-    return base_fail(err, BASE_EINVAL, "the study's page is neither in ../share/lull/study nor in the source tree: set LULL_STUDY_PAGE");
+    return base_fail(err, BASE_EINVAL,
+                     "the study's page is neither in ../share/lull/study nor in the source tree: set LULL_STUDY_PAGE");
 }

@@ -4,8 +4,8 @@
 
 #include "base/err.h"
 
-/* The first of these folders that holds index.html goes into path (room for 4096 bytes): $LULL_STUDY_PAGE; ../share/lull/study
- * from the program (an installed tree); ggn/study/page of the source tree that it was built in. */
+/* The first of these folders that holds index.html goes into path (room for 4096 bytes): $LULL_STUDY_PAGE;
+ * ../share/lull/study from the program (an installed tree); ggn/study/page of the source tree that it was built in. */
 int ggn_study_page_find(char *path, struct base_err *err);
 
 #endif

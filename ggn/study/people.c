@@ -38,7 +38,7 @@ void ggn_study_people_release(struct ggn_study_people *p)
     *p = (struct ggn_study_people){0};
 }
 
-struct input { /* what the estimates of one person are made from */
+struct input {                      /* what the estimates of one person are made from */
     struct ggn_study_trial *trials; /* owns; of every slot the last revision, by slot */
     int n;
     struct ggn_study_plan plan;
@@ -68,7 +68,9 @@ static int estimate_choices(const struct ggn_study_people *p, struct ggn_study_r
                 sorted[used++] = r->choices[i];
         if (used - first < GGN_STUDY_MIN_TRIALS)
             continue;
-        curves[n_curves] = (struct ggn_study_curve){.choices = sorted + first, .n = used - first, .x_min = log2(b->levels[0]),
+        curves[n_curves] = (struct ggn_study_curve){.choices = sorted + first,
+                                                    .n = used - first,
+                                                    .x_min = log2(b->levels[0]),
                                                     .x_max = log2(b->levels[b->n_levels - 1])};
         cells[n_curves++] = cell;
     }
@@ -82,7 +84,8 @@ static int estimate_choices(const struct ggn_study_people *p, struct ggn_study_r
     return rc;
 }
 
-static int read_choices(const struct ggn_study_people *p, const struct input *in, struct ggn_study_result *r, struct base_err *err)
+static int read_choices(const struct ggn_study_people *p, const struct input *in, struct ggn_study_result *r,
+                        struct base_err *err)
 {
     r->choices = malloc((size_t)(in->n + 1) * sizeof *r->choices);
     r->choice_cells = malloc((size_t)(in->n + 1) * sizeof *r->choice_cells);
@@ -102,7 +105,8 @@ static int read_choices(const struct ggn_study_people *p, const struct input *in
 /* --- adjustment --- */
 
 /* The mean of log2 of the settings; the interval from the scatter of all blocks around their own means, Student's t. */
-static int read_settings(const struct ggn_study_people *p, const struct input *in, struct ggn_study_result *r, struct base_err *err)
+static int read_settings(const struct ggn_study_people *p, const struct input *in, struct ggn_study_result *r,
+                         struct base_err *err)
 {
     double *sums = calloc(2 * (size_t)p->n_cells + 1, sizeof *sums), *squares = sums + p->n_cells, within = 0.0;
     int df = 0;
@@ -200,15 +204,16 @@ static void keep_last(struct input *in)
     in->n = n;
 }
 
-static int read_inputs(struct work *w, const struct ggn_study *study, struct ggn_study_store *store, const struct ggn_study_person *list,
-                       struct base_err *err)
+static int read_inputs(struct work *w, const struct ggn_study *study, struct ggn_study_store *store,
+                       const struct ggn_study_person *list, struct base_err *err)
 {
     int rc = 0;
     for (int i = 0; i < w->people->n && !rc; i++) {
         struct ggn_study_result *r = &w->people->results[i];
         snprintf(r->id, sizeof r->id, "%s", list[i].id);
         r->cells = calloc((size_t)w->people->n_cells + 1, sizeof *r->cells);
-        rc = r->cells ? ggn_study_plan_init(&w->inputs[i].plan, study, list[i].seed, err) : base_fail_nomem(err, "estimates");
+        rc =
+            r->cells ? ggn_study_plan_init(&w->inputs[i].plan, study, list[i].seed, err) : base_fail_nomem(err, "estimates");
         if (!rc)
             rc = ggn_study_store_trials(store, list[i].row, &w->inputs[i].trials, &w->inputs[i].n, err);
         if (!rc)
@@ -238,7 +243,9 @@ int ggn_study_people_init(struct ggn_study_people *people, const struct ggn_stud
     if (!rc)
         rc = ggn_study_store_people(store, &list, &n, err);
     size_t room = n > 0 ? (size_t)n : 1;
-    struct work w = {.people = &p, .inputs = calloc(room, sizeof *w.inputs), .rc = calloc(room, sizeof *w.rc),
+    struct work w = {.people = &p,
+                     .inputs = calloc(room, sizeof *w.inputs),
+                     .rc = calloc(room, sizeof *w.rc),
                      .errs = calloc(room, sizeof *w.errs)};
     p.results = calloc(room, sizeof *p.results);
     if (!rc && (!w.inputs || !w.rc || !w.errs || !p.results))

@@ -20,11 +20,11 @@ struct ggn_study_judgement { /* one of a validation */
 
 struct ggn_study_result { /* one person */
     char id[GGN_STUDY_ID];
-    int done, of;                 /* slots */
+    int done, of; /* slots */
     int catch_passed, catch_total;
-    int untouched, settings;      /* adjustment: settings left where they started, of so many */
-    double minutes;               /* answering; pauses not counted */
-    char excluded[96];            /* why; empty: counts */
+    int untouched, settings;          /* adjustment: settings left where they started, of so many */
+    double minutes;                   /* answering; pauses not counted */
+    char excluded[96];                /* why; empty: counts */
     struct ggn_study_estimate *cells; /* owns; [n_cells]; trials 0 where there is none */
     struct ggn_study_choice *choices; /* owns; [n_choices]; 2ifc: all of them, for pictures */
     int *choice_cells;                /* owns; [n_choices] */
@@ -35,7 +35,7 @@ struct ggn_study_result { /* one person */
 
 struct ggn_study_people {
     const struct ggn_study *study; /* borrowed */
-    int *first;   /* owns; [n_views + 1] */
+    int *first;                    /* owns; [n_views + 1] */
     int n_cells;
     int n;
     struct ggn_study_result *results; /* owns; in order of arrival */

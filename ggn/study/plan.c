@@ -78,12 +78,13 @@ static void plan_adjustment(const struct ggn_study *s, uint64_t *state, int *ord
     }
 }
 
-/* View by view, so that the page preloads one view at a time. In each round every block comes once, and no block follows itself:
- * its next level depends on the answer, everybody else's is known and loaded before. Per block a permutation of the rounds says
- * which are catch trials, and the noise comes as often first as second. */
+/* View by view, so that the page preloads one view at a time. In each round every block comes once, and no block follows
+ * itself: its next level depends on the answer, everybody else's is known and loaded before. Per block a permutation of the
+ * rounds says which are catch trials, and the noise comes as often first as second. */
 static void plan_two_interval(const struct ggn_study *s, uint64_t *state, int *work, struct ggn_study_plan *p)
 {
-    int *order = work, *blocks = order + s->n_views, *rounds = blocks + GGN_STUDY_MAX_BLOCKS; /* rounds: [n_blocks][trials] */
+    int *order = work, *blocks = order + s->n_views,
+        *rounds = blocks + GGN_STUDY_MAX_BLOCKS; /* rounds: [n_blocks][trials] */
     int catches = catch_count(s, s->trials);
     identity(order, s->n_views);
     shuffle(state, order, s->n_views);
@@ -102,9 +103,11 @@ static void plan_two_interval(const struct ggn_study *s, uint64_t *state, int *w
             }
             for (int b = 0; b < n; b++) {
                 int rank = rounds[(size_t)blocks[b] * (size_t)s->trials + (size_t)round];
-                p->slots[p->n++] = (struct ggn_study_slot){
-                    .view = order[i], .block = blocks[b], .side = rank & 1,
-                    .catch_trial = rank < catches ? GGN_STUDY_CATCH_PLAIN : GGN_STUDY_NO_CATCH};
+                p->slots[p->n++] =
+                    (struct ggn_study_slot){.view = order[i],
+                                            .block = blocks[b],
+                                            .side = rank & 1,
+                                            .catch_trial = rank < catches ? GGN_STUDY_CATCH_PLAIN : GGN_STUDY_NO_CATCH};
             }
             last = blocks[n - 1];
         }
@@ -119,8 +122,10 @@ static void plan_validation(const struct ggn_study *s, uint64_t *state, struct g
     for (int i = 0; i < judged; i++)
         slots[i] = (struct ggn_study_slot){.view = i % s->n_views, .condition = i / s->n_views % s->n_conditions};
     for (int i = 0; i < catches; i++)
-        slots[judged + i] = (struct ggn_study_slot){.view = below(state, s->n_views), .condition = -1,
-                                                    .catch_trial = i % 2 ? GGN_STUDY_CATCH_IDENTICAL : GGN_STUDY_CATCH_PLAIN};
+        slots[judged + i] =
+            (struct ggn_study_slot){.view = below(state, s->n_views),
+                                    .condition = -1,
+                                    .catch_trial = i % 2 ? GGN_STUDY_CATCH_IDENTICAL : GGN_STUDY_CATCH_PLAIN};
     p->n = judged + catches;
     for (int i = p->n - 1; i > 0; i--) {
         int j = below(state, i + 1);
@@ -138,7 +143,8 @@ int ggn_study_plan_init(struct ggn_study_plan *plan, const struct ggn_study *s, 
     uint64_t state = seed;
     int n = ggn_study_plan_count(s);
     if (n > GGN_STUDY_MAX_TRIALS)
-        return base_fail(err, BASE_EINVAL, "study: more than %d trials for one person; take fewer views or trials", GGN_STUDY_MAX_TRIALS);
+        return base_fail(err, BASE_EINVAL, "study: more than %d trials for one person; take fewer views or trials",
+                         GGN_STUDY_MAX_TRIALS);
     int *work = malloc(((size_t)s->n_views + GGN_STUDY_MAX_BLOCKS + (size_t)n) * sizeof *work);
     p.slots = malloc((size_t)(n > 0 ? n : 1) * sizeof *p.slots);
     if (!p.slots || !work) {

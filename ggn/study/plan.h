@@ -10,7 +10,8 @@
 
 enum ggn_study_catch {
     GGN_STUDY_NO_CATCH,
-    GGN_STUDY_CATCH_PLAIN,    /* a difference that nobody misses: two-interval at the lowest level, validation against heavy noise */
+    GGN_STUDY_CATCH_PLAIN,    /* a difference that nobody misses: two-interval at the lowest level, validation against heavy
+                                 noise */
     GGN_STUDY_CATCH_IDENTICAL /* validation: the reference against itself */
 };
 

@@ -51,8 +51,9 @@ static int enough_levels(const char *dir, const struct ggn_study_block *b, struc
 {
     if (b->n_levels >= 3)
         return 0;
-    return base_fail(err, BASE_EINVAL, "%s: block %u has %d levels to show; record more, or halves, or widen --spp-min and --spp-max",
-                    dir, b->id, b->n_levels);
+    return base_fail(err, BASE_EINVAL,
+                     "%s: block %u has %d levels to show; record more, or halves, or widen --spp-min and --spp-max", dir,
+                     b->id, b->n_levels);
 }
 
 /* --- recorded sequences --- */
@@ -67,7 +68,8 @@ struct work {
     struct base_err *errs;
 };
 
-static int make_levels(const struct work *w, struct ggn_study_block *b, struct ggn_stimuli *s, uint8_t *rgb, struct base_err *err)
+static int make_levels(const struct work *w, struct ggn_study_block *b, struct ggn_stimuli *s, uint8_t *rgb,
+                       struct base_err *err)
 {
     char what[32];
     int rc = write_block(w->request->dir, w->view, b, "reference", s->converged, err);
@@ -101,8 +103,8 @@ static void work_block(void *data, long i, int worker)
     if (w->rc[i] != 0)
         return;
     uint8_t *rgb = malloc(3 * (size_t)block.width * block.height);
-    w->rc[i] = rgb ? ggn_stimuli_init(&stimuli, &block, w->manifest->reference_independent, err) :
-                     base_fail_nomem(err, w->folder);
+    w->rc[i] =
+        rgb ? ggn_stimuli_init(&stimuli, &block, w->manifest->reference_independent, err) : base_fail_nomem(err, w->folder);
     if (w->rc[i] == 0) {
         w->rc[i] = make_levels(w, b, &stimuli, rgb, err);
         ggn_stimuli_release(&stimuli);
@@ -123,7 +125,8 @@ static int prepare_sequence(const struct ggn_study_request_views *q, int index, 
     struct seq_manifest m = {0};
     int rc = seq_manifest_read(q->views[index], &m, err);
     if (!rc && (m.n_blocks < 1 || m.n_blocks > GGN_STUDY_MAX_BLOCKS))
-        rc = base_fail(err, BASE_EINVAL, "%s: %u finished blocks, wanted 1 … %d", q->views[index], m.n_blocks, GGN_STUDY_MAX_BLOCKS);
+        rc = base_fail(err, BASE_EINVAL, "%s: %u finished blocks, wanted 1 … %d", q->views[index], m.n_blocks,
+                       GGN_STUDY_MAX_BLOCKS);
     if (rc) {
         seq_manifest_release(&m);
         return rc;
@@ -131,8 +134,13 @@ static int prepare_sequence(const struct ggn_study_request_views *q, int index, 
     view->width = m.width;
     view->height = m.height;
     view->blocks = calloc(m.n_blocks, sizeof *view->blocks);
-    struct work w = {.request = q, .folder = q->views[index], .manifest = &m, .view = index, .blocks = view->blocks,
-                     .rc = calloc(m.n_blocks, sizeof *w.rc), .errs = calloc(m.n_blocks, sizeof *w.errs)};
+    struct work w = {.request = q,
+                     .folder = q->views[index],
+                     .manifest = &m,
+                     .view = index,
+                     .blocks = view->blocks,
+                     .rc = calloc(m.n_blocks, sizeof *w.rc),
+                     .errs = calloc(m.n_blocks, sizeof *w.errs)};
     if (!view->blocks || !w.rc || !w.errs) {
         rc = base_fail_nomem(err, w.folder);
     } else {
@@ -152,9 +160,9 @@ static int prepare_sequence(const struct ggn_study_request_views *q, int index, 
 /* --- folders of pictures --- */
 
 struct picture {
-    char name[256];           /* the file's */
+    char name[256];            /* the file's */
     char stem[GGN_STUDY_NAME]; /* without its extension */
-    double spp;               /* the digits at the end of the stem; 0 without any */
+    double spp;                /* the digits at the end of the stem; 0 without any */
 };
 
 static int by_spp(const void *a, const void *b)
@@ -203,16 +211,16 @@ static int read_picture(const char *folder, const char *name, const struct ggn_s
     if (!rc)
         rc = ggn_image8_read(path, image, err);
     if (!rc && view->width && ((uint32_t)image->width != view->width || (uint32_t)image->height != view->height)) {
-        rc = base_fail(err, BASE_EINVAL, "%s: %dx%d pixels, the reference has %ux%u", path, image->width, image->height, view->width,
-                      view->height);
+        rc = base_fail(err, BASE_EINVAL, "%s: %dx%d pixels, the reference has %ux%u", path, image->width, image->height,
+                       view->width, view->height);
         ggn_image8_release(image);
     }
     return rc;
 }
 
 /* The picture called reference; its size becomes the view's. */
-static int read_reference(const char *folder, const struct picture *list, int n, struct ggn_study_view *view, struct ggn_image8 *image,
-                          struct base_err *err)
+static int read_reference(const char *folder, const struct picture *list, int n, struct ggn_study_view *view,
+                          struct ggn_image8 *image, struct base_err *err)
 {
     for (int i = 0; i < n; i++)
         if (strcmp(list[i].stem, "reference") == 0) {
@@ -224,8 +232,8 @@ static int read_reference(const char *folder, const struct picture *list, int n,
     return base_fail(err, BASE_EINVAL, "%s: neither manifest.json nor a picture called reference in it", folder);
 }
 
-static int write_crops(const struct ggn_study_request_views *q, int index, const struct ggn_study_view *view, const char *what,
-                       const struct ggn_image8 *image, struct base_err *err)
+static int write_crops(const struct ggn_study_request_views *q, int index, const struct ggn_study_view *view,
+                       const char *what, const struct ggn_image8 *image, struct base_err *err)
 {
     int rc = 0;
     for (int i = 0; i < view->n_blocks && !rc; i++) {
@@ -246,14 +254,18 @@ static int cut_blocks(const struct ggn_study_request_views *q, struct ggn_study_
 {
     uint32_t size = (uint32_t)q->block, columns = (view->width + size - 1) / size, rows = (view->height + size - 1) / size;
     if ((uint64_t)columns * rows > GGN_STUDY_MAX_BLOCKS)
-        return base_fail(err, BASE_EINVAL, "%s: %u blocks of %u pixels; --block makes them larger", view->name, columns * rows, size);
+        return base_fail(err, BASE_EINVAL, "%s: %u blocks of %u pixels; --block makes them larger", view->name,
+                         columns * rows, size);
     view->blocks = calloc((size_t)columns * rows, sizeof *view->blocks);
     if (!view->blocks)
         return base_fail_nomem(err, view->name);
     for (uint32_t i = 0; i < columns * rows; i++) {
         uint32_t x0 = i % columns * size, y0 = i / columns * size;
         struct ggn_study_block *b = &view->blocks[view->n_blocks++];
-        *b = (struct ggn_study_block){.id = i, .x0 = x0, .y0 = y0, .x1 = x0 + size < view->width ? x0 + size : view->width,
+        *b = (struct ggn_study_block){.id = i,
+                                      .x0 = x0,
+                                      .y0 = y0,
+                                      .x1 = x0 + size < view->width ? x0 + size : view->width,
                                       .y1 = y0 + size < view->height ? y0 + size : view->height,
                                       .levels = malloc(((size_t)levels + 1) * sizeof *b->levels)};
         if (!b->levels)
@@ -295,7 +307,8 @@ static int write_heavy(const char *path, const struct ggn_image8 *reference, str
     if (!rgb)
         return base_fail_nomem(err, path);
     for (size_t i = 0; i < n; i++) {
-        state = state * 1664525u + 1013904223u; /* a linear congruence does for noise that is only looked at (Numerical Recipes) */
+        state = state * 1664525u +
+                1013904223u; /* a linear congruence does for noise that is only looked at (Numerical Recipes) */
         int v = reference->data[i] + (int)(state >> 16) % 97 - 48;
         rgb[i] = (uint8_t)(v < 0 ? 0 : v > 255 ? 255 : v);
     }
@@ -313,8 +326,9 @@ static int know_condition(struct ggn_study *s, int index, const char *name, cons
         if (strcmp(s->conditions[i], name) == 0)
             return 0;
     if (index > 0 || s->n_conditions == GGN_STUDY_MAX_CONDITIONS)
-        return base_fail(err, BASE_EINVAL, "%s: '%s' is not a picture that every view has, or there are too many", folder, name);
-    char (*more)[GGN_STUDY_NAME] = realloc(s->conditions, ((size_t)s->n_conditions + 1) * sizeof *more);
+        return base_fail(err, BASE_EINVAL, "%s: '%s' is not a picture that every view has, or there are too many", folder,
+                         name);
+    char(*more)[GGN_STUDY_NAME] = realloc(s->conditions, ((size_t)s->n_conditions + 1) * sizeof *more);
     if (!more)
         return base_fail_nomem(err, folder);
     s->conditions = more;
@@ -350,7 +364,8 @@ static int prepare_conditions(const struct ggn_study_request_views *q, int index
         found++;
     }
     if (!rc && (found == 0 || found != s->n_conditions))
-        rc = base_fail(err, BASE_EINVAL, "%s: %d pictures beside the reference, wanted the same in every view", folder, found);
+        rc = base_fail(err, BASE_EINVAL, "%s: %d pictures beside the reference, wanted the same in every view", folder,
+                       found);
     return rc;
 }
 
@@ -364,8 +379,8 @@ static int prepare_folder(const struct ggn_study_request_views *q, int index, st
         return rc;
     rc = read_reference(q->views[index], list, n, view, &reference, err);
     if (!rc) {
-        rc = s->task == GGN_STUDY_VALIDATION ? prepare_conditions(q, index, list, n, &reference, s, err) :
-                                               prepare_levels(q, index, list, n, &reference, view, err);
+        rc = s->task == GGN_STUDY_VALIDATION ? prepare_conditions(q, index, list, n, &reference, s, err)
+                                             : prepare_levels(q, index, list, n, &reference, view, err);
         ggn_image8_release(&reference);
     }
     free(list);
@@ -374,8 +389,8 @@ static int prepare_folder(const struct ggn_study_request_views *q, int index, st
 
 /* --- the study --- */
 
-static int prepare_view(const struct ggn_study_request_views *q, int index, struct ggn_study *s, struct base_threads *threads,
-                        struct base_err *err)
+static int prepare_view(const struct ggn_study_request_views *q, int index, struct ggn_study *s,
+                        struct base_threads *threads, struct base_err *err)
 {
     char path[4096], folder[64];
     struct ggn_study_view *view = &s->views[index];
@@ -387,7 +402,9 @@ static int prepare_view(const struct ggn_study_request_views *q, int index, stru
         start--;
     snprintf(view->name, sizeof view->name, "%.*s", (int)(n - start), q->views[index] + start);
     if (!ggn_study_plain_name(view->name) || ggn_study_find_view(s, view->name) != index)
-        return base_fail(err, BASE_EINVAL, "%s: a view's folder needs a name of its own of letters, digits, '.', '_' and '-'", q->views[index]);
+        return base_fail(err, BASE_EINVAL,
+                         "%s: a view's folder needs a name of its own of letters, digits, '.', '_' and '-'",
+                         q->views[index]);
     snprintf(folder, sizeof folder, "stimuli/v%d", index);
     int rc = base_file_join(path, q->dir, folder, err);
     if (!rc)
@@ -399,8 +416,9 @@ static int prepare_view(const struct ggn_study_request_views *q, int index, stru
     if (access(path, F_OK) != 0)
         return prepare_folder(q, index, s, err);
     if (s->task == GGN_STUDY_VALIDATION)
-        return base_fail(err, BASE_EINVAL, "%s: a validation takes folders of pictures; `ggn reconstruct` makes them from a sequence",
-                        q->views[index]);
+        return base_fail(err, BASE_EINVAL,
+                         "%s: a validation takes folders of pictures; `ggn reconstruct` makes them from a sequence",
+                         q->views[index]);
     return prepare_sequence(q, index, view, threads, err);
 }
 
@@ -421,7 +439,8 @@ static int copy_texts(const struct ggn_study_request_views *q, struct base_err *
     return rc;
 }
 
-int ggn_study_prepare(const struct ggn_study_request_views *q, struct ggn_study *s, struct base_threads *threads, struct base_err *err)
+int ggn_study_prepare(const struct ggn_study_request_views *q, struct ggn_study *s, struct base_threads *threads,
+                      struct base_err *err)
 {
     char path[4096];
     int rc = make_dir(q->dir, err);
@@ -443,7 +462,8 @@ int ggn_study_prepare(const struct ggn_study_request_views *q, struct ggn_study 
         rc = prepare_view(q, i, s, threads, err);
     }
     if (!rc && ggn_study_plan_count(s) > GGN_STUDY_MAX_TRIALS)
-        rc = base_fail(err, BASE_EINVAL, "more than %d trials for one person: take fewer views, trials or repeats", GGN_STUDY_MAX_TRIALS);
+        rc = base_fail(err, BASE_EINVAL, "more than %d trials for one person: take fewer views, trials or repeats",
+                       GGN_STUDY_MAX_TRIALS);
     if (!rc)
         rc = copy_texts(q, err);
     return !rc ? ggn_study_write(q->dir, s, err) : rc;

@@ -1,9 +1,9 @@
 /*
  * Makes a study: chooses blocks and levels, writes every picture it shows as a lossless PNG, then texts.json and study.json.
  *
- * A view is a folder. With a manifest.json it is a recorded sequence: its levels, and where a block has independent halves also
- * simulated ones up to GGN_SIMULATED_CAP (study/stimuli.h). Without one it holds pictures of one size: `reference.png` (or
- * any extension that is read), and for thresholds one picture per level whose name ends in its samples per pixel
+ * A view is a folder. With a manifest.json it is a recorded sequence: its levels, and where a block has independent halves
+ * also simulated ones up to GGN_SIMULATED_CAP (study/stimuli.h). Without one it holds pictures of one size: `reference.png`
+ * (or any extension that is read), and for thresholds one picture per level whose name ends in its samples per pixel
  * (`view-00256.png`), for a validation one picture per condition, named like it.
  */
 #ifndef GGN_STUDY_PREPARE_H
@@ -17,13 +17,13 @@ struct ggn_study_request_views { /* what `ggn study init` was told; all borrowed
     const char *page_dir;        /* its texts.en.json becomes DIR/texts.json */
     const char *const *views;    /* folders; a view's name is the folder's */
     int n_views;
-    int block;                   /* pixels, for folders of pictures */
-    double spacing;              /* octaves: nearer levels are left out */
-    uint32_t spp_min, spp_max;   /* levels outside are left out */
+    int block;                 /* pixels, for folders of pictures */
+    double spacing;            /* octaves: nearer levels are left out */
+    uint32_t spp_min, spp_max; /* levels outside are left out */
 };
 
-/* study: the numbers are given, id, views and conditions are filled in (released by the caller). Nothing is left in DIR that looks
- * like a study unless all went well: study.json is written last. */
+/* study: the numbers are given, id, views and conditions are filled in (released by the caller). Nothing is left in DIR that
+ * looks like a study unless all went well: study.json is written last. */
 int ggn_study_prepare(const struct ggn_study_request_views *request, struct ggn_study *study, struct base_threads *threads,
                       struct base_err *err);
 

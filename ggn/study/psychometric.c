@@ -3,9 +3,9 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Steps of 1/12 octave are a small part of any standard error that 30 trials reach. The priors: spreads around half an octave as
- * in the published raw trials, a block's with the person's or one step from it; lapses mostly below a tenth; biases mostly below
- * half of a d' of 1. Habits are pairs of bias and lapse. */
+/* Steps of 1/12 octave are a small part of any standard error that 30 trials reach. The priors: spreads around half an
+ * octave as in the published raw trials, a block's with the person's or one step from it; lapses mostly below a tenth;
+ * biases mostly below half of a d' of 1. Habits are pairs of bias and lapse. */
 enum { STEPS_PER_OCTAVE = 12, MARGIN = 2, N_SPREADS = 7, N_LAPSES = 4, N_BIASES = 5, N_HABITS = N_LAPSES * N_BIASES };
 static const double spreads[N_SPREADS] = {0.15, 0.22, 0.33, 0.5, 0.75, 1.1, 1.6};
 static const double spread_prior[N_SPREADS] = {0.05, 0.1, 0.2, 0.3, 0.2, 0.1, 0.05};
@@ -110,8 +110,10 @@ static double spread_quantile(const double w[N_SPREADS], double q)
 {
     double sum = 0.0;
     for (int i = 0; i < N_SPREADS; i++) {
-        double below = log2(i > 0 ? sqrt(spreads[i - 1] * spreads[i]) : spreads[0] * spreads[0] / sqrt(spreads[0] * spreads[1]));
-        double above = log2(i + 1 < N_SPREADS ? sqrt(spreads[i] * spreads[i + 1]) : spreads[i] * spreads[i] / sqrt(spreads[i - 1] * spreads[i]));
+        double below =
+            log2(i > 0 ? sqrt(spreads[i - 1] * spreads[i]) : spreads[0] * spreads[0] / sqrt(spreads[0] * spreads[1]));
+        double above = log2(i + 1 < N_SPREADS ? sqrt(spreads[i] * spreads[i + 1])
+                                              : spreads[i] * spreads[i] / sqrt(spreads[i - 1] * spreads[i]));
         if (sum + w[i] >= q)
             return exp2(below + (above - below) * (q - sum) / w[i]);
         sum += w[i];
@@ -145,7 +147,8 @@ static double step_t(const struct ggn_study_curve *c, int i)
     return c->x_min - MARGIN + (double)i / STEPS_PER_OCTAVE;
 }
 
-/* log of the block's evidence, sum over t and over its own spread, for each spread and habit of the person; to or from what is known. */
+/* log of the block's evidence, sum over t and over its own spread, for each spread and habit of the person; to or from what
+ * is known. */
 static void add_evidence(struct person *p, const struct ggn_study_curve *c, double evidence[N_SPREADS][N_HABITS])
 {
     double likelihood[N_SPREADS][N_HABITS], sum[N_SPREADS][N_HABITS] = {{0}};
@@ -165,7 +168,8 @@ static void add_evidence(struct person *p, const struct ggn_study_curve *c, doub
         }
 }
 
-/* Weights of the block's own spread and the habits that everything but the block tells: posterior less the block's evidence. */
+/* Weights of the block's own spread and the habits that everything but the block tells: posterior less the block's evidence.
+ */
 static void weights(const struct person *p, const double evidence[N_SPREADS][N_HABITS], double w[N_SPREADS][N_HABITS])
 {
     double most = -HUGE_VAL;
@@ -203,10 +207,14 @@ static void estimate(const struct person *p, struct ggn_study_curve *c, const do
     for (int s = 0; s < N_SPREADS; s++)
         of_s[s] /= sum;
     double first = step_t(c, 0), step = 1.0 / STEPS_PER_OCTAVE;
-    c->estimate = (struct ggn_study_estimate){
-        .trials = c->n, .t = quantile(of_t, n, first, step, 0.5), .lo = quantile(of_t, n, first, step, 0.025),
-        .hi = quantile(of_t, n, first, step, 0.975), .se = sqrt(var), .spread = spread_quantile(of_s, 0.5),
-        .spread_lo = spread_quantile(of_s, 0.025), .spread_hi = spread_quantile(of_s, 0.975)};
+    c->estimate = (struct ggn_study_estimate){.trials = c->n,
+                                              .t = quantile(of_t, n, first, step, 0.5),
+                                              .lo = quantile(of_t, n, first, step, 0.025),
+                                              .hi = quantile(of_t, n, first, step, 0.975),
+                                              .se = sqrt(var),
+                                              .spread = spread_quantile(of_s, 0.5),
+                                              .spread_lo = spread_quantile(of_s, 0.025),
+                                              .spread_hi = spread_quantile(of_s, 0.975)};
 }
 
 int ggn_study_psychometric(struct ggn_study_curve *curves, int n_curves, struct base_err *err)
@@ -215,7 +223,7 @@ int ggn_study_psychometric(struct ggn_study_curve *curves, int n_curves, struct 
     for (int i = 0; i < n_curves; i++)
         longest = steps(&curves[i]) > longest ? steps(&curves[i]) : longest;
     struct person *p = malloc(sizeof *p);
-    double (*evidence)[N_SPREADS][N_HABITS] = malloc((size_t)(n_curves + 1) * sizeof *evidence), w[N_SPREADS][N_HABITS];
+    double(*evidence)[N_SPREADS][N_HABITS] = malloc((size_t)(n_curves + 1) * sizeof *evidence), w[N_SPREADS][N_HABITS];
     double *of_t = malloc((size_t)(longest + 1) * sizeof *of_t);
     if (!p || !evidence || !of_t) {
         rc = base_fail_nomem(err, "psychometric curves");
@@ -228,8 +236,8 @@ int ggn_study_psychometric(struct ggn_study_curve *curves, int n_curves, struct 
     for (int i = 0; i < n_curves; i++)
         add_evidence(p, &curves[i], evidence[i]);
     for (int i = 0; i < n_curves; i++) {
-        weights(p, (const double (*)[N_HABITS])evidence[i], w);
-        estimate(p, &curves[i], (const double (*)[N_HABITS])w, of_t);
+        weights(p, (const double(*)[N_HABITS])evidence[i], w);
+        estimate(p, &curves[i], (const double(*)[N_HABITS])w, of_t);
     }
 out:
     free(of_t);

@@ -13,7 +13,6 @@ enum { POWER_DIFFERENCE_PERCENT = 10 };
 
 /* --- tables --- */
 
-
 static int begin(struct base_file_out *out, const char *dir, const char *name, struct base_err *err)
 {
     char path[4096];
@@ -36,8 +35,8 @@ static int write_people(const char *dir, const struct ggn_study_people *p, struc
     fputs("person;done;of;catch_passed;catch_total;untouched;settings;minutes;excluded\n", out.file);
     for (int i = 0; i < p->n; i++) {
         const struct ggn_study_result *r = &p->results[i];
-        fprintf(out.file, "%s;%d;%d;%d;%d;%d;%d;%.2f;%s\n", r->id, r->done, r->of, r->catch_passed, r->catch_total, r->untouched,
-                r->settings, r->minutes, r->excluded);
+        fprintf(out.file, "%s;%d;%d;%d;%d;%d;%d;%.2f;%s\n", r->id, r->done, r->of, r->catch_passed, r->catch_total,
+                r->untouched, r->settings, r->minutes, r->excluded);
     }
     return base_file_commit(&out, err);
 }
@@ -55,13 +54,15 @@ static int write_estimates(const char *dir, const struct ggn_study_people *p, st
             int view;
             const struct ggn_study_block *b = ggn_study_cell_block(p, c, &view);
             if (e->trials > 0)
-                fprintf(out.file, "%s;%s;%u;%.2f;%.2f;%.2f;%.4f;%.4f;%.4f;%.4f;%d\n", p->results[i].id, p->study->views[view].name, b->id,
-                        spp(e->t), spp(e->lo), spp(e->hi), e->se, e->spread, e->spread_lo, e->spread_hi, e->trials);
+                fprintf(out.file, "%s;%s;%u;%.2f;%.2f;%.2f;%.4f;%.4f;%.4f;%.4f;%d\n", p->results[i].id,
+                        p->study->views[view].name, b->id, spp(e->t), spp(e->lo), spp(e->hi), e->se, e->spread, e->spread_lo,
+                        e->spread_hi, e->trials);
         }
     return base_file_commit(&out, err);
 }
 
-static int write_blocks(const char *dir, const struct ggn_study_people *p, const struct ggn_study_threshold *t, struct base_err *err)
+static int write_blocks(const char *dir, const struct ggn_study_people *p, const struct ggn_study_threshold *t,
+                        struct base_err *err)
 {
     struct base_file_out out;
     int rc = begin(&out, dir, "blocks.csv", err);
@@ -71,8 +72,8 @@ static int write_blocks(const char *dir, const struct ggn_study_people *p, const
     for (int c = 0; c < p->n_cells; c++) {
         int view;
         const struct ggn_study_block *b = ggn_study_cell_block(p, c, &view);
-        fprintf(out.file, "%s;%u;%.2f;%.2f;%.2f;%.4f;%d;%d;%d\n", p->study->views[view].name, b->id, spp(t[c].t), spp(t[c].lo), spp(t[c].hi),
-                t[c].spread, t[c].people, t[c].trials, t[c].at_cap);
+        fprintf(out.file, "%s;%u;%.2f;%.2f;%.2f;%.4f;%d;%d;%d\n", p->study->views[view].name, b->id, spp(t[c].t),
+                spp(t[c].lo), spp(t[c].hi), t[c].spread, t[c].people, t[c].trials, t[c].at_cap);
     }
     return base_file_commit(&out, err);
 }
@@ -87,7 +88,8 @@ static int is_whole(const struct ggn_study_people *p, const struct ggn_study_thr
     return 1;
 }
 
-static int write_thresholds(const char *dir, const struct ggn_study_people *p, const struct ggn_study_threshold *t, struct base_err *err)
+static int write_thresholds(const char *dir, const struct ggn_study_people *p, const struct ggn_study_threshold *t,
+                            struct base_err *err)
 {
     struct base_file_out out;
     int whole = 0, rc = 0;
@@ -237,8 +239,9 @@ static int people_needed(const struct ggn_study_people *p, int condition, double
 {
     struct ggn_study_share s = ggn_study_share(p, -1, condition);
     *icc = ggn_study_icc(p, condition);
-    return s.n > 0 ? ggn_study_people_needed(s.share, POWER_DIFFERENCE_PERCENT / 100.0, p->study->n_views * p->study->repeats,
-                                             isnan(*icc) ? 0.0 : *icc) : 0;
+    return s.n > 0 ? ggn_study_people_needed(s.share, POWER_DIFFERENCE_PERCENT / 100.0,
+                                             p->study->n_views * p->study->repeats, isnan(*icc) ? 0.0 : *icc)
+                   : 0;
 }
 
 static void add_conditions(cJSON *root, const struct ggn_study_people *p, int *failed)
@@ -261,7 +264,8 @@ static void add_conditions(cJSON *root, const struct ggn_study_people *p, int *f
     }
 }
 
-static int write_json(const char *dir, const struct ggn_study_people *p, const struct ggn_study_ceiling *ceiling, struct base_err *err)
+static int write_json(const char *dir, const struct ggn_study_people *p, const struct ggn_study_ceiling *ceiling,
+                      struct base_err *err)
 {
     char path[4096];
     int failed = 0, rc = base_file_join(path, dir, "report.json", err);
@@ -280,7 +284,8 @@ static int write_json(const char *dir, const struct ggn_study_people *p, const s
 
 /* --- the whole --- */
 
-static void print_figures(const struct ggn_study_people *p, const struct ggn_study_threshold *t, const struct ggn_study_ceiling *c)
+static void print_figures(const struct ggn_study_people *p, const struct ggn_study_threshold *t,
+                          const struct ggn_study_ceiling *c)
 {
     int known = 0;
     printf("%d people, %d count\n", p->n, people_that_count(p));
@@ -294,7 +299,8 @@ static void print_figures(const struct ggn_study_people *p, const struct ggn_stu
             double icc;
             int needed = people_needed(p, i, &icc);
             if (needed > 0)
-                printf("%s: about %d people would show a difference of %d %%%s\n", p->study->conditions[i], needed, POWER_DIFFERENCE_PERCENT,
+                printf("%s: about %d people would show a difference of %d %%%s\n", p->study->conditions[i], needed,
+                       POWER_DIFFERENCE_PERCENT,
                        isnan(icc) ? " (if people do not differ, which one person cannot tell)" : "");
         }
         return;
@@ -303,12 +309,15 @@ static void print_figures(const struct ggn_study_people *p, const struct ggn_stu
         known += !isnan(t[i].t);
     printf("%d of %d blocks have a threshold\n", known, p->n_cells);
     if (c->people > 1)
-        printf("noise ceiling, %d people, up to %d blocks: r %.2f … %.2f, Spearman %.2f … %.2f, median |log2| %.2f octaves (one person against "
-               "the others)\n", c->people, c->blocks, c->pearson_lower, c->pearson_upper, c->spearman_lower, c->spearman_upper,
+        printf("noise ceiling, %d people, up to %d blocks: r %.2f … %.2f, Spearman %.2f … %.2f, median |log2| %.2f octaves "
+               "(one person against "
+               "the others)\n",
+               c->people, c->blocks, c->pearson_lower, c->pearson_upper, c->spearman_lower, c->spearman_upper,
                c->median_abs_log2_lower);
 }
 
-static int write_threshold_files(const char *dir, const struct ggn_study_people *p, const struct ggn_study_threshold *t, struct base_err *err)
+static int write_threshold_files(const char *dir, const struct ggn_study_people *p, const struct ggn_study_threshold *t,
+                                 struct base_err *err)
 {
     int rc = write_estimates(dir, p, err);
     if (!rc)

@@ -3,8 +3,8 @@
  *
  * Thresholds: thresholds.csv (`ggn label --human`, `ggn compare`: one line per view of which all blocks are known),
  * thresholds-VIEW.json (the same per view, any blocks), blocks.csv, estimates.csv (per person), people.csv, report.json,
- * thresholds.png, people.png, and for two intervals curves.png. Validation: people.csv, judgements.csv, scenes.csv, report.json,
- * shares.png. Columns: ggn/study/FORMAT.md.
+ * thresholds.png, people.png, and for two intervals curves.png. Validation: people.csv, judgements.csv, scenes.csv,
+ * report.json, shares.png. Columns: ggn/study/FORMAT.md.
  */
 #ifndef GGN_STUDY_REPORT_H
 #define GGN_STUDY_REPORT_H
@@ -15,7 +15,7 @@
 int ggn_study_report(const char *dir, const struct ggn_study_people *people, int pictures, struct base_err *err);
 
 /* The pictures alone (report_pictures.c). */
-int ggn_study_report_pictures(const char *dir, const struct ggn_study_people *people, const struct ggn_study_threshold *thresholds,
-                              struct base_err *err);
+int ggn_study_report_pictures(const char *dir, const struct ggn_study_people *people,
+                              const struct ggn_study_threshold *thresholds, struct base_err *err);
 
 #endif

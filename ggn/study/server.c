@@ -91,9 +91,10 @@ static enum MHD_Result send_response(struct MHD_Connection *c, struct ggn_study_
     MHD_add_response_header(m, "Referrer-Policy", "no-referrer"); /* the address holds the token and the person's key */
     MHD_add_response_header(m, "Cross-Origin-Resource-Policy", "same-origin");
     /* unsafe-eval: the QUEST+ library's numeric part makes its loops with Function(); scripts still come from here alone */
-    MHD_add_response_header(m, "Content-Security-Policy",
-                            "default-src 'none'; script-src 'self' 'unsafe-eval'; style-src 'self' 'unsafe-inline'; "
-                            "img-src 'self' blob: data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'");
+    MHD_add_response_header(
+        m, "Content-Security-Policy",
+        "default-src 'none'; script-src 'self' 'unsafe-eval'; style-src 'self' 'unsafe-inline'; "
+        "img-src 'self' blob: data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'");
     enum MHD_Result sent = MHD_queue_response(c, (unsigned)r->status, m);
     MHD_destroy_response(m);
     return sent;
@@ -121,8 +122,8 @@ static void receive(struct upload *u, const char *data, size_t size)
     u->size += size;
 }
 
-static enum MHD_Result on_request(void *data, struct MHD_Connection *c, const char *url, const char *method, const char *version,
-                                  const char *upload, size_t *upload_size, void **context)
+static enum MHD_Result on_request(void *data, struct MHD_Connection *c, const char *url, const char *method,
+                                  const char *version, const char *upload, size_t *upload_size, void **context)
 {
     const struct server *s = data;
     struct upload *u = *context;
@@ -142,12 +143,17 @@ static enum MHD_Result on_request(void *data, struct MHD_Connection *c, const ch
     else if (u->no_memory)
         ggn_study_refuse(&r, MHD_HTTP_INTERNAL_SERVER_ERROR, "out of memory");
     else
-        ggn_study_answer(&s->site, &(struct ggn_study_request){
-            .method = method, .path = url, .body = u->body, .size = u->size,
-            .host = MHD_lookup_connection_value(c, MHD_HEADER_KIND, MHD_HTTP_HEADER_HOST),
-            .origin = MHD_lookup_connection_value(c, MHD_HEADER_KIND, MHD_HTTP_HEADER_ORIGIN),
-            .fetch_site = MHD_lookup_connection_value(c, MHD_HEADER_KIND, "Sec-Fetch-Site"),
-            .content_type = MHD_lookup_connection_value(c, MHD_HEADER_KIND, MHD_HTTP_HEADER_CONTENT_TYPE)}, &r);
+        ggn_study_answer(&s->site,
+                         &(struct ggn_study_request){
+                             .method = method,
+                             .path = url,
+                             .body = u->body,
+                             .size = u->size,
+                             .host = MHD_lookup_connection_value(c, MHD_HEADER_KIND, MHD_HTTP_HEADER_HOST),
+                             .origin = MHD_lookup_connection_value(c, MHD_HEADER_KIND, MHD_HTTP_HEADER_ORIGIN),
+                             .fetch_site = MHD_lookup_connection_value(c, MHD_HEADER_KIND, "Sec-Fetch-Site"),
+                             .content_type = MHD_lookup_connection_value(c, MHD_HEADER_KIND, MHD_HTTP_HEADER_CONTENT_TYPE)},
+                         &r);
     if (r.why[0] != '\0')
         log_refusal(method, url, r.status, r.why);
     return send_response(c, &r);
@@ -230,12 +236,12 @@ int ggn_study_serve(const struct ggn_study_site *site, const struct ggn_study_ad
     if (fd < 0)
         return BASE_EINVAL;
     know_hosts(&s, a, port);
-    struct MHD_Daemon *daemon = MHD_start_daemon(
-        MHD_USE_INTERNAL_POLLING_THREAD | MHD_USE_EPOLL | MHD_USE_ERROR_LOG, 0, NULL, NULL, on_request, &s,
-        MHD_OPTION_EXTERNAL_LOGGER, on_log, NULL, MHD_OPTION_LISTEN_SOCKET, (MHD_socket)fd, MHD_OPTION_NOTIFY_COMPLETED, on_done, NULL,
-        MHD_OPTION_UNESCAPE_CALLBACK, on_unescape, NULL,
-        MHD_OPTION_CONNECTION_LIMIT, (unsigned)MAX_CONNECTIONS, MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)IDLE_S,
-        MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)HEADER_MEMORY, MHD_OPTION_END);
+    struct MHD_Daemon *daemon =
+        MHD_start_daemon(MHD_USE_INTERNAL_POLLING_THREAD | MHD_USE_EPOLL | MHD_USE_ERROR_LOG, 0, NULL, NULL, on_request, &s,
+                         MHD_OPTION_EXTERNAL_LOGGER, on_log, NULL, MHD_OPTION_LISTEN_SOCKET, (MHD_socket)fd,
+                         MHD_OPTION_NOTIFY_COMPLETED, on_done, NULL, MHD_OPTION_UNESCAPE_CALLBACK, on_unescape, NULL,
+                         MHD_OPTION_CONNECTION_LIMIT, (unsigned)MAX_CONNECTIONS, MHD_OPTION_CONNECTION_TIMEOUT,
+                         (unsigned)IDLE_S, MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)HEADER_MEMORY, MHD_OPTION_END);
     if (!daemon) {
         close(fd);
         return base_fail(err, BASE_EIO, "the server does not start");

@@ -21,7 +21,7 @@ int ggn_study_address_parse(const char *text, struct ggn_study_address *address,
 
 /* Prints the link on stdout once it answers, refusals on stderr, and returns when *stop is set (checked ten times a second).
  * site->hosts is ignored: on a loopback address it is the address itself, else anything, since then there is a token. */
-int ggn_study_serve(const struct ggn_study_site *site, const struct ggn_study_address *address, const volatile sig_atomic_t *stop,
-                    struct base_err *err);
+int ggn_study_serve(const struct ggn_study_site *site, const struct ggn_study_address *address,
+                    const volatile sig_atomic_t *stop, struct base_err *err);
 
 #endif

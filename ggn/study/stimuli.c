@@ -49,8 +49,8 @@ static const struct seq_record *full_level(const struct seq_block *b)
 /* Whether halves stand for levels beyond the last recorded one; up to a tenth of an octave is not worth simulating. */
 static int extends(const struct seq_block *b, int reference_independent)
 {
-    return reference_independent && b->reference && full_level(b) && 1.07 * b->levels[b->n_levels - 1].spp < GGN_SIMULATED_CAP &&
-           seq_has(b->reference, SEQ_PLANE_MEAN_F16);
+    return reference_independent && b->reference && full_level(b) &&
+           1.07 * b->levels[b->n_levels - 1].spp < GGN_SIMULATED_CAP && seq_has(b->reference, SEQ_PLANE_MEAN_F16);
 }
 
 /* Without a reference: the mean of the full level stands for the converged image. */
@@ -59,7 +59,8 @@ static int init_halves(struct ggn_stimuli *s, struct base_err *err)
     const struct seq_block *b = s->block;
     const struct seq_record *full = full_level(b);
     if (!full)
-        return base_fail(err, BASE_EINVAL, "block %u has neither a reference nor a full level with a half-buffer difference", b->id);
+        return base_fail(err, BASE_EINVAL, "block %u has neither a reference nor a full level with a half-buffer difference",
+                         b->id);
     s->spp0 = full->spp;
     int rc = seq_half(b, full, s->difference, err);
     if (!rc)

@@ -1,11 +1,11 @@
 /*
- * The pictures of one recorded block that people are shown: the converged one, and the one at each of `n` sample counts: the recorded
- * levels, and beyond the last one (or, without a reference, for all of 20, 23, ... 10,000 spp, each 1.15 times the one before) what two
- * halves stand for: the converged picture + sqrt(spp0 / n) times the half-buffer difference at spp0.
+ * The pictures of one recorded block that people are shown: the converged one, and the one at each of `n` sample counts: the
+ * recorded levels, and beyond the last one (or, without a reference, for all of 20, 23, ... 10,000 spp, each 1.15 times the
+ * one before) what two halves stand for: the converged picture + sqrt(spp0 / n) times the half-buffer difference at spp0.
  *
- * A reference of n_r independent samples has noise of its own: I_n - R has the variance s^2 (1/n + 1/n_r), not s^2/n. Scaling that
- * linear difference by sqrt(n_r/(n_r + n)) gives it the variance that I_n has against a perfect reference. Without linear data, or when
- * the reference is not independent, pictures are taken as they are. Not thread-safe per object.
+ * A reference of n_r independent samples has noise of its own: I_n - R has the variance s^2 (1/n + 1/n_r), not s^2/n.
+ * Scaling that linear difference by sqrt(n_r/(n_r + n)) gives it the variance that I_n has against a perfect reference.
+ * Without linear data, or when the reference is not independent, pictures are taken as they are. Not thread-safe per object.
  */
 #ifndef GGN_STUDY_STIMULI_H
 #define GGN_STUDY_STIMULI_H
@@ -19,9 +19,9 @@ enum { GGN_SIMULATED_CAP = 10000 }; /* the last sample count that is simulated *
 
 struct ggn_stimuli {
     const struct seq_block *block; /* borrows */
-    int recorded;                      /* the first so many are recorded levels, the others simulated */
-    int scale;                         /* whether the difference to the reference is scaled */
-    double spp0;                       /* of the difference */
+    int recorded;                  /* the first so many are recorded levels, the others simulated */
+    int scale;                     /* whether the difference to the reference is scaled */
+    double spp0;                   /* of the difference */
     int n;
     double *spp;                     /* owns; [n]; rising */
     float *base, *difference, *work; /* own; [3][P]; linear */

@@ -18,9 +18,11 @@ enum { BUSY_MS = 5000 };
 
 static const char schema[] =
     "CREATE TABLE IF NOT EXISTS study (id TEXT PRIMARY KEY, version INTEGER NOT NULL);"
-    "CREATE TABLE IF NOT EXISTS person (row INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT NOT NULL UNIQUE, key TEXT NOT NULL UNIQUE,"
+    "CREATE TABLE IF NOT EXISTS person (row INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT NOT NULL UNIQUE, key TEXT NOT NULL "
+    "UNIQUE,"
     " seed INTEGER NOT NULL, created TEXT NOT NULL, profile TEXT NOT NULL);"
-    "CREATE TABLE IF NOT EXISTS trial (person INTEGER NOT NULL REFERENCES person(row) ON DELETE CASCADE, slot INTEGER NOT NULL,"
+    "CREATE TABLE IF NOT EXISTS trial (person INTEGER NOT NULL REFERENCES person(row) ON DELETE CASCADE, slot INTEGER NOT "
+    "NULL,"
     " revision INTEGER NOT NULL, level INTEGER NOT NULL, answer INTEGER NOT NULL, rating INTEGER NOT NULL, ms REAL NOT NULL,"
     " layout TEXT NOT NULL, at TEXT NOT NULL, PRIMARY KEY (person, slot, revision)) WITHOUT ROWID;";
 
@@ -61,7 +63,8 @@ static int step(struct ggn_study_store *s, sqlite3_stmt *st, struct base_err *er
 }
 
 /* One number out of one row; 0 without a row. The statement's first variable is `row`, its second `slot`. */
-static int query_number(struct ggn_study_store *s, const char *sql, int64_t row, int slot, int64_t *out, struct base_err *err)
+static int query_number(struct ggn_study_store *s, const char *sql, int64_t row, int slot, int64_t *out,
+                        struct base_err *err)
 {
     sqlite3_stmt *st = NULL;
     int rc = prepare(s, sql, &st, err);
@@ -92,13 +95,15 @@ static int claim(struct ggn_study_store *s, const char *study_id, struct base_er
     rc = step(s, st, err);
     const unsigned char *id = rc == 1 ? sqlite3_column_text(st, 0) : NULL;
     if (rc >= 0)
-        rc = id && strcmp((const char *)id, study_id) == 0 ? 0 :
-             base_fail(err, BASE_EINVAL, "%s: belongs to another study than study.json beside it", s->path);
+        rc = id && strcmp((const char *)id, study_id) == 0
+                 ? 0
+                 : base_fail(err, BASE_EINVAL, "%s: belongs to another study than study.json beside it", s->path);
     sqlite3_finalize(st);
     return rc;
 }
 
-int ggn_study_store_open(const char *dir, const char *study_id, int create, struct ggn_study_store **store, struct base_err *err)
+int ggn_study_store_open(const char *dir, const char *study_id, int create, struct ggn_study_store **store,
+                         struct base_err *err)
 {
     struct ggn_study_store *s = calloc(1, sizeof *s);
     if (!s)
@@ -117,7 +122,8 @@ int ggn_study_store_open(const char *dir, const char *study_id, int create, stru
     if (!rc)
         sqlite3_busy_timeout(s->db, BUSY_MS);
     if (!rc) /* FULL: an acknowledged trial survives a power cut, not only a crash */
-        rc = run(s, "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; PRAGMA foreign_keys=ON; PRAGMA secure_delete=ON;", err);
+        rc = run(s, "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; PRAGMA foreign_keys=ON; PRAGMA secure_delete=ON;",
+                 err);
     if (!rc)
         rc = run(s, schema, err);
     if (!rc)
@@ -159,7 +165,8 @@ int ggn_study_store_next_number(struct ggn_study_store *s, int64_t *number, stru
     return query_number(s, "SELECT seq FROM sqlite_sequence WHERE name = 'person'", 0, 0, number, err);
 }
 
-int ggn_study_store_add_person(struct ggn_study_store *s, const struct ggn_study_person *p, const char *profile, struct base_err *err)
+int ggn_study_store_add_person(struct ggn_study_store *s, const struct ggn_study_person *p, const char *profile,
+                               struct base_err *err)
 {
     sqlite3_stmt *st = NULL;
     int rc = prepare(s, "INSERT INTO person (id, key, seed, created, profile) VALUES (?1, ?2, ?3, ?4, ?5)", &st, err);
@@ -184,11 +191,14 @@ static void get_person(sqlite3_stmt *st, struct ggn_study_person *p)
     copy_text(st, 4, p->created, sizeof p->created);
 }
 
-int ggn_study_store_find(struct ggn_study_store *s, const char *key, const char *id, struct ggn_study_person *person, struct base_err *err)
+int ggn_study_store_find(struct ggn_study_store *s, const char *key, const char *id, struct ggn_study_person *person,
+                         struct base_err *err)
 {
     sqlite3_stmt *st = NULL;
-    int rc = prepare(s, key ? "SELECT row, id, key, seed, created FROM person WHERE key = ?1" :
-                              "SELECT row, id, key, seed, created FROM person WHERE id = ?1", &st, err);
+    int rc = prepare(s,
+                     key ? "SELECT row, id, key, seed, created FROM person WHERE key = ?1"
+                         : "SELECT row, id, key, seed, created FROM person WHERE id = ?1",
+                     &st, err);
     if (rc)
         return rc;
     bind_text(st, 1, key ? key : id);
@@ -271,9 +281,12 @@ int ggn_study_store_delete(struct ggn_study_store *s, int64_t row, struct base_e
 
 static void get_trial(sqlite3_stmt *st, struct ggn_study_trial *t)
 {
-    *t = (struct ggn_study_trial){.slot = sqlite3_column_int(st, 0), .revision = sqlite3_column_int(st, 1),
-                                  .level = (uint32_t)sqlite3_column_int64(st, 2), .answer = sqlite3_column_int(st, 3),
-                                  .rating = sqlite3_column_int(st, 4), .ms = sqlite3_column_double(st, 5)};
+    *t = (struct ggn_study_trial){.slot = sqlite3_column_int(st, 0),
+                                  .revision = sqlite3_column_int(st, 1),
+                                  .level = (uint32_t)sqlite3_column_int64(st, 2),
+                                  .answer = sqlite3_column_int(st, 3),
+                                  .rating = sqlite3_column_int(st, 4),
+                                  .ms = sqlite3_column_double(st, 5)};
     copy_text(st, 6, t->layout, sizeof t->layout);
     copy_text(st, 7, t->at, sizeof t->at);
 }
@@ -281,7 +294,8 @@ static void get_trial(sqlite3_stmt *st, struct ggn_study_trial *t)
 #define TRIAL_COLUMNS "slot, revision, level, answer, rating, ms, layout, at"
 
 /* The trial of a slot and revision. 1 there, 0 not, negative on an error. */
-static int find_trial(struct ggn_study_store *s, int64_t row, int slot, int revision, struct ggn_study_trial *t, struct base_err *err)
+static int find_trial(struct ggn_study_store *s, int64_t row, int slot, int revision, struct ggn_study_trial *t,
+                      struct base_err *err)
 {
     sqlite3_stmt *st = NULL;
     int rc = prepare(s, "SELECT " TRIAL_COLUMNS " FROM trial WHERE person = ?1 AND slot = ?2 AND revision = ?3", &st, err);
@@ -326,7 +340,8 @@ int ggn_study_store_add_trial(struct ggn_study_store *s, int64_t row, const stru
     return rc < 0 ? rc : 1;
 }
 
-int ggn_study_store_trials(struct ggn_study_store *s, int64_t row, struct ggn_study_trial **trials, int *n, struct base_err *err)
+int ggn_study_store_trials(struct ggn_study_store *s, int64_t row, struct ggn_study_trial **trials, int *n,
+                           struct base_err *err)
 {
     sqlite3_stmt *st = NULL;
     struct ggn_study_trial *list = NULL;

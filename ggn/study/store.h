@@ -1,8 +1,8 @@
 /*
  * People and their trials: DIR/study.db (SQLite, write-ahead log, every trial on the disk before it is acknowledged).
  *
- * A trial is (slot, revision): a slot of the person's plan, and how often it was done again (adjustment only). Trials are added
- * and never changed; the last revision counts. One thread per store; several processes may have the same file open.
+ * A trial is (slot, revision): a slot of the person's plan, and how often it was done again (adjustment only). Trials are
+ * added and never changed; the last revision counts. One thread per store; several processes may have the same file open.
  */
 #ifndef GGN_STUDY_STORE_H
 #define GGN_STUDY_STORE_H
@@ -29,17 +29,18 @@ struct ggn_study_person {
 
 struct ggn_study_trial {
     int slot, revision;
-    uint32_t level; /* samples per pixel shown or set; 0 in a validation */
-    int answer;     /* 2ifc: the interval said to be noisy, 1 or 2; validation: 1 same, 0 different */
-    int rating;     /* validation: 1 very disturbing … 5 no difference */
-    double ms;      /* from what was shown to the answer, by the page's clock */
+    uint32_t level;  /* samples per pixel shown or set; 0 in a validation */
+    int answer;      /* 2ifc: the interval said to be noisy, 1 or 2; validation: 1 same, 0 different */
+    int rating;      /* validation: 1 very disturbing … 5 no difference */
+    double ms;       /* from what was shown to the answer, by the page's clock */
     char layout[16]; /* validation: "beside" or "flip" */
-    char at[32];    /* when it was stored: UTC, ISO 8601 */
+    char at[32];     /* when it was stored: UTC, ISO 8601 */
 };
 
 /* Opens DIR/study.db, made when missing; `study_id` must be that of the study it was made for. create 0: must exist already.
  * dir NULL: in memory, for tests. */
-int ggn_study_store_open(const char *dir, const char *study_id, int create, struct ggn_study_store **store, struct base_err *err);
+int ggn_study_store_open(const char *dir, const char *study_id, int create, struct ggn_study_store **store,
+                         struct base_err *err);
 void ggn_study_store_close(struct ggn_study_store *store);
 
 /* Everything between begin and commit is on the disk together or not at all. */
@@ -62,9 +63,11 @@ int ggn_study_store_profile(struct ggn_study_store *store, int64_t row, char **p
 int ggn_study_store_set_profile(struct ggn_study_store *store, int64_t row, const char *profile, struct base_err *err);
 
 /* 1 added, 0 the same trial is there already, negative on an error; BASE_EINVAL: another one is there in its place. */
-int ggn_study_store_add_trial(struct ggn_study_store *store, int64_t row, const struct ggn_study_trial *trial, struct base_err *err);
+int ggn_study_store_add_trial(struct ggn_study_store *store, int64_t row, const struct ggn_study_trial *trial,
+                              struct base_err *err);
 /* Trials of a person by slot and revision; *trials is malloc'ed (caller frees), NULL when there are none. */
-int ggn_study_store_trials(struct ggn_study_store *store, int64_t row, struct ggn_study_trial **trials, int *n, struct base_err *err);
+int ggn_study_store_trials(struct ggn_study_store *store, int64_t row, struct ggn_study_trial **trials, int *n,
+                           struct base_err *err);
 /* Slots that have a trial. */
 int ggn_study_store_count(struct ggn_study_store *store, int64_t row, int *slots, struct base_err *err);
 /* Revisions that a slot has. */

@@ -67,8 +67,10 @@ struct reader {
 static int number(const struct reader *r, const cJSON *o, const char *name, double lo, double hi, int whole, double *out)
 {
     const cJSON *v = cJSON_GetObjectItemCaseSensitive(o, name);
-    if (!cJSON_IsNumber(v) || !(v->valuedouble >= lo && v->valuedouble <= hi) || (whole && floor(v->valuedouble) != v->valuedouble))
-        return base_fail(r->err, BASE_EINVAL, "%s: '%s' must be a %snumber in %g … %g", r->path, name, whole ? "whole " : "", lo, hi);
+    if (!cJSON_IsNumber(v) || !(v->valuedouble >= lo && v->valuedouble <= hi) ||
+        (whole && floor(v->valuedouble) != v->valuedouble))
+        return base_fail(r->err, BASE_EINVAL, "%s: '%s' must be a %snumber in %g … %g", r->path, name, whole ? "whole " : "",
+                         lo, hi);
     *out = v->valuedouble;
     return 0;
 }
@@ -92,7 +94,8 @@ static int pixels(const struct reader *r, const cJSON *o, const char *name, doub
 static int plain_name(const struct reader *r, const cJSON *v, char out[GGN_STUDY_NAME])
 {
     if (!cJSON_IsString(v) || !ggn_study_plain_name(v->valuestring))
-        return base_fail(r->err, BASE_EINVAL, "%s: a name must be 1 … %d letters, digits, '.', '_' or '-'", r->path, GGN_STUDY_NAME - 1);
+        return base_fail(r->err, BASE_EINVAL, "%s: a name must be 1 … %d letters, digits, '.', '_' or '-'", r->path,
+                         GGN_STUDY_NAME - 1);
     strcpy(out, v->valuestring);
     return 0;
 }
@@ -127,10 +130,12 @@ static int read_block(const struct reader *r, const cJSON *o, const struct ggn_s
     b->levels = malloc((size_t)cJSON_GetArraySize(levels) * sizeof *b->levels);
     if (!b->levels)
         return base_fail_nomem(r->err, r->path);
-    cJSON_ArrayForEach(level, levels) {
+    cJSON_ArrayForEach(level, levels)
+    {
         double spp = cJSON_IsNumber(level) ? level->valuedouble : 0.0;
         if (!(spp >= 1.0 && spp <= 1e9) || floor(spp) != spp || (b->n_levels > 0 && spp <= b->levels[b->n_levels - 1]))
-            return base_fail(r->err, BASE_EINVAL, "%s: levels of block %u must be rising whole numbers from 1", r->path, b->id);
+            return base_fail(r->err, BASE_EINVAL, "%s: levels of block %u must be rising whole numbers from 1", r->path,
+                             b->id);
         b->levels[b->n_levels++] = (uint32_t)spp;
     }
     return 0;
@@ -151,7 +156,8 @@ static int read_view(const struct reader *r, const cJSON *o, enum ggn_study_task
     view->blocks = calloc((size_t)cJSON_GetArraySize(blocks), sizeof *view->blocks);
     if (!view->blocks)
         return base_fail_nomem(r->err, r->path);
-    cJSON_ArrayForEach(block, blocks) {
+    cJSON_ArrayForEach(block, blocks)
+    {
         struct ggn_study_block *b = &view->blocks[view->n_blocks++];
         rc = read_block(r, block, view, b);
         if (!rc && view->n_blocks > 1 && b->id <= b[-1].id)
@@ -170,7 +176,8 @@ static int read_views(const struct reader *r, const cJSON *root, struct ggn_stud
     s->views = calloc((size_t)cJSON_GetArraySize(views), sizeof *s->views);
     if (!s->views)
         return base_fail_nomem(r->err, r->path);
-    cJSON_ArrayForEach(view, views) {
+    cJSON_ArrayForEach(view, views)
+    {
         struct ggn_study_view *v = &s->views[s->n_views++];
         int rc = read_view(r, view, s->task, v);
         if (!rc && ggn_study_find_view(s, v->name) != s->n_views - 1)
@@ -189,7 +196,8 @@ static int read_conditions(const struct reader *r, const cJSON *root, struct ggn
     s->conditions = calloc((size_t)cJSON_GetArraySize(conditions), sizeof *s->conditions);
     if (!s->conditions)
         return base_fail_nomem(r->err, r->path);
-    cJSON_ArrayForEach(condition, conditions) {
+    cJSON_ArrayForEach(condition, conditions)
+    {
         int rc = plain_name(r, condition, s->conditions[s->n_conditions]);
         if (rc)
             return rc;
@@ -200,7 +208,8 @@ static int read_conditions(const struct reader *r, const cJSON *root, struct ggn
 
 static int read_head(const struct reader *r, const cJSON *root, struct ggn_study *s)
 {
-    const cJSON *format = cJSON_GetObjectItemCaseSensitive(root, "format"), *id = cJSON_GetObjectItemCaseSensitive(root, "id");
+    const cJSON *format = cJSON_GetObjectItemCaseSensitive(root, "format"),
+                *id = cJSON_GetObjectItemCaseSensitive(root, "id");
     const cJSON *task = cJSON_GetObjectItemCaseSensitive(root, "task");
     int version, found = 0;
     double seed = 0.0;

@@ -1,9 +1,9 @@
 /*
  * The definition of one study: what is shown, how often, and what counts. DIR/study.json; its form is ggn/study/FORMAT.md.
  *
- * A study is written once by `ggn study init` and read by everything else. Beside it lie DIR/texts.json (what the page says),
- * DIR/stimuli (lossless pictures) and DIR/study.db (people and trials, ggn/study/store.h). Immutable after reading, so any
- * number of threads may read one object.
+ * A study is written once by `ggn study init` and read by everything else. Beside it lie DIR/texts.json (what the page
+ * says), DIR/stimuli (lossless pictures) and DIR/study.db (people and trials, ggn/study/store.h). Immutable after reading,
+ * so any number of threads may read one object.
  */
 #ifndef GGN_STUDY_STUDY_H
 #define GGN_STUDY_STUDY_H
@@ -14,10 +14,10 @@
 #include "base/err.h"
 
 enum {
-    GGN_STUDY_NAME = 96,          /* bytes of a name, the NUL included */
+    GGN_STUDY_NAME = 96, /* bytes of a name, the NUL included */
     GGN_STUDY_MAX_VIEWS = 1024,
-    GGN_STUDY_MAX_BLOCKS = 4096,  /* of one view */
-    GGN_STUDY_MAX_LEVELS = 1024,  /* of one block */
+    GGN_STUDY_MAX_BLOCKS = 4096, /* of one view */
+    GGN_STUDY_MAX_LEVELS = 1024, /* of one block */
     GGN_STUDY_MAX_CONDITIONS = 64,
     GGN_STUDY_MAX_TRIALS = 200000 /* of one person */
 };
@@ -36,24 +36,24 @@ struct ggn_study_block {
 
 struct ggn_study_view {
     char name[GGN_STUDY_NAME];
-    uint32_t width, height; /* pixels */
-    int n_blocks;           /* 0 in a validation */
+    uint32_t width, height;         /* pixels */
+    int n_blocks;                   /* 0 in a validation */
     struct ggn_study_block *blocks; /* owns; ids strictly rising */
 };
 
 struct ggn_study {
     char id[33]; /* 32 hex digits, made at init: trials are imported into their own study only */
     enum ggn_study_task task;
-    uint64_t seed;   /* below 2^53, so that JSON keeps it: the order of every person follows from it and from their number */
-    int trials;      /* per block, catch trials included (two-interval) */
-    int repeats;     /* settings per block (adjustment), judgements per picture (validation) */
+    uint64_t seed; /* below 2^53, so that JSON keeps it: the order of every person follows from it and from their number */
+    int trials;    /* per block, catch trials included (two-interval) */
+    int repeats;   /* settings per block (adjustment), judgements per picture (validation) */
     double catch_share;
-    int show_ms, gap_ms; /* two-interval: each interval, and the blank between them */
-    int break_every;     /* trials between offered breaks; 0: none */
+    int show_ms, gap_ms;                    /* two-interval: each interval, and the blank between them */
+    int break_every;                        /* trials between offered breaks; 0: none */
     double min_catch_passed, max_untouched; /* exclusion rules, shares: see FORMAT.md */
     int n_views;
-    struct ggn_study_view *views; /* owns */
-    int n_conditions;             /* validation; each view has a picture of each */
+    struct ggn_study_view *views;       /* owns */
+    int n_conditions;                   /* validation; each view has a picture of each */
     char (*conditions)[GGN_STUDY_NAME]; /* owns */
 };
 

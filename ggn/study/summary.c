@@ -39,7 +39,8 @@ static struct ggn_study_threshold threshold(const struct ggn_study_people *p, in
     g.t = sum / g.people;
     g.spread = exp2(spread / g.people);
     double half = g.people > 1 ? ggn_study_t975(g.people - 1) *
-                                     sqrt(fmax(squares - sum * sum / g.people, 0.0) / (g.people - 1) / g.people) : 0.0;
+                                     sqrt(fmax(squares - sum * sum / g.people, 0.0) / (g.people - 1) / g.people)
+                               : 0.0;
     g.lo = g.people > 1 ? g.t - half : last->lo;
     g.hi = g.people > 1 ? g.t + half : last->hi;
     return g;
@@ -53,7 +54,7 @@ void ggn_study_thresholds(const struct ggn_study_people *p, struct ggn_study_thr
 
 /* --- agreement --- */
 
-struct pairs { /* one person against a mean */
+struct pairs {                   /* one person against a mean */
     double *own, *mean, *errors; /* [n_cells] */
     size_t n;
 };
@@ -114,8 +115,8 @@ int ggn_study_ceiling(const struct ggn_study_people *p, struct ggn_study_ceiling
         }
     free(room);
     double k = c.people > 0 ? c.people : (double)NAN;
-    double *means[] = {&c.pearson_lower, &c.pearson_upper, &c.spearman_lower, &c.spearman_upper, &c.median_abs_log2_lower,
-                       &c.median_abs_log2_upper, &c.within_half_lower, &c.within_one_lower};
+    double *means[] = {&c.pearson_lower,         &c.pearson_upper,         &c.spearman_lower,    &c.spearman_upper,
+                       &c.median_abs_log2_lower, &c.median_abs_log2_upper, &c.within_half_lower, &c.within_one_lower};
     for (size_t i = 0; i < sizeof means / sizeof means[0]; i++)
         *means[i] /= k;
     if (!rc)

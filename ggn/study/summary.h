@@ -1,6 +1,6 @@
 /*
- * What all people together gave: a threshold per block, how well people agree, shares of judgements, and how many people it takes.
- * Only people who count (people.h) enter.
+ * What all people together gave: a threshold per block, how well people agree, shares of judgements, and how many people it
+ * takes. Only people who count (people.h) enter.
  */
 #ifndef GGN_STUDY_SUMMARY_H
 #define GGN_STUDY_SUMMARY_H
@@ -8,19 +8,19 @@
 #include "study/people.h"
 
 struct ggn_study_threshold { /* of a cell, octaves; NaN without people */
-    double t, lo, hi;        /* mean over people of their estimates, none beyond the highest level; 95 %: Student's t over people,
-                                or with one person their own interval */
-    double spread;           /* geometric mean of theirs */
+    double t, lo, hi; /* mean over people of their estimates, none beyond the highest level; 95 %: Student's t over people,
+                         or with one person their own interval */
+    double spread;    /* geometric mean of theirs */
     int people, trials;
-    int at_cap;              /* so many did not reach their threshold at the highest level */
+    int at_cap; /* so many did not reach their threshold at the highest level */
 };
 
 /* out: [n_cells] */
 void ggn_study_thresholds(const struct ggn_study_people *people, struct ggn_study_threshold *out);
 
-/* Agreement of people over blocks, in log2 of the thresholds. Each person against the mean of the others says how well the best
- * possible prediction could do on one person (lower bound of the noise ceiling); against the mean with them in it is the upper bound
- * (Nili et al. 2014). Means over people; NaN below two people or three blocks. */
+/* Agreement of people over blocks, in log2 of the thresholds. Each person against the mean of the others says how well the
+ * best possible prediction could do on one person (lower bound of the noise ceiling); against the mean with them in it is
+ * the upper bound (Nili et al. 2014). Means over people; NaN below two people or three blocks. */
 struct ggn_study_ceiling {
     int people, blocks; /* blocks that at least two people have */
     double pearson_lower, pearson_upper, spearman_lower, spearman_upper;
@@ -37,11 +37,12 @@ struct ggn_study_share {
 };
 struct ggn_study_share ggn_study_share(const struct ggn_study_people *people, int view, int condition);
 
-/* People needed to show that two conditions differ by `difference` of share (two-sided 5 %, power 80 %), when one has the share p and
- * each person judges m pictures of each condition: n = (z.975 + z.80)^2 (p q + p' q') / difference^2 · (1 + (m - 1) icc) / m. */
+/* People needed to show that two conditions differ by `difference` of share (two-sided 5 %, power 80 %), when one has the
+ * share p and each person judges m pictures of each condition:
+ *     n = (z.975 + z.80)^2 (p q + p' q') / difference^2 · (1 + (m - 1) icc) / m */
 int ggn_study_people_needed(double p, double difference, int m, double icc);
-/* Intraclass correlation of the judgements of one condition within people (one-way analysis of variance, not below 0); NaN below two
- * people or two judgements each. */
+/* Intraclass correlation of the judgements of one condition within people (one-way analysis of variance, not below 0); NaN
+ * below two people or two judgements each. */
 double ggn_study_icc(const struct ggn_study_people *people, int condition);
 
 #endif

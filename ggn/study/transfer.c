@@ -15,7 +15,8 @@ enum { MAX_TEXT = 1 << 29 };
 /* --- out --- */
 
 /* What a reader of the file wants to know of a trial without making the plan again; the import does not look at it. */
-static void add_meaning(cJSON *o, const struct ggn_study *s, const struct ggn_study_slot *slot, const struct ggn_study_trial *t, int *failed)
+static void add_meaning(cJSON *o, const struct ggn_study *s, const struct ggn_study_slot *slot,
+                        const struct ggn_study_trial *t, int *failed)
 {
     const struct ggn_study_view *view = &s->views[slot->view];
     base_json_text(o, "view", view->name, failed);
@@ -34,8 +35,8 @@ static void add_meaning(cJSON *o, const struct ggn_study *s, const struct ggn_st
     }
 }
 
-static void add_trials(cJSON *list, const struct ggn_study *s, const struct ggn_study_plan *plan, const struct ggn_study_trial *trials, int n,
-                       int *failed)
+static void add_trials(cJSON *list, const struct ggn_study *s, const struct ggn_study_plan *plan,
+                       const struct ggn_study_trial *trials, int n, int *failed)
 {
     for (int i = 0; i < n; i++) {
         const struct ggn_study_trial *t = &trials[i];
@@ -53,8 +54,8 @@ static void add_trials(cJSON *list, const struct ggn_study *s, const struct ggn_
     }
 }
 
-static int add_person(cJSON *list, const struct ggn_study *s, struct ggn_study_store *store, const struct ggn_study_person *p, int *failed,
-                      struct base_err *err)
+static int add_person(cJSON *list, const struct ggn_study *s, struct ggn_study_store *store,
+                      const struct ggn_study_person *p, int *failed, struct base_err *err)
 {
     struct ggn_study_plan plan = {0};
     struct ggn_study_trial *trials = NULL;
@@ -79,7 +80,8 @@ static int add_person(cJSON *list, const struct ggn_study *s, struct ggn_study_s
     return rc;
 }
 
-int ggn_study_export(const struct ggn_study *study, struct ggn_study_store *store, const char *path, int *people, struct base_err *err)
+int ggn_study_export(const struct ggn_study *study, struct ggn_study_store *store, const char *path, int *people,
+                     struct base_err *err)
 {
     struct ggn_study_person *list = NULL;
     int n = 0, failed = 0, rc = ggn_study_store_people(store, &list, &n, err);
@@ -113,7 +115,8 @@ struct reader {
 static int get_number(const cJSON *o, const char *name, double lo, double hi, int whole, double *out)
 {
     const cJSON *v = cJSON_GetObjectItemCaseSensitive(o, name);
-    if (!cJSON_IsNumber(v) || !(v->valuedouble >= lo && v->valuedouble <= hi) || (whole && floor(v->valuedouble) != v->valuedouble))
+    if (!cJSON_IsNumber(v) || !(v->valuedouble >= lo && v->valuedouble <= hi) ||
+        (whole && floor(v->valuedouble) != v->valuedouble))
         return 0;
     *out = v->valuedouble;
     return 1;
@@ -154,7 +157,8 @@ static int import_trials(const struct reader *r, const cJSON *list, const struct
     struct ggn_study_trial trial;
     const cJSON *o;
     int rc = ggn_study_plan_init(&plan, r->study, p->seed, r->err);
-    cJSON_ArrayForEach(o, list) {
+    cJSON_ArrayForEach(o, list)
+    {
         if (!rc && !read_trial(r, o, &plan, &trial))
             rc = base_fail(r->err, BASE_EINVAL, "%s: person %s has a trial that this study cannot have", r->path, p->id);
         if (!rc) {
@@ -169,7 +173,8 @@ static int import_trials(const struct reader *r, const cJSON *list, const struct
 static int import_person(const struct reader *r, const cJSON *o)
 {
     struct ggn_study_person p = {0}, there;
-    const cJSON *profile = cJSON_GetObjectItemCaseSensitive(o, "profile"), *trials = cJSON_GetObjectItemCaseSensitive(o, "trials");
+    const cJSON *profile = cJSON_GetObjectItemCaseSensitive(o, "profile"),
+                *trials = cJSON_GetObjectItemCaseSensitive(o, "trials");
     double seed = 0.0;
     if (!get_text(o, "id", p.id, sizeof p.id) || strspn(p.id, "0123456789abcdef") != GGN_STUDY_ID - 1 ||
         !get_number(o, "seed", 0, 9007199254740991.0, 1, &seed) || !get_text(o, "created", p.created, sizeof p.created) ||
@@ -178,7 +183,9 @@ static int import_person(const struct reader *r, const cJSON *o)
     p.seed = (uint64_t)seed;
     int rc = ggn_study_store_find(r->store, NULL, p.id, &there, r->err);
     if (rc)
-        return rc < 0 ? rc : base_fail(r->err, BASE_EINVAL, "%s: person %s is in the study already; nothing was imported", r->path, p.id);
+        return rc < 0 ? rc
+                      : base_fail(r->err, BASE_EINVAL, "%s: person %s is in the study already; nothing was imported",
+                                  r->path, p.id);
     rc = ggn_study_token(p.key, GGN_STUDY_KEY - 1, r->err);
     char *text = cJSON_PrintUnformatted(profile);
     if (!rc && !text)
@@ -191,7 +198,8 @@ static int import_person(const struct reader *r, const cJSON *o)
     return rc < 0 ? rc : import_trials(r, trials, &p);
 }
 
-int ggn_study_import(const struct ggn_study *study, struct ggn_study_store *store, const char *path, int *people, struct base_err *err)
+int ggn_study_import(const struct ggn_study *study, struct ggn_study_store *store, const char *path, int *people,
+                     struct base_err *err)
 {
     struct reader r = {path, study, store, err};
     char *text = NULL;
@@ -200,7 +208,8 @@ int ggn_study_import(const struct ggn_study *study, struct ggn_study_store *stor
     if (rc)
         return rc;
     cJSON *root = cJSON_ParseWithLength(text, size);
-    const cJSON *format = cJSON_GetObjectItemCaseSensitive(root, "format"), *id = cJSON_GetObjectItemCaseSensitive(root, "study");
+    const cJSON *format = cJSON_GetObjectItemCaseSensitive(root, "format"),
+                *id = cJSON_GetObjectItemCaseSensitive(root, "study");
     const cJSON *list = cJSON_GetObjectItemCaseSensitive(root, "people"), *o;
     free(text);
     if (!cJSON_IsString(format) || strcmp(format->valuestring, "lull-study-trials") != 0 || !cJSON_IsArray(list))
@@ -213,7 +222,8 @@ int ggn_study_import(const struct ggn_study *study, struct ggn_study_store *stor
         cJSON_Delete(root);
         return rc;
     }
-    cJSON_ArrayForEach(o, list) {
+    cJSON_ArrayForEach(o, list)
+    {
         if (!rc)
             rc = import_person(&r, o);
         n++;

@@ -10,9 +10,11 @@
 #include "study/study.h"
 
 /* Writes everybody's trials to path, atomically. */
-int ggn_study_export(const struct ggn_study *study, struct ggn_study_store *store, const char *path, int *people, struct base_err *err);
-/* Adds everybody in the file, or nobody: a file of another study, a person who is there already, a trial that cannot be of this
- * study are refused. */
-int ggn_study_import(const struct ggn_study *study, struct ggn_study_store *store, const char *path, int *people, struct base_err *err);
+int ggn_study_export(const struct ggn_study *study, struct ggn_study_store *store, const char *path, int *people,
+                     struct base_err *err);
+/* Adds everybody in the file, or nobody: a file of another study, a person who is there already, a trial that cannot be of
+ * this study are refused. */
+int ggn_study_import(const struct ggn_study *study, struct ggn_study_store *store, const char *path, int *people,
+                     struct base_err *err);
 
 #endif

@@ -1,4 +1,5 @@
 """`ggn study` over raw HTTP: what is refused changes nothing and is logged; what is stored comes back. Speaks TAP."""
+
 import http.client
 import json
 import os
@@ -32,8 +33,12 @@ def png(path, width, height, value):
         return len(data).to_bytes(4, "big") + kind + data + zlib.crc32(kind + data).to_bytes(4, "big")
 
     with open(path, "wb") as f:
-        f.write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", width.to_bytes(4, "big") + height.to_bytes(4, "big") + b"\x08\x02\0\0\0") +
-                chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
+        f.write(
+            b"\x89PNG\r\n\x1a\n"
+            + chunk(b"IHDR", width.to_bytes(4, "big") + height.to_bytes(4, "big") + b"\x08\x02\0\0\0")
+            + chunk(b"IDAT", zlib.compress(rows))
+            + chunk(b"IEND", b"")
+        )
 
 
 def view(name, pictures, width=32, height=16):
@@ -50,13 +55,19 @@ def ggn(*args):
 
 def fails(name, pattern, *args):
     r = ggn(*args)
-    check(r.returncode == 2 and any(line.startswith("ggn study ") and pattern in line for line in r.stderr.split("\n")), name, f"{r.returncode} {r.stderr}")
+    check(
+        r.returncode == 2 and any(line.startswith("ggn study ") and pattern in line for line in r.stderr.split("\n")),
+        name,
+        f"{r.returncode} {r.stderr}",
+    )
 
 
 class Server:
     def __init__(self, folder, listen="127.0.0.1:0"):
         self.log = open(os.path.join(TMP.name, "serve.log"), "w")
-        self.child = subprocess.Popen([GGN, "study", "serve", folder, "--listen", listen], stdout=subprocess.PIPE, stderr=self.log, text=True)
+        self.child = subprocess.Popen(
+            [GGN, "study", "serve", folder, "--listen", listen], stdout=subprocess.PIPE, stderr=self.log, text=True
+        )
         self.link = self.child.stdout.readline().strip()
         rest = self.link.split("://")[1]
         self.authority, self.prefix = rest.split("/", 1)
@@ -71,7 +82,9 @@ class Server:
         h.update(headers or {})
         h = {k: v for k, v in h.items() if v is not None}
         data = body if body is None or isinstance(body, bytes) else json.dumps(body).encode()
-        c.putrequest(method, (self.prefix if prefix is None else prefix) + address, skip_host=True, skip_accept_encoding=True)
+        c.putrequest(
+            method, (self.prefix if prefix is None else prefix) + address, skip_host=True, skip_accept_encoding=True
+        )
         for k, v in h.items():
             c.putheader(k, v)
         if data is not None:
@@ -120,43 +133,117 @@ def contents(folder):
 # --- init ---
 levels = view("levels", ["reference", "n-16", "n-64", "n-256", "n-1024"])
 study = os.path.join(TMP.name, "study")
-init = ["init", study, "--task", "thresholds", "--method", "2ifc", "--views", levels, "--block", "16", "--trials", "4", "--catch", "0.25"]
+init = [
+    "init",
+    study,
+    "--task",
+    "thresholds",
+    "--method",
+    "2ifc",
+    "--views",
+    levels,
+    "--block",
+    "16",
+    "--trials",
+    "4",
+    "--catch",
+    "0.25",
+]
 r = ggn(*init)
 check(r.returncode == 0 and "8 trials for each person" in r.stdout, "init from pictures", r.stderr)
 definition = json.load(open(os.path.join(study, "study.json")))
-check([b["levels"] for b in definition["views"][0]["blocks"]] == [[16, 64, 256, 1024]] * 2 and os.path.exists(os.path.join(study, "texts.json")),
-      "study.json holds blocks and levels, texts.json lies beside")
+check(
+    [b["levels"] for b in definition["views"][0]["blocks"]] == [[16, 64, 256, 1024]] * 2
+    and os.path.exists(os.path.join(study, "texts.json")),
+    "study.json holds blocks and levels, texts.json lies beside",
+)
 fails("init: not over another study", "a study already", *init)
 fails("init: no views", "--views are needed", "init", os.path.join(TMP.name, "none"), "--task", "thresholds")
-fails("init: no such task", "--task taste: expected thresholds or validation", "init", os.path.join(TMP.name, "none"), "--task", "taste", "--views", levels)
-fails("init: not a view", "neither manifest.json nor a picture called reference", "init", os.path.join(TMP.name, "none"), "--task", "thresholds",
-      "--views", TMP.name)
-fails("init: too few levels", "levels to show", "init", os.path.join(TMP.name, "none"), "--task", "thresholds", "--views", levels, "--spp-min", "200")
+fails(
+    "init: no such task",
+    "--task taste: expected thresholds or validation",
+    "init",
+    os.path.join(TMP.name, "none"),
+    "--task",
+    "taste",
+    "--views",
+    levels,
+)
+fails(
+    "init: not a view",
+    "neither manifest.json nor a picture called reference",
+    "init",
+    os.path.join(TMP.name, "none"),
+    "--task",
+    "thresholds",
+    "--views",
+    TMP.name,
+)
+fails(
+    "init: too few levels",
+    "levels to show",
+    "init",
+    os.path.join(TMP.name, "none"),
+    "--task",
+    "thresholds",
+    "--views",
+    levels,
+    "--spp-min",
+    "200",
+)
 check(not os.path.exists(os.path.join(TMP.name, "none", "study.json")), "init: what failed looks like no study")
 other = view("other", ["reference", "lull"], 20, 20)
-fails("init: sizes differ", "the reference has", "init", os.path.join(TMP.name, "odd"), "--task", "validation", "--views",
-      (lambda f: (png(os.path.join(f, "big.png"), 21, 20, lambda x, y: 7), f)[1])(view("odd-view", ["reference", "lull"], 20, 20)))
+fails(
+    "init: sizes differ",
+    "the reference has",
+    "init",
+    os.path.join(TMP.name, "odd"),
+    "--task",
+    "validation",
+    "--views",
+    (lambda f: (png(os.path.join(f, "big.png"), 21, 20, lambda x, y: 7), f)[1])(
+        view("odd-view", ["reference", "lull"], 20, 20)
+    ),
+)
 fails("serve: not a study", "study.json", "serve", TMP.name)
 fails("serve: names are not looked up", "not an address in numbers", "serve", study, "--listen", "localhost")
 
 # --- serving ---
 server = Server(study)
 status, page, headers = server.request("GET", "")
-check(status == 200 and b"main.js" in page and "default-src 'none'" in headers["Content-Security-Policy"] and
-      headers["Referrer-Policy"] == "no-referrer", "the page, with a policy that lets nothing in from outside")
+check(
+    status == 200
+    and b"main.js" in page
+    and "default-src 'none'" in headers["Content-Security-Policy"]
+    and headers["Referrer-Policy"] == "no-referrer",
+    "the page, with a policy that lets nothing in from outside",
+)
 for name in ("main.js", "study.css", "texts.json", "vendor/jspsych.js", "vendor/questplus.js"):
     check(server.request("GET", name)[0] == 200, f"GET {name}")
 status, picture, headers = server.request("GET", "stimuli/v0/b1-64.png")
-check(status == 200 and picture[:4] == b"\x89PNG" and "immutable" in headers["Cache-Control"], "a picture, kept by the browser")
+check(
+    status == 200 and picture[:4] == b"\x89PNG" and "immutable" in headers["Cache-Control"], "a picture, kept by the browser"
+)
 status, person = server.json("POST", "api/people", {"consent": True})
 key = person["key"]
 status, me = server.json("GET", f"api/people/{key}")
-check(status == 200 and len(me["slots"]) == 8 and sum(s["catch"] for s in me["slots"]) == 2 and me["trials"] == [], "consent, a key, a plan")
+check(
+    status == 200 and len(me["slots"]) == 8 and sum(s["catch"] for s in me["slots"]) == 2 and me["trials"] == [],
+    "consent, a key, a plan",
+)
 
 
 def trial(slot, level=None, answer=1, **more):
     s = me["slots"][slot]
-    return {"slot": slot, "revision": 0, "level": level or (16 if s["catch"] else 64), "answer": answer, "rating": 0, "ms": 512.5, **more}
+    return {
+        "slot": slot,
+        "revision": 0,
+        "level": level or (16 if s["catch"] else 64),
+        "answer": answer,
+        "rating": 0,
+        "ms": 512.5,
+        **more,
+    }
 
 
 address = f"api/people/{key}/trials"
@@ -168,66 +255,103 @@ before, logged = contents(study), len(server.refusals())
 secret = os.path.join(TMP.name, "secret.txt")
 open(secret, "w").write("secret")
 os.symlink(secret, os.path.join(study, "stimuli", "v0", "link.txt"))
-cases = [("another answer in its place", 409, "POST", address, trial(0, answer=2), {}),
-         ("a trial out of turn", 409, "POST", address, trial(5), {}),
-         ("a slot beyond the plan", 400, "POST", address, {**trial(1), "slot": 8}, {}),
-         ("a negative slot", 400, "POST", address, {**trial(1), "slot": -1}, {}),
-         ("no slot", 400, "POST", address, {k: v for k, v in trial(1).items() if k != "slot"}, {}),
-         ("a slot in words", 400, "POST", address, {**trial(1), "slot": "1; DROP TABLE trial"}, {}),
-         ("a slot that is a fraction", 400, "POST", address, {**trial(1), "slot": 1.5}, {}),
-         ("a level that the block has not", 400, "POST", address, {**trial(1), "level": 63}, {}),
-         ("a huge level", 400, "POST", address, {**trial(1), "level": 1e300}, {}),
-         ("no such answer", 400, "POST", address, {**trial(1), "answer": 3}, {}),
-         ("no time", 400, "POST", address, {k: v for k, v in trial(1).items() if k != "ms"}, {}),
-         ("a revision in the wrong task", 400, "POST", address, {**trial(0), "revision": 1}, {}),
-         ("malformed JSON", 400, "POST", address, b'{"slot": 1, ', {}),
-         ("JSON that is no object", 400, "POST", address, b"[1, 2]", {}),
-         ("nested without end", 400, "POST", address, b"[" * 60000, {}),
-         ("an empty body", 400, "POST", address, b"", {}),
-         ("an oversized body", 413, "POST", address, b" " * 70000, {}),
-         ("an oversized profile", 413, "POST", f"api/people/{key}/profile", {"x": "y" * 20000}, {}),
-         ("no consent", 400, "POST", "api/people", {"consent": False}, {}),
-         ("consent in words", 400, "POST", "api/people", {"consent": "true"}, {}),
-         ("an unknown key", 404, "POST", f"api/people/{'0' * 32}/trials", trial(1), {}),
-         ("SQL in the key", 404, "POST", "api/people/' OR 1=1 --/trials".replace(" ", "%20"), trial(1), {}),
-         ("SQL in an address", 404, "GET", "api/people/'%3B%20DROP%20TABLE%20person%3B--", None, {}),
-         ("an unknown address", 404, "POST", "api/delete", {}, {}),
-         ("a post from another site", 403, "POST", "api/people", {"consent": True}, {"Origin": "http://evil.example"}),
-         ("a post from a page without origin", 403, "POST", "api/people", {"consent": True}, {"Origin": "null"}),
-         ("a post that the browser calls foreign", 403, "POST", "api/people", {"consent": True}, {"Sec-Fetch-Site": "cross-site"}),
-         ("a form of another site", 403, "POST", "api/people", {"consent": True}, {"Content-Type": "application/x-www-form-urlencoded"}),
-         ("text of another site", 403, "POST", "api/people", {"consent": True}, {"Content-Type": "text/plain"}),
-         ("no Content-Type", 403, "POST", "api/people", {"consent": True}, {"Content-Type": None}),
-         ("another name for this machine", 403, "GET", "api/study", None, {"Host": "evil.example"}),
-         ("PUT", 405, "PUT", "study.json", b"{}", {}),
-         ("DELETE", 405, "DELETE", f"api/people/{key}", None, {}),
-         ("out of the folder", 404, "GET", "../study.db", None, {}),
-         ("out of the folder, encoded", 404, "GET", "%2e%2e/%2e%2e/etc/passwd", None, {}),
-         ("out of the folder, encoded slashes", 404, "GET", "stimuli/..%2f..%2fstudy.json", None, {}),
-         ("out of the folder, from stimuli", 404, "GET", "stimuli/v0/../../study.db", None, {}),
-         ("an absolute path", 404, "GET", "//etc/passwd", None, {}),
-         ("a zero byte", 404, "GET", "study.css%00.png", None, {}),
-         ("a hidden file", 404, "GET", ".token", None, {}),
-         ("the database", 404, "GET", "study.db", None, {}),
-         ("a link out of the folder", 404, "GET", "stimuli/v0/link.txt", None, {}),
-         ("a folder", 404, "GET", "vendor", None, {})]
+cases = [
+    ("another answer in its place", 409, "POST", address, trial(0, answer=2), {}),
+    ("a trial out of turn", 409, "POST", address, trial(5), {}),
+    ("a slot beyond the plan", 400, "POST", address, {**trial(1), "slot": 8}, {}),
+    ("a negative slot", 400, "POST", address, {**trial(1), "slot": -1}, {}),
+    ("no slot", 400, "POST", address, {k: v for k, v in trial(1).items() if k != "slot"}, {}),
+    ("a slot in words", 400, "POST", address, {**trial(1), "slot": "1; DROP TABLE trial"}, {}),
+    ("a slot that is a fraction", 400, "POST", address, {**trial(1), "slot": 1.5}, {}),
+    ("a level that the block has not", 400, "POST", address, {**trial(1), "level": 63}, {}),
+    ("a huge level", 400, "POST", address, {**trial(1), "level": 1e300}, {}),
+    ("no such answer", 400, "POST", address, {**trial(1), "answer": 3}, {}),
+    ("no time", 400, "POST", address, {k: v for k, v in trial(1).items() if k != "ms"}, {}),
+    ("a revision in the wrong task", 400, "POST", address, {**trial(0), "revision": 1}, {}),
+    ("malformed JSON", 400, "POST", address, b'{"slot": 1, ', {}),
+    ("JSON that is no object", 400, "POST", address, b"[1, 2]", {}),
+    ("nested without end", 400, "POST", address, b"[" * 60000, {}),
+    ("an empty body", 400, "POST", address, b"", {}),
+    ("an oversized body", 413, "POST", address, b" " * 70000, {}),
+    ("an oversized profile", 413, "POST", f"api/people/{key}/profile", {"x": "y" * 20000}, {}),
+    ("no consent", 400, "POST", "api/people", {"consent": False}, {}),
+    ("consent in words", 400, "POST", "api/people", {"consent": "true"}, {}),
+    ("an unknown key", 404, "POST", f"api/people/{'0' * 32}/trials", trial(1), {}),
+    ("SQL in the key", 404, "POST", "api/people/' OR 1=1 --/trials".replace(" ", "%20"), trial(1), {}),
+    ("SQL in an address", 404, "GET", "api/people/'%3B%20DROP%20TABLE%20person%3B--", None, {}),
+    ("an unknown address", 404, "POST", "api/delete", {}, {}),
+    ("a post from another site", 403, "POST", "api/people", {"consent": True}, {"Origin": "http://evil.example"}),
+    ("a post from a page without origin", 403, "POST", "api/people", {"consent": True}, {"Origin": "null"}),
+    (
+        "a post that the browser calls foreign",
+        403,
+        "POST",
+        "api/people",
+        {"consent": True},
+        {"Sec-Fetch-Site": "cross-site"},
+    ),
+    (
+        "a form of another site",
+        403,
+        "POST",
+        "api/people",
+        {"consent": True},
+        {"Content-Type": "application/x-www-form-urlencoded"},
+    ),
+    ("text of another site", 403, "POST", "api/people", {"consent": True}, {"Content-Type": "text/plain"}),
+    ("no Content-Type", 403, "POST", "api/people", {"consent": True}, {"Content-Type": None}),
+    ("another name for this machine", 403, "GET", "api/study", None, {"Host": "evil.example"}),
+    ("PUT", 405, "PUT", "study.json", b"{}", {}),
+    ("DELETE", 405, "DELETE", f"api/people/{key}", None, {}),
+    ("out of the folder", 404, "GET", "../study.db", None, {}),
+    ("out of the folder, encoded", 404, "GET", "%2e%2e/%2e%2e/etc/passwd", None, {}),
+    ("out of the folder, encoded slashes", 404, "GET", "stimuli/..%2f..%2fstudy.json", None, {}),
+    ("out of the folder, from stimuli", 404, "GET", "stimuli/v0/../../study.db", None, {}),
+    ("an absolute path", 404, "GET", "//etc/passwd", None, {}),
+    ("a zero byte", 404, "GET", "study.css%00.png", None, {}),
+    ("a hidden file", 404, "GET", ".token", None, {}),
+    ("the database", 404, "GET", "study.db", None, {}),
+    ("a link out of the folder", 404, "GET", "stimuli/v0/link.txt", None, {}),
+    ("a folder", 404, "GET", "vendor", None, {}),
+]
 for name, wanted, method, where, body, more in cases:
     status, raw, _ = server.request(method, where, body, headers=more)
     check(status == wanted and b"root:" not in raw and b"secret" not in raw, f"refused: {name}", f"{status} {raw[:200]}")
 check(contents(study) == before, "nothing was changed by them")
 check(len(server.refusals()) - logged >= len(cases) - 1, "all of them were logged", len(server.refusals()) - logged)
-check(server.request("GET", "api/study", headers={"X-Long": "x" * 100000})[0] in (400, 413, 431, 494), "refused: endless headers")
-for name, data in (("no HTTP", b"\0\1\2\3 hello\r\n\r\n"), ("a negative length", b"POST /api/people HTTP/1.1\r\nHost: x\r\nContent-Length: -5\r\n\r\n"),
-                   ("half a request", b"POST /api/people HTTP/1.1\r\nHost: " + server.authority.encode() +
-                    b"\r\nContent-Type: application/json\r\nContent-Length: 16\r\n\r\n{\"consent\"")):
+check(
+    server.request("GET", "api/study", headers={"X-Long": "x" * 100000})[0] in (400, 413, 431, 494),
+    "refused: endless headers",
+)
+for name, data in (
+    ("no HTTP", b"\0\1\2\3 hello\r\n\r\n"),
+    ("a negative length", b"POST /api/people HTTP/1.1\r\nHost: x\r\nContent-Length: -5\r\n\r\n"),
+    (
+        "half a request",
+        b"POST /api/people HTTP/1.1\r\nHost: "
+        + server.authority.encode()
+        + b'\r\nContent-Type: application/json\r\nContent-Length: 16\r\n\r\n{"consent"',
+    ),
+):
     got = server.raw(data)
     check(b" 200 " not in got.split(b"\r\n")[0], f"refused: {name}", got[:100])
 check(contents(study) == before and server.json("GET", "api/study")[0] == 200, "and the server goes on")
 check(all(c == "\n" or " " <= c for line in server.refusals() for c in line), "the log has no control characters")
-check(server.json("POST", f"api/people/{key}/profile", {"name": "Robert'); DROP TABLE trial;--"})[0] == 200 and
-      server.json("GET", f"api/people/{key}")[1]["profile"]["name"] == "Robert'); DROP TABLE trial;--", "SQL in a name is a name")
-check(server.json("POST", "api/people", {"consent": True}, headers={"Origin": "http://" + server.authority, "Sec-Fetch-Site": "same-origin"})[0] == 200,
-      "the page itself may post")
+check(
+    server.json("POST", f"api/people/{key}/profile", {"name": "Robert'); DROP TABLE trial;--"})[0] == 200
+    and server.json("GET", f"api/people/{key}")[1]["profile"]["name"] == "Robert'); DROP TABLE trial;--",
+    "SQL in a name is a name",
+)
+check(
+    server.json(
+        "POST",
+        "api/people",
+        {"consent": True},
+        headers={"Origin": "http://" + server.authority, "Sec-Fetch-Site": "same-origin"},
+    )[0]
+    == 200,
+    "the page itself may post",
+)
 
 # --- killed in the middle ---
 server.json("POST", address, trial(1))
@@ -243,10 +367,16 @@ check(server.stop() == 0, "serve ends with 0 when interrupted")
 # --- beyond this machine ---
 server = Server(study, "0.0.0.0:0")
 check(len(server.prefix) == 34, "beyond this machine the link has a token", server.link)
-check(server.request("GET", "")[0] == 200 and server.json("POST", "api/people", {"consent": True})[0] == 200, "with the token all is as usual")
+check(
+    server.request("GET", "")[0] == 200 and server.json("POST", "api/people", {"consent": True})[0] == 200,
+    "with the token all is as usual",
+)
 for name, prefix in (("no", "/"), ("a wrong", "/" + "0" * 32 + "/"), ("half a", server.prefix[:20] + "/")):
-    check(server.request("GET", "api/study", prefix=prefix)[0] == 403 and
-          server.request("POST", "api/people", {"consent": True}, prefix=prefix)[0] == 403, f"refused: {name} token")
+    check(
+        server.request("GET", "api/study", prefix=prefix)[0] == 403
+        and server.request("POST", "api/people", {"consent": True}, prefix=prefix)[0] == 403,
+        f"refused: {name} token",
+    )
 link = server.prefix
 server.stop()
 server = Server(study, "0.0.0.0:0")
@@ -254,7 +384,12 @@ check(server.prefix == link, "the token stays when it is started again")
 server.stop()
 
 # --- what was collected ---
-fails("report: nobody took part", "nobody has taken part yet", "report", (lambda d: (ggn("init", d, *init[2:]), d)[1])(os.path.join(TMP.name, "fresh")))
+fails(
+    "report: nobody took part",
+    "nobody has taken part yet",
+    "report",
+    (lambda d: (ggn("init", d, *init[2:]), d)[1])(os.path.join(TMP.name, "fresh")),
+)
 adjustment = os.path.join(TMP.name, "adjustment")
 ggn("init", adjustment, "--task", "thresholds", "--views", levels, "--block", "16")
 server = Server(adjustment)
@@ -264,29 +399,77 @@ for levels_set in ((64, 256), (16, 256), (1024, 1024)):
     codes.append(person["id"])
     slots = server.json("GET", f"api/people/{person['key']}")[1]["slots"]
     for i, s in enumerate(slots):
-        server.json("POST", f"api/people/{person['key']}/trials",
-                    {"slot": i, "revision": 0, "level": levels_set[s["block"]], "answer": 0, "rating": 0, "ms": 1500})
-check(server.json("POST", f"api/people/{person['key']}/trials", {"slot": 0, "revision": 2, "level": 16, "answer": 0, "rating": 0, "ms": 1})[0] == 409,
-      "a revision may not leave one out")
-server.json("POST", f"api/people/{person['key']}/trials", {"slot": 0, "revision": 1, "level": 256, "answer": 0, "rating": 0, "ms": 1500})
+        server.json(
+            "POST",
+            f"api/people/{person['key']}/trials",
+            {"slot": i, "revision": 0, "level": levels_set[s["block"]], "answer": 0, "rating": 0, "ms": 1500},
+        )
+check(
+    server.json(
+        "POST",
+        f"api/people/{person['key']}/trials",
+        {"slot": 0, "revision": 2, "level": 16, "answer": 0, "rating": 0, "ms": 1},
+    )[0]
+    == 409,
+    "a revision may not leave one out",
+)
+server.json(
+    "POST",
+    f"api/people/{person['key']}/trials",
+    {"slot": 0, "revision": 1, "level": 256, "answer": 0, "rating": 0, "ms": 1500},
+)
 server.stop()
 r = ggn("report", adjustment)
 report = os.path.join(adjustment, "report")
 lines = open(os.path.join(report, "blocks.csv")).read().split("\n")
-wanted = {0: (64 * 16 * (1024 if slots[0]["block"] == 1 else 512)) ** (1 / 3), 1: (256 * 256 * (1024 if slots[0]["block"] == 0 else 512)) ** (1 / 3)}
+wanted = {
+    0: (64 * 16 * (1024 if slots[0]["block"] == 1 else 512)) ** (1 / 3),
+    1: (256 * 256 * (1024 if slots[0]["block"] == 0 else 512)) ** (1 / 3),
+}
 got = {int(line.split(";")[1]): float(line.split(";")[2]) for line in lines[1:] if line}
-check(r.returncode == 0 and all(abs(got[b] / wanted[b] - 1) < 1e-3 for b in wanted), "report: thresholds are the geometric means over people and settings",
-      f"{r.stderr} {got} {wanted}")
-check(all(os.path.exists(os.path.join(report, f)) for f in
-          ("thresholds.csv", "thresholds-levels.json", "estimates.csv", "people.csv", "report.json", "thresholds.png", "people.png")), "report: all its files")
-r = subprocess.run([GGN, "compare", os.path.join(report, "thresholds.csv"), os.path.join(report, "thresholds-levels.json"), "--json"],
-                   capture_output=True, text=True)
-check(r.returncode == 0 and '"blocks": 2' in r.stdout and json.loads(r.stdout)["mae"] < 0.01, "report: ggn compare reads CSV and JSON", r.stderr)
+check(
+    r.returncode == 0 and all(abs(got[b] / wanted[b] - 1) < 1e-3 for b in wanted),
+    "report: thresholds are the geometric means over people and settings",
+    f"{r.stderr} {got} {wanted}",
+)
+check(
+    all(
+        os.path.exists(os.path.join(report, f))
+        for f in (
+            "thresholds.csv",
+            "thresholds-levels.json",
+            "estimates.csv",
+            "people.csv",
+            "report.json",
+            "thresholds.png",
+            "people.png",
+        )
+    ),
+    "report: all its files",
+)
+r = subprocess.run(
+    [GGN, "compare", os.path.join(report, "thresholds.csv"), os.path.join(report, "thresholds-levels.json"), "--json"],
+    capture_output=True,
+    text=True,
+)
+check(
+    r.returncode == 0 and '"blocks": 2' in r.stdout and json.loads(r.stdout)["mae"] < 0.01,
+    "report: ggn compare reads CSV and JSON",
+    r.stderr,
+)
 ceiling = json.load(open(os.path.join(report, "report.json")))["noise_ceiling"]
-check(ceiling["people"] == 0 and ceiling["pearson_lower"] is None, "report: two blocks are too few for a noise ceiling, and it says so")
+check(
+    ceiling["people"] == 0 and ceiling["pearson_lower"] is None,
+    "report: two blocks are too few for a noise ceiling, and it says so",
+)
 exported = os.path.join(TMP.name, "trials.json")
 r = ggn("export", adjustment, "-o", exported)
-check(r.returncode == 0 and len(json.load(open(exported))["people"]) == 3 and "key" not in json.load(open(exported))["people"][0], "export, without keys")
+check(
+    r.returncode == 0
+    and len(json.load(open(exported))["people"]) == 3
+    and "key" not in json.load(open(exported))["people"][0],
+    "export, without keys",
+)
 copy = os.path.join(TMP.name, "copy")
 os.makedirs(copy)
 for name in ("study.json", "texts.json"):
@@ -298,8 +481,12 @@ check(open(exported).read() == open(exported + "2").read(), "and out again: the 
 fails("import: nobody twice", "is in the study already", "import", copy, exported)
 fails("import: another study", "trials of another study", "import", study, exported)
 fails("delete: nobody has that code", "nobody has the code", "delete", adjustment, "zzzzzzzz")
-check(ggn("delete", adjustment, codes[2]).returncode == 0 and ggn("report", adjustment, "-n").returncode == 0 and
-      codes[2] not in open(os.path.join(report, "people.csv")).read(), "delete: gone from the next report")
+check(
+    ggn("delete", adjustment, codes[2]).returncode == 0
+    and ggn("report", adjustment, "-n").returncode == 0
+    and codes[2] not in open(os.path.join(report, "people.csv")).read(),
+    "delete: gone from the next report",
+)
 check(len(contents(adjustment)[1]) == 8, "delete: the others' trials stay")
 check(ggn().returncode == 2 and ggn("taste", study).returncode == 2 and ggn("--help").returncode == 0, "usage")
 

@@ -14,11 +14,12 @@ check() { # check NAME STATUS
 
 mkdir "$tmp/data"
 for scene in cornell-box demo; do
-    "$bin/pathtracer" -q scenes/$scene.pbrt --size 64x32 --block 32 --sampler independent --levels geometric:20:400:1.35 --reference-spp 512 \
-        --sequence "$tmp/data/$scene" --name $scene >"$tmp/out" 2>"$tmp/err"
+    "$bin/pathtracer" -q scenes/$scene.pbrt --size 64x32 --block 32 --sampler independent --levels geometric:20:400:1.35 \
+        --reference-spp 512 --sequence "$tmp/data/$scene" --name $scene >"$tmp/out" 2>"$tmp/err"
     check "record $scene" $?
 done
-"$bin/ggn" study init "$tmp/study" --task thresholds --views "$tmp/data/cornell-box" "$tmp/data/demo" --repeats 1 >"$tmp/out" 2>"$tmp/err" &&
+"$bin/ggn" study init "$tmp/study" --task thresholds --views "$tmp/data/cornell-box" "$tmp/data/demo" --repeats 1 \
+    >"$tmp/out" 2>"$tmp/err" &&
     [ "$(find "$tmp/study/stimuli" -name 'b0-10000.png' -o -name 'b0-9*.png' | wc -l)" -ge 2 ]
 check "init: levels up to 10,000 from the halves" $?
 "$bin/ggn" study serve "$tmp/study" --listen 127.0.0.1:0 >"$tmp/link" 2>"$tmp/err" &
@@ -41,7 +42,8 @@ END
 check "a simulated participant sets all blocks" $?
 kill $server && wait $server
 check "serve ends" $?
-"$bin/ggn" study report "$tmp/study" --no-pictures >"$tmp/out" 2>"$tmp/err" && [ "$(wc -l <"$tmp/study/report/thresholds.csv")" -eq 2 ]
+"$bin/ggn" study report "$tmp/study" --no-pictures >"$tmp/out" 2>"$tmp/err" &&
+    [ "$(wc -l <"$tmp/study/report/thresholds.csv")" -eq 2 ]
 check "report" $?
 "$bin/ggn" label "$tmp/data" --human "$tmp/study/report/thresholds.csv" >"$tmp/out" 2>"$tmp/err" &&
     [ "$(grep -c 'labelled with human thresholds' "$tmp/out")" -eq 2 ] && grep -q '"human"' "$tmp/data/demo/labels.json"
@@ -50,7 +52,8 @@ echo '{"train": ["cornell-box"], "validation": ["demo"], "test": []}' >"$tmp/dat
 "$bin/ggn" train --data "$tmp/data" --out "$tmp/mine.ggn" --kr 4 --km 6 --kd 16 --crop 32 --ratio 0 --steps-denoiser 4 --steps 8 \
     --epoch-steps 4 >"$tmp/out" 2>"$tmp/err" && [ -s "$tmp/mine.ggn" ]
 check "train" $?
-"$bin/ggn" compare "$tmp/study/report/thresholds.csv" "$tmp/study/report/thresholds-demo.json" --view demo --json >"$tmp/out" 2>"$tmp/err" &&
+"$bin/ggn" compare "$tmp/study/report/thresholds.csv" "$tmp/study/report/thresholds-demo.json" --view demo --json \
+    >"$tmp/out" 2>"$tmp/err" &&
     grep -q '"blocks": 2,' "$tmp/out"
 check "compare with people" $?
 echo "1..$n"

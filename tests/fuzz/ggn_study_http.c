@@ -1,7 +1,7 @@
 /*
- * A request to a study, as it comes from the network: METHOD PATH, a line of Host, Origin, Sec-Fetch-Site and Content-Type (each after
- * a tab, empty: not sent), then the body. The first byte chooses the task. Whatever comes, there is an answer, and trials that were
- * stored before stay as they were.
+ * A request to a study, as it comes from the network: METHOD PATH, a line of Host, Origin, Sec-Fetch-Site and Content-Type
+ * (each after a tab, empty: not sent), then the body. The first byte chooses the task. Whatever comes, there is an answer,
+ * and trials that were stored before stay as they were.
  */
 #include <stdint.h>
 #include <stdio.h>
@@ -15,11 +15,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 #define KEY "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa"
 
-static const char head[] = "{\"format\":\"lull-study\",\"version\":1,\"id\":\"00000000000000000000000000000000\",\"seed\":1,\"trials\":4,"
-                           "\"repeats\":2,\"catch_share\":0.25,\"show_ms\":1,\"gap_ms\":1,\"break_every\":0,\"min_catch_passed\":0.5,"
-                           "\"max_untouched\":0.5,\"conditions\":[\"a\",\"b\"],\"views\":[{\"name\":\"v\",\"width\":16,\"height\":8,\"blocks\":["
-                           "{\"id\":0,\"x0\":0,\"y0\":0,\"x1\":8,\"y1\":8,\"levels\":[16,64,256]},"
-                           "{\"id\":1,\"x0\":8,\"y0\":0,\"x1\":16,\"y1\":8,\"levels\":[16,64,256]}]}],\"task\":\"";
+static const char head[] =
+    "{\"format\":\"lull-study\",\"version\":1,\"id\":\"00000000000000000000000000000000\",\"seed\":1,\"trials\":4,"
+    "\"repeats\":2,\"catch_share\":0.25,\"show_ms\":1,\"gap_ms\":1,\"break_every\":0,\"min_catch_passed\":0.5,"
+    "\"max_untouched\":0.5,\"conditions\":[\"a\",\"b\"],\"views\":[{\"name\":\"v\",\"width\":16,\"height\":8,\"blocks\":["
+    "{\"id\":0,\"x0\":0,\"y0\":0,\"x1\":8,\"y1\":8,\"levels\":[16,64,256]},"
+    "{\"id\":1,\"x0\":8,\"y0\":0,\"x1\":16,\"y1\":8,\"levels\":[16,64,256]}]}],\"task\":\"";
 
 static struct ggn_study studies[3];
 
@@ -47,7 +48,8 @@ static char *cut(char *text, char end)
 static void ask(const struct ggn_study *study, struct ggn_study_store *store, struct ggn_study_request *q)
 {
     static const char *const hosts[] = {"h", NULL};
-    struct ggn_study_site site = {.dir = "/nonexistent", .page_dir = "/nonexistent", .hosts = hosts, .study = study, .store = store};
+    struct ggn_study_site site = {
+        .dir = "/nonexistent", .page_dir = "/nonexistent", .hosts = hosts, .study = study, .store = store};
     struct ggn_study_response r;
     ggn_study_answer(&site, q, &r);
     if (r.status < 200 || r.status > 599 || (r.fd < 0 && (!r.body || strlen(r.body) != r.size)) || !r.type)
@@ -86,8 +88,14 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
             fields[i] = *headers ? headers : NULL;
             headers = next;
         }
-        struct ggn_study_request q = {.method = text, .path = path, .host = fields[0], .origin = fields[1], .fetch_site = fields[2],
-                                      .content_type = fields[3], .body = body, .size = size - 1 - (size_t)(body - text)};
+        struct ggn_study_request q = {.method = text,
+                                      .path = path,
+                                      .host = fields[0],
+                                      .origin = fields[1],
+                                      .fetch_site = fields[2],
+                                      .content_type = fields[3],
+                                      .body = body,
+                                      .size = size - 1 - (size_t)(body - text)};
         ask(study, store, &q);
         if (ggn_study_store_trials(store, 1, &trials, &n, &err) || n < 1 || trials[0].level != 16 || trials[0].answer != 1)
             abort();

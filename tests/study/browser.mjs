@@ -1,5 +1,5 @@
-// A real browser goes through every task to the end, at two window sizes, once with the keyboard alone; reload, a second tab, a
-// lost connection and a killed server lose nothing. Screenshots are left beside the studies to be looked at.
+// A real browser goes through every task to the end, at two window sizes, once with the keyboard alone; reload, a second tab,
+// a lost connection and a killed server lose nothing. Screenshots are left beside the studies to be looked at.
 // usage: GGN=… CHROMIUM=… node browser.mjs FOLDER
 import fs from 'node:fs';
 import path from 'node:path';
@@ -7,7 +7,8 @@ import { chromium } from 'playwright-core';
 import { Client, Server, check, finish, ggn, makeConditions, makeLevels } from './support.mjs';
 
 const root = process.argv[2];
-const SMALL = { width: 1280, height: 800 }, LARGE = { width: 1960, height: 1080 };
+const SMALL = { width: 1280, height: 800 },
+    LARGE = { width: 1960, height: 1080 };
 const LEVELS = [16, 32, 64, 128, 256, 512, 1024, 2048, 4096];
 const outside = []; // requests that would leave this machine
 const errors = [];
@@ -22,319 +23,420 @@ makeConditions(path.join(root, 'hall'), 800, 800, { lull: 1, 'fixed-64': 12 });
 const browser = await chromium.launch({ executablePath: process.env.CHROMIUM, args: ['--no-sandbox'] });
 
 async function openPage(link, viewport, options = {}) {
-  const context = await browser.newContext({ viewport, screen: viewport, ...options });
-  const page = await context.newPage();
-  page.on('request', (r) => { if (!/^(http:\/\/127\.0\.0\.1:|blob:|data:)/.test(r.url())) outside.push(r.url()); });
-  page.on('pageerror', (e) => errors.push(e.message));
-  page.on('console', (m) => { if (m.type() === 'error' && !/ERR_|Failed to load resource/.test(m.text())) errors.push(m.text()); });
-  await page.goto(link);
-  return page;
+    const context = await browser.newContext({ viewport, screen: viewport, ...options });
+    const page = await context.newPage();
+    page.on('request', (r) => {
+        if (!/^(http:\/\/127\.0\.0\.1:|blob:|data:)/.test(r.url())) outside.push(r.url());
+    });
+    page.on('pageerror', (e) => errors.push(e.message));
+    page.on('console', (m) => {
+        if (m.type() === 'error' && !/ERR_|Failed to load resource/.test(m.text())) errors.push(m.text());
+    });
+    await page.goto(link);
+    return page;
 }
 
 const shot = (page, name) => page.screenshot({ path: path.join(root, 'shots', `${name}.png`) });
-const state = (page, ...names) => page.waitForFunction((n) => n.includes(document.body.dataset.state), names, { timeout: 30000 });
+const state = (page, ...names) =>
+    page.waitForFunction((n) => n.includes(document.body.dataset.state), names, { timeout: 30000 });
 const title = (page, words) => page.getByRole('heading', { name: words }).waitFor();
 
 // Consent to instructions. shots: prefix of the screenshots, or none.
 async function enter(page, shots) {
-  const see = async (name) => shots && shot(page, `${shots}-${name}`);
-  await title(page, 'A study on noise');
-  await see('consent');
-  await page.getByRole('checkbox').check();
-  await page.getByRole('button', { name: 'I agree' }).click();
-  await title(page, 'A few questions');
-  for (const group of await page.locator('fieldset').all()) await group.locator('input').first().check();
-  await see('questions');
-  await page.getByRole('button', { name: 'Continue' }).click();
-  await title(page, 'How large is your screen');
-  await see('card');
-  await page.getByRole('button', { name: 'Continue' }).click();
-  await title(page, 'How far away');
-  await page.getByRole('button', { name: 'Continue' }).click();
-  await title(page, 'How does your screen show greys');
-  await page.locator('input[name=gamma]').fill('186');
-  await see('gamma');
-  await page.getByRole('button', { name: 'Continue' }).click();
-  await page.getByRole('button', { name: 'Start' }).waitFor();
-  await see('instructions');
+    const see = async (name) => shots && shot(page, `${shots}-${name}`);
+    await title(page, 'A study on noise');
+    await see('consent');
+    await page.getByRole('checkbox').check();
+    await page.getByRole('button', { name: 'I agree' }).click();
+    await title(page, 'A few questions');
+    for (const group of await page.locator('fieldset').all()) await group.locator('input').first().check();
+    await see('questions');
+    await page.getByRole('button', { name: 'Continue' }).click();
+    await title(page, 'How large is your screen');
+    await see('card');
+    await page.getByRole('button', { name: 'Continue' }).click();
+    await title(page, 'How far away');
+    await page.getByRole('button', { name: 'Continue' }).click();
+    await title(page, 'How does your screen show greys');
+    await page.locator('input[name=gamma]').fill('186');
+    await see('gamma');
+    await page.getByRole('button', { name: 'Continue' }).click();
+    await page.getByRole('button', { name: 'Start' }).waitFor();
+    await see('instructions');
 }
 
 // The same with Tab, Space, arrows and Enter.
 async function enterByKeys(page) {
-  await title(page, 'A study on noise');
-  await page.keyboard.press('Space');
-  await page.keyboard.press('Enter');
-  await title(page, 'A few questions');
-  for (let i = 0; i < 5; i++) {
-    if (i > 0) await page.keyboard.press('Tab');
+    await title(page, 'A study on noise');
     await page.keyboard.press('Space');
-  }
-  await page.keyboard.press('Enter');
-  await title(page, 'How large is your screen');
-  await page.keyboard.press('ArrowRight');
-  await page.keyboard.press('Enter');
-  await title(page, 'How far away');
-  await page.keyboard.press('Enter');
-  await title(page, 'How does your screen show greys');
-  for (let i = 0; i < 58; i++) await page.keyboard.press('ArrowRight');
-  await page.keyboard.press('Enter');
-  await page.getByRole('button', { name: 'Start' }).waitFor();
-  await page.keyboard.press('Enter');
+    await page.keyboard.press('Enter');
+    await title(page, 'A few questions');
+    for (let i = 0; i < 5; i++) {
+        if (i > 0) await page.keyboard.press('Tab');
+        await page.keyboard.press('Space');
+    }
+    await page.keyboard.press('Enter');
+    await title(page, 'How large is your screen');
+    await page.keyboard.press('ArrowRight');
+    await page.keyboard.press('Enter');
+    await title(page, 'How far away');
+    await page.keyboard.press('Enter');
+    await title(page, 'How does your screen show greys');
+    for (let i = 0; i < 58; i++) await page.keyboard.press('ArrowRight');
+    await page.keyboard.press('Enter');
+    await page.getByRole('button', { name: 'Start' }).waitFor();
+    await page.keyboard.press('Enter');
 }
 
 const keyOf = (page) => new URL(page.url()).searchParams.get('p');
 const stored = async (server, key) => (await new Client(server.link).get(`api/people/${key}`)).body;
 
 async function study(name, ...args) {
-  const dir = path.join(root, name);
-  ggn('init', dir, ...args);
-  return new Server(dir).start();
+    const dir = path.join(root, name);
+    ggn('init', dir, ...args);
+    return new Server(dir).start();
 }
 
 // --- adjustment ---
 
 async function adjustByMouse(page, server, shots) {
-  await page.getByRole('button', { name: 'Start' }).click();
-  await state(page, 'asking');
-  const canvas = page.locator('canvas').first();
-  const box = await canvas.boundingBox();
-  const at = (i) => [box.x + 100 + 200 * (i % 4), box.y + 100 + 200 * Math.floor(i / 4)];
-  for (let i = 0; i < 16; i++) {
-    await page.mouse.move(...at(i));
-    for (let k = 0; k < 3; k++) await page.mouse.wheel(0, i % 2 ? 120 : -120);
-    if (i === 5 && shots) await shot(page, `${shots}-adjustment`);
-    await page.mouse.click(...at(i));
-    await page.waitForFunction((n) => document.querySelectorAll('.map .done').length === n, i + 1);
-    if (i === 7) { // in the middle: what was set is there after a reload
-      await page.reload();
-      await page.getByRole('button', { name: 'Start' }).click();
-      await state(page, 'asking');
-      check(await page.locator('.map .done').count() === 8, 'adjustment: a reload keeps the settings');
+    await page.getByRole('button', { name: 'Start' }).click();
+    await state(page, 'asking');
+    const canvas = page.locator('canvas').first();
+    const box = await canvas.boundingBox();
+    const at = (i) => [box.x + 100 + 200 * (i % 4), box.y + 100 + 200 * Math.floor(i / 4)];
+    for (let i = 0; i < 16; i++) {
+        await page.mouse.move(...at(i));
+        for (let k = 0; k < 3; k++) await page.mouse.wheel(0, i % 2 ? 120 : -120);
+        if (i === 5 && shots) await shot(page, `${shots}-adjustment`);
+        await page.mouse.click(...at(i));
+        await page.waitForFunction((n) => document.querySelectorAll('.map .done').length === n, i + 1);
+        if (i === 7) {
+            // in the middle: what was set is there after a reload
+            await page.reload();
+            await page.getByRole('button', { name: 'Start' }).click();
+            await state(page, 'asking');
+            check((await page.locator('.map .done').count()) === 8, 'adjustment: a reload keeps the settings');
+        }
     }
-  }
-  const before = await stored(server, keyOf(page));
-  await page.mouse.move(...at(3)); // set once more: kept as a second revision
-  for (let k = 0; k < 9; k++) await page.mouse.wheel(0, -120);
-  await page.mouse.click(...at(3));
-  await page.waitForTimeout(300);
-  const after = await stored(server, keyOf(page));
-  check(before.trials.length === 16 && after.trials.length === 17 && after.trials.some((t) => t.slot === 3 && t.revision === 1 && t.level === 4096),
-    'adjustment: a field set again is a second revision', JSON.stringify([before.trials.length, after.trials.length]));
-  if (shots) await shot(page, `${shots}-adjustment-done`);
-  await page.getByRole('button', { name: 'Next picture' }).click();
-  await state(page, 'finished');
-  if (shots) await shot(page, `${shots}-thanks`);
+    const before = await stored(server, keyOf(page));
+    await page.mouse.move(...at(3)); // set once more: kept as a second revision
+    for (let k = 0; k < 9; k++) await page.mouse.wheel(0, -120);
+    await page.mouse.click(...at(3));
+    await page.waitForTimeout(300);
+    const after = await stored(server, keyOf(page));
+    check(
+        before.trials.length === 16 &&
+            after.trials.length === 17 &&
+            after.trials.some((t) => t.slot === 3 && t.revision === 1 && t.level === 4096),
+        'adjustment: a field set again is a second revision',
+        JSON.stringify([before.trials.length, after.trials.length]),
+    );
+    if (shots) await shot(page, `${shots}-adjustment-done`);
+    await page.getByRole('button', { name: 'Next picture' }).click();
+    await state(page, 'finished');
+    if (shots) await shot(page, `${shots}-thanks`);
 }
 
 async function adjustByKeys(page, server) {
-  await state(page, 'asking');
-  const order = [...Array(16).keys()].map((i) => (i >> 2) % 2 ? 4 * (i >> 2) + 3 - i % 4 : i); // a snake through the rows
-  for (let n = 0; n < 16; n++) {
-    if (n > 0) await page.keyboard.press(order[n] - order[n - 1] === 4 ? 'ArrowDown' : order[n] > order[n - 1] ? 'ArrowRight' : 'ArrowLeft');
-    for (let k = 0; k < 9; k++) await page.keyboard.press('-');
-    await page.keyboard.press('+');
-    await page.keyboard.press('+');
-    if (n === 6) {
-      await page.keyboard.down('Space');
-      await shot(page, 'keys-reference');
-      await page.keyboard.up('Space');
+    await state(page, 'asking');
+    // a snake through the rows
+    const order = [...Array(16).keys()].map((i) => ((i >> 2) % 2 ? 4 * (i >> 2) + 3 - (i % 4) : i));
+    for (let n = 0; n < 16; n++) {
+        if (n > 0)
+            await page.keyboard.press(
+                order[n] - order[n - 1] === 4 ? 'ArrowDown' : order[n] > order[n - 1] ? 'ArrowRight' : 'ArrowLeft',
+            );
+        for (let k = 0; k < 9; k++) await page.keyboard.press('-');
+        await page.keyboard.press('+');
+        await page.keyboard.press('+');
+        if (n === 6) {
+            await page.keyboard.down('Space');
+            await shot(page, 'keys-reference');
+            await page.keyboard.up('Space');
+        }
+        await page.keyboard.press('Enter');
+        await page.waitForFunction((m) => document.querySelectorAll('.map .done').length === m, n + 1);
     }
     await page.keyboard.press('Enter');
-    await page.waitForFunction((m) => document.querySelectorAll('.map .done').length === m, n + 1);
-  }
-  await page.keyboard.press('Enter');
-  await state(page, 'finished');
-  const person = await stored(server, keyOf(page));
-  check(person.trials.length === 16 && person.trials.every((t) => t.level === 64), 'adjustment by keys alone: every field at the level chosen',
-    JSON.stringify(person.trials));
+    await state(page, 'finished');
+    const person = await stored(server, keyOf(page));
+    check(
+        person.trials.length === 16 && person.trials.every((t) => t.level === 64),
+        'adjustment by keys alone: every field at the level chosen',
+        JSON.stringify(person.trials),
+    );
 }
 
 {
-  const server = await study('adjustment', '--task', 'thresholds', '--views', path.join(root, 'ball'), '--repeats', '1');
-  const page = await openPage(server.link, SMALL);
-  await enter(page, 'small');
-  await adjustByMouse(page, server, 'small');
-  check(true, 'adjustment to the end at 1280×800, by mouse');
-  const profile = (await stored(server, keyOf(page))).profile;
-  check(profile.answers.vision.startsWith('well') && profile.screen.pixels_per_degree > 20 && Math.abs(profile.screen.gamma - 2.2) < 0.1 &&
-    profile.screen.device_pixel_ratio === 1, 'answers and screen are stored', JSON.stringify(profile));
-  await page.context().close();
-  const large = await openPage(server.link, LARGE);
-  await enterByKeys(large);
-  await state(large, 'asking');
-  check(await large.locator('.stage canvas').count() === 2, 'adjustment: the reference stands beside on a wide screen');
-  await large.waitForTimeout(500);
-  await shot(large, 'large-adjustment');
-  await adjustByKeys(large, server);
-  await large.context().close();
-  await server.stop();
+    const server = await study('adjustment', '--task', 'thresholds', '--views', path.join(root, 'ball'), '--repeats', '1');
+    const page = await openPage(server.link, SMALL);
+    await enter(page, 'small');
+    await adjustByMouse(page, server, 'small');
+    check(true, 'adjustment to the end at 1280×800, by mouse');
+    const profile = (await stored(server, keyOf(page))).profile;
+    check(
+        profile.answers.vision.startsWith('well') &&
+            profile.screen.pixels_per_degree > 20 &&
+            Math.abs(profile.screen.gamma - 2.2) < 0.1 &&
+            profile.screen.device_pixel_ratio === 1,
+        'answers and screen are stored',
+        JSON.stringify(profile),
+    );
+    await page.context().close();
+    const large = await openPage(server.link, LARGE);
+    await enterByKeys(large);
+    await state(large, 'asking');
+    check((await large.locator('.stage canvas').count()) === 2, 'adjustment: the reference stands beside on a wide screen');
+    await large.waitForTimeout(500);
+    await shot(large, 'large-adjustment');
+    await adjustByKeys(large, server);
+    await large.context().close();
+    await server.stop();
 }
 
 // --- two intervals ---
 
 async function answerTrials(page, n, key = () => '1') {
-  for (let i = 0; i < n; i++) {
-    await state(page, 'asking');
-    await page.keyboard.press(key(i));
-    await page.waitForFunction(() => document.body.dataset.state !== 'asking');
-  }
+    for (let i = 0; i < n; i++) {
+        await state(page, 'asking');
+        await page.keyboard.press(key(i));
+        await page.waitForFunction(() => document.body.dataset.state !== 'asking');
+    }
 }
 
 {
-  const server = await study('2ifc', '--task', 'thresholds', '--method', '2ifc', '--views', path.join(root, 'small'), '--trials', '10',
-    '--show', '60', '--gap', '40', '--break-every', '12');
-  const page = await openPage(server.link, SMALL);
-  await enter(page);
-  await page.getByRole('button', { name: 'Start' }).click();
-  await state(page, 'showing');
-  await shot(page, 'small-2ifc-showing');
-  await state(page, 'asking');
-  await shot(page, 'small-2ifc-asking');
-  await answerTrials(page, 4);
-  await state(page, 'asking');
-  const key = keyOf(page);
-  check((await stored(server, key)).trials.length === 4, '2ifc: every answer is stored at once');
-  await page.reload();
-  await page.getByRole('button', { name: 'Start' }).click();
-  await answerTrials(page, 1);
-  await state(page, 'asking');
-  check((await stored(server, key)).trials.length === 5, '2ifc: a reload goes on where it was');
+    const server = await study(
+        '2ifc',
+        '--task',
+        'thresholds',
+        '--method',
+        '2ifc',
+        '--views',
+        path.join(root, 'small'),
+        '--trials',
+        '10',
+        '--show',
+        '60',
+        '--gap',
+        '40',
+        '--break-every',
+        '12',
+    );
+    const page = await openPage(server.link, SMALL);
+    await enter(page);
+    await page.getByRole('button', { name: 'Start' }).click();
+    await state(page, 'showing');
+    await shot(page, 'small-2ifc-showing');
+    await state(page, 'asking');
+    await shot(page, 'small-2ifc-asking');
+    await answerTrials(page, 4);
+    await state(page, 'asking');
+    const key = keyOf(page);
+    check((await stored(server, key)).trials.length === 4, '2ifc: every answer is stored at once');
+    await page.reload();
+    await page.getByRole('button', { name: 'Start' }).click();
+    await answerTrials(page, 1);
+    await state(page, 'asking');
+    check((await stored(server, key)).trials.length === 5, '2ifc: a reload goes on where it was');
 
-  // a second tab goes on; the first one is told, and goes on after it
-  const second = await page.context().newPage();
-  await second.goto(page.url());
-  await second.getByRole('button', { name: 'Start' }).click();
-  await answerTrials(second, 1);
-  await state(second, 'asking');
-  await page.keyboard.press('2');
-  await title(page, 'Open somewhere else');
-  await shot(page, 'small-conflict');
-  check((await stored(server, key)).trials.length === 6, '2ifc: a second tab: nothing twice, nothing lost');
-  await second.close();
-  await page.getByRole('button', { name: 'Continue here' }).click();
-  await page.getByRole('button', { name: 'Start' }).click();
+    // a second tab goes on; the first one is told, and goes on after it
+    const second = await page.context().newPage();
+    await second.goto(page.url());
+    await second.getByRole('button', { name: 'Start' }).click();
+    await answerTrials(second, 1);
+    await state(second, 'asking');
+    await page.keyboard.press('2');
+    await title(page, 'Open somewhere else');
+    await shot(page, 'small-conflict');
+    check((await stored(server, key)).trials.length === 6, '2ifc: a second tab: nothing twice, nothing lost');
+    await second.close();
+    await page.getByRole('button', { name: 'Continue here' }).click();
+    await page.getByRole('button', { name: 'Start' }).click();
 
-  // the connection is lost while answering
-  await state(page, 'asking');
-  await page.context().setOffline(true);
-  await page.keyboard.press('1');
-  await page.getByText('The connection is lost').waitFor();
-  await shot(page, 'small-lost');
-  check((await stored(server, key)).trials.length === 6, '2ifc: offline: the answer waits');
-  await page.context().setOffline(false);
-  await state(page, 'asking');
-  check((await stored(server, key)).trials.length === 7, '2ifc: online again: it arrives');
+    // the connection is lost while answering
+    await state(page, 'asking');
+    await page.context().setOffline(true);
+    await page.keyboard.press('1');
+    await page.getByText('The connection is lost').waitFor();
+    await shot(page, 'small-lost');
+    check((await stored(server, key)).trials.length === 6, '2ifc: offline: the answer waits');
+    await page.context().setOffline(false);
+    await state(page, 'asking');
+    check((await stored(server, key)).trials.length === 7, '2ifc: online again: it arrives');
 
-  // the server is killed while answering
-  await server.stop('SIGKILL');
-  await page.keyboard.press('1');
-  await page.getByText('The connection is lost').waitFor();
-  await server.start();
-  await state(page, 'asking');
-  const after = await stored(server, key);
-  check(after.trials.length === 8 && after.trials.every((t, i) => t.slot === i), '2ifc: killed and started again: all is there');
-  await answerTrials(page, 4);
-  await title(page, 'Take a break');
-  await shot(page, 'small-break');
-  await page.keyboard.press('Enter');
-  await answerTrials(page, 8, (i) => i % 2 ? 'ArrowRight' : 'ArrowLeft');
-  await state(page, 'finished');
-  const person = await stored(server, key);
-  check(person.trials.length === 20 && person.slots.filter((s) => s.catch).length === 2, '2ifc to the end at 1280×800, one catch trial in ten');
-  check(person.trials.every((t) => !person.slots[t.slot].catch || t.level === 16), '2ifc: catch trials at the lowest level');
-  await page.context().close();
+    // the server is killed while answering
+    await server.stop('SIGKILL');
+    await page.keyboard.press('1');
+    await page.getByText('The connection is lost').waitFor();
+    await server.start();
+    await state(page, 'asking');
+    const after = await stored(server, key);
+    check(
+        after.trials.length === 8 && after.trials.every((t, i) => t.slot === i),
+        '2ifc: killed and started again: all is there',
+    );
+    await answerTrials(page, 4);
+    await title(page, 'Take a break');
+    await shot(page, 'small-break');
+    await page.keyboard.press('Enter');
+    await answerTrials(page, 8, (i) => (i % 2 ? 'ArrowRight' : 'ArrowLeft'));
+    await state(page, 'finished');
+    const person = await stored(server, key);
+    check(
+        person.trials.length === 20 && person.slots.filter((s) => s.catch).length === 2,
+        '2ifc to the end at 1280×800, one catch trial in ten',
+    );
+    check(
+        person.trials.every((t) => !person.slots[t.slot].catch || t.level === 16),
+        '2ifc: catch trials at the lowest level',
+    );
+    await page.context().close();
 
-  const large = await openPage(server.link, LARGE);
-  await enterByKeys(large);
-  await answerTrials(large, 12, () => '2');
-  await title(large, 'Take a break');
-  await large.keyboard.press('Enter');
-  await answerTrials(large, 8, () => '2');
-  await state(large, 'finished');
-  check((await stored(server, keyOf(large))).trials.length === 20, '2ifc to the end at 1960×1080, by keys alone');
-  await large.context().close();
-  await server.stop();
+    const large = await openPage(server.link, LARGE);
+    await enterByKeys(large);
+    await answerTrials(large, 12, () => '2');
+    await title(large, 'Take a break');
+    await large.keyboard.press('Enter');
+    await answerTrials(large, 8, () => '2');
+    await state(large, 'finished');
+    check((await stored(server, keyOf(large))).trials.length === 20, '2ifc to the end at 1960×1080, by keys alone');
+    await large.context().close();
+    await server.stop();
 }
 
 // --- validation ---
 
 async function judge(page, beside, key) {
-  await state(page, 'asking');
-  if (!beside) {
-    await page.keyboard.press('ArrowRight');
-    await page.waitForTimeout(80);
-  }
-  await page.keyboard.press(key);
-  await state(page, 'rating');
-  await page.keyboard.press(key === 's' ? '5' : '3');
-  await page.waitForFunction(() => document.body.dataset.state !== 'rating');
+    await state(page, 'asking');
+    if (!beside) {
+        await page.keyboard.press('ArrowRight');
+        await page.waitForTimeout(80);
+    }
+    await page.keyboard.press(key);
+    await state(page, 'rating');
+    await page.keyboard.press(key === 's' ? '5' : '3');
+    await page.waitForFunction(() => document.body.dataset.state !== 'rating');
 }
 
-for (const [name, viewport, beside] of [['small', SMALL, false], ['large', LARGE, true]]) {
-  const server = await study(`validation-${name}`, '--task', 'validation', '--views', path.join(root, 'room'), path.join(root, 'hall'), '--gap', '40',
-    '--repeats', '2');
-  const page = await openPage(server.link, viewport);
-  await enterByKeys(page);
-  await state(page, 'asking');
-  await page.waitForTimeout(300);
-  await shot(page, `${name}-validation`);
-  if (!beside) {
-    await page.keyboard.press('s');
-    check(await page.getByText('Look at A and at B first').isVisible(), 'validation: no answer before both were seen');
-  }
-  const total = (await stored(server, keyOf(page))).slots.length;
-  await judge(page, beside, 's');
-  await state(page, 'asking');
-  await page.reload();
-  await page.getByRole('button', { name: 'Start' }).click();
-  for (let i = 1; i < total; i++) {
-    if (i === 2) {
-      await state(page, 'asking');
-      if (!beside) { await page.keyboard.press('ArrowRight'); await page.waitForTimeout(80); }
-      await page.keyboard.press('d');
-      await state(page, 'rating');
-      await shot(page, `${name}-validation-rating`);
-      await page.getByRole('button', { name: 'slightly' }).click();
-      await page.waitForFunction(() => document.body.dataset.state !== 'rating');
-    } else {
-      await judge(page, beside, i % 3 ? 's' : 'd');
+for (const [name, viewport, beside] of [
+    ['small', SMALL, false],
+    ['large', LARGE, true],
+]) {
+    const server = await study(
+        `validation-${name}`,
+        '--task',
+        'validation',
+        '--views',
+        path.join(root, 'room'),
+        path.join(root, 'hall'),
+        '--gap',
+        '40',
+        '--repeats',
+        '2',
+    );
+    const page = await openPage(server.link, viewport);
+    await enterByKeys(page);
+    await state(page, 'asking');
+    await page.waitForTimeout(300);
+    await shot(page, `${name}-validation`);
+    if (!beside) {
+        await page.keyboard.press('s');
+        check(await page.getByText('Look at A and at B first').isVisible(), 'validation: no answer before both were seen');
     }
-  }
-  await state(page, 'finished');
-  const person = await stored(server, keyOf(page));
-  check(person.trials.length === total && person.trials[0].answer === 1 && person.trials[2].answer === 0 && person.trials[2].rating === 3,
-    `validation to the end at ${viewport.width}×${viewport.height}`);
-  await page.context().close();
-  await server.stop();
+    const total = (await stored(server, keyOf(page))).slots.length;
+    await judge(page, beside, 's');
+    await state(page, 'asking');
+    await page.reload();
+    await page.getByRole('button', { name: 'Start' }).click();
+    for (let i = 1; i < total; i++) {
+        if (i === 2) {
+            await state(page, 'asking');
+            if (!beside) {
+                await page.keyboard.press('ArrowRight');
+                await page.waitForTimeout(80);
+            }
+            await page.keyboard.press('d');
+            await state(page, 'rating');
+            await shot(page, `${name}-validation-rating`);
+            await page.getByRole('button', { name: 'slightly' }).click();
+            await page.waitForFunction(() => document.body.dataset.state !== 'rating');
+        } else {
+            await judge(page, beside, i % 3 ? 's' : 'd');
+        }
+    }
+    await state(page, 'finished');
+    const person = await stored(server, keyOf(page));
+    check(
+        person.trials.length === total &&
+            person.trials[0].answer === 1 &&
+            person.trials[2].answer === 0 &&
+            person.trials[2].rating === 3,
+        `validation to the end at ${viewport.width}×${viewport.height}`,
+    );
+    await page.context().close();
+    await server.stop();
 }
 
 // --- what is refused ---
 
 {
-  const server = await study('refuse', '--task', 'validation', '--views', path.join(root, 'room'));
-  for (const [name, viewport, options, words] of [
-    ['ratio', SMALL, { deviceScaleFactor: 1.25 }, 'scales pages by 1.25'], ['small', { width: 900, height: 700 }, {}, 'too small']]) {
-    const page = await openPage(server.link, viewport, options);
-    check(await page.getByText(words).waitFor().then(() => true, () => false), `refused with a text: ${name}`);
-    await shot(page, `refuse-${name}`);
-    if (name === 'small') {
-      await page.setViewportSize(SMALL);
-      await page.locator('#notice').waitFor({ state: 'hidden' });
-      check(await page.getByRole('heading', { name: 'A study on noise' }).isVisible(), 'a larger window goes on by itself');
+    const server = await study('refuse', '--task', 'validation', '--views', path.join(root, 'room'));
+    for (const [name, viewport, options, words] of [
+        ['ratio', SMALL, { deviceScaleFactor: 1.25 }, 'scales pages by 1.25'],
+        ['small', { width: 900, height: 700 }, {}, 'too small'],
+    ]) {
+        const page = await openPage(server.link, viewport, options);
+        check(
+            await page
+                .getByText(words)
+                .waitFor()
+                .then(
+                    () => true,
+                    () => false,
+                ),
+            `refused with a text: ${name}`,
+        );
+        await shot(page, `refuse-${name}`);
+        if (name === 'small') {
+            await page.setViewportSize(SMALL);
+            await page.locator('#notice').waitFor({ state: 'hidden' });
+            check(
+                await page.getByRole('heading', { name: 'A study on noise' }).isVisible(),
+                'a larger window goes on by itself',
+            );
+        }
+        await page.context().close();
     }
-    await page.context().close();
-  }
-  const retina = await openPage(server.link, SMALL, { deviceScaleFactor: 2 });
-  await title(retina, 'A study on noise');
-  check(await retina.locator('#notice').isHidden(), 'two device pixels per pixel are let in');
-  const zoomed = await retina.context().newPage();
-  await zoomed.addInitScript(() => Object.defineProperty(window, 'outerWidth', { get: () => window.innerWidth * 1.5 }));
-  await zoomed.goto(server.link);
-  check(await zoomed.getByText('zoomed to about 150 %').waitFor().then(() => true, () => false), 'refused with a text: zoom');
-  await shot(zoomed, 'refuse-zoom');
-  await zoomed.goto(`${server.link}?p=${'0'.repeat(32)}`);
-  check(await zoomed.getByText('Nobody has this link').waitFor().then(() => true, () => false), 'an unknown link is told so');
-  await server.stop();
+    const retina = await openPage(server.link, SMALL, { deviceScaleFactor: 2 });
+    await title(retina, 'A study on noise');
+    check(await retina.locator('#notice').isHidden(), 'two device pixels per pixel are let in');
+    const zoomed = await retina.context().newPage();
+    await zoomed.addInitScript(() => Object.defineProperty(window, 'outerWidth', { get: () => window.innerWidth * 1.5 }));
+    await zoomed.goto(server.link);
+    check(
+        await zoomed
+            .getByText('zoomed to about 150 %')
+            .waitFor()
+            .then(
+                () => true,
+                () => false,
+            ),
+        'refused with a text: zoom',
+    );
+    await shot(zoomed, 'refuse-zoom');
+    await zoomed.goto(`${server.link}?p=${'0'.repeat(32)}`);
+    check(
+        await zoomed
+            .getByText('Nobody has this link')
+            .waitFor()
+            .then(
+                () => true,
+                () => false,
+            ),
+        'an unknown link is told so',
+    );
+    await server.stop();
 }
 
 check(outside.length === 0, 'nothing was asked from outside', outside.join('\n'));

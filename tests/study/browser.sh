@@ -4,6 +4,7 @@
 need chromium chromium
 if [ ! -d "$work/node_modules/playwright-core" ]; then
     need npm npm
-    npm install --prefix "$work" --no-fund --no-audit --silent playwright-core@1.65.1 >/dev/null 2>&1 || skip "playwright-core cannot be installed with npm"
+    npm install --prefix "$work" --no-fund --no-audit --silent playwright-core@1.65.1 >/dev/null 2>&1 ||
+        skip "playwright-core cannot be installed with npm"
 fi
 CHROMIUM=$(command -v chromium) exec node "$work/browser.mjs" "$work/browser"

@@ -6,31 +6,52 @@ import path from 'node:path';
 import { Client, Server, check, finish, ggn, makeLevels, random } from './support.mjs';
 
 const root = process.argv[2];
-const PARTICIPANTS = 50, LIMIT_MS = 50;
+const PARTICIPANTS = 50,
+    LIMIT_MS = 50;
 
 fs.rmSync(root, { recursive: true, force: true });
 fs.mkdirSync(root, { recursive: true });
 makeLevels(path.join(root, 'view'), 400, 400, [16, 64, 256, 1024]);
-ggn('init', path.join(root, 'study'), '--task', 'thresholds', '--method', '2ifc', '--trials', '5', '--views', path.join(root, 'view'));
+ggn(
+    'init',
+    path.join(root, 'study'),
+    '--task',
+    'thresholds',
+    '--method',
+    '2ifc',
+    '--trials',
+    '5',
+    '--views',
+    path.join(root, 'view'),
+);
 const server = await new Server(path.join(root, 'study')).start();
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
-const times = [], sent = [];
+const times = [],
+    sent = [];
 
 async function participate(seed) {
-  const next = random(seed), client = new Client(server.link);
-  await sleep(1500 * next());
-  const { body } = await client.post('api/people', { consent: true });
-  const me = (await client.get(`api/people/${body.key}`)).body;
-  for (const [slot, s] of me.slots.entries()) {
-    await sleep(500 + 1000 * next()); // three times as fast as two intervals and an answer take
-    const trial = { slot, revision: 0, level: s.catch ? 16 : [16, 64, 256, 1024][Math.floor(4 * next())], answer: 1 + Math.floor(2 * next()), rating: 0, ms: 1 };
-    const { status, ms } = await client.post(`api/people/${body.key}/trials`, trial);
-    if (status !== 200) throw new Error(`refused: ${status}`);
-    times.push(ms);
-    sent.push(`${body.key} ${slot} ${trial.level} ${trial.answer}`);
-  }
-  client.close();
-  return body.key;
+    const next = random(seed),
+        client = new Client(server.link);
+    await sleep(1500 * next());
+    const { body } = await client.post('api/people', { consent: true });
+    const me = (await client.get(`api/people/${body.key}`)).body;
+    for (const [slot, s] of me.slots.entries()) {
+        await sleep(500 + 1000 * next()); // three times as fast as two intervals and an answer take
+        const trial = {
+            slot,
+            revision: 0,
+            level: s.catch ? 16 : [16, 64, 256, 1024][Math.floor(4 * next())],
+            answer: 1 + Math.floor(2 * next()),
+            rating: 0,
+            ms: 1,
+        };
+        const { status, ms } = await client.post(`api/people/${body.key}/trials`, trial);
+        if (status !== 200) throw new Error(`refused: ${status}`);
+        times.push(ms);
+        sent.push(`${body.key} ${slot} ${trial.level} ${trial.answer}`);
+    }
+    client.close();
+    return body.key;
 }
 
 const from = Date.now();
@@ -38,16 +59,26 @@ const keys = await Promise.all(Array.from({ length: PARTICIPANTS }, (_, i) => pa
 const seconds = (Date.now() - from) / 1000;
 await server.stop('SIGKILL');
 await server.start();
-const client = new Client(server.link), kept = [];
-for (const key of keys) for (const t of (await client.get(`api/people/${key}`)).body.trials) kept.push(`${key} ${t.slot} ${t.level} ${t.answer}`);
+const client = new Client(server.link),
+    kept = [];
+for (const key of keys)
+    for (const t of (await client.get(`api/people/${key}`)).body.trials)
+        kept.push(`${key} ${t.slot} ${t.level} ${t.answer}`);
 client.close();
 await server.stop();
 
 times.sort((a, b) => a - b);
 const at = (q) => times[Math.min(times.length - 1, Math.floor(q * times.length))].toFixed(1);
-console.log(`# ${PARTICIPANTS} at once, ${times.length} trials in ${seconds.toFixed(1)} s: median ${at(0.5)} ms, 99th percentile ${at(0.99)} ms, worst ${at(1)} ms`);
-check(JSON.stringify(kept.sort()) === JSON.stringify(sent.sort()), 'every trial that was acknowledged is there, even after a kill');
+console.log(
+    `# ${PARTICIPANTS} at once, ${times.length} trials in ${seconds.toFixed(1)} s: ` +
+        `median ${at(0.5)} ms, 99th percentile ${at(0.99)} ms, worst ${at(1)} ms`,
+);
+check(
+    JSON.stringify(kept.sort()) === JSON.stringify(sent.sort()),
+    'every trial that was acknowledged is there, even after a kill',
+);
 const busy = os.loadavg()[0]; // others on this machine make us wait: then the time says nothing about the server
-if (Number(at(0.99)) < LIMIT_MS || busy < os.cpus().length + 1) check(Number(at(0.99)) < LIMIT_MS, `99th percentile under ${LIMIT_MS} ms`, at(0.99));
+if (Number(at(0.99)) < LIMIT_MS || busy < os.cpus().length + 1)
+    check(Number(at(0.99)) < LIMIT_MS, `99th percentile under ${LIMIT_MS} ms`, at(0.99));
 else check(true, `99th percentile under ${LIMIT_MS} ms # SKIP ${at(0.99)} ms, on a busy machine (load ${busy.toFixed(1)})`);
 finish();

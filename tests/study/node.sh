@@ -1,11 +1,13 @@
-# Sourced by the tests beside it: puts node, and for the browser's test Chromium and playwright-core, where they are found, or skips.
-# What is missing is installed when that is possible: Debian's packages as root, playwright-core under build/.
+# Sourced by the tests beside it: puts node, and for the browser's test Chromium and playwright-core, where they are found,
+# or skips. What is missing is installed when that is possible: Debian's packages as root, playwright-core under build/.
 cd "$(dirname "$0")/../.." || exit 2
 work=build/study-test
 skip() { echo "ok 1 - $(basename "$0") # SKIP $1"; exit 0; }
 need() { # need COMMAND PACKAGE
     command -v "$1" >/dev/null 2>&1 && return
-    if [ "$(id -u)" = 0 ]; then DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$2" >/dev/null 2>&1; fi
+    if [ "$(id -u)" = 0 ]; then
+        DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$2" >/dev/null 2>&1
+    fi
     command -v "$1" >/dev/null 2>&1 || skip "$1 is not installed (apt-get install $2)"
 }
 need node nodejs

@@ -27,13 +27,16 @@ static const char *study_text(const char *task, const char *instead_of, const ch
 {
     char base[4096];
     snprintf(base, sizeof base,
-             "{\"format\":\"lull-study\",\"version\":1,\"id\":\"" ID "\",\"task\":\"%s\",\"seed\":7,\"trials\":20,\"repeats\":3,"
-             "\"catch_share\":0.1,\"show_ms\":700,\"gap_ms\":400,\"break_every\":60,\"min_catch_passed\":0.75,\"max_untouched\":0.5,"
+             "{\"format\":\"lull-study\",\"version\":1,\"id\":\"" ID
+             "\",\"task\":\"%s\",\"seed\":7,\"trials\":20,\"repeats\":3,"
+             "\"catch_share\":0.1,\"show_ms\":700,\"gap_ms\":400,\"break_every\":60,\"min_catch_passed\":0.75,\"max_"
+             "untouched\":0.5,"
              "\"conditions\":[\"a\",\"b\"],\"views\":[{\"name\":\"v\",\"width\":40,\"height\":10,\"blocks\":["
              "{\"id\":0,\"x0\":0,\"y0\":0,\"x1\":10,\"y1\":10,\"levels\":[16,64,256]},"
              "{\"id\":1,\"x0\":10,\"y0\":0,\"x1\":20,\"y1\":10,\"levels\":[16,64,256]},"
              "{\"id\":2,\"x0\":20,\"y0\":0,\"x1\":30,\"y1\":10,\"levels\":[16,64,256]},"
-             "{\"id\":5,\"x0\":30,\"y0\":0,\"x1\":40,\"y1\":10,\"levels\":[16,64,512]}]}]}", task);
+             "{\"id\":5,\"x0\":30,\"y0\":0,\"x1\":40,\"y1\":10,\"levels\":[16,64,512]}]}]}",
+             task);
     char *at = instead_of ? strstr(base, instead_of) : NULL;
     if (!at)
         snprintf(text, sizeof text, "%s", base);
@@ -71,12 +74,26 @@ static void a_study_comes_back_as_it_was_written(void **state)
 
 static void a_bad_study_is_refused(void **state)
 {
-    static const char *const cases[][2] = {
-        {"lull-study", "lull-sequence"}, {"\"version\":1", "\"version\":2"}, {"\"id\":\"0123", "\"id\":\"x123"}, {"\"seed\":7", "\"seed\":-7"},
-        {"\"seed\":7", "\"seed\":\"7\""}, {"\"trials\":20", "\"trials\":0"}, {"\"trials\":20", "\"trials\":2.5"}, {"\"name\":\"v\"", "\"name\":\"../v\""},
-        {"\"name\":\"v\"", "\"name\":\".v\""}, {"\"x1\":40", "\"x1\":41"}, {"\"x1\":40", "\"x1\":30"}, {"[16,64,512]", "[16,64,64]"},
-        {"[16,64,512]", "[]"}, {"[16,64,512]", "[0,64]"}, {"\"id\":5", "\"id\":2"}, {"\"catch_share\":0.1", "\"catch_share\":0.6"},
-        {"\"task\":\"2ifc\"", "\"task\":\"taste\""}, {"\"views\":[{", "\"views\":[1,{"}, {"\"gap_ms\":400,", ""}, {"]}]}", ""}};
+    static const char *const cases[][2] = {{"lull-study", "lull-sequence"},
+                                           {"\"version\":1", "\"version\":2"},
+                                           {"\"id\":\"0123", "\"id\":\"x123"},
+                                           {"\"seed\":7", "\"seed\":-7"},
+                                           {"\"seed\":7", "\"seed\":\"7\""},
+                                           {"\"trials\":20", "\"trials\":0"},
+                                           {"\"trials\":20", "\"trials\":2.5"},
+                                           {"\"name\":\"v\"", "\"name\":\"../v\""},
+                                           {"\"name\":\"v\"", "\"name\":\".v\""},
+                                           {"\"x1\":40", "\"x1\":41"},
+                                           {"\"x1\":40", "\"x1\":30"},
+                                           {"[16,64,512]", "[16,64,64]"},
+                                           {"[16,64,512]", "[]"},
+                                           {"[16,64,512]", "[0,64]"},
+                                           {"\"id\":5", "\"id\":2"},
+                                           {"\"catch_share\":0.1", "\"catch_share\":0.6"},
+                                           {"\"task\":\"2ifc\"", "\"task\":\"taste\""},
+                                           {"\"views\":[{", "\"views\":[1,{"},
+                                           {"\"gap_ms\":400,", ""},
+                                           {"]}]}", ""}};
     struct ggn_study s = {0};
     (void)state;
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
@@ -127,7 +144,9 @@ static void a_plan_depends_on_the_seed_alone(void **state)
         parse(ggn_study_task_names[task], &s);
         uint64_t one = ggn_study_person_seed(&s, 0), other = ggn_study_person_seed(&s, 1);
         assert_true(one != other && one < (UINT64_C(1) << 53));
-        assert_int_equal(ggn_study_plan_init(&a, &s, one, &err) | ggn_study_plan_init(&b, &s, one, &err) | ggn_study_plan_init(&c, &s, other, &err), 0);
+        assert_int_equal(ggn_study_plan_init(&a, &s, one, &err) | ggn_study_plan_init(&b, &s, one, &err) |
+                             ggn_study_plan_init(&c, &s, other, &err),
+                         0);
         assert_int_equal(a.n, c.n);
         assert_memory_equal(a.slots, b.slots, (size_t)a.n * sizeof *a.slots);
         assert_memory_not_equal(a.slots, c.slots, (size_t)a.n * sizeof *a.slots);
@@ -261,8 +280,13 @@ static void what_is_exported_can_be_imported(void **state)
         id[7] = (char)(id[7] + person);
         int64_t row = add_person(from, id, ggn_study_person_seed(&s, (uint64_t)person));
         for (int slot = 0; slot < 10 * person; slot++)
-            assert_int_equal(ggn_study_store_add_trial(from, row, &(struct ggn_study_trial){.slot = slot, .level = 64, .answer = 1 + slot % 2,
-                             .ms = 0.1 * slot, .at = "2024-01-01T00:00:00Z"}, &err), 1);
+            assert_int_equal(
+                ggn_study_store_add_trial(
+                    from, row,
+                    &(struct ggn_study_trial){
+                        .slot = slot, .level = 64, .answer = 1 + slot % 2, .ms = 0.1 * slot, .at = "2024-01-01T00:00:00Z"},
+                    &err),
+                1);
     }
     assert_int_equal(ggn_study_export(&s, from, first, &n, &err), 0);
     assert_int_equal(n, 3);
@@ -278,7 +302,8 @@ static void what_is_exported_can_be_imported(void **state)
     assert_int_equal(base_file_write_line(first, a, &err), 0);
     ggn_study_store_close(to);
     to = open_store(NULL);
-    assert_int_equal(ggn_study_import(&s, to, first, &n, &err), BASE_EINVAL); /* a level that the study has not: nobody at all */
+    assert_int_equal(ggn_study_import(&s, to, first, &n, &err),
+                     BASE_EINVAL); /* a level that the study has not: nobody at all */
     struct ggn_study_person *people = NULL;
     assert_int_equal(ggn_study_store_people(to, &people, &n, &err), 0);
     assert_int_equal(n, 0);
@@ -295,10 +320,17 @@ static void what_is_exported_can_be_imported(void **state)
 
 static void addresses_are_numbers(void **state)
 {
-    static const struct { const char *text, *host; int port, ipv6, loopback; } good[] = {
-        {"127.0.0.1", "127.0.0.1", GGN_STUDY_PORT, 0, 1}, {"127.8.9.1:80", "127.8.9.1", 80, 0, 1}, {"0.0.0.0:0", "0.0.0.0", 0, 0, 0},
-        {"192.168.1.5:8080", "192.168.1.5", 8080, 0, 0}, {"[::1]", "::1", GGN_STUDY_PORT, 1, 1}, {"[::]:81", "::", 81, 1, 0}};
-    static const char *const bad[] = {"", "localhost", "127.0.0.1:", "127.0.0.1:x", "127.0.0.1:70000", "127.0.0.1:-1", "[::1", "[::1]x", "::1", "1.2.3"};
+    static const struct {
+        const char *text, *host;
+        int port, ipv6, loopback;
+    } good[] = {{"127.0.0.1", "127.0.0.1", GGN_STUDY_PORT, 0, 1},
+                {"127.8.9.1:80", "127.8.9.1", 80, 0, 1},
+                {"0.0.0.0:0", "0.0.0.0", 0, 0, 0},
+                {"192.168.1.5:8080", "192.168.1.5", 8080, 0, 0},
+                {"[::1]", "::1", GGN_STUDY_PORT, 1, 1},
+                {"[::]:81", "::", 81, 1, 0}};
+    static const char *const bad[] = {"",     "localhost", "127.0.0.1:", "127.0.0.1:x", "127.0.0.1:70000", "127.0.0.1:-1",
+                                      "[::1", "[::1]x",    "::1",        "1.2.3"};
     struct ggn_study_address a;
     struct base_err err = {0};
     (void)state;

@@ -57,12 +57,15 @@ static int expected_choices(struct ggn_study_choice *c, double t, double spread,
 
 static void a_curve_comes_back(void **state)
 {
-    static const struct { double t, spread, bias; } cases[] = {{7.0, 0.5, 0.0}, {6.3, 0.33, 0.0}, {8.1, 0.75, 0.0}, {7.0, 0.5, 0.8}, {7.0, 0.5, -0.4}};
+    static const struct {
+        double t, spread, bias;
+    } cases[] = {{7.0, 0.5, 0.0}, {6.3, 0.33, 0.0}, {8.1, 0.75, 0.0}, {7.0, 0.5, 0.8}, {7.0, 0.5, -0.4}};
     struct ggn_study_choice c[LEVELS * EACH];
     struct base_err err = {0};
     (void)state;
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        struct ggn_study_curve curve = {.choices = c, .n = expected_choices(c, cases[i].t, cases[i].spread, cases[i].bias), .x_min = 4, .x_max = 10};
+        struct ggn_study_curve curve = {
+            .choices = c, .n = expected_choices(c, cases[i].t, cases[i].spread, cases[i].bias), .x_min = 4, .x_max = 10};
         assert_int_equal(ggn_study_psychometric(&curve, 1, &err), 0);
         const struct ggn_study_estimate *e = &curve.estimate;
         NEAR(e->t, cases[i].t, 0.12);
@@ -102,8 +105,8 @@ static void guessing_tells_nothing(void **state)
 }
 
 /* People over one view: settings[person][block] in octaves, one choice of words for excluded. */
-static void people_of(struct ggn_study_people *p, const struct ggn_study *s, int n, const double *settings, struct ggn_study_result *results,
-                      struct ggn_study_estimate *cells)
+static void people_of(struct ggn_study_people *p, const struct ggn_study *s, int n, const double *settings,
+                      struct ggn_study_result *results, struct ggn_study_estimate *cells)
 {
     static int first[2];
     first[1] = s->views[0].n_blocks;
@@ -111,12 +114,14 @@ static void people_of(struct ggn_study_people *p, const struct ggn_study *s, int
     for (int i = 0; i < n; i++) {
         results[i] = (struct ggn_study_result){.cells = cells + i * first[1]};
         for (int b = 0; b < first[1]; b++)
-            results[i].cells[b] = (struct ggn_study_estimate){.trials = 2, .t = settings[i * first[1] + b], .lo = 1, .hi = 2, .spread = 0.5};
+            results[i].cells[b] =
+                (struct ggn_study_estimate){.trials = 2, .t = settings[i * first[1] + b], .lo = 1, .hi = 2, .spread = 0.5};
     }
 }
 
 static uint32_t levels[] = {16, 1024};
-static struct ggn_study_block blocks[] = {{0, 0, 0, 8, 8, 2, levels}, {1, 8, 0, 16, 8, 2, levels}, {2, 16, 0, 24, 8, 2, levels}, {3, 24, 0, 32, 8, 2, levels}};
+static struct ggn_study_block blocks[] = {
+    {0, 0, 0, 8, 8, 2, levels}, {1, 8, 0, 16, 8, 2, levels}, {2, 16, 0, 24, 8, 2, levels}, {3, 24, 0, 32, 8, 2, levels}};
 static struct ggn_study_view view = {.name = "v", .width = 32, .height = 8, .n_blocks = 4, .blocks = blocks};
 
 static void thresholds_are_means_over_people_that_count(void **state)
@@ -169,9 +174,11 @@ static void the_noise_ceiling_is_between_people(void **state)
 static void judgements_are_shares(void **state)
 {
     char conditions[1][GGN_STUDY_NAME] = {"a"};
-    const struct ggn_study s = {.task = GGN_STUDY_VALIDATION, .n_views = 1, .views = &view, .n_conditions = 1, .conditions = conditions};
+    const struct ggn_study s = {
+        .task = GGN_STUDY_VALIDATION, .n_views = 1, .views = &view, .n_conditions = 1, .conditions = conditions};
     struct ggn_study_judgement all[2][5];
-    struct ggn_study_result results[2] = {{.judgements = all[0], .n_judgements = 5}, {.judgements = all[1], .n_judgements = 5}};
+    struct ggn_study_result results[2] = {{.judgements = all[0], .n_judgements = 5},
+                                          {.judgements = all[1], .n_judgements = 5}};
     struct ggn_study_people p = {.study = &s, .n = 2, .results = results};
     (void)state;
     for (int i = 0; i < 2; i++)
@@ -190,7 +197,7 @@ static void judgements_are_shares(void **state)
 static void power_is_the_textbook_formula(void **state)
 {
     (void)state;
-    assert_int_equal(ggn_study_people_needed(0.7, 0.1, 1, 0.0), 354);  /* 7.849 · (0.21 + 0.24) / 0.01 = 353.2 */
+    assert_int_equal(ggn_study_people_needed(0.7, 0.1, 1, 0.0), 354); /* 7.849 · (0.21 + 0.24) / 0.01 = 353.2 */
     assert_int_equal(ggn_study_people_needed(0.7, 0.1, 10, 0.0), 36);
     assert_int_equal(ggn_study_people_needed(0.7, 0.1, 10, 1.0), 354); /* more of the same person tells nothing more */
     assert_int_equal(ggn_study_people_needed(0.05, 0.1, 1, 0.0), ggn_study_people_needed(0.15, 0.1, 1, 0.0));

@@ -5,66 +5,90 @@ import { blockUrl, canvas } from './stimuli.js';
 import { say } from './texts.js';
 
 export function twoInterval(session) {
-  const quests = new Map(); // of the view in hand, by block
-  let viewInHand = -1;
+    const quests = new Map(); // of the view in hand, by block
+    let viewInHand = -1;
 
-  // What was answered before goes into the estimates, catch trials excepted.
-  function questOf(view, index) {
-    if (view !== viewInHand) quests.clear();
-    viewInHand = view;
-    if (!quests.has(index)) {
-      const quest = new Quest(session.study.views[view].blocks[index].levels);
-      for (const t of session.person.trials) learn(quest, view, index, t);
-      quests.set(index, quest);
+    // What was answered before goes into the estimates, catch trials excepted.
+    function questOf(view, index) {
+        if (view !== viewInHand) quests.clear();
+        viewInHand = view;
+        if (!quests.has(index)) {
+            const quest = new Quest(session.study.views[view].blocks[index].levels);
+            for (const t of session.person.trials) learn(quest, view, index, t);
+            quests.set(index, quest);
+        }
+        return quests.get(index);
     }
-    return quests.get(index);
-  }
 
-  function learn(quest, view, index, trial) {
-    const slot = session.person.slots[trial.slot];
-    if (slot.view === view && slot.block === index && !slot.catch) quest.update(trial.level, trial.answer === slot.side + 1);
-  }
-
-  async function present(context, bitmaps, note, label) {
-    const { show_ms, gap_ms } = session.study;
-    note.textContent = '';
-    await wait(gap_ms);
-    for (let interval = 0; interval < 2; interval++) {
-      note.textContent = label[interval];
-      await frame();
-      context.drawImage(bitmaps[interval], 0, 0);
-      await wait(show_ms);
-      context.clearRect(0, 0, context.canvas.width, context.canvas.height);
-      note.textContent = '';
-      if (interval === 0) await wait(gap_ms);
+    function learn(quest, view, index, trial) {
+        const slot = session.person.slots[trial.slot];
+        if (slot.view === view && slot.block === index && !slot.catch)
+            quest.update(trial.level, trial.answer === slot.side + 1);
     }
-  }
 
-  return async function trial(display) {
-    const number = session.done;
-    const slot = session.person.slots[number];
-    const view = session.study.views[slot.view], block = view.blocks[slot.block];
-    await session.stimuli.load(display, view.blocks.flatMap((b) => ['reference', ...b.levels].map((l) => blockUrl(slot.view, b, l))));
+    async function present(context, bitmaps, note, label) {
+        const { show_ms, gap_ms } = session.study;
+        note.textContent = '';
+        await wait(gap_ms);
+        for (let interval = 0; interval < 2; interval++) {
+            note.textContent = label[interval];
+            await frame();
+            context.drawImage(bitmaps[interval], 0, 0);
+            await wait(show_ms);
+            context.clearRect(0, 0, context.canvas.width, context.canvas.height);
+            note.textContent = '';
+            if (interval === 0) await wait(gap_ms);
+        }
+    }
 
-    const level = slot.catch ? block.levels[0] : questOf(slot.view, slot.block).next();
-    const clean = await session.stimuli.bitmap(blockUrl(slot.view, block, 'reference'));
-    const grainy = await session.stimuli.bitmap(blockUrl(slot.view, block, level));
-    const picture = canvas(block.x1 - block.x0, block.y1 - block.y0);
-    const note = element('div.interval');
-    const first = element('button', {}, say('2ifc.answer_first')), second = element('button', {}, say('2ifc.answer_second'));
-    const prompt = element('div.prompt', {}, element('p', {}, say('2ifc.prompt')), element('div.row', {}, first, second));
-    prompt.style.visibility = 'hidden';
-    display.replaceChildren(element('div.trial', {}, note, picture, prompt));
-    document.body.dataset.state = 'showing';
-    while (paused()) await wait(200);
-    await present(picture.getContext('2d'), slot.side === 0 ? [grainy, clean] : [clean, grainy], note, [say('2ifc.first'), say('2ifc.second')]);
+    return async function trial(display) {
+        const number = session.done;
+        const slot = session.person.slots[number];
+        const view = session.study.views[slot.view],
+            block = view.blocks[slot.block];
+        await session.stimuli.load(
+            display,
+            view.blocks.flatMap((b) => ['reference', ...b.levels].map((l) => blockUrl(slot.view, b, l))),
+        );
 
-    prompt.style.visibility = 'visible';
-    document.body.dataset.state = 'asking';
-    const from = performance.now();
-    const answer = await choice({ 1: 1, ArrowLeft: 1, 2: 2, ArrowRight: 2 }, [[first, 1], [second, 2]]);
-    document.body.dataset.state = 'storing';
-    await session.store({ slot: number, revision: 0, level, answer, rating: 0, ms: Math.round(performance.now() - from) });
-    if (!slot.catch) learn(questOf(slot.view, slot.block), slot.view, slot.block, session.person.trials.at(-1));
-  };
+        const level = slot.catch ? block.levels[0] : questOf(slot.view, slot.block).next();
+        const clean = await session.stimuli.bitmap(blockUrl(slot.view, block, 'reference'));
+        const grainy = await session.stimuli.bitmap(blockUrl(slot.view, block, level));
+        const picture = canvas(block.x1 - block.x0, block.y1 - block.y0);
+        const note = element('div.interval');
+        const first = element('button', {}, say('2ifc.answer_first')),
+            second = element('button', {}, say('2ifc.answer_second'));
+        const prompt = element(
+            'div.prompt',
+            {},
+            element('p', {}, say('2ifc.prompt')),
+            element('div.row', {}, first, second),
+        );
+        prompt.style.visibility = 'hidden';
+        display.replaceChildren(element('div.trial', {}, note, picture, prompt));
+        document.body.dataset.state = 'showing';
+        while (paused()) await wait(200);
+        await present(picture.getContext('2d'), slot.side === 0 ? [grainy, clean] : [clean, grainy], note, [
+            say('2ifc.first'),
+            say('2ifc.second'),
+        ]);
+
+        prompt.style.visibility = 'visible';
+        document.body.dataset.state = 'asking';
+        const from = performance.now();
+        const answer = await choice({ 1: 1, ArrowLeft: 1, 2: 2, ArrowRight: 2 }, [
+            [first, 1],
+            [second, 2],
+        ]);
+        document.body.dataset.state = 'storing';
+        await session.store({
+            slot: number,
+            revision: 0,
+            level,
+            answer,
+            rating: 0,
+            ms: Math.round(performance.now() - from),
+        });
+        if (!slot.catch) learn(questOf(slot.view, slot.block), slot.view, slot.block, session.person.trials.at(-1));
+    };
 }

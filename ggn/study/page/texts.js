@@ -2,19 +2,19 @@
 let texts = {};
 
 export async function loadTexts() {
-  texts = await (await fetch('texts.json')).json();
-  document.documentElement.lang = texts.language;
-  document.title = texts.title;
+    texts = await (await fetch('texts.json')).json();
+    document.documentElement.lang = texts.language;
+    document.title = texts.title;
 }
 
 export function text(path) {
-  return path.split('.').reduce((o, key) => o?.[key], texts) ?? path;
+    return path.split('.').reduce((o, key) => o?.[key], texts) ?? path;
 }
 
 export function say(path, values = {}) {
-  return fill(text(path), values);
+    return fill(text(path), values);
 }
 
 export function fill(line, values) {
-  return String(line).replace(/\{(\w+)\}/g, (whole, key) => values[key] ?? whole);
+    return String(line).replace(/\{(\w+)\}/g, (whole, key) => values[key] ?? whole);
 }
