@@ -260,7 +260,7 @@ static const char *read_trial(const struct ggn_study *s, const struct ggn_study_
         return "no such slot";
     if (!get_whole(body, "revision", 0, adjustment ? 1000 : 0, &revision))
         return "no such revision";
-    if (!get_whole(body, "level", validation ? 0 : 1, validation ? 0 : 1e9, &level))
+    if (!get_whole(body, "level", 0, 1e9, &level))
         return "no such level";
     if (!get_whole(body, "answer", s->task == GGN_STUDY_TWO_INTERVAL ? 1 : 0,
                    adjustment   ? 0
@@ -284,10 +284,7 @@ static const char *read_trial(const struct ggn_study *s, const struct ggn_study_
         return "no layout";
     if (validation)
         snprintf(t->layout, sizeof t->layout, "%s", layout->valuestring);
-    const struct ggn_study_slot *sl = &plan->slots[t->slot];
-    const struct ggn_study_block *b = validation ? NULL : &s->views[sl->view].blocks[sl->block];
-    int index = b ? ggn_study_level(b, t->level) : 0;
-    if (index < 0 || (b && sl->catch_trial && index != 0))
+    if (!ggn_study_slot_takes(s, &plan->slots[t->slot], t->level))
         return "no such level";
     now_utc(t->at);
     return NULL;

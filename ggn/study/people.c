@@ -94,7 +94,8 @@ static int read_choices(const struct ggn_study_people *p, const struct input *in
     for (int i = 0; i < in->n; i++) {
         const struct ggn_study_slot *s = &in->plan.slots[in->trials[i].slot];
         int correct = in->trials[i].answer == s->side + 1;
-        r->choices[r->n_choices] = (struct ggn_study_choice){log2(in->trials[i].level), s->side == 0, correct};
+        double x = s->catch_trial ? GGN_STUDY_PLAIN : log2(in->trials[i].level);
+        r->choices[r->n_choices] = (struct ggn_study_choice){x, s->side == 0, correct};
         r->choice_cells[r->n_choices++] = p->first[s->view] + s->block;
         r->catch_total += s->catch_trial != 0;
         r->catch_passed += s->catch_trial && correct;

@@ -39,6 +39,13 @@ uint64_t ggn_study_person_seed(const struct ggn_study *study, uint64_t n)
     return next_random(&state) >> 11;
 }
 
+int ggn_study_slot_takes(const struct ggn_study *s, const struct ggn_study_slot *slot, uint32_t level)
+{
+    if (s->task == GGN_STUDY_VALIDATION || slot->catch_trial)
+        return level == 0;
+    return ggn_study_level(&s->views[slot->view].blocks[slot->block], level) >= 0;
+}
+
 /* Of n trials so many are catch trials: at least one when there are any. */
 static int catch_count(const struct ggn_study *s, int n)
 {

@@ -10,8 +10,7 @@
 
 enum ggn_study_catch {
     GGN_STUDY_NO_CATCH,
-    GGN_STUDY_CATCH_PLAIN,    /* a difference that nobody misses: two-interval at the lowest level, validation against heavy
-                                 noise */
+    GGN_STUDY_CATCH_PLAIN,    /* heavy noise, which nobody misses */
     GGN_STUDY_CATCH_IDENTICAL /* validation: the reference against itself */
 };
 
@@ -33,6 +32,9 @@ int ggn_study_plan_init(struct ggn_study_plan *plan, const struct ggn_study *stu
 void ggn_study_plan_release(struct ggn_study_plan *plan);
 /* Number of slots without making them; GGN_STUDY_MAX_TRIALS + 1 when there would be more than that. */
 int ggn_study_plan_count(const struct ggn_study *study);
+
+/* Whether a trial of the slot can have been at that level: 0 in catch trials and validations, else one of its block's. */
+int ggn_study_slot_takes(const struct ggn_study *study, const struct ggn_study_slot *slot, uint32_t level);
 
 /* The seed of the study's n-th person. Below 2^53. */
 uint64_t ggn_study_person_seed(const struct ggn_study *study, uint64_t n);

@@ -56,6 +56,37 @@ static int enough_levels(const char *dir, const struct ggn_study_block *b, struc
                      b->id, b->n_levels);
 }
 
+/* *out: a copy of rgb[n] (malloc) with noise that nobody misses, for catch trials: uniform, up to 48 codes either way. A
+ * linear congruence does for noise that is only looked at (Numerical Recipes). */
+static int make_heavy(const uint8_t *rgb, size_t n, uint8_t **out, struct base_err *err)
+{
+    uint32_t state = 1;
+    *out = malloc(n);
+    if (!*out)
+        return base_fail_nomem(err, "picture of a catch trial");
+    for (size_t i = 0; i < n; i++) {
+        state = state * 1664525u + 1013904223u;
+        int v = rgb[i] + (int)(state >> 16) % 97 - 48;
+        (*out)[i] = (uint8_t)(v < 0 ? 0 : v > 255 ? 255 : v);
+    }
+    return 0;
+}
+
+/* What a block is compared with, and what its catch trials show. */
+static int write_reference(const char *dir, int view, const struct ggn_study_block *b, const uint8_t *rgb,
+                           struct base_err *err)
+{
+    uint8_t *noisy;
+    int rc = write_block(dir, view, b, "reference", rgb, err);
+    if (!rc)
+        rc = make_heavy(rgb, 3 * (size_t)(b->x1 - b->x0) * (b->y1 - b->y0), &noisy, err);
+    if (rc)
+        return rc;
+    rc = write_block(dir, view, b, "heavy", noisy, err);
+    free(noisy);
+    return rc;
+}
+
 /* --- recorded sequences --- */
 
 struct work {
@@ -72,7 +103,7 @@ static int make_levels(const struct work *w, struct ggn_study_block *b, struct g
                        struct base_err *err)
 {
     char what[32];
-    int rc = write_block(w->request->dir, w->view, b, "reference", s->converged, err);
+    int rc = write_reference(w->request->dir, w->view, b, s->converged, err);
     b->levels = malloc((size_t)s->n * sizeof *b->levels);
     if (!b->levels)
         return base_fail_nomem(err, w->folder);
@@ -232,6 +263,7 @@ static int read_reference(const char *folder, const struct picture *list, int n,
     return base_fail(err, BASE_EINVAL, "%s: neither manifest.json nor a picture called reference in it", folder);
 }
 
+/* The picture cut into blocks; what NULL: it is the reference. */
 static int write_crops(const struct ggn_study_request_views *q, int index, const struct ggn_study_view *view,
                        const char *what, const struct ggn_image8 *image, struct base_err *err)
 {
@@ -244,7 +276,7 @@ static int write_crops(const struct ggn_study_request_views *q, int index, const
             return base_fail_nomem(err, q->views[index]);
         for (size_t y = 0; y < h; y++)
             memcpy(rgb + 3 * w * y, image->data + 3 * ((b->y0 + y) * view->width + b->x0), 3 * w);
-        rc = write_block(q->dir, index, b, what, rgb, err);
+        rc = what ? write_block(q->dir, index, b, what, rgb, err) : write_reference(q->dir, index, b, rgb, err);
         free(rgb);
     }
     return rc;
@@ -281,7 +313,7 @@ static int prepare_levels(const struct ggn_study_request_views *q, int index, co
     const char *folder = q->views[index];
     int rc = cut_blocks(q, view, n, err);
     if (!rc)
-        rc = write_crops(q, index, view, "reference", reference, err);
+        rc = write_crops(q, index, view, NULL, reference, err);
     for (int i = 0; i < n && !rc; i++) {
         struct ggn_image8 image;
         if (list[i].spp < 1.0 || !takes(q, &view->blocks[0], list[i].spp))
@@ -296,25 +328,6 @@ static int prepare_levels(const struct ggn_study_request_views *q, int index, co
             view->blocks[b].levels[view->blocks[b].n_levels++] = (uint32_t)list[i].spp;
     }
     return !rc ? enough_levels(folder, &view->blocks[0], err) : rc;
-}
-
-/* The reference with noise that nobody misses, for catch trials: 24 codes of uniform noise of either sign per channel. */
-static int write_heavy(const char *path, const struct ggn_image8 *reference, struct base_err *err)
-{
-    size_t n = 3 * (size_t)reference->width * (size_t)reference->height;
-    uint8_t *rgb = malloc(n);
-    uint32_t state = 1;
-    if (!rgb)
-        return base_fail_nomem(err, path);
-    for (size_t i = 0; i < n; i++) {
-        state = state * 1664525u +
-                1013904223u; /* a linear congruence does for noise that is only looked at (Numerical Recipes) */
-        int v = reference->data[i] + (int)(state >> 16) % 97 - 48;
-        rgb[i] = (uint8_t)(v < 0 ? 0 : v > 255 ? 255 : v);
-    }
-    int rc = ggn_image8_write_png(path, rgb, reference->width, reference->height, err);
-    free(rgb);
-    return rc;
 }
 
 /* The first view says which conditions there are, the others must have the same. */
@@ -341,13 +354,17 @@ static int prepare_conditions(const struct ggn_study_request_views *q, int index
 {
     char path[4096];
     const char *folder = q->views[index];
+    uint8_t *noisy = NULL;
     int found = 0, rc = picture_path(path, q->dir, index, "reference", err);
     if (!rc)
         rc = ggn_image8_write_png(path, reference->data, reference->width, reference->height, err);
     if (!rc)
         rc = picture_path(path, q->dir, index, "heavy", err);
     if (!rc)
-        rc = write_heavy(path, reference, err);
+        rc = make_heavy(reference->data, 3 * (size_t)reference->width * (size_t)reference->height, &noisy, err);
+    if (!rc)
+        rc = ggn_image8_write_png(path, noisy, reference->width, reference->height, err);
+    free(noisy);
     for (int i = 0; i < n && !rc; i++) {
         struct ggn_image8 image;
         if (strcmp(list[i].stem, "reference") == 0 || strcmp(list[i].stem, "heavy") == 0)

@@ -16,6 +16,9 @@
 
 #include "base/err.h"
 
+/* The x of a catch trial: so far below any threshold that only a lapse answers wrong. */
+#define GGN_STUDY_PLAIN (-1000.0)
+
 struct ggn_study_choice {
     double x;  /* octaves */
     int first; /* the noise was in the first interval */

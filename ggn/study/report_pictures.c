@@ -23,7 +23,7 @@ static int plot_thresholds(const char *dir, const struct ggn_study_people *p, co
         return rc;
     fputs("set logscale y 2\nset ylabel 'samples per pixel'\nset xlabel 'block, view after view'\nset grid ytics\nset key "
           "off\n"
-          "set style fill solid\nplot '-' using 1:2:3:4 with yerrorbars lc '#3b6ea5' pt 7 ps 0.8\n",
+          "set style fill solid\nset xrange [-0.5:*]\nplot '-' using 1:2:3:4 with yerrorbars lc '#3b6ea5' pt 7 ps 0.8\n",
           plot.script);
     for (int c = 0; c < p->n_cells; c++)
         if (!isnan(t[c].t))
@@ -31,6 +31,16 @@ static int plot_thresholds(const char *dir, const struct ggn_study_people *p, co
                     exp2(isnan(t[c].hi) ? t[c].t : t[c].hi));
     fputs("e\n", plot.script);
     return ggn_plot_end(&plot, 1, err);
+}
+
+/* Whether a person counts and has an estimate. */
+static int is_shown(const struct ggn_study_people *p, int person)
+{
+    const struct ggn_study_result *r = &p->results[person];
+    for (int c = 0; c < p->n_cells && r->excluded[0] == '\0'; c++)
+        if (r->cells[c].trials > 0)
+            return 1;
+    return 0;
 }
 
 /* Each person's thresholds against the mean of all. */
@@ -46,12 +56,14 @@ static int plot_people(const char *dir, const struct ggn_study_people *p, const 
           "set grid\nset key off\nplot x with lines lc '#888888'",
           plot.script);
     for (int i = 0; i < p->n; i++)
-        fprintf(plot.script, ", '-' using 1:2 with points pt 7 ps 0.6");
+        if (is_shown(p, i))
+            fputs(", '-' using 1:2 with points pt 7 ps 0.6", plot.script);
     putc('\n', plot.script);
     for (int i = 0; i < p->n; i++) {
-        int counts = p->results[i].excluded[0] == '\0';
+        if (!is_shown(p, i))
+            continue;
         for (int c = 0; c < p->n_cells; c++)
-            if (counts && p->results[i].cells[c].trials > 0 && !isnan(t[c].t))
+            if (p->results[i].cells[c].trials > 0)
                 fprintf(plot.script, "%g %g\n", exp2(t[c].t),
                         exp2(fmin(p->results[i].cells[c].t, ggn_study_cell_cap(p, c))));
         fputs("e\n", plot.script);

@@ -29,7 +29,7 @@ struct ggn_study_person {
 
 struct ggn_study_trial {
     int slot, revision;
-    uint32_t level;  /* samples per pixel shown or set; 0 in a validation */
+    uint32_t level;  /* samples per pixel shown or set; 0 in catch trials and validations */
     int answer;      /* 2ifc: the interval said to be noisy, 1 or 2; validation: 1 same, 0 different */
     int rating;      /* validation: 1 very disturbing … 5 no difference */
     double ms;       /* from what was shown to the answer, by the page's clock */

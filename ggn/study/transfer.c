@@ -146,9 +146,7 @@ static int read_trial(const struct reader *r, const cJSON *o, const struct ggn_s
     t->answer = (int)answer;
     t->rating = (int)rating;
     t->ms = ms;
-    const struct ggn_study_slot *s = &plan->slots[t->slot];
-    return r->study->task == GGN_STUDY_VALIDATION ||
-           ggn_study_level(&r->study->views[s->view].blocks[s->block], t->level) >= 0;
+    return ggn_study_slot_takes(r->study, &plan->slots[t->slot], t->level);
 }
 
 static int import_trials(const struct reader *r, const cJSON *list, const struct ggn_study_person *p)

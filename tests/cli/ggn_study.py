@@ -238,7 +238,7 @@ def trial(slot, level=None, answer=1, **more):
     return {
         "slot": slot,
         "revision": 0,
-        "level": level or (16 if s["catch"] else 64),
+        "level": level or (0 if s["catch"] else 64),
         "answer": answer,
         "rating": 0,
         "ms": 512.5,
@@ -265,6 +265,7 @@ cases = [
     ("a slot that is a fraction", 400, "POST", address, {**trial(1), "slot": 1.5}, {}),
     ("a level that the block has not", 400, "POST", address, {**trial(1), "level": 63}, {}),
     ("a huge level", 400, "POST", address, {**trial(1), "level": 1e300}, {}),
+    ("a level in a catch trial", 400, "POST", address, {**trial(1), "level": 64 if me["slots"][1]["catch"] else 0}, {}),
     ("no such answer", 400, "POST", address, {**trial(1), "answer": 3}, {}),
     ("no time", 400, "POST", address, {k: v for k, v in trial(1).items() if k != "ms"}, {}),
     ("a revision in the wrong task", 400, "POST", address, {**trial(0), "revision": 1}, {}),

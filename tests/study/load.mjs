@@ -40,7 +40,7 @@ async function participate(seed) {
         const trial = {
             slot,
             revision: 0,
-            level: s.catch ? 16 : [16, 64, 256, 1024][Math.floor(4 * next())],
+            level: s.catch ? 0 : [16, 64, 256, 1024][Math.floor(4 * next())],
             answer: 1 + Math.floor(2 * next()),
             rating: 0,
             ms: 1,

@@ -142,7 +142,7 @@ function judge(dir, truth, what) {
         const quests = t.map(() => new Quest(LEVELS));
         truth[me.id] = { curve, t };
         for (const [slot, s] of me.slots.entries()) {
-            const level = s.catch ? LEVELS[0] : quests[s.block].next();
+            const level = s.catch ? 0 : quests[s.block].next();
             const correct = isCorrect(CURVES[curve], t[s.block], level, s.side === 0, next);
             if (!s.catch) quests[s.block].update(level, correct);
             const { status } = await client.post(`api/people/${me.key}/trials`, {
@@ -208,7 +208,7 @@ function judge(dir, truth, what) {
             guesses = i < BAD;
         (guesses ? bad : good).add(me.id);
         for (const [slot, s] of me.slots.entries()) {
-            const level = LEVELS[s.catch ? 0 : 12],
+            const level = s.catch ? 0 : LEVELS[12],
                 correct = guesses ? next() < 0.5 : isCorrect(CURVES.lapsing, 9, level, s.side === 0, next);
             await client.post(`api/people/${me.key}/trials`, {
                 slot,

@@ -278,15 +278,19 @@ static void what_is_exported_can_be_imported(void **state)
     for (int person = 0; person < 3; person++) {
         char id[] = "0000000a";
         id[7] = (char)(id[7] + person);
-        int64_t row = add_person(from, id, ggn_study_person_seed(&s, (uint64_t)person));
-        for (int slot = 0; slot < 10 * person; slot++)
-            assert_int_equal(
-                ggn_study_store_add_trial(
-                    from, row,
-                    &(struct ggn_study_trial){
-                        .slot = slot, .level = 64, .answer = 1 + slot % 2, .ms = 0.1 * slot, .at = "2024-01-01T00:00:00Z"},
-                    &err),
-                1);
+        struct ggn_study_plan plan;
+        uint64_t seed = ggn_study_person_seed(&s, (uint64_t)person);
+        int64_t row = add_person(from, id, seed);
+        assert_int_equal(ggn_study_plan_init(&plan, &s, seed, &err), 0);
+        for (int slot = 0; slot < 10 * person; slot++) {
+            const struct ggn_study_trial t = {.slot = slot,
+                                              .level = plan.slots[slot].catch_trial ? 0 : 64,
+                                              .answer = 1 + slot % 2,
+                                              .ms = 0.1 * slot,
+                                              .at = "2024-01-01T00:00:00Z"};
+            assert_int_equal(ggn_study_store_add_trial(from, row, &t, &err), 1);
+        }
+        ggn_study_plan_release(&plan);
     }
     assert_int_equal(ggn_study_export(&s, from, first, &n, &err), 0);
     assert_int_equal(n, 3);

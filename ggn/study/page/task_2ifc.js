@@ -48,12 +48,12 @@ export function twoInterval(session) {
             block = view.blocks[slot.block];
         await session.stimuli.load(
             display,
-            view.blocks.flatMap((b) => ['reference', ...b.levels].map((l) => blockUrl(slot.view, b, l))),
+            view.blocks.flatMap((b) => ['reference', 'heavy', ...b.levels].map((l) => blockUrl(slot.view, b, l))),
         );
 
-        const level = slot.catch ? block.levels[0] : questOf(slot.view, slot.block).next();
+        const level = slot.catch ? 0 : questOf(slot.view, slot.block).next();
         const clean = await session.stimuli.bitmap(blockUrl(slot.view, block, 'reference'));
-        const grainy = await session.stimuli.bitmap(blockUrl(slot.view, block, level));
+        const grainy = await session.stimuli.bitmap(blockUrl(slot.view, block, level || 'heavy'));
         const picture = canvas(block.x1 - block.x0, block.y1 - block.y0);
         const note = element('div.interval');
         const first = element('button', {}, say('2ifc.answer_first')),
