@@ -1,5 +1,6 @@
 #include "study/psychometric.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -81,13 +82,16 @@ static double separation(const double d[N_D], double z)
     return d[i] + (at - i) * (d[i + 1] - d[i]);
 }
 
+/* Nothing is impossible: a finger slips. */
+#define RAREST 1e-9
+
 /* Multiplies the likelihoods of one cell (t, s) for every habit by that of one choice. */
 static void multiply(double *cell, double d, const struct ggn_study_choice *c)
 {
     for (int b = 0; b < N_BIASES; b++) {
         double p = ggn_study_normal(c->first ? d + biases[b] : d - biases[b]);
         for (int l = 0; l < N_LAPSES; l++) {
-            double correct = 0.5 * lapses[l] + (1.0 - lapses[l]) * p;
+            double correct = fmin(0.5 * lapses[l] + (1.0 - lapses[l]) * p, 1.0 - RAREST);
             cell[b * N_LAPSES + l] *= c->correct ? correct : 1.0 - correct;
         }
     }
@@ -163,7 +167,7 @@ static void add_evidence(struct person *p, const struct ggn_study_curve *c, doub
             double e = 0.0;
             for (int b = 0; b < N_SPREADS; b++)
                 e += spread_given(b, s) * sum[b][h];
-            evidence[s][h] = log(e);
+            evidence[s][h] = log(fmax(e, DBL_MIN)); /* what underflowed is out of the question anyway */
             p->posterior[s][h] += evidence[s][h];
         }
 }

@@ -128,7 +128,7 @@ function judge(dir, truth, what) {
 
 // --- two intervals ---
 {
-    const BLOCKS = 4;
+    const BLOCKS = 10;
     const server = await study('2ifc', BLOCKS, '--method', '2ifc', '--trials', '30', '--break-every', '0');
     const client = new Client(server.link),
         next = random(20240501),

@@ -92,6 +92,20 @@ static void blocks_help_each_other(void **state)
     assert_true(curves[0].estimate.hi - curves[0].estimate.lo < alone.estimate.hi - alone.estimate.lo);
 }
 
+static void slips_in_catch_trials_are_lapses(void **state)
+{
+    struct ggn_study_choice c[LEVELS * EACH + 6];
+    struct base_err err = {0};
+    (void)state;
+    int n = expected_choices(c, 7.0, 0.5, 0.0);
+    for (int i = 0; i < 6; i++)
+        c[n++] = (struct ggn_study_choice){GGN_STUDY_PLAIN, i & 1, i < 3};
+    struct ggn_study_curve curve = {.choices = c, .n = n, .x_min = 4, .x_max = 10};
+    assert_int_equal(ggn_study_psychometric(&curve, 1, &err), 0);
+    NEAR(curve.estimate.t, 7.0, 0.25);
+    NEAR(curve.estimate.spread, 0.5, 0.3);
+}
+
 static void guessing_tells_nothing(void **state)
 {
     struct ggn_study_choice c[200];
@@ -210,6 +224,7 @@ int main(void)
         cmocka_unit_test(wilson_is_wilson),
         cmocka_unit_test(a_curve_comes_back),
         cmocka_unit_test(blocks_help_each_other),
+        cmocka_unit_test(slips_in_catch_trials_are_lapses),
         cmocka_unit_test(guessing_tells_nothing),
         cmocka_unit_test(thresholds_are_means_over_people_that_count),
         cmocka_unit_test(the_noise_ceiling_is_between_people),
