@@ -1,6 +1,7 @@
 #include "cli.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -114,6 +115,16 @@ static int set_param(void *into, const char *value, struct base_err *err)
     return 0;
 }
 
+static int set_visible(void *into, const char *value, struct base_err *err)
+{
+    char param[64];
+    double share;
+    if (!base_parse_real(value, 0, 1, &share) || share == 0 || share == 1)
+        return expected(err, "a share of viewers between 0 and 1");
+    snprintf(param, sizeof param, "visible=%.17g", share);
+    return set_param(into, param, err);
+}
+
 static int set_filter(void *into, const char *value, struct base_err *err)
 {
     struct pt_cli *cli = into;
@@ -181,6 +192,9 @@ static const struct base_option options[] = {
     {.help = "When to stop:"},
     {"criterion", 'c', "NAME|PATH[:ID]", TO(criterion),
      .help = "Stopping criterion: a name (see --list-criteria) or a shared object; default ggn"},
+    {"visible", 0, "SHARE", .set = set_visible,
+     .help = "Stop a block when at most this share of viewers would still see noise, of criteria that can tell (observer: "
+             "default 0.25, ggn: the model's own)"},
     {"param", 'p', "KEY=VALUE", .set = set_param, .help = "Parameter of the criterion; may be repeated"},
     {"list-criteria", 0, NULL, TO(action), PT_CLI_LIST_CRITERIA,
      .help = "List the criteria that are found and their parameters, and exit"},

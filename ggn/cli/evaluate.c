@@ -61,7 +61,7 @@ static int add_adjusted(void *into, const char *arg, struct base_err *err)
     if (!base_parse_real(equals + 1, -1e300, 1e300, &o->adjusted[i].value) ||
         !ggn_policy_adjust(&any, o->adjusted[i].name, o->adjusted[i].value) || ggn_policy_check(&any, NULL))
         return base_fail(err, BASE_EINVAL,
-                         "expected threshold, passes, gate, tail, gini or first-spp and a number in its range");
+                         "expected visible, passes, gate, tail, gini or first-spp and a number in its range");
     return 0;
 }
 
@@ -75,11 +75,11 @@ static const struct base_option list[] = {
      .help = "the observer's parameters, each view without itself (ggn label --calibrate); needed where there are people's "
              "views"},
     {"visible", 0, "SHARE", TO(visible), 1e-4, 0.9999,
-     .help = "share of viewers that may still see noise, for observer (0.25)"},
+     .help = "share of viewers that may still see noise, for observer (0.25) and models (their own)"},
     {"thresholds", 0, "CSV", .set = add_thresholds,
      .help = "a published model's thresholds of people's views; may be repeated"},
     {"param", 'p', "KEY=NUMBER", .set = add_adjusted,
-     .help = "judge as the criterion does with this parameter: threshold, passes, gate, tail, gini, first-spp"},
+     .help = "judge as the criterion does with this parameter: visible, passes, gate, tail, gini, first-spp"},
     {.help = "What comes out:"},
     {"json", 'j', NULL, TO(json), .help = "print the figures as JSON"},
     {"output", 'o', "DIR", TO(out), .help = "write figures.json and pictures there"},
@@ -164,6 +164,8 @@ static int add_baselines(struct job *j, struct base_threads *threads, struct bas
 static int policy_of(const struct options *o, const struct ggn_model *model, struct ggn_policy *policy, struct base_err *err)
 {
     int rc = ggn_policy_of(model, policy, err);
+    if (!rc && o->visible > 0)
+        policy->threshold = o->visible;
     for (int i = 0; i < o->n_adjusted && !rc; i++)
         ggn_policy_adjust(policy, o->adjusted[i].name, o->adjusted[i].value);
     return rc;
@@ -214,7 +216,7 @@ static int add_observed(struct job *j, struct base_err *err)
     if (rc)
         return rc;
     struct ggn_method *m = &j->methods[j->n];
-    rc = ggn_method_observer(m, &j->set, j->o->observer, j->o->visible, &available, err);
+    rc = ggn_method_observer(m, &j->set, j->o->observer, j->o->visible > 0 ? j->o->visible : 0.25, &available, err);
     if (!rc && available)
         j->n++;
     else if (!rc)
@@ -334,7 +336,7 @@ int ggn_cmd_evaluate(int argc, char **argv)
         .doc =
             "Measures models, the trivial baselines and the criteria halfbuf and variance on the same recorded sequences, "
             "separately for training, validation and test scenes and for views that people judged."};
-    struct options o = {.early = 0.05, .visible = 0.25, .threads = base_threads_available(), .window = 6, .epochs = 15};
+    struct options o = {.early = 0.05, .threads = base_threads_available(), .window = 6, .epochs = 15};
     struct job j = {.o = &o};
     struct base_err err = {0};
     int window, skipped = 0;

@@ -59,7 +59,7 @@ int ggn_policy_adjust(struct ggn_policy *p, const char *name, double value)
     const struct {
         const char *name;
         double *field;
-    } adjustable[] = {{"threshold", &p->threshold}, {"tail", &p->tail999}, {"gini", &p->gini}, {"first-spp", &p->first_spp}};
+    } adjustable[] = {{"visible", &p->threshold}, {"tail", &p->tail999}, {"gini", &p->gini}, {"first-spp", &p->first_spp}};
 
     for (size_t i = 0; i < sizeof adjustable / sizeof adjustable[0]; i++)
         if (!strcmp(name, adjustable[i].name)) {

@@ -1,7 +1,7 @@
 /*
  * The criterion "ggn": a window of the block's last S display images goes through the Guided-Generative Network, whose
  * answer is the probability that the newest image still looks noisy. A block stops after `passes` checks in a row below
- * `threshold`.
+ * `visible`.
  *
  * Two cheap statistics stand beside the network. The *gate* compares the window's oldest and newest image: while their
  * difference says that the noise is far above what the model ever called clean in training, the block is plainly noisy and
@@ -14,16 +14,17 @@
 #include "plugin/model_path.h"
 #include "plugin/translate.h"
 
-enum { P_MODEL, P_THRESHOLD, P_PASSES, P_GATE, P_TAIL, P_GINI, P_FIRST_SPP, P_PRECISION, P_COUNT };
+enum { P_MODEL, P_VISIBLE, P_PASSES, P_GATE, P_TAIL, P_GINI, P_FIRST_SPP, P_PRECISION, P_COUNT };
 
 static const struct lull_param params[P_COUNT] = {
     [P_MODEL] = LULL_KIT_FILE("model", NULL,
                               "model file; without it lull-1.ggn beside the criterion, in ../share/lull or in the source "
                               "tree"),
-    [P_THRESHOLD] = LULL_KIT_FLOAT("threshold", NULL, 0, 1,
-                                   "stop when the probability of visible noise is below this; without it the model's own"),
+    [P_VISIBLE] = LULL_KIT_FLOAT("visible", NULL, 0, 1,
+                                 "stop when less than this share of viewers would still see noise; without it the model's "
+                                 "own"),
     [P_PASSES] = LULL_KIT_INT("passes", NULL, 1, 16,
-                              "checks in a row that must be below the threshold; without it the model's own"),
+                              "checks in a row that must be below that share; without it the model's own"),
     [P_GATE] = LULL_KIT_BOOL("gate", "1", "spare the network while a block is plainly noisy (p_noisy is then not given)"),
     [P_TAIL] = LULL_KIT_FLOAT("tail", NULL, 0, 1e30,
                               "do not stop while the 99.9th percentile of the half-buffer difference exceeds this many "

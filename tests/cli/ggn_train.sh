@@ -98,7 +98,7 @@ LULL_MODEL=$tmp/a.ggn $build/bin/lull-check "$build/lib/lull/ggn.so:ggn" >"$tmp/
 rc=$?
 grep '^not ok' "$tmp/out" >"$tmp/err"
 check "lull-check passes the criterion ggn" $rc
-LULL_MODEL=$tmp/a.ggn $build/bin/lull-check -q -o state -o repeat -o batch -p gate=0 -p threshold=0.9 -p passes=1 \
+LULL_MODEL=$tmp/a.ggn $build/bin/lull-check -q -o state -o repeat -o batch -p gate=0 -p visible=0.9 -p passes=1 \
     "$build/lib/lull/ggn.so:ggn" >"$tmp/err" 2>&1
 check "and with other parameters" $?
 echo "1..$n"

@@ -36,6 +36,9 @@ t "--usage" sh -c "$P --usage | grep -q -- --criterion"
 t "--version" sh -c "$P --version | grep -q 1.0"
 t "--list-criteria names criteria and parameters" sh -c "$P --list-criteria | grep -q '^halfbuf ' && $P --list-criteria | grep -q -- '-p threshold='"
 
+t "--visible is a share that observer and ggn know" sh -c "[ \"\$($P --list-criteria | grep -c -e '-p visible=')\" = 2 ]"
+t "--visible sets the parameter" sh -c "$P $scene -q -c observer --visible 0.5 --spp 32 --report visible.json && grep -q '\"visible\":.*\"0.5\"' visible.json"
+
 # --- errors: one line, exit 2, nothing left behind ---
 refused "a scene file is needed"
 refused "No such file" nowhere.pbrt -q
@@ -85,6 +88,8 @@ refused "nosuch.so" "$scene" -q -c ./nosuch.so
 refused "'nope'" "$scene" -q -c halfbuf -p nope=1
 refused "threshold" "$scene" -q -c halfbuf -p threshold=-1
 refused "KEY=VALUE" "$scene" -p threshold
+refused "between 0 and 1" "$scene" -q -c observer --visible 1.5
+refused "halfbuf: no parameter 'visible'" "$scene" -q -c halfbuf --visible 0.3
 refused "no criterion is used" "$scene" --spp 4 -p threshold=1
 refused "--resume needs" "$scene" --resume
 refused "--checkpoint-every" "$scene" --checkpoint-every x

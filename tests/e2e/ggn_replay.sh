@@ -48,13 +48,13 @@ replay() {
     check "$name: the same stop and the same p for every block" $?
 }
 
-replay "gate and guard" threshold=0.6 first-spp=4 tail=0.6
+replay "gate and guard" visible=0.6 first-spp=4 tail=0.6
 cp "$tmp/rendered" "$tmp/both"
-replay "no gate" threshold=0.6 first-spp=4 tail=0.6 gate=0
+replay "no gate" visible=0.6 first-spp=4 tail=0.6 gate=0
 cp "$tmp/rendered" "$tmp/no-gate"
-replay "no guard" threshold=0.6 first-spp=4 tail=0 gini=0
+replay "no guard" visible=0.6 first-spp=4 tail=0 gini=0
 cp "$tmp/rendered" "$tmp/no-guard"
-replay "neither" threshold=0.6 first-spp=4 tail=0 gini=0 gate=0
+replay "neither" visible=0.6 first-spp=4 tail=0 gini=0 gate=0
 # or the equalities above would say little (at 4 spp blocks are so noisy that the gate leaps over levels)
 ! cmp -s "$tmp/both" "$tmp/no-guard" && ! cmp -s "$tmp/both" "$tmp/no-gate" &&
     [ "$(awk '$2 < 250' "$tmp/both" | wc -l)" -ge 3 ] && [ "$(awk '$2 == 250' "$tmp/both" | wc -l)" -ge 1 ]

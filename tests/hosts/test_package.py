@@ -116,7 +116,7 @@ def test_closed():
 
 def test_noisier_blocks():
     """noisier blocks get more samples, whoever judges"""
-    for name, parameters in (("halfbuf", {"threshold": .02}), ("ggn", {"threshold": .9, "passes": 1})):
+    for name, parameters in (("halfbuf", {"threshold": .02}), ("ggn", {"visible": .9, "passes": 1})):
         result, f, _ = run(name, parameters=parameters)
         spp = [b.spp for b in f.blocks]
         assert result.outcome == "done" and spp[0] < spp[-1] and sorted(spp) == spp, (name, spp)
