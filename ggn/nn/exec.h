@@ -11,7 +11,6 @@
 #include "base/threads.h"
 #include "nn/weights.h"
 
-#define GGN_BN_EPS 1e-5
 #define GGN_BN_MOMENTUM 0.1
 
 enum ggn_mode {

@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "nn/bf16.h"
-#include "nn/exec.h"
 #include "nn/hash.h"
 #include "nn/real.h"
 #include "nn/winograd.h"

@@ -10,6 +10,8 @@
 #include "nn/graph.h"
 #include "nn/kernels.h"
 
+#define GGN_BN_EPS 1e-5
+
 enum {
     GGN_WEIGHTS_BACKWARD = 1, /* also packed for the backward pass */
     GGN_WEIGHTS_BF16 = 2      /* also packed in bfloat16, where the processor has it */

@@ -48,9 +48,12 @@ rm "$tmp/t/pathtracer/render/c.h"
 echo '#include "shade/c.h"' | plant pathtracer/shade/b.c
 echo '#include "shade/b.h"' | plant pathtracer/shade/c.h
 run "$tmp/t"
-grep -qxF "pathtracer/shade/c.h:1: circle of files: pathtracer/shade/b pathtracer/shade/c" "$tmp/out" && [ "$(wc -l <"$tmp/out")" = 2 ]
+check "a private header is part of its source" $?
+echo '#include "shade/c.h"' | plant pathtracer/shade/c.c
+run "$tmp/t"
+grep -qxF "pathtracer/shade/b.c:1: circle of files: pathtracer/shade/b pathtracer/shade/c" "$tmp/out" && [ "$(wc -l <"$tmp/out")" = 2 ]
 check "a circle of files" $?
-rm "$tmp/t/pathtracer/shade/c.h"
+rm "$tmp/t/pathtracer/shade/c.h" "$tmp/t/pathtracer/shade/c.c"
 { echo 'int f(void)'; echo '{'; yes '    g();' | head -58; echo '}'; } | plant pathtracer/shade/b.c
 finds "a function of 61 lines" "pathtracer/shade/b.c:1: a function of 61 lines, at most 60"
 { echo 'int f(void)'; echo '{'; yes '    g();' | head -57; echo '}'; } | plant pathtracer/shade/b.c
