@@ -26,8 +26,8 @@ refused() { ! run "$@" 2>"$tmp/err" && grep -q "$wanted" "$tmp/err" && [ "$(wc -
 t "halfbuf: noisier blocks get more samples" quiet_before_noisy "$BUILD/lib/lull/halfbuf.so" threshold=.008
 t "variance: noisier blocks get more samples" quiet_before_noisy "$BUILD/lib/lull/variance.so"
 t "halfbuf: fireflies keep a block alive" guarded "$BUILD/lib/lull/halfbuf.so"
-wanted=' 112 spp, 1 checks, criterion'
-t "fixed stops at the first whole wave past 100" all "$BUILD/lib/lull/fixed.so" spp=100
+wanted=' 128 spp, 1 checks, criterion'
+t "fixed stops at the first pair of waves past 100" all "$BUILD/lib/lull/fixed.so" spp=100
 wanted='1024 spp.*spp-max'
 t "null runs to the limit" all "$BUILD/lib/lull/null.so"
 t "a criterion with history" run "$BUILD/tests/abi/plugins/faulty.so"

@@ -19,7 +19,7 @@ def raises(kind, text, call, *arguments, **named):
 
 def main(namespace):
     tests = [f for name, f in namespace.items() if name.startswith("test_")]
-    wanted = sys.argv[1:]
+    wanted = [a for a in sys.argv if a.startswith("test_")]
     for n, test in enumerate(tests, 1):
         if wanted and test.__name__ not in wanted:
             continue

@@ -29,7 +29,8 @@ CALL_S = 1.0
 
 def in_half(wave: int) -> bool:
     """Is this wave in half A? The parity of some bits of its number: simply taking every second one would halve a dimension
-    of a Sobol' sequence. With waves of four samples these are the path tracer's halves."""
+    of a Sobol' sequence. Two successive waves 2k, 2k + 1 are always split. With waves of four samples these are the path
+    tracer's halves."""
     return bin(wave & 0x1F4A7C1B).count("1") % 2 == 0
 
 
@@ -58,7 +59,8 @@ class Result:
 class Driver:
     """Samples every active block up to its next check, asks about all of them at once, stops or schedules each.
 
-    wave: samples that stay together in one half; checks are moved up to whole waves unless whole_waves is False.
+    wave: samples that stay together in one half; checks are moved up to whole pairs of waves, where the halves are equal
+    (criteria take that for granted), unless whole_waves is False.
     uniform: every block gets spp_max samples and the criterion is asked once at the end. max_check_overhead: share of the
     time that checks may take, 0 = any. max_seam: most ratio of samples of neighbouring blocks, 0 = any. threads: of the
     host, for the report. after_call: called after each call of the render function (progress, a partial picture). suspend:
@@ -79,14 +81,13 @@ class Driver:
         self.totals = Totals()
         self.samples_per_s = 0.0  # recent, 0 = not known yet
         self.interrupted = False
-        # not before the second wave, the first of half B: without it the halves say nothing
-        first = frame.spp_max if uniform else max(frame.first_spp, 2 * wave) if whole_waves else frame.first_spp
+        first = frame.spp_max if uniform else frame.first_spp
         for b in frame.blocks:
             b.next_spp = self._at_wave(first)
 
     def _at_wave(self, spp: int) -> int:
         if self.whole_waves:
-            spp = -(-spp // self.wave) * self.wave
+            spp = -(-spp // (2 * self.wave)) * 2 * self.wave
         return min(spp, self.frame.spp_max)
 
     @property
