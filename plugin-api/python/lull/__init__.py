@@ -20,3 +20,18 @@ from .library import Info, LullError, Parameter, criteria, find
 __all__ = ["Block", "BlockState", "Criterion", "Decision", "Driver", "Frame", "Info", "LullError", "Needs", "Parameter",
            "Plane", "Rect", "Result", "criteria", "find", "load", "merge"]
 __version__ = "1.0"
+
+# The package is a Blender add-on too: scripts/hosts/blender-addon packs it.
+bl_info = {"name": "Lull", "author": "Lull", "version": (1, 0), "blender": (3, 4, 0), "category": "Render",
+           "location": "Render Properties > Lull", "support": "COMMUNITY",
+           "description": "Cycles stops each block when its noise can no longer be seen"}
+
+
+def register() -> None:
+    from .blender import ui
+    ui.register()
+
+
+def unregister() -> None:
+    from .blender import ui
+    ui.unregister()

@@ -31,7 +31,8 @@ class Frame:
     def __init__(self, criterion: Criterion, width: int, height: int, *, block: Union[int, tuple[int, int], None] = None,
                  crop: Optional[Rect] = None, supplies: Sequence[str] = (), spp_min: int = 32, spp_max: int = 10000,
                  time_budget_s: float = 0.0, seed: int = 0, exposure: float = 1.0, transfer: str = "srgb",
-                 gamma: float = 2.2, sample_clamp: float = 0.0, independent: bool = False, deterministic: bool = True,
+                 gamma: float = 2.2, sample_clamp: float = 0.0, independent: bool = False,
+                 shared: bool = False, deterministic: bool = True,
                  display: Optional[Callable[[np.ndarray], np.ndarray]] = None, mask: Optional[np.ndarray] = None):
         if not 1 <= spp_min <= spp_max:
             raise ValueError(f"spp_min {spp_min}, spp_max {spp_max}: expected 1 <= spp_min <= spp_max")
@@ -52,7 +53,7 @@ class Frame:
             judge.begin_frame(width, height, [b.rect for b in self.blocks], self.planes, spp_min=spp_min, spp_max=spp_max,
                               seed=seed, time_budget_s=time_budget_s, exposure=1.0 if display else exposure,
                               transfer="srgb" if display else transfer, gamma=gamma, sample_clamp=sample_clamp,
-                              deterministic=deterministic, independent=independent)
+                              deterministic=deterministic, independent=independent, shared=shared)
         self.first_spp = max(spp_min, needs.first_spp)
         self._begin_s = time.monotonic()
 

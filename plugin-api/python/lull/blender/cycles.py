@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: MIT
+"""Blender's Cycles as a host: rectangles of the current frame at ranges of samples, through the public API only.
+
+Relies on what Cycles does with persistent data, a fixed seed, a Sobol' pattern and a sample offset: samples [first, first +
+count) of a pixel are those that one long render would take, whatever border is rendered, so that waves add up to it. The
+pixels come back through an uncompressed EXR in memory-backed storage, because the Render Result cannot be read in background
+mode. Every setting that is touched is put back on exit.
+"""
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import sys
+import tempfile
+from typing import Iterator, Sequence
+
+import bpy
+import numpy as np
+
+from .. import exr
+from ..blocks import merge
+from ..criterion import Rect
+
+PATTERNS = ("SOBOL_BURLEY", "SOBOL")  # its names in 4.x and 3.x; tabulated patterns depend on the total number of samples
+
+
+@contextlib.contextmanager
+def _silence() -> Iterator[None]:
+    """Without a window Blender prints a page per call: not to be seen for every wave."""
+    if not bpy.app.background:
+        yield
+        return
+    sys.stdout.flush()
+    kept, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)
+    os.close(nowhere)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+
+
+class HostError(Exception):
+    """The scene cannot be rendered; one line for people."""
+
+
+class Cycles:
+    """Use as a context manager around everything that renders. scene: borrowed; spp_max: the most samples of a pixel."""
+
+    def __init__(self, scene: bpy.types.Scene, spp_max: int):
+        if not hasattr(scene, "cycles"):
+            raise HostError("Cycles is not available: enable the add-on 'Cycles Render Engine' in the preferences")
+        if scene.camera is None:
+            raise HostError(f"scene '{scene.name}' has no camera: add one, or set the scene's active camera")
+        render = scene.render
+        if render.use_multiview:
+            raise HostError(f"scene '{scene.name}' renders several views: turn stereoscopy off")
+        if not any(layer.use for layer in scene.view_layers):
+            raise HostError(f"scene '{scene.name}' has no view layer that is used for rendering")
+        self.scene, self.spp_max = scene, spp_max
+        self.width = render.resolution_x * render.resolution_percentage // 100
+        self.height = render.resolution_y * render.resolution_percentage // 100
+        self.threads = render.threads
+        self._touched: list[tuple[object, str, object]] = []
+        self._folder = ""
+
+    def crop(self) -> Rect:
+        """The scene's own render region in pixels from the top, or the whole picture."""
+        r = self.scene.render
+        if not r.use_border:
+            return Rect(0, 0, self.width, self.height)
+        x0, x1 = round(r.border_min_x * self.width), round(r.border_max_x * self.width)
+        y0, y1 = round((1 - r.border_max_y) * self.height), round((1 - r.border_min_y) * self.height)
+        if x0 >= x1 or y0 >= y1:
+            raise HostError(f"scene '{self.scene.name}': its render region holds no pixel")
+        return Rect(x0, y0, x1, y1)
+
+    def __enter__(self) -> Cycles:
+        memory = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
+        self._folder = tempfile.mkdtemp(prefix="lull-", dir=memory)
+        render, cycles = self.scene.render, self.scene.cycles
+        try:
+            self._set(render, engine="CYCLES", use_persistent_data=True, use_border=True, use_crop_to_border=True,
+                      use_compositing=False, use_sequencer=False, use_overwrite=True, use_placeholder=False,
+                      use_file_extension=False, filepath=os.path.join(self._folder, "wave.exr"))
+            for name in ("border_min_x", "border_min_y", "border_max_x", "border_max_y"):
+                self._set(render, **{name: getattr(render, name)})  # to be put back
+            self._set(render.image_settings, media_type="IMAGE", file_format="OPEN_EXR", color_mode="RGB", color_depth="32",
+                      exr_codec="NONE", color_management="FOLLOW_SCENE")
+            self._set(cycles, use_adaptive_sampling=False, use_denoising=False, use_layer_samples="IGNORE", time_limit=0.0,
+                      use_sample_subset=True, sample_offset=0, samples=1, sample_subset_length=1)
+            self._set_pattern()
+            first = next(layer for layer in self.scene.view_layers if layer.use)
+            for layer in self.scene.view_layers:  # only the first one is written to the file
+                self._set(layer, use=layer == first)
+        except BaseException:
+            self.__exit__()
+            raise
+        return self
+
+    def _set(self, owner: object, **settings: object) -> None:
+        """Sets those of the settings that this Blender has, to be put back on exit."""
+        known = {name: value for name, value in settings.items() if hasattr(owner, name)}
+        self._touched += [(owner, name, getattr(owner, name)) for name in known]  # before one changes another
+        for name, value in known.items():
+            setattr(owner, name, value)
+
+    def _set_pattern(self) -> None:
+        cycles = self.scene.cycles
+        for name in PATTERNS:
+            try:
+                return self._set(cycles, sampling_pattern=name)
+            except TypeError:
+                self._touched.pop()  # no such pattern in this version
+        raise HostError("this Cycles has no Sobol-Burley sampling pattern: waves would not add up to one render")
+
+    def __exit__(self, *_) -> None:
+        for owner, name, value in self._touched:  # in order: what a file format allows depends on the format
+            setattr(owner, name, value)
+        self._touched.clear()
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    # --- rendering -----------------------------------------------------------------------------------------------------
+
+    def render(self, rects: Sequence[Rect], first: int, count: int, _half: bool) -> Iterator[np.ndarray]:
+        """The driver's render function: the mean of samples [first, first + count), [h, w, 3] float32 per rectangle."""
+        areas = {area: self._render_area(area, first, count) for area in merge(rects)}
+        for r in rects:
+            area, pixels = next((a, p) for a, p in areas.items() if a.x0 <= r.x0 < a.x1 and a.y0 <= r.y0 < a.y1)
+            yield pixels[r.y0 - area.y0:r.y1 - area.y0, r.x0 - area.x0:r.x1 - area.x0]
+
+    def _render_area(self, area: Rect, first: int, count: int) -> np.ndarray:
+        render, cycles = self.scene.render, self.scene.cycles
+        # Blender cuts border · size down to whole pixels, in single precision: aim inside the pixel. Rows are from below.
+        render.border_min_x, render.border_max_x = (area.x0 + 0.25) / self.width, (area.x1 + 0.25) / self.width
+        render.border_min_y = (self.height - area.y1 + 0.25) / self.height
+        render.border_max_y = (self.height - area.y0 + 0.25) / self.height
+        cycles.sample_offset = first
+        if hasattr(cycles, "use_sample_subset"):
+            cycles.samples, cycles.sample_subset_length = self.spp_max, count
+        else:
+            cycles.samples = count
+        with _silence():
+            status = bpy.ops.render.render(write_still=True, scene=self.scene.name)
+        if "FINISHED" not in status:
+            raise HostError("Cycles did not finish the wave")
+        pixels, _ = exr.read(render.filepath)
+        if pixels.shape != (area.height, area.width, 3):
+            raise HostError(f"Cycles rendered {pixels.shape[1]}x{pixels.shape[0]} pixels for a border of "
+                            f"{area.width}x{area.height}")
+        return pixels

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: MIT
+"""What the scene's view settings (exposure, Filmic, AgX, looks, curves) make of linear radiance, for lull.Frame.
+
+Blender's colour management cannot be called from Python, but it can save a picture: a ramp of greys is saved through it once
+and read back. The curve is applied to each channel, which leaves out what a view does across channels (Filmic and AgX take
+colour out of highlights): the noise of luminance is judged as it is shown, that of saturated highlights nearly so.
+"""
+from __future__ import annotations
+
+import os
+import tempfile
+from typing import Callable, Optional
+
+import bpy
+import numpy as np
+
+from .. import png
+
+LOW, HIGH, STEPS = -14.0, 8.0, 2048  # log2 of the darkest and the brightest grey of the ramp, and their number
+
+
+def is_plain(scene: bpy.types.Scene) -> bool:
+    """Exposure and the sRGB transfer are all there is: the criterion can be told so exactly."""
+    view = scene.view_settings
+    return (scene.display_settings.display_device == "sRGB" and view.view_transform == "Standard" and
+            view.look in ("None", "") and view.gamma == 1.0 and not view.use_curve_mapping)
+
+
+def display_of(scene: bpy.types.Scene) -> Optional[Callable[[np.ndarray], np.ndarray]]:
+    """None if the view is plain; else linear radiance [..., 3] -> linear display values in [0, 1]."""
+    if is_plain(scene):
+        return None
+    greys = np.concatenate(([0.0], np.exp2(np.linspace(LOW, HIGH, STEPS - 1))))
+    encoded = _save_ramp(scene, greys)
+    shown = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+    return lambda linear: np.interp(linear, greys, shown)
+
+
+def _save_ramp(scene: bpy.types.Scene, greys: np.ndarray) -> np.ndarray:
+    """Display codes in [0, 1] of the greys."""
+    settings = scene.render.image_settings
+    names = [n for n in ("media_type", "file_format", "color_mode", "color_depth", "color_management")
+             if hasattr(settings, n)]
+    before = {name: getattr(settings, name) for name in names}
+    image = bpy.data.images.new("lull ramp", len(greys), 1, float_buffer=True)
+    try:
+        image.colorspace_settings.name = "Linear" if bpy.app.version < (4, 0) else "Linear Rec.709"
+        image.pixels.foreach_set(np.stack([greys, greys, greys, np.ones_like(greys)], -1).astype(np.float32).ravel())
+        for name, value in {"media_type": "IMAGE", "file_format": "PNG", "color_mode": "RGB", "color_depth": "16",
+                            "color_management": "FOLLOW_SCENE"}.items():
+            if name in before:
+                setattr(settings, name, value)
+        with tempfile.TemporaryDirectory(prefix="lull-") as folder:
+            path = os.path.join(folder, "ramp.png")
+            image.save_render(path, scene=scene)
+            return png.read_grey(path)[0]
+    finally:
+        bpy.data.images.remove(image)
+        for name, value in before.items():
+            setattr(settings, name, value)

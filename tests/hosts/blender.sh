@@ -1,0 +1,16 @@
+#!/bin/sh
+# Blender's Cycles as a host, in Blender and, where it is installed, in the Python module bpy.
+BUILD=${BUILD:-build}
+export BUILD
+lines='^(ok|not ok|#|1\.\.)'
+if command -v blender >/dev/null; then
+    blender -b --factory-startup -noaudio --python tests/hosts/test_blender.py 2>&1 | grep -E "$lines"
+else
+    echo "ok 1 - Blender # SKIP no blender: run make test-hosts"
+fi
+python=build/hosts/bpy/bin/python3
+if "$python" -c 'import bpy' 2>/dev/null; then
+    "$python" tests/hosts/test_blender.py 2>&1 | grep -E "$lines" | sed 's/ - / - bpy: /'
+else
+    echo "ok 1 - the Python module bpy # SKIP not in build/hosts/bpy: run make test-hosts"
+fi
