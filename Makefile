@@ -79,7 +79,9 @@ GGN_CLI     := $(wildcard ggn/cli/*.c)
 TEST_SRC    := $(wildcard tests/unit/*.c tests/grad/*.c tests/golden/*.c tests/stat/*.c tests/abi/*.c tests/hard/*.c tests/oom/*.c)
 # The subset that also runs under ASan+UBSan in `make test`.
 SANE_SRC    := $(wildcard tests/unit/*.c tests/abi/*.c tests/oom/*.c)
-SCRIPT_TEST := $(wildcard tests/cli/*.sh tests/e2e/*.sh tests/hosts/*.sh)
+# Hosts that are not installed are skipped; `make test-hosts` installs them first.
+HOST_TEST   := $(wildcard tests/hosts/*.sh)
+SCRIPT_TEST := $(wildcard tests/cli/*.sh tests/e2e/*.sh) $(HOST_TEST)
 FUZZ_SRC    := $(filter-out tests/fuzz/replay.c,$(wildcard tests/fuzz/*.c))
 
 o = $(addprefix $(OBJ)/,$(addsuffix .o,$(1)) $(addsuffix .double.o,$(filter $(GGN_TWICE),$(1))))
@@ -98,7 +100,7 @@ REPLAY   := $(patsubst tests/fuzz/%.c,$(OUT)/fuzz/replay-%,$(FUZZ_SRC))
 FUZZERS  := $(patsubst tests/fuzz/%.c,build/fuzz/%,$(FUZZ_SRC))
 
 .DEFAULT_GOAL := all
-.PHONY: all demo test bench asan tsan fuzz mutants hdr-check abi-check install compdb clean help setup tests replay train-demo test-study
+.PHONY: all demo test bench asan tsan fuzz mutants hdr-check abi-check install compdb clean help setup tests replay train-demo test-study test-hosts
 .SECONDARY:
 
 all: $(PROGRAMS) $(CRITERIA) ## build the programs and the criteria
@@ -193,6 +195,11 @@ test: setup ## build everything, run every test; closes with "N passed, N failed
 	@$(MAKE) --no-print-directory MODE=asan all replay $(SANE)
 	@BUILD=build tests/run $(patsubst tests/%.c,build/tests/%,$(TEST_SRC)) $(SCRIPT_TEST) \
 	    --asan $(SANE) --replay $(patsubst tests/fuzz/%.c,build/asan/fuzz/replay-%,$(FUZZ_SRC))
+
+test-hosts: setup ## install Blender, Mitsuba and bpy as far as they can be had, and test Lull in them
+	@$(MAKE) --no-print-directory all $(ABI_PLUGINS)
+	@scripts/hosts/setup
+	@BUILD=build tests/run $(HOST_TEST)
 
 asan tsan: ## run the unit and ABI tests under the sanitizer
 	@$(MAKE) --no-print-directory MODE=$@ all tests

@@ -68,8 +68,8 @@ def test_same_picture():
     with Session(scene, Settings("fixed", {"spp": "40"}, block=24)) as session:
         assert session.driver.run().outcome == "done" and len(session.frame.blocks) == 6
         mean = session.frame.mean()
-    assert {b.spp for b in session.frame.blocks} == {48}
-    whole = one_render(scene, 48)
+    assert {b.spp for b in session.frame.blocks} == {64}
+    whole = one_render(scene, 64)
     assert whole.std() > .01 and abs(mean - whole).max() < SAME * whole.max(), abs(mean - whole).max()
 
 
