@@ -11,7 +11,7 @@
 #include "data/thresholds.h"
 #include "figures/stats.h"
 #include "observer/calibrate.h"
-#include "observer/judge.h"
+#include "observer/views.h"
 #include "observer/trials.h"
 
 enum { MAX_INPUTS = 256 };

@@ -9,19 +9,23 @@
 static const double FIRST_SPP = 16.0; /* the criterion's default */
 
 /* Visible noise over its limit at spp, between cases in log-log, beyond them as at the nearest. */
-static double error_at(const struct ggn_observer *o, const struct ggn_eval_set *s, const struct ggn_eval_block *b, double spp)
+static double error_at(const struct ggn_observer *o, const struct ggn_eval_set *s, const struct ggn_eval_block *b,
+                       double spp)
 {
     size_t i = b->first;
     while (i + 2 < b->end && s->spp[i + 1] < spp)
         i++;
     size_t k = i + 1 < b->end ? i + 1 : i;
-    double one = s->visible[i] / ggn_observer_limit(o, s->texture[i]), other = s->visible[k] / ggn_observer_limit(o, s->texture[k]);
+    double one = s->visible[i] / ggn_observer_limit(o, s->texture[i]),
+           other = s->visible[k] / ggn_observer_limit(o, s->texture[k]);
     double t = spp <= s->spp[i] ? 0.0 : spp >= s->spp[k] ? 1.0 : log(spp / s->spp[i]) / log(s->spp[k] / s->spp[i]);
     return one > 0.0 && other > 0.0 ? one * pow(other / one, t) : one + t * (other - one);
 }
 
-/* Where the criterion stops, which asks at sample counts of its own: where it expects to stop, but a tenth to a half more than now. */
-static double replay(const struct ggn_observer *o, const struct ggn_eval_set *s, const struct ggn_eval_block *b, double stop_error)
+/* Where the criterion stops, which asks at sample counts of its own: where it expects to stop, but a tenth to a half more
+ * than now. */
+static double replay(const struct ggn_observer *o, const struct ggn_eval_set *s, const struct ggn_eval_block *b,
+                     double stop_error)
 {
     double spp = fmax(FIRST_SPP, s->spp[b->first]);
     while (spp < b->cap) {
@@ -45,7 +49,9 @@ int ggn_method_observer(struct ggn_method *m, const struct ggn_eval_set *s, cons
             rc = ggn_observer_read(path, s->chains.data.views[block->view].name, &o, err);
         view = block->view;
         for (size_t i = block->first; i < block->end; i++) {
-            m->score[i] = isnan(s->visible[i]) ? (double)NAN : ggn_observer_p_noisy(&o, s->visible[i] / ggn_observer_limit(&o, s->texture[i]));
+            m->score[i] = isnan(s->visible[i])
+                              ? (double)NAN
+                              : ggn_observer_p_noisy(&o, s->visible[i] / ggn_observer_limit(&o, s->texture[i]));
             *available &= !isnan(s->visible[i]);
         }
         m->stop[b] = *available ? replay(&o, s, block, ggn_observer_error_at(&o, visible)) : block->cap;
@@ -58,8 +64,8 @@ int ggn_method_observer(struct ggn_method *m, const struct ggn_eval_set *s, cons
     return 0;
 }
 
-int ggn_method_thresholds(struct ggn_method *m, const struct ggn_eval_set *s, const char *path, enum ggn_split split, int *available,
-                          struct base_err *err)
+int ggn_method_thresholds(struct ggn_method *m, const struct ggn_eval_set *s, const char *path, enum ggn_split split,
+                          int *available, struct base_err *err)
 {
     const char *slash = strrchr(path, '/');
     struct ggn_thresholds t = {0};

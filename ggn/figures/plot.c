@@ -45,9 +45,13 @@ int ggn_plot_begin(struct ggn_plot *plot, const char *path, int width, int heigh
     plot->script = fopen(plot->tmp_script, "w");
     if (!plot->script)
         return base_fail(err, BASE_EIO, "%s: %s", path, strerror(errno));
-    fprintf(plot->script, "set encoding utf8\nset terminal pngcairo size %d,%d noenhanced font 'sans,11' background '#ffffff'\nset output ", width, height);
+    fprintf(
+        plot->script,
+        "set encoding utf8\nset terminal pngcairo size %d,%d noenhanced font 'sans,11' background '#ffffff'\nset output ",
+        width, height);
     ggn_plot_quote(plot->script, plot->tmp_picture);
-    fputs("\nset border lc '#444444'\nset grid lc '#dddddd'\nset key noenhanced\nset datafile missing 'nan'\n", plot->script);
+    fputs("\nset border lc '#444444'\nset grid lc '#dddddd'\nset key noenhanced\nset datafile missing 'nan'\n",
+          plot->script);
     return 0;
 }
 

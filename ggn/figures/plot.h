@@ -19,7 +19,7 @@ struct ggn_plot {
 
 /* path ends in .png; width, height in pixels. On failure nothing is left behind. */
 int ggn_plot_begin(struct ggn_plot *plot, const char *path, int width, int height, struct base_err *err);
-/* Closes the script and, when run != 0, draws it. Always removes the temporaries. BASE_EIO: gnuplot is missing or refused. */
+/* Closes the script and, when run != 0, draws it. Removes the temporaries always. BASE_EIO: no gnuplot, or it refused. */
 int ggn_plot_end(struct ggn_plot *plot, int run, struct base_err *err);
 
 /* Writes text as a single-quoted gnuplot string without enhanced-text surprises (quotes doubled, underscores kept). */

@@ -126,7 +126,8 @@ int ggn_stats_auc(const double *score, const unsigned char *label, size_t n, dou
     return 0;
 }
 
-int ggn_stats_best_cut(const double *score, const unsigned char *label, size_t n, double *cut, double *accuracy, struct base_err *err)
+int ggn_stats_best_cut(const double *score, const unsigned char *label, size_t n, double *cut, double *accuracy,
+                       struct base_err *err)
 {
     struct keyed *k = sorted(score, n);
     if (!k)

@@ -21,7 +21,8 @@ void ggn_stats_line(const double *x, const double *y, size_t n, double *a, doubl
  * empty. BASE_ENOMEM only. */
 int ggn_stats_auc(const double *score, const unsigned char *label, size_t n, double *auc, struct base_err *err);
 /* The cut t that maximises the accuracy of "score >= t means 1", and that accuracy. BASE_ENOMEM only. */
-int ggn_stats_best_cut(const double *score, const unsigned char *label, size_t n, double *cut, double *accuracy, struct base_err *err);
+int ggn_stats_best_cut(const double *score, const unsigned char *label, size_t n, double *cut, double *accuracy,
+                       struct base_err *err);
 
 /* Predicted against true thresholds. */
 struct ggn_agreement {

@@ -25,8 +25,8 @@ struct ggn_policy ggn_policy_default(void);
 /* BASE_EINVAL naming the field that is out of range. */
 int ggn_policy_check(const struct ggn_policy *policy, struct base_err *err);
 
-/* The parameters that users may set over the model's own policy, by name: visible (the threshold), passes, gate (0: none), tail, gini,
- * first-spp. Returns 0 if there is none of this name. */
+/* The parameters that users may set over the model's own policy, by name: visible (the threshold), passes, gate (0: none),
+ * tail, gini, first-spp. Returns 0 if there is none of this name. */
 int ggn_policy_adjust(struct ggn_policy *policy, const char *name, double value);
 
 /* Calibrated probability; 1 for a logit that is not finite. */

@@ -5,7 +5,7 @@
 
 #include "base/json.h"
 #include "figures/stats.h"
-#include "observer/judge.h"
+#include "observer/views.h"
 
 /* What is known of all blocks before any fit. */
 struct evidence {
@@ -34,7 +34,10 @@ static int fit(struct evidence *e, int skip, struct ggn_observer *o, struct base
     ggn_stats_line(e->x, e->y, n, &level, &o->exponent);
     o->level = exp(level);
     if (n < 3 || !isfinite(o->level) || !isfinite(o->exponent))
-        return base_fail(err, BASE_EINVAL, "calibration needs at least 3 blocks of different texture with thresholds below %d in the other views", GGN_CURVE_CAP);
+        return base_fail(
+            err, BASE_EINVAL,
+            "calibration needs at least 3 blocks of different texture with thresholds below %d in the other views",
+            GGN_CURVE_CAP);
     return 0;
 }
 
@@ -43,7 +46,8 @@ static void predict(struct evidence *e, int view, const struct ggn_observer *o, 
     for (int i = 0; i < e->n; i++) {
         int censored;
         if (blocks[i].view == view)
-            blocks[i].predicted = clamp_to_cap(ggn_curve_threshold(&e->curves[i], ggn_observer_limit(o, e->curves[i].texture), &censored));
+            blocks[i].predicted =
+                clamp_to_cap(ggn_curve_threshold(&e->curves[i], ggn_observer_limit(o, e->curves[i].texture), &censored));
     }
 }
 
@@ -73,7 +77,8 @@ static int summarise(struct evidence *e, int from, int to, struct ggn_calibratio
     return rc;
 }
 
-static int leave_each_out(struct evidence *e, const struct ggn_calibration_input *inputs, struct ggn_calibration *c, struct base_err *err)
+static int leave_each_out(struct evidence *e, const struct ggn_calibration_input *inputs, struct ggn_calibration *c,
+                          struct base_err *err)
 {
     int rc = 0, from = 0;
     for (int v = 0; v < c->n_views && !rc; v++) {
@@ -92,7 +97,8 @@ static int leave_each_out(struct evidence *e, const struct ggn_calibration_input
     }
     if (!rc)
         rc = fit(e, -1, &c->observer, err);
-    c->all = (struct ggn_calibration_row){.name = "all, each view left out", .level = c->observer.level, .exponent = c->observer.exponent};
+    c->all = (struct ggn_calibration_row){
+        .name = "all, each view left out", .level = c->observer.level, .exponent = c->observer.exponent};
     if (!rc)
         rc = summarise(e, 0, e->n, &c->all, err);
     for (int i = 0; i < e->n && !rc; i++)
@@ -102,15 +108,17 @@ static int leave_each_out(struct evidence *e, const struct ggn_calibration_input
 }
 
 /* Curves and thresholds of one view, from block `*at` on. */
-static int add_view(const struct ggn_calibration_input *in, int view, enum ggn_curve_source source, struct base_threads *threads,
-                    struct evidence *e, struct ggn_calibration_block *blocks, struct base_err *err)
+static int add_view(const struct ggn_calibration_input *in, int view, enum ggn_curve_source source,
+                    struct base_threads *threads, struct evidence *e, struct ggn_calibration_block *blocks,
+                    struct base_err *err)
 {
     const struct seq_manifest *m = &in->view->manifest;
     uint32_t tiles = ggn_dataset_tiles(in->view);
     if (m->n_blocks == 0)
         return base_fail(err, BASE_EINVAL, "%s: no finished block yet", in->view->dir);
     if ((uint32_t)in->human->n != tiles)
-        return base_fail(err, BASE_EINVAL, "'%s' has %d thresholds, %s has %u blocks of %u pixels", in->human->name, in->human->n, in->view->dir, tiles, m->block);
+        return base_fail(err, BASE_EINVAL, "'%s' has %d thresholds, %s has %u blocks of %u pixels", in->human->name,
+                         in->human->n, in->view->dir, tiles, m->block);
     int rc = ggn_view_curves(in->view, source, threads, e->curves + e->n, err);
     for (uint32_t i = 0; i < m->n_blocks && !rc; i++) {
         uint32_t id = m->blocks[i].id;
@@ -129,8 +137,8 @@ void ggn_calibration_release(struct ggn_calibration *c)
     *c = (struct ggn_calibration){0};
 }
 
-int ggn_calibrate(const struct ggn_calibration_input *inputs, int n, enum ggn_curve_source source, struct base_threads *threads,
-                  struct ggn_calibration *out, struct base_err *err)
+int ggn_calibrate(const struct ggn_calibration_input *inputs, int n, enum ggn_curve_source source,
+                  struct base_threads *threads, struct ggn_calibration *out, struct base_err *err)
 {
     size_t room = 1;
     int rc = 0;
@@ -138,7 +146,8 @@ int ggn_calibrate(const struct ggn_calibration_input *inputs, int n, enum ggn_cu
         return base_fail(err, BASE_EINVAL, "calibration leaves one view out: it needs at least 2 views, there is %d", n);
     for (int v = 0; v < n; v++)
         room += inputs[v].view->manifest.n_blocks;
-    struct ggn_calibration c = {.n_views = n, .views = calloc((size_t)n, sizeof *c.views), .blocks = calloc(room, sizeof *c.blocks)};
+    struct ggn_calibration c = {
+        .n_views = n, .views = calloc((size_t)n, sizeof *c.views), .blocks = calloc(room, sizeof *c.blocks)};
     struct evidence e = {.blocks = c.blocks, .curves = calloc(room, sizeof *e.curves), .x = malloc(2 * room * sizeof *e.x)};
     if (!c.views || !c.blocks || !e.curves || !e.x)
         rc = base_fail_nomem(err, "calibration");

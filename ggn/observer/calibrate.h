@@ -1,9 +1,9 @@
 /*
  * Fitting the observer to human thresholds, judged on views that had no part in the fit.
  *
- * At a human threshold noise is just not visible: log(visible noise there) = log(level) + exponent * log(texture + 2), least squares
- * over the blocks of all views, those at the cap left out (nothing is known but that people still saw noise). Every figure of the
- * table is of a view that was left out of its own fit.
+ * At a human threshold noise is just not visible: log(visible noise there) = log(level) + exponent * log(texture + 2), least
+ * squares over the blocks of all views, those at the cap left out (nothing is known but that people still saw noise). Every
+ * figure of the table is of a view that was left out of its own fit.
  */
 #ifndef GGN_OBSERVER_CALIBRATE_H
 #define GGN_OBSERVER_CALIBRATE_H
@@ -41,8 +41,8 @@ struct ggn_calibration {
 };
 
 /* At least two views. BASE_EINVAL also where thresholds are for another number of blocks. */
-int ggn_calibrate(const struct ggn_calibration_input *inputs, int n, enum ggn_curve_source source, struct base_threads *threads,
-                  struct ggn_calibration *out, struct base_err *err);
+int ggn_calibrate(const struct ggn_calibration_input *inputs, int n, enum ggn_curve_source source,
+                  struct base_threads *threads, struct ggn_calibration *out, struct base_err *err);
 void ggn_calibration_release(struct ggn_calibration *c);
 
 /* The observer's parameters as JSON, with the table; ggn_observer_read reads it. */

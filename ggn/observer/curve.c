@@ -134,11 +134,13 @@ static int add_levels(struct ggn_curve *c, struct planes *p, int independent, st
     return 0;
 }
 
-int ggn_curve_make(const struct seq_block *block, enum ggn_curve_source source, int reference_independent, struct ggn_curve *curve,
-                   struct base_err *err)
+int ggn_curve_make(const struct seq_block *block, enum ggn_curve_source source, int reference_independent,
+                   struct ggn_curve *curve, struct base_err *err)
 {
     if (source == GGN_FROM_HALVES && !full_level(block))
-        return base_fail(err, BASE_EINVAL, "block %u has no full level with a half-buffer difference: record one, or use --source levels", block->id);
+        return base_fail(err, BASE_EINVAL,
+                         "block %u has no full level with a half-buffer difference: record one, or use --source levels",
+                         block->id);
     if (source == GGN_FROM_LEVELS && !block->reference)
         return base_fail(err, BASE_EINVAL, "block %u has no reference: record one, or use --source halves", block->id);
     size_t room = SIMULATED + block->n_levels;

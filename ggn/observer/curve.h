@@ -1,12 +1,11 @@
 /*
  * How visible the noise of a recorded block is at any number of samples.
  *
- * From two halves: M and D of the block's full level, recorded at n0 spp, give the look at n spp as M + sqrt(n0/n) D and its twin with
- * the other sign. Nothing else is needed, and every n up to GGN_CURVE_CAP can be asked about; it errs where rare bright paths make the
- * noise far from Gaussian (ggn/observer/README.md).
- * From recorded levels: the picture I at n spp against a reference R of n_r independent samples. I - R has the variance
- * s^2 (1/n + 1/n_r), so it is scaled by sqrt(n_r / (n_r + n)); texture is what the last level and R share. Where the block has halves
- * too they go on beyond the last level.
+ * From two halves: M and D of the block's full level, recorded at n0 spp, give the look at n spp as M + sqrt(n0/n) D and its
+ * twin with the other sign. Nothing else is needed, and every n up to GGN_CURVE_CAP can be asked about; it errs where rare
+ * bright paths make the noise far from Gaussian (ggn/observer/README.md). From recorded levels: the picture I at n spp
+ * against a reference R of n_r independent samples. I - R has the variance s^2 (1/n + 1/n_r), so it is scaled by sqrt(n_r /
+ * (n_r + n)); texture is what the last level and R share. Where the block has halves too they go on beyond the last level.
  */
 #ifndef GGN_OBSERVER_CURVE_H
 #define GGN_OBSERVER_CURVE_H
@@ -26,16 +25,17 @@ struct ggn_curve {
 };
 
 /* BASE_EINVAL: GGN_FROM_HALVES without a full level, GGN_FROM_LEVELS without a reference. */
-int ggn_curve_make(const struct seq_block *block, enum ggn_curve_source source, int reference_independent, struct ggn_curve *curve,
-                   struct base_err *err);
+int ggn_curve_make(const struct seq_block *block, enum ggn_curve_source source, int reference_independent,
+                   struct ggn_curve *curve, struct base_err *err);
 void ggn_curve_release(struct ggn_curve *curve);
 
-/* Noise and texture of one recorded level as the criterion `observer` sees them in the renderer: from the level's own two halves (where
- * only the luminance of their difference was recorded, that, as grey). BASE_EINVAL where it was not recorded. */
-int ggn_curve_level(const struct seq_block *block, const struct seq_record *level, double *visible, double *texture, struct base_err *err);
+/* Noise and texture of one recorded level as the criterion `observer` sees them in the renderer: from the level's own two
+ * halves (where only the luminance of their difference was recorded, that, as grey). BASE_EINVAL: not recorded. */
+int ggn_curve_level(const struct seq_block *block, const struct seq_record *level, double *visible, double *texture,
+                    struct base_err *err);
 
-/* Smallest spp from which the noise stays at or below `limit`, interpolated between levels in log-log. censored: still above at the
- * last level, which is then returned. A curve that starts below gives its first level. */
+/* Smallest spp from which the noise stays at or below `limit`, interpolated between levels in log-log. censored: still above
+ * at the last level, which is then returned. A curve that starts below gives its first level. */
 double ggn_curve_threshold(const struct ggn_curve *curve, double limit, int *censored);
 /* Visible noise at spp, interpolated in log-log and clamped to the ends. */
 double ggn_curve_at(const struct ggn_curve *curve, double spp);

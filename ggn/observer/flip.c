@@ -247,7 +247,8 @@ static void detect(const float *y, const struct features *f, const float *detect
 }
 
 /* Eq. 5: difference[i] = (max(|edges|, |points|) / sqrt 2)^0.5. y: the two lightness planes; s: five planes of scratch. */
-static void feature_difference(float *const y[2], const struct features *f, float *const s[5], int w, int h, float *difference)
+static void feature_difference(float *const y[2], const struct features *f, float *const s[5], int w, int h,
+                               float *difference)
 {
     size_t n = (size_t)w * (size_t)h;
     for (int kind = 0; kind < 2; kind++) {

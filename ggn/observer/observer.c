@@ -36,7 +36,8 @@ double ggn_observer_error_at(const struct ggn_observer *o, double share)
 
 void ggn_observer_describe(const struct ggn_observer *o, char *text, size_t room)
 {
-    snprintf(text, room, "model observer: noise in L* is seen above %.4f (texture + 2)^%.4f, spread %.2f octaves", o->level, o->exponent, o->spread);
+    snprintf(text, room, "model observer: noise in L* is seen above %.4f (texture + 2)^%.4f, spread %.2f octaves", o->level,
+             o->exponent, o->spread);
 }
 
 static int get(const cJSON *root, const char *name, double lo, double hi, double *out)
@@ -72,7 +73,8 @@ int ggn_observer_read(const char *path, const char *left_out, struct ggn_observe
     const cJSON *from = fit_without(root, left_out);
     if (!get(from, "level", 1e-6, 1e3, &o.level) || !get(from, "exponent", -10, 10, &o.exponent) ||
         !get(root, "spread", 1e-3, 10, &o.spread))
-        rc = base_fail(err, BASE_EINVAL, "%s: level, exponent or spread is missing or out of range (ggn label --calibrate writes them)", path);
+        rc = base_fail(err, BASE_EINVAL,
+                       "%s: level, exponent or spread is missing or out of range (ggn label --calibrate writes them)", path);
     else
         *out = o;
     cJSON_Delete(root);

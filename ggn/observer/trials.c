@@ -29,7 +29,8 @@ static int parse_trials(const char *path, char *text, struct trial **out, int *c
         next = strchr(line, '\n');
         if (next)
             *next++ = '\0';
-        double block = strtod(line, &end), level = *end == ';' ? strtod(end + 1, &end) : -1.0, seen = *end == ';' ? strtod(end + 1, &end) : -1.0;
+        double block = strtod(line, &end), level = *end == ';' ? strtod(end + 1, &end) : -1.0,
+               seen = *end == ';' ? strtod(end + 1, &end) : -1.0;
         if (!(block >= 0 && block < TRIAL_BLOCKS) || !(level > 0 && level < 1e6) || (seen != 0.0 && seen != 1.0) ||
             end[strspn(end, "\r \t")] != '\0')
             ++*skipped;
@@ -41,7 +42,7 @@ static int parse_trials(const char *path, char *text, struct trial **out, int *c
     return 0;
 }
 
-/* Log-likelihood of one block's trials for threshold x (log2) and spread s. A lapse rate of 2 % keeps one slip from ruling. */
+/* Log-likelihood of one block's trials for threshold x (log2) and spread s. A lapse rate of 2 %: no slip rules. */
 static double likelihood(const struct trial *t, int n, int block, double x, double s)
 {
     double sum = 0.0;

@@ -127,7 +127,8 @@ double ggn_visible_texture(const float *a, const float *b, int width, int height
     for (int y = 0; y < height; y++) {
         sum_rows(a, b, width, height, y, columns);
         for (int x = 0; x < width; x++) {
-            double covariance = mean_of_window(columns[2] + x) - mean_of_window(columns[0] + x) * mean_of_window(columns[1] + x);
+            double covariance =
+                mean_of_window(columns[2] + x) - mean_of_window(columns[0] + x) * mean_of_window(columns[1] + x);
             double texture = covariance - (1.0 / TAPS) * mean_of_window(columns[3] + x);
             deviation[x] += sqrt(texture > 0.0 ? texture : 0.0);
         }

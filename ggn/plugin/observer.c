@@ -1,8 +1,9 @@
 /*
- * The criterion "observer": the model observer (observer/observer.h) in the renderer. From COLOR and HALF it makes the means of the two
- * halves of a block's samples as a display shows them; what differs between them is noise, what they share is texture that hides noise.
- * `error` is the visible noise over the limit at which people stop seeing it, `p_noisy` the share of viewers who still do; a block stops
- * when that is at most `visible`. No model, no history: an answer follows from the block's pixels alone.
+ * The criterion "observer": the model observer (observer/observer.h) in the renderer. From COLOR and HALF it makes the means
+ * of the two halves of a block's samples as a display shows them; what differs between them is noise, what they share is
+ * texture that hides noise. `error` is the visible noise over the limit at which people stop seeing it, `p_noisy` the share
+ * of viewers who still do; a block stops when that is at most `visible`. No model, no history: an answer follows from the
+ * block's pixels alone.
  */
 #include <stdatomic.h>
 
@@ -15,12 +16,13 @@
 enum { P_VISIBLE, P_FIRST_SPP, P_GROWTH, P_COUNT };
 enum { PLANES = LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_HALF) };
 
-/* Standard error of the pooled Gaussian noise of P pixels is this over sqrt(P), as a share of it: a fourth moment scatters by
- * sqrt(96)/3, its root by a quarter of that, and the blur leaves about a third of the pixels independent. */
+/* Standard error of the pooled Gaussian noise of P pixels is this over sqrt(P), as a share of it: a fourth moment scatters
+ * by sqrt(96)/3, its root by a quarter of that, and the blur leaves about a third of the pixels independent. */
 static const double POOLING_ERROR = 1.4;
 
 static const struct lull_param params[P_COUNT] = {
-    [P_VISIBLE] = LULL_KIT_FLOAT("visible", "0.25", 1e-4, 0.9999, "stop when at most this share of viewers would still see noise"),
+    [P_VISIBLE] =
+        LULL_KIT_FLOAT("visible", "0.25", 1e-4, 0.9999, "stop when at most this share of viewers would still see noise"),
     [P_FIRST_SPP] = LULL_KIT_INT("first-spp", "16", 2, 1e15, "samples per pixel before the first judgement"),
     [P_GROWTH] = LULL_KIT_FLOAT("growth", "1.5", 1.01, 100, "largest ratio of samples between two checks of a block"),
 };
@@ -65,10 +67,10 @@ static int usable(const double a[3], const double m[3])
     return isfinite(a[0]) && isfinite(a[1]) && isfinite(a[2]) && isfinite(m[0]) && isfinite(m[1]) && isfinite(m[2]);
 }
 
-/* Fills w->rgb with the means of the two halves; n samples, of which h are in HALF. A pixel that is no number takes the place of the
- * one before it: neither noise nor texture. Returns whether the halves differ anywhere. */
-static int read_halves(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *b, struct worker *w,
-                       struct lull_kit_tally *tally)
+/* Fills w->rgb with the means of the two halves; n samples, of which h are in HALF. A pixel that is no number takes the
+ * place of the one before it: neither noise nor texture. Returns whether the halves differ anywhere. */
+static int read_halves(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *b,
+                       struct worker *w, struct lull_kit_tally *tally)
 {
     const double n = (double)b->spp, h = (double)b->half_spp;
     const size_t plane = (size_t)lull_kit_pixels(b);
@@ -108,8 +110,8 @@ static double error_of(const struct lull_instance *in, const struct lull_block *
     return (1 + POOLING_ERROR / sqrt((double)pixels)) * noise / ggn_observer_limit(&in->observer, texture);
 }
 
-/* A picture whose halves are the same everywhere has no noise, which is right for black or evenly lit blocks; one with structure says
- * that HALF is no half of the samples. */
+/* A picture whose halves are the same everywhere has no noise, which is right for black or evenly lit blocks; one with
+ * structure says that HALF is no half of the samples. */
 static int has_structure(const struct worker *w, size_t pixels)
 {
     for (size_t c = 0; c < 3; c++)
@@ -126,8 +128,8 @@ static void warn(struct lull_instance *in, const char *what)
         host->log(host, LULL_LOG_WARNING, what);
 }
 
-static void judge(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b, struct lull_decision *d,
-                  uint32_t worker)
+static void judge(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
+                  struct lull_decision *d, uint32_t worker)
 {
     struct worker *w = &in->worker[worker < in->workers ? worker : 0];
     struct lull_kit_tally tally = {0};
@@ -136,12 +138,14 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
     if (b->spp < in->kit.need.first_spp) {
         tally.early = 1;
     } else if (!b->half_spp || b->half_spp >= b->spp) {
-        warn(in, "observer: HALF holds none or all of a block's samples, so that noise cannot be told; no block is stopped by it");
+        warn(in, "observer: HALF holds none or all of a block's samples, so that noise cannot be told; no block is stopped "
+                 "by it");
         tally.early = 1;
     } else if (read_halves(&in->kit, view, b, w, &tally)) {
         error = error_of(in, b, w);
     } else if (has_structure(w, (size_t)lull_kit_pixels(b))) {
-        warn(in, "observer: COLOR and HALF are the same in a block that is not of one colour: HALF must hold a fixed half of the samples");
+        warn(in, "observer: COLOR and HALF are the same in a block that is not of one colour: HALF must hold a fixed half "
+                 "of the samples");
         tally.early = tally.bad = 1;
     } else {
         error = 0;
@@ -261,8 +265,10 @@ const struct lull_criterion ggn_plugin_observer = {
     .id = "observer",
     .name = "Model observer",
     .version = "1.0",
-    .description = "Noise that people would see, from the two halves of the samples: their difference in lightness, slightly blurred and\n"
-                   "pooled so that a few bright pixels count, against a limit that rises with the block's texture. `error` is the visible\n"
+    .description = "Noise that people would see, from the two halves of the samples: their difference in lightness, "
+                   "slightly blurred and\n"
+                   "pooled so that a few bright pixels count, against a limit that rises with the block's texture. `error` "
+                   "is the visible\n"
                    "noise over that limit (1 = just not visible), fitted to human thresholds.",
     .params = params,
     .param_count = P_COUNT,

@@ -391,7 +391,7 @@ static void answer_person(const struct ggn_study_site *site, const char *path, i
 /* NULL, or why a request is not let in at all. */
 static const char *check_origin(const struct ggn_study_site *site, const struct ggn_study_request *q, int post)
 {
-    int known = site->hosts == NULL;
+    int known = !site->hosts;
     for (int i = 0; !known && q->host && site->hosts[i]; i++)
         known = strcmp(q->host, site->hosts[i]) == 0;
     if (!known) /* a name of somebody else's that points here */

@@ -15,7 +15,7 @@
 #include "support/ggn_noise.h"
 
 #include "observer/calibrate.h"
-#include "observer/judge.h"
+#include "observer/views.h"
 #include "observer/trials.h"
 #include "observer/visibility.h"
 

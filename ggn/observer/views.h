@@ -1,8 +1,9 @@
 /*
- * The observer on a whole recorded view, its blocks in parallel: labels, and how labels from halves agree with recorded levels.
+ * The observer on a whole recorded view, its blocks in parallel: labels, and how labels from halves agree with recorded
+ * levels.
  */
-#ifndef GGN_OBSERVER_JUDGE_H
-#define GGN_OBSERVER_JUDGE_H
+#ifndef GGN_OBSERVER_VIEWS_H
+#define GGN_OBSERVER_VIEWS_H
 
 #include "base/threads.h"
 #include "data/dataset.h"
@@ -21,8 +22,8 @@ struct ggn_check {
     uint32_t id;
     double recorded, halves; /* thresholds, spp */
     int beyond;              /* recorded lies beyond the last recorded level, which it then is */
-    double curve;            /* median over the recorded levels of the shift between the two curves in octaves of samples, whatever the
-                              * limit: positive where halves ask for more; NaN if no recorded level shows noise */
+    double curve; /* median over the recorded levels of the shift between the two curves in octaves of samples, whatever the
+                   * limit: positive where halves ask for more; NaN if no recorded level shows noise */
 };
 
 /* checks: [n_blocks of the view]. */

@@ -1,4 +1,4 @@
-#include "observer/judge.h"
+#include "observer/views.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -64,7 +64,8 @@ int ggn_view_label(const struct ggn_observer *observer, const struct ggn_dataset
     free(curves);
     ggn_observer_describe(observer, l.detail, sizeof l.detail);
     size_t used = strlen(l.detail);
-    snprintf(l.detail + used, sizeof l.detail - used, source == GGN_FROM_HALVES ? "; from two halves" : "; from recorded levels, beyond them two halves");
+    snprintf(l.detail + used, sizeof l.detail - used,
+             source == GGN_FROM_HALVES ? "; from two halves" : "; from recorded levels, beyond them two halves");
     if (rc)
         ggn_labels_release(&l);
     else
@@ -82,8 +83,8 @@ static double curve_shift(const struct ggn_curve *recorded, const struct ggn_cur
     return ggn_stats_quantile(room, n, 0.5);
 }
 
-static int check_block(const struct ggn_observer *o, struct ggn_curve *recorded, const struct ggn_curve *halves, struct ggn_check *out,
-                       struct base_err *err)
+static int check_block(const struct ggn_observer *o, struct ggn_curve *recorded, const struct ggn_curve *halves,
+                       struct ggn_check *out, struct base_err *err)
 {
     int censored;
     double *room = malloc((size_t)recorded->n * sizeof *room);
