@@ -14,7 +14,7 @@ static const double lapses[N_LAPSES] = {0.0, 0.03, 0.08, 0.2};
 static const double lapse_prior[N_LAPSES] = {0.4, 0.4, 0.15, 0.05};
 static const double biases[N_BIASES] = {-0.8, -0.4, 0.0, 0.4, 0.8};
 static const double bias_prior[N_BIASES] = {0.06, 0.24, 0.4, 0.24, 0.06};
-static const double own_spread = 0.6; /* that a block's spread is the person's; the rest on its neighbours */
+static const double own_spread = 0.8; /* that a block's spread is the person's; the rest on its neighbours */
 
 /* Of a block's spread b given the person's p. */
 static double spread_given(int b, int p)

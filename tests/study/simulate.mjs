@@ -138,7 +138,7 @@ function judge(dir, truth, what) {
     for (let i = 0; i < Math.ceil(RUNS / BLOCKS); i++) {
         const me = await enter(client),
             curve = names[i % names.length],
-            t = Array.from({ length: BLOCKS }, () => 6 + 6 * next());
+            t = Array.from({ length: BLOCKS }, () => 5 + 8 * next());
         const quests = t.map(() => new Quest(LEVELS));
         truth[me.id] = { curve, t };
         for (const [slot, s] of me.slots.entries()) {
