@@ -191,7 +191,7 @@ static const char *const exr[] = {"exr", NULL}, *const png[] = {"png", NULL}, *c
 static const struct base_option options[] = {
     {.help = "When to stop:"},
     {"criterion", 'c', "NAME|PATH[:ID]", TO(criterion),
-     .help = "Stopping criterion: a name (see --list-criteria) or a shared object; default ggn"},
+     .help = "Stopping criterion: a name (see --list-criteria) or a shared object; default observer"},
     {"visible", 0, "SHARE", .set = set_visible,
      .help = "Stop a block when at most this share of viewers would still see noise, of criteria that can tell (observer: "
              "default 0.25, ggn: the model's own)"},

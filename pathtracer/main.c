@@ -21,7 +21,7 @@
 #include "render/sequence.h"
 
 /* The criterion when none is named. */
-static const char DEFAULT_CRITERION[] = "ggn";
+static const char DEFAULT_CRITERION[] = "observer";
 
 enum { EXIT_FAILED = 1, EXIT_BAD_INPUT = 2, EXIT_INTERRUPTED = 130 };
 

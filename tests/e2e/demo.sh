@@ -18,7 +18,7 @@ within() { stats "$1" "$2" | tee "$dir/log2" | awk -v l="$3" -v h="$4" 'NF == 3 
 mean() { stats "$1" "$2" | tee "$dir/log2" | awk -v l="$3" -v h="$4" 'NF == 3 {ok = $3 >= l && $3 <= h} END {exit !ok}'; }
 
 args="--criterion halfbuf -p threshold=0.05 --size 240x240 --block 40 --spp-min 16 --spp-max 150 --seed 3 -q"
-t "the demo runs" env DEMO_DIR="$dir" DEMO_ARGS="$args" scripts/demo
+t "the demo runs" env DEMO_DIR="$dir" DEMO_SCENE=scenes/environment.pbrt DEMO_ARGS="$args" scripts/demo
 for f in demo.exr demo.png stop-map.png stop-map.csv report.json; do t "it leaves $f" test -s "$dir/$f"; done
 t "nothing temporary is left" test -z "$(ls "$dir" | grep tmp)"
 t "the image has 240x240 pixels and all layers" sh -c "oiiotool --info -v $dir/demo.exr | tr -d ' ' | grep -q '240x240,14channel'"
@@ -43,5 +43,10 @@ t "36 numbers in the table" test "$(tr -cd ';' <"$dir/stop-map.csv" | wc -c)" -e
 t "blocks stop at different samples" test "$(tr ';' '\n' <"$dir/stop-map.csv" | sed 1d | grep . | sort -u | wc -l)" -gt 2
 t "the report tells 36 blocks" test "$(grep -c '"reason"' "$dir/report.json")" -eq 36
 t "preview is the image" sh -c "oiiotool $dir/demo.exr --ch R,G,B --clamp:min=0:max=1 --colorconvert linear sRGB -d uint8 -o $dir/x.png && oiiotool --fail 0.005 --failpercent 0 --hardfail 0.01 $dir/x.png $dir/demo.png --diff"
+# the demo's own scene with the default criterion: sky and lit paving are done long before the shade behind the door
+t "the demo's own scene runs" env DEMO_DIR="$dir/own" DEMO_ARGS="--size 240x240 --block 60 --spp-max 400 --seed 3 -q" scripts/demo
+t "the default criterion stopped blocks" grep -q '"reason":[[:space:]]*"criterion"' "$dir/own/report.json"
+t "its blocks differ by four times in samples at least" \
+    sh -c "tr ';' '\n' <$dir/own/stop-map.csv | sed 1d | grep . | sort -n | awk 'NR == 1 {a = \$1} {b = \$1} END {exit !(b >= 4 * a)}'"
 echo "1..$n"
 exit $bad
