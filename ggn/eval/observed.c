@@ -6,9 +6,9 @@
 #include "eval/method.h"
 #include "observer/observer.h"
 
-static const double FIRST_SPP = 16.0; /* the criterion's default */
+static const double FIRST_SPP = 16.0, GROWTH = 1.5; /* the criterion's defaults */
 
-/* Visible noise over its limit at spp, between cases in log-log, beyond them as at the nearest. */
+/* The criterion's error at spp, between cases in log-log, beyond them as at the nearest. */
 static double error_at(const struct ggn_observer *o, const struct ggn_eval_set *s, const struct ggn_eval_block *b,
                        double spp)
 {
@@ -16,14 +16,14 @@ static double error_at(const struct ggn_observer *o, const struct ggn_eval_set *
     while (i + 2 < b->end && s->spp[i + 1] < spp)
         i++;
     size_t k = i + 1 < b->end ? i + 1 : i;
-    double one = s->visible[i] / ggn_observer_limit(o, s->texture[i]),
-           other = s->visible[k] / ggn_observer_limit(o, s->texture[k]);
+    size_t pixels = (size_t)s->chains.width * (size_t)s->chains.height;
+    double one = ggn_observer_error(o, s->visible[i], s->texture[i], pixels);
+    double other = ggn_observer_error(o, s->visible[k], s->texture[k], pixels);
     double t = spp <= s->spp[i] ? 0.0 : spp >= s->spp[k] ? 1.0 : log(spp / s->spp[i]) / log(s->spp[k] / s->spp[i]);
     return one > 0.0 && other > 0.0 ? one * pow(other / one, t) : one + t * (other - one);
 }
 
-/* Where the criterion stops, which asks at sample counts of its own: where it expects to stop, but a tenth to a half more
- * than now. */
+/* Where the criterion stops, which asks at sample counts of its own. */
 static double replay(const struct ggn_observer *o, const struct ggn_eval_set *s, const struct ggn_eval_block *b,
                      double stop_error)
 {
@@ -32,7 +32,7 @@ static double replay(const struct ggn_observer *o, const struct ggn_eval_set *s,
         double ratio = error_at(o, s, b, spp) / stop_error;
         if (ratio <= 1.0)
             break;
-        spp = ceil(spp * fmin(fmax(ratio * ratio, 1.1), 1.5));
+        spp = ceil(ggn_observer_next(spp, spp * ratio * ratio, GROWTH));
     }
     return fmin(spp, b->cap);
 }
@@ -42,6 +42,7 @@ int ggn_method_observer(struct ggn_method *m, const struct ggn_eval_set *s, cons
 {
     int rc = ggn_method_init(m, s, "observer", 1, err), view = -1;
     struct ggn_observer o = ggn_observer_default;
+    size_t pixels = (size_t)s->chains.width * (size_t)s->chains.height;
     *available = 1;
     for (int b = 0; b < s->n_blocks && !rc; b++) {
         const struct ggn_eval_block *block = &s->blocks[b];
@@ -51,7 +52,7 @@ int ggn_method_observer(struct ggn_method *m, const struct ggn_eval_set *s, cons
         for (size_t i = block->first; i < block->end; i++) {
             m->score[i] = isnan(s->visible[i])
                               ? (double)NAN
-                              : ggn_observer_p_noisy(&o, s->visible[i] / ggn_observer_limit(&o, s->texture[i]));
+                              : ggn_observer_p_noisy(&o, ggn_observer_error(&o, s->visible[i], s->texture[i], pixels));
             *available &= !isnan(s->visible[i]);
         }
         m->stop[b] = *available ? replay(&o, s, block, ggn_observer_error_at(&o, visible)) : block->cap;

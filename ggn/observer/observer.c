@@ -16,6 +16,21 @@ double ggn_observer_limit(const struct ggn_observer *o, double texture)
     return o->level * pow(texture + GGN_OBSERVER_OFFSET, o->exponent);
 }
 
+/* Standard error of the pooled Gaussian noise of P pixels is this over sqrt(P), as a share of it: a fourth moment
+ * scatters by
+ * sqrt(96)/3, its root by a quarter of that, and the blur leaves about a third of the pixels independent. */
+static const double POOLING_ERROR = 1.4;
+
+double ggn_observer_error(const struct ggn_observer *o, double visible, double texture, size_t pixels)
+{
+    return (1.0 + POOLING_ERROR / sqrt((double)pixels)) * visible / ggn_observer_limit(o, texture);
+}
+
+double ggn_observer_next(double spp, double predicted, double growth)
+{
+    return fmin(fmax(predicted, 1.04 * spp), growth * spp);
+}
+
 double ggn_observer_p_noisy(const struct ggn_observer *o, double error)
 {
     return error > 0.0 ? 0.5 * erfc(-2.0 * log2(error) / (o->spread * sqrt(2.0))) : 0.0;

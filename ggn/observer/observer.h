@@ -25,8 +25,16 @@ extern const struct ggn_observer ggn_observer_default;
 
 /* The visible noise at which people stop seeing it in a block of this texture. */
 double ggn_observer_limit(const struct ggn_observer *observer, double texture);
+/* What the criterion `observer` calls error: visible noise over its limit, and one standard error of the pooling more, so
+ * that luck in
+ * the few pixels of a small block stops nothing: 0.7 % for 200x200 pixels. */
+double ggn_observer_error(const struct ggn_observer *observer, double visible, double texture, size_t pixels);
+/* Where to ask again about a block whose error falls to stop_error at `predicted` spp: there, but within [1.04, growth]
+ * times spp. */
+double ggn_observer_next(double spp, double predicted, double growth);
 /* Share of viewers who still see noise of `error` times the limit: the noise of a mean falls as 1/sqrt(spp), so that an
- * error of 2 is two octaves of samples away. error >= 0. */
+ * error of
+ * 2 is two octaves of samples away. error >= 0. */
 double ggn_observer_p_noisy(const struct ggn_observer *observer, double error);
 /* Its inverse: the error at which this share of viewers, in (0, 1), sees noise. */
 double ggn_observer_error_at(const struct ggn_observer *observer, double share);

@@ -16,10 +16,6 @@
 enum { P_VISIBLE, P_FIRST_SPP, P_GROWTH, P_COUNT };
 enum { PLANES = LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_HALF) };
 
-/* Standard error of the pooled Gaussian noise of P pixels is this over sqrt(P), as a share of it: a fourth moment scatters
- * by sqrt(96)/3, its root by a quarter of that, and the blur leaves about a third of the pixels independent. */
-static const double POOLING_ERROR = 1.4;
-
 static const struct lull_param params[P_COUNT] = {
     [P_VISIBLE] =
         LULL_KIT_FLOAT("visible", "0.25", 1e-4, 0.9999, "stop when at most this share of viewers would still see noise"),
@@ -107,7 +103,7 @@ static double error_of(const struct lull_instance *in, const struct lull_block *
     for (size_t i = 0; i < pixels; i++)
         w->lightness[0][i] = split * (w->lightness[0][i] - w->lightness[1][i]);
     double noise = ggn_visible_noise(w->lightness[0], width, height, w->scratch);
-    return (1 + POOLING_ERROR / sqrt((double)pixels)) * noise / ggn_observer_limit(&in->observer, texture);
+    return ggn_observer_error(&in->observer, noise, texture, pixels);
 }
 
 /* A picture whose halves are the same everywhere has no noise, which is right for black or evenly lit blocks; one with
@@ -151,6 +147,8 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
         error = 0;
     }
     lull_kit_verdict(&in->kit, b, &tally, error, in->stop_error, 0, in->kit.value[P_GROWTH], d);
+    if (d->action == LULL_CONTINUE && !isnan(d->predicted_spp)) /* the last steps are short: checks cost little here */
+        lull_kit_continue(&in->kit, b, ggn_observer_next((double)b->spp, d->predicted_spp, in->kit.value[P_GROWTH]), d);
     if (!isnan(d->error))
         d->p_noisy = ggn_observer_p_noisy(&in->observer, d->error);
 }

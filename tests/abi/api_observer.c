@@ -1,5 +1,6 @@
 /*
- * The criterion "observer" on pictures whose truth and noise are known: the law of the noise, texture against noise, and what a stopping
+ * The criterion "observer" on pictures whose truth and noise are known: the law of the noise, texture against noise, and
+ * what a stopping
  * rule is prone to get wrong (rare bright pixels, black, constant and saturated blocks, small ones, halves that are none).
  */
 #include <math.h>
@@ -41,7 +42,8 @@ static double gauss(void)
 }
 
 /* grey + texture * +-1 per pixel, with Gaussian noise of sigma per sample; half_spp of the spp samples are in the half. */
-static void make(struct picture *p, uint64_t spp, uint64_t half_spp, double grey, double texture, double sigma, uint64_t seed)
+static void make(struct picture *p, uint64_t spp, uint64_t half_spp, double grey, double texture, double sigma,
+                 uint64_t seed)
 {
     double n = (double)spp, h = (double)half_spp;
     state = 99;
@@ -90,17 +92,30 @@ static struct lull_decision ask(const struct picture *p, struct setting set)
         found.criterion->create(&host, &pair, 1, sizeof pair, &in, &err) != LULL_OK)
         fail_msg("%s", err.message);
     struct lull_rect rect = {0, 0, p->w, p->h};
-    struct lull_frame frame = {.struct_size = sizeof frame, .width = (uint32_t)p->w, .height = (uint32_t)p->h, .blocks = &rect,
-                               .block_count = 1, .block_stride = sizeof rect, .planes = 0xff, .exposure = set.exposure,
-                               .transfer = set.transfer, .gamma = 2.2, .rgb_to_xyz = {0, 0, 0, 0.2, 0.7, 0.1, 0, 0, 0}};
+    struct lull_frame frame = {.struct_size = sizeof frame,
+                               .width = (uint32_t)p->w,
+                               .height = (uint32_t)p->h,
+                               .blocks = &rect,
+                               .block_count = 1,
+                               .block_stride = sizeof rect,
+                               .planes = 0xff,
+                               .exposure = set.exposure,
+                               .transfer = set.transfer,
+                               .gamma = 2.2,
+                               .rgb_to_xyz = {0, 0, 0, 0.2, 0.7, 0.1, 0, 0, 0}};
     assert_int_equal(found.criterion->begin_frame(in, &frame, &err), LULL_OK);
     struct lull_plane planes[LULL_PLANE_COUNT] = {
         [LULL_PLANE_COLOR] = {p->color, 24, 24 * p->w, 8, 1, LULL_TYPE_F64, LULL_NORM_ONE, 3, 0},
         [LULL_PLANE_HALF] = {p->half, 24, 24 * p->w, 8, 1, LULL_TYPE_F64, LULL_NORM_ONE, 3, 0},
     };
     struct lull_block block = {.x1 = p->w, .y1 = p->h, .spp = p->spp, .half_spp = p->half_spp, .thread_s = (double)NAN};
-    struct lull_view view = {.struct_size = sizeof view, .x1 = p->w, .y1 = p->h, .planes = planes, .plane_count = LULL_PLANE_COUNT,
-                             .plane_stride = sizeof planes[0], .elapsed_s = (double)NAN};
+    struct lull_view view = {.struct_size = sizeof view,
+                             .x1 = p->w,
+                             .y1 = p->h,
+                             .planes = planes,
+                             .plane_count = LULL_PLANE_COUNT,
+                             .plane_stride = sizeof planes[0],
+                             .elapsed_s = (double)NAN};
     struct lull_decision d[2];
     for (int i = 0; i < 2; i++) {
         d[i] = (struct lull_decision){.p_noisy = (double)NAN, .predicted_spp = (double)NAN, .error = (double)NAN};
@@ -261,7 +276,8 @@ static void sizes(void **unused)
         }
         double narrow = side[i][0] == 1 || side[i][1] == 1 ? 2 : 1; /* there is less to blur over */
         assert_true(pixels < 200 || least > 0.95 * error); /* one standard error is added: luck stops no block */
-        assert_true(sum > 0.9 * error && sum < narrow * (1 + 5 / sqrt(pixels)) * error); /* few pixels err towards more samples */
+        assert_true(sum > 0.9 * error &&
+                    sum < narrow * (1 + 5 / sqrt(pixels)) * error); /* few pixels err towards more samples */
         free(p);
     }
     free(whole);
@@ -326,9 +342,16 @@ int main(void)
     *strrchr(exe, '/') = '\0';
     snprintf(criteria, sizeof criteria, "%s/../../lib/lull", exe);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(law_of_the_noise), cmocka_unit_test(texture_hides_and_noise_does_not), cmocka_unit_test(bright_pixels_count),
-        cmocka_unit_test(without_noise), cmocka_unit_test(halves_that_are_none), cmocka_unit_test(broken_pixels), cmocka_unit_test(sizes),
-        cmocka_unit_test(unequal_halves), cmocka_unit_test(display), cmocka_unit_test(share_of_viewers),
+        cmocka_unit_test(law_of_the_noise),
+        cmocka_unit_test(texture_hides_and_noise_does_not),
+        cmocka_unit_test(bright_pixels_count),
+        cmocka_unit_test(without_noise),
+        cmocka_unit_test(halves_that_are_none),
+        cmocka_unit_test(broken_pixels),
+        cmocka_unit_test(sizes),
+        cmocka_unit_test(unequal_halves),
+        cmocka_unit_test(display),
+        cmocka_unit_test(share_of_viewers),
     };
     return cmocka_run_group_tests_name("observer_criterion", tests, NULL, NULL);
 }

@@ -1,4 +1,5 @@
-/* The model observer: its kernel against naive ones, thresholds from curves, halves against recorded levels, calibration on made-up people. */
+/* The model observer: its kernel against naive ones, thresholds from curves, halves against recorded levels, calibration
+ * on made-up people. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -87,7 +88,8 @@ static double naive_texture(const float *a, const float *b, int w, int h)
         for (int x = 0; x < w; x++) {
             double u = 0.0, v = 0.0, uv = 0.0, nn = 0.0;
             for (int k = 0; k < 25; k++) {
-                double p = (double)pixel(a, w, h, x + k % 5 - 2, y + k / 5 - 2), q = (double)pixel(b, w, h, x + k % 5 - 2, y + k / 5 - 2);
+                double p = (double)pixel(a, w, h, x + k % 5 - 2, y + k / 5 - 2),
+                       q = (double)pixel(b, w, h, x + k % 5 - 2, y + k / 5 - 2);
                 u += p / 25.0;
                 v += q / 25.0;
                 uv += p * q / 25.0;
@@ -205,7 +207,8 @@ static void scaling(void **state)
         double sigma = 0.2 * pow(2.0, i);
         struct seq_block b = make_block(sigma, 0.0, (uint32_t)i + 1, 4096);
         double recorded = threshold_of(&b, &o, GGN_FROM_LEVELS), halves = threshold_of(&b, &o, GGN_FROM_HALVES);
-        assert_near(log2(halves / recorded), 0.0, 0.25); /* far above the limit, noise scatters into the texture of a smooth block */
+        assert_near(log2(halves / recorded), 0.0,
+                    0.25); /* far above the limit, noise scatters into the texture of a smooth block */
         if (i > 0)
             assert_near(log2(recorded / last), 2.0, 0.2); /* twice the noise: four times the samples */
         last = recorded;
@@ -216,7 +219,8 @@ static void scaling(void **state)
     seq_block_release(&busy);
 }
 
-/* A reference of few samples must not raise the threshold: its own noise is taken out of the difference, and is no texture. */
+/* A reference of few samples must not raise the threshold: its own noise is taken out of the difference, and is no
+ * texture. */
 static void noisy_reference(void **state)
 {
     (void)state;
@@ -393,9 +397,13 @@ static void trials(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(lightness), cmocka_unit_test(kernel), cmocka_unit_test(apart), cmocka_unit_test(people), cmocka_unit_test(thresholds),
-        cmocka_unit_test(scaling), cmocka_unit_test(noisy_reference), cmocka_unit_test(beyond_the_last_level), cmocka_unit_test(needs),
-        cmocka_unit_test(calibration), cmocka_unit_test(parameters), cmocka_unit_test(built_in), cmocka_unit_test(trials),
+        cmocka_unit_test(lightness),       cmocka_unit_test(kernel),
+        cmocka_unit_test(apart),           cmocka_unit_test(people),
+        cmocka_unit_test(thresholds),      cmocka_unit_test(scaling),
+        cmocka_unit_test(noisy_reference), cmocka_unit_test(beyond_the_last_level),
+        cmocka_unit_test(needs),           cmocka_unit_test(calibration),
+        cmocka_unit_test(parameters),      cmocka_unit_test(built_in),
+        cmocka_unit_test(trials),
     };
     return cmocka_run_group_tests_name("observer", tests, NULL, NULL);
 }
