@@ -489,6 +489,73 @@ check(
     "delete: gone from the next report",
 )
 check(len(contents(adjustment)[1]) == 8, "delete: the others' trials stay")
+# --- a validation ---
+validation = os.path.join(TMP.name, "validation")
+rooms = [view(name, ["reference", "lull", "fixed"], 24, 24) for name in ("room", "hall")]
+ggn("init", validation, "--task", "validation", "--views", *rooms, "--repeats", "5", "--catch", "0.2")
+server = Server(validation)
+
+
+def judge(says):  # says(slot) -> same or different
+    key = server.json("POST", "api/people", {"consent": True})[1]["key"]
+    slots = server.json("GET", f"api/people/{key}")[1]["slots"]
+    for i, s in enumerate(slots):
+        same = int(says(s))
+        trial = {"slot": i, "answer": same, "rating": 5 if same else 2, "ms": 900, "layout": "beside"}
+        assert server.json("POST", f"api/people/{key}/trials", trial)[0] == 200
+    return slots
+
+
+names = json.load(open(os.path.join(validation, "study.json")))["conditions"]
+lull = names.index("lull")
+slots = judge(lambda s: s["catch"] == 2 or s["condition"] == lull)  # lull looks the same, fixed does not
+judge(lambda s: s["catch"] == 2 or (s["condition"] == lull and s["view"] == 0))  # lull only in the first view
+judge(lambda s: s["catch"] == 1)  # fails every catch trial
+check(
+    len(slots) == 24 and sum(s["catch"] == 1 for s in slots) == 2 and sum(s["catch"] == 2 for s in slots) == 2,
+    "validation: a plan with catch trials",
+)
+key = server.json("POST", "api/people", {"consent": True})[1]["key"]
+good = {"slot": 0, "answer": 1, "rating": 5, "ms": 900, "layout": "flip"}
+for name, bad in (
+    ("rating", {"rating": 6}),
+    ("layout", {"layout": "above"}),
+    ("level", {"level": 16}),
+    ("answer", {"answer": 2}),
+):
+    check(server.json("POST", f"api/people/{key}/trials", {**good, **bad})[0] == 400, f"validation: refused: a wrong {name}")
+server.stop()
+r = ggn("report", validation)
+report = os.path.join(validation, "report")
+rows = [line.strip().split(";") for line in open(os.path.join(report, "judgements.csv"))]
+table = {(row[0], row[1]): row for row in rows[1:]}
+check(
+    r.returncode == 0
+    and table["room", "lull"][2:4] == ["10", "10"]
+    and table["hall", "lull"][2:4] == ["5", "10"]
+    and table["(all)", "lull"][2:5] == ["15", "20", "0.7500"]
+    and table["(all)", "fixed"][2:4] == ["0", "20"],
+    "validation: shares per view and pooled, without the one who fails the catch trials",
+    r.stderr + str(table),
+)
+check(
+    abs(float(table["(all)", "lull"][5]) - 0.5313) < 2e-3 and abs(float(table["(all)", "lull"][6]) - 0.8881) < 2e-3,
+    "validation: Wilson's interval",
+    table["(all)", "lull"],
+)
+check(
+    "75 % [53, 89]" in open(os.path.join(report, "scenes.csv")).read()
+    and os.path.exists(os.path.join(report, "shares.png")),
+    "validation: table and picture",
+)
+found = json.load(open(os.path.join(report, "report.json")))
+check(
+    found["people_that_count"] == 2
+    and len(found["excluded"]) == 1
+    and found["conditions"][lull]["people_for_10_percent"] > 30,
+    "validation: report.json says who does not count, and how many people it takes",
+    found,
+)
 check(ggn().returncode == 2 and ggn("taste", study).returncode == 2 and ggn("--help").returncode == 0, "usage")
 
 print(f"1..{count}")
