@@ -273,7 +273,7 @@ static void make_views(const char *dir, const struct ggn_observer *person, struc
 {
     static const uint32_t few[] = {64, 384};
     for (int v = 0; v < VIEWS; v++) {
-        char view[128], scene[16];
+        char view[128], scene[24];
         double sigma[BLOCKS];
         struct ggn_noise n = {W, H, few, 2, 0, 0.0, 0.05 * v, (uint32_t)v + 1};
         for (int i = 0; i < BLOCKS; i++)
