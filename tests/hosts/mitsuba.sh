@@ -11,7 +11,9 @@ fi
 library=$(find /usr/lib -name 'libLLVM*.so*' 2>/dev/null | sed 's/.*libLLVM[-.a-z]*\([0-9]*\).*/\1 &/' | sort -n | tail -n 1)
 [ -z "$library" ] || export DRJIT_LIBLLVM_PATH="${DRJIT_LIBLLVM_PATH:-${library#* }}"
 "$python" tests/hosts/test_mitsuba.py scalar_rgb
-probe='import mitsuba as mi; mi.set_variant("llvm_ad_rgb"); mi.render(mi.load_file("tests/hosts/scenes/box.xml"), spp=1).numpy()'
+probe='import mitsuba as mi
+mi.set_variant("llvm_ad_rgb")
+mi.render(mi.load_file("tests/hosts/scenes/box.xml"), spp=1).numpy()'
 if "$python" -c "$probe" >/dev/null 2>&1; then
     "$python" tests/hosts/test_mitsuba.py llvm_ad_rgb | sed 's/ - / - llvm: /'
 else

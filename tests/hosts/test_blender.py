@@ -46,9 +46,9 @@ def cube(width=70, height=46):
     return scene
 
 
-def one_render(scene, spp):
+def one_render(scene, spp, spp_max=4096):
     """The whole picture by a single call."""
-    with Cycles(scene, spp) as host:
+    with Cycles(scene, spp_max) as host:
         return next(iter(host.render([Rect(0, 0, host.width, host.height)], 0, spp, False)))
 
 
@@ -79,7 +79,7 @@ def test_borders():
         scene = cube(width, height)
         whole = one_render(scene, 1)
         rng = np.random.default_rng(width)
-        with Cycles(scene, 1) as host:
+        with Cycles(scene, 4096) as host:
             for _ in range(12):
                 x0, x1 = sorted(rng.choice(width + 1, 2, False).tolist())
                 y0, y1 = sorted(rng.choice(height + 1, 2, False).tolist())

@@ -6,9 +6,9 @@
     picture = lull.mitsuba.render(mi.load_file("scene.xml"), "ggn", spp_max=2048)
     picture.image, picture.spp
 
-Blocks are crops of the film. Each wave of each area has a seed of its own, so that waves are independent renders whose mean is
-the picture, and alternate waves make the half buffers. Use a sampler of independent samples: stratified ones stratify within a
-wave only. Splatting integrators (ptracer) do not work by crops.
+Blocks are crops of the film. Each wave of each area has a seed of its own, so that waves are independent renders whose mean
+is the picture, and alternate waves make the half buffers. Use a sampler of independent samples: stratified ones stratify
+within a wave only. Splatting integrators (ptracer) do not work by crops.
 """
 from __future__ import annotations
 
@@ -57,8 +57,8 @@ class Film:
         sampler = self.sensor.sampler().clone()
         sampler.set_sample_count(wave)
         if sampler.sample_count() != wave:
-            raise ValueError(f"the scene's sampler makes {sampler.sample_count()} samples of a wave of {wave}: use the sampler "
-                             "'independent', or another wave")
+            raise ValueError(f"the scene's sampler makes {sampler.sample_count()} samples of a wave of {wave}: use the "
+                             "sampler 'independent', or another wave")
 
     def _set_crop(self, rect: Rect) -> None:
         self._parameters["film.crop_size"] = [rect.width, rect.height]

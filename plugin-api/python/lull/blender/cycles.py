@@ -22,7 +22,10 @@ from .. import exr
 from ..blocks import merge
 from ..criterion import Rect
 
-PATTERNS = ("SOBOL_BURLEY", "SOBOL")  # its names in 4.x and 3.x; tabulated patterns depend on the total number of samples
+# Sobol-Burley under its names in 3.x and 4.x; a tabulated pattern depends on the total number of samples, and is usable
+# where Cycles can be told that total apart from the subset to render (4.4 and later).
+PATTERNS = ("SOBOL", "SOBOL_BURLEY")
+SUBSET_PATTERNS = ("TABULATED_SOBOL",)
 
 
 @contextlib.contextmanager
@@ -109,12 +112,12 @@ class Cycles:
 
     def _set_pattern(self) -> None:
         cycles = self.scene.cycles
-        for name in PATTERNS:
+        for name in PATTERNS + (SUBSET_PATTERNS if hasattr(cycles, "use_sample_subset") else ()):
             try:
                 return self._set(cycles, sampling_pattern=name)
             except TypeError:
                 self._touched.pop()  # no such pattern in this version
-        raise HostError("this Cycles has no Sobol-Burley sampling pattern: waves would not add up to one render")
+        raise HostError("this Cycles has no pattern whose waves add up to one render: use Blender 3.x, or 4.4 or later")
 
     def __exit__(self, *_) -> None:
         for owner, name, value in self._touched:  # in order: what a file format allows depends on the format
