@@ -13,7 +13,7 @@ import bpy
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "plugin-api" / "python"))
 import lull  # noqa: E402
 
-out, criterion = (sys.argv[sys.argv.index("--") + 1:] + ["ggn"])[:2]
+out, criterion = (sys.argv[sys.argv.index("--") + 1:] + ["observer"])[:2]
 lull.register()
 scene = bpy.context.scene
 scene.render.engine = "CYCLES"

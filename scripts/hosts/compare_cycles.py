@@ -76,7 +76,7 @@ def replay(data, criterion, dial, value):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    parser.add_argument("-c", "--criterion", default="ggn")
+    parser.add_argument("-c", "--criterion", default="observer")
     parser.add_argument("dial", metavar="DIAL=V,V,…")
     parser.add_argument("recorded", nargs="+")
     options = parser.parse_args()

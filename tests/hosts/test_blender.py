@@ -112,7 +112,8 @@ def test_region():
     """the scene's own render region is the crop: its blocks are rendered whole, the file holds the region"""
     scene = cube()
     render = scene.render
-    render.use_border, render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y = True, .4, .5, .5, .9
+    render.use_border = True
+    render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y = .4, .5, .5, .9
     with Session(scene, Settings("fixed", {"spp": "16"}, block=24, output=tmp("r.exr"))) as session:
         result = session.driver.run()
         session.write(result)
@@ -129,8 +130,8 @@ def test_animation():
     """the command renders frames of an animation, with the same dial, into numbered files"""
     cube()
     bpy.ops.wm.save_as_mainfile(filepath=tmp("cube.blend"))
-    status, text = command(tmp("cube.blend"), "-c", "halfbuf", "-p", "threshold=.02", "--frames", "1-2", "--block", "24", "-q",
-                           "--spp-max", "64", "-o", tmp("f.exr"), "--preview", tmp("f.png"), "--stop-map", tmp("f-map.png"),
+    status, text = command(tmp("cube.blend"), "-c", "halfbuf", "-p", "threshold=.02", "--frames", "1-2", "--block", "24",
+                           "-q", "--spp-max", "64", "-o", tmp("f.exr"), "--preview", tmp("f.png"), "--stop-map", tmp("f-map.png"),
                            "--report", tmp("f.json"))
     assert status == 0 and not text, text
     first, second = (png.read_grey(tmp(f"f_000{k}.png")) for k in (1, 2))
@@ -149,7 +150,8 @@ def test_bad_input():
     bpy.ops.wm.save_as_mainfile(filepath=tmp("blind.blend"))
     png.write(tmp("mask.png"), np.zeros((4, 4, 3), np.uint8))
     out = tmp("bad.exr")
-    for arguments, wanted in (([tmp("blind.blend")], "no camera"), ([tmp("cube.blend"), "-c", "nobody"], "no criterion 'nobody'"),
+    for arguments, wanted in (([tmp("blind.blend")], "no camera"),
+                              ([tmp("cube.blend"), "-c", "nobody"], "no criterion 'nobody'"),
                               ([tmp("cube.blend"), "-c", "/none.so"], "no such file"),
                               ([tmp("cube.blend"), "-c", "halfbuf", "-p", "x"], "KEY=VALUE"),
                               ([tmp("cube.blend"), "-c", "halfbuf", "-p", "x=1"], "no parameter 'x'"),
@@ -181,7 +183,8 @@ def test_interrupt():
     bpy.ops.wm.save_as_mainfile(filepath=tmp("cube.blend"))
     timer = threading.Timer(1.5, lambda: os.kill(os.getpid(), signal.SIGINT))
     timer.start()
-    status, _ = command(tmp("cube.blend"), "-c", "null", "--spp-max", "100000", "-o", tmp("i.exr"), "--report", tmp("i.json"), "-q")
+    status, _ = command(tmp("cube.blend"), "-c", "null", "--spp-max", "100000", "-o", tmp("i.exr"), "--report",
+                        tmp("i.json"), "-q")
     timer.cancel()
     report = json.loads(Path(tmp("i.json")).read_text())
     assert status == 1 and report["interrupted"] and {b["reason"] for b in report["blocks"]} == {"interrupt"}

@@ -100,8 +100,8 @@ def test_bad_input():
     raises(ValueError, "sensor 3", lull.mitsuba.render, scene("box"), "halfbuf", sensor=3)
     raises(ValueError, "mask of shape", lull.mitsuba.render, scene("box"), "halfbuf", mask=np.zeros((2, 2)))
     text = Path("tests/hosts/scenes/box.xml").read_text()
-    raises(ValueError, "'independent'", lull.mitsuba.render, mi.load_string(text.replace("independent", "stratified")), "halfbuf",
-           wave=15)
+    raises(ValueError, "'independent'", lull.mitsuba.render, mi.load_string(text.replace("independent", "stratified")),
+           "halfbuf", wave=15)
     picture = lull.mitsuba.render(mi.load_string(text.replace('value="rgb"', 'value="luminance"')), "halfbuf", block=24)
     assert picture.result.outcome == "failed" and "expected RGB" in str(picture.result.exception)
     assert picture.image.shape == (96, 96, 3) and not picture.spp.any()

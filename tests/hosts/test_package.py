@@ -67,7 +67,7 @@ def test_numbers():
 def test_criteria():
     """criteria() lists what is installed, with parameters"""
     found = {c.id: c for c in lull.criteria()}
-    assert {"fixed", "halfbuf", "null", "variance", "ggn"} <= set(found)
+    assert {"fixed", "halfbuf", "null", "variance", "ggn", "observer"} <= set(found)
     threshold = found["halfbuf"].parameter("threshold")
     assert threshold.type == "float" and threshold.min <= float(threshold.default) <= threshold.max and threshold.help
 
@@ -168,7 +168,7 @@ def test_independence():
     assert part.mean().shape == (16, 16, 3) and part.cropped(part.mean()).shape == (6, 11, 3)
     answers = []
     for threads in (1, 3):
-        f = lull.Frame(lull.load("ggn", threads=threads, threshold=.9, passes=1), 32, 32, block=16, spp_max=200)
+        f = lull.Frame(lull.load("ggn", threads=threads, visible=.9, passes=1), 32, 32, block=16, spp_max=200)
         lull.Driver(f, Noise(SIGMAS)).run()
         answers.append([(b.spp, b.p_noisy, b.error) for b in f.blocks])
     assert repr(answers[0]) == repr(answers[1])
@@ -176,7 +176,7 @@ def test_independence():
 
 def test_same_stops_as_pathtracer():
     """on the path tracer's recorded sequences the driver stops every block where the path tracer does"""
-    for criterion, parameters in (("halfbuf", {"threshold": .01}), ("ggn", {}), ("null", {})):
+    for criterion, parameters in (("halfbuf", {"threshold": .01}), ("ggn", {}), ("observer", {}), ("null", {})):
         options = ["--spp-min", "20", "--spp-max", "700"]
         seed, scene = 5, "scenes/cornell-box.pbrt"
         pairs = [a for k, v in parameters.items() for a in ("-p", f"{k}={v}")]
@@ -363,7 +363,7 @@ def test_not_finite():
 def test_state():
     """a criterion's saved history goes on as if there had been no break; broken bytes are refused"""
     def frames():
-        return lull.Frame(lull.load("ggn", threads=1, threshold=.9, passes=1), 32, 32, block=16, spp_max=256)
+        return lull.Frame(lull.load("ggn", threads=1, visible=.9, passes=1), 32, 32, block=16, spp_max=256)
     f = frames()
     d = lull.Driver(f, Noise(SIGMAS))
     while d.totals.checks < 12:
@@ -378,7 +378,7 @@ def test_state():
 def test_resume():
     """an interrupted run goes on from a checkpoint to the same picture; a finished one can be given more samples"""
     def start(spp_max=400):
-        f = lull.Frame(lull.load("ggn", threads=1, threshold=.9, passes=1), 32, 32, block=16, spp_max=spp_max)
+        f = lull.Frame(lull.load("ggn", threads=1, visible=.9, passes=1), 32, 32, block=16, spp_max=spp_max)
         return lull.Driver(f, Noise(SIGMAS))
     whole, first, second = start(), start(), start()
     whole.run()
@@ -393,7 +393,7 @@ def test_resume():
     checkpoint.load(tmp("short.npz"), more)
     more.run()
     assert max(b.spp for b in more.frame.blocks) > 400
-    other = lull.Driver(lull.Frame(lull.load("ggn", threads=1, threshold=.9, passes=1), 32, 16, block=16), None)
+    other = lull.Driver(lull.Frame(lull.load("ggn", threads=1, visible=.9, passes=1), 32, 16, block=16), None)
     raises(ValueError, "picture", checkpoint.load, tmp("run.npz"), other)
     Path(tmp("junk.npz")).write_bytes(b"junk")
     raises(ValueError, "not a checkpoint", checkpoint.load, tmp("junk.npz"), start())

@@ -2,7 +2,7 @@
 """Stops sampling each block of a path-traced image when its noise can no longer be seen: the host's side in Python.
 
     import lull
-    criterion = lull.load("ggn")                       # an installed criterion, or a path; lull.criteria() lists them
+    criterion = lull.load("observer")                       # an installed criterion, or a path; lull.criteria() lists them
     frame = lull.Frame(criterion, 1920, 1080)          # blocks and buffers
     driver = lull.Driver(frame, render)                # render(rects, first, count, half) -> a mean per rectangle
     driver.run()

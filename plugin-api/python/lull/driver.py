@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The wave loop for a host that can render rectangles: the same schedule, limits and reasons as in the path tracer.
 
-    frame = lull.Frame(lull.load("ggn"), width, height)
+    frame = lull.Frame(lull.load("observer"), width, height)
     result = lull.Driver(frame, render).run()
 
 `render(rects, first, count, half)` renders the rectangles, all of them for the samples [first, first + count), and returns

@@ -3,7 +3,7 @@
 
     import mitsuba as mi
     mi.set_variant("llvm_ad_rgb")
-    picture = lull.mitsuba.render(mi.load_file("scene.xml"), "ggn", spp_max=2048)
+    picture = lull.mitsuba.render(mi.load_file("scene.xml"), "observer", spp_max=2048)
     picture.image, picture.spp
 
 Blocks are crops of the film. Each wave of each area has a seed of its own, so that waves are independent renders whose mean
@@ -87,8 +87,8 @@ class Film:
         return pixels[..., :3]
 
 
-def render(scene: Any, criterion: Union[str, Criterion] = "ggn", *, sensor: int = 0, spp_min: int = 32, spp_max: int = 1024,
-           time_budget_s: float = 0.0, block: Optional[int] = None, wave: int = 8, seed: int = 0,
+def render(scene: Any, criterion: Union[str, Criterion] = "observer", *, sensor: int = 0, spp_min: int = 32,
+           spp_max: int = 1024, time_budget_s: float = 0.0, block: Optional[int] = None, wave: int = 8, seed: int = 0,
            mask: Optional[np.ndarray] = None, after_call: Optional[Callable[[Driver], None]] = None,
            **parameters: Any) -> Picture:
     """Renders a mi.Scene; each block until the criterion stops it.

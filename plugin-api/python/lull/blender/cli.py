@@ -15,7 +15,7 @@ def parser() -> argparse.ArgumentParser:
     p = argparse.ArgumentParser("python3 -m lull.blender", description="Render a Blender scene with Cycles, block by "
                                 "block, each until its noise can no longer be seen.")
     p.add_argument("file", nargs="?", help="the .blend file (inside Blender: default the open one)")
-    p.add_argument("-c", "--criterion", default="ggn", help="name or PATH[:ID] of a stopping criterion (default ggn)")
+    p.add_argument("-c", "--criterion", default="observer", help="name or PATH[:ID] of a criterion (default observer)")
     p.add_argument("-p", "--param", action="append", default=[], metavar="KEY=VALUE", help="parameter of the criterion")
     p.add_argument("--visible", metavar="SHARE", help="stop when at most this share of viewers would still see noise")
     p.add_argument("--spp-min", type=int, default=32, metavar="N", help="samples before the first check (default 32)")

@@ -19,7 +19,7 @@ from .view import display_of, is_plain
 @dataclass
 class Settings:
     """What a user chooses. Files are named without a frame number; "" = not written."""
-    criterion: str = "ggn"
+    criterion: str = "observer"
     parameters: dict[str, str] = field(default_factory=dict)
     spp_min: int = 32
     spp_max: int = 4096

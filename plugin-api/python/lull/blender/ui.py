@@ -20,7 +20,7 @@ _items: list[tuple[str, str, str]] = []  # kept: Blender does not copy the texts
 def _criteria(_self, _context) -> list[tuple[str, str, str]]:
     if not _items:
         found = [c for c in criteria() if c.id != "null"]
-        found.sort(key=lambda c: (c.id != "ggn", c.id))
+        found.sort(key=lambda c: (c.id != "observer", c.id))
         _items.extend((c.id, c.name, c.description) for c in found)
         if not _items:
             _items.append(("none", "none found", f"No criteria in {', '.join(search_path())}: set LULL_PLUGIN_PATH"))
