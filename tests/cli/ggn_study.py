@@ -1,5 +1,6 @@
 """`ggn study` over raw HTTP: what is refused changes nothing and is logged; what is stored comes back. Speaks TAP."""
 
+import atexit
 import http.client
 import json
 import os
@@ -68,6 +69,7 @@ class Server:
         self.child = subprocess.Popen(
             [GGN, "study", "serve", folder, "--listen", listen], stdout=subprocess.PIPE, stderr=self.log, text=True
         )
+        atexit.register(self.child.kill)  # also when a test ends in the middle
         self.link = self.child.stdout.readline().strip()
         rest = self.link.split("://")[1]
         self.authority, self.prefix = rest.split("/", 1)

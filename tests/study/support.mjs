@@ -126,6 +126,7 @@ export class Server {
         this.child = spawn(process.env.GGN, ['study', 'serve', this.dir, '--listen', this.listen], {
             stdio: ['ignore', 'pipe', 'pipe'],
         });
+        process.once('exit', () => this.child.kill('SIGKILL')); // also when a test ends in the middle
         this.child.stderr.on('data', (d) => {
             this.log += d;
         });
