@@ -28,6 +28,7 @@ struct pt_cli {
     struct lull_pair params[PT_CLI_MAX_PARAMS];
     char *param_text[PT_CLI_MAX_PARAMS]; /* owns; what the keys and values point into */
     uint32_t param_count;
+    const char *mask;           /* picture that scales the dial per block; NULL = none */
     int threads;                /* 0 = all processors */
     uint32_t seed;
     const char *output, *preview, *report;

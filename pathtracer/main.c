@@ -46,6 +46,7 @@ struct session {
     struct base_threads *threads;
     struct pt_scene *scene;
     struct pt_scene_defaults defaults;
+    struct pt_mask mask;
     struct pt_criterion *criterion;
     struct pt_render *render;
     struct pt_progress progress;
@@ -137,7 +138,12 @@ static int open_criterion(struct session *s, struct base_err *err)
         return 0;
     const struct lull_criterion *table;
     int rc = pt_criterion_find(spec, note, s, &table, err);
-    return rc ? rc : pt_criterion_create(table, cli->params, cli->param_count, s->threads, note, s, &s->criterion, err);
+    if (!rc)
+        rc = pt_criterion_create(table, cli->params, cli->param_count, s->threads, note, s, &s->criterion, err);
+    if (rc || !cli->mask)
+        return rc;
+    rc = pt_mask_read(cli->mask, s->defaults.width, s->defaults.height, &s->mask, err);
+    return rc ? rc : pt_criterion_set_mask(s->criterion, &s->mask, cli->params, cli->param_count, err);
 }
 
 /* An output that cannot be written should not be found out after hours: its folder is looked at now. */
@@ -179,8 +185,8 @@ static int check_outputs(struct session *s, struct base_err *err)
     return 0;
 }
 
-/* CRC of the scene file itself; included files are not followed. */
-static int scene_crc(const char *path, uint32_t *crc, struct base_err *err)
+/* CRC of a file itself; what a scene includes is not followed. */
+static int file_crc(const char *path, uint32_t *crc, struct base_err *err)
 {
     char *data = NULL;
     size_t size = 0;
@@ -195,7 +201,10 @@ static int scene_crc(const char *path, uint32_t *crc, struct base_err *err)
 static int describe_settings(struct session *s, const struct pt_render_config *c, struct base_err *err)
 {
     uint32_t crc = 0;
-    int rc = scene_crc(s->cli.scene, &crc, err);
+    uint32_t mask_crc = 0;
+    int rc = file_crc(s->cli.scene, &crc, err);
+    if (!rc && s->cli.mask)
+        rc = file_crc(s->cli.mask, &mask_crc, err);
     if (rc)
         return rc;
     const struct pt_integrator *i = &c->integrator;
@@ -215,6 +224,8 @@ static int describe_settings(struct session *s, const struct pt_render_config *c
     const struct lull_criterion *t = s->criterion ? s->criterion->table : NULL;
     used += (size_t)snprintf(s->settings + used, room - used, "\ncriterion=%s %s\n", t ? t->id : "none",
                              t ? t->version : "");
+    if (s->cli.mask && used < room)
+        used += (size_t)snprintf(s->settings + used, room - used, "mask-crc=%08x\n", mask_crc);
     for (uint32_t k = 0; k < s->cli.param_count && used < room; k++)
         used += (size_t)snprintf(s->settings + used, room - used, "param=%s=%s\n", s->cli.params[k].key,
                                  s->cli.params[k].value);
@@ -358,7 +369,7 @@ static int record_sequence(struct session *s, int *status, struct base_err *err)
                                         .slice = after_slice};
     int rc = make_config(s, &config.render, err);
     if (!rc)
-        rc = scene_crc(s->cli.scene, &config.scene_crc, err);
+        rc = file_crc(s->cli.scene, &config.scene_crc, err);
     if (!rc && s->cli.criterion)
         rc = open_criterion(s, err);
     if (rc)
@@ -418,6 +429,7 @@ int main(int argc, char **argv)
     }
     pt_render_destroy(s.render);
     pt_criterion_destroy(s.criterion);
+    pt_mask_release(&s.mask);
     pt_scene_destroy(s.scene);
     base_threads_destroy(s.threads);
     pt_cli_release(&s.cli);

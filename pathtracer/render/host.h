@@ -13,11 +13,17 @@
 #include "render/blocks.h"
 #include "render/film.h"
 #include "render/host_services.h"
+#include "render/mask.h"
 
 /* Read-only but for the functions of host*.h. */
 struct pt_criterion {
     const struct lull_criterion *table;
-    struct lull_instance *instance; /* owns */
+    struct lull_instance *dialled[PT_MASK_STEPS + 1]; /* own; by step of the mask, NULL where no block is of that step */
+    const struct pt_mask *mask;     /* borrows until destroy, as the pairs; NULL = none */
+    const struct lull_pair *pairs;
+    uint32_t pair_count;
+    uint8_t *step;                  /* owns; [blocks] whose instance judges it */
+    struct lull_decision *answers;  /* owns; [blocks] scratch of evaluate */
     struct lull_requirements needs;
     struct pt_host_services services;
     struct lull_host host;          /* shows the services to the criterion */
@@ -45,6 +51,10 @@ int pt_criterion_create(const struct lull_criterion *table, const struct lull_pa
                         struct base_threads *threads, void (*warn)(void *data, const char *line), void *warn_data,
                         struct pt_criterion **out, struct base_err *err);
 void pt_criterion_destroy(struct pt_criterion *criterion);
+
+/* Before begin: blocks are judged by instances of their own dial. pairs are those of create. */
+int pt_criterion_set_mask(struct pt_criterion *criterion, const struct pt_mask *mask, const struct lull_pair *pairs,
+                          uint32_t pair_count, struct base_err *err);
 
 /* Opens the frame. Fails when the criterion judges blocks of another size only. */
 int pt_criterion_begin(struct pt_criterion *criterion, const struct pt_criterion_frame *frame,

@@ -55,7 +55,9 @@ int pt_criterion_save(const struct pt_criterion *c, unsigned char **data, size_t
     if (state) {
         struct lull_writer writer = {.struct_size = sizeof writer, .context = &b, .write = write_bytes};
         struct lull_error e = {.struct_size = sizeof e};
-        int32_t code = state->save(c->instance, &writer, &e);
+        int32_t code = LULL_OK;
+        for (int s = 0; s <= PT_MASK_STEPS && code == LULL_OK; s++)
+            code = c->dialled[s] ? state->save(c->dialled[s], &writer, &e) : LULL_OK;
         if (code != LULL_OK) {
             free(b.data);
             return pt_criterion_fail(c, "cannot save its state: ", code, &e, err);
@@ -75,7 +77,9 @@ int pt_criterion_load(struct pt_criterion *c, const unsigned char *data, size_t 
     struct const_bytes b = {.data = data, .size = size};
     struct lull_reader reader = {.struct_size = sizeof reader, .context = &b, .read = read_bytes};
     struct lull_error e = {.struct_size = sizeof e};
-    int32_t code = state->load(c->instance, &reader, &e);
+    int32_t code = LULL_OK;
+    for (int s = 0; s <= PT_MASK_STEPS && code == LULL_OK; s++)
+        code = c->dialled[s] ? state->load(c->dialled[s], &reader, &e) : LULL_OK;
     if (code != LULL_OK)
         return pt_criterion_fail(c, "cannot load its state: ", code, &e, err);
     if (b.at != size)

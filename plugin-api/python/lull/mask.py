@@ -3,7 +3,7 @@
 
 Black leaves the dial as it is, white takes a quarter of it, grey g in between 4^(-g), in steps of an eighth. The lightest
 pixel of a block counts, so that painting over a part of a block is enough. The dial is the parameter `visible` (share of
-viewers) if the criterion has one, else `threshold`. The path tracer's --mask does the same.
+viewers) if it has a value, else `threshold`. The path tracer's --mask does the same.
 """
 from __future__ import annotations
 

@@ -1,0 +1,56 @@
+#!/bin/sh
+# pathtracer --mask: painted blocks get more samples, the others the same; refusals, and what a resumed run must notice.
+set -u
+here=$(cd "$(dirname "$0")" && pwd)
+P=$(cd "${BUILD:-build}" && pwd)/bin/pathtracer
+scene=$here/room.pbrt
+dir=$(mktemp -d) || exit 2
+trap 'rm -rf "$dir"' EXIT
+cd "$dir" || exit 2
+n=0 bad=0
+
+t() { # t DESCRIPTION COMMAND...: passes when the command succeeds
+    n=$((n + 1)); what=$1; shift
+    if "$@" >log 2>&1; then echo "ok $n - $what"; else echo "not ok $n - $what"; sed 's/^/# /' log; bad=1; fi
+}
+refused() { # refused TEXT ARGUMENTS...: exit status 2, one line on stderr that contains TEXT
+    n=$((n + 1)); text=$1; shift
+    "$P" "$@" >out 2>err; status=$?
+    if [ $status -eq 2 ] && [ "$(wc -l <err)" -eq 1 ] && grep -qF -- "$text" err; then echo "ok $n - refused: $text"
+    else echo "not ok $n - refused: $text (status $status)"; sed 's/^/# /' err; bad=1; fi
+}
+common="$scene -q --size 64x48 --block 16 -c halfbuf -p threshold=0.02 --spp-max 4000"
+counts() { cut -d';' -f2- "$1" | tr ';' '\n' | grep .; }
+# block 5 is touched by one white pixel, block 6 by a grey one: 4^-1 and 4^-0.5 of the dial
+oiiotool --create 64x48 1 --fill:color=1 1x1+20+20 --fill:color=0.5 1x1+40+20 -d uint8 -o mask.png
+oiiotool --create 64x48 3 -d uint8 -o black.png
+oiiotool --create 60x48 1 -d uint8 -o small.png
+echo "no picture" >text.png
+
+"$P" $common --stop-map plain.csv && "$P" $common --mask mask.png --stop-map masked.csv
+"$P" $common --mask black.png --stop-map black.csv
+"$P" $common -p threshold=0.005 --stop-map white.csv && "$P" $common -p threshold=0.01 --stop-map grey.csv
+of() { counts "$1" | sed -n "$2p"; }
+others() { counts "$1" | sed '6,7d'; }
+t "a white pixel: its block stops as with a quarter of the dial" test "$(of masked.csv 6)" = "$(of white.csv 6)"
+t "a grey one: half of the dial" test "$(of masked.csv 7)" = "$(of grey.csv 7)"
+more() { [ "$(of masked.csv "$1")" -gt "$(of plain.csv "$1")" ]; }
+t "the white one got more samples" more 6
+t "so did the grey one" more 7
+t "the other blocks stop as without a mask" test "$(others masked.csv)" = "$(others plain.csv)"
+t "a black mask changes nothing" cmp plain.csv black.csv
+observed() { "$P" "$scene" -q --size 64x48 --block 16 -c observer --spp-max 4000 --stop-map "$@"; }
+observed v.csv --mask mask.png --visible 0.4 && observed w.csv --visible 0.1
+t "--visible is scaled too" test "$(of v.csv 6)" = "$(of w.csv 6)"
+
+"$P" $common --mask mask.png --time-budget 0.05 --checkpoint c.ckpt --stop-map part.csv
+"$P" $common --mask mask.png --checkpoint c.ckpt --resume --stop-map resumed.csv
+t "a checkpoint holds the history of every dial" cmp masked.csv resumed.csv
+"$P" $common --mask mask.png --time-budget 0.05 --checkpoint d.ckpt --stop-map part.csv
+refused "mask" $common --mask black.png --checkpoint d.ckpt --resume
+refused "60x48 pixels" $common --mask small.png
+refused "text.png" $common --mask text.png
+refused "none.png" $common --mask none.png
+refused "no dial" $scene -q --size 64x48 -c fixed --mask mask.png
+echo "1..$n"
+exit $bad
