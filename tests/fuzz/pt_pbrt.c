@@ -65,7 +65,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (!scene || !b || pt_builder_init(b, scene, &defaults, &options, &source, &err) != 0)
         abort();
     int rc = pt_pbrt_read(b, "main");
-    if ((rc) != (err.text[0] != '\0') || strchr(err.text, '\n'))
+    if ((rc != 0) != (err.text[0] != '\0') || strchr(err.text, '\n'))
         abort();
     pt_builder_release(b);
     pt_arena_release(&scene->arena);
