@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/files.h"
 #include "base/options.h"
 #include "pbrt/xform.h"
 #include "render/film.h"
@@ -160,7 +161,7 @@ static int set_stop_map(void *into, const char *value, struct base_err *err)
     if (cli->stop_map_count == PT_CLI_MAX_STOP_MAPS)
         return base_fail(err, BASE_EINVAL, "more than %d stop maps", PT_CLI_MAX_STOP_MAPS);
     cli->stop_maps[cli->stop_map_count++] = value;
-    return 0;
+    return base_file_check_output(value, err);
 }
 
 static int set_debug_path(void *into, const char *value, struct base_err *err)
@@ -234,17 +235,17 @@ static const struct base_option options[] = {
     {"strict", 0, NULL, TO(strict), .help = "Unsupported scene features are errors"},
     {"threads", 't', "N", TO(threads), 1, 1024, .help = "Worker threads (default: all processors)"},
     {.help = "What to write:"},
-    {"output", 'o', "FILE.exr", TO(output), .words = exr,
+    {"output", 'o', "FILE.exr", TO(output), .output = 1, .words = exr,
      .help = "Multi-layer EXR (default: the scene's name in the current folder, if nothing else is asked for)"},
-    {"preview", 0, "FILE.png", TO(preview), .words = png, .help = "The image as sRGB"},
+    {"preview", 0, "FILE.png", TO(preview), .output = 1, .words = png, .help = "The image as sRGB"},
     {"stop-map", 0, "FILE.png|FILE.csv", .set = set_stop_map,
      .help = "Samples per block as a picture or a table; may be repeated"},
-    {"report", 0, "FILE.json", TO(report), .words = json, .help = "Everything about the run"},
+    {"report", 0, "FILE.json", TO(report), .output = 1, .words = json, .help = "Everything about the run"},
     {"aov", 0, "LIST", .set = set_aov, .help = "More layers: albedo,normal,depth"},
     {"reproducible", 0, NULL, TO(reproducible), .help = "Leave times out of the EXR: equal renders are equal files"},
     {"quiet", 'q', NULL, TO(quiet), .help = "No progress, no notes"},
     {.help = "Interrupting and going on:"},
-    {"checkpoint", 0, "FILE", TO(checkpoint),
+    {"checkpoint", 0, "FILE", TO(checkpoint), .output = 1,
      .help = "Save the state of the render now and then, and when it is interrupted"},
     {"checkpoint-every", 0, "SECONDS", TO(checkpoint_every_s), 0, 1e9, .help = "How often (default 60)"},
     {"resume", 0, NULL, TO(resume), .help = "Go on from the checkpoint"},

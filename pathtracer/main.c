@@ -6,10 +6,9 @@
 #include <string.h>
 #include <unistd.h>
 
-#include <zlib.h>
-
 #include "base/clock.h"
 #include "base/files.h"
+#include "base/inputs.h"
 #include "cli.h"
 #include "explain.h"
 #include "pbrt/load.h"
@@ -33,16 +32,18 @@ static void on_interrupt(int number)
     interrupt_seen = 1;
 }
 
-/* The first SIGINT asks for an end, a second one kills. */
+/* The first SIGINT or SIGTERM asks for an end, a second one kills. */
 static void catch_interrupt(void)
 {
     struct sigaction action = {.sa_handler = on_interrupt, .sa_flags = (int)SA_RESETHAND};
     sigemptyset(&action.sa_mask);
     sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
 }
 
 struct session {
     struct pt_cli cli;
+    struct base_inputs scene_files, judging; /* what was read; judging: plugin and mask */
     struct base_threads *threads;
     struct pt_scene *scene;
     struct pt_scene_defaults defaults;
@@ -78,7 +79,7 @@ static int load_scene(struct session *s, struct base_err *err)
 {
     struct pt_load_options options = {.strict = s->cli.strict, .width = s->cli.width, .height = s->cli.height,
                                       .view = s->cli.view, .forced = s->cli.all_effects ? PT_FX_ALL : 0,
-                                      .quiet = s->cli.quiet, .warn = note, .warn_data = s};
+                                      .quiet = s->cli.quiet, .inputs = &s->scene_files, .warn = note, .warn_data = s};
     int rc = pt_scene_load(s->cli.scene, &options, &s->scene, &s->defaults, err);
     if (rc)
         return rc;
@@ -137,30 +138,24 @@ static int open_criterion(struct session *s, struct base_err *err)
     if (!cli->criterion && cli->spp > 0)
         return 0;
     const struct lull_criterion *table;
-    int rc = pt_criterion_find(spec, note, s, &table, err);
+    int rc = pt_criterion_find(spec, &s->judging, note, s, &table, err);
     if (!rc)
         rc = pt_criterion_create(table, cli->params, cli->param_count, s->threads, note, s, &s->criterion, err);
     if (rc || !cli->mask)
         return rc;
     rc = pt_mask_read(cli->mask, s->defaults.width, s->defaults.height, &s->mask, err);
+    if (!rc)
+        rc = base_inputs_add(&s->judging, cli->mask, err);
     return rc ? rc : pt_criterion_set_mask(s->criterion, &s->mask, cli->params, cli->param_count, err);
 }
 
-/* An output that cannot be written should not be found out after hours: its folder is looked at now. */
-static int check_folder(const char *path, struct base_err *err)
+/* Outputs that cannot be written, or that would overwrite what the image is made from, are found out before the work. */
+static int check_output(const struct session *s, const char *path, struct base_err *err)
 {
-    char folder[4096];
-    const char *slash = path ? strrchr(path, '/') : NULL;
-    if (!path)
-        return 0;
-    size_t n = !slash ? 0 : slash == path ? 1 : (size_t)(slash - path);
-    if (n >= sizeof folder)
-        return base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", path);
-    memcpy(folder, path, n);
-    folder[n] = '\0';
-    if (access(n > 0 ? folder : ".", W_OK | X_OK) != 0)
-        return base_fail(err, BASE_EINVAL, "%s: cannot write there: %s", path, strerror(errno));
-    return 0;
+    int rc = base_file_check_output(path, err);
+    if (!rc)
+        rc = base_inputs_protect(&s->scene_files, path, err);
+    return rc ? rc : base_inputs_protect(&s->judging, path, err);
 }
 
 static int check_outputs(struct session *s, struct base_err *err)
@@ -177,34 +172,35 @@ static int check_outputs(struct session *s, struct base_err *err)
     }
     const char *paths[] = {cli->output, cli->preview, cli->report, cli->checkpoint};
     for (size_t i = 0; i < sizeof paths / sizeof paths[0]; i++)
-        if (check_folder(paths[i], err) != 0)
+        if (check_output(s, paths[i], err) != 0)
             return BASE_EINVAL;
     for (int i = 0; i < cli->stop_map_count; i++)
-        if (check_folder(cli->stop_maps[i], err) != 0)
+        if (check_output(s, cli->stop_maps[i], err) != 0)
             return BASE_EINVAL;
     return 0;
 }
 
-/* CRC of a file itself; what a scene includes is not followed. */
 static int file_crc(const char *path, uint32_t *crc, struct base_err *err)
 {
-    char *data = NULL;
-    size_t size = 0;
-    int rc = base_file_read(path, (size_t)1 << 32, &data, &size, err);
+    struct base_inputs one = BASE_INPUTS_EMPTY;
+    int rc = base_inputs_add(&one, path, err);
     if (!rc)
-        *crc = (uint32_t)crc32_z(0, (const unsigned char *)data, size);
-    free(data);
+        rc = base_inputs_crc32(&one, crc, err);
+    base_inputs_release(&one);
     return rc;
 }
 
-/* Everything that decides the bytes of the image, and nothing else. */
+/* Everything that decides the bytes of the image, and nothing else. A criterion's model is in its saved state. */
 static int describe_settings(struct session *s, const struct pt_render_config *c, struct base_err *err)
 {
-    uint32_t crc = 0;
-    uint32_t mask_crc = 0;
-    int rc = file_crc(s->cli.scene, &crc, err);
+    uint32_t scene_crc = 0, mask_crc = 0, plugin_crc = 0;
+    if (!s->cli.checkpoint)
+        return 0;
+    int rc = base_inputs_crc32(&s->scene_files, &scene_crc, err);
     if (!rc && s->cli.mask)
         rc = file_crc(s->cli.mask, &mask_crc, err);
+    if (!rc)
+        rc = base_inputs_crc32(&s->judging, &plugin_crc, err);
     if (rc)
         return rc;
     const struct pt_integrator *i = &c->integrator;
@@ -212,7 +208,7 @@ static int describe_settings(struct session *s, const struct pt_render_config *c
         s->settings, room,
         "scene-crc=%08x\nsize=%dx%d\ncrop=%d,%d,%d,%d\nblock=%dx%d\nspp-min=%llu\nspp-max=%llu\nuniform=%d\nmax-seam=%g\n"
         "aov=%u\nseed=%u\nsampler=%d\nintegrator=%d\nfilter=%d:%gx%g:%g\nmax-depth=%d\nrr-depth=%d\nclamp=%g\n",
-        crc, c->width, c->height, c->crop[0], c->crop[1], c->crop[2], c->crop[3], c->block_width, c->block_height,
+        scene_crc, c->width, c->height, c->crop[0], c->crop[1], c->crop[2], c->crop[3], c->block_width, c->block_height,
         (unsigned long long)c->spp_min, (unsigned long long)c->spp_max, c->uniform, c->max_seam, c->planes, i->seed,
         i->sampler,
         i->strategy, i->filter, (double)i->filter_x, (double)i->filter_y, (double)i->filter_sigma, i->max_depth, i->rr_depth,
@@ -226,6 +222,8 @@ static int describe_settings(struct session *s, const struct pt_render_config *c
                              t ? t->version : "");
     if (s->cli.mask && used < room)
         used += (size_t)snprintf(s->settings + used, room - used, "mask-crc=%08x\n", mask_crc);
+    if (used < room)
+        used += (size_t)snprintf(s->settings + used, room - used, "plugin-crc=%08x\n", plugin_crc);
     for (uint32_t k = 0; k < s->cli.param_count && used < room; k++)
         used += (size_t)snprintf(s->settings + used, room - used, "param=%s=%s\n", s->cli.params[k].key,
                                  s->cli.params[k].value);
@@ -234,15 +232,26 @@ static int describe_settings(struct session *s, const struct pt_render_config *c
 
 /* --- rendering ------------------------------------------------------------------------------------------------------ */
 
+/* A checkpoint that fails on the way costs nothing yet: the next one may succeed. */
+static void save_now_and_then(struct session *s, const struct pt_render *render)
+{
+    struct base_err why = {0};
+    char line[640];
+    if (pt_checkpoint_save(s->cli.checkpoint, render, s->settings, &why) != 0) {
+        snprintf(line, sizeof line, "no checkpoint, the render goes on: %s", why.text);
+        say(s, line);
+    }
+    s->checkpoint_at_s = base_clock_wall_s() + s->cli.checkpoint_every_s;
+}
+
 static int after_slice(void *data, struct pt_render *render, struct base_err *err)
 {
     struct session *s = data;
+    (void)err;
     pt_progress_update(&s->progress, render);
-    if (!s->cli.checkpoint || base_clock_wall_s() < s->checkpoint_at_s)
-        return 0;
-    int rc = pt_checkpoint_save(s->cli.checkpoint, render, s->settings, err);
-    s->checkpoint_at_s = base_clock_wall_s() + s->cli.checkpoint_every_s;
-    return rc;
+    if (s->cli.checkpoint && base_clock_wall_s() >= s->checkpoint_at_s)
+        save_now_and_then(s, render);
+    return 0;
 }
 
 static int on_suspend(void *data, struct pt_render *render, struct base_err *err)
@@ -257,7 +266,33 @@ static int interrupted(void *data)
     return interrupt_seen != 0;
 }
 
-/* Writes what was asked for; goes on after a failure so that one full disk does not cost the other files. */
+typedef int writer(const char *path, const struct pt_render *render, const struct pt_output_info *info,
+                   struct base_err *err);
+
+static int write_preview(const char *path, const struct pt_render *render, const struct pt_output_info *info,
+                         struct base_err *err)
+{
+    (void)info;
+    return pt_output_preview(path, render, err);
+}
+
+/* What cannot be written after all is kept where temporary files go. On failure err says so; on success it stays. */
+static void write_or_keep(const struct session *s, writer *write, const char *path, const struct pt_output_info *info,
+                          struct base_err *err)
+{
+    struct base_err why = {0}, again = {0};
+    char kept[4096];
+    if (!path || write(path, s->render, info, &why) == 0)
+        return;
+    *err = why;
+    const char *folder = getenv("TMPDIR"), *slash = strrchr(path, '/');
+    int n = snprintf(kept, sizeof kept, "%s/lull-%ld-%s", folder && folder[0] != '\0' ? folder : "/tmp", (long)getpid(),
+                     slash ? slash + 1 : path);
+    if (n < (int)sizeof kept && write(kept, s->render, info, &again) == 0)
+        base_fail(err, why.code, "%.320s; kept as %.160s", why.text, kept);
+}
+
+/* Writes what was asked for; goes on after a failure so that one missing folder does not cost the other files. */
 static int write_outputs(struct session *s, int was_interrupted, struct base_err *err)
 {
     const struct pt_cli *cli = &s->cli;
@@ -265,16 +300,11 @@ static int write_outputs(struct session *s, int was_interrupted, struct base_err
                                   .effects = s->scene->effects, .kernel = s->kernel_name,
                                   .threads = base_threads_count(s->threads), .reproducible = cli->reproducible,
                                   .aov = cli->aov, .scene_bytes = s->scene->stats.bytes, .interrupted = was_interrupted};
-    struct base_err e = {0};
-    if (cli->output && pt_output_exr(cli->output, s->render, &info, &e) != 0)
-        *err = e;
-    if (cli->preview && pt_output_preview(cli->preview, s->render, &e) != 0)
-        *err = e;
+    write_or_keep(s, pt_output_exr, cli->output, &info, err);
+    write_or_keep(s, write_preview, cli->preview, &info, err);
     for (int i = 0; i < cli->stop_map_count; i++)
-        if (pt_output_stop_map(cli->stop_maps[i], s->render, &info, &e) != 0)
-            *err = e;
-    if (cli->report && pt_output_report(cli->report, s->render, &info, &e) != 0)
-        *err = e;
+        write_or_keep(s, pt_output_stop_map, cli->stop_maps[i], &info, err);
+    write_or_keep(s, pt_output_report, cli->report, &info, err);
     return err->code;
 }
 
@@ -307,7 +337,7 @@ static int render_image(struct session *s, int *status, struct base_err *err)
     struct pt_render_config config;
     enum pt_render_outcome outcome;
     int rc = make_config(s, &config, err);
-    if (rc || (rc = check_outputs(s, err)) != 0 || (rc = open_criterion(s, err)) != 0 ||
+    if (rc || (rc = open_criterion(s, err)) != 0 || (rc = check_outputs(s, err)) != 0 ||
         (rc = describe_settings(s, &config, err)) != 0)
         return rc;
     rc = pt_render_create(&config, s->scene, s->kernel, s->threads, s->criterion, &s->render, err);
@@ -324,9 +354,12 @@ static int render_image(struct session *s, int *status, struct base_err *err)
     rc = pt_render_run(s->render, &hooks, &outcome, err);
     pt_progress_clear(&s->progress);
     struct base_err write_err = {0};
-    if (write_outputs(s, outcome == PT_RENDER_INTERRUPTED, &write_err) != 0 && !rc) {
-        *err = write_err;
-        return err->code;
+    if (write_outputs(s, outcome == PT_RENDER_INTERRUPTED, &write_err) != 0) {
+        if (rc)
+            say(s, write_err.text); /* besides the render's own error: it tells where the image is */
+        else
+            rc = base_fail(err, write_err.code, "%s", write_err.text);
+        return rc;
     }
     tell_summary(s);
     *status = outcome == PT_RENDER_INTERRUPTED ? EXIT_INTERRUPTED : 0;
@@ -370,6 +403,8 @@ static int record_sequence(struct session *s, int *status, struct base_err *err)
     int rc = make_config(s, &config.render, err);
     if (!rc)
         rc = file_crc(s->cli.scene, &config.scene_crc, err);
+    if (!rc)
+        rc = base_inputs_crc32(&s->scene_files, &config.inputs_crc, err);
     if (!rc && s->cli.criterion)
         rc = open_criterion(s, err);
     if (rc)
@@ -414,7 +449,7 @@ static int run(struct session *s, int *status, struct base_err *err)
 
 int main(int argc, char **argv)
 {
-    static struct session s;
+    static struct session s = {.scene_files = BASE_INPUTS_EMPTY, .judging = BASE_INPUTS_EMPTY};
     struct base_err err = {0};
     int status = 0;
     int rc = pt_cli_parse(&s.cli, argc, argv, &err);
@@ -432,10 +467,12 @@ int main(int argc, char **argv)
     pt_mask_release(&s.mask);
     pt_scene_destroy(s.scene);
     base_threads_destroy(s.threads);
+    base_inputs_release(&s.scene_files);
+    base_inputs_release(&s.judging);
     pt_cli_release(&s.cli);
     if ((fflush(stdout) != 0 || ferror(stdout)) && status == 0) {
         fprintf(stderr, "pathtracer: cannot write standard output\n");
-        status = EXIT_FAILED;
+        status = EXIT_BAD_INPUT;
     }
     return status;
 }

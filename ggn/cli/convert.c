@@ -19,6 +19,7 @@ int ggn_cmd_convert(int argc, char **argv)
         .args_doc = "MODEL OUT",
         .args_min = 2,
         .args_max = 2,
+        .args_output = 2,
         .args = offsetof(struct options, paths),
         .doc = "Stores a model's weights in fewer (or more) bits. Half the size; decisions near the threshold may change, "
                "`ggn evaluate -m MODEL -m OUT` says which."};

@@ -100,7 +100,7 @@ int main(int argc, char **argv)
     int status = command->run(argc - 1, argv + 1);
     if (fflush(stdout) || ferror(stdout)) {
         fprintf(stderr, "%s: cannot write standard output\n", name);
-        return status ? status : GGN_EXIT_FAILED;
+        return status ? status : GGN_EXIT_BAD_INPUT;
     }
     return status;
 }

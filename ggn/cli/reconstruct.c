@@ -22,8 +22,8 @@ static const struct base_option list[] = {
     {"stops", 's', "FILE", TO(stops),
      .help = "stops or thresholds per block: CSV, report JSON or EXR stop map (the sequence's labels)"},
     {"view", 'v', "NAME", TO(view), .help = "row of the CSV"},
-    {"output", 'o', "OUT.png", TO(out), .needed = 1, .help = "the picture (needed)"},
-    {"reference", 'r', "REF.png", TO(reference), .help = "write the reference too"},
+    {"output", 'o', "OUT.png", TO(out), .needed = 1, .output = 1, .help = "the picture (needed)"},
+    {"reference", 'r', "REF.png", TO(reference), .output = 1, .help = "write the reference too"},
     {"json", 'j', NULL, TO(json), .help = "print the figures as JSON"},
     {0}};
 

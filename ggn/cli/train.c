@@ -1,4 +1,5 @@
 /* `ggn train`: from a data set to a model file. */
+#include "base/files.h"
 #include "base/options.h"
 #include "cli/commands.h"
 #include "train/train.h"
@@ -11,7 +12,7 @@ struct settings {
 static const struct base_option list[] = {
     {"data", 'd', "DIR", TO(plan.data.dir), .needed = 1,
      .help = "data set: a folder of recorded, labelled sequences (needed)"},
-    {"out", 'o', "FILE", TO(plan.out), .needed = 1,
+    {"out", 'o', "FILE", TO(plan.out), .needed = 1, .output = 1,
      .help = "model file; FILE.ckpt, .csv, .png and .card.json lie beside it (needed)"},
     {"preset", 0, NULL, TO(preset), .words = ggn_preset_names, .help = "networks, procedure and defaults (lull)"},
     {"init", 0, "FILE", TO(plan.init), .help = "start from this model"},
@@ -56,6 +57,17 @@ static const struct base_option list[] = {
      .help = "threads, 0 = all processors; the result does not depend on it (0)"},
     {0}};
 
+/* What training leaves beside the model has longer names; and it must not become part of the data. */
+static int check_out(const struct ggn_train_plan *plan, struct base_err *err)
+{
+    char longest[4096 + sizeof ".card.json"];
+    snprintf(longest, sizeof longest, "%s.card.json", plan->out);
+    int rc = base_file_check_output(longest, err);
+    if (!rc && base_file_is_inside(plan->out, plan->data.dir))
+        rc = base_fail(err, BASE_EINVAL, "%s: this is inside its data, %s", plan->out, plan->data.dir);
+    return rc;
+}
+
 int ggn_cmd_train(int argc, char **argv)
 {
     static const struct base_options options = {.list = list,
@@ -70,6 +82,8 @@ int ggn_cmd_train(int argc, char **argv)
     s.plan = ggn_train_plan_default((enum ggn_preset)s.preset);
     if (!rc)
         rc = base_options_parse(&options, argc, argv, &s, &err);
+    if (!rc)
+        rc = check_out(&s.plan, &err);
     if (rc)
         return ggn_cmd_fail(argv[0], &err);
     s.plan.progress = s.quiet ? NULL : stderr;

@@ -85,6 +85,8 @@ void find_rgb(const ImageSpec &spec, int rgb[3])
 
 template <class T, class Image> int read_rgb(const char *path, Image *image, bool *is_float, struct base_err *err)
 {
+    if (int rc = base_file_check_input(path, err))
+        return rc;
     OIIO::ImageSpec config;
     config["oiio:UnassociatedAlpha"] = 1;
     std::unique_ptr<ImageInput> in = ImageInput::open(path, &config);
@@ -141,6 +143,8 @@ int read_float(const char *path, struct ggn_imagef *image, struct base_err *err)
 
 int read_channel(const char *path, const char *channel, struct ggn_imagef *image, struct base_err *err)
 {
+    if (int rc = base_file_check_input(path, err))
+        return rc;
     std::unique_ptr<ImageInput> in = ImageInput::open(path);
     if (!in)
         return complain(path, err);

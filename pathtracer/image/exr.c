@@ -106,19 +106,38 @@ static exr_result_t write_pixels(exr_context_t file, const struct pt_exr_image *
     return rc;
 }
 
+/* The library jumps about in the file: its head comes last. */
+static int64_t write_at(exr_const_context_t file, void *data, const void *bytes, uint64_t size, uint64_t offset,
+                        exr_stream_error_func_ptr_t fail)
+{
+    struct base_file_out *out = data;
+    (void)file;
+    (void)fail;
+    uint64_t done = 0;
+    while (done < size) {
+        ssize_t n = pwrite(fileno(out->file), (const char *)bytes + done, (size_t)(size - done), (off_t)(offset + done));
+        if (n <= 0)
+            return -1;
+        done += (uint64_t)n;
+    }
+    return (int64_t)size;
+}
+
 int pt_exr_write(const char *path, const struct pt_exr_image *image, struct base_err *err)
 {
-    char tmp_path[4200];
-    int rc = base_file_tmp_name(path, tmp_path, sizeof tmp_path, err);
-    if (rc)
-        return rc;
+    struct base_file_out out;
     if (image->channel_count < 1 || image->channel_count > MAX_CHANNELS)
         return base_fail(err, BASE_EINVAL, "%s: %d channels, at most %d can be written", path, image->channel_count,
                          MAX_CHANNELS);
+    int rc = base_file_begin(&out, path, err);
+    if (rc)
+        return rc;
     exr_context_t file = NULL;
     exr_context_initializer_t init = EXR_DEFAULT_CONTEXT_INITIALIZER;
     init.error_handler_fn = ignore_message;
-    exr_result_t code = exr_start_write(&file, tmp_path, EXR_WRITE_FILE_DIRECTLY, &init);
+    init.user_data = &out;
+    init.write_fn = write_at;
+    exr_result_t code = exr_start_write(&file, out.tmp_path, EXR_WRITE_FILE_DIRECTLY, &init);
     if (code == EXR_ERR_SUCCESS)
         code = write_header(file, image);
     if (code == EXR_ERR_SUCCESS)
@@ -127,8 +146,8 @@ int pt_exr_write(const char *path, const struct pt_exr_image *image, struct base
     if (code == EXR_ERR_SUCCESS)
         code = finish;
     if (code == EXR_ERR_SUCCESS)
-        return base_file_rename(tmp_path, path, err);
-    unlink(tmp_path);
+        return base_file_commit(&out, err);
+    base_file_abort(&out);
     if (code == EXR_ERR_OUT_OF_MEMORY)
         return base_fail_nomem(err, path);
     return base_fail(err, BASE_EIO, "%s: cannot write EXR: %s", path, exr_get_default_error_message(code));

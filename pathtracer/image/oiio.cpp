@@ -112,8 +112,8 @@ extern "C" int pt_oiio_read(const char *path, struct pt_oiio_image *out, struct 
 {
     try {
         configure_once();
-        if (access(path, R_OK) != 0)
-            return base_fail(err, BASE_EIO, "%s: %s", path, std::strerror(errno));
+        if (int rc = base_file_check_input(path, err))
+            return rc;
         if (is_png(path)) {
             char *data = nullptr;
             size_t size = 0;

@@ -107,7 +107,9 @@ int32_t pt_build_image_map(struct pt_builder *b, struct pt_loc loc, const char *
         return id;
     int rc;
     if (b->source->files) {
-        rc = pt_oiio_read(path, &image, &err);
+        rc = b->source->note(b->source->data, path, &err);
+        if (!rc)
+            rc = pt_oiio_read(path, &image, &err);
     } else {
         char *bytes = NULL;
         size_t size = 0;

@@ -79,5 +79,6 @@ out:
 int pt_scene_load(const char *path, const struct pt_load_options *options, struct pt_scene **out,
                   struct pt_scene_defaults *defaults, struct base_err *err)
 {
-    return pt_scene_load_source(path, &pt_source_files, options, out, defaults, err);
+    const struct pt_source files = pt_source_files(options ? options->inputs : NULL);
+    return pt_scene_load_source(path, &files, options, out, defaults, err);
 }

@@ -2,6 +2,7 @@
 #ifndef PT_PBRT_LOAD_OPTIONS_H
 #define PT_PBRT_LOAD_OPTIONS_H
 
+#include "base/inputs.h"
 #include "scene/effects.h"
 #include "scene/settings.h"
 
@@ -18,6 +19,7 @@ struct pt_load_options {
     int width, height;    /* > 0: replaces the film's resolution before the camera is set up (--size) */
     struct pt_view view;
     pt_effects forced;    /* effects to turn on whether needed or not (--effects=all) */
+    struct base_inputs *inputs; /* gets every file that is read; may be NULL */
     int quiet;            /* no progress notes */
     void (*warn)(void *data, const char *line); /* one line per warning or note; may be NULL */
     void *warn_data;

@@ -57,12 +57,18 @@ static int unpack(const char *path, char *packed, size_t packed_size, char **byt
     return 0;
 }
 
+static int note_file(void *data, const char *path, struct base_err *err)
+{
+    return data ? base_inputs_add(data, path, err) : 0;
+}
+
 static int read_file(void *data, const char *path, char **bytes, size_t *size, struct base_err *err)
 {
-    (void)data;
     char *raw = NULL;
     size_t n = 0, length = strlen(path);
-    int rc = base_file_read(path, max_file_bytes, &raw, &n, err);
+    int rc = note_file(data, path, err);
+    if (!rc)
+        rc = base_file_read(path, max_file_bytes, &raw, &n, err);
     if (rc || length < 3 || strcmp(path + length - 3, ".gz") != 0) {
         if (!rc) {
             *bytes = raw;
@@ -75,7 +81,10 @@ static int read_file(void *data, const char *path, char **bytes, size_t *size, s
     return rc;
 }
 
-const struct pt_source pt_source_files = {read_file, NULL, 1};
+struct pt_source pt_source_files(struct base_inputs *inputs)
+{
+    return (struct pt_source){read_file, note_file, inputs, 1};
+}
 
 static int read_single(void *data, const char *path, char **bytes, size_t *size, struct base_err *err)
 {
@@ -95,5 +104,5 @@ static int read_single(void *data, const char *path, char **bytes, size_t *size,
 
 struct pt_source pt_source_from_memory(const struct pt_source_single *single)
 {
-    return (struct pt_source){read_single, (void *)(uintptr_t)single, 0};
+    return (struct pt_source){read_single, NULL, (void *)(uintptr_t)single, 0};
 }

@@ -7,16 +7,20 @@
 #include <stddef.h>
 
 #include "base/err.h"
+#include "base/inputs.h"
 
 struct pt_source {
     /* Reads all of `path`; *bytes is malloc'ed (caller frees) and NUL-terminated one past *size. Must be thread-safe. */
     int (*read)(void *data, const char *path, char **bytes, size_t *size, struct base_err *err);
+    /* Told about a real file that another library is about to read itself; NULL: nobody asks. */
+    int (*note)(void *data, const char *path, struct base_err *err);
     void *data;
     int files; /* 1: paths are real files that other libraries may open */
 };
 
-/* The file system. Names that end in .gz are unpacked. Files above 2 GiB are refused. */
-extern const struct pt_source pt_source_files;
+/* The file system. Names that end in .gz are unpacked. Files above 2 GiB are refused. Every file read is put into `inputs`
+ * (borrowed; may be NULL). */
+struct pt_source pt_source_files(struct base_inputs *inputs);
 
 /* A file system of one file, `path` with text[0, size), that it borrows; every other path does not exist. */
 struct pt_source_single {

@@ -16,8 +16,8 @@ static void tell(void *context, int32_t level, const char *text)
         t->warn(t->data, text);
 }
 
-int pt_criterion_find(const char *spec, void (*warn)(void *data, const char *line), void *warn_data,
-                      const struct lull_criterion **out, struct base_err *err)
+int pt_criterion_find(const char *spec, struct base_inputs *inputs, void (*warn)(void *data, const char *line),
+                      void *warn_data, const struct lull_criterion **out, struct base_err *err)
 {
     struct teller teller = {warn, warn_data};
     struct lull_search search = {.log = tell, .log_context = &teller};
@@ -26,8 +26,10 @@ int pt_criterion_find(const char *spec, void (*warn)(void *data, const char *lin
     int32_t code = lull_open(&search, spec, &found, &e);
     if (code != LULL_OK)
         return base_fail(err, code == LULL_E_MEMORY ? BASE_ENOMEM : BASE_EINVAL, "%s", e.message);
-    *out = found.criterion;
-    return 0;
+    int rc = inputs ? base_inputs_add(inputs, found.path, err) : 0;
+    if (!rc)
+        *out = found.criterion;
+    return rc;
 }
 
 struct listing {

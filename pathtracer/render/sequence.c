@@ -8,6 +8,7 @@
 
 #include "base/clock.h"
 #include "base/files.h"
+#include "base/lock.h"
 #include "base/version.h"
 #include "sequence/builder.h"
 #include "sequence/manifest.h"
@@ -79,6 +80,7 @@ struct recorder {
     struct pt_render_hooks hooks;
     struct seq_manifest manifest; /* owns; room for every block of the grid */
     struct pt_blocks grid;      /* owns; of the whole image */
+    struct base_lock lock;      /* of the folder */
     uint8_t *chosen;            /* owns; [grid.count] */
     double *mean, *half, *difference, *moment2, *scratch; /* own; one block, planar */
 };
@@ -122,6 +124,7 @@ static void describe(struct recorder *r)
              pt_sampler_words[i->sampler], pt_strategy_words[i->strategy], pt_filter_words[i->filter],
              (double)i->filter_x, i->max_depth, (double)i->max_component);
     m->source_crc32 = c->scene_crc;
+    m->inputs_crc32 = c->inputs_crc;
     m->has_look_at = c->view.has_look_at;
     if (m->has_look_at)
         memcpy(m->look_at, c->view.look_at_world, sizeof m->look_at);
@@ -337,11 +340,13 @@ static int prepare(struct recorder *r, struct base_err *err)
     describe(r);
     if (mkdir(r->config->directory, 0777) != 0 && errno != EEXIST)
         return base_fail(err, BASE_EINVAL, "%s: %s", r->config->directory, strerror(errno));
-    return resume(r, err);
+    rc = base_lock_folder(&r->lock, r->config->directory, err);
+    return rc ? rc : resume(r, err);
 }
 
 static void recorder_release(struct recorder *r)
 {
+    base_lock_release(&r->lock);
     seq_manifest_release(&r->manifest);
     pt_blocks_release(&r->grid);
     free(r->chosen);

@@ -20,7 +20,7 @@ struct pt_sequence_config {
     struct pt_view view;        /* that replaced the scene's camera */
     uint64_t reference_spp;     /* 0 = no reference */
     const char *scene_path;
-    uint32_t scene_crc;
+    uint32_t scene_crc, inputs_crc; /* of the scene file; of every file that was read */
     int quiet;
     int (*slice)(void *data, struct pt_render *render, struct base_err *err); /* as in pt_render_hooks; may be NULL */
     struct pt_render_config render; /* size, block, integrator; the rest is set here */

@@ -1,21 +1,57 @@
 #include "base/files.h"
 
+#include <dirent.h>
 #include <errno.h>
+#include <fcntl.h>
+#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
+
+enum { PATH_ROOM = 4096, LINKS_MAX = 40, TRIES_MAX = 100, NAME_KEPT = 180 };
+static const char TMP_PREFIX[] = ".tmp-lull"; /* .tmp-lullPID-N.NAME */
+
+/* --- reading --- */
+
+int base_file_open(const char *path, FILE **file, struct base_err *err)
+{
+    struct stat st;
+    int fd = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC); /* a FIFO without a writer would be waited for */
+    if (fd < 0)
+        return base_fail(err, BASE_EIO, "%s: %s", path, strerror(errno));
+    if (fstat(fd, &st) != 0 || !S_ISREG(st.st_mode)) {
+        close(fd);
+        return base_fail(err, BASE_EINVAL, "%s: not a regular file", path);
+    }
+    *file = fdopen(fd, "rb");
+    if (!*file) {
+        close(fd);
+        return base_fail_nomem(err, path);
+    }
+    return 0;
+}
+
+int base_file_check_input(const char *path, struct base_err *err)
+{
+    FILE *f;
+    int rc = base_file_open(path, &f, err);
+    if (!rc)
+        fclose(f);
+    return rc;
+}
 
 int base_file_read(const char *path, size_t max_size, char **data, size_t *size, struct base_err *err)
 {
     struct stat st;
     char *buffer = NULL;
-    int rc = 0;
-    FILE *f = fopen(path, "rb");
-    if (!f)
-        return base_fail(err, BASE_EIO, "%s: %s", path, strerror(errno));
-    if (fstat(fileno(f), &st) != 0 || !S_ISREG(st.st_mode)) {
-        rc = base_fail(err, BASE_EINVAL, "%s: not a regular file", path);
+    FILE *f = NULL;
+    int rc = base_file_open(path, &f, err);
+    if (rc)
+        return rc;
+    if (fstat(fileno(f), &st) != 0) {
+        rc = base_fail(err, BASE_EIO, "%s: %s", path, strerror(errno));
         goto out;
     }
     if ((unsigned long long)st.st_size > max_size) {
@@ -43,24 +79,150 @@ out:
     return rc;
 }
 
-int base_file_tmp_name(const char *path, char *tmp_path, size_t room, struct base_err *err)
+/* --- names of outputs --- */
+
+static int too_long(const char *path, struct base_err *err)
+{
+    return base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", path);
+}
+
+static const char *base_name(const char *path)
 {
     const char *slash = strrchr(path, '/');
-    const char *base = slash ? slash + 1 : path;
-    int n = snprintf(tmp_path, room, "%.*s.tmp%ld.%s", (int)(base - path), path, (long)getpid(), base);
-    if (n < 0 || (size_t)n >= room)
-        return base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", path);
+    return slash ? slash + 1 : path;
+}
+
+/* The file that writing to `path` changes: links are followed, also to where no file is yet. */
+static int follow(const char *path, char *target, struct base_err *err)
+{
+    char link[PATH_ROOM], whole[2 * PATH_ROOM];
+    if (strlen(path) >= PATH_ROOM)
+        return too_long(path, err);
+    strcpy(target, path);
+    for (int i = 0; i < LINKS_MAX; i++) {
+        ssize_t n = readlink(target, link, sizeof link - 1);
+        if (n < 0)
+            return 0;
+        link[n] = '\0';
+        int folder = link[0] == '/' ? 0 : (int)(base_name(target) - target);
+        if (snprintf(whole, sizeof whole, "%.*s%s", folder, target, link) >= PATH_ROOM)
+            return too_long(path, err);
+        strcpy(target, whole);
+    }
+    return base_fail(err, BASE_EINVAL, "%s: %s", path, strerror(ELOOP));
+}
+
+static void folder_of(const char *path, char *folder)
+{
+    size_t n = (size_t)(base_name(path) - path);
+    memcpy(folder, path, n);
+    strcpy(folder + n, n > 0 ? "" : "./");
+}
+
+/* Whose temporary `name` is: a process, or 0 if it is none. */
+static long owner_of(const char *name)
+{
+    size_t n = sizeof TMP_PREFIX - 1;
+    char *end;
+    if (strncmp(name, TMP_PREFIX, n) != 0)
+        return 0;
+    long pid = strtol(name + n, &end, 10);
+    return pid > 0 && *end == '-' ? pid : 0;
+}
+
+/* Removes the temporaries of processes that are gone. One on another machine, or in another container, holds its lock. */
+static void sweep(const char *folder)
+{
+    DIR *d = opendir(folder);
+    for (struct dirent *e; d && (e = readdir(d));) {
+        long pid = owner_of(e->d_name);
+        if (pid == 0 || kill((pid_t)pid, 0) == 0 || errno != ESRCH)
+            continue;
+        int fd = openat(dirfd(d), e->d_name, O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+        if (fd < 0)
+            continue;
+        if (flock(fd, LOCK_EX | LOCK_NB) == 0)
+            unlinkat(dirfd(d), e->d_name, 0);
+        close(fd);
+    }
+    if (d)
+        closedir(d);
+}
+
+/* Fills `target` with the file behind `path`, if it can be written. */
+static int check_output(const char *path, char *target, struct base_err *err)
+{
+    struct stat st;
+    char folder[PATH_ROOM + 4];
+    int rc = follow(path, target, err);
+    if (rc)
+        return rc;
+    if (base_name(target)[0] == '\0')
+        return base_fail(err, BASE_EINVAL, "%s: not the name of a file", path);
+    folder_of(target, folder);
+    if (access(folder, W_OK | X_OK) != 0)
+        return base_fail(err, BASE_EIO, "%s: cannot write there: %s", path, strerror(errno));
+    if (lstat(target, &st) != 0 && errno == ENAMETOOLONG)
+        return too_long(path, err);
+    if (lstat(target, &st) != 0 && errno != ENOENT)
+        return base_fail(err, BASE_EIO, "%s: cannot write there: %s", path, strerror(errno));
+    if (stat(target, &st) == 0 && !S_ISREG(st.st_mode))
+        return base_fail(err, BASE_EINVAL, "%s: cannot write there: %s", path,
+                         S_ISDIR(st.st_mode) ? "it is a folder" : "it is no regular file and would be replaced");
+    sweep(folder);
     return 0;
+}
+
+int base_file_check_output(const char *path, struct base_err *err)
+{
+    char target[PATH_ROOM];
+    return path ? check_output(path, target, err) : 0;
+}
+
+int base_file_is_inside(const char *path, const char *folder)
+{
+    char at[2 * PATH_ROOM], target[PATH_ROOM];
+    struct stat outer, here, below = {0};
+    if (follow(path, target, NULL) != 0 || stat(folder, &outer) != 0)
+        return 0;
+    folder_of(target, at);
+    while (strlen(at) < PATH_ROOM && stat(at, &here) == 0 && (here.st_dev != below.st_dev || here.st_ino != below.st_ino)) {
+        if (here.st_dev == outer.st_dev && here.st_ino == outer.st_ino)
+            return 1;
+        below = here; /* only the root is its own parent */
+        strcat(at, "/..");
+    }
+    return 0;
+}
+
+/* The n-th name for a temporary beside `target`. A long name is cut at the front: the temporary's fits where it does. */
+static int name_tmp(const char *target, int n, char *tmp_path, size_t room, struct base_err *err)
+{
+    const char *base = base_name(target);
+    size_t length = strlen(base);
+    int used = snprintf(tmp_path, room, "%.*s%s%ld-%d.%s", (int)(base - target), target, TMP_PREFIX, (long)getpid(), n,
+                        length > NAME_KEPT ? base + length - NAME_KEPT : base);
+    return used > 0 && (size_t)used < room ? 0 : too_long(target, err);
+}
+
+/* --- writing --- */
+
+int base_file_tmp_name(const char *path, char *tmp_path, size_t room, struct base_err *err)
+{
+    char target[PATH_ROOM];
+    int rc = check_output(path, target, err);
+    return rc ? rc : name_tmp(target, 0, tmp_path, room, err);
 }
 
 int base_file_rename(const char *tmp_path, const char *path, struct base_err *err)
 {
-    if (rename(tmp_path, path) != 0) {
-        int rc = base_fail(err, BASE_EIO, "%s: %s", path, strerror(errno));
+    char target[PATH_ROOM];
+    int rc = follow(path, target, err);
+    if (!rc && rename(tmp_path, target) != 0)
+        rc = base_fail(err, BASE_EIO, "%s: %s", path, strerror(errno));
+    if (rc)
         unlink(tmp_path);
-        return rc;
-    }
-    return 0;
+    return rc;
 }
 
 int base_file_join(char *path, const char *dir, const char *name, struct base_err *err)
@@ -69,18 +231,40 @@ int base_file_join(char *path, const char *dir, const char *name, struct base_er
     return n > 0 && n < 4096 ? 0 : base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", dir);
 }
 
+/* Makes the temporary and locks it; one that somebody swept away in between is made again under the next name. */
+static int create_tmp(struct base_file_out *out, int *fd, struct base_err *err)
+{
+    struct stat st;
+    for (int n = 0, rc; n < TRIES_MAX; n++) {
+        if ((rc = name_tmp(out->path, n, out->tmp_path, sizeof out->tmp_path, err)) != 0)
+            return rc;
+        *fd = open(out->tmp_path, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+        if (*fd < 0 && errno != EEXIST)
+            break;
+        if (*fd < 0)
+            continue;
+        int taken = flock(*fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+        if (!taken && fstat(*fd, &st) == 0 && st.st_nlink > 0)
+            return 0;
+        close(*fd);
+    }
+    return base_fail(err, BASE_EIO, "%s: cannot write there: %s", out->path, strerror(errno));
+}
+
 int base_file_begin(struct base_file_out *out, const char *path, struct base_err *err)
 {
     memset(out, 0, sizeof *out);
-    if (strlen(path) >= sizeof out->path)
-        return base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", path);
-    strcpy(out->path, path);
-    int rc = base_file_tmp_name(path, out->tmp_path, sizeof out->tmp_path, err);
+    int fd = -1, rc = check_output(path, out->path, err);
+    if (!rc)
+        rc = create_tmp(out, &fd, err);
     if (rc)
         return rc;
-    out->file = fopen(out->tmp_path, "wb");
-    if (!out->file)
-        return base_fail(err, BASE_EIO, "%s: %s", path, strerror(errno));
+    out->file = fdopen(fd, "wb");
+    if (!out->file) {
+        close(fd);
+        unlink(out->tmp_path);
+        return base_fail_nomem(err, path);
+    }
     return 0;
 }
 

@@ -1,8 +1,11 @@
 /*
- * Whole-file reads and atomic writes.
+ * Whole-file reads and atomic writes of regular files. Folders, devices, FIFOs and sockets are refused on either side:
+ * reading them may never end, and an output takes the place of what was there.
  *
  * An output is written to a temporary beside PATH and renamed onto PATH by base_file_commit, so that a reader sees the old
- * file or the new one and never a part. Not thread-safe per object.
+ * file or the new one and never a part. A symbolic link is followed. A temporary is locked while its process lives; those
+ * that a killed process left in a folder are removed when the next output there is checked or begun. Not thread-safe per
+ * object.
  */
 #ifndef BASE_FILES_H
 #define BASE_FILES_H
@@ -12,6 +15,10 @@
 
 #include "base/err.h"
 
+/* Opens a regular file for reading; waits for nothing. The caller closes it. */
+int base_file_open(const char *path, FILE **file, struct base_err *err);
+/* For libraries that open inputs by name themselves: fails where base_file_open would. */
+int base_file_check_input(const char *path, struct base_err *err);
 /* Reads all of a regular file. *data is malloc'ed (caller frees), NUL-terminated one past *size. Files above max_size bytes
  * and anything but regular files are refused (BASE_EINVAL). */
 int base_file_read(const char *path, size_t max_size, char **data, size_t *size, struct base_err *err);
@@ -19,9 +26,16 @@ int base_file_read(const char *path, size_t max_size, char **data, size_t *size,
 /* DIR/NAME; path has room for 4096 bytes. */
 int base_file_join(char *path, const char *dir, const char *name, struct base_err *err);
 
+/* Can `path` be written? To be asked before the work: BASE_EIO when its folder is missing or read-only, BASE_EINVAL when
+ * the name is too long or what is there is no regular file. NULL is no output. */
+int base_file_check_output(const char *path, struct base_err *err);
+
+/* 1 when writing `path` would put a file into `folder` or one of its folders. */
+int base_file_is_inside(const char *path, const char *folder);
+
 struct base_file_out {
     FILE *file;         /* open for writing between begin and commit/abort */
-    char path[4096];    /* the final name */
+    char path[4096];    /* the final name, links followed */
     char tmp_path[4128];
 };
 
@@ -34,8 +48,8 @@ int base_file_write_line(const char *path, const char *text, struct base_err *er
 /* Closes and removes the temporary. Safe after commit and on a zeroed object. */
 void base_file_abort(struct base_file_out *out);
 
-/* For writers that open files by name themselves (EXR, OpenImageIO): makes the temporary's name, which keeps the extension
- * of `path`; base_file_rename puts it in place. tmp_path has room for `room` bytes. */
+/* For programs that write a file by name themselves (gnuplot): checks `path` like base_file_check_output and makes the
+ * temporary's name, which keeps the extension of `path`; base_file_rename puts it in place. tmp_path has `room` bytes. */
 int base_file_tmp_name(const char *path, char *tmp_path, size_t room, struct base_err *err);
 int base_file_rename(const char *tmp_path, const char *path, struct base_err *err);
 

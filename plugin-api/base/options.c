@@ -8,10 +8,12 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+#include <sys/stat.h>
 
+#include "base/files.h"
 #include "base/version.h"
 
-enum { MAX_OPTIONS = 96, KEY_LONG = 256, KEY_USAGE = KEY_LONG + MAX_OPTIONS, KEY_HELP, KEY_VERSION };
+enum { EXIT_UNWRITTEN = 2, MAX_OPTIONS = 96, KEY_LONG = 256, KEY_USAGE = KEY_LONG + MAX_OPTIONS, KEY_HELP, KEY_VERSION };
 
 /* --- values --- */
 
@@ -178,7 +180,10 @@ _Noreturn static void answer(const struct base_options *options, const char *pro
         print_help(options, program, ARGP_HELP_USAGE);
     else
         print_help(options, program, ARGP_HELP_SHORT_USAGE | ARGP_HELP_LONG | ARGP_HELP_DOC);
-    exit(fflush(stdout) || ferror(stdout) ? EXIT_FAILURE : EXIT_SUCCESS);
+    if (!fflush(stdout) && !ferror(stdout))
+        exit(EXIT_SUCCESS);
+    fprintf(stderr, "%s: cannot write standard output\n", program);
+    exit(EXIT_UNWRITTEN);
 }
 
 /* --- parsing --- */
@@ -238,6 +243,20 @@ static int take_arguments(const struct base_options *options, int count, char **
     return 0;
 }
 
+/* An output that cannot be written, or that would take the place of an input, is found out before the work. */
+static int check_output(const struct base_options *options, const char *path, const void *into, struct base_err *err)
+{
+    struct stat out, in;
+    const char *const *args = (const void *)((const char *)into + options->args);
+    int rc = base_file_check_output(path, err);
+    if (rc || !path || stat(path, &out))
+        return rc;
+    for (int i = 0; i < options->args_max; i++)
+        if (args[i] && args[i] != path && !stat(args[i], &in) && in.st_dev == out.st_dev && in.st_ino == out.st_ino)
+            return base_fail(err, BASE_EINVAL, "%s: this is an input, it would be overwritten", path);
+    return 0;
+}
+
 int base_options_parse(const struct base_options *options, int argc, char **argv, void *into, struct base_err *err)
 {
     struct getopt_form form;
@@ -261,5 +280,10 @@ int base_options_parse(const struct base_options *options, int argc, char **argv
     for (const struct base_option *o = options->list; !rc && (o->name || o->help); o++)
         if (o->needed && !*(const char **)(void *)((char *)into + o->to.offset))
             rc = base_fail(err, BASE_EINVAL, "--%s %s is needed (--help says more)", o->name, o->arg);
+        else if (o->output)
+            rc = check_output(options, *(const char **)(void *)((char *)into + o->to.offset), into, err);
+    if (!rc && options->args_output)
+        rc = check_output(options, ((const char **)(void *)((char *)into + options->args))[options->args_output - 1], into,
+                          err);
     return rc;
 }

@@ -42,6 +42,7 @@ struct base_option {
      * before it. Out of memory is passed on as it is. */
     int (*set)(void *into, const char *value, struct base_err *err);
     int needed, hidden;     /* needed: text only; without it the command line is refused */
+    int output;             /* text: a file to be written, refused when it cannot be or is an argument */
 };
 
 struct base_options {
@@ -50,6 +51,7 @@ struct base_options {
     const struct base_option *list; /* ends with {0} */
     int args_min, args_max; /* arguments that are no options */
     size_t args;            /* offset of their const char *[args_max], borrowed from argv */
+    int args_output;        /* which of them, from 1, names a file to be written; 0: none */
     size_t arg_count;       /* offset of an int that gets their number; 0: nobody asks */
 };
 

@@ -157,6 +157,7 @@ static int get_all(const char *path, const cJSON *root, struct seq_manifest *m, 
     get_text(root, "camera", m->camera, sizeof m->camera);
     get_text(root, "renderer", m->renderer, sizeof m->renderer);
     get_crc(root, "source_crc32", &m->source_crc32);
+    get_crc(root, "inputs_crc32", &m->inputs_crc32);
     if (m->scene[0] == '\0')
         return base_fail(err, BASE_EINVAL, "%s: the scene has no name", path);
     int rc = get_sizes(path, root, m, err);
@@ -237,6 +238,8 @@ static void put_all(cJSON *root, const struct seq_manifest *m, int *failed)
     base_json_text(root, "source", m->source, failed);
     if (m->source_crc32)
         put_crc(root, "source_crc32", m->source_crc32, failed);
+    if (m->inputs_crc32)
+        put_crc(root, "inputs_crc32", m->inputs_crc32, failed);
     base_json_text(root, "camera", m->camera, failed);
     put_view(root, m, failed);
     base_json_text(root, "renderer", m->renderer, failed);
@@ -277,6 +280,7 @@ const char *seq_manifest_difference(const struct seq_manifest *a, const struct s
     } members[] = {
         {"scene", !strcmp(a->scene, b->scene)},
         {"source_crc32", a->source_crc32 == b->source_crc32},
+        {"inputs_crc32", !a->inputs_crc32 || !b->inputs_crc32 || a->inputs_crc32 == b->inputs_crc32},
         {"camera", !strcmp(a->camera, b->camera)},
         {"look_at", a->has_look_at == b->has_look_at && !memcmp(a->look_at, b->look_at, sizeof a->look_at)},
         {"fov", a->fov_deg == b->fov_deg},

@@ -289,7 +289,7 @@ static void differences(void **state)
 {
     (void)state;
     uint32_t levels[] = {20, 40}, other[] = {20, 41};
-    const struct seq_manifest m = {.scene = "s", .source = "a/s.pbrt", .source_crc32 = 7, .camera = "view0", .renderer = "r",
+    const struct seq_manifest m = {.scene = "s", .source = "a/s.pbrt", .source_crc32 = 7, .inputs_crc32 = 8, .camera = "view0", .renderer = "r",
                                    .has_look_at = 1, .look_at = {0.1, 2, 3, 4, 5, 6, 7, 8, 1.0 / 3}, .fov_deg = 33.3, .width = 64,
                                    .height = 48, .block = 16, .seed = 1, .reference_seed = 2, .reference_spp = 9,
                                    .reference_independent = 1, .n_levels = 2, .levels = levels};
@@ -302,12 +302,15 @@ static void differences(void **state)
     struct seq_manifest n = m;
     strcpy(n.source, "b/s.pbrt");
     assert_null(seq_manifest_difference(&m, &n));
+    n.inputs_crc32 = 0; /* recorded before it was noted */
+    assert_null(seq_manifest_difference(&m, &n));
 #define DIFFERS(change, member) \
     n = m;                      \
     change;                     \
     assert_string_equal(seq_manifest_difference(&m, &n), member)
     DIFFERS(n.scene[0] = 't', "scene");
     DIFFERS(n.source_crc32++, "source_crc32");
+    DIFFERS(n.inputs_crc32++, "inputs_crc32");
     DIFFERS(n.camera[4] = '1', "camera");
     DIFFERS(n.look_at[8] = 0, "look_at");
     DIFFERS(n.has_look_at = 0, "look_at");

@@ -43,7 +43,7 @@ struct fixture {
 static void open_files(struct fixture *x, struct files *files)
 {
     memset(x, 0, sizeof *x);
-    x->source = (struct pt_source){read_files, files, 0};
+    x->source = (struct pt_source){read_files, NULL, files, 0};
     x->diag.err = &x->err;
     x->lexer = (struct pt_lexer){.source = &x->source, .diag = &x->diag, .arena = &x->arena};
     assert_int_equal(pt_lexer_include(&x->lexer, files->names[0], (struct pt_loc){0}, 0), 0);

@@ -20,6 +20,8 @@ static void packed_files(void **state)
     char folder[] = "/tmp/pt_source_XXXXXX", path[64], *text = malloc(SIZE), *bytes = NULL;
     size_t size = 0;
     struct base_err err = {0};
+    struct base_inputs inputs = BASE_INPUTS_EMPTY;
+    const struct pt_source files = pt_source_files(&inputs);
     assert_true(mkdtemp(folder) && text);
     snprintf(path, sizeof path, "%s/a.gz", folder);
     for (int i = 0; i < SIZE; i++)
@@ -28,14 +30,17 @@ static void packed_files(void **state)
     assert_non_null(gz);
     assert_int_equal(gzwrite(gz, text, SIZE), SIZE);
     assert_int_equal(gzclose(gz), Z_OK);
-    assert_int_equal(pt_source_files.read(NULL, path, &bytes, &size, &err), 0);
+    assert_int_equal(files.read(files.data, path, &bytes, &size, &err), 0);
     assert_int_equal(size, SIZE);
     assert_memory_equal(bytes, text, SIZE);
     assert_int_equal(bytes[size], 0);
     free(bytes);
     assert_int_equal(truncate(path, 4096), 0);
-    assert_int_equal(pt_source_files.read(NULL, path, &bytes, &size, &err), BASE_EINVAL);
+    assert_int_equal(files.read(files.data, path, &bytes, &size, &err), BASE_EINVAL);
     assert_null(strchr(err.text, '\n'));
+    assert_int_equal(inputs.count, 1);
+    assert_string_equal(inputs.paths[0], path);
+    base_inputs_release(&inputs);
     unlink(path);
     rmdir(folder);
     free(text);
@@ -47,8 +52,9 @@ static void what_is_no_file(void **state)
     char *bytes = NULL;
     size_t size = 0;
     struct base_err err = {0};
-    assert_int_equal(pt_source_files.read(NULL, "/nonexistent", &bytes, &size, &err), BASE_EIO);
-    assert_int_equal(pt_source_files.read(NULL, "/tmp", &bytes, &size, &err), BASE_EINVAL);
+    const struct pt_source files = pt_source_files(NULL);
+    assert_int_equal(files.read(files.data, "/nonexistent", &bytes, &size, &err), BASE_EIO);
+    assert_int_equal(files.read(files.data, "/tmp", &bytes, &size, &err), BASE_EINVAL);
     assert_null(bytes);
 }
 

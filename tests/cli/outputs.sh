@@ -1,0 +1,149 @@
+#!/bin/sh
+# What is written: known before the work whether it can be, never onto an input or a device, and nothing stays behind.
+set -u
+here=$(cd "$(dirname "$0")" && pwd)
+bin=$(cd "${BUILD:-build}" && pwd)/bin
+P=$bin/pathtracer ggn=$bin/ggn
+data=$here/../data/train-demo
+dir=$(mktemp -d) || exit 2
+trap 'rm -rf "$dir"' EXIT
+cp "$here/room.pbrt" "$dir" && cp "$here/../../scenes/textures/bricks.png" "$dir/a.png" && cd "$dir" || exit 2
+unset LULL_PLUGIN_PATH
+n=0 bad=0
+
+t() { # t DESCRIPTION COMMAND...: passes when the command succeeds
+    n=$((n + 1)); what=$1; shift
+    if "$@" >log 2>&1; then echo "ok $n - $what"; else echo "not ok $n - $what"; sed 's/^/# /' log; bad=1; fi
+}
+sums() { find . -type f ! -name log ! -name out ! -name err -exec cksum {} + | sort; }
+refused() { # refused TEXT COMMAND...: at once, exit status 2, one line on stderr that contains TEXT, no file made or changed
+    n=$((n + 1)); text=$1; shift
+    before=$(sums)
+    timeout -k 1 10 "$@" >out 2>err </dev/null; status=$?
+    if [ $status -eq 2 ] && [ "$(wc -l <err)" -eq 1 ] && grep -qF -- "$text" err && [ "$before" = "$(sums)" ]; then
+        echo "ok $n - refused: $*"
+    else echo "not ok $n - refused: $* (status $status)"; sed 's/^/# /' err; bad=1; fi
+}
+# More than ten seconds of work: a refusal comes before it.
+long="$P room.pbrt -q -c null --spp-min 100000000 --spp-max 100000000"
+train="$ggn train -d $data --crop 32 --batch 64 --steps-denoiser 100000 -q --out"
+
+# --- what cannot be written is known before the work ---
+name=$(printf 'n%.0s' $(seq 1 260))
+mkdir folder folder.exr folder.png folder.json folder.csv folder.ggn
+for kind in "-o exr" "--preview png" "--report json" "--stop-map csv" "--stop-map png" "--checkpoint ggn"; do
+    option=${kind% *} ending=${kind#* }
+    for path in folder nowhere/a room.pbrt/a; do
+        refused "cannot write there" $long $option "$path.$ending"
+    done
+    refused "the path is too long" $long $option "$name.$ending"
+done
+refused "not the name of a file" $long --checkpoint folder/
+refused "cannot write there" $train folder.ggn
+refused "cannot write there" $train nowhere/a.ggn
+refused "the path is too long" $train "$name.ggn"
+refused "the path is too long" $train "$(printf 'n%.0s' $(seq 1 250))" # what lies beside it has longer names
+refused "cannot write there" "$ggn" flip a.png a.png -o folder.png
+refused "cannot write there" "$ggn" reconstruct "$data/scene0" -o nowhere/a.png
+refused "cannot write there" "$ggn" reconstruct "$data/scene0" -o b.png -r nowhere/a.png
+
+# --- never onto an input ---
+ln -s room.pbrt room.ckp
+ln room.pbrt other.ckp
+refused "this is an input" $long --checkpoint room.pbrt
+refused "this is an input" $long --checkpoint room.ckp
+refused "this is an input" $long --checkpoint other.ckp
+sed 's/^WorldBegin/&\nTexture "t" "spectrum" "imagemap" "string filename" "a.png"\nMaterial "diffuse" "texture reflectance" "t"/' \
+    room.pbrt >textured.pbrt
+refused "this is an input" "$P" textured.pbrt -q --spp 1 --preview a.png
+refused "this is an input" "$ggn" flip a.png a.png -o a.png
+cp "$here/../../ggn/models/lull-1.ggn" m.ggn
+refused "this is an input" "$ggn" convert m.ggn m.ggn
+refused "this is an input" "$ggn" convert m.ggn ./folder/../m.ggn
+cp -r "$data" data
+refused "inside its data" "$ggn" train -d data --crop 32 --out data/a.ggn
+refused "inside its data" "$ggn" train -d data --crop 32 --out data/scene0/../a.ggn
+
+# --- devices stay, links are followed ---
+mkfifo pipe.ggn
+ln -s /dev/null null.exr
+refused "no regular file" "$ggn" convert m.ggn /dev/null
+refused "no regular file" "$ggn" convert m.ggn pipe.ggn
+refused "no regular file" $long -o null.exr
+refused "no regular file" $long --checkpoint /dev/full
+t "/dev/null is what it was" test -c /dev/null -a -c /dev/full -a -p pipe.ggn -a -L null.exr
+mkdir far && echo old >far/there.csv && ln -s far/there.csv link.csv && ln -s far/none.png dangling.png && ln -s far/e.exr e.exr
+t "outputs through links" "$P" room.pbrt -q --spp 1 --stop-map link.csv --preview dangling.png -o e.exr
+t "  …are followed" sh -c "test -L link.csv -a -L dangling.png -a -L e.exr && grep -q '^room;1;' far/there.csv && oiiotool --info far/none.png far/e.exr"
+
+# --- a folder that goes away while the image is made ---
+wait_for() { until [ -s "$1" ] || ! kill -0 "$2"; do sleep 0.1; done; } # its progress: from here on it listens
+mkdir away
+TMPDIR=$dir "$P" room.pbrt -c null --spp-min 100000000 --spp-max 100000000 --checkpoint away/c.ckp --checkpoint-every 0.1 \
+    -o away/a.exr --report r.json 2>away.err &
+pid=$!
+wait_for away.err $pid
+rm -r away
+until grep -q 'the render goes on' away.err || ! kill -0 $pid; do sleep 0.1; done
+t "a checkpoint that fails on the way is a warning" kill -TERM $pid
+wait $pid
+status=$?
+t "  …SIGTERM ends the render, the lost output is an error" test $status -eq 2
+t "  …that says where the image is" sh -c "grep -q 'away/.*; kept as $dir/lull-$pid-a.exr' away.err && oiiotool --info lull-$pid-a.exr"
+t "  …and the report is there" grep -q '"interrupted":[[:space:]]*true' r.json
+"$P" room.pbrt -c null --spp-min 100000000 --spp-max 100000000 -o term.exr 2>term.err &
+pid=$!
+wait_for term.err $pid
+kill -TERM $pid
+wait $pid
+t "SIGTERM is SIGINT: exit status 130" test $? -eq 130 -a -s term.exr
+
+# --- one folder, one process ---
+record="$P room.pbrt --block 16 --levels linear:1000:1000000:1000 --sequence seq"
+$record --blocks 0-5 2>record.err &
+pid=$!
+until [ -e seq/manifest.json ] || ! kill -0 $pid; do sleep 0.1; done
+refused "seq: process $pid is writing there" $record -q --blocks 6-11
+kill -KILL $pid
+wait $pid 2>/dev/null
+t "after a kill the folder is free" "$P" room.pbrt -q --block 16 --levels linear:20:40:20 --sequence free --blocks 0
+: >free/.lock
+t "  …a lock left behind is none" "$P" room.pbrt -q --block 16 --levels linear:20:40:20 --sequence free --blocks 0-1
+t "  …and goes" test "$(ls -A free | tr '\n' ' ')" = "block-00000.lseq block-00001.lseq manifest.json "
+
+# --- what a killed run leaves, the next one removes ---
+mkdir kill && cd kill || exit 2
+(exec sleep 300) & stranger=$!
+: >.tmp-lull$stranger-0.room.exr      # its process lives
+: >.tmp-lull4194303-0.room.exr        # nobody's: above every process id
+: >.tmp-lull4194303-1.room.png.gp
+: >.tmp-lull4194303-2.locked
+: >.tmp4194303.foreign
+flock .tmp-lull4194303-2.locked sleep 300 & locker=$!
+until ! flock -n .tmp-lull4194303-2.locked true; do sleep 0.1; done
+t "a run beside leftovers" "$P" ../room.pbrt -q --spp 1 -o a.exr
+t "  …removes them" test "$(ls -A | wc -l)" -eq 5 # with the log
+t "  …but not what is in use, or not its own" test -e .tmp-lull4194303-2.locked -a -e .tmp-lull$stranger-0.room.exr -a -e .tmp4194303.foreign
+kill $stranger $locker
+cd ..
+
+# --- a full standard output ---
+if [ -c /dev/full ]; then
+    full() { n=$((n + 1)); "$@" >/dev/full 2>err; status=$?
+        if [ $status -eq 2 ] && [ "$(wc -l <err)" -eq 1 ]; then echo "ok $n - full: $*"
+        else echo "not ok $n - full: $* (status $status)"; sed 's/^/# /' err; bad=1; fi; }
+    full "$ggn" flip a.png a.png
+    full "$ggn" inspect m.ggn
+    full "$ggn" --help
+    full "$ggn" flip --help
+
+    full "$P" --help
+    full "$P" --version
+    full "$P" --list-criteria
+    full "$P" room.pbrt -q --debug-path 3,3,0
+    full "$bin/lull-check" --list
+    full "$bin/lull-check" --version
+fi
+
+echo "1..$n"
+exit $bad
