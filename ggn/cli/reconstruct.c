@@ -124,10 +124,18 @@ static int build(const struct options *o, const struct seq_manifest *m, const st
 static int report(const struct options *o, const struct seq_manifest *m, const struct picture *p, struct base_err *err)
 {
     struct ggn_flip_stats flip;
+    double mean_spp = p->samples / p->blocks;
+    if (!m->reference_spp) { /* nothing to compare with */
+        if (o->json)
+            printf("{\"blocks\": %d, \"mean_spp\": %.2f, \"beyond_last_level\": %d}\n", p->blocks, mean_spp, p->beyond);
+        else
+            printf("%d blocks, %.1f samples per pixel on average; no reference to compare with%s\n", p->blocks, mean_spp,
+                   p->beyond > 0 ? "; some stops lie beyond the last level" : "");
+        return 0;
+    }
     int rc = ggn_flip(p->reference, p->taken, (int)m->width, (int)m->height, GGN_FLIP_PPD, NULL, &flip, err);
     if (rc)
         return rc;
-    double mean_spp = p->samples / p->blocks;
     if (o->json)
         printf("{\"blocks\": %d, \"mean_spp\": %.2f, \"flip_mean\": %.6f, \"flip_max\": %.6f, \"worst_block\": %u, "
                "\"worst_block_flip\": %.6f, "
@@ -170,6 +178,8 @@ int ggn_cmd_reconstruct(int argc, char **argv)
             rc = base_fail(&err, BASE_EINVAL, "%s: %s", o.stops,
                            o.view ? "no such view" : "several views: --view NAME chooses one");
     }
+    if (!rc && o.reference && !m.reference_spp)
+        rc = base_fail(&err, BASE_EINVAL, "%s: it was recorded without a reference", o.dir);
     if (!rc)
         rc = build(&o, &m, view, &labels, &p, &err);
     if (!rc)

@@ -111,6 +111,12 @@ t "after a kill the folder is free" "$P" room.pbrt -q --block 16 --levels linear
 t "  …a lock left behind is none" "$P" room.pbrt -q --block 16 --levels linear:20:40:20 --sequence free --blocks 0-1
 t "  …and goes" test "$(ls -A free | tr '\n' ' ')" = "block-00000.lseq block-00001.lseq manifest.json "
 
+# --- without a reference there is nothing to compare with ---
+echo 'room;20;40;' >stops.csv
+"$ggn" reconstruct free -s stops.csv -o built.png >built.txt 2>&1
+t "reconstruct without a reference prints no FLIP" sh -c "grep -q 'no reference' built.txt && ! grep -q FLIP built.txt"
+refused "without a reference" "$ggn" reconstruct free -s stops.csv -o built2.png -r reference.png
+
 # --- what a killed run leaves, the next one removes ---
 mkdir kill && cd kill || exit 2
 (exec sleep 300) & stranger=$!

@@ -195,7 +195,8 @@ head -c 5000 c.ckp >short.ckp
 refused "damaged or cut off" $long --checkpoint short.ckp --resume
 cp c.ckp flip.ckp && printf 'X' | dd of=flip.ckp bs=1 seek=3000 conv=notrunc 2>/dev/null
 refused "damaged or cut off" $long --checkpoint flip.ckp --resume
-refused "not a checkpoint" $long --checkpoint "$scene" --resume
+cp "$scene" none-such.ckp
+refused "not a checkpoint" $long --checkpoint none-such.ckp --resume
 refused "No such file" $long --checkpoint none.ckp --resume
 
 # --- the shipped network, when it is there: its history goes through the checkpoint ---

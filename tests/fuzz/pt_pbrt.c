@@ -57,7 +57,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     static const struct pt_load_options options;
     struct input in = {data, size};
-    struct pt_source source = {read_memory, &in, 0};
+    struct pt_source source = {read_memory, NULL, &in, 0};
     struct pt_scene_defaults defaults = {0};
     struct base_err err = {0};
     struct pt_scene *scene = calloc(1, sizeof *scene);
