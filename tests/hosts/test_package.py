@@ -201,6 +201,19 @@ def test_same_stops_as_pathtracer():
         assert Path(tmp("own.csv")).read_text() == Path(tmp("pt.csv")).read_text()
 
 
+def test_mask_of_pathtracer():
+    """a mask does in the driver what --mask does in the path tracer"""
+    mask = np.zeros((80, 96))
+    mask[7, 50], mask[60, 3] = 1, .4
+    png.write(tmp("mask.png"), np.dstack([(255 * mask).round().astype(np.uint8)] * 3))
+    subprocess.run([PATHTRACER, "scenes/cornell-box.pbrt", "-q", "--size", "96x80", "--block", "48", "-c", "halfbuf", "-p",
+                    "threshold=.03", "--mask", tmp("mask.png"), "--stop-map", tmp("mask.csv")], check=True)
+    wanted = [int(v) for v in Path(tmp("mask.csv")).read_text().split(";")[1:5]]
+    f = lull.Frame(lull.load("halfbuf", threshold=.03), 96, 80, block=48, mask=png.read_grey(tmp("mask.png")))
+    assert Playback(f, PATHTRACER, "scenes/cornell-box.pbrt", []).run().outcome == "done"
+    assert [b.spp for b in f.blocks] == wanted and wanted[1] > 2 * wanted[0], wanted
+
+
 def test_stop_map():
     """the stop map is the path tracer's, pixel by pixel"""
     subprocess.run([PATHTRACER, "scenes/cornell-box.pbrt", "-q", "--size", "300x180", "--block", "60", "-c", "halfbuf",
