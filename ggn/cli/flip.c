@@ -17,7 +17,8 @@ struct options {
 #define TO(member) BASE_TO(struct options, member)
 static const struct base_option list[] = {
     {"json", 'j', NULL, TO(json), .help = "print {\"mean\": …, \"max\": …}"},
-    {"output", 'o', "MAP.png", TO(map_path), .output = 1, .help = "write the error map as a picture (magma, black 0 … white 1)"},
+    {"output", 'o', "MAP.png", TO(map_path), .output = 1,
+     .help = "write the error map as a picture (magma, black 0 … white 1)"},
     {"ppd", 'p', "N", TO(ppd), 1, 1000, .help = "pixels per degree of the viewer (67.02)"},
     {0}};
 
