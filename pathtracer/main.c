@@ -193,14 +193,12 @@ static int file_crc(const char *path, uint32_t *crc, struct base_err *err)
 /* Everything that decides the bytes of the image, and nothing else. A criterion's model is in its saved state. */
 static int describe_settings(struct session *s, const struct pt_render_config *c, struct base_err *err)
 {
-    uint32_t scene_crc = 0, mask_crc = 0, plugin_crc = 0;
+    uint32_t scene_crc = 0, judging_crc = 0;
     if (!s->cli.checkpoint)
         return 0;
     int rc = base_inputs_crc32(&s->scene_files, &scene_crc, err);
-    if (!rc && s->cli.mask)
-        rc = file_crc(s->cli.mask, &mask_crc, err);
     if (!rc)
-        rc = base_inputs_crc32(&s->judging, &plugin_crc, err);
+        rc = base_inputs_crc32(&s->judging, &judging_crc, err);
     if (rc)
         return rc;
     const struct pt_integrator *i = &c->integrator;
@@ -210,9 +208,8 @@ static int describe_settings(struct session *s, const struct pt_render_config *c
         "aov=%u\nseed=%u\nsampler=%d\nintegrator=%d\nfilter=%d:%gx%g:%g\nmax-depth=%d\nrr-depth=%d\nclamp=%g\n",
         scene_crc, c->width, c->height, c->crop[0], c->crop[1], c->crop[2], c->crop[3], c->block_width, c->block_height,
         (unsigned long long)c->spp_min, (unsigned long long)c->spp_max, c->uniform, c->max_seam, c->planes, i->seed,
-        i->sampler,
-        i->strategy, i->filter, (double)i->filter_x, (double)i->filter_y, (double)i->filter_sigma, i->max_depth, i->rr_depth,
-        (double)i->max_component);
+        i->sampler, i->strategy, i->filter, (double)i->filter_x, (double)i->filter_y, (double)i->filter_sigma, i->max_depth,
+        i->rr_depth, (double)i->max_component);
     const struct pt_view *view = &s->cli.view;
     used += (size_t)snprintf(s->settings + used, room - used, "fov=%.17g\nlook-at=", view->fov_deg);
     for (int k = 0; view->has_look_at && k < 9; k++)
@@ -220,10 +217,8 @@ static int describe_settings(struct session *s, const struct pt_render_config *c
     const struct lull_criterion *t = s->criterion ? s->criterion->table : NULL;
     used += (size_t)snprintf(s->settings + used, room - used, "\ncriterion=%s %s\n", t ? t->id : "none",
                              t ? t->version : "");
-    if (s->cli.mask && used < room)
-        used += (size_t)snprintf(s->settings + used, room - used, "mask-crc=%08x\n", mask_crc);
     if (used < room)
-        used += (size_t)snprintf(s->settings + used, room - used, "plugin-crc=%08x\n", plugin_crc);
+        used += (size_t)snprintf(s->settings + used, room - used, "plugin-and-mask-crc=%08x\n", judging_crc);
     for (uint32_t k = 0; k < s->cli.param_count && used < room; k++)
         used += (size_t)snprintf(s->settings + used, room - used, "param=%s=%s\n", s->cli.params[k].key,
                                  s->cli.params[k].value);

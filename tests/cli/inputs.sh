@@ -53,7 +53,7 @@ for file in whole.pbrt part.pbrt mesh.ply a.png; do
     cp kept "$file"
 done
 printf 'x' >>plugins/mine.so # behind the end: the same criterion, another file
-refused "made with plugin-crc" $begin --resume
+refused "made with plugin-and-mask-crc" $begin --resume
 cp "$bin/../lib/lull/null.so" plugins/mine.so
 t "  …and goes on when all is as it was" $begin --resume
 model=$here/../../ggn/models/lull-1.ggn
