@@ -19,6 +19,7 @@
     X(inspect, "print what a model file holds") \
     X(convert, "store a model's weights in another type") \
     X(flip, "visible difference of two images (LDR-FLIP)") \
+    X(visible, "where the noise of an image is still seen, against a reference") \
     X(compare, "stop maps or thresholds against (human) thresholds") \
     X(import_sin3d, "SIN3D images into block sequences") \
     X(label, "thresholds for recorded sequences: human, or a model observer's") \

@@ -61,7 +61,7 @@ static double visible(struct planes *p, float factor)
 {
     for (size_t i = 0; i < p->pixels; i++)
         p->lightness[0][i] = factor * (p->lightness[0][i] - p->lightness[1][i]);
-    return ggn_visible_noise(p->lightness[0], (int)p->block->width, (int)p->block->height, p->scratch);
+    return ggn_visible_noise(p->lightness[0], (int)p->block->width, (int)p->block->height, p->scratch, NULL);
 }
 
 static double texture(struct planes *p)

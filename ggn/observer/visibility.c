@@ -64,7 +64,7 @@ static void extend(double *column, int width)
     }
 }
 
-double ggn_visible_noise(const float *noise, int width, int height, double *scratch)
+double ggn_visible_noise(const float *noise, int width, int height, double *scratch, float *blurred)
 {
     double *column = scratch, *fourth = scratch + width + 2 * RADIUS, sum = 0.0;
     memset(fourth, 0, (size_t)width * sizeof *fourth);
@@ -80,6 +80,8 @@ double ggn_visible_noise(const float *noise, int width, int height, double *scra
             const double *c = column + x;
             double seen = blur[2] * (c[0] + c[4]) + blur[1] * (c[1] + c[3]) + blur[0] * c[2];
             fourth[x] += seen * seen * seen * seen;
+            if (blurred)
+                blurred[(size_t)y * (size_t)width + (size_t)x] = (float)seen;
         }
     }
     for (int x = 0; x < width; x++)

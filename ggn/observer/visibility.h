@@ -21,8 +21,8 @@ void ggn_visible_lightness(const float *rgb, size_t n, float *lightness);
 
 /* Doubles of scratch memory for blocks of this width. */
 size_t ggn_visibility_scratch(int width);
-/* noise: [height][width]. */
-double ggn_visible_noise(const float *noise, int width, int height, double *scratch);
+/* noise: [height][width]. blurred: the same, what is left of it after the blur; or NULL. */
+double ggn_visible_noise(const float *noise, int width, int height, double *scratch, float *blurred);
 /* a, b: [height][width]. */
 double ggn_visible_texture(const float *a, const float *b, int width, int height, double *scratch);
 

@@ -102,7 +102,7 @@ static double error_of(const struct lull_instance *in, const struct lull_block *
     double texture = ggn_visible_texture(w->lightness[0], w->lightness[1], width, height, w->scratch);
     for (size_t i = 0; i < pixels; i++)
         w->lightness[0][i] = split * (w->lightness[0][i] - w->lightness[1][i]);
-    double noise = ggn_visible_noise(w->lightness[0], width, height, w->scratch);
+    double noise = ggn_visible_noise(w->lightness[0], width, height, w->scratch, NULL);
     return ggn_observer_error(&in->observer, noise, texture, pixels);
 }
 

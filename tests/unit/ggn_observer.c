@@ -16,6 +16,7 @@
 #include "support/ggn_noise.h"
 
 #include "observer/calibrate.h"
+#include "observer/remaining.h"
 #include "observer/views.h"
 #include "observer/trials.h"
 #include "observer/visibility.h"
@@ -100,6 +101,53 @@ static double naive_texture(const float *a, const float *b, int w, int h)
     return sum / (w * h);
 }
 
+/* L* of an 8-bit sRGB colour, by the definitions of sRGB and CIE. */
+static float lightness_of_codes(const uint8_t *rgb)
+{
+    static const double weight[] = {0.2126, 0.7152, 0.0722};
+    double y = 0.0;
+    for (int c = 0; c < 3; c++) {
+        double v = rgb[c] / 255.0;
+        y += weight[c] * (v <= 0.04045 ? v / 12.92 : pow((v + 0.055) / 1.055, 2.4));
+    }
+    return (float)(y > 216.0 / 24389.0 ? 116.0 * cbrt(y) - 16.0 : y * 24389.0 / 27.0);
+}
+
+/* Images against references: blocks of 32 of 75x50 pixels, the last ones smaller. */
+static void remaining_noise(void **state)
+{
+    (void)state;
+    enum { WIDTH = 75, HEIGHT = 50, BLOCK = 32, COUNT = 6 };
+    static uint8_t codes[2][HEIGHT * WIDTH * 3];
+    static float map[HEIGHT * WIDTH], ours[BLOCK * BLOCK], theirs[BLOCK * BLOCK], noise[BLOCK * BLOCK];
+    struct ggn_remaining blocks[COUNT];
+    struct base_err err = {0};
+    for (int i = 0; i < HEIGHT * WIDTH * 3; i++) {
+        codes[0][i] = (uint8_t)(120 + 100 * sin(0.1 * (i % (3 * WIDTH))));
+        codes[1][i] = (uint8_t)(codes[0][i] + (i % 41 == 0 && i > 3 * WIDTH * BLOCK ? 30 : 0));
+    }
+    struct ggn_image8 reference = {WIDTH, HEIGHT, codes[0]}, image = {WIDTH, HEIGHT, codes[1]};
+    assert_int_equal(ggn_remaining_count(WIDTH, HEIGHT, BLOCK), COUNT);
+    assert_int_equal(ggn_remaining(&ggn_observer_default, &reference, &image, BLOCK, blocks, map, &err), 0);
+    for (int k = 0; k < COUNT; k++) {
+        const struct ggn_remaining *b = blocks + k;
+        int x0 = k % 3 * BLOCK, y0 = k / 3 * BLOCK, w = k % 3 == 2 ? 11 : BLOCK, h = k / 3 ? 18 : BLOCK;
+        double fourth = 0.0;
+        assert_true(b->x == x0 && b->y == y0 && b->width == w && b->height == h);
+        for (int i = 0; i < w * h; i++) {
+            int p = (y0 + i / w) * WIDTH + x0 + i % w;
+            ours[i] = lightness_of_codes(codes[1] + 3 * p);
+            theirs[i] = lightness_of_codes(codes[0] + 3 * p);
+            noise[i] = ours[i] - theirs[i];
+            fourth += pow((double)map[p], 4.0) / (w * h);
+        }
+        double limit = ggn_observer_limit(&ggn_observer_default, naive_texture(theirs, theirs, w, h));
+        assert_near(b->error, naive_noise(noise, w, h) / limit, 1e-4);
+        assert_near(pow(fourth, 0.25), b->error, 1e-4);
+        assert_true(k < 3 ? b->error == 0.0 : b->error > 0.1);
+    }
+}
+
 static void kernel(void **state)
 {
     (void)state;
@@ -115,13 +163,13 @@ static void kernel(void **state)
             noise[i] = (a[i] - b[i]) / 2;
         }
         double expected = naive_noise(noise, w, h);
-        assert_near(ggn_visible_noise(noise, w, h, scratch) / expected, 1.0, 1e-6);
+        assert_near(ggn_visible_noise(noise, w, h, scratch, NULL) / expected, 1.0, 1e-6);
         assert_near(ggn_visible_texture(a, b, w, h, scratch), naive_texture(a, b, w, h), 1e-9);
     }
     /* a bright pixel in a quiet block counts */
     memset(noise, 0, sizeof noise);
     noise[20 * W + 24] = 60.0f;
-    assert_true(ggn_visible_noise(noise, W, H, scratch) > 1.0);
+    assert_true(ggn_visible_noise(noise, W, H, scratch, NULL) > 1.0);
     /* a constant picture has neither */
     for (int i = 0; i < P; i++)
         a[i] = 95.0f;
@@ -398,6 +446,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(lightness),       cmocka_unit_test(kernel),
+        cmocka_unit_test(remaining_noise),
         cmocka_unit_test(apart),           cmocka_unit_test(people),
         cmocka_unit_test(thresholds),      cmocka_unit_test(scaling),
         cmocka_unit_test(noisy_reference), cmocka_unit_test(beyond_the_last_level),

@@ -1,0 +1,28 @@
+/*
+ * How visible the noise is that remains in an image, block by block, against a reference of the same view.
+ *
+ * The noise of a block is the difference of its lightness to the reference's (CIE L* of the 8-bit display images), its
+ * texture the reference's own; the rest is the observer's (observer/visibility.h). What noise the reference has itself
+ * counts as the image's: with k times the samples it adds a factor of sqrt(1 + 1/k). Thread-safe.
+ */
+#ifndef GGN_OBSERVER_REMAINING_H
+#define GGN_OBSERVER_REMAINING_H
+
+#include "base/err.h"
+#include "data/image.h"
+#include "observer/observer.h"
+
+struct ggn_remaining {
+    int x, y, width, height; /* pixels; from the top left corner */
+    double error;            /* visible noise over the limit: 1 is just not seen, 2 twice that */
+};
+
+/* Blocks of side `block` >= 1 that cover width x height pixels, row by row; those at the right and bottom may be smaller. */
+int ggn_remaining_count(int width, int height, int block);
+
+/* image and reference of equal size. blocks: [ggn_remaining_count]. map: [height][width], each pixel's blurred difference
+ * over its block's limit, or NULL. BASE_ENOMEM. */
+int ggn_remaining(const struct ggn_observer *observer, const struct ggn_image8 *reference, const struct ggn_image8 *image,
+                  int block, struct ggn_remaining *blocks, float *map, struct base_err *err);
+
+#endif
