@@ -202,7 +202,7 @@ static const struct base_option options[] = {
     {"param", 'p', "KEY=VALUE", .set = set_param, .help = "Parameter of the criterion; may be repeated"},
     {"list-criteria", 0, NULL, TO(action), PT_CLI_LIST_CRITERIA,
      .help = "List the criteria that are found and their parameters, and exit"},
-    {"spp-min", 0, "N", TO(spp_min), 1, INT32_MAX, .help = "Samples per pixel before the first check (default 32)"},
+    {"spp-min", 0, "N", TO(spp_min), 1, INT32_MAX, .help = "Samples per pixel before the first check (default 16)"},
     {"spp-max", 0, "N", TO(spp_max), 1, INT32_MAX, .help = "Samples per pixel at which every block stops (default 10000)"},
     {"spp", 0, "N", TO(spp), 1, INT32_MAX,
      .help = "The same number of samples everywhere; a criterion, if given, is asked once at the end"},
@@ -276,7 +276,7 @@ static int check_together(struct pt_cli *cli, struct base_err *err)
     if (cli->spp > 0 && has_bounds)
         return base_fail(err, BASE_EINVAL, "--spp takes the same samples everywhere: leave out --spp-min and --spp-max");
     if (!cli->spp_min)
-        cli->spp_min = 32;
+        cli->spp_min = 16;
     if (!cli->spp_max)
         cli->spp_max = 10000;
     if (cli->spp_min > cli->spp_max)

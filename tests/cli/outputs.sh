@@ -100,7 +100,7 @@ t "SIGTERM is SIGINT: exit status 130" test $? -eq 130 -a -s term.exr
 
 # --- one folder, one process ---
 record="$P room.pbrt --block 16 --levels linear:1000:1000000:1000 --sequence seq"
-$record --blocks 0-5 2>record.err &
+$record -q --blocks 0-5 &
 pid=$!
 until [ -e seq/manifest.json ] || ! kill -0 $pid; do sleep 0.1; done
 refused "seq: process $pid is writing there" $record -q --blocks 6-11
