@@ -1,0 +1,224 @@
+/* Images whose pixels have a closed form, from the text of a scene to the kernel: where things are, and what light gets through. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+
+#include <cmocka.h>
+#include <math.h>
+
+#include "integ/integrator.h"
+#include "support/pt_text_scene.h"
+
+enum { SIZE = 8, SPP = 4096 };
+
+/* One scene unit is one pixel: pixel (i, j) is x from i - 4 to i - 3 and, downwards, y from 4 - j to 3 - j. The camera looks along +z. */
+#define HEAD(filter, more)                                                                                                    \
+    "Film \"rgb\" \"integer xresolution\" 8 \"integer yresolution\" 8 PixelFilter " filter more                                 \
+    " Camera \"orthographic\" \"float screenwindow\" [ -4 4 -4 4 ] \"float shutteropen\" 0 \"float shutterclose\" 1\n"           \
+    "Integrator \"path\" \"integer maxdepth\" 1\nWorldBegin\n"
+#define BOX "\"box\" \"float xradius\" .5 \"float yradius\" .5"
+/* A rectangle in the plane z, seen from the camera's side. */
+#define QUAD "Shape \"trianglemesh\" \"integer indices\" [ 0 2 1 0 3 2 ] \"point2 uv\" [ 0 0 1 0 1 1 0 1 ] \"point3 P\" "
+#define GLOW "AreaLightSource \"diffuse\" \"rgb L\" [ 1 1 1 ] "
+#define BLACK "Material \"diffuse\" \"rgb reflectance\" [ 0 0 0 ] "
+#define WHITE "Material \"diffuse\" \"rgb reflectance\" [ 1 1 1 ] "
+
+/* Of Sobol' points, which a straight edge cuts: the discrepancy of 4096 of them is below 0.003. */
+static const double SOBOL_ERROR = 3e-3;
+/* Of decisions by chance (alpha, the time of a path): four standard errors of a share. */
+static const double CHANCE_ERROR = 4 * 0.5 / 64;
+
+typedef double expected_at(int x, int y);
+
+static double pixel_mean(const struct pt_scene *scene, const struct pt_integrator *settings, int x, int y)
+{
+    pt_kernel *kernel = pt_kernel_select(scene->effects, NULL, NULL);
+    double sum = 0.0;
+    for (uint32_t s = 0; s < SPP; s++) {
+        struct pt_path_result r;
+        kernel(scene, settings, (uint32_t)x, (uint32_t)y, s, &r);
+        sum += (double)r.radiance.y / SPP;
+    }
+    return sum;
+}
+
+/* The row and the column through the middle. */
+static void check_image(const char *text, expected_at *expected, double tolerance)
+{
+    struct pt_scene_defaults defaults;
+    struct pt_scene *scene = text_scene(text, &defaults, NULL);
+    defaults.integrator.sampler = PT_SAMPLER_SOBOL;
+    for (int i = 0; i < 2 * SIZE; i++) {
+        int x = i < SIZE ? i : 5, y = i < SIZE ? 2 : i - SIZE;
+        double got = pixel_mean(scene, &defaults.integrator, x, y), want = expected(x, y);
+        if (!(fabs(got - want) <= tolerance))
+            fail_msg("pixel %d, %d is %.5f, not %.5f: %s", x, y, got, want, text);
+    }
+    pt_scene_destroy(scene);
+}
+
+/* --- an edge under each filter ------------------------------------------------------------------------------------------ */
+
+static double box_share(double d, double r) { return fmin(1.0, fmax(0.0, 0.5 + 0.5 * d / r)); }
+
+/* Of the filter's weight, what lies below d pixels beside its centre. */
+static double triangle_share(double d, double r)
+{
+    d = fmin(r, fmax(-r, d)) / r;
+    return d < 0.0 ? 0.5 * (1.0 + d) * (1.0 + d) : 1.0 - 0.5 * (1.0 - d) * (1.0 - d);
+}
+
+static double gaussian_share(double d, double r, double sigma)
+{
+    d = fmin(r, fmax(-r, d));
+    return 0.5 + 0.5 * erf(d / (sigma * sqrt(2.0))) / erf(r / (sigma * sqrt(2.0)));
+}
+
+/* The light ends at x = 0.3, pixel 4.3 from the left, or at y = 0.6, pixel 3.4 from above. */
+static const double EDGE_X = 4.3, EDGE_Y = 3.4;
+static double box_x(int x, int y) { return (void)y, box_share(EDGE_X - x - 0.5, 0.5); }
+static double box_y(int x, int y) { return (void)x, box_share(EDGE_Y - y - 0.5, 1.0); }
+static double triangle_x(int x, int y) { return (void)y, triangle_share(EDGE_X - x - 0.5, 2.0); }
+static double triangle_y(int x, int y) { return (void)x, triangle_share(EDGE_Y - y - 0.5, 1.0); }
+static double gaussian_x(int x, int y) { return (void)y, gaussian_share(EDGE_X - x - 0.5, 1.5, 0.7); }
+static double gaussian_y(int x, int y) { return (void)x, gaussian_share(EDGE_Y - y - 0.5, 2.5, 0.7); }
+
+#define LEFT_OF_EDGE BLACK GLOW QUAD "[ -50 -50 5  .3 -50 5  .3 50 5  -50 50 5 ]"
+#define ABOVE_EDGE BLACK GLOW QUAD "[ -50 .6 5  50 .6 5  50 50 5  -50 50 5 ]"
+#define BOX_XY "\"box\" \"float xradius\" .5 \"float yradius\" 1"
+#define TRIANGLE_XY "\"triangle\" \"float xradius\" 2 \"float yradius\" 1"
+#define GAUSSIAN_XY "\"gaussian\" \"float xradius\" 1.5 \"float yradius\" 2.5 \"float sigma\" .7"
+
+static void edges(void **state)
+{
+    (void)state;
+    check_image(HEAD(BOX_XY, "") LEFT_OF_EDGE, box_x, SOBOL_ERROR);
+    check_image(HEAD(BOX_XY, "") ABOVE_EDGE, box_y, SOBOL_ERROR);
+    check_image(HEAD(TRIANGLE_XY, "") LEFT_OF_EDGE, triangle_x, SOBOL_ERROR);
+    check_image(HEAD(TRIANGLE_XY, "") ABOVE_EDGE, triangle_y, SOBOL_ERROR);
+    check_image(HEAD(GAUSSIAN_XY, "") LEFT_OF_EDGE, gaussian_x, SOBOL_ERROR);
+    check_image(HEAD(GAUSSIAN_XY, "") ABOVE_EDGE, gaussian_y, SOBOL_ERROR);
+}
+
+/* --- a texture's squares ------------------------------------------------------------------------------------------------- */
+
+/* u = (x + 4) / 8 is seen as 4u + 0.3, v = (y + 4) / 8 as 2v - 0.7: squares of 2 by 4 pixels, white where the sum of their numbers
+ * is odd. */
+static double squares(int x, int y)
+{
+    enum { FINE = 400 };
+    int odd = 0;
+    for (int j = 0; j < FINE; j++)
+        for (int i = 0; i < FINE; i++) {
+            double u = (x + (i + 0.5) / FINE) / 8.0, v = 1.0 - (y + (j + 0.5) / FINE) / 8.0;
+            odd += ((int)floor(4.0 * u + 0.3) + (int)floor(2.0 * v - 0.7)) & 1;
+        }
+    return (double)odd / (FINE * FINE);
+}
+
+/* Under a white sky a diffuse plane has its reflectance's radiance, without noise. */
+static void texture_offsets(void **state)
+{
+    (void)state;
+    check_image(HEAD(BOX, "") "LightSource \"infinite\" \"rgb L\" [ 1 1 1 ]\n"
+                "Texture \"t\" \"spectrum\" \"checkerboard\" \"float uscale\" 4 \"float udelta\" .3 \"float vscale\" 2 \"float vdelta\" -.7 "
+                "\"rgb tex1\" [ 0 0 0 ] \"rgb tex2\" [ 1 1 1 ]\n"
+                "Material \"diffuse\" \"texture reflectance\" \"t\" " QUAD "[ -4 -4 5  4 -4 5  4 4 5  -4 4 5 ]", squares, SOBOL_ERROR);
+}
+
+/* --- light that gets through --------------------------------------------------------------------------------------------- */
+
+static double glow_through(int x, int y) { return (void)y, x < 4 ? 0.7 : 1.0; }
+
+/* A black sheet of alpha 0.3 over the left half, the light behind it. */
+static void half_transparent_to_the_eye(void **state)
+{
+    (void)state;
+    check_image(HEAD(BOX, "") BLACK "AttributeBegin " GLOW QUAD "[ -50 -50 9  50 -50 9  50 50 9  -50 50 9 ] AttributeEnd\n"
+                "Shape \"trianglemesh\" \"float alpha\" .3 \"integer indices\" [ 0 2 1 0 3 2 ] "
+                "\"point3 P\" [ -50 -50 5  0 -50 5  0 50 5  -50 50 5 ]", glow_through, CHANCE_ERROR);
+}
+
+/* Parallel light along +z with the irradiance π: a white plane facing it has the radiance 1. */
+#define SUN "LightSource \"distant\" \"point3 from\" [ 0 0 0 ] \"point3 to\" [ 0 0 1 ] \"rgb L\" [ 3.14159265 3.14159265 3.14159265 ]\n"
+#define FLOOR WHITE QUAD "[ -50 -50 5  50 -50 5  50 50 5  -50 50 5 ]\n"
+
+/* The sheet is behind the camera, so only shadow rays meet it. */
+static void half_transparent_to_light(void **state)
+{
+    (void)state;
+    check_image(HEAD(BOX, "") SUN FLOOR
+                "Shape \"trianglemesh\" \"float alpha\" .3 \"integer indices\" [ 0 2 1 0 3 2 ] "
+                "\"point3 P\" [ -50 -50 -5  0 -50 -5  0 50 -5  -50 50 -5 ]", glow_through, CHANCE_ERROR);
+}
+
+/* At time t the shadow reaches from the left to x = -3 + 6t: pixel column x is lit while it has not come. */
+static double lit_share(int x, int y)
+{
+    double from = x - 4.0, mean = 0.0;
+    (void)y;
+    for (int i = 0; i < 1000; i++)
+        mean += fmin(1.0, fmax(0.0, (from + (i + 0.5) / 1000.0 + 3.0) / 6.0)) / 1000.0;
+    return mean;
+}
+
+static void moving_shadow(void **state)
+{
+    (void)state;
+    check_image(HEAD(BOX, "") SUN FLOOR BLACK
+                "ActiveTransform StartTime Translate -3 0 0 ActiveTransform EndTime Translate 3 0 0 ActiveTransform All "
+                QUAD "[ -50 -50 -5  0 -50 -5  0 50 -5  -50 50 -5 ]", lit_share, CHANCE_ERROR);
+}
+
+/* --- normals of sheared instances ---------------------------------------------------------------------------------------- */
+
+/* z' = z + x / 2 tilts the plane: its normal is (-1/2, 0, 1) whatever the matrix does to other vectors, so cos² = 4/5. The same with
+ * the normal given at the vertices. */
+static double tilted(int x, int y) { return (void)x, (void)y, sqrt(0.8); }
+
+static void sheared_instances(void **state)
+{
+    (void)state;
+    static const char *const normals[2] = {"", "\"normal N\" [ 0 0 -1  0 0 -1  0 0 -1  0 0 -1 ]"};
+    for (int i = 0; i < 2; i++) {
+        char text[1500];
+        snprintf(text, sizeof text,
+                 HEAD(BOX, "") SUN WHITE "ObjectBegin \"o\" Shape \"trianglemesh\" %s \"integer indices\" [ 0 2 1 0 3 2 ] "
+                 "\"point3 P\" [ -6 -6 0  6 -6 0  6 6 0  -6 6 0 ] ObjectEnd\n"
+                 "Translate 0 0 9 Transform [ 1 0 .5 0  0 1 0 0  0 0 1 0  0 0 9 1 ] ObjectInstance \"o\"", normals[i]);
+        check_image(text, tilted, 1e-4);
+    }
+}
+
+/* --- shadow rays reach their light --------------------------------------------------------------------------------------- */
+
+static double dark(int x, int y) { return (void)x, (void)y, 0.0; }
+
+/* A shutter a fifth of a thousandth of the way before the light keeps all of it back: from a point 100 above the floor and from a
+ * lamp there, and a sun's however far away it is. */
+static void shadows_of_what_is_close_to_the_light(void **state)
+{
+    (void)state;
+#define SHUTTER(z) BLACK QUAD "[ -50 -50 " z "  50 -50 " z "  50 50 " z "  -50 50 " z " ]\n"
+    check_image(HEAD(BOX, "") FLOOR SHUTTER("-94.98")
+                "LightSource \"point\" \"rgb I\" [ 1e4 1e4 1e4 ] \"point3 from\" [ 0 0 -95 ]", dark, 0.0);
+    check_image(HEAD(BOX, "") FLOOR SHUTTER("-94.98") BLACK "AreaLightSource \"diffuse\" \"rgb L\" [ 1e4 1e4 1e4 ] \"bool twosided\" true "
+                QUAD "[ -1 -1 -95  1 -1 -95  1 1 -95  -1 1 -95 ]", dark, 0.0);
+    check_image(HEAD(BOX, "") FLOOR SUN SHUTTER("-1e6"), dark, 0.0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(edges),
+        cmocka_unit_test(texture_offsets),
+        cmocka_unit_test(half_transparent_to_the_eye),
+        cmocka_unit_test(half_transparent_to_light),
+        cmocka_unit_test(moving_shadow),
+        cmocka_unit_test(sheared_instances),
+        cmocka_unit_test(shadows_of_what_is_close_to_the_light),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
