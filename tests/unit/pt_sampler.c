@@ -4,6 +4,7 @@
 #include <stdint.h>
 
 #include <cmocka.h>
+#include <math.h>
 
 #include "sample/sampler.h"
 
@@ -41,22 +42,86 @@ static void pairs_are_nets(void **state)
             }
 }
 
-/* Correlation of two sequences of numbers, which should be about 1/sqrt(n). */
+/* So do single numbers, of the camera and of each vertex that still has Sobol' points: one in each of 2^m intervals. */
+static void single_numbers_are_stratified(void **state)
+{
+    (void)state;
+    enum { N = 256 };
+    for (uint32_t block = 0; block < PT_SOBOL_BLOCKS; block++)
+        for (uint32_t dim = 0; dim < PT_DIMS_PER_VERTEX; dim++) {
+            unsigned char seen[N] = {0};
+            for (uint32_t i = 0; i < N; i++) {
+                struct pt_sampler s = pt_sampler_make(1, 7, 5, 3, i);
+                pt_sampler_block(&s, block);
+                seen[(int)(pt_sampler_1d(&s, dim) * N)]++;
+            }
+            for (int i = 0; i < N; i++)
+                assert_int_equal(seen[i], 1);
+        }
+}
+
+/* What a vertex and the camera draw, and how many dimensions from there. */
+static const struct {
+    uint32_t dim, width;
+} vertex_dims[] = {{PT_DIM_BSDF, 2}, {PT_DIM_LIGHT, 2}, {PT_DIM_LIGHT_PICK, 1}, {PT_DIM_BSDF_LOBE, 1}, {PT_DIM_ROULETTE, 1}, {PT_DIM_MEDIUM, 1},
+                   {PT_DIM_PHASE, 2}, {PT_DIM_ALPHA, 1}, {PT_DIM_SHADOW, 1}, {PT_DIM_MIX, 1}, {PT_DIM_BSDF_WALK, 1}},
+  camera_dims[] = {{PT_DIM_PIXEL, 2}, {PT_DIM_LENS, 2}, {PT_DIM_TIME, 1}};
+
+static void no_dimension_has_two_uses(void **state)
+{
+    (void)state;
+    int camera[PT_DIMS_PER_VERTEX] = {0}, vertex[PT_DIMS_PER_VERTEX] = {0};
+    for (size_t i = 0; i < sizeof vertex_dims / sizeof *vertex_dims; i++)
+        for (uint32_t k = 0; k < vertex_dims[i].width; k++) {
+            assert_true(vertex_dims[i].dim + k < PT_DIMS_PER_VERTEX);
+            assert_int_equal(vertex[vertex_dims[i].dim + k]++, 0);
+        }
+    for (size_t i = 0; i < sizeof camera_dims / sizeof *camera_dims; i++)
+        for (uint32_t k = 0; k < camera_dims[i].width; k++)
+            assert_int_equal(camera[camera_dims[i].dim + k]++, 0);
+}
+
+enum { N_SAMPLES = 4096, N_BLOCKS = 6, N_DIMS = 14 * N_BLOCKS };
+
+/* All numbers that the camera and five vertices draw, about 0 with variance 1; blocks beyond the third are no Sobol' points any more. */
+static int draw_all(int kind, float (*u)[N_SAMPLES])
+{
+    int n = 0;
+    for (uint32_t block = 0; block < N_BLOCKS; block++) {
+        size_t uses = block ? sizeof vertex_dims / sizeof *vertex_dims : sizeof camera_dims / sizeof *camera_dims;
+        for (size_t k = 0; k < uses; k++) {
+            uint32_t dim = block ? vertex_dims[k].dim : camera_dims[k].dim, width = block ? vertex_dims[k].width : camera_dims[k].width;
+            for (uint32_t i = 0; i < N_SAMPLES; i++) {
+                struct pt_sampler s = pt_sampler_make(kind, 1, i % 64, i / 64 % 4, i / 256);
+                pt_sampler_block(&s, block);
+                struct pt_sample2 p = width == 2 ? pt_sampler_2d(&s, dim) : (struct pt_sample2){pt_sampler_1d(&s, dim), 0.0f};
+                u[n][i] = (p.x - 0.5f) * sqrtf(12.0f);
+                if (width == 2)
+                    u[n + 1][i] = (p.y - 0.5f) * sqrtf(12.0f);
+            }
+            n += (int)width;
+        }
+    }
+    return n;
+}
+
+/* No two numbers of a path are correlated, whichever vertices they belong to: |r| beyond 6/sqrt(n) has no place among 2,500 pairs. */
 static void dimensions_are_uncorrelated(void **state)
 {
     (void)state;
-    enum { N = 4096 };
-    for (int kind = 0; kind < 2; kind++)
-        for (uint32_t a = 0; a < 8; a++)
-            for (uint32_t b = a + 1; b < 8; b++) {
-                double sum = 0.0;
-                for (uint32_t i = 0; i < N; i++) {
-                    struct pt_sampler s = pt_sampler_make(kind, 1, i % 64, i / 64, i);
-                    pt_sampler_block(&s, 1);
-                    sum += ((double)pt_sampler_1d(&s, a) - 0.5) * ((double)pt_sampler_1d(&s, b) - 0.5) * 12.0;
-                }
-                assert_true(sum / N > -5.0 / 64.0 && sum / N < 5.0 / 64.0);
+    static float u[N_DIMS][N_SAMPLES];
+    for (int kind = 0; kind < 2; kind++) {
+        int n = draw_all(kind, u);
+        assert_int_equal(n, 5 + 14 * (N_BLOCKS - 1));
+        for (int a = 0; a < n; a++)
+            for (int b = a + 1; b < n; b++) {
+                float r = 0.0f;
+                for (int i = 0; i < N_SAMPLES; i++)
+                    r += u[a][i] * u[b][i];
+                if (!(fabsf(r) < 6.0f * 64.0f))
+                    fail_msg("sampler %d: numbers %d and %d have the correlation %g", kind, a, b, (double)r / N_SAMPLES);
             }
+    }
 }
 
 static void numbers_depend_on_their_key_only(void **state)
@@ -98,7 +163,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(second_dimension_is_sobol),       cmocka_unit_test(pairs_are_nets),
-        cmocka_unit_test(dimensions_are_uncorrelated),     cmocka_unit_test(numbers_depend_on_their_key_only),
+        cmocka_unit_test(single_numbers_are_stratified), cmocka_unit_test(no_dimension_has_two_uses), cmocka_unit_test(dimensions_are_uncorrelated),     cmocka_unit_test(numbers_depend_on_their_key_only),
         cmocka_unit_test(streams_are_uniform),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
