@@ -132,12 +132,55 @@ static void non_finite_samples_are_dropped(void **state)
     pt_film_release(&film);
 }
 
+/* Most that is dropped is of one half: each half's mean is that of what it kept, and the view's sums are scaled by its own count. */
+static void halves_drop_apart(void **state)
+{
+    (void)state;
+    struct pt_film film;
+    struct pt_film_pixel p;
+    struct base_err err = {0};
+    enum { SPP = 40 };
+    double sum[3] = {0}, kept[3] = {0}, squares = 0.0, mean[3]; /* whole, half A, half B */
+    assert_int_equal(pt_film_init(&film, 3, 0, 5, 1, PT_FILM_ALL, &err), 0);
+    pt_film_load(&film, 1, &p);
+    for (uint32_t s = 0; s < SPP; s++) {
+        int half = pt_film_in_half(s) ? 1 : 2, bad = half == 1 ? (int)(s % 2) : s == 9;
+        struct pt_path_result r = sample_of(bad ? NAN : (float)s, 1.0f, 1.0f);
+        pt_film_add(&p, film.planes, s, &r);
+        for (int k = 0; !bad && k < 3; k++)
+            if (k == 0 || k == half) {
+                sum[k] += s;
+                kept[k] += 1.0;
+            }
+        squares += bad ? 0.0 : pow(base_luminance(s, 1.0, 1.0), 2.0);
+    }
+    pt_film_store(&film, 1, &p);
+    uint64_t half_spp = pt_film_half_spp(SPP);
+    assert_true(kept[1] < kept[2] && kept[1] + kept[2] == kept[0]);
+    assert_true(film.dropped[1] == SPP - kept[0] && film.dropped_half[1] == (double)half_spp - kept[1]);
+    pt_film_mean(&film, 1, SPP, mean);
+    assert_true(fabs(mean[0] - sum[0] / kept[0]) < 1e-12);
+    pt_film_half_mean(&film, 1, half_spp, mean);
+    assert_true(fabs(mean[0] - sum[1] / kept[1]) < 1e-12);
+
+    struct pt_film_patch patch = {0};
+    assert_int_equal(pt_film_patch(&film, 3, 0, 5, 1, SPP, &patch, &err), 0);
+    assert_true(fabs(film.color[3] / SPP - sum[0] / kept[0]) < 1e-12);
+    assert_true(fabs(film.half[3] / (double)half_spp - sum[1] / kept[1]) < 1e-12);
+    assert_true(fabs(film.moment2[1] / SPP - squares / kept[0]) < 1e-9);
+    assert_true(film.color[0] == 0.0 && film.half[0] == 0.0);
+    pt_film_unpatch(&film, &patch);
+    assert_true(film.color[3] == sum[0] && film.half[3] == sum[1] && fabs(film.moment2[1] - squares) < 1e-9);
+    pt_film_release(&film);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(half_is_balanced),       cmocka_unit_test(half_is_spread),
         cmocka_unit_test(planes_on_demand),       cmocka_unit_test(sums_survive_load_and_store),
         cmocka_unit_test(million_samples_of_a_constant), cmocka_unit_test(non_finite_samples_are_dropped),
+        cmocka_unit_test(halves_drop_apart),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

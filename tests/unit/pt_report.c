@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <cmocka.h>
+#include <math.h>
 
 #include <cjson/cJSON.h>
 #include <openexr.h>
@@ -35,6 +36,46 @@ static const char *in_folder(const char *name)
     return path;
 }
 
+/* Like pt_fake_nan, but every output is its own function of pixel and sample. */
+static void varied(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y, uint32_t sample,
+                   struct pt_path_result *out)
+{
+    pt_fake_nan(scene, settings, x, y, sample, out);
+    float u = (float)((x * 7 + y * 13 + sample * 29) % 64) / 64.0f;
+    out->radiance.z += u;
+    out->albedo = v3(u, 0.5f * u, 0.25f + 0.5f * u);
+    out->normal_world = v3(1.0f - u, u, -u);
+    out->depth = sample % 5 == y % 5 ? INFINITY : 1.0f + (float)x + u;
+    out->rays = 1 + (x + y + sample) % 4;
+}
+
+/* What a render of `varied` must come to, worked out from the kernel alone. */
+struct sums {
+    double radiance[3], albedo[3], normal[3], depth, hits, kept, rays;
+};
+
+static struct sums sums_of(int x, int y, uint64_t spp)
+{
+    struct sums s = {0};
+    for (uint32_t k = 0; k < spp; k++) {
+        struct pt_path_result r;
+        varied(NULL, &render->config.integrator, (uint32_t)x, (uint32_t)y, k, &r);
+        int good = v3_is_finite(r.radiance);
+        const float *from[3] = {&r.radiance.x, &r.albedo.x, &r.normal_world.x};
+        double *to[3] = {s.radiance, s.albedo, s.normal};
+        for (int i = good ? 0 : 1; i < 3; i++)
+            for (int c = 0; c < 3; c++)
+                to[i][c] += (double)from[i][c];
+        if (isfinite(r.depth)) {
+            s.depth += (double)r.depth;
+            s.hits += 1.0;
+        }
+        s.kept += good;
+        s.rays += r.rays;
+    }
+    return s;
+}
+
 static int setup(void **state)
 {
     (void)state;
@@ -47,7 +88,7 @@ static int setup(void **state)
                                    .scene_bytes = 1000};
     if (!mkdtemp(folder))
         return -1;
-    return pt_fake_render(&config, pt_fake_nan, 2, "32", &render, &criterion, &pool);
+    return pt_fake_render(&config, varied, 2, "32", &render, &criterion, &pool);
 }
 
 static int teardown(void **state)
@@ -112,20 +153,22 @@ static void exr_holds_every_layer(void **state)
     assert_string_equal(text, "alpha,motion");
     assert_int_equal(exr_attr_get_string(file, 0, "lull:block", &length, &text), EXR_ERR_SUCCESS);
     assert_string_equal(text, "16x16");
-    static const char *const names[] = {"R", "lull.spp", "lull.reason", "lull.p_noisy", "lull.error", "albedo.G", "normal.Z", "depth.Z"};
-    for (int k = 0; k < 8; k++) {
+    static const char *const names[] = {"R", "G", "B", "lull.spp", "lull.reason", "lull.p_noisy", "lull.error",
+                                        "albedo.R", "albedo.G", "albedo.B", "normal.X", "normal.Y", "normal.Z", "depth.Z"};
+    for (int k = 0; k < 14; k++) {
         read_channel(file, names[k], pixels);
-        for (int y = 5; y < 40; y++) {
+        for (int y = 5; y < 40; y++)
             for (int x = 3; x < 60; x++) {
                 const struct pt_block *b = &render->blocks.list[y / 16 * 4 + x / 16];
-                size_t i = pt_film_index(&render->film, x, y);
-                double rgb[3];
-                pt_film_mean(&render->film, i, b->spp, rgb);
-                const double expected[8] = {rgb[0], (double)(b->spp - render->film.dropped[i]), b->reason, b->p_noisy, b->error,
-                                            0.5, 1.0, 2.0};
-                assert_true(pixels[(y - 5) * 57 + x - 3] == (float)expected[k]);
+                const struct sums s = sums_of(x, y, b->spp);
+                double n = (double)b->spp;
+                const double expected[14] = {s.radiance[0] / s.kept, s.radiance[1] / s.kept, s.radiance[2] / s.kept, s.kept,
+                                             x < 16 ? PT_REASON_DROPPED : PT_REASON_CRITERION, 1.0 / b->checks, b->error, s.albedo[0] / n, s.albedo[1] / n,
+                                             s.albedo[2] / n, s.normal[0] / n, s.normal[1] / n, s.normal[2] / n, s.depth / s.hits};
+                double got = (double)pixels[(y - 5) * 57 + x - 3];
+                if (!(fabs(got - expected[k]) <= 2e-7 * fabs(expected[k]))) /* the file holds floats */
+                    fail_msg("%s of pixel %d, %d is %.9g, not %.9g", names[k], x, y, got, expected[k]);
             }
-        }
     }
     exr_finish(&file);
 }
@@ -234,44 +277,92 @@ static void stop_map_table(void **state)
 
 /* --- report and progress -------------------------------------------------------------------------------------------- */
 
-static void has_keys(const cJSON *object, const char *const *keys)
+static double number(const cJSON *o, const char *key)
 {
-    for (; *keys != NULL; keys++)
-        if (!cJSON_HasObjectItem(object, *keys))
-            fail_msg("no key %s", *keys);
+    const cJSON *item = cJSON_GetObjectItem(o, key);
+    if (!cJSON_IsNumber(item))
+        fail_msg("no number %s", key);
+    return item->valuedouble;
 }
 
-static void report_has_every_key(void **state)
+static const char *words(const cJSON *o, const char *key)
+{
+    const char *text = cJSON_GetStringValue(cJSON_GetObjectItem(o, key));
+    assert_non_null(text);
+    return text;
+}
+
+/* One block of the report against the grid (blocks are whole whatever the crop) and the kernel; adds what it holds to the totals. */
+static void check_block(const cJSON *b, int id, struct sums *all, double *samples)
+{
+    int x0 = id % 4 * 16, y0 = id / 4 * 16, x1 = x0 + 16 < 60 ? x0 + 16 : 60, y1 = y0 + 16 < 44 ? y0 + 16 : 44;
+    double spp = number(b, "spp"), red = 0.0;
+    assert_true(number(b, "id") == id && number(b, "x0") == x0 && number(b, "y0") == y0 && number(b, "x1") == x1 && number(b, "y1") == y1);
+    int at = 32 * (1 + id % 4), dropped = x0 == 0; /* those ask twice */
+    assert_true(spp >= at && spp < (dropped ? 4 : 2) * at);
+    for (int y = y0; y < y1; y++)
+        for (int x = x0; x < x1; x++) {
+            struct sums s = sums_of(x, y, (uint64_t)spp);
+            all->kept += s.kept;
+            all->rays += s.rays;
+            *samples += spp;
+            red += s.radiance[0] / s.kept / ((x1 - x0) * (y1 - y0));
+        }
+    assert_string_equal(words(b, "reason"), dropped ? "dropped" : "criterion");
+    assert_true(fabs(number(b, "error") - red) < 1e-12); /* the fake criterion's: the mean of red as it was shown */
+    assert_true(number(b, "checks") >= 1 && fabs(number(b, "p_noisy") * number(b, "checks") - 1.0) < 1e-14);
+    assert_true(number(b, "thread_s") > 0.0 && number(b, "thread_s") < 60.0);
+}
+
+static void check_totals(const cJSON *root, const struct sums *all, double samples)
+{
+    const cJSON *t = cJSON_GetObjectItem(root, "totals"), *d;
+    double threads_s = 0.0;
+    assert_true(number(t, "samples") == samples && number(t, "paths") == samples && number(t, "rays") == all->rays);
+    assert_true(number(t, "dropped_samples") == samples - all->kept && samples > all->kept);
+    assert_true(number(t, "render_s") > 0.0 && number(t, "criterion_s") > 0.0);
+    assert_true(fabs(number(t, "paths_per_s") * number(t, "render_s") / samples - 1.0) < 1e-6);
+    assert_true(fabs(number(t, "rays_per_s") * number(t, "render_s") / all->rays - 1.0) < 1e-6);
+    cJSON_ArrayForEach(d, cJSON_GetObjectItem(root, "blocks")) threads_s += number(d, "thread_s");
+    assert_true(threads_s <= 2.0 * number(t, "render_s"));
+    assert_true(cJSON_GetArraySize(cJSON_GetObjectItem(root, "dropped")) > 0);
+    cJSON_ArrayForEach(d, cJSON_GetObjectItem(root, "dropped"))
+    {
+        struct pt_path_result r;
+        varied(NULL, &render->config.integrator, (uint32_t)number(d, "x"), (uint32_t)number(d, "y"), (uint32_t)number(d, "sample"), &r);
+        assert_false(v3_is_finite(r.radiance));
+    }
+}
+
+static void report_is_what_happened(void **state)
 {
     (void)state;
-    static const char *const top[] = {"scene", "width", "height", "block", "seed", "threads", "criterion", "effects", "blocks", "totals", NULL};
-    static const char *const block[] = {"id", "x0", "y0", "x1", "y1", "spp", "reason", "p_noisy", "error", "checks", "thread_s", NULL};
-    static const char *const totals[] = {"samples", "render_s", "criterion_s", "paths", "rays", "paths_per_s", "rays_per_s", "dropped_samples", NULL};
-    static const char *const by[] = {"id", "version", "params", NULL};
     struct base_err err = {0};
+    struct sums all = {0};
+    double samples = 0.0;
     char *text;
     size_t n;
     assert_int_equal(pt_output_report(in_folder("r.json"), render, &info, &err), 0);
     assert_int_equal(base_file_read(in_folder("r.json"), 1 << 20, &text, &n, &err), 0);
     cJSON *root = cJSON_Parse(text);
     assert_non_null(root);
-    has_keys(root, top);
-    has_keys(cJSON_GetObjectItem(root, "criterion"), by);
-    has_keys(cJSON_GetObjectItem(root, "totals"), totals);
-    const cJSON *blocks = cJSON_GetObjectItem(root, "blocks");
+    assert_string_equal(words(root, "scene"), "dir/fake-view1.pbrt");
+    assert_string_equal(words(root, "kernel"), "fake");
+    assert_true(number(root, "width") == 60 && number(root, "height") == 44 && number(root, "block") == 16 && number(root, "seed") == 7);
+    assert_true(number(root, "threads") == 2 && cJSON_IsFalse(cJSON_GetObjectItem(root, "interrupted")));
+    const cJSON *by = cJSON_GetObjectItem(root, "criterion"), *effects = cJSON_GetObjectItem(root, "effects");
+    assert_string_equal(words(by, "id"), "fake");
+    assert_string_equal(words(by, "version"), "1");
+    assert_string_equal(words(cJSON_GetObjectItem(by, "params"), "at"), "32");
+    assert_int_equal(cJSON_GetArraySize(effects), 2);
+    assert_string_equal(cJSON_GetStringValue(cJSON_GetArrayItem(effects, 0)), "alpha");
+    assert_string_equal(cJSON_GetStringValue(cJSON_GetArrayItem(effects, 1)), "motion");
+    const cJSON *blocks = cJSON_GetObjectItem(root, "blocks"), *memory = cJSON_GetObjectItem(root, "memory");
     assert_int_equal(cJSON_GetArraySize(blocks), 12);
-    double samples = 0.0;
-    const cJSON *b;
-    cJSON_ArrayForEach(b, blocks)
-    {
-        has_keys(b, block);
-        samples += cJSON_GetObjectItem(b, "spp")->valuedouble *
-                   (cJSON_GetObjectItem(b, "x1")->valuedouble - cJSON_GetObjectItem(b, "x0")->valuedouble) *
-                   (cJSON_GetObjectItem(b, "y1")->valuedouble - cJSON_GetObjectItem(b, "y0")->valuedouble);
-    }
-    assert_true(samples == cJSON_GetObjectItem(cJSON_GetObjectItem(root, "totals"), "samples")->valuedouble);
-    assert_true(cJSON_GetArraySize(cJSON_GetObjectItem(root, "dropped")) > 0);
-    assert_string_equal(cJSON_GetStringValue(cJSON_GetObjectItem(cJSON_GetObjectItem(cJSON_GetObjectItem(root, "criterion"), "params"), "at")), "32");
+    for (int id = 0; id < 12; id++)
+        check_block(cJSON_GetArrayItem(blocks, id), id, &all, &samples);
+    check_totals(root, &all, samples);
+    assert_true(number(memory, "film_bytes_per_pixel") == 124 && number(memory, "film_bytes") == 124 * 60 * 44 && number(memory, "scene_bytes") == 1000);
     cJSON_Delete(root);
     free(text);
 }
@@ -307,7 +398,7 @@ int main(void)
         cmocka_unit_test(exr_holds_every_layer), cmocka_unit_test(exr_of_equal_renders_are_equal),
         cmocka_unit_test(unwritable_folder_is_one_line), cmocka_unit_test(preview_is_srgb),
         cmocka_unit_test(srgb_codes), cmocka_unit_test(stop_map_picture), cmocka_unit_test(stop_map_table),
-        cmocka_unit_test(report_has_every_key), cmocka_unit_test(progress_is_honest),
+        cmocka_unit_test(report_is_what_happened), cmocka_unit_test(progress_is_honest),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }
