@@ -21,7 +21,7 @@ enum { MAX_MODELS = 8, MAX_FILES = 8, MAX_METHODS = 9 + MAX_FILES + 2 * MAX_MODE
 
 struct options {
     const char *data, *out, *observer, *models[MAX_MODELS], *thresholds[MAX_FILES];
-    int n_models, n_thresholds, json, no_quality, threads, window, retune, recorded, baselines, epochs, bf16;
+    int n_models, n_thresholds, json, no_quality, threads, window, retune, recorded, baselines, epochs, bf16, no_pictures;
     double early, ratio, visible;
     int n_adjusted;
     struct {
@@ -90,6 +90,8 @@ static const struct base_option list[] = {
     {"bf16", 0, NULL, TO(bf16),
      .help = "judge with bfloat16 products too: one more method per model, whose changed decisions are counted"},
     {"no-quality", 0, NULL, TO(no_quality), .help = "skip FLIP and SSIM at the stop"},
+    {"no-pictures", 0, NULL, TO(no_pictures),
+     .help = "judge as in a host without half buffers: models get no noise pictures"},
     {"baselines", 0, NULL, TO(baselines),
      .help = "train the published baselines on the training scenes and measure them too (minutes)"},
     {"epochs", 0, "N", TO(epochs), 1, 1024, .help = "epochs of the LSTM baseline (15)"},
@@ -356,6 +358,8 @@ int ggn_cmd_evaluate(int argc, char **argv)
     if (!rc) {
         struct ggn_eval_options eo = {
             .dir = o.data, .window = window, .quality = !o.no_quality, .recorded = o.recorded, .ratio = o.ratio, .seed = 1};
+        for (int i = 0; i < o.n_models && !o.no_pictures; i++)
+            eo.pictures |= j.models[i]->hyper.picture;
         rc = ggn_eval_set_load(&j.set, &eo, threads, &skipped, &err);
     }
     if (!rc) {

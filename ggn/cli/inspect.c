@@ -37,6 +37,7 @@ static void print_model(const struct ggn_model *m, const struct ggn_container *c
     printf("preset       %s\n", ggn_preset_names[h->preset]);
     printf("block        %d x %d pixels, window of %d images\n", h->width, h->height, h->window);
     printf("widths       denoiser %d, generator %d, discriminator %d\n", h->k_r, h->k_m, h->k_d);
+    printf("noise picture of half buffers: %s\n", h->picture ? "taken where the host has them" : "not taken");
     for (int net = 0; net < GGN_NETS; net++)
         printf("%-12s %zu parameters, %.0f MAC\n", m->graph[net].name, m->graph[net].n_params,
                ggn_graph_mac(&m->graph[net]));

@@ -4,6 +4,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/colour.h"
+#include "model/window.h"
+
 enum { MAX_CHAINS = 1 << 16 };
 
 size_t ggn_chains_values(const struct ggn_chains *set)
@@ -20,6 +23,8 @@ void ggn_chains_release(struct ggn_chains *set)
         free(c->denoised);
         if (!c->synthetic)
             free(c->reference);
+        free(c->picture);
+        free(c->has_picture);
         free(c->tail999);
         free(c->gini);
     }
@@ -116,24 +121,81 @@ static int choose_split(struct ggn_chains *set, const struct ggn_chains_options 
 
 /* --- chains --- */
 
-static int chain_alloc(const struct ggn_chains *set, struct ggn_chain *c, int levels, int reference, struct base_err *err)
+int ggn_chain_grow(const struct ggn_chains *set, struct ggn_chain *c, int levels, struct base_err *err)
 {
-    size_t n = (size_t)levels, values = ggn_chains_values(set);
+    const size_t n = (size_t)levels, values = ggn_chains_values(set);
+    double **const numbers[] = {&c->spp, &c->tail999, &c->gini};
+    uint8_t **const images[] = {&c->noisy, &c->has_picture, &c->picture};
+    const size_t bytes[] = {values, 1, values / 3};
 
-    c->spp = malloc(n * sizeof *c->spp);
-    c->noisy = malloc(n * values);
-    c->tail999 = malloc(n * sizeof *c->tail999);
-    c->gini = malloc(n * sizeof *c->gini);
-    c->reference = reference ? malloc(values) : NULL;
-    return c->spp && c->noisy && c->tail999 && c->gini && (c->reference || !reference)
-               ? 0 : base_fail_nomem(err, "images of the data set");
+    for (size_t i = 0; i < 3; i++) {
+        double *grown = realloc(*numbers[i], n * sizeof *grown);
+        if (!grown)
+            return base_fail_nomem(err, "images of the data set");
+        *numbers[i] = grown;
+    }
+    for (size_t i = 0; i < (set->pictures ? 3 : 2); i++) {
+        uint8_t *grown = realloc(*images[i], n * bytes[i]);
+        if (!grown)
+            return base_fail_nomem(err, "images of the data set");
+        *images[i] = grown;
+    }
+    return 0;
 }
 
-static int fill_chain(const struct ggn_chains *set, struct ggn_chain *c, const struct seq_block *b, double ratio,
-                      struct base_err *err)
+const struct seq_record *ggn_chains_full_level(const struct seq_block *b)
+{
+    for (uint32_t i = 0; i < b->n_levels; i++)
+        if (seq_has(&b->levels[i], SEQ_PLANE_HALF_F16))
+            return &b->levels[i];
+    return NULL;
+}
+
+void ggn_chain_set_picture(const struct ggn_chains *set, struct ggn_chain *c, int k, const float *mean, const float *d,
+                           double scale)
+{
+    const size_t pixels = ggn_chains_values(set) / 3;
+    uint8_t *out = set->pictures ? c->picture + pixels * (size_t)k : NULL;
+
+    c->has_picture[k] = set->pictures != 0;
+    for (size_t p = 0; out && p < pixels; p++)
+        out[p] = ggn_picture_code((double)mean[p], scale * (double)d[p], NULL);
+}
+
+/* Scratch for noise pictures of recorded levels: linear mean [3][P], luminance of D [P]. */
+struct halves {
+    const struct seq_record *full; /* NULL: no level has halves of all channels */
+    float *mean, *d;
+};
+
+/* From the level's own halves. Where none are recorded, from those of the full level: their noise has another draw, the
+ * same strength in the mean, and none of the bright paths that were met only later or earlier. */
+static int recorded_picture(const struct ggn_chains *set, struct ggn_chain *c, int k, const struct seq_block *b,
+                            const struct seq_record *r, const struct halves *h, struct base_err *err)
+{
+    const size_t pixels = ggn_chains_values(set) / 3;
+    const int own = seq_has(r, SEQ_PLANE_HALF_LOG) || seq_has(r, SEQ_PLANE_HALF_F16);
+    const struct seq_record *from = own ? r : h->full;
+
+    c->has_picture[k] = 0;
+    if (!set->pictures || !from)
+        return 0;
+    int rc = seq_mean(b, r, h->mean, err);
+    if (!rc)
+        rc = seq_half_luminance(b, from, h->d, err);
+    if (rc)
+        return rc;
+    for (size_t p = 0; p < pixels; p++)
+        h->mean[p] = (float)base_luminance((double)h->mean[p], (double)h->mean[pixels + p], (double)h->mean[2 * pixels + p]);
+    ggn_chain_set_picture(set, c, k, h->mean, h->d, sqrt((double)from->spp / r->spp));
+    return 0;
+}
+
+static int fill_levels(const struct ggn_chains *set, struct ggn_chain *c, const struct seq_block *b, double ratio,
+                       const struct halves *h, struct base_err *err)
 {
     double wanted = 0;
-    int rc = chain_alloc(set, c, (int)b->n_levels, b->reference != NULL, err);
+    int rc = 0;
 
     for (uint32_t i = 0; !rc && i < b->n_levels; i++) {
         const struct seq_record *r = &b->levels[i];
@@ -144,11 +206,32 @@ static int fill_chain(const struct ggn_chains *set, struct ggn_chain *c, const s
         c->tail999[c->n_levels] = seq_stat(r, "tail999");
         c->gini[c->n_levels] = seq_stat(r, "gini");
         rc = seq_display_planar(b, r, c->noisy + (size_t)c->n_levels * ggn_chains_values(set), err);
+        if (!rc)
+            rc = recorded_picture(set, c, c->n_levels, b, r, h, err);
         c->n_levels++;
     }
-    if (!rc && b->reference)
-        rc = seq_display_planar(b, b->reference, c->reference, err);
     return rc;
+}
+
+static int fill_chain(const struct ggn_chains *set, struct ggn_chain *c, const struct seq_block *b,
+                      const struct ggn_chains_options *o, struct base_err *err)
+{
+    const size_t values = ggn_chains_values(set);
+    struct halves h = {.full = ggn_chains_full_level(b)};
+    const struct seq_record *reference = b->reference || !o->mean_for_reference ? b->reference : h.full;
+    float *memory = set->pictures ? malloc((values + values / 3) * sizeof *memory) : NULL;
+    int rc = set->pictures && !memory ? base_fail_nomem(err, "noise pictures")
+                                      : ggn_chain_grow(set, c, (int)b->n_levels, err);
+
+    h.mean = memory;
+    h.d = memory ? memory + values : NULL;
+    if (!rc)
+        rc = fill_levels(set, c, b, o->ratio, &h, err);
+    free(memory);
+    if (rc || !reference)
+        return rc;
+    c->reference = malloc(values);
+    return c->reference ? seq_display_planar(b, reference, c->reference, err) : base_fail_nomem(err, "a reference");
 }
 
 static int load_block(struct ggn_chains *set, int view, uint32_t index, const struct ggn_chains_options *o,
@@ -180,7 +263,7 @@ static int load_block(struct ggn_chains *set, int view, uint32_t index, const st
         if (label)
             c->label = *label;
         c->spread = v->has_labels ? v->labels.spread : 0;
-        rc = fill_chain(set, c, &b, o->ratio, err);
+        rc = fill_chain(set, c, &b, o, err);
     }
     seq_block_release(&b);
     return rc;
@@ -221,7 +304,7 @@ static void find_spacing(struct ggn_chains *set)
 
 int ggn_chains_load(struct ggn_chains *set, const struct ggn_chains_options *o, struct base_err *err)
 {
-    struct ggn_chains made = {0};
+    struct ggn_chains made = {.pictures = o->pictures};
     int rc = ggn_dataset_open(o->dir, &made.data, err);
 
     if (rc)

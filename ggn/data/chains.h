@@ -23,7 +23,9 @@ struct ggn_chain {
     uint8_t *noisy;       /* [n_levels][3][H][W] display codes */
     uint16_t *denoised;   /* the same, 16-bit fixed point; NULL until needed */
     uint8_t *reference;   /* [3][H][W] display codes; NULL without; a synthetic chain shares its original's */
-    double *tail999, *gini; /* [n_levels], NaN where not recorded; NULL in synthetic chains */
+    /* with set->pictures: the noise pictures (model/window.h), [n_levels][H][W], and whether a level has one */
+    uint8_t *picture, *has_picture;
+    double *tail999, *gini; /* [n_levels], NaN where not recorded */
     int has_label;
     struct ggn_label label;
     double spread;        /* octaves, for soft labels */
@@ -32,6 +34,7 @@ struct ggn_chain {
 struct ggn_chains {
     struct ggn_dataset data; /* the views */
     int width, height;       /* of every block */
+    int pictures;            /* chains have noise pictures */
     int n, n_scenes;
     struct ggn_chain *chains;
     double first_spp, ratio, step_spp; /* how real levels are spaced: ratio, or (ratio 0) a constant step */
@@ -43,6 +46,10 @@ struct ggn_chains_options {
     const char *validation;
     const char *test;       /* likewise; NULL: the split, or none */
     double ratio;           /* thin the levels to at least this ratio; 0: keep all */
+    int pictures;           /* also make the noise pictures */
+    /* where there is no reference, the mean of the full level stands for it: as noisy as that many samples are, which
+     * levels recorded below it share */
+    int mean_for_reference;
     int with_test;          /* read the pixels of the test scenes and of the people's views too (training never does) */
 };
 
@@ -64,6 +71,15 @@ int ggn_chains_extend(struct ggn_chains *set, uint32_t seed, struct base_err *er
 int ggn_chains_count(const struct ggn_chains *set, enum ggn_split split, int real_only);
 /* Values of one image: 3·H·W. */
 size_t ggn_chains_values(const struct ggn_chains *set);
+
+/* Makes room for n levels, or for more. */
+int ggn_chain_grow(const struct ggn_chains *set, struct ggn_chain *chain, int n, struct base_err *err);
+/* The full level of a block, the one with all of its half difference; NULL without. */
+const struct seq_record *ggn_chains_full_level(const struct seq_block *block);
+/* With set->pictures: the noise picture of level k, from the luminance of its mean and of a half difference D (linear,
+ * [H][W]) whose noise is that of `scale`⁻² times fewer samples: scale = √(N/n) takes D from N samples to n. */
+void ggn_chain_set_picture(const struct ggn_chains *set, struct ggn_chain *chain, int k, const float *mean, const float *d,
+                           double scale);
 
 /* Appends an empty chain; NULL: out of memory. Pointers to chains are invalid afterwards. */
 struct ggn_chain *ggn_chains_append(struct ggn_chains *set, struct base_err *err);

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "data/image.h"
+#include "base/colour.h"
 #include "model/preprocess.h"
 #include "nn/hash.h"
 #include "data/chains.h"
@@ -18,17 +18,10 @@ static const double CLEAN_END = 0.4;     /* a threshold below this share of the 
 /* One block's source. */
 struct source {
     float *base, *d, *last; /* [3][P] linear: the converged image, the half-buffer difference, the last recorded level */
+    float *d_luminance, *mean; /* [P]: of d; of the level that is being made */
     /* n_reference infinite: `base` is the mean of the full level and stands for the converged image */
     double n_full, n_reference;
 };
-
-static const struct seq_record *full_level(const struct seq_block *b)
-{
-    for (uint32_t i = 0; i < b->n_levels; i++)
-        if (seq_has(&b->levels[i], SEQ_PLANE_HALF_F16))
-            return &b->levels[i];
-    return NULL;
-}
 
 static int choose_levels(double *spp, double first, double ratio, double highest, uint32_t seed)
 {
@@ -56,41 +49,67 @@ static void step_down(const struct source *s, size_t pixels, double n, double ab
     }
 }
 
-static void fill_levels(struct ggn_chain *c, const struct source *s, size_t pixels, float *noise, uint32_t seed)
+/* Level k of the chain, whose mean is (a·(base + noise) + b·last)/(a + b), in display codes, and its noise picture. The
+ * picture's D is that of the full level, whose signs the noise has not kept: noise of its own, as of other samples, but
+ * large in the same pixels. */
+static void fill_level(const struct ggn_chains *set, struct ggn_chain *c, int k, const struct source *s, const float *noise,
+                       double a, double b)
 {
+    const size_t values = ggn_chains_values(set), pixels = values / 3;
+    uint8_t *out = c->noisy + values * (size_t)k;
+
+    for (size_t p = 0; p < pixels; p++) {
+        double rgb[3];
+        for (size_t i = 0; i < 3; i++) {
+            const size_t v = i * pixels + p;
+            rgb[i] = (b * (double)s->last[v] + a * (double)(s->base[v] + noise[v])) / (a + b);
+            out[v] = ggn_preprocess(rgb[i], NULL, NULL);
+        }
+        s->mean[p] = (float)base_luminance(rgb[0], rgb[1], rgb[2]);
+    }
+    ggn_chain_set_picture(set, c, k, s->mean, s->d_luminance, sqrt(s->n_full / c->spp[k]));
+}
+
+static void fill_levels(const struct ggn_chains *set, struct ggn_chain *c, const struct source *s, float *noise,
+                        uint32_t seed)
+{
+    const size_t pixels = ggn_chains_values(set) / 3;
+
     memset(noise, 0, 3 * pixels * sizeof *noise);
     for (int k = c->n_levels - 1; k >= 0; k--) {
-        uint8_t *out = c->noisy + 3 * pixels * (size_t)k;
         step_down(s, pixels, c->spp[k], k + 1 < c->n_levels ? c->spp[k + 1] : s->n_reference, ggn_hash((uint32_t)k, seed),
                   noise);
-        for (size_t i = 0; i < 3 * pixels; i++)
-            out[i] = ggn_preprocess((double)(s->base[i] + noise[i]), NULL, NULL);
+        fill_level(set, c, k, s, noise, 1, 0);
     }
+}
+
+static void no_statistics(struct ggn_chain *c, int from)
+{
+    for (int k = from; k < c->n_levels; k++)
+        c->tail999[k] = c->gini[k] = (double)NAN;
 }
 
 static int make_chain(struct ggn_chains *set, const struct ggn_chain *real, struct ggn_chain *c, const struct source *s,
                       uint32_t seed, struct base_err *err)
 {
-    size_t pixels = (size_t)set->width * (size_t)set->height;
     double spp[MAX_LEVELS];
-    float *noise = malloc(3 * pixels * sizeof *noise);
+    float *noise = malloc(ggn_chains_values(set) * sizeof *noise);
     int n = choose_levels(spp, set->first_spp, set->ratio > 1.01 ? set->ratio : 1.15, HIGHEST_SHARE * s->n_reference, seed);
 
     *c = *real;
     c->synthetic = 1;
-    c->tail999 = c->gini = NULL;
+    c->spp = c->tail999 = c->gini = NULL;
+    c->noisy = c->picture = c->has_picture = NULL;
     c->denoised = NULL;
     c->n_levels = n;
-    c->spp = malloc((size_t)(n ? n : 1) * sizeof *c->spp);
-    c->noisy = malloc((size_t)(n ? n : 1) * 3 * pixels);
-    if (!noise || !c->spp || !c->noisy) {
-        free(noise);
-        return base_fail_nomem(err, "synthetic images");
+    int rc = noise ? ggn_chain_grow(set, c, n ? n : 1, err) : base_fail_nomem(err, "synthetic images");
+    if (!rc) {
+        memcpy(c->spp, spp, (size_t)n * sizeof *spp);
+        no_statistics(c, 0);
+        fill_levels(set, c, s, noise, seed);
     }
-    memcpy(c->spp, spp, (size_t)n * sizeof *spp);
-    fill_levels(c, s, pixels, noise, seed);
     free(noise);
-    return 0;
+    return rc;
 }
 
 static int read_source(const struct ggn_chains *set, const struct ggn_chain *c, struct source *s, int *usable,
@@ -109,7 +128,7 @@ static int read_source(const struct ggn_chains *set, const struct ggn_chain *c, 
     rc = seq_manifest_read_block(v->dir, &v->manifest, index, &b, err);
     if (rc)
         return rc;
-    const struct seq_record *full = full_level(&b);
+    const struct seq_record *full = ggn_chains_full_level(&b);
     if (full) {
         s->n_full = full->spp;
         s->n_reference = b.reference ? b.reference->spp : (double)INFINITY;
@@ -118,6 +137,8 @@ static int read_source(const struct ggn_chains *set, const struct ggn_chain *c, 
             rc = seq_half(&b, full, s->d, err);
         if (!rc)
             rc = seq_mean(&b, &b.levels[b.n_levels - 1], s->last, err);
+        if (!rc)
+            rc = seq_half_luminance(&b, full, s->d_luminance, err);
         *usable = !rc;
     }
     seq_block_release(&b);
@@ -127,11 +148,15 @@ static int read_source(const struct ggn_chains *set, const struct ggn_chain *c, 
 static int source_init(struct source *s, const struct ggn_chains *set, struct base_err *err)
 {
     size_t values = ggn_chains_values(set);
-    float *memory = malloc(3 * values * sizeof *memory);
+    float *memory = malloc((3 * values + 2 * (values / 3)) * sizeof *memory);
 
     if (!memory)
         return base_fail_nomem(err, "synthetic images");
-    *s = (struct source){.base = memory, .d = memory + values, .last = memory + 2 * values};
+    *s = (struct source){.base = memory,
+                         .d = memory + values,
+                         .last = memory + 2 * values,
+                         .d_luminance = memory + 3 * values,
+                         .mean = memory + 3 * values + values / 3};
     return 0;
 }
 
@@ -154,27 +179,6 @@ int ggn_chains_add_synthetic(struct ggn_chains *set, int per_chain, uint32_t see
     return rc;
 }
 
-/* Room for `more` further levels; NaN statistics. */
-static int chain_grow(const struct ggn_chains *set, struct ggn_chain *c, int more, struct base_err *err)
-{
-    size_t n = (size_t)(c->n_levels + more);
-    void *noisy = realloc(c->noisy, n * ggn_chains_values(set));
-    double **const arrays[] = {&c->spp, &c->tail999, &c->gini};
-
-    if (!noisy)
-        return base_fail_nomem(err, "synthetic images");
-    c->noisy = noisy;
-    for (size_t k = 0; k < 3; k++) {
-        double *grown = realloc(*arrays[k], n * sizeof *grown);
-        if (!grown)
-            return base_fail_nomem(err, "synthetic images");
-        *arrays[k] = grown;
-        for (size_t i = (size_t)c->n_levels; i < n; i++)
-            grown[i] = (double)NAN;
-    }
-    return 0;
-}
-
 /* X_n = (n₀·X + m·Y_m)/n with m = n − n₀: the last recorded level X, continued with the first m samples of the reference,
  * whose running mean Y_m is the same walk as above. */
 static int extend_chain(const struct ggn_chains *set, struct ggn_chain *c, const struct source *s, uint32_t seed,
@@ -191,18 +195,18 @@ static int extend_chain(const struct ggn_chains *set, struct ggn_chain *c, const
         next = floor(next * ratio + 0.5);
     }
     float *noise = calloc(values, sizeof *noise);
-    int rc = noise ? chain_grow(set, c, n, err) : base_fail_nomem(err, "synthetic images");
+    int rc = noise ? ggn_chain_grow(set, c, first + n, err) : base_fail_nomem(err, "synthetic images");
     for (int k = n - 1; !rc && k >= 0; k--) {
         double m = spp[k] - n0;
-        uint8_t *out = c->noisy + values * (size_t)(first + k);
         step_down(s, values / 3, m, k + 1 < n ? spp[k + 1] - n0 : s->n_reference, ggn_hash((uint32_t)k, seed), noise);
-        for (size_t i = 0; i < values; i++)
-            out[i] = ggn_preprocess((n0 * (double)s->last[i] + m * (double)(s->base[i] + noise[i])) / spp[k], NULL, NULL);
         c->spp[first + k] = spp[k];
+        fill_level(set, c, first + k, s, noise, m, n0);
     }
     free(noise);
-    if (!rc)
+    if (!rc) {
         c->n_levels += n;
+        no_statistics(c, first);
+    }
     return rc;
 }
 
@@ -217,15 +221,14 @@ static int simulate_chain(const struct ggn_chains *set, struct ggn_chain *c, con
     spp[n++] = SIMULATED_END;
     float *noise = malloc(ggn_chains_values(set) * sizeof *noise);
     int rc = !noise            ? base_fail_nomem(err, "simulated images")
-             : n > c->n_levels ? chain_grow(set, c, n - c->n_levels, err)
+             : n > c->n_levels ? ggn_chain_grow(set, c, n, err)
                                : 0;
     if (!rc) {
         c->n_levels = n;
         c->simulated = 1;
         memcpy(c->spp, spp, (size_t)n * sizeof *spp);
-        for (int k = 0; k < n; k++)
-            c->tail999[k] = c->gini[k] = (double)NAN;
-        fill_levels(c, s, ggn_chains_values(set) / 3, noise, seed);
+        no_statistics(c, 0);
+        fill_levels(set, c, s, noise, seed);
     }
     free(noise);
     return rc;

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "base/colour.h"
-#include "data/image.h"
+#include "model/window.h"
 #include "nn/hash.h"
 
 void ggn_windows_release(struct ggn_windows *w)
@@ -129,15 +129,16 @@ struct ggn_augment ggn_augment_none(void)
     return (struct ggn_augment){.gain = {1, 1, 1}};
 }
 
-struct ggn_augment ggn_augment_draw(uint64_t step, int i, uint32_t seed, int square, double jitter)
+struct ggn_augment ggn_augment_draw(uint64_t step, int i, uint32_t seed, const struct ggn_augment_options *o)
 {
-    struct ggn_augment a = {.flip_x = draw(11, step, i, seed) < 0.5,
-                            .flip_y = draw(12, step, i, seed) < 0.5,
-                            .transpose = square && draw(13, step, i, seed) < 0.5};
-    double exposure = jitter * (draw(14, step, i, seed) - 0.5);
+    struct ggn_augment a = {.flip_x = o->flips && draw(11, step, i, seed) < 0.5,
+                            .flip_y = o->flips && draw(12, step, i, seed) < 0.5,
+                            .transpose = o->flips && o->square && draw(13, step, i, seed) < 0.5,
+                            .blind = draw(18, step, i, seed) >= o->picture};
+    double exposure = o->jitter * (draw(14, step, i, seed) - 0.5);
 
     for (uint32_t c = 0; c < 3; c++)
-        a.gain[c] = (float)exp2(exposure + 0.25 * jitter * (draw(15 + c, step, i, seed) - 0.5));
+        a.gain[c] = (float)exp2(exposure + 0.25 * o->jitter * (draw(15 + c, step, i, seed) - 0.5));
     return a;
 }
 
@@ -217,6 +218,21 @@ void ggn_window_planes(const struct ggn_chain *chain, int last, int length, int 
         for (size_t i = 0; i < 3 * pixels; i++)
             image[i] = difference * (image[i] - newest[i]);
     }
+}
+
+int ggn_picture_plane(const struct ggn_chain *chain, int last, int width, int height, const struct ggn_augment *a,
+                      float *plane)
+{
+    if (!chain->picture || !chain->has_picture[last] || a->blind)
+        return 0;
+    const uint8_t *picture = chain->picture + (size_t)last * (size_t)width * (size_t)height;
+    double gain = base_luminance((double)a->gain[0], (double)a->gain[1], (double)a->gain[2]);
+    float table[256];
+
+    for (int i = 0; i < 256; i++)
+        table[i] = (float)(pow(gain, 1 / 2.4) * i) * GGN_PICTURE_GAIN;
+    plane_u8(picture, width, height, a, table, plane);
+    return 1;
 }
 
 void ggn_crop_planes(const struct ggn_chain *chain, int level, int width, int height, int x0, int y0, int crop_w, int crop_h,

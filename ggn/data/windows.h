@@ -45,16 +45,27 @@ int ggn_windows_draw(const struct ggn_windows *windows, uint64_t step, int i, ui
 struct ggn_augment {
     int flip_x, flip_y, transpose; /* transpose for square blocks only */
     float gain[3];                 /* linear light */
+    int blind;                     /* the noise picture is left out, as of a host without half buffers */
 };
 struct ggn_augment ggn_augment_none(void);
-/* Flips and rotations, exposure up to ±jitter/2 octaves, white balance up to ±jitter/8: little enough for the label to hold.
- */
-struct ggn_augment ggn_augment_draw(uint64_t step, int i, uint32_t seed, int square, double jitter);
+struct ggn_augment_options {
+    int flips;      /* flips and rotations */
+    int square;     /* the images are */
+    /* exposure up to ±jitter/2 octaves, white balance up to ±jitter/8: little enough for the label to hold */
+    double jitter;
+    double picture; /* share of samples that keep their noise picture */
+};
+struct ggn_augment ggn_augment_draw(uint64_t step, int i, uint32_t seed, const struct ggn_augment_options *options);
 
 /* The input planes of M for one window, gap-free [3·S][H][W] in 0..1. `difference` > 0: the images before the last one hold
  * difference · (image − last) instead, see ggn_train_fold. */
 void ggn_window_planes(const struct ggn_chain *chain, int last, int length, int width, int height, int denoised,
                        const struct ggn_augment *augment, float difference, float *planes);
+
+/* The noise picture of level `last` as D takes it, gap-free [H][W]; 0: the sample has none. The gain is taken as one of all
+ * channels, on a curve of power 1/2.4. */
+int ggn_picture_plane(const struct ggn_chain *chain, int last, int width, int height, const struct ggn_augment *augment,
+                      float *plane);
 
 /* A crop for the denoiser: image `level` of the chain and its reference, [3][size][size] each. */
 void ggn_crop_planes(const struct ggn_chain *chain, int level, int width, int height, int x0, int y0, int crop_w, int crop_h,

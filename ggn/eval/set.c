@@ -310,7 +310,7 @@ int ggn_eval_set_load(struct ggn_eval_set *out, const struct ggn_eval_options *o
                       struct base_err *err)
 {
     struct ggn_eval_set s = {.window = o->window};
-    struct ggn_chains_options co = {.dir = o->dir, .ratio = o->ratio, .with_test = 1};
+    struct ggn_chains_options co = {.dir = o->dir, .ratio = o->ratio, .with_test = 1, .pictures = o->pictures};
     struct fill f = {&s, o->quality};
     int rc = ggn_chains_load(&s.chains, &co, err);
     if (rc)

@@ -41,6 +41,7 @@ struct ggn_eval_options {
                          (ggn_chains_extend) */
     double ratio;     /* thin the levels to at least this ratio; 0: keep all */
     uint32_t seed;    /* of the continuation */
+    int pictures;     /* also make the noise pictures (data/chains.h) */
 };
 
 /* Blocks without a label are left out; *skipped counts the views without any. BASE_EINVAL if nothing is left. Errors of the

@@ -88,6 +88,10 @@ double ggn_viewer_logit(void *viewer, const int *levels)
         clean[i] = denoised(v, levels[i], levels, v->window);
     }
     memcpy(known->level, levels, bytes);
-    known->logit = ggn_judge_logit(v->judge, noisy, clean, v->set->width, v->set->height);
+    const int last = levels[v->window - 1];
+    const size_t pixels = ggn_chains_values(v->set) / 3;
+    const uint8_t *picture =
+        v->set->pictures && v->chain->has_picture[last] ? v->chain->picture + pixels * (size_t)last : NULL;
+    known->logit = ggn_judge_logit(v->judge, noisy, clean, picture, v->set->width, v->set->height);
     return known->logit;
 }

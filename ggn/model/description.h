@@ -3,6 +3,8 @@
  *
  *   {"kind": "model", "preset": "paper"|"lull", "height", "width", "window", "k_r", "k_m", "k_d",
  *    "calibration": {"scale", "shift", "threshold", "consecutive", "spacing"}, "provenance": {...}}
+ *
+ * and "picture": 1 in a model that takes the noise picture.
  */
 #ifndef GGN_MODEL_DESCRIPTION_H
 #define GGN_MODEL_DESCRIPTION_H

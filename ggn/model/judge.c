@@ -107,8 +107,22 @@ static void map_into(struct ggn_judge *j, int which)
     ggn_plane_copy(to, ggn_exec_plane(j->exec[GGN_NET_D], 0, 0, which), output_plane(j, GGN_NET_M), map->row);
 }
 
-static double tile_logit(struct ggn_judge *j, const uint8_t *const *noisy, const uint16_t *const *denoised, int width,
-                         int height, int x0, int y0)
+/* The noise picture, and whether there is one, into the discriminator's input. */
+static void load_picture(struct ggn_judge *j, const uint8_t *picture, int width, int height, int x0, int y0)
+{
+    static const uint8_t there[2] = {0, 1};
+    const struct ggn_value *to = input(j, GGN_NET_D);
+    float *plane = ggn_exec_plane(j->exec[GGN_NET_D], 0, 0, 2), *flag = ggn_exec_plane(j->exec[GGN_NET_D], 0, 0, 3);
+
+    if (picture)
+        ggn_tile_load_plane(picture, width, height, x0, y0, to->w, to->h, GGN_PICTURE_GAIN, plane, (size_t)to->row);
+    else
+        ggn_tile_load_plane(&there[0], 1, 1, 0, 0, to->w, to->h, 1, plane, (size_t)to->row);
+    ggn_tile_load_plane(&there[picture != NULL], 1, 1, 0, 0, to->w, to->h, 1, flag, (size_t)to->row);
+}
+
+static double tile_logit(struct ggn_judge *j, const uint8_t *const *noisy, const uint16_t *const *denoised,
+                         const uint8_t *picture, int width, int height, int x0, int y0)
 {
     const struct ggn_value *in = input(j, GGN_NET_M);
 
@@ -120,12 +134,14 @@ static double tile_logit(struct ggn_judge *j, const uint8_t *const *noisy, const
         ggn_tile_load_u8(noisy[k], width, height, x0, y0, in->w, in->h, 1.0F / 255,
                          ggn_exec_plane(j->exec[GGN_NET_M], 0, 0, 3 * k), (size_t)in->row, in->plane);
     map_into(j, 1);
+    if (j->model->hyper.picture)
+        load_picture(j, picture, width, height, x0, y0);
     forward(j, GGN_NET_D);
     return (double)*output_plane(j, GGN_NET_D);
 }
 
-double ggn_judge_logit(struct ggn_judge *j, const uint8_t *const *noisy, const uint16_t *const *denoised, int width,
-                       int height)
+double ggn_judge_logit(struct ggn_judge *j, const uint8_t *const *noisy, const uint16_t *const *denoised,
+                       const uint8_t *picture, int width, int height)
 {
     const struct ggn_value *in = input(j, GGN_NET_M);
     const int nx = ggn_tile_count(width, in->w), ny = ggn_tile_count(height, in->h);
@@ -135,7 +151,7 @@ double ggn_judge_logit(struct ggn_judge *j, const uint8_t *const *noisy, const u
         if (!ggn_fixed_is_finite(denoised[k], 3 * (size_t)width * (size_t)height))
             return (double)NAN;
     for (int t = 0; t < nx * ny; t++) {
-        double z = tile_logit(j, noisy, denoised, width, height, ggn_tile_start(width, in->w, t % nx),
+        double z = tile_logit(j, noisy, denoised, picture, width, height, ggn_tile_start(width, in->w, t % nx),
                               ggn_tile_start(height, in->h, t / nx));
         if (!isfinite(z))
             return z;

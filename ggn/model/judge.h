@@ -30,10 +30,11 @@ void ggn_judge_destroy(struct ggn_judge *judge);
 
 /* noisy [3][height][width] display codes → denoised, 16-bit fixed point. */
 void ggn_judge_denoise(struct ggn_judge *judge, const uint8_t *noisy, uint16_t *denoised, int width, int height);
-/* noisy, denoised: S images each, noisiest first. The raw logit of the discriminator; calibrate it with ggn_policy_p. NaN or
- * infinite when the model's weights overflow on this window. */
-double ggn_judge_logit(struct ggn_judge *judge, const uint8_t *const *noisy, const uint16_t *const *denoised, int width,
-                       int height);
+/* noisy, denoised: S images each, noisiest first. picture: [height][width], the noise picture of the newest image, or NULL:
+ * it has none; a model that takes no picture does not look. The raw logit of the discriminator; calibrate it with
+ * ggn_policy_p. NaN or infinite when the model's weights overflow on this window. */
+double ggn_judge_logit(struct ggn_judge *judge, const uint8_t *const *noisy, const uint16_t *const *denoised,
+                       const uint8_t *picture, int width, int height);
 /* The noise feature map of the last tile that was judged, for pictures: 0 of the denoised window, 1 of the noisy one. Rows
  * are *row apart. Borrowed until the next call. */
 const float *ggn_judge_feature_map(const struct ggn_judge *judge, int which, int *row);

@@ -7,7 +7,6 @@
 #include "nn/hash.h"
 #include "nn/loss.h"
 #include "nn/ssim.h"
-#include "nn/ssim.h"
 #include "nn/real.h"
 
 enum { N_STATE = 5 };
@@ -310,6 +309,21 @@ static void exchange_maps(struct ggn_trainer *t, const struct ggn_exec *ref, int
     }
 }
 
+/* The noise pictures behind the maps in D's input, each with a plane that says whether there is one. */
+void ggn_trainer_set_pictures(struct ggn_trainer *t, const struct ggn_batch *b)
+{
+    const struct ggn_value *v = &t->graph[GGN_NET_D].value[0];
+
+    for (int i = 0; i < b->count && t->hyper.picture; i++) {
+        real *picture = ggn_exec_plane(t->d, 0, i, 2), *flag = ggn_exec_plane(t->d, 0, i, 3);
+        for (int y = 0; y < v->h; y++)
+            for (int x = 0; x < v->w; x++) {
+                picture[y * v->row + x] = b->picture[i] ? b->picture[i][y * v->w + x] : 0;
+                flag[y * v->row + x] = b->picture[i] ? 1 : 0;
+            }
+    }
+}
+
 /* D forward, weighted BCE, D backward (its own gradient is added to grad, that of the maps stays in d). */
 static double judge(struct ggn_trainer *t, const struct ggn_batch *b, double *logits)
 {
@@ -351,6 +365,7 @@ int ggn_trainer_judge_step(struct ggn_trainer *t, const struct ggn_batch *b, dou
     zero_grad(t, GGN_NET_D);
     ggn_exec_forward(t->m, t->weights[GGN_NET_M], 2 * b->count, GGN_TRAIN);
     exchange_maps(t, t->m, 0, t->m, b->count, b->count, 0);
+    ggn_trainer_set_pictures(t, b);
     *bce = judge(t, b, logits);
     rc = check(t, GGN_NET_D, *bce, "loss", err);
     if (rc)

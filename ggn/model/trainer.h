@@ -42,6 +42,7 @@ struct ggn_batch {
     const real *const *noisy;     /* [count][3S] windows, noisiest image first (M's input order: image, channel) */
     const real *const *denoised;  /* [count][3S] for ggn_trainer_judge_step */
     const real *const *reference; /* [count][3] for ggn_trainer_paper_step */
+    const real *const *picture;   /* [count] noise pictures, GGN_PICTURE_GAIN · codes, NULL: none; with hyper.picture */
     const double *label;          /* [count] 1 = still noisy, 0 = not, between = uncertain */
     const double *weight;         /* [count] of each sample in the loss, or NULL = 1 */
 };
@@ -83,6 +84,9 @@ int ggn_trainer_denoiser_step(struct ggn_trainer *trainer, const real *const *x,
  * backward pass, all of M is trained. *bce = weighted mean before it; logits (may be NULL) [count]. */
 int ggn_trainer_judge_step(struct ggn_trainer *trainer, const struct ggn_batch *batch, double *bce, double *logits,
                            struct base_err *err);
+
+/* Puts batch->picture into D's input, for who runs D without a step; nothing without hyper.picture. */
+void ggn_trainer_set_pictures(struct ggn_trainer *trainer, const struct ggn_batch *batch);
 
 /* One published iteration: six steps of R, one of D, one of M on the sum of two gradients without its last convolution. */
 struct ggn_paper_record {

@@ -11,10 +11,20 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "model/preprocess.h"
+
 /* Root mean square, in display units (1 = white), of the noise left in `last`, told from an earlier image of the same block
  * whose samples `last` contains: var(first − last) = σ²·(1/n_first − 1/n_last), so noise² = msd / (n_last/n_first − 1).
  * count: values per image. Needs spp_last > spp_first. */
 double ggn_window_noise(const uint8_t *first, const uint8_t *last, size_t count, double spp_first, double spp_last);
+
+/* The noise picture of an image, one value per pixel: how many display codes apart the luminance of the mean and that of
+ * mean + half difference are shown. It has the noise of the mean, whatever the samples. Both in linear light; difference: of
+ * the half buffers, (A − B)/2, noise of the variance of the mean. Luminance alone, since more is not recorded at every level
+ * (sequence/FORMAT.md). Values that are no number show nothing. */
+uint8_t ggn_picture_code(double mean, double difference, const struct ggn_display *display);
+/* Of a code, on its way into the network: noise at the threshold of sight is one to three codes. */
+#define GGN_PICTURE_GAIN (16.0F / 255)
 
 /* Tiles of size `tile` that cover `size` pixels, evenly spread, overlapping as needed: their number, and where one begins.
  * A block smaller than a tile is one tile at 0, continued by reflection. */
@@ -29,6 +39,9 @@ int ggn_fixed_is_finite(const uint16_t *values, size_t count);
  * are the distances in floats between rows and planes of dst. Beyond the edge the image is reflected (… c b a | a b c …). */
 void ggn_tile_load_u8(const uint8_t *src, int width, int height, int x0, int y0, int tile_w, int tile_h, float scale,
                       float *dst, size_t dst_row, size_t dst_plane);
+/* The same of an image of one plane. */
+void ggn_tile_load_plane(const uint8_t *src, int width, int height, int x0, int y0, int tile_w, int tile_h, float scale,
+                         float *dst, size_t dst_row);
 void ggn_tile_load_u16(const uint16_t *src, int width, int height, int x0, int y0, int tile_w, int tile_h, float scale,
                        float *dst, size_t dst_row, size_t dst_plane);
 /* Stores the part of a float tile in [0, 1] that lies inside the image, rounded to 16-bit fixed point; NaN becomes

@@ -7,6 +7,8 @@
  * difference says that the noise is far above what the model ever called clean in training, the block is plainly noisy and
  * the network is not asked; it says when to ask again. The *tail guard* looks at the half buffer: a block whose noise sits
  * in a few pixels has not met its rare bright paths often enough for any judgement by eye, and is not stopped.
+ *
+ * A model may also take the noise picture that the half buffer shows; without half buffer it judges without.
  */
 #include "plugin/ggn.h"
 
@@ -83,7 +85,7 @@ static void refine_need(const struct lull_instance *in, struct lull_requirements
     const struct ggn_hyper *hyper = &in->model->hyper;
     const struct ggn_policy *policy = &in->rule.policy;
 
-    if (policy->tail999 > 0 || policy->gini > 0)
+    if (policy->tail999 > 0 || policy->gini > 0 || hyper->picture)
         need->planes_used |= LULL_PLANE_BIT(LULL_PLANE_HALF);
     need->block_width = (uint32_t)hyper->width;
     need->block_height = (uint32_t)hyper->height;
@@ -121,6 +123,7 @@ static void workers_release(struct gp_worker *worker, uint32_t count)
     for (uint32_t i = 0; worker && i < count; i++) {
         ggn_judge_destroy(worker[i].judge);
         free(worker[i].noise);
+        free(worker[i].picture);
     }
     free(worker);
 }
@@ -147,7 +150,9 @@ static struct gp_worker *workers_create(const struct lull_instance *in, uint32_t
 
     for (uint32_t i = 0; i < count && !rc; i++) {
         worker[i].noise = malloc(pixels * sizeof *worker[i].noise);
-        worker[i].judge = worker[i].noise ? ggn_judge_create(in->model, in->precision, NULL, &error) : NULL;
+        worker[i].picture = malloc(pixels);
+        worker[i].judge =
+            worker[i].noise && worker[i].picture ? ggn_judge_create(in->model, in->precision, NULL, &error) : NULL;
         rc = worker[i].judge ? 0 : error.code;
     }
     if (!rc)

@@ -13,7 +13,8 @@
 
 struct gp_worker {
     struct ggn_judge *judge;
-    double *noise; /* [pixels of the largest block], for the tail guard */
+    double *noise;    /* [pixels of the largest block], for the tail guard */
+    uint8_t *picture; /* [pixels of the largest block], for models with the noise picture */
 };
 
 struct lull_instance {

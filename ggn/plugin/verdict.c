@@ -41,6 +41,39 @@ static double window_noise(void *data)
                             (double)s->spp[s->used - 1]);
 }
 
+/* D = (A − I)·√(h/(n − h)) of n samples, h of them in HALF: noise of the variance of the mean. *split is that root. 0: the
+ * view has no half buffer with part of the samples. */
+static int has_half(const struct look *l, double *split)
+{
+    const double n = (double)l->block->spp, h = (double)l->block->half_spp;
+
+    if (!lull_kit_plane(l->view, LULL_PLANE_HALF) || h <= 0 || h >= n)
+        return 0;
+    *split = sqrt(h / (n - h));
+    return 1;
+}
+
+static const uint32_t HALVES = LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_HALF);
+
+/* The noise picture of the block as it is now, NULL: it has none. */
+static const uint8_t *read_picture(const struct look *l)
+{
+    const struct lull_kit *kit = &l->in->kit;
+    uint8_t *to = l->worker->picture;
+    struct lull_kit_span s;
+    double split;
+
+    if (!l->in->model->hyper.picture || !has_half(l, &split))
+        return NULL;
+    for (lull_kit_span_begin(&s, l->view, l->block, HALVES); lull_kit_span_next(&s);)
+        for (int32_t i = 0; i < s.count; i++) {
+            double mean = lull_kit_luminance(kit, s.value[LULL_PLANE_COLOR][i]);
+            double half = lull_kit_luminance(kit, s.value[LULL_PLANE_HALF][i]);
+            *to++ = ggn_picture_code(mean, split * (half - mean), &l->in->display);
+        }
+    return l->worker->picture;
+}
+
 /* Denoises the images that have not been denoised yet. */
 static double window_logit(void *data)
 {
@@ -60,24 +93,20 @@ static double window_logit(void *data)
             ggn_judge_denoise(l->worker->judge, noisy[i], to, w, h);
         l->head->denoised |= UINT32_C(1) << slot;
     }
-    return ggn_judge_logit(l->worker->judge, noisy, denoised, w, h);
+    return ggn_judge_logit(l->worker->judge, noisy, denoised, read_picture(l), w, h);
 }
 
-/* D = (A − I)·√(h/(n − h)): noise of the variance of the mean. */
 static int tail_statistics(void *data, double *tail999, double *gini)
 {
     const struct look *l = data;
     const struct lull_kit *kit = &l->in->kit;
-    const uint32_t planes = LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_HALF);
-    const double n = (double)l->block->spp, h = (double)l->block->half_spp;
-    double *noise = l->worker->noise, sum = 0;
+    double *noise = l->worker->noise, sum = 0, split;
     struct lull_kit_span s;
     size_t count = 0;
 
-    if (!lull_kit_plane(l->view, LULL_PLANE_HALF) || h <= 0 || h >= n)
+    if (!has_half(l, &split))
         return 0;
-    const double split = sqrt(h / (n - h));
-    for (lull_kit_span_begin(&s, l->view, l->block, planes); lull_kit_span_next(&s);)
+    for (lull_kit_span_begin(&s, l->view, l->block, HALVES); lull_kit_span_next(&s);)
         for (int32_t i = 0; i < s.count; i++) {
             double luminance = lull_kit_luminance(kit, s.value[LULL_PLANE_COLOR][i]);
             double d = split * (lull_kit_luminance(kit, s.value[LULL_PLANE_HALF][i]) - luminance);

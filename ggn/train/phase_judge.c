@@ -13,6 +13,12 @@
 #include "train/resume.h"
 #include "train/start.h"
 
+/* Of a sample: the window, the second window or reference, and the noise picture, which needs no more than an image. */
+static size_t sample_values(const struct ggn_session *s)
+{
+    return (2 * (size_t)s->hyper.window + 1) * ggn_chains_values(&s->set);
+}
+
 static size_t window_values(const struct ggn_session *s)
 {
     return (size_t)s->hyper.window * ggn_chains_values(&s->set);
@@ -39,10 +45,11 @@ static void fill_window(void *data, long i, int worker)
     const struct ggn_session *s = f->s;
     const struct ggn_window *w = &f->windows->list[f->index[i]];
     const struct ggn_chain *c = &s->set.chains[w->chain];
-    struct ggn_augment augment = f->augment ? ggn_augment_draw(f->step, (int)i, ggn_session_seed(s) ^ 2,
-                                                               s->set.width == s->set.height, s->plan->jitter)
-                                            : ggn_augment_none();
-    float *at = s->buffer + 2 * (size_t)i * window_values(s);
+    const struct ggn_augment_options how = {s->plan->flips, s->set.width == s->set.height, s->plan->jitter,
+                                            s->plan->picture};
+    struct ggn_augment augment =
+        f->augment ? ggn_augment_draw(f->step, (int)i, ggn_session_seed(s) ^ 2, &how) : ggn_augment_none();
+    float *at = s->buffer + (size_t)i * sample_values(s), *picture = at + 2 * window_values(s);
 
     ggn_window_planes(c, w->last, s->hyper.window, s->set.width, s->set.height, 0, &augment, difference(s), at);
     at += window_values(s);
@@ -54,10 +61,12 @@ static void fill_window(void *data, long i, int worker)
         once.noisy = c->reference;
         ggn_window_planes(&once, 0, 1, s->set.width, s->set.height, 0, &augment, 0, at);
     }
+    s->planes[6 * (size_t)s->hyper.window * (size_t)s->plan->batch + (size_t)i] =
+        ggn_picture_plane(c, w->last, s->set.width, s->set.height, &augment, picture) ? picture : NULL;
     (void)worker;
 }
 
-/* Fills the buffer and the plane pointers: noisy windows first, then denoised ones (or references). */
+/* Fills the buffer and the plane pointers: noisy windows first, then denoised ones (or references), then noise pictures. */
 static struct ggn_batch fill_batch(struct ggn_session *s, const struct fill *f, int count)
 {
     const size_t plane = (size_t)s->set.width * (size_t)s->set.height;
@@ -67,14 +76,17 @@ static struct ggn_batch fill_batch(struct ggn_session *s, const struct fill *f, 
     base_threads_for(s->threads, count, fill_window, (void *)(size_t)f);
     for (size_t i = 0; i < (size_t)count; i++)
         for (size_t k = 0; k < planes; k++) {
-            noisy[i * planes + k] = s->buffer + 2 * i * window_values(s) + k * plane;
+            noisy[i * planes + k] = s->buffer + i * sample_values(s) + k * plane;
             if (f->denoised)
                 second[i * planes + k] = noisy[i * planes + k] + window_values(s);
             else if (k < 3)
                 second[3 * i + k] = noisy[i * planes + k] + window_values(s);
         }
-    return (struct ggn_batch){
-        .count = count, .noisy = noisy, .denoised = f->denoised ? second : NULL, .reference = f->denoised ? NULL : second};
+    return (struct ggn_batch){.count = count,
+                              .noisy = noisy,
+                              .denoised = f->denoised ? second : NULL,
+                              .reference = f->denoised ? NULL : second,
+                              .picture = second + planes * (size_t)s->plan->batch};
 }
 
 /* --- evaluation mode -------------------------------------------------------------------------------------------------- */
@@ -109,6 +121,7 @@ static void logits(struct ggn_session *s, const struct ggn_windows *windows, con
         struct ggn_batch b = fill_batch(s, &f, count);
         generate(s, b.denoised, count, 0);
         generate(s, b.noisy, count, 1);
+        ggn_trainer_set_pictures(t, &b);
         ggn_exec_forward(t->d, t->weights[GGN_NET_D], count, GGN_EVAL);
         for (int i = 0; i < count; i++)
             logit[first + i] = (double)*ggn_exec_plane(t->d, out, i, 0);
@@ -194,6 +207,29 @@ static int paper_window(const struct ggn_session *s, uint64_t step, int i)
     return (int)k;
 }
 
+/* Running mean of the weights; while it is young, over the steps there were. */
+static void average(struct ggn_session *s, uint64_t step)
+{
+    const double share = fmax(1.0 / (s->plan->average + 1), 1.0 / (double)(step + 1));
+
+    for (int net = 0; net < GGN_NETS; net++)
+        for (size_t i = 0; s->average[net] && i < s->trainer->graph[net].n_learned; i++) {
+            float *mean = &s->average[net][i];
+            *mean = (float)((double)*mean + share * ((double)s->trainer->weights[net]->params[i] - (double)*mean));
+        }
+}
+
+/* Puts the averaged weights in the place of the trained ones, or back. */
+static void exchange_average(struct ggn_session *s)
+{
+    for (int net = 0; net < GGN_NETS; net++)
+        for (size_t i = 0; s->average[net] && i < s->trainer->graph[net].n_learned; i++) {
+            float *w = &s->trainer->weights[net]->params[i], trained = *w;
+            *w = s->average[net][i];
+            s->average[net][i] = trained;
+        }
+}
+
 static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, double *loss, double *right,
                       struct base_err *err)
 {
@@ -218,6 +254,7 @@ static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, doub
         return rc;
     if (paper)
         *loss = record.bce_before;
+    average(s, step);
     *right = 0;
     for (int i = 0; i < n; i++) {
         double z = !paper ? logit[i] : i < 64 ? record.logit_before[i] : (double)NAN;
@@ -314,10 +351,14 @@ static int validate(struct ggn_session *s, struct ggn_log_row *row, struct base_
 {
     int rc = s->hyper.preset == GGN_PRESET_PAPER ? renew_denoiser(s, err) : 0;
 
+    exchange_average(s);
     if (!rc)
         rc = measure(s, row, err);
     if (!rc)
         note_best(s, row);
+    exchange_average(s);
+    for (int net = GGN_NET_M; net < GGN_NETS && s->average[net]; net++)
+        ggn_weights_pack(s->trainer->weights[net], NULL);
     return rc;
 }
 
@@ -335,6 +376,8 @@ static int begin(struct ggn_session *s, struct base_err *err)
         s->best[net] = calloc(s->trainer->graph[net].n_learned, sizeof *s->best[net]);
         if (!s->best[net])
             return base_fail_nomem(err, "the best epoch");
+        if (s->plan->average && !(s->average[net] = calloc(s->trainer->graph[net].n_learned, sizeof *s->average[net])))
+            return base_fail_nomem(err, "averaged weights");
         struct ggn_weights *w = s->trainer->weights[net];
         if (!s->init)
             continue;

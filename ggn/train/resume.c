@@ -31,7 +31,10 @@ uint32_t ggn_resume_key(const struct ggn_session *s)
                               p->lr,
                               p->difference,
                               p->soft_labels,
+                              p->flips,
                               p->jitter,
+                              p->picture,
+                              p->average,
                               p->synthetic,
                               p->extend,
                               p->validation_windows,
@@ -68,11 +71,20 @@ static float *state_array(struct ggn_session *s, int i, size_t *count)
     if (i < 10)
         return ggn_trainer_state(s->trainer, i < 5 ? GGN_NET_M : GGN_NET_D, i % 5, count);
     static const int net_of[] = {GGN_NET_M, GGN_NET_D, GGN_NET_R};
+    float *const lists[] = {s->best[GGN_NET_M],    s->best[GGN_NET_D],    s->best[GGN_NET_R],
+                            s->average[GGN_NET_M], s->average[GGN_NET_D], s->average[GGN_NET_R]};
+    float *kept[6];
+    int nets[6], n = 0;
+    for (int k = 0; k < 6; k++)
+        if (lists[k]) {
+            nets[n] = net_of[k % 3];
+            kept[n++] = lists[k];
+        }
     i -= 10;
-    if (i > 2 || !s->best[net_of[i]])
+    if (i >= n)
         return NULL;
-    *count = s->trainer->graph[net_of[i]].n_learned;
-    return s->best[net_of[i]];
+    *count = s->trainer->graph[nets[i]].n_learned;
+    return kept[i];
 }
 
 /* --- JSON ------------------------------------------------------------------------------------------------------------- */

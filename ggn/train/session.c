@@ -48,6 +48,8 @@ static int check_plan(const struct ggn_session *s, struct base_err *err)
     if (!paper && (p->crop < 16 || p->crop > s->set.width || p->crop > s->set.height))
         return base_fail(err, BASE_EINVAL, "crop %d is not in 16..%d, the side of the blocks", p->crop,
                          s->set.width < s->set.height ? s->set.width : s->set.height);
+    if (paper && (p->picture > 0 || p->average > 0))
+        return base_fail(err, BASE_EINVAL, "preset paper has neither noise pictures nor averaged weights");
     if (p->k_r < 3)
         return base_fail(err, BASE_EINVAL, "the denoiser needs a width of at least 3");
     if (!s->train.n)
@@ -71,7 +73,10 @@ int ggn_session_init(struct ggn_session *s, struct base_err *err)
     const int paper = p->preset == GGN_PRESET_PAPER;
 
     s->threads = base_threads_create(p->threads > 0 ? p->threads : base_threads_available(), err);
-    int rc = s->threads ? ggn_chains_load(&s->set, &p->data, err) : BASE_ENOMEM;
+    struct ggn_chains_options data = p->data;
+    data.pictures = p->picture > 0;
+    data.mean_for_reference = 1;
+    int rc = s->threads ? ggn_chains_load(&s->set, &data, err) : BASE_ENOMEM;
 
     if (!rc && p->synthetic > 0)
         rc = ggn_chains_add_synthetic(&s->set, p->synthetic, p->seed, err);
@@ -95,14 +100,15 @@ int ggn_session_init(struct ggn_session *s, struct base_err *err)
                                   .window = p->window,
                                   .k_r = p->k_r,
                                   .k_m = p->k_m,
-                                  .k_d = p->k_d};
+                                  .k_d = p->k_d,
+                                  .picture = p->picture > 0};
     rc = ggn_network_build(&s->r_graph, GGN_NET_R, &s->hyper, err);
     s->r = rc ? NULL : ggn_weights_create(&s->r_graph, NULL, 0, err);
     if (!s->r)
         return rc ? rc : BASE_ENOMEM;
     size_t crops = 6 * (size_t)p->batch_r * (size_t)p->crop * (size_t)p->crop;
-    size_t windows = 2 * (size_t)p->batch * (size_t)p->window * ggn_chains_values(&s->set);
-    size_t pointers = 6 * (size_t)p->batch_r + 6 * (size_t)p->batch * (size_t)p->window;
+    size_t windows = (size_t)p->batch * (2 * (size_t)p->window + 1) * ggn_chains_values(&s->set);
+    size_t pointers = 6 * (size_t)p->batch_r + (6 * (size_t)p->window + 1) * (size_t)p->batch;
     s->buffer = malloc((crops > windows ? crops : windows) * sizeof *s->buffer);
     s->planes = malloc(pointers * sizeof *s->planes);
     return s->buffer && s->planes ? 0 : base_fail_nomem(err, "a batch");
@@ -113,8 +119,10 @@ void ggn_session_release(struct ggn_session *s)
     ggn_trainer_destroy(s->trainer);
     ggn_weights_destroy(s->r);
     ggn_model_destroy(s->init);
-    for (int net = 0; net < GGN_NETS; net++)
+    for (int net = 0; net < GGN_NETS; net++) {
         free(s->best[net]);
+        free(s->average[net]);
+    }
     free(s->buffer);
     free((void *)s->planes);
     ggn_log_release(&s->log);
@@ -132,9 +140,9 @@ int ggn_session_load_init(struct ggn_session *s, struct base_err *err)
         return rc;
     const struct ggn_hyper *a = &s->init->hyper, *b = &s->hyper;
     if (a->preset == b->preset && a->height == b->height && a->width == b->width && a->window == b->window &&
-        a->k_r == b->k_r && a->k_m == b->k_m && a->k_d == b->k_d)
+        a->k_r == b->k_r && a->k_m == b->k_m && a->k_d == b->k_d && a->picture == b->picture)
         return 0;
-    return base_fail(err, BASE_EINVAL, "%s: networks of another size or preset", s->plan->init);
+    return base_fail(err, BASE_EINVAL, "%s: networks of another size, preset or input", s->plan->init);
 }
 
 int ggn_session_begin(struct ggn_session *s, int parts, int batch, int height, int width, struct base_err *err)

@@ -23,6 +23,7 @@ struct ggn_train_plan ggn_train_plan_default(enum ggn_preset preset)
         .lr = lull ? 1e-3 : 2e-4,
         .difference = lull ? 8 : 0,
         .soft_labels = lull,
+        .flips = lull,
         .jitter = lull ? 0.3 : 0,
         .synthetic = lull ? 1 : 0,
         .extend = lull,

@@ -25,7 +25,12 @@ struct ggn_train_plan {
     double lr_r, lr;
     double difference; /* preset lull: see ggn_train_fold */
     int soft_labels;
-    double jitter;          /* octaves of exposure; see ggn_augment_draw */
+    int flips;              /* see ggn_augment_options */
+    double jitter;          /* octaves of exposure; see ggn_augment_options */
+    /* preset lull: share of windows that come with the noise picture of their newest image; 0: networks without that input
+     */
+    double picture;
+    int average;            /* preset lull: steps over which the weights of M and D are averaged; 0: none */
     int synthetic;          /* synthetic chains per block */
     int extend;             /* continue recorded chains beyond their last level, see ggn_chains_extend */
     int validation_windows; /* most windows per validation */

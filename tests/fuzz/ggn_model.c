@@ -35,7 +35,7 @@ static void decide(const struct ggn_model *m)
             n[i] = noisy;
             d[i] = denoised;
         }
-        ggn_judge_logit(j, n, d, m->hyper.width, m->hyper.height);
+        ggn_judge_logit(j, n, d, NULL, m->hyper.width, m->hyper.height);
     }
     ggn_judge_destroy(j);
     free(noisy);

@@ -50,7 +50,7 @@ static double decide(const struct ggn_model *m, float (*block)(int image, int k)
             noisy[i][k] = ggn_preprocess((double)block(i, k), NULL, counts);
         ggn_judge_denoise(j, noisy[i], denoised[i], SIDE, SIDE);
     }
-    double p = ggn_policy_p(&policy, ggn_judge_logit(j, n, d, SIDE, SIDE));
+    double p = ggn_policy_p(&policy, ggn_judge_logit(j, n, d, NULL, SIDE, SIDE));
     ggn_judge_destroy(j);
     return p;
 }

@@ -203,7 +203,7 @@ static void continued(void **state)
 static void network(void **state)
 {
     (void)state;
-    struct ggn_hyper hyper = {GGN_PRESET_LULL, 20, 24, WINDOW, 2, 2, 2};
+    struct ggn_hyper hyper = {GGN_PRESET_LULL, 20, 24, WINDOW, 2, 2, 2, 0};
     struct base_err err = {0};
     struct ggn_method m;
     struct ggn_model *model = ggn_model_create(&hyper, &err);

@@ -13,7 +13,7 @@
 #include "base/half.h"
 
 static char path[] = "/tmp/ggn_model.XXXXXX";
-static const struct ggn_hyper small = {GGN_PRESET_LULL, 16, 17, 2, 1, 2, 1};
+static struct ggn_hyper small = {GGN_PRESET_LULL, 16, 17, 2, 1, 2, 1, 0};
 
 static int setup(void **state)
 {
@@ -156,6 +156,29 @@ static void forge(const char *from, const char *to, const char *expected)
     free(data);
 }
 
+/* A model that takes the noise picture says so in its file, and a file that says so of other networks is refused. */
+static void test_picture(void **state)
+{
+    struct base_err err = {0};
+    struct ggn_hyper published = ggn_hyper_default(GGN_PRESET_PAPER);
+
+    small.picture = 1;
+    forge("\"picture\":\t1", "\"picture\":\t0", "does not have the shape");
+    forge("\"picture\":\t1", "\"picture\":\t7", "'picture' is missing or not a number in 0..1");
+    struct ggn_model *m = make(), *read = NULL;
+    assert_int_equal(ggn_model_save(m, path, GGN_F32, NULL), 0);
+    assert_int_equal(ggn_model_load(path, &read, &err), 0);
+    assert_int_equal(read->hyper.picture, 1);
+    assert_int_equal(read->graph[GGN_NET_D].value[0].c, 4);
+    ggn_model_destroy(m);
+    ggn_model_destroy(read);
+    small.picture = 0;
+    published.picture = 1;
+    assert_int_equal(ggn_hyper_check(&published, &err), BASE_EINVAL);
+    assert_non_null(strstr(err.text, "picture"));
+    (void)state;
+}
+
 static void test_forged(void **state)
 {
     char *data;
@@ -270,6 +293,7 @@ int main(void)
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_round_trip), cmocka_unit_test(test_truncated),
                                        cmocka_unit_test(test_bit_flips),  cmocka_unit_test(test_forged),
                                        cmocka_unit_test(test_not_finite), cmocka_unit_test(test_too_large),
-                                       cmocka_unit_test(test_paths),      cmocka_unit_test(test_half_floats)};
+                                       cmocka_unit_test(test_paths),      cmocka_unit_test(test_half_floats),
+                                       cmocka_unit_test(test_picture)};
     return cmocka_run_group_tests(tests, setup, teardown);
 }

@@ -11,7 +11,7 @@
 #include "nn/exec.h"
 #include "nn/hash.h"
 
-static const struct ggn_hyper hyper = {GGN_PRESET_LULL, 24, 33, 3, 4, 6, 3};
+static struct ggn_hyper hyper = {GGN_PRESET_LULL, 24, 33, 3, 4, 6, 3, 0};
 enum { AREA = 24 * 33, BYTES = 3 * AREA };
 
 static struct ggn_model *make(void)
@@ -32,8 +32,8 @@ static void image(uint8_t *rgb, uint32_t seed)
         rgb[k] = (uint8_t)(ggn_hash(k, seed) >> 24);
 }
 
-/* The logit of the window of images `first` and the next two. */
-static double window_logit(struct ggn_judge *j, uint32_t first)
+/* The logit of the window of images `first` and the next two, with a noise picture or NULL. */
+static double picture_logit(struct ggn_judge *j, uint32_t first, const uint8_t *picture)
 {
     static uint8_t noisy[3][BYTES];
     static uint16_t denoised[3][BYTES];
@@ -44,9 +44,14 @@ static double window_logit(struct ggn_judge *j, uint32_t first)
         image(noisy[i], first + i);
         ggn_judge_denoise(j, noisy[i], denoised[i], 33, 24);
     }
-    double logit = ggn_judge_logit(j, n, d, 33, 24);
+    double logit = ggn_judge_logit(j, n, d, picture, 33, 24);
     assert_true(isfinite(logit));
     return logit;
+}
+
+static double window_logit(struct ggn_judge *j, uint32_t first)
+{
+    return picture_logit(j, first, NULL);
 }
 
 /* The answer depends on the window alone: not on the judge, nor on what it judged before. */
@@ -65,8 +70,8 @@ static void test_no_memory(void **state)
     (void)state;
 }
 
-/* The judge is the three networks run plainly, but for the 16-bit storage of denoised images. */
-static void test_against_networks(void **state)
+/* The judge is the three networks run plainly, but for the 16-bit storage of denoised images. picture: NULL, none. */
+static void compare_with_networks(const uint8_t *picture)
 {
     struct ggn_model *m = make();
     struct ggn_judge *j = ggn_judge_create(m, GGN_PRECISION_F32, NULL, NULL);
@@ -77,7 +82,7 @@ static void test_against_networks(void **state)
     const int denoised = m->graph[GGN_NET_R].n_values - 1, out = m->graph[GGN_NET_M].n_values - 1;
 
     assert_true(j && den && gen && dis && rgb);
-    double got = window_logit(j, 1);
+    double got = picture_logit(j, 1, picture);
     for (int i = 0; i < 3; i++) {
         image(rgb, 1 + (uint32_t)i);
         for (int k = 0; k < BYTES; k++)
@@ -94,6 +99,10 @@ static void test_against_networks(void **state)
         for (int y = 0; y < 24; y++)
             memcpy(ggn_exec_plane(dis, 0, 0, c) + y * 34, ggn_exec_plane(gen, out, c, 0) + y * 34,
                    33 * sizeof(float));
+    for (int k = 0; k < AREA && hyper.picture; k++) {
+        ggn_exec_plane(dis, 0, 0, 2)[k / 33 * 34 + k % 33] = picture ? 16.0F * (float)picture[k] / 255 : 0;
+        ggn_exec_plane(dis, 0, 0, 3)[k / 33 * 34 + k % 33] = picture ? 1 : 0;
+    }
     ggn_exec_forward(dis, m->weights[GGN_NET_D], 1, GGN_EVAL);
     double want = (double)*ggn_exec_plane(dis, m->graph[GGN_NET_D].n_values - 1, 0, 0);
     if (!(fabs(got - want) < 1e-4 * fmax(1, fabs(want))))
@@ -104,6 +113,38 @@ static void test_against_networks(void **state)
     ggn_judge_destroy(j);
     ggn_model_destroy(m);
     free(rgb);
+}
+
+static void test_against_networks(void **state)
+{
+    compare_with_networks(NULL);
+    (void)state;
+}
+
+/* The noise picture reaches the discriminator; none is not the same as one without noise; other models do not look at it. */
+static void test_picture(void **state)
+{
+    static uint8_t picture[AREA], still[AREA];
+    struct ggn_judge *j;
+    struct ggn_model *m = make();
+
+    for (uint32_t k = 0; k < AREA; k++)
+        picture[k] = (uint8_t)(ggn_hash(k, 77) >> 30);
+    assert_non_null(j = ggn_judge_create(m, GGN_PRECISION_F32, NULL, NULL));
+    assert_true(picture_logit(j, 1, picture) == window_logit(j, 1));
+    ggn_judge_destroy(j);
+    ggn_model_destroy(m);
+    hyper.picture = 1;
+    compare_with_networks(picture);
+    compare_with_networks(NULL);
+    m = make();
+    assert_non_null(j = ggn_judge_create(m, GGN_PRECISION_F32, NULL, NULL));
+    double with = picture_logit(j, 1, picture), without = window_logit(j, 1), calm = picture_logit(j, 1, still);
+    assert_true(with != without && with != calm && calm != without);
+    assert_true(window_logit(j, 1) == without);
+    ggn_judge_destroy(j);
+    ggn_model_destroy(m);
+    hyper.picture = 0;
     (void)state;
 }
 
@@ -179,7 +220,7 @@ static void test_cleaning(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_no_memory),     cmocka_unit_test(test_against_networks),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_no_memory),     cmocka_unit_test(test_against_networks), cmocka_unit_test(test_picture),
                                        cmocka_unit_test(test_memory_bounds), cmocka_unit_test(test_bf16),
                                        cmocka_unit_test(test_srgb),          cmocka_unit_test(test_cleaning)};
     return cmocka_run_group_tests(tests, NULL, NULL);

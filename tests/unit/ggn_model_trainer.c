@@ -42,9 +42,11 @@ static int setup(void **state)
     return 0;
 }
 
+static int with_picture; /* of the networks that are made next */
+
 static struct ggn_trainer *make(enum ggn_preset preset, double lr, struct base_threads *threads)
 {
-    struct ggn_hyper hyper = {preset, H, W, WINDOW, 4, 6, 4};
+    struct ggn_hyper hyper = {preset, H, W, WINDOW, 4, 6, 4, with_picture};
     struct ggn_train_options options = ggn_train_options_default(preset);
     struct base_err err = {0};
 
@@ -90,6 +92,40 @@ static void test_learns(void **state)
     }
     if (!(last < 0.7 * first && last_bce < 0.6 * first_bce))
         fail_msg("1 - SSIM went from %g to %g, cross-entropy from %g to %g", first, last, first_bce, last_bce);
+    ggn_trainer_destroy(t);
+    (void)state;
+}
+
+/* Windows that do not differ, labels that the noise picture alone tells; one sample has none. */
+static void test_learns_from_the_picture(void **state)
+{
+    static float picture[BATCH][AREA];
+    const float *pictures[BATCH], *same[BATCH * PLANES];
+    struct base_err err = {0};
+    double bce = 0;
+
+    for (int n = 0; n < BATCH; n++) {
+        for (int k = 0; k < AREA; k++)
+            picture[n][k] = (n & 1 ? 0.5f : 0.05f) * (float)ggn_hash_unit((uint32_t)k, (uint32_t)(500 + n));
+        pictures[n] = n == 2 ? NULL : picture[n];
+    }
+    for (int i = 0; i < BATCH * PLANES; i++)
+        same[i] = data.denoised[i % PLANES];
+    struct ggn_batch batch = {.count = BATCH, .noisy = same, .denoised = same, .label = data.label, .picture = pictures};
+    with_picture = 1;
+    struct ggn_trainer *t = make(GGN_PRESET_LULL, 4e-3, NULL);
+    with_picture = 0;
+    for (int i = 0; i < 40; i++)
+        assert_int_equal(ggn_trainer_judge_step(t, &batch, &bce, NULL, &err), 0);
+    if (!(bce < 0.5)) /* log 2 = 0.69 is the least without the picture */
+        fail_msg("cross-entropy %g", bce);
+    const struct ggn_value *v = &t->graph[GGN_NET_D].value[0];
+    for (int n = 0; n < BATCH; n++)
+        for (int k = 0; k < AREA; k++) {
+            int at = k / W * v->row + k % W;
+            assert_true(ggn_exec_plane(t->d, 0, n, 2)[at] == (n == 2 ? 0 : picture[n][k]));
+            assert_true(ggn_exec_plane(t->d, 0, n, 3)[at] == (n == 2 ? 0 : 1));
+        }
     ggn_trainer_destroy(t);
     (void)state;
 }
@@ -193,7 +229,7 @@ static void test_copy(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_learns), cmocka_unit_test(test_resume_and_threads),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_learns), cmocka_unit_test(test_learns_from_the_picture), cmocka_unit_test(test_resume_and_threads),
                                        cmocka_unit_test(test_paper), cmocka_unit_test(test_copy)};
     return cmocka_run_group_tests(tests, setup, NULL);
 }

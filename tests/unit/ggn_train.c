@@ -13,7 +13,9 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "ggn_noise.h"
 #include "ggn_seqgen.h"
+#include "sequence/manifest.h"
 #include "nn/exec.h"
 #include "train/fit_policy.h"
 #include "train/start.h"
@@ -146,6 +148,143 @@ static void windows_are_labelled_by_their_last_image(void **state)
     assert_true(drawn[0] > 120 && drawn[1] > 120);
     ggn_windows_release(&w);
     ggn_windows_release(&published);
+    ggn_chains_release(&set);
+    (void)state;
+}
+
+/* --- noise pictures --- */
+
+static int code(double linear)
+{
+    double v = linear > 0 ? linear < 1 ? linear : 1 : 0;
+    return (int)floor(255 * (v <= 0.0031308 ? 12.92 * v : 1.055 * pow(v, 1 / 2.4) - 0.055) + 0.5);
+}
+
+/* The noise picture of level k of a recorded block by its definition, from the halves of record `from`. */
+static void compare_picture(const struct ggn_chains *set, const struct ggn_chain *c, int k, const struct seq_block *b,
+                            const struct seq_record *r, const struct seq_record *from)
+{
+    const size_t pixels = ggn_chains_values(set) / 3;
+    float *mean = malloc(4 * pixels * sizeof *mean), *d = mean + 3 * pixels;
+    struct base_err err = {0};
+
+    assert_int_equal(seq_mean(b, r, mean, &err), 0);
+    assert_int_equal(seq_half_luminance(b, from, d, &err), 0);
+    assert_true(c->has_picture[k]);
+    int largest = 0;
+    for (size_t p = 0; p < pixels; p++) {
+        double y = 0.2126729 * (double)mean[p] + 0.7151522 * (double)mean[pixels + p] + 0.0721750 * (double)mean[2 * pixels + p];
+        int want = abs(code(y + sqrt((double)from->spp / r->spp) * (double)d[p]) - code(y)), got = c->picture[(size_t)k * pixels + p];
+        assert_true(abs(got - want) <= 1); /* a value between two codes may be rounded either way */
+        largest = want > largest ? want : largest;
+    }
+    assert_true(largest > 1);
+    free(mean);
+}
+
+/* From a level's own halves where it has them, else from those of the full level. */
+static void pictures_of_recorded_levels(void **state)
+{
+    char own[] = "/tmp/ggn_pictures.XXXXXX", view[64];
+    static const uint32_t levels[] = {8, 16, 32, 64};
+    const struct ggn_noise noise = {.width = 20, .height = 16, .levels = levels, .n_levels = 4, .sigma = 0.3, .seed = 4};
+    const double sigma[] = {0.3};
+    const char *const dirs[] = {own, dir};
+    struct base_err err = {0};
+
+    assert_non_null(mkdtemp(own));
+    snprintf(view, sizeof view, "%s/view", own);
+    ggn_noise_view(view, "view", &noise, sigma, 1, 100);
+    for (int which = 0; which < 2; which++) {
+        struct ggn_chains_options o = {.dir = dirs[which], .pictures = 1};
+        struct ggn_chains set;
+        struct seq_block b;
+        if (ggn_chains_load(&set, &o, &err))
+            fail_msg("%s", err.text);
+        const struct ggn_chain *c = &set.chains[0];
+        const struct ggn_dataset_view *v = &set.data.views[c->view];
+        assert_int_equal(seq_manifest_read_block(v->dir, &v->manifest, 0, &b, &err), 0);
+        int full = 0, with = 0;
+        for (int k = 0; k < c->n_levels; k++) {
+            full = seq_has(&b.levels[k], SEQ_PLANE_HALF_F16) ? k : full;
+            with += seq_has(&b.levels[k], SEQ_PLANE_HALF_F16) || seq_has(&b.levels[k], SEQ_PLANE_HALF_LOG);
+        }
+        assert_int_equal(with, which == 0 ? c->n_levels : 1);
+        for (int k = 0; k < c->n_levels; k++)
+            compare_picture(&set, c, k, &b, &b.levels[k], &b.levels[which == 0 ? k : full]);
+        seq_block_release(&b);
+        ggn_chains_release(&set);
+    }
+    struct ggn_chains_options o = {.dir = own};
+    struct ggn_chains set;
+    assert_int_equal(ggn_chains_load(&set, &o, &err), 0);
+    assert_null(set.chains[0].picture);
+    struct ggn_augment none = ggn_augment_none();
+    assert_int_equal(ggn_picture_plane(&set.chains[0], 1, set.width, set.height, &none, NULL), 0);
+    ggn_chains_release(&set);
+    (void)state;
+}
+
+/* Levels that were never rendered have pictures as strong as those of rendered levels at the same samples. */
+static void pictures_of_made_levels(void **state)
+{
+    struct ggn_chains_options o = {.dir = dir, .pictures = 1, .mean_for_reference = 1};
+    struct ggn_chains set;
+    struct base_err err = {0};
+    double sum[2] = {0, 0};
+
+    if (ggn_chains_load(&set, &o, &err))
+        fail_msg("%s", err.text);
+    for (int i = 0; i < set.n; i++)
+        set.chains[i].label.threshold = 400;
+    assert_int_equal(ggn_chains_add_synthetic(&set, 1, 3, &err), 0);
+    assert_int_equal(ggn_chains_extend(&set, 3, &err), 0);
+    const size_t pixels = ggn_chains_values(&set) / 3;
+    for (int i = 0; i < set.n; i++) {
+        const struct ggn_chain *c = &set.chains[i];
+        for (int k = 2; k < c->n_levels; k++) {
+            double mean = 0;
+            assert_true(c->has_picture[k]);
+            for (size_t p = 0; p < pixels; p++)
+                mean += c->picture[(size_t)k * pixels + p] / (double)pixels;
+            if (c->spp[k] < 100) /* codes of more than one, so that rounding matters little */
+                sum[c->synthetic] += mean * sqrt(c->spp[k]) / (c->synthetic ? 9 : 12);
+        }
+    }
+    if (fabs(sum[1] / sum[0] - 1) > 0.15)
+        fail_msg("made %g, rendered %g", sum[1], sum[0]);
+    ggn_chains_release(&set);
+    (void)state;
+}
+
+/* Flips and gains as of the images, and nothing for the share of samples that goes without. */
+static void pictures_are_augmented_with_their_window(void **state)
+{
+    struct ggn_chains_options o = {.dir = dir, .pictures = 1};
+    struct ggn_chains set;
+    struct base_err err = {0};
+    struct ggn_augment a = {.flip_x = 1, .flip_y = 1, .gain = {2, 2, 2}};
+    const struct ggn_augment_options half = {.picture = 0.5}, all = {.flips = 1, .picture = 1};
+    int blind = 0, flips = 0;
+
+    assert_int_equal(ggn_chains_load(&set, &o, &err), 0);
+    const struct ggn_chain *c = &set.chains[0];
+    const size_t pixels = ggn_chains_values(&set) / 3;
+    float *plane = malloc(pixels * sizeof *plane);
+    assert_int_equal(ggn_picture_plane(c, 3, set.width, set.height, &a, plane), 1);
+    for (size_t p = 0; p < pixels; p++) /* (2^(1/2.4) codes of 16/255 each) */
+        assert_float_equal(plane[pixels - 1 - p], 1.334840 * 16 / 255 * c->picture[3 * pixels + p], 1e-4);
+    a.blind = 1;
+    assert_int_equal(ggn_picture_plane(c, 3, set.width, set.height, &a, plane), 0);
+    for (int i = 0; i < 1000; i++) {
+        struct ggn_augment without = ggn_augment_draw((uint64_t)i, 1, 5, &half), with = ggn_augment_draw((uint64_t)i, 1, 5, &all);
+        assert_false(with.blind || without.flip_x || without.flip_y || without.transpose || with.transpose);
+        blind += without.blind;
+        flips += with.flip_x;
+    }
+    assert_in_range(blind, 430, 570);
+    assert_in_range(flips, 430, 570);
+    free(plane);
     ggn_chains_release(&set);
     (void)state;
 }
@@ -363,6 +502,9 @@ int main(int argc, char **argv)
         cmocka_unit_test(extended_levels_continue_the_recording),
         cmocka_unit_test(windows_are_labelled_by_their_last_image),
         cmocka_unit_test(augmentation_moves_whole_windows),
+        cmocka_unit_test(pictures_of_recorded_levels),
+        cmocka_unit_test(pictures_of_made_levels),
+        cmocka_unit_test(pictures_are_augmented_with_their_window),
         cmocka_unit_test(folding_keeps_the_function),
         cmocka_unit_test(the_denoiser_begins_near_its_input),
         cmocka_unit_test(platt_recovers_the_scale),
