@@ -286,8 +286,10 @@ static int check_together(struct pt_cli *cli, struct base_err *err)
         return base_fail(err, BASE_EINVAL, "--resume needs --checkpoint FILE");
     if (!cli->sequence && (cli->levels || cli->sequence_blocks || cli->reference_spp > 0 || cli->name))
         return base_fail(err, BASE_EINVAL, "--levels, --blocks, --reference-spp and --name belong to --sequence DIR");
-    if (cli->sequence && (cli->spp > 0 || cli->checkpoint || cli->has_crop))
-        return base_fail(err, BASE_EINVAL, "--sequence goes with neither --spp, --checkpoint nor --crop");
+    if (cli->sequence && (cli->spp > 0 || cli->checkpoint || cli->has_crop || cli->mask))
+        return base_fail(err, BASE_EINVAL, "--sequence goes with neither --spp, --checkpoint, --crop nor --mask");
+    if (cli->mask && cli->spp > 0)
+        return base_fail(err, BASE_EINVAL, "--mask %s: --spp takes the same samples everywhere", cli->mask);
     if (cli->param_count > 0 && cli->spp > 0 && !cli->criterion)
         return base_fail(err, BASE_EINVAL, "-p %s=%s: no criterion is used", cli->params[0].key, cli->params[0].value);
     return 0;

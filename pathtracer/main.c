@@ -292,7 +292,7 @@ static int write_outputs(struct session *s, int was_interrupted, struct base_err
 {
     const struct pt_cli *cli = &s->cli;
     struct pt_output_info info = {.scene = cli->scene, .params = cli->params, .param_count = cli->param_count,
-                                  .effects = s->scene->effects, .kernel = s->kernel_name,
+                                  .mask = cli->mask, .effects = s->scene->effects, .kernel = s->kernel_name,
                                   .threads = base_threads_count(s->threads), .reproducible = cli->reproducible,
                                   .aov = cli->aov, .scene_bytes = s->scene->stats.bytes, .interrupted = was_interrupted};
     write_or_keep(s, pt_output_exr, cli->output, &info, err);

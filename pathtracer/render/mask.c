@@ -60,6 +60,11 @@ int pt_mask_step(const struct pt_mask *mask, const struct pt_block *b)
     return (int)(lightest * PT_MASK_STEPS + 0.5f);
 }
 
+double pt_mask_scale(int step)
+{
+    return pow(WHITE_SCALE, (double)step / PT_MASK_STEPS);
+}
+
 static const struct lull_param *find_param(const struct lull_criterion *t, const char *name)
 {
     for (uint32_t i = 0; i < t->param_count; i++) {
@@ -74,6 +79,7 @@ int pt_mask_dial(const struct lull_criterion *t, const struct lull_pair *pairs, 
                  char value[32], struct lull_pair *pair, struct base_err *err)
 {
     static const char *const dials[] = {"visible", "threshold"};
+    const char *known = NULL; /* a dial that has no value */
     for (size_t d = 0; d < sizeof dials / sizeof dials[0]; d++) {
         const struct lull_param *p = find_param(t, dials[d]);
         const char *text = p ? p->default_value : NULL;
@@ -81,13 +87,17 @@ int pt_mask_dial(const struct lull_criterion *t, const struct lull_pair *pairs, 
             if (strcmp(pairs[i].key, dials[d]) == 0)
                 text = pairs[i].value;
         double dial;
+        if (p && !text && !known)
+            known = dials[d];
         if (!text || !base_parse_real(text, p->min, p->max, &dial))
             continue;
-        dial *= pow(WHITE_SCALE, (double)step / PT_MASK_STEPS);
+        dial *= pt_mask_scale(step);
         snprintf(value, 32, "%.17g", fmin(fmax(dial, p->min), p->max));
         *pair = (struct lull_pair){dials[d], value};
         return 0;
     }
-    return base_fail(err, BASE_EINVAL, "criterion %s has no dial 'visible' or 'threshold' with a value for --mask to scale",
-                     t->id);
+    if (known)
+        return base_fail(err, BASE_EINVAL, "criterion %s: --mask scales '%s', which has no value: give it with -p %s=VALUE",
+                         t->id, known, known);
+    return base_fail(err, BASE_EINVAL, "criterion %s has no dial 'visible' or 'threshold' for --mask to scale", t->id);
 }

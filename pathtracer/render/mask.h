@@ -27,6 +27,9 @@ void pt_mask_release(struct pt_mask *mask);
 /* In 0 … PT_MASK_STEPS: how many eighths of the way to a quarter of the dial this block goes. */
 int pt_mask_step(const struct pt_mask *mask, const struct pt_block *block);
 
+/* The factor of the dial, 1 for step 0. */
+double pt_mask_scale(int step);
+
 /* Writes the dial's pair for a step: *pair points to static text and to `value`. pairs are those of the criterion. */
 int pt_mask_dial(const struct lull_criterion *table, const struct lull_pair *pairs, uint32_t pair_count, int step,
                  char value[32], struct lull_pair *pair, struct base_err *err);

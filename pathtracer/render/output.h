@@ -12,6 +12,7 @@ struct pt_output_info {
     const char *scene;           /* path of the scene file */
     const struct lull_pair *params; /* of the criterion, as given */
     uint32_t param_count;
+    const char *mask;            /* path of the picture that scales the dial; NULL = none */
     pt_effects effects;          /* what the scene calls for */
     const char *kernel;          /* name of the kernel that rendered it */
     int threads;

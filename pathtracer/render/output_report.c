@@ -55,6 +55,7 @@ static void add_blocks(cJSON *root, const struct pt_render *r, int *failed)
         base_json_number(o, "error", b->error, failed);
         base_json_number(o, "checks", b->checks, failed);
         base_json_number(o, "thread_s", b->thread_s, failed);
+        base_json_number(o, "dial", r->criterion ? pt_mask_scale(r->criterion->step[i]) : NAN, failed);
     }
 }
 
@@ -103,6 +104,7 @@ int pt_output_report(const char *path, const struct pt_render *r, const struct p
     base_json_number(root, "seed", r->config.integrator.seed, &failed);
     base_json_number(root, "threads", info->threads, &failed);
     add_criterion(root, r, info, &failed);
+    base_json_text(root, "mask", info->mask, &failed);
     cJSON *effects = base_json_array(root, "effects", &failed);
     for (int i = 0; i < PT_FX_COUNT; i++)
         if (info->effects >> i & 1)

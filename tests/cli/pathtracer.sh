@@ -1,30 +1,6 @@
 #!/bin/sh
 # The command line of pathtracer: every option, every error, interrupting and going on.
-set -u
-here=$(cd "$(dirname "$0")" && pwd)
-P=$(cd "${BUILD:-build}" && pwd)/bin/pathtracer
-scene=$here/room.pbrt
-dir=$(mktemp -d) || exit 2
-trap 'rm -rf "$dir"' EXIT
-cd "$dir" || exit 2
-n=0 bad=0
-unset LULL_PLUGIN_PATH
-
-t() { # t DESCRIPTION COMMAND...: passes when the command succeeds
-    n=$((n + 1)); what=$1; shift
-    if "$@" >log 2>&1; then echo "ok $n - $what"; else echo "not ok $n - $what"; sed 's/^/# /' log; bad=1; fi
-}
-refused() { # refused TEXT ARGUMENTS...: exit status 2, one line on stderr that contains TEXT, nothing left behind
-    n=$((n + 1)); text=$1; shift
-    before=$(ls -A)
-    "$P" "$@" >out 2>err; status=$?
-    rm -f out
-    lines=$(wc -l <err)
-    if [ $status -eq 2 ] && [ "$lines" -eq 1 ] && grep -qF -- "$text" err; then echo "ok $n - refused: $*"
-    else echo "not ok $n - refused: $* (status $status)"; sed 's/^/# /' err; bad=1; fi
-    rm -f err
-    [ "$before" = "$(ls -A)" ] || { n=$((n + 1)); bad=1; echo "not ok $n - left files behind: $*"; }
-}
+. "$(dirname "$0")/pathtracer_setup"
 layers() { oiiotool --info -v "$1" | grep -F 'channel list' | grep -qF "$2"; }
 same() { cmp "$1" "$2"; }
 differ() { ! cmp -s "$1" "$2"; }

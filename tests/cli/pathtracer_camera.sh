@@ -1,24 +1,6 @@
 #!/bin/sh
 # pathtracer --look-at and --fov: the same picture as a file with that camera, refusals, and what a resumed run must notice.
-set -u
-here=$(cd "$(dirname "$0")" && pwd)
-P=$(cd "${BUILD:-build}" && pwd)/bin/pathtracer
-scene=$here/room.pbrt
-dir=$(mktemp -d) || exit 2
-trap 'rm -rf "$dir"' EXIT
-cd "$dir" || exit 2
-n=0 bad=0
-
-t() { # t DESCRIPTION COMMAND...: passes when the command succeeds
-    n=$((n + 1)); what=$1; shift
-    if "$@" >log 2>&1; then echo "ok $n - $what"; else echo "not ok $n - $what"; sed 's/^/# /' log; bad=1; fi
-}
-refused() { # refused TEXT ARGUMENTS...: exit status 2, one line on stderr that contains TEXT
-    n=$((n + 1)); text=$1; shift
-    "$P" "$@" >out 2>err; status=$?
-    if [ $status -eq 2 ] && [ "$(wc -l <err)" -eq 1 ] && grep -qF -- "$text" err; then echo "ok $n - refused: $*"
-    else echo "not ok $n - refused: $* (status $status)"; sed 's/^/# /' err; bad=1; fi
-}
+. "$(dirname "$0")/pathtracer_setup"
 same() { oiiotool --fail 0 --warn 0 "$1" "$2" --diff; }
 differ() { ! same "$1" "$2"; }
 shot() { out=$1; shift; "$P" -q --spp 8 -o "$out" "$@"; }

@@ -1,24 +1,6 @@
 #!/bin/sh
 # pathtracer --mask: painted blocks get more samples, the others the same; refusals, and what a resumed run must notice.
-set -u
-here=$(cd "$(dirname "$0")" && pwd)
-P=$(cd "${BUILD:-build}" && pwd)/bin/pathtracer
-scene=$here/room.pbrt
-dir=$(mktemp -d) || exit 2
-trap 'rm -rf "$dir"' EXIT
-cd "$dir" || exit 2
-n=0 bad=0
-
-t() { # t DESCRIPTION COMMAND...: passes when the command succeeds
-    n=$((n + 1)); what=$1; shift
-    if "$@" >log 2>&1; then echo "ok $n - $what"; else echo "not ok $n - $what"; sed 's/^/# /' log; bad=1; fi
-}
-refused() { # refused TEXT ARGUMENTS...: exit status 2, one line on stderr that contains TEXT
-    n=$((n + 1)); text=$1; shift
-    "$P" "$@" >out 2>err; status=$?
-    if [ $status -eq 2 ] && [ "$(wc -l <err)" -eq 1 ] && grep -qF -- "$text" err; then echo "ok $n - refused: $text"
-    else echo "not ok $n - refused: $text (status $status)"; sed 's/^/# /' err; bad=1; fi
-}
+. "$(dirname "$0")/pathtracer_setup"
 common="$scene -q --size 64x48 --block 16 -c halfbuf -p threshold=0.02 --spp-max 4000"
 counts() { cut -d';' -f2- "$1" | tr ';' '\n' | grep .; }
 # block 5 is touched by one white pixel, block 6 by a grey one: 4^-1 and 4^-0.5 of the dial
@@ -42,6 +24,15 @@ t "a black mask changes nothing" cmp plain.csv black.csv
 observed() { "$P" "$scene" -q --size 64x48 --block 16 -c observer --spp-max 4000 --stop-map "$@"; }
 observed v.csv --mask mask.png --visible 0.4 && observed w.csv --visible 0.1
 t "--visible is scaled too" test "$(of v.csv 6)" = "$(of w.csv 6)"
+judged() { "$P" "$scene" -q --size 64x48 --block 16 -c ggn --spp-max 400 "$@"; }
+judged --stop-map g.csv --mask mask.png --visible 0.9 --report g.json
+judged --stop-map gw.csv --visible 0.225
+judged --stop-map gp.csv --visible 0.9
+t "ggn: the dial of the network is scaled" test "$(of g.csv 6) $(others g.csv)" = "$(of gw.csv 6) $(others gp.csv)"
+t "  …and that is more than without" test "$(of g.csv 6)" -gt "$(of gp.csv 6)"
+dials() { grep -o '"dial":[[:space:]]*[0-9.]*' "$1" | grep -o '[0-9.]*$' | tr '\n' ' '; }
+t "the report names the mask" grep -q '"mask":[[:space:]]*"mask.png"' g.json
+t "  …and the factor of each block" test "$(dials g.json)" = "1 1 1 1 1 0.25 0.5 1 1 1 1 1 "
 
 "$P" $common --mask mask.png --time-budget 0.05 --checkpoint c.ckpt --stop-map part.csv
 "$P" $common --mask mask.png --checkpoint c.ckpt --resume --stop-map resumed.csv
@@ -51,6 +42,9 @@ refused "mask" $common --mask black.png --checkpoint d.ckpt --resume
 refused "60x48 pixels" $common --mask small.png
 refused "text.png" $common --mask text.png
 refused "none.png" $common --mask none.png
+refused "takes the same samples" $scene -q --size 64x48 --spp 4 --mask mask.png -o x.exr
+refused "nor --mask" $scene -q --size 64x48 --block 16 --sequence seq --levels linear:4:8:4 --mask mask.png
+refused "-p visible=VALUE" $scene -q --size 64x48 -c ggn --mask mask.png
 refused "no dial" $scene -q --size 64x48 -c fixed --mask mask.png
 echo "1..$n"
 exit $bad

@@ -202,16 +202,22 @@ def test_same_stops_as_pathtracer():
 
 
 def test_mask_of_pathtracer():
-    """a mask does in the driver what --mask does in the path tracer"""
+    """a mask does in the driver what --mask does in the path tracer, and both reports say so alike"""
     mask = np.zeros((80, 96))
     mask[7, 50], mask[60, 3] = 1, .4
     png.write(tmp("mask.png"), np.dstack([(255 * mask).round().astype(np.uint8)] * 3))
-    subprocess.run([PATHTRACER, "scenes/cornell-box.pbrt", "-q", "--size", "96x80", "--block", "48", "-c", "halfbuf", "-p",
-                    "threshold=.03", "--mask", tmp("mask.png"), "--stop-map", tmp("mask.csv")], check=True)
-    wanted = [int(v) for v in Path(tmp("mask.csv")).read_text().split(";")[1:5]]
-    f = lull.Frame(lull.load("halfbuf", threshold=.03), 96, 80, block=48, mask=png.read_grey(tmp("mask.png")))
-    assert Playback(f, PATHTRACER, "scenes/cornell-box.pbrt", []).run().outcome == "done"
-    assert [b.spp for b in f.blocks] == wanted and wanted[1] > 2 * wanted[0], wanted
+    for criterion, dial, value in (("halfbuf", "threshold", .03), ("ggn", "visible", .9)):
+        subprocess.run([PATHTRACER, "scenes/cornell-box.pbrt", "-q", "--size", "96x80", "--block", "48", "-c", criterion, "-p",
+                        f"{dial}={value}", "--spp-max", "400", "--mask", tmp("mask.png"), "--report", tmp("mask.json")],
+                       check=True)
+        wanted = json.loads(Path(tmp("mask.json")).read_text())
+        f = lull.Frame(lull.load(criterion, **{dial: value}), 96, 80, block=48, spp_max=400, mask=png.read_grey(tmp("mask.png")))
+        d = Playback(f, PATHTRACER, "scenes/cornell-box.pbrt", [])
+        assert d.run().outcome == "done"
+        own = outputs.report(d, mask=tmp("mask.png"))
+        seen = [[(b["spp"], b["dial"]) for b in r["blocks"]] for r in (own, wanted)]
+        assert seen[0] == seen[1] and seen[0][1][0] > 1.5 * seen[0][0][0], (criterion, seen)
+        assert own["mask"] == wanted["mask"] == tmp("mask.png") and [b[1] for b in seen[0]] == [1, .25, .25 ** .375, 1]
 
 
 def test_stop_map():
@@ -427,6 +433,11 @@ def test_mask():
     spp = [b.spp for b in painted.blocks]
     assert spp[1] > 3 * plain.blocks[1].spp and [spp[i] for i in (0, 2, 3)] == [plain.blocks[i].spp for i in (0, 2, 3)]
     raises(ValueError, "no dial", run, "fixed", parameters={}, mask=mask)
+    raises(ValueError, "'visible', which has no value", run, "ggn", parameters={}, mask=mask)
+    raises(ValueError, "uniform", run, mask=mask, driver={"uniform": True})
+    saved, other = (lull.Driver(lull.Frame(lull.load("halfbuf"), 32, 32, block=16, mask=m), None) for m in (mask, mask * 0))
+    checkpoint.save(tmp("masked.npz"), saved)
+    raises(ValueError, "its mask is", checkpoint.load, tmp("masked.npz"), other)
     raises(ValueError, "shape", run, mask=mask[:3])
     raises(ValueError, "[0, 1]", run, mask=mask + 1)
 

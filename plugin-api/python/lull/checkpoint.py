@@ -20,7 +20,7 @@ def _settings(driver: Driver) -> dict:
     frame, criterion = driver.frame, driver.frame.criterion
     return {"picture": [frame.width, frame.height], "crop": list(frame.crop),
             "block": [frame.block_width, frame.block_height], "seed": frame.seed,
-            "planes": list(frame.planes), "wave": driver.wave,
+            "planes": list(frame.planes), "wave": driver.wave, "mask": frame.dials,
             "criterion": [criterion.info.id, criterion.info.version, criterion.parameters]}
 
 

@@ -75,6 +75,8 @@ class Driver:
             raise ValueError(f"wave {wave}: expected at least 1 sample")
         if max_seam and max_seam < 1:
             raise ValueError(f"max_seam {max_seam}: expected 0 or at least 1")
+        if uniform and min(frame.dials) < 1:
+            raise ValueError("mask: uniform takes the same samples everywhere")
         self.frame, self.render, self.wave, self.whole_waves, self.uniform = frame, render, wave, whole_waves, uniform
         self.max_check_overhead, self.max_seam, self.threads = max_check_overhead, max_seam, threads
         self.after_call, self.suspend, self.warn = after_call, suspend, warn

@@ -24,6 +24,7 @@ class Frame:
     and its halves (of moment2, albedo, normal, depth); kept only if the criterion reads them.
     display: maps linear radiance [..., 3] to linear display values in [0, 1], for hosts whose view is not
     transfer(exposure · value); the criterion then judges these. mask: [height, width] in [0, 1], see lull.mask.
+    dials: for each block, the factor that the mask gives the criterion's dial.
     sums: `color`, `half` [h, w, 3], `moment2` [h, w], …; `dropped`, `dropped_half` [h, w]: samples left out for a value
     that is not finite. y grows downwards.
     """
@@ -48,7 +49,8 @@ class Frame:
         self.sums = {name: np.zeros(shape + ((3,) if CHANNELS[name] == 3 else ()))
                      for name in self.planes if name not in COUNTS}
         self.dropped, self.dropped_half = np.zeros(shape, np.uint32), np.zeros(shape, np.uint32)
-        self._owned, self._judge = judges_of(criterion, dial_scales(mask, self.blocks, width, height))
+        self.dials = dial_scales(mask, self.blocks, width, height)
+        self._owned, self._judge = judges_of(criterion, self.dials)
         for judge in {id(j): j for j in self._judge}.values():
             judge.begin_frame(width, height, [b.rect for b in self.blocks], self.planes, spp_min=spp_min, spp_max=spp_max,
                               seed=seed, time_budget_s=time_budget_s, exposure=1.0 if display else exposure,

@@ -34,12 +34,13 @@ def dial_scales(mask: Optional[np.ndarray], blocks: Sequence[Block], width: int,
 
 def dial_of(criterion: Criterion) -> tuple[Parameter, float]:
     """The criterion's dial and its value."""
-    for name in ("visible", "threshold"):
-        parameter = criterion.info.parameter(name)
-        value = criterion.parameters.get(name, parameter.default) if parameter else None
-        if parameter and value is not None:
+    known = [p for p in map(criterion.info.parameter, ("visible", "threshold")) if p]
+    for parameter in known:
+        value = criterion.parameters.get(parameter.name, parameter.default)
+        if value is not None:
             return parameter, float(value)
-    raise ValueError(f"criterion {criterion.info.id} has no dial 'visible' or 'threshold' with a value for a mask to scale")
+    raise ValueError(f"criterion {criterion.info.id}: a mask scales '{known[0].name}', which has no value: give it one"
+                     if known else f"criterion {criterion.info.id} has no dial 'visible' or 'threshold' for a mask to scale")
 
 
 def judges_of(criterion: Criterion, scales: Sequence[float]) -> tuple[list[Criterion], list[Criterion]]:

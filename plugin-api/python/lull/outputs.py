@@ -46,8 +46,8 @@ def _number(value: float) -> Optional[float]:
     return value if math.isfinite(value) else None
 
 
-def report(driver: Driver, scene: str = "", kernel: str = "", interrupted: bool = False) -> dict:
-    """Everything about the run; members and meanings as in the path tracer's --report. null: not known."""
+def report(driver: Driver, scene: str = "", kernel: str = "", interrupted: bool = False, mask: Optional[str] = None) -> dict:
+    """Everything about the run; members and meanings as in the path tracer's --report. null: not known. mask: its file."""
     frame, totals, criterion = driver.frame, driver.totals, driver.frame.criterion
     bytes_kept = sum(s.nbytes for s in frame.sums.values()) + frame.dropped.nbytes + frame.dropped_half.nbytes
     square = frame.block_width == frame.block_height
@@ -57,10 +57,10 @@ def report(driver: Driver, scene: str = "", kernel: str = "", interrupted: bool 
         "threads": driver.threads,
         "criterion": {"id": criterion.info.id, "version": criterion.info.version,
                       "params": {p.name: criterion.parameters.get(p.name, p.default) for p in criterion.info.parameters}},
-        "effects": [],
+        "mask": mask, "effects": [],
         "blocks": [{"id": b.id, "x0": b.rect.x0, "y0": b.rect.y0, "x1": b.rect.x1, "y1": b.rect.y1, "spp": b.spp,
                     "reason": b.reason, "p_noisy": _number(b.p_noisy), "error": _number(b.error), "checks": b.checks,
-                    "thread_s": b.thread_s} for b in frame.blocks],
+                    "thread_s": b.thread_s, "dial": dial} for b, dial in zip(frame.blocks, frame.dials)],
         "totals": {"samples": totals.samples, "render_s": totals.render_s, "criterion_s": totals.criterion_s,
                    "paths": totals.samples, "rays": None,
                    "paths_per_s": totals.samples / totals.render_s if totals.render_s > 0 else None, "rays_per_s": None,

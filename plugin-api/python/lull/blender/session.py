@@ -71,7 +71,8 @@ class Session:
         writers = ((s.output, lambda p: outputs.write_exr(p, self.driver, scene, f"lull for Python 1.0; {kernel}")),
                    (s.preview, lambda p: outputs.write_preview(p, self.driver)),
                    (s.stop_map, lambda p: stopmap.write(p, self.frame.blocks, scene)),
-                   (s.report, lambda p: outputs.write_report(p, self.driver, scene, kernel, interrupted)))
+                   (s.report, lambda p: outputs.write_report(p, self.driver, scene, kernel, interrupted,
+                                                                       s.mask or None)))
         written = []
         for path, write in writers:
             if path:
