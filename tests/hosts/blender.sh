@@ -4,7 +4,8 @@ BUILD=${BUILD:-build}
 export BUILD
 lines='^(ok|not ok|#|1\.\.)'
 if command -v blender >/dev/null; then
-    blender -b --factory-startup -noaudio --python tests/hosts/test_blender.py 2>&1 | grep -E "$lines"
+    . tests/hosts/find-python
+    PYTHON=$python blender -b --factory-startup -noaudio --python tests/hosts/test_blender.py 2>&1 | grep -E "$lines"
 else
     echo "ok 1 - Blender # SKIP no blender: run make test-hosts"
 fi

@@ -1,6 +1,7 @@
 """Blender's Cycles as a host; run inside Blender or by a Python with the module bpy. BUILD names the build folder."""
 import json
 import os
+import runpy
 import signal
 import subprocess
 import sys
@@ -73,6 +74,35 @@ def test_same_picture():
     assert whole.std() > .01 and abs(mean - whole).max() < SAME * whole.max(), abs(mean - whole).max()
 
 
+def exported(name, width=48, height=36):
+    """A scene of ours, as scripts/hosts/pbrt_to_blend.py makes it."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    arguments, sys.argv = sys.argv, ["", "--", str(ROOT / f"scenes/{name}.pbrt"), tmp(f"{name}.blend"), f"{width}x{height}"]
+    try:
+        runpy.run_path(str(ROOT / "scripts/hosts/pbrt_to_blend.py"))
+    finally:
+        sys.argv = arguments
+    bpy.ops.wm.open_mainfile(filepath=tmp(f"{name}.blend"))
+    return bpy.context.scene
+
+
+def test_exported_scenes():
+    """three scenes of ours: where blocks stopped, the picture is that of one Cycles render with the same samples"""
+    for name, threshold in (("cornell-box", ".01"), ("soft-shadow", ".006"), ("glossy", ".02")):
+        scene = exported(name)
+        with Session(scene, Settings("halfbuf", {"threshold": threshold, "tail-share": "1"}, block=24, spp_max=96)) as session:
+            assert session.driver.run().outcome == "done"
+            mean, blocks = session.frame.mean(), session.frame.blocks
+        counts = sorted({b.spp for b in blocks})
+        assert len(blocks) == 4 and len(counts) > 1, (name, counts)
+        for spp in counts:
+            whole = one_render(scene, spp)
+            assert whole.std() > .01
+            for r in (b.rect for b in blocks if b.spp == spp):
+                here = np.s_[r.y0:r.y1, r.x0:r.x1]
+                assert abs(mean[here] - whole[here]).max() < SAME * whole.max(), (name, spp)
+
+
 def test_borders():
     """any border holds the pixels of the whole picture, whatever the rounding"""
     for width, height in ((53, 31), (97, 64), (101, 77)):
@@ -122,8 +152,11 @@ def test_region():
     subprocess.run(["oiiotool", tmp("r.exr"), "--compression", "none", "-o", tmp("s.exr")], check=True)
     pixels, origin = exr.read(tmp("s.exr"))
     assert origin == (28, 5) and abs(pixels - mean).max() < 1e-6
+    assert (exr.read(tmp("s.exr"), ("lull.spp",))[0] == 32).all()
     render.use_border = False
     assert abs(one_render(scene, 32)[5:23, 28:35] - mean).max() < SAME * 10  # two waves: the first check
+    render.use_border, render.border_max_x = True, render.border_min_x
+    raises(HostError, "holds no pixel", Cycles(scene, 4).crop)
 
 
 def test_animation():
@@ -139,6 +172,51 @@ def test_animation():
     report = json.loads(Path(tmp("f_0002.json")).read_text())
     assert report["kernel"].startswith("Cycles") and report["criterion"]["params"]["threshold"] == ".02"
     assert all(os.path.getsize(tmp(f"f{ending}")) > 100 for ending in ("_0001.exr", "_0002.exr", "-map_0001.png"))
+
+
+def test_frames_of_scene():
+    """--frames all is the scene's own range, step by step"""
+    scene = cube(24, 24)
+    scene.frame_start, scene.frame_end, scene.frame_step = 1, 5, 2
+    bpy.ops.wm.save_as_mainfile(filepath=tmp("range.blend"))
+    status, text = command(tmp("range.blend"), "-c", "fixed", "--frames", "all", "-q", "--report", tmp("all.json"))
+    assert status == 0 and not text, text
+    assert sorted(p.name for p in Path(TMP.name).glob("all_*")) == ["all_0001.json", "all_0003.json", "all_0005.json"]
+
+
+def test_mask():
+    """a painted block gets more samples, and the report says why"""
+    cube(48, 24)
+    bpy.ops.wm.save_as_mainfile(filepath=tmp("cube.blend"))
+    painted = np.zeros((24, 48, 3), np.uint8)
+    painted[5, 7] = 255
+    png.write(tmp("mask.png"), painted)
+    blocks = []
+    for mask in ((), ("--mask", tmp("mask.png"))):
+        status, text = command(tmp("cube.blend"), "-c", "halfbuf", "-p", "threshold=.003", "--block", "24", "-q", "--report",
+                               tmp("m.json"), "--spp-max", "256", *mask)
+        assert status == 0, text
+        blocks.append([(b["spp"], b["dial"]) for b in json.loads(Path(tmp("m.json")).read_text())["blocks"]])
+    plain, masked = blocks
+    assert masked[0][0] > plain[0][0] and masked[1] == plain[1] and [b[1] for b in masked] == [.25, 1], blocks
+    assert json.loads(Path(tmp("m.json")).read_text())["mask"] == tmp("mask.png")
+
+
+def test_resume():
+    """a checkpoint goes on to the picture of an unbroken run"""
+    cube(48, 24)
+    bpy.ops.wm.save_as_mainfile(filepath=tmp("cube.blend"))
+    common = (tmp("cube.blend"), "-c", "null", "--block", "24", "-q")
+    state = ("--checkpoint", tmp("run.npz"))
+    assert command(*common, "--spp-max", "64", "-o", tmp("whole.exr")) == (0, "")
+    assert command(*common, "--spp-max", "32", "-o", tmp("part.exr"), *state) == (0, "")
+    assert command(*common, "--spp-max", "64", "-o", tmp("on.exr"), *state, "--resume") == (0, "")
+    whole, part, on = (Path(tmp(n + ".exr")).read_bytes() for n in ("whole", "part", "on"))
+    assert whole == on != part
+    status, text = command(*common, "--spp-max", "64", "-o", tmp("lost.exr"), "--checkpoint", tmp("no-folder/run.npz"))
+    assert status == 2 and "no-folder" in text and os.path.exists(tmp("lost.exr"))  # the picture is kept all the same
+    status, text = command(*common, "--resume")
+    assert status == 2 and "--checkpoint" in text
 
 
 def test_bad_input():
@@ -164,6 +242,39 @@ def test_bad_input():
         status, text = command(*arguments, "-o", out, "-q")
         assert status == 2 and wanted in text and len(text.strip().splitlines()) == 1, (arguments, status, text)
         assert not os.path.exists(out)
+
+
+def test_device():
+    """a scene for a GPU that is not there is refused, not rendered on something else; --device chooses"""
+    if bpy.context.preferences.addons["cycles"].preferences.has_active_device():
+        raise Skip("a GPU is switched on")
+    scene = cube(24, 24)
+    scene.cycles.device = "GPU"
+    bpy.ops.wm.save_as_mainfile(filepath=tmp("gpu.blend"))
+    common = (tmp("gpu.blend"), "-c", "fixed", "-q", "-o", tmp("gpu.exr"))
+    for device, wanted in (((), "has none switched on"), (("--device", "CUDA"), "device CUDA"), (("--device", "METAL"), "METAL")):
+        status, text = command(*common, *device)
+        assert status == 2 and wanted in text and len(text.strip().splitlines()) == 1, (status, text)
+        assert not os.path.exists(tmp("gpu.exr"))
+    assert command(*common, "--device", "CPU") == (0, "") and os.path.exists(tmp("gpu.exr"))
+
+
+def test_programs():
+    """from a shell: the package as a program, and Blender itself with --python-expr"""
+    cube(24, 24)
+    bpy.ops.wm.save_as_mainfile(filepath=tmp("cube.blend"))
+    environment = {**os.environ, "PYTHONPATH": str(ROOT / "plugin-api/python")}
+    program = [os.environ.get("PYTHON", sys.executable), "-m", "lull.blender", tmp("cube.blend"), "-c", "fixed", "-q", "-o"]
+    expression = ["-b", tmp("cube.blend"), "-noaudio", "--python-use-system-env", "--python-expr",
+                  "from lull.blender import cli; cli.main()", "--", "-c", "fixed", "-q", "-o"]
+    starts = [program] + ([[bpy.app.binary_path, *expression]] if bpy.app.binary_path else [])
+    for n, start in enumerate(starts):
+        done = subprocess.run([*start, tmp(f"p{n}.exr")], env=environment, text=True, capture_output=True)
+        assert done.returncode == 0 and os.path.getsize(tmp(f"p{n}.exr")) > 1000, done.stderr
+    if bpy.app.binary_path:
+        done = subprocess.run([*program, tmp("p.exr"), "--blender", "no-blender"], env=environment, text=True,
+                              capture_output=True)
+        assert done.returncode == 2 and "no program 'no-blender'" in done.stderr and done.stderr.count("\n") == 1, done.stderr
 
 
 def test_no_cycles():
@@ -231,6 +342,14 @@ def test_addon():
         scene.lull.parameters, scene.lull.spp_max = "threshold=.02", 64
         assert bpy.ops.lull.render() == {"FINISHED"} and "blocks converged" in scene.lull.state
         assert "Lull Stop Map" in bpy.data.images and os.path.getsize(tmp("lull.exr")) > 1000
+        scene.frame_start, scene.frame_end, scene.lull.folder = 1, 2, tmp("frames")
+        os.mkdir(tmp("frames"))
+        assert bpy.ops.lull.render(animation=True) == {"FINISHED"}
+        assert {"lull_0001.exr", "lull_0002.exr", "lull-report_0002.json"} <= set(os.listdir(tmp("frames")))
+        scene.lull.criterion, scene.lull.visible, scene.lull.parameters = "observer", .5, "growth=2"
+        assert scene.lull.chosen("").parameters == {"visible": "0.5", "growth": "2"}
+        scene.lull.parameters = "visible=.1"
+        assert scene.lull.chosen("").parameters == {"visible": ".1"}
         scene.lull.parameters = "threshold"
         try:
             raise AssertionError(bpy.ops.lull.render())

@@ -65,5 +65,5 @@ def load(path: str, driver: Driver) -> None:
         for name in _STATE:
             setattr(b, name, saved[name])
         if b.reason in ("spp-max", "time", "interrupt", "uniform") and b.spp < frame.spp_max:
-            b.reason, b.next_spp = "none", max(b.spp + 1, min(b.next_spp, frame.spp_max))
+            b.reason, b.next_spp = "none", driver.at_wave(max(b.spp + 1, b.next_spp))
     driver.totals = Totals(**state["totals"])

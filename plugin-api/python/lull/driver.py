@@ -85,9 +85,10 @@ class Driver:
         self.interrupted = False
         first = frame.spp_max if uniform else frame.first_spp
         for b in frame.blocks:
-            b.next_spp = self._at_wave(first)
+            b.next_spp = self.at_wave(first)
 
-    def _at_wave(self, spp: int) -> int:
+    def at_wave(self, spp: int) -> int:
+        """The first place for a check that is not before spp."""
         if self.whole_waves:
             spp = -(-spp // (2 * self.wave)) * 2 * self.wave
         return min(spp, self.frame.spp_max)
@@ -208,7 +209,7 @@ class Driver:
             b.reason = "spp-max"
         else:
             b.reason = "none"
-            b.next_spp = self._at_wave(next_check(b.spp, answer.next_spp, self.frame.spp_max))
+            b.next_spp = self.at_wave(next_check(b.spp, answer.next_spp, self.frame.spp_max))
 
     def _ask(self, due: Sequence[int], final: Sequence[bool]) -> list[Decision]:
         """Asks and notes the answers. An error of the criterion costs time, never quality: all continue."""

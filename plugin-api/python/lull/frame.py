@@ -30,7 +30,7 @@ class Frame:
     """
 
     def __init__(self, criterion: Criterion, width: int, height: int, *, block: Union[int, tuple[int, int], None] = None,
-                 crop: Optional[Rect] = None, supplies: Sequence[str] = (), spp_min: int = 32, spp_max: int = 10000,
+                 crop: Optional[Rect] = None, supplies: Sequence[str] = (), spp_min: int = 16, spp_max: int = 10000,
                  time_budget_s: float = 0.0, seed: int = 0, exposure: float = 1.0, transfer: str = "srgb",
                  gamma: float = 2.2, sample_clamp: float = 0.0, independent: bool = False,
                  shared: bool = False, deterministic: bool = True,

@@ -87,7 +87,7 @@ class Film:
         return pixels[..., :3]
 
 
-def render(scene: Any, criterion: Union[str, Criterion] = "observer", *, sensor: int = 0, spp_min: int = 32,
+def render(scene: Any, criterion: Union[str, Criterion] = "observer", *, sensor: int = 0, spp_min: int = 16,
            spp_max: int = 1024, time_budget_s: float = 0.0, block: Optional[int] = None, wave: int = 8, seed: int = 0,
            mask: Optional[np.ndarray] = None, after_call: Optional[Callable[[Driver], None]] = None,
            **parameters: Any) -> Picture:

@@ -11,6 +11,10 @@ from pathlib import Path
 from typing import Optional, Sequence
 
 
+# As Blender names them
+DEVICES = ("CPU", "CUDA", "OPTIX", "HIP", "ONEAPI", "METAL")
+
+
 def parser() -> argparse.ArgumentParser:
     p = argparse.ArgumentParser("python3 -m lull.blender", description="Render a Blender scene with Cycles, block by "
                                 "block, each until its noise can no longer be seen.")
@@ -18,18 +22,22 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("-c", "--criterion", default="observer", help="name or PATH[:ID] of a criterion (default observer)")
     p.add_argument("-p", "--param", action="append", default=[], metavar="KEY=VALUE", help="parameter of the criterion")
     p.add_argument("--visible", metavar="SHARE", help="stop when at most this share of viewers would still see noise")
-    p.add_argument("--spp-min", type=int, default=32, metavar="N", help="samples before the first check (default 32)")
+    p.add_argument("--spp-min", type=int, default=16, metavar="N", help="samples before the first check (default 16)")
     p.add_argument("--spp-max", type=int, default=4096, metavar="N", help="most samples of a block (default 4096)")
     p.add_argument("--time-budget", type=float, default=0, metavar="SECONDS", help="per frame; 0 = no limit (default)")
     p.add_argument("--block", type=int, metavar="N", help="block size in pixels (default: the criterion's own, else 200)")
     p.add_argument("--mask", default="", metavar="FILE.png", help="lighter regions are rendered better")
     p.add_argument("--frames", metavar="FIRST-LAST", help="an animation; 'all' = the scene's range (default: current frame)")
+    p.add_argument("--device", choices=DEVICES, help="what Cycles renders on (default: what the scene says)")
     p.add_argument("--scene", metavar="NAME", help="which scene of the file (default: the active one)")
     p.add_argument("-o", "--output", default="", metavar="FILE.exr", help="picture with layers for samples and noise "
                    "(default: the .blend's name in the current folder, if nothing else is asked for)")
     p.add_argument("--preview", default="", metavar="FILE.png", help="as it is shown (curve per channel)")
     p.add_argument("--stop-map", default="", metavar="FILE.png|FILE.csv", help="samples per block")
     p.add_argument("--report", default="", metavar="FILE.json", help="everything about the run")
+    p.add_argument("--checkpoint", default="", metavar="FILE.npz", help="keep the state there at the end, however it ends")
+    p.add_argument("--resume", action="store_true", help="go on from the checkpoint, if it is there; with a higher --spp-max "
+                   "a finished picture gets more samples")
     p.add_argument("-q", "--quiet", action="store_true", help="no progress")
     p.add_argument("--blender", default="blender", metavar="PROGRAM", help="which Blender to run (default: on PATH)")
     return p
@@ -91,12 +99,18 @@ def _render(options: argparse.Namespace) -> int:
 
     from ..criterion import load
     from ..outputs import Progress
-    from .session import Session, Settings
+    from .cycles import choose_device
+    from .session import Session, Settings, numbered
     if options.file:
         bpy.ops.wm.open_mainfile(filepath=os.path.abspath(options.file))
     if options.scene and options.scene not in bpy.data.scenes:
         raise ValueError(f"--scene {options.scene}: the file has {', '.join(bpy.data.scenes.keys())}")
     scene = bpy.data.scenes[options.scene] if options.scene else bpy.context.scene
+    if options.device:
+        choose_device(options.device)
+        scene.cycles.device = "CPU" if options.device == "CPU" else "GPU"
+    if options.resume and not options.checkpoint:
+        raise ValueError("--resume needs --checkpoint FILE.npz")
     bad = [pair for pair in options.param if "=" not in pair]
     if bad:
         raise ValueError(f"--param {bad[0]}: expected KEY=VALUE")
@@ -115,11 +129,14 @@ def _render(options: argparse.Namespace) -> int:
                 scene.frame_set(frame)
             progress = None if options.quiet else Progress()
             with Session(scene, settings, criterion, progress.show if progress else None) as session:
-                result = session.driver.run()
-                written = session.write(result, "" if frame is None else f"_{frame:04}")
+                suffix = "" if frame is None else f"_{frame:04}"
+                result = session.run(options.checkpoint and numbered(options.checkpoint, suffix), options.resume)
+                written = session.write(result, suffix)
             if progress:
                 progress.clear()
             print("lull:", summary(session), "; ".join(written))
+            if session.unsaved:
+                raise session.unsaved
             if result.exception:
                 print(f"lull: rendering failed, what was rendered is kept: {result.exception}", file=sys.stderr)
             if result.outcome in ("interrupt", "failed"):

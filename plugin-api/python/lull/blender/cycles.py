@@ -49,6 +49,28 @@ class HostError(Exception):
     """The scene cannot be rendered; one line for people."""
 
 
+def _gpus():
+    """Cycles' preferences: which processors it may use."""
+    addon = bpy.context.preferences.addons.get("cycles")
+    if addon is None:
+        raise HostError("Cycles is not available: enable the add-on 'Cycles Render Engine' in the preferences")
+    return addon.preferences
+
+
+def choose_device(name: str) -> None:
+    """Switches on every device of this kind in Blender's preferences, for this session."""
+    gpus = _gpus()
+    try:
+        gpus.compute_device_type = "NONE" if name == "CPU" else name
+    except TypeError:
+        raise HostError(f"device {name}: this Blender's Cycles cannot use such a device") from None
+    gpus.refresh_devices()
+    for device in gpus.devices:
+        device.use = device.type == name
+    if name != "CPU" and not gpus.has_active_device():
+        raise HostError(f"device {name}: Cycles finds none on this machine")
+
+
 class Cycles:
     """Use as a context manager around everything that renders. scene: borrowed; spp_max: the most samples of a pixel."""
 
@@ -57,6 +79,8 @@ class Cycles:
             raise HostError("Cycles is not available: enable the add-on 'Cycles Render Engine' in the preferences")
         if scene.camera is None:
             raise HostError(f"scene '{scene.name}' has no camera: add one, or set the scene's active camera")
+        if scene.cycles.device == "GPU" and not _gpus().has_active_device():
+            raise HostError(f"scene '{scene.name}' renders on a GPU and Cycles has none switched on: choose a device, or CPU")
         render = scene.render
         if render.use_multiview:
             raise HostError(f"scene '{scene.name}' renders several views: turn stereoscopy off")

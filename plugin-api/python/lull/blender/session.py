@@ -8,7 +8,7 @@ from typing import Any, Callable, Optional
 
 import bpy
 
-from .. import outputs, png, stopmap
+from .. import checkpoint, outputs, png, stopmap
 from ..criterion import Criterion, load
 from ..driver import Driver, Result
 from ..frame import Frame
@@ -21,7 +21,7 @@ class Settings:
     """What a user chooses. Files are named without a frame number; "" = not written."""
     criterion: str = "observer"
     parameters: dict[str, str] = field(default_factory=dict)
-    spp_min: int = 32
+    spp_min: int = 16
     spp_max: int = 4096
     time_budget_s: float = 0.0
     block: Optional[int] = None  # pixels; None: the criterion's own size
@@ -33,8 +33,17 @@ class Settings:
     report: str = ""
 
 
+def numbered(path: str, suffix: str) -> str:
+    """The file's name with a suffix before its ending."""
+    base, ending = os.path.splitext(path)
+    return base + suffix + ending
+
+
 class Session:
-    """The scene's current frame in the making. Use as a context manager; call driver.run() or driver.step() inside."""
+    """The scene's current frame in the making. Use as a context manager; call run() or driver.step() inside.
+
+    unsaved: why the checkpoint could not be written, if so.
+    """
 
     def __init__(self, scene: bpy.types.Scene, settings: Settings, criterion: Optional[Criterion] = None,
                  after_call: Optional[Callable[[Driver], None]] = None):
@@ -52,6 +61,7 @@ class Session:
                            mask=png.read_grey(settings.mask) if settings.mask else None)
         self.driver = Driver(self.frame, self.host.render, wave=settings.wave, threads=self.host.threads,
                              after_call=after_call)
+        self.unsaved: Optional[OSError] = None
 
     def __enter__(self) -> Session:
         self.host.__enter__()
@@ -63,8 +73,26 @@ class Session:
         if self._own:
             self._own.close()
 
+    def run(self, state: str = "", resume: bool = False) -> Result:
+        """driver.run(), which keeps its state in the file `state`, and goes on from it if it is there; "" = no file."""
+        if state and resume and os.path.exists(state):
+            checkpoint.load(state, self.driver)
+        if state:
+            self.driver.suspend = lambda _: self._save(state)
+        result = self.driver.run()
+        if state and result.outcome == "done":
+            self._save(state)
+        return result
+
+    def _save(self, state: str) -> None:
+        """The picture is worth more than its checkpoint: an error is kept for later."""
+        try:
+            checkpoint.save(state, self.driver)
+        except OSError as error:
+            self.unsaved = error
+
     def write(self, result: Result, suffix: str = "") -> list[str]:
-        """Writes the files of the settings; suffix goes before their endings (a frame number). Returns their names."""
+        """Writes the files of the settings; suffix: a frame's number. Returns their names."""
         s, scene = self.settings, bpy.data.filepath or self.scene.name
         kernel = f"Cycles, Blender {bpy.app.version_string}"
         interrupted = result.outcome in ("interrupt", "failed")
@@ -76,7 +104,6 @@ class Session:
         written = []
         for path, write in writers:
             if path:
-                base, ending = os.path.splitext(path)
-                write(base + suffix + ending)
-                written.append(base + suffix + ending)
+                write(numbered(path, suffix))
+                written.append(numbered(path, suffix))
         return written

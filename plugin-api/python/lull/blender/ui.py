@@ -5,7 +5,7 @@ import tempfile
 from typing import Optional
 
 import bpy
-from bpy.props import EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
 from .. import outputs, stopmap
 from ..library import LullError, criteria, search_path
@@ -15,6 +15,7 @@ from .session import Session, Settings
 
 REFUSED = (HostError, LullError, ValueError, OSError, RuntimeError)
 _items: list[tuple[str, str, str]] = []  # kept: Blender does not copy the texts of dynamic enums
+_with_visible: set[str] = set()  # criteria whose dial is the share of viewers
 
 
 def _criteria(_self, _context) -> list[tuple[str, str, str]]:
@@ -22,6 +23,7 @@ def _criteria(_self, _context) -> list[tuple[str, str, str]]:
         found = [c for c in criteria() if c.id != "null"]
         found.sort(key=lambda c: (c.id != "observer", c.id))
         _items.extend((c.id, c.name, c.description) for c in found)
+        _with_visible.update(c.id for c in found if c.parameter("visible"))
         if not _items:
             _items.append(("none", "none found", f"No criteria in {', '.join(search_path())}: set LULL_PLUGIN_PATH"))
     return _items
@@ -30,9 +32,11 @@ def _criteria(_self, _context) -> list[tuple[str, str, str]]:
 class LullSettings(bpy.types.PropertyGroup):
     """Kept with the scene."""
     criterion: EnumProperty(name="Criterion", items=_criteria, description="What decides that a block may stop")
+    visible: FloatProperty(name="Visible To", default=.25, min=.0001, max=.9999, subtype="FACTOR", precision=3,
+                           description="Stop a block when at most this share of viewers would still see its noise")
     parameters: StringProperty(name="Parameters", description="KEY=VALUE pairs of the criterion, with spaces between; for "
-                               "example visible=0.25")
-    spp_min: IntProperty(name="Min Samples", default=32, min=1, description="Samples before the first decision")
+                               "example first-spp=64")
+    spp_min: IntProperty(name="Min Samples", default=16, min=1, description="Samples before the first decision")
     spp_max: IntProperty(name="Max Samples", default=4096, min=1, description="Every block stops here")
     time_budget_s: FloatProperty(name="Time Limit", default=0, min=0, subtype="TIME_ABSOLUTE", unit="TIME_ABSOLUTE",
                                  description="Seconds for the frame, 0 = none; the first limit reached wins")
@@ -49,16 +53,19 @@ class LullSettings(bpy.types.PropertyGroup):
         pairs = self.parameters.split()
         if bad := [p for p in pairs if "=" not in p]:
             raise ValueError(f"parameter {bad[0]}: expected KEY=VALUE")
-        return Settings(self.criterion, dict(p.split("=", 1) for p in pairs), self.spp_min, self.spp_max,
+        dial = {"visible": f"{self.visible:.6g}"} if self.criterion in _with_visible else {}
+        return Settings(self.criterion, {**dial, **dict(p.split("=", 1) for p in pairs)}, self.spp_min, self.spp_max,
                         self.time_budget_s, self.block or None, mask=bpy.path.abspath(self.mask) if self.mask else "",
                         output=os.path.join(folder, "lull.exr"), stop_map=os.path.join(folder, "lull-stop-map.png"),
                         report=os.path.join(folder, "lull-report.json"))
 
 
 class LULL_OT_render(bpy.types.Operator):
-    """Render the current frame with Cycles, each block until its noise can no longer be seen. Esc keeps what there is"""
+    """Render with Cycles, each block until its noise can no longer be seen. Esc keeps what there is"""
     bl_idname = "lull.render"
     bl_label = "Render Until Noise Is Invisible"
+
+    animation: BoolProperty(name="Animation", default=False, description="The scene's frame range, into numbered files")
 
     _session: Optional[Session] = None
     _timer = None
@@ -68,10 +75,14 @@ class LULL_OT_render(bpy.types.Operator):
         return context.scene is not None and hasattr(context.scene, "cycles")
 
     def _begin(self, context) -> bool:
-        settings = context.scene.lull
-        self._folder = bpy.path.abspath(settings.folder) if settings.folder else tempfile.mkdtemp(prefix="lull-")
+        """The next frame."""
+        scene = context.scene
+        frame = next(self._frames)
+        self._suffix = "" if frame is None else f"_{frame:04}"
+        if frame is not None:
+            scene.frame_set(frame)
         try:
-            self._session = Session(context.scene, settings.chosen(self._folder))
+            self._session = Session(scene, scene.lull.chosen(self._folder))
             self._session.__enter__()
         except REFUSED as error:
             self._session = None
@@ -79,14 +90,24 @@ class LULL_OT_render(bpy.types.Operator):
             return False
         return True
 
-    def _end(self, context, result) -> set[str]:
+    def _plan(self, context) -> bool:
+        scene = context.scene
+        folder = scene.lull.folder
+        self._folder = bpy.path.abspath(folder) if folder else tempfile.mkdtemp(prefix="lull-")
+        frames = range(scene.frame_start, scene.frame_end + 1, scene.frame_step) if self.animation else [None]
+        self._left = len(frames)
+        self._frames = iter(frames)
+        return self._begin(context)
+
+    def _end(self, context, result) -> bool:
+        """Writes the frame; whether there is another one to render."""
         session, settings = self._session, context.scene.lull
         session.__exit__()
         try:
-            written = session.write(result)
+            written = session.write(result, self._suffix)
         except OSError as error:
             self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return False
         settings.state = summary(session)
         for name, path in (("Lull", written[0]), ("Lull Stop Map", written[1])):
             image = bpy.data.images.get(name) or bpy.data.images.new(name, 1, 1)
@@ -96,15 +117,19 @@ class LULL_OT_render(bpy.types.Operator):
             self.report({"ERROR"}, f"Rendering failed, what was rendered is kept: {result.exception}")
         else:
             self.report({"INFO"}, settings.state)
-        return {"FINISHED"}
+        self._left -= 1
+        return self._left > 0 and result.outcome not in ("interrupt", "failed")
 
     def execute(self, context):
-        if not self._begin(context):
+        more = self._plan(context)
+        if not more:
             return {"CANCELLED"}
-        return self._end(context, self._session.driver.run())
+        while more:
+            more = self._end(context, self._session.driver.run()) and self._begin(context)
+        return {"FINISHED"}
 
     def invoke(self, context, _event):
-        if not self._begin(context):
+        if not self._plan(context):
             return {"CANCELLED"}
         manager = context.window_manager
         self._timer = manager.event_timer_add(0.05, window=context.window)
@@ -123,10 +148,10 @@ class LULL_OT_render(bpy.types.Operator):
         context.workspace.status_text_set(None if result else f"Lull: {text}   Esc: stop and keep")
         for area in context.screen.areas:
             area.tag_redraw()
-        if result is None:
+        if result is None or (self._end(context, result) and self._begin(context)):
             return {"RUNNING_MODAL"}
         context.window_manager.event_timer_remove(self._timer)
-        return self._end(context, result)
+        return {"FINISHED"}
 
 
 class LULL_PT_render(bpy.types.Panel):
@@ -143,11 +168,14 @@ class LULL_PT_render(bpy.types.Panel):
     def draw(self, context):
         layout, settings = self.layout, context.scene.lull
         layout.use_property_split, layout.use_property_decorate = True, False
-        for names in (("criterion", "parameters"), ("spp_min", "spp_max", "time_budget_s"), ("block", "mask", "folder")):
+        dial = ("visible",) if settings.criterion in _with_visible else ()
+        for names in (("criterion", *dial, "parameters"), ("spp_min", "spp_max", "time_budget_s"),
+                      ("block", "mask", "folder")):
             column = layout.column(align=True)
             for name in names:
                 column.prop(settings, name)
         layout.operator("lull.render", icon="RENDER_STILL")
+        layout.operator("lull.render", text="Render Animation", icon="RENDER_ANIMATION").animation = True
         if settings.state:
             for line in settings.state.replace("  ", "\n").splitlines():
                 layout.label(text=line)
