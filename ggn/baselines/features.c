@@ -44,7 +44,7 @@ static double entropy(const double *s, int first, int last)
 int ggn_svd_entropy(const double *l, int w, int h, int first, int last, double *out, struct base_err *err)
 {
     enum { N = GGN_SUB_BLOCK };
-    double a[N * N], s[N], superb[N];
+    double a[N * N], s[N], work[64 * N];
     if (first < 0 || last > N || last - first < 2 || w < N || h < N)
         return base_fail(err, BASE_EINVAL, "SVD-entropy of singular values %d to %d of a %dx%d block", first, last, w, h);
     for (int by = 0; by < h / N; by++)
@@ -52,8 +52,8 @@ int ggn_svd_entropy(const double *l, int w, int h, int first, int last, double *
             double largest = 0.0;
             for (int y = 0; y < N; y++)
                 for (int x = 0; x < N; x++)
-                    a[y * N + x] = floor(l[(size_t)(by * N + y) * (size_t)w + (size_t)(bx * N + x)]);
-            if (LAPACKE_dgesvd(LAPACK_ROW_MAJOR, 'N', 'N', N, N, a, N, s, NULL, 1, NULL, 1, superb) != 0)
+                    a[x * N + y] = floor(l[(size_t)(by * N + y) * (size_t)w + (size_t)(bx * N + x)]);
+            if (LAPACKE_dgesvd_work(LAPACK_COL_MAJOR, 'N', 'N', N, N, a, N, s, NULL, 1, NULL, 1, work, 64 * N) != 0)
                 return base_fail(err, BASE_EINVAL, "SVD-entropy: the singular values do not converge");
             largest = s[0];
             for (int i = 0; i < N; i++) /* rounding errors of a rank-deficient sub-block are no noise */
@@ -153,10 +153,31 @@ static void wiener(const double *in, double *tmp, double *out, double *scratch, 
         out[i] = !(variance[i] > noise) ? mean[i] : mean[i] + (in[i] - mean[i]) * (1.0 - noise / variance[i]);
 }
 
-static int by_value(const void *a, const void *b)
+/* Element k of v in rising order; v is reordered (Hoare 1961). Not qsort, which allocates. */
+static double ranked(double *v, size_t n, size_t k)
 {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
+    size_t first = 0, last = n - 1;
+    while (first < last) {
+        double pivot = v[first + (last - first) / 2];
+        size_t i = first, j = last + 1;
+        for (;; i++) {
+            while (v[i] < pivot)
+                i++;
+            do
+                j--;
+            while (v[j] > pivot);
+            if (i >= j)
+                break;
+            double keep = v[i];
+            v[i] = v[j];
+            v[j] = keep;
+        }
+        if (k <= j)
+            last = j;
+        else
+            first = j + 1;
+    }
+    return v[k];
 }
 
 static double shrink(double v, double threshold)
@@ -177,8 +198,7 @@ static void haar(const double *in, double *out, double *scratch, int w, int h)
         }
     if (n == 0)
         return;
-    qsort(scratch, n, sizeof *scratch, by_value);
-    double threshold = scratch[n / 2] / 0.6745 * sqrt(2.0 * log((double)(step * (size_t)h)));
+    double threshold = ranked(scratch, n, n / 2) / 0.6745 * sqrt(2.0 * log((double)(step * (size_t)h)));
     for (int y = 0; y + 1 < h; y += 2)
         for (int x = 0; x + 1 < w; x += 2) {
             double *p = out + (size_t)y * step + (size_t)x, a = p[0], b = p[1], c = p[step], d = p[step + 1];
@@ -203,15 +223,12 @@ static void residual(const double *l, const double *filtered, size_t n, double *
     out[1] = sqrt(fmax(square / (double)n - out[0] * out[0], 0.0));
 }
 
-int ggn_attributes(const double *l, int w, int h, double out[GGN_ATTRIBUTES], struct base_err *err)
+int ggn_attributes(const double *l, int w, int h, double *tmp, double out[GGN_ATTRIBUTES], struct base_err *err)
 {
     static const double sigmas[3] = {0.5, 1.0, 1.5};
     if (w < 3 || h < 3)
         return base_fail(err, BASE_EINVAL, "attributes of a %dx%d block", w, h);
     size_t n = (size_t)w * (size_t)h;
-    double *tmp = malloc(4 * n * sizeof *tmp);
-    if (!tmp)
-        return base_fail_nomem(err, "attributes");
     double *f = tmp + n, *scratch = tmp + 2 * n;
     for (int r = 1; r <= 2; r++) {
         box(l, tmp, f, w, h, r, BORDER_MIRROR);
@@ -227,7 +244,6 @@ int ggn_attributes(const double *l, int w, int h, double out[GGN_ATTRIBUTES], st
     }
     haar(l, f, tmp, w, h);
     residual(l, f, n, out + 24);
-    free(tmp);
     return 0;
 }
 
@@ -248,17 +264,13 @@ static void reduce_mask(const double *image, double *tmp, double *smooth, int w,
         }
 }
 
-int ggn_noise_mask(const double *l, int w, int h, double out[GGN_MASK_FEATURES], struct base_err *err)
+int ggn_noise_mask(const double *l, int w, int h, double *tmp, double out[GGN_MASK_FEATURES], struct base_err *err)
 {
     if (w < GGN_MASK_GRID || h < GGN_MASK_GRID)
         return base_fail(err, BASE_EINVAL, "noise mask of a %dx%d block", w, h);
     size_t n = (size_t)w * (size_t)h;
-    double *tmp = malloc(5 * n * sizeof *tmp);
-    if (!tmp)
-        return base_fail_nomem(err, "noise mask");
     reduce_mask(l, tmp, tmp + n, w, h, out);
     wiener(l, tmp, tmp + n, tmp + 2 * n, w, h, 2);
     reduce_mask(tmp + n, tmp, tmp + 2 * n, w, h, out + GGN_MASK_FEATURES / 2);
-    free(tmp);
     return 0;
 }

@@ -1,6 +1,6 @@
 /*
  * What the published models before the network look at: numbers from the L channel (CIELAB) of one block. Pure functions,
- * thread-safe.
+ * thread-safe, without allocation. scratch: [GGN_FEATURE_SCRATCH][h][w], overwritten.
  */
 #ifndef GGN_BASELINES_FEATURES_H
 #define GGN_BASELINES_FEATURES_H
@@ -10,7 +10,13 @@
 
 #include "base/err.h"
 
-enum { GGN_SUB_BLOCK = 20, GGN_ATTRIBUTES = 26, GGN_MASK_GRID = 8, GGN_MASK_FEATURES = 2 * GGN_MASK_GRID * GGN_MASK_GRID };
+enum {
+    GGN_SUB_BLOCK = 20,
+    GGN_ATTRIBUTES = 26,
+    GGN_MASK_GRID = 8,
+    GGN_MASK_FEATURES = 2 * GGN_MASK_GRID * GGN_MASK_GRID,
+    GGN_FEATURE_SCRATCH = 5
+};
 
 /* L in 0..100 of a display image, rgb [3][P] planar codes. */
 void ggn_lightness(const uint8_t *rgb, size_t pixels, double *l);
@@ -28,12 +34,12 @@ int ggn_svd_entropy(const double *l, int w, int h, int first, int last, double *
  * Mean and standard deviation of |L - filter(L)| for 13 filters (Constantin et al. 2015): box 3, 5; Gaussian 3x3 with sigma
  * 0.5, 1, 1.5, then 5x5 with the same; median 3, 5; Wiener 3, 5; Haar wavelet shrinkage. out: mean, deviation, mean, ...
  */
-int ggn_attributes(const double *l, int w, int h, double out[GGN_ATTRIBUTES], struct base_err *err);
+int ggn_attributes(const double *l, int w, int h, double *scratch, double out[GGN_ATTRIBUTES], struct base_err *err);
 
 /*
  * Noise masks (Takouachet et al. 2017): |L - Gaussian(L)| of the image and of an approximate reference (here the image after
  * a 5x5 Wiener filter, since no reference is at hand), each reduced to the means of an 8x8 grid. w, h >= 8.
  */
-int ggn_noise_mask(const double *l, int w, int h, double out[GGN_MASK_FEATURES], struct base_err *err);
+int ggn_noise_mask(const double *l, int w, int h, double *scratch, double out[GGN_MASK_FEATURES], struct base_err *err);
 
 #endif

@@ -4,220 +4,262 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "baselines/features.h"
 #include "baselines/lstm.h"
-#include "baselines/svm.h"
+#include "data/replay.h"
+#include "train/fit_policy.h"
 
-/* Features of every level of every chain, [level][n]. */
-struct table {
-    int n;
-    size_t *first; /* [blocks]: row of the block's level 0 */
-    size_t rows;
-    double *x; /* [rows][n] */
-};
+/* --- looks --- */
 
-struct job {
-    const struct ggn_eval_set *set;
-    struct table *table;
-    int (*make)(const double *l, int w, int h, int parameter, double *out, struct base_err *err);
-    int parameter;
-};
-
-static void release_table(struct table *t)
+void ggn_looks_release(struct ggn_looks *t)
 {
     free(t->first);
     free(t->x);
+    *t = (struct ggn_looks){0};
 }
 
-static int make_attributes(const double *l, int w, int h, int parameter, double *out, struct base_err *err)
+struct looking {
+    const struct ggn_baseline *baseline;
+    const struct ggn_eval_set *set;
+    const struct ggn_looks *looks;
+};
+
+static int look_at_block(void *data, int index, int worker, struct base_err *err)
 {
-    (void)parameter;
-    return ggn_attributes(l, w, h, out, err);
+    const struct looking *j = data;
+    const struct ggn_chain *c = &j->set->chains.chains[j->set->blocks[index].chain];
+    int w = j->set->chains.width, h = j->set->chains.height;
+    struct ggn_baseline_reader *r = ggn_baseline_reader_create(j->baseline, err);
+    (void)worker;
+    if (!r)
+        return err->code;
+    for (int i = 0; i < c->n_levels; i++)
+        ggn_baseline_look(r, c->noisy + ggn_chains_values(&j->set->chains) * (size_t)i, w, h,
+                          j->looks->x + (j->looks->first[index] + (size_t)i) * j->looks->size);
+    ggn_baseline_reader_destroy(r);
+    return 0;
 }
 
-static int make_mask(const double *l, int w, int h, int parameter, double *out, struct base_err *err)
+int ggn_looks_make(struct ggn_looks *t, const struct ggn_baseline *b, const struct ggn_eval_set *s,
+                   struct base_threads *threads, struct base_err *err)
 {
-    (void)parameter;
-    return ggn_noise_mask(l, w, h, out, err);
+    struct looking j = {b, s, t};
+    size_t rows = 0;
+    *t = (struct ggn_looks){.size = ggn_baseline_look_size(b, s->chains.width, s->chains.height),
+                            .first = malloc((size_t)s->n_blocks * sizeof *t->first)};
+    for (int k = 0; k < s->n_blocks && t->first; k++) {
+        t->first[k] = rows;
+        rows += (size_t)s->chains.chains[s->blocks[k].chain].n_levels;
+    }
+    t->x = malloc(rows * t->size * sizeof *t->x);
+    int rc = !t->first || !t->x ? base_fail_nomem(err, "baseline") : ggn_eval_each_block(s, threads, look_at_block, &j, err);
+    if (rc)
+        ggn_looks_release(t);
+    return rc;
 }
 
-static int make_entropy(const double *l, int w, int h, int parameter, double *out, struct base_err *err)
+/* --- training --- */
+
+/* The cases of a split that have a label: where their window's looks begin, [window][size] one after the other. */
+struct cases {
+    size_t n;
+    const double **window;
+    unsigned char *label;
+};
+
+static void cases_release(struct cases *c)
 {
-    return ggn_svd_entropy(l, w, h, parameter, GGN_SUB_BLOCK, out, err);
+    free(c->window);
+    free(c->label);
 }
 
-static int fill_block(void *data, int index, int worker, struct base_err *err)
+static int list_cases(struct cases *c, const struct ggn_baseline *b, const struct ggn_looks *t,
+                      const struct ggn_eval_set *s, enum ggn_split split, struct base_err *err)
 {
-    const struct job *j = data;
+    size_t room = s->n > 0 ? s->n : 1, skipped = (size_t)(s->window - b->window);
+    *c = (struct cases){.window = malloc(room * sizeof *c->window), .label = malloc(room)};
+    if (!c->window || !c->label) {
+        cases_release(c);
+        return base_fail_nomem(err, "baseline");
+    }
+    for (int k = 0; k < s->n_blocks; k++)
+        for (size_t i = s->blocks[k].first; i < s->blocks[k].end; i++)
+            if (s->blocks[k].split == split && s->noisy[i] >= 0) {
+                c->window[c->n] = t->x + (t->first[k] + (i - s->blocks[k].first) + skipped) * t->size;
+                c->label[c->n++] = s->noisy[i] == 1;
+            }
+    return 0;
+}
+
+static int train_lstm(struct ggn_baseline *b, const struct cases *c, int epochs, struct base_err *err)
+{
+    size_t n = ggn_lstm_parameters(b->features);
+    struct ggn_lstm *lstm = ggn_lstm_create(b->features, b->window, 7, err);
+    if (!lstm)
+        return err->code;
+    for (int e = 0; e < epochs; e++)
+        ggn_lstm_epoch(lstm, c->window, c->label, c->n, (uint32_t)e);
+    b->lstm = malloc(n * sizeof *b->lstm);
+    if (b->lstm)
+        memcpy(b->lstm, ggn_lstm_weights(lstm), n * sizeof *b->lstm);
+    ggn_lstm_destroy(lstm);
+    return b->lstm ? 0 : base_fail_nomem(err, "LSTM");
+}
+
+static int train_svm(struct ggn_baseline *b, const struct cases *c, size_t size, struct base_err *err)
+{
+    double *x = malloc(c->n * size * sizeof *x);
+    if (!x)
+        return base_fail_nomem(err, "SVM");
+    for (size_t i = 0; i < c->n; i++)
+        memcpy(x + i * size, c->window[i], size * sizeof *x);
+    /* C and gamma as the library's users start from; a grid search on a few scenes fits their quirks. */
+    int rc = ggn_svm_train(&b->svm, x, c->label, c->n, b->features, 1.0, 1.0, err);
+    free(x);
+    return rc;
+}
+
+static int calibrate(struct ggn_baseline *b, const struct ggn_looks *t, const struct ggn_eval_set *s, enum ggn_split split,
+                     struct base_err *err)
+{
+    struct cases c;
+    enum ggn_split on = ggn_eval_count(s, GGN_SPLIT_VALIDATION) > 0 ? GGN_SPLIT_VALIDATION : split;
+    int rc = list_cases(&c, b, t, s, on, err);
+    if (rc)
+        return rc;
+    double *logit = malloc((c.n + 1) * sizeof *logit), *label = malloc((c.n + 1) * sizeof *label);
+    struct ggn_baseline_reader *r = ggn_baseline_reader_create(b, err);
+    rc = !r ? err->code : !logit || !label ? base_fail_nomem(err, "baseline") : 0;
+    int n = 0;
+    for (size_t i = 0; i < c.n && !rc; i++) {
+        const double *looks[GGN_WINDOW_MAX];
+        for (int k = 0; k < b->window; k++)
+            looks[k] = c.window[i] + (size_t)k * t->size;
+        double l = ggn_baseline_logit(r, looks, s->chains.width, s->chains.height);
+        if (isfinite(l)) {
+            logit[n] = l;
+            label[n++] = c.label[i];
+        }
+    }
+    if (!rc)
+        ggn_calibrate_platt(logit, label, n, &b->policy);
+    ggn_baseline_reader_destroy(r);
+    free(label);
+    free(logit);
+    cases_release(&c);
+    return rc;
+}
+
+/* The first window of the LSTM begins at the first level; an SVM answers from where that window ends. */
+static void set_cadence(struct ggn_baseline *b, const struct ggn_eval_set *s)
+{
+    const struct ggn_chains *c = &s->chains;
+    b->policy.ratio = c->ratio > 1.001 ? c->ratio : 0;
+    b->policy.step_spp = c->step_spp;
+    b->policy.first_spp = c->first_spp;
+    for (int k = b->window; k < s->window; k++)
+        b->policy.first_spp = ggn_policy_next(&b->policy, b->policy.first_spp);
+}
+
+int ggn_baseline_train(struct ggn_baseline *b, const struct ggn_looks *t, const struct ggn_eval_set *s,
+                       enum ggn_split split, int epochs, struct base_err *err)
+{
+    struct cases c;
+    size_t positive = 0;
+    int rc = list_cases(&c, b, t, s, split, err);
+    if (rc)
+        return rc;
+    for (size_t i = 0; i < c.n; i++)
+        positive += c.label[i];
+    if (positive == 0 || positive == c.n)
+        rc = base_fail(err, BASE_EINVAL, "%s: the split '%s' lacks one of the classes", ggn_baseline_titles[b->kind],
+                       ggn_split_names[split]);
+    if (!rc)
+        rc = b->kind == GGN_SVD_ENTROPY ? train_lstm(b, &c, epochs, err) : train_svm(b, &c, t->size, err);
+    cases_release(&c);
+    set_cadence(b, s);
+    return rc ? rc : calibrate(b, t, s, split, err);
+}
+
+/* --- judging --- */
+
+struct judging {
+    const struct ggn_eval_set *set;
+    const struct ggn_baseline *baseline;
+    const struct ggn_looks *looks;
+    struct ggn_method *method;
+};
+
+struct one_block {
+    const struct judging *j;
+    struct ggn_baseline_reader *reader;
+    const double *first; /* look at its level 0 */
+};
+
+static double window_logit(void *data, const int *levels)
+{
+    const struct one_block *o = data;
+    const double *looks[GGN_WINDOW_MAX];
+    for (int k = 0; k < o->j->baseline->window; k++)
+        looks[k] = o->first + (size_t)levels[k] * o->j->looks->size;
+    return ggn_baseline_logit(o->reader, looks, o->j->set->chains.width, o->j->set->chains.height);
+}
+
+static int judge_block(void *data, int index, int worker, struct base_err *err)
+{
+    const struct judging *j = data;
     const struct ggn_eval_block *b = &j->set->blocks[index];
     const struct ggn_chain *c = &j->set->chains.chains[b->chain];
-    int w = j->set->chains.width, h = j->set->chains.height, rc = 0;
-    size_t pixels = (size_t)w * (size_t)h;
-    double *l = malloc(pixels * sizeof *l);
+    const struct ggn_stop_rule rule = {.policy = j->baseline->policy, .window = j->baseline->window};
+    struct one_block one = {j, ggn_baseline_reader_create(j->baseline, err),
+                            j->looks->x + j->looks->first[index] * j->looks->size};
+    struct ggn_seen *seen = malloc((size_t)c->n_levels * sizeof *seen);
+    int rc = !one.reader ? err->code : !seen ? base_fail_nomem(err, j->method->name) : 0;
     (void)worker;
-    if (!l)
-        return base_fail_nomem(err, "features");
-    for (int i = 0; i < c->n_levels && !rc; i++) {
-        ggn_lightness(c->noisy + 3 * pixels * (size_t)i, pixels, l);
-        rc = j->make(l, w, h, j->parameter, j->table->x + (j->table->first[index] + (size_t)i) * (size_t)j->table->n, err);
-    }
-    free(l);
-    return rc;
-}
-
-static int make_table(struct table *t, const struct ggn_eval_set *s, int n,
-                      int (*make)(const double *, int, int, int, double *, struct base_err *), int parameter,
-                      struct base_threads *threads, struct base_err *err)
-{
-    struct job j = {s, t, make, parameter};
-    *t = (struct table){.n = n, .first = malloc((size_t)s->n_blocks * sizeof *t->first)};
-    if (!t->first)
-        return base_fail_nomem(err, "features");
-    for (int b = 0; b < s->n_blocks; b++) {
-        t->first[b] = t->rows;
-        t->rows += (size_t)s->chains.chains[s->blocks[b].chain].n_levels;
-    }
-    t->x = malloc(t->rows * (size_t)n * sizeof *t->x);
-    int rc = !t->x ? base_fail_nomem(err, "features") : ggn_eval_each_block(s, threads, fill_block, &j, err);
-    if (rc)
-        release_table(t);
-    return rc;
-}
-
-/* Row of the table that a case is about: the last level of its window. */
-static const double *row_of(const struct table *t, const struct ggn_eval_set *s, int b, size_t i)
-{
-    return t->x + (t->first[b] + (i - s->blocks[b].first) + (size_t)s->window - 1) * (size_t)t->n;
-}
-
-/* --- SVMs --- */
-
-static struct ggn_svm *train_svm(const struct table *t, const struct ggn_eval_set *s, enum ggn_split split,
-                                 struct base_err *err)
-{
-    double *x = malloc((s->n > 0 ? s->n : 1) * (size_t)t->n * sizeof *x);
-    unsigned char *label = malloc(s->n > 0 ? s->n : 1);
-    struct ggn_svm *svm = NULL;
-    size_t n = 0;
-    if (!x || !label) {
-        base_fail_nomem(err, "SVM");
-        goto out;
-    }
-    for (int b = 0; b < s->n_blocks; b++)
-        for (size_t i = s->blocks[b].first; i < s->blocks[b].end; i++)
-            if (s->blocks[b].split == split && s->noisy[i] >= 0) {
-                memcpy(x + n * (size_t)t->n, row_of(t, s, b, i), (size_t)t->n * sizeof *x);
-                label[n++] = s->noisy[i] == 1;
-            }
-    /* C and gamma as the library's users start from; a grid search on a few scenes fits their quirks. */
-    svm = n > 0 ? ggn_svm_train(x, label, n, t->n, 1.0, 1.0, err) : NULL;
-    if (n == 0)
-        base_fail(err, BASE_EINVAL, "SVM: nothing to train on in the split '%s'", ggn_split_names[split]);
-out:
-    free(label);
-    free(x);
-    return svm;
-}
-
-static int svm_method(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, const char *name,
-                      const struct table *t, struct base_err *err)
-{
-    struct ggn_svm *svm = train_svm(t, s, split, err);
-    if (!svm)
-        return err->code;
-    double *score = malloc(s->n * sizeof *score), *scratch = malloc((size_t)t->n * sizeof *scratch);
-    int rc = !score || !scratch ? base_fail_nomem(err, name) : 0;
-    for (int b = 0; b < s->n_blocks && !rc; b++)
-        for (size_t i = s->blocks[b].first; i < s->blocks[b].end; i++)
-            score[i] = ggn_svm_score(svm, row_of(t, s, b, i), scratch);
     if (!rc)
-        rc = ggn_method_scores(m, s, name, score, err);
-    free(scratch);
-    free(score);
-    ggn_svm_destroy(svm);
+        ggn_replay(&j->set->chains, c, &rule, window_logit, &one, seen);
+    for (size_t i = b->first; i < b->end && !rc; i++)
+        j->method->score[i] = seen[i - b->first + (size_t)j->set->window - 1].p;
+    free(seen);
+    ggn_baseline_reader_destroy(one.reader);
     return rc;
 }
 
-int ggn_method_attributes_svm(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split,
-                              struct base_threads *threads, struct base_err *err)
+int ggn_method_baseline(struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_baseline *b,
+                        const struct ggn_looks *looks, struct base_threads *threads, struct base_err *err)
 {
-    struct table t;
-    int rc = make_table(&t, s, GGN_ATTRIBUTES, make_attributes, 0, threads, err);
+    struct judging j = {s, b, looks, m};
+    int rc = ggn_method_init(m, s, ggn_baseline_titles[b->kind], 1, err);
     if (rc)
         return rc;
-    rc = svm_method(m, s, split, "26 attributes + SVM", &t, err);
-    release_table(&t);
-    return rc;
-}
-
-int ggn_method_mask_svm(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split,
-                        struct base_threads *threads, struct base_err *err)
-{
-    struct table t;
-    int rc = make_table(&t, s, GGN_MASK_FEATURES, make_mask, 0, threads, err);
+    m->cut = b->policy.threshold;
+    m->passes = b->policy.passes;
+    rc = ggn_eval_each_block(s, threads, judge_block, &j, err);
     if (rc)
-        return rc;
-    rc = svm_method(m, s, split, "noise mask + SVM", &t, err);
-    release_table(&t);
+        ggn_method_release(m);
+    else
+        ggn_method_run(m, s);
     return rc;
 }
 
-/* --- SVD-entropy + LSTM --- */
-
-/* The window of a case: its S levels, oldest first, [S][n]: rows of the table that follow one another. */
-static const double *window_of(const struct table *t, const struct ggn_eval_set *s, int b, size_t i)
+int ggn_method_learned(struct ggn_method *m, struct ggn_baseline *b, const struct ggn_eval_set *s,
+                       enum ggn_baseline_kind kind, enum ggn_split split, double early, int epochs,
+                       struct base_threads *threads, struct base_err *err)
 {
-    return t->x + (t->first[b] + (i - s->blocks[b].first)) * (size_t)t->n;
-}
-
-static int train_lstm(struct ggn_lstm *lstm, const struct table *t, const struct ggn_eval_set *s, enum ggn_split split,
-                      int epochs, struct base_err *err)
-{
-    const double **windows = malloc((s->n > 0 ? s->n : 1) * sizeof *windows);
-    unsigned char *label = malloc(s->n > 0 ? s->n : 1);
-    size_t n = 0, positive = 0;
-    int rc = 0;
-    if (!windows || !label) {
-        rc = base_fail_nomem(err, "LSTM");
-        goto out;
-    }
-    for (int b = 0; b < s->n_blocks; b++)
-        for (size_t i = s->blocks[b].first; i < s->blocks[b].end; i++)
-            if (s->blocks[b].split == split && s->noisy[i] >= 0) {
-                windows[n] = window_of(t, s, b, i);
-                label[n] = s->noisy[i] == 1;
-                positive += label[n++];
-            }
-    if (positive == 0 || positive == n)
-        rc = base_fail(err, BASE_EINVAL, "LSTM: the split '%s' lacks one of the classes", ggn_split_names[split]);
-    for (int e = 0; e < epochs && !rc; e++)
-        ggn_lstm_epoch(lstm, windows, label, n, (uint32_t)e);
-out:
-    free(label);
-    free(windows);
-    return rc;
-}
-
-int ggn_method_svd_lstm(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, int first, int epochs,
-                        struct base_threads *threads, struct base_err *err)
-{
-    struct table t;
-    int count = ggn_svd_entropy_count(s->chains.width, s->chains.height), rc;
-    if (count == 0)
-        return base_fail(err, BASE_EINVAL, "SVD-entropy needs blocks of at least 20x20 pixels");
-    rc = make_table(&t, s, count, make_entropy, first, threads, err);
-    if (rc)
-        return rc;
-    struct ggn_lstm *lstm = ggn_lstm_create(count, s->window, 7, err);
-    double *score = malloc(s->n * sizeof *score);
-    rc = !lstm ? err->code : !score ? base_fail_nomem(err, "LSTM") : train_lstm(lstm, &t, s, split, epochs, err);
-    for (int b = 0; b < s->n_blocks && !rc; b++)
-        for (size_t i = s->blocks[b].first; i < s->blocks[b].end; i++)
-            score[i] = ggn_lstm_predict(lstm, window_of(&t, s, b, i));
+    struct ggn_looks looks = {0};
+    *b = (struct ggn_baseline){0};
+    int rc = ggn_baseline_init(b, kind, s->chains.width, s->chains.height, s->window, err), made = 0;
     if (!rc)
-        rc = ggn_method_scores(m, s, "SVD-entropy + LSTM", score, err);
-    free(score);
-    ggn_lstm_destroy(lstm);
-    release_table(&t);
+        rc = ggn_looks_make(&looks, b, s, threads, err);
+    if (!rc)
+        rc = ggn_baseline_train(b, &looks, s, split, epochs, err);
+    if (!rc)
+        made = !(rc = ggn_method_baseline(m, s, b, &looks, threads, err));
+    if (!rc && !(rc = ggn_method_tune(m, s, split, early, err)))
+        b->policy.threshold = fmin(m->cut, 1);
+    ggn_looks_release(&looks);
+    if (rc && made)
+        ggn_method_release(m);
+    if (rc)
+        ggn_baseline_release(b);
     return rc;
 }

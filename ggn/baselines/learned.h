@@ -1,22 +1,40 @@
 /*
- * The published models before the network as methods of evaluation: trained on the training scenes' cases, judged on all.
+ * The published models before the network on a data set: training, and as methods of evaluation that judge the blocks'
+ * levels by the one stopping rule (data/replay.h), as the criteria of the same names do in a renderer.
  *
- * 26 attributes + SVM (Constantin et al. 2015), noise mask + SVM (Takouachet et al. 2017), SVD-entropy + LSTM (Buisine et
- * al. 2021). Everything is seeded; results do not depend on the number of threads.
+ * Everything is seeded; results do not depend on the number of threads.
  */
 #ifndef GGN_BASELINES_LEARNED_H
 #define GGN_BASELINES_LEARNED_H
 
+#include "baselines/baseline.h"
 #include "eval/method.h"
 
-/* Each trains on the blocks of `split` and gives every case a score. BASE_EINVAL when that split lacks one of the classes.
- * The cut is to be tuned afterwards. */
-int ggn_method_attributes_svm(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split,
-                              struct base_threads *threads, struct base_err *err);
-int ggn_method_mask_svm(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split,
-                        struct base_threads *threads, struct base_err *err);
-/* epochs: passes over the training cases (published: 30). interval [first, 20) of the singular values: 0 or 5. */
-int ggn_method_svd_lstm(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, int first, int epochs,
-                        struct base_threads *threads, struct base_err *err);
+/* What a baseline sees of every level of a set's blocks: [level][size]. */
+struct ggn_looks {
+    size_t size;   /* numbers per level */
+    size_t *first; /* owns; [blocks]: row of the block's level 0 */
+    double *x;     /* owns; [rows][size] */
+};
+
+int ggn_looks_make(struct ggn_looks *looks, const struct ggn_baseline *b, const struct ggn_eval_set *s,
+                   struct base_threads *threads, struct base_err *err);
+void ggn_looks_release(struct ggn_looks *looks);
+
+/* Trains an empty baseline on the cases of `split`: weights, calibration (Platt's, on the validation scenes if there are
+ * any) and cadence; the threshold stays at 0.5. epochs: of the LSTM (published: 30). BASE_EINVAL when the split lacks one of
+ * the classes. */
+int ggn_baseline_train(struct ggn_baseline *b, const struct ggn_looks *looks, const struct ggn_eval_set *s,
+                       enum ggn_split split, int epochs, struct base_err *err);
+
+/* Scores: p_noisy of every case; cut and passes are the policy's. Then runs. */
+int ggn_method_baseline(struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_baseline *b,
+                        const struct ggn_looks *looks, struct base_threads *threads, struct base_err *err);
+
+/* All of that for one kind, on blocks and windows of the set's size, and the threshold with at most `early` of the blocks of
+ * `split` stopped early (ggn_method_tune). The caller owns both on success. */
+int ggn_method_learned(struct ggn_method *m, struct ggn_baseline *b, const struct ggn_eval_set *s,
+                       enum ggn_baseline_kind kind, enum ggn_split split, double early, int epochs,
+                       struct base_threads *threads, struct base_err *err);
 
 #endif

@@ -14,21 +14,23 @@ struct layer {
     int in, out;
     size_t w, u, b;  /* offsets of W [4·out, in], U [4·out, out], b [4·out] in the parameters; gates in the order i, f, g, o
                         */
-    float *z;        /* [steps][BATCH][4·out]: gates after their activation; then d loss / d pre-activation */
-    float *c, *s, *h; /* [steps][BATCH][out]: cell, sigmoid(cell), output (before dropout) */
-    float *x;        /* [steps][BATCH][in]: what came in (after dropout) */
+    float *z;        /* [steps][batch][4·out]: gates after their activation; then d loss / d pre-activation */
+    float *c, *s, *h; /* [steps][batch][out]: cell, sigmoid(cell), output (before dropout) */
+    float *x;        /* [steps][batch][in]: what came in (after dropout) */
     float *dx;       /* the same shape: d loss / d x */
-    float *mask;     /* [steps][BATCH][out]: dropout of the output, 0 or 1/(1-p) */
+    float *mask;     /* [steps][batch][out]: dropout of the output, 0 or 1/(1-p) */
 };
 
 struct ggn_lstm {
-    int inputs, steps;
+    int inputs, steps, batch; /* batch: sequences at a time, 1 or BATCH */
     uint32_t seed, calls;
     size_t n, dense;        /* parameters; offset of the last unit's [32] weights and bias */
     long adam_steps;
-    float *p, *grad, *m, *v; /* [n] each; p owns all four */
+    float *owned;            /* p, grad, m, v, [n] each; NULL: a reader, whose p is borrowed and that has no others */
+    const float *p;
+    float *grad, *m, *v;
     float *activations;      /* owns what the layers point to */
-    float *dh, *dc;          /* [BATCH][512] scratch of the backward pass */
+    float *dh, *dc;          /* [batch][512] scratch of the backward pass */
     struct layer layers[LAYERS];
 };
 
@@ -61,43 +63,38 @@ static float hard_sigmoid(float x)
 /* Glorot uniform; forget gates start open (bias 1), as the published code's library has it. */
 static void init_weights(struct ggn_lstm *l, uint32_t seed)
 {
-    memset(l->p, 0, 4 * l->n * sizeof *l->p);
+    float *p = l->owned;
+    memset(p, 0, 4 * l->n * sizeof *p);
     for (int k = 0; k < LAYERS; k++) {
         const struct layer *y = &l->layers[k];
         size_t nw = 4 * (size_t)y->out * (size_t)y->in, nu = 4 * (size_t)y->out * (size_t)y->out;
         float limit_w = sqrtf(6.0f / (float)(y->in + 4 * y->out)), limit_u = sqrtf(6.0f / (float)(5 * y->out));
         for (size_t i = 0; i < nw; i++)
-            l->p[y->w + i] = limit_w * (2.0f * uniform((uint32_t)i, seed + 10 * (uint32_t)k) - 1.0f);
+            p[y->w + i] = limit_w * (2.0f * uniform((uint32_t)i, seed + 10 * (uint32_t)k) - 1.0f);
         for (size_t i = 0; i < nu; i++)
-            l->p[y->u + i] = limit_u * (2.0f * uniform((uint32_t)i, seed + 10 * (uint32_t)k + 1) - 1.0f);
+            p[y->u + i] = limit_u * (2.0f * uniform((uint32_t)i, seed + 10 * (uint32_t)k + 1) - 1.0f);
         for (int i = 0; i < y->out; i++)
-            l->p[y->b + (size_t)(y->out + i)] = 1.0f;
+            p[y->b + (size_t)(y->out + i)] = 1.0f;
     }
     float limit = sqrtf(6.0f / (float)(widths[LAYERS - 1] + 1));
     for (int i = 0; i < widths[LAYERS - 1]; i++)
-        l->p[l->dense + (size_t)i] = limit * (2.0f * uniform((uint32_t)i, seed + 99) - 1.0f);
+        p[l->dense + (size_t)i] = limit * (2.0f * uniform((uint32_t)i, seed + 99) - 1.0f);
 }
 
 void ggn_lstm_destroy(struct ggn_lstm *l)
 {
     if (!l)
         return;
-    free(l->p);
+    free(l->owned);
     free(l->activations);
     free(l);
 }
 
-struct ggn_lstm *ggn_lstm_create(int inputs, int steps, uint32_t seed, struct base_err *err)
+/* Lays out the parameters; returns how many there are. */
+static size_t lay_out(struct ggn_lstm *l, int inputs)
 {
-    struct ggn_lstm *l = calloc(1, sizeof *l);
-    if (!l) {
-        base_fail_nomem(err, "LSTM");
-        return NULL;
-    }
     l->inputs = inputs;
-    l->steps = steps;
-    l->seed = seed;
-    size_t rows = (size_t)steps * BATCH, floats = 2 * BATCH * (size_t)widths[0];
+    l->n = 0;
     for (int k = 0; k < LAYERS; k++) {
         struct layer *y = &l->layers[k];
         y->in = k == 0 ? inputs : widths[k - 1];
@@ -106,24 +103,25 @@ struct ggn_lstm *ggn_lstm_create(int inputs, int steps, uint32_t seed, struct ba
         y->u = y->w + 4 * (size_t)y->out * (size_t)y->in;
         y->b = y->u + 4 * (size_t)y->out * (size_t)y->out;
         l->n = y->b + 4 * (size_t)y->out;
-        floats += rows * (size_t)(8 * y->out + 2 * y->in);
     }
     l->dense = l->n;
-    l->n += (size_t)widths[LAYERS - 1] + 1;
-    l->p = malloc(4 * l->n * sizeof *l->p);
-    l->activations = calloc(floats, sizeof *l->activations);
-    if (!l->p || !l->activations) {
-        base_fail_nomem(err, "LSTM");
-        ggn_lstm_destroy(l);
-        return NULL;
-    }
-    l->grad = l->p + l->n;
-    l->m = l->grad + l->n;
-    l->v = l->m + l->n;
+    return l->n += (size_t)widths[LAYERS - 1] + 1;
+}
+
+size_t ggn_lstm_parameters(int inputs)
+{
+    struct ggn_lstm l;
+    return lay_out(&l, inputs);
+}
+
+/* Shares out one allocation among the layers. */
+static void place_activations(struct ggn_lstm *l)
+{
+    size_t batch = (size_t)l->batch, rows = (size_t)l->steps * batch;
     float *at = l->activations;
     l->dh = at;
-    l->dc = at + BATCH * (size_t)widths[0];
-    at += 2 * BATCH * (size_t)widths[0];
+    l->dc = at + batch * (size_t)widths[0];
+    at += 2 * batch * (size_t)widths[0];
     for (int k = 0; k < LAYERS; k++) {
         struct layer *y = &l->layers[k];
         size_t out = rows * (size_t)y->out, in = rows * (size_t)y->in;
@@ -136,39 +134,78 @@ struct ggn_lstm *ggn_lstm_create(int inputs, int steps, uint32_t seed, struct ba
         y->dx = y->x + in;
         at = y->dx + in;
     }
+}
+
+/* weights NULL: for training, with parameters of its own. */
+static struct ggn_lstm *create(int inputs, int steps, int batch, const float *weights, struct base_err *err)
+{
+    struct ggn_lstm *l = calloc(1, sizeof *l);
+    if (!l) {
+        base_fail_nomem(err, "LSTM");
+        return NULL;
+    }
+    lay_out(l, inputs);
+    l->steps = steps;
+    l->batch = batch;
+    size_t floats = 2 * (size_t)batch * (size_t)widths[0];
+    for (int k = 0; k < LAYERS; k++)
+        floats += (size_t)steps * (size_t)batch * (size_t)(8 * l->layers[k].out + 2 * l->layers[k].in);
+    l->owned = weights ? NULL : malloc(4 * l->n * sizeof *l->owned);
+    l->activations = calloc(floats, sizeof *l->activations);
+    if ((!weights && !l->owned) || !l->activations) {
+        base_fail_nomem(err, "LSTM");
+        ggn_lstm_destroy(l);
+        return NULL;
+    }
+    l->p = weights ? weights : l->owned;
+    if (!weights) {
+        l->grad = l->owned + l->n;
+        l->m = l->grad + l->n;
+        l->v = l->m + l->n;
+    }
+    place_activations(l);
+    return l;
+}
+
+struct ggn_lstm *ggn_lstm_create(int inputs, int steps, uint32_t seed, struct base_err *err)
+{
+    struct ggn_lstm *l = create(inputs, steps, BATCH, NULL, err);
+    if (!l)
+        return NULL;
+    l->seed = seed;
     openblas_set_num_threads(1);
     init_weights(l, seed);
     return l;
 }
 
-size_t ggn_lstm_parameters(const struct ggn_lstm *l)
+struct ggn_lstm *ggn_lstm_reader(int inputs, int steps, const float *weights, struct base_err *err)
 {
-    return l->n;
+    return create(inputs, steps, 1, weights, err);
 }
 
 float *ggn_lstm_weights(struct ggn_lstm *l)
 {
-    return l->p;
+    return l->owned;
 }
 
 /* Z = X·Wᵀ + H₋·Uᵀ + b; i, f, o = hard sigmoid, g = sigmoid; c = f∘c₋ + i∘g; h = o∘sigmoid(c). */
 static void forward_step(const struct ggn_lstm *l, const struct layer *y, int t, int batch)
 {
     int out = y->out;
-    float *z = y->z + (size_t)t * BATCH * 4 * (size_t)out;
-    const float *x = y->x + (size_t)t * BATCH * (size_t)y->in;
+    float *z = y->z + (size_t)t * (size_t)l->batch * 4 * (size_t)out;
+    const float *x = y->x + (size_t)t * (size_t)l->batch * (size_t)y->in;
     for (int r = 0; r < batch; r++)
         memcpy(z + (size_t)r * 4 * (size_t)out, l->p + y->b, 4 * (size_t)out * sizeof *z);
     cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasTrans, batch, 4 * out, y->in, 1.0f, x, y->in, l->p + y->w, y->in, 1.0f, z,
                 4 * out);
     if (t > 0)
         cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasTrans, batch, 4 * out, out, 1.0f,
-                    y->h + (size_t)(t - 1) * BATCH * (size_t)out, out, l->p + y->u, out, 1.0f, z, 4 * out);
+                    y->h + (size_t)(t - 1) * (size_t)l->batch * (size_t)out, out, l->p + y->u, out, 1.0f, z, 4 * out);
     for (int r = 0; r < batch; r++)
         for (int k = 0; k < out; k++) {
             float *g = z + (size_t)r * 4 * (size_t)out + (size_t)k;
-            size_t at = ((size_t)t * BATCH + (size_t)r) * (size_t)out + (size_t)k;
-            float before = t > 0 ? y->c[at - (size_t)BATCH * (size_t)out] : 0.0f;
+            size_t at = ((size_t)t * (size_t)l->batch + (size_t)r) * (size_t)out + (size_t)k;
+            float before = t > 0 ? y->c[at - (size_t)l->batch * (size_t)out] : 0.0f;
             g[0] = hard_sigmoid(g[0]);
             g[out] = hard_sigmoid(g[out]);
             g[2 * out] = sigmoid(g[2 * out]);
@@ -184,7 +221,7 @@ static void forward(struct ggn_lstm *l, int batch, int training, float *logit)
 {
     for (int k = 0; k < LAYERS; k++) {
         const struct layer *y = &l->layers[k];
-        size_t n = (size_t)l->steps * BATCH * (size_t)y->out;
+        size_t n = (size_t)l->steps * (size_t)l->batch * (size_t)y->out;
         for (int t = 0; t < l->steps; t++)
             forward_step(l, y, t, batch);
         l->calls += training != 0;
@@ -196,7 +233,7 @@ static void forward(struct ggn_lstm *l, int batch, int training, float *logit)
     }
     const struct layer *last = &l->layers[LAYERS - 1];
     for (int r = 0; r < batch; r++) {
-        size_t at = ((size_t)(l->steps - 1) * BATCH + (size_t)r) * (size_t)last->out;
+        size_t at = ((size_t)(l->steps - 1) * (size_t)l->batch + (size_t)r) * (size_t)last->out;
         logit[r] = l->p[l->dense + (size_t)last->out];
         for (int k = 0; k < last->out; k++)
             logit[r] += l->p[l->dense + (size_t)k] * last->h[at + (size_t)k] * last->mask[at + (size_t)k];
@@ -214,12 +251,12 @@ static float hard_slope(float y)
 static void backward_step(struct ggn_lstm *l, struct layer *y, int t, int batch)
 {
     int out = y->out;
-    float *z = y->z + (size_t)t * BATCH * 4 * (size_t)out;
+    float *z = y->z + (size_t)t * (size_t)l->batch * 4 * (size_t)out;
     for (int r = 0; r < batch; r++)
         for (int k = 0; k < out; k++) {
             float *g = z + (size_t)r * 4 * (size_t)out + (size_t)k;
-            size_t at = ((size_t)t * BATCH + (size_t)r) * (size_t)out + (size_t)k, rk = (size_t)r * (size_t)out + (size_t)k;
-            float before = t > 0 ? y->c[at - (size_t)BATCH * (size_t)out] : 0.0f;
+            size_t rk = (size_t)r * (size_t)out + (size_t)k, at = (size_t)t * (size_t)l->batch * (size_t)out + rk;
+            float before = t > 0 ? y->c[at - (size_t)l->batch * (size_t)out] : 0.0f;
             float i = g[0], f = g[out], c = g[2 * out], o = g[3 * out], s = y->s[at];
             float dh = l->dh[rk], dc = l->dc[rk] + dh * o * s * (1.0f - s);
             g[0] = dc * c * hard_slope(i);
@@ -228,19 +265,19 @@ static void backward_step(struct ggn_lstm *l, struct layer *y, int t, int batch)
             g[3 * out] = dh * s * hard_slope(o);
             l->dc[rk] = dc * f;
         }
-    const float *x = y->x + (size_t)t * BATCH * (size_t)y->in;
+    const float *x = y->x + (size_t)t * (size_t)l->batch * (size_t)y->in;
     /* dW += dZᵀ·X, dU += dZᵀ·H₋, dX = dZ·W, dH₋ = dZ·U */
     cblas_sgemm(CblasRowMajor, CblasTrans, CblasNoTrans, 4 * out, y->in, batch, 1.0f, z, 4 * out, x, y->in, 1.0f,
                 l->grad + y->w, y->in);
     cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, batch, y->in, 4 * out, 1.0f, z, 4 * out, l->p + y->w, y->in, 0.0f,
-                y->dx + (size_t)t * BATCH * (size_t)y->in, y->in);
+                y->dx + (size_t)t * (size_t)l->batch * (size_t)y->in, y->in);
     for (int r = 0; r < batch; r++)
         for (int k = 0; k < 4 * out; k++)
             l->grad[y->b + (size_t)k] += z[(size_t)r * 4 * (size_t)out + (size_t)k];
     if (t == 0)
         return;
     cblas_sgemm(CblasRowMajor, CblasTrans, CblasNoTrans, 4 * out, out, batch, 1.0f, z, 4 * out,
-                y->h + (size_t)(t - 1) * BATCH * (size_t)out, out, 1.0f, l->grad + y->u, out);
+                y->h + (size_t)(t - 1) * (size_t)l->batch * (size_t)out, out, 1.0f, l->grad + y->u, out);
     cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, batch, out, 4 * out, 1.0f, z, 4 * out, l->p + y->u, out, 0.0f,
                 l->dh, out);
 }
@@ -256,7 +293,7 @@ static void backward(struct ggn_lstm *l, int batch, const float *d)
         memset(l->dh, 0, (size_t)batch * out * sizeof *l->dh);
         memset(l->dc, 0, (size_t)batch * out * sizeof *l->dc);
         for (int t = l->steps - 1; t >= 0; t--) {
-            size_t first = (size_t)t * BATCH * out;
+            size_t first = (size_t)t * (size_t)l->batch * out;
             for (size_t i = 0; i < (size_t)batch * out; i++) {
                 if (layer + 1 < LAYERS) /* what the layer above asks for */
                     l->dh[i] += l->layers[layer + 1].dx[first + i] * y->mask[first + i];
@@ -267,19 +304,24 @@ static void backward(struct ggn_lstm *l, int batch, const float *d)
         }
     }
     for (int r = 0; r < batch; r++) {
-        size_t at = ((size_t)(l->steps - 1) * BATCH + (size_t)r) * (size_t)last->out;
+        size_t at = ((size_t)(l->steps - 1) * (size_t)l->batch + (size_t)r) * (size_t)last->out;
         for (int k = 0; k < last->out; k++)
             l->grad[l->dense + (size_t)k] += d[r] * last->h[at + (size_t)k] * last->mask[at + (size_t)k];
         l->grad[l->dense + (size_t)last->out] += d[r];
     }
 }
 
+static void load_step(struct ggn_lstm *l, int r, int t, const double *inputs)
+{
+    float *to = l->layers[0].x + ((size_t)t * (size_t)l->batch + (size_t)r) * (size_t)l->inputs;
+    for (int k = 0; k < l->inputs; k++)
+        to[k] = (float)inputs[k];
+}
+
 static void load_sequence(struct ggn_lstm *l, int r, const double *sequence)
 {
     for (int t = 0; t < l->steps; t++)
-        for (int k = 0; k < l->inputs; k++)
-            l->layers[0].x[((size_t)t * BATCH + (size_t)r) * (size_t)l->inputs + (size_t)k] =
-                (float)sequence[t * l->inputs + k];
+        load_step(l, r, t, sequence + (size_t)t * (size_t)l->inputs);
 }
 
 /* Kingma & Ba 2015, lr 1e-3. */
@@ -291,7 +333,7 @@ static void adam(struct ggn_lstm *l)
     for (size_t i = 0; i < l->n; i++) {
         l->m[i] = b1 * l->m[i] + (1.0f - b1) * l->grad[i];
         l->v[i] = b2 * l->v[i] + (1.0f - b2) * l->grad[i] * l->grad[i];
-        l->p[i] -= rate * l->m[i] / (sqrtf(l->v[i]) + 1e-7f);
+        l->owned[i] -= rate * l->m[i] / (sqrtf(l->v[i]) + 1e-7f);
     }
 }
 
@@ -337,12 +379,13 @@ double ggn_lstm_epoch(struct ggn_lstm *l, const double *const *sequences, const 
     return n > 0 ? loss / (double)n : (double)NAN;
 }
 
-double ggn_lstm_predict(struct ggn_lstm *l, const double *sequence)
+double ggn_lstm_logit(struct ggn_lstm *l, const double *const *sequence)
 {
     float logit;
-    load_sequence(l, 0, sequence);
+    for (int t = 0; t < l->steps; t++)
+        load_step(l, 0, t, sequence[t]);
     forward(l, 1, 0, &logit);
-    return (double)sigmoid(logit);
+    return (double)logit;
 }
 
 double ggn_lstm_gradient(struct ggn_lstm *l, const double *sequence, int label, float *grad)

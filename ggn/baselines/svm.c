@@ -6,23 +6,34 @@
 
 #include <libsvm/svm.h>
 
-struct ggn_svm {
-    int features;
-    double gamma, rho, sign;
-    size_t n_support;
-    double *support;     /* [n_support][features], standardised */
-    double *coefficient; /* [n_support] */
-    double *mean, *scale; /* [features] */
-};
-
-void ggn_svm_destroy(struct ggn_svm *svm)
+void ggn_svm_release(struct ggn_svm *svm)
 {
-    if (!svm)
-        return;
-    free(svm->support);
-    free(svm->coefficient);
-    free(svm->mean);
-    free(svm);
+    free(svm->values);
+    *svm = (struct ggn_svm){0};
+}
+
+size_t ggn_svm_values(const struct ggn_svm *svm)
+{
+    size_t d = (size_t)svm->features, n = (size_t)svm->n_support;
+    return 2 * d + n + n * d;
+}
+
+int ggn_svm_init(struct ggn_svm *svm, int features, int n_support, struct base_err *err)
+{
+    size_t d = (size_t)features;
+    *svm = (struct ggn_svm){0};
+    if (features < 1 || features > GGN_SVM_FEATURES || n_support < 0)
+        return base_fail(err, BASE_EINVAL, "SVM of %d features (1 to %d) and %d vectors", features, GGN_SVM_FEATURES,
+                         n_support);
+    *svm = (struct ggn_svm){.features = features, .n_support = n_support};
+    svm->values = malloc(ggn_svm_values(svm) * sizeof *svm->values);
+    if (!svm->values)
+        return base_fail_nomem(err, "SVM");
+    svm->mean = svm->values;
+    svm->scale = svm->mean + d;
+    svm->coefficient = svm->scale + d;
+    svm->support = svm->coefficient + n_support;
+    return 0;
 }
 
 static void be_quiet(const char *text)
@@ -30,66 +41,65 @@ static void be_quiet(const char *text)
     (void)text;
 }
 
-static void fit_scale(struct ggn_svm *svm, const double *x, size_t n)
+/* Mean and 1/deviation of each feature: [features] each. */
+static void fit_scale(double *mean, double *scale, const double *x, size_t n, size_t features)
 {
-    for (int k = 0; k < svm->features; k++) {
+    for (size_t k = 0; k < features; k++) {
         double sum = 0.0, square = 0.0;
         for (size_t i = 0; i < n; i++)
-            sum += x[i * (size_t)svm->features + (size_t)k];
-        svm->mean[k] = sum / (double)n;
+            sum += x[i * features + k];
+        mean[k] = sum / (double)n;
         for (size_t i = 0; i < n; i++) {
-            double d = x[i * (size_t)svm->features + (size_t)k] - svm->mean[k];
+            double d = x[i * features + k] - mean[k];
             square += d * d;
         }
         double deviation = sqrt(square / (double)n);
-        svm->scale[k] = deviation > 1e-12 ? 1.0 / deviation : 0.0;
+        scale[k] = deviation > 1e-12 ? 1.0 / deviation : 0.0;
     }
 }
 
 /* Keeps what scoring needs and nothing of libsvm's own. */
-static int take_over(struct ggn_svm *svm, const struct svm_model *model, const double *x, struct base_err *err)
+static int take_over(struct ggn_svm *svm, const struct svm_model *model, const double *mean, const double *scale,
+                     struct svm_node *const *rows, int features, struct base_err *err)
 {
-    size_t n = (size_t)model->l, d = (size_t)svm->features;
-    svm->support = malloc((n > 0 ? n : 1) * d * sizeof *svm->support);
-    svm->coefficient = malloc((n > 0 ? n : 1) * sizeof *svm->coefficient);
-    if (!svm->support || !svm->coefficient)
-        return base_fail_nomem(err, "SVM");
-    svm->n_support = n;
-    svm->rho = model->rho[0];
-    svm->sign = model->label[0] == 1 ? 1.0 : -1.0;
-    for (size_t i = 0; i < n; i++) {
-        size_t from = (size_t)model->sv_indices[i] - 1;
-        svm->coefficient[i] = model->sv_coef[0][i];
-        for (size_t k = 0; k < d; k++)
-            svm->support[i * d + k] = (x[from * d + k] - svm->mean[k]) * svm->scale[k];
+    int rc = ggn_svm_init(svm, features, model->l, err);
+    if (rc)
+        return rc;
+    double sign = model->label[0] == 1 ? 1.0 : -1.0;
+    svm->gamma = model->param.gamma;
+    svm->rho = sign * model->rho[0];
+    for (int k = 0; k < features; k++) {
+        svm->mean[k] = (float)mean[k];
+        svm->scale[k] = (float)scale[k];
+    }
+    for (int i = 0; i < model->l; i++) {
+        const struct svm_node *row = rows[model->sv_indices[i] - 1];
+        svm->coefficient[i] = (float)(sign * model->sv_coef[0][i]);
+        for (int k = 0; k < features; k++)
+            svm->support[(size_t)i * (size_t)features + (size_t)k] = (float)row[k].value;
     }
     return 0;
 }
 
-struct ggn_svm *ggn_svm_train(const double *x, const unsigned char *label, size_t n, int features, double c, double gamma,
-                              struct base_err *err)
+int ggn_svm_train(struct ggn_svm *svm, const double *x, const unsigned char *label, size_t n, int features, double c,
+                  double gamma, struct base_err *err)
 {
     size_t d = (size_t)features, positive = 0;
-    struct ggn_svm *svm = calloc(1, sizeof *svm);
     struct svm_node *nodes = malloc(n * (d + 1) * sizeof *nodes), **rows = malloc((n > 0 ? n : 1) * sizeof *rows);
-    double *y = malloc((n > 0 ? n : 1) * sizeof *y);
+    double *y = malloc((n > 0 ? n : 1) * sizeof *y), *mean = malloc(2 * d * sizeof *mean);
     int rc = 0;
-    if (svm)
-        svm->mean = malloc(2 * d * sizeof *svm->mean);
-    if (!svm || !nodes || !rows || !y || !svm->mean) {
+    *svm = (struct ggn_svm){0};
+    if (!nodes || !rows || !y || !mean) {
         rc = base_fail_nomem(err, "SVM");
         goto out;
     }
-    svm->scale = svm->mean + d;
-    svm->features = features;
-    svm->gamma = gamma / features;
-    fit_scale(svm, x, n);
+    fit_scale(mean, mean + d, x, n, d);
     for (size_t i = 0; i < n; i++) {
         rows[i] = nodes + i * (d + 1);
         y[i] = label[i] != 0;
         positive += label[i] != 0;
         for (size_t k = 0; k < d; k++)
-            rows[i][k] = (struct svm_node){(int)k + 1, (x[i * d + k] - svm->mean[k]) * svm->scale[k]};
+            rows[i][k] = (struct svm_node){(int)k + 1, (x[i * d + k] - mean[k]) * mean[d + k]};
         rows[i][d].index = -1;
     }
     if (positive == 0 || positive == n) {
@@ -99,38 +109,34 @@ struct ggn_svm *ggn_svm_train(const double *x, const unsigned char *label, size_
     int labels[2] = {1, 0};
     double weights[2] = {0.5 * (double)n / (double)positive, 0.5 * (double)n / (double)(n - positive)};
     struct svm_problem problem = {.l = (int)n, .y = y, .x = rows};
-    struct svm_parameter parameter = {.svm_type = C_SVC, .kernel_type = RBF, .gamma = svm->gamma, .C = c, .cache_size = 100,
-                                      .eps = 1e-3, .shrinking = 1,
+    struct svm_parameter parameter = {.svm_type = C_SVC, .kernel_type = RBF, .gamma = gamma / features, .C = c,
+                                      .cache_size = 100, .eps = 1e-3, .shrinking = 1,
                                       .nr_weight = 2, .weight_label = labels, .weight = weights};
     svm_set_print_string_function(be_quiet);
     struct svm_model *model = svm_train(&problem, &parameter);
-    rc = !model ? base_fail_nomem(err, "SVM") : take_over(svm, model, x, err);
+    rc = !model ? base_fail_nomem(err, "SVM") : take_over(svm, model, mean, mean + d, rows, features, err);
     if (model)
         svm_free_and_destroy_model(&model);
 out:
+    free(mean);
     free(y);
     free(rows);
     free(nodes);
-    if (rc) {
-        ggn_svm_destroy(svm);
-        return NULL;
-    }
-    return svm;
+    return rc;
 }
 
-double ggn_svm_score(const struct ggn_svm *svm, const double *x, double *scratch)
+double ggn_svm_score(const struct ggn_svm *svm, const double *x)
 {
     size_t d = (size_t)svm->features;
-    double sum = 0.0;
+    double z[GGN_SVM_FEATURES], sum = 0.0;
     for (size_t k = 0; k < d; k++)
-        scratch[k] = (x[k] - svm->mean[k]) * svm->scale[k];
-    for (size_t i = 0; i < svm->n_support; i++) {
+        z[k] = (x[k] - (double)svm->mean[k]) * (double)svm->scale[k];
+    for (int i = 0; i < svm->n_support; i++) {
+        const float *support = svm->support + (size_t)i * d;
         double distance = 0.0;
-        for (size_t k = 0; k < d; k++) {
-            double t = scratch[k] - svm->support[i * d + k];
-            distance += t * t;
-        }
-        sum += svm->coefficient[i] * exp(-svm->gamma * distance);
+        for (size_t k = 0; k < d; k++)
+            distance += (z[k] - (double)support[k]) * (z[k] - (double)support[k]);
+        sum += (double)svm->coefficient[i] * exp(-svm->gamma * distance);
     }
-    return svm->sign * (sum - svm->rho);
+    return sum - svm->rho;
 }

@@ -24,6 +24,7 @@
     X(import_sin3d, "SIN3D images into block sequences") \
     X(label, "thresholds for recorded sequences: human, or a model observer's") \
     X(train, "train a stopping criterion on block sequences") \
+    X(baseline, "train a published model before the network, as a criterion") \
     X(evaluate, "figures of models and baselines on recorded sequences") \
     X(reconstruct, "the picture with each block at its threshold") \
     X(study, "ask people for thresholds and judgements, on a local page")

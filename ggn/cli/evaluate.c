@@ -17,11 +17,12 @@
 #include "eval/strips.h"
 #include "eval/trained.h"
 
-enum { MAX_MODELS = 8, MAX_FILES = 8, MAX_METHODS = 9 + MAX_FILES + 2 * MAX_MODELS, MAX_ADJUSTED = 8 };
+enum { MAX_MODELS = 8, MAX_FILES = 8, MAX_METHODS = 9 + 2 * MAX_FILES + 2 * MAX_MODELS, MAX_ADJUSTED = 8 };
 
 struct options {
-    const char *data, *out, *observer, *models[MAX_MODELS], *thresholds[MAX_FILES];
-    int n_models, n_thresholds, json, no_quality, threads, window, retune, recorded, baselines, epochs, bf16, no_pictures;
+    const char *data, *out, *observer, *models[MAX_MODELS], *thresholds[MAX_FILES], *trained[MAX_FILES];
+    int n_models, n_thresholds, n_trained, json, no_quality, threads, window, retune, recorded, baselines, epochs, bf16,
+        no_pictures;
     double early, ratio, visible;
     int n_adjusted;
     struct {
@@ -45,6 +46,15 @@ static int add_thresholds(void *into, const char *path, struct base_err *err)
     if (o->n_thresholds == MAX_FILES)
         return base_fail(err, BASE_EINVAL, "more than %d files of thresholds", MAX_FILES);
     o->thresholds[o->n_thresholds++] = path;
+    return 0;
+}
+
+static int add_trained(void *into, const char *path, struct base_err *err)
+{
+    struct options *o = into;
+    if (o->n_trained == MAX_FILES)
+        return base_fail(err, BASE_EINVAL, "more than %d baselines", MAX_FILES);
+    o->trained[o->n_trained++] = path;
     return 0;
 }
 
@@ -76,6 +86,7 @@ static const struct base_option list[] = {
              "views"},
     {"visible", 0, "SHARE", TO(visible), 1e-4, 0.9999,
      .help = "share of viewers that may still see noise, for observer (0.25) and models (their own)"},
+    {"baseline", 0, "FILE", .set = add_trained, .help = "a published baseline as ggn baseline trained it; may be repeated"},
     {"thresholds", 0, "CSV", .set = add_thresholds,
      .help = "a published model's thresholds of people's views; may be repeated"},
     {"param", 'p', "KEY=NUMBER", .set = add_adjusted,
@@ -146,19 +157,47 @@ static int add_trivial(struct job *j, struct base_err *err)
     return rc;
 }
 
+static void adjust(const struct options *o, struct ggn_policy *policy)
+{
+    if (o->visible > 0)
+        policy->threshold = o->visible;
+    for (int i = 0; i < o->n_adjusted; i++)
+        ggn_policy_adjust(policy, o->adjusted[i].name, o->adjusted[i].value);
+}
+
+static int add_baseline_file(struct job *j, const char *path, struct base_threads *threads, struct base_err *err)
+{
+    struct ggn_baseline b;
+    struct ggn_looks looks = {0};
+    int rc = ggn_baseline_load(&b, path, GGN_BASELINES, err);
+    if (rc)
+        return rc;
+    adjust(j->o, &b.policy);
+    if (b.window > j->set.window)
+        rc = base_fail(err, BASE_EINVAL, "%s: it judges %d images, windows here have %d (--window)", path, b.window,
+                       j->set.window);
+    if (!rc)
+        rc = ggn_looks_make(&looks, &b, &j->set, threads, err);
+    if (!rc && !(rc = ggn_method_baseline(&j->methods[j->n], &j->set, &b, &looks, threads, err)))
+        j->n++;
+    ggn_looks_release(&looks);
+    ggn_baseline_release(&b);
+    return rc;
+}
+
 static int add_baselines(struct job *j, struct base_threads *threads, struct base_err *err)
 {
     int rc = 0;
-    for (int k = 0; k < 3 && !rc; k++) {
-        struct ggn_method *m = &j->methods[j->n];
-        if (k == 0)
-            rc = ggn_method_attributes_svm(m, &j->set, j->tuning, threads, err);
-        else if (k == 1)
-            rc = ggn_method_mask_svm(m, &j->set, j->tuning, threads, err);
-        else
-            rc = ggn_method_svd_lstm(m, &j->set, j->tuning, 0, j->o->epochs, threads, err);
-        if (!rc)
-            rc = ggn_method_tune(&j->methods[j->n++], &j->set, j->tuning, j->o->early, err);
+    for (int i = 0; i < j->o->n_trained && !rc; i++)
+        rc = add_baseline_file(j, j->o->trained[i], threads, err);
+    for (int k = 0; k < GGN_BASELINES && j->o->baselines && !rc; k++) {
+        struct ggn_baseline trained;
+        rc = ggn_method_learned(&j->methods[j->n], &trained, &j->set, (enum ggn_baseline_kind)k, j->tuning, j->o->early,
+                                j->o->epochs, threads, err);
+        if (rc)
+            return rc;
+        ggn_baseline_release(&trained);
+        j->n++;
     }
     return rc;
 }
@@ -166,10 +205,8 @@ static int add_baselines(struct job *j, struct base_threads *threads, struct bas
 static int policy_of(const struct options *o, const struct ggn_model *model, struct ggn_policy *policy, struct base_err *err)
 {
     int rc = ggn_policy_of(model, policy, err);
-    if (!rc && o->visible > 0)
-        policy->threshold = o->visible;
-    for (int i = 0; i < o->n_adjusted && !rc; i++)
-        ggn_policy_adjust(policy, o->adjusted[i].name, o->adjusted[i].value);
+    if (!rc)
+        adjust(o, policy);
     return rc;
 }
 
@@ -369,7 +406,7 @@ int ggn_cmd_evaluate(int argc, char **argv)
     }
     if (!rc)
         rc = add_observed(&j, &err);
-    if (!rc && o.baselines)
+    if (!rc)
         rc = add_baselines(&j, threads, &err);
     if (!rc)
         rc = add_models(&j, threads, &err);

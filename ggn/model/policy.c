@@ -106,14 +106,49 @@ double ggn_policy_predict(const struct ggn_policy *policy, double p, double thre
     return above > 0 ? spp * exp2(fmin(above / policy->slope, 20)) : spp;
 }
 
+static void put_fields(cJSON *to, const struct ggn_policy *policy, int only_own, int *failed)
+{
+    for (int i = 0; i < N_FIELDS; i++)
+        if (fields[i].own || !only_own)
+            base_json_number(to, fields[i].name, get(policy, i), failed);
+}
+
+static int get_fields(const cJSON *from, struct ggn_policy *policy, int only_own, struct base_err *err)
+{
+    for (int i = 0; i < N_FIELDS; i++) {
+        const cJSON *item = fields[i].own || !only_own ? cJSON_GetObjectItemCaseSensitive(from, fields[i].name) : NULL;
+        if (item && !cJSON_IsNumber(item))
+            return base_fail(err, BASE_EINVAL, "policy: %s is not a number", fields[i].name);
+        if (item)
+            memcpy((char *)policy + fields[i].offset, &item->valuedouble, sizeof item->valuedouble);
+    }
+    return ggn_policy_check(policy, err);
+}
+
+void ggn_policy_print(cJSON *to, const struct ggn_policy *policy, int *failed)
+{
+    put_fields(to, policy, 0, failed);
+    base_json_number(to, "passes", policy->passes, failed);
+}
+
+int ggn_policy_parse(const cJSON *from, struct ggn_policy *policy, struct base_err *err)
+{
+    struct ggn_policy p = ggn_policy_default();
+    const cJSON *passes = cJSON_GetObjectItemCaseSensitive(from, "passes");
+
+    p.passes = cJSON_IsNumber(passes) ? passes->valueint : 0;
+    int rc = get_fields(from, &p, 0, err);
+    if (!rc)
+        *policy = p;
+    return rc;
+}
+
 int ggn_policy_set(struct ggn_model *model, const struct ggn_policy *policy, struct base_err *err)
 {
     cJSON *object = cJSON_CreateObject();
     int rc = ggn_policy_check(policy, err), failed = !object;
 
-    for (int i = 0; i < N_FIELDS && !rc; i++)
-        if (fields[i].own)
-            base_json_number(object, fields[i].name, get(policy, i), &failed);
+    put_fields(object, policy, 1, &failed);
     if (!rc && failed)
         rc = base_fail_nomem(err, "model policy");
     if (rc) {
@@ -145,14 +180,7 @@ int ggn_policy_of(const struct ggn_model *model, struct ggn_policy *policy, stru
     p.threshold = c->threshold;
     p.passes = c->consecutive;
     p.ratio = c->spacing;
-    for (int i = 0; i < N_FIELDS; i++) {
-        const cJSON *item = fields[i].own ? cJSON_GetObjectItemCaseSensitive(object, fields[i].name) : NULL;
-        if (item && !cJSON_IsNumber(item))
-            return base_fail(err, BASE_EINVAL, "policy: %s is not a number", fields[i].name);
-        if (item)
-            memcpy((char *)&p + fields[i].offset, &item->valuedouble, sizeof item->valuedouble);
-    }
-    int rc = ggn_policy_check(&p, err);
+    int rc = get_fields(object, &p, 1, err);
     if (!rc)
         *policy = p;
     return rc;

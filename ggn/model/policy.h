@@ -46,4 +46,9 @@ int ggn_policy_of(const struct ggn_model *model, struct ggn_policy *policy, stru
 /* Puts the policy into the model. */
 int ggn_policy_set(struct ggn_model *model, const struct ggn_policy *policy, struct base_err *err);
 
+/* A whole policy as members of a JSON object, for models that are no networks. */
+void ggn_policy_print(struct cJSON *to, const struct ggn_policy *policy, int *failed);
+/* BASE_EINVAL when a field is no number or out of range; fields that are missing keep their default. */
+int ggn_policy_parse(const struct cJSON *from, struct ggn_policy *policy, struct base_err *err);
+
 #endif

@@ -23,7 +23,7 @@ enum { GGN_WINDOW_MAX = 16 };
 
 struct ggn_stop_rule {
     struct ggn_policy policy; /* gate_noise 0: no gate; tail999, gini 0: no guard */
-    int window;               /* images per window, S; 2 .. GGN_WINDOW_MAX */
+    int window;               /* images per window, S; 1 .. GGN_WINDOW_MAX */
     uint64_t spp_max;         /* nobody asks beyond; 0: no limit */
 };
 

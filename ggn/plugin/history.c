@@ -2,20 +2,14 @@
 
 #include <lull/criterion_kit.h>
 
-static size_t pixels_of(const struct lull_rect *r)
+static size_t slot_bytes(struct gp_slot slot)
 {
-    return (size_t)((int64_t)r->x1 - r->x0) * (size_t)((int64_t)r->y1 - r->y0);
+    return (slot.made + slot.kept + 63) & ~(size_t)63;
 }
 
-/* A slot: 3 bytes and 3 16-bit values per pixel, kept 64-byte aligned. */
-static size_t slot_bytes(size_t pixels)
+uint64_t gp_history_block_bytes(int window, struct gp_slot slot)
 {
-    return (9 * pixels + 63) & ~(size_t)63;
-}
-
-uint64_t gp_history_block_bytes(int window, int32_t width, int32_t height)
-{
-    return (uint64_t)(window + 1) * slot_bytes((size_t)width * (size_t)height) + 2 * sizeof(struct gp_head);
+    return (uint64_t)(window + 1) * slot_bytes(slot) + 2 * sizeof(struct gp_head);
 }
 
 static void head_clear(struct gp_head *head, int window)
@@ -25,33 +19,41 @@ static void head_clear(struct gp_head *head, int window)
         head->order[i] = (uint32_t)i;
 }
 
-int32_t gp_history_create(struct gp_history *history, int window, const struct lull_frame *frame, struct lull_error *err)
+int32_t gp_history_create(struct gp_history *history, int window, const struct lull_frame *frame,
+                          struct gp_slot (*slot)(const void *of, int32_t width, int32_t height), const void *of,
+                          struct lull_error *err)
 {
-    uint64_t pixels = 0;
+    uint64_t bytes = 0;
     size_t n = frame->block_count;
 
-    for (uint32_t i = 0; i < frame->block_count; i++)
-        pixels += (uint64_t)(window + 1) * slot_bytes(pixels_of(lull_kit_rect(frame, i)));
-    uint64_t heads = 2 * n * sizeof(struct gp_head) + n * (sizeof(struct lull_rect) + sizeof(size_t)) + 256;
-    if (pixels > PTRDIFF_MAX - heads)
+    for (uint32_t i = 0; i < frame->block_count; i++) {
+        const struct lull_rect *r = lull_kit_rect(frame, i);
+        bytes += (uint64_t)(window + 1) * slot_bytes(slot(of, r->x1 - r->x0, r->y1 - r->y0));
+    }
+    uint64_t heads =
+        2 * n * sizeof(struct gp_head) + n * (sizeof(struct lull_rect) + sizeof(size_t) + sizeof(struct gp_slot)) + 256;
+    if (bytes > PTRDIFF_MAX - heads)
         return lull_kit_fail(err, LULL_E_MEMORY, "begin_frame: the blocks are too large for memory");
-    unsigned char *memory = aligned_alloc(64, (size_t)((pixels + heads + 63) & ~(uint64_t)63));
+    unsigned char *memory = aligned_alloc(64, (size_t)((bytes + heads + 63) & ~(uint64_t)63));
     if (!memory)
         return lull_kit_fail(err, LULL_E_MEMORY, "begin_frame: no memory for the history of %u blocks", frame->block_count);
 
-    struct gp_history h = {.window = window, .count = frame->block_count, .memory = memory, .pixels = memory};
-    void *p = memory + pixels;
+    struct gp_history h = {.window = window, .count = frame->block_count, .memory = memory, .bytes = memory};
+    void *p = memory + bytes;
     h.head = p;
     h.pending = h.head + n;
     p = h.pending + n;
     h.at = p;
     p = h.at + n;
+    h.slot = p;
+    p = h.slot + n;
     h.rect = p;
     size_t at = 0;
     for (uint32_t i = 0; i < frame->block_count; i++) {
         h.rect[i] = *lull_kit_rect(frame, i);
+        h.slot[i] = slot(of, h.rect[i].x1 - h.rect[i].x0, h.rect[i].y1 - h.rect[i].y0);
         h.at[i] = at;
-        at += (size_t)(window + 1) * slot_bytes(pixels_of(&h.rect[i]));
+        at += (size_t)(window + 1) * slot_bytes(h.slot[i]);
         head_clear(&h.head[i], window);
     }
     *history = h;
@@ -64,15 +66,14 @@ void gp_history_release(struct gp_history *history)
     *history = (struct gp_history){0};
 }
 
-uint8_t *gp_history_noisy(const struct gp_history *h, uint32_t id, uint32_t slot)
+void *gp_history_made(const struct gp_history *h, uint32_t id, uint32_t slot)
 {
-    return h->pixels + h->at[id] + slot * slot_bytes(pixels_of(&h->rect[id])) + 6 * pixels_of(&h->rect[id]);
+    return h->bytes + h->at[id] + slot * slot_bytes(h->slot[id]);
 }
 
-uint16_t *gp_history_denoised(const struct gp_history *h, uint32_t id, uint32_t slot)
+void *gp_history_kept(const struct gp_history *h, uint32_t id, uint32_t slot)
 {
-    void *p = h->pixels + h->at[id] + slot * slot_bytes(pixels_of(&h->rect[id]));
-    return p;
+    return (unsigned char *)gp_history_made(h, id, slot) + h->slot[id].made;
 }
 
 uint32_t gp_head_push(struct gp_head *head, int window, uint32_t before)
@@ -85,7 +86,7 @@ uint32_t gp_head_push(struct gp_head *head, int window, uint32_t before)
         memmove(head->order, head->order + 1, (size_t)window * sizeof head->order[0]);
         head->order[window] = oldest;
     }
-    head->denoised &= ~(UINT32_C(1) << slot);
+    head->made &= ~(UINT32_C(1) << slot);
     return slot;
 }
 
@@ -113,14 +114,13 @@ int32_t gp_history_save(const struct gp_history *h, uint32_t key, const struct l
 
     for (uint32_t id = 0; !status && id < h->count; id++) {
         struct gp_head head = h->head[id];
-        size_t image = 3 * pixels_of(&h->rect[id]);
 
-        head.denoised = 0; /* denoised images are computed again on demand: the same bytes, and a file a third of the size */
+        head.made = 0; /* computed again on demand: the same bytes, and a smaller file */
         status = writer->write(writer, &h->rect[id], sizeof h->rect[id]);
         if (!status)
             status = writer->write(writer, &head, sizeof head);
         for (uint32_t i = 0; !status && i < head.stopper.used; i++)
-            status = writer->write(writer, gp_history_noisy(h, id, head.order[i]), image);
+            status = writer->write(writer, gp_history_kept(h, id, head.order[i]), h->slot[id].kept);
     }
     return status ? lull_kit_fail(err, status, "state: the host could not write it") : LULL_OK;
 }
@@ -135,7 +135,7 @@ static int head_valid(const struct gp_head *head, const struct ggn_stop_rule *ru
             return 0;
         seen |= UINT32_C(1) << head->order[i];
     }
-    return !head->denoised && head->bad <= 1 && ggn_stopper_valid(rule, &head->stopper);
+    return !head->made && head->bad <= 1 && ggn_stopper_valid(rule, &head->stopper);
 }
 
 static int32_t load_blocks(struct gp_history *h, const struct ggn_stop_rule *rule, const struct lull_reader *reader,
@@ -144,14 +144,13 @@ static int32_t load_blocks(struct gp_history *h, const struct ggn_stop_rule *rul
     for (uint32_t id = 0; id < h->count; id++) {
         struct lull_rect rect;
         struct gp_head head;
-        size_t image = 3 * pixels_of(&h->rect[id]);
 
         if (reader->read(reader, &rect, sizeof rect) || reader->read(reader, &head, sizeof head))
             return lull_kit_fail(err, LULL_E_IO, "state: it ends early, at block %u", id);
         if (memcmp(&rect, &h->rect[id], sizeof rect) || !head_valid(&head, rule))
             return lull_kit_fail(err, LULL_E_IO, "state: block %u does not fit the frame", id);
         for (uint32_t i = 0; i < head.stopper.used; i++)
-            if (reader->read(reader, gp_history_noisy(h, id, head.order[i]), image))
+            if (reader->read(reader, gp_history_kept(h, id, head.order[i]), h->slot[id].kept))
                 return lull_kit_fail(err, LULL_E_IO, "state: it ends early, at block %u", id);
         h->head[id] = head;
     }

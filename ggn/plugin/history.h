@@ -1,5 +1,5 @@
 /*
- * What the criterion remembers of a frame: for each block the last S images it judged, keyed by spp.
+ * What a criterion remembers of a frame: for each block what it keeps of the last S images it judged, keyed by spp.
  *
  * One allocation per frame. A block owns S + 1 slots: a new image goes into the spare one and becomes part of the history
  * only when the whole evaluate call has succeeded (gp_history_commit), so that a failed or cancelled call leaves no trace.
@@ -17,11 +17,16 @@
 
 enum { GP_SLOTS_MAX = GGN_WINDOW_MAX + 1 };
 
+/* What a slot holds of an image: bytes that are saved with the state, after some that can be made again from those. */
+struct gp_slot {
+    size_t made, kept;
+};
+
 /* Fixed-size part of a block's history. Copied as a whole between pending and current; without padding. */
 struct gp_head {
     struct ggn_stopper stopper;   /* its window's images are order[0 .. used − 1] */
     uint32_t order[GP_SLOTS_MAX]; /* slots, oldest image first; order[used] is the spare one */
-    uint32_t denoised;            /* bit per slot: its denoised image is there */
+    uint32_t made;                /* bit per slot: what is made from it is there */
     uint32_t bad;                 /* the last image had broken pixels */
     uint32_t zero;
 };
@@ -30,20 +35,25 @@ struct gp_history {
     int window;                   /* S */
     uint32_t count;               /* blocks */
     struct lull_rect *rect;       /* owns, with everything below, as one allocation */
-    size_t *at;                   /* offset of the block's slots in `pixels` */
+    size_t *at;                   /* offset of the block's slots in `bytes` */
+    struct gp_slot *slot;         /* of each block */
     struct gp_head *head, *pending;
-    unsigned char *pixels;
+    unsigned char *bytes;
     void *memory;
 };
 
-/* Bytes of one block of this size. */
-uint64_t gp_history_block_bytes(int window, int32_t width, int32_t height);
-/* Copies the rectangles of a checked frame. LULL_E_MEMORY leaves *history as it was. */
-int32_t gp_history_create(struct gp_history *history, int window, const struct lull_frame *frame, struct lull_error *err);
+/* Bytes of one block with such slots. */
+uint64_t gp_history_block_bytes(int window, struct gp_slot slot);
+/* Copies the rectangles of a checked frame; `slot` says what one of a block of this size holds. LULL_E_MEMORY leaves
+ * *history as it was. */
+int32_t gp_history_create(struct gp_history *history, int window, const struct lull_frame *frame,
+                          struct gp_slot (*slot)(const void *of, int32_t width, int32_t height), const void *of,
+                          struct lull_error *err);
 void gp_history_release(struct gp_history *history);
 
-uint8_t *gp_history_noisy(const struct gp_history *h, uint32_t id, uint32_t slot);      /* [3][height][width] */
-uint16_t *gp_history_denoised(const struct gp_history *h, uint32_t id, uint32_t slot);  /* [3][height][width] */
+/* Where a slot begins: `made` bytes, 64-byte aligned, and after them, aligned as far as `made` is, `kept` bytes. */
+void *gp_history_made(const struct gp_history *h, uint32_t id, uint32_t slot);
+void *gp_history_kept(const struct gp_history *h, uint32_t id, uint32_t slot);
 
 /* Makes the spare slot that of the image which head->stopper has just accepted; returns the slot. `before`: images in the
  * window until then. */

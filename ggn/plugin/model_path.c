@@ -7,15 +7,13 @@
 #include <string.h>
 #include <unistd.h>
 
-#define MODEL_NAME "lull-1.ggn"
-
-int gp_model_find(char *path, size_t room)
+int gp_model_find(const char *name, const char *variable, char *path, size_t room)
 {
     /* build/lib/lull and build/MODE/lib/lull lie three and four folders below the tree's root */
     static const char *const places[] = {".", "../share/lull", "../../share/lull", "../../../ggn/models",
                                          "../../../../ggn/models"};
     static const char anchor = 0; /* an address inside this shared object */
-    const char *named = getenv("LULL_MODEL");
+    const char *named = variable ? getenv(variable) : NULL;
     char folder[4096] = ".";
     Dl_info info;
 
@@ -29,12 +27,12 @@ int gp_model_find(char *path, size_t room)
             snprintf(folder, sizeof folder, "%.*s", (int)(slash - info.dli_fname), info.dli_fname);
     }
     for (size_t i = 0; i < sizeof places / sizeof places[0]; i++) {
-        int n = snprintf(path, room, "%s/%s/" MODEL_NAME, folder, places[i]);
+        int n = snprintf(path, room, "%s/%s/%s", folder, places[i], name);
         if (n > 0 && (size_t)n < room && access(path, R_OK) == 0)
             return 1;
     }
-    snprintf(path, room, "no " MODEL_NAME " beside %.200s, in ../share/lull, ../../share/lull or the source tree's "
-                         "ggn/models; "
-                         "give model=FILE or set LULL_MODEL", info.dli_fname ? info.dli_fname : "the criterion");
+    snprintf(path, room,
+             "no %s beside %.200s, in ../share/lull, ../../share/lull or the source tree's ggn/models; give model=FILE%s%s",
+             name, info.dli_fname ? info.dli_fname : "the criterion", variable ? " or set " : "", variable ? variable : "");
     return 0;
 }

@@ -257,27 +257,11 @@ static void destroy(struct lull_instance *in)
 static const struct lull_kit_rule rule = {
     .planes_required = PLANES, .planes_used = PLANES, .first_spp = "first-spp", .judge = judge, .check = check_block};
 
-const struct lull_criterion ggn_plugin_observer = {
-    .struct_size = sizeof(struct lull_criterion),
-    .api_minor = LULL_API_MINOR,
-    .id = "observer",
-    .name = "Model observer",
-    .version = "1.0",
+const struct lull_criterion ggn_plugin_observer = GP_TABLE(
+    .create = create, .begin_frame = begin_frame, .evaluate = lull_kit_evaluate, .end_frame = end_frame, .destroy = destroy,
+    .get_extension = lull_kit_get_extension, .id = "observer", .name = "Model observer",
     .description = "Noise that people would see, from the two halves of the samples: their difference in lightness, "
                    "slightly blurred and\n"
                    "pooled so that a few bright pixels count, against a limit that rises with the block's texture. `error` "
                    "is the visible\n"
-                   "noise over that limit (1 = just not visible), fitted to human thresholds.",
-    .params = params,
-    .param_count = P_COUNT,
-    .param_stride = sizeof(struct lull_param),
-    .thread_level = LULL_THREADS_INSTANCE,
-    .capabilities = LULL_CAP_DETERMINISTIC | LULL_CAP_BATCH_INVARIANT,
-    .create = create,
-    .requirements = lull_kit_requirements,
-    .begin_frame = begin_frame,
-    .evaluate = lull_kit_evaluate,
-    .end_frame = end_frame,
-    .destroy = destroy,
-    .get_extension = lull_kit_get_extension,
-};
+                   "noise over that limit (1 = just not visible), fitted to human thresholds.");

@@ -32,21 +32,23 @@ check "every sample count from 1 to 250 recorded" $?
 
 # p to 14 digits: a report holds no more
 numbers='printf "%d %d %.14g\n", $1, $2, $3'
-# replay NAME PARAMETERS: blocks that a render stops, and the same from the recording, as lines of block, stop and p (0: none)
-replay() {
-    name=$1
-    shift
+# judged CRITERION OPTION FILE METHOD NAME PARAMETERS: blocks that a render stops, and the same from the recording, as lines of
+# block, stop and p (0: none)
+judged() {
+    criterion=$1 option=$2 file=$3 method=$4 name=$5
+    shift 5
     params=$(printf ' -p %s' "$@")
     # shellcheck disable=SC2086
-    $render --spp-min 1 --spp-max 250 -c ggn -p model="$tmp/tiny.ggn" $params --report "$tmp/report.json" </dev/null 2>"$tmp/err" &&
-        "$build/bin/ggn" evaluate --data "$tmp/data" --model "$tmp/tiny.ggn" $params --recorded --no-quality -o "$tmp/out" \
+    $render --spp-min 1 --spp-max 250 -c "$criterion" -p model="$file" $params --report "$tmp/report.json" </dev/null 2>"$tmp/err" &&
+        "$build/bin/ggn" evaluate --data "$tmp/data" "$option" "$file" $params --recorded --no-quality -o "$tmp/out" \
             >"$tmp/log" 2>"$tmp/err"
     check "$name: rendered and replayed" $?
     awk '/"id":/ { id = $2 + 0 } /"spp":/ { spp = $2 + 0 } /"p_noisy":/ { $3 = $2 + 0 == 0 ? 0 : $2; $1 = id; $2 = spp; '"$numbers"' }' "$tmp/report.json" >"$tmp/rendered"
-    awk -F';' "NR > 1 { \$1 = \$2; \$2 = \$5; \$3 = \$6 } NR > 1 { $numbers }" "$tmp"/out/*-stops-tinyggn.csv >"$tmp/replayed"
+    awk -F';' "NR > 1 { \$1 = \$2; \$2 = \$5; \$3 = \$6 } NR > 1 { $numbers }" "$tmp"/out/*-stops-"$method".csv >"$tmp/replayed"
     diff "$tmp/rendered" "$tmp/replayed" >"$tmp/err" && [ "$(wc -l <"$tmp/rendered")" -eq 6 ]
     check "$name: the same stop and the same p for every block" $?
 }
+replay() { judged ggn --model "$tmp/tiny.ggn" tinyggn "$@"; }
 
 replay "gate and guard" visible=0.6 first-spp=4 tail=0.6
 cp "$tmp/rendered" "$tmp/both"
@@ -59,4 +61,20 @@ replay "neither" visible=0.6 first-spp=4 tail=0 gini=0 gate=0
 ! cmp -s "$tmp/both" "$tmp/no-guard" && ! cmp -s "$tmp/both" "$tmp/no-gate" &&
     [ "$(awk '$2 < 250' "$tmp/both" | wc -l)" -ge 3 ] && [ "$(awk '$2 == 250' "$tmp/both" | wc -l)" -ge 1 ]
 check "gate and guard change stops, and blocks stop or do not" $?
+
+# The baselines likewise: their criteria and their evaluation are one. A window of evaluation has six images, so that an SVM,
+# which looks at one, is asked from the sixth level on.
+baseline() { # baseline NAME METHOD PARAMETERS
+    "$build/bin/ggn" baseline "$1" --data tests/data/train-demo --epochs 20 --ratio 1.3 --output "$tmp/$1.ggn" >"$tmp/log" 2>"$tmp/err"
+    check "a small model for $1" $?
+    name=$1 method=$2
+    shift 2
+    judged "$name" --baseline "$tmp/$name.ggn" "$method" "$name" "$@"
+}
+baseline attributes 26attributesSVM first-spp=6 visible=0.6
+cp "$tmp/rendered" "$tmp/attributes"
+baseline noise-mask noisemaskSVM first-spp=6 visible=0.5 passes=2
+baseline svd-entropy SVDentropyLSTM first-spp=1 visible=0.5
+[ "$(awk '$2 < 250' "$tmp/attributes" | wc -l)" -ge 1 ] && [ "$(awk '$3 > 0' "$tmp/attributes" | wc -l)" -eq 6 ]
+check "the attributes stop blocks" $?
 echo "1..$n"

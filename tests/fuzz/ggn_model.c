@@ -1,9 +1,11 @@
-/* Model files from hostile bytes; a model that loads is asked for a decision. */
+/* Model files, of networks and of baselines, from hostile bytes; a model that loads is asked for a decision. */
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "baselines/baseline.h"
 #include "model/judge.h"
+#include "model/stopper.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
@@ -44,9 +46,29 @@ static void decide(const struct ggn_model *m)
     free(d);
 }
 
+static void judge_by(const struct ggn_baseline *b)
+{
+    struct ggn_baseline_reader *r = ggn_baseline_reader_create(b, NULL);
+    const int w = b->width + 3, h = b->height; /* two tiles */
+    uint8_t *codes = calloc(3 * (size_t)w * (size_t)h, 1);
+    double *look = calloc(ggn_baseline_look_size(b, w, h), sizeof *look);
+    const double *looks[GGN_WINDOW_MAX];
+
+    for (int i = 0; i < b->window; i++)
+        looks[i] = look;
+    if (r && codes && look) {
+        ggn_baseline_look(r, codes, w, h, look);
+        ggn_baseline_logit(r, looks, w, h);
+    }
+    ggn_baseline_reader_destroy(r);
+    free(codes);
+    free(look);
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     struct ggn_model *m = NULL;
+    struct ggn_baseline b;
     uint8_t *copy = malloc(size + 1);
 
     if (!copy)
@@ -61,6 +83,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
             if (m->hyper.height * m->hyper.width <= 64 * 64)
                 decide(m);
             ggn_model_destroy(m);
+        }
+        if (ggn_baseline_load_memory(&b, "fuzz", copy, size, GGN_BASELINES, NULL) == 0) {
+            if (b.height * b.width <= 64 * 64)
+                judge_by(&b);
+            ggn_baseline_release(&b);
         }
     }
     free(copy);

@@ -16,7 +16,7 @@
 
 enum { W = 200, P = W * W };
 static uint8_t rgb[3 * P];
-static double l[P];
+static double l[P], scratch[GGN_FEATURE_SCRATCH * P];
 
 static int setup(void **state)
 {
@@ -55,7 +55,7 @@ static void attributes(void **state)
     double a[GGN_ATTRIBUTES];
     static const struct { int index; double mean, deviation; } golden[] = {
         {0, 8.824568150, 5.850814836}, {3, 7.920462968, 5.261391390}, {9, 9.200309384, 6.720253924}, {10, 7.952331544, 5.181926634}};
-    assert_int_equal(ggn_attributes(l, W, W, a, NULL), 0);
+    assert_int_equal(ggn_attributes(l, W, W, scratch, a, NULL), 0);
     for (size_t i = 0; i < 4; i++) { /* box 3; Gaussian 3 with sigma 1; median 5; Wiener 3 */
         assert_near(a[2 * golden[i].index], golden[i].mean, 1e-6);
         assert_near(a[2 * golden[i].index + 1], golden[i].deviation, 1e-6);
@@ -79,16 +79,16 @@ static void degenerate(void **state)
         ggn_svd_entropy(flat, W, W, 5, 20, h, NULL);
         for (int i = 0; i < 100; i++)
             assert_near(h[i], 0.0, 0.0);
-        assert_int_equal(ggn_attributes(flat, W, W, a, NULL), 0);
-        assert_int_equal(ggn_noise_mask(flat, W, W, mask, NULL), 0);
+        assert_int_equal(ggn_attributes(flat, W, W, scratch, a, NULL), 0);
+        assert_int_equal(ggn_noise_mask(flat, W, W, scratch, mask, NULL), 0);
         for (int i = 0; i < GGN_ATTRIBUTES; i++)
             assert_true(isfinite(a[i]));
         for (int i = 0; i < GGN_MASK_FEATURES; i++)
             assert_true(isfinite(mask[i]));
     }
     assert_int_equal(ggn_svd_entropy(flat, 19, W, 0, 20, h, NULL), BASE_EINVAL);
-    assert_int_equal(ggn_attributes(flat, 2, 2, a, NULL), BASE_EINVAL);
-    assert_int_equal(ggn_noise_mask(flat, 7, 9, mask, NULL), BASE_EINVAL);
+    assert_int_equal(ggn_attributes(flat, 2, 2, scratch, a, NULL), BASE_EINVAL);
+    assert_int_equal(ggn_noise_mask(flat, 7, 9, scratch, mask, NULL), BASE_EINVAL);
 }
 
 /* More noise, larger features. */
@@ -99,12 +99,12 @@ static void monotone(void **state)
     double a[GGN_ATTRIBUTES], b[GGN_ATTRIBUTES], ma[GGN_MASK_FEATURES], mb[GGN_MASK_FEATURES];
     for (int i = 0; i < P; i++)
         soft[i] = 50.0 + 0.25 * (l[i] - 50.0);
-    ggn_attributes(l, W, W, a, NULL);
-    ggn_attributes(soft, W, W, b, NULL);
+    ggn_attributes(l, W, W, scratch, a, NULL);
+    ggn_attributes(soft, W, W, scratch, b, NULL);
     for (int i = 0; i < GGN_ATTRIBUTES; i++)
         assert_true(b[i] < a[i]);
-    ggn_noise_mask(l, W, W, ma, NULL);
-    ggn_noise_mask(soft, W, W, mb, NULL);
+    ggn_noise_mask(l, W, W, scratch, ma, NULL);
+    ggn_noise_mask(soft, W, W, scratch, mb, NULL);
     for (int i = 0; i < GGN_MASK_FEATURES / 2; i++)
         assert_near(mb[i], 0.25 * ma[i], 1e-9);
 }

@@ -5,6 +5,10 @@
 #include <stdlib.h>
 #include <unistd.h>
 
+#include <cjson/cJSON.h>
+
+#include "baselines/baseline.h"
+#include "baselines/lstm.h"
 #include "model/judge.h"
 #include "model/trainer.h"
 #include "support/fail_alloc.h"
@@ -45,6 +49,29 @@ static int judge(struct base_err *err)
 
     ggn_judge_destroy(j);
     ggn_model_destroy(m);
+    return rc;
+}
+
+static int baseline(struct base_err *err)
+{
+    struct ggn_baseline a, b = {0};
+    struct ggn_baseline_reader *r = NULL;
+    cJSON *from = cJSON_CreateObject();
+    int rc = !from ? base_fail_nomem(err, "object") : ggn_baseline_init(&a, GGN_SVD_ENTROPY, 20, 20, 2, err);
+    if (rc) {
+        cJSON_Delete(from);
+        return rc;
+    }
+    a.lstm = calloc(ggn_lstm_parameters(a.features), sizeof *a.lstm);
+    rc = a.lstm ? ggn_baseline_save(&a, path, GGN_F16, from, err) : base_fail_nomem(err, "weights");
+    if (!rc)
+        rc = ggn_baseline_load(&b, path, GGN_SVD_ENTROPY, err);
+    if (!rc && !(r = ggn_baseline_reader_create(&b, err)))
+        rc = err->code;
+    ggn_baseline_reader_destroy(r);
+    ggn_baseline_release(&a);
+    ggn_baseline_release(&b);
+    cJSON_Delete(from);
     return rc;
 }
 
@@ -99,9 +126,15 @@ static void test_train(void **state)
     fail_each(train, 25);
 }
 
+static void test_baseline(void **state)
+{
+    (void)state;
+    fail_each(baseline, 12);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_files), cmocka_unit_test(test_judge),
-                                       cmocka_unit_test(test_train)};
+                                       cmocka_unit_test(test_train), cmocka_unit_test(test_baseline)};
     return cmocka_run_group_tests(tests, setup, teardown);
 }

@@ -11,10 +11,10 @@ for so in "$BUILD"/lib/lull/*.so "$BUILD/tests/abi/plugins/faulty.so"; do
         continue
     fi
     # ggn's convolutions are slow here: one check, whose host has threads
-    checks="-o workers -o concurrent -o instances -o cancel"
-    [ "${so##*/}" = ggn.so ] && checks="-L 900 -o cancel"
+    checks="-o workers -o concurrent -o instances -o cancel" spec=$so
+    [ "${so##*/}" = ggn.so ] && checks="-L 900 -o cancel" spec=$so:ggn
     # shellcheck disable=SC2086
-    if "$check" -q $checks "$so" >"$log" 2>&1; then echo "ok $n - ${so##*/}"; else
+    if "$check" -q $checks "$spec" >"$log" 2>&1; then echo "ok $n - ${so##*/}"; else
         echo "not ok $n - ${so##*/}"
         sed 's/^/#   /' "$log"
     fi

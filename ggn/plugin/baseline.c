@@ -1,0 +1,182 @@
+/*
+ * The criteria "svd-entropy", "attributes" and "noise-mask": the published models before the network (baselines/baseline.h)
+ * in the renderer. An image leaves only its numbers behind; the block stops after `passes` checks in a row below `visible`.
+ * As published they have no gate and no guard against rare bright paths.
+ */
+#include "baselines/baseline.h"
+#include "baselines/lstm.h"
+#include "plugin/model_path.h"
+#include "plugin/translate.h"
+#include "plugin/windowed.h"
+
+enum { P_MODEL, P_VISIBLE, P_PASSES, P_FIRST_SPP, P_COUNT };
+
+static const struct lull_param params[P_COUNT] = {
+    [P_MODEL] = LULL_KIT_FILE("model", NULL,
+                              "file that ggn baseline wrote; without it NAME.ggn (NAME: the criterion's) beside the "
+                              "criterion, in ../share/lull or in the source tree"),
+    [P_VISIBLE] = LULL_KIT_FLOAT("visible", NULL, 0, 1,
+                                 "stop when the probability that noise is still seen is less than this; without it the "
+                                 "model's own"),
+    [P_PASSES] = LULL_KIT_INT("passes", NULL, 1, 16,
+                              "checks in a row that must be below that; without it the model's own"),
+    [P_FIRST_SPP] = LULL_KIT_INT("first-spp", NULL, 1, 1e9,
+                                 "samples per pixel of the first image that is looked at; without it the model's own"),
+};
+
+struct worker {
+    struct ggn_baseline_reader *reader;
+    uint8_t *codes; /* [3][pixels of the largest block] */
+};
+
+static struct gp_slot slot_of(const void *of, int32_t width, int32_t height)
+{
+    const struct lull_instance *in = of;
+
+    return (struct gp_slot){.kept = sizeof(double) * ggn_baseline_look_size(in->model, width, height)};
+}
+
+static void worker_destroy(void *data)
+{
+    struct worker *w = data;
+
+    if (!w)
+        return;
+    ggn_baseline_reader_destroy(w->reader);
+    free(w->codes);
+    free(w);
+}
+
+static void *worker_create(const struct lull_instance *in, size_t pixels, struct base_err *err)
+{
+    struct worker *w = calloc(1, sizeof *w);
+
+    if (!w)
+        return NULL;
+    w->codes = malloc(3 * pixels);
+    w->reader = w->codes ? ggn_baseline_reader_create(in->model, err) : NULL;
+    if (w->reader)
+        return w;
+    worker_destroy(w);
+    return NULL;
+}
+
+static void model_destroy(void *model)
+{
+    if (model)
+        ggn_baseline_release(model);
+    free(model);
+}
+
+static long take(const struct gp_look *l, uint32_t slot)
+{
+    const struct worker *w = l->worker;
+    const struct lull_block *b = l->block;
+    long broken = gp_windowed_read(l, w->codes);
+
+    ggn_baseline_look(w->reader, w->codes, b->x1 - b->x0, b->y1 - b->y0, gp_history_kept(&l->in->history, b->id, slot));
+    return broken;
+}
+
+/* Only the numbers of older images are left. */
+static double no_noise(void *data)
+{
+    (void)data;
+    return (double)NAN;
+}
+
+static double window_logit(void *data)
+{
+    const struct gp_look *l = data;
+    const struct worker *w = l->worker;
+    const struct lull_block *b = l->block;
+    const double *looks[GGN_WINDOW_MAX];
+
+    for (int i = 0; i < l->in->rule.window; i++)
+        looks[i] = gp_history_kept(&l->in->history, b->id, l->head->order[i]);
+    return ggn_baseline_logit(w->reader, looks, b->x1 - b->x0, b->y1 - b->y0);
+}
+
+static int no_tail(void *data, double *tail999, double *gini)
+{
+    (void)data;
+    (void)tail999;
+    (void)gini;
+    return 0;
+}
+
+static const struct gp_sight sight = {slot_of, worker_create, worker_destroy, model_destroy, take,
+                                      {NULL, no_noise, window_logit, no_tail}};
+
+static void hash_model(struct lull_instance *in, const struct ggn_baseline *b)
+{
+    const struct ggn_svm *s = &b->svm;
+
+    gp_windowed_hash(in, &b->kind, sizeof b->kind);
+    if (b->lstm)
+        gp_windowed_hash(in, b->lstm, ggn_lstm_parameters(b->features) * sizeof *b->lstm);
+    else
+        gp_windowed_hash(in, s->values, sizeof *s->values * ggn_svm_values(s));
+}
+
+static int32_t load_model(struct lull_instance *in, enum ggn_baseline_kind kind, const char *path, struct lull_error *err)
+{
+    struct base_err error = {0};
+    struct ggn_baseline *b = calloc(1, sizeof *b);
+    char name[64], found[5000];
+
+    in->model = b;
+    if (!b)
+        return lull_kit_fail(err, LULL_E_MEMORY, "create: out of memory");
+    snprintf(name, sizeof name, "%s.ggn", ggn_baseline_names[kind]);
+    if (!path) {
+        if (!gp_model_find(name, NULL, found, sizeof found))
+            return lull_kit_fail(err, LULL_E_IO, "model: %.480s", found);
+        path = found;
+    }
+    if (ggn_baseline_load(b, path, kind, &error))
+        return gp_fail_from(err, "model", &error);
+    in->rule = (struct ggn_stop_rule){.policy = b->policy, .window = b->window};
+    hash_model(in, b);
+    gp_windowed_ready(in, params, P_COUNT, b->width, b->height);
+    return LULL_OK;
+}
+
+static int32_t create(enum ggn_baseline_kind kind, const struct lull_criterion *table, const struct lull_host *host,
+                      const struct lull_pair *pairs, uint32_t pair_count, uint32_t pair_stride,
+                      struct lull_instance **instance, struct lull_error *err)
+{
+    const char *text[LULL_KIT_PARAM_MAX];
+    struct lull_instance *in = NULL;
+    int32_t status = gp_windowed_create(&sight, table, host, pairs, pair_count, pair_stride, text, instance ? &in : NULL,
+                                        err);
+
+    if (!status)
+        status = load_model(in, kind, text[P_MODEL], err);
+    if (status) {
+        gp_windowed_destroy(in);
+        return status;
+    }
+    *instance = in;
+    return LULL_OK;
+}
+
+/* X(kind, member of criteria.h, id, name, what it looks at) */
+#define BASELINES(X) \
+    X(GGN_SVD_ENTROPY, svd_entropy, "svd-entropy", "SVD-entropy LSTM", \
+      "the entropy of the singular values of\n20x20 pixels over six images, by an LSTM (Buisine et al. 2021)") \
+    X(GGN_ATTRIBUTES_SVM, attributes, "attributes", "26 attributes + SVM", \
+      "what 13 filters take off the\nlightness, by a support vector machine (Constantin et al. 2015)") \
+    X(GGN_MASK_SVM, noise_mask, "noise-mask", "Noise mask + SVM", \
+      "the noise masks of the image and of\na smoothed one, by a support vector machine (Takouachet et al. 2017)")
+
+#define TABLE(kind, member, identity, title, eye) \
+    static int32_t create_##member(const struct lull_host *host, const struct lull_pair *pairs, uint32_t pair_count, \
+                                   uint32_t pair_stride, struct lull_instance **instance, struct lull_error *err) \
+    { \
+        return create(kind, &ggn_plugin_##member, host, pairs, pair_count, pair_stride, instance, err); \
+    } \
+    const struct lull_criterion ggn_plugin_##member = \
+        GP_WINDOWED_TABLE(.create = create_##member, .id = identity, .name = title, \
+                          .description = "Probability that noise is still seen in the block, from " eye ".");
+BASELINES(TABLE)

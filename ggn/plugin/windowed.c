@@ -1,0 +1,255 @@
+#include "plugin/windowed.h"
+
+#include "plugin/translate.h"
+
+/* --- instance ---------------------------------------------------------------------------------------------------------- */
+
+static const struct lull_kit_rule rule;
+
+int32_t gp_windowed_create(const struct gp_sight *sight, const struct lull_criterion *table, const struct lull_host *host,
+                           const struct lull_pair *pairs, uint32_t pair_count, uint32_t pair_stride, const char **text,
+                           struct lull_instance **instance, struct lull_error *err)
+{
+    int32_t status = lull_kit_create(&rule, table, sizeof **instance, host, pairs, pair_count, pair_stride, text, instance,
+                                     err);
+
+    if (status)
+        return status;
+    (*instance)->sight = sight;
+    (*instance)->key = UINT32_C(2166136261);
+    return LULL_OK;
+}
+
+void gp_windowed_hash(struct lull_instance *in, const void *data, size_t size)
+{
+    const unsigned char *p = data;
+
+    for (size_t i = 0; i < size; i++)
+        in->key = (in->key ^ p[i]) * UINT32_C(16777619); /* FNV-1a */
+}
+
+void gp_windowed_ready(struct lull_instance *in, const struct lull_param *params, uint32_t count, int width, int height)
+{
+    struct ggn_policy *policy = &in->rule.policy;
+    struct lull_requirements *need = &in->kit.need;
+
+    for (uint32_t i = 0; i < count; i++)
+        if (!isnan(in->kit.value[i]))
+            ggn_policy_adjust(policy, params[i].name, in->kit.value[i]);
+    const double numbers[] = {policy->threshold, policy->passes,  policy->gate_noise,
+                              policy->tail999,   policy->gini,    policy->first_spp};
+    gp_windowed_hash(in, numbers, sizeof numbers);
+    if (policy->tail999 > 0 || policy->gini > 0)
+        need->planes_used |= LULL_PLANE_BIT(LULL_PLANE_HALF);
+    need->block_width = (uint32_t)width;
+    need->block_height = (uint32_t)height;
+    need->checks_hint = policy->ratio > 1.001 ? (uint32_t)(log(200) / log(policy->ratio)) : 100;
+    need->first_spp = (uint64_t)policy->first_spp;
+    need->bytes_per_block = gp_history_block_bytes(in->rule.window, in->sight->slot(in, width, height));
+}
+
+static void workers_release(const struct gp_sight *sight, void **worker, uint32_t count)
+{
+    for (uint32_t i = 0; worker && i < count; i++)
+        sight->worker_destroy(worker[i]);
+    free(worker);
+}
+
+static size_t largest_block(const struct lull_frame *frame)
+{
+    size_t most = 0;
+
+    for (uint32_t i = 0; i < frame->block_count; i++) {
+        const struct lull_rect *r = lull_kit_rect(frame, i);
+        size_t pixels = (size_t)((int64_t)r->x1 - r->x0) * (size_t)((int64_t)r->y1 - r->y0);
+        most = pixels > most ? pixels : most;
+    }
+    return most;
+}
+
+/* Scratch for as many workers as can be busy. */
+static int32_t workers_create(const struct lull_instance *in, uint32_t count, size_t pixels, void ***out,
+                              struct lull_error *err)
+{
+    struct base_err error = {.code = BASE_ENOMEM, .text = "out of memory"};
+    void **worker = calloc(count, sizeof *worker);
+    int good = worker != NULL;
+
+    for (uint32_t i = 0; i < count && good; i++)
+        good = (worker[i] = in->sight->worker_create(in, pixels, &error)) != NULL;
+    *out = worker;
+    if (good)
+        return LULL_OK;
+    workers_release(in->sight, worker, count);
+    return gp_fail_from(err, "begin_frame", &error);
+}
+
+int32_t gp_windowed_begin_frame(struct lull_instance *in, const struct lull_frame *frame, struct lull_error *err)
+{
+    struct gp_history history = {0};
+    void **worker;
+    int32_t status = lull_kit_frame_check(in, frame, err);
+
+    if (status)
+        return status;
+    uint32_t count = lull_kit_workers(&in->kit);
+    status = workers_create(in, count, largest_block(frame), &worker, err);
+    if (status)
+        return status;
+    status = gp_history_create(&history, in->rule.window, frame, in->sight->slot, in, err);
+    if (status) {
+        workers_release(in->sight, worker, count);
+        return status;
+    }
+    gp_history_release(&in->history);
+    workers_release(in->sight, in->worker, in->workers);
+    in->history = history;
+    in->worker = worker;
+    in->workers = count;
+    lull_kit_frame_open(in, frame);
+    in->rule.spp_max = frame->spp_max;
+    in->display = gp_display_of(&in->kit);
+    return LULL_OK;
+}
+
+void gp_windowed_end_frame(struct lull_instance *in)
+{
+    if (!in)
+        return;
+    gp_history_release(&in->history);
+    workers_release(in->sight, in->worker, in->workers);
+    in->worker = NULL;
+    in->workers = 0;
+    lull_kit_end_frame(in);
+}
+
+void gp_windowed_destroy(struct lull_instance *in)
+{
+    if (!in)
+        return;
+    gp_windowed_end_frame(in);
+    in->sight->model_destroy(in->model);
+    lull_kit_destroy(in);
+}
+
+/* --- evaluate ---------------------------------------------------------------------------------------------------------- */
+
+long gp_windowed_read(const struct gp_look *l, uint8_t *out)
+{
+    const struct lull_block *b = l->block;
+    const size_t w = (size_t)(b->x1 - b->x0), plane = w * (size_t)(b->y1 - b->y0);
+    struct ggn_pixel_counts counts = {0};
+    struct lull_kit_span s;
+
+    for (lull_kit_span_begin(&s, l->view, b, LULL_PLANE_BIT(LULL_PLANE_COLOR)); lull_kit_span_next(&s);) {
+        uint8_t *to = out + (size_t)(s.y - b->y0) * w + (size_t)(s.x - b->x0);
+        for (int32_t i = 0; i < s.count; i++)
+            for (int c = 0; c < 3; c++)
+                to[(size_t)c * plane + (size_t)i] =
+                    ggn_preprocess(s.value[LULL_PLANE_COLOR][i][c], &l->in->display, &counts);
+    }
+    return ggn_pixel_counts_bad(&counts);
+}
+
+/* Fills in->history.pending[b->id] with the verdict on a checked block. */
+static void look_at(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b, uint32_t worker)
+{
+    struct gp_head *head = &in->history.pending[b->id];
+    struct gp_look look = {in, view, b, head, in->worker[worker < in->workers ? worker : 0]};
+    struct ggn_evidence evidence = in->sight->evidence;
+
+    evidence.data = &look;
+    *head = in->history.head[b->id];
+    uint32_t before = head->stopper.used;
+    if (!ggn_stopper_ask(&in->rule, &head->stopper, b->spp))
+        return;
+    uint32_t slot = gp_head_push(head, in->rule.window, before);
+    head->bad = in->sight->take(&look, slot) > 0;
+    ggn_stopper_judge(&in->rule, &head->stopper, &evidence);
+}
+
+static void judge(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
+                  struct lull_decision *d, uint32_t worker)
+{
+    const struct gp_head *head = &in->history.pending[b->id];
+    const struct ggn_verdict *v = &head->stopper.verdict;
+
+    look_at(in, view, b, worker);
+    d->action = v->stop ? LULL_STOP : LULL_CONTINUE;
+    d->flags = (v->too_early ? LULL_DECISION_TOO_EARLY : 0) | (head->bad ? LULL_DECISION_BAD_INPUT : 0);
+    d->next_spp = v->next_spp;
+    d->p_noisy = v->p;
+    d->predicted_spp = v->predicted_spp;
+    d->error = v->noise;
+}
+
+static int32_t check_block(const struct lull_instance *in, const struct lull_block *b, struct lull_error *err)
+{
+    const struct lull_rect *r = &in->history.rect[b->id];
+
+    if (b->x0 != r->x0 || b->y0 != r->y0 || b->x1 != r->x1 || b->y1 != r->y1)
+        return lull_kit_fail(err, LULL_E_INVALID, "evaluate: block %u is none of the frame's", b->id);
+    if (b->spp < in->history.head[b->id].stopper.asked_spp)
+        return lull_kit_fail(err, LULL_E_INVALID, "evaluate: block %u has fewer samples than before", b->id);
+    return LULL_OK;
+}
+
+int32_t gp_windowed_evaluate(struct lull_instance *in, const struct lull_view *view, const struct lull_block *blocks,
+                             uint32_t block_stride, struct lull_decision *decisions, uint32_t decision_stride,
+                             uint32_t count, struct lull_error *err)
+{
+    int32_t status = lull_kit_evaluate(in, view, blocks, block_stride, decisions, decision_stride, count, err);
+
+    for (uint32_t i = 0; i < count && !status; i++) { /* a call that failed leaves no trace */
+        const struct lull_block *b = lull_kit_at(blocks, block_stride, i);
+        in->history.head[b->id] = in->history.pending[b->id];
+    }
+    return status;
+}
+
+static const struct lull_kit_rule rule = {
+    .planes_required = LULL_PLANE_BIT(LULL_PLANE_COLOR),
+    .planes_used = LULL_PLANE_BIT(LULL_PLANE_COLOR),
+    .judge = judge,
+    .check = check_block,
+};
+
+/* --- state ------------------------------------------------------------------------------------------------------------- */
+
+static int32_t state_save(const struct lull_instance *in, const struct lull_writer *writer, struct lull_error *err)
+{
+    if (!in || !writer || !writer->write)
+        return lull_kit_fail(err, LULL_E_INVALID, "save: an argument is missing");
+    if (!in->kit.block_count)
+        return lull_kit_fail(err, LULL_E_STATE, "save: no frame is open");
+    return gp_history_save(&in->history, in->key, writer, err);
+}
+
+static int32_t state_load(struct lull_instance *in, const struct lull_reader *reader, struct lull_error *err)
+{
+    struct gp_history history = {0};
+
+    if (!in || !reader || !reader->read)
+        return lull_kit_fail(err, LULL_E_INVALID, "load: an argument is missing");
+    if (!in->kit.block_count)
+        return lull_kit_fail(err, LULL_E_STATE, "load: no frame is open");
+    struct lull_frame frame = {
+        .blocks = in->history.rect, .block_count = in->history.count, .block_stride = sizeof(struct lull_rect)};
+    int32_t status = gp_history_create(&history, in->rule.window, &frame, in->sight->slot, in, err);
+    if (!status)
+        status = gp_history_load(&history, &in->rule, in->key, reader, err);
+    if (status) {
+        gp_history_release(&history);
+        return status;
+    }
+    gp_history_release(&in->history);
+    in->history = history;
+    return LULL_OK;
+}
+
+static const struct lull_state state = {.struct_size = sizeof state, .save = state_save, .load = state_load};
+
+const void *gp_windowed_get_extension(const char *id)
+{
+    return id && !strcmp(id, LULL_EXT_STATE) ? &state : NULL;
+}
