@@ -26,6 +26,7 @@
     X(train, "train a stopping criterion on block sequences") \
     X(baseline, "train a published model before the network, as a criterion") \
     X(evaluate, "figures of models and baselines on recorded sequences") \
+    X(cost, "what accuracy costs each criterion on recorded sequences") \
     X(reconstruct, "the picture with each block at its threshold") \
     X(study, "ask people for thresholds and judgements, on a local page")
 

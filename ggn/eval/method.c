@@ -13,6 +13,7 @@ void ggn_method_release(struct ggn_method *m)
     free(m->verdict);
     free(m->own_guard);
     free(m->stop);
+    free(m->asked);
     *m = (struct ggn_method){0};
 }
 

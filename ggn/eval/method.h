@@ -25,6 +25,7 @@ struct ggn_method {
     int passes;          /* cases in a row below the cut that stop a block, >= 1 */
     double cut;          /* the block goes on while score >= cut */
     double *stop;        /* owns; [blocks], spp */
+    double *asked;       /* owns; [blocks]: checks until there, of a method that asks at counts of its own; else NULL */
     int is_oracle;       /* it looked at the answers */
 };
 

@@ -1,5 +1,6 @@
 /* Methods that stand for people: the model observer, and thresholds from a file. */
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "data/thresholds.h"
@@ -25,10 +26,10 @@ static double error_at(const struct ggn_observer *o, const struct ggn_eval_set *
 
 /* Where the criterion stops, which asks at sample counts of its own. */
 static double replay(const struct ggn_observer *o, const struct ggn_eval_set *s, const struct ggn_eval_block *b,
-                     double stop_error)
+                     double stop_error, double *asked)
 {
     double spp = fmax(FIRST_SPP, s->spp[b->first]);
-    while (spp < b->cap) {
+    for (*asked = 1.0; spp < b->cap; ++*asked) {
         double ratio = error_at(o, s, b, spp) / stop_error;
         if (ratio <= 1.0)
             break;
@@ -44,6 +45,8 @@ int ggn_method_observer(struct ggn_method *m, const struct ggn_eval_set *s, cons
     struct ggn_observer o = ggn_observer_default;
     size_t pixels = (size_t)s->chains.width * (size_t)s->chains.height;
     *available = 1;
+    if (!rc && !(m->asked = malloc((size_t)s->n_blocks * sizeof *m->asked)))
+        rc = base_fail_nomem(err, "observer");
     for (int b = 0; b < s->n_blocks && !rc; b++) {
         const struct ggn_eval_block *block = &s->blocks[b];
         if (path && block->view != view)
@@ -55,7 +58,7 @@ int ggn_method_observer(struct ggn_method *m, const struct ggn_eval_set *s, cons
                               : ggn_observer_p_noisy(&o, ggn_observer_error(&o, s->visible[i], s->texture[i], pixels));
             *available &= !isnan(s->visible[i]);
         }
-        m->stop[b] = *available ? replay(&o, s, block, ggn_observer_error_at(&o, visible)) : block->cap;
+        m->stop[b] = *available ? replay(&o, s, block, ggn_observer_error_at(&o, visible), &m->asked[b]) : block->cap;
     }
     if (rc) {
         ggn_method_release(m);

@@ -72,9 +72,9 @@ static int list_blocks(struct ggn_eval_set *s, int *skipped, struct base_err *er
 
 static int make_columns(struct ggn_eval_set *s, struct base_err *err)
 {
-    enum { COLUMNS = 10 };
+    enum { COLUMNS = 11 };
     double **columns[COLUMNS] = {&s->spp, &s->seconds, &s->dammertz, &s->half_unsettled, &s->rse, &s->rse_unsettled,
-                                 &s->flip, &s->ssim, &s->visible, &s->texture};
+                                 &s->flip, &s->ssim, &s->visible, &s->texture, &s->relmse};
     double *all = malloc(COLUMNS * s->n * sizeof *all);
     s->noisy = malloc(s->n);
     s->spp = all;
@@ -158,26 +158,59 @@ static void interleave(const uint8_t *planar, size_t pixels, uint8_t *rgb)
             rgb[3 * i + c] = planar[c * pixels + i];
 }
 
+static const struct seq_record *full_level(const struct seq_block *p)
+{
+    for (uint32_t i = 0; i < p->n_levels; i++)
+        if (seq_has(&p->levels[i], SEQ_PLANE_HALF_F16))
+            return &p->levels[i];
+    return NULL;
+}
+
+/* Planar codes of what a block is compared with: its reference; without one the mean of its full level, from which its
+ * simulated levels were made. *known 0: neither is there. */
+static int comparison(const struct ggn_eval_set *s, const struct ggn_eval_block *block, uint8_t *codes, int *known,
+                      struct base_err *err)
+{
+    const struct ggn_dataset_view *v = &s->chains.data.views[block->view];
+    const struct ggn_chain *c = &s->chains.chains[block->chain];
+    struct seq_block p;
+    *known = c->reference != NULL;
+    if (c->reference) {
+        memcpy(codes, c->reference, ggn_chains_values(&s->chains));
+        return 0;
+    }
+    int rc = seq_manifest_read_block(v->dir, &v->manifest, block->index, &p, err);
+    if (rc)
+        return rc;
+    const struct seq_record *full = full_level(&p);
+    *known = full != NULL;
+    if (full)
+        rc = seq_display_planar(&p, full, codes, err);
+    seq_block_release(&p);
+    return rc;
+}
+
 static int measure_quality(struct ggn_eval_set *s, const struct ggn_eval_block *block, struct base_err *err)
 {
     const struct ggn_chain *c = &s->chains.chains[block->chain];
-    int w = s->chains.width, h = s->chains.height, rc = 0;
+    int w = s->chains.width, h = s->chains.height, rc = 0, known = 0;
     size_t pixels = (size_t)w * (size_t)h, values = 3 * pixels;
-    uint8_t *rgb = malloc(2 * values);
+    uint8_t *rgb = malloc(3 * values), *against = rgb ? rgb + 2 * values : NULL;
     float *work = malloc(2 * values * sizeof *work);
     struct ggn_ssim *ssim = ggn_ssim_create(h, w, NULL, err);
     if (!rgb || !work || !ssim) {
         rc = base_fail_nomem(err, "quality");
         goto out;
     }
-    interleave(c->reference, pixels, rgb);
-    for (size_t i = block->first; i < block->end && !rc; i++) {
+    rc = comparison(s, block, against, &known, err);
+    interleave(against, pixels, rgb);
+    for (size_t i = block->first; i < block->end && known && !rc; i++) {
         const uint8_t *level = c->noisy + (i - block->first + (size_t)s->window - 1) * values;
         struct ggn_flip_stats flip;
         interleave(level, pixels, rgb + values);
         rc = ggn_flip(rgb, rgb + values, w, h, GGN_FLIP_PPD, NULL, &flip, err);
         s->flip[i] = flip.mean;
-        s->ssim[i] = ssim_of(ssim, level, c->reference, pixels, w, work);
+        s->ssim[i] = ssim_of(ssim, level, against, pixels, w, work);
     }
 out:
     ggn_ssim_destroy(ssim);
@@ -230,10 +263,8 @@ static int has_halves(const struct seq_record *r)
 static int fill_observed(struct ggn_eval_set *s, const struct ggn_eval_block *block, const struct seq_block *p,
                          struct base_err *err)
 {
-    int simulated = s->chains.chains[block->chain].simulated, rc = 0, known = 0;
+    int simulated = s->chains.chains[block->chain].simulated, rc = 0, known = full_level(p) != NULL;
     struct ggn_curve curve = {0};
-    for (uint32_t i = 0; i < p->n_levels; i++)
-        known |= seq_has(&p->levels[i], SEQ_PLANE_HALF_F16);
     if (known)
         rc = ggn_curve_make(p, GGN_FROM_HALVES, 1, &curve, err);
     for (size_t i = block->first; i < block->end && !rc; i++) {
@@ -246,6 +277,28 @@ static int fill_observed(struct ggn_eval_set *s, const struct ggn_eval_block *bl
         }
     }
     ggn_curve_release(&curve);
+    return rc;
+}
+
+/* Mean over pixels and channels of D^2/(M^2 + 0.01), M and D of the full level: its variance, which falls with the samples.
+ */
+static int fill_relmse(struct ggn_eval_set *s, const struct ggn_eval_block *block, const struct seq_block *p,
+                       struct base_err *err)
+{
+    const struct seq_record *full = full_level(p);
+    size_t values = 3 * (size_t)p->width * p->height;
+    if (!full)
+        return 0;
+    float *mean = malloc(2 * values * sizeof *mean), *d = mean ? mean + values : NULL;
+    int rc = mean ? seq_mean(p, full, mean, err) : base_fail_nomem(err, "evaluation");
+    if (!rc)
+        rc = seq_half(p, full, d, err);
+    double sum = 0.0;
+    for (size_t i = 0; i < values && !rc; i++)
+        sum += (double)(d[i] * d[i]) / ((double)(mean[i] * mean[i]) + 0.01);
+    for (size_t i = block->first; i < block->end && !rc; i++)
+        s->relmse[i] = sum / (double)values * full->spp / s->spp[i];
+    free(mean);
     return rc;
 }
 
@@ -269,6 +322,8 @@ static int fill_statistics(struct ggn_eval_set *s, const struct ggn_eval_block *
         rc = extrapolate(s, block, i, &p, err);
     if (!rc)
         rc = fill_observed(s, block, &p, err);
+    if (!rc)
+        rc = fill_relmse(s, block, &p, err);
     seq_block_release(&p);
     return rc;
 }
@@ -279,7 +334,7 @@ static int fill_block(void *data, int index, int worker, struct base_err *err)
     const struct ggn_eval_block *block = &f->set->blocks[index];
     (void)worker;
     int rc = fill_statistics(f->set, block, err);
-    return !rc && f->quality && f->set->chains.chains[block->chain].reference ? measure_quality(f->set, block, err) : rc;
+    return !rc && f->quality ? measure_quality(f->set, block, err) : rc;
 }
 
 /* Continues every labelled chain, also those that training has no use for: a method that does not stop in time must be seen

@@ -30,7 +30,10 @@ struct ggn_eval_set {
     double *dammertz, *half_unsettled, *rse, *rse_unsettled; /* own; [n]; NaN where not recorded */
     double *visible, *texture;      /* own; [n]: what the model observer sees (observer/visibility.h); NaN without half
                                        buffers */
-    double *flip, *ssim;            /* own; [n]: against the block's reference; NaN unless asked for */
+    double *flip, *ssim;            /* own; [n]: against the block's reference, without one against the mean of its full
+                                       level; NaN unless asked for */
+    double *relmse;                 /* owns; [n]: variance over the squared mean, from the full level's halves; NaN
+                                       without */
 };
 
 struct ggn_eval_options {

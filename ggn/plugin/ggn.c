@@ -78,7 +78,8 @@ static void *worker_create(const struct lull_instance *in, size_t pixels, struct
         return NULL;
     w->noise = malloc(pixels * sizeof *w->noise);
     w->picture = malloc(pixels);
-    w->judge = w->noise && w->picture ? ggn_judge_create(in->model, (enum ggn_precision)in->kit.value[P_PRECISION], NULL, err) : NULL;
+    if (w->noise && w->picture)
+        w->judge = ggn_judge_create(in->model, (enum ggn_precision)in->kit.value[P_PRECISION], NULL, err);
     if (w->judge)
         return w;
     worker_destroy(w);

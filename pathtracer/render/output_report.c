@@ -66,6 +66,7 @@ static void add_totals(cJSON *root, const struct pt_render *r, int *failed)
     base_json_number(o, "samples", (double)t->samples, failed);
     base_json_number(o, "render_s", t->render_s, failed);
     base_json_number(o, "criterion_s", t->criterion_s, failed);
+    base_json_number(o, "criterion_thread_s", r->criterion_thread_s, failed);
     base_json_number(o, "paths", (double)t->paths, failed);
     base_json_number(o, "rays", (double)t->rays, failed);
     base_json_number(o, "paths_per_s", t->render_s > 0.0 ? (double)t->paths / t->render_s : NAN, failed);

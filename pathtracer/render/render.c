@@ -300,10 +300,11 @@ static void ask(struct pt_render *r, uint32_t count, const struct pt_render_hook
 {
     struct pt_render_work *w = r->work;
     struct base_err err = {0};
-    double start_s = base_clock_wall_s();
+    double start_s = base_clock_wall_s(), start_cpu_s = base_clock_process_s(); /* nothing else runs during a check */
     if (pt_criterion_evaluate(r->criterion, &r->film, &r->blocks, w->due, count, w->final, w->decisions, &err) != 0)
         warn_once(r, hooks, err.text);
     r->totals.criterion_s += base_clock_wall_s() - start_s;
+    r->criterion_thread_s += base_clock_process_s() - start_cpu_s;
     r->totals.checks += count;
 }
 

@@ -52,6 +52,7 @@ struct pt_render {
     struct pt_criterion *criterion;   /* borrows; NULL only with config.uniform */
     struct pt_film film;
     struct pt_blocks blocks;
+    double criterion_thread_s; /* processor seconds of the checks of this run, all threads together */
     struct pt_render_totals totals;
     struct pt_dropped_sample dropped[PT_DROPPED_KEPT]; /* in no particular order */
     uint32_t dropped_count;           /* entries used */

@@ -14,6 +14,11 @@ double base_clock_wall_s(void)
     return read_s(CLOCK_MONOTONIC);
 }
 
+double base_clock_process_s(void)
+{
+    return read_s(CLOCK_PROCESS_CPUTIME_ID);
+}
+
 double base_clock_thread_s(void)
 {
     return read_s(CLOCK_THREAD_CPUTIME_ID);

@@ -1,0 +1,345 @@
+/* `ggn cost --data DATA`: what accuracy costs each criterion, over the range of its dials, from recorded sequences. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cjson/cJSON.h>
+
+#include "base/json.h"
+#include "base/options.h"
+#include "baselines/learned.h"
+#include "cli/commands.h"
+#include "eval/cost.h"
+#include "eval/trained.h"
+
+enum { MAX_FILES = 8 };
+
+struct options {
+    const char *data, *out, *observer, *models[MAX_FILES], *baselines[MAX_FILES];
+    int n_models, n_baselines, split, threads, no_quality, recorded;
+    double ratio;
+};
+
+static int add_file(const char **list, int *n, const char *path, struct base_err *err)
+{
+    if (*n == MAX_FILES)
+        return base_fail(err, BASE_EINVAL, "more than %d files", MAX_FILES);
+    list[(*n)++] = path;
+    return 0;
+}
+
+static int add_model(void *into, const char *path, struct base_err *err)
+{
+    struct options *o = into;
+    return add_file(o->models, &o->n_models, path, err);
+}
+
+static int add_baseline(void *into, const char *path, struct base_err *err)
+{
+    struct options *o = into;
+    return add_file(o->baselines, &o->n_baselines, path, err);
+}
+
+static const char *const split_words[] = {"train", "validation", "test", "people", "none", NULL};
+
+#define TO(member) BASE_TO(struct options, member)
+static const struct base_option list[] = {
+    {"data", 'd', "DATA", TO(data), .needed = 1, .help = "labelled data set (needed)"},
+    {"split", 0, NULL, TO(split), .words = split_words, .help = "which of its views (test)"},
+    {"model", 'm', "FILE", .set = add_model, .help = "trained network (.ggn); may be repeated"},
+    {"baseline", 0, "FILE", .set = add_baseline, .help = "what ggn baseline wrote; may be repeated"},
+    {"observer", 'O', "FILE", TO(observer), .help = "the observer's parameters, each view without itself"},
+    {"output", 'o', "FILE", TO(out), .output = 1, .help = "write there instead of printing"},
+    {"ratio", 0, "R", TO(ratio), 1, 16, .help = "thin the levels, and the checks, to this ratio of samples"},
+    {"recorded", 0, NULL, TO(recorded), .help = "stop at the last recorded level"},
+    {"no-quality", 0, NULL, TO(no_quality), .help = "skip FLIP"},
+    {"threads", 't', "N", TO(threads), 1, 1024, .help = "worker threads (all processors)"},
+    {0}};
+
+struct job {
+    const struct options *o;
+    struct ggn_eval_set set;
+    enum ggn_split split;
+    struct ggn_checks_made *checks; /* [blocks] */
+    double *stop;                   /* [blocks] */
+    cJSON *points;
+    int failed;
+};
+
+/* --- output --- */
+
+static void put_cost(cJSON *to, const struct ggn_cost *c, int *failed)
+{
+    const struct {
+        const char *key;
+        double value;
+    } fields[] = {{"samples", c->samples}, {"sampling_s", c->sampling_s}, {"checks_cheap", c->cheap},
+                  {"checks_full", c->full}, {"noisy", c->noisy}, {"early", c->early}, {"worst", c->worst},
+                  {"uniform_spp", c->uniform_spp}, {"time_ratio", c->time_ratio}, {"samples_ratio", c->samples_ratio},
+                  {"flip", c->flip}, {"flip_worst", c->flip_worst}, {"relmse", c->relmse}};
+    base_json_number(to, "blocks", c->blocks, failed);
+    for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++)
+        base_json_number(to, fields[i].key, fields[i].value, failed);
+}
+
+/* One setting of one criterion: a point for each scene and one for all together (scene null). */
+static void put_setting(struct job *j, const char *criterion, const char *dial, double value, const double *stop,
+                        const struct ggn_checks_made *checks)
+{
+    const struct ggn_dataset *d = &j->set.chains.data;
+    cJSON *o = base_json_object(j->points, NULL, &j->failed);
+    base_json_text(o, "criterion", criterion, &j->failed);
+    base_json_text(o, "dial", dial, &j->failed);
+    base_json_number(o, "value", value, &j->failed);
+    cJSON *scenes = base_json_object(o, "scenes", &j->failed);
+    for (int scene = 0; scene < j->set.n_scenes; scene++) {
+        struct ggn_cost c;
+        ggn_cost_of(&j->set, j->split, scene, stop, checks, &c);
+        if (c.blocks > 0)
+            put_cost(base_json_object(scenes, d->views[scene].manifest.scene, &j->failed), &c, &j->failed);
+    }
+}
+
+static void put_method(struct job *j, const char *dial, double value, const struct ggn_method *m)
+{
+    ggn_cost_checks(m, &j->set, j->checks);
+    put_setting(j, m->name, dial, value, m->stop, j->checks);
+}
+
+static void put_scenes(struct job *j, cJSON *root)
+{
+    const struct ggn_eval_set *s = &j->set;
+    cJSON *to = base_json_object(root, "scenes", &j->failed);
+    for (int scene = 0; scene < s->n_scenes; scene++) {
+        cJSON *o = NULL, *blocks = NULL;
+        for (int b = 0; b < s->n_blocks; b++) {
+            const struct ggn_eval_block *e = &s->blocks[b];
+            if (e->split != j->split || e->scene != scene)
+                continue;
+            if (!o) {
+                o = base_json_object(to, s->chains.data.views[scene].manifest.scene, &j->failed);
+                blocks = base_json_array(o, "blocks", &j->failed);
+            }
+            const struct ggn_chain *c = &s->chains.chains[e->chain];
+            cJSON *block = base_json_object(blocks, NULL, &j->failed);
+            base_json_text(block, "view", s->chains.data.views[e->view].name, &j->failed);
+            base_json_number(block, "id", e->label.id, &j->failed);
+            base_json_number(block, "threshold", e->label.threshold, &j->failed);
+            base_json_bool(block, "censored", e->label.censored, &j->failed);
+            base_json_bool(block, "simulated", c->simulated, &j->failed);
+            base_json_bool(block, "reference", c->reference != NULL, &j->failed);
+            base_json_number(block, "us_per_path", 1e6 * ggn_cost_path_s(s, e), &j->failed);
+        }
+    }
+}
+
+/* --- dials --- */
+
+static void turn(struct job *j, struct ggn_method *m, const char *dial, const double *values, size_t n)
+{
+    double own = m->cut;
+    for (size_t i = 0; i < n; i++) {
+        m->cut = values[i];
+        ggn_method_run(m, &j->set);
+        put_method(j, dial, values[i], m);
+    }
+    m->cut = own;
+    ggn_method_run(m, &j->set);
+}
+
+#define COUNT(a) (sizeof(a) / sizeof(a)[0])
+static const double shares[] = {0.9, 0.7, 0.5, 0.35, 0.25, 0.15, 0.1, 0.05, 0.02, 0.01, 0.004};
+
+static void cost_uniform(struct job *j)
+{
+    for (double spp = 16; spp <= 16384; spp *= 2) {
+        for (int b = 0; b < j->set.n_blocks; b++)
+            j->stop[b] = spp;
+        put_setting(j, "uniform", "spp", spp, j->stop, NULL);
+    }
+    for (int b = 0; b < j->set.n_blocks; b++)
+        j->stop[b] = j->set.blocks[b].label.threshold;
+    put_setting(j, "limit", "none", 0, j->stop, NULL);
+}
+
+static int cost_errors(struct job *j, struct base_err *err)
+{
+    static const double variance[] = {0.64, 0.45, 0.32, 0.23, 0.16, 0.113, 0.08, 0.057, 0.04, 0.03, 0.02, 0.014, 0.01};
+    static const double halfbuf[] = {0.03, 0.021, 0.015, 0.011, 0.0075, 0.0053, 0.004, 0.0028, 0.002, 0.0014, 0.001};
+    for (int k = 0; k < 2; k++) {
+        struct ggn_method m;
+        int available, rc = k ? ggn_method_halfbuf(&m, &j->set, &available, err)
+                              : ggn_method_variance(&m, &j->set, &available, err);
+        if (rc)
+            return rc;
+        if (available)
+            turn(j, &m, "threshold", k ? halfbuf : variance, k ? COUNT(halfbuf) : COUNT(variance));
+        m.guard = NULL;
+        snprintf(m.name, sizeof m.name, k ? "halfbuf, no guard" : "variance, no guard");
+        if (available)
+            turn(j, &m, "threshold", k ? halfbuf : variance, k ? COUNT(halfbuf) : COUNT(variance));
+        ggn_method_release(&m);
+    }
+    return 0;
+}
+
+static int cost_observer(struct job *j, struct base_err *err)
+{
+    int rc = 0, available;
+    for (size_t i = 0; i < COUNT(shares) && !rc; i++) {
+        struct ggn_method m;
+        rc = ggn_method_observer(&m, &j->set, j->o->observer, shares[i], &available, err);
+        if (rc)
+            return rc;
+        if (available)
+            put_method(j, "visible", shares[i], &m);
+        ggn_method_release(&m);
+    }
+    return rc;
+}
+
+static void cost_network(struct job *j, struct ggn_method *m)
+{
+    int own = m->passes;
+    double *gated = m->verdict;
+    put_method(j, "own", m->cut, m);
+    turn(j, m, "visible", shares, COUNT(shares));
+    for (m->passes = 1; m->passes <= 4; m->passes++) {
+        ggn_method_run(m, &j->set);
+        put_method(j, "passes", m->passes, m);
+    }
+    m->passes = own;
+    m->verdict = NULL; /* scores of every window, as without the gate */
+    ggn_method_run(m, &j->set);
+    put_method(j, "gate", 0, m);
+    m->verdict = gated;
+    const double *guard = m->guard;
+    m->guard = NULL;
+    ggn_method_run(m, &j->set);
+    put_method(j, "guard", 0, m);
+    m->guard = guard;
+}
+
+static int cost_models(struct job *j, struct base_threads *threads, struct base_err *err)
+{
+    int rc = 0;
+    for (int i = 0; i < j->o->n_models && !rc; i++) {
+        struct ggn_model *model = NULL;
+        struct ggn_policy policy;
+        struct ggn_method m;
+        const char *slash = strrchr(j->o->models[i], '/');
+        rc = ggn_model_load(j->o->models[i], &model, err);
+        if (!rc)
+            rc = ggn_policy_of(model, &policy, err);
+        if (!rc)
+            rc = ggn_eval_trained(&m, &j->set, model, &policy, slash ? slash + 1 : j->o->models[i], GGN_PRECISION_F32,
+                                  threads, err);
+        if (!rc) {
+            cost_network(j, &m);
+            ggn_method_release(&m);
+        }
+        ggn_model_destroy(model);
+    }
+    return rc;
+}
+
+static int cost_baselines(struct job *j, struct base_threads *threads, struct base_err *err)
+{
+    int rc = 0;
+    for (int i = 0; i < j->o->n_baselines && !rc; i++) {
+        struct ggn_baseline b;
+        struct ggn_looks looks = {0};
+        struct ggn_method m;
+        rc = ggn_baseline_load(&b, j->o->baselines[i], GGN_BASELINES, err);
+        if (rc)
+            return rc;
+        rc = b.window > j->set.window ? base_fail(err, BASE_EINVAL, "%s: it judges %d images, windows here have %d",
+                                                  j->o->baselines[i], b.window, j->set.window)
+                                      : ggn_looks_make(&looks, &b, &j->set, threads, err);
+        if (!rc && !(rc = ggn_method_baseline(&m, &j->set, &b, &looks, threads, err))) {
+            snprintf(m.name, sizeof m.name, "%s", ggn_baseline_names[b.kind]);
+            put_method(j, "own", m.cut, &m);
+            turn(j, &m, "visible", shares, COUNT(shares));
+            ggn_method_release(&m);
+        }
+        ggn_looks_release(&looks);
+        ggn_baseline_release(&b);
+    }
+    return rc;
+}
+
+static int write_all(struct job *j, cJSON *root, struct base_err *err)
+{
+    if (j->o->out)
+        return base_json_write(j->o->out, root, j->failed, err);
+    char *text = j->failed ? NULL : cJSON_Print(root);
+    if (!text)
+        return base_fail_nomem(err, "cost");
+    puts(text);
+    cJSON_free(text);
+    return 0;
+}
+
+static int cost(struct job *j, struct base_threads *threads, struct base_err *err)
+{
+    size_t n = (size_t)j->set.n_blocks;
+    cJSON *root = cJSON_CreateObject();
+    int rc = 0;
+    j->checks = calloc(n, sizeof *j->checks);
+    j->stop = calloc(n, sizeof *j->stop);
+    if (!root || !j->checks || !j->stop)
+        rc = base_fail_nomem(err, "cost");
+    base_json_text(root, "split", ggn_split_names[j->split], &j->failed);
+    base_json_text(root, "labels", ggn_dataset_label_source(&j->set.chains.data), &j->failed);
+    base_json_number(root, "ratio", j->set.chains.ratio, &j->failed);
+    put_scenes(j, root);
+    j->points = base_json_array(root, "points", &j->failed);
+    if (!rc)
+        cost_uniform(j);
+    if (!rc)
+        rc = cost_errors(j, err);
+    if (!rc)
+        rc = cost_observer(j, err);
+    if (!rc)
+        rc = cost_models(j, threads, err);
+    if (!rc)
+        rc = cost_baselines(j, threads, err);
+    if (!rc)
+        rc = write_all(j, root, err);
+    cJSON_Delete(root);
+    free(j->checks);
+    free(j->stop);
+    return rc;
+}
+
+int ggn_cmd_cost(int argc, char **argv)
+{
+    static const struct base_options options = {
+        .list = list,
+        .doc = "Replays recorded blocks through every criterion over the range of its dials and writes, scene by scene, "
+               "what was spent until the blocks stop and how good the picture is then, as JSON. scripts/cost puts "
+               "measured prices on the checks and draws it."};
+    struct options o = {.split = GGN_SPLIT_TEST, .threads = base_threads_available()};
+    struct job j = {.o = &o};
+    struct base_threads *threads = NULL;
+    struct base_err err = {0};
+    int skipped;
+
+    int rc = base_options_parse(&options, argc, argv, &o, &err);
+    j.split = (enum ggn_split)o.split;
+    if (!rc && !(threads = base_threads_create(o.threads, &err)))
+        rc = err.code;
+    if (!rc)
+        rc = ggn_eval_set_load(&j.set,
+                               &(struct ggn_eval_options){.dir = o.data, .window = 6, .quality = !o.no_quality,
+                                                          .recorded = o.recorded, .ratio = o.ratio, .seed = 1},
+                               threads, &skipped, &err);
+    if (!rc && ggn_eval_count(&j.set, j.split) == 0)
+        rc = base_fail(&err, BASE_EINVAL, "%s: no labelled block in the split '%s'", o.data, ggn_split_names[j.split]);
+    if (!rc)
+        rc = cost(&j, threads, &err);
+    ggn_eval_set_release(&j.set);
+    base_threads_destroy(threads);
+    return rc ? ggn_cmd_fail(argv[0], &err) : GGN_EXIT_OK;
+}
