@@ -182,6 +182,24 @@ static int set_sequence(void *into, const char *value, struct base_err *err)
     return 0;
 }
 
+static int set_quote_pilot(void *into, const char *value, struct base_err *err)
+{
+    struct pt_cli *cli = into;
+    char spp[24];
+    int64_t n;
+    size_t length = strcspn(value, ":");
+    if (length < sizeof spp) {
+        memcpy(spp, value, length);
+        spp[length] = '\0';
+        if (base_parse_integer(spp, 1, INT32_MAX, &n) &&
+            (value[length] == '\0' || base_parse_real(value + length + 1, 0.01, 1e9, &cli->pilot_s))) {
+            cli->pilot_spp = (uint64_t)n;
+            return 0;
+        }
+    }
+    return expected(err, "SPP or SPP:SECONDS, samples per pixel from 1, seconds from 0.01");
+}
+
 /* --- options -------------------------------------------------------------------------------------------------------- */
 
 static const char *const effect_words[] = {"auto", "all", NULL};
@@ -249,6 +267,14 @@ static const struct base_option options[] = {
      .help = "Save the state of the render now and then, and when it is interrupted"},
     {"checkpoint-every", 0, "SECONDS", TO(checkpoint_every_s), 0, 1e9, .help = "How often (default 60)"},
     {"resume", 0, NULL, TO(resume), .help = "Go on from the checkpoint"},
+    {.help = "What it will cost:"},
+    {"quote", 0, NULL, TO(quote),
+     .help = "Render a pilot only, say what samples and time the whole image will take, and exit; a --checkpoint of the "
+             "pilot can be resumed by a render"},
+    {"quote-pilot", 0, "SPP[:SECONDS]", .set = set_quote_pilot,
+     .help = "The pilot ends at so many samples per pixel or after so long (default 128:30)"},
+    {"quote-map", 0, "FILE.png", TO(quote_map), .output = 1, .words = png, .help = "The predicted time of each block"},
+    {"json", 0, NULL, TO(json), .help = "Print the quote as JSON"},
     {.help = "Looking inside:"},
     {"explain", 0, NULL, TO(action), PT_CLI_EXPLAIN,
      .help = "Print the scene's effects, why, and the kernel chosen, and exit"},
@@ -265,6 +291,31 @@ static const struct base_option options[] = {
     {0}};
 
 /* --- the whole ------------------------------------------------------------------------------------------------------ */
+
+static int check_quote(struct pt_cli *cli, struct base_err *err)
+{
+    if (cli->action != PT_CLI_RENDER)
+        return base_fail(err, BASE_EINVAL, "--quote goes with none of --explain, --debug-path and --sequence");
+    if (cli->output || cli->preview || cli->report || cli->stop_map_count > 0)
+        return base_fail(err, BASE_EINVAL, "--quote writes no image: leave out -o, --preview, --report and --stop-map");
+    if (cli->resume || cli->time_budget_s > 0)
+        return base_fail(err, BASE_EINVAL, "--quote goes with neither --resume nor --time-budget (--quote-pilot bounds it)");
+    if (cli->max_seam > 0)
+        return base_fail(err, BASE_EINVAL, "--quote does not know what --max-seam re-opens: leave it out");
+    if (cli->pilot_spp == 0)
+        cli->pilot_spp = 128;
+    if (cli->pilot_s <= 0)
+        cli->pilot_s = 30.0;
+    cli->action = PT_CLI_QUOTE;
+    return 0;
+}
+
+static int check_no_quote(const struct pt_cli *cli, struct base_err *err)
+{
+    if (cli->pilot_spp > 0 || cli->quote_map || cli->json)
+        return base_fail(err, BASE_EINVAL, "--quote-pilot, --quote-map and --json belong to --quote");
+    return 0;
+}
 
 static int check_together(struct pt_cli *cli, struct base_err *err)
 {
@@ -290,6 +341,8 @@ static int check_together(struct pt_cli *cli, struct base_err *err)
         return base_fail(err, BASE_EINVAL, "--sequence goes with neither --spp, --checkpoint, --crop nor --mask");
     if (cli->mask && cli->spp > 0)
         return base_fail(err, BASE_EINVAL, "--mask %s: --spp takes the same samples everywhere", cli->mask);
+    if (cli->quote ? check_quote(cli, err) != 0 : check_no_quote(cli, err) != 0)
+        return BASE_EINVAL;
     if (cli->param_count > 0 && cli->spp > 0 && !cli->criterion)
         return base_fail(err, BASE_EINVAL, "-p %s=%s: no criterion is used", cli->params[0].key, cli->params[0].value);
     return 0;

@@ -11,7 +11,7 @@
 
 enum { PT_CLI_MAX_PARAMS = 64, PT_CLI_MAX_STOP_MAPS = 4, PT_CLI_SCENES_DEPTH = -2 };
 
-enum pt_cli_action { PT_CLI_RENDER, PT_CLI_LIST_CRITERIA, PT_CLI_EXPLAIN, PT_CLI_DEBUG_PATH, PT_CLI_SEQUENCE };
+enum pt_cli_action { PT_CLI_RENDER, PT_CLI_LIST_CRITERIA, PT_CLI_EXPLAIN, PT_CLI_DEBUG_PATH, PT_CLI_SEQUENCE, PT_CLI_QUOTE };
 
 /* Text is borrowed from argv, except for the keys of params. Integers that may be absent are -1 then. */
 struct pt_cli {
@@ -37,6 +37,11 @@ struct pt_cli {
     const char *checkpoint;
     double checkpoint_every_s;
     int resume;
+    int quote;
+    uint64_t pilot_spp;         /* 0 without quote */
+    double pilot_s;
+    const char *quote_map;
+    int json;
     int debug[3];               /* x, y, sample of --debug-path */
     int all_effects, strict, quiet, reproducible;
     int sampler, strategy, filter; /* enums of scene/settings.h; -1 = the scene's */

@@ -12,10 +12,12 @@
 #include "cli.h"
 #include "explain.h"
 #include "pbrt/load.h"
+#include "quote_output.h"
 #include "render/checkpoint.h"
 #include "render/host_find.h"
 #include "render/output.h"
 #include "render/progress.h"
+#include "render/quote.h"
 #include "render/render.h"
 #include "render/sequence.h"
 
@@ -50,6 +52,8 @@ struct session {
     struct pt_mask mask;
     struct pt_criterion *criterion;
     struct pt_render *render;
+    struct pt_quote *quote;
+    double start_s;         /* wall time of the program's start */
     struct pt_progress progress;
     pt_kernel *kernel;
     const char *kernel_name;
@@ -121,6 +125,8 @@ static int make_config(const struct session *s, struct pt_render_config *config,
         .planes = cli->aov,
         .integrator = s->defaults.integrator,
         .order_seed = cli->order_seed,
+        .pilot_spp = cli->pilot_spp,
+        .pilot_s = cli->pilot_s,
     };
     memcpy(config->crop, cli->has_crop ? cli->crop : s->defaults.crop, sizeof config->crop);
     override_integrator(cli, &config->integrator);
@@ -161,7 +167,7 @@ static int check_output(const struct session *s, const char *path, struct base_e
 static int check_outputs(struct session *s, struct base_err *err)
 {
     struct pt_cli *cli = &s->cli;
-    if (!cli->output && !cli->preview && !cli->report && cli->stop_map_count == 0) {
+    if (!cli->quote && !cli->output && !cli->preview && !cli->report && cli->stop_map_count == 0) {
         const char *slash = strrchr(cli->scene, '/'), *name = slash ? slash + 1 : cli->scene;
         const char *dot = strrchr(name, '.');
         int n = dot ? (int)(dot - name) : (int)strlen(name);
@@ -170,7 +176,7 @@ static int check_outputs(struct session *s, struct base_err *err)
         snprintf(s->default_output, sizeof s->default_output, "%.*s.exr", n, name);
         cli->output = s->default_output;
     }
-    const char *paths[] = {cli->output, cli->preview, cli->report, cli->checkpoint};
+    const char *paths[] = {cli->output, cli->preview, cli->report, cli->checkpoint, cli->quote_map};
     for (size_t i = 0; i < sizeof paths / sizeof paths[0]; i++)
         if (check_output(s, paths[i], err) != 0)
             return BASE_EINVAL;
@@ -327,10 +333,10 @@ static void tell_summary(struct session *s)
     }
 }
 
-static int render_image(struct session *s, int *status, struct base_err *err)
+/* The render with its criterion, as the command line says, and as far as a checkpoint to be resumed had come. */
+static int open_render(struct session *s, struct base_err *err)
 {
     struct pt_render_config config;
-    enum pt_render_outcome outcome;
     int rc = make_config(s, &config, err);
     if (rc || (rc = open_criterion(s, err)) != 0 || (rc = check_outputs(s, err)) != 0 ||
         (rc = describe_settings(s, &config, err)) != 0)
@@ -338,11 +344,17 @@ static int render_image(struct session *s, int *status, struct base_err *err)
     rc = pt_render_create(&config, s->scene, s->kernel, s->threads, s->criterion, &s->render, err);
     if (!rc && s->cli.resume)
         rc = pt_checkpoint_load(s->cli.checkpoint, s->render, s->settings, err);
-    if (rc) {
-        if (rc == BASE_EIO)
-            rc = err->code = BASE_EINVAL; /* the checkpoint is an input */
+    if (rc == BASE_EIO)
+        rc = err->code = BASE_EINVAL; /* the checkpoint is an input */
+    return rc;
+}
+
+static int render_image(struct session *s, int *status, struct base_err *err)
+{
+    enum pt_render_outcome outcome;
+    int rc = open_render(s, err);
+    if (rc)
         return rc;
-    }
     struct pt_render_hooks hooks = {.slice = after_slice, .interrupted = interrupted, .suspend = on_suspend, .warn = say,
                                     .data = s};
     s->checkpoint_at_s = base_clock_wall_s() + s->cli.checkpoint_every_s;
@@ -357,6 +369,53 @@ static int render_image(struct session *s, int *status, struct base_err *err)
         return rc;
     }
     tell_summary(s);
+    *status = outcome == PT_RENDER_INTERRUPTED ? EXIT_INTERRUPTED : 0;
+    return rc;
+}
+
+/* --- what it will cost ------------------------------------------------------------------------------------------------ */
+
+static void ask_quote(void *data, struct pt_render *render, const uint32_t *due, uint32_t count)
+{
+    struct session *s = data;
+    pt_quote_ask(s->quote, render, due, count);
+}
+
+/* The pilot is over: the checkpoint is the render's, whoever goes on with it. */
+static int tell_quote(struct session *s, double load_s, int was_interrupted, struct base_err *err)
+{
+    const struct pt_cli *cli = &s->cli;
+    int rc = pt_quote_finish(s->quote, s->render, err);
+    if (rc)
+        return rc;
+    struct pt_quote_info info = {.scene = cli->scene, .params = cli->params, .param_count = cli->param_count,
+                                 .scene_bytes = s->scene->stats.bytes, .load_s = load_s, .interrupted = was_interrupted};
+    if (cli->json)
+        rc = pt_quote_json(stdout, s->quote, s->render, &info, err);
+    else
+        pt_quote_text(stdout, s->quote, s->render, &info);
+    return rc || !cli->quote_map ? rc : pt_quote_map(cli->quote_map, s->quote, s->render, err);
+}
+
+static int quote_image(struct session *s, int *status, struct base_err *err)
+{
+    enum pt_render_outcome outcome;
+    double load_s = base_clock_wall_s() - s->start_s;
+    int rc = open_render(s, err);
+    if (!rc)
+        rc = pt_quote_create(s->render, s->criterion ? s->criterion->table : NULL, s->cli.params, s->cli.param_count,
+                             s->cli.mask ? &s->mask : NULL, say, s, &s->quote, err);
+    if (rc)
+        return rc;
+    struct pt_render_hooks hooks = {.slice = after_slice, .judged = ask_quote, .interrupted = interrupted,
+                                    .suspend = on_suspend, .warn = say, .data = s};
+    s->checkpoint_at_s = base_clock_wall_s() + s->cli.checkpoint_every_s;
+    rc = pt_render_run(s->render, &hooks, &outcome, err);
+    pt_progress_clear(&s->progress);
+    if (!rc && s->cli.checkpoint && outcome != PT_RENDER_INTERRUPTED)
+        rc = pt_checkpoint_save(s->cli.checkpoint, s->render, s->settings, err);
+    if (!rc)
+        rc = tell_quote(s, load_s, outcome == PT_RENDER_INTERRUPTED, err);
     *status = outcome == PT_RENDER_INTERRUPTED ? EXIT_INTERRUPTED : 0;
     return rc;
 }
@@ -435,6 +494,8 @@ static int run(struct session *s, int *status, struct base_err *err)
         return 0;
     case PT_CLI_DEBUG_PATH:
         return debug_path(s, err);
+    case PT_CLI_QUOTE:
+        return quote_image(s, status, err);
     case PT_CLI_SEQUENCE:
         return record_sequence(s, status, err);
     default:
@@ -447,6 +508,7 @@ int main(int argc, char **argv)
     static struct session s = {.scene_files = BASE_INPUTS_EMPTY, .judging = BASE_INPUTS_EMPTY};
     struct base_err err = {0};
     int status = 0;
+    s.start_s = base_clock_wall_s();
     int rc = pt_cli_parse(&s.cli, argc, argv, &err);
     if (!rc) {
         pt_progress_init(&s.progress, s.cli.quiet ? NULL : stderr);
@@ -457,6 +519,7 @@ int main(int argc, char **argv)
         fprintf(stderr, "pathtracer: %s\n", err.text);
         status = rc == BASE_EINVAL || rc == BASE_EIO ? EXIT_BAD_INPUT : EXIT_FAILED;
     }
+    pt_quote_destroy(s.quote);
     pt_render_destroy(s.render);
     pt_criterion_destroy(s.criterion);
     pt_mask_release(&s.mask);

@@ -26,9 +26,20 @@ void pt_viridis(double t, uint8_t rgb[3])
         rgb[c] = (uint8_t)lround((1.0 - f) * stops[i][c] + f * stops[i + 1][c]);
 }
 
-static double scale_of(uint64_t spp, uint64_t low, uint64_t high)
+/* Nothing has no place on a logarithmic scale. */
+static double positive(double value)
 {
-    return high > low ? log((double)spp / (double)low) / log((double)high / (double)low) : 0.5;
+    return value > 0.0 ? value : 1.0;
+}
+
+static double scale_of(double value, double low, double high)
+{
+    return high > low ? log(value / low) / log(high / low) : 0.5;
+}
+
+static int format(double value, char text[24])
+{
+    return snprintf(text, 24, value > 99.0 || value == floor(value) ? "%.0f" : "%.2g", value);
 }
 
 /* Black on light colours, white on dark ones. */
@@ -44,7 +55,7 @@ static void put(const struct pt_canvas *c, int x, int y, const uint8_t rgb[3])
 }
 
 /* digits: of the longest number, so that all are written in the same size. */
-static void paint_block(const struct pt_canvas *canvas, int x0, int y0, int x1, int y1, uint64_t spp, double t, int digits)
+static void paint_block(const struct pt_canvas *canvas, int x0, int y0, int x1, int y1, double value, double t, int digits)
 {
     uint8_t colour[3], edge[3];
     pt_viridis(t, colour);
@@ -54,7 +65,7 @@ static void paint_block(const struct pt_canvas *canvas, int x0, int y0, int x1, 
         for (int x = x0; x < x1; x++)
             put(canvas, x, y, x == x1 - 1 || y == y1 - 1 ? edge : colour);
     char text[24];
-    int length = snprintf(text, sizeof text, "%llu", (unsigned long long)spp);
+    int length = format(value, text);
     for (int scale = 4; scale >= 1; scale--) {
         int w = (length * PT_FONT_WIDTH - 1) * scale, h = PT_FONT_HEIGHT * scale;
         if ((digits * PT_FONT_WIDTH - 1) * scale * 5 > (x1 - x0) * 4 || h * 3 > (y1 - y0) * 2)
@@ -64,7 +75,7 @@ static void paint_block(const struct pt_canvas *canvas, int x0, int y0, int x1, 
     }
 }
 
-static void paint_legend(const struct pt_canvas *canvas, int top, uint64_t low, uint64_t high)
+static void paint_legend(const struct pt_canvas *canvas, int top, double low, double high, const char *unit)
 {
     static const uint8_t paper[3] = {255, 255, 255}, black[3] = {0, 0, 0};
     int margin = 8, left = margin, right = canvas->width - margin;
@@ -81,22 +92,23 @@ static void paint_legend(const struct pt_canvas *canvas, int top, uint64_t low, 
     const double at[3] = {0.0, 1.0, 0.5};
     for (int i = 0; i < (canvas->width >= 360 && high > low ? 3 : 2); i++) {
         char text[40];
-        double spp = (double)low * pow((double)high / (double)low, at[i]);
-        int n = snprintf(text, sizeof text, i == 0 ? "%.0f spp" : "%.0f", spp) * PT_FONT_WIDTH * 2;
+        char number[24];
+        double value = low * pow(high / low, at[i]);
+        format(high > 99.0 ? round(value) : value, number);
+        int n = snprintf(text, sizeof text, i == 0 ? "%s %s" : "%s", number, unit) * PT_FONT_WIDTH * 2;
         int x = left + (int)(at[i] * (right - left - n));
         pt_font_draw(canvas, x, top + 25, 2, black, text);
     }
 }
 
 int pt_stopmap_draw(int x0, int y0, int x1, int y1, const struct pt_stopmap_block *blocks, uint32_t count,
-                    struct pt_stopmap *out, struct base_err *err)
+                    const char *unit, struct pt_stopmap *out, struct base_err *err)
 {
-    uint64_t low = UINT64_MAX, high = 0;
+    double low = INFINITY, high = 0.0;
     int widest = 1;
     for (uint32_t i = 0; i < count; i++) {
-        uint64_t spp = blocks[i].spp > 0 ? blocks[i].spp : 1;
-        low = spp < low ? spp : low;
-        high = spp > high ? spp : high;
+        low = fmin(low, positive(blocks[i].value));
+        high = fmax(high, positive(blocks[i].value));
         int w = blocks[i].x1 - blocks[i].x0;
         widest = w > widest ? w : widest;
     }
@@ -108,15 +120,19 @@ int pt_stopmap_draw(int x0, int y0, int x1, int y1, const struct pt_stopmap_bloc
     map.rgb = calloc((size_t)map.width * (size_t)map.height, 3);
     if (!map.rgb)
         return base_fail_nomem(err, "stop map");
-    char longest[24];
-    int digits = snprintf(longest, sizeof longest, "%llu", (unsigned long long)high);
+    int digits = 1;
+    for (uint32_t i = 0; i < count; i++) {
+        char text[24];
+        int n = format(blocks[i].value, text);
+        digits = n > digits ? n : digits;
+    }
     struct pt_canvas canvas = {.width = map.width, .height = map.height, .rgb = map.rgb};
     for (uint32_t i = 0; i < count; i++) {
         const struct pt_stopmap_block *b = &blocks[i];
         paint_block(&canvas, (b->x0 - x0) * enlarge, (b->y0 - y0) * enlarge, (b->x1 - x0) * enlarge, (b->y1 - y0) * enlarge,
-                    b->spp, scale_of(b->spp > 0 ? b->spp : 1, low, high), digits);
+                    b->value, scale_of(positive(b->value), low, high), digits);
     }
-    paint_legend(&canvas, (y1 - y0) * enlarge, low, high);
+    paint_legend(&canvas, (y1 - y0) * enlarge, low, high, unit);
     *out = map;
     return 0;
 }

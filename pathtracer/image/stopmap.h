@@ -1,6 +1,6 @@
 /*
- * The stop map as a picture: each block in the colour of its sample count (viridis over a logarithmic scale), the count
- * written into it, and a legend below.
+ * A number per block as a picture, the stop map above all: each block in the colour of its number (viridis over a
+ * logarithmic scale), the number written into it, and a legend below.
  */
 #ifndef PT_IMAGE_STOPMAP_H
 #define PT_IMAGE_STOPMAP_H
@@ -11,7 +11,7 @@
 
 struct pt_stopmap_block {
     int x0, y0, x1, y1; /* end exclusive */
-    uint64_t spp;
+    double value; /* >= 0 */
 };
 
 struct pt_stopmap {
@@ -19,9 +19,10 @@ struct pt_stopmap {
     uint8_t *rgb;      /* owns; [height, width, 3] */
 };
 
-/* Paints blocks of the area [x0, x1) x [y0, y1); small blocks are enlarged until their numbers fit. */
+/* unit: of the values, for the legend. Integers and what is above 99 are written whole, others with two digits.
+ * Paints blocks of the area [x0, x1) x [y0, y1); small blocks are enlarged until their numbers fit. */
 int pt_stopmap_draw(int x0, int y0, int x1, int y1, const struct pt_stopmap_block *blocks, uint32_t count,
-                    struct pt_stopmap *out, struct base_err *err);
+                    const char *unit, struct pt_stopmap *out, struct base_err *err);
 void pt_stopmap_release(struct pt_stopmap *map);
 
 /* Colour of t in [0, 1] (clamped), dark blue to yellow, perceptually uniform. */

@@ -10,6 +10,7 @@
 #include <stdint.h>
 
 #include "scene/effects.h"
+#include "scene/materials.h"
 #include "scene/settings.h"
 #include "scene/vec.h"
 
@@ -29,6 +30,13 @@ typedef void pt_kernel(const struct pt_scene *scene, const struct pt_integrator 
 
 /* The smallest compiled kernel that covers `needed`; *covers (may be NULL) gets its effect set, *name a static name. */
 pt_kernel *pt_kernel_select(pt_effects needed, pt_effects *covers, const char **name);
+
+/* What the vertices of paths are: a scattering model each, or a collision in a medium. */
+enum { PT_MET_MEDIUM = PT_BSDF_COUNT, PT_MET_COUNT };
+
+/* Adds the vertices of one path to met[PT_MET_COUNT]. Slower than a kernel: it is the one that traces. */
+void pt_kernel_census(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y,
+                      uint32_t sample, uint64_t *met);
 
 /* One path vertex by vertex in words on `out` (--debug-path). */
 void pt_kernel_trace(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y,

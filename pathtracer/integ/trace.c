@@ -22,6 +22,7 @@ void pt_trace_surface(struct pt_trace *trace, const struct pt_place *at, const s
              ++trace->vertex, pt_bsdf_models[bsdf->kind].words, (double)p.x, (double)p.y, (double)p.z, (double)n.x,
              (double)n.y, (double)n.z, (int)at->shape->material, (int)at->primitive, (double)t.x, (double)t.y, (double)t.z);
     trace->line(trace->data, text);
+    trace->met[bsdf->kind]++;
 }
 
 void pt_trace_scatter(struct pt_trace *trace, int32_t medium, pt_vec3 p, pt_vec3 throughput)
@@ -31,6 +32,7 @@ void pt_trace_scatter(struct pt_trace *trace, int32_t medium, pt_vec3 p, pt_vec3
     snprintf(text, sizeof text, "%d: scattered in medium %d at (%g, %g, %g) throughput (%g, %g, %g)", ++trace->vertex,
              (int)medium, (double)p.x, (double)p.y, (double)p.z, (double)t.x, (double)t.y, (double)t.z);
     trace->line(trace->data, text);
+    trace->met[PT_MET_MEDIUM]++;
 }
 
 void pt_trace_light(struct pt_trace *trace, pt_vec3 wi, pt_vec3 added)

@@ -1,13 +1,15 @@
-/* --debug-path: the tracing kernel tells what happens at each vertex, one line of text each. */
+/* --debug-path: the tracing kernel tells what happens at each vertex, one line of text each, and counts them for --quote. */
 #ifndef PT_INTEG_TRACE_H
 #define PT_INTEG_TRACE_H
 
+#include "integ/integrator.h"
 #include "integ/surface.h"
 
 struct pt_trace {
     void (*line)(void *data, const char *text); /* borrows text during the call */
     void *data;
     int vertex;
+    uint32_t met[PT_MET_COUNT]; /* vertices so far, by what they are */
 };
 
 void pt_trace_camera(struct pt_trace *trace, const struct pt_ray *ray);

@@ -3,10 +3,10 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "base/options.h"
 #include "image/oiio.h"
+#include "render/host_find.h"
 
 static const double WHITE_SCALE = 0.25;
 
@@ -65,27 +65,14 @@ double pt_mask_scale(int step)
     return pow(WHITE_SCALE, (double)step / PT_MASK_STEPS);
 }
 
-static const struct lull_param *find_param(const struct lull_criterion *t, const char *name)
-{
-    for (uint32_t i = 0; i < t->param_count; i++) {
-        const struct lull_param *p = (const void *)((const char *)t->params + (size_t)i * t->param_stride);
-        if (strcmp(p->name, name) == 0)
-            return p;
-    }
-    return NULL;
-}
-
 int pt_mask_dial(const struct lull_criterion *t, const struct lull_pair *pairs, uint32_t pair_count, int step,
                  char value[32], struct lull_pair *pair, struct base_err *err)
 {
     static const char *const dials[] = {"visible", "threshold"};
     const char *known = NULL; /* a dial that has no value */
     for (size_t d = 0; d < sizeof dials / sizeof dials[0]; d++) {
-        const struct lull_param *p = find_param(t, dials[d]);
-        const char *text = p ? p->default_value : NULL;
-        for (uint32_t i = 0; p && i < pair_count; i++)
-            if (strcmp(pairs[i].key, dials[d]) == 0)
-                text = pairs[i].value;
+        const struct lull_param *p;
+        const char *text = pt_criterion_parameter(t, dials[d], pairs, pair_count, &p);
         double dial;
         if (p && !text && !known)
             known = dials[d];

@@ -176,9 +176,10 @@ static int stop_map_png(const char *path, const struct pt_render *r, struct base
     if (!list)
         return base_fail_nomem(err, "stop map");
     for (uint32_t i = 0; i < b->count; i++)
-        list[i] = (struct pt_stopmap_block){b->list[i].x0, b->list[i].y0, b->list[i].x1, b->list[i].y1, b->list[i].spp};
+        list[i] = (struct pt_stopmap_block){b->list[i].x0, b->list[i].y0, b->list[i].x1, b->list[i].y1,
+                                            (double)b->list[i].spp};
     struct pt_stopmap map = {0};
-    int rc = pt_stopmap_draw(b->x0, b->y0, b->x1, b->y1, list, b->count, &map, err);
+    int rc = pt_stopmap_draw(b->x0, b->y0, b->x1, b->y1, list, b->count, "spp", &map, err);
     if (!rc)
         rc = pt_oiio_write_png(path, map.width, map.height, 3, map.rgb, err);
     pt_stopmap_release(&map);

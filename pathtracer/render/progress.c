@@ -1,10 +1,12 @@
 #include "render/progress.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "render/outlook.h"
 
 static const double LIVE_S = 0.2, FIRST_PLAIN_S = 2.0, PLAIN_S = 10.0;
 
@@ -27,38 +29,54 @@ static void format_time(double s, char *text, size_t room)
 }
 
 struct outlook {
-    double done, expected; /* pixel samples */
+    double done_s, left_s; /* thread seconds */
+    double wall_s;         /* that what is left takes */
     int known;             /* every active block has a prediction */
     uint64_t low, high;    /* samples of the active blocks */
     uint32_t active;
 };
 
+/* What is left of one active block. */
+static struct pt_outlook_work look_at(const struct pt_render *r, const struct pt_block *b, struct outlook *o)
+{
+    struct pt_outlook_stop stop = pt_outlook_of_block(b, r->config.uniform, r->config.spp_max);
+    double more = stop.spp - (double)b->spp, left_s = b->spp > 0 ? more * b->thread_s / (double)b->spp : 0.0;
+    o->active++;
+    o->low = b->spp < o->low ? b->spp : o->low;
+    o->high = b->spp > o->high ? b->spp : o->high;
+    o->known &= stop.known;
+    o->left_s += left_s;
+    if (!r->config.uniform && r->totals.checks > 0)
+        o->wall_s += pt_outlook_checks(b, stop.spp) * r->totals.criterion_s / (double)r->totals.checks;
+    return (struct pt_outlook_work){more, left_s, b->y1 - b->y0};
+}
+
 static struct outlook look(const struct pt_render *r)
 {
     struct outlook o = {.known = 1, .low = UINT64_MAX};
-    for (uint32_t i = 0; i < r->blocks.count; i++) {
+    struct pt_outlook_work *work = malloc(r->blocks.count * sizeof *work);
+    int threads = base_threads_count(r->threads);
+    for (uint32_t i = 0; i < r->blocks.count && work; i++) {
         const struct pt_block *b = &r->blocks.list[i];
-        double pixels = (double)(b->x1 - b->x0) * (double)(b->y1 - b->y0), end = (double)b->spp;
-        if (b->reason == PT_REASON_NONE) {
-            int predicted = b->asked && isfinite(b->predicted_spp);
-            o.active++;
-            o.low = b->spp < o.low ? b->spp : o.low;
-            o.high = b->spp > o.high ? b->spp : o.high;
-            o.known &= predicted || r->config.uniform;
-            end = predicted && !r->config.uniform ? fmax(b->predicted_spp, (double)b->next_spp) : (double)r->config.spp_max;
-            end = fmin(end, (double)r->config.spp_max);
-        }
-        o.done += pixels * (double)b->spp;
-        o.expected += pixels * end;
+        o.done_s += b->thread_s;
+        if (b->reason != PT_REASON_NONE)
+            continue;
+        struct pt_outlook_work *one = &work[o.active];
+        *one = look_at(r, b, &o);
     }
+    if (!work || r->busy_threads <= 0.0)
+        o.wall_s = INFINITY;
+    else /* what keeps the threads from it now, other programs for one, will go on doing so */
+        o.wall_s += pt_outlook_wall_s(work, o.active, threads) * pt_outlook_busy(r->sampled_rows, threads) / r->busy_threads;
+    free(work);
     return o;
 }
 
 void pt_progress_text(const struct pt_render *r, char *text, size_t room)
 {
     struct outlook o = look(r);
-    double elapsed_s = pt_render_elapsed_s(r), share = o.expected > 0.0 ? o.done / o.expected : 1.0;
-    double left_s = r->samples_per_s > 0.0 ? (o.expected - o.done) / r->samples_per_s : INFINITY;
+    double elapsed_s = pt_render_elapsed_s(r), left_s = o.wall_s;
+    double share = o.left_s > 0.0 ? o.done_s / (o.done_s + o.left_s) : 1.0;
     int known = o.known;
     if (r->config.time_budget_s > 0.0) {
         double budget_left_s = fmax(0.0, r->config.time_budget_s - elapsed_s);

@@ -71,7 +71,7 @@ static void work_destroy(struct pt_render_work *w)
     free(w);
 }
 
-static int open_frame(struct pt_render *r, struct base_err *err)
+int pt_render_open_frame(const struct pt_render *r, struct pt_criterion *criterion, struct base_err *err)
 {
     const struct pt_render_config *c = &r->config;
     struct pt_criterion_frame frame = {
@@ -85,7 +85,7 @@ static int open_frame(struct pt_render *r, struct base_err *err)
         .deterministic = c->time_budget_s <= 0.0 && c->max_check_overhead <= 0.0,
         .independent = c->integrator.sampler == PT_SAMPLER_INDEPENDENT,
     };
-    return pt_criterion_begin(r->criterion, &frame, &r->blocks, &r->film, err);
+    return pt_criterion_begin(criterion, &frame, &r->blocks, &r->film, err);
 }
 
 /* Samples at the first check. */
@@ -126,7 +126,7 @@ int pt_render_create(const struct pt_render_config *config, const struct pt_scen
             rc = base_fail_nomem(err, "work list");
     }
     if (!rc && criterion)
-        rc = open_frame(r, err);
+        rc = pt_render_open_frame(r, criterion, err);
     if (rc) {
         pt_render_destroy(r);
         return rc;
@@ -175,6 +175,13 @@ static void sample_row(void *data, long n, int worker)
     item->thread_s = base_clock_thread_s() - start_s;
 }
 
+/* Samples up to which a block goes now. */
+static uint64_t goal(const struct pt_render *r, const struct pt_block *b)
+{
+    uint64_t most = r->config.pilot_spp;
+    return most > 0 && b->next_spp > most ? most : b->next_spp;
+}
+
 /* Lists the rows of every active block that has not reached its next check, at most `step` samples further. */
 static size_t list_items(struct pt_render *r, uint64_t step)
 {
@@ -182,9 +189,10 @@ static size_t list_items(struct pt_render *r, uint64_t step)
     w->count = 0;
     for (uint32_t i = 0; i < r->blocks.count; i++) {
         const struct pt_block *b = &r->blocks.list[i];
-        if (b->reason != PT_REASON_NONE || b->spp >= b->next_spp)
+        uint64_t end = goal(r, b);
+        if (b->reason != PT_REASON_NONE || b->spp >= end)
             continue;
-        uint64_t to = b->next_spp - b->spp > step ? b->spp + step : b->next_spp;
+        uint64_t to = end - b->spp > step ? b->spp + step : end;
         for (int y = b->y0; y < b->y1; y++) {
             w->order[w->count] = (uint32_t)w->count;
             w->items[w->count++] = (struct item){.block = i, .y = y, .from = (uint32_t)b->spp, .to = (uint32_t)to};
@@ -203,15 +211,18 @@ static size_t list_items(struct pt_render *r, uint64_t step)
     return w->count;
 }
 
-static void gather(struct pt_render *r)
+/* Returns the thread seconds of the slice. */
+static double gather(struct pt_render *r)
 {
     const struct pt_render_work *w = r->work;
+    double thread_s = 0.0;
     for (size_t k = 0; k < w->count; k++) {
         const struct item *item = &w->items[k];
         struct pt_block *b = &r->blocks.list[item->block];
         uint64_t samples = (uint64_t)(b->x1 - b->x0) * (item->to - item->from);
         b->rays += item->rays;
         b->thread_s += item->thread_s;
+        thread_s += item->thread_s;
         b->dropped += item->dropped;
         if (item->y == b->y1 - 1)
             b->spp = item->to;
@@ -223,6 +234,12 @@ static void gather(struct pt_render *r)
             r->dropped[r->dropped_count++] =
                 (struct pt_dropped_sample){item->first_x, (uint32_t)item->y, item->first_sample};
     }
+    return thread_s;
+}
+
+static double recent(double before, double now)
+{
+    return before > 0.0 ? 0.7 * before + 0.3 * now : now;
 }
 
 static uint64_t active_pixels(const struct pt_render *r)
@@ -230,7 +247,7 @@ static uint64_t active_pixels(const struct pt_render *r)
     uint64_t pixels = 0;
     for (uint32_t i = 0; i < r->blocks.count; i++) {
         const struct pt_block *b = &r->blocks.list[i];
-        if (b->reason == PT_REASON_NONE && b->spp < b->next_spp)
+        if (b->reason == PT_REASON_NONE && b->spp < goal(r, b))
             pixels += (uint64_t)(b->x1 - b->x0) * (uint64_t)(b->y1 - b->y0);
     }
     return pixels;
@@ -251,10 +268,11 @@ static int slice(struct pt_render *r)
     double start_s = base_clock_wall_s();
     base_threads_for(r->threads, (long)r->work->count, sample_row, r);
     double wall_s = base_clock_wall_s() - start_s;
-    gather(r);
+    double thread_s = gather(r);
     r->totals.render_s += wall_s;
-    double rate = (double)(r->totals.samples - before) / fmax(wall_s, 1e-6);
-    r->samples_per_s = r->samples_per_s > 0.0 ? 0.7 * r->samples_per_s + 0.3 * rate : rate;
+    r->samples_per_s = recent(r->samples_per_s, (double)(r->totals.samples - before) / fmax(wall_s, 1e-6));
+    r->busy_threads = recent(r->busy_threads, thread_s / fmax(wall_s, 1e-6));
+    r->sampled_rows = (long)r->work->count;
     return 1;
 }
 
@@ -345,6 +363,8 @@ static void check(struct pt_render *r, const struct pt_render_hooks *hooks)
     if (active == 0)
         return;
     ask(r, n, hooks);
+    if (hooks->judged)
+        hooks->judged(hooks->data, r, w->due, n);
     for (uint32_t k = 0; k < n; k++) {
         struct pt_block *b = &r->blocks.list[w->due[k]];
         note(b, &w->decisions[k]);
@@ -385,6 +405,15 @@ static int suspend(struct pt_render *r, const struct pt_render_hooks *hooks, int
     return rc;
 }
 
+/* A block of this wave has the samples of a pilot before it is at its check. */
+static int pilot_is_over(const struct pt_render *r)
+{
+    int held = 0;
+    for (uint32_t i = 0; i < r->blocks.count; i++)
+        held |= r->blocks.list[i].reason == PT_REASON_NONE && r->blocks.list[i].spp < r->blocks.list[i].next_spp;
+    return held;
+}
+
 int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum pt_render_outcome *outcome,
                   struct base_err *err)
 {
@@ -392,6 +421,10 @@ int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum
     *outcome = PT_RENDER_DONE;
     while (pt_render_active(r) > 0) {
         if (!slice(r)) {
+            if (pilot_is_over(r)) {
+                *outcome = PT_RENDER_PILOT;
+                break;
+            }
             check(r, hooks);
             if (r->config.max_seam >= 1.0)
                 pt_blocks_reopen(&r->blocks, r->config.max_seam);
@@ -407,6 +440,10 @@ int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum
         if (r->config.time_budget_s > 0.0 && pt_render_elapsed_s(r) >= r->config.time_budget_s) {
             *outcome = PT_RENDER_OUT_OF_TIME;
             rc = suspend(r, hooks, PT_REASON_TIME, err);
+            break;
+        }
+        if (r->config.pilot_spp > 0 && pt_render_elapsed_s(r) >= r->config.pilot_s) {
+            *outcome = PT_RENDER_PILOT;
             break;
         }
     }

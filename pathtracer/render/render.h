@@ -25,6 +25,8 @@ struct pt_render_config {
     uint64_t spp_min, spp_max; /* 1 <= spp_min <= spp_max <= 2^31 - 1; equal: uniform */
     int uniform;             /* every block gets spp_max samples; a criterion is asked once at the end */
     double time_budget_s;    /* 0 = none */
+    uint64_t pilot_spp;      /* not 0: pt_render_run ends, with the blocks still active, before one gets more samples … */
+    double pilot_s;          /* … and after so many seconds */
     double max_check_overhead; /* share of the elapsed time that checks may take; 0 = no bound */
     double max_seam;         /* most ratio of samples of neighbouring blocks, 0 = any (pt_blocks_reopen) */
     uint32_t planes;         /* PT_FILM_* wanted besides those of the criterion */
@@ -58,13 +60,18 @@ struct pt_render {
     uint32_t dropped_count;           /* entries used */
     struct pt_render_work *work;      /* owns; scratch of the slices */
     double samples_per_s;             /* recent, 0 = not known yet */
+    double busy_threads;              /* likewise: thread seconds per wall second of sampling */
+    long sampled_rows;                /* what those threads had to share */
 };
 
-enum pt_render_outcome { PT_RENDER_DONE, PT_RENDER_OUT_OF_TIME, PT_RENDER_INTERRUPTED };
+enum pt_render_outcome { PT_RENDER_DONE, PT_RENDER_OUT_OF_TIME, PT_RENDER_INTERRUPTED, PT_RENDER_PILOT };
 
 struct pt_render_hooks {
     /* After every slice; a negative code ends pt_render_run with it. May be NULL. */
     int (*slice)(void *data, struct pt_render *render, struct base_err *err);
+    /* After the criterion was asked about blocks list[due[0 … count)], before they are stopped or scheduled. May be
+     * NULL. */
+    void (*judged)(void *data, struct pt_render *render, const uint32_t *due, uint32_t count);
     /* Not 0: end after this slice. May be NULL. */
     int (*interrupted)(void *data);
     /* Called once before the blocks still active are closed for time or interrupt, while everything is as a later run needs
@@ -81,7 +88,11 @@ int pt_render_create(const struct pt_render_config *config, const struct pt_scen
                      struct base_err *err);
 void pt_render_destroy(struct pt_render *render);
 
-/* Renders until all blocks are stopped, time is up, or interrupted() says so. */
+/* Opens a frame of this render for one more criterion, which must need no planes beyond those of the render's own. */
+int pt_render_open_frame(const struct pt_render *render, struct pt_criterion *criterion, struct base_err *err);
+
+/* Renders until all blocks are stopped, time is up, a pilot is over, or interrupted() says so. A pilot leaves the render
+ * as it is between two slices: going on gives what it would have been without. */
 int pt_render_run(struct pt_render *render, const struct pt_render_hooks *hooks, enum pt_render_outcome *outcome,
                   struct base_err *err);
 

@@ -243,7 +243,7 @@ static void stop_map_picture(void **state)
     struct pt_stopmap map;
     const struct pt_stopmap_block blocks[2] = {{0, 0, 200, 100, 32}, {200, 0, 400, 100, 10000}};
     uint8_t low[3], high[3];
-    assert_int_equal(pt_stopmap_draw(0, 0, 400, 100, blocks, 2, &map, &err), 0);
+    assert_int_equal(pt_stopmap_draw(0, 0, 400, 100, blocks, 2, "spp", &map, &err), 0);
     assert_int_equal(map.width, 400);
     assert_true(map.height > 100);
     pt_viridis(0.0, low);
@@ -372,22 +372,26 @@ static void progress_is_honest(void **state)
     (void)state;
     char text[256];
     struct pt_render r = *render;
-    struct pt_block list[2] = {{.x1 = 10, .y1 = 10, .spp = 100, .next_spp = 120, .asked = 1, .predicted_spp = 200},
-                               {.x1 = 10, .y1 = 10, .spp = 50, .reason = PT_REASON_CRITERION}};
+    struct pt_block list[2] = {{.x1 = 10, .y1 = 10, .spp = 100, .next_spp = 120, .asked = 1, .asked_spp = 100,
+                                .predicted_spp = 200, .thread_s = 30.0},
+                               {.x1 = 10, .y1 = 10, .spp = 50, .reason = PT_REASON_CRITERION, .thread_s = 10.0}};
     r.blocks.list = list;
     r.blocks.count = 2;
     r.config.spp_max = 1000;
     r.samples_per_s = 1000.0;
+    r.busy_threads = 1.5; /* of 2 */
+    r.sampled_rows = 20;
+    r.totals.checks = 0;
     pt_progress_text(&r, text, sizeof text);
-    assert_string_equal(text, " 60%  1 of 2 blocks active  spp 100..100  0.00 Mpaths/s  ETA 0:10");
+    assert_string_equal(text, " 57%  1 of 2 blocks active  spp 100..100  0.00 Mpaths/s  ETA 0:20");
     list[0].predicted_spp = (double)NAN;
     pt_progress_text(&r, text, sizeof text);
-    assert_string_equal(text, ">= 14%  1 of 2 blocks active  spp 100..100  0.00 Mpaths/s  ETA at most 1:30");
+    assert_string_equal(text, ">= 12%  1 of 2 blocks active  spp 100..100  0.00 Mpaths/s  ETA at most 3:00");
     r.config.time_budget_s = pt_render_elapsed_s(&r) + 4.0;
     pt_progress_text(&r, text, sizeof text);
     assert_non_null(strstr(text, "0:04"));
     r.config.time_budget_s = 0.0;
-    r.samples_per_s = 0.0;
+    r.busy_threads = 0.0;
     pt_progress_text(&r, text, sizeof text);
     assert_non_null(strstr(text, "ETA unknown"));
 }

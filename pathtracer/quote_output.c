@@ -1,0 +1,279 @@
+#include "quote_output.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/json.h"
+#include "image/oiio.h"
+#include "image/stopmap.h"
+#include "shade/bsdf_models.h"
+
+enum { DEAREST = 5, REPLAYED = 256 };
+
+static const struct pt_quote_row *asked_row(const struct pt_quote *q)
+{
+    int i = 0;
+    while (!q->rows[i].asked)
+        i++;
+    return &q->rows[i];
+}
+
+/* --- what stands out --------------------------------------------------------------------------------------------------- */
+
+struct dear_block {
+    uint32_t index;
+    double share;            /* of the time of all blocks */
+    double bounces;          /* vertices per path */
+    const char *mostly;      /* what most of them are */
+    double mostly_share;
+};
+
+/* What the paths of a block meet: those of REPLAYED pixels spread over it, replayed by the tracing kernel. */
+static void take_census(const struct pt_render *r, const struct pt_block *b, struct dear_block *dear)
+{
+    uint64_t met[PT_MET_COUNT] = {0}, all = 0, most = 0;
+    uint32_t width = (uint32_t)(b->x1 - b->x0), pixels = width * (uint32_t)(b->y1 - b->y0);
+    for (uint32_t i = 0; i < REPLAYED; i++) {
+        uint32_t at = (uint32_t)((uint64_t)i * pixels / REPLAYED);
+        uint32_t x = (uint32_t)b->x0 + at % width, y = (uint32_t)b->y0 + at / width;
+        pt_kernel_census(r->scene, &r->config.integrator, x, y, i, met);
+    }
+    dear->mostly = "nothing";
+    for (int k = 0; k < PT_MET_COUNT; k++) {
+        all += met[k];
+        if (met[k] > most) {
+            most = met[k];
+            dear->mostly = k == PT_MET_MEDIUM ? "scattering in a medium" : pt_bsdf_models[k].words;
+        }
+    }
+    dear->bounces = (double)all / REPLAYED;
+    dear->mostly_share = all > 0 ? (double)most / (double)all : 0.0;
+}
+
+/* The blocks that cost most, dearest first. Returns their number. */
+static uint32_t find_dearest(const struct pt_quote *q, const struct pt_render *r, struct dear_block out[DEAREST])
+{
+    const struct pt_quote_row *row = asked_row(q);
+    uint32_t n = 0;
+    for (uint32_t i = 0; i < q->block_count; i++) {
+        uint32_t at = n < DEAREST ? n++ : DEAREST;
+        for (; at > 0 && row->blocks[out[at - 1].index].thread_s < row->blocks[i].thread_s; at--)
+            if (at < DEAREST)
+                out[at] = out[at - 1];
+        if (at < DEAREST)
+            out[at] = (struct dear_block){.index = i, .share = row->blocks[i].thread_s / row->thread_s};
+    }
+    for (uint32_t k = 0; k < n; k++)
+        take_census(r, &r->blocks.list[out[k].index], &out[k]);
+    return n;
+}
+
+/* --- text -------------------------------------------------------------------------------------------------------------- */
+
+static const char *duration(double s, char text[32])
+{
+    if (s < 99.5)
+        snprintf(text, 32, s < 9.95 ? "%.1f s" : "%.0f s", s);
+    else if (s < 99.5 * 60)
+        snprintf(text, 32, "%.0f min", s / 60);
+    else
+        snprintf(text, 32, "%.1f h", s / 3600);
+    return text;
+}
+
+/* 12,345; with + where --spp-max ended it. */
+static const char *thousands(double value, int more, char text[32])
+{
+    char digits[24];
+    int n = snprintf(digits, sizeof digits, "%.0f", value), used = 0;
+    for (int i = 0; i < n; i++) {
+        text[used++] = digits[i];
+        if ((n - i - 1) % 3 == 0 && i + 1 < n)
+            text[used++] = ',';
+    }
+    if (more)
+        text[used++] = '+';
+    text[used] = '\0';
+    return text;
+}
+
+static void print_row(FILE *out, const struct pt_quote_row *row)
+{
+    char who[32], least[32], mean[32], most[32], samples[112], time[32], low[32], high[32], from_to[80], wall[160];
+    if (isnan(row->visible))
+        snprintf(who, sizeof who, "as asked");
+    else
+        snprintf(who, sizeof who, "%3.3g %%  %s", 100 * row->visible,
+                 row->visible == 0.5    ? "draft"
+                 : row->visible == 0.25 ? "default"
+                 : row->visible == 0.05 ? "final"
+                                        : "as asked");
+    snprintf(samples, sizeof samples, "%6s / %6s / %7s", thousands(row->spp_min, 0, least),
+             thousands(row->spp_mean, row->unknown > 0 || row->capped > 0, mean),
+             thousands(row->spp_max, row->unknown > 0 || row->capped > 0, most));
+    snprintf(from_to, sizeof from_to, "(%s to %s)", duration(row->wall_low_s, low), duration(row->wall_high_s, high));
+    snprintf(wall, sizeof wall, "%-8s %s", duration(row->wall_s, time), from_to);
+    fprintf(out, "%-26s  %-26s  %-30s  %.2f x\n", who, samples, wall, row->against_uniform);
+}
+
+static void print_dearest(FILE *out, const struct pt_quote *q, const struct pt_render *r)
+{
+    struct dear_block dear[DEAREST];
+    uint32_t n = find_dearest(q, r, dear);
+    const struct pt_quote_row *row = asked_row(q);
+    fprintf(out, "\nblocks that take most of the time, as asked:\n");
+    for (uint32_t k = 0; k < n; k++) {
+        const struct pt_block *b = &r->blocks.list[dear[k].index];
+        const struct pt_outlook_stop *stop = &row->blocks[dear[k].index].stop;
+        double paths = (double)b->spp * (double)(b->x1 - b->x0) * (double)(b->y1 - b->y0);
+        char spp[32], low[32], high[32];
+        fprintf(out, "  block %u (%d,%d to %d,%d): %.0f %%, %s spp (%s to %s), %.2f us per path of %.1f vertices, %.0f %% "
+                "of them %s\n",
+                b->id, b->x0, b->y0, b->x1, b->y1, 100 * dear[k].share, thousands(stop->spp, 0, spp),
+                thousands(stop->low, 0, low), thousands(stop->high, 0, high), paths > 0 ? b->thread_s / paths * 1e6 : 0.0,
+                dear[k].bounces, 100 * dear[k].mostly_share, dear[k].mostly);
+    }
+}
+
+void pt_quote_text(FILE *out, const struct pt_quote *q, const struct pt_render *r, const struct pt_quote_info *info)
+{
+    const struct pt_quote_row *asked = asked_row(q);
+    char time[64], took[32], load[32];
+    snprintf(time, sizeof time, "time, %d thread%s", q->threads, q->threads > 1 ? "s" : "");
+    fprintf(out, "%-26s  %-26s  %-30s  %s\n", "viewers who still see noise", "spp min / mean / max", time,
+            "against uniform");
+    for (int i = 0; i < q->row_count; i++)
+        print_row(out, &q->rows[i]);
+    if (asked->unknown > 0)
+        fprintf(out, "criterion %s does not say when it expects to stop %u of %u blocks: those are counted with --spp-max, "
+                "so that all is at most\n",
+                r->criterion->table->id, asked->unknown, q->block_count);
+    print_dearest(out, q, r);
+    fprintf(out, "\npilot: %.0f spp on average in %s, loading %s, %.1f of %d threads at work%s\n",
+            (double)r->totals.samples / (double)r->film.pixels, duration(pt_render_elapsed_s(r), took),
+            duration(info->load_s, load), r->busy_threads, q->threads, info->interrupted ? "; interrupted" : "");
+    fprintf(out, "memory: film %.1f MB, scene %.1f MB\n", (double)r->film.bytes * 1e-6, (double)info->scene_bytes * 1e-6);
+}
+
+/* --- JSON -------------------------------------------------------------------------------------------------------------- */
+
+static void add_range(cJSON *to, const char *key, double value, double low, double high, int *failed)
+{
+    cJSON *o = base_json_object(to, key, failed);
+    base_json_number(o, "expected", value, failed);
+    base_json_number(o, "low", low, failed);
+    base_json_number(o, "high", high, failed);
+}
+
+static void add_row(cJSON *list, const struct pt_quote_row *row, uint32_t count, int *failed)
+{
+    cJSON *o = base_json_object(list, NULL, failed), *blocks;
+    base_json_number(o, "visible", row->visible, failed);
+    base_json_bool(o, "as_asked", row->asked, failed);
+    base_json_number(o, "spp_min", row->spp_min, failed);
+    add_range(o, "spp_mean", row->spp_mean, row->spp_mean_low, row->spp_mean_high, failed);
+    base_json_number(o, "spp_max", row->spp_max, failed);
+    add_range(o, "thread_s", row->thread_s, row->thread_low_s, row->thread_high_s, failed);
+    add_range(o, "wall_s", row->wall_s, row->wall_low_s, row->wall_high_s, failed);
+    base_json_number(o, "against_uniform", row->against_uniform, failed);
+    base_json_number(o, "unknown_blocks", row->unknown, failed);
+    base_json_number(o, "blocks_at_spp_max", row->capped, failed);
+    blocks = base_json_array(o, "blocks", failed);
+    for (uint32_t i = 0; i < count; i++) {
+        const struct pt_quote_block *b = &row->blocks[i];
+        cJSON *block = base_json_object(blocks, NULL, failed);
+        add_range(block, "spp", b->stop.spp, b->stop.low, b->stop.high, failed);
+        add_range(block, "thread_s", b->thread_s, b->thread_low_s, b->thread_high_s, failed);
+        base_json_bool(block, "known", b->stop.known, failed);
+    }
+}
+
+static void add_pilot(cJSON *root, const struct pt_render *r, const struct pt_quote_info *info, int *failed)
+{
+    cJSON *o = base_json_object(root, "pilot", failed);
+    base_json_number(o, "spp_mean", (double)r->totals.samples / (double)r->film.pixels, failed);
+    base_json_number(o, "elapsed_s", pt_render_elapsed_s(r), failed);
+    base_json_number(o, "load_s", info->load_s, failed);
+    base_json_number(o, "busy_threads", r->busy_threads, failed);
+    base_json_bool(o, "interrupted", info->interrupted, failed);
+    o = base_json_object(root, "memory", failed);
+    base_json_number(o, "film_bytes", (double)r->film.bytes, failed);
+    base_json_number(o, "scene_bytes", (double)info->scene_bytes, failed);
+}
+
+static void add_dearest(cJSON *root, const struct pt_quote *q, const struct pt_render *r, int *failed)
+{
+    struct dear_block dear[DEAREST];
+    uint32_t n = find_dearest(q, r, dear);
+    cJSON *list = base_json_array(root, "dearest", failed);
+    for (uint32_t k = 0; k < n; k++) {
+        cJSON *o = base_json_object(list, NULL, failed);
+        base_json_number(o, "id", r->blocks.list[dear[k].index].id, failed);
+        base_json_number(o, "share", dear[k].share, failed);
+        base_json_number(o, "vertices_per_path", dear[k].bounces, failed);
+        base_json_text(o, "mostly", dear[k].mostly, failed);
+        base_json_number(o, "mostly_share", dear[k].mostly_share, failed);
+    }
+}
+
+int pt_quote_json(FILE *out, const struct pt_quote *q, const struct pt_render *r, const struct pt_quote_info *info,
+                  struct base_err *err)
+{
+    int failed = 0;
+    cJSON *root = cJSON_CreateObject();
+    base_json_text(root, "scene", info->scene, &failed);
+    base_json_number(root, "width", r->config.width, &failed);
+    base_json_number(root, "height", r->config.height, &failed);
+    base_json_number(root, "threads", q->threads, &failed);
+    base_json_text(root, "criterion", r->criterion ? r->criterion->table->id : NULL, &failed);
+    cJSON *rows = base_json_array(root, "rows", &failed);
+    for (int i = 0; i < q->row_count; i++)
+        add_row(rows, &q->rows[i], q->block_count, &failed);
+    cJSON *blocks = base_json_array(root, "blocks", &failed);
+    for (uint32_t i = 0; i < q->block_count; i++) {
+        const struct pt_block *b = &r->blocks.list[i];
+        cJSON *o = base_json_object(blocks, NULL, &failed);
+        base_json_number(o, "id", b->id, &failed);
+        base_json_number(o, "x0", b->x0, &failed);
+        base_json_number(o, "y0", b->y0, &failed);
+        base_json_number(o, "x1", b->x1, &failed);
+        base_json_number(o, "y1", b->y1, &failed);
+        base_json_number(o, "pilot_spp", (double)b->spp, &failed);
+        base_json_number(o, "thread_s_per_spp", q->block_cost_s[i], &failed);
+    }
+    add_dearest(root, q, r, &failed);
+    add_pilot(root, r, info, &failed);
+    char *text = failed ? NULL : cJSON_Print(root);
+    cJSON_Delete(root);
+    if (!text)
+        return base_fail_nomem(err, "quote");
+    fprintf(out, "%s\n", text);
+    cJSON_free(text);
+    return 0;
+}
+
+/* --- picture ----------------------------------------------------------------------------------------------------------- */
+
+int pt_quote_map(const char *path, const struct pt_quote *q, const struct pt_render *r, struct base_err *err)
+{
+    const struct pt_quote_row *row = asked_row(q);
+    const struct pt_blocks *b = &r->blocks;
+    struct pt_stopmap_block *list = calloc(b->count, sizeof *list);
+    double most_s = 0.0;
+    if (!list)
+        return base_fail_nomem(err, "quote map");
+    for (uint32_t i = 0; i < b->count; i++)
+        most_s = fmax(most_s, row->blocks[i].thread_s);
+    int minutes = most_s >= 60.0;
+    for (uint32_t i = 0; i < b->count; i++)
+        list[i] = (struct pt_stopmap_block){b->list[i].x0, b->list[i].y0, b->list[i].x1, b->list[i].y1,
+                                            row->blocks[i].thread_s / (minutes ? 60.0 : 1.0)};
+    struct pt_stopmap map = {0};
+    int rc = pt_stopmap_draw(b->x0, b->y0, b->x1, b->y1, list, b->count, minutes ? "min" : "s", &map, err);
+    if (!rc)
+        rc = pt_oiio_write_png(path, map.width, map.height, 3, map.rgb, err);
+    pt_stopmap_release(&map);
+    free(list);
+    return rc;
+}

@@ -1,0 +1,248 @@
+#include "render/quote.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "base/options.h"
+#include "render/host_find.h"
+
+/* --- rows -------------------------------------------------------------------------------------------------------------- */
+
+static int add_row(struct pt_quote *q, double visible, int asked, struct base_err *err)
+{
+    struct pt_quote_row *row = &q->rows[q->row_count++];
+    row->visible = visible;
+    row->asked = asked;
+    row->said = calloc(q->block_count, sizeof *row->said);
+    row->blocks = calloc(q->block_count, sizeof *row->blocks);
+    return row->said && row->blocks ? 0 : base_fail_nomem(err, "quote");
+}
+
+/* The row's own instance: the given parameters, and its share of viewers after them, which wins. */
+static int open_row(struct pt_quote_row *row, const struct pt_render *r, const struct lull_criterion *table,
+                    const struct lull_pair *pairs, uint32_t pair_count, const struct pt_mask *mask,
+                    void (*warn)(void *data, const char *line), void *warn_data, struct base_err *err)
+{
+    uint32_t n = pair_count;
+    row->pairs = calloc(pair_count + 1, sizeof *row->pairs);
+    if (!row->pairs)
+        return base_fail_nomem(err, "quote");
+    for (uint32_t i = 0; i < pair_count; i++)
+        row->pairs[i] = pairs[i];
+    if (!isnan(row->visible)) {
+        snprintf(row->value, sizeof row->value, "%.17g", row->visible);
+        row->pairs[n++] = (struct lull_pair){"visible", row->value};
+    }
+    int rc = pt_criterion_create(table, row->pairs, n, r->threads, warn, warn_data, &row->criterion, err);
+    if (!rc && mask)
+        rc = pt_criterion_set_mask(row->criterion, mask, row->pairs, n, err);
+    return rc ? rc : pt_render_open_frame(r, row->criterion, err);
+}
+
+/* Rows by falling share, the one that the options ask for among them; its share is NaN, and it comes first, when the
+ * criterion has no such parameter or no value for it. */
+static int add_rows(struct pt_quote *q, const struct lull_criterion *table, const struct lull_pair *pairs,
+                    uint32_t pair_count, struct base_err *err)
+{
+    static const double shares[] = {0.5, 0.25, 0.05};
+    const struct lull_param *dial = NULL;
+    const char *text = table ? pt_criterion_parameter(table, "visible", pairs, pair_count, &dial) : NULL;
+    double asked;
+    int met = !text || !base_parse_real(text, 0, 1, &asked);
+    int rc = met ? add_row(q, (double)NAN, 1, err) : 0;
+    if (!dial || rc)
+        return rc;
+    if (met)
+        asked = -1.0;
+    for (size_t i = 0; i < sizeof shares / sizeof shares[0] && !rc; i++) {
+        if (!met && asked > shares[i])
+            rc = add_row(q, asked, met = 1, err);
+        met |= asked == shares[i];
+        if (!rc)
+            rc = add_row(q, shares[i], asked == shares[i], err);
+    }
+    return rc || met ? rc : add_row(q, asked, 1, err);
+}
+
+int pt_quote_create(const struct pt_render *r, const struct lull_criterion *table, const struct lull_pair *pairs,
+                    uint32_t pair_count, const struct pt_mask *mask, void (*warn)(void *data, const char *line),
+                    void *warn_data, struct pt_quote **out, struct base_err *err)
+{
+    struct pt_quote *q = calloc(1, sizeof *q);
+    if (!q)
+        return base_fail_nomem(err, "quote");
+    q->block_count = r->blocks.count;
+    q->threads = base_threads_count(r->threads);
+    q->block_cost_s = calloc(q->block_count, sizeof *q->block_cost_s);
+    int rc = q->block_cost_s ? add_rows(q, table, pairs, pair_count, err) : base_fail_nomem(err, "quote");
+    for (int i = 0; i < q->row_count && table && !rc; i++)
+        rc = open_row(&q->rows[i], r, table, pairs, pair_count, mask, warn, warn_data, err);
+    if (rc) {
+        pt_quote_destroy(q);
+        return rc;
+    }
+    *out = q;
+    return 0;
+}
+
+void pt_quote_destroy(struct pt_quote *q)
+{
+    if (!q)
+        return;
+    for (int i = 0; i < q->row_count; i++) {
+        pt_criterion_destroy(q->rows[i].criterion);
+        free(q->rows[i].pairs);
+        free(q->rows[i].said);
+        free(q->rows[i].blocks);
+    }
+    free(q->block_cost_s);
+    free(q);
+}
+
+/* --- asking ------------------------------------------------------------------------------------------------------------ */
+
+/* A row that would have stopped the block at an earlier check has stopped it; where between the two checks follows from what
+ * it expected at the first. */
+static void hear(struct pt_outlook_said *said, const struct pt_block *b, const struct lull_decision *d, uint64_t spp_min)
+{
+    if (said->stopped || b->spp <= said->spp)
+        return;
+    if (d->action == LULL_STOP && b->spp >= spp_min) {
+        double expected = said->spp > 0 && isfinite(said->predicted) ? said->predicted : (double)b->spp;
+        double stop = fmin(fmax(expected, (double)said->spp), (double)b->spp);
+        *said = (struct pt_outlook_said){b->spp, fmax(stop, (double)spp_min), 1};
+    } else {
+        *said = (struct pt_outlook_said){b->spp, d->predicted_spp, 0};
+    }
+}
+
+static int ask_row(struct pt_quote_row *row, struct pt_render *r, const uint32_t *due, uint32_t count, struct base_err *err)
+{
+    struct lull_decision *decisions = calloc(count, sizeof *decisions);
+    uint8_t *final = calloc(count, 1);
+    int rc = decisions && final ? 0 : base_fail_nomem(err, "quote");
+    if (!rc)
+        rc = pt_criterion_evaluate(row->criterion, &r->film, &r->blocks, due, count, final, decisions, err);
+    for (uint32_t k = 0; k < count && !rc; k++)
+        hear(&row->said[due[k]], &r->blocks.list[due[k]], &decisions[k], r->config.spp_min);
+    free(decisions);
+    free(final);
+    return rc;
+}
+
+void pt_quote_ask(struct pt_quote *q, struct pt_render *r, const uint32_t *due, uint32_t count)
+{
+    struct base_err ignored = {0};
+    for (int i = 0; i < q->row_count && !r->config.uniform; i++)
+        ask_row(&q->rows[i], r, due, count, &ignored);
+}
+
+static int ask_all(struct pt_quote *q, struct pt_render *r, struct base_err *err)
+{
+    uint32_t *due = calloc(q->block_count, sizeof *due), n = 0;
+    if (!due)
+        return base_fail_nomem(err, "quote");
+    for (uint32_t i = 0; i < q->block_count; i++)
+        if (r->blocks.list[i].spp > 0)
+            due[n++] = i;
+    int rc = 0;
+    for (int i = 0; i < q->row_count && n > 0 && !r->config.uniform && !rc; i++)
+        rc = ask_row(&q->rows[i], r, due, n, err);
+    free(due);
+    return rc;
+}
+
+/* --- the answer -------------------------------------------------------------------------------------------------------- */
+
+/* Thread seconds of one sample of every pixel of a block; blocks that have none take the mean of the rest. */
+static void cost_blocks(struct pt_quote *q, const struct pt_render *r)
+{
+    double thread_s = 0.0, samples = 0.0;
+    for (uint32_t i = 0; i < q->block_count; i++) {
+        const struct pt_block *b = &r->blocks.list[i];
+        thread_s += b->thread_s;
+        samples += (double)b->spp * (double)(b->x1 - b->x0) * (double)(b->y1 - b->y0);
+    }
+    for (uint32_t i = 0; i < q->block_count; i++) {
+        const struct pt_block *b = &r->blocks.list[i];
+        double pixels = (double)(b->x1 - b->x0) * (double)(b->y1 - b->y0);
+        q->block_cost_s[i] = b->spp > 0 ? b->thread_s / (double)b->spp : pixels * thread_s / samples;
+    }
+}
+
+static double wall_s(const struct pt_quote *q, const struct pt_render *r, const struct pt_quote_row *row, int which,
+                     struct pt_outlook_work *work)
+{
+    double checks = 0.0;
+    for (uint32_t i = 0; i < q->block_count; i++) {
+        const struct pt_block *b = &r->blocks.list[i];
+        const struct pt_quote_block *a = &row->blocks[i];
+        const double spp[3] = {a->stop.spp, a->stop.low, a->stop.high};
+        work[i] = (struct pt_outlook_work){spp[which], spp[which] * q->block_cost_s[i], b->y1 - b->y0};
+        checks += r->config.uniform ? 0.0 : (double)b->checks + pt_outlook_checks(b, spp[which]);
+    }
+    return pt_outlook_wall_s(work, q->block_count, q->threads) + checks * q->check_s;
+}
+
+/* The render's own blocks are where they are; another row's may have stopped before, or would go on. */
+static struct pt_outlook_stop stop_of(const struct pt_quote_row *row, const struct pt_render *r, uint32_t i)
+{
+    const struct pt_block *b = &r->blocks.list[i];
+    uint64_t most = r->config.spp_max;
+    if (r->config.uniform)
+        return pt_outlook_of_block(b, 1, most);
+    if (!row->asked)
+        return pt_outlook_stop(&row->said[i], 0, most);
+    if (b->reason == PT_REASON_CRITERION || b->reason == PT_REASON_SPP_MAX || b->reason == PT_REASON_DROPPED)
+        return pt_outlook_of_block(b, 0, most);
+    struct pt_outlook_said said = row->said[i];
+    if (said.stopped)
+        said.predicted = (double)b->next_spp;
+    return pt_outlook_stop(&said, b->next_spp, most);
+}
+
+static void add_up(struct pt_quote *q, const struct pt_render *r, struct pt_quote_row *row, struct pt_outlook_work *work)
+{
+    double pixels = 0.0;
+    row->spp_min = INFINITY;
+    for (uint32_t i = 0; i < q->block_count; i++) {
+        const struct pt_block *b = &r->blocks.list[i];
+        struct pt_quote_block *a = &row->blocks[i];
+        double size = (double)(b->x1 - b->x0) * (double)(b->y1 - b->y0), cost_s = q->block_cost_s[i];
+        a->stop = stop_of(row, r, i);
+        a->thread_s = a->stop.spp * cost_s;
+        a->thread_low_s = a->stop.low * cost_s;
+        a->thread_high_s = a->stop.high * cost_s;
+        row->thread_s += a->thread_s;
+        row->spp_mean += size * a->stop.spp;
+        row->spp_mean_low += size * a->stop.low;
+        row->spp_mean_high += size * a->stop.high;
+        row->spp_min = fmin(row->spp_min, a->stop.spp);
+        row->spp_max = fmax(row->spp_max, a->stop.spp);
+        row->unknown += (uint32_t)!a->stop.known;
+        row->capped += (uint32_t)(!r->config.uniform && a->stop.spp >= (double)r->config.spp_max);
+        row->thread_low_s += a->thread_low_s;
+        row->thread_high_s += a->thread_high_s;
+        pixels += size;
+    }
+    row->spp_mean /= pixels;
+    row->spp_mean_low /= pixels;
+    row->spp_mean_high /= pixels;
+    row->against_uniform = row->spp_mean / row->spp_max;
+    row->wall_s = wall_s(q, r, row, 0, work);
+    row->wall_low_s = wall_s(q, r, row, 1, work);
+    row->wall_high_s = wall_s(q, r, row, 2, work);
+}
+
+int pt_quote_finish(struct pt_quote *q, struct pt_render *r, struct base_err *err)
+{
+    struct pt_outlook_work *work = calloc(q->block_count, sizeof *work);
+    int rc = work ? ask_all(q, r, err) : base_fail_nomem(err, "quote");
+    cost_blocks(q, r);
+    q->check_s = r->totals.checks > 0 ? r->totals.criterion_s / (double)r->totals.checks : 0.0;
+    for (int i = 0; i < q->row_count && !rc; i++)
+        add_up(q, r, &q->rows[i], work);
+    free(work);
+    return rc;
+}

@@ -1,0 +1,60 @@
+/*
+ * What accuracy costs in this scene, before it is rendered: predicted from a pilot, the first waves of the render itself.
+ *
+ * While the pilot runs, the criterion is asked at the render's own checks by several instances that differ in how many
+ * viewers may still see noise (its parameter `visible`): each row of the quote is one of them. Neither the film nor the
+ * render's own instance is touched, so that the render can go on afterwards as if nobody had asked. Not thread-safe.
+ */
+#ifndef PT_RENDER_QUOTE_H
+#define PT_RENDER_QUOTE_H
+
+#include "render/outlook.h"
+#include "render/render.h"
+
+enum { PT_QUOTE_ROWS = 4 };
+
+struct pt_quote_block {
+    struct pt_outlook_stop stop;
+    double thread_s, thread_low_s, thread_high_s; /* of sampling up to there, and to the ends of the interval */
+};
+
+struct pt_quote_row {
+    double visible;            /* NaN: the criterion has no such parameter, or none is used */
+    int asked;                 /* this is what a render with the given options does */
+    struct pt_criterion *criterion; /* owns; NULL: uniform */
+    char value[32];            /* of `visible` */
+    struct lull_pair *pairs;   /* owns */
+    struct pt_outlook_said *said; /* owns; [blocks] */
+    /* The answer, of pt_quote_finish: */
+    struct pt_quote_block *blocks; /* owns; [blocks] */
+    double spp_min, spp_mean, spp_max;      /* samples per pixel: least block, all pixels, dearest block */
+    double spp_mean_low, spp_mean_high;
+    double thread_s, thread_low_s, thread_high_s; /* of sampling, the whole image from its start */
+    double wall_s, wall_low_s, wall_high_s; /* with the checks, on free processors */
+    double against_uniform;                 /* samples over those of spp_max everywhere */
+    uint32_t unknown, capped;               /* blocks without a prediction; blocks that reach --spp-max */
+};
+
+struct pt_quote {
+    struct pt_quote_row rows[PT_QUOTE_ROWS];
+    int row_count;
+    int threads;
+    uint32_t block_count;
+    double *block_cost_s;      /* owns; [blocks] thread seconds per sample of every pixel; NaN: not known */
+    double check_s;            /* wall seconds that the criterion takes for one block */
+};
+
+/* Rows of visible 0.5, 0.25, 0.05, and of the given one if it is another; one row "as asked" where the criterion has no such
+ * parameter or the render has no criterion (table NULL). pairs and mask, which may be NULL, are
+ * borrowed until destroy, as the render's threads. */
+int pt_quote_create(const struct pt_render *render, const struct lull_criterion *table, const struct lull_pair *pairs,
+                    uint32_t pair_count, const struct pt_mask *mask, void (*warn)(void *data, const char *line),
+                    void *warn_data, struct pt_quote **out, struct base_err *err);
+void pt_quote_destroy(struct pt_quote *quote);
+
+/* The hook `judged` of the pilot. A row whose criterion fails keeps what it knew. */
+void pt_quote_ask(struct pt_quote *quote, struct pt_render *render, const uint32_t *due, uint32_t count);
+/* After the pilot: asks about every block as it is and works out the answer. */
+int pt_quote_finish(struct pt_quote *quote, struct pt_render *render, struct base_err *err);
+
+#endif

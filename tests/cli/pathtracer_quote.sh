@@ -1,0 +1,98 @@
+#!/bin/sh
+# pathtracer --quote: what it prints, draws and refuses, and that its pilot loses nothing.
+set -u
+here=$(cd "$(dirname "$0")" && pwd)
+P=$(cd "${BUILD:-build}" && pwd)/bin/pathtracer
+scene=$here/room.pbrt
+dir=$(mktemp -d) || exit 2
+trap 'rm -rf "$dir"' EXIT
+cd "$dir" || exit 2
+n=0 bad=0
+unset LULL_PLUGIN_PATH
+
+t() { # t DESCRIPTION COMMAND...: passes when the command succeeds
+    n=$((n + 1)); what=$1; shift
+    if "$@" >log 2>&1; then echo "ok $n - $what"; else echo "not ok $n - $what"; sed 's/^/# /' log; bad=1; fi
+}
+refused() { # refused TEXT ARGUMENTS...: exit status 2, one line on stderr that contains TEXT, nothing on stdout
+    n=$((n + 1)); text=$1; shift
+    "$P" "$@" >out 2>err; status=$?
+    if [ $status -eq 2 ] && [ "$(wc -l <err)" -eq 1 ] && [ ! -s out ] && grep -qF -- "$text" err; then echo "ok $n - refused: $*"
+    else echo "not ok $n - refused: $* (status $status)"; sed 's/^/# /' err; bad=1; fi
+}
+json() { python3 -c "import json; q = json.load(open('$1')); rows = q['rows']; assert $2, [r['spp_mean'] for r in rows]"; }
+
+quote="$scene -q --size 64x48 --block 16 --spp-max 2000 -t 2"
+
+# --- text ---
+"$P" $quote --quote >text 2>notes
+t "the table has its three rows, 25 % by default" sh -c "grep -q '^ 50 %  draft .* x$' text && grep -q '^ 25 %  default' text && grep -q '^  5 %  final' text"
+t "  …samples rise as fewer viewers may see noise" \
+    awk '/ %  (draft|default|final)/ { gsub(",", ""); mean = $6 + 0; if (mean < last) exit 1; last = mean; rows++ } END { exit rows != 3 }' text
+t "  …names the blocks that take most, and what their paths meet" \
+    grep -qE '^  block [0-9]+ \([0-9,]+ to [0-9,]+\): [0-9]+ %, .* us per path of [0-9.]+ vertices, [0-9]+ % of them [a-z]' text
+t "  …tells pilot and memory" sh -c "grep -q '^pilot: ' text && grep -q '^memory: film .* MB, scene .* MB' text"
+t "  …and nothing on stderr" test ! -s notes
+t "no image is left behind" test ! -e room.exr
+t "another share has a row" sh -c "$P $quote --quote --visible 0.1 | grep -q '^ 10 %  as asked'"
+t "a criterion without 'visible' has one row" sh -c "$P $quote --quote -c halfbuf >one && [ \$(grep -c ' x$' one) -eq 1 ] && grep -q '^as asked' one"
+t "a criterion without predictions is told so" sh -c "$P $quote --quote -c null | grep -q 'criterion null does not say when it expects to stop 12 of 12 blocks'"
+t "a uniform render has a quote" sh -c "$P $quote --quote --spp-max 2000 --spp-min 2000 -c null >/dev/null && $P $scene -q --size 64x48 --spp 900 --quote | grep -qE '^as asked +900 / +900 / +900 '"
+
+# --- JSON: the same, block by block ---
+t "--json" "$P" $quote --quote --json
+"$P" $quote --quote --json >q.json
+t "  …has rows of shares" json q.json "[r['visible'] for r in rows] == [0.5, 0.25, 0.05] and [r['as_asked'] for r in rows] == [False, True, False]"
+t "  …every row has every block, inside its interval" \
+    json q.json "all(len(r['blocks']) == 12 and all(b['spp']['low'] <= b['spp']['expected'] <= b['spp']['high'] for b in r['blocks']) for r in rows)"
+t "  …the row's time is that of its blocks" \
+    json q.json "all(abs(sum(b['thread_s']['expected'] for b in r['blocks']) / r['thread_s']['expected'] - 1) < 1e-6 for r in rows)"
+t "  …the pilot keeps its limit" json q.json "all(b['pilot_spp'] <= 128 for b in q['blocks'])"
+"$P" $quote --quote --json --quote-pilot 40 >q40.json
+t "--quote-pilot SPP" json q40.json "max(b['pilot_spp'] for b in q['blocks']) == 40"
+"$P" $scene -q --size 640x480 --quote --json --quote-pilot 100000:0.3 >qs.json
+t "--quote-pilot SPP:SECONDS" json qs.json "q['pilot']['elapsed_s'] < 5 and max(b['pilot_spp'] for b in q['blocks']) < 100000"
+
+# --- map ---
+t "--quote-map" "$P" $quote --quote --quote-map map.png
+t "  …is a picture of the blocks and a legend" sh -c "oiiotool --info map.png | grep -q ' 192 x  188'"
+
+# --- the render is what it would have been ---
+same="$quote --reproducible"
+"$P" $same -o whole.exr
+t "a pilot with a checkpoint" "$P" $same --quote --checkpoint pilot.ckp
+t "  …is gone on with" "$P" $same --checkpoint pilot.ckp --resume -o parts.exr --report parts.json
+t "  …to the same bytes as without" cmp whole.exr parts.exr
+"$P" $same --report real.json -o whole.exr
+t "predicted mean samples are within a factor of 1.6 of the real ones" python3 -c "
+import json
+q, real = json.load(open('q.json')), json.load(open('real.json'))
+spp = real['totals']['samples'] / (64 * 48)
+ratio = q['rows'][1]['spp_mean']['expected'] / spp
+assert 1 / 1.6 < ratio < 1.6, ratio"
+
+# --- interrupt ---
+"$P" "$scene" --size 640x480 --quote --quote-pilot 1000000:60 --checkpoint int.ckp >int.txt 2>int.err &
+pid=$!
+until [ -s int.err ] || ! kill -0 $pid 2>/dev/null; do sleep 0.1; done # its progress: from here on it listens
+kill -INT $pid
+wait $pid
+t "SIGINT: exit status 130" test $? -eq 130
+t "  …what is known is told, and a checkpoint kept" sh -c "grep -q '; interrupted' int.txt && test -s int.ckp"
+
+# --- errors ---
+refused "--quote writes no image" $quote --quote -o a.exr
+refused "--quote writes no image" $quote --quote --stop-map a.png
+refused "--quote goes with none of" $quote --quote --sequence seq
+refused "--quote goes with none of" $quote --quote --explain
+refused "--quote goes with neither" $quote --quote --time-budget 5
+refused "--quote goes with neither" $quote --quote --checkpoint pilot.ckp --resume
+refused "--max-seam" $quote --quote --max-seam 4
+refused "belong to --quote" $quote --json
+refused "belong to --quote" $quote --quote-map a.png
+refused "belong to --quote" $quote --quote-pilot 64
+refused "SPP or SPP:SECONDS" $quote --quote --quote-pilot 0
+refused "SPP or SPP:SECONDS" $quote --quote --quote-pilot 64:never
+refused "ends in .png" $quote --quote --quote-map a.jpg
+refused "cannot write there" $quote --quote --quote-map nowhere/a.png
+exit $bad

@@ -1,0 +1,239 @@
+/* The prediction behind --quote and the progress line, under a noise whose law is known in closed form. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include <lull/criterion_kit.h>
+
+#include "render/quote.h"
+#include "support/pt_fake.h"
+
+/* --- a criterion that knows the law ------------------------------------------------------------------------------------ */
+
+/* error = sqrt(40 (1 + column) / n), stopped at 2 visible: at 40 (1 + column) spp for visible = 0.5, at 4 times as many for
+ * 0.25, at 100 times as many for 0.05. */
+static double law_spp(const struct pt_block *b, double visible)
+{
+    return 40.0 * (1 + b->x0 / 16) * 0.25 / (visible * visible);
+}
+
+static const struct lull_param law_params[] = {LULL_KIT_FLOAT("visible", "0.25", 1e-3, 0.999, "share of viewers")};
+
+static void law_judge(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
+                      struct lull_decision *d, uint32_t worker)
+{
+    const struct lull_kit *kit = lull_kit_of(in);
+    struct lull_kit_tally tally = {.valid = 1};
+    (void)view;
+    (void)worker;
+    lull_kit_verdict(kit, b, &tally, sqrt(40.0 * (1 + b->x0 / 16) / (double)b->spp), 2 * kit->value[0], 0, 1.5, d);
+}
+
+static const struct lull_kit_rule law_rule = {.planes_required = LULL_PLANE_BIT(LULL_PLANE_COLOR),
+                                              .planes_used = LULL_PLANE_BIT(LULL_PLANE_COLOR), .judge = law_judge};
+LULL_KIT_CRITERION(law_rule, law_params, 1, "law", "Law of noise", "1", "knows");
+
+/* --- running ----------------------------------------------------------------------------------------------------------- */
+
+struct run {
+    struct base_threads *pool;
+    struct pt_criterion *criterion;
+    struct pt_render *render;
+    struct pt_quote *quote;
+    struct lull_pair pair;
+};
+
+static void judged(void *data, struct pt_render *render, const uint32_t *due, uint32_t count)
+{
+    pt_quote_ask(((struct run *)data)->quote, render, due, count);
+}
+
+/* visible NULL: uniform, without a criterion. */
+static void start(struct run *run, const char *visible, uint64_t pilot_spp)
+{
+    struct base_err err = {0};
+    struct pt_render_config config = pt_fake_config();
+    const struct lull_criterion *table = visible ? lull_criterion_entry_v1(0) : NULL;
+    config.spp_max = 10000;
+    config.pilot_spp = pilot_spp;
+    config.pilot_s = 1e9;
+    config.uniform = !visible;
+    *run = (struct run){.pair = {"visible", visible}};
+    assert_non_null(run->pool = base_threads_create(2, &err));
+    if (visible)
+        assert_int_equal(pt_criterion_create(table, &run->pair, 1, run->pool, NULL, NULL, &run->criterion, &err), 0);
+    assert_int_equal(pt_render_create(&config, NULL, pt_fake_noise, run->pool, run->criterion, &run->render, &err), 0);
+    if (pilot_spp > 0)
+        assert_int_equal(pt_quote_create(run->render, table, &run->pair, visible != NULL, NULL, NULL, NULL, &run->quote,
+                                         &err), 0);
+}
+
+static enum pt_render_outcome go(struct run *run)
+{
+    enum pt_render_outcome outcome;
+    struct base_err err = {0};
+    struct pt_render_hooks hooks = {.judged = run->quote ? judged : NULL, .data = run};
+    assert_int_equal(pt_render_run(run->render, &hooks, &outcome, &err), 0);
+    return outcome;
+}
+
+static void end(struct run *run)
+{
+    pt_quote_destroy(run->quote);
+    pt_render_destroy(run->render);
+    pt_criterion_destroy(run->criterion);
+    base_threads_destroy(run->pool);
+}
+
+/* --- tests ------------------------------------------------------------------------------------------------------------- */
+
+/* Rows of 50, 25 and 5 % say the law's samples; a real render stops at its first check from there on, a
+ * tenth further at most. */
+static void rows_follow_the_law(void **state)
+{
+    (void)state;
+    static const double visible[3] = {0.5, 0.25, 0.05};
+    struct base_err err = {0};
+    struct run pilot, real;
+    start(&pilot, "0.25", 64);
+    assert_int_equal(go(&pilot), PT_RENDER_PILOT);
+    assert_int_equal(pt_quote_finish(pilot.quote, pilot.render, &err), 0);
+    assert_int_equal(pilot.quote->row_count, 3);
+    for (int i = 0; i < 3; i++) {
+        char text[16];
+        const struct pt_quote_row *row = &pilot.quote->rows[i];
+        snprintf(text, sizeof text, "%g", visible[i]);
+        start(&real, text, 0);
+        assert_int_equal(go(&real), PT_RENDER_DONE);
+        assert_int_equal(row->asked, i == 1);
+        for (uint32_t k = 0; k < pilot.quote->block_count; k++) {
+            const struct pt_block *b = &real.render->blocks.list[k];
+            double law = fmin(law_spp(b, visible[i]), 10000.0), said = row->blocks[k].stop.spp;
+            assert_true(row->blocks[k].stop.known);
+            assert_true(said >= 0.999 * law && said <= fmax(1.1 * law + 1.0, 8.0));
+            assert_true(row->blocks[k].stop.low <= said && said <= row->blocks[k].stop.high);
+            assert_true(fabs((double)b->spp / said - 1.0) < 0.11);
+        }
+        end(&real);
+    }
+    assert_true(pilot.quote->rows[2].capped > 0);
+    end(&pilot);
+}
+
+static void sums_are_those_of_the_blocks(void **state)
+{
+    (void)state;
+    struct base_err err = {0};
+    struct run pilot;
+    start(&pilot, "0.25", 64);
+    go(&pilot);
+    for (uint32_t i = 0; i < pilot.render->blocks.count; i++)
+        pilot.render->blocks.list[i].thread_s = 1e-3 * (1 + i) * (double)pilot.render->blocks.list[i].spp;
+    assert_int_equal(pt_quote_finish(pilot.quote, pilot.render, &err), 0);
+    const struct pt_quote_row *row = &pilot.quote->rows[1];
+    double thread_s = 0.0, samples = 0.0;
+    for (uint32_t i = 0; i < pilot.quote->block_count; i++) {
+        const struct pt_block *b = &pilot.render->blocks.list[i];
+        thread_s += 1e-3 * (1 + i) * row->blocks[i].stop.spp;
+        samples += (b->x1 - b->x0) * (b->y1 - b->y0) * row->blocks[i].stop.spp;
+    }
+    assert_true(fabs(row->thread_s / thread_s - 1.0) < 1e-9);
+    assert_true(fabs(row->spp_mean / (samples / (60 * 44)) - 1.0) < 1e-9);
+    assert_true(fabs(row->against_uniform / (row->spp_mean / row->spp_max) - 1.0) < 1e-9);
+    assert_true(row->wall_s >= 0.5 * thread_s && row->wall_s < 0.6 * thread_s + 0.1); /* two threads, an uneven tail */
+    end(&pilot);
+}
+
+/* A share that is none of the three gets a row of its own, in order. */
+static void what_was_asked_has_a_row(void **state)
+{
+    (void)state;
+    struct run run;
+    start(&run, "0.1", 64);
+    assert_int_equal(run.quote->row_count, 4);
+    assert_true(run.quote->rows[2].visible == 0.1 && run.quote->rows[2].asked && run.quote->rows[3].visible == 0.05);
+    end(&run);
+    start(&run, "0.01", 64);
+    assert_true(run.quote->row_count == 4 && run.quote->rows[3].visible == 0.01 && run.quote->rows[3].asked);
+    end(&run);
+}
+
+static void uniform_needs_no_criterion(void **state)
+{
+    (void)state;
+    struct base_err err = {0};
+    struct run run;
+    start(&run, NULL, 16);
+    assert_int_equal(go(&run), PT_RENDER_PILOT);
+    assert_int_equal(pt_quote_finish(run.quote, run.render, &err), 0);
+    assert_int_equal(run.quote->row_count, 1);
+    assert_true(run.quote->rows[0].spp_min == 10000.0 && run.quote->rows[0].spp_mean == 10000.0);
+    assert_int_equal(run.quote->rows[0].unknown, 0);
+    for (uint32_t i = 0; i < run.render->blocks.count; i++)
+        assert_int_equal(run.render->blocks.list[i].spp, 16); /* no sample beyond the pilot */
+    end(&run);
+}
+
+/* The film after a pilot and going on is the one without, bit for bit. */
+static void a_pilot_loses_nothing(void **state)
+{
+    (void)state;
+    struct base_err err = {0};
+    struct run whole, parts;
+    start(&whole, "0.4", 0);
+    go(&whole);
+    start(&parts, "0.4", 50);
+    assert_int_equal(go(&parts), PT_RENDER_PILOT);
+    assert_int_equal(pt_quote_finish(parts.quote, parts.render, &err), 0);
+    parts.render->config.pilot_spp = 0;
+    assert_int_equal(go(&parts), PT_RENDER_DONE);
+    assert_memory_equal(whole.render->film.color, parts.render->film.color,
+                        3 * whole.render->film.pixels * sizeof(double));
+    for (uint32_t i = 0; i < whole.render->blocks.count; i++)
+        assert_int_equal(whole.render->blocks.list[i].spp, parts.render->blocks.list[i].spp);
+    end(&whole);
+    end(&parts);
+}
+
+static void stops_that_nobody_predicts(void **state)
+{
+    (void)state;
+    struct pt_outlook_said said = {0};
+    struct pt_outlook_stop stop = pt_outlook_stop(&said, 20, 500);
+    assert_true(!stop.known && stop.spp == 500.0 && stop.low == 20.0 && stop.high == 500.0);
+    said = (struct pt_outlook_said){.spp = 32, .predicted = (double)NAN};
+    assert_false(pt_outlook_stop(&said, 32, 500).known);
+    said.predicted = 1e9;
+    stop = pt_outlook_stop(&said, 32, 500);
+    assert_true(stop.known && stop.spp == 500.0);
+    said.predicted = 3.0;
+    assert_true(pt_outlook_stop(&said, 32, 500).spp == 32.0);
+    said.stopped = 1;
+    assert_true(pt_outlook_stop(&said, 0, 500).spp == 3.0);
+}
+
+/* 4 threads: while both blocks are active 3 rows keep 3 busy, the single row of the second keeps one. */
+static void the_last_blocks_leave_threads_idle(void **state)
+{
+    (void)state;
+    struct pt_outlook_work work[2] = {{.spp = 300, .thread_s = 300, .rows = 1}, {.spp = 100, .thread_s = 200, .rows = 2}};
+    assert_true(fabs(pt_outlook_wall_s(work, 2, 4) - (100.0 * 3.0 / 3.0 + 200.0)) < 1e-9);
+    assert_true(fabs(pt_outlook_busy(5, 4) - 2.5) < 1e-12 && pt_outlook_busy(8, 4) == 4.0 && pt_outlook_busy(0, 4) == 0.0);
+    struct pt_outlook_work nothing = {.rows = 4};
+    assert_true(pt_outlook_wall_s(&nothing, 1, 2) == 0.0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(rows_follow_the_law), cmocka_unit_test(sums_are_those_of_the_blocks),
+        cmocka_unit_test(what_was_asked_has_a_row), cmocka_unit_test(uniform_needs_no_criterion),
+        cmocka_unit_test(a_pilot_loses_nothing), cmocka_unit_test(stops_that_nobody_predicts),
+        cmocka_unit_test(the_last_blocks_leave_threads_idle),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
