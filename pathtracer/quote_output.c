@@ -136,6 +136,19 @@ static void print_dearest(FILE *out, const struct pt_quote *q, const struct pt_r
     }
 }
 
+/* Their noise comes from light that few of their pixels have met: what they need is known to an octave either way only. */
+static void print_unmet(FILE *out, const struct pt_quote_row *row, const struct pt_render *r)
+{
+    if (row->unmet == 0)
+        return;
+    fprintf(out, "\n%u of %u blocks have not met their light yet (a longer --quote-pilot says more):", row->unmet,
+            r->blocks.count);
+    for (uint32_t i = 0; i < r->blocks.count; i++)
+        if (row->said[i].unmet)
+            fprintf(out, " %u", r->blocks.list[i].id);
+    fprintf(out, "\n");
+}
+
 void pt_quote_text(FILE *out, const struct pt_quote *q, const struct pt_render *r, const struct pt_quote_info *info)
 {
     const struct pt_quote_row *asked = asked_row(q);
@@ -150,6 +163,7 @@ void pt_quote_text(FILE *out, const struct pt_quote *q, const struct pt_render *
                 "so that all is at most\n",
                 r->criterion->table->id, asked->unknown, q->block_count);
     print_dearest(out, q, r);
+    print_unmet(out, asked, r);
     fprintf(out, "\npilot: %.0f spp on average in %s, loading %s, %.1f of %d threads at work%s\n",
             (double)r->totals.samples / (double)r->film.pixels, duration(pt_render_elapsed_s(r), took),
             duration(info->load_s, load), r->busy_threads, q->threads, info->interrupted ? "; interrupted" : "");
@@ -178,6 +192,7 @@ static void add_row(cJSON *list, const struct pt_quote_row *row, uint32_t count,
     add_range(o, "wall_s", row->wall_s, row->wall_low_s, row->wall_high_s, failed);
     base_json_number(o, "against_uniform", row->against_uniform, failed);
     base_json_number(o, "unknown_blocks", row->unknown, failed);
+    base_json_number(o, "unmet_blocks", row->unmet, failed);
     base_json_number(o, "blocks_at_spp_max", row->capped, failed);
     blocks = base_json_array(o, "blocks", failed);
     for (uint32_t i = 0; i < count; i++) {
@@ -186,6 +201,7 @@ static void add_row(cJSON *list, const struct pt_quote_row *row, uint32_t count,
         add_range(block, "spp", b->stop.spp, b->stop.low, b->stop.high, failed);
         add_range(block, "thread_s", b->thread_s, b->thread_low_s, b->thread_high_s, failed);
         base_json_bool(block, "known", b->stop.known, failed);
+        base_json_bool(block, "met_light", !row->said[i].unmet, failed);
     }
 }
 

@@ -3,6 +3,16 @@
 #include <math.h>
 #include <stdlib.h>
 
+/* Half an interval that holds 8 of 10 blocks, in octaves of samples: luck in the last checks, and so much more for each
+ * octave that the prediction looks ahead. Fitted to 43 blocks of seven renders and 61 of 33 recordings (docs/quote.md). */
+static const double NEAR = 0.15, PER_OCTAVE = 0.08, UNMET = 1.0;
+
+static double half_width(const struct pt_outlook_said *said, double end)
+{
+    double ahead = log2(end / (double)said->spp);
+    return said->unmet ? UNMET : NEAR + PER_OCTAVE * fmax(ahead, 0.0);
+}
+
 struct pt_outlook_stop pt_outlook_stop(const struct pt_outlook_said *said, uint64_t spp, uint64_t spp_max)
 {
     double has = (double)spp, most = (double)spp_max;
@@ -11,13 +21,14 @@ struct pt_outlook_stop pt_outlook_stop(const struct pt_outlook_said *said, uint6
     double end = fmin(fmax(said->predicted, 1.0), most);
     if (said->stopped)
         return (struct pt_outlook_stop){end, end, end, 1};
+    double factor = exp2(half_width(said, end));
     end = fmax(end, has);
-    return (struct pt_outlook_stop){end, end, end, 1};
+    return (struct pt_outlook_stop){end, fmax(end / factor, has), fmin(end * factor, most), 1};
 }
 
 struct pt_outlook_stop pt_outlook_of_block(const struct pt_block *b, int uniform, uint64_t spp_max)
 {
-    struct pt_outlook_said said = {b->asked ? b->asked_spp : 0, b->predicted_spp, 0};
+    struct pt_outlook_said said = {.spp = b->asked ? b->asked_spp : 0, .predicted = b->predicted_spp};
     double most = (double)spp_max, has = (double)b->spp;
     if (b->reason != PT_REASON_NONE)
         return (struct pt_outlook_stop){has, has, has, 1};

@@ -17,6 +17,7 @@ struct pt_outlook_said {
     uint64_t spp;     /* samples when it was asked; 0 = it never was */
     double predicted; /* samples at which it expects to stop; NaN = it does not say */
     int stopped;      /* it said stop: `predicted` is where, at most spp */
+    int unmet;        /* its noise sits in few pixels or grows: light that most of its pixels have not met yet */
 };
 
 struct pt_outlook_stop {
@@ -25,7 +26,9 @@ struct pt_outlook_stop {
     int known;        /* 0: nobody predicted anything; spp and high are spp_max, low what the block has */
 };
 
-/* It does not stop before `spp`: samples that it has or gets in any case, 0 … spp_max. */
+/* Predictions are taken as they are: from a hundred samples on they were neither low nor high (docs/quote.md). The interval
+ * widens with the octaves from the samples at hand to the predicted ones, and to an octave either way for a block that is
+ * `unmet`. It does not stop before `spp`: samples that it has or gets in any case, 0 … spp_max. */
 struct pt_outlook_stop pt_outlook_stop(const struct pt_outlook_said *said, uint64_t spp, uint64_t spp_max);
 /* Of a block of a render that is going on; uniform: it stops at spp_max. A stopped block: where it did. */
 struct pt_outlook_stop pt_outlook_of_block(const struct pt_block *block, int uniform, uint64_t spp_max);

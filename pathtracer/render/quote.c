@@ -15,8 +15,9 @@ static int add_row(struct pt_quote *q, double visible, int asked, struct base_er
     row->visible = visible;
     row->asked = asked;
     row->said = calloc(q->block_count, sizeof *row->said);
+    row->first = calloc(q->block_count, sizeof *row->first);
     row->blocks = calloc(q->block_count, sizeof *row->blocks);
-    return row->said && row->blocks ? 0 : base_fail_nomem(err, "quote");
+    return row->said && row->first && row->blocks ? 0 : base_fail_nomem(err, "quote");
 }
 
 /* The row's own instance: the given parameters, and its share of viewers after them, which wins. */
@@ -94,6 +95,7 @@ void pt_quote_destroy(struct pt_quote *q)
         pt_criterion_destroy(q->rows[i].criterion);
         free(q->rows[i].pairs);
         free(q->rows[i].said);
+        free(q->rows[i].first);
         free(q->rows[i].blocks);
     }
     free(q->block_cost_s);
@@ -111,9 +113,9 @@ static void hear(struct pt_outlook_said *said, const struct pt_block *b, const s
     if (d->action == LULL_STOP && b->spp >= spp_min) {
         double expected = said->spp > 0 && isfinite(said->predicted) ? said->predicted : (double)b->spp;
         double stop = fmin(fmax(expected, (double)said->spp), (double)b->spp);
-        *said = (struct pt_outlook_said){b->spp, fmax(stop, (double)spp_min), 1};
+        *said = (struct pt_outlook_said){.spp = b->spp, .predicted = fmax(stop, (double)spp_min), .stopped = 1};
     } else {
-        *said = (struct pt_outlook_said){b->spp, d->predicted_spp, 0};
+        *said = (struct pt_outlook_said){.spp = b->spp, .predicted = d->predicted_spp};
     }
 }
 
@@ -126,6 +128,9 @@ static int ask_row(struct pt_quote_row *row, struct pt_render *r, const uint32_t
         rc = pt_criterion_evaluate(row->criterion, &r->film, &r->blocks, due, count, final, decisions, err);
     for (uint32_t k = 0; k < count && !rc; k++)
         hear(&row->said[due[k]], &r->blocks.list[due[k]], &decisions[k], r->config.spp_min);
+    for (uint32_t k = 0; k < count && !rc; k++)
+        if (row->first[due[k]].spp == 0)
+            row->first[due[k]] = row->said[due[k]];
     free(decisions);
     free(final);
     return rc;
@@ -151,6 +156,68 @@ static int ask_all(struct pt_quote *q, struct pt_render *r, struct base_err *err
         rc = ask_row(&q->rows[i], r, due, n, err);
     free(due);
     return rc;
+}
+
+/* --- light that is rare --- */
+
+/* One pixel in a hundred with more than this share of the squared difference of the halves (8 % in normal noise) … */
+static const double TAIL_SHARE = 0.6;
+/* … or predicted samples that grow by half as many octaves as the samples do: noise that more samples find more of. */
+static const double GROWTH = 0.5;
+
+static int falling(const void *a, const void *b)
+{
+    float x = *(const float *)a, y = *(const float *)b;
+    return (x < y) - (x > y);
+}
+
+/* Share of the squared luminance difference of the halves that the hundredth part of a block's pixels has that has most;
+ * 0 without halves or differences. scratch: [pixels of the block] */
+static double tail_share(const struct pt_render *r, const struct pt_block *b, float *scratch)
+{
+    size_t n = 0;
+    double all = 0.0, top = 0.0;
+    uint64_t half_spp = pt_film_half_spp(b->spp);
+    if (!(r->film.planes & PT_FILM_HALF) || half_spp == 0 || half_spp == b->spp)
+        return 0.0;
+    for (int y = b->y0; y < b->y1; y++)
+        for (int x = b->x0; x < b->x1; x++) {
+            double m[3], a[3];
+            size_t at = pt_film_index(&r->film, x, y);
+            pt_film_mean(&r->film, at, b->spp, m);
+            pt_film_half_mean(&r->film, at, half_spp, a);
+            double d = base_luminance(a[0] - m[0], a[1] - m[1], a[2] - m[2]);
+            scratch[n++] = isfinite(d) ? (float)(d * d) : 0.0f;
+        }
+    qsort(scratch, n, sizeof *scratch, falling);
+    for (size_t i = 0; i < n; i++) {
+        all += (double)scratch[i];
+        top += i < (n + 99) / 100 ? (double)scratch[i] : 0.0;
+    }
+    return all > 0.0 ? top / all : 0.0;
+}
+
+static int grows(const struct pt_outlook_said *first, const struct pt_outlook_said *said)
+{
+    return first->spp > 0 && said->spp > first->spp && !said->stopped &&
+           log2(said->predicted / first->predicted) > GROWTH * log2((double)said->spp / (double)first->spp);
+}
+
+static int find_unmet(struct pt_quote *q, const struct pt_render *r, struct base_err *err)
+{
+    size_t most = (size_t)r->config.block_width * (size_t)r->config.block_height;
+    float *scratch = malloc(most * sizeof *scratch);
+    if (!scratch)
+        return base_fail_nomem(err, "quote");
+    for (uint32_t i = 0; i < q->block_count; i++) {
+        int tail = tail_share(r, &r->blocks.list[i], scratch) > TAIL_SHARE;
+        for (int k = 0; k < q->row_count; k++) {
+            struct pt_outlook_said *said = &q->rows[k].said[i];
+            said->unmet = !said->stopped && (tail || grows(&q->rows[k].first[i], said));
+        }
+    }
+    free(scratch);
+    return 0;
 }
 
 /* --- the answer -------------------------------------------------------------------------------------------------------- */
@@ -221,6 +288,7 @@ static void add_up(struct pt_quote *q, const struct pt_render *r, struct pt_quot
         row->spp_min = fmin(row->spp_min, a->stop.spp);
         row->spp_max = fmax(row->spp_max, a->stop.spp);
         row->unknown += (uint32_t)!a->stop.known;
+        row->unmet += (uint32_t)row->said[i].unmet;
         row->capped += (uint32_t)(!r->config.uniform && a->stop.spp >= (double)r->config.spp_max);
         row->thread_low_s += a->thread_low_s;
         row->thread_high_s += a->thread_high_s;
@@ -239,6 +307,8 @@ int pt_quote_finish(struct pt_quote *q, struct pt_render *r, struct base_err *er
 {
     struct pt_outlook_work *work = calloc(q->block_count, sizeof *work);
     int rc = work ? ask_all(q, r, err) : base_fail_nomem(err, "quote");
+    if (!rc)
+        rc = find_unmet(q, r, err);
     cost_blocks(q, r);
     q->check_s = r->totals.checks > 0 ? r->totals.criterion_s / (double)r->totals.checks : 0.0;
     for (int i = 0; i < q->row_count && !rc; i++)

@@ -25,6 +25,7 @@ struct pt_quote_row {
     char value[32];            /* of `visible` */
     struct lull_pair *pairs;   /* owns */
     struct pt_outlook_said *said; /* owns; [blocks] */
+    struct pt_outlook_said *first; /* owns; [blocks] what it said when it was asked first */
     /* The answer, of pt_quote_finish: */
     struct pt_quote_block *blocks; /* owns; [blocks] */
     double spp_min, spp_mean, spp_max;      /* samples per pixel: least block, all pixels, dearest block */
@@ -32,7 +33,7 @@ struct pt_quote_row {
     double thread_s, thread_low_s, thread_high_s; /* of sampling, the whole image from its start */
     double wall_s, wall_low_s, wall_high_s; /* with the checks, on free processors */
     double against_uniform;                 /* samples over those of spp_max everywhere */
-    uint32_t unknown, capped;               /* blocks without a prediction; blocks that reach --spp-max */
+    uint32_t unknown, unmet, capped; /* blocks without a prediction; without their light yet; that reach --spp-max */
 };
 
 struct pt_quote {

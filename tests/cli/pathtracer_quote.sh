@@ -47,6 +47,7 @@ t "  …every row has every block, inside its interval" \
     json q.json "all(len(r['blocks']) == 12 and all(b['spp']['low'] <= b['spp']['expected'] <= b['spp']['high'] for b in r['blocks']) for r in rows)"
 t "  …the row's time is that of its blocks" \
     json q.json "all(abs(sum(b['thread_s']['expected'] for b in r['blocks']) / r['thread_s']['expected'] - 1) < 1e-6 for r in rows)"
+t "  …what has not met its light is counted" json q.json "all(sum(not b['met_light'] for b in r['blocks']) == r['unmet_blocks'] for r in rows)"
 t "  …the pilot keeps its limit" json q.json "all(b['pilot_spp'] <= 128 for b in q['blocks'])"
 "$P" $quote --quote --json --quote-pilot 40 >q40.json
 t "--quote-pilot SPP" json q40.json "max(b['pilot_spp'] for b in q['blocks']) == 40"

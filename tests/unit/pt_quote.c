@@ -33,8 +33,8 @@ static void law_judge(struct lull_instance *in, const struct lull_view *view, co
     lull_kit_verdict(kit, b, &tally, sqrt(40.0 * (1 + b->x0 / 16) / (double)b->spp), 2 * kit->value[0], 0, 1.5, d);
 }
 
-static const struct lull_kit_rule law_rule = {.planes_required = LULL_PLANE_BIT(LULL_PLANE_COLOR),
-                                              .planes_used = LULL_PLANE_BIT(LULL_PLANE_COLOR), .judge = law_judge};
+enum { LAW_PLANES = LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_HALF) };
+static const struct lull_kit_rule law_rule = {.planes_required = LAW_PLANES, .planes_used = LAW_PLANES, .judge = law_judge};
 LULL_KIT_CRITERION(law_rule, law_params, 1, "law", "Law of noise", "1", "knows");
 
 /* --- running ----------------------------------------------------------------------------------------------------------- */
@@ -199,6 +199,42 @@ static void a_pilot_loses_nothing(void **state)
     end(&parts);
 }
 
+/* 40 spp expected at 10: two octaves ahead; at 40: none; with light unmet: an octave either way, inside what is possible. */
+static void intervals_widen_with_distance(void **state)
+{
+    (void)state;
+    struct pt_outlook_said said = {.spp = 10, .predicted = 40.0};
+    struct pt_outlook_stop far = pt_outlook_stop(&said, 10, 500);
+    said.spp = 40;
+    struct pt_outlook_stop near = pt_outlook_stop(&said, 10, 500);
+    assert_true(far.spp == 40.0 && near.spp == 40.0);
+    assert_true(near.low > far.low && far.low > 20.0 && near.high < far.high && far.high < 80.0);
+    assert_true(near.low < 38.0 && near.high > 42.0);
+    said.unmet = 1;
+    struct pt_outlook_stop unmet = pt_outlook_stop(&said, 30, 70);
+    assert_true(unmet.low == 30.0 && unmet.high == 70.0);
+}
+
+/* Every block has uniform noise; in the first of them one pixel of a hundred has a hundred times as much. */
+static void light_that_few_pixels_met_is_told(void **state)
+{
+    (void)state;
+    struct base_err err = {0};
+    struct run run;
+    start(&run, "0.25", 64);
+    go(&run);
+    struct pt_film *film = &run.render->film;
+    assert_true(film->planes & PT_FILM_HALF);
+    for (int i = 0; i < 2; i++)
+        film->half[3 * pt_film_index(film, 3 + 5 * i, 4) + 1] *= 100.0;
+    assert_int_equal(pt_quote_finish(run.quote, run.render, &err), 0);
+    for (uint32_t i = 1; i < run.quote->block_count; i++)
+        assert_false(run.quote->rows[2].said[i].unmet);
+    assert_true(run.quote->rows[2].said[0].unmet);
+    assert_int_equal(run.quote->rows[2].unmet, 1);
+    end(&run);
+}
+
 static void stops_that_nobody_predicts(void **state)
 {
     (void)state;
@@ -233,6 +269,7 @@ int main(void)
         cmocka_unit_test(rows_follow_the_law), cmocka_unit_test(sums_are_those_of_the_blocks),
         cmocka_unit_test(what_was_asked_has_a_row), cmocka_unit_test(uniform_needs_no_criterion),
         cmocka_unit_test(a_pilot_loses_nothing), cmocka_unit_test(stops_that_nobody_predicts),
+        cmocka_unit_test(intervals_widen_with_distance), cmocka_unit_test(light_that_few_pixels_met_is_told),
         cmocka_unit_test(the_last_blocks_leave_threads_idle),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
