@@ -11,6 +11,7 @@
 
 #include "render/checkpoint.h"
 #include "render/output.h"
+#include "render/quote.h"
 #include "render/sequence.h"
 #include "support/fail_alloc.h"
 #include "support/pt_fake.h"
@@ -184,9 +185,53 @@ static void recording(void **state)
     assert_int_equal(system(command), 0);
 }
 
+static void ask_quote(void *data, struct pt_render *render, const uint32_t *due, uint32_t count)
+{
+    pt_quote_ask(data, render, due, count);
+}
+
+static int quote(struct pt_render *render, struct base_err *err)
+{
+    struct pt_quote *q = NULL;
+    enum pt_render_outcome outcome;
+    int rc = pt_quote_create(render, pt_fake_criterion(), NULL, 0, NULL, NULL, NULL, &q, err);
+    struct pt_render_hooks hooks = {.judged = ask_quote, .data = q};
+    if (!rc)
+        rc = pt_render_run(render, &hooks, &outcome, err);
+    if (!rc)
+        rc = pt_quote_finish(q, render, err);
+    pt_quote_destroy(q);
+    return rc;
+}
+
+/* A quote is there or it is not; a check on the way that fails leaves a row with what it knew. */
+static void quoting(void **state)
+{
+    int failures = 0;
+    (void)state;
+    for (long k = 1; k < 1000; k++) {
+        struct pt_render *render = NULL;
+        struct pt_criterion *criterion = NULL;
+        struct base_err err = {0};
+        assert_int_equal(open_render(&render, &criterion, &err), 0);
+        render->config.pilot_spp = 100;
+        render->config.pilot_s = 1e9;
+        fail_arm(k);
+        int rc = quote(render, &err);
+        int happened = fail_disarm();
+        assert_true(rc == 0 || (happened && rc == BASE_ENOMEM && err.text[0] != '\0'));
+        failures += rc != 0;
+        pt_render_destroy(render);
+        pt_criterion_destroy(criterion);
+        if (!happened)
+            break;
+    }
+    assert_in_range(failures, 12, 100);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(creating), cmocka_unit_test(checking), cmocka_unit_test(writing),
-                                       cmocka_unit_test(recording)};
+                                       cmocka_unit_test(recording), cmocka_unit_test(quoting)};
     return cmocka_run_group_tests(tests, setup, teardown);
 }
