@@ -168,8 +168,17 @@ struct halves {
     float *mean, *d;
 };
 
+/* D = (A − B)/2 of a record, h of its n samples in A, as noise of the variance of the mean: σ²/4·(1/h + 1/(n − h)) is larger
+ * than σ²/n where the halves are unequal, as they are for the first samples. 0: one half is empty, and D no difference. */
+static double half_scale(const struct seq_record *r)
+{
+    const double n = r->spp, h = r->half_spp;
+
+    return h > 0 && h < n ? 2 * sqrt(h * (n - h)) / n : 0;
+}
+
 /* From the level's own halves. Where none are recorded, from those of the full level: their noise has another draw, the
- * same strength in the mean, and none of the bright paths that were met only later or earlier. */
+ * same strength in the mean, and bright paths spread out that few samples meet one by one. */
 static int recorded_picture(const struct ggn_chains *set, struct ggn_chain *c, int k, const struct seq_block *b,
                             const struct seq_record *r, const struct halves *h, struct base_err *err)
 {
@@ -178,7 +187,7 @@ static int recorded_picture(const struct ggn_chains *set, struct ggn_chain *c, i
     const struct seq_record *from = own ? r : h->full;
 
     c->has_picture[k] = 0;
-    if (!set->pictures || !from)
+    if (!set->pictures || !from || half_scale(from) == 0)
         return 0;
     int rc = seq_mean(b, r, h->mean, err);
     if (!rc)
@@ -187,7 +196,7 @@ static int recorded_picture(const struct ggn_chains *set, struct ggn_chain *c, i
         return rc;
     for (size_t p = 0; p < pixels; p++)
         h->mean[p] = (float)base_luminance((double)h->mean[p], (double)h->mean[pixels + p], (double)h->mean[2 * pixels + p]);
-    ggn_chain_set_picture(set, c, k, h->mean, h->d, sqrt((double)from->spp / r->spp));
+    ggn_chain_set_picture(set, c, k, h->mean, h->d, half_scale(from) * sqrt((double)from->spp / r->spp));
     return 0;
 }
 

@@ -1,0 +1,37 @@
+#!/bin/sh
+# scripts/ablate with a tiny plan: a line for each variant, nothing trained twice, a changed plan is refused.
+set -u
+cd "$(dirname "$0")/../.." || exit 2
+BUILD=${BUILD:-build}
+export BUILD
+n=0 bad=0
+tmp=$(mktemp -d) || exit 2
+trap 'rm -rf "$tmp"' EXIT
+check() { # check NAME STATUS
+    n=$((n + 1))
+    if [ "$2" -eq 0 ]; then echo "ok $n - $1"; else echo "not ok $n - $1"; sed 's/^/# /' "$tmp/err"; bad=1; fi
+}
+ablate() { scripts/ablate --data tests/data/train-demo --out "$tmp/out" "$@" >"$tmp/table" 2>"$tmp/err"; }
+
+cat >"$tmp/plan" <<'END'
+# two variants
+common --kr 3 --km 3 --kd 4 --crop 32 --ratio 0 --batch 8 --steps-denoiser 5 --steps 10 --epoch-steps 10 -q
+first
+second --picture 1   # one change
+END
+ablate "$tmp/plan" && [ "$(grep -c '^| \(first\|second\) | ' "$tmp/table")" -eq 2 ] && grep -q '^| second | --picture 1 | [01]\.[0-9]* | ' "$tmp/table"
+check "a table with a line for each variant" $?
+grep '^| second' "$tmp/table" | awk -F'|' '{ for (i = 4; i <= 12; i++) if ($i !~ /[0-9]/ || $i ~ /nan/) exit 1; if ($10 <= 0 || $11 < 0) exit 1 }'
+check "every figure is a number" $?
+rm "$tmp/out/second.ggn" && cp "$tmp/out/first.ggn" "$tmp/kept" && touch -d '2001-01-01' "$tmp/out/first.ggn" &&
+    ablate "$tmp/plan" && [ -e "$tmp/out/second.ggn" ] && [ "$(stat -c %Y "$tmp/out/first.ggn")" -lt 1000000000 ]
+check "what is there is not trained again, what is missing is" $?
+rm "$tmp/out/second.ggn" && ablate --table "$tmp/plan" && grep -q '^| first ' "$tmp/table" && ! grep -q '^| second ' "$tmp/table"
+check "--table trains nothing" $?
+sed -i 's/--picture 1/--picture 0.5/' "$tmp/plan"
+! ablate "$tmp/plan" && [ "$(wc -l <"$tmp/err")" -eq 1 ] && grep -q "second.ggn: trained with other options" "$tmp/err"
+check "a plan that was changed is refused" $?
+! ablate "$tmp/none" && [ "$(wc -l <"$tmp/err")" -eq 1 ] && grep -q "no such plan" "$tmp/err"
+check "no plan" $?
+echo "1..$n"
+exit $bad
