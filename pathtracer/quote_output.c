@@ -76,7 +76,7 @@ static const char *duration(double s, char text[32])
     if (s < 99.5)
         snprintf(text, 32, s < 9.95 ? "%.1f s" : "%.0f s", s);
     else if (s < 99.5 * 60)
-        snprintf(text, 32, "%.0f min", s / 60);
+        snprintf(text, 32, s < 9.95 * 60 ? "%.1f min" : "%.0f min", s / 60);
     else
         snprintf(text, 32, "%.1f h", s / 3600);
     return text;

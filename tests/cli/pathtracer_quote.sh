@@ -54,6 +54,13 @@ t "--quote-pilot SPP" json q40.json "max(b['pilot_spp'] for b in q['blocks']) ==
 "$P" $scene -q --size 640x480 --quote --json --quote-pilot 100000:0.3 >qs.json
 t "--quote-pilot SPP:SECONDS" json qs.json "q['pilot']['elapsed_s'] < 5 and max(b['pilot_spp'] for b in q['blocks']) < 100000"
 
+oiiotool --pattern constant:color=1,1,1 64x48 3 -d uint8 -o white.png
+"$P" $quote --quote --json --quote-pilot 40 --mask white.png >mask.json
+t "--mask counts: white asks for more" python3 -c "
+import json
+plain, mask = ([r['spp_mean']['expected'] for r in json.load(open(f))['rows']] for f in ('q40.json', 'mask.json'))
+assert all(m > 1.1 * p for p, m in zip(plain, mask)), (plain, mask)"
+
 # --- map ---
 t "--quote-map" "$P" $quote --quote --quote-map map.png
 t "  …is a picture of the blocks and a legend" sh -c "oiiotool --info map.png | grep -q ' 192 x  188'"

@@ -1,4 +1,5 @@
 /* Every allocation of a render, of its outputs and of a sequence fails once: an error, no crash, no leak, no file left. */
+#include <limits.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -190,41 +191,46 @@ static void ask_quote(void *data, struct pt_render *render, const uint32_t *due,
     pt_quote_ask(data, render, due, count);
 }
 
-static int quote(struct pt_render *render, struct base_err *err)
+/* The k-th allocation of opening (finishing 0) or of finishing a quote fails; *happened: there were as many. */
+static int quote(struct pt_render *render, int finishing, long k, int *happened, struct base_err *err)
 {
     struct pt_quote *q = NULL;
     enum pt_render_outcome outcome;
+    fail_arm(finishing ? LONG_MAX : k);
     int rc = pt_quote_create(render, pt_fake_criterion(), NULL, 0, NULL, NULL, NULL, &q, err);
+    *happened = fail_disarm();
     struct pt_render_hooks hooks = {.judged = ask_quote, .data = q};
-    if (!rc)
-        rc = pt_render_run(render, &hooks, &outcome, err);
-    if (!rc)
+    if (!rc && finishing) {
+        assert_int_equal(pt_render_run(render, &hooks, &outcome, err), 0);
+        fail_arm(k);
         rc = pt_quote_finish(q, render, err);
+        *happened = fail_disarm();
+    }
     pt_quote_destroy(q);
     return rc;
 }
 
-/* A quote is there or it is not; a check on the way that fails leaves a row with what it knew. */
 static void quoting(void **state)
 {
     int failures = 0;
     (void)state;
-    for (long k = 1; k < 1000; k++) {
-        struct pt_render *render = NULL;
-        struct pt_criterion *criterion = NULL;
-        struct base_err err = {0};
-        assert_int_equal(open_render(&render, &criterion, &err), 0);
-        render->config.pilot_spp = 100;
-        render->config.pilot_s = 1e9;
-        fail_arm(k);
-        int rc = quote(render, &err);
-        int happened = fail_disarm();
-        assert_true(rc == 0 || (happened && rc == BASE_ENOMEM && err.text[0] != '\0'));
-        failures += rc != 0;
-        pt_render_destroy(render);
-        pt_criterion_destroy(criterion);
-        if (!happened)
-            break;
+    for (int finishing = 0; finishing < 2; finishing++) {
+        for (long k = 1, happened = 1; k < 1000 && happened; k++) {
+            struct pt_render *render = NULL;
+            struct pt_criterion *criterion = NULL;
+            struct base_err err = {0};
+            int was = 0;
+            assert_int_equal(open_render(&render, &criterion, &err), 0);
+            render->config.pilot_spp = 40;
+            render->config.pilot_s = 1e9;
+            int rc = quote(render, finishing, k, &was, &err);
+            assert_int_equal(rc, was ? BASE_ENOMEM : 0);
+            assert_true(!was || err.text[0] != '\0');
+            failures += was;
+            happened = was;
+            pt_render_destroy(render);
+            pt_criterion_destroy(criterion);
+        }
     }
     assert_in_range(failures, 12, 100);
 }
