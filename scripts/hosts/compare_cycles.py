@@ -101,7 +101,7 @@ def main():
     parser.add_argument("--spp", type=int, default=1024, help="most samples of a pixel, of both")
     parser.add_argument("--seeds", type=int, default=2, help="at least 2: each is judged against the others")
     parser.add_argument("-c", "--criterion", default="observer")
-    parser.add_argument("-d", "--dial", default="visible=.999,.97,.9,.7,.5,.25,.1,.05,.02,.01")
+    parser.add_argument("-d", "--dial", default="visible=.999,.97,.9,.7,.5,.25,.1,.05,.02,.01,.001,.0001")
     options = parser.parse_args()
     if options.seeds < 2:
         parser.error("--seeds: expected at least 2")

@@ -90,7 +90,9 @@ def test_crop():
 
 def test_seeds():
     """the same seed gives the same picture, another one another"""
-    pictures = [lull.mitsuba.render(scene("balls"), "fixed", spp=32, block=24, spp_max=32, seed=k).image for k in (1, 1, 2)]
+    rendered = [lull.mitsuba.render(scene("balls"), "fixed", spp=32, block=24, spp_max=32, seed=k) for k in (1, 1, 2)]
+    assert all(p.result.outcome == "done" for p in rendered), [p.result for p in rendered]
+    pictures = [p.image for p in rendered]
     assert abs(pictures[0] - pictures[1]).max() < 1e-5 and abs(pictures[0] - pictures[2]).max() > .01
 
 

@@ -36,10 +36,11 @@ def in_half(wave: int) -> bool:
 
 @dataclass
 class Totals:
-    """Sums over the run; seconds are wall seconds."""
+    """Sums over the run; seconds are wall seconds, but criterion_thread_s: processor seconds of the checks, all threads."""
     samples: int = 0
     render_s: float = 0.0
     criterion_s: float = 0.0
+    criterion_thread_s: float = 0.0
     checks: int = 0
     failed_checks: int = 0
     skipped_checks: int = 0
@@ -213,7 +214,7 @@ class Driver:
 
     def _ask(self, due: Sequence[int], final: Sequence[bool]) -> list[Decision]:
         """Asks and notes the answers. An error of the criterion costs time, never quality: all continue."""
-        start_s = time.monotonic()
+        start_s, start_cpu_s = time.monotonic(), time.process_time()
         try:
             answers = self.frame.evaluate(due, final)
         except LullError as error:
@@ -222,6 +223,7 @@ class Driver:
             if self.totals.failed_checks == 1:
                 self.warn(str(error))
         self.totals.criterion_s += time.monotonic() - start_s
+        self.totals.criterion_thread_s += time.process_time() - start_cpu_s
         self.totals.checks += len(due)
         for i, answer in zip(due, answers):
             b = self.frame.blocks[i]

@@ -62,6 +62,7 @@ def report(driver: Driver, scene: str = "", kernel: str = "", interrupted: bool 
                     "reason": b.reason, "p_noisy": _number(b.p_noisy), "error": _number(b.error), "checks": b.checks,
                     "thread_s": b.thread_s, "dial": dial} for b, dial in zip(frame.blocks, frame.dials)],
         "totals": {"samples": totals.samples, "render_s": totals.render_s, "criterion_s": totals.criterion_s,
+                   "criterion_thread_s": totals.criterion_thread_s,
                    "paths": totals.samples, "rays": None,
                    "paths_per_s": totals.samples / totals.render_s if totals.render_s > 0 else None, "rays_per_s": None,
                    "dropped_samples": sum(b.dropped for b in frame.blocks)},
