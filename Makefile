@@ -100,7 +100,7 @@ REPLAY   := $(patsubst tests/fuzz/%.c,$(OUT)/fuzz/replay-%,$(FUZZ_SRC))
 FUZZERS  := $(patsubst tests/fuzz/%.c,build/fuzz/%,$(FUZZ_SRC))
 
 .DEFAULT_GOAL := all
-.PHONY: all demo test bench asan tsan fuzz mutants hdr-check abi-check install compdb clean help setup tests replay train-demo test-study test-hosts
+.PHONY: all demo test bench cost asan tsan fuzz mutants hdr-check abi-check install compdb clean help setup tests replay train-demo test-study test-hosts
 .SECONDARY:
 
 all: $(PROGRAMS) $(CRITERIA) ## build the programs and the criteria
@@ -245,6 +245,8 @@ demo: setup ## install what is missing, build, render a scene with per-block sto
 	@scripts/demo
 bench: all $(BENCHES) ## measure speed as ratios, interleaved, against the peers that are installed
 	@scripts/bench
+cost: all ## measure what accuracy costs each criterion, from recordings in data/ (docs/cost.md)
+	@scripts/cost
 train-demo: all ## train a tiny model on a tiny bundled data set and show that it learns
 	@scripts/train-demo
 

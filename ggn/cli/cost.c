@@ -12,12 +12,14 @@
 #include "cli/commands.h"
 #include "eval/cost.h"
 #include "eval/trained.h"
+#include "observer/curve.h"
+#include "observer/observer.h"
 
 enum { MAX_FILES = 8 };
 
 struct options {
     const char *data, *out, *observer, *models[MAX_FILES], *baselines[MAX_FILES];
-    int n_models, n_baselines, split, threads, no_quality, recorded;
+    int n_models, n_baselines, split, threads, no_quality, recorded, sizes;
     double ratio;
 };
 
@@ -52,8 +54,9 @@ static const struct base_option list[] = {
     {"observer", 'O', "FILE", TO(observer), .help = "the observer's parameters, each view without itself"},
     {"output", 'o', "FILE", TO(out), .output = 1, .help = "write there instead of printing"},
     {"ratio", 0, "R", TO(ratio), 1, 16, .help = "thin the levels, and the checks, to this ratio of samples"},
-    {"recorded", 0, NULL, TO(recorded), .help = "stop at the last recorded level"},
+    {"recorded", 0, NULL, TO(recorded), .help = "recorded levels only; blocks that show noise in the last one are left out"},
     {"no-quality", 0, NULL, TO(no_quality), .help = "skip FLIP"},
+    {"sizes", 0, NULL, TO(sizes), .help = "also thresholds of the blocks' parts, as of smaller blocks"},
     {"threads", 't', "N", TO(threads), 1, 1024, .help = "worker threads (all processors)"},
     {0}};
 
@@ -92,6 +95,10 @@ static void put_setting(struct job *j, const char *criterion, const char *dial, 
     base_json_text(o, "criterion", criterion, &j->failed);
     base_json_text(o, "dial", dial, &j->failed);
     base_json_number(o, "value", value, &j->failed);
+    cJSON *stops = base_json_array(o, "stops", &j->failed);
+    for (int b = 0; b < j->set.n_blocks; b++)
+        if (j->set.blocks[b].split == j->split)
+            base_json_number(stops, NULL, floor(stop[b] + 0.5), &j->failed);
     cJSON *scenes = base_json_object(o, "scenes", &j->failed);
     for (int scene = 0; scene < j->set.n_scenes; scene++) {
         struct ggn_cost c;
@@ -105,6 +112,15 @@ static void put_method(struct job *j, const char *dial, double value, const stru
 {
     ggn_cost_checks(m, &j->set, j->checks);
     put_setting(j, m->name, dial, value, m->stop, j->checks);
+}
+
+/* Where a block is in the lists of stops. */
+static int place_of(const struct job *j, int b)
+{
+    int n = 0;
+    for (int k = 0; k < b; k++)
+        n += j->set.blocks[k].split == j->split;
+    return n;
 }
 
 static void put_scenes(struct job *j, cJSON *root)
@@ -123,15 +139,63 @@ static void put_scenes(struct job *j, cJSON *root)
             }
             const struct ggn_chain *c = &s->chains.chains[e->chain];
             cJSON *block = base_json_object(blocks, NULL, &j->failed);
+            base_json_number(block, "place", place_of(j, b), &j->failed);
             base_json_text(block, "view", s->chains.data.views[e->view].name, &j->failed);
             base_json_number(block, "id", e->label.id, &j->failed);
             base_json_number(block, "threshold", e->label.threshold, &j->failed);
+            base_json_number(block, "cap", e->cap, &j->failed);
             base_json_bool(block, "censored", e->label.censored, &j->failed);
             base_json_bool(block, "simulated", c->simulated, &j->failed);
             base_json_bool(block, "reference", c->reference != NULL, &j->failed);
             base_json_number(block, "us_per_path", 1e6 * ggn_cost_path_s(s, e), &j->failed);
         }
     }
+}
+
+/* Thresholds of every square of `side` pixels that a block divides into. */
+static int put_parts(struct job *j, cJSON *to, const struct seq_block *p, int side, struct base_err *err)
+{
+    for (int k = 0; k < (int)(p->width / (uint32_t)side * (p->height / (uint32_t)side)); k++) {
+        struct ggn_curve c;
+        int across = (int)p->width / side, censored;
+        int rc = ggn_curve_part(p, k % across * side, k / across * side, side, side, &c, err);
+        if (rc)
+            return rc;
+        double limit = ggn_observer_limit(&ggn_observer_default, c.texture);
+        base_json_number(to, NULL, ggn_curve_threshold(&c, limit, &censored), &j->failed);
+        ggn_curve_release(&c);
+    }
+    return 0;
+}
+
+/* For each scene and side all thresholds of such parts, by the observer from the halves. */
+static int put_sizes(struct job *j, cJSON *root, struct base_err *err)
+{
+    static const int sides[] = {25, 50, 100, 200};
+    const struct ggn_eval_set *s = &j->set;
+    cJSON *to = base_json_object(root, "parts", &j->failed);
+    int rc = 0;
+    for (int b = 0; b < s->n_blocks && !rc; b++) {
+        const struct ggn_eval_block *e = &s->blocks[b];
+        const struct ggn_dataset_view *v = &s->chains.data.views[e->view];
+        struct seq_block p;
+        if (e->split != j->split)
+            continue;
+        rc = seq_manifest_read_block(v->dir, &v->manifest, e->index, &p, err);
+        if (rc)
+            return rc;
+        cJSON *scene = cJSON_GetObjectItemCaseSensitive(to, v->manifest.scene);
+        for (size_t i = 0; i < sizeof sides / sizeof sides[0] && !rc; i++) {
+            char key[16];
+            snprintf(key, sizeof key, "%d", sides[i]);
+            if (!scene)
+                scene = base_json_object(to, v->manifest.scene, &j->failed);
+            cJSON *parts = cJSON_GetObjectItemCaseSensitive(scene, key);
+            rc = put_parts(j, parts ? parts : base_json_array(scene, key, &j->failed), &p, sides[i], err);
+        }
+        seq_block_release(&p);
+    }
+    return rc;
 }
 
 /* --- dials --- */
@@ -294,6 +358,8 @@ static int cost(struct job *j, struct base_threads *threads, struct base_err *er
     base_json_text(root, "labels", ggn_dataset_label_source(&j->set.chains.data), &j->failed);
     base_json_number(root, "ratio", j->set.chains.ratio, &j->failed);
     put_scenes(j, root);
+    if (!rc && j->o->sizes)
+        rc = put_sizes(j, root, err);
     j->points = base_json_array(root, "points", &j->failed);
     if (!rc)
         cost_uniform(j);
@@ -335,6 +401,9 @@ int ggn_cmd_cost(int argc, char **argv)
                                &(struct ggn_eval_options){.dir = o.data, .window = 6, .quality = !o.no_quality,
                                                           .recorded = o.recorded, .ratio = o.ratio, .seed = 1},
                                threads, &skipped, &err);
+    for (int b = 0; o.recorded && b < j.set.n_blocks; b++) /* whose thresholds lie beyond: nothing is known there */
+        if (j.set.blocks[b].label.censored)
+            j.set.blocks[b].split = GGN_SPLITS;
     if (!rc && ggn_eval_count(&j.set, j.split) == 0)
         rc = base_fail(&err, BASE_EINVAL, "%s: no labelled block in the split '%s'", o.data, ggn_split_names[j.split]);
     if (!rc)

@@ -19,6 +19,7 @@ static double simulated_spp(int i)
 /* Planes of one block. */
 struct planes {
     const struct seq_block *block; /* borrows */
+    int x0, y0, width, height;        /* the part of it that is looked at */
     size_t pixels;
     float *mean, *difference, *work;  /* [3][P], linear; one allocation, `mean` owns it */
     float *lightness[3];              /* [P] */
@@ -35,7 +36,8 @@ static void planes_release(struct planes *p)
 static int planes_init(struct planes *p, const struct seq_block *block, struct base_err *err)
 {
     size_t n = (size_t)block->width * block->height;
-    *p = (struct planes){.block = block, .pixels = n, .mean = malloc(12 * n * sizeof *p->mean),
+    *p = (struct planes){.block = block, .width = (int)block->width, .height = (int)block->height, .pixels = n,
+                         .mean = malloc(12 * n * sizeof *p->mean),
                          .scratch = malloc(ggn_visibility_scratch((int)block->width) * sizeof *p->scratch)};
     if (!p->mean || !p->scratch) {
         planes_release(p);
@@ -46,6 +48,16 @@ static int planes_init(struct planes *p, const struct seq_block *block, struct b
     for (int i = 0; i < 3; i++)
         p->lightness[i] = p->mean + (9 + (size_t)i) * n;
     return 0;
+}
+
+/* Leaves of planes [3][P] of the whole block the part that is looked at. */
+static void crop(const struct planes *p, float *planes)
+{
+    const size_t row = p->block->width, all = row * p->block->height;
+    for (size_t c = 0; c < 3; c++)
+        for (int y = 0; y < p->height; y++)
+            memmove(planes + c * p->pixels + (size_t)y * (size_t)p->width,
+                    planes + c * all + (size_t)(p->y0 + y) * row + (size_t)p->x0, (size_t)p->width * sizeof *planes);
 }
 
 /* L* of mean + scale * difference. */
@@ -61,12 +73,12 @@ static double visible(struct planes *p, float factor)
 {
     for (size_t i = 0; i < p->pixels; i++)
         p->lightness[0][i] = factor * (p->lightness[0][i] - p->lightness[1][i]);
-    return ggn_visible_noise(p->lightness[0], (int)p->block->width, (int)p->block->height, p->scratch, NULL);
+    return ggn_visible_noise(p->lightness[0], p->width, p->height, p->scratch, NULL);
 }
 
 static double texture(struct planes *p)
 {
-    return ggn_visible_texture(p->lightness[0], p->lightness[1], (int)p->block->width, (int)p->block->height, p->scratch);
+    return ggn_visible_texture(p->lightness[0], p->lightness[1], p->width, p->height, p->scratch);
 }
 
 /* The level whose half-buffer difference is kept in full. */
@@ -87,6 +99,8 @@ static int add_halves(struct ggn_curve *c, struct planes *p, double beyond, stru
         rc = seq_half(p->block, full, p->difference, err);
     if (rc)
         return rc;
+    crop(p, p->mean);
+    crop(p, p->difference);
     if (c->n == 0) {
         look(p, 1.0, p->lightness[0]);
         look(p, -1.0, p->lightness[1]);
@@ -151,6 +165,32 @@ int ggn_curve_make(const struct seq_block *block, enum ggn_curve_source source, 
         rc = add_levels(&c, &p, reference_independent, err);
     if (!rc && (source == GGN_FROM_HALVES || (reference_independent && full_level(block))))
         rc = add_halves(&c, &p, c.n > 0 ? 1.07 * c.spp[c.n - 1] : 0.0, err);
+    if (rc)
+        ggn_curve_release(&c);
+    else
+        *curve = c;
+    planes_release(&p);
+    return rc;
+}
+
+int ggn_curve_part(const struct seq_block *block, int x0, int y0, int width, int height, struct ggn_curve *curve,
+                   struct base_err *err)
+{
+    if (x0 < 0 || y0 < 0 || width < 1 || height < 1 || x0 + width > (int)block->width || y0 + height > (int)block->height)
+        return base_fail(err, BASE_EINVAL, "block %u has no part %dx%d at %d, %d", block->id, width, height, x0, y0);
+    if (!full_level(block))
+        return base_fail(err, BASE_EINVAL, "block %u has no full level with a half-buffer difference", block->id);
+    struct ggn_curve c = {.spp = malloc(SIMULATED * sizeof *c.spp), .visible = malloc(SIMULATED * sizeof *c.visible)};
+    struct planes p = {0};
+    int rc = !c.spp || !c.visible ? base_fail_nomem(err, "observer") : planes_init(&p, block, err);
+    if (!rc) {
+        p.x0 = x0;
+        p.y0 = y0;
+        p.width = width;
+        p.height = height;
+        p.pixels = (size_t)width * (size_t)height;
+        rc = add_halves(&c, &p, 0.0, err);
+    }
     if (rc)
         ggn_curve_release(&c);
     else

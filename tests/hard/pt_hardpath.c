@@ -6,6 +6,7 @@
 
 #include <cmocka.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 
 #include "geom/accel.h"
@@ -39,6 +40,7 @@ static void closed_furnace(void **state)
         settings.rr_depth = 2000;
         settings.strategy = strategy ? PT_STRATEGY_BSDF_ONLY : PT_STRATEGY_MIS;
         pt_vec3 l = mean_of(&scene, &settings, strategy ? 8 : 16, &error);
+        printf("# figure furnace: radiance %.1f instead of %.1f\n", (double)l.y, expected);
         assert_ratio((double)l.y, expected, strategy ? 5e-4 : 5e-3, strategy ? "brute force" : "light sampling");
         test_scene_end(&scene);
     }

@@ -312,6 +312,46 @@ static void needs(void **state)
     seq_block_release(&b);
 }
 
+/* A part is judged as a block of its size would be: by hand from the cropped halves; the whole is a part too. */
+static void parts(void **state)
+{
+    (void)state;
+    enum { X = 17, Y = 9, PW = 40, PH = 30 };
+    static float mean[3 * P], d[3 * P], cut[2][3 * PW * PH], l[2][PW * PH];
+    struct ggn_curve whole, all, part;
+    struct base_err err = {0};
+    struct seq_block b = make_block(0.3, 0.2, 11, 0);
+    const struct seq_record *full = NULL;
+    assert_int_equal(ggn_curve_make(&b, GGN_FROM_HALVES, 1, &whole, &err), 0);
+    assert_int_equal(ggn_curve_part(&b, 0, 0, W, H, &all, &err), 0);
+    assert_int_equal(ggn_curve_part(&b, X, Y, PW, PH, &part, &err), 0);
+    assert_memory_equal(whole.visible, all.visible, (size_t)all.n * sizeof *all.visible);
+    for (uint32_t i = 0; i < b.n_levels && !full; i++)
+        full = seq_has(&b.levels[i], SEQ_PLANE_HALF_F16) ? &b.levels[i] : NULL;
+    assert_int_equal(seq_mean(&b, full, mean, &err), 0);
+    assert_int_equal(seq_half(&b, full, d, &err), 0);
+    for (int side = 0; side < 2; side++) {
+        float scale = (side ? -1.0f : 1.0f) * (float)sqrt(full->spp / part.spp[20]);
+        for (int c = 0; c < 3; c++)
+            for (int k = 0; k < PW * PH; k++) {
+                int at = c * P + (Y + k / PW) * W + X + k % PW;
+                cut[side][c * PW * PH + k] = mean[at] + scale * d[at];
+            }
+        ggn_visible_lightness(cut[side], PW * PH, l[side]);
+    }
+    for (int k = 0; k < PW * PH; k++)
+        l[0][k] = 0.5f * (l[0][k] - l[1][k]);
+    double *scratch = malloc(ggn_visibility_scratch(PW) * sizeof *scratch);
+    assert_near(ggn_visible_noise(l[0], PW, PH, scratch, NULL), part.visible[20], 1e-5 * part.visible[20]);
+    free(scratch);
+    assert_int_equal(ggn_curve_part(&b, X, Y, W, PH, &all, &err), BASE_EINVAL);
+    assert_non_null(strstr(err.text, "has no part"));
+    ggn_curve_release(&whole);
+    ggn_curve_release(&all);
+    ggn_curve_release(&part);
+    seq_block_release(&b);
+}
+
 /* --- calibration --- */
 
 enum { VIEWS = 3, BLOCKS = 6 };
@@ -450,7 +490,7 @@ int main(void)
         cmocka_unit_test(apart),           cmocka_unit_test(people),
         cmocka_unit_test(thresholds),      cmocka_unit_test(scaling),
         cmocka_unit_test(noisy_reference), cmocka_unit_test(beyond_the_last_level),
-        cmocka_unit_test(needs),           cmocka_unit_test(calibration),
+        cmocka_unit_test(needs), cmocka_unit_test(parts),           cmocka_unit_test(calibration),
         cmocka_unit_test(parameters),      cmocka_unit_test(built_in),
         cmocka_unit_test(trials),
     };
