@@ -166,7 +166,7 @@ def draw(folder, out):
         draw_ratio(folder, points)
         draw_paths(folder, points)
     if "people" in out.get("sets", {}):
-        draw_frontiers(folder, points_of(out, "people"), "cost-people.png", "to_limit", "samples against those at people\\'s thresholds")
+        draw_frontiers(folder, points_of(out, "people"), "cost-people.png", "to_limit", "time, checks included, against stopping at the thresholds that people gave")
     draw_growth(folder, out)
 
 
