@@ -66,6 +66,30 @@ done
 grep -q "status 130" "$tmp/interrupted" && $ggn train $tiny --out "$tmp/d.ggn" --resume -q 2>"$tmp/err" &&
     cmp "$tmp/a.ggn" "$tmp/d.ggn" 2>"$tmp/err"
 check "interrupted and resumed: the same bytes" $?
+# The learning rate of each epoch's last step: 20 steps of warming up, then half a cosine down to a fiftieth.
+awk -F, 'NR > 1 {
+    all = 20; step = $2 - 1; warm = (step + 1) / 20 < 1 ? (step + 1) / 20 : 1
+    want = 1e-3 * warm * (0.02 + 0.98 * (1 + cos(3.14159265358979 * step / all)) / 2)
+    if ($8 > want * 1.00001 || $8 < want * 0.99999) { print $0 " instead of " want; bad = 1 }
+} END { exit bad || NR != 5 }' "$tmp/a.ggn.csv" >"$tmp/err"
+check "learning rates warm up and decay" $?
+
+# Without patience left: the epochs since the best one are counted through an interruption. The best is the seventh of the judge.
+long="$tiny --steps-denoiser 10 --epoch-steps 5 --steps 100 --lr 0.02 --patience 4 -q"
+$ggn train $long --out "$tmp/g.ggn" 2>"$tmp/err"
+for try in 1 2 3 4 5; do # the signal may come too late
+    rm -f "$tmp"/h.ggn*
+    $ggn train $long --out "$tmp/h.ggn" --resume 2>"$tmp/err" &
+    pid=$!
+    while kill -0 $pid 2>/dev/null && [ "$(cat "$tmp/h.ggn.csv" 2>/dev/null | wc -l)" -lt 11 ]; do sleep 0.01; done
+    kill -INT $pid 2>/dev/null
+    wait $pid
+    [ $? -eq 130 ] && break
+done
+[ ! -e "$tmp/h.ggn" ] && $ggn train $long --out "$tmp/h.ggn" --resume 2>"$tmp/err" && cmp "$tmp/g.ggn" "$tmp/h.ggn" 2>"$tmp/err" &&
+    [ "$(tail -n 1 "$tmp/h.ggn.csv" | cut -d, -f1,2)" = "judge,55" ] && [ "$(wc -l <"$tmp/g.ggn.csv")" -eq "$(wc -l <"$tmp/h.ggn.csv")" ]
+check "patience ends a resumed run where it ends the other" $?
+
 cp "$tmp/a.ggn.ckpt" "$tmp/bad.ggn.ckpt"
 fails "a checkpoint of another run is refused" "other data or options" $ggn train $tiny --seed 3 --resume
 head -c 4000 "$tmp/a.ggn.ckpt" >"$tmp/bad.ggn.ckpt"

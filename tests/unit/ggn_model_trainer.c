@@ -184,6 +184,58 @@ static void test_resume_and_threads(void **state)
     (void)state;
 }
 
+/* One step of every network, each parameter against Kingma & Ba 2015, algorithm 1, in double from the gradients that the trainer left:
+ * with the bias corrections, whose part is large in the first steps. */
+static void check_adam(const struct ggn_trainer *t, int net, const float *before, double *m, double *v, int step)
+{
+    const struct ggn_train_options *o = &t->options;
+    double norm2 = 0, c1 = 1 - pow(o->beta1, step), c2 = 1 - pow(o->beta2, step);
+
+    assert_int_equal(t->adam_t[net], step);
+    for (size_t i = 0; i < t->graph[net].n_params; i++) {
+        double g = (double)t->grad[net][i], was = (double)before[i];
+        norm2 += g * g;
+        m[i] = o->beta1 * m[i] + (1 - o->beta1) * g;
+        v[i] = o->beta2 * v[i] + (1 - o->beta2) * g * g;
+        double want = was - o->lr[net] * (m[i] / c1) / (sqrt(v[i] / c2) + o->eps);
+        /* rounding of the parameter, and of moments that are sums of floats */
+        if (!(fabs((double)t->weights[net]->params[i] - want) <= 2e-7 * fabs(was) + 2e-5 * o->lr[net]))
+            fail_msg("net %d, step %d, parameter %zu: %.9g, not %.9g", net, step, i, (double)t->weights[net]->params[i], want);
+    }
+    assert_true(sqrt(norm2) <= o->clip * (1 + 1e-5) && norm2 > 0);
+}
+
+static void test_adam(void **state)
+{
+    struct ggn_trainer *t = make(GGN_PRESET_LULL, 1e-3, NULL);
+    double *m[GGN_NETS], *v[GGN_NETS];
+    float *before[GGN_NETS];
+
+    t->options.lr[GGN_NET_D] = 3e-3;
+    for (int net = 0; net < GGN_NETS; net++) {
+        size_t n = t->graph[net].n_params;
+        m[net] = calloc(n, sizeof **m);
+        v[net] = calloc(n, sizeof **v);
+        before[net] = malloc(n * sizeof **before);
+        assert_true(m[net] && v[net] && before[net]);
+    }
+    for (int step = 1; step <= 4; step++) {
+        for (int net = 0; net < GGN_NETS; net++)
+            memcpy(before[net], t->weights[net]->params, t->graph[net].n_params * sizeof **before);
+        denoise(t);
+        judge(t);
+        for (int net = 0; net < GGN_NETS; net++)
+            check_adam(t, net, before[net], m[net], v[net], step);
+    }
+    for (int net = 0; net < GGN_NETS; net++) {
+        free(m[net]);
+        free(v[net]);
+        free(before[net]);
+    }
+    ggn_trainer_destroy(t);
+    (void)state;
+}
+
 static void test_paper(void **state)
 {
     struct ggn_trainer *t = make(GGN_PRESET_PAPER, 2e-4, NULL);
@@ -230,6 +282,6 @@ static void test_copy(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_learns), cmocka_unit_test(test_learns_from_the_picture), cmocka_unit_test(test_resume_and_threads),
-                                       cmocka_unit_test(test_paper), cmocka_unit_test(test_copy)};
+                                       cmocka_unit_test(test_adam), cmocka_unit_test(test_paper), cmocka_unit_test(test_copy)};
     return cmocka_run_group_tests(tests, setup, NULL);
 }
