@@ -83,6 +83,6 @@ cp "$d/manifest.json" "$b/"
 rm "$b/labels.json"
 fails "no labels" 'run ggn label first' $ggn evaluate -d "$tmp/bad"
 if [ -w /dev/full ]; then
-    fails "disk full" 'write' sh -c "$ggn evaluate -d $tmp/data >/dev/full; rc=\$?; [ \$rc -ne 0 ] && exit 2"
+    fails "disk full" 'write' sh -c "exec $ggn evaluate -d $tmp/data >/dev/full"
 fi
 echo "1..$n"

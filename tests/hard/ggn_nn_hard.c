@@ -94,16 +94,46 @@ static float broken(int image, int k)
     return k % 97 == 0 ? bad[(k / 97 + image) % 6] : (float)ggn_hash_unit((uint32_t)k, 3);
 }
 
+/* The same pictures as a display would show them: what is beyond white is white, what is no light is black. */
+static float full(int image, int k)
+{
+    (void)image;
+    (void)k;
+    return 1;
+}
+
+static float white_pixel(int image, int k)
+{
+    (void)image;
+    return k == 500;
+}
+
+static float repaired(int image, int k)
+{
+    static const float good[6] = {1, 0, 1, 0, 0, 0};
+    return k % 97 == 0 ? good[(k / 97 + image) % 6] : (float)ggn_hash_unit((uint32_t)k, 3);
+}
+
 static void test_blocks(void **state)
 {
-    float (*const block[])(int, int) = {constant, black, white, firefly, equal_images, broken};
+    static const struct {
+        float (*block)(int, int), (*as)(int, int);
+    } cases[] = {{constant, constant}, {black, black}, {white, full}, {firefly, white_pixel}, {equal_images, equal_images}, {broken, repaired}};
+    enum { CASES = sizeof cases / sizeof *cases };
     struct ggn_model *m = make();
+    double p[CASES];
 
-    for (size_t i = 0; i < sizeof block / sizeof block[0]; i++) {
-        struct ggn_pixel_counts counts = {0};
-        double p = decide(m, block[i], &counts);
-        assert_true(p > 0 && p < 1);
-        assert_int_equal(ggn_pixel_counts_bad(&counts) > 0, block[i] == broken);
+    for (size_t i = 0; i < CASES; i++) {
+        struct ggn_pixel_counts counts = {0}, none = {0};
+        p[i] = decide(m, cases[i].block, &counts);
+        assert_true(p[i] > 0 && p[i] < 1 && p[i] == decide(m, cases[i].as, &none));
+        assert_int_equal(ggn_pixel_counts_bad(&none), 0);
+        assert_int_equal(ggn_pixel_counts_bad(&counts), counts.nan + counts.infinite + counts.huge);
+        int spoilt = cases[i].block == broken; /* every 97th of 3 x 3072 values, the six kinds in turn */
+        assert_true(counts.nan == 17 * spoilt && counts.infinite == 33 * spoilt && counts.negative == 15 * spoilt &&
+                    counts.huge == 16 * spoilt && counts.denormal == 15 * spoilt);
+        for (size_t k = 0; k < i; k++)
+            assert_true(p[k] != p[i]); /* it looks at the pixels */
     }
     ggn_model_destroy(m);
     (void)state;
