@@ -141,7 +141,8 @@ static int look(struct base_err *err)
     return rc;
 }
 
-static void fail_each(int (*body)(struct base_err *))
+/* What may fail silently, because the work is whole all the same: the buffer of a file, the search for what an earlier writer left. */
+static void fail_each(int (*body)(struct base_err *), int silent)
 {
     enum { MANY = 5000 };
     long k = 1;
@@ -152,7 +153,9 @@ static void fail_each(int (*body)(struct base_err *))
         int rc = body(&err), failed = fail_disarm();
         if (!failed)
             break;
-        if (!rc || err.text[0] == '\0')
+        if (!rc && body == write_block)
+            assert_int_equal(read_block(NULL), 0);
+        if (rc ? err.text[0] == '\0' : --silent < 0)
             fail_msg("allocation %ld failed and nothing was said", k);
     }
     assert_true(k > 2 && k < MANY);
@@ -162,27 +165,27 @@ static void fail_each(int (*body)(struct base_err *))
 static void blocks(void **state)
 {
     (void)state;
-    fail_each(write_block);
-    fail_each(read_block);
+    fail_each(write_block, 2);
+    fail_each(read_block, 1);
 }
 
 static void json(void **state)
 {
     (void)state;
-    fail_each(texts);
+    fail_each(texts, 6);
 }
 
 static void small_inputs(void **state)
 {
     (void)state;
-    fail_each(tables);
+    fail_each(tables, 0);
 }
 
 static void observer(void **state)
 {
     (void)state;
     assert_int_equal(write_block(NULL), 0);
-    fail_each(look);
+    fail_each(look, 1);
 }
 
 int main(void)

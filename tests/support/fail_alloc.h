@@ -41,9 +41,12 @@ static void fail_find(const char *name, void *function)
     memcpy(function, &found, sizeof found);
 }
 
+/* Visible to the shared libraries as well, which -fvisibility=hidden would keep them from being. */
+#pragma GCC visibility push(default)
 void *malloc(size_t size);
 void *calloc(size_t count, size_t size);
 void *realloc(void *old, size_t size);
+#pragma GCC visibility pop
 
 void *malloc(size_t size)
 {
