@@ -93,7 +93,8 @@ def test_seeds():
     rendered = [lull.mitsuba.render(scene("balls"), "fixed", spp=32, block=24, spp_max=32, seed=k) for k in (1, 1, 2)]
     assert all(p.result.outcome == "done" for p in rendered), [p.result for p in rendered]
     pictures = [p.image for p in rendered]
-    assert abs(pictures[0] - pictures[1]).max() < 1e-5 and abs(pictures[0] - pictures[2]).max() > .01
+    same, other = (abs(pictures[0] - p).max() for p in pictures[1:])
+    assert same < 1e-5 and other > .01, (same, other)  # what order threads add in is worth 1e-8
 
 
 def test_bad_input():
