@@ -64,6 +64,8 @@ static int set_size(void *into, const char *value, struct base_err *err)
     int v[2];
     if (!get_list(value, 'x', 2, 1, 32768, v))
         return expected(err, "WxH, each from 1 to 32768");
+    if ((double)v[0] * v[1] > PT_CLI_MAX_PIXELS)
+        return expected(err, "WxH of at most 2^28 pixels in all");
     cli->width = v[0];
     cli->height = v[1];
     return 0;
@@ -178,7 +180,6 @@ static int set_sequence(void *into, const char *value, struct base_err *err)
     struct pt_cli *cli = into;
     (void)err;
     cli->sequence = value;
-    cli->action = PT_CLI_SEQUENCE;
     return 0;
 }
 
@@ -339,6 +340,10 @@ static int check_together(struct pt_cli *cli, struct base_err *err)
         return base_fail(err, BASE_EINVAL, "--levels, --blocks, --reference-spp and --name belong to --sequence DIR");
     if (cli->sequence && (cli->spp > 0 || cli->checkpoint || cli->has_crop || cli->mask))
         return base_fail(err, BASE_EINVAL, "--sequence goes with neither --spp, --checkpoint, --crop nor --mask");
+    if (cli->sequence && cli->action != PT_CLI_RENDER)
+        return base_fail(err, BASE_EINVAL, "--sequence records blocks: leave out what only looks at the scene or a path");
+    if (cli->sequence)
+        cli->action = PT_CLI_SEQUENCE;
     if (cli->mask && cli->spp > 0)
         return base_fail(err, BASE_EINVAL, "--mask %s: --spp takes the same samples everywhere", cli->mask);
     if (cli->quote ? check_quote(cli, err) != 0 : check_no_quote(cli, err) != 0)

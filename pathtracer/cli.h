@@ -9,7 +9,8 @@
 #include "base/err.h"
 #include "pbrt/load_options.h"
 
-enum { PT_CLI_MAX_PARAMS = 64, PT_CLI_MAX_STOP_MAPS = 4, PT_CLI_SCENES_DEPTH = -2 };
+enum { PT_CLI_MAX_PARAMS = 64, PT_CLI_MAX_STOP_MAPS = 4, PT_CLI_SCENES_DEPTH = -2,
+       PT_CLI_MAX_PIXELS = 1 << 28 };
 
 enum pt_cli_action { PT_CLI_RENDER, PT_CLI_LIST_CRITERIA, PT_CLI_EXPLAIN, PT_CLI_DEBUG_PATH, PT_CLI_SEQUENCE, PT_CLI_QUOTE };
 

@@ -9,6 +9,7 @@
 #define GGN_CLI_COMMANDS_H
 
 #include <signal.h>
+#include <stddef.h>
 
 #include "base/err.h"
 
@@ -38,6 +39,9 @@ enum { GGN_EXIT_OK = 0, GGN_EXIT_FAILED = 1, GGN_EXIT_BAD_INPUT = 2, GGN_EXIT_IN
 
 /* Prints "COMMAND: text" on stderr and returns the exit status that err->code stands for (`command` is argv[0]). */
 int ggn_cmd_fail(const char *command, const struct base_err *err);
+
+/* Says on stderr how many pixels of the image at `path` could not be shown as they are, if any. */
+void ggn_cmd_tell_clipped(const char *command, const char *path, size_t clipped);
 
 /* After ggn_cmd_catch_interrupt(), SIGINT and SIGTERM set the flag instead of ending the process; a second one ends it. The
  * command polls the flag, leaves its outputs whole and returns GGN_EXIT_INTERRUPTED. */

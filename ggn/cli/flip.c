@@ -56,6 +56,8 @@ int ggn_cmd_flip(int argc, char **argv)
         rc = ggn_image8_read(o.paths[i], &images[i], &err);
     if (rc)
         goto out;
+    for (int i = 0; i < 2; i++)
+        ggn_cmd_tell_clipped(argv[0], o.paths[i], images[i].clipped);
     if (images[0].width != images[1].width || images[0].height != images[1].height) {
         rc = base_fail(&err, BASE_EINVAL, "%s is %dx%d, %s is %dx%d: the sizes must be equal", o.paths[0], images[0].width,
                       images[0].height, o.paths[1], images[1].width, images[1].height);

@@ -118,11 +118,14 @@ int ggn_cmd_import_sin3d(int argc, char **argv)
         rc = ggn_thresholds_read(o.thresholds, o.block, &thresholds, &err);
         so.thresholds = &thresholds;
     }
-    if (!rc && mkdir(o.out, 0777) != 0 && errno != EEXIST)
+    int made = !rc && mkdir(o.out, 0777) == 0;
+    if (!rc && !made && errno != EEXIST)
         rc = base_fail(&err, BASE_EIO, "%s: %s", o.out, strerror(errno));
     if (!rc)
         rc = ggn_sin3d_is_view(o.dir) ? import_one(&o, &so, o.dir, &err) : import_all(&o, &so, &err);
     ggn_thresholds_release(&thresholds);
+    if (rc && made)
+        rmdir(o.out); /* goes only if nothing was imported */
     if (rc)
         return ggn_cmd_fail(argv[0], &err);
     return ggn_cmd_interrupted ? GGN_EXIT_INTERRUPTED : GGN_EXIT_OK;

@@ -35,6 +35,13 @@ void ggn_cmd_catch_interrupt(void)
     sigaction(SIGTERM, &action, NULL);
 }
 
+void ggn_cmd_tell_clipped(const char *command, const char *path, size_t clipped)
+{
+    if (clipped > 0)
+        fprintf(stderr, "%s: %s: %zu pixels are NaN, infinite or negative; they are compared as black or white\n",
+                command, path, clipped);
+}
+
 int ggn_cmd_fail(const char *command, const struct base_err *err)
 {
     fprintf(stderr, "%s: %s\n", command, err->text);

@@ -136,6 +136,8 @@ int ggn_cmd_visible(int argc, char **argv)
     int rc = base_options_parse(&options, argc, argv, &o, &err);
     for (int i = 0; i < 2 && !rc; i++)
         rc = ggn_image8_read(o.paths[i], &images[i], &err);
+    for (int i = 0; i < 2 && !rc; i++)
+        ggn_cmd_tell_clipped(argv[0], o.paths[i], images[i].clipped);
     if (!rc)
         rc = run(&o, images, &err);
     ggn_image8_release(&images[0]);

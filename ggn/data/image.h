@@ -21,6 +21,7 @@ enum { GGN_IMAGE_MAX_SIDE = 32768, GGN_IMAGE_MAX_PIXELS = 1 << 27 };
 struct ggn_image8 { /* display image: sRGB, 8 bit; owns data [height][width][3] */
     int width, height;
     uint8_t *data;
+    size_t clipped; /* pixels of a float file that were NaN, infinite or negative before they were encoded */
 };
 
 struct ggn_imagef { /* linear light, Rec. 709 primaries; owns data [height][width][channels] */

@@ -173,11 +173,16 @@ int read_channel(const char *path, const char *channel, struct ggn_imagef *image
 
 } // namespace
 
+static bool is_light(float v)
+{
+    return std::isfinite(v) && v >= 0.0f;
+}
+
 extern "C" int ggn_image8_read(const char *path, struct ggn_image8 *image, struct base_err *err)
 {
     return guarded(path, err, [&] {
         bool is_float = false;
-        struct ggn_image8 out = {0, 0, nullptr};
+        struct ggn_image8 out = {0, 0, nullptr, 0};
         int rc = read_rgb<uint8_t>(path, &out, &is_float, err);
         if (rc || !is_float) {
             if (!rc)
@@ -187,8 +192,12 @@ extern "C" int ggn_image8_read(const char *path, struct ggn_image8 *image, struc
         struct ggn_imagef linear = {0, 0, 0, nullptr};
         rc = read_float(path, &linear, err);
         if (!rc) {
-            for (size_t i = 0, n = (size_t)out.width * (size_t)out.height * 3; i < n; i++)
-                out.data[i] = ggn_preprocess(linear.data[i], nullptr, nullptr);
+            for (size_t i = 0, n = (size_t)out.width * (size_t)out.height; i < n; i++) {
+                const float *rgb = linear.data + 3 * i;
+                for (size_t c = 0; c < 3; c++)
+                    out.data[3 * i + c] = ggn_preprocess(rgb[c], nullptr, nullptr);
+                out.clipped += !(is_light(rgb[0]) && is_light(rgb[1]) && is_light(rgb[2]));
+            }
             ggn_imagef_release(&linear);
             *image = out;
         } else {

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "data/image.h"
 #include "data/labels.h"
@@ -143,7 +144,7 @@ static int read_picture(const struct view *v, const struct level *level, struct 
     if (rc)
         return rc;
     size_t n = 3 * (size_t)p->linear.width * (size_t)p->linear.height;
-    p->display = (struct ggn_image8){p->linear.width, p->linear.height, malloc(n)};
+    p->display = (struct ggn_image8){.width = p->linear.width, .height = p->linear.height, .data = malloc(n)};
     if (!p->display.data) {
         release_picture(p);
         return base_fail_nomem(err, path);
@@ -342,7 +343,8 @@ int ggn_sin3d_import_view(const char *dir, const char *out, const struct ggn_sin
         rc = check_levels(&v, o->allow_gaps, err);
     if (!rc)
         rc = init_manifest(&v, o, &m, err);
-    if (!rc && mkdir(out, 0777) != 0 && errno != EEXIST)
+    int made = !rc && mkdir(out, 0777) == 0;
+    if (!rc && !made && errno != EEXIST)
         rc = base_fail(err, BASE_EIO, "%s: %s", out, strerror(errno));
     if (!rc)
         rc = take_over(out, &m, err);
@@ -353,6 +355,8 @@ int ggn_sin3d_import_view(const char *dir, const char *out, const struct ggn_sin
     }
     if (!rc)
         rc = attach_thresholds(&v, out, &m, o->thresholds, labelled, err);
+    if (rc && made)
+        rmdir(out); /* goes only if it is empty */
     seq_manifest_release(&m);
     free(v.levels);
     return rc;

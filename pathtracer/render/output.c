@@ -8,6 +8,7 @@
 
 #include "base/colour.h"
 #include "base/files.h"
+#include "base/text.h"
 #include "base/version.h"
 #include "image/exr.h"
 #include "image/oiio.h"
@@ -29,6 +30,7 @@ static const struct pt_block *block_at(const struct pt_blocks *b, int x, int y)
 
 /* --- EXR ------------------------------------------------------------------------------------------------------------ */
 
+enum { VIEW_NAME = 256 }; /* bytes; no file system has longer names */
 enum { R, G, B, SPP, P_NOISY, ERROR, REASON, FIRST_AOV, CHANNELS_MAX = FIRST_AOV + 7 };
 
 struct exr_source {
@@ -187,17 +189,16 @@ static int stop_map_png(const char *path, const struct pt_render *r, struct base
     return rc;
 }
 
-/* name;t0;…;t15; with the scene file's name without folder and ending. */
+/* name;t0;…;t15; */
 static int stop_map_csv(const char *path, const struct pt_render *r, const char *scene, struct base_err *err)
 {
     struct base_file_out out;
     int rc = base_file_begin(&out, path, err);
     if (rc)
         return rc;
-    const char *slash = strrchr(scene, '/');
-    const char *name = slash ? slash + 1 : scene;
-    const char *dot = strrchr(name, '.');
-    fprintf(out.file, "%.*s;", dot ? (int)(dot - name) : (int)strlen(name), name);
+    char name[VIEW_NAME];
+    base_view_name(scene, name, sizeof name);
+    fprintf(out.file, "%s;", name);
     for (uint32_t i = 0; i < r->blocks.count; i++)
         fprintf(out.file, "%llu;", (unsigned long long)r->blocks.list[i].spp);
     fprintf(out.file, "\n");

@@ -9,6 +9,7 @@
 #include "base/clock.h"
 #include "base/files.h"
 #include "base/lock.h"
+#include "base/text.h"
 #include "base/version.h"
 #include "sequence/builder.h"
 #include "sequence/manifest.h"
@@ -72,6 +73,7 @@ int pt_sequence_choose(const char *text, uint8_t *chosen, uint32_t count, struct
 }
 
 struct recorder {
+    uint64_t dropped; /* samples of the block in hand that were not finite */
     const struct pt_sequence_config *config;
     const struct pt_scene *scene;
     pt_kernel *kernel;
@@ -99,12 +101,7 @@ static void name_view(const struct pt_sequence_config *c, char *scene, char *vie
         snprintf(scene, room, "%.*s", slash ? (int)(slash - text) : (int)strlen(text), text);
         return;
     }
-    slash = strrchr(c->scene_path, '/');
-    text = slash ? slash + 1 : c->scene_path;
-    snprintf(scene, room, "%s", text);
-    char *dot = strrchr(scene, '.');
-    if (dot && dot != scene)
-        *dot = '\0';
+    base_view_name(c->scene_path, scene, room);
     char *dash = strstr(scene, "-view");
     if (dash && dash != scene) {
         snprintf(view, room, "%s", dash + 1);
@@ -251,6 +248,8 @@ static int record_levels(struct recorder *r, struct seq_builder *file, const str
         rc = put_level(r, file, render, 0, full, err);
         full_done |= full;
     }
+    if (render)
+        r->dropped += render->totals.dropped;
     pt_render_destroy(render);
     return rc;
 }
@@ -266,6 +265,8 @@ static int record_reference(struct recorder *r, struct seq_builder *file, const 
         rc = pt_render_advance(render, r->config->reference_spp, &r->hooks, stopped, err);
     if (!rc && !*stopped)
         rc = put_level(r, file, render, 1, 1, err);
+    if (render)
+        r->dropped += render->totals.dropped;
     pt_render_destroy(render);
     return rc;
 }
@@ -276,7 +277,8 @@ static int finish_block(struct recorder *r, struct seq_builder *file, const stru
 {
     char path[4096];
     struct seq_manifest_block entry = {.id = b->id, .x0 = (uint32_t)b->x0, .y0 = (uint32_t)b->y0, .x1 = (uint32_t)b->x1,
-                                       .y1 = (uint32_t)b->y1, .bytes = file->size, .seconds = seconds};
+                                       .y1 = (uint32_t)b->y1, .bytes = file->size, .seconds = seconds,
+                                       .dropped = r->dropped};
     snprintf(entry.file, sizeof entry.file, "block-%05u.lseq", b->id);
     int rc = base_file_join(path, r->config->directory, entry.file, err);
     if (!rc)
@@ -291,6 +293,7 @@ static int record_block(struct recorder *r, const struct pt_block *b, int *stopp
 {
     struct seq_builder file;
     double start_s = base_clock_wall_s();
+    r->dropped = 0;
     int rc = seq_builder_init(&file, (uint32_t)(b->x1 - b->x0), (uint32_t)(b->y1 - b->y0), b->x0, b->y0, b->id,
                               r->manifest.seed, err);
     if (rc)
@@ -367,10 +370,15 @@ static int record_chosen(struct recorder *r, int *stopped, struct base_err *err)
     for (uint32_t i = 0; i < r->grid.count && !rc && !*stopped; i++) {
         if (!r->chosen[i])
             continue;
+        char line[128];
         rc = record_block(r, &r->grid.list[i], stopped, err);
+        if (!rc && !*stopped && r->dropped > 0) {
+            snprintf(line, sizeof line, "block %u: %llu samples were not finite and were dropped; manifest.json counts them",
+                     i, (unsigned long long)r->dropped);
+            r->hooks.warn(r->hooks.data, line);
+        }
         if (rc || *stopped || r->config->quiet)
             continue;
-        char line[128];
         double each_s = (base_clock_wall_s() - start_s) / ++done;
         snprintf(line, sizeof line, "block %u recorded, %u of %u, %.1f s each, %.0f s left", i, done, todo, each_s,
                  each_s * (todo - done));

@@ -4,6 +4,7 @@
 #include <stdio.h>
 
 #include "base/files.h"
+#include "base/text.h"
 
 /* Owns item from here on. Returns it, or NULL when it could not be added. */
 static cJSON *add(cJSON *to, const char *key, cJSON *item, int *failed)
@@ -22,7 +23,10 @@ void base_json_number(cJSON *to, const char *key, double value, int *failed)
 
 void base_json_text(cJSON *to, const char *key, const char *text, int *failed)
 {
-    add(to, key, text ? cJSON_CreateString(text) : cJSON_CreateNull(), failed);
+    cJSON *item = text ? cJSON_CreateString(text) : cJSON_CreateNull();
+    if (item && text)
+        base_utf8_mend(item->valuestring);
+    add(to, key, item, failed);
 }
 
 void base_json_bool(cJSON *to, const char *key, int value, int *failed)

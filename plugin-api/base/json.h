@@ -11,7 +11,7 @@
 
 /* NaN and infinity have no form in JSON: null says "not known". key NULL: appends to an array. */
 void base_json_number(cJSON *to, const char *key, double value, int *failed);
-/* text NULL: null */
+/* text NULL: null. Bytes that are not UTF-8 become '?'. */
 void base_json_text(cJSON *to, const char *key, const char *text, int *failed);
 void base_json_bool(cJSON *to, const char *key, int value, int *failed);
 /* New member or element; borrowed from `to`. */

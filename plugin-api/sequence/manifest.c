@@ -71,17 +71,19 @@ static int get_block(const cJSON *o, const struct seq_manifest *m, struct seq_ma
 {
     const cJSON *file = cJSON_GetObjectItemCaseSensitive(o, "file");
     const cJSON *seconds = cJSON_GetObjectItemCaseSensitive(o, "seconds");
-    double id, x0, y0, x1, y1, bytes;
+    double id, x0, y0, x1, y1, bytes, dropped = 0;
     uint32_t crc;
     if (!get_number(o, "id", 0, UINT32_MAX, &id) || !get_number(o, "x0", 0, m->width - 1.0, &x0) ||
         !get_number(o, "y0", 0, m->height - 1.0, &y0) || !get_number(o, "x1", x0 + 1, m->width, &x1) ||
         !get_number(o, "y1", y0 + 1, m->height, &y1) || !get_number(o, "bytes", 1, 1 << 30, &bytes) ||
+        (cJSON_HasObjectItem(o, "dropped") && !get_number(o, "dropped", 0, 1e15, &dropped)) ||
         !get_crc(o, "crc32", &crc) || !cJSON_IsString(file) || strlen(file->valuestring) >= sizeof b->file ||
         strchr(file->valuestring, '/') || file->valuestring[0] == '.' || file->valuestring[0] == '\0')
         return 0;
     *b = (struct seq_manifest_block){.id = (uint32_t)id, .x0 = (uint32_t)x0, .y0 = (uint32_t)y0, .x1 = (uint32_t)x1,
                                      .y1 = (uint32_t)y1, .bytes = (uint64_t)bytes, .crc32 = crc,
-                                     .seconds = cJSON_IsNumber(seconds) ? seconds->valuedouble : 0.0};
+                                     .seconds = cJSON_IsNumber(seconds) ? seconds->valuedouble : 0.0,
+                                     .dropped = (uint64_t)dropped};
     strcpy(b->file, file->valuestring);
     return 1;
 }
@@ -217,6 +219,8 @@ static void put_block(cJSON *blocks, const struct seq_manifest_block *b, int *fa
     put_crc(o, "crc32", b->crc32, failed);
     if (b->seconds > 0)
         base_json_number(o, "seconds", b->seconds, failed);
+    if (b->dropped > 0)
+        base_json_number(o, "dropped", (double)b->dropped, failed);
 }
 
 static void put_view(cJSON *root, const struct seq_manifest *m, int *failed)

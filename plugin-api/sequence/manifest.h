@@ -18,6 +18,7 @@ struct seq_manifest_block {
     uint64_t bytes;
     uint32_t crc32;
     double seconds; /* wall time that recording it took; 0: not known */
+    uint64_t dropped; /* samples, of levels and reference, that were not finite and count as not taken */
 };
 
 struct seq_manifest {

@@ -165,7 +165,9 @@ static inline int32_t lull_kit_value(const struct lull_param *p, const char *tex
     } else {
         if (!lull_kit_number(text, &number) || (p->type != LULL_PARAM_FLOAT && number != floor(number)))
             return lull_kit_fail(err, LULL_E_VALUE, "%s: '%.80s' is not %s", p->name, text,
-                                 p->type == LULL_PARAM_FLOAT ? "a number" : "an integer");
+                                 p->type == LULL_PARAM_FLOAT  ? "a number"
+                                 : p->type == LULL_PARAM_BOOL ? "0 or 1"
+                                                              : "an integer");
         if (number < min || number > max)
             return lull_kit_fail(err, LULL_E_VALUE, "%s: %.80s is not in [%g, %g]", p->name, text, min, max);
     }

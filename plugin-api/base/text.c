@@ -1,0 +1,54 @@
+#include "base/text.h"
+
+#include <string.h>
+
+int base_utf8_length(const char *s)
+{
+    const unsigned char *u = (const unsigned char *)s;
+    if (u[0] == 0)
+        return 0;
+    if (u[0] < 0x80)
+        return 1;
+    int n = u[0] >= 0xc2 && u[0] <= 0xdf ? 2 : u[0] >= 0xe0 && u[0] <= 0xef ? 3 : u[0] >= 0xf0 && u[0] <= 0xf4 ? 4 : 0;
+    for (int i = 1; i < n; i++)
+        if ((u[i] & 0xc0) != 0x80)
+            return 0;
+    if ((u[0] == 0xe0 && u[1] < 0xa0) || (u[0] == 0xed && u[1] > 0x9f) || (u[0] == 0xf0 && u[1] < 0x90) ||
+        (u[0] == 0xf4 && u[1] > 0x8f))
+        return 0;
+    return n;
+}
+
+void base_utf8_mend(char *s)
+{
+    while (*s != '\0') {
+        int n = base_utf8_length(s);
+        if (n == 0)
+            *s = '?';
+        s += n > 0 ? n : 1;
+    }
+}
+
+void base_view_name(const char *path, char *name, size_t room)
+{
+    const char *slash = strrchr(path, '/'), *at = slash ? slash + 1 : path, *dot = strrchr(at, '.');
+    const char *end = dot && dot != at ? dot : at + strlen(at);
+    char *out = name, *limit = name + room - 1;
+    while (at < end) {
+        int n = base_utf8_length(at);
+        int plain = n > 1 || (n == 1 && (unsigned char)*at >= 0x20 && *at != 0x7f && !strchr(";#\"", *at));
+        if (out + (n > 0 ? n : 1) > limit)
+            break;
+        if (plain) {
+            memcpy(out, at, (size_t)n);
+            out += n;
+        } else
+            *out++ = '_';
+        at += n > 0 ? n : 1;
+    }
+    if (out == name && room > 1)
+        *out++ = '_';
+    *out = '\0';
+    if (name[0] == '.')
+        name[0] = '_';
+}
