@@ -21,7 +21,7 @@ enum { P_MODEL, P_VISIBLE, P_PASSES, P_GATE, P_TAIL, P_GINI, P_FIRST_SPP, P_PREC
 
 static const struct lull_param params[P_COUNT] = {
     [P_MODEL] = LULL_KIT_FILE("model", NULL,
-                              "model file; without it lull-1.ggn beside the criterion, in ../share/lull or in the source "
+                              "model file; without it lull-2.ggn beside the criterion, in ../share/lull or in the source "
                               "tree"),
     [P_VISIBLE] = LULL_KIT_FLOAT("visible", NULL, 0, 1,
                                  "stop when less than this share of viewers would still see noise; without it the model's "
@@ -204,7 +204,7 @@ static int32_t load_model(struct lull_instance *in, const char *path, struct lul
     char found[5000];
 
     if (!path) {
-        if (!gp_model_find("lull-1.ggn", "LULL_MODEL", found, sizeof found))
+        if (!gp_model_find("lull-2.ggn", "LULL_MODEL", found, sizeof found))
             return lull_kit_fail(err, LULL_E_IO, "model: %.480s", found);
         path = found;
     }

@@ -39,7 +39,7 @@ criterion() { # criterion ID MODEL: as create answers
 }
 criterion attributes "$tmp/noise-mask.ggn"
 check "a criterion refuses another's model" $([ $rc = 1 ] && grep -q 'noise-mask.ggn: not a baseline for attributes' "$tmp/out" && echo 1)
-criterion attributes ggn/models/lull-1.ggn
+criterion attributes ggn/models/lull-2.ggn
 check "a criterion refuses a network" $([ $rc = 1 ] && grep -q 'not a baseline' "$tmp/out" && echo 1)
 head -c 3000 "$tmp/attributes.ggn" >"$tmp/short.ggn"
 criterion attributes "$tmp/short.ggn"

@@ -32,7 +32,7 @@ P
 check "uniform costs what uniform costs, the limit is reached by exact stops" $([ $? = 0 ] && echo 1)
 run -d $data
 check "a split without blocks is one line and exit 2" $([ $rc = 2 ] && one_line && grep -q "split 'test'" "$tmp/err" && echo 1)
-run -d $data --split train --baseline ggn/models/lull-1.ggn
+run -d $data --split train --baseline ggn/models/lull-2.ggn
 check "a network is no baseline: one line and exit 2" $([ $rc = 2 ] && one_line && grep -q "not a baseline" "$tmp/err" && echo 1)
 run --split train
 check "no data: one line and exit 2" $([ $rc = 2 ] && one_line && echo 1)
