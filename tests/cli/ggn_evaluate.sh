@@ -66,6 +66,12 @@ $ggn reconstruct "$d" -o "$tmp/r.png" -r "$tmp/ref.png" --json >"$tmp/out" 2>"$t
 check "reconstruct at the labels (100 and 160)" $?
 $ggn flip "$tmp/ref.png" "$tmp/r.png" --json >"$tmp/flip" 2>"$tmp/err" && [ "$(sed 's/.*"mean": \([0-9.]*\).*/\1/' "$tmp/flip")" = "$(sed 's/.*"flip_mean": \([0-9.]*\).*/\1/' "$tmp/out")" ]
 check "its FLIP is that of ggn flip" $?
+# a level itself, and the next above: 100 and 40 of 20, 40, …, 160
+printf 'p3d_toy-view0_part6;100;30;\n' >"$tmp/stops.csv"
+$ggn reconstruct "$d" -o "$tmp/r2.png" -s "$tmp/stops.csv" --json >"$tmp/out" 2>"$tmp/err" && grep -q '"mean_spp": 70.00' "$tmp/out" &&
+    oiiotool "$view/p3d_toy-view0_00100.png" --cut 32x32+0+0 "$view/p3d_toy-view0_00040.png" --cut 32x32+32+0 --origin +0+0 \
+        --mosaic 2x1 "$tmp/r2.png" --fail 0 --warn 0 --diff >"$tmp/err" 2>&1
+check "reconstruct takes the first level that has as many samples, pixel for pixel" $?
 fails "reconstruct: several views" 'view NAME' sh -c "printf 'a;1;2;\nb;1;2;\n' >$tmp/two.csv; $ggn reconstruct $d -o $tmp/r.png -s $tmp/two.csv"
 
 # Damage: each is one clear line and exit 2.

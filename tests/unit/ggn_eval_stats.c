@@ -68,6 +68,10 @@ static void agreement(void **state)
     assert_int_equal(a.below_cap, 3);
     assert_near(a.mae, 610.0 / 4, 1e-9);
     assert_near(a.mae_below_cap, 610.0 / 3, 1e-9);
+    assert_near(a.rmse, 189.80252896102306, 1e-9); /* sqrt(144100 / 4) */
+    assert_near(a.pearson_r, 0.9992308294157498, 1e-12); /* Python's, of the definition */
+    assert_near(a.pearson_r_below_cap, 0.9957550460225943, 1e-12);
+    assert_near(a.spearman, 1.0, 1e-12);
     assert_near(a.share_below, 0.5, 0);
     assert_near(a.early_stop_rate, 0.25, 0); /* 790 < 800; 1700 > 1600 */
     assert_near(a.samples_ratio, 12690.0 / 13100.0, 1e-12);
