@@ -19,7 +19,7 @@
 #include <xmmintrin.h>
 #endif
 
-static const struct ggn_hyper hyper = {GGN_PRESET_LULL, 32, 32, 3, 4, 4, 3};
+static const struct ggn_hyper hyper = {.preset = GGN_PRESET_LULL, .height = 32, .width = 32, .window = 3, .k_r = 4, .k_m = 4, .k_d = 3};
 enum { SIDE = 32, AREA = SIDE * SIDE, BYTES = 3 * AREA };
 
 static struct ggn_model *make(void)
@@ -262,6 +262,48 @@ static void test_zero_variance(void **state)
     (void)state;
 }
 
+/* γ·(x − μ)/√(var + 1e-5) + β (Ioffe & Szegedy 2015, algorithm 1) where the variances are so small that what is added to them counts. */
+static void test_batch_norm_of_tiny_variances(void **state)
+{
+    static struct ggn_graph g;
+    int layers = 0;
+
+    assert_int_equal(ggn_network_build(&g, GGN_NET_M, &hyper, NULL), 0);
+    struct ggn_weights *w = ggn_weights_create(&g, NULL, 1, NULL);
+    struct ggn_exec *e = ggn_exec_create(&g, NULL, 1, GGN_EXEC_GRADS, NULL, NULL);
+    assert_true(w && e);
+    ggn_weights_init(w, GGN_INIT_HE, 3);
+    for (size_t i = 0; i < g.n_stats; i++) {
+        w->mean[i] = (float)ggn_hash_unit((uint32_t)i, 1) - 0.5f;
+        w->var[i] = 2e-5f * (float)ggn_hash_unit((uint32_t)i, 2);
+    }
+    ggn_weights_pack(w, NULL);
+    for (int c = 0; c < g.value[0].c; c++)
+        for (int k = 0; k < AREA; k++)
+            ggn_exec_plane(e, 0, 0, c)[k / SIDE * g.value[0].row + k % SIDE] = (float)ggn_hash_unit((uint32_t)k, (uint32_t)c);
+    ggn_exec_forward(e, w, 1, GGN_EVAL);
+    for (int i = 0; i < g.n_layers; i++) {
+        const struct ggn_layer *l = &g.layer[i];
+        const struct ggn_value *v = &g.value[l->out];
+        layers += l->op == GGN_OP_BN;
+        for (int c = 0; l->op == GGN_OP_BN && c < v->c; c++)
+            for (int y = 0; y < v->h; y++)
+                for (int x = 0; x < v->w; x++) {
+                    size_t at = (size_t)(y * v->row + x), k = (size_t)c;
+                    double in = (double)ggn_exec_plane(e, l->in, 0, c)[at], out = (double)ggn_exec_plane(e, l->out, 0, c)[at];
+                    double mean = (double)w->mean[l->stats + k], sd = sqrt((double)w->var[l->stats + k] + 1e-5);
+                    double want = (double)w->params[l->weight + k] * (in - mean) / sd + (double)w->params[l->bias + k];
+                    /* scale and shift are floats, and their difference may be small */
+                    if (!(fabs(out - want) <= 1e-5 * (fabs(in) + fabs(mean) + 1e-3) / sd))
+                        fail_msg("layer %d, channel %d: %g becomes %g, not %g", i, c, in, out, want);
+                }
+    }
+    assert_true(layers > 0);
+    ggn_exec_destroy(e);
+    ggn_weights_destroy(w);
+    (void)state;
+}
+
 enum { BATCH = 2, PLANES = 9 };
 static float noisy[BATCH * PLANES][AREA], reference[BATCH * 3][AREA];
 static const float *p_noisy[BATCH * PLANES], *p_reference[BATCH * 3], *p_image[BATCH * 3];
@@ -399,7 +441,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_blocks),     cmocka_unit_test(test_flush_to_zero),
         cmocka_unit_test(test_overflowing_weights), cmocka_unit_test(test_bce_extremes),
-        cmocka_unit_test(test_ssim_flat),  cmocka_unit_test(test_zero_variance), cmocka_unit_test(test_equal_labels),
+        cmocka_unit_test(test_ssim_flat),  cmocka_unit_test(test_zero_variance), cmocka_unit_test(test_batch_norm_of_tiny_variances), cmocka_unit_test(test_equal_labels),
         cmocka_unit_test(test_divergence), cmocka_unit_test(test_nan_data),      cmocka_unit_test(test_many_adam_steps)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
