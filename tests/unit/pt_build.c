@@ -183,13 +183,15 @@ static void textures(void **state)
 static void media(void **state)
 {
     (void)state;
+    int warnings = 0;
     struct pt_scene *s = text_scene("MediumInterface \"\" \"fog\" Camera \"perspective\" WorldBegin\n"
                                     "MakeNamedMedium \"fog\" \"string type\" \"homogeneous\" \"rgb sigma_a\" [ 1 2 3 ] "
-                                    "\"rgb sigma_s\" [ 0 0 0 ] \"float scale\" 0.5\n"
+                                    "\"rgb sigma_s\" [ 0 0 0 ] \"float scale\" 0.5 \"float Lescale\" 3\n" /* which scales nothing without Le */
                                     "MakeNamedMedium \"smoke\" \"string type\" \"uniformgrid\" \"integer nx\" 2 \"float density\" [ 1 3 ] "
                                     "\"point3 p0\" [ -1 -1 -1 ] \"point3 p1\" [ 1 1 1 ]\n"
                                     "MediumInterface \"smoke\" \"fog\" Material \"interface\" Shape \"sphere\"",
-                                    NULL, NULL);
+                                    NULL, &warnings);
+    assert_int_equal(warnings, 0);
     assert_int_equal(s->camera.medium, 0); /* named before it was made */
     near(s->media[0].sigma_a.z, 1.5, 1e-6);
     assert_true(s->shapes[0].medium_in == 1 && s->shapes[0].medium_out == 0);
