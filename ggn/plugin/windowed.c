@@ -107,6 +107,9 @@ int32_t gp_windowed_begin_frame(struct lull_instance *in, const struct lull_fram
     in->worker = worker;
     in->workers = count;
     lull_kit_frame_open(in, frame);
+    const struct lull_host *host = in->kit.host;
+    if (in->half_wanted && !(frame->planes & LULL_PLANE_BIT(LULL_PLANE_HALF)) && host && host->log)
+        host->log(host, LULL_LOG_WARNING, in->half_wanted);
     in->rule.spp_max = frame->spp_max;
     in->display = gp_display_of(&in->kit);
     return LULL_OK;

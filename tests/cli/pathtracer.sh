@@ -15,7 +15,7 @@ t "--usage" sh -c "$P --usage | grep -q -- --criterion"
 t "--version" sh -c "$P --version | grep -q 1.0"
 t "--list-criteria names criteria and parameters" sh -c "$P --list-criteria | grep -q '^halfbuf ' && $P --list-criteria | grep -q -- '-p threshold='"
 
-t "--visible is a share that observer and ggn know" sh -c "[ \"\$($P --list-criteria | grep -c -e '-p visible=')\" = 2 ]"
+t "--visible is a share that observer, ggn and the three baselines know" sh -c "[ \"\$($P --list-criteria | grep -c -e '-p visible=')\" = 5 ]"
 t "--visible sets the parameter" sh -c "$P $scene -q -c observer --visible 0.5 --spp 32 --report visible.json && grep -q '\"visible\":.*\"0.5\"' visible.json"
 
 # --- errors: one line, exit 2, nothing left behind ---

@@ -1,0 +1,70 @@
+/* The criterion "ggn": a model that judges by half buffers says so where a host gives none. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include <lull/loader.h>
+
+enum { SIDE = 64 };
+
+static char criteria[2048], lull_1[2048], warning[512];
+
+static void log_line(const struct lull_host *host, int32_t level, const char *text)
+{
+    (void)host;
+    assert_int_equal(level, LULL_LOG_WARNING);
+    snprintf(warning, sizeof warning, "%s", text);
+}
+
+/* What is logged when a frame with these planes begins. model NULL: the one that is shipped. */
+static const char *warned(const char *model, uint32_t planes)
+{
+    static const struct lull_host host = {.struct_size = sizeof host, .max_workers = 1, .log = log_line};
+    const char *dirs[] = {criteria};
+    struct lull_search search = {.dirs = dirs, .dir_count = 1};
+    struct lull_found found;
+    struct lull_error err = {.struct_size = sizeof err};
+    struct lull_instance *in = NULL;
+    struct lull_pair pair = {"model", model};
+    struct lull_rect rect = {0, 0, SIDE, SIDE};
+    struct lull_frame frame = {.struct_size = sizeof frame, .width = SIDE, .height = SIDE, .blocks = &rect, .block_count = 1,
+                               .block_stride = sizeof rect, .planes = planes, .exposure = 1, .transfer = LULL_TRANSFER_SRGB,
+                               .rgb_to_xyz = {0, 0, 0, 0.2, 0.7, 0.1, 0, 0, 0}};
+    warning[0] = '\0';
+    if (lull_open(&search, "ggn", &found, &err) != LULL_OK ||
+        found.criterion->create(&host, &pair, model ? 1 : 0, sizeof pair, &in, &err) != LULL_OK ||
+        found.criterion->begin_frame(in, &frame, &err) != LULL_OK)
+        fail_msg("%s", err.message);
+    found.criterion->destroy(in);
+    return warning;
+}
+
+static void a_missing_half_is_told(void **state)
+{
+    const uint32_t color = LULL_PLANE_BIT(LULL_PLANE_COLOR), half = LULL_PLANE_BIT(LULL_PLANE_HALF);
+    (void)state;
+    assert_string_equal(warned(NULL, color | half), "");
+    assert_non_null(strstr(warned(NULL, color), "half buffers"));
+    assert_non_null(strstr(warning, "lull-1.ggn"));
+    assert_string_equal(warned(lull_1, color), "");
+}
+
+int main(void)
+{
+    char exe[1024];
+    ssize_t length = readlink("/proc/self/exe", exe, sizeof exe - 1);
+    if (length <= 0)
+        return 1;
+    exe[length] = '\0';
+    *strrchr(exe, '/') = '\0';
+    snprintf(criteria, sizeof criteria, "%s/../../lib/lull", exe);
+    snprintf(lull_1, sizeof lull_1, "ggn/models/lull-1.ggn");
+    const struct CMUnitTest tests[] = {cmocka_unit_test(a_missing_half_is_told)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
