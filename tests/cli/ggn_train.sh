@@ -105,30 +105,30 @@ check "preset paper" $?
 
 # the noise picture, dropped at random, averaged weights, no flips: the same bytes after an interruption, and other bytes than without
 more="$tiny --picture 0.7 --average 8 --flips 0"
-$ggn train $more --out "$tmp/g.ggn" -q 2>"$tmp/err" && $ggn inspect "$tmp/g.ggn" 2>"$tmp/err" | grep -q "noise picture.*taken"
+$ggn train $more --out "$tmp/picture.ggn" -q 2>"$tmp/err" && $ggn inspect "$tmp/picture.ggn" 2>"$tmp/err" | grep -q "noise picture.*taken"
 check "a model with the noise picture" $?
-$ggn train $more --out "$tmp/h.ggn" --resume -q 2>"$tmp/err" &
+$ggn train $more --out "$tmp/resumed.ggn" --resume -q 2>"$tmp/err" &
 pid=$!
 for _ in $(seq 1000); do
-    [ "$(cat "$tmp/h.ggn.csv" 2>/dev/null | wc -l)" -ge 4 ] && break
+    [ "$(cat "$tmp/resumed.ggn.csv" 2>/dev/null | wc -l)" -ge 4 ] && break
     sleep 0.01
 done
 kill -INT $pid && wait $pid
 rc=$?
-[ $rc -eq 130 ] && $ggn train $more --out "$tmp/h.ggn" --resume --threads 1 -q 2>"$tmp/err" && cmp "$tmp/g.ggn" "$tmp/h.ggn" 2>"$tmp/err"
+[ $rc -eq 130 ] && $ggn train $more --out "$tmp/resumed.ggn" --resume --threads 1 -q 2>"$tmp/err" && cmp "$tmp/picture.ggn" "$tmp/resumed.ggn" 2>"$tmp/err"
 check "the same bytes when interrupted and resumed, averaged weights included (first run ended with $rc)" $?
 for option in "--picture 1" "--average 9" "--flips 1"; do
-    $ggn train $more $option --out "$tmp/i.ggn" -q 2>"$tmp/err" && ! cmp -s "$tmp/g.ggn" "$tmp/i.ggn"
+    $ggn train $more $option --out "$tmp/i.ggn" -q 2>"$tmp/err" && ! cmp -s "$tmp/picture.ggn" "$tmp/i.ggn"
     check "other bytes with $option" $?
 done
 # half buffers at one level only: it lends the others theirs
 for no in "" --no-pictures; do
-    $ggn evaluate -d $data -m "$tmp/g.ggn" --no-quality --json $no >"$tmp/figures$no" 2>"$tmp/err" || break
+    $ggn evaluate -d $data -m "$tmp/picture.ggn" --no-quality --json $no >"$tmp/figures$no" 2>"$tmp/err" || break
 done && ! cmp -s "$tmp/figures" "$tmp/figures--no-pictures"
 check "evaluate with and without noise pictures" $?
-LULL_MODEL=$tmp/g.ggn $build/bin/lull-check -q "$build/lib/lull/ggn.so:ggn" >"$tmp/err" 2>&1
+LULL_MODEL=$tmp/picture.ggn $build/bin/lull-check -q "$build/lib/lull/ggn.so:ggn" >"$tmp/err" 2>&1
 check "lull-check passes the criterion with this model" $?
-fails "a model of another input to start from" "another size, preset or input" $ggn train $tiny --init "$tmp/g.ggn"
+fails "a model of another input to start from" "another size, preset or input" $ggn train $tiny --init "$tmp/picture.ggn"
 fails "no noise picture in the published preset" "preset paper has neither noise pictures" $ggn train --data $data --preset paper --picture 1
 
 mkdir "$tmp/empty"
