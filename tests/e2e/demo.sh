@@ -44,9 +44,13 @@ t "blocks stop at different samples" test "$(tr ';' '\n' <"$dir/stop-map.csv" | 
 t "the report tells 36 blocks" test "$(grep -c '"reason"' "$dir/report.json")" -eq 36
 t "preview is the image" sh -c "oiiotool $dir/demo.exr --ch R,G,B --clamp:min=0:max=1 --colorconvert linear sRGB -d uint8 -o $dir/x.png && oiiotool --fail 0.005 --failpercent 0 --hardfail 0.01 $dir/x.png $dir/demo.png --diff"
 # the demo's own scene with the default criterion: sky and lit paving are done long before the shade behind the door
-t "the demo's own scene runs" env DEMO_DIR="$dir/own" DEMO_ARGS="--size 240x240 --block 60 --spp-max 400 --seed 3 -q" scripts/demo
+oiiotool scenes/demo-reference.png --resize 240x240 -o "$dir/reference.png"
+t "the demo's own scene runs" env DEMO_DIR="$dir/own" DEMO_REFERENCE="$dir/reference.png" DEMO_BLOCK=60 DEMO_ARGS="--size 240x240 --block 60 --spp-max 400 --seed 3 -q" scripts/demo
 t "the default criterion stopped blocks" grep -q '"reason":[[:space:]]*"criterion"' "$dir/own/report.json"
 t "its blocks differ by four times in samples at least" \
     sh -c "tr ';' '\n' <$dir/own/stop-map.csv | sed 1d | grep . | sort -n | awk 'NR == 1 {a = \$1} {b = \$1} END {exit !(b >= 4 * a)}'"
+t "three pictures side by side" sh -c "oiiotool --info $dir/own/three.png | grep -q ' 736 x *240'"
+t "the sky has no visible noise, a frame is round a block that has" sh -c "oiiotool $dir/own/visible.png --cut 50x50+5+5 --printstats |
+    awk '/Stats Avg/ {exit !(\$3 < 0.05)}' && oiiotool $dir/own/visible.png --cut 240x1+0+121 --printstats | grep -q 'Stats Max: 1.0* 1.0* 1.0*'"
 echo "1..$n"
 exit $bad

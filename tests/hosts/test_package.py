@@ -208,10 +208,10 @@ def test_mask_of_pathtracer():
     png.write(tmp("mask.png"), np.dstack([(255 * mask).round().astype(np.uint8)] * 3))
     for criterion, dial, value in (("halfbuf", "threshold", .03), ("ggn", "visible", .9)):
         subprocess.run([PATHTRACER, "scenes/cornell-box.pbrt", "-q", "--size", "96x80", "--block", "48", "-c", criterion, "-p",
-                        f"{dial}={value}", "--spp-max", "500", "--mask", tmp("mask.png"), "--report", tmp("mask.json")],
+                        f"{dial}={value}", "--spp-max", "1500", "--mask", tmp("mask.png"), "--report", tmp("mask.json")],
                        check=True)
         wanted = json.loads(Path(tmp("mask.json")).read_text())
-        f = lull.Frame(lull.load(criterion, **{dial: value}), 96, 80, block=48, spp_max=500, mask=png.read_grey(tmp("mask.png")))
+        f = lull.Frame(lull.load(criterion, **{dial: value}), 96, 80, block=48, spp_max=1500, mask=png.read_grey(tmp("mask.png")))
         d = Playback(f, PATHTRACER, "scenes/cornell-box.pbrt", [])
         assert d.run().outcome == "done"
         own = outputs.report(d, mask=tmp("mask.png"))
