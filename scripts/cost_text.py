@@ -17,7 +17,7 @@ def percent(value):
 
 
 def row_of(p):
-    label = p[0] + ("" if is_default(p) else ", %s %g" % (p[1], p[2]))
+    label = p[0] + ("" if is_default(p) or p[0] == "limit" else ", %s %g" % (p[1], p[2]))
     return [label, figure(over_scenes(p, "samples"), "%.0f"), figure(over_scenes(p, "to_limit")),
             figure(over_scenes(p, "total_ratio")), percent(over_scenes(p, "noisy", mean)), percent(over_scenes(p, "early", mean)),
             figure(over_scenes(p, "worst")), figure(over_scenes(p, "flip", mean), "%.3f"),
