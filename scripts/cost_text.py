@@ -103,7 +103,7 @@ dial show. What it does with real halves is in the next table, and against peopl
 
 def references(out):
     blocks = [b for s in out["sets"]["test"]["scenes"].values() for b in s["blocks"]]
-    return ("%d blocks of %d test scenes so far (`scripts/dataset.plan` has 90 of 15). No reference has 8,192 samples: %d of the blocks have an independent one of 4,096, the others are "
+    return ("%d blocks of %d test scenes so far, of those in `scripts/dataset.plan`. No reference has 8,192 samples: %d of the blocks have an independent one of 4,096, the others are "
             "compared (FLIP) with the mean of their own full level, 384 to 2,700 samples, from which their simulated levels were made (%d blocks); relMSE is the variance that "
             "their two halves show. Thresholds come from the halves too, up to 10,000 samples.\n"
             % (len(blocks), len(out["sets"]["test"]["scenes"]), sum(b["reference"] for b in blocks), sum(b["simulated"] for b in blocks)))
