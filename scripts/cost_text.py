@@ -185,7 +185,7 @@ def precision(out, points):
     text = ("\n## Precision and stability\n\nWhat number formats, instruction sets, threads and compilers change. p: four golden windows of the published networks, against double "
             "(`ggn golden`).\n\n")
     text += table(["in p", "moved at most", "windows"], [[g["name"], "%.1e" % g["p_moved"], str(g["windows"])] for g in out.get("golden", [])])
-    text += ("\nIn decisions: bfloat16 products change 2 of 368 verdicts and 2 of 13 stops of the shipped model (`ggn evaluate --bf16`, [ggn/README.md](../ggn/README.md)); a check in which the "
+    text += ("\nIn decisions: bfloat16 products change 2 of 368 verdicts and 2 of 13 stops of lull-1 (`ggn evaluate --bf16`, [ggn/README.md](../ggn/README.md)); a check in which the "
              "host has flush-to-zero and denormals-are-zero on gives the same answer (`lull-check`, check `fp`, every criterion; `tests/hard/ggn_nn_hard.c`: p moves by less than 10⁻⁶ "
              "with activations in the denormal range). Stops of render and replay agree one by one, p to 14 digits (`tests/e2e/ggn_replay.sh`).\n\nIn images (pixels of the EXR files of small "
              "renders with a criterion):\n\n")
