@@ -252,7 +252,10 @@ static const struct base_option options[] = {
     {"seed", 0, "N", TO(seed), 0, UINT32_MAX, .help = "Seed of all random numbers (default 0)"},
     {"effects", 0, NULL, TO(all_effects), .words = effect_words, .help = "all: use the general kernel (same image, slower)"},
     {"strict", 0, NULL, TO(strict), .help = "Unsupported scene features are errors"},
-    {"threads", 't', "N", TO(threads), 1, 1024, .help = "Worker threads (default: all processors)"},
+    {"threads", 't', "N", TO(threads), 1, 1024,
+     .help = "Worker threads (default: all processors; of several processes on a host, their share)"},
+    {"rank-timeout", 0, "SECONDS", TO(rank_timeout_s), 0.1, 1e6,
+     .help = "Under mpirun: give up when a process has owed an answer for so long (default 120)"},
     {.help = "What to write:"},
     {"output", 'o', "FILE.exr", TO(output), .output = 1, .words = exr,
      .help = "Multi-layer EXR (default: the scene's name in the current folder, if nothing else is asked for)"},
@@ -363,9 +366,10 @@ int pt_cli_parse(struct pt_cli *cli, int argc, char **argv, struct base_err *err
         .list = options,
         .args_max = 1,
         .args = offsetof(struct pt_cli, scene),
+        .uses_peers = 1,
     };
-    *cli = (struct pt_cli){.block_width = 200, .block_height = 200, .checkpoint_every_s = 60.0, .sampler = -1,
-                           .strategy = -1, .filter = -1, .max_depth = PT_CLI_SCENES_DEPTH};
+    *cli = (struct pt_cli){.block_width = 200, .block_height = 200, .checkpoint_every_s = 60.0, .rank_timeout_s = 120.0,
+                           .sampler = -1, .strategy = -1, .filter = -1, .max_depth = PT_CLI_SCENES_DEPTH};
     int rc = base_options_parse(&command, argc, argv, cli, err);
     if (!rc)
         rc = check_together(cli, err);

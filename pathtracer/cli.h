@@ -31,6 +31,7 @@ struct pt_cli {
     uint32_t param_count;
     const char *mask;           /* picture that scales the dial per block; NULL = none */
     int threads;                /* 0 = all processors */
+    double rank_timeout_s;      /* wait for an answer of another process */
     uint32_t seed;
     const char *output, *preview, *report;
     const char *stop_maps[PT_CLI_MAX_STOP_MAPS];

@@ -5,16 +5,22 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+#include <zlib.h>
 
 #include "base/clock.h"
 #include "base/files.h"
 #include "base/inputs.h"
+#include "base/peers.h"
+#include "base/version.h"
 #include "cli.h"
 #include "explain.h"
 #include "pbrt/load.h"
 #include "quote_output.h"
 #include "render/checkpoint.h"
+#include "render/crew.h"
+#include "render/crew_member.h"
 #include "render/host_find.h"
+#include "render/host_state.h"
 #include "render/output.h"
 #include "render/progress.h"
 #include "render/quote.h"
@@ -46,6 +52,8 @@ static void catch_interrupt(void)
 struct session {
     struct pt_cli cli;
     struct base_inputs scene_files, judging; /* what was read; judging: plugin and mask */
+    struct base_peers *peers;  /* NULL: this process is alone */
+    struct pt_crew *crew;      /* of rank 0 */
     struct base_threads *threads;
     struct pt_scene *scene;
     struct pt_scene_defaults defaults;
@@ -62,9 +70,12 @@ struct session {
     char default_output[1024];
 };
 
+/* Of several processes rank 0 speaks. */
 static void say(void *data, const char *line)
 {
     struct session *s = data;
+    if (s->peers && s->peers->rank > 0)
+        return;
     pt_progress_clear(&s->progress);
     fprintf(stderr, "pathtracer: %s\n", line);
 }
@@ -127,6 +138,7 @@ static int make_config(const struct session *s, struct pt_render_config *config,
         .order_seed = cli->order_seed,
         .pilot_spp = cli->pilot_spp,
         .pilot_s = cli->pilot_s,
+        .crew = s->crew,
     };
     memcpy(config->crop, cli->has_crop ? cli->crop : s->defaults.crop, sizeof config->crop);
     override_integrator(cli, &config->integrator);
@@ -200,7 +212,7 @@ static int file_crc(const char *path, uint32_t *crc, struct base_err *err)
 static int describe_settings(struct session *s, const struct pt_render_config *c, struct base_err *err)
 {
     uint32_t scene_crc = 0, judging_crc = 0;
-    if (!s->cli.checkpoint)
+    if (!s->cli.checkpoint && !s->peers)
         return 0;
     int rc = base_inputs_crc32(&s->scene_files, &scene_crc, err);
     if (!rc)
@@ -231,6 +243,40 @@ static int describe_settings(struct session *s, const struct pt_render_config *c
     return used < room ? 0 : base_fail(err, BASE_EINVAL, "the criterion's parameters are too long");
 }
 
+/* --- several processes ------------------------------------------------------------------------------------------------ */
+
+/* What every process of a job must agree about: the settings, and the model that the criterion starts with. */
+static int describe_job(const struct session *s, char *text, size_t room, struct base_err *err)
+{
+    unsigned char *state = NULL;
+    size_t size = 0;
+    int rc = s->render && s->criterion ? pt_criterion_save(s->criterion, &state, &size, err) : 0;
+    if (rc)
+        return rc;
+    snprintf(text, room, "version=%s\n%scriterion-model-crc=%08x\n", BASE_VERSION, s->settings,
+             (unsigned)crc32_z(0, state, size));
+    free(state);
+    return 0;
+}
+
+/* Rank 0, ready to begin. */
+static int greet_crew(const struct session *s, struct base_err *err)
+{
+    char text[sizeof s->settings + 128];
+    int rc = s->crew ? describe_job(s, text, sizeof text, err) : 0;
+    return rc || !s->crew ? rc : pt_crew_greet(s->crew, text, err);
+}
+
+/* As many as there are processors for each process of this host. */
+static int threads_wanted(const struct session *s)
+{
+    int available = base_threads_available();
+    if (s->cli.threads > 0)
+        return s->cli.threads;
+    long share = s->peers ? sysconf(_SC_NPROCESSORS_ONLN) / base_peers_on_host(s->peers) : available;
+    return share < 1 ? 1 : share < available ? (int)share : available;
+}
+
 /* --- rendering ------------------------------------------------------------------------------------------------------ */
 
 /* A checkpoint that fails on the way costs nothing yet: the next one may succeed. */
@@ -250,7 +296,7 @@ static int after_slice(void *data, struct pt_render *render, struct base_err *er
     struct session *s = data;
     (void)err;
     pt_progress_update(&s->progress, render);
-    if (s->cli.checkpoint && base_clock_wall_s() >= s->checkpoint_at_s)
+    if (s->cli.checkpoint && !interrupt_seen && base_clock_wall_s() >= s->checkpoint_at_s)
         save_now_and_then(s, render);
     return 0;
 }
@@ -299,7 +345,7 @@ static int write_outputs(struct session *s, int was_interrupted, struct base_err
     const struct pt_cli *cli = &s->cli;
     struct pt_output_info info = {.scene = cli->scene, .params = cli->params, .param_count = cli->param_count,
                                   .mask = cli->mask, .effects = s->scene->effects, .kernel = s->kernel_name,
-                                  .threads = base_threads_count(s->threads), .reproducible = cli->reproducible,
+                                  .threads = pt_render_threads(s->render), .reproducible = cli->reproducible,
                                   .aov = cli->aov, .scene_bytes = s->scene->stats.bytes, .interrupted = was_interrupted};
     write_or_keep(s, pt_output_exr, cli->output, &info, err);
     write_or_keep(s, write_preview, cli->preview, &info, err);
@@ -333,15 +379,26 @@ static void tell_summary(struct session *s)
     }
 }
 
-/* The render with its criterion, as the command line says, and as far as a checkpoint to be resumed had come. */
-static int open_render(struct session *s, struct base_err *err)
+/* The render with its criterion, as the command line says. */
+static int create_render(struct session *s, struct base_err *err)
 {
     struct pt_render_config config;
     int rc = make_config(s, &config, err);
-    if (rc || (rc = open_criterion(s, err)) != 0 || (rc = check_outputs(s, err)) != 0 ||
-        (rc = describe_settings(s, &config, err)) != 0)
-        return rc;
-    rc = pt_render_create(&config, s->scene, s->kernel, s->threads, s->criterion, &s->render, err);
+    if (!rc)
+        rc = open_criterion(s, err);
+    if (!rc && (!s->peers || s->peers->rank == 0)) /* the others write nothing */
+        rc = check_outputs(s, err);
+    if (!rc)
+        rc = describe_settings(s, &config, err);
+    return rc ? rc : pt_render_create(&config, s->scene, s->kernel, s->threads, s->criterion, &s->render, err);
+}
+
+/* …and as far as a checkpoint to be resumed had come. */
+static int open_render(struct session *s, struct base_err *err)
+{
+    int rc = create_render(s, err);
+    if (!rc)
+        rc = greet_crew(s, err);
     if (!rc && s->cli.resume)
         rc = pt_checkpoint_load(s->cli.checkpoint, s->render, s->settings, err);
     if (rc == BASE_EIO)
@@ -447,6 +504,15 @@ static int debug_path(struct session *s, struct base_err *err)
     return 0;
 }
 
+/* What deals with the settings of a recording besides pt_sequence_record. */
+static int open_sequence(struct session *s, struct pt_render_config *config, struct base_err *err)
+{
+    int rc = make_config(s, config, err);
+    if (!rc && s->cli.criterion)
+        rc = open_criterion(s, err);
+    return rc ? rc : describe_settings(s, config, err);
+}
+
 static int record_sequence(struct session *s, int *status, struct base_err *err)
 {
     struct pt_sequence_config config = {.directory = s->cli.sequence, .levels = s->cli.levels,
@@ -454,13 +520,13 @@ static int record_sequence(struct session *s, int *status, struct base_err *err)
                                         .reference_spp = s->cli.reference_spp, .scene_path = s->cli.scene,
                                         .name = s->cli.name, .view = s->cli.view, .quiet = s->cli.quiet,
                                         .slice = after_slice};
-    int rc = make_config(s, &config.render, err);
+    int rc = open_sequence(s, &config.render, err);
     if (!rc)
         rc = file_crc(s->cli.scene, &config.scene_crc, err);
     if (!rc)
         rc = base_inputs_crc32(&s->scene_files, &config.inputs_crc, err);
-    if (!rc && s->cli.criterion)
-        rc = open_criterion(s, err);
+    if (!rc)
+        rc = greet_crew(s, err);
     if (rc)
         return rc;
     int was_interrupted = 0;
@@ -471,6 +537,18 @@ static int record_sequence(struct session *s, int *status, struct base_err *err)
     return rc;
 }
 
+/* Threads and scene. */
+static int open_session(struct session *s, struct base_err *err)
+{
+    s->threads = base_threads_create(threads_wanted(s), err);
+    if (!s->threads)
+        return BASE_ENOMEM;
+    int rc = load_scene(s, err);
+    if (rc == BASE_EIO)
+        rc = err->code = BASE_EINVAL; /* the scene and its files are inputs */
+    return rc;
+}
+
 static int run(struct session *s, int *status, struct base_err *err)
 {
     if (s->cli.action == PT_CLI_LIST_CRITERIA) {
@@ -478,15 +556,9 @@ static int run(struct session *s, int *status, struct base_err *err)
             return base_fail(err, BASE_EINVAL, "no criterion was found (LULL_PLUGIN_PATH names more folders to look in)");
         return 0;
     }
-    s->threads = base_threads_create(s->cli.threads > 0 ? s->cli.threads : base_threads_available(), err);
-    if (!s->threads)
-        return BASE_ENOMEM;
-    int rc = load_scene(s, err);
-    if (rc) {
-        if (rc == BASE_EIO)
-            rc = err->code = BASE_EINVAL; /* the scene and its files are inputs */
+    int rc = open_session(s, err);
+    if (rc)
         return rc;
-    }
     catch_interrupt();
     switch (s->cli.action) {
     case PT_CLI_EXPLAIN:
@@ -503,13 +575,64 @@ static int run(struct session *s, int *status, struct base_err *err)
     }
 }
 
+/* Makes everything as rank 0 makes it, and tells it what that is. */
+static int join_crew(struct session *s, struct base_err *err)
+{
+    char text[sizeof s->settings + 128];
+    struct pt_render_config config;
+    int rc = open_session(s, err);
+    if (!rc)
+        rc = s->cli.action == PT_CLI_SEQUENCE ? open_sequence(s, &config, err) : create_render(s, err);
+    if (!rc)
+        rc = describe_job(s, text, sizeof text, err);
+    return rc ? rc : pt_crew_member_join(s->peers, base_threads_count(s->threads), text, err);
+}
+
+/* Any process but rank 0. rc: what became of the command line. Who interrupts or ends the job does it through rank 0. */
+static int run_member(struct session *s, int rc, struct base_err *err)
+{
+    struct base_err unheard = {0};
+    int renders = s->cli.action == PT_CLI_RENDER || s->cli.action == PT_CLI_QUOTE || s->cli.action == PT_CLI_SEQUENCE;
+    signal(SIGINT, SIG_IGN);
+    signal(SIGTERM, SIG_IGN);
+    if (!rc && renders)
+        rc = join_crew(s, err);
+    if (rc)
+        pt_crew_member_fail(s->peers, err, &unheard);
+    const struct pt_row_maker maker = {s->scene, s->kernel, NULL};
+    return pt_crew_member_serve(s->peers, s->threads, rc || !renders ? NULL : &maker, &unheard);
+}
+
+static void release(struct session *s)
+{
+    pt_quote_destroy(s->quote);
+    pt_render_destroy(s->render);
+    pt_criterion_destroy(s->criterion);
+    pt_mask_release(&s->mask);
+    pt_scene_destroy(s->scene);
+    base_threads_destroy(s->threads);
+    base_inputs_release(&s->scene_files);
+    base_inputs_release(&s->judging);
+    pt_cli_release(&s->cli);
+}
+
 int main(int argc, char **argv)
 {
     static struct session s = {.scene_files = BASE_INPUTS_EMPTY, .judging = BASE_INPUTS_EMPTY};
-    struct base_err err = {0};
+    struct base_err err = {0}, peers_err = {0};
     int status = 0;
     s.start_s = base_clock_wall_s();
     int rc = pt_cli_parse(&s.cli, argc, argv, &err);
+    if (base_peers_open(&s.peers, rc ? &peers_err : &err) != 0 && !rc)
+        rc = err.code;
+    if (s.peers && s.peers->rank > 0) {
+        rc = run_member(&s, rc, &err);
+        release(&s);
+        base_peers_close(s.peers);
+        return rc ? EXIT_FAILED : 0;
+    }
+    if (s.peers && pt_crew_create(s.peers, s.cli.rank_timeout_s, &s.crew, rc ? &peers_err : &err) != 0 && !rc)
+        rc = err.code;
     if (!rc) {
         pt_progress_init(&s.progress, s.cli.quiet ? NULL : stderr);
         rc = run(&s, &status, &err);
@@ -519,18 +642,12 @@ int main(int argc, char **argv)
         fprintf(stderr, "pathtracer: %s\n", err.text);
         status = rc == BASE_EINVAL || rc == BASE_EIO ? EXIT_BAD_INPUT : EXIT_FAILED;
     }
-    pt_quote_destroy(s.quote);
-    pt_render_destroy(s.render);
-    pt_criterion_destroy(s.criterion);
-    pt_mask_release(&s.mask);
-    pt_scene_destroy(s.scene);
-    base_threads_destroy(s.threads);
-    base_inputs_release(&s.scene_files);
-    base_inputs_release(&s.judging);
-    pt_cli_release(&s.cli);
+    release(&s);
     if ((fflush(stdout) != 0 || ferror(stdout)) && status == 0) {
         fprintf(stderr, "pathtracer: cannot write standard output\n");
         status = EXIT_BAD_INPUT;
     }
+    pt_crew_dismiss(s.crew, status);
+    base_peers_close(s.peers);
     return status;
 }

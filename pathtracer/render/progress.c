@@ -55,7 +55,7 @@ static struct outlook look(const struct pt_render *r)
 {
     struct outlook o = {.known = 1, .low = UINT64_MAX};
     struct pt_outlook_work *work = malloc(r->blocks.count * sizeof *work);
-    int threads = base_threads_count(r->threads);
+    int threads = pt_render_threads(r);
     for (uint32_t i = 0; i < r->blocks.count && work; i++) {
         const struct pt_block *b = &r->blocks.list[i];
         o.done_s += b->thread_s;

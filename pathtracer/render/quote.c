@@ -74,7 +74,7 @@ int pt_quote_create(const struct pt_render *r, const struct lull_criterion *tabl
     if (!q)
         return base_fail_nomem(err, "quote");
     q->block_count = r->blocks.count;
-    q->threads = base_threads_count(r->threads);
+    q->threads = pt_render_threads(r);
     q->block_cost_s = calloc(q->block_count, sizeof *q->block_cost_s);
     int rc = q->block_cost_s ? add_rows(q, table, pairs, pair_count, err) : base_fail_nomem(err, "quote");
     for (int i = 0; i < q->row_count && table && !rc; i++)

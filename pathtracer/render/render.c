@@ -11,20 +11,26 @@
  * nothing. */
 static const double SLICE_S = 0.25;
 
-/* One row of one block from its spp to `to`: the unit of work. Results are summed by the main thread in a fixed order. */
-struct item {
+/* Rows that each thread has to choose from in a slice: few enough that a block is sampled in one go, enough that threads and
+ * processes end together. */
+static const double ROWS_PER_THREAD = 128.0;
+
+/* What a block may get in one slice before others have had as much: its samples again, or this. */
+enum { LEAD_SPP = 8 };
+
+/* A block that is to be sampled. */
+struct candidate {
     uint32_t block;
-    int32_t y;
-    uint32_t from, to;
-    uint64_t rays;
-    double thread_s;
-    uint32_t dropped, first_x, first_sample; /* the first dropped sample of the row */
+    int octave;      /* of its samples: who has few goes first */
+    double left_s;   /* thread seconds to its check, for want of better its samples to there */
+    double per_spp_s; /* thread seconds per sample of all its pixels; 0 = not known */
 };
 
 struct pt_render_work {
-    struct item *items;  /* [rows of all blocks] */
+    struct pt_row *items; /* [rows of all blocks] */
     uint32_t *order;     /* [rows of all blocks] item to be done n-th */
     size_t count;
+    struct candidate *candidates; /* [blocks] */
     uint32_t *due;       /* [blocks] */
     uint8_t *final;      /* [blocks] */
     struct lull_decision *decisions; /* [blocks] */
@@ -36,6 +42,11 @@ uint32_t pt_render_active(const struct pt_render *r)
     for (uint32_t i = 0; i < r->blocks.count; i++)
         n += r->blocks.list[i].reason == PT_REASON_NONE;
     return n;
+}
+
+int pt_render_threads(const struct pt_render *r)
+{
+    return base_threads_count(r->threads) + pt_crew_threads(r->config.crew);
 }
 
 double pt_render_elapsed_s(const struct pt_render *r)
@@ -53,6 +64,7 @@ static struct pt_render_work *work_create(const struct pt_blocks *blocks)
         return NULL;
     w->items = calloc(rows, sizeof *w->items);
     w->order = calloc(rows, sizeof *w->order);
+    w->candidates = calloc(n, sizeof *w->candidates);
     w->due = calloc(n, sizeof *w->due);
     w->final = calloc(n, sizeof *w->final);
     w->decisions = calloc(n, sizeof *w->decisions);
@@ -65,6 +77,7 @@ static void work_destroy(struct pt_render_work *w)
         return;
     free(w->items);
     free(w->order);
+    free(w->candidates);
     free(w->due);
     free(w->final);
     free(w->decisions);
@@ -122,7 +135,7 @@ int pt_render_create(const struct pt_render_config *config, const struct pt_scen
         rc = pt_film_init(&r->film, r->blocks.x0, r->blocks.y0, r->blocks.x1, r->blocks.y1, planes, err);
     if (!rc) {
         struct pt_render_work *w = r->work = work_create(&r->blocks);
-        if (!w || !w->items || !w->order || !w->due || !w->final || !w->decisions)
+        if (!w || !w->items || !w->order || !w->candidates || !w->due || !w->final || !w->decisions)
             rc = base_fail_nomem(err, "work list");
     }
     if (!rc && criterion)
@@ -152,27 +165,23 @@ void pt_render_destroy(struct pt_render *r)
 static void sample_row(void *data, long n, int worker)
 {
     struct pt_render *r = data;
-    struct item *item = &r->work->items[r->work->order[n]];
-    const struct pt_block *block = &r->blocks.list[item->block];
-    uint32_t planes = r->film.planes;
-    double start_s = base_clock_thread_s();
+    const struct pt_row_maker maker = {r->scene, r->kernel, &r->config.integrator};
     (void)worker;
-    for (int x = block->x0; x < block->x1; x++) {
-        size_t index = pt_film_index(&r->film, x, item->y);
-        struct pt_film_pixel pixel;
-        pt_film_load(&r->film, index, &pixel);
-        for (uint32_t s = item->from; s < item->to; s++) {
-            struct pt_path_result path;
-            r->kernel(r->scene, &r->config.integrator, (uint32_t)x, (uint32_t)item->y, s, &path);
-            item->rays += path.rays;
-            if (!pt_film_add(&pixel, planes, s, &path) && item->dropped++ == 0) {
-                item->first_x = (uint32_t)x;
-                item->first_sample = s;
-            }
-        }
-        pt_film_store(&r->film, index, &pixel);
+    pt_row_sample(&maker, &r->film, &r->work->items[r->work->order[n]]);
+}
+
+/* All rows of the slice. Not 0: none of them, as pt_crew_sample. */
+static int sample_rows(struct pt_render *r, const struct pt_render_hooks *hooks, struct base_err *err)
+{
+    const struct pt_render_work *w = r->work;
+    if (!r->config.crew) {
+        base_threads_for(r->threads, (long)w->count, sample_row, r);
+        return 0;
     }
-    item->thread_s = base_clock_thread_s() - start_s;
+    struct pt_crew_slice slice = {.maker = {r->scene, r->kernel, &r->config.integrator}, .film = &r->film, .rows = w->items,
+                                  .order = w->order, .count = w->count, .interrupted = hooks->interrupted,
+                                  .data = hooks->data};
+    return pt_crew_sample(r->config.crew, r->threads, &slice, err);
 }
 
 /* Samples up to which a block goes now. */
@@ -182,32 +191,85 @@ static uint64_t goal(const struct pt_render *r, const struct pt_block *b)
     return most > 0 && b->next_spp > most ? most : b->next_spp;
 }
 
-/* Lists the rows of every active block that has not reached its next check, at most `step` samples further. */
-static size_t list_items(struct pt_render *r, uint64_t step)
+static int octave_of(uint64_t spp)
 {
-    struct pt_render_work *w = r->work;
-    w->count = 0;
+    int octave = 0;
+    for (uint64_t n = spp / LEAD_SPP; n > 1; n /= 2)
+        octave++;
+    return octave;
+}
+
+static int by_turn(const void *a, const void *b)
+{
+    const struct candidate *x = a, *y = b;
+    if (x->octave != y->octave)
+        return (x->octave > y->octave) - (x->octave < y->octave);
+    if (x->left_s != y->left_s)
+        return (x->left_s < y->left_s) - (x->left_s > y->left_s);
+    return (x->block > y->block) - (x->block < y->block);
+}
+
+/* The blocks that have not reached their next check, whose turn it is first. */
+static uint32_t list_candidates(struct pt_render *r)
+{
+    uint32_t n = 0;
     for (uint32_t i = 0; i < r->blocks.count; i++) {
         const struct pt_block *b = &r->blocks.list[i];
         uint64_t end = goal(r, b);
         if (b->reason != PT_REASON_NONE || b->spp >= end)
             continue;
-        uint64_t to = end - b->spp > step ? b->spp + step : end;
-        for (int y = b->y0; y < b->y1; y++) {
-            w->order[w->count] = (uint32_t)w->count;
-            w->items[w->count++] = (struct item){.block = i, .y = y, .from = (uint32_t)b->spp, .to = (uint32_t)to};
-        }
+        double per_spp_s = b->spp > 0 ? b->thread_s / (double)b->spp : 0.0, left = (double)(end - b->spp);
+        r->work->candidates[n++] = (struct candidate){i, octave_of(b->spp), left * (per_spp_s > 0.0 ? per_spp_s : 1.0),
+                                                      per_spp_s};
     }
-    if (r->config.order_seed != 0) {
-        uint32_t state = r->config.order_seed;
-        for (size_t i = w->count; i > 1; i--) {
-            state = state * 1664525u + 1013904223u; /* Numerical Recipes' quick generator: any order will do */
-            size_t j = state % i;
-            uint32_t swap = w->order[i - 1];
-            w->order[i - 1] = w->order[j];
-            w->order[j] = swap;
-        }
+    qsort(r->work->candidates, n, sizeof r->work->candidates[0], by_turn);
+    return n;
+}
+
+static void shuffle(struct pt_render_work *w, uint32_t state)
+{
+    for (size_t i = w->count; i > 1; i--) {
+        state = state * 1664525u + 1013904223u; /* Numerical Recipes' quick generator: any order will do */
+        size_t j = state % i;
+        uint32_t swap = w->order[i - 1];
+        w->order[i - 1] = w->order[j];
+        w->order[j] = swap;
     }
+}
+
+static void list_block(struct pt_render *r, const struct candidate *c, double step)
+{
+    struct pt_render_work *w = r->work;
+    const struct pt_block *b = &r->blocks.list[c->block];
+    uint64_t end = goal(r, b), most = b->spp > LEAD_SPP ? b->spp : LEAD_SPP;
+    most = step < (double)most ? (uint64_t)fmax(step, 1.0) : most;
+    uint64_t to = end - b->spp > most ? b->spp + most : end;
+    for (int y = b->y0; y < b->y1; y++) {
+        w->order[w->count] = (uint32_t)w->count;
+        w->items[w->count++] = (struct pt_row){.block = c->block, .y = y, .x0 = b->x0, .x1 = b->x1,
+                                               .from = (uint32_t)b->spp, .to = (uint32_t)to};
+    }
+}
+
+/* Lists rows worth span_s wall seconds. Returns how many, 0 when every block is at its check. */
+static size_t list_items(struct pt_render *r, double span_s)
+{
+    struct pt_render_work *w = r->work;
+    double threads = pt_render_threads(r), rows = 0.0, per_spp_s = 0.0;
+    uint32_t chosen = 0, n = list_candidates(r);
+    int known = 1;
+    while (chosen < n && rows < threads * ROWS_PER_THREAD) {
+        const struct candidate *c = &w->candidates[chosen++];
+        rows += r->blocks.list[c->block].y1 - r->blocks.list[c->block].y0;
+        per_spp_s += c->per_spp_s;
+        known &= c->per_spp_s > 0.0;
+    }
+    double busy = r->busy_threads > 0.0 ? r->busy_threads : threads;
+    w->count = 0;
+    for (uint32_t k = 0; k < chosen; k++)
+        list_block(r, &w->candidates[k], known ? span_s * busy / per_spp_s : 1.0);
+    if (r->config.order_seed != 0)
+        shuffle(w, r->config.order_seed);
     return w->count;
 }
 
@@ -217,7 +279,7 @@ static double gather(struct pt_render *r)
     const struct pt_render_work *w = r->work;
     double thread_s = 0.0;
     for (size_t k = 0; k < w->count; k++) {
-        const struct item *item = &w->items[k];
+        const struct pt_row *item = &w->items[k];
         struct pt_block *b = &r->blocks.list[item->block];
         uint64_t samples = (uint64_t)(b->x1 - b->x0) * (item->to - item->from);
         b->rays += item->rays;
@@ -242,38 +304,28 @@ static double recent(double before, double now)
     return before > 0.0 ? 0.7 * before + 0.3 * now : now;
 }
 
-static uint64_t active_pixels(const struct pt_render *r)
-{
-    uint64_t pixels = 0;
-    for (uint32_t i = 0; i < r->blocks.count; i++) {
-        const struct pt_block *b = &r->blocks.list[i];
-        if (b->reason == PT_REASON_NONE && b->spp < goal(r, b))
-            pixels += (uint64_t)(b->x1 - b->x0) * (uint64_t)(b->y1 - b->y0);
-    }
-    return pixels;
-}
-
-/* Samples about SLICE_S worth, less when the time budget ends sooner. Returns 0 when every block is at its check. */
-static int slice(struct pt_render *r)
+/* Samples about SLICE_S worth, less when the time budget ends sooner. *more is 0 when every block is at its check. After a
+ * failure, as when it was interrupted on the way, everything is as before. */
+static int slice(struct pt_render *r, const struct pt_render_hooks *hooks, int *more, struct base_err *err)
 {
     double span_s = SLICE_S;
     if (r->config.time_budget_s > 0.0)
         span_s = fmax(0.01, fmin(span_s, r->config.time_budget_s - pt_render_elapsed_s(r)));
-    uint64_t pixels = active_pixels(r);
-    if (pixels == 0)
+    *more = list_items(r, span_s) > 0;
+    if (!*more)
         return 0;
-    double step = r->samples_per_s * span_s / (double)pixels;
-    list_items(r, step > 1.0 ? (uint64_t)fmin(step, 1e9) : 1);
     uint64_t before = r->totals.samples;
     double start_s = base_clock_wall_s();
-    base_threads_for(r->threads, (long)r->work->count, sample_row, r);
+    int rc = sample_rows(r, hooks, err);
     double wall_s = base_clock_wall_s() - start_s;
-    double thread_s = gather(r);
     r->totals.render_s += wall_s;
+    if (rc)
+        return rc == PT_CREW_STOPPED ? 0 : rc;
+    double thread_s = gather(r);
     r->samples_per_s = recent(r->samples_per_s, (double)(r->totals.samples - before) / fmax(wall_s, 1e-6));
     r->busy_threads = recent(r->busy_threads, thread_s / fmax(wall_s, 1e-6));
     r->sampled_rows = (long)r->work->count;
-    return 1;
+    return 0;
 }
 
 /* --- checks --------------------------------------------------------------------------------------------------------- */
@@ -417,10 +469,17 @@ static int pilot_is_over(const struct pt_render *r)
 int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum pt_render_outcome *outcome,
                   struct base_err *err)
 {
-    int rc = 0;
+    int rc = 0, more = 0;
     *outcome = PT_RENDER_DONE;
     while (pt_render_active(r) > 0) {
-        if (!slice(r)) {
+        if ((rc = slice(r, hooks, &more, err)) != 0) {
+            struct base_err why = {0};
+            *outcome = PT_RENDER_INTERRUPTED;
+            if (suspend(r, hooks, PT_REASON_INTERRUPT, &why) != 0 && hooks->warn)
+                hooks->warn(hooks->data, why.text);
+            break;
+        }
+        if (!more) {
             if (pilot_is_over(r)) {
                 *outcome = PT_RENDER_PILOT;
                 break;
@@ -455,16 +514,18 @@ int pt_render_advance(struct pt_render *r, uint64_t spp, const struct pt_render_
 {
     for (uint32_t i = 0; i < r->blocks.count; i++)
         r->blocks.list[i].next_spp = spp;
-    while (slice(r)) {
-        int rc = hooks->slice ? hooks->slice(hooks->data, r, err) : 0;
+    for (;;) {
+        int more = 0, rc = slice(r, hooks, &more, err);
+        if (rc || !more)
+            return rc;
+        rc = hooks->slice ? hooks->slice(hooks->data, r, err) : 0;
         if (rc)
             return rc;
         if (hooks->interrupted && hooks->interrupted(hooks->data)) {
             *stopped = 1;
-            break;
+            return 0;
         }
     }
-    return 0;
 }
 
 void pt_render_judge(struct pt_render *r, const struct pt_render_hooks *hooks)

@@ -3,8 +3,9 @@
  * schedules each, until none is active.
  *
  * Between two checks the work is cut into slices of a fraction of a second, after which the caller may show progress, write
- * a checkpoint or ask for an end. Slices leave no trace in the image: samples of a pixel are summed in index order whatever
- * the slices, threads and order of blocks. Not thread-safe; uses the pool that it is given.
+ * a checkpoint or ask for an end. A slice takes as many blocks as its threads need rows, those first that are furthest from
+ * their check. Slices leave no trace in the image: samples of a pixel are summed in index order whatever the slices,
+ * threads, processes and order of blocks. Not thread-safe; uses the pool that it is given.
  */
 #ifndef PT_RENDER_RENDER_H
 #define PT_RENDER_RENDER_H
@@ -15,6 +16,7 @@
 #include "base/threads.h"
 #include "integ/integrator.h"
 #include "render/blocks.h"
+#include "render/crew.h"
 #include "render/host.h"
 #include "render/film.h"
 
@@ -32,6 +34,7 @@ struct pt_render_config {
     uint32_t planes;         /* PT_FILM_* wanted besides those of the criterion */
     struct pt_integrator integrator; /* want_aux is set by the renderer */
     uint32_t order_seed;     /* not 0: work is handed out in a shuffled order (tests) */
+    struct pt_crew *crew;    /* borrows; processes that help to sample, NULL: none */
 };
 
 struct pt_render_totals {
@@ -92,7 +95,8 @@ void pt_render_destroy(struct pt_render *render);
 int pt_render_open_frame(const struct pt_render *render, struct pt_criterion *criterion, struct base_err *err);
 
 /* Renders until all blocks are stopped, time is up, a pilot is over, or interrupted() says so. A pilot leaves the render
- * as it is between two slices: going on gives what it would have been without. */
+ * as it is between two slices: going on gives what it would have been without. When a member of the crew is lost the render
+ * ends as if interrupted, with that error. */
 int pt_render_run(struct pt_render *render, const struct pt_render_hooks *hooks, enum pt_render_outcome *outcome,
                   struct base_err *err);
 
@@ -103,6 +107,7 @@ int pt_render_advance(struct pt_render *render, uint64_t spp, const struct pt_re
 void pt_render_judge(struct pt_render *render, const struct pt_render_hooks *hooks);
 
 uint32_t pt_render_active(const struct pt_render *render);
+int pt_render_threads(const struct pt_render *render); /* that sample, those of the crew too */
 double pt_render_elapsed_s(const struct pt_render *render); /* render_s + criterion_s */
 
 #endif

@@ -11,6 +11,7 @@
 #include <sys/stat.h>
 
 #include "base/files.h"
+#include "base/peers.h"
 #include "base/version.h"
 
 enum { EXIT_UNWRITTEN = 2, MAX_OPTIONS = 96, KEY_LONG = 256, KEY_USAGE = KEY_LONG + MAX_OPTIONS, KEY_HELP, KEY_VERSION };
@@ -174,9 +175,11 @@ static void print_help(const struct base_options *options, const char *program, 
 
 _Noreturn static void answer(const struct base_options *options, const char *program, int key)
 {
-    if (key == KEY_VERSION)
+    if (key == KEY_VERSION) {
         printf("%.*s (Lull) %s\n", (int)strcspn(program, " "), program, BASE_VERSION);
-    else if (key == KEY_USAGE)
+        if (options->uses_peers)
+            printf("MPI: %s\n", base_peers_version());
+    } else if (key == KEY_USAGE)
         print_help(options, program, ARGP_HELP_USAGE);
     else
         print_help(options, program, ARGP_HELP_SHORT_USAGE | ARGP_HELP_LONG | ARGP_HELP_DOC);

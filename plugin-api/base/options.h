@@ -52,6 +52,7 @@ struct base_options {
     int args_min, args_max; /* arguments that are no options */
     size_t args;            /* offset of their const char *[args_max], borrowed from argv */
     int args_output;        /* which of them, from 1, names a file to be written; 0: none */
+    int uses_peers;         /* --version says which MPI there is */
     size_t arg_count;       /* offset of an int that gets their number; 0: nobody asks */
 };
 

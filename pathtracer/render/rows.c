@@ -1,0 +1,61 @@
+#include "render/rows.h"
+
+#include <string.h>
+
+#include "base/clock.h"
+
+void pt_row_sample(const struct pt_row_maker *maker, struct pt_film *film, struct pt_row *row)
+{
+    uint32_t planes = film->planes;
+    double start_s = base_clock_thread_s();
+    for (int x = row->x0; x < row->x1; x++) {
+        size_t index = pt_film_index(film, x, row->y);
+        struct pt_film_pixel pixel;
+        pt_film_load(film, index, &pixel);
+        for (uint32_t s = row->from; s < row->to; s++) {
+            struct pt_path_result path;
+            maker->kernel(maker->scene, maker->integrator, (uint32_t)x, (uint32_t)row->y, s, &path);
+            row->rays += path.rays;
+            if (!pt_film_add(&pixel, planes, s, &path) && row->dropped++ == 0) {
+                row->first_x = (uint32_t)x;
+                row->first_sample = s;
+            }
+        }
+        pt_film_store(film, index, &pixel);
+    }
+    row->thread_s = base_clock_thread_s() - start_s;
+}
+
+size_t pt_row_bytes(const struct pt_row *row, uint32_t planes)
+{
+    return (size_t)(row->x1 - row->x0) * pt_film_pixel_bytes(planes);
+}
+
+/* The row's part of one of the film's arrays. */
+static struct pt_film_array part(const struct pt_film *film, const struct pt_row *row, struct pt_film_array whole)
+{
+    size_t pixel = whole.bytes / film->pixels, first = pt_film_index(film, row->x0, row->y);
+    return (struct pt_film_array){(unsigned char *)whole.data + first * pixel, (size_t)(row->x1 - row->x0) * pixel};
+}
+
+void pt_row_save(const struct pt_film *film, const struct pt_row *row, unsigned char *bytes)
+{
+    struct pt_film_array arrays[PT_FILM_ARRAYS];
+    int n = pt_film_list_arrays(film, arrays);
+    for (int i = 0; i < n; i++) {
+        struct pt_film_array p = part(film, row, arrays[i]);
+        memcpy(bytes, p.data, p.bytes);
+        bytes += p.bytes;
+    }
+}
+
+void pt_row_restore(struct pt_film *film, const struct pt_row *row, const unsigned char *bytes)
+{
+    struct pt_film_array arrays[PT_FILM_ARRAYS];
+    int n = pt_film_list_arrays(film, arrays);
+    for (int i = 0; i < n; i++) {
+        struct pt_film_array p = part(film, row, arrays[i]);
+        memcpy(p.data, bytes, p.bytes);
+        bytes += p.bytes;
+    }
+}

@@ -1,0 +1,109 @@
+#include "base/peers.h"
+
+#include <dlfcn.h>
+#include <errno.h>
+#include <limits.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+/* The implementation's one symbol. */
+typedef int open_fn(struct base_peers **out, struct base_err *err);
+static const char MODULE[] = "../lib/lull-mpi.so"; /* from the program's folder */
+
+/* What launchers leave in the environment: Open MPI, any with PMIx, MPICH and Slurm. */
+static int was_launched(void)
+{
+    static const char *const marks[] = {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK"};
+    for (size_t i = 0; i < sizeof marks / sizeof marks[0]; i++)
+        if (getenv(marks[i]))
+            return 1;
+    return 0;
+}
+
+static int launched_alone(void)
+{
+    const char *count = getenv("OMPI_COMM_WORLD_SIZE");
+    count = count ? count : getenv("PMI_SIZE");
+    return count && strcmp(count, "1") == 0;
+}
+
+/* Stays loaded until the program ends, as MPI wants it. */
+static void *module_symbol(const char *name)
+{
+    char path[PATH_MAX + sizeof MODULE];
+    ssize_t n = readlink("/proc/self/exe", path, PATH_MAX - 1);
+    if (n <= 0)
+        return NULL;
+    path[n] = '\0';
+    char *slash = strrchr(path, '/');
+    memcpy(slash ? slash + 1 : path, MODULE, sizeof MODULE);
+    void *module = dlopen(path, RTLD_NOW | RTLD_GLOBAL); /* GLOBAL: MPI libraries load parts of themselves */
+    return module ? dlsym(module, name) : NULL;
+}
+
+int base_peers_open(struct base_peers **out, struct base_err *err)
+{
+    open_fn *open = NULL;
+    *out = NULL;
+    if (!was_launched() || launched_alone())
+        return 0;
+    void *symbol = module_symbol("base_peers_open_mpi");
+    memcpy(&open, &symbol, sizeof open);
+    if (!open)
+        return base_fail(err, BASE_EINVAL, "started by an MPI launcher, but this program has no MPI (its lib/lull-mpi.so): "
+                                           "build it with MPI installed, or start it without the launcher");
+    return open(out, err);
+}
+
+void base_peers_close(struct base_peers *peers)
+{
+    if (peers)
+        peers->calls->close(peers);
+}
+
+void base_peers_abort(struct base_peers *peers, int status)
+{
+    peers->calls->abort(peers, status);
+}
+
+int base_peers_send(struct base_peers *peers, int rank, void *data, size_t size, struct base_err *err)
+{
+    return peers->calls->send(peers, rank, data, size, err);
+}
+
+int base_peers_receive(struct base_peers *peers, double wait_s, int *rank, void **data, size_t *size, struct base_err *err)
+{
+    return peers->calls->receive(peers, wait_s, rank, data, size, err);
+}
+
+static int same_host(const struct base_peers *peers, int rank)
+{
+    return strcmp(peers->list[rank].host, peers->list[peers->rank].host) == 0;
+}
+
+int base_peers_on_host(const struct base_peers *peers)
+{
+    int n = 0;
+    for (int i = 0; i < peers->count; i++)
+        n += same_host(peers, i);
+    return n;
+}
+
+int base_peers_find_dead(const struct base_peers *peers)
+{
+    for (int i = 0; i < peers->count; i++)
+        if (same_host(peers, i) && kill((pid_t)peers->list[i].pid, 0) != 0 && errno == ESRCH)
+            return i;
+    return -1;
+}
+
+const char *base_peers_version(void)
+{
+    const char *(*version)(void) = NULL;
+    void *symbol = module_symbol("base_peers_version_mpi");
+    memcpy(&version, &symbol, sizeof version);
+    return version ? version() : "none (built without it)";
+}
