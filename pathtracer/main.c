@@ -406,6 +406,11 @@ static int open_render(struct session *s, struct base_err *err)
     return rc;
 }
 
+static int status_of(enum pt_render_outcome outcome)
+{
+    return outcome == PT_RENDER_INTERRUPTED ? EXIT_INTERRUPTED : outcome == PT_RENDER_LOST ? EXIT_BAD_INPUT : 0;
+}
+
 static int render_image(struct session *s, int *status, struct base_err *err)
 {
     enum pt_render_outcome outcome;
@@ -418,7 +423,7 @@ static int render_image(struct session *s, int *status, struct base_err *err)
     rc = pt_render_run(s->render, &hooks, &outcome, err);
     pt_progress_clear(&s->progress);
     struct base_err write_err = {0};
-    if (write_outputs(s, outcome == PT_RENDER_INTERRUPTED, &write_err) != 0) {
+    if (write_outputs(s, status_of(outcome) != 0, &write_err) != 0) {
         if (rc)
             say(s, write_err.text); /* besides the render's own error: it tells where the image is */
         else
@@ -426,7 +431,7 @@ static int render_image(struct session *s, int *status, struct base_err *err)
         return rc;
     }
     tell_summary(s);
-    *status = outcome == PT_RENDER_INTERRUPTED ? EXIT_INTERRUPTED : 0;
+    *status = status_of(outcome);
     return rc;
 }
 
@@ -469,11 +474,11 @@ static int quote_image(struct session *s, int *status, struct base_err *err)
     s->checkpoint_at_s = base_clock_wall_s() + s->cli.checkpoint_every_s;
     rc = pt_render_run(s->render, &hooks, &outcome, err);
     pt_progress_clear(&s->progress);
-    if (!rc && s->cli.checkpoint && outcome != PT_RENDER_INTERRUPTED)
+    if (!rc && s->cli.checkpoint && status_of(outcome) == 0)
         rc = pt_checkpoint_save(s->cli.checkpoint, s->render, s->settings, err);
-    if (!rc)
+    if (!rc && outcome != PT_RENDER_LOST)
         rc = tell_quote(s, load_s, outcome == PT_RENDER_INTERRUPTED, err);
-    *status = outcome == PT_RENDER_INTERRUPTED ? EXIT_INTERRUPTED : 0;
+    *status = status_of(outcome);
     return rc;
 }
 

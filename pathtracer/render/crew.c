@@ -7,8 +7,7 @@
 #include "base/clock.h"
 #include "render/crew_messages.h"
 
-/* Parcels with one member, and the rows per thread in one: few enough that nobody is left with many at the end of a slice, no
- * more than a tenth of a second's work. */
+/* Parcels with one member, and the rows per thread in one: few enough that nobody is left with many when a slice ends. */
 enum { PARCELS = 2, MOST_ROWS = 32, SHARES = 4 };
 
 /* How often rank 0 looks for messages while it samples. */
@@ -187,7 +186,7 @@ void pt_crew_dismiss(struct pt_crew *crew, int status)
     free(crew);
 }
 
-/* --- dealing out rows --------------------------------------------------------------------------------------------------- */
+/* --- dealing out rows ------------------------------------------------------------------------------------------------ */
 
 static void fail_with(struct sampling *s, int rc)
 {

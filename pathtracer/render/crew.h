@@ -1,10 +1,10 @@
 /*
- * The crew: the other processes of an MPI job, as rank 0 sees them. Rank 0 has the scene's only film, asks the criterion,
- * shows progress, writes; the crew samples rows for it (crew_member.h) and keeps nothing.
+ * The crew: the other processes of an MPI job, as rank 0 sees them. Rank 0 has the only film, asks the criterion, shows
+ * progress, writes; the crew samples rows for it (crew_member.h) and keeps nothing.
  *
- * Who is idle is given the next rows of the slice with the sums that they have so far, and sends both back. A row is with one
- * process at a time, so that the film has the bytes that one process would give it (rows.h). Two parcels are with
- * each member, so that it need not wait for rank 0. One thread only: that which opened the peers.
+ * Who is idle is given the next rows of the slice with the sums that they have so far, and sends both back. A row is with
+ * one process at a time, so that the film has the bytes that one process would give it (rows.h). Two parcels are with each
+ * member, so that it need not wait for rank 0. One thread only: that which opened the peers.
  */
 #ifndef PT_RENDER_CREW_H
 #define PT_RENDER_CREW_H
@@ -45,8 +45,8 @@ struct pt_crew_slice {
     void *data;
 };
 
-/* Samples the rows, with the threads here and by the crew. PT_CREW_STOPPED when interrupted() said so, negative when a member
- * was lost: then the film is as it was before and so are the rows. */
+/* Samples the rows, with the threads here and by the crew. PT_CREW_STOPPED when interrupted() said so, negative when a
+ * member was lost: then the film is as it was before and so are the rows. */
 enum { PT_CREW_STOPPED = 1 };
 int pt_crew_sample(struct pt_crew *crew, struct base_threads *threads, const struct pt_crew_slice *slice,
                    struct base_err *err);

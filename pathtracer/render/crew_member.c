@@ -97,7 +97,7 @@ static void do_row(struct member *m, struct parcel *p, struct pt_row *row, unsig
     pthread_mutex_unlock(&m->lock);
 }
 
-/* --- the thread that serves --------------------------------------------------------------------------------------------- */
+/* --- the thread that serves ------------------------------------------------------------------------------------------- */
 
 static int accept(struct member *m, void *data, size_t size, struct base_err *err)
 {

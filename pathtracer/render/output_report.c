@@ -74,6 +74,18 @@ static void add_totals(cJSON *root, const struct pt_render *r, int *failed)
     base_json_number(o, "dropped_samples", (double)t->dropped, failed);
 }
 
+/* How many took part, and what went between them. */
+static void add_processes(cJSON *root, const struct pt_crew *crew, int *failed)
+{
+    base_json_number(root, "processes", pt_crew_processes(crew), failed);
+    if (!crew)
+        return;
+    const struct pt_crew_traffic *traffic = pt_crew_traffic(crew);
+    base_json_number(root, "messages", (double)traffic->messages, failed);
+    base_json_number(root, "message_bytes", (double)traffic->bytes, failed);
+    base_json_number(root, "message_wait_s", traffic->waiting_s, failed);
+}
+
 /* The first few dropped samples, for --debug-path. */
 static void add_dropped(cJSON *root, const struct pt_render *r, int *failed)
 {
@@ -104,6 +116,7 @@ int pt_output_report(const char *path, const struct pt_render *r, const struct p
     add_block_size(root, r->config.block_width, r->config.block_height, &failed);
     base_json_number(root, "seed", r->config.integrator.seed, &failed);
     base_json_number(root, "threads", info->threads, &failed);
+    add_processes(root, r->config.crew, &failed);
     add_criterion(root, r, info, &failed);
     base_json_text(root, "mask", info->mask, &failed);
     cJSON *effects = base_json_array(root, "effects", &failed);

@@ -457,6 +457,18 @@ static int suspend(struct pt_render *r, const struct pt_render_hooks *hooks, int
     return rc;
 }
 
+/* Who is left has a second to live: first things first, and the criterion is not asked. */
+static int lost(struct pt_render *r, const struct pt_render_hooks *hooks, const struct base_err *why, struct base_err *err)
+{
+    int rc = hooks->suspend ? hooks->suspend(hooks->data, r, err) : 0;
+    if (hooks->warn)
+        hooks->warn(hooks->data, why->text);
+    for (uint32_t i = 0; i < r->blocks.count; i++)
+        if (r->blocks.list[i].reason == PT_REASON_NONE)
+            r->blocks.list[i].reason = PT_REASON_INTERRUPT;
+    return rc;
+}
+
 /* A block of this wave has the samples of a pilot before it is at its check. */
 static int pilot_is_over(const struct pt_render *r)
 {
@@ -469,14 +481,13 @@ static int pilot_is_over(const struct pt_render *r)
 int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum pt_render_outcome *outcome,
                   struct base_err *err)
 {
+    struct base_err why = {0};
     int rc = 0, more = 0;
     *outcome = PT_RENDER_DONE;
     while (pt_render_active(r) > 0) {
-        if ((rc = slice(r, hooks, &more, err)) != 0) {
-            struct base_err why = {0};
-            *outcome = PT_RENDER_INTERRUPTED;
-            if (suspend(r, hooks, PT_REASON_INTERRUPT, &why) != 0 && hooks->warn)
-                hooks->warn(hooks->data, why.text);
+        if (slice(r, hooks, &more, &why) != 0) {
+            *outcome = PT_RENDER_LOST;
+            rc = lost(r, hooks, &why, err);
             break;
         }
         if (!more) {

@@ -67,7 +67,13 @@ struct pt_render {
     long sampled_rows;                /* what those threads had to share */
 };
 
-enum pt_render_outcome { PT_RENDER_DONE, PT_RENDER_OUT_OF_TIME, PT_RENDER_INTERRUPTED, PT_RENDER_PILOT };
+enum pt_render_outcome {
+    PT_RENDER_DONE,
+    PT_RENDER_OUT_OF_TIME,
+    PT_RENDER_INTERRUPTED,
+    PT_RENDER_PILOT,
+    PT_RENDER_LOST /* a process of the crew: ended as if interrupted, and hooks.warn was told why */
+};
 
 struct pt_render_hooks {
     /* After every slice; a negative code ends pt_render_run with it. May be NULL. */
@@ -95,8 +101,7 @@ void pt_render_destroy(struct pt_render *render);
 int pt_render_open_frame(const struct pt_render *render, struct pt_criterion *criterion, struct base_err *err);
 
 /* Renders until all blocks are stopped, time is up, a pilot is over, or interrupted() says so. A pilot leaves the render
- * as it is between two slices: going on gives what it would have been without. When a member of the crew is lost the render
- * ends as if interrupted, with that error. */
+ * as it is between two slices: going on gives what it would have been without. */
 int pt_render_run(struct pt_render *render, const struct pt_render_hooks *hooks, enum pt_render_outcome *outcome,
                   struct base_err *err);
 

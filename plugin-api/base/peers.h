@@ -1,6 +1,6 @@
 /*
- * The processes of one job, as a launcher such as mpirun starts them: which of them this is, how many there are, and messages
- * of bytes between them. Rank 0 is the one that people talk to.
+ * The processes of one job, as a launcher such as mpirun starts them: which of them this is, how many there are, and
+ * messages of bytes between them. Rank 0 is the one that people talk to.
  *
  * The only implementation speaks MPI and lives in a shared object of its own (plugin-api/mpi), which is loaded only by a
  * process that a launcher has started: a program needs no MPI to be built or to run alone. Messages from one process to
@@ -47,10 +47,10 @@ void base_peers_close(struct base_peers *peers);
 /* Ends every process now, whatever it is doing; returns if it cannot. */
 void base_peers_abort(struct base_peers *peers, int status);
 
-/* Hands `data` (from malloc, owned by the peers from here on, also after a failure) to another process. Does not wait. */
+/* Hands `data` (from malloc, the peers' own from here on, also after a failure) to another process. Does not wait. */
 int base_peers_send(struct base_peers *peers, int rank, void *data, size_t size, struct base_err *err);
-/* The next message of any process, waiting for it up to wait_s. 1: there was one, *data is the caller's to free; 0: there was
- * none; negative: an error. */
+/* The next message of any process, waiting for it up to wait_s. 1: there was one, *data is the caller's to free; 0: there
+ * was none; negative: an error. */
 int base_peers_receive(struct base_peers *peers, double wait_s, int *rank, void **data, size_t *size, struct base_err *err);
 
 /* Processes of the job on this one's host, itself included. */
