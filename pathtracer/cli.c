@@ -242,6 +242,8 @@ static const struct base_option options[] = {
      .help = "Look from E at A with U up, in the scene's world, instead of through the scene's camera"},
     {"fov", 0, "DEGREES", TO(view.fov_deg), 1e-3, 179.9,
      .help = "Field of view over the image's short side, instead of the scene's"},
+    {"light-selection", 0, NULL, TO(light_selection), .words = pt_light_selection_words,
+     .help = "How next-event estimation picks among many lights (default hierarchy: by distance and orientation too)"},
     {"sampler", 0, NULL, TO(sampler), .words = pt_sampler_words, .help = "Instead of the scene's"},
     {"integrator", 0, NULL, TO(strategy), .words = pt_strategy_words,
      .help = "path: next-event estimation with multiple importance sampling (default); bsdf-only: brute force, for "

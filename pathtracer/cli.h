@@ -46,6 +46,7 @@ struct pt_cli {
     int json;
     int debug[3];               /* x, y, sample of --debug-path */
     int all_effects, strict, quiet, reproducible;
+    int light_selection;        /* enum pt_light_selection */
     int sampler, strategy, filter; /* enums of scene/settings.h; -1 = the scene's */
     double filter_radius;       /* <= 0: the usual one of the filter */
     int max_depth;              /* -1 = unlimited, PT_CLI_SCENES_DEPTH */

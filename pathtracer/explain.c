@@ -58,6 +58,7 @@ void pt_explain(const struct pt_scene *scene, const struct pt_scene_defaults *de
     }
     printf("kernel: %s\n", name);
     print_times(scene, defaults, integrator, kernel);
+    printf("light selection: %s, %d emitters\n", scene->light_tree ? "hierarchy" : "power", (int)scene->emitter_count);
     printf("scene: %lld triangles, %lld quadrics, %lld instances, %lld lights, %lld materials, %lld textures, %.1f MB\n",
            stats->triangles, stats->quadrics, stats->instances, stats->lights, stats->materials, stats->textures,
            (double)stats->bytes * 1e-6);

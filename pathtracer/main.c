@@ -93,7 +93,8 @@ static void note(void *data, const char *line)
 static int load_scene(struct session *s, struct base_err *err)
 {
     struct pt_load_options options = {.strict = s->cli.strict, .width = s->cli.width, .height = s->cli.height,
-                                      .view = s->cli.view, .forced = s->cli.all_effects ? PT_FX_ALL : 0,
+                                      .view = s->cli.view, .light_selection = s->cli.light_selection,
+                                      .forced = s->cli.all_effects ? PT_FX_ALL : 0,
                                       .quiet = s->cli.quiet, .inputs = &s->scene_files, .warn = note, .warn_data = s};
     int rc = pt_scene_load(s->cli.scene, &options, &s->scene, &s->defaults, err);
     if (rc)
@@ -223,10 +224,12 @@ static int describe_settings(struct session *s, const struct pt_render_config *c
     size_t room = sizeof s->settings, used = (size_t)snprintf(
         s->settings, room,
         "scene-crc=%08x\nsize=%dx%d\ncrop=%d,%d,%d,%d\nblock=%dx%d\nspp-min=%llu\nspp-max=%llu\nuniform=%d\nmax-seam=%g\n"
-        "aov=%u\nseed=%u\nsampler=%d\nintegrator=%d\nfilter=%d:%gx%g:%g\nmax-depth=%d\nrr-depth=%d\nclamp=%g\n",
+        "aov=%u\nseed=%u\nsampler=%d\nintegrator=%d\nfilter=%d:%gx%g:%g\n"
+        "light-selection=%s\nmax-depth=%d\nrr-depth=%d\nclamp=%g\n",
         scene_crc, c->width, c->height, c->crop[0], c->crop[1], c->crop[2], c->crop[3], c->block_width, c->block_height,
         (unsigned long long)c->spp_min, (unsigned long long)c->spp_max, c->uniform, c->max_seam, c->planes, i->seed,
-        i->sampler, i->strategy, i->filter, (double)i->filter_x, (double)i->filter_y, (double)i->filter_sigma, i->max_depth,
+        i->sampler, i->strategy, i->filter, (double)i->filter_x, (double)i->filter_y, (double)i->filter_sigma,
+        pt_light_selection_words[s->cli.light_selection], i->max_depth,
         i->rr_depth, (double)i->max_component);
     const struct pt_view *view = &s->cli.view;
     used += (size_t)snprintf(s->settings + used, room - used, "fov=%.17g\nlook-at=", view->fov_deg);

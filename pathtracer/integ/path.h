@@ -38,7 +38,7 @@ struct pt_path {
     struct pt_sampler sampler;
     struct pt_ray ray;
     pt_vec3 throughput, radiance;
-    pt_vec3 p_prev;      /* last vertex, and … */
+    struct pt_receiver prev; /* last vertex, and … */
     float pdf_prev;      /* … density of the direction taken there; 0: no other strategy could have found what comes next */
     float eta_scale;     /* undoes in the roulette what refraction did to the throughput */
     int32_t medium;      /* the ray is in it, -1 = vacuum */
@@ -131,12 +131,12 @@ PT_KERNEL_INLINE float pt_mis_weight(float p, float q)
     return 1.0f / (1.0f + r * r);
 }
 
-PT_KERNEL_INLINE int pt_path_sample_light(pt_effects fx, const struct pt_path *path, pt_vec3 p, struct pt_sample2 u,
-                                          struct pt_light_sample *light)
+PT_KERNEL_INLINE int pt_path_sample_light(pt_effects fx, const struct pt_path *path, const struct pt_receiver *at,
+                                          struct pt_sample2 u, struct pt_light_sample *light)
 {
     if (path->scene->emitter_count == 0 || path->settings->strategy != PT_STRATEGY_MIS)
         return 0;
-    return pt_light_sample(fx, path->scene, p, pt_sampler_1d(&path->sampler, PT_DIM_LIGHT_PICK), u.x, u.y, light);
+    return pt_light_sample(fx, path->scene, at, pt_sampler_1d(&path->sampler, PT_DIM_LIGHT_PICK), u.x, u.y, light);
 }
 
 /* What a light adds if nothing is in between. It is worked out before the shadow ray is traced, together with the path's
@@ -197,7 +197,7 @@ PT_KERNEL_INLINE void pt_path_add_emission(pt_effects fx, struct pt_path *path, 
         return;
     float weight = 1.0f;
     if (path->pdf_prev > 0.0f && path->settings->strategy == PT_STRATEGY_MIS)
-        weight = pt_mis_weight(path->pdf_prev, pt_light_area_pdf(fx, path->scene, at->shape, at->primitive, path->p_prev,
+        weight = pt_mis_weight(path->pdf_prev, pt_light_area_pdf(fx, path->scene, at->shape, at->primitive, &path->prev,
                                                                  at->p, at->s.n_geometric, path->ray.direction));
     pt_vec3 l = v3_scale(v3_mul(path->throughput, light->emission), weight);
     path->radiance = v3_add(path->radiance, l);
@@ -260,15 +260,15 @@ PT_KERNEL_INLINE int pt_path_cross_medium(pt_effects fx, struct pt_path *path, f
     pt_vec3 p = v3_madd(start, event.t, path->ray.direction), wo = v3_neg(path->ray.direction), wi;
     if (path->trace)
         pt_trace_scatter(path->trace, path->medium, p, path->throughput);
+    path->prev = (struct pt_receiver){p, v3_splat(0.0f), PT_RECEIVER_VOLUME};
     struct pt_light_plan plan;
-    if (pt_path_sample_light(fx, path, p, pt_sampler_2d(&path->sampler, PT_DIM_LIGHT), &plan.light)) {
+    if (pt_path_sample_light(fx, path, &path->prev, pt_sampler_2d(&path->sampler, PT_DIM_LIGHT), &plan.light)) {
         float phase = pt_phase_eval(medium->g, wo, plan.light.wi);
         pt_path_plan_light(fx, path, v3_splat(phase), phase, p, path->medium, &plan);
         pt_path_resolve_light(fx, path, &plan);
     }
     struct pt_sample2 u = pt_sampler_2d(&path->sampler, PT_DIM_PHASE);
     path->pdf_prev = pt_phase_sample(medium->g, wo, u.x, u.y, &wi);
-    path->p_prev = p;
     path->ray = (struct pt_ray){p, wi, 0.0f, INFINITY, path->ray.time};
     path->depth++;
     return pt_path_survives(path) ? 1 : -1;
@@ -304,11 +304,19 @@ PT_KERNEL_INLINE int pt_path_scatter(pt_effects fx, struct pt_path *path, const 
     pt_vec3 wi = pt_frame_to_world(frame, next.wi);
     if (fx & PT_FX_MEDIA)
         path->medium = pt_medium_towards(at, wi, path->medium);
-    path->p_prev = at->p;
     path->ray = (struct pt_ray){pt_offset_point(at->p, at->s.n_geometric, at->error, wi), wi, 0.0f, INFINITY,
                                 path->ray.time};
     path->depth++;
     return pt_path_survives(path);
+}
+
+/* How a surface gathers light: a model that does not transmit takes it from the side of wo only. */
+PT_KERNEL_INLINE struct pt_receiver pt_path_receiver(pt_effects fx, pt_vec3 p, const struct pt_frame *frame,
+                                                     const struct pt_bsdf *bsdf, pt_vec3 wo)
+{
+    int transmits = pt_bsdf_transmits(fx, bsdf);
+    return (struct pt_receiver){p, wo.z < 0.0f ? v3_neg(frame->n) : frame->n,
+                                transmits ? PT_RECEIVER_BOTH_SIDES : PT_RECEIVER_SURFACE};
 }
 
 /* Light and the next direction at a surface. 0: the path ends. */
@@ -333,7 +341,8 @@ PT_KERNEL_INLINE int pt_path_bounce(pt_effects fx, struct pt_path *path, const s
 
     struct pt_light_plan plan; /* no initialiser: it would clear all of it at each bounce */
     plan.add = plan.light.target = v3_splat(0.0f);
-    if (pt_bsdf_has_smooth(fx, &bsdf) && pt_path_sample_light(fx, path, at->p, u_light, &plan.light)) {
+    path->prev = pt_path_receiver(fx, at->p, &frame, &bsdf, wo);
+    if (pt_bsdf_has_smooth(fx, &bsdf) && pt_path_sample_light(fx, path, &path->prev, u_light, &plan.light)) {
         float pdf;
         pt_vec3 wi = plan.light.wi, f = pt_bsdf_eval(fx, &bsdf, wo, pt_frame_to_local(&frame, wi), &pdf);
         pt_path_plan_light(fx, path, f, pdf, pt_offset_point(at->p, at->s.n_geometric, at->error, wi),
@@ -356,7 +365,6 @@ PT_KERNEL_INLINE void pt_path_start(pt_effects fx, struct pt_path *path, uint32_
         time = pt_sampler_1d(&path->sampler, PT_DIM_TIME);
     pt_camera_ray(fx, camera, (float)x + 0.5f + dx, (float)y + 0.5f + dy, lens.x, lens.y, time, &path->ray);
     path->medium = fx & PT_FX_MEDIA ? camera->medium : -1;
-    path->p_prev = path->ray.origin;
 }
 
 PT_KERNEL_INLINE pt_vec3 pt_path_exposed(const struct pt_path *path)

@@ -216,6 +216,7 @@ int pt_builder_finish(struct pt_builder *b)
         return rc;
     add_shape_effects(b);
     scene->effects |= b->options->forced;
+    scene->light_selection = b->options->light_selection;
     for (int i = 0; i < PT_FX_COUNT; i++)
         scene->effect_reasons[i].on = scene->effects >> i & 1;
     pt_camera_init(&scene->camera);

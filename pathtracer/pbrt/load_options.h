@@ -18,6 +18,7 @@ struct pt_load_options {
     int strict;           /* unsupported features are errors, not warnings */
     int width, height;    /* > 0: replaces the film's resolution before the camera is set up (--size) */
     struct pt_view view;
+    int light_selection;  /* enum pt_light_selection */
     pt_effects forced;    /* effects to turn on whether needed or not (--effects=all) */
     struct base_inputs *inputs; /* gets every file that is read; may be NULL */
     int quiet;            /* no progress notes */

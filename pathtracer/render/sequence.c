@@ -14,6 +14,7 @@
 #include "sequence/builder.h"
 #include "sequence/manifest.h"
 #include "sequence/statistics.h"
+#include "scene/scene.h"
 
 /* Seeds of levels and reference differ in these bits: no sample is shared, and the reference of one seed is not the input of
  * the next. */
@@ -117,9 +118,9 @@ static void describe(struct recorder *r)
     name_view(c, m->scene, m->camera, sizeof m->scene);
     snprintf(m->source, sizeof m->source, "%s", c->scene_path);
     snprintf(m->renderer, sizeof m->renderer,
-             "lull pathtracer " BASE_VERSION ", %s sampler, %s, filter %s %g, max depth %d, clamp %g",
+             "lull pathtracer " BASE_VERSION ", %s sampler, %s, filter %s %g, max depth %d, clamp %g%s",
              pt_sampler_words[i->sampler], pt_strategy_words[i->strategy], pt_filter_words[i->filter],
-             (double)i->filter_x, i->max_depth, (double)i->max_component);
+             (double)i->filter_x, i->max_depth, (double)i->max_component, r->scene->light_tree ? ", light hierarchy" : "");
     m->source_crc32 = c->scene_crc;
     m->inputs_crc32 = c->inputs_crc;
     m->has_look_at = c->view.has_look_at;

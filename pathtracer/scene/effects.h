@@ -25,7 +25,7 @@ typedef uint32_t pt_effects;
     X(ENVIRONMENT, "environment", "a table search per light sample, a lookup per escaping ray") \
     X(DELTA_LIGHT, "delta-light", "no density to weigh by; cheap") /* point, spot, distant lights */ \
     /* more than one light: selection needed */ \
-    X(MANY_LIGHTS, "many-lights", "a choice by power per light sample, its probability per emitter hit") \
+    X(MANY_LIGHTS, "many-lights", "a choice per light sample (see light selection), its probability per emitter hit") \
     /* spheres, disks, cylinders kept analytic */ \
     X(QUADRIC, "quadric", "double-precision intersection, in a callback of the ray query") \
     /* participating media without scattering */ \

@@ -164,10 +164,38 @@ struct pt_emitter {
     int32_t primitive;   /* AREA on a mesh: triangle */
     int32_t alias;       /* Walker/Vose alias table over the emitters … */
     float alias_q;       /* … keep this one when the fractional part is below q */
-    float pmf;           /* > 0 for all that can emit */
+    float pmf;           /* > 0 for all that can emit; the hierarchy's own probability multiplies it */
     float area_over_pmf; /* AREA on a mesh: of the triangle, units² */
     pt_vec3 p0, e1, e2;  /* AREA on a mesh: corner and edges to the other two */
     pt_vec3 n;           /* AREA on a mesh: unit normal of the emitting side */
+};
+
+/*
+ * A hierarchy over the emitters that are somewhere (not at infinity), four children to a node, each with bounds of where its
+ * light comes from and where it goes (Conty Estevez & Kulla 2018). Derived by pt_lights_build; what each number does is in
+ * shade/light_tree.c.
+ */
+enum { PT_LIGHT_FAN = 4 };
+
+struct pt_light_node {
+    float centre_x[PT_LIGHT_FAN], centre_y[PT_LIGHT_FAN], centre_z[PT_LIGHT_FAN]; /* of a sphere around all emitters */
+    float radius[PT_LIGHT_FAN];                                                   /* of it, > 0 */
+    float axis_x[PT_LIGHT_FAN], axis_y[PT_LIGHT_FAN], axis_z[PT_LIGHT_FAN];       /* unit, of a cone around all normals */
+    float cos_normals[PT_LIGHT_FAN], sin_normals[PT_LIGHT_FAN];                   /* its half angle */
+    float cos_emission[PT_LIGHT_FAN];    /* nothing is emitted further than this off a normal */
+    float intensity[PT_LIGHT_FAN];       /* luminance times projected area, share of all children; 0: no child */
+    int32_t two_sided[PT_LIGHT_FAN];     /* -1 or 0: a mask */
+    int32_t child[PT_LIGHT_FAN];         /* a node, or ~emitter */
+    int32_t parent;                      /* its place, PT_LIGHT_FAN · node + slot; -1 = this is the root */
+};
+
+struct pt_light_tree {
+    struct pt_light_node *nodes;  /* [0] is the root */
+    int32_t node_count;
+    int32_t *places;              /* [emitter_count] PT_LIGHT_FAN · node + slot, -1 = in no node */
+    float share;                  /* probability that the hierarchy is asked rather than a light at infinity */
+    int32_t *far;                 /* emitters at infinity, each as likely as the others */
+    int32_t far_count;
 };
 
 /* 2D piecewise-constant distribution over an environment image as cumulative sums from 0 to 1; derived. */
@@ -228,6 +256,7 @@ struct pt_scene {
     struct pt_medium *media;
     int32_t image_count, texture_count, material_count, mesh_count, quadric_count;
     int32_t shape_count, world_shape_count, object_count, instance_count, light_count, medium_count;
+    int32_t light_selection;       /* enum pt_light_selection: what is wanted where there are enough lights */
     float radiance_scale;          /* the film's exposure: factor from radiance to pixel value */
     pt_effects effects;            /* needed or forced */
 
@@ -238,6 +267,7 @@ struct pt_scene {
     /* derived by pt_lights_build */
     struct pt_emitter *emitters;
     int32_t emitter_count;
+    struct pt_light_tree *light_tree; /* NULL: emitters are selected by power */
     int32_t *env_lights;           /* ids of ENV_* lights */
     int32_t env_light_count;
     struct pt_env_distribution *env_distributions; /* [light_count] or NULL; used for ENV_IMAGE */

@@ -12,17 +12,23 @@
 #define PT_STRATEGIES(X) \
     X(MIS, "path") /* next-event estimation and BSDF sampling, power heuristic */ \
     X(BSDF_ONLY, "bsdf-only") /* brute force: emission is met by BSDF sampling only; the oracle of tests */
+#define PT_LIGHT_SELECTIONS(X) \
+    X(HIERARCHY, "hierarchy") /* by distance, orientation and cosine too, where there are many emitters; else by power */ \
+    X(POWER, "power")
 #define PT_FILTERS(X) X(BOX, "box") X(TRIANGLE, "triangle") X(GAUSSIAN, "gaussian")
 
 #define PT_SAMPLER_ID(id, word) PT_SAMPLER_##id,
 enum pt_sampler_kind { PT_SAMPLERS(PT_SAMPLER_ID) };
 #define PT_STRATEGY_ID(id, word) PT_STRATEGY_##id,
 enum pt_strategy { PT_STRATEGIES(PT_STRATEGY_ID) };
+#define PT_LIGHT_SELECTION_ID(id, word) PT_LIGHT_SELECTION_##id,
+enum pt_light_selection { PT_LIGHT_SELECTIONS(PT_LIGHT_SELECTION_ID) };
 #define PT_FILTER_ID(id, word) PT_FILTER_##id,
 enum pt_filter_kind { PT_FILTERS(PT_FILTER_ID) };
 
 /* The words by the enumerations above, NULL after the last; and all of them as one text, "|box|triangle|gaussian". */
-extern const char *const pt_sampler_words[], *const pt_strategy_words[], *const pt_filter_words[];
+extern const char *const pt_sampler_words[], *const pt_strategy_words[], *const pt_light_selection_words[],
+    *const pt_filter_words[];
 #define PT_WORD_OR(id, word) "|" word
 
 struct pt_integrator {

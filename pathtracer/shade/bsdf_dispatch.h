@@ -47,6 +47,17 @@ static inline int pt_bsdf_has_smooth(pt_effects fx, const struct pt_bsdf *b)
     return 1;
 }
 
+/* Whether light from the side that wo is not on may be scattered towards wo. */
+static inline int pt_bsdf_transmits(pt_effects fx, const struct pt_bsdf *b)
+{
+#define PT_BSDF_CASE(id, name, file_name, words, needs) \
+    if (((needs) & PT_FX_TRANSMISSION) && PT_BSDF_IS(id, needs)) \
+        return 1;
+    PT_BSDFS(PT_BSDF_CASE)
+#undef PT_BSDF_CASE
+    return 0;
+}
+
 /* f(wo, wi) |cos θi|, without delta parts; *pdf_solid gets the density with which pt_bsdf_sample returns wi. */
 static inline pt_vec3 pt_bsdf_eval(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, pt_vec3 wi, float *pdf_solid)
 {

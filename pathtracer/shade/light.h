@@ -10,6 +10,18 @@
 
 #include "scene/scene.h"
 
+/* Where light is gathered, and what is known of the cosine there: it may steer the selection, no more. */
+enum pt_receiver_kind {
+    PT_RECEIVER_SURFACE,    /* from the side of n only */
+    PT_RECEIVER_BOTH_SIDES, /* from either side of n */
+    PT_RECEIVER_VOLUME      /* from everywhere; n is 0 */
+};
+struct pt_receiver {
+    pt_vec3 p;
+    pt_vec3 n;    /* unit: that of the cosine in the reflection integral */
+    int32_t kind; /* enum pt_receiver_kind */
+};
+
 struct pt_light_sample {
     pt_vec3 wi;          /* unit, from the reference point to the light */
     pt_vec3 radiance;    /* arriving along wi when nothing is in between; for a DELTA light: irradiance on a facing surface

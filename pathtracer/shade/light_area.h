@@ -4,7 +4,7 @@
 #define PT_SHADE_LIGHT_AREA_H
 
 #include "geom/offset.h"
-#include "shade/light.h"
+#include "shade/light_tree.h"
 
 /* Area in render space. */
 float pt_light_quadric_area(const struct pt_quadric *q);
@@ -42,17 +42,21 @@ static inline int pt_light_triangle_sample(const struct pt_scene *scene, const s
     return out->inv_pdf_solid > 0.0f;
 }
 
-/* Density with which sampling from p_ref would have chosen the point p (unit geometric normal n) of a shape's primitive. */
+/* Density with which sampling towards `at` would have chosen the point p (unit geometric normal n) of a shape's
+ * primitive. */
 static inline float pt_light_area_pdf(pt_effects fx, const struct pt_scene *scene, const struct pt_shape *shape,
-                                      int32_t primitive, pt_vec3 p_ref, pt_vec3 p, pt_vec3 n, pt_vec3 wi)
+                                      int32_t primitive, const struct pt_receiver *at, pt_vec3 p, pt_vec3 n, pt_vec3 wi)
 {
     const struct pt_light *light = &scene->lights[shape->light];
-    if ((fx & PT_FX_QUADRIC) && shape->kind == PT_SHAPE_QUADRIC)
-        return scene->emitters[light->first_emitter].pmf * pt_light_quadric_pdf(scene, shape, p_ref, p, n, wi);
-    const struct pt_emitter *e = &scene->emitters[light->first_emitter + primitive];
-    pt_vec3 d = v3_sub(p, p_ref);
+    int quadric = (fx & PT_FX_QUADRIC) && shape->kind == PT_SHAPE_QUADRIC;
+    int32_t emitter = light->first_emitter + (quadric ? 0 : primitive);
+    const struct pt_emitter *e = &scene->emitters[emitter];
+    float pmf = scene->light_tree ? pt_light_tree_pmf(scene, at, emitter) : 1.0f;
+    if (quadric)
+        return pmf * e->pmf * pt_light_quadric_pdf(scene, shape, at->p, p, n, wi);
+    pt_vec3 d = v3_sub(p, at->p);
     float cosine = fabsf(v3_dot(e->n, wi));
-    return cosine > 0.0f ? v3_dot(d, d) / (e->area_over_pmf * cosine) : 0.0f;
+    return cosine > 0.0f ? pmf * v3_dot(d, d) / (e->area_over_pmf * cosine) : 0.0f;
 }
 
 #endif

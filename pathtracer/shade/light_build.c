@@ -2,13 +2,24 @@
 
 #include <math.h>
 
+#include "geom/quadric.h"
+#include "scene/settings.h"
 #include "shade/alias.h"
 #include "shade/light_area.h"
 #include "shade/light_env.h"
+#include "shade/light_tree_build.h"
 
 /* Share of the selection probability that is spread evenly over the finite lights, so that a weak lamp near the camera is
  * not starved by strong ones elsewhere. */
 #define UNIFORM_SHARE 0.2
+/* The same in the hierarchy, which looks after near lamps itself: for strong ones nearer by but hidden. */
+#define TREE_UNIFORM_SHARE 0.05
+/* A hierarchy needs this many lights that are somewhere. */
+enum { TREE_LIGHTS = 2 };
+/* Least radius of a node relative to the scene: importance is finite in a point light. */
+#define SMALLEST_NODE 1e-6f
+/* Radians by which a spot's cone is widened against rounding. */
+#define SPOT_SLACK 2e-3f
 
 static int at_infinity(const struct pt_light *light)
 {
@@ -97,21 +108,34 @@ static void fill(struct pt_scene *scene, double *weights)
     }
 }
 
-/* Power → probabilities: every light at infinity gets 1/(1 + number of them) when there are finite ones too (their power
- * depends on the scene's size, not on what they do to the image), the finite ones share the rest by power. */
-static void balance(const struct pt_scene *scene, double *weights)
+/* What the lights at infinity and the others share of the probability. */
+struct shares {
+    double far;  /* of each emitter at infinity that emits at all */
+    double near; /* of all others together */
+    double power; /* of those */
+    int far_count, near_lights;
+};
+
+/* Every light at infinity gets 1/(1 + number of them) when there are finite ones too: its power depends on the scene's size,
+ * not on what it does to the image. */
+static struct shares share_out(const struct pt_scene *scene, const double *weights)
 {
-    double finite = 0.0;
-    int infinite_count = 0, finite_count = 0;
+    struct shares s = {0};
     for (int32_t i = 0; i < scene->emitter_count; i++) {
         int far = at_infinity(&scene->lights[scene->emitters[i].light]);
-        infinite_count += far && weights[i] > 0.0;
-        finite += far ? 0.0 : weights[i];
+        s.far_count += far && weights[i] > 0.0;
+        s.power += far ? 0.0 : weights[i];
     }
     for (int32_t i = 0; i < scene->light_count; i++)
-        finite_count += !at_infinity(&scene->lights[i]) && emitters_of(scene, &scene->lights[i]) > 0;
-    double far_share = infinite_count ? 1.0 / (infinite_count + (finite > 0.0 ? 1 : 0)) : 0.0;
-    double near_share = 1.0 - far_share * infinite_count;
+        s.near_lights += !at_infinity(&scene->lights[i]) && emitters_of(scene, &scene->lights[i]) > 0;
+    s.far = s.far_count ? 1.0 / (s.far_count + (s.power > 0.0 ? 1 : 0)) : 0.0;
+    s.near = 1.0 - s.far * s.far_count;
+    return s;
+}
+
+/* Power → probabilities; the finite lights share theirs by power. */
+static void balance(const struct pt_scene *scene, const struct shares *s, double *weights)
+{
     for (int32_t i = 0; i < scene->light_count; i++) {
         const struct pt_light *light = &scene->lights[i];
         int32_t count = emitters_of(scene, light);
@@ -119,10 +143,18 @@ static void balance(const struct pt_scene *scene, double *weights)
         for (int32_t k = 0; k < count; k++)
             sum += w[k];
         for (int32_t k = 0; k < count && sum > 0.0; k++)
-            w[k] = at_infinity(light) ? far_share
-                                      : near_share * (w[k] / finite * (1.0 - UNIFORM_SHARE) +
-                                                      w[k] / sum * UNIFORM_SHARE / finite_count);
+            w[k] = at_infinity(light) ? s->far
+                                      : s->near * (w[k] / s->power * (1.0 - UNIFORM_SHARE) +
+                                                   w[k] / sum * UNIFORM_SHARE / s->near_lights);
     }
+}
+
+static void set_pmf(struct pt_scene *scene, struct pt_emitter *e, double pmf)
+{
+    e->pmf = (float)pmf;
+    e->area_over_pmf = e->pmf > 0.0f ? e->area_over_pmf / e->pmf : 0.0f;
+    if (e->primitive < 0)
+        scene->lights[e->light].emitter_pmf = e->pmf;
 }
 
 static int make_table(struct pt_scene *scene, double *weights, struct pt_arena *scratch)
@@ -141,14 +173,115 @@ static int make_table(struct pt_scene *scene, double *weights, struct pt_arena *
     sum = sum > 0.0 ? sum : (double)n;
     pt_alias_build(weights, n, q, alias, work);
     for (int32_t i = 0; i < n; i++) {
-        struct pt_emitter *e = &scene->emitters[i];
-        e->alias = alias[i];
-        e->alias_q = q[i];
-        e->pmf = (float)(weights[i] / sum);
-        e->area_over_pmf = e->pmf > 0.0f ? e->area_over_pmf / e->pmf : 0.0f;
-        if (e->primitive < 0)
-            scene->lights[e->light].emitter_pmf = e->pmf;
+        scene->emitters[i].alias = alias[i];
+        scene->emitters[i].alias_q = q[i];
+        set_pmf(scene, &scene->emitters[i], weights[i] / sum);
     }
+    return 1;
+}
+
+/* --- hierarchy -------------------------------------------------------------------------------------------------------- */
+
+static pt_vec3 least(pt_vec3 a, pt_vec3 b) { return v3(fminf(a.x, b.x), fminf(a.y, b.y), fminf(a.z, b.z)); }
+static pt_vec3 most(pt_vec3 a, pt_vec3 b) { return v3(fmaxf(a.x, b.x), fmaxf(a.y, b.y), fmaxf(a.z, b.z)); }
+
+static void bound_quadric(const struct pt_shape *shape, const struct pt_quadric *q, struct pt_light_bounds *out)
+{
+    pt_quadric_bounds(q, &out->lower, &out->upper);
+    if (q->kind != PT_QUADRIC_DISK)
+        return;
+    struct pt_quadric_point at;
+    pt_quadric_at(q, v3(0.0f, 0.0f, q->z_min), &at);
+    out->axis = v3_norm(shape->flip_normal ? v3_neg(at.n) : at.n);
+    out->normals_rad = 0.0f;
+}
+
+/* Where the light of an emitter that is not at infinity comes from and where it goes; `power` as by power_of. 0: nowhere. */
+static int bound_emitter(const struct pt_scene *scene, const struct pt_emitter *e, double power, struct pt_light_bounds *out)
+{
+    const struct pt_light *light = &scene->lights[e->light];
+    const struct pt_shape *shape = light->kind == PT_LIGHT_AREA ? &scene->shapes[light->shape] : NULL;
+    double pi = (double)PT_PI;
+    *out = (struct pt_light_bounds){light->position, light->position, {0.0f, 0.0f, 1.0f}, PT_PI, 0.5f * PT_PI,
+                                    light->two_sided, 0.0};
+    if (e->primitive >= 0) {
+        pt_vec3 b = v3_add(e->p0, e->e1), c = v3_add(e->p0, e->e2);
+        out->lower = least(e->p0, least(b, c));
+        out->upper = most(e->p0, most(b, c));
+        out->axis = e->n;
+        out->normals_rad = 0.0f;
+    } else if (shape) {
+        bound_quadric(shape, &scene->quadrics[shape->data], out);
+    } else if (light->kind == PT_LIGHT_SPOT) {
+        out->axis = light->direction;
+        out->normals_rad = acosf(light->cos_start);
+        out->emission_rad = acosf(light->cos_total) - out->normals_rad + SPOT_SLACK;
+    }
+    /* power over all directions → what is sent one way */
+    double solid = light->kind == PT_LIGHT_SPOT ? 2.0 * pi * (1.0 - 0.5 * (double)(light->cos_total + light->cos_start))
+                   : out->normals_rad < PT_PI   ? pi * (light->two_sided ? 2.0 : 1.0)
+                                                : 4.0 * pi;
+    out->intensity = power / solid;
+    return out->intensity > 0.0 && isfinite(out->intensity) && v3_is_finite(out->lower) && v3_is_finite(out->upper) &&
+           v3_is_finite(out->axis);
+}
+
+/* A share of the intensity spread evenly over the lights, as UNIFORM_SHARE is: strong lamps that stand in another room. */
+static void spread(const struct pt_scene *scene, const int32_t *ids, int32_t count, struct pt_light_bounds *bounds)
+{
+    double total = 0.0;
+    int lights = 0;
+    for (int32_t i = 0; i < count; i++) {
+        total += bounds[i].intensity;
+        lights += i == 0 || scene->emitters[ids[i]].light != scene->emitters[ids[i - 1]].light;
+    }
+    for (int32_t i = 0, end; i < count; i = end) {
+        double sum = 0.0;
+        for (end = i; end < count && scene->emitters[ids[end]].light == scene->emitters[ids[i]].light; end++)
+            sum += bounds[end].intensity;
+        for (int32_t k = i; k < end; k++)
+            bounds[k].intensity *= (1.0 - TREE_UNIFORM_SHARE) / total + TREE_UNIFORM_SHARE / (sum * lights);
+    }
+}
+
+static int list_far(struct pt_scene *scene, struct pt_light_tree *tree, const struct shares *s, const double *weights)
+{
+    if (s->far_count == 0)
+        return 1;
+    if (!(tree->far = pt_arena_alloc(&scene->arena, (size_t)s->far_count, sizeof *tree->far)))
+        return 0;
+    for (int32_t i = 0; i < scene->emitter_count; i++)
+        if (at_infinity(&scene->lights[scene->emitters[i].light]) && weights[i] > 0.0)
+            tree->far[tree->far_count++] = i;
+    return 1;
+}
+
+/* Whether the hierarchy is wanted and there are enough emitters for it; then it is made. 0 when out of memory. */
+static int make_tree(struct pt_scene *scene, const double *weights, struct pt_arena *scratch)
+{
+    const struct shares s = share_out(scene, weights);
+    size_t n = (size_t)scene->emitter_count;
+    if (scene->light_selection != PT_LIGHT_SELECTION_HIERARCHY || s.near_lights < TREE_LIGHTS)
+        return 1;
+    struct pt_light_tree *tree = pt_arena_alloc(&scene->arena, 1, sizeof *tree);
+    struct pt_light_bounds *bounds = pt_arena_alloc(scratch, n, sizeof *bounds);
+    int32_t *ids = pt_arena_alloc(scratch, n, sizeof *ids), count = 0;
+    if (!tree || !bounds || !ids || !list_far(scene, tree, &s, weights))
+        return 0;
+    for (int32_t i = 0; i < scene->emitter_count; i++)
+        if (!at_infinity(&scene->lights[scene->emitters[i].light]) &&
+            bound_emitter(scene, &scene->emitters[i], weights[i], &bounds[count]))
+            ids[count++] = i;
+    if (count < TREE_LIGHTS)
+        return 1;
+    spread(scene, ids, count, bounds);
+    float smallest = fmaxf(SMALLEST_NODE * v3_len(v3_sub(scene->bounds_max, scene->bounds_min)), 1e-18f);
+    if (!pt_light_tree_build(tree, bounds, ids, count, scene->emitter_count, smallest, &scene->arena, scratch))
+        return 0;
+    tree->share = (float)s.near;
+    for (int32_t i = 0; i < scene->emitter_count; i++)
+        set_pmf(scene, &scene->emitters[i], at_infinity(&scene->lights[scene->emitters[i].light]) ? s.far : s.near);
+    scene->light_tree = tree;
     return 1;
 }
 
@@ -171,6 +304,7 @@ int pt_lights_build(struct pt_scene *scene, struct base_err *err)
         count += emitters_of(scene, &scene->lights[i]);
     scene->emitter_count = 0;
     scene->env_light_count = 0;
+    scene->light_tree = NULL;
     if (scene->light_count == 0)
         return 0;
     if (count > INT32_MAX / 2)
@@ -188,7 +322,11 @@ int pt_lights_build(struct pt_scene *scene, struct base_err *err)
         if (ok) {
             scene->emitter_count = (int32_t)count;
             fill(scene, weights);
-            balance(scene, weights);
+            ok = make_tree(scene, weights, &scratch);
+        }
+        if (ok && !scene->light_tree) {
+            const struct shares s = share_out(scene, weights);
+            balance(scene, &s, weights);
             ok = make_table(scene, weights, &scratch);
         }
     }

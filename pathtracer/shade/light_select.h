@@ -1,4 +1,5 @@
-/* Which light: the dispatchers over light kinds, and selection in constant time by an alias table. */
+/* Which light: the dispatchers over light kinds, and selection by power in constant time (an alias table) or by the
+ * hierarchy. */
 #ifndef PT_SHADE_LIGHT_SELECT_H
 #define PT_SHADE_LIGHT_SELECT_H
 
@@ -6,17 +7,20 @@
 #include "shade/light_env.h"
 #include "shade/light_point.h"
 
-/* Selects an emitter by u_pick and samples it towards p_ref; numbers in [0, 1). 0 when nothing arrives from it. */
-static inline int pt_light_sample(pt_effects fx, const struct pt_scene *scene, pt_vec3 p_ref, float u_pick, float u0,
-                                  float u1, struct pt_light_sample *out)
+static inline const struct pt_emitter *pt_light_pick_by_power(const struct pt_scene *scene, float u_pick)
 {
     float x = u_pick * (float)scene->emitter_count;
     int32_t i = (int32_t)x;
     if (i >= scene->emitter_count)
         i = scene->emitter_count - 1;
     const struct pt_emitter *e = &scene->emitters[i];
-    if (!(x - (float)i < e->alias_q))
-        e = &scene->emitters[e->alias];
+    return x - (float)i < e->alias_q ? e : &scene->emitters[e->alias];
+}
+
+/* Samples an emitter as if it had been selected with its own pmf. */
+static inline int pt_light_sample_emitter(pt_effects fx, const struct pt_scene *scene, const struct pt_emitter *e,
+                                          pt_vec3 p_ref, float u0, float u1, struct pt_light_sample *out)
+{
     if (fx & PT_FX_ENVIRONMENT)
         out->pixel = NULL;
     if (fx & (PT_FX_ENVIRONMENT | PT_FX_DELTA_LIGHT | PT_FX_QUADRIC)) {
@@ -32,6 +36,20 @@ static inline int pt_light_sample(pt_effects fx, const struct pt_scene *scene, p
             return pt_light_delta_sample(light, e->pmf, p_ref, out);
     }
     return pt_light_triangle_sample(scene, e, p_ref, u0, u1, out);
+}
+
+/* Selects an emitter by u_pick and samples it towards `at`; numbers in [0, 1). 0 when nothing arrives from it. */
+static inline int pt_light_sample(pt_effects fx, const struct pt_scene *scene, const struct pt_receiver *at, float u_pick,
+                                  float u0, float u1, struct pt_light_sample *out)
+{
+    if (!scene->light_tree)
+        return pt_light_sample_emitter(fx, scene, pt_light_pick_by_power(scene, u_pick), at->p, u0, u1, out);
+    float pmf;
+    int32_t i = pt_light_tree_pick(scene, at, u_pick, &pmf);
+    if (i < 0 || !pt_light_sample_emitter(fx, scene, &scene->emitters[i], at->p, u0, u1, out))
+        return 0;
+    out->inv_pdf_solid /= pmf;
+    return 1;
 }
 
 #endif

@@ -11,6 +11,7 @@
 #include <math.h>
 
 #include "geom/accel.h"
+#include "scene/settings.h"
 #include "support/pt_scenes.h"
 
 enum { TILES = 8 }; /* per side */
@@ -57,14 +58,18 @@ static double sidak(int k, double family)
     return hi;
 }
 
-static void compare(const struct pt_scene *scene, uint32_t spp_mis, uint32_t spp_brute, const char *name)
+static struct moments a[TILES * TILES][3], b[TILES * TILES][3];
+
+static void clear(void)
 {
-    static struct moments a[TILES * TILES][3], b[TILES * TILES][3];
     for (int i = 0; i < TILES * TILES; i++)
         for (int c = 0; c < 3; c++)
             a[i][c] = b[i][c] = (struct moments){0};
-    accumulate(scene, PT_STRATEGY_MIS, PT_SAMPLER_INDEPENDENT, 1, spp_mis, a);
-    accumulate(scene, PT_STRATEGY_BSDF_ONLY, PT_SAMPLER_INDEPENDENT, 2, spp_brute, b);
+}
+
+/* The tiles of a against those of b. */
+static void judge(const char *name)
+{
     double bound = sidak(3 * TILES * TILES, 1e-4), worst = 0.0;
     for (int i = 0; i < TILES * TILES; i++)
         for (int c = 0; c < 3; c++) {
@@ -75,6 +80,14 @@ static void compare(const struct pt_scene *scene, uint32_t spp_mis, uint32_t spp
         }
     if (worst > bound)
         fail_msg("%s: a z-score of %.2f beyond %.2f", name, worst, bound);
+}
+
+static void compare(const struct pt_scene *scene, uint32_t spp_mis, uint32_t spp_brute, const char *name)
+{
+    clear();
+    accumulate(scene, PT_STRATEGY_MIS, PT_SAMPLER_INDEPENDENT, 1, spp_mis, a);
+    accumulate(scene, PT_STRATEGY_BSDF_ONLY, PT_SAMPLER_INDEPENDENT, 2, spp_brute, b);
+    judge(name);
 }
 
 static void cornell(void **state)
@@ -153,10 +166,92 @@ static void fog(void **state)
     test_scene_end(&scene);
 }
 
+/* Lamps of all kinds and powers, some in the wall's plane, some turned away, over surfaces that reflect, transmit and shine;
+ * a weak lamp in a box of its own, so that the strong ones do not drown it. */
+static void lamps(struct pt_scene *scene)
+{
+    test_scene_begin(scene);
+    test_camera(scene, v3(0, 2, -6), v3(0, 1.0f, 0), v3(0, 1, 0), 40.0f, 32);
+    int32_t floor = test_add_diffuse(scene, v3(0.7f, 0.6f, 0.5f)), black = test_add_diffuse(scene, v3_splat(0.0f));
+    int32_t paper = test_add_material(scene, PT_BSDF_DIFFUSE_TRANSMISSION), metal = test_add_material(scene, PT_BSDF_CONDUCTOR);
+    scene->materials[metal].roughness_u = scene->materials[metal].roughness_v = grey(0.35f);
+    test_add_quad(scene, floor, v3(-4, 0, -4), v3(0, 0, 8), v3(8, 0, 0));
+    test_add_quad(scene, metal, v3(-4, 0, 3), v3(0, 4, 0), v3(8, 0, 0));
+    test_add_quad(scene, paper, v3(-2.5f, 0.1f, 1.5f), v3(0.3f, 1.6f, 0), v3(1.8f, 0, 0.4f));
+    test_add_sphere(scene, floor, v3(1.2f, 0.6f, 0.3f), 0.6f);
+    for (int i = 0; i < 9; i++) {
+        pt_vec3 p = v3(-3.0f + 0.75f * (float)i, i % 2 ? 3.0f : 1.2f, i % 3 ? 2.0f : -0.5f);
+        pt_vec3 x = v3(0.5f, 0, 0), z = v3(0, 0.1f * (float)i, 0.5f);
+        float power = i == 4 ? 0.0f : 1.0f + (float)(i % 4);
+        test_add_area_light(scene, test_add_quad(scene, black, p, i % 4 ? x : z, i % 4 ? z : x), v3(power, 2, power), i % 3 == 1);
+    }
+    for (int i = 0; i < 4; i++) {
+        int32_t id = test_add_sphere(scene, black, v3(-2.0f + 1.3f * (float)i, 0.5f + 0.3f * (float)i, 1.0f), 0.25f);
+        struct pt_quadric *q = &scene->quadrics[scene->shapes[id].data];
+        for (int k = 0; k < 3; k++) /* two are ellipsoids that lean */
+            q->to_render.m[4 * k + 1] += i % 2 ? 0.6f * q->to_render.m[4 * k] : 0.0f;
+        assert_int_equal(pt_mat34_invert(&q->to_render, &q->from_render), 1);
+        test_add_area_light(scene, id, v3(6, 5, (float)i), 0);
+    }
+}
+
+static void many_lights(void **state)
+{
+    (void)state;
+    struct pt_scene scene;
+    lamps(&scene);
+    test_scene_finish(&scene);
+    assert_non_null(scene.light_tree);
+    compare(&scene, 256, 3072, "many lamps");
+    test_scene_end(&scene);
+}
+
+/* In fog, where lamps are gathered from all sides, and under a sky that shares the selection with them. */
+static void many_lights_in_fog(void **state)
+{
+    (void)state;
+    struct pt_scene scene;
+    lamps(&scene);
+    scene.camera.medium = test_add_medium(&scene, v3(0.01f, 0.02f, 0.03f), v3_splat(0.15f), 0.4f);
+    for (int32_t i = 0; i < scene.shape_count; i++)
+        scene.shapes[i].medium_in = scene.shapes[i].medium_out = scene.camera.medium;
+    test_scene_finish(&scene);
+    assert_non_null(scene.light_tree);
+    compare(&scene, 128, 1536, "many lamps in fog");
+    test_scene_end(&scene);
+}
+
+/* Lights without size cannot be met by chance: the hierarchy against selection by power. A lamp of enormous power stands behind
+ * the metal, where nothing sees it. */
+static void delta_lights_by_both_selections(void **state)
+{
+    (void)state;
+    clear();
+    for (int32_t selection = 0; selection < 2; selection++) {
+        struct pt_scene scene;
+        lamps(&scene);
+        for (int i = 0; i < 6; i++) {
+            struct pt_light light = {.kind = i < 3 ? PT_LIGHT_POINT : i < 5 ? PT_LIGHT_SPOT : PT_LIGHT_DISTANT, .shape = -1,
+                                     .image = -1, .emission = {1.0f + (float)i, 2, 1}, .position = v3((float)i - 2.5f, 0, 7),
+                                     .direction = v3_norm(v3(0.2f, -1.0f, 0.1f)), .cos_total = 0.75f, .cos_start = 0.85f};
+            test_add_light(&scene, &light);
+        }
+        int32_t hidden = test_add_quad(&scene, 1, v3(-0.5f, 1, 4), v3(0, 1, 0), v3(-1, 0, 0));
+        test_add_area_light(&scene, hidden, v3_splat(1e4f), 0);
+        scene.light_selection = selection;
+        test_scene_finish(&scene);
+        assert_true((scene.light_tree != NULL) == (selection == PT_LIGHT_SELECTION_HIERARCHY));
+        accumulate(&scene, PT_STRATEGY_MIS, PT_SAMPLER_INDEPENDENT, 5 + (uint32_t)selection, 600, selection ? b : a);
+        test_scene_end(&scene);
+    }
+    judge("lights without size");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(cornell), cmocka_unit_test(glossy), cmocka_unit_test(environment), cmocka_unit_test(fog),
+        cmocka_unit_test(many_lights), cmocka_unit_test(many_lights_in_fog), cmocka_unit_test(delta_lights_by_both_selections),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -36,9 +36,9 @@ static void alias_table_keeps_probabilities(void **state)
 }
 
 /* Density of a direction by asking what it hits, as the kernel does for BSDF sampling. */
-static float pdf_of(const struct pt_scene *scene, pt_vec3 p_ref, pt_vec3 wi)
+static float pdf_of(const struct pt_scene *scene, const struct pt_receiver *from, pt_vec3 wi)
 {
-    struct pt_ray ray = {p_ref, wi, 0.0f, INFINITY, 0.0f};
+    struct pt_ray ray = {from->p, wi, 0.0f, INFINITY, 0.0f};
     struct pt_hit hit;
     struct pt_place at;
     if (!pt_accel_intersect(scene, &ray, 0, &hit)) {
@@ -50,7 +50,7 @@ static float pdf_of(const struct pt_scene *scene, pt_vec3 p_ref, pt_vec3 wi)
     pt_place_at_hit(PT_FX_ALL, scene, &ray, &hit, &at);
     if (v3_dot(at.s.n_geometric, wi) >= 0.0f)
         return 0.0f;
-    return pt_light_area_pdf(PT_FX_ALL, scene, at.shape, at.primitive, p_ref, at.p, at.s.n_geometric, wi);
+    return pt_light_area_pdf(PT_FX_ALL, scene, at.shape, at.primitive, from, at.p, at.s.n_geometric, wi);
 }
 
 /* The density of samples equals the density asked for, it integrates to 1 over directions
@@ -58,23 +58,24 @@ static float pdf_of(const struct pt_scene *scene, pt_vec3 p_ref, pt_vec3 wi)
  * on a sphere around p_ref (∫ L dω) agrees with uniform sampling of directions. */
 static void check_light(const struct pt_scene *scene, pt_vec3 p_ref, int all_visible)
 {
+    const struct pt_receiver volume = {p_ref, {0, 0, 0}, PT_RECEIVER_VOLUME}, *at = &volume;
     struct pt_rng rng = pt_rng_make(11);
     double norm = 0.0, by_light = 0.0, by_direction = 0.0, square = 0.0;
     int lit = 0, agree = 0;
     for (int i = 0; i < SAMPLES; i++) {
         struct pt_light_sample s;
         float pick = pt_rng_float(&rng), u0 = pt_rng_float(&rng), u1 = pt_rng_float(&rng);
-        if (pt_light_sample(PT_FX_ALL, scene, p_ref, pick, u0, u1, &s)) {
+        if (pt_light_sample(PT_FX_ALL, scene, at, pick, u0, u1, &s)) {
             if (s.pixel)
                 s.radiance = v3_mul(s.radiance, v3(s.pixel[0], s.pixel[1], s.pixel[2]));
             by_light += (double)v3_luminance(s.radiance) / (1.0 / (double)s.inv_pdf_solid) / SAMPLES;
-            float pdf = pdf_of(scene, p_ref, s.wi);
+            float pdf = pdf_of(scene, at, s.wi);
             lit++;
             agree += fabsf(pdf * s.inv_pdf_solid - 1.0f) <= 2e-3f;
             assert_true(fabsf(v3_len(s.wi) - 1.0f) < 1e-4f);
         }
         pt_vec3 w = pt_sample_sphere(pt_rng_float(&rng), pt_rng_float(&rng));
-        double pdf = (double)pdf_of(scene, p_ref, w);
+        double pdf = (double)pdf_of(scene, at, w);
         norm += pdf * 4.0 * PI / SAMPLES;
         square += pdf * pdf * 16.0 * PI * PI / SAMPLES;
         struct pt_ray ray = {p_ref, w, 0.0f, INFINITY, 0.0f};
