@@ -583,6 +583,11 @@ static int run(struct session *s, int *status, struct base_err *err)
     }
 }
 
+static struct pt_crew_tools tools_of(const struct session *s)
+{
+    return (struct pt_crew_tools){s->threads, {s->scene, s->kernel, NULL}, s->render};
+}
+
 /* Makes everything as rank 0 makes it, and tells it what that is. */
 static int join_crew(struct session *s, struct base_err *err)
 {
@@ -593,7 +598,8 @@ static int join_crew(struct session *s, struct base_err *err)
         rc = s->cli.action == PT_CLI_SEQUENCE ? open_sequence(s, &config, err) : create_render(s, err);
     if (!rc)
         rc = describe_job(s, text, sizeof text, err);
-    return rc ? rc : pt_crew_member_join(s->peers, base_threads_count(s->threads), text, err);
+    const struct pt_crew_tools tools = tools_of(s);
+    return rc ? rc : pt_crew_member_join(s->peers, &tools, text, err);
 }
 
 /* Any process but rank 0. rc: what became of the command line. Who interrupts or ends the job does it through rank 0. */
@@ -607,8 +613,8 @@ static int run_member(struct session *s, int rc, struct base_err *err)
         rc = join_crew(s, err);
     if (rc)
         pt_crew_member_fail(s->peers, err, &unheard);
-    const struct pt_row_maker maker = {s->scene, s->kernel, NULL};
-    return pt_crew_member_serve(s->peers, s->threads, rc || !renders ? NULL : &maker, &unheard);
+    const struct pt_crew_tools tools = tools_of(s);
+    return pt_crew_member_serve(s->peers, rc || !renders ? NULL : &tools, &unheard);
 }
 
 static void release(struct session *s)

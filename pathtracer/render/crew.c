@@ -7,27 +7,11 @@
 #include "base/clock.h"
 #include "render/crew_messages.h"
 
-/* Parcels with one member, and the rows per thread in one: few enough that nobody is left with many when a slice ends. */
-enum { PARCELS = 2, MOST_ROWS = 32, SHARES = 4 };
+/* Rows per thread in one parcel, and what share of those left: few enough that nobody is left with many at the end. */
+enum { MOST_ROWS = 32, SHARES = 4 };
 
 /* How often rank 0 looks for messages while it samples. */
 static const double LOOK_EVERY_S = 0.001;
-
-struct member {
-    int ready, threads;
-    int parcels;       /* with it now */
-    double since_s;    /* wall time since which it owes an answer */
-};
-
-struct pt_crew {
-    struct base_peers *peers; /* borrows */
-    double timeout_s;
-    struct member *members;   /* owns; [peers->count], 0 unused */
-    int threads;
-    uint32_t serial;
-    int lost;                 /* a member is gone: nobody can be sent home */
-    struct pt_crew_traffic traffic;
-};
 
 /* One slice while it is being sampled. */
 struct sampling {
@@ -47,15 +31,16 @@ struct sampling {
 int pt_crew_create(struct base_peers *peers, double timeout_s, struct pt_crew **out, struct base_err *err)
 {
     struct pt_crew *crew = calloc(1, sizeof *crew);
-    struct member *members = calloc((size_t)peers->count, sizeof *members);
-    if (!crew || !members) {
+    struct pt_crew_mate *mates = calloc((size_t)peers->count, sizeof *mates);
+    if (!crew || !mates) {
         free(crew);
-        free(members);
+        free(mates);
         return base_fail_nomem(err, "crew");
     }
     crew->peers = peers;
     crew->timeout_s = timeout_s;
-    crew->members = members;
+    crew->judges = 1;
+    crew->mates = mates;
     *out = crew;
     return 0;
 }
@@ -78,6 +63,11 @@ const struct pt_crew_traffic *pt_crew_traffic(const struct pt_crew *crew)
 static const char *name_of(const struct pt_crew *crew, int rank)
 {
     return crew->peers->list[rank].name;
+}
+
+int pt_crew_nonsense(const struct pt_crew *crew, int rank, struct base_err *err)
+{
+    return base_fail(err, BASE_EIO, "%s said something that makes no sense", name_of(crew, rank));
 }
 
 /* --- the beginning and the end ---------------------------------------------------------------------------------------- */
@@ -104,7 +94,7 @@ static int hear(struct pt_crew *crew, int rank, const struct pt_crew_hello *hell
     char *text = size >= sizeof *hello ? strndup(hello->text, n) : NULL;
     int rc = 0;
     if (!text)
-        rc = base_fail(err, BASE_EIO, "%s said something that makes no sense", name_of(crew, rank));
+        rc = pt_crew_nonsense(crew, rank, err);
     else if (hello->kind == PT_CREW_FAILED)
         rc = base_fail(err, BASE_EINVAL, "%s: %s", name_of(crew, rank), text);
     else if (strcmp(text, ours) != 0)
@@ -112,9 +102,10 @@ static int hear(struct pt_crew *crew, int rank, const struct pt_crew_hello *hell
     free(text);
     if (rc)
         return rc;
-    crew->members[rank].ready = 1;
-    crew->members[rank].threads = (int)hello->threads;
+    crew->mates[rank].ready = 1;
+    crew->mates[rank].threads = (int)hello->threads;
     crew->threads += (int)hello->threads;
+    crew->judges &= (int)hello->judges;
     return 0;
 }
 
@@ -134,7 +125,7 @@ int pt_crew_greet(struct pt_crew *crew, const char *text, struct base_err *err)
         int got = base_peers_receive(crew->peers, until_s - base_clock_wall_s(), &rank, &data, &size, err);
         if (got < 0)
             return got;
-        for (rank = got ? rank : 1; !got && crew->members[rank].ready;)
+        for (rank = got ? rank : 1; !got && crew->mates[rank].ready;)
             rank++;
         if (!got)
             return lose(crew, err, rank);
@@ -182,8 +173,48 @@ void pt_crew_dismiss(struct pt_crew *crew, int status)
         return;
     if (crew->lost || part(crew) != 0)
         base_peers_abort(crew->peers, status);
-    free(crew->members);
+    free(crew->mates);
     free(crew);
+}
+
+/* --- parcels -------------------------------------------------------------------------------------------------------- */
+
+int pt_crew_send(struct pt_crew *crew, int rank, void *message, size_t size, struct base_err *err)
+{
+    struct pt_crew_mate *m = &crew->mates[rank];
+    if (m->parcels++ == 0)
+        m->since_s = base_clock_wall_s();
+    crew->traffic.messages++;
+    crew->traffic.bytes += size;
+    return base_peers_send(crew->peers, rank, message, size, err);
+}
+
+int pt_crew_settle(struct pt_crew *crew, int rank, const void *message, size_t size, struct base_err *err)
+{
+    struct pt_crew_mate *m = &crew->mates[rank];
+    const struct pt_crew_hello *why = message;
+    if (size > sizeof *why && why->kind == PT_CREW_FAILED)
+        return base_fail(err, BASE_EIO, "%s: %.*s", name_of(crew, rank), (int)(size - sizeof *why), why->text);
+    m->parcels--;
+    m->since_s = base_clock_wall_s();
+    crew->traffic.messages++;
+    crew->traffic.bytes += size;
+    return size < sizeof(struct pt_crew_rows) ? pt_crew_nonsense(crew, rank, err) : 0;
+}
+
+/* mpirun ends every process when one has died: then that is why we are asked to stop. */
+int pt_crew_look_round(struct pt_crew *crew, int (*interrupted)(void *data), void *data, struct base_err *err)
+{
+    double now_s = base_clock_wall_s();
+    if (interrupted && interrupted(data)) {
+        int dead = base_peers_find_dead(crew->peers);
+        crew->lost = dead >= 0;
+        return dead < 0 ? PT_CREW_STOPPED : base_fail(err, BASE_EIO, "%s has died", name_of(crew, dead));
+    }
+    for (int rank = 1; rank < crew->peers->count; rank++)
+        if (crew->mates[rank].parcels > 0 && now_s - crew->mates[rank].since_s > crew->timeout_s)
+            return lose(crew, err, rank);
+    return 0;
 }
 
 /* --- dealing out rows ------------------------------------------------------------------------------------------------ */
@@ -214,7 +245,6 @@ static size_t take_rows(struct sampling *s, int member_threads, int all_threads,
 static int send_rows(struct sampling *s, int rank, size_t first, size_t n)
 {
     const struct pt_crew_slice *slice = s->slice;
-    struct member *m = &s->crew->members[rank];
     size_t size = sizeof(struct pt_crew_rows) + n * sizeof(struct pt_row);
     for (size_t i = 0; i < n; i++)
         size += pt_row_bytes(&slice->rows[slice->order[first + i]], slice->film->planes);
@@ -231,20 +261,16 @@ static int send_rows(struct sampling *s, int rank, size_t first, size_t n)
         pt_row_save(slice->film, row, sums);
         sums += pt_row_bytes(row, slice->film->planes);
     }
-    if (m->parcels++ == 0)
-        m->since_s = base_clock_wall_s();
     s->away += n;
-    s->crew->traffic.messages++;
-    s->crew->traffic.bytes += size;
-    return base_peers_send(s->crew->peers, rank, message, size, s->err);
+    return pt_crew_send(s->crew, rank, message, size, s->err);
 }
 
 static void deal(struct sampling *s, int all_threads)
 {
     for (int rank = 1; rank < s->crew->peers->count && !atomic_load(&s->stop); rank++) {
-        struct member *m = &s->crew->members[rank];
+        struct pt_crew_mate *m = &s->crew->mates[rank];
         size_t first, n;
-        while (m->parcels < PARCELS && (n = take_rows(s, m->threads, all_threads, &first)) > 0) {
+        while (m->parcels < PT_CREW_PARCELS && (n = take_rows(s, m->threads, all_threads, &first)) > 0) {
             int rc = send_rows(s, rank, first, n);
             if (rc) {
                 fail_with(s, rc);
@@ -282,21 +308,11 @@ static int is_answer(const struct sampling *s, const struct pt_crew_rows *m, siz
 
 static int take_answer(struct sampling *s, int rank, const struct pt_crew_rows *m, size_t size)
 {
-    struct member *member = &s->crew->members[rank];
-    uint32_t kind;
-    memcpy(&kind, m, sizeof kind);
-    if (kind == PT_CREW_FAILED && size > sizeof(struct pt_crew_hello)) {
-        const struct pt_crew_hello *why = (const void *)m;
-        return base_fail(s->err, BASE_EIO, "%s: %.*s", name_of(s->crew, rank), (int)(size - sizeof *why), why->text);
-    }
-    member->parcels--;
-    member->since_s = base_clock_wall_s();
-    s->crew->traffic.messages++;
-    s->crew->traffic.bytes += size;
-    if (size >= sizeof *m && m->kind == PT_CREW_ROWS && m->serial != s->crew->serial)
-        return 0;
+    int rc = pt_crew_settle(s->crew, rank, m, size, s->err);
+    if (rc || (m->kind == PT_CREW_ROWS && m->serial != s->crew->serial))
+        return rc;
     if (!is_answer(s, m, size))
-        return base_fail(s->err, BASE_EIO, "%s said something that makes no sense", name_of(s->crew, rank));
+        return pt_crew_nonsense(s->crew, rank, s->err);
     const unsigned char *sums = (const unsigned char *)(m->rows + m->count);
     for (uint32_t i = 0; i < m->count; i++) {
         struct pt_row *row = &s->slice->rows[m->rows[i].zero];
@@ -310,25 +326,6 @@ static int take_answer(struct sampling *s, int rank, const struct pt_crew_rows *
     return 0;
 }
 
-static void find_missing(struct sampling *s)
-{
-    struct pt_crew *crew = s->crew;
-    double now_s = base_clock_wall_s();
-    for (int rank = 1; rank < crew->peers->count && !atomic_load(&s->stop); rank++)
-        if (crew->members[rank].parcels > 0 && now_s - crew->members[rank].since_s > crew->timeout_s)
-            fail_with(s, lose(crew, s->err, rank));
-}
-
-/* mpirun ends every process when one has died: then that is why we are asked to stop. */
-static void ask_for_stop(struct sampling *s)
-{
-    if (atomic_load(&s->stop) || !s->slice->interrupted || !s->slice->interrupted(s->slice->data))
-        return;
-    int dead = base_peers_find_dead(s->crew->peers);
-    s->crew->lost = dead >= 0;
-    fail_with(s, dead < 0 ? PT_CREW_STOPPED : base_fail(s->err, BASE_EIO, "%s has died", name_of(s->crew, dead)));
-}
-
 /* Takes what has come in, waiting for it up to wait_s, and keeps everybody busy. */
 static void attend(struct sampling *s, int all_threads, double wait_s)
 {
@@ -337,13 +334,15 @@ static void attend(struct sampling *s, int all_threads, double wait_s)
         void *data = NULL;
         size_t size = 0;
         got = base_peers_receive(s->crew->peers, wait_s, &rank, &data, &size, s->err);
-        int rc = got > 0 ? take_answer(s, rank, data, size) : got;
+        if (got > 0)
+            got = take_answer(s, rank, data, size) ? -1 : 1;
         free(data);
-        if (rc)
-            fail_with(s, rc);
+        if (got < 0)
+            fail_with(s, s->err->code);
     }
-    ask_for_stop(s);
-    find_missing(s);
+    int rc = atomic_load(&s->stop) ? 0 : pt_crew_look_round(s->crew, s->slice->interrupted, s->slice->data, s->err);
+    if (rc)
+        fail_with(s, rc);
     deal(s, all_threads);
 }
 

@@ -1,6 +1,6 @@
 /*
- * The crew: the other processes of an MPI job, as rank 0 sees them. Rank 0 has the only film, asks the criterion, shows
- * progress, writes; the crew samples rows for it (crew_member.h) and keeps nothing.
+ * The crew: the other processes of an MPI job, as rank 0 sees them. Rank 0 has the only film, decides, shows progress,
+ * writes; the crew samples rows and asks the criterion about blocks for it (crew_member.h), and keeps nothing.
  *
  * Who is idle is given the next rows of the slice with the sums that they have so far, and sends both back. A row is with
  * one process at a time, so that the film has the bytes that one process would give it (rows.h). Two parcels are with each
@@ -12,6 +12,7 @@
 #include "base/err.h"
 #include "base/peers.h"
 #include "base/threads.h"
+#include "render/host.h"
 #include "render/rows.h"
 
 struct pt_crew;
@@ -50,5 +51,26 @@ struct pt_crew_slice {
 enum { PT_CREW_STOPPED = 1 };
 int pt_crew_sample(struct pt_crew *crew, struct base_threads *threads, const struct pt_crew_slice *slice,
                    struct base_err *err);
+
+/* Blocks about which the criterion is to be asked: the arguments of pt_criterion_evaluate. */
+struct pt_crew_question {
+    struct pt_criterion *criterion;
+    struct pt_film *film;
+    const struct pt_blocks *blocks;
+    const uint32_t *due;
+    const uint8_t *final;
+    uint32_t count;
+    struct lull_decision *decisions;
+    int (*interrupted)(void *data); /* may be NULL; asked now and then */
+    void *data;
+};
+
+/* Can others answer as well? Yes if the criterion keeps no history of its own, its answers are a function of the block's
+ * pixels, and every member has opened the frame. No without crew (NULL). */
+int pt_crew_can_ask(const struct pt_crew *crew, const struct pt_criterion *criterion);
+/* pt_criterion_evaluate by everybody. Fails as pt_crew_sample; what the criterion itself fails with is *said, and costs all
+ * decisions. *thread_s: processor seconds of the others. */
+int pt_crew_ask(struct pt_crew *crew, struct base_threads *threads, const struct pt_crew_question *question,
+                double *thread_s, struct base_err *said, struct base_err *err);
 
 #endif

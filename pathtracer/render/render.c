@@ -365,7 +365,7 @@ static void warn_once(struct pt_render *r, const struct pt_render_hooks *hooks, 
         hooks->warn(hooks->data, line);
 }
 
-/* Asks about the `count` blocks of work->due and times it. Failure leaves every decision at CONTINUE. */
+/* Asks about the `count` blocks of work->due and times it. A criterion that fails leaves every decision at CONTINUE. */
 static void ask(struct pt_render *r, uint32_t count, const struct pt_render_hooks *hooks)
 {
     struct pt_render_work *w = r->work;
@@ -378,6 +378,29 @@ static void ask(struct pt_render *r, uint32_t count, const struct pt_render_hook
     r->totals.checks += count;
 }
 
+/* The same by the crew too, if it can and there are enough blocks. Not 0: nothing has come of it, as pt_crew_ask. */
+static int ask_all(struct pt_render *r, uint32_t count, const struct pt_render_hooks *hooks, struct base_err *err)
+{
+    struct pt_render_work *w = r->work;
+    if (!pt_crew_can_ask(r->config.crew, r->criterion) || count <= (uint32_t)base_threads_count(r->threads)) {
+        ask(r, count, hooks);
+        return 0;
+    }
+    struct pt_crew_question question = {r->criterion, &r->film,     &r->blocks,         w->due,     w->final,
+                                        count,        w->decisions, hooks->interrupted, hooks->data};
+    struct base_err said = {0};
+    double others_s = 0.0, start_s = base_clock_wall_s(), start_cpu_s = base_clock_process_s();
+    int rc = pt_crew_ask(r->config.crew, r->threads, &question, &others_s, &said, err);
+    r->totals.criterion_s += base_clock_wall_s() - start_s;
+    r->criterion_thread_s += base_clock_process_s() - start_cpu_s + others_s;
+    if (rc)
+        return rc;
+    if (said.code)
+        warn_once(r, hooks, said.text);
+    r->totals.checks += count;
+    return 0;
+}
+
 /* Checks may take config.max_check_overhead of the elapsed time: beyond it they are left out until rendering caught up. */
 static int too_expensive(const struct pt_render *r)
 {
@@ -385,8 +408,8 @@ static int too_expensive(const struct pt_render *r)
     return share > 0.0 && r->totals.criterion_s > share * pt_render_elapsed_s(r);
 }
 
-/* All active blocks are at their next check. */
-static void check(struct pt_render *r, const struct pt_render_hooks *hooks)
+/* All active blocks are at their next check. Not 0: it was given up on the way, and nothing has changed. */
+static int check(struct pt_render *r, const struct pt_render_hooks *hooks, struct base_err *err)
 {
     struct pt_render_work *w = r->work;
     static const struct lull_decision keep_on = {.action = LULL_CONTINUE, .p_noisy = NAN, .predicted_spp = NAN,
@@ -412,9 +435,9 @@ static void check(struct pt_render *r, const struct pt_render_hooks *hooks)
         w->final[n++] = (uint8_t)final;
         active += (uint32_t)is_active;
     }
-    if (active == 0)
-        return;
-    ask(r, n, hooks);
+    int rc = active > 0 ? ask_all(r, n, hooks, err) : 0;
+    if (rc || active == 0)
+        return rc;
     if (hooks->judged)
         hooks->judged(hooks->data, r, w->due, n);
     for (uint32_t k = 0; k < n; k++) {
@@ -422,6 +445,7 @@ static void check(struct pt_render *r, const struct pt_render_hooks *hooks)
         note(b, &w->decisions[k]);
         settle(r, b, &w->decisions[k]);
     }
+    return 0;
 }
 
 /* Blocks still active get no more samples: the criterion is asked once more, for the report only. */
@@ -485,20 +509,22 @@ int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum
     int rc = 0, more = 0;
     *outcome = PT_RENDER_DONE;
     while (pt_render_active(r) > 0) {
-        if (slice(r, hooks, &more, &why) != 0) {
-            *outcome = PT_RENDER_LOST;
-            rc = lost(r, hooks, &why, err);
-            break;
-        }
-        if (!more) {
+        int given_up = slice(r, hooks, &more, &why);
+        if (!given_up && !more) {
             if (pilot_is_over(r)) {
                 *outcome = PT_RENDER_PILOT;
                 break;
             }
-            check(r, hooks);
-            if (r->config.max_seam >= 1.0)
+            given_up = check(r, hooks, &why);
+            if (!given_up && r->config.max_seam >= 1.0)
                 pt_blocks_reopen(&r->blocks, r->config.max_seam);
-            continue;
+            if (!given_up)
+                continue;
+        }
+        if (given_up < 0) {
+            *outcome = PT_RENDER_LOST;
+            rc = lost(r, hooks, &why, err);
+            break;
         }
         if (hooks->slice && (rc = hooks->slice(hooks->data, r, err)) != 0)
             break;

@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include <pthread.h>
+#include <stdatomic.h>
 
 #include "render/checkpoint.h"
 #include "render/crew_member.h"
@@ -17,7 +18,31 @@
 #include "support/pt_fake.h"
 #include "support/pt_peers.h"
 
-enum behaviour { WORKS, SILENT, BABBLES, FAILS, OTHER_SETTINGS };
+/* DEAF: it samples, but does not answer when the criterion is to be asked. */
+enum behaviour { WORKS, SILENT, BABBLES, FAILS, DEAF, OTHER_SETTINGS };
+
+/* The fake criterion without history, which others may ask too; how many blocks they did ask about. */
+static struct lull_criterion pure;
+static _Thread_local int is_member;
+static atomic_int asked_elsewhere;
+
+static int32_t pure_evaluate(struct lull_instance *i, const struct lull_view *view, const struct lull_block *blocks,
+                             uint32_t block_stride, struct lull_decision *decisions, uint32_t decision_stride,
+                             uint32_t count, struct lull_error *err)
+{
+    int32_t code = pt_fake_criterion()->evaluate(i, view, blocks, block_stride, decisions, decision_stride, count, err);
+    for (uint32_t k = 0; k < count; k++)
+        decisions[k].p_noisy = 0.25;
+    if (is_member)
+        atomic_fetch_add(&asked_elsewhere, (int)count);
+    return code;
+}
+
+static const void *no_extension(const char *id)
+{
+    (void)id;
+    return NULL;
+}
 
 struct member {
     pthread_t thread;
@@ -35,6 +60,24 @@ static void send_words(struct base_peers *peers, uint32_t kind, const char *word
     base_peers_send(peers, 0, hello, sizeof *hello + strlen(words), &err);
 }
 
+static void sample(struct member *m, struct pt_crew_rows *rows, size_t size)
+{
+    unsigned char *sums = (unsigned char *)(rows->rows + rows->count);
+    const struct pt_row_maker maker = {NULL, pt_fake_noise, &rows->integrator};
+    struct base_err err = {0};
+    for (uint32_t i = 0; i < rows->count; i++) {
+        struct pt_row *row = &rows->rows[i];
+        struct pt_film film;
+        pt_film_init(&film, row->x0, row->y, row->x1, row->y + 1, rows->planes, &err);
+        pt_row_restore(&film, row, sums);
+        pt_row_sample(&maker, &film, row);
+        pt_row_save(&film, row, sums);
+        sums += pt_row_bytes(row, rows->planes);
+        pt_film_release(&film);
+    }
+    base_peers_send(m->peers, 0, rows, size, &err);
+}
+
 /* Takes what comes until rank 0 says that it is over; answers the first rows as it is told to. */
 static void misbehave(struct member *m)
 {
@@ -44,11 +87,15 @@ static void misbehave(struct member *m)
         size_t size;
         struct base_err err = {0};
         if (base_peers_receive(m->peers, 0.05, &rank, &data, &size, &err) <= 0) {
-            if (m->behaviour == SILENT && answered)
+            if ((m->behaviour == SILENT || m->behaviour == DEAF) && answered)
                 return; /* rank 0 gives it up: nobody will say anything any more */
             continue;
         }
         const struct pt_crew_rows *rows = data;
+        if (m->behaviour == DEAF && rows->kind == PT_CREW_ROWS) {
+            sample(m, data, size);
+            continue;
+        }
         over = rows->kind == PT_CREW_END;
         if (!over && m->behaviour == BABBLES && !answered)
             send_words(m->peers, PT_CREW_ROWS, "what is this");
@@ -64,13 +111,22 @@ static void *member_main(void *arg)
 {
     struct member *m = arg;
     struct base_err err = {0};
-    const struct pt_row_maker maker = {NULL, pt_fake_noise, NULL};
+    is_member = 1;
+    struct pt_render_config config = pt_fake_config();
+    struct pt_criterion *criterion = NULL;
+    struct lull_pair pair = {"at", "32"};
     struct base_threads *threads = base_threads_create(m->threads, &err);
-    pt_crew_member_join(m->peers, m->threads, m->behaviour == OTHER_SETTINGS ? "a=1\nb=3\n" : "a=1\nb=2\n", &err);
+    struct pt_crew_tools tools = {threads, {NULL, pt_fake_noise, NULL}, NULL};
+    config.planes = PT_FILM_ALL;
+    pt_criterion_create(&pure, &pair, 1, threads, NULL, NULL, &criterion, &err);
+    pt_render_create(&config, NULL, pt_fake_noise, threads, criterion, &tools.render, &err);
+    pt_crew_member_join(m->peers, &tools, m->behaviour == OTHER_SETTINGS ? "a=1\nb=3\n" : "a=1\nb=2\n", &err);
     if (m->behaviour == WORKS || m->behaviour == OTHER_SETTINGS)
-        pt_crew_member_serve(m->peers, threads, &maker, &err);
+        pt_crew_member_serve(m->peers, &tools, &err);
     else
         misbehave(m);
+    pt_render_destroy(tools.render);
+    pt_criterion_destroy(criterion);
     base_threads_destroy(threads);
     return NULL;
 }
@@ -141,14 +197,32 @@ static void release(struct run *r)
     base_threads_destroy(r->pool);
 }
 
-static void any_number_of_processes_gives_the_bytes_of_one(void **state)
+static void create(struct run *r, const struct pt_render_config *config, const struct lull_criterion *table, int threads)
 {
-    (void)state;
+    struct base_err err = {0};
+    struct lull_pair pair = {"at", "32"};
+    r->pool = base_threads_create(threads, &err);
+    assert_int_equal(pt_criterion_create(table, &pair, 1, r->pool, NULL, NULL, &r->criterion, &err), 0);
+    assert_int_equal(pt_render_create(config, NULL, pt_fake_noise, r->pool, r->criterion, &r->render, &err), 0);
+}
+
+static void finish(const struct run *r)
+{
+    const struct pt_render_hooks none = {0};
+    enum pt_render_outcome outcome;
+    struct base_err err = {0};
+    assert_int_equal(pt_render_run(r->render, &none, &outcome, &err), 0);
+    assert_int_equal(outcome, PT_RENDER_DONE);
+}
+
+static void same_bytes(const struct lull_criterion *table)
+{
     struct pt_render_config config = pt_fake_config();
     struct base_err err = {0};
     config.planes = PT_FILM_ALL;
     struct run one = {0};
-    assert_int_equal(pt_fake_render(&config, pt_fake_noise, 1, "32", &one.render, &one.criterion, &one.pool), 0);
+    create(&one, &config, table, 1);
+    finish(&one);
     const int sizes[][3] = {{2, 1, 1}, {3, 2, 1}, {8, 1, 2}, {5, 3, 3}}; /* processes, their threads, those of rank 0 */
     for (int i = 0; i < 4; i++) {
         struct stage stage;
@@ -158,14 +232,30 @@ static void any_number_of_processes_gives_the_bytes_of_one(void **state)
         assert_int_equal(pt_crew_threads(stage.crew), (sizes[i][0] - 1) * sizes[i][1]);
         config.crew = stage.crew;
         config.order_seed = i == 3 ? 99 : 0;
-        assert_int_equal(pt_fake_render(&config, pt_fake_noise, sizes[i][2], "32", &many.render, &many.criterion, &many.pool),
-                         0);
+        create(&many, &config, table, sizes[i][2]);
+        finish(&many);
         assert_same(one.render, many.render);
         assert_true(pt_crew_traffic(stage.crew)->bytes > 0);
         part(&stage, 0);
         release(&many);
     }
     release(&one);
+}
+
+static void any_number_of_processes_gives_the_bytes_of_one(void **state)
+{
+    (void)state;
+    atomic_store(&asked_elsewhere, 0);
+    same_bytes(pt_fake_criterion());
+    assert_int_equal(atomic_load(&asked_elsewhere), 0); /* it has a history, which rank 0 keeps */
+}
+
+static void a_criterion_without_history_is_asked_by_all(void **state)
+{
+    (void)state;
+    atomic_store(&asked_elsewhere, 0);
+    same_bytes(&pure);
+    assert_true(atomic_load(&asked_elsewhere) > 20);
 }
 
 /* --- faults ------------------------------------------------------------------------------------------------------------- */
@@ -196,36 +286,28 @@ static int count_down(void *data)
 }
 
 /* Renders with a crew until it is lost or interrupted; the checkpoint then goes on alone to the bytes of one process. */
-static void ends_well(enum behaviour last, int interrupt_after, const char *words)
+static void ends_well(const struct lull_criterion *table, enum behaviour last, int interrupt_after, const char *words)
 {
     struct pt_render_config config = pt_fake_config();
     struct base_err err = {0};
     enum pt_render_outcome outcome;
     struct watch watch = {.checkpoint = "/tmp/pt_crew_test.ckp", .left = interrupt_after};
+    const struct pt_render_hooks hooks = {.interrupted = count_down, .suspend = save, .warn = keep_line, .data = &watch};
     struct run one = {0}, lost = {0}, rest = {0};
     struct stage stage;
-    struct lull_pair pair = {"at", "64"};
-    assert_int_equal(pt_fake_render(&config, pt_fake_noise, 1, "64", &one.render, &one.criterion, &one.pool), 0);
-    for (int turn = 0; turn < 2; turn++) {
-        struct run *r = turn == 0 ? &lost : &rest;
-        struct pt_render_hooks hooks = {.interrupted = count_down, .suspend = save, .warn = keep_line, .data = &watch};
-        struct pt_render_hooks none = {0};
-        config.crew = NULL;
-        if (turn == 0) {
-            assemble(&stage, 3, 1, last, 0.3);
-            assert_int_equal(pt_crew_greet(stage.crew, "a=1\nb=2\n", &err), 0);
-            config.crew = stage.crew;
-        }
-        r->pool = base_threads_create(2, &err);
-        assert_int_equal(pt_criterion_create(pt_fake_criterion(), &pair, 1, r->pool, NULL, NULL, &r->criterion, &err), 0);
-        assert_int_equal(pt_render_create(&config, NULL, pt_fake_noise, r->pool, r->criterion, &r->render, &err), 0);
-        if (turn == 1)
-            assert_int_equal(pt_checkpoint_load(watch.checkpoint, r->render, "settings\n", &err), 0);
-        assert_int_equal(pt_render_run(r->render, turn == 0 ? &hooks : &none, &outcome, &err), 0);
-        assert_int_equal(outcome, turn == 1 ? PT_RENDER_DONE : words ? PT_RENDER_LOST : PT_RENDER_INTERRUPTED);
-        if (turn == 0)
-            part(&stage, last == SILENT);
-    }
+    config.planes = PT_FILM_ALL;
+    create(&one, &config, table, 1);
+    finish(&one);
+    create(&rest, &config, table, 2);
+    assemble(&stage, 3, 1, last, 0.3);
+    assert_int_equal(pt_crew_greet(stage.crew, "a=1\nb=2\n", &err), 0);
+    config.crew = stage.crew;
+    create(&lost, &config, table, 2);
+    assert_int_equal(pt_render_run(lost.render, &hooks, &outcome, &err), 0);
+    assert_int_equal(outcome, words ? PT_RENDER_LOST : PT_RENDER_INTERRUPTED);
+    part(&stage, last == SILENT || last == DEAF);
+    assert_int_equal(pt_checkpoint_load(watch.checkpoint, rest.render, "settings\n", &err), 0);
+    finish(&rest);
     if (words)
         assert_non_null(strstr(watch.line, words));
     assert_same(one.render, rest.render);
@@ -238,26 +320,32 @@ static void ends_well(enum behaviour last, int interrupt_after, const char *word
 static void a_silent_member_is_named_and_nothing_is_lost(void **state)
 {
     (void)state;
-    ends_well(SILENT, 0, "rank 2 on host here has not answered for 0.3 s");
+    ends_well(pt_fake_criterion(), SILENT, 0, "rank 2 on host here has not answered for 0.3 s");
+}
+
+static void a_member_that_is_silent_when_asked_is_named(void **state)
+{
+    (void)state;
+    ends_well(&pure, DEAF, 0, "rank 2 on host here has not answered for 0.3 s");
 }
 
 static void a_member_that_makes_no_sense_is_named(void **state)
 {
     (void)state;
-    ends_well(BABBLES, 0, "rank 2 on host here said something that makes no sense");
+    ends_well(pt_fake_criterion(), BABBLES, 0, "rank 2 on host here said something that makes no sense");
 }
 
 static void a_member_that_fails_says_why(void **state)
 {
     (void)state;
-    ends_well(FAILS, 0, "rank 2 on host here: no more paper");
+    ends_well(pt_fake_criterion(), FAILS, 0, "rank 2 on host here: no more paper");
 }
 
 static void an_interruption_leaves_the_slice_undone(void **state)
 {
     (void)state;
     for (int after = 2; after < 60; after += 11)
-        ends_well(WORKS, after, NULL);
+        ends_well(after % 2 ? &pure : pt_fake_criterion(), WORKS, after, NULL);
 }
 
 static void other_settings_are_refused_by_name(void **state)
@@ -273,8 +361,13 @@ static void other_settings_are_refused_by_name(void **state)
 
 int main(void)
 {
+    pure = *pt_fake_criterion();
+    pure.evaluate = pure_evaluate;
+    pure.get_extension = no_extension;
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(any_number_of_processes_gives_the_bytes_of_one),
+        cmocka_unit_test(a_criterion_without_history_is_asked_by_all),
+        cmocka_unit_test(a_member_that_is_silent_when_asked_is_named),
         cmocka_unit_test(a_silent_member_is_named_and_nothing_is_lost),
         cmocka_unit_test(a_member_that_makes_no_sense_is_named),
         cmocka_unit_test(a_member_that_fails_says_why),
