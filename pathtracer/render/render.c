@@ -10,6 +10,11 @@
 /* Length of a slice: short enough for a live line, an interrupt and a time budget, long enough that its barrier costs
  * nothing. */
 static const double SLICE_S = 0.25;
+/* A crew makes it longer by so much for each of its threads, up to a limit: what rank 0 sends in a slice grows with the
+ * threads, and should take a small part of it. */
+static const double SLICE_PER_MEMBER_S = 0.004, LONGEST_SLICE_S = 5.0;
+/* What a byte costs rank 0 that it sends to a member (measured: docs/scale.md). */
+static const double SEND_BYTE_S = 4e-10;
 
 /* Rows that each thread has to choose from in a slice: few enough that a block is sampled in one go, enough that threads and
  * processes end together. */
@@ -308,7 +313,7 @@ static double recent(double before, double now)
  * failure, as when it was interrupted on the way, everything is as before. */
 static int slice(struct pt_render *r, const struct pt_render_hooks *hooks, int *more, struct base_err *err)
 {
-    double span_s = SLICE_S;
+    double span_s = fmin(SLICE_S + SLICE_PER_MEMBER_S * pt_crew_threads(r->config.crew), LONGEST_SLICE_S);
     if (r->config.time_budget_s > 0.0)
         span_s = fmax(0.01, fmin(span_s, r->config.time_budget_s - pt_render_elapsed_s(r)));
     *more = list_items(r, span_s) > 0;
@@ -376,13 +381,24 @@ static void ask(struct pt_render *r, uint32_t count, const struct pt_render_hook
     r->totals.criterion_s += base_clock_wall_s() - start_s;
     r->criterion_thread_s += base_clock_process_s() - start_cpu_s;
     r->totals.checks += count;
+    r->asked += count;
 }
 
-/* The same by the crew too, if it can and there are enough blocks. Not 0: nothing has come of it, as pt_crew_ask. */
+/* Whether a block is better sent to the crew than asked about here: if its checks so far took longer than that. */
+static int worth_sending(const struct pt_render *r, uint32_t count)
+{
+    int threads = base_threads_count(r->threads);
+    double pixels = (double)r->blocks.block_width * (double)r->blocks.block_height;
+    double send_s = pixels * (double)pt_film_pixel_bytes(r->film.planes) * SEND_BYTE_S;
+    return pt_crew_can_ask(r->config.crew, r->criterion) && count > (uint32_t)threads && r->asked > 0 &&
+           r->criterion_thread_s / (double)r->asked > send_s * threads;
+}
+
+/* The same by the crew too, if that is quicker. Not 0: nothing has come of it, as pt_crew_ask. */
 static int ask_all(struct pt_render *r, uint32_t count, const struct pt_render_hooks *hooks, struct base_err *err)
 {
     struct pt_render_work *w = r->work;
-    if (!pt_crew_can_ask(r->config.crew, r->criterion) || count <= (uint32_t)base_threads_count(r->threads)) {
+    if (!worth_sending(r, count)) {
         ask(r, count, hooks);
         return 0;
     }
@@ -398,6 +414,7 @@ static int ask_all(struct pt_render *r, uint32_t count, const struct pt_render_h
     if (said.code)
         warn_once(r, hooks, said.text);
     r->totals.checks += count;
+    r->asked += count;
     return 0;
 }
 

@@ -58,6 +58,7 @@ struct pt_render {
     struct pt_film film;
     struct pt_blocks blocks;
     double criterion_thread_s; /* processor seconds of the checks of this run, all threads together */
+    uint64_t asked;            /* blocks that they were about */
     struct pt_render_totals totals;
     struct pt_dropped_sample dropped[PT_DROPPED_KEPT]; /* in no particular order */
     uint32_t dropped_count;           /* entries used */
