@@ -39,6 +39,11 @@ t "a recording by three processes" mpi 3 "$P" "$scene" -q --size 64x48 --block 3
 same_but_seconds() { [ "$(wc -c <"$1")" = "$(wc -c <"$2")" ] && [ "$(cmp -l "$1" "$2" | wc -l)" -le 80 ]; }
 for f in one/*.lseq; do t "  …the same ${f#one/} but for times" same_but_seconds "$f" "many/${f#one/}"; done
 
+printf 'train room %s 1 linear:1:2:1 0 0\n' "$scene" >tiny.plan
+t "a data set, each view by all processes" env BUILD="${P%/bin/*}" "$here/../../scripts/make-dataset" --plan tiny.plan \
+    --launcher "mpirun --oversubscribe -n 2" set
+t "  …the view is there" test -s set/train/room/block-00000.lseq
+
 # --- what is said once is said by rank 0 ---
 mpi_refused() { # mpi_refused TEXT N COMMAND...: exit status 2, one line of ours, which contains TEXT
     n=$((n + 1)); text=$1; shift
