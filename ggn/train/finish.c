@@ -152,7 +152,7 @@ static int choose_threshold(const struct ggn_session *s, const struct ggn_judged
     int rc = ggn_checks_create(&checks, &s->validation, v->logit, policy, err);
     if (rc)
         return rc;
-    rc = ggn_calibrate_threshold(&checks, s->plan->early_rate, &policy->threshold, stopping, err);
+    rc = ggn_calibrate_threshold(&checks, s->plan->early_rate, policy, stopping, err);
     ggn_checks_release(&checks);
     return rc;
 }

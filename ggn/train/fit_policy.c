@@ -84,15 +84,18 @@ void ggn_checks_release(struct ggn_checks *checks)
     *checks = (struct ggn_checks){0};
 }
 
-int ggn_calibrate_stopping(const struct ggn_checks *checks, double t, struct ggn_stopping *out, struct base_err *err)
+int ggn_calibrate_stopping(const struct ggn_checks *checks, int passes, double t, struct ggn_stopping *out,
+                           struct base_err *err)
 {
+    struct ggn_policy policy = checks->policy;
     const struct ggn_windows *w = checks->windows;
     const struct ggn_seen *seen = checks->seen;
     double *error = malloc(((size_t)w->set->n + 1) * sizeof *error), spent = 0, needed = 0;
-    int early = 0, unsure = 0;
+    int early = 0;
 
     if (!error)
         return base_fail_nomem(err, "thresholds");
+    policy.passes = passes;
     *out = (struct ggn_stopping){0};
     for (int c = 0; c < w->set->n; c++) {
         const struct ggn_chain *chain = &w->set->chains[c];
@@ -100,12 +103,11 @@ int ggn_calibrate_stopping(const struct ggn_checks *checks, double t, struct ggn
         seen += chain->n_levels;
         if (w->first[c + 1] == w->first[c])
             continue;
-        int level = ggn_replay_stop(own, chain->n_levels, &checks->policy, t);
+        int level = ggn_replay_stop(own, chain->n_levels, &policy, t);
         double truth = chain->label.threshold;
         /* nothing is known after the end of the chain: right if the noise is seen until there */
         double stop = level < 0 ? fmax(chain->spp[chain->n_levels - 1], truth) : chain->spp[level];
         early += stop < 0.8 * truth;
-        unsure += stop < 0.8 * truth * exp2(chain->spread);
         spent += stop;
         needed += truth;
         error[out->blocks] = fabs(log2(stop / truth));
@@ -113,7 +115,6 @@ int ggn_calibrate_stopping(const struct ggn_checks *checks, double t, struct ggn
     }
     if (out->blocks) {
         out->early_rate = (double)early / out->blocks;
-        out->unsure_rate = (double)unsure / out->blocks;
         out->samples_ratio = spent / needed;
         out->mean_abs_log2 /= out->blocks;
         out->median_abs_log2 = ggn_stats_quantile(error, (size_t)out->blocks, 0.5);
@@ -122,23 +123,25 @@ int ggn_calibrate_stopping(const struct ggn_checks *checks, double t, struct ggn
     return 0;
 }
 
-int ggn_calibrate_threshold(const struct ggn_checks *checks, double early_rate, double *threshold, struct ggn_stopping *out,
-                            struct base_err *err)
+int ggn_calibrate_threshold(const struct ggn_checks *checks, double early_rate, struct ggn_policy *policy,
+                            struct ggn_stopping *out, struct base_err *err)
 {
     struct ggn_stopping best = {0};
-    double chosen = 0;
 
-    for (int percent = 1; percent <= 99; percent++) {
+    policy->threshold = 0;
+    for (int k = 0; k < 2 * 99; k++) {
+        const int passes = 1 + k / 99;
+        const double t = (1 + k % 99) / 100.0;
         struct ggn_stopping now;
-        int rc = ggn_calibrate_stopping(checks, percent / 100.0, &now, err);
+        int rc = ggn_calibrate_stopping(checks, passes, t, &now, err);
         if (rc)
             return rc;
-        if (chosen > 0 && (now.unsure_rate > early_rate || now.mean_abs_log2 >= best.mean_abs_log2))
+        if (policy->threshold > 0 && (now.early_rate > early_rate || now.mean_abs_log2 >= best.mean_abs_log2))
             continue;
         best = now;
-        chosen = percent / 100.0;
+        policy->threshold = t;
+        policy->passes = passes;
     }
-    *threshold = chosen;
     *out = best;
     return 0;
 }

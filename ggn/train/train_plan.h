@@ -34,7 +34,7 @@ struct ggn_train_plan {
     int synthetic;          /* synthetic chains per block */
     int extend;             /* continue recorded chains beyond their last level, see ggn_chains_extend */
     int validation_windows; /* most windows per validation */
-    double early_rate;      /* share of validation blocks that may be stopped early (ggn_stopping.unsure_rate) */
+    double early_rate;      /* share of validation blocks that may be stopped early (ggn_stopping.early_rate) */
     uint32_t seed;
     int threads;
     FILE *progress;                           /* lines for people, or NULL */

@@ -421,8 +421,8 @@ static void platt_recovers_the_scale(void **state)
     (void)state;
 }
 
-/* A judge whose logit crosses 0 one check after the true threshold: no early stop at t = 0.5, and the chosen t stops
- * none early even if the labels are one spread too low. */
+/* A judge whose logit crosses 0 at the true threshold: no early stop at t = 0.5, and the chosen t stops none early. Two passes
+ * cost a check more, and are chosen where a single low logit long before the threshold would stop the block. */
 static void the_threshold_respects_the_early_rate(void **state)
 {
     struct ggn_chains set;
@@ -442,20 +442,25 @@ static void the_threshold_respects_the_early_rate(void **state)
     policy.ratio = set.ratio;
     struct ggn_checks checks;
     assert_int_equal(ggn_checks_create(&checks, &w, logit, &policy, &err), 0);
-    assert_int_equal(ggn_calibrate_stopping(&checks, 0.5, &at, &err), 0);
+    assert_int_equal(ggn_calibrate_stopping(&checks, 1, 0.5, &at, &err), 0);
     assert_int_equal(at.blocks, 9);
     assert_true(at.early_rate == 0 && at.samples_ratio >= 1);
-    assert_int_equal(ggn_calibrate_threshold(&checks, 0, &policy.threshold, &chosen, &err), 0);
-    assert_true(chosen.early_rate == 0 && chosen.unsure_rate == 0);
+    assert_int_equal(ggn_calibrate_threshold(&checks, 0, &policy, &chosen, &err), 0);
+    assert_true(chosen.early_rate == 0 && policy.passes == 1);
     assert_true(policy.threshold > 0.05 && policy.threshold < 0.9);
     double slope = ggn_calibrate_slope(&w, logit, &policy);
     assert_true(fabs(slope - 6) < 1e-6);
-    /* labels that are not sure by an octave: every stop keeps that distance */
     double near = chosen.mean_abs_log2;
+    assert_int_equal(ggn_calibrate_stopping(&checks, 2, policy.threshold, &at, &err), 0);
+    assert_true(at.samples_ratio > 1.05 * chosen.samples_ratio);
+    /* the first window of every block is as clean as any */
+    ggn_checks_release(&checks);
     for (int c = 0; c < set.n; c++)
-        set.chains[c].spread = 1;
-    assert_int_equal(ggn_calibrate_threshold(&checks, 0, &policy.threshold, &chosen, &err), 0);
-    assert_true(chosen.unsure_rate == 0 && chosen.mean_abs_log2 > near + 0.5);
+        if (w.first[c + 1] > w.first[c])
+            logit[w.first[c]] = -30;
+    assert_int_equal(ggn_checks_create(&checks, &w, logit, &policy, &err), 0);
+    assert_int_equal(ggn_calibrate_threshold(&checks, 0, &policy, &chosen, &err), 0);
+    assert_true(chosen.early_rate == 0 && policy.passes == 2 && chosen.mean_abs_log2 > near);
     ggn_checks_release(&checks);
     /* a guard that no level satisfies lets nothing stop, a gate that spares the network everywhere neither */
     for (int c = 0; c < set.n; c++)
@@ -466,7 +471,7 @@ static void the_threshold_respects_the_early_rate(void **state)
         *(k ? &held.gate_noise : &held.tail999) = 1e-12;
         assert_int_equal(ggn_checks_create(&checks, &w, logit, &held, &err), 0);
         struct ggn_stopping none;
-        assert_int_equal(ggn_calibrate_stopping(&checks, 0.99, &none, &err), 0);
+        assert_int_equal(ggn_calibrate_stopping(&checks, 2, 0.99, &none, &err), 0);
         assert_true(none.samples_ratio > at.samples_ratio && none.early_rate == 0);
         ggn_checks_release(&checks);
     }
