@@ -15,12 +15,12 @@
 #include "observer/curve.h"
 #include "observer/observer.h"
 
-enum { MAX_FILES = 8 };
+enum { MAX_FILES = 16 };
 
 struct options {
-    const char *data, *out, *observer, *models[MAX_FILES], *baselines[MAX_FILES];
-    int n_models, n_baselines, split, threads, no_quality, recorded, sizes;
-    double ratio;
+    const char *data, *out, *observer, *models[MAX_FILES], *baselines[MAX_FILES], *thresholds[MAX_FILES];
+    int n_models, n_baselines, n_thresholds, split, threads, no_quality, recorded, sizes, scores, precision;
+    double ratio, cadence;
 };
 
 static int add_file(const char **list, int *n, const char *path, struct base_err *err)
@@ -37,12 +37,19 @@ static int add_model(void *into, const char *path, struct base_err *err)
     return add_file(o->models, &o->n_models, path, err);
 }
 
+static int add_thresholds(void *into, const char *path, struct base_err *err)
+{
+    struct options *o = into;
+    return add_file(o->thresholds, &o->n_thresholds, path, err);
+}
+
 static int add_baseline(void *into, const char *path, struct base_err *err)
 {
     struct options *o = into;
     return add_file(o->baselines, &o->n_baselines, path, err);
 }
 
+static const char *const precisions[] = {"f32", "bf16", "f64", NULL}; /* enum ggn_precision */
 static const char *const split_words[] = {"train", "validation", "test", "people", "none", NULL};
 
 #define TO(member) BASE_TO(struct options, member)
@@ -51,9 +58,15 @@ static const struct base_option list[] = {
     {"split", 0, NULL, TO(split), .words = split_words, .help = "which of its views (test)"},
     {"model", 'm', "FILE", .set = add_model, .help = "trained network (.ggn); may be repeated"},
     {"baseline", 0, "FILE", .set = add_baseline, .help = "what ggn baseline wrote; may be repeated"},
+    {"thresholds", 0, "CSV", .set = add_thresholds,
+     .help = "stop where this file says (published thresholds); may be repeated"},
     {"observer", 'O', "FILE", TO(observer), .help = "the observer's parameters, each view without itself"},
     {"output", 'o', "FILE", TO(out), .output = 1, .help = "write there instead of printing"},
     {"ratio", 0, "R", TO(ratio), 1, 16, .help = "thin the levels, and the checks, to this ratio of samples"},
+    {"cadence", 0, "R", TO(cadence), 1.02, 16,
+     .help = "simulate all levels, this far apart, and ask networks and baselines as often"},
+    {"precision", 0, NULL, TO(precision), .words = precisions, .help = "of the networks' arithmetic (f32)"},
+    {"scores", 0, NULL, TO(scores), .help = "of the networks' own settings only: p of every window, and the stops"},
     {"recorded", 0, NULL, TO(recorded), .help = "recorded levels only; blocks that show noise in the last one are left out"},
     {"no-quality", 0, NULL, TO(no_quality), .help = "skip FLIP"},
     {"sizes", 0, NULL, TO(sizes), .help = "also thresholds of the blocks' parts, as of smaller blocks"},
@@ -152,19 +165,69 @@ static void put_scenes(struct job *j, cJSON *root)
     }
 }
 
+static void put_threshold(struct job *j, cJSON *to, const struct ggn_curve *c)
+{
+    int censored;
+    base_json_number(to, NULL, ggn_curve_threshold(c, ggn_observer_limit(&ggn_observer_default, c->texture), &censored),
+                     &j->failed);
+}
+
 /* Thresholds of every square of `side` pixels that a block divides into. */
 static int put_parts(struct job *j, cJSON *to, const struct seq_block *p, int side, struct base_err *err)
 {
     for (int k = 0; k < (int)(p->width / (uint32_t)side * (p->height / (uint32_t)side)); k++) {
         struct ggn_curve c;
-        int across = (int)p->width / side, censored;
+        int across = (int)p->width / side;
         int rc = ggn_curve_part(p, k % across * side, k / across * side, side, side, &c, err);
         if (rc)
             return rc;
-        double limit = ggn_observer_limit(&ggn_observer_default, c.texture);
-        base_json_number(to, NULL, ggn_curve_threshold(&c, limit, &censored), &j->failed);
+        put_threshold(j, to, &c);
         ggn_curve_release(&c);
     }
+    return 0;
+}
+
+/* The manifest's blocks that begin at (x, y) of a view and beside and below it. 0: one of the four was not recorded. */
+static int four_at(const struct seq_manifest *m, int x, int y, int side, uint32_t out[4])
+{
+    int found = 0;
+    for (uint32_t i = 0; i < m->n_blocks; i++) {
+        int dx = (int)m->blocks[i].x0 - x, dy = (int)m->blocks[i].y0 - y;
+        if ((dx == 0 || dx == side) && (dy == 0 || dy == side)) {
+            out[dx / side + 2 * (dy / side)] = i;
+            found++;
+        }
+    }
+    return found == 4;
+}
+
+/* Thresholds of every square of four neighbours, of twice a block's side. */
+static int put_joined(struct job *j, cJSON *to, const struct ggn_dataset_view *v, struct base_err *err)
+{
+    const int side = j->set.chains.width;
+    char key[16];
+    snprintf(key, sizeof key, "%d", 2 * side);
+    for (int y = 0; y + 2 * side <= (int)v->manifest.height; y += 2 * side)
+        for (int x = 0; x + 2 * side <= (int)v->manifest.width; x += 2 * side) {
+            struct seq_block four[4];
+            uint32_t index[4];
+            struct ggn_curve c;
+            int rc = 0, read = 0;
+            if (!four_at(&v->manifest, x, y, side, index))
+                continue;
+            for (; read < 4 && !rc; read += !rc)
+                rc = seq_manifest_read_block(v->dir, &v->manifest, index[read], &four[read], err);
+            if (!rc && !(rc = ggn_curve_joined(four, 2, 2, &c, err))) {
+                cJSON *scene = cJSON_GetObjectItemCaseSensitive(to, v->manifest.scene);
+                cJSON *parts = cJSON_GetObjectItemCaseSensitive(scene, key);
+                put_threshold(j, parts ? parts : base_json_array(scene, key, &j->failed), &c);
+                ggn_curve_release(&c);
+            }
+            while (read > 0)
+                seq_block_release(&four[--read]);
+            if (rc)
+                return rc;
+        }
     return 0;
 }
 
@@ -195,6 +258,9 @@ static int put_sizes(struct job *j, cJSON *root, struct base_err *err)
         }
         seq_block_release(&p);
     }
+    for (int v = 0; v < s->chains.data.n && !rc; v++)
+        if (s->chains.data.views[v].split == j->split)
+            rc = put_joined(j, to, &s->chains.data.views[v], err);
     return rc;
 }
 
@@ -215,12 +281,16 @@ static void turn(struct job *j, struct ggn_method *m, const char *dial, const do
 #define COUNT(a) (sizeof(a) / sizeof(a)[0])
 static const double shares[] = {0.9, 0.7, 0.5, 0.35, 0.25, 0.15, 0.1, 0.05, 0.02, 0.01, 0.004};
 
+/* The same samples everywhere: as the host's own limit, and as the criterion `fixed`, which is asked once. */
 static void cost_uniform(struct job *j)
 {
     for (double spp = 16; spp <= 16384; spp *= 2) {
-        for (int b = 0; b < j->set.n_blocks; b++)
+        for (int b = 0; b < j->set.n_blocks; b++) {
             j->stop[b] = spp;
+            j->checks[b] = (struct ggn_checks_made){.full = 1};
+        }
         put_setting(j, "uniform", "spp", spp, j->stop, NULL);
+        put_setting(j, "fixed", "spp", spp, j->stop, j->checks);
     }
     for (int b = 0; b < j->set.n_blocks; b++)
         j->stop[b] = j->set.blocks[b].label.threshold;
@@ -237,43 +307,64 @@ static int cost_errors(struct job *j, struct base_err *err)
                               : ggn_method_variance(&m, &j->set, &available, err);
         if (rc)
             return rc;
-        if (available)
-            turn(j, &m, "threshold", k ? halfbuf : variance, k ? COUNT(halfbuf) : COUNT(variance));
-        m.guard = NULL;
-        snprintf(m.name, sizeof m.name, k ? "halfbuf, no guard" : "variance, no guard");
-        if (available)
-            turn(j, &m, "threshold", k ? halfbuf : variance, k ? COUNT(halfbuf) : COUNT(variance));
+        const double *dial = k ? halfbuf : variance, own = k ? 0.004 : 0.03; /* the criteria's defaults */
+        const size_t n = k ? COUNT(halfbuf) : COUNT(variance);
+        for (int guarded = 1; guarded >= 0 && available; guarded--) {
+            if (!guarded)
+                snprintf(m.name, sizeof m.name, k ? "halfbuf, no guard" : "variance, no guard");
+            m.guard = guarded ? m.guard : NULL;
+            turn(j, &m, "threshold", j->o->cadence > 0 ? &own : dial, j->o->cadence > 0 ? 1 : n);
+        }
         ggn_method_release(&m);
     }
     return 0;
 }
 
+static int put_observer(struct job *j, const char *dial, double visible, double growth, struct base_err *err)
+{
+    struct ggn_method m;
+    int available, rc = ggn_method_observer(&m, &j->set, j->o->observer, visible, growth, &available, err);
+    if (rc)
+        return rc;
+    if (available)
+        put_method(j, dial, strcmp(dial, "growth") == 0 ? growth : visible, &m);
+    ggn_method_release(&m);
+    return 0;
+}
+
 static int cost_observer(struct job *j, struct base_err *err)
 {
-    int rc = 0, available;
-    for (size_t i = 0; i < COUNT(shares) && !rc; i++) {
-        struct ggn_method m;
-        rc = ggn_method_observer(&m, &j->set, j->o->observer, shares[i], &available, err);
-        if (rc)
-            return rc;
-        if (available)
-            put_method(j, "visible", shares[i], &m);
-        ggn_method_release(&m);
-    }
+    static const double growths[] = {1.05, 1.1, 1.25, 1.5, 2.0};
+    int rc = 0;
+    if (j->o->cadence > 0)
+        return put_observer(j, "growth", 0.25, j->o->cadence, err);
+    for (size_t i = 0; i < COUNT(shares) && !rc; i++)
+        rc = put_observer(j, "visible", shares[i], GGN_OBSERVER_GROWTH, err);
+    for (size_t i = 0; i < COUNT(growths) && !rc; i++)
+        rc = put_observer(j, "growth", 0.25, growths[i], err);
     return rc;
 }
 
-static void cost_network(struct job *j, struct ggn_method *m)
+/* How many checks in a row must pass. */
+static void turn_passes(struct job *j, struct ggn_method *m)
 {
-    int own = m->passes;
-    double *gated = m->verdict;
-    put_method(j, "own", m->cut, m);
-    turn(j, m, "visible", shares, COUNT(shares));
+    const int own = m->passes;
     for (m->passes = 1; m->passes <= 4; m->passes++) {
         ggn_method_run(m, &j->set);
         put_method(j, "passes", m->passes, m);
     }
     m->passes = own;
+    ggn_method_run(m, &j->set);
+}
+
+static void cost_network(struct job *j, struct ggn_method *m)
+{
+    double *gated = m->verdict;
+    put_method(j, "own", m->cut, m);
+    if (j->o->cadence > 0 || j->o->scores)
+        return;
+    turn(j, m, "visible", shares, COUNT(shares));
+    turn_passes(j, m);
     m->verdict = NULL; /* scores of every window, as without the gate */
     ggn_method_run(m, &j->set);
     put_method(j, "gate", 0, m);
@@ -285,6 +376,18 @@ static void cost_network(struct job *j, struct ggn_method *m)
     m->guard = guard;
 }
 
+/* Beside the point that was just put: p of every window of the split, null where none was judged. */
+static void put_scores(struct job *j, const struct ggn_method *m)
+{
+    cJSON *point = cJSON_GetArrayItem(j->points, cJSON_GetArraySize(j->points) - 1);
+    cJSON *scores = j->o->scores ? base_json_array(point, "scores", &j->failed) : NULL;
+    for (int b = 0; b < j->set.n_blocks && scores; b++)
+        for (size_t i = j->set.blocks[b].first; i < j->set.blocks[b].end && j->set.blocks[b].split == j->split; i++)
+            base_json_number(scores, NULL, m->score[i], &j->failed);
+    if (scores)
+        base_json_number(point, "cut", m->cut, &j->failed);
+}
+
 static int cost_models(struct job *j, struct base_threads *threads, struct base_err *err)
 {
     int rc = 0;
@@ -293,14 +396,19 @@ static int cost_models(struct job *j, struct base_threads *threads, struct base_
         struct ggn_policy policy;
         struct ggn_method m;
         const char *slash = strrchr(j->o->models[i], '/');
+        char name[GGN_METHOD_NAME];
+        snprintf(name, sizeof name, "%.40s%s%s", slash ? slash + 1 : j->o->models[i], j->o->precision ? " " : "",
+                 j->o->precision ? precisions[j->o->precision] : "");
         rc = ggn_model_load(j->o->models[i], &model, err);
         if (!rc)
             rc = ggn_policy_of(model, &policy, err);
+        if (j->o->cadence > 0)
+            policy.ratio = j->o->cadence;
         if (!rc)
-            rc = ggn_eval_trained(&m, &j->set, model, &policy, slash ? slash + 1 : j->o->models[i], GGN_PRECISION_F32,
-                                  threads, err);
+            rc = ggn_eval_trained(&m, &j->set, model, &policy, name, (enum ggn_precision)j->o->precision, threads, err);
         if (!rc) {
             cost_network(j, &m);
+            put_scores(j, &m);
             ggn_method_release(&m);
         }
         ggn_model_destroy(model);
@@ -318,17 +426,40 @@ static int cost_baselines(struct job *j, struct base_threads *threads, struct ba
         rc = ggn_baseline_load(&b, j->o->baselines[i], GGN_BASELINES, err);
         if (rc)
             return rc;
+        if (j->o->cadence > 0)
+            b.policy.ratio = j->o->cadence;
         rc = b.window > j->set.window ? base_fail(err, BASE_EINVAL, "%s: it judges %d images, windows here have %d",
                                                   j->o->baselines[i], b.window, j->set.window)
                                       : ggn_looks_make(&looks, &b, &j->set, threads, err);
         if (!rc && !(rc = ggn_method_baseline(&m, &j->set, &b, &looks, threads, err))) {
             snprintf(m.name, sizeof m.name, "%s", ggn_baseline_names[b.kind]);
             put_method(j, "own", m.cut, &m);
-            turn(j, &m, "visible", shares, COUNT(shares));
+            if (!(j->o->cadence > 0)) {
+                turn(j, &m, "visible", shares, COUNT(shares));
+                turn_passes(j, &m);
+            }
             ggn_method_release(&m);
         }
         ggn_looks_release(&looks);
         ggn_baseline_release(&b);
+    }
+    return rc;
+}
+
+static int cost_thresholds(struct job *j, struct base_err *err)
+{
+    int rc = 0, available;
+    for (int i = 0; i < j->o->n_thresholds && !rc; i++) {
+        struct ggn_method m;
+        rc = ggn_method_thresholds(&m, &j->set, j->o->thresholds[i], j->split, &available, err);
+        if (rc)
+            return rc;
+        if (available)
+            put_setting(j, m.name, "own", 0, m.stop, NULL);
+        else
+            rc = base_fail(err, BASE_EINVAL, "%s: not all views of the split '%s' are in it", j->o->thresholds[i],
+                           ggn_split_names[j->split]);
+        ggn_method_release(&m);
     }
     return rc;
 }
@@ -343,6 +474,22 @@ static int write_all(struct job *j, cJSON *root, struct base_err *err)
     puts(text);
     cJSON_free(text);
     return 0;
+}
+
+/* Whether a model takes the noise picture, and the longest window. */
+static int look_at_models(const struct options *o, int *pictures, int *window, struct base_err *err)
+{
+    int rc = 0;
+    for (int i = 0; i < o->n_models && !rc; i++) {
+        struct ggn_model *model = NULL;
+        rc = ggn_model_load(o->models[i], &model, err);
+        if (!rc) {
+            *pictures |= model->hyper.picture;
+            *window = model->hyper.window > *window ? model->hyper.window : *window;
+        }
+        ggn_model_destroy(model);
+    }
+    return rc;
 }
 
 static int cost(struct job *j, struct base_threads *threads, struct base_err *err)
@@ -361,16 +508,18 @@ static int cost(struct job *j, struct base_threads *threads, struct base_err *er
     if (!rc && j->o->sizes)
         rc = put_sizes(j, root, err);
     j->points = base_json_array(root, "points", &j->failed);
-    if (!rc)
+    if (!rc && !j->o->scores) {
         cost_uniform(j);
-    if (!rc)
         rc = cost_errors(j, err);
-    if (!rc)
-        rc = cost_observer(j, err);
+        if (!rc)
+            rc = cost_observer(j, err);
+    }
     if (!rc)
         rc = cost_models(j, threads, err);
-    if (!rc)
+    if (!rc && !j->o->scores)
         rc = cost_baselines(j, threads, err);
+    if (!rc && !j->o->scores)
+        rc = cost_thresholds(j, err);
     if (!rc)
         rc = write_all(j, root, err);
     cJSON_Delete(root);
@@ -390,16 +539,19 @@ int ggn_cmd_cost(int argc, char **argv)
     struct job j = {.o = &o};
     struct base_threads *threads = NULL;
     struct base_err err = {0};
-    int skipped;
+    int skipped, pictures = 0, window = 6;
 
     int rc = base_options_parse(&options, argc, argv, &o, &err);
     j.split = (enum ggn_split)o.split;
     if (!rc && !(threads = base_threads_create(o.threads, &err)))
         rc = err.code;
     if (!rc)
+        rc = look_at_models(&o, &pictures, &window, &err);
+    if (!rc)
         rc = ggn_eval_set_load(&j.set,
-                               &(struct ggn_eval_options){.dir = o.data, .window = 6, .quality = !o.no_quality,
-                                                          .recorded = o.recorded, .ratio = o.ratio, .seed = 1},
+                               &(struct ggn_eval_options){.dir = o.data, .window = window, .quality = !o.no_quality,
+                                                          .recorded = o.recorded, .ratio = o.ratio, .seed = 1,
+                                                          .cadence = o.cadence, .pictures = pictures},
                                threads, &skipped, &err);
     for (int b = 0; o.recorded && b < j.set.n_blocks; b++) /* whose thresholds lie beyond: nothing is known there */
         if (j.set.blocks[b].label.censored)

@@ -255,7 +255,8 @@ static int add_observed(struct job *j, struct base_err *err)
     if (rc)
         return rc;
     struct ggn_method *m = &j->methods[j->n];
-    rc = ggn_method_observer(m, &j->set, j->o->observer, j->o->visible > 0 ? j->o->visible : 0.25, &available, err);
+    rc = ggn_method_observer(m, &j->set, j->o->observer, j->o->visible > 0 ? j->o->visible : 0.25, GGN_OBSERVER_GROWTH,
+                             &available, err);
     if (!rc && available)
         j->n++;
     else if (!rc)

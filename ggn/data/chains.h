@@ -67,6 +67,10 @@ int ggn_chains_add_synthetic(struct ggn_chains *set, int per_chain, uint32_t see
  * stands for the converged image. */
 int ggn_chains_extend(struct ggn_chains *set, uint32_t seed, struct base_err *err);
 
+/* Makes every labelled chain that has a full level anew, its levels `ratio` > 1 apart and up to 10,000 spp: from the two
+ * halves alone, so that chains with and without a reference are made alike. The same seed gives the same chains. */
+int ggn_chains_simulate(struct ggn_chains *set, double ratio, uint32_t seed, struct base_err *err);
+
 /* Chains of a split, real ones only if real_only. */
 int ggn_chains_count(const struct ggn_chains *set, enum ggn_split split, int real_only);
 /* Values of one image: 3·H·W. */

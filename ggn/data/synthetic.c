@@ -9,7 +9,7 @@
 #include "nn/hash.h"
 #include "data/chains.h"
 
-enum { MAX_LEVELS = 128 };
+enum { MAX_LEVELS = 192 };
 static const double HIGHEST_SHARE = 0.7; /* of the reference's samples: nearer than that nothing but the reference is left */
 static const double JITTER = 0.04;       /* of the ratio between levels */
 static const double SIMULATED_END = 10000; /* spp, where there is no reference */
@@ -23,13 +23,15 @@ struct source {
     double n_full, n_reference;
 };
 
-static int choose_levels(double *spp, double first, double ratio, double highest, uint32_t seed)
+static int choose_levels(double *spp, double first, double ratio, double highest, int jittered, uint32_t seed)
 {
     int n = 0;
 
-    for (double s = floor(first * (1 + 0.1 * ggn_hash_unit(0, seed)) + 0.5); n < MAX_LEVELS && s <= highest; n++) {
+    for (double s = floor(first * (jittered ? 1 + 0.1 * ggn_hash_unit(0, seed) : 1) + 0.5); n < MAX_LEVELS && s <= highest;
+         n++) {
+        double off = jittered ? JITTER * (2 * ggn_hash_unit((uint32_t)n + 1, seed) - 1) : 0;
         spp[n] = s;
-        s = fmax(s + 1, floor(s * ratio * (1 + JITTER * (2 * ggn_hash_unit((uint32_t)n + 1, seed) - 1)) + 0.5));
+        s = fmax(s + 1, floor(s * ratio * (1 + off) + 0.5));
     }
     return n;
 }
@@ -94,7 +96,8 @@ static int make_chain(struct ggn_chains *set, const struct ggn_chain *real, stru
 {
     double spp[MAX_LEVELS];
     float *noise = malloc(ggn_chains_values(set) * sizeof *noise);
-    int n = choose_levels(spp, set->first_spp, set->ratio > 1.01 ? set->ratio : 1.15, HIGHEST_SHARE * s->n_reference, seed);
+    const double ratio = set->ratio > 1.01 ? set->ratio : 1.15;
+    int n = choose_levels(spp, set->first_spp, ratio, HIGHEST_SHARE * s->n_reference, 1, seed);
 
     *c = *real;
     c->synthetic = 1;
@@ -112,8 +115,9 @@ static int make_chain(struct ggn_chains *set, const struct ggn_chain *real, stru
     return rc;
 }
 
-static int read_source(const struct ggn_chains *set, const struct ggn_chain *c, struct source *s, int *usable,
-                       struct base_err *err)
+/* with_reference 0: as if none had been recorded. */
+static int read_source(const struct ggn_chains *set, const struct ggn_chain *c, int with_reference, struct source *s,
+                       int *usable, struct base_err *err)
 {
     const struct ggn_dataset_view *v = &set->data.views[c->view];
     struct seq_block b = {0};
@@ -130,9 +134,10 @@ static int read_source(const struct ggn_chains *set, const struct ggn_chain *c, 
         return rc;
     const struct seq_record *full = ggn_chains_full_level(&b);
     if (full) {
+        const struct seq_record *reference = with_reference ? b.reference : NULL;
         s->n_full = full->spp;
-        s->n_reference = b.reference ? b.reference->spp : (double)INFINITY;
-        rc = seq_mean(&b, b.reference ? b.reference : full, s->base, err);
+        s->n_reference = reference ? reference->spp : (double)INFINITY;
+        rc = seq_mean(&b, reference ? reference : full, s->base, err);
         if (!rc)
             rc = seq_half(&b, full, s->d, err);
         if (!rc)
@@ -169,7 +174,7 @@ int ggn_chains_add_synthetic(struct ggn_chains *set, int per_chain, uint32_t see
         int usable = 0;
         if (set->chains[i].split != GGN_SPLIT_TRAIN)
             continue;
-        rc = read_source(set, &set->chains[i], &s, &usable, err);
+        rc = read_source(set, &set->chains[i], 1, &s, &usable, err);
         for (int k = 0; !rc && usable && isfinite(s.n_reference) && k < per_chain; k++) {
             struct ggn_chain *c = ggn_chains_append(set, err);
             rc = c ? make_chain(set, &set->chains[i], c, &s, ggn_hash((uint32_t)(i * 64 + k), seed), err) : BASE_ENOMEM;
@@ -211,12 +216,11 @@ static int extend_chain(const struct ggn_chains *set, struct ggn_chain *c, const
 }
 
 /* Without a reference: levels up to SIMULATED_END in place of the recorded ones. */
-static int simulate_chain(const struct ggn_chains *set, struct ggn_chain *c, const struct source *s, uint32_t seed,
-                          struct base_err *err)
+static int simulate_chain(const struct ggn_chains *set, struct ggn_chain *c, const struct source *s, double ratio,
+                          int jittered, uint32_t seed, struct base_err *err)
 {
-    const double ratio = set->ratio > 1.01 && set->ratio < 2 ? set->ratio : 1.2565; /* a third of an octave */
     double spp[MAX_LEVELS];
-    int n = choose_levels(spp, set->first_spp < 16 ? set->first_spp : 16, ratio, SIMULATED_END / ratio, seed);
+    int n = choose_levels(spp, set->first_spp < 16 ? set->first_spp : 16, ratio, SIMULATED_END / ratio, jittered, seed);
 
     spp[n++] = SIMULATED_END;
     float *noise = malloc(ggn_chains_values(set) * sizeof *noise);
@@ -236,6 +240,7 @@ static int simulate_chain(const struct ggn_chains *set, struct ggn_chain *c, con
 
 int ggn_chains_extend(struct ggn_chains *set, uint32_t seed, struct base_err *err)
 {
+    const double ratio = set->ratio > 1.01 && set->ratio < 2 ? set->ratio : 1.2565; /* a third of an octave */
     struct source s = {0};
     int rc = source_init(&s, set, err);
 
@@ -247,10 +252,31 @@ int ggn_chains_extend(struct ggn_chains *set, uint32_t seed, struct base_err *er
         if (c->synthetic || !c->has_label || c->label.threshold < CLEAN_END * last ||
             (c->label.censored && c->label.threshold <= last))
             continue;
-        rc = read_source(set, c, &s, &usable, err);
-        if (!rc && usable)
-            rc = (isfinite(s.n_reference) ? extend_chain : simulate_chain)(set, c, &s, ggn_hash((uint32_t)i, seed + 1), err);
+        rc = read_source(set, c, 1, &s, &usable, err);
+        if (!rc && usable && isfinite(s.n_reference))
+            rc = extend_chain(set, c, &s, ggn_hash((uint32_t)i, seed + 1), err);
+        else if (!rc && usable)
+            rc = simulate_chain(set, c, &s, ratio, 1, ggn_hash((uint32_t)i, seed + 1), err);
     }
+    free(s.base);
+    return rc;
+}
+
+int ggn_chains_simulate(struct ggn_chains *set, double ratio, uint32_t seed, struct base_err *err)
+{
+    struct source s = {0};
+    int rc = source_init(&s, set, err);
+
+    for (int i = 0; !rc && i < set->n; i++) {
+        int usable = 0;
+        if (set->chains[i].synthetic || !set->chains[i].has_label)
+            continue;
+        rc = read_source(set, &set->chains[i], 0, &s, &usable, err);
+        if (!rc && usable)
+            rc = simulate_chain(set, &set->chains[i], &s, ratio, 0, ggn_hash((uint32_t)i, seed + 1), err);
+    }
+    set->ratio = ratio;
+    set->step_spp = 0;
     free(s.base);
     return rc;
 }

@@ -7,7 +7,7 @@
 #include "eval/method.h"
 #include "observer/observer.h"
 
-static const double FIRST_SPP = 16.0, GROWTH = 1.5; /* the criterion's defaults */
+static const double FIRST_SPP = 16.0; /* the criterion's default */
 
 /* The criterion's error at spp, between cases in log-log, beyond them as at the nearest. */
 static double error_at(const struct ggn_observer *o, const struct ggn_eval_set *s, const struct ggn_eval_block *b,
@@ -26,20 +26,20 @@ static double error_at(const struct ggn_observer *o, const struct ggn_eval_set *
 
 /* Where the criterion stops, which asks at sample counts of its own. */
 static double replay(const struct ggn_observer *o, const struct ggn_eval_set *s, const struct ggn_eval_block *b,
-                     double stop_error, double *asked)
+                     double stop_error, double growth, double *asked)
 {
     double spp = fmax(FIRST_SPP, s->spp[b->first]);
     for (*asked = 1.0; spp < b->cap; ++*asked) {
         double ratio = error_at(o, s, b, spp) / stop_error;
         if (ratio <= 1.0)
             break;
-        spp = ceil(ggn_observer_next(spp, spp * ratio * ratio, GROWTH));
+        spp = ceil(ggn_observer_next(spp, spp * ratio * ratio, growth));
     }
     return fmin(spp, b->cap);
 }
 
-int ggn_method_observer(struct ggn_method *m, const struct ggn_eval_set *s, const char *path, double visible, int *available,
-                        struct base_err *err)
+int ggn_method_observer(struct ggn_method *m, const struct ggn_eval_set *s, const char *path, double visible, double growth,
+                        int *available, struct base_err *err)
 {
     int rc = ggn_method_init(m, s, "observer", 1, err), view = -1;
     struct ggn_observer o = ggn_observer_default;
@@ -58,7 +58,9 @@ int ggn_method_observer(struct ggn_method *m, const struct ggn_eval_set *s, cons
                               : ggn_observer_p_noisy(&o, ggn_observer_error(&o, s->visible[i], s->texture[i], pixels));
             *available &= !isnan(s->visible[i]);
         }
-        m->stop[b] = *available ? replay(&o, s, block, ggn_observer_error_at(&o, visible), &m->asked[b]) : block->cap;
+        m->stop[b] = block->cap;
+        if (*available)
+            m->stop[b] = replay(&o, s, block, ggn_observer_error_at(&o, visible), growth, &m->asked[b]);
     }
     if (rc) {
         ggn_method_release(m);

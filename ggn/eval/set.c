@@ -339,7 +339,7 @@ static int fill_block(void *data, int index, int worker, struct base_err *err)
 
 /* Continues every labelled chain, also those that training has no use for: a method that does not stop in time must be seen
  * to. */
-static int extend(struct ggn_chains *chains, uint32_t seed, struct base_err *err)
+static int extend(struct ggn_chains *chains, double cadence, uint32_t seed, struct base_err *err)
 {
     struct ggn_label *labels = malloc((size_t)(chains->n > 0 ? chains->n : 1) * sizeof *labels);
     if (!labels)
@@ -348,7 +348,7 @@ static int extend(struct ggn_chains *chains, uint32_t seed, struct base_err *err
         labels[i] = chains->chains[i].label;
         chains->chains[i].label = (struct ggn_label){labels[i].id, INFINITY, 0};
     }
-    int rc = ggn_chains_extend(chains, seed, err);
+    int rc = cadence > 1.0 ? ggn_chains_simulate(chains, cadence, seed, err) : ggn_chains_extend(chains, seed, err);
     for (int i = 0; i < chains->n; i++) {
         const struct ggn_chain *c = &chains->chains[i];
         chains->chains[i].label = labels[i];
@@ -371,7 +371,7 @@ int ggn_eval_set_load(struct ggn_eval_set *out, const struct ggn_eval_options *o
     if (rc)
         return rc;
     if (!o->recorded)
-        rc = extend(&s.chains, o->seed, err);
+        rc = extend(&s.chains, o->cadence, o->seed, err);
     if (!rc)
         rc = list_blocks(&s, skipped, err);
     if (!rc)

@@ -43,6 +43,7 @@ struct ggn_eval_options {
     int recorded;     /* only recorded levels; else each block goes on to about 0.7 of its reference's samples
                          (ggn_chains_extend) */
     double ratio;     /* thin the levels to at least this ratio; 0: keep all */
+    double cadence;   /* > 1: simulate all levels, this far apart (ggn_chains_simulate); 0: no */
     uint32_t seed;    /* of the continuation */
     int pictures;     /* also make the noise pictures (data/chains.h) */
 };

@@ -6,9 +6,28 @@
 void ggn_viewer_release(struct ggn_viewer *v)
 {
     ggn_judge_destroy(v->judge);
+    ggn_exact_destroy(v->exact);
     free(v->denoised[0]);
     free(v->known);
     *v = (struct ggn_viewer){0};
+}
+
+static int make_networks(struct ggn_viewer *v, const struct ggn_model *model, enum ggn_precision precision,
+                         struct base_err *err)
+{
+    const float *learned[GGN_NETS];
+
+    if (precision != GGN_PRECISION_F64) {
+        v->judge = ggn_judge_create(model, precision, NULL, err);
+        return v->judge ? 0 : err->code;
+    }
+    if (v->set->width != model->hyper.width || v->set->height != model->hyper.height)
+        return base_fail(err, BASE_EINVAL, "in double precision only blocks of the network's size, %dx%d, are judged",
+                         model->hyper.width, model->hyper.height);
+    for (int net = 0; net < GGN_NETS; net++)
+        learned[net] = model->weights[net]->params;
+    v->exact = ggn_exact_create(&model->hyper, model->graph, learned, err);
+    return v->exact ? 0 : err->code;
 }
 
 int ggn_viewer_init(struct ggn_viewer *v, const struct ggn_model *model, enum ggn_precision precision,
@@ -20,8 +39,7 @@ int ggn_viewer_init(struct ggn_viewer *v, const struct ggn_model *model, enum gg
     *v = (struct ggn_viewer){.set = set, .window = model->hyper.window};
     for (int i = 0; i < set->n; i++)
         levels = set->chains[i].n_levels > levels ? set->chains[i].n_levels : levels;
-    v->judge = ggn_judge_create(model, precision, NULL, err);
-    if (!v->judge)
+    if (make_networks(v, model, precision, err))
         return err->code;
     v->denoised[0] = malloc((size_t)v->window * values * sizeof *v->denoised[0]);
     v->known = malloc((size_t)levels * sizeof *v->known);
@@ -63,7 +81,10 @@ static uint16_t *denoised(struct ggn_viewer *v, int level, const int *needed, in
         if (!is_in(v->holds[i], needed, n))
             spare = i;
     }
-    ggn_judge_denoise(v->judge, noisy, v->denoised[spare], v->set->width, v->set->height);
+    if (v->exact)
+        ggn_exact_denoise(v->exact, noisy, v->denoised[spare]);
+    else
+        ggn_judge_denoise(v->judge, noisy, v->denoised[spare], v->set->width, v->set->height);
     v->holds[spare] = level;
     return v->denoised[spare];
 }
@@ -92,6 +113,7 @@ double ggn_viewer_logit(void *viewer, const int *levels)
     const size_t pixels = ggn_chains_values(v->set) / 3;
     const uint8_t *picture =
         v->set->pictures && v->chain->has_picture[last] ? v->chain->picture + pixels * (size_t)last : NULL;
-    known->logit = ggn_judge_logit(v->judge, noisy, clean, picture, v->set->width, v->set->height);
+    known->logit = v->exact ? ggn_exact_logit(v->exact, noisy, clean, picture)
+                            : ggn_judge_logit(v->judge, noisy, clean, picture, v->set->width, v->set->height);
     return known->logit;
 }

@@ -3,6 +3,7 @@
 #define GGN_EVAL_VIEWER_H
 
 #include "data/chains.h"
+#include "model/exact.h"
 #include "model/judge.h"
 #include "model/stopper.h"
 
@@ -12,7 +13,8 @@ struct ggn_viewed {
 };
 
 struct ggn_viewer {
-    struct ggn_judge *judge;       /* owns */
+    struct ggn_judge *judge;       /* owns; NULL: exact looks instead */
+    struct ggn_exact *exact;       /* owns; of GGN_PRECISION_F64 */
     const struct ggn_chains *set;  /* borrows */
     const struct ggn_chain *chain; /* borrows; the block */
     int window;

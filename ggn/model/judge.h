@@ -15,7 +15,11 @@
 #include "model/model.h"
 
 /* Of the products inside convolutions; sums are float either way. */
-enum ggn_precision { GGN_PRECISION_F32, GGN_PRECISION_BF16 };
+enum ggn_precision {
+    GGN_PRECISION_F32,
+    GGN_PRECISION_BF16,
+    GGN_PRECISION_F64 /* no judge's: model/exact.h */
+};
 extern const char *const ggn_precision_names[]; /* "f32", "bf16", NULL */
 /* Whether this processor has bfloat16 products; without them GGN_PRECISION_BF16 is f32. */
 int ggn_precision_has_bf16(void);

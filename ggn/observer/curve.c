@@ -33,12 +33,14 @@ static void planes_release(struct planes *p)
     *p = (struct planes){0};
 }
 
-static int planes_init(struct planes *p, const struct seq_block *block, struct base_err *err)
+/* Room for `across` x `down` such blocks. */
+static int planes_init(struct planes *p, const struct seq_block *block, int across, int down, struct base_err *err)
 {
-    size_t n = (size_t)block->width * block->height;
-    *p = (struct planes){.block = block, .width = (int)block->width, .height = (int)block->height, .pixels = n,
+    int width = across * (int)block->width, height = down * (int)block->height;
+    size_t n = (size_t)width * (size_t)height;
+    *p = (struct planes){.block = block, .width = width, .height = height, .pixels = n,
                          .mean = malloc(12 * n * sizeof *p->mean),
-                         .scratch = malloc(ggn_visibility_scratch((int)block->width) * sizeof *p->scratch)};
+                         .scratch = malloc(ggn_visibility_scratch(width) * sizeof *p->scratch)};
     if (!p->mean || !p->scratch) {
         planes_release(p);
         return base_fail_nomem(err, "observer");
@@ -90,7 +92,26 @@ static const struct seq_record *full_level(const struct seq_block *b)
     return NULL;
 }
 
-/* Appends the levels that halves stand for above `beyond` spp. */
+/* Appends the levels above `beyond` spp that mean and difference at full_spp stand for. */
+static void add_simulated(struct ggn_curve *c, struct planes *p, double full_spp, double beyond)
+{
+    if (c->n == 0) {
+        look(p, 1.0, p->lightness[0]);
+        look(p, -1.0, p->lightness[1]);
+        c->texture = texture(p);
+    }
+    for (int i = 0; i < SIMULATED; i++) {
+        double spp = simulated_spp(i), scale = sqrt(full_spp / spp);
+        if (spp <= beyond)
+            continue;
+        look(p, scale, p->lightness[0]);
+        look(p, -scale, p->lightness[1]);
+        c->spp[c->n] = spp;
+        c->visible[c->n++] = visible(p, 0.5f);
+    }
+}
+
+/* Appends the levels that the block's halves stand for above `beyond` spp. */
 static int add_halves(struct ggn_curve *c, struct planes *p, double beyond, struct base_err *err)
 {
     const struct seq_record *full = full_level(p->block);
@@ -101,20 +122,7 @@ static int add_halves(struct ggn_curve *c, struct planes *p, double beyond, stru
         return rc;
     crop(p, p->mean);
     crop(p, p->difference);
-    if (c->n == 0) {
-        look(p, 1.0, p->lightness[0]);
-        look(p, -1.0, p->lightness[1]);
-        c->texture = texture(p);
-    }
-    for (int i = 0; i < SIMULATED; i++) {
-        double spp = simulated_spp(i), scale = sqrt(full->spp / spp);
-        if (spp <= beyond)
-            continue;
-        look(p, scale, p->lightness[0]);
-        look(p, -scale, p->lightness[1]);
-        c->spp[c->n] = spp;
-        c->visible[c->n++] = visible(p, 0.5f);
-    }
+    add_simulated(c, p, full->spp, beyond);
     return 0;
 }
 
@@ -160,7 +168,7 @@ int ggn_curve_make(const struct seq_block *block, enum ggn_curve_source source, 
     size_t room = SIMULATED + block->n_levels;
     struct ggn_curve c = {.spp = malloc(room * sizeof *c.spp), .visible = malloc(room * sizeof *c.visible)};
     struct planes p = {0};
-    int rc = !c.spp || !c.visible ? base_fail_nomem(err, "observer") : planes_init(&p, block, err);
+    int rc = !c.spp || !c.visible ? base_fail_nomem(err, "observer") : planes_init(&p, block, 1, 1, err);
     if (!rc && source == GGN_FROM_LEVELS)
         rc = add_levels(&c, &p, reference_independent, err);
     if (!rc && (source == GGN_FROM_HALVES || (reference_independent && full_level(block))))
@@ -182,7 +190,7 @@ int ggn_curve_part(const struct seq_block *block, int x0, int y0, int width, int
         return base_fail(err, BASE_EINVAL, "block %u has no full level with a half-buffer difference", block->id);
     struct ggn_curve c = {.spp = malloc(SIMULATED * sizeof *c.spp), .visible = malloc(SIMULATED * sizeof *c.visible)};
     struct planes p = {0};
-    int rc = !c.spp || !c.visible ? base_fail_nomem(err, "observer") : planes_init(&p, block, err);
+    int rc = !c.spp || !c.visible ? base_fail_nomem(err, "observer") : planes_init(&p, block, 1, 1, err);
     if (!rc) {
         p.x0 = x0;
         p.y0 = y0;
@@ -199,11 +207,63 @@ int ggn_curve_part(const struct seq_block *block, int x0, int y0, int width, int
     return rc;
 }
 
+/* Planes of one of several blocks of n pixels, at (x, y) of the joined ones. */
+static void paste(const struct planes *p, const float *from, size_t x, size_t y, float *to)
+{
+    size_t w = p->block->width, h = p->block->height, row = (size_t)p->width;
+    for (size_t c = 0; c < 3; c++)
+        for (size_t k = 0; k < h; k++)
+            memcpy(to + c * p->pixels + (y + k) * row + x, from + (c * h + k) * w, w * sizeof *to);
+}
+
+static int read_joined(struct planes *p, const struct seq_block *blocks, int across, int down, struct base_err *err)
+{
+    const size_t w = blocks->width, h = blocks->height;
+    float *one = malloc(3 * w * h * sizeof *one);
+    int rc = one ? 0 : base_fail_nomem(err, "observer");
+    for (int k = 0; k < across * down && !rc; k++) {
+        size_t x = w * (size_t)(k % across), y = h * (size_t)(k / across);
+        const struct seq_record *full = full_level(&blocks[k]);
+        rc = seq_mean(&blocks[k], full, one, err);
+        if (!rc)
+            paste(p, one, x, y, p->mean);
+        if (!rc)
+            rc = seq_half(&blocks[k], full, one, err);
+        if (!rc)
+            paste(p, one, x, y, p->difference);
+    }
+    free(one);
+    return rc;
+}
+
+int ggn_curve_joined(const struct seq_block *blocks, int across, int down, struct ggn_curve *curve, struct base_err *err)
+{
+    for (int k = 0; k < across * down; k++) {
+        const struct seq_record *full = full_level(&blocks[k]), *first = full_level(&blocks[0]);
+        if (!full || full->spp != first->spp || blocks[k].width != blocks->width || blocks[k].height != blocks->height)
+            return base_fail(err, BASE_EINVAL, "blocks %u and %u have no full levels of the same size and samples",
+                             blocks[0].id, blocks[k].id);
+    }
+    struct ggn_curve c = {.spp = malloc(SIMULATED * sizeof *c.spp), .visible = malloc(SIMULATED * sizeof *c.visible)};
+    struct planes p = {0};
+    int rc = !c.spp || !c.visible ? base_fail_nomem(err, "observer") : planes_init(&p, blocks, across, down, err);
+    if (!rc)
+        rc = read_joined(&p, blocks, across, down, err);
+    if (!rc)
+        add_simulated(&c, &p, full_level(blocks)->spp, 0.0);
+    if (rc)
+        ggn_curve_release(&c);
+    else
+        *curve = c;
+    planes_release(&p);
+    return rc;
+}
+
 int ggn_curve_level(const struct seq_block *block, const struct seq_record *level, double *visible_out, double *texture_out,
                     struct base_err *err)
 {
     struct planes p;
-    int rc = planes_init(&p, block, err);
+    int rc = planes_init(&p, block, 1, 1, err);
     if (rc)
         return rc;
     rc = seq_mean(block, level, p.mean, err);

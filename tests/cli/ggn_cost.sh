@@ -21,15 +21,46 @@ import json, sys
 d = json.load(open(sys.argv[1]))
 assert d["split"] == "train" and len(d["scenes"]) == 3
 kinds = {p["criterion"] for p in d["points"]}
-assert {"uniform", "limit", "attributes"} <= kinds, kinds
+assert {"uniform", "fixed", "limit", "attributes"} <= kinds, kinds
 limit = next(p for p in d["points"] if p["criterion"] == "limit")["scenes"]
 for s in limit:
     assert abs(limit[s]["worst"] - 1) < 1e-6 and limit[s]["noisy"] == 0 and limit[s]["samples_ratio"] < 1
 for p in d["points"]:
     for s, f in p["scenes"].items():
-        assert p["criterion"] != "uniform" or abs(f["samples_ratio"] - 1) < 1e-9 and abs(f["samples"] - p["value"]) < 1e-6
+        assert p["criterion"] not in ("uniform", "fixed") or abs(f["samples_ratio"] - 1) < 1e-9 and abs(f["samples"] - p["value"]) < 1e-6
+        assert p["criterion"] != "fixed" or f["checks_full"] == 1
+rows = [p for p in d["points"] if p["criterion"] == "attributes" and p["dial"] == "passes"]
+spent = [sum(f["samples"] for f in p["scenes"].values()) for p in rows]
+assert len(rows) == 4 and spent == sorted(spent) and spent[0] < spent[3], spent
 P
 check "uniform costs what uniform costs, the limit is reached by exact stops" $([ $? = 0 ] && echo 1)
+run -d $data --split train --cadence 1.1 --no-quality --baseline "$tmp/attributes.ggn" -o "$tmp/cadence.json"
+run -d $data --split train --cadence 2 --no-quality -o "$tmp/rare.json" && python3 - "$tmp/cadence.json" "$tmp/rare.json" >"$tmp/err" 2>&1 <<'P'
+import json, sys
+d, rare = json.load(open(sys.argv[1])), json.load(open(sys.argv[2]))
+asked = [sum(f["checks_full"] for f in p["scenes"].values()) for x in (d, rare) for p in x["points"] if p["criterion"] == "observer"]
+assert asked[0] > asked[1] > 0, asked
+assert abs(d["ratio"] - 1.1) < 1e-9
+assert all(b["simulated"] for s in d["scenes"].values() for b in s["blocks"])
+assert {(p["dial"], p["value"]) for p in d["points"] if p["criterion"] == "observer"} == {("growth", 1.1)}
+assert len([p for p in d["points"] if p["criterion"] == "attributes"]) == 1
+P
+check "another cadence simulates all levels, and asks the defaults alone" $([ $? = 0 ] && echo 1)
+run -d $data --split train --scores --recorded --no-quality -m ggn/models/lull-2.ggn --baseline "$tmp/attributes.ggn" -o "$tmp/scores.json" && python3 - "$tmp/scores.json" >"$tmp/err" 2>&1 <<'P'
+import json, sys
+d = json.load(open(sys.argv[1]))
+assert [p["criterion"] for p in d["points"]] == ["lull-2.ggn"]
+p = d["points"][0]
+windows = sum(len(s["blocks"]) for s in d["scenes"].values()) * (14 - 5)
+assert len(p["scores"]) == windows and 0 < p["cut"] < 1 and all(x is None or 0 <= x <= 1 for x in p["scores"])
+assert any(x is not None for x in p["scores"])
+P
+check "scores of a network's windows, nothing else" $([ $? = 0 ] && echo 1)
+run -d $data --split train --scores --precision f64 -m ggn/models/lull-2.ggn
+check "double precision of blocks that are not the network's size: one line and exit 2" $([ $rc = 2 ] && one_line && grep -q "network's size, 200x200" "$tmp/err" && echo 1)
+echo 'other_part6;100;200;300' >"$tmp/thresholds.csv"
+run -d $data --split train --thresholds "$tmp/thresholds.csv"
+check "thresholds of other views: one line and exit 2" $([ $rc = 2 ] && one_line && grep -q "thresholds.csv" "$tmp/err" && echo 1)
 run -d $data
 check "a split without blocks is one line and exit 2" $([ $rc = 2 ] && one_line && grep -q "split 'test'" "$tmp/err" && echo 1)
 run -d $data --split train --baseline ggn/models/lull-2.ggn

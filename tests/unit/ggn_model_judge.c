@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "model/exact.h"
 #include "model/judge.h"
 #include "model/preprocess.h"
 #include "nn/exec.h"
@@ -199,6 +200,47 @@ static void test_srgb(void **state)
     (void)state;
 }
 
+/* In double the same answer, as far as floats go, with and without a noise picture; and not the very same. */
+static void test_exact(void **state)
+{
+    static uint8_t noisy[3][BYTES], picture[AREA];
+    static uint16_t wide[3][BYTES], narrow[3][BYTES];
+    const uint8_t *const n[3] = {noisy[0], noisy[1], noisy[2]};
+    const uint16_t *const w[3] = {wide[0], wide[1], wide[2]};
+    const float *learned[GGN_NETS];
+    const int before = hyper.picture;
+
+    hyper.picture = 1;
+    struct ggn_model *m = make();
+    for (int net = 0; net < GGN_NETS; net++)
+        learned[net] = m->weights[net]->params;
+    struct ggn_judge *j = ggn_judge_create(m, GGN_PRECISION_F32, NULL, NULL);
+    struct ggn_exact *e = ggn_exact_create(&m->hyper, m->graph, learned, NULL);
+    assert_true(j && e);
+    int differ = 0;
+    for (uint32_t i = 0; i < 3; i++) {
+        image(noisy[i], 1 + i);
+        ggn_judge_denoise(j, noisy[i], narrow[i], 33, 24);
+        ggn_exact_denoise(e, noisy[i], wide[i]);
+        for (int k = 0; k < BYTES; k++)
+            assert_in_range((int)wide[i][k] - (int)narrow[i][k] + 2, 0, 4);
+    }
+    for (int k = 0; k < AREA; k++)
+        picture[k] = (uint8_t)(k % 7);
+    for (int with = 0; with < 2; with++) {
+        double exact = ggn_exact_logit(e, n, w, with ? picture : NULL), judged = ggn_judge_logit(j, n, w, with ? picture : NULL, 33, 24);
+        if (!(fabs(exact - judged) < 1e-4 * fmax(1, fabs(judged))))
+            fail_msg("picture %d: double %.12g, judge %.12g", with, exact, judged);
+        differ += exact != judged;
+    }
+    assert_true(differ > 0);
+    ggn_exact_destroy(e);
+    ggn_judge_destroy(j);
+    ggn_model_destroy(m);
+    hyper.picture = before;
+    (void)state;
+}
+
 static void test_cleaning(void **state)
 {
     const float bad[8] = {NAN, INFINITY, -INFINITY, -1, 1e30f, 1e-40f, -1e-40f, -0.0f};
@@ -221,7 +263,7 @@ static void test_cleaning(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_no_memory),     cmocka_unit_test(test_against_networks), cmocka_unit_test(test_picture),
-                                       cmocka_unit_test(test_memory_bounds), cmocka_unit_test(test_bf16),
+                                       cmocka_unit_test(test_memory_bounds), cmocka_unit_test(test_bf16), cmocka_unit_test(test_exact),
                                        cmocka_unit_test(test_srgb),          cmocka_unit_test(test_cleaning)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -352,6 +352,47 @@ static void parts(void **state)
     seq_block_release(&b);
 }
 
+/* Blocks side by side are judged as one: by hand from their planes beside each other; one block alone is itself. */
+static void joined(void **state)
+{
+    (void)state;
+    static float planes[2][3 * P], l[2][2 * P], pair[2][3 * 2 * P];
+    struct base_err err = {0};
+    struct seq_block b[2] = {make_block(0.3, 0.2, 11, 0), make_block(0.6, 0.1, 12, 0)};
+    struct ggn_curve whole, one, two;
+    const struct seq_record *full[2] = {NULL, NULL};
+    assert_int_equal(ggn_curve_make(&b[0], GGN_FROM_HALVES, 1, &whole, &err), 0);
+    assert_int_equal(ggn_curve_joined(b, 1, 1, &one, &err), 0);
+    assert_memory_equal(whole.visible, one.visible, (size_t)one.n * sizeof *one.visible);
+    assert_true(whole.texture == one.texture);
+    assert_int_equal(ggn_curve_joined(b, 2, 1, &two, &err), 0);
+    for (int k = 0; k < 2; k++) {
+        for (uint32_t i = 0; i < b[k].n_levels && !full[k]; i++)
+            full[k] = seq_has(&b[k].levels[i], SEQ_PLANE_HALF_F16) ? &b[k].levels[i] : NULL;
+        assert_int_equal(seq_mean(&b[k], full[k], planes[0], &err), 0);
+        assert_int_equal(seq_half(&b[k], full[k], planes[1], &err), 0);
+        float scale = (float)sqrt(full[k]->spp / two.spp[20]);
+        for (int side = 0; side < 2; side++)
+            for (int v = 0; v < 3 * P; v++)
+                pair[side][v / P * 2 * P + v % P / W * 2 * W + k * W + v % W] = planes[0][v] + (side ? -scale : scale) * planes[1][v];
+    }
+    for (int side = 0; side < 2; side++)
+        ggn_visible_lightness(pair[side], 2 * P, l[side]);
+    for (int k = 0; k < 2 * P; k++)
+        l[0][k] = 0.5f * (l[0][k] - l[1][k]);
+    double *scratch = malloc(ggn_visibility_scratch(2 * W) * sizeof *scratch);
+    assert_near(ggn_visible_noise(l[0], 2 * W, H, scratch, NULL), two.visible[20], 1e-5 * two.visible[20]);
+    free(scratch);
+    ggn_curve_release(&two);
+    b[1].levels[full[1] - b[1].levels].spp += 1; /* another level than the first block's */
+    assert_int_equal(ggn_curve_joined(b, 2, 1, &two, &err), BASE_EINVAL);
+    assert_non_null(strstr(err.text, "same size and samples"));
+    ggn_curve_release(&whole);
+    ggn_curve_release(&one);
+    for (int k = 0; k < 2; k++)
+        seq_block_release(&b[k]);
+}
+
 /* --- calibration --- */
 
 enum { VIEWS = 3, BLOCKS = 6 };
@@ -490,7 +531,7 @@ int main(void)
         cmocka_unit_test(apart),           cmocka_unit_test(people),
         cmocka_unit_test(thresholds),      cmocka_unit_test(scaling),
         cmocka_unit_test(noisy_reference), cmocka_unit_test(beyond_the_last_level),
-        cmocka_unit_test(needs), cmocka_unit_test(parts),           cmocka_unit_test(calibration),
+        cmocka_unit_test(needs), cmocka_unit_test(parts), cmocka_unit_test(joined),           cmocka_unit_test(calibration),
         cmocka_unit_test(parameters),      cmocka_unit_test(built_in),
         cmocka_unit_test(trials),
     };

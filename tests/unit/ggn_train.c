@@ -117,6 +117,43 @@ static void extended_levels_continue_the_recording(void **state)
     (void)state;
 }
 
+/* Levels made anew: evenly spaced from the first to the end of what is looked at, reference or not, their noise against the
+ * mean of the halves as large as the samples say. */
+static void simulated_levels_lie_as_far_apart_as_asked(void **state)
+{
+    struct ggn_chains set;
+    struct base_err err = {0};
+    const double wanted[] = {1.05, 1.5};
+
+    for (int t = 0; t < 2; t++) {
+        load(&set, 0);
+        const double first = set.chains[0].spp[0];
+        const size_t values = ggn_chains_values(&set);
+        assert_int_equal(ggn_chains_simulate(&set, wanted[t], 3, &err), 0);
+        for (int i = 0; i < set.n; i++) {
+            const struct ggn_chain *c = &set.chains[i];
+            const int end = c->n_levels - 1;
+            double low = 0, high = 0;
+            int half = 0;
+            assert_true(c->simulated && c->spp[0] == first && c->spp[end] == 10000 && isnan(c->tail999[0]));
+            for (int k = 1; k < end; k++)
+                assert_true(c->spp[k] == fmax(c->spp[k - 1] + 1, floor(c->spp[k - 1] * wanted[t] + 0.5)));
+            while (c->spp[half] < 100)
+                half++;
+            for (size_t v = 0; v < values; v++) {
+                double a = c->noisy[v] - c->noisy[(size_t)end * values + v];
+                double b = c->noisy[(size_t)half * values + v] - c->noisy[(size_t)end * values + v];
+                low += a * a * c->spp[0];
+                high += b * b * c->spp[half];
+            }
+            assert_true(fabs(high / low - 1) < 0.35); /* eight bits, and noise that is cut off at black and white */
+        }
+        assert_true(set.ratio == wanted[t] && set.step_spp == 0);
+        ggn_chains_release(&set);
+    }
+    (void)state;
+}
+
 static void windows_are_labelled_by_their_last_image(void **state)
 {
     struct ggn_chains set;
@@ -506,6 +543,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(splits_and_levels),
         cmocka_unit_test(synthetic_noise_has_the_variance_of_rendered_noise),
         cmocka_unit_test(extended_levels_continue_the_recording),
+        cmocka_unit_test(simulated_levels_lie_as_far_apart_as_asked),
         cmocka_unit_test(windows_are_labelled_by_their_last_image),
         cmocka_unit_test(augmentation_moves_whole_windows),
         cmocka_unit_test(pictures_of_recorded_levels),

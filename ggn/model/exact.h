@@ -1,0 +1,27 @@
+/*
+ * The three networks at work on one block in double precision: what a judge (model/judge.h) would say if it did not round.
+ *
+ * For measurements; slow. Between the networks it keeps what a judge keeps, denoised images of 16 bits. Blocks of the
+ * network's own size only. Borrows the graphs until destroy, owns everything else. One call at a time per object.
+ */
+#ifndef GGN_MODEL_EXACT_H
+#define GGN_MODEL_EXACT_H
+
+#include <stdint.h>
+
+#include "model/networks.h"
+
+struct ggn_exact;
+
+/* graph, learned: [GGN_NETS]; learned: parameters and running statistics as struct ggn_weights of floats holds them
+ * (params, [n_learned]). NULL on failure. */
+struct ggn_exact *ggn_exact_create(const struct ggn_hyper *hyper, const struct ggn_graph *graph,
+                                   const float *const *learned, struct base_err *err);
+void ggn_exact_destroy(struct ggn_exact *exact);
+
+/* As ggn_judge_denoise and ggn_judge_logit. */
+void ggn_exact_denoise(struct ggn_exact *exact, const uint8_t *noisy, uint16_t *denoised);
+double ggn_exact_logit(struct ggn_exact *exact, const uint8_t *const *noisy, const uint16_t *const *denoised,
+                       const uint8_t *picture);
+
+#endif
