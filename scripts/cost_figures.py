@@ -6,10 +6,8 @@ import subprocess
 
 # Where a setting is what a user gets who says nothing else; of models that are named otherwise: their own.
 DEFAULTS = {"observer": ("visible", 0.25), "variance": ("threshold", 0.03), "halfbuf": ("threshold", 0.004)}
-DRAWN = ("uniform", "variance", "halfbuf", "observer", "lull-1.ggn", "svd-entropy", "attributes", "noise-mask")
-COLOURS = {"uniform": "#999999", "variance": "#8c564b", "halfbuf": "#e377c2", "observer": "#d62728", "lull-1.ggn": "#1f77b4",
-           "svd-entropy": "#2ca02c", "attributes": "#bcbd22", "noise-mask": "#17becf"}
-DENOISER = 0.41  # of one full check of the network: 1.58 of 3.89 GMAC; the first window denoises six images, not one
+DRAWN = ("uniform", "variance", "halfbuf", "observer", "lull-3.ggn", "lull-2.ggn", "lull-1.ggn", "paper.ggn", "svd-entropy", "attributes", "noise-mask")
+COLOURS = dict(zip(DRAWN, ("#999999", "#8c564b", "#e377c2", "#d62728", "#000080", "#1f77b4", "#17becf", "#9467bd", "#2ca02c", "#bcbd22", "#ff7f0e")))
 BLOCK = 200 * 200
 
 
@@ -30,21 +28,24 @@ def price_of(out, criterion):
 
 
 def points_of(out, name):
+    return points_in(out, out["sets"][name])
+
+
+def points_in(out, data):
     """[(criterion, dial, value, {scene: figures})] with what the checks cost: check_s, total_s, overhead, total_ratio, and
     to_limit, the time against that of stopping every block exactly at its threshold."""
-    data = out["sets"][name]
-    limit = next(p for p in data["points"] if p["criterion"] == "limit")["scenes"]
+    named = lambda scenes: {scene: dict(zip(data["keys"], f)) for scene, f in scenes.items()}
+    limit = named(next(p for p in data["points"] if p["criterion"] == "limit")["scenes"])
     points = []
     for p in data["points"]:
         full = price_of(out, p["criterion"])
         cheap = price_of(out, "variance")
-        network = p["criterion"].endswith(".ggn")
+        network = out.get("networks", {}).get(p["criterion"].replace(" bf16", ""))
         scenes = {}
-        for scene, f in p["scenes"].items():
-            f = dict(f)
+        for scene, f in named(p["scenes"]).items():
             f["check_s"] = f["checks_full"] * full + f["checks_cheap"] * cheap
-            if network and f["checks_full"] > 0:
-                f["check_s"] += 5 * DENOISER * full
+            if network and f["checks_full"] > 0:  # a first window has all of its images denoised, later ones one
+                f["check_s"] += (network["window"] - 1) * network["denoiser"] * full
             if f["sampling_s"]:
                 f["total_s"] = f["sampling_s"] + f["check_s"]
                 f["overhead"] = f["check_s"] / f["total_s"]
@@ -100,25 +101,33 @@ def curves(points, x, y, dials=("visible", "threshold", "spp"), how=median):
     return "".join(blocks), clauses
 
 
-def draw_frontiers(folder, points, name, x, title):
-    limit = [p for p in points if p[0] == "limit"]
-    script = "set multiplot layout 1,2\nset logscale x\nset xlabel '%s'\n" % title
-    for y, label, how in (("noisy", "share of blocks that still show noise", mean), ("worst", "visible difference of the worst block", median)):
+PANELS = {"noisy": ("share of blocks that still show noise", mean, "unset logscale y\nset yrange [0:1]\n"),
+          "early": ("share of blocks stopped early, below 0.8 of the threshold", mean, "unset logscale y\nset yrange [0:1]\n"),
+          "worst": ("visible difference of the worst block", median, "set logscale y\nset yrange [0.1:10]\n"),
+          "flip": ("mean FLIP", mean, "unset logscale y\nset yrange [0:*]\n"),
+          "relmse": ("relMSE", median, "set logscale y\nset yrange [1e-6:*]\n")}
+
+
+def draw_frontiers(folder, points, name, x, title, panels):
+    rows = (len(panels) + 1) // 2
+    script = "set multiplot layout %d,2\nset logscale x\nset xlabel '%s'\nset xrange [0.1:40]\n" % (rows, title)
+    for number, y in enumerate(panels):
+        label, how, scale = PANELS[y]
         blocks, clauses = curves(points, x, y, how=how)
-        at = "set arrow 1 from 1,graph 0 to 1,graph 1 nohead dt 2 lc '#000000'\n" if limit else ""
-        scale = "set logscale y\nset yrange [0.3:10]\n" if y == "worst" else "set yrange [0:1]\n"
-        script += ("%s%s%sset ylabel '%s'\nset xrange [0.2:30]\nset label 1 'the limit' at 1,graph 0.97 offset 0.5,0\nplot %s\n"
-                   % (blocks, at, scale, label, ", ".join(clauses)))
-    plot(folder, name, (1200, 480), script + "unset multiplot\n")
+        script += ("%s%sset ylabel '%s'\n%sset arrow 1 from 1,graph 0 to 1,graph 1 nohead dt 2 lc '#000000'\n"
+                   "set label 1 'the limit' at 1,graph 0.96 offset 0.5,0\nplot %s\n"
+                   % (blocks, scale, label, "unset key\n" if number else "set key top right samplen 2\n", ", ".join(clauses)))
+    plot(folder, name, (1280, 480 * rows), script + "unset multiplot\n")
 
 
 def draw_ratio(folder, points):
+    points = [(*p[:3], {scene: f for scene, f in p[3].items() if f["blocks"] > 1}) for p in points]  # alone, a block is its own uniform
     blocks, clauses = curves([p for p in points if p[0] != "uniform"], "worst", "total_ratio")
     limit = next(p for p in points if p[0] == "limit")
     script = ("%sset logscale xy\nset xlabel 'visible difference of the worst block (1: just visible)'\n"
-              "set ylabel 'time against uniform samples of the same worst block'\nset xrange [0.3:10]\n"
+              "set ylabel 'time against uniform samples of the same worst block'\nset xrange [0.2:10]\nset yrange [0.2:10]\n"
               "set arrow 1 from graph 0,first %g to graph 1,first %g nohead dt 2 lc '#000000'\n"
-              "set label 1 'limit: mean(T)/max(T)' at graph 0.02,first %g offset 0,0.6\n"
+              "set label 1 'limit: mean(T)/max(T)' at graph 0.02,first %g offset 0,-0.8\n"
               "set arrow 2 from graph 0,first 1 to graph 1,first 1 nohead lc '#aaaaaa'\nplot %s\n"
               % (blocks, *[over_scenes(limit, "limit")] * 3, ", ".join(clauses)))
     plot(folder, "cost-ratio.png", (760, 520), script)
@@ -131,43 +140,84 @@ def saving(p):
     return spent, saved
 
 
+def at_path_cost(p, us):
+    """Time against uniform samples of the same worst block if every path took `us` microseconds: median of the scenes with several
+    blocks, one block's time being the same at any number of samples."""
+    return median([(f["samples"] + f["check_s"] / (BLOCK * us * 1e-6)) / f["uniform_spp"] for f in p[3].values() if f["blocks"] > 1])
+
+
 def draw_paths(folder, points):
-    blocks, clauses = "", []
-    for p in points:
-        if p[0] not in DRAWN or not is_default(p) or p[0] == "uniform":
-            continue
+    steps = [0.02 * 1.6**i for i in range(20)]
+    share, total, defaults = "", "", [p for p in points if p[0] in DRAWN and is_default(p) and p[0] != "uniform"]
+    for n, p in enumerate(defaults):
         spent, samples = median([f["check_s"] for f in p[3].values()]), over_scenes(p, "samples")
-        rows = "\n".join("%g %g" % (us, spent / (spent + samples * BLOCK * us * 1e-6)) for us in (0.05 * 1.6**i for i in range(18)))
-        name = "$d%d" % len(clauses)
-        blocks += "%s << E\n%s\nE\n" % (name, rows)
-        clauses.append("%s using 1:2 with lines lw 2 lc '%s' title '%s'" % (name, COLOURS[p[0]], p[0]))
-    script = ("%sset logscale xy\nset xlabel 'microseconds per path and thread'\nset ylabel 'share of the time that the checks take'\n"
-              "set xrange [0.05:150]\nset yrange [1e-5:1]\n"
+        share += "$a%d << E\n%s\nE\n" % (n, "\n".join("%g %g" % (us, spent / (spent + samples * BLOCK * us * 1e-6)) for us in steps))
+        total += "$b%d << E\n%s\nE\n" % (n, "\n".join("%g %g" % (us, at_path_cost(p, us)) for us in steps))
+    lines = lambda letter: ", ".join("$%s%d using 1:2 with lines lw 2 lc '%s' title '%s'" % (letter, n, COLOURS[p[0]], p[0])
+                                     for n, p in enumerate(defaults))
+    limit = next(p for p in points if p[0] == "limit")
+    bound = median([f["samples"] / f["uniform_spp"] for f in limit[3].values() if f["blocks"] > 1])
+    script = ("%s%sset multiplot layout 1,2\nset logscale xy\nset xlabel 'microseconds per path and thread'\nset xrange [0.02:150]\n"
+              "set ylabel 'share of the time that the checks take'\nset yrange [1e-5:1]\n"
               "set arrow 1 from graph 0,first 0.01 to graph 1,first 0.01 nohead dt 2 lc '#000000'\n"
-              "set label 1 'wanted: 1 %%' at graph 0.98,first 0.013 right\nplot %s\n" % (blocks, ", ".join(clauses)))
-    plot(folder, "cost-path.png", (760, 520), script)
+              "set label 1 'wanted: 1 %%' at graph 0.98,first 0.013 right\nset key bottom left\nplot %s\n"
+              "set ylabel 'time against uniform samples of the same worst block'\nset yrange [0.1:20]\nunset key\n"
+              "set arrow 1 from graph 0,first %g to graph 1,first %g nohead dt 2 lc '#000000'\n"
+              "set label 1 'the limit: mean(T)/max(T)' at graph 0.02,first %g left offset 0,-0.7\n"
+              "set arrow 2 from graph 0,first 1 to graph 1,first 1 nohead lc '#aaaaaa'\nset label 2 'uniform' at graph 0.98,first 1.1 right\n"
+              "plot %s\nunset multiplot\n" % (share, total, lines("a"), bound, bound, bound, lines("b")))
+    plot(folder, "cost-path.png", (1280, 520), script)
 
 
-def draw_growth(folder, out):
-    rows = [g for g in out.get("growth", []) if g["threads"] == 1]
-    if not rows:
+SIDES = ("25", "50", "100", "200", "400")
+
+
+def limits_by_side(out, name):
+    """{side: [mean(T)/max(T) of each scene]}: scenes with several blocks of 200 pixels."""
+    parts = {scene: p for scene, p in out["sets"].get(name, {}).get("parts", {}).items() if len(p["200"]) > 1}
+    return {side: [mean(p[side]) / max(p[side]) for p in parts.values() if len(p.get(side, ())) > 1] for side in SIDES}
+
+
+def draw_growth(folder, out, points):
+    observer = [g for g in out.get("growth", []) if g["threads"] == 1 and g["criterion"] == "observer" or g["side"] == 4000]
+    network = [g for g in out.get("growth", []) if g["threads"] == 1 and g["criterion"] == "ggn"]
+    if not observer:
         return
-    data = "\n".join("%d %g %g" % (g["blocks"], g["criterion_s"], g["sampling_s"]) for g in rows)
-    plot(folder, "cost-growth.png", (700, 460),
-         "$d << E\n%s\nE\nset logscale xy\nset xlabel 'blocks of 100x100 pixels'\nset ylabel 'thread seconds'\nset key left\n"
-         "plot $d using 1:3 with linespoints pt 6 lw 2 lc '#999999' title 'sampling, 20 spp', "
-         "$d using 1:2 with linespoints pt 7 lw 2 lc '#d62728' title 'checks of observer'\n" % data)
+    bound = over_scenes(next(p for p in points if p[0] == "limit"), "limit")
+    data = lambda rows: "\n".join("%d %g %g" % (g["side"]**2, g["criterion_s"], g["sampling_s"]) for g in rows)
+    script = ("$o << E\n%s\nE\n$n << E\n%s\nE\nset multiplot layout 1,2\nset logscale xy\nset xlabel 'pixels, in blocks of 200x200'\n"
+              "set ylabel 'thread seconds'\nset key left\nset format x '10^{%%T}'\nset termoption enhanced\n"
+              "plot $o using 1:3 with linespoints pt 6 lw 2 lc '#999999' title 'sampling, %d spp', "
+              "$o using 1:($3*%g) with lines dt 2 lc '#000000' title 'what the limit leaves of it', "
+              "$o using 1:2 with linespoints pt 7 lw 2 lc '#d62728' title 'checks of observer', "
+              "$n using 1:2 with linespoints pt 7 lw 2 lc '#1f77b4' title 'checks of ggn (%d spp)'\nset format x '%%g'\n"
+              % (data(observer), data(network), observer[0]["spp"], bound, network[0]["spp"] if network else 0))
+    clauses, blocks = [], ""
+    for n, (name, title) in enumerate((("test", "test scenes"), ("people", "views that people judged"), ("validation", "validation views"))):
+        found = [(side, median(r), min(r), max(r)) for side, r in limits_by_side(out, name).items() if r]
+        if found:
+            blocks += "$l%d << E\n%s\nE\n" % (n, "\n".join("%g %g %g %g" % (float(s) * (0.97 + 0.03 * n), m, a, b) for s, m, a, b in found))
+            clauses.append("$l%d using 1:2:3:4 with yerrorlines pt 7 lw 2 lc '%s' title '%s'"
+                           % (n, ("#000000", "#d62728", "#1f77b4")[n], title))
+    if clauses:
+        script += ("%sset xlabel 'side of a block, pixels'\nset ylabel 'the limit: mean(T)/max(T), median and range of the scenes'\n"
+                   "unset logscale y\nset yrange [0:1]\nset xrange [20:500]\nset xtics (25, 50, 100, 200, 400)\nplot %s\n" % (blocks, ", ".join(clauses)))
+    plot(folder, "cost-growth.png", (1280, 480), script + "unset multiplot\n")
 
 
 def draw(folder, out):
     if "test" in out.get("sets", {}):
         points = points_of(out, "test")
-        draw_frontiers(folder, points, "cost-frontier.png", "to_limit", "time, checks included, against stopping every block exactly at its threshold")
+        draw_frontiers(folder, points, "cost-frontier.png", "to_limit", "time, checks included, against stopping every block at its threshold",
+                       ("noisy", "worst", "flip", "relmse"))
+        draw_frontiers(folder, points_of(out, "recorded"), "cost-recorded.png", "to_limit",
+                       "time, checks included, against stopping every block at its threshold", ("noisy", "worst"))
         draw_ratio(folder, points)
         draw_paths(folder, points)
+        draw_growth(folder, out, points)
     if "people" in out.get("sets", {}):
-        draw_frontiers(folder, points_of(out, "people"), "cost-people.png", "to_limit", "time, checks included, against stopping at the thresholds that people gave")
-    draw_growth(folder, out)
+        draw_frontiers(folder, points_of(out, "people"), "cost-people.png", "to_limit",
+                       "time, checks included, against stopping at the thresholds of people", ("early", "worst"))
 
 
 def on_frontier(points, default):

@@ -133,7 +133,7 @@ int ggn_eval_each_block(const struct ggn_eval_set *set, struct base_threads *thr
 
 struct fill {
     struct ggn_eval_set *set;
-    int quality;
+    int quality, no_ssim;
 };
 
 /* SSIM of two display images on [0,1], mean over the channels. */
@@ -190,7 +190,7 @@ static int comparison(const struct ggn_eval_set *s, const struct ggn_eval_block 
     return rc;
 }
 
-static int measure_quality(struct ggn_eval_set *s, const struct ggn_eval_block *block, struct base_err *err)
+static int measure_quality(struct ggn_eval_set *s, const struct ggn_eval_block *block, int with_ssim, struct base_err *err)
 {
     const struct ggn_chain *c = &s->chains.chains[block->chain];
     int w = s->chains.width, h = s->chains.height, rc = 0, known = 0;
@@ -210,7 +210,8 @@ static int measure_quality(struct ggn_eval_set *s, const struct ggn_eval_block *
         interleave(level, pixels, rgb + values);
         rc = ggn_flip(rgb, rgb + values, w, h, GGN_FLIP_PPD, NULL, &flip, err);
         s->flip[i] = flip.mean;
-        s->ssim[i] = ssim_of(ssim, level, against, pixels, w, work);
+        if (with_ssim)
+            s->ssim[i] = ssim_of(ssim, level, against, pixels, w, work);
     }
 out:
     ggn_ssim_destroy(ssim);
@@ -334,7 +335,7 @@ static int fill_block(void *data, int index, int worker, struct base_err *err)
     const struct ggn_eval_block *block = &f->set->blocks[index];
     (void)worker;
     int rc = fill_statistics(f->set, block, err);
-    return !rc && f->quality ? measure_quality(f->set, block, err) : rc;
+    return !rc && f->quality ? measure_quality(f->set, block, !f->no_ssim, err) : rc;
 }
 
 /* Continues every labelled chain, also those that training has no use for: a method that does not stop in time must be seen
@@ -366,7 +367,7 @@ int ggn_eval_set_load(struct ggn_eval_set *out, const struct ggn_eval_options *o
 {
     struct ggn_eval_set s = {.window = o->window};
     struct ggn_chains_options co = {.dir = o->dir, .ratio = o->ratio, .with_test = 1, .pictures = o->pictures};
-    struct fill f = {&s, o->quality};
+    struct fill f = {&s, o->quality, o->no_ssim};
     int rc = ggn_chains_load(&s.chains, &co, err);
     if (rc)
         return rc;

@@ -39,7 +39,8 @@ struct ggn_eval_set {
 struct ggn_eval_options {
     const char *dir;  /* data set */
     int window;       /* S */
-    int quality;      /* also compute FLIP and SSIM of every case */
+    int quality;      /* also compute FLIP and SSIM of every case ... */
+    int no_ssim;      /* ... but SSIM, which takes longer */
     int recorded;     /* only recorded levels; else each block goes on to about 0.7 of its reference's samples
                          (ggn_chains_extend) */
     double ratio;     /* thin the levels to at least this ratio; 0: keep all */
