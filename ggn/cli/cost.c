@@ -549,7 +549,8 @@ int ggn_cmd_cost(int argc, char **argv)
         rc = look_at_models(&o, &pictures, &window, &err);
     if (!rc)
         rc = ggn_eval_set_load(&j.set,
-                               &(struct ggn_eval_options){.dir = o.data, .window = window, .quality = !o.no_quality, .no_ssim = 1,
+                               &(struct ggn_eval_options){.dir = o.data, .window = window, .quality = !o.no_quality,
+                                                          .no_ssim = 1,
                                                           .recorded = o.recorded, .ratio = o.ratio, .seed = 1,
                                                           .cadence = o.cadence, .pictures = pictures},
                                threads, &skipped, &err);
