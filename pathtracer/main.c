@@ -270,16 +270,6 @@ static int greet_crew(const struct session *s, struct base_err *err)
     return rc || !s->crew ? rc : pt_crew_greet(s->crew, text, err);
 }
 
-/* As many as there are processors for each process of this host. */
-static int threads_wanted(const struct session *s)
-{
-    int available = base_threads_available();
-    if (s->cli.threads > 0)
-        return s->cli.threads;
-    long share = s->peers ? sysconf(_SC_NPROCESSORS_ONLN) / base_peers_on_host(s->peers) : available;
-    return share < 1 ? 1 : share < available ? (int)share : available;
-}
-
 /* --- rendering ------------------------------------------------------------------------------------------------------ */
 
 /* A checkpoint that fails on the way costs nothing yet: the next one may succeed. */
@@ -548,7 +538,7 @@ static int record_sequence(struct session *s, int *status, struct base_err *err)
 /* Threads and scene. */
 static int open_session(struct session *s, struct base_err *err)
 {
-    s->threads = base_threads_create(threads_wanted(s), err);
+    s->threads = base_threads_create(s->cli.threads > 0 ? s->cli.threads : base_peers_threads(s->peers), err);
     if (!s->threads)
         return BASE_ENOMEM;
     int rc = load_scene(s, err);

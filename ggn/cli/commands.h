@@ -12,6 +12,7 @@
 #include <stddef.h>
 
 #include "base/err.h"
+#include "base/peers.h"
 
 /* X(name, one-line help), in the order `ggn --help` lists them. */
 #define GGN_COMMANDS(X) \
@@ -39,6 +40,11 @@ enum { GGN_EXIT_OK = 0, GGN_EXIT_FAILED = 1, GGN_EXIT_BAD_INPUT = 2, GGN_EXIT_IN
 
 /* Prints "COMMAND: text" on stderr and returns the exit status that err->code stands for (`command` is argv[0]). */
 int ggn_cmd_fail(const char *command, const struct base_err *err);
+
+/* Under mpirun the processes of the job, else NULL. What a process says with ggn_cmd_fail is said once, by rank 0. */
+extern struct base_peers *ggn_cmd_peers;
+/* Is the i-th of equal pieces of work this process's? Always, when it is alone. */
+int ggn_cmd_is_mine(long i);
 
 /* Says on stderr how many pixels of the image at `path` could not be shown as they are, if any. */
 void ggn_cmd_tell_clipped(const char *command, const char *path, size_t clipped);

@@ -129,8 +129,9 @@ static int check_view(const struct ggn_observer *observer, struct base_threads *
     return rc;
 }
 
+/* *seen counts the views of all folders: each is labelled by one process. */
 static int run_views(const struct options *o, const struct ggn_dataset *d, const struct ggn_observer *observer,
-                     const struct ggn_thresholds *human, struct base_threads *threads, struct base_err *err)
+                     const struct ggn_thresholds *human, struct base_threads *threads, long *seen, struct base_err *err)
 {
     size_t count = 0, room = 1;
     int rc = 0;
@@ -142,6 +143,8 @@ static int run_views(const struct options *o, const struct ggn_dataset *d, const
     if (o->check)
         printf("%-24s %5s %10s %9s %8s %8s\n", "view", "block", "recorded", "halves", "log2", "curve");
     for (int i = 0; i < d->n && !rc && !ggn_cmd_interrupted; i++) {
+        if (!o->check && !ggn_cmd_is_mine((*seen)++))
+            continue;
         if (d->views[i].manifest.n_blocks == 0)
             fprintf(stderr, "ggn label: %s: no finished block yet, left out\n", d->views[i].dir);
         else if (o->check)
@@ -162,6 +165,7 @@ static int label(const struct options *o, struct base_threads *threads, struct b
 {
     struct ggn_observer observer = ggn_observer_default;
     struct ggn_thresholds human = {0};
+    long seen = 0;
     int rc = o->observer_path ? ggn_observer_read(o->observer_path, NULL, &observer, err) : 0;
     if (o->spread > 0)
         observer.spread = o->spread;
@@ -172,7 +176,7 @@ static int label(const struct options *o, struct base_threads *threads, struct b
         rc = ggn_dataset_open(o->inputs[i], &d, err);
         if (rc)
             break;
-        rc = run_views(o, &d, &observer, &human, threads, err);
+        rc = run_views(o, &d, &observer, &human, threads, &seen, err);
         ggn_dataset_release(&d);
     }
     ggn_thresholds_release(&human);
@@ -275,13 +279,15 @@ int ggn_cmd_label(int argc, char **argv)
                                                 .doc = "Attaches thresholds to recorded sequences (DATA: a sequence or a "
                                                        "folder of them): those of people, or those of the "
                                                        "model observer, which are never called human."};
-    struct options o = {.source = GGN_FROM_HALVES, .threads = base_threads_available()};
+    struct options o = {.source = GGN_FROM_HALVES, .threads = base_peers_threads(ggn_cmd_peers)};
     struct base_err err = {0};
     int rc = base_options_parse(&options, argc, argv, &o, &err);
 
     if (rc)
         return ggn_cmd_fail(argv[0], &err);
     ggn_cmd_catch_interrupt();
+    if ((o.trials || o.calibrate || o.check) && !ggn_cmd_is_mine(0))
+        return GGN_EXIT_OK;
     if (o.trials) {
         rc = fit_trials(&o, &err);
     } else {

@@ -19,6 +19,24 @@ static const struct command commands[] = {GGN_COMMANDS(COMMAND_ENTRY)};
 enum { N_COMMANDS = sizeof commands / sizeof commands[0] };
 
 volatile sig_atomic_t ggn_cmd_interrupted;
+struct base_peers *ggn_cmd_peers;
+
+/* How a process of a job ended. */
+struct farewell {
+    int status;
+    char text[600]; /* what it would have said */
+};
+static struct farewell farewell;
+
+static int is_member(void)
+{
+    return ggn_cmd_peers && ggn_cmd_peers->rank > 0;
+}
+
+int ggn_cmd_is_mine(long i)
+{
+    return !ggn_cmd_peers || i % ggn_cmd_peers->count == ggn_cmd_peers->rank;
+}
 
 static void on_interrupt(int signum)
 {
@@ -44,7 +62,10 @@ void ggn_cmd_tell_clipped(const char *command, const char *path, size_t clipped)
 
 int ggn_cmd_fail(const char *command, const struct base_err *err)
 {
-    fprintf(stderr, "%s: %s\n", command, err->text);
+    if (is_member())
+        snprintf(farewell.text, sizeof farewell.text, "%s: %s", command, err->text);
+    else
+        fprintf(stderr, "%s: %s\n", command, err->text);
     return err->code == BASE_EINVAL || err->code == BASE_EIO ? GGN_EXIT_BAD_INPUT : GGN_EXIT_FAILED;
 }
 
@@ -92,6 +113,59 @@ static int main_options(int argc, char **argv)
     return refuse("a command is needed");
 }
 
+/* Rank 0 hears how the others ended: the worst status is that of the job, and the first failure is told. */
+static int hear_all(int status)
+{
+    for (int left = ggn_cmd_peers->count - 1; left > 0;) {
+        struct base_err err = {0};
+        struct farewell *theirs = NULL;
+        void *data = NULL;
+        size_t size = 0;
+        int rank = 0, got = base_peers_receive(ggn_cmd_peers, 1.0, &rank, &data, &size, &err);
+        if (got < 0)
+            return ggn_cmd_fail("ggn", &err);
+        theirs = size == sizeof *theirs ? data : NULL;
+        if (theirs && theirs->status != 0 && status == 0) {
+            fprintf(stderr, "%s%s\n", theirs->text, theirs->text[0] == '\0' ? "interrupted" : "");
+            status = theirs->status;
+        }
+        left -= got;
+        free(data);
+    }
+    return status;
+}
+
+static int part(int status)
+{
+    struct base_err err = {0};
+    if (is_member()) {
+        struct farewell *mine = malloc(sizeof *mine);
+        farewell.status = status;
+        if (mine) {
+            *mine = farewell;
+            base_peers_send(ggn_cmd_peers, 0, mine, sizeof *mine, &err);
+        }
+        status = 0;
+    } else if (ggn_cmd_peers) {
+        status = hear_all(status);
+    }
+    base_peers_close(ggn_cmd_peers);
+    return status;
+}
+
+/* Of the commands only label shares out its work; another would do it as often as there are processes. */
+static int run(const struct command *command, int argc, char **argv)
+{
+    struct base_err err = {0};
+    if (base_peers_open(&ggn_cmd_peers, &err))
+        return ggn_cmd_fail(argv[0], &err);
+    if (ggn_cmd_peers && command->run != ggn_cmd_label) {
+        base_fail(&err, BASE_EINVAL, "works in one process: start it without mpirun");
+        return part(ggn_cmd_fail(argv[0], &err));
+    }
+    return part(command->run(argc, argv));
+}
+
 int main(int argc, char **argv)
 {
     char name[64], text[128];
@@ -104,7 +178,7 @@ int main(int argc, char **argv)
     }
     snprintf(name, sizeof name, "ggn %s", argv[1]);
     argv[1] = name;
-    int status = command->run(argc - 1, argv + 1);
+    int status = run(command, argc - 1, argv + 1);
     if (fflush(stdout) || ferror(stdout)) {
         fprintf(stderr, "%s: cannot write standard output\n", name);
         return status ? status : GGN_EXIT_BAD_INPUT;

@@ -9,6 +9,7 @@
 
 /* Rows per thread in one parcel, and what share of those left: few enough that nobody is left with many at the end. */
 enum { MOST_ROWS = 32, SHARES = 4 };
+static const size_t MOST_BYTES = (size_t)64 << 20; /* of their sums, unless one row weighs more */
 
 /* How often rank 0 looks for messages while it samples. */
 static const double LOOK_EVERY_S = 0.001;
@@ -236,6 +237,7 @@ static size_t take_rows(struct sampling *s, int member_threads, int all_threads,
         n = (count - at) * (size_t)member_threads / (size_t)(SHARES * all_threads);
         size_t least = (size_t)member_threads, most = (size_t)member_threads * MOST_ROWS;
         n = n < least ? least : n > most ? most : n;
+        n = n * s->stride > MOST_BYTES ? MOST_BYTES / s->stride + 1 : n;
         n = n < count - at ? n : count - at;
     } while (!atomic_compare_exchange_weak(&s->next, &at, at + n));
     *first = at;

@@ -9,6 +9,8 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "base/threads.h"
+
 /* The implementation's one symbol. */
 typedef int open_fn(struct base_peers **out, struct base_err *err);
 static const char MODULE[] = "../lib/lull-mpi.so"; /* from the program's folder */
@@ -84,12 +86,15 @@ static int same_host(const struct base_peers *peers, int rank)
     return strcmp(peers->list[rank].host, peers->list[peers->rank].host) == 0;
 }
 
-int base_peers_on_host(const struct base_peers *peers)
+int base_peers_threads(const struct base_peers *peers)
 {
-    int n = 0;
+    int available = base_threads_available(), processes = 0;
+    if (!peers)
+        return available;
     for (int i = 0; i < peers->count; i++)
-        n += same_host(peers, i);
-    return n;
+        processes += same_host(peers, i);
+    long share = sysconf(_SC_NPROCESSORS_ONLN) / processes;
+    return share < 1 ? 1 : share < available ? (int)share : available;
 }
 
 int base_peers_find_dead(const struct base_peers *peers)

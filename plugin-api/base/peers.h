@@ -5,7 +5,7 @@
  * The only implementation speaks MPI and lives in a shared object of its own (plugin-api/mpi), which is loaded only by a
  * process that a launcher has started: a program needs no MPI to be built or to run alone. Messages from one process to
  * another arrive in the order in which they were sent. Only the thread that opened the peers may call anything here but
- * name, rank, count and on_host.
+ * name, rank, count and threads.
  */
 #ifndef BASE_PEERS_H
 #define BASE_PEERS_H
@@ -53,8 +53,8 @@ int base_peers_send(struct base_peers *peers, int rank, void *data, size_t size,
  * was none; negative: an error. */
 int base_peers_receive(struct base_peers *peers, double wait_s, int *rank, void **data, size_t *size, struct base_err *err);
 
-/* Processes of the job on this one's host, itself included. */
-int base_peers_on_host(const struct base_peers *peers);
+/* Threads for this process: the processors that it may use, or its share of the host's if that is less. NULL is allowed. */
+int base_peers_threads(const struct base_peers *peers);
 /* A process of this host that is no more, -1 if there is none. Of other hosts nothing is known. */
 int base_peers_find_dead(const struct base_peers *peers);
 

@@ -1,0 +1,29 @@
+#!/bin/sh
+# ggn label by several processes: views are shared out; what goes wrong is said once, and other commands refuse.
+. "$(dirname "$0")/pathtracer_setup"
+. "$here/mpi_setup"
+G=${P%/*}/ggn
+same() { cmp "$1" "$2"; }
+mkdir alone
+for v in a b c; do
+    "$P" "$scene" -q --size 24x24 --block 24 --sampler independent --seed ${#v} --sequence alone/$v --levels geometric:16:384:4.8 --reference-spp 0
+done
+cp -r alone shared
+t "labels by one process" "$G" label alone
+for processes in 2 5; do
+    rm -f shared/*/labels.json
+    t "labels by $processes processes" sh -c "mpirun --oversubscribe -n $processes $G label shared >said"
+    t "  …each view by one of them" test "$(grep -c ' blocks labelled' said)" = 3
+    for v in a b c; do t "  …the same of view $v" same alone/$v/labels.json shared/$v/labels.json; done
+done
+ggn_refused() { # ggn_refused TEXT N COMMAND...: exit status 2, one line of ours, which contains TEXT
+    n=$((n + 1)); text=$1; shift
+    mpi "$@" >out 2>err; status=$?
+    if [ $status -eq 2 ] && [ "$(grep -c '^ggn ' err)" -eq 1 ] && grep '^ggn ' err | grep -qF -- "$text"; then echo "ok $n - refused: $text"
+    else echo "not ok $n - refused: $text (status $status)"; sed 's/^/# /' err; bad=1; fi
+}
+printf x >shared/b/block-00000.lseq
+ggn_refused "block-00000.lseq" 3 "$G" label shared
+ggn_refused "unknown option" 3 "$G" label --nonsense shared
+ggn_refused "start it without mpirun" 2 "$G" train --data shared --out m.ggn
+exit $bad
