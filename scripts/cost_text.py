@@ -277,7 +277,7 @@ def precision(out, points):
     text = ("\n## Precision and stability\n\nWhat number formats, instruction sets, threads and compilers change. In p and in decisions of %s, the shipped network, on recorded levels of "
             "the test blocks (a verdict: p of a window on one side of the threshold or the other):\n\n" % out.get("decisions", {}).get("model", "the network"))
     text += decisions_table(out)
-    text += ("\nWinograd's and direct convolution differ within a row of AVX2 too, since only AVX-512 has Winograd's. Flush-to-zero is switched on for the whole process, as a host with `-ffast-math` "
+    text += ("\nWhat has no row (instruction sets, flush-to-zero, -O levels) was not measured in this run. AVX2 and the baseline have direct convolution, AVX-512 Winograd's. Flush-to-zero is switched on for the whole process, as a host with `-ffast-math` "
              "does at loading; `lull-check` holds every criterion to the same answer then (check `fp`). Number of threads and batch change nothing by construction; "
              "stops of render and replay agree one by one (`tests/e2e/ggn_replay.sh`).\n\nThe published networks at their own widths, four golden windows against double (`ggn golden`):\n\n")
     text += table(["in p", "moved at most", "windows"], [[g["name"], "%.1e" % g["p_moved"], str(g["windows"])] for g in out.get("golden", [])])
@@ -308,7 +308,8 @@ def page(out):
     criteria = ("uniform", "fixed", "variance", "halfbuf", "variance, no guard", "halfbuf, no guard", "observer", mine, mine + " bf16",
                 *networks[1:], *BASELINES)
     shown = lambda points: table(HEADS, [row_of(p) for p in points if p[0] == "limit"] + setting_rows(points, criteria))
-    text += "\n" + references(out) + "\n## The frontier\n\n![](cost-frontier.png)\n\nMedians over scenes (noisy, early, FLIP: means); filled points are defaults.\n\n"
+    commits = ", ".join("%s of %s" % (n, c) for n, c in out.get("commits", {}).items() if c)
+    text += "\n" + references(out) + ("\nNetworks as committed: %s; one that was trained anew since then is not in these figures until `make cost` runs again.\n" % commits if commits else "") + "\n## The frontier\n\n![](cost-frontier.png)\n\nMedians over scenes (noisy, early, FLIP: means); filled points are defaults.\n\n"
     text += shown(test) + CIRCLE + scenes_table(out, test)
     if "recorded" in out["sets"]:
         recorded = points_of(out, "recorded")
