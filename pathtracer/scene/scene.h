@@ -164,7 +164,7 @@ struct pt_emitter {
     int32_t primitive;   /* AREA on a mesh: triangle */
     int32_t alias;       /* Walker/Vose alias table over the emitters … */
     float alias_q;       /* … keep this one when the fractional part is below q */
-    float pmf;           /* > 0 for all that can emit; the hierarchy's own probability multiplies it */
+    float pmf;           /* by power; > 0 for all that can emit */
     float area_over_pmf; /* AREA on a mesh: of the triangle, units² */
     pt_vec3 p0, e1, e2;  /* AREA on a mesh: corner and edges to the other two */
     pt_vec3 n;           /* AREA on a mesh: unit normal of the emitting side */

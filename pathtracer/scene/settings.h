@@ -13,7 +13,7 @@
     X(MIS, "path") /* next-event estimation and BSDF sampling, power heuristic */ \
     X(BSDF_ONLY, "bsdf-only") /* brute force: emission is met by BSDF sampling only; the oracle of tests */
 #define PT_LIGHT_SELECTIONS(X) \
-    X(HIERARCHY, "hierarchy") /* by distance, orientation and cosine too, where there are many emitters; else by power */ \
+    X(HIERARCHY, "hierarchy") /* by distance, orientation and cosine too, where that is worth its time; else by power */ \
     X(POWER, "power")
 #define PT_FILTERS(X) X(BOX, "box") X(TRIANGLE, "triangle") X(GAUSSIAN, "gaussian")
 

@@ -51,12 +51,12 @@ static inline float pt_light_area_pdf(pt_effects fx, const struct pt_scene *scen
     int quadric = (fx & PT_FX_QUADRIC) && shape->kind == PT_SHAPE_QUADRIC;
     int32_t emitter = light->first_emitter + (quadric ? 0 : primitive);
     const struct pt_emitter *e = &scene->emitters[emitter];
-    float pmf = scene->light_tree ? pt_light_tree_pmf(scene, at, emitter) : 1.0f;
+    float by_tree = scene->light_tree ? pt_light_tree_pmf(scene, at, emitter) / e->pmf : 1.0f;
     if (quadric)
-        return pmf * e->pmf * pt_light_quadric_pdf(scene, shape, at->p, p, n, wi);
+        return by_tree * e->pmf * pt_light_quadric_pdf(scene, shape, at->p, p, n, wi);
     pt_vec3 d = v3_sub(p, at->p);
     float cosine = fabsf(v3_dot(e->n, wi));
-    return cosine > 0.0f ? pmf * v3_dot(d, d) / (e->area_over_pmf * cosine) : 0.0f;
+    return cosine > 0.0f ? by_tree * v3_dot(d, d) / (e->area_over_pmf * cosine) : 0.0f;
 }
 
 #endif

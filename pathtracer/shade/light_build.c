@@ -1,12 +1,15 @@
 #include "shade/light_build.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 #include "geom/quadric.h"
+#include "sample/rng.h"
 #include "scene/settings.h"
 #include "shade/alias.h"
 #include "shade/light_area.h"
 #include "shade/light_env.h"
+#include "shade/light_tree.h"
 #include "shade/light_tree_build.h"
 
 /* Share of the selection probability that is spread evenly over the finite lights, so that a weak lamp near the camera is
@@ -16,6 +19,10 @@
 #define TREE_UNIFORM_SHARE 0.05
 /* A hierarchy needs this many lights that are somewhere. */
 enum { TREE_LIGHTS = 2 };
+/* With so few emitters it is looked, at so many places, whether the hierarchy is worth its time: below WORTH (see advantage)
+ * scenes measured worse with it than by power, above it better (docs/speed.md). */
+enum { FEW = 64, PROBES = 512 };
+static const double WORTH = 1.06;
 /* Least radius of a node relative to the scene: importance is finite in a point light. */
 #define SMALLEST_NODE 1e-6f
 /* Radians by which a spot's cone is widened against rounding. */
@@ -108,6 +115,12 @@ static void fill(struct pt_scene *scene, double *weights)
     }
 }
 
+static int by_value(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
 /* What the lights at infinity and the others share of the probability. */
 struct shares {
     double far;  /* of each emitter at infinity that emits at all */
@@ -149,14 +162,6 @@ static void balance(const struct pt_scene *scene, const struct shares *s, double
     }
 }
 
-static void set_pmf(struct pt_scene *scene, struct pt_emitter *e, double pmf)
-{
-    e->pmf = (float)pmf;
-    e->area_over_pmf = e->pmf > 0.0f ? e->area_over_pmf / e->pmf : 0.0f;
-    if (e->primitive < 0)
-        scene->lights[e->light].emitter_pmf = e->pmf;
-}
-
 static int make_table(struct pt_scene *scene, double *weights, struct pt_arena *scratch)
 {
     int32_t n = scene->emitter_count;
@@ -173,9 +178,13 @@ static int make_table(struct pt_scene *scene, double *weights, struct pt_arena *
     sum = sum > 0.0 ? sum : (double)n;
     pt_alias_build(weights, n, q, alias, work);
     for (int32_t i = 0; i < n; i++) {
-        scene->emitters[i].alias = alias[i];
-        scene->emitters[i].alias_q = q[i];
-        set_pmf(scene, &scene->emitters[i], weights[i] / sum);
+        struct pt_emitter *e = &scene->emitters[i];
+        e->alias = alias[i];
+        e->alias_q = q[i];
+        e->pmf = (float)(weights[i] / sum);
+        e->area_over_pmf = e->pmf > 0.0f ? e->area_over_pmf / e->pmf : 0.0f;
+        if (e->primitive < 0)
+            scene->lights[e->light].emitter_pmf = e->pmf;
     }
     return 1;
 }
@@ -256,6 +265,47 @@ static int list_far(struct pt_scene *scene, struct pt_light_tree *tree, const st
     return 1;
 }
 
+/* A place on a mesh that is no lamp, the k-th of PROBES; 0 when the shape has none. */
+static int probe(const struct pt_scene *scene, int k, struct pt_rng *rng, struct pt_receiver *at)
+{
+    const struct pt_shape *shape = &scene->shapes[k % scene->world_shape_count];
+    if (shape->kind != PT_SHAPE_MESH || shape->light >= 0)
+        return 0;
+    const struct pt_mesh *mesh = &scene->meshes[shape->data];
+    uint32_t triangle = (uint32_t)(pt_rng_float(rng) * (float)mesh->triangle_count);
+    const uint32_t *index = mesh->indices + 3 * (size_t)(triangle < mesh->triangle_count ? triangle : 0);
+    float u = sqrtf(pt_rng_float(rng)), v = pt_rng_float(rng);
+    pt_vec3 a = vertex(mesh->positions, index[0]), e1 = v3_sub(vertex(mesh->positions, index[1]), a),
+            e2 = v3_sub(vertex(mesh->positions, index[2]), a);
+    pt_vec3 p = v3_madd(v3_madd(a, 1.0f - u, e1), u * v, e2);
+    *at = (struct pt_receiver){p, v3_norm(v3_cross(e1, e2)), PT_RECEIVER_BOTH_SIDES};
+    return 1;
+}
+
+/* How much more the second moment of the selection is by power than by the hierarchy, at places all over the scene: Σ p²/q
+ * where what arrives is as the hierarchy's p says and q is by power. The median over places; visibility is not looked at. */
+static double advantage(const struct pt_scene *scene)
+{
+    double ratios[PROBES], share = (double)scene->light_tree->share;
+    int n = 0;
+    struct pt_rng rng = pt_rng_make(1);
+    struct pt_receiver at;
+    for (int k = 0; k < PROBES && scene->world_shape_count > 0; k++) {
+        if (!probe(scene, k, &rng, &at))
+            continue;
+        double sum = 0.0, all = 0.0;
+        for (int32_t i = 0; i < scene->emitter_count; i++) {
+            double p = (double)pt_light_tree_pmf(scene, &at, i) / share, q = (double)scene->emitters[i].pmf / share;
+            all += p;
+            sum += q > 0.0 ? p * p / q : 0.0;
+        }
+        if (all > 0.0)
+            ratios[n++] = sum;
+    }
+    qsort(ratios, (size_t)n, sizeof *ratios, by_value);
+    return n > 0 ? ratios[n / 2] : INFINITY;
+}
+
 /* Whether the hierarchy is wanted and there are enough emitters for it; then it is made. 0 when out of memory. */
 static int make_tree(struct pt_scene *scene, const double *weights, struct pt_arena *scratch)
 {
@@ -278,11 +328,20 @@ static int make_tree(struct pt_scene *scene, const double *weights, struct pt_ar
     float smallest = fmaxf(SMALLEST_NODE * v3_len(v3_sub(scene->bounds_max, scene->bounds_min)), 1e-18f);
     if (!pt_light_tree_build(tree, bounds, ids, count, scene->emitter_count, smallest, &scene->arena, scratch))
         return 0;
-    tree->share = (float)s.near;
-    for (int32_t i = 0; i < scene->emitter_count; i++)
-        set_pmf(scene, &scene->emitters[i], at_infinity(&scene->lights[scene->emitters[i].light]) ? s.far : s.near);
     scene->light_tree = tree;
     return 1;
+}
+
+/* Lights at infinity keep the probability that the table gave them. */
+static void finish_tree(struct pt_scene *scene)
+{
+    struct pt_light_tree *tree = scene->light_tree;
+    double far = 0.0;
+    for (int32_t i = 0; i < tree->far_count; i++)
+        far += (double)scene->emitters[tree->far[i]].pmf;
+    tree->share = (float)(1.0 - far);
+    if (scene->emitter_count <= FEW && advantage(scene) < WORTH)
+        scene->light_tree = NULL;
 }
 
 static int build_environments(struct pt_scene *scene)
@@ -324,10 +383,12 @@ int pt_lights_build(struct pt_scene *scene, struct base_err *err)
             fill(scene, weights);
             ok = make_tree(scene, weights, &scratch);
         }
-        if (ok && !scene->light_tree) {
+        if (ok) {
             const struct shares s = share_out(scene, weights);
             balance(scene, &s, weights);
             ok = make_table(scene, weights, &scratch);
+            if (ok && scene->light_tree)
+                finish_tree(scene);
         }
     }
     pt_arena_release(&scratch);

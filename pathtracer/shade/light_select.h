@@ -17,7 +17,7 @@ static inline const struct pt_emitter *pt_light_pick_by_power(const struct pt_sc
     return x - (float)i < e->alias_q ? e : &scene->emitters[e->alias];
 }
 
-/* Samples an emitter as if it had been selected with its own pmf. */
+/* Samples an emitter as if it had been selected by power. */
 static inline int pt_light_sample_emitter(pt_effects fx, const struct pt_scene *scene, const struct pt_emitter *e,
                                           pt_vec3 p_ref, float u0, float u1, struct pt_light_sample *out)
 {
@@ -48,7 +48,7 @@ static inline int pt_light_sample(pt_effects fx, const struct pt_scene *scene, c
     int32_t i = pt_light_tree_pick(scene, at, u_pick, &pmf);
     if (i < 0 || !pt_light_sample_emitter(fx, scene, &scene->emitters[i], at->p, u0, u1, out))
         return 0;
-    out->inv_pdf_solid /= pmf;
+    out->inv_pdf_solid *= scene->emitters[i].pmf / pmf;
     return 1;
 }
 

@@ -58,18 +58,19 @@ static inline pt_f4 weigh(const struct pt_light_node *n, const struct pt_receive
     return w + f4_select(w > f4_splat(0.0f), DEFENSIVE * sum * intensity, f4_splat(0.0f));
 }
 
-static int32_t pick_far(const struct pt_light_tree *tree, float u)
+static int32_t pick_far(const struct pt_light_tree *tree, float u, float *pmf)
 {
     int32_t i = (int32_t)(u * (float)tree->far_count);
+    *pmf = (1.0f - tree->share) / (float)tree->far_count;
     return tree->far[i < tree->far_count ? i : tree->far_count - 1];
 }
 
 int32_t pt_light_tree_pick(const struct pt_scene *scene, const struct pt_receiver *at, float u, float *pmf)
 {
     const struct pt_light_tree *tree = scene->light_tree;
-    *pmf = 1.0f;
     if (u >= tree->share)
-        return pick_far(tree, (u - tree->share) / (1.0f - tree->share));
+        return pick_far(tree, (u - tree->share) / (1.0f - tree->share), pmf);
+    *pmf = tree->share;
     u /= tree->share;
     for (int32_t i = 0; i >= 0;) {
         const struct pt_light_node *n = &tree->nodes[i];
@@ -93,7 +94,7 @@ int32_t pt_light_tree_pick(const struct pt_scene *scene, const struct pt_receive
 float pt_light_tree_pmf(const struct pt_scene *scene, const struct pt_receiver *at, int32_t emitter)
 {
     const struct pt_light_tree *tree = scene->light_tree;
-    float pmf = 1.0f;
+    float pmf = tree->share;
     int32_t place = tree->places[emitter];
     if (place < 0)
         return 0.0f;

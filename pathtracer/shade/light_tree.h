@@ -8,11 +8,10 @@
 
 #include "shade/light.h"
 
-/* The emitter selected by u in [0, 1), -1 when none of the node reached can send light to `at`; *pmf: to be multiplied with
- * the emitter's own pmf. */
+/* The emitter selected by u in [0, 1) and its probability, -1 when none of the node reached can send light to `at`. */
 int32_t pt_light_tree_pick(const struct pt_scene *scene, const struct pt_receiver *at, float u, float *pmf);
 
-/* The *pmf with which pt_light_tree_pick would have selected `emitter`; 0 for one that is in no node. */
+/* The probability with which pt_light_tree_pick selects `emitter`; 0 for one that is in no node. */
 float pt_light_tree_pmf(const struct pt_scene *scene, const struct pt_receiver *at, int32_t emitter);
 
 #endif

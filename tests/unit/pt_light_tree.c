@@ -101,11 +101,11 @@ static void check_frequencies(const struct pt_scene *s, const struct pt_receiver
         int far = s->lights[s->emitters[e].light].kind == PT_LIGHT_DISTANT;
         count[e]++;
         assert_true(pmf > 0.0f);
-        assert_true(far ? pmf == 1.0f : fabsf(pt_light_tree_pmf(s, at, e) / pmf - 1.0f) < 1e-5f);
+        assert_true(far ? fabsf(pmf / s->emitters[e].pmf - 1.0f) < 1e-5f : fabsf(pt_light_tree_pmf(s, at, e) / pmf - 1.0f) < 1e-5f);
     }
     for (int e = 0; e < s->emitter_count && !none; e++) {
         int far = s->lights[s->emitters[e].light].kind == PT_LIGHT_DISTANT;
-        float p = s->emitters[e].pmf * (far ? 1.0f : pt_light_tree_pmf(s, at, e));
+        float p = far ? s->emitters[e].pmf : pt_light_tree_pmf(s, at, e);
         if (fabsf((float)count[e] / SWEEP - p) > 1.5f / SWEEP + 1e-5f)
             fail_msg("emitter %d: %d of %d, probability %g", e, count[e], SWEEP, (double)p);
     }
