@@ -217,8 +217,8 @@ static int32_t load_model(struct lull_instance *in, const char *path, struct lul
         return lull_kit_fail(err, LULL_E_IO, "model: %.200s: windows of %d images", path, in->rule.window);
     if (model->hyper.picture) {
         in->kit.need.planes_used |= LULL_PLANE_BIT(LULL_PLANE_HALF);
-        in->half_wanted = "this model judges by half buffers, which the host does not give: it will stop few blocks, if "
-                          "any; another model, like lull-1.ggn (-p model=), needs none";
+        in->half_wanted = "this model judges by half buffers too, which the host does not give: how well it decides without "
+                          "them depends on how it was trained (ggn evaluate --no-pictures)";
     }
     gp_windowed_hash(in, &in->kit.value[P_PRECISION], sizeof in->kit.value[P_PRECISION]);
     for (int net = 0; net < GGN_NETS; net++)

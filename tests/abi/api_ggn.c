@@ -51,7 +51,7 @@ static void a_missing_half_is_told(void **state)
     (void)state;
     assert_string_equal(warned(NULL, color | half), "");
     assert_non_null(strstr(warned(NULL, color), "half buffers"));
-    assert_non_null(strstr(warning, "lull-1.ggn"));
+    assert_non_null(strstr(warning, "--no-pictures"));
     assert_string_equal(warned(lull_1, color), "");
 }
 
