@@ -15,6 +15,7 @@
 #include "render/output.h"
 #include "render/quote.h"
 #include "render/sequence.h"
+#include "scene/scene.h"
 #include "support/fail_alloc.h"
 #include "support/pt_fake.h"
 
@@ -212,7 +213,8 @@ static void recording(void **state)
         snprintf(manifest, sizeof manifest, "%s/manifest.json", directory);
         unlink(manifest);
         fail_arm(k);
-        int rc = pt_sequence_record(&config, NULL, pt_fake_noise, pool, NULL, NULL, say, NULL, &stopped, &err);
+        static const struct pt_scene empty; /* the kernel here needs none */
+        int rc = pt_sequence_record(&config, &empty, pt_fake_noise, pool, NULL, NULL, say, NULL, &stopped, &err);
         int happened = fail_disarm();
         if (!happened) {
             assert_int_equal(rc, 0);

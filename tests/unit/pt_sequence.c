@@ -17,6 +17,7 @@
 #include "base/files.h"
 #include "render/film.h"
 #include "render/sequence.h"
+#include "scene/scene.h"
 #include "sequence/manifest.h"
 #include "sequence/statistics.h"
 #include "support/lseq_oracle.h"
@@ -119,7 +120,8 @@ static pt_kernel *kernel = pt_fake_noise;
 static int record(const struct pt_sequence_config *config, struct pt_criterion *criterion, struct base_err *err)
 {
     int stopped;
-    return pt_sequence_record(config, NULL, kernel, pool, criterion, NULL, say, NULL, &stopped, err);
+    static const struct pt_scene empty; /* the kernel here needs none */
+    return pt_sequence_record(config, &empty, kernel, pool, criterion, NULL, say, NULL, &stopped, err);
 }
 
 static uint32_t u32(const unsigned char *p)
