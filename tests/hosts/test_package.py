@@ -382,7 +382,7 @@ def test_not_finite():
 def test_state():
     """a criterion's saved history goes on as if there had been no break; broken bytes are refused"""
     def frames():
-        return lull.Frame(lull.load("ggn", threads=1, visible=.9, passes=1), 32, 32, block=16, spp_max=256)
+        return lull.Frame(lull.load("ggn", threads=1, visible=.7, passes=1), 32, 32, block=16, spp_max=256)
     f = frames()
     d = lull.Driver(f, Noise(SIGMAS))
     while d.totals.checks < 12:
@@ -397,7 +397,7 @@ def test_state():
 def test_resume():
     """an interrupted run goes on from a checkpoint to the same picture; a finished one can be given more samples"""
     def start(spp_max=400):
-        f = lull.Frame(lull.load("ggn", threads=1, visible=.9, passes=1), 32, 32, block=16, spp_max=spp_max)
+        f = lull.Frame(lull.load("ggn", threads=1, visible=.7, passes=1), 32, 32, block=16, spp_max=spp_max)
         return lull.Driver(f, Noise(SIGMAS))
     whole, first, second = start(), start(), start()
     whole.run()

@@ -54,7 +54,7 @@ def report(driver: Driver, scene: str = "", kernel: str = "", interrupted: bool 
     return {
         "scene": scene, "width": frame.width, "height": frame.height,
         "block": frame.block_width if square else [frame.block_width, frame.block_height], "seed": frame.seed,
-        "threads": driver.threads,
+        "threads": driver.threads, "processes": 1,
         "criterion": {"id": criterion.info.id, "version": criterion.info.version,
                       "params": {p.name: criterion.parameters.get(p.name, p.default) for p in criterion.info.parameters}},
         "mask": mask, "effects": [],
