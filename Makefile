@@ -116,7 +116,7 @@ all: $(PROGRAMS) $(CRITERIA) $(MPI_MODULE) ## build the programs and the criteri
 # --- compiling: one rule, flags by folder --------------------------------------------------------------------------------
 inc = $(or $(strip \
   $(if $(filter plugin-api/%,$(1)),$(if $(filter plugin-api/base/% plugin-api/sequence/%,$(1)),$(INC_plugin-api_base),$(if $(filter plugin-api/tools/%,$(1)),$(INC_plugin-api_tools),$(if $(filter plugin-api/mpi/%,$(1)),$(INC_plugin-api_mpi),$(INC_plugin-api))))) \
-  $(if $(filter pathtracer/%,$(1)),$(if $(filter pathtracer/render/% $(PT_MAIN) $(PT_MAIN:.c=.h),$(1)),$(INC_pathtracer_host),$(INC_pathtracer))) \
+  $(if $(filter pathtracer/%,$(1)),$(if $(filter pathtracer/render/% $(PT_MAIN) $(wildcard pathtracer/*.h),$(1)),$(INC_pathtracer_host),$(INC_pathtracer))) \
   $(if $(filter ggn/%,$(1)),$(if $(filter ggn/plugin/%,$(1)),$(INC_ggn_plugin),$(INC_ggn))) \
   $(if $(filter tests/%,$(1)),$(if $(filter pt_%,$(notdir $(1))),$(INC_tests_pt),$(if $(filter ggn_%,$(notdir $(1))),$(INC_tests_ggn),$(if $(filter base_%,$(notdir $(1))),$(INC_tests_base),$(INC_tests_api)))))),)
 # Kernels for one instruction set carry it in their name (x_avx2.c, x_avx512.c); they are reached by run-time dispatch only.

@@ -158,10 +158,11 @@ static int part(struct pt_crew *crew)
         int rank = 0;
         void *data = NULL;
         size_t size = 0;
-        uint32_t kind;
+        uint32_t kind = PT_CREW_FAILED;
         if (base_peers_receive(crew->peers, crew->timeout_s, &rank, &data, &size, &err) <= 0)
             return BASE_EIO;
-        memcpy(&kind, data, sizeof kind);
+        if (size >= sizeof kind)
+            memcpy(&kind, data, sizeof kind);
         left -= kind == PT_CREW_BYE;
         free(data);
     }
@@ -259,7 +260,7 @@ static int send_rows(struct sampling *s, int rank, size_t first, size_t n)
     for (size_t i = 0; i < n; i++) {
         const struct pt_row *row = &slice->rows[slice->order[first + i]];
         message->rows[i] = *row;
-        message->rows[i].zero = slice->order[first + i]; /* to find it again */
+        message->rows[i].place = slice->order[first + i];
         pt_row_save(slice->film, row, sums);
         sums += pt_row_bytes(row, slice->film->planes);
     }
@@ -298,9 +299,9 @@ static int is_answer(const struct sampling *s, const struct pt_crew_rows *m, siz
         return 0;
     for (uint32_t i = 0; i < m->count; i++) {
         const struct pt_row *theirs = &m->rows[i];
-        if (theirs->zero >= s->slice->count)
+        if (theirs->place >= s->slice->count)
             return 0;
-        const struct pt_row *ours = &s->slice->rows[theirs->zero];
+        const struct pt_row *ours = &s->slice->rows[theirs->place];
         if (theirs->y != ours->y || theirs->x0 != ours->x0 || theirs->x1 != ours->x1)
             return 0;
         wanted += sizeof(struct pt_row) + pt_row_bytes(theirs, m->planes);
@@ -317,10 +318,10 @@ static int take_answer(struct sampling *s, int rank, const struct pt_crew_rows *
         return pt_crew_nonsense(s->crew, rank, s->err);
     const unsigned char *sums = (const unsigned char *)(m->rows + m->count);
     for (uint32_t i = 0; i < m->count; i++) {
-        struct pt_row *row = &s->slice->rows[m->rows[i].zero];
-        remember(s, m->rows[i].zero);
+        struct pt_row *row = &s->slice->rows[m->rows[i].place];
+        remember(s, m->rows[i].place);
         *row = m->rows[i];
-        row->zero = 0;
+        row->place = 0;
         pt_row_restore(s->slice->film, row, sums);
         sums += pt_row_bytes(row, m->planes);
     }

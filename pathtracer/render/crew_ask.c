@@ -1,5 +1,4 @@
 /* Asking the criterion by everybody: whole blocks travel, answers come back. */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -168,8 +167,7 @@ int pt_crew_ask(struct pt_crew *crew, struct base_threads *threads, const struct
             rc = attend(&a, a.next < question->count ? 0.0 : 0.05);
     }
     for (uint32_t k = 0; k < question->count && said->code; k++)
-        question->decisions[k] = (struct lull_decision){.action = LULL_CONTINUE, .p_noisy = NAN, .predicted_spp = NAN,
-                                                        .error = NAN};
+        question->decisions[k] = pt_criterion_undecided;
     *thread_s = a.thread_s;
     return rc;
 }

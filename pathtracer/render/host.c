@@ -192,17 +192,19 @@ static int32_t evaluate_step(struct pt_criterion *c, int step, const struct lull
     return code;
 }
 
+const struct lull_decision pt_criterion_undecided = {.action = LULL_CONTINUE, .p_noisy = NAN, .predicted_spp = NAN,
+                                                     .error = NAN};
+
 int pt_criterion_evaluate(struct pt_criterion *c, struct pt_film *film, const struct pt_blocks *blocks, const uint32_t *due,
                           uint32_t count, const uint8_t *final, struct lull_decision *decisions, struct base_err *err)
 {
     int rc = 0, has_half = film->half != NULL;
     struct pt_film_patch patch = {0};
-    const struct lull_decision preset = {.action = LULL_CONTINUE, .p_noisy = NAN, .predicted_spp = NAN, .error = NAN};
 
     for (uint32_t i = 0; i < blocks->count; i++)
         c->all[i] = block_state(&blocks->list[i], i, has_half);
     for (uint32_t k = 0; k < count; k++)
-        decisions[k] = preset;
+        decisions[k] = pt_criterion_undecided;
     for (uint32_t i = 0; i < blocks->count && !rc; i++) {
         const struct pt_block *b = &blocks->list[i];
         if (b->dropped > 0)
@@ -222,7 +224,7 @@ int pt_criterion_evaluate(struct pt_criterion *c, struct pt_film *film, const st
         code = evaluate_step(c, s, &view, due, count, final, decisions, &e);
     if (code != LULL_OK) {
         for (uint32_t k = 0; k < count; k++)
-            decisions[k] = preset;
+            decisions[k] = pt_criterion_undecided;
         rc = pt_criterion_fail(c, "", code, &e, err);
     }
 out:

@@ -60,8 +60,11 @@ int pt_criterion_set_mask(struct pt_criterion *criterion, const struct pt_mask *
 int pt_criterion_begin(struct pt_criterion *criterion, const struct pt_criterion_frame *frame,
                        const struct pt_blocks *blocks, const struct pt_film *film, struct base_err *err);
 
-/* Asks about blocks->list[due[0 … count)] (rising). final: they get no more samples. decisions[i] is preset to CONTINUE and
- * stays so when the criterion fails, which is an error of this call too. */
+/* What is decided where nobody was asked or the answer is not to be had: go on. */
+extern const struct lull_decision pt_criterion_undecided;
+
+/* Asks about blocks->list[due[0 … count)] (rising). final: they get no more samples. decisions[i] is preset to undecided
+ * and stays so when the criterion fails, which is an error of this call too. */
 int pt_criterion_evaluate(struct pt_criterion *criterion, struct pt_film *film, const struct pt_blocks *blocks,
                           const uint32_t *due, uint32_t count, const uint8_t *final, struct lull_decision *decisions,
                           struct base_err *err);

@@ -370,20 +370,6 @@ static void warn_once(struct pt_render *r, const struct pt_render_hooks *hooks, 
         hooks->warn(hooks->data, line);
 }
 
-/* Asks about the `count` blocks of work->due and times it. A criterion that fails leaves every decision at CONTINUE. */
-static void ask(struct pt_render *r, uint32_t count, const struct pt_render_hooks *hooks)
-{
-    struct pt_render_work *w = r->work;
-    struct base_err err = {0};
-    double start_s = base_clock_wall_s(), start_cpu_s = base_clock_process_s(); /* nothing else runs during a check */
-    if (pt_criterion_evaluate(r->criterion, &r->film, &r->blocks, w->due, count, w->final, w->decisions, &err) != 0)
-        warn_once(r, hooks, err.text);
-    r->totals.criterion_s += base_clock_wall_s() - start_s;
-    r->criterion_thread_s += base_clock_process_s() - start_cpu_s;
-    r->totals.checks += count;
-    r->asked += count;
-}
-
 /* Whether a block is better sent to the crew than asked about here: if its checks so far took longer than that. */
 static int worth_sending(const struct pt_render *r, uint32_t count)
 {
@@ -394,19 +380,20 @@ static int worth_sending(const struct pt_render *r, uint32_t count)
            r->criterion_thread_s / (double)r->asked > send_s * threads;
 }
 
-/* The same by the crew too, if that is quicker. Not 0: nothing has come of it, as pt_crew_ask. */
-static int ask_all(struct pt_render *r, uint32_t count, const struct pt_render_hooks *hooks, struct base_err *err)
+/* Asks about the `count` blocks of work->due and times it; by_crew: not only here. A criterion that fails leaves every
+ * decision undecided. Not 0: nothing has come of it, as pt_crew_ask; only by the crew, else err is not used. */
+static int ask(struct pt_render *r, uint32_t count, int by_crew, const struct pt_render_hooks *hooks, struct base_err *err)
 {
     struct pt_render_work *w = r->work;
-    if (!worth_sending(r, count)) {
-        ask(r, count, hooks);
-        return 0;
-    }
     struct pt_crew_question question = {r->criterion, &r->film,     &r->blocks,         w->due,     w->final,
                                         count,        w->decisions, hooks->interrupted, hooks->data};
     struct base_err said = {0};
     double others_s = 0.0, start_s = base_clock_wall_s(), start_cpu_s = base_clock_process_s();
-    int rc = pt_crew_ask(r->config.crew, r->threads, &question, &others_s, &said, err);
+    int rc = 0; /* nothing else runs meanwhile: the process's seconds are those of the check */
+    if (by_crew)
+        rc = pt_crew_ask(r->config.crew, r->threads, &question, &others_s, &said, err);
+    else
+        pt_criterion_evaluate(r->criterion, &r->film, &r->blocks, w->due, count, w->final, w->decisions, &said);
     r->totals.criterion_s += base_clock_wall_s() - start_s;
     r->criterion_thread_s += base_clock_process_s() - start_cpu_s + others_s;
     if (rc)
@@ -429,8 +416,6 @@ static int too_expensive(const struct pt_render *r)
 static int check(struct pt_render *r, const struct pt_render_hooks *hooks, struct base_err *err)
 {
     struct pt_render_work *w = r->work;
-    static const struct lull_decision keep_on = {.action = LULL_CONTINUE, .p_noisy = NAN, .predicted_spp = NAN,
-                                                 .error = NAN};
     int reopens = r->criterion && !r->config.uniform &&
                   (r->criterion->table->capabilities & LULL_CAP_REOPENS);
     int skip = !r->criterion || too_expensive(r);
@@ -444,7 +429,7 @@ static int check(struct pt_render *r, const struct pt_render_hooks *hooks, struc
         int final = is_active && b->spp >= r->config.spp_max;
         if (skip && !(final && r->criterion)) {
             if (is_active)
-                settle(r, b, &keep_on);
+                settle(r, b, &pt_criterion_undecided);
             r->totals.skipped_checks += r->criterion != NULL;
             continue;
         }
@@ -452,7 +437,7 @@ static int check(struct pt_render *r, const struct pt_render_hooks *hooks, struc
         w->final[n++] = (uint8_t)final;
         active += (uint32_t)is_active;
     }
-    int rc = active > 0 ? ask_all(r, n, hooks, err) : 0;
+    int rc = active > 0 ? ask(r, n, worth_sending(r, n), hooks, err) : 0;
     if (rc || active == 0)
         return rc;
     if (hooks->judged)
@@ -484,7 +469,7 @@ static void close_blocks(struct pt_render *r, int reason, const struct pt_render
         return;
     for (uint32_t k = 0; k < n; k++)
         r->blocks.list[w->due[k]].reason = PT_REASON_NONE;
-    ask(r, n, hooks);
+    ask(r, n, 0, hooks, NULL);
     for (uint32_t k = 0; k < n; k++) {
         note(&r->blocks.list[w->due[k]], &w->decisions[k]);
         r->blocks.list[w->due[k]].reason = reason;
@@ -590,7 +575,7 @@ void pt_render_judge(struct pt_render *r, const struct pt_render_hooks *hooks)
         r->work->due[i] = i;
         r->work->final[i] = 0;
     }
-    ask(r, r->blocks.count, hooks);
+    ask(r, r->blocks.count, 0, hooks, NULL);
     for (uint32_t i = 0; i < r->blocks.count; i++)
         note(&r->blocks.list[i], &r->work->decisions[i]);
 }

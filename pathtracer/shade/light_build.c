@@ -307,16 +307,15 @@ static double advantage(const struct pt_scene *scene)
 }
 
 /* Whether the hierarchy is wanted and there are enough emitters for it; then it is made. 0 when out of memory. */
-static int make_tree(struct pt_scene *scene, const double *weights, struct pt_arena *scratch)
+static int make_tree(struct pt_scene *scene, const struct shares *s, const double *weights, struct pt_arena *scratch)
 {
-    const struct shares s = share_out(scene, weights);
     size_t n = (size_t)scene->emitter_count;
-    if (scene->light_selection != PT_LIGHT_SELECTION_HIERARCHY || s.near_lights < TREE_LIGHTS)
+    if (scene->light_selection != PT_LIGHT_SELECTION_HIERARCHY || s->near_lights < TREE_LIGHTS)
         return 1;
     struct pt_light_tree *tree = pt_arena_alloc(&scene->arena, 1, sizeof *tree);
     struct pt_light_bounds *bounds = pt_arena_alloc(scratch, n, sizeof *bounds);
     int32_t *ids = pt_arena_alloc(scratch, n, sizeof *ids), count = 0;
-    if (!tree || !bounds || !ids || !list_far(scene, tree, &s, weights))
+    if (!tree || !bounds || !ids || !list_far(scene, tree, s, weights))
         return 0;
     for (int32_t i = 0; i < scene->emitter_count; i++)
         if (!at_infinity(&scene->lights[scene->emitters[i].light]) &&
@@ -381,12 +380,10 @@ int pt_lights_build(struct pt_scene *scene, struct base_err *err)
         if (ok) {
             scene->emitter_count = (int32_t)count;
             fill(scene, weights);
-            ok = make_tree(scene, weights, &scratch);
-        }
-        if (ok) {
             const struct shares s = share_out(scene, weights);
+            ok = make_tree(scene, &s, weights, &scratch);
             balance(scene, &s, weights);
-            ok = make_table(scene, weights, &scratch);
+            ok = ok && make_table(scene, weights, &scratch);
             if (ok && scene->light_tree)
                 finish_tree(scene);
         }

@@ -1,0 +1,85 @@
+#include "session.h"
+
+#include <signal.h>
+#include <stdio.h>
+
+#include "pbrt/load.h"
+
+static volatile sig_atomic_t interrupt_seen;
+
+static void on_interrupt(int number)
+{
+    (void)number;
+    interrupt_seen = 1;
+}
+
+/* The first SIGINT or SIGTERM asks for an end, a second one kills. */
+void pt_catch_interrupt(void)
+{
+    struct sigaction action = {.sa_handler = on_interrupt, .sa_flags = (int)SA_RESETHAND};
+    sigemptyset(&action.sa_mask);
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+}
+
+/* Of several processes rank 0 speaks. */
+void pt_say(void *data, const char *line)
+{
+    struct pt_session *s = data;
+    if (s->peers && s->peers->rank > 0)
+        return;
+    pt_progress_clear(&s->progress);
+    fprintf(stderr, "pathtracer: %s\n", line);
+}
+
+/* Notes are for people at the terminal; -q has none. */
+void pt_note(void *data, const char *line)
+{
+    struct pt_session *s = data;
+    if (!s->cli.quiet)
+        pt_say(data, line);
+}
+
+static int load_scene(struct pt_session *s, struct base_err *err)
+{
+    struct pt_load_options options = {.strict = s->cli.strict, .width = s->cli.width, .height = s->cli.height,
+                                      .view = s->cli.view, .light_selection = s->cli.light_selection,
+                                      .forced = s->cli.all_effects ? PT_FX_ALL : 0,
+                                      .quiet = s->cli.quiet, .inputs = &s->scene_files, .warn = pt_note, .warn_data = s};
+    int rc = pt_scene_load(s->cli.scene, &options, &s->scene, &s->defaults, err);
+    if (rc)
+        return rc;
+    s->kernel = pt_kernel_select(s->scene->effects, NULL, &s->kernel_name);
+    return 0;
+}
+
+/* Threads and scene. */
+int pt_session_open(struct pt_session *s, struct base_err *err)
+{
+    s->threads = base_threads_create(s->cli.threads > 0 ? s->cli.threads : base_peers_threads(s->peers), err);
+    if (!s->threads)
+        return BASE_ENOMEM;
+    int rc = load_scene(s, err);
+    if (rc == BASE_EIO)
+        rc = err->code = BASE_EINVAL; /* the scene and its files are inputs */
+    return rc;
+}
+
+void pt_session_release(struct pt_session *s)
+{
+    pt_quote_destroy(s->quote);
+    pt_render_destroy(s->render);
+    pt_criterion_destroy(s->criterion);
+    pt_mask_release(&s->mask);
+    pt_scene_destroy(s->scene);
+    base_threads_destroy(s->threads);
+    base_inputs_release(&s->scene_files);
+    base_inputs_release(&s->judging);
+    pt_cli_release(&s->cli);
+}
+
+int pt_interrupted(void *data)
+{
+    (void)data;
+    return interrupt_seen != 0;
+}

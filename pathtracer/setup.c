@@ -1,0 +1,120 @@
+#include "setup.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "agree.h"
+#include "base/files.h"
+#include "render/host_find.h"
+
+/* The criterion when none is named. */
+static const char DEFAULT_CRITERION[] = "observer";
+
+void pt_setup_override(const struct pt_cli *cli, struct pt_integrator *i)
+{
+    i->seed = cli->seed;
+    if (cli->sampler >= 0)
+        i->sampler = cli->sampler;
+    if (cli->strategy >= 0)
+        i->strategy = cli->strategy;
+    if (cli->max_depth != PT_CLI_SCENES_DEPTH)
+        i->max_depth = cli->max_depth;
+    if (cli->filter >= 0) {
+        static const float usual_radius[3] = {0.5f, 1.0f, 1.5f};
+        i->filter = cli->filter;
+        i->filter_x = i->filter_y = cli->filter_radius > 0.0 ? (float)cli->filter_radius : usual_radius[cli->filter];
+        i->filter_sigma = 0.5f;
+    }
+}
+
+int pt_setup_config(const struct pt_session *s, struct pt_render_config *config, struct base_err *err)
+{
+    const struct pt_cli *cli = &s->cli;
+    *config = (struct pt_render_config){
+        .width = s->defaults.width,
+        .height = s->defaults.height,
+        .block_width = cli->block_width,
+        .block_height = cli->block_height,
+        .spp_min = cli->spp > 0 ? cli->spp : cli->spp_min,
+        .spp_max = cli->spp > 0 ? cli->spp : cli->spp_max,
+        .uniform = cli->spp > 0,
+        .time_budget_s = cli->time_budget_s,
+        .max_check_overhead = cli->max_check_overhead,
+        .max_seam = cli->max_seam,
+        .planes = cli->aov,
+        .integrator = s->defaults.integrator,
+        .order_seed = cli->order_seed,
+        .pilot_spp = cli->pilot_spp,
+        .pilot_s = cli->pilot_s,
+        .crew = s->crew,
+    };
+    memcpy(config->crop, cli->has_crop ? cli->crop : s->defaults.crop, sizeof config->crop);
+    pt_setup_override(cli, &config->integrator);
+    if (config->crop[2] > config->width || config->crop[3] > config->height)
+        return base_fail(err, BASE_EINVAL, "--crop %d,%d,%d,%d: the image has %dx%d pixels", config->crop[0],
+                         config->crop[1], config->crop[2], config->crop[3], config->width, config->height);
+    return 0;
+}
+
+int pt_setup_criterion(struct pt_session *s, struct base_err *err)
+{
+    const struct pt_cli *cli = &s->cli;
+    const char *spec = cli->criterion ? cli->criterion : DEFAULT_CRITERION;
+    if (!cli->criterion && cli->spp > 0)
+        return 0;
+    const struct lull_criterion *table;
+    int rc = pt_criterion_find(spec, &s->judging, pt_note, s, &table, err);
+    if (!rc)
+        rc = pt_criterion_create(table, cli->params, cli->param_count, s->threads, pt_note, s, &s->criterion, err);
+    if (rc || !cli->mask)
+        return rc;
+    rc = pt_mask_read(cli->mask, s->defaults.width, s->defaults.height, &s->mask, err);
+    if (!rc)
+        rc = base_inputs_add(&s->judging, cli->mask, err);
+    return rc ? rc : pt_criterion_set_mask(s->criterion, &s->mask, cli->params, cli->param_count, err);
+}
+
+/* Outputs that cannot be written, or that would overwrite what the image is made from, are found out before the work. */
+static int check_output(const struct pt_session *s, const char *path, struct base_err *err)
+{
+    int rc = base_file_check_output(path, err);
+    if (!rc)
+        rc = base_inputs_protect(&s->scene_files, path, err);
+    return rc ? rc : base_inputs_protect(&s->judging, path, err);
+}
+
+static int check_outputs(struct pt_session *s, struct base_err *err)
+{
+    struct pt_cli *cli = &s->cli;
+    if (!cli->quote && !cli->output && !cli->preview && !cli->report && cli->stop_map_count == 0) {
+        const char *slash = strrchr(cli->scene, '/'), *name = slash ? slash + 1 : cli->scene;
+        const char *dot = strrchr(name, '.');
+        int n = dot ? (int)(dot - name) : (int)strlen(name);
+        if (n > (int)sizeof s->default_output - 8)
+            return base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", cli->scene);
+        snprintf(s->default_output, sizeof s->default_output, "%.*s.exr", n, name);
+        cli->output = s->default_output;
+    }
+    const char *paths[] = {cli->output, cli->preview, cli->report, cli->checkpoint, cli->quote_map};
+    for (size_t i = 0; i < sizeof paths / sizeof paths[0]; i++)
+        if (check_output(s, paths[i], err) != 0)
+            return BASE_EINVAL;
+    for (int i = 0; i < cli->stop_map_count; i++)
+        if (check_output(s, cli->stop_maps[i], err) != 0)
+            return BASE_EINVAL;
+    return 0;
+}
+
+/* The render with its criterion, as the command line says. */
+int pt_setup_render(struct pt_session *s, struct base_err *err)
+{
+    struct pt_render_config config;
+    int rc = pt_setup_config(s, &config, err);
+    if (!rc)
+        rc = pt_setup_criterion(s, err);
+    if (!rc && (!s->peers || s->peers->rank == 0)) /* the others write nothing */
+        rc = check_outputs(s, err);
+    if (!rc)
+        rc = pt_agree_settings(s, &config, err);
+    return rc ? rc : pt_render_create(&config, s->scene, s->kernel, s->threads, s->criterion, &s->render, err);
+}
