@@ -43,7 +43,8 @@ LDFLAGS_ALL  = -pthread $(SAN_$(MODE)) $(LDFLAGS)
 EXR_CFLAGS  := $(shell $(PKG) --cflags OpenEXR 2>/dev/null)
 BLAS_CFLAGS := $(shell $(PKG) --cflags openblas 2>/dev/null)
 BASE_LIBS := -lcjson -lz -lm
-PT_LIBS  := -lembree3 -lOpenEXRCore-3_1 -lOpenImageIO -lOpenImageIO_Util -lcjson -lz -ldl -lstdc++ -lm
+PT_LIBS  := -lembree3 -lOpenEXRCore-3_1 -lcjson -lz -ldl -lm
+PT_IMAGE_LIBS := -lOpenImageIO -lOpenImageIO_Util -lstdc++# hundreds of libraries: the program loads them when it reads an image
 # MPI is optional and in a shared object of its own, so that programs run where it is not: MPI= leaves it out.
 MPI_PKG := $(firstword $(foreach p,ompi-c mpich,$(shell $(PKG) --exists $(p) 2>/dev/null && echo $(p))))
 MPI     ?= $(if $(MPI_PKG),1)
@@ -74,7 +75,8 @@ LOADER_SRC  := $(wildcard plugin-api/src/*.c)
 EXAMPLE_SRC := $(wildcard plugin-api/examples/*.c)
 TOOL_SRC    := $(wildcard plugin-api/tools/*.c)
 MPI_SRC     := $(wildcard plugin-api/mpi/*.c)
-PT_SRC      := $(wildcard pathtracer/*/*.c pathtracer/*/*.cpp)
+PT_SRC      := $(wildcard pathtracer/*/*.c)
+PT_IMAGES   := $(wildcard pathtracer/*/*.cpp)# in a shared object of their own; tests link them
 PT_MAIN     := $(wildcard pathtracer/*.c)
 GGN_SRC     := $(filter-out ggn/plugin/% ggn/study/% ggn/cli/%,$(wildcard ggn/*/*.c ggn/*/*.cpp))
 # What includes nn/real.h itself is compiled for float and, with GGN_DOUBLE, for double.
@@ -93,7 +95,8 @@ FUZZ_SRC    := $(filter-out tests/fuzz/replay.c,$(wildcard tests/fuzz/*.c))
 
 o = $(addprefix $(OBJ)/,$(addsuffix .o,$(1)) $(addsuffix .double.o,$(filter $(GGN_TWICE),$(1))))
 BASE_OBJ    := $(call o,$(BASE_SRC))
-PT_OBJ      := $(call o,$(PT_SRC)) $(BASE_OBJ)
+PT_CORE_OBJ := $(call o,$(PT_SRC)) $(BASE_OBJ)
+PT_OBJ      := $(PT_CORE_OBJ) $(call o,$(PT_IMAGES))
 LOADER_OBJ  := $(call o,$(LOADER_SRC))
 GGN_OBJ     := $(call o,$(GGN_SRC)) $(BASE_OBJ)
 GGN_PLUGIN_OBJ := $(call o,$(GGN_PLUGIN))
@@ -101,6 +104,7 @@ GGN_STUDY_OBJ := $(call o,$(GGN_STUDY))
 
 PROGRAMS := $(if $(PT_MAIN),$(BIN)/pathtracer) $(if $(GGN_CLI),$(BIN)/ggn) $(if $(TOOL_SRC),$(BIN)/lull-check)
 MPI_MODULE := $(if $(MPI),$(OUT)/lib/lull-mpi.so)# loaded only by processes that a launcher has started
+MODULES  := $(MPI_MODULE) $(OUT)/lib/lull-images.so
 CRITERIA := $(EXAMPLE_SRC:plugin-api/examples/%.c=$(LIB)/%.so) $(if $(GGN_PLUGIN),$(LIB)/ggn.so)
 TESTS    := $(patsubst tests/%.c,$(OUT)/tests/%,$(TEST_SRC))
 SANE     := $(patsubst tests/%.c,build/asan/tests/%,$(SANE_SRC))
@@ -111,7 +115,7 @@ FUZZERS  := $(patsubst tests/fuzz/%.c,build/fuzz/%,$(FUZZ_SRC))
 .PHONY: all demo test bench cost asan tsan fuzz mutants hdr-check abi-check install compdb clean help setup tests replay train-demo test-study test-hosts
 .SECONDARY:
 
-all: $(PROGRAMS) $(CRITERIA) $(MPI_MODULE) ## build the programs and the criteria
+all: $(PROGRAMS) $(CRITERIA) $(MODULES) ## build the programs and the criteria
 
 # --- compiling: one rule, flags by folder --------------------------------------------------------------------------------
 inc = $(or $(strip \
@@ -142,7 +146,7 @@ $(OBJ)/%.cpp.o: %.cpp
 link = @mkdir -p $(@D); echo "  LD   $@"; $(CC)
 so   = @mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--version-script=plugin-api/plugin.map -Wl,-z,defs
 
-$(BIN)/pathtracer: $(call o,$(PT_MAIN)) $(PT_OBJ) $(LOADER_OBJ)
+$(BIN)/pathtracer: $(call o,$(PT_MAIN)) $(PT_CORE_OBJ) $(LOADER_OBJ) | $(OUT)/lib/lull-images.so
 	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) -o $@
 $(BIN)/ggn: $(call o,$(GGN_CLI)) $(GGN_STUDY_OBJ) $(GGN_OBJ)
 	$(link) $^ $(LDFLAGS_ALL) $(STUDY_LIBS) $(GGN_LIBS) -o $@
@@ -151,10 +155,15 @@ $(OBJ)/base.a: $(BASE_OBJ)
 	@rm -f $@; echo "  AR   $@"; $(AR) rcs $@ $^
 $(BIN)/lull-check: $(call o,$(TOOL_SRC)) $(LOADER_OBJ) $(OBJ)/base.a
 	$(link) $^ $(LDFLAGS_ALL) -ldl -lm -o $@
+$(OUT)/lib/lull-images.so: $(call o,$(PT_IMAGES)) $(OBJ)/base.a
+	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--exclude-libs,ALL $^ $(LDFLAGS_ALL) $(PT_IMAGE_LIBS) -lz -lm -o $@
 $(OUT)/lib/lull-mpi.so: $(call o,$(MPI_SRC)) $(OBJ)/base.a
 	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--exclude-libs,ALL $^ $(LDFLAGS_ALL) $(MPI_LIBS) -lm -o $@
-$(LIB)/ggn.so: $(GGN_PLUGIN_OBJ) $(GGN_OBJ) plugin-api/plugin.map
-	$(so) $(filter %.o,$^) $(LDFLAGS_ALL) $(GGN_LIBS) -o $@
+# Of the networks the criteria take what they name: no image is read there, and no image library loaded.
+$(OBJ)/ggn.a: $(GGN_OBJ)
+	@rm -f $@; echo "  AR   $@"; $(AR) rcs $@ $^
+$(LIB)/ggn.so: $(GGN_PLUGIN_OBJ) $(OBJ)/ggn.a plugin-api/plugin.map
+	$(so) $(filter %.o %.a,$^) $(LDFLAGS_ALL) -Wl,--as-needed $(GGN_LIBS) -o $@
 $(LIB)/%.so: $(OBJ)/plugin-api/examples/%.c.o plugin-api/plugin.map
 	$(so) $(filter %.o,$^) $(LDFLAGS_ALL) -lm -o $@
 
@@ -165,7 +174,7 @@ SUPPORT_ggn := $(call o,$(filter-out tests/support/pt_%,$(wildcard tests/support
 SUPPORT_api := $(call o,$(filter-out tests/support/pt_% tests/support/ggn_%,$(wildcard tests/support/*.c)))
 define test_rules
 $(OUT)/tests/$(1)/pt_%: $(OBJ)/tests/$(1)/pt_%.c.o $(PT_OBJ) $(LOADER_OBJ) $(SUPPORT_pt)
-	$$(link) $$^ $$(LDFLAGS_ALL) $(PT_LIBS) -lcmocka -o $$@
+	$$(link) $$^ $$(LDFLAGS_ALL) $(PT_LIBS) $(PT_IMAGE_LIBS) -lcmocka -o $$@
 $(OUT)/tests/$(1)/ggn_%: $(OBJ)/tests/$(1)/ggn_%.c.o $(GGN_OBJ) $(SUPPORT_ggn)
 	$$(link) $$^ $$(LDFLAGS_ALL) $(GGN_LIBS) -lcmocka -o $$@
 $(OUT)/tests/$(1)/ggn_study%: $(OBJ)/tests/$(1)/ggn_study%.c.o $(GGN_STUDY_OBJ) $(GGN_OBJ) $(SUPPORT_ggn)
@@ -184,7 +193,7 @@ $(OUT)/tests/abi/plugins/%.so: $(OBJ)/tests/abi/plugins/%.c.o
 	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared $< $(LDFLAGS_ALL) -lm -o $@
 $(patsubst tests/%.c,$(OUT)/tests/%,$(wildcard tests/abi/api_*.c)): | $(ABI_PLUGINS) $(CRITERIA)
 $(OUT)/fuzz/replay-pt_%: $(OBJ)/tests/fuzz/pt_%.c.o $(OBJ)/tests/fuzz/replay.c.o $(PT_OBJ) $(LOADER_OBJ)
-	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) -o $@
+	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) $(PT_IMAGE_LIBS) -o $@
 $(OUT)/fuzz/replay-ggn_study%: $(OBJ)/tests/fuzz/ggn_study%.c.o $(OBJ)/tests/fuzz/replay.c.o $(GGN_STUDY_OBJ) $(GGN_OBJ)
 	$(link) $^ $(LDFLAGS_ALL) $(STUDY_LIBS) $(GGN_LIBS) -o $@
 $(OUT)/fuzz/replay-ggn_%: $(OBJ)/tests/fuzz/ggn_%.c.o $(OBJ)/tests/fuzz/replay.c.o $(GGN_OBJ)
@@ -193,7 +202,7 @@ $(OUT)/fuzz/replay-ggn_%: $(OBJ)/tests/fuzz/ggn_%.c.o $(OBJ)/tests/fuzz/replay.c
 # Measuring programs; scripts/bench runs them.
 BENCHES := $(patsubst tests/bench/%.c,$(OUT)/bench/%,$(wildcard tests/bench/*.c))
 $(OUT)/bench/pt_%: $(OBJ)/tests/bench/pt_%.c.o $(PT_OBJ) $(LOADER_OBJ) $(SUPPORT_pt)
-	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) -lcmocka -o $@
+	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) $(PT_IMAGE_LIBS) -lcmocka -o $@
 
 setup: ## install the Debian packages that are missing
 	@scripts/setup
@@ -229,7 +238,7 @@ fuzz: ## fuzz each target for FUZZ_SECONDS (default 60) under ASan+UBSan; needs 
 .PHONY: fuzzers
 fuzzers: $(FUZZERS)
 build/fuzz/pt_%: $(OBJ)/tests/fuzz/pt_%.c.o $(PT_OBJ) $(LOADER_OBJ)
-	$(link) -fsanitize=fuzzer $^ $(LDFLAGS_ALL) $(PT_LIBS) -o $@
+	$(link) -fsanitize=fuzzer $^ $(LDFLAGS_ALL) $(PT_LIBS) $(PT_IMAGE_LIBS) -o $@
 build/fuzz/ggn_study%: $(OBJ)/tests/fuzz/ggn_study%.c.o $(GGN_STUDY_OBJ) $(GGN_OBJ)
 	$(link) -fsanitize=fuzzer $^ $(LDFLAGS_ALL) $(STUDY_LIBS) $(GGN_LIBS) -o $@
 build/fuzz/ggn_%: $(OBJ)/tests/fuzz/ggn_%.c.o $(GGN_OBJ)
@@ -265,7 +274,7 @@ install: all ## install under $(DESTDIR)$(PREFIX)
 	    $(DESTDIR)$(PREFIX)/include/lull $(DESTDIR)$(PREFIX)/share/man/man1 $(DESTDIR)$(PREFIX)/share/man/man7
 	install -m 755 $(PROGRAMS) $(DESTDIR)$(PREFIX)/bin
 	install -m 755 $(CRITERIA) $(DESTDIR)$(PREFIX)/lib/lull
-	$(if $(MPI_MODULE),install -m 755 $(MPI_MODULE) $(DESTDIR)$(PREFIX)/lib)
+	install -m 755 $(MODULES) $(DESTDIR)$(PREFIX)/lib
 	install -m 644 plugin-api/include/lull/*.h $(DESTDIR)$(PREFIX)/include/lull
 	install -m 644 $(wildcard docs/man/*.1) $(DESTDIR)$(PREFIX)/share/man/man1
 	install -m 644 $(wildcard docs/man/*.7) $(DESTDIR)$(PREFIX)/share/man/man7
@@ -276,7 +285,7 @@ install: all ## install under $(DESTDIR)$(PREFIX)
 	sed 's|@PREFIX@|$(PREFIX)|g' plugin-api/lull-criterion.pc.in > $(DESTDIR)$(PREFIX)/lib/pkgconfig/lull-criterion.pc
 
 compdb: ## write compile_commands.json
-	@{ echo '['; sep=; for f in $(BASE_SRC) $(PT_SRC) $(PT_MAIN) $(GGN_SRC) $(GGN_PLUGIN) $(GGN_STUDY) $(GGN_CLI) $(LOADER_SRC) $(EXAMPLE_SRC) $(TOOL_SRC) $(MPI_SRC); do \
+	@{ echo '['; sep=; for f in $(BASE_SRC) $(PT_SRC) $(PT_IMAGES) $(PT_MAIN) $(GGN_SRC) $(GGN_PLUGIN) $(GGN_STUDY) $(GGN_CLI) $(LOADER_SRC) $(EXAMPLE_SRC) $(TOOL_SRC) $(MPI_SRC); do \
 	  printf '%s' "$$sep"; $(MAKE) --no-print-directory -s compdb-one F=$$f; sep=,; done; echo ']'; } > compile_commands.json
 .PHONY: compdb-one
 compdb-one:

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "base/json.h"
-#include "image/oiio.h"
+#include "base/png.h"
 #include "image/stopmap.h"
 #include "shade/bsdf_models.h"
 
@@ -288,7 +288,7 @@ int pt_quote_map(const char *path, const struct pt_quote *q, const struct pt_ren
     struct pt_stopmap map = {0};
     int rc = pt_stopmap_draw(b->x0, b->y0, b->x1, b->y1, list, b->count, minutes ? "min" : "s", &map, err);
     if (!rc)
-        rc = pt_oiio_write_png(path, map.width, map.height, 3, map.rgb, err);
+        rc = base_png_write(path, map.width, map.height, 3, map.rgb, err);
     pt_stopmap_release(&map);
     free(list);
     return rc;

@@ -2,8 +2,10 @@
 
 #include <pthread.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/colour.h"
+#include "base/png.h"
 
 void ggn_image8_release(struct ggn_image8 *image)
 {
@@ -15,6 +17,14 @@ void ggn_imagef_release(struct ggn_imagef *image)
 {
     free(image->data);
     *image = (struct ggn_imagef){0};
+}
+
+int ggn_image8_write_png(const char *path, const uint8_t *data, int width, int height, struct base_err *err)
+{
+    size_t length = strlen(path);
+    if (length < 4 || strcmp(path + length - 4, ".png") != 0)
+        return base_fail(err, BASE_EINVAL, "%s: a picture's name must end in .png", path);
+    return base_png_write(path, width, height, 3, data, err);
 }
 
 static float decode_table[256];

@@ -216,29 +216,3 @@ extern "C" int ggn_imagef_read_channel(const char *path, const char *channel, st
 {
     return guarded(path, err, [&] { return read_channel(path, channel, image, err); });
 }
-
-/* Encoded in memory and then written by us: OpenImageIO's PNG writer does not notice a disk that is full. */
-extern "C" int ggn_image8_write_png(const char *path, const uint8_t *data, int width, int height, struct base_err *err)
-{
-    size_t length = strlen(path);
-    if (length < 4 || strcmp(path + length - 4, ".png") != 0)
-        return base_fail(err, BASE_EINVAL, "%s: a picture's name must end in .png", path);
-    return guarded(path, err, [&] {
-        std::vector<unsigned char> bytes;
-        OIIO::Filesystem::IOVecOutput memory(bytes);
-        std::unique_ptr<OIIO::ImageOutput> out = OIIO::ImageOutput::create("png");
-        bool ok = out && out->set_ioproxy(&memory) && out->open(path, ImageSpec(width, height, 3, TypeDesc::UINT8)) &&
-                  out->write_image(TypeDesc::UINT8, data);
-        ok = out && out->close() && ok;
-        if (!ok) {
-            std::string why = out ? out->geterror() : "OpenImageIO was built without PNG";
-            return base_fail(err, BASE_EIO, "%s: %s", path, why.substr(0, why.find('\n')).c_str());
-        }
-        struct base_file_out file;
-        int rc = base_file_begin(&file, path, err);
-        if (rc)
-            return rc;
-        fwrite(bytes.data(), 1, bytes.size(), file.file);
-        return base_file_commit(&file, err);
-    });
-}

@@ -108,36 +108,7 @@ int check_png(const char *name, const unsigned char *data, size_t size, base_err
 
 } // namespace
 
-extern "C" int pt_oiio_read(const char *path, struct pt_oiio_image *out, struct base_err *err)
-{
-    try {
-        configure_once();
-        if (int rc = base_file_check_input(path, err))
-            return rc;
-        if (is_png(path)) {
-            char *data = nullptr;
-            size_t size = 0;
-            int rc = base_file_read(path, 1u << 30, &data, &size, err);
-            if (!rc)
-                rc = pt_oiio_read_memory(path, data, size, out, err);
-            std::free(data);
-            return rc;
-        }
-        const OIIO::ImageSpec config = raw_config();
-        std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::open(path, &config);
-        if (!input)
-            return base_fail(err, BASE_EINVAL, "%s: not an image that can be read: %s", path,
-                             one_line(OIIO::geterror()).c_str());
-        return read_pixels(*input, path, out, err);
-    } catch (const std::bad_alloc &) {
-        return base_fail_nomem(err, path);
-    } catch (const std::exception &e) {
-        return base_fail(err, BASE_EINVAL, "%s: %s", path, one_line(e.what()).c_str());
-    }
-}
-
-extern "C" int pt_oiio_read_memory(const char *name, const void *data, size_t size, struct pt_oiio_image *out,
-                                   struct base_err *err)
+static int read_memory(const char *name, const void *data, size_t size, struct pt_oiio_image *out, struct base_err *err)
 {
     try {
         configure_once();
@@ -168,41 +139,32 @@ extern "C" int pt_oiio_read_memory(const char *name, const void *data, size_t si
     }
 }
 
-extern "C" void pt_oiio_release(struct pt_oiio_image *image)
+static int read_file(const char *path, struct pt_oiio_image *out, struct base_err *err)
 {
-    std::free(image->u8);
-    std::free(image->f32);
-    *image = pt_oiio_image{};
-}
-
-/* Encoded in memory and then written by us: OpenImageIO's PNG writer does not notice a disk that is full. */
-extern "C" int pt_oiio_write_png(const char *path, int32_t width, int32_t height, int32_t channels, const uint8_t *pixels,
-                                 struct base_err *err)
-{
-    if (width < 1 || height < 1 || channels < 1 || channels > 4)
-        return base_fail(err, BASE_EINVAL, "%s: cannot write %dx%d pixels of %d channels as PNG", path, width, height,
-                         channels);
     try {
         configure_once();
-        std::vector<unsigned char> bytes;
-        OIIO::Filesystem::IOVecOutput memory(bytes);
-        std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create("png");
-        if (!output)
-            return base_fail(err, BASE_EIO, "%s: OpenImageIO was built without PNG", path);
-        OIIO::ImageSpec spec(width, height, channels, OIIO::TypeDesc::UINT8);
-        spec.attribute("oiio:ColorSpace", "sRGB");
-        if (channels == 4)
-            spec.attribute("oiio:UnassociatedAlpha", 1);
-        if (!output->set_ioproxy(&memory) || !output->open(path, spec) ||
-            !output->write_image(OIIO::TypeDesc::UINT8, pixels) || !output->close())
-            return base_fail(err, BASE_EIO, "%s: %s", path, one_line(output->geterror()).c_str());
-        struct base_file_out file;
-        int rc = base_file_begin(&file, path, err);
-        if (rc)
+        if (int rc = base_file_check_input(path, err))
             return rc;
-        fwrite(bytes.data(), 1, bytes.size(), file.file);
-        return base_file_commit(&file, err);
+        if (is_png(path)) {
+            char *data = nullptr;
+            size_t size = 0;
+            int rc = base_file_read(path, 1u << 30, &data, &size, err);
+            if (!rc)
+                rc = read_memory(path, data, size, out, err);
+            std::free(data);
+            return rc;
+        }
+        const OIIO::ImageSpec config = raw_config();
+        std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::open(path, &config);
+        if (!input)
+            return base_fail(err, BASE_EINVAL, "%s: not an image that can be read: %s", path,
+                             one_line(OIIO::geterror()).c_str());
+        return read_pixels(*input, path, out, err);
+    } catch (const std::bad_alloc &) {
+        return base_fail_nomem(err, path);
     } catch (const std::exception &e) {
-        return base_fail(err, BASE_EIO, "%s: %s", path, one_line(e.what()).c_str());
+        return base_fail(err, BASE_EINVAL, "%s: %s", path, one_line(e.what()).c_str());
     }
 }
+
+extern "C" const struct pt_oiio_library pt_oiio_library = {read_file, read_memory};

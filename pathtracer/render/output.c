@@ -8,10 +8,10 @@
 
 #include "base/colour.h"
 #include "base/files.h"
+#include "base/png.h"
 #include "base/text.h"
 #include "base/version.h"
 #include "image/exr.h"
-#include "image/oiio.h"
 #include "image/stopmap.h"
 
 int pt_output_has_ending(const char *path, const char *ending)
@@ -166,7 +166,7 @@ int pt_output_preview(const char *path, const struct pt_render *r, struct base_e
                 out[c] = base_srgb_code(rgb[c]);
         }
     }
-    int rc = pt_oiio_write_png(path, width, height, 3, pixels, err);
+    int rc = base_png_write(path, width, height, 3, pixels, err);
     free(pixels);
     return rc;
 }
@@ -183,7 +183,7 @@ static int stop_map_png(const char *path, const struct pt_render *r, struct base
     struct pt_stopmap map = {0};
     int rc = pt_stopmap_draw(b->x0, b->y0, b->x1, b->y1, list, b->count, "spp", &map, err);
     if (!rc)
-        rc = pt_oiio_write_png(path, map.width, map.height, 3, map.rgb, err);
+        rc = base_png_write(path, map.width, map.height, 3, map.rgb, err);
     pt_stopmap_release(&map);
     free(list);
     return rc;

@@ -1,19 +1,17 @@
 #include "base/peers.h"
 
-#include <dlfcn.h>
 #include <errno.h>
-#include <limits.h>
 #include <signal.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
+#include "base/module.h"
 #include "base/threads.h"
 
 /* The implementation's one symbol. */
 typedef int open_fn(struct base_peers **out, struct base_err *err);
-static const char MODULE[] = "../lib/lull-mpi.so"; /* from the program's folder */
+static const char MODULE[] = "lull-mpi.so";
 
 /* What launchers leave in the environment: Open MPI, any with PMIx, MPICH and Slurm. */
 static int was_launched(void)
@@ -32,27 +30,13 @@ static int launched_alone(void)
     return count && strcmp(count, "1") == 0;
 }
 
-/* Stays loaded until the program ends, as MPI wants it. */
-static void *module_symbol(const char *name)
-{
-    char path[PATH_MAX + sizeof MODULE];
-    ssize_t n = readlink("/proc/self/exe", path, PATH_MAX - 1);
-    if (n <= 0)
-        return NULL;
-    path[n] = '\0';
-    char *slash = strrchr(path, '/');
-    memcpy(slash ? slash + 1 : path, MODULE, sizeof MODULE);
-    void *module = dlopen(path, RTLD_NOW | RTLD_GLOBAL); /* GLOBAL: MPI libraries load parts of themselves */
-    return module ? dlsym(module, name) : NULL;
-}
-
 int base_peers_open(struct base_peers **out, struct base_err *err)
 {
     open_fn *open = NULL;
     *out = NULL;
     if (!was_launched() || launched_alone())
         return 0;
-    void *symbol = module_symbol("base_peers_open_mpi");
+    void *symbol = base_module_symbol(MODULE, "base_peers_open_mpi", 1); /* MPI libraries load parts of themselves */
     memcpy(&open, &symbol, sizeof open);
     if (!open)
         return base_fail(err, BASE_EINVAL, "started by an MPI launcher, but this program has no MPI (its lib/lull-mpi.so): "
@@ -108,7 +92,7 @@ int base_peers_find_dead(const struct base_peers *peers)
 const char *base_peers_version(void)
 {
     const char *(*version)(void) = NULL;
-    void *symbol = module_symbol("base_peers_version_mpi");
+    void *symbol = base_module_symbol(MODULE, "base_peers_version_mpi", 1);
     memcpy(&version, &symbol, sizeof version);
     return version ? version() : "none (built without it)";
 }

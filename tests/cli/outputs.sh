@@ -151,5 +151,13 @@ if [ -c /dev/full ]; then
     full "$bin/lull-check" --version
 fi
 
+# --- pictures: the image library is loaded by who reads one ---
+mkdir -p alone/bin && cp "$P" alone/bin
+t "a scene without pictures is rendered without the image library" alone/bin/pathtracer room.pbrt -q --spp 1 --preview plain.png
+t "  …and its preview is a PNG" oiiotool --info plain.png
+refused "a.png: images cannot be read: lib/lull-images.so" alone/bin/pathtracer textured.pbrt -q --spp 1 --preview b.png
+mkdir alone/lib && cp "$bin/../lib/lull-images.so" alone/lib
+t "  …which is found beside the program" alone/bin/pathtracer textured.pbrt -q --spp 1 --preview b.png
+
 echo "1..$n"
 exit $bad

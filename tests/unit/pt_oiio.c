@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include "base/files.h"
+#include "base/png.h"
 #include "image/oiio.h"
 
 static char dir[] = "/tmp/pt_oiio_XXXXXX";
@@ -42,7 +43,7 @@ static void png_round_trip(void **state)
     char path[64];
     snprintf(path, sizeof path, "%s/a.png", dir);
     struct base_err err = {0};
-    assert_int_equal(pt_oiio_write_png(path, W, H, C, pixels, &err), 0);
+    assert_int_equal(base_png_write(path, W, H, C, pixels, &err), 0);
     struct pt_oiio_image image = {0};
     assert_int_equal(pt_oiio_read(path, &image, &err), 0);
     assert_int_equal(image.width, W);
@@ -68,6 +69,31 @@ static void png_round_trip(void **state)
     free(data);
 }
 
+/* More than one chunk, rows of every filter's edge, each number of channels: OpenImageIO reads back what was written. */
+static void png_of_many_sizes(void **state)
+{
+    (void)state;
+    enum { W = 301, H = 203, C = 4 };
+    static uint8_t pixels[W * H * C];
+    uint32_t random = 1;
+    char path[64];
+    snprintf(path, sizeof path, "%s/a.png", dir);
+    for (int i = 0; i < W * H * C; i++)
+        pixels[i] = (uint8_t)((random = random * 1664525u + 1013904223u) >> 24);
+    for (int channels = 1; channels <= C; channels++) {
+        int width = channels == 2 ? 1 : W;
+        struct base_err err = {0};
+        struct pt_oiio_image image = {0};
+        assert_int_equal(base_png_write(path, width, H, channels, pixels, &err), 0);
+        assert_int_equal(pt_oiio_read(path, &image, &err), 0);
+        assert_int_equal(image.width, width);
+        assert_int_equal(image.height, H);
+        assert_int_equal(image.channels, channels);
+        assert_memory_equal(image.u8, pixels, (size_t)(width * H * channels));
+        pt_oiio_release(&image);
+    }
+}
+
 static void refusals(void **state)
 {
     (void)state;
@@ -84,12 +110,13 @@ static void refusals(void **state)
     assert_int_equal(pt_oiio_read(path, &image, &err), BASE_EINVAL);
     assert_null(strchr(err.text, '\n'));
     uint8_t pixel[3] = {1, 2, 3};
-    assert_int_equal(pt_oiio_write_png("/nonexistent/x.png", 1, 1, 3, pixel, &err), BASE_EIO);
-    assert_int_equal(pt_oiio_write_png(path, 0, 1, 3, pixel, &err), BASE_EINVAL);
+    assert_int_equal(base_png_write("/nonexistent/x.png", 1, 1, 3, pixel, &err), BASE_EIO);
+    assert_int_equal(base_png_write(path, 0, 1, 3, pixel, &err), BASE_EINVAL);
 }
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(png_round_trip), cmocka_unit_test(refusals)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(png_round_trip), cmocka_unit_test(png_of_many_sizes),
+                                       cmocka_unit_test(refusals)};
     return cmocka_run_group_tests(tests, make_dir, remove_dir);
 }
