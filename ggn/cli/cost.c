@@ -172,6 +172,17 @@ static void put_threshold(struct job *j, cJSON *to, const struct ggn_curve *c)
                      &j->failed);
 }
 
+/* The list of a scene's parts of `side` pixels, empty when nothing has been put into it. */
+static cJSON *parts_of(struct job *j, cJSON *to, const char *scene, int side)
+{
+    char key[16];
+    snprintf(key, sizeof key, "%d", side);
+    cJSON *sides = cJSON_GetObjectItemCaseSensitive(to, scene);
+    sides = sides ? sides : base_json_object(to, scene, &j->failed);
+    cJSON *parts = cJSON_GetObjectItemCaseSensitive(sides, key);
+    return parts ? parts : base_json_array(sides, key, &j->failed);
+}
+
 /* Thresholds of every square of `side` pixels that a block divides into. */
 static int put_parts(struct job *j, cJSON *to, const struct seq_block *p, int side, struct base_err *err)
 {
@@ -205,8 +216,6 @@ static int four_at(const struct seq_manifest *m, int x, int y, int side, uint32_
 static int put_joined(struct job *j, cJSON *to, const struct ggn_dataset_view *v, struct base_err *err)
 {
     const int side = j->set.chains.width;
-    char key[16];
-    snprintf(key, sizeof key, "%d", 2 * side);
     for (int y = 0; y + 2 * side <= (int)v->manifest.height; y += 2 * side)
         for (int x = 0; x + 2 * side <= (int)v->manifest.width; x += 2 * side) {
             struct seq_block four[4];
@@ -218,9 +227,7 @@ static int put_joined(struct job *j, cJSON *to, const struct ggn_dataset_view *v
             for (; read < 4 && !rc; read += !rc)
                 rc = seq_manifest_read_block(v->dir, &v->manifest, index[read], &four[read], err);
             if (!rc && !(rc = ggn_curve_joined(four, 2, 2, &c, err))) {
-                cJSON *scene = cJSON_GetObjectItemCaseSensitive(to, v->manifest.scene);
-                cJSON *parts = cJSON_GetObjectItemCaseSensitive(scene, key);
-                put_threshold(j, parts ? parts : base_json_array(scene, key, &j->failed), &c);
+                put_threshold(j, parts_of(j, to, v->manifest.scene, 2 * side), &c);
                 ggn_curve_release(&c);
             }
             while (read > 0)
@@ -247,15 +254,8 @@ static int put_sizes(struct job *j, cJSON *root, struct base_err *err)
         rc = seq_manifest_read_block(v->dir, &v->manifest, e->index, &p, err);
         if (rc)
             return rc;
-        cJSON *scene = cJSON_GetObjectItemCaseSensitive(to, v->manifest.scene);
-        for (size_t i = 0; i < sizeof sides / sizeof sides[0] && !rc; i++) {
-            char key[16];
-            snprintf(key, sizeof key, "%d", sides[i]);
-            if (!scene)
-                scene = base_json_object(to, v->manifest.scene, &j->failed);
-            cJSON *parts = cJSON_GetObjectItemCaseSensitive(scene, key);
-            rc = put_parts(j, parts ? parts : base_json_array(scene, key, &j->failed), &p, sides[i], err);
-        }
+        for (size_t i = 0; i < sizeof sides / sizeof sides[0] && !rc; i++)
+            rc = put_parts(j, parts_of(j, to, v->manifest.scene, sides[i]), &p, sides[i], err);
         seq_block_release(&p);
     }
     for (int v = 0; v < s->chains.data.n && !rc; v++)

@@ -58,6 +58,17 @@ P
 check "scores of a network's windows, nothing else" $([ $? = 0 ] && echo 1)
 run -d $data --split train --scores --precision f64 -m ggn/models/lull-2.ggn
 check "double precision of blocks that are not the network's size: one line and exit 2" $([ $rc = 2 ] && one_line && grep -q "network's size, 200x200" "$tmp/err" && echo 1)
+mkdir -p "$tmp/whole/train" && cp -R $data/scene? "$tmp/whole/train" || exit 2
+${BUILD:-build}/bin/pathtracer -q tests/cli/room.pbrt --name room --size 80x80 --block 40 --sampler independent --levels geometric:4:16:1.26 \
+    --sequence "$tmp/whole/train/room" && "$ggn" label "$tmp/whole/train/room" >/dev/null
+run -d "$tmp/whole" --split train --sizes --no-quality -o "$tmp/sizes.json"
+run -d "$tmp/whole" --split train --sizes --recorded --no-quality -o "$tmp/known.json" && python3 - "$tmp/sizes.json" "$tmp/known.json" >"$tmp/err" 2>&1 <<'P'
+import json, sys
+whole, known = (json.load(open(f))["parts"]["room"] for f in sys.argv[1:])
+assert len(whole["25"]) == 4 and len(whole["80"]) == 1 and min(whole["25"]) < whole["80"][0] < max(whole["25"]), whole
+assert "25" not in known and known["80"] == whole["80"], known
+P
+check "other block sizes, joined ones of blocks still noisy at the end too" $([ $? = 0 ] && echo 1)
 echo 'other_part6;100;200;300' >"$tmp/thresholds.csv"
 run -d $data --split train --thresholds "$tmp/thresholds.csv"
 check "thresholds of other views: one line and exit 2" $([ $rc = 2 ] && one_line && grep -q "thresholds.csv" "$tmp/err" && echo 1)
