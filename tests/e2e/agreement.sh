@@ -11,12 +11,14 @@ check() { # check NAME STATUS
     n=$((n + 1))
     if [ "$2" -eq 0 ]; then echo "ok $n - $1"; else echo "not ok $n - $1"; tail -n 12 "$tmp/err" "$tmp/table" 2>/dev/null | sed 's/^/# /'; bad=1; fi
 }
-agreement() { scripts/agreement --human "$tmp/human" --observer "$tmp/o.json" --out "$tmp/out" "$@" >"$tmp/table" 2>"$tmp/err"; }
-record() { # record FOLDER NAME SEED REFERENCE-SPP SCENE
-    "$BUILD/bin/pathtracer" -q "$5" --size 400x200 --sampler independent --levels geometric:4:24:1.3 --seed "$3" \
-        --reference-spp "$4" --sequence "$1" --name "$2" >"$tmp/table" 2>"$tmp/err"
+agreement() { scripts/agreement --human "$tmp/human" --rendered "$tmp/rendered" --observer "$tmp/o.json" --out "$tmp/out" "$@" >"$tmp/table" 2>"$tmp/err"; }
+record() { # record FOLDER NAME SEED REFERENCE-SPP SCENE [OPTION ...]
+    folder=$1 name=$2 seed=$3 reference=$4 scene=$5
+    shift 5
+    "$BUILD/bin/pathtracer" -q "$scene" --size 400x200 --sampler independent --levels geometric:4:24:1.3 --seed "$seed" \
+        --reference-spp "$reference" --sequence "$folder" --name "$name" "$@" >"$tmp/table" 2>"$tmp/err"
 }
-mkdir -p "$tmp/human/views" "$tmp/data/test"
+mkdir -p "$tmp/human/views" "$tmp/data/test" "$tmp/rendered"
 record "$tmp/human/views/one" one 1 0 tests/cli/room.pbrt && record "$tmp/human/views/two" two 2 0 tests/cli/room.pbrt && record "$tmp/data/test/room" room 3 0 tests/cli/room.pbrt &&
     record "$tmp/data/test/sky" sky 3 64 scenes/bright-sky.pbrt
 check "recorded" $?
@@ -49,6 +51,16 @@ for line, row in zip(lines, (r["observer"] for r in rows)):
 assert rows[2]["observer"]["samples_ratio"] < rows[1]["observer"]["samples_ratio"], "half of the viewers cost no less than three quarters"
 EOF
 check "the figures are those of ggn evaluate, and the dial turns" $?
+record "$tmp/rendered/two" two 5 0 tests/cli/room.pbrt --levels geometric:4:60:1.3 --blocks 1 && agreement --data "$tmp/none" &&
+    [ "$(grep -c 'Against' "$tmp/table")" -eq 3 ] && [ "$(grep -c '^| 1 blocks, 1 censored ' "$tmp/table")" -eq 2 ] &&
+    [ "$(grep -c '^| observer |' "$tmp/table")" -eq 3 ] && [ "$(grep -c '^| halfbuf |' "$tmp/table")" -eq 1 ]
+check "rendered blocks of people's views beside the same blocks made from halves" $?
+python3 - "$tmp/out" <<'EOF' 2>"$tmp/err"
+import json, sys
+rendered, made = (json.load(open(f"{sys.argv[1]}/{k}/people/two/manifest.json")) for k in ("rendered", "made"))
+assert [b["id"] for b in rendered["blocks"]] == [b["id"] for b in made["blocks"]] == [1] and rendered["levels"][-1] > made["levels"][-1]
+EOF
+check "each from its own recordings" $?
 rm "$tmp/human/human-thresholds.csv"
 ! agreement && [ "$(wc -l <"$tmp/err")" -eq 1 ] && grep -q 'no thresholds of people there' "$tmp/err"
 check "no people" $?
