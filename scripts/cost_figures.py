@@ -21,9 +21,14 @@ def mean(values):
     return statistics.fmean(values) if values else math.nan
 
 
+def bare(criterion):
+    """Without what it went without."""
+    return criterion.replace(", no guard", "").replace(", no halves", "")
+
+
 def price_of(out, criterion):
     prices = out.get("prices", {})
-    name = criterion.replace(", no guard", "")
+    name = bare(criterion)
     return prices.get(name, {"check_s": 0.0})["check_s"] if name != "limit" else 0.0
 
 
@@ -40,7 +45,7 @@ def points_in(out, data):
     for p in data["points"]:
         full = price_of(out, p["criterion"])
         cheap = price_of(out, "variance")
-        network = out.get("networks", {}).get(p["criterion"].replace(" bf16", ""))
+        network = out.get("networks", {}).get(bare(p["criterion"]).replace(" bf16", ""))
         scenes = {}
         for scene, f in named(p["scenes"]).items():
             f["check_s"] = f["checks_full"] * full + f["checks_cheap"] * cheap

@@ -305,7 +305,7 @@ def page(out):
     text = INTRO % out
     test = points_of(out, "test")
     mine, networks = shipped(out), [n for n in out["networks"] if not n.startswith("window")]
-    criteria = ("uniform", "fixed", "variance", "halfbuf", "variance, no guard", "halfbuf, no guard", "observer", mine, mine + " bf16",
+    criteria = ("uniform", "fixed", "variance", "halfbuf", "variance, no guard", "halfbuf, no guard", "observer", mine, mine + ", no halves", mine + " bf16",
                 *networks[1:], *BASELINES)
     shown = lambda points: table(HEADS, [row_of(p) for p in points if p[0] == "limit"] + setting_rows(points, criteria))
     commits = ", ".join("%s of %s" % (n, c) for n, c in out.get("commits", {}).items() if c)
@@ -389,14 +389,13 @@ def final(p):
 
 
 def without_halves(out):
-    """Settings for hosts without half buffers: a network that takes no noise picture, without the guard that looks at them."""
-    networks = out.get("networks", {})
+    """Settings for hosts without half buffers: a network judges without noise picture and guard there."""
+    networks = set(out.get("networks", {}))
+    return lambda p: not p[0].startswith(("halfbuf", "observer")) and p[0].replace(" bf16", "") not in networks
 
-    def allowed(p):
-        if p[0] in networks:
-            return not networks[p[0]]["picture"] and p[1] == "guard"
-        return not p[0].startswith(("halfbuf", "observer")) and not p[0].endswith(" bf16")
-    return allowed
+
+def with_halves(p):
+    return not p[0].endswith(", no halves")
 
 
 def best(points, holds, allowed, us=None):
@@ -422,12 +421,12 @@ def choice(out):
     people = points_of(out, "people") if "people" in out["sets"] else []
     against = lambda p: over_scenes(p, "early", mean) <= 0.05
     for points, purpose, holds, allowed, us in (
-            (people, "against people: at most 5 % of the blocks early", against, lambda p: True, None),
+            (people, "against people: at most 5 % of the blocks early", against, with_halves, None),
             (people, "the same, no half buffers", against, without_halves(out), None),
-            (test, "a draft: no block shows more than twice what is just visible", draft, lambda p: True, None),
-            (test, "a final frame: at most 5 % of the blocks early, 10 % noisy, the median scene's worst at what is just visible", final, lambda p: True, None),
-            (test, "the same, a cheap scene (0.05 µs per path)", final, lambda p: True, 0.05),
-            (test, "the same, a slow renderer (20 µs per path)", final, lambda p: True, 20),
+            (test, "a draft: no block shows more than twice what is just visible", draft, with_halves, None),
+            (test, "a final frame: at most 5 % of the blocks early, 10 % noisy, the median scene's worst at what is just visible", final, with_halves, None),
+            (test, "the same, a cheap scene (0.05 µs per path)", final, with_halves, 0.05),
+            (test, "the same, a slow renderer (20 µs per path)", final, with_halves, 20),
             (test, "the same, no half buffers", final, without_halves(out), None),
             (test, "the same, nothing but the colour", final, lambda p: without_halves(out)(p) and not p[0].startswith("variance"), None)):
         found = best(points, holds, allowed, us)
@@ -456,7 +455,7 @@ def worst_table(points):
     """Where each default fails: the scene on which it leaves most noise, and the one on which it wastes most."""
     rows = []
     for p in points:
-        if not is_default(p) or p[0] in ("uniform", "limit") or p[0].startswith("window") or p[0].endswith(" bf16"):
+        if not is_default(p) or p[0] in ("uniform", "limit") or p[0].startswith("window") or p[0].endswith((" bf16", ", no halves")):
             continue
         early = max(p[3].items(), key=lambda s: s[1]["worst"])
         late = max(p[3].items(), key=lambda s: s[1]["to_limit"])

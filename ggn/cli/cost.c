@@ -19,7 +19,8 @@ enum { MAX_FILES = 16 };
 
 struct options {
     const char *data, *out, *observer, *models[MAX_FILES], *baselines[MAX_FILES], *thresholds[MAX_FILES];
-    int n_models, n_baselines, n_thresholds, split, threads, no_quality, recorded, sizes, scores, precision;
+    int n_models, n_baselines, n_thresholds, split, threads, no_quality, recorded, sizes, scores, precision,
+        no_pictures;
     double ratio, cadence;
 };
 
@@ -68,6 +69,8 @@ static const struct base_option list[] = {
     {"precision", 0, NULL, TO(precision), .words = precisions, .help = "of the networks' arithmetic (f32)"},
     {"scores", 0, NULL, TO(scores), .help = "of the networks' own settings only: p of every window, and the stops"},
     {"recorded", 0, NULL, TO(recorded), .help = "recorded levels only; blocks that show noise in the last one are left out"},
+    {"no-pictures", 0, NULL, TO(no_pictures),
+     .help = "networks as in a host without half buffers: no noise pictures, no tail guard"},
     {"no-quality", 0, NULL, TO(no_quality), .help = "skip FLIP"},
     {"sizes", 0, NULL, TO(sizes), .help = "also thresholds of the blocks' parts, as of smaller blocks"},
     {"threads", 't', "N", TO(threads), 1, 1024, .help = "worker threads (all processors)"},
@@ -397,13 +400,15 @@ static int cost_models(struct job *j, struct base_threads *threads, struct base_
         struct ggn_method m;
         const char *slash = strrchr(j->o->models[i], '/');
         char name[GGN_METHOD_NAME];
-        snprintf(name, sizeof name, "%.40s%s%s", slash ? slash + 1 : j->o->models[i], j->o->precision ? " " : "",
-                 j->o->precision ? precisions[j->o->precision] : "");
+        snprintf(name, sizeof name, "%.32s%s%s%s", slash ? slash + 1 : j->o->models[i], j->o->precision ? " " : "",
+                 j->o->precision ? precisions[j->o->precision] : "", j->o->no_pictures ? ", no halves" : "");
         rc = ggn_model_load(j->o->models[i], &model, err);
         if (!rc)
             rc = ggn_policy_of(model, &policy, err);
         if (j->o->cadence > 0)
             policy.ratio = j->o->cadence;
+        if (j->o->no_pictures)
+            ggn_policy_without_halves(&policy);
         if (!rc)
             rc = ggn_eval_trained(&m, &j->set, model, &policy, name, (enum ggn_precision)j->o->precision, threads, err);
         if (!rc) {
@@ -484,7 +489,7 @@ static int look_at_models(const struct options *o, int *pictures, int *window, s
         struct ggn_model *model = NULL;
         rc = ggn_model_load(o->models[i], &model, err);
         if (!rc) {
-            *pictures |= model->hyper.picture;
+            *pictures |= model->hyper.picture && !o->no_pictures;
             *window = model->hyper.window > *window ? model->hyper.window : *window;
         }
         ggn_model_destroy(model);

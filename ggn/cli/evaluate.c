@@ -102,7 +102,7 @@ static const struct base_option list[] = {
      .help = "judge with bfloat16 products too: one more method per model, whose changed decisions are counted"},
     {"no-quality", 0, NULL, TO(no_quality), .help = "skip FLIP and SSIM at the stop"},
     {"no-pictures", 0, NULL, TO(no_pictures),
-     .help = "judge as in a host without half buffers: models get no noise pictures"},
+     .help = "judge as in a host without half buffers: models get no noise pictures and no tail guard"},
     {"baselines", 0, NULL, TO(baselines),
      .help = "train the published baselines on the training scenes and measure them too (minutes)"},
     {"epochs", 0, "N", TO(epochs), 1, 1024, .help = "epochs of the LSTM baseline (15)"},
@@ -163,6 +163,8 @@ static void adjust(const struct options *o, struct ggn_policy *policy)
         policy->threshold = o->visible;
     for (int i = 0; i < o->n_adjusted; i++)
         ggn_policy_adjust(policy, o->adjusted[i].name, o->adjusted[i].value);
+    if (o->no_pictures)
+        ggn_policy_without_halves(policy);
 }
 
 static int add_baseline_file(struct job *j, const char *path, struct base_threads *threads, struct base_err *err)

@@ -84,6 +84,11 @@ int ggn_policy_tail_holds(const struct ggn_policy *p, double tail999, double gin
     return (p->tail999 > 0 && tail999 > p->tail999) || (p->gini > 0 && gini > p->gini && tail999 > CALM_TAIL);
 }
 
+void ggn_policy_without_halves(struct ggn_policy *p)
+{
+    p->tail999 = p->gini = 0;
+}
+
 double ggn_policy_p(const struct ggn_policy *p, double logit)
 {
     /* an error costs time, never quality */

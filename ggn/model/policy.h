@@ -40,6 +40,8 @@ double ggn_policy_predict(const struct ggn_policy *policy, double p, double thre
  * alone says nothing where even the noisiest pixels are calm: a block that is half sky has a large Gini coefficient for
  * ever. */
 int ggn_policy_tail_holds(const struct ggn_policy *policy, double tail999, double gini);
+/* What is left of a policy in a host without half buffers: no tail guard. */
+void ggn_policy_without_halves(struct ggn_policy *policy);
 
 /* What the model says, defaults elsewhere. BASE_EINVAL when a field is out of range. */
 int ggn_policy_of(const struct ggn_model *model, struct ggn_policy *policy, struct base_err *err);

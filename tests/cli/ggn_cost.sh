@@ -56,6 +56,16 @@ assert len(p["scores"]) == windows and 0 < p["cut"] < 1 and all(x is None or 0 <
 assert any(x is not None for x in p["scores"])
 P
 check "scores of a network's windows, nothing else" $([ $? = 0 ] && echo 1)
+run -d $data --split train --no-pictures --recorded --no-quality -m ggn/models/lull-2.ggn -o "$tmp/blind.json"
+run -d $data --split train --recorded --no-quality -m ggn/models/lull-2.ggn -o "$tmp/seeing.json" && python3 - "$tmp/blind.json" "$tmp/seeing.json" >"$tmp/err" 2>&1 <<'P'
+import json, sys
+def spent(file, name):
+    points = [p for p in json.load(open(file))["points"] if p["criterion"] == name]
+    return {(p["dial"], p["value"]): [s["samples"] for s in p["scenes"].values()] for p in points}
+blind, seeing = spent(sys.argv[1], "lull-2.ggn, no halves"), spent(sys.argv[2], "lull-2.ggn")
+assert len(blind) > 10 and blind.keys() == seeing.keys() and blind != seeing
+P
+check "without half buffers a network judges otherwise, and is named so" $([ $? = 0 ] && echo 1)
 run -d $data --split train --scores --precision f64 -m ggn/models/lull-2.ggn
 check "double precision of blocks that are not the network's size: one line and exit 2" $([ $rc = 2 ] && one_line && grep -q "network's size, 200x200" "$tmp/err" && echo 1)
 mkdir -p "$tmp/whole/train" && cp -R $data/scene? "$tmp/whole/train" || exit 2

@@ -62,6 +62,11 @@ replay "neither" visible=0.6 first-spp=4 tail=0 gini=0 gate=0
     [ "$(awk '$2 < 250' "$tmp/both" | wc -l)" -ge 3 ] && [ "$(awk '$2 == 250' "$tmp/both" | wc -l)" -ge 1 ]
 check "gate and guard change stops, and blocks stop or do not" $?
 
+"$build/bin/ggn" evaluate --data "$tmp/data" --model "$tmp/tiny.ggn" --no-pictures -p visible=0.6 -p first-spp=4 -p tail=0.6 --recorded \
+    --no-quality -o "$tmp/out" >"$tmp/log" 2>"$tmp/err" &&
+    awk -F';' "NR > 1 { \$1 = \$2; \$2 = \$5; \$3 = \$6 } NR > 1 { $numbers }" "$tmp"/out/*-stops-tinyggn.csv | diff "$tmp/no-guard" - >"$tmp/err"
+check "--no-pictures: as in a host without half buffers no guard holds a block back" $?
+
 # The baselines likewise: their criteria and their evaluation are one. A window of evaluation has six images, so that an SVM,
 # which looks at one, is asked from the sixth level on.
 baseline() { # baseline NAME METHOD PARAMETERS
