@@ -17,12 +17,6 @@ struct pt_place {
     int32_t primitive;
 };
 
-static inline pt_vec3 pt_vertex(const float *data, uint32_t i)
-{
-    data += 3 * (size_t)i;
-    return v3(data[0], data[1], data[2]);
-}
-
 static inline pt_vec3 pt_corners_mix(pt_vec3 a, pt_vec3 b, pt_vec3 c, float u, float v)
 {
     return v3_madd(v3_madd(v3_scale(a, 1.0f - u - v), u, b), v, c);
@@ -38,33 +32,40 @@ static inline float pt_max3_abs(float a, float b, float c)
     return a > c ? a : c;
 }
 
-static inline void pt_place_uv(const struct pt_mesh *mesh, const uint32_t *index, float u, float v, struct pt_surface *s)
+/* The corners of a hit triangle. */
+struct pt_corners {
+    const struct pt_vertex *a, *b, *c;
+};
+
+static inline struct pt_corners pt_mesh_corners(const struct pt_mesh *mesh, int32_t triangle)
 {
-    if (!mesh->uvs) { /* (0,0), (1,0), (1,1) */
+    const uint32_t *index = mesh->indices + 3 * (size_t)triangle;
+    return (struct pt_corners){mesh->vertices + index[0], mesh->vertices + index[1], mesh->vertices + index[2]};
+}
+
+static inline void pt_place_uv(const struct pt_mesh *mesh, struct pt_corners k, float u, float v, struct pt_surface *s)
+{
+    if (!mesh->has_uvs) { /* (0,0), (1,0), (1,1) */
         s->u = u + v;
         s->v = v;
         return;
     }
-    const float *a = mesh->uvs + 2 * (size_t)index[0], *b = mesh->uvs + 2 * (size_t)index[1],
-        *c = mesh->uvs + 2 * (size_t)index[2];
     float w = 1.0f - u - v;
-    s->u = w * a[0] + u * b[0] + v * c[0];
-    s->v = w * a[1] + u * b[1] + v * c[1];
+    s->u = w * k.a->u + u * k.b->u + v * k.c->u;
+    s->v = w * k.a->v + u * k.b->v + v * k.c->v;
 }
 
 /* Tangents from positions and texture coordinates (Pharr, Jakob & Humphreys 2016, §3.6.2); zero when those are
  * degenerate. */
-static inline void pt_place_tangents(const struct pt_mesh *mesh, const uint32_t *index, pt_vec3 e1, pt_vec3 e2,
-                                     struct pt_surface *s)
+static inline void pt_place_tangents(const struct pt_mesh *mesh, struct pt_corners k, struct pt_surface *s)
 {
+    pt_vec3 e1 = v3_sub(k.b->p, k.a->p), e2 = v3_sub(k.c->p, k.a->p);
     float u1 = 1.0f, v1 = 0.0f, u2 = 1.0f, v2 = 1.0f;
-    if (mesh->uvs) {
-        const float *a = mesh->uvs + 2 * (size_t)index[0], *b = mesh->uvs + 2 * (size_t)index[1];
-        const float *c = mesh->uvs + 2 * (size_t)index[2];
-        u1 = b[0] - a[0];
-        v1 = b[1] - a[1];
-        u2 = c[0] - a[0];
-        v2 = c[1] - a[1];
+    if (mesh->has_uvs) {
+        u1 = k.b->u - k.a->u;
+        v1 = k.b->v - k.a->v;
+        u2 = k.c->u - k.a->u;
+        v2 = k.c->v - k.a->v;
     }
     float det = u1 * v2 - u2 * v1;
     if (det == 0.0f) {
@@ -81,27 +82,25 @@ static inline void pt_place_mesh(pt_effects fx, const struct pt_scene *scene, co
 {
     const struct pt_shape *shape = at->shape;
     const struct pt_mesh *mesh = &scene->meshes[shape->data];
-    const uint32_t *index = mesh->indices + 3 * (size_t)hit->primitive;
-    pt_vec3 a = pt_vertex(mesh->positions, index[0]), b = pt_vertex(mesh->positions, index[1]);
-    pt_vec3 c = pt_vertex(mesh->positions, index[2]);
+    const struct pt_corners k = pt_mesh_corners(mesh, hit->primitive);
+    pt_vec3 a = k.a->p, b = k.b->p, c = k.c->p;
     struct pt_surface *s = &at->s;
     at->p = pt_corners_mix(a, b, c, hit->u, hit->v);
     at->error = v3_scale(v3(pt_max3_abs(a.x, b.x, c.x), pt_max3_abs(a.y, b.y, c.y), pt_max3_abs(a.z, b.z, c.z)),
                          PT_OFFSET_ERROR);
     pt_vec3 n = v3_norm(hit->geometric);
-    if (mesh->normals) {
-        pt_vec3 ns = v3_norm(pt_corners_mix(pt_vertex(mesh->normals, index[0]), pt_vertex(mesh->normals, index[1]),
-                                            pt_vertex(mesh->normals, index[2]), hit->u, hit->v));
+    if (mesh->has_normals) {
+        pt_vec3 ns = v3_norm(pt_corners_mix(k.a->n, k.b->n, k.c->n, hit->u, hit->v));
         s->n_shading = v3_is_black(ns) ? n : ns;
         s->n_geometric = v3_dot(s->n_shading, n) < 0.0f ? v3_neg(n) : n;
     } else {
         s->n_geometric = s->n_shading = shape->flip_normal ? v3_neg(n) : n;
     }
     if (fx & (PT_FX_TEXTURE | PT_FX_ALPHA | PT_FX_BUMP))
-        pt_place_uv(mesh, index, hit->u, hit->v, s);
+        pt_place_uv(mesh, k, hit->u, hit->v, s);
     const struct pt_material *m = &scene->materials[shape->material];
     if ((fx & (PT_FX_BUMP | PT_FX_GLOSSY | PT_FX_MIX)) && (m->kind == PT_MATERIAL_MIX || pt_material_needs_tangents(fx, m)))
-        pt_place_tangents(mesh, index, v3_sub(b, a), v3_sub(c, a), s);
+        pt_place_tangents(mesh, k, s);
 }
 
 static inline void pt_place_quadric(const struct pt_scene *scene, const struct pt_hit *hit, struct pt_place *at)

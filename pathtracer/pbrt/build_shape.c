@@ -115,40 +115,34 @@ static double value(const double *d, const float *f, size_t i)
 }
 
 /* Vertices in double, stored in float. 0 when one is not finite there. */
-static int store_positions(const struct pt_soup *soup, const struct pt_xform *t, float *out)
+static int store_positions(const struct pt_soup *soup, const struct pt_xform *t, struct pt_vertex *out)
 {
     for (size_t i = 0; i < soup->vertex_count; i++) {
         double p[3], q[3];
         for (size_t k = 0; k < 3; k++)
             p[k] = value(soup->pd, soup->pf, 3 * i + k);
         pt_xform_point(t, p, q);
-        for (size_t k = 0; k < 3; k++) {
-            out[3 * i + k] = (float)q[k];
-            if (!isfinite(out[3 * i + k]))
-                return 0;
-        }
+        out[i].p = v3((float)q[0], (float)q[1], (float)q[2]);
+        if (!isfinite(out[i].p.x) || !isfinite(out[i].p.y) || !isfinite(out[i].p.z))
+            return 0;
     }
     return 1;
 }
 
-static void store_normals(const struct pt_soup *soup, const struct pt_xform *inverse, int negate, float *out)
+static void store_normals(const struct pt_soup *soup, const struct pt_xform *inverse, int negate, struct pt_vertex *out)
 {
     for (size_t i = 0; i < soup->vertex_count; i++) {
         double n[3];
+        float o[3];
         for (size_t k = 0; k < 3; k++)
             n[k] = value(soup->nd, soup->nf, 3 * i + k);
         for (size_t k = 0; k < 3; k++) {
             double v = inverse->m[0][k] * n[0] + inverse->m[1][k] * n[1] + inverse->m[2][k] * n[2];
-            out[3 * i + k] = (float)(negate ? -v : v);
+            o[k] = (float)(negate ? -v : v);
         }
         /* Scenes scaled by 1e±6 must not leave float's range when the length is squared. */
-        float *o = out + 3 * i, big = fmaxf(fabsf(o[0]), fmaxf(fabsf(o[1]), fabsf(o[2])));
-        if (big > 0 && isfinite(big)) {
-            for (size_t k = 0; k < 3; k++)
-                o[k] /= big;
-        } else {
-            o[0] = o[1] = o[2] = 0;
-        }
+        float big = fmaxf(fabsf(o[0]), fmaxf(fabsf(o[1]), fabsf(o[2])));
+        out[i].n = big > 0 && isfinite(big) ? v3(o[0] / big, o[1] / big, o[2] / big) : v3_splat(0);
     }
 }
 
@@ -156,14 +150,10 @@ static double mesh_area(const struct pt_mesh *m)
 {
     double area = 0;
     for (size_t i = 0; i < m->triangle_count; i++) {
-        const float *v[3];
-        double e1[3], e2[3];
-        for (size_t k = 0; k < 3; k++)
-            v[k] = m->positions + 3 * (size_t)m->indices[3 * i + k];
-        for (int k = 0; k < 3; k++) {
-            e1[k] = (double)v[1][k] - (double)v[0][k];
-            e2[k] = (double)v[2][k] - (double)v[0][k];
-        }
+        const uint32_t *index = m->indices + 3 * i;
+        pt_vec3 p = m->vertices[index[0]].p, q = m->vertices[index[1]].p, r = m->vertices[index[2]].p;
+        double e1[3] = {(double)q.x - (double)p.x, (double)q.y - (double)p.y, (double)q.z - (double)p.z};
+        double e2[3] = {(double)r.x - (double)p.x, (double)r.y - (double)p.y, (double)r.z - (double)p.z};
         double c[3] = {e1[1] * e2[2] - e1[2] * e2[1], e1[2] * e2[0] - e1[0] * e2[2], e1[0] * e2[1] - e1[1] * e2[0]};
         area += 0.5 * sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]);
     }
@@ -176,23 +166,24 @@ static int store_mesh(struct pt_builder *b, const struct pt_state *s, struct pt_
     struct pt_arena *arena = &b->scene->arena;
     struct pt_xform inverse;
     size_t n = soup->vertex_count;
-    float *positions = pt_arena_alloc(arena, 3 * n + 1, sizeof *positions);
+    struct pt_vertex *vertices = pt_arena_alloc(arena, n + 1, sizeof *vertices); /* one more: to begin at a multiple of 32 */
     uint32_t *indices = pt_arena_alloc(arena, soup->triangle_count, 3 * sizeof *indices);
     int has_n = soup->nd || soup->nf, has_uv = soup->uvd || soup->uvf;
-    float *normals = has_n ? pt_arena_alloc(arena, n, 3 * sizeof *normals) : NULL;
-    float *uvs = has_uv ? pt_arena_alloc(arena, n, 2 * sizeof *uvs) : NULL;
-    if (!positions || !indices || (has_n && !normals) || (has_uv && !uvs))
+    if (!vertices || !indices)
         return pt_diag_nomem(&b->diag, "a mesh");
-    if (!store_positions(soup, t, positions))
+    vertices = (struct pt_vertex *)(((uintptr_t)vertices + sizeof *vertices - 1) & ~(uintptr_t)(sizeof *vertices - 1));
+    if (!store_positions(soup, t, vertices))
         return pt_diag_fail(&b->diag, p->loc, "a vertex is not finite after its transform");
     if (!pt_xform_invert(t, &inverse))
         return pt_diag_fail(&b->diag, p->loc, "singular transform of a shape");
     if (has_n)
-        store_normals(soup, &inverse, s->reverse_orientation, normals);
-    for (size_t i = 0; has_uv && i < 2 * n; i++)
-        uvs[i] = (float)value(soup->uvd, soup->uvf, i);
+        store_normals(soup, &inverse, s->reverse_orientation, vertices);
+    for (size_t i = 0; has_uv && i < n; i++) {
+        vertices[i].u = (float)value(soup->uvd, soup->uvf, 2 * i);
+        vertices[i].v = (float)value(soup->uvd, soup->uvf, 2 * i + 1);
+    }
     memcpy(indices, soup->indices, soup->triangle_count * 3 * sizeof *indices);
-    *m = (struct pt_mesh){(uint32_t)n, (uint32_t)soup->triangle_count, positions, indices, normals, uvs};
+    *m = (struct pt_mesh){(uint32_t)n, (uint32_t)soup->triangle_count, vertices, indices, has_n, has_uv};
     return 0;
 }
 

@@ -82,14 +82,19 @@ struct pt_texture {
 
 /* --- shapes ----------------------------------------------------------------------------------------------------------- */
 
+/* All that a hit reads of a corner lies in one cache line. */
+struct pt_vertex {
+    pt_vec3 p, n;              /* n: shading normal, any length, already negated for a shape with reverse orientation */
+    float u, v;
+};
+_Static_assert(sizeof(struct pt_vertex) == 32, "a vertex is half a cache line");
+
 struct pt_mesh {
     uint32_t vertex_count, triangle_count;
-    const float *positions;    /* [vertex_count][3] and one float of padding after the last (the ray kernel loads 16 bytes)
-                                  */
+    const struct pt_vertex *vertices; /* [vertex_count], each within one cache line */
     const uint32_t *indices;   /* [triangle_count][3], each < vertex_count */
-    const float *normals;      /* [vertex_count][3] shading normals, need not be unit, already negated for a shape with
-                                  reverse orientation: where present they decide the side of the geometric normal; or NULL */
-    const float *uvs;          /* [vertex_count][2]; or NULL: (0,0), (1,0), (1,1) at the three corners */
+    int32_t has_normals;       /* they decide the side of the geometric normal */
+    int32_t has_uvs;           /* else (0,0), (1,0), (1,1) at the three corners of a triangle */
 };
 
 enum pt_quadric_kind { PT_QUADRIC_SPHERE, PT_QUADRIC_DISK, PT_QUADRIC_CYLINDER };

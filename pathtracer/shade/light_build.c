@@ -42,27 +42,23 @@ static int32_t emitters_of(const struct pt_scene *scene, const struct pt_light *
     return (int32_t)scene->meshes[scene->shapes[light->shape].data].triangle_count;
 }
 
-static pt_vec3 vertex(const float *data, uint32_t i) { return v3(data[3 * i], data[3 * i + 1], data[3 * i + 2]); }
-
 /* Geometry of one triangle of a mesh light; returns its area. */
 static double triangle_emitter(const struct pt_scene *scene, const struct pt_shape *shape, int32_t primitive,
                                struct pt_emitter *e)
 {
     const struct pt_mesh *mesh = &scene->meshes[shape->data];
     const uint32_t *index = mesh->indices + 3 * (size_t)primitive;
-    e->p0 = vertex(mesh->positions, index[0]);
-    e->e1 = v3_sub(vertex(mesh->positions, index[1]), e->p0);
-    e->e2 = v3_sub(vertex(mesh->positions, index[2]), e->p0);
+    const struct pt_vertex *a = mesh->vertices + index[0], *b = mesh->vertices + index[1], *c = mesh->vertices + index[2];
+    e->p0 = a->p;
+    e->e1 = v3_sub(b->p, a->p);
+    e->e2 = v3_sub(c->p, a->p);
     pt_vec3 n = v3_cross(e->e1, e->e2);
     double area = 0.5 * sqrt((double)n.x * (double)n.x + (double)n.y * (double)n.y + (double)n.z * (double)n.z);
     e->n = area > 0.0 ? v3_scale(n, (float)(0.5 / area)) : v3_splat(0.0f);
     e->area_over_pmf = (float)area; /* divided by the pmf once that is known */
     int against = shape->flip_normal;
-    if (mesh->normals) {
-        pt_vec3 ns = v3_add(vertex(mesh->normals, index[0]), v3_add(vertex(mesh->normals, index[1]),
-                                                                    vertex(mesh->normals, index[2])));
-        against = v3_dot(ns, n) < 0.0f;
-    }
+    if (mesh->has_normals)
+        against = v3_dot(v3_add(a->n, v3_add(b->n, c->n)), n) < 0.0f;
     if (against)
         e->n = v3_neg(e->n);
     return isfinite(e->area_over_pmf) ? area : 0.0;
@@ -275,8 +271,8 @@ static int probe(const struct pt_scene *scene, int k, struct pt_rng *rng, struct
     uint32_t triangle = (uint32_t)(pt_rng_float(rng) * (float)mesh->triangle_count);
     const uint32_t *index = mesh->indices + 3 * (size_t)(triangle < mesh->triangle_count ? triangle : 0);
     float u = sqrtf(pt_rng_float(rng)), v = pt_rng_float(rng);
-    pt_vec3 a = vertex(mesh->positions, index[0]), e1 = v3_sub(vertex(mesh->positions, index[1]), a),
-            e2 = v3_sub(vertex(mesh->positions, index[2]), a);
+    pt_vec3 a = mesh->vertices[index[0]].p, e1 = v3_sub(mesh->vertices[index[1]].p, a),
+            e2 = v3_sub(mesh->vertices[index[2]].p, a);
     pt_vec3 p = v3_madd(v3_madd(a, 1.0f - u, e1), u * v, e2);
     *at = (struct pt_receiver){p, v3_norm(v3_cross(e1, e2)), PT_RECEIVER_BOTH_SIDES};
     return 1;

@@ -107,10 +107,11 @@ static void one_scene_at_all_scales(void **state)
         assert_non_null(other);
         assert_int_equal(other->mesh_count, one->mesh_count);
         for (int32_t i = 0; i < one->mesh_count; i++)
-            for (uint32_t v = 0; v < 3 * one->meshes[i].vertex_count; v++) {
-                float a = one->meshes[i].positions[v], b = other->meshes[i].positions[v] / others[k].scale;
-                if (!(fabsf(a - b) <= tolerance))
-                    fail_msg("%s: mesh %d coordinate %u is %.9g, expected %.9g", others[k].path, (int)i, (unsigned)v, (double)b, (double)a);
+            for (uint32_t v = 0; v < one->meshes[i].vertex_count; v++) {
+                pt_vec3 a = one->meshes[i].vertices[v].p, b = v3_scale(other->meshes[i].vertices[v].p, 1.0f / others[k].scale);
+                if (!(fabsf(a.x - b.x) <= tolerance && fabsf(a.y - b.y) <= tolerance && fabsf(a.z - b.z) <= tolerance))
+                    fail_msg("%s: mesh %d vertex %u is %.9g %.9g %.9g, expected %.9g %.9g %.9g", others[k].path, (int)i, (unsigned)v,
+                             (double)b.x, (double)b.y, (double)b.z, (double)a.x, (double)a.y, (double)a.z);
             }
         pt_scene_destroy(other);
     }

@@ -121,17 +121,15 @@ int32_t test_add_mesh(struct pt_scene *scene, int32_t material, const float *pos
                       const uint32_t *indices, uint32_t triangle_count)
 {
     assert(scene->mesh_count < TEST_ROOM);
-    float *p = pt_arena_alloc(&scene->arena, 3 * (size_t)vertex_count + 1, sizeof *p);
+    struct pt_vertex *p = pt_arena_alloc(&scene->arena, vertex_count, sizeof *p);
     uint32_t *t = pt_arena_alloc(&scene->arena, 3 * (size_t)triangle_count, sizeof *t);
     assert(p && t);
     pt_vec3 eye = eye_of(scene);
     for (uint32_t i = 0; i < vertex_count; i++) {
-        p[3 * i] = positions[3 * i] - eye.x;
-        p[3 * i + 1] = positions[3 * i + 1] - eye.y;
-        p[3 * i + 2] = positions[3 * i + 2] - eye.z;
+        p[i].p = v3_sub(v3(positions[3 * i], positions[3 * i + 1], positions[3 * i + 2]), eye);
     }
     memcpy(t, indices, 3 * (size_t)triangle_count * sizeof *t);
-    scene->meshes[scene->mesh_count] = (struct pt_mesh){vertex_count, triangle_count, p, t, NULL, NULL};
+    scene->meshes[scene->mesh_count] = (struct pt_mesh){vertex_count, triangle_count, p, t, 0, 0};
     return add_shape(scene, PT_SHAPE_MESH, scene->mesh_count++, material);
 }
 

@@ -65,16 +65,13 @@ static void far_from_the_origin(void **state)
         snprintf(text, sizeof text, format, shift, shift, shift);
         s[i] = text_scene(text, NULL, NULL);
     }
-    for (int i = 0; i < 9; i++)
-        near(s[1]->meshes[0].positions[i], (double)s[0]->meshes[0].positions[i], 1e-6);
-    near(s[0]->meshes[0].positions[2], 6, 1e-6);
+    for (int i = 0; i < 3; i++)
+        near(v3_len(v3_sub(s[1]->meshes[0].vertices[i].p, s[0]->meshes[0].vertices[i].p)), 0, 1e-6);
+    near(s[0]->meshes[0].vertices[0].p.z, 6, 1e-6);
     for (int i = 0; i < 3; i++) {
-        const float *p[2];
         pt_vec3 q[2];
-        for (int k = 0; k < 2; k++) {
-            p[k] = s[k]->meshes[1].positions + 3 * i;
-            q[k] = pt_mat34_point(&s[k]->instances[0].to_render[0], v3(p[k][0], p[k][1], p[k][2]));
-        }
+        for (int k = 0; k < 2; k++)
+            q[k] = pt_mat34_point(&s[k]->instances[0].to_render[0], s[k]->meshes[1].vertices[i].p);
         near(q[1].x, (double)q[0].x, 1e-6);
         near(q[1].z, (double)q[0].z, 1e-6);
     }
@@ -90,7 +87,7 @@ static void orientation(void **state)
                                      " ReverseOrientation Shape \"sphere\"");
     assert_int_equal(s->shape_count, 4);
     assert_true(!s->shapes[0].flip_normal && s->shapes[1].flip_normal && s->shapes[2].flip_normal && !s->shapes[3].flip_normal);
-    near(s->meshes[1].normals[2], -1, 0); /* reversed orientation negates the given normals */
+    near(s->meshes[1].vertices[0].n.z, -1, 0); /* reversed orientation negates the given normals */
     pt_scene_destroy(s);
 }
 
@@ -278,20 +275,18 @@ static void tessellated(void **state)
     const struct pt_mesh *ball = &s->meshes[0];
     assert_int_equal(ball->triangle_count, 8 * 256);
     for (uint32_t i = 0; i < ball->vertex_count; i++) {
-        const float *p = ball->positions + 3 * i, *n = ball->normals + 3 * i;
-        float r = sqrtf(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]), along = p[0] * n[0] + p[1] * n[1] + p[2] * n[2];
-        float len = sqrtf(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+        const struct pt_vertex *v = &ball->vertices[i];
+        float r = v3_len(v->p), along = v3_dot(v->p, v->n), len = v3_len(v->n);
         assert_true(r > 0.4f && r < 0.7f && fabsf(along) > 0.9f * r * len); /* a rounded octahedron: normals point along p */
-        assert_true(along * (ball->normals[0] * ball->positions[0] + ball->normals[1] * ball->positions[1] +
-                             ball->normals[2] * ball->positions[2]) > 0);
+        assert_true(along * v3_dot(ball->vertices[0].n, ball->vertices[0].p) > 0);
     }
     for (uint32_t i = 0; i < s->meshes[1].vertex_count; i++)
-        assert_true(fabsf(s->meshes[1].positions[3 * i + 2]) < 1e-6f); /* flat stays flat, boundary included */
+        assert_true(fabsf(s->meshes[1].vertices[i].p.z) < 1e-6f); /* flat stays flat, boundary included */
     assert_int_equal(s->meshes[2].triangle_count, 2);
     assert_int_equal(s->meshes[3].triangle_count, 128);
     const struct pt_mesh *tube = &s->meshes[4];
     for (uint32_t i = 0; i < tube->vertex_count; i++)
-        near(hypotf(tube->positions[3 * i + 1], tube->positions[3 * i + 2]), 0.05, 1e-5);
+        near(hypotf(tube->vertices[i].p.y, tube->vertices[i].p.z), 0.05, 1e-5);
     pt_scene_destroy(s);
 }
 
