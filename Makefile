@@ -262,8 +262,8 @@ abi-check: $(OUT)/tests/abi/api_layout ## the ABI's layout is the frozen one (pl
 demo: setup ## install what is missing, build, render a scene with per-block stopping
 	@$(MAKE) --no-print-directory all
 	@scripts/demo
-bench: all $(BENCHES) ## measure speed as ratios, interleaved, against the peers that are installed
-	@scripts/bench
+bench: all $(BENCHES) ## measure speed as ratios, interleaved, against the peers that are installed; the table in docs/speed.md
+	@scripts/bench --into docs/speed.md
 cost: all ## measure what accuracy costs each criterion, from recordings in data/ (docs/cost.md)
 	@scripts/cost
 train-demo: all ## train a tiny model on a tiny bundled data set and show that it learns

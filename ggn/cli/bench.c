@@ -13,7 +13,7 @@
 #include "model/trainer.h"
 #include "nn/hash.h"
 
-enum { MAX_ROUNDS = 101, SGEMM_N = 768 };
+enum { MAX_ROUNDS = 101, SGEMM_N = 768, BLOCKS = 16 };
 
 struct options {
     const char *model;
@@ -35,14 +35,17 @@ struct bench {
     struct base_threads *threads;
     struct ggn_trainer *trainer;
     struct ggn_exec *r, *m, *d; /* inference */
+    struct ggn_exec *(*alone)[GGN_NETS]; /* [threads] the same for each thread: criteria decide about blocks side by side */
     float *planes;                  /* random pictures */
     const float *noisy[64 * 3 * GGN_WINDOW_MAX], *reference[64 * 3], *picture[64];
 };
 
-enum { DENOISER, GENERATOR, DISCRIMINATOR, DECISION, DENOISER_TRAIN, GENERATOR_TRAIN, TRAIN_SAMPLE, SGEMM, N_FIGURES };
+enum { DENOISER, GENERATOR, DISCRIMINATOR, DECISION, BLOCKS_TOGETHER, BLOCKS_ALONE, DENOISER_TRAIN,
+       GENERATOR_TRAIN, TRAIN_SAMPLE, SGEMM, N_FIGURES };
 
 static const char *const figure_name[N_FIGURES] = {
     "denoiser_forward_ms", "generator_forward_ms", "discriminator_forward_ms", "decision_ms",
+    "blocks_16_ms",        "blocks_16_alone_ms",
     "denoiser_train_ms",   "generator_train_ms",   "train_sample_ms",          "sgemm_gflops",
 };
 
@@ -57,6 +60,27 @@ static int sizes(const struct bench *b, struct ggn_hyper *hyper, struct base_err
     hyper->preset = GGN_PRESET_LULL;
     ggn_model_destroy(model);
     return rc;
+}
+
+static void fill_input(const struct bench *b, struct ggn_exec *e, int width)
+{
+    for (int c = 0; c < e->graph->value[0].c; c++)
+        ggn_plane_copy(&e->graph->value[0], ggn_exec_plane(e, 0, 0, c), b->noisy[c], width);
+}
+
+static int create_alone(struct bench *b, int flags, int width, struct base_err *err)
+{
+    b->alone = calloc((size_t)b->o.threads, sizeof *b->alone);
+    if (!b->alone)
+        return base_fail_nomem(err, "bench");
+    for (int i = 0; i < b->o.threads; i++)
+        for (int net = 0; net < GGN_NETS; net++) {
+            b->alone[i][net] = ggn_exec_create(&b->trainer->graph[net], NULL, 1, flags, NULL, err);
+            if (!b->alone[i][net])
+                return err->code;
+            fill_input(b, b->alone[i][net], width);
+        }
+    return 0;
 }
 
 static int setup(struct bench *b, struct base_err *err)
@@ -92,9 +116,8 @@ static int setup(struct bench *b, struct base_err *err)
     }
     struct ggn_exec *const all[] = {b->r, b->m, b->d};
     for (int net = 0; net < GGN_NETS; net++)
-        for (int c = 0; c < all[net]->graph->value[0].c; c++)
-            ggn_plane_copy(&all[net]->graph->value[0], ggn_exec_plane(all[net], 0, 0, c), b->noisy[c], hyper.width);
-    return 0;
+        fill_input(b, all[net], hyper.width);
+    return create_alone(b, flags, hyper.width, err);
 }
 
 static void release(struct bench *b)
@@ -102,6 +125,10 @@ static void release(struct bench *b)
     ggn_exec_destroy(b->r);
     ggn_exec_destroy(b->m);
     ggn_exec_destroy(b->d);
+    for (int i = 0; b->alone && i < b->o.threads; i++)
+        for (int net = 0; net < GGN_NETS; net++)
+            ggn_exec_destroy(b->alone[i][net]);
+    free(b->alone);
     ggn_trainer_destroy(b->trainer);
     base_threads_destroy(b->threads);
     free(b->planes);
@@ -117,6 +144,27 @@ static double forward_ms(struct bench *b, struct ggn_exec *e, int net)
 {
     double start = now_s(b);
     ggn_exec_forward(e, b->trainer->weights[net], 1, GGN_EVAL);
+    return 1e3 * (now_s(b) - start);
+}
+
+static void decide(void *data, long block, int worker)
+{
+    static const int passes[] = {GGN_NET_R, GGN_NET_M, GGN_NET_M, GGN_NET_D};
+    struct bench *b = data;
+    (void)block;
+    for (size_t i = 0; i < sizeof passes / sizeof passes[0]; i++)
+        ggn_exec_forward(b->alone[worker][passes[i]], b->trainer->weights[passes[i]], 1, GGN_EVAL);
+}
+
+/* Decisions about BLOCKS blocks, side by side by all threads or one after the other by one. */
+static double blocks_ms(struct bench *b, int together)
+{
+    double start = now_s(b);
+    if (together)
+        base_threads_for(b->threads, BLOCKS, decide, b);
+    else
+        for (long i = 0; i < BLOCKS; i++)
+            decide(b, i, 0);
     return 1e3 * (now_s(b) - start);
 }
 
@@ -195,6 +243,8 @@ static int measure(struct bench *b, double figure[N_FIGURES], struct base_err *e
         sample[DISCRIMINATOR][k] = forward_ms(b, b->d, GGN_NET_D);
         sample[DECISION][k] = forward_ms(b, b->r, GGN_NET_R) + forward_ms(b, b->m, GGN_NET_M) +
                               forward_ms(b, b->m, GGN_NET_M) + forward_ms(b, b->d, GGN_NET_D);
+        sample[BLOCKS_TOGETHER][k] = blocks_ms(b, 1);
+        sample[BLOCKS_ALONE][k] = blocks_ms(b, 0);
         sample[SGEMM][k] = sgemm_gflops(b, gemm);
     }
     for (int i = -1; i < (b->o.rounds + 2) / 3; i++) {
