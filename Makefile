@@ -112,7 +112,7 @@ REPLAY   := $(patsubst tests/fuzz/%.c,$(OUT)/fuzz/replay-%,$(FUZZ_SRC))
 FUZZERS  := $(patsubst tests/fuzz/%.c,build/fuzz/%,$(FUZZ_SRC))
 
 .DEFAULT_GOAL := all
-.PHONY: all demo test bench cost asan tsan fuzz mutants hdr-check abi-check install compdb clean help setup tests replay train-demo test-study test-hosts
+.PHONY: all demo test bench cost asan tsan fuzz mutants host-model hdr-check abi-check install compdb clean help setup tests replay train-demo test-study test-hosts
 .SECONDARY:
 
 all: $(PROGRAMS) $(CRITERIA) $(MODULES) ## build the programs and the criteria
@@ -246,6 +246,9 @@ build/fuzz/ggn_%: $(OBJ)/tests/fuzz/ggn_%.c.o $(GGN_OBJ)
 
 mutants: ## plant single-line faults and see that the tests notice (hours; resumes)
 	@scripts/mutants $(MUTANTS_FLAGS) $(TEST_SRC) $(SCRIPT_TEST)
+
+host-model: $(BIN)/pathtracer $(CRITERIA) ## 1,000 runs that are interrupted, killed or out of disk, against a model of what must be there
+	@tests/model/host.py $(MODEL_FLAGS)
 
 # Every header compiles alone; the ABI header also as C99 and C++11.
 HEADERS := $(shell find pathtracer ggn plugin-api tests -name '*.h' 2>/dev/null)

@@ -123,7 +123,9 @@ struct lc_image {
 int lc_image_build(struct lc_image *image, const struct lc_film *f, const struct lc_layout *layout, uint32_t planes);
 void lc_image_release(struct lc_image *image);
 struct lull_plane *lc_image_plane(struct lc_image *image, unsigned plane);
-/* Overwrites the stored COLOR (and MOMENT2, HALF) of a pixel of a float image with default layout. */
+/* Overwrites what is stored at a pixel of a float image with default layout, if the image has the plane: in one plane, or
+ * in all that hold floats. */
+void lc_image_poke_plane(struct lc_image *image, unsigned plane, int32_t x, int32_t y, float value);
 void lc_image_poke(struct lc_image *image, int32_t x, int32_t y, float value);
 
 /* Memory that ends right before a page that cannot be touched; size bytes, zeroed. NULL if there is none. */

@@ -350,16 +350,20 @@ struct lull_plane *lc_image_plane(struct lc_image *image, unsigned plane)
     return (struct lull_plane *)(void *)(image->descriptors + plane * stride);
 }
 
+void lc_image_poke_plane(struct lc_image *image, unsigned plane, int32_t x, int32_t y, float value)
+{
+    const struct lull_plane *p = lc_image_plane(image, plane);
+    if (!p->data)
+        return;
+    char *at = (char *)(uintptr_t)p->data + x * p->stride_x + y * p->stride_y;
+    for (uint32_t c = 0; c < lc_plane_channels[plane]; c++)
+        memcpy(at + c * p->stride_c, &value, sizeof value);
+}
+
 void lc_image_poke(struct lc_image *image, int32_t x, int32_t y, float value)
 {
     static const unsigned planes[] = {LULL_PLANE_COLOR,  LULL_PLANE_MOMENT2, LULL_PLANE_HALF,
                                       LULL_PLANE_ALBEDO, LULL_PLANE_NORMAL,  LULL_PLANE_DEPTH};
-    for (size_t i = 0; i < sizeof planes / sizeof *planes; i++) {
-        const struct lull_plane *p = lc_image_plane(image, planes[i]);
-        if (!p->data)
-            continue;
-        char *at = (char *)(uintptr_t)p->data + x * p->stride_x + y * p->stride_y;
-        for (uint32_t c = 0; c < lc_plane_channels[planes[i]]; c++)
-            memcpy(at + c * p->stride_c, &value, sizeof value);
-    }
+    for (size_t i = 0; i < sizeof planes / sizeof *planes; i++)
+        lc_image_poke_plane(image, planes[i], x, y, value);
 }

@@ -58,6 +58,11 @@ fault 35 unknown-key "does not name the key" "does not name an unknown key"
 fault 36 state "writing failed" "ignores that saving failed"
 fault 37 older-host "crashed" "reads past the view"
 
+# A mean over the block alone, without the guard against rare bright paths.
+for k in halfbuf variance; do
+    expect "$k without its guard stops a block with a firefly" firefly "hang on one sample" -o firefly -p tail-share=1 $k
+done
+
 expect "exports two symbols" symbols "helper_that_should_be_static" -o symbols "$plugins/two_symbols.so"
 expect "create never works" create "create failed" "$plugins/two_symbols.so"
 for broken in no_entry unresolved short_table twin_ids endless empty crash_on_load; do

@@ -102,6 +102,50 @@ static void edges(void **state)
     check_image(HEAD(GAUSSIAN_XY, "") ABOVE_EDGE, gaussian_y, SOBOL_ERROR);
 }
 
+/* --- an edge out of focus, an edge that moves ----------------------------------------------------------------------------- */
+
+/* Of three numbers of the camera at once, two of them drawn as pairs: what 4096 samples leave. */
+static const double CAMERA_ERROR = 0.012;
+
+/* Of a disc of radius r, what lies below d beside its centre. */
+static double disc_share(double d, double r)
+{
+    d = fmin(1.0, fmax(-1.0, d / r));
+    return 0.5 + (d * sqrt(1.0 - d * d) + asin(d)) / 3.14159265358979;
+}
+
+/* The edge is half as far away as the focus: the lens of radius 2 makes a disc of radius 1 of each of its points. */
+static double unsharp(int x, int y)
+{
+    double mean = 0.0;
+    (void)y;
+    for (int i = 0; i < 1000; i++)
+        mean += disc_share(EDGE_X - x - (i + 0.5) / 1000.0, 1.0) / 1000.0;
+    return mean;
+}
+
+/* A black sheet before a white sky ends at x = 0.3 and goes one pixel to the right: a box over a box. */
+static double moving(int x, int y)
+{
+    double mean = 0.0;
+    (void)y;
+    for (int i = 0; i < 1000; i++)
+        mean += (1.0 - box_share(EDGE_X + (i + 0.5) / 1000.0 - x - 0.5, 0.5)) / 1000.0;
+    return mean;
+}
+
+/* A lens or a shutter that shared its numbers with the pixel would have other edges. */
+static void unsharp_and_moving_edges(void **state)
+{
+    (void)state;
+    check_image("Film \"rgb\" \"integer xresolution\" 8 \"integer yresolution\" 8 PixelFilter " BOX
+                " Camera \"orthographic\" \"float screenwindow\" [ -4 4 -4 4 ] \"float lensradius\" 2 \"float focaldistance\" 10\n"
+                "Integrator \"path\" \"integer maxdepth\" 1\nWorldBegin\n" LEFT_OF_EDGE, unsharp, CAMERA_ERROR);
+    check_image(HEAD(BOX, "") "LightSource \"infinite\" \"rgb L\" [ 1 1 1 ]\n"
+                "ActiveTransform EndTime Translate 1 0 0 ActiveTransform All " BLACK QUAD "[ -50 -50 5  .3 -50 5  .3 50 5  -50 50 5 ]",
+                moving, CAMERA_ERROR);
+}
+
 /* --- a texture's squares ------------------------------------------------------------------------------------------------- */
 
 /* u = (x + 4) / 8 is seen as 4u + 0.3, v = (y + 4) / 8 as 2v - 0.7: squares of 2 by 4 pixels, white where the sum of their numbers
@@ -213,6 +257,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(edges),
+        cmocka_unit_test(unsharp_and_moving_edges),
         cmocka_unit_test(texture_offsets),
         cmocka_unit_test(half_transparent_to_the_eye),
         cmocka_unit_test(half_transparent_to_light),

@@ -90,11 +90,199 @@ static void rough_metals_lose_what_one_reflection_loses(void **state)
     }
 }
 
+/* --- what rough glass and coatings give back ------------------------------------------------------------------------------ */
+
+/* An oracle in double with its own walk: normals are drawn by D(h) cos h, not by what is visible, and light is followed through the
+ * whole sphere or layer. Relative to the interface z is up, rel = index of the far side over that of the near one. */
+struct rng48 {
+    uint64_t state;
+};
+
+static double uniform(struct rng48 *r)
+{
+    r->state = r->state * 0x5deece66dull + 11u; /* that of drand48 */
+    return ((double)(r->state >> 16 & 0xffffffffu) + 0.5) * 0x1p-32;
+}
+
+struct d3 {
+    double x, y, z;
+};
+static double d3_dot(struct d3 a, struct d3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+static struct d3 d3_mix(double s, struct d3 a, double t, struct d3 b) { return (struct d3){s * a.x + t * b.x, s * a.y + t * b.y, s * a.z + t * b.z}; }
+
+static struct d3 draw_normal(double alpha, struct rng48 *r)
+{
+    double u = uniform(r), c = sqrt((1.0 - u) / (1.0 + (alpha * alpha - 1.0) * u)), s = sqrt(1.0 - c * c), turn = 2.0 * 3.14159265358979 * uniform(r);
+    return (struct d3){s * cos(turn), s * sin(turn), c};
+}
+
+/* Walter et al. 2007, eq. 22; 1 in total reflection. */
+static double fresnel(double c, double rel)
+{
+    double g2 = rel * rel - 1.0 + c * c;
+    if (g2 <= 0.0)
+        return 1.0;
+    double g = sqrt(g2), a = (g - c) / (g + c), b = (c * (g + c) - 1.0) / (c * (g - c) + 1.0);
+    return 0.5 * a * a * (1.0 + b * b);
+}
+
+/* Light that looks back along o goes on along *i; its weight without the radiance's 1/η², which leaving undoes. metal: no way through. */
+static double scatter(double alpha, double eta, int metal, struct d3 o, struct d3 *i, struct rng48 *r)
+{
+    const double side = o.z < 0.0 ? -1.0 : 1.0, rel = side > 0.0 ? eta : 1.0 / eta;
+    struct d3 w = {o.x, o.y, side * o.z}, h = alpha > 0.0 ? draw_normal(alpha, r) : (struct d3){0, 0, 1};
+    double oh = d3_dot(w, h), weight = 1.0;
+    if (oh <= 0.0)
+        return 0.0;
+    if (metal || uniform(r) < fresnel(oh, rel)) {
+        *i = d3_mix(2.0 * oh, h, -1.0, w);
+        if (i->z <= 0.0)
+            return 0.0;
+    } else {
+        double cos_t = sqrt(1.0 - (1.0 - oh * oh) / (rel * rel));
+        *i = d3_mix(-1.0 / rel, w, oh / rel - cos_t, h);
+        if (i->z >= 0.0)
+            return 0.0;
+    }
+    if (alpha > 0.0)
+        weight = oh / (w.z * h.z * (1.0 + smith_lambda(w.z, alpha) + smith_lambda(fabs(i->z), alpha)));
+    i->z *= side;
+    return weight;
+}
+
+/* A frame about n: world to local and back. */
+static struct d3 turn(struct d3 n, struct d3 w, int back)
+{
+    struct d3 a = fabs(n.x) > 0.5 ? (struct d3){0, 1, 0} : (struct d3){1, 0, 0}, s = d3_mix(1.0, a, -d3_dot(a, n), n);
+    s = d3_mix(1.0 / sqrt(d3_dot(s, s)), s, 0.0, s);
+    struct d3 t = {n.y * s.z - n.z * s.y, n.z * s.x - n.x * s.z, n.x * s.y - n.y * s.x};
+    return back ? d3_mix(1.0, d3_mix(w.x, s, w.y, t), w.z, n) : (struct d3){d3_dot(w, s), d3_dot(w, t), d3_dot(w, n)};
+}
+
+/* A coating on a base that absorbs nothing: five meetings with the base at most, as the header of bsdf_coated_diffuse.h says. */
+struct coating {
+    const char *name;
+    double alpha, base_alpha, eta, thickness;
+    int metal;
+};
+
+static double coating_walk(const struct coating *k, struct d3 o, struct rng48 *r)
+{
+    struct d3 i;
+    double weight = scatter(k->alpha, k->eta, 0, o, &i, r);
+    for (int base = 0; base < 5 && weight > 0.0 && i.z < 0.0; base++) {
+        weight *= exp(-k->thickness / fabs(i.z));
+        struct d3 up = {-i.x, -i.y, -i.z}, next;
+        if (k->metal) {
+            weight *= scatter(k->base_alpha, 1.0, 1, up, &next, r);
+        } else {
+            double c2 = uniform(r), s = sqrt(1.0 - c2), at = 2.0 * 3.14159265358979 * uniform(r);
+            next = (struct d3){s * cos(at), s * sin(at), sqrt(c2)};
+        }
+        if (weight <= 0.0)
+            return 0.0;
+        weight *= exp(-k->thickness / next.z);
+        weight *= scatter(k->alpha, k->eta, 0, (struct d3){-next.x, -next.y, -next.z}, &i, r);
+    }
+    return i.z > 0.0 ? weight : 0.0;
+}
+
+static double glass_walk(double alpha, double eta, struct d3 p, struct d3 d, struct rng48 *r)
+{
+    double weight = 1.0;
+    for (int k = 0; k < 1000; k++) {
+        struct d3 i;
+        weight *= scatter(alpha, eta, 0, turn(p, (struct d3){-d.x, -d.y, -d.z}, 0), &i, r);
+        if (weight <= 0.0 || i.z > 0.0)
+            return weight;
+        d = turn(p, i, 1);
+        p = d3_mix(1.0, p, -2.0 * d3_dot(p, d), d);
+        p = d3_mix(1.0 / sqrt(d3_dot(p, p)), p, 0.0, p);
+    }
+    return weight;
+}
+
+/* The mean over the view of sphere_scene, by n walks; k NULL: glass of roughness alpha. */
+static double walk_sphere(const struct coating *k, double alpha, int n, double *error)
+{
+    struct rng48 r = {4711};
+    double edge = tan(10.0 * 3.14159265358979 / 180.0), sum = 0.0, sum2 = 0.0;
+    for (int j = 0; j < n; j++) {
+        struct d3 d = {edge * (2.0 * uniform(&r) - 1.0), edge * (2.0 * uniform(&r) - 1.0), 1.0}, eye = {0, 0, -4};
+        d = d3_mix(1.0 / sqrt(d3_dot(d, d)), d, 0.0, d);
+        double b = d3_dot(eye, d), t = -b - sqrt(b * b - 15.0), x;
+        struct d3 p = d3_mix(1.0, eye, t, d);
+        x = k ? coating_walk(k, turn(p, (struct d3){-d.x, -d.y, -d.z}, 0), &r) : glass_walk(alpha, 1.5, p, d, &r);
+        sum += x / n;
+        sum2 += x * x / n;
+    }
+    *error = sqrt(fmax(sum2 - sum * sum, 0.0) / n);
+    return sum;
+}
+
+/* Of the image against the walk, besides four standard errors of both: the tables of rough coatings, the cut of long walks. */
+static void check_walk(const char *name, double y, double error, double want, double want_error, double tolerance)
+{
+    if (!(fabs(y - want) <= 4.0 * hypot(error, want_error) + tolerance))
+        fail_msg("%s: %.5f ± %.5f, not %.5f ± %.5f", name, y, error, want, want_error);
+}
+
+enum { GLASS_SPP = 64, WALKS = 200000 };
+static const double COAT_TOLERANCE = 0.003;
+
+static void rough_glass_loses_what_single_reflections_lose(void **state)
+{
+    (void)state;
+    static const float alphas[] = {0.1f, 0.4f, 1.0f};
+    for (int i = 0; i < 3; i++) {
+        struct pt_scene scene;
+        double error, want_error, want = walk_sphere(NULL, (double)alphas[i], WALKS, &want_error);
+        sphere_scene(&scene);
+        int32_t id = test_add_material(&scene, PT_BSDF_DIELECTRIC);
+        scene.materials[id].roughness_u = scene.materials[id].roughness_v = grey(alphas[i]);
+        test_add_sphere(&scene, id, v3(0, 0, 0), 1.0f);
+        test_scene_finish(&scene);
+        double y = (double)v3_luminance(mean_of(&scene, -1, GLASS_SPP, &error));
+        check_walk("rough glass", y, error, want, want_error, 0.0);
+        test_scene_end(&scene);
+    }
+}
+
+static void coatings_lose_what_their_walk_loses(void **state)
+{
+    (void)state;
+    static const struct coating cases[] = {
+        {"coated diffuse", 0.0, 0.0, 1.5, 0.01, 0},       {"thick coat on diffuse", 0.0, 0.0, 1.5, 0.3, 0},
+        {"coated diffuse, dense", 0.0, 0.0, 1.9, 0.01, 0}, {"rough coat on diffuse", 0.3, 0.0, 1.5, 0.05, 0},
+        {"coated metal", 0.0, 0.0, 1.5, 0.05, 1},          {"coat on rough metal", 0.0, 0.3, 1.5, 0.01, 1},
+        {"rough coat on rough metal", 0.3, 0.2, 1.5, 0.01, 1},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        const struct coating *k = &cases[i];
+        struct pt_scene scene;
+        double error, want_error, want = walk_sphere(k, 0.0, WALKS, &want_error);
+        sphere_scene(&scene);
+        int32_t id = test_add_material(&scene, k->metal ? PT_BSDF_COATED_CONDUCTOR : PT_BSDF_COATED_DIFFUSE);
+        struct pt_material *m = &scene.materials[id];
+        m->reflectance = grey(1.0f);
+        m->conductor_by_colour = 1;
+        m->eta = (float)k->eta;
+        m->thickness = grey((float)k->thickness);
+        m->roughness_u = m->roughness_v = grey((float)k->alpha);
+        m->base_roughness_u = m->base_roughness_v = grey((float)k->base_alpha);
+        test_add_sphere(&scene, id, v3(0, 0, 0), 1.0f);
+        test_scene_finish(&scene);
+        double y = (double)v3_luminance(mean_of(&scene, -1, GLASS_SPP, &error));
+        check_walk(k->name, y, error, want, want_error, COAT_TOLERANCE);
+        test_scene_end(&scene);
+    }
+}
+
 struct furnace {
     const char *name;
     int32_t kind;
     float roughness, eta;
-    double least, most; /* mean radiance: single-scattering microfacets, and coatings with their few inner bounces, lose some */
+    double least, most; /* mean radiance */
 };
 
 /* No BSDF may return more than it gets; those that lose nothing must return all. */
@@ -106,19 +294,12 @@ static void every_bsdf(void **state)
         {"mirror", PT_BSDF_CONDUCTOR, 0.0f, 1.5f, 0.999, 1.0001},
         {"rough metal 1e-4", PT_BSDF_CONDUCTOR, 1e-4f, 1.5f, 0.999, 1.001},
         {"rough metal 0.01", PT_BSDF_CONDUCTOR, 0.01f, 1.5f, 0.99, 1.001},
-        {"rough metal 0.1", PT_BSDF_CONDUCTOR, 0.1f, 1.5f, 0.97, 1.001},
-        {"rough metal 1", PT_BSDF_CONDUCTOR, 1.0f, 1.5f, 0.3, 1.001},
         {"glass", PT_BSDF_DIELECTRIC, 0.0f, 1.5f, 0.995, 1.005},
         {"matched glass", PT_BSDF_DIELECTRIC, 0.0f, 1.0f, 0.9999, 1.0001},
         {"bubble", PT_BSDF_DIELECTRIC, 0.0f, 0.667f, 0.995, 1.005},
-        {"rough glass 1e-4", PT_BSDF_DIELECTRIC, 1e-4f, 1.5f, 0.99, 1.005},
-        {"rough glass 0.1", PT_BSDF_DIELECTRIC, 0.1f, 1.5f, 0.95, 1.005},
-        {"rough glass 1", PT_BSDF_DIELECTRIC, 1.0f, 1.5f, 0.3, 1.005},
+        {"rough glass 1e-4", PT_BSDF_DIELECTRIC, 1e-4f, 1.5f, 0.995, 1.005},
         {"thin glass", PT_BSDF_THIN_DIELECTRIC, 0.0f, 1.5f, 0.995, 1.005},
         {"diffuse transmission", PT_BSDF_DIFFUSE_TRANSMISSION, 0.0f, 1.5f, 0.995, 1.005},
-        {"coated diffuse", PT_BSDF_COATED_DIFFUSE, 0.0f, 1.5f, 0.8, 1.01},
-        {"coated diffuse rough", PT_BSDF_COATED_DIFFUSE, 0.3f, 1.5f, 0.6, 1.01},
-        {"coated metal", PT_BSDF_COATED_CONDUCTOR, 0.0f, 1.5f, 0.6, 1.01},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         struct pt_scene scene;
@@ -207,12 +388,48 @@ static void beer_lambert_on_shadow_rays(void **state)
     test_scene_end(&scene);
 }
 
+/* Ulbricht's sphere: what a point of a diffuse sphere throws on any other is the same everywhere, so of a light of intensity I inside
+ * the unit sphere, with the irradiance E there, L = ρ/π (E + ρ I / (1 - ρ)). The light is close to the wall: where a path goes next
+ * matters, and must not follow from where it went before. */
+static void light_in_a_white_sphere(void **state)
+{
+    (void)state;
+    enum { SPP = 256, SIZE = 24, FINE = 4 };
+    const double rho = 0.7, at = 0.75, pi = 3.14159265358979, edge = tan(20.0 * pi / 180.0);
+    double direct = 0.0;
+    for (int i = 0; i < SIZE * FINE * SIZE * FINE; i++) {
+        struct d3 p = {edge * (2.0 * (i % (SIZE * FINE) + 0.5) / (SIZE * FINE) - 1.0), edge * (2.0 * (i / (SIZE * FINE) + 0.5) / (SIZE * FINE) - 1.0), 1};
+        p = d3_mix(1.0 / sqrt(d3_dot(p, p)), p, 0.0, p);
+        struct d3 l = {at - p.x, -p.y, -p.z};
+        double d2 = d3_dot(l, l);
+        direct += -d3_dot(l, p) / (d2 * sqrt(d2)) / (SIZE * FINE * SIZE * FINE);
+    }
+    const double want = rho / pi * (direct + rho / (1.0 - rho));
+    for (int sampler = 0; sampler < 2; sampler++) {
+        struct pt_scene scene;
+        double error;
+        test_scene_begin(&scene);
+        test_camera(&scene, v3(0, 0, 0), v3(0, 0, 1), v3(0, 1, 0), 40.0f, SIZE);
+        struct pt_light point = {.kind = PT_LIGHT_POINT, .shape = -1, .image = -1, .emission = {1, 1, 1}, .position = {(float)at, 0, 0}};
+        test_add_light(&scene, &point);
+        test_add_sphere(&scene, test_add_diffuse(&scene, v3_splat((float)rho)), v3(0, 0, 0), 1.0f);
+        test_scene_finish(&scene);
+        struct pt_integrator settings = test_integrator(-1);
+        settings.sampler = sampler;
+        double y = (double)v3_luminance(test_mean(&scene, &settings, pt_kernel_select(scene.effects, NULL, NULL), SPP, &error));
+        if (!(fabs(y - want) <= 4.0 * error + 1e-3 * want))
+            fail_msg("sampler %d: %.5f ± %.5f, not %.5f", sampler, y, error, want);
+        test_scene_end(&scene);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(rough_metals_lose_what_one_reflection_loses), cmocka_unit_test(every_bsdf),
+        cmocka_unit_test(rough_metals_lose_what_one_reflection_loses), cmocka_unit_test(rough_glass_loses_what_single_reflections_lose),
+        cmocka_unit_test(coatings_lose_what_their_walk_loses), cmocka_unit_test(every_bsdf),
         cmocka_unit_test(medium_furnace), cmocka_unit_test(beer_lambert),
-        cmocka_unit_test(beer_lambert_on_shadow_rays),
+        cmocka_unit_test(beer_lambert_on_shadow_rays), cmocka_unit_test(light_in_a_white_sphere),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

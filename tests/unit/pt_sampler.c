@@ -105,8 +105,23 @@ static int draw_all(int kind, float (*u)[N_SAMPLES])
     return n;
 }
 
-/* No two numbers of a path are correlated, whichever vertices they belong to: |r| beyond 6/sqrt(n) has no place among 2,500 pairs. */
-static void dimensions_are_uncorrelated(void **state)
+/* χ² of two numbers over 8 by 8 squares: 63 degrees of freedom, so that 63 + 6 sqrt(126) has no place among 2,800 pairs. */
+static double joint_chi2(const float *a, const float *b)
+{
+    enum { SIDE = 8 };
+    const float to_side = SIDE / sqrtf(12.0f);
+    int seen[SIDE * SIDE] = {0};
+    double chi2 = 0.0, each = (double)N_SAMPLES / (SIDE * SIDE);
+    for (int i = 0; i < N_SAMPLES; i++)
+        seen[(int)(a[i] * to_side + SIDE / 2) * SIDE + (int)(b[i] * to_side + SIDE / 2)]++;
+    for (int i = 0; i < SIDE * SIDE; i++)
+        chi2 += (seen[i] - each) * (seen[i] - each) / each;
+    return chi2;
+}
+
+/* No two numbers of a path know of each other, whichever vertices they belong to: neither by their product, |r| beyond 6/sqrt(n), nor by
+ * where they fall together. */
+static void dimensions_are_independent(void **state)
 {
     (void)state;
     static float u[N_DIMS][N_SAMPLES];
@@ -120,6 +135,9 @@ static void dimensions_are_uncorrelated(void **state)
                     r += u[a][i] * u[b][i];
                 if (!(fabsf(r) < 6.0f * 64.0f))
                     fail_msg("sampler %d: numbers %d and %d have the correlation %g", kind, a, b, (double)r / N_SAMPLES);
+                double chi2 = joint_chi2(u[a], u[b]);
+                if (!(chi2 < 63.0 + 6.0 * sqrt(126.0)))
+                    fail_msg("sampler %d: numbers %d and %d fall together with a chi-squared of %g", kind, a, b, chi2);
             }
     }
 }
@@ -163,7 +181,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(second_dimension_is_sobol),       cmocka_unit_test(pairs_are_nets),
-        cmocka_unit_test(single_numbers_are_stratified), cmocka_unit_test(no_dimension_has_two_uses), cmocka_unit_test(dimensions_are_uncorrelated),     cmocka_unit_test(numbers_depend_on_their_key_only),
+        cmocka_unit_test(single_numbers_are_stratified), cmocka_unit_test(no_dimension_has_two_uses), cmocka_unit_test(dimensions_are_independent),     cmocka_unit_test(numbers_depend_on_their_key_only),
         cmocka_unit_test(streams_are_uniform),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
