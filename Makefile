@@ -168,10 +168,11 @@ $(LIB)/%.so: $(OBJ)/plugin-api/examples/%.c.o plugin-api/plugin.map
 	$(so) $(filter %.o,$^) $(LDFLAGS_ALL) -lm -o $@
 
 # --- tests ---------------------------------------------------------------------------------------------------------------
-# tests/support/*.c is linked into every test of its prefix (pt_*.c, ggn_*.c) or into all (no prefix).
+# tests/support/*.c is linked into every test of its prefix (pt_*.c, ggn_*.c; base_*.c into theirs too) or into all (no prefix).
 SUPPORT_pt  := $(call o,$(filter-out tests/support/ggn_%,$(wildcard tests/support/*.c)))
 SUPPORT_ggn := $(call o,$(filter-out tests/support/pt_%,$(wildcard tests/support/*.c)))
-SUPPORT_api := $(call o,$(filter-out tests/support/pt_% tests/support/ggn_%,$(wildcard tests/support/*.c)))
+SUPPORT_api := $(call o,$(filter-out tests/support/pt_% tests/support/ggn_% tests/support/base_%,$(wildcard tests/support/*.c)))
+SUPPORT_base := $(call o,$(wildcard tests/support/base_*.c))
 define test_rules
 $(OUT)/tests/$(1)/pt_%: $(OBJ)/tests/$(1)/pt_%.c.o $(PT_OBJ) $(LOADER_OBJ) $(SUPPORT_pt)
 	$$(link) $$^ $$(LDFLAGS_ALL) $(PT_LIBS) $(PT_IMAGE_LIBS) -lcmocka -o $$@
@@ -183,7 +184,7 @@ $(OUT)/tests/$(1)/ggn_plugin%: $(OBJ)/tests/$(1)/ggn_plugin%.c.o $(GGN_PLUGIN_OB
 	$$(link) $$^ $$(LDFLAGS_ALL) $(GGN_LIBS) -lcmocka -o $$@
 $(OUT)/tests/$(1)/api_%: $(OBJ)/tests/$(1)/api_%.c.o $(LOADER_OBJ) $(SUPPORT_api)
 	$$(link) $$^ $$(LDFLAGS_ALL) -ldl -lm -lcmocka -o $$@
-$(OUT)/tests/$(1)/base_%: $(OBJ)/tests/$(1)/base_%.c.o $(BASE_OBJ)
+$(OUT)/tests/$(1)/base_%: $(OBJ)/tests/$(1)/base_%.c.o $(BASE_OBJ) $(SUPPORT_base)
 	$$(link) $$^ $$(LDFLAGS_ALL) $(BASE_LIBS) -lcmocka -o $$@
 endef
 $(foreach d,unit grad golden stat abi hard oom,$(eval $(call test_rules,$(d))))

@@ -12,7 +12,7 @@
 #include <stddef.h>
 
 #include "base/err.h"
-#include "base/peers.h"
+#include "base/team.h"
 
 /* X(name, one-line help), in the order `ggn --help` lists them. */
 #define GGN_COMMANDS(X) \
@@ -42,7 +42,9 @@ enum { GGN_EXIT_OK = 0, GGN_EXIT_FAILED = 1, GGN_EXIT_BAD_INPUT = 2, GGN_EXIT_IN
 int ggn_cmd_fail(const char *command, const struct base_err *err);
 
 /* Under mpirun the processes of the job, else NULL. What a process says with ggn_cmd_fail is said once, by rank 0. */
-extern struct base_peers *ggn_cmd_peers;
+extern struct base_team *ggn_cmd_team;
+/* Rank 0 ends the job: the others leave SIGINT and SIGTERM to it. */
+void ggn_cmd_follow_rank_0(void);
 /* Is the i-th of equal pieces of work this process's? Always, when it is alone. */
 int ggn_cmd_is_mine(long i);
 

@@ -279,7 +279,7 @@ int ggn_cmd_label(int argc, char **argv)
                                                 .doc = "Attaches thresholds to recorded sequences (DATA: a sequence or a "
                                                        "folder of them): those of people, or those of the "
                                                        "model observer, which are never called human."};
-    struct options o = {.source = GGN_FROM_HALVES, .threads = base_peers_threads(ggn_cmd_peers)};
+    struct options o = {.source = GGN_FROM_HALVES, .threads = base_team_threads(ggn_cmd_team)};
     struct base_err err = {0};
     int rc = base_options_parse(&options, argc, argv, &o, &err);
 

@@ -19,23 +19,13 @@ static const struct command commands[] = {GGN_COMMANDS(COMMAND_ENTRY)};
 enum { N_COMMANDS = sizeof commands / sizeof commands[0] };
 
 volatile sig_atomic_t ggn_cmd_interrupted;
-struct base_peers *ggn_cmd_peers;
+struct base_team *ggn_cmd_team;
 
-/* How a process of a job ended. */
-struct farewell {
-    int status;
-    char text[600]; /* what it would have said */
-};
-static struct farewell farewell;
-
-static int is_member(void)
-{
-    return ggn_cmd_peers && ggn_cmd_peers->rank > 0;
-}
+static char last_words[512]; /* what a process other than rank 0 would have said */
 
 int ggn_cmd_is_mine(long i)
 {
-    return !ggn_cmd_peers || i % ggn_cmd_peers->count == ggn_cmd_peers->rank;
+    return i % base_team_count(ggn_cmd_team) == base_team_rank(ggn_cmd_team);
 }
 
 static void on_interrupt(int signum)
@@ -53,6 +43,14 @@ void ggn_cmd_catch_interrupt(void)
     sigaction(SIGTERM, &action, NULL);
 }
 
+void ggn_cmd_follow_rank_0(void)
+{
+    if (base_team_rank(ggn_cmd_team) == 0)
+        return;
+    signal(SIGINT, SIG_IGN);
+    signal(SIGTERM, SIG_IGN);
+}
+
 void ggn_cmd_tell_clipped(const char *command, const char *path, size_t clipped)
 {
     if (clipped > 0)
@@ -62,8 +60,8 @@ void ggn_cmd_tell_clipped(const char *command, const char *path, size_t clipped)
 
 int ggn_cmd_fail(const char *command, const struct base_err *err)
 {
-    if (is_member())
-        snprintf(farewell.text, sizeof farewell.text, "%s: %s", command, err->text);
+    if (base_team_rank(ggn_cmd_team) > 0)
+        snprintf(last_words, sizeof last_words, "%s", err->text);
     else
         fprintf(stderr, "%s: %s\n", command, err->text);
     return err->code == BASE_EINVAL || err->code == BASE_EIO ? GGN_EXIT_BAD_INPUT : GGN_EXIT_FAILED;
@@ -113,57 +111,35 @@ static int main_options(int argc, char **argv)
     return refuse("a command is needed");
 }
 
-/* Rank 0 hears how the others ended: the worst status is that of the job, and the first failure is told. */
-static int hear_all(int status)
-{
-    for (int left = ggn_cmd_peers->count - 1; left > 0;) {
-        struct base_err err = {0};
-        struct farewell *theirs = NULL;
-        void *data = NULL;
-        size_t size = 0;
-        int rank = 0, got = base_peers_receive(ggn_cmd_peers, 1.0, &rank, &data, &size, &err);
-        if (got < 0)
-            return ggn_cmd_fail("ggn", &err);
-        theirs = size == sizeof *theirs ? data : NULL;
-        if (theirs && theirs->status != 0 && status == 0) {
-            fprintf(stderr, "%s%s\n", theirs->text, theirs->text[0] == '\0' ? "interrupted" : "");
-            status = theirs->status;
-        }
-        left -= got;
-        free(data);
-    }
-    return status;
-}
-
-static int part(int status)
+/* The worst status is that of the job, and the first failure of another process is told. */
+static int part(const char *command, int status)
 {
     struct base_err err = {0};
-    if (is_member()) {
-        struct farewell *mine = malloc(sizeof *mine);
-        farewell.status = status;
-        if (mine) {
-            *mine = farewell;
-            base_peers_send(ggn_cmd_peers, 0, mine, sizeof *mine, &err);
-        }
-        status = 0;
-    } else if (ggn_cmd_peers) {
-        status = hear_all(status);
-    }
-    base_peers_close(ggn_cmd_peers);
-    return status;
+    int all = base_team_close(ggn_cmd_team, status, last_words, &err);
+
+    ggn_cmd_team = NULL;
+    if (all != status && err.code)
+        fprintf(stderr, "%s: %s\n", command, err.text);
+    return all;
 }
 
-/* Of the commands only label shares out its work; another would do it as often as there are processes. */
+/* These share out their work; another command would do it as often as there are processes. */
+static int is_shared(const struct command *command)
+{
+    return command->run == ggn_cmd_label || command->run == ggn_cmd_train || command->run == ggn_cmd_evaluate;
+}
+
 static int run(const struct command *command, int argc, char **argv)
 {
     struct base_err err = {0};
-    if (base_peers_open(&ggn_cmd_peers, &err))
+    if (base_team_open(&ggn_cmd_team, &err))
         return ggn_cmd_fail(argv[0], &err);
-    if (ggn_cmd_peers && command->run != ggn_cmd_label) {
+    base_team_watch(ggn_cmd_team, 0, &ggn_cmd_interrupted);
+    if (ggn_cmd_team && !is_shared(command)) {
         base_fail(&err, BASE_EINVAL, "works in one process: start it without mpirun");
-        return part(ggn_cmd_fail(argv[0], &err));
+        return part(argv[0], ggn_cmd_fail(argv[0], &err));
     }
-    return part(command->run(argc, argv));
+    return part(argv[0], command->run(argc, argv));
 }
 
 int main(int argc, char **argv)

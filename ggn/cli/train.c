@@ -7,6 +7,7 @@
 struct settings {
     struct ggn_train_plan plan;
     int preset, quiet;
+    double rank_timeout_s;
 };
 #define TO(member) BASE_TO(struct settings, member)
 static const struct base_option list[] = {
@@ -60,7 +61,10 @@ static const struct base_option list[] = {
     {"early-rate", 0, "N", TO(plan.early_rate), 0, 1,
      .help = "share of validation blocks that the threshold may stop early (0.02)"},
     {"threads", 0, "N", TO(plan.threads), 0, 1024,
-     .help = "threads, 0 = all processors; the result does not depend on it (0)"},
+     .help = "threads, 0 = all processors (of several processes on a host, their share); the result does not depend on it "
+             "(0)"},
+    {"rank-timeout", 0, "SECONDS", TO(rank_timeout_s), 0.1, 1e6,
+     .help = "under mpirun: give up when a process has owed its part for so long (120)"},
     {0}};
 
 /* What training leaves beside the model has longer names; and it must not become part of the data. */
@@ -79,8 +83,9 @@ int ggn_cmd_train(int argc, char **argv)
     static const struct base_options options = {.list = list,
                                                 .doc = "Trains a stopping criterion on a data set of block sequences.\vThe "
                                                        "same data, options and seed give the same model "
-                                                       "bytes, also after an interruption and --resume."};
-    struct settings s = {.preset = GGN_PRESET_LULL};
+                                                       "bytes, also after an interruption and --resume, by any number of threads and "
+                                                       "of processes (mpirun)."};
+    struct settings s = {.preset = GGN_PRESET_LULL, .rank_timeout_s = 120};
     struct base_err err = {0};
 
     /* Twice: the preset decides the defaults that other options override, wherever it stands. */
@@ -88,17 +93,20 @@ int ggn_cmd_train(int argc, char **argv)
     s.plan = ggn_train_plan_default((enum ggn_preset)s.preset);
     if (!rc)
         rc = base_options_parse(&options, argc, argv, &s, &err);
-    if (!rc)
+    if (!rc && base_team_rank(ggn_cmd_team) == 0) /* the others write nothing */
         rc = check_out(&s.plan, &err);
     if (rc)
         return ggn_cmd_fail(argv[0], &err);
-    s.plan.progress = s.quiet ? NULL : stderr;
+    s.plan.progress = s.quiet || base_team_rank(ggn_cmd_team) > 0 ? NULL : stderr;
     s.plan.interrupted = &ggn_cmd_interrupted;
+    s.plan.team = ggn_cmd_team;
+    base_team_watch(ggn_cmd_team, s.rank_timeout_s, &ggn_cmd_interrupted);
     ggn_cmd_catch_interrupt();
+    ggn_cmd_follow_rank_0();
     rc = ggn_train(&s.plan, &err);
-    if (rc == GGN_TRAIN_INTERRUPTED) {
+    if (rc == GGN_TRAIN_INTERRUPTED && base_team_rank(ggn_cmd_team) == 0)
         fprintf(stderr, "%s: interrupted; --resume continues from the last validation\n", argv[0]);
+    if (rc == GGN_TRAIN_INTERRUPTED)
         return GGN_EXIT_INTERRUPTED;
-    }
     return rc ? ggn_cmd_fail(argv[0], &err) : GGN_EXIT_OK;
 }

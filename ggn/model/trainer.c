@@ -83,34 +83,34 @@ static int create_net(struct ggn_trainer *t, int net, struct base_err *err)
 static int create_execs(struct ggn_trainer *t, struct base_err *err)
 {
     const int batch = t->options.batch, paper = t->hyper.preset == GGN_PRESET_PAPER;
-    const int drop = t->options.dropout ? 0 : GGN_EXEC_NO_DROPOUT;
+    const int drop = t->options.dropout ? 0 : GGN_EXEC_NO_DROPOUT, per_sample = paper ? 1 : 2;
 
     if (t->options.parts & GGN_TRAIN_R) {
-        t->r = ggn_exec_create(&t->graph[GGN_NET_R], NULL, batch, GGN_EXEC_GRADS, t->threads, err);
+        t->r = ggn_exec_create_shared(&t->graph[GGN_NET_R], NULL, batch, GGN_EXEC_GRADS, t->threads, t->team, 1, err);
         t->ssim = t->r ? ggn_ssim_create(t->hyper.height, t->hyper.width, t->threads, err) : NULL;
         if (!t->ssim)
             return BASE_ENOMEM;
     }
     if (t->options.parts & GGN_TRAIN_MD) {
         const struct ggn_graph *m = &t->graph[GGN_NET_M];
-        t->m = ggn_exec_create(m, NULL, paper ? batch : 2 * batch, GGN_EXEC_GRADS, t->threads, err);
-        t->d =
-            ggn_exec_create(&t->graph[GGN_NET_D], NULL, batch, GGN_EXEC_GRADS | GGN_EXEC_INPUT_GRAD | drop, t->threads, err);
+        t->m = ggn_exec_create_shared(m, NULL, per_sample * batch, GGN_EXEC_GRADS, t->threads, t->team, per_sample, err);
+        t->d = ggn_exec_create_shared(&t->graph[GGN_NET_D], NULL, batch, GGN_EXEC_GRADS | GGN_EXEC_INPUT_GRAD | drop,
+                                      t->threads, t->team, 1, err);
         if (!t->m || !t->d)
             return BASE_ENOMEM;
-        if (paper && !(t->m2 = ggn_exec_create(m, NULL, batch, GGN_EXEC_GRADS, t->threads, err)))
+        if (paper && !(t->m2 = ggn_exec_create_shared(m, NULL, batch, GGN_EXEC_GRADS, t->threads, t->team, 1, err)))
             return BASE_ENOMEM;
     }
     return 0;
 }
 
 struct ggn_trainer *ggn_trainer_create(const struct ggn_hyper *hyper, const struct ggn_train_options *options,
-                                       struct base_threads *threads, struct base_err *err)
+                                       struct base_threads *threads, struct base_team *team, struct base_err *err)
 {
     if (ggn_hyper_check(hyper, err))
         return NULL;
-    if (options->batch < 1 || options->batch > 1024) {
-        base_fail(err, BASE_EINVAL, "batch size %d is not in 1..1024", options->batch);
+    if (options->batch < 1 || options->batch > GGN_BATCH_MAX) {
+        base_fail(err, BASE_EINVAL, "batch size %d is not in 1..%d", options->batch, GGN_BATCH_MAX);
         return NULL;
     }
     struct ggn_trainer *t = calloc(1, sizeof *t);
@@ -121,6 +121,7 @@ struct ggn_trainer *ggn_trainer_create(const struct ggn_hyper *hyper, const stru
     t->hyper = *hyper;
     t->options = *options;
     t->threads = threads;
+    t->team = team;
     int rc = 0;
     for (int net = 0; net < GGN_NETS && !rc; net++)
         rc = create_net(t, net, err);
@@ -151,6 +152,15 @@ void ggn_trainer_destroy(struct ggn_trainer *t)
     ggn_exec_destroy(t->d);
     ggn_ssim_destroy(t->ssim);
     free(t);
+}
+
+/* The samples of a batch that this process has: how many, and *first of them. */
+static int mine(const struct ggn_trainer *t, int count, int *first)
+{
+    const int rank = base_team_rank(t->team);
+
+    *first = (int)base_team_first(t->team, count, rank);
+    return (int)base_team_first(t->team, count, rank + 1) - *first;
 }
 
 static double grad_l2(const struct ggn_trainer *t, int net, size_t n)
@@ -238,9 +248,10 @@ static double denoiser_loss(struct ggn_trainer *t, const real *const *reference,
 {
     const int out = t->graph[GGN_NET_R].n_values - 1;
     const struct ggn_value *v = &t->graph[GGN_NET_R].value[out], *in = &t->graph[GGN_NET_R].value[0];
-    double total = 0;
+    double each[GGN_BATCH_MAX], total = 0;
+    int first, n = mine(t, count, &first);
 
-    for (int i = 0; i < count; i++) {
+    for (int i = 0; i < n; i++) {
         const real *x[3], *y[3];
         real *dx[3];
         for (int c = 0; c < 3; c++) {
@@ -251,8 +262,11 @@ static double denoiser_loss(struct ggn_trainer *t, const real *const *reference,
             dx[c] = ggn_exec_grad(t->r, out, i, c);
             y[c] = copy;
         }
-        total += ggn_ssim_mean(t->ssim, x, y, dx, 3, v->row, -1.0 / count);
+        each[first + i] = ggn_ssim_mean(t->ssim, x, y, dx, 3, v->row, -1.0 / count);
     }
+    base_team_gather_items(t->team, each, sizeof each[0], count);
+    for (int i = 0; i < count; i++)
+        total += each[i];
     return 1 - total / count;
 }
 
@@ -260,13 +274,16 @@ static double denoiser_loss(struct ggn_trainer *t, const real *const *reference,
 static int denoiser_gradient(struct ggn_trainer *t, const real *const *x, int x_stride, const real *const *reference,
                              int count, double *loss, struct base_err *err)
 {
-    for (int i = 0; i < count; i++)
+    int first, n = mine(t, count, &first);
+
+    for (int i = 0; i < n; i++)
         set_input(t->r, i, x + (size_t)i * (size_t)x_stride, 3);
     zero_grad(t, GGN_NET_R);
     ggn_exec_forward(t->r, t->weights[GGN_NET_R], count, GGN_TRAIN);
     *loss = denoiser_loss(t, reference, count);
     ggn_exec_backward(t->r, t->weights[GGN_NET_R], t->grad[GGN_NET_R]);
-    return check(t, GGN_NET_R, *loss, "loss", err);
+    int rc = base_team_failed(t->team, err);
+    return rc ? rc : check(t, GGN_NET_R, *loss, "loss", err);
 }
 
 static int check_batch(const struct ggn_trainer *t, int count, int parts, struct base_err *err)
@@ -292,16 +309,21 @@ int ggn_trainer_denoiser_step(struct ggn_trainer *t, const real *const *x, const
     return rc;
 }
 
-/* D's input (NFM of denoised, NFM of noisy) from two generator outputs, or back for the gradients. */
-static void exchange_maps(struct ggn_trainer *t, const struct ggn_exec *ref, int ref0, const struct ggn_exec *noisy,
-                          int noisy0, int count, int back)
+/* Where a sample's map comes from: image step · sample + first of an executor. */
+struct maps {
+    const struct ggn_exec *m;
+    int step, first;
+};
+
+/* D's input (NFM of denoised, NFM of noisy) from generator outputs, or back for the gradients; count samples of this process. */
+static void exchange_maps(struct ggn_trainer *t, const struct maps of[2], int count, int back)
 {
     const int out = t->graph[GGN_NET_M].n_values - 1;
     const struct ggn_value *v = &t->graph[GGN_NET_M].value[out];
 
     for (int i = 0; i < 2 * count; i++) {
-        const int channel = i % 2, image = i / 2, n = image + (channel ? noisy0 : ref0);
-        const struct ggn_exec *m = channel ? noisy : ref;
+        const int channel = i % 2, image = i / 2, n = of[channel].step * image + of[channel].first;
+        const struct ggn_exec *m = of[channel].m;
         if (back)
             ggn_plane_copy(v, ggn_exec_grad(m, out, n, 0), ggn_exec_grad(t->d, 0, image, channel), v->row);
         else
@@ -310,16 +332,16 @@ static void exchange_maps(struct ggn_trainer *t, const struct ggn_exec *ref, int
 }
 
 /* The noise pictures behind the maps in D's input, each with a plane that says whether there is one. */
-void ggn_trainer_set_pictures(struct ggn_trainer *t, const struct ggn_batch *b)
+void ggn_trainer_set_pictures(struct ggn_trainer *t, const real *const *pictures, int count)
 {
     const struct ggn_value *v = &t->graph[GGN_NET_D].value[0];
 
-    for (int i = 0; i < b->count && t->hyper.picture; i++) {
+    for (int i = 0; i < count && t->hyper.picture; i++) {
         real *picture = ggn_exec_plane(t->d, 0, i, 2), *flag = ggn_exec_plane(t->d, 0, i, 3);
         for (int y = 0; y < v->h; y++)
             for (int x = 0; x < v->w; x++) {
-                picture[y * v->row + x] = b->picture[i] ? b->picture[i][y * v->w + x] : 0;
-                flag[y * v->row + x] = b->picture[i] ? 1 : 0;
+                picture[y * v->row + x] = pictures[i] ? pictures[i][y * v->w + x] : 0;
+                flag[y * v->row + x] = pictures[i] ? 1 : 0;
             }
     }
 }
@@ -328,20 +350,24 @@ void ggn_trainer_set_pictures(struct ggn_trainer *t, const struct ggn_batch *b)
 static double judge(struct ggn_trainer *t, const struct ggn_batch *b, double *logits)
 {
     const int out = t->graph[GGN_NET_D].n_values - 1;
-    double total = 0, weights = 0;
+    double each[GGN_BATCH_MAX], total = 0, weights = 0;
+    double *z = logits ? logits : each;
+    int first, n = mine(t, b->count, &first);
 
     t->d->dropout_seed = ggn_hash((uint32_t)t->steps, ggn_hash((uint32_t)t->adam_t[GGN_NET_D], t->options.seed));
     ggn_exec_forward(t->d, t->weights[GGN_NET_D], b->count, GGN_TRAIN);
+    for (int i = 0; i < n; i++)
+        z[first + i] = (double)*ggn_exec_plane(t->d, out, i, 0);
+    base_team_gather_items(t->team, z, sizeof *z, b->count);
     for (int i = 0; i < b->count; i++)
         weights += b->weight ? b->weight[i] : 1;
     if (weights <= 0)
         weights = 1;
     for (int i = 0; i < b->count; i++) {
-        double z = (double)*ggn_exec_plane(t->d, out, i, 0), share = (b->weight ? b->weight[i] : 1) / weights;
-        total += share * ggn_bce(z, b->label[i]);
-        *ggn_exec_grad(t->d, out, i, 0) = (real)(share * ggn_bce_grad(z, b->label[i]));
-        if (logits)
-            logits[i] = z;
+        double share = (b->weight ? b->weight[i] : 1) / weights;
+        total += share * ggn_bce(z[i], b->label[i]);
+        if (i >= first && i < first + n)
+            *ggn_exec_grad(t->d, out, i - first, 0) = (real)(share * ggn_bce_grad(z[i], b->label[i]));
     }
     ggn_exec_backward(t->d, t->weights[GGN_NET_D], t->grad[GGN_NET_D]);
     return total;
@@ -357,22 +383,28 @@ int ggn_trainer_judge_step(struct ggn_trainer *t, const struct ggn_batch *b, dou
         return rc;
     if (t->hyper.preset == GGN_PRESET_PAPER)
         return base_fail(err, BASE_EINVAL, "the published preset trains in its own order");
-    for (int i = 0; i < b->count; i++) {
-        set_input(t->m, i, b->denoised + (size_t)i * (size_t)planes, planes);
-        set_input(t->m, b->count + i, b->noisy + (size_t)i * (size_t)planes, planes);
+    const struct maps maps[2] = {{t->m, 2, 0}, {t->m, 2, 1}}; /* a sample's two windows lie side by side */
+    int first, n = mine(t, b->count, &first);
+    for (int i = 0; i < n; i++) {
+        set_input(t->m, 2 * i, b->denoised + (size_t)i * (size_t)planes, planes);
+        set_input(t->m, 2 * i + 1, b->noisy + (size_t)i * (size_t)planes, planes);
     }
     zero_grad(t, GGN_NET_M);
     zero_grad(t, GGN_NET_D);
     ggn_exec_forward(t->m, t->weights[GGN_NET_M], 2 * b->count, GGN_TRAIN);
-    exchange_maps(t, t->m, 0, t->m, b->count, b->count, 0);
-    ggn_trainer_set_pictures(t, b);
+    exchange_maps(t, maps, n, 0);
+    ggn_trainer_set_pictures(t, b->picture, n);
     *bce = judge(t, b, logits);
-    rc = check(t, GGN_NET_D, *bce, "loss", err);
+    rc = base_team_failed(t->team, err);
+    if (!rc)
+        rc = check(t, GGN_NET_D, *bce, "loss", err);
     if (rc)
         return rc;
-    exchange_maps(t, t->m, 0, t->m, b->count, b->count, 1);
+    exchange_maps(t, maps, n, 1);
     ggn_exec_backward(t->m, t->weights[GGN_NET_M], t->grad[GGN_NET_M]);
-    rc = update(t, GGN_NET_D, t->graph[GGN_NET_D].n_params, err);
+    rc = base_team_failed(t->team, err);
+    if (!rc)
+        rc = update(t, GGN_NET_D, t->graph[GGN_NET_D].n_params, err);
     if (!rc)
         rc = update(t, GGN_NET_M, t->graph[GGN_NET_M].n_params, err);
     if (!rc)
@@ -386,6 +418,7 @@ static int paper_denoise(struct ggn_trainer *t, const struct ggn_batch *b, struc
 {
     const int planes = 3 * t->hyper.window, out = t->graph[GGN_NET_R].n_values - 1;
     const struct ggn_value *v = &t->graph[GGN_NET_R].value[out];
+    int first, n = mine(t, b->count, &first);
 
     for (int k = 0; k < t->hyper.window; k++) {
         int rc = denoiser_gradient(t, b->noisy + 3 * k, planes, b->reference, b->count, &record->denoiser_loss[k], err);
@@ -396,7 +429,7 @@ static int paper_denoise(struct ggn_trainer *t, const struct ggn_batch *b, struc
         rc = update(t, GGN_NET_R, t->graph[GGN_NET_R].n_params, err);
         if (rc)
             return rc;
-        for (int i = 0; i < b->count; i++)
+        for (int i = 0; i < n; i++)
             for (int c = 0; c < 3; c++)
                 ggn_plane_copy(v, ggn_exec_plane(t->m, 0, i, 3 * k + c), ggn_exec_plane(t->r, out, i, c), v->row);
     }
@@ -404,9 +437,9 @@ static int paper_denoise(struct ggn_trainer *t, const struct ggn_batch *b, struc
 }
 
 /* Backward through both generator passes from D's input gradient. */
-static void paper_generator_backward(struct ggn_trainer *t, int count)
+static void paper_generator_backward(struct ggn_trainer *t, const struct maps maps[2], int count)
 {
-    exchange_maps(t, t->m, 0, t->m2, 0, count, 1);
+    exchange_maps(t, maps, count, 1);
     ggn_exec_backward(t->m, t->weights[GGN_NET_M], t->grad[GGN_NET_M]);
     ggn_exec_backward(t->m2, t->weights[GGN_NET_M], t->grad[GGN_NET_M]);
 }
@@ -427,30 +460,38 @@ int ggn_trainer_paper_step(struct ggn_trainer *t, const struct ggn_batch *b, str
     if (rc)
         return rc;
 
+    const struct maps maps[2] = {{t->m, 1, 0}, {t->m2, 1, 0}};
+    int first, n = mine(t, b->count, &first);
     zero_grad(t, GGN_NET_M);
     zero_grad(t, GGN_NET_D);
-    for (int i = 0; i < b->count; i++)
+    for (int i = 0; i < n; i++)
         set_input(t->m2, i, b->noisy + (size_t)i * (size_t)planes, planes);
     ggn_exec_forward(t->m, t->weights[GGN_NET_M], b->count, GGN_TRAIN);
     ggn_exec_forward(t->m2, t->weights[GGN_NET_M], b->count, GGN_TRAIN);
-    exchange_maps(t, t->m, 0, t->m2, 0, b->count, 0);
+    exchange_maps(t, maps, n, 0);
 
     record->bce_before = judge(t, b, record_all ? record->logit_before : NULL);
-    rc = check(t, GGN_NET_D, record->bce_before, "loss", err);
+    rc = base_team_failed(t->team, err);
+    if (!rc)
+        rc = check(t, GGN_NET_D, record->bce_before, "loss", err);
     if (rc)
         return rc;
-    paper_generator_backward(t, b->count);
+    paper_generator_backward(t, maps, n);
     record->d_grad_l2 = grad_l2(t, GGN_NET_D, d->n_params);
     record->m_grad_l2 = grad_l2(t, GGN_NET_M, m->n_params);
-    rc = update(t, GGN_NET_D, d->n_params, err);
+    rc = base_team_failed(t->team, err);
+    if (!rc)
+        rc = update(t, GGN_NET_D, d->n_params, err);
     if (rc)
         return rc;
 
     zero_grad(t, GGN_NET_D);
     record->bce_after = judge(t, b, record_all ? record->logit_after : NULL);
-    paper_generator_backward(t, b->count);
+    paper_generator_backward(t, maps, n);
     record->m_grad_l2_accumulated = grad_l2(t, GGN_NET_M, m_trained);
-    rc = update(t, GGN_NET_M, m_trained, err);
+    rc = base_team_failed(t->team, err);
+    if (!rc)
+        rc = update(t, GGN_NET_M, m_trained, err);
     if (!rc)
         finish_step(t);
     return rc;

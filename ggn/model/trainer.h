@@ -5,6 +5,9 @@
  * ggn_trainer_state, so that resuming continues bit-exactly. Results do not depend on the number of threads. One call at a
  * time. Parts that a phase does not use (the denoiser when training on cached denoised windows) can be left out.
  *
+ * A batch may be shared by the processes of a team: the trainers of all of them make the same steps and hold the same state,
+ * with the bytes that one process would have. Each is given the samples of the batch that are its own.
+ *
  * Every step checks its losses and gradients: when one is not finite or has exploded, nothing of the step remains, the
  * trainer returns to the last good state (ggn_trainer_keep) and the step returns GGN_EDIVERGED with the tensor's name.
  */
@@ -15,7 +18,7 @@
 #include "nn/exec.h"
 #include "nn/ssim.h"
 
-enum { GGN_EDIVERGED = -10 };
+enum { GGN_EDIVERGED = -10, GGN_BATCH_MAX = 1024 };
 
 enum { GGN_TRAIN_R = 1, GGN_TRAIN_MD = 2, GGN_TRAIN_ALL = 3 };
 
@@ -36,13 +39,14 @@ struct ggn_train_options {
 /* Published: lr 2e-4, betas (0.5, 0.999), dropout. LULL adds He initialisation and clipping at 1. */
 struct ggn_train_options ggn_train_options_default(enum ggn_preset preset);
 
-/* A batch. Pictures are planes of height × width elements without gaps, values 0..1. */
+/* A batch. Pictures are planes of height × width elements without gaps, values 0..1; of the `mine` samples from
+ * base_team_first on that this process has (alone: mine = count). */
 struct ggn_batch {
-    int count;
-    const real *const *noisy;     /* [count][3S] windows, noisiest image first (M's input order: image, channel) */
-    const real *const *denoised;  /* [count][3S] for ggn_trainer_judge_step */
-    const real *const *reference; /* [count][3] for ggn_trainer_paper_step */
-    const real *const *picture;   /* [count] noise pictures, GGN_PICTURE_GAIN · codes, NULL: none; with hyper.picture */
+    int count;                    /* of the whole batch */
+    const real *const *noisy;     /* [mine][3S] windows, noisiest image first (M's input order: image, channel) */
+    const real *const *denoised;  /* [mine][3S] for ggn_trainer_judge_step */
+    const real *const *reference; /* [mine][3] for ggn_trainer_paper_step */
+    const real *const *picture;   /* [mine] noise pictures, GGN_PICTURE_GAIN · codes, NULL: none; with hyper.picture */
     const double *label;          /* [count] 1 = still noisy, 0 = not, between = uncertain */
     const double *weight;         /* [count] of each sample in the loss, or NULL = 1 */
 };
@@ -51,6 +55,7 @@ struct ggn_trainer {
     struct ggn_hyper hyper;
     struct ggn_train_options options;
     struct base_threads *threads; /* borrows */
+    struct base_team *team;       /* borrows; NULL: alone */
     struct ggn_graph graph[GGN_NETS];
     struct ggn_weights *weights[GGN_NETS];     /* owns */
     real *grad[GGN_NETS];                      /* [n_params] of the last step */
@@ -63,9 +68,10 @@ struct ggn_trainer {
     uint64_t good_t[GGN_NETS], good_steps;
 };
 
-/* NULL on failure. Weights are initialised and packed. */
+/* NULL on failure. Weights are initialised and packed. team (NULL: alone) shares the batches; its failures are those of the
+ * steps. */
 struct ggn_trainer *ggn_trainer_create(const struct ggn_hyper *hyper, const struct ggn_train_options *options,
-                                       struct base_threads *threads, struct base_err *err);
+                                       struct base_threads *threads, struct base_team *team, struct base_err *err);
 void ggn_trainer_destroy(struct ggn_trainer *trainer);
 
 /* Remembers the present state as the one to return to after a divergence (create does so too). */
@@ -75,7 +81,7 @@ void ggn_trainer_keep(struct ggn_trainer *trainer);
  * the end. After writing into them call ggn_weights_pack on weights[net]. */
 real *ggn_trainer_state(struct ggn_trainer *trainer, int net, int i, size_t *count);
 
-/* One Adam step of R on `count` images (x and reference: [count][3] planes). *loss = mean of 1 − SSIM before it. The
+/* One Adam step of R on `count` images (x and reference: [mine][3] planes). *loss = mean of 1 − SSIM before it. The
  * denoised images stay in trainer->r (value n_values − 1) until the next step. */
 int ggn_trainer_denoiser_step(struct ggn_trainer *trainer, const real *const *x, const real *const *reference, int count,
                               double *loss, struct base_err *err);
@@ -85,8 +91,8 @@ int ggn_trainer_denoiser_step(struct ggn_trainer *trainer, const real *const *x,
 int ggn_trainer_judge_step(struct ggn_trainer *trainer, const struct ggn_batch *batch, double *bce, double *logits,
                            struct base_err *err);
 
-/* Puts batch->picture into D's input, for who runs D without a step; nothing without hyper.picture. */
-void ggn_trainer_set_pictures(struct ggn_trainer *trainer, const struct ggn_batch *batch);
+/* Puts picture[count] into D's input, for who runs D without a step; nothing without hyper.picture. */
+void ggn_trainer_set_pictures(struct ggn_trainer *trainer, const real *const *picture, int count);
 
 /* One published iteration: six steps of R, one of D, one of M on the sum of two gradients without its last convolution. */
 struct ggn_paper_record {

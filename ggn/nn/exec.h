@@ -3,12 +3,17 @@
  *
  * An executor owns activations (and gradients) for up to `capacity` images and borrows graph and threads. Numbers do not
  * depend on the number of threads, nor, with running statistics (GGN_EVAL), on which images share a batch. One call at a
- * time per executor; several executors may read the same weights at once. Nothing is allocated after create.
+ * time per executor; several executors may read the same weights at once. Nothing is allocated after create but messages.
+ *
+ * A batch in GGN_TRAIN may be shared by the processes of a team: each has some of the images, statistics and gradients are
+ * those of all of them, with the bytes that one process would compute (nn/nodes.h).
  */
 #ifndef GGN_NN_EXEC_H
 #define GGN_NN_EXEC_H
 
+#include "base/team.h"
 #include "base/threads.h"
+#include "nn/nodes.h"
 #include "nn/weights.h"
 
 #define GGN_BN_MOMENTUM 0.1
@@ -30,7 +35,10 @@ struct ggn_exec {
     const struct ggn_graph *graph;
     const struct ggn_kernels *kernels;
     struct base_threads *threads; /* NULL: the calling thread alone */
-    int capacity, batch, flags;
+    int capacity, batch, flags; /* images of this process: most; of the last forward pass */
+    struct base_team *team;     /* borrows; NULL: alone */
+    int images;                 /* of one sample: samples are what a team shares out */
+    int first, total;           /* of the batch in all processes: images before those of this one; images */
     enum ggn_mode mode;                        /* of the last forward pass */
     uint32_t dropout_seed;                     /* masks are a function of it; change it between passes */
     size_t offset[GGN_MAX_LAYERS + 1], n_acts; /* where each value starts in one image's activations; their total */
@@ -39,6 +47,10 @@ struct ggn_exec {
     real *scratch;                             /* [workers][scratch_size] */
     size_t scratch_size;
     void *memory;    /* owns */
+    double *sums;    /* owns; [total][channels][2] of one batch norm, image by image */
+    real *nodes;     /* owns; [n_nodes][n_params] gradients of nodes */
+    struct ggn_node node[GGN_NODES_MAX]; /* of this process's images */
+    int n_nodes;
     double *layer_s; /* [n_layers] or NULL; when set, forward adds the seconds of each layer */
 };
 
@@ -47,6 +59,11 @@ size_t ggn_exec_bytes(const struct ggn_graph *graph, int capacity, int flags, in
 /* `kernels` must be those of the weights (NULL = the best). NULL on failure. */
 struct ggn_exec *ggn_exec_create(const struct ggn_graph *graph, const struct ggn_kernels *kernels, int capacity, int flags,
                                  struct base_threads *threads, struct base_err *err);
+/* For batches that a team shares: capacity is that of all processes, of which base_team_most(team, capacity / images) · images
+ * find room in this one. capacity is below 4096 and a multiple of `images`, the images that make one sample. */
+struct ggn_exec *ggn_exec_create_shared(const struct ggn_graph *graph, const struct ggn_kernels *kernels, int capacity,
+                                        int flags, struct base_threads *threads, struct base_team *team, int images,
+                                        struct base_err *err);
 void ggn_exec_destroy(struct ggn_exec *exec);
 
 /* Element (0,0) of plane `c` of value `value` of image `n`; rows are graph->value[value].row apart. Value 0 is the input,
@@ -58,7 +75,8 @@ real *ggn_exec_grad(const struct ggn_exec *exec, int value, int n, int c);
 /* Copies one plane of the size of `v` from rows that lie `row` apart to rows as `v` has them. */
 void ggn_plane_copy(const struct ggn_value *v, real *to, const real *from, int row);
 
-/* Images 0..batch−1. GGN_TRAIN updates the running statistics in `weights` (not the packed ones: pack before evaluating). */
+/* Images 0..batch−1; of a shared executor in GGN_TRAIN: the images of all processes, of which those of this one are filled in,
+ * numbered from 0. GGN_TRAIN updates the running statistics in `weights` (not the packed ones: pack before evaluating). */
 void ggn_exec_forward(struct ggn_exec *exec, struct ggn_weights *weights, int batch, enum ggn_mode mode);
 /* Adds to params_grad [n_params]. Activations stay, so that it may be called again for another gradient of the output. */
 void ggn_exec_backward(struct ggn_exec *exec, const struct ggn_weights *weights, real *params_grad);

@@ -139,57 +139,88 @@ static void conv_act_back(void *data, long c, int worker)
     const struct ggn_task *t = data;
     const struct ggn_graph *g = t->e->graph;
     const struct ggn_value *v = &g->value[t->l->out];
-    double sum = 0;
+    struct ggn_tree tree;
 
-    for (int n = 0; n < t->e->batch; n++) {
-        real *dy = ggn_grad(t, t->l->out, n, (int)c);
-        sum += t->l->slope == 1
-                   ? t->e->kernels->sum(dy, v->h, v->w, v->row)
-                   : t->e->kernels->act_grad(dy, ggn_act(t, t->l->out, n, (int)c), (real)t->l->slope, v->h, v->w, v->row);
+    for (int k = 0; k < t->e->n_nodes; k++) {
+        const real *total = NULL;
+        for (int i = 0; i < t->e->node[k].size; i++) {
+            const int n = ggn_node_image(t, k, i);
+            real *dy = ggn_grad(t, t->l->out, n, (int)c);
+            real sum = (real)(t->l->slope == 1 ? t->e->kernels->sum(dy, v->h, v->w, v->row)
+                                               : t->e->kernels->act_grad(dy, ggn_act(t, t->l->out, n, (int)c),
+                                                                         (real)t->l->slope, v->h, v->w, v->row));
+            total = ggn_tree_add(&tree, i, &sum, 1);
+        }
+        ggn_node_grad(t, k)[t->l->bias + (size_t)c] += total[0];
     }
-    t->g[t->l->bias + (size_t)c] += (real)sum;
     (void)worker;
+}
+
+/* A part of dW: `ot` output channels from `oc` on, `nic` input channels from `ic0` on. */
+struct weight_part {
+    int oc, ot, ic0, nic;
+};
+
+/* sums [nic][taps][ot], laid out as the accumulators, into the weights' gradient. */
+static void add_weights(const struct ggn_task *t, real *g, const struct weight_part *p, const real *sums)
+{
+    const int n_in = ggn_layer_c_in(t->e->graph, t->l), taps = t->l->kernel * t->l->kernel;
+    const int c_out = t->e->graph->value[t->l->out].c;
+
+    for (int ic = 0; ic < p->nic; ic++)
+        for (int tap = 0; tap < taps; tap++)
+            for (int o = 0; o < p->ot; o++) {
+                int at = t->l->transposed ? taps - 1 - tap : tap;
+                size_t pair = t->l->transposed ? (size_t)(p->ic0 + ic) * (size_t)c_out + (size_t)(p->oc + o)
+                                               : (size_t)(p->oc + o) * (size_t)n_in + (size_t)(p->ic0 + ic);
+                g[t->l->weight + pair * (size_t)taps + (size_t)at] += sums[(ic * taps + tap) * p->ot + o];
+            }
+}
+
+/* sums: that part of dW of one image. */
+static void image_weights(const struct ggn_task *t, const struct weight_part *p, int n, real *acc, real *sums)
+{
+    const struct ggn_value *v = &t->e->graph->value[t->l->out];
+    const struct ggn_kernels *k = t->e->kernels;
+    const int taps = t->l->kernel * t->l->kernel, values = p->ot * p->nic * taps;
+    const long px = (long)v->h * v->row;
+    real *x[GGN_MAX_CHANNELS];
+    const real *dy[GGN_TILE_MAX];
+
+    memset(acc, 0, (size_t)(values * k->lanes) * sizeof *acc);
+    input_planes(x, t, t->e->acts, n);
+    for (int o = 0; o < p->ot; o++)
+        dy[o] = ggn_grad(t, t->l->out, n, p->oc + o);
+    for (long at = 0; at < px; at += GRAD_CHUNK)
+        k->conv_grad(acc, (const real *const *)x + p->ic0, p->nic, dy, p->ot, taps, v->row, at,
+                     at + GRAD_CHUNK < px ? at + GRAD_CHUNK : px);
+    k->lane_sums(sums, acc, values);
 }
 
 /* dW of one tile of output channels and up to GGN_GRAD_IC input channels, over all images. */
 static void conv_weight_back(void *data, long i, int worker)
 {
     const struct ggn_task *t = data;
-    const struct ggn_graph *g = t->e->graph;
-    const struct ggn_value *v = &g->value[t->l->out];
-    const struct ggn_kernels *k = t->e->kernels;
-    const int n_in = ggn_layer_c_in(g, t->l), taps = t->l->kernel * t->l->kernel;
-    const int groups = (n_in + GGN_GRAD_IC - 1) / GGN_GRAD_IC;
-    const int ic0 = (int)(i % groups) * GGN_GRAD_IC, nic = n_in - ic0 < GGN_GRAD_IC ? n_in - ic0 : GGN_GRAD_IC;
-    const long px = (long)v->h * v->row;
-    int oc = (int)(i / groups) * k->tile_oc;
-    const int oc_end = oc + k->tile_oc < v->c ? oc + k->tile_oc : v->c;
+    const int n_in = ggn_layer_c_in(t->e->graph, t->l), tile = t->e->kernels->tile_oc, c_out = t->e->graph->value[t->l->out].c;
+    const int groups = (n_in + GGN_GRAD_IC - 1) / GGN_GRAD_IC, taps = t->l->kernel * t->l->kernel;
+    struct weight_part p = {.oc = (int)(i / groups) * tile, .ic0 = (int)(i % groups) * GGN_GRAD_IC};
+    const int oc_end = p.oc + tile < c_out ? p.oc + tile : c_out;
     real *acc = t->e->scratch + (size_t)worker * t->e->scratch_size;
-    real sums[GGN_TILE_MAX * GGN_GRAD_IC * 9];
-    real *x[GGN_MAX_CHANNELS];
-    const real *dy[GGN_TILE_MAX];
+    real sums[GGN_TREE_WIDTH];
+    struct ggn_tree tree;
 
-    for (int ot; oc < oc_end; oc += ot) {
-        for (ot = k->tile_oc; ot > oc_end - oc;)
-            ot /= 2;
-        memset(acc, 0, (size_t)(ot * nic * taps * k->lanes) * sizeof *acc);
-        for (int n = 0; n < t->e->batch; n++) {
-            input_planes(x, t, t->e->acts, n);
-            for (int o = 0; o < ot; o++)
-                dy[o] = ggn_grad(t, t->l->out, n, oc + o);
-            for (long p = 0; p < px; p += GRAD_CHUNK)
-                k->conv_grad(acc, (const real *const *)x + ic0, nic, dy, ot, taps, v->row, p,
-                             p + GRAD_CHUNK < px ? p + GRAD_CHUNK : px);
+    p.nic = n_in - p.ic0 < GGN_GRAD_IC ? n_in - p.ic0 : GGN_GRAD_IC;
+    for (; p.oc < oc_end; p.oc += p.ot) {
+        for (p.ot = tile; p.ot > oc_end - p.oc;)
+            p.ot /= 2;
+        for (int k = 0; k < t->e->n_nodes; k++) {
+            const real *total = NULL;
+            for (int n = 0; n < t->e->node[k].size; n++) {
+                image_weights(t, &p, ggn_node_image(t, k, n), acc, sums);
+                total = ggn_tree_add(&tree, n, sums, p.ot * p.nic * taps);
+            }
+            add_weights(t, ggn_node_grad(t, k), &p, total);
         }
-        k->lane_sums(sums, acc, ot * nic * taps);
-        for (int ic = 0; ic < nic; ic++)
-            for (int tap = 0; tap < taps; tap++)
-                for (int o = 0; o < ot; o++) {
-                    int at = t->l->transposed ? taps - 1 - tap : tap;
-                    size_t pair = t->l->transposed ? (size_t)(ic0 + ic) * (size_t)v->c + (size_t)(oc + o)
-                                                   : (size_t)(oc + o) * (size_t)n_in + (size_t)(ic0 + ic);
-                    t->g[t->l->weight + pair * (size_t)taps + (size_t)at] += sums[(ic * taps + tap) * ot + o];
-                }
     }
 }
 

@@ -8,20 +8,50 @@
 
 /* --- batch norm ------------------------------------------------------------------------------------------------------- */
 
-/* Batch statistics of channel c: biased variance to normalise, unbiased for the running estimate. */
+/* The two sums of image n (of all processes) and channel c that the images share with each other. */
+static double *bn_sums_of(const struct ggn_task *t, int n, int c)
+{
+    return t->e->sums + 2 * ((size_t)n * (size_t)t->e->graph->value[t->l->out].c + (size_t)c);
+}
+
+static void bn_share(const struct ggn_task *t)
+{
+    const size_t image = 2 * sizeof(double) * (size_t)t->e->graph->value[t->l->out].c;
+
+    base_team_gather_items(t->e->mode == GGN_TRAIN ? t->e->team : NULL, t->e->sums, image * (size_t)t->e->images,
+                           t->e->total / t->e->images);
+}
+
+/* Mean of one channel of one image, and the sum of squares around it. */
+static void bn_image(void *data, long i, int worker)
+{
+    const struct ggn_task *t = data;
+    const struct ggn_value *v = &t->e->graph->value[t->l->out];
+    const int n = (int)(i / v->c), c = (int)(i % v->c);
+    const real *x = ggn_act(t, t->l->in, n, c);
+    double *sums = bn_sums_of(t, t->e->first + n, c);
+
+    sums[0] = t->e->kernels->sum(x, v->h, v->w, v->row) / ((double)v->h * v->w);
+    sums[1] = t->e->kernels->sum_sq(x, sums[0], v->h, v->w, v->row);
+    (void)worker;
+}
+
+/* Batch statistics of channel c from those of the images (Chan, Golub & LeVeque 1979): biased variance to normalise, unbiased
+ * for the running estimate. */
 static void bn_statistics(const struct ggn_task *t, long c)
 {
-    const struct ggn_graph *g = t->e->graph;
-    const struct ggn_value *v = &g->value[t->l->out];
+    const struct ggn_value *v = &t->e->graph->value[t->l->out];
     const size_t s = t->l->stats + (size_t)c;
-    const double count = (double)v->h * v->w * t->e->batch;
+    const double pixels = (double)v->h * v->w, count = pixels * t->e->total;
     double mean = 0, var = 0;
 
-    for (int n = 0; n < t->e->batch; n++)
-        mean += t->e->kernels->sum(ggn_act(t, t->l->in, n, (int)c), v->h, v->w, v->row);
-    mean /= count;
-    for (int n = 0; n < t->e->batch; n++)
-        var += t->e->kernels->sum_sq(ggn_act(t, t->l->in, n, (int)c), mean, v->h, v->w, v->row);
+    for (int n = 0; n < t->e->total; n++)
+        mean += bn_sums_of(t, n, (int)c)[0];
+    mean /= t->e->total;
+    for (int n = 0; n < t->e->total; n++) {
+        const double *image = bn_sums_of(t, n, (int)c);
+        var += image[1] + pixels * (image[0] - mean) * (image[0] - mean);
+    }
     var /= count;
     t->e->bn_mean[s] = (real)mean;
     t->e->bn_inv[s] = (real)(1 / sqrt(var + GGN_BN_EPS));
@@ -54,31 +84,47 @@ static void bn_channel(void *data, long c, int worker)
 
 static void bn_forward(struct ggn_task *t)
 {
-    ggn_task_run(t, t->e->graph->value[t->l->out].c, bn_channel);
+    const int channels = t->e->graph->value[t->l->out].c;
+
+    if (t->e->mode == GGN_TRAIN) {
+        ggn_task_run(t, (long)t->e->batch * channels, bn_image);
+        bn_share(t);
+    }
+    ggn_task_run(t, channels, bn_channel);
 }
 
 /* x̂ = (x − μ)·inv. dγ = Σ dY·x̂, dβ = Σ dY, dX = γ·inv·(dY − mean(dY) − x̂·mean(dY·x̂)); with running statistics the two
  * means are constants of the pass and dX = γ·inv·dY. */
+static void bn_back_image(void *data, long i, int worker)
+{
+    const struct ggn_task *t = data;
+    const struct ggn_value *v = &t->e->graph->value[t->l->out];
+    const int n = (int)(i / v->c), c = (int)(i % v->c);
+
+    t->e->kernels->bn_sums(bn_sums_of(t, t->e->first + n, c), ggn_grad(t, t->l->out, n, c), ggn_act(t, t->l->in, n, c),
+                           t->e->bn_mean[t->l->stats + (size_t)c], v->h, v->w, v->row);
+    (void)worker;
+}
+
 static void bn_back_channel(void *data, long c, int worker)
 {
     const struct ggn_task *t = data;
     const struct ggn_graph *g = t->e->graph;
     const struct ggn_value *v = &g->value[t->l->out];
     const size_t s = t->l->stats + (size_t)c;
-    const double count = (double)v->h * v->w * t->e->batch;
+    const double count = (double)v->h * v->w * t->e->total;
     const double inv = (double)t->e->bn_inv[s], mean = (double)t->e->bn_mean[s];
     const double gamma = (double)t->w->params[t->l->weight + (size_t)c];
     double sum[2] = {0, 0};
 
-    for (int n = 0; n < t->e->batch; n++) {
-        double part[2];
-        t->e->kernels->bn_sums(part, ggn_grad(t, t->l->out, n, (int)c), ggn_act(t, t->l->in, n, (int)c), t->e->bn_mean[s],
-                               v->h, v->w, v->row);
-        sum[0] += part[0];
-        sum[1] += part[1];
+    for (int n = 0; n < t->e->total; n++) {
+        sum[0] += bn_sums_of(t, n, (int)c)[0];
+        sum[1] += bn_sums_of(t, n, (int)c)[1];
     }
-    t->g[t->l->weight + (size_t)c] += (real)(sum[1] * inv);
-    t->g[t->l->bias + (size_t)c] += (real)sum[0];
+    if (t->e->first == 0 && t->e->batch > 0) { /* they are of the whole batch: told once, by who has its first image */
+        ggn_node_grad(t, 0)[t->l->weight + (size_t)c] += (real)(sum[1] * inv);
+        ggn_node_grad(t, 0)[t->l->bias + (size_t)c] += (real)sum[0];
+    }
     double b = t->e->mode == GGN_TRAIN ? -gamma * inv * inv * inv * sum[1] / count : 0;
     double shift = t->e->mode == GGN_TRAIN ? -gamma * inv * sum[0] / count - b * mean : 0;
     for (int n = 0; n < t->e->batch; n++)
@@ -90,7 +136,11 @@ static void bn_back_channel(void *data, long c, int worker)
 
 static void bn_backward(struct ggn_task *t)
 {
-    ggn_task_run(t, t->e->graph->value[t->l->out].c, bn_back_channel);
+    const int channels = t->e->graph->value[t->l->out].c;
+
+    ggn_task_run(t, (long)t->e->batch * channels, bn_back_image);
+    bn_share(t);
+    ggn_task_run(t, channels, bn_back_channel);
 }
 
 const struct ggn_layer_passes GGN_LAYER(bn) = {bn_forward, bn_backward};
@@ -234,9 +284,10 @@ static void flatten_plane(const struct ggn_task *t, const struct pair *p, int ba
 
 PLANE_LAYER(flatten, flatten_plane(t, &p, 0), flatten_plane(t, &p, 1))
 
-/* 0 or 1/(1 − drop), a function of the seed, the layer, the image and the element. */
+/* 0 or 1/(1 − drop), a function of the seed, the layer, the image of the whole batch and the element. */
 static real dropout_factor(const struct ggn_task *t, long i)
 {
+    i += (long)t->e->first * t->e->graph->value[t->l->in].c;
     if (t->e->mode == GGN_EVAL || (t->e->flags & GGN_EXEC_NO_DROPOUT))
         return 1;
     uint32_t layer = (uint32_t)(t->l - t->e->graph->layer);
@@ -269,14 +320,25 @@ static void linear_forward(struct ggn_task *t)
 static void linear_weight_back(void *data, long o, int worker)
 {
     const struct ggn_task *t = data;
-    const struct ggn_graph *g = t->e->graph;
-    const long c_in = g->value[t->l->in].c;
+    const int c_in = t->e->graph->value[t->l->in].c;
+    real leaf[GGN_TREE_WIDTH];
+    struct ggn_tree tree;
 
-    for (int n = 0; n < t->e->batch; n++) {
-        real d = ggn_grad(t, t->l->out, n, 0)[o];
-        t->e->kernels->axpy(t->g + t->l->weight + (size_t)(o * c_in), d, ggn_act(t, t->l->in, n, 0), c_in);
-        t->g[t->l->bias + (size_t)o] += d;
-    }
+    for (int k = 0; k < t->e->n_nodes; k++)
+        for (int from = 0; from <= c_in; from += GGN_TREE_WIDTH) { /* element c_in is the bias */
+            const int n = c_in + 1 - from < GGN_TREE_WIDTH ? c_in + 1 - from : GGN_TREE_WIDTH;
+            const real *total = NULL;
+            for (int i = 0; i < t->e->node[k].size; i++) {
+                const real d = ggn_grad(t, t->l->out, ggn_node_image(t, k, i), 0)[o];
+                const real *x = ggn_act(t, t->l->in, ggn_node_image(t, k, i), 0);
+                for (int c = 0; c < n; c++)
+                    leaf[c] = from + c < c_in ? d * x[from + c] : d;
+                total = ggn_tree_add(&tree, i, leaf, n);
+            }
+            real *g = ggn_node_grad(t, k);
+            for (int c = 0; c < n; c++)
+                g[from + c < c_in ? t->l->weight + (size_t)(o * c_in + from + c) : t->l->bias + (size_t)o] += total[c];
+        }
     (void)worker;
 }
 

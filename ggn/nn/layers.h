@@ -13,7 +13,6 @@ struct ggn_task {
     struct ggn_weights *w;
     const struct ggn_layer *l;
     const struct ggn_layer *bn;         /* CONV: the batch norm that follows and is applied on the way, or NULL */
-    real *g;                            /* gradient of the parameters */
     int px_blocks, oc_groups, oc_group; /* how a convolution is cut */
     long px_block;
     const real *wino;     /* CONV: transformed weights when Winograd's algorithm is used */
@@ -54,6 +53,18 @@ static inline real *ggn_act(const struct ggn_task *t, int value, long n, int c)
 static inline real *ggn_grad(const struct ggn_task *t, int value, long n, int c)
 {
     return ggn_plane_in(t->e, t->e->grads, value, n, c);
+}
+
+/* Where the gradient of the parameters of node k of the executor is added to. */
+static inline real *ggn_node_grad(const struct ggn_task *t, int k)
+{
+    return t->e->nodes + (size_t)k * t->e->graph->n_params;
+}
+
+/* The i-th image of node k, as this process numbers its images. */
+static inline int ggn_node_image(const struct ggn_task *t, int k, int i)
+{
+    return t->e->node[k].first - t->e->first + i;
 }
 
 #endif

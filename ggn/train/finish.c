@@ -165,21 +165,24 @@ int ggn_session_finish(struct ggn_session *s, struct base_err *err)
     double accuracy = (double)NAN;
     int rc = ggn_judge_validation(s, s->validation.n, &v, err), right = 0;
 
-    if (!rc && v.n) {
+    if (rc || base_team_rank(s->plan->team) > 0) {
+        ggn_judged_release(&v);
+        return rc;
+    }
+    if (v.n) {
         ggn_calibrate_platt(v.logit, v.label, v.n, &policy);
         for (int i = 0; i < v.n; i++)
             right += (ggn_policy_p(&policy, v.logit[i]) >= 0.5) == v.noisy[i];
         accuracy = (double)right / v.n;
         policy.slope = ggn_calibrate_slope(&s->validation, v.logit, &policy);
     }
-    if (!rc) { /* the threshold last: it is chosen for the cadence, the gate and the guard that will stand beside it */
-        policy.first_spp = s->set.first_spp;
-        policy.ratio = s->set.ratio > 1.001 ? s->set.ratio : 0;
-        policy.step_spp = s->set.step_spp;
-        ggn_calibrate_limits(&s->train, &policy);
-        ggn_calibrate_limits(&s->validation, &policy);
-        rc = choose_threshold(s, &v, &policy, &stopping, err);
-    }
+    policy.first_spp = s->set.first_spp;
+    policy.ratio = s->set.ratio > 1.001 ? s->set.ratio : 0;
+    policy.step_spp = s->set.step_spp;
+    ggn_calibrate_limits(&s->train, &policy);
+    ggn_calibrate_limits(&s->validation, &policy);
+    /* the threshold last: it is chosen for the cadence, the gate and the guard that will stand beside it */
+    rc = choose_threshold(s, &v, &policy, &stopping, err);
     if (!rc)
         rc = export(s, &policy, &stopping, v.auc, accuracy, err);
     if (!rc)

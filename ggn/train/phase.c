@@ -40,6 +40,18 @@ static int write_files(struct ggn_session *s, struct base_err *err)
     return ggn_resume_save(s, path, err);
 }
 
+/* Rank 0 decides when to stop, so that all do it after the same step. Processes are also asked to stop when one of them has died.
+ */
+static int asked_to_stop(const struct ggn_session *s)
+{
+    int stop = s->plan->interrupted && *s->plan->interrupted;
+
+    if (stop)
+        base_team_look(s->plan->team);
+    base_team_tell(s->plan->team, &stop, sizeof stop);
+    return stop;
+}
+
 /* One epoch; on divergence the trainer is back at the epoch's start and so is the step. */
 static int epoch(struct ggn_session *s, const struct ggn_phase *phase, struct base_err *err)
 {
@@ -49,9 +61,10 @@ static int epoch(struct ggn_session *s, const struct ggn_phase *phase, struct ba
     double start = base_clock_wall_s(), loss, right;
 
     while (s->progress.step < begin + n) {
-        if (s->plan->interrupted && *s->plan->interrupted)
-            return GGN_TRAIN_INTERRUPTED;
-        int rc = phase->step(s, s->progress.step, phase->steps, &loss, &right, err);
+        int stop = asked_to_stop(s), rc = base_team_failed(s->plan->team, err);
+        if (rc || stop)
+            return rc ? rc : GGN_TRAIN_INTERRUPTED;
+        rc = phase->step(s, s->progress.step, phase->steps, &loss, &right, err);
         if (rc) {
             s->progress.step = begin;
             return rc;
@@ -73,7 +86,7 @@ static int epoch(struct ggn_session *s, const struct ggn_phase *phase, struct ba
     if (rc)
         return rc;
     say(s, &row, phase, (double)n * phase->batch / fmax(seconds, 1e-9));
-    return write_files(s, err);
+    return base_team_rank(s->plan->team) == 0 ? write_files(s, err) : 0;
 }
 
 int ggn_phase_run(struct ggn_session *s, const struct ggn_phase *phase, struct base_err *err)

@@ -82,9 +82,10 @@ static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, doub
     const int n = s->plan->batch_r;
     const size_t plane = (size_t)s->plan->crop * (size_t)s->plan->crop;
     const float **x = s->planes, **y = s->planes + 3 * (size_t)n;
+    int mine, first = ggn_session_first(s, n, &mine);
 
-    fill_batch(s, GGN_SPLIT_TRAIN, step, ggn_session_seed(s), 0, n);
-    for (int i = 0; i < 3 * n; i++) {
+    fill_batch(s, GGN_SPLIT_TRAIN, step, ggn_session_seed(s), first, mine);
+    for (int i = 0; i < 3 * mine; i++) {
         x[i] = s->buffer + ((size_t)(i / 3) * 6 + (size_t)(i % 3)) * plane;
         y[i] = x[i] + 3 * plane;
     }
@@ -93,14 +94,13 @@ static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, doub
     return ggn_trainer_denoiser_step(s->trainer, x, y, n, loss, err);
 }
 
-/* Σ of 1 − SSIM over `count` crops in the buffer. */
-static double evaluate(struct ggn_session *s, int count)
+/* loss[count]: 1 − SSIM of the crops in the buffer. */
+static void evaluate(struct ggn_session *s, int count, double *loss)
 {
     struct ggn_trainer *t = s->trainer;
     const struct ggn_value *in = &t->r->graph->value[0];
     const int out = t->r->graph->n_values - 1;
     const size_t plane = (size_t)s->plan->crop * (size_t)s->plan->crop;
-    double total = 0;
 
     for (int i = 0; i < count; i++)
         for (int c = 0; c < 3; c++) {
@@ -116,27 +116,29 @@ static double evaluate(struct ggn_session *s, int count)
             x[c] = ggn_exec_plane(t->r, out, i, c);
             y[c] = ggn_exec_grad(t->r, 0, i, c);
         }
-        total += 1 - ggn_ssim_mean(t->ssim, x, y, NULL, 3, in->row, 0);
+        loss[i] = 1 - ggn_ssim_mean(t->ssim, x, y, NULL, 3, in->row, 0);
     }
-    return total;
 }
 
 /* Mean of 1 − SSIM over fixed crops of the validation scenes; NaN without any. */
 static int validate(struct ggn_session *s, struct ggn_log_row *row, struct base_err *err)
 {
-    const int n = s->plan->batch_r, any = nth_chain(s, GGN_SPLIT_VALIDATION, -1);
-    double total = 0;
+    const int n = (int)base_team_most(s->plan->team, s->plan->batch_r), any = nth_chain(s, GGN_SPLIT_VALIDATION, -1);
+    double loss[VALIDATION_CROPS] = {0}, total = 0;
+    int mine, first = ggn_session_first(s, VALIDATION_CROPS, &mine);
 
     ggn_weights_pack(s->trainer->weights[GGN_NET_R], NULL);
-    for (int first = 0; any && first < VALIDATION_CROPS; first += n) {
-        int count = VALIDATION_CROPS - first < n ? VALIDATION_CROPS - first : n;
+    for (int end = first + mine; any && first < end; first += n) {
+        int count = end - first < n ? end - first : n;
         fill_batch(s, GGN_SPLIT_VALIDATION, 0, VALIDATION_SEED, first, count);
-        total += evaluate(s, count);
+        evaluate(s, count, loss + first);
     }
+    base_team_gather_items(s->plan->team, loss, sizeof loss[0], VALIDATION_CROPS);
+    for (int i = 0; i < VALIDATION_CROPS; i++)
+        total += loss[i];
     row->validation_loss = any ? total / VALIDATION_CROPS : (double)NAN;
     row->validation_accuracy = row->validation_auc = (double)NAN;
-    (void)err;
-    return 0;
+    return base_team_failed(s->plan->team, err);
 }
 
 static int begin(struct ggn_session *s, struct base_err *err)

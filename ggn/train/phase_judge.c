@@ -36,6 +36,7 @@ struct fill {
     const struct ggn_windows *windows;
     const int *index; /* of the windows */
     uint64_t step;
+    int first;        /* place of the first of them in the batch */
     int augment, denoised;
 };
 
@@ -48,7 +49,7 @@ static void fill_window(void *data, long i, int worker)
     const struct ggn_augment_options how = {s->plan->flips, s->set.width == s->set.height, s->plan->jitter,
                                             s->plan->picture};
     struct ggn_augment augment =
-        f->augment ? ggn_augment_draw(f->step, (int)i, ggn_session_seed(s) ^ 2, &how) : ggn_augment_none();
+        f->augment ? ggn_augment_draw(f->step, f->first + (int)i, ggn_session_seed(s) ^ 2, &how) : ggn_augment_none();
     float *at = s->buffer + (size_t)i * sample_values(s), *picture = at + 2 * window_values(s);
 
     ggn_window_planes(c, w->last, s->hyper.window, s->set.width, s->set.height, 0, &augment, difference(s), at);
@@ -107,26 +108,30 @@ static void generate(struct ggn_session *s, const float *const *planes, int coun
                        t->m->graph->value[out].row);
 }
 
-/* Raw logits of windows list[index[i]], i < n, with the weights as they are. */
+/* Raw logits of windows list[index[i]], i < n, with the weights as they are; each process computes some of them. */
 static void logits(struct ggn_session *s, const struct ggn_windows *windows, const int *index, int n, double *logit)
 {
     struct ggn_trainer *t = s->trainer;
-    const int out = t->d->graph->n_values - 1;
+    const int out = t->d->graph->n_values - 1, most = (int)base_team_most(s->plan->team, s->plan->batch);
+    int mine, first = ggn_session_first(s, n, &mine);
 
     ggn_weights_pack(t->weights[GGN_NET_M], NULL);
     ggn_weights_pack(t->weights[GGN_NET_D], NULL);
-    for (int first = 0; first < n; first += s->plan->batch) {
-        int count = n - first < s->plan->batch ? n - first : s->plan->batch;
+    for (int end = first + mine; first < end; first += most) {
+        int count = end - first < most ? end - first : most;
         struct fill f = {.s = s, .windows = windows, .index = index + first, .denoised = 1};
         struct ggn_batch b = fill_batch(s, &f, count);
         generate(s, b.denoised, count, 0);
         generate(s, b.noisy, count, 1);
-        ggn_trainer_set_pictures(t, &b);
+        ggn_trainer_set_pictures(t, b.picture, count);
         ggn_exec_forward(t->d, t->weights[GGN_NET_D], count, GGN_EVAL);
         for (int i = 0; i < count; i++)
             logit[first + i] = (double)*ggn_exec_plane(t->d, out, i, 0);
     }
+    base_team_gather_items(s->plan->team, logit, sizeof *logit, n);
 }
+
+enum { DENOISED_AT_ONCE = 4 }; /* images */
 
 struct denoise {
     struct ggn_session *s;
@@ -149,30 +154,69 @@ static void denoise_images(const struct denoise *d, struct ggn_chain *c, int fir
                            d->exec->graph->value[out].plane);
 }
 
-/* Denoises the chains of one split (GGN_SPLITS: all) with s->r, in evaluation mode. */
-static int denoise(struct ggn_session *s, enum ggn_split split, struct base_err *err)
+static size_t denoised_bytes(const struct ggn_session *s, const struct ggn_chain *c)
 {
-    enum { AT_ONCE = 4 };
-    struct denoise d = {s, ggn_exec_create(&s->r_graph, NULL, AT_ONCE, 0, s->threads, err)};
+    return (size_t)c->n_levels * ggn_chains_values(&s->set) * sizeof *c->denoised;
+}
 
-    if (!d.exec)
-        return BASE_ENOMEM;
-    ggn_weights_pack(s->r, NULL);
+/* The chains round[0 … n) have been denoised, the k-th by rank k: now by everybody. */
+static void share_denoised(const struct ggn_session *s, struct ggn_chain *const *round, int n)
+{
+    struct base_team *team = s->plan->team;
+    const int rank = base_team_rank(team);
+    const struct base_team_part *parts =
+        base_team_collect(team, rank < n ? round[rank]->denoised : NULL, rank < n ? denoised_bytes(s, round[rank]) : 0);
+
+    for (int k = 1; parts && k < n; k++) {
+        if (parts[k].size != denoised_bytes(s, round[k]))
+            base_team_refuse(team, k);
+        else
+            memcpy(round[k]->denoised, parts[k].data, parts[k].size);
+    }
+    for (int k = 0; k < n; k++)
+        base_team_tell(team, round[k]->denoised, denoised_bytes(s, round[k]));
+}
+
+static int denoise_chains(struct ggn_session *s, enum ggn_split split, struct ggn_exec *exec, struct ggn_chain **round,
+                          struct base_err *err)
+{
+    const struct denoise d = {s, exec};
+    const int count = base_team_count(s->plan->team), rank = base_team_rank(s->plan->team);
+    int n = 0;
+
     for (int i = 0; i < s->set.n; i++) {
         struct ggn_chain *c = &s->set.chains[i];
         if (split != GGN_SPLITS && c->split != split)
             continue;
         if (!c->denoised)
-            c->denoised = malloc((size_t)(c->n_levels ? c->n_levels : 1) * ggn_chains_values(&s->set) * sizeof *c->denoised);
-        if (!c->denoised) {
-            ggn_exec_destroy(d.exec);
+            c->denoised = malloc(denoised_bytes(s, c) + 1);
+        if (!c->denoised)
             return base_fail_nomem(err, "denoised images");
-        }
-        for (int k = 0; k < c->n_levels; k += AT_ONCE)
-            denoise_images(&d, c, k, c->n_levels - k < AT_ONCE ? c->n_levels - k : AT_ONCE);
+        for (int k = 0; n == rank && k < c->n_levels; k += DENOISED_AT_ONCE)
+            denoise_images(&d, c, k, c->n_levels - k < DENOISED_AT_ONCE ? c->n_levels - k : DENOISED_AT_ONCE);
+        round[n++] = c;
+        if (n == count)
+            share_denoised(s, round, n);
+        n %= count;
     }
-    ggn_exec_destroy(d.exec);
-    return 0;
+    if (n > 0)
+        share_denoised(s, round, n);
+    return base_team_failed(s->plan->team, err);
+}
+
+/* Denoises the chains of one split (GGN_SPLITS: all) with s->r, in evaluation mode; processes take turns. */
+static int denoise(struct ggn_session *s, enum ggn_split split, struct base_err *err)
+{
+    struct ggn_chain **round = malloc((size_t)base_team_count(s->plan->team) * sizeof *round);
+    struct ggn_exec *exec = round ? ggn_exec_create(&s->r_graph, NULL, DENOISED_AT_ONCE, 0, s->threads, err) : NULL;
+    int rc = exec ? 0 : base_fail_nomem(err, "denoised images");
+
+    ggn_weights_pack(s->r, NULL);
+    if (!rc)
+        rc = denoise_chains(s, split, exec, round, err);
+    ggn_exec_destroy(exec);
+    free(round);
+    return rc;
 }
 
 /* --- one step --------------------------------------------------------------------------------------------------------- */
@@ -234,16 +278,19 @@ static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, doub
                       struct base_err *err)
 {
     const int paper = s->hyper.preset == GGN_PRESET_PAPER, n = s->plan->batch;
-    int index[1024];
-    double label[1024], logit[1024];
+    int index[GGN_BATCH_MAX];
+    double label[GGN_BATCH_MAX], logit[GGN_BATCH_MAX];
     struct ggn_paper_record record;
 
     for (int i = 0; i < n; i++) {
         index[i] = paper ? paper_window(s, step, i) : ggn_windows_draw(&s->train, step, i, ggn_session_seed(s));
         label[i] = s->train.list[index[i]].label;
     }
-    struct fill f = {.s = s, .windows = &s->train, .index = index, .step = step, .augment = !paper, .denoised = !paper};
-    struct ggn_batch b = fill_batch(s, &f, n);
+    int mine, first = ggn_session_first(s, n, &mine);
+    struct fill f = {.s = s, .windows = &s->train, .index = index + first, .step = step, .first = first, .augment = !paper,
+                     .denoised = !paper};
+    struct ggn_batch b = fill_batch(s, &f, mine);
+    b.count = n;
     b.label = label;
     double scale = paper ? 1 : ggn_session_lr(s, 1, step, steps);
     s->trainer->options.lr[GGN_NET_M] = s->trainer->options.lr[GGN_NET_D] = s->plan->lr * scale;
@@ -294,8 +341,10 @@ int ggn_judge_validation(struct ggn_session *s, int most, struct ggn_judged *o, 
     }
     if (!rc && n) {
         logits(s, &s->validation, index, n, o->logit);
-        rc = ggn_stats_auc(o->logit, o->noisy, (size_t)n, &o->auc, err);
+        rc = base_team_failed(s->plan->team, err);
     }
+    if (!rc && n)
+        rc = ggn_stats_auc(o->logit, o->noisy, (size_t)n, &o->auc, err);
     free(index);
     return rc;
 }

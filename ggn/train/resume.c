@@ -229,7 +229,25 @@ int ggn_resume_phase(const char *path, int *phase, struct base_err *err)
     return 0;
 }
 
-int ggn_resume_load(struct ggn_session *s, const char *path, struct base_err *err)
+/* Rank 0 has the state: now everybody. */
+static int share_state(struct ggn_session *s, struct base_err *err)
+{
+    struct ggn_trainer *t = s->trainer;
+    size_t count;
+    float *array;
+
+    base_team_tell(s->plan->team, &s->progress, sizeof s->progress);
+    base_team_tell(s->plan->team, &t->steps, sizeof t->steps);
+    base_team_tell(s->plan->team, t->adam_t, sizeof t->adam_t);
+    for (int i = 0; (array = state_array(s, i, &count)); i++)
+        base_team_tell(s->plan->team, array, count * sizeof *array);
+    for (int net = 0; net < GGN_NETS; net++)
+        ggn_weights_pack(t->weights[net], NULL);
+    ggn_trainer_keep(t);
+    return base_team_failed(s->plan->team, err);
+}
+
+static int load(struct ggn_session *s, const char *path, struct base_err *err)
 {
     struct ggn_container c = {0};
     cJSON *root = NULL;
@@ -249,11 +267,14 @@ int ggn_resume_load(struct ggn_session *s, const char *path, struct base_err *er
     }
     if (!rc)
         rc = restore(s, root, path, err);
-    for (int net = 0; net < GGN_NETS && !rc; net++)
-        ggn_weights_pack(s->trainer->weights[net], NULL);
-    if (!rc)
-        ggn_trainer_keep(s->trainer);
     cJSON_Delete(root);
     ggn_container_release(&c);
     return rc;
+}
+
+int ggn_resume_load(struct ggn_session *s, const char *path, struct base_err *err)
+{
+    int rc = base_team_rank(s->plan->team) == 0 ? load(s, path, err) : 0;
+
+    return rc ? rc : share_state(s, err);
 }

@@ -37,7 +37,7 @@ struct ggn_session {
     float *average[GGN_NETS];    /* with plan->average: the mean of the weights lately; it is what is validated and kept */
     struct ggn_progress progress;
     struct ggn_log log;
-    float *buffer;        /* pixels of a batch */
+    float *buffer;        /* pixels of this process's part of a batch */
     const float **planes; /* pointers into it */
 };
 
@@ -56,6 +56,8 @@ void ggn_session_load_best(struct ggn_session *session);
 
 /* Cosine from lr down to a fiftieth, after a short warm-up; divergences halve it. */
 double ggn_session_lr(const struct ggn_session *session, double lr, uint64_t step, uint64_t steps);
+/* Of n samples in order, the first that is this process's; *mine: how many are. */
+int ggn_session_first(const struct ggn_session *session, int n, int *mine);
 /* Seed of the draws. */
 uint32_t ggn_session_seed(const struct ggn_session *session);
 /* plan->out + suffix. */

@@ -1,7 +1,11 @@
 #include "train/train.h"
 
+#include <stdio.h>
 #include <sys/stat.h>
+#include <zlib.h>
 
+#include "base/version.h"
+#include "nn/isa.h"
 #include "train/finish.h"
 #include "train/phase_denoiser.h"
 #include "train/phase_judge.h"
@@ -33,22 +37,89 @@ static void draw_curves(const struct ggn_session *s)
         fprintf(s->plan->progress, "no picture of the learning curves: %s\n", err.text);
 }
 
+/* --- several processes ------------------------------------------------------------------------------------------------ */
+
+static unsigned data_crc(const struct ggn_chains *set)
+{
+    const size_t values = ggn_chains_values(set);
+    uLong crc = crc32(0, NULL, 0);
+
+    for (int i = 0; i < set->n; i++) {
+        const struct ggn_chain *c = &set->chains[i];
+        crc = crc32_z(crc, c->noisy, (size_t)c->n_levels * values);
+        crc = crc32_z(crc, c->reference, c->reference ? values : 0);
+        crc = crc32_z(crc, c->picture, c->picture ? (size_t)c->n_levels * values / 3 : 0);
+    }
+    return (unsigned)crc;
+}
+
+static unsigned init_crc(const struct ggn_session *s)
+{
+    uLong crc = crc32(0, NULL, 0);
+
+    for (int net = 0; s->init && net < GGN_NETS; net++)
+        crc = crc32_z(crc, (const Bytef *)s->init->weights[net]->params,
+                      s->init->graph[net].n_learned * sizeof *s->init->weights[net]->params);
+    return (unsigned)crc;
+}
+
+/* What decides the bytes of the model must be the same everywhere: vectors of another length add in another order. */
+static int agree(const struct ggn_session *s, struct base_err *err)
+{
+    char text[512];
+
+    if (!s->plan->team)
+        return 0;
+    snprintf(text, sizeof text, "version=%s\ninstructions=%s (GGN_ISA)\noptions-and-labels-crc=%08x\ndata-crc=%08x\n"
+             "init-crc=%08x\n", BASE_VERSION, ggn_isa_name(ggn_isa_best()), (unsigned)ggn_resume_key(s), data_crc(&s->set),
+             init_crc(s));
+    return base_team_agree(s->plan->team, text, err);
+}
+
+/* Only rank 0 needs to see the checkpoint. *path is set to NULL where there is none. */
+static int find_checkpoint(const struct ggn_train_plan *plan, const char **path, int *phase, struct base_err *err)
+{
+    struct stat st;
+    int rc = 0, found[2] = {*phase, 0};
+
+    if (base_team_rank(plan->team) == 0 && plan->resume && stat(*path, &st) == 0) {
+        rc = ggn_resume_phase(*path, &found[0], err);
+        found[1] = 1;
+    }
+    if (!rc)
+        rc = base_team_tell(plan->team, found, sizeof found);
+    *phase = found[0];
+    *path = found[1] ? *path : NULL;
+    return rc;
+}
+
+static void tell_traffic(const struct ggn_session *s)
+{
+    const struct base_team_traffic t = base_team_traffic(s->plan->team);
+    double steps = s->plan->steps_r + (double)s->progress.step;
+
+    if (s->plan->team && s->plan->progress)
+        fprintf(s->plan->progress, "%d processes: %.0f messages and %.2f MB per step at rank 0, which waited %.1f s for them\n",
+                base_team_count(s->plan->team), (double)t.messages / steps, (double)t.bytes / steps * 1e-6, t.waiting_s);
+}
+
 int ggn_train(const struct ggn_train_plan *plan, struct base_err *err)
 {
     struct ggn_session s = {.plan = plan};
     char path[4096];
-    struct stat st;
+    const char *checkpoint = path;
     int phase = plan->preset == GGN_PRESET_PAPER ? GGN_PHASE_JUDGE : GGN_PHASE_DENOISER;
 
     ggn_session_path(&s, ".ckpt", path, sizeof path);
-    const char *checkpoint = plan->resume && stat(path, &st) == 0 ? path : NULL;
-    int rc = checkpoint ? ggn_resume_phase(checkpoint, &phase, err) : 0;
+    int rc = find_checkpoint(plan, &checkpoint, &phase, err);
     if (!rc)
         rc = ggn_session_init(&s, err);
     if (!rc)
         announce(&s);
     if (!rc && plan->init)
         rc = ggn_session_load_init(&s, err);
+    if (!rc)
+        rc = agree(&s, err);
     if (!rc && phase == GGN_PHASE_DENOISER) {
         rc = ggn_phase_denoiser(&s, checkpoint, err);
         checkpoint = NULL;
@@ -57,8 +128,10 @@ int ggn_train(const struct ggn_train_plan *plan, struct base_err *err)
         rc = ggn_phase_judge(&s, checkpoint, err);
     if (!rc)
         rc = ggn_session_finish(&s, err);
-    if (!rc)
+    if (!rc && base_team_rank(plan->team) == 0) {
         draw_curves(&s);
+        tell_traffic(&s);
+    }
     ggn_session_release(&s);
     return rc;
 }

@@ -5,6 +5,7 @@
 #include <signal.h>
 #include <stdio.h>
 
+#include "base/team.h"
 #include "data/chains.h"
 #include "model/networks.h"
 
@@ -36,9 +37,10 @@ struct ggn_train_plan {
     int validation_windows; /* most windows per validation */
     double early_rate;      /* share of validation blocks that may be stopped early (ggn_stopping.early_rate) */
     uint32_t seed;
-    int threads;
-    FILE *progress;                           /* lines for people, or NULL */
-    const volatile sig_atomic_t *interrupted; /* checked between steps, or NULL */
+    int threads;                              /* of this process; 0: all that it may use */
+    struct base_team *team;                   /* borrows; the processes that train together, all with this plan; NULL: alone */
+    FILE *progress;                           /* lines for people, or NULL; rank 0 */
+    const volatile sig_atomic_t *interrupted; /* checked between steps, or NULL; rank 0 */
 };
 
 struct ggn_train_plan ggn_train_plan_default(enum ggn_preset preset);

@@ -73,20 +73,6 @@ int pt_crew_nonsense(const struct pt_crew *crew, int rank, struct base_err *err)
 
 /* --- the beginning and the end ---------------------------------------------------------------------------------------- */
 
-/* Names the first line that differs. */
-static int refuse(const struct pt_crew *crew, int rank, const char *theirs, const char *ours, struct base_err *err)
-{
-    while (*theirs != '\0' && *ours != '\0') {
-        int a = (int)strcspn(theirs, "\n"), b = (int)strcspn(ours, "\n");
-        if (a != b || memcmp(theirs, ours, (size_t)a) != 0)
-            return base_fail(err, BASE_EINVAL, "%s has %.*s, but rank 0 has %.*s: give all hosts the same files",
-                             name_of(crew, rank), a, theirs, b, ours);
-        theirs += a + (theirs[a] != '\0');
-        ours += b + (ours[b] != '\0');
-    }
-    return base_fail(err, BASE_EINVAL, "%s has other settings than rank 0", name_of(crew, rank));
-}
-
 /* A message before work begins. */
 static int hear(struct pt_crew *crew, int rank, const struct pt_crew_hello *hello, size_t size, const char *ours,
                 struct base_err *err)
@@ -99,7 +85,7 @@ static int hear(struct pt_crew *crew, int rank, const struct pt_crew_hello *hell
     else if (hello->kind == PT_CREW_FAILED)
         rc = base_fail(err, BASE_EINVAL, "%s: %s", name_of(crew, rank), text);
     else if (strcmp(text, ours) != 0)
-        rc = refuse(crew, rank, text, ours, err);
+        rc = base_peers_differ(crew->peers, rank, text, ours, err);
     free(text);
     if (rc)
         return rc;
@@ -113,7 +99,7 @@ static int hear(struct pt_crew *crew, int rank, const struct pt_crew_hello *hell
 static int lose(struct pt_crew *crew, struct base_err *err, int rank)
 {
     crew->lost = 1;
-    return base_fail(err, BASE_EIO, "%s has not answered for %g s (--rank-timeout)", name_of(crew, rank), crew->timeout_s);
+    return base_peers_give_up(crew->peers, rank, crew->timeout_s, err);
 }
 
 int pt_crew_greet(struct pt_crew *crew, const char *text, struct base_err *err)
@@ -209,9 +195,9 @@ int pt_crew_look_round(struct pt_crew *crew, int (*interrupted)(void *data), voi
 {
     double now_s = base_clock_wall_s();
     if (interrupted && interrupted(data)) {
-        int dead = base_peers_find_dead(crew->peers);
-        crew->lost = dead >= 0;
-        return dead < 0 ? PT_CREW_STOPPED : base_fail(err, BASE_EIO, "%s has died", name_of(crew, dead));
+        int rc = base_peers_mourn(crew->peers, err);
+        crew->lost = rc != 0;
+        return rc ? rc : PT_CREW_STOPPED;
     }
     for (int rank = 1; rank < crew->peers->count; rank++)
         if (crew->mates[rank].parcels > 0 && now_s - crew->mates[rank].since_s > crew->timeout_s)

@@ -81,12 +81,31 @@ int base_peers_threads(const struct base_peers *peers)
     return share < 1 ? 1 : share < available ? (int)share : available;
 }
 
-int base_peers_find_dead(const struct base_peers *peers)
+int base_peers_mourn(const struct base_peers *peers, struct base_err *err)
 {
     for (int i = 0; i < peers->count; i++)
         if (same_host(peers, i) && kill((pid_t)peers->list[i].pid, 0) != 0 && errno == ESRCH)
-            return i;
-    return -1;
+            return base_fail(err, BASE_EIO, "%s has died", peers->list[i].name);
+    return 0;
+}
+
+int base_peers_give_up(const struct base_peers *peers, int rank, double timeout_s, struct base_err *err)
+{
+    return base_fail(err, BASE_EIO, "%s has not answered for %g s (--rank-timeout)", peers->list[rank].name, timeout_s);
+}
+
+int base_peers_differ(const struct base_peers *peers, int rank, const char *theirs, const char *ours, struct base_err *err)
+{
+    const char *name = peers->list[rank].name;
+    while (*theirs != '\0' && *ours != '\0') {
+        int a = (int)strcspn(theirs, "\n"), b = (int)strcspn(ours, "\n");
+        if (a != b || memcmp(theirs, ours, (size_t)a) != 0)
+            return base_fail(err, BASE_EINVAL, "%s has %.*s, but rank 0 has %.*s: give all hosts the same files", name, a,
+                             theirs, b, ours);
+        theirs += a + (theirs[a] != '\0');
+        ours += b + (ours[b] != '\0');
+    }
+    return base_fail(err, BASE_EINVAL, "%s has other settings than rank 0", name);
 }
 
 const char *base_peers_version(void)

@@ -55,8 +55,13 @@ int base_peers_receive(struct base_peers *peers, double wait_s, int *rank, void 
 
 /* Threads for this process: the processors that it may use, or its share of the host's if that is less. NULL is allowed. */
 int base_peers_threads(const struct base_peers *peers);
-/* A process of this host that is no more, -1 if there is none. Of other hosts nothing is known. */
-int base_peers_find_dead(const struct base_peers *peers);
+/* What is said of a process, and by every program in the same words; each fails and returns its code. */
+/* Of one that is no more (BASE_EIO); 0 if all processes of this host are there. Of other hosts nothing is known. */
+int base_peers_mourn(const struct base_peers *peers, struct base_err *err);
+/* Of one that has not answered for so long (BASE_EIO). */
+int base_peers_give_up(const struct base_peers *peers, int rank, double timeout_s, struct base_err *err);
+/* Of one whose lines of key=value are not those of rank 0 (BASE_EINVAL): names the first that differs. */
+int base_peers_differ(const struct base_peers *peers, int rank, const char *theirs, const char *ours, struct base_err *err);
 
 /* "Open MPI v4.1.4 …", or why there is none. Static text. */
 const char *base_peers_version(void);

@@ -45,13 +45,6 @@ t "a data set, each view by all processes" env BUILD="${P%/bin/*}" "$here/../../
 t "  …the view is there" test -s set/train/room/block-00000.lseq
 
 # --- what is said once is said by rank 0 ---
-mpi_refused() { # mpi_refused TEXT N COMMAND...: exit status 2, one line of ours, which contains TEXT
-    n=$((n + 1)); text=$1; shift
-    mpi "$@" >out 2>err; status=$?
-    lines=$(grep -c '^pathtracer: ' err)
-    if [ $status -eq 2 ] && [ "$lines" -eq 1 ] && grep '^pathtracer: ' err | grep -qF -- "$text"; then echo "ok $n - refused: $text"
-    else echo "not ok $n - refused: $text (status $status)"; sed 's/^/# /' err; bad=1; fi
-}
 mpi_refused "--seed" 3 "$P" "$scene" --seed x
 mpi_refused "nowhere.pbrt" 3 "$P" nowhere.pbrt -q
 mpi_refused "cannot write there" 2 "$P" "$scene" -q -o nowhere/a.exr
@@ -79,9 +72,6 @@ fi
 
 # --- faults, on the way through a render of some seconds ---
 long="$scene -q --size 48x32 --block 16 -c fixed -p spp=2500 --spp-min 4 --spp-max 4000 --reproducible -t 1"
-until_there() { i=0; while [ ! -s "$1" ] && [ $i -lt 600 ]; do sleep 0.1; i=$((i + 1)); done; [ -s "$1" ]; }
-rank_of() { tr '\0' '\n' 2>/dev/null <"/proc/$1/environ" | sed -n 's/^OMPI_COMM_WORLD_RANK=//p'; }
-pid_of() { for p in $(pgrep -P $job); do [ "$(rank_of "$p")" = "$1" ] && echo "$p"; done; } # pid_of RANK
 # begin N ARGUMENTS...: in the background, until there is a checkpoint
 begin() {
     ranks=$1; shift
@@ -89,12 +79,6 @@ begin() {
     mpirun --oversubscribe -n "$ranks" "$P" $long --checkpoint c.ckp --checkpoint-every 0.1 -o part.exr "$@" >out 2>err &
     job=$!
     until_there c.ckp || echo "# no checkpoint"
-}
-ended() { # ended NAME STATUS TEXT: the job ends with this status and one line of ours, which contains TEXT
-    n=$((n + 1)); wait $job; status=$?
-    if [ $status -eq "$2" ] && [ "$(grep -c '^pathtracer: ' err)" -eq 1 ] && grep '^pathtracer: ' err | grep -qF -- "$3"; then
-        echo "ok $n - $1"
-    else echo "not ok $n - $1 (status $status)"; sed 's/^/# /' err; bad=1; fi
 }
 t "the render, by one process" "$P" $long -o long.exr
 
@@ -109,7 +93,6 @@ begin 3 --rank-timeout 2
 hung=$(pid_of 1)
 kill -STOP "$hung"
 ended "a process that hangs is named" 2 "rank 1 on host $(hostname) (process $hung) has not answered for 2 s"
-gone() { i=0; while kill -0 "$1" 2>/dev/null && [ $i -lt 100 ]; do sleep 0.1; i=$((i + 1)); done; ! kill -0 "$1" 2>/dev/null; }
 t "  …and is ended" gone "$hung"
 t "  …the checkpoint goes on, with one process" "$P" $long --checkpoint c.ckp --resume -o part.exr
 t "  …to the same image" same long.exr part.exr

@@ -2,12 +2,14 @@
 #include "support/ggn_cmocka.h"
 
 #include <math.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "model/trainer.h"
 #include "nn/hash.h"
+#include "support/base_room.h"
 
 enum { H = 17, W = 21, AREA = H * W, WINDOW = 2, PLANES = 3 * WINDOW, BATCH = 4 };
 
@@ -44,7 +46,8 @@ static int setup(void **state)
 
 static int with_picture; /* of the networks that are made next */
 
-static struct ggn_trainer *make(enum ggn_preset preset, double lr, struct base_threads *threads)
+static struct ggn_trainer *make_one_of(enum ggn_preset preset, double lr, struct base_threads *threads,
+                                        struct base_team *team)
 {
     struct ggn_hyper hyper = {preset, H, W, WINDOW, 4, 6, 4, with_picture};
     struct ggn_train_options options = ggn_train_options_default(preset);
@@ -54,10 +57,15 @@ static struct ggn_trainer *make(enum ggn_preset preset, double lr, struct base_t
     options.dropout = preset == GGN_PRESET_PAPER;
     for (int net = 0; net < GGN_NETS; net++)
         options.lr[net] = lr;
-    struct ggn_trainer *t = ggn_trainer_create(&hyper, &options, threads, &err);
+    struct ggn_trainer *t = ggn_trainer_create(&hyper, &options, threads, team, &err);
     if (!t)
         fail_msg("%s", err.text);
     return t;
+}
+
+static struct ggn_trainer *make(enum ggn_preset preset, double lr, struct base_threads *threads)
+{
+    return make_one_of(preset, lr, threads, NULL);
 }
 
 static double judge(struct ggn_trainer *t)
@@ -279,9 +287,98 @@ static void test_copy(void **state)
     (void)state;
 }
 
+/* --- several processes ------------------------------------------------------------------------------------------------ */
+
+/* One of them: a thread with a trainer of its own, which is given the samples that are its share. */
+struct process {
+    struct base_team *team;
+    struct ggn_trainer *trainer;
+    enum ggn_preset preset;
+    int rc;
+    double loss[6];
+    pthread_t thread;
+};
+
+/* Batches of 4 and of 3, so that shares change; logits are everybody's. */
+static int take_steps(struct process *p)
+{
+    struct base_err err = {0};
+    double logits[BATCH];
+    int rc = 0;
+
+    for (int step = 0; step < 3 && !rc; step++) {
+        const int count = step == 1 ? BATCH - 1 : BATCH, first = (int)base_team_first(p->team, count, base_team_rank(p->team));
+        const float *const none[BATCH] = {NULL};
+        struct ggn_batch b = {.count = count, .noisy = data.p_noisy + first * PLANES, .label = data.label, .picture = none,
+                              .denoised = data.p_denoised + first * PLANES, .reference = data.p_reference + 3 * first};
+        struct ggn_paper_record record;
+        if (p->preset == GGN_PRESET_PAPER) {
+            rc = ggn_trainer_paper_step(p->trainer, &b, &record, &err);
+            p->loss[step] = record.bce_after + record.logit_before[count - 1];
+            continue;
+        }
+        rc = ggn_trainer_denoiser_step(p->trainer, data.p_first + 3 * first, data.p_reference + 3 * first, count,
+                                       &p->loss[step], &err);
+        if (!rc)
+            rc = ggn_trainer_judge_step(p->trainer, &b, &p->loss[3 + step], logits, &err);
+        p->loss[step] += logits[count - 1];
+    }
+    return rc;
+}
+
+static void *train_together(void *data_of)
+{
+    struct process *p = data_of;
+    struct base_err err = {0};
+    p->rc = take_steps(p);
+    p->rc |= base_team_close(p->team, 0, "", &err);
+    return NULL;
+}
+
+static void check_processes(enum ggn_preset preset, int count, const struct process *alone)
+{
+    struct process list[BASE_ROOM_MAX] = {{0}};
+    struct base_room *room = base_room_create(count);
+    struct base_threads *threads = base_threads_create(2, NULL);
+
+    assert_non_null(room);
+    for (int r = 0; r < count; r++) {
+        list[r].preset = preset;
+        assert_int_equal(base_team_create(base_room_of(room, r), &list[r].team, NULL), 0);
+        list[r].trainer = make_one_of(preset, 1e-3, r == 0 ? threads : NULL, list[r].team);
+    }
+    for (int r = 0; r < count; r++)
+        assert_int_equal(pthread_create(&list[r].thread, NULL, train_together, &list[r]), 0);
+    for (int r = 0; r < count; r++)
+        pthread_join(list[r].thread, NULL);
+    for (int r = 0; r < count; r++) {
+        assert_int_equal(list[r].rc, 0);
+        same_state(alone->trainer, list[r].trainer);
+        assert_memory_equal(alone->loss, list[r].loss, sizeof alone->loss);
+        ggn_trainer_destroy(list[r].trainer);
+    }
+    base_threads_destroy(threads);
+    base_room_destroy(room);
+}
+
+/* One process of two threads against 2, 3 and 5, of which some have no sample. */
+static void test_processes(void **state)
+{
+    for (int preset = GGN_PRESET_PAPER; preset <= GGN_PRESET_LULL; preset++) {
+        struct process alone = {.trainer = make((enum ggn_preset)preset, 1e-3, NULL), .preset = (enum ggn_preset)preset};
+        assert_int_equal(take_steps(&alone), 0);
+        const int counts[] = {2, 3, 5};
+        for (int k = 0; k < 3; k++)
+            check_processes((enum ggn_preset)preset, counts[k], &alone);
+        ggn_trainer_destroy(alone.trainer);
+    }
+    (void)state;
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_learns), cmocka_unit_test(test_learns_from_the_picture), cmocka_unit_test(test_resume_and_threads),
-                                       cmocka_unit_test(test_adam), cmocka_unit_test(test_paper), cmocka_unit_test(test_copy)};
+                                       cmocka_unit_test(test_adam), cmocka_unit_test(test_paper), cmocka_unit_test(test_copy),
+                                       cmocka_unit_test(test_processes)};
     return cmocka_run_group_tests(tests, setup, NULL);
 }

@@ -17,7 +17,7 @@
 #include "render/crew_member.h"
 #include "render/crew_messages.h"
 #include "support/pt_fake.h"
-#include "support/pt_peers.h"
+#include "support/base_room.h"
 
 /* DEAF: it samples, but does not answer when the criterion is to be asked. */
 enum behaviour { WORKS, SILENT, BABBLES, FAILS, DEAF, OTHER_SETTINGS };
@@ -136,8 +136,8 @@ static void *member_main(void *arg)
 }
 
 struct stage {
-    struct pt_peers_room *room;
-    struct member members[PT_PEERS_MAX];
+    struct base_room *room;
+    struct member members[BASE_ROOM_MAX];
     int count;
     struct pt_crew *crew;
 };
@@ -145,29 +145,29 @@ struct stage {
 static void assemble(struct stage *stage, int count, int threads, enum behaviour last, double timeout_s)
 {
     struct base_err err = {0};
-    *stage = (struct stage){.room = pt_peers_create(count), .count = count};
+    *stage = (struct stage){.room = base_room_create(count), .count = count};
     assert_non_null(stage->room);
     for (int i = 1; i < count; i++) {
-        stage->members[i] = (struct member){.peers = pt_peers_of(stage->room, i), .threads = threads,
+        stage->members[i] = (struct member){.peers = base_room_of(stage->room, i), .threads = threads,
                                             .behaviour = i == count - 1 ? last : WORKS};
         assert_int_equal(pthread_create(&stage->members[i].thread, NULL, member_main, &stage->members[i]), 0);
     }
-    assert_int_equal(pt_crew_create(pt_peers_of(stage->room, 0), timeout_s, &stage->crew, &err), 0);
+    assert_int_equal(pt_crew_create(base_room_of(stage->room, 0), timeout_s, &stage->crew, &err), 0);
 }
 
 /* lost: the crew cannot be sent home, so that the test does it. */
 static void part(struct stage *stage, int lost)
 {
     pt_crew_dismiss(stage->crew, 2);
-    assert_int_equal(pt_peers_aborted(stage->room), lost);
+    assert_int_equal(base_room_aborted(stage->room), lost);
     for (int i = 1; i < stage->count; i++) {
         struct base_err err = {0};
         uint32_t *end = malloc(sizeof *end);
         *end = PT_CREW_END;
-        base_peers_send(pt_peers_of(stage->room, 0), i, end, sizeof *end, &err); /* nobody reads it who was dismissed */
+        base_peers_send(base_room_of(stage->room, 0), i, end, sizeof *end, &err); /* nobody reads it who was dismissed */
         pthread_join(stage->members[i].thread, NULL);
     }
-    pt_peers_destroy(stage->room);
+    base_room_destroy(stage->room);
 }
 
 /* --- same bytes --------------------------------------------------------------------------------------------------------- */

@@ -1,4 +1,4 @@
-#include "support/pt_peers.h"
+#include "support/base_room.h"
 
 #include <pthread.h>
 #include <stdio.h>
@@ -15,21 +15,21 @@ struct letter {
 
 struct seat {
     struct base_peers face; /* first */
-    struct pt_peers_room *room;
+    struct base_room *room;
     struct letter *first, *last; /* guarded by the room's lock */
 };
 
-struct pt_peers_room {
+struct base_room {
     pthread_mutex_t lock;
     pthread_cond_t arrival;
-    struct base_peer list[PT_PEERS_MAX];
-    struct seat seats[PT_PEERS_MAX];
+    struct base_peer list[BASE_ROOM_MAX];
+    struct seat seats[BASE_ROOM_MAX];
     int count, aborted;
 };
 
 static int post(struct base_peers *face, int rank, void *data, size_t size, struct base_err *err)
 {
-    struct pt_peers_room *room = ((struct seat *)face)->room;
+    struct base_room *room = ((struct seat *)face)->room;
     struct seat *to = &room->seats[rank];
     struct letter *letter = malloc(sizeof *letter);
     if (!letter) {
@@ -51,7 +51,7 @@ static int post(struct base_peers *face, int rank, void *data, size_t size, stru
 static int collect(struct base_peers *face, double wait_s, int *rank, void **data, size_t *size, struct base_err *err)
 {
     struct seat *seat = (struct seat *)face;
-    struct pt_peers_room *room = seat->room;
+    struct base_room *room = seat->room;
     struct timespec until;
     (void)err;
     clock_gettime(CLOCK_REALTIME, &until);
@@ -81,7 +81,7 @@ static void leave(struct base_peers *face)
 
 static void count_abort(struct base_peers *face, int status)
 {
-    struct pt_peers_room *room = ((struct seat *)face)->room;
+    struct base_room *room = ((struct seat *)face)->room;
     (void)status;
     pthread_mutex_lock(&room->lock);
     room->aborted++;
@@ -93,10 +93,10 @@ static const char *version(void)
     return "threads";
 }
 
-struct pt_peers_room *pt_peers_create(int count)
+struct base_room *base_room_create(int count)
 {
     static const struct base_peers_calls calls = {post, collect, leave, count_abort, version};
-    struct pt_peers_room *room = calloc(1, sizeof *room);
+    struct base_room *room = calloc(1, sizeof *room);
     if (!room)
         return NULL;
     pthread_mutex_init(&room->lock, NULL);
@@ -110,12 +110,12 @@ struct pt_peers_room *pt_peers_create(int count)
     return room;
 }
 
-struct base_peers *pt_peers_of(struct pt_peers_room *room, int rank)
+struct base_peers *base_room_of(struct base_room *room, int rank)
 {
     return &room->seats[rank].face;
 }
 
-int pt_peers_aborted(struct pt_peers_room *room)
+int base_room_aborted(struct base_room *room)
 {
     pthread_mutex_lock(&room->lock);
     int n = room->aborted;
@@ -123,7 +123,7 @@ int pt_peers_aborted(struct pt_peers_room *room)
     return n;
 }
 
-void pt_peers_destroy(struct pt_peers_room *room)
+void base_room_destroy(struct base_room *room)
 {
     for (int i = 0; i < room->count; i++)
         while (room->seats[i].first) {

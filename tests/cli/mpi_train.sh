@@ -1,0 +1,82 @@
+#!/bin/sh
+# ggn train and ggn evaluate by several processes: the bytes of one, whatever their number; a process that dies or hangs; the checkpoint
+# of some resumed by others; processes that do not have the same.
+. "$(dirname "$0")/pathtracer_setup"
+. "$here/mpi_setup"
+G=${P%/*}/ggn
+says='ggn [a-z]*'
+data=$here/../data/train-demo
+same() { cmp "$1" "$2"; }
+timeless() { cut -d, -f1-8 "$1"; }
+same_curves() { timeless "$1" >a.txt; timeless "$2" >b.txt; cmp a.txt b.txt; }
+tiny="--data $data --kr 3 --km 3 --kd 4 --crop 32 --ratio 0 --batch 5 --batch-denoiser 4 --picture 0.5"
+
+# --- same bytes ---
+short="$tiny --steps-denoiser 3 --steps 4 --epoch-steps 2 --average 2"
+t "a model by one process" "$G" train $short --out one.ggn --threads 2 -q
+for processes in 2 3 5; do # more than crops in a batch, too
+    t "$processes processes" sh -c "mpirun --oversubscribe -n $processes $G train $short --out many.ggn \
+        --threads $((processes == 3 ? 2 : 1)) 2>said"
+    t "  …the same model" same one.ggn many.ggn
+    t "  …the same curves but for times" same_curves one.ggn.csv many.ggn.csv
+    t "  …progress is told once" test "$(grep -c 'judge  *4/4' said)" -eq 1
+    t "  …and what was sent" grep -q "^$processes processes: [0-9]* messages and [0-9.]* MB per step" said
+    rm -f many.*
+done
+paper="--preset paper $tiny --picture 0 --epochs 1 --batch 100" # three validation chains: as many as processes, below
+t "the published order by one process" "$G" train $paper --out one-paper.ggn -q
+t "  …by three processes" mpi 3 "$G" train $paper --out many.ggn -q
+t "  …the same model" same one-paper.ggn many.ggn
+
+# --- processes that do not have the same: folders of their own stand for hosts ---
+for h in 0 1; do mkdir host$h; cp -r "$data" host$h/data; cp one.ggn host$h/init.ggn; done
+own="--data data --kr 3 --km 3 --kd 4 --crop 32 --ratio 0 --batch 4 --steps-denoiser 1 --steps 1 --picture 0.5"
+each() { mpi_refused "$1" 2 sh -c "cd host\$OMPI_COMM_WORLD_RANK && exec $2 $G train $own --out m.ggn -q $3"; }
+each "has instructions=base (GGN_ISA)" 'env GGN_ISA=$([ $OMPI_COMM_WORLD_RANK = 1 ] && echo base || echo avx512)' ""
+each "has options-and-labels-crc=" "" '--seed $OMPI_COMM_WORLD_RANK'
+each "rank 1 on host $(hostname)" "" '--seed $OMPI_COMM_WORLD_RANK'
+cp one-paper.ggn host1/init.ggn
+each "init.ggn: networks of another" "" "--init init.ggn"
+"$G" train $short --out host1/init.ggn --seed 7 -q
+each "has init-crc=" "" "--init init.ggn"
+swap=$(cd host1/data && ls */*.lseq | head -n 1); other=$(cd host1/data && ls */*.lseq | sed -n 2p)
+mv "host1/data/$swap" x; mv "host1/data/$other" "host1/data/$swap"; mv x "host1/data/$other"
+each "rank " "" "" # by the block's number in the file, or by the pixels
+rm "host1/data/$swap"
+each "$swap: No such file" "" ""
+t "nothing was written where something differed" test ! -e host0/m.ggn -a ! -e host1/m.ggn
+
+# --- faults ---
+long="$tiny --steps-denoiser 40 --steps 20 --epoch-steps 4 -q"
+begin() { # begin N ARGUMENTS...: in the background, until there is a checkpoint
+    ranks=$1; shift
+    rm -f part.*
+    mpirun --oversubscribe -n "$ranks" "$G" train $long --out part.ggn --threads 1 "$@" >out 2>err &
+    job=$!
+    until_there part.ggn.ckpt || echo "# no checkpoint"
+}
+t "a longer training, by one process" "$G" train $long --out long.ggn
+
+begin 3
+killed=$(pid_of 2)
+kill -KILL "$killed"
+ended "a killed process is named, with its host" 137 "rank 2 on host $(hostname) (process $killed) has died"
+t "  …there is no model" test ! -e part.ggn
+t "  …the checkpoint goes on, with two processes" mpi 2 "$G" train $long --out part.ggn --resume
+t "  …to the same model" same long.ggn part.ggn
+
+begin 2 --rank-timeout 2
+hung=$(pid_of 1)
+kill -STOP "$hung"
+ended "a process that hangs is named" 2 "rank 1 on host $(hostname) (process $hung) has not answered for 2 s"
+t "  …and is ended" gone "$hung"
+t "  …the checkpoint goes on, with one process" "$G" train $long --out part.ggn --resume
+t "  …to the same model" same long.ggn part.ggn
+
+begin 2
+kill -INT "$(pid_of 0)"
+ended "interrupted at rank 0" 130 "interrupted; --resume continues"
+t "  …the checkpoint goes on, with three processes" mpi 3 "$G" train $long --out part.ggn --resume
+t "  …to the same model" same long.ggn part.ggn
+t "  …and the same curves" same_curves long.ggn.csv part.ggn.csv
+exit $bad
