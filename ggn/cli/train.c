@@ -82,9 +82,9 @@ int ggn_cmd_train(int argc, char **argv)
 {
     static const struct base_options options = {.list = list,
                                                 .doc = "Trains a stopping criterion on a data set of block sequences.\vThe "
-                                                       "same data, options and seed give the same model "
-                                                       "bytes, also after an interruption and --resume, by any number of threads and "
-                                                       "of processes (mpirun)."};
+                                                       "same data, options and seed give the same model bytes, also "
+                                                       "after an interruption and --resume, with any number of threads "
+                                                       "and (under mpirun) of processes."};
     struct settings s = {.preset = GGN_PRESET_LULL, .rank_timeout_s = 120};
     struct base_err err = {0};
 

@@ -315,7 +315,7 @@ struct maps {
     int step, first;
 };
 
-/* D's input (NFM of denoised, NFM of noisy) from generator outputs, or back for the gradients; count samples of this process. */
+/* D's input (NFM of denoised, NFM of noisy) from generator outputs, or back for the gradients; count: this process's. */
 static void exchange_maps(struct ggn_trainer *t, const struct maps of[2], int count, int back)
 {
     const int out = t->graph[GGN_NET_M].n_values - 1;

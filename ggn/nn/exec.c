@@ -119,7 +119,8 @@ struct ggn_exec *ggn_exec_create_shared(const struct ggn_graph *graph, const str
     if (e)
         *e = (struct ggn_exec){.graph = graph, .kernels = k, .threads = threads, .capacity = here, .flags = flags,
                                .team = team, .images = images, .memory = memory,
-                               .sums = malloc((sums + 1) * sizeof *e->sums), .nodes = malloc((nodes + 1) * sizeof *e->nodes)};
+                               .sums = malloc((sums + 1) * sizeof *e->sums),
+                               .nodes = malloc((nodes + 1) * sizeof *e->nodes)};
     if (!memory || !e->sums || !e->nodes) {
         ggn_exec_destroy(e);
         base_fail_nomem(err, "network activations");

@@ -59,8 +59,8 @@ size_t ggn_exec_bytes(const struct ggn_graph *graph, int capacity, int flags, in
 /* `kernels` must be those of the weights (NULL = the best). NULL on failure. */
 struct ggn_exec *ggn_exec_create(const struct ggn_graph *graph, const struct ggn_kernels *kernels, int capacity, int flags,
                                  struct base_threads *threads, struct base_err *err);
-/* For batches that a team shares: capacity is that of all processes, of which base_team_most(team, capacity / images) · images
- * find room in this one. capacity is below 4096 and a multiple of `images`, the images that make one sample. */
+/* For batches that a team shares: capacity is that of all processes, of which base_team_most(team, capacity / images) ·
+ * images find room in this one. capacity is below 4096 and a multiple of `images`, the images that make one sample. */
 struct ggn_exec *ggn_exec_create_shared(const struct ggn_graph *graph, const struct ggn_kernels *kernels, int capacity,
                                         int flags, struct base_threads *threads, struct base_team *team, int images,
                                         struct base_err *err);
@@ -75,8 +75,8 @@ real *ggn_exec_grad(const struct ggn_exec *exec, int value, int n, int c);
 /* Copies one plane of the size of `v` from rows that lie `row` apart to rows as `v` has them. */
 void ggn_plane_copy(const struct ggn_value *v, real *to, const real *from, int row);
 
-/* Images 0..batch−1; of a shared executor in GGN_TRAIN: the images of all processes, of which those of this one are filled in,
- * numbered from 0. GGN_TRAIN updates the running statistics in `weights` (not the packed ones: pack before evaluating). */
+/* Images 0..batch−1; of a shared executor in GGN_TRAIN: the images of all processes, of which those of this one are filled
+ * in, numbered from 0. GGN_TRAIN updates the running statistics in `weights` (not the packed ones: pack before evaluating). */
 void ggn_exec_forward(struct ggn_exec *exec, struct ggn_weights *weights, int batch, enum ggn_mode mode);
 /* Adds to params_grad [n_params]. Activations stay, so that it may be called again for another gradient of the output. */
 void ggn_exec_backward(struct ggn_exec *exec, const struct ggn_weights *weights, real *params_grad);

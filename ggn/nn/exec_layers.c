@@ -36,8 +36,8 @@ static void bn_image(void *data, long i, int worker)
     (void)worker;
 }
 
-/* Batch statistics of channel c from those of the images (Chan, Golub & LeVeque 1979): biased variance to normalise, unbiased
- * for the running estimate. */
+/* Batch statistics of channel c from those of the images (Chan, Golub & LeVeque 1979): biased variance to normalise,
+ * unbiased for the running estimate. */
 static void bn_statistics(const struct ggn_task *t, long c)
 {
     const struct ggn_value *v = &t->e->graph->value[t->l->out];

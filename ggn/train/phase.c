@@ -40,8 +40,7 @@ static int write_files(struct ggn_session *s, struct base_err *err)
     return ggn_resume_save(s, path, err);
 }
 
-/* Rank 0 decides when to stop, so that all do it after the same step. Processes are also asked to stop when one of them has died.
- */
+/* Rank 0 decides when to stop, so that all do it after the same step. It is also asked to stop when a process has died. */
 static int asked_to_stop(const struct ggn_session *s)
 {
     int stop = s->plan->interrupted && *s->plan->interrupted;

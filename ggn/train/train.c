@@ -99,7 +99,7 @@ static void tell_traffic(const struct ggn_session *s)
     double steps = s->plan->steps_r + (double)s->progress.step;
 
     if (s->plan->team && s->plan->progress)
-        fprintf(s->plan->progress, "%d processes: %.0f messages and %.2f MB per step at rank 0, which waited %.1f s for them\n",
+        fprintf(s->plan->progress, "%d processes: %.0f messages, %.2f MB per step at rank 0, which waited %.1f s for them\n",
                 base_team_count(s->plan->team), (double)t.messages / steps, (double)t.bytes / steps * 1e-6, t.waiting_s);
 }
 

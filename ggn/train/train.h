@@ -14,7 +14,8 @@
 
 #include "train/train_plan.h"
 
-/* Runs the plan; of several processes rank 0 reads and writes the files beside the model. GGN_TRAIN_INTERRUPTED: the checkpoint of the last finished epoch is there. */
+/* Runs the plan; of several processes rank 0 reads and writes the files beside the model. GGN_TRAIN_INTERRUPTED: the
+ * checkpoint of the last finished epoch is there. */
 int ggn_train(const struct ggn_train_plan *plan, struct base_err *err);
 
 #endif

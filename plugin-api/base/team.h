@@ -22,8 +22,8 @@ struct base_team;
 int base_team_open(struct base_team **out, struct base_err *err);
 /* Of peers that are there already and become the team's own. */
 int base_team_create(struct base_peers *peers, struct base_team **out, struct base_err *err);
-/* The end of this process's part: what went wrong (text, of status not 0) reaches rank 0. There it returns the exit status of
- * all, after everybody's part has ended: its own, else the first other that is not 0, with its text in *err. A team that
+/* The end of this process's part: what went wrong (text, of status not 0) reaches rank 0. There it returns the exit status
+ * of all, after everybody's part has ended: its own, else the first other that is not 0, with its text in *err. A team that
  * has lost somebody ends here and now. Releases the team. NULL is allowed. */
 int base_team_close(struct base_team *team, int status, const char *text, struct base_err *err);
 
@@ -56,7 +56,8 @@ int base_team_gather(struct base_team *team, void *all, const size_t *start);
 /* The same of n items of `size` bytes, shared out as base_team_first says. */
 int base_team_gather_items(struct base_team *team, void *items, size_t size, long n);
 /* Hands bytes to rank 0, which gets everybody's [count], but for its own; they may be written into and are there until the
- * next call, which must be base_team_tell: else somebody could be a call ahead. NULL at the others, without team, and after a failure. */
+ * next call, which must be base_team_tell: else somebody could be a call ahead. NULL at the others, without team, and after
+ * a failure. */
 struct base_team_part {
     void *data;
     size_t size;

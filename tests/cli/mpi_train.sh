@@ -20,7 +20,7 @@ for processes in 2 3 5; do # more than crops in a batch, too
     t "  …the same model" same one.ggn many.ggn
     t "  …the same curves but for times" same_curves one.ggn.csv many.ggn.csv
     t "  …progress is told once" test "$(grep -c 'judge  *4/4' said)" -eq 1
-    t "  …and what was sent" grep -q "^$processes processes: [0-9]* messages and [0-9.]* MB per step" said
+    t "  …and what was sent" grep -q "^$processes processes: [0-9]* messages, [0-9.]* MB per step" said
     rm -f many.*
 done
 paper="--preset paper $tiny --picture 0 --epochs 1 --batch 100" # three validation chains: as many as processes, below
