@@ -76,7 +76,8 @@ real *ggn_exec_grad(const struct ggn_exec *exec, int value, int n, int c);
 void ggn_plane_copy(const struct ggn_value *v, real *to, const real *from, int row);
 
 /* Images 0..batch−1; of a shared executor in GGN_TRAIN: the images of all processes, of which those of this one are filled
- * in, numbered from 0. GGN_TRAIN updates the running statistics in `weights` (not the packed ones: pack before evaluating). */
+ * in, numbered from 0. GGN_TRAIN updates the running statistics in `weights` (not the packed ones: pack before evaluating).
+ */
 void ggn_exec_forward(struct ggn_exec *exec, struct ggn_weights *weights, int batch, enum ggn_mode mode);
 /* Adds to params_grad [n_params]. Activations stay, so that it may be called again for another gradient of the output. */
 void ggn_exec_backward(struct ggn_exec *exec, const struct ggn_weights *weights, real *params_grad);

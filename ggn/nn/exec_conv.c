@@ -202,7 +202,8 @@ static void conv_weight_back(void *data, long i, int worker)
 {
     const struct ggn_task *t = data;
     const int n_in = ggn_layer_c_in(t->e->graph, t->l), c_out = t->e->graph->value[t->l->out].c;
-    const int tile = t->e->kernels->tile_oc, groups = (n_in + GGN_GRAD_IC - 1) / GGN_GRAD_IC, taps = t->l->kernel * t->l->kernel;
+    const int tile = t->e->kernels->tile_oc, groups = (n_in + GGN_GRAD_IC - 1) / GGN_GRAD_IC;
+    const int taps = t->l->kernel * t->l->kernel;
     struct weight_part p = {.oc = (int)(i / groups) * tile, .ic0 = (int)(i % groups) * GGN_GRAD_IC};
     const int oc_end = p.oc + tile < c_out ? p.oc + tile : c_out;
     real *acc = t->e->scratch + (size_t)worker * t->e->scratch_size;
