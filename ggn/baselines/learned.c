@@ -45,13 +45,17 @@ int ggn_looks_make(struct ggn_looks *t, const struct ggn_baseline *b, const stru
     struct looking j = {b, s, t};
     size_t rows = 0;
     *t = (struct ggn_looks){.size = ggn_baseline_look_size(b, s->chains.width, s->chains.height),
-                            .first = malloc((size_t)s->n_blocks * sizeof *t->first)};
+                            .first = malloc(((size_t)s->n_blocks + 1) * sizeof *t->first)};
     for (int k = 0; k < s->n_blocks && t->first; k++) {
         t->first[k] = rows;
         rows += (size_t)s->chains.chains[s->blocks[k].chain].n_levels;
     }
+    if (t->first)
+        t->first[s->n_blocks] = rows;
     t->x = malloc(rows * t->size * sizeof *t->x);
     int rc = !t->first || !t->x ? base_fail_nomem(err, "baseline") : ggn_eval_each_block(s, threads, look_at_block, &j, err);
+    if (!rc)
+        rc = ggn_eval_share(s, t->x, t->size * sizeof *t->x, t->first, err);
     if (rc)
         ggn_looks_release(t);
     return rc;
@@ -234,6 +238,8 @@ int ggn_method_baseline(struct ggn_method *m, const struct ggn_eval_set *s, cons
     m->cut = b->policy.threshold;
     m->passes = b->policy.passes;
     rc = ggn_eval_each_block(s, threads, judge_block, &j, err);
+    if (!rc)
+        rc = ggn_eval_share(s, m->score, sizeof *m->score, NULL, err);
     if (rc)
         ggn_method_release(m);
     else

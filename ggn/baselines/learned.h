@@ -13,7 +13,7 @@
 /* What a baseline sees of every level of a set's blocks: [level][size]. */
 struct ggn_looks {
     size_t size;   /* numbers per level */
-    size_t *first; /* owns; [blocks]: row of the block's level 0 */
+    size_t *first; /* owns; [blocks + 1]: row of the block's level 0 */
     double *x;     /* owns; [rows][size] */
 };
 

@@ -371,49 +371,71 @@ static int report(struct job *j, int skipped, struct base_err *err)
     return rc;
 }
 
+static int load(struct job *j, struct base_threads *threads, int *skipped, struct base_err *err)
+{
+    const struct options *o = j->o;
+    const char *files[2 * MAX_FILES + MAX_MODELS + 1];
+    int window, n = 0, rc = load_models(j, &window, err);
+
+    for (int i = 0; i < o->n_models; i++)
+        files[n++] = o->models[i];
+    for (int i = 0; i < o->n_thresholds; i++)
+        files[n++] = o->thresholds[i];
+    for (int i = 0; i < o->n_trained; i++)
+        files[n++] = o->trained[i];
+    if (o->observer)
+        files[n++] = o->observer;
+    struct ggn_eval_options eo = {.dir = o->data, .window = window, .quality = !o->no_quality, .recorded = o->recorded,
+                                  .ratio = o->ratio, .seed = 1, .team = ggn_cmd_team, .files = files, .n_files = n};
+    for (int i = 0; i < o->n_models && !rc && !o->no_pictures; i++)
+        eo.pictures |= j->models[i]->hyper.picture;
+    return rc ? rc : ggn_eval_set_load(&j->set, &eo, threads, skipped, err);
+}
+
+static int measure(struct job *j, struct base_threads *threads, struct base_err *err)
+{
+    j->tuning = ggn_eval_count(&j->set, GGN_SPLIT_TRAIN) > 0 ? GGN_SPLIT_TRAIN : j->set.blocks[0].split;
+    j->tuning_models = ggn_eval_count(&j->set, GGN_SPLIT_VALIDATION) > 0 ? GGN_SPLIT_VALIDATION : j->tuning;
+    int rc = add_trivial(j, err);
+    if (!rc)
+        rc = add_observed(j, err);
+    if (!rc)
+        rc = add_baselines(j, threads, err);
+    return rc ? rc : add_models(j, threads, err);
+}
+
 int ggn_cmd_evaluate(int argc, char **argv)
 {
     static const struct base_options options = {
         .list = list,
         .doc =
             "Measures models, the trivial baselines and the criteria halfbuf and variance on the same recorded sequences, "
-            "separately for training, validation and test scenes and for views that people judged."};
-    struct options o = {.early = 0.05, .threads = base_threads_available(), .window = 6, .epochs = 15};
+            "separately for training, validation and test scenes and for views that people judged. Under mpirun the "
+            "processes share out the blocks."};
+    struct options o = {.early = 0.05, .threads = base_team_threads(ggn_cmd_team), .window = 6, .epochs = 15};
+    const int speaks = base_team_rank(ggn_cmd_team) == 0;
     struct job j = {.o = &o};
     struct base_err err = {0};
-    int window, skipped = 0;
+    int skipped = 0;
 
     if (base_options_parse(&options, argc, argv, &o, &err))
         return ggn_cmd_fail(argv[0], &err);
-    if (o.bf16 && !ggn_precision_has_bf16())
+    if (speaks && o.bf16 && !ggn_precision_has_bf16())
         fprintf(stderr, "%s: this processor has no bfloat16 products: --bf16 judges in float\n", argv[0]);
+    if (ggn_cmd_team)
+        ggn_cmd_catch_interrupt(); /* that is how MPI says that a process has died */
+    ggn_cmd_follow_rank_0();
     for (int i = 0; i < MAX_METHODS; i++)
         j.likened[i] = -1;
     struct base_threads *threads = base_threads_create(o.threads, &err);
     int rc = !threads ? err.code : 0;
-    if (!rc && o.out && mkdir(o.out, 0777) != 0 && errno != EEXIST)
+    if (!rc && speaks && o.out && mkdir(o.out, 0777) != 0 && errno != EEXIST)
         rc = base_fail(&err, BASE_EIO, "%s: %s", o.out, strerror(errno));
     if (!rc)
-        rc = load_models(&j, &window, &err);
-    if (!rc) {
-        struct ggn_eval_options eo = {
-            .dir = o.data, .window = window, .quality = !o.no_quality, .recorded = o.recorded, .ratio = o.ratio, .seed = 1};
-        for (int i = 0; i < o.n_models && !o.no_pictures; i++)
-            eo.pictures |= j.models[i]->hyper.picture;
-        rc = ggn_eval_set_load(&j.set, &eo, threads, &skipped, &err);
-    }
-    if (!rc) {
-        j.tuning = ggn_eval_count(&j.set, GGN_SPLIT_TRAIN) > 0 ? GGN_SPLIT_TRAIN : j.set.blocks[0].split;
-        j.tuning_models = ggn_eval_count(&j.set, GGN_SPLIT_VALIDATION) > 0 ? GGN_SPLIT_VALIDATION : j.tuning;
-        rc = add_trivial(&j, &err);
-    }
-    if (!rc)
-        rc = add_observed(&j, &err);
-    if (!rc)
-        rc = add_baselines(&j, threads, &err);
-    if (!rc)
-        rc = add_models(&j, threads, &err);
-    if (!rc)
+        rc = load(&j, threads, &skipped, &err);
+    if (!rc && !ggn_cmd_interrupted)
+        rc = measure(&j, threads, &err);
+    if (!rc && !ggn_cmd_interrupted && speaks)
         rc = report(&j, skipped, &err);
     for (int i = 0; i < j.n; i++)
         ggn_method_release(&j.methods[i]);
@@ -421,5 +443,5 @@ int ggn_cmd_evaluate(int argc, char **argv)
     for (int i = 0; i < o.n_models; i++)
         ggn_model_destroy(j.models[i]);
     base_threads_destroy(threads);
-    return !rc ? GGN_EXIT_OK : ggn_cmd_fail(argv[0], &err);
+    return rc ? ggn_cmd_fail(argv[0], &err) : ggn_cmd_interrupted ? GGN_EXIT_INTERRUPTED : GGN_EXIT_OK;
 }

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/colour.h"
+#include "data/agree.h"
 #include "nn/ssim.h"
 #include "observer/curve.h"
 #include "observer/flip.h"
@@ -70,9 +71,10 @@ static int list_blocks(struct ggn_eval_set *s, int *skipped, struct base_err *er
     return 0;
 }
 
+enum { COLUMNS = 11 };
+
 static int make_columns(struct ggn_eval_set *s, struct base_err *err)
 {
-    enum { COLUMNS = 11 };
     double **columns[COLUMNS] = {&s->spp, &s->seconds, &s->dammertz, &s->half_unsettled, &s->rse, &s->rse_unsettled,
                                  &s->flip, &s->ssim, &s->visible, &s->texture, &s->relmse};
     double *all = malloc(COLUMNS * s->n * sizeof *all);
@@ -99,6 +101,7 @@ static int make_columns(struct ggn_eval_set *s, struct base_err *err)
 /* --- blocks in parallel --- */
 
 struct each {
+    long first; /* block of this process */
     int (*fn)(void *, int, int, struct base_err *);
     void *data;
     int *rc;
@@ -108,25 +111,41 @@ struct each {
 static void each_block(void *data, long i, int worker)
 {
     struct each *e = data;
+    i += e->first;
     e->rc[i] = e->fn(e->data, (int)i, worker, &e->errs[i]);
 }
 
 int ggn_eval_each_block(const struct ggn_eval_set *set, struct base_threads *threads,
-                        int (*fn)(void *data, int block, int worker, struct base_err *err), void *data, struct base_err *err)
+                        int (*fn)(void *data, int block, int worker, struct base_err *err), void *data,
+                        struct base_err *err)
 {
-    int n = set->n_blocks, rc = 0;
-    struct each e = {.fn = fn, .data = data, .rc = calloc((size_t)n, sizeof(int)),
-                     .errs = calloc((size_t)n, sizeof(struct base_err))};
+    int n = set->n_blocks, rc = 0, rank = base_team_rank(set->team);
+    struct each e = {.first = base_team_first(set->team, n, rank), .fn = fn, .data = data,
+                     .rc = calloc((size_t)n, sizeof(int)), .errs = calloc((size_t)n, sizeof(struct base_err))};
     if (!e.rc || !e.errs)
         rc = base_fail_nomem(err, "evaluation");
     else
-        base_threads_for(threads, n, each_block, &e);
+        base_threads_for(threads, base_team_first(set->team, n, rank + 1) - e.first, each_block, &e);
     for (int i = 0; i < n && !rc; i++)
         if (e.rc[i] != 0)
             rc = base_fail(err, e.rc[i], "%s", e.errs[i].text);
     free(e.rc);
     free(e.errs);
     return rc;
+}
+
+int ggn_eval_share(const struct ggn_eval_set *s, void *values, size_t size, const size_t *begin, struct base_err *err)
+{
+    size_t *start = malloc(((size_t)base_team_count(s->team) + 1) * sizeof *start);
+    if (!start)
+        return base_fail_nomem(err, "evaluation");
+    for (int r = 0; r <= base_team_count(s->team); r++) {
+        long b = base_team_first(s->team, s->n_blocks, r);
+        start[r] = size * (begin ? begin[b] : b < s->n_blocks ? s->blocks[b].first : s->n);
+    }
+    base_team_gather(s->team, values, start);
+    free(start);
+    return base_team_failed(s->team, err);
 }
 
 /* --- statistics and quality --- */
@@ -365,7 +384,7 @@ static int extend(struct ggn_chains *chains, double cadence, uint32_t seed, stru
 int ggn_eval_set_load(struct ggn_eval_set *out, const struct ggn_eval_options *o, struct base_threads *threads, int *skipped,
                       struct base_err *err)
 {
-    struct ggn_eval_set s = {.window = o->window};
+    struct ggn_eval_set s = {.window = o->window, .team = o->team};
     struct ggn_chains_options co = {.dir = o->dir, .ratio = o->ratio, .with_test = 1, .pictures = o->pictures};
     struct fill f = {&s, o->quality, o->no_ssim};
     int rc = ggn_chains_load(&s.chains, &co, err);
@@ -378,7 +397,11 @@ int ggn_eval_set_load(struct ggn_eval_set *out, const struct ggn_eval_options *o
     if (!rc)
         rc = make_columns(&s, err);
     if (!rc)
+        rc = ggn_agree(s.team, &s.chains, o->files, o->n_files, 0, err);
+    if (!rc)
         rc = ggn_eval_each_block(&s, threads, fill_block, &f, err);
+    for (size_t c = 0; c < COLUMNS && !rc; c++)
+        rc = ggn_eval_share(&s, s.spp + c * s.n, sizeof *s.spp, NULL, err);
     if (rc)
         ggn_eval_set_release(&s);
     else

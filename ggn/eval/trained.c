@@ -77,6 +77,9 @@ int ggn_eval_trained(struct ggn_method *m, const struct ggn_eval_set *s, const s
         rc = ggn_viewer_init(&r.viewers[made], model, precision, &s->chains, err);
     if (!rc)
         rc = ggn_eval_each_block(s, threads, judge_block, &r, err);
+    double *const columns[] = {m->score, m->verdict, m->own_guard};
+    for (int i = 0; i < 3 && !rc; i++)
+        rc = ggn_eval_share(s, columns[i], sizeof *columns[i], NULL, err);
     for (int i = 0; i < made; i++)
         ggn_viewer_release(&r.viewers[i]);
     free(r.viewers);

@@ -2,10 +2,8 @@
 
 #include <stdio.h>
 #include <sys/stat.h>
-#include <zlib.h>
 
-#include "base/version.h"
-#include "nn/isa.h"
+#include "data/agree.h"
 #include "train/finish.h"
 #include "train/phase_denoiser.h"
 #include "train/phase_judge.h"
@@ -38,43 +36,6 @@ static void draw_curves(const struct ggn_session *s)
 }
 
 /* --- several processes ------------------------------------------------------------------------------------------------ */
-
-static unsigned data_crc(const struct ggn_chains *set)
-{
-    const size_t values = ggn_chains_values(set);
-    uLong crc = crc32(0, NULL, 0);
-
-    for (int i = 0; i < set->n; i++) {
-        const struct ggn_chain *c = &set->chains[i];
-        crc = crc32_z(crc, c->noisy, (size_t)c->n_levels * values);
-        crc = crc32_z(crc, c->reference, c->reference ? values : 0);
-        crc = crc32_z(crc, c->picture, c->picture ? (size_t)c->n_levels * values / 3 : 0);
-    }
-    return (unsigned)crc;
-}
-
-static unsigned init_crc(const struct ggn_session *s)
-{
-    uLong crc = crc32(0, NULL, 0);
-
-    for (int net = 0; s->init && net < GGN_NETS; net++)
-        crc = crc32_z(crc, (const Bytef *)s->init->weights[net]->params,
-                      s->init->graph[net].n_learned * sizeof *s->init->weights[net]->params);
-    return (unsigned)crc;
-}
-
-/* What decides the bytes of the model must be the same everywhere: vectors of another length add in another order. */
-static int agree(const struct ggn_session *s, struct base_err *err)
-{
-    char text[512];
-
-    if (!s->plan->team)
-        return 0;
-    snprintf(text, sizeof text, "version=%s\ninstructions=%s (GGN_ISA)\noptions-and-labels-crc=%08x\ndata-crc=%08x\n"
-             "init-crc=%08x\n", BASE_VERSION, ggn_isa_name(ggn_isa_best()), (unsigned)ggn_resume_key(s), data_crc(&s->set),
-             init_crc(s));
-    return base_team_agree(s->plan->team, text, err);
-}
 
 /* Only rank 0 needs to see the checkpoint. *path is set to NULL where there is none. */
 static int find_checkpoint(const struct ggn_train_plan *plan, const char **path, int *phase, struct base_err *err)
@@ -119,7 +80,7 @@ int ggn_train(const struct ggn_train_plan *plan, struct base_err *err)
     if (!rc && plan->init)
         rc = ggn_session_load_init(&s, err);
     if (!rc)
-        rc = agree(&s, err);
+        rc = ggn_agree(plan->team, &s.set, &plan->init, plan->init != NULL, ggn_resume_key(&s), err);
     if (!rc && phase == GGN_PHASE_DENOISER) {
         rc = ggn_phase_denoiser(&s, checkpoint, err);
         checkpoint = NULL;

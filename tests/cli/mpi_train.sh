@@ -28,17 +28,31 @@ t "the published order by one process" "$G" train $paper --out one-paper.ggn -q
 t "  …by three processes" mpi 3 "$G" train $paper --out many.ggn -q
 t "  …the same model" same one-paper.ggn many.ggn
 
+# --- evaluation ---
+t "tables by one process" sh -c "$G evaluate -d $data -m one.ggn -o one-figures >one.txt"
+for processes in 2 3 5; do
+    rm -rf many-figures
+    t "tables by $processes processes" sh -c "mpirun --oversubscribe -n $processes $G evaluate -d $data -m one.ggn \
+        -o many-figures >many.txt"
+    t "  …the same tables" same one.txt many.txt
+    t "  …the same figures" diff -r one-figures many-figures
+done
+for h in 0 1; do mkdir -p host$h; cp one.ggn host$h/model.ggn; done
+mpi_refused "a.ggn: No such file" 3 "$G" evaluate -d "$data" -m a.ggn
+printf x >>host1/model.ggn
+mpi_refused "rank 1 on host $(hostname)" 2 sh -c "cd host\$OMPI_COMM_WORLD_RANK && exec $G evaluate -d $data -m model.ggn"
+
 # --- processes that do not have the same: folders of their own stand for hosts ---
-for h in 0 1; do mkdir host$h; cp -r "$data" host$h/data; cp one.ggn host$h/init.ggn; done
+for h in 0 1; do cp -r "$data" host$h/data; cp one.ggn host$h/init.ggn; done
 own="--data data --kr 3 --km 3 --kd 4 --crop 32 --ratio 0 --batch 4 --steps-denoiser 1 --steps 1 --picture 0.5"
 each() { mpi_refused "$1" 2 sh -c "cd host\$OMPI_COMM_WORLD_RANK && exec $2 $G train $own --out m.ggn -q $3"; }
 each "has instructions=base (GGN_ISA)" 'env GGN_ISA=$([ $OMPI_COMM_WORLD_RANK = 1 ] && echo base || echo avx512)' ""
-each "has options-and-labels-crc=" "" '--seed $OMPI_COMM_WORLD_RANK'
-each "rank 1 on host $(hostname)" "" '--seed $OMPI_COMM_WORLD_RANK'
+each "has options-crc=" "" '--lr 0.01$OMPI_COMM_WORLD_RANK'
+each "rank 1 on host $(hostname)" "" '--seed $OMPI_COMM_WORLD_RANK' # of which synthetic data are a function
 cp one-paper.ggn host1/init.ggn
 each "init.ggn: networks of another" "" "--init init.ggn"
 "$G" train $short --out host1/init.ggn --seed 7 -q
-each "has init-crc=" "" "--init init.ggn"
+each "has files-crc=" "" "--init init.ggn"
 swap=$(cd host1/data && ls */*.lseq | head -n 1); other=$(cd host1/data && ls */*.lseq | sed -n 2p)
 mv "host1/data/$swap" x; mv "host1/data/$other" "host1/data/$swap"; mv x "host1/data/$other"
 each "rank " "" "" # by the block's number in the file, or by the pixels
