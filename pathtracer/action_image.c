@@ -34,6 +34,26 @@ int pt_action_after_slice(void *data, struct pt_render *render, struct base_err 
     return 0;
 }
 
+/* The picture so far: after the first slice, then when three times as long has passed, at most so often that it takes a
+ * hundredth of the time. One that cannot be written costs nothing yet: the last one is what fails. */
+static void show_preview(struct pt_session *s, const struct pt_render *render)
+{
+    const double ratio = 3.0, longest_s = 60.0, share = 0.01;
+    struct base_err ignored = {0};
+    double begin_s = base_clock_wall_s();
+    pt_output_preview(s->cli.preview, render, &ignored);
+    double now_s = base_clock_wall_s();
+    s->preview_at_s = now_s + fmax(fmin(ratio * (now_s - s->start_s), longest_s), (now_s - begin_s) / share);
+}
+
+static int after_slice_of_image(void *data, struct pt_render *render, struct base_err *err)
+{
+    struct pt_session *s = data;
+    if (s->cli.preview && !pt_interrupted(NULL) && base_clock_wall_s() >= s->preview_at_s)
+        show_preview(s, render);
+    return pt_action_after_slice(data, render, err);
+}
+
 int pt_action_suspend(void *data, struct pt_render *render, struct base_err *err)
 {
     struct pt_session *s = data;
@@ -130,7 +150,7 @@ int pt_action_image(struct pt_session *s, int *status, struct base_err *err)
     int rc = pt_action_open_render(s, err);
     if (rc)
         return rc;
-    struct pt_render_hooks hooks = {.slice = pt_action_after_slice, .interrupted = pt_interrupted,
+    struct pt_render_hooks hooks = {.slice = after_slice_of_image, .interrupted = pt_interrupted,
                                     .suspend = pt_action_suspend, .warn = pt_say, .data = s};
     s->checkpoint_at_s = base_clock_wall_s() + s->cli.checkpoint_every_s;
     rc = pt_render_run(s->render, &hooks, &outcome, err);

@@ -261,7 +261,7 @@ static const struct base_option options[] = {
     {.help = "What to write:"},
     {"output", 'o', "FILE.exr", TO(output), .output = 1, .words = exr,
      .help = "Multi-layer EXR (default: the scene's name in the current folder, if nothing else is asked for)"},
-    {"preview", 0, "FILE.png", TO(preview), .output = 1, .words = png, .help = "The image as sRGB"},
+    {"preview", 0, "FILE.png", TO(preview), .output = 1, .words = png, .help = "The image as sRGB, also while rendering"},
     {"stop-map", 0, "FILE.png|FILE.csv", .set = set_stop_map,
      .help = "Samples per block as a picture or a table; may be repeated"},
     {"report", 0, "FILE.json", TO(report), .output = 1, .words = json, .help = "Everything about the run"},

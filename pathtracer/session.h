@@ -33,6 +33,7 @@ struct pt_session {
     const char *kernel_name;
     char settings[4096];    /* what decides the image, for checkpoints */
     double checkpoint_at_s; /* wall time of the next one */
+    double preview_at_s;    /* likewise, while rendering */
     char default_output[1024];
 };
 

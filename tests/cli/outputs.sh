@@ -151,6 +151,13 @@ if [ -c /dev/full ]; then
     full "$bin/lull-check" --version
 fi
 
+# --- a preview while rendering ---
+"$P" room.pbrt -q -c null --spp-max 100000000 --time-budget 120 --preview early.png & early=$!
+for i in $(seq 300); do [ -s early.png ] && break; sleep 0.2; done
+t "a preview is there while the render goes on" sh -c "kill -0 $early && oiiotool --info early.png"
+kill -INT $early; wait $early
+t "  …and one of the end" oiiotool --info early.png
+
 # --- pictures: the image library is loaded by who reads one ---
 mkdir -p alone/bin && cp "$P" alone/bin
 t "a scene without pictures is rendered without the image library" alone/bin/pathtracer room.pbrt -q --spp 1 --preview plain.png
