@@ -8,9 +8,11 @@
 #include <stdint.h>
 
 #include <cmocka.h>
+#include <glob.h>
 #include <math.h>
 
 #include "geom/accel.h"
+#include "pbrt/load.h"
 #include "scene/settings.h"
 #include "support/pt_scenes.h"
 
@@ -247,11 +249,49 @@ static void delta_lights_by_both_selections(void **state)
     judge("lights without size");
 }
 
+static struct pt_scene *load(const char *path, int32_t selection)
+{
+    enum { SIZE = 32 };
+    const struct pt_load_options options = {.width = SIZE, .height = SIZE, .quiet = 1, .light_selection = selection};
+    struct pt_scene_defaults defaults;
+    struct pt_scene *scene = NULL;
+    struct base_err err = {0};
+    if (pt_scene_load(path, &options, &scene, &defaults, &err) != 0)
+        fail_msg("%s", err.text);
+    return scene;
+}
+
+/* Every scene of ours that has a hierarchy, against selection by power. */
+static void scenes_by_both_selections(void **state)
+{
+    (void)state;
+    glob_t found;
+    int compared = 0;
+    assert_int_equal(glob("scenes/*.pbrt", 0, NULL, &found), 0);
+    for (size_t i = 0; i < found.gl_pathc; i++) {
+        struct pt_scene *hierarchy = load(found.gl_pathv[i], PT_LIGHT_SELECTION_HIERARCHY);
+        if (hierarchy->light_tree) {
+            struct pt_scene *power = load(found.gl_pathv[i], PT_LIGHT_SELECTION_POWER);
+            assert_null(power->light_tree);
+            clear();
+            accumulate(hierarchy, PT_STRATEGY_MIS, PT_SAMPLER_INDEPENDENT, 7, 32, a);
+            accumulate(power, PT_STRATEGY_MIS, PT_SAMPLER_INDEPENDENT, 8, 32, b);
+            judge(found.gl_pathv[i]);
+            pt_scene_destroy(power);
+            compared++;
+        }
+        pt_scene_destroy(hierarchy);
+    }
+    globfree(&found);
+    assert_true(compared >= 10);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(cornell), cmocka_unit_test(glossy), cmocka_unit_test(environment), cmocka_unit_test(fog),
         cmocka_unit_test(many_lights), cmocka_unit_test(many_lights_in_fog), cmocka_unit_test(delta_lights_by_both_selections),
+        cmocka_unit_test(scenes_by_both_selections),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
