@@ -281,9 +281,9 @@ def main():
                 h.mount(rng.choice(TMPFS_K))
                 counts["tmpfs"] = counts.get("tmpfs", 0) + h.mounted
             (image_history if image else recording_history)(h, events, reference)
-        except Broken as why:
+        except (Broken, ValueError, KeyError, IndexError, OSError, struct.error, subprocess.TimeoutExpired) as why:
             failed += 1
-            tell(i, o.seed, h, why, o.keep)
+            tell(i, o.seed, h, "%s: %s" % (type(why).__name__, why), o.keep)
         finally:
             h.close()
         for line in h.log:
