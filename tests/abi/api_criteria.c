@@ -16,6 +16,8 @@
 
 #include <lull/loader.h>
 
+#include "support/api_folders.h"
+
 enum { W = 200, H = 200, PIXELS = W * H };
 
 /* One block of a picture of 400x400, as sums over its samples. */
@@ -453,13 +455,8 @@ static void numbers_are_read_without_the_locale(void **state)
 
 int main(void)
 {
-    char exe[1900];
-    ssize_t length = readlink("/proc/self/exe", exe, sizeof exe - 1);
-    if (length <= 0)
+    if (api_folder(criteria, sizeof criteria, API_CRITERIA) != 0)
         return 2;
-    exe[length] = '\0';
-    *strrchr(exe, '/') = '\0';
-    snprintf(criteria, sizeof criteria, "%s/../../lib/lull", exe);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(null_never_stops),
         cmocka_unit_test(fixed_stops_at_its_number),

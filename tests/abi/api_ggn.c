@@ -11,6 +11,8 @@
 
 #include <lull/loader.h>
 
+#include "support/api_folders.h"
+
 enum { SIDE = 64 };
 
 static const char without_picture[] = "tests/data/no-picture.ggn"; /* ggn train, a step or two */
@@ -58,13 +60,8 @@ static void a_missing_half_is_told(void **state)
 
 int main(void)
 {
-    char exe[1024];
-    ssize_t length = readlink("/proc/self/exe", exe, sizeof exe - 1);
-    if (length <= 0)
+    if (api_folder(criteria, sizeof criteria, API_CRITERIA) != 0)
         return 1;
-    exe[length] = '\0';
-    *strrchr(exe, '/') = '\0';
-    snprintf(criteria, sizeof criteria, "%s/../../lib/lull", exe);
     const struct CMUnitTest tests[] = {cmocka_unit_test(a_missing_half_is_told)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

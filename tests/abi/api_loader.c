@@ -17,6 +17,8 @@
 
 #if defined(__SSE__)
 #include <xmmintrin.h>
+
+#include "support/api_folders.h"
 #endif
 
 static char plugins[2048];  /* tests/abi/plugins of this build */
@@ -345,14 +347,8 @@ static void errors_fit_the_callers_struct(void **state)
 
 static int find_directories(void)
 {
-    char exe[1900];
-    ssize_t length = readlink("/proc/self/exe", exe, sizeof exe - 1);
-    if (length <= 0)
+    if (api_folder(plugins, sizeof plugins, API_PLUGINS) != 0 || api_folder(criteria, sizeof criteria, API_CRITERIA) != 0)
         return -1;
-    exe[length] = '\0';
-    *strrchr(exe, '/') = '\0'; /* OUT/tests/abi */
-    snprintf(plugins, sizeof plugins, "%s/plugins", exe);
-    snprintf(criteria, sizeof criteria, "%s/../../lib/lull", exe);
     const char *tmp = getenv("TMPDIR");
     snprintf(scratch, sizeof scratch, "%s/lull-loader-XXXXXX", tmp ? tmp : "/tmp");
     return mkdtemp(scratch) ? 0 : -1;

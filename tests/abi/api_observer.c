@@ -17,6 +17,8 @@
 
 #include <lull/loader.h>
 
+#include "support/api_folders.h"
+
 enum { SIDE = 200, PIXELS = SIDE * SIDE };
 
 struct picture {
@@ -334,13 +336,8 @@ static void share_of_viewers(void **unused)
 
 int main(void)
 {
-    char exe[1024];
-    ssize_t length = readlink("/proc/self/exe", exe, sizeof exe - 1);
-    if (length <= 0)
+    if (api_folder(criteria, sizeof criteria, API_CRITERIA) != 0)
         return 1;
-    exe[length] = '\0';
-    *strrchr(exe, '/') = '\0';
-    snprintf(criteria, sizeof criteria, "%s/../../lib/lull", exe);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(law_of_the_noise),
         cmocka_unit_test(texture_hides_and_noise_does_not),

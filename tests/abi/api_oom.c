@@ -3,6 +3,7 @@
  * before. create and begin_frame are covered by lull-check's out-of-memory check.
  */
 #include "../../plugin-api/tools/alloc_probe.c"
+#include "support/api_folders.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -82,13 +83,8 @@ int main(void)
         puts("1..1\nok 1 - allocations fail one by one # SKIP a sanitizer build brings its own malloc");
         return 0;
     }
-    char exe[1900];
-    ssize_t length = readlink("/proc/self/exe", exe, sizeof exe - 1);
-    if (length <= 0)
+    if (api_folder(criteria, sizeof criteria, API_CRITERIA) != 0)
         return 2;
-    exe[length] = '\0';
-    *strrchr(exe, '/') = '\0';
-    snprintf(criteria, sizeof criteria, "%s/../../lib/lull", exe);
     const struct CMUnitTest tests[] = {cmocka_unit_test(open_survives), cmocka_unit_test(list_survives)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
