@@ -50,7 +50,7 @@ int ggn_method_spp(struct ggn_method *m, const struct ggn_eval_set *s, struct ba
 
 int ggn_method_constant(struct ggn_method *m, const struct ggn_eval_set *s, struct base_err *err)
 {
-    enum ggn_split split = ggn_eval_count(s, GGN_SPLIT_TRAIN) > 0 ? GGN_SPLIT_TRAIN : GGN_SPLIT_NONE;
+    enum ggn_split split = ggn_eval_count(s, GGN_SPLIT_TRAIN) > 0 ? GGN_SPLIT_TRAIN : GGN_SPLIT_VALIDATION;
     size_t n = 0;
     double *t = malloc((size_t)s->n_blocks * sizeof *t);
     if (!t)

@@ -134,6 +134,13 @@ static void fixed_stops(void **state)
     assert_near(m.agreement.mae, (180 + 120 + 0 + 320) / 4.0, 1e-6);
     ggn_method_release(&constant);
     ggn_method_release(&oracle);
+    for (int i = 0; i < BLOCKS; i++)
+        set.blocks[i].split = GGN_SPLIT_NONE;
+    ggn_method_constant(&constant, &set, NULL);
+    assert_near(constant.stop[0], 1.1 * 230, 1e-6); /* without training scenes: of the validation scene */
+    ggn_method_release(&constant);
+    for (int i = 0; i < BLOCKS; i++)
+        set.blocks[i].split = GGN_SPLIT_TRAIN;
 }
 
 /* Passes in a row, guards, unjudged cases. */
