@@ -42,8 +42,8 @@ LDFLAGS_ALL  = -pthread $(SAN_$(MODE)) $(LDFLAGS)
 # --- libraries -----------------------------------------------------------------------------------------------------------
 EXR_CFLAGS  := $(shell $(PKG) --cflags OpenEXR 2>/dev/null)
 BLAS_CFLAGS := $(shell $(PKG) --cflags openblas 2>/dev/null)
-BASE_LIBS := -lcjson -lz -lm
-PT_LIBS  := -lembree3 -lOpenEXRCore-3_1 -lcjson -lz -ldl -lm
+BASE_LIBS := -lcjson -lpng -lz -lm
+PT_LIBS  := -lembree3 -lOpenEXRCore-3_1 -lcjson -lpng -lz -ldl -lm
 PT_IMAGE_LIBS := -lOpenImageIO -lOpenImageIO_Util -lstdc++# hundreds of libraries: the program loads them when it reads an image
 # MPI is optional and in a shared object of its own, so that programs run where it is not: MPI= leaves it out.
 MPI_PKG := $(firstword $(foreach p,ompi-c mpich,$(shell $(PKG) --exists $(p) 2>/dev/null && echo $(p))))
@@ -51,7 +51,7 @@ MPI     ?= $(if $(MPI_PKG),1)
 MPI_CFLAGS := $(patsubst -I%,-isystem %,$(if $(MPI_PKG),$(shell $(PKG) --cflags $(MPI_PKG))))
 MPI_LIBS   := $(if $(MPI_PKG),$(shell $(PKG) --libs $(MPI_PKG)))
 STUDY_LIBS := -lmicrohttpd -lsqlite3
-GGN_LIBS := -lopenblas -llapacke -lsvm -lOpenImageIO -lOpenImageIO_Util -lcjson -lz -ldl -lstdc++ -lm
+GGN_LIBS := -lopenblas -llapacke -lsvm -lOpenImageIO -lOpenImageIO_Util -lcjson -lpng -lz -ldl -lstdc++ -lm
 
 # --- include paths: the dependency arrows --------------------------------------------------------------------------------
 API := -Iplugin-api/include
