@@ -54,7 +54,8 @@ static void repeat(struct lc *c, void (*once)(struct lc *), const char *what)
     }
     /* what is left each time has 16 bytes or more; less than 8 a time is something made once, late, like a thread's cache */
     size_t now = bytes_in_use(), once_only = 8 * (size_t)(i - WARM);
-    LC_EXPECT(c, now < bytes + (once_only > SLACK ? once_only : SLACK), "%d times %s left %zu bytes behind", i - WARM, what, now - bytes);
+    LC_EXPECT(c, now < bytes + (once_only > SLACK ? once_only : SLACK), "%d times %s left %zu bytes behind", i - WARM, what,
+              now - bytes);
     LC_EXPECT(c, descriptors() <= files, "%s leaves files open", what);
     lc_note(c, "%d times %s", i, what);
 }
