@@ -20,8 +20,11 @@ static unsigned data_crc(const struct ggn_chains *set)
             crc = crc32_z(crc, c->noisy, (size_t)c->n_levels * values);
         if (c->reference)
             crc = crc32_z(crc, c->reference, values);
-        if (c->picture)
-            crc = crc32_z(crc, c->picture, (size_t)c->n_levels * values / 3);
+        for (int k = 0; c->picture && k < c->n_levels; k++) {
+            crc = crc32_z(crc, &c->has_picture[k], 1);
+            if (c->has_picture[k]) /* otherwise nobody has written it */
+                crc = crc32_z(crc, c->picture + (size_t)k * (values / 3), values / 3);
+        }
     }
     return (unsigned)crc;
 }

@@ -74,26 +74,17 @@ fi
 long="$scene -q --size 48x32 --block 16 -c fixed -p spp=2500 --spp-min 4 --spp-max 4000 --reproducible -t 1"
 # begin N ARGUMENTS...: in the background, until there is a checkpoint
 begin() {
-    ranks=$1; shift
+    processes=$1; shift
     rm -f c.ckp part.exr
-    mpirun --oversubscribe -n "$ranks" "$P" $long --checkpoint c.ckp --checkpoint-every 0.1 -o part.exr "$@" >out 2>err &
-    job=$!
-    until_there c.ckp || echo "# no checkpoint"
+    start c.ckp "$processes" "$P" $long --checkpoint c.ckp --checkpoint-every 0.1 -o part.exr "$@"
 }
 t "the render, by one process" "$P" $long -o long.exr
 
-begin 3
-killed=$(pid_of 2)
-kill -KILL "$killed"
-ended "a killed process is named, with its host" 137 "rank 2 on host $(hostname) (process $killed) has died"
+kill_one
 t "  …the checkpoint goes on, with two processes" mpi 2 "$P" $long --checkpoint c.ckp --resume -o part.exr
 t "  …to the same image" same long.exr part.exr
 
-begin 3 --rank-timeout 2
-hung=$(pid_of 1)
-kill -STOP "$hung"
-ended "a process that hangs is named" 2 "rank 1 on host $(hostname) (process $hung) has not answered for 2 s"
-t "  …and is ended" gone "$hung"
+hang_one 3
 t "  …the checkpoint goes on, with one process" "$P" $long --checkpoint c.ckp --resume -o part.exr
 t "  …to the same image" same long.exr part.exr
 

@@ -37,6 +37,29 @@ for processes in 2 3 5; do
     t "  …the same tables" same one.txt many.txt
     t "  …the same figures" diff -r one-figures many-figures
 done
+# What holds a block back is shared too: the small set above has no half buffers, a recording does.
+mkdir guarded
+t "a recording with half buffers" "$P" "$scene" -q --size 80x80 --block 40 --sampler independent --levels geometric:2:96:1.35 \
+    --reference-spp 0 --sequence guarded/view --name view
+{
+    printf '{"format": "lull-labels", "version": 1, "source": "observer", "detail": "made up", "cap": 10000, "spread": 0.15, "blocks": ['
+    for id in 0 1 2 3; do printf '%s{"id": %d, "threshold": 20, "censored": false}' "$([ $id = 0 ] || echo ,)" $id; done
+    echo ']}'
+} >guarded/view/labels.json
+# held PROCESSES FOLDER OPTIONS...: the table to FOLDER.txt, the figures into FOLDER
+held() {
+    processes=$1 folder=$2; shift 2
+    mpirun --oversubscribe -n "$processes" "$G" evaluate -d guarded -m one.ggn -p visible=0.9 -p gate=0 --recorded --no-quality "$@" \
+        -o "$folder" >"$folder.txt"
+}
+t "the guard's tables by one process" held 1 one-held -p tail=0.6
+t "  …which holds blocks back" sh -c "$G evaluate -d guarded -m one.ggn -p visible=0.9 -p gate=0 --recorded --no-quality -p tail=0 -p gini=0 \
+    -o none-held >none-held.txt && ! cmp one-held/*-stops-oneggn.csv none-held/*-stops-oneggn.csv"
+for processes in 2 3; do
+    t "the guard's tables by $processes processes" held $processes many-held -p tail=0.6
+    t "  …the same tables" same one-held.txt many-held.txt
+    t "  …the same figures" diff -r one-held many-held
+done
 for h in 0 1; do mkdir -p host$h; cp one.ggn host$h/model.ggn; done
 mpi_refused "a.ggn: No such file" 3 "$G" evaluate -d "$data" -m a.ggn
 printf x >>host1/model.ggn
@@ -63,27 +86,18 @@ t "nothing was written where something differed" test ! -e host0/m.ggn -a ! -e h
 # --- faults ---
 long="$tiny --steps-denoiser 40 --steps 20 --epoch-steps 4 -q"
 begin() { # begin N ARGUMENTS...: in the background, until there is a checkpoint
-    ranks=$1; shift
+    processes=$1; shift
     rm -f part.*
-    mpirun --oversubscribe -n "$ranks" "$G" train $long --out part.ggn --threads 1 "$@" >out 2>err &
-    job=$!
-    until_there part.ggn.ckpt || echo "# no checkpoint"
+    start part.ggn.ckpt "$processes" "$G" train $long --out part.ggn --threads 1 "$@"
 }
 t "a longer training, by one process" "$G" train $long --out long.ggn
 
-begin 3
-killed=$(pid_of 2)
-kill -KILL "$killed"
-ended "a killed process is named, with its host" 137 "rank 2 on host $(hostname) (process $killed) has died"
+kill_one
 t "  …there is no model" test ! -e part.ggn
 t "  …the checkpoint goes on, with two processes" mpi 2 "$G" train $long --out part.ggn --resume
 t "  …to the same model" same long.ggn part.ggn
 
-begin 2 --rank-timeout 2
-hung=$(pid_of 1)
-kill -STOP "$hung"
-ended "a process that hangs is named" 2 "rank 1 on host $(hostname) (process $hung) has not answered for 2 s"
-t "  …and is ended" gone "$hung"
+hang_one 2
 t "  …the checkpoint goes on, with one process" "$G" train $long --out part.ggn --resume
 t "  …to the same model" same long.ggn part.ggn
 
