@@ -1,16 +1,6 @@
 #!/bin/sh
 # scripts/ablate with a tiny plan: a line for each variant, nothing trained twice, a changed plan is refused.
-set -u
-cd "$(dirname "$0")/../.." || exit 2
-BUILD=${BUILD:-build}
-export BUILD
-n=0 bad=0
-tmp=$(mktemp -d) || exit 2
-trap 'rm -rf "$tmp"' EXIT
-check() { # check NAME STATUS
-    n=$((n + 1))
-    if [ "$2" -eq 0 ]; then echo "ok $n - $1"; else echo "not ok $n - $1"; sed 's/^/# /' "$tmp/err"; bad=1; fi
-}
+. "$(dirname "$0")/ggn_setup"
 ablate() { scripts/ablate --data tests/data/train-demo --out "$tmp/out" "$@" >"$tmp/table" 2>"$tmp/err"; }
 
 cat >"$tmp/plan" <<'END'

@@ -1,24 +1,6 @@
 #!/bin/sh
 # `ggn flip` and `ggn compare` from the outside: outputs, formats, and what they say about bad input.
-set -u
-cd "$(dirname "$0")/../.." || exit 2
-ggn=${BUILD:-build}/bin/ggn
-n=0
-tmp=$(mktemp -d) || exit 2
-trap 'rm -rf "$tmp"' EXIT
-check() { # check NAME STATUS
-    n=$((n + 1))
-    if [ "$2" -eq 0 ]; then echo "ok $n - $1"; else echo "not ok $n - $1"; sed 's/^/# /' "$tmp/err" 2>/dev/null; fi
-}
-fails() { # fails NAME PATTERN COMMAND…: exit 2, the last line on stderr has PATTERN
-    name=$1 pattern=$2
-    shift 2
-    "$@" >"$tmp/out" 2>"$tmp/err"
-    rc=$?
-    [ "$rc" -eq 2 ] && tail -n 1 "$tmp/err" | grep "^ggn " | grep -q "$pattern"
-    check "$name" $?
-}
-
+. "$(dirname "$0")/ggn_setup"
 printf 'a;100;200;400;800;\nb;50;60;70;80;\n' >"$tmp/t.csv"
 printf 'a;100;400;400;800;\nc;1;\n' >"$tmp/m.csv"
 $ggn compare "$tmp/t.csv" "$tmp/m.csv" --json >"$tmp/out" 2>"$tmp/err" && grep -q '"blocks": 4,' "$tmp/out" &&
@@ -69,3 +51,4 @@ else
     n=$((n + 1)); echo "ok $n - flip: published figures # SKIP ../shared is absent"
 fi
 echo "1..$n"
+exit $bad

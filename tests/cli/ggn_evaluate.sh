@@ -1,24 +1,6 @@
 #!/bin/sh
 # import-sin3d, label, evaluate and reconstruct from the outside, on a small made-up view in the SIN3D layout.
-set -u
-cd "$(dirname "$0")/../.." || exit 2
-ggn=${BUILD:-build}/bin/ggn
-n=0
-tmp=$(mktemp -d) || exit 2
-trap 'rm -rf "$tmp"' EXIT
-check() { # check NAME STATUS
-    n=$((n + 1))
-    if [ "$2" -eq 0 ]; then echo "ok $n - $1"; else echo "not ok $n - $1"; sed 's/^/# /' "$tmp/err" "$tmp/out" 2>/dev/null | tail -n 20; fi
-}
-fails() { # fails NAME PATTERN COMMAND…: exit 2, the last line on stderr has PATTERN
-    name=$1 pattern=$2
-    shift 2
-    "$@" >"$tmp/out" 2>"$tmp/err"
-    rc=$?
-    [ "$rc" -eq 2 ] && tail -n 1 "$tmp/err" | grep "^ggn " | grep -q "$pattern"
-    check "$name" $?
-}
-
+. "$(dirname "$0")/ggn_setup"
 view=$tmp/sin3d/p3d_toy-view0_part6
 mkdir -p "$view"
 # Noise of amplitude 4/level over grey, 8 levels.
@@ -92,3 +74,4 @@ if [ -w /dev/full ]; then
     fails "disk full" 'write' sh -c "exec $ggn evaluate -d $tmp/data >/dev/full"
 fi
 echo "1..$n"
+exit $bad

@@ -1,18 +1,7 @@
 #!/bin/sh
 # Options of ggn by what they do: each changes what it is there to change, measured in what comes out, not in what is repeated of the
 # command line.
-set -u
-cd "$(dirname "$0")/../.." || exit 2
-ggn=${BUILD:-build}/bin/ggn
-data=tests/data/train-demo
-n=0 failed=0
-tmp=$(mktemp -d) || exit 2
-trap 'rm -rf "$tmp"' EXIT
-check() { # check NAME STATUS
-    n=$((n + 1))
-    if [ "$2" -eq 0 ]; then echo "ok $n - $1"; else echo "not ok $n - $1"; tail -n 5 "$tmp/err" | sed 's/^/# /'; failed=1; fi
-}
-
+. "$(dirname "$0")/ggn_setup"
 # --- train: other losses, another threshold, other scenes ------------------------------------------------------------------
 tiny="--data $data --kr 3 --km 3 --kd 4 --crop 32 --ratio 0 --batch 4 --steps-denoiser 2 --steps 4 --epoch-steps 2 -q --threads 1"
 trained() { # trained NAME OPTIONS...: what training came to, without times and without the options that it repeats
@@ -165,4 +154,4 @@ assert a["x_mean"] == b["x_mean"] and 0 < abs(a["denoiser_mean"] - b["denoiser_m
 END
 check "golden --bf16: close, not the same" $?
 echo "1..$n"
-exit $failed
+exit $bad

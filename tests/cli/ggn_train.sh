@@ -1,18 +1,7 @@
 #!/bin/sh
 # `ggn train` from the outside: same bytes again, with another number of threads and after an interruption; bad input; the model in
 # the criterion.
-set -u
-cd "$(dirname "$0")/../.." || exit 2
-build=${BUILD:-build}
-ggn=$build/bin/ggn
-data=tests/data/train-demo
-n=0
-tmp=$(mktemp -d) || exit 2
-trap 'rm -rf "$tmp"' EXIT
-check() { # check NAME STATUS
-    n=$((n + 1))
-    if [ "$2" -eq 0 ]; then echo "ok $n - $1"; else echo "not ok $n - $1"; sed 's/^/# /' "$tmp/err" 2>/dev/null; fi
-}
+. "$(dirname "$0")/ggn_setup"
 fails() { # fails NAME PATTERN COMMAND…: exit 2, the last line on stderr has PATTERN, no model is left
     name=$1 pattern=$2
     shift 2
@@ -126,7 +115,7 @@ for no in "" --no-pictures; do
     $ggn evaluate -d $data -m "$tmp/picture.ggn" --no-quality --json $no >"$tmp/figures$no" 2>"$tmp/err" || break
 done && ! cmp -s "$tmp/figures" "$tmp/figures--no-pictures"
 check "evaluate with and without noise pictures" $?
-LULL_MODEL=$tmp/picture.ggn $build/bin/lull-check -q "$build/lib/lull/ggn.so:ggn" >"$tmp/err" 2>&1
+LULL_MODEL=$tmp/picture.ggn $BUILD/bin/lull-check -q "$BUILD/lib/lull/ggn.so:ggn" >"$tmp/err" 2>&1
 check "lull-check passes the criterion with this model" $?
 fails "a model of another input to start from" "another size, preset or input" $ggn train $tiny --init "$tmp/picture.ggn"
 fails "no noise picture in the published preset" "preset paper has neither noise pictures" $ggn train --data $data --preset paper --picture 1
@@ -146,11 +135,12 @@ $ggn train $tiny --out "$tmp/no/such/folder/m.ggn" -q 2>"$tmp/err"
 check "an output folder that is not there" $?
 
 # the criterion with this model holds to the whole contract
-LULL_MODEL=$tmp/a.ggn $build/bin/lull-check "$build/lib/lull/ggn.so:ggn" >"$tmp/out" 2>&1
+LULL_MODEL=$tmp/a.ggn $BUILD/bin/lull-check "$BUILD/lib/lull/ggn.so:ggn" >"$tmp/out" 2>&1
 rc=$?
 grep '^not ok' "$tmp/out" >"$tmp/err"
 check "lull-check passes the criterion ggn" $rc
-LULL_MODEL=$tmp/a.ggn $build/bin/lull-check -q -o state -o repeat -o batch -p gate=0 -p visible=0.9 -p passes=1 \
-    "$build/lib/lull/ggn.so:ggn" >"$tmp/err" 2>&1
+LULL_MODEL=$tmp/a.ggn $BUILD/bin/lull-check -q -o state -o repeat -o batch -p gate=0 -p visible=0.9 -p passes=1 \
+    "$BUILD/lib/lull/ggn.so:ggn" >"$tmp/err" 2>&1
 check "and with other parameters" $?
 echo "1..$n"
+exit $bad

@@ -1,15 +1,6 @@
 #!/bin/sh
 # `ggn visible` from the outside: what it says of images with and without noise, its picture, and bad input.
-set -u
-cd "$(dirname "$0")/../.." || exit 2
-ggn=${BUILD:-build}/bin/ggn
-n=0
-tmp=$(mktemp -d) || exit 2
-trap 'rm -rf "$tmp"' EXIT
-check() { # check NAME STATUS
-    n=$((n + 1))
-    if [ "$2" -eq 0 ]; then echo "ok $n - $1"; else echo "not ok $n - $1"; sed 's/^/# /' "$tmp/out" "$tmp/err" 2>/dev/null; fi
-}
+. "$(dirname "$0")/ggn_setup"
 fails() { # fails NAME PATTERN COMMAND…: exit 2, one line of ours on stderr (libpng may add its own), nothing on stdout
     name=$1 pattern=$2
     shift 2
@@ -48,3 +39,4 @@ fails "blocks of no size" 'block' $ggn visible "$tmp/clean.png" "$tmp/noisy.png"
 fails "an observer that is none" 'clean.png' $ggn visible "$tmp/clean.png" "$tmp/noisy.png" --observer "$tmp/clean.png"
 fails "a folder as map" "$tmp" $ggn visible "$tmp/clean.png" "$tmp/noisy.png" -o "$tmp"
 echo "1..$n"
+exit $bad

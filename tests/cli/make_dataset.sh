@@ -1,19 +1,9 @@
 #!/bin/sh
 # scripts/make-dataset with tiny plans: order, resuming after an interrupt, cameras, plans that are wrong.
-set -u
-here=$(cd "$(dirname "$0")" && pwd)
-BUILD=$(cd "${BUILD:-build}" && pwd)
+. "$(dirname "$0")/pathtracer_setup"
+BUILD=${P%/bin/*}
 export BUILD
 M=$here/../../scripts/make-dataset
-dir=$(mktemp -d) || exit 2
-trap 'rm -rf "$dir"' EXIT
-cd "$dir" || exit 2
-n=0 bad=0
-
-t() { # t DESCRIPTION COMMAND...: passes when the command succeeds
-    n=$((n + 1)); what=$1; shift
-    if "$@" >log 2>&1; then echo "ok $n - $what"; else echo "not ok $n - $what"; sed 's/^/# /' log; bad=1; fi
-}
 refused() { # refused TEXT ARGUMENTS...: exit status 2, one line on stderr that contains TEXT, no folder made
     n=$((n + 1)); text=$1; shift
     "$M" "$@" >out 2>err; status=$?

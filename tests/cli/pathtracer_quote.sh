@@ -1,25 +1,6 @@
 #!/bin/sh
 # pathtracer --quote: what it prints, draws and refuses, and that its pilot loses nothing.
-set -u
-here=$(cd "$(dirname "$0")" && pwd)
-P=$(cd "${BUILD:-build}" && pwd)/bin/pathtracer
-scene=$here/room.pbrt
-dir=$(mktemp -d) || exit 2
-trap 'rm -rf "$dir"' EXIT
-cd "$dir" || exit 2
-n=0 bad=0
-unset LULL_PLUGIN_PATH
-
-t() { # t DESCRIPTION COMMAND...: passes when the command succeeds
-    n=$((n + 1)); what=$1; shift
-    if "$@" >log 2>&1; then echo "ok $n - $what"; else echo "not ok $n - $what"; sed 's/^/# /' log; bad=1; fi
-}
-refused() { # refused TEXT ARGUMENTS...: exit status 2, one line on stderr that contains TEXT, nothing on stdout
-    n=$((n + 1)); text=$1; shift
-    "$P" "$@" >out 2>err; status=$?
-    if [ $status -eq 2 ] && [ "$(wc -l <err)" -eq 1 ] && [ ! -s out ] && grep -qF -- "$text" err; then echo "ok $n - refused: $*"
-    else echo "not ok $n - refused: $* (status $status)"; sed 's/^/# /' err; bad=1; fi
-}
+. "$(dirname "$0")/pathtracer_setup"
 json() { python3 -c "import json; q = json.load(open('$1')); rows = q['rows']; assert $2, [r['spp_mean'] for r in rows]"; }
 
 quote="$scene -q --size 64x48 --block 16 --spp-max 2000 -t 2"

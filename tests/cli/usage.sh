@@ -1,14 +1,7 @@
 #!/bin/sh
 # Wrong command lines of ggn and lull-check: one line on stderr that names the trouble, nothing on stdout, exit status 2. --help,
 # --usage and --version of every command.
-bin=${BUILD:-build}/bin
-tmp=$(mktemp -d) || exit 2
-trap 'rm -rf "$tmp"' EXIT
-n=0 failed=0
-check() { # check NAME STATUS: 0 is good
-    n=$((n + 1))
-    if [ "$2" = 0 ]; then echo "ok $n - $1"; else echo "not ok $n - $1"; sed 's/^/# /' "$tmp/out" "$tmp/err"; failed=1; fi
-}
+. "$(dirname "$0")/ggn_setup"
 refused() { # refused PATTERN COMMAND...
     pattern=$1
     shift
@@ -43,4 +36,4 @@ refused "--threads 1: expected an integer from 2 to 32" "$bin/lull-check" -t 1 x
 refused "--only nothing: no such check" "$bin/lull-check" -o nothing x
 refused "--param x: expected KEY=VALUE" "$bin/lull-check" -p x y
 echo "1..$n"
-exit $failed
+exit $bad

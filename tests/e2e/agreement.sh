@@ -1,16 +1,6 @@
 #!/bin/sh
 # scripts/agreement: people's views and a test scene through to the tables, with the numbers of ggn evaluate.
-set -u
-cd "$(dirname "$0")/../.." || exit 2
-BUILD=${BUILD:-build}
-export BUILD
-n=0 bad=0
-tmp=$(mktemp -d) || exit 2
-trap 'rm -rf "$tmp"' EXIT
-check() { # check NAME STATUS
-    n=$((n + 1))
-    if [ "$2" -eq 0 ]; then echo "ok $n - $1"; else echo "not ok $n - $1"; tail -n 12 "$tmp/err" "$tmp/table" 2>/dev/null | sed 's/^/# /'; bad=1; fi
-}
+. "$(dirname "$0")/../cli/ggn_setup"
 agreement() { scripts/agreement --human "$tmp/human" --rendered "$tmp/rendered" --observer "$tmp/o.json" --out "$tmp/out" "$@" >"$tmp/table" 2>"$tmp/err"; }
 record() { # record FOLDER NAME SEED REFERENCE-SPP SCENE [OPTION ...]
     folder=$1 name=$2 seed=$3 reference=$4 scene=$5

@@ -2,23 +2,14 @@
 # One stopping rule: what `ggn evaluate` makes of a recording is what the criteria do in a render. Every sample count is recorded,
 # hence each at which a criterion was asked; the replay has to find these by itself. The criterion ggn: the same stop and the same p
 # for every block, with gate and guard on and off. The default, observer, sees halves that a recording rounds: nearly the same.
-set -u
-cd "$(dirname "$0")/../.." || exit 2
-build=${BUILD:-build}
-n=0
-tmp=$(mktemp -d) || exit 2
-trap 'rm -rf "$tmp"' EXIT
-check() { # check NAME STATUS
-    n=$((n + 1))
-    if [ "$2" -eq 0 ]; then echo "ok $n - $1"; else echo "not ok $n - $1"; sed 's/^/# /' "$tmp/err" 2>/dev/null; fi
-}
+. "$(dirname "$0")/../cli/ggn_setup"
 # A tiny model for blocks of 40 pixels: its windows are judged in a millisecond, each level has 1.35 times the samples
 # of the last, and its gate opens where the noise is a few display codes.
-"$build/bin/ggn" train --data tests/data/train-demo --kr 3 --km 3 --kd 8 --crop 32 --ratio 0 --batch 8 --steps-denoiser 20 \
+"$BUILD/bin/ggn" train --data tests/data/train-demo --kr 3 --km 3 --kd 8 --crop 32 --ratio 0 --batch 8 --steps-denoiser 20 \
     --steps 60 --epoch-steps 20 --out "$tmp/tiny.ggn" -q 2>"$tmp/err"
 check "a tiny model" $?
 
-render="$build/bin/pathtracer -q scenes/cornell-box.pbrt --size 120x80 --block 40 --sampler independent"
+render="$BUILD/bin/pathtracer -q scenes/cornell-box.pbrt --size 120x80 --block 40 --sampler independent"
 mkdir "$tmp/data"
 $render --levels linear:1:250:1 --reference-spp 0 --sequence "$tmp/data/view" --name view </dev/null 2>"$tmp/err"
 check "every sample count from 1 to 250 recorded" $?
@@ -40,7 +31,7 @@ judged() {
     params=$(printf ' -p %s' "$@")
     # shellcheck disable=SC2086
     $render --spp-min 1 --spp-max 250 -c "$criterion" -p model="$file" $params --report "$tmp/report.json" </dev/null 2>"$tmp/err" &&
-        "$build/bin/ggn" evaluate --data "$tmp/data" "$option" "$file" $params --recorded --no-quality -o "$tmp/out" \
+        "$BUILD/bin/ggn" evaluate --data "$tmp/data" "$option" "$file" $params --recorded --no-quality -o "$tmp/out" \
             >"$tmp/log" 2>"$tmp/err"
     check "$name: rendered and replayed" $?
     awk '/"id":/ { id = $2 + 0 } /"spp":/ { spp = $2 + 0 } /"p_noisy":/ { $3 = $2 + 0 == 0 ? 0 : $2; $1 = id; $2 = spp; '"$numbers"' }' "$tmp/report.json" >"$tmp/rendered"
@@ -62,7 +53,7 @@ replay "neither" visible=0.6 first-spp=4 tail=0 gini=0 gate=0
     [ "$(awk '$2 < 250' "$tmp/both" | wc -l)" -ge 3 ] && [ "$(awk '$2 == 250' "$tmp/both" | wc -l)" -ge 1 ]
 check "gate and guard change stops, and blocks stop or do not" $?
 
-"$build/bin/ggn" evaluate --data "$tmp/data" --model "$tmp/tiny.ggn" --no-pictures -p visible=0.6 -p first-spp=4 -p tail=0.6 --recorded \
+"$BUILD/bin/ggn" evaluate --data "$tmp/data" --model "$tmp/tiny.ggn" --no-pictures -p visible=0.6 -p first-spp=4 -p tail=0.6 --recorded \
     --no-quality -o "$tmp/out" >"$tmp/log" 2>"$tmp/err" &&
     awk -F';' "NR > 1 { \$1 = \$2; \$2 = \$5; \$3 = \$6 } NR > 1 { $numbers }" "$tmp"/out/*-stops-tinyggn.csv | diff "$tmp/no-guard" - >"$tmp/err"
 check "--no-pictures: as in a host without half buffers no guard holds a block back" $?
@@ -70,7 +61,7 @@ check "--no-pictures: as in a host without half buffers no guard holds a block b
 # The baselines likewise: their criteria and their evaluation are one. A window of evaluation has six images, so that an SVM,
 # which looks at one, is asked from the sixth level on.
 baseline() { # baseline NAME METHOD PARAMETERS
-    "$build/bin/ggn" baseline "$1" --data tests/data/train-demo --epochs 20 --ratio 1.3 --output "$tmp/$1.ggn" >"$tmp/log" 2>"$tmp/err"
+    "$BUILD/bin/ggn" baseline "$1" --data tests/data/train-demo --epochs 20 --ratio 1.3 --output "$tmp/$1.ggn" >"$tmp/log" 2>"$tmp/err"
     check "a small model for $1" $?
     name=$1 method=$2
     shift 2
@@ -87,7 +78,7 @@ check "the attributes stop blocks" $?
 # to 4 % in samples; a check that falls on the other side of the limit moves a stop by its step, at most 6 %.
 watch() {
     $render --spp-max 250 --visible "$1" --report "$tmp/report.json" </dev/null 2>"$tmp/err" &&
-        "$build/bin/ggn" evaluate --data "$tmp/data" --visible "$1" --recorded --no-quality -o "$tmp/out" >"$tmp/log" 2>"$tmp/err"
+        "$BUILD/bin/ggn" evaluate --data "$tmp/data" --visible "$1" --recorded --no-quality -o "$tmp/out" >"$tmp/log" 2>"$tmp/err"
     check "observer, visible $1: rendered and replayed" $?
     awk '/"id":[[:space:]]*"/ { which = $2 } /"id":/ { id = $2 + 0 } /"spp":/ { spp = $2 + 0 } /"p_noisy":/ { print id, spp, $2 + 0, which }' "$tmp/report.json" >"$tmp/rendered"
     awk -F';' 'NR > 1 { print $2, $5, $6 + 0 }' "$tmp"/out/*-stops-observer.csv >"$tmp/replayed"
@@ -104,3 +95,4 @@ watch 0.97
     paste "$tmp/watched-0.9" "$tmp/watched-0.97" | awk '$6 > $2 || $6 < 16 { bad = 1 } $6 < $2 { n++ } END { exit bad || n < 5 }'
 check "blocks stop or do not, and sooner when more viewers may see noise" $?
 echo "1..$n"
+exit $bad

@@ -1,16 +1,7 @@
 #!/bin/sh
 # What the path tracer writes, ggn reads: recorded sequences through label, evaluate and reconstruct; stop maps through compare.
-set -u
-cd "$(dirname "$0")/../.." || exit 2
-bin=${BUILD:-build}/bin lib=${BUILD:-build}/lib/lull
-n=0
-tmp=$(mktemp -d) || exit 2
-trap 'rm -rf "$tmp"' EXIT
-check() { # check NAME STATUS
-    n=$((n + 1))
-    if [ "$2" -eq 0 ]; then echo "ok $n - $1"; else echo "not ok $n - $1"; sed 's/^/# /' "$tmp/err" "$tmp/out" 2>/dev/null | tail -n 20; fi
-}
-
+. "$(dirname "$0")/../cli/ggn_setup"
+lib=$BUILD/lib/lull
 "$bin/pathtracer" -q scenes/cornell-box.pbrt --size 64x32 --block 32 --sampler independent --levels geometric:20:400:1.35 --reference-spp 512 \
     --sequence "$tmp/data" --name toy >"$tmp/out" 2>"$tmp/err"
 check "record two blocks" $?
@@ -20,13 +11,6 @@ check "label them" $?
 check "cheap labels beside rendered ones" $?
 "$bin/ggn" evaluate -d "$tmp/data" -w 3 --json >"$tmp/out" 2>"$tmp/err" && grep -q '"halfbuf"' "$tmp/out" && grep -q '"variance"' "$tmp/out"
 check "evaluate has the criteria's recorded errors" $?
-fails() { # fails NAME PATTERN COMMAND…: exit 2 and a line with PATTERN
-    name=$1 pattern=$2
-    shift 2
-    "$@" >"$tmp/out" 2>"$tmp/err"
-    [ $? -eq 2 ] && grep -q -e "$pattern" "$tmp/err"
-    check "$name" $?
-}
 # Views that people judged: levels from their halves to 10,000 spp, the observer without the view, thresholds of others beside it.
 mkdir -p "$tmp/judged/people"
 for v in one two; do
@@ -80,3 +64,4 @@ for f in a.exr a.json; do
     check "the stops in $f are those of the CSV" $?
 done
 echo "1..$n"
+exit $bad

@@ -1,17 +1,8 @@
 #!/bin/sh
 # From a recorded scene to a trained criterion by way of a study: the lines of docs/study.md, with a simulated participant.
-set -u
-cd "$(dirname "$0")/../.." || exit 2
-bin=${BUILD:-build}/bin
-n=0
-tmp=$(mktemp -d) || exit 2
+. "$(dirname "$0")/../cli/ggn_setup"
 server=
 trap 'kill $server 2>/dev/null; rm -rf "$tmp"' EXIT
-check() { # check NAME STATUS
-    n=$((n + 1))
-    if [ "$2" -eq 0 ]; then echo "ok $n - $1"; else echo "not ok $n - $1"; sed 's/^/# /' "$tmp/err" "$tmp/out" 2>/dev/null | tail -n 20; fi
-}
-
 mkdir "$tmp/data"
 for scene in cornell-box demo; do
     "$bin/pathtracer" -q scenes/$scene.pbrt --size 64x32 --block 32 --sampler independent --levels geometric:20:400:1.35 \
@@ -57,3 +48,4 @@ check "train" $?
     grep -q '"blocks": 2,' "$tmp/out"
 check "compare with people" $?
 echo "1..$n"
+exit $bad
