@@ -12,19 +12,31 @@ struct worker {
     int id;
 };
 
+/* A job is posted as an odd `state` and closed as the even one after it. Workers look at it for a while before they sleep,
+ * because the layers of a network follow each other within microseconds and waking a thread takes longer than most of them.
+ * Who wakes too late finds the job closed and is not waited for.
+ *
+ * Pairs of atomics that two threads write and read crosswise, all sequentially consistent, so that one sees the other:
+ * a worker enters (running) and then looks whether the job is still open (state), the caller closes it and then looks at
+ * running; a worker is about to sleep (sleeping) and looks at state, the caller posts and looks at sleeping; the caller is
+ * about to sleep (finishing) and looks at running, a worker leaves and looks at finishing. */
 struct base_threads {
-    pthread_mutex_t lock;
+    pthread_mutex_t lock; /* for the two conditions only */
     pthread_cond_t work, done;
-    unsigned long generation; /* counts jobs; guarded by lock */
-    int running;              /* workers that have not finished the job; guarded by lock */
-    int quit;
-    int count, started;
+    atomic_ulong state;
+    atomic_int running; /* workers that have entered a job, or are about to see that it is closed */
+    atomic_int sleeping, finishing;
+    atomic_int quit;
+    int count, started, looks;
     long n;
     atomic_long next;
     void (*fn)(void *, long, int);
     void *data;
     struct worker workers[];
 };
+
+/* How often one looks before one sleeps: some ten microseconds. */
+enum { LOOKS = 500 };
 
 int base_threads_available(void)
 {
@@ -40,25 +52,58 @@ static void take_indices(struct base_threads *t, int worker)
         t->fn(t->data, i, worker);
 }
 
+static void relax(void)
+{
+#if defined(__x86_64__)
+    __builtin_ia32_pause();
+#elif defined(__aarch64__)
+    __asm__ volatile("yield");
+#endif
+}
+
+static void sleep_while(struct base_threads *t, unsigned long seen)
+{
+    pthread_mutex_lock(&t->lock);
+    atomic_fetch_add(&t->sleeping, 1);
+    while (!atomic_load(&t->quit) && atomic_load(&t->state) == seen)
+        pthread_cond_wait(&t->work, &t->lock);
+    atomic_fetch_sub(&t->sleeping, 1);
+    pthread_mutex_unlock(&t->lock);
+}
+
+static void leave(struct base_threads *t)
+{
+    if (atomic_fetch_sub(&t->running, 1) != 1 || !atomic_load(&t->finishing))
+        return;
+    pthread_mutex_lock(&t->lock);
+    pthread_cond_signal(&t->done);
+    pthread_mutex_unlock(&t->lock);
+}
+
 static void *worker_main(void *arg)
 {
     struct worker *w = arg;
     struct base_threads *t = w->pool;
     unsigned long seen = 0;
-    pthread_mutex_lock(&t->lock);
-    for (;;) {
-        while (!t->quit && t->generation == seen)
-            pthread_cond_wait(&t->work, &t->lock);
-        if (t->quit)
-            break;
-        seen = t->generation;
-        pthread_mutex_unlock(&t->lock);
-        take_indices(t, w->id);
-        pthread_mutex_lock(&t->lock);
-        if (--t->running == 0)
-            pthread_cond_signal(&t->done);
+    int looks = t->looks;
+
+    while (!atomic_load(&t->quit)) {
+        const unsigned long state = atomic_load(&t->state);
+        if (state == seen && looks-- > 0) {
+            relax();
+        } else if (state == seen) {
+            sleep_while(t, seen);
+            looks = t->looks;
+        } else {
+            seen = state;
+            atomic_fetch_add(&t->running, 1);
+            if (state % 2 && atomic_load(&t->state) == state) {
+                take_indices(t, w->id);
+                looks = t->looks;
+            }
+            leave(t);
+        }
     }
-    pthread_mutex_unlock(&t->lock);
     return NULL;
 }
 
@@ -73,6 +118,7 @@ struct base_threads *base_threads_create(int count, struct base_err *err)
     pthread_cond_init(&t->work, NULL);
     pthread_cond_init(&t->done, NULL);
     t->count = count;
+    t->looks = count <= base_threads_available() ? LOOKS : 0; /* who looks keeps no processor from who works */
     for (int i = 1; i < count; i++) {
         t->workers[i] = (struct worker){.pool = t, .id = i};
         if (pthread_create(&t->workers[i].thread, NULL, worker_main, &t->workers[i]) != 0) {
@@ -90,7 +136,7 @@ void base_threads_destroy(struct base_threads *t)
     if (!t)
         return;
     pthread_mutex_lock(&t->lock);
-    t->quit = 1;
+    atomic_store(&t->quit, 1);
     pthread_cond_broadcast(&t->work);
     pthread_mutex_unlock(&t->lock);
     for (int i = 1; i <= t->started; i++)
@@ -106,22 +152,43 @@ int base_threads_count(const struct base_threads *t)
     return t->count;
 }
 
-void base_threads_for(struct base_threads *t, long n, void (*fn)(void *, long, int), void *data)
+static void post(struct base_threads *t)
 {
-    if (n <= 0)
+    atomic_fetch_add(&t->state, 1);
+    if (!atomic_load(&t->sleeping))
         return;
     pthread_mutex_lock(&t->lock);
+    pthread_cond_broadcast(&t->work);
+    pthread_mutex_unlock(&t->lock);
+}
+
+static void finish(struct base_threads *t)
+{
+    atomic_fetch_add(&t->state, 1);
+    for (int k = t->looks; k > 0 && atomic_load(&t->running) > 0; k--)
+        relax();
+    if (!atomic_load(&t->running))
+        return;
+    pthread_mutex_lock(&t->lock);
+    atomic_store(&t->finishing, 1);
+    while (atomic_load(&t->running) > 0)
+        pthread_cond_wait(&t->done, &t->lock);
+    atomic_store(&t->finishing, 0);
+    pthread_mutex_unlock(&t->lock);
+}
+
+void base_threads_for(struct base_threads *t, long n, void (*fn)(void *, long, int), void *data)
+{
+    if (n <= 1 || t->started == 0) {
+        for (long i = 0; i < n; i++)
+            fn(data, i, 0);
+        return;
+    }
     t->fn = fn;
     t->data = data;
     t->n = n;
     atomic_store(&t->next, 0);
-    t->running = t->started;
-    t->generation++;
-    pthread_cond_broadcast(&t->work);
-    pthread_mutex_unlock(&t->lock);
+    post(t);
     take_indices(t, 0);
-    pthread_mutex_lock(&t->lock);
-    while (t->running > 0)
-        pthread_cond_wait(&t->done, &t->lock);
-    pthread_mutex_unlock(&t->lock);
+    finish(t);
 }

@@ -1,0 +1,99 @@
+/* The pool: each index once, whoever takes it; nobody waits for a worker that never came. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdatomic.h>
+#include <stddef.h>
+#include <time.h>
+#include <cmocka.h>
+
+#include "base/threads.h"
+
+enum { THREADS = 4, INDICES = 64, JOBS = 3000 };
+
+struct job {
+    atomic_int taken[INDICES], inside[THREADS];
+    atomic_int twice; /* two threads as one worker at the same time */
+    atomic_int who;   /* bit per worker that took an index */
+    int nap_ns;
+};
+
+static void take(void *data, long i, int worker)
+{
+    struct job *j = data;
+    if (atomic_fetch_add(&j->inside[worker], 1) != 0)
+        atomic_store(&j->twice, 1);
+    atomic_fetch_or(&j->who, 1 << worker);
+    if (j->nap_ns > 0)
+        nanosleep(&(struct timespec){.tv_nsec = j->nap_ns}, NULL);
+    atomic_fetch_add(&j->taken[i], 1);
+    atomic_fetch_sub(&j->inside[worker], 1);
+}
+
+static void expect_once(struct base_threads *t, struct job *j, long n)
+{
+    for (int i = 0; i < INDICES; i++)
+        atomic_store(&j->taken[i], 0);
+    base_threads_for(t, n, take, j);
+    for (int i = 0; i < INDICES; i++)
+        assert_int_equal(atomic_load(&j->taken[i]), i < n);
+    assert_int_equal(atomic_load(&j->twice), 0);
+}
+
+/* One after the other, so that workers come late, and with pauses, so that they sleep. */
+static void each_index_once(void **state)
+{
+    struct base_err err = {0};
+    struct job j = {.nap_ns = 0};
+    (void)state;
+    for (int threads = 1; threads <= THREADS; threads++) {
+        struct base_threads *t = base_threads_create(threads, &err);
+        assert_non_null(t);
+        for (int k = 0; k < JOBS; k++) {
+            if (k % 500 == 499)
+                nanosleep(&(struct timespec){.tv_nsec = 2000000}, NULL);
+            expect_once(t, &j, k % (INDICES + 1));
+        }
+        base_threads_destroy(t);
+    }
+}
+
+/* Long enough tasks are shared out, also to workers that slept. */
+static void all_workers_take_part(void **state)
+{
+    struct base_err err = {0};
+    struct base_threads *t = base_threads_create(THREADS, &err);
+    struct job j = {.nap_ns = 5000000};
+    (void)state;
+    assert_non_null(t);
+    for (int k = 0; k < 3; k++) {
+        atomic_store(&j.who, 0);
+        nanosleep(&(struct timespec){.tv_nsec = 5000000}, NULL);
+        expect_once(t, &j, INDICES);
+        assert_int_equal(atomic_load(&j.who), (1 << THREADS) - 1);
+    }
+    base_threads_destroy(t);
+}
+
+/* A pool that never had a job, or has one after a long rest, ends too. */
+static void destroys_idle(void **state)
+{
+    struct base_err err = {0};
+    (void)state;
+    for (int k = 0; k < 50; k++) {
+        struct base_threads *t = base_threads_create(THREADS, &err);
+        assert_non_null(t);
+        if (k % 2)
+            nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL);
+        base_threads_destroy(t);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(each_index_once),
+        cmocka_unit_test(all_workers_take_part),
+        cmocka_unit_test(destroys_idle),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
