@@ -256,11 +256,20 @@ static void im2col_piece(void *data, long i, int worker)
     const real *x = ggn_act(t, t->l->in, n, c / 9);
     real *y = ggn_act(t, t->l->out, n, c);
 
-    for (int r = 0; r < out->h; r++)
-        for (int s = 0; s < out->w; s++) {
-            int yy = r * t->l->stride + dy, xx = s * t->l->stride + dx;
-            y[r * out->row + s] = yy >= 0 && yy < in->h && xx >= 0 && xx < in->w ? x[(long)yy * in->row + xx] : 0;
-        }
+    int s0 = 0, s1 = out->w; /* columns [s0, s1) lie inside */
+    while (s0 < s1 && s0 * t->l->stride + dx < 0)
+        s0++;
+    while (s1 > s0 && (s1 - 1) * t->l->stride + dx >= in->w)
+        s1--;
+    for (int r = 0; r < out->h; r++, y += out->row) {
+        const int yy = r * t->l->stride + dy;
+        memset(y, 0, (size_t)out->w * sizeof *y);
+        if (yy < 0 || yy >= in->h)
+            continue;
+        const real *from = x + (long)yy * in->row + (long)s0 * t->l->stride + dx;
+        for (int s = s0; s < s1; s++, from += t->l->stride)
+            y[s] = *from;
+    }
     (void)worker;
 }
 

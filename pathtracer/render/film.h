@@ -155,9 +155,9 @@ static inline int pt_film_add(struct pt_film_pixel *p, uint32_t planes, uint32_t
     double rgb[3] = {(double)r->radiance.x, (double)r->radiance.y, (double)r->radiance.z};
     for (int c = 0; c < 3; c++)
         p->color[c] += rgb[c];
-    if (in_half)
+    if (planes & PT_FILM_HALF) /* a product, because a branch on in_half would often be predicted wrong */
         for (int c = 0; c < 3; c++)
-            p->half[c] += rgb[c];
+            p->half[c] += in_half * rgb[c];
     if (planes & PT_FILM_MOMENT2) {
         double luminance = base_luminance(rgb[0], rgb[1], rgb[2]);
         p->moment2 += luminance * luminance;
