@@ -26,8 +26,10 @@ static size_t scratch_size(const struct ggn_graph *g, const struct ggn_kernels *
             continue;
         if (k->bf16 && flags & GGN_EXEC_BF16 && bf16 > need)
             need = bf16;
-        if (k->wino && ggn_wino_suits(c_in, v->c, v->h, v->w) && wino > need)
-            need = wino;
+        if (k->wino && ggn_wino_suits(c_in, v->c, v->h, v->w))
+            need = wino > need ? wino : need;
+        if (k->wino && flags & GGN_EXEC_GRADS && need < GGN_WINO_GRAD_SCRATCH)
+            need = GGN_WINO_GRAD_SCRATCH;
     }
     return (need + 15) / 16 * 16;
 }
@@ -67,6 +69,19 @@ static size_t most_normed(const struct ggn_graph *g)
     return (size_t)most;
 }
 
+/* Most weights of a convolution. */
+static size_t leaf_size(const struct ggn_graph *g, int flags)
+{
+    size_t most = 0;
+
+    for (int i = 0; i < g->n_layers && flags & GGN_EXEC_GRADS; i++) {
+        const struct ggn_layer *l = &g->layer[i];
+        if (l->op == GGN_OP_CONV && ggn_conv_weights(g, l) > most)
+            most = ggn_conv_weights(g, l);
+    }
+    return most;
+}
+
 static size_t sum_values(const struct ggn_graph *g, int capacity)
 {
     return 2 * most_normed(g) * (size_t)capacity;
@@ -76,7 +91,8 @@ static size_t total_size(const struct ggn_graph *g, const struct ggn_kernels *k,
 {
     size_t offset[GGN_MAX_LAYERS + 1];
     size_t acts = place_values(g, flags, offset) * (size_t)capacity;
-    return acts * (flags & GGN_EXEC_GRADS ? 2 : 1) + 2 * (g->n_stats + 16) + scratch_size(g, k, flags) * (size_t)workers;
+    return acts * (flags & GGN_EXEC_GRADS ? 2 : 1) + 2 * (g->n_stats + 16) + scratch_size(g, k, flags) * (size_t)workers +
+           leaf_size(g, flags) * (size_t)capacity;
 }
 
 size_t ggn_exec_bytes(const struct ggn_graph *g, int capacity, int flags, int workers)
@@ -101,6 +117,8 @@ static void place_memory(struct ggn_exec *e, char *memory, int workers)
     e->scratch_size = scratch_size(e->graph, e->kernels, e->flags);
     e->bn_mean = e->scratch + e->scratch_size * (size_t)workers;
     e->bn_inv = e->bn_mean + e->graph->n_stats + 16;
+    e->leaves = e->bn_inv + e->graph->n_stats + 16;
+    e->leaf_size = leaf_size(e->graph, e->flags);
 }
 
 struct ggn_exec *ggn_exec_create_shared(const struct ggn_graph *graph, const struct ggn_kernels *kernels, int capacity,

@@ -5,7 +5,10 @@
 #include "nn/real.h"
 #include "nn/winograd.h"
 
-enum { GRAD_CHUNK = 512 /* pixels whose gradients stay in the first-level cache */ };
+enum {
+    GRAD_CHUNK = 512, /* pixels whose gradients stay in the first-level cache */
+    SUM_CHUNK = 4096  /* weights whose gradients one task adds up */
+};
 
 /* Pointers to all planes of a layer's input(s); returns their number. */
 static int input_planes(real **out, const struct ggn_task *t, real *base, long n)
@@ -161,68 +164,111 @@ struct weight_part {
     int oc, ot, ic0, nic;
 };
 
-/* sums [nic][taps][ot], laid out as the accumulators, into the weights' gradient. */
-static void add_weights(const struct ggn_task *t, real *g, const struct weight_part *p, const real *sums)
+/* Where the taps of an output and an input channel lie among the weights, and in which order. */
+static size_t weight_at(const struct ggn_task *t, int o, int i)
 {
-    const int n_in = ggn_layer_c_in(t->e->graph, t->l), taps = t->l->kernel * t->l->kernel;
-    const int c_out = t->e->graph->value[t->l->out].c;
-
-    for (int ic = 0; ic < p->nic; ic++)
-        for (int tap = 0; tap < taps; tap++)
-            for (int o = 0; o < p->ot; o++) {
-                int at = t->l->transposed ? taps - 1 - tap : tap;
-                size_t pair = t->l->transposed ? (size_t)(p->ic0 + ic) * (size_t)c_out + (size_t)(p->oc + o)
-                                               : (size_t)(p->oc + o) * (size_t)n_in + (size_t)(p->ic0 + ic);
-                g[t->l->weight + pair * (size_t)taps + (size_t)at] += sums[(ic * taps + tap) * p->ot + o];
-            }
+    const size_t n_in = (size_t)ggn_layer_c_in(t->e->graph, t->l), c_out = (size_t)t->e->graph->value[t->l->out].c;
+    const size_t pair = t->l->transposed ? (size_t)i * c_out + (size_t)o : (size_t)o * n_in + (size_t)i;
+    return pair * (size_t)(t->l->kernel * t->l->kernel);
 }
 
-/* sums: that part of dW of one image. */
-static void image_weights(const struct ggn_task *t, const struct weight_part *p, int n, real *acc, real *sums)
+/* Tasks of one image and up to so many channels. */
+static long cut_weights(struct ggn_task *t)
+{
+    const struct ggn_kernels *k = t->e->kernels;
+    const struct ggn_value *v = &t->e->graph->value[t->l->out];
+    const int n_in = ggn_layer_c_in(t->e->graph, t->l);
+
+    t->weights_by_wino = k->wino_grad && t->l->kernel == 3 && ggn_wino_suits(n_in, v->c, v->h, v->w);
+    t->oc_group = t->weights_by_wino ? GGN_WINO_GRAD : k->tile_oc;
+    t->ic_group = t->weights_by_wino ? GGN_WINO_GRAD : GGN_GRAD_IC;
+    t->oc_groups = (v->c + t->oc_group - 1) / t->oc_group;
+    t->ic_groups = (n_in + t->ic_group - 1) / t->ic_group;
+    return (long)t->e->batch * t->oc_groups * t->ic_groups;
+}
+
+static void weights_by_definition(const struct ggn_task *t, const struct weight_part *p, real *const *x,
+                                  const real *const *dy, real *acc, real *leaf)
 {
     const struct ggn_value *v = &t->e->graph->value[t->l->out];
     const struct ggn_kernels *k = t->e->kernels;
     const int taps = t->l->kernel * t->l->kernel, values = p->ot * p->nic * taps;
     const long px = (long)v->h * v->row;
-    real *x[GGN_MAX_CHANNELS];
-    const real *dy[GGN_TILE_MAX];
+    real sums[GGN_TILE_MAX * GGN_GRAD_IC * 9]; /* [nic][taps][ot] */
 
     memset(acc, 0, (size_t)(values * k->lanes) * sizeof *acc);
-    input_planes(x, t, t->e->acts, n);
-    for (int o = 0; o < p->ot; o++)
-        dy[o] = ggn_grad(t, t->l->out, n, p->oc + o);
     for (long at = 0; at < px; at += GRAD_CHUNK)
-        k->conv_grad(acc, (const real *const *)x + p->ic0, p->nic, dy, p->ot, taps, v->row, at,
+        k->conv_grad(acc, (const real *const *)x, p->nic, dy, p->ot, taps, v->row, at,
                      at + GRAD_CHUNK < px ? at + GRAD_CHUNK : px);
     k->lane_sums(sums, acc, values);
+    for (int ic = 0; ic < p->nic; ic++)
+        for (int o = 0; o < p->ot; o++) {
+            real *to = leaf + weight_at(t, p->oc + o, p->ic0 + ic);
+            for (int tap = 0; tap < taps; tap++)
+                to[t->l->transposed ? taps - 1 - tap : tap] = sums[(ic * taps + tap) * p->ot + o];
+        }
 }
 
-/* dW of one tile of output channels and up to GGN_GRAD_IC input channels, over all images. */
+static void weights_by_wino(const struct ggn_task *t, const struct weight_part *p, real *const *x, const real *const *dy,
+                            real *scratch, real *leaf)
+{
+    const struct ggn_value *v = &t->e->graph->value[t->l->out];
+    const struct ggn_conv_grad grad = {
+        .x = (const real *const *)x,
+        .dy = dy,
+        .n_in = p->nic,
+        .n_out = p->ot,
+        .h = v->h,
+        .w_px = v->w,
+        .row = v->row,
+        .dw = leaf + weight_at(t, p->oc, p->ic0),
+        .o_step = (long)weight_at(t, 1, 0),
+        .i_step = (long)weight_at(t, 0, 1),
+        .mirrored = t->l->transposed,
+    };
+    t->e->kernels->wino_grad(&grad, scratch);
+}
+
+/* dW of one image and one group of output and of input channels, into the image's leaf. */
 static void conv_weight_back(void *data, long i, int worker)
 {
     const struct ggn_task *t = data;
     const int n_in = ggn_layer_c_in(t->e->graph, t->l), c_out = t->e->graph->value[t->l->out].c;
-    const int tile = t->e->kernels->tile_oc, groups = (n_in + GGN_GRAD_IC - 1) / GGN_GRAD_IC;
-    const int taps = t->l->kernel * t->l->kernel;
-    struct weight_part p = {.oc = (int)(i / groups) * tile, .ic0 = (int)(i % groups) * GGN_GRAD_IC};
-    const int oc_end = p.oc + tile < c_out ? p.oc + tile : c_out;
-    real *acc = t->e->scratch + (size_t)worker * t->e->scratch_size;
-    real sums[GGN_TREE_WIDTH];
-    struct ggn_tree tree;
+    const long n = i / (t->oc_groups * t->ic_groups);
+    struct weight_part p = {.oc = (int)(i / t->ic_groups % t->oc_groups) * t->oc_group,
+                            .ic0 = (int)(i % t->ic_groups) * t->ic_group};
+    const int oc_end = p.oc + t->oc_group < c_out ? p.oc + t->oc_group : c_out;
+    real *scratch = t->e->scratch + (size_t)worker * t->e->scratch_size;
+    real *x[GGN_MAX_CHANNELS];
+    const real *dy[GGN_WINO_GRAD];
 
-    p.nic = n_in - p.ic0 < GGN_GRAD_IC ? n_in - p.ic0 : GGN_GRAD_IC;
+    p.nic = n_in - p.ic0 < t->ic_group ? n_in - p.ic0 : t->ic_group;
+    input_planes(x, t, t->e->acts, n);
     for (; p.oc < oc_end; p.oc += p.ot) {
-        for (p.ot = tile; p.ot > oc_end - p.oc;)
-            p.ot /= 2;
-        for (int k = 0; k < t->e->n_nodes; k++) {
-            const real *total = NULL;
-            for (int n = 0; n < t->e->node[k].size; n++) {
-                image_weights(t, &p, ggn_node_image(t, k, n), acc, sums);
-                total = ggn_tree_add(&tree, n, sums, p.ot * p.nic * taps);
-            }
-            add_weights(t, ggn_node_grad(t, k), &p, total);
-        }
+        for (p.ot = t->oc_group; p.ot > oc_end - p.oc;)
+            p.ot = t->weights_by_wino ? oc_end - p.oc : p.ot / 2;
+        for (int o = 0; o < p.ot; o++)
+            dy[o] = ggn_grad(t, t->l->out, n, p.oc + o);
+        (t->weights_by_wino ? weights_by_wino : weights_by_definition)(t, &p, x + p.ic0, dy, scratch, ggn_leaf(t, n));
     }
+}
+
+/* Some elements of the leaves of each node into its gradient: siblings first, in place. */
+static void conv_weight_sum(void *data, long i, int worker)
+{
+    const struct ggn_task *t = data;
+    const struct ggn_kernels *k = t->e->kernels;
+    const size_t from = (size_t)i * SUM_CHUNK, count = ggn_conv_weights(t->e->graph, t->l);
+    const long n = (long)(count - from < SUM_CHUNK ? count - from : SUM_CHUNK);
+
+    for (int node = 0; node < t->e->n_nodes; node++) {
+        const int first = ggn_node_image(t, node, 0), size = t->e->node[node].size;
+        for (int step = 1; step < size; step *= 2)
+            for (int j = first; j < first + size; j += 2 * step)
+                k->axpy(ggn_leaf(t, j) + from, 1, ggn_leaf(t, j + step) + from, n);
+        k->axpy(ggn_node_grad(t, node) + t->l->weight + from, 1, ggn_leaf(t, first) + from, n);
+    }
+    (void)worker;
 }
 
 static int needs_input_grad(const struct ggn_task *t)
@@ -235,10 +281,10 @@ static void conv_backward(struct ggn_task *t)
     const struct ggn_graph *g = t->e->graph;
     const int c_out = g->value[t->l->out].c;
     const int c_in = ggn_layer_c_in(g, t->l);
-    const int tile = t->e->kernels->tile_oc;
 
     ggn_task_run(t, c_out, conv_act_back);
-    ggn_task_run(t, (long)((c_out + tile - 1) / tile) * ((c_in + GGN_GRAD_IC - 1) / GGN_GRAD_IC), conv_weight_back);
+    ggn_task_run(t, cut_weights(t), conv_weight_back);
+    ggn_task_run(t, (long)((ggn_conv_weights(g, t->l) + SUM_CHUNK - 1) / SUM_CHUNK), conv_weight_sum);
     if (needs_input_grad(t))
         ggn_task_run(t, cut_conv(t, c_out, c_in, t->w->wino_back), conv_back_piece);
 }

@@ -15,6 +15,7 @@
 enum {
     GGN_TILE_MAX = 8, /* most output channels of a register tile */
     GGN_GRAD_IC = 16, /* input channels whose weight gradient one task accumulates */
+    GGN_WINO_GRAD = 32, /* input and output channels of a task where Winograd's algorithm is used */
     GGN_SSIM_RADIUS = 5
 };
 
@@ -33,6 +34,17 @@ struct ggn_conv {
     real slope;       /* LeakyReLU; 1 = none */
 };
 
+/* The gradient of the weights of a 3×3 convolution for one image: dw[o][i][t] = Σ_p dy[o][p]·x[i][p + t]. */
+struct ggn_conv_grad {
+    const real *const *x;  /* [n_in] */
+    const real *const *dy; /* [n_out] */
+    int n_in, n_out;       /* <= GGN_WINO_GRAD */
+    int h, w_px, row;
+    real *dw;            /* of o, i at dw + o·o_step + i·i_step: nine taps, from the last to the first if `mirrored` */
+    long o_step, i_step;
+    int mirrored;
+};
+
 struct ggn_kernels {
     enum ggn_isa isa;
     int lanes;   /* elements of a vector */
@@ -44,6 +56,7 @@ struct ggn_kernels {
     void (*conv)(const struct ggn_conv *conv, long p0, long p1, int oc0, int oc1);
     /* Faster forms of a 3×3 convolution, NULL where there are none; see nn/winograd.h and nn/bf16.h. */
     void (*wino)(const struct ggn_conv *conv, const real *u, int t0, int t1, real *scratch);
+    void (*wino_grad)(const struct ggn_conv_grad *grad, real *scratch);
     void (*wino_pack)(real *u, const real *packed, int n_in, int n_out, int tile_oc);
     void (*bf16)(const struct ggn_conv *conv, const uint32_t *w, long p0, long p1, int oc0, int oc1, uint32_t *scratch);
     void (*bf16_pack)(uint32_t *out, const real *packed, int n_in, int n_out, int tile_oc);

@@ -20,7 +20,8 @@
 #define FMA(a, b, c) ((vf)_mm512_fmadd_ps((__m512)(a), (__m512)(b), (__m512)(c)))
 #define VSUM(v) _mm512_reduce_add_ps((__m512)(v))
 #define FASTER_FORMS                                                                                                        \
-    .wino = ggn_wino_conv_avx512, .wino_pack = ggn_wino_pack, .bf16 = ggn_bf16_conv_avx512, .bf16_pack = ggn_bf16_pack,
+    .wino = ggn_wino_conv_avx512, .wino_grad = ggn_wino_grad_avx512, .wino_pack = ggn_wino_pack,                            \
+    .bf16 = ggn_bf16_conv_avx512, .bf16_pack = ggn_bf16_pack,
 #endif
 
 #include "nn/kernels_body.h"

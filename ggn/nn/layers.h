@@ -14,7 +14,9 @@ struct ggn_task {
     const struct ggn_layer *l;
     const struct ggn_layer *bn;         /* CONV: the batch norm that follows and is applied on the way, or NULL */
     int px_blocks, oc_groups, oc_group; /* how a convolution is cut */
+    int ic_groups, ic_group;            /* of its weights' gradient */
     long px_block;
+    int weights_by_wino;  /* CONV: the gradient of its weights */
     const real *wino;     /* CONV: transformed weights when Winograd's algorithm is used */
     const uint32_t *bf16; /* CONV: pairs of weights when bfloat16 is used */
 };
@@ -59,6 +61,18 @@ static inline real *ggn_grad(const struct ggn_task *t, int value, long n, int c)
 static inline real *ggn_node_grad(const struct ggn_task *t, int k)
 {
     return t->e->nodes + (size_t)k * t->e->graph->n_params;
+}
+
+/* How many weights a convolution has. */
+static inline size_t ggn_conv_weights(const struct ggn_graph *g, const struct ggn_layer *l)
+{
+    return (size_t)ggn_layer_c_in(g, l) * (size_t)g->value[l->out].c * (size_t)(l->kernel * l->kernel);
+}
+
+/* Where image n leaves the gradient of the weights of the present layer, laid out as they are. */
+static inline real *ggn_leaf(const struct ggn_task *t, long n)
+{
+    return t->e->leaves + (size_t)n * t->e->leaf_size;
 }
 
 /* The i-th image of node k, as this process numbers its images. */

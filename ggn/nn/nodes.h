@@ -16,7 +16,7 @@
 enum {
     GGN_TREE_DEPTH = 13,           /* images of a batch: below 2^12 */
     GGN_NODES_MAX = 2 * GGN_TREE_DEPTH,
-    GGN_TREE_WIDTH = 8 * 16 * 9    /* elements summed at a time: GGN_TILE_MAX · GGN_GRAD_IC · 9 */
+    GGN_TREE_WIDTH = 1024          /* elements summed at a time */
 };
 
 struct ggn_node {

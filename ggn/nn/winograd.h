@@ -11,7 +11,11 @@
 
 enum {
     GGN_WINO_TILES = 64, /* most tiles of 4×4 outputs per call */
-    GGN_WINO_OC = 32     /* output channels whose products are kept at a time */
+    GGN_WINO_OC = 32,    /* output channels whose products are kept at a time */
+    GGN_WINO_GRAD_TILES = 32,
+    GGN_WINO_GRAD_STRIDE = GGN_WINO_GRAD_TILES * GGN_WINO_GRAD + 16, /* not 4 KiB, so that stores do not collide */
+    GGN_WINO_GRAD_STRIP = 4 * GGN_WINO_GRAD_TILES + 2 + 15,          /* columns of GGN_WINO_GRAD_TILES tiles in a row */
+    GGN_WINO_GRAD_SCRATCH = 36 * (2 * GGN_WINO_GRAD_STRIDE + GGN_WINO_GRAD * GGN_WINO_GRAD) + 6 * 16 * GGN_WINO_GRAD_STRIP
 };
 
 /* Whether it pays for a convolution of this shape. */
@@ -27,5 +31,8 @@ void ggn_wino_pack(float *u, const float *packed, int n_in, int n_out, int tile_
 
 /* Tiles [t0, t1) of the convolution `a` (a->w is not read), at most GGN_WINO_TILES. */
 void ggn_wino_conv_avx512(const struct ggn_conv *a, const float *u, int t0, int t1, float *scratch);
+
+/* The gradient of the weights, by the adjoint of that algorithm. scratch: GGN_WINO_GRAD_SCRATCH floats. */
+void ggn_wino_grad_avx512(const struct ggn_conv_grad *grad, float *scratch);
 
 #endif

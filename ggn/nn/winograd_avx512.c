@@ -279,6 +279,225 @@ void ggn_wino_conv_avx512(const struct ggn_conv *a, const float *u, int t0, int 
     }
 }
 
+/* --- gradient of the weights ------------------------------------------------------------------------------------------ */
+
+/* dU = Σ over the tiles of (A dY Aᵀ) ⊙ (Bᵀ d B), dW = Gᵀ dU G, the adjoint of the above. Here the lanes of a vector are 16
+ * channels, so that the sum over tiles is one of products of a broadcast value and a vector, in order. */
+enum { GRAD_TILES = GGN_WINO_GRAD_TILES, STRIDE = GGN_WINO_GRAD_STRIDE, CHANNELS = GGN_WINO_GRAD };
+
+/* Some whole rows of tiles, or a part of one. */
+struct tile_block {
+    int ty0, rows;
+    int tx0, n;
+};
+
+/* m[c] = lane c of the vectors m[0..15]. */
+INLINE void transpose16(vf m[16])
+{
+    vf t[16];
+
+    for (int i = 0; i < 16; i += 2) {
+        t[i] = _mm512_unpacklo_ps(m[i], m[i + 1]);
+        t[i + 1] = _mm512_unpackhi_ps(m[i], m[i + 1]);
+    }
+    for (int i = 0; i < 16; i += 4)
+        for (int k = 0; k < 2; k++) {
+            __m512d a = _mm512_castps_pd(t[i + k]), b = _mm512_castps_pd(t[i + k + 2]);
+            m[i + 2 * k] = _mm512_castpd_ps(_mm512_unpacklo_pd(a, b));
+            m[i + 2 * k + 1] = _mm512_castpd_ps(_mm512_unpackhi_pd(a, b));
+        }
+    for (int k = 0; k < 4; k++) { /* m[4i + k]: columns k, k+4, k+8, k+12 of rows 4i to 4i+3, in this order */
+        vf a = _mm512_shuffle_f32x4(m[k], m[4 + k], 0x88), b = _mm512_shuffle_f32x4(m[k], m[4 + k], 0xdd);
+        vf c = _mm512_shuffle_f32x4(m[8 + k], m[12 + k], 0x88), d = _mm512_shuffle_f32x4(m[8 + k], m[12 + k], 0xdd);
+        t[k] = _mm512_shuffle_f32x4(a, c, 0x88);
+        t[8 + k] = _mm512_shuffle_f32x4(a, c, 0xdd);
+        t[4 + k] = _mm512_shuffle_f32x4(b, d, 0x88);
+        t[12 + k] = _mm512_shuffle_f32x4(b, d, 0xdd);
+    }
+    for (int i = 0; i < 16; i++)
+        m[i] = t[i];
+}
+
+/* strip[column][16 channels]: columns [x0, x0 + n) of row y of up to 16 planes, 0 outside of the picture. */
+static void load_strip(float *strip, const float *const *plane, int channels, const struct ggn_conv_grad *g, int y, int x0,
+                       int n)
+{
+    if (y < 0 || y >= g->h) {
+        memset(strip, 0, (size_t)(n * L) * sizeof *strip);
+        return;
+    }
+    for (int at = 0; at < n; at += L, strip += L * L) {
+        const int first = x0 + at, left = first < 0 ? -first : 0, inside = g->w_px - first < L ? g->w_px - first : L;
+        const unsigned bits = inside > left ? ((1u << inside) - 1) & ~((1u << left) - 1) : 0;
+        vf m[16];
+        for (int c = 0; c < 16; c++)
+            m[c] = c < channels ? _mm512_maskz_loadu_ps((__mmask16)bits, plane[c] + (long)y * g->row + first)
+                                : _mm512_setzero_ps();
+        transpose16(m);
+        for (int c = 0; c < 16; c++)
+            _mm512_storeu_ps(strip + c * L, m[c]);
+    }
+}
+
+/* A on four values. */
+INLINE void spread6(vf o[6], const vf g[4])
+{
+    const vf two = _mm512_set1_ps(2), four = _mm512_set1_ps(4), eight = _mm512_set1_ps(8);
+    vf even = _mm512_add_ps(g[0], g[2]), odd = _mm512_add_ps(g[1], g[3]);
+    vf even2 = _mm512_fmadd_ps(four, g[2], g[0]), odd2 = _mm512_fmadd_ps(eight, g[3], _mm512_mul_ps(two, g[1]));
+
+    o[0] = g[0];
+    o[1] = _mm512_add_ps(even, odd);
+    o[2] = _mm512_sub_ps(even, odd);
+    o[3] = _mm512_add_ps(even2, odd2);
+    o[4] = _mm512_sub_ps(even2, odd2);
+    o[5] = g[3];
+}
+
+/* One tile of 16 channels, `side` rows and columns of the strip: into the 36 matrices. */
+INLINE void transform_tile(float *v, const float *strip, const int side)
+{
+    vf t[6][6];
+
+    for (int j = 0; j < side; j++) {
+        vf x[6], o[6];
+        for (int i = 0; i < side; i++)
+            x[i] = _mm512_loadu_ps(strip + (i * GGN_WINO_GRAD_STRIP + j) * L);
+        if (side == 6)
+            forward6(o, x);
+        else
+            spread6(o, x);
+        for (int i = 0; i < 6; i++)
+            t[i][j] = o[i];
+    }
+    for (int i = 0; i < 6; i++) {
+        vf o[6];
+        if (side == 6)
+            forward6(o, t[i]);
+        else
+            spread6(o, t[i]);
+        for (int j = 0; j < 6; j++)
+            _mm512_storeu_ps(v + (6 * i + j) * STRIDE, o[j]);
+    }
+}
+
+/* v[36][tile][CHANNELS]: the tiles of a block of `n` planes; side 6 with a border of one pixel (Bᵀ d B) or 4 (A dY Aᵀ). */
+INLINE void transform_block(float *v, const float *const *plane, int n, const struct ggn_conv_grad *g,
+                            const struct tile_block *b, float *strip, const int side)
+{
+    const int border = side == 6;
+
+    for (int c = 0; c < n; c += L)
+        for (int r = 0; r < b->rows; r++) {
+            for (int i = 0; i < side; i++)
+                load_strip(strip + i * GGN_WINO_GRAD_STRIP * L, plane + c, n - c < L ? n - c : L, g,
+                           4 * (b->ty0 + r) - border + i, 4 * b->tx0 - border, 4 * b->n + 2 * border);
+            for (int k = 0; k < b->n; k++)
+                transform_tile(v + (r * b->n + k) * CHANNELS + c, strip + 4 * k * L, side);
+        }
+}
+
+/* u[o][CHANNELS] += Σ_t m[t][o]·v[t] for `ot` output channels and nv vectors of input channels. */
+INLINE void accumulate_tile(float *u, const float *m, const float *v, int tiles, const int ot, const int nv)
+{
+    vf acc[8][2];
+
+    for (int o = 0; o < ot; o++)
+        for (int k = 0; k < nv; k++)
+            acc[o][k] = _mm512_loadu_ps(u + o * CHANNELS + k * L);
+    for (int t = 0; t < tiles; t++, m += CHANNELS, v += CHANNELS) {
+        vf x[2];
+        for (int k = 0; k < nv; k++)
+            x[k] = _mm512_loadu_ps(v + k * L);
+        for (int o = 0; o < ot; o++) {
+            vf w = _mm512_set1_ps(m[o]);
+            for (int k = 0; k < nv; k++)
+                acc[o][k] = _mm512_fmadd_ps(w, x[k], acc[o][k]);
+        }
+    }
+    for (int o = 0; o < ot; o++)
+        for (int k = 0; k < nv; k++)
+            _mm512_storeu_ps(u + o * CHANNELS + k * L, acc[o][k]);
+}
+
+static void accumulate(float *u, const float *m, const float *v, const struct ggn_conv_grad *g, int tiles)
+{
+    for (int xi = 0; xi < XI; xi++, u += CHANNELS * CHANNELS, m += STRIDE, v += STRIDE)
+        for (int o = 0; o < g->n_out; o += 8) { /* channels beyond n_out are 0 */
+            float *to = u + o * CHANNELS;
+            if (g->n_out - o > 4 && g->n_in > L)
+                accumulate_tile(to, m + o, v, tiles, 8, 2);
+            else if (g->n_out - o > 4)
+                accumulate_tile(to, m + o, v, tiles, 8, 1);
+            else if (g->n_in > L)
+                accumulate_tile(to, m + o, v, tiles, 4, 2);
+            else
+                accumulate_tile(to, m + o, v, tiles, 4, 1);
+        }
+}
+
+/* Gᵀ on six values. */
+INLINE void gather3(vf o[3], const vf u[6])
+{
+    const vf sixth = _mm512_set1_ps(1.0f / 6);
+    vf s = _mm512_add_ps(u[1], u[2]), d = _mm512_sub_ps(u[2], u[1]);
+    vf p = _mm512_add_ps(u[3], u[4]), q = _mm512_sub_ps(u[3], u[4]);
+
+    o[0] = _mm512_fmadd_ps(_mm512_set1_ps(1.0f / 24), p,
+                           _mm512_fnmadd_ps(sixth, s, _mm512_mul_ps(_mm512_set1_ps(0.25f), u[0])));
+    o[1] = _mm512_fmadd_ps(_mm512_set1_ps(1.0f / 12), q, _mm512_mul_ps(sixth, d));
+    o[2] = _mm512_fmadd_ps(sixth, _mm512_sub_ps(p, s), u[5]);
+}
+
+/* Gᵀ dU G of output channel o and up to 16 input channels from i0 on. */
+static void write_weights(const struct ggn_conv_grad *g, const float *u, int o, int i0)
+{
+    const int n = g->n_in - i0 < L ? g->n_in - i0 : L;
+    float *to = g->dw + (long)o * g->o_step + (long)i0 * g->i_step;
+    vf t[3][6], m[16];
+
+    for (int j = 0; j < 6; j++) {
+        vf x[6], r[3];
+        for (int i = 0; i < 6; i++)
+            x[i] = _mm512_loadu_ps(u + ((6 * i + j) * CHANNELS + o) * CHANNELS + i0);
+        gather3(r, x);
+        for (int i = 0; i < 3; i++)
+            t[i][j] = r[i];
+    }
+    for (int i = 0; i < 3; i++) {
+        vf r[3];
+        gather3(r, t[i]);
+        for (int j = 0; j < 3; j++)
+            m[g->mirrored ? 8 - (3 * i + j) : 3 * i + j] = r[j];
+    }
+    for (int k = 9; k < 16; k++)
+        m[k] = _mm512_setzero_ps();
+    transpose16(m);
+    for (int c = 0; c < n; c++)
+        _mm512_mask_storeu_ps(to + (long)c * g->i_step, (__mmask16)0x1ff, m[c]);
+}
+
+void ggn_wino_grad_avx512(const struct ggn_conv_grad *g, float *scratch)
+{
+    const int tiles_x = (g->w_px + 3) / 4, tiles_y = (g->h + 3) / 4;
+    const int parts = (tiles_x + GRAD_TILES - 1) / GRAD_TILES, rows = tiles_x < GRAD_TILES ? GRAD_TILES / tiles_x : 1;
+    float *v = scratch, *m = v + XI * STRIDE, *u = m + XI * STRIDE, *strip = u + XI * CHANNELS * CHANNELS;
+
+    memset(u, 0, (size_t)(XI * CHANNELS * CHANNELS) * sizeof *u);
+    for (int ty = 0; ty < tiles_y; ty += rows)
+        for (int part = 0; part < parts; part++) {
+            struct tile_block b = {.ty0 = ty, .rows = tiles_y - ty < rows ? tiles_y - ty : rows,
+                                   .tx0 = tiles_x * part / parts};
+            b.n = tiles_x * (part + 1) / parts - b.tx0;
+            transform_block(v, g->x, g->n_in, g, &b, strip, 6);
+            transform_block(m, g->dy, g->n_out, g, &b, strip, 4);
+            accumulate(u, m, v, g, b.rows * b.n);
+        }
+    for (int o = 0; o < g->n_out; o++)
+        for (int i = 0; i < g->n_in; i += L)
+            write_weights(g, u, o, i);
+}
+
 #else
 typedef int ggn_no_winograd_here; /* ISO C forbids an empty file */
 #endif

@@ -36,15 +36,9 @@ static double *filled(size_t n, uint32_t seed)
     return a;
 }
 
-static struct oracle make_oracle(uint32_t seed)
+static struct oracle oracle_of(struct ggn_naive_conv c, double slope, uint32_t seed)
 {
-    struct oracle o = {.slope = ggn_hash(1, seed) % 2 ? 0.25 : 1};
-    o.c = (struct ggn_naive_conv){.c_in = 1 + (int)(ggn_hash(2, seed) % 40),
-                                  .c_out = 1 + (int)(ggn_hash(3, seed) % 24),
-                                  .h = 1 + (int)(ggn_hash(4, seed) % 15),
-                                  .w = 1 + (int)(ggn_hash(5, seed) % 70),
-                                  .kernel = ggn_hash(6, seed) % 4 ? 3 : 1,
-                                  .transposed = (int)(ggn_hash(7, seed) % 2)};
+    struct oracle o = {.c = c, .slope = slope};
     size_t area = (size_t)(o.c.h * o.c.w), n_in = (size_t)o.c.c_in, n_out = (size_t)o.c.c_out;
     size_t n_w = n_in * n_out * (size_t)(o.c.kernel * o.c.kernel);
     o.x = filled(n_in * area, seed + 1);
@@ -60,6 +54,17 @@ static struct oracle make_oracle(uint32_t seed)
         o.dz[i] = o.y[i] > 0 ? o.dz[i] : o.slope * o.dz[i];
     ggn_naive_backward(&o.c, o.x, o.weight, o.dz, o.dx, o.dweight, o.dbias);
     return o;
+}
+
+static struct oracle make_oracle(uint32_t seed)
+{
+    const struct ggn_naive_conv c = {.c_in = 1 + (int)(ggn_hash(2, seed) % 40),
+                                     .c_out = 1 + (int)(ggn_hash(3, seed) % 24),
+                                     .h = 1 + (int)(ggn_hash(4, seed) % 15),
+                                     .w = 1 + (int)(ggn_hash(5, seed) % 70),
+                                     .kernel = ggn_hash(6, seed) % 4 ? 3 : 1,
+                                     .transposed = (int)(ggn_hash(7, seed) % 2)};
+    return oracle_of(c, ggn_hash(1, seed) % 2 ? 0.25 : 1, seed);
 }
 
 static void free_oracle(struct oracle *o)
@@ -122,6 +127,21 @@ static void test_convolutions(void **state)
                 check(ggn_network_run, &o, (enum ggn_isa)isa, seed, F32_TOLERANCE);
                 check(ggn_network_run_f64, &o, (enum ggn_isa)isa, seed, F64_TOLERANCE);
             }
+        free_oracle(&o);
+    }
+    (void)state;
+}
+
+/* More channels, columns and rows than one task, register tile or block of tiles has. */
+static void test_large_convolutions(void **state)
+{
+    static const struct ggn_naive_conv sizes[] = {{.c_in = 35, .c_out = 45, .h = 9, .w = 145, .kernel = 3},
+                                                  {.c_in = 20, .c_out = 35, .h = 41, .w = 30, .kernel = 3, .transposed = 1}};
+    for (uint32_t k = 0; k < sizeof sizes / sizeof sizes[0]; k++) {
+        struct oracle o = oracle_of(sizes[k], 0.25, 60 + k);
+        for (int isa = 0; isa < GGN_ISA_COUNT; isa++)
+            if (ggn_isa_available((enum ggn_isa)isa))
+                check(ggn_network_run, &o, (enum ggn_isa)isa, 60 + k, F32_TOLERANCE);
         free_oracle(&o);
     }
     (void)state;
@@ -342,8 +362,9 @@ static void test_batch_same_bytes(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_convolutions),       cmocka_unit_test(test_bf16),
-                                       cmocka_unit_test(test_row_ends),           cmocka_unit_test(test_instruction_sets),
-                                       cmocka_unit_test(test_threads_same_bytes), cmocka_unit_test(test_batch_same_bytes)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_convolutions),       cmocka_unit_test(test_large_convolutions),
+                                       cmocka_unit_test(test_bf16),               cmocka_unit_test(test_row_ends),
+                                       cmocka_unit_test(test_instruction_sets),   cmocka_unit_test(test_threads_same_bytes),
+                                       cmocka_unit_test(test_batch_same_bytes)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
