@@ -9,6 +9,7 @@
 #include "geom/accel.h"
 #include "geom/quadric.h"
 #include "integ/surface.h"
+#include "sample/rng.h"
 #include "support/pt_scenes.h"
 
 static struct pt_ray ray_to(pt_vec3 origin, pt_vec3 direction)
@@ -100,6 +101,66 @@ static void quadrics(void **state)
     assert_int_equal(pt_quadric_intersect(&q, v3(0.25f, 0, 0), v3(0, 0, 1), 0.0f, INFINITY, &t, &p), 0);
 }
 
+/* A point of the surface by pbrt's parameters, in double and the quadric's own space. */
+static void surface_point(const struct pt_quadric *q, double u, double v, double p[3])
+{
+    double phi = u * (double)q->phi_max, r = (double)q->radius, z0 = (double)q->z_min, z1 = (double)q->z_max;
+    if (q->kind == PT_QUADRIC_SPHERE) {
+        double theta0 = acos(z0 / r), theta = theta0 + v * (acos(z1 / r) - theta0);
+        p[2] = r * cos(theta);
+        r *= sin(theta);
+    } else if (q->kind == PT_QUADRIC_CYLINDER) {
+        p[2] = z0 + v * (z1 - z0);
+    } else {
+        p[2] = z0;
+        r -= v * (r - (double)q->inner_radius);
+    }
+    p[0] = r * cos(phi);
+    p[1] = r * sin(phi);
+}
+
+/* Bounds hold the surface and are not much wider than its box, under any affine map; u, v and their tangents are pbrt's. */
+static void quadric_surfaces(void **state)
+{
+    (void)state;
+    struct pt_rng rng = pt_rng_make(3);
+    for (int k = 0; k < 600; k++) {
+        struct pt_quadric q = {.kind = k % 3, .radius = 0.5f + pt_rng_float(&rng), .phi_max = (k % 2 ? 1.0f : 2.0f) * PT_PI};
+        q.z_min = q.kind == PT_QUADRIC_SPHERE ? k % 5 ? -q.radius : -0.3f : -0.5f;
+        q.z_max = q.kind == PT_QUADRIC_SPHERE ? k % 7 ? q.radius : 0.2f : q.kind == PT_QUADRIC_DISK ? q.z_min : 0.75f;
+        q.inner_radius = q.kind == PT_QUADRIC_DISK ? 0.25f * q.radius : 0.0f;
+        for (int i = 0; i < 12; i++)
+            q.to_render.m[i] = 2.0f * pt_rng_float(&rng) - 1.0f;
+        if (!pt_mat34_invert(&q.to_render, &q.from_render))
+            continue;
+        pt_vec3 lower, upper, seen_lower = v3_splat(INFINITY), seen_upper = v3_splat(-INFINITY);
+        pt_quadric_bounds(&q, &lower, &upper);
+        for (int i = 0; i < 32 * 32; i++) {
+            double u = (i % 32 + 0.5) / 32, v = (i / 32 + 0.5) / 32, p[3];
+            surface_point(&q, u, v, p);
+            pt_vec3 own = v3((float)p[0], (float)p[1], (float)p[2]), at = pt_mat34_point(&q.to_render, own), du, dv;
+            float gu, gv;
+            assert_true(at.x >= lower.x && at.y >= lower.y && at.z >= lower.z && at.x <= upper.x && at.y <= upper.y && at.z <= upper.z);
+            seen_lower = v3(fminf(seen_lower.x, at.x), fminf(seen_lower.y, at.y), fminf(seen_lower.z, at.z));
+            seen_upper = v3(fmaxf(seen_upper.x, at.x), fmaxf(seen_upper.y, at.y), fmaxf(seen_upper.z, at.z));
+            pt_quadric_uv(&q, own, &gu, &gv, &du, &dv);
+            assert_near(gu, (float)u, 1e-5f);
+            assert_near(gv, (float)v, 1e-4f);
+            double a[3], b[3], d[2][3];
+            for (int which = 0; which < 2; which++) {
+                surface_point(&q, u + (which ? 0 : 1e-6), v + (which ? 1e-6 : 0), a);
+                surface_point(&q, u - (which ? 0 : 1e-6), v - (which ? 1e-6 : 0), b);
+                for (int c = 0; c < 3; c++)
+                    d[which][c] = (a[c] - b[c]) / 2e-6;
+            }
+            for (int which = 0; which < 2; which++)
+                assert_vec_near(which ? dv : du, pt_mat34_vector(&q.to_render, v3((float)d[which][0], (float)d[which][1], (float)d[which][2])), 2e-3f);
+        }
+        pt_vec3 room = v3_sub(upper, lower), used = v3_sub(seen_upper, seen_lower);
+        assert_true(room.x < 4.0f * used.x + 0.1f && room.y < 4.0f * used.y + 0.1f && room.z < 4.0f * used.z + 0.1f);
+    }
+}
+
 /* One triangle pair as an object, placed by a turn of 90° about y, a scale of 2 and a shift; then moving. */
 static void instances(void **state)
 {
@@ -180,7 +241,7 @@ static void matrices_invert(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(triangles_have_right_hand_normals), cmocka_unit_test(empty_scene_has_no_hits), cmocka_unit_test(quadrics),
+        cmocka_unit_test(triangles_have_right_hand_normals), cmocka_unit_test(empty_scene_has_no_hits), cmocka_unit_test(quadrics), cmocka_unit_test(quadric_surfaces),
         cmocka_unit_test(instances), cmocka_unit_test(meshes_are_watertight), cmocka_unit_test(matrices_invert),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
