@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -272,11 +273,207 @@ static void one_class(void **state)
     assert_non_null(strstr(err.text, "a window needs 8"));
 }
 
+/* Where a block stops by a cut and a limit of the guard, and what that costs a split. */
+static void cost(const struct ggn_method *m, enum ggn_split split, double cut, double limit, double *early, double *samples)
+{
+    int n = 0;
+    *early = *samples = 0;
+    for (int b = 0; b < set.n_blocks; b++) {
+        const struct ggn_eval_block *block = &set.blocks[b];
+        double stop = block->cap;
+        for (size_t i = block->first; i < block->end && block->split == split; i++)
+            if (m->score[i] < cut && !(m->guard && m->guard[i] > limit)) {
+                stop = set.spp[i];
+                break;
+            }
+        if (block->split != split)
+            continue;
+        n++;
+        *samples += stop;
+        *early += stop < 0.8 * block->label.threshold;
+    }
+    *early /= n;
+}
+
+/* No other cut between two scores does better, whatever share of early stops is allowed. */
+static void tuned_cuts_are_the_best(void **state)
+{
+    (void)state;
+    static const double limits[] = {0.0, 1e-4, 1e-3, 1e-2, INFINITY};
+    static double score[3 * BLOCKS * (LEVELS - WINDOW + 1)], guard[3 * BLOCKS * (LEVELS - WINDOW + 1)];
+    for (int k = 0; k < 12; k++) {
+        double rate = (double)(k % 6) / 5.0, best_early = INFINITY, best_samples = INFINITY, early, samples;
+        struct ggn_method m;
+        for (size_t i = 0; i < set.n; i++) { /* falling, with slips; and a guard that now and then holds */
+            score[i] = 100.0 / set.spp[i] * exp(1.5 * ggn_noise_gauss((uint32_t)i, (uint32_t)k));
+            guard[i] = 3e-4 * exp(3.0 * ggn_noise_gauss((uint32_t)i, (uint32_t)k + 100)) * 100.0 / set.spp[i];
+        }
+        assert_int_equal(ggn_method_scores(&m, &set, "made up", score, NULL), 0);
+        m.guard = k % 3 ? guard : NULL;
+        assert_int_equal(ggn_method_tune(&m, &set, GGN_SPLIT_VALIDATION, rate, NULL), 0);
+        for (size_t i = 0; i <= set.n; i++)
+            for (int g = m.guard ? 0 : 4; g < 5; g++) {
+                cost(&m, GGN_SPLIT_VALIDATION, i < set.n ? score[i] : INFINITY, limits[g], &early, &samples);
+                int fits = early <= rate, fitted = best_early <= rate;
+                if (fits > fitted || (fits == fitted && (fits ? samples < best_samples : early < best_early))) {
+                    best_early = early;
+                    best_samples = samples;
+                }
+            }
+        cost(&m, GGN_SPLIT_VALIDATION, m.cut, m.guard_limit, &early, &samples);
+        assert_true(best_early <= rate ? early <= rate : early == best_early);
+        if (best_early <= rate)
+            assert_near(samples, best_samples, 0);
+        double run = 0;
+        for (int b = 0; b < set.n_blocks; b++)
+            run += set.blocks[b].split == GGN_SPLIT_VALIDATION ? m.stop[b] : 0.0;
+        assert_near(run, samples, 0);
+        ggn_method_release(&m);
+    }
+}
+
+/* Every figure of a method once more from its definition. */
+static void figures(void **state)
+{
+    (void)state;
+    struct ggn_method m;
+    struct ggn_method_metrics f;
+    assert_int_equal(ggn_method_scores(&m, &set, "made up", set.rse, NULL), 0);
+    m.cut = 0.06;
+    ggn_method_run(&m, &set);
+    for (int b = 0; b < set.n_blocks; b++) /* time is no multiple of samples */
+        for (size_t i = set.blocks[b].first; i < set.blocks[b].end; i++)
+            set.seconds[i] *= 1.0 + b;
+    assert_int_equal(ggn_method_measure(&m, &set, GGN_SPLIT_TEST, &f, NULL), 0);
+    double needed = 0, spent = 0, time = 0, early = 0, flip = 0, ssim = 0, worst = 0, least = 1, right = 0, cases = 0, pairs = 0, won = 0;
+    for (int b = 10; b < 15; b++) {
+        const struct ggn_eval_block *block = &set.blocks[b];
+        size_t at = block->first;
+        while (at + 1 < block->end && set.rse[at] >= m.cut)
+            at++;
+        assert_near(m.stop[b], set.spp[at], 0);
+        needed += block->label.threshold;
+        spent += set.spp[at];
+        time += set.seconds[at];
+        early += set.spp[at] < 0.8 * block->label.threshold;
+        flip += set.flip[at] / BLOCKS;
+        ssim += set.ssim[at] / BLOCKS;
+        worst = fmax(worst, set.flip[at]);
+        least = fmin(least, set.ssim[at]);
+        for (size_t i = block->first; i < block->end; i++)
+            if (set.noisy[i] >= 0) {
+                cases++;
+                right += (set.rse[i] >= m.cut) == set.noisy[i];
+                for (size_t k = set.blocks[10].first; k < set.blocks[14].end && set.noisy[i] == 1; k++)
+                    if (set.noisy[k] == 0) {
+                        pairs++;
+                        won += set.rse[i] > set.rse[k] ? 1.0 : set.rse[i] == set.rse[k] ? 0.5 : 0.0;
+                    }
+            }
+    }
+    assert_true(f.blocks == BLOCKS && f.scenes == 1 && f.cases == (size_t)cases);
+    assert_near(f.accuracy, right / cases, 1e-12);
+    assert_near(f.auc, won / pairs, 1e-12);
+    assert_near(f.auc_scene_mean, f.auc, 1e-12);
+    assert_near(f.early_stop_rate, early / BLOCKS, 1e-12);
+    assert_near(f.samples_ratio, spent / needed, 1e-12);
+    assert_near(f.flip_mean, flip, 1e-12);
+    assert_near(f.ssim_mean, ssim, 1e-12);
+    assert_near(f.flip_worst, worst, 0);
+    assert_near(f.ssim_worst, least, 0);
+    /* the first count at which all blocks, and at all counts after it, are as good as the worst at its stop */
+    size_t k = LEVELS - WINDOW;
+    for (int good = 1; good && k > 0; k -= (size_t)good)
+        for (int b = 10; b < 15; b++)
+            good &= set.flip[set.blocks[b].first + k - 1] <= worst;
+    double uniform = 0, uniform_time = 0;
+    for (int b = 10; b < 15; b++) {
+        uniform += set.spp[set.blocks[b].first + k];
+        uniform_time += set.seconds[set.blocks[b].first + k];
+    }
+    assert_near(f.uniform_spp, set.spp[set.blocks[10].first + k], 0);
+    assert_near(f.samples_vs_uniform, spent / uniform, 1e-12);
+    assert_near(f.time_vs_uniform, time / uniform_time, 1e-12);
+    assert_true(fabs(f.time_vs_uniform - f.samples_vs_uniform) > 1e-3);
+    for (int b = 0; b < set.n_blocks; b++)
+        for (size_t i = set.blocks[b].first; i < set.blocks[b].end; i++)
+            set.seconds[i] /= 1.0 + b;
+    ggn_method_release(&m);
+}
+
+/* The scale of the criterion halfbuf: √(area of the block / area of the picture), of blocks that are not square. */
+static void errors_of_the_criteria(void **state)
+{
+    (void)state;
+    struct ggn_method halfbuf, variance;
+    int available;
+    assert_int_equal(ggn_method_halfbuf(&halfbuf, &set, &available, NULL), 0);
+    assert_int_equal(ggn_method_variance(&variance, &set, &available, NULL), 0);
+    for (size_t i = 0; i < set.n; i++) {
+        assert_near(halfbuf.score[i], set.dammertz[i] / sqrt(BLOCKS), 1e-12);
+        assert_near(variance.score[i], set.rse[i], 0);
+    }
+    assert_true(halfbuf.guard == set.half_unsettled && variance.guard == set.rse_unsettled);
+    ggn_method_release(&halfbuf);
+    ggn_method_release(&variance);
+}
+
+/* Beyond the recording noise falls with the root of the samples, time rises with them; what the guard counts is counted anew. */
+static void beyond_the_recording(void **state)
+{
+    (void)state;
+    char dir[64], view[128];
+    const double sigma[2] = {5, 4};
+    struct ggn_noise n = {24, 20, levels, LEVELS, 4000, 0, 0, 9};
+    snprintf(dir, sizeof dir, "%s.more", root);
+    snprintf(view, sizeof view, "%s/view", dir);
+    assert_int_equal(mkdir(dir, 0777), 0);
+    ggn_noise_view(view, "view", &n, sigma, 2, 40.0);
+    struct ggn_eval_options o = {.dir = dir, .window = WINDOW, .seed = 3};
+    struct ggn_eval_set more;
+    struct base_err err = {0};
+    int skipped;
+    if (ggn_eval_set_load(&more, &o, threads, &skipped, &err) != 0)
+        fail_msg("%s", err.text);
+    double shares = 0, last_relmse = 0;
+    for (int b = 0; b < 2; b++) {
+        const struct ggn_eval_block *block = &more.blocks[b];
+        const struct ggn_dataset_view *v = &more.chains.data.views[0];
+        const size_t known = block->first + LEVELS - WINDOW; /* the case of the last recorded level */
+        static float mean[3 * 24 * 20], d[24 * 20];
+        struct seq_block p;
+        assert_true(block->end > known + 1);
+        assert_int_equal(seq_manifest_read_block(v->dir, &v->manifest, block->index, &p, &err), 0);
+        assert_int_equal(seq_mean(&p, &p.levels[LEVELS - 1], mean, &err), 0);
+        assert_int_equal(seq_half_luminance(&p, &p.levels[LEVELS - 1], d, &err), 0);
+        for (size_t i = known + 1; i < block->end; i++) {
+            double by = more.spp[known] / more.spp[i], unsettled = 0;
+            assert_near(more.dammertz[i], more.dammertz[known] * sqrt(by), 1e-9 * more.dammertz[known]);
+            assert_near(more.rse[i], more.rse[known] * sqrt(by), 1e-9 * more.rse[known]);
+            assert_near(more.seconds[i], more.seconds[known] / by, 1e-9 * more.seconds[i]);
+            assert_near(more.relmse[i], more.relmse[known] * by, 1e-9 * more.relmse[known]);
+            for (size_t k = 0; k < 24 * 20; k++) {
+                double y = 0.2126 * (double)mean[k] + 0.7152 * (double)mean[480 + k] + 0.0722 * (double)mean[960 + k];
+                unsettled += fabs((double)d[k]) * sqrt(by) > 0.5 * fmax(fabs(y), 0.02);
+            }
+            assert_near(more.half_unsettled[i], unsettled / 480, 1.5 / 480); /* a pixel may lie on the edge */
+            shares += more.half_unsettled[i];
+        }
+        last_relmse = more.relmse[known];
+        seq_block_release(&p);
+    }
+    assert_true(shares > 0.02 && last_relmse > 0);
+    ggn_eval_set_release(&more);
+    snprintf(view, sizeof view, "rm -rf %s", dir);
+    assert_int_equal(system(view), 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(cases), cmocka_unit_test(informed_scores), cmocka_unit_test(fixed_stops), cmocka_unit_test(decisions), cmocka_unit_test(continued), cmocka_unit_test(network),
-        cmocka_unit_test(one_class),
+        cmocka_unit_test(one_class), cmocka_unit_test(tuned_cuts_are_the_best), cmocka_unit_test(figures), cmocka_unit_test(errors_of_the_criteria),
+        cmocka_unit_test(beyond_the_recording),
     };
     return cmocka_run_group_tests_name("eval_method", tests, setup, teardown);
 }
