@@ -204,6 +204,8 @@ $(OUT)/fuzz/replay-ggn_%: $(OBJ)/tests/fuzz/ggn_%.c.o $(OBJ)/tests/fuzz/replay.c
 BENCHES := $(patsubst tests/bench/%.c,$(OUT)/bench/%,$(wildcard tests/bench/*.c))
 $(OUT)/bench/pt_%: $(OBJ)/tests/bench/pt_%.c.o $(PT_OBJ) $(LOADER_OBJ) $(SUPPORT_pt)
 	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) $(PT_IMAGE_LIBS) -lcmocka -o $@
+$(OUT)/bench/ggn_%: $(OBJ)/tests/bench/ggn_%.c.o $(GGN_OBJ) $(SUPPORT_ggn)
+	$(link) $^ $(LDFLAGS_ALL) $(GGN_LIBS) -lcmocka -o $@
 
 setup: ## install the Debian packages that are missing
 	@scripts/setup

@@ -9,6 +9,7 @@
 
 #include "base/files.h"
 #include "base/json.h"
+#include "base/unique.h"
 
 enum { MAX_TEXT = 1 << 26, MAX_LABELS = 1 << 20 };
 
@@ -67,11 +68,13 @@ static int parse_entries(const char *path, const cJSON *blocks, struct ggn_label
             return base_fail(err, BASE_EINVAL, "%s: entry %u of blocks has no id or no threshold", path, l->n);
         label->id = (uint32_t)id->valuedouble;
         label->censored = cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(v, "censored"));
-        if (ggn_labels_find(l, label->id))
-            return base_fail(err, BASE_EINVAL, "%s: block %u is labelled twice", path, label->id);
         l->n++;
     }
-    return 0;
+    uint32_t twice;
+    int rc = base_unique_numbers(&l->labels->id, sizeof *l->labels, l->n, &twice);
+    if (rc > 0)
+        return base_fail(err, BASE_EINVAL, "%s: block %u is labelled twice", path, twice);
+    return rc ? base_fail_nomem(err, path) : 0;
 }
 
 int ggn_labels_parse(const char *path, const char *text, size_t size, struct ggn_labels *out, struct base_err *err)

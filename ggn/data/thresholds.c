@@ -8,6 +8,7 @@
 #include <cjson/cJSON.h>
 
 #include "base/files.h"
+#include "base/unique.h"
 #include "data/image.h"
 
 enum { MAX_TEXT = 1 << 26, MAX_VIEWS = 1 << 20 };
@@ -69,8 +70,6 @@ static int parse_line(const char *path, int number, char *line, struct ggn_thres
     n += sep[1] != '\0' && sep[strlen(sep + 1)] != ';'; /* a last value without its ';' */
     if (n < 1 || n > GGN_VIEW_BLOCKS)
         return base_fail(err, BASE_EINVAL, "%s:%d: %d thresholds", path, number, n);
-    if (ggn_thresholds_find(t, line))
-        return base_fail(err, BASE_EINVAL, "%s:%d: view '%s' appears twice", path, number, line);
     struct ggn_view *v = add_view(t, line, n);
     if (!v)
         return base_fail_nomem(err, path);
@@ -103,6 +102,11 @@ int ggn_thresholds_parse_csv(const char *path, char *text, struct ggn_thresholds
     }
     if (!rc && t.n == 0)
         rc = base_fail(err, BASE_EINVAL, "%s: no thresholds in it", path);
+    const char *twice;
+    int repeated = rc ? 0 : base_unique_texts(t.views->name, sizeof *t.views, (size_t)t.n, &twice);
+    if (repeated)
+        rc = repeated > 0 ? base_fail(err, BASE_EINVAL, "%s: view '%s' appears twice", path, twice)
+                          : base_fail_nomem(err, path);
     if (rc) {
         ggn_thresholds_release(&t);
         return rc;

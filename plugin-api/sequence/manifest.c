@@ -10,6 +10,7 @@
 
 #include "base/files.h"
 #include "base/json.h"
+#include "base/unique.h"
 
 enum { MAX_TEXT = 1 << 26, MAX_BLOCKS = 1 << 20, MAX_SPP = INT32_MAX };
 
@@ -100,12 +101,13 @@ static int get_blocks(const char *path, const cJSON *root, struct seq_manifest *
     cJSON_ArrayForEach(v, blocks) {
         if (!get_block(v, m, &m->blocks[m->n_blocks]))
             return base_fail(err, BASE_EINVAL, "%s: entry %u of blocks is not usable", path, m->n_blocks);
-        for (uint32_t i = 0; i < m->n_blocks; i++)
-            if (m->blocks[i].id == m->blocks[m->n_blocks].id)
-                return base_fail(err, BASE_EINVAL, "%s: block %u is listed twice", path, m->blocks[i].id);
         m->n_blocks++;
     }
-    return 0;
+    uint32_t twice;
+    int rc = base_unique_numbers(&m->blocks->id, sizeof *m->blocks, m->n_blocks, &twice);
+    if (rc > 0)
+        return base_fail(err, BASE_EINVAL, "%s: block %u is listed twice", path, twice);
+    return rc ? base_fail_nomem(err, path) : 0;
 }
 
 /* The camera, where it is not the source's. */

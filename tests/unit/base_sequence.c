@@ -349,12 +349,32 @@ static void bad_manifests(void **state)
     }
 }
 
+static void a_block_is_listed_once(void **state)
+{
+    (void)state;
+    for (int second = 3; second >= 2; second--) {
+        struct seq_manifest m;
+        struct base_err err = {0};
+        char text[512];
+        int n = snprintf(text, sizeof text,
+                         "{\"format\":\"lull-sequence\",\"version\":1,\"scene\":\"s\",\"width\":8,\"height\":8,\"block\":8,\"levels\":[2],"
+                         "\"blocks\":[{\"id\":2,\"x0\":0,\"y0\":0,\"x1\":8,\"y1\":8,\"file\":\"x\",\"bytes\":9,\"crc32\":\"00000000\"},"
+                         "{\"id\":%d,\"x0\":0,\"y0\":0,\"x1\":8,\"y1\":8,\"file\":\"y\",\"bytes\":9,\"crc32\":\"00000000\"}]}",
+                         second);
+        assert_int_equal(seq_manifest_parse("m.json", text, (size_t)n, &m, &err), second == 3 ? 0 : BASE_EINVAL);
+        if (second == 3)
+            seq_manifest_release(&m);
+        else
+            assert_string_equal(err.text, "m.json: block 2 is listed twice");
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(half_floats), cmocka_unit_test(codings), cmocka_unit_test(statistics), cmocka_unit_test(filters),
         cmocka_unit_test(round_trip), cmocka_unit_test(differences),
-        cmocka_unit_test(damage), cmocka_unit_test(builder_limits), cmocka_unit_test(manifest), cmocka_unit_test(bad_manifests),
+        cmocka_unit_test(damage), cmocka_unit_test(builder_limits), cmocka_unit_test(manifest), cmocka_unit_test(bad_manifests), cmocka_unit_test(a_block_is_listed_once),
     };
     return cmocka_run_group_tests_name("sequence", tests, setup, teardown);
 }

@@ -13,6 +13,7 @@
 #include "support/ggn_near.h"
 
 #include "data/dataset.h"
+#include "data/thresholds.h"
 
 static char root[] = "/tmp/ggn_labels.XXXXXX";
 
@@ -71,6 +72,19 @@ static void round_trip(void **state)
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
         if (ggn_labels_parse("l.json", bad[i], strlen(bad[i]), &back, &err) != BASE_EINVAL)
             fail_msg("%s was accepted", bad[i]);
+}
+
+static void a_view_is_listed_once(void **state)
+{
+    char once[] = "a;1;\n# a;2;\nb;2;3;\n", twice[] = "a;1;\nb;2;\na;3;\n";
+    struct ggn_thresholds t;
+    struct base_err err = {0};
+    (void)state;
+    assert_int_equal(ggn_thresholds_parse_csv("t.csv", once, &t, &err), 0);
+    assert_int_equal(t.n, 2);
+    ggn_thresholds_release(&t);
+    assert_int_equal(ggn_thresholds_parse_csv("t.csv", twice, &t, &err), BASE_EINVAL);
+    assert_string_equal(err.text, "t.csv: view 'a' appears twice");
 }
 
 static void add_view(const char *name, const char *scene)
@@ -144,6 +158,6 @@ static void split_folders(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(probabilities), cmocka_unit_test(round_trip), cmocka_unit_test(splits), cmocka_unit_test(split_folders)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(probabilities), cmocka_unit_test(round_trip), cmocka_unit_test(a_view_is_listed_once), cmocka_unit_test(splits), cmocka_unit_test(split_folders)};
     return cmocka_run_group_tests_name("data_labels", tests, setup, teardown);
 }
