@@ -258,11 +258,16 @@ static void reduce(struct ggn_exec *e, real *params_grad)
 
 void ggn_exec_backward(struct ggn_exec *e, const struct ggn_weights *weights, real *params_grad)
 {
+    const int alone = e->mode != GGN_TRAIN || !e->team;
+
     e->n_nodes = ggn_nodes_list(e->node, e->first, e->first + e->batch);
-    memset(e->nodes, 0, (size_t)e->n_nodes * e->graph->n_params * sizeof *e->nodes);
+    e->node_grads = alone && e->n_nodes == 1 ? params_grad : e->nodes;
+    if (e->node_grads == e->nodes)
+        memset(e->nodes, 0, (size_t)e->n_nodes * e->graph->n_params * sizeof *e->nodes);
     for (int i = e->graph->n_layers - 1; i >= 0; i--) {
         struct ggn_task t = {.e = e, .w = (struct ggn_weights *)(size_t)weights, .l = &e->graph->layer[i]};
         passes[t.l->op]->backward(&t);
     }
-    reduce(e, params_grad);
+    if (e->node_grads == e->nodes)
+        reduce(e, params_grad);
 }

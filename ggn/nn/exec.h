@@ -49,6 +49,7 @@ struct ggn_exec {
     void *memory;    /* owns */
     double *sums;    /* owns; [total][channels][2] of one batch norm, image by image */
     real *nodes;     /* owns; [n_nodes][n_params] gradients of nodes */
+    real *node_grads; /* of the backward pass under way: nodes, or the caller's where there is one node and nobody else */
     real *leaves;    /* [capacity][leaf_size] the weights' gradient of each image, one convolution at a time */
     size_t leaf_size;
     struct ggn_node node[GGN_NODES_MAX]; /* of this process's images */

@@ -232,15 +232,12 @@ static void pool3_row(const struct pair *p, int r)
     const real *b = p->x + 2L * r * in->row, *a = r > 0 ? b - in->row : b, *c = 2 * r + 1 < in->h ? b + in->row : b;
     real column[GGN_MAX_SIDE], *y = p->y + (long)r * p->out->row;
 
-    for (int i = 0; i < in->w; i++) {
-        real m = a[i] > b[i] ? a[i] : b[i];
-        column[i] = m > c[i] ? m : c[i];
-    }
+    for (int i = 0; i < in->w; i++)
+        column[i] = ggn_larger(ggn_larger(a[i], b[i]), c[i]);
     for (int s = 0; s < p->out->w; s++) {
         real left = column[s > 0 ? 2 * s - 1 : 0], mid = column[2 * s],
              right = column[2 * s + 1 < in->w ? 2 * s + 1 : 2 * s];
-        real m = left > mid ? left : mid;
-        y[s] = m > right ? m : right;
+        y[s] = ggn_larger(ggn_larger(left, mid), right);
     }
 }
 

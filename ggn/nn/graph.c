@@ -159,6 +159,8 @@ int ggn_graph_sigmoid(struct ggn_graph *g, int in)
 
 int ggn_graph_dropout(struct ggn_graph *g, int in, double p)
 {
+    if (!g->err.code && !g->value[in].flat)
+        base_fail(&g->err, BASE_EINVAL, "network %s, stage %s: dropout of planes, not of a vector", g->name, g->stage);
     return add_same_shape(g, GGN_OP_DROPOUT, in, 1, p);
 }
 

@@ -111,7 +111,7 @@ int ggn_graph_maxpool(struct ggn_graph *g, int in, int kernel);
 int ggn_graph_up(struct ggn_graph *g, int in, int pad_y, int pad_x);
 int ggn_graph_flatten(struct ggn_graph *g, int in);
 int ggn_graph_linear(struct ggn_graph *g, int in, int c_out);
-int ggn_graph_dropout(struct ggn_graph *g, int in, double p);
+int ggn_graph_dropout(struct ggn_graph *g, int in, double p); /* of a vector */
 /* Names the value for `ggn golden`. */
 void ggn_graph_mark(struct ggn_graph *g, int value, const char *stage);
 /* Plans the backward pass; the last value is the output. BASE_EINVAL with the first failure. */

@@ -415,9 +415,7 @@ static void maxpool2(real *restrict y, const real *restrict x, int h, int w, int
     for (int r = 0; r < h; r++, y += row_y, x += 2 * row_x) {
         const real *restrict b = x + row_x;
         for (int i = 0; i < w; i++) {
-            real top = x[2 * i] > x[2 * i + 1] ? x[2 * i] : x[2 * i + 1];
-            real low = b[2 * i] > b[2 * i + 1] ? b[2 * i] : b[2 * i + 1];
-            y[i] = top > low ? top : low;
+            y[i] = ggn_larger(ggn_larger(x[2 * i], x[2 * i + 1]), ggn_larger(b[2 * i], b[2 * i + 1]));
         }
     }
 }

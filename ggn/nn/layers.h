@@ -60,7 +60,7 @@ static inline real *ggn_grad(const struct ggn_task *t, int value, long n, int c)
 /* Where the gradient of the parameters of node k of the executor is added to. */
 static inline real *ggn_node_grad(const struct ggn_task *t, int k)
 {
-    return t->e->nodes + (size_t)k * t->e->graph->n_params;
+    return t->e->node_grads + (size_t)k * t->e->graph->n_params;
 }
 
 /* How many weights a convolution has. */

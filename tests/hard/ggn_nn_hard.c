@@ -156,6 +156,43 @@ static void test_overflowing_weights(void **state)
     (void)state;
 }
 
+/* A pixel that is no number makes every maximum it takes part in none: it must not vanish on the way to a decision. */
+static void check_nan_in_pool(int kernel, enum ggn_isa isa)
+{
+    enum { W = 50, H = 7 };
+    static struct ggn_graph g;
+    const struct ggn_kernels *k = ggn_kernels_for(isa);
+
+    ggn_graph_begin(&g, "pool", 1, H, W);
+    ggn_graph_stage(&g, "a");
+    ggn_graph_maxpool(&g, 0, kernel);
+    assert_int_equal(ggn_graph_end(&g, NULL), 0);
+    struct ggn_weights *w = ggn_weights_create(&g, k, 0, NULL);
+    struct ggn_exec *e = ggn_exec_create(&g, k, 1, 0, NULL, NULL);
+    assert_true(w && e);
+    for (int at = 0; at < H * W; at++) {
+        for (int i = 0; i < H * W; i++)
+            ggn_exec_plane(e, 0, 0, 0)[i / W * g.value[0].row + i % W] = i == at ? NAN : (float)ggn_hash_unit((uint32_t)i, 1);
+        ggn_exec_forward(e, w, 1, GGN_EVAL);
+        for (int y = 0; y < g.value[1].h; y++)
+            for (int x = 0; x < g.value[1].w; x++) {
+                const int first_y = 2 * y - (kernel == 3), first_x = 2 * x - (kernel == 3);
+                const int met = at / W >= first_y && at / W < first_y + kernel && at % W >= first_x && at % W < first_x + kernel;
+                assert_int_equal(isnan(ggn_exec_plane(e, 1, 0, 0)[y * g.value[1].row + x]) != 0, met);
+            }
+    }
+    ggn_exec_destroy(e);
+    ggn_weights_destroy(w);
+}
+
+static void test_nan_in_pools(void **state)
+{
+    for (int isa = 0; isa < GGN_ISA_COUNT; isa++)
+        for (int kernel = 2; kernel <= 3 && ggn_isa_available((enum ggn_isa)isa); kernel++)
+            check_nan_in_pool(kernel, (enum ggn_isa)isa);
+    (void)state;
+}
+
 /* Flush-to-zero and denormals-are-zero must not change a decision, even with activations in the denormal range. */
 static void test_flush_to_zero(void **state)
 {
@@ -440,7 +477,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_blocks),     cmocka_unit_test(test_flush_to_zero),
-        cmocka_unit_test(test_overflowing_weights), cmocka_unit_test(test_bce_extremes),
+        cmocka_unit_test(test_overflowing_weights), cmocka_unit_test(test_nan_in_pools), cmocka_unit_test(test_bce_extremes),
         cmocka_unit_test(test_ssim_flat),  cmocka_unit_test(test_zero_variance), cmocka_unit_test(test_batch_norm_of_tiny_variances), cmocka_unit_test(test_equal_labels),
         cmocka_unit_test(test_divergence), cmocka_unit_test(test_nan_data),      cmocka_unit_test(test_many_adam_steps)};
     return cmocka_run_group_tests(tests, NULL, NULL);
