@@ -19,8 +19,7 @@ size_t ggn_bf16_pack_size(int n_in, int n_out)
 void ggn_bf16_pack(uint32_t *out, const float *packed, int n_in, int n_out, int tile_oc)
 {
     for (int oc = 0, tile; oc < n_out; oc += tile) {
-        for (tile = tile_oc; tile > n_out - oc;)
-            tile /= 2;
+        tile = n_out - oc < tile_oc ? n_out - oc : tile_oc;
         for (int i = 0; i < n_in; i += 2) {
             const int pair = i + 1 < n_in;
             for (int k = 0; k < 9 * tile; k++)

@@ -60,20 +60,15 @@ INLINE void tile(const struct ggn_conv *a, const uint32_t *w, const uint32_t *x,
     {                                                                                                                       \
         tile(a, w, x, x_stride, oc, p, OT, NV);                                                                             \
     }
-TILE(1, 1)
-TILE(1, 3)
-TILE(2, 1)
-TILE(2, 3)
-TILE(4, 1)
-TILE(4, 3)
-TILE(8, 1)
-TILE(8, 3)
+#define TILES(OT) TILE(OT, 1) TILE(OT, 3)
+TILES(1) TILES(2) TILES(3) TILES(4) TILES(5) TILES(6) TILES(7) TILES(8)
 
 void ggn_bf16_conv_avx512(const struct ggn_conv *a, const uint32_t *w, long p0, long p1, int oc0, int oc1,
                           uint32_t *scratch)
 {
     typedef void tile_fn(const struct ggn_conv *, const uint32_t *, const uint32_t *, long, int, long);
-    static tile_fn *const tiles[2][4] = {{tile_1_3, tile_2_3, tile_4_3, tile_8_3}, {tile_1_1, tile_2_1, tile_4_1, tile_8_1}};
+#define ROW(NV) {tile_1_##NV, tile_2_##NV, tile_3_##NV, tile_4_##NV, tile_5_##NV, tile_6_##NV, tile_7_##NV, tile_8_##NV}
+    static tile_fn *const tiles[2][8] = {ROW(3), ROW(1)};
     const long end = (long)a->h * a->row, pairs = (a->n_in + 1) / 2;
 
     if (p1 > end)
@@ -86,9 +81,9 @@ void ggn_bf16_conv_avx512(const struct ggn_conv *a, const uint32_t *w, long p0, 
     for (long p = p0, n; p < p1; p += n) {
         const int narrow = p1 - p <= L;
         n = narrow ? L : TILE_V * L;
-        for (int oc = oc0, lg; oc < oc1; oc += 1 << lg) {
-            lg = oc1 - oc >= 8 ? 3 : oc1 - oc >= 4 ? 2 : oc1 - oc >= 2 ? 1 : 0;
-            tiles[narrow][lg](a, w + (long)oc * pairs * 9, scratch + (p - p0), x_stride, oc, p);
+        for (int oc = oc0, ot; oc < oc1; oc += ot) {
+            ot = oc1 - oc < 8 ? oc1 - oc : 8;
+            tiles[narrow][ot - 1](a, w + (long)oc * pairs * 9, scratch + (p - p0), x_stride, oc, p);
         }
         for (int o = oc0; o < oc1; o++) { /* the zeros of the layout */
             for (long q = p + (a->w_px - p % a->row); q < p + n; q += a->row)

@@ -237,20 +237,16 @@ static void conv_weight_back(void *data, long i, int worker)
     const long n = i / (t->oc_groups * t->ic_groups);
     struct weight_part p = {.oc = (int)(i / t->ic_groups % t->oc_groups) * t->oc_group,
                             .ic0 = (int)(i % t->ic_groups) * t->ic_group};
-    const int oc_end = p.oc + t->oc_group < c_out ? p.oc + t->oc_group : c_out;
     real *scratch = t->e->scratch + (size_t)worker * t->e->scratch_size;
     real *x[GGN_MAX_CHANNELS];
     const real *dy[GGN_WINO_GRAD];
 
+    p.ot = c_out - p.oc < t->oc_group ? c_out - p.oc : t->oc_group;
     p.nic = n_in - p.ic0 < t->ic_group ? n_in - p.ic0 : t->ic_group;
     input_planes(x, t, t->e->acts, n);
-    for (; p.oc < oc_end; p.oc += p.ot) {
-        for (p.ot = t->oc_group; p.ot > oc_end - p.oc;)
-            p.ot = t->weights_by_wino ? oc_end - p.oc : p.ot / 2;
-        for (int o = 0; o < p.ot; o++)
-            dy[o] = ggn_grad(t, t->l->out, n, p.oc + o);
-        (t->weights_by_wino ? weights_by_wino : weights_by_definition)(t, &p, x + p.ic0, dy, scratch, ggn_leaf(t, n));
-    }
+    for (int o = 0; o < p.ot; o++)
+        dy[o] = ggn_grad(t, t->l->out, n, p.oc + o);
+    (t->weights_by_wino ? weights_by_wino : weights_by_definition)(t, &p, x + p.ic0, dy, scratch, ggn_leaf(t, n));
 }
 
 /* Some elements of the leaves of each node into its gradient: siblings first, in place. */

@@ -23,7 +23,7 @@ enum {
 struct ggn_conv {
     const real *const *x; /* [n_in] element (0,0) of each input plane */
     real *const *y;       /* [n_out] */
-    const real *w;        /* packed, tiles of 8, 4, 2, 1 output channels, [n_in][taps][tile] each */
+    const real *w;        /* packed, tiles of tile_oc output channels and one of the rest, [n_in][taps][tile] each */
     const real *bias;     /* [n_out] or NULL */
     const real *scale;    /* [n_out] or NULL: y = y·scale + shift after the activation */
     const real *shift;
@@ -62,7 +62,7 @@ struct ggn_kernels {
     void (*bf16_pack)(uint32_t *out, const real *packed, int n_in, int n_out, int tile_oc);
 
     /* acc[i][tap][o] (vectors of lanes) += Σ_p dy[o][p]·x[i][p + tap], p in [p0, p1), for n_in ≤ GGN_GRAD_IC and
-     * ot ∈ {8, 4, 2, 1}; p1 is rounded up to whole vectors. */
+     * ot ≤ tile_oc; p1 is rounded up to whole vectors. */
     void (*conv_grad)(real *acc, const real *const *x, int n_in, const real *const *dy, int ot, int taps, int row, long p0,
                       long p1);
     /* out[k] = Σ of the lanes of acc[k] */

@@ -112,20 +112,16 @@ INLINE void conv_tile(const struct ggn_conv *a, const real *w, int oc, int i0, i
         conv_tile(a, w, oc, i0, i1, p, OT, NV, TAPS);                                                                       \
     }
 #define CONV_TILES(OT) CONV_TILE(OT, 3, 9) CONV_TILE(OT, 1, 9) CONV_TILE(OT, 3, 1) CONV_TILE(OT, 1, 1)
-CONV_TILES(1)
-CONV_TILES(2)
-CONV_TILES(4)
+CONV_TILES(1) CONV_TILES(2) CONV_TILES(3) CONV_TILES(4)
 #if TILE_OC == 8
-CONV_TILES(8)
+CONV_TILES(5) CONV_TILES(6) CONV_TILES(7) CONV_TILES(8)
+#define EACH_TILE(NAME, END) {NAME##1##END, NAME##2##END, NAME##3##END, NAME##4##END, \
+                              NAME##5##END, NAME##6##END, NAME##7##END, NAME##8##END}
+#else
+#define EACH_TILE(NAME, END) {NAME##1##END, NAME##2##END, NAME##3##END, NAME##4##END}
 #endif
 
 typedef void conv_tile_fn(const struct ggn_conv *a, const real *w, int oc, int i0, int i1, long p);
-
-/* The largest tile of 8, 4, 2, 1 channels that fits n; as a base-2 logarithm. */
-INLINE int tile_log(int n)
-{
-    return n >= 8 && TILE_OC == 8 ? 3 : n >= 4 ? 2 : n >= 2 ? 1 : 0;
-}
 
 /* Writes the zeros that the layout asks for after the tile [p, p + n) has been computed as if the plane had no row ends. */
 static void restore_padding(const struct ggn_conv *a, int oc0, int oc1, long p, long n)
@@ -143,19 +139,8 @@ static void restore_padding(const struct ggn_conv *a, int oc0, int oc1, long p, 
 
 static void conv(const struct ggn_conv *a, long p0, long p1, int oc0, int oc1)
 {
-    static conv_tile_fn *const tiles[2][2][4] = {
-#if TILE_OC == 8
-        {{conv_tile_1_3_9, conv_tile_2_3_9, conv_tile_4_3_9, conv_tile_8_3_9},
-         {conv_tile_1_1_9, conv_tile_2_1_9, conv_tile_4_1_9, conv_tile_8_1_9}},
-        {{conv_tile_1_3_1, conv_tile_2_3_1, conv_tile_4_3_1, conv_tile_8_3_1},
-         {conv_tile_1_1_1, conv_tile_2_1_1, conv_tile_4_1_1, conv_tile_8_1_1}},
-#else
-        {{conv_tile_1_3_9, conv_tile_2_3_9, conv_tile_4_3_9, NULL},
-         {conv_tile_1_1_9, conv_tile_2_1_9, conv_tile_4_1_9, NULL}},
-        {{conv_tile_1_3_1, conv_tile_2_3_1, conv_tile_4_3_1, NULL},
-         {conv_tile_1_1_1, conv_tile_2_1_1, conv_tile_4_1_1, NULL}},
-#endif
-    };
+    static conv_tile_fn *const tiles[2][2][TILE_OC] = {{EACH_TILE(conv_tile_, _3_9), EACH_TILE(conv_tile_, _1_9)},
+                                                       {EACH_TILE(conv_tile_, _3_1), EACH_TILE(conv_tile_, _1_1)}};
     const int chunk = a->taps == 9 ? 32 : 256; /* input channels whose rows and weights stay in the first-level cache */
     const long end = (long)a->h * a->row;
 
@@ -166,10 +151,10 @@ static void conv(const struct ggn_conv *a, long p0, long p1, int oc0, int oc1)
         for (long p = p0, n; p < p1; p += n) {
             int wide = p1 - p > VW;
             n = (wide ? TILE_V : 1) * VW;
-            for (int oc = oc0, lg; oc < oc1; oc += 1 << lg) {
-                lg = tile_log(oc1 - oc);
-                const real *w = a->w + ((long)oc * a->n_in + ((long)i0 << lg)) * a->taps;
-                tiles[a->taps != 9][!wide][lg](a, w, oc, i0, i1, p);
+            for (int oc = oc0, ot; oc < oc1; oc += ot) {
+                ot = oc1 - oc < TILE_OC ? oc1 - oc : TILE_OC;
+                const real *w = a->w + ((long)oc * a->n_in + (long)i0 * ot) * a->taps;
+                tiles[a->taps != 9][!wide][ot - 1](a, w, oc, i0, i1, p);
             }
             if (i1 == a->n_in)
                 restore_padding(a, oc0, oc1, p, n);
@@ -206,31 +191,18 @@ INLINE void grad_tile(real *acc, const real *x, const real *const *dy, long p0, 
     {                                                                                                                       \
         grad_tile(acc, x, dy, p0, p1, OT, NT);                                                                              \
     }
-GRAD_TILE(1, 3)
-GRAD_TILE(1, 1)
-GRAD_TILE(2, 3)
-GRAD_TILE(2, 1)
-GRAD_TILE(4, 3)
-GRAD_TILE(4, 1)
+#define GRAD_TILES(OT) GRAD_TILE(OT, 3) GRAD_TILE(OT, 1)
+GRAD_TILES(1) GRAD_TILES(2) GRAD_TILES(3) GRAD_TILES(4)
 #if TILE_OC == 8
-GRAD_TILE(8, 3)
-GRAD_TILE(8, 1)
+GRAD_TILES(5) GRAD_TILES(6) GRAD_TILES(7) GRAD_TILES(8)
 #endif
 
 static void conv_grad(real *acc, const real *const *x, int n_in, const real *const *dy, int ot, int taps, int row, long p0,
                       long p1)
 {
     typedef void grad_tile_fn(real *, const real *, const real *const *, long, long);
-    static grad_tile_fn *const tiles[2][4] = {
-#if TILE_OC == 8
-        {grad_tile_1_3, grad_tile_2_3, grad_tile_4_3, grad_tile_8_3},
-        {grad_tile_1_1, grad_tile_2_1, grad_tile_4_1, grad_tile_8_1}
-#else
-        {grad_tile_1_3, grad_tile_2_3, grad_tile_4_3, NULL},
-        {grad_tile_1_1, grad_tile_2_1, grad_tile_4_1, NULL}
-#endif
-    };
-    grad_tile_fn *const fn = tiles[taps == 1][tile_log(ot)];
+    static grad_tile_fn *const tiles[2][TILE_OC] = {EACH_TILE(grad_tile_, _3), EACH_TILE(grad_tile_, _1)};
+    grad_tile_fn *const fn = tiles[taps == 1][ot - 1];
 
     for (int i = 0; i < n_in; i++)
         for (int ky = 0; ky < (taps == 9 ? 3 : 1); ky++, acc += (taps == 9 ? 3 : 1) * ot * VW)

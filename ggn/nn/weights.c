@@ -97,8 +97,8 @@ void ggn_weights_init(struct ggn_weights *w, enum ggn_init init, uint32_t seed)
     }
 }
 
-/* Tiles of 8, 4, 2, 1 output channels; inside a tile [n_in][taps][tile]. `back` packs the convolution of the backward pass:
- * inputs and outputs swapped, taps mirrored. */
+/* Tiles of kernels->tile_oc output channels, the last one of what is left; inside a tile [n_in][taps][tile]. `back` packs
+ * the convolution of the backward pass: inputs and outputs swapped, taps mirrored. */
 static void pack_conv(real *out, const struct ggn_weights *w, const struct ggn_layer *l, int back)
 {
     const struct ggn_graph *g = w->graph;
@@ -109,9 +109,7 @@ static void pack_conv(real *out, const struct ggn_weights *w, const struct ggn_l
     const size_t o_step = (size_t)taps * (o_first ? (size_t)n_in : 1), i_step = (size_t)taps * (o_first ? 1 : (size_t)n_out);
 
     for (int oc = 0, tile; oc < n_out; oc += tile) {
-        tile = w->kernels->tile_oc;
-        while (tile > n_out - oc)
-            tile /= 2;
+        tile = n_out - oc < w->kernels->tile_oc ? n_out - oc : w->kernels->tile_oc;
         for (int i = 0; i < n_in; i++)
             for (int t = 0; t < taps; t++) {
                 const real *from =

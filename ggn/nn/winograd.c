@@ -58,8 +58,7 @@ void ggn_wino_pack(float *u, const float *packed, int n_in, int n_out, int tile_
     const size_t stride = (size_t)n_in * (size_t)n_out;
 
     for (int oc = 0, tile; oc < n_out; oc += tile) {
-        for (tile = tile_oc; tile > n_out - oc;)
-            tile /= 2;
+        tile = n_out - oc < tile_oc ? n_out - oc : tile_oc;
         for (int i = 0; i < n_in; i++, packed += 9 * tile) {
             float *to = u + (size_t)oc * (size_t)n_in + (size_t)(i * tile);
             if (tile == GGN_TILE_MAX)

@@ -26,7 +26,7 @@ int ggn_wino_blocks(int tiles);
 /* Floats of scratch for one call. */
 size_t ggn_wino_scratch(int n_in);
 
-/* u[36][n_out tiles of 8, 4, 2, 1 as in ggn_conv][n_in][tile] from a packed 3×3 convolution (ggn_conv.w). */
+/* u[36][tiles of n_out as in ggn_conv][n_in][tile] from a packed 3×3 convolution (ggn_conv.w). */
 void ggn_wino_pack(float *u, const float *packed, int n_in, int n_out, int tile_oc);
 
 /* Tiles [t0, t1) of the convolution `a` (a->w is not read), at most GGN_WINO_TILES. */

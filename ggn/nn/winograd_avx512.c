@@ -151,38 +151,26 @@ INLINE void multiply_tile(float *m, const float *u, const float *v, int n_in, in
     {                                                                                                                       \
         multiply_tile(m, u, v, n_in, lanes, OT, NV);                                                                        \
     }
-TILE(1, 1)
-TILE(1, 2)
-TILE(1, 3)
-TILE(2, 1)
-TILE(2, 2)
-TILE(2, 3)
-TILE(4, 1)
-TILE(4, 2)
-TILE(4, 3)
-TILE(8, 1)
-TILE(8, 2)
-TILE(8, 3)
+#define TILES(OT) TILE(OT, 1) TILE(OT, 2) TILE(OT, 3)
+TILES(1) TILES(2) TILES(3) TILES(4) TILES(5) TILES(6) TILES(7) TILES(8)
 
 /* All 36 products for output channels [oc0, oc1). */
 static void multiply(float *m, const float *u, const float *v, const struct ggn_conv *a, const struct block *b, int oc0,
                      int oc1)
 {
     typedef void tile_fn(float *, const float *, const float *, int, int);
-    static tile_fn *const tiles[4][3] = {{multiply_1_1, multiply_1_2, multiply_1_3},
-                                         {multiply_2_1, multiply_2_2, multiply_2_3},
-                                         {multiply_4_1, multiply_4_2, multiply_4_3},
-                                         {multiply_8_1, multiply_8_2, multiply_8_3}};
+#define ROW(OT) {multiply_##OT##_1, multiply_##OT##_2, multiply_##OT##_3}
+    static tile_fn *const tiles[8][3] = {ROW(1), ROW(2), ROW(3), ROW(4), ROW(5), ROW(6), ROW(7), ROW(8)};
     const int vectors = b->lanes / L;
 
     for (int xi = 0; xi < XI; xi++)
-        for (int oc = oc0, lg; oc < oc1; oc += 1 << lg) {
-            lg = oc1 - oc >= 8 ? 3 : oc1 - oc >= 4 ? 2 : oc1 - oc >= 2 ? 1 : 0;
+        for (int oc = oc0, ot; oc < oc1; oc += ot) {
+            ot = oc1 - oc < 8 ? oc1 - oc : 8;
             const float *w = u + ((long)xi * a->n_out + oc) * a->n_in;
             float *to = m + ((long)(oc - oc0) * XI + xi) * GGN_WINO_TILES;
             for (int k = 0, nv; k < vectors; k += nv) {
                 nv = vectors - k == 4 ? 2 : vectors - k < 3 ? vectors - k : 3;
-                tiles[lg][nv - 1](to + k * L, w, v + xi * b->v_stride + k * L, a->n_in, b->lanes);
+                tiles[ot - 1][nv - 1](to + k * L, w, v + xi * b->v_stride + k * L, a->n_in, b->lanes);
             }
         }
 }
