@@ -4,9 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/memory.h"
-
-enum { ALIGNMENT = 16, CHUNK_BYTES = 1 << 18, LARGE_BYTES = 1 << 21 };
+enum { ALIGNMENT = 16, CHUNK_BYTES = 1 << 18 };
 
 struct pt_arena_chunk {
     struct pt_arena_chunk *next;
@@ -25,8 +23,6 @@ void *pt_arena_alloc(struct pt_arena *arena, size_t count, size_t size)
         c = calloc(1, sizeof *c + room);
         if (!c)
             return NULL;
-        if (room >= LARGE_BYTES)
-            base_memory_large_pages(c, sizeof *c + room);
         c->size = room;
         /* A block larger than a chunk goes behind the open chunk, which keeps being filled. */
         if (arena->chunks && bytes > CHUNK_BYTES) {
