@@ -14,6 +14,7 @@ struct pt_accel {
     RTCScene *objects;        /* [object_count], owns */
     RTCGeometry *instances;   /* [instance_count], borrows from `world` */
     int32_t object_count;
+    int packet;               /* rays that go together: the processor's own width, 1 = one by one */
     atomic_llong bytes;
 };
 
@@ -37,31 +38,54 @@ static int quadric_query(const struct pt_quadric *q, const struct RTCRay *ray, f
                                 ray->tnear, ray->tfar, t, p_quadric);
 }
 
-/* Only single rays are traced, so N is 1 and the argument is a plain RTCRayHit. */
+/* Embree's packets of n rays are arrays of n, one after the other; in C it gives no names to them. */
+union lane {
+    float f;
+    uint32_t u;
+};
+enum { ORG_X, ORG_Y, ORG_Z, TNEAR, DIR_X, DIR_Y, DIR_Z, TIME, TFAR, MASK, RAY_ID, FLAGS, RAY_FIELDS };
+enum { NG_X = RAY_FIELDS, NG_Y, NG_Z, HIT_U, HIT_V, PRIM_ID, GEOM_ID, INST_ID, FIELDS };
+_Static_assert(sizeof(struct RTCRayHit16) == 16 * FIELDS * sizeof(union lane), "Embree has several levels of instances");
+
+static struct RTCRay lane_ray(const union lane *rays, unsigned n, unsigned i)
+{
+    return (struct RTCRay){.org_x = rays[ORG_X * n + i].f, .org_y = rays[ORG_Y * n + i].f, .org_z = rays[ORG_Z * n + i].f,
+                           .dir_x = rays[DIR_X * n + i].f, .dir_y = rays[DIR_Y * n + i].f, .dir_z = rays[DIR_Z * n + i].f,
+                           .tnear = rays[TNEAR * n + i].f, .tfar = rays[TFAR * n + i].f};
+}
+
 static void quadric_intersect(const struct RTCIntersectFunctionNArguments *args)
 {
-    struct RTCRayHit *rayhit = (struct RTCRayHit *)args->rayhit;
-    float t;
-    pt_vec3 p;
-    if (!args->valid[0] || !quadric_query(args->geometryUserPtr, &rayhit->ray, &t, &p))
-        return;
-    rayhit->ray.tfar = t;
-    rayhit->hit.u = rayhit->hit.v = 0.0f;
-    rayhit->hit.Ng_x = p.x;
-    rayhit->hit.Ng_y = p.y;
-    rayhit->hit.Ng_z = p.z;
-    rayhit->hit.geomID = args->geomID;
-    rayhit->hit.primID = args->primID;
-    rayhit->hit.instID[0] = args->context->instID[0];
+    unsigned n = args->N;
+    union lane *lanes = (union lane *)args->rayhit;
+    for (unsigned i = 0; i < n; i++) {
+        struct RTCRay ray = lane_ray(lanes, n, i);
+        float t;
+        pt_vec3 p;
+        if (!args->valid[i] || !quadric_query(args->geometryUserPtr, &ray, &t, &p))
+            continue;
+        lanes[TFAR * n + i].f = t;
+        lanes[HIT_U * n + i].f = lanes[HIT_V * n + i].f = 0.0f;
+        lanes[NG_X * n + i].f = p.x;
+        lanes[NG_Y * n + i].f = p.y;
+        lanes[NG_Z * n + i].f = p.z;
+        lanes[GEOM_ID * n + i].u = args->geomID;
+        lanes[PRIM_ID * n + i].u = args->primID;
+        lanes[INST_ID * n + i].u = args->context->instID[0];
+    }
 }
 
 static void quadric_occluded(const struct RTCOccludedFunctionNArguments *args)
 {
-    struct RTCRay *ray = (struct RTCRay *)args->ray;
-    float t;
-    pt_vec3 p;
-    if (args->valid[0] && quadric_query(args->geometryUserPtr, ray, &t, &p))
-        ray->tfar = -INFINITY;
+    unsigned n = args->N;
+    union lane *lanes = (union lane *)args->ray;
+    for (unsigned i = 0; i < n; i++) {
+        struct RTCRay ray = lane_ray(lanes, n, i);
+        float t;
+        pt_vec3 p;
+        if (args->valid[i] && quadric_query(args->geometryUserPtr, &ray, &t, &p))
+            lanes[TFAR * n + i].f = -INFINITY;
+    }
 }
 
 /* --- building --------------------------------------------------------------------------------------------------------- */
@@ -205,6 +229,16 @@ static void destroy(struct pt_accel *accel)
     free(accel);
 }
 
+/* Only widths that Embree has code for on this processor: those it would have to cut up it gets wrong (rtcOccluded16 of 3.13
+ * with AVX2 fails an assertion). */
+static int native_packet(RTCDevice device)
+{
+    return rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED)  ? 16
+           : rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) ? 8
+           : rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY4_SUPPORTED) ? 4
+                                                                                     : 1;
+}
+
 static int build(struct pt_scene *scene, struct pt_accel *accel)
 {
     accel->object_count = scene->object_count;
@@ -215,6 +249,7 @@ static int build(struct pt_scene *scene, struct pt_accel *accel)
     accel->device = rtcNewDevice(NULL);
     if (!accel->device)
         return 0;
+    accel->packet = native_packet(accel->device);
     rtcSetDeviceMemoryMonitorFunction(accel->device, count_bytes, accel);
     for (int32_t i = 0; i < scene->object_count; i++) {
         const struct pt_object *o = &scene->objects[i];
@@ -268,33 +303,36 @@ static inline struct RTCRay make_ray(const struct pt_ray *ray)
                            .tfar = ray->t_max,        .mask = ~0u,               .id = 0,                   .flags = 0};
 }
 
-int pt_accel_intersect(const struct pt_scene *scene, const struct pt_ray *ray, int coherent, struct pt_hit *hit)
+/* Embree's ids as ours. */
+static inline void name_shape(const struct pt_scene *scene, unsigned geometry, unsigned instance, struct pt_hit *hit)
+{
+    if (geometry == RTC_INVALID_GEOMETRY_ID) {
+        hit->shape = -1;
+    } else if (instance == RTC_INVALID_GEOMETRY_ID) {
+        hit->instance = -1;
+        hit->shape = (int32_t)geometry;
+    } else {
+        hit->instance = (int32_t)instance - scene->world_shape_count;
+        hit->shape = scene->objects[scene->instances[hit->instance].object].first_shape + (int32_t)geometry;
+    }
+}
+
+int pt_accel_intersect(const struct pt_scene *scene, const struct pt_ray *ray, struct pt_hit *hit)
 {
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    context.flags = coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
     struct RTCRayHit rh;
     rh.ray = make_ray(ray);
     rh.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     rh.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
     rtcIntersect1(scene->accel->world, &context, &rh);
-    if (rh.hit.geomID == RTC_INVALID_GEOMETRY_ID) {
-        hit->shape = -1;
-        return 0;
-    }
     hit->t = rh.ray.tfar;
     hit->u = rh.hit.u;
     hit->v = rh.hit.v;
     hit->primitive = (int32_t)rh.hit.primID;
     hit->geometric = v3(rh.hit.Ng_x, rh.hit.Ng_y, rh.hit.Ng_z);
-    if (rh.hit.instID[0] == RTC_INVALID_GEOMETRY_ID) {
-        hit->instance = -1;
-        hit->shape = (int32_t)rh.hit.geomID;
-    } else {
-        hit->instance = (int32_t)rh.hit.instID[0] - scene->world_shape_count;
-        hit->shape = scene->objects[scene->instances[hit->instance].object].first_shape + (int32_t)rh.hit.geomID;
-    }
-    return 1;
+    name_shape(scene, rh.hit.geomID, rh.hit.instID[0], hit);
+    return hit->shape >= 0;
 }
 
 int pt_accel_occluded(const struct pt_scene *scene, const struct pt_ray *ray)
@@ -304,6 +342,106 @@ int pt_accel_occluded(const struct pt_scene *scene, const struct pt_ray *ray)
     struct RTCRay r = make_ray(ray);
     rtcOccluded1(scene->accel->world, &context, &r);
     return r.tfar < 0.0f;
+}
+
+struct packet {
+    _Alignas(64) union lane lanes[FIELDS * 16];
+    _Alignas(64) int valid[16];
+    struct RTCIntersectContext context;
+};
+
+static inline void put_ray(const struct pt_ray *from, union lane *lanes, int n, int i)
+{
+    lanes[ORG_X * n + i].f = from->origin.x;
+    lanes[ORG_Y * n + i].f = from->origin.y;
+    lanes[ORG_Z * n + i].f = from->origin.z;
+    lanes[TNEAR * n + i].f = from->t_min;
+    lanes[DIR_X * n + i].f = from->direction.x;
+    lanes[DIR_Y * n + i].f = from->direction.y;
+    lanes[DIR_Z * n + i].f = from->direction.z;
+    lanes[TIME * n + i].f = from->time;
+    lanes[TFAR * n + i].f = from->t_max;
+    lanes[MASK * n + i].u = ~0u;
+    lanes[RAY_ID * n + i].u = lanes[FLAGS * n + i].u = 0;
+}
+
+/* The first rays of a list of `count`, as many as go together. Lanes without one hold a ray all the same. */
+static inline int packet_fill(struct packet *p, const struct pt_ray *const *rays, int count, int n, int coherent)
+{
+    count = count < n ? count : n;
+    rtcInitIntersectContext(&p->context);
+    p->context.flags = coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+    for (int i = 0; i < n; i++) {
+        p->valid[i] = i < count ? -1 : 0;
+        put_ray(rays[i < count ? i : 0], p->lanes, n, i);
+    }
+    return count;
+}
+
+static void packet_intersect(const struct pt_scene *scene, struct packet *p, int n)
+{
+    RTCScene world = scene->accel->world;
+    for (int i = 0; i < n; i++)
+        p->lanes[GEOM_ID * n + i].u = p->lanes[INST_ID * n + i].u = RTC_INVALID_GEOMETRY_ID;
+    if (n == 16)
+        rtcIntersect16(p->valid, world, &p->context, (struct RTCRayHit16 *)p->lanes);
+    else if (n == 8)
+        rtcIntersect8(p->valid, world, &p->context, (struct RTCRayHit8 *)p->lanes);
+    else
+        rtcIntersect4(p->valid, world, &p->context, (struct RTCRayHit4 *)p->lanes);
+}
+
+static void packet_occluded(const struct pt_scene *scene, struct packet *p, int n)
+{
+    RTCScene world = scene->accel->world;
+    if (n == 16)
+        rtcOccluded16(p->valid, world, &p->context, (struct RTCRay16 *)p->lanes);
+    else if (n == 8)
+        rtcOccluded8(p->valid, world, &p->context, (struct RTCRay8 *)p->lanes);
+    else
+        rtcOccluded4(p->valid, world, &p->context, (struct RTCRay4 *)p->lanes);
+}
+
+void pt_accel_intersect_many(const struct pt_scene *scene, const struct pt_ray *const *rays, int count, int coherent,
+                             struct pt_hit *const *hits)
+{
+    struct packet p;
+    int n = scene->accel->packet;
+    while (count > 1 && n > 1) {
+        int filled = packet_fill(&p, rays, count, n, coherent);
+        packet_intersect(scene, &p, n);
+        for (int i = 0; i < filled; i++) {
+            struct pt_hit *hit = hits[i];
+            hit->t = p.lanes[TFAR * n + i].f;
+            hit->u = p.lanes[HIT_U * n + i].f;
+            hit->v = p.lanes[HIT_V * n + i].f;
+            hit->primitive = (int32_t)p.lanes[PRIM_ID * n + i].u;
+            hit->geometric = v3(p.lanes[NG_X * n + i].f, p.lanes[NG_Y * n + i].f, p.lanes[NG_Z * n + i].f);
+            name_shape(scene, p.lanes[GEOM_ID * n + i].u, p.lanes[INST_ID * n + i].u, hit);
+        }
+        count -= filled;
+        rays += filled;
+        hits += filled;
+    }
+    for (int i = 0; i < count; i++)
+        pt_accel_intersect(scene, rays[i], hits[i]);
+}
+
+void pt_accel_occluded_many(const struct pt_scene *scene, const struct pt_ray *const *rays, int count, uint8_t *occluded)
+{
+    struct packet p;
+    int n = scene->accel->packet;
+    while (count > 1 && n > 1) {
+        int filled = packet_fill(&p, rays, count, n, 0);
+        packet_occluded(scene, &p, n);
+        for (int i = 0; i < filled; i++)
+            occluded[i] = p.lanes[TFAR * n + i].f < 0.0f;
+        count -= filled;
+        rays += filled;
+        occluded += filled;
+    }
+    for (int i = 0; i < count; i++)
+        occluded[i] = (uint8_t)pt_accel_occluded(scene, rays[i]);
 }
 
 void pt_accel_instance_transform(const struct pt_scene *scene, int32_t id, float time, struct pt_mat34 *to_render)

@@ -1,8 +1,8 @@
 /*
- * What the renderer calls to get one sample of one pixel.
+ * What the renderer calls to get a sample of each of some pixels.
  *
- * A kernel is pure: its result depends on the scene, the settings and (pixel, sample) only, never on thread, block, or what
- * was rendered before. Any number of threads may call it at once.
+ * A kernel is pure: its result depends on its arguments only, never on thread or what was rendered before, and that of a
+ * pixel not on the other pixels, unless two surfaces coincide (integ/run.h). Any number of threads may call it at once.
  */
 #ifndef PT_INTEG_INTEGRATOR_H
 #define PT_INTEG_INTEGRATOR_H
@@ -24,9 +24,13 @@ struct pt_path_result {
     uint32_t rays;         /* intersection and occlusion queries */
 };
 
-/* (x, y): pixel of the full image, whatever the crop; sample: index from 0. */
+/* The most paths that a kernel traces together. */
+enum { PT_RUN = 64 };
+
+/* Sample `sample` (from 0) of the pixels (x, y) … (x + count - 1, y) of the full image, whatever the crop; out: [count],
+ * 1 <= count <= PT_RUN. */
 typedef void pt_kernel(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y,
-                       uint32_t sample, struct pt_path_result *out);
+                       int count, uint32_t sample, struct pt_path_result *out);
 
 /* The smallest compiled kernel that covers `needed`; *covers (may be NULL) gets its effect set, *name a static name. */
 pt_kernel *pt_kernel_select(pt_effects needed, pt_effects *covers, const char **name);

@@ -1,4 +1,4 @@
 #include "integ/kernel_sets.h"
-#include "integ/path.h"
+#include "integ/run.h"
 
 PT_KERNEL_DEFINE(diffuse, PT_FX_SET_DIFFUSE)

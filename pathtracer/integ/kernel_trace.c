@@ -1,12 +1,12 @@
 #include "integ/integrator.h"
-#include "integ/path.h"
+#include "integ/run.h"
 
 void pt_kernel_trace(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y,
                      uint32_t sample, void (*line)(void *data, const char *text), void *data)
 {
     struct pt_trace trace = {.line = line, .data = data};
     struct pt_path_result result;
-    pt_path_sample(PT_FX_ALL, scene, settings, x, y, sample, &trace, &result);
+    pt_run_sample(PT_FX_ALL, scene, settings, x, y, 1, sample, &trace, &result);
 }
 
 static void no_line(void *data, const char *text)
@@ -20,7 +20,7 @@ void pt_kernel_census(const struct pt_scene *scene, const struct pt_integrator *
 {
     struct pt_trace trace = {.line = no_line};
     struct pt_path_result result;
-    pt_path_sample(PT_FX_ALL, scene, settings, x, y, sample, &trace, &result);
+    pt_run_sample(PT_FX_ALL, scene, settings, x, y, 1, sample, &trace, &result);
     for (int i = 0; i < PT_MET_COUNT; i++)
         met[i] += trace.met[i];
 }

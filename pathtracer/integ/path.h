@@ -1,5 +1,5 @@
 /*
- * The path kernel: one source, compiled once per effect set by the files kernel_*.c.
+ * One path of the kernel, from vertex to vertex; integ/run.h traces its rays, many paths together.
  *
  * Unidirectional path tracing with next-event estimation and multiple importance sampling (power heuristic; Veach 1997,
  * §9.2), Russian roulette on the throughput without refraction's radiance scaling, participating media, interfaces and
@@ -31,6 +31,16 @@
 #define PT_PATH_LONG 1000
 #define PT_KEEP_LONG 0.99f
 
+/* What a light adds if nothing is in between. It is worked out before the shadow ray is traced, together with the path's
+ * next direction: two independent chains of arithmetic then overlap, where a query between them would make the second
+ * wait. */
+struct pt_light_plan {
+    struct pt_light_sample light;
+    pt_vec3 add;         /* to the path's radiance; black: no shadow ray needed */
+    pt_vec3 origin;
+    int32_t medium;      /* the shadow ray starts in it */
+};
+
 struct pt_path {
     const struct pt_scene *scene;
     const struct pt_integrator *settings;
@@ -44,6 +54,9 @@ struct pt_path {
     int32_t medium;      /* the ray is in it, -1 = vacuum */
     int32_t depth;       /* bounces so far */
     uint32_t rays;
+    struct pt_hit hit;          /* what the ray has met first */
+    struct pt_light_plan plan;  /* of the last vertex */
+    struct pt_path_result *out; /* borrows */
 };
 
 PT_KERNEL_INLINE int32_t pt_medium_towards(const struct pt_place *at, pt_vec3 w, int32_t current)
@@ -66,20 +79,19 @@ PT_KERNEL_INLINE int pt_passes_alpha(const struct pt_scene *scene, const struct 
     return alpha < 1.0f && (alpha <= 0.0f || pt_rng_float(rng) >= alpha);
 }
 
-/* Nearest hit that counts. */
-PT_KERNEL_INLINE int pt_path_intersect(pt_effects fx, struct pt_path *path, int coherent, struct pt_hit *hit)
+/* Whether the path met anything that counts: goes on behind what it passes through by chance. */
+PT_KERNEL_INLINE int pt_path_found(pt_effects fx, struct pt_path *path)
 {
-    struct pt_rng rng;
-    if (fx & PT_FX_ALPHA)
-        rng = pt_sampler_stream(&path->sampler, PT_DIM_ALPHA);
-    for (;;) {
-        path->rays++;
-        if (!pt_accel_intersect(path->scene, &path->ray, coherent, hit))
-            return 0;
-        if (!(fx & PT_FX_ALPHA) || !pt_passes_alpha(path->scene, &path->ray, hit, &rng))
-            return 1;
-        path->ray.t_min = pt_ray_beyond(hit->t);
+    path->rays++;
+    if (fx & PT_FX_ALPHA) {
+        struct pt_rng rng = pt_sampler_stream(&path->sampler, PT_DIM_ALPHA);
+        while (path->hit.shape >= 0 && pt_passes_alpha(path->scene, &path->ray, &path->hit, &rng)) {
+            path->ray.t_min = pt_ray_beyond(path->hit.t);
+            path->rays++;
+            pt_accel_intersect(path->scene, &path->ray, &path->hit);
+        }
     }
+    return path->hit.shape >= 0;
 }
 
 /* Of a medium that fills the whole shadow ray; direction unnormalised, its length in `length`. */
@@ -102,7 +114,7 @@ PT_KERNEL_INLINE pt_vec3 pt_path_transmittance(pt_effects fx, struct pt_path *pa
     for (;;) {
         struct pt_hit hit;
         path->rays++;
-        int found = pt_accel_intersect(scene, ray, 0, &hit);
+        int found = pt_accel_intersect(scene, ray, &hit);
         int alpha = found && (fx & PT_FX_ALPHA) && pt_passes_alpha(scene, ray, &hit, &rng);
         int interface = found && (fx & PT_FX_INTERFACE) &&
                         scene->materials[scene->shapes[hit.shape].material].kind == PT_MATERIAL_INTERFACE;
@@ -139,16 +151,6 @@ PT_KERNEL_INLINE int pt_path_sample_light(pt_effects fx, const struct pt_path *p
     return pt_light_sample(fx, path->scene, at, pt_sampler_1d(&path->sampler, PT_DIM_LIGHT_PICK), u.x, u.y, light);
 }
 
-/* What a light adds if nothing is in between. It is worked out before the shadow ray is traced, together with the path's
- * next direction: two independent chains of arithmetic then overlap, where a query between them would make the second
- * wait. */
-struct pt_light_plan {
-    struct pt_light_sample light;
-    pt_vec3 add;         /* to the path's radiance; black: no shadow ray needed */
-    pt_vec3 origin;
-    int32_t medium;      /* the shadow ray starts in it */
-};
-
 /* `f` is BSDF · cos or the phase function towards the light, `pdf` the density with which it would have sampled that. */
 PT_KERNEL_INLINE void pt_path_plan_light(pt_effects fx, const struct pt_path *path, pt_vec3 f, float pdf, pt_vec3 origin,
                                          int32_t medium, struct pt_light_plan *plan)
@@ -162,31 +164,32 @@ PT_KERNEL_INLINE void pt_path_plan_light(pt_effects fx, const struct pt_path *pa
     plan->medium = medium;
 }
 
-PT_KERNEL_INLINE void pt_path_resolve_light(pt_effects fx, struct pt_path *path, const struct pt_light_plan *plan)
+/* The ray that says whether the planned light arrives. */
+PT_KERNEL_INLINE struct pt_ray pt_path_shadow_ray(const struct pt_path *path)
 {
-    if (v3_is_black(plan->add))
-        return;
-    const struct pt_light_sample *light = &plan->light;
-    struct pt_ray ray = {plan->origin, light->wi, 0.0f, INFINITY, path->ray.time};
-    pt_vec3 add = plan->add;
-    if (light->finite) {
-        ray.direction = v3_sub(light->target, plan->origin);
+    const struct pt_light_plan *plan = &path->plan;
+    struct pt_ray ray = {plan->origin, plan->light.wi, 0.0f, INFINITY, path->ray.time};
+    if (plan->light.finite) {
+        ray.direction = v3_sub(plan->light.target, plan->origin);
         ray.t_max = PT_SHADOW_END;
     }
-    if (fx & (PT_FX_ALPHA | PT_FX_INTERFACE)) {
-        add = v3_mul(add, pt_path_transmittance(fx, path, &ray, v3_len(ray.direction), plan->medium));
-    } else {
-        path->rays++;
-        if (pt_accel_occluded(path->scene, &ray))
-            return;
-        if ((fx & PT_FX_MEDIA) && plan->medium >= 0)
-            add = v3_mul(add, pt_path_medium_transmittance(path, &ray, v3_len(ray.direction), plan->medium));
-    }
-    if ((fx & PT_FX_ENVIRONMENT) && light->pixel)
-        add = v3_mul(add, v3(light->pixel[0], light->pixel[1], light->pixel[2]));
+    return ray;
+}
+
+/* Adds the planned light, of which nothing opaque was in the way of `ray`. */
+PT_KERNEL_INLINE void pt_path_add_light(pt_effects fx, struct pt_path *path, struct pt_ray *ray)
+{
+    const struct pt_light_plan *plan = &path->plan;
+    pt_vec3 add = plan->add;
+    if (fx & (PT_FX_ALPHA | PT_FX_INTERFACE))
+        add = v3_mul(add, pt_path_transmittance(fx, path, ray, v3_len(ray->direction), plan->medium));
+    else if ((fx & PT_FX_MEDIA) && plan->medium >= 0)
+        add = v3_mul(add, pt_path_medium_transmittance(path, ray, v3_len(ray->direction), plan->medium));
+    if ((fx & PT_FX_ENVIRONMENT) && plan->light.pixel)
+        add = v3_mul(add, v3(plan->light.pixel[0], plan->light.pixel[1], plan->light.pixel[2]));
     path->radiance = v3_add(path->radiance, add);
     if (path->trace)
-        pt_trace_light(path->trace, light->wi, add);
+        pt_trace_light(path->trace, plan->light.wi, add);
 }
 
 /* Emission of the surface that the path has met. */
@@ -261,11 +264,10 @@ PT_KERNEL_INLINE int pt_path_cross_medium(pt_effects fx, struct pt_path *path, f
     if (path->trace)
         pt_trace_scatter(path->trace, path->medium, p, path->throughput);
     path->prev = (struct pt_receiver){p, v3_splat(0.0f), PT_RECEIVER_VOLUME};
-    struct pt_light_plan plan;
-    if (pt_path_sample_light(fx, path, &path->prev, pt_sampler_2d(&path->sampler, PT_DIM_LIGHT), &plan.light)) {
-        float phase = pt_phase_eval(medium->g, wo, plan.light.wi);
-        pt_path_plan_light(fx, path, v3_splat(phase), phase, p, path->medium, &plan);
-        pt_path_resolve_light(fx, path, &plan);
+    struct pt_light_plan *plan = &path->plan;
+    if (pt_path_sample_light(fx, path, &path->prev, pt_sampler_2d(&path->sampler, PT_DIM_LIGHT), &plan->light)) {
+        float phase = pt_phase_eval(medium->g, wo, plan->light.wi);
+        pt_path_plan_light(fx, path, v3_splat(phase), phase, p, path->medium, plan);
     }
     struct pt_sample2 u = pt_sampler_2d(&path->sampler, PT_DIM_PHASE);
     path->pdf_prev = pt_phase_sample(medium->g, wo, u.x, u.y, &wi);
@@ -339,92 +341,81 @@ PT_KERNEL_INLINE int pt_path_bounce(pt_effects fx, struct pt_path *path, const s
     if (path->trace)
         pt_trace_surface(path->trace, at, &bsdf, path->throughput);
 
-    struct pt_light_plan plan; /* no initialiser: it would clear all of it at each bounce */
-    plan.add = plan.light.target = v3_splat(0.0f);
+    struct pt_light_plan *plan = &path->plan;
     path->prev = pt_path_receiver(fx, at->p, &frame, &bsdf, wo);
-    if (pt_bsdf_has_smooth(fx, &bsdf) && pt_path_sample_light(fx, path, &path->prev, u_light, &plan.light)) {
+    if (pt_bsdf_has_smooth(fx, &bsdf) && pt_path_sample_light(fx, path, &path->prev, u_light, &plan->light)) {
         float pdf;
-        pt_vec3 wi = plan.light.wi, f = pt_bsdf_eval(fx, &bsdf, wo, pt_frame_to_local(&frame, wi), &pdf);
+        pt_vec3 wi = plan->light.wi, f = pt_bsdf_eval(fx, &bsdf, wo, pt_frame_to_local(&frame, wi), &pdf);
         pt_path_plan_light(fx, path, f, pdf, pt_offset_point(at->p, at->s.n_geometric, at->error, wi),
-                           fx & PT_FX_MEDIA ? pt_medium_towards(at, wi, path->medium) : -1, &plan);
+                           fx & PT_FX_MEDIA ? pt_medium_towards(at, wi, path->medium) : -1, plan);
     }
-    int alive = pt_path_scatter(fx, path, at, &frame, &bsdf, wo, u_bsdf);
-    pt_path_resolve_light(fx, path, &plan);
-    return alive;
+    return pt_path_scatter(fx, path, at, &frame, &bsdf, wo, u_bsdf);
 }
 
-PT_KERNEL_INLINE void pt_path_start(pt_effects fx, struct pt_path *path, uint32_t x, uint32_t y)
+/* The camera's ray through pixel (x, y). Scene, settings, trace and out are set, the rest is not. */
+PT_KERNEL_INLINE void pt_path_start(pt_effects fx, struct pt_path *path, uint32_t x, uint32_t y, uint32_t sample)
 {
     const struct pt_camera *camera = &path->scene->camera;
+    const struct pt_integrator *settings = path->settings;
+    path->sampler = pt_sampler_make(settings->sampler == PT_SAMPLER_SOBOL, settings->seed, x, y, sample);
+    path->throughput = v3_splat(1.0f);
+    path->radiance = v3_splat(0.0f);
+    path->eta_scale = 1.0f;
+    path->pdf_prev = 0.0f;
+    path->depth = 0;
+    path->rays = 0;
+    *path->out = (struct pt_path_result){.depth = INFINITY};
     struct pt_sample2 pixel = pt_sampler_2d(&path->sampler, PT_DIM_PIXEL), lens = {0.5f, 0.5f};
     float dx, dy, time = 0.0f;
-    pt_filter_sample(path->settings, pixel.x, pixel.y, &dx, &dy);
+    pt_filter_sample(settings, pixel.x, pixel.y, &dx, &dy);
     if (fx & PT_FX_DEFOCUS)
         lens = pt_sampler_2d(&path->sampler, PT_DIM_LENS);
     if (fx & PT_FX_MOTION)
         time = pt_sampler_1d(&path->sampler, PT_DIM_TIME);
     pt_camera_ray(fx, camera, (float)x + 0.5f + dx, (float)y + 0.5f + dy, lens.x, lens.y, time, &path->ray);
     path->medium = fx & PT_FX_MEDIA ? camera->medium : -1;
+    if (path->trace)
+        pt_trace_camera(path->trace, &path->ray);
 }
 
-PT_KERNEL_INLINE pt_vec3 pt_path_exposed(const struct pt_path *path)
+/* What happens where the path's ray ends: emission that it met, the light planned there, and the next ray. 0: the path
+ * ends. */
+PT_KERNEL_INLINE int pt_path_vertex(pt_effects fx, struct pt_path *path)
+{
+    const struct pt_scene *scene = path->scene;
+    struct pt_place at;
+    path->plan.add = path->plan.light.target = v3_splat(0.0f);
+    int found = pt_path_found(fx, path);
+    if ((fx & PT_FX_MEDIA) && path->medium >= 0) {
+        int crossed = pt_path_cross_medium(fx, path, found ? path->hit.t : INFINITY);
+        if (crossed != 0)
+            return crossed > 0;
+    }
+    if (!found) {
+        if (fx & PT_FX_ENVIRONMENT)
+            pt_path_add_environment(path);
+        return 0;
+    }
+    pt_place_at_hit(fx, scene, &path->ray, &path->hit, &at);
+    if ((fx & PT_FX_INTERFACE) && scene->materials[at.shape->material].kind == PT_MATERIAL_INTERFACE) {
+        path->medium = pt_medium_towards(&at, path->ray.direction, path->medium);
+        path->ray.t_min = pt_ray_beyond(path->hit.t);
+        return 1;
+    }
+    if (at.shape->light >= 0)
+        pt_path_add_emission(fx, path, &at);
+    return !pt_path_at_max_depth(path) && pt_path_bounce(fx, path, &at, path->hit.t, path->out);
+}
+
+/* The result of a path that is over. */
+PT_KERNEL_INLINE void pt_path_end(const struct pt_path *path)
 {
     pt_vec3 c = v3_scale(path->radiance, path->scene->radiance_scale);
     float peak = v3_max(c), limit = path->settings->max_component;
-    return peak > limit && isfinite(peak) ? v3_scale(c, limit / peak) : c;
+    path->out->radiance = peak > limit && isfinite(peak) ? v3_scale(c, limit / peak) : c;
+    path->out->rays = path->rays;
+    if (path->trace)
+        pt_trace_end(path->trace, path->out->radiance);
 }
-
-PT_KERNEL_INLINE void pt_path_sample(pt_effects fx, const struct pt_scene *scene, const struct pt_integrator *settings,
-                                     uint32_t x,
-                                     uint32_t y, uint32_t sample, struct pt_trace *trace, struct pt_path_result *out)
-{
-    struct pt_path path = {.scene = scene, .settings = settings, .trace = trace, .throughput = {1.0f, 1.0f, 1.0f},
-                           .eta_scale = 1.0f};
-    path.sampler = pt_sampler_make(settings->sampler == PT_SAMPLER_SOBOL, settings->seed, x, y, sample);
-    *out = (struct pt_path_result){.depth = INFINITY};
-    pt_path_start(fx, &path, x, y);
-    if (trace)
-        pt_trace_camera(trace, &path.ray);
-    for (uint32_t vertex = 1;; vertex++) {
-        struct pt_hit hit;
-        struct pt_place at;
-        pt_sampler_block(&path.sampler, vertex);
-        int found = pt_path_intersect(fx, &path, vertex == 1, &hit);
-        if ((fx & PT_FX_MEDIA) && path.medium >= 0) {
-            int crossed = pt_path_cross_medium(fx, &path, found ? hit.t : INFINITY);
-            if (crossed > 0)
-                continue;
-            if (crossed < 0)
-                break;
-        }
-        if (!found) {
-            if (fx & PT_FX_ENVIRONMENT)
-                pt_path_add_environment(&path);
-            break;
-        }
-        pt_place_at_hit(fx, scene, &path.ray, &hit, &at);
-        if ((fx & PT_FX_INTERFACE) && scene->materials[at.shape->material].kind == PT_MATERIAL_INTERFACE) {
-            path.medium = pt_medium_towards(&at, path.ray.direction, path.medium);
-            path.ray.t_min = pt_ray_beyond(hit.t);
-            continue;
-        }
-        if (at.shape->light >= 0)
-            pt_path_add_emission(fx, &path, &at);
-        if (pt_path_at_max_depth(&path) || !pt_path_bounce(fx, &path, &at, hit.t, out))
-            break;
-    }
-    out->radiance = pt_path_exposed(&path);
-    out->rays = path.rays;
-    if (trace)
-        pt_trace_end(trace, out->radiance);
-}
-
-/* The whole of a file kernel_NAME.c: the kernel of the list PT_KERNELS (kernel_sets.h) for its effect set. */
-#define PT_KERNEL_DEFINE(name, set)                                                                                        \
-    void pt_kernel_##name(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y,      \
-                          uint32_t sample, struct pt_path_result *out)                                                     \
-    {                                                                                                                      \
-        pt_path_sample(set, scene, settings, x, y, sample, NULL, out);                                                     \
-    }
 
 #endif

@@ -4,25 +4,33 @@
 
 #include "base/clock.h"
 
-void pt_row_sample(const struct pt_row_maker *maker, struct pt_film *film, struct pt_row *row)
+/* Samples of neighbouring pixels, in the order of samples in each of them. */
+static void sample_run(const struct pt_row_maker *maker, struct pt_film *film, struct pt_row *row, int x, int count)
 {
-    uint32_t planes = film->planes;
-    double start_s = base_clock_thread_s();
-    for (int x = row->x0; x < row->x1; x++) {
-        size_t index = pt_film_index(film, x, row->y);
-        struct pt_film_pixel pixel;
-        pt_film_load(film, index, &pixel);
-        for (uint32_t s = row->from; s < row->to; s++) {
-            struct pt_path_result path;
-            maker->kernel(maker->scene, maker->integrator, (uint32_t)x, (uint32_t)row->y, s, &path);
-            row->rays += path.rays;
-            if (!pt_film_add(&pixel, planes, s, &path) && row->dropped++ == 0) {
-                row->first_x = (uint32_t)x;
+    struct pt_film_pixel pixels[PT_RUN];
+    struct pt_path_result paths[PT_RUN];
+    size_t index = pt_film_index(film, x, row->y);
+    for (int i = 0; i < count; i++)
+        pt_film_load(film, index + (size_t)i, &pixels[i]);
+    for (uint32_t s = row->from; s < row->to; s++) {
+        maker->kernel(maker->scene, maker->integrator, (uint32_t)x, (uint32_t)row->y, count, s, paths);
+        for (int i = 0; i < count; i++) {
+            row->rays += paths[i].rays;
+            if (!pt_film_add(&pixels[i], film->planes, s, &paths[i]) && row->dropped++ == 0) {
+                row->first_x = (uint32_t)(x + i);
                 row->first_sample = s;
             }
         }
-        pt_film_store(film, index, &pixel);
     }
+    for (int i = 0; i < count; i++)
+        pt_film_store(film, index + (size_t)i, &pixels[i]);
+}
+
+void pt_row_sample(const struct pt_row_maker *maker, struct pt_film *film, struct pt_row *row)
+{
+    double start_s = base_clock_thread_s();
+    for (int x = row->x0; x < row->x1; x += PT_RUN)
+        sample_run(maker, film, row, x, row->x1 - x < PT_RUN ? row->x1 - x : PT_RUN);
     row->thread_s = base_clock_thread_s() - start_s;
 }
 

@@ -42,4 +42,22 @@ static inline float pt_input_float(pt_effects fx, const struct pt_scene *scene, 
     return in->value.x;
 }
 
+/* Fetches into the cache what texture `number` will read at (u, v), if it is an image. */
+static inline void pt_texture_fetch(const struct pt_scene *scene, int32_t number, float u, float v)
+{
+    const struct pt_texture *t = &scene->textures[number - 1];
+    if (t->kind != PT_TEXTURE_IMAGE)
+        return;
+    const struct pt_image_map *image = &scene->images[t->image];
+    float x = t->su * u + t->du, y = 1.0f - (t->sv * v + t->dv);
+    x = (x - floorf(x)) * (float)image->width - 0.5f; /* as if it repeated: else something else is fetched in vain */
+    y = (y - floorf(y)) * (float)image->height - 0.5f;
+    size_t size = image->type == PT_PIXEL_FLOAT ? 4 : 1, row = (size_t)image->width * (size_t)image->channels * size;
+    if (!(x >= 0.0f && y >= 0.0f && x < (float)image->width && y < (float)image->height - 1.0f))
+        return;
+    const char *texel = (const char *)image->pixels + (size_t)y * row + (size_t)x * (size_t)image->channels * size;
+    __builtin_prefetch(texel);
+    __builtin_prefetch(texel + row);
+}
+
 #endif

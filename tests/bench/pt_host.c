@@ -32,7 +32,7 @@ static double run_kernel(struct bench *b, uint32_t first)
         for (int x = 0; x < b->width; x++)
             for (uint32_t s = first; s < first + b->spp; s++) {
                 struct pt_path_result r;
-                b->kernel(b->scene, &b->integrator, (uint32_t)x, (uint32_t)y, s, &r);
+                b->kernel(b->scene, &b->integrator, (uint32_t)x, (uint32_t)y, 1, s, &r);
                 b->sink += (double)r.radiance.x;
             }
     return base_clock_thread_s() - start_s;
@@ -48,7 +48,7 @@ static double run_film(struct bench *b, struct pt_film *film, uint32_t first)
             pt_film_load(film, i, &p);
             for (uint32_t s = first; s < first + b->spp; s++) {
                 struct pt_path_result r;
-                b->kernel(b->scene, &b->integrator, (uint32_t)x, (uint32_t)y, s, &r);
+                b->kernel(b->scene, &b->integrator, (uint32_t)x, (uint32_t)y, 1, s, &r);
                 pt_film_add(&p, film->planes, s, &r);
             }
             pt_film_store(film, i, &p);

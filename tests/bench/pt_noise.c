@@ -39,17 +39,21 @@ static void render(struct mode *m, const struct pt_integrator *settings, int see
     double start_s = base_clock_thread_s(), pixels_per_tile = (double)width * height / (TILES * TILES);
     own.seed = (uint32_t)(2 * seed + (m - modes)); /* no sample is shared */
     for (int y = 0; y < height; y++)
-        for (int x = 0; x < width; x++) {
-            double mean = 0.0;
+        for (int x = 0; x < width; x += PT_RUN) {
+            int n = width - x < PT_RUN ? width - x : PT_RUN;
+            double mean[PT_RUN] = {0};
             for (int s = 0; s < spp; s++) {
-                struct pt_path_result r;
-                m->kernel(m->scene, &own, (uint32_t)x, (uint32_t)y, (uint32_t)s, &r);
-                if (v3_is_finite(r.radiance))
-                    mean += (double)v3_luminance(r.radiance) / spp;
+                struct pt_path_result r[PT_RUN];
+                m->kernel(m->scene, &own, (uint32_t)x, (uint32_t)y, n, (uint32_t)s, r);
+                for (int i = 0; i < n; i++)
+                    if (v3_is_finite(r[i].radiance))
+                        mean[i] += (double)v3_luminance(r[i].radiance) / spp;
             }
-            m->sum[y * width + x] += mean;
-            m->sum2[y * width + x] += mean * mean;
-            m->tile[tile_of(x, y)][seed] += mean / pixels_per_tile;
+            for (int i = 0; i < n; i++) {
+                m->sum[y * width + x + i] += mean[i];
+                m->sum2[y * width + x + i] += mean[i] * mean[i];
+                m->tile[tile_of(x + i, y)][seed] += mean[i] / pixels_per_tile;
+            }
         }
     m->time_s += base_clock_thread_s() - start_s;
 }

@@ -13,10 +13,11 @@
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 static void no_kernel(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y,
-                      uint32_t sample, struct pt_path_result *out)
+                      int count, uint32_t sample, struct pt_path_result *out)
 {
     (void)scene, (void)settings, (void)x, (void)y, (void)sample;
-    *out = (struct pt_path_result){.rays = 1};
+    for (int i = 0; i < count; i++)
+        out[i] = (struct pt_path_result){.rays = 1};
 }
 
 static const char *write_file(const uint8_t *data, size_t size)

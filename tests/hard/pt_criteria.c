@@ -25,25 +25,21 @@ static uint32_t mix(uint32_t v)
     return v ^ v >> 16;
 }
 
-static void black(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y, uint32_t sample,
-                  struct pt_path_result *out)
-{
-    (void)scene, (void)settings, (void)x, (void)y, (void)sample;
-    *out = (struct pt_path_result){.rays = 1};
-}
-
 /* Block 0 black, block 1 constant, block 2 with fireflies on 0.2, block 3 infinite in one of 50 samples. */
-static void four_blocks(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y,
+static void four_blocks(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y, int count,
                         uint32_t sample, struct pt_path_result *out)
 {
-    black(scene, settings, x, y, sample, out);
-    uint32_t h = mix(mix(mix(x + 1) + y) + sample);
-    if (x >= 3 * BLOCK)
-        out->radiance = h % 50 == 0 ? v3(INFINITY, 1, 1) : v3_splat(0.2f);
-    else if (x >= 2 * BLOCK)
-        out->radiance = v3_splat(h % 100000 == 0 ? 1e5f : 0.2f);
-    else if (x >= BLOCK)
-        out->radiance = v3(0.1f, 0.2f, 0.3f);
+    (void)scene, (void)settings;
+    for (int i = 0; i < count; i++, x++, out++) {
+        uint32_t h = mix(mix(mix(x + 1) + y) + sample);
+        *out = (struct pt_path_result){.rays = 1};
+        if (x >= 3 * BLOCK)
+            out->radiance = h % 50 == 0 ? v3(INFINITY, 1, 1) : v3_splat(0.2f);
+        else if (x >= 2 * BLOCK)
+            out->radiance = v3_splat(h % 100000 == 0 ? 1e5f : 0.2f);
+        else if (x >= BLOCK)
+            out->radiance = v3(0.1f, 0.2f, 0.3f);
+    }
 }
 
 static struct pt_render *render(const char *criterion_id, struct pt_criterion **criterion, struct base_threads *pool)

@@ -118,7 +118,7 @@ static void render(const struct pt_scene *scene, const struct pt_integrator *set
         double sum = 0.0, sum2 = 0.0;
         for (uint32_t s = 0; s < SPP; s++) {
             struct pt_path_result r;
-            kernel(scene, settings, i % SIZE, i / SIZE, s, &r);
+            kernel(scene, settings, i % SIZE, i / SIZE, 1, s, &r);
             double l = (double)v3_luminance(r.radiance);
             sum += l;
             sum2 += l * l;
@@ -314,7 +314,7 @@ static void bad_emission(void **state)
     int bad = 0, good = 0;
     for (uint32_t i = 0; i < SIZE * SIZE * 4; i++) {
         struct pt_path_result r;
-        kernel(&scene, &settings, i % SIZE, i / SIZE % SIZE, i / (SIZE * SIZE), &r);
+        kernel(&scene, &settings, i % SIZE, i / SIZE % SIZE, 1, i / (SIZE * SIZE), &r);
         if (v3_is_finite(r.radiance))
             good++;
         else

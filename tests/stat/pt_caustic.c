@@ -58,7 +58,7 @@ static double photon_irradiance(const struct bench *b, double *caustic, double *
         for (int bounce = 0; bounce <= BOUNCES; bounce++) {
             struct pt_hit hit;
             struct pt_place at;
-            if (!pt_accel_intersect(&b->scene, &ray, 0, &hit))
+            if (!pt_accel_intersect(&b->scene, &ray, &hit))
                 break;
             pt_place_at_hit(PT_FX_ALL, &b->scene, &ray, &hit, &at);
             if (hit.shape == b->screen) {

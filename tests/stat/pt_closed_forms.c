@@ -38,7 +38,7 @@ static double pixel_mean(const struct pt_scene *scene, const struct pt_integrato
     double sum = 0.0;
     for (uint32_t s = 0; s < SPP; s++) {
         struct pt_path_result r;
-        kernel(scene, settings, (uint32_t)x, (uint32_t)y, s, &r);
+        kernel(scene, settings, (uint32_t)x, (uint32_t)y, 1, s, &r);
         sum += (double)r.radiance.y / SPP;
     }
     return sum;

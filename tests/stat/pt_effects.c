@@ -48,8 +48,8 @@ static void check_scene(const char *path)
         settings.want_aux = 1;
         for (uint32_t i = 0; i < SIZE * SIZE * SPP; i++) {
             struct pt_path_result a, b;
-            kernel(scene, &settings, i % SIZE, i / SIZE % SIZE, i / (SIZE * SIZE), &a);
-            pt_kernel_all(scene, &settings, i % SIZE, i / SIZE % SIZE, i / (SIZE * SIZE), &b);
+            kernel(scene, &settings, i % SIZE, i / SIZE % SIZE, 1, i / (SIZE * SIZE), &a);
+            pt_kernel_all(scene, &settings, i % SIZE, i / SIZE % SIZE, 1, i / (SIZE * SIZE), &b);
             if (!same(&a, &b))
                 fail_msg("%s: kernel %s differs from the general one at pixel %u, %u sample %u", path, name, i % SIZE,
                          i / SIZE % SIZE, i / (SIZE * SIZE));
@@ -92,7 +92,7 @@ static double image_mean(const struct pt_scene *scene, const struct pt_integrato
         double sum = 0.0, sum2 = 0.0;
         for (uint32_t s = 0; s < Z_SPP; s++) {
             struct pt_path_result r;
-            kernel(scene, settings, i % SIZE, i / SIZE, s, &r);
+            kernel(scene, settings, i % SIZE, i / SIZE, 1, s, &r);
             double l = (double)v3_luminance(r.radiance);
             sum += l / Z_SPP;
             sum2 += l * l / Z_SPP;

@@ -39,7 +39,7 @@ static void sample(const struct pt_scene *scene, const struct pt_integrator *set
             pt_film_load(film, i, &p);
             for (uint32_t s = 0; s < spp; s++) {
                 struct pt_path_result r;
-                kernel(scene, settings, (uint32_t)x, (uint32_t)y, s, &r);
+                kernel(scene, settings, (uint32_t)x, (uint32_t)y, 1, s, &r);
                 pt_film_add(&p, film->planes, s, &r);
             }
             pt_film_store(film, i, &p);

@@ -35,7 +35,7 @@ static void accumulate(const struct pt_scene *scene, int strategy, int sampler, 
         for (int x = 0; x < size; x++)
             for (uint32_t s = 0; s < spp; s++) {
                 struct pt_path_result r;
-                kernel(scene, &settings, (uint32_t)x, (uint32_t)y, s, &r);
+                kernel(scene, &settings, (uint32_t)x, (uint32_t)y, 1, s, &r);
                 const float l[3] = {r.radiance.x, r.radiance.y, r.radiance.z};
                 struct moments *m = tiles[y * TILES / size * TILES + x * TILES / size];
                 for (int c = 0; c < 3; c++) {

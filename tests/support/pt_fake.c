@@ -13,36 +13,41 @@ static uint32_t hash(uint32_t v)
     return v ^ v >> 16;
 }
 
-void pt_fake_noise(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y, uint32_t sample,
-                   struct pt_path_result *out)
+void pt_fake_noise(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y, int count,
+                   uint32_t sample, struct pt_path_result *out)
 {
     (void)scene;
-    float u = (float)(hash(hash(hash(settings->seed + x) + y) + sample) >> 8) * 0x1p-24f;
-    *out = (struct pt_path_result){.radiance = v3(0.5f + 0.5f * u, 0.25f, (float)x / 1000.0f), .albedo = v3_splat(0.5f),
-                                   .normal_world = v3(0, 0, 1), .depth = 2.0f, .rays = 3};
+    for (int i = 0; i < count; i++, x++) {
+        float u = (float)(hash(hash(hash(settings->seed + x) + y) + sample) >> 8) * 0x1p-24f;
+        out[i] = (struct pt_path_result){.radiance = v3(0.5f + 0.5f * u, 0.25f, (float)x / 1000.0f), .albedo = v3_splat(0.5f),
+                                         .normal_world = v3(0, 0, 1), .depth = 2.0f, .rays = 3};
+    }
 }
 
-void pt_fake_constant(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y,
+void pt_fake_constant(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y, int count,
                       uint32_t sample, struct pt_path_result *out)
 {
-    pt_fake_noise(scene, settings, x, y, sample, out);
-    out->radiance = v3(0.1f, 0.2f, 0.3f);
+    pt_fake_noise(scene, settings, x, y, count, sample, out);
+    for (int i = 0; i < count; i++)
+        out[i].radiance = v3(0.1f, 0.2f, 0.3f);
 }
 
-void pt_fake_nan(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y, uint32_t sample,
-                 struct pt_path_result *out)
+void pt_fake_nan(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y, int count,
+                 uint32_t sample, struct pt_path_result *out)
 {
-    pt_fake_noise(scene, settings, x, y, sample, out);
-    if (x < 8 && sample % 97 == 5)
-        out->radiance.y = NAN;
+    pt_fake_noise(scene, settings, x, y, count, sample, out);
+    for (int i = 0; i < count; i++)
+        if (x + (uint32_t)i < 8 && sample % 97 == 5)
+            out[i].radiance.y = NAN;
 }
 
-void pt_fake_all_nan(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y,
+void pt_fake_all_nan(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y, int count,
                      uint32_t sample, struct pt_path_result *out)
 {
-    pt_fake_noise(scene, settings, x, y, sample, out);
-    if (x < 8)
-        out->radiance = v3_splat(INFINITY);
+    pt_fake_noise(scene, settings, x, y, count, sample, out);
+    for (int i = 0; i < count; i++)
+        if (x + (uint32_t)i < 8)
+            out[i].radiance = v3_splat(INFINITY);
 }
 
 /* --- criterion ------------------------------------------------------------------------------------------------------ */

@@ -238,19 +238,24 @@ pt_vec3 test_mean(const struct pt_scene *scene, const struct pt_integrator *sett
                   double *error_of_mean)
 {
     double sum[3] = {0}, sum_l = 0.0, sum_l2 = 0.0, n = 0.0;
-    for (uint32_t y = 0; y < (uint32_t)scene->camera.height; y++)
-        for (uint32_t x = 0; x < (uint32_t)scene->camera.width; x++)
+    int width = scene->camera.width, height = scene->camera.height;
+    for (int y = 0; y < height; y++)
+        for (int x = 0; x < width; x += PT_RUN) {
+            int count = width - x < PT_RUN ? width - x : PT_RUN;
             for (uint32_t s = 0; s < spp; s++) {
-                struct pt_path_result r;
-                kernel(scene, settings, x, y, s, &r);
-                double l = (double)v3_luminance(r.radiance);
-                sum[0] += (double)r.radiance.x;
-                sum[1] += (double)r.radiance.y;
-                sum[2] += (double)r.radiance.z;
-                sum_l += l;
-                sum_l2 += l * l;
-                n += 1.0;
+                struct pt_path_result r[PT_RUN];
+                kernel(scene, settings, (uint32_t)x, (uint32_t)y, count, s, r);
+                for (int i = 0; i < count; i++) {
+                    double l = (double)v3_luminance(r[i].radiance);
+                    sum[0] += (double)r[i].radiance.x;
+                    sum[1] += (double)r[i].radiance.y;
+                    sum[2] += (double)r[i].radiance.z;
+                    sum_l += l;
+                    sum_l2 += l * l;
+                    n += 1.0;
+                }
             }
+        }
     if (error_of_mean)
         *error_of_mean = sqrt(fmax(0.0, sum_l2 / n - sum_l / n * (sum_l / n)) / n);
     return v3((float)(sum[0] / n), (float)(sum[1] / n), (float)(sum[2] / n));

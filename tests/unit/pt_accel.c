@@ -40,7 +40,7 @@ static void triangles_have_right_hand_normals(void **state)
     test_add_quad(&scene, grey, v3(-1, -1, 2), v3(2, 0, 0), v3(0, 2, 0));
     test_scene_finish(&scene);
     struct pt_ray ray = ray_to(v3(0.25f, -0.5f, 0.0f), v3(0, 0, 1));
-    assert_int_equal(pt_accel_intersect(&scene, &ray, 0, &hit), 1);
+    assert_int_equal(pt_accel_intersect(&scene, &ray, &hit), 1);
     assert_near(hit.t, 2.0f, 1e-6f);
     assert_int_equal(hit.shape, 0);
     assert_int_equal(hit.instance, -1);
@@ -51,7 +51,7 @@ static void triangles_have_right_hand_normals(void **state)
     assert_vec_near(at.s.n_geometric, v3(0, 0, 1), 1e-6f);
     /* going on from the distance of a hit must not meet the same surface */
     ray.t_min = pt_ray_beyond(hit.t);
-    assert_int_equal(pt_accel_intersect(&scene, &ray, 0, &hit), 0);
+    assert_int_equal(pt_accel_intersect(&scene, &ray, &hit), 0);
     ray.t_min = 0.0f;
     assert_int_equal(pt_accel_occluded(&scene, &ray), 1);
     ray.t_max = 1.9f;
@@ -67,7 +67,7 @@ static void empty_scene_has_no_hits(void **state)
     test_scene_begin(&scene);
     test_scene_finish(&scene);
     struct pt_ray ray = ray_to(v3(0, 0, 0), v3(0, 0, 1));
-    assert_int_equal(pt_accel_intersect(&scene, &ray, 0, &hit), 0);
+    assert_int_equal(pt_accel_intersect(&scene, &ray, &hit), 0);
     assert_int_equal(pt_accel_occluded(&scene, &ray), 0);
     test_scene_end(&scene);
 }
@@ -182,7 +182,7 @@ static void instances(void **state)
 
     struct pt_ray ray = ray_to(v3(0, 0.5f, 10.5f), v3(1, 0, 0));
     struct pt_place at;
-    assert_int_equal(pt_accel_intersect(&scene, &ray, 0, &hit), 1);
+    assert_int_equal(pt_accel_intersect(&scene, &ray, &hit), 1);
     assert_int_equal(hit.instance, 0);
     assert_int_equal(hit.shape, 1);
     pt_place_at_hit(PT_FX_ALL, &scene, &ray, &hit, &at);
@@ -192,7 +192,7 @@ static void instances(void **state)
     for (int i = 0; i <= 4; i++) {
         ray = ray_to(v3(0, 20.5f, 10.5f), v3(1, 0, 0));
         ray.time = (float)i / 4.0f;
-        assert_int_equal(pt_accel_intersect(&scene, &ray, 0, &hit), 1);
+        assert_int_equal(pt_accel_intersect(&scene, &ray, &hit), 1);
         assert_int_equal(hit.instance, 1);
         assert_near(hit.t, 4.0f + (float)i, 1e-4f);
         pt_place_at_hit(PT_FX_ALL, &scene, &ray, &hit, &at);
@@ -200,7 +200,7 @@ static void instances(void **state)
         assert_vec_near(at.s.n_geometric, v3(1, 0, 0), 1e-5f);
     }
     ray = ray_to(v3(0, 10, 0), v3(0, 0, 1));
-    assert_int_equal(pt_accel_intersect(&scene, &ray, 0, &hit), 1);
+    assert_int_equal(pt_accel_intersect(&scene, &ray, &hit), 1);
     assert_int_equal(hit.shape, 0);
     assert_int_equal(hit.instance, -1);
     test_scene_end(&scene);
@@ -222,9 +222,77 @@ static void meshes_are_watertight(void **state)
         float e[3] = {s, corner & 1 ? 1.0f : -1.0f, corner & 2 ? 1.0f : -1.0f};
         struct pt_ray ray = ray_to(v3(0.1f, -0.2f, 0.3f), v3(0, 0, 0));
         ray.direction = v3_sub(v3(e[axis], e[(axis + 1) % 3], e[(axis + 2) % 3]), ray.origin);
-        missed += !pt_accel_intersect(&scene, &ray, 0, &hit);
+        missed += !pt_accel_intersect(&scene, &ray, &hit);
     }
     assert_int_equal(missed, 0);
+    test_scene_end(&scene);
+}
+
+static float number(uint32_t *state)
+{
+    *state = *state * 1664525u + 1013904223u;
+    return (float)(*state >> 8) * 0x1p-24f;
+}
+
+enum { RAYS = 37, MOVING = 2 }; /* no multiple of a packet; the shape of the instance */
+
+static void compare_many(const struct pt_scene *scene, int count, int coherent, uint32_t *state)
+{
+    struct pt_ray rays[RAYS];
+    const struct pt_ray *list[RAYS];
+    struct pt_hit hits[RAYS], *got[RAYS];
+    uint8_t occluded[RAYS];
+    for (int i = 0; i < count; i++) {
+        pt_vec3 to = v3(4.0f * number(state) - 2.0f, 4.0f * number(state) - 2.0f, 5.0f);
+        rays[i] = ray_to(v3(0.1f, 0.2f, -4.0f), v3_sub(to, v3(0.1f, 0.2f, -4.0f)));
+        rays[i].time = number(state);
+        rays[i].t_min = 0.3f * number(state);
+        rays[i].t_max = 0.5f + number(state);
+        list[i] = &rays[i];
+        got[i] = &hits[i];
+    }
+    pt_accel_intersect_many(scene, list, count, coherent, got);
+    pt_accel_occluded_many(scene, list, count, occluded);
+    for (int i = 0; i < count; i++) {
+        struct pt_hit one;
+        assert_int_equal(pt_accel_intersect(scene, &rays[i], &one), hits[i].shape >= 0);
+        assert_int_equal(pt_accel_occluded(scene, &rays[i]), occluded[i]);
+        assert_int_equal(one.shape, hits[i].shape);
+        if (one.shape < 0)
+            continue;
+        assert_int_equal(one.primitive, hits[i].primitive);
+        assert_int_equal(one.instance, hits[i].instance);
+        assert_int_equal(one.instance, one.shape == MOVING ? 0 : -1);
+        assert_memory_equal(&one.t, &hits[i].t, sizeof one.t);
+        assert_memory_equal(&one.geometric, &hits[i].geometric, sizeof one.geometric);
+        if (scene->shapes[one.shape].kind == PT_SHAPE_MESH) {
+            assert_memory_equal(&one.u, &hits[i].u, sizeof one.u);
+            assert_memory_equal(&one.v, &hits[i].v, sizeof one.v);
+        }
+    }
+}
+
+/* Triangles, a quadric and an instance that moves: many rays together meet what each would meet alone. */
+static void many_rays_are_as_single_ones(void **state)
+{
+    (void)state;
+    struct pt_scene scene;
+    uint32_t seed = 1;
+    test_scene_begin(&scene);
+    int32_t grey = test_add_diffuse(&scene, v3_splat(0.5f));
+    test_add_quad(&scene, grey, v3(-2, -2, 3), v3(3, 0, 0), v3(0, 3, 0.5f));
+    test_add_sphere(&scene, grey, v3(-0.5f, 0.5f, 1), 0.6f);
+    scene.world_shape_count = 2;
+    test_add_quad(&scene, grey, v3(-0.5f, -0.5f, 0), v3(1, 0, 0), v3(0, 1, 0));
+    scene.objects[scene.object_count++] = (struct pt_object){2, 1};
+    struct pt_mat34 here = {{1, 0, 0, 0.2f, 0, 1, 0, -0.3f, 0, 0, 1, 0}}, there = here;
+    there.m[3] = 0.9f;
+    scene.instances[scene.instance_count++] = (struct pt_instance){0, 1, {here, there}};
+    test_scene_finish(&scene);
+    for (int count = 1; count <= RAYS; count++)
+        for (int coherent = 0; coherent < 2; coherent++)
+            for (int round = 0; round < 20; round++)
+                compare_many(&scene, count, coherent, &seed);
     test_scene_end(&scene);
 }
 
@@ -241,8 +309,10 @@ static void matrices_invert(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(triangles_have_right_hand_normals), cmocka_unit_test(empty_scene_has_no_hits), cmocka_unit_test(quadrics), cmocka_unit_test(quadric_surfaces),
-        cmocka_unit_test(instances), cmocka_unit_test(meshes_are_watertight), cmocka_unit_test(matrices_invert),
+        cmocka_unit_test(triangles_have_right_hand_normals), cmocka_unit_test(empty_scene_has_no_hits),
+        cmocka_unit_test(quadrics), cmocka_unit_test(quadric_surfaces), cmocka_unit_test(instances),
+        cmocka_unit_test(meshes_are_watertight), cmocka_unit_test(many_rays_are_as_single_ones),
+        cmocka_unit_test(matrices_invert),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

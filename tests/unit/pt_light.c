@@ -41,7 +41,7 @@ static float pdf_of(const struct pt_scene *scene, const struct pt_receiver *from
     struct pt_ray ray = {from->p, wi, 0.0f, INFINITY, 0.0f};
     struct pt_hit hit;
     struct pt_place at;
-    if (!pt_accel_intersect(scene, &ray, 0, &hit)) {
+    if (!pt_accel_intersect(scene, &ray, &hit)) {
         float pdf = 0.0f;
         for (int32_t i = 0; i < scene->env_light_count; i++)
             pdf += pt_light_env_pdf(scene, &scene->lights[scene->env_lights[i]], wi);
@@ -81,7 +81,7 @@ static void check_light(const struct pt_scene *scene, pt_vec3 p_ref, int all_vis
         struct pt_ray ray = {p_ref, w, 0.0f, INFINITY, 0.0f};
         struct pt_hit hit;
         double l = 0.0;
-        if (pt_accel_intersect(scene, &ray, 0, &hit))
+        if (pt_accel_intersect(scene, &ray, &hit))
             l = pdf > 0.0 ? (double)v3_luminance(scene->lights[scene->shapes[hit.shape].light].emission) : 0.0;
         else
             for (int32_t k = 0; k < scene->env_light_count; k++)

@@ -107,7 +107,7 @@ static void instances_turn_evenly(void **state)
                 at[i] = m[4 * i] * ball[0] + m[4 * i + 1] * ball[1] + m[4 * i + 2] * ball[2] + m[4 * i + 3];
             struct pt_ray ray = {v3((float)at[0], (float)at[1], (float)at[2] - 5.0f), v3(0, 0, 1), 0.0f, INFINITY, (float)t};
             struct pt_hit hit;
-            if (!pt_accel_intersect(&scene, &ray, 0, &hit) || !(fabsf(hit.t - 5.0f) < 0.04f))
+            if (!pt_accel_intersect(&scene, &ray, &hit) || !(fabsf(hit.t - 5.0f) < 0.04f))
                 fail_msg("case %d at %g: not met at %g, %g, %g", k, t, at[0], at[1], at[2]);
         }
         test_scene_end(&scene);

@@ -55,24 +55,37 @@ static void rich_scene(struct pt_scene *scene, int media)
     test_scene_finish(scene);
 }
 
-/* Every kernel that covers the scene against the general one, bit for bit. */
+static void assert_same_path(const struct pt_path_result *got, const struct pt_path_result *expected)
+{
+    assert_memory_equal(&got->radiance, &expected->radiance, sizeof got->radiance);
+    assert_memory_equal(&got->albedo, &expected->albedo, sizeof got->albedo);
+    assert_memory_equal(&got->normal_world, &expected->normal_world, sizeof got->normal_world);
+    assert_memory_equal(&got->depth, &expected->depth, sizeof got->depth);
+}
+
+/* Runs of 24, 17 and 7 paths of every kernel that covers the scene against the general one path by path, bit for bit. */
 static void compare_kernels(const struct pt_scene *scene, pt_kernel *const *kernels, int count)
 {
     for (int sampler = 0; sampler < 2; sampler++) {
         struct pt_integrator settings = test_integrator(6);
         settings.sampler = sampler;
         settings.want_aux = 1;
-        for (uint32_t i = 0; i < 24 * 24 * 4; i++) {
-            struct pt_path_result expected, got;
-            memset(&expected, 0, sizeof expected);
-            pt_kernel_all(scene, &settings, i % 24, i / 24 % 24, i / 576, &expected);
-            for (int k = 0; k < count; k++) {
-                memset(&got, 0, sizeof got);
-                kernels[k](scene, &settings, i % 24, i / 24 % 24, i / 576, &got);
-                assert_memory_equal(&got.radiance, &expected.radiance, sizeof got.radiance);
-                assert_memory_equal(&got.albedo, &expected.albedo, sizeof got.albedo);
-                assert_memory_equal(&got.normal_world, &expected.normal_world, sizeof got.normal_world);
-                assert_memory_equal(&got.depth, &expected.depth, sizeof got.depth);
+        for (uint32_t i = 0; i < 24 * 4; i++) {
+            uint32_t y = i % 24, sample = i / 24;
+            struct pt_path_result expected[24], got[24];
+            for (uint32_t x = 0; x < 24; x++)
+                pt_kernel_all(scene, &settings, x, y, 1, sample, &expected[x]);
+            for (int k = -1; k < count; k++) {
+                pt_kernel *kernel = k < 0 ? pt_kernel_all : kernels[k];
+                int first = i % 2 ? 24 : 17;
+                memset(got, 0, sizeof got);
+                kernel(scene, &settings, 0, y, first, sample, got);
+                if (first < 24)
+                    kernel(scene, &settings, (uint32_t)first, y, 24 - first, sample, got + first);
+                for (uint32_t x = 0; x < 24; x++) {
+                    assert_same_path(&got[x], &expected[x]);
+                    assert_int_equal(got[x].rays, expected[x].rays);
+                }
             }
         }
     }
@@ -155,7 +168,7 @@ static void planes(void **state)
     struct pt_path_result r;
     test_cornell(&scene, 24, 1.0f, v3_splat(0.0f));
     settings.want_aux = 1;
-    pt_kernel_diffuse(&scene, &settings, 12, 3, 0, &r); /* the back wall */
+    pt_kernel_diffuse(&scene, &settings, 12, 3, 1, 0, &r); /* the back wall */
     assert_true(fabsf(r.albedo.x - 0.725f) < 1e-6f && fabsf(r.albedo.y - 0.71f) < 1e-6f);
     assert_true(r.normal_world.z > 0.999f); /* towards the camera */
     assert_true(r.depth > 7.7f && r.depth < 8.0f);
@@ -184,7 +197,7 @@ static void trace_tells_the_same_path(void **state)
     struct lines lines = {0};
     char expected[256];
     rich_scene(&scene, 1);
-    pt_kernel_all(&scene, &settings, 12, 14, 3, &r);
+    pt_kernel_all(&scene, &settings, 12, 14, 1, 3, &r);
     pt_kernel_trace(&scene, &settings, 12, 14, 3, keep_line, &lines);
     snprintf(expected, sizeof expected, "end: pixel value (%g, %g, %g)", (double)r.radiance.x, (double)r.radiance.y,
              (double)r.radiance.z);

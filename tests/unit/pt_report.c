@@ -37,16 +37,18 @@ static const char *in_folder(const char *name)
 }
 
 /* Like pt_fake_nan, but every output is its own function of pixel and sample. */
-static void varied(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y, uint32_t sample,
-                   struct pt_path_result *out)
+static void varied(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y, int count,
+                   uint32_t sample, struct pt_path_result *out)
 {
-    pt_fake_nan(scene, settings, x, y, sample, out);
-    float u = (float)((x * 7 + y * 13 + sample * 29) % 64) / 64.0f;
-    out->radiance.z += u;
-    out->albedo = v3(u, 0.5f * u, 0.25f + 0.5f * u);
-    out->normal_world = v3(1.0f - u, u, -u);
-    out->depth = sample % 5 == y % 5 ? INFINITY : 1.0f + (float)x + u;
-    out->rays = 1 + (x + y + sample) % 4;
+    pt_fake_nan(scene, settings, x, y, count, sample, out);
+    for (int i = 0; i < count; i++, x++, out++) {
+        float u = (float)((x * 7 + y * 13 + sample * 29) % 64) / 64.0f;
+        out->radiance.z += u;
+        out->albedo = v3(u, 0.5f * u, 0.25f + 0.5f * u);
+        out->normal_world = v3(1.0f - u, u, -u);
+        out->depth = sample % 5 == y % 5 ? INFINITY : 1.0f + (float)x + u;
+        out->rays = 1 + (x + y + sample) % 4;
+    }
 }
 
 /* What a render of `varied` must come to, worked out from the kernel alone. */
@@ -59,7 +61,7 @@ static struct sums sums_of(int x, int y, uint64_t spp)
     struct sums s = {0};
     for (uint32_t k = 0; k < spp; k++) {
         struct pt_path_result r;
-        varied(NULL, &render->config.integrator, (uint32_t)x, (uint32_t)y, k, &r);
+        varied(NULL, &render->config.integrator, (uint32_t)x, (uint32_t)y, 1, k, &r);
         int good = v3_is_finite(r.radiance);
         const float *from[3] = {&r.radiance.x, &r.albedo.x, &r.normal_world.x};
         double *to[3] = {s.radiance, s.albedo, s.normal};
@@ -329,7 +331,8 @@ static void check_totals(const cJSON *root, const struct sums *all, double sampl
     cJSON_ArrayForEach(d, cJSON_GetObjectItem(root, "dropped"))
     {
         struct pt_path_result r;
-        varied(NULL, &render->config.integrator, (uint32_t)number(d, "x"), (uint32_t)number(d, "y"), (uint32_t)number(d, "sample"), &r);
+        varied(NULL, &render->config.integrator, (uint32_t)number(d, "x"), (uint32_t)number(d, "y"), 1, (uint32_t)number(d, "sample"),
+               &r);
         assert_false(v3_is_finite(r.radiance));
     }
 }

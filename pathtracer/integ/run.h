@@ -1,0 +1,142 @@
+/*
+ * A run of paths: neighbouring pixels of a row, vertex by vertex together. One source, compiled once per effect set by the
+ * files kernel_*.c.
+ *
+ * Rays go to the acceleration structure in packets, and what the hits need from memory is fetched for all of them before the
+ * first is looked at: while one path would wait, others are worked on. Paths are in the order of their pixels throughout. Of
+ * two surfaces at the very same distance the other rays of a packet may decide which is met: the bytes of an image depend on
+ * the runs that rows are cut into (render/rows.c), never on thread or time.
+ */
+#ifndef PT_INTEG_RUN_H
+#define PT_INTEG_RUN_H
+
+#include "integ/path.h"
+
+/* Smaller scenes are in the caches: there is nothing to fetch. */
+#define PT_FETCH_TRIANGLES 10000
+
+static inline const struct pt_mesh *pt_hit_mesh(const struct pt_scene *scene, const struct pt_hit *hit)
+{
+    if (hit->shape < 0 || scene->shapes[hit->shape].kind != PT_SHAPE_MESH)
+        return NULL;
+    return &scene->meshes[scene->shapes[hit->shape].data];
+}
+
+/* The texels of the texture that most hits read first. */
+PT_KERNEL_INLINE void pt_run_fetch_texels(const struct pt_scene *scene, struct pt_path *const *live, int count)
+{
+    for (int i = 0; i < count; i++) {
+        const struct pt_hit *hit = &live[i]->hit;
+        const struct pt_mesh *mesh = pt_hit_mesh(scene, hit);
+        int32_t texture = mesh ? scene->materials[scene->shapes[hit->shape].material].reflectance.texture : 0;
+        if (!texture)
+            continue;
+        struct pt_surface s;
+        pt_place_uv(mesh, pt_mesh_corners(mesh, hit->primitive), hit->u, hit->v, &s);
+        pt_texture_fetch(scene, texture, s.u, s.v);
+    }
+}
+
+/* Indices, then vertices, then texels: where one waits for another, that of all paths was asked for before. */
+PT_KERNEL_INLINE void pt_run_fetch(pt_effects fx, struct pt_path *const *live, int count)
+{
+    const struct pt_scene *scene = live[0]->scene;
+    if (scene->stats.triangles < PT_FETCH_TRIANGLES)
+        return;
+    for (int i = 0; i < count; i++) {
+        const struct pt_mesh *mesh = pt_hit_mesh(scene, &live[i]->hit);
+        if (mesh)
+            __builtin_prefetch(mesh->indices + 3 * (size_t)live[i]->hit.primitive);
+    }
+    for (int i = 0; i < count; i++) {
+        const struct pt_mesh *mesh = pt_hit_mesh(scene, &live[i]->hit);
+        if (!mesh)
+            continue;
+        struct pt_corners k = pt_mesh_corners(mesh, live[i]->hit.primitive);
+        __builtin_prefetch(k.a);
+        __builtin_prefetch(k.b);
+        __builtin_prefetch(k.c);
+    }
+    if (fx & PT_FX_TEXTURE)
+        pt_run_fetch_texels(scene, live, count);
+}
+
+/* Where the paths' rays end. Camera rays keep together, those of later vertices do not. */
+PT_KERNEL_INLINE void pt_run_intersect(struct pt_path *const *live, int count, int coherent)
+{
+    const struct pt_ray *rays[PT_RUN];
+    struct pt_hit *hits[PT_RUN];
+    for (int i = 0; i < count; i++) {
+        rays[i] = &live[i]->ray;
+        hits[i] = &live[i]->hit;
+    }
+    pt_accel_intersect_many(live[0]->scene, rays, count, coherent, hits);
+}
+
+/* Adds to each path what its last vertex planned, if it arrives. */
+PT_KERNEL_INLINE void pt_run_lights(pt_effects fx, struct pt_path *const *live, int count)
+{
+    struct pt_ray shadow[PT_RUN];
+    const struct pt_ray *rays[PT_RUN];
+    struct pt_path *asked[PT_RUN];
+    uint8_t occluded[PT_RUN] = {0};
+    const int through = (fx & (PT_FX_ALPHA | PT_FX_INTERFACE)) != 0; /* a hit says little: rays go one by one */
+    int n = 0;
+    for (int i = 0; i < count; i++)
+        if (!v3_is_black(live[i]->plan.add)) {
+            asked[n] = live[i];
+            shadow[n] = pt_path_shadow_ray(live[i]);
+            rays[n] = &shadow[n];
+            n++;
+        }
+    if (!through)
+        pt_accel_occluded_many(live[0]->scene, rays, n, occluded);
+    for (int k = 0; k < n; k++) {
+        asked[k]->rays += !through;
+        if (!occluded[k])
+            pt_path_add_light(fx, asked[k], &shadow[k]);
+    }
+}
+
+PT_KERNEL_INLINE void pt_run_sample(pt_effects fx, const struct pt_scene *scene, const struct pt_integrator *settings,
+                                    uint32_t x, uint32_t y, int count, uint32_t sample, struct pt_trace *trace,
+                                    struct pt_path_result *out)
+{
+    struct pt_path paths[PT_RUN], *live[PT_RUN]; /* no initialiser: it would clear them all for each run */
+    for (int i = 0; i < count; i++) {
+        live[i] = &paths[i];
+        paths[i].scene = scene;
+        paths[i].settings = settings;
+        paths[i].trace = trace;
+        paths[i].out = &out[i];
+        pt_path_start(fx, &paths[i], x + (uint32_t)i, y, sample);
+    }
+    int n = count;
+    for (uint32_t vertex = 1; n > 0; vertex++) {
+        uint8_t alive[PT_RUN];
+        pt_run_intersect(live, n, vertex == 1);
+        pt_run_fetch(fx, live, n);
+        for (int i = 0; i < n; i++) {
+            pt_sampler_block(&live[i]->sampler, vertex);
+            alive[i] = (uint8_t)pt_path_vertex(fx, live[i]);
+        }
+        pt_run_lights(fx, live, n);
+        int left = 0;
+        for (int i = 0; i < n; i++)
+            if (alive[i])
+                live[left++] = live[i];
+        n = left;
+    }
+    for (int i = 0; i < count; i++)
+        pt_path_end(&paths[i]);
+}
+
+/* The whole of a file kernel_NAME.c: the kernel of the list PT_KERNELS (kernel_sets.h) for its effect set. */
+#define PT_KERNEL_DEFINE(name, set)                                                                                        \
+    void pt_kernel_##name(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y,      \
+                          int count, uint32_t sample, struct pt_path_result *out)                                          \
+    {                                                                                                                      \
+        pt_run_sample(set, scene, settings, x, y, count, sample, NULL, out);                                               \
+    }
+
+#endif
