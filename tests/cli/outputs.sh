@@ -28,6 +28,14 @@ refused() { # refused TEXT COMMAND...: at once, exit status 2, one line on stder
 long="$P room.pbrt -q -c null --spp-min 100000000 --spp-max 100000000"
 train="$ggn train -d $data --crop 32 --batch 64 --steps-denoiser 100000 -q --out"
 
+# --- descriptors 0, 1 and 2 may be closed: files then get these numbers ---
+for closed in "<&-" "<&- >&-" "<&- >&- 2>&-"; do
+    rm -f b.exr b.csv
+    t "written with $closed" sh -c "$P room.pbrt -q --size 8x8 -c null --spp-min 1 --spp-max 2 -o b.exr --stop-map b.csv $closed"
+    t "  …whole, and nothing besides" sh -c 'oiiotool --info b.exr | grep -q " 8 x  *8, " && grep -q "^room;2;$" b.csv && ls -A && ! ls -A | grep tmp'
+done
+rm -f b.exr b.csv
+
 # --- what cannot be written is known before the work ---
 name=$(printf 'n%.0s' $(seq 1 260))
 mkdir folder folder.exr folder.png folder.json folder.csv folder.ggn

@@ -17,12 +17,14 @@
 #include "figures/stats.h"
 #include "observer/curve.h"
 #include "observer/flip.h"
+#include "observer/views.h"
 #include "support/fail_alloc.h"
 
 enum { W = 12, H = 10, P = W * H };
 
 static char dir[] = "/tmp/ggn_oom_data.XXXXXX";
 static char block_path[64];
+static uint32_t block_crc;
 static uint8_t display[3 * P], other[3 * P];
 static double mean[3 * P], half[3 * P];
 
@@ -52,14 +54,13 @@ static int teardown(void **state)
 static int write_block(struct base_err *err)
 {
     struct seq_builder w = {0};
-    uint32_t crc;
     int rc = seq_builder_init(&w, W, H, 0, 0, 0, 1, err);
     for (uint32_t i = 0; i < 3 && !rc; i++) {
         struct seq_frame f = {.spp = 100u << i, .half_spp = 50, .is_reference = i == 2, .full = i == 1, .display = display, .mean = mean, .half = half};
         rc = seq_builder_add(&w, &f, err);
     }
     if (!rc)
-        rc = seq_builder_write(&w, block_path, &crc, err);
+        rc = seq_builder_write(&w, block_path, &block_crc, err);
     seq_builder_release(&w);
     return rc;
 }
@@ -141,6 +142,31 @@ static int look(struct base_err *err)
     return rc;
 }
 
+/* The labels of a view of one block. */
+static int label(struct base_err *err)
+{
+    struct stat st;
+    uint32_t levels[] = {100, 200};
+    struct seq_manifest_block entry = {.id = 0, .x1 = W, .y1 = H, .file = "block-00000.lseq", .crc32 = block_crc};
+    struct ggn_dataset_view view = {.manifest = {.scene = "s", .width = W, .height = H, .block = W, .n_levels = 2, .levels = levels,
+                                                 .reference_spp = 400, .reference_independent = 1, .n_blocks = 1, .blocks = &entry}};
+    const struct ggn_observer *model = &ggn_observer_default;
+    struct ggn_labels l;
+    struct base_threads *threads = base_threads_create(1, err);
+    if (!threads)
+        return BASE_ENOMEM;
+    snprintf(view.dir, sizeof view.dir, "%s", dir);
+    assert_int_equal(stat(block_path, &st), 0);
+    entry.bytes = (uint64_t)st.st_size;
+    int rc = ggn_view_label(model, &view, GGN_FROM_HALVES, threads, &l, err);
+    if (!rc) {
+        assert_true(l.n == 1 && l.labels[0].threshold > 0);
+        ggn_labels_release(&l);
+    }
+    base_threads_destroy(threads);
+    return rc;
+}
+
 /* What may fail silently, because the work is whole all the same: the buffer of a file, the search for what an earlier writer left. */
 static void fail_each(int (*body)(struct base_err *), int silent)
 {
@@ -186,6 +212,7 @@ static void observer(void **state)
     (void)state;
     assert_int_equal(write_block(NULL), 0);
     fail_each(look, 1);
+    fail_each(label, 1);
 }
 
 int main(void)

@@ -123,6 +123,32 @@ static void rank_0_gets_parts_of_any_size_and_is_heard(void **state)
     (void)state;
 }
 
+/* What a call of so many bytes from each process adds to the traffic of rank 0: the parts, and a few bytes with each. */
+static void counted(struct seat *s)
+{
+    static char mine[100000];
+    struct base_team_traffic before, after;
+    for (size_t size = 1000; size <= sizeof mine; size *= 10) {
+        before = base_team_traffic(s->team);
+        base_team_collect(s->team, mine, size);
+        s->rc |= base_team_tell(s->team, mine, size);
+        after = base_team_traffic(s->team);
+        uint64_t bytes = after.bytes - before.bytes, messages = after.messages - before.messages;
+        uint64_t others = base_team_rank(s->team) == 0 ? 2 : 1; /* a part comes from or goes to each, and the word likewise */
+        s->rc |= messages < 2 * others || messages > 4 * others || bytes < 2 * others * size || bytes > 2 * others * size + 64 * messages;
+        s->rc |= !(after.waiting_s >= before.waiting_s);
+    }
+}
+
+static void traffic_is_counted_both_ways(void **state)
+{
+    struct seat seats[3];
+    together(seats, 3, counted, 0);
+    for (int r = 0; r < 3; r++)
+        assert_int_equal(seats[r].rc, 0);
+    (void)state;
+}
+
 static void agree(struct seat *s)
 {
     s->rc = base_team_agree(s->team, base_team_rank(s->team) == 2 ? "a=1\nb=3\n" : "a=1\nb=2\n", &s->err);
@@ -198,7 +224,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(everybody_has_all_items_in_order), cmocka_unit_test(nobody_else_is_a_team_too),
-        cmocka_unit_test(rank_0_gets_parts_of_any_size_and_is_heard), cmocka_unit_test(who_differs_is_named_with_the_line),
+        cmocka_unit_test(rank_0_gets_parts_of_any_size_and_is_heard), cmocka_unit_test(traffic_is_counted_both_ways),
+        cmocka_unit_test(who_differs_is_named_with_the_line),
         cmocka_unit_test(who_ends_early_says_why), cmocka_unit_test(the_job_has_the_status_of_who_failed),
         cmocka_unit_test(who_is_silent_is_given_up),
     };

@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include <pthread.h>
+#include <unistd.h>
 #include <stdatomic.h>
 
 #include "base/clock.h"
@@ -20,7 +21,7 @@
 #include "support/base_room.h"
 
 /* DEAF: it samples, but does not answer when the criterion is to be asked. */
-enum behaviour { WORKS, SILENT, BABBLES, FAILS, DEAF, OTHER_SETTINGS };
+enum behaviour { WORKS, SILENT, BABBLES, FAILS, DEAF, OTHER_SETTINGS, ABSENT };
 
 /* The fake criterion without history, which others may ask too; how many blocks they did ask about. */
 static struct lull_criterion pure;
@@ -116,6 +117,8 @@ static void *member_main(void *arg)
     struct member *m = arg;
     struct base_err err = {0};
     is_member = 1;
+    if (m->behaviour == ABSENT)
+        return NULL;
     struct pt_render_config config = pt_fake_config();
     struct pt_criterion *criterion = NULL;
     struct lull_pair pair = {"at", "32"};
@@ -363,6 +366,19 @@ static void other_settings_are_refused_by_name(void **state)
     part(&stage, 0);
 }
 
+static void who_never_says_hello_is_named(void **state)
+{
+    (void)state;
+    struct stage stage;
+    struct base_err err = {0};
+    alarm(60); /* waiting for ever is a failure */
+    assemble(&stage, 3, 1, ABSENT, 2.0);
+    assert_int_not_equal(pt_crew_greet(stage.crew, "a=1\nb=2\n", &err), 0);
+    assert_non_null(strstr(err.text, "rank 2 on host here has not answered for 2 s"));
+    part(&stage, 1);
+    alarm(0);
+}
+
 int main(void)
 {
     pure = *pt_fake_criterion();
@@ -377,6 +393,7 @@ int main(void)
         cmocka_unit_test(a_member_that_fails_says_why),
         cmocka_unit_test(an_interruption_leaves_the_slice_undone),
         cmocka_unit_test(other_settings_are_refused_by_name),
+        cmocka_unit_test(who_never_says_hello_is_named),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

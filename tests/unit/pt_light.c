@@ -207,13 +207,39 @@ static void delta_lights(void **state)
     assert_true(!s.finite && s.wi.z == 1.0f && s.radiance.x == 3.0f);
 }
 
+/* The table from which an environment is sampled: small where the image is even, fine enough where it is not. */
+static void tables_are_as_fine_as_the_image_asks(void **state)
+{
+    (void)state;
+    enum { W = 1024, H = 512 };
+    for (int kind = 0; kind < 3; kind++) {
+        struct pt_scene scene;
+        test_scene_begin(&scene);
+        float *px = pt_arena_alloc(&scene.arena, (size_t)3 * W * H, sizeof *px);
+        assert_non_null(px);
+        for (int i = 0; i < 3 * W * H; i++) /* even; every other pixel dark; one pixel that outshines all others */
+            px[i] = kind == 1 && i / 3 % 2 ? 0.0f : kind == 2 && i / 3 == 100 * W + 300 ? 1e6f : 1.0f;
+        scene.images[scene.image_count++] = (struct pt_image_map){W, H, 3, PT_PIXEL_FLOAT, 1.0f, px};
+        struct pt_light light = {.kind = PT_LIGHT_ENV_IMAGE, .shape = -1, .image = 0, .mapping = PT_ENV_LATLONG, .emission = {1, 1, 1},
+                                 .from_render = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}}};
+        test_add_light(&scene, &light);
+        test_scene_finish(&scene);
+        const struct pt_env_distribution *d = &scene.env_distributions[0];
+        if (kind == 0)
+            assert_true(d->width == 128 && d->height == 128);
+        else
+            assert_true(d->width == W && d->height == H);
+        test_scene_end(&scene);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(alias_table_keeps_probabilities), cmocka_unit_test(quads),     cmocka_unit_test(sphere_outside),
         cmocka_unit_test(sphere_inside),                   cmocka_unit_test(ellipsoid), cmocka_unit_test(cylinder),
         cmocka_unit_test(disk),                            cmocka_unit_test(latlong),   cmocka_unit_test(equal_area),
-        cmocka_unit_test(delta_lights),
+        cmocka_unit_test(delta_lights), cmocka_unit_test(tables_are_as_fine_as_the_image_asks),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
