@@ -129,10 +129,9 @@ static inline void pt_film_store(struct pt_film *f, size_t i, const struct pt_fi
     }
 }
 
-/* Adds one sample. Returns 0 when it was dropped. */
-static inline int pt_film_add(struct pt_film_pixel *p, uint32_t planes, uint32_t sample, const struct pt_path_result *r)
+/* Adds one sample; in_half: pt_film_in_half of its index, worked out once for many pixels. Returns 0 when it was dropped. */
+static inline int pt_film_add(struct pt_film_pixel *p, uint32_t planes, int in_half, const struct pt_path_result *r)
 {
-    int in_half = (planes & PT_FILM_HALF) && pt_film_in_half(sample);
     if (planes & PT_FILM_AUX) {
         if (v3_is_finite(r->albedo)) {
             p->albedo[0] += (double)r->albedo.x;
@@ -149,15 +148,15 @@ static inline int pt_film_add(struct pt_film_pixel *p, uint32_t planes, uint32_t
     }
     if (!v3_is_finite(r->radiance)) {
         p->dropped++;
-        p->dropped_half += (uint32_t)in_half;
+        p->dropped_half += in_half && (planes & PT_FILM_HALF);
         return 0;
     }
     double rgb[3] = {(double)r->radiance.x, (double)r->radiance.y, (double)r->radiance.z};
     for (int c = 0; c < 3; c++)
         p->color[c] += rgb[c];
-    if (planes & PT_FILM_HALF) /* a product, because a branch on in_half would often be predicted wrong */
+    if (in_half && (planes & PT_FILM_HALF))
         for (int c = 0; c < 3; c++)
-            p->half[c] += in_half * rgb[c];
+            p->half[c] += rgb[c];
     if (planes & PT_FILM_MOMENT2) {
         double luminance = base_luminance(rgb[0], rgb[1], rgb[2]);
         p->moment2 += luminance * luminance;

@@ -9,14 +9,16 @@ static void sample_run(const struct pt_row_maker *maker, struct pt_film *film, s
 {
     struct pt_film_pixel pixels[PT_RUN];
     struct pt_path_result paths[PT_RUN];
-    size_t index = pt_film_index(film, x, row->y);
+    const size_t index = pt_film_index(film, x, row->y);
+    const uint32_t planes = film->planes;
     for (int i = 0; i < count; i++)
         pt_film_load(film, index + (size_t)i, &pixels[i]);
     for (uint32_t s = row->from; s < row->to; s++) {
+        const int in_half = pt_film_in_half(s);
         maker->kernel(maker->scene, maker->integrator, (uint32_t)x, (uint32_t)row->y, count, s, paths);
         for (int i = 0; i < count; i++) {
             row->rays += paths[i].rays;
-            if (!pt_film_add(&pixels[i], film->planes, s, &paths[i]) && row->dropped++ == 0) {
+            if (!pt_film_add(&pixels[i], planes, in_half, &paths[i]) && row->dropped++ == 0) {
                 row->first_x = (uint32_t)(x + i);
                 row->first_sample = s;
             }

@@ -49,7 +49,7 @@ static double run_film(struct bench *b, struct pt_film *film, uint32_t first)
             for (uint32_t s = first; s < first + b->spp; s++) {
                 struct pt_path_result r;
                 b->kernel(b->scene, &b->integrator, (uint32_t)x, (uint32_t)y, 1, s, &r);
-                pt_film_add(&p, film->planes, s, &r);
+                pt_film_add(&p, film->planes, pt_film_in_half(s), &r);
             }
             pt_film_store(film, i, &p);
         }

@@ -40,7 +40,7 @@ static void sample(const struct pt_scene *scene, const struct pt_integrator *set
             for (uint32_t s = 0; s < spp; s++) {
                 struct pt_path_result r;
                 kernel(scene, settings, (uint32_t)x, (uint32_t)y, 1, s, &r);
-                pt_film_add(&p, film->planes, s, &r);
+                pt_film_add(&p, film->planes, pt_film_in_half(s), &r);
             }
             pt_film_store(film, i, &p);
         }

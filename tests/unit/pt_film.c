@@ -71,7 +71,7 @@ static void sums_survive_load_and_store(void **state)
     for (uint32_t s = 0; s < 64; s++) {
         struct pt_path_result r = sample_of((float)s, 1.0f, 2.0f);
         pt_film_load(&film, i, &p);
-        assert_true(pt_film_add(&p, film.planes, s, &r));
+        assert_true(pt_film_add(&p, film.planes, pt_film_in_half(s), &r));
         pt_film_store(&film, i, &p);
     }
     pt_film_mean(&film, i, 64, mean);
@@ -93,7 +93,7 @@ static void million_samples_of_a_constant(void **state)
     struct pt_film_pixel p = {0};
     struct pt_path_result r = sample_of(0.1f, 1234.567f, 1e-5f);
     for (uint32_t s = 0; s < 1000000; s++)
-        pt_film_add(&p, PT_FILM_ALL, s, &r);
+        pt_film_add(&p, PT_FILM_ALL, pt_film_in_half(s), &r);
     const float *expected = &r.radiance.x;
     for (int c = 0; c < 3; c++) {
         assert_true(fabs(p.color[c] / 1e6 / (double)expected[c] - 1.0) < 1e-6);
@@ -112,7 +112,7 @@ static void non_finite_samples_are_dropped(void **state)
     pt_film_load(&film, 1, &p);
     for (uint32_t s = 0; s < 32; s++) {
         struct pt_path_result r = sample_of(s % 4 == 1 ? NAN : 2.0f, s % 8 == 3 ? -INFINITY : 2.0f, 2.0f);
-        assert_int_equal(pt_film_add(&p, film.planes, s, &r), s % 4 != 1 && s % 8 != 3);
+        assert_int_equal(pt_film_add(&p, film.planes, pt_film_in_half(s), &r), s % 4 != 1 && s % 8 != 3);
     }
     pt_film_store(&film, 1, &p);
     assert_int_equal(film.dropped[1], 12);
@@ -146,7 +146,7 @@ static void halves_drop_apart(void **state)
     for (uint32_t s = 0; s < SPP; s++) {
         int half = pt_film_in_half(s) ? 1 : 2, bad = half == 1 ? (int)(s % 2) : s == 9;
         struct pt_path_result r = sample_of(bad ? NAN : (float)s, 1.0f, 1.0f);
-        pt_film_add(&p, film.planes, s, &r);
+        pt_film_add(&p, film.planes, pt_film_in_half(s), &r);
         for (int k = 0; !bad && k < 3; k++)
             if (k == 0 || k == half) {
                 sum[k] += s;

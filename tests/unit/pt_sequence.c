@@ -67,7 +67,7 @@ static void noise_free_colours_have_no_error(void **state)
         struct pt_film_pixel p = {0};
         struct pt_path_result sample = {.radiance = v3(colours[k][0], colours[k][1], colours[k][2])};
         for (uint32_t s = 0; s < 64; s++)
-            assert_true(pt_film_add(&p, PT_FILM_HALF | PT_FILM_MOMENT2, s, &sample));
+            assert_true(pt_film_add(&p, PT_FILM_HALF | PT_FILM_MOMENT2, pt_film_in_half(s), &sample));
         double mean[3], half[3], none[3] = {0}, m2 = p.moment2 / 64, scratch;
         for (int c = 0; c < 3; c++) {
             mean[c] = p.color[c] / 64;
