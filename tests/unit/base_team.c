@@ -60,6 +60,8 @@ static void nap(int ms)
 static void share_items(struct seat *s)
 {
     const int rank = base_team_rank(s->team), count = base_team_count(s->team);
+    const long own = base_team_first(s->team, ITEMS, rank + 1) - base_team_first(s->team, ITEMS, rank);
+    s->rc = own > base_team_most(s->team, ITEMS) || own < base_team_most(s->team, ITEMS) - 1;
     for (int round = 0; round < 3 && !s->rc; round++) {
         double items[ITEMS] = {0};
         for (long i = base_team_first(s->team, ITEMS, rank); i < base_team_first(s->team, ITEMS, rank + 1); i++)
@@ -111,6 +113,7 @@ static void parts_and_words(struct seat *s)
         s->rc |= parts[r].size != (size_t)r || memcmp(parts[r].data, mine, (size_t)r) != 0;
     s->rc |= base_team_tell(s->team, &word, sizeof word) || word != 42;
     s->rc |= base_team_tell(s->team, NULL, 0);
+    s->rc |= base_team_traffic(s->team).messages != (rank == 0 ? 9 : 3); /* a part and two tellings, for each of three */
 }
 
 static void rank_0_gets_parts_of_any_size_and_is_heard(void **state)
@@ -164,6 +167,38 @@ static void who_differs_is_named_with_the_line(void **state)
     (void)state;
 }
 
+/* Rank 2 gives a part where the others are told something. */
+static void out_of_step(struct seat *s)
+{
+    int word = 1;
+    base_team_collect(s->team, &word, sizeof word);
+    if (base_team_rank(s->team) != 2)
+        base_team_tell(s->team, &word, sizeof word);
+    base_team_collect(s->team, &word, sizeof word);
+    s->rc = base_team_failed(s->team, &s->err);
+}
+
+/* Rank 2 takes what it is told for something longer. */
+static void of_another_length(struct seat *s)
+{
+    int words[2] = {1, 2};
+    s->rc = base_team_tell(s->team, words, base_team_rank(s->team) == 2 ? sizeof words : sizeof words[0]);
+    base_team_failed(s->team, &s->err);
+}
+
+static void who_is_out_of_step_is_found(void **state)
+{
+    struct seat seats[3];
+    together(seats, 3, out_of_step, 0);
+    assert_int_equal(seats[0].status, 2);
+    assert_string_equal(seats[0].err.text, "rank 2 on host here said something that makes no sense");
+    together(seats, 3, of_another_length, 0);
+    assert_int_equal(seats[0].status, 2);
+    assert_int_equal(seats[1].rc, 0);
+    assert_string_equal(seats[2].err.text, "rank 0 on host here said something that makes no sense");
+    (void)state;
+}
+
 static void end_early(struct seat *s)
 {
     if (base_team_rank(s->team) == 1) {
@@ -197,6 +232,7 @@ static void the_job_has_the_status_of_who_failed(void **state)
     together(seats, 3, fail_after_work, 0);
     assert_int_equal(seats[0].status, 2);
     assert_int_equal(seats[1].status, 0);
+    assert_int_equal(seats[2].status, 0); /* who failed leaves it to rank 0 to say so */
     assert_string_equal(seats[0].err.text, "disk full");
     (void)state;
 }
@@ -211,7 +247,10 @@ static void who_is_silent_is_given_up(void **state)
     assert_int_equal(base_team_create(base_room_of(room, 0), &team, &err), 0);
     base_team_watch(team, 0.2, NULL);
     assert_int_equal(base_team_gather_items(team, items, sizeof items[0], 3), BASE_EIO);
+    double waited_s = base_team_traffic(team).waiting_s;
+    assert_true(waited_s > 0.2 && waited_s < 1.9); /* not a tenth and not ten times, on a busy machine too */
     assert_int_equal(base_team_gather_items(team, items, sizeof items[0], 3), BASE_EIO); /* for good */
+    assert_true(base_team_traffic(team).waiting_s == waited_s);
     base_team_failed(team, &err);
     assert_string_equal(err.text, "rank 1 on host here has not answered for 0.2 s (--rank-timeout)");
     assert_int_equal(base_team_close(team, 2, "", &unheard), 2);
@@ -225,7 +264,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(everybody_has_all_items_in_order), cmocka_unit_test(nobody_else_is_a_team_too),
         cmocka_unit_test(rank_0_gets_parts_of_any_size_and_is_heard), cmocka_unit_test(traffic_is_counted_both_ways),
-        cmocka_unit_test(who_differs_is_named_with_the_line),
+        cmocka_unit_test(who_differs_is_named_with_the_line), cmocka_unit_test(who_is_out_of_step_is_found),
         cmocka_unit_test(who_ends_early_says_why), cmocka_unit_test(the_job_has_the_status_of_who_failed),
         cmocka_unit_test(who_is_silent_is_given_up),
     };
