@@ -101,14 +101,16 @@ t "default output is named after the scene" sh -c "$P $scene -q --spp 1 && test 
 t "no temporaries left" test -z "$(ls -A | grep tmp)"
 
 # --- what decides the image ---
-for threads in 1 2 3 8; do "$P" $common --threads $threads -o t$threads.exr; done
+for threads in 1 2 3 8; do "$P" $common --threads $threads -o t$threads.exr --report t$threads.json; done
+t "--threads are as many" test "$(number t1.json threads) $(number t3.json threads) $(number t8.json threads)" = "1 3 8"
 t "same bytes for 1 and 2 threads" same t1.exr t2.exr
 t "same bytes for 1 and 3 threads" same t1.exr t3.exr
 t "same bytes for 1 and 8 threads" same t1.exr t8.exr
 "$P" $common --order-seed 5 -o order.exr
 t "same bytes for another order of blocks" same t1.exr order.exr
-"$P" "$scene" -q --spp 8 -o plain.exr --reproducible
-"$P" "$scene" -q --spp 8 -o general.exr --reproducible --effects all
+"$P" "$scene" -q --spp 8 -o plain.exr --reproducible --report plain.json
+"$P" "$scene" -q --spp 8 -o general.exr --reproducible --effects all --report general.json
+t "--effects all: another kernel" sh -c "grep -q '\"kernel\":[[:space:]]*\"all\"' general.json && ! grep -q '\"kernel\":[[:space:]]*\"all\"' plain.json"
 t "--effects all: the same pixels" sh -c "oiiotool --fail 0 --warn 0 plain.exr general.exr --diff"
 "$P" "$scene" -q --spp 8 --seed 2 -o other.exr
 t "another seed is another image" sh -c "! oiiotool --fail 0 plain.exr other.exr --diff"
@@ -160,7 +162,7 @@ t "  …and none that the bound allows" test "$(total all.json checks)" -eq "$(t
 
 # --- looking inside ---
 t "--explain tells effects and kernel" sh -c "$P $scene --explain | grep -q '^kernel: '"
-t "--explain names the line" sh -c "$P $scene --explain | grep -q 'quadric *on .*room.pbrt:'"
+t "--explain names the line" sh -c "$P $scene --explain | grep -q 'quadric *on .*room.pbrt:$(grep -n '"sphere"' "$scene" | cut -d: -f1) '"
 t "--explain lists what is off" sh -c "$P $scene --explain | grep -q 'grid-medium *off'"
 t "--explain measures a path" sh -c "$P $scene --explain | grep -q '^time: [0-9.]* us per path'"
 t "--debug-path tells the path" sh -c "test \$($P $scene --debug-path 30,20,1 | wc -l) -ge 2"
@@ -182,6 +184,9 @@ t "  …everything is written" test -s int.exr -a -s int.json -a -s int.png -a -
 t "  …and the report says so" sh -c "grep -q '\"interrupt\"' int.json && grep -q '\"interrupted\":[[:space:]]*true' int.json"
 t "stopped by time, with a checkpoint" "$P" $long --time-budget 0.1 --checkpoint c.ckp -o part.exr --report part.json
 t "  …before it was done" holds "$(total part.json spp) < 6 * 300"
+cp c.ckp gone-on.ckp
+t "resumed and stopped at once" "$P" $long --time-budget 0.0001 --checkpoint gone-on.ckp --resume -o gone-on.exr --report gone-on.json
+t "  …where it was, and not at the beginning" holds "$(total part.json spp) > 6 * 8 && $(total gone-on.json spp) >= $(total part.json spp)"
 t "resumed, stopped again" "$P" $long --time-budget 0.2 --checkpoint c.ckp --resume -o part.exr --threads 3
 t "resumed and finished" "$P" $long --checkpoint c.ckp --resume -o part.exr
 t "the resumed image is the uninterrupted one, byte for byte" same full.exr part.exr

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include <cmocka.h>
+#include <math.h>
 
 #include <cjson/cJSON.h>
 #include <zlib.h>
@@ -173,11 +174,68 @@ static struct pt_render *render_block(int x0, int y0, int x1, int y1, uint32_t s
     memcpy(c.crop, crop, sizeof crop);
     c.spp_min = c.spp_max = spp;
     c.uniform = 1;
-    c.planes = PT_FILM_HALF;
+    c.planes = PT_FILM_HALF | PT_FILM_MOMENT2;
     c.integrator.seed = seed;
     assert_int_equal(pt_render_create(&c, NULL, pt_fake_noise, pool, NULL, &r, &err), 0);
     assert_int_equal(pt_render_run(r, &none, &outcome, &err), 0);
     return r;
+}
+
+/* Means from the film's sums: I, A of the half, D = (A - B)/2. */
+static void means(const struct pt_render *r, size_t i, double mean[3], double a[3], double d[3])
+{
+    const double spp = (double)r->blocks.list[0].spp, half = floor(spp / 2);
+    for (size_t c = 0; c < 3; c++) {
+        const double all = r->film.color[3 * i + c], first = r->film.half[3 * i + c];
+        mean[c] = all / spp;
+        a[c] = first / half;
+        d[c] = (first / half - (all - first) / (spp - half)) / 2;
+    }
+}
+
+static double luminance(const double c[3]) { return 0.2126729 * c[0] + 0.7151522 * c[1] + 0.0721750 * c[2]; }
+
+static int rising(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* The statistics of FORMAT.md from its text, in its order. */
+static void check_statistics(const unsigned char *p, const struct pt_render *r)
+{
+    static const char *const names[6] = {"dammertz", "half_unsettled", "rse", "rse_unsettled", "tail999", "gini"};
+    static double noise[256];
+    const size_t n = r->film.pixels;
+    const double spp = (double)r->blocks.list[0].spp, pixels = (double)n;
+    double expected[6] = {0}, bright = 0, sum = 0;
+    for (size_t i = 0; i < n; i++) {
+        double mean[3], a[3], d[3];
+        means(r, i, mean, a, d);
+        const double y = luminance(mean), m2 = r->film.moment2[i] / spp;
+        const double e = sqrt(fmax(m2 - y * y, 0) / (spp - 1)) / fmax(fabs(y), 0.02);
+        expected[0] += (fabs(mean[0] - a[0]) + fabs(mean[1] - a[1]) + fabs(mean[2] - a[2])) / sqrt(mean[0] + mean[1] + mean[2]) / pixels;
+        expected[1] += (fabs(y - luminance(a)) > 0.5 * fmax(fabs(y), 0.02)) / pixels;
+        expected[2] += e * e / pixels;
+        expected[3] += (e > 0.5) / pixels;
+        noise[i] = fabs(luminance(d));
+        bright += y / pixels;
+    }
+    expected[2] = sqrt(expected[2]);
+    qsort(noise, n, sizeof *noise, rising);
+    expected[4] = noise[(size_t)ceil(0.999 * pixels) - 1] / bright;
+    for (size_t i = 0; i < n; i++) {
+        expected[5] += (2 * (double)(i + 1) - pixels - 1) * noise[i];
+        sum += noise[i];
+    }
+    expected[5] /= pixels * sum;
+    for (int i = 0; i < 6; i++, p += 32) {
+        assert_string_equal((const char *)p, names[i]);
+        if (!(fabs(f64(p + 24) - expected[i]) <= 1e-9 * (1 + expected[i]))) /* sums in another order */
+            fail_msg("%s at %g spp: %.12g, expected %.12g", names[i], spp, f64(p + 24), expected[i]);
+    }
+    assert_string_equal((const char *)p, "seconds");
+    assert_true(f64(p + 24) > 0 && f64(p + 24) < 60);
 }
 
 static const unsigned char *check_plane(const unsigned char *p, uint32_t id, const struct pt_render *r)
@@ -186,7 +244,6 @@ static const unsigned char *check_plane(const unsigned char *p, uint32_t id, con
     uLongf n = sizeof raw;
     size_t pixels = r->film.pixels;
     int width = r->film.x1 - r->film.x0;
-    uint64_t spp = r->blocks.list[0].spp, half = pt_film_half_spp(spp);
     assert_int_equal(u32(p), id);
     assert_int_equal(uncompress(raw, &n, p + 16, u32(p + 12)), Z_OK);
     assert_int_equal(n, u32(p + 8));
@@ -194,10 +251,7 @@ static const unsigned char *check_plane(const unsigned char *p, uint32_t id, con
         unfilter(raw, width, (int)pixels / width);
     for (size_t i = 0; i < pixels; i++) {
         double mean[3], a[3], d[3];
-        pt_film_mean(&r->film, i, spp, mean);
-        pt_film_half_mean(&r->film, i, half, a);
-        for (int c = 0; c < 3; c++)
-            d[c] = (a[c] - (r->film.color[3 * i + (size_t)c] - r->film.half[3 * i + (size_t)c]) / (double)(spp - half)) / 2.0;
+        means(r, i, mean, a, d);
         for (size_t c = 0; c < 3; c++) {
             uint16_t h = (uint16_t)(raw[c * pixels + i] | raw[(id > 3 ? 3 * pixels : 0) + c * pixels + i] << 8);
             if (id == 1)
@@ -208,7 +262,7 @@ static const unsigned char *check_plane(const unsigned char *p, uint32_t id, con
                 assert_int_equal(h, oracle_f16(id == 4 ? mean[c] : d[c]));
         }
         if (id == 3)
-            assert_int_equal(raw[i], oracle_half_log(0.2126729 * d[0] + 0.7151522 * d[1] + 0.0721750 * d[2]));
+            assert_int_equal(raw[i], oracle_half_log(luminance(d)));
     }
     return p + 16 + u32(p + 12);
 }
@@ -230,7 +284,7 @@ static void check_block(const char *name, int x0, int y0, int x1, int y1, int wi
         uint32_t statistics_count = u32(p + 12), bytes = u32(p + 20);
         assert_int_equal(u32(p), k < 4 ? 1 : 2);
         assert_int_equal(u32(p + 4), spp[k]);
-        assert_int_equal(u32(p + 8), pt_film_half_spp(spp[k]));
+        assert_int_equal(u32(p + 8), spp[k] / 2);
         assert_int_equal(statistics_count, k == 4 ? 1 : 7 + with_criterion);
         assert_int_equal(u32(p + 16), 3);
         assert_int_equal(u32(p + 24), crc32(0, p + 32, bytes));
@@ -240,6 +294,8 @@ static void check_block(const char *name, int x0, int y0, int x1, int y1, int wi
             assert_true(fabs(f64(p + 32 + 7 * 32 + 24) - 0.75) < 0.02);
         }
         struct pt_render *r = render_block(x0, y0, x1, y1, spp[k], k < 4 ? 7 : 7 ^ 0x5bd1e995u);
+        if (k < 4)
+            check_statistics(p + 32, r);
         const unsigned char *q = p + 32 + 32 * statistics_count;
         q = check_plane(q, 1, r);
         q = check_plane(q, k >= 3 ? 4 : 2, r); /* 352 is the first level of 320 or more */
