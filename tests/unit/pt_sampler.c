@@ -161,6 +161,28 @@ static void numbers_depend_on_their_key_only(void **state)
     }
 }
 
+/* Streams of other samples, vertices and dimensions begin with other numbers: among 64·6·4 numbers of 32 bits two are the same by
+ * chance once in 3,600 choices of the seed. */
+static void no_two_streams_begin_alike(void **state)
+{
+    static const uint32_t keys[] = {PT_DIM_ALPHA, PT_DIM_SHADOW, PT_DIM_MIX, PT_DIM_BSDF_WALK};
+    enum { SAMPLES = 64, KEYS = sizeof keys / sizeof *keys, ALL = SAMPLES * N_BLOCKS * KEYS };
+    static uint32_t first[ALL];
+    int n = 0;
+    (void)state;
+    for (uint32_t i = 0; i < SAMPLES; i++)
+        for (uint32_t block = 0; block < N_BLOCKS; block++)
+            for (size_t k = 0; k < KEYS; k++) {
+                struct pt_sampler s = pt_sampler_make(1, 1, 3, 4, i);
+                pt_sampler_block(&s, block);
+                struct pt_rng rng = pt_sampler_stream(&s, keys[k]);
+                first[n++] = pt_rng_next(&rng);
+            }
+    for (int i = 0; i < ALL; i++)
+        for (int k = 0; k < i; k++)
+            assert_int_not_equal(first[i], first[k]);
+}
+
 /* Mean of the stream and of its lag-1 product. */
 static void streams_are_uniform(void **state)
 {
@@ -182,7 +204,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(second_dimension_is_sobol),       cmocka_unit_test(pairs_are_nets),
         cmocka_unit_test(single_numbers_are_stratified), cmocka_unit_test(no_dimension_has_two_uses), cmocka_unit_test(dimensions_are_independent),     cmocka_unit_test(numbers_depend_on_their_key_only),
-        cmocka_unit_test(streams_are_uniform),
+        cmocka_unit_test(streams_are_uniform),             cmocka_unit_test(no_two_streams_begin_alike),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
