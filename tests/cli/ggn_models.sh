@@ -54,12 +54,26 @@ cp "$tmp/out" "$tmp/first"
 run golden --float --base-r=1 --base-m=2 --base-d=3 --threads=1
 [ $rc = 0 ] && cmp -s "$tmp/first" "$tmp/out"
 check "golden does not depend on the number of threads" $?
+# The first loss is that of the denoiser as it begins, from PyTorch in double; then it is trained on the next five images.
+number() { sed -n "s/.*\"$1\":[[:space:]]*\[\{0,1\}\([-0-9.e+]*\).*/\1/p" "$2"; }
+run golden --float --train-step
+[ $rc = 0 ] && ! grep -q bce_ "$tmp/first" &&
+    echo "$(number denoiser_loss "$tmp/out") $(number bce_before "$tmp/out") $(number bce_after "$tmp/out")" |
+    awk '{exit !(NF == 3 && $1 > 0.80947 && $1 < 0.80964 && $2 > $3 && $3 > 0)}'
+check "golden --train-step: an iteration more" $?
 run bench --json --rounds=1 --batch=1 --threads=2
 for k in denoiser_forward_ms generator_forward_ms discriminator_forward_ms decision_ms denoiser_train_ms generator_train_ms \
     train_sample_ms sgemm_gflops; do
     [ $rc = 0 ] && grep -q "\"$k\": [0-9.]" "$tmp/out"
     check "bench --json: $k" $?
 done
+cp "$tmp/out" "$tmp/published"
+run bench --json --rounds=1 --batch=1 --threads=2 --model "$corpus/f16.ggn" --precision bf16
+[ $rc = 0 ] && echo "$(number decision_ms "$tmp/out") $(number decision_ms "$tmp/published")" | awk '{exit !(NF == 2 && $1 < $2 / 5)}'
+check "bench --model: a small one decides in less than a fifth" $?
+wanted=f32 && grep -q avx512_bf16 /proc/cpuinfo && wanted=bf16
+grep -q '"precision": "f32"' "$tmp/published" && grep -q "\"precision\": \"$wanted\"" "$tmp/out"
+check "bench --precision: $wanted is used here, where it is asked for" $?
 run frobnicate
 [ $rc = 2 ]
 check "an unknown command is exit 2" $?
