@@ -9,9 +9,11 @@
 
 #include "base/threads.h"
 #include "study/api.h"
+#include "study/stimuli.h"
 #include "study/summary.h"
 #include "study/transfer.h"
 #include "support/fail_alloc.h"
+#include "support/ggn_noise.h"
 
 #define KEY "0123456789abcdef0123456789abcdef"
 
@@ -115,6 +117,22 @@ static int requests(struct base_err *err)
     return person == 200 && profile == 200 && (trial == 200 || trial == 400) ? 0 : base_fail(err, BASE_ENOMEM, "refused");
 }
 
+/* A block's pictures. */
+static struct seq_block recording;
+
+static int pictures(struct base_err *err)
+{
+    struct ggn_stimuli s;
+    int rc = ggn_stimuli_init(&s, &recording, 1, err);
+    if (rc)
+        return rc;
+    uint8_t *rgb = malloc((size_t)3 * recording.width * recording.height);
+    rc = rgb ? ggn_stimuli_make(&s, s.n - 1, rgb, err) : base_fail_nomem(err, "t");
+    free(rgb);
+    ggn_stimuli_release(&s);
+    return rc;
+}
+
 static void fail_each(int (*body)(struct base_err *), int quiet)
 {
     enum { MANY = 20000 };
@@ -152,6 +170,18 @@ static void a_transfer(void **state)
     fail_each(there_and_back, 1);
 }
 
+static void a_block(void **state)
+{
+    static const uint32_t levels[] = {20, 400};
+    (void)state;
+    for (uint32_t reference_spp = 0; reference_spp <= 800; reference_spp += 800) {
+        const struct ggn_noise noise = {12, 10, levels, 2, reference_spp, 1, 0, 1};
+        recording = ggn_noise_block(&noise);
+        fail_each(pictures, 0);
+        seq_block_release(&recording);
+    }
+}
+
 static void a_request(void **state)
 {
     struct ggn_study_trial *trials;
@@ -165,7 +195,7 @@ static void a_request(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(a_study), cmocka_unit_test(a_report), cmocka_unit_test(a_transfer),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(a_study), cmocka_unit_test(a_report), cmocka_unit_test(a_transfer), cmocka_unit_test(a_block),
                                        cmocka_unit_test(a_request)};
     return cmocka_run_group_tests_name("oom_study", tests, setup, teardown);
 }
