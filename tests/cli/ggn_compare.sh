@@ -10,6 +10,16 @@ for key in blocks pearson_r pearson_r_below_cap spearman mae mae_below_cap rmse 
     grep -q "\"$key\":" "$tmp/out" || { echo "no $key" >"$tmp/err"; false; }
     check "json key $key" $?
 done
+# the table: a line for each figure of the JSON, in its order, rounded; - for null
+$ggn compare "$tmp/t.csv" "$tmp/m.csv" >"$tmp/table" 2>"$tmp/err" && python3 - "$tmp/out" "$tmp/table" >"$tmp/err" 2>&1 <<'P'
+import json, sys
+figures = list(json.load(open(sys.argv[1])).values())
+lines = [l.rsplit(None, 1) for l in open(sys.argv[2]).read().split("\n") if l.strip() and l.rsplit(None, 1)[1].replace(".", "").replace("-", "").isdigit() or l.endswith(" -")]
+assert len(lines) == len(figures) and lines[0][0] == "blocks", (lines, figures)
+for (label, shown), value in zip(lines, figures):
+    assert shown == "-" if value is None else abs(float(shown) - value) <= 0.51 * 10 ** -len(shown.partition(".")[2]), (label, shown, value)
+P
+check "the table says what the JSON says" $?
 cat >"$tmp/r.json" <<'END'
 {"scene": "whatever", "blocks": [{"id": 0, "x0": 0, "y0": 0, "spp": 50}, {"id": 3, "x0": 1, "y0": 1, "spp": 160},
  {"id": 1, "x0": 1, "y0": 0, "spp": 60}, {"id": 2, "x0": 0, "y0": 1, "spp": 70}]}

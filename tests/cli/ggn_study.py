@@ -159,6 +159,19 @@ check(
     and os.path.exists(os.path.join(study, "texts.json")),
     "study.json holds blocks and levels, texts.json lies beside",
 )
+
+def same_as_crop(picture, block, source):
+    """Whether the stimulus is the block's part of the picture that it was made from."""
+    made = os.path.join(study, "stimuli", "v0", f"b{block}-{picture}.png")
+    cut = ["oiiotool", os.path.join(levels, source + ".png"), "--cut", f"16x16+{16 * block}+0", "--origin", "+0+0"]
+    return subprocess.run([*cut, made, "--fail", "0", "--diff"], capture_output=True).returncode == 0
+
+
+for b in (0, 1):
+    for picture, source in (("reference", "reference"), ("16", "n-16"), ("1024", "n-1024")):
+        check(same_as_crop(picture, b, source), f"stimulus {picture} of block {b} is cut from its picture")
+    check(not same_as_crop("heavy", b, "reference"), f"stimulus heavy of block {b} is another")
+    check(os.path.exists(os.path.join(study, "stimuli", "v0", f"b{b}-heavy.png")), f"  …and there, block {b}")
 fails("init: not over another study", "a study already", *init)
 fails("init: no views", "--views are needed", "init", os.path.join(TMP.name, "none"), "--task", "thresholds")
 fails(

@@ -39,6 +39,8 @@ $ggn evaluate -d $data -m "$tmp/a.ggn" -m "$tmp/f.ggn" --retune --no-quality -o 
     changed=$(diff "$tmp/stops-a" "$tmp/stops-f" | grep -c '^>') && [ "$changed" -gt 0 ] &&
     grep -q "^f.ggn: [1-9][0-9]* of [0-9]* verdicts and $changed of 9 stops differ from a.ggn" "$tmp/out"
 check "evaluate counts what another model decides differently" $?
+tr -d '\t\n' <"$tmp/report/figures.json" | grep -Eq "\"f.ggn\": *\{ *\"from\": *\"a.ggn\", *\"windows\": *[0-9]+, *\"verdicts_changed\": *[1-9][0-9]*, *\"blocks\": *9, *\"stops_changed\": *$changed, *\"p_moved_at_most\": *0"
+check "  …in figures.json too" $?
 
 # interrupted once in each phase: as soon as the curves have so many rows
 for rows in 2 4; do
@@ -81,6 +83,9 @@ check "patience ends a resumed run where it ends the other" $?
 
 cp "$tmp/a.ggn.ckpt" "$tmp/bad.ggn.ckpt"
 fails "a checkpoint of another run is refused" "other data or options" $ggn train $tiny --seed 3 --resume
+cp -r $data "$tmp/labelled" && sed -i '0,/"threshold":[[:space:]]*[0-9.]*/s//"threshold": 77/' "$tmp/labelled/scene0/labels.json" && ! cmp -s $data/scene0/labels.json "$tmp/labelled/scene0/labels.json"
+check "a copy of the data with another label" $?
+fails "a checkpoint of other labels is refused" "other data or options" $ggn train $tiny --data "$tmp/labelled" --resume
 head -c 4000 "$tmp/a.ggn.ckpt" >"$tmp/bad.ggn.ckpt"
 fails "a truncated checkpoint" "bad.ggn.ckpt" $ggn train $tiny --resume
 rm -f "$tmp/bad.ggn.ckpt"

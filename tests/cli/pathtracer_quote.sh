@@ -10,6 +10,7 @@ quote="$scene -q --size 64x48 --block 16 --spp-max 2000 -t 2"
 t "the table has its three rows, 25 % by default" sh -c "grep -q '^ 50 %  draft .* x$' text && grep -q '^ 25 %  default' text && grep -q '^  5 %  final' text"
 t "  …samples rise as fewer viewers may see noise" \
     awk '/ %  (draft|default|final)/ { gsub(",", ""); mean = $6 + 0; if (mean < last) exit 1; last = mean; rows++ } END { exit rows != 3 }' text
+t "  …has a heading for the blocks" grep -qx "blocks that take most of the time, as asked:" text
 t "  …names the blocks that take most, and what their paths meet" \
     grep -qE '^  block [0-9]+ \([0-9,]+ to [0-9,]+\): [0-9]+ %, .* us per path of [0-9.]+ vertices, [0-9]+ % of them [a-z]' text
 t "  …tells pilot and memory" sh -c "grep -q '^pilot: ' text && grep -q '^memory: film .* MB, scene .* MB' text"

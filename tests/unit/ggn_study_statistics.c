@@ -92,6 +92,88 @@ static void blocks_help_each_other(void **state)
     assert_true(curves[0].estimate.hi - curves[0].estimate.lo < alone.estimate.hi - alone.estimate.lo);
 }
 
+/* The model once more, all of it at once: a person's spread and habits (prior), each block's own spread given the person's, a
+ * threshold on a grid of 1/12 octave; the posterior of each block's threshold with everything else summed over. */
+enum { SPREADS = 7, HABITS = 20, GRID = 200, JOINT = 3 };
+static const double joint_spread[SPREADS] = {0.15, 0.22, 0.33, 0.5, 0.75, 1.1, 1.6};
+
+static double joint_likelihood(const struct ggn_study_curve *c, double t, double spread, int habit)
+{
+    static const double lapses[4] = {0.0, 0.03, 0.08, 0.2}, biases[5] = {-0.8, -0.4, 0.0, 0.4, 0.8};
+    double all = 1, lapse = lapses[habit % 4], bias = biases[habit / 4];
+    for (int i = 0; i < c->n; i++) {
+        double d = ggn_study_normal_quantile(ggn_study_p_correct(c->choices[i].x, t, spread));
+        double p = fmin(0.5 * lapse + (1 - lapse) * ggn_study_normal(c->choices[i].first ? d + bias : d - bias), 1 - 1e-9);
+        all *= c->choices[i].correct ? p : 1 - p;
+    }
+    return all;
+}
+
+static double joint_prior(int s, int h)
+{
+    static const double of_spread[SPREADS] = {0.05, 0.1, 0.2, 0.3, 0.2, 0.1, 0.05}, of_lapse[4] = {0.4, 0.4, 0.15, 0.05},
+                        of_bias[5] = {0.06, 0.24, 0.4, 0.24, 0.06};
+    return of_spread[s] * of_lapse[h % 4] * of_bias[h / 4];
+}
+
+static double joint_given(int b, int s) /* a block's spread, given the person's */
+{
+    int neighbours = s == 0 || s == SPREADS - 1 ? 1 : 2;
+    return b == s ? 0.8 : abs(b - s) == 1 ? 0.2 / neighbours : 0;
+}
+
+static void estimates_are_those_of_the_joint_posterior(void **state)
+{
+    static const double threshold[JOINT] = {5.5, 7, 8.2};
+    static struct ggn_study_choice choices[JOINT][14];
+    static double likelihood[JOINT][GRID][SPREADS][HABITS], evidence[JOINT][SPREADS][HABITS];
+    struct ggn_study_curve c[JOINT];
+    int n = (int)ceil((10.0 - 4.0 + 4.0) * 12) + 1;
+    (void)state;
+    for (int b = 0; b < JOINT; b++) {
+        for (int i = 0; i < 14; i++) { /* around the threshold, with slips */
+            double x = threshold[b] - 1.5 + 0.25 * i;
+            choices[b][i] = (struct ggn_study_choice){x, (i + b) % 2, x < threshold[b] + (i % 3 == b ? 0.9 : -0.4) || i % 5 == 0};
+        }
+        c[b] = (struct ggn_study_curve){choices[b], 14, 4.0, 10.0, {0}};
+        for (int i = 0; i < n; i++)
+            for (int s = 0; s < SPREADS; s++)
+                for (int h = 0; h < HABITS; h++)
+                    likelihood[b][i][s][h] = joint_likelihood(&c[b], 2.0 + i / 12.0, joint_spread[s], h);
+        memset(evidence[b], 0, sizeof evidence[b]);
+        for (int s = 0; s < SPREADS; s++)
+            for (int h = 0; h < HABITS; h++)
+                for (int own = 0; own < SPREADS; own++)
+                    for (int i = 0; i < n; i++)
+                        evidence[b][s][h] += joint_given(own, s) * likelihood[b][i][own][h];
+    }
+    assert_int_equal(ggn_study_psychometric(c, JOINT, NULL), 0);
+    for (int b = 0; b < JOINT; b++) {
+        double w[GRID] = {0}, sum = 0, mean = 0, var = 0, below = 0;
+        for (int i = 0; i < n; i++)
+            for (int s = 0; s < SPREADS; s++)
+                for (int h = 0; h < HABITS; h++) {
+                    double others = joint_prior(s, h), mine = 0;
+                    for (int k = 0; k < JOINT; k++)
+                        others *= k == b ? 1 : evidence[k][s][h];
+                    for (int own = 0; own < SPREADS; own++)
+                        mine += joint_given(own, s) * likelihood[b][i][own][h];
+                    w[i] += others * mine;
+                }
+        for (int i = 0; i < n; i++)
+            sum += w[i];
+        for (int i = 0; i < n; i++)
+            mean += w[i] / sum * (2.0 + i / 12.0);
+        for (int i = 0; i < n; i++) {
+            var += w[i] / sum * pow(2.0 + i / 12.0 - mean, 2);
+            below += 2.0 + (i + 0.5) / 12.0 <= c[b].estimate.t ? w[i] / sum : 0;
+        }
+        NEAR(c[b].estimate.se, sqrt(var), 1e-3); /* the product's d comes from a table */
+        assert_true(c[b].estimate.lo < c[b].estimate.t && c[b].estimate.t < c[b].estimate.hi);
+        assert_true(below <= 0.5 && below > 0.5 - 1.05 * w[(int)((c[b].estimate.t - 2.0) * 12 + 0.5)] / sum); /* the median's cell */
+    }
+}
+
 static void slips_in_catch_trials_are_lapses(void **state)
 {
     struct ggn_study_choice c[LEVELS * EACH + 6];
@@ -224,7 +306,7 @@ int main(void)
         cmocka_unit_test(wilson_is_wilson),
         cmocka_unit_test(a_curve_comes_back),
         cmocka_unit_test(blocks_help_each_other),
-        cmocka_unit_test(slips_in_catch_trials_are_lapses),
+        cmocka_unit_test(estimates_are_those_of_the_joint_posterior), cmocka_unit_test(slips_in_catch_trials_are_lapses),
         cmocka_unit_test(guessing_tells_nothing),
         cmocka_unit_test(thresholds_are_means_over_people_that_count),
         cmocka_unit_test(the_noise_ceiling_is_between_people),
