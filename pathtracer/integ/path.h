@@ -214,7 +214,7 @@ PT_KERNEL_INLINE void pt_path_add_environment(struct pt_path *path)
         const struct pt_light *light = &path->scene->lights[path->scene->env_lights[i]];
         float weight = 1.0f;
         if (path->pdf_prev > 0.0f && path->settings->strategy == PT_STRATEGY_MIS)
-            weight = pt_mis_weight(path->pdf_prev, pt_light_env_pdf(path->scene, light, path->ray.direction));
+            weight = pt_mis_weight(path->pdf_prev, pt_light_env_pdf(path->scene, light, path->prev.p, path->ray.direction));
         pt_vec3 l = v3_scale(v3_mul(path->throughput, pt_light_env_eval(path->scene, light, path->ray.direction)), weight);
         path->radiance = v3_add(path->radiance, l);
         if (path->trace)

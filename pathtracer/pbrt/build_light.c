@@ -148,6 +148,32 @@ static int32_t float_rgb(struct pt_builder *b, int32_t id)
     return pt_list_add(b, &b->images, &map);
 }
 
+/* v4's "portal": the corners of a rectangle, in order around it, in the light's space. Any parallelogram will do here. */
+static void make_portal(struct context *c)
+{
+    size_t n;
+    struct pt_light *light = c->light;
+    const struct pt_param *given = pt_params_find(c->p, "portal");
+    const double *xyz = pt_params_floats(c->p, "portal", 3, &n);
+    if (!given)
+        return;
+    pt_vec3 corner[4];
+    for (size_t i = 0; i < 4 && n == 4; i++)
+        place(c->b, &c->ctm, xyz + 3 * i, &corner[i]);
+    if (n == 4) {
+        light->portal = corner[0];
+        light->portal_u = v3_sub(corner[1], corner[0]);
+        light->portal_v = v3_sub(corner[3], corner[0]);
+    }
+    float area = n == 4 ? v3_len(v3_cross(light->portal_u, light->portal_v)) : 0.0f;
+    pt_vec3 off = n == 4 ? v3_sub(v3_sub(corner[2], corner[1]), light->portal_v) : v3_splat(0.0f);
+    if (!(area > 0.0f) || !isfinite(area) || !(v3_len(off) < 0.01f * sqrtf(area))) {
+        pt_diag_fail(&c->b->diag, given->loc, "a portal is the 4 corners of a rectangle, in order around it");
+        return;
+    }
+    light->has_portal = 1;
+}
+
 static void make_infinite(struct context *c)
 {
     struct pt_params *p = c->p;
@@ -155,11 +181,7 @@ static void make_infinite(struct context *c)
     double illuminance = pt_params_float(p, "illuminance", -1);
     c->light->emission = scaled_colour(c->b, c->s, p, "L");
     c->light->kind = PT_LIGHT_ENV_CONSTANT;
-    if (pt_params_find(p, "portal")) {
-        pt_diag_warn(&c->b->diag, pt_params_find(p, "portal")->loc,
-                     "the portal of an infinite light only guides sampling: ignored");
-        pt_params_ignore(p, "portal");
-    }
+    make_portal(c);
     pt_builder_effect(c->b, PT_FX_ENVIRONMENT, p->loc);
     if (file[0] == '\0') {
         if (illuminance > 0) /* of an upward patch under the whole sky: π L */

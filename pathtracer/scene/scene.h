@@ -158,6 +158,8 @@ struct pt_light {
     pt_vec3 direction;         /* SPOT: axis; DISTANT: the way the light travels; unit */
     float cos_total, cos_start; /* SPOT: full darkness beyond, full light within */
     struct pt_mat34 from_render; /* ENV_IMAGE: render → light space, rotation only */
+    int32_t has_portal;        /* ENV: … through which its light mostly comes */
+    pt_vec3 portal, portal_u, portal_v; /* a corner of it and its edges, render space */
     /* derived by pt_lights_build */
     int32_t first_emitter;     /* AREA: emitter of primitive 0 */
     float emitter_pmf;         /* other kinds: probability that next-event estimation selects this light */

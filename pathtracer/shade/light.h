@@ -3,7 +3,8 @@
  * needs for both. All densities are per solid angle at the reference point and include the probability of the selection.
  * Pure, thread-safe, no allocation.
  *
- * A constant environment is never selected: sampling the BSDF or phase function is already the better strategy for it.
+ * A constant environment without a portal is never selected: sampling the BSDF or phase function is already the better
+ * strategy for it.
  */
 #ifndef PT_SHADE_LIGHT_H
 #define PT_SHADE_LIGHT_H

@@ -30,12 +30,12 @@ static const double WORTH = 1.06;
 
 static int at_infinity(const struct pt_light *light)
 {
-    return light->kind == PT_LIGHT_ENV_IMAGE || light->kind == PT_LIGHT_DISTANT;
+    return light->kind == PT_LIGHT_ENV_IMAGE || light->kind == PT_LIGHT_ENV_CONSTANT || light->kind == PT_LIGHT_DISTANT;
 }
 
 static int32_t emitters_of(const struct pt_scene *scene, const struct pt_light *light)
 {
-    if (light->kind == PT_LIGHT_ENV_CONSTANT)
+    if (light->kind == PT_LIGHT_ENV_CONSTANT && !light->has_portal)
         return 0;
     if (light->kind != PT_LIGHT_AREA || scene->shapes[light->shape].kind == PT_SHAPE_QUADRIC)
         return 1;
@@ -76,6 +76,7 @@ static double power_of(const struct pt_scene *scene, const struct pt_light *ligh
     case PT_LIGHT_AREA:
         return pi * area * l * (light->two_sided ? 2.0 : 1.0);
     case PT_LIGHT_ENV_IMAGE:
+    case PT_LIGHT_ENV_CONSTANT:
         return 4.0 * pi * disk * (double)pt_light_env_mean(scene, light);
     case PT_LIGHT_DISTANT:
         return disk * l;

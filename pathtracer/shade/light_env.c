@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "shade/light_portal.h"
 #include "shade/warp.h"
 
 /* The importance table has at most this many columns: it only steers sampling, and its reads miss the cache when it is
@@ -66,7 +67,7 @@ static float to_solid(const struct pt_light *light, float pdf_square, float sin_
     return sin_theta > 0.0f ? pdf_square / (2.0f * PT_PI * PT_PI * sin_theta) : 0.0f;
 }
 
-float pt_light_env_image_pdf(const struct pt_scene *scene, const struct pt_light *light, pt_vec3 w)
+static float image_pdf(const struct pt_scene *scene, const struct pt_light *light, pt_vec3 w)
 {
     const struct pt_env_distribution *d = &scene->env_distributions[light - scene->lights];
     float s, t, sin_theta;
@@ -103,8 +104,9 @@ pt_vec3 pt_light_env_image_eval(const struct pt_scene *scene, const struct pt_li
     return v3_mul(light->emission, v3(px[0], px[1], px[2]));
 }
 
-int pt_light_env_image_sample(const struct pt_scene *scene, const struct pt_light *light, float u0, float u1,
-                              struct pt_light_sample *out)
+/* A direction by the image's importance; 0 when there is none. */
+static float image_sample(const struct pt_scene *scene, const struct pt_light *light, float u0, float u1, pt_vec3 *w,
+                          const float **pixel)
 {
     const struct pt_env_distribution *d = &scene->env_distributions[light - scene->lights];
     float in_x, in_y, sin_theta = 1.0f;
@@ -123,11 +125,46 @@ int pt_light_env_image_sample(const struct pt_scene *scene, const struct pt_ligh
     }
     float pdf = (columns[x + 1] - columns[x]) * (float)d->width * ((d->rows[y + 1] - d->rows[y]) * (float)d->height);
     /* from_render is a rotation (perhaps mirrored): its transpose is its inverse */
-    out->wi = v3_norm(pt_mat34_normal(&light->from_render, l));
-    pdf = to_solid(light, pdf, sin_theta);
+    *w = v3_norm(pt_mat34_normal(&light->from_render, l));
+    *pixel = pixel_at(scene, light, s, t);
+    return to_solid(light, pdf, sin_theta);
+}
+
+float pt_light_env_density(const struct pt_scene *scene, const struct pt_light *light, pt_vec3 p, pt_vec3 w)
+{
+    float through = light->has_portal ? pt_portal_pdf(light, p, w) : 0.0f;
+    if (light->kind == PT_LIGHT_ENV_CONSTANT)
+        return through;
+    return light->has_portal ? 0.5f * (through + image_pdf(scene, light, w)) : image_pdf(scene, light, w);
+}
+
+/* Sampling through the portal: u0 in [0, 1). */
+static float portal_sample(const struct pt_scene *scene, const struct pt_light *light, pt_vec3 p, float u0, float u1,
+                           struct pt_light_sample *out)
+{
+    float pdf = pt_portal_sample(light, p, u0, u1, &out->wi), s, t, sin_theta;
+    if (light->kind == PT_LIGHT_ENV_CONSTANT || !(pdf > 0.0f))
+        return pdf;
+    direction_to_map(light, out->wi, &s, &t, &sin_theta);
+    out->pixel = pixel_at(scene, light, s, t);
+    return 0.5f * (pdf + image_pdf(scene, light, out->wi));
+}
+
+int pt_light_env_sample(const struct pt_scene *scene, const struct pt_light *light, pt_vec3 p, float u0, float u1,
+                        struct pt_light_sample *out)
+{
+    const int constant = light->kind == PT_LIGHT_ENV_CONSTANT;
+    float pdf;
+    out->pixel = NULL;
+    if (light->has_portal && (constant || u0 < 0.5f)) {
+        pdf = portal_sample(scene, light, p, constant ? u0 : 2.0f * u0, u1, out);
+    } else {
+        pdf = image_sample(scene, light, light->has_portal ? 2.0f * u0 - 1.0f : u0, u1, &out->wi, &out->pixel);
+        if (light->has_portal)
+            pdf = 0.5f * (pdf + pt_portal_pdf(light, p, out->wi));
+    }
     out->inv_pdf_solid = 1.0f / pdf;
     out->radiance = light->emission;
-    out->pixel = pixel_at(scene, light, s, t);
     out->delta = 0;
     out->finite = 0;
     return pdf > 0.0f;

@@ -27,8 +27,8 @@ static inline int pt_light_sample_emitter(pt_effects fx, const struct pt_scene *
         const struct pt_light *light = &scene->lights[e->light];
         if ((fx & PT_FX_QUADRIC) && light->kind == PT_LIGHT_AREA && e->primitive < 0)
             return pt_light_quadric_sample(scene, e, p_ref, u0, u1, out);
-        if ((fx & PT_FX_ENVIRONMENT) && light->kind == PT_LIGHT_ENV_IMAGE) {
-            int lit = pt_light_env_image_sample(scene, light, u0, u1, out);
+        if ((fx & PT_FX_ENVIRONMENT) && (light->kind == PT_LIGHT_ENV_IMAGE || light->kind == PT_LIGHT_ENV_CONSTANT)) {
+            int lit = pt_light_env_sample(scene, light, p_ref, u0, u1, out);
             out->inv_pdf_solid /= e->pmf;
             return lit;
         }

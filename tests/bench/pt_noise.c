@@ -1,13 +1,14 @@
 /*
- * Noise for time: two ways of selecting lights against each other, in one scene. One thread, interleaved.
+ * Noise for time: two ways of sampling lights against each other, in one scene: the hierarchy and portals, if it has one, against
+ * selection by power without portals. One thread, interleaved.
  *
  *   build/bench/pt_noise SCENE.pbrt [WIDTHxHEIGHT] [SEEDS] [SPP] [SAMPLER]
  *
  * Every pixel is rendered with SPP samples by each of SEEDS seeds and each selection; the variance is that between seeds. Prints
- * one line of JSON, each a ratio of power to hierarchy, above 1 where the hierarchy is better: `time` of one path, `variance`
+ * one line of JSON, each a ratio of the plain way to the other, above 1 where the other is better: `time` of one path, `variance`
  * (median over 8 × 8 tiles, of the ratio within each), `gain` their product; `gain_mean` with the variance
  * relative to the tile's light, averaged over tiles before the ratio is taken (a few bright specks decide that one); and the largest `z`
- * of the difference of their tile means (64 of them: up to 5 by chance with few seeds). Scenes without a hierarchy are only named.
+ * of the difference of their tile means (64 of them: up to 5 by chance with few seeds). Scenes without a hierarchy or portal are only named.
  */
 #include <math.h>
 #include <stdio.h>
@@ -17,6 +18,7 @@
 #include "base/clock.h"
 #include "integ/integrator.h"
 #include "pbrt/load.h"
+#include "shade/light_build.h"
 
 enum { TILES = 8, MODES = 2, SEEDS_MAX = 64 };
 
@@ -110,15 +112,30 @@ static void print_result(const char *path)
     }
     qsort(ratios, (size_t)n, sizeof *ratios, by_value);
     double variance = n ? ratios[n / 2] : 1.0, averaged = n ? relative[1] / relative[0] : 1.0;
-    printf("{\"scene\":\"%s\",\"emitters\":%d,\"hierarchy\":true,\"us_per_path\":%.3f,\"time\":%.3f,\"variance\":%.3f,\"gain\":%.3f,"
+    printf("{\"scene\":\"%s\",\"emitters\":%d,\"two_ways\":true,\"us_per_path\":%.3f,\"time\":%.3f,\"variance\":%.3f,\"gain\":%.3f,"
            "\"gain_mean\":%.3f,\"z\":%.2f}\n",
            path, modes[0].scene->emitter_count,
            1e6 * modes[0].time_s / ((double)width * height * spp * seeds), time, variance, time * variance, time * averaged, worst);
 }
 
+/* 1 when there was a portal. */
+static int close_portals(struct pt_scene *scene)
+{
+    struct base_err err = {0};
+    int found = 0;
+    for (int32_t i = 0; i < scene->light_count; i++) {
+        found |= scene->lights[i].has_portal;
+        scene->lights[i].has_portal = 0;
+    }
+    if (found && pt_lights_build(scene, &err) != 0)
+        exit(1);
+    return found;
+}
+
 int main(int argc, char **argv)
 {
     struct pt_integrator settings = {0};
+    int differ = 0;
     if (argc < 2 || (argc > 2 && sscanf(argv[2], "%dx%d", &width, &height) != 2)) {
         fprintf(stderr, "usage: %s SCENE.pbrt [WIDTHxHEIGHT] [SEEDS] [SPP] [independent|sobol]\n", argv[0]);
         return 2;
@@ -137,6 +154,9 @@ int main(int argc, char **argv)
             return 2;
         }
         settings = defaults.integrator;
+        if (k == 1)
+            differ |= close_portals(m->scene);
+        differ |= m->scene->light_tree != NULL;
         m->kernel = pt_kernel_select(m->scene->effects, NULL, NULL);
         m->sum = calloc((size_t)width * (size_t)height, sizeof *m->sum);
         m->sum2 = calloc((size_t)width * (size_t)height, sizeof *m->sum2);
@@ -145,13 +165,13 @@ int main(int argc, char **argv)
     }
     if (argc > 5)
         settings.sampler = strcmp(argv[5], "sobol") == 0 ? PT_SAMPLER_SOBOL : PT_SAMPLER_INDEPENDENT;
-    for (int s = 0; s < seeds && modes[0].scene->light_tree; s++)
+    for (int s = 0; s < seeds && differ; s++)
         for (int k = 0; k < MODES; k++)
             render(&modes[k], &settings, s);
-    if (modes[0].scene->light_tree)
+    if (differ)
         print_result(argv[1]);
     else
-        printf("{\"scene\":\"%s\",\"emitters\":%d,\"hierarchy\":false}\n", argv[1], modes[0].scene->emitter_count);
+        printf("{\"scene\":\"%s\",\"emitters\":%d,\"two_ways\":false}\n", argv[1], modes[0].scene->emitter_count);
     for (int k = 0; k < MODES; k++) {
         free(modes[k].sum);
         free(modes[k].sum2);

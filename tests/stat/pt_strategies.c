@@ -111,11 +111,52 @@ static void light_sampling_changes_no_mean(void **state)
     }
 }
 
+/* A room open to one side, under a constant sky and under one with a sun: with a portal in its opening, without, and by chance
+ * alone it is as bright. Some light comes past the portal. */
+static void portals_change_no_mean(void **state)
+{
+    (void)state;
+    static const float sky[3 * 8] = {1, 1, 2, 1, 1, 2, 20, 18, 15, 1, 1, 2, 0.2f, 0.2f, 0.1f, 0.2f, 0.2f, 0.1f, 0.3f, 0.2f, 0.1f, 0, 0, 0};
+    for (int image = 0; image < 2; image++) {
+        double mean[3], error[3];
+        for (int way = 0; way < 3; way++) {
+            struct pt_scene scene;
+            begin(&scene, 40.0f);
+            int32_t grey = test_add_diffuse(&scene, v3_splat(0.6f));
+            test_add_quad(&scene, grey, v3(-1, -1, 1), v3(2, 0, 0), v3(0, 0, -2));
+            test_add_quad(&scene, grey, v3(-1, 1, 1), v3(2, 0, 0), v3(0, 0, -2));
+            test_add_quad(&scene, grey, v3(-1, -1, -1), v3(2, 0, 0), v3(0, 2, 0));
+            test_add_quad(&scene, grey, v3(-1, -1, 1), v3(0, 2, 0), v3(0, 0, -2));
+            struct pt_light light = {.kind = PT_LIGHT_ENV_CONSTANT, .shape = -1, .image = -1, .emission = {1, 1, 1}};
+            if (image) {
+                light.kind = PT_LIGHT_ENV_IMAGE;
+                light.image = scene.image_count;
+                light.mapping = PT_ENV_LATLONG;
+                light.from_render = (struct pt_mat34){{1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0}};
+                scene.images[scene.image_count++] = (struct pt_image_map){4, 2, 3, PT_PIXEL_FLOAT, 1.0f, sky};
+            }
+            light.has_portal = way == 0; /* render space has the camera, at world z = 4, in its origin */
+            light.portal = v3(1, -0.7f, -5);
+            light.portal_u = v3(0, 1.6f, 0);
+            light.portal_v = v3(0, 0, 1.8f);
+            test_add_light(&scene, &light);
+            test_scene_finish(&scene);
+            mean[way] = (double)v3_luminance(render(&scene, 4, way < 2 ? PT_STRATEGY_MIS : PT_STRATEGY_BSDF_ONLY, 1600, &error[way]));
+            test_scene_end(&scene);
+        }
+        assert_true(mean[2] > 0.01 && error[0] < 0.02 * mean[0]);
+        for (int way = 0; way < 2; way++)
+            if (fabs(mean[way] - mean[2]) > 4.0 * hypot(error[way], error[2]))
+                fail_msg("image %d: %g ± %g %s portal, %g ± %g by chance", image, mean[way], error[way], way ? "without" : "with", mean[2], error[2]);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(lossless_media_vanish),
         cmocka_unit_test(light_sampling_changes_no_mean),
+        cmocka_unit_test(portals_change_no_mean),
     };
     print_message("seed 1\n");
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -44,7 +44,7 @@ static float pdf_of(const struct pt_scene *scene, const struct pt_receiver *from
     if (!pt_accel_intersect(scene, &ray, &hit)) {
         float pdf = 0.0f;
         for (int32_t i = 0; i < scene->env_light_count; i++)
-            pdf += pt_light_env_pdf(scene, &scene->lights[scene->env_lights[i]], wi);
+            pdf += pt_light_env_pdf(scene, &scene->lights[scene->env_lights[i]], from->p, wi);
         return pdf;
     }
     pt_place_at_hit(PT_FX_ALL, scene, &ray, &hit, &at);
@@ -83,8 +83,8 @@ static void check_light(const struct pt_scene *scene, pt_vec3 p_ref, int all_vis
         double l = 0.0;
         if (pt_accel_intersect(scene, &ray, &hit))
             l = pdf > 0.0 ? (double)v3_luminance(scene->lights[scene->shapes[hit.shape].light].emission) : 0.0;
-        else
-            for (int32_t k = 0; k < scene->env_light_count; k++)
+        else /* light sampling goes through the portal only where an environment is constant */
+            for (int32_t k = 0; k < scene->env_light_count && pdf > 0.0; k++)
                 l += (double)v3_luminance(pt_light_env_eval(scene, &scene->lights[scene->env_lights[k]], w));
         by_direction += l * 4.0 * PI / SAMPLES;
     }
@@ -165,8 +165,32 @@ static void build_env(struct pt_scene *s, int32_t mapping, int32_t width, int32_
 static void build_latlong(struct pt_scene *s) { build_env(s, PT_ENV_LATLONG, 32, 16); }
 static void build_equal_area(struct pt_scene *s) { build_env(s, PT_ENV_EQUAL_AREA, 24, 24); }
 
+static void add_portal(struct pt_scene *s)
+{
+    struct pt_light *light = &s->lights[s->light_count - 1];
+    light->has_portal = 1;
+    light->portal = v3(-0.3f, -0.8f, 1.2f);
+    light->portal_u = v3(1.1f, 0.1f, 0.2f);
+    light->portal_v = v3(0.4f, 0.9f, -0.3f);
+}
+
+static void build_latlong_portal(struct pt_scene *s)
+{
+    build_latlong(s);
+    add_portal(s);
+}
+
+static void build_constant_portal(struct pt_scene *s)
+{
+    struct pt_light light = {.kind = PT_LIGHT_ENV_CONSTANT, .shape = -1, .image = -1, .emission = {1, 1, 2}};
+    test_add_light(s, &light);
+    add_portal(s);
+}
+
 static void quads(void **state) { (void)state; run(build_quad, 1); }
 static void sphere_outside(void **state) { (void)state; run(build_sphere, 1); }
+static void portal_of_an_image(void **state) { (void)state; run(build_latlong_portal, 1); }
+static void portal_of_a_constant(void **state) { (void)state; run(build_constant_portal, 1); }
 static void ellipsoid(void **state) { (void)state; run(build_ellipsoid, 0); }
 static void cylinder(void **state) { (void)state; run(build_cylinder, 0); }
 static void disk(void **state) { (void)state; run(build_disk, 1); }
@@ -239,6 +263,7 @@ int main(void)
         cmocka_unit_test(alias_table_keeps_probabilities), cmocka_unit_test(quads),     cmocka_unit_test(sphere_outside),
         cmocka_unit_test(sphere_inside),                   cmocka_unit_test(ellipsoid), cmocka_unit_test(cylinder),
         cmocka_unit_test(disk),                            cmocka_unit_test(latlong),   cmocka_unit_test(equal_area),
+        cmocka_unit_test(portal_of_an_image),              cmocka_unit_test(portal_of_a_constant),
         cmocka_unit_test(delta_lights), cmocka_unit_test(tables_are_as_fine_as_the_image_asks),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
