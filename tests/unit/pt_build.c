@@ -300,6 +300,27 @@ static void pixel_bounds(void **state)
     pt_scene_destroy(s);
 }
 
+/* A portal is where the light's transform puts its corners; a constant environment is selected for it alone. */
+static void portals(void **state)
+{
+    (void)state;
+    struct pt_scene *s = text_scene("LookAt 1 2 3  1 2 13  0 1 0 Camera \"perspective\" WorldBegin AttributeBegin Rotate -90 1 0 0\n"
+                                    "LightSource \"infinite\" \"rgb L\" [ 1 1 1 ] "
+                                    "\"point3 portal\" [ -2 1 0.5  -2 1 2.5  -2 -2 2.5  -2 -2 0.5 ]\nAttributeEnd\n"
+                                    "LightSource \"infinite\" \"rgb L\" [ 1 1 1 ]", NULL, NULL);
+    const struct pt_light *light = &s->lights[0];
+    assert_true(light->has_portal && !s->lights[1].has_portal);
+    /* (x, y, z) of the light is (x, z, -y) of the world, and that less (1, 2, 3) where the camera is the origin */
+    const float expected[9] = {-3, -1.5f, -4, 0, 2, 0, 0, 0, 3};
+    const float got[9] = {light->portal.x, light->portal.y, light->portal.z, light->portal_u.x, light->portal_u.y,
+                          light->portal_u.z, light->portal_v.x, light->portal_v.y, light->portal_v.z};
+    for (int i = 0; i < 9; i++)
+        near(got[i], (double)expected[i], 1e-6);
+    assert_int_equal(s->emitter_count, 1);
+    assert_int_equal(s->env_light_count, 2);
+    pt_scene_destroy(s);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -307,6 +328,6 @@ int main(void)
         cmocka_unit_test(materials_of_both_versions), cmocka_unit_test(textures), cmocka_unit_test(media),
         cmocka_unit_test(instances_and_motion), cmocka_unit_test(part_of_the_motion), cmocka_unit_test(graphics_state),
         cmocka_unit_test(warnings_come_once_and_strict_refuses), cmocka_unit_test(tessellated),
-        cmocka_unit_test(pixel_bounds)};
+        cmocka_unit_test(pixel_bounds), cmocka_unit_test(portals)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
