@@ -58,10 +58,35 @@ static void a_missing_half_is_told(void **state)
     assert_string_equal(warned(without_picture, color), "");
 }
 
+/* The last value that each parameter takes, and the first that it does not. */
+static void ends_of_ranges(void **state)
+{
+    static const char *const cases[][3] = {{"first-spp", "1", "0"},  {"first-spp", "1000000000", "1000000001"}, {"visible", "1", "1.01"},
+                                           {"visible", "0", "-0.1"}, {"passes", "1", "0"},                      {"gate", "0", "-1"},
+                                           {"tail", "0", "-0.1"},    {"gini", "2", "2.01"},                     {"gini", "0", "-0.1"},
+                                           {"precision", "bf16", "f16"}};
+    const char *dirs[] = {criteria};
+    struct lull_search search = {.dirs = dirs, .dir_count = 1};
+    struct lull_found found;
+    struct lull_error err = {.struct_size = sizeof err};
+    (void)state;
+    assert_int_equal(lull_open(&search, "ggn", &found, &err), LULL_OK);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++)
+        for (int bad = 0; bad < 2; bad++) {
+            struct lull_instance *in = NULL;
+            struct lull_pair pair = {cases[i][0], cases[i][1 + bad]};
+            int32_t status = found.criterion->create(NULL, &pair, 1, sizeof pair, &in, &err);
+            if (status != (bad ? LULL_E_VALUE : LULL_OK))
+                fail_msg("%s=%s: %d", pair.key, pair.value, status);
+            if (!bad)
+                found.criterion->destroy(in);
+        }
+}
+
 int main(void)
 {
     if (api_folder(criteria, sizeof criteria, API_CRITERIA) != 0)
         return 1;
-    const struct CMUnitTest tests[] = {cmocka_unit_test(a_missing_half_is_told)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(a_missing_half_is_told), cmocka_unit_test(ends_of_ranges)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

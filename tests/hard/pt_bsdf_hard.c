@@ -121,6 +121,20 @@ static void total_internal_reflection_reflects_all(void **state)
     }
 }
 
+/* Exactly along the surface there is nothing to sample. */
+static void along_the_surface_nothing_is_sampled(void **state)
+{
+    (void)state;
+    struct pt_bsdf all[] = {bsdf_conductor(0.0f, 0.0f), bsdf_conductor(0.3f, 0.3f), bsdf_dielectric(0.0f, 0.0f, 1.5f),
+                            bsdf_thin(1.5f), bsdf_coated_diffuse(0.0f, 1.5f, 1.0f, 0.01f), bsdf_coated_diffuse(0.3f, 1.5f, 1.0f, 0.01f),
+                            bsdf_coated_conductor(0.0f, 0.0f), bsdf_coated_conductor(0.3f, 0.2f)};
+    for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
+        struct pt_bsdf_sample s = {0};
+        if (pt_bsdf_sample(PT_FX_ALL, &all[i], v3(0.6f, 0.8f, 0.0f), 0.4f, 0.3f, 0.7f, &s))
+            fail_msg("model %zu is sampled", i);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -129,6 +143,7 @@ int main(void)
         cmocka_unit_test(coatings),
         cmocka_unit_test(index_matched_glass_is_invisible),
         cmocka_unit_test(total_internal_reflection_reflects_all),
+        cmocka_unit_test(along_the_surface_nothing_is_sampled),
     };
     print_message("seed %d\n", SEED);
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -13,6 +13,7 @@
 
 #include <cmocka.h>
 
+#include "base/clock.h"
 #include "base/files.h"
 #include "base/png.h"
 #include "pt_text_scene.h"
@@ -466,11 +467,32 @@ static void counted(void **state)
     pt_scene_destroy(s);
 }
 
+/* The times of loading are parts of it: none is counted twice. */
+static void times_add_up(void **state)
+{
+    (void)state;
+    enum { VERTICES = 60000 };
+    static char text[VERTICES * 12 + 200];
+    struct pt_scene *s = NULL;
+    size_t at = (size_t)sprintf(text, "WorldBegin Shape \"trianglemesh\" \"integer indices\" [ 0 1 2 ] \"point3 P\" [");
+    for (int i = 0; i < VERTICES; i++)
+        at += (size_t)sprintf(text + at, " %d %d %d", i % 100, i % 7, i % 3);
+    strcpy(text + at, " ]");
+    double start_s = base_clock_wall_s();
+    s = text_scene(text, NULL, NULL);
+    double all_s = base_clock_wall_s() - start_s;
+    const struct pt_scene_stats *t = &s->stats;
+    assert_true(t->parse_s > 0 && t->build_s >= 0 && t->accel_s >= 0 && t->texture_s >= 0);
+    assert_true(t->parse_s + t->build_s + t->accel_s + t->texture_s <= all_s);
+    pt_scene_destroy(s);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(film_filter_and_sampler), cmocka_unit_test(camera), cmocka_unit_test(lights), cmocka_unit_test(area_lights),
-        cmocka_unit_test(environment_map), cmocka_unit_test(media), cmocka_unit_test(media_by_name), cmocka_unit_test(materials), cmocka_unit_test(materials_of_version_3),
-        cmocka_unit_test(shapes), cmocka_unit_test(read_over), cmocka_unit_test(ends_of_ranges), cmocka_unit_test(counted)};
+        cmocka_unit_test(environment_map), cmocka_unit_test(media), cmocka_unit_test(media_by_name), cmocka_unit_test(materials),
+        cmocka_unit_test(materials_of_version_3),
+        cmocka_unit_test(shapes), cmocka_unit_test(read_over), cmocka_unit_test(ends_of_ranges), cmocka_unit_test(counted), cmocka_unit_test(times_add_up)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
