@@ -17,6 +17,8 @@ assert d["split"] == "train" and len(d["scenes"]) == 3
 kinds = {p["criterion"] for p in d["points"]}
 assert {"uniform", "fixed", "limit", "attributes"} <= kinds, kinds
 limit = next(p for p in d["points"] if p["criterion"] == "limit")["scenes"]
+views = sorted(limit)
+assert len(views) == 3 and all(sorted(p["scenes"]) == views and len(p["stops"]) == 9 for p in d["points"])
 for s in limit:
     assert abs(limit[s]["worst"] - 1) < 1e-6 and limit[s]["noisy"] == 0 and limit[s]["samples_ratio"] < 1
 for p in d["points"]:

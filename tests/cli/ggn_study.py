@@ -174,6 +174,17 @@ for b in (0, 1):
     check(os.path.exists(os.path.join(study, "stimuli", "v0", f"b{b}-heavy.png")), f"  …and there, block {b}")
 fails("init: not over another study", "a study already", *init)
 fails("init: no views", "--views are needed", "init", os.path.join(TMP.name, "none"), "--task", "thresholds")
+many = [str(i) for i in range(1026)]
+fails("init: 1025 views", "at most 1024 views", "init", os.path.join(TMP.name, "none"), "--task", "thresholds", "--views", *many[:1025])
+fails("init: 1026 views", "one argument too many", "init", os.path.join(TMP.name, "none"), "--task", "thresholds", "--views", *many)
+named = os.path.join(TMP.name, "named")
+os.makedirs(named)
+for length in (95, 96):
+    with open(os.path.join(named, "study.json"), "w") as f:
+        json.dump({**definition, "views": [{**definition["views"][0], "name": "n" * length}]}, f)
+    r = ggn("report", named)
+    told = "a name must be 1 … 95 letters" in r.stderr
+    check(r.returncode == 2 and told == (length == 96), f"a name of {length} letters", r.stderr)
 fails(
     "init: no such task",
     "--task taste: expected thresholds or validation",
