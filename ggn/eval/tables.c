@@ -217,13 +217,14 @@ static int plot_roc(const char *path, const struct ggn_eval_set *s, enum ggn_spl
     return ggn_plot_end(&plot, !first, err);
 }
 
-/* Score against spp for six blocks spread over the split by threshold; dashed: the threshold. */
+/* Score against spp for six blocks spread over the split by threshold; dashed: the threshold. No picture of a method that
+ * judged none of them. */
 static int plot_scores(const char *path, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *m,
                        struct base_err *err)
 {
     enum { SHOWN = 6 };
     struct ggn_plot plot;
-    int chosen[SHOWN], n = 0, total = ggn_eval_count(s, split), seen = 0;
+    int chosen[SHOWN], n = 0, total = ggn_eval_count(s, split), seen = 0, judged = 0;
     static const char *const colours[SHOWN] = {"#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#17becf"};
     for (int b = 0; b < s->n_blocks && n < SHOWN; b++)
         if (s->blocks[b].split == split && seen++ * SHOWN >= n * total)
@@ -237,7 +238,7 @@ static int plot_scores(const char *path, const struct ggn_eval_set *s, enum ggn_
         fprintf(f, "$b%d << EOD\n", k);
         for (size_t i = b->first; i < b->end; i++)
             if (!isnan(m->score[i]))
-                fprintf(f, "%.0f %.6g\n", s->spp[i], m->score[i]);
+                judged |= fprintf(f, "%.0f %.6g\n", s->spp[i], m->score[i]) > 0;
         fprintf(f, "EOD\nset arrow from %.6g, graph 0 to %.6g, graph 1 nohead dt 2 lc '%s'\n", b->label.threshold,
                 b->label.threshold, colours[k]);
     }
@@ -254,7 +255,7 @@ static int plot_scores(const char *path, const struct ggn_eval_set *s, enum ggn_
         ggn_plot_quote(f, title);
     }
     fprintf(f, ", %.9g dt 3 lc '#444444' title 'cut'\n", isnan(m->cut) ? 0.0 : m->cut);
-    return ggn_plot_end(&plot, 1, err);
+    return ggn_plot_end(&plot, judged, err);
 }
 
 static void fill_view(struct ggn_view *v, const struct ggn_eval_set *s, int view, const double *stop)

@@ -90,6 +90,16 @@ P
 KEPT="$tmp/kept" PATH="$tmp/path:$PATH" $ggn evaluate -d "$tmp/early" -m "$tmp/m.ggn" -o "$tmp/report" >"$tmp/out" 2>"$tmp/err" &&
     python3 "$tmp/look.py" strips "$tmp/kept" "$tmp/report" "$tmp/early" >"$tmp/out" 2>"$tmp/err"
 check "strips: of a block that is converged from the start" $?
+# A recording so short that the network judges no window of it: the other pictures are drawn, by gnuplot itself.
+mkdir "$tmp/short"
+$bin/pathtracer tests/cli/room.pbrt -q --size 80x80 --block 40 --sampler independent --levels geometric:4:16:1.35 --reference-spp 0 \
+    --sequence "$tmp/short/view" --name view 2>"$tmp/err" &&
+    printf '{"format": "lull-labels", "version": 1, "source": "observer", "detail": "made up", "cap": 10000, "spread": 0.15, "blocks": [%s]}' \
+        "$(for id in 0 1 2 3; do printf '%s{"id": %d, "threshold": 20, "censored": false}' "$([ $id = 0 ] || echo ,)" $id; done)" \
+        >"$tmp/short/view/labels.json" &&
+    $ggn evaluate -d "$tmp/short" -m "$tmp/m.ggn" --recorded --no-quality -o "$tmp/few" >"$tmp/out" 2>"$tmp/err" &&
+    [ -s "$tmp/few/train-score-spp.png" ] && [ ! -e "$tmp/few/train-score-mggn.png" ] && [ -s "$tmp/few/train-stops-mggn.csv" ]
+check "a method that judged nothing has no picture of its scores" $?
 # The denoiser's strip is noisy image, denoised image and reference; its title has the SSIM of the first two against the third.
 oiiotool "$tmp/kept/validation-denoiser.png.part0.png" -d uint8 -o "$tmp/strip.ppm" >"$tmp/out" 2>&1
 cat >"$tmp/ssim.py" <<'P'
