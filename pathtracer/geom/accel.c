@@ -32,12 +32,6 @@ static void quadric_bounds(const struct RTCBoundsFunctionArguments *args)
     args->bounds_o->upper_z = upper.z;
 }
 
-static int quadric_query(const struct pt_quadric *q, const struct RTCRay *ray, float *t, pt_vec3 *p_quadric)
-{
-    return pt_quadric_intersect(q, v3(ray->org_x, ray->org_y, ray->org_z), v3(ray->dir_x, ray->dir_y, ray->dir_z),
-                                ray->tnear, ray->tfar, t, p_quadric);
-}
-
 /* Embree's packets of n rays are arrays of n, one after the other; in C it gives no names to them. */
 union lane {
     float f;
@@ -47,22 +41,22 @@ enum { ORG_X, ORG_Y, ORG_Z, TNEAR, DIR_X, DIR_Y, DIR_Z, TIME, TFAR, MASK, RAY_ID
 enum { NG_X = RAY_FIELDS, NG_Y, NG_Z, HIT_U, HIT_V, PRIM_ID, GEOM_ID, INST_ID, FIELDS };
 _Static_assert(sizeof(struct RTCRayHit16) == 16 * FIELDS * sizeof(union lane), "Embree has several levels of instances");
 
-static struct RTCRay lane_ray(const union lane *rays, unsigned n, unsigned i)
+/* Ray i of n. */
+static int quadric_query(const struct pt_quadric *q, const union lane *rays, unsigned n, unsigned i, float *t, pt_vec3 *p_quadric)
 {
-    return (struct RTCRay){.org_x = rays[ORG_X * n + i].f, .org_y = rays[ORG_Y * n + i].f, .org_z = rays[ORG_Z * n + i].f,
-                           .dir_x = rays[DIR_X * n + i].f, .dir_y = rays[DIR_Y * n + i].f, .dir_z = rays[DIR_Z * n + i].f,
-                           .tnear = rays[TNEAR * n + i].f, .tfar = rays[TFAR * n + i].f};
+    return pt_quadric_intersect(q, v3(rays[ORG_X * n + i].f, rays[ORG_Y * n + i].f, rays[ORG_Z * n + i].f),
+                                v3(rays[DIR_X * n + i].f, rays[DIR_Y * n + i].f, rays[DIR_Z * n + i].f),
+                                rays[TNEAR * n + i].f, rays[TFAR * n + i].f, t, p_quadric);
 }
 
 static void quadric_intersect(const struct RTCIntersectFunctionNArguments *args)
 {
     unsigned n = args->N;
     union lane *lanes = (union lane *)args->rayhit;
+    float t;
+    pt_vec3 p;
     for (unsigned i = 0; i < n; i++) {
-        struct RTCRay ray = lane_ray(lanes, n, i);
-        float t;
-        pt_vec3 p;
-        if (!args->valid[i] || !quadric_query(args->geometryUserPtr, &ray, &t, &p))
+        if (!args->valid[i] || !quadric_query(args->geometryUserPtr, lanes, n, i, &t, &p))
             continue;
         lanes[TFAR * n + i].f = t;
         lanes[HIT_U * n + i].f = lanes[HIT_V * n + i].f = 0.0f;
@@ -79,13 +73,11 @@ static void quadric_occluded(const struct RTCOccludedFunctionNArguments *args)
 {
     unsigned n = args->N;
     union lane *lanes = (union lane *)args->ray;
-    for (unsigned i = 0; i < n; i++) {
-        struct RTCRay ray = lane_ray(lanes, n, i);
-        float t;
-        pt_vec3 p;
-        if (args->valid[i] && quadric_query(args->geometryUserPtr, &ray, &t, &p))
+    float t;
+    pt_vec3 p;
+    for (unsigned i = 0; i < n; i++)
+        if (args->valid[i] && quadric_query(args->geometryUserPtr, lanes, n, i, &t, &p))
             lanes[TFAR * n + i].f = -INFINITY;
-    }
 }
 
 /* --- building --------------------------------------------------------------------------------------------------------- */
