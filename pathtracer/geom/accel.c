@@ -42,7 +42,8 @@ enum { NG_X = RAY_FIELDS, NG_Y, NG_Z, HIT_U, HIT_V, PRIM_ID, GEOM_ID, INST_ID, F
 _Static_assert(sizeof(struct RTCRayHit16) == 16 * FIELDS * sizeof(union lane), "Embree has several levels of instances");
 
 /* Ray i of n. */
-static int quadric_query(const struct pt_quadric *q, const union lane *rays, unsigned n, unsigned i, float *t, pt_vec3 *p_quadric)
+static int quadric_query(const struct pt_quadric *q, const union lane *rays, unsigned n, unsigned i, float *t,
+                         pt_vec3 *p_quadric)
 {
     return pt_quadric_intersect(q, v3(rays[ORG_X * n + i].f, rays[ORG_Y * n + i].f, rays[ORG_Z * n + i].f),
                                 v3(rays[DIR_X * n + i].f, rays[DIR_Y * n + i].f, rays[DIR_Z * n + i].f),

@@ -67,11 +67,10 @@ static float to_solid(const struct pt_light *light, float pdf_square, float sin_
     return sin_theta > 0.0f ? pdf_square / (2.0f * PT_PI * PT_PI * sin_theta) : 0.0f;
 }
 
-static float image_pdf(const struct pt_scene *scene, const struct pt_light *light, pt_vec3 w)
+/* Density of a place of the map. */
+static float map_pdf(const struct pt_scene *scene, const struct pt_light *light, float s, float t, float sin_theta)
 {
     const struct pt_env_distribution *d = &scene->env_distributions[light - scene->lights];
-    float s, t, sin_theta;
-    direction_to_map(light, w, &s, &t, &sin_theta);
     int32_t y = cell(t, d->height), x = cell(s, d->width);
     const float *columns = d->columns + (size_t)y * (size_t)(d->width + 1);
     float pdf = (columns[x + 1] - columns[x]) * (float)d->width * ((d->rows[y + 1] - d->rows[y]) * (float)d->height);
@@ -130,39 +129,45 @@ static float image_sample(const struct pt_scene *scene, const struct pt_light *l
     return to_solid(light, pdf, sin_theta);
 }
 
-float pt_light_env_density(const struct pt_scene *scene, const struct pt_light *light, pt_vec3 p, pt_vec3 w)
+/* One density of two ways: through the portal, and by the image's importance. */
+static float mixed(const struct pt_light *light, float through, float by_image)
 {
-    float through = light->has_portal ? pt_portal_pdf(light, p, w) : 0.0f;
     if (light->kind == PT_LIGHT_ENV_CONSTANT)
         return through;
-    return light->has_portal ? 0.5f * (through + image_pdf(scene, light, w)) : image_pdf(scene, light, w);
+    return light->has_portal ? 0.5f * (through + by_image) : by_image;
 }
 
-/* Sampling through the portal: u0 in [0, 1). */
-static float portal_sample(const struct pt_scene *scene, const struct pt_light *light, pt_vec3 p, float u0, float u1,
-                           struct pt_light_sample *out)
+float pt_light_env_density(const struct pt_scene *scene, const struct pt_light *light, pt_vec3 p, pt_vec3 w)
 {
-    float pdf = pt_portal_sample(light, p, u0, u1, &out->wi), s, t, sin_theta;
-    if (light->kind == PT_LIGHT_ENV_CONSTANT || !(pdf > 0.0f))
-        return pdf;
-    direction_to_map(light, out->wi, &s, &t, &sin_theta);
-    out->pixel = pixel_at(scene, light, s, t);
-    return 0.5f * (pdf + image_pdf(scene, light, out->wi));
+    float s, t, sin_theta, through = light->has_portal ? pt_portal_pdf(light, p, w) : 0.0f, by_image = 0.0f;
+    if (light->kind == PT_LIGHT_ENV_IMAGE) {
+        direction_to_map(light, w, &s, &t, &sin_theta);
+        by_image = map_pdf(scene, light, s, t, sin_theta);
+    }
+    return mixed(light, through, by_image);
 }
 
 int pt_light_env_sample(const struct pt_scene *scene, const struct pt_light *light, pt_vec3 p, float u0, float u1,
                         struct pt_light_sample *out)
 {
     const int constant = light->kind == PT_LIGHT_ENV_CONSTANT;
-    float pdf;
+    float s, t, sin_theta, through = 0.0f, by_image = 0.0f;
     out->pixel = NULL;
     if (light->has_portal && (constant || u0 < 0.5f)) {
-        pdf = portal_sample(scene, light, p, constant ? u0 : 2.0f * u0, u1, out);
+        through = pt_portal_sample(light, p, constant ? u0 : 2.0f * u0, u1, &out->wi);
+        if (!(through > 0.0f))
+            return 0;
+        if (!constant) {
+            direction_to_map(light, out->wi, &s, &t, &sin_theta);
+            out->pixel = pixel_at(scene, light, s, t);
+            by_image = map_pdf(scene, light, s, t, sin_theta);
+        }
     } else {
-        pdf = image_sample(scene, light, light->has_portal ? 2.0f * u0 - 1.0f : u0, u1, &out->wi, &out->pixel);
+        by_image = image_sample(scene, light, light->has_portal ? 2.0f * u0 - 1.0f : u0, u1, &out->wi, &out->pixel);
         if (light->has_portal)
-            pdf = 0.5f * (pdf + pt_portal_pdf(light, p, out->wi));
+            through = pt_portal_pdf(light, p, out->wi);
     }
+    float pdf = mixed(light, through, by_image);
     out->inv_pdf_solid = 1.0f / pdf;
     out->radiance = light->emission;
     out->delta = 0;
