@@ -277,10 +277,11 @@ PT_KERNEL_INLINE int pt_path_cross_medium(pt_effects fx, struct pt_path *path, f
 }
 
 PT_KERNEL_INLINE void pt_path_aux(pt_effects fx, const struct pt_path *path, const struct pt_bsdf *bsdf, pt_vec3 wo,
-                                  const struct pt_frame *frame, float t, struct pt_path_result *out)
+                                  const struct pt_frame *frame)
 {
+    struct pt_path_result *out = path->out;
     if (out->depth == INFINITY) {
-        out->depth = t;
+        out->depth = path->hit.t;
         out->normal_world = v3_dot(frame->n, path->ray.direction) > 0.0f ? v3_neg(frame->n) : frame->n;
     }
     if (pt_bsdf_has_smooth(fx, bsdf) && v3_is_black(out->albedo))
@@ -322,8 +323,7 @@ PT_KERNEL_INLINE struct pt_receiver pt_path_receiver(pt_effects fx, pt_vec3 p, c
 }
 
 /* Light and the next direction at a surface. 0: the path ends. */
-PT_KERNEL_INLINE int pt_path_bounce(pt_effects fx, struct pt_path *path, const struct pt_place *at, float t,
-                                    struct pt_path_result *out)
+PT_KERNEL_INLINE int pt_path_bounce(pt_effects fx, struct pt_path *path, const struct pt_place *at)
 {
     /* these need nothing of the hit: asked for first, they are worked out while its data arrive */
     struct pt_sample2 u_bsdf = pt_sampler_2d(&path->sampler, PT_DIM_BSDF),
@@ -337,7 +337,7 @@ PT_KERNEL_INLINE int pt_path_bounce(pt_effects fx, struct pt_path *path, const s
         bsdf.walk_key = pt_sampler_bits(&path->sampler, PT_DIM_BSDF_WALK);
     pt_vec3 wo = pt_frame_to_local(&frame, v3_neg(path->ray.direction));
     if (path->settings->want_aux)
-        pt_path_aux(fx, path, &bsdf, wo, &frame, t, out);
+        pt_path_aux(fx, path, &bsdf, wo, &frame);
     if (path->trace)
         pt_trace_surface(path->trace, at, &bsdf, path->throughput);
 
@@ -404,7 +404,7 @@ PT_KERNEL_INLINE int pt_path_vertex(pt_effects fx, struct pt_path *path)
     }
     if (at.shape->light >= 0)
         pt_path_add_emission(fx, path, &at);
-    return !pt_path_at_max_depth(path) && pt_path_bounce(fx, path, &at, path->hit.t, path->out);
+    return !pt_path_at_max_depth(path) && pt_path_bounce(fx, path, &at);
 }
 
 /* The result of a path that is over. */
