@@ -7,8 +7,10 @@
 
 static int compare_numbers(const void *a, const void *b)
 {
-    const uint32_t *const *x = a, *const *y = b;
-    return (**x > **y) - (**x < **y);
+    uint32_t x, y;
+    memcpy(&x, *(const char *const *)a, sizeof x);
+    memcpy(&y, *(const char *const *)b, sizeof y);
+    return (x > y) - (x < y);
 }
 
 static int compare_texts(const void *a, const void *b) { return strcmp(*(const char *const *)a, *(const char *const *)b); }
