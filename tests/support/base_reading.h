@@ -14,12 +14,8 @@ struct base_reading {
     double (*read_s)(char *copy, size_t size, size_t items);
 };
 
-/* The least thread seconds of `rounds` readings of an input of `items`, its bytes to *size; negative if it was refused. */
-double base_reading_s(const struct base_reading *r, size_t items, int rounds, size_t *size);
-
-/* The exponent of time against bytes from the smallest input to that of eight times the items: 1 where reading is linear, 2 where it is
- * quadratic. Measured again, three times at most, while it is above `bound`. Negative if an input was refused. */
-double base_reading_exponent(const struct base_reading *r, double bound);
+/* 0 where eight times the input takes no more than some twenty times as long, for each kind; says what it found. */
+int base_reading_check(const struct base_reading *readings, size_t count);
 
 /* One line `name;items;bytes;seconds` to stdout for each size, doubled while the next takes less than `limit_s`. 1: refused. */
 int base_reading_table(const struct base_reading *readings, size_t count, double limit_s);
