@@ -199,10 +199,20 @@ static int take(struct base_team *t, int *rank, struct letter **out, size_t *siz
 
 /* --- calls ---------------------------------------------------------------------------------------------------------- */
 
-/* Rank 0: one part from everybody. */
+static int ended_too_early(struct base_team *t, int rank)
+{
+    const struct farewell *f = &t->ended[rank];
+    return base_fail(&t->failed, f->status == 1 ? BASE_ENOMEM : BASE_EINVAL, "%s: %s", t->peers->list[rank].name,
+                     f->text[0] ? f->text : "ended too early");
+}
+
+/* Rank 0: one part from everybody. Who has given it may say goodbye while the others' are on their way. */
 static int take_parts(struct base_team *t)
 {
-    for (int left = t->peers->count - 1; left > 0; left--) {
+    for (int r = 1; r < t->peers->count; r++)
+        if (t->gone[r])
+            return ended_too_early(t, r);
+    for (int left = t->peers->count - 1; left > 0;) {
         int rank = 1;
         struct letter *l;
         size_t size;
@@ -210,20 +220,20 @@ static int take_parts(struct base_team *t)
             rank++;
         if (take(t, &rank, &l, &size))
             return t->failed.code;
-        if (l->kind == BYE && hear_end(t, rank, l, size) == 0) {
-            const struct farewell *f = &t->ended[rank];
-            base_fail(&t->failed, f->status == 1 ? BASE_ENOMEM : BASE_EINVAL, "%s: %s", t->peers->list[rank].name,
-                      f->text[0] ? f->text : "ended too early");
-        } else if (l->kind != PART || l->call != t->call || t->parts[rank].data) {
+        if (l->kind == PART && l->call == t->call && !t->parts[rank].data) {
+            t->parts[rank].size = size - sizeof *l;
+            memmove(l, l->bytes, size - sizeof *l);
+            t->parts[rank].data = l;
+            left--;
+            continue;
+        }
+        if (l->kind != BYE)
             base_team_refuse(t, rank);
-        }
-        if (t->failed.code) {
-            free(l);
+        else if (hear_end(t, rank, l, size) == 0 && !t->parts[rank].data)
+            ended_too_early(t, rank);
+        free(l);
+        if (t->failed.code)
             return t->failed.code;
-        }
-        t->parts[rank].size = size - sizeof *l;
-        memmove(l, l->bytes, size - sizeof *l);
-        t->parts[rank].data = l;
     }
     return 0;
 }

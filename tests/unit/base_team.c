@@ -21,6 +21,7 @@ struct seat {
     struct base_err err;
     void (*work)(struct seat *seat);
     int rc, status;
+    int heard; /* calls of which rank 0 has all parts */
     const char *said; /* last words */
     pthread_t thread;
 };
@@ -174,6 +175,8 @@ static void out_of_step(struct seat *s)
     base_team_collect(s->team, &word, sizeof word);
     if (base_team_rank(s->team) != 2)
         base_team_tell(s->team, &word, sizeof word);
+    else
+        nap(20); /* rank 1 has said goodbye by then: it did nothing wrong */
     base_team_collect(s->team, &word, sizeof word);
     s->rc = base_team_failed(s->team, &s->err);
 }
@@ -196,6 +199,29 @@ static void who_is_out_of_step_is_found(void **state)
     assert_int_equal(seats[0].status, 2);
     assert_int_equal(seats[1].rc, 0);
     assert_string_equal(seats[2].err.text, "rank 0 on host here said something that makes no sense");
+    (void)state;
+}
+
+/* Rank 1 gives its part and goes, which is right the first time; rank 0 hears it while it waits for rank 2. */
+static void give_and_go(struct seat *s)
+{
+    const int rank = base_team_rank(s->team), calls = rank == 1 ? 1 : 2;
+    const char letter = (char)('a' + rank);
+    for (int i = 0; i < calls && !s->rc; i++) {
+        nap(rank == 2 ? 20 : 0);
+        const struct base_team_part *parts = base_team_collect(s->team, &letter, 1);
+        s->heard += parts && *(char *)parts[1].data == 'b' && *(char *)parts[2].data == 'c';
+    }
+    s->rc = base_team_failed(s->team, &s->err);
+}
+
+static void who_has_given_its_part_may_go(void **state)
+{
+    struct seat seats[3];
+    together(seats, 3, give_and_go, 0);
+    assert_int_equal(seats[0].heard, 1);
+    assert_int_equal(seats[0].status, 2); /* the second call asks too much */
+    assert_string_equal(seats[0].err.text, "rank 1 on host here: ended too early");
     (void)state;
 }
 
@@ -265,6 +291,7 @@ int main(void)
         cmocka_unit_test(everybody_has_all_items_in_order), cmocka_unit_test(nobody_else_is_a_team_too),
         cmocka_unit_test(rank_0_gets_parts_of_any_size_and_is_heard), cmocka_unit_test(traffic_is_counted_both_ways),
         cmocka_unit_test(who_differs_is_named_with_the_line), cmocka_unit_test(who_is_out_of_step_is_found),
+        cmocka_unit_test(who_has_given_its_part_may_go),
         cmocka_unit_test(who_ends_early_says_why), cmocka_unit_test(the_job_has_the_status_of_who_failed),
         cmocka_unit_test(who_is_silent_is_given_up),
     };
