@@ -44,14 +44,14 @@ EXR_CFLAGS  := $(shell $(PKG) --cflags OpenEXR 2>/dev/null)
 BLAS_CFLAGS := $(shell $(PKG) --cflags openblas 2>/dev/null)
 BASE_LIBS := -lcjson -lpng -lz -lm
 PT_LIBS  := -lembree3 -lOpenEXRCore-3_1 -lcjson -lpng -lz -ldl -lm
-PT_IMAGE_LIBS := -lOpenImageIO -lOpenImageIO_Util -lstdc++# hundreds of libraries: the program loads them when it reads an image
+IMAGE_LIBS := -lOpenImageIO -lOpenImageIO_Util -lstdc++# hundreds of libraries: the programs load them when they read an image
 # MPI is optional and in a shared object of its own, so that programs run where it is not: MPI= leaves it out.
 MPI_PKG := $(firstword $(foreach p,ompi-c mpich,$(shell $(PKG) --exists $(p) 2>/dev/null && echo $(p))))
 MPI     ?= $(if $(MPI_PKG),1)
 MPI_CFLAGS := $(patsubst -I%,-isystem %,$(if $(MPI_PKG),$(shell $(PKG) --cflags $(MPI_PKG))))
 MPI_LIBS   := $(if $(MPI_PKG),$(shell $(PKG) --libs $(MPI_PKG)))
 STUDY_LIBS := -lmicrohttpd -lsqlite3
-GGN_LIBS := -lopenblas -llapacke -lsvm -lOpenImageIO -lOpenImageIO_Util -lcjson -lpng -lz -ldl -lstdc++ -lm
+GGN_LIBS := -lopenblas -llapacke -lsvm -lcjson -lpng -lz -ldl -lm
 
 # --- include paths: the dependency arrows --------------------------------------------------------------------------------
 API := -Iplugin-api/include
@@ -78,7 +78,8 @@ MPI_SRC     := $(wildcard plugin-api/mpi/*.c)
 PT_SRC      := $(wildcard pathtracer/*/*.c)
 PT_IMAGES   := $(wildcard pathtracer/*/*.cpp)# in a shared object of their own; tests link them
 PT_MAIN     := $(wildcard pathtracer/*.c)
-GGN_SRC     := $(filter-out ggn/plugin/% ggn/study/% ggn/cli/%,$(wildcard ggn/*/*.c ggn/*/*.cpp))
+GGN_SRC     := $(filter-out ggn/plugin/% ggn/study/% ggn/cli/%,$(wildcard ggn/*/*.c))
+GGN_IMAGES  := $(wildcard ggn/*/*.cpp)# as PT_IMAGES
 # What includes nn/real.h itself is compiled for float and, with GGN_DOUBLE, for double.
 GGN_TWICE   := $(shell grep -ls '"nn/real.h"' ggn/nn/*.c ggn/model/*.c tests/support/*.c)
 GGN_PLUGIN  := $(wildcard ggn/plugin/*.c)
@@ -98,13 +99,14 @@ BASE_OBJ    := $(call o,$(BASE_SRC))
 PT_CORE_OBJ := $(call o,$(PT_SRC)) $(BASE_OBJ)
 PT_OBJ      := $(PT_CORE_OBJ) $(call o,$(PT_IMAGES))
 LOADER_OBJ  := $(call o,$(LOADER_SRC))
-GGN_OBJ     := $(call o,$(GGN_SRC)) $(BASE_OBJ)
+GGN_CORE_OBJ := $(call o,$(GGN_SRC)) $(BASE_OBJ)
+GGN_OBJ     := $(GGN_CORE_OBJ) $(call o,$(GGN_IMAGES))
 GGN_PLUGIN_OBJ := $(call o,$(GGN_PLUGIN))
 GGN_STUDY_OBJ := $(call o,$(GGN_STUDY))
 
 PROGRAMS := $(if $(PT_MAIN),$(BIN)/pathtracer) $(if $(GGN_CLI),$(BIN)/ggn) $(if $(TOOL_SRC),$(BIN)/lull-check)
 MPI_MODULE := $(if $(MPI),$(OUT)/lib/lull-mpi.so)# loaded only by processes that a launcher has started
-MODULES  := $(MPI_MODULE) $(OUT)/lib/lull-images.so
+MODULES  := $(MPI_MODULE) $(OUT)/lib/lull-images.so $(OUT)/lib/ggn-images.so
 CRITERIA := $(EXAMPLE_SRC:plugin-api/examples/%.c=$(LIB)/%.so) $(if $(GGN_PLUGIN),$(LIB)/ggn.so)
 TESTS    := $(patsubst tests/%.c,$(OUT)/tests/%,$(TEST_SRC))
 SANE     := $(patsubst tests/%.c,build/asan/tests/%,$(SANE_SRC))
@@ -150,7 +152,7 @@ so   = @mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--version-script=plu
 
 $(BIN)/pathtracer: $(call o,$(PT_MAIN)) $(PT_CORE_OBJ) $(LOADER_OBJ) | $(OUT)/lib/lull-images.so
 	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) -o $@
-$(BIN)/ggn: $(call o,$(GGN_CLI)) $(GGN_STUDY_OBJ) $(GGN_OBJ)
+$(BIN)/ggn: $(call o,$(GGN_CLI)) $(GGN_STUDY_OBJ) $(GGN_CORE_OBJ) | $(OUT)/lib/ggn-images.so
 	$(link) $^ $(LDFLAGS_ALL) $(STUDY_LIBS) $(GGN_LIBS) -o $@
 # Of what both programs stand on the checker takes what it names.
 $(OBJ)/base.a: $(BASE_OBJ)
@@ -158,11 +160,13 @@ $(OBJ)/base.a: $(BASE_OBJ)
 $(BIN)/lull-check: $(call o,$(TOOL_SRC)) $(LOADER_OBJ) $(OBJ)/base.a
 	$(link) $^ $(LDFLAGS_ALL) -ldl -lm -o $@
 $(OUT)/lib/lull-images.so: $(call o,$(PT_IMAGES)) $(OBJ)/base.a
-	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--exclude-libs,ALL $^ $(LDFLAGS_ALL) $(PT_IMAGE_LIBS) -lz -lm -o $@
+$(OUT)/lib/ggn-images.so: $(call o,$(GGN_IMAGES)) $(OBJ)/base.a
+$(OUT)/lib/lull-images.so $(OUT)/lib/ggn-images.so:
+	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--exclude-libs,ALL $^ $(LDFLAGS_ALL) $(IMAGE_LIBS) -lz -lm -o $@
 $(OUT)/lib/lull-mpi.so: $(call o,$(MPI_SRC)) $(OBJ)/base.a
 	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--exclude-libs,ALL $^ $(LDFLAGS_ALL) $(MPI_LIBS) -lm -o $@
 # Of the networks the criteria take what they name: no image is read there, and no image library loaded.
-$(OBJ)/ggn.a: $(GGN_OBJ)
+$(OBJ)/ggn.a: $(GGN_CORE_OBJ)
 	@rm -f $@; echo "  AR   $@"; $(AR) rcs $@ $^
 $(LIB)/ggn.so: $(GGN_PLUGIN_OBJ) $(OBJ)/ggn.a plugin-api/plugin.map
 	$(so) $(filter %.o %.a,$^) $(LDFLAGS_ALL) -Wl,--as-needed $(GGN_LIBS) -o $@
@@ -177,13 +181,13 @@ SUPPORT_api := $(call o,$(filter-out tests/support/pt_% tests/support/ggn_% test
 SUPPORT_base := $(call o,$(wildcard tests/support/base_*.c))
 define test_rules
 $(OUT)/tests/$(1)/pt_%: $(OBJ)/tests/$(1)/pt_%.c.o $(PT_OBJ) $(LOADER_OBJ) $(SUPPORT_pt)
-	$$(link) $$^ $$(LDFLAGS_ALL) $(PT_LIBS) $(PT_IMAGE_LIBS) -lcmocka -o $$@
+	$$(link) $$^ $$(LDFLAGS_ALL) $(PT_LIBS) $(IMAGE_LIBS) -lcmocka -o $$@
 $(OUT)/tests/$(1)/ggn_%: $(OBJ)/tests/$(1)/ggn_%.c.o $(GGN_OBJ) $(SUPPORT_ggn)
-	$$(link) $$^ $$(LDFLAGS_ALL) $(GGN_LIBS) -lcmocka -o $$@
+	$$(link) $$^ $$(LDFLAGS_ALL) $(GGN_LIBS) $(IMAGE_LIBS) -lcmocka -o $$@
 $(OUT)/tests/$(1)/ggn_study%: $(OBJ)/tests/$(1)/ggn_study%.c.o $(GGN_STUDY_OBJ) $(GGN_OBJ) $(SUPPORT_ggn)
-	$$(link) $$^ $$(LDFLAGS_ALL) $(STUDY_LIBS) $(GGN_LIBS) -lcmocka -o $$@
+	$$(link) $$^ $$(LDFLAGS_ALL) $(STUDY_LIBS) $(GGN_LIBS) $(IMAGE_LIBS) -lcmocka -o $$@
 $(OUT)/tests/$(1)/ggn_plugin%: $(OBJ)/tests/$(1)/ggn_plugin%.c.o $(GGN_PLUGIN_OBJ) $(GGN_OBJ) $(SUPPORT_ggn)
-	$$(link) $$^ $$(LDFLAGS_ALL) $(GGN_LIBS) -lcmocka -o $$@
+	$$(link) $$^ $$(LDFLAGS_ALL) $(GGN_LIBS) $(IMAGE_LIBS) -lcmocka -o $$@
 $(OUT)/tests/$(1)/api_%: $(OBJ)/tests/$(1)/api_%.c.o $(LOADER_OBJ) $(SUPPORT_api)
 	$$(link) $$^ $$(LDFLAGS_ALL) -ldl -lm -lcmocka -o $$@
 $(OUT)/tests/$(1)/base_%: $(OBJ)/tests/$(1)/base_%.c.o $(BASE_OBJ) $(SUPPORT_base)
@@ -196,18 +200,18 @@ $(OUT)/tests/abi/plugins/%.so: $(OBJ)/tests/abi/plugins/%.c.o
 	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared $< $(LDFLAGS_ALL) -lm -o $@
 $(patsubst tests/%.c,$(OUT)/tests/%,$(wildcard tests/abi/api_*.c)): | $(ABI_PLUGINS) $(CRITERIA)
 $(OUT)/fuzz/replay-pt_%: $(OBJ)/tests/fuzz/pt_%.c.o $(OBJ)/tests/fuzz/replay.c.o $(PT_OBJ) $(LOADER_OBJ)
-	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) $(PT_IMAGE_LIBS) -o $@
+	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) $(IMAGE_LIBS) -o $@
 $(OUT)/fuzz/replay-ggn_study%: $(OBJ)/tests/fuzz/ggn_study%.c.o $(OBJ)/tests/fuzz/replay.c.o $(GGN_STUDY_OBJ) $(GGN_OBJ)
-	$(link) $^ $(LDFLAGS_ALL) $(STUDY_LIBS) $(GGN_LIBS) -o $@
+	$(link) $^ $(LDFLAGS_ALL) $(STUDY_LIBS) $(GGN_LIBS) $(IMAGE_LIBS) -o $@
 $(OUT)/fuzz/replay-ggn_%: $(OBJ)/tests/fuzz/ggn_%.c.o $(OBJ)/tests/fuzz/replay.c.o $(GGN_OBJ)
-	$(link) $^ $(LDFLAGS_ALL) $(GGN_LIBS) -o $@
+	$(link) $^ $(LDFLAGS_ALL) $(GGN_LIBS) $(IMAGE_LIBS) -o $@
 
 # Measuring programs; scripts/bench runs them.
 BENCHES := $(patsubst tests/bench/%.c,$(OUT)/bench/%,$(wildcard tests/bench/*.c))
 $(OUT)/bench/pt_%: $(OBJ)/tests/bench/pt_%.c.o $(PT_OBJ) $(LOADER_OBJ) $(SUPPORT_pt)
-	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) $(PT_IMAGE_LIBS) -lcmocka -o $@
+	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) $(IMAGE_LIBS) -lcmocka -o $@
 $(OUT)/bench/ggn_%: $(OBJ)/tests/bench/ggn_%.c.o $(GGN_OBJ) $(SUPPORT_ggn)
-	$(link) $^ $(LDFLAGS_ALL) $(GGN_LIBS) -lcmocka -o $@
+	$(link) $^ $(LDFLAGS_ALL) $(GGN_LIBS) $(IMAGE_LIBS) -lcmocka -o $@
 
 setup: ## install the Debian packages that are missing
 	@scripts/setup
@@ -243,11 +247,11 @@ fuzz: ## fuzz each target for FUZZ_SECONDS (default 60) under ASan+UBSan; needs 
 .PHONY: fuzzers
 fuzzers: $(FUZZERS)
 build/fuzz/pt_%: $(OBJ)/tests/fuzz/pt_%.c.o $(PT_OBJ) $(LOADER_OBJ)
-	$(link) -fsanitize=fuzzer $^ $(LDFLAGS_ALL) $(PT_LIBS) $(PT_IMAGE_LIBS) -o $@
+	$(link) -fsanitize=fuzzer $^ $(LDFLAGS_ALL) $(PT_LIBS) $(IMAGE_LIBS) -o $@
 build/fuzz/ggn_study%: $(OBJ)/tests/fuzz/ggn_study%.c.o $(GGN_STUDY_OBJ) $(GGN_OBJ)
-	$(link) -fsanitize=fuzzer $^ $(LDFLAGS_ALL) $(STUDY_LIBS) $(GGN_LIBS) -o $@
+	$(link) -fsanitize=fuzzer $^ $(LDFLAGS_ALL) $(STUDY_LIBS) $(GGN_LIBS) $(IMAGE_LIBS) -o $@
 build/fuzz/ggn_%: $(OBJ)/tests/fuzz/ggn_%.c.o $(GGN_OBJ)
-	$(link) -fsanitize=fuzzer $^ $(LDFLAGS_ALL) $(GGN_LIBS) -o $@
+	$(link) -fsanitize=fuzzer $^ $(LDFLAGS_ALL) $(GGN_LIBS) $(IMAGE_LIBS) -o $@
 
 mutants: ## plant single-line faults and see that the tests notice (hours; resumes)
 	@scripts/mutants $(MUTANTS_FLAGS) $(TEST_SRC) $(SCRIPT_TEST)
@@ -293,7 +297,7 @@ install: all ## install under $(DESTDIR)$(PREFIX)
 	sed 's|@PREFIX@|$(PREFIX)|g' plugin-api/lull-criterion.pc.in > $(DESTDIR)$(PREFIX)/lib/pkgconfig/lull-criterion.pc
 
 compdb: ## write compile_commands.json
-	@{ echo '['; sep=; for f in $(BASE_SRC) $(PT_SRC) $(PT_IMAGES) $(PT_MAIN) $(GGN_SRC) $(GGN_PLUGIN) $(GGN_STUDY) $(GGN_CLI) $(LOADER_SRC) $(EXAMPLE_SRC) $(TOOL_SRC) $(MPI_SRC); do \
+	@{ echo '['; sep=; for f in $(BASE_SRC) $(PT_SRC) $(PT_IMAGES) $(PT_MAIN) $(GGN_SRC) $(GGN_IMAGES) $(GGN_PLUGIN) $(GGN_STUDY) $(GGN_CLI) $(LOADER_SRC) $(EXAMPLE_SRC) $(TOOL_SRC) $(MPI_SRC); do \
 	  printf '%s' "$$sep"; $(MAKE) --no-print-directory -s compdb-one F=$$f; sep=,; done; echo ']'; } > compile_commands.json
 .PHONY: compdb-one
 compdb-one:

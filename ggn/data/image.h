@@ -1,8 +1,8 @@
 /*
  * Images in and out of ggn: whole images in memory, RGB, rows top to bottom, no padding.
  *
- * The only door to OpenImageIO (ggn/data/oiio.cpp is the one C++ file). Any format that OpenImageIO reads is accepted; what
- * comes out is always three channels: grey is repeated, alpha is dropped. Thread-safe on distinct objects.
+ * The only door to OpenImageIO (data/oiio.h). Any format that it reads is accepted; what comes out is always three channels:
+ * grey is repeated, alpha is dropped. BASE_EIO when lib/ggn-images.so cannot be loaded. Thread-safe on distinct objects.
  */
 #ifndef GGN_DATA_IMAGE_H
 #define GGN_DATA_IMAGE_H

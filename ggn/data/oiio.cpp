@@ -1,11 +1,9 @@
-// OpenImageIO behind ggn/data/image.h: the only C++ in ggn. Exceptions end here.
+// OpenImageIO behind ggn/data/oiio.h: the only C++ in ggn. Exceptions end here.
 extern "C" {
-#include "base/colour.h"
 #include "base/files.h"
 }
 
-#include "data/image.h"
-#include "model/preprocess.h"
+#include "data/oiio.h"
 
 #include <algorithm>
 #include <cstdio>
@@ -83,7 +81,8 @@ void find_rgb(const ImageSpec &spec, int rgb[3])
             rgb[c] = spec.nchannels >= 3 ? c : 0;
 }
 
-template <class T, class Image> int read_rgb(const char *path, Image *image, bool *is_float, struct base_err *err)
+template <class T, class Image>
+int read_rgb(const char *path, bool of_floats, Image *image, int *is_float, struct base_err *err)
 {
     if (int rc = base_file_check_input(path, err))
         return rc;
@@ -96,6 +95,8 @@ template <class T, class Image> int read_rgb(const char *path, Image *image, boo
     if (!sane(spec))
         return base_fail(err, BASE_EINVAL, "%s: %dx%d is not a size that can be used", path, spec.width, spec.height);
     *is_float = spec.format.is_floating_point();
+    if (*is_float && !of_floats)
+        return 0;
     int rgb[3];
     find_rgb(spec, rgb);
     int lo = std::min(rgb[0], std::min(rgb[1], rgb[2])), hi = std::max(rgb[0], std::max(rgb[1], rgb[2])) + 1;
@@ -127,21 +128,7 @@ template <class F> int guarded(const char *path, struct base_err *err, F body)
     }
 }
 
-int read_float(const char *path, struct ggn_imagef *image, struct base_err *err)
-{
-    bool is_float = false;
-    struct ggn_imagef out = {0, 0, 3, nullptr};
-    int rc = read_rgb<float>(path, &out, &is_float, err);
-    if (rc)
-        return rc;
-    if (!is_float)
-        for (size_t i = 0, n = (size_t)out.width * (size_t)out.height * 3; i < n; i++)
-            out.data[i] = (float)base_srgb_eotf(out.data[i]);
-    *image = out;
-    return 0;
-}
-
-int read_channel(const char *path, const char *channel, struct ggn_imagef *image, struct base_err *err)
+int find_channel(const char *path, const char *channel, struct ggn_imagef *image, struct base_err *err)
 {
     if (int rc = base_file_check_input(path, err))
         return rc;
@@ -171,48 +158,23 @@ int read_channel(const char *path, const char *channel, struct ggn_imagef *image
     return base_fail(err, BASE_EINVAL, "%s: has no channel '%s'", path, channel);
 }
 
+// A file of floats is only known as one: what it holds is read as such.
+int read_display(const char *path, struct ggn_image8 *image, int *is_float, struct base_err *err)
+{
+    return guarded(path, err, [&] { return read_rgb<uint8_t>(path, false, image, is_float, err); });
+}
+
+int read_linear(const char *path, struct ggn_imagef *image, int *is_float, struct base_err *err)
+{
+    image->channels = 3;
+    return guarded(path, err, [&] { return read_rgb<float>(path, true, image, is_float, err); });
+}
+
+int read_channel(const char *path, const char *channel, struct ggn_imagef *image, struct base_err *err)
+{
+    return guarded(path, err, [&] { return find_channel(path, channel, image, err); });
+}
+
 } // namespace
 
-static bool is_light(float v)
-{
-    return std::isfinite(v) && v >= 0.0f;
-}
-
-extern "C" int ggn_image8_read(const char *path, struct ggn_image8 *image, struct base_err *err)
-{
-    return guarded(path, err, [&] {
-        bool is_float = false;
-        struct ggn_image8 out = {0, 0, nullptr, 0};
-        int rc = read_rgb<uint8_t>(path, &out, &is_float, err);
-        if (rc || !is_float) {
-            if (!rc)
-                *image = out;
-            return rc;
-        }
-        struct ggn_imagef linear = {0, 0, 0, nullptr};
-        rc = read_float(path, &linear, err);
-        if (!rc) {
-            for (size_t i = 0, n = (size_t)out.width * (size_t)out.height; i < n; i++) {
-                const float *rgb = linear.data + 3 * i;
-                for (size_t c = 0; c < 3; c++)
-                    out.data[3 * i + c] = ggn_preprocess(rgb[c], nullptr, nullptr);
-                out.clipped += !(is_light(rgb[0]) && is_light(rgb[1]) && is_light(rgb[2]));
-            }
-            ggn_imagef_release(&linear);
-            *image = out;
-        } else {
-            ggn_image8_release(&out);
-        }
-        return rc;
-    });
-}
-
-extern "C" int ggn_imagef_read(const char *path, struct ggn_imagef *image, struct base_err *err)
-{
-    return guarded(path, err, [&] { return read_float(path, image, err); });
-}
-
-extern "C" int ggn_imagef_read_channel(const char *path, const char *channel, struct ggn_imagef *image, struct base_err *err)
-{
-    return guarded(path, err, [&] { return read_channel(path, channel, image, err); });
-}
+extern "C" const struct ggn_oiio_library ggn_oiio_library = {read_display, read_linear, read_channel};

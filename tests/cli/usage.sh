@@ -35,5 +35,12 @@ refused "expected CRITERION" "$bin/lull-check"
 refused "--threads 1: expected an integer from 2 to 32" "$bin/lull-check" -t 1 x
 refused "--only nothing: no such check" "$bin/lull-check" -o nothing x
 refused "--param x: expected KEY=VALUE" "$bin/lull-check" -p x y
+# OpenImageIO is loaded by who reads an image.
+mkdir -p "$tmp/alone/bin" && cp "$bin/ggn" "$tmp/alone/bin" && "$tmp/alone/bin/ggn" --version >"$tmp/out"
+check "ggn starts without the image library" $?
+picture=scenes/demo-reference.png
+refused "$picture: images cannot be read: lib/ggn-images.so" "$tmp/alone/bin/ggn" flip $picture $picture
+mkdir "$tmp/alone/lib" && cp "$bin/../lib/ggn-images.so" "$tmp/alone/lib" && "$tmp/alone/bin/ggn" flip $picture $picture >"$tmp/out"
+check "  ...which is found beside the program" $?
 echo "1..$n"
 exit $bad
