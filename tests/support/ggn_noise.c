@@ -76,9 +76,10 @@ static void add_frame(struct seq_builder *w, const struct film *f, const struct 
         dammertz += 3.0 * fabs(half[p]) / sqrt(fmax(total, 1e-3)) / pixels;
         rse += n->sigma * n->sigma / f->spp / fmax(total * total / 9.0, 4e-4) / pixels;
     }
-    struct seq_stat stats[] = {{"dammertz", dammertz}, {"half_unsettled", 0.0}, {"rse", sqrt(rse)}, {"rse_unsettled", 0.0}, {"seconds", 1e-3 * f->spp}};
+    struct seq_stat stats[] = {{"dammertz", dammertz}, {"half_unsettled", 0.0}, {"rse", sqrt(rse)}, {"rse_unsettled", 0.0}, {"seconds", 1e-3 * f->spp},
+                               {"tail999", n->tail / sqrt(f->spp)}, {"gini", 0.3 + 0.1 * n->sigma}};
     struct seq_frame frame = {.spp = f->spp, .half_spp = f->spp / 2, .is_reference = is_reference, .full = full, .display = display,
-                                  .mean = mean, .half = is_reference ? NULL : half, .stats = stats, .n_stats = is_reference ? 0 : 5};
+                                  .mean = mean, .half = is_reference ? NULL : half, .stats = stats, .n_stats = is_reference ? 0 : n->tail > 0.0 ? 7 : 5};
     assert_int_equal(seq_builder_add(w, &frame, NULL), 0);
     free(display);
     free(half);

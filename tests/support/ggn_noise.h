@@ -15,6 +15,7 @@ struct ggn_noise {
     uint32_t n_levels, reference_spp; /* 0: no reference */
     double sigma, texture;
     uint32_t seed;
+    double tail; /* the statistics tail999 (this at one sample) and gini are recorded; 0: they are not */
 };
 
 uint32_t ggn_noise_hash(uint32_t k, uint32_t s);
