@@ -346,11 +346,12 @@ void ggn_trainer_set_pictures(struct ggn_trainer *t, const real *const *pictures
     }
 }
 
-/* D forward, weighted BCE, D backward (its own gradient is added to grad, that of the maps stays in d). */
+/* D forward, mean BCE, D backward (its own gradient is added to grad, that of the maps stays in d). */
 static double judge(struct ggn_trainer *t, const struct ggn_batch *b, double *logits)
 {
     const int out = t->graph[GGN_NET_D].n_values - 1;
-    double each[GGN_BATCH_MAX], total = 0, weights = 0;
+    const double share = 1.0 / b->count;
+    double each[GGN_BATCH_MAX], total = 0;
     double *z = logits ? logits : each;
     int first, n = mine(t, b->count, &first);
 
@@ -359,12 +360,7 @@ static double judge(struct ggn_trainer *t, const struct ggn_batch *b, double *lo
     for (int i = 0; i < n; i++)
         z[first + i] = (double)*ggn_exec_plane(t->d, out, i, 0);
     base_team_gather_items(t->team, z, sizeof *z, b->count);
-    for (int i = 0; i < b->count; i++)
-        weights += b->weight ? b->weight[i] : 1;
-    if (weights <= 0)
-        weights = 1;
     for (int i = 0; i < b->count; i++) {
-        double share = (b->weight ? b->weight[i] : 1) / weights;
         total += share * ggn_bce(z[i], b->label[i]);
         if (i >= first && i < first + n)
             *ggn_exec_grad(t->d, out, i - first, 0) = (real)(share * ggn_bce_grad(z[i], b->label[i]));

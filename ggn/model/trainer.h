@@ -48,7 +48,6 @@ struct ggn_batch {
     const real *const *reference; /* [mine][3] for ggn_trainer_paper_step */
     const real *const *picture;   /* [mine] noise pictures, GGN_PICTURE_GAIN · codes, NULL: none; with hyper.picture */
     const double *label;          /* [count] 1 = still noisy, 0 = not, between = uncertain */
-    const double *weight;         /* [count] of each sample in the loss, or NULL = 1 */
 };
 
 struct ggn_trainer {
@@ -87,7 +86,7 @@ int ggn_trainer_denoiser_step(struct ggn_trainer *trainer, const real *const *x,
                               double *loss, struct base_err *err);
 
 /* One Adam step of M and D on given denoised windows, mended form: both windows pass M in one batch (shared statistics), one
- * backward pass, all of M is trained. *bce = weighted mean before it; logits (may be NULL) [count]. */
+ * backward pass, all of M is trained. *bce = mean before it; logits (may be NULL) [count]. */
 int ggn_trainer_judge_step(struct ggn_trainer *trainer, const struct ggn_batch *batch, double *bce, double *logits,
                            struct base_err *err);
 

@@ -176,7 +176,5 @@ int ggn_phase_denoiser(struct ggn_session *s, const char *checkpoint, struct bas
     if (rc)
         return rc;
     ggn_weights_copy(s->r, s->trainer->weights[GGN_NET_R]->params);
-    ggn_trainer_destroy(s->trainer);
-    s->trainer = NULL;
     return 0;
 }

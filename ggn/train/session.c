@@ -165,6 +165,7 @@ int ggn_session_begin(struct ggn_session *s, int parts, int batch, int height, i
     o.seed = s->plan->seed;
     o.lr[GGN_NET_R] = s->plan->lr_r;
     o.lr[GGN_NET_M] = o.lr[GGN_NET_D] = s->plan->lr;
+    ggn_trainer_destroy(s->trainer);
     s->trainer = ggn_trainer_create(&hyper, &o, s->threads, s->plan->team, err);
     return s->trainer ? 0 : BASE_ENOMEM;
 }

@@ -47,7 +47,7 @@ void ggn_session_release(struct ggn_session *session);
 /* Loads plan->init: a model of the same networks. */
 int ggn_session_load_init(struct ggn_session *session, struct base_err *err);
 
-/* Makes the trainer of a phase with the networks GGN_TRAIN_* for blocks of height × width. */
+/* Makes the trainer of a phase with the networks GGN_TRAIN_* for blocks of height × width, in the place of the former. */
 int ggn_session_begin(struct ggn_session *session, int parts, int batch, int height, int width, struct base_err *err);
 
 /* To and from `best`. */

@@ -13,11 +13,13 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "base/files.h"
 #include "ggn_noise.h"
 #include "ggn_seqgen.h"
 #include "sequence/manifest.h"
 #include "nn/exec.h"
 #include "train/fit_policy.h"
+#include "train/session.h"
 #include "train/start.h"
 #include "data/windows.h"
 #include "nn/hash.h"
@@ -518,6 +520,262 @@ static void the_threshold_respects_the_early_rate(void **state)
     (void)state;
 }
 
+/* --- numbers of a plan, and what is fitted: closed forms ------------------------------------------------------------------ */
+
+/* Every number of both presets' plans, in the order of the struct. */
+static void default_plans(void **state)
+{
+    static const struct {
+        double ratio;
+        int window, k[3], crop, batch_r, batch, steps, epochs, epoch_steps, patience;
+        double lr, difference;
+        int soft, flips;
+        double jitter;
+        int synthetic, extend;
+    } want[] = {{0, 6, {16, 20, 64}, 0, 16, 64, 0, 30, 0, 0, 2e-4, 0, 0, 0, 0, 0, 0},
+                {1.1, 6, {8, 10, 32}, 96, 16, 16, 2000, 30, 100, 8, 1e-3, 8, 1, 1, 0.3, 1, 1}};
+
+    for (int preset = 0; preset < 2; preset++) {
+        const struct ggn_train_plan p = ggn_train_plan_default((enum ggn_preset)preset);
+        assert_true(p.preset == (enum ggn_preset)preset && p.data.ratio == want[preset].ratio && !p.data.dir);
+        assert_true(!p.out && !p.init && !p.resume && !p.team && !p.progress && !p.interrupted);
+        assert_true(p.window == want[preset].window && p.k_r == want[preset].k[0] && p.k_m == want[preset].k[1]);
+        assert_true(p.k_d == want[preset].k[2] && p.crop == want[preset].crop && p.batch_r == want[preset].batch_r);
+        assert_true(p.batch == want[preset].batch && p.steps == want[preset].steps && p.steps_r == p.steps);
+        assert_true(p.epochs == want[preset].epochs && p.epoch_steps == want[preset].epoch_steps);
+        assert_true(p.patience == want[preset].patience && p.lr == want[preset].lr && p.lr_r == p.lr);
+        assert_true(p.difference == want[preset].difference && p.soft_labels == want[preset].soft);
+        assert_true(p.flips == want[preset].flips && p.jitter == want[preset].jitter && p.picture == 0 && p.average == 0);
+        assert_true(p.synthetic == want[preset].synthetic && p.extend == want[preset].extend && p.seed == 1);
+        assert_true(p.validation_windows == 400 && p.early_rate == 0.02 && p.threads == 0);
+        const struct ggn_train_options o = ggn_train_options_default((enum ggn_preset)preset);
+        assert_true(o.parts == GGN_TRAIN_ALL && o.batch == want[preset].batch && o.beta1 == 0.5 && o.beta2 == 0.999);
+        assert_true(o.eps == 1e-8 && o.clip == preset && o.explode == 1e6 && o.keep_every == 100 && o.dropout == 1);
+        assert_true(o.seed == 1 && o.bf16 == 0);
+        for (int net = 0; net < GGN_NETS; net++) {
+            assert_true(o.lr[net] == 2e-4);
+            assert_int_equal(o.init[net], preset ? GGN_INIT_HE : net == GGN_NET_D ? GGN_INIT_GAN : GGN_INIT_PAPER);
+        }
+    }
+    (void)state;
+}
+
+/* A ramp of a fiftieth of the steps, twenty at least, times half a cosine from 1 to a fiftieth; a half for each divergence. */
+static void learning_rates(void **state)
+{
+    static const double steps[] = {0, 10, 1000, 5000};
+
+    for (int k = 0; k < 4; k++)
+        for (double step = 0; step <= steps[k]; step += steps[k] / 10 + (steps[k] == 0)) {
+            struct ggn_session s = {.progress.divergences = k};
+            double t = steps[k] > 0 ? floor(step) / steps[k] : 0, ramp = fmin(1, (floor(step) + 1) / fmax(20, steps[k] / 50));
+            double want = 3 * ramp * (0.02 + 0.98 * (0.5 + 0.5 * cos(3.141592653589793 * t))) / pow(2, k);
+            double got = ggn_session_lr(&s, 3, (uint64_t)step, (uint64_t)steps[k]);
+            if (!(fabs(got - want) <= 1e-12))
+                fail_msg("step %g of %g: %.15g, not %.15g", step, steps[k], got, want);
+        }
+    (void)state;
+}
+
+/* Where the derivatives of −log likelihood + (a − 1)²/2 + b²/200 are zero, in few cases too, where the prior counts. */
+static void platt_is_at_the_minimum(void **state)
+{
+    for (uint32_t n = 2; n < 60; n += 7) {
+        double logit[64], label[64], ga, gb;
+        struct ggn_policy p = ggn_policy_default();
+        for (uint32_t i = 0; i < n; i++) {
+            logit[i] = 9 * ggn_hash_unit(i, n) - 3;
+            label[i] = i < 2 ? i : ggn_hash_unit(i, n + 1) < 0.3 ? 1 - (logit[i] > 1) : logit[i] > 1;
+        }
+        ggn_calibrate_platt(logit, label, (int)n, &p);
+        ga = p.scale - 1;
+        gb = p.shift / 100;
+        for (uint32_t i = 0; i < n; i++) {
+            double d = 1 / (1 + exp(-(p.scale * logit[i] + p.shift))) - label[i];
+            ga += d * logit[i];
+            gb += d;
+        }
+        if (!(fabs(ga) < 1e-8 && fabs(gb) < 1e-8))
+            fail_msg("%u cases: derivatives %g and %g at %g, %g", n, ga, gb, p.scale, p.shift);
+    }
+    /* half a case of each class is the least that says something */
+    static const double half[] = {0.5, 0, 0.0}, less[] = {0.49, 0, 0}, all[] = {1, 1, 0.51}, enough[] = {1, 1, 0.5};
+    static const double z[] = {2, -2, -1}, inverted[] = {-50, 50, 40};
+    static const double first[] = {1, 0, 0};
+    struct ggn_policy p = ggn_policy_default();
+    ggn_calibrate_platt(z, less, 3, &p);
+    assert_true(p.scale == 1 && p.shift == 0);
+    ggn_calibrate_platt(z, all, 3, &p);
+    assert_true(p.scale == 1 && p.shift == 0);
+    ggn_calibrate_platt(inverted, first, 3, &p); /* a network that says the opposite is not turned round */
+    assert_true(p.scale == 1 && p.shift == 0);
+    ggn_calibrate_platt(z, half, 3, &p);
+    assert_true(p.scale != 1 && p.shift != 0);
+    p = ggn_policy_default();
+    ggn_calibrate_platt(z, enough, 3, &p);
+    assert_true(p.scale != 1 && p.shift != 0);
+    (void)state;
+}
+
+/* The regression of the calibrated logit on octaves, of windows within one of them. */
+static void slopes(void **state)
+{
+    enum { N = 40 };
+    struct ggn_window list[N];
+    struct ggn_windows w = {.n = N, .list = list};
+    struct ggn_policy p = {.scale = 2, .shift = 5};
+    double logit[N], mean_x = 0, mean_y = 0, xy = 0, xx = 0;
+    int n = 0;
+
+    for (uint32_t i = 0; i < N; i++) {
+        list[i] = (struct ggn_window){.octave = i < 2 ? 1 - 2.0 * i : 5 * ggn_hash_unit(i, 1) - 2.5};
+        logit[i] = -3 * list[i].octave + ggn_hash_unit(i, 2) + (fabs(list[i].octave) > 1 ? 100 : 0);
+        if (fabs(list[i].octave) <= 1) {
+            mean_x += list[i].octave;
+            mean_y += 2 * logit[i] + 5;
+            n++;
+        }
+    }
+    mean_x /= n;
+    mean_y /= n;
+    for (int i = 0; i < N; i++)
+        if (fabs(list[i].octave) <= 1) {
+            xy += (list[i].octave - mean_x) * (2 * logit[i] + 5 - mean_y);
+            xx += (list[i].octave - mean_x) * (list[i].octave - mean_x);
+        }
+    assert_true(fabs(ggn_calibrate_slope(&w, logit, &p) + xy / xx) < 1e-9);
+    for (int i = 0; i < N; i++)
+        logit[i] = -logit[i];
+    assert_true(ggn_calibrate_slope(&w, logit, &p) == 0); /* more samples, more noise: nothing to predict from */
+    w.n = 1;
+    assert_true(ggn_calibrate_slope(&w, logit, &p) == 0);
+    (void)state;
+}
+
+/* Three blocks with made-up p, and one without windows: every figure by hand. */
+static void stopping_by_hand(void **state)
+{
+    static double spp[] = {10, 20, 40, 80};
+    struct ggn_chain chains[4];
+    /* the third stops at no level at 0.5; the second never */
+    struct ggn_seen seen[16] = {{.p = 0.9}, {.p = 0.4}, {.p = 0.3}, {.p = 0.05}, {.p = 0.6}, {.p = 0.6}, {.p = 0.7}, {.p = 0.6},
+                                {.p = 0}, {.p = 0}, {.p = 0}, {.p = 0}, {.p = 0.4, .is_held = 1}, {.p = 0.6}, {.p = 0.2},
+                                {.p = 0.1}};
+    static const double truth[] = {25, 200, 30, 30};
+    int first[] = {0, 1, 2, 2, 3};
+    struct ggn_stopping got;
+    struct base_err err = {0};
+
+    for (int c = 0; c < 4; c++)
+        chains[c] = (struct ggn_chain){.n_levels = 4, .spp = spp, .label.threshold = truth[c]};
+    struct ggn_chains set = {.n = 4, .chains = chains};
+    struct ggn_windows w = {.set = &set, .n = 3, .first = first};
+    struct ggn_checks checks = {.windows = &w, .policy = ggn_policy_default(), .seen = seen};
+    assert_int_equal(ggn_calibrate_stopping(&checks, 1, 0.5, &got, &err), 0);
+    /* stops at 20, 200 (past the end, seen until its threshold) and 40: log2 0.322 (not early at 0.8 of it), 0, 0.415 */
+    assert_int_equal(got.blocks, 3);
+    assert_true(got.early_rate == 0 && fabs(got.samples_ratio - 260.0 / 255) < 1e-12);
+    assert_true(fabs(got.median_abs_log2 - log2(25.0 / 20)) < 1e-12);
+    assert_true(fabs(got.mean_abs_log2 - (log2(25.0 / 20) + log2(40.0 / 30)) / 3) < 1e-12);
+    chains[0].label.threshold = 25.1; /* now 20 is early */
+    chains[1].label.threshold = 50;   /* and the end of the recording late */
+    assert_int_equal(ggn_calibrate_stopping(&checks, 1, 0.5, &got, &err), 0);
+    assert_true(got.early_rate == 1.0 / 3 && fabs(got.samples_ratio - 140.0 / 105.1) < 1e-12);
+    assert_int_equal(ggn_calibrate_stopping(&checks, 2, 0.5, &got, &err), 0); /* 40, never, 80 */
+    assert_true(got.early_rate == 0 && fabs(got.samples_ratio - 200.0 / 105.1) < 1e-12);
+    /* one pass below 0.5 is right for the first and too early for none of the others: the best that is allowed */
+    chains[0].label.threshold = 20;
+    chains[1].label.threshold = 80;
+    chains[3].label.threshold = 40;
+    struct ggn_policy p = ggn_policy_default();
+    assert_int_equal(ggn_calibrate_threshold(&checks, 0, &p, &got, &err), 0);
+    assert_true(p.threshold == 0.41 && p.passes == 1 && got.mean_abs_log2 == 0 && got.samples_ratio == 1); /* p < t, not p <= t */
+    chains[0].label.threshold = 50; /* 40 is four fifths of it, which is not early; 20, better for two passes, is */
+    assert_int_equal(ggn_calibrate_threshold(&checks, 0, &p, &got, &err), 0);
+    assert_true(p.threshold == 0.31 && p.passes == 1 && fabs(got.mean_abs_log2 - log2(1.25) / 3) < 1e-12);
+    (void)state;
+}
+
+/* The largest values of windows that count, each with its margin; what the policy has already is kept where it is larger. */
+static void limits_by_brute_force(void **state)
+{
+    struct ggn_chains set;
+    struct ggn_windows w;
+    struct ggn_window_options o = {.split = GGN_SPLIT_TRAIN, .length = 4};
+    struct ggn_policy got = {.tail999 = 0.01}, kept = {.gate_noise = 7, .tail999 = 8, .gini = 1.5};
+    struct base_err err = {0};
+    double gate = 0, tail = 0.01, gini = 0;
+
+    load(&set, 0);
+    assert_int_equal(ggn_windows_create(&w, &set, &o, &err), 0);
+    const size_t values = ggn_chains_values(&set);
+    for (int c = 0; c < set.n; c++)
+        for (int k = 0; k < set.chains[c].n_levels; k++) {
+            uint32_t at = (uint32_t)(100 * c + k);
+            set.chains[c].synthetic = c == 1;
+            set.chains[c].tail999[k] = at % 5 == 1 ? (double)NAN : ggn_hash_unit(at, 1);
+            set.chains[c].gini[k] = at % 7 == 2 ? (double)NAN : 0.9 * ggn_hash_unit(at, 2);
+        }
+    for (int i = 0; i < w.n; i++) {
+        const struct ggn_chain *c = &set.chains[w.list[i].chain];
+        const int last = w.list[i].last;
+        double octave = log2(c->spp[last] / c->label.threshold), square = 0;
+        if (c->synthetic || octave < log2(0.8))
+            continue;
+        for (size_t v = 0; v < values; v++) {
+            double d = (c->noisy[(size_t)(last - 3) * values + v] - c->noisy[(size_t)last * values + v]) / 255.0;
+            square += d * d / (double)values;
+        }
+        gate = fmax(gate, 1.1 * sqrt(square / (c->spp[last] / c->spp[last - 3] - 1)));
+        if (octave < 0 || isnan(c->tail999[last]) || isnan(c->gini[last]))
+            continue;
+        tail = fmax(tail, 1.5 * c->tail999[last]);
+        gini = fmax(gini, 1 - 0.75 * (1 - c->gini[last]));
+    }
+    ggn_calibrate_limits(&w, &got);
+    assert_true(gate > 0 && tail > 1 && gini > 0.8);
+    assert_true(fabs(got.gate_noise / gate - 1) < 1e-12 && got.tail999 == tail && fabs(got.gini - gini) < 1e-12);
+    ggn_calibrate_limits(&w, &kept);
+    assert_true(kept.gate_noise == 7 && kept.tail999 == 8 && kept.gini == 1.5);
+    ggn_windows_release(&w);
+    ggn_chains_release(&set);
+    (void)state;
+}
+
+static void learning_curves(void **state)
+{
+    char path[] = "/tmp/ggn_curves.XXXXXX", *text;
+    struct ggn_log log = {0};
+    struct base_err err = {0};
+    size_t size;
+
+    assert_true(close(mkstemp(path)) == 0);
+    for (int i = 0; i < 9; i++) {
+        struct ggn_log_row r = {.phase = i > 6, .step = 10 * i, .loss = 1.0 / (i + 1), .accuracy = (double)NAN,
+                                .validation_loss = i + 0.5, .validation_accuracy = 0.25, .validation_auc = 0.75, .lr = 1e-3,
+                                .seconds = 0.06 * i};
+        *(i % 3 ? &r.validation_auc : &r.lr) = (double)NAN;
+        assert_int_equal(ggn_log_add(&log, &r, &err), 0);
+    }
+    assert_int_equal(ggn_log_write_csv(&log, path, &err), 0);
+    assert_int_equal(base_file_read(path, 1 << 16, &text, &size, &err), 0);
+    assert_string_equal(text, "phase,step,loss,accuracy,validation_loss,validation_accuracy,validation_auc,learning_rate,seconds\n"
+                              "denoiser,0,1,,0.5,0.25,0.75,,0.0\n"
+                              "denoiser,10,0.5,,1.5,0.25,,0.001,0.1\n"
+                              "denoiser,20,0.333333333,,2.5,0.25,,0.001,0.1\n"
+                              "denoiser,30,0.25,,3.5,0.25,0.75,,0.2\n"
+                              "denoiser,40,0.2,,4.5,0.25,,0.001,0.2\n"
+                              "denoiser,50,0.166666667,,5.5,0.25,,0.001,0.3\n"
+                              "denoiser,60,0.142857143,,6.5,0.25,0.75,,0.4\n"
+                              "judge,70,0.125,,7.5,0.25,,0.001,0.4\n"
+                              "judge,80,0.111111111,,8.5,0.25,,0.001,0.5\n");
+    free(text);
+    ggn_log_release(&log);
+    assert_true(log.n == 0 && !log.rows);
+    unlink(path);
+    (void)state;
+}
+
 static int make_data(void **state)
 {
     struct seqgen g = seqgen_default();
@@ -553,6 +811,13 @@ int main(int argc, char **argv)
         cmocka_unit_test(the_denoiser_begins_near_its_input),
         cmocka_unit_test(platt_recovers_the_scale),
         cmocka_unit_test(the_threshold_respects_the_early_rate),
+        cmocka_unit_test(default_plans),
+        cmocka_unit_test(learning_rates),
+        cmocka_unit_test(platt_is_at_the_minimum),
+        cmocka_unit_test(slopes),
+        cmocka_unit_test(stopping_by_hand),
+        cmocka_unit_test(limits_by_brute_force),
+        cmocka_unit_test(learning_curves),
     };
 
     if (argc == 3 && !strcmp(argv[1], "--write-demo")) {
