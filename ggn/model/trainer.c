@@ -227,13 +227,6 @@ static int update(struct ggn_trainer *t, int net, size_t n, struct base_err *err
     return 0;
 }
 
-static void finish_step(struct ggn_trainer *t)
-{
-    t->steps++;
-    if (t->options.keep_every > 0 && t->steps % (uint64_t)t->options.keep_every == 0)
-        ggn_trainer_keep(t);
-}
-
 /* Copies `n` gap-free planes into the first channels of image i of the executor's input. */
 static void set_input(const struct ggn_exec *e, int i, const real *const *planes, int n)
 {
@@ -305,7 +298,7 @@ int ggn_trainer_denoiser_step(struct ggn_trainer *t, const real *const *x, const
     if (!rc)
         rc = update(t, GGN_NET_R, t->graph[GGN_NET_R].n_params, err);
     if (!rc)
-        finish_step(t);
+        t->steps++;
     return rc;
 }
 
@@ -404,7 +397,7 @@ int ggn_trainer_judge_step(struct ggn_trainer *t, const struct ggn_batch *b, dou
     if (!rc)
         rc = update(t, GGN_NET_M, t->graph[GGN_NET_M].n_params, err);
     if (!rc)
-        finish_step(t);
+        t->steps++;
     return rc;
 }
 
@@ -489,6 +482,6 @@ int ggn_trainer_paper_step(struct ggn_trainer *t, const struct ggn_batch *b, str
     if (!rc)
         rc = update(t, GGN_NET_M, m_trained, err);
     if (!rc)
-        finish_step(t);
+        t->steps++;
     return rc;
 }

@@ -29,7 +29,6 @@ struct ggn_train_options {
     double beta1, beta2, eps;
     double clip;    /* largest L2 norm of a network's gradient; 0 = no clipping */
     double explode; /* a loss or gradient norm above it counts as divergence */
-    int keep_every; /* steps between automatic calls of ggn_trainer_keep; 0 = never */
     int dropout;
     int bf16; /* weights also packed for GGN_EXEC_BF16 */
     enum ggn_init init[GGN_NETS];

@@ -14,7 +14,6 @@ struct ggn_train_options ggn_train_options_default(enum ggn_preset preset)
         .eps = 1e-8,
         .clip = lull ? 1 : 0,
         .explode = 1e6,
-        .keep_every = 100,
         .dropout = 1,
         .init = {plain, plain, lull ? GGN_INIT_HE : GGN_INIT_GAN},
         .seed = 1,

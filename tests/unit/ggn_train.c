@@ -550,7 +550,7 @@ static void default_plans(void **state)
         assert_true(p.validation_windows == 400 && p.early_rate == 0.02 && p.threads == 0);
         const struct ggn_train_options o = ggn_train_options_default((enum ggn_preset)preset);
         assert_true(o.parts == GGN_TRAIN_ALL && o.batch == want[preset].batch && o.beta1 == 0.5 && o.beta2 == 0.999);
-        assert_true(o.eps == 1e-8 && o.clip == preset && o.explode == 1e6 && o.keep_every == 100 && o.dropout == 1);
+        assert_true(o.eps == 1e-8 && o.clip == preset && o.explode == 1e6 && o.dropout == 1);
         assert_true(o.seed == 1 && o.bf16 == 0);
         for (int net = 0; net < GGN_NETS; net++) {
             assert_true(o.lr[net] == 2e-4);
