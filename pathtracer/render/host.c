@@ -78,7 +78,6 @@ static void release_frame(struct pt_criterion *c)
     free(c->spp);
     free(c->step);
     free(c->answers);
-    c->spp = NULL;
 }
 
 void pt_criterion_destroy(struct pt_criterion *c)

@@ -6,8 +6,11 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+#include <zlib.h>
 
 #include <cmocka.h>
+
+#include "base/files.h"
 
 #include "render/checkpoint.h"
 #include "support/pt_fake.h"
@@ -280,6 +283,273 @@ static void bad_checkpoints_are_refused(void **state)
     unlink(path);
 }
 
+/* --- what a slice does -------------------------------------------------------------------------------------------------- */
+
+/* The rows that a kernel was asked for: blocks begin at multiples of 16, and so does the first call of a row. */
+enum { ROWS = 4096 };
+static struct {
+    uint32_t x, y, from, to;
+} rows[ROWS];
+static int row_count;
+
+static void write_down(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y, int count,
+                       uint32_t sample, struct pt_path_result *out)
+{
+    pt_fake_noise(scene, settings, x, y, count, sample, out);
+    if (x % 16 != 0)
+        return;
+    if (row_count > 0 && rows[row_count - 1].x == x && rows[row_count - 1].y == y && rows[row_count - 1].to == sample) {
+        rows[row_count - 1].to++;
+        return;
+    }
+    assert_true(row_count < ROWS);
+    rows[row_count].x = x;
+    rows[row_count].y = y;
+    rows[row_count].from = sample;
+    rows[row_count++].to = sample + 1;
+}
+
+static int enough(void *data, struct pt_render *r, struct base_err *err)
+{
+    (void)data;
+    (void)r;
+    return base_fail(err, BASE_EINVAL, "enough");
+}
+
+struct slice_case {
+    uint64_t spp[3], next[3];
+    double per_spp_s[3], busy, budget_s, elapsed_s;
+    uint64_t pilot;
+    int order[4]; /* of blocks, -1 after the last */
+    uint32_t to[3];
+};
+
+static void check_slice(const struct slice_case *c)
+{
+    struct pt_render_config config = pt_fake_config();
+    struct base_err err = {0};
+    enum pt_render_outcome outcome;
+    const struct pt_render_hooks hooks = {.slice = enough};
+    struct result r = {.pool = base_threads_create(1, &err)};
+    config.width = config.crop[2] = 48;
+    config.height = config.crop[3] = 16;
+    config.spp_max = 1000;
+    config.time_budget_s = c->budget_s;
+    config.pilot_spp = c->pilot;
+    config.pilot_s = 1e9;
+    assert_int_equal(pt_criterion_create(pt_fake_criterion(), NULL, 0, r.pool, NULL, NULL, &r.criterion, &err), 0);
+    assert_int_equal(pt_render_create(&config, NULL, write_down, r.pool, r.criterion, &r.render, &err), 0);
+    for (int i = 0; i < 3; i++) {
+        r.render->blocks.list[i].spp = c->spp[i];
+        r.render->blocks.list[i].next_spp = c->next[i];
+        r.render->blocks.list[i].thread_s = c->per_spp_s[i] * (double)c->spp[i];
+    }
+    r.render->busy_threads = c->busy;
+    r.render->totals.render_s = c->elapsed_s;
+    row_count = 0;
+    assert_int_equal(pt_render_run(r.render, &hooks, &outcome, &err), BASE_EINVAL);
+    int k = 0;
+    uint64_t samples = 0;
+    for (int n = 0; c->order[n] >= 0; n++)
+        for (uint32_t y = 0, b = (uint32_t)c->order[n]; y < 16; y++, k++) {
+            assert_true(rows[k].x == 16 * b && rows[k].y == y && rows[k].from == c->spp[b] && rows[k].to == c->to[b]);
+            samples += 16 * (c->to[b] - c->spp[b]);
+        }
+    assert_int_equal(k, row_count);
+    for (int i = 0; i < 3; i++) {
+        const struct pt_block *b = &r.render->blocks.list[i];
+        uint64_t end = c->to[i] ? c->to[i] : c->spp[i];
+        assert_true(b->spp == end && b->rays == 3 * 256 * (end - c->spp[i]));
+        assert_true(c->to[i] == 0 || b->thread_s > c->per_spp_s[i] * (double)c->spp[i]);
+    }
+    const struct pt_render_totals *t = &r.render->totals;
+    assert_true(t->samples == samples && t->paths == samples && t->rays == 3 * samples && t->dropped == 0 && t->checks == 0);
+    assert_true(t->render_s > c->elapsed_s && r.render->samples_per_s > 0 && r.render->sampled_rows == row_count);
+    release(&r);
+}
+
+/* Who has few samples goes first, by octaves; then who is furthest from its check. A slice is a quarter of a second of those that are
+ * busy, no block gets more than its samples again (8 at least), and what is not known yet gets one. */
+static void slices_deal_out_the_time(void **state)
+{
+    (void)state;
+    static const struct slice_case cases[] = {
+        {{0, 0, 0}, {100, 100, 100}, {0}, 0, 0, 0, 0, {0, 1, 2, -1}, {1, 1, 1}},
+        {{40, 10, 12}, {100, 100, 100}, {1e-9, 1e-9, 2e-9}, 0, 0, 0, 0, {2, 1, 0, -1}, {80, 20, 24}},
+        {{40, 10, 12}, {100, 100, 100}, {0.01, 0.02, 0.02}, 0, 0, 0, 0, {1, 2, 0, -1}, {45, 15, 17}},
+        {{40, 10, 12}, {100, 100, 100}, {0.01, 0.02, 0.02}, 3, 0, 0, 0, {1, 2, 0, -1}, {55, 20, 24}},
+        {{40, 10, 12}, {100, 100, 100}, {0.5, 0.25, 0.25}, 1, 0, 0, 0, {1, 2, 0, -1}, {41, 11, 13}},
+        {{40, 0, 12}, {100, 100, 100}, {1e-9, 0, 1e-9}, 0, 0, 0, 0, {1, 2, 0, -1}, {41, 1, 13}},
+        {{40, 10, 12}, {45, 14, 12}, {0.01, 0.02, 0.02}, 2, 0, 0, 0, {1, 0, -1}, {45, 14, 0}},
+        {{40, 15, 16}, {46, 100, 100}, {1e-9, 1e-9, 1e-9}, 0, 0, 0, 0, {1, 2, 0, -1}, {46, 30, 32}},
+        {{64, 31, 32}, {200, 200, 200}, {1e-9, 1e-9, 1e-9}, 0, 0, 0, 0, {1, 2, 0, -1}, {128, 62, 64}},
+        {{3, 5, 4}, {100, 100, 100}, {1e-9, 1e-9, 1e-9}, 0, 0, 0, 0, {0, 2, 1, -1}, {11, 13, 12}},
+        {{40, 40, 40}, {100, 100, 100}, {1e-9, 1e-9, 1e-9}, 0, 0, 0, 44, {0, 1, 2, -1}, {44, 44, 44}},
+        {{40, 40, 40}, {100, 100, 100}, {0.002, 0.002, 0.002}, 0, 1.0, 0.9349, 0, {0, 1, 2, -1}, {50, 50, 50}},
+        {{40, 40, 40}, {100, 100, 100}, {0.0003, 0.0003, 0.0003}, 0, 1.0, 2.0, 0, {0, 1, 2, -1}, {51, 51, 51}},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++)
+        check_slice(&cases[i]);
+}
+
+/* With a seed the same rows are handed out in another order; without one block after block, as many as give each thread 128 rows. */
+static void the_order_of_work_follows_its_seed(void **state)
+{
+    (void)state;
+    struct pt_render_config config = pt_fake_config();
+    const struct pt_render_hooks hooks = {.slice = enough};
+    static const uint32_t seeds[4] = {0, 99, 99, 100};
+    uint32_t order[4][128];
+    for (int k = 0; k < 4; k++) {
+        struct base_err err = {0};
+        enum pt_render_outcome outcome;
+        struct result r = {.pool = base_threads_create(1, &err)};
+        uint8_t seen[128] = {0};
+        config.order_seed = seeds[k];
+        assert_int_equal(pt_criterion_create(pt_fake_criterion(), NULL, 0, r.pool, NULL, NULL, &r.criterion, &err), 0);
+        assert_int_equal(pt_render_create(&config, NULL, write_down, r.pool, r.criterion, &r.render, &err), 0);
+        row_count = 0;
+        assert_int_equal(pt_render_run(r.render, &hooks, &outcome, &err), BASE_EINVAL);
+        assert_int_equal(row_count, 128);
+        for (int i = 0; i < 128; i++) {
+            order[k][i] = (rows[i].y / 16 * 4 + rows[i].x / 16) * 16 + rows[i].y % 16;
+            assert_true(order[k][i] < 128 && !seen[order[k][i]]++ && rows[i].from == 0 && rows[i].to == 1);
+        }
+        for (int i = 0; i < 8; i++)
+            assert_int_equal(r.render->blocks.list[i].spp, 1);
+        release(&r);
+    }
+    int moved = 0, apart = 0;
+    for (uint32_t i = 0; i < 128; i++) {
+        assert_int_equal(order[0][i], i);
+        moved += order[1][i] != i;
+        apart += order[1][i] != order[3][i];
+    }
+    assert_memory_equal(order[1], order[2], sizeof order[1]);
+    assert_true(moved > 100 && apart > 100);
+}
+
+/* --- a checkpoint, byte by byte ------------------------------------------------------------------------------------------ */
+
+static const unsigned char *piece(const unsigned char *at, const void *expected, size_t n)
+{
+    assert_memory_equal(at, expected, n);
+    return at + n;
+}
+
+static const unsigned char *word(const unsigned char *at, uint64_t expected)
+{
+    return piece(at, &expected, 8);
+}
+
+static const unsigned char *check_block_record(const unsigned char *at, const struct pt_block *b)
+{
+    at = word(word(word(word(word(at, b->spp), b->next_spp), b->asked_spp), b->rays), b->dropped);
+    at = piece(piece(piece(piece(at, &b->p_noisy, 8), &b->error, 8), &b->predicted_spp, 8), &b->thread_s, 8);
+    return piece(piece(piece(piece(at, &b->reason, 4), &b->checks, 4), &b->stop_votes, 4), &b->asked, 4);
+}
+
+/* Writes the bytes with a good checksum and wants this answer. */
+static void expect_answer(const char *path, unsigned char *data, size_t n, struct pt_render *r, const char *settings, const char *words)
+{
+    struct base_err err = {0};
+    char line[256];
+    uint32_t crc = (uint32_t)crc32_z(0, data, n - 4);
+    memcpy(data + n - 4, &crc, 4);
+    FILE *f = fopen(path, "wb");
+    assert_true(f && fwrite(data, 1, n, f) == n && fclose(f) == 0);
+    int rc = pt_checkpoint_load(path, r, settings, &err);
+    snprintf(line, sizeof line, "%s: %s", path, words ? words : "");
+    if (rc != (words ? BASE_EINVAL : 0) || (words && strcmp(err.text, line) != 0))
+        fail_msg("%d \"%s\", expected \"%s\"", rc, err.text, line);
+}
+
+static void put_word(unsigned char *at, uint64_t value)
+{
+    memcpy(at, &value, 8);
+}
+
+static void checkpoints_have_a_layout(void **state)
+{
+    (void)state;
+    char path[] = "/tmp/pt_render_test_XXXXXX", *bytes;
+    close(mkstemp(path));
+    struct pt_render_config config = pt_fake_config();
+    struct base_err err = {0};
+    size_t size;
+    config.planes = PT_FILM_ALL;
+    struct result r = render(&config, pt_fake_nan, 1, "16");
+    const struct pt_film *f = &r.render->film;
+    assert_true(r.render->dropped_count > 0 && r.render->dropped_count <= PT_DROPPED_KEPT);
+    assert_int_equal(pt_checkpoint_save(path, r.render, "a=1\nb=2\n", &err), 0);
+    assert_int_equal(base_file_read(path, 1 << 24, &bytes, &size, &err), 0);
+    unsigned char *data = (unsigned char *)bytes;
+    const unsigned char *at = piece(word(piece(data, "LULLCKP1", 8), 8), "a=1\nb=2\n", 8), *film = at, *list, *drops, *history;
+    at = word(at, f->bytes);
+    assert_int_equal(f->bytes, f->pixels * 124);
+    at = piece(piece(piece(at, f->color, 24 * f->pixels), f->half, 24 * f->pixels), f->moment2, 8 * f->pixels);
+    at = piece(piece(piece(at, f->albedo, 24 * f->pixels), f->normal, 24 * f->pixels), f->depth, 8 * f->pixels);
+    at = piece(piece(piece(at, f->depth_hits, 4 * f->pixels), f->dropped, 4 * f->pixels), f->dropped_half, 4 * f->pixels);
+    list = at;
+    at = word(at, 12);
+    for (int i = 0; i < 12; i++)
+        at = check_block_record(at, &r.render->blocks.list[i]);
+    const struct pt_render_totals *t = &r.render->totals;
+    at = word(word(word(word(at, t->samples), t->paths), t->rays), t->dropped);
+    at = piece(piece(at, &t->render_s, 8), &t->criterion_s, 8);
+    drops = at = word(word(word(at, t->checks), t->failed_checks), t->skipped_checks);
+    history = at = piece(word(at, r.render->dropped_count), r.render->dropped, 12 * PT_DROPPED_KEPT);
+    at = word(at, 4 * 64) + 4 * 64; /* the fake criterion's counts */
+    assert_int_equal(at + 4 - data, size);
+
+    struct {
+        size_t at;
+        uint64_t good, bad;
+        const char *words;
+    } const faults[] = {
+        {(size_t)(film - data), f->bytes, f->bytes + 1, "the checkpoint has another number of bytes of pixels"},
+        {(size_t)(list - data), 12, 11, "the checkpoint has another number of blocks"},
+        {(size_t)(list - data) + 8 + 88 * 5, 256, 257, "block 5 of the checkpoint makes no sense"},
+        {(size_t)(list - data) + 16 + 88 * 11, 256, 257, "block 11 of the checkpoint makes no sense"},
+        {(size_t)(drops - data), 16, 17, "the checkpoint makes no sense"},
+        {(size_t)(history - data), 256, 255, "the checkpoint has a wrong length"},
+        {8, 8, 9, "made with other settings"},
+        {8, 8, size, "the checkpoint is too short"},
+    };
+    for (size_t i = 0; i < sizeof faults / sizeof faults[0]; i++) {
+        unsigned char kept[8];
+        memcpy(kept, data + faults[i].at, 8);
+        put_word(data + faults[i].at, faults[i].good);
+        expect_answer(path, data, size, r.render, "a=1\nb=2\n", NULL);
+        put_word(data + faults[i].at, faults[i].bad);
+        expect_answer(path, data, size, r.render, "a=1\nb=2\n", faults[i].words);
+        memcpy(data + faults[i].at, kept, 8);
+    }
+    unsigned char *reason = data + (list - data) + 8 + 72;
+    for (int32_t k = -1; k <= PT_REASON_COUNT; k++) {
+        memcpy(reason, &k, 4);
+        expect_answer(path, data, size, r.render, "a=1\nb=2\n",
+                      k < 0 || k == PT_REASON_COUNT ? "block 0 of the checkpoint makes no sense" : NULL);
+    }
+    expect_answer(path, data, size, r.render, "a=1\nb=3\n", "made with b=2, but this render has b=3");
+    expect_answer(path, data, size, r.render, "a=1\nb=", "made with b=2, but this render has b=");
+    expect_answer(path, data, size, r.render, "a=1\n", "made with other settings");
+    expect_answer(path, data, size, r.render, "a=1\nb=2\nc=3\n", "made with other settings");
+    expect_answer(path, data, (size_t)(history - data) + 4, r.render, "a=1\nb=2\n", "block 0 of the checkpoint makes no sense");
+    *reason = 1;
+    memset(reason + 1, 0, 3);
+    expect_answer(path, data, (size_t)(history - data) + 4, r.render, "a=1\nb=2\n", "the checkpoint is too short");
+    expect_answer(path, data, (size_t)(drops - data) + 4, r.render, "a=1\nb=2\n", "the checkpoint is too short");
+    expect_answer(path, data, (size_t)(list - data) + 8 + 4, r.render, "a=1\nb=2\n", "the checkpoint is too short");
+    expect_answer(path, data, 12, r.render, "a=1\nb=2\n", "the checkpoint is too short");
+    expect_answer(path, data, 11, r.render, "a=1\nb=2\n", "not a checkpoint");
+    data[7] = '2';
+    expect_answer(path, data, size, r.render, "a=1\nb=2\n", "not a checkpoint");
+    free(bytes);
+    release(&r);
+    unlink(path);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -293,6 +563,9 @@ int main(void)
         cmocka_unit_test(time_budget_ends_a_render),
         cmocka_unit_test(resumed_render_is_identical),
         cmocka_unit_test(bad_checkpoints_are_refused),
+        cmocka_unit_test(slices_deal_out_the_time),
+        cmocka_unit_test(the_order_of_work_follows_its_seed),
+        cmocka_unit_test(checkpoints_have_a_layout),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
