@@ -1,24 +1,16 @@
 /*
  * Small scenes and all that the loader makes of them: the files of tests/golden/pbrt hold each scene's text and the recorded
- * answer, which is its warnings, then its one-line error or the whole renderable.
+ * answer, which is its warnings, then its one-line error or the whole renderable (support/pt_approve.h says how to record).
  *
- *     # comment          kept
- *     = strict size=8x4  options of the next scene (also: fov=, look-at=a,b,…, effects, power, only-warnings)
- *     @ a.ply text       a line of a file beside the scene
- *     > text             the first line of the scene
- *     >> text            each further one
- *       answer           two blanks before it; made anew by `APPROVE=1 build/tests/unit/pt_approved`, and then to be read
- *
- * The header (film … camera) is part of the answer of scenes that do not begin with WorldBegin. Pictures named WxHxC.png exist
- * with 8 bits, deep-WxHxC.png with 16; an alpha channel is opaque in opaque-….
+ * Options: strict, size=8x4, fov=, look-at=a,b,…, effects, power, only-warnings. The header (film … camera) is part of the answer of
+ * scenes that do not begin with WorldBegin. Pictures named WxHxC.png exist with 8 bits, deep-WxHxC.png with 16; an alpha channel is
+ * opaque in opaque-….
  */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
 
-#include <ctype.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -26,20 +18,8 @@
 
 #include <cmocka.h>
 
-#include "base/files.h"
+#include "support/pt_approve.h"
 #include "support/pt_dump.h"
-
-/* Numbers may differ so much: sums in another order, sines of another C library. */
-static const double relative = 1e-5, absolute = 3e-7;
-
-enum { TEXT = 1 << 14, FILES = 4 };
-
-struct scene_case {
-    char options[200], text[TEXT];
-    struct {
-        char name[64], text[TEXT];
-    } files[FILES];
-};
 
 /* --- files beside a scene --------------------------------------------------------------------------------------------- */
 
@@ -86,14 +66,14 @@ static size_t make_png(const char *name, unsigned char *out)
 
 static int read_beside(void *data, const char *path, char **bytes, size_t *size, struct base_err *err)
 {
-    const struct scene_case *c = data;
+    const struct pt_approve_case *c = data;
     unsigned char png[2048];
     const void *found = NULL;
     if (strcmp(path, "d/t.pbrt") == 0) {
         found = c->text;
         *size = strlen(c->text);
     }
-    for (int i = 0; i < FILES && !found; i++)
+    for (int i = 0; i < PT_APPROVE_FILES && !found; i++)
         if (c->files[i].name[0] != '\0' && strncmp(path, "d/", 2) == 0 && strcmp(path + 2, c->files[i].name) == 0) {
             found = c->files[i].text;
             *size = strlen(c->files[i].text);
@@ -135,7 +115,7 @@ static void read_options(const char *text, struct pt_load_options *o)
 }
 
 /* malloc'ed */
-static char *answer(struct scene_case *c)
+static char *answer(struct pt_approve_case *c)
 {
     char *text = NULL;
     size_t size = 0;
@@ -160,118 +140,11 @@ static char *answer(struct scene_case *c)
     return text;
 }
 
-/* The same characters, and numbers as near as the bounds say. */
-static int same(const char *a, const char *b)
-{
-    while (*a != '\0' && *b != '\0') {
-        int numbers = (isdigit((unsigned char)*a) || (*a == '-' && isdigit((unsigned char)a[1]))) &&
-                      (isdigit((unsigned char)*b) || (*b == '-' && isdigit((unsigned char)b[1])));
-        if (numbers) {
-            char *x, *y;
-            double p = strtod(a, &x), q = strtod(b, &y);
-            if (p != q && !(fabs(p - q) <= relative * fmax(fabs(p), fabs(q)) + absolute))
-                return 0;
-            a = x;
-            b = y;
-        } else if (*a++ != *b++) {
-            return 0;
-        }
-    }
-    return *a == *b;
-}
-
-/* --- files of cases --------------------------------------------------------------------------------------------------- */
-
-static void append(char *text, size_t room, const char *line)
-{
-    size_t n = strlen(text);
-    assert_true(n + strlen(line) + 2 < room);
-    snprintf(text + n, room - n, "%s\n", line);
-}
-
-static void add_file_line(struct scene_case *c, const char *line)
-{
-    size_t n = strcspn(line, " ");
-    int i = 0;
-    while (c->files[i].name[0] != '\0' && (strlen(c->files[i].name) != n || strncmp(c->files[i].name, line, n) != 0))
-        assert_true(++i < FILES);
-    snprintf(c->files[i].name, sizeof c->files[i].name, "%.*s", (int)n, line);
-    append(c->files[i].text, TEXT, line[n] == ' ' ? line + n + 1 : "");
-}
-
-/* Compares line by line with the recorded answer from `recorded` on; returns behind it. In `anew` goes the new one. */
-static char *compare(struct scene_case *c, char *recorded, FILE *anew, int *wrong)
-{
-    char *text = answer(c), *save = NULL, *line = strtok_r(text, "\n", &save);
-    int told = 0;
-    for (; line || strncmp(recorded, "  ", 2) == 0; line = line ? strtok_r(NULL, "\n", &save) : NULL) {
-        char expected[4096] = "";
-        if (strncmp(recorded, "  ", 2) == 0) {
-            size_t n = strcspn(recorded, "\n");
-            snprintf(expected, sizeof expected, "%.*s", (int)n - 2, recorded + 2);
-            recorded += n + (recorded[n] == '\n');
-        }
-        if (line)
-            fprintf(anew, "  %s\n", line);
-        if (same(expected, line ? line : ""))
-            continue;
-        *wrong += 1;
-        if (told++ == 0)
-            print_error("of %s  recorded: %s\n  now:      %s\n", c->text, expected, line ? line : "");
-    }
-    free(text);
-    memset(c, 0, sizeof *c);
-    return recorded;
-}
-
-static void check_file(const char *name)
-{
-    static struct scene_case c;
-    char path[256], *bytes, *made = NULL;
-    size_t size, made_size;
-    int wrong = 0;
-    struct base_err err = {0};
-    snprintf(path, sizeof path, "tests/golden/pbrt/%s", name);
-    assert_int_equal(base_file_read(path, 1 << 24, &bytes, &size, &err), 0);
-    FILE *anew = open_memstream(&made, &made_size);
-    assert_non_null(anew);
-    memset(&c, 0, sizeof c);
-    for (char *at = bytes; *at != '\0';) {
-        char line[4096];
-        size_t n = strcspn(at, "\n");
-        snprintf(line, sizeof line, "%.*s", (int)n, at);
-        if (c.text[0] != '\0' && strncmp(line, ">>", 2) != 0) {
-            at = compare(&c, at, anew, &wrong);
-            continue;
-        }
-        assert_true(n < sizeof line && strncmp(line, "  ", 2) != 0);
-        if (line[0] == '>')
-            append(c.text, TEXT, line + (line[1] == '>' ? 3 : 2));
-        else if (line[0] == '=')
-            snprintf(c.options, sizeof c.options, "%.*s", (int)sizeof c.options - 1, line);
-        else if (line[0] == '@')
-            add_file_line(&c, line + 2);
-        fprintf(anew, "%s\n", line);
-        at += n + (at[n] == '\n');
-    }
-    if (c.text[0] != '\0')
-        compare(&c, bytes + size, anew, &wrong);
-    fclose(anew);
-    if (getenv("APPROVE")) {
-        FILE *f = fopen(path, "w");
-        assert_true(f && fputs(made, f) >= 0 && fclose(f) == 0);
-    } else if (wrong > 0) {
-        fail_msg("%s: %d lines differ", path, wrong);
-    }
-    free(made);
-    free(bytes);
-}
-
 #define CHECK(name) \
     static void name(void **state) \
     { \
         (void)state; \
-        check_file(#name ".txt"); \
+        pt_approve("tests/golden/pbrt/" #name ".txt", answer); \
     }
 CHECK(header)
 CHECK(transforms)

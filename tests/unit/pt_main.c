@@ -1,0 +1,230 @@
+/* The command line and the words of a quote. They belong to the program and are in no library: their files are read in here. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "cli.c"
+#include "quote_output.c"
+
+#include "integ/integrator.h"
+#include "support/pt_approve.h"
+#include "support/pt_fake.h"
+#include "support/pt_text_scene.h"
+
+/* --- command lines ------------------------------------------------------------------------------------------------------ */
+
+static void print_text(FILE *out, const char *name, const char *text)
+{
+    if (text)
+        fprintf(out, "%s=%s ", name, text);
+}
+
+/* A number that is not what it is without options. */
+static void print_number(FILE *out, const char *name, double value, double usual)
+{
+    if (value != usual)
+        fprintf(out, "%s=%.17g ", name, value);
+}
+
+static void print_several(FILE *out, const struct pt_cli *c)
+{
+    if (c->has_crop)
+        fprintf(out, "crop=%d,%d,%d,%d ", c->crop[0], c->crop[1], c->crop[2], c->crop[3]);
+    for (int i = 0; c->view.has_look_at && i < 9; i++)
+        fprintf(out, "%s%g", i ? "," : "look-at=", c->view.look_at_world[i]);
+    for (uint32_t i = 0; i < c->param_count; i++)
+        fprintf(out, "param %s is %s; ", c->params[i].key, c->params[i].value);
+    for (int i = 0; i < c->stop_map_count; i++)
+        print_text(out, "stop-map", c->stop_maps[i]);
+    if (c->action == PT_CLI_DEBUG_PATH)
+        fprintf(out, "debug=%d,%d,%d ", c->debug[0], c->debug[1], c->debug[2]);
+}
+
+static void print_cli(FILE *out, const struct pt_cli *c)
+{
+    static const char *const actions[] = {"render", "list", "explain", "debug", "sequence", "quote"};
+    const struct {
+        const char *name, *text;
+    } texts[] = {{"criterion", c->criterion}, {"mask", c->mask}, {"output", c->output}, {"preview", c->preview}, {"report", c->report},
+                 {"checkpoint", c->checkpoint}, {"quote-map", c->quote_map}, {"sequence", c->sequence}, {"levels", c->levels},
+                 {"blocks", c->sequence_blocks}, {"name", c->name}};
+    const struct {
+        const char *name;
+        double value, usual;
+    } numbers[] = {{"block", c->block_width, 200}, {"by", c->block_height, 200}, {"spp-min", (double)c->spp_min, 16},
+                   {"spp-max", (double)c->spp_max, 10000}, {"spp", (double)c->spp, 0}, {"budget", c->time_budget_s, 0},
+                   {"overhead", c->max_check_overhead, 0}, {"seam", c->max_seam, 0}, {"width", c->width, 0}, {"height", c->height, 0},
+                   {"fov", c->view.fov_deg, 0}, {"threads", c->threads, 0}, {"rank-timeout", c->rank_timeout_s, 120}, {"seed", c->seed, 0},
+                   {"every", c->checkpoint_every_s, 60}, {"resume", c->resume, 0}, {"quote", c->quote, 0},
+                   {"pilot-spp", (double)c->pilot_spp, 0}, {"pilot-s", c->pilot_s, 0}, {"json", c->json, 0},
+                   {"effects", c->all_effects, 0}, {"strict", c->strict, 0}, {"quiet", c->quiet, 0}, {"reproducible", c->reproducible, 0},
+                   {"selection", c->light_selection, 0}, {"sampler", c->sampler, -1}, {"strategy", c->strategy, -1},
+                   {"filter", c->filter, -1}, {"radius", c->filter_radius, 0}, {"depth", c->max_depth, -2}, {"aov", c->aov, 0},
+                   {"order", c->order_seed, 0}, {"reference", (double)c->reference_spp, 0}};
+    fprintf(out, "%s %s ", actions[c->action], c->scene ? c->scene : "nothing");
+    for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++)
+        print_text(out, texts[i].name, texts[i].text);
+    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)
+        print_number(out, numbers[i].name, numbers[i].value, numbers[i].usual);
+    print_several(out, c);
+    fprintf(out, "\n");
+}
+
+/* The words of the case, "a b" being one. */
+static char *parse_words(struct pt_approve_case *c)
+{
+    char *argv[128] = {c->options, NULL}, *text = NULL;
+    size_t size;
+    struct pt_cli cli;
+    struct base_err err = {0};
+    int argc = 1;
+    strcpy(c->options, "pathtracer");
+    for (char *at = c->text; *at != '\0' && argc < 127;) {
+        at += strspn(at, " \n");
+        char *end = *at == '"' ? strchr(++at, '"') : at + strcspn(at, " \n");
+        if (end == at && *end != '"')
+            break;
+        argv[argc++] = at;
+        at = end + (*end != '\0');
+        *end = '\0';
+    }
+    FILE *out = open_memstream(&text, &size);
+    assert_non_null(out);
+    int rc = pt_cli_parse(&cli, argc, argv, &err);
+    if (rc)
+        fprintf(out, "%d: %s\n", rc, err.text);
+    else
+        print_cli(out, &cli);
+    pt_cli_release(&cli);
+    fclose(out);
+    return text;
+}
+
+static void command_lines(void **state)
+{
+    (void)state;
+    pt_approve("tests/golden/pathtracer/command_lines.txt", parse_words);
+}
+
+/* --- quotes ------------------------------------------------------------------------------------------------------------- */
+
+/* 24 x 8 pixels, six blocks of 8 x 4, of which the last has no sample yet; every number of its own. The camera stands in a white
+ * ball that no path leaves, so that each has as many vertices as it may have bounces. */
+static struct pt_scene *scene;
+static struct pt_render render;
+static struct pt_quote quote;
+static struct pt_block list[7];
+static struct pt_quote_block answers[3][7];
+static struct pt_outlook_said said[3][7];
+static struct base_threads *pool;
+static struct lull_criterion table;
+static struct pt_criterion criterion = {.table = &table};
+
+static void fill_row(struct pt_quote_row *row, int k, double visible)
+{
+    *row = (struct pt_quote_row){.visible = visible, .asked = k == 1, .blocks = answers[k], .said = said[k], .spp_min = 12.4 + k,
+                                 .spp_mean = 1234.6 * (k + 1), .spp_max = 99999.5 * (k + 1), .spp_mean_low = 1000 + k, .spp_mean_high = 2000 + k,
+                                 .thread_s = 40 + k, .thread_low_s = 30 + k, .thread_high_s = 60 + k, .against_uniform = 0.25 * (k + 1),
+                                 .unmet = (uint32_t)k, .capped = k == 2 ? 5 : 0};
+    const double walls[3][3] = {{9.94, 0.04, 9.96}, {99.4, 99.6, 9.96 * 60}, {99.4 * 60, 99.6 * 60, 123456}};
+    row->wall_s = walls[k][0];
+    row->wall_low_s = walls[k][1];
+    row->wall_high_s = walls[k][2];
+    for (int i = 0; i < 7; i++) {
+        static const double share[7] = {3, 9, 1, 7, 5, 9, 2};
+        answers[k][i] = (struct pt_quote_block){{100.0 * (i + 1) + k, 90.0 * (i + 1), 12345.0 * (i + 1), i != 2}, share[i], share[i] / 2, share[i] * 2};
+        said[k][i].unmet = k > 0 && i < 2 * k;
+    }
+}
+
+static int set_up_quote(void **state)
+{
+    (void)state;
+    struct base_err err = {0};
+    const struct pt_render_config config = {.width = 24, .height = 9, .block_width = 8, .block_height = 4,
+                                            .integrator = {.max_depth = 2, .rr_depth = 9, .max_component = INFINITY}};
+    scene = text_scene("Film \"rgb\" \"integer xresolution\" 24 \"integer yresolution\" 9 Camera \"perspective\" WorldBegin\n"
+                       "Shape \"sphere\" \"float radius\" 5", NULL, NULL);
+    pool = base_threads_create(2, &err);
+    for (int i = 0; i < 7; i++)
+        list[i] = (struct pt_block){.id = 10u + (uint32_t)i, .x0 = i % 3 * 8, .y0 = i / 3 * 4, .x1 = i % 3 * 8 + 8, .y1 = i < 6 ? i / 3 * 4 + 4 : 9,
+                                    .spp = i == 3 ? 0 : 16u + (uint32_t)i, .thread_s = i == 3 ? 0 : 0.001 * (i + 1)};
+    render = (struct pt_render){.config = config, .scene = scene, .threads = pool, .criterion = &criterion, .busy_threads = 1.84,
+                                .film = {.pixels = 200, .bytes = 34567890}, .blocks = {.list = list, .count = 7},
+                                .totals = {.samples = 4321, .render_s = 50.5, .criterion_s = 60.75}};
+    table.id = "law";
+    static double costs[7] = {0.25, 0.5, 0.75, 1, 1.25, 1.5, 1.75};
+    quote = (struct pt_quote){.row_count = 3, .threads = 2, .block_count = 7, .block_cost_s = costs, .check_s = 0.125};
+    static const double visible[3] = {0.5, 0.125, 0.05};
+    for (int k = 0; k < 3; k++)
+        fill_row(&quote.rows[k], k, visible[k]);
+    return pool ? 0 : -1;
+}
+
+static int tear_down_quote(void **state)
+{
+    (void)state;
+    pt_scene_destroy(scene);
+    base_threads_destroy(pool);
+    return 0;
+}
+
+static char *tell_quote(struct pt_approve_case *c)
+{
+    char *text = NULL;
+    size_t size;
+    struct base_err err = {0};
+    const struct pt_quote_info info = {.scene = "dir/a.pbrt", .scene_bytes = 98765432, .load_s = 12.3456, .interrupted = strstr(c->text, "interrupted") != NULL};
+    FILE *out = open_memstream(&text, &size);
+    assert_non_null(out);
+    quote.rows[1].unknown = strstr(c->text, "unknown") ? 2 : 0;
+    quote.rows[1].visible = strstr(c->text, "uniform") ? (double)NAN : strstr(c->text, "default") ? 0.25 : 0.125;
+    quote.rows[1].unmet = strstr(c->text, "met") ? 0 : 1;
+    quote.threads = strstr(c->text, "one-thread") ? 1 : 2;
+    render.criterion = strstr(c->text, "uniform") ? NULL : &criterion;
+    if (strstr(c->text, "json"))
+        assert_int_equal(pt_quote_json(out, &quote, &render, &info, &err), 0);
+    else
+        pt_quote_text(out, &quote, &render, &info);
+    fclose(out);
+    return text;
+}
+
+static void quotes(void **state)
+{
+    (void)state;
+    pt_approve("tests/golden/pathtracer/quotes.txt", tell_quote);
+}
+
+static void durations_and_thousands(void **state)
+{
+    (void)state;
+    char text[32];
+    static const struct {
+        double s;
+        const char *words;
+    } times[] = {{0, "0.0 s"}, {9.94, "9.9 s"}, {9.95, "10 s"}, {99.4, "99 s"}, {99.5, "1.7 min"}, {9.94 * 60, "9.9 min"}, {9.95 * 60, "10 min"},
+                 {99.4 * 60, "99 min"}, {99.5 * 60, "1.7 h"}, {36000, "10.0 h"}};
+    for (size_t i = 0; i < sizeof times / sizeof times[0]; i++)
+        assert_string_equal(duration(times[i].s, text), times[i].words);
+    static const struct {
+        double value;
+        int more;
+        const char *words;
+    } numbers[] = {{0, 0, "0"}, {999.4, 0, "999"}, {1000, 0, "1,000"}, {999999, 1, "999,999+"}, {1234567, 0, "1,234,567"}, {12, 1, "12+"}};
+    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)
+        assert_string_equal(thousands(numbers[i].value, numbers[i].more, text), numbers[i].words);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(command_lines), cmocka_unit_test(quotes), cmocka_unit_test(durations_and_thousands)};
+    return cmocka_run_group_tests(tests, set_up_quote, tear_down_quote);
+}
