@@ -3,6 +3,9 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include <cmocka.h>
@@ -10,6 +13,7 @@
 #include <lull/criterion_kit.h>
 
 #include "render/quote.h"
+#include "support/pt_approve.h"
 #include "support/pt_fake.h"
 
 /* --- a criterion that knows the law ------------------------------------------------------------------------------------ */
@@ -263,6 +267,95 @@ static void the_last_blocks_leave_threads_idle(void **state)
     assert_true(pt_outlook_wall_s(&nothing, 1, 2) == 0.0);
 }
 
+/* Half of the interval is 0.15 octaves and 0.08 more for each octave ahead, a whole one where light is missing; never less than there is
+ * nor more than there may be. */
+static void outlooks_in_closed_form(void **state)
+{
+    (void)state;
+    static const struct {
+        struct pt_outlook_said said;
+        uint64_t spp;
+        double stop, low, high;
+        int known;
+    } cases[] = {
+        {{10, 40, 0, 0}, 10, 40, 32.266, 49.588, 1},     /* 2^0.31 */
+        {{40, 40, 0, 0}, 10, 40, 36.050, 44.383, 1},     /* 2^0.15 */
+        {{80, 40, 0, 0}, 10, 40, 36.050, 44.383, 1},     /* no narrower than that */
+        {{10, 40, 0, 1}, 10, 40, 20, 80, 1},
+        {{10, 40, 0, 0}, 45, 45, 45, 55.786, 1},
+        {{10, 400, 0, 0}, 10, 400, 268.37, 500, 1},       /* 2^(0.15 + 0.08 log2 40) = 1.4905, capped */
+        {{10, 0.5, 0, 0}, 0, 1, 0.90125, 1.10957, 1},    /* one sample at least */
+        {{10, 900, 1, 0}, 10, 500, 500, 500, 1},
+        {{10, 7, 1, 0}, 10, 7, 7, 7, 1},
+        {{0, 40, 0, 0}, 10, 500, 10, 500, 0},
+        {{10, INFINITY, 0, 0}, 10, 500, 10, 500, 0},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        struct pt_outlook_stop s = pt_outlook_stop(&cases[i].said, cases[i].spp, 500);
+        if (!(fabs(s.spp - cases[i].stop) < 1e-9 && fabs(s.low / cases[i].low - 1) < 3e-4 && fabs(s.high / cases[i].high - 1) < 3e-4) ||
+            s.known != cases[i].known)
+            fail_msg("case %zu: %g (%g to %g) %d", i, s.spp, s.low, s.high, s.known);
+    }
+    struct pt_block b = {.spp = 30, .next_spp = 60, .asked = 1, .asked_spp = 20, .predicted_spp = 40};
+    struct pt_outlook_stop s = pt_outlook_of_block(&b, 0, 500);
+    assert_true(s.spp == 60 && fabs(s.low / (40 / exp2(0.23)) - 1) < 1e-12 && s.known); /* said at 20, an octave ahead */
+    assert_true(pt_outlook_of_block(&b, 1, 500).low == 500 && pt_outlook_of_block(&b, 1, 500).spp == 500);
+    assert_true(fabs(pt_outlook_checks(&b, 60) - 1) < 1e-12 && fabs(pt_outlook_checks(&b, 540) - 3) < 1e-12); /* threefold from check to check */
+    b.asked = 0;
+    assert_true(!pt_outlook_of_block(&b, 0, 500).known && fabs(pt_outlook_checks(&b, 60 * 2.25) - 3) < 1e-12);
+    b.asked = 1;
+    b.asked_spp = 60;
+    assert_true(pt_outlook_checks(&b, 500) == 1); /* a ratio of 1 says nothing */
+    b.reason = PT_REASON_CRITERION;
+    s = pt_outlook_of_block(&b, 0, 500);
+    assert_true(s.spp == 30 && s.low == 30 && s.high == 30 && s.known && pt_outlook_checks(&b, 500) == 0);
+}
+
+/* Every number of a quote after pilots of a known cost, but for what the clock says. "0.1 64": asked for, samples of the pilot. */
+static char *quote_of(struct pt_approve_case *c)
+{
+    char *text = NULL, visible[16];
+    unsigned long pilot;
+    size_t size;
+    struct base_err err = {0};
+    struct run run;
+    FILE *out = open_memstream(&text, &size);
+    assert_true(out && sscanf(c->text, "%15s %lu", visible, &pilot) == 2);
+    start(&run, visible[0] == '-' ? NULL : visible, pilot);
+    fprintf(out, "outcome %d\n", go(&run));
+    struct pt_render *r = run.render;
+    for (uint32_t i = 0; i < r->blocks.count; i++)
+        r->blocks.list[i].thread_s = 1e-3 * (1 + i) * (double)r->blocks.list[i].spp;
+    if (strstr(c->text, "unasked"))
+        r->blocks.list[3].spp = 0;
+    r->totals.criterion_s = 0.25 * (double)r->totals.checks;
+    assert_int_equal(pt_quote_finish(run.quote, r, &err), 0);
+    fprintf(out, "a check takes %.9g\n", run.quote->check_s);
+    for (int i = 0; i < run.quote->row_count; i++) {
+        const struct pt_quote_row *row = &run.quote->rows[i];
+        fprintf(out, "row %g asked %d spp %.9g %.9g %.9g from %.9g to %.9g thread %.9g %.9g %.9g wall %.9g %.9g %.9g of uniform %.9g", row->visible,
+                row->asked, row->spp_min, row->spp_mean, row->spp_max, row->spp_mean_low, row->spp_mean_high, row->thread_s, row->thread_low_s,
+                row->thread_high_s, row->wall_s, row->wall_low_s, row->wall_high_s, row->against_uniform);
+        fprintf(out, " unknown %u unmet %u capped %u\n", row->unknown, row->unmet, row->capped);
+        for (uint32_t k = 0; k < run.quote->block_count; k++) {
+            const struct pt_quote_block *b = &row->blocks[k];
+            fprintf(out, "  block %u said %llu %.9g%s%s first %llu %.9g stop %.9g %.9g %.9g %d thread %.9g %.9g %.9g\n", k,
+                    (unsigned long long)row->said[k].spp, row->said[k].predicted, row->said[k].stopped ? " stopped" : "",
+                    row->said[k].unmet ? " unmet" : "", (unsigned long long)row->first[k].spp, row->first[k].predicted, b->stop.spp, b->stop.low,
+                    b->stop.high, b->stop.known, b->thread_s, b->thread_low_s, b->thread_high_s);
+        }
+    }
+    end(&run);
+    fclose(out);
+    return text;
+}
+
+static void quotes_in_every_number(void **state)
+{
+    (void)state;
+    pt_approve("tests/golden/pathtracer/quote_numbers.txt", quote_of);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -271,6 +364,7 @@ int main(void)
         cmocka_unit_test(a_pilot_loses_nothing), cmocka_unit_test(stops_that_nobody_predicts),
         cmocka_unit_test(intervals_widen_with_distance), cmocka_unit_test(light_that_few_pixels_met_is_told),
         cmocka_unit_test(the_last_blocks_leave_threads_idle),
+        cmocka_unit_test(outlooks_in_closed_form), cmocka_unit_test(quotes_in_every_number),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

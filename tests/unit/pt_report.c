@@ -14,12 +14,14 @@
 #include <cjson/cJSON.h>
 #include <openexr.h>
 
+#include "base/clock.h"
 #include "base/colour.h"
 #include "base/files.h"
 #include "image/oiio.h"
 #include "image/stopmap.h"
 #include "render/output.h"
 #include "render/progress.h"
+#include "support/pt_approve.h"
 #include "support/pt_fake.h"
 
 static struct pt_render *render;
@@ -370,6 +372,84 @@ static void report_is_what_happened(void **state)
     free(text);
 }
 
+/* The report of the render with times that are known. */
+static char *report_of(struct pt_approve_case *c)
+{
+    struct base_err err = {0};
+    char *text;
+    size_t n;
+    int alone = strstr(c->text, "uniform") != NULL;
+    struct pt_render r = *render;
+    struct pt_block list[12];
+    struct pt_output_info told = info;
+    memcpy(list, render->blocks.list, sizeof list);
+    for (int i = 0; i < 12; i++) {
+        list[i].thread_s = 0.25 * (i + 1);
+        list[i].reason = alone ? i % PT_REASON_COUNT : list[i].reason;
+    }
+    r.blocks.list = list;
+    r.criterion_thread_s = 3.5;
+    r.totals.render_s = alone ? 0 : 8;
+    r.totals.criterion_s = 1.25;
+    r.dropped_count = alone ? 0 : 2;
+    r.dropped[0] = (struct pt_dropped_sample){1, 2, 3};
+    r.dropped[1] = (struct pt_dropped_sample){4, 5, 6};
+    if (alone) {
+        r.criterion = NULL;
+        r.config.block_height = 8;
+        told = (struct pt_output_info){.scene = "a \"b\".pbrt", .mask = "m.png", .effects = PT_FX_ALL, .kernel = "k", .threads = 9, .scene_bytes = -1,
+                                       .interrupted = 1};
+    }
+    assert_int_equal(pt_output_report(in_folder("r.json"), &r, &told, &err), 0);
+    assert_int_equal(base_file_read(in_folder("r.json"), 1 << 20, &text, &n, &err), 0);
+    return text;
+}
+
+static void report_word_for_word(void **state)
+{
+    (void)state;
+    pt_approve("tests/golden/pathtracer/report.txt", report_of);
+}
+
+/* Redrawn in place on a terminal, a line now and then elsewhere, nothing without a file. */
+static void progress_lines(void **state)
+{
+    (void)state;
+    struct pt_progress p;
+    char line[300], expected[300], *text = NULL;
+    size_t n;
+    FILE *out = open_memstream(&text, &n), *null = fopen("/dev/null", "w");
+    assert_true(out && null);
+    pt_progress_init(&p, null);
+    double now_s = base_clock_wall_s();
+    assert_true(!p.terminal && p.next_s > now_s + 1 && p.next_s <= now_s + 2 && !p.shown);
+    pt_progress_text(render, line, sizeof line);
+    assert_string_equal(line + strlen(line) - 8, "ETA 0:00");
+    for (int terminal = 0; terminal < 2; terminal++) {
+        rewind(out);
+        p = (struct pt_progress){.out = out, .terminal = terminal, .next_s = base_clock_wall_s() + 100};
+        pt_progress_update(&p, render); /* too early */
+        p.next_s = 0;
+        pt_progress_update(&p, render);
+        now_s = base_clock_wall_s();
+        assert_true(p.shown == terminal && p.next_s <= now_s + (terminal ? 0.2 : 10) && p.next_s > now_s + (terminal ? 0 : 9));
+        pt_progress_clear(&p);
+        pt_progress_clear(&p); /* once is enough */
+        snprintf(expected, sizeof expected, terminal ? "\r%s\033[K\r\033[K" : "%s\n", line);
+        fputc('|', out);
+        fflush(out);
+        assert_memory_equal(text, expected, strlen(expected));
+        assert_int_equal(text[strlen(expected)], '|');
+        assert_false(p.shown);
+    }
+    p = (struct pt_progress){.shown = 1};
+    pt_progress_update(&p, render);
+    pt_progress_clear(&p);
+    fclose(out);
+    fclose(null);
+    free(text);
+}
+
 static void progress_is_honest(void **state)
 {
     (void)state;
@@ -390,9 +470,41 @@ static void progress_is_honest(void **state)
     list[0].predicted_spp = (double)NAN;
     pt_progress_text(&r, text, sizeof text);
     assert_string_equal(text, ">= 12%  1 of 2 blocks active  spp 100..100  0.00 Mpaths/s  ETA at most 3:00");
+    r.samples_per_s = 12.5e6;
+    list[0].spp = 97; /* 310 thread seconds of 310 + 903 · 300 / 97 */
+    list[0].thread_s = 300.0;
+    pt_progress_text(&r, text, sizeof text);
+    assert_string_equal(text, ">=  9%  1 of 2 blocks active  spp 97..97  12.50 Mpaths/s  ETA at most 31:02");
+    list[0].thread_s = 3000.0; /* 903 · 3000 / 97 thread seconds of 1.5 threads */
+    pt_progress_text(&r, text, sizeof text);
+    assert_string_equal(text, ">=  9%  1 of 2 blocks active  spp 97..97  12.50 Mpaths/s  ETA at most 5:10:19");
+    r.totals.checks = 4; /* 2 s each: one at 120, 11.6 more in steps of 1.2 */
+    r.totals.criterion_s = 8.0;
+    pt_progress_text(&r, text, sizeof text);
+    assert_string_equal(text, ">=  9%  1 of 2 blocks active  spp 97..97  12.50 Mpaths/s  ETA at most 5:10:44");
+    r.config.uniform = 1; /* nobody is asked */
+    pt_progress_text(&r, text, sizeof text);
+    assert_string_equal(text, "  9%  1 of 2 blocks active  spp 97..97  12.50 Mpaths/s  ETA 5:10:19");
+    r.config.uniform = 0;
+    list[1].reason = PT_REASON_NONE;
+    list[0].predicted_spp = list[1].predicted_spp = 150.0;
+    list[1].asked = 1;
+    list[1].asked_spp = list[1].next_spp = 50;
+    list[0].thread_s = 97.0;
+    list[1].thread_s = 50.0;
+    r.totals.checks = 0;
+    pt_progress_text(&r, text, sizeof text); /* 53 s and 100 s of thread time on 1.5 threads */
+    assert_string_equal(text, " 49%  2 of 2 blocks active  spp 50..97  12.50 Mpaths/s  ETA 1:42");
     r.config.time_budget_s = pt_render_elapsed_s(&r) + 4.0;
     pt_progress_text(&r, text, sizeof text);
     assert_non_null(strstr(text, "0:04"));
+    r.totals.render_s = 92.0; /* 100 s with the criterion's */
+    r.config.time_budget_s = 125.0;
+    pt_progress_text(&r, text, sizeof text);
+    assert_string_equal(text, " 80%  2 of 2 blocks active  spp 50..97  12.50 Mpaths/s  ETA 0:25");
+    r.config.time_budget_s = 80.0;
+    pt_progress_text(&r, text, sizeof text);
+    assert_string_equal(text, "100%  2 of 2 blocks active  spp 50..97  12.50 Mpaths/s  ETA 0:00");
     r.config.time_budget_s = 0.0;
     r.busy_threads = 0.0;
     pt_progress_text(&r, text, sizeof text);
@@ -405,7 +517,8 @@ int main(void)
         cmocka_unit_test(exr_holds_every_layer), cmocka_unit_test(exr_of_equal_renders_are_equal),
         cmocka_unit_test(unwritable_folder_is_one_line), cmocka_unit_test(preview_is_srgb),
         cmocka_unit_test(srgb_codes), cmocka_unit_test(stop_map_picture), cmocka_unit_test(stop_map_table),
-        cmocka_unit_test(report_is_what_happened), cmocka_unit_test(progress_is_honest),
+        cmocka_unit_test(report_is_what_happened), cmocka_unit_test(report_word_for_word), cmocka_unit_test(progress_is_honest),
+        cmocka_unit_test(progress_lines),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }
