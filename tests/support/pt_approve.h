@@ -3,7 +3,7 @@
  *
  *     # comment          kept
  *     = words            options of the next case, for whoever answers
- *     @ a.ply text       a line of a file beside the case
+ *     @ a.ply text       a line of a file beside the case; \c at its end: the file ends there
  *     > text             the first line of the case
  *     >> text            each further one
  *       answer           two blanks before it; made anew when the environment has APPROVE=1, and then to be read
