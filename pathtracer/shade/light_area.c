@@ -18,12 +18,16 @@ static float whole_sphere(const struct pt_quadric *q, pt_vec3 *centre)
     return similar ? q->radius * sqrtf(xx) : 0.0f;
 }
 
+/* A point of the sphere itself counts as inside: its own rounding must not decide which way it is lit, and from outside only
+ * the near half is sampled, which for an inner side is the point itself. */
+#define ON_SPHERE 0.99999f
+
 /* 1 - cos of the half angle of the cone that the sphere fills, 0 when seen from inside. Without cancellation:
  * 1 - cos θ = sin² θ / (1 + cos θ). */
 static float cone(pt_vec3 to_centre, float radius)
 {
     float dist2 = v3_dot(to_centre, to_centre), sin2 = radius * radius / dist2;
-    return sin2 < 1.0f ? sin2 / (1.0f + sqrtf(1.0f - sin2)) : 0.0f;
+    return sin2 < ON_SPHERE ? sin2 / (1.0f + sqrtf(1.0f - sin2)) : 0.0f;
 }
 
 /* Area in the quadric's own space. */

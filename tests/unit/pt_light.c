@@ -210,6 +210,34 @@ static void sphere_inside(void **state)
     test_scene_end(&scene);
 }
 
+/* Points of its own inner side are lit by the whole of it, evenly by area, whichever side of it their rounding puts them. */
+static void sphere_lights_itself(void **state)
+{
+    (void)state;
+    struct pt_scene scene;
+    struct pt_rng rng = pt_rng_make(7);
+    int lit = 0;
+    test_scene_begin(&scene);
+    build_sphere(&scene);
+    scene.shapes[0].flip_normal = 1;
+    test_scene_finish(&scene);
+    for (int i = 0; i < 4000; i++) {
+        pt_vec3 n = pt_sample_sphere(pt_rng_float(&rng), pt_rng_float(&rng)), p = v3_add(v3(2, 0.5f, 1), n);
+        const struct pt_receiver at = {p, v3_neg(n), PT_RECEIVER_SURFACE};
+        struct pt_light_sample s;
+        if (!pt_light_sample(PT_FX_ALL, &scene, &at, 0.5f, pt_rng_float(&rng), pt_rng_float(&rng), &s))
+            continue;
+        /* the chord of a unit sphere meets both ends at cosine d/2, so dω = (d/2) dA/d² */
+        float d = v3_len(v3_sub(s.target, p));
+        lit++;
+        if (d > 0.1f && !(fabsf(s.inv_pdf_solid - 2.0f * PT_PI / d) < 1e-3f * s.inv_pdf_solid))
+            fail_msg("sample %d at distance %g has 1/pdf %g", i, (double)d, (double)s.inv_pdf_solid);
+        assert_true(s.inv_pdf_solid < 2.0f * PT_PI / 0.1f || d < 0.11f);
+    }
+    assert_true(lit > 3900);
+    test_scene_end(&scene);
+}
+
 /* Point, spot and distant lights against their closed forms. */
 static void delta_lights(void **state)
 {
@@ -264,7 +292,7 @@ int main(void)
         cmocka_unit_test(sphere_inside),                   cmocka_unit_test(ellipsoid), cmocka_unit_test(cylinder),
         cmocka_unit_test(disk),                            cmocka_unit_test(latlong),   cmocka_unit_test(equal_area),
         cmocka_unit_test(portal_of_an_image),              cmocka_unit_test(portal_of_a_constant),
-        cmocka_unit_test(delta_lights), cmocka_unit_test(tables_are_as_fine_as_the_image_asks),
+        cmocka_unit_test(delta_lights), cmocka_unit_test(sphere_lights_itself), cmocka_unit_test(tables_are_as_fine_as_the_image_asks),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
