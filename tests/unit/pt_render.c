@@ -392,6 +392,45 @@ static void slices_deal_out_the_time(void **state)
         check_slice(&cases[i]);
 }
 
+static void keep_words(void *data, const char *line)
+{
+    strcpy(data, line);
+}
+
+/* Half of the time may go to checks: at 9 of 19 seconds they are asked for, at 11 of 21 left out, except of who gets no more samples. */
+static void checks_may_be_too_dear(void **state)
+{
+    (void)state;
+    for (int dear = 0; dear < 2; dear++) {
+        struct pt_render_config config = pt_fake_config();
+        struct base_err err = {0};
+        enum pt_render_outcome outcome;
+        char words[256] = "";
+        const struct pt_render_hooks hooks = {.slice = enough, .warn = keep_words, .data = words};
+        struct result r = {.pool = base_threads_create(1, &err)};
+        config.width = config.crop[2] = 48;
+        config.height = config.crop[3] = 16;
+        config.spp_max = 30;
+        config.max_check_overhead = 0.5;
+        assert_int_equal(pt_criterion_create(pt_fake_criterion(), NULL, 0, r.pool, NULL, NULL, &r.criterion, &err), 0);
+        assert_int_equal(pt_render_create(&config, NULL, pt_fake_noise, r.pool, r.criterion, &r.render, &err), 0);
+        struct pt_block *b = r.render->blocks.list;
+        for (int i = 0; i < 3; i++)
+            b[i].spp = b[i].next_spp = i < 2 ? 20 : 30;
+        r.render->totals.render_s = 10;
+        r.render->totals.criterion_s = dear ? 11 : 9;
+        assert_int_equal(pt_render_run(r.render, &hooks, &outcome, &err), BASE_EINVAL);
+        const struct pt_render_totals *t = &r.render->totals;
+        assert_true(t->checks == (dear ? 1 : 3) && t->skipped_checks == (dear ? 2 : 0) && t->failed_checks == 0 && !words[0]);
+        assert_true(r.render->asked == t->checks && t->criterion_s > (dear ? 11 : 9) && r.render->criterion_thread_s > 0);
+        for (int i = 0; i < 2; i++)
+            assert_true(b[i].reason == PT_REASON_NONE && b[i].next_spp == 23 && b[i].checks == (dear ? 0 : 1) && b[i].asked == b[i].checks &&
+                        b[i].asked_spp == (dear ? 0 : 20) && (dear || b[i].predicted_spp == 32 * (i + 1)));
+        assert_true(b[2].reason == PT_REASON_SPP_MAX && b[2].checks == 1);
+        release(&r);
+    }
+}
+
 /* With a seed the same rows are handed out in another order; without one block after block, as many as give each thread 128 rows. */
 static void the_order_of_work_follows_its_seed(void **state)
 {
@@ -564,6 +603,7 @@ int main(void)
         cmocka_unit_test(resumed_render_is_identical),
         cmocka_unit_test(bad_checkpoints_are_refused),
         cmocka_unit_test(slices_deal_out_the_time),
+        cmocka_unit_test(checks_may_be_too_dear),
         cmocka_unit_test(the_order_of_work_follows_its_seed),
         cmocka_unit_test(checkpoints_have_a_layout),
     };
