@@ -12,12 +12,14 @@
 #include <stddef.h>
 #include <cmocka.h>
 
+#include "base/bytes.h"
 #include "base/colour.h"
 #include "base/files.h"
 #include "base/half.h"
 #include "sequence/builder.h"
 #include "sequence/manifest.h"
 #include "sequence/statistics.h"
+#include "sequence/layout.h"
 #include "support/ggn_near.h"
 #include "support/lseq_oracle.h"
 
@@ -235,6 +237,121 @@ static void damage(void **state)
     free(bytes);
 }
 
+/* Makes the checksums right again, as far as the records go. */
+static void reseal(uint8_t *bytes, size_t size)
+{
+    base_put_u32(bytes + 60, seq_crc(bytes, 60));
+    for (size_t at = SEQ_FILE_HEADER; at + SEQ_RECORD_HEADER <= size;) {
+        size_t payload = base_get_u32(bytes + at + 20);
+        if (payload <= size - at - SEQ_RECORD_HEADER)
+            base_put_u32(bytes + at + 24, seq_crc(bytes + at + SEQ_RECORD_HEADER, payload));
+        base_put_u32(bytes + at + 28, seq_crc(bytes + at, 28));
+        at += SEQ_RECORD_HEADER + payload;
+    }
+}
+
+static void expect_block(uint8_t *bytes, size_t size, const char *words)
+{
+    struct seq_block b;
+    struct base_err err = {0};
+    char line[128];
+    uint8_t *copy = malloc(size);
+    memcpy(copy, bytes, size);
+    snprintf(line, sizeof line, "b: %s", words ? words : "");
+    int rc = seq_block_parse("b", copy, size, &b, &err);
+    if (rc != (words ? BASE_EINVAL : 0) || (words && strcmp(err.text, line) != 0))
+        fail_msg("%d \"%s\", expected \"%s\"", rc, err.text, line);
+    if (rc)
+        free(copy);
+    else
+        seq_block_release(&b);
+}
+
+/* One number of a good file is another one, and the checksums fit: what is said of it, word for word. */
+static void limits_of_blocks(void **state)
+{
+    (void)state;
+    enum { FIRST = SEQ_FILE_HEADER, STATS = FIRST + SEQ_RECORD_HEADER, PLANE = STATS + 2 * SEQ_STAT_BYTES };
+    char *text;
+    size_t size;
+    struct base_err err = {0};
+    assert_int_equal(base_file_read(block_path, 1 << 24, &text, &size, &err), 0);
+    uint8_t *bytes = (uint8_t *)text;
+    const size_t second = FIRST + SEQ_RECORD_HEADER + base_get_u32(bytes + FIRST + 20);
+    const size_t plane_1 = PLANE + SEQ_PLANE_HEADER + base_get_u32(bytes + PLANE + 12);
+    const struct {
+        size_t at;
+        uint32_t value;
+        const char *words;
+    } cases[] = {
+        {0, 0, "not a block sequence"},
+        {8, 2, "version 2 of the format is not known"},
+        {12, 63, "version 1 of the format is not known"},
+        {16, 0, "a block of 0x21 pixels with 4 images"},
+        {16, 4097, "a block of 4097x21 pixels with 4 images"},
+        {20, 0, "a block of 37x0 pixels with 4 images"},
+        {20, 4097, "a block of 37x4097 pixels with 4 images"},
+        {36, 0, "a block of 37x21 pixels with 0 images"},
+        {36, 4097, "a block of 37x21 pixels with 4097 images"},
+        {36, (uint32_t)((size - FIRST) / SEQ_RECORD_HEADER) + 1, NULL}, /* told below: it depends on zlib */
+        {36, 5, "header of image 3 makes no sense"}, /* a reference that is not the last */
+        {36, 3, "bytes after the last image"},
+        {24, 0xfffffff0u, NULL},
+        {32, 77, NULL},
+        {FIRST, 3, "header of image 0 makes no sense"},
+        {FIRST, 2, "header of image 0 makes no sense"},
+        {FIRST, 0, "header of image 0 makes no sense"},
+        {FIRST + 4, 0, "header of image 0 makes no sense"},
+        {FIRST + 4, 39, NULL},
+        {FIRST + 4, 40, "levels do not rise: 40 spp after 40"},
+        {FIRST + 8, 20, NULL},
+        {FIRST + 8, 21, "header of image 0 makes no sense"},
+        {FIRST + 12, 65, "header of image 0 makes no sense"},
+        {FIRST + 16, 0, "header of image 0 makes no sense"},
+        {FIRST + 16, 17, "header of image 0 makes no sense"},
+        {FIRST + 16, 2, "20 spp: bytes after the last plane"},
+        {FIRST + 16, 4, "20 spp: plane 3 is cut short"},
+        {FIRST + 20, 0xffffff, "truncated: 0 of 4 images"},
+        {second, 2, "header of image 1 makes no sense"},
+        {second + 4, 20, "levels do not rise: 20 spp after 20"},
+        {second + 4, 21, NULL},
+        {STATS + SEQ_NAME + 4, 0x7ff00000, "20 spp: statistic 0 is not usable"},
+        {STATS + SEQ_STAT_BYTES + SEQ_NAME + 4, 0x7ff80000, "20 spp: statistic 1 is not usable"},
+        {PLANE, 99, "20 spp: no display image"},
+        {PLANE + 4, 8, "20 spp: plane 0 has the wrong size, filter or number"},
+        {PLANE + 8, 3 * P + 1, "20 spp: plane 0 has the wrong size, filter or number"},
+        {PLANE + 12, 0xffffff, "20 spp: plane 0 is cut short"},
+        {plane_1, SEQ_PLANE_DISPLAY, "20 spp: plane 1 has the wrong size, filter or number"},
+        {plane_1, 98, NULL},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        char line[64];
+        uint32_t kept = base_get_u32(bytes + cases[i].at);
+        base_put_u32(bytes + cases[i].at, cases[i].value);
+        reseal(bytes, size);
+        snprintf(line, sizeof line, "truncated: room for fewer than %u images", cases[i].value);
+        expect_block(bytes, size, cases[i].at == 36 && cases[i].value > 5 && !cases[i].words ? line : cases[i].words);
+        base_put_u32(bytes + cases[i].at, kept);
+        if (cases[i].at == FIRST + 20)
+            base_put_u32(bytes + FIRST + 24, seq_crc(bytes + STATS, kept));
+    }
+    reseal(bytes, size);
+    expect_block(bytes, size, NULL);
+    memset(bytes + STATS, 'n', SEQ_NAME); /* a name without an end */
+    reseal(bytes, size);
+    expect_block(bytes, size, "20 spp: statistic 0 is not usable");
+    static const struct {
+        size_t at;
+        const char *words;
+    } damaged[] = {{40, "the header is damaged (CRC)"}, {FIRST + 8, "header of image 0 is damaged (CRC)"}, {PLANE + 20, "image at 20 spp is damaged (CRC)"}};
+    for (int i = 0; i < 3; i++) {
+        bytes[damaged[i].at] ^= 1;
+        expect_block(bytes, size, damaged[i].words);
+        bytes[damaged[i].at] ^= 1;
+    }
+    free(text);
+}
+
 static void builder_limits(void **state)
 {
     (void)state;
@@ -243,7 +360,38 @@ static void builder_limits(void **state)
     struct seq_frame more = {.spp = 5000, .display = display};
     assert_int_equal(seq_builder_add(&w, &more, NULL), BASE_EINVAL); /* nothing after the reference */
     seq_builder_release(&w);
-    assert_int_equal(seq_builder_init(&w, 0, 5, 0, 0, 0, 0, NULL), BASE_EINVAL);
+    struct base_err err = {0};
+    static const uint32_t sizes[][3] = {{0, 5, 0}, {5, 0, 0}, {4097, 5, 0}, {5, 4097, 0}, {4096, 1, 1}, {1, 4096, 1}};
+    for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
+        char line[64];
+        int rc = seq_builder_init(&w, sizes[i][0], sizes[i][1], 0, 0, 0, 0, &err);
+        assert_int_equal(rc, sizes[i][2] ? 0 : BASE_EINVAL);
+        snprintf(line, sizeof line, "a block of %ux%u pixels", sizes[i][0], sizes[i][1]);
+        if (rc)
+            assert_string_equal(err.text, line);
+        else
+            seq_builder_release(&w);
+    }
+    assert_int_equal(seq_builder_init(&w, W, H, 0, 0, 0, 0, &err), 0);
+    static const struct seq_stat stats[SEQ_MAX_STATS + 1];
+    const struct seq_frame frames[] = {{.spp = 0, .display = display}, {.spp = 7}, {.spp = 7, .display = display, .stats = stats, .n_stats = SEQ_MAX_STATS + 1},
+                                       {.spp = 7, .display = display, .stats = stats, .n_stats = SEQ_MAX_STATS}, {.spp = 8, .mean = mean}};
+    for (int i = 0; i < 5; i++)
+        assert_int_equal(seq_builder_add(&w, &frames[i], &err), i < 3 ? BASE_EINVAL : 0);
+    assert_string_equal(err.text, "image at 7 spp cannot be added to the sequence");
+    assert_int_equal(w.n_records, 2);
+    seq_builder_release(&w);
+    assert_true(!w.bytes && w.size == 0);
+}
+
+static void expect_unread(const struct seq_manifest *m, const char *words)
+{
+    struct seq_block b;
+    struct base_err err = {0};
+    char line[256];
+    snprintf(line, sizeof line, "%s: %s", block_path, words);
+    assert_int_equal(seq_manifest_read_block(dir, m, 0, &b, &err), BASE_EINVAL);
+    assert_string_equal(err.text, line);
 }
 
 static void manifest(void **state)
@@ -271,16 +419,26 @@ static void manifest(void **state)
     seq_block_release(&b);
 
     back.blocks[0].crc32 ^= 1;
-    assert_int_equal(seq_manifest_read_block(dir, &back, 0, &b, &err), BASE_EINVAL);
+    expect_unread(&back, "not the file that the manifest lists (size or CRC)");
     back.blocks[0].crc32 ^= 1;
-    back.blocks[0].x1++; /* mixed sizes */
-    assert_int_equal(seq_manifest_read_block(dir, &back, 0, &b, &err), BASE_EINVAL);
+    back.blocks[0].bytes++;
+    expect_unread(&back, "not the file that the manifest lists (size or CRC)");
+    back.blocks[0].bytes--;
+    uint32_t *const places[] = {&back.blocks[0].x1, &back.blocks[0].y1, &back.blocks[0].x0, &back.blocks[0].y0, &back.blocks[0].id};
+    for (int i = 0; i < 5; i++) {
+        ++*places[i];
+        back.blocks[0].x1 += i == 2; /* the same size, elsewhere */
+        back.blocks[0].y1 += i == 3;
+        expect_unread(&back, "block 9 is 37x21 at 400,200, the manifest says otherwise");
+        --*places[i];
+        back.blocks[0].x1 -= i == 2;
+        back.blocks[0].y1 -= i == 3;
+    }
     seq_manifest_release(&back);
     m.n_levels = 4; /* a level that the block does not have */
     seq_manifest_write(dir, &m, &err);
     seq_manifest_read(dir, &back, &err);
-    assert_int_equal(seq_manifest_read_block(dir, &back, 0, &b, &err), BASE_EINVAL);
-    assert_non_null(strstr(err.text, "160 spp is missing"));
+    expect_unread(&back, "the level at 160 spp is missing");
     seq_manifest_release(&back);
 }
 
@@ -325,6 +483,127 @@ static void differences(void **state)
     DIFFERS(n.reference_independent = 0, "reference_independent");
     DIFFERS(n.levels = other, "levels");
     DIFFERS(n.n_levels = 1, "levels");
+}
+
+static void expect_text(const char *name, const char *expected)
+{
+    char path[64], *text;
+    size_t size;
+    struct base_err err = {0};
+    snprintf(path, sizeof path, "%s/%s", dir, name);
+    assert_int_equal(base_file_read(path, 1 << 16, &text, &size, &err), 0);
+    assert_string_equal(text, expected);
+    free(text);
+}
+
+/* The manifest word for word: what is always there, and what is there only if it says something. */
+static void manifests_word_for_word(void **state)
+{
+    (void)state;
+    uint32_t levels[] = {20, 40};
+    struct base_err err = {0};
+    struct seq_manifest_block list[2] = {{.id = 3, .x0 = 16, .y0 = 0, .x1 = 32, .y1 = 16, .file = "block-00003.lseq", .bytes = 1234, .crc32 = 0xabc},
+                                         {.id = 4, .x0 = 32, .y0 = 1, .x1 = 40, .y1 = 9, .file = "f", .bytes = 5, .crc32 = 0xfedcba98u, .seconds = 1.5,
+                                          .dropped = 17}};
+    struct seq_manifest m = {.scene = "s", .source = "a/s.pbrt", .camera = "view0", .renderer = "r", .width = 64, .height = 48, .block = 16,
+                             .seed = 1, .reference_seed = 2, .reference_spp = 9, .reference_independent = 1, .n_levels = 2, .levels = levels},
+                        back;
+    assert_int_equal(seq_manifest_write(dir, &m, &err), 0);
+    expect_text("manifest.json", "{\n\t\"format\":\t\"lull-sequence\",\n\t\"version\":\t1,\n\t\"scene\":\t\"s\",\n\t\"source\":\t\"a/s.pbrt\",\n"
+                                 "\t\"camera\":\t\"view0\",\n\t\"renderer\":\t\"r\",\n\t\"width\":\t64,\n\t\"height\":\t48,\n\t\"block\":\t16,\n"
+                                 "\t\"seed\":\t1,\n\t\"reference_seed\":\t2,\n\t\"reference_spp\":\t9,\n\t\"levels\":\t[20, 40],\n\t\"blocks\":\t[]\n}\n");
+    m.source_crc32 = 0x12;
+    m.inputs_crc32 = 0x345;
+    m.has_look_at = 1;
+    for (int i = 0; i < 9; i++)
+        m.look_at[i] = i + 0.5;
+    m.fov_deg = 33.25;
+    m.reference_independent = 0;
+    m.n_blocks = 2;
+    m.blocks = list;
+    assert_int_equal(seq_manifest_write(dir, &m, &err), 0);
+    expect_text("manifest.json",
+                "{\n\t\"format\":\t\"lull-sequence\",\n\t\"version\":\t1,\n\t\"scene\":\t\"s\",\n\t\"source\":\t\"a/s.pbrt\",\n"
+                "\t\"source_crc32\":\t\"00000012\",\n\t\"inputs_crc32\":\t\"00000345\",\n\t\"camera\":\t\"view0\",\n"
+                "\t\"look_at\":\t[0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5, 8.5],\n\t\"fov\":\t33.25,\n\t\"renderer\":\t\"r\",\n\t\"width\":\t64,\n"
+                "\t\"height\":\t48,\n\t\"block\":\t16,\n\t\"seed\":\t1,\n\t\"reference_seed\":\t2,\n\t\"reference_spp\":\t9,\n"
+                "\t\"reference_independent\":\tfalse,\n\t\"levels\":\t[20, 40],\n\t\"blocks\":\t[{\n\t\t\t\"id\":\t3,\n\t\t\t\"x0\":\t16,\n\t\t\t\"y0\":\t0,\n"
+                "\t\t\t\"x1\":\t32,\n\t\t\t\"y1\":\t16,\n\t\t\t\"file\":\t\"block-00003.lseq\",\n\t\t\t\"bytes\":\t1234,\n\t\t\t\"crc32\":\t\"00000abc\"\n"
+                "\t\t}, {\n\t\t\t\"id\":\t4,\n\t\t\t\"x0\":\t32,\n\t\t\t\"y0\":\t1,\n\t\t\t\"x1\":\t40,\n\t\t\t\"y1\":\t9,\n\t\t\t\"file\":\t\"f\",\n"
+                "\t\t\t\"bytes\":\t5,\n\t\t\t\"crc32\":\t\"fedcba98\",\n\t\t\t\"seconds\":\t1.5,\n\t\t\t\"dropped\":\t17\n\t\t}]\n}\n");
+    assert_int_equal(seq_manifest_read(dir, &back, &err), 0);
+    assert_null(seq_manifest_difference(&m, &back));
+    assert_string_equal(back.source, "a/s.pbrt");
+    assert_true(back.n_blocks == 2 && memcmp(back.blocks, list, sizeof list) == 0);
+    seq_manifest_release(&back);
+    assert_true(back.n_blocks == 0 && !back.blocks && !back.levels);
+}
+
+/* `%s` of a good manifest, or of its only block, is changed; NULL: it stays good. */
+static void limits_of_manifests(void **state)
+{
+    (void)state;
+    static const char good[] = "{\"format\":\"lull-sequence\",\"version\":1,\"scene\":\"s\",\"width\":1048576,\"height\":1048576,\"block\":4096,"
+                               "\"reference_spp\":2147483647,\"levels\":[1,2147483647],\"blocks\":[{\"id\":4294967295,\"x0\":0,\"y0\":0,\"x1\":1,"
+                               "\"y1\":1048576,\"file\":\"x\",\"bytes\":1073741824,\"crc32\":\"0000000f\",\"dropped\":0}]}";
+    static const struct {
+        const char *from, *to, *words;
+    } cases[] = {
+        {"lull-sequence", "other", "not the manifest of a sequence"},
+        {"\"version\":1", "\"version\":2", "this version of the format is not known"},
+        {"\"scene\":\"s\"", "\"scene\":7", "the scene has no name"},
+        {"\"width\":1048576", "\"width\":1048577", "width, height or block is missing or out of range"},
+        {"\"width\":1048576", "\"width\":0", "width, height or block is missing or out of range"},
+        {"\"width\":1048576", "\"width\":1", NULL},
+        {"\"height\":1048576", "\"height\":1048577", "width, height or block is missing or out of range"},
+        {"\"height\":1048576", "\"height\":1.5", "width, height or block is missing or out of range"},
+        {"\"block\":4096", "\"block\":4097", "width, height or block is missing or out of range"},
+        {"\"block\":4096", "\"block\":\"8\"", "width, height or block is missing or out of range"},
+        {"[1,2147483647]", "[0,2]", "level 0 does not rise"},
+        {"[1,2147483647]", "[1,2147483648]", "level 1 does not rise"},
+        {"[1,2147483647]", "[1,1]", "level 1 does not rise"},
+        {"[1,2147483647]", "[]", "no list of levels"},
+        {"[1,2147483647]", "7", "no list of levels"},
+        {"\"blocks\":[", "\"blocks\":7,\"more\":[", "no list of blocks"},
+        {"\"id\":4294967295", "\"id\":4294967296", "entry 0 of blocks is not usable"},
+        {"\"id\":4294967295", "\"id\":0", NULL},
+        {"\"x0\":0,", "\"x0\":1,", "entry 0 of blocks is not usable"},
+        {"\"x0\":0,", "\"x0\":-1,", "entry 0 of blocks is not usable"},
+        {"\"x1\":1,", "\"x1\":1048576,", NULL},
+        {"\"x1\":1,", "\"x1\":1048577,", "entry 0 of blocks is not usable"},
+        {"\"y0\":0,", "\"y0\":1048575,", NULL},
+        {"\"y0\":0,", "\"y0\":1048576,", "entry 0 of blocks is not usable"},
+        {"\"y1\":1048576", "\"y1\":0", "entry 0 of blocks is not usable"},
+        {"\"bytes\":1073741824", "\"bytes\":1073741825", "entry 0 of blocks is not usable"},
+        {"\"bytes\":1073741824", "\"bytes\":0", "entry 0 of blocks is not usable"},
+        {"\"0000000f\"", "\"g\"", "entry 0 of blocks is not usable"},
+        {"\"0000000f\"", "\"0000000f0\"", "entry 0 of blocks is not usable"},
+        {"\"0000000f\"", "15", "entry 0 of blocks is not usable"},
+        {"\"dropped\":0", "\"dropped\":1e15", NULL},
+        {"\"dropped\":0", "\"dropped\":-1", "entry 0 of blocks is not usable"},
+        {"\"file\":\"x\"", "\"file\":\"\"", "entry 0 of blocks is not usable"},
+        {"\"file\":\"x\"", "\"file\":\".x\"", "entry 0 of blocks is not usable"},
+        {"\"file\":\"x\"", "\"file\":\"a/x\"", "entry 0 of blocks is not usable"},
+        {"\"file\":\"x\"", "\"file\":4", "entry 0 of blocks is not usable"},
+        {"\"version\":1", "\"version\":1,\"look_at\":[1,2,3,4,5,6,7,8]", "look_at is not nine numbers"},
+        {"\"version\":1", "\"version\":1,\"look_at\":[1,2,3,4,5,6,7,8,\"9\"]", "look_at is not nine numbers"},
+        {"\"version\":1", "\"version\":1,\"look_at\":9", "look_at is not nine numbers"},
+        {"\"version\":1", "\"version\":1,\"look_at\":[1,2,3,4,5,6,7,8,9],\"fov\":\"x\"", NULL},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        char text[1024], line[128];
+        struct seq_manifest m;
+        struct base_err err = {0};
+        const char *at = strstr(good, cases[i].from);
+        assert_non_null(at);
+        snprintf(text, sizeof text, "%.*s%s%s", (int)(at - good), good, cases[i].to, at + strlen(cases[i].from));
+        snprintf(line, sizeof line, "m.json: %s", cases[i].words ? cases[i].words : "");
+        int rc = seq_manifest_parse("m.json", text, strlen(text), &m, &err);
+        if (rc != (cases[i].words ? BASE_EINVAL : 0) || (rc && strcmp(err.text, line) != 0))
+            fail_msg("%s: %d \"%s\", expected \"%s\"", cases[i].to, rc, err.text, line);
+        if (!rc)
+            seq_manifest_release(&m);
+    }
 }
 
 static void bad_manifests(void **state)
@@ -374,7 +653,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(half_floats), cmocka_unit_test(codings), cmocka_unit_test(statistics), cmocka_unit_test(filters),
         cmocka_unit_test(round_trip), cmocka_unit_test(differences),
-        cmocka_unit_test(damage), cmocka_unit_test(builder_limits), cmocka_unit_test(manifest), cmocka_unit_test(bad_manifests), cmocka_unit_test(a_block_is_listed_once),
+        cmocka_unit_test(damage), cmocka_unit_test(limits_of_blocks), cmocka_unit_test(builder_limits), cmocka_unit_test(manifest), cmocka_unit_test(bad_manifests), cmocka_unit_test(a_block_is_listed_once),
+        cmocka_unit_test(manifests_word_for_word), cmocka_unit_test(limits_of_manifests),
     };
     return cmocka_run_group_tests_name("sequence", tests, setup, teardown);
 }

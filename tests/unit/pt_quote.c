@@ -239,6 +239,20 @@ static void light_that_few_pixels_met_is_told(void **state)
     end(&run);
 }
 
+/* A pilot is over after its time, too: here after one slice. */
+static void a_pilot_ends_with_its_time(void **state)
+{
+    (void)state;
+    struct run run;
+    start(&run, "0.25", 64);
+    run.render->config.pilot_s = 0;
+    assert_int_equal(go(&run), PT_RENDER_PILOT);
+    assert_true(pt_render_active(run.render) == 12 && run.render->blocks.list[0].spp == 1 && run.render->totals.checks == 0);
+    run.render->config.pilot_spp = 0; /* no pilot */
+    assert_int_equal(go(&run), PT_RENDER_DONE);
+    end(&run);
+}
+
 static void stops_that_nobody_predicts(void **state)
 {
     (void)state;
@@ -365,6 +379,7 @@ int main(void)
         cmocka_unit_test(intervals_widen_with_distance), cmocka_unit_test(light_that_few_pixels_met_is_told),
         cmocka_unit_test(the_last_blocks_leave_threads_idle),
         cmocka_unit_test(outlooks_in_closed_form), cmocka_unit_test(quotes_in_every_number),
+        cmocka_unit_test(a_pilot_ends_with_its_time),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -39,7 +39,27 @@ static void levels(void **state)
     for (int i = 1; i < n; i++)
         assert_true(spp[i] > spp[i - 1]);
     assert_int_equal(pt_sequence_levels("geometric:1:5:1.01", spp, &err), 5);
-    static const char *const bad[] = {"", "linear", "linear:1:2", "cubic:1:2:3", "linear:0:5:1", "linear:5:1:1", "geometric:1:9:1",
+    enum { MOST = PT_SEQUENCE_MAX_LEVELS };
+    char text[64], line[200];
+    snprintf(text, sizeof text, "linear:1:%d:1", MOST - 1);
+    assert_int_equal(pt_sequence_levels(text, spp, &err), MOST - 1);
+    assert_true(spp[0] == 1 && spp[MOST - 2] == MOST - 1);
+    snprintf(text, sizeof text, "linear:1:%d:1", MOST);
+    assert_int_equal(pt_sequence_levels(text, spp, &err), BASE_EINVAL);
+    snprintf(line, sizeof line, "--levels %s: more than %d levels", text, MOST - 1);
+    assert_string_equal(err.text, line);
+    snprintf(text, sizeof text, "linear:1:%d.5:1", MOST - 1); /* the last is whole and there */
+    assert_int_equal(pt_sequence_levels(text, spp, &err), MOST - 1);
+    assert_int_equal(pt_sequence_levels("linear:3:10:4", spp, &err), 3);
+    assert_true(spp[0] == 3 && spp[1] == 7 && spp[2] == 10);
+    assert_int_equal(pt_sequence_levels("geometric:3:3:1.001", spp, &err), 1);
+    assert_int_equal(pt_sequence_levels("geometric:2:20:2.2", spp, &err), 4); /* 2, 4.4, 9.68 and the end */
+    assert_true(spp[0] == 2 && spp[1] == 4 && spp[2] == 10 && spp[3] == 20);
+    pt_sequence_levels("cubic:1:2:3", spp, &err);
+    assert_string_equal(err.text, "--levels cubic:1:2:3: expected geometric:FIRST:LAST:RATIO or linear:FIRST:LAST:STEP");
+    pt_sequence_levels("linear:2:1:1", spp, &err);
+    assert_string_equal(err.text, "--levels linear:2:1:1: expected 1 <= FIRST <= LAST, RATIO >= 1.001, STEP >= 1");
+    static const char *const bad[] = {"geometric:1:9:1.0009", "linear:1:9:0.9", "linear:0.9:9:1", "linear:1:1000000001:900000000", "", "linear", "linear:1:2", "cubic:1:2:3", "linear:0:5:1", "linear:5:1:1", "geometric:1:9:1",
                                       "linear:1:9:1:2", "linear:1:9:nan", "linear:1:100000:1", "geometric:1:inf:2"};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
         assert_int_equal(pt_sequence_levels(bad[i], spp, &err), BASE_EINVAL);
@@ -56,6 +76,10 @@ static void block_lists(void **state)
     static const char *const bad[] = {"", "12", "1-", "3-1", "-1", "a", "1,", "1;2", "0-12"};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
         assert_int_equal(pt_sequence_choose(bad[i], chosen, 12, &err), BASE_EINVAL);
+    pt_sequence_choose("3-12", chosen, 12, &err);
+    assert_string_equal(err.text, "--blocks 3-12: blocks are 0 to 11 here");
+    pt_sequence_choose("3;4", chosen, 12, &err);
+    assert_string_equal(err.text, "--blocks 3;4: expected a list like 0,3,8-11");
 }
 
 /* The film's second moment and the statistics must weigh colours alike: a pixel whose samples are all the same has no error,
@@ -110,11 +134,20 @@ static struct pt_sequence_config make_config(void)
 }
 
 static int lines_said;
+static char said[8][160];
 static void say(void *data, const char *line)
 {
     (void)data;
-    (void)line;
-    lines_said++;
+    snprintf(said[lines_said++ % 8], sizeof said[0], "%s", line);
+}
+
+/* "…, 0.1 s each, 3 s left" after what is known. */
+static void check_said(int i, const char *begin, const char *end)
+{
+    double each_s, left_s;
+    assert_memory_equal(said[i], begin, strlen(begin));
+    assert_int_equal(sscanf(said[i] + strlen(begin), "%lf s each, %lf s left", &each_s, &left_s), 2);
+    assert_string_equal(said[i] + strlen(said[i]) - strlen(end), end);
 }
 
 static pt_kernel *kernel = pt_fake_noise;
@@ -325,7 +358,11 @@ static void recorded_folder(void **state)
     struct pt_criterion *criterion = NULL;
     struct base_err err = {0};
     assert_int_equal(pt_criterion_create(pt_fake_criterion(), NULL, 0, pool, NULL, NULL, &criterion, &err), 0);
+    lines_said = 0;
     assert_int_equal(record(&config, criterion, &err), 0);
+    assert_int_equal(lines_said, 2);
+    check_said(0, "block 1 recorded, 1 of 2, ", " s left");
+    check_said(1, "block 11 recorded, 2 of 2, ", ", 0 s left");
     pt_criterion_destroy(criterion);
     check_block("block-00001.lseq", 16, 0, 32, 16, 1);
     check_block("block-00011.lseq", 48, 32, 60, 44, 1);
@@ -363,11 +400,67 @@ static void dropped_samples_are_counted(void **state)
     assert_int_equal(record(&config, NULL, &err), 0);
     kernel = pt_fake_noise;
     assert_int_equal(lines_said, 1);
+    assert_string_equal(said[0], "block 0: 640 samples were not finite and were dropped; manifest.json counts them");
     struct seq_manifest m;
     assert_int_equal(seq_manifest_read(own, &m, &err), 0);
     assert_int_equal(m.blocks[0].dropped, 8 * 16 * (4 + 1));
     assert_int_equal(m.blocks[1].dropped, 0);
     seq_manifest_release(&m);
+    snprintf(command, sizeof command, "rm -r %s", own);
+    assert_int_equal(system(command), 0);
+}
+
+/* The slices of one phase fail, or are the last before an interrupt. */
+static struct {
+    uint64_t spp_max; /* the phase: of levels or of the reference */
+    int fails, stop;
+} ending;
+
+static int end_there(void *data, struct pt_render *r, struct base_err *err)
+{
+    (void)data;
+    if (r->config.spp_max != ending.spp_max)
+        return 0;
+    ending.stop = !ending.fails;
+    return ending.fails ? base_fail(err, BASE_EIO, "the disk is gone") : 0;
+}
+
+static int stop_there(void *data)
+{
+    (void)data;
+    return ending.stop;
+}
+
+/* A block that failed or was interrupted, on its way up or in its reference, is not there; the next run makes it. */
+static void a_block_is_recorded_whole_or_not(void **state)
+{
+    (void)state;
+    static const struct pt_scene empty;
+    struct pt_sequence_config config = make_config();
+    char own[] = "/tmp/pt_sequence_end_XXXXXX", command[128];
+    assert_non_null(mkdtemp(own));
+    config.directory = own;
+    config.blocks = "0";
+    config.quiet = 1;
+    for (int k = 0; k < 5; k++) {
+        struct seq_manifest m;
+        struct base_err err = {0};
+        int stopped = 7;
+        config.slice = k < 4 ? end_there : NULL;
+        ending.spp_max = k % 2 ? 64 : 352;
+        ending.fails = k < 2;
+        ending.stop = 0;
+        int rc = pt_sequence_record(&config, &empty, kernel, pool, NULL, stop_there, say, NULL, &stopped, &err);
+        assert_int_equal(rc, k < 2 ? BASE_EIO : 0);
+        assert_int_equal(stopped, k == 2 || k == 3);
+        if (k < 2)
+            assert_string_equal(err.text, "the disk is gone");
+        assert_int_equal(seq_manifest_read(own, &m, &err), 0);
+        assert_int_equal(m.n_blocks, k == 4);
+        seq_manifest_release(&m);
+        snprintf(command, sizeof command, "%s/block-00000.lseq", own);
+        assert_int_equal(access(command, F_OK), k == 4 ? 0 : -1);
+    }
     snprintf(command, sizeof command, "rm -r %s", own);
     assert_int_equal(system(command), 0);
 }
@@ -385,6 +478,7 @@ static void going_on(void **state)
     config.blocks = "1,2,11";
     assert_int_equal(record(&config, NULL, &err), 0);
     assert_int_equal(lines_said, 1);
+    check_said(0, "block 2 recorded, 1 of 1, ", ", 0 s left");
     stat(path, &after);
     assert_true(before.st_ino == after.st_ino);
     check_block("block-00002.lseq", 32, 0, 48, 16, 0);
@@ -417,7 +511,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(levels), cmocka_unit_test(block_lists), cmocka_unit_test(noise_free_colours_have_no_error),
-        cmocka_unit_test(recorded_folder), cmocka_unit_test(dropped_samples_are_counted), cmocka_unit_test(going_on),
+        cmocka_unit_test(recorded_folder), cmocka_unit_test(dropped_samples_are_counted), cmocka_unit_test(a_block_is_recorded_whole_or_not),
+        cmocka_unit_test(going_on),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }
