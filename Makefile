@@ -76,7 +76,7 @@ EXAMPLE_SRC := $(wildcard plugin-api/examples/*.c)
 TOOL_SRC    := $(wildcard plugin-api/tools/*.c)
 MPI_SRC     := $(wildcard plugin-api/mpi/*.c)
 PT_SRC      := $(wildcard pathtracer/*/*.c)
-PT_IMAGES   := $(wildcard pathtracer/*/*.cpp)# in a shared object of their own; tests link them
+PT_IMAGES   := $(wildcard pathtracer/*/*.cpp)# in a shared object of their own; fuzz targets and benchmarks link them
 PT_MAIN     := $(wildcard pathtracer/*.c)
 GGN_SRC     := $(filter-out ggn/plugin/% ggn/study/% ggn/cli/%,$(wildcard ggn/*/*.c))
 GGN_IMAGES  := $(wildcard ggn/*/*.cpp)# as PT_IMAGES
@@ -180,20 +180,24 @@ SUPPORT_ggn := $(call o,$(filter-out tests/support/pt_%,$(wildcard tests/support
 SUPPORT_api := $(call o,$(filter-out tests/support/pt_% tests/support/ggn_% tests/support/base_%,$(wildcard tests/support/*.c)))
 SUPPORT_base := $(call o,$(wildcard tests/support/base_*.c))
 define test_rules
-$(OUT)/tests/$(1)/pt_%: $(OBJ)/tests/$(1)/pt_%.c.o $(PT_OBJ) $(LOADER_OBJ) $(SUPPORT_pt)
-	$$(link) $$^ $$(LDFLAGS_ALL) $(PT_LIBS) $(IMAGE_LIBS) -lcmocka -o $$@
-$(OUT)/tests/$(1)/ggn_%: $(OBJ)/tests/$(1)/ggn_%.c.o $(GGN_OBJ) $(SUPPORT_ggn)
-	$$(link) $$^ $$(LDFLAGS_ALL) $(GGN_LIBS) $(IMAGE_LIBS) -lcmocka -o $$@
-$(OUT)/tests/$(1)/ggn_study%: $(OBJ)/tests/$(1)/ggn_study%.c.o $(GGN_STUDY_OBJ) $(GGN_OBJ) $(SUPPORT_ggn)
-	$$(link) $$^ $$(LDFLAGS_ALL) $(STUDY_LIBS) $(GGN_LIBS) $(IMAGE_LIBS) -lcmocka -o $$@
-$(OUT)/tests/$(1)/ggn_plugin%: $(OBJ)/tests/$(1)/ggn_plugin%.c.o $(GGN_PLUGIN_OBJ) $(GGN_OBJ) $(SUPPORT_ggn)
-	$$(link) $$^ $$(LDFLAGS_ALL) $(GGN_LIBS) $(IMAGE_LIBS) -lcmocka -o $$@
+$(OUT)/tests/$(1)/pt_%: $(OBJ)/tests/$(1)/pt_%.c.o $(PT_CORE_OBJ) $(LOADER_OBJ) $(SUPPORT_pt)
+	$$(link) $$^ $$(LDFLAGS_ALL) $(PT_LIBS) -lcmocka -o $$@
+$(OUT)/tests/$(1)/ggn_%: $(OBJ)/tests/$(1)/ggn_%.c.o $(GGN_CORE_OBJ) $(SUPPORT_ggn)
+	$$(link) $$^ $$(LDFLAGS_ALL) $(GGN_LIBS) -lcmocka -o $$@
+$(OUT)/tests/$(1)/ggn_study%: $(OBJ)/tests/$(1)/ggn_study%.c.o $(GGN_STUDY_OBJ) $(GGN_CORE_OBJ) $(SUPPORT_ggn)
+	$$(link) $$^ $$(LDFLAGS_ALL) $(STUDY_LIBS) $(GGN_LIBS) -lcmocka -o $$@
+$(OUT)/tests/$(1)/ggn_plugin%: $(OBJ)/tests/$(1)/ggn_plugin%.c.o $(GGN_PLUGIN_OBJ) $(GGN_CORE_OBJ) $(SUPPORT_ggn)
+	$$(link) $$^ $$(LDFLAGS_ALL) $(GGN_LIBS) -lcmocka -o $$@
 $(OUT)/tests/$(1)/api_%: $(OBJ)/tests/$(1)/api_%.c.o $(LOADER_OBJ) $(SUPPORT_api)
 	$$(link) $$^ $$(LDFLAGS_ALL) -ldl -lm -lcmocka -o $$@
 $(OUT)/tests/$(1)/base_%: $(OBJ)/tests/$(1)/base_%.c.o $(BASE_OBJ) $(SUPPORT_base)
 	$$(link) $$^ $$(LDFLAGS_ALL) $(BASE_LIBS) -lcmocka -o $$@
 endef
 $(foreach d,unit grad golden stat abi hard oom,$(eval $(call test_rules,$(d))))
+# They load their modules from where a program's lie.
+$(TESTS) $(SANE): | $(OUT)/tests/lib
+$(OUT)/tests/lib: | $(MODULES)
+	@mkdir -p $(@D); ln -sfn ../lib $@
 # Criteria for the tests of the loader and of lull-check, most of them broken on purpose.
 ABI_PLUGINS := $(patsubst tests/%.c,$(OUT)/tests/%.so,$(wildcard tests/abi/plugins/*.c))
 $(OUT)/tests/abi/plugins/%.so: $(OBJ)/tests/abi/plugins/%.c.o
