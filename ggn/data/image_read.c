@@ -1,7 +1,6 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "base/colour.h"
 #include "base/module.h"
 #include "data/oiio.h"
 #include "model/preprocess.h"
@@ -13,17 +12,6 @@ static int library(const char *path, const struct ggn_oiio_library **out, struct
     *out = linked ? linked : base_module_symbol("ggn-images.so", "ggn_oiio_library", 0);
     return *out ? 0 : base_fail(err, BASE_EIO, "%s: images cannot be read: lib/ggn-images.so, which belongs beside this "
                                                "program's bin/, or OpenImageIO cannot be loaded", path);
-}
-
-int ggn_imagef_read(const char *path, struct ggn_imagef *image, struct base_err *err)
-{
-    const struct ggn_oiio_library *l;
-    int is_float = 0, rc = library(path, &l, err);
-    if (!rc)
-        rc = l->read_linear(path, image, &is_float, err);
-    for (size_t i = 0, n = (size_t)image->width * (size_t)image->height * 3; i < n && !rc && !is_float; i++)
-        image->data[i] = (float)base_srgb_eotf(image->data[i]);
-    return rc;
 }
 
 static int is_light(float v)
