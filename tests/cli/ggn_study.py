@@ -1,9 +1,13 @@
-"""`ggn study` over raw HTTP: what is refused changes nothing and is logged; what is stored comes back. Speaks TAP."""
+"""`ggn study` over raw HTTP: what is refused changes nothing and is logged; what is stored comes back. Speaks TAP.
+
+Every command, request and answer, what is stored, the exports and the reports are kept as they come and compared whole at the end
+(tests/golden/whole/study.txt; whole.py says how to record anew). gnuplot is one that hands its script back as the picture."""
 
 import atexit
 import http.client
 import json
 import os
+import re
 import signal
 import socket
 import sqlite3
@@ -12,10 +16,54 @@ import sys
 import tempfile
 import zlib
 
+sys.dont_write_bytecode = True
+import whole
+
 GGN = sys.argv[1]
 TMP = tempfile.TemporaryDirectory()
 count = 0
 failed = 0
+kept = {}  # section -> text
+drawn = {}  # what is drawn at random -> its name
+
+os.makedirs(os.path.join(TMP.name, "path"))
+with open(os.path.join(TMP.name, "path", "gnuplot"), "w") as f:
+    f.write("#!/bin/sh\ncp \"$1\" \"$(sed -n \"s/^set output '\\(.*\\)'$/\\1/p\" \"$1\")\"\n")
+os.chmod(f.name, 0o755)
+os.environ["PATH"] = os.path.dirname(f.name) + ":" + os.environ["PATH"]
+
+
+def keep(section, text):
+    """Adds to a section, without what differs from run to run."""
+    for word, name in drawn.items():
+        text = text.replace(word, name)
+    for regex, word in (
+        (re.escape(TMP.name), "TMP"),
+        (re.escape(whole.ROOT), "TREE"),
+        (re.escape(GGN), "ggn"),
+        (r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ", "TIME"),
+        (r"\b(?!0{32})[0-9a-f]{32}\b", "HEX32"),
+        (r"(127\.0\.0\.1|0\.0\.0\.0):\d{2,}", r"\1:PORT"),
+        (r"/[0-9a-f]{19}/", "/HALF/"),
+        (r"\.tmp-lull\d+-\d+\.", ".tmp."),
+    ):
+        text = re.sub(regex, word, text)
+    kept[section] = kept.get(section, "") + text
+
+
+def keep_files(section, folder):
+    """The files of a folder: text as it is, pictures by a checksum of their pixels."""
+    for path, folders, names in os.walk(folder):
+        folders.sort()
+        for name in sorted(names):
+            with open(os.path.join(path, name), "rb") as f:
+                data = f.read()
+            name = os.path.relpath(os.path.join(path, name), folder)
+            if data[:4] == b"\x89PNG":
+                shown = whole.pixels(data)
+                keep(section, "%s: %s, checksum %08x\n" % (name, shown.split("\n")[0], zlib.crc32(shown.encode())))
+            elif not name.startswith("study.db"):
+                keep(section, "--- %s\n%s\n" % (name, data.decode()))
 
 
 def check(ok, name, detail=""):
@@ -51,7 +99,10 @@ def view(name, pictures, width=32, height=16):
 
 
 def ggn(*args):
-    return subprocess.run([GGN, "study", *args], capture_output=True, text=True)
+    r = subprocess.run([GGN, "study", *args], capture_output=True, text=True)
+    if len(args) < 100:
+        keep("commands", "$ ggn study %s\n%s%sexit %d\n" % (" ".join(args), r.stdout, r.stderr, r.returncode))
+    return r
 
 
 def fails(name, pattern, *args):
@@ -64,6 +115,8 @@ def fails(name, pattern, *args):
 
 
 class Server:
+    headers = {}  # those of all answers
+
     def __init__(self, folder, listen="127.0.0.1:0"):
         self.log = open(os.path.join(TMP.name, "serve.log"), "w")
         self.child = subprocess.Popen(
@@ -100,7 +153,33 @@ class Server:
         r = c.getresponse()
         raw = r.read()
         c.close()
+        self.keep(method, address, body, {**(headers or {}), **({"Host": host} if host else {})}, r, raw)
         return r.status, raw, dict(r.getheaders())
+
+    def keep(self, method, address, body, headers, r, raw):
+        """Request and answer; of the page's own files the kind alone."""
+        told = dict(r.getheaders())
+        kind, cache = told.pop("Content-Type", "none"), told.pop("Cache-Control", "none")
+        for name in ("Date", "Connection", "Content-Length"):
+            told.pop(name, None)
+        if "X-Content-Type-Options" not in told:  # the library's own answer
+            return
+        if kind == "application/json" and b'"key":"' in raw:
+            person = json.loads(raw)
+            n = len(drawn) // 2 + 1
+            drawn[person["key"]], drawn[person["id"]] = "KEY%d" % n, "PERSON%d" % n
+        shown = body if isinstance(body, bytes) else json.dumps(body).encode() if body is not None else b""
+        line = "%s %s %s%s" % (method, address, headers or "", "" if body is None else " " + shown.decode("latin-1"))
+        if len(line) > 400:
+            line = line[:60] + "... %d in all" % len(line)
+        keep("served", "%s\n%d %s, %s\n" % (line, r.status, kind, cache))
+        if told != Server.headers:
+            keep("served", "".join("%s: %s\n" % item for item in sorted(told.items())))
+        Server.headers = told
+        if kind == "application/json" and address != "texts.json":
+            keep("served", raw.decode() + "\n")
+        elif kind == "image/png":
+            keep("served", whole.pixels(raw))
 
     def json(self, method, address, body=None, **more):
         status, raw, _ = self.request(method, address, body, **more)
@@ -120,6 +199,8 @@ class Server:
             return [line for line in f if " refused " in line]
 
     def stop(self, sig=signal.SIGTERM):
+        for line in self.refusals():
+            keep("refused", line)
         self.child.send_signal(sig)
         self.child.stdout.close()
         return self.child.wait(20)
@@ -130,6 +211,22 @@ def contents(folder):
     found = [db.execute(f"SELECT * FROM {table} ORDER BY 1, 2, 3").fetchall() for table in ("person", "trial")]
     db.close()
     return found
+
+
+def keep_export(path):
+    """An export, a line for each trial."""
+    whole_file = json.load(open(path))
+    people = whole_file.pop("people")
+    keep("exported", json.dumps(whole_file) + "\n")
+    for person in people:
+        trials = person.pop("trials")
+        keep("exported", json.dumps(person) + "\n" + "".join(json.dumps(t) + "\n" for t in trials))
+
+
+def keep_contents(folder):
+    for table, rows in zip(("person", "trial"), contents(folder)):
+        for row in rows:
+            keep("stored", "%s %s: %s\n" % (os.path.basename(folder), table, "; ".join(map(str, row))))
 
 
 # --- init ---
@@ -159,6 +256,9 @@ check(
     and os.path.exists(os.path.join(study, "texts.json")),
     "study.json holds blocks and levels, texts.json lies beside",
 )
+
+keep_files("made", study)
+
 
 def same_as_crop(picture, block, source):
     """Whether the stimulus is the block's part of the picture that it was made from."""
@@ -446,7 +546,10 @@ server.json(
     {"slot": 0, "revision": 1, "level": 256, "answer": 0, "rating": 0, "ms": 1500},
 )
 server.stop()
+keep_contents(study)
+keep_contents(adjustment)
 r = ggn("report", adjustment)
+keep_files("reported-adjustment", os.path.join(adjustment, "report"))
 report = os.path.join(adjustment, "report")
 lines = open(os.path.join(report, "blocks.csv")).read().split("\n")
 wanted = {
@@ -502,6 +605,7 @@ os.makedirs(copy)
 for name in ("study.json", "texts.json"):
     with open(os.path.join(adjustment, name)) as f, open(os.path.join(copy, name), "w") as g:
         g.write(f.read())
+keep_export(exported)
 check(ggn("import", copy, exported).returncode == 0, "import into a copy of the study")
 ggn("export", copy, "-o", exported + "2")
 check(open(exported).read() == open(exported + "2").read(), "and out again: the same bytes")
@@ -551,7 +655,12 @@ for name, bad in (
 ):
     check(server.json("POST", f"api/people/{key}/trials", {**good, **bad})[0] == 400, f"validation: refused: a wrong {name}")
 server.stop()
+keep_contents(validation)
+keep_files("made", validation)
 r = ggn("report", validation)
+keep_files("reported-validation", os.path.join(validation, "report"))
+ggn("export", validation, "-o", exported)
+keep_export(exported)
 report = os.path.join(validation, "report")
 rows = [line.strip().split(";") for line in open(os.path.join(report, "judgements.csv"))]
 table = {(row[0], row[1]): row for row in rows[1:]}
@@ -584,5 +693,54 @@ check(
 )
 check(ggn().returncode == 2 and ggn("taste", study).returncode == 2 and ggn("--help").returncode == 0, "usage")
 
-print(f"1..{count}")
-sys.exit(1 if failed else 0)
+# --- two intervals and settings of several people, with their reports ---
+wide = view("wide", ["reference", "n-16", "n-64", "n-256", "n-1024"], 40, 20)
+choices = os.path.join(TMP.name, "choices")
+ggn("init", choices, "--task=thresholds", "--method=2ifc", "--views", wide, levels, "--block=20", "--trials=12", "--catch=0.2", "--seed=5",
+    "--show=300", "--gap=200", "--break-every=7")
+settings = os.path.join(TMP.name, "settings")
+ggn("init", settings, "--task=thresholds", "--views", wide, levels, "--block=10", "--repeats=3", "--spp-min=17", "--seed=6")
+for folder, people in ((choices, 3), (settings, 4)):
+    server = Server(folder)
+    studied = server.json("GET", "api/study")[1]
+    for person in range(people):
+        key = server.json("POST", "api/people", {"consent": True})[1]["key"]
+        server.json("POST", f"api/people/{key}/profile", {"answers": {"vision": "well", "age": 20 + person}})
+        for i, s in enumerate(server.json("GET", f"api/people/{key}")[1]["slots"]):
+            block = studied["views"][s["view"]]["blocks"][s["block"]]
+            if "side" in s:  # more is seen where the samples are few; the last one fails the catch trials
+                level = 0 if s["catch"] else block["levels"][(i + person) % 4]
+                right = person < 2 if s["catch"] else level * (1 + s["view"]) <= 100 << person or i % 4 == 0
+                answer = s["side"] + 1 if right else 2 - s["side"]
+            else:  # the last one leaves most settings where they started
+                level, answer = block["levels"][s["start"] if person == 3 and i % 5 else min(2, s["block"] * 7 % 3 + (i * (person + 2) % 5 == 0))], 0
+            body = {"slot": i, "revision": 0, "level": level, "answer": answer, "rating": 0, "ms": 700 + 10.5 * i}
+            if person == 1 and i == 20:
+                break  # went away
+            status, got = server.json("POST", f"api/people/{key}/trials", body)
+    server.stop()
+    keep_contents(folder)
+    ggn("report", folder, "-o", folder + "-report")
+    keep_files("reported-" + os.path.basename(folder), folder + "-report")
+    ggn("export", folder, "-o", exported)
+    keep_export(exported)
+recorded = os.path.join(whole.ROOT, "tests", "data", "recorded")
+sequence = os.path.join(TMP.name, "sequence")
+ggn("init", sequence, "--task=thresholds", "--views", os.path.join(recorded, "train", "one-view0"), os.path.join(recorded, "validation", "two"),
+    "--spacing=0.9", "--spp-min=12", "--spp-max=2000")
+made = json.load(open(os.path.join(sequence, "study.json")))
+keep("sequence", json.dumps({**made, "id": ""}, indent=1) + "\n" + "\n".join(
+    sorted(os.path.join(path, n)[len(sequence):] for path, _, names in os.walk(sequence) for n in names)))
+
+# --- as many people as there may be ---
+db = sqlite3.connect(os.path.join(settings, "study.db"))
+db.execute("UPDATE sqlite_sequence SET seq = 99999 WHERE name = 'person'")
+db.commit()
+db.close()
+server = Server(settings)
+check([server.json("POST", "api/people", {"consent": True})[0] for _ in range(2)] == [200, 500], "the 100000th person is the last")
+server.stop()
+
+count, good = whole.compare("study", kept, count + 1)
+print(f"1..{count - 1}")
+sys.exit(0 if good and not failed else 1)

@@ -1,0 +1,82 @@
+/*
+ * A transcript: what a test was told, line by line, compared whole with tests/golden/whole/NAME.txt. The product wrote that file and somebody
+ * read it; RECORD=1 in the environment of the test writes it anew, then read `git diff`. Tests run in the repository's root.
+ */
+#ifndef TESTS_GGN_TRANSCRIPT_H
+#define TESTS_GGN_TRANSCRIPT_H
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+struct transcript {
+    FILE *file; /* write here */
+    char *text;
+    size_t size;
+};
+
+static inline FILE *transcript_begin(struct transcript *t)
+{
+    *t = (struct transcript){0};
+    t->file = open_memstream(&t->text, &t->size);
+    assert_non_null(t->file);
+    return t->file;
+}
+
+/* Replaces what differs from run to run. */
+static inline void transcript_hide(struct transcript *t, const char *what, const char *word)
+{
+    char *made = NULL;
+    size_t size = 0;
+    fflush(t->file);
+    FILE *f = open_memstream(&made, &size);
+    for (const char *p = t->text, *at; *p; p = at + strlen(what)) {
+        at = strstr(p, what);
+        if (!at) {
+            fputs(p, f);
+            break;
+        }
+        fprintf(f, "%.*s%s", (int)(at - p), p, word);
+    }
+    fclose(f);
+    rewind(t->file);
+    fputs(made, t->file);
+    fflush(t->file);
+    t->text[size] = '\0';
+    free(made);
+}
+
+static inline void transcript_end(struct transcript *t, const char *name)
+{
+    char path[128], want[4096];
+    int line = 0;
+    snprintf(path, sizeof path, "tests/golden/whole/%s.txt", name);
+    fclose(t->file);
+    FILE *f = fopen(path, getenv("RECORD") ? "w+" : "r");
+    if (!f)
+        fail_msg("%s cannot be opened", path);
+    if (getenv("RECORD")) {
+        fputs(t->text, f);
+        rewind(f);
+    }
+    const char *p = t->text;
+    while (fgets(want, sizeof want, f)) {
+        size_t n = strlen(want);
+        line++;
+        if (strncmp(p, want, n) != 0)
+            fail_msg("%s:%d: wanted %sgot %.*s", path, line, want, (int)strcspn(p, "\n"), p);
+        p += n;
+    }
+    fclose(f);
+    if (*p)
+        fail_msg("%s ends before %.*s", path, (int)strcspn(p, "\n"), p);
+    free(t->text);
+}
+
+#endif
