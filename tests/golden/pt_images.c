@@ -8,8 +8,8 @@
  *     build/tests/golden/pt_images record
  * and says in the commit which scenes changed and why that is right.
  *
- * A line of the file is one plane of one scene, row by row: colour, albedo, normal, depth (0 where there is none) and rays,
- * all as means over the samples of a pixel.
+ * First of a scene comes what was made of it, then the vertices that one path in each pixel meets, then a line for each
+ * plane, row by row: colour, albedo, normal, depth (0 where there is none) and rays, all as means over a pixel's samples.
  */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -41,6 +41,8 @@ enum { PLANE_COUNT = sizeof plane_names / sizeof *plane_names };
 
 struct picture {
     double plane[PLANE_COUNT][PIXELS];
+    char made[200];               /* what was made of the scene, in words and whole numbers */
+    uint64_t met[PT_MET_COUNT];   /* vertices of one path in each pixel, by what they are */
 };
 
 /* A value may be off by this share of itself and of the plane's mean: five digits are recorded. */
@@ -81,6 +83,15 @@ static void add_sample(const struct pt_path_result *r, struct picture *out, int 
 #undef ADD
 }
 
+static void tell_scene(const struct pt_scene *s, const char *kernel, char *out, size_t room)
+{
+    snprintf(out, room, "%s %x shapes %d %d %d %d triangles %lld placed %d %d lights %d %d %d %d images %d %d %d %d", kernel,
+             s->effects, s->shape_count, s->world_shape_count, s->mesh_count, s->quadric_count, s->stats.triangles,
+             s->object_count, s->instance_count, s->emitter_count, s->env_light_count,
+             s->light_tree ? s->light_tree->node_count : 0, s->light_tree ? s->light_tree->far_count : 0, s->image_count,
+             s->texture_count, s->material_count, s->medium_count);
+}
+
 static void draw(const char *path, const struct way *way, struct picture *out)
 {
     struct pt_scene *scene = NULL;
@@ -99,8 +110,12 @@ static void draw(const char *path, const struct way *way, struct picture *out)
         settings.sampler = way->sampler;
     if (way && way->strategy >= 0)
         settings.strategy = way->strategy;
-    pt_kernel *kernel = pt_kernel_select(scene->effects, NULL, NULL);
+    const char *kernel_name;
+    pt_kernel *kernel = pt_kernel_select(scene->effects, NULL, &kernel_name);
     memset(out, 0, sizeof *out);
+    tell_scene(scene, kernel_name, out->made, sizeof out->made);
+    for (uint32_t i = 0; i < PIXELS; i++)
+        pt_kernel_census(scene, &settings, i % WIDTH, i / WIDTH, 0, out->met);
     for (int y = 0; y < HEIGHT; y++)
         for (uint32_t sample = 0; sample < SPP; sample++) {
             struct pt_path_result row[WIDTH];
@@ -116,7 +131,7 @@ static void draw(const char *path, const struct way *way, struct picture *out)
 enum { ROOM = 192, NAME_ROOM = 64, LINE_ROOM = 16 * (PIXELS + 8) };
 struct record {
     char name[NAME_ROOM];
-    int planes, met;
+    int planes, looked_at;
     struct picture picture;
 };
 static struct record records[ROOM];
@@ -181,6 +196,16 @@ static uint64_t rounding_here(void)
     return hash;
 }
 
+/* What is before the planes of a scene. */
+static int read_head(struct record *r, const char *what, char *rest)
+{
+    if (strcmp(what, "made") == 0)
+        return snprintf(r->picture.made, sizeof r->picture.made, "%.*s", (int)strcspn(rest, "\n"), rest) > 0;
+    for (int i = 0; i < PT_MET_COUNT; i++)
+        r->picture.met[i] = strtoull(rest, &rest, 10);
+    return *rest == '\n';
+}
+
 /* A line is a scene, a plane and its values, or the one value that all of them have. */
 static int read_line(char *line)
 {
@@ -189,6 +214,10 @@ static int read_line(char *line)
     if (name && plane && strcmp(name, "rounding") == 0) {
         strict = strtoull(plane, NULL, 16) == rounding_here();
         return 1;
+    }
+    if (name && plane && (strcmp(plane, "made") == 0 || strcmp(plane, "met") == 0)) {
+        struct record *of = find_record(name, 1);
+        return of && read_head(of, plane, plane + strlen(plane) + 1);
     }
     struct record *r = name && plane ? find_record(name, 1) : NULL;
     if (!r || r->planes == PLANE_COUNT || strcmp(plane, plane_names[r->planes]) != 0)
@@ -229,6 +258,10 @@ static void write_number(FILE *file, double v)
 
 static void write_picture(FILE *file, const char *name, const struct picture *p)
 {
+    fprintf(file, "%s made %s\n%s met", name, p->made, name);
+    for (int i = 0; i < PT_MET_COUNT; i++)
+        fprintf(file, " %llu", (unsigned long long)p->met[i]);
+    fputc('\n', file);
     for (int c = 0; c < PLANE_COUNT; c++) {
         int n = 1;
         for (int i = 1; i < PIXELS; i++)
@@ -281,6 +314,16 @@ static int count_off(const struct picture *got, const struct picture *want, int 
     return count;
 }
 
+static void check_head(const char *name, const struct picture *got, const struct picture *want)
+{
+    if (strcmp(got->made, want->made) != 0)
+        fail_msg("%s: made is %s, was %s", name, got->made, want->made);
+    for (int i = 0; i < PT_MET_COUNT && strict; i++)
+        if (got->met[i] != want->met[i])
+            fail_msg("%s: of kind %d %llu vertices are met, were %llu", name, i, (unsigned long long)got->met[i],
+                     (unsigned long long)want->met[i]);
+}
+
 /* Compares with what the file says, or writes it there. */
 static void check_picture(const char *path, const struct way *way, FILE *out)
 {
@@ -298,7 +341,8 @@ static void check_picture(const char *path, const struct way *way, FILE *out)
     struct record *r = find_record(name, 0);
     if (!r || r->planes != PLANE_COUNT)
         fail_msg("%s: %s has no such scene: look at the picture, then record anew", name, file_name);
-    r->met = 1;
+    r->looked_at = 1;
+    check_head(name, &got, &r->picture);
     int off = count_off(&got, &r->picture, &plane, &pixel);
     if (off > 0 && !strict && is_fickle(name)) {
         for (int c = 0; c < PLANE_COUNT; c++) {
@@ -356,7 +400,7 @@ static void all_were_looked_at(void **state)
 {
     (void)state;
     for (int i = 0; i < record_count; i++)
-        if (!records[i].met)
+        if (!records[i].looked_at)
             fail_msg("%s: %s is no longer drawn", file_name, records[i].name);
     print_message("%d of %d pixels are off\n", off_in_all, pixels_in_all);
     if (off_in_all > OFF_IN_ALL * pixels_in_all)

@@ -3,6 +3,7 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <openexr.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -11,7 +12,11 @@
 
 #include "base/files.h"
 #include "base/png.h"
+#include "image/exr.h"
+#include "image/font.h"
 #include "image/oiio.h"
+#include "image/stopmap.h"
+#include "support/pt_approve.h"
 
 static char dir[] = "/tmp/pt_oiio_XXXXXX";
 
@@ -114,9 +119,171 @@ static void refusals(void **state)
     assert_int_equal(base_png_write(path, 0, 1, 3, pixel, &err), BASE_EINVAL);
 }
 
+static void channel_row(void *data, int y, float *const *rows)
+{
+    for (int c = 0; c < *(const int *)data; c++)
+        for (int x = 0; x < 3; x++)
+            rows[c][x] = (float)(1000 * c + 10 * y + x);
+}
+
+/* As many channels as are promised; the picture's own window, not what is stored, gives its size; numbers and words beside it. */
+static void exr_channels(void **state)
+{
+    (void)state;
+    char path[64], names[65][4];
+    const char *list[65];
+    for (int i = 0; i < 65; i++) { /* not in the order in which the library sorts them */
+        snprintf(names[i], sizeof names[i], "c%02d", (i * 7 + 3) % 65);
+        list[i] = names[i];
+    }
+    snprintf(path, sizeof path, "%s/a.png", dir); /* the name does not matter to it */
+    const struct pt_exr_attribute attributes[] = {{"lull:words", "two words", 0}, {"lull:number", NULL, 2.5}};
+    for (int count = 0; count <= 65; count += count == 0 ? 1 : count == 1 ? 63 : 1) {
+        struct base_err err = {0};
+        struct pt_exr_image image = {20, 40, 5, 2, 8, 39, count, list, 2, attributes, channel_row, &count};
+        int rc = pt_exr_write(path, &image, &err);
+        assert_int_equal(rc, count >= 1 && count <= 64 ? 0 : BASE_EINVAL);
+        if (rc) {
+            char expected[128];
+            snprintf(expected, sizeof expected, "%s: %d channels, at most 64 can be written", path, count);
+            assert_string_equal(err.text, expected);
+            continue;
+        }
+        exr_context_t file = NULL;
+        exr_attr_box2i_t window;
+        const char *words;
+        int32_t length;
+        double number;
+        assert_int_equal(exr_start_read(&file, path, NULL), EXR_ERR_SUCCESS);
+        assert_int_equal(exr_get_display_window(file, 0, &window), EXR_ERR_SUCCESS);
+        assert_true(window.min.x == 0 && window.min.y == 0 && window.max.x == 19 && window.max.y == 39);
+        assert_int_equal(exr_get_data_window(file, 0, &window), EXR_ERR_SUCCESS);
+        assert_true(window.min.x == 5 && window.min.y == 2 && window.max.x == 7 && window.max.y == 38);
+        assert_int_equal(exr_attr_get_string(file, 0, "lull:words", &length, &words), EXR_ERR_SUCCESS);
+        assert_true(length == 9 && strcmp(words, "two words") == 0);
+        assert_int_equal(exr_attr_get_double(file, 0, "lull:number", &number), EXR_ERR_SUCCESS);
+        assert_true(number == 2.5);
+        exr_finish(&file);
+        struct pt_oiio_image read;
+        char renamed[80];
+        snprintf(renamed, sizeof renamed, "%s.exr", path);
+        assert_int_equal(rename(path, renamed), 0);
+        assert_int_equal(pt_oiio_read(renamed, &read, &err), 0);
+        assert_true(read.width == 3 && read.height == 37 && read.channels == (count < 4 ? count : 4) && read.is_float_file && !read.u8);
+        for (int i = 0; i < 3 * 37 * read.channels; i++) {
+            int place = i % read.channels, wanted = 0; /* the file sorts by name: which of ours is the place-th */
+            for (int c = 0; c < count; c++) {
+                int before = 0;
+                for (int k = 0; k < count; k++)
+                    before += strcmp(names[k], names[c]) < 0;
+                wanted = before == place ? c : wanted;
+            }
+            assert_true(read.f32[i] == (float)(1000 * wanted + 10 * (i / read.channels / 3 + 2) + i / read.channels % 3));
+        }
+        pt_oiio_release(&read);
+        assert_null(read.f32);
+        unlink(renamed);
+    }
+}
+
+/* --- drawings --------------------------------------------------------------------------------------------------------- */
+
+enum { DRAWING_ROOM = 1 << 16 };
+
+static size_t letters(const char *words, char *out)
+{
+    struct pt_canvas canvas = {0};
+    const uint8_t ink[3] = {1, 2, 3};
+    uint8_t rgb[64 * 64 * 3] = {0};
+    int x, y, scale, start;
+    size_t n = 0;
+    assert_int_equal(sscanf(words, "%d %d %d %d %d %n", &canvas.width, &canvas.height, &x, &y, &scale, &start), 5);
+    canvas.rgb = rgb;
+    pt_font_draw(&canvas, x, y, scale, ink, words + start);
+    for (int v = 0; v < canvas.height; v++) {
+        out[n++] = ' ';
+        for (int u = 0; u < canvas.width; u++) {
+            const uint8_t *pixel = rgb + 3 * (v * canvas.width + u);
+            out[n++] = memcmp(pixel, ink, 3) == 0 ? '#' : pixel[0] + pixel[1] + pixel[2] == 0 ? '.' : '?';
+        }
+        out[n++] = '\n';
+    }
+    return n;
+}
+
+static size_t colours(const char *words, char *out)
+{
+    size_t n = 0;
+    char *end;
+    for (double t = strtod(words, &end); end != words; t = strtod(words, &end)) {
+        uint8_t rgb[3];
+        pt_viridis(t, rgb);
+        n += (size_t)sprintf(out + n, " #%02x%02x%02x", rgb[0], rgb[1], rgb[2]);
+        words = end;
+    }
+    return n + (size_t)sprintf(out + n, "\n");
+}
+
+/* Runs of one colour. */
+static size_t tell_row(const uint8_t *row, int width, char *out)
+{
+    size_t n = 0;
+    for (int x = 0, end; x < width; x = end) {
+        for (end = x + 1; end < width && memcmp(row + 3 * x, row + 3 * end, 3) == 0; end++)
+            ;
+        n += (size_t)sprintf(out + n, " #%02x%02x%02x*%d", row[3 * x], row[3 * x + 1], row[3 * x + 2], end - x);
+    }
+    return n + (size_t)sprintf(out + n, "\n");
+}
+
+static size_t map_of_blocks(const char *words, char *out)
+{
+    struct pt_stopmap_block blocks[4], *b = blocks;
+    struct pt_stopmap map;
+    struct base_err err = {0};
+    char unit[16];
+    int x0, y0, x1, y1, used;
+    assert_int_equal(sscanf(words, "%d %d %d %d %15s%n", &x0, &y0, &x1, &y1, unit, &used), 5);
+    for (words += used; sscanf(words, " %d,%d,%d,%d=%lf%n", &b->x0, &b->y0, &b->x1, &b->y1, &b->value, &used) == 5; words += used)
+        b++;
+    assert_int_equal(pt_stopmap_draw(x0, y0, x1, y1, blocks, (uint32_t)(b - blocks), unit, &map, &err), 0);
+    size_t n = (size_t)sprintf(out, " %d x %d\n", map.width, map.height), stride = 3 * (size_t)map.width;
+    for (int y = 0, end; y < map.height; y = end) {
+        const uint8_t *row = map.rgb + (size_t)y * stride;
+        for (end = y + 1; end < map.height && memcmp(row, map.rgb + (size_t)end * stride, stride) == 0; end++)
+            ;
+        n += (size_t)sprintf(out + n, " %d:", y);
+        n += tell_row(row, map.width, out + n);
+    }
+    pt_stopmap_release(&map);
+    assert_null(map.rgb);
+    return n;
+}
+
+static char *draw(struct pt_approve_case *c)
+{
+    static const struct {
+        const char *name;
+        size_t (*draw)(const char *words, char *out);
+    } kinds[] = {{"letters ", letters}, {"colours ", colours}, {"map ", map_of_blocks}};
+    char *out = calloc(DRAWING_ROOM, 1);
+    assert_non_null(out);
+    c->text[strcspn(c->text, "\n")] = '\0';
+    for (size_t i = 0; i < 3; i++)
+        if (strncmp(c->text, kinds[i].name, strlen(kinds[i].name)) == 0)
+            kinds[i].draw(c->text + strlen(kinds[i].name), out);
+    return out;
+}
+
+static void drawings(void **state)
+{
+    (void)state;
+    pt_approve("tests/golden/image/drawings.txt", draw);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(png_round_trip), cmocka_unit_test(png_of_many_sizes),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(drawings), cmocka_unit_test(exr_channels), cmocka_unit_test(png_round_trip), cmocka_unit_test(png_of_many_sizes),
                                        cmocka_unit_test(refusals)};
     return cmocka_run_group_tests(tests, make_dir, remove_dir);
 }

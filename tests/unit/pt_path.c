@@ -11,6 +11,8 @@
 
 #include "geom/accel.h"
 #include "integ/kernel_sets.h"
+#include "integ/trace.h"
+#include "shade/bsdf.h"
 #include "shade/medium.h"
 #include "shade/texture.h"
 #include "support/pt_scenes.h"
@@ -206,11 +208,49 @@ static void trace_tells_the_same_path(void **state)
     test_scene_end(&scene);
 }
 
+static void next_line(void *data, const char *text)
+{
+    const char ***expected = data;
+    assert_string_equal(text, *(*expected)++);
+}
+
+/* Every line of --debug-path, word for word, and what it counts. */
+static void trace_says_what_it_is_told(void **state)
+{
+    (void)state;
+    static const char *const lines[] = {
+        "camera: origin (1, -2, 3.5) direction (4, 5e-07, -6) time 0.25",
+        "1: conductor at (7, 8, 9) normal (0.5, -1, 0.25) material 3 primitive 11 throughput (0.1, 0.2, 0.3)",
+        "   light towards (-1, 2, 0.125) adds (10, 20, 30)",
+        "   emission met, weight 0.75, adds (11, 21, 31)",
+        "2: scattered in medium 4 at (0.1, 0.2, 0.3) throughput (0.4, 0.5, 0.6)",
+        "3: thin dielectric at (7, 8, 9) normal (0.5, -1, 0.25) material 3 primitive 11 throughput (1, 1, 1)",
+        "end: pixel value (12, 22, 32)",
+    };
+    const char *const *expected = lines;
+    struct pt_trace trace = {.line = next_line, .data = &expected};
+    const struct pt_shape shape = {.material = 3};
+    const struct pt_place at = {.p = {7, 8, 9}, .s = {.n_geometric = {0.5f, -1, 0.25f}, .n_shading = {9, 9, 9}}, .shape = &shape, .primitive = 11};
+    const struct pt_ray ray = {{1, -2, 3.5f}, {4, 5e-7f, -6}, 0, 100, 0.25f};
+    const struct pt_bsdf metal = {.kind = PT_BSDF_CONDUCTOR}, pane = {.kind = PT_BSDF_THIN_DIELECTRIC};
+    pt_trace_camera(&trace, &ray);
+    pt_trace_surface(&trace, &at, &metal, v3(0.1f, 0.2f, 0.3f));
+    pt_trace_light(&trace, v3(-1, 2, 0.125f), v3(10, 20, 30));
+    pt_trace_emission(&trace, 0.75f, v3(11, 21, 31));
+    pt_trace_scatter(&trace, 4, v3(0.1f, 0.2f, 0.3f), v3(0.4f, 0.5f, 0.6f));
+    pt_trace_surface(&trace, &at, &pane, v3_splat(1));
+    pt_trace_end(&trace, v3(12, 22, 32));
+    assert_ptr_equal(expected, lines + 7);
+    assert_int_equal(trace.vertex, 3);
+    for (int i = 0; i < PT_MET_COUNT; i++)
+        assert_int_equal(trace.met[i], i == PT_BSDF_CONDUCTOR || i == PT_BSDF_THIN_DIELECTRIC || i == PT_MET_MEDIUM);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(diffuse_kernel_is_exact), cmocka_unit_test(surface_kernels_are_exact), cmocka_unit_test(selection_covers), cmocka_unit_test(media_kernel_is_exact),
-        cmocka_unit_test(absent_effects_run_no_code), cmocka_unit_test(planes), cmocka_unit_test(trace_tells_the_same_path),
+        cmocka_unit_test(absent_effects_run_no_code), cmocka_unit_test(planes), cmocka_unit_test(trace_says_what_it_is_told), cmocka_unit_test(trace_tells_the_same_path),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
