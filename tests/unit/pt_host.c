@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include <cmocka.h>
 
@@ -16,6 +17,8 @@
 #include "render/host_planes.h"
 #include "render/host_state.h"
 #include "render/mask.h"
+#include "support/api_folders.h"
+#include "support/pt_approve.h"
 #include "support/pt_fake.h"
 
 /* --- a criterion that writes everything down ---------------------------------------------------------------------------- */
@@ -580,6 +583,63 @@ static void services(void **state)
     tear_down();
 }
 
+/* --- criteria by name ---------------------------------------------------------------------------------------------------- */
+
+static char lines[1000];
+
+static void keep_line(void *data, const char *line)
+{
+    assert_ptr_equal(data, lines);
+    snprintf(lines + strlen(lines), sizeof lines - strlen(lines), "%s\n", line);
+}
+
+/* A folder with two criteria and something that is none; its name is CRITERIA in what is said. */
+static char *listed(struct pt_approve_case *c)
+{
+    char folder[] = "/tmp/pt_host_XXXXXX", built[2048], from[2200], path[3][64], *text = NULL, *at;
+    static const char *const names[3] = {"fixed.so", "halfbuf.so", "none.so"};
+    size_t size;
+    struct base_err err = {0};
+    struct base_inputs inputs = BASE_INPUTS_EMPTY;
+    const struct lull_criterion *found = NULL;
+    (void)c;
+    assert_true(mkdtemp(folder) && api_folder(built, sizeof built, API_CRITERIA) == 0 && setenv("LULL_PLUGIN_PATH", folder, 1) == 0);
+    for (int i = 0; i < 3; i++) {
+        snprintf(from, sizeof from, "%s/%s", i < 2 ? built : "/dev/null", i < 2 ? names[i] : "");
+        snprintf(path[i], sizeof path[i], "%s/%s", folder, names[i]);
+        if (i < 2)
+            assert_int_equal(symlink(from, path[i]), 0);
+    }
+    FILE *out = fopen(path[2], "w");
+    assert_true(out && fclose(out) == 0);
+    lines[0] = '\0';
+    assert_non_null(out = open_memstream(&text, &size));
+    fprintf(out, "%d\n", pt_criterion_list(out, keep_line, lines));
+    assert_int_equal(pt_criterion_find("halfbuf", &inputs, keep_line, lines, &found, &err), 0);
+    fprintf(out, "found %s; an input is %s\n", found->id, inputs.paths[0]);
+    int rc = pt_criterion_find("nobody", &inputs, keep_line, lines, &found, &err);
+    fprintf(out, "%d: %s; %zu input\n%s", rc, err.text, inputs.count, lines);
+    assert_int_equal(pt_criterion_find("fixed", NULL, NULL, NULL, &found, &err), 0);
+    assert_string_equal(found->id, "fixed");
+    fclose(out);
+    base_inputs_release(&inputs);
+    while ((at = strstr(text, folder)) != NULL) {
+        memcpy(at, "CRITERIA", 8);
+        memmove(at + 8, at + strlen(folder), strlen(at + strlen(folder)) + 1);
+    }
+    for (int i = 0; i < 3; i++)
+        unlink(path[i]);
+    rmdir(folder);
+    unsetenv("LULL_PLUGIN_PATH");
+    return text;
+}
+
+static void criteria_by_name(void **state)
+{
+    (void)state;
+    pt_approve("tests/golden/pathtracer/criteria.txt", listed);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -593,6 +653,7 @@ int main(void)
         cmocka_unit_test(every_step_has_its_instance),
         cmocka_unit_test(histories),
         cmocka_unit_test(services),
+        cmocka_unit_test(criteria_by_name),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

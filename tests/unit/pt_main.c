@@ -1,4 +1,5 @@
-/* The command line and the words of a quote. They belong to the program and are in no library: their files are read in here. */
+/* The command line, what is made of it, the words of a quote. They belong to the program and are in no library: their files are read in
+ * here. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -7,13 +8,20 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include <cmocka.h>
+
+#include "agree.c"
+#include "session.c"
+#include "setup.c"
 
 #include "cli.c"
 #include "quote_output.c"
 
+#include "base/png.h"
 #include "integ/integrator.h"
+#include "support/api_folders.h"
 #include "support/pt_approve.h"
 #include "support/pt_fake.h"
 #include "support/pt_text_scene.h"
@@ -77,15 +85,12 @@ static void print_cli(FILE *out, const struct pt_cli *c)
     fprintf(out, "\n");
 }
 
-/* The words of the case, "a b" being one. */
-static char *parse_words(struct pt_approve_case *c)
+/* The words of the case, "a b" being one, into argv[128]. */
+static int split_words(struct pt_approve_case *c, char **argv)
 {
-    char *argv[128] = {c->options, NULL}, *text = NULL;
-    size_t size;
-    struct pt_cli cli;
-    struct base_err err = {0};
     int argc = 1;
     strcpy(c->options, "pathtracer");
+    argv[0] = c->options;
     for (char *at = c->text; *at != '\0' && argc < 127;) {
         at += strspn(at, " \n");
         char *end = *at == '"' ? strchr(++at, '"') : at + strcspn(at, " \n");
@@ -95,6 +100,17 @@ static char *parse_words(struct pt_approve_case *c)
         at = end + (*end != '\0');
         *end = '\0';
     }
+    argv[argc] = NULL;
+    return argc;
+}
+
+static char *parse_words(struct pt_approve_case *c)
+{
+    char *argv[128], *text = NULL;
+    size_t size;
+    struct pt_cli cli;
+    struct base_err err = {0};
+    int argc = split_words(c, argv);
     FILE *out = open_memstream(&text, &size);
     assert_non_null(out);
     int rc = pt_cli_parse(&cli, argc, argv, &err);
@@ -111,6 +127,136 @@ static void command_lines(void **state)
 {
     (void)state;
     pt_approve("tests/golden/pathtracer/command_lines.txt", parse_words);
+}
+
+/* --- what is made of it -------------------------------------------------------------------------------------------------- */
+
+static char folder[] = "/tmp/pt_main_XXXXXX", criteria[2048];
+
+static void write_files(void)
+{
+    struct base_err err = {0};
+    uint8_t grey[24 * 9];
+    for (int i = 0; i < 24 * 9; i++)
+        grey[i] = i % 24 < 8 ? 255 : 0;
+    assert_int_equal(base_file_write_line("s.pbrt", "Film \"rgb\" \"integer xresolution\" 24 \"integer yresolution\" 9 "
+                                                    "\"float cropwindow\" [ 0.25 1 0 0.5 ] \"float maxcomponentvalue\" 40\n"
+                                                    "PixelFilter \"triangle\" \"float yradius\" 1.5 Integrator \"path\" \"integer maxdepth\" 7\n"
+                                                    "Sampler \"independent\" Camera \"perspective\" WorldBegin Include \"i.pbrt\"", &err), 0);
+    assert_int_equal(base_file_write_line("i.pbrt", "Material \"hair\" Shape \"sphere\" \"float radius\" 5", &err), 0);
+    assert_int_equal(base_file_write_line("bad.pbrt", "WorldBegin Include \"missing.pbrt\"", &err), 0);
+    assert_int_equal(base_png_write("mask.png", 24, 9, 1, grey, &err), 0);
+    assert_int_equal(base_png_write("small.png", 2, 2, 1, grey, &err), 0);
+}
+
+static void print_render(FILE *out, const struct pt_session *s)
+{
+    const struct pt_render_config *c = &s->render->config;
+    const struct pt_integrator *i = &c->integrator;
+    fprintf(out, "%dx%d crop %d %d %d %d block %dx%d spp %llu to %llu%s budget %g overhead %g seam %g planes %u order %u pilot %llu %g\n", c->width,
+            c->height, c->crop[0], c->crop[1], c->crop[2], c->crop[3], c->block_width, c->block_height, (unsigned long long)c->spp_min,
+            (unsigned long long)c->spp_max, c->uniform ? " everywhere" : "", c->time_budget_s, c->max_check_overhead, c->max_seam, c->planes,
+            c->order_seed, (unsigned long long)c->pilot_spp, c->pilot_s);
+    fprintf(out, "depth %d rr %d sampler %d strategy %d filter %d %g %g sigma %g clamp %g seed %u aux %d\n", i->max_depth, i->rr_depth, i->sampler,
+            i->strategy, i->filter, (double)i->filter_x, (double)i->filter_y, (double)i->filter_sigma, (double)i->max_component, i->seed, i->want_aux);
+    fprintf(out, "threads %d kernel %s effects %x output %s criterion %s", base_threads_count(s->threads), s->kernel_name, s->scene->effects,
+            s->cli.output ? s->cli.output : "none", s->criterion ? s->criterion->table->id : "none");
+    for (uint32_t k = 0; s->criterion && k < s->render->blocks.count; k++)
+        fprintf(out, " %d", s->criterion->step[k]);
+    fprintf(out, "\n");
+    for (size_t k = 0; k < s->scene_files.count; k++)
+        fprintf(out, "read %s\n", s->scene_files.paths[k]);
+}
+
+/* What depends on the build is masked. */
+static void print_settings(FILE *out, char *text)
+{
+    char *crc = strstr(text, "plugin-and-mask-crc=");
+    if (crc)
+        memcpy(crc + 20, "########", 8);
+    crc = strstr(text, "version=");
+    if (crc == text)
+        text = strchr(text, '\n') + 1;
+    fprintf(out, "%s", text);
+}
+
+static char *make_render(struct pt_approve_case *c)
+{
+    char *argv[128], *text = NULL, at[4096], job[PT_AGREE_JOB];
+    size_t size;
+    struct base_err err = {0};
+    static struct pt_session s;
+    s = (struct pt_session){.scene_files = BASE_INPUTS_EMPTY, .judging = BASE_INPUTS_EMPTY};
+    int argc = split_words(c, argv);
+    FILE *out = open_memstream(&text, &size);
+    assert_true(out && getcwd(at, sizeof at) && chdir(folder) == 0);
+    int rc = pt_cli_parse(&s.cli, argc, argv, &err);
+    if (!rc)
+        rc = pt_session_open(&s, &err);
+    if (!rc)
+        rc = pt_setup_render(&s, &err);
+    if (!rc)
+        print_render(out, &s);
+    if (!rc && s.cli.checkpoint)
+        rc = pt_agree_job(&s, job, sizeof job, &err);
+    if (!rc && s.cli.checkpoint)
+        print_settings(out, job);
+    if (rc)
+        fprintf(out, "%d: %s\n", rc, err.text);
+    pt_session_release(&s);
+    fclose(out);
+    assert_int_equal(chdir(at), 0);
+    return text;
+}
+
+static void renders(void **state)
+{
+    (void)state;
+    char command[128], at[4096];
+    assert_true(mkdtemp(folder) && getcwd(at, sizeof at) && chdir(folder) == 0);
+    write_files();
+    assert_int_equal(chdir(at), 0);
+    assert_true(api_folder(criteria, sizeof criteria, API_CRITERIA) == 0 && setenv("LULL_PLUGIN_PATH", criteria, 1) == 0);
+    pt_approve("tests/golden/pathtracer/renders.txt", make_render);
+    unsetenv("LULL_PLUGIN_PATH");
+    snprintf(command, sizeof command, "rm -r %s", folder);
+    assert_int_equal(system(command), 0);
+}
+
+static void words_on_the_way(void **state)
+{
+    (void)state;
+    struct pt_session s = {0};
+    assert_false(pt_interrupted(NULL));
+    pt_catch_interrupt();
+    raise(SIGTERM);
+    assert_true(pt_interrupted(NULL));
+    interrupt_seen = 0;
+    pt_catch_interrupt();
+    raise(SIGINT);
+    assert_true(pt_interrupted(&s));
+    signal(SIGINT, SIG_DFL);
+    signal(SIGTERM, SIG_DFL);
+    char text[200] = "";
+    FILE *kept = tmpfile();
+    int old = dup(2);
+    assert_true(kept && old >= 0 && dup2(fileno(kept), 2) == 2);
+    pt_say(&s, "a line");
+    pt_note(&s, "a note");
+    s.cli.quiet = 1;
+    pt_note(&s, "a quiet note");
+    struct base_peers other = {.rank = 1};
+    s.peers = &other;
+    pt_say(&s, "from somebody else");
+    other.rank = 0;
+    pt_say(&s, "from rank 0");
+    fflush(stderr);
+    dup2(old, 2);
+    close(old);
+    rewind(kept);
+    text[fread(text, 1, sizeof text - 1, kept)] = '\0';
+    fclose(kept);
+    assert_string_equal(text, "pathtracer: a line\npathtracer: a note\npathtracer: from rank 0\n");
 }
 
 /* --- quotes ------------------------------------------------------------------------------------------------------------- */
@@ -225,6 +371,6 @@ static void durations_and_thousands(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(command_lines), cmocka_unit_test(quotes), cmocka_unit_test(durations_and_thousands)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(command_lines), cmocka_unit_test(renders), cmocka_unit_test(words_on_the_way), cmocka_unit_test(quotes), cmocka_unit_test(durations_and_thousands)};
     return cmocka_run_group_tests(tests, set_up_quote, tear_down_quote);
 }
