@@ -12,7 +12,9 @@
 
 #include <cmocka.h>
 
+#include "action_image.c"
 #include "agree.c"
+#include "explain.c"
 #include "session.c"
 #include "setup.c"
 
@@ -223,6 +225,31 @@ static void renders(void **state)
     assert_int_equal(system(command), 0);
 }
 
+/* What is written to a stream meanwhile; static. */
+static int old_stream, stream_number;
+static FILE *kept_stream;
+
+static void listen_to(FILE *stream)
+{
+    fflush(stream);
+    stream_number = fileno(stream);
+    kept_stream = tmpfile();
+    old_stream = dup(stream_number);
+    assert_true(kept_stream && old_stream >= 0 && dup2(fileno(kept_stream), stream_number) == stream_number);
+}
+
+static const char *heard_on(FILE *stream)
+{
+    static char text[8192];
+    fflush(stream);
+    dup2(old_stream, stream_number);
+    close(old_stream);
+    rewind(kept_stream);
+    text[fread(text, 1, sizeof text - 1, kept_stream)] = '\0';
+    fclose(kept_stream);
+    return text;
+}
+
 static void words_on_the_way(void **state)
 {
     (void)state;
@@ -237,10 +264,7 @@ static void words_on_the_way(void **state)
     assert_true(pt_interrupted(&s));
     signal(SIGINT, SIG_DFL);
     signal(SIGTERM, SIG_DFL);
-    char text[200] = "";
-    FILE *kept = tmpfile();
-    int old = dup(2);
-    assert_true(kept && old >= 0 && dup2(fileno(kept), 2) == 2);
+    listen_to(stderr);
     pt_say(&s, "a line");
     pt_note(&s, "a note");
     s.cli.quiet = 1;
@@ -250,13 +274,7 @@ static void words_on_the_way(void **state)
     pt_say(&s, "from somebody else");
     other.rank = 0;
     pt_say(&s, "from rank 0");
-    fflush(stderr);
-    dup2(old, 2);
-    close(old);
-    rewind(kept);
-    text[fread(text, 1, sizeof text - 1, kept)] = '\0';
-    fclose(kept);
-    assert_string_equal(text, "pathtracer: a line\npathtracer: a note\npathtracer: from rank 0\n");
+    assert_string_equal(heard_on(stderr), "pathtracer: a line\npathtracer: a note\npathtracer: from rank 0\n");
 }
 
 /* --- quotes ------------------------------------------------------------------------------------------------------------- */
@@ -270,6 +288,8 @@ static struct pt_block list[7];
 static struct pt_quote_block answers[3][7];
 static struct pt_outlook_said said[3][7];
 static struct base_threads *pool;
+static double black[3]; /* of the first pixel */
+static uint32_t no_drops[1];
 static struct lull_criterion table;
 static struct pt_criterion criterion = {.table = &table};
 
@@ -303,7 +323,8 @@ static int set_up_quote(void **state)
         list[i] = (struct pt_block){.id = 10u + (uint32_t)i, .x0 = i % 3 * 8, .y0 = i / 3 * 4, .x1 = i % 3 * 8 + 8, .y1 = i < 6 ? i / 3 * 4 + 4 : 9,
                                     .spp = i == 3 ? 0 : 16u + (uint32_t)i, .thread_s = i == 3 ? 0 : 0.001 * (i + 1)};
     render = (struct pt_render){.config = config, .scene = scene, .threads = pool, .criterion = &criterion, .busy_threads = 1.84,
-                                .film = {.pixels = 200, .bytes = 34567890}, .blocks = {.list = list, .count = 7},
+                                .film = {.x1 = 24, .y1 = 9, .pixels = 200, .bytes = 34567890, .color = black, .dropped = no_drops},
+                                .blocks = {.list = list, .count = 7, .list_columns = 3, .block_width = 8, .block_height = 4},
                                 .totals = {.samples = 4321, .render_s = 50.5, .criterion_s = 60.75}};
     table.id = "law";
     static double costs[7] = {0.25, 0.5, 0.75, 1, 1.25, 1.5, 1.75};
@@ -349,6 +370,147 @@ static void quotes(void **state)
     pt_approve("tests/golden/pathtracer/quotes.txt", tell_quote);
 }
 
+/* --- at the end of a render --------------------------------------------------------------------------------------------- */
+
+static char *written[3];
+static int write_count, fails_until;
+
+static int write_nothing(const char *path, const struct pt_render *r, const struct pt_output_info *info_of, struct base_err *err)
+{
+    (void)r;
+    (void)info_of;
+    free(written[write_count]);
+    written[write_count] = strdup(path);
+    return write_count++ < fails_until ? base_fail(err, BASE_EIO, "%s: no paper", path) : 0;
+}
+
+/* What cannot be written where it was asked for is kept elsewhere, and said. */
+static void outputs_are_kept(void **state)
+{
+    (void)state;
+    struct pt_session s = {0};
+    const struct pt_output_info none = {0};
+    char line[300], name[100];
+    struct base_err err = {0};
+    setenv("TMPDIR", "/elsewhere", 1);
+    write_or_keep(&s, write_nothing, NULL, &none, &err);
+    assert_int_equal(write_count, 0);
+    write_or_keep(&s, write_nothing, "a/b.exr", &none, &err);
+    assert_true(write_count == 1 && err.code == 0);
+    for (int k = 1; k < 3; k++) { /* at first only here, then there too */
+        write_count = 0;
+        fails_until = k;
+        write_or_keep(&s, write_nothing, "a/b.exr", &none, &err);
+        assert_int_equal(write_count, 2);
+        snprintf(name, sizeof name, "/elsewhere/lull-%ld-b.exr", (long)getpid());
+        assert_string_equal(written[1], name);
+        snprintf(line, sizeof line, k == 1 ? "a/b.exr: no paper; kept as %s" : "a/b.exr: no paper", name);
+        assert_string_equal(err.text, line);
+        assert_int_equal(err.code, BASE_EIO);
+    }
+    setenv("TMPDIR", "", 1);
+    write_count = 0;
+    write_or_keep(&s, write_nothing, "b.exr", &none, &err);
+    snprintf(name, sizeof name, "/tmp/lull-%ld-b.exr", (long)getpid());
+    assert_string_equal(written[1], name);
+    unsetenv("TMPDIR");
+    for (int i = 0; i < 3; i++)
+        free(written[i]);
+    assert_int_equal(pt_action_status(PT_RENDER_DONE), 0);
+    assert_int_equal(pt_action_status(PT_RENDER_OUT_OF_TIME), 0);
+    assert_int_equal(pt_action_status(PT_RENDER_PILOT), 0);
+    assert_int_equal(pt_action_status(PT_RENDER_INTERRUPTED), 130);
+    assert_int_equal(pt_action_status(PT_RENDER_LOST), 2);
+}
+
+static void the_last_line(void **state)
+{
+    (void)state;
+    struct pt_session s = {.render = &render};
+    for (int i = 0; i < 7; i++)
+        list[i].reason = i < 3 ? PT_REASON_CRITERION : i < 5 ? PT_REASON_SPP_MAX : PT_REASON_DROPPED;
+    render.totals.paths = 123456789;
+    render.totals.dropped = 12;
+    render.dropped[0] = (struct pt_dropped_sample){7, 8, 9};
+    listen_to(stderr);
+    tell_summary(&s);
+    s.cli.quiet = 1;
+    tell_summary(&s);
+    render.totals.dropped = 0;
+    tell_summary(&s);
+    assert_string_equal(heard_on(stderr), "pathtracer: 22 spp on average, 111.2 s, 2.44 Mpaths/s, criterion 54.6 %; blocks: 3 criterion 2 spp-max 2 dropped\n"
+                                          "pathtracer: 12 samples were not finite and were dropped, the first seen at --debug-path 7,8,9\n"
+                                          "pathtracer: 12 samples were not finite and were dropped, the first seen at --debug-path 7,8,9\n");
+    for (int i = 0; i < 7; i++)
+        list[i].reason = PT_REASON_NONE;
+}
+
+/* A checkpoint that fails is said and tried again after its time; previews come when three times as long has passed, a minute later at
+ * most, and take a hundredth of the time. */
+static void between_two_slices(void **state)
+{
+    (void)state;
+    struct base_err err = {0};
+    struct pt_session s = {.render = &render, .cli = {.checkpoint = "/missing/c", .checkpoint_every_s = 1000}};
+    double before_s = base_clock_wall_s();
+    interrupt_seen = 0;
+    listen_to(stderr);
+    s.checkpoint_at_s = before_s + 1e6;
+    pt_action_after_slice(&s, &render, &err); /* too early */
+    s.checkpoint_at_s = before_s;
+    interrupt_seen = 1;
+    pt_action_after_slice(&s, &render, &err); /* too late */
+    assert_true(s.checkpoint_at_s == before_s);
+    interrupt_seen = 0;
+    render.criterion = NULL;
+    assert_int_equal(pt_action_after_slice(&s, &render, &err), 0);
+    double after_s = base_clock_wall_s();
+    assert_true(s.checkpoint_at_s >= before_s + 1000 && s.checkpoint_at_s <= after_s + 1000);
+    assert_string_equal(heard_on(stderr), "pathtracer: no checkpoint, the render goes on: /missing/c: cannot write there: No such file or directory\n");
+    assert_int_equal(pt_action_suspend(&s, &render, &err), BASE_EIO);
+    s.cli.checkpoint = NULL;
+    assert_int_equal(pt_action_suspend(&s, &render, &err), 0);
+    static const double waits[2][2] = {{15, 45}, {100, 60}};
+    s.cli.preview = "/missing/p.png";
+    render.config.crop[2] = render.config.crop[3] = 1;
+    for (int i = 0; i < 2; i++) {
+        before_s = base_clock_wall_s();
+        s.start_s = before_s - waits[i][0];
+        s.preview_at_s = before_s + 1e6;
+        after_slice_of_image(&s, &render, &err);
+        assert_true(s.preview_at_s == before_s + 1e6);
+        s.preview_at_s = 0;
+        after_slice_of_image(&s, &render, &err);
+        after_s = base_clock_wall_s();
+        assert_true(s.preview_at_s >= before_s + waits[i][1]);
+        assert_true(s.preview_at_s <= after_s + fmax(waits[i][1] + 4 * (after_s - before_s), 100 * (after_s - before_s)));
+    }
+}
+
+/* --explain, but for the times. */
+static char *explain_it(struct pt_approve_case *c)
+{
+    struct pt_scene_defaults defaults;
+    struct pt_scene *s = text_scene(c->text, &defaults, NULL);
+    s->stats.bytes = 12345678;
+    listen_to(stdout);
+    pt_explain(s, &defaults, &defaults.integrator, "t.pbrt");
+    char *text = strdup(heard_on(stdout)), *time = strstr(text, "time: "), *end = time ? strchr(time, '\n') : NULL;
+    double us, ratio;
+    assert_non_null(end);
+    assert_int_equal(sscanf(time, "time: %lf us per path and thread; the general kernel takes %lf times as long for the same image", &us, &ratio), 2);
+    assert_true(us > 0 && ratio > 0);
+    memmove(time + 6, end, strlen(end) + 1);
+    pt_scene_destroy(s);
+    return text;
+}
+
+static void explanations(void **state)
+{
+    (void)state;
+    pt_approve("tests/golden/pathtracer/explanations.txt", explain_it);
+}
+
 static void durations_and_thousands(void **state)
 {
     (void)state;
@@ -371,6 +533,8 @@ static void durations_and_thousands(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(command_lines), cmocka_unit_test(renders), cmocka_unit_test(words_on_the_way), cmocka_unit_test(quotes), cmocka_unit_test(durations_and_thousands)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(command_lines), cmocka_unit_test(renders), cmocka_unit_test(words_on_the_way), cmocka_unit_test(quotes),
+                                       cmocka_unit_test(outputs_are_kept), cmocka_unit_test(the_last_line), cmocka_unit_test(between_two_slices),
+                                       cmocka_unit_test(explanations), cmocka_unit_test(durations_and_thousands)};
     return cmocka_run_group_tests(tests, set_up_quote, tear_down_quote);
 }
