@@ -265,6 +265,36 @@ static void a_criterion_without_history_is_asked_by_all(void **state)
     assert_true(atomic_load(&asked_elsewhere) > 20);
 }
 
+/* Without a criterion blocks are cut by the crop: the first rows are narrower than others. */
+static void rows_of_different_widths(void **state)
+{
+    (void)state;
+    const struct pt_render_hooks none = {0};
+    static const int crop[4] = {10, 9, 37, 20};
+    struct pt_render_config config = pt_fake_config();
+    struct pt_render *renders[2];
+    struct stage stage;
+    struct base_err err = {0};
+    enum pt_render_outcome outcome;
+    struct base_threads *pool = base_threads_create(2, &err);
+    memcpy(config.crop, crop, sizeof crop);
+    config.uniform = 1;
+    config.spp_min = config.spp_max = 40;
+    config.planes = PT_FILM_ALL;
+    assemble(&stage, 3, 1, WORKS, 60.0);
+    assert_int_equal(pt_crew_greet(stage.crew, "a=1\nb=2\n", &err), 0);
+    for (int i = 0; i < 2; i++) {
+        config.crew = i ? stage.crew : NULL;
+        assert_int_equal(pt_render_create(&config, NULL, pt_fake_noise, pool, NULL, &renders[i], &err), 0);
+        assert_int_equal(pt_render_run(renders[i], &none, &outcome, &err), 0);
+    }
+    part(&stage, 0);
+    assert_same(renders[0], renders[1]);
+    pt_render_destroy(renders[0]);
+    pt_render_destroy(renders[1]);
+    base_threads_destroy(pool);
+}
+
 /* --- faults ------------------------------------------------------------------------------------------------------------- */
 
 struct watch {
@@ -387,6 +417,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(any_number_of_processes_gives_the_bytes_of_one),
         cmocka_unit_test(a_criterion_without_history_is_asked_by_all),
+        cmocka_unit_test(rows_of_different_widths),
         cmocka_unit_test(a_member_that_is_silent_when_asked_is_named),
         cmocka_unit_test(a_silent_member_is_named_and_nothing_is_lost),
         cmocka_unit_test(a_member_that_makes_no_sense_is_named),

@@ -593,6 +593,20 @@ static void keep_line(void *data, const char *line)
     snprintf(lines + strlen(lines), sizeof lines - strlen(lines), "%s\n", line);
 }
 
+/* What is printed of the first two criteria: the build's own follow, if it has some. */
+static void print_first_two(FILE *out, const char *text, int count)
+{
+    int seen = 0, from = 0;
+    for (size_t n; *text != '\0'; text += n) {
+        n = strcspn(text, "\n") + 1;
+        seen += *text != ' ';
+        from += strncmp(text, "    from ", 9) == 0;
+        if (seen <= 2)
+            fprintf(out, "%.*s", (int)n, text);
+    }
+    assert_true(from == count && seen == count);
+}
+
 /* A folder with two criteria and something that is none; its name is CRITERIA in what is said. */
 static char *listed(struct pt_approve_case *c)
 {
@@ -614,7 +628,12 @@ static char *listed(struct pt_approve_case *c)
     assert_true(out && fclose(out) == 0);
     lines[0] = '\0';
     assert_non_null(out = open_memstream(&text, &size));
-    fprintf(out, "%d\n", pt_criterion_list(out, keep_line, lines));
+    int count = pt_criterion_list(out, keep_line, lines);
+    fclose(out);
+    char *all = text;
+    assert_non_null(out = open_memstream(&text, &size));
+    print_first_two(out, all, count);
+    free(all);
     assert_int_equal(pt_criterion_find("halfbuf", &inputs, keep_line, lines, &found, &err), 0);
     fprintf(out, "found %s; an input is %s\n", found->id, inputs.paths[0]);
     int rc = pt_criterion_find("nobody", &inputs, keep_line, lines, &found, &err);

@@ -392,6 +392,79 @@ static void slices_deal_out_the_time(void **state)
         check_slice(&cases[i]);
 }
 
+static struct {
+    uint32_t x, y, sample;
+    int count;
+} runs[64];
+static int run_count;
+
+/* Radiance tells place and sample; of sample 7 every 50th pixel is no number. */
+static void tell_place(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y, int count,
+                       uint32_t sample, struct pt_path_result *out)
+{
+    (void)scene;
+    (void)settings;
+    assert_true(run_count < 64);
+    runs[run_count].x = x;
+    runs[run_count].y = y;
+    runs[run_count].sample = sample;
+    runs[run_count++].count = count;
+    for (int i = 0; i < count; i++)
+        out[i] = (struct pt_path_result){.radiance = v3((float)x + (float)i, (float)y, sample == 7 && (x + (uint32_t)i) % 50 == 49 ? NAN : (float)sample),
+                                         .rays = 2};
+}
+
+/* A row is sampled in runs of neighbours, each pixel once for each sample; what is saved of it is restored. */
+static void rows_are_cut_into_runs(void **state)
+{
+    (void)state;
+    for (int width = 2 * PT_RUN - 1; width <= 2 * PT_RUN + 1; width++) {
+        struct pt_film film;
+        struct base_err err = {0};
+        struct pt_integrator integrator = {0};
+        const struct pt_row_maker maker = {NULL, tell_place, &integrator};
+        struct pt_row row = {.y = 6, .x0 = 3, .x1 = 3 + width, .from = 5, .to = 8};
+        assert_int_equal(pt_film_init(&film, 1, 5, 140, 8, PT_FILM_HALF, &err), 0);
+        run_count = 0;
+        pt_row_sample(&maker, &film, &row);
+        int per_sample = width > 2 * PT_RUN ? 3 : 2, n = 0;
+        assert_int_equal(run_count, 3 * per_sample);
+        for (int k = 0; k < per_sample; k++)
+            for (uint32_t s = 5; s < 8; s++, n++) {
+                int left = width - k * PT_RUN;
+                assert_true(runs[n].x == 3 + (uint32_t)(k * PT_RUN) && runs[n].y == 6 && runs[n].sample == s && runs[n].count == (left < PT_RUN ? left : PT_RUN));
+            }
+        assert_true(row.rays == 6 * (uint64_t)width && row.dropped == 2 && row.first_x == 49 && row.first_sample == 7 && row.thread_s >= 0);
+        for (int y = 5; y < 8; y++)
+            for (int x = 1; x < 140; x++) {
+                size_t i = pt_film_index(&film, x, y);
+                int inside = y == 6 && x >= 3 && x < 3 + width, bad = inside && x % 50 == 49;
+                double n_kept = inside ? 3 - bad : 0;
+                assert_true(film.color[3 * i] == n_kept * x && film.color[3 * i + 1] == n_kept * 6 && film.dropped[i] == (uint32_t)bad);
+                assert_true(film.color[3 * i + 2] == (inside ? 5 + 6 + (bad ? 0 : 7) : 0));
+            }
+        size_t bytes = pt_row_bytes(&row, film.planes);
+        assert_int_equal(bytes, (size_t)width * 56);
+        unsigned char *saved = malloc(bytes);
+        double *copy = malloc(film.pixels * 24);
+        pt_row_save(&film, &row, saved);
+        memcpy(copy, film.color, film.pixels * 24);
+        for (int x = row.x0; x < row.x1; x++) {
+            film.color[3 * pt_film_index(&film, x, 6)] = -1;
+            film.half[3 * pt_film_index(&film, x, 6) + 2] = -1;
+            film.dropped[pt_film_index(&film, x, 6)] = film.dropped_half[pt_film_index(&film, x, 6)] = 9;
+        }
+        pt_row_restore(&film, &row, saved);
+        assert_memory_equal(film.color, copy, film.pixels * 24);
+        for (int x = row.x0; x < row.x1; x++)
+            assert_true(film.half[3 * pt_film_index(&film, x, 6) + 2] >= 0 && film.dropped[pt_film_index(&film, x, 6)] < 2 &&
+                        film.dropped_half[pt_film_index(&film, x, 6)] < 2);
+        free(copy);
+        free(saved);
+        pt_film_release(&film);
+    }
+}
+
 static void keep_words(void *data, const char *line)
 {
     strcpy(data, line);
@@ -603,6 +676,7 @@ int main(void)
         cmocka_unit_test(resumed_render_is_identical),
         cmocka_unit_test(bad_checkpoints_are_refused),
         cmocka_unit_test(slices_deal_out_the_time),
+        cmocka_unit_test(rows_are_cut_into_runs),
         cmocka_unit_test(checks_may_be_too_dear),
         cmocka_unit_test(the_order_of_work_follows_its_seed),
         cmocka_unit_test(checkpoints_have_a_layout),
