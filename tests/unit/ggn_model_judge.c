@@ -9,6 +9,7 @@
 #include "model/exact.h"
 #include "model/judge.h"
 #include "model/preprocess.h"
+#include "model/window.h"
 #include "nn/exec.h"
 #include "nn/hash.h"
 
@@ -260,10 +261,133 @@ static void test_cleaning(void **state)
     (void)state;
 }
 
+/* --- blocks of another size ----------------------------------------------------------------------------------------------- */
+
+enum { NET_H = 24, NET_W = 33, MOST = 3 * 60 * 90 };
+
+static int mirrored(int i, int n)
+{
+    while (i < 0 || i >= n)
+        i = i < 0 ? -1 - i : 2 * n - 1 - i;
+    return i;
+}
+
+/* Where tile k of those that cover n pixels begins: the first at 0, the last at the end, evenly between. */
+static int begin_of(int n, int tile, int k)
+{
+    const int count = n <= tile ? 1 : (n + tile - 1) / tile;
+    return count == 1 ? 0 : (n - tile) * k / (count - 1);
+}
+
+/* The block cut into images of the network's size, each judged alone: the highest logit, and what the last tile that covers a pixel makes
+ * of it. */
+static double tile_by_tile(struct ggn_judge *j, uint8_t noisy[3][MOST], const uint8_t *picture, int w, int h, uint16_t denoised[3][MOST])
+{
+    static uint8_t cut[3][BYTES], small[AREA];
+    static uint16_t out[3][BYTES];
+    const uint8_t *const n[3] = {cut[0], cut[1], cut[2]};
+    const uint16_t *const d[3] = {out[0], out[1], out[2]};
+    const int nx = w <= NET_W ? 1 : (w + NET_W - 1) / NET_W, ny = h <= NET_H ? 1 : (h + NET_H - 1) / NET_H;
+    double highest = -1e30;
+
+    for (int pass = 0; pass < 2; pass++) /* denoised first: tiles overlap */
+        for (int t = 0; t < nx * ny; t++) {
+            const int x0 = begin_of(w, NET_W, t % nx), y0 = begin_of(h, NET_H, t / nx);
+            for (int i = 0; i < 3; i++) {
+                for (int k = 0; k < BYTES; k++) {
+                    const int at = k / AREA * w * h + mirrored(y0 + k % AREA / NET_W, h) * w + mirrored(x0 + k % NET_W, w);
+                    cut[i][k] = noisy[i][at];
+                    if (pass)
+                        out[i][k] = denoised[i][at];
+                    small[k % AREA] = picture[at % (w * h)];
+                }
+                if (!pass)
+                    ggn_judge_denoise(j, cut[i], out[i], NET_W, NET_H);
+                for (int k = 0; k < BYTES && !pass; k++) {
+                    const int y = y0 + k % AREA / NET_W, x = x0 + k % NET_W;
+                    if (y < h && x < w)
+                        denoised[i][k / AREA * w * h + y * w + x] = out[i][k];
+                }
+            }
+            highest = pass ? fmax(highest, ggn_judge_logit(j, n, d, small, NET_W, NET_H)) : highest;
+        }
+    return highest;
+}
+
+static void test_tiles(void **state)
+{
+    static const int sizes[][2] = {{33, 24}, {20, 10}, {5, 60}, {34, 25}, {90, 24}, {70, 53}};
+    static uint8_t noisy[3][MOST], picture[MOST];
+    static uint16_t want[3][MOST], got[3][MOST];
+    const uint8_t *const n[3] = {noisy[0], noisy[1], noisy[2]};
+    const uint16_t *const d[3] = {got[0], got[1], got[2]};
+    const int before = hyper.picture;
+
+    hyper.picture = 1;
+    struct ggn_model *m = make();
+    struct ggn_judge *j = ggn_judge_create(m, GGN_PRECISION_F32, NULL, NULL);
+    assert_non_null(j);
+    for (uint32_t k = 0; k < MOST; k++) {
+        picture[k] = (uint8_t)(ggn_hash(k, 7) >> 29);
+        for (uint32_t i = 0; i < 3; i++)
+            noisy[i][k] = (uint8_t)(ggn_hash(k, 20 + i) >> (24 + k % 3));
+    }
+    for (size_t s = 0; s < sizeof sizes / sizeof sizes[0]; s++) {
+        const int w = sizes[s][0], h = sizes[s][1];
+        double highest = tile_by_tile(j, noisy, picture, w, h, want);
+        for (int i = 0; i < 3; i++) {
+            ggn_judge_denoise(j, noisy[i], got[i], w, h);
+            assert_memory_equal(got[i], want[i], (size_t)(3 * w * h) * sizeof got[i][0]);
+        }
+        assert_true(ggn_judge_logit(j, n, d, picture, w, h) == highest);
+        got[1][3 * w * h - 1] = GGN_FIXED_NAN; /* one value that is none, of the last image's neighbour */
+        assert_true(isnan(ggn_judge_logit(j, n, d, picture, w, h)));
+    }
+    ggn_judge_destroy(j);
+    ggn_model_destroy(m);
+    hyper.picture = before;
+    (void)state;
+}
+
+/* In double too what is no number stays none. */
+static void test_exact_without_numbers(void **state)
+{
+    static uint8_t noisy[3][BYTES];
+    static uint16_t denoised[3][BYTES];
+    const uint8_t *const n[3] = {noisy[0], noisy[1], noisy[2]};
+    const uint16_t *const d[3] = {denoised[0], denoised[1], denoised[2]};
+    const float *learned[GGN_NETS];
+    struct ggn_model *m = make();
+
+    for (int net = 0; net < GGN_NETS; net++)
+        learned[net] = m->weights[net]->params;
+    m->weights[GGN_NET_R]->params[m->graph[GGN_NET_R].n_params - 1] = 1e30f; /* the last bias: blue is 1 */
+    m->weights[GGN_NET_R]->params[m->graph[GGN_NET_R].n_params - 2] = -1e30f;
+    struct ggn_exact *e = ggn_exact_create(&m->hyper, m->graph, learned, NULL);
+    assert_non_null(e);
+    for (int i = 0; i < 3; i++)
+        ggn_exact_denoise(e, noisy[i], denoised[i]);
+    assert_int_equal(denoised[0][2 * AREA + 5], 65534);
+    assert_int_equal(denoised[0][AREA + 5], 0);
+    assert_true(isfinite(ggn_exact_logit(e, n, d, NULL)));
+    denoised[2][7] = GGN_FIXED_NAN;
+    assert_true(isnan(ggn_exact_logit(e, n, d, NULL)));
+    ggn_exact_destroy(e);
+    m->weights[GGN_NET_R]->params[m->graph[GGN_NET_R].n_params - 1] = NAN;
+    e = ggn_exact_create(&m->hyper, m->graph, learned, NULL);
+    assert_non_null(e);
+    ggn_exact_denoise(e, noisy[0], denoised[0]);
+    assert_int_equal(denoised[0][2 * AREA + 5], GGN_FIXED_NAN);
+    ggn_exact_destroy(e);
+    ggn_model_destroy(m);
+    (void)state;
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_no_memory),     cmocka_unit_test(test_against_networks), cmocka_unit_test(test_picture),
                                        cmocka_unit_test(test_memory_bounds), cmocka_unit_test(test_bf16), cmocka_unit_test(test_exact),
-                                       cmocka_unit_test(test_srgb),          cmocka_unit_test(test_cleaning)};
+                                       cmocka_unit_test(test_srgb),          cmocka_unit_test(test_cleaning),
+                                       cmocka_unit_test(test_tiles), cmocka_unit_test(test_exact_without_numbers)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

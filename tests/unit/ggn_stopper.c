@@ -182,6 +182,192 @@ static void a_damaged_stopper_is_told(void **state)
     assert_false(ggn_stopper_valid(&rule, &bad));
 }
 
+/* --- the rule again, from its words --------------------------------------------------------------------------------------- */
+
+struct oracle {
+    uint64_t asked, spp[GGN_WINDOW_MAX], next;
+    int used, regular, passes, leapt, stop, too_early;
+    double p, predicted, noise;
+};
+
+static double next_level(const struct ggn_policy *p, double spp)
+{
+    double next = p->ratio > 1.001 ? floor(spp * p->ratio + 0.5) : spp + p->step_spp;
+    return next > spp + 1 ? next : spp + 1;
+}
+
+static void oracle_schedule(const struct ggn_stop_rule *rule, struct oracle *o, double opens)
+{
+    double n = (double)o->asked, next = next_level(&rule->policy, n);
+    if (opens > 0 && rule->policy.ratio > 1.001) {
+        double leap = opens / 2;
+        for (int i = 1; i < rule->window; i++)
+            leap /= rule->policy.ratio;
+        leap = leap < 4 * n ? leap : 4 * n;
+        o->leapt = leap > 1.5 * next;
+        next = o->leapt ? leap : next;
+    }
+    next = next > rule->policy.first_spp ? next : rule->policy.first_spp;
+    o->next = next >= 1e18 ? UINT64_C(1000000000000000000) : (uint64_t)ceil(next);
+    if (rule->spp_max > o->asked && o->next > rule->spp_max)
+        o->next = rule->spp_max;
+}
+
+/* One question; whether the image was looked at. */
+static int oracle_ask(const struct ggn_stop_rule *rule, struct oracle *o, uint64_t spp, const struct show *show)
+{
+    const struct ggn_policy *p = &rule->policy;
+    const double last = o->used ? (double)o->spp[o->used - 1] : 0;
+
+    if (spp && o->asked == spp)
+        return 0;
+    o->asked = spp;
+    if ((double)spp < p->first_spp || (o->used && (double)spp < last + (next_level(p, last) - last) / 2)) {
+        if (!o->used) {
+            o->stop = 0;
+            o->p = o->predicted = o->noise = (double)NAN;
+            o->too_early = 1;
+            o->next = (uint64_t)fmax(p->first_spp, (double)spp + 1);
+        } else if (!o->stop && o->next <= spp) {
+            o->next = spp + 1;
+        }
+        return 0;
+    }
+    if (o->used == rule->window)
+        memmove(o->spp, o->spp + 1, (size_t)--o->used * sizeof o->spp[0]);
+    o->spp[o->used++] = spp;
+    o->regular = o->leapt ? 1 : o->regular + 1 < o->used ? o->regular + 1 : o->used;
+    o->leapt = o->stop = o->too_early = 0;
+    o->p = o->predicted = (double)NAN;
+    o->noise = o->used > 1 ? show->noise : (double)NAN;
+    if (p->gate_noise > 0 && o->noise > p->gate_noise) {
+        o->passes = 0;
+        o->predicted = (double)spp * (o->noise / p->gate_noise) * (o->noise / p->gate_noise);
+        oracle_schedule(rule, o, o->predicted);
+        return 1;
+    }
+    o->too_early = o->regular < rule->window;
+    if (!o->too_early) {
+        o->p = isfinite(show->logit) ? 1 / (1 + exp(-(p->scale * show->logit + p->shift))) : 1;
+        o->passes = o->p < p->threshold ? o->passes + 1 : 0;
+        int held = (p->tail999 > 0 && show->tail999 > p->tail999) || (p->gini > 0 && show->gini > p->gini && show->tail999 > 0.2);
+        o->stop = o->passes >= p->passes && !(held && show->has_tail);
+    }
+    if (o->stop)
+        o->predicted = (double)spp;
+    else
+        oracle_schedule(rule, o, 0);
+    if (!o->stop && !o->too_early) {
+        double above = log(o->p / (1 - o->p)) - log(p->threshold / (1 - p->threshold));
+        o->predicted = p->slope > 0 && above > 0 ? (double)spp * exp2(above / p->slope) : (double)spp;
+        o->predicted = p->slope > 0 ? fmax(o->predicted, (double)o->next) : (double)o->next;
+    }
+    return 1;
+}
+
+static double draw(void)
+{
+    static uint64_t state = 7; /* SplitMix64 */
+    uint64_t z = state += UINT64_C(0x9e3779b97f4a7c15);
+    z = (z ^ (z >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);
+    z = (z ^ (z >> 27)) * UINT64_C(0x94d049bb133111eb);
+    return (double)((z ^ (z >> 31)) >> 11) * 0x1p-53;
+}
+
+static int close_to(double a, double b)
+{
+    return isnan(a) ? isnan(b) : fabs(a - b) <= 1e-9 * fmax(1, fabs(b));
+}
+
+static void same(const struct ggn_stop_rule *rule, const struct ggn_stopper *s, const struct oracle *o)
+{
+    const struct ggn_verdict *v = &s->verdict;
+
+    assert_true(s->asked_spp == o->asked && (int)s->used == o->used && (int)s->regular == o->regular);
+    assert_true((int)s->passes == o->passes && (int)s->leapt == o->leapt && !memcmp(s->spp, o->spp, s->used * sizeof *s->spp));
+    assert_true((int)v->stop == o->stop && (int)v->too_early == o->too_early && (v->stop || v->next_spp == o->next));
+    if (!close_to(v->p, o->p) || !close_to(v->predicted_spp, o->predicted) || !close_to(v->noise, o->noise))
+        fail_msg("at %llu: p %g for %g, predicted %g for %g, noise %g for %g", (unsigned long long)o->asked, v->p, o->p,
+                 v->predicted_spp, o->predicted, v->noise, o->noise);
+    assert_true(ggn_stopper_valid(rule, s));
+}
+
+/* Policies and blocks of all kinds, asked at the level that was wanted, or one beside it, or half way, or again. */
+static void any_history_is_that_of_the_words(void **state)
+{
+    int stops = 0, leaps = 0, held = 0;
+
+    for (int run = 0; run < 3000; run++) {
+        struct ggn_stop_rule rule = {.policy = ggn_policy_default(), .window = 1 + (int)(5 * draw())};
+        struct ggn_policy *p = &rule.policy;
+        p->first_spp = 1 + floor(20 * draw());
+        p->ratio = draw() < 0.2 ? 1.001 : draw() < 0.1 ? 1.002 : 1 + draw();
+        p->step_spp = 1 + floor(9 * draw());
+        p->scale = 0.5 + draw();
+        p->shift = draw() - 0.5;
+        p->threshold = 0.3 + 0.4 * draw();
+        p->passes = 1 + (int)(3 * draw());
+        p->gate_noise = draw() < 0.3 ? 0 : 0.5;
+        p->slope = draw() < 0.3 ? 0 : 1 + draw();
+        p->tail999 = draw() < 0.5 ? 0 : 1;
+        p->gini = draw() < 0.5 ? 0 : 0.5;
+        rule.spp_max = draw() < 0.5 ? 0 : 100;
+        struct ggn_stopper s = {0};
+        struct oracle o = {.next = (uint64_t)p->first_spp};
+        for (int k = 0; k < 25 && !s.verdict.stop; k++) {
+            struct show show = {.noise = draw() < 0.3 ? 0.5 : 4 * draw() * draw(), .logit = draw() < 0.05 ? (double)INFINITY : 4 * draw() - 3,
+                                .tail999 = draw() < 0.1 ? 1 : 1.5 * draw() * draw(), .gini = draw() < 0.1 ? 0.5 : draw(),
+                                .has_tail = draw() < 0.7};
+            double how = draw(), last = s.used ? (double)s.spp[s.used - 1] : 0;
+            uint64_t spp = how < 0.6 ? o.next : how < 0.7 ? o.next + 1 : how < 0.8 ? s.asked_spp : (uint64_t)ceil((last + (double)o.next) / 2);
+            spp = spp > s.asked_spp ? spp : s.asked_spp;
+            int looked = ask(&rule, &s, spp, &show);
+            assert_int_equal(looked, oracle_ask(&rule, &o, spp, &show));
+            same(&rule, &s, &o);
+            stops += looked && o.stop;
+            leaps += looked && o.leapt;
+            held += looked && !o.stop && !o.too_early && o.passes >= p->passes;
+        }
+    }
+    assert_true(stops > 300 && leaps > 300 && held > 300);
+    (void)state;
+}
+
+/* Numbers of samples that no counter holds, and each way in which a stopper can be impossible. */
+static void far_and_damaged(void **state)
+{
+    struct ggn_stop_rule rule = make_rule();
+    struct show noisy = {.noise = 1e12, .logit = 5};
+    struct ggn_stopper s = {0}, good = {.spp = {10, 15, 23}, .used = 3, .regular = 3, .leapt = 1, .verdict.stop = 1};
+
+    rule.policy.gate_noise = 1;
+    assert_true(ask(&rule, &s, 10, &noisy));
+    assert_true(ask(&rule, &s, UINT64_C(900000000000000000), &noisy));
+    assert_true(s.verdict.next_spp == UINT64_C(1000000000000000000));
+    assert_true(ggn_stopper_valid(&rule, &good));
+    struct ggn_stopper bad = good;
+    bad.leapt = 2;
+    assert_false(ggn_stopper_valid(&rule, &bad));
+    bad = good;
+    bad.verdict.stop = 2;
+    assert_false(ggn_stopper_valid(&rule, &bad));
+    bad = good;
+    bad.regular = 4;
+    assert_false(ggn_stopper_valid(&rule, &bad));
+    bad = good;
+    bad.spp[0] = 0;
+    assert_false(ggn_stopper_valid(&rule, &bad));
+    bad = good;
+    bad.spp[2] = 15;
+    assert_false(ggn_stopper_valid(&rule, &bad));
+    bad = good;
+    bad.used = 2; /* the third is none of the window's */
+    bad.regular = 2;
+    bad.spp[2] = 0;
+    assert_true(ggn_stopper_valid(&rule, &bad));
+    (void)state;
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -191,6 +377,8 @@ int main(void)
         cmocka_unit_test(noise_between_two_passes_begins_anew),
         cmocka_unit_test(nobody_is_sent_beyond_the_limit),
         cmocka_unit_test(a_damaged_stopper_is_told),
+        cmocka_unit_test(any_history_is_that_of_the_words),
+        cmocka_unit_test(far_and_damaged),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

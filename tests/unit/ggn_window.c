@@ -5,11 +5,14 @@
 #include <stdint.h>
 #include <setjmp.h>
 #include <cmocka.h>
+#include <cjson/cJSON.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "sequence/tail.h"
 #include "model/policy.h"
+#include "model/srgb_table.h"
 #include "model/window.h"
 #include "nn/hash.h"
 
@@ -184,6 +187,244 @@ static void tail_guard(void **state)
     (void)state;
 }
 
+/* Each step of the table lies where the curve rounds up, and every bin of the index leads to it. */
+static void codes_change_where_the_curve_rounds(void **state)
+{
+    for (int code = 1; code < 256; code++) {
+        float at, below;
+        const uint32_t bits[2] = {ggn_srgb_limit[code], ggn_srgb_limit[code] - 1};
+        memcpy(&at, &bits[0], sizeof at);
+        memcpy(&below, &bits[1], sizeof below);
+        assert_int_equal(shown((double)at), code);
+        assert_int_equal(shown((double)below), code - 1);
+        assert_int_equal(ggn_preprocess((double)at, NULL, NULL), code);
+        assert_int_equal(ggn_preprocess((double)below, NULL, NULL), code - 1);
+    }
+    for (uint32_t first = 0x30000000u; first < 0x40000000u; first += 0x10000u)
+        for (int end = 0; end < 2; end++) {
+            const uint32_t bits = end ? first | 0xffffu : first;
+            float v;
+            memcpy(&v, &bits, sizeof v);
+            assert_int_equal(ggn_preprocess((double)v, NULL, NULL), shown((double)v));
+        }
+    (void)state;
+}
+
+/* A tile that begins inside of the image, and one that reaches beyond it; what is stored lies inside. */
+static void tiles_begin_anywhere(void **state)
+{
+    enum { W = 7, H = 5, TW = 4, TH = 3, ROW = 6, PLANE = 20 };
+    uint8_t small[3 * W * H];
+    uint16_t wide[3 * W * H], back[3 * W * H];
+
+    for (int i = 0; i < 3 * W * H; i++) {
+        small[i] = (uint8_t)(2 * i);
+        wide[i] = (uint16_t)(600 * i);
+    }
+    for (int x0 = 0; x0 < W; x0++)
+        for (int y0 = 0; y0 < H; y0++) {
+            float a[3 * PLANE], b[3 * PLANE];
+            for (int i = 0; i < 3 * PLANE; i++)
+                a[i] = b[i] = -1;
+            ggn_tile_load_u8(small, W, H, x0, y0, TW, TH, 0.5f, a, ROW, PLANE);
+            ggn_tile_load_u16(wide, W, H, x0, y0, TW, TH, 1.0f / 65535, b, ROW, PLANE);
+            for (int i = 0; i < 3 * PLANE; i++) {
+                const int c = i / PLANE, y = i % PLANE / ROW, x = i % PLANE % ROW, u = x0 + x, v = y0 + y;
+                const int at = (c * H + (v < H ? v : 2 * H - 1 - v)) * W + (u < W ? u : 2 * W - 1 - u);
+                assert_true(a[i] == (x < TW && y < TH ? (float)at : -1));
+                assert_true(b[i] == (x < TW && y < TH ? (float)(600 * at) * (1.0f / 65535) : -1));
+            }
+            memset(back, 0, sizeof back);
+            ggn_tile_store_u16(back, W, H, x0, y0, TW, TH, b, ROW, PLANE);
+            for (int i = 0; i < 3 * W * H; i++) {
+                const int x = i % W - x0, y = i / W % H - y0;
+                assert_int_equal(back[i], x >= 0 && x < TW && y >= 0 && y < TH ? wide[i] : 0);
+            }
+        }
+    static const int starts[][4] = {{10, 10, 1, 0}, {9, 10, 1, 0}, {11, 10, 2, 1}, {20, 10, 2, 10}, {21, 10, 3, 11}, {29, 10, 3, 19}};
+    for (size_t i = 0; i < sizeof starts / sizeof starts[0]; i++) {
+        assert_int_equal(ggn_tile_count(starts[i][0], starts[i][1]), starts[i][2]);
+        assert_int_equal(ggn_tile_start(starts[i][0], starts[i][1], starts[i][2] - 1), starts[i][3]);
+    }
+    assert_int_equal(ggn_tile_start(29, 10, 1), 9);
+    /* codes: half up; all of 1 and beyond is 65534, less than 0 is 0 */
+    const float v[] = {0.49999f / 65535, 0.50001f / 65535, 1.6f / 65535, -3, 1, 65533.9f / 65535, (float)NAN, 2e30f, -(float)INFINITY};
+    static const uint16_t codes[] = {0, 1, 2, 0, 65534, 65534, 65535, 65534, 0};
+    float planes[27] = {0};
+    memcpy(planes, v, sizeof v);
+    ggn_tile_store_u16(back, 9, 1, 0, 0, 9, 1, planes, 9, 9);
+    assert_memory_equal(back, codes, sizeof codes);
+    const uint8_t first[] = {10, 20, 30, 250}, last[] = {12, 19, 30, 245};
+    assert_true(fabs(ggn_window_noise(first, last, 4, 10, 40) - sqrt(30.0 / 4 / 3) / 255) < 1e-15);
+    assert_true(ggn_window_noise(first, last, 0, 10, 40) == 0);
+    (void)state;
+}
+
+/* --- policy -------------------------------------------------------------------------------------------------------------- */
+
+static const struct {
+    const char *name;
+    size_t at;
+    double min, max;
+} limits[] = {{"first_spp", offsetof(struct ggn_policy, first_spp), 1, 1e9}, {"ratio", offsetof(struct ggn_policy, ratio), 0, 100},
+              {"step_spp", offsetof(struct ggn_policy, step_spp), 0, 1e9},   {"scale", offsetof(struct ggn_policy, scale), 1e-6, 1e6},
+              {"shift", offsetof(struct ggn_policy, shift), -1e6, 1e6},      {"threshold", offsetof(struct ggn_policy, threshold), 0, 1},
+              {"gate_noise", offsetof(struct ggn_policy, gate_noise), 0, 1e6}, {"slope", offsetof(struct ggn_policy, slope), 0, 1e6},
+              {"tail999", offsetof(struct ggn_policy, tail999), 0, 1e30},    {"gini", offsetof(struct ggn_policy, gini), 0, 2}};
+
+static void policies_have_limits(void **state)
+{
+    for (size_t i = 0; i < sizeof limits / sizeof limits[0]; i++)
+        for (int k = 0; k < 5; k++) {
+            const double span = limits[i].max - limits[i].min;
+            const double values[] = {limits[i].min, limits[i].max, limits[i].min - 1e-3 * span, limits[i].max + 1e-3 * span, (double)NAN};
+            struct ggn_policy p = ggn_policy_default();
+            struct base_err err = {0};
+            char want[128];
+            p.step_spp = 1;
+            memcpy((char *)&p + limits[i].at, &values[k], sizeof values[k]);
+            snprintf(want, sizeof want, "policy: %s = %g is not in %g..%g", limits[i].name, values[k], limits[i].min, limits[i].max);
+            assert_int_equal(ggn_policy_check(&p, &err), k < 2 ? 0 : BASE_EINVAL);
+            if (k >= 2)
+                assert_string_equal(err.text, want);
+        }
+    for (int passes = 0; passes <= 17; passes++) {
+        struct ggn_policy p = ggn_policy_default();
+        struct base_err err = {0};
+        p.passes = passes;
+        assert_int_equal(ggn_policy_check(&p, &err), passes >= 1 && passes <= 16 ? 0 : BASE_EINVAL);
+        if (passes == 17)
+            assert_string_equal(err.text, "policy: passes = 17 is not in 1..16");
+    }
+    struct ggn_policy p = ggn_policy_default();
+    struct base_err err = {0};
+    assert_true(p.first_spp == 20 && p.ratio == 1.15 && p.step_spp == 0 && p.scale == 1 && p.shift == 0 && p.threshold == 0.5);
+    assert_true(p.passes == 2 && p.gate_noise == 0 && p.slope == 0 && p.tail999 == 0 && p.gini == 0);
+    p.ratio = 1.001;
+    p.step_spp = 1;
+    assert_int_equal(ggn_policy_check(&p, &err), 0);
+    p.step_spp = 0.99;
+    assert_int_equal(ggn_policy_check(&p, &err), BASE_EINVAL);
+    assert_string_equal(err.text, "policy: neither a ratio above 1 nor a step says how levels are spaced");
+    p.ratio = 1.0011;
+    assert_int_equal(ggn_policy_check(&p, &err), 0);
+    (void)state;
+}
+
+/* What users may set, and what follows from it. */
+static void policies_are_adjusted(void **state)
+{
+    struct ggn_policy p = {.first_spp = 12, .ratio = 1.25, .scale = 2, .shift = -1, .threshold = 0.25, .passes = 3, .gate_noise = 0.02,
+                           .slope = 2, .tail999 = 2, .gini = 0.9}, was = p;
+
+    assert_true(ggn_policy_adjust(&p, "visible", 0.1) && p.threshold == 0.1);
+    assert_true(ggn_policy_adjust(&p, "tail", 7) && p.tail999 == 7);
+    assert_true(ggn_policy_adjust(&p, "gini", 0.7) && p.gini == 0.7);
+    assert_true(ggn_policy_adjust(&p, "first-spp", 99) && p.first_spp == 99);
+    assert_true(ggn_policy_adjust(&p, "passes", 5) && p.passes == 5);
+    assert_true(ggn_policy_adjust(&p, "gate", 1) && p.gate_noise == 0.02);
+    assert_true(ggn_policy_adjust(&p, "gate", 0) && p.gate_noise == 0);
+    assert_true(ggn_policy_adjust(&p, "gate", 1) && p.gate_noise == 0);
+    struct ggn_policy kept = p;
+    assert_false(ggn_policy_adjust(&p, "model", 1) || ggn_policy_adjust(&p, "", 1) || ggn_policy_adjust(&p, "gates", 1));
+    assert_memory_equal(&kept, &p, sizeof p);
+    ggn_policy_without_halves(&p);
+    assert_true(p.tail999 == 0 && p.gini == 0 && p.threshold == 0.1);
+    p = was;
+    assert_true(fabs(ggn_policy_p(&p, 0.5) - 0.5) < 1e-15 && fabs(ggn_policy_p(&p, 1) - 1 / (1 + exp(-1))) < 1e-15);
+    assert_true(ggn_policy_p(&p, (double)INFINITY) == 1 && ggn_policy_p(&p, -(double)INFINITY) == 1 && ggn_policy_p(&p, (double)NAN) == 1);
+    assert_true(ggn_policy_next(&p, 10) == 13 && ggn_policy_next(&p, 9) == 11 && ggn_policy_next(&p, 2) == 3);
+    p.ratio = 1.001;
+    p.step_spp = 7;
+    assert_true(ggn_policy_next(&p, 10) == 17);
+    p.step_spp = 0.5;
+    assert_true(ggn_policy_next(&p, 10) == 11);
+    /* octaves of logit over slope, p and threshold at most six nines apart, twenty octaves at most */
+    assert_true(fabs(ggn_policy_predict(&p, 0.75, 0.25, 8) - 8 * exp2(2 * log(3) / 2)) < 1e-9);
+    assert_true(ggn_policy_predict(&p, 0.2, 0.25, 8) == 8 && isnan(ggn_policy_predict(&p, (double)NAN, 0.25, 8)));
+    assert_true(fabs(ggn_policy_predict(&p, 1, 0.5, 8) / (8 * exp2(log(999999) / 2)) - 1) < 1e-9);
+    assert_true(fabs(ggn_policy_predict(&p, 0.5, 0, 8) / (8 * exp2(log(999999) / 2)) - 1) < 1e-9);
+    assert_true(ggn_policy_predict(&p, 0, 1, 8) == 8 && ggn_policy_predict(&p, 0, 0, 8) == 8);
+    p.slope = 1e-3;
+    assert_true(ggn_policy_predict(&p, 0.9, 0.1, 8) == 8 * exp2(20));
+    p.slope = 0;
+    assert_true(isnan(ggn_policy_predict(&p, 0.9, 0.1, 8)));
+    /* more than the limit holds, as much does not; a Gini coefficient counts above a tail of 0.2 only */
+    assert_false(ggn_policy_tail_holds(&p, 2, 0.9));
+    assert_true(ggn_policy_tail_holds(&p, 2.0001, 0) && ggn_policy_tail_holds(&p, 0.2001, 0.9001));
+    assert_false(ggn_policy_tail_holds(&p, 0.2, 1));
+    p.tail999 = 0;
+    assert_false(ggn_policy_tail_holds(&p, 1e9, 0.9));
+    p.gini = 0;
+    assert_false(ggn_policy_tail_holds(&p, 1e9, 2));
+    (void)state;
+}
+
+/* As JSON, whole; what is missing keeps its default, but for passes. */
+static void policies_are_written_down(void **state)
+{
+    const struct ggn_policy p = {.first_spp = 12, .ratio = 1.25, .step_spp = 3, .scale = 2, .shift = -1, .threshold = 0.25, .passes = 3,
+                                 .gate_noise = 0.5, .slope = 4, .tail999 = 6, .gini = 0.75};
+    struct ggn_policy q = {.scale = 77};
+    struct base_err err = {0};
+    cJSON *root = cJSON_CreateObject();
+    int failed = 0;
+
+    ggn_policy_print(root, &p, &failed);
+    char *text = cJSON_PrintUnformatted(root);
+    assert_string_equal(text, "{\"first_spp\":12,\"ratio\":1.25,\"step_spp\":3,\"scale\":2,\"shift\":-1,\"threshold\":0.25,\"gate_noise\":0.5,"
+                              "\"slope\":4,\"tail999\":6,\"gini\":0.75,\"passes\":3}");
+    assert_false(failed);
+    assert_int_equal(ggn_policy_parse(root, &q, &err), 0);
+    assert_memory_equal(&p, &q, sizeof p);
+    cJSON_ReplaceItemInObject(root, "slope", cJSON_CreateString("4"));
+    assert_int_equal(ggn_policy_parse(root, &q, &err), BASE_EINVAL);
+    assert_string_equal(err.text, "policy: slope is not a number");
+    cJSON_DeleteItemFromObject(root, "slope");
+    cJSON_DeleteItemFromObject(root, "ratio");
+    assert_int_equal(ggn_policy_parse(root, &q, &err), 0);
+    assert_true(q.slope == 0 && q.ratio == 1.15 && q.gini == 0.75);
+    cJSON_DeleteItemFromObject(root, "passes");
+    assert_int_equal(ggn_policy_parse(root, &q, &err), BASE_EINVAL);
+    assert_string_equal(err.text, "policy: passes = 0 is not in 1..16");
+    free(text);
+    cJSON_Delete(root);
+    (void)state;
+}
+
+/* In a model: its calibration, and the rest beside it; without the rest the model's own numbers and the defaults. */
+static void policies_of_models(void **state)
+{
+    struct ggn_hyper hyper = {GGN_PRESET_LULL, 16, 16, 2, 1, 1, 1, 0};
+    struct ggn_policy p = {.first_spp = 12, .step_spp = 3, .scale = 2, .shift = -1, .threshold = 0.25, .passes = 3, .gini = 0.75}, q;
+    struct ggn_model *m = ggn_model_create(&hyper, NULL);
+
+    assert_non_null(m);
+    assert_true(m->calibration.scale == 1 && m->calibration.shift == 0 && m->calibration.threshold == 0.5);
+    assert_true(m->calibration.consecutive == 2 && m->calibration.spacing == 1.2);
+    assert_int_equal(ggn_policy_of(m, &q, NULL), 0);
+    assert_true(q.first_spp == 20 && q.ratio == 1.2 && q.threshold == 0.5 && q.passes == 2 && q.scale == 1);
+    for (int twice = 0; twice < 2; twice++) {
+        assert_int_equal(ggn_policy_set(m, &p, NULL), 0);
+        assert_int_equal(cJSON_GetArraySize(m->provenance), 1);
+    }
+    assert_true(m->calibration.scale == 2 && m->calibration.shift == -1 && m->calibration.threshold == 0.25);
+    assert_true(m->calibration.consecutive == 3 && m->calibration.spacing == 1);
+    char *text = cJSON_PrintUnformatted(m->provenance);
+    assert_string_equal(text, "{\"policy\":{\"first_spp\":12,\"ratio\":0,\"step_spp\":3,\"gate_noise\":0,\"slope\":0,\"tail999\":0,"
+                              "\"gini\":0.75}}");
+    free(text);
+    assert_int_equal(ggn_policy_of(m, &q, NULL), 0);
+    assert_memory_equal(&p, &q, sizeof p);
+    p.ratio = 1.5;
+    assert_int_equal(ggn_policy_set(m, &p, NULL), 0);
+    assert_true(m->calibration.spacing == 1.5);
+    m->calibration.threshold = 2;
+    assert_int_equal(ggn_policy_of(m, &q, NULL), BASE_EINVAL);
+    ggn_model_destroy(m);
+    (void)state;
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -192,6 +433,12 @@ int main(void)
         cmocka_unit_test(noise_pictures_are_differences_of_codes), cmocka_unit_test(tiles_cover_and_reflect),
         cmocka_unit_test(tail_statistics_match_their_definition),
         cmocka_unit_test(policy_travels_with_the_model),
+        cmocka_unit_test(codes_change_where_the_curve_rounds),
+        cmocka_unit_test(tiles_begin_anywhere),
+        cmocka_unit_test(policies_have_limits),
+        cmocka_unit_test(policies_are_adjusted),
+        cmocka_unit_test(policies_are_written_down),
+        cmocka_unit_test(policies_of_models),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
