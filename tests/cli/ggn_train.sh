@@ -111,10 +111,6 @@ kill -INT $pid && wait $pid
 rc=$?
 [ $rc -eq 130 ] && $ggn train $more --out "$tmp/resumed.ggn" --resume --threads 1 -q 2>"$tmp/err" && cmp "$tmp/picture.ggn" "$tmp/resumed.ggn" 2>"$tmp/err"
 check "the same bytes when interrupted and resumed, averaged weights included (first run ended with $rc)" $?
-for option in "--picture 1" "--average 9" "--flips 1"; do
-    $ggn train $more $option --out "$tmp/i.ggn" -q 2>"$tmp/err" && ! cmp -s "$tmp/picture.ggn" "$tmp/i.ggn"
-    check "other bytes with $option" $?
-done
 # half buffers at one level only: it lends the others theirs
 for no in "" --no-pictures; do
     $ggn evaluate -d $data -m "$tmp/picture.ggn" --no-quality --json $no >"$tmp/figures$no" 2>"$tmp/err" || break

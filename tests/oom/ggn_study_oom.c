@@ -175,7 +175,7 @@ static void a_block(void **state)
     static const uint32_t levels[] = {20, 400};
     (void)state;
     for (uint32_t reference_spp = 0; reference_spp <= 800; reference_spp += 800) {
-        const struct ggn_noise noise = {12, 10, levels, 2, reference_spp, 1, 0, 1};
+        const struct ggn_noise noise = {12, 10, levels, 2, reference_spp, 1, 0, 1, 0};
         recording = ggn_noise_block(&noise);
         fail_each(pictures, 0);
         seq_block_release(&recording);

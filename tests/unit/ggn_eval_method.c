@@ -43,7 +43,7 @@ static int setup(void **state)
     for (int v = 0; v < 3; v++) {
         double sigma[BLOCKS];
         static const double t[BLOCKS] = {50, 110, 230, 550, 3000};
-        struct ggn_noise n = {24, 20, levels, LEVELS, 2000, 0, 0, (uint32_t)v + 1};
+        struct ggn_noise n = {24, 20, levels, LEVELS, 2000, 0, 0, (uint32_t)v + 1, 0};
         for (int i = 0; i < BLOCKS; i++)
             sigma[i] = sqrt(t[i] / 1000.0 * (1.0 + 0.1 * v));
         snprintf(dir, sizeof dir, "%s/%s", root, names[v]);
@@ -424,7 +424,7 @@ static void beyond_the_recording(void **state)
     (void)state;
     char dir[64], view[128];
     const double sigma[2] = {5, 4};
-    struct ggn_noise n = {24, 20, levels, LEVELS, 4000, 0, 0, 9};
+    struct ggn_noise n = {24, 20, levels, LEVELS, 4000, 0, 0, 9, 0};
     snprintf(dir, sizeof dir, "%s.more", root);
     snprintf(view, sizeof view, "%s/view", dir);
     assert_int_equal(mkdir(dir, 0777), 0);

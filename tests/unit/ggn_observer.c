@@ -12,9 +12,11 @@
 #include <stddef.h>
 #include <cmocka.h>
 
+#include "support/ggn_approve.h"
 #include "support/ggn_near.h"
 #include "support/ggn_noise.h"
 
+#include "base/files.h"
 #include "observer/calibrate.h"
 #include "observer/remaining.h"
 #include "observer/views.h"
@@ -28,7 +30,7 @@ enum { LEVELS = sizeof levels / sizeof levels[0] };
 
 static struct seq_block make_block(double sigma, double texture, uint32_t seed, uint32_t reference_spp)
 {
-    struct ggn_noise n = {W, H, levels, LEVELS, reference_spp, sigma, texture, seed};
+    struct ggn_noise n = {W, H, levels, LEVELS, reference_spp, sigma, texture, seed, 0};
     return ggn_noise_block(&n);
 }
 
@@ -286,7 +288,7 @@ static void beyond_the_last_level(void **state)
 {
     (void)state;
     struct ggn_observer o = {0.35, 0.4, 0.4};
-    struct ggn_noise n = {W, H, levels, LEVELS, 4096, 0.6, 0.0, 6}, few = {W, H, levels, 8, 4096, 0.6, 0.0, 6};
+    struct ggn_noise n = {W, H, levels, LEVELS, 4096, 0.6, 0.0, 6, 0}, few = {W, H, levels, 8, 4096, 0.6, 0.0, 6, 0};
     struct seq_block all = ggn_noise_block(&n), head = ggn_noise_block(&few);
     double a = threshold_of(&all, &o, GGN_FROM_LEVELS), b = threshold_of(&head, &o, GGN_FROM_LEVELS);
     assert_true(a > 500);
@@ -404,7 +406,7 @@ static void make_views(const char *dir, const struct ggn_observer *person, struc
     for (int v = 0; v < VIEWS; v++) {
         char view[128], scene[24];
         double sigma[BLOCKS];
-        struct ggn_noise n = {W, H, few, 2, 0, 0.0, 0.05 * v, (uint32_t)v + 1};
+        struct ggn_noise n = {W, H, few, 2, 0, 0.0, 0.05 * v, (uint32_t)v + 1, 0};
         for (int i = 0; i < BLOCKS; i++)
             sigma[i] = (0.2 + 0.08 * i) * (1.0 + v);
         snprintf(view, sizeof view, "%s/view%d", dir, v);
@@ -423,6 +425,67 @@ static void make_views(const char *dir, const struct ggn_observer *person, struc
         ggn_labels_release(&l);
     }
     base_threads_destroy(threads);
+}
+
+/* Halves against really recorded levels, of a quiet block, one that is noisy up to the last level, and one with texture. */
+static void checks(void **state)
+{
+    (void)state;
+    static const uint32_t few[] = {16, 32, 64, 128, 256, 512};
+    static const double sigma[] = {0.15, 2.5, 0.5};
+    char dir[] = "/tmp/ggn_checks.XXXXXX", view[64], command[80], *report;
+    struct ggn_noise n = {40, 32, few, 6, 2048, 0.0, 0.02, 5, 0};
+    struct ggn_dataset data;
+    struct ggn_check found[3];
+    struct ggn_labels l;
+    struct base_err err = {0};
+    size_t size;
+    FILE *f = open_memstream(&report, &size);
+    assert_non_null(mkdtemp(dir));
+    snprintf(view, sizeof view, "%s/view", dir);
+    ggn_noise_view(view, "scene", &n, sigma, 3, 1.0);
+    assert_int_equal(ggn_dataset_open(dir, &data, NULL), 0);
+    struct base_threads *threads = base_threads_create(2, NULL);
+    assert_int_equal(ggn_view_check(&ggn_observer_default, &data.views[0], threads, found, &err), 0);
+    for (int i = 0; i < 3; i++)
+        fprintf(f, "block %u: halves %.6g recorded %.6g beyond %d curve %.6g\n", found[i].id, found[i].halves, found[i].recorded,
+                found[i].beyond, found[i].curve);
+    assert_int_equal(ggn_view_label(&ggn_observer_default, &data.views[0], GGN_FROM_LEVELS, threads, &l, &err), 0);
+    fprintf(f, "%s, cap %g, spread %g\n", l.detail, l.cap, l.spread);
+    for (uint32_t i = 0; i < l.n; i++)
+        fprintf(f, "block %u: %.6g censored %d\n", l.labels[i].id, l.labels[i].threshold, l.labels[i].censored);
+    fclose(f);
+    ggn_approve("ggn_observer_checks", report, 1e-4);
+    free(report);
+    ggn_labels_release(&l);
+    base_threads_destroy(threads);
+    ggn_dataset_release(&data);
+    snprintf(command, sizeof command, "rm -r %s", dir);
+    assert_int_equal(system(command), 0);
+}
+
+/* All that is written about a calibration, and about the labels of a view, as recorded. */
+static void record(const char *path, const struct ggn_dataset_view *view, const struct ggn_calibration *c, struct base_threads *threads)
+{
+    struct base_err err = {0};
+    struct ggn_labels l;
+    char *text, *report;
+    size_t size;
+    assert_int_equal(base_file_read(path, 1 << 20, &text, &size, &err), 0);
+    FILE *f = open_memstream(&report, &size);
+    fputs(text, f);
+    free(text);
+    for (int i = 0; i < c->n_blocks; i++)
+        fprintf(f, "view %d block %u: people %.6g, the others' observer %.6g\n", c->blocks[i].view, c->blocks[i].id, c->blocks[i].human,
+                c->blocks[i].predicted);
+    assert_int_equal(ggn_view_label(&c->observer, view, GGN_FROM_HALVES, threads, &l, &err), 0);
+    fprintf(f, "%s: %s, cap %g, spread %g\n", l.source, l.detail, l.cap, l.spread);
+    for (uint32_t i = 0; i < l.n; i++)
+        fprintf(f, "block %u: %.6g censored %d\n", l.labels[i].id, l.labels[i].threshold, l.labels[i].censored);
+    ggn_labels_release(&l);
+    fclose(f);
+    ggn_approve("ggn_observer_calibration", report, 1e-4);
+    free(report);
 }
 
 static void calibration(void **state)
@@ -452,10 +515,12 @@ static void calibration(void **state)
     ggn_calibration_release(&c);
     for (int i = 0; i < BLOCKS; i++)
         human[2].spp[i] *= 2.0;
+    human[2].spp[5] = 12000; /* people look no further than 10,000: no point of a fit, and no error beyond */
     assert_int_equal(ggn_calibrate(inputs, VIEWS, GGN_FROM_HALVES, threads, &c, &err), 0);
     assert_near(c.views[2].median_log2, -1.0, 0.1);
     snprintf(path, sizeof path, "%s/observer.json", dir);
     assert_int_equal(ggn_calibration_write(path, &c, &err), 0);
+    record(path, &data.views[1], &c, threads);
     assert_int_equal(ggn_observer_read(path, NULL, &back, &err), 0);
     assert_near(back.level, c.observer.level, 1e-9);
     assert_near(back.spread, c.observer.spread, 1e-9);
@@ -523,6 +588,238 @@ static void trials(void **state)
     unlink(path);
 }
 
+/* --- closed forms --------------------------------------------------------------------------------------------------------- */
+
+static void laws(void **state)
+{
+    (void)state;
+    const struct ggn_observer o = {0.3, 0.5, 0.4};
+    char text[128];
+    assert_near(ggn_observer_error(&o, 0.9, 7.0, 49), (1 + 1.4 / 7) * 0.9 / (0.3 * 3), 1e-12);
+    assert_near(ggn_observer_p_noisy(&o, -1.0), 0.0, 0);
+    assert_near(ggn_observer_p_noisy(&o, 0.5), 0.5 * erfc(2 / (0.4 * sqrt(2))), 1e-15);
+    assert_near(ggn_observer_error_at(&o, 0.8413447460685429), exp2(0.2), 1e-9);
+    assert_near(ggn_observer_error_at(&o, 0.25), exp2(-0.2 * 0.6744897501960817), 1e-9);
+    assert_near(ggn_observer_next(100, 120, 1.5), 120, 0);
+    assert_near(ggn_observer_next(100, 160, 1.5), 150, 0);
+    assert_near(ggn_observer_next(100, 90, 1.5), 104, 1e-12);
+    assert_near(ggn_observer_next(100, 90, 1.02), 102, 1e-12);
+    ggn_observer_describe(&o, text, sizeof text);
+    assert_string_equal(text, "model observer: noise in L* is seen above 0.3000 (texture + 2)^0.5000, spread 0.40 octaves");
+    /* 0.7 px: exp(-k^2 / 0.98) of five taps */
+    static float impulse[15 * 15], seen[15 * 15];
+    static double scratch[5 * 20];
+    double taps = 1 + 2 * exp(-1 / 0.98) + 2 * exp(-4 / 0.98), fourth = 0;
+    impulse[7 * 15 + 7] = 1;
+    double noise = ggn_visible_noise(impulse, 15, 15, scratch, seen);
+    for (int i = 0; i < 225; i++) {
+        int x = abs(i % 15 - 7), y = abs(i / 15 - 7);
+        double want = x > 2 || y > 2 ? 0 : exp(-(x * x + y * y) / 0.98) / taps / taps;
+        assert_near((double)seen[i], want, 1e-8);
+        fourth += pow(want, 4);
+    }
+    assert_near(noise, pow(fourth / 225, 0.25), 1e-8);
+}
+
+/* Every place of a curve: which levels there are, and what lies between them. */
+static void levels_of_curves(void **state)
+{
+    (void)state;
+    struct ggn_curve c;
+    struct base_err err = {0};
+    struct seq_block b = make_block(0.3, 0.1, 3, 4096);
+    assert_int_equal(ggn_curve_make(&b, GGN_FROM_HALVES, 1, &c, &err), 0);
+    assert_true(c.n == 45 && c.recorded == 0);
+    for (int i = 0; i < 45; i++)
+        assert_near(c.spp[i], 10000 * exp2(0.25 * (i - 44)), 1e-9);
+    assert_near(ggn_curve_at(&c, 10000), c.visible[44], 0);
+    assert_near(ggn_curve_at(&c, 1e6), c.visible[44], 0);
+    assert_near(ggn_curve_at(&c, sqrt(c.spp[20] * c.spp[21])), sqrt(c.visible[20] * c.visible[21]), 1e-12);
+    assert_near(ggn_curve_at(&c, c.spp[0]), c.visible[0], 0);
+    double keep = c.visible[21];
+    c.visible[21] = 0; /* no logarithm of it: along the line */
+    assert_near(ggn_curve_at(&c, sqrt(c.spp[20] * c.spp[21])), 0.5 * c.visible[20], 1e-12);
+    c.visible[21] = keep;
+    double texture = c.texture, at_full = ggn_curve_at(&c, 342), at_half = ggn_curve_at(&c, 171);
+    ggn_curve_release(&c);
+    assert_true(!c.spp && !c.visible && c.n == 0);
+    for (int independent = 0; independent < 2; independent++) {
+        assert_int_equal(ggn_curve_make(&b, GGN_FROM_LEVELS, independent, &c, &err), 0);
+        assert_int_equal(c.recorded, LEVELS);
+        assert_int_equal(c.n, LEVELS + independent); /* 8758 * 1.07 < 10000 */
+        for (int i = 0; i < LEVELS; i++)
+            assert_near(c.spp[i], levels[i], 0);
+        /* the part of a reference of n_r that a level shares with it: without, sqrt(n_r / (n_r + n)) */
+        if (independent)
+            assert_near(c.spp[LEVELS], 10000, 0);
+        ggn_curve_release(&c);
+    }
+    const struct seq_record *full = &b.levels[0];
+    while (!seq_has(full, SEQ_PLANE_HALF_F16))
+        full++;
+    double visible, one_texture;
+    assert_int_equal(ggn_curve_level(&b, full, &visible, &one_texture, &err), 0);
+    assert_near(one_texture, texture, 1e-9);
+    assert_near(visible, at_full, 0.01 * at_full); /* at_full: along the curve's line */
+    double grey[2];
+    for (int k = 0; k < 2; k++) /* luminance alone is kept of other levels: as visible as their samples say */
+        assert_int_equal(ggn_curve_level(&b, full - 2 * k, &grey[k], &one_texture, &err), 0);
+    assert_near(log2(grey[1] / grey[0]), 0.5 * log2(342.0 / 152), 0.1);
+    assert_true(at_half > at_full);
+    seq_block_release(&b);
+}
+
+/* Where the noise of one level is, of a block seen through its reference: by hand, of shared and of other samples. */
+static void levels_by_hand(void **state)
+{
+    (void)state;
+    static float mean[3 * P], reference[3 * P], work[3 * P], l[3][P];
+    struct ggn_curve c;
+    struct base_err err = {0};
+    struct seq_block b = make_block(0.3, 0.2, 3, 1024);
+    double *scratch = malloc(ggn_visibility_scratch(W) * sizeof *scratch);
+    assert_int_equal(seq_mean(&b, b.reference, reference, &err), 0);
+    ggn_visible_lightness(reference, P, l[2]);
+    for (int independent = 0; independent < 2; independent++) {
+        assert_int_equal(ggn_curve_make(&b, GGN_FROM_LEVELS, independent, &c, &err), 0);
+        for (int k = 0; k < LEVELS; k += LEVELS - 1) {
+            const double scale = independent ? sqrt(1024 / (1024.0 + levels[k])) : 1;
+            assert_int_equal(seq_mean(&b, &b.levels[k], mean, &err), 0);
+            for (int i = 0; i < 3 * P; i++)
+                work[i] = reference[i] + (float)scale * (mean[i] - reference[i]);
+            ggn_visible_lightness(work, P, l[0]);
+            for (int i = 0; i < P; i++)
+                l[0][i] -= l[2][i];
+            assert_near(c.visible[k], ggn_visible_noise(l[0], W, H, scratch, NULL), 1e-6);
+        }
+        ggn_visible_lightness(independent ? mean : reference, P, l[1]); /* the last level's */
+        assert_near(c.texture, ggn_visible_texture(l[1], l[2], W, H, scratch), 1e-9);
+        ggn_curve_release(&c);
+    }
+    free(scratch);
+    seq_block_release(&b);
+}
+
+/* Whole lines of what cannot be judged. */
+static void refusals(void **state)
+{
+    (void)state;
+    struct base_err err = {0};
+    struct ggn_curve c;
+    struct seq_block b = make_block(0.3, 0.0, 7, 0);
+    assert_int_equal(ggn_curve_make(&b, GGN_FROM_LEVELS, 1, &c, &err), BASE_EINVAL);
+    assert_string_equal(err.text, "block 7 has no reference: record one, or use --source halves");
+    static const int parts_of[][5] = {{0, 0, W, H, 1}, {-1, 0, 5, 5, 0}, {0, -1, 5, 5, 0}, {0, 0, 0, 5, 0}, {0, 0, 5, 0, 0}, {W - 5, 0, 5, H, 1},
+                                      {W - 4, 0, 5, 5, 0}, {0, H - 4, 5, 5, 0}, {W - 1, H - 1, 1, 1, 1}};
+    for (size_t i = 0; i < sizeof parts_of / sizeof parts_of[0]; i++) {
+        const int *p = parts_of[i];
+        char want[64];
+        int rc = ggn_curve_part(&b, p[0], p[1], p[2], p[3], &c, &err);
+        assert_int_equal(rc, p[4] ? 0 : BASE_EINVAL);
+        snprintf(want, sizeof want, "block 7 has no part %dx%d at %d, %d", p[2], p[3], p[0], p[1]);
+        if (rc)
+            assert_string_equal(err.text, want);
+        else
+            ggn_curve_release(&c);
+    }
+    for (uint32_t l = 0; l < b.n_levels; l++)
+        for (uint32_t p = 0; p < b.levels[l].n_planes; p++)
+            if (b.levels[l].planes[p].plane == SEQ_PLANE_HALF_F16)
+                b.levels[l].n_planes = p;
+    assert_int_equal(ggn_curve_make(&b, GGN_FROM_HALVES, 1, &c, &err), BASE_EINVAL);
+    assert_string_equal(err.text, "block 7 has no full level with a half-buffer difference: record one, or use --source levels");
+    assert_int_equal(ggn_curve_part(&b, 0, 0, 5, 5, &c, &err), BASE_EINVAL);
+    assert_string_equal(err.text, "block 7 has no full level with a half-buffer difference");
+    struct seq_block two[2] = {make_block(0.3, 0.0, 8, 0), b};
+    assert_int_equal(ggn_curve_joined(two, 2, 1, &c, &err), BASE_EINVAL);
+    assert_string_equal(err.text, "blocks 8 and 7 have no full levels of the same size and samples");
+    seq_block_release(&two[0]);
+    seq_block_release(&b);
+}
+
+/* Parameters at their limits, and a fit that leaves a view out. */
+static void parameter_files(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *text;
+        int good;
+    } files[] = {{"{\"level\":1e-6,\"exponent\":-10,\"spread\":1e-3}", 1}, {"{\"level\":1e3,\"exponent\":10,\"spread\":10}", 1},
+                 {"{\"level\":9e-7,\"exponent\":1,\"spread\":1}", 0},      {"{\"level\":1001,\"exponent\":1,\"spread\":1}", 0},
+                 {"{\"level\":1,\"exponent\":-11,\"spread\":1}", 0},       {"{\"level\":1,\"exponent\":10.1,\"spread\":1}", 0},
+                 {"{\"level\":1,\"exponent\":1,\"spread\":9e-4}", 0},      {"{\"level\":1,\"exponent\":1,\"spread\":10.1}", 0},
+                 {"{\"level\":\"1\",\"exponent\":1,\"spread\":1}", 0},     {"[]", 0},
+                 {"{\"level\":1,\"exponent\":1,\"spread\":1,\"each_view_left_out\":[{\"name\":\"a\",\"level\":2,\"exponent\":3},"
+                  "{\"name\":\"b\",\"level\":5,\"exponent\":6}]}", 2}};
+    char path[] = "/tmp/ggn_parameters.XXXXXX", want[160];
+    assert_true(close(mkstemp(path)) == 0);
+    snprintf(want, sizeof want, "%s: level, exponent or spread is missing or out of range (ggn label --calibrate writes them)", path);
+    for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
+        struct ggn_observer o = {7, 7, 7};
+        struct base_err err = {0};
+        FILE *f = fopen(path, "w");
+        fputs(files[i].text, f);
+        fclose(f);
+        assert_int_equal(ggn_observer_read(path, files[i].good == 2 ? "b" : "a", &o, &err), files[i].good ? 0 : BASE_EINVAL);
+        if (!files[i].good)
+            assert_string_equal(err.text, want);
+        assert_true(files[i].good ? o.level != 7 : o.level == 7 && o.exponent == 7 && o.spread == 7);
+        assert_true(files[i].good != 2 || (o.level == 5 && o.exponent == 6 && o.spread == 1));
+    }
+    unlink(path);
+}
+
+/* The most likely spread of the grid, by the definition; lines that are no trial. */
+static void trials_by_hand(void **state)
+{
+    (void)state;
+    static const char text[] = "0.0;1.0;1\n0.0;2.0;1\n0.0;3.0;0\n255.0;4.0;1\n255.0;6.0;0\r\n0;2;0 \t\n256;1;1\n-1;1;1\n1;0;1\n1;1e6;1\n"
+                               "1;5;2\n1;5;0.5\n1;5\n1,5,1\n1;5;1;\n3;999999;0";
+    static const struct {
+        int block;
+        double level;
+        int seen;
+    } good[] = {{0, 1, 1}, {0, 2, 1}, {0, 3, 0}, {255, 4, 1}, {255, 6, 0}, {0, 2, 0}, {3, 999999, 0}};
+    char path[] = "/tmp/ggn_trials.XXXXXX", want[64];
+    double spread = 0, likely = -INFINITY, wanted = 0;
+    int blocks, n, skipped;
+    struct base_err err = {0};
+    FILE *f = fdopen(mkstemp(path), "w");
+    fputs(text, f);
+    fclose(f);
+    assert_int_equal(ggn_trials_spread(path, &spread, &blocks, &n, &skipped, &err), 0);
+    assert_true(blocks == 3 && n == 7 && skipped == 9);
+    for (double s = 0.05; s < 3; s *= 1.05) {
+        double total = 0;
+        for (int k = 0; k < 3; k++) {
+            const int block = (const int[]){0, 255, 3}[k];
+            double best = -INFINITY;
+            for (int at = 0; at <= 200; at++) {
+                double sum = 0;
+                for (int i = 0; i < 7; i++) {
+                    double p = 0.01 + 0.49 * erfc((log2(20 * good[i].level) - (4 + 0.05 * at)) / s / sqrt(2));
+                    sum += good[i].block == block ? log(good[i].seen ? p : 1 - p) : 0;
+                }
+                best = fmax(best, sum);
+            }
+            total += best;
+        }
+        if (total > likely) {
+            likely = total;
+            wanted = s;
+        }
+    }
+    assert_near(spread, wanted, 1e-9);
+    f = fopen(path, "w");
+    fputs("nothing\n", f);
+    fclose(f);
+    assert_int_equal(ggn_trials_spread(path, &spread, &blocks, &n, &skipped, &err), BASE_EINVAL);
+    snprintf(want, sizeof want, "%s: no trials in it", path);
+    assert_string_equal(err.text, want);
+    assert_true(blocks == 0 && n == 0 && skipped == 1);
+    unlink(path);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -533,7 +830,9 @@ int main(void)
         cmocka_unit_test(noisy_reference), cmocka_unit_test(beyond_the_last_level),
         cmocka_unit_test(needs), cmocka_unit_test(parts), cmocka_unit_test(joined),           cmocka_unit_test(calibration),
         cmocka_unit_test(parameters),      cmocka_unit_test(built_in),
-        cmocka_unit_test(trials),
+        cmocka_unit_test(trials),          cmocka_unit_test(laws),
+        cmocka_unit_test(levels_of_curves), cmocka_unit_test(levels_by_hand), cmocka_unit_test(refusals),
+        cmocka_unit_test(parameter_files), cmocka_unit_test(trials_by_hand), cmocka_unit_test(checks),
     };
     return cmocka_run_group_tests_name("observer", tests, NULL, NULL);
 }

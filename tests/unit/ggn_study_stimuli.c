@@ -20,7 +20,7 @@ static const uint32_t levels[] = {20, 40, 80, 160, 320, 640, 1280};
 
 static struct seq_block block_of(const uint32_t *spp, uint32_t n, uint32_t reference_spp)
 {
-    struct ggn_noise noise = {W, H, spp, n, reference_spp, 1.5, 0.05, 3};
+    struct ggn_noise noise = {W, H, spp, n, reference_spp, 1.5, 0.05, 3, 0};
     return ggn_noise_block(&noise);
 }
 
