@@ -574,7 +574,7 @@ static void described(void **state)
     assert_int_equal(ggn_baseline_save(&b, path, GGN_F32, from, NULL), 0);
     cJSON_Delete(from);
     ggn_baseline_release(&b);
-    forged(path, "\"width\":\t24", "\"width\":\t4000", "the file is too small for a network of this size");
+    forged(path, "\"width\":\t24,\n\t\"height\":\t24", "\"width\":4000,\"height\":4000", "the file is too small for a network of this size");
     forged(path, "\"width\":\t24", "\"width\":\t40", "tensor 'lstm' does not have the shape that the network asks for");
     unlink(path);
 }
