@@ -163,6 +163,7 @@ t "  …and none that the bound allows" test "$(total all.json checks)" -eq "$(t
 # --- looking inside ---
 t "--explain tells effects and kernel" sh -c "$P $scene --explain | grep -q '^kernel: '"
 t "--explain names the line" sh -c "$P $scene --explain | grep -q 'quadric *on .*room.pbrt:$(grep -n '"sphere"' "$scene" | cut -d: -f1) '"
+t "--explain times paths: some take more than 0.02 us" sh -c "$P $scene --explain | awk '/^time: / { n++; good = \$2 > 0.02 && \$(NF - 7) > 0 } END { exit !(n == 1 && good) }'"
 t "--explain lists what is off" sh -c "$P $scene --explain | grep -q 'grid-medium *off'"
 t "--explain measures a path" sh -c "$P $scene --explain | grep -q '^time: [0-9.]* us per path'"
 t "--debug-path tells the path" sh -c "test \$($P $scene --debug-path 30,20,1 | wc -l) -ge 2"

@@ -175,7 +175,7 @@ static void test_pool2(void **state)
 /* d/dh L(θ + h·d) at 0 against g·d for random directions d of all parameters and inputs. */
 static void check_network(int net, enum ggn_preset preset, int side, int images)
 {
-    struct ggn_hyper hyper = {preset, side, side + 5, 2, 2, 3, 4};
+    struct ggn_hyper hyper = {preset, side, side + 5, 2, 2, 3, 4, 0};
     struct base_err err = {0};
 
     if (ggn_network_build(&graph, net, &hyper, &err))

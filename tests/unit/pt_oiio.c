@@ -130,7 +130,7 @@ static void channel_row(void *data, int y, float *const *rows)
 static void exr_channels(void **state)
 {
     (void)state;
-    char path[64], names[65][4];
+    char path[64], names[65][16];
     const char *list[65];
     for (int i = 0; i < 65; i++) { /* not in the order in which the library sorts them */
         snprintf(names[i], sizeof names[i], "c%02d", (i * 7 + 3) % 65);
