@@ -174,7 +174,7 @@ static double half_scale(const struct seq_record *r)
 {
     const double n = r->spp, h = r->half_spp;
 
-    return h > 0 && h < n ? 2 * sqrt(h * (n - h)) / n : 0;
+    return 2 * sqrt(h * (n - h)) / n;
 }
 
 /* From the level's own halves. Where none are recorded, from those of the full level: their noise has another draw, the

@@ -42,8 +42,11 @@ int ggn_image8_read(const char *path, struct ggn_image8 *image, struct base_err 
     int is_float = 0, rc = library(path, &l, err);
     if (!rc)
         rc = l->read_display(path, image, &is_float, err);
-    if (rc || !is_float)
+    if (rc)
         return rc;
+    image->clipped = 0;
+    if (!is_float)
+        return 0;
     rc = l->read_linear(path, &linear, &is_float, err);
     if (!rc)
         rc = encode(path, &linear, image, err);

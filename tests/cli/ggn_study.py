@@ -43,7 +43,7 @@ def keep(section, text):
         (re.escape(GGN), "ggn"),
         (r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ", "TIME"),
         (r"\b(?!0{32})[0-9a-f]{32}\b", "HEX32"),
-        (r"(127\.0\.0\.1|0\.0\.0\.0):\d{2,}", r"\1:PORT"),
+        (r"(127\.0\.0\.1|0\.0\.0\.0)(:|, port )\d{2,}", r"\1\2PORT"),
         (r"/[0-9a-f]{19}/", "/HALF/"),
         (r"\.tmp-lull\d+-\d+\.", ".tmp."),
     ):
@@ -62,6 +62,9 @@ def keep_files(section, folder):
             if data[:4] == b"\x89PNG":
                 shown = whole.pixels(data)
                 keep(section, "%s: %s, checksum %08x\n" % (name, shown.split("\n")[0], zlib.crc32(shown.encode())))
+            elif name == "texts.json":
+                with open(os.path.join(whole.ROOT, "ggn", "study", "page", "texts.en.json"), "rb") as f:
+                    keep(section, name + (": those of the page\n" if f.read() == data else ": other texts\n"))
             elif not name.startswith("study.db"):
                 keep(section, "--- %s\n%s\n" % (name, data.decode()))
 
@@ -731,6 +734,64 @@ ggn("init", sequence, "--task=thresholds", "--views", os.path.join(recorded, "tr
 made = json.load(open(os.path.join(sequence, "study.json")))
 keep("sequence", json.dumps({**made, "id": ""}, indent=1) + "\n" + "\n".join(
     sorted(os.path.join(path, n)[len(sequence):] for path, _, names in os.walk(sequence) for n in names)))
+
+# --- what an init, a server and a store refuse ---
+def init_fails(name, *args):
+    r = ggn("init", os.path.join(TMP.name, name), *args)
+    check(r.returncode == 2 and not os.path.exists(os.path.join(TMP.name, name, "study.json")), "init refuses: " + name, r.stderr)
+
+
+init_fails("nothing", "--task=validation")
+init_fails("method", "--task=validation", "--method=2ifc", "--views", rooms[0])
+init_fails("recording", "--task=validation", "--views", os.path.join(recorded, "test", "three"))
+init_fails("twice", "--task=thresholds", "--views", levels, levels + "/")
+init_fails("named-badly", "--task=thresholds", "--views", view("a b", ["reference", "n-1", "n-2", "n-3"]))
+init_fails("others", "--task=validation", "--views", rooms[0], view("attic", ["reference", "lull", "other"], 24, 24))
+init_fails("fewer", "--task=validation", "--views", rooms[0], view("cellar", ["reference", "lull"], 24, 24))
+init_fails("alone", "--task=validation", "--views", view("loft", ["reference", "heavy"], 24, 24))
+init_fails("odd-name", "--task=validation", "--views", view("shed", ["reference", "a b"], 24, 24))
+init_fails("many-blocks", "--task=thresholds", "--views", (lambda f: (png(os.path.join(f, "reference.png"), 520, 512, lambda x, y: 7), f)[1])(view("tower", [])), "--block=8")
+os.makedirs(os.path.join(TMP.name, "unfinished"))
+with open(os.path.join(recorded, "test", "three", "manifest.json")) as f:
+    manifest = json.load(f)
+json.dump({**manifest, "blocks": []}, open(os.path.join(TMP.name, "unfinished", "manifest.json"), "w"))
+init_fails("no-blocks", "--task=thresholds", "--views", os.path.join(TMP.name, "unfinished"))
+json.dump(manifest, open(os.path.join(TMP.name, "unfinished", "manifest.json"), "w"))
+init_fails("no-files", "--task=thresholds", "--views", os.path.join(TMP.name, "unfinished"))
+mixed = view("mixed", ["n-300", "reference", "heavy", "n-20", "20", "x1000", "n-25", "notes", "n-2", "n-5000"], 16, 16)
+open(os.path.join(mixed, ".hidden-7.png"), "w").close()
+open(os.path.join(mixed, "plain"), "w").close()
+ggn("init", os.path.join(TMP.name, "chosen"), "--task", "thresholds", "--views", mixed, "--block", "16", "--spp-min", "2", "--spp-max", "5000", "--spacing", "0.5")
+keep_files("chosen", os.path.join(TMP.name, "chosen"))
+for name, token in (("short", "0" * 31 + "\n"), ("bare", "0" * 32), ("long", "0" * 33 + "\n"), ("capitals", "A" * 32 + "\n")):
+    with open(os.path.join(study, "token"), "w") as f:
+        f.write(token)
+    fails("serve: a token that is none: " + name, "not a token", "serve", study, "--listen", "0.0.0.0:0")
+os.remove(os.path.join(study, "token"))
+with open(os.path.join(TMP.name, "fresh", "study.db"), "w") as f:
+    f.write("garbage " * 100)
+fails("report: a store that is none", "file is not a database", "report", os.path.join(TMP.name, "fresh"))
+with open(os.path.join(copy, "study.json")) as f:
+    changed = {**json.load(f), "id": "0" * 32}
+json.dump(changed, open(os.path.join(copy, "study.json"), "w"))
+fails("report: people of another study", "belongs to another study", "report", copy)
+fails("export: onto a folder", "cannot write there", "export", study, "-o", TMP.name)
+with open(os.path.join(TMP.name, "no.json"), "w") as f:
+    f.write("{}")
+fails("import: no export", "not a file of", "import", study, os.path.join(TMP.name, "no.json"))
+os.environ["LULL_STUDY_PAGE"] = os.path.join(TMP.name, "none")
+fails("serve: a page that is none", "no index.html in it", "serve", study)
+os.environ["LULL_STUDY_PAGE"] = os.path.join(TMP.name, "named")
+with open(os.path.join(TMP.name, "named", "index.html"), "w") as f:
+    f.write("another page\n")
+server = Server(study)
+check(server.request("GET", "")[1] == b"another page\n", "serve: the page that is named")
+for size in (65536, 65537):
+    body = b'{"consent":false,"x":"%s"}' % (b"y" * (size - 24))
+    check((len(body), server.request("POST", "api/people", body)[0]) == (size, 400 if size == 65536 else 413), f"a body of {size} bytes")
+fails("serve: a port that is taken", "Address already in use", "serve", study, "--listen", server.authority)
+server.stop()
+del os.environ["LULL_STUDY_PAGE"]
 
 # --- as many people as there may be ---
 db = sqlite3.connect(os.path.join(settings, "study.db"))

@@ -343,6 +343,33 @@ static void datasets_are_told_word_by_word(void **state)
     transcript_end(&t, "data-sets");
 }
 
+/* Without a split every fifth scene is held out, or the second of two. */
+static void scenes_are_held_out(void **state)
+{
+    struct transcript t;
+    FILE *f = transcript_begin(&t);
+    char command[500], dir[128];
+    (void)state;
+    snprintf(dir, sizeof dir, "%s/scenes", root);
+    assert_int_equal(mkdir(dir, 0777), 0);
+    for (int n = 1; n <= 13; n++) {
+        struct ggn_chains set;
+        const struct ggn_chains_options o = {.dir = dir, .validation = n == 4 ? "s2" : NULL};
+        snprintf(command, sizeof command, "cp -r tests/data/recorded/test/three %s/s%02d && sed -i 's/\"scene\":.*/\"scene\": \"s%d\",/' %s/s%02d/manifest.json", dir, n, n - n / 6, dir, n);
+        assert_int_equal(system(command), 0);
+        assert_int_equal(ggn_chains_load(&set, &o, NULL), 0);
+        fprintf(f, "%d scenes:", set.n_scenes);
+        for (int i = 0; i < set.data.n; i++)
+            fprintf(f, " %s %s", set.data.views[i].manifest.scene, ggn_split_names[set.data.views[i].split]);
+        fputs("; of chains:", f);
+        for (int i = 0; i < set.n; i++)
+            fprintf(f, " %d", set.chains[i].scene);
+        fputc('\n', f);
+        ggn_chains_release(&set);
+    }
+    transcript_end(&t, "data-scenes");
+}
+
 /* --- chains, windows and what training sees of them --- */
 
 /* Two sums of codes, one with weights by place: a code elsewhere changes it. */
@@ -490,7 +517,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(probabilities), cmocka_unit_test(round_trip), cmocka_unit_test(a_view_is_listed_once), cmocka_unit_test(splits), cmocka_unit_test(split_folders),
                                        cmocka_unit_test(labels_are_told_word_by_word), cmocka_unit_test(thresholds_are_told_word_by_word),
-                                       cmocka_unit_test(datasets_are_told_word_by_word), cmocka_unit_test(chains_are_as_they_were),
+                                       cmocka_unit_test(datasets_are_told_word_by_word), cmocka_unit_test(chains_are_as_they_were), cmocka_unit_test(scenes_are_held_out),
                                        cmocka_unit_test(windows_are_as_they_were)};
     return cmocka_run_group_tests_name("data_labels", tests, setup, teardown);
 }

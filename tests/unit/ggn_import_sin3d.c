@@ -17,6 +17,7 @@
 #include "data/image.h"
 #include "data/rawls.h"
 #include "data/sin3d.h"
+#include "support/ggn_transcript.h"
 
 enum { SIDE = 16, BLOCK = 8, LEVELS = 5 };
 
@@ -313,11 +314,243 @@ static void real_sequence(void **state)
     seq_manifest_release(&m);
 }
 
+/* --- transcripts: what is read, and every line --- */
+
+static void put(const char *format, const char *name, const char *contents)
+{
+    char path[900];
+    snprintf(path, sizeof path, format, root, name);
+    FILE *f = fopen(path, "wb");
+    assert_non_null(f);
+    fputs(contents, f);
+    fclose(f);
+}
+
+/* Which names are levels of a view. */
+static void names_of_levels(FILE *f)
+{
+    static const char *const names[] = {"a_00020.png", "a_20.rawls", "a_20.PNG", "a_20.jpg", "_20.png", "b_7.png", "a20.png", "a_.png", "a_0.png", "a_000.png", "a_123456789.png",
+                                        "a_1234567890.png", "a_20", "a_20.png.bak", ".a_20.png", "a_2x.png", "a-b_c_20.png", "a_20.png.png"};
+    char dir[600], name[300];
+    for (size_t i = 0; i < sizeof names / sizeof names[0] + 3; i++) {
+        size_t more = i - sizeof names / sizeof names[0];
+        snprintf(dir, sizeof dir, "%s/name", root);
+        mkdir(dir, 0777);
+        if (i < sizeof names / sizeof names[0])
+            snprintf(name, sizeof name, "%s", names[i]);
+        else
+            snprintf(name, sizeof name, "%0*d_20.png", (int)more + GGN_VIEW_NAME - 2, 0);
+        put("%s/name/%s", name, "");
+        fprintf(f, "%s: %d\n", name, ggn_sin3d_is_view(dir));
+        shell("rm -r %s%s", dir, "");
+    }
+}
+
+static void tell_progress(void *data, const char *view, int done, int of)
+{
+    fprintf(data, "  %s %d of %d\n", view, done, of);
+}
+
+static void tell_import(FILE *f, const char *name, const char *dir, const char *out, const struct ggn_sin3d_options *o)
+{
+    struct base_err err = {0};
+    struct seq_manifest m;
+    struct ggn_labels l;
+    int labelled = -1;
+    fprintf(f, "%s: ", name);
+    if (ggn_sin3d_import_view(dir, out, o, &labelled, &err)) {
+        fprintf(f, "%s; %s\n", err.text, access(out, F_OK) == 0 ? "the folder is there" : "nothing is there");
+        return;
+    }
+    assert_int_equal(seq_manifest_read(out, &m, NULL), 0);
+    fprintf(f, "labelled %d; %s of %s by %s, %ux%u in %u, reference %u %d, levels", labelled, m.scene, m.source, m.renderer, m.width, m.height, m.block, m.reference_spp,
+            m.reference_independent);
+    for (uint32_t i = 0; i < m.n_levels; i++)
+        fprintf(f, " %u", m.levels[i]);
+    for (uint32_t i = 0; i < m.n_blocks; i++)
+        fprintf(f, "; %u %s %u,%u..%u,%u", m.blocks[i].id, m.blocks[i].file, m.blocks[i].x0, m.blocks[i].y0, m.blocks[i].x1, m.blocks[i].y1);
+    fputc('\n', f);
+    seq_manifest_release(&m);
+    if (!labelled)
+        return;
+    assert_int_equal(ggn_labels_read(out, &l, NULL), 0);
+    fprintf(f, "  %s, %s, cap %g, spread %g:", l.source, l.detail, l.cap, l.spread);
+    for (uint32_t i = 0; i < l.n; i++)
+        fprintf(f, " %u %g %d", l.labels[i].id, l.labels[i].threshold, l.labels[i].censored);
+    fputc('\n', f);
+    ggn_labels_release(&l);
+}
+
+static void twice(const char *dir) { shell("cp %s/p3d_toy-view2_00060.png %s/p3d_toy-view2_060.png", dir, dir); }
+static void other_kind(const char *dir) { shell("cp %s/p3d_toy-view2_00060.png %s/p3d_toy-view2_00120.rawls", dir, dir); }
+static void second_gone(const char *dir) { shell("rm %s/*_00040.png%s", dir, ""); }
+static void early(const char *dir) { shell("mv %s/p3d_toy-view2_00080.png %s/p3d_toy-view2_00070.png", dir, dir); }
+static void keep(const char *dir) { (void)dir; }
+
+static void views_are_told_word_by_word(void **state)
+{
+    static const struct {
+        const char *name, *thresholds;
+        void (*spoil)(const char *dir);
+        int block, gaps;
+    } cases[] = {{"whole", "p3d_toy-view2;1;2;3;4\np3d_toy-view2_part6;40;99.5;100;101\n", keep, BLOCK, 0}, {"named", "other;1\np3d_toy-view2;1;2;3;4\nnamed;5;6;7;8", keep, BLOCK, 0},
+                 {"folder", "x;1\nfolder;5;6;7;8", keep, BLOCK, 0}, {"nobody", "x;1", keep, BLOCK, 0}, {"few", "few;5;6;7", keep, BLOCK, 0}, {"large", "large;7", keep, SIDE, 0},
+                 {"odd5", "odd5;1", keep, 5, 0}, {"drop", NULL, drop_level, BLOCK, 0}, {"second", NULL, second_gone, BLOCK, 0}, {"early", NULL, early, BLOCK, 0}, {"gaps", NULL, early, BLOCK, 1},
+                 {"mix", NULL, mix_sizes, BLOCK, 0}, {"one", NULL, one_level, BLOCK, 0}, {"stranger2", NULL, stranger, BLOCK, 0}, {"twice", NULL, twice, BLOCK, 0},
+                 {"kind", NULL, other_kind, BLOCK, 0}};
+    struct transcript t;
+    FILE *f = transcript_begin(&t);
+    char out[700];
+    (void)state;
+    names_of_levels(f);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        struct ggn_sin3d_options o = {.block = cases[i].block, .allow_gaps = cases[i].gaps, .progress = i == 0 ? tell_progress : NULL, .data = f};
+        struct ggn_thresholds thresholds = {0};
+        char csv[200];
+        const char *dir = make_view(cases[i].name);
+        cases[i].spoil(dir);
+        if (cases[i].thresholds) {
+            snprintf(csv, sizeof csv, "%s", cases[i].thresholds);
+            assert_int_equal(ggn_thresholds_parse_csv("t.csv", csv, &thresholds, NULL), 0);
+            o.thresholds = &thresholds;
+        }
+        snprintf(out, sizeof out, "%s/%s-out", root, cases[i].name);
+        tell_import(f, cases[i].name, dir, out, &o);
+        if (i == 0) { /* and once more, with other options */
+            tell_import(f, "again", dir, out, &o);
+            tell_import(f, "in larger blocks", dir, out, &(struct ggn_sin3d_options){.block = SIDE});
+            snprintf(out, sizeof out, "%s/none/x", root);
+            tell_import(f, "into no folder", dir, out, &o);
+            tell_import(f, "nothing", out, dir, &o);
+        }
+        ggn_thresholds_release(&thresholds);
+    }
+    transcript_hide(&t, root, "ROOT");
+    transcript_end(&t, "data-sin3d");
+}
+
+/* A line for each run of equal answers. */
+static void tell_rawls(FILE *f, const char *what, long value, const char *file, size_t n, char last[256])
+{
+    struct ggn_imagef image;
+    struct base_err err = {0};
+    int rc = ggn_rawls_parse("x", file, n, &image, &err);
+    char text[256] = "";
+    size_t used = 0;
+    if (rc)
+        snprintf(text, sizeof text, "%.200s", err.text);
+    for (int i = 0; i < 12 && !rc && i < 3 * image.width * image.height; i++)
+        used += (size_t)snprintf(text + used, sizeof text - used, " %g", (double)image.data[i]);
+    if (!rc)
+        ggn_imagef_release(&image);
+    if (strcmp(text, last) != 0)
+        fprintf(f, "%s %ld: %s\n", what, value, text);
+    strcpy(last, text);
+}
+
+static void rawls_are_told_word_by_word(void **state)
+{
+    static const uint32_t sizes[][3] = {{2, 2, 1}, {2, 2, 3}, {2, 2, 2}, {2, 2, 4}, {2, 2, 0}, {0, 2, 3}, {2, 0, 3}, {32768, 1, 1}, {32769, 1, 1}, {1, 32768, 1}, {1, 32769, 1}, {32768, 4096, 3},
+                                        {32768, 4097, 3}, {3, 1, 3}, {1, 4, 3}};
+    float v[12] = {0, 0.5f, 1, 2, -1, 3.25f, 7, 8, 9, 10, 11, 1e-3f};
+    char file[512], last[256] = "";
+    struct transcript t;
+    FILE *f = transcript_begin(&t);
+    (void)state;
+    size_t n = make_rawls(file, 2, 2, 3, v);
+    for (size_t i = 0; i <= n; i++)
+        tell_rawls(f, "bytes", (long)i, file, i, last);
+    for (size_t i = 0; i < n; i++) {
+        file[i] ^= 0x20;
+        tell_rawls(f, "otherwise at", (long)i, file, n, last);
+        file[i] ^= 0x20;
+    }
+    for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
+        n = make_rawls(file, 2, 2, 3, v);
+        memcpy(file + 8, sizes[i], 12);
+        last[0] = '\0';
+        tell_rawls(f, "size", (long)i, file, n, last);
+    }
+    for (int i = 0; i < 12; i++) {
+        float kept = v[i];
+        v[i] = i % 2 ? INFINITY : NAN;
+        n = make_rawls(file, 2, 2, 3, v);
+        tell_rawls(f, "value", i, file, n, last);
+        v[i] = kept;
+    }
+    transcript_end(&t, "data-rawls");
+}
+
+/* --- pictures of other programs --- */
+
+static void print_image(FILE *f, const char *name)
+{
+    struct ggn_image8 image;
+    struct ggn_imagef channel;
+    struct base_err err = {0};
+    char path[600];
+    snprintf(path, sizeof path, "%s/%s", root, name);
+    fprintf(f, "%s: ", name);
+    if (ggn_image8_read(path, &image, &err)) {
+        fprintf(f, "%s\n", err.text);
+    } else {
+        fprintf(f, "%dx%d, %zu clipped:", image.width, image.height, image.clipped);
+        for (int i = 0; i < 3 * image.width * image.height && i < 18; i++)
+            fprintf(f, " %d", image.data[i]);
+        fputc('\n', f);
+        ggn_image8_release(&image);
+    }
+    if (!strstr(name, ".exr"))
+        return;
+    if (ggn_imagef_read_channel(path, "lull.spp", &channel, &err)) {
+        fprintf(f, "  %s\n", err.text);
+    } else {
+        fprintf(f, "  %dx%d, %d channel:", channel.width, channel.height, channel.channels);
+        for (int i = 0; i < channel.width * channel.height; i++)
+            fprintf(f, " %g", (double)channel.data[i]);
+        fputc('\n', f);
+        ggn_imagef_release(&channel);
+    }
+}
+
+static void pictures_of_others(void **state)
+{
+    static const char *const names[] = {"none.png", "grey.png", "grey-alpha.png", "rgba.png", "mixed.exr", "xyz.exr", "two.exr", "parts.exr", "half.exr", "folder.png"};
+    struct transcript t;
+    FILE *f = transcript_begin(&t);
+    char path[600], command[2000];
+    struct base_err err = {0};
+    struct ggn_image8 image;
+    (void)state;
+    snprintf(command, sizeof command,
+             "cd %s && mkdir folder.png && oiiotool --pattern constant:color=0.3 2x1 1 -d uint8 -o grey.png --pattern constant:color=0.3,0.5 2x1 2 --chnames Y,A -d uint8 -o grey-alpha.png "
+             "--pattern constant:color=0.1,0.2,0.3,0.5 2x1 4 -d uint8 -o rgba.png --pattern constant:color=9,0.2,0.3,0.4,8 2x1 5 --chnames AA,G,B,R,Z -d float -o mixed.exr "
+             "--pattern constant:color=0.1,0.2,-0.3,0.4 2x1 4 --chnames x1,x2,x3,x4 -d float -o xyz.exr --pattern constant:color=0.7,0.2 2x1 2 --chnames a1,lull.spp -d float -o two.exr "
+             "--pattern constant:color=0.25,2,1 3x2 3 -d half -o half.exr --pattern constant:color=7,5 3x2 2 --chnames other,lull.spp -d float --siappend -o parts.exr >/dev/null 2>&1", root);
+    if (system(command) != 0)
+        fail_msg("oiiotool failed");
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++)
+        print_image(f, names[i]);
+    transcript_hide(&t, root, "ROOT");
+    transcript_end(&t, "data-pictures");
+    /* the library's words are its own: each line begins with the file, once */
+    for (int i = 0; i < 2; i++) {
+        put("%s/%s", i ? "garbage.webp" : "garbage.jpg", "garbage garbage garbage garbage garbage\n");
+        snprintf(path, sizeof path, "%s/garbage.%s", root, i ? "webp" : "jpg");
+        assert_int_equal(ggn_image8_read(path, &image, &err), BASE_EINVAL);
+        assert_int_equal(strncmp(err.text, path, strlen(path)), 0);
+        assert_null(strchr(err.text, '\n'));
+        if (i ? strstr(err.text + 1, path) != NULL : strncmp(err.text + strlen(path), ": ", 2) != 0)
+            fail_msg("%s", err.text);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(layout), cmocka_unit_test(resume), cmocka_unit_test(bad_layouts), cmocka_unit_test(scene_names),
         cmocka_unit_test(rawls), cmocka_unit_test(rawls_layout), cmocka_unit_test(real_sequence),
+        cmocka_unit_test(views_are_told_word_by_word), cmocka_unit_test(rawls_are_told_word_by_word), cmocka_unit_test(pictures_of_others),
     };
     return cmocka_run_group_tests_name("import_sin3d", tests, setup, teardown);
 }

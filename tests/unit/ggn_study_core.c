@@ -348,6 +348,44 @@ static void addresses_are_numbers(void **state)
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
         if (ggn_study_address_parse(bad[i], &a, &err) != BASE_EINVAL)
             fail_msg("'%s' was taken", bad[i]);
+    static const char *const told[][2] = {
+        {"localhost", "--listen localhost: not an address in numbers, like 127.0.0.1 or [::1]"},
+        {"[::1", "--listen [::1: expected ADDRESS, ADDRESS:PORT or [ADDRESS6]:PORT"},
+        {"127.0.0.1:65536", "--listen 127.0.0.1:65536: a port is 0 … 65535"},
+        {"127.0.0.1:1x", "--listen 127.0.0.1:1x: a port is 0 … 65535"}};
+    for (size_t i = 0; i < sizeof told / sizeof told[0]; i++) {
+        assert_int_equal(ggn_study_address_parse(told[i][0], &a, &err), BASE_EINVAL);
+        assert_string_equal(err.text, told[i][1]);
+    }
+    assert_int_equal(ggn_study_address_parse("127.0.0.1:65535", &a, &err), 0);
+    assert_int_equal(a.port, 65535);
+    assert_int_equal(ggn_study_address_parse("126.0.0.1", &a, &err), 0);
+    assert_int_equal(a.loopback, 0);
+}
+
+/* Hex digits that nobody guesses, and the same only when all of them are. */
+static void tokens(void **state)
+{
+    char a[33], b[33];
+    struct base_err err = {0};
+    int seen[16] = {0}, different = 0;
+    (void)state;
+    for (int i = 0; i < 8; i++) {
+        assert_int_equal(ggn_study_token(a, 32, &err) | ggn_study_token(b, 32, &err), 0);
+        assert_true(strlen(a) == 32 && strspn(a, "0123456789abcdef") == 32 && !ggn_study_token_equal(a, b));
+        for (int k = 0; k < 32; k++)
+            seen[strchr("0123456789abcdef", a[k]) - "0123456789abcdef"]++;
+        for (int k = 0; k < 32; k += 2)
+            different += a[k] != a[k + 1];
+    }
+    assert_true(different > 64); /* of 128 pairs; the two halves of a byte are two digits */
+    for (int i = 0; i < 16; i++)
+        assert_true(seen[i] > 0); /* missing with a chance of 1e-6 */
+    assert_int_equal(ggn_study_token(a, 7, &err), 0);
+    assert_int_equal(strlen(a), 7);
+    assert_true(ggn_study_token_equal("abc", "abc") && ggn_study_token_equal("", ""));
+    assert_true(!ggn_study_token_equal("abc", "abd") && !ggn_study_token_equal("abc", "bbc") && !ggn_study_token_equal("abc", "ab") && !ggn_study_token_equal("ab", "abc"));
+    assert_true(!ggn_study_token_equal("ab", "ba")); /* differences do not cancel */
 }
 
 /* --- transcripts: every answer, every line, every slot --- */
@@ -721,6 +759,7 @@ int main(void)
         cmocka_unit_test(a_deleted_person_leaves_no_bytes),
         cmocka_unit_test(what_is_exported_can_be_imported),
         cmocka_unit_test(addresses_are_numbers),
+        cmocka_unit_test(tokens),
         cmocka_unit_test(plans_are_as_they_were),
         cmocka_unit_test(studies_are_refused_in_these_words),
         cmocka_unit_test(trials_are_answered_word_by_word),

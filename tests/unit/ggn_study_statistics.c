@@ -23,6 +23,14 @@ static void quantiles_are_those_of_the_tables(void **state)
     NEAR(ggn_study_t975(10), 2.2281, 1e-4);
     NEAR(ggn_study_t975(40), 2.0211, 2e-3);
     NEAR(ggn_study_t975(1000), 1.9623, 1e-3);
+    NEAR(ggn_study_t975(2), 4.3027, 1e-4);
+    NEAR(ggn_study_t975(30), 2.0423, 1e-4);
+    NEAR(ggn_study_t975(31), 1.959964 + (pow(1.959964, 3) + 1.959964) / 124.0, 1e-5);
+    NEAR(ggn_study_normal(-1.0), 0.158655254, 1e-9);
+    NEAR(ggn_study_normal_quantile(0.001), -3.090232306, 1e-8);
+    NEAR(ggn_study_normal_quantile(0.0), -7.941345326, 1e-6); /* of 1e-15 */
+    NEAR(ggn_study_normal_quantile(1.0), 7.941345326, 0.1); /* 1 - 1e-15 is rounded */
+    NEAR(ggn_study_p_correct(5.0, 6.0, 0.5), 0.988624934, 1e-8); /* half and half of 0.977249868 */
 }
 
 static void wilson_is_wilson(void **state)
@@ -35,6 +43,12 @@ static void wilson_is_wilson(void **state)
     ggn_study_wilson(0, 10, &lo, &hi);
     NEAR(lo, 0.0, 0.0);
     NEAR(hi, 0.2775, 5e-4);
+    ggn_study_wilson(10, 10, &lo, &hi);
+    NEAR(lo, 0.7225, 5e-4);
+    NEAR(hi, 1.0, 0.0);
+    ggn_study_wilson(1, 10, &lo, &hi);
+    NEAR(lo, 0.0179, 5e-4);
+    NEAR(hi, 0.4042, 5e-4);
     ggn_study_wilson(50, 100, &lo, &hi);
     NEAR(lo + hi, 1.0, 1e-12);
 }
@@ -122,6 +136,43 @@ static double joint_given(int b, int s) /* a block's spread, given the person's 
     return b == s ? 0.8 : abs(b - s) == 1 ? 0.2 / neighbours : 0;
 }
 
+/* Where a distribution over cells with these n + 1 edges reaches q, evenly spread within a cell. */
+static double reached(const double *w, const double *edge, int n, double q)
+{
+    double sum = 0, below = 0;
+    for (int i = 0; i < n; i++)
+        sum += w[i];
+    for (int i = 0; i < n; i++) {
+        if (below + w[i] / sum >= q)
+            return edge[i] + (edge[i + 1] - edge[i]) * (q - below) * sum / w[i];
+        below += w[i] / sum;
+    }
+    return edge[n];
+}
+
+/* Edges half the way between neighbours, in octaves; the outer cells are as wide on either side of their spread. */
+static void spread_edges(double edge[SPREADS + 1])
+{
+    for (int s = 1; s < SPREADS; s++)
+        edge[s] = 0.5 * (log2(joint_spread[s - 1]) + log2(joint_spread[s]));
+    edge[0] = 2 * log2(joint_spread[0]) - edge[1];
+    edge[SPREADS] = 2 * log2(joint_spread[SPREADS - 1]) - edge[SPREADS - 1];
+}
+
+static void assert_quantiles(const struct ggn_study_estimate *e, const double *of_t, int n, const double of_s[SPREADS])
+{
+    static const double q[3] = {0.5, 0.025, 0.975};
+    const double t[3] = {e->t, e->lo, e->hi}, s[3] = {e->spread, e->spread_lo, e->spread_hi};
+    double edge[GRID + 1], edge_s[SPREADS + 1];
+    for (int i = 0; i <= n; i++)
+        edge[i] = 2.0 + (i - 0.5) / 12.0;
+    spread_edges(edge_s);
+    for (int k = 0; k < 3; k++) {
+        NEAR(t[k], reached(of_t, edge, n, q[k]), 2e-3); /* as for the standard error */
+        NEAR(log2(s[k]), reached(of_s, edge_s, SPREADS, q[k]), 5e-3);
+    }
+}
+
 static void estimates_are_those_of_the_joint_posterior(void **state)
 {
     static const double threshold[JOINT] = {5.5, 7, 8.2};
@@ -149,15 +200,17 @@ static void estimates_are_those_of_the_joint_posterior(void **state)
     }
     assert_int_equal(ggn_study_psychometric(c, JOINT, NULL), 0);
     for (int b = 0; b < JOINT; b++) {
-        double w[GRID] = {0}, sum = 0, mean = 0, var = 0, below = 0;
+        double w[GRID] = {0}, of_s[SPREADS] = {0}, sum = 0, mean = 0, var = 0, below = 0;
         for (int i = 0; i < n; i++)
             for (int s = 0; s < SPREADS; s++)
                 for (int h = 0; h < HABITS; h++) {
                     double others = joint_prior(s, h), mine = 0;
                     for (int k = 0; k < JOINT; k++)
                         others *= k == b ? 1 : evidence[k][s][h];
-                    for (int own = 0; own < SPREADS; own++)
+                    for (int own = 0; own < SPREADS; own++) {
                         mine += joint_given(own, s) * likelihood[b][i][own][h];
+                        of_s[own] += others * joint_given(own, s) * likelihood[b][i][own][h];
+                    }
                     w[i] += others * mine;
                 }
         for (int i = 0; i < n; i++)
@@ -169,7 +222,7 @@ static void estimates_are_those_of_the_joint_posterior(void **state)
             below += 2.0 + (i + 0.5) / 12.0 <= c[b].estimate.t ? w[i] / sum : 0;
         }
         NEAR(c[b].estimate.se, sqrt(var), 1e-3); /* the product's d comes from a table */
-        assert_true(c[b].estimate.lo < c[b].estimate.t && c[b].estimate.t < c[b].estimate.hi);
+        assert_quantiles(&c[b].estimate, w, n, of_s);
         assert_true(below <= 0.5 && below > 0.5 - 1.05 * w[(int)((c[b].estimate.t - 2.0) * 12 + 0.5)] / sum); /* the median's cell */
     }
 }
