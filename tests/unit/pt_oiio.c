@@ -126,6 +126,28 @@ static void channel_row(void *data, int y, float *const *rows)
             rows[c][x] = (float)(1000 * c + 10 * y + x);
 }
 
+static void check_exr_header(exr_context_t file, int count)
+{
+    const exr_attr_chlist_t *channels;
+    exr_compression_t compression;
+    exr_lineorder_t order;
+    exr_attr_v2f_t centre;
+    float aspect, width;
+    assert_int_equal(exr_get_channels(file, 0, &channels), EXR_ERR_SUCCESS);
+    assert_int_equal(channels->num_channels, count);
+    for (int i = 0; i < count; i++) {
+        const exr_attr_chlist_entry_t *e = &channels->entries[i];
+        assert_true(e->pixel_type == EXR_PIXEL_FLOAT && e->p_linear == EXR_PERCEPTUALLY_LINEAR && e->x_sampling == 1 && e->y_sampling == 1);
+    }
+    assert_int_equal(exr_get_compression(file, 0, &compression), EXR_ERR_SUCCESS);
+    assert_int_equal(exr_get_lineorder(file, 0, &order), EXR_ERR_SUCCESS);
+    assert_int_equal(exr_get_pixel_aspect_ratio(file, 0, &aspect), EXR_ERR_SUCCESS);
+    assert_int_equal(exr_get_screen_window_width(file, 0, &width), EXR_ERR_SUCCESS);
+    assert_int_equal(exr_get_screen_window_center(file, 0, &centre), EXR_ERR_SUCCESS);
+    assert_true(compression == EXR_COMPRESSION_ZIP && order == EXR_LINEORDER_INCREASING_Y && aspect == 1 && width == 1);
+    assert_true(centre.x == 0 && centre.y == 0);
+}
+
 /* As many channels as are promised; the picture's own window, not what is stored, gives its size; numbers and words beside it. */
 static void exr_channels(void **state)
 {
@@ -163,6 +185,7 @@ static void exr_channels(void **state)
         assert_true(length == 9 && strcmp(words, "two words") == 0);
         assert_int_equal(exr_attr_get_double(file, 0, "lull:number", &number), EXR_ERR_SUCCESS);
         assert_true(number == 2.5);
+        check_exr_header(file, count);
         exr_finish(&file);
         struct pt_oiio_image read;
         char renamed[80];
@@ -208,6 +231,8 @@ static size_t letters(const char *words, char *out)
         }
         out[n++] = '\n';
     }
+    for (size_t i = (size_t)(3 * canvas.width * canvas.height); i < sizeof rgb; i++)
+        assert_int_equal(rgb[i], 0);
     return n;
 }
 
