@@ -53,7 +53,7 @@ static inline void pt_texture_fetch(const struct pt_scene *scene, int32_t number
     x = (x - floorf(x)) * (float)image->width - 0.5f; /* as if it repeated: else something else is fetched in vain */
     y = (y - floorf(y)) * (float)image->height - 0.5f;
     size_t size = image->type == PT_PIXEL_FLOAT ? 4 : 1, row = (size_t)image->width * (size_t)image->channels * size;
-    if (!(x >= 0.0f && y >= 0.0f && x < (float)image->width && y < (float)image->height - 1.0f))
+    if (!(x >= 0.0f && y >= 0.0f && y < (float)image->height - 1.0f))
         return;
     const char *texel = (const char *)image->pixels + (size_t)y * row + (size_t)x * (size_t)image->channels * size;
     __builtin_prefetch(texel);

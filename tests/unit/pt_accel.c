@@ -5,6 +5,7 @@
 
 #include <cmocka.h>
 #include <math.h>
+#include <string.h>
 
 #include "geom/accel.h"
 #include "geom/quadric.h"
@@ -306,13 +307,52 @@ static void matrices_invert(void **state)
     assert_int_equal(pt_mat34_invert(&flat, &inv), 0);
 }
 
+/* Blocks are zeroed, apart and at multiples of 16; large ones go by themselves and do not close the one being filled. */
+static void arenas_give_room(void **state)
+{
+    (void)state;
+    struct pt_arena arena = {0};
+    unsigned char *at[200], *last = NULL;
+    size_t sizes[200], total = 0;
+    assert_null(pt_arena_alloc(&arena, 0, 8));
+    assert_null(pt_arena_alloc(&arena, 8, 0));
+    assert_null(pt_arena_alloc(&arena, SIZE_MAX / 4, 8));
+    assert_null(pt_arena_alloc(&arena, SIZE_MAX / 16 + 1, 8));
+    assert_int_equal(arena.bytes, 0);
+    for (int i = 0; i < 200; i++) {
+        int large = i % 50 == 7;
+        sizes[i] = large ? (1u << 18) + 1 + (size_t)i : (size_t)(i * i % 4001 + 1);
+        at[i] = pt_arena_alloc(&arena, sizes[i], 1);
+        assert_non_null(at[i]);
+        assert_int_equal((uintptr_t)at[i] % 16, 0);
+        for (size_t k = 0; k < sizes[i]; k++)
+            assert_int_equal(at[i][k], 0);
+        memset(at[i], 1 + i, sizes[i]);
+        size_t rounded = (sizes[i] + 15) / 16 * 16;
+        total += rounded;
+        assert_int_equal(arena.bytes, total);
+        if (!large && i > 0 && i < 60) /* 60 small ones fit one block of 2^18 */
+            assert_ptr_equal(at[i], last);
+        last = large ? last : at[i] + rounded;
+    }
+    for (int i = 0; i < 200; i++)
+        for (size_t k = 0; k < sizes[i]; k++)
+            assert_int_equal(at[i][k], (unsigned char)(1 + i));
+    char *copy = pt_arena_strndup(&arena, "abcdef", 4);
+    assert_string_equal(copy, "abcd");
+    unsigned char *whole = pt_arena_alloc(&arena, (1u << 18) / 8, 8);
+    memset(whole, 7, 1u << 18);
+    pt_arena_release(&arena);
+    assert_true(arena.bytes == 0 && !arena.chunks);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(triangles_have_right_hand_normals), cmocka_unit_test(empty_scene_has_no_hits),
         cmocka_unit_test(quadrics), cmocka_unit_test(quadric_surfaces), cmocka_unit_test(instances),
         cmocka_unit_test(meshes_are_watertight), cmocka_unit_test(many_rays_are_as_single_ones),
-        cmocka_unit_test(matrices_invert),
+        cmocka_unit_test(matrices_invert), cmocka_unit_test(arenas_give_room),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

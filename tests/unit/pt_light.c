@@ -35,6 +35,55 @@ static void alias_table_keeps_probabilities(void **state)
         assert_true(fabs(p[i] - weights[i] / 7.0) < 1e-6);
 }
 
+/* Any weights: what is kept and what is passed on add up, and nothing without weight is ever chosen. */
+static void alias_tables_of_any_weights(void **state)
+{
+    (void)state;
+    enum { N = 97 };
+    struct pt_rng rng = pt_rng_make(9);
+    for (int round = 0; round < 300; round++) {
+        double weights[N], sum = 0.0, p[N] = {0};
+        float q[N];
+        int32_t alias[N], work[N], n = 1 + round % N;
+        for (int i = 0; i < n; i++) {
+            float u = pt_rng_float(&rng);
+            weights[i] = round % 3 == 0 ? 1.0 : i > 0 && u < 0.2f ? 0.0 : pow(10.0, 6.0 * (double)u - 3.0);
+            sum += weights[i];
+        }
+        pt_alias_build(weights, n, q, alias, work);
+        for (int i = 0; i < n; i++) {
+            assert_true(q[i] >= 0.0f && q[i] <= 1.0f && alias[i] >= 0 && alias[i] < n);
+            assert_true(weights[alias[i]] > 0.0 && (weights[i] > 0.0 || q[i] == 0.0f));
+            p[i] += (double)q[i] / n;
+            p[alias[i]] += (1.0 - (double)q[i]) / n;
+        }
+        for (int i = 0; i < n; i++)
+            if (!(fabs(p[i] - weights[i] / sum) < 1e-5))
+                fail_msg("round %d: %d of %d has %g instead of %g", round, i, (int)n, p[i], weights[i] / sum);
+    }
+}
+
+/* Lamps without area are all that there is: each is as likely as the others, and none lights anything. */
+static void lamps_without_power(void **state)
+{
+    (void)state;
+    struct pt_scene scene;
+    const struct pt_receiver at = {{0, 0, -3}, {0, 0, 1}, PT_RECEIVER_SURFACE};
+    test_scene_begin(&scene);
+    int32_t black = test_add_diffuse(&scene, v3_splat(0.0f));
+    for (int i = 0; i < 2; i++)
+        test_add_area_light(&scene, test_add_quad(&scene, black, v3((float)i, 0, 1), v3(0, 2, 0), v3(0, 1, 0)), v3(1, 2, 3), 0);
+    test_scene_finish(&scene);
+    assert_int_equal(scene.emitter_count, 4);
+    assert_null(scene.light_tree);
+    for (int i = 0; i < 4; i++) {
+        struct pt_light_sample s;
+        assert_true(scene.emitters[i].pmf == 0.25f && scene.emitters[i].alias_q == 1.0f);
+        assert_int_equal(pt_light_sample(PT_FX_ALL, &scene, &at, 0.25f * (float)i, 0.3f, 0.4f, &s), 0);
+    }
+    test_scene_end(&scene);
+}
+
 /* Density of a direction by asking what it hits, as the kernel does for BSDF sampling. */
 static float pdf_of(const struct pt_scene *scene, const struct pt_receiver *from, pt_vec3 wi)
 {
@@ -288,7 +337,8 @@ static void tables_are_as_fine_as_the_image_asks(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(alias_table_keeps_probabilities), cmocka_unit_test(quads),     cmocka_unit_test(sphere_outside),
+        cmocka_unit_test(alias_table_keeps_probabilities), cmocka_unit_test(alias_tables_of_any_weights), cmocka_unit_test(lamps_without_power),
+        cmocka_unit_test(quads),     cmocka_unit_test(sphere_outside),
         cmocka_unit_test(sphere_inside),                   cmocka_unit_test(ellipsoid), cmocka_unit_test(cylinder),
         cmocka_unit_test(disk),                            cmocka_unit_test(latlong),   cmocka_unit_test(equal_area),
         cmocka_unit_test(portal_of_an_image),              cmocka_unit_test(portal_of_a_constant),

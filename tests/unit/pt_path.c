@@ -9,8 +9,15 @@
 #include <stdio.h>
 #include <string.h>
 
+/* What is fetched ahead changes no picture: it is written down here, where the headers are compiled with this instead. */
+static const void *fetched[64];
+static int fetched_count;
+static void note_fetch(const void *address) { fetched[fetched_count++ % 64] = address; }
+#define __builtin_prefetch(address) note_fetch(address)
+
 #include "geom/accel.h"
 #include "integ/kernel_sets.h"
+#include "integ/run.h"
 #include "integ/trace.h"
 #include "shade/bsdf.h"
 #include "shade/medium.h"
@@ -246,11 +253,87 @@ static void trace_says_what_it_is_told(void **state)
         assert_int_equal(trace.met[i], i == PT_BSDF_CONDUCTOR || i == PT_BSDF_THIN_DIELECTRIC || i == PT_MET_MEDIUM);
 }
 
+/* The upper left of the four texels that a bilinear lookup reads and the one below it, or nothing where they wrap. */
+static void texels_are_fetched_that_are_read(void **state)
+{
+    (void)state;
+    enum { W = 5, H = 4 };
+    static const float floats[W * H * 4];
+    static const uint8_t bytes[W * H * 4];
+    for (int k = 0; k < 6; k++) {
+        struct pt_image_map image = {W, H, k % 3 == 0 ? 1 : k % 3 + 2, k < 3 ? PT_PIXEL_FLOAT : PT_PIXEL_U8_SRGB, 1,
+                                     k < 3 ? (const void *)floats : (const void *)bytes};
+        struct pt_texture t[2] = {{.kind = PT_TEXTURE_CHECKERBOARD},
+                                  {.kind = PT_TEXTURE_IMAGE, .scale = 1, .su = 2, .sv = -3, .du = 0.125f, .dv = 0.5f}};
+        struct pt_scene scene = {.images = &image, .textures = t, .image_count = 1, .texture_count = 2};
+        size_t texel = (size_t)image.channels * (k < 3 ? sizeof(float) : 1);
+        int met = 0;
+        for (int i = 0; i < 400; i++) {
+            float u = -1.0f + 0.1037f * (float)(i % 20), v = -0.8f + 0.0871f * (float)(i / 20);
+            double s = 2 * (double)u + 0.125, w = 1 - (-3 * (double)v + 0.5);
+            double x = floor((s - floor(s)) * W - 0.5), y = floor((w - floor(w)) * H - 0.5);
+            fetched_count = 0;
+            pt_texture_fetch(&scene, 1, u, v);
+            assert_int_equal(fetched_count, 0);
+            pt_texture_fetch(&scene, 2, u, v);
+            if (x < 0 || y < 0 || y >= H - 1) {
+                assert_int_equal(fetched_count, 0);
+                continue;
+            }
+            const char *first = (const char *)image.pixels + ((size_t)y * W + (size_t)x) * texel;
+            assert_int_equal(fetched_count, 2);
+            assert_ptr_equal(fetched[0], first);
+            assert_ptr_equal(fetched[1], first + W * texel);
+            met++;
+        }
+        assert_in_range(met, 100, 380);
+    }
+}
+
+/* Of each path that has met a mesh: its indices, then its corners, then its texels; of small scenes nothing. */
+static void hits_are_fetched_in_waves(void **state)
+{
+    (void)state;
+    static const float texels[4 * 4];
+    static const uint32_t twice[2][6] = {{0, 1, 2, 0, 2, 3}, {1, 2, 3, 1, 3, 0}};
+    static const float corners[12] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0};
+    struct pt_scene scene;
+    struct pt_path paths[4], *live[4];
+    test_scene_begin(&scene);
+    int32_t plain = test_add_diffuse(&scene, v3_splat(0.5f)), textured = test_add_diffuse(&scene, v3_splat(0.5f));
+    scene.images[scene.image_count++] = (struct pt_image_map){4, 4, 1, PT_PIXEL_FLOAT, 1, texels};
+    scene.textures[scene.texture_count++] = (struct pt_texture){.kind = PT_TEXTURE_IMAGE, .scale = 1, .su = 1, .sv = 1};
+    scene.materials[textured].reflectance.texture = 1;
+    int32_t a = test_add_mesh(&scene, plain, corners, 4, twice[0], 2), b = test_add_mesh(&scene, textured, corners, 4, twice[1], 2);
+    int32_t ball = test_add_sphere(&scene, textured, v3(0, 0, 0), 1);
+    const int32_t met[4] = {b, -1, ball, a};
+    for (int i = 0; i < 4; i++) {
+        live[i] = &paths[i];
+        paths[i].scene = &scene;
+        paths[i].hit = (struct pt_hit){.shape = met[i], .primitive = 1, .u = 0.25f, .v = 0.5f};
+    }
+    const struct pt_mesh *first = &scene.meshes[scene.shapes[b].data], *second = &scene.meshes[scene.shapes[a].data];
+    /* without texture coordinates u = 0.75, v = 0.5: texel 2.5 across, 1.5 down */
+    const void *expected[10] = {first->indices + 3, second->indices + 3, first->vertices + 1, first->vertices + 3, first->vertices,
+                                second->vertices, second->vertices + 2, second->vertices + 3, texels + 4 + 2, texels + 8 + 2};
+    for (int k = 0; k < 4; k++) {
+        scene.stats.triangles = k == 0 ? PT_FETCH_TRIANGLES - 1 : PT_FETCH_TRIANGLES;
+        fetched_count = 0;
+        pt_run_fetch(k == 3 ? PT_FX_ALL & ~PT_FX_TEXTURE : PT_FX_ALL, live + (k == 2), k == 2 ? 2 : 4);
+        assert_int_equal(fetched_count, k == 0 || k == 2 ? 0 : k == 3 ? 8 : 10);
+        for (int i = 0; i < fetched_count; i++)
+            assert_ptr_equal(fetched[i], expected[i]);
+    }
+    test_scene_finish(&scene);
+    test_scene_end(&scene);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(diffuse_kernel_is_exact), cmocka_unit_test(surface_kernels_are_exact), cmocka_unit_test(selection_covers), cmocka_unit_test(media_kernel_is_exact),
-        cmocka_unit_test(absent_effects_run_no_code), cmocka_unit_test(planes), cmocka_unit_test(trace_says_what_it_is_told), cmocka_unit_test(trace_tells_the_same_path),
+        cmocka_unit_test(absent_effects_run_no_code), cmocka_unit_test(planes), cmocka_unit_test(trace_says_what_it_is_told), cmocka_unit_test(texels_are_fetched_that_are_read),
+        cmocka_unit_test(hits_are_fetched_in_waves), cmocka_unit_test(trace_tells_the_same_path),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
