@@ -8,6 +8,8 @@
 
 #include <dirent.h>
 #include <math.h>
+#include <pthread.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -21,6 +23,7 @@
 #include "base/files.h"
 #include "model/container.h"
 #include "model/model.h"
+#include "support/base_room.h"
 #include "support/ggn_approve.h"
 #include "support/ggn_heap.h"
 #include "support/ggn_noise.h"
@@ -40,11 +43,11 @@ static size_t reported_size;
 /* Seconds pass as somebody looks: 41.375 for each look. */
 int clock_gettime(clockid_t id, struct timespec *t)
 {
-    static long looks;
+    static atomic_long all_looks;
 
     if (id != CLOCK_MONOTONIC)
         return (int)syscall(SYS_clock_gettime, id, t);
-    looks++;
+    const long looks = atomic_fetch_add(&all_looks, 1);
     *t = (struct timespec){.tv_sec = looks * 331 / 8, .tv_nsec = looks * 331 % 8 * 125000000};
     return 0;
 }
@@ -419,6 +422,86 @@ static void resuming(void **state)
     interrupted_and_resumed("paper", paper, 2);
 }
 
+/* One of several processes: a thread with a plan of its own. */
+struct process {
+    struct ggn_train_plan plan;
+    pthread_t thread;
+    int rc;
+    struct base_err err;
+};
+
+static void *take_part(void *data_of)
+{
+    struct process *p = data_of;
+    struct base_err err = {0};
+
+    p->rc = ggn_train(&p->plan, &p->err);
+    base_team_close(p->plan.team, p->rc, p->err.text, &err);
+    return NULL;
+}
+
+/* Processes that share a training, from the beginning or from one process's checkpoint, make the bytes of one; what rank 0 says. */
+static void together(const char *name, struct ggn_train_plan plan, int count, const char *checkpoint)
+{
+    struct process list[3] = {{.rc = 0}};
+    struct base_room *room = base_room_create(count);
+    char *said = NULL, *alone, *shared, command[256];
+    size_t size, sizes[2];
+
+    plan.out = path_of("together", "");
+    plan.resume = checkpoint != NULL;
+    snprintf(command, sizeof command, "/bin/cp %s %s", checkpoint ? checkpoint : "/dev/null", path_of("together", ".ckpt"));
+    assert_int_equal(system(command), 0);
+    FILE *f = open_memstream(&said, &size);
+    for (int r = 0; r < count; r++) {
+        list[r].plan = plan;
+        list[r].plan.progress = r ? NULL : f;
+        assert_int_equal(base_team_create(base_room_of(room, r), &list[r].plan.team, NULL), 0);
+    }
+    for (int r = 0; r < count; r++)
+        assert_int_equal(pthread_create(&list[r].thread, NULL, take_part, &list[r]), 0);
+    for (int r = 0; r < count; r++)
+        pthread_join(list[r].thread, NULL);
+    fclose(f);
+    for (int r = 0; r < count; r++)
+        if (list[r].rc)
+            fail_msg("process %d: %s", r, list[r].err.text);
+    assert_int_equal(base_file_read(path_of(name, ""), 1 << 24, &alone, &sizes[0], NULL), 0);
+    assert_int_equal(base_file_read(path_of("together", ""), 1 << 24, &shared, &sizes[1], NULL), 0);
+    assert_true(sizes[0] == sizes[1] && !memcmp(alone, shared, sizes[0]));
+    const char *traffic = strstr(said, " processes: ");
+    assert_non_null(traffic);
+    fprintf(report, "=== %s, shared by %.*s\n", name, (int)strcspn(traffic, "w") + 1, traffic - 1);
+    free(said);
+    free(alone);
+    free(shared);
+    base_room_destroy(room);
+}
+
+static void processes(void **state)
+{
+    struct ggn_train_plan paper = small("paper", GGN_PRESET_PAPER), all = full("all"), first = full("half");
+    (void)state;
+    paper.steps = paper.epoch_steps = 0;
+    paper.epochs = 2;
+    paper.batch = 5;
+    together("all", all, 3, NULL);
+    together("paper", paper, 2, NULL);
+    for (rows_left = 1; rows_left <= 4; rows_left += 3) { /* begun by one process, in either phase */
+        char checkpoint[128];
+        const int rows = rows_left;
+        struct base_err err = {0};
+        snprintf(checkpoint, sizeof checkpoint, "%s", path_of("half", ".ckpt"));
+        first.interrupted = &interrupted;
+        interrupted = 0;
+        first.progress = fopencookie(NULL, "w", (cookie_io_functions_t){.write = count_rows});
+        assert_int_equal(ggn_train(&first, &err), GGN_TRAIN_INTERRUPTED);
+        fclose(first.progress);
+        together("all", all, 2, checkpoint);
+        rows_left = rows;
+    }
+}
+
 /* --- what is refused ------------------------------------------------------------------------------------------------------------------- */
 
 static void try(const char *name, struct ggn_train_plan plan)
@@ -614,7 +697,7 @@ static void keys_of_runs(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(presets),     cmocka_unit_test(divergences), cmocka_unit_test(resuming),
-                                       cmocka_unit_test(plans),       cmocka_unit_test(checkpoints), cmocka_unit_test(keys_of_runs),
+                                       cmocka_unit_test(plans),       cmocka_unit_test(checkpoints), cmocka_unit_test(keys_of_runs), cmocka_unit_test(processes),
                                        cmocka_unit_test(nothing_stays),
                                        cmocka_unit_test(approve)};
     return cmocka_run_group_tests(tests, setup, teardown);
