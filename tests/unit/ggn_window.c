@@ -272,6 +272,13 @@ static const struct {
               {"gate_noise", offsetof(struct ggn_policy, gate_noise), 0, 1e6}, {"slope", offsetof(struct ggn_policy, slope), 0, 1e6},
               {"tail999", offsetof(struct ggn_policy, tail999), 0, 1e30},    {"gini", offsetof(struct ggn_policy, gini), 0, 2}};
 
+static void same_policy(const struct ggn_policy *a, const struct ggn_policy *b)
+{
+    for (size_t i = 0; i < sizeof limits / sizeof limits[0]; i++)
+        assert_memory_equal((const char *)a + limits[i].at, (const char *)b + limits[i].at, sizeof(double));
+    assert_int_equal(a->passes, b->passes);
+}
+
 static void policies_have_limits(void **state)
 {
     for (size_t i = 0; i < sizeof limits / sizeof limits[0]; i++)
@@ -327,7 +334,7 @@ static void policies_are_adjusted(void **state)
     assert_true(ggn_policy_adjust(&p, "gate", 1) && p.gate_noise == 0);
     struct ggn_policy kept = p;
     assert_false(ggn_policy_adjust(&p, "model", 1) || ggn_policy_adjust(&p, "", 1) || ggn_policy_adjust(&p, "gates", 1));
-    assert_memory_equal(&kept, &p, sizeof p);
+    same_policy(&kept, &p);
     ggn_policy_without_halves(&p);
     assert_true(p.tail999 == 0 && p.gini == 0 && p.threshold == 0.1);
     p = was;
@@ -376,7 +383,7 @@ static void policies_are_written_down(void **state)
                               "\"slope\":4,\"tail999\":6,\"gini\":0.75,\"passes\":3}");
     assert_false(failed);
     assert_int_equal(ggn_policy_parse(root, &q, &err), 0);
-    assert_memory_equal(&p, &q, sizeof p);
+    same_policy(&p, &q);
     cJSON_ReplaceItemInObject(root, "slope", cJSON_CreateString("4"));
     assert_int_equal(ggn_policy_parse(root, &q, &err), BASE_EINVAL);
     assert_string_equal(err.text, "policy: slope is not a number");
@@ -415,7 +422,7 @@ static void policies_of_models(void **state)
                               "\"gini\":0.75}}");
     free(text);
     assert_int_equal(ggn_policy_of(m, &q, NULL), 0);
-    assert_memory_equal(&p, &q, sizeof p);
+    same_policy(&p, &q);
     p.ratio = 1.5;
     assert_int_equal(ggn_policy_set(m, &p, NULL), 0);
     assert_true(m->calibration.spacing == 1.5);
