@@ -22,6 +22,7 @@
 #include "quote_output.c"
 
 #include "base/png.h"
+#include "image/oiio.h"
 #include "integ/integrator.h"
 #include "support/api_folders.h"
 #include "support/pt_approve.h"
@@ -511,6 +512,37 @@ static void explanations(void **state)
     pt_approve("tests/golden/pathtracer/explanations.txt", explain_it);
 }
 
+/* The picture of a quote is that of its blocks' times, in minutes when the dearest takes one. */
+static void quotes_as_pictures(void **state)
+{
+    (void)state;
+    struct base_err err = {0};
+    char path[64];
+    snprintf(path, sizeof path, "/tmp/pt_main_%ld.png", (long)getpid());
+    render.blocks.x1 = 24;
+    render.blocks.y1 = 9;
+    quote.rows[1].visible = 0.125;
+    for (int k = 0; k < 2; k++) {
+        struct pt_stopmap_block blocks[7];
+        struct pt_stopmap map;
+        struct pt_oiio_image image;
+        for (int i = 0; i < 7; i++) {
+            double value = answers[1][i].thread_s;
+            answers[1][i].thread_s = k ? value * 60 / 9 : value; /* the dearest: 9 s, or just a minute */
+            blocks[i] = (struct pt_stopmap_block){list[i].x0, list[i].y0, list[i].x1, list[i].y1, answers[1][i].thread_s / (k ? 60 : 1)};
+        }
+        assert_int_equal(pt_quote_map(path, &quote, &render, &err), 0);
+        assert_int_equal(pt_stopmap_draw(0, 0, 24, 9, blocks, 7, k ? "min" : "s", &map, &err), 0);
+        assert_int_equal(pt_oiio_read(path, &image, &err), 0);
+        assert_true(image.width == map.width && image.height == map.height && image.channels == 3 && image.u8);
+        assert_memory_equal(image.u8, map.rgb, (size_t)(3 * map.width * map.height));
+        pt_oiio_release(&image);
+        pt_stopmap_release(&map);
+    }
+    unlink(path);
+    assert_int_equal(pt_quote_map("/missing/q.png", &quote, &render, &err), BASE_EIO);
+}
+
 static void durations_and_thousands(void **state)
 {
     (void)state;
@@ -535,6 +567,6 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(command_lines), cmocka_unit_test(renders), cmocka_unit_test(words_on_the_way), cmocka_unit_test(quotes),
                                        cmocka_unit_test(outputs_are_kept), cmocka_unit_test(the_last_line), cmocka_unit_test(between_two_slices),
-                                       cmocka_unit_test(explanations), cmocka_unit_test(durations_and_thousands)};
+                                       cmocka_unit_test(explanations), cmocka_unit_test(quotes_as_pictures), cmocka_unit_test(durations_and_thousands)};
     return cmocka_run_group_tests(tests, set_up_quote, tear_down_quote);
 }
