@@ -1,6 +1,7 @@
 /*
  * Finding, loading and checking criteria, good ones and broken ones (tests/abi/plugins).
  */
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -324,6 +325,71 @@ static void tables_are_checked(void **state)
     PARAM_REFUSED(p->type = LULL_PARAM_CHOICE);
 }
 
+/* Each promise of a table, at its limit, with what is said word for word. */
+static void tables_word_for_word(void **state)
+{
+    (void)state;
+    struct lull_found found;
+    struct lull_error err = {.struct_size = sizeof err};
+    struct lull_param two[2], *p = two;
+    struct lull_criterion good, bad;
+    char id[66];
+    assert_int_equal(open_in(criteria, "halfbuf", &found, &err), LULL_OK);
+    good = *found.criterion;
+    good.id = "x";
+    good.params = two;
+    good.param_count = 2;
+    good.param_stride = sizeof two[0];
+#define SAYS(change, words)                                                                                                 \
+    two[0] = two[1] = (struct lull_param){.name = "a-0", .help = "h", .type = LULL_PARAM_INT, .min = 3, .max = 3};          \
+    two[1].name = "b";                                                                                                      \
+    bad = good;                                                                                                             \
+    change;                                                                                                                 \
+    err.message[0] = '\0';                                                                                                  \
+    assert_int_equal(lull_table_check(&bad, &err) == LULL_OK, words[0] == '\0');                                            \
+    assert_string_equal(err.message, words)
+    SAYS((void)p, "");
+    assert_int_equal(lull_table_check(NULL, &err), LULL_E_INVALID);
+    assert_string_equal(err.message, "no table");
+    snprintf(id, sizeof id, "its table is smaller than in version 1.0 (%u bytes)", (unsigned)sizeof bad - 1);
+    SAYS(bad.struct_size = sizeof bad - 1, id);
+    SAYS(bad.struct_size = sizeof bad + 8, "");
+    memset(id, 'i', sizeof id);
+    id[63] = '\0';
+    SAYS(bad.id = id, "");
+    id[63] = 'i';
+    id[64] = '\0';
+    SAYS(bad.id = id, "its id is not of the form [a-z0-9.-]+");
+    SAYS(bad.id = "a.z-09", "");
+    SAYS(bad.id = "a_b", "its id is not of the form [a-z0-9.-]+");
+    SAYS(bad.id = "`", "its id is not of the form [a-z0-9.-]+");
+    SAYS(bad.id = "{", "its id is not of the form [a-z0-9.-]+");
+    SAYS(bad.id = "a:b", "its id is not of the form [a-z0-9.-]+");
+    SAYS(bad.version = NULL, "x: name, version or description is missing");
+    SAYS(bad.destroy = NULL, "x: a function is missing");
+    SAYS(bad.thread_level = LULL_THREADS_FULL, "");
+    SAYS(bad.thread_level = LULL_THREADS_NONE, "");
+    SAYS(bad.thread_level = 3, "x: unknown thread level 3");
+    SAYS(bad.thread_level = -1, "x: unknown thread level -1");
+    SAYS(bad.param_stride = sizeof two[0] - 1, "x: the parameter table is missing or has a bad stride");
+    SAYS(bad.param_count = 10001, "x: the parameter table is missing or has a bad stride");
+    SAYS((bad.params = NULL, bad.param_count = 0), "");
+    SAYS(two[1].name = "a.b", "parameter 1 has no name of the form [a-z0-9-]+");
+    SAYS(two[1].name = "a-0", "two parameters have the name a-0");
+    SAYS(two[1].help = NULL, "parameter b has no help");
+    SAYS(two[1].type = LULL_PARAM_TEXT, "");
+    SAYS(two[1].type = LULL_PARAM_TEXT + 1, "parameter b has the unknown type 6");
+    SAYS(two[1].type = LULL_PARAM_INT - 1, "parameter b has the unknown type -1");
+    SAYS(two[1].max = 2, "parameter b has no finite range");
+    SAYS((two[1].type = LULL_PARAM_FLOAT, two[1].max = HUGE_VAL), "parameter b has no finite range");
+    SAYS((two[1].type = LULL_PARAM_FLOAT, two[1].min = -HUGE_VAL), "parameter b has no finite range");
+    SAYS((two[1].type = LULL_PARAM_BOOL, two[1].max = 2), "");
+    SAYS((two[1].type = LULL_PARAM_CHOICE, two[1].choices = "a|b"), "");
+    SAYS(two[1].type = LULL_PARAM_CHOICE, "parameter b: choices go with the type CHOICE only");
+    SAYS(two[1].choices = "a", "parameter b: choices go with the type CHOICE only");
+#undef SAYS
+}
+
 static void errors_fit_the_callers_struct(void **state)
 {
     (void)state;
@@ -369,7 +435,7 @@ int main(void)
         cmocka_unit_test(broken_libraries_are_refused),
         cmocka_unit_test(cut_libraries_are_refused),
         cmocka_unit_test(side_effects_of_loading_are_told),
-        cmocka_unit_test(tables_are_checked),
+        cmocka_unit_test(tables_are_checked), cmocka_unit_test(tables_word_for_word),
         cmocka_unit_test(errors_fit_the_callers_struct),
     };
     int failed = cmocka_run_group_tests(tests, NULL, NULL);

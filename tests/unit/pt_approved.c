@@ -122,7 +122,7 @@ static char *answer(struct pt_approve_case *c)
     FILE *out = open_memstream(&text, &size);
     assert_non_null(out);
     struct pt_source source = {read_beside, NULL, c, 0};
-    struct pt_load_options options = {.warn = tell, .warn_data = out};
+    struct pt_load_options options = {.quiet = 1, .warn = tell, .warn_data = out}; /* no word of how long it took */
     struct pt_scene *scene = NULL;
     struct pt_scene_defaults defaults;
     struct base_err err = {0};
