@@ -11,11 +11,6 @@ int ggn_bf16_available(void)
 #endif
 }
 
-size_t ggn_bf16_pack_size(int n_in, int n_out)
-{
-    return (size_t)((n_in + 1) / 2) * (size_t)n_out * 9;
-}
-
 void ggn_bf16_pack(uint32_t *out, const float *packed, int n_in, int n_out, int tile_oc)
 {
     for (int oc = 0, tile; oc < n_out; oc += tile) {

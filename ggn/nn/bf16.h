@@ -15,8 +15,6 @@
 /* Whether this build and processor have it (and GGN_ISA does not forbid it). */
 int ggn_bf16_available(void);
 
-/* Elements of 32 bits (two input channels) of the packed weights. */
-size_t ggn_bf16_pack_size(int n_in, int n_out);
 /* From a packed 3×3 convolution (ggn_conv.w): tiles of output channels as there, [n_in pairs][9][tile] pairs. */
 void ggn_bf16_pack(uint32_t *out, const float *packed, int n_in, int n_out, int tile_oc);
 

@@ -107,6 +107,22 @@ static void scratch(void **state)
     (void)state;
 }
 
+/* Which convolutions are worth the transforms, and how their tiles are shared out. */
+static void winograd(void **state)
+{
+    static const int suits[][5] = {{6, 34, 24, 16, 1}, {5, 200, 24, 16, 0}, {34, 6, 24, 16, 1}, {200, 5, 24, 16, 0}, {14, 14, 24, 16, 0},
+                                   {10, 20, 24, 16, 1}, {10, 20, 20, 16, 0}, {10, 20, 21, 13, 1}, {10, 20, 1, 96, 1}, {10, 20, 1, 92, 0}};
+    static const int blocks[][2] = {{24, 2}, {64, 2}, {65, 4}, {128, 4}, {256, 4}, {257, 5}, {2500, 40}};
+    (void)state;
+
+    for (size_t i = 0; i < sizeof suits / sizeof suits[0]; i++)
+        assert_int_equal(ggn_wino_suits(suits[i][0], suits[i][1], suits[i][2], suits[i][3]), suits[i][4]);
+    for (size_t i = 0; i < sizeof blocks / sizeof blocks[0]; i++)
+        assert_int_equal(ggn_wino_blocks(blocks[i][0]), blocks[i][1]);
+    assert_int_equal(ggn_wino_tiles(200, 197), 2500);
+    assert_int_equal(ggn_wino_tiles(5, 4), 2);
+}
+
 /* --- first weights --------------------------------------------------------------------------------------------------------------------- */
 
 static double uniform(size_t k, uint32_t seed)
@@ -331,7 +347,7 @@ static void graphs(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(structure), cmocka_unit_test(scratch),          cmocka_unit_test(first_weights),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(structure), cmocka_unit_test(scratch), cmocka_unit_test(winograd),          cmocka_unit_test(first_weights),
                                        cmocka_unit_test(packed),    cmocka_unit_test(instruction_sets), cmocka_unit_test(ranges),
                                        cmocka_unit_test(graphs)};
     return cmocka_run_group_tests(tests, NULL, NULL);

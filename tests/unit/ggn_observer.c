@@ -491,7 +491,7 @@ static void record(const char *path, const struct ggn_dataset_view *view, const 
 static void calibration(void **state)
 {
     (void)state;
-    char dir[] = "/tmp/ggn_observer.XXXXXX", path[64], command[80];
+    char dir[] = "/tmp/ggn_observer.XXXXXX", path[64], command[200];
     const struct ggn_observer person = {0.4, 0.5, 0.3};
     struct ggn_dataset data;
     struct ggn_view human[VIEWS];
@@ -531,9 +531,22 @@ static void calibration(void **state)
     assert_near(back.level, c.observer.level, 1e-9);
     ggn_calibration_release(&c);
     assert_int_equal(ggn_calibrate(inputs, 1, GGN_FROM_HALVES, threads, &c, &err), BASE_EINVAL);
+    assert_string_equal(err.text, "calibration leaves one view out: it needs at least 2 views, there is 1");
+    for (int i = 0; i < BLOCKS; i++) /* three blocks of each of two views below the cap are enough, two of one are not */
+        human[0].spp[i] = human[1].spp[i] = i < 3 ? human[1].spp[i] : 10000;
+    assert_int_equal(ggn_calibrate(inputs, 2, GGN_FROM_HALVES, threads, &c, &err), 0);
+    ggn_calibration_release(&c);
+    human[0].spp[2] = 10000;
+    assert_int_equal(ggn_calibrate(inputs, 2, GGN_FROM_HALVES, threads, &c, &err), BASE_EINVAL);
+    assert_string_equal(err.text, "calibration needs at least 3 blocks of different texture with thresholds below 10000 in the other views");
+    human[1].spp[3] = 0;
+    assert_int_equal(ggn_calibrate(inputs, 2, GGN_FROM_HALVES, threads, &c, &err), BASE_EINVAL);
+    snprintf(command, sizeof command, "%s/view1: block 3 has no threshold in ''", dir);
+    assert_string_equal(err.text, command);
     human[1].n = BLOCKS - 1;
     assert_int_equal(ggn_calibrate(inputs, VIEWS, GGN_FROM_HALVES, threads, &c, &err), BASE_EINVAL);
-    assert_non_null(strstr(err.text, "5 thresholds"));
+    snprintf(command, sizeof command, "'' has 5 thresholds, %s/view1 has 6 blocks of 96 pixels", dir);
+    assert_string_equal(err.text, command);
     base_threads_destroy(threads);
     for (int v = 0; v < VIEWS; v++)
         free(human[v].spp);
