@@ -287,6 +287,108 @@ static void test_copy(void **state)
     (void)state;
 }
 
+/* --- what is refused, and what is done with it ------------------------------------------------------------------------ */
+
+static void test_refusals(void **state)
+{
+    struct ggn_hyper hyper = {GGN_PRESET_LULL, H, W, WINDOW, 4, 6, 4, 0};
+    struct ggn_batch batch = {.count = BATCH, .noisy = data.p_noisy, .denoised = data.p_denoised, .reference = data.p_reference,
+                              .label = data.label};
+    struct ggn_paper_record record;
+    struct base_err err = {0};
+    double loss;
+
+    for (int size = 0; size <= GGN_BATCH_MAX + 1; size += GGN_BATCH_MAX + 1) {
+        struct ggn_train_options o = ggn_train_options_default(GGN_PRESET_LULL);
+        char want[64];
+        o.batch = size;
+        assert_null(ggn_trainer_create(&hyper, &o, NULL, NULL, &err));
+        snprintf(want, sizeof want, "batch size %d is not in 1..1024", size);
+        assert_string_equal(err.text, want);
+    }
+    for (int preset = GGN_PRESET_PAPER; preset <= GGN_PRESET_LULL; preset++) {
+        struct ggn_trainer *t = make((enum ggn_preset)preset, 1e-3, NULL);
+        for (batch.count = 0; batch.count <= BATCH + 1; batch.count += BATCH + 1) {
+            char want[64];
+            snprintf(want, sizeof want, "a batch of %d is not in 1..%d", batch.count, BATCH);
+            assert_int_equal(ggn_trainer_judge_step(t, &batch, &loss, NULL, &err), BASE_EINVAL);
+            assert_string_equal(err.text, want);
+            assert_int_equal(ggn_trainer_denoiser_step(t, data.p_first, data.p_reference, batch.count, &loss, &err), BASE_EINVAL);
+            assert_string_equal(err.text, want);
+        }
+        batch.count = BATCH;
+        int rc = preset == GGN_PRESET_PAPER ? ggn_trainer_judge_step(t, &batch, &loss, NULL, &err)
+                                            : ggn_trainer_paper_step(t, &batch, &record, &err);
+        assert_int_equal(rc, BASE_EINVAL);
+        assert_string_equal(err.text, preset == GGN_PRESET_PAPER ? "the published preset trains in its own order"
+                                                                 : "the published order needs the preset paper");
+        assert_int_equal(t->steps, 0);
+        ggn_trainer_destroy(t);
+    }
+    for (int parts = GGN_TRAIN_R; parts <= GGN_TRAIN_MD; parts++) { /* the networks of one phase alone */
+        struct ggn_train_options o = ggn_train_options_default(GGN_PRESET_LULL);
+        size_t count;
+        o.parts = parts;
+        o.batch = BATCH;
+        struct ggn_trainer *t = ggn_trainer_create(&hyper, &o, NULL, NULL, &err);
+        assert_non_null(t);
+        assert_true((t->r != NULL) == (parts == GGN_TRAIN_R) && (t->d != NULL) == (parts == GGN_TRAIN_MD) && !t->m2);
+        int rc = parts == GGN_TRAIN_MD ? ggn_trainer_denoiser_step(t, data.p_first, data.p_reference, BATCH, &loss, &err)
+                                       : ggn_trainer_judge_step(t, &batch, &loss, NULL, &err);
+        assert_int_equal(rc, BASE_EINVAL);
+        assert_string_equal(err.text, "this trainer was made without the networks of the step");
+        for (int net = 0; net < GGN_NETS; net++) {
+            const int trained = (net == GGN_NET_R) == (parts == GGN_TRAIN_R);
+            assert_true((ggn_trainer_state(t, net, 4, &count) != NULL) == trained && (t->grad[net] != NULL) == trained);
+            assert_null(ggn_trainer_state(t, net, 5, &count));
+            assert_null(ggn_trainer_state(t, net, -1, &count));
+            assert_non_null(ggn_trainer_state(t, net, 2, &count));
+            assert_int_equal(count, t->graph[net].n_stats);
+        }
+        ggn_trainer_destroy(t);
+    }
+    (void)state;
+}
+
+/* A gradient longer than the clip is made as long as it, of each network its own; a loss or gradient beyond what explodes goes back to what
+ * was kept last, which says which step and tensor it was. */
+static void test_clip_and_explode(void **state)
+{
+    struct ggn_trainer *t = make(GGN_PRESET_LULL, 1e-3, NULL), *u = make(GGN_PRESET_LULL, 1e-3, NULL);
+    struct base_err err = {0};
+    double loss, length = 0;
+
+    for (int i = 0; i < 3; i++) {
+        denoise(t);
+        judge(t);
+        if (i == 1) {
+            ggn_trainer_keep(t);
+            copy_state(u, t);
+        }
+    }
+    t->options.clip = u->options.clip = 1e-3;
+    denoise(t);
+    for (size_t i = 0; i < t->graph[GGN_NET_R].n_params; i++)
+        length += (double)t->grad[GGN_NET_R][i] * (double)t->grad[GGN_NET_R][i];
+    assert_true(fabs(sqrt(length) / 1e-3 - 1) < 1e-5);
+    t->options.explode = 1e-9;
+    assert_int_equal(ggn_trainer_denoiser_step(t, data.p_first, data.p_reference, BATCH, &loss, &err), GGN_EDIVERGED);
+    char want[160], *tensor = strstr(err.text, "worst in ");
+    snprintf(want, sizeof want, "training diverged: loss of the denoiser is %g, worst in %.*s; returned to step 4", loss,
+             tensor ? (int)strcspn(tensor + 9, ";") : 0, tensor ? tensor + 9 : "");
+    assert_string_equal(err.text, want);
+    same_state(t, u); /* two of each, which were kept */
+    t->options.explode = 1e6;
+    denoise(t);
+    denoise(u);
+    judge(t);
+    judge(u);
+    same_state(t, u);
+    ggn_trainer_destroy(t);
+    ggn_trainer_destroy(u);
+    (void)state;
+}
+
 /* --- several processes ------------------------------------------------------------------------------------------------ */
 
 /* One of them: a thread with a trainer of its own, which is given the samples that are its share. */
@@ -379,6 +481,6 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_learns), cmocka_unit_test(test_learns_from_the_picture), cmocka_unit_test(test_resume_and_threads),
                                        cmocka_unit_test(test_adam), cmocka_unit_test(test_paper), cmocka_unit_test(test_copy),
-                                       cmocka_unit_test(test_processes)};
+                                       cmocka_unit_test(test_processes), cmocka_unit_test(test_refusals), cmocka_unit_test(test_clip_and_explode)};
     return cmocka_run_group_tests(tests, setup, NULL);
 }

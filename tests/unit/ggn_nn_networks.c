@@ -66,6 +66,10 @@ static void structure(void **state)
                         ggn_exec_bytes(&graph, 1, flags[k], 1) - sizeof(struct ggn_exec),
                         ggn_exec_bytes(&graph, 5, flags[k], 2) - sizeof(struct ggn_exec));
         }
+    struct ggn_model *model = ggn_model_create(&odd, NULL);
+    fprintf(f, "a judge: %zu bytes, with two threads %zu\n", ggn_judge_bytes(model, GGN_PRECISION_F32, 1),
+            ggn_judge_bytes(model, GGN_PRECISION_F32, 2));
+    ggn_model_destroy(model);
     unsetenv("GGN_ISA");
     fclose(f);
     ggn_approve("ggn_nn_networks", text, 0);
