@@ -24,7 +24,7 @@ static int load(const char *text, int strict, int *warnings, struct pt_scene **s
     int ignored = 0;
     struct pt_source_single single = {"t.pbrt", text, strlen(text)};
     struct pt_source source = pt_source_from_memory(&single);
-    struct pt_load_options options = {.strict = strict, .warn = count_warning, .warn_data = warnings ? warnings : &ignored};
+    struct pt_load_options options = {.strict = strict, .quiet = 1, .warn = count_warning, .warn_data = warnings ? warnings : &ignored};
     return pt_scene_load_source("t.pbrt", &source, &options, scene, defaults, err);
 }
 

@@ -504,6 +504,53 @@ static void checks_may_be_too_dear(void **state)
     }
 }
 
+static int always(void *data)
+{
+    (void)data;
+    return 1;
+}
+
+/* What the render is when it may be saved: as it would go on. */
+static int look_before(void *data, struct pt_render *r, struct base_err *err)
+{
+    (void)err;
+    *(int *)data += 10 + (int)pt_render_active(r);
+    assert_true(r->blocks.list[1].checks == 0 && r->totals.checks == 0);
+    return 0;
+}
+
+/* At an interrupt who was asked at these very samples is not asked again, who is stopped neither; the others are, for the report. */
+static void interrupted_blocks_are_asked_once_more(void **state)
+{
+    (void)state;
+    struct pt_render_config config = pt_fake_config();
+    struct base_err err = {0};
+    enum pt_render_outcome outcome;
+    int looks = 0;
+    const struct pt_render_hooks hooks = {.interrupted = always, .suspend = look_before, .data = &looks};
+    struct result r = {.pool = base_threads_create(1, &err)};
+    config.width = config.crop[2] = 48;
+    config.height = config.crop[3] = 16;
+    assert_int_equal(pt_criterion_create(pt_fake_criterion(), NULL, 0, r.pool, NULL, NULL, &r.criterion, &err), 0);
+    assert_int_equal(pt_render_create(&config, NULL, pt_fake_noise, r.pool, r.criterion, &r.render, &err), 0);
+    struct pt_block *b = r.render->blocks.list;
+    for (int i = 0; i < 3; i++)
+        b[i].spp = b[i].next_spp = 20;
+    b[0].asked = 1;
+    b[0].asked_spp = 20;
+    b[1].next_spp = 100;
+    b[1].asked = 1; /* once, at fewer samples */
+    b[1].asked_spp = 20;
+    b[2].reason = PT_REASON_SPP_MAX;
+    assert_int_equal(pt_render_run(r.render, &hooks, &outcome, &err), 0);
+    assert_true(outcome == PT_RENDER_INTERRUPTED && looks == 12);
+    assert_true(b[0].reason == PT_REASON_INTERRUPT && b[0].checks == 0 && b[0].spp == 20 && isnan(b[0].error));
+    assert_true(b[1].reason == PT_REASON_INTERRUPT && b[1].checks == 1 && b[1].spp == 21 && b[1].asked_spp == 21 && b[1].predicted_spp == 64);
+    assert_true(b[2].reason == PT_REASON_SPP_MAX && b[2].checks == 0);
+    assert_true(r.render->totals.checks == 1 && pt_render_active(r.render) == 0);
+    release(&r);
+}
+
 /* With a seed the same rows are handed out in another order; without one block after block, as many as give each thread 128 rows. */
 static void the_order_of_work_follows_its_seed(void **state)
 {
@@ -678,6 +725,7 @@ int main(void)
         cmocka_unit_test(slices_deal_out_the_time),
         cmocka_unit_test(rows_are_cut_into_runs),
         cmocka_unit_test(checks_may_be_too_dear),
+        cmocka_unit_test(interrupted_blocks_are_asked_once_more),
         cmocka_unit_test(the_order_of_work_follows_its_seed),
         cmocka_unit_test(checkpoints_have_a_layout),
     };
