@@ -12,6 +12,8 @@
 
 #include <cmocka.h>
 
+#include "base/files.h"
+#include "base/png.h"
 #include "base/version.h"
 #include "render/host_find.h"
 #include "render/host_planes.h"
@@ -475,6 +477,46 @@ static void dials(void **state)
     assert_null(pt_criterion_parameter(&table, "visible", twice, 2, NULL));
 }
 
+/* Grey is the mean of the colours as they are stored, alpha is none of them; what is no number, or beyond 0 to 1, is cut. */
+static void masks_are_read(void **state)
+{
+    (void)state;
+    struct base_err err = {0};
+    char path[64], line[200];
+    struct pt_mask mask;
+    static const uint8_t pixels[24] = {0, 30, 255, 51, 102, 102, 255, 255, 255, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+    snprintf(path, sizeof path, "/tmp/pt_host_%ld.png", (long)getpid());
+    for (int channels = 1; channels <= 4; channels++) {
+        assert_int_equal(base_png_write(path, 3, 2, channels, pixels, &err), 0);
+        assert_int_equal(pt_mask_read(path, 3, 2, &mask, &err), 0);
+        assert_true(mask.width == 3 && mask.height == 2);
+        for (int i = 0; i < 6; i++) {
+            const uint8_t *p = pixels + channels * i;
+            double grey = channels < 3 ? p[0] / 255.0 : (p[0] + p[1] + p[2]) / 765.0;
+            assert_true(fabs((double)mask.grey[i] - grey) < 1e-6);
+        }
+        pt_mask_release(&mask);
+        assert_true(!mask.grey && mask.width == 0);
+    }
+    for (int k = 0; k < 2; k++) {
+        assert_int_equal(pt_mask_read(path, 3 + k, 3 - k, &mask, &err), BASE_EINVAL);
+        snprintf(line, sizeof line, "--mask %s: it has 3x2 pixels, the image %dx%d", path, 3 + k, 3 - k);
+        assert_string_equal(err.text, line);
+    }
+    unlink(path);
+    assert_int_equal(pt_mask_read(path, 3, 2, &mask, &err), BASE_EINVAL); /* an input: not BASE_EIO */
+    snprintf(line, sizeof line, "%s: No such file or directory", path);
+    assert_string_equal(err.text, line);
+    snprintf(path, sizeof path, "/tmp/pt_host_%ld.pfm", (long)getpid());
+    static const float values[4] = {-0.5f, 0.25f, 7.0f, NAN};
+    FILE *f = fopen(path, "wb");
+    assert_true(f && fputs("Pf\n4 1\n-1.0\n", f) >= 0 && fwrite(values, 4, 4, f) == 4 && fclose(f) == 0);
+    assert_int_equal(pt_mask_read(path, 4, 1, &mask, &err), 0);
+    assert_true(mask.grey[0] == 0 && mask.grey[1] == 0.25f && mask.grey[2] == 1 && mask.grey[3] == 0);
+    pt_mask_release(&mask);
+    unlink(path);
+}
+
 /* Blocks of a mask are judged by instances of their own dial, each asked once. */
 static void every_step_has_its_instance(void **state)
 {
@@ -670,6 +712,7 @@ int main(void)
         cmocka_unit_test(planes_as_wanted_and_dropped_samples),
         cmocka_unit_test(what_a_criterion_fails_with),
         cmocka_unit_test(dials),
+        cmocka_unit_test(masks_are_read),
         cmocka_unit_test(every_step_has_its_instance),
         cmocka_unit_test(histories),
         cmocka_unit_test(services),
