@@ -151,6 +151,77 @@ static void parameter_spellings(void **state)
     close_files(&x);
 }
 
+/* Where words end, every escape, the mark at the beginning of a file, an end without a line's end. */
+static void characters(void **state)
+{
+    (void)state;
+    struct files files = {{"a"}, {"\xef\xbb\xbf" "ab[cd]ef\"g\"hi#j\n\vk\fl\tm\rn\r\n\"\\n\\r\\t\\b\\f\\\\\\'\\\"\" o"}};
+    struct fixture x;
+    open_files(&x, &files);
+    expect(&x, PT_TOKEN_WORD, "ab", 1, 1);
+    expect(&x, PT_TOKEN_OPEN, "[", 1, 3);
+    expect(&x, PT_TOKEN_WORD, "cd", 1, 4);
+    expect(&x, PT_TOKEN_CLOSE, "]", 1, 6);
+    expect(&x, PT_TOKEN_WORD, "ef", 1, 7);
+    expect(&x, PT_TOKEN_STRING, "g", 1, 9);
+    expect(&x, PT_TOKEN_WORD, "hi", 1, 12);
+    expect(&x, PT_TOKEN_WORD, "k", 2, 2);
+    expect(&x, PT_TOKEN_WORD, "l", 2, 4);
+    expect(&x, PT_TOKEN_WORD, "m", 2, 6);
+    expect(&x, PT_TOKEN_WORD, "n", 2, 8);
+    expect(&x, PT_TOKEN_STRING, "\n\r\t\b\f\\'\"", 3, 1);
+    assert_int_equal(pt_lexer_peek(&x.lexer).loc.column, 20);
+    expect(&x, PT_TOKEN_WORD, "o", 3, 20);
+    struct pt_token end = pt_lexer_next(&x.lexer);
+    assert_true(end.kind == PT_TOKEN_END && end.loc.line == 3 && end.loc.column == 21 && end.length == 0);
+    close_files(&x);
+    static const char *const bad[][2] = {{"\"a", "a:1:1: string without a closing quote on its line"},
+                                         {" \"a\nb\"", "a:1:2: string without a closing quote on its line"},
+                                         {"\"a\\q\"", "a:1:1: unknown escape \\q in a string"},
+                                         {"\"a\\", "a:1:1: string without a closing quote on its line"}};
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        files = (struct files){{"a"}, {bad[i][0]}};
+        open_files(&x, &files);
+        assert_int_equal(pt_lexer_next(&x.lexer).kind, PT_TOKEN_BAD);
+        assert_string_equal(x.err.text, bad[i][1]);
+        close_files(&x);
+    }
+}
+
+static int read_any(void *data, const char *path, char **bytes, size_t *size, struct base_err *err)
+{
+    (void)data;
+    (void)path;
+    (void)err;
+    *bytes = strdup("x");
+    *size = 1;
+    return 0;
+}
+
+/* Files may stand on each other 32 deep; each comes to its end, and a scoped one says so. */
+static void include_depth(void **state)
+{
+    (void)state;
+    struct fixture x;
+    memset(&x, 0, sizeof x);
+    x.source = (struct pt_source){read_any, NULL, NULL, 0};
+    x.diag.err = &x.err;
+    x.lexer = (struct pt_lexer){.source = &x.source, .diag = &x.diag, .arena = &x.arena};
+    for (int i = 0; i <= PT_LEXER_DEPTH; i++) {
+        char name[8];
+        snprintf(name, sizeof name, "f%d", i);
+        assert_int_equal(pt_lexer_include(&x.lexer, name, (struct pt_loc){"f", 7, 8}, i % 2), i < PT_LEXER_DEPTH ? 0 : BASE_EINVAL);
+    }
+    assert_string_equal(x.err.text, "f:7:8: files include each other more than 32 levels deep");
+    for (int i = PT_LEXER_DEPTH - 1; i >= 0; i--) {
+        expect(&x, PT_TOKEN_WORD, "x", 1, 1);
+        if (i % 2)
+            assert_int_equal(pt_lexer_next(&x.lexer).kind, PT_TOKEN_FILE_END);
+    }
+    assert_int_equal(pt_lexer_next(&x.lexer).kind, PT_TOKEN_END);
+    close_files(&x);
+}
+
 static void numbers(void **state)
 {
     (void)state;
@@ -194,7 +265,7 @@ static void numbers_in_other_locales(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(tokens_and_places), cmocka_unit_test(list_across_files),
-                                       cmocka_unit_test(include_loops),     cmocka_unit_test(parameter_spellings),
+                                       cmocka_unit_test(include_loops), cmocka_unit_test(characters), cmocka_unit_test(include_depth),     cmocka_unit_test(parameter_spellings),
                                        cmocka_unit_test(numbers),           cmocka_unit_test(numbers_in_other_locales)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
