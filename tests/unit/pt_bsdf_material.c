@@ -3,6 +3,7 @@
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
+#include <string.h>
 
 #include <cmocka.h>
 
@@ -139,6 +140,66 @@ static void effects_are_those_the_closure_needs(void **state)
     pt_arena_release(&scene.arena);
 }
 
+/* What each model needs by itself, and what each of its parameters adds when it is a texture. */
+static void effects_of_every_model(void **state)
+{
+    (void)state;
+    static const pt_effects plain[PT_BSDF_COUNT] = {
+        0, PT_FX_SPECULAR, PT_FX_TRANSMISSION | PT_FX_SPECULAR, PT_FX_TRANSMISSION | PT_FX_SPECULAR, PT_FX_TRANSMISSION,
+        PT_FX_COATED | PT_FX_SPECULAR, PT_FX_COATED | PT_FX_SPECULAR};
+    /* which of reflectance, transmittance, roughness, roughness of the base, eta, k, thickness, g, albedo it reads */
+    static const char *const reads[PT_BSDF_COUNT] = {"r", "aek", "a", "", "rt", "ratgs", "abtgsek"};
+    static const int coated[PT_BSDF_COUNT] = {[PT_BSDF_COATED_DIFFUSE] = 1, [PT_BSDF_COATED_CONDUCTOR] = 1};
+    for (int kind = 0; kind < PT_BSDF_COUNT; kind++) {
+        struct pt_material m = {.kind = kind, PLAIN, ROUGH(0.0f)};
+        struct pt_scene scene = {.materials = &m, .material_count = 1};
+        struct {
+            char read;
+            struct pt_input *in;
+            pt_effects adds;
+        } inputs[] = {{'r', &m.reflectance, PT_FX_TEXTURE},
+                      {coated[kind] ? 0 : 't', &m.transmittance, PT_FX_TEXTURE},
+                      {'a', &m.roughness_u, PT_FX_TEXTURE | PT_FX_GLOSSY | PT_FX_SPECULAR},
+                      {'a', &m.roughness_v, PT_FX_TEXTURE | PT_FX_GLOSSY | PT_FX_SPECULAR},
+                      {'b', &m.base_roughness_u, PT_FX_TEXTURE | PT_FX_GLOSSY | PT_FX_SPECULAR},
+                      {'b', &m.base_roughness_v, PT_FX_TEXTURE | PT_FX_GLOSSY | PT_FX_SPECULAR},
+                      {'e', &m.eta_rgb, PT_FX_TEXTURE},
+                      {'k', &m.k_rgb, PT_FX_TEXTURE},
+                      {coated[kind] ? 't' : 0, &m.thickness, PT_FX_TEXTURE},
+                      {'g', &m.g, PT_FX_TEXTURE},
+                      {'s', &m.albedo, PT_FX_TEXTURE}};
+        assert_int_equal(pt_material_effects(&scene, 0), plain[kind]);
+        for (size_t i = 0; i < sizeof inputs / sizeof *inputs; i++) {
+            int is_read = inputs[i].read && strchr(reads[kind], inputs[i].read);
+            inputs[i].in->texture = 1;
+            assert_int_equal(pt_material_effects(&scene, 0), plain[kind] | (is_read ? inputs[i].adds : 0));
+            inputs[i].in->texture = 0;
+        }
+        m.conductor_by_colour = 1;
+        m.eta_rgb.texture = m.k_rgb.texture = 1;
+        assert_int_equal(pt_material_effects(&scene, 0), plain[kind]);
+        m.reflectance.texture = 1;
+        int by_colour = strchr(reads[kind], 'r') || strchr(reads[kind], 'e');
+        assert_int_equal(pt_material_effects(&scene, 0), plain[kind] | (by_colour ? PT_FX_TEXTURE : 0));
+        m.reflectance.texture = 0;
+        for (int which = 0; which < 2; which++) {
+            *(which ? &m.bump : &m.normal_map) = 1;
+            assert_int_equal(pt_material_effects(&scene, 0), plain[kind] | PT_FX_BUMP | PT_FX_TEXTURE);
+            *(which ? &m.bump : &m.normal_map) = 0;
+        }
+        for (int remap = 0; remap < 2; remap++) { /* from alpha 1e-3 on it is rough */
+            m.remap_roughness = remap;
+            m.roughness_v.value.x = remap ? 0.98e-6f : 0.98e-3f;
+            assert_int_equal(pt_material_effects(&scene, 0), plain[kind]);
+            m.roughness_v.value.x = remap ? 1.02e-6f : 1e-3f;
+            pt_effects rough = !strchr(reads[kind], 'a') ? plain[kind] : kind == PT_BSDF_COATED_CONDUCTOR ? plain[kind] | PT_FX_GLOSSY
+                               : (plain[kind] & ~(pt_effects)PT_FX_SPECULAR) | PT_FX_GLOSSY;
+            assert_int_equal(pt_material_effects(&scene, 0), rough);
+            m.roughness_v.value.x = 0;
+        }
+    }
+}
+
 static void coatings_share_tables(void **state)
 {
     (void)state;
@@ -228,6 +289,7 @@ int main(void)
         cmocka_unit_test(models_have_their_closed_forms),
         cmocka_unit_test(roughness_is_remapped_as_in_pbrt),
         cmocka_unit_test(effects_are_those_the_closure_needs),
+        cmocka_unit_test(effects_of_every_model),
         cmocka_unit_test(coatings_share_tables),
         cmocka_unit_test(mixes_choose_by_amount),
         cmocka_unit_test(bump_tips_the_normal),

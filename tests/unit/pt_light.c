@@ -287,6 +287,44 @@ static void sphere_lights_itself(void **state)
     test_scene_end(&scene);
 }
 
+/* The middle of each pixel, in double: latitude and longitude from the upper pole; poles are the first and last row. */
+static void skies_are_looked_up_where_they_are(void **state)
+{
+    (void)state;
+    enum { W = 12, H = 7 };
+    static float pixels[W * H * 3];
+    struct pt_scene scene = {0};
+    struct pt_image_map map = {W, H, 3, PT_PIXEL_FLOAT, 1, pixels};
+    struct pt_light light = {.kind = PT_LIGHT_ENV_IMAGE, .emission = {1, 10, 100}, .mapping = PT_ENV_LATLONG,
+                             .from_render = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}}};
+    scene.images = &map;
+    for (int i = 0; i < W * H * 3; i++)
+        pixels[i] = (float)(i + 1);
+    for (int y = 0; y < H; y++)
+        for (int x = 0; x < W; x++) {
+            double theta = (y + 0.5) / H * PI, phi = (x + 0.5) / W * 2 * PI;
+            pt_vec3 got = pt_light_env_image_eval(&scene, &light, v3((float)(sin(theta) * cos(phi)), (float)(sin(theta) * sin(phi)), (float)cos(theta)));
+            float first = (float)(3 * (y * W + x) + 1);
+            assert_true(got.x == first && got.y == 10 * (first + 1) && got.z == 100 * (first + 2));
+        }
+    assert_true(pt_light_env_image_eval(&scene, &light, v3(0, 0, 1)).x == 1);
+    assert_true(pt_light_env_image_eval(&scene, &light, v3(0, 0, -1)).x == 3 * W * (H - 1) + 1);
+    assert_true(pt_light_env_image_eval(&scene, &light, v3(1, -1e-9f, 0)).x == 3 * (H / 2 * W + W - 1) + 1); /* a whole turn */
+    /* Clarberg's square: the upper pole in the middle, the lower in the corners, axes on the edges' middles */
+    static const struct {
+        pt_vec3 w;
+        int x, y;
+    } known[] = {{{0, 0, 1}, 4, 4}, {{0.01f, 0.01f, -1}, 7, 7}, {{-0.01f, 0.01f, -1}, 0, 7}, {{-0.01f, -0.01f, -1}, 0, 0}, {{1, 0.01f, 0}, 7, 4},
+                 {{0.01f, 1, 0}, 4, 7}, {{-1, -0.01f, 0}, 0, 3}, {{-0.01f, -1, 0}, 3, 0}, {{0.5f, 0.5f, 0.1f}, 5, 5}, {{0.5f, 0.5f, -0.1f}, 6, 6}};
+    map.width = map.height = 8;
+    light.mapping = PT_ENV_EQUAL_AREA;
+    for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
+        float got = pt_light_env_image_eval(&scene, &light, known[i].w).x;
+        if (got != (float)(3 * (known[i].y * 8 + known[i].x) + 1))
+            fail_msg("direction %d is in pixel %d, %d", (int)i, (int)(got - 1) / 3 % 8, (int)(got - 1) / 24);
+    }
+}
+
 /* Point, spot and distant lights against their closed forms. */
 static void delta_lights(void **state)
 {
@@ -342,7 +380,8 @@ int main(void)
         cmocka_unit_test(sphere_inside),                   cmocka_unit_test(ellipsoid), cmocka_unit_test(cylinder),
         cmocka_unit_test(disk),                            cmocka_unit_test(latlong),   cmocka_unit_test(equal_area),
         cmocka_unit_test(portal_of_an_image),              cmocka_unit_test(portal_of_a_constant),
-        cmocka_unit_test(delta_lights), cmocka_unit_test(sphere_lights_itself), cmocka_unit_test(tables_are_as_fine_as_the_image_asks),
+        cmocka_unit_test(delta_lights), cmocka_unit_test(sphere_lights_itself), cmocka_unit_test(skies_are_looked_up_where_they_are),
+        cmocka_unit_test(tables_are_as_fine_as_the_image_asks),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
