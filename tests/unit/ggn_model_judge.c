@@ -72,7 +72,7 @@ static void test_no_memory(void **state)
     (void)state;
 }
 
-/* The judge is the three networks run plainly, but for the 16-bit storage of denoised images. picture: NULL, none. */
+/* The judge is the three networks run plainly, with denoised images in 16 bits. picture: NULL, none. */
 static void compare_with_networks(const uint8_t *picture)
 {
     struct ggn_model *m = make();
@@ -92,7 +92,7 @@ static void compare_with_networks(const uint8_t *picture)
         ggn_exec_forward(den, m->weights[GGN_NET_R], 1, GGN_EVAL);
         for (int k = 0; k < BYTES; k++) {
             int c = 3 * i + k / AREA, at = k % AREA / 33 * 34 + k % AREA % 33;
-            ggn_exec_plane(gen, 0, 0, c)[at] = ggn_exec_plane(den, denoised, 0, k / AREA)[at];
+            ggn_exec_plane(gen, 0, 0, c)[at] = floorf(ggn_exec_plane(den, denoised, 0, k / AREA)[at] * 65535 + 0.5f) / 65535;
             ggn_exec_plane(gen, 0, 1, c)[at] = (float)rgb[k] / 255;
         }
     }
@@ -101,6 +101,12 @@ static void compare_with_networks(const uint8_t *picture)
         for (int y = 0; y < 24; y++)
             memcpy(ggn_exec_plane(dis, 0, 0, c) + y * 34, ggn_exec_plane(gen, out, c, 0) + y * 34,
                    33 * sizeof(float));
+    for (int k = 0; k < 2 * AREA; k++) { /* its maps, to a few roundings of a float */
+        int row;
+        const float *map = ggn_judge_feature_map(j, k / AREA, &row);
+        const int y = k % AREA / 33, x = k % AREA % 33;
+        assert_true(fabsf(map[y * row + x] - ggn_exec_plane(gen, out, k / AREA, 0)[y * 34 + x]) < 1.5e-6f);
+    }
     for (int k = 0; k < AREA && hyper.picture; k++) {
         ggn_exec_plane(dis, 0, 0, 2)[k / 33 * 34 + k % 33] = picture ? 16.0F * (float)picture[k] / 255 : 0;
         ggn_exec_plane(dis, 0, 0, 3)[k / 33 * 34 + k % 33] = picture ? 1 : 0;
