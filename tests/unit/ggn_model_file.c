@@ -441,6 +441,30 @@ static void test_refused_containers(void **state)
     (void)state;
 }
 
+/* A description of a mebibyte is read, one of a byte more is not. */
+static void test_longest_description(void **state)
+{
+    const size_t most = 1 << 20;
+    unsigned char *file = calloc(1, 64 + most + 1);
+    struct ggn_container c;
+    struct base_err err = {0};
+
+    for (size_t more = 0; more < 2; more++) {
+        memcpy(file, "LULLGGN\n", 8);
+        put(file + 8, 4, 1);
+        put(file + 16, 8, 64 + most + more);
+        put(file + 24, 8, 64);
+        put(file + 32, 8, most + more);
+        put(file + 40, 8, 64);
+        mend((char *)file, 64 + most + more);
+        assert_int_equal(ggn_container_parse(&c, "n", file, 64 + most + more, &err), more ? BASE_EINVAL : 0);
+        ggn_container_release(&c);
+    }
+    assert_string_equal(err.text, "n: the description lies outside of the file");
+    free(file);
+    (void)state;
+}
+
 /* A name of 48 bytes is cut, what is no character of ASCII becomes a question mark, and a value must be a number. */
 static void test_names_and_values(void **state)
 {
@@ -590,7 +614,7 @@ int main(void)
                                        cmocka_unit_test(test_not_finite), cmocka_unit_test(test_too_large),
                                        cmocka_unit_test(test_paths),      cmocka_unit_test(test_half_floats),
                                        cmocka_unit_test(test_picture),    cmocka_unit_test(test_layout),
-                                       cmocka_unit_test(test_refused_containers), cmocka_unit_test(test_names_and_values),
+                                       cmocka_unit_test(test_refused_containers), cmocka_unit_test(test_names_and_values), cmocka_unit_test(test_longest_description),
                                        cmocka_unit_test(test_descriptions), cmocka_unit_test(test_refused_models)};
     return cmocka_run_group_tests(tests, setup, teardown);
 }
