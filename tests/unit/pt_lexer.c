@@ -12,6 +12,7 @@
 
 #include <cmocka.h>
 
+#include "pbrt/names.h"
 #include "pbrt/number.h"
 #include "pbrt/params.h"
 
@@ -222,6 +223,30 @@ static void include_depth(void **state)
     close_files(&x);
 }
 
+/* A thousand names, each found with its last value, none that was not given. */
+static void names(void **state)
+{
+    (void)state;
+    struct pt_names n = {0};
+    char name[16];
+    assert_int_equal(pt_names_get(&n, "n0"), -1);
+    for (int round = 0; round < 2; round++)
+        for (int i = 0; i < 1000; i++) {
+            snprintf(name, sizeof name, "n%d", i);
+            assert_int_equal(pt_names_set(&n, name, 3 * i + round), 0);
+            assert_true(4 * n.count <= 3 * n.room);
+        }
+    assert_true(n.count == 1000 && n.room == 2048);
+    for (int i = 0; i < 1000; i++) {
+        snprintf(name, sizeof name, "n%d", i);
+        assert_int_equal(pt_names_get(&n, name), 3 * i + 1);
+        snprintf(name, sizeof name, "m%d", i);
+        assert_int_equal(pt_names_get(&n, name), -1);
+    }
+    pt_names_release(&n);
+    assert_true(n.count == 0 && n.room == 0 && pt_names_get(&n, "n0") == -1);
+}
+
 static void numbers(void **state)
 {
     (void)state;
@@ -265,7 +290,7 @@ static void numbers_in_other_locales(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(tokens_and_places), cmocka_unit_test(list_across_files),
-                                       cmocka_unit_test(include_loops), cmocka_unit_test(characters), cmocka_unit_test(include_depth),     cmocka_unit_test(parameter_spellings),
+                                       cmocka_unit_test(include_loops), cmocka_unit_test(characters), cmocka_unit_test(names), cmocka_unit_test(include_depth),     cmocka_unit_test(parameter_spellings),
                                        cmocka_unit_test(numbers),           cmocka_unit_test(numbers_in_other_locales)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -88,8 +88,62 @@ static void reads_binary(void **state)
     }
 }
 
+static size_t put_number(char *out, size_t at, int type, double v, int big)
+{
+    const int8_t i8 = (int8_t)v;
+    const uint8_t u8 = (uint8_t)(int)v;
+    const int16_t i16 = (int16_t)v;
+    const uint16_t u16 = (uint16_t)(int)v;
+    const int32_t i32 = (int32_t)v;
+    const uint32_t u32 = (uint32_t)(int64_t)v;
+    const float f32 = (float)v;
+    const void *const from[] = {&i8, &u8, &i16, &u16, &i32, &u32, &f32, &v};
+    static const size_t sizes[] = {1, 1, 2, 2, 4, 4, 4, 8};
+    return put(out, at, from[type], sizes[type], big);
+}
+
+/* A coordinate, the count of a list and its items may be of any type, in either order of bytes and by either name. */
+static void numbers_of_every_type(void **state)
+{
+    (void)state;
+    static const char *const names[2][8] = {{"char", "uchar", "short", "ushort", "int", "uint", "float", "double"},
+                                            {"int8", "uint8", "int16", "uint16", "int32", "uint32", "float32", "float64"}};
+    static const double values[8] = {-100, 200, -30000, 60000, -2000000000, 4000000000.0, -1.5e30, 1.25e-30};
+    for (int k = 0; k < 32; k++) {
+        int type = k % 8, big = k / 8 % 2, name = k / 16;
+        char bytes[1024];
+        struct pt_ply ply;
+        struct base_err err = {0};
+        int indices = type < 6 ? type : 4;
+        size_t n = (size_t)snprintf(bytes, sizeof bytes,
+                                    "ply\r\nformat binary_%s_endian 1.0\nelement vertex 2\nproperty float x\nproperty %s y\nproperty float z\n"
+                                    "property %s nx\nproperty float ny\nproperty float nz\nproperty float u\nproperty %s v\nelement face 1\n"
+                                    "property list %s %s vertex_index\nend_header\n",
+                                    big ? "big" : "little", names[name][type], names[name][type], names[name][type], names[name][indices],
+                                    names[name][indices]);
+        for (int i = 0; i < 2; i++) {
+            n = put_number(bytes, put_number(bytes, put_number(bytes, n, 6, 1 + i, big), type, values[type], big), 6, 3, big);
+            n = put_number(bytes, put_number(bytes, put_number(bytes, n, type, values[type], big), 6, 5, big), 6, 6, big);
+            n = put_number(bytes, put_number(bytes, n, 6, 7, big), type, values[type], big);
+        }
+        n = put_number(bytes, n, indices, 3, big);
+        for (int i = 0; i < 3; i++)
+            n = put_number(bytes, n, indices, i == 1, big);
+        if (pt_ply_parse("t.ply", bytes, n, &ply, &err) != 0)
+            fail_msg("%s: %s", names[name][type], err.text);
+        for (int i = 0; i < 2; i++) {
+            const float v = (float)values[type], *p = ply.positions + 3 * i, *m = ply.normals + 3 * i;
+            assert_true(p[0] == (float)(1 + i) && p[1] == v && p[2] == 3 && m[0] == v && m[1] == 5 && m[2] == 6);
+            assert_true(ply.uvs[2 * i] == 7 && ply.uvs[2 * i + 1] == v);
+        }
+        assert_true(ply.triangle_count == 1 && ply.indices[0] == 0 && ply.indices[1] == 1 && ply.indices[2] == 0);
+        pt_ply_release(&ply);
+        assert_true(!ply.positions && ply.vertex_count == 0);
+    }
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(reads_ascii), cmocka_unit_test(reads_binary)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(reads_ascii), cmocka_unit_test(reads_binary), cmocka_unit_test(numbers_of_every_type)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

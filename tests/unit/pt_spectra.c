@@ -82,6 +82,25 @@ static void metals(void **state)
     assert_int_equal(pt_spd_named("metal-", &eta), 0);
 }
 
+/* Oxides absorb nothing: where the reflectance is below what the mean index alone gives, k is 0 and the index follows from it. */
+static void what_absorbs_nothing(void **state)
+{
+    (void)state;
+    struct pt_spd eta, k;
+    pt_vec3 n, kk;
+    assert_true(pt_spd_named("metal-MgO-eta", &eta) && pt_spd_named("metal-MgO-k", &k));
+    for (int i = 0; i < PT_SPD_COUNT; i++)
+        assert_true(k.v[i] == 0 && eta.v[i] > 1.7 && eta.v[i] < 1.8);
+    pt_spd_conductor_rgb(&eta, &k, &n, &kk);
+    assert_true(kk.x == 0 && kk.y == 0 && kk.z < 0.05f);
+    const float root = (n.x - 1) / (n.x + 1);
+    struct pt_spd f0;
+    for (int i = 0; i < PT_SPD_COUNT; i++)
+        f0.v[i] = pow((eta.v[i] - 1) / (eta.v[i] + 1), 2);
+    assert_true(fabsf(root * root - pt_spd_reflectance_rgb(&f0).x) < 1e-6f);
+    assert_true(pt_spd_named("metal-TiO2-eta", &eta) && fabs(eta.v[42] - 2.6124) < 1e-4); /* Devore at 590 nm */
+}
+
 static void lists(void **state)
 {
     (void)state;
@@ -113,6 +132,6 @@ static void colour_spaces(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(white_reflectance), cmocka_unit_test(black_bodies), cmocka_unit_test(metals),
-                                       cmocka_unit_test(lists), cmocka_unit_test(colour_spaces)};
+                                       cmocka_unit_test(lists), cmocka_unit_test(what_absorbs_nothing), cmocka_unit_test(colour_spaces)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
