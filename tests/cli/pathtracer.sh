@@ -13,6 +13,7 @@ spp_of() { tr ';' '\n' <"$1" | sed -n '2,$p' | grep . | sort -n | uniq | tr '\n'
 t "--help" sh -c "$P --help | grep -q -- --time-budget"
 t "--usage" sh -c "$P --usage | grep -q -- --criterion"
 t "--version" sh -c "$P --version | grep -q 1.0"
+t "--list-criteria succeeds" "$P" --list-criteria
 t "--list-criteria names criteria and parameters" sh -c "$P --list-criteria | grep -q '^halfbuf ' && $P --list-criteria | grep -q -- '-p threshold='"
 
 t "--visible is a share that observer, ggn and the three baselines know" sh -c "[ \"\$($P --list-criteria | grep -c -e '-p visible=')\" = 5 ]"
@@ -73,7 +74,9 @@ refused "no criterion is used" "$scene" --spp 4 -p threshold=1
 refused "--resume needs" "$scene" --resume
 refused "--checkpoint-every" "$scene" --checkpoint-every x
 refused "--debug-path" "$scene" --debug-path 1,2
-refused "64x48" "$scene" -q --debug-path 64,0,0
+refused "--debug-path 64,0,0: the image has 64x48 pixels" "$scene" -q --debug-path 64,0,0
+refused "--debug-path 0,48,0: the image has 64x48 pixels" "$scene" -q --debug-path 0,48,0
+t "--debug-path: the last pixel" "$P" "$scene" -q --debug-path 63,47,0
 refused "belong to --sequence" "$scene" --levels linear:1:2:1
 refused "goes with neither" "$scene" --sequence s --spp 4
 refused "--levels" "$scene" -q --sequence s --levels cubic:1:2:3
