@@ -8,6 +8,12 @@ static uint64_t to_spp(double spp)
     return spp >= 1e18 ? UINT64_C(1000000000000000000) : (uint64_t)spp;
 }
 
+/* Asks at so many samples, but later than now; 2^64 - 1 samples make that 0: when the host likes. */
+static void ask_at(struct ggn_stopper *s, uint64_t spp)
+{
+    s->verdict.next_spp = spp > s->asked_spp ? spp : s->asked_spp + 1;
+}
+
 static int due(const struct ggn_policy *p, const struct ggn_stopper *s, uint64_t spp)
 {
     if ((double)spp < p->first_spp)
@@ -44,9 +50,9 @@ int ggn_stopper_ask(const struct ggn_stop_rule *rule, struct ggn_stopper *s, uin
     if (!s->used) {
         s->verdict = nothing;
         s->verdict.too_early = 1;
-        s->verdict.next_spp = to_spp(fmax(rule->policy.first_spp, (double)spp + 1));
-    } else if (!s->verdict.stop && s->verdict.next_spp <= spp) {
-        s->verdict.next_spp = spp + 1;
+        ask_at(s, to_spp(rule->policy.first_spp));
+    } else if (!s->verdict.stop) {
+        ask_at(s, s->verdict.next_spp);
     }
     return 0;
 }
@@ -63,7 +69,7 @@ static void schedule(const struct ggn_stop_rule *rule, struct ggn_stopper *s, do
         s->leapt = leap > 1.5 * next;
         next = s->leapt ? leap : next;
     }
-    s->verdict.next_spp = to_spp(ceil(fmax(next, p->first_spp)));
+    ask_at(s, to_spp(ceil(fmax(next, p->first_spp))));
     if (rule->spp_max > s->asked_spp && s->verdict.next_spp > rule->spp_max)
         s->verdict.next_spp = rule->spp_max;
 }
@@ -110,9 +116,26 @@ void ggn_stopper_judge(const struct ggn_stop_rule *rule, struct ggn_stopper *s, 
     v->predicted_spp = fmax(ggn_policy_predict(p, v->p, p->threshold, spp), (double)v->next_spp);
 }
 
+static int unknown_or_positive(double value)
+{
+    return isnan(value) || (value >= 0 && isfinite(value));
+}
+
+/* Only the last check can have said it, and stops are about samples that were taken. */
+static int verdict_valid(const struct ggn_stopper *s)
+{
+    const struct ggn_verdict *v = &s->verdict;
+
+    if (v->stop ? !s->used || v->stop > 1 || v->too_early : v->next_spp && v->next_spp <= s->asked_spp)
+        return 0;
+    return unknown_or_positive(v->predicted_spp) && unknown_or_positive(v->noise) && unknown_or_positive(v->p) && !(v->p > 1);
+}
+
 int ggn_stopper_valid(const struct ggn_stop_rule *rule, const struct ggn_stopper *s)
 {
-    if (s->used > (uint32_t)rule->window || s->regular > s->used || s->leapt > 1 || s->verdict.stop > 1)
+    if (s->used > (uint32_t)rule->window || s->regular > s->used || s->leapt > 1 || !verdict_valid(s))
+        return 0;
+    if (s->used && s->spp[s->used - 1] > s->asked_spp)
         return 0;
     for (uint32_t i = 0; i < s->used; i++)
         if (!s->spp[i] || (i && s->spp[i] <= s->spp[i - 1]))

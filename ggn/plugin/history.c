@@ -26,7 +26,7 @@ int32_t gp_history_create(struct gp_history *history, int window, const struct l
     uint64_t bytes = 0;
     size_t n = frame->block_count;
 
-    for (uint32_t i = 0; i < frame->block_count; i++) {
+    for (uint32_t i = 0; i < frame->block_count && bytes <= PTRDIFF_MAX; i++) {
         const struct lull_rect *r = lull_kit_rect(frame, i);
         bytes += (uint64_t)(window + 1) * slot_bytes(slot(of, r->x1 - r->x0, r->y1 - r->y0));
     }

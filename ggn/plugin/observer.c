@@ -170,14 +170,14 @@ static void workers_release(struct lull_instance *in)
 static int32_t workers_create(struct lull_instance *in, size_t pixels, int32_t width, struct lull_error *err)
 {
     const size_t count = lull_kit_workers(&in->kit), doubles = ggn_visibility_scratch(width);
-    struct worker *worker = calloc(count, sizeof *worker);
-    float *planes = malloc(count * 8 * pixels * sizeof *planes);
-    double *scratch = malloc(count * doubles * sizeof *scratch);
+    const int fits = pixels <= PTRDIFF_MAX / (8 * sizeof(float)) / count;
+    struct worker *worker = fits ? calloc(count, sizeof *worker) : NULL;
+    float *planes = worker ? malloc(count * 8 * pixels * sizeof *planes) : NULL;
+    double *scratch = planes ? malloc(count * doubles * sizeof *scratch) : NULL;
 
-    if (!worker || !planes || !scratch) {
+    if (!scratch) {
         free(worker);
         free(planes);
-        free(scratch);
         return lull_kit_fail(err, LULL_E_MEMORY, "begin_frame: out of memory");
     }
     for (size_t i = 0; i < count; i++) {

@@ -92,8 +92,11 @@ int32_t gp_windowed_begin_frame(struct lull_instance *in, const struct lull_fram
 
     if (status)
         return status;
-    uint32_t count = lull_kit_workers(&in->kit);
-    status = workers_create(in, count, largest_block(frame), &worker, err);
+    const uint32_t count = lull_kit_workers(&in->kit);
+    const size_t pixels = largest_block(frame), bytes_per_pixel = 1024; /* more than history and scratch need of either */
+    if (pixels > PTRDIFF_MAX / bytes_per_pixel)
+        return lull_kit_fail(err, LULL_E_MEMORY, "begin_frame: a block is too large for memory");
+    status = workers_create(in, count, pixels, &worker, err);
     if (status)
         return status;
     status = gp_history_create(&history, in->rule.window, frame, in->sight->slot, in, err);
@@ -221,6 +224,8 @@ static const struct lull_kit_rule rule = {
 
 static int32_t state_save(const struct lull_instance *in, const struct lull_writer *writer, struct lull_error *err)
 {
+    if (writer && !LULL_HAS(struct lull_writer, writer, write))
+        return lull_kit_fail(err, LULL_E_VERSION, "save: the host's struct is older than version 1.0");
     if (!in || !writer || !writer->write)
         return lull_kit_fail(err, LULL_E_INVALID, "save: an argument is missing");
     if (!in->kit.block_count)
@@ -232,6 +237,8 @@ static int32_t state_load(struct lull_instance *in, const struct lull_reader *re
 {
     struct gp_history history = {0};
 
+    if (reader && !LULL_HAS(struct lull_reader, reader, read))
+        return lull_kit_fail(err, LULL_E_VERSION, "load: the host's struct is older than version 1.0");
     if (!in || !reader || !reader->read)
         return lull_kit_fail(err, LULL_E_INVALID, "load: an argument is missing");
     if (!in->kit.block_count)

@@ -92,6 +92,13 @@ void lc_alloc_fail_after(long k)
     atomic_store(&left, k);
 }
 #else
+/* AddressSanitizer ends the process when it is asked for more memory than there is; malloc returns NULL. */
+__attribute__((visibility("default"), used)) const char *__asan_default_options(void);
+const char *__asan_default_options(void)
+{
+    return "allocator_may_return_null=1";
+}
+
 long lc_alloc_count(void)
 {
     return -1;

@@ -23,7 +23,9 @@ struct lc {
     uint32_t pair_count;
     struct lull_requirements req; /* of an instance made with them */
     uint32_t workers;             /* threads for concurrent checks, at least 2 */
+    uint64_t seed, misuse;        /* of the random calls outside the rules, and how many */
     int report_fd;
+    char *doing; /* what lc_doing said last; the parent reads it too */
     int failed;
     int concurrent; /* the check itself runs threads: their number says nothing */
 };
@@ -32,6 +34,9 @@ struct lc {
 __attribute__((format(printf, 2, 3))) void lc_fail(struct lc *c, const char *format, ...);
 __attribute__((format(printf, 2, 3))) void lc_note(struct lc *c, const char *format, ...);
 __attribute__((format(printf, 2, 3))) void lc_skip(struct lc *c, const char *format, ...);
+
+/* What comes now, for the report if the process does not survive it. Not thread safe. */
+__attribute__((format(printf, 2, 3))) void lc_doing(struct lc *c, const char *format, ...);
 
 #define LC_EXPECT(c, condition, ...) ((condition) ? 1 : (lc_fail((c), __VA_ARGS__), 0))
 
@@ -50,6 +55,7 @@ extern const struct lc_check lc_life_checks[];
 extern const struct lc_check lc_batch_checks[];
 extern const struct lc_check lc_thread_checks[];
 extern const struct lc_check lc_state_checks[];
+extern const struct lc_check lc_misuse_checks[];
 extern const struct lc_check lc_cost_checks[];
 
 /* --- host -------------------------------------------------------------------------------------------------------------- */
@@ -207,6 +213,20 @@ void lc_decision_check(struct lc *c, const struct lull_block *block, const struc
 /* Reports a call that changed the floating-point environment since `before`, and undoes it. */
 void lc_fp_check(struct lc *c, const struct lull_process_state *before, const char *call);
 int lc_deterministic(const struct lc *c);
+
+/* Where a state is written to and read from. */
+struct lc_buffer {
+    char *data; /* owns what lc_buffer_write made */
+    uint64_t size, at;
+    uint64_t limit; /* bytes until writing fails */
+};
+
+/* For lull_writer and lull_reader; their context is a struct lc_buffer. */
+int32_t lc_buffer_write(const struct lull_writer *writer, const void *data, uint64_t size);
+int32_t lc_buffer_read(const struct lull_reader *reader, void *data, uint64_t size);
+/* Appends the state of the session's instance: the status of save. */
+int32_t lc_state_save(const struct lull_state *state, const struct lc_session *s, struct lc_buffer *b,
+                      struct lull_error *err);
 
 /* --- the rest ---------------------------------------------------------------------------------------------------------- */
 

@@ -7,15 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-struct buffer {
-    char *data; /* owns */
-    uint64_t size, at;
-    uint64_t limit; /* bytes until writing fails */
-};
-
-static int32_t buffer_write(const struct lull_writer *writer, const void *data, uint64_t size)
+int32_t lc_buffer_write(const struct lull_writer *writer, const void *data, uint64_t size)
 {
-    struct buffer *b = writer->context;
+    struct lc_buffer *b = writer->context;
     if (size > b->limit - b->size)
         return LULL_E_IO;
     char *grown = realloc(b->data, (size_t)(b->size + size + 1));
@@ -28,9 +22,9 @@ static int32_t buffer_write(const struct lull_writer *writer, const void *data, 
     return LULL_OK;
 }
 
-static int32_t buffer_read(const struct lull_reader *reader, void *data, uint64_t size)
+int32_t lc_buffer_read(const struct lull_reader *reader, void *data, uint64_t size)
 {
-    struct buffer *b = reader->context;
+    struct lc_buffer *b = reader->context;
     if (size > b->size - b->at)
         return LULL_E_IO;
     if (size > 0)
@@ -39,21 +33,22 @@ static int32_t buffer_read(const struct lull_reader *reader, void *data, uint64_
     return LULL_OK;
 }
 
-static int32_t save(const struct lull_state *state, const struct lc_session *s, struct buffer *b, struct lull_error *err)
+int32_t lc_state_save(const struct lull_state *state, const struct lc_session *s, struct lc_buffer *b,
+                      struct lull_error *err)
 {
-    struct lull_writer writer = {.struct_size = sizeof writer, .context = b, .write = buffer_write};
+    struct lull_writer writer = {.struct_size = sizeof writer, .context = b, .write = lc_buffer_write};
     return state->save(s->instance, &writer, err);
 }
 
-static int32_t load(const struct lull_state *state, const struct lc_session *s, struct buffer *b, struct lull_error *err)
+static int32_t load(const struct lull_state *state, const struct lc_session *s, struct lc_buffer *b, struct lull_error *err)
 {
-    struct lull_reader reader = {.struct_size = sizeof reader, .context = b, .read = buffer_read};
+    struct lull_reader reader = {.struct_size = sizeof reader, .context = b, .read = lc_buffer_read};
     b->at = 0;
     return state->load(s->instance, &reader, err);
 }
 
 /* Destroys the instance and goes on with another one that has loaded the state. */
-static int replace_instance(struct lc *c, const struct lull_state *state, struct lc_session *s, struct buffer *b)
+static int replace_instance(struct lc *c, const struct lull_state *state, struct lc_session *s, struct lc_buffer *b)
 {
     c->criterion->end_frame(s->instance);
     c->criterion->destroy(s->instance);
@@ -70,11 +65,11 @@ static int replace_instance(struct lc *c, const struct lull_state *state, struct
 }
 
 /* States that were cut short, then some with one byte changed: refused, or accepted where it does not matter. */
-static void damage(struct lc *c, const struct lull_state *state, struct lc_session *s, const struct buffer *whole)
+static void damage(struct lc *c, const struct lull_state *state, struct lc_session *s, const struct lc_buffer *whole)
 {
     uint64_t stride = whole->size / 64 + 1;
     for (uint64_t size = 0; size < whole->size; size += stride) {
-        struct buffer cut = {.data = whole->data, .size = size};
+        struct lc_buffer cut = {.data = whole->data, .size = size};
         struct lull_error err = {.struct_size = sizeof err};
         int32_t status = load(state, s, &cut, &err);
         if (!LC_EXPECT(c, status != LULL_OK, "a state cut to %llu of %llu bytes is accepted", (unsigned long long)size,
@@ -82,7 +77,7 @@ static void damage(struct lc *c, const struct lull_state *state, struct lc_sessi
             break;
     }
     for (uint64_t at = 0; at < whole->size; at += stride) {
-        struct buffer bad = {.data = malloc((size_t)whole->size), .size = whole->size};
+        struct lc_buffer bad = {.data = malloc((size_t)whole->size), .size = whole->size};
         if (!bad.data)
             return;
         memcpy(bad.data, whole->data, (size_t)whole->size);
@@ -103,12 +98,12 @@ static void run_state(struct lc *c, const struct lull_state *state)
         lc_log_release(&expected);
         return;
     }
-    struct buffer whole = {.limit = UINT64_MAX};
+    struct lc_buffer whole = {.limit = UINT64_MAX};
     int ok = 1;
     for (int step = 0; step < LC_STEPS && ok; step++) {
-        struct buffer b = {.limit = UINT64_MAX};
+        struct lc_buffer b = {.limit = UINT64_MAX};
         struct lull_error err = {.struct_size = sizeof err};
-        ok = LC_EXPECT(c, save(state, &s, &b, &err) == LULL_OK, "save: %s", err.message) &&
+        ok = LC_EXPECT(c, lc_state_save(state, &s, &b, &err) == LULL_OK, "save: %s", err.message) &&
              replace_instance(c, state, &s, &b) == 0 && lc_session_step(&s) == 0;
         free(whole.data);
         whole = b;
@@ -116,8 +111,8 @@ static void run_state(struct lc *c, const struct lull_state *state)
     if (ok)
         lc_log_compare(c, &expected, &s.log, lc_deterministic(c), "saved and loaded before every step");
     if (ok && whole.size > 0) {
-        struct buffer full = {.limit = whole.size / 2};
-        LC_EXPECT(c, save(state, &s, &full, NULL) != LULL_OK, "save does not notice that writing failed");
+        struct lc_buffer full = {.limit = whole.size / 2};
+        LC_EXPECT(c, lc_state_save(state, &s, &full, NULL) != LULL_OK, "save does not notice that writing failed");
         free(full.data);
         /* a refused load changes nothing: the good state, then every bad one, then one more step */
         replace_instance(c, state, &s, &whole);
@@ -138,9 +133,9 @@ static void run_refused(struct lc *c, const struct lull_state *state)
         return;
     if (lc_session_open(&s, c, &plain) == 0) {
         lc_session_steps(&s, 3);
-        struct buffer b = {.limit = UINT64_MAX};
-        if (save(state, &s, &b, NULL) == LULL_OK && b.size > 0) {
-            struct buffer cut = {.data = b.data, .size = b.size - 1};
+        struct lc_buffer b = {.limit = UINT64_MAX};
+        if (lc_state_save(state, &s, &b, NULL) == LULL_OK && b.size > 0) {
+            struct lc_buffer cut = {.data = b.data, .size = b.size - 1};
             LC_EXPECT(c, load(state, &s, &cut, NULL) != LULL_OK, "a state without its last byte is accepted");
         }
         free(b.data);
@@ -158,8 +153,7 @@ static void check_state(struct lc *c)
         lc_skip(c, "it does not offer lull.state/1");
         return;
     }
-    if (!LC_EXPECT(c, LULL_HAS(struct lull_state, state, load) && state->save && state->load,
-                   "lull.state/1 is incomplete"))
+    if (!LC_EXPECT(c, LULL_HAS(struct lull_state, state, load) && state->save && state->load, "lull.state/1 is incomplete"))
         return;
     run_state(c, state);
     run_refused(c, state);

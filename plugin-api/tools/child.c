@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+#define _DEFAULT_SOURCE 1 /* MAP_ANONYMOUS */
 #include "child.h"
 
 #include <errno.h>
@@ -8,6 +9,7 @@
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
@@ -47,6 +49,14 @@ static void report_line(struct lc *c, char kind, const char *format, va_list arg
 REPORT_FUNCTION(lc_fail, 'F')
 REPORT_FUNCTION(lc_note, 'N')
 REPORT_FUNCTION(lc_skip, 'S')
+
+void lc_doing(struct lc *c, const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    vsnprintf(c->doing, LC_LINE_SIZE, format, args);
+    va_end(args);
+}
 
 _Noreturn static void child_main(struct lc *c, void (*fn)(struct lc *c, const void *arg), const void *arg)
 {
@@ -147,15 +157,35 @@ static void keep_end(int status, struct lc_report *report)
         keep_failure(report, "it ended the process (exit status %d)", WEXITSTATUS(status));
 }
 
+/* Waits for the child and says how it ended, what it was at if that was no good end, and what it printed. */
+static void gather(struct lc *c, pid_t pid, int fd, unsigned limit_s, FILE *output, struct lc_report *report)
+{
+    int status = 0;
+    if (!read_lines(fd, limit_s, report)) {
+        kill(pid, SIGKILL);
+        waitpid(pid, &status, 0);
+        keep_failure(report, "it did not end within %u s", limit_s);
+    } else {
+        waitpid(pid, &status, 0);
+        keep_end(status, report);
+    }
+    if (!report->completed && c->doing[0] != '\0')
+        keep(report, 'N', c->doing);
+    keep_output(output, report);
+}
+
 int lc_child_run(struct lc *c, void (*fn)(struct lc *c, const void *arg), const void *arg, unsigned limit_s,
                  struct lc_report *report)
 {
     int ends[2];
     *report = (struct lc_report){0};
     FILE *output = tmpfile();
-    if (!output || pipe(ends) != 0) {
+    c->doing = mmap(NULL, LC_LINE_SIZE, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    if (!output || c->doing == MAP_FAILED || pipe(ends) != 0) {
         if (output)
             fclose(output);
+        if (c->doing != MAP_FAILED)
+            munmap(c->doing, LC_LINE_SIZE);
         return -1;
     }
     fflush(stdout);
@@ -168,20 +198,10 @@ int lc_child_run(struct lc *c, void (*fn)(struct lc *c, const void *arg), const 
         child_main(c, fn, arg);
     }
     close(ends[1]);
-    if (pid > 0) {
-        int status = 0;
-        if (!read_lines(ends[0], limit_s, report)) {
-            kill(pid, SIGKILL);
-            keep_failure(report, "it did not end within %u s", limit_s);
-            report->completed = 1;
-            waitpid(pid, &status, 0);
-        } else {
-            waitpid(pid, &status, 0);
-            keep_end(status, report);
-        }
-        keep_output(output, report);
-    }
+    if (pid > 0)
+        gather(c, pid, ends[0], limit_s, output, report);
     close(ends[0]);
     fclose(output);
+    munmap(c->doing, LC_LINE_SIZE);
     return pid > 0 ? 0 : -1;
 }

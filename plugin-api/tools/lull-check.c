@@ -21,13 +21,14 @@ struct arguments {
     int spec_count;
     uint32_t workers;
     unsigned limit_s;
+    uint64_t misuse, seed;
     int quiet, list;
 };
 
 /* The first group needs no instance. */
-static const struct lc_check *const groups[] = {lc_table_checks,  lc_create_checks, lc_struct_checks,
-                                                lc_pixel_checks,  lc_life_checks,   lc_batch_checks,
-                                                lc_thread_checks, lc_state_checks,  lc_cost_checks};
+static const struct lc_check *const groups[] = {lc_table_checks,  lc_create_checks, lc_struct_checks, lc_pixel_checks,
+                                                lc_life_checks,   lc_batch_checks,  lc_thread_checks, lc_state_checks,
+                                                lc_misuse_checks, lc_cost_checks};
 enum { GROUPS = sizeof groups / sizeof *groups };
 
 /* --- command line --------------------------------------------------------------------------------------------------------
@@ -70,6 +71,8 @@ static const struct base_option list[] = {
     {"quiet", 'q', NULL, TO(quiet), .help = "Print failures and the last line only"},
     {"threads", 't', "N", TO(workers), 2, 32, .help = "Threads for the concurrent checks (4)"},
     {"limit", 'L', "SECONDS", TO(limit_s), 1, 100000, .help = "A check that takes longer has failed (120)"},
+    {"misuse", 'm', "CALLS", TO(misuse), 1, 1e12, .help = "Random calls outside the rules in the check misuse (2000)"},
+    {"seed", 's', "N", TO(seed), 0, 1e15, .help = "Where these calls begin (1)"},
     {0}};
 static const struct base_options options = {
     .list = list,
@@ -243,7 +246,8 @@ static int check_criterion(const struct arguments *a, struct lc *c, const char *
 
 static int check_spec(const struct arguments *a, const char *spec, struct totals *t)
 {
-    struct lc c = {.pairs = a->pairs, .pair_count = a->pair_count, .workers = a->workers};
+    struct lc c = {
+        .pairs = a->pairs, .pair_count = a->pair_count, .workers = a->workers, .seed = a->seed, .misuse = a->misuse};
     struct lc_report *r = malloc(sizeof *r);
     if (!r || lc_child_run(&c, find, spec, a->limit_s, r) != 0) {
         free(r);
@@ -277,7 +281,7 @@ static int finish(int status)
 
 int main(int argc, char **argv)
 {
-    static struct arguments a = {.workers = 4, .limit_s = 120};
+    static struct arguments a = {.workers = 4, .limit_s = 120, .misuse = 2000, .seed = 1};
     struct base_err err = {0};
     if (!base_options_parse(&options, argc, argv, &a, &err) && a.spec_count == 0 && !a.list)
         base_fail(&err, BASE_EINVAL, "expected CRITERION... (--help says more)");

@@ -27,7 +27,8 @@ says() { # says TEXT ARGS...
 }
 
 t "--help" says "Exit status: 0 all checks passed" --help
-t "--help names every option" sh -c '"$1" --help | grep -c -e --param= -e --only= -e --list -e --quiet -e --threads= -e --limit= | grep -qx 6' - "$check"
+t "--help names every option" sh -c '"$1" --help | grep -c -e --param= -e --only= -e --list -e --quiet -e --threads= -e --limit= \
+    -e --misuse= -e --seed= | grep -qx 8' - "$check"
 t "the manual page names every option" sh -c 'for o in $("$1" --help | grep -o -e "--[a-z]*" | sort -u); do
     tr -d "\\\\" <docs/man/lull-check.1 | grep -qF -e "$o" || case $o in --usage | --version) ;; *) echo "$o"; exit 1 ;; esac; done' - "$check"
 t "--list names the checks" sh -c '[ "$("$1" --list | wc -l)" -ge 40 ]' - "$check"
@@ -48,6 +49,9 @@ t "by name, from LULL_PLUGIN_PATH" env LULL_PLUGIN_PATH="$BUILD/tests/abi/plugin
 t "by path and id" status 0 -o table "$BUILD/lib/lull/null.so:null"
 t "a library of two: both are checked" sh -c '[ "$("$1" "$2" | grep -c "^not ok .* create:")" = 2 ]' - "$check" "$BUILD/tests/abi/plugins/pair.so"
 t "-p reaches the criterion" says "first at 77 spp" -o requirements -p first-spp=77 halfbuf
+t "-m and -s reach the calls outside the rules" sh -c '[ "$("$1" -o misuse -m 1000 -s 2 halfbuf)" = "$("$1" -o misuse -m 1000 -s 2 halfbuf)" ] &&
+    [ "$("$1" -o misuse -m 1000 halfbuf)" != "$("$1" -o misuse -m 1000 -s 2 halfbuf)" ] && "$1" -o misuse -m 999 -s 2 halfbuf | grep -F "(999 calls, "' - "$check"
+t "no misuse: 2" status 2 -m 0 null
 t "-q says little" sh -c '[ "$("$1" -q -o table null | wc -l)" = 2 ]' - "$check"
 t "TAP: a plan at the end" says "1..1" -o table null
 t "a limit that is too short fails the check" status 1 -L 1 -o shapes -p fault=30 "$BUILD/tests/abi/plugins/faulty.so"
@@ -59,11 +63,11 @@ done
 # ggn judges a block in some 80 ms: all checks take two minutes (LULL_CHECK_ALL=1), these ten seconds; the sanitizer makes its
 # convolutions 50 times slower, so there only the checks that end before a full window of images. The baselines' checks take
 # half a minute each: those of what they add to the others, their own numbers and state.
-few="symbols load entry table unknown-key parameters requirements older-host short-structs no-samples"
+few="symbols load entry table unknown-key parameters requirements older-host short-structs no-samples misuse"
 of() { # of ID [CHECK...]: options for the criterion
     id=$1
     shift
-    [ -z "${LULL_CHECK_ALL:-}" ] && for k in "$@"; do echo "-o $k"; done
+    [ -z "${LULL_CHECK_ALL:-}" ] && echo "-m 50" && for k in "$@"; do echo "-o $k"; done
     case $id in svd-entropy | attributes | noise-mask) echo "-p model=$tmp/$id.ggn" ;; esac
 }
 all() { # all CHECKER LIBDIR WHERE CHECK...: each criterion of the build

@@ -57,6 +57,20 @@ fault 34 short-structs "crashed" "reads past a short host struct"
 fault 35 unknown-key "does not name the key" "does not name an unknown key"
 fault 36 state "writing failed" "ignores that saving failed"
 fault 37 older-host "crashed" "reads past the view"
+fault 38 misuse "a short stride of the decisions" "writes decisions into a stride that is too short"
+fault 39 misuse "a plane of a scale that is none: status 0, expected -1 -5" "takes a scale of 0"
+fault 40 misuse "a block that the frame has not: status 0, expected -1" "looks at the first block only"
+fault 41 misuse "but the error says -1, \"\"" "refuses without a word"
+fault 42 misuse "too few planes: status 5, expected -5" "answers a status that there is not"
+fault 43 misuse "status 0, but the error says -11, \"all is well\"" "fills the error of a call that succeeds"
+fault 44 misuse "after refused calls: block 0" "drops its history when it refuses a frame"
+fault 45 misuse "evaluate: a block of another rectangle" "makes memory for the frame's blocks and trusts the call's"
+fault 46 misuse "create: an unknown key" "crashes on a long key"
+limit=2
+fault 47 misuse "evaluate: a block from right to left" "hangs on a block from right to left"
+limit=
+fault 48 misuse "save: no frame is open: status 0, expected -6" "saves without a frame"
+fault 49 misuse "save: no frame is open, a short writer" "reads past a short writer"
 
 # A mean over the block alone, without the guard against rare bright paths.
 for k in halfbuf variance; do

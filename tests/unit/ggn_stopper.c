@@ -166,20 +166,51 @@ static void nobody_is_sent_beyond_the_limit(void **state)
     assert_true(!s.verdict.stop && s.verdict.next_spp == 45); /* the host ends it */
 }
 
+/* 2^63 samples and more fit a uint64_t, but no double and no schedule: what it says is never in the past. */
+static void it_asks_again_later_however_many_samples_there_are(void **state)
+{
+    struct ggn_stop_rule rule = make_rule();
+    static const uint64_t many[] = {UINT64_C(1) << 53, 1000000000000000000u, UINT64_C(1) << 63, UINT64_MAX - 1, UINT64_MAX};
+    (void)state;
+    for (size_t i = 0; i < sizeof many / sizeof *many; i++) {
+        struct ggn_stopper s = {0};
+        struct show show = {.noise = 0.01, .logit = 5};
+        ask(&rule, &s, 10, &show);
+        ask(&rule, &s, many[i], &show);
+        assert_true(s.verdict.next_spp > many[i] || (s.verdict.next_spp == 0 && many[i] == UINT64_MAX));
+        assert_true(ggn_stopper_valid(&rule, &s));
+    }
+}
+
 static void a_damaged_stopper_is_told(void **state)
 {
     struct ggn_stop_rule rule = make_rule();
-    struct ggn_stopper good = {.spp = {10, 15, 23}, .used = 3, .regular = 3}, bad = good;
+    struct ggn_stopper good = {.spp = {10, 15, 23}, .used = 3, .regular = 3, .asked_spp = 23, .leapt = 1,
+                               .verdict = {.next_spp = 24, .p = 1, .predicted_spp = 0, .noise = (double)NAN}}, bad = good;
     (void)state;
     assert_true(ggn_stopper_valid(&rule, &good));
-    bad.spp[1] = 10;
+#define BAD(change) (bad = good, bad.change, assert_false(ggn_stopper_valid(&rule, &bad)))
+    BAD(spp[1] = 10);
+    BAD(spp[0] = 0);
+    BAD(used = 4);
+    BAD(regular = 4);
+    BAD(leapt = 2);
+    BAD(asked_spp = 22);
+    BAD(verdict.next_spp = 23);
+    BAD(verdict.p = 1.0000001);
+    BAD(verdict.p = -1e-9);
+    BAD(verdict.predicted_spp = -1e98);
+    BAD(verdict.predicted_spp = (double)INFINITY);
+    BAD(verdict.noise = -1e-9);
+    BAD(verdict.noise = (double)INFINITY);
+    good.verdict = (struct ggn_verdict){.stop = 1, .p = 0, .predicted_spp = (double)NAN, .noise = 2};
+    assert_true(ggn_stopper_valid(&rule, &good));
+    BAD(verdict.stop = 2);
+    BAD(verdict.too_early = 1);
+    bad = (struct ggn_stopper){.verdict = {.stop = 1}};
     assert_false(ggn_stopper_valid(&rule, &bad));
-    bad = good;
-    bad.used = 4;
-    assert_false(ggn_stopper_valid(&rule, &bad));
-    bad = good;
-    bad.regular = 5;
-    assert_false(ggn_stopper_valid(&rule, &bad));
+    bad.verdict.stop = 0; /* never asked */
+    assert_true(ggn_stopper_valid(&rule, &bad));
 }
 
 /* --- the rule again, from its words --------------------------------------------------------------------------------------- */
@@ -371,6 +402,7 @@ static void far_and_damaged(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(it_asks_again_later_however_many_samples_there_are),
         cmocka_unit_test(levels_are_too_early_until_a_window_is_full),
         cmocka_unit_test(a_guard_holds_and_leaves_the_passes),
         cmocka_unit_test(a_gate_spares_the_network_forgets_passes_and_leaps),

@@ -584,7 +584,8 @@ static inline uint64_t lull_kit_spp(double spp)
     return spp >= 1e18 ? UINT64_C(1000000000000000000) : (uint64_t)spp;
 }
 
-/* CONTINUE, next check at `next` samples: rounded up, later than now, within the host's limit. */
+/* CONTINUE, next check at `next` samples: rounded up, later than now, within the host's limit. More samples than a double
+ * or lull_kit_spp can count: when the host likes. */
 static inline void lull_kit_continue(const struct lull_kit *kit, const struct lull_block *block, double next,
                                      struct lull_decision *decision)
 {
@@ -593,6 +594,8 @@ static inline void lull_kit_continue(const struct lull_kit *kit, const struct lu
     decision->next_spp = lull_kit_spp(ceil(fmax(next, first)));
     if (kit->spp_max > block->spp && decision->next_spp > kit->spp_max)
         decision->next_spp = kit->spp_max;
+    if (decision->next_spp <= block->spp)
+        decision->next_spp = 0;
 }
 
 /* What a mean over a block's pixels is made of. */

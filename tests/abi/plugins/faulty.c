@@ -53,6 +53,18 @@ enum fault {
     ANONYMOUS_KEY,
     SAVE_IGNORES,
     READS_LATER_FIELD,
+    SHORT_DECISIONS,
+    ANY_SCALE,
+    FIRST_BLOCK_ONLY,
+    MUTE,
+    POSITIVE,
+    FALSE_ALARM,
+    DROPS_WHEN_REFUSED,
+    TRUSTS_RECTANGLE,
+    SHORT_KEYS_ONLY,
+    SPINS,
+    SAVES_NOTHING,
+    SHORT_WRITER,
     FAULT_COUNT
 };
 
@@ -76,6 +88,7 @@ struct lull_instance {
     struct lull_kit kit;
     struct history *history; /* owns, [kit.block_count] */
     uint32_t history_count;
+    double most_pixels; /* of a block of the frame */
     const struct lull_rect *rects; /* KEEPS_POINTER */
 };
 
@@ -84,7 +97,7 @@ static double shared_scratch[2];
 
 static enum fault fault_of(const struct lull_instance *in)
 {
-    return (enum fault)(int)in->kit.value[FAULT];
+    return in ? (enum fault)(int)in->kit.value[FAULT] : NONE;
 }
 
 /* --- pixels ---------------------------------------------------------------------------------------------------------- */
@@ -207,11 +220,19 @@ static void remember(const struct lull_instance *in, const struct lull_view *vie
     d->flags |= bad ? LULL_DECISION_BAD_INPUT : 0;
 }
 
+/* 0, when the host likes, beyond what can be counted. */
+static uint64_t later(uint64_t spp)
+{
+    return spp < UINT64_MAX / 2 ? spp + spp / 2 + 2 : 0;
+}
+
 static void judge(struct lull_instance *in, const struct lull_view *view, const struct lull_block *block,
                   struct lull_decision *d, uint32_t worker)
 {
     (void)worker;
     misbehave(in, block);
+    if (fault_of(in) == TRUSTS_RECTANGLE && lull_kit_pixels(block) > in->most_pixels)
+        abort(); /* it would write beyond what it made for the frame's blocks */
     d->flags = 0;
     d->action = LULL_CONTINUE;
     if (fault_of(in) == STOPS_AT_0 && block->spp == 0)
@@ -224,7 +245,7 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
     const struct history *h = history_of(in, block->id);
     if (h->count < KEPT || block->spp < in->kit.need.first_spp) {
         d->flags |= LULL_DECISION_TOO_EARLY;
-        d->next_spp = block->spp + block->spp / 2 + 2;
+        d->next_spp = later(block->spp);
         return;
     }
     d->error = change(h);
@@ -233,7 +254,7 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
         d->error += 1e-6 * calls++;
     }
     d->action = d->error <= in->kit.value[THRESHOLD] ? LULL_STOP : LULL_CONTINUE;
-    d->next_spp = fault_of(in) == NEXT_IN_PAST ? block->spp : block->spp + block->spp / 2 + 2;
+    d->next_spp = fault_of(in) == NEXT_IN_PAST ? block->spp : later(block->spp);
 }
 
 static const struct lull_kit_rule rule = {
@@ -271,6 +292,14 @@ static int chosen(const struct lull_pair *pairs, uint32_t count, enum fault faul
            lull_kit_number(pairs->value, &number) && number == (double)fault;
 }
 
+static int has_long_key(const struct lull_pair *pairs, uint32_t count)
+{
+    for (uint32_t i = 0; i < count && pairs; i++)
+        if (pairs[i].key && strlen(pairs[i].key) > 200)
+            return 1;
+    return 0;
+}
+
 static const struct lull_criterion criterion;
 
 static int32_t create(const struct lull_host *host, const struct lull_pair *pairs, uint32_t pair_count, uint32_t pair_stride,
@@ -279,22 +308,25 @@ static int32_t create(const struct lull_host *host, const struct lull_pair *pair
     if (!instance)
         return lull_kit_fail(err, LULL_E_INVALID, "create: no place for the instance");
     struct lull_host whole = {.struct_size = sizeof whole};
-    if (chosen(pairs, pair_count, SHORT_STRUCT) && host) {
+    const uint32_t readable = pair_stride >= sizeof *pairs ? pair_count : 0;
+    if (chosen(pairs, readable, SHORT_STRUCT) && host) {
         whole = *host;
         whole.struct_size = sizeof whole;
         host = &whole;
     }
     struct lull_instance *in = NULL;
     int32_t status = lull_kit_create(&rule, &criterion, sizeof *in, host, pairs, pair_count, pair_stride, NULL, &in, err);
-    if ((status == LULL_E_KEY && chosen(pairs, pair_count, ANY_KEY)) ||
-        (status == LULL_E_VALUE && chosen(pairs, pair_count, ANY_VALUE)))
+    if ((status == LULL_E_KEY && chosen(pairs, readable, ANY_KEY)) ||
+        (status == LULL_E_VALUE && chosen(pairs, readable, ANY_VALUE)))
         status = lull_kit_create(&rule, &criterion, sizeof *in, host, pairs, 1, pair_stride, NULL, &in, NULL);
-    if (status == LULL_E_MEMORY && chosen(pairs, pair_count, UNCHECKED_MALLOC))
-        create_faults(in);
+    if (status == LULL_E_MEMORY && chosen(pairs, readable, UNCHECKED_MALLOC))
+        in->history_count = 0;
     if (status != LULL_OK) {
-        if (chosen(pairs, pair_count, TOUCHES_INSTANCE))
+        if (chosen(pairs, readable, TOUCHES_INSTANCE))
             *instance = NULL;
-        if (chosen(pairs, pair_count, ANONYMOUS_KEY) && err)
+        if (chosen(pairs, readable, SHORT_KEYS_ONLY) && has_long_key(pairs, readable))
+            abort(); /* it would print the key into a small array */
+        if (chosen(pairs, readable, ANONYMOUS_KEY) && err)
             lull_kit_fail(err, status, "cannot");
         return status;
     }
@@ -319,8 +351,15 @@ static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *fr
         frame = &lenient;
     }
     int32_t status = lull_kit_frame_check(in, frame, err);
+    if (status != LULL_OK && fault_of(in) == DROPS_WHEN_REFUSED && in->history)
+        memset(in->history, 0, in->history_count * sizeof *in->history);
     if (status != LULL_OK)
         return status;
+    in->most_pixels = 0;
+    for (uint32_t i = 0; i < frame->block_count; i++) {
+        const struct lull_rect *r = lull_kit_rect(frame, i);
+        in->most_pixels = fmax(in->most_pixels, ((double)r->x1 - r->x0) * ((double)r->y1 - r->y0));
+    }
     struct history *history = calloc(frame->block_count, sizeof *history);
     if (!history)
         return lull_kit_fail(err, LULL_E_MEMORY, "out of memory");
@@ -335,18 +374,57 @@ static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *fr
     return LULL_OK;
 }
 
+/* Faults of those who refuse: the status instead. */
+static int32_t misanswer(struct lull_instance *in, const struct lull_view *view, const struct lull_block *blocks,
+                         uint32_t block_stride, struct lull_decision *decisions, uint32_t decision_stride, uint32_t count,
+                         int32_t status, struct lull_error *err)
+{
+    const struct lull_plane *color;
+    switch (fault_of(in)) {
+    case SHORT_DECISIONS:
+        return status == LULL_E_VERSION && decision_stride < sizeof *decisions
+                   ? lull_kit_evaluate(in, view, blocks, block_stride, decisions, sizeof *decisions, count, err)
+                   : status;
+    case ANY_SCALE:
+        color = status == LULL_E_PLANE && view->planes && view->plane_stride >= sizeof *color
+                    ? lull_kit_plane(view, LULL_PLANE_COLOR)
+                    : NULL;
+        return color && color->scale == 0 ? LULL_OK : status;
+    case FIRST_BLOCK_ONLY:
+        return status == LULL_E_INVALID && blocks && decisions && count > 1
+                   ? lull_kit_evaluate(in, view, blocks, block_stride, decisions, decision_stride, 1, err)
+                   : status;
+    case MUTE:
+        if (err && err->struct_size == sizeof *err)
+            err->message[0] = '\0';
+        return status;
+    case POSITIVE:
+        return status == LULL_E_PLANE ? 5 : status;
+    case SPINS:
+        while (status == LULL_E_INVALID && blocks && block_stride >= sizeof *blocks && blocks->x0 > blocks->x1)
+            pause(); /* it would go from x0 on until it meets x1 */
+        return status;
+    default:
+        return status;
+    }
+}
+
 static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, const struct lull_block *blocks,
                         uint32_t block_stride, struct lull_decision *decisions, uint32_t decision_stride, uint32_t count,
                         struct lull_error *err)
 {
-    if (fault_of(in) == ANY_ID && count > 0 && blocks && blocks->id >= in->kit.block_count)
+    if (fault_of(in) == ANY_ID && count > 0 && blocks && block_stride >= sizeof *blocks && blocks->id >= in->kit.block_count)
         return LULL_OK;
     int32_t status = lull_kit_evaluate(in, view, blocks, block_stride, decisions, decision_stride, count, err);
-    if (status == LULL_OK && fault_of(in) == WIDE_WRITE && count > 0 && decision_stride >= sizeof *decisions + 8)
+    if (status != LULL_OK)
+        return misanswer(in, view, blocks, block_stride, decisions, decision_stride, count, status, err);
+    if (fault_of(in) == FALSE_ALARM && count > 0)
+        lull_kit_fail(err, LULL_E_INTERNAL, "all is well");
+    if (fault_of(in) == WIDE_WRITE && count > 0 && decision_stride >= sizeof *decisions + 8)
         memset(decisions + 1, 0, 8);
-    if (status == LULL_OK && fault_of(in) == READS_LATER_FIELD)
+    if (fault_of(in) == READS_LATER_FIELD)
         return *((const volatile char *)(view + 1)) == 0 ? LULL_OK : LULL_OK;
-    if (status == LULL_OK && fault_of(in) == BATCH_INDEX)
+    if (fault_of(in) == BATCH_INDEX)
         for (uint32_t i = 0; i < count; i++) {
             void *at = (char *)decisions + (size_t)i * decision_stride;
             ((struct lull_decision *)at)->predicted_spp = 100 + (double)i;
@@ -374,7 +452,15 @@ static void destroy(struct lull_instance *in)
 
 static int32_t save(const struct lull_instance *in, const struct lull_writer *writer, struct lull_error *err)
 {
+    if (writer && fault_of(in) != SHORT_WRITER && !LULL_HAS(struct lull_writer, writer, write))
+        return lull_kit_fail(err, LULL_E_VERSION, "save: the writer is older than version 1.0");
+    if (!in || !writer || !writer->write)
+        return lull_kit_fail(err, LULL_E_INVALID, "save: an argument is missing");
     uint32_t count = in->kit.block_count;
+    if (count == 0 && fault_of(in) == SAVES_NOTHING)
+        return LULL_OK;
+    if (count == 0)
+        return lull_kit_fail(err, LULL_E_STATE, "save: no frame is open");
     int32_t status = writer->write(writer, &count, sizeof count);
     if (status == LULL_OK)
         status = writer->write(writer, in->history, count * sizeof(struct history));
@@ -386,6 +472,10 @@ static int32_t save(const struct lull_instance *in, const struct lull_writer *wr
 static int32_t load(struct lull_instance *in, const struct lull_reader *reader, struct lull_error *err)
 {
     uint32_t count;
+    if (reader && !LULL_HAS(struct lull_reader, reader, read))
+        return lull_kit_fail(err, LULL_E_VERSION, "load: the reader is older than version 1.0");
+    if (!in || !reader || !reader->read)
+        return lull_kit_fail(err, LULL_E_INVALID, "load: an argument is missing");
     if (in->kit.block_count == 0)
         return lull_kit_fail(err, LULL_E_STATE, "load: no frame is open");
     struct history *fresh = calloc(in->kit.block_count, sizeof *fresh);
