@@ -88,7 +88,7 @@ struct lull_instance {
     struct lull_kit kit;
     struct history *history; /* owns, [kit.block_count] */
     uint32_t history_count;
-    double most_pixels; /* of a block of the frame */
+    double most_pixels;            /* of a block of the frame */
     const struct lull_rect *rects; /* KEEPS_POINTER */
 };
 
@@ -288,8 +288,8 @@ static void create_faults(struct lull_instance *in)
 static int chosen(const struct lull_pair *pairs, uint32_t count, enum fault fault)
 {
     double number;
-    return count > 0 && pairs && pairs->key && strcmp(pairs->key, "fault") == 0 &&
-           lull_kit_number(pairs->value, &number) && number == (double)fault;
+    return count > 0 && pairs && pairs->key && strcmp(pairs->key, "fault") == 0 && lull_kit_number(pairs->value, &number) &&
+           number == (double)fault;
 }
 
 static int has_long_key(const struct lull_pair *pairs, uint32_t count)
