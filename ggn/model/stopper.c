@@ -128,7 +128,8 @@ static int verdict_valid(const struct ggn_stopper *s)
 
     if (v->stop ? !s->used || v->stop > 1 || v->too_early : v->next_spp && v->next_spp <= s->asked_spp)
         return 0;
-    return unknown_or_positive(v->predicted_spp) && unknown_or_positive(v->noise) && unknown_or_positive(v->p) && !(v->p > 1);
+    return unknown_or_positive(v->predicted_spp) && unknown_or_positive(v->noise) && unknown_or_positive(v->p) &&
+           !(v->p > 1);
 }
 
 int ggn_stopper_valid(const struct ggn_stop_rule *rule, const struct ggn_stopper *s)

@@ -22,7 +22,8 @@ struct lc_report {
 };
 
 /* Forks; the child calls fn(c, arg) with c->report_fd set, the parent waits, at most limit_s. What the child prints, or a
- * signal that ends it, is a failure; what lc_doing said last is then noted. Returns 0, or -1 if no process could be made. Not thread safe. */
+ * signal that ends it, is a failure; what lc_doing said last is then noted. Returns 0, or -1 if no process could be made.
+ * Not thread safe. */
 int lc_child_run(struct lc *c, void (*fn)(struct lc *c, const void *arg), const void *arg, unsigned limit_s,
                  struct lc_report *report);
 
