@@ -369,7 +369,8 @@ static void far_and_damaged(void **state)
 {
     struct ggn_stop_rule rule = make_rule();
     struct show noisy = {.noise = 1e12, .logit = 5};
-    struct ggn_stopper s = {0}, good = {.spp = {10, 15, 23}, .used = 3, .regular = 3, .leapt = 1, .verdict.stop = 1};
+    struct ggn_stopper s = {0}, good = {.spp = {10, 15, 23}, .used = 3, .regular = 3, .leapt = 1, .asked_spp = 23};
+    good.verdict.stop = 1;
 
     rule.policy.gate_noise = 1;
     assert_true(ask(&rule, &s, 10, &noisy));
