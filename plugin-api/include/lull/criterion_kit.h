@@ -568,7 +568,7 @@ static inline int32_t lull_kit_evaluate(struct lull_instance *in, const struct l
     if (status != LULL_OK)
         return status;
     const struct lull_host *host = lull_kit_read_of(in)->host;
-    if (host && host->parallel_for && count > 1) {
+    if (host && host->parallel_for && count > 0) { /* for one block too: only the host knows which worker is free */
         status = host->parallel_for(host, count, lull_kit_task, &batch);
         return status == LULL_OK ? LULL_OK : lull_kit_fail(err, status, "evaluate: the host left out blocks");
     }

@@ -9,6 +9,7 @@
 #include <lull/criterion_kit.h>
 
 #include <stdatomic.h>
+#include <time.h>
 
 enum { ALL_PLANES = (1 << LULL_PLANE_COUNT) - 1, WORKERS_MOST = 64 };
 
@@ -197,6 +198,8 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
     (void)view;
     if (worker >= lull_kit_workers(&in->kit) || worker >= WORKERS_MOST || atomic_flag_test_and_set(&in->busy[worker]))
         witness("worker %u is none or busy\n", worker); /* no line of numbers: seen */
+    if (witnessed && in->kit.host && in->kit.host->parallel_for)
+        nanosleep(&(struct timespec){.tv_nsec = 50000}, NULL); /* so that a second call with this worker meets it */
     atomic_fetch_add(&in->answered, 1);
     double n = (double)b->spp, end = fmax(dial.stop, dial.first);
     d->action = dial.action >= 0 && n >= dial.from ? (int32_t)dial.action : n >= end && n > 0 ? LULL_STOP : LULL_CONTINUE;
