@@ -342,6 +342,8 @@ static char *quote_of(struct pt_approve_case *c)
         r->blocks.list[i].thread_s = 1e-3 * (1 + i) * (double)r->blocks.list[i].spp;
     if (strstr(c->text, "unasked"))
         r->blocks.list[3].spp = 0;
+    for (int i = 0; i < run.quote->row_count && strstr(c->text, "unsaid"); i++)
+        run.quote->rows[i].said[2] = (struct pt_outlook_said){.spp = r->blocks.list[2].spp, .predicted = (double)NAN};
     r->totals.criterion_s = 0.25 * (double)r->totals.checks;
     assert_int_equal(pt_quote_finish(run.quote, r, &err), 0);
     fprintf(out, "a check takes %.9g\n", run.quote->check_s);

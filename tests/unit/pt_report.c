@@ -17,6 +17,7 @@
 #include "base/clock.h"
 #include "base/colour.h"
 #include "base/files.h"
+#include "base/version.h"
 #include "image/oiio.h"
 #include "image/stopmap.h"
 #include "render/output.h"
@@ -157,6 +158,22 @@ static void exr_holds_every_layer(void **state)
     assert_string_equal(text, "alpha,motion");
     assert_int_equal(exr_attr_get_string(file, 0, "lull:block", &length, &text), EXR_ERR_SUCCESS);
     assert_string_equal(text, "16x16");
+    static const char *const words[][2] = {
+        {"lull:scene", "dir/fake-view1.pbrt"}, {"software", "lull pathtracer " BASE_VERSION},
+        {"lull:reasons", "0=none 1=criterion 2=spp-max 3=uniform 4=time 5=interrupt 6=dropped"}};
+    for (int i = 0; i < 3; i++) {
+        assert_int_equal(exr_attr_get_string(file, 0, words[i][0], &length, &text), EXR_ERR_SUCCESS);
+        assert_string_equal(text, words[i][1]);
+    }
+    const struct {
+        const char *name;
+        double value;
+    } figures[] = {{"lull:seed", 7}, {"lull:samples", (double)render->totals.samples}, {"lull:seconds", pt_render_elapsed_s(render)}};
+    for (int i = 0; i < 3; i++) {
+        double value = -1;
+        assert_int_equal(exr_attr_get_double(file, 0, figures[i].name, &value), EXR_ERR_SUCCESS);
+        assert_true(value == figures[i].value);
+    }
     static const char *const names[] = {"R", "G", "B", "lull.spp", "lull.reason", "lull.p_noisy", "lull.error",
                                         "albedo.R", "albedo.G", "albedo.B", "normal.X", "normal.Y", "normal.Z", "depth.Z"};
     for (int k = 0; k < 14; k++) {
