@@ -256,7 +256,7 @@ static void average(struct ggn_session *s, uint64_t step)
 {
     const double share = fmax(1.0 / (s->plan->average + 1), 1.0 / (double)(step + 1));
 
-    for (int net = 0; net < GGN_NETS; net++)
+    for (int net = GGN_NET_M; net < GGN_NETS; net++)
         for (size_t i = 0; s->average[net] && i < s->trainer->graph[net].n_learned; i++) {
             float *mean = &s->average[net][i];
             *mean = (float)((double)*mean + share * ((double)s->trainer->weights[net]->params[i] - (double)*mean));
@@ -266,7 +266,7 @@ static void average(struct ggn_session *s, uint64_t step)
 /* Puts the averaged weights in the place of the trained ones, or back. */
 static void exchange_average(struct ggn_session *s)
 {
-    for (int net = 0; net < GGN_NETS; net++)
+    for (int net = GGN_NET_M; net < GGN_NETS; net++)
         for (size_t i = 0; s->average[net] && i < s->trainer->graph[net].n_learned; i++) {
             float *w = &s->trainer->weights[net]->params[i], trained = *w;
             *w = s->average[net][i];

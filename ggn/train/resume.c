@@ -71,11 +71,12 @@ static float *state_array(struct ggn_session *s, int i, size_t *count)
     if (i < 10)
         return ggn_trainer_state(s->trainer, i < 5 ? GGN_NET_M : GGN_NET_D, i % 5, count);
     static const int net_of[] = {GGN_NET_M, GGN_NET_D, GGN_NET_R};
-    float *const lists[] = {s->best[GGN_NET_M],    s->best[GGN_NET_D],    s->best[GGN_NET_R],
-                            s->average[GGN_NET_M], s->average[GGN_NET_D], s->average[GGN_NET_R]};
-    float *kept[6];
-    int nets[6], n = 0;
-    for (int k = 0; k < 6; k++)
+    float *const lists[] = {s->best[GGN_NET_M], s->best[GGN_NET_D], s->best[GGN_NET_R], s->average[GGN_NET_M],
+                            s->average[GGN_NET_D]};
+    enum { LISTS = sizeof lists / sizeof lists[0] };
+    float *kept[LISTS];
+    int nets[LISTS], n = 0;
+    for (int k = 0; k < LISTS; k++)
         if (lists[k]) {
             nets[n] = net_of[k % 3];
             kept[n++] = lists[k];
