@@ -32,7 +32,7 @@ static int roots(double a, double b, double c, double *t0, double *t1)
     if (!(disc >= 0.0) || a == 0.0)
         return 0;
     double s = b < 0.0 ? sqrt(disc) - b : -sqrt(disc) - b;
-    double r0 = s / a, r1 = s != 0.0 ? c / s : -2.0 * b / a - r0;
+    double r0 = s / a, r1 = s != 0.0 ? c / s : r0; /* s is 0 where b and c are */
     *t0 = r0 < r1 ? r0 : r1;
     *t1 = r0 < r1 ? r1 : r0;
     return 1;

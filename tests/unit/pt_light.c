@@ -259,6 +259,30 @@ static void sphere_inside(void **state)
     test_scene_end(&scene);
 }
 
+/* Only whole spheres that are still spheres after their transform are sampled by the cone that they fill. */
+static void only_spheres_are_cones(void **state)
+{
+    (void)state;
+    static const struct {
+        float columns[9], z_min, z_max, phi_max;
+        int cone;
+    } cases[] = {{{2, 0, 0, 0, 2, 0, 0, 0, 2}, -1, 1, 6.2831853f, 1},          {{2, 0, 0, 0, 0, 2, 0, -2, 0}, -2, 3, 6.2831853f, 1},
+                 {{2, 0, 0, 0, 2.01f, 0, 0, 0, 2}, -1, 1, 6.2831853f, 0},      {{2, 0, 0, 0, 2, 0, 0, 0, 2.01f}, -1, 1, 6.2831853f, 0},
+                 {{1.92f, 0.56f, 0, 0.56f, 1.92f, 0, 0, 0, 2}, -1, 1, 6.2831853f, 0}, {{1.92f, 0, 0.56f, 0, 2, 0, 0.56f, 0, 1.92f}, -1, 1, 6.2831853f, 0},
+                 {{2, 0, 0, 0, 1.92f, 0.56f, 0, 0.56f, 1.92f}, -1, 1, 6.2831853f, 0}, {{2, 0, 0, 0, 2, 0, 0, 0, 2}, -0.99f, 1, 6.2831853f, 0},
+                 {{2, 0, 0, 0, 2, 0, 0, 0, 2}, -1, 0.99f, 6.2831853f, 0},      {{2, 0, 0, 0, 2, 0, 0, 0, 2}, -1, 1, 6.28f, 0}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        const float *c = cases[i].columns;
+        struct pt_quadric q = {.kind = PT_QUADRIC_SPHERE, .radius = 1, .z_min = cases[i].z_min, .z_max = cases[i].z_max, .phi_max = cases[i].phi_max};
+        set_transform(&q, (struct pt_mat34){{c[0], c[3], c[6], 5, c[1], c[4], c[7], 0, c[2], c[5], c[8], 0}});
+        struct pt_scene scene = {.quadrics = &q};
+        const struct pt_shape shape = {.kind = PT_SHAPE_QUADRIC};
+        float pdf = pt_light_quadric_pdf(&scene, &shape, v3(0, 0, 0), v3(3, 0, 0), v3(-1, 0, 0), v3(1, 0, 0));
+        float cone = 1.0f / (2.0f * PT_PI * (1.0f - sqrtf(1.0f - 0.16f))); /* radius 2 at distance 5 */
+        assert_int_equal(fabsf(pdf / cone - 1.0f) < 1e-5f, cases[i].cone);
+    }
+}
+
 /* Points of its own inner side are lit by the whole of it, evenly by area, whichever side of it their rounding puts them. */
 static void sphere_lights_itself(void **state)
 {
@@ -380,7 +404,7 @@ int main(void)
         cmocka_unit_test(sphere_inside),                   cmocka_unit_test(ellipsoid), cmocka_unit_test(cylinder),
         cmocka_unit_test(disk),                            cmocka_unit_test(latlong),   cmocka_unit_test(equal_area),
         cmocka_unit_test(portal_of_an_image),              cmocka_unit_test(portal_of_a_constant),
-        cmocka_unit_test(delta_lights), cmocka_unit_test(sphere_lights_itself), cmocka_unit_test(skies_are_looked_up_where_they_are),
+        cmocka_unit_test(delta_lights), cmocka_unit_test(sphere_lights_itself), cmocka_unit_test(only_spheres_are_cones), cmocka_unit_test(skies_are_looked_up_where_they_are),
         cmocka_unit_test(tables_are_as_fine_as_the_image_asks),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
