@@ -32,11 +32,6 @@ static inline struct pt_bsdf pt_layer_base(const struct pt_bsdf *b)
     return base;
 }
 
-static inline int pt_layer_base_is_delta(const struct pt_bsdf *base)
-{
-    return base->kind == PT_BSDF_CONDUCTOR && base->alpha_x == 0.0f;
-}
-
 /* Through the interface, given that it transmits; the 1/etap² of radiance is left to the caller. 0: nothing passes. */
 static inline int pt_layer_transmit(const struct pt_bsdf *b, pt_vec3 wo, float u0, float u1, struct pt_layer_ray *out)
 {
@@ -114,7 +109,7 @@ struct pt_layer_walk {
     pt_vec3 wi;                  /* outside */
     pt_vec3 w, beta, f;          /* current direction (along the walk), throughput, result */
     float z;
-    int top_delta, base_delta;
+    int top_delta;
 };
 
 /* Light that leaves by `exit` after scattering at height z with f |cos| = `scattered` and sampling density pdf. */
@@ -170,28 +165,29 @@ static inline int pt_layer_at_interface(struct pt_layer_walk *k, struct pt_rng *
     return 1;
 }
 
+static inline int pt_layer_bounce(const struct pt_bsdf *base, pt_vec3 wo, struct pt_rng *rng, struct pt_bsdf_sample *s)
+{
+    float u0 = pt_rng_float(rng), u1 = pt_rng_float(rng);
+    if (base->kind != PT_BSDF_CONDUCTOR)
+        return pt_diffuse_sample(PT_FX_ALL, base, wo, 0.0f, u0, u1, s);
+    return base->alpha_x > 0.0f ? pt_conductor_sample_rough(base, wo, u0, u1, s) : pt_conductor_sample_smooth(base, wo, s);
+}
+
 static inline int pt_layer_at_base(struct pt_layer_walk *k, struct pt_rng *rng)
 {
-    pt_vec3 wo = v3_neg(k->w);
+    pt_vec3 wo = v3_neg(k->w), to_exit = v3_neg(k->exit.wi);
     struct pt_bsdf_sample s;
-    float u0 = pt_rng_float(rng), u1 = pt_rng_float(rng), pdf;
-    int metal = k->base.kind == PT_BSDF_CONDUCTOR, ok;
-    if (!k->base_delta) {
-        pt_vec3 to_exit = v3_neg(k->exit.wi);
-        pt_vec3 f = metal ? pt_conductor_eval(PT_FX_ALL, &k->base, wo, to_exit, &pdf)
-                          : pt_diffuse_eval(PT_FX_ALL, &k->base, wo, to_exit, &pdf);
-        pt_layer_connect(k, f, pdf);
-        ok = metal ? pt_conductor_sample_rough(&k->base, wo, u0, u1, &s)
-                   : pt_diffuse_sample(PT_FX_ALL, &k->base, wo, 0.0f, u0, u1, &s);
-    } else {
-        ok = pt_conductor_sample_smooth(&k->base, wo, &s);
-    }
-    if (!ok)
+    float pdf;
+    /* black for a mirror, which nothing can be connected to */
+    pt_vec3 f = k->base.kind == PT_BSDF_CONDUCTOR ? pt_conductor_eval(PT_FX_ALL, &k->base, wo, to_exit, &pdf)
+                                                  : pt_diffuse_eval(PT_FX_ALL, &k->base, wo, to_exit, &pdf);
+    pt_layer_connect(k, f, pdf);
+    if (!pt_layer_bounce(&k->base, wo, rng, &s))
         return 0;
     k->beta = v3_mul(k->beta, s.weight);
     k->w = s.wi;
     if (!k->top_delta)
-        pt_layer_escape(k, k->base_delta ? 0.0f : s.pdf_solid);
+        pt_layer_escape(k, s.flags & PT_SCATTER_DELTA ? 0.0f : s.pdf_solid);
     return 1;
 }
 
@@ -201,7 +197,6 @@ static inline pt_vec3 pt_layer_walk_eval(const struct pt_bsdf *b, pt_vec3 wo, pt
 {
     struct pt_layer_walk k = {.top = b, .base = pt_layer_base(b), .wi = wi, .f = v3_splat(0.0f), .z = b->thickness};
     struct pt_layer_ray enter;
-    k.base_delta = pt_layer_base_is_delta(&k.base);
     k.top_delta = pt_dielectric_is_smooth(b);
     float u0 = pt_rng_float(rng), u1 = pt_rng_float(rng), u2 = pt_rng_float(rng), u3 = pt_rng_float(rng);
     if (!pt_layer_transmit(b, wo, u0, u1, &enter) || !pt_layer_transmit(b, wi, u2, u3, &k.exit))
@@ -260,14 +255,6 @@ static inline int pt_layer_scatter(const struct pt_bsdf *b, pt_vec3 *w, pt_vec3 
     float u0 = pt_rng_float(rng), u1 = pt_rng_float(rng);
     pt_phase_sample(b->g, v3_neg(*w), u0, u1, w);
     return 1;
-}
-
-static inline int pt_layer_bounce(const struct pt_bsdf *base, pt_vec3 wo, struct pt_rng *rng, struct pt_bsdf_sample *s)
-{
-    float u0 = pt_rng_float(rng), u1 = pt_rng_float(rng);
-    if (base->kind != PT_BSDF_CONDUCTOR)
-        return pt_diffuse_sample(PT_FX_ALL, base, wo, 0.0f, u0, u1, s);
-    return base->alpha_x > 0.0f ? pt_conductor_sample_rough(base, wo, u0, u1, s) : pt_conductor_sample_smooth(base, wo, s);
 }
 
 /*

@@ -73,6 +73,19 @@ static void empty_scene_has_no_hits(void **state)
     test_scene_end(&scene);
 }
 
+/* The bounds of a sheet have no thickness; it still has a place. */
+static void bounds_of_a_sheet(void **state)
+{
+    (void)state;
+    struct pt_scene scene;
+    test_scene_begin(&scene);
+    test_add_quad(&scene, test_add_diffuse(&scene, v3_splat(0.5f)), v3(2, -1, 3), v3(0, 4, 0), v3(0, 0, 5));
+    test_scene_finish(&scene);
+    assert_vec_near(scene.bounds_min, v3(2, -1, 3), 1e-5f);
+    assert_vec_near(scene.bounds_max, v3(2, 3, 8), 1e-5f);
+    test_scene_end(&scene);
+}
+
 /* Known hits of a whole sphere, a clipped one, a half cylinder and an annulus. */
 static void quadrics(void **state)
 {
@@ -350,7 +363,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(triangles_have_right_hand_normals), cmocka_unit_test(empty_scene_has_no_hits),
-        cmocka_unit_test(quadrics), cmocka_unit_test(quadric_surfaces), cmocka_unit_test(instances),
+        cmocka_unit_test(bounds_of_a_sheet), cmocka_unit_test(quadrics), cmocka_unit_test(quadric_surfaces), cmocka_unit_test(instances),
         cmocka_unit_test(meshes_are_watertight), cmocka_unit_test(many_rays_are_as_single_ones),
         cmocka_unit_test(matrices_invert), cmocka_unit_test(arenas_give_room),
     };

@@ -259,6 +259,29 @@ static void sphere_inside(void **state)
     test_scene_end(&scene);
 }
 
+/* A triangle with normals emits to the side that they have together, whatever its winding and the first of them say. */
+static void normals_say_which_side_emits(void **state)
+{
+    (void)state;
+    for (int k = 0; k < 8; k++) {
+        struct pt_scene scene;
+        test_scene_begin(&scene);
+        int32_t id = test_add_quad(&scene, test_add_diffuse(&scene, v3_splat(0.0f)), v3(0, 0, 0), v3(1, 0, 0), v3(0, 1, 0));
+        struct pt_mesh *mesh = &scene.meshes[scene.shapes[id].data];
+        struct pt_vertex vertices[4];
+        memcpy(vertices, mesh->vertices, sizeof vertices);
+        for (int i = 0; i < 3; i++) /* of the corners of the first triangle, those in k point down */
+            vertices[mesh->indices[i]].n = v3(0, 0, k >> i & 1 ? -1.0f : 1.0f);
+        mesh->vertices = vertices;
+        mesh->has_normals = 1;
+        test_add_area_light(&scene, id, v3(1, 1, 1), 0);
+        test_scene_finish(&scene);
+        int down = (k & 1) + (k >> 1 & 1) + (k >> 2 & 1);
+        assert_true(scene.emitters[0].n.z == (down > 1 ? -1.0f : 1.0f));
+        test_scene_end(&scene);
+    }
+}
+
 /* Only whole spheres that are still spheres after their transform are sampled by the cone that they fill. */
 static void only_spheres_are_cones(void **state)
 {
@@ -404,7 +427,7 @@ int main(void)
         cmocka_unit_test(sphere_inside),                   cmocka_unit_test(ellipsoid), cmocka_unit_test(cylinder),
         cmocka_unit_test(disk),                            cmocka_unit_test(latlong),   cmocka_unit_test(equal_area),
         cmocka_unit_test(portal_of_an_image),              cmocka_unit_test(portal_of_a_constant),
-        cmocka_unit_test(delta_lights), cmocka_unit_test(sphere_lights_itself), cmocka_unit_test(only_spheres_are_cones), cmocka_unit_test(skies_are_looked_up_where_they_are),
+        cmocka_unit_test(delta_lights), cmocka_unit_test(sphere_lights_itself), cmocka_unit_test(only_spheres_are_cones), cmocka_unit_test(normals_say_which_side_emits), cmocka_unit_test(skies_are_looked_up_where_they_are),
         cmocka_unit_test(tables_are_as_fine_as_the_image_asks),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
