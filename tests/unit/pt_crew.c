@@ -20,8 +20,10 @@
 #include "support/pt_fake.h"
 #include "support/base_room.h"
 
-/* DEAF: it samples, but does not answer when the criterion is to be asked. */
-enum behaviour { WORKS, SILENT, BABBLES, FAILS, DEAF, OTHER_SETTINGS, ABSENT };
+/* DEAF: it samples, but does not answer when the criterion is to be asked. LIES: what it says of its rows is wrong. */
+enum behaviour { WORKS, SILENT, BABBLES, FAILS, DEAF, LIES, OTHER_SETTINGS, ABSENT };
+enum { LIE_ROW, LIE_LEFT, LIE_RIGHT, LIE_PLACE, LIE_PLANES, LIE_COUNT, LIE_SIZE, LIE_KINDS };
+static int lie;
 
 /* The fake criterion without history, which others may ask too; how many blocks they did ask about. */
 static struct lull_criterion pure;
@@ -80,6 +82,15 @@ static void sample(struct member *m, struct pt_crew_rows *rows, size_t size)
         sums += pt_row_bytes(row, rows->planes);
         pt_film_release(&film);
     }
+    if (m->behaviour == LIES) {
+        rows->rows[0].y += lie == LIE_ROW;
+        rows->rows[0].x0 += lie == LIE_LEFT;
+        rows->rows[0].x1 -= lie == LIE_RIGHT;
+        rows->rows[0].place += lie == LIE_PLACE ? 1000000 : 0;
+        rows->planes ^= lie == LIE_PLANES ? PT_FILM_DEPTH : 0;
+        rows->count += lie == LIE_COUNT ? 1000000 : 0;
+        size -= lie == LIE_SIZE;
+    }
     base_peers_send(m->peers, 0, rows, size, &err);
 }
 
@@ -97,7 +108,7 @@ static void misbehave(struct member *m)
             continue;
         }
         const struct pt_crew_rows *rows = data;
-        if (m->behaviour == DEAF && rows->kind == PT_CREW_ROWS) {
+        if ((m->behaviour == DEAF || m->behaviour == LIES) && rows->kind == PT_CREW_ROWS) {
             sample(m, data, size);
             continue;
         }
@@ -375,6 +386,13 @@ static void a_member_that_makes_no_sense_is_named(void **state)
     ends_well(pt_fake_criterion(), BABBLES, 0, "rank 2 on host here said something that makes no sense");
 }
 
+static void a_member_whose_rows_are_not_those_sent_is_named(void **state)
+{
+    (void)state;
+    for (lie = 0; lie < LIE_KINDS; lie++)
+        ends_well(pt_fake_criterion(), LIES, 0, "rank 2 on host here said something that makes no sense");
+}
+
 static void a_member_that_fails_says_why(void **state)
 {
     (void)state;
@@ -424,6 +442,7 @@ int main(void)
         cmocka_unit_test(a_member_that_is_silent_when_asked_is_named),
         cmocka_unit_test(a_silent_member_is_named_and_nothing_is_lost),
         cmocka_unit_test(a_member_that_makes_no_sense_is_named),
+        cmocka_unit_test(a_member_whose_rows_are_not_those_sent_is_named),
         cmocka_unit_test(a_member_that_fails_says_why),
         cmocka_unit_test(an_interruption_leaves_the_slice_undone),
         cmocka_unit_test(other_settings_are_refused_by_name),
