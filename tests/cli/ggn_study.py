@@ -727,6 +727,14 @@ for folder, people in ((choices, 3), (settings, 4)):
     keep_files("reported-" + os.path.basename(folder), folder + "-report")
     ggn("export", folder, "-o", exported)
     keep_export(exported)
+for folder, gone in ((choices, (-3, -1)), (validation, (-3, -2, -1))):  # who is left: one who went away; one of whom no spread is known
+    people = [row[1] for row in contents(folder)[0]]
+    for i in gone:
+        ggn("delete", folder, people[i])
+    ggn("report", folder, "-o", folder + "-left")
+    keep_files("left-" + os.path.basename(folder), folder + "-left")
+ggn("report", study)  # too few trials for a threshold
+keep_files("left-study", os.path.join(study, "report"))
 recorded = os.path.join(whole.ROOT, "tests", "data", "recorded")
 sequence = os.path.join(TMP.name, "sequence")
 ggn("init", sequence, "--task=thresholds", "--views", os.path.join(recorded, "train", "one-view0"), os.path.join(recorded, "validation", "two"),

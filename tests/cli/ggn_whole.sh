@@ -99,8 +99,10 @@ says label-errors label "$d/none"
 people="-O $tmp/o.json --thresholds $recorded/people.csv"
 # shellcheck disable=SC2086
 run evaluate evaluate -d "$d" -w 4 $people -o "$got/evaluated"
+mv "$d/test/three/labels.json" "$tmp/kept-labels"
 # shellcheck disable=SC2086
 run evaluate-recorded evaluate -d "$d" -w 3 $people --recorded --no-quality --ratio 2 --early 0.5 --visible 0.6
+mv "$tmp/kept-labels" "$d/test/three/labels.json"
 "$ggn" convert -t bf16 $model "$tmp/bf16.ggn" && run baseline.near baseline attributes -d "$d" --early 0.1 --ratio 1.2 -o "$tmp/a.ggn"
 # shellcheck disable=SC2086
 run evaluate.near evaluate -d "$d" -m $model -m "$tmp/bf16.ggn" --baseline "$tmp/a.ggn" $people -w 6 -o "$got/evaluated.near"
@@ -170,6 +172,14 @@ run compare-constant compare "$tmp/two.csv" "$tmp/two.csv"
 for i in 1 2 3 4 5 6 7; do printf 'v%d;%d;%d;\n' $i $((100 * i)) $((50 * i)) >>"$tmp/many.csv"; done
 sed 's/;1/;2/g' "$tmp/many.csv" >"$tmp/others.csv"
 run compare-many compare "$tmp/many.csv" "$tmp/others.csv" -o "$got/compared-many"
+for i in $(seq 101); do echo "v$i;$i"; done >"$tmp/101.csv"
+"$ggn" compare "$tmp/101.csv" "$tmp/101.csv" -o "$tmp/101" >"$tmp/said" 2>"$tmp/err" && grep -c '<< EOD' "$tmp/101/heatmaps.png" >"$got/compare-101"
+mkdir "$tmp/broken" "$tmp/empty" && printf '#!/bin/sh\nexit 1\n' >"$tmp/broken/gnuplot" && chmod +x "$tmp/broken/gnuplot"
+for where in broken empty; do
+    rm -rf "$tmp/plots"
+    env PATH="$tmp/$where" "$ggn" compare "$tmp/t.csv" "$tmp/m.csv" -o "$tmp/plots" 2>&1
+    echo "exit $?" && ls -A "$tmp/plots"
+done >"$got/compare-gnuplot"
 says compare-errors compare "$tmp/t.csv" "$tmp/q.csv"
 says compare-errors compare "$tmp/t.csv" "$tmp/m.csv" -v zz
 says compare-errors compare "$tmp/t.csv" "$tmp/m.csv" -v d -o "$tmp/none/x"
@@ -190,6 +200,7 @@ run import-again import-sin3d "$tmp/sin3d/p3d_toy-view1///" -o "$tmp/imported" -
 run import-another import-sin3d "$tmp/sin3d/p3d_toy-view1" -o "$tmp/imported" --block 8
 cp "$tmp/imported/p3d_toy-view0_part6/manifest.json" "$got/imported-manifest" && cp "$tmp/imported/p3d_toy-view0_part6/labels.json" "$got/imported-labels"
 run import-picture reconstruct "$tmp/imported/p3d_toy-view0_part6" -o "$got/pictures/imported.png"
+run evaluate-imported evaluate -d "$tmp/imported" -w 2
 says import-errors import-sin3d "$tmp/sin3d/nothing" -o "$tmp/failed"
 says import-errors import-sin3d "$tmp/sin3d" -o "$tmp/failed" --block 15
 says import-errors import-sin3d "$tmp/none" -o "$tmp/failed"
