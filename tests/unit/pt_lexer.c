@@ -209,7 +209,7 @@ static void include_depth(void **state)
     x.diag.err = &x.err;
     x.lexer = (struct pt_lexer){.source = &x.source, .diag = &x.diag, .arena = &x.arena};
     for (int i = 0; i <= PT_LEXER_DEPTH; i++) {
-        char name[8];
+        char name[16];
         snprintf(name, sizeof name, "f%d", i);
         assert_int_equal(pt_lexer_include(&x.lexer, name, (struct pt_loc){"f", 7, 8}, i % 2), i < PT_LEXER_DEPTH ? 0 : BASE_EINVAL);
     }
