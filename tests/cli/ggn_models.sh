@@ -98,6 +98,13 @@ check "bench --model: a small one decides in less than a fifth" $?
 wanted=f32 && grep -q avx512_bf16 /proc/cpuinfo && wanted=bf16
 grep -q "\"precision\": \"$wanted\"" "$tmp/out" && grep -q '"threads": 2, .*"batch": 1,' "$tmp/out"
 check "bench --precision: $wanted is used here, where it is asked for" $?
+# every layer is timed: the rows of each network give its sum
+run bench --rounds=2 --batch=1 --threads=2 --model "$corpus/f16.ggn"
+[ $rc = 0 ] && awk '$1 == "all" { n++; inside = 0; bad += !(rows > 9 && $3 > 0 && $3 < 1000 && ms > $3 - 0.001 * rows && ms < $3 + 0.001 * rows) }
+    inside { ms += $(NF - 1); rows++ }
+    $1 == "stage" { inside = 1; ms = rows = 0 }
+    END { exit !(n == 3 && bad == 0) }' "$tmp/out"
+check "bench: the times of the layers are that of the network" $?
 run frobnicate
 [ $rc = 2 ]
 check "an unknown command is exit 2" $?
