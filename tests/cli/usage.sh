@@ -25,9 +25,9 @@ for p in ggn lull-check pathtracer; do
     "$bin/$p" --version >"$tmp/out" 2>"$tmp/err" && grep -qx "$p (Lull) $("$bin/ggn" --version | sed 's/.* //')" "$tmp/out"
     check "$p --version is the project's" $?
 done
-# What the path tracer says of itself, as recorded; anew with APPROVE=1, and then to be read.
+# What the path tracer says of itself, as recorded; anew with RECORD=1, and then to be read.
 { "$bin/pathtracer" --help && "$bin/pathtracer" --usage; } >"$tmp/out" 2>"$tmp/err"
-[ -z "${APPROVE:-}" ] || cp "$tmp/out" tests/golden/pathtracer/help.txt
+[ -z "${RECORD:-}" ] || cp "$tmp/out" tests/golden/pathtracer/help.txt
 diff "$tmp/out" tests/golden/pathtracer/help.txt >"$tmp/err"
 check "pathtracer --help and --usage are those that were recorded" $?
 refused "a command is needed" "$bin/ggn"

@@ -5,7 +5,7 @@
  *
  * This proves sameness and nothing else. The recorded values were made by the program itself; that they are right is the
  * work of stat/ and unit/. Who means to change a picture records anew,
- *     build/tests/golden/pt_images record
+ *     RECORD=1 build/tests/golden/pt_images
  * and says in the commit which scenes changed and why that is right.
  *
  * First of a scene comes what was made of it, then the vertices that one path in each pixel meets, then a line for each
@@ -412,7 +412,7 @@ static int record_anew(void)
     FILE *out = fopen(file_name, "w");
     if (!out)
         return 1;
-    fprintf(out, "# Made by build/tests/golden/pt_images record: %d x %d pixels, %d samples, row by row. See pt_images.c.\n",
+    fprintf(out, "# Made by RECORD=1 build/tests/golden/pt_images: %d x %d pixels, %d samples, row by row. See pt_images.c.\n",
             WIDTH, HEIGHT, SPP);
     fprintf(out, "rounding %016llx\n", (unsigned long long)rounding_here());
     check_folder("scenes/*.pbrt", out);
@@ -421,13 +421,13 @@ static int record_anew(void)
     return fclose(out) != 0;
 }
 
-int main(int argc, char **argv)
+int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(scenes_keep_their_pictures), cmocka_unit_test(small_scenes_keep_their_pictures),
         cmocka_unit_test(options_keep_their_pictures), cmocka_unit_test(all_were_looked_at),
     };
-    if (argc == 2 && strcmp(argv[1], "record") == 0)
+    if (getenv("RECORD"))
         return record_anew();
     return cmocka_run_group_tests(tests, read_file, NULL);
 }

@@ -63,7 +63,7 @@ void ggn_approve(const char *name, const char *text, double tolerance)
     size_t size;
 
     snprintf(path, sizeof path, "tests/golden/%s.txt", name);
-    if (getenv("GGN_RECORD")) {
+    if (getenv("RECORD")) {
         FILE *f = fopen(path, "w");
         assert_non_null(f);
         fputs(text, f);

@@ -2,7 +2,7 @@
  * Approval: a text against the one recorded in tests/golden/NAME.txt, words as they are, numbers within a tolerance. What is recorded was
  * made by the product and looked at; it says that nothing has changed, not that it is right.
  *
- * To record anew, on purpose: GGN_RECORD=1 build/tests/…/PROGRAM, then look at `git diff tests/golden`.
+ * To record anew, on purpose: RECORD=1 build/tests/…/PROGRAM, then look at `git diff tests/golden`.
  */
 #ifndef TESTS_SUPPORT_GGN_APPROVE_H
 #define TESTS_SUPPORT_GGN_APPROVE_H

@@ -1,6 +1,5 @@
 /*
- * A transcript: what a test was told, line by line, compared whole with tests/golden/whole/NAME.txt. The product wrote that file and somebody
- * read it; RECORD=1 in the environment of the test writes it anew, then read `git diff`. Tests run in the repository's root.
+ * A transcript: what a test was told, line by line, compared whole with tests/golden/whole/NAME.txt as support/ggn_approve.h does.
  */
 #ifndef TESTS_GGN_TRANSCRIPT_H
 #define TESTS_GGN_TRANSCRIPT_H
@@ -14,6 +13,8 @@
 #include <string.h>
 
 #include <cmocka.h>
+
+#include "support/ggn_approve.h"
 
 struct transcript {
     FILE *file; /* write here */
@@ -54,28 +55,10 @@ static inline void transcript_hide(struct transcript *t, const char *what, const
 
 static inline void transcript_end(struct transcript *t, const char *name)
 {
-    char path[128], want[4096];
-    int line = 0;
-    snprintf(path, sizeof path, "tests/golden/whole/%s.txt", name);
+    char whole[128];
+    snprintf(whole, sizeof whole, "whole/%s", name);
     fclose(t->file);
-    FILE *f = fopen(path, getenv("RECORD") ? "w+" : "r");
-    if (!f)
-        fail_msg("%s cannot be opened", path);
-    if (getenv("RECORD")) {
-        fputs(t->text, f);
-        rewind(f);
-    }
-    const char *p = t->text;
-    while (fgets(want, sizeof want, f)) {
-        size_t n = strlen(want);
-        line++;
-        if (strncmp(p, want, n) != 0)
-            fail_msg("%s:%d: wanted %sgot %.*s", path, line, want, (int)strcspn(p, "\n"), p);
-        p += n;
-    }
-    fclose(f);
-    if (*p)
-        fail_msg("%s ends before %.*s", path, (int)strcspn(p, "\n"), p);
+    ggn_approve(whole, t->text, 0);
     free(t->text);
 }
 

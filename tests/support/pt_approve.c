@@ -118,7 +118,7 @@ void pt_approve(const char *path, pt_approve_answer *answer)
     if (c.text[0] != '\0')
         compare(&c, answer, bytes + size, anew, &wrong);
     fclose(anew);
-    if (getenv("APPROVE")) {
+    if (getenv("RECORD")) {
         FILE *f = fopen(path, "w");
         assert_true(f && fputs(made, f) >= 0 && fclose(f) == 0);
     } else if (wrong > 0) {

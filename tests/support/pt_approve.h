@@ -6,7 +6,7 @@
  *     @ a.ply text       a line of a file beside the case; \c at its end: the file ends there
  *     > text             the first line of the case
  *     >> text            each further one
- *       answer           two blanks before it; made anew when the environment has APPROVE=1, and then to be read
+ *       answer           two blanks before it; made anew when the environment has RECORD=1, and then to be read
  */
 #ifndef TESTS_SUPPORT_PT_APPROVE_H
 #define TESTS_SUPPORT_PT_APPROVE_H
