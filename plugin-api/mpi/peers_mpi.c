@@ -20,12 +20,20 @@ struct parcel {
     void *data;
 };
 
+/* One that has begun to come. Its rest may never: its sender may hang half way, and who waits must be able to give up. */
+struct arrival {
+    MPI_Request request;
+    void *data; /* owns; NULL: nothing is coming */
+    int rank, size;
+};
+
 struct peers {
     struct base_peers face; /* first: what callers see */
     struct base_peer *list; /* owns; [count] */
     MPI_Comm world;
     struct parcel *sent;    /* owns; [room] */
     size_t count, room;
+    struct arrival coming;
 };
 
 static void forget_sent(struct peers *p)
@@ -66,22 +74,38 @@ static int send_parcel(struct base_peers *face, int rank, void *data, size_t siz
     return 0;
 }
 
-static int take(struct peers *p, MPI_Message *message, const MPI_Status *status, int *rank, void **data, size_t *size,
-                struct base_err *err)
+static int begin_to_take(struct peers *p, MPI_Message *message, const MPI_Status *status, struct base_err *err)
 {
-    int n = 0;
-    MPI_Get_count(status, MPI_BYTE, &n);
-    void *bytes = malloc(n > 0 ? (size_t)n : 1);
-    if (!bytes)
+    struct arrival a = {.rank = status->MPI_SOURCE};
+    MPI_Get_count(status, MPI_BYTE, &a.size);
+    a.data = malloc(a.size > 0 ? (size_t)a.size : 1);
+    if (!a.data)
         return base_fail_nomem(err, "messages");
-    if (MPI_Mrecv(bytes, n, MPI_BYTE, message, MPI_STATUS_IGNORE) != MPI_SUCCESS) {
-        free(bytes);
-        return base_fail(err, BASE_EIO, "cannot receive from %s", p->face.list[status->MPI_SOURCE].name);
+    if (MPI_Imrecv(a.data, a.size, MPI_BYTE, message, &a.request) != MPI_SUCCESS) {
+        free(a.data);
+        return base_fail(err, BASE_EIO, "cannot receive from %s", p->face.list[a.rank].name);
     }
-    *rank = status->MPI_SOURCE;
-    *data = bytes;
-    *size = (size_t)n;
-    return 1;
+    p->coming = a;
+    return 0;
+}
+
+/* Looks once: 1 when a whole message is there, which p->coming then holds, 0 not yet. */
+static int look(struct peers *p, struct base_err *err)
+{
+    int there = 0;
+    MPI_Message message;
+    MPI_Status status;
+    forget_sent(p);
+    if (!p->coming.data) {
+        if (MPI_Improbe(MPI_ANY_SOURCE, 0, p->world, &there, &message, &status) != MPI_SUCCESS)
+            return base_fail(err, BASE_EIO, "MPI has lost the other processes");
+        int rc = there ? begin_to_take(p, &message, &status, err) : 0;
+        if (rc || !there)
+            return rc;
+    }
+    if (MPI_Test(&p->coming.request, &there, MPI_STATUS_IGNORE) != MPI_SUCCESS)
+        return base_fail(err, BASE_EIO, "cannot receive from %s", p->face.list[p->coming.rank].name);
+    return there != 0;
 }
 
 static int receive_parcel(struct base_peers *face, double wait_s, int *rank, void **data, size_t *size, struct base_err *err)
@@ -89,16 +113,15 @@ static int receive_parcel(struct base_peers *face, double wait_s, int *rank, voi
     struct peers *p = (struct peers *)face;
     double until_s = base_clock_wall_s() + wait_s;
     for (long nap_ns = FIRST_NAP_NS;; nap_ns = nap_ns < LONGEST_NAP_NS ? 2 * nap_ns : nap_ns) {
-        int there = 0;
-        MPI_Message message;
-        MPI_Status status;
-        forget_sent(p);
-        if (MPI_Improbe(MPI_ANY_SOURCE, 0, p->world, &there, &message, &status) != MPI_SUCCESS)
-            return base_fail(err, BASE_EIO, "MPI has lost the other processes");
-        if (there)
-            return take(p, &message, &status, rank, data, size, err);
-        if (base_clock_wall_s() >= until_s)
-            return 0;
+        int rc = look(p, err);
+        if (rc > 0) {
+            *rank = p->coming.rank;
+            *data = p->coming.data;
+            *size = (size_t)p->coming.size;
+            p->coming.data = NULL;
+        }
+        if (rc != 0 || base_clock_wall_s() >= until_s)
+            return rc;
         nanosleep(&(struct timespec){.tv_nsec = nap_ns}, NULL);
     }
 }

@@ -84,6 +84,11 @@ kill_one
 t "  …the checkpoint goes on, with two processes" mpi 2 "$P" $long --checkpoint c.ckp --resume -o part.exr
 t "  …to the same image" same long.exr part.exr
 
+if command -v mpicc >/dev/null; then
+    mpicc -shared -fPIC -o half.so "$here/mpi_half_message.c" || bad=1
+    mpi_refused "has not answered for 1 s (--rank-timeout)" 2 env "LD_PRELOAD=$PWD/half.so" "$P" "$scene" -q --size 64x48 --spp 64 \
+        --rank-timeout 1 -o half.exr
+fi
 hang_one 3
 t "  …the checkpoint goes on, with one process" "$P" $long --checkpoint c.ckp --resume -o part.exr
 t "  …to the same image" same long.exr part.exr
