@@ -29,11 +29,13 @@ static void print_tensors(const struct ggn_container *c)
     }
 }
 
-static void print_model(const struct ggn_model *m, const struct ggn_container *c)
+static int print_model(const struct ggn_model *m, const struct ggn_container *c, struct base_err *err)
 {
     const struct ggn_hyper *h = &m->hyper;
     char *provenance = cJSON_Print(m->provenance);
 
+    if (!provenance)
+        return base_fail_nomem(err, "provenance");
     printf("preset       %s\n", ggn_preset_names[h->preset]);
     printf("block        %d x %d pixels, window of %d images\n", h->width, h->height, h->window);
     printf("widths       denoiser %d, generator %d, discriminator %d\n", h->k_r, h->k_m, h->k_d);
@@ -50,8 +52,9 @@ static void print_model(const struct ggn_model *m, const struct ggn_container *c
            m->calibration.scale, m->calibration.shift, m->calibration.threshold, m->calibration.consecutive,
            m->calibration.spacing);
     printf("file         %zu bytes, version %d, %d tensors\n", c->size, GGN_CONTAINER_VERSION, c->n_entries);
-    printf("provenance   %s\n", provenance ? provenance : "");
+    printf("provenance   %s\n", provenance);
     cJSON_free(provenance);
+    return 0;
 }
 
 int ggn_cmd_inspect(int argc, char **argv)
@@ -74,7 +77,7 @@ int ggn_cmd_inspect(int argc, char **argv)
     if (!rc && o.json)
         printf("%s\n", c.json);
     else if (!rc)
-        print_model(model, &c);
+        rc = print_model(model, &c, &err);
     if (!rc && o.tensors)
         print_tensors(&c);
     ggn_model_destroy(model);

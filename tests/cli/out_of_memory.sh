@@ -1,0 +1,33 @@
+#!/bin/sh
+# Commands of ggn that lack memory once, at each of their calls for it: none crashes or hangs; they say so in one line, exit status 2
+# or 1, or do as well without.
+. "$(dirname "$0")/ggn_setup"
+case $BUILD in */asan | */tsan) echo "ok 1 # SKIP a sanitizer brings its own malloc"; exit 0 ;; esac
+${CC:-cc} -shared -fPIC -O1 -o "$tmp/oom.so" tests/cli/out_of_memory.c -ldl || exit 2
+
+# lacking NAME COMMAND…: at least ten times, and the command itself ends well.
+lacking() {
+    name=$1
+    shift
+    rm -rf "$tmp/k" && mkdir "$tmp/k"
+    env "LD_PRELOAD=$tmp/oom.so" "OOM_FOLDER=$tmp/k" OPENBLAS_NUM_THREADS=1 "$@" >"$tmp/whole" 2>"$tmp/err"
+    rc=$?
+    : >"$tmp/out"
+    while read -r k status; do
+        lines=$(wc -l <"$tmp/k/$k.err")
+        case $status in
+        0) tail -c "$(wc -c <"$tmp/k/$k.out")" "$tmp/whole" | cmp -s - "$tmp/k/$k.out" || echo "allocation $k failed: exit 0, but another output" >>"$tmp/out" ;;
+        1 | 2) [ "$lines" -eq 1 ] || { echo "allocation $k failed: $lines lines"; head -n 3 "$tmp/k/$k.err"; } >>"$tmp/out" ;;
+        *) { echo "allocation $k failed: status $status"; tail -n 1 "$tmp/k/$k.err"; } >>"$tmp/out" ;;
+        esac
+    done <"$tmp/k/log"
+    [ $rc -eq 0 ] && [ "$(wc -l <"$tmp/k/log")" -ge 10 ] && [ ! -s "$tmp/out" ]
+    check "$name, $(wc -l <"$tmp/k/log") times without memory" $?
+}
+printf 'a;100;200;400;800;1600;\nb;50;60;70;80;\n' >"$tmp/t.csv"
+printf 'a;100;400;380;100;1500;\nb;51;20;300;81;\n' >"$tmp/m.csv"
+lacking "compare" "$ggn" compare "$tmp/t.csv" "$tmp/m.csv" --json
+lacking "inspect" "$ggn" inspect tests/data/tiny.ggn
+lacking "convert" "$ggn" convert tests/data/tiny.ggn "$tmp/b.ggn" --type bf16
+echo "1..$n"
+exit $bad
