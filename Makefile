@@ -31,7 +31,7 @@ NUM   := -ffp-contract=off -fno-math-errno
 OPT_release := -O3 -g
 OPT_debug   := -O0 -g3
 # With -Werror: `make test` builds everything so, and a warning fails it; what users build does not break with another compiler.
-OPT_asan    := -O1 -g -Werror -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=undefined
+OPT_asan    := -O1 -g1 -Werror -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=undefined
 OPT_tsan    := -O1 -g -fsanitize=thread
 SAN_asan    := -fsanitize=address,undefined
 SAN_tsan    := -fsanitize=thread

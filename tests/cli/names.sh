@@ -31,6 +31,8 @@ done
 t "a recorded one" "$P" "$latin.pbrt" -q --size 20x20 --block 20 --levels linear:4:8:4 --sequence seq
 t "  …has a manifest that is UTF-8" python3 -c "import json; assert json.load(open('seq/manifest.json', encoding='utf-8'))['scene'] == 'l_t'"
 
+refused "no criterion nowhere" "$P" "$root/tests/cli/room.pbrt" -q --size 16x16 --sequence named --levels linear:1:2:1 -c nowhere
+t "  …and nothing is recorded" test ! -e named
 refused "--sequence records blocks: leave out" "$P" "$root/tests/cli/room.pbrt" --explain --sequence none
 t "  …and makes no folder" test ! -e none
 refused "'maybe' is not 0 or 1" "$P" "$root/tests/cli/room.pbrt" -c ggn -p gate=maybe
