@@ -39,18 +39,18 @@ int ggn_image8_read(const char *path, struct ggn_image8 *image, struct base_err 
 {
     const struct ggn_oiio_library *l;
     struct ggn_imagef linear = {0};
+    struct ggn_image8 out = {0};
     int is_float = 0, rc = library(path, &l, err);
     if (!rc)
-        rc = l->read_display(path, image, &is_float, err);
-    if (rc)
-        return rc;
-    image->clipped = 0;
-    if (!is_float)
-        return 0;
-    rc = l->read_linear(path, &linear, &is_float, err);
+        rc = l->read_display(path, &out, &is_float, err);
+    if (!rc && is_float) {
+        rc = l->read_linear(path, &linear, err);
+        if (!rc)
+            rc = encode(path, &linear, &out, err);
+        ggn_imagef_release(&linear);
+    }
     if (!rc)
-        rc = encode(path, &linear, image, err);
-    ggn_imagef_release(&linear);
+        *image = out;
     return rc;
 }
 

@@ -81,8 +81,8 @@ void find_rgb(const ImageSpec &spec, int rgb[3])
             rgb[c] = spec.nchannels >= 3 ? c : 0;
 }
 
-template <class T, class Image>
-int read_rgb(const char *path, bool of_floats, Image *image, int *is_float, struct base_err *err)
+// Bytes are not taken from a file of floats: only *is_float is set then.
+template <class T, class Image> int read_rgb(const char *path, Image *image, int *is_float, struct base_err *err)
 {
     if (int rc = base_file_check_input(path, err))
         return rc;
@@ -95,7 +95,7 @@ int read_rgb(const char *path, bool of_floats, Image *image, int *is_float, stru
     if (!sane(spec))
         return base_fail(err, BASE_EINVAL, "%s: %dx%d is not a size that can be used", path, spec.width, spec.height);
     *is_float = spec.format.is_floating_point();
-    if (*is_float && !of_floats)
+    if (*is_float && sizeof(T) == 1)
         return 0;
     int rgb[3];
     find_rgb(spec, rgb);
@@ -158,16 +158,16 @@ int find_channel(const char *path, const char *channel, struct ggn_imagef *image
     return base_fail(err, BASE_EINVAL, "%s: has no channel '%s'", path, channel);
 }
 
-// A file of floats is only known as one: what it holds is read as such.
 int read_display(const char *path, struct ggn_image8 *image, int *is_float, struct base_err *err)
 {
-    return guarded(path, err, [&] { return read_rgb<uint8_t>(path, false, image, is_float, err); });
+    return guarded(path, err, [&] { return read_rgb<uint8_t>(path, image, is_float, err); });
 }
 
-int read_linear(const char *path, struct ggn_imagef *image, int *is_float, struct base_err *err)
+int read_linear(const char *path, struct ggn_imagef *image, struct base_err *err)
 {
+    int is_float = 0;
     image->channels = 3;
-    return guarded(path, err, [&] { return read_rgb<float>(path, true, image, is_float, err); });
+    return guarded(path, err, [&] { return read_rgb<float>(path, image, &is_float, err); });
 }
 
 int read_channel(const char *path, const char *channel, struct ggn_imagef *image, struct base_err *err)

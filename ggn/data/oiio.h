@@ -13,12 +13,12 @@ extern "C" {
 #endif
 
 /* What the shared object holds. The program has its address from there; whoever links with it has it at once. All are
- * thread-safe; on failure nothing is kept. *is_float: the file holds half or float. */
+ * thread-safe; on failure nothing is kept. */
 struct ggn_oiio_library {
-    /* 8-bit codes as stored. Of a file of floats only *is_float is set and *image stays as it is. */
+    /* 8-bit codes as stored. Of a file that holds half or float only *is_float is set, and *image stays as it is. */
     int (*read_display)(const char *path, struct ggn_image8 *image, int *is_float, struct base_err *err);
-    /* Values as stored; those of integer files scaled to [0, 1]. */
-    int (*read_linear)(const char *path, struct ggn_imagef *image, int *is_float, struct base_err *err);
+    /* Of such a file: its values. */
+    int (*read_linear)(const char *path, struct ggn_imagef *image, struct base_err *err);
     int (*read_channel)(const char *path, const char *channel, struct ggn_imagef *image, struct base_err *err);
 };
 extern const struct ggn_oiio_library ggn_oiio_library __attribute__((weak, visibility("default")));
