@@ -418,6 +418,47 @@ def test_resume():
     raises(ValueError, "not a checkpoint", checkpoint.load, tmp("junk.npz"), start())
 
 
+def test_identity():
+    """a checkpoint is refused by name wherever the picture or the stops would be others, whatever the host's words for it"""
+    def driver(identity=None, criterion=None, wave=16, max_seam=0., uniform=False, whole_waves=True, **frame):
+        f = lull.Frame(criterion or lull.load("halfbuf", threshold=.02), 32, 32, **{"block": 16, **frame})
+        return lull.Driver(f, None, wave=wave, max_seam=max_seam, uniform=uniform, whole_waves=whole_waves,
+                           identity={"scene": "a.blend", "camera": "left"} if identity is None else identity)
+    checkpoint.save(tmp("a.npz"), driver())
+    checkpoint.load(tmp("a.npz"), driver(spp_max=20000, time_budget_s=9.))  # limits may change
+    own_plugin = tmp("halfbuf.so")
+    Path(own_plugin).write_bytes(Path(f"{LIB}/halfbuf.so").read_bytes() + b"0")  # a plugin built anew under the same version
+    for name, theirs, own, other in (
+            ("scene", "a.blend", "b.blend", {"identity": {"scene": "b.blend", "camera": "left"}}),
+            ("camera", "left", "not known", {"identity": {"scene": "a.blend"}}),
+            ("view", "not known", "x", {"identity": {"scene": "a.blend", "camera": "left", "view": "x"}}),
+            ("exposure", "1.0", "2.0", {"exposure": 2}), ("transfer", "srgb", "linear", {"transfer": "linear"}),
+            ("gamma", "2.2", "2.0", {"gamma": 2.}), ("sample-clamp", "0.0", "3.0", {"sample_clamp": 3}),
+            ("independent", "False", "True", {"independent": True}), ("shared", "False", "True", {"shared": True}),
+            ("seed", "0", "1", {"seed": 1}), ("spp-min", "16", "17", {"spp_min": 17}), ("wave", "16", "8", {"wave": 8}),
+            ("block", "16x16", "8x16", {"block": (8, 16)}), ("max-seam", "0.0", "2.0", {"max_seam": 2}),
+            ("uniform", "False", "True", {"uniform": True}), ("whole-waves", "True", "False", {"whole_waves": False}),
+            ("display", "none", "crc ", {"display": lambda x: x.clip(0, 1)}),
+            ("mask", "none", "crc ", {"mask": np.ones((32, 32))}), ("crop", "0,0,32,32", "0,0,32,9", {"crop": (0, 0, 32, 9)}),
+            ("criterion", "halfbuf 1.0 threshold=0.02", "halfbuf 1.0 threshold=0.03",
+             {"criterion": lull.load("halfbuf", threshold=.03)}),
+            ("criterion-files", "crc ", "crc ", {"criterion": lull.load(own_plugin, threshold=.02)})):
+        d = driver(**other)
+        before = {**d.identity}
+        raises(ValueError, f"its {name} is {theirs}", checkpoint.load, tmp("a.npz"), d)
+        raises(ValueError, f"this render's is {own}", checkpoint.load, tmp("a.npz"), d)
+        assert d.identity == before and d.frame.blocks[0].spp == 0
+    curves = [lull.Frame(lull.load("halfbuf"), 8, 8, display=lambda x, k=k: (k * x).clip(0, 1)).identity()
+              for k in (1, 1, 1.01)]
+    assert curves[0] == curves[1] != curves[2]
+    raises(TypeError, "text for text", driver, identity={"frame": 3})
+    raises(ValueError, "'seed' is the package's own", driver, identity={"seed": "3"})
+    np.savez(tmp("theirs.npz"), state=np.zeros(3), samples=np.zeros(3))
+    Path(tmp("text.npz")).write_text("my notes")
+    kinds = [checkpoint.is_one(tmp(name)) for name in ("a.npz", "theirs.npz", "text.npz", "no-such.npz")]
+    assert kinds == [True, False, False, False], kinds
+
+
 def test_display():
     """a host's own view decides: what it shows as white needs no samples"""
     _, seen, _ = run(sigmas=[[.5]])

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """A run in the middle, as a file: sums, blocks, totals and the criterion's history. Going on from it, the same samples are
-asked for and the same decisions made as without the break; with a higher spp_max a finished picture can be given more."""
+asked for and the same decisions made as without the break; with a higher spp_max a finished picture can be given more.
+What the picture depends on (Driver.identity) is kept with it: another scene, view or criterion is refused by name."""
 from __future__ import annotations
 
 import dataclasses
@@ -16,14 +17,6 @@ from .files import replaced
 _STATE = {f.name for f in dataclasses.fields(Block)} - {"id", "rect", "column", "row"}
 
 
-def _settings(driver: Driver) -> dict:
-    frame, criterion = driver.frame, driver.frame.criterion
-    return {"picture": [frame.width, frame.height], "crop": list(frame.crop),
-            "block": [frame.block_width, frame.block_height], "seed": frame.seed,
-            "planes": list(frame.planes), "wave": driver.wave, "mask": frame.dials,
-            "criterion": [criterion.info.id, criterion.info.version, criterion.parameters]}
-
-
 def _arrays(driver: Driver) -> dict[str, np.ndarray]:
     frame = driver.frame
     return {"dropped": frame.dropped, "dropped_half": frame.dropped_half,
@@ -33,7 +26,7 @@ def _arrays(driver: Driver) -> dict[str, np.ndarray]:
 def save(path: str, driver: Driver) -> None:
     """Replaces the file as a whole."""
     frame = driver.frame
-    state = {"settings": _settings(driver), "totals": dataclasses.asdict(driver.totals),
+    state = {"identity": driver.identity, "totals": dataclasses.asdict(driver.totals),
              "blocks": [{name: getattr(b, name) for name in _STATE} for b in frame.blocks]}
     histories = {f"history-{i}": np.frombuffer(data, np.uint8) for i, data in enumerate(frame.save_state())}
     arrays = {**_arrays(driver), **histories, "state": np.frombuffer(json.dumps(state).encode(), np.uint8)}
@@ -41,19 +34,38 @@ def save(path: str, driver: Driver) -> None:
         np.savez(file, **arrays)  # type: ignore[arg-type]
 
 
-def load(path: str, driver: Driver) -> None:
-    """Into a fresh driver of the same settings; ValueError says which setting differs. Blocks that were closed by a limit or
-    an interrupt are active again as far as the limits of this driver allow."""
-    frame = driver.frame
+def _read(path: str) -> tuple[dict[str, np.ndarray], dict]:
+    """The arrays and the state; ValueError for a file that is none."""
     try:
         with np.load(path, allow_pickle=False) as file:
             data = dict(file)
         state = json.loads(data.pop("state").tobytes())
-    except (ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        if not {"identity", "totals", "blocks"} <= state.keys():
+            raise ValueError("it was made by another version of Lull")
+    except (ValueError, KeyError, EOFError, AttributeError, zipfile.BadZipFile) as error:
         raise ValueError(f"{path}: not a checkpoint: {error}") from None
-    for name, own in _settings(driver).items():
-        if state["settings"].get(name) != json.loads(json.dumps(own)):
-            raise ValueError(f"{path}: its {name} is {state['settings'].get(name)}, this render's {own}")
+    return data, state
+
+
+def is_one(path: str) -> bool:
+    """Is there a file of this kind? What is none must not be replaced by one."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            return {"totals", "blocks"} <= json.loads(file["state"].tobytes()).keys()
+    except (OSError, ValueError, KeyError, EOFError, AttributeError, zipfile.BadZipFile):
+        return False
+
+
+def load(path: str, driver: Driver) -> None:
+    """Into a fresh driver of the same identity; ValueError names what differs. Blocks that were closed by a limit or an
+    interrupt are active again as far as the limits of this driver allow."""
+    frame = driver.frame
+    data, state = _read(path)
+    theirs, own = state["identity"], driver.identity
+    for name in [*own, *theirs]:
+        if theirs.get(name) != own.get(name):
+            raise ValueError(f"{path}: its {name} is {theirs.get(name, 'not known')}, this render's is "
+                             f"{own.get(name, 'not known')}: give it the same, or start anew with another checkpoint")
     arrays = _arrays(driver)
     for name, to in arrays.items():
         if name not in data or data[name].shape != to.shape or data[name].dtype != to.dtype:

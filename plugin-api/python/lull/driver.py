@@ -14,7 +14,7 @@ import math
 import signal
 import time
 from dataclasses import dataclass
-from typing import Callable, Iterable, Iterator, Optional, Sequence
+from typing import Callable, Iterable, Iterator, Mapping, Optional, Sequence
 
 from .blocks import Block, next_check, reopen
 from .criterion import Decision, Rect
@@ -64,12 +64,15 @@ class Driver:
     (criteria take that for granted), unless whole_waves is False.
     uniform: every block gets spp_max samples and the criterion is asked once at the end. max_check_overhead: share of the
     time that checks may take, 0 = any. max_seam: most ratio of samples of neighbouring blocks, 0 = any. threads: of the
-    host, for the report. after_call: called after each call of the render function (progress, a partial picture). suspend:
-    called before active blocks are closed for time, interrupt or failure, the moment for lull.checkpoint.save.
+    host, for the report. identity: what the samples depend on (scene, frame, camera, the renderer's version …), by name: a
+    checkpoint is only resumed where all of it and of Frame.identity() is the same. after_call: called after each call of
+    the render function (progress, a partial picture). suspend: called before active blocks are closed for time, interrupt
+    or failure, the moment for lull.checkpoint.save.
     """
 
     def __init__(self, frame: Frame, render: Render, *, wave: int = 16, whole_waves: bool = True, uniform: bool = False,
                  max_check_overhead: float = 0.0, max_seam: float = 0.0, threads: int = 1,
+                 identity: Optional[Mapping[str, str]] = None,
                  after_call: Optional[Callable[[Driver], None]] = None,
                  suspend: Optional[Callable[[Driver], None]] = None, warn: Callable[[str], None] = print):
         if wave < 1:
@@ -81,12 +84,23 @@ class Driver:
         self.frame, self.render, self.wave, self.whole_waves, self.uniform = frame, render, wave, whole_waves, uniform
         self.max_check_overhead, self.max_seam, self.threads = max_check_overhead, max_seam, threads
         self.after_call, self.suspend, self.warn = after_call, suspend, warn
+        self.identity = self._identity(identity or {})
         self.totals = Totals()
         self.samples_per_s = 0.0  # recent, 0 = not known yet
         self.interrupted = False
         first = frame.spp_max if uniform else frame.first_spp
         for b in frame.blocks:
             b.next_spp = self.at_wave(first)
+
+    def _identity(self, of_host: Mapping[str, str]) -> dict[str, str]:
+        own = {**self.frame.identity(), "wave": str(self.wave), "whole-waves": str(self.whole_waves),
+               "uniform": str(self.uniform), "max-seam": str(float(self.max_seam))}
+        for name, value in of_host.items():
+            if not isinstance(name, str) or not isinstance(value, str):
+                raise TypeError(f"identity: expected text for text, not {name!r}: {value!r}")
+            if name in own:
+                raise ValueError(f"identity: '{name}' is the package's own name: choose another")
+        return {**of_host, **own}
 
     def at_wave(self, spp: int) -> int:
         """The first place for a check that is not before spp."""

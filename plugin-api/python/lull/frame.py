@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+import zlib
+from pathlib import Path
 from typing import Callable, Mapping, Optional, Sequence, Union
 
 import numpy as np
@@ -51,11 +53,13 @@ class Frame:
         self.dropped, self.dropped_half = np.zeros(shape, np.uint32), np.zeros(shape, np.uint32)
         self.dials = dial_scales(mask, self.blocks, width, height)
         self._owned, self._judge = judges_of(criterion, self.dials)
+        # what the criterion is told of the pixels: with a display mapping they come as shown
+        self.shown = {"exposure": 1.0 if display else float(exposure), "transfer": "srgb" if display else transfer,
+                      "gamma": float(gamma), "sample_clamp": float(sample_clamp), "independent": independent,
+                      "shared": shared}
         for judge in {id(j): j for j in self._judge}.values():
             judge.begin_frame(width, height, [b.rect for b in self.blocks], self.planes, spp_min=spp_min, spp_max=spp_max,
-                              seed=seed, time_budget_s=time_budget_s, exposure=1.0 if display else exposure,
-                              transfer="srgb" if display else transfer, gamma=gamma, sample_clamp=sample_clamp,
-                              deterministic=deterministic, independent=independent, shared=shared)
+                              seed=seed, time_budget_s=time_budget_s, deterministic=deterministic, **self.shown)
         self.first_spp = max(spp_min, needs.first_spp)
         self._begin_s = time.monotonic()
 
@@ -166,6 +170,15 @@ class Frame:
 
     # --- state ---------------------------------------------------------------------------------------------------------
 
+    def identity(self) -> dict[str, str]:
+        """All that the stops depend on beside the samples and the limits, by name, for lull.checkpoint."""
+        return {"picture": f"{self.width}x{self.height}", "crop": ",".join(map(str, self.crop)),
+                "block": f"{self.block_width}x{self.block_height}", "seed": str(self.seed), "planes": " ".join(self.planes),
+                "spp-min": str(self.spp_min), "mask": _crc(np.array(self.dials)) if min(self.dials) < 1 else "none",
+                "criterion": _named(self.criterion), "criterion-files": _files_crc(self.criterion),
+                **{name.replace("_", "-"): str(value) for name, value in self.shown.items()},
+                "display": _crc(np.round(self.display(_RAMP), 4)) if self.display else "none"}
+
     def save_state(self) -> list[bytes]:
         """The history of every instance of the criterion that is in use (one, unless there is a mask)."""
         return [judge.save_state() for judge in {id(j): j for j in self._judge}.values()]
@@ -182,6 +195,30 @@ class Frame:
         self.criterion.end_frame()
         for judge in self._owned:
             judge.close()
+
+
+# Radiance that tells one display mapping from another: greys from black to far beyond white, and the primaries
+_RAMP = np.concatenate([np.multiply.outer(np.append(0, np.exp2(np.linspace(-12, 8, 200))), w)
+                        for w in ((1.0, 1.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))])
+
+
+def _crc(array: np.ndarray) -> str:
+    return f"crc {zlib.crc32(np.ascontiguousarray(array, '<f8').tobytes()):08x}"
+
+
+def _named(criterion: Criterion) -> str:
+    """Its id, version and parameters."""
+    info = criterion.info
+    return " ".join([info.id, info.version, *(f"{key}={value}" for key, value in sorted(criterion.parameters.items()))])
+
+
+def _files_crc(criterion: Criterion) -> str:
+    """Of the criterion's library and of the files that its parameters name."""
+    named = (criterion.parameters.get(p.name) for p in criterion.info.parameters if p.type == "file")
+    crc = 0
+    for path in (criterion.info.path, *filter(None, named)):
+        crc = zlib.crc32(Path(path).read_bytes(), crc)
+    return f"crc {crc:08x}"
 
 
 def _scaled(array: np.ndarray, by: np.ndarray) -> np.ndarray:
