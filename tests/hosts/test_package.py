@@ -235,6 +235,21 @@ def test_stop_map():
     assert report.returncode == 0, report.stdout
 
 
+def test_default_block():
+    """by default a picture has at least 12 blocks, of 16 to 200 pixels"""
+    for size, wanted in (((1920, 1080), 200), ((640, 480), 200), ((240, 160), 64), ((512, 512), 146), ((100, 60), 22)):
+        assert blocks.default_block(*size) == wanted, (size, blocks.default_block(*size))
+        assert len(blocks.grid(*size, wanted, wanted)) >= 12
+    assert blocks.default_block(8, 8) == 16 and blocks.default_block(1920, 1080, 100) == 100
+    for width in range(64, 800, 37):
+        for height in range(48, 700, 29):
+            size = blocks.default_block(width, height)
+            grid = blocks.grid(width, height, size, size)
+            assert 16 <= size <= 200 and len(grid) >= 12, (width, height, size)
+    _, frame, _ = run(width=240, height=160, block=None, sigmas=[[.01] * 4] * 3, host=Noise([[.01] * 4] * 3, 64), spp_max=32)
+    assert (frame.block_width, len(frame.blocks)) == (64, 12)
+
+
 def test_limits():
     """the first limit wins: samples, time, minimum"""
     _, f, _ = run(sigmas=[[5.]], spp_max=100)

@@ -14,6 +14,9 @@ from .criterion import Rect
 REASONS = ("none", "criterion", "spp-max", "uniform", "time", "interrupt", "dropped")
 # Checks that the criterion did not place grow by this factor: a block overshoots its threshold by 15 % at most.
 CHECK_RATIO = 1.15
+# A picture in fewer blocks than this has little to stop early: its default block is smaller. A block of fewer pixels a side
+# holds too few to judge, so the default stays above.
+ENOUGH_BLOCKS, LEAST_DEFAULT = 12, 16
 
 
 @dataclass
@@ -39,6 +42,21 @@ class Block:
     @property
     def active(self) -> bool:
         return self.reason == "none"
+
+
+def default_block(width: int, height: int, largest: int = 200) -> int:
+    """The block size, up to `largest`, with which a picture has ENOUGH_BLOCKS: the largest one that leaves no block at an edge
+    narrower than half of it, if there is one. Never below LEAST_DEFAULT, however small the picture."""
+    def count(size: int) -> int:
+        return -(-width // size) * -(-height // size)
+
+    def even(size: int) -> bool:
+        return all(length <= size or length % size == 0 or 2 * (length % size) >= size for length in (width, height))
+
+    if count(largest) >= ENOUGH_BLOCKS:
+        return largest
+    fine = [size for size in range(largest - 1, LEAST_DEFAULT - 1, -1) if count(size) >= ENOUGH_BLOCKS]
+    return next(filter(even, fine), fine[0] if fine else min(LEAST_DEFAULT, largest))
 
 
 def grid(width: int, height: int, block_width: int, block_height: int, crop: Optional[Rect] = None) -> list[Block]:

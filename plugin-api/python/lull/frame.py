@@ -9,7 +9,7 @@ from typing import Callable, Mapping, Optional, Sequence, Union
 
 import numpy as np
 
-from .blocks import Block, bounds, grid
+from .blocks import Block, bounds, default_block, grid
 from .criterion import CHANNELS, SRGB_TO_XYZ, BlockState, Criterion, Decision, Plane, Rect
 from .mask import dial_scales, judges_of
 
@@ -22,8 +22,9 @@ class Frame:
     """Owns the blocks and, for the pixels that they cover (`view`), float64 sums; opens the criterion's frame.
 
     criterion: borrowed while the frame lives. block: pixels, one number or (width, height); default the criterion's own
-    size, else 200. crop: blocks that it touches are rendered whole. supplies: planes that the host will add besides "color"
-    and its halves (of moment2, albedo, normal, depth); kept only if the criterion reads them.
+    size, else 200, or less where that would be fewer than 12 blocks (blocks.default_block). crop: blocks that it touches
+    are rendered whole. supplies: planes that the host will add besides "color" and its halves (of moment2, albedo, normal,
+    depth); kept only if the criterion reads them.
     display: maps linear radiance [..., 3] to linear display values in [0, 1], for hosts whose view is not
     transfer(exposure · value); the criterion then judges these. mask: [height, width] in [0, 1], see lull.mask.
     dials: for each block, the factor that the mask gives the criterion's dial.
@@ -41,7 +42,7 @@ class Frame:
             raise ValueError(f"spp_min {spp_min}, spp_max {spp_max}: expected 1 <= spp_min <= spp_max")
         needs = criterion.needs
         self.criterion, self.width, self.height, self.seed = criterion, width, height, seed
-        self.block_width, self.block_height = _block_size(criterion, block)
+        self.block_width, self.block_height = _block_size(criterion, block, width, height)
         self.spp_min, self.spp_max, self.time_budget_s, self.display = spp_min, spp_max, time_budget_s, display
         self.crop = Rect(*crop) if crop else Rect(0, 0, width, height)
         self.blocks = grid(width, height, self.block_width, self.block_height, crop)
@@ -226,13 +227,17 @@ def _scaled(array: np.ndarray, by: np.ndarray) -> np.ndarray:
     return array * (by[..., None] if array.ndim == 3 else by)
 
 
-def _block_size(criterion: Criterion, block: Union[int, tuple[int, int], None]) -> tuple[int, int]:
+def _block_size(criterion: Criterion, block: Union[int, tuple[int, int], None], width: int, height: int) -> tuple[int, int]:
+    """Of blocks, for a picture of width x height."""
     needs = criterion.needs
     own = (needs.block_width or 200, needs.block_height or 200)
-    width, height = own if block is None else (block, block) if isinstance(block, int) else block
-    if not needs.flexible and needs.block_width and (width, height) != own:
+    fixed = needs.block_width and not needs.flexible
+    if block is None:
+        return own if fixed else (default_block(width, height, min(own)),) * 2
+    chosen = (block, block) if isinstance(block, int) else block
+    if fixed and chosen != own:
         raise ValueError(f"criterion {criterion.info.id} judges blocks of {own[0]}x{own[1]} pixels only")
-    return width, height
+    return chosen
 
 
 def _as_mean(name: str, array: np.ndarray, rect: Rect) -> np.ndarray:

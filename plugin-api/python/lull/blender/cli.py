@@ -25,7 +25,8 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--spp-min", type=int, default=16, metavar="N", help="samples before the first check (default 16)")
     p.add_argument("--spp-max", type=int, default=4096, metavar="N", help="most samples of a block (default 4096)")
     p.add_argument("--time-budget", type=float, default=0, metavar="SECONDS", help="per frame; 0 = no limit (default)")
-    p.add_argument("--block", type=int, metavar="N", help="block size in pixels (default: the criterion's own, else 200)")
+    p.add_argument("--block", type=int, metavar="N", help="block size in pixels (default: the criterion's own, else 200, "
+                   "less where that would be fewer than 12 blocks)")
     p.add_argument("--mask", default="", metavar="FILE.png", help="lighter regions are rendered better")
     p.add_argument("--frames", metavar="FIRST-LAST", help="an animation; 'all' = the scene's range (default: current frame)")
     p.add_argument("--device", choices=DEVICES, help="what Cycles renders on (default: what the scene says)")
