@@ -16,7 +16,7 @@ assert diary[1] == "begin 48x32 blocks 6 min %d max %d seed 5 budget 0 clamp 0 e
 asked = [re.fullmatch(r"ask (\d+) spp (\d+) flags (\d) at (\S+) red (\S+)", l).groups() for l in diary[2:-2]]
 for b in range(6):
     x, y = b % 3 * 16, b // 3 * 16
-    end, spp, opened, want = 16 * (1 + b % 3), first, False, []
+    end, spp, opened, want = 16 * (1 + b % 3), min(max(first, 4), last), False, [] # 4: its first_spp, asking before is useless
     mine = [(int(a[1]), int(a[2])) for a in asked if int(a[0]) == b]
     assert all(a[3] == "%d,%d,%d,%d" % (x, y, x + 16, y + 16) for a in asked if int(a[0]) == b)
     while True:
@@ -58,6 +58,10 @@ for threads in 1 3; do
 done
 run diary --spp-min 4 --spp-max 1000
 t "no longer than it wishes" python3 check.py a.json a.csv 4 1000 0 said
+run diary --spp-min 1 --spp-max 40
+t "not before its first_spp" python3 check.py a.json a.csv 1 40 0 said
+run diary --spp-min 1 --spp-max 3
+t "  …but once where the render ends before" python3 check.py a.json a.csv 1 3 0 said
 run diary-reopens --spp-min 8 --spp-max 40
 t "who reopens is asked about stopped blocks, and only then" python3 check.py a.json a.csv 8 40 1 said
 
