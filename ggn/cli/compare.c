@@ -59,7 +59,7 @@ int ggn_cmd_compare(int argc, char **argv)
         .args_max = 2,
         .args = offsetof(struct options, paths),
         .doc = "How well the stops or thresholds in MODEL agree with those in REFERENCE (people first). Both may be CSV "
-               "(name;t0;…), a render's report JSON, or an EXR with the channel lull.spp."};
+               "(name;t0;…), a render's report JSON, or an EXR with the channel lull.spp.V."};
     struct options o = {.cap = 10000.0, .block = 200};
     struct ggn_thresholds sides[2] = {{0}, {0}};
     struct ggn_pairing pairing = {0};

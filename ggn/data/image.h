@@ -35,7 +35,7 @@ void ggn_imagef_release(struct ggn_imagef *image);
 /* Reads a display image. 8-bit files come through unchanged; float files (EXR, HDR) are clamped and sRGB-encoded. */
 int ggn_image8_read(const char *path, struct ggn_image8 *image, struct base_err *err);
 
-/* Reads one named channel ("lull.spp") of any part of an EXR into a one-channel image. BASE_EINVAL if there is none. */
+/* Reads one named channel ("lull.spp.V") of any part of an EXR into a one-channel image. BASE_EINVAL if there is none. */
 int ggn_imagef_read_channel(const char *path, const char *channel, struct ggn_imagef *image, struct base_err *err);
 
 /* Writes an 8-bit RGB PNG atomically. data [height][width][3]. */

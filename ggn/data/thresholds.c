@@ -168,7 +168,7 @@ static int read_exr(const char *path, int block, struct ggn_thresholds *out, str
 {
     struct ggn_imagef image;
     struct ggn_thresholds t = {0};
-    int rc = ggn_imagef_read_channel(path, "lull.spp", &image, err);
+    int rc = ggn_imagef_read_channel(path, "lull.spp.V", &image, err);
     if (rc)
         return rc;
     long columns = (image.width + block - 1) / block, rows = (image.height + block - 1) / block;

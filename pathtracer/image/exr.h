@@ -1,5 +1,5 @@
 /*
- * Writes one scan-line OpenEXR file with any number of named float channels ("R", "lull.spp"), ZIP-compressed, row by row,
+ * Writes one scan-line OpenEXR file with any number of named float channels ("R", "lull.spp.V"), ZIP-compressed, row by row,
  * so that no second copy of the image is needed. The file appears under its name only when it is complete.
  */
 #ifndef PT_IMAGE_EXR_H

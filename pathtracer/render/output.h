@@ -22,7 +22,7 @@ struct pt_output_info {
     int interrupted;
 };
 
-/* RGB, lull.spp, lull.p_noisy, lull.error, lull.reason and the AOVs, cropped as the config says. */
+/* RGB, lull.spp.V, lull.p_noisy.V, lull.error.V, lull.reason.V and the AOVs, cropped as the config says. */
 int pt_output_exr(const char *path, const struct pt_render *render, const struct pt_output_info *info, struct base_err *err);
 /* sRGB, 8 bits. */
 int pt_output_preview(const char *path, const struct pt_render *render, struct base_err *err);

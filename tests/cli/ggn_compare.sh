@@ -31,7 +31,7 @@ $ggn compare "$tmp/t.csv" "$tmp/m.csv" -o "$tmp/pictures" >"$tmp/out" 2>"$tmp/er
     [ "$(wc -l <"$tmp/pictures/blocks.csv")" -eq 5 ] && [ "$(find "$tmp/pictures" -name '.tmp*' | wc -l)" -eq 0 ]
 check "pictures, table, nothing temporary left" $?
 
-oiiotool --pattern constant:color=300 8x4 1 --chnames lull.spp -d float -o "$tmp/map.exr" >"$tmp/err" 2>&1 &&
+oiiotool --pattern constant:color=300 8x4 1 --chnames lull.spp.V -d float -o "$tmp/map.exr" >"$tmp/err" 2>&1 &&
     printf 'map.exr;100;600;\n' >"$tmp/e.csv" && $ggn compare "$tmp/e.csv" "$tmp/map.exr" -b 4 --json >"$tmp/out" 2>"$tmp/err" &&
     grep -q '"blocks": 2,' "$tmp/out" && grep -q '"samples_ratio": 0.857143' "$tmp/out"
 check "EXR stop map" $?

@@ -174,7 +174,7 @@ static void exr_holds_every_layer(void **state)
         assert_int_equal(exr_attr_get_double(file, 0, figures[i].name, &value), EXR_ERR_SUCCESS);
         assert_true(value == figures[i].value);
     }
-    static const char *const names[] = {"R", "G", "B", "lull.spp", "lull.reason", "lull.p_noisy", "lull.error",
+    static const char *const names[] = {"R", "G", "B", "lull.spp.V", "lull.reason.V", "lull.p_noisy.V", "lull.error.V",
                                         "albedo.R", "albedo.G", "albedo.B", "normal.X", "normal.Y", "normal.Z", "depth.Z"};
     for (int k = 0; k < 14; k++) {
         read_channel(file, names[k], pixels);

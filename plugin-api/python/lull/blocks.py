@@ -10,7 +10,7 @@ import numpy as np
 
 from .criterion import Rect
 
-# Why a block got no more samples; the index is what the EXR's lull.reason holds.
+# Why a block got no more samples; the index is what the EXR's lull.reason.V holds.
 REASONS = ("none", "criterion", "spp-max", "uniform", "time", "interrupt", "dropped")
 # Checks that the criterion did not place grow by this factor: a block overshoots its threshold by 15 % at most.
 CHECK_RATIO = 1.15

@@ -17,13 +17,13 @@ from .files import replaced
 
 
 def write_exr(path: str, driver: Driver, scene: str = "", software: str = "lull for Python 1.0") -> None:
-    """Layers R, G, B, lull.spp, lull.p_noisy, lull.error, lull.reason, cut to the crop."""
+    """R, G, B and the layer lull, which image programs show as spp, p_noisy, error and reason, cut to the crop."""
     frame = driver.frame
     rgb = frame.cropped(frame.mean())
-    channels = {"R": rgb[..., 0], "G": rgb[..., 1], "B": rgb[..., 2], "lull.spp": frame.cropped(frame.spp())}
+    channels = {"R": rgb[..., 0], "G": rgb[..., 1], "B": rgb[..., 2], "lull.spp.V": frame.cropped(frame.spp())}
     for name, value in (("p_noisy", lambda b: b.p_noisy), ("error", lambda b: b.error),
                         ("reason", lambda b: REASONS.index(b.reason))):
-        channels[f"lull.{name}"] = frame.cropped(frame.per_pixel(value))
+        channels[f"lull.{name}.V"] = frame.cropped(frame.per_pixel(value))
     info = frame.criterion.info
     settings = "".join(f" {key}={value}" for key, value in frame.criterion.parameters.items())
     exr.write(path, channels, (frame.width, frame.height), frame.crop[:2], {
