@@ -1,7 +1,8 @@
 /*
  * Thresholds (or stops) per block of one or more views, from any file that says them.
  *
- * CSV `name;t0;…;tN;` (one view per line) · a render's report JSON (`blocks[].spp`) · labels.json · an EXR with `lull.spp.V`.
+ * CSV `name;t0;…;tN;` (one view per line) · a render's report JSON (`blocks[].spp`) · labels.json · an EXR with
+ * `lull.spp.V`.
  */
 #ifndef GGN_DATA_THRESHOLDS_H
 #define GGN_DATA_THRESHOLDS_H
