@@ -13,12 +13,14 @@
 #include "study/prepare.h"
 #include "study/report.h"
 #include "study/server.h"
+#include "study/status.h"
 #include "study/token.h"
 #include "study/transfer.h"
 
 /* --- init --- */
 
 enum { TASK_THRESHOLDS, TASK_VALIDATION };
+enum { MIN_SHOW_MS = 50 }; /* three pictures of a screen of 60 Hz; in less an interval may never be seen */
 
 struct init_options {
     const char *args[1 + GGN_STUDY_MAX_VIEWS]; /* DIR and views */
@@ -28,6 +30,7 @@ struct init_options {
     uint32_t spp_min, spp_max;
     uint64_t seed;
     double catch_share, spacing;
+    const char *asked_by, *contact;
 };
 
 static int add_view(void *into, const char *value, struct base_err *err)
@@ -47,11 +50,14 @@ static const struct base_option init_list[] = {
     {"task", 0, NULL, TO(task), .words = task_words, .help = "what people are asked (required)"},
     {"method", 0, NULL, TO(method), .words = method_words, .help = "how thresholds are measured (adjustment)"},
     {"views", 0, "FOLDER", .set = add_view, .help = "a recorded sequence, or a folder of pictures; more may follow"},
-    {"trials", 0, "N", TO(trials), 1, 1000, .help = "2ifc: trials per block, catch trials included (30)"},
+    {"asked-by", 0, "NAME", TO(asked_by), .help = "who asks, as the page says it (required)"},
+    {"contact", 0, "ADDRESS", TO(contact), .help = "whom to write to or to call, as the page says it (required)"},
+    {"trials", 0, "N", TO(trials), GGN_STUDY_MIN_TRIALS, 1000,
+     .help = "2ifc: trials per block, catch trials included, at least 10 (30)"},
     {"repeats", 0, "N", TO(repeats), 1, 100,
      .help = "adjustment: settings per block (2); validation: judgements per picture (1)"},
-    {"catch", 0, "SHARE", TO(catch_share), 0, 0.5, .help = "share of catch trials (0.1)"},
-    {"show", 0, "MS", TO(show_ms), 1, 60000, .help = "2ifc: how long an interval is shown (700)"},
+    {"catch", 0, "SHARE", TO(catch_share), 0, 0.5, .help = "2ifc, validation: share of catch trials (0.1)"},
+    {"show", 0, "MS", TO(show_ms), MIN_SHOW_MS, 60000, .help = "2ifc: how long an interval is shown (700)"},
     {"gap", 0, "MS", TO(gap_ms), 1, 60000, .help = "the blank between two pictures in the same place (400)"},
     {"break-every", 0, "N", TO(break_every), 0, 100000, .help = "offer a break after so many trials (60; 0: never)"},
     {"spacing", 0, "OCTAVES", TO(spacing), 0.01, 4, .help = "leave out levels that are nearer than that (0.15)"},
@@ -62,25 +68,63 @@ static const struct base_option init_list[] = {
     {0}};
 #undef TO
 
-static int init(struct init_options *o, struct ggn_study *study, struct base_err *err)
+/* What one task alone listens to is refused in another: a study that ignores it would not be the one that was meant. */
+static int options_fit(const struct init_options *o, enum ggn_study_task task, struct base_err *err)
 {
-    char page[4096];
+    const struct {
+        const char *name;
+        int given, fits;
+    } rules[] = {{"trials", o->trials != 0, task == GGN_STUDY_TWO_INTERVAL},
+                 {"show", o->show_ms != 0, task == GGN_STUDY_TWO_INTERVAL},
+                 {"gap", o->gap_ms != 0, task != GGN_STUDY_ADJUSTMENT},
+                 {"catch", o->catch_share >= 0.0, task != GGN_STUDY_ADJUSTMENT},
+                 {"repeats", o->repeats != 0, task != GGN_STUDY_TWO_INTERVAL}};
+    for (size_t i = 0; i < sizeof rules / sizeof rules[0]; i++)
+        if (rules[i].given && !rules[i].fits)
+            return base_fail(err, BASE_EINVAL, "--%s does nothing in this task (%s)", rules[i].name,
+                             ggn_study_task_names[task]);
+    return 0;
+}
+
+/* Task, names and numbers of the study. */
+static int define(const struct init_options *o, struct ggn_study *study, struct base_err *err)
+{
     int validation = o->task == TASK_VALIDATION;
-    for (int i = 1; i < o->n_args; i++)
-        if (add_view(o, o->args[i], err))
-            return err->code;
     if (o->task < 0 || o->n_views == 0)
         return base_fail(err, BASE_EINVAL, "--task and --views are needed");
     if (validation && o->method >= 0)
         return base_fail(err, BASE_EINVAL, "--method goes with --task thresholds");
+    if (!o->asked_by || !o->contact)
+        return base_fail(err, BASE_EINVAL,
+                         "--asked-by NAME and --contact ADDRESS are needed: the page tells people who asks them and whom to "
+                         "write to");
+    if (!ggn_study_plain_line(o->asked_by) || !ggn_study_plain_line(o->contact))
+        return base_fail(err, BASE_EINVAL, "--%s: expected one line of at most %d bytes that is not blank",
+                         ggn_study_plain_line(o->asked_by) ? "contact" : "asked-by", GGN_STUDY_LINE - 1);
     study->task = validation ? GGN_STUDY_VALIDATION : o->method == 1 ? GGN_STUDY_TWO_INTERVAL : GGN_STUDY_ADJUSTMENT;
+    if (options_fit(o, study->task, err))
+        return err->code;
+    snprintf(study->asked_by, sizeof study->asked_by, "%s", o->asked_by);
+    snprintf(study->contact, sizeof study->contact, "%s", o->contact);
+    study->min_ms = ggn_study_min_ms[study->task];
     study->repeats = o->repeats ? o->repeats : study->task == GGN_STUDY_ADJUSTMENT ? 2 : 1;
     study->seed = o->seed;
-    study->trials = o->trials;
-    study->catch_share = o->catch_share;
-    study->show_ms = o->show_ms;
-    study->gap_ms = o->gap_ms;
+    study->trials = o->trials ? o->trials : 30;
+    study->catch_share = o->catch_share >= 0.0 ? o->catch_share : 0.1;
+    study->show_ms = o->show_ms ? o->show_ms : 700;
+    study->gap_ms = o->gap_ms ? o->gap_ms : 400;
     study->break_every = o->break_every;
+    return 0;
+}
+
+static int init(struct init_options *o, struct ggn_study *study, struct base_err *err)
+{
+    char page[4096];
+    for (int i = 1; i < o->n_args; i++)
+        if (add_view(o, o->args[i], err))
+            return err->code;
+    if (define(o, study, err))
+        return err->code;
     struct ggn_study_request_views q = {.dir = o->args[0],
                                         .page_dir = page,
                                         .views = o->views,
@@ -106,24 +150,20 @@ static int run_init(int argc, char **argv)
                                                 .args = offsetof(struct init_options, args),
                                                 .arg_count = offsetof(struct init_options, n_args),
                                                 .doc = "Makes the study DIR: study.json, the pictures it shows, and "
-                                                       "texts.json, what the page says (edit it: who asks, whom to "
-                                                       "write to)."};
+                                                       "texts.json, what the page says (edit or translate it)."};
     struct init_options *o = calloc(1, sizeof *o);
-    struct ggn_study study = {.min_catch_passed = 0.75, .max_untouched = 0.5};
+    struct ggn_study study = {.min_catch_passed = 0.75, .max_untouched = 0.5, .max_fast = 0.1};
     struct base_err err = {0};
     if (!o)
         return base_fail_nomem(&err, "options") ? ggn_cmd_fail(argv[0], &err) : 0;
     *o = (struct init_options){.task = -1,
                                .method = -1,
-                               .trials = 30,
-                               .show_ms = 700,
-                               .gap_ms = 400,
                                .break_every = 60,
                                .block = 200,
                                .spp_min = 1,
                                .spp_max = 1000000,
                                .seed = 1,
-                               .catch_share = 0.1,
+                               .catch_share = -1.0,
                                .spacing = 0.15};
     int rc = base_options_parse(&options, argc, argv, o, &err);
     if (!rc)
@@ -242,14 +282,21 @@ static int with_store(const struct base_options *options, int argc, char **argv,
 static int do_report(const struct options *o, const struct ggn_study *study, struct ggn_study_store *store,
                      struct base_err *err)
 {
-    char folder[4096];
+    char folder[4096], table[4096];
     struct ggn_study_people people = {0};
-    struct base_threads *threads = base_threads_create(base_threads_available(), err);
-    int rc = threads ? ggn_study_people_init(&people, study, store, threads, err) : err->code;
-    if (!rc && !o->out)
-        rc = base_file_join(folder, o->args[0], "report", err);
+    struct base_threads *threads = NULL;
+    int rc = base_file_join(folder, o->args[0], "report", err);
+    const char *out = o->out ? o->out : folder;
     if (!rc)
-        rc = ggn_study_report(o->out ? o->out : folder, &people, !o->no_pictures, err);
+        rc = base_file_join(table, out, "people.csv", err);
+    if (!rc)
+        rc = ggn_study_protect(o->args[0], table, err);
+    if (!rc && !(threads = base_threads_create(base_threads_available(), err)))
+        rc = err->code;
+    if (!rc)
+        rc = ggn_study_people_init(&people, study, store, threads, err);
+    if (!rc)
+        rc = ggn_study_report(out, &people, !o->no_pictures, err);
     ggn_study_people_release(&people);
     base_threads_destroy(threads);
     return rc;
@@ -272,10 +319,37 @@ static int run_report(int argc, char **argv)
     return with_store(&options, argc, argv, 0, do_report);
 }
 
+static int do_status(const struct options *o, const struct ggn_study *study, struct ggn_study_store *store,
+                     struct base_err *err)
+{
+    struct ggn_study_people people = {0};
+    struct base_threads *threads = base_threads_create(base_threads_available(), err);
+    int rc = threads ? ggn_study_people_init(&people, study, store, threads, err) : err->code;
+    (void)o;
+    if (!rc)
+        ggn_study_status(stdout, &people);
+    ggn_study_people_release(&people);
+    base_threads_destroy(threads);
+    return rc;
+}
+
+static int run_status(int argc, char **argv)
+{
+    static const struct base_options options = {
+        .list = no_options,
+        .args_doc = "DIR",
+        ARGS(1),
+        .doc = "Who takes part, how far everybody is, how many catch trials they passed, how quickly they answer, and who "
+               "would not count in a report made now. The study may be served at the same time."};
+    return with_store(&options, argc, argv, 0, do_status);
+}
+
 static int do_export(const struct options *o, const struct ggn_study *study, struct ggn_study_store *store,
                      struct base_err *err)
 {
-    int people = 0, rc = ggn_study_export(study, store, o->out, &people, err);
+    int people = 0, rc = ggn_study_protect(o->args[0], o->out, err);
+    if (!rc)
+        rc = ggn_study_export(study, store, o->out, &people, err);
     if (!rc)
         printf("%s: %d people\n", o->out, people);
     return rc;
@@ -351,6 +425,7 @@ struct verb {
 static const struct verb verbs[] = {
     {"init", run_init, "make a study from recorded sequences or pictures"},
     {"serve", run_serve, "serve its page on this machine"},
+    {"status", run_status, "who takes part, how far, how quickly"},
     {"report", run_report, "thresholds, agreement, judgements: CSV, JSON, pictures"},
     {"export", run_export, "all raw trials"},
     {"import", run_import, "raw trials of the same study"},

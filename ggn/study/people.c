@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "figures/stats.h"
+
 const struct ggn_study_block *ggn_study_cell_block(const struct ggn_study_people *p, int cell, int *view)
 {
     int v = 0;
@@ -51,6 +53,12 @@ struct work {
     struct base_err *errs; /* [n] */
 };
 
+/* Nobody can have looked in so short a time. Catch trials count all the same. */
+static int is_fast(const struct ggn_study_people *p, const struct ggn_study_trial *t)
+{
+    return t->ms < p->study->min_ms;
+}
+
 /* --- two intervals --- */
 
 /* The blocks with enough choices, estimated together. */
@@ -95,10 +103,12 @@ static int read_choices(const struct ggn_study_people *p, const struct input *in
         const struct ggn_study_slot *s = &in->plan.slots[in->trials[i].slot];
         int correct = in->trials[i].answer == s->side + 1;
         double x = s->catch_trial ? GGN_STUDY_PLAIN : log2(in->trials[i].level);
-        r->choices[r->n_choices] = (struct ggn_study_choice){x, s->side == 0, correct};
-        r->choice_cells[r->n_choices++] = p->first[s->view] + s->block;
         r->catch_total += s->catch_trial != 0;
         r->catch_passed += s->catch_trial && correct;
+        if (is_fast(p, &in->trials[i]))
+            continue;
+        r->choices[r->n_choices] = (struct ggn_study_choice){x, s->side == 0, correct};
+        r->choice_cells[r->n_choices++] = p->first[s->view] + s->block;
     }
     return estimate_choices(p, r, err);
 }
@@ -117,11 +127,13 @@ static int read_settings(const struct ggn_study_people *p, const struct input *i
         const struct ggn_study_slot *s = &in->plan.slots[in->trials[i].slot];
         int cell = p->first[s->view] + s->block;
         double x = log2(in->trials[i].level);
+        r->settings++;
+        r->untouched += p->study->views[s->view].blocks[s->block].levels[s->start] == in->trials[i].level;
+        if (is_fast(p, &in->trials[i]))
+            continue;
         sums[cell] += x;
         squares[cell] += x * x;
         r->cells[cell].trials++;
-        r->settings++;
-        r->untouched += p->study->views[s->view].blocks[s->block].levels[s->start] == in->trials[i].level;
     }
     for (int c = 0; c < p->n_cells; c++)
         if (r->cells[c].trials > 1) {
@@ -146,7 +158,8 @@ static int read_settings(const struct ggn_study_people *p, const struct input *i
 
 /* --- validation --- */
 
-static int read_judgements(const struct input *in, struct ggn_study_result *r, struct base_err *err)
+static int read_judgements(const struct ggn_study_people *p, const struct input *in, struct ggn_study_result *r,
+                           struct base_err *err)
 {
     r->judgements = malloc((size_t)(in->n + 1) * sizeof *r->judgements);
     if (!r->judgements)
@@ -154,14 +167,37 @@ static int read_judgements(const struct input *in, struct ggn_study_result *r, s
     for (int i = 0; i < in->n; i++) {
         const struct ggn_study_slot *s = &in->plan.slots[in->trials[i].slot];
         const struct ggn_study_trial *t = &in->trials[i];
-        r->judgements[r->n_judgements++] = (struct ggn_study_judgement){s->view, s->condition, t->answer, t->rating};
         r->catch_total += s->catch_trial != 0;
         r->catch_passed += s->catch_trial && t->answer == (s->catch_trial == GGN_STUDY_CATCH_IDENTICAL);
+        if (!is_fast(p, t))
+            r->judgements[r->n_judgements++] = (struct ggn_study_judgement){s->view, s->condition, t->answer, t->rating};
     }
     return 0;
 }
 
 /* --- people --- */
+
+/* How much was done, when and how quickly. */
+static int read_times(const struct ggn_study_people *p, const struct input *in, struct ggn_study_result *r,
+                      struct base_err *err)
+{
+    double *ms = malloc((size_t)(in->n + 1) * sizeof *ms);
+    if (!ms)
+        return base_fail_nomem(err, "times of answers");
+    for (int i = 0; i < in->n; i++) {
+        const struct ggn_study_trial *t = &in->trials[i];
+        ms[i] = t->ms;
+        r->minutes += t->ms / 60000.0;
+        r->fast += is_fast(p, t);
+        if (strcmp(t->at, r->last) > 0)
+            strcpy(r->last, t->at);
+    }
+    r->done = in->n;
+    r->of = in->plan.n;
+    r->median_s = ggn_stats_quantile(ms, (size_t)in->n, 0.5) / 1000.0;
+    free(ms);
+    return 0;
+}
 
 static void exclude(const struct ggn_study *s, struct ggn_study_result *r)
 {
@@ -169,6 +205,8 @@ static void exclude(const struct ggn_study *s, struct ggn_study_result *r)
         snprintf(r->excluded, sizeof r->excluded, "%d of %d catch trials passed", r->catch_passed, r->catch_total);
     else if (r->settings > 0 && r->untouched > s->max_untouched * r->settings)
         snprintf(r->excluded, sizeof r->excluded, "%d of %d settings left where they started", r->untouched, r->settings);
+    else if (r->fast > s->max_fast * r->done)
+        snprintf(r->excluded, sizeof r->excluded, "%d of %d answers in less than %g ms", r->fast, r->done, s->min_ms);
 }
 
 static void work_person(void *data, long i, int worker)
@@ -178,16 +216,15 @@ static void work_person(void *data, long i, int worker)
     struct ggn_study_result *r = &p->results[i];
     const struct input *in = &w->inputs[i];
     (void)worker;
-    r->done = in->n;
-    r->of = in->plan.n;
-    for (int t = 0; t < in->n; t++)
-        r->minutes += in->trials[t].ms / 60000.0;
+    w->rc[i] = read_times(p, in, r, &w->errs[i]);
+    if (w->rc[i])
+        return;
     if (p->study->task == GGN_STUDY_TWO_INTERVAL)
         w->rc[i] = read_choices(p, in, r, &w->errs[i]);
     else if (p->study->task == GGN_STUDY_ADJUSTMENT)
         w->rc[i] = read_settings(p, in, r, &w->errs[i]);
     else
-        w->rc[i] = read_judgements(in, r, &w->errs[i]);
+        w->rc[i] = read_judgements(p, in, r, &w->errs[i]);
     exclude(p->study, r);
 }
 

@@ -11,7 +11,7 @@
 #include "study/psychometric.h"
 #include "study/store.h"
 
-enum { GGN_STUDY_MIN_TRIALS = 10 }; /* of a block, catch trials included: fewer give no estimate */
+enum { GGN_STUDY_MIN_TRIALS = 10 }; /* of a block, catch trials included, fast ones not: fewer give no estimate */
 
 struct ggn_study_judgement { /* one of a validation */
     int view, condition;     /* condition -1: a catch trial */
@@ -23,7 +23,10 @@ struct ggn_study_result { /* one person */
     int done, of; /* slots */
     int catch_passed, catch_total;
     int untouched, settings;          /* adjustment: settings left where they started, of so many */
+    int fast;                         /* answers in less than min_ms: in no estimate */
     double minutes;                   /* answering; pauses not counted */
+    double median_s;                  /* of an answer; NaN without any */
+    char last[32];                    /* when the latest was stored: UTC, ISO 8601; empty without any */
     char excluded[96];                /* why; empty: counts */
     struct ggn_study_estimate *cells; /* owns; [n_cells]; trials 0 where there is none */
     struct ggn_study_choice *choices; /* owns; [n_choices]; 2ifc: all of them, for pictures */

@@ -423,7 +423,11 @@ static int prepare_view(const struct ggn_study_request_views *q, int index, stru
                          "%s: a view's folder needs a name of its own of letters, digits, '.', '_' and '-'",
                          q->views[index]);
     snprintf(folder, sizeof folder, "stimuli/v%d", index);
-    int rc = base_file_join(path, q->dir, folder, err);
+    int rc = base_file_join(path, q->views[index], "reference.png", err);
+    if (!rc)
+        rc = ggn_study_protect(q->dir, path, err);
+    if (!rc)
+        rc = base_file_join(path, q->dir, folder, err);
     if (!rc)
         rc = make_dir(path, err);
     if (!rc)
@@ -465,6 +469,10 @@ int ggn_study_prepare(const struct ggn_study_request_views *q, struct ggn_study 
         rc = base_file_join(path, q->dir, "study.json", err);
     if (!rc && access(path, F_OK) == 0)
         rc = base_fail(err, BASE_EINVAL, "%s: there is a study already", q->dir);
+    if (!rc)
+        rc = base_file_join(path, q->dir, "texts.json", err);
+    if (!rc && access(path, F_OK) == 0)
+        rc = base_fail(err, BASE_EINVAL, "%s: is there and would be replaced; move it away, and back after init", path);
     if (!rc)
         rc = base_file_join(path, q->dir, "stimuli", err);
     if (!rc)

@@ -32,11 +32,11 @@ static int write_people(const char *dir, const struct ggn_study_people *p, struc
     int rc = begin(&out, dir, "people.csv", err);
     if (rc)
         return rc;
-    fputs("person;done;of;catch_passed;catch_total;untouched;settings;minutes;excluded\n", out.file);
+    fputs("person;done;of;catch_passed;catch_total;untouched;settings;minutes;median_s;fast;excluded\n", out.file);
     for (int i = 0; i < p->n; i++) {
         const struct ggn_study_result *r = &p->results[i];
-        fprintf(out.file, "%s;%d;%d;%d;%d;%d;%d;%.2f;%s\n", r->id, r->done, r->of, r->catch_passed, r->catch_total,
-                r->untouched, r->settings, r->minutes, r->excluded);
+        fprintf(out.file, "%s;%d;%d;%d;%d;%d;%d;%.2f;%.3f;%d;%s\n", r->id, r->done, r->of, r->catch_passed, r->catch_total,
+                r->untouched, r->settings, r->minutes, r->median_s, r->fast, r->excluded);
     }
     return base_file_commit(&out, err);
 }
@@ -200,6 +200,14 @@ static int people_that_count(const struct ggn_study_people *p)
     return n;
 }
 
+static int fast_answers(const struct ggn_study_people *p)
+{
+    int n = 0;
+    for (int i = 0; i < p->n; i++)
+        n += p->results[i].fast;
+    return n;
+}
+
 static void add_head(cJSON *root, const struct ggn_study_people *p, int *failed)
 {
     base_json_text(root, "format", "lull-study-report", failed);
@@ -210,6 +218,9 @@ static void add_head(cJSON *root, const struct ggn_study_people *p, int *failed)
     base_json_number(root, "people_that_count", people_that_count(p), failed);
     base_json_number(root, "min_catch_passed", p->study->min_catch_passed, failed);
     base_json_number(root, "max_untouched", p->study->max_untouched, failed);
+    base_json_number(root, "min_ms", p->study->min_ms, failed);
+    base_json_number(root, "max_fast", p->study->max_fast, failed);
+    base_json_number(root, "fast_answers", fast_answers(p), failed);
     cJSON *list = base_json_array(root, "excluded", failed);
     for (int i = 0; i < p->n; i++)
         if (p->results[i].excluded[0] != '\0') {
@@ -292,6 +303,8 @@ static void print_figures(const struct ggn_study_people *p, const struct ggn_stu
     for (int i = 0; i < p->n; i++)
         if (p->results[i].excluded[0] != '\0')
             printf("  %s does not count: %s\n", p->results[i].id, p->results[i].excluded);
+    if (fast_answers(p) > 0)
+        printf("%d answers in less than %g ms are left out\n", fast_answers(p), p->study->min_ms);
     if (p->study->task == GGN_STUDY_VALIDATION) {
         puts("judged the same as the reference, with 95 % intervals (Wilson):");
         print_scenes(stdout, p, "\t");

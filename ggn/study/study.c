@@ -6,11 +6,13 @@
 #include <string.h>
 
 #include "base/files.h"
+#include "base/inputs.h"
 #include "base/json.h"
 
 enum { MAX_TEXT = 1 << 26 };
 
 const char *const ggn_study_task_names[3] = {"adjustment", "2ifc", "validation"};
+const double ggn_study_min_ms[3] = {300.0, 150.0, 500.0};
 
 void ggn_study_release(struct ggn_study *s)
 {
@@ -30,6 +32,17 @@ int ggn_study_plain_name(const char *name)
     if (n == 0 || n >= GGN_STUDY_NAME || name[0] == '.')
         return 0;
     return strspn(name, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._-") == n;
+}
+
+int ggn_study_plain_line(const char *text)
+{
+    size_t n = strlen(text);
+    if (n >= GGN_STUDY_LINE || strspn(text, " ") == n)
+        return 0;
+    for (; *text; text++)
+        if ((unsigned char)*text < ' ' || *text == 127)
+            return 0;
+    return 1;
 }
 
 int ggn_study_level(const struct ggn_study_block *block, uint32_t spp)
@@ -231,6 +244,28 @@ static int read_head(const struct reader *r, const cJSON *root, struct ggn_study
     return rc;
 }
 
+/* What studies made before these members existed do without. */
+static int read_later_members(const struct reader *r, const cJSON *root, struct ggn_study *s)
+{
+    static const char *const names[2] = {"asked_by", "contact"};
+    char *const into[2] = {s->asked_by, s->contact};
+    int rc = 0;
+    s->max_fast = 1.0;
+    if (cJSON_HasObjectItem(root, "min_ms"))
+        rc = number(r, root, "min_ms", 0, 60000, 0, &s->min_ms);
+    if (!rc && cJSON_HasObjectItem(root, "max_fast"))
+        rc = number(r, root, "max_fast", 0, 1, 0, &s->max_fast);
+    for (int i = 0; i < 2 && !rc; i++) {
+        const cJSON *v = cJSON_GetObjectItemCaseSensitive(root, names[i]);
+        if (v && (!cJSON_IsString(v) || !ggn_study_plain_line(v->valuestring)))
+            rc = base_fail(r->err, BASE_EINVAL, "%s: '%s' must be one line of at most %d bytes", r->path, names[i],
+                           GGN_STUDY_LINE - 1);
+        else if (v)
+            strcpy(into[i], v->valuestring);
+    }
+    return rc;
+}
+
 static int read_numbers(const struct reader *r, const cJSON *root, struct ggn_study *s)
 {
     int rc = whole(r, root, "trials", 1, 1000, &s->trials);
@@ -261,6 +296,8 @@ int ggn_study_parse(const char *path, const char *text, size_t size, struct ggn_
         rc = read_head(&r, root, &s);
     if (!rc)
         rc = read_numbers(&r, root, &s);
+    if (!rc)
+        rc = read_later_members(&r, root, &s);
     if (!rc)
         rc = read_views(&r, root, &s);
     if (!rc && s.task == GGN_STUDY_VALIDATION)
@@ -327,6 +364,12 @@ char *ggn_study_print(const struct ggn_study *s)
     base_json_number(root, "break_every", s->break_every, &failed);
     base_json_number(root, "min_catch_passed", s->min_catch_passed, &failed);
     base_json_number(root, "max_untouched", s->max_untouched, &failed);
+    base_json_number(root, "min_ms", s->min_ms, &failed);
+    base_json_number(root, "max_fast", s->max_fast, &failed);
+    if (*s->asked_by)
+        base_json_text(root, "asked_by", s->asked_by, &failed);
+    if (*s->contact)
+        base_json_text(root, "contact", s->contact, &failed);
     if (s->task == GGN_STUDY_VALIDATION)
         conditions = base_json_array(root, "conditions", &failed);
     for (int i = 0; i < s->n_conditions; i++)
@@ -346,5 +389,30 @@ int ggn_study_write(const char *dir, const struct ggn_study *s, struct base_err 
     if (!rc)
         rc = base_file_write_line(path, text, err);
     free(text);
+    return rc;
+}
+
+/* --- what nothing may be written onto --- */
+
+int ggn_study_protect(const char *dir, const char *output, struct base_err *err)
+{
+    static const char *const own[] = {"study.json", "texts.json", "token", "study.db", "study.db-wal", "study.db-shm"};
+    struct base_inputs files = BASE_INPUTS_EMPTY;
+    const char *slash = strrchr(output, '/'), *name = slash ? slash + 1 : output;
+    char path[4096];
+    int rc = base_file_join(path, dir, "stimuli", err), named = 0;
+    if (!rc && base_file_is_inside(output, path))
+        rc = base_fail(err, BASE_EINVAL, "%s: lies among the pictures that the study shows", output);
+    for (size_t i = 0; i < sizeof own / sizeof own[0] && !rc; i++) {
+        named |= strcmp(name, own[i]) == 0;
+        rc = base_file_join(path, dir, own[i], err);
+        if (!rc)
+            rc = base_inputs_add(&files, path, err);
+    }
+    if (!rc)
+        rc = base_inputs_protect(&files, output, err);
+    if (!rc && named && base_file_is_inside(output, dir))
+        rc = base_fail(err, BASE_EINVAL, "%s: the study keeps this name for a file of its own", output);
+    base_inputs_release(&files);
     return rc;
 }

@@ -15,6 +15,7 @@
 
 enum {
     GGN_STUDY_NAME = 96, /* bytes of a name, the NUL included */
+    GGN_STUDY_LINE = 200, /* bytes of who asks and of their address, the NUL included */
     GGN_STUDY_MAX_VIEWS = 1024,
     GGN_STUDY_MAX_BLOCKS = 4096, /* of one view */
     GGN_STUDY_MAX_LEVELS = 1024, /* of one block */
@@ -51,6 +52,9 @@ struct ggn_study {
     int show_ms, gap_ms;                    /* two-interval: each interval, and the blank between them */
     int break_every;                        /* trials between offered breaks; 0: none */
     double min_catch_passed, max_untouched; /* exclusion rules, shares: see FORMAT.md */
+    double min_ms;   /* an answer in less time is left out: nobody can have looked */
+    double max_fast; /* nor does somebody count of whose answers a larger share is */
+    char asked_by[GGN_STUDY_LINE], contact[GGN_STUDY_LINE]; /* UTF-8, who asks and where; empty in old studies */
     int n_views;
     struct ggn_study_view *views;       /* owns */
     int n_conditions;                   /* validation; each view has a picture of each */
@@ -58,18 +62,24 @@ struct ggn_study {
 };
 
 extern const char *const ggn_study_task_names[3]; /* "adjustment", "2ifc", "validation" */
+extern const double ggn_study_min_ms[3];          /* of each task, for new studies: the reasons are in docs/study.md */
 
 /* Reads and checks DIR/study.json. */
 int ggn_study_read(const char *dir, struct ggn_study *study, struct base_err *err);
 int ggn_study_parse(const char *path, const char *text, size_t size, struct ggn_study *study, struct base_err *err);
 /* Writes DIR/study.json atomically. */
 int ggn_study_write(const char *dir, const struct ggn_study *study, struct base_err *err);
+/* BASE_EINVAL when writing `output` would replace a file of the study in DIR, by whatever name, or take the name of one that
+ * is made later. Reports and exports may lie beside them. */
+int ggn_study_protect(const char *dir, const char *output, struct base_err *err);
 /* The same as text (malloc, caller frees); NULL when out of memory. */
 char *ggn_study_print(const struct ggn_study *study);
 void ggn_study_release(struct ggn_study *study);
 
 /* Letters, digits, '.', '_', '-', not starting with '.': what may stand in a file name or an address. */
 int ggn_study_plain_name(const char *name);
+/* One line of 1 … GGN_STUDY_LINE - 1 bytes that is not blank. */
+int ggn_study_plain_line(const char *text);
 /* Index of a level in the block, or -1. */
 int ggn_study_level(const struct ggn_study_block *block, uint32_t spp);
 /* Index of a view by name, of a block by id, or -1. */

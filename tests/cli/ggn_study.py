@@ -101,7 +101,12 @@ def view(name, pictures, width=32, height=16):
     return folder
 
 
+ASKING = ["--asked-by", "Ada Example, Test Lab", "--contact", "room 7, or ada@lab.example"]
+
+
 def ggn(*args):
+    if args[:1] == ("init",) and "--asked-by" not in args and "--contact" not in args:
+        args = (*args, *ASKING)
     r = subprocess.run([GGN, "study", *args], capture_output=True, text=True)
     if len(args) < 100:
         keep("commands", "$ ggn study %s\n%s%sexit %d\n" % (" ".join(args), r.stdout, r.stderr, r.returncode))
@@ -247,12 +252,12 @@ init = [
     "--block",
     "16",
     "--trials",
-    "4",
+    "10",
     "--catch",
-    "0.25",
+    "0.2",
 ]
 r = ggn(*init)
-check(r.returncode == 0 and "8 trials for each person" in r.stdout, "init from pictures", r.stderr)
+check(r.returncode == 0 and "20 trials for each person" in r.stdout, "init from pictures", r.stderr)
 definition = json.load(open(os.path.join(study, "study.json")))
 check(
     [b["levels"] for b in definition["views"][0]["blocks"]] == [[16, 64, 256, 1024]] * 2
@@ -276,6 +281,43 @@ for b in (0, 1):
     check(not same_as_crop("heavy", b, "reference"), f"stimulus heavy of block {b} is another")
     check(os.path.exists(os.path.join(study, "stimuli", "v0", f"b{b}-heavy.png")), f"  …and there, block {b}")
 fails("init: not over another study", "a study already", *init)
+def refuses(name, pattern, *args):
+    """An init that is refused and makes nothing."""
+    where = os.path.join(TMP.name, "refused")
+    fails("init: " + name, pattern, "init", where, *args)
+    check(not os.path.exists(where), "  …and nothing is made")
+
+
+intervals = ["--task", "thresholds", "--method", "2ifc", "--block", "16", "--views", levels]
+refuses("nobody asks", "--asked-by NAME and --contact ADDRESS are needed", *intervals, "--contact", "here")
+refuses("no address", "--asked-by NAME and --contact ADDRESS are needed", *intervals, "--asked-by", "Ada")
+refuses("a blank name", "--asked-by: expected one line", *intervals, "--asked-by", "  ", "--contact", "here")
+refuses("an address of two lines", "--contact: expected one line", *intervals, "--asked-by", "Ada", "--contact", "a\nb")
+refuses("a name of 200 bytes", "--asked-by: expected one line", *intervals, "--asked-by", "é" * 100, "--contact", "here")
+refuses("nine trials give no threshold", "--trials 9: ", *intervals, "--trials", "9")
+refuses("an interval that no screen shows", "--show 49: ", *intervals, "--show", "49")
+refuses("repeats of intervals", "--repeats does nothing in this task (2ifc)", *intervals, "--repeats", "2")
+for option in ("--trials", "--show", "--gap"):
+    refuses(option + " of settings", option + " does nothing in this task (adjustment)", "--task", "thresholds", "--views", levels, option, "60")
+refuses("catch trials of settings", "--catch does nothing in this task (adjustment)", "--task", "thresholds", "--views", levels, "--catch", "0")
+refuses("trials of a validation", "--trials does nothing in this task (validation)", "--task", "validation", "--views", levels, "--trials", "30")
+check(
+    definition["asked_by"] == ASKING[1] and definition["contact"] == ASKING[3] and definition["min_ms"] == 150 and definition["max_fast"] == 0.1,
+    "study.json says who asks, and which answers are too fast",
+)
+os.makedirs(os.path.join(TMP.name, "own"))
+for name in ("texts.json", "study.json"):
+    with open(os.path.join(TMP.name, "own", name), "w") as f:
+        f.write("mine\n")
+fails("init: not over another study", "a study already", "init", os.path.join(TMP.name, "own"), *intervals)
+os.remove(os.path.join(TMP.name, "own", "study.json"))
+fails("init: not over somebody's texts", "is there and would be replaced", "init", os.path.join(TMP.name, "own"), *intervals)
+check(open(os.path.join(TMP.name, "own", "texts.json")).read() == "mine\n", "  …and they stay")
+os.remove(os.path.join(TMP.name, "own", "texts.json"))
+os.makedirs(os.path.join(TMP.name, "own", "stimuli"))
+os.rename(view("v0", ["reference", "n-16", "n-64", "n-256"]), os.path.join(TMP.name, "own", "stimuli", "v0"))
+fails("init: not into its own view", "lies among the pictures", "init", os.path.join(TMP.name, "own"), "--task=thresholds", "--views", os.path.join(TMP.name, "own", "stimuli", "v0"))
+check(sorted(os.listdir(os.path.join(TMP.name, "own", "stimuli", "v0"))) == ["n-16.png", "n-256.png", "n-64.png", "reference.png"], "  …and its pictures stay")
 fails("init: no views", "--views are needed", "init", os.path.join(TMP.name, "none"), "--task", "thresholds")
 many = [str(i) for i in range(1026)]
 fails("init: 1025 views", "at most 1024 views", "init", os.path.join(TMP.name, "none"), "--task", "thresholds", "--views", *many[:1025])
@@ -357,7 +399,7 @@ status, person = server.json("POST", "api/people", {"consent": True})
 key = person["key"]
 status, me = server.json("GET", f"api/people/{key}")
 check(
-    status == 200 and len(me["slots"]) == 8 and sum(s["catch"] for s in me["slots"]) == 2 and me["trials"] == [],
+    status == 200 and len(me["slots"]) == 20 and sum(s["catch"] for s in me["slots"]) == 4 and me["trials"] == [],
     "consent, a key, a plan",
 )
 
@@ -376,8 +418,8 @@ def trial(slot, level=None, answer=1, **more):
 
 
 address = f"api/people/{key}/trials"
-check(server.json("POST", address, trial(0)) == (200, {"done": 1, "of": 8}), "a trial is stored")
-check(server.json("POST", address, trial(0)) == (200, {"done": 1, "of": 8}), "sent again it is acknowledged again")
+check(server.json("POST", address, trial(0)) == (200, {"done": 1, "of": 20}), "a trial is stored")
+check(server.json("POST", address, trial(0)) == (200, {"done": 1, "of": 20}), "sent again it is acknowledged again")
 
 # --- what is refused ---
 before, logged = contents(study), len(server.refusals())
@@ -387,7 +429,7 @@ os.symlink(secret, os.path.join(study, "stimuli", "v0", "link.txt"))
 cases = [
     ("another answer in its place", 409, "POST", address, trial(0, answer=2), {}),
     ("a trial out of turn", 409, "POST", address, trial(5), {}),
-    ("a slot beyond the plan", 400, "POST", address, {**trial(1), "slot": 8}, {}),
+    ("a slot beyond the plan", 400, "POST", address, {**trial(1), "slot": 20}, {}),
     ("a negative slot", 400, "POST", address, {**trial(1), "slot": -1}, {}),
     ("no slot", 400, "POST", address, {k: v for k, v in trial(1).items() if k != "slot"}, {}),
     ("a slot in words", 400, "POST", address, {**trial(1), "slot": "1; DROP TABLE trial"}, {}),
@@ -491,7 +533,7 @@ status, me = server.json("GET", f"api/people/{key}")
 check([t["slot"] for t in me["trials"]] == [0, 1], "killed without warning: every acknowledged trial is there")
 for slot in range(2, 8):
     server.json("POST", address, trial(slot, answer=me["slots"][slot]["side"] + 1))
-check(len(server.json("GET", f"api/people/{key}")[1]["trials"]) == 8, "and it goes on to the end")
+check(len(server.json("GET", f"api/people/{key}")[1]["trials"]) == 8, "and it goes on")
 check(server.stop() == 0, "serve ends with 0 when interrupted")
 
 # --- beyond this machine ---
@@ -603,6 +645,30 @@ check(
     and "key" not in json.load(open(exported))["people"][0],
     "export, without keys",
 )
+
+
+def bytes_of(folder):
+    """Every file of a folder, with its bytes."""
+    return {
+        os.path.join(path, name): open(os.path.join(path, name), "rb").read()
+        for path, _, names in os.walk(folder)
+        for name in names
+        if not name.endswith("-shm")
+    }
+
+
+kept_bytes = bytes_of(adjustment)
+os.symlink(os.path.join(adjustment, "study.db"), os.path.join(TMP.name, "elsewhere.json"))
+os.symlink(adjustment, os.path.join(TMP.name, "another"))
+for name in ("study.db", "study.json", "texts.json", "token", "study.db-wal", "study.db-shm", "stimuli/v0/b0-16.png", "stimuli/v0/new.json", "stimuli/x"):
+    for path in (os.path.join(adjustment, name), os.path.join(TMP.name, "another", ".", name)):
+        fails("export: not onto the study's own " + name, os.path.basename(name), "export", adjustment, "-o", path)
+fails("export: not onto it by a link", "this is an input", "export", adjustment, "-o", os.path.join(TMP.name, "elsewhere.json"))
+fails("report: not among the pictures", "lies among the pictures", "report", adjustment, "-n", "-o", os.path.join(adjustment, "stimuli", "v0"))
+check(bytes_of(adjustment) == kept_bytes, "  …and nothing in the folder has changed")
+inside = os.path.join(adjustment, "trials.json")
+check(ggn("export", adjustment, "-o", inside).returncode == 0 and open(inside).read() == open(exported).read(), "export: beside them")
+os.remove(inside)
 copy = os.path.join(TMP.name, "copy")
 os.makedirs(copy)
 for name in ("study.json", "texts.json"):
@@ -742,6 +808,39 @@ ggn("init", sequence, "--task=thresholds", "--views", os.path.join(recorded, "tr
 made = json.load(open(os.path.join(sequence, "study.json")))
 keep("sequence", json.dumps({**made, "id": ""}, indent=1) + "\n" + "\n".join(
     sorted(os.path.join(path, n)[len(sequence):] for path, _, names in os.walk(sequence) for n in names)))
+
+# --- how it stands ---
+quick = os.path.join(TMP.name, "quick")
+ggn("init", quick, "--task=thresholds", "--views", levels, "--block=16", "--repeats=5")
+server = Server(quick)
+for fast in (1, 2):  # of ten settings
+    person = server.json("POST", "api/people", {"consent": True})[1]
+    for i, s in enumerate(server.json("GET", f"api/people/{person['key']}")[1]["slots"]):
+        ms = 299.9 if i < fast else 300
+        body = {"slot": i, "revision": 0, "level": 16 if i < fast else 256, "answer": 0, "rating": 0, "ms": ms}
+        server.json("POST", f"api/people/{person['key']}/trials", body)
+third = server.json("POST", "api/people", {"consent": True})[1]["id"]
+r = ggn("status", quick)
+lines = r.stdout.split("\n")
+check(
+    r.returncode == 0
+    and lines[0].startswith("adjustment: 3 people, 2 finished, 0 under way, 1 without an answer; last answer 2")
+    and lines[2].split()[1:6] == ["10/10", "0/0", "0.3", "1", "0.0"]
+    and lines[3].endswith("does not count: 2 of 10 answers in less than 300 ms")
+    and lines[4].split() == [third, "0/10", "0/0", "-", "0", "0.0", "-"],
+    "status, while it is served",
+    r.stdout + r.stderr,
+)
+server.stop()
+r = ggn("report", quick, "-n")
+keep_files("reported-quick", os.path.join(quick, "report"))
+rows = [line.split(";") for line in open(os.path.join(quick, "report", "blocks.csv")).read().split("\n")[1:3]]
+check(
+    r.returncode == 0 and [row[2] for row in rows] == ["256.00"] * 2 and "3 answers in less than 300 ms are left out" in r.stdout,
+    "report: what was set in less than a look is in no threshold",
+    r.stdout + str(rows),
+)
+fails("status: nobody took part", "nobody has taken part yet", "status", os.path.join(TMP.name, "fresh"))
 
 # --- what an init, a server and a store refuse ---
 def init_fails(name, *args):

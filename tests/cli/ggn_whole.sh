@@ -35,7 +35,7 @@ d=$tmp/d one=$tmp/d/train/one-view0
 # --- options: help, and both bounds of every number ----------------------------------------------------------------------------
 says help --help
 for command in bench golden inspect convert flip visible compare import-sin3d label train baseline evaluate cost reconstruct study \
-    "study init" "study serve" "study report" "study export" "study import" "study delete"; do
+    "study init" "study serve" "study status" "study report" "study export" "study import" "study delete"; do
     # shellcheck disable=SC2086
     says help $command --help
 done

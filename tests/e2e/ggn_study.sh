@@ -10,6 +10,7 @@ for scene in cornell-box demo; do
     check "record $scene" $?
 done
 "$bin/ggn" study init "$tmp/study" --task thresholds --views "$tmp/data/cornell-box" "$tmp/data/demo" --repeats 1 \
+    --asked-by "Ada Example" --contact ada@lab.example \
     >"$tmp/out" 2>"$tmp/err" &&
     [ "$(find "$tmp/study/stimuli" -name 'b0-10000.png' -o -name 'b0-9*.png' | wc -l)" -ge 2 ]
 check "init: levels up to 10,000 from the halves" $?

@@ -11,7 +11,7 @@ const PARTICIPANTS = 50,
 
 fs.rmSync(root, { recursive: true, force: true });
 fs.mkdirSync(root, { recursive: true });
-makeLevels(path.join(root, 'view'), 400, 400, [16, 64, 256, 1024]);
+makeLevels(path.join(root, 'view'), 400, 200, [16, 64, 256, 1024]);
 ggn(
     'init',
     path.join(root, 'study'),
@@ -20,7 +20,7 @@ ggn(
     '--method',
     '2ifc',
     '--trials',
-    '5',
+    '10',
     '--views',
     path.join(root, 'view'),
 );

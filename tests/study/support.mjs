@@ -114,7 +114,15 @@ export function makeConditions(folder, width, height, sigmas) {
 
 // --- the program ---
 
-export const ggn = (...args) => execFileSync(process.env.GGN, ['study', ...args], { encoding: 'utf8' });
+// init: who asks is said for the caller
+export const ASKED_BY = 'Ada Example, Test Lab',
+    CONTACT = 'room 7, or tests@lab.example';
+export const ggn = (verb, ...args) =>
+    execFileSync(
+        process.env.GGN,
+        ['study', verb, ...args, ...(verb === 'init' ? ['--asked-by', ASKED_BY, '--contact', CONTACT] : [])],
+        { encoding: 'utf8' },
+    );
 
 export class Server {
     constructor(dir, listen = '127.0.0.1:0') {

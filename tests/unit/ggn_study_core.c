@@ -61,11 +61,17 @@ static void a_study_comes_back_as_it_was_written(void **state)
     (void)state;
     for (int i = 0; i < 3; i++) {
         parse(ggn_study_task_names[i], &s);
+        s.min_ms = 150.5;
+        s.max_fast = 0.1;
+        strcpy(s.asked_by, "Ada \"Example\"");
+        memset(s.contact, 'c', GGN_STUDY_LINE - 1);
         char *first = ggn_study_print(&s);
         assert_int_equal(ggn_study_parse("test", first, strlen(first), &again, &err), 0);
         char *second = ggn_study_print(&again);
         assert_string_equal(first, second);
         assert_int_equal(again.task, i);
+        assert_true(again.min_ms == 150.5 && again.max_fast == 0.1 && strlen(again.contact) == GGN_STUDY_LINE - 1);
+        assert_string_equal(again.asked_by, "Ada \"Example\"");
         assert_int_equal(again.views[0].n_blocks, i == GGN_STUDY_VALIDATION ? 0 : 4);
         free(first);
         free(second);
@@ -462,7 +468,11 @@ static void studies_are_refused_in_these_words(void **state)
         {"\"blocks\":[", "\"other\":["}, {"\"views\":[", "\"views\":[],\"x\":["}, {"\"x1\":40", "\"x1\":41"}, {"\"x1\":40", "\"x1\":30"}, {"\"x0\":30", "\"x0\":-1"},
         {"\"y0\":0", "\"y0\":10"}, {"\"y0\":0", "\"y0\":9"}, {"\"y1\":10", "\"y1\":0"}, {"\"id\":5", "\"id\":2"}, {"\"id\":5", "\"id\":3"}, {"\"id\":5", "\"id\":32769"},
         {"[16,64,512]", "[16,64,64]"}, {"[16,64,512]", "[16,64,65]"}, {"[16,64,512]", "[]"}, {"[16,64,512]", "[0,64]"}, {"[16,64,512]", "[1,64]"},
-        {"[16,64,512]", "[16,1000000000]"}, {"[16,64,512]", "[16,1000000001]"}, {"[16,64,512]", "[16.5]"}, {"[16,64,512]", "[\"16\"]"}, {"]}]}", ""}, {"{", "["}};
+        {"[16,64,512]", "[16,1000000000]"}, {"[16,64,512]", "[16,1000000001]"}, {"[16,64,512]", "[16.5]"}, {"[16,64,512]", "[\"16\"]"}, {"]}]}", ""}, {"{", "["},
+        {"\"trials\"", "\"min_ms\":-1,\"trials\""}, {"\"trials\"", "\"min_ms\":60000,\"trials\""}, {"\"trials\"", "\"min_ms\":60001,\"trials\""},
+        {"\"trials\"", "\"max_fast\":1.01,\"trials\""}, {"\"trials\"", "\"max_fast\":true,\"trials\""}, {"\"trials\"", "\"asked_by\":\"Ada\",\"trials\""},
+        {"\"trials\"", "\"asked_by\":7,\"trials\""}, {"\"trials\"", "\"asked_by\":\"  \",\"trials\""}, {"\"trials\"", "\"contact\":\"a\\nb\",\"trials\""},
+        {"\"trials\"", "\"contact\":\"a\\u007fb\",\"trials\""}};
     struct transcript t;
     FILE *f = transcript_begin(&t);
     (void)state;

@@ -7,7 +7,7 @@ import { Stimuli } from './stimuli.js';
 import { adjustment } from './task_adjustment.js';
 import { twoInterval } from './task_2ifc.js';
 import { validation } from './task_validation.js';
-import { loadTexts, say, text } from './texts.js';
+import { loadTexts, say, setAlways, text } from './texts.js';
 
 const TASKS = { adjustment, '2ifc': twoInterval, validation };
 
@@ -56,6 +56,7 @@ class Session {
 
     async open() {
         this.study = await ask('api/study');
+        setAlways({ asked_by: this.study.asked_by, contact: this.study.contact });
         if (this.key) await this.reload();
     }
     async reload() {
