@@ -1,14 +1,17 @@
 // A real browser goes through every task to the end, at two window sizes, once with the keyboard alone; reload, a second tab,
-// a lost connection and a killed server lose nothing. Screenshots are left beside the studies to be looked at.
+// a lost connection and a killed server lose nothing. Every page is looked at as it stands on the screen (look.mjs), and its
+// screenshot is left beside the studies.
 // usage: GGN=… CHROMIUM=… node browser.mjs FOLDER
 import fs from 'node:fs';
 import path from 'node:path';
 import { chromium } from 'playwright-core';
-import { Client, Server, check, finish, ggn, makeConditions, makeLevels } from './support.mjs';
+import { Looker } from './look.mjs';
+import { ASKED_BY, CONTACT, Client, Server, check, finish, ggn, makeConditions, makeLevels } from './support.mjs';
 
 const root = process.argv[2];
 const SMALL = { width: 1280, height: 800 },
     LARGE = { width: 1960, height: 1080 };
+const SHOW_MS = 61; // of the study with two intervals
 const LEVELS = [16, 32, 64, 128, 256, 512, 1024, 2048, 4096];
 const outside = []; // requests that would leave this machine
 const errors = [];
@@ -36,38 +39,53 @@ async function openPage(link, viewport, options = {}) {
     return page;
 }
 
-const shot = (page, name) => page.screenshot({ path: path.join(root, 'shots', `${name}.png`) });
+const looker = new Looker(browser, path.join(root, 'shots'));
+const look = (...what) => looker.look(...what);
 const state = (page, ...names) =>
     page.waitForFunction((n) => n.includes(document.body.dataset.state), names, { timeout: 30000 });
 const title = (page, words) => page.getByRole('heading', { name: words }).waitFor();
 
-// Consent to instructions. shots: prefix of the screenshots, or none.
-async function enter(page, shots) {
-    const see = async (name) => shots && shot(page, `${shots}-${name}`);
+// What the pages before the trials say, by task where it differs.
+const CONSENT = ['A study on noise', ASKED_BY, CONTACT, 'I am at least 18', 'I agree, go on'];
+const QUESTIONS = ['A few questions', 'How do you see', 'How bright is the room', 'sometimes', 'Continue'];
+const CARD = ['How large is your screen', 'Hold a bank card', 'Width of the box', 'Continue'];
+const DISTANCE = ['How far away do you sit', 'Distance in centimetres', 'Continue'];
+const GAMMA = ['How does your screen show greys', 'Brightness of the plain field', 'Continue'];
+const INSTRUCTIONS = {
+    adjustment: ['Make the grain disappear', 'in 16 fields', 'Start'],
+    '2ifc': ['Which one is grainy?', 'then guess', 'Start'],
+    validation: ['Do they look the same?', 'S same, D different', 'Start'],
+};
+
+// Consent to instructions. shots: prefix of the screenshots.
+async function enter(page, shots, task) {
     await title(page, 'A study on noise');
-    await see('consent');
+    await look(page, `${shots}-consent`, CONSENT);
     await page.getByRole('checkbox').check();
     await page.getByRole('button', { name: 'I agree' }).click();
     await title(page, 'A few questions');
+    await page.getByRole('button', { name: 'Continue' }).click();
+    await look(page, `${shots}-questions-missing`, [...QUESTIONS, 'Please answer every question']);
     for (const group of await page.locator('fieldset').all()) await group.locator('input').first().check();
-    await see('questions');
     await page.getByRole('button', { name: 'Continue' }).click();
     await title(page, 'How large is your screen');
-    await see('card');
+    await look(page, `${shots}-card`, CARD);
     await page.getByRole('button', { name: 'Continue' }).click();
     await title(page, 'How far away');
+    await look(page, `${shots}-distance`, DISTANCE);
     await page.getByRole('button', { name: 'Continue' }).click();
     await title(page, 'How does your screen show greys');
     await page.locator('input[name=gamma]').fill('186');
-    await see('gamma');
+    await look(page, `${shots}-gamma`, GAMMA, 2);
     await page.getByRole('button', { name: 'Continue' }).click();
     await page.getByRole('button', { name: 'Start' }).waitFor();
-    await see('instructions');
+    await look(page, `${shots}-instructions`, INSTRUCTIONS[task]);
 }
 
 // The same with Tab, Space, arrows and Enter.
-async function enterByKeys(page) {
+async function enterByKeys(page, shots, task) {
     await title(page, 'A study on noise');
+    await look(page, `${shots}-consent`, CONSENT);
     await page.keyboard.press('Space');
     await page.keyboard.press('Enter');
     await title(page, 'A few questions');
@@ -75,17 +93,34 @@ async function enterByKeys(page) {
         if (i > 0) await page.keyboard.press('Tab');
         await page.keyboard.press('Space');
     }
+    await look(page, `${shots}-questions`, QUESTIONS);
     await page.keyboard.press('Enter');
     await title(page, 'How large is your screen');
     await page.keyboard.press('ArrowRight');
+    await look(page, `${shots}-card`, CARD);
     await page.keyboard.press('Enter');
     await title(page, 'How far away');
+    await look(page, `${shots}-distance`, DISTANCE);
     await page.keyboard.press('Enter');
     await title(page, 'How does your screen show greys');
     for (let i = 0; i < 58; i++) await page.keyboard.press('ArrowRight');
+    await look(page, `${shots}-gamma`, GAMMA, 2);
     await page.keyboard.press('Enter');
     await page.getByRole('button', { name: 'Start' }).waitFor();
+    await look(page, `${shots}-instructions`, INSTRUCTIONS[task]);
     await page.keyboard.press('Enter');
+}
+
+// The last page, with the code for deletion, as it comes and after a reload.
+async function thanked(page, server, shots) {
+    await state(page, 'finished');
+    const { id } = await stored(server, keyOf(page));
+    const words = ['Thank you', `Your code is ${id}`, ASKED_BY, CONTACT];
+    await page.waitForTimeout(50); // what would empty the page comes after
+    await look(page, `${shots}-thanks`, words);
+    await page.reload();
+    await state(page, 'finished');
+    await look(page, `${shots}-thanks-again`, words);
 }
 
 const keyOf = (page) => new URL(page.url()).searchParams.get('p');
@@ -108,7 +143,7 @@ async function adjustByMouse(page, server, shots) {
     for (let i = 0; i < 16; i++) {
         await page.mouse.move(...at(i));
         for (let k = 0; k < 3; k++) await page.mouse.wheel(0, i % 2 ? 120 : -120);
-        if (i === 5 && shots) await shot(page, `${shots}-adjustment`);
+        if (i === 5) await look(page, `${shots}-adjustment`, ['Picture 1 of 1', 'Fields left to set: 11', 'choose a field'], 1);
         await page.mouse.click(...at(i));
         await page.waitForFunction((n) => document.querySelectorAll('.map .done').length === n, i + 1);
         if (i === 7) {
@@ -132,13 +167,54 @@ async function adjustByMouse(page, server, shots) {
         'adjustment: a field set again is a second revision',
         JSON.stringify([before.trials.length, after.trials.length]),
     );
-    if (shots) await shot(page, `${shots}-adjustment-done`);
+    await look(page, `${shots}-adjustment-done`, ['Fields left to set: 0', 'Next picture'], 1);
     await page.getByRole('button', { name: 'Next picture' }).click();
-    await state(page, 'finished');
-    if (shots) await shot(page, `${shots}-thanks`);
+    await thanked(page, server, shots);
 }
 
-async function adjustByKeys(page, server) {
+// Where the pointer comes to a field its outline is drawn, in the picture and in the one beside, and goes away.
+async function outlined(page, shots, pictures) {
+    const canvases = await page.locator('.stage canvas').all(),
+        rings = await page.locator('.outline').all();
+    check(canvases.length === pictures && rings.length === pictures, `an outline in each of ${pictures} pictures`);
+    await page.evaluate(() => {
+        const usual = Element.prototype.animate;
+        window.held = [];
+        Element.prototype.animate = function (...how) {
+            const animation = usual.apply(this, how);
+            animation.pause();
+            window.held.push(animation);
+            return animation;
+        };
+    });
+    const box = await canvases[0].boundingBox();
+    await page.mouse.move(box.x + 650, box.y + 300); // field 7
+    const edges = [],
+        drawn = [];
+    for (const [i, ring] of rings.entries()) {
+        const at = await ring.boundingBox(),
+            from = await canvases[i].boundingBox();
+        check(
+            at.x === from.x + 600 && at.y === from.y + 200 && at.width === 200 && at.height === 200,
+            `the outline lies around the field under the pointer, picture ${i + 1}`,
+            JSON.stringify([at, from]),
+        );
+        edges.push({ x: at.x + 50, y: at.y, w: 100, h: 3 });
+        drawn.push(await looker.part(page, edges[i]));
+    }
+    await look(page, `${shots}-outline`, ['choose a field'], pictures);
+    await page.evaluate(() => window.held.forEach((animation) => animation.finish()));
+    for (const [i, edge] of edges.entries()) {
+        const after = await looker.part(page, edge);
+        check(
+            drawn[i].hi === 255 && drawn[i].lo === 0 && after.hi < 255 && after.lo > 0,
+            `the outline is seen and goes away, picture ${i + 1}`,
+            JSON.stringify([drawn[i], after]),
+        );
+    }
+}
+
+async function adjustByKeys(page, server, shots) {
     await state(page, 'asking');
     // a snake through the rows
     const order = [...Array(16).keys()].map((i) => ((i >> 2) % 2 ? 4 * (i >> 2) + 3 - (i % 4) : i));
@@ -152,14 +228,14 @@ async function adjustByKeys(page, server) {
         await page.keyboard.press('+');
         if (n === 6) {
             await page.keyboard.down('Space');
-            await shot(page, 'keys-reference');
+            await look(page, `${shots}-reference`, ['the clean picture'], 2);
             await page.keyboard.up('Space');
         }
         await page.keyboard.press('Enter');
         await page.waitForFunction((m) => document.querySelectorAll('.map .done').length === m, n + 1);
     }
     await page.keyboard.press('Enter');
-    await state(page, 'finished');
+    await thanked(page, server, shots);
     const person = await stored(server, keyOf(page));
     check(
         person.trials.length === 16 && person.trials.every((t) => t.level === 64),
@@ -171,8 +247,8 @@ async function adjustByKeys(page, server) {
 {
     const server = await study('adjustment', '--task', 'thresholds', '--views', path.join(root, 'ball'), '--repeats', '1');
     const page = await openPage(server.link, SMALL);
-    await enter(page, 'small');
-    await adjustByMouse(page, server, 'small');
+    await enter(page, 'small-adjustment', 'adjustment');
+    await adjustByMouse(page, server, 'small-adjustment');
     check(true, 'adjustment to the end at 1280×800, by mouse');
     const profile = (await stored(server, keyOf(page))).profile;
     check(
@@ -185,12 +261,14 @@ async function adjustByKeys(page, server) {
     );
     await page.context().close();
     const large = await openPage(server.link, LARGE);
-    await enterByKeys(large);
+    await enterByKeys(large, 'large-adjustment', 'adjustment');
     await state(large, 'asking');
     check((await large.locator('.stage canvas').count()) === 2, 'adjustment: the reference stands beside on a wide screen');
-    await large.waitForTimeout(500);
-    await shot(large, 'large-adjustment');
-    await adjustByKeys(large, server);
+    await look(large, 'large-adjustment', ['Picture 1 of 1', 'Fields left to set: 16', 'choose a field'], 2);
+    await outlined(large, 'large-adjustment', 2);
+    await large.mouse.move(1900, 1000);
+    for (const key of ['ArrowUp', 'ArrowLeft', 'ArrowLeft', 'ArrowLeft']) await large.keyboard.press(key);
+    await adjustByKeys(large, server, 'large-adjustment');
     await large.context().close();
     await server.stop();
 }
@@ -205,6 +283,32 @@ async function answerTrials(page, n, key = () => '1') {
     }
 }
 
+// The first trial, step by step: the pictures while they are loaded, each interval while it is held, the question.
+async function watch(page, shots) {
+    let waiting = [];
+    await page.route('**/stimuli/**', (route) => (waiting ? waiting.push(route) : route.continue()));
+    await page.evaluate((ms) => {
+        const usual = window.setTimeout;
+        window.held = [];
+        window.letGo = () => (window.setTimeout = usual);
+        window.setTimeout = (f, delay, ...more) => (delay === ms ? window.held.push(f) : usual(f, delay, ...more));
+    }, SHOW_MS);
+    await page.getByRole('button', { name: 'Start' }).click();
+    await page.getByText('Loading pictures').waitFor();
+    await look(page, `${shots}-loading`, ['Loading pictures']);
+    const held = waiting;
+    waiting = null;
+    for (const route of held) await route.continue();
+    for (const interval of ['first', 'second']) {
+        await page.waitForFunction(() => window.held.length === 1);
+        await look(page, `${shots}-${interval}`, [interval], 1);
+        await page.evaluate(() => window.held.shift()());
+    }
+    await page.evaluate(() => void window.letGo());
+    await state(page, 'asking');
+    await look(page, `${shots}-asking`, ['Which one was grainy?', '1  first', 'second  2']);
+}
+
 {
     const server = await study(
         '2ifc',
@@ -217,19 +321,15 @@ async function answerTrials(page, n, key = () => '1') {
         '--trials',
         '10',
         '--show',
-        '60',
+        String(SHOW_MS),
         '--gap',
         '40',
         '--break-every',
         '12',
     );
     const page = await openPage(server.link, SMALL);
-    await enter(page);
-    await page.getByRole('button', { name: 'Start' }).click();
-    await state(page, 'showing');
-    await shot(page, 'small-2ifc-showing');
-    await state(page, 'asking');
-    await shot(page, 'small-2ifc-asking');
+    await enter(page, 'small-2ifc', '2ifc');
+    await watch(page, 'small-2ifc');
     await answerTrials(page, 4);
     await state(page, 'asking');
     const key = keyOf(page);
@@ -248,7 +348,7 @@ async function answerTrials(page, n, key = () => '1') {
     await state(second, 'asking');
     await page.keyboard.press('2');
     await title(page, 'Open somewhere else');
-    await shot(page, 'small-conflict');
+    await look(page, 'small-conflict', ['Open somewhere else', 'Continue here']);
     check((await stored(server, key)).trials.length === 6, '2ifc: a second tab: nothing twice, nothing lost');
     await second.close();
     await page.getByRole('button', { name: 'Continue here' }).click();
@@ -259,7 +359,7 @@ async function answerTrials(page, n, key = () => '1') {
     await page.context().setOffline(true);
     await page.keyboard.press('1');
     await page.getByText('The connection is lost').waitFor();
-    await shot(page, 'small-lost');
+    await look(page, 'small-lost', ['The connection is lost', 'Nothing is gone']);
     check((await stored(server, key)).trials.length === 6, '2ifc: offline: the answer waits');
     await page.context().setOffline(false);
     await state(page, 'asking');
@@ -278,10 +378,10 @@ async function answerTrials(page, n, key = () => '1') {
     );
     await answerTrials(page, 4);
     await title(page, 'Take a break');
-    await shot(page, 'small-break');
+    await look(page, 'small-break', ['Take a break', 'Done so far: 12 of 20', 'keep the address']);
     await page.keyboard.press('Enter');
     await answerTrials(page, 8, (i) => (i % 2 ? 'ArrowRight' : 'ArrowLeft'));
-    await state(page, 'finished');
+    await thanked(page, server, 'small-2ifc');
     const person = await stored(server, key);
     check(
         person.trials.length === 20 && person.slots.filter((s) => s.catch).length === 2,
@@ -294,12 +394,15 @@ async function answerTrials(page, n, key = () => '1') {
     await page.context().close();
 
     const large = await openPage(server.link, LARGE);
-    await enterByKeys(large);
+    await enterByKeys(large, 'large-2ifc', '2ifc');
+    await state(large, 'asking');
+    await look(large, 'large-2ifc-asking', ['Which one was grainy?']);
     await answerTrials(large, 12, () => '2');
     await title(large, 'Take a break');
+    await look(large, 'large-break', ['Take a break', 'Done so far: 12 of 20']);
     await large.keyboard.press('Enter');
     await answerTrials(large, 8, () => '2');
-    await state(large, 'finished');
+    await thanked(large, server, 'large-2ifc');
     check((await stored(server, keyOf(large))).trials.length === 20, '2ifc to the end at 1960×1080, by keys alone');
     await large.context().close();
     await server.stop();
@@ -336,13 +439,15 @@ for (const [name, viewport, beside] of [
         '2',
     );
     const page = await openPage(server.link, viewport);
-    await enterByKeys(page);
+    const shots = `${name}-validation`;
+    await enterByKeys(page, shots, 'validation');
     await state(page, 'asking');
-    await page.waitForTimeout(300);
-    await shot(page, `${name}-validation`);
+    await page.waitForFunction(() => document.querySelector('canvas').getContext('2d').getImageData(9, 9, 1, 1).data[3] > 0);
+    await look(page, shots, ['Pair 1 of', 'Do A and B look the same?', 'S  same', 'D  different'], beside ? 2 : 1);
     if (!beside) {
         await page.keyboard.press('s');
-        check(await page.getByText('Look at A and at B first').isVisible(), 'validation: no answer before both were seen');
+        await page.getByText('Look at A and at B first').waitFor();
+        await look(page, `${shots}-both`, ['Look at A and at B first'], 1);
     }
     const total = (await stored(server, keyOf(page))).slots.length;
     await judge(page, beside, 's');
@@ -358,14 +463,14 @@ for (const [name, viewport, beside] of [
             }
             await page.keyboard.press('d');
             await state(page, 'rating');
-            await shot(page, `${name}-validation-rating`);
+            await look(page, `${shots}-rating`, ['And the difference?', '1  very disturbing', '5  I see none'], beside ? 2 : 1);
             await page.getByRole('button', { name: 'slightly' }).click();
             await page.waitForFunction(() => document.body.dataset.state !== 'rating');
         } else {
             await judge(page, beside, i % 3 ? 's' : 'd');
         }
     }
-    await state(page, 'finished');
+    await thanked(page, server, shots);
     const person = await stored(server, keyOf(page));
     check(
         person.trials.length === total &&
@@ -397,7 +502,7 @@ for (const [name, viewport, beside] of [
                 ),
             `refused with a text: ${name}`,
         );
-        await shot(page, `refuse-${name}`);
+        await look(page, `refuse-${name}`, ['One moment', words]);
         if (name === 'small') {
             await page.setViewportSize(SMALL);
             await page.locator('#notice').waitFor({ state: 'hidden' });
@@ -424,7 +529,7 @@ for (const [name, viewport, beside] of [
             ),
         'refused with a text: zoom',
     );
-    await shot(zoomed, 'refuse-zoom');
+    await look(zoomed, 'refuse-zoom', ['One moment', 'zoomed to about 150 %']);
     await zoomed.goto(`${server.link}?p=${'0'.repeat(32)}`);
     check(
         await zoomed
@@ -436,6 +541,15 @@ for (const [name, viewport, beside] of [
             ),
         'an unknown link is told so',
     );
+    await look(zoomed, 'unknown', ['Nobody has this link', ASKED_BY, CONTACT]);
+    const broken = await openPage(server.link, SMALL);
+    await broken.route('**/api/people', (route) => route.fulfill({ status: 400, json: { error: 'a reason' } }));
+    await title(broken, 'A study on noise');
+    await broken.getByRole('checkbox').check();
+    await broken.getByRole('button', { name: 'I agree' }).click();
+    await broken.getByText('Something went wrong').waitFor();
+    await look(broken, 'failed', ['Something went wrong: a reason', 'reload the page']);
+    check(errors.splice(0).join().includes('a reason'), 'what failed is in the console too');
     await server.stop();
 }
 

@@ -160,7 +160,8 @@ async function takeBreak(display) {
     });
 }
 
-async function thanks(display) {
+// The last page is none of jsPsych's steps: it empties the display after each of them.
+function thanks(display) {
     display.replaceChildren(
         element(
             'div.text',
@@ -200,8 +201,8 @@ async function start() {
             timeline: [{ timeline: [step(trial)], conditional_function: () => !session.finished }],
             loop_function: () => !session.finished,
         },
-        step(thanks),
     ]);
+    thanks(jsPsych.getDisplayElement());
 }
 
 start().catch(fail);

@@ -6,6 +6,8 @@ import { say, text } from './texts.js';
 const PANEL = 300,
     GAP = 24; // CSS pixels
 const WHEEL_STEP = 60; // of deltaY, so that a touch pad does not run away
+// The outline of the chosen field: long enough to find it, then gone, since it would disturb the judgement.
+const FADE = [[{ opacity: 1 }, { opacity: 1, offset: 0.4 }, { opacity: 0 }], { duration: 1500 }];
 
 class Screen {
     // slots: [{number, block, start}], all of one view; display is filled.
@@ -36,8 +38,14 @@ class Screen {
     build(display, screens) {
         const { width, height } = this.view;
         this.picture = canvas(width, height);
-        this.stage = element('div.stage', { tabIndex: 0 }, this.picture);
-        if (window.innerWidth >= 2 * width + GAP + PANEL) this.stage.append((this.beside = canvas(width, height)));
+        if (window.innerWidth >= 2 * width + GAP + PANEL) this.beside = canvas(width, height);
+        const pictures = [this.picture, this.beside].filter(Boolean);
+        this.outlines = pictures.map(() => element('div.outline'));
+        this.stage = element(
+            'div.stage',
+            { tabIndex: 0 },
+            ...pictures.map((p, i) => element('div.picture', {}, p, this.outlines[i])),
+        );
         const columns = [...new Set(this.blocks.map((b) => b.x0))].length;
         this.map = element('div.map', {}, ...this.blocks.map(() => element('span')));
         this.map.style.gridTemplateColumns = `repeat(${columns}, 26px)`;
@@ -76,6 +84,23 @@ class Screen {
             );
         await Promise.all(this.blocks.map((b, i) => this.paint(i)));
         this.stage.focus();
+        this.outline();
+        this.since = performance.now();
+    }
+
+    // Shows for a moment where the chosen block lies, in the picture and in the one beside.
+    outline() {
+        const b = this.blocks[this.here];
+        for (const e of this.outlines) {
+            Object.assign(e.style, {
+                left: `${b.x0}px`,
+                top: `${b.y0}px`,
+                width: `${b.x1 - b.x0}px`,
+                height: `${b.y1 - b.y0}px`,
+            });
+            for (const old of e.getAnimations()) old.cancel();
+            e.animate(...FADE);
+        }
     }
 
     async paint(i, reference = false) {
@@ -110,6 +135,7 @@ class Screen {
         this.here = i;
         this.since = performance.now();
         this.mark();
+        this.outline();
         const b = this.blocks[i];
         if (scroll)
             this.stage.scrollTo({
