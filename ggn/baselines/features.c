@@ -10,12 +10,11 @@
 
 void ggn_lightness(const uint8_t *rgb, size_t pixels, double *l)
 {
-    double linear[256];
-    for (int i = 0; i < 256; i++)
-        linear[i] = base_srgb_eotf(i / 255.0);
     for (size_t i = 0; i < pixels; i++) {
         /* Y row of the sRGB matrix with the digits that the published code's library has */
-        double y = 0.212671 * linear[rgb[i]] + 0.715160 * linear[rgb[pixels + i]] + 0.072169 * linear[rgb[2 * pixels + i]];
+        double r = base_srgb_linear[rgb[i]], g = base_srgb_linear[rgb[pixels + i]];
+        double b = base_srgb_linear[rgb[2 * pixels + i]];
+        double y = 0.212671 * r + 0.715160 * g + 0.072169 * b;
         double f = y > 0.008856 ? cbrt(y) : 7.787 * y + 16.0 / 116.0;
         l[i] = 116.0 * f - 16.0;
     }

@@ -1,10 +1,8 @@
 #include "data/image.h"
 
-#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/colour.h"
 #include "base/png.h"
 
 void ggn_image8_release(struct ggn_image8 *image)
@@ -25,21 +23,6 @@ int ggn_image8_write_png(const char *path, const uint8_t *data, int width, int h
     if (length < 4 || strcmp(path + length - 4, ".png") != 0)
         return base_fail(err, BASE_EINVAL, "%s: a picture's name must end in .png", path);
     return base_png_write(path, width, height, 3, data, err);
-}
-
-static float decode_table[256];
-
-static void fill_table(void)
-{
-    for (int i = 0; i < 256; i++)
-        decode_table[i] = (float)base_srgb_eotf(i / 255.0);
-}
-
-const float *ggn_srgb_table(void)
-{
-    static pthread_once_t once = PTHREAD_ONCE_INIT;
-    pthread_once(&once, fill_table);
-    return decode_table;
 }
 
 void ggn_colormap_rgb(enum ggn_colormap map, double v, uint8_t rgb[3])

@@ -41,9 +41,6 @@ int ggn_imagef_read_channel(const char *path, const char *channel, struct ggn_im
 /* Writes an 8-bit RGB PNG atomically. data [height][width][3]. */
 int ggn_image8_write_png(const char *path, const uint8_t *data, int width, int height, struct base_err *err);
 
-/* 256-entry table: display code -> linear. Borrowed for ever. Codes of linear values come from ggn_preprocess. */
-const float *ggn_srgb_table(void);
-
 enum ggn_colormap { GGN_MAGMA, GGN_VIRIDIS };
 /* v in [0,1] (clamped, NaN is 0) -> rgb. Perceptually uniform maps (van der Walt & Smith), interpolated from nine knots. */
 void ggn_colormap_rgb(enum ggn_colormap map, double v, uint8_t rgb[3]);

@@ -147,7 +147,7 @@ static void gain_table(float gain, float table[256])
 {
     for (int i = 0; i < 256; i++)
         table[i] = gain == 1 ? (float)i / 255
-                             : (float)base_srgb_oetf(fmin((double)gain * base_srgb_eotf(i / 255.0), 1));
+                             : (float)base_srgb_oetf(fmin((double)gain * base_srgb_linear[i], 1));
 }
 
 /* Where the pixel of row y of the result comes from: src[start + x · step]. */

@@ -1,48 +1,32 @@
 #include "model/preprocess.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
-#include "model/srgb_table.h"
+#include "base/colour.h"
 
-enum { BIN_BITS = 16 };
-
-/* The code of a clean value: the table of the sRGB curve's 255 rounding points, entered through the top bits of the float. A
- * bin of the index is so narrow that the code grows by at most one inside it. */
-static unsigned code_of(uint32_t bits)
+/* The cleaned value; counts what was cleaned. */
+static double clean(double value, struct ggn_pixel_counts *counts)
 {
-    if (bits >= 0x3f800000u) /* ≥ 1 */
-        return 255;
-    if (bits < GGN_SRGB_FIRST_BITS)
-        return 0;
-    unsigned code = ggn_srgb_bin[(bits - GGN_SRGB_FIRST_BITS) >> BIN_BITS];
-    return code + (bits >= ggn_srgb_limit[code + 1]);
-}
+    uint64_t bits;
 
-/* The bits of the cleaned value; counts what was cleaned. */
-static uint32_t clean(uint32_t bits, struct ggn_pixel_counts *counts)
-{
-    uint32_t magnitude = bits & 0x7fffffffu, huge;
-    const float limit = GGN_PIXEL_HUGE;
-
-    memcpy(&huge, &limit, sizeof huge);
-    if (magnitude - 0x00800000u < 0x7f800000u - 0x00800000u && bits == magnitude && magnitude <= huge)
-        return bits; /* positive and normal: almost always */
-    if (magnitude == 0)
+    if (value >= (double)FLT_MIN && value <= (double)GGN_PIXEL_HUGE)
+        return value; /* almost always */
+    memcpy(&bits, &value, sizeof bits);
+    if (bits << 1 == 0)
         return 0;
-    if (magnitude > 0x7f800000u) {
+    if (isnan(value))
         counts->nan++;
-        return 0;
-    }
-    if (magnitude == 0x7f800000u)
+    else if (isinf(value))
         counts->infinite++;
-    else if (magnitude < 0x00800000u)
+    else if (fabs(value) < (double)FLT_MIN)
         counts->denormal++;
-    else if (bits != magnitude)
+    else if (value < 0)
         counts->negative++;
     else
         counts->huge++;
-    return bits == magnitude && magnitude >= 0x00800000u ? 0x3f800000u : 0;
+    return value > (double)GGN_PIXEL_HUGE ? 1 : 0;
 }
 
 static unsigned code_by_formula(double value, const struct ggn_display *display)
@@ -55,20 +39,12 @@ static unsigned code_by_formula(double value, const struct ggn_display *display)
 uint8_t ggn_preprocess(double linear, const struct ggn_display *display, struct ggn_pixel_counts *counts)
 {
     struct ggn_pixel_counts uncounted = {0};
-    float value = (float)linear;
-    uint32_t bits;
+    double value = clean(linear, counts ? counts : &uncounted);
 
-    memcpy(&bits, &value, sizeof bits);
-    bits = clean(bits, counts ? counts : &uncounted);
-    if (!display || !bits)
-        return (uint8_t)code_of(bits);
-    memcpy(&value, &bits, sizeof value);
-    double exposed = (double)value * display->exposure;
-    if (display->transfer != GGN_TRANSFER_SRGB)
-        return (uint8_t)code_by_formula(exposed, display);
-    value = (float)exposed;
-    memcpy(&bits, &value, sizeof bits);
-    return (uint8_t)code_of(bits);
+    if (!display)
+        return base_srgb_code(value);
+    value *= display->exposure;
+    return display->transfer == GGN_TRANSFER_SRGB ? base_srgb_code(value) : (uint8_t)code_by_formula(value, display);
 }
 
 long ggn_pixel_counts_bad(const struct ggn_pixel_counts *counts)

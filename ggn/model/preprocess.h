@@ -2,9 +2,9 @@
  * From linear radiance to what the networks see: the one conversion that data, training and inference share.
  *
  * Linear value, times exposure, cleaned, transfer curve, rounded to 8 bits. Network inputs are these codes divided by 255.
- * Cleaning: NaN and −∞ and negative → 0, +∞ and values above GGN_PIXEL_HUGE → white, denormal → 0; each kind is counted,
- * so that a block with broken pixels can be reported and is never called converged silently. Bits decide, so flush-to-zero
- * modes change nothing. Thread-safe.
+ * Cleaning: NaN and −∞ and negative → 0, +∞ and values above GGN_PIXEL_HUGE → white, denormal as a float → 0; each kind is
+ * counted, so that a block with broken pixels can be reported and is never called converged silently. Flush-to-zero modes
+ * change nothing. Thread-safe.
  */
 #ifndef GGN_MODEL_PREPROCESS_H
 #define GGN_MODEL_PREPROCESS_H

@@ -133,11 +133,9 @@ static void convolve(const float *in, float *tmp, float *out, int w, int h, cons
 /* YCxCz planes (linearised CIELAB) of an image. */
 static void to_ycxcz(const struct colour *c, const uint8_t *image, size_t n, float *planes[3])
 {
-    double linear[256];
-    for (int i = 0; i < 256; i++)
-        linear[i] = base_srgb_eotf(i / 255.0);
     for (size_t i = 0; i < n; i++) {
-        double rgb[3] = {linear[image[3 * i]], linear[image[3 * i + 1]], linear[image[3 * i + 2]]}, xyz[3];
+        const uint8_t *code = image + 3 * i;
+        double rgb[3] = {base_srgb_linear[code[0]], base_srgb_linear[code[1]], base_srgb_linear[code[2]]}, xyz[3];
         rgb_to_relative_xyz(c, rgb, xyz);
         planes[0][i] = (float)(116.0 * xyz[1] - 16.0);
         planes[1][i] = (float)(500.0 * (xyz[0] - xyz[1]));

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "base/colour.h"
 #include "observer/visibility.h"
 
 struct workspace { /* for one block; owns */
@@ -35,13 +36,12 @@ static int init(struct workspace *w, int width, int height, struct base_err *err
 
 static void lightness_of(const struct ggn_image8 *image, const struct ggn_remaining *b, float *rgb, float *lightness)
 {
-    const float *linear = ggn_srgb_table();
     size_t n = (size_t)b->width * (size_t)b->height, i = 0;
     for (int y = 0; y < b->height; y++) {
         const uint8_t *row = image->data + 3 * ((size_t)(b->y + y) * (size_t)image->width + (size_t)b->x);
         for (int x = 0; x < b->width; x++, i++)
             for (int c = 0; c < 3; c++)
-                rgb[(size_t)c * n + i] = linear[row[3 * x + c]];
+                rgb[(size_t)c * n + i] = base_srgb_linear_f32[row[3 * x + c]];
     }
     ggn_visible_lightness(rgb, n, lightness);
 }

@@ -136,10 +136,9 @@ static int32_t float_rgb(struct pt_builder *b, int32_t id)
     for (size_t i = 0; i < n; i++)
         for (int k = 0; k < 3; k++) {
             size_t at = i * (size_t)map.channels + (size_t)(map.channels >= 3 ? k : 0);
-            float v = map.type == PT_PIXEL_FLOAT ? ((const float *)map.pixels)[at]
-                                                 : (float)((const uint8_t *)map.pixels)[at] / 255.0f;
-            if (map.type == PT_PIXEL_U8_SRGB)
-                v = base_srgb_eotf_f32(v);
+            float v = map.type == PT_PIXEL_FLOAT     ? ((const float *)map.pixels)[at]
+                      : map.type == PT_PIXEL_U8_SRGB ? base_srgb_linear_f32[((const uint8_t *)map.pixels)[at]]
+                                                     : (float)((const uint8_t *)map.pixels)[at] / 255.0f;
             pixels[3 * i + (size_t)k] = fmaxf(v, 0);
         }
     map.type = PT_PIXEL_FLOAT;

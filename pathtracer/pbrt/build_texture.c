@@ -76,7 +76,7 @@ static int convert(struct pt_builder *b, const struct pt_oiio_image *image, doub
             for (size_t j = 0; j < k; j++) {
                 float v = image->f32[i * c + (size_t)from[j]];
                 if (!image->is_float_file && j < 3 && encoding != 1)
-                    v = encoding == 0 ? base_srgb_eotf_f32(v) : powf(v, (float)encoding);
+                    v = encoding == 0 ? (float)base_srgb_eotf((double)v) : powf(v, (float)encoding);
                 /* An infinite pixel is a half float that overflowed: the largest half. */
                 pixels[i * k + j] = isfinite(v) ? v : v > 0 ? 65504.0f : 0;
             }

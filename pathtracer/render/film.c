@@ -76,11 +76,19 @@ int pt_film_list_arrays(const struct pt_film *film, struct pt_film_array out[PT_
     return n;
 }
 
+/* A sum as if all samples had been kept: sum / spp is the mean (pt_film_patch). */
+static double filled(double sum, uint64_t spp, uint32_t dropped)
+{
+    return spp > dropped ? sum * ((double)spp / (double)(spp - dropped)) : sum;
+}
+
+/* To the last bit what a criterion makes of the filled sums (lull_kit_read, which multiplies with 1/N): a recording has the
+ * codes of one mean, a network those of the other. */
 static void mean_of(const double *sum, uint64_t spp, uint32_t dropped, double rgb[3])
 {
-    double n = spp > dropped ? (double)(spp - dropped) : 0.0;
+    const double factor = spp > dropped ? 1.0 / (double)spp : 0.0;
     for (int c = 0; c < 3; c++)
-        rgb[c] = n > 0.0 ? sum[c] / n : 0.0;
+        rgb[c] = filled(sum[c], spp, dropped) * factor;
 }
 
 void pt_film_mean(const struct pt_film *f, size_t i, uint64_t spp, double rgb[3])
@@ -100,9 +108,8 @@ struct pt_film_patch_pixel {
 
 static void scale(double *sum, int n, uint64_t spp, uint32_t dropped)
 {
-    if (spp > dropped)
-        for (int c = 0; c < n; c++)
-            sum[c] *= (double)spp / (double)(spp - dropped);
+    for (int c = 0; c < n; c++)
+        sum[c] = filled(sum[c], spp, dropped);
 }
 
 int pt_film_patch(struct pt_film *f, int x0, int y0, int x1, int y1, uint64_t spp, struct pt_film_patch *patch,

@@ -1,6 +1,6 @@
 #include "shade/texture.h"
 
-#include "shade/texture_srgb.h"
+#include "base/colour.h"
 
 _Thread_local unsigned long long pt_texture_lookups;
 
@@ -23,7 +23,7 @@ static float decode(const struct pt_image_map *image, size_t index)
         return ((const float *)image->pixels)[index];
     uint8_t byte = ((const uint8_t *)image->pixels)[index];
     if (image->type == PT_PIXEL_U8_SRGB)
-        return pt_srgb_to_linear[byte];
+        return base_srgb_linear_f32[byte];
     float value = (float)byte * (1.0f / 255.0f);
     return image->gamma == 1.0f ? value : powf(value, image->gamma);
 }
@@ -58,7 +58,7 @@ static inline pt_vec3 colour_at(const struct pt_image_map *image, size_t i)
         return v3_splat(decode(image, i));
     if (image->type == PT_PIXEL_U8_SRGB) {
         const uint8_t *p = (const uint8_t *)image->pixels + i;
-        return v3(pt_srgb_to_linear[p[0]], pt_srgb_to_linear[p[1]], pt_srgb_to_linear[p[2]]);
+        return v3(base_srgb_linear_f32[p[0]], base_srgb_linear_f32[p[1]], base_srgb_linear_f32[p[2]]);
     }
     return v3(decode(image, i), decode(image, i + 1), decode(image, i + 2));
 }

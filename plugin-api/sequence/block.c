@@ -279,7 +279,7 @@ int seq_mean(const struct seq_block *b, const struct seq_record *r, float *rgb, 
     float table[256][8];
     for (int d = 0; d < 256; d++)
         for (int q = 0; q < 8; q++)
-            table[d][q] = (float)(fine ? seq_fine_decode((uint8_t)d, (uint8_t)q) : base_srgb_eotf(d / 255.0));
+            table[d][q] = (float)(fine ? seq_fine_decode((uint8_t)d, (uint8_t)q) : base_srgb_linear[d]);
     for (size_t i = 0; i < n; i++) {
         uint8_t q = fine ? fine[i] : 0;
         rgb[i] = q < 8 ? table[display[i]][q] : (float)seq_fine_decode(display[i], q);

@@ -119,29 +119,23 @@ uint16_t seq_half_float(double value)
     return isnan(value) ? 0 : base_f64_to_f16(fmin(fmax(value, -65504.0), 65504.0));
 }
 
-/* Linear bounds of the display codes: code d stands for [edge[d], edge[d+1]). */
-static double code_edge(int d)
-{
-    return d <= 0 ? 0.0 : base_srgb_eotf((d - 0.5) / 255.0);
-}
-
 uint8_t seq_fine_encode(uint8_t display, double x)
 {
-    double lo = code_edge(display);
+    double lo = base_srgb_limit[display];
     if (display == 255) {
         double q = x > lo ? round(16.0 * log2(x / lo)) : 0.0;
         return (uint8_t)(q < 255.0 ? q : 255.0);
     }
-    double q = floor(8.0 * (x - lo) / (code_edge(display + 1) - lo));
+    double q = floor(8.0 * (x - lo) / (base_srgb_limit[display + 1] - lo));
     return (uint8_t)(q > 0.0 ? (q < 7.0 ? q : 7.0) : 0.0);
 }
 
 double seq_fine_decode(uint8_t display, uint8_t fine)
 {
-    double lo = code_edge(display);
+    double lo = base_srgb_limit[display];
     if (display == 255)
         return lo * exp2(fine / 16.0);
-    return lo + (fine + 0.5) / 8.0 * (code_edge(display + 1) - lo);
+    return lo + (fine + 0.5) / 8.0 * (base_srgb_limit[display + 1] - lo);
 }
 
 uint8_t seq_half_log_encode(double value)

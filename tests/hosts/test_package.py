@@ -14,7 +14,7 @@ import numpy as np
 
 import lull
 import tap
-from lull import abi, blocks, checkpoint, exr, outputs, png, stopmap
+from lull import abi, blocks, checkpoint, exr, outputs, png, srgb, stopmap
 from renderer import Noise, Playback
 from tap import raises
 
@@ -544,13 +544,27 @@ def test_outputs():
     info = subprocess.run(["oiiotool", "--info", "-v", tmp("o.exr")], text=True, capture_output=True, check=True).stdout
     assert "26 x   16" in info and "lull.reason.V" in info and "halfbuf 1.0 threshold=0.02" in info, info
     outputs.write_preview(tmp("o.png"), d)
-    assert png.read_grey(tmp("o.png")).shape == (16, 26)
+    shown = srgb.codes(f.cropped(f.mean())).mean(axis=-1)
+    assert shown.shape == (16, 26) and abs(255 * png.read_grey(tmp("o.png")) - shown).max() < 1e-9
     outputs.write_report(tmp("o.json"), d)
     raises(OSError, "no-folder", outputs.write_report, tmp("no-folder/o.json"), d)
     before = sorted(os.listdir(TMP.name))
     d.threads = object()
     raises(TypeError, "JSON", outputs.write_report, tmp("o.json"), d)
     assert sorted(os.listdir(TMP.name)) == before and json.loads(Path(tmp("o.json")).read_text())["width"] == 32
+
+
+def test_srgb():
+    """a preview has the path tracer's codes, at every limit and one step of a double or a float beside it"""
+    table = Path("plugin-api/base/colour_tables.c").read_text().partition("base_srgb_limit[257] = {")[2].partition("}")[0]
+    limits = np.array([float(text) for text in table.split(",")[1:256]])
+    code = np.arange(1, 256)
+    assert (srgb.limits() == limits).all()
+    assert (srgb.codes(limits) == code).all() and (srgb.codes(np.nextafter(limits, 0)) == code - 1).all()
+    near = limits.astype(np.float32)
+    for single in (near, np.nextafter(near, np.float32(0)), np.nextafter(near, np.float32(1))):
+        assert (srgb.codes(single) == code - (single.astype(float) < limits)).all()
+    assert srgb.codes([np.nan, -1, -np.inf, 0, .18, 1, 7, np.inf]).tolist() == [0, 0, 0, 0, 118, 255, 255, 255]
 
 
 def test_progress():

@@ -199,7 +199,7 @@ static void test_srgb(void **state)
         for (int c = 0; c < 3; c++) {
             double x = (double)v[c];
             assert_int_equal(ggn_preprocess(x, NULL, NULL), (int)fmin(255, floor(255 * srgb(x) + 0.5)));
-            assert_int_equal(ggn_preprocess(x, &brighter, NULL), (int)fmin(255, floor(255 * srgb((double)(float)(1.5 * x)) + 0.5)));
+            assert_int_equal(ggn_preprocess(x, &brighter, NULL), (int)fmin(255, floor(255 * srgb(1.5 * x) + 0.5)));
             assert_int_equal(ggn_preprocess(x, &gamma, NULL), (int)fmin(255, floor(255 * pow(x, 1 / 2.2) + 0.5)));
             assert_int_equal(ggn_preprocess(x, &linear, NULL), (int)fmin(255, floor(255 * 2 * x + 0.5)));
         }

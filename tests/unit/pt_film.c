@@ -6,6 +6,8 @@
 
 #include <cmocka.h>
 
+#include <lull/criterion_kit.h>
+
 #include "render/film.h"
 
 static struct pt_path_result sample_of(float r, float g, float b)
@@ -132,6 +134,33 @@ static void non_finite_samples_are_dropped(void **state)
     pt_film_release(&film);
 }
 
+/* To the last bit, whatever was dropped: a recording's codes come from the one, a network's from the other. */
+static void a_criterion_reads_the_mean(void **state)
+{
+    (void)state;
+    enum { PIXELS = 3000 };
+    struct pt_film film;
+    struct base_err err = {0};
+    struct pt_film_patch patch = {0};
+    double want[PIXELS][3], got[PIXELS][3];
+    const uint64_t spp = 5347;
+    assert_int_equal(pt_film_init(&film, 0, 0, PIXELS, 1, PT_FILM_COLOR, &err), 0);
+    for (size_t i = 0; i < PIXELS; i++) {
+        for (size_t c = 0; c < 3; c++)
+            film.color[3 * i + c] = (double)spp * fabs(sin((double)(3 * i + c)));
+        film.dropped[i] = (uint32_t)(i % 8 < 4 ? 0 : i);
+        pt_film_mean(&film, i, spp, want[i]);
+    }
+    assert_int_equal(pt_film_patch(&film, 0, 0, PIXELS, 1, spp, &patch, &err), 0);
+    const struct lull_view view = {.struct_size = sizeof view, .x1 = PIXELS, .y1 = 1};
+    const struct lull_block block = {.x1 = PIXELS, .y1 = 1, .spp = spp};
+    const struct lull_plane plane = {film.color, 3 * sizeof(double), 0, sizeof(double), 1, LULL_TYPE_F64, LULL_NORM_SPP, 3, 0};
+    lull_kit_read(&view, &plane, &block, 0, 0, PIXELS, 3, got);
+    assert_memory_equal(got, want, sizeof got);
+    pt_film_unpatch(&film, &patch);
+    pt_film_release(&film);
+}
+
 /* Most that is dropped is of one half: each half's mean is that of what it kept, and the view's sums are scaled by its own count. */
 static void halves_drop_apart(void **state)
 {
@@ -180,7 +209,7 @@ int main(void)
         cmocka_unit_test(half_is_balanced),       cmocka_unit_test(half_is_spread),
         cmocka_unit_test(planes_on_demand),       cmocka_unit_test(sums_survive_load_and_store),
         cmocka_unit_test(million_samples_of_a_constant), cmocka_unit_test(non_finite_samples_are_dropped),
-        cmocka_unit_test(halves_drop_apart),
+        cmocka_unit_test(halves_drop_apart), cmocka_unit_test(a_criterion_reads_the_mean),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -10,7 +10,7 @@ from typing import Optional
 
 import numpy as np
 
-from . import exr, png
+from . import exr, png, srgb
 from .blocks import REASONS
 from .driver import Driver
 from .files import replaced
@@ -37,9 +37,7 @@ def write_preview(path: str, driver: Driver) -> None:
     """PNG: the display mapping of the frame if it has one, then the sRGB transfer."""
     frame = driver.frame
     mean = frame.cropped(frame.mean())
-    linear = np.clip(frame.display(mean) if frame.display else mean, 0, 1)
-    srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    png.write(path, np.floor(255 * srgb + 0.5).astype(np.uint8))
+    png.write(path, srgb.codes(frame.display(mean) if frame.display else mean))
 
 
 def _number(value: float) -> Optional[float]:
