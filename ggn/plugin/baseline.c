@@ -131,7 +131,7 @@ static int32_t load_model(struct lull_instance *in, enum ggn_baseline_kind kind,
     snprintf(name, sizeof name, "%s.ggn", ggn_baseline_names[kind]);
     if (!path) {
         if (!gp_model_find(name, NULL, found, sizeof found))
-            return lull_kit_fail(err, LULL_E_IO, "model: %.480s", found);
+            return lull_kit_fail(err, LULL_E_VALUE, "model: %.480s", found);
         path = found;
     }
     if (ggn_baseline_load(b, path, kind, &error))

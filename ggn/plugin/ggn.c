@@ -205,7 +205,7 @@ static int32_t load_model(struct lull_instance *in, const char *path, struct lul
 
     if (!path) {
         if (!gp_model_find("lull-2.ggn", "LULL_MODEL", found, sizeof found))
-            return lull_kit_fail(err, LULL_E_IO, "model: %.480s", found);
+            return lull_kit_fail(err, LULL_E_VALUE, "model: %.480s", found);
         path = found;
     }
     int rc = ggn_model_load(path, &model, &error);

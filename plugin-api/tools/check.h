@@ -34,6 +34,7 @@ struct lc {
 __attribute__((format(printf, 2, 3))) void lc_fail(struct lc *c, const char *format, ...);
 __attribute__((format(printf, 2, 3))) void lc_note(struct lc *c, const char *format, ...);
 __attribute__((format(printf, 2, 3))) void lc_skip(struct lc *c, const char *format, ...);
+__attribute__((format(printf, 2, 3))) void lc_refuse(struct lc *c, const char *format, ...); /* wrong usage */
 
 /* What comes now, for the report if the process does not survive it. Not thread safe. */
 __attribute__((format(printf, 2, 3))) void lc_doing(struct lc *c, const char *format, ...);

@@ -49,6 +49,7 @@ static void report_line(struct lc *c, char kind, const char *format, va_list arg
 REPORT_FUNCTION(lc_fail, 'F')
 REPORT_FUNCTION(lc_note, 'N')
 REPORT_FUNCTION(lc_skip, 'S')
+REPORT_FUNCTION(lc_refuse, 'R')
 
 void lc_doing(struct lc *c, const char *format, ...)
 {
@@ -74,6 +75,7 @@ static void keep(struct lc_report *r, char kind, const char *text)
 {
     r->failures += kind == 'F';
     r->skipped |= kind == 'S';
+    r->refused |= kind == 'R';
     if (r->line_count == LC_LINES_MAX) {
         r->lines_left_out++;
         return;

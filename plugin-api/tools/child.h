@@ -14,10 +14,11 @@ enum { LC_LINES_MAX = 24, LC_LINE_SIZE = 800 };
 struct lc_report {
     int failures;
     int skipped;
+    int refused;    /* what the command line asks for cannot be done */
     int completed;  /* the function returned */
     int line_count; /* lines kept, failures first come first served */
     int lines_left_out;
-    char kind[LC_LINES_MAX]; /* 'F'ailure, 'N'ote, 'S'kip */
+    char kind[LC_LINES_MAX]; /* 'F'ailure, 'N'ote, 'S'kip, 'R'efusal */
     char lines[LC_LINES_MAX][LC_LINE_SIZE];
 };
 

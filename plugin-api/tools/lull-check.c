@@ -89,7 +89,7 @@ static const struct base_options options = {
 /* --- finding -------------------------------------------------------------------------------------------------------------
  */
 
-/* In a child: reports the path and then the ids to check as notes; skipped means that there is no such criterion. */
+/* In a child: reports the path and then the ids to check as notes; refuses what is no criterion. */
 static void find(struct lc *c, const void *arg)
 {
     const char *spec = arg;
@@ -100,7 +100,7 @@ static void find(struct lc *c, const void *arg)
         size_t last = strlen(spec) > 0 ? strlen(spec) - 1 : 0;
         int senseless = spec[0] == '\0' || spec[0] == ':' || spec[last] == ':';
         if (senseless || err.code == LULL_E_KEY || (err.code == LULL_E_IO && access(spec, R_OK) != 0))
-            lc_skip(c, "%s", err.message);
+            lc_refuse(c, "%s", err.message);
         else
             lc_fail(c, "%s", err.message);
         free(found);
@@ -131,14 +131,34 @@ static int find_table(struct lc *c, const char *id)
     return LC_EXPECT(c, c->criterion != NULL, "no criterion %s", id) ? 0 : -1;
 }
 
-/* And what it requires. */
+/* A parameter without a default that the message names and the command line does not give; NULL: none. */
+static const char *missing(const struct lc *c, const char *message)
+{
+    for (uint32_t i = 0; i < c->criterion->param_count; i++) {
+        const struct lull_param *p =
+            (const void *)((const char *)c->criterion->params + (size_t)i * c->criterion->param_stride);
+        int given = 0;
+        for (uint32_t k = 0; k < c->pair_count; k++)
+            given |= strcmp(c->pairs[k].key, p->name) == 0;
+        if (!given && !p->default_value && strstr(message, p->name))
+            return p->name;
+    }
+    return NULL;
+}
+
+/* And what it requires. Skips a criterion that wants a parameter, refuses parameters that are wrong. */
 static int prepare(struct lc *c)
 {
     struct lull_instance *instance = NULL;
     struct lull_error err = {.struct_size = sizeof err};
     int32_t status = c->criterion->create(NULL, c->pairs, c->pair_count, sizeof *c->pairs, &instance, &err);
+    const char *wanted = status == LULL_E_VALUE ? missing(c, err.message) : NULL;
+    if (wanted) {
+        lc_skip(c, "it wants -p %s=...: %s", wanted, err.message);
+        return -1;
+    }
     if (c->pair_count > 0 && (status == LULL_E_KEY || status == LULL_E_VALUE)) {
-        lc_skip(c, "%s", err.message);
+        lc_refuse(c, "%s", err.message);
         return -1;
     }
     if (!LC_EXPECT(c, status == LULL_OK && instance, "create failed (%d): %s", status, err.message))
@@ -227,16 +247,17 @@ static int check_criterion(const struct arguments *a, struct lc *c, const char *
     int result = LC_EXIT_OK;
     if (!r || !made || lc_child_run(c, run_task, &make_one, a->limit_s, made) != 0) {
         result = no_process();
-    } else if (made->skipped) { /* the command line's parameters are wrong */
+    } else if (made->refused) { /* the command line's parameters are wrong */
         fprintf(stderr, "lull-check: %s: %s\n", id, made->lines[0]);
         result = LC_EXIT_USAGE;
     } else {
         if (!a->quiet)
             printf("# %s:%s\n", c->path, id);
         result = run_group(a, c, groups[0], (struct task){id, NULL, 0}, t, r);
-        if (made->failures > 0)
+        const int usable = made->failures == 0 && !made->skipped;
+        if (!usable)
             print_report(a, t, "create", "an instance can be made", made);
-        for (int g = 1; g < GROUPS && result == LC_EXIT_OK && made->failures == 0; g++)
+        for (int g = 1; g < GROUPS && result == LC_EXIT_OK && usable; g++)
             result = run_group(a, c, groups[g], (struct task){id, NULL, 1}, t, r);
     }
     free(r);
@@ -254,7 +275,7 @@ static int check_spec(const struct arguments *a, const char *spec, struct totals
         return no_process();
     }
     int status = LC_EXIT_OK;
-    if (r->skipped) {
+    if (r->refused) {
         fprintf(stderr, "lull-check: %s\n", r->lines[0]);
         status = LC_EXIT_USAGE;
     } else if (r->failures > 0) {

@@ -49,10 +49,15 @@ run "an unknown parameter" -p no-such=1 halfbuf
 run "no such criterion" no-such-criterion
 run "no such id" "$BUILD/lib/lull/null.so:other"
 run "no library" ./Makefile
+run "a model that is wanted" -o table "$BUILD/lib/lull/ggn.so:svd-entropy"
+run "a model that is wanted, beside another parameter" -o table -p visible=0.5 "$BUILD/lib/lull/ggn.so:svd-entropy"
 for k in null fixed halfbuf variance; do
     run "all checks of $k" $k
 done
 t "a limit that is too short fails the check" status 1 -L 1 -o shapes -p fault=30 "$BUILD/tests/abi/plugins/faulty.so"
+
+mkdir "$tmp/lib" && cp "$BUILD/lib/lull/ggn.so" "$tmp/lib" && echo broken >"$tmp/lib/svd-entropy.ggn"
+t "a model that is there and is broken is no reason to skip" status 1 -o table "$tmp/lib/ggn.so:svd-entropy"
 
 # The criteria of ggn.so need a model each (observer has none): ggn the shipped one, the baselines one of a few small blocks.
 for k in svd-entropy attributes noise-mask; do

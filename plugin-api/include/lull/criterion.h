@@ -72,7 +72,7 @@ extern "C" {
 #define LULL_OK 0
 #define LULL_E_INVALID (-1)     /* an argument makes no sense: a NULL that is not allowed, an empty frame, a bad block */
 #define LULL_E_KEY (-2)         /* create: no parameter has this name */
-#define LULL_E_VALUE (-3)       /* create: not a value of this parameter, or out of its range */
+#define LULL_E_VALUE (-3)       /* create: not a value of this parameter, out of its range, or none where one is needed */
 #define LULL_E_MEMORY (-4)      /* out of memory */
 #define LULL_E_PLANE (-5)       /* a required plane is missing or has a form that is not described here */
 #define LULL_E_STATE (-6)       /* the call does not fit the life cycle, such as evaluate before begin_frame */
