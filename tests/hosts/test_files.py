@@ -111,14 +111,25 @@ def test_replaced():
 
 
 def test_on_the_disk():
-    """a file gets its name after it is on the disk"""
-    order, fsync, replace = [], os.fsync, os.replace
-    os.fsync, os.replace = (lambda h: (order.append("fsync"), fsync(h)), lambda a, b: (order.append("replace"), replace(a, b)))
+    """a file is whole and on the disk before it takes the old one's place, which is there until then"""
+    log, real = [], {name: getattr(os, name) for name in ("fsync", "replace", "unlink", "rename", "remove")}
+
+    def told(name):
+        def call(first, *rest):
+            log.append((name, os.fstat(first).st_size if name == "fsync" else 0, Path("disk").read_text()))
+            return real[name](first, *rest)
+        return call
+    Path("disk").write_text("old")
     try:
-        write("disk")
+        for name in real:
+            setattr(os, name, told(name))
+        with replaced("disk") as file:
+            file.write(b"x" * 99990)
+            file.write(b"x" * 10)  # in the buffer still
     finally:
-        os.fsync, os.replace = fsync, replace
-    assert order == ["fsync", "replace"], order
+        for name, function in real.items():
+            setattr(os, name, function)
+    assert log == [("fsync", 100000, "old"), ("replace", 0, "old")] and Path("disk").read_text() == "x" * 100000, log
 
 
 def test_full_disk():

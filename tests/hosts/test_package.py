@@ -1,8 +1,10 @@
 """The Python package lull: the ABI's layout, finding criteria, the driver with a renderer in numpy, the path tracer's stops,
 files, and bad input. BUILD names the build folder."""
+import copy
 import ctypes
 import json
 import os
+import pickle
 import re
 import signal
 import subprocess
@@ -135,7 +137,8 @@ def test_moment2():
     _, f, _ = run("variance", parameters={"threshold": .01}, host=host, supplies=["moment2"])
     spp = [b.spp for b in f.blocks]
     assert spp[0] < spp[1] < spp[2] <= spp[3], spp
-    raises(lull.LullError, "MOMENT2", run, "variance")
+    raises(lull.LullError, "reads moment2, which this host does not supply: choose another criterion", run, "variance")
+    raises(lull.LullError, "with a display mapping", run, "variance", supplies=["moment2"], display=lambda x: x.clip(0, 1))
 
 
 def test_sums():
@@ -264,10 +267,38 @@ def test_limits():
 
 
 def test_seam():
-    """a block beside one with many more samples is re-opened up to the ratio"""
+    """a block beside one with many more samples is re-opened, up to exactly that ratio"""
+    for counts, ratio, wanted in (((100, 1000, 90), 4, [250, 0, 250]), ((100, 1000, 90), 3, [334, 0, 334]),
+                                  ((250, 1000, 251), 4, [0, 0, 0]), ((100, 150, 1000), 2, [0, 500, 0])):
+        row = blocks.grid(48, 16, 16, 16)
+        for b, spp in zip(row, counts):
+            b.spp, b.reason = spp, "criterion"
+        assert blocks.reopen(row, ratio) == sum(n > 0 for n in wanted)
+        assert [b.next_spp for b in row] == wanted and [b.active for b in row] == [n > 0 for n in wanted], (counts, ratio)
+    for reason in ("spp-max", "time", "interrupt", "uniform"):
+        row = blocks.grid(32, 16, 16, 16)
+        row[0].spp, row[0].reason, row[1].spp = 1, reason, 99
+        assert blocks.reopen(row, 2) == 0
     plain = run(sigmas=[[.01, .5]])[1]
-    even = run(sigmas=[[.01, .5]], driver={"max_seam": 2.})[1]
-    assert plain.blocks[1].spp > 3 * plain.blocks[0].spp and even.blocks[1].spp <= 2 * even.blocks[0].spp
+    for ratio in (2., 3.):
+        even, d = run(sigmas=[[.01, .5]], driver={"max_seam": ratio})[1:]
+        spp = [b.spp for b in even.blocks]
+        assert plain.blocks[1].spp > 3.5 * plain.blocks[0].spp and spp[1] == plain.blocks[1].spp
+        assert spp[0] == d.at_wave(-(-spp[1] // int(ratio))), (ratio, spp)  # where the halves are equal
+        assert even.blocks[0].half_spp == spp[0] / 2
+
+
+def test_first_spp():
+    """a criterion is asked first where it says that asking has a use, never before"""
+    for parameters, options, first in (({"first-spp": "100"}, {}, 128), ({"first-spp": "100"}, {"spp_min": 200}, 224),
+                                       ({"first-spp": "1000"}, {}, 512)):
+        c = lull.load("halfbuf", **parameters)
+        f = lull.Frame(c, 32, 32, **{"block": 16, "spp_max": 512, **options})
+        asked, evaluate = [], f.evaluate
+        f.evaluate = lambda due, final: asked.append([f.blocks[i].spp for i in due]) or evaluate(due, final)
+        lull.Driver(f, Noise([[.5] * 2] * 2)).run()
+        assert f.first_spp == max(options.get("spp_min", 16), int(parameters["first-spp"]))
+        assert asked[0] == [first] * 4, asked
 
 
 def test_failing_criterion():
@@ -367,8 +398,25 @@ def test_bad_planes():
 
 def test_bad_frames():
     """sizes, crops and limits that make no sense are named"""
-    c = lull.load("halfbuf")
-    raises(ValueError, "sizes of at least 1", lull.Frame, c, 0, 8)
+    c, nan, inf = lull.load("halfbuf"), float("nan"), float("inf")
+    for width, height, text in ((0, 8, "width 0"), (8, -1, "height -1"), (10 ** 9, 10 ** 6, "from 1 to 32768"),
+                                (30000, 30000, "2^28 pixels")):
+        raises(ValueError, text, lull.Frame, c, width, height)
+        raises(ValueError, text, c.begin_frame, width, height, [lull.Rect(0, 0, 8, 8)], ["color", "half"])
+    raises(ValueError, "2^20 blocks", lull.Frame, c, 16384, 16384, block=1)
+    for name, values in (("exposure", (nan, inf, 0, -1)), ("gamma", (nan, 0)), ("sample_clamp", (nan, -1)),
+                         ("block", (0, 5000)), ("time_budget_s", (nan, inf, -1)), ("spp_max", (0, 1 << 31)),
+                         ("spp_min", (0,)), ("seed", (-1, 1 << 64))):
+        for value in values:
+            raises(ValueError, f"{name} {value}: expected", lull.Frame, c, 8, 8, **{name: value})
+    for name, value in (("exposure", "1 stop"), ("block", 8.), ("spp_max", 100.), ("spp_min", nan), ("time_budget_s", None),
+                        ("seed", "a"), ("crop", (0, 0, 8, 8.5))):
+        raises(TypeError, name, lull.Frame, c, 8, 8, **{name: value})
+    raises(TypeError, "width 8.0: expected a whole number", lull.Frame, c, 8., 8)
+    raises(ValueError, "one number or (width, height)", lull.Frame, c, 8, 8, block=(8, 8, 8))
+    assert lull.Frame(c, np.int64(8), np.int32(8), block=np.uint8(8)).blocks
+    for name, value in (("max_check_overhead", nan), ("max_check_overhead", 2), ("max_seam", nan), ("max_seam", inf)):
+        raises(ValueError, f"{name} {value}: expected", lull.Driver, lull.Frame(c, 8, 8), None, **{name: value})
     for crop in ((3, 3, 3, 9), (-1, 0, 4, 4), (0, 0, 9, 4), (5, 0, 2, 4)):
         raises(ValueError, "no block is left", lull.Frame, c, 8, 8, crop=crop)
     raises(ValueError, "spp_min", lull.Frame, c, 8, 8, spp_min=10, spp_max=5)
@@ -454,7 +502,8 @@ def test_identity():
             ("block", "16x16", "8x16", {"block": (8, 16)}), ("max-seam", "0.0", "2.0", {"max_seam": 2}),
             ("uniform", "False", "True", {"uniform": True}), ("whole-waves", "True", "False", {"whole_waves": False}),
             ("display", "none", "crc ", {"display": lambda x: x.clip(0, 1)}),
-            ("mask", "none", "crc ", {"mask": np.ones((32, 32))}), ("crop", "0,0,32,32", "0,0,32,9", {"crop": (0, 0, 32, 9)}),
+            ("mask", "none", "crc ", {"mask": np.ones((32, 32))}),
+            ("crop", "0,0,32,32", "0,0,32,9", {"crop": (0, 0, 32, 9)}),
             ("criterion", "halfbuf 1.0 threshold=0.02", "halfbuf 1.0 threshold=0.03",
              {"criterion": lull.load("halfbuf", threshold=.03)}),
             ("criterion-files", "crc ", "crc ", {"criterion": lull.load(own_plugin, threshold=.02)})):
@@ -575,6 +624,106 @@ def test_progress():
         d.step()
     form = r"(>=)?\s*\d+%  \d+ of \d+ blocks active  spp \d+\.\.\d+  \d+\.\d\d Mpaths/s  ETA (at most )?(\d+:\d\d|unknown)"
     assert re.fullmatch(form, outputs.progress_text(d)), outputs.progress_text(d)
+
+
+def test_two_frames():
+    """two frames on one criterion are each judged by its own view, in whatever order; a frame that was dropped says so"""
+    def frame(c, exposure):
+        return lull.Frame(c, 32, 32, block=16, spp_max=4000, exposure=exposure)
+    alone = []
+    for exposure in (1, .1):
+        f = frame(lull.load("halfbuf", threshold=.02), exposure)
+        lull.Driver(f, Noise(SIGMAS)).run()
+        alone.append([b.spp for b in f.blocks])
+    c = lull.load("halfbuf", threshold=.02)
+    frames = [frame(c, 1), frame(c, .1)]
+    drivers = [lull.Driver(f, Noise(SIGMAS)) for f in frames]
+    while any([d.step() is None for d in drivers]):
+        pass
+    assert [[b.spp for b in f.blocks] for f in frames] == alone and alone[0] != alone[1], (alone, frames)
+    frames[0].close()
+    assert frames[1].evaluate([0])[0].error > 0  # closing one leaves the other
+    again = frame(c, 1)
+    c.begin_frame(8, 8, [lull.Rect(0, 0, 8, 8)], ["color", "half"])
+    raises(lull.LullError, "make a new Frame", again.evaluate, [0])
+    raises(lull.LullError, "make a new Frame", again.save_state)
+    again.close()
+    assert c.open_frame  # the other frame is not closed with it
+    raises(lull.LullError, "make a new Frame", frames[0].evaluate, [0])
+
+
+def test_copies():
+    """an instance cannot be copied, and a call while another one is under way is refused"""
+    c = lull.load("halfbuf")
+    for make in (copy.copy, copy.deepcopy, pickle.dumps):
+        raises(TypeError, "with_parameters()", make, c)
+    raises(TypeError, "with_parameters()", copy.deepcopy, lull.Frame(c, 8, 8))
+    other = c.with_parameters(threshold=.5)
+    c.close()
+    assert other.parameters["threshold"] == "0.5" and lull.Frame(other, 8, 8).blocks
+
+    class Busy(lull.Criterion):
+        seen = ()
+
+        def _host_parallel_for(self, *arguments):
+            for call in (self.close, self.end_frame, self.save_state):
+                raises(lull.LullError, "another call is under way", call)
+                self.seen += (call,)
+            return super()._host_parallel_for(*arguments)
+    busy = Busy(lull.find("ggn"), {"visible": ".9", "passes": "1"}, threads=2)
+    f = lull.Frame(busy, 32, 32, block=16, spp_max=64)
+    assert lull.Driver(f, Noise(SIGMAS)).run().outcome == "done" and len(busy.seen) >= 3
+    busy.close()
+
+
+def test_types():
+    """half floats and single ones are summed in double: nothing overflows, nothing is rounded on the way"""
+    def host(dtype, value):
+        return lambda rects, *_: [np.full((16, 16, 3), value, dtype) for _ in rects]
+    for dtype, value in ((np.float16, 60000.), (np.float32, 3e38), (np.float64, 1e300)):
+        _, f, _ = run("fixed", sigmas=[[0.]], parameters={"spp": 64}, host=host(dtype, value))
+        assert f.blocks[0].spp == 64 and f.blocks[0].dropped == 0 and (f.mean() == float(dtype(value))).all(), dtype
+        f.put(f.blocks[0], np.full((16, 16, 3), value, dtype), 64, np.full((16, 16, 3), value, dtype), 32)
+        assert (f.mean() == float(dtype(value))).all(), dtype
+    holes = np.ma.masked_array(np.ones((16, 16, 3)), np.zeros((16, 16, 3), bool))
+    result, f, _ = run(host=lambda rects, *_: [holes], sigmas=[[.1]])
+    assert "fill its holes first" in str(result.exception) and not f.sums["color"].any(), result
+    raises(TypeError, "fill its holes first", lull.Plane, holes)
+    raises(TypeError, "fill its holes first", run, mask=np.ma.masked_array(np.zeros((32, 32))))
+
+
+def test_weights():
+    """samples that come with weights are averaged by them, whole, by halves and as the criterion sees them"""
+    rng = np.random.default_rng(6)
+    seen = []
+
+    def host(rects, first, count, half):
+        for r in rects:
+            w = rng.uniform(.1, 2, (r.height, r.width))
+            w[2, 3] = 0  # nothing has met this pixel
+            v = rng.uniform(0, 1, (r.height, r.width, 3))
+            seen.append((count, half, w, v))
+            yield {"color": w[..., None] * v, "weight": w, "alpha": w * v[..., 0]}
+    _, f, d = run(sigmas=[[0.]], host=host, weighted=True, layers=["alpha"], spp_max=64)
+    for name, chosen in (("color", seen), ("half", [s for s in seen if s[1]])):
+        w, v = (np.array([s[0] * s[k] if k == 2 else s[k] for s in chosen]) for k in (2, 3))
+        wanted = (w[..., None] * v).sum(0) / np.maximum(w.sum(0), 1e-30)[..., None]
+        assert abs(f.mean(name) - wanted).max() < 1e-12
+        plane = f._planes_now()[name].array / (f.blocks[0].spp if name == "color" else f.blocks[0].half_spp)
+        assert abs(plane - wanted).max() < 1e-12
+        assert name == "half" or abs(f.mean("alpha") - wanted[..., 0]).max() < 1e-12
+    checkpoint.save(tmp("w.npz"), d)
+    other = lull.Frame(lull.load("halfbuf", threshold=.02), 16, 16, block=16, spp_max=64, weighted=True, layers=["alpha"])
+    checkpoint.load(tmp("w.npz"), lull.Driver(other, host))
+    assert (other.mean() == f.mean()).all() and (other.mean("alpha") == f.mean("alpha")).all()
+    outputs.write_exr(tmp("w.exr"), d)
+    info = subprocess.run(["oiiotool", "--info", "-v", tmp("w.exr")], text=True, capture_output=True, check=True).stdout
+    assert re.search(r"channel list: .*\balpha\b", info), info
+    raises(ValueError, "alpha", lull.Frame, lull.load("halfbuf"), 8, 8, layers=["alpha", "alpha"])
+    for name in ("R", "color", "", "lull.spp"):
+        raises(ValueError, "layer", lull.Frame, lull.load("halfbuf"), 8, 8, layers=[name])
+    result = run(host=lambda rects, *_: [np.zeros((16, 16, 3))], sigmas=[[0.]], weighted=True)[0]
+    assert "no plane weight" in str(result.exception)
 
 
 def test_merge():

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Optional, Sequence
+from typing import Callable, Optional, Sequence
 
 import numpy as np
 
+from . import limits
 from .criterion import Rect
 
 # Why a block got no more samples; the index is what the EXR's lull.reason.V holds.
@@ -45,8 +46,8 @@ class Block:
 
 
 def default_block(width: int, height: int, largest: int = 200) -> int:
-    """The block size, up to `largest`, with which a picture has ENOUGH_BLOCKS: the largest one that leaves no block at an edge
-    narrower than half of it, if there is one. Never below LEAST_DEFAULT, however small the picture."""
+    """The block size, up to `largest`, with which a picture has ENOUGH_BLOCKS: the largest one that leaves no block at an
+    edge narrower than half of it, if there is one. Never below LEAST_DEFAULT, however small the picture."""
     def count(size: int) -> int:
         return -(-width // size) * -(-height // size)
 
@@ -61,12 +62,16 @@ def default_block(width: int, height: int, largest: int = 200) -> int:
 
 def grid(width: int, height: int, block_width: int, block_height: int, crop: Optional[Rect] = None) -> list[Block]:
     """The blocks that the crop touches, whole, row by row. The grid starts at the upper left corner whatever the crop."""
-    if min(width, height, block_width, block_height) < 1:
-        raise ValueError(f"picture {width}x{height} in blocks of {block_width}x{block_height}: expected sizes of at least 1")
-    x0, y0, x1, y1 = crop or (0, 0, width, height)
+    width, height = limits.picture(width, height)
+    block_width = limits.whole("block width", block_width, 1, limits.MAX_BLOCK)
+    block_height = limits.whole("block height", block_height, 1, limits.MAX_BLOCK)
+    x0, y0, x1, y1 = (limits.whole("crop", v, -limits.MAX_SIDE, limits.MAX_SIDE) for v in crop or (0, 0, width, height))
     if not (0 <= x0 < x1 <= width and 0 <= y0 < y1 <= height):
         raise ValueError(f"crop {x0},{y0},{x1},{y1}: no block is left; expected 0 <= x0 < x1 <= {width} and "
                          f"0 <= y0 < y1 <= {height}")
+    if -(-(x1 - x0) // block_width) * -(-(y1 - y0) // block_height) > limits.MAX_BLOCKS:
+        raise ValueError(f"a picture of {width}x{height} in blocks of {block_width}x{block_height}: expected at most 2^20 "
+                         "blocks: take larger ones")
     columns = -(-width // block_width)
     return [Block(row * columns + column,
                   Rect(column * block_width, row * block_height, min(width, (column + 1) * block_width),
@@ -81,17 +86,18 @@ def next_check(spp: int, asked: int, spp_max: int) -> int:
     return min(max(following, spp + 1), spp_max)
 
 
-def reopen(blocks: Sequence[Block], max_seam: float) -> int:
-    """Re-opens stopped blocks beside one with more than max_seam times their samples, up to that ratio. Returns how many."""
-    at = {(b.column, b.row): b for b in blocks}
+def reopen(blocks: Sequence[Block], max_seam: float, at: Callable[[int], int] = int) -> int:
+    """Re-opens stopped blocks beside one with more than max_seam times their samples, up to that ratio. Returns how many.
+    at: moves a check to where one can be."""
+    placed = {(b.column, b.row): b for b in blocks}
     reopened = 0
     for b in blocks:
         if b.reason not in ("criterion", "dropped"):
             continue
-        near = (at.get((b.column + dx, b.row + dy)) for dx, dy in ((-1, 0), (1, 0), (0, -1), (0, 1)))
+        near = (placed.get((b.column + dx, b.row + dy)) for dx, dy in ((-1, 0), (1, 0), (0, -1), (0, 1)))
         need = math.ceil(max((n.spp for n in near if n), default=0) / max_seam)
         if need > b.spp:
-            b.reason, b.next_spp = "none", need
+            b.reason, b.next_spp = "none", at(need)
             reopened += 1
     return reopened
 

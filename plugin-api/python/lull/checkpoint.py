@@ -17,19 +17,13 @@ from .files import replaced
 _STATE = {f.name for f in dataclasses.fields(Block)} - {"id", "rect", "column", "row"}
 
 
-def _arrays(driver: Driver) -> dict[str, np.ndarray]:
-    frame = driver.frame
-    return {"dropped": frame.dropped, "dropped_half": frame.dropped_half,
-            **{f"sum-{name}": s for name, s in frame.sums.items()}}
-
-
 def save(path: str, driver: Driver) -> None:
     """Replaces the file as a whole."""
     frame = driver.frame
     state = {"identity": driver.identity, "totals": dataclasses.asdict(driver.totals),
              "blocks": [{name: getattr(b, name) for name in _STATE} for b in frame.blocks]}
     histories = {f"history-{i}": np.frombuffer(data, np.uint8) for i, data in enumerate(frame.save_state())}
-    arrays = {**_arrays(driver), **histories, "state": np.frombuffer(json.dumps(state).encode(), np.uint8)}
+    arrays = {**frame.arrays(), **histories, "state": np.frombuffer(json.dumps(state).encode(), np.uint8)}
     with replaced(path) as file:
         np.savez(file, **arrays)  # type: ignore[arg-type]
 
@@ -66,7 +60,7 @@ def load(path: str, driver: Driver) -> None:
         if theirs.get(name) != own.get(name):
             raise ValueError(f"{path}: its {name} is {theirs.get(name, 'not known')}, this render's is "
                              f"{own.get(name, 'not known')}: give it the same, or start anew with another checkpoint")
-    arrays = _arrays(driver)
+    arrays = frame.arrays()
     for name, to in arrays.items():
         if name not in data or data[name].shape != to.shape or data[name].dtype != to.dtype:
             raise ValueError(f"{path}: {name} is missing or of another shape")

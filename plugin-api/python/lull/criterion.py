@@ -5,6 +5,7 @@ A Criterion belongs to one thread at a time. It may use the worker threads that 
 """
 from __future__ import annotations
 
+import contextlib
 import ctypes as C
 import itertools
 import math
@@ -12,11 +13,11 @@ import os
 import threading
 import warnings
 from dataclasses import dataclass
-from typing import Callable, Mapping, NamedTuple, Optional, Sequence
+from typing import Callable, Iterator, Mapping, NamedTuple, Optional, Sequence
 
 import numpy as np
 
-from . import abi
+from . import abi, limits
 from .library import Info, LullError, find
 
 PLANES = {"color": abi.COLOR, "weight": abi.WEIGHT, "spp": abi.SPP, "moment2": abi.MOMENT2, "half": abi.HALF,
@@ -95,6 +96,7 @@ class Plane:
     def __init__(self, array: np.ndarray, normaliser: str = "one", scale: float = 1.0):
         if not isinstance(array, np.ndarray):
             raise TypeError(f"a plane is a numpy array, not {type(array).__name__}")
+        limits.unmasked("a plane", array)
         if array.dtype not in _TYPES or not array.dtype.isnative:
             raise TypeError(f"a plane holds float32, float16, float64 or uint32 in native byte order, not {array.dtype}")
         if array.ndim not in (2, 3):
@@ -139,7 +141,8 @@ def _warn(level: int, text: str) -> None:
 
 
 class Criterion:
-    """An instance with its frame, if one is open. Use as a context manager, or call close()."""
+    """An instance with its frame, if one is open. Use as a context manager, or call close(). It cannot be copied: another
+    one is made by with_parameters(). open_frame: a number that no other frame of this instance has, 0 = none is open."""
 
     def __init__(self, info: Info, parameters: Optional[Mapping[str, str]] = None, threads: Optional[int] = None,
                  log: Optional[Callable[[int, str], None]] = None):
@@ -148,7 +151,9 @@ class Criterion:
         if self.threads < 1:
             raise ValueError(f"threads {threads}: expected at least 1")
         self.log = log or _warn
-        self._open = False
+        self.open_frame = 0
+        self._frames = itertools.count(1)
+        self._busy = threading.Lock()
         self._error = abi.sized(abi.Error)
         self._host = abi.sized(abi.Host, api_minor=abi.API_MINOR, name=b"lull for Python 1.0", max_workers=self.threads,
                                log=abi.LogFn(self._host_log), parallel_for=abi.ParallelForFn(self._host_parallel_for))
@@ -191,9 +196,25 @@ class Criterion:
 
     # --- calls ---------------------------------------------------------------------------------------------------------
 
+    @contextlib.contextmanager
+    def _alone(self) -> Iterator[None]:
+        """An instance has no locks of its own: a second call while one is under way would crash."""
+        if not self._busy.acquire(blocking=False):
+            raise LullError(abi.E_STATE, f"criterion {self.info.id}: another call is under way: give each thread an "
+                                         "instance of its own, with_parameters()")
+        try:
+            yield
+        finally:
+            self._busy.release()
+
+    def _ask(self, function, *arguments) -> None:
+        """A call of the instance, which comes first, with the error last."""
+        with self._alone():
+            if self._instance is None:
+                raise LullError(abi.E_STATE, f"criterion {self.info.id}: it was closed")
+            self._call(function, self._instance, *arguments)
+
     def _call(self, function, *arguments) -> None:
-        if None in arguments:
-            raise LullError(abi.E_STATE, f"criterion {self.info.id}: it was closed")
         status = function(*arguments, C.addressof(self._error))
         if status != abi.OK:
             raise LullError(status, f"criterion {self.info.id}: {self._error.message.decode(errors='replace')}")
@@ -210,16 +231,22 @@ class Criterion:
         """
         if transfer not in TRANSFERS:
             raise ValueError(f"transfer '{transfer}': expected one of {', '.join(TRANSFERS)}")
+        width, height = limits.picture(width, height)
+        spp_max = limits.whole("spp_max", spp_max, 0, limits.MAX_SPP)
+        spp_min, seed = limits.whole("spp_min", spp_min, 0, limits.MAX_SPP), limits.whole("seed", seed, 0, limits.MAX_SEED)
+        time_budget_s = limits.real("time_budget_s", time_budget_s, 0, limits.MAX_TIME_S)
+        exposure, gamma = limits.positive("exposure", exposure), limits.positive("gamma", gamma)
+        sample_clamp = limits.real("sample_clamp", sample_clamp, 0)
         rects = (abi.Rect * len(blocks))(*[abi.Rect(*r) for r in blocks])
-        flags = (abi.FRAME_RESTART * self._open | abi.FRAME_DETERMINISTIC * deterministic |
+        flags = (abi.FRAME_RESTART * (self.open_frame > 0) | abi.FRAME_DETERMINISTIC * deterministic |
                  abi.FRAME_INDEPENDENT * independent | abi.FRAME_SHARED * shared)
         frame = abi.sized(abi.Frame, flags=flags, width=width, height=height, blocks=C.addressof(rects),
                           block_count=len(rects), block_stride=C.sizeof(abi.Rect),
                           planes=sum(1 << PLANES[name] for name in set(planes)), transfer=TRANSFERS[transfer], gamma=gamma,
                           exposure=exposure, sample_clamp=sample_clamp, time_budget_s=time_budget_s, spp_min=spp_min,
                           spp_max=spp_max, seed=seed, rgb_to_xyz=(C.c_double * 9)(*rgb_to_xyz))
-        self._call(self.info.table.begin_frame, self._instance, C.addressof(frame))
-        self._open = True
+        self._ask(self.info.table.begin_frame, C.addressof(frame))
+        self.open_frame = next(self._frames)
 
     def evaluate(self, planes: Mapping[str, Plane], blocks: Sequence[BlockState], due: Sequence[int],
                  view: Optional[Rect] = None, elapsed_s: float = math.nan) -> list[Decision]:
@@ -243,8 +270,8 @@ class Criterion:
         abi_view = abi.sized(abi.View, x0=view.x0, y0=view.y0, x1=view.x1, y1=view.y1, planes=C.addressof(table),
                              plane_count=abi.PLANE_COUNT, plane_stride=C.sizeof(abi.Plane), all=C.addressof(states),
                              all_count=len(states), all_stride=C.sizeof(abi.Block), elapsed_s=elapsed_s)
-        self._call(self.info.table.evaluate, self._instance, C.addressof(abi_view), C.addressof(asked), C.sizeof(abi.Block),
-                   C.addressof(answers), C.sizeof(abi.Decision), len(due))
+        self._ask(self.info.table.evaluate, C.addressof(abi_view), C.addressof(asked), C.sizeof(abi.Block),
+                  C.addressof(answers), C.sizeof(abi.Decision), len(due))
         return [Decision(a.action == abi.STOP, a.next_spp, a.p_noisy, a.predicted_spp, a.error,
                          bool(a.flags & abi.DECISION_TOO_EARLY), bool(a.flags & abi.DECISION_BAD_INPUT)) for a in answers]
 
@@ -262,7 +289,7 @@ class Criterion:
             out.extend(C.string_at(data, size))
             return abi.OK
         writer = abi.sized(abi.Writer, write=abi.WriteFn(write))
-        self._call(state.save, self._instance, C.addressof(writer))
+        self._ask(state.save, C.addressof(writer))
         return bytes(out)
 
     def load_state(self, data: bytes) -> None:
@@ -281,19 +308,25 @@ class Criterion:
             at += size
             return abi.OK
         reader = abi.sized(abi.Reader, read=abi.ReadFn(read))
-        self._call(state.load, self._instance, C.addressof(reader))
+        self._ask(state.load, C.addressof(reader))
 
     def end_frame(self) -> None:
         """Forgets the frame."""
-        if self._instance is not None:
-            self.info.table.end_frame(self._instance)
-        self._open = False
+        with self._alone():
+            if self._instance is not None:
+                self.info.table.end_frame(self._instance)
+            self.open_frame = 0
 
     def close(self) -> None:
         """Frees the instance; nothing happens the second time."""
-        instance, self._instance = self._instance, None
-        if instance is not None:
-            self.info.table.destroy(instance)
+        with self._alone():
+            instance, self._instance, self.open_frame = self._instance, None, 0
+            if instance is not None:
+                self.info.table.destroy(instance)
+
+    def __reduce_ex__(self, _protocol):  # what copy and pickle go by
+        raise TypeError(f"criterion {self.info.id}: an instance cannot be copied, as both would free it: make another one, "
+                        "with_parameters()")
 
     def __enter__(self) -> Criterion:
         return self

@@ -16,6 +16,7 @@ import time
 from dataclasses import dataclass
 from typing import Callable, Iterable, Iterator, Mapping, Optional, Sequence
 
+from . import limits
 from .blocks import Block, next_check, reopen
 from .criterion import Decision, Rect
 from .frame import Frame, Sample
@@ -75,10 +76,10 @@ class Driver:
                  identity: Optional[Mapping[str, str]] = None,
                  after_call: Optional[Callable[[Driver], None]] = None,
                  suspend: Optional[Callable[[Driver], None]] = None, warn: Callable[[str], None] = print):
-        if wave < 1:
-            raise ValueError(f"wave {wave}: expected at least 1 sample")
-        if max_seam and max_seam < 1:
-            raise ValueError(f"max_seam {max_seam}: expected 0 or at least 1")
+        wave = limits.whole("wave", wave, 1, limits.MAX_SPP)
+        max_check_overhead = limits.real("max_check_overhead", max_check_overhead, 0, 1)
+        if limits.real("max_seam", max_seam, 0, limits.MAX_SEAM) and max_seam < 1:
+            raise ValueError(f"max_seam {max_seam}: expected 0 or a number from 1 to {limits.MAX_SEAM:g}")
         if uniform and min(frame.dials) < 1:
             raise ValueError("mask: uniform takes the same samples everywhere")
         self.frame, self.render, self.wave, self.whole_waves, self.uniform = frame, render, wave, whole_waves, uniform
@@ -140,7 +141,7 @@ class Driver:
             if not self._wave():
                 self._check()
                 if self.max_seam:
-                    reopen(self.frame.blocks, self.max_seam)
+                    reopen(self.frame.blocks, self.max_seam, self.at_wave)
                 return None
         except KeyboardInterrupt:
             self.interrupted = True

@@ -11,6 +11,7 @@ from typing import Optional, Sequence
 
 import numpy as np
 
+from . import limits
 from .blocks import Block
 from .criterion import Criterion
 from .library import Parameter
@@ -23,7 +24,7 @@ def dial_scales(mask: Optional[np.ndarray], blocks: Sequence[Block], width: int,
     """The factor of the dial for each block. mask: [height, width] in [0, 1]."""
     if mask is None:
         return [1.0] * len(blocks)
-    mask = np.asarray(mask, np.float64)
+    mask = np.asarray(limits.unmasked("mask", mask), np.float64)
     if mask.shape != (height, width):
         raise ValueError(f"mask of shape {mask.shape}: expected the picture's, [{height}, {width}]")
     if not ((mask >= 0) & (mask <= 1)).all():

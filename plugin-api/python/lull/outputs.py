@@ -17,13 +17,16 @@ from .files import replaced
 
 
 def write_exr(path: str, driver: Driver, scene: str = "", software: str = "lull for Python 1.0") -> None:
-    """R, G, B and the layer lull, which image programs show as spp, p_noisy, error and reason, cut to the crop."""
+    """R, G, B and the layer lull, which image programs show as spp, p_noisy, error and reason, then those of the frame; cut to
+    the crop."""
     frame = driver.frame
     rgb = frame.cropped(frame.mean())
     channels = {"R": rgb[..., 0], "G": rgb[..., 1], "B": rgb[..., 2], "lull.spp.V": frame.cropped(frame.spp())}
     for name, value in (("p_noisy", lambda b: b.p_noisy), ("error", lambda b: b.error),
                         ("reason", lambda b: REASONS.index(b.reason))):
         channels[f"lull.{name}.V"] = frame.cropped(frame.per_pixel(value))
+    for name in frame.layers:
+        channels[name] = frame.cropped(frame.mean(name))
     info = frame.criterion.info
     settings = "".join(f" {key}={value}" for key, value in frame.criterion.parameters.items())
     exr.write(path, channels, (frame.width, frame.height), frame.crop[:2], {
@@ -47,7 +50,7 @@ def _number(value: float) -> Optional[float]:
 def report(driver: Driver, scene: str = "", kernel: str = "", interrupted: bool = False, mask: Optional[str] = None) -> dict:
     """Everything about the run; members and meanings as in the path tracer's --report. null: not known. mask: its file."""
     frame, totals, criterion = driver.frame, driver.totals, driver.frame.criterion
-    bytes_kept = sum(s.nbytes for s in frame.sums.values()) + frame.dropped.nbytes + frame.dropped_half.nbytes
+    bytes_kept = sum(a.nbytes for a in frame.arrays().values())
     square = frame.block_width == frame.block_height
     return {
         "scene": scene, "width": frame.width, "height": frame.height,
