@@ -5,9 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/files.h"
 #include "base/options.h"
 #include "pbrt/xform.h"
+#include "render/checkpoint.h"
 #include "render/film.h"
 #include "render/output.h"
 
@@ -163,7 +163,7 @@ static int set_stop_map(void *into, const char *value, struct base_err *err)
     if (cli->stop_map_count == PT_CLI_MAX_STOP_MAPS)
         return base_fail(err, BASE_EINVAL, "more than %d stop maps", PT_CLI_MAX_STOP_MAPS);
     cli->stop_maps[cli->stop_map_count++] = value;
-    return base_file_check_output(value, err);
+    return 0;
 }
 
 static int set_debug_path(void *into, const char *value, struct base_err *err)
@@ -215,7 +215,7 @@ static const struct base_option options[] = {
     {"visible", 0, "SHARE", .set = set_visible,
      .help = "Stop a block when at most this share of viewers would still see noise, of criteria that can tell (observer: "
              "default 0.25, ggn: the model's own)"},
-    {"mask", 0, "FILE.png", TO(mask), .words = png,
+    {"mask", 0, "FILE.png", TO(mask), .input = BASE_FILE, .words = png,
      .help = "A grey picture of the image's size: lighter regions are rendered better. White takes a quarter of the dial "
              "(visible, else threshold), black leaves it; the lightest pixel of a block counts"},
     {"param", 'p', "KEY=VALUE", .set = set_param, .help = "Parameter of the criterion; may be repeated"},
@@ -259,17 +259,18 @@ static const struct base_option options[] = {
     {"rank-timeout", 0, "SECONDS", TO(rank_timeout_s), 0.1, 1e6,
      .help = "Under mpirun: give up when a process has owed an answer for so long (default 120)"},
     {.help = "What to write:"},
-    {"output", 'o', "FILE.exr", TO(output), .output = 1, .words = exr,
+    {"output", 'o', "FILE.exr", TO(output), .output = BASE_FILE, .words = exr,
      .help = "Multi-layer EXR (default: the scene's name in the current folder, if nothing else is asked for)"},
-    {"preview", 0, "FILE.png", TO(preview), .output = 1, .words = png, .help = "The image as sRGB, also while rendering"},
-    {"stop-map", 0, "FILE.png|FILE.csv", .set = set_stop_map,
+    {"preview", 0, "FILE.png", TO(preview), .output = BASE_FILE, .words = png,
+     .help = "The image as sRGB, also while rendering"},
+    {"stop-map", 0, "FILE.png|FILE.csv", .set = set_stop_map, .output = BASE_FILE,
      .help = "Samples per block as a picture or a table; may be repeated"},
-    {"report", 0, "FILE.json", TO(report), .output = 1, .words = json, .help = "Everything about the run"},
+    {"report", 0, "FILE.json", TO(report), .output = BASE_FILE, .words = json, .help = "Everything about the run"},
     {"aov", 0, "LIST", .set = set_aov, .help = "More layers: albedo,normal,depth"},
     {"reproducible", 0, NULL, TO(reproducible), .help = "Leave times out of the EXR: equal renders are equal files"},
     {"quiet", 'q', NULL, TO(quiet), .help = "No progress, no notes"},
     {.help = "Interrupting and going on:"},
-    {"checkpoint", 0, "FILE", TO(checkpoint), .output = 1,
+    {"checkpoint", 0, "FILE", TO(checkpoint), .output = BASE_FILE, .kind = &pt_checkpoint_kind,
      .help = "Save the state of the render now and then, and when it is interrupted"},
     {"checkpoint-every", 0, "SECONDS", TO(checkpoint_every_s), 0, 1e9, .help = "How often (default 60)"},
     {"resume", 0, NULL, TO(resume), .help = "Go on from the checkpoint"},
@@ -279,7 +280,8 @@ static const struct base_option options[] = {
              "pilot can be resumed by a render"},
     {"quote-pilot", 0, "SPP[:SECONDS]", .set = set_quote_pilot,
      .help = "The pilot ends at so many samples per pixel or after so long (default 128:30)"},
-    {"quote-map", 0, "FILE.png", TO(quote_map), .output = 1, .words = png, .help = "The predicted time of each block"},
+    {"quote-map", 0, "FILE.png", TO(quote_map), .output = BASE_FILE, .words = png,
+     .help = "The predicted time of each block"},
     {"json", 0, NULL, TO(json), .help = "Print the quote as JSON"},
     {.help = "Looking inside:"},
     {"explain", 0, NULL, TO(action), PT_CLI_EXPLAIN,
@@ -345,6 +347,8 @@ static int check_together(struct pt_cli *cli, struct base_err *err)
         return base_fail(err, BASE_EINVAL, "--levels, --blocks, --reference-spp and --name belong to --sequence DIR");
     if (cli->sequence && (cli->spp > 0 || cli->checkpoint || cli->has_crop || cli->mask))
         return base_fail(err, BASE_EINVAL, "--sequence goes with neither --spp, --checkpoint, --crop nor --mask");
+    if (cli->sequence && (cli->output || cli->preview || cli->report || cli->stop_map_count > 0))
+        return base_fail(err, BASE_EINVAL, "--sequence writes no image: leave out -o, --preview, --report and --stop-map");
     if (cli->sequence && cli->action != PT_CLI_RENDER)
         return base_fail(err, BASE_EINVAL, "--sequence records blocks: leave out what only looks at the scene or a path");
     if (cli->sequence)
@@ -368,7 +372,9 @@ int pt_cli_parse(struct pt_cli *cli, int argc, char **argv, struct base_err *err
         .list = options,
         .args_max = 1,
         .args = offsetof(struct pt_cli, scene),
+        .args_are = BASE_ARGS_FILES,
         .uses_peers = 1,
+        .outputs = offsetof(struct pt_cli, outputs),
     };
     *cli = (struct pt_cli){.block_width = 200, .block_height = 200, .checkpoint_every_s = 60.0, .rank_timeout_s = 120.0,
                            .sampler = -1, .strategy = -1, .filter = -1, .max_depth = PT_CLI_SCENES_DEPTH};

@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 #include "base/err.h"
+#include "base/outputs.h"
 #include "pbrt/load_options.h"
 
 enum { PT_CLI_MAX_PARAMS = 64, PT_CLI_MAX_STOP_MAPS = 4, PT_CLI_SCENES_DEPTH = -2,
@@ -34,6 +35,7 @@ struct pt_cli {
     double rank_timeout_s;      /* wait for an answer of another process */
     uint32_t seed;
     const char *output, *preview, *report;
+    struct base_outputs outputs; /* all files to be written that the command line names */
     const char *stop_maps[PT_CLI_MAX_STOP_MAPS];
     int stop_map_count;
     const char *checkpoint;

@@ -2,6 +2,7 @@
 
 #include "actions.h"
 #include "base/clock.h"
+#include "base/interrupt.h"
 #include "explain.h"
 #include "member.h"
 #include "render/host_find.h"
@@ -42,7 +43,7 @@ static int run(struct pt_session *s, int *status, struct base_err *err)
     int rc = pt_session_open(s, err);
     if (rc)
         return rc;
-    pt_catch_interrupt();
+    base_interrupt_catch();
     switch (s->cli.action) {
     case PT_CLI_EXPLAIN:
         explain(s);

@@ -1,9 +1,8 @@
 #include "member.h"
 
-#include <signal.h>
-
 #include "actions.h"
 #include "agree.h"
+#include "base/interrupt.h"
 #include "render/crew_member.h"
 #include "setup.h"
 
@@ -30,8 +29,7 @@ int pt_member_serve(struct pt_session *s, int rc, struct base_err *err)
 {
     struct base_err unheard = {0};
     int renders = s->cli.action == PT_CLI_RENDER || s->cli.action == PT_CLI_QUOTE || s->cli.action == PT_CLI_SEQUENCE;
-    signal(SIGINT, SIG_IGN);
-    signal(SIGTERM, SIG_IGN);
+    base_interrupt_ignore();
     if (!rc && renders)
         rc = join_crew(s, err);
     if (rc)

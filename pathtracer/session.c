@@ -1,26 +1,9 @@
 #include "session.h"
 
-#include <signal.h>
 #include <stdio.h>
 
+#include "base/interrupt.h"
 #include "pbrt/load.h"
-
-static volatile sig_atomic_t interrupt_seen;
-
-static void on_interrupt(int number)
-{
-    (void)number;
-    interrupt_seen = 1;
-}
-
-/* The first SIGINT or SIGTERM asks for an end, a second one kills. */
-void pt_catch_interrupt(void)
-{
-    struct sigaction action = {.sa_handler = on_interrupt, .sa_flags = (int)SA_RESETHAND};
-    sigemptyset(&action.sa_mask);
-    sigaction(SIGINT, &action, NULL);
-    sigaction(SIGTERM, &action, NULL);
-}
 
 /* Of several processes rank 0 speaks. */
 void pt_say(void *data, const char *line)
@@ -81,5 +64,5 @@ void pt_session_release(struct pt_session *s)
 int pt_interrupted(void *data)
 {
     (void)data;
-    return interrupt_seen != 0;
+    return base_interrupted != 0;
 }

@@ -46,8 +46,7 @@ void pt_session_release(struct pt_session *session);
 void pt_say(void *data, const char *line);
 void pt_note(void *data, const char *line);
 
-/* From here on the first SIGINT or SIGTERM asks for an end, which pt_interrupted tells (data: not used); a second kills. */
-void pt_catch_interrupt(void);
+/* base_interrupted as a hook; data: not used. */
 int pt_interrupted(void *data);
 
 #endif

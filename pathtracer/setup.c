@@ -5,7 +5,10 @@
 
 #include "agree.h"
 #include "base/files.h"
+#include "base/inputs.h"
+#include "base/outputs.h"
 #include "render/host_find.h"
+#include "render/output.h"
 
 /* The criterion when none is named. */
 static const char DEFAULT_CRITERION[] = "observer";
@@ -74,18 +77,25 @@ int pt_setup_criterion(struct pt_session *s, struct base_err *err)
     return rc ? rc : pt_criterion_set_mask(s->criterion, &s->mask, cli->params, cli->param_count, err);
 }
 
-/* Outputs that cannot be written, or that would overwrite what the image is made from, are found out before the work. */
-static int check_output(const struct pt_session *s, const char *path, struct base_err *err)
+/* A parameter may name a file: a model. */
+static int protect_parameters(const struct pt_cli *cli, struct base_err *err)
 {
-    int rc = base_file_check_output(path, err);
+    struct base_inputs named = BASE_INPUTS_EMPTY;
+    int rc = 0;
+    for (uint32_t i = 0; i < cli->param_count && !rc; i++)
+        if (base_file_check_input(cli->params[i].value, NULL) == 0)
+            rc = base_inputs_add(&named, cli->params[i].value, err);
     if (!rc)
-        rc = base_inputs_protect(&s->scene_files, path, err);
-    return rc ? rc : base_inputs_protect(&s->judging, path, err);
+        rc = base_outputs_protect(&cli->outputs, &named, err);
+    base_inputs_release(&named);
+    return rc;
 }
 
+/* Outputs that would overwrite what the image is made from, or each other, are found out before the work. */
 static int check_outputs(struct pt_session *s, struct base_err *err)
 {
     struct pt_cli *cli = &s->cli;
+    int rc = 0;
     if (!cli->quote && !cli->output && !cli->preview && !cli->report && cli->stop_map_count == 0) {
         const char *slash = strrchr(cli->scene, '/'), *name = slash ? slash + 1 : cli->scene;
         const char *dot = strrchr(name, '.');
@@ -94,15 +104,16 @@ static int check_outputs(struct pt_session *s, struct base_err *err)
             return base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", cli->scene);
         snprintf(s->default_output, sizeof s->default_output, "%.*s.exr", n, name);
         cli->output = s->default_output;
+        rc = base_outputs_add(&cli->outputs, "output", cli->output, err);
+        if (!rc && !pt_output_is_ours(cli->output)) /* nobody asked for this name */
+            rc = base_fail(err, BASE_EINVAL, "%s: another program's image would be replaced; -o FILE.exr names the output",
+                           cli->output);
     }
-    const char *paths[] = {cli->output, cli->preview, cli->report, cli->checkpoint, cli->quote_map};
-    for (size_t i = 0; i < sizeof paths / sizeof paths[0]; i++)
-        if (check_output(s, paths[i], err) != 0)
-            return BASE_EINVAL;
-    for (int i = 0; i < cli->stop_map_count; i++)
-        if (check_output(s, cli->stop_maps[i], err) != 0)
-            return BASE_EINVAL;
-    return 0;
+    if (!rc)
+        rc = base_outputs_protect(&cli->outputs, &s->scene_files, err);
+    if (!rc)
+        rc = base_outputs_protect(&cli->outputs, &s->judging, err);
+    return rc ? rc : protect_parameters(cli, err);
 }
 
 /* The render with its criterion, as the command line says. */

@@ -8,6 +8,7 @@
 #include "base/options.h"
 #include "baselines/learned.h"
 #include "cli/commands.h"
+#include "model/container.h"
 
 struct options {
     const char *name, *data, *out;
@@ -16,9 +17,10 @@ struct options {
 };
 #define TO(member) BASE_TO(struct options, member)
 static const struct base_option list[] = {
-    {"data", 'd', "DATA", TO(data), .needed = 1,
+    {"data", 'd', "DATA", TO(data), .input = BASE_FOLDER, .needed = 1,
      .help = "labelled data set: a folder of sequences with split.json (needed)"},
-    {"output", 'o', "FILE", TO(out), .needed = 1, .output = 1, .help = "the model, for -p model=FILE (needed)"},
+    {"output", 'o', "FILE", TO(out), .needed = 1, .output = BASE_FILE, .kind = &ggn_container_kind,
+     .help = "the model, for -p model=FILE (needed)"},
     {"epochs", 0, "N", TO(epochs), 1, 1024, .help = "epochs of svd-entropy's LSTM (30, as published)"},
     {"early", 0, "RATE", TO(early), 0, 1, .help = "early-stop rate that the threshold is tuned for on the training scenes "
                                                   "(0.05)"},
@@ -87,6 +89,7 @@ int ggn_cmd_baseline(int argc, char **argv)
         .args_doc = "NAME",
         .args_min = 1,
         .args_max = 1,
+        .args_are = BASE_ARGS_WORDS,
         .args = offsetof(struct options, name),
         .doc = "Trains svd-entropy, attributes or noise-mask, the published models before the network, on the training "
                "scenes of a data set (calibrated on its validation scenes). The file is what the criterion of that name and "

@@ -21,7 +21,8 @@ struct options {
 };
 #define TO(member) BASE_TO(struct options, member)
 static const struct base_option list[] = {
-    {"model", 0, "FILE", TO(model), .help = "networks of the sizes of this model instead of the published ones"},
+    {"model", 0, "FILE", TO(model), .input = BASE_FILE,
+     .help = "networks of the sizes of this model instead of the published ones"},
     {"json", 0, NULL, TO(json), .help = "one JSON object of medians instead of tables"},
     {"threads", 0, "N", TO(threads), 1, 1024, .help = "threads (all processors); with 1 the figures are processor time"},
     {"precision", 0, NULL, TO(precision), .words = ggn_precision_names,

@@ -2,13 +2,13 @@
  * The subcommands of `ggn`: one file each, ggn/cli/NAME.c, with `int ggn_cmd_NAME(int argc, char **argv)`.
  *
  * A subcommand parses its own argv by a table of options (base/options.h; argv[0] is "ggn NAME" already) and returns the
- * exit status: 0 done, 1 failed (out of memory), 2 bad usage, bad input, or an output could not be written, 130 interrupted.
+ * exit status: 0 done, 1 failed (out of memory), 2 bad usage, bad input, or an output could not be written, 130 interrupted
+ * (a command that takes long polls base_interrupted and leaves its outputs whole).
  * To add one: write the file and add its line to GGN_COMMANDS. An underscore in the name is a hyphen on the command line.
  */
 #ifndef GGN_CLI_COMMANDS_H
 #define GGN_CLI_COMMANDS_H
 
-#include <signal.h>
 #include <stddef.h>
 
 #include "base/err.h"
@@ -43,17 +43,12 @@ int ggn_cmd_fail(const char *command, const struct base_err *err);
 
 /* Under mpirun the processes of the job, else NULL. What a process says with ggn_cmd_fail is said once, by rank 0. */
 extern struct base_team *ggn_cmd_team;
-/* Rank 0 ends the job: the others leave SIGINT and SIGTERM to it. */
+/* Rank 0 ends the job: the others leave it to be asked (base/interrupt.h). */
 void ggn_cmd_follow_rank_0(void);
 /* Is the i-th of equal pieces of work this process's? Always, when it is alone. */
 int ggn_cmd_is_mine(long i);
 
 /* Says on stderr how many pixels of the image at `path` could not be shown as they are, if any. */
 void ggn_cmd_tell_clipped(const char *command, const char *path, size_t clipped);
-
-/* After ggn_cmd_catch_interrupt(), SIGINT and SIGTERM set the flag instead of ending the process; a second one ends it. The
- * command polls the flag, leaves its outputs whole and returns GGN_EXIT_INTERRUPTED. */
-extern volatile sig_atomic_t ggn_cmd_interrupted;
-void ggn_cmd_catch_interrupt(void);
 
 #endif

@@ -17,10 +17,12 @@ struct options {
     int block, json;
 };
 
+static const char *const written[] = {"scatter.png", "errors.png", "heatmaps.png", "blocks.csv", "summary.json", NULL};
+
 #define TO(member) BASE_TO(struct options, member)
 static const struct base_option list[] = {
     {"json", 'j', NULL, TO(json), .help = "print the statistics as one JSON object"},
-    {"output", 'o', "DIR", TO(dir),
+    {"output", 'o', "DIR", TO(dir), .output = BASE_FOLDER, .files = written,
      .help = "write scatter.png, errors.png, heatmaps.png, blocks.csv and summary.json there"},
     {"view", 'v', "NAME", TO(view), .help = "compare with this view of REFERENCE only"},
     {"cap", 'c', "SPP", TO(cap), 1e-9, 1e12, .help = "thresholds at the cap are censored (10000)"},
@@ -57,6 +59,7 @@ int ggn_cmd_compare(int argc, char **argv)
         .args_doc = "REFERENCE MODEL",
         .args_min = 2,
         .args_max = 2,
+        .args_are = BASE_ARGS_FILES,
         .args = offsetof(struct options, paths),
         .doc = "How well the stops or thresholds in MODEL agree with those in REFERENCE (people first). Both may be CSV "
                "(name;t0;…), a render's report JSON, or an EXR with the channel lull.spp.V."};
@@ -79,7 +82,11 @@ int ggn_cmd_compare(int argc, char **argv)
         ggn_agreement_print_json(stdout, &figures);
         putchar('\n');
     } else if (!rc) {
-        printf("%d view%s in common\n", pairing.n_views, pairing.n_views == 1 ? "" : "s");
+        const struct ggn_pair *first = &pairing.views[0];
+        if (strcmp(first->truth->name, first->model->name) != 0)
+            printf("'%s' against '%s'\n", first->truth->name, first->model->name); /* --view made them a pair */
+        else
+            printf("%d view%s in common\n", pairing.n_views, pairing.n_views == 1 ? "" : "s");
         ggn_agreement_print_table(stdout, &figures);
     }
     ggn_pairing_release(&pairing);

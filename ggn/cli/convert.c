@@ -19,6 +19,7 @@ int ggn_cmd_convert(int argc, char **argv)
         .args_doc = "MODEL OUT",
         .args_min = 2,
         .args_max = 2,
+        .args_are = BASE_ARGS_FILES,
         .args_output = 2,
         .args = offsetof(struct options, paths),
         .doc = "Stores a model's weights in fewer (or more) bits. Half the size; decisions near the threshold may change, "
@@ -28,6 +29,8 @@ int ggn_cmd_convert(int argc, char **argv)
     struct base_err err = {0};
 
     int rc = base_options_parse(&options, argc, argv, &o, &err);
+    if (!rc)
+        rc = base_file_check_kind(o.paths[1], &ggn_container_kind, &err);
     if (!rc)
         rc = ggn_model_load(o.paths[0], &model, &err);
     if (!rc)

@@ -55,14 +55,15 @@ static const char *const split_words[] = {"train", "validation", "test", "people
 
 #define TO(member) BASE_TO(struct options, member)
 static const struct base_option list[] = {
-    {"data", 'd', "DATA", TO(data), .needed = 1, .help = "labelled data set (needed)"},
+    {"data", 'd', "DATA", TO(data), .input = BASE_FOLDER, .needed = 1, .help = "labelled data set (needed)"},
     {"split", 0, NULL, TO(split), .words = split_words, .help = "which of its views (test)"},
-    {"model", 'm', "FILE", .set = add_model, .help = "trained network (.ggn); may be repeated"},
-    {"baseline", 0, "FILE", .set = add_baseline, .help = "what ggn baseline wrote; may be repeated"},
-    {"thresholds", 0, "CSV", .set = add_thresholds,
+    {"model", 'm', "FILE", .set = add_model, .input = BASE_FILE, .help = "trained network (.ggn); may be repeated"},
+    {"baseline", 0, "FILE", .set = add_baseline, .input = BASE_FILE, .help = "what ggn baseline wrote; may be repeated"},
+    {"thresholds", 0, "CSV", .set = add_thresholds, .input = BASE_FILE,
      .help = "stop where this file says (published thresholds); may be repeated"},
-    {"observer", 'O', "FILE", TO(observer), .help = "the observer's parameters, each view without itself"},
-    {"output", 'o', "FILE", TO(out), .output = 1, .help = "write there instead of printing"},
+    {"observer", 'O', "FILE", TO(observer), .input = BASE_FILE,
+     .help = "the observer's parameters, each view without itself"},
+    {"output", 'o', "FILE", TO(out), .output = BASE_FILE, .help = "write there instead of printing"},
     {"ratio", 0, "R", TO(ratio), 1, 16, .help = "thin the levels, and the checks, to this ratio of samples"},
     {"cadence", 0, "R", TO(cadence), 1.02, 16,
      .help = "simulate all levels, this far apart, and ask networks and baselines as often"},

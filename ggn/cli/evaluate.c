@@ -9,6 +9,7 @@
 #include <cjson/cJSON.h>
 
 #include "base/files.h"
+#include "base/interrupt.h"
 #include "base/json.h"
 #include "base/options.h"
 #include "baselines/learned.h"
@@ -75,25 +76,29 @@ static int add_adjusted(void *into, const char *arg, struct base_err *err)
     return 0;
 }
 
+static const char *const written[] = {"figures.json", NULL}; /* its inputs are no pictures */
+
 #define TO(member) BASE_TO(struct options, member)
 static const struct base_option list[] = {
     {.help = "What is measured:"},
-    {"data", 'd', "DATA", TO(data), .needed = 1,
+    {"data", 'd', "DATA", TO(data), .input = BASE_FOLDER, .needed = 1,
      .help = "labelled data set: a folder of sequences with split.json (needed)"},
-    {"model", 'm', "FILE", .set = add_model, .help = "trained model (.ggn); may be repeated"},
-    {"observer", 'O', "FILE", TO(observer),
+    {"model", 'm', "FILE", .set = add_model, .input = BASE_FILE, .help = "trained model (.ggn); may be repeated"},
+    {"observer", 'O', "FILE", TO(observer), .input = BASE_FILE,
      .help = "the observer's parameters, each view without itself (ggn label --calibrate); needed where there are people's "
              "views"},
     {"visible", 0, "SHARE", TO(visible), 1e-4, 0.9999,
      .help = "share of viewers that may still see noise, for observer (0.25) and models (their own)"},
-    {"baseline", 0, "FILE", .set = add_trained, .help = "a published baseline as ggn baseline trained it; may be repeated"},
-    {"thresholds", 0, "CSV", .set = add_thresholds,
+    {"baseline", 0, "FILE", .set = add_trained, .input = BASE_FILE,
+     .help = "a published baseline as ggn baseline trained it; may be repeated"},
+    {"thresholds", 0, "CSV", .set = add_thresholds, .input = BASE_FILE,
      .help = "a published model's thresholds of people's views; may be repeated"},
     {"param", 'p', "KEY=NUMBER", .set = add_adjusted,
      .help = "judge as the criterion does with this parameter: visible, passes, gate, tail, gini, first-spp"},
     {.help = "What comes out:"},
     {"json", 'j', NULL, TO(json), .help = "print the figures as JSON"},
-    {"output", 'o', "DIR", TO(out), .help = "write figures.json and pictures there"},
+    {"output", 'o', "DIR", TO(out), .output = BASE_FOLDER, .files = written,
+     .help = "write figures.json and pictures there"},
     {.help = "How:"},
     {"early", 0, "RATE", TO(early), 0, 1, .help = "early-stop rate that cuts are tuned for on the training scenes (0.05)"},
     {"retune", 0, NULL, TO(retune),
@@ -423,7 +428,7 @@ int ggn_cmd_evaluate(int argc, char **argv)
     if (speaks && o.bf16 && !ggn_precision_has_bf16())
         fprintf(stderr, "%s: this processor has no bfloat16 products: --bf16 judges in float\n", argv[0]);
     if (ggn_cmd_team)
-        ggn_cmd_catch_interrupt(); /* that is how MPI says that a process has died */
+        base_interrupt_catch(); /* that is how MPI says that a process has died */
     ggn_cmd_follow_rank_0();
     for (int i = 0; i < MAX_METHODS; i++)
         j.likened[i] = -1;
@@ -433,9 +438,9 @@ int ggn_cmd_evaluate(int argc, char **argv)
         rc = base_fail(&err, BASE_EIO, "%s: %s", o.out, strerror(errno));
     if (!rc)
         rc = load(&j, threads, &skipped, &err);
-    if (!rc && !ggn_cmd_interrupted)
+    if (!rc && !base_interrupted)
         rc = measure(&j, threads, &err);
-    if (!rc && !ggn_cmd_interrupted && speaks)
+    if (!rc && !base_interrupted && speaks)
         rc = report(&j, skipped, &err);
     for (int i = 0; i < j.n; i++)
         ggn_method_release(&j.methods[i]);
@@ -443,5 +448,5 @@ int ggn_cmd_evaluate(int argc, char **argv)
     for (int i = 0; i < o.n_models; i++)
         ggn_model_destroy(j.models[i]);
     base_threads_destroy(threads);
-    return rc ? ggn_cmd_fail(argv[0], &err) : ggn_cmd_interrupted ? GGN_EXIT_INTERRUPTED : GGN_EXIT_OK;
+    return rc ? ggn_cmd_fail(argv[0], &err) : base_interrupted ? GGN_EXIT_INTERRUPTED : GGN_EXIT_OK;
 }

@@ -17,7 +17,7 @@ struct options {
 #define TO(member) BASE_TO(struct options, member)
 static const struct base_option list[] = {
     {"json", 'j', NULL, TO(json), .help = "print {\"mean\": …, \"max\": …}"},
-    {"output", 'o', "MAP.png", TO(map_path), .output = 1,
+    {"output", 'o', "MAP.png", TO(map_path), .output = BASE_FILE,
      .help = "write the error map as a picture (magma, black 0 … white 1)"},
     {"ppd", 'p', "N", TO(ppd), 1, 1000, .help = "pixels per degree of the viewer (67.02)"},
     {0}};
@@ -42,6 +42,7 @@ int ggn_cmd_flip(int argc, char **argv)
         .args_doc = "REFERENCE TEST",
         .args_min = 2,
         .args_max = 2,
+        .args_are = BASE_ARGS_FILES,
         .args = offsetof(struct options, paths),
         .doc =
             "Visible difference of two display images: LDR-FLIP (Andersson et al. 2020), mean and maximum over the pixels."};

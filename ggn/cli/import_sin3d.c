@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "base/files.h"
+#include "base/interrupt.h"
 #include "base/options.h"
 #include "cli/commands.h"
 #include "data/sin3d.h"
@@ -19,8 +20,10 @@ struct options {
 
 #define TO(member) BASE_TO(struct options, member)
 static const struct base_option list[] = {
-    {"output", 'o', "OUT", TO(out), .needed = 1, .help = "data set to write, one folder per view (needed)"},
-    {"thresholds", 't', "CSV", TO(thresholds), .help = "human thresholds, name;t0;…;t15; (written as labels)"},
+    {"output", 'o', "OUT", TO(out), .output = BASE_FOLDER, .needed = 1,
+     .help = "data set to write, one folder per view (needed)"},
+    {"thresholds", 't', "CSV", TO(thresholds), .input = BASE_FILE,
+     .help = "human thresholds, name;t0;…;t15; (written as labels)"},
     {"block", 'b', "PIXELS", TO(block), 1, 4096, .help = "side of a block (200)"},
     {"allow-gaps", 'g', NULL, TO(allow_gaps), .help = "take levels that are not evenly spaced"},
     {0}};
@@ -40,6 +43,8 @@ static int import_one(const struct options *o, const struct ggn_sin3d_options *s
         copy[--n] = '\0';
     const char *slash = strrchr(copy, '/');
     int rc = base_file_join(out, o->out, slash ? slash + 1 : copy, err);
+    if (!rc && base_file_is_same(out, copy))
+        rc = base_fail(err, BASE_EINVAL, "%s: this is the view itself; --output names another folder", out);
     if (!rc)
         rc = ggn_sin3d_import_view(copy, out, so, &labelled, err);
     if (!rc)
@@ -75,7 +80,7 @@ static int import_all(const struct options *o, const struct ggn_sin3d_options *s
     closedir(d);
     if (!rc && n > 0)
         qsort(names, n, sizeof *names, compare_names);
-    for (size_t i = 0; i < n && !rc && !ggn_cmd_interrupted; i++) {
+    for (size_t i = 0; i < n && !rc && !base_interrupted; i++) {
         char path[4096];
         int length = snprintf(path, sizeof path, "%s/%s", o->dir, names[i]);
         struct stat st;
@@ -111,7 +116,7 @@ int ggn_cmd_import_sin3d(int argc, char **argv)
     int rc = base_options_parse(&options, argc, argv, &o, &err);
     if (rc)
         return ggn_cmd_fail(argv[0], &err);
-    ggn_cmd_catch_interrupt();
+    base_interrupt_catch();
     struct ggn_sin3d_options so = {
         .block = o.block, .allow_gaps = o.allow_gaps, .progress = isatty(2) ? show_progress : NULL};
     if (o.thresholds) {
@@ -128,5 +133,5 @@ int ggn_cmd_import_sin3d(int argc, char **argv)
         rmdir(o.out); /* goes only if nothing was imported */
     if (rc)
         return ggn_cmd_fail(argv[0], &err);
-    return ggn_cmd_interrupted ? GGN_EXIT_INTERRUPTED : GGN_EXIT_OK;
+    return base_interrupted ? GGN_EXIT_INTERRUPTED : GGN_EXIT_OK;
 }

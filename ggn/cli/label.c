@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/interrupt.h"
 #include "base/options.h"
 #include "base/threads.h"
 #include "cli/commands.h"
@@ -21,18 +22,20 @@ struct options {
     int n_inputs;
     const char *human, *calibrate, *view, *observer_path, *out;
     int source; /* enum ggn_curve_source */
-    int check, trials, threads;
+    int check, trials, threads, replace_human;
     double spread;
 };
 
 #define TO(member) BASE_TO(struct options, member)
 static const struct base_option list[] = {
     {.help = "Thresholds of people:"},
-    {"human", 0, "CSV", TO(human),
+    {"human", 0, "CSV", TO(human), .input = BASE_FILE,
      .help = "label with human thresholds, name;t0;t1;…, matched by --view or by the folder's name"},
+    {"replace-human", 0, NULL, TO(replace_human),
+     .help = "replace thresholds of people that DATA has already (otherwise other ones are refused)"},
     {"view", 0, "NAME", TO(view), .help = "row of the CSV for --human (when there is one sequence)"},
     {.help = "Thresholds of the model observer:"},
-    {"observer", 'O', "FILE", TO(observer_path), .help = "parameters of the model observer (built in)"},
+    {"observer", 'O', "FILE", TO(observer_path), .input = BASE_FILE, .help = "parameters of the model observer (built in)"},
     {"source", 0, NULL, TO(source), .words = ggn_curve_sources,
      .help = "judge two independent halves (halves), or the recorded levels against their reference and halves beyond the "
              "last one"},
@@ -40,11 +43,11 @@ static const struct base_option list[] = {
     {"check", 0, NULL, TO(check),
      .help = "write nothing: compare the thresholds from halves with those of the recorded levels"},
     {.help = "Fitting it:"},
-    {"calibrate", 0, "CSV", TO(calibrate),
+    {"calibrate", 0, "CSV", TO(calibrate), .input = BASE_FILE,
      .help =
          "fit the observer to human thresholds of several views and print the table with each view left out; -o FILE gets "
          "parameters and table"},
-    {"output", 'o', "FILE", TO(out), .help = "where --calibrate writes"},
+    {"output", 'o', "FILE", TO(out), .output = BASE_FILE, .help = "where --calibrate writes"},
     {"fit-trials", 0, NULL, TO(trials),
      .help = "DATA are files of raw trials block;level;seen: print the spread of the psychometric curve"},
     {.help = "All:"},
@@ -61,8 +64,8 @@ static int find_row(const char *csv, const char *name, const struct ggn_threshol
 
 /* --- labels --- */
 
-static int label_human(const struct options *o, const struct ggn_thresholds *t, const struct ggn_dataset_view *v,
-                       struct base_err *err)
+static int human_labels(const struct options *o, const struct ggn_thresholds *t, const struct ggn_dataset_view *v,
+                        struct ggn_labels *out, struct base_err *err)
 {
     const struct seq_manifest *m = &v->manifest;
     const struct ggn_view *row;
@@ -84,8 +87,21 @@ static int label_human(const struct options *o, const struct ggn_thresholds *t, 
             l.labels[l.n++] = (struct ggn_label){id, fmin(row->spp[id], l.cap), row->spp[id] >= l.cap};
     }
     snprintf(l.detail, sizeof l.detail, "thresholds of '%.200s'", row->name);
-    if (!rc)
-        rc = ggn_labels_write(v->dir, &l, err);
+    if (rc)
+        ggn_labels_release(&l);
+    else
+        *out = l;
+    return rc;
+}
+
+static int label_human(const struct options *o, const struct ggn_thresholds *t, const struct ggn_dataset_view *v,
+                       struct base_err *err)
+{
+    struct ggn_labels l;
+    int rc = human_labels(o, t, v, &l, err);
+    if (rc)
+        return rc;
+    rc = ggn_labels_write(v->dir, &l, o->replace_human, err);
     if (!rc)
         printf("%s: %u blocks labelled with human thresholds\n", v->dir, l.n);
     ggn_labels_release(&l);
@@ -102,7 +118,7 @@ static int label_observer(const struct options *o, const struct ggn_observer *ob
         return rc;
     for (uint32_t i = 0; i < l.n; i++)
         censored += l.labels[i].censored != 0;
-    rc = ggn_labels_write(v->dir, &l, err);
+    rc = ggn_labels_write(v->dir, &l, o->replace_human, err);
     if (!rc)
         printf("%s: %u blocks labelled by the model observer, %u censored at %.0f spp\n", v->dir, l.n, censored, l.cap);
     ggn_labels_release(&l);
@@ -142,7 +158,7 @@ static int run_views(const struct options *o, const struct ggn_dataset *d, const
         return base_fail_nomem(err, "check");
     if (o->check)
         printf("%-24s %5s %10s %9s %8s %8s\n", "view", "block", "recorded", "halves", "log2", "curve");
-    for (int i = 0; i < d->n && !rc && !ggn_cmd_interrupted; i++) {
+    for (int i = 0; i < d->n && !rc && !base_interrupted; i++) {
         if (!o->check && !ggn_cmd_is_mine((*seen)++))
             continue;
         if (d->views[i].manifest.n_blocks == 0)
@@ -161,6 +177,23 @@ static int run_views(const struct options *o, const struct ggn_dataset *d, const
     return rc;
 }
 
+/* Whether people's thresholds would be lost is known before the first view is labelled. */
+static int check_views(const struct options *o, const struct ggn_dataset *d, const struct ggn_thresholds *human,
+                       struct base_err *err)
+{
+    int rc = 0;
+    for (int i = 0; i < d->n && !rc && !o->check && !o->replace_human; i++) {
+        struct ggn_labels next = {0};
+        if (d->views[i].manifest.n_blocks == 0)
+            continue;
+        rc = o->human ? human_labels(o, human, &d->views[i], &next, err) : 0;
+        if (!rc)
+            rc = ggn_labels_keep_people(d->views[i].dir, o->human ? &next : NULL, err);
+        ggn_labels_release(&next);
+    }
+    return rc;
+}
+
 static int label(const struct options *o, struct base_threads *threads, struct base_err *err)
 {
     struct ggn_observer observer = ggn_observer_default;
@@ -171,12 +204,12 @@ static int label(const struct options *o, struct base_threads *threads, struct b
         observer.spread = o->spread;
     if (!rc && o->human)
         rc = ggn_thresholds_read(o->human, 200, &human, err);
-    for (int i = 0; i < o->n_inputs && !rc && !ggn_cmd_interrupted; i++) {
+    for (int i = 0; i < 2 * o->n_inputs && !rc && !base_interrupted; i++) { /* a look at all, then the work */
         struct ggn_dataset d;
-        rc = ggn_dataset_open(o->inputs[i], &d, err);
+        rc = ggn_dataset_open(o->inputs[i % o->n_inputs], &d, err);
         if (rc)
             break;
-        rc = run_views(o, &d, &observer, &human, threads, &seen, err);
+        rc = i < o->n_inputs ? check_views(o, &d, &human, err) : run_views(o, &d, &observer, &human, threads, &seen, err);
         ggn_dataset_release(&d);
     }
     ggn_thresholds_release(&human);
@@ -285,7 +318,7 @@ int ggn_cmd_label(int argc, char **argv)
 
     if (rc)
         return ggn_cmd_fail(argv[0], &err);
-    ggn_cmd_catch_interrupt();
+    base_interrupt_catch();
     if ((o.trials || o.calibrate || o.check) && !ggn_cmd_is_mine(0))
         return GGN_EXIT_OK;
     if (o.trials) {
@@ -297,5 +330,5 @@ int ggn_cmd_label(int argc, char **argv)
     }
     if (rc)
         return ggn_cmd_fail(argv[0], &err);
-    return ggn_cmd_interrupted ? GGN_EXIT_INTERRUPTED : GGN_EXIT_OK;
+    return base_interrupted ? GGN_EXIT_INTERRUPTED : GGN_EXIT_OK;
 }

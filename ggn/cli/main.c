@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/interrupt.h"
 #include "base/options.h"
 #include "cli/commands.h"
 
@@ -18,7 +19,6 @@ static const struct command commands[] = {GGN_COMMANDS(COMMAND_ENTRY)};
 
 enum { N_COMMANDS = sizeof commands / sizeof commands[0] };
 
-volatile sig_atomic_t ggn_cmd_interrupted;
 struct base_team *ggn_cmd_team;
 
 static char last_words[512]; /* what a process other than rank 0 would have said */
@@ -28,27 +28,10 @@ int ggn_cmd_is_mine(long i)
     return i % base_team_count(ggn_cmd_team) == base_team_rank(ggn_cmd_team);
 }
 
-static void on_interrupt(int signum)
-{
-    ggn_cmd_interrupted = 1;
-    (void)signum;
-}
-
-void ggn_cmd_catch_interrupt(void)
-{
-    struct sigaction action = {.sa_handler = on_interrupt, .sa_flags = (int)SA_RESETHAND};
-
-    sigemptyset(&action.sa_mask);
-    sigaction(SIGINT, &action, NULL);
-    sigaction(SIGTERM, &action, NULL);
-}
-
 void ggn_cmd_follow_rank_0(void)
 {
-    if (base_team_rank(ggn_cmd_team) == 0)
-        return;
-    signal(SIGINT, SIG_IGN);
-    signal(SIGTERM, SIG_IGN);
+    if (base_team_rank(ggn_cmd_team) > 0)
+        base_interrupt_ignore();
 }
 
 void ggn_cmd_tell_clipped(const char *command, const char *path, size_t clipped)
@@ -134,7 +117,7 @@ static int run(const struct command *command, int argc, char **argv)
     struct base_err err = {0};
     if (base_team_open(&ggn_cmd_team, &err))
         return ggn_cmd_fail(argv[0], &err);
-    base_team_watch(ggn_cmd_team, 0, &ggn_cmd_interrupted);
+    base_team_watch(ggn_cmd_team, 0, &base_interrupted);
     if (ggn_cmd_team && !is_shared(command)) {
         base_fail(&err, BASE_EINVAL, "works in one process: start it without mpirun");
         return part(argv[0], ggn_cmd_fail(argv[0], &err));

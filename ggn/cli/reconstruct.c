@@ -19,11 +19,11 @@ struct options {
 
 #define TO(member) BASE_TO(struct options, member)
 static const struct base_option list[] = {
-    {"stops", 's', "FILE", TO(stops),
+    {"stops", 's', "FILE", TO(stops), .input = BASE_FILE,
      .help = "stops or thresholds per block: CSV, report JSON or EXR stop map (the sequence's labels)"},
     {"view", 'v', "NAME", TO(view), .help = "row of the CSV"},
-    {"output", 'o', "OUT.png", TO(out), .needed = 1, .output = 1, .help = "the picture (needed)"},
-    {"reference", 'r', "REF.png", TO(reference), .output = 1, .help = "write the reference too"},
+    {"output", 'o', "OUT.png", TO(out), .needed = 1, .output = BASE_FILE, .help = "the picture (needed)"},
+    {"reference", 'r', "REF.png", TO(reference), .output = BASE_FILE, .help = "write the reference too"},
     {"json", 'j', NULL, TO(json), .help = "print the figures as JSON"},
     {0}};
 

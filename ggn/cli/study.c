@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include "base/files.h"
+#include "base/interrupt.h"
 #include "base/options.h"
 #include "base/threads.h"
 #include "cli/commands.h"
@@ -184,7 +185,7 @@ struct options {
     int no_pictures;
 };
 #define TO(member) BASE_TO(struct options, member)
-#define ARGS(n) .args_min = n, .args_max = n, .args = offsetof(struct options, args)
+#define ARGS(n) .args_min = n, .args_max = n, .args = offsetof(struct options, args), .args_are = BASE_ARGS_FILES
 static const struct base_option no_options[] = {{0}};
 
 /* DIR/token: made once, so that links stay good. */
@@ -231,8 +232,8 @@ static int serve(const struct options *o, struct base_err *err)
     if (!rc) {
         struct ggn_study_site site = {
             .dir = o->args[0], .page_dir = page, .token = address.loopback ? NULL : token, .study = &study, .store = store};
-        ggn_cmd_catch_interrupt();
-        rc = ggn_study_serve(&site, &address, &ggn_cmd_interrupted, err);
+        base_interrupt_catch();
+        rc = ggn_study_serve(&site, &address, &base_interrupted, err);
     }
     ggn_study_store_close(store);
     ggn_study_release(&study);
@@ -356,7 +357,7 @@ static int do_export(const struct options *o, const struct ggn_study *study, str
 }
 
 static const struct base_option export_list[] = {
-    {"output", 'o', "FILE", TO(out), .needed = 1, .output = 1, .help = "the file to write (required)"},
+    {"output", 'o', "FILE", TO(out), .needed = 1, .output = BASE_FILE, .help = "the file to write (required)"},
     {0}};
 
 static int run_export(int argc, char **argv)

@@ -1,7 +1,10 @@
 /* `ggn train`: from a data set to a model file. */
 #include "base/files.h"
+#include "base/inputs.h"
+#include "base/interrupt.h"
 #include "base/options.h"
 #include "cli/commands.h"
+#include "model/container.h"
 #include "train/train.h"
 
 struct settings {
@@ -11,12 +14,12 @@ struct settings {
 };
 #define TO(member) BASE_TO(struct settings, member)
 static const struct base_option list[] = {
-    {"data", 'd', "DIR", TO(plan.data.dir), .needed = 1,
+    {"data", 'd', "DIR", TO(plan.data.dir), .input = BASE_FOLDER, .needed = 1,
      .help = "data set: a folder of recorded, labelled sequences (needed)"},
-    {"out", 'o', "FILE", TO(plan.out), .needed = 1, .output = 1,
+    {"out", 'o', "FILE", TO(plan.out), .needed = 1, .output = BASE_FILE, .kind = &ggn_container_kind,
      .help = "model file; FILE.ckpt, .csv, .png and .card.json lie beside it (needed)"},
     {"preset", 0, NULL, TO(preset), .words = ggn_preset_names, .help = "networks, procedure and defaults (lull)"},
-    {"init", 0, "FILE", TO(plan.init), .help = "start from this model"},
+    {"init", 0, "FILE", TO(plan.init), .input = BASE_FILE, .help = "start from this model"},
     {"resume", 0, NULL, TO(plan.resume), .help = "continue from FILE.ckpt if it is there"},
     {"validation", 'V', "SCENE,...", TO(plan.data.validation), .help = "validation scenes, over the data set's split.json"},
     {"test", 'T', "SCENE,...", TO(plan.data.test),
@@ -67,14 +70,22 @@ static const struct base_option list[] = {
      .help = "under mpirun: give up when a process has owed its part for so long (120)"},
     {0}};
 
-/* What training leaves beside the model has longer names; and it must not become part of the data. */
-static int check_out(const struct ggn_train_plan *plan, struct base_err *err)
+/* What training leaves beside the model has longer names, and could be what it begins with. */
+static int check_beside(const struct ggn_train_plan *plan, struct base_err *err)
 {
-    char longest[4096 + sizeof ".card.json"];
-    snprintf(longest, sizeof longest, "%s.card.json", plan->out);
-    int rc = base_file_check_output(longest, err);
-    if (!rc && base_file_is_inside(plan->out, plan->data.dir))
-        rc = base_fail(err, BASE_EINVAL, "%s: this is inside its data, %s", plan->out, plan->data.dir);
+    static const char *const endings[] = {".ckpt", ".csv", ".png", ".card.json"};
+    struct base_inputs inputs = BASE_INPUTS_EMPTY;
+    char path[4096 + sizeof ".card.json"];
+    int rc = plan->init ? base_inputs_add(&inputs, plan->init, err) : 0;
+    for (size_t i = 0; i < sizeof endings / sizeof endings[0] && !rc; i++) {
+        snprintf(path, sizeof path, "%s%s", plan->out, endings[i]);
+        rc = base_file_check_output(path, err);
+        if (!rc)
+            rc = base_inputs_protect(&inputs, path, err);
+        if (!rc && i == 0)
+            rc = base_file_check_kind(path, &ggn_container_kind, err);
+    }
+    base_inputs_release(&inputs);
     return rc;
 }
 
@@ -94,14 +105,14 @@ int ggn_cmd_train(int argc, char **argv)
     if (!rc)
         rc = base_options_parse(&options, argc, argv, &s, &err);
     if (!rc && base_team_rank(ggn_cmd_team) == 0) /* the others write nothing */
-        rc = check_out(&s.plan, &err);
+        rc = check_beside(&s.plan, &err);
     if (rc)
         return ggn_cmd_fail(argv[0], &err);
     s.plan.progress = s.quiet || base_team_rank(ggn_cmd_team) > 0 ? NULL : stderr;
-    s.plan.interrupted = &ggn_cmd_interrupted;
+    s.plan.interrupted = &base_interrupted;
     s.plan.team = ggn_cmd_team;
-    base_team_watch(ggn_cmd_team, s.rank_timeout_s, &ggn_cmd_interrupted);
-    ggn_cmd_catch_interrupt();
+    base_team_watch(ggn_cmd_team, s.rank_timeout_s, &base_interrupted);
+    base_interrupt_catch();
     ggn_cmd_follow_rank_0();
     rc = ggn_train(&s.plan, &err);
     if (rc == GGN_TRAIN_INTERRUPTED && base_team_rank(ggn_cmd_team) == 0)

@@ -17,8 +17,9 @@ struct options {
 static const struct base_option list[] = {
     {"block", 'b', "PIXELS", TO(block), 1, 32768, .help = "side of the blocks in pixels (200)"},
     {"json", 'j', NULL, TO(json), .help = "print one JSON object, with every block"},
-    {"observer", 'O', "FILE", TO(observer_path), .help = "parameters of the observer (those this was built with)"},
-    {"output", 'o', "MAP.png", TO(map_path), .output = 1,
+    {"observer", 'O', "FILE", TO(observer_path), .input = BASE_FILE,
+     .help = "parameters of the observer (those this was built with)"},
+    {"output", 'o', "MAP.png", TO(map_path), .output = BASE_FILE,
      .help = "write where: black nothing, light yellow twice what is just seen; blocks with visible noise are framed"},
     {0}};
 
@@ -127,6 +128,7 @@ int ggn_cmd_visible(int argc, char **argv)
         .args_doc = "REFERENCE IMAGE",
         .args_min = 2,
         .args_max = 2,
+        .args_are = BASE_ARGS_FILES,
         .args = offsetof(struct options, paths),
         .doc = "Where the noise of an image is still seen, against a reference of the same view: the model observer's error "
                "of each block, 1 where noise is just not seen, and the share of viewers who see it."};

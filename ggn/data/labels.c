@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include <cjson/cJSON.h>
 
@@ -138,10 +139,39 @@ static cJSON *to_json(const struct ggn_labels *labels, int *failed)
     return root;
 }
 
-int ggn_labels_write(const char *dir, const struct ggn_labels *labels, struct base_err *err)
+static int is_same(const struct ggn_labels *a, const struct ggn_labels *b)
+{
+    int same = strcmp(a->source, b->source) == 0 && a->n == b->n;
+    for (uint32_t i = 0; i < a->n && same; i++) {
+        const struct ggn_label *l = ggn_labels_find(b, a->labels[i].id);
+        same = l && l->threshold == a->labels[i].threshold && l->censored == a->labels[i].censored;
+    }
+    return same;
+}
+
+int ggn_labels_keep_people(const char *dir, const struct ggn_labels *next, struct base_err *err)
+{
+    struct ggn_labels old;
+    char path[4096];
+    int rc = base_file_join(path, dir, "labels.json", err);
+    if (rc || access(path, F_OK) != 0)
+        return rc;
+    rc = ggn_labels_read(dir, &old, err);
+    if (rc)
+        return rc;
+    if (strcmp(old.source, "human") == 0 && !(next && is_same(&old, next)))
+        rc = base_fail(err, BASE_EINVAL, "%s: thresholds of people would be lost; ggn label --replace-human replaces them",
+                       path);
+    ggn_labels_release(&old);
+    return rc;
+}
+
+int ggn_labels_write(const char *dir, const struct ggn_labels *labels, int replace_human, struct base_err *err)
 {
     char path[4096];
     int rc = base_file_join(path, dir, "labels.json", err);
+    if (!rc && !replace_human)
+        rc = ggn_labels_keep_people(dir, labels, err);
     if (rc)
         return rc;
     int failed = 0;

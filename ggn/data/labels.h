@@ -34,7 +34,11 @@ struct ggn_labels {
 
 int ggn_labels_parse(const char *path, const char *text, size_t size, struct ggn_labels *labels, struct base_err *err);
 int ggn_labels_read(const char *dir, struct ggn_labels *labels, struct base_err *err);
-int ggn_labels_write(const char *dir, const struct ggn_labels *labels, struct base_err *err);
+/* BASE_EINVAL when DIR has thresholds of people that are not those of `next` (NULL: an observer's), or labels that cannot be
+ * read. */
+int ggn_labels_keep_people(const char *dir, const struct ggn_labels *next, struct base_err *err);
+/* Without replace_human it fails where ggn_labels_keep_people does. */
+int ggn_labels_write(const char *dir, const struct ggn_labels *labels, int replace_human, struct base_err *err);
 void ggn_labels_release(struct ggn_labels *labels);
 /* NULL if the block has none. */
 const struct ggn_label *ggn_labels_find(const struct ggn_labels *labels, uint32_t id);

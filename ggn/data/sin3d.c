@@ -326,7 +326,7 @@ static int attach_thresholds(const struct view *v, const char *out, const struct
         return base_fail_nomem(err, out);
     for (uint32_t i = 0; i < n; i++)
         labels.labels[i] = (struct ggn_label){i, row->spp[i], row->spp[i] >= labels.cap};
-    int rc = ggn_labels_write(out, &labels, err);
+    int rc = ggn_labels_write(out, &labels, 0, err);
     ggn_labels_release(&labels);
     return rc;
 }

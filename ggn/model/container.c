@@ -7,10 +7,9 @@
 #include <string.h>
 
 #include "base/bytes.h"
-#include "base/files.h"
 #include "base/half.h"
 
-static const char MAGIC[8] = {'L', 'U', 'L', 'L', 'G', 'G', 'N', '\n'};
+const struct base_file_kind ggn_container_kind = {"model file", {'L', 'U', 'L', 'L', 'G', 'G', 'N', '\n'}};
 
 enum { HEADER = 64, ENTRY = 88, ALIGN = 64, AT_CHECKSUM = 48, MAX_JSON = 1 << 20 };
 static const uint64_t MAX_FILE = (uint64_t)4 << 30;
@@ -106,7 +105,7 @@ static unsigned char *assemble(struct ggn_container *c, size_t *size)
     unsigned char *file = calloc(1, at);
     if (!file)
         return NULL;
-    memcpy(file, MAGIC, sizeof MAGIC);
+    memcpy(file, ggn_container_kind.magic, sizeof ggn_container_kind.magic);
     base_put_u32(file + 8, GGN_CONTAINER_VERSION);
     base_put_u32(file + 12, (uint32_t)c->n_entries);
     base_put_u64(file + 16, at);
@@ -169,7 +168,7 @@ int ggn_container_write(struct ggn_container *c, const char *path, struct base_e
 
 static int check_header(const unsigned char *p, size_t size, const char *name, struct base_err *err)
 {
-    if (size < HEADER || memcmp(p, MAGIC, sizeof MAGIC) != 0)
+    if (size < HEADER || memcmp(p, ggn_container_kind.magic, sizeof ggn_container_kind.magic) != 0)
         return base_fail(err, BASE_EINVAL, "%s: not a .ggn file", name);
     if (base_get_u32(p + 8) != GGN_CONTAINER_VERSION)
         return base_fail(err, BASE_EINVAL, "%s: .ggn version %u; this program reads version %d", name, base_get_u32(p + 8),

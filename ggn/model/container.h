@@ -23,8 +23,11 @@
 #include <stdint.h>
 
 #include "base/err.h"
+#include "base/files.h"
 
 enum ggn_type { GGN_F32, GGN_F16, GGN_BF16, GGN_TYPES };
+
+extern const struct base_file_kind ggn_container_kind;
 
 enum { GGN_CONTAINER_VERSION = 1, GGN_CONTAINER_NAME = 48, GGN_CONTAINER_TENSORS = 4096 };
 

@@ -12,7 +12,7 @@
  * magic[8], settings bytes, settings; film bytes, film arrays; blocks, block records; totals; dropped samples; criterion
  * bytes, criterion; crc32 of all before. Counts are u64, records are the structs below, made without padding.
  */
-static const char MAGIC[8] = {'L', 'U', 'L', 'L', 'C', 'K', 'P', '1'};
+const struct base_file_kind pt_checkpoint_kind = {"checkpoint", {'L', 'U', 'L', 'L', 'C', 'K', 'P', '1'}};
 enum { MAX_CRITERION_BYTES = 1 << 30 };
 
 struct block_record {
@@ -73,7 +73,7 @@ int pt_checkpoint_save(const char *path, const struct pt_render *r, const char *
         return rc;
     }
     struct sink s = {.file = out.file, .crc = (uint32_t)crc32(0, NULL, 0)};
-    put(&s, MAGIC, sizeof MAGIC);
+    put(&s, pt_checkpoint_kind.magic, sizeof pt_checkpoint_kind.magic);
     put_count(&s, strlen(settings));
     put(&s, settings, strlen(settings));
     put_count(&s, r->film.bytes);
@@ -227,7 +227,8 @@ int pt_checkpoint_load(const char *path, struct pt_render *r, const char *settin
     if (rc)
         return rc;
     uint32_t crc = 0;
-    if (size < sizeof MAGIC + sizeof crc || memcmp(data, MAGIC, sizeof MAGIC) != 0) {
+    const size_t begin = sizeof pt_checkpoint_kind.magic;
+    if (size < begin + sizeof crc || memcmp(data, pt_checkpoint_kind.magic, begin) != 0) {
         rc = base_fail(err, BASE_EINVAL, "%s: not a checkpoint", path);
         goto out;
     }
@@ -236,7 +237,7 @@ int pt_checkpoint_load(const char *path, struct pt_render *r, const char *settin
         rc = base_fail(err, BASE_EINVAL, "%s: the checkpoint is damaged or cut off", path);
         goto out;
     }
-    struct source s = {.path = path, .data = (const unsigned char *)data, .at = sizeof MAGIC, .size = size - sizeof crc};
+    struct source s = {.path = path, .data = (const unsigned char *)data, .at = begin, .size = size - sizeof crc};
     rc = take_all(&s, r, settings, err);
 out:
     free(data);

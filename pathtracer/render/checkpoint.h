@@ -8,7 +8,10 @@
 #define PT_RENDER_CHECKPOINT_H
 
 #include "base/err.h"
+#include "base/files.h"
 #include "render/render.h"
+
+extern const struct base_file_kind pt_checkpoint_kind;
 
 /* settings: lines of key=value that decide the image, made by the caller; compared when loading. */
 int pt_checkpoint_save(const char *path, const struct pt_render *render, const char *settings, struct base_err *err);

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+#include <unistd.h>
 
 #include "base/colour.h"
 #include "base/files.h"
@@ -147,6 +148,23 @@ int pt_output_exr(const char *path, const struct pt_render *r, const struct pt_o
         .data = &source,
     };
     return pt_exr_write(path, &image, err);
+}
+
+int pt_output_is_ours(const char *path)
+{
+    static const char mark[] = "lull.spp"; /* a layer of each, named in the header's first attribute */
+    char begin[4096];
+    FILE *f;
+    if (access(path, F_OK) != 0)
+        return 1;
+    if (base_file_open(path, &f, NULL) != 0)
+        return 0;
+    size_t n = fread(begin, 1, sizeof begin, f);
+    fclose(f);
+    for (size_t at = 0; at + sizeof mark - 1 <= n; at++)
+        if (memcmp(begin + at, mark, sizeof mark - 1) == 0)
+            return 1;
+    return n == 0;
 }
 
 /* --- pictures ------------------------------------------------------------------------------------------------------- */

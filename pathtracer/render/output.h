@@ -24,6 +24,8 @@ struct pt_output_info {
 
 /* RGB, lull.spp.V, lull.p_noisy.V, lull.error.V, lull.reason.V and the AOVs, cropped as the config says. */
 int pt_output_exr(const char *path, const struct pt_render *render, const struct pt_output_info *info, struct base_err *err);
+/* 0 when there is a file at `path` that is not such an EXR. */
+int pt_output_is_ours(const char *path);
 /* sRGB, 8 bits. */
 int pt_output_preview(const char *path, const struct pt_render *render, struct base_err *err);
 /* PNG or CSV by the name's ending. */

@@ -179,6 +179,38 @@ int base_file_check_output(const char *path, struct base_err *err)
     return path ? check_output(path, target, err) : 0;
 }
 
+int base_file_check_kind(const char *path, const struct base_file_kind *kind, struct base_err *err)
+{
+    unsigned char begin[sizeof kind->magic];
+    FILE *f;
+    if (!path || access(path, F_OK) != 0)
+        return 0;
+    int rc = base_file_open(path, &f, err);
+    if (rc)
+        return rc;
+    size_t n = fread(begin, 1, sizeof begin, f);
+    fclose(f);
+    if (n > 0 && (n < sizeof begin || memcmp(begin, kind->magic, sizeof begin) != 0))
+        return base_fail(err, BASE_EINVAL, "%s: this is no %s and would be replaced; choose another name", path, kind->name);
+    return 0;
+}
+
+int base_file_is_same(const char *a, const char *b)
+{
+    char target_a[PATH_ROOM], target_b[PATH_ROOM], folder[PATH_ROOM + 4];
+    struct stat at_a, at_b;
+    if (follow(a, target_a, NULL) != 0 || follow(b, target_b, NULL) != 0)
+        return 0;
+    int has_a = stat(target_a, &at_a) == 0, has_b = stat(target_b, &at_b) == 0;
+    if (!has_a && !has_b && strcmp(base_name(target_a), base_name(target_b)) == 0) { /* then by their folders */
+        folder_of(target_a, folder);
+        has_a = stat(folder, &at_a) == 0;
+        folder_of(target_b, folder);
+        has_b = stat(folder, &at_b) == 0;
+    }
+    return has_a && has_b && at_a.st_dev == at_b.st_dev && at_a.st_ino == at_b.st_ino;
+}
+
 int base_file_is_inside(const char *path, const char *folder)
 {
     char at[2 * PATH_ROOM], target[PATH_ROOM];

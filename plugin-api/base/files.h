@@ -30,6 +30,18 @@ int base_file_join(char *path, const char *dir, const char *name, struct base_er
  * the name is too long or what is there is no regular file. NULL is no output. */
 int base_file_check_output(const char *path, struct base_err *err);
 
+/* What files of a program's own begin with, and what they are called: "checkpoint". */
+struct base_file_kind {
+    const char *name;
+    unsigned char magic[8];
+};
+/* BASE_EINVAL when there is a file at `path` that is neither empty nor of this kind: what a program keeps for itself takes
+ * the place of nothing but its like. NULL is no output. */
+int base_file_check_kind(const char *path, const struct base_file_kind *kind, struct base_err *err);
+
+/* 1 when writing `a` and writing `b` changes one and the same file, also when neither is there yet. */
+int base_file_is_same(const char *a, const char *b);
+
 /* 1 when writing `path` would put a file into `folder` or one of its folders. */
 int base_file_is_inside(const char *path, const char *folder);
 

@@ -1,10 +1,8 @@
 #include "base/inputs.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <zlib.h>
 
 #include "base/files.h"
 
@@ -51,36 +49,19 @@ int base_inputs_add(struct base_inputs *inputs, const char *path, struct base_er
     return rc;
 }
 
-int base_inputs_crc32(const struct base_inputs *inputs, uint32_t *crc, struct base_err *err)
-{
-    static const size_t piece = 1 << 16;
-    unsigned char *bytes = malloc(piece);
-    int rc = bytes ? 0 : base_fail_nomem(err, "checksum");
-    *crc = 0;
-    for (size_t i = 0; i < inputs->count && !rc; i++) {
-        FILE *f = NULL;
-        rc = base_file_open(inputs->paths[i], &f, err);
-        if (rc)
-            break;
-        for (size_t n; (n = fread(bytes, 1, piece, f)) > 0;)
-            *crc = (uint32_t)crc32_z(*crc, bytes, n);
-        if (ferror(f))
-            rc = base_fail(err, BASE_EIO, "%s: read error", inputs->paths[i]);
-        fclose(f);
-    }
-    free(bytes);
-    return rc;
-}
-
 int base_inputs_protect(const struct base_inputs *inputs, const char *output, struct base_err *err)
 {
     struct stat out, in;
-    if (!output || stat(output, &out) != 0)
-        return 0;
-    for (size_t i = 0; i < inputs->count; i++)
-        if (stat(inputs->paths[i], &in) == 0 && in.st_dev == out.st_dev && in.st_ino == out.st_ino)
-            return base_fail(err, BASE_EINVAL, "%s: this is an input (%s), it would be overwritten", output,
-                             inputs->paths[i]);
+    int exists = output && stat(output, &out) == 0;
+    for (size_t i = 0; output && i < inputs->count; i++) {
+        const char *path = inputs->paths[i];
+        if (stat(path, &in) != 0)
+            continue;
+        if (S_ISDIR(in.st_mode) && base_file_is_inside(output, path))
+            return base_fail(err, BASE_EINVAL, "%s: this is inside its data, %s", output, path);
+        if (exists && in.st_dev == out.st_dev && in.st_ino == out.st_ino)
+            return base_fail(err, BASE_EINVAL, "%s: this is an input (%s), it would be overwritten", output, path);
+    }
     return 0;
 }
 

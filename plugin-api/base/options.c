@@ -8,9 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
-#include <sys/stat.h>
 
-#include "base/files.h"
+#include "base/inputs.h"
+#include "base/outputs.h"
 #include "base/peers.h"
 #include "base/version.h"
 
@@ -246,21 +246,71 @@ static int take_arguments(const struct base_options *options, int count, char **
     return 0;
 }
 
-/* An output that cannot be written, or that would take the place of an input, is found out before the work. */
-static int check_output(const struct base_options *options, const char *path, const void *into, struct base_err *err)
+static const char *text_of(const struct base_option *o, const void *into)
 {
-    struct stat out, in;
-    const char *const *args = (const void *)((const char *)into + options->args);
-    int rc = base_file_check_output(path, err);
-    if (rc || !path || stat(path, &out))
-        return rc;
-    for (int i = 0; i < options->args_max; i++)
-        if (args[i] && args[i] != path && !stat(args[i], &in) && in.st_dev == out.st_dev && in.st_ino == out.st_ino)
-            return base_fail(err, BASE_EINVAL, "%s: this is an input, it would be overwritten", path);
-    return 0;
+    return o->to.type == BASE_STORE_TEXT ? *(const char *const *)(const void *)((const char *)into + o->to.offset) : NULL;
 }
 
-int base_options_parse(const struct base_options *options, int argc, char **argv, void *into, struct base_err *err)
+/* What is to be read and written, as far as the command line says so. */
+struct files {
+    struct base_inputs inputs;
+    struct base_outputs outputs;
+};
+
+/* A folder in the place of a file is refused by who reads it. */
+static int add_input(struct files *files, const char *path, enum base_path what, struct base_err *err)
+{
+    return what == BASE_FILE && base_file_check_input(path, NULL) != 0 ? 0 : base_inputs_add(&files->inputs, path, err);
+}
+
+/* Values of a row that keeps several, or only a part, are met one by one. */
+static int note_value(const struct base_option *o, const char *value, struct files *files, struct base_err *err)
+{
+    if (o->set && o->input)
+        return add_input(files, value, o->input, err);
+    return o->set && o->output ? base_outputs_add(&files->outputs, o->name, value, err) : 0;
+}
+
+static int note_files(const struct base_options *options, const void *into, struct files *files, struct base_err *err)
+{
+    int rc = 0;
+    for (const struct base_option *o = options->list; !rc && (o->name || o->help); o++) {
+        const char *text = text_of(o, into);
+        if (o->needed && !text)
+            rc = base_fail(err, BASE_EINVAL, "--%s %s is needed (--help says more)", o->name, o->arg);
+        else if (o->output == BASE_FILE)
+            rc = base_outputs_add(&files->outputs, o->name, text, err);
+        else if (o->input && text)
+            rc = add_input(files, text, o->input, err);
+    }
+    for (int i = 0; i < options->args_max && !rc && options->args_are != BASE_ARGS_WORDS; i++) {
+        const char *arg = ((const char *const *)(const void *)((const char *)into + options->args))[i];
+        if (i + 1 == options->args_output)
+            rc = base_outputs_add(&files->outputs, "output", arg, err);
+        else if (arg)
+            rc = add_input(files, arg, options->args_are == BASE_ARGS_FILES ? BASE_FILE : BASE_FOLDER, err);
+    }
+    return rc;
+}
+
+/* Outputs that cannot be written, or that would take the place of an input or of each other, are found before the work. */
+static int check_files(const struct base_options *options, void *into, struct files *files, struct base_err *err)
+{
+    int rc = note_files(options, into, files, err);
+    if (!rc)
+        rc = base_outputs_protect(&files->outputs, &files->inputs, err);
+    for (const struct base_option *o = options->list; !rc && (o->name || o->help); o++)
+        if (o->output == BASE_FOLDER && text_of(o, into))
+            rc = base_outputs_protect_folder(text_of(o, into), o->files, &files->inputs, err);
+        else if (o->kind)
+            rc = base_file_check_kind(text_of(o, into), o->kind, err);
+    if (!rc && options->outputs)
+        *(struct base_outputs *)(void *)((char *)into + options->outputs) = files->outputs;
+    return rc;
+}
+
+static int parse(const struct base_options *options, int argc, char **argv, void *into, struct files *files,
+                 struct base_err *err)
 {
     struct getopt_form form;
     const char *slash = strrchr(argv[0], '/'), *program = slash ? slash + 1 : argv[0];
@@ -275,18 +325,21 @@ int base_options_parse(const struct base_options *options, int argc, char **argv
             answer(options, program, key);
         if (key == ':' || key == '?')
             return bad_option(key, token, err);
-        int rc = take(find(options->list, key), into, optarg, err);
+        const struct base_option *o = find(options->list, key);
+        int rc = take(o, into, optarg, err);
+        if (!rc)
+            rc = note_value(o, optarg, files, err);
         if (rc)
             return rc;
     }
     int rc = take_arguments(options, argc - optind, argv + optind, into, err);
-    for (const struct base_option *o = options->list; !rc && (o->name || o->help); o++)
-        if (o->needed && !*(const char **)(void *)((char *)into + o->to.offset))
-            rc = base_fail(err, BASE_EINVAL, "--%s %s is needed (--help says more)", o->name, o->arg);
-        else if (o->output)
-            rc = check_output(options, *(const char **)(void *)((char *)into + o->to.offset), into, err);
-    if (!rc && options->args_output)
-        rc = check_output(options, ((const char **)(void *)((char *)into + options->args))[options->args_output - 1], into,
-                          err);
+    return rc ? rc : check_files(options, into, files, err);
+}
+
+int base_options_parse(const struct base_options *options, int argc, char **argv, void *into, struct base_err *err)
+{
+    struct files files = {.inputs = BASE_INPUTS_EMPTY};
+    int rc = parse(options, argc, argv, into, &files, err);
+    base_inputs_release(&files.inputs);
     return rc;
 }

@@ -18,6 +18,7 @@
 #include <stdint.h>
 
 #include "base/err.h"
+#include "base/files.h"
 
 enum base_store_type { BASE_STORE_NONE, BASE_STORE_INT, BASE_STORE_U32, BASE_STORE_U64, BASE_STORE_REAL, BASE_STORE_TEXT };
 
@@ -29,6 +30,9 @@ struct base_store {
 #define BASE_TO(struct_type, member)                                                                                        \
     {_Generic(((struct_type *)0)->member, int: BASE_STORE_INT, uint32_t: BASE_STORE_U32, uint64_t: BASE_STORE_U64,          \
               double: BASE_STORE_REAL, const char *: BASE_STORE_TEXT), offsetof(struct_type, member)}
+
+enum base_path { BASE_NO_PATH, BASE_FILE, BASE_FOLDER };
+enum base_args { BASE_ARGS_PATHS, BASE_ARGS_FILES, BASE_ARGS_WORDS };
 
 struct base_option {
     const char *name;       /* long name without dashes; NULL: `help` is the heading of the rows that follow */
@@ -42,7 +46,10 @@ struct base_option {
      * before it. Out of memory is passed on as it is. */
     int (*set)(void *into, const char *value, struct base_err *err);
     int needed, hidden;     /* needed: text only; without it the command line is refused */
-    int output;             /* text: a file to be written, refused when it cannot be or is an argument */
+    enum base_path input;   /* the value is read, if it is there: no output may take its place or go into its folder */
+    enum base_path output;  /* the value is written: refused when it cannot be, is an input, or is written twice */
+    const struct base_file_kind *kind; /* of a file: refused when one of another kind is there; NULL: any is replaced */
+    const char *const *files; /* of a folder: names written there that an input might have; ends with NULL */
 };
 
 struct base_options {
@@ -54,6 +61,8 @@ struct base_options {
     int args_output;        /* which of them, from 1, names a file to be written; 0: none */
     int uses_peers;         /* --version says which MPI there is */
     size_t arg_count;       /* offset of an int that gets their number; 0: nobody asks */
+    enum base_args args_are; /* all but args_output: read, as files or folders or as files only; or mere words */
+    size_t outputs;         /* offset of a struct base_outputs that gets the files to be written; 0: nobody asks */
 };
 
 /* Fills *into from argv (whose order it may change); what is not on the command line stays as it was. --help, --usage and

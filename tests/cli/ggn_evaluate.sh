@@ -30,7 +30,27 @@ fails "evaluate: window longer than the levels" 'a window needs 9' $ggn evaluate
 fails "evaluate: no model file" 'No such file' $ggn evaluate -d "$tmp/data" -m "$tmp/none.ggn"
 fails "evaluate: not a model" 'human.csv' $ggn evaluate -d "$tmp/data" -m "$tmp/human.csv"
 
-$ggn label --source levels "$tmp/data" >"$tmp/out" 2>"$tmp/err" && grep -q 'model observer' "$tmp/out" && grep -q '"source":.*"observer"' "$d/labels.json" &&
+cp "$d/labels.json" "$tmp/people.json"
+fails "label: people's thresholds stay" "labels.json: thresholds of people would be lost; ggn label --replace-human" $ggn label --source levels "$tmp/data"
+printf 'p3d_toy-view0_part6;90;161;\n' >"$tmp/other.csv"
+fails "label --human: other people's too" "thresholds of people would be lost" $ggn label "$tmp/data" --human "$tmp/other.csv"
+fails "import: so does it" "thresholds of people would be lost" $ggn import-sin3d "$tmp/sin3d" -o "$tmp/data" --block 32 -t "$tmp/other.csv"
+cmp -s "$d/labels.json" "$tmp/people.json"
+check "  …and they are what they were" $?
+fails "baseline: nothing is written into the data" "labels.json: this is inside its data, " $ggn baseline attributes -d "$tmp/data" -o "$d/labels.json"
+fails "cost: nor by this" "labels.json: this is inside its data, " $ggn cost -d "$tmp/data" -o "$d/labels.json"
+fails "evaluate: nor a folder" "figures: this is inside its data, " $ggn evaluate -d "$tmp/data" -o "$tmp/data/figures"
+fails "evaluate: nor beside the labels" "this is inside its data, " $ggn evaluate -d "$tmp/data" -o "$d/"
+fails "reconstruct: nor a picture" "manifest.json: this is inside its data, " $ggn reconstruct "$d" -o "$d/manifest.json"
+fails "label --calibrate: nor parameters" "labels.json: this is inside its data, " $ggn label "$tmp/data" --calibrate "$tmp/human.csv" -o "$d/labels.json"
+fails "label --calibrate: nor onto what it reads" "this is an input" $ggn label "$tmp/data" --calibrate "$tmp/human.csv" -o "$tmp/human.csv"
+fails "reconstruct: two pictures, one name" "--reference .*/none.png: the same file as --output" $ggn reconstruct "$d" -o "$tmp/./none.png" -r "$tmp/none.png"
+fails "import: a view into itself" "inside its data" $ggn import-sin3d "$view" -o "$view" --block 32
+fails "import: a view onto itself" "this is the view itself" $ggn import-sin3d "$view" -o "$tmp/sin3d" --block 32
+cmp -s "$d/labels.json" "$tmp/people.json" && [ ! -e "$tmp/none.png" ] && [ ! -e "$tmp/data/figures" ]
+check "  …and nothing has changed" $?
+
+$ggn label --source levels --replace-human "$tmp/data" >"$tmp/out" 2>"$tmp/err" && grep -q 'model observer' "$tmp/out" && grep -q '"source":.*"observer"' "$d/labels.json" &&
     ! grep -q human "$d/labels.json"
 check "observer labels are not called human" $?
 $ggn label "$tmp/data" --human "$tmp/human.csv" >"$tmp/out" 2>"$tmp/err" && grep -q '"threshold":.*90' "$d/labels.json"
@@ -40,7 +60,7 @@ $ggn label "$tmp/data" --human "$tmp/human.csv" -t 1 >"$tmp/out" 2>"$tmp/err" &&
 check "labels are the same bytes again" $?
 fails "label --human: unknown view" 'no thresholds for' $ggn label "$tmp/data" --human "$tmp/human.csv" --view other
 fails "label --check without half buffers" 'no full level' $ggn label "$tmp/data" --check
-fails "label without half buffers" 'use --source levels' $ggn label "$tmp/data"
+fails "label without half buffers" 'use --source levels' $ggn label "$tmp/data" --replace-human
 fails "label --calibrate with one view" 'at least 2 views' $ggn label "$tmp/data" --calibrate "$tmp/human.csv"
 fails "label: bad observer" 'level, exponent or spread' sh -c "echo '{}' >$tmp/o.json; $ggn label $tmp/data -O $tmp/o.json"
 

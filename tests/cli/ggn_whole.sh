@@ -165,7 +165,7 @@ run compare compare "$tmp/t.csv" "$tmp/m.csv" -o "$got/compared"
 run compare-view compare "$tmp/t.csv" "$tmp/m.csv" -v b -o "$got/compared-view" --json
 run compare-cap compare "$tmp/t.csv" "$tmp/m.csv" --cap 75 --json
 printf 'it'"'"'s;8;9;12;13;160;161\n' >"$tmp/q.csv"
-run compare-report compare "$tmp/s.json" "$tmp/q.csv" -o "$got/compared-report"
+run compare-report compare "$tmp/s.json" "$tmp/q.csv" -v x -o "$got/compared-report"
 run compare-one compare "$tmp/s.csv" "$tmp/q.csv" -v one
 run compare-pair compare "$tmp/q.csv" "$tmp/s.json" -v "it's" --json
 run compare-constant compare "$tmp/two.csv" "$tmp/two.csv"

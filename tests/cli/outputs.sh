@@ -72,6 +72,48 @@ cp -r "$data" data
 refused "inside its data" "$ggn" train -d data --crop 32 --out data/a.ggn
 refused "inside its data" "$ggn" train -d data --crop 32 --out data/scene0/../a.ggn
 
+# --- no two outputs are one file: by the same name, another way to the folder, a link, a hard link, there already or not ---
+mkdir real && ln -s real way && echo old >real/old.png && ln real/old.png real/twin.png && ln -s ../far.png real/later.png
+for pair in "x.png x.png" "x.png ./x.png" "x.png $dir/x.png" "real/new.png way/new.png" "way/../x.png x.png" "real/old.png way/twin.png" \
+    "real/later.png far.png"; do
+    refused "one of the two would be lost" $long --preview ${pair% *} --stop-map ${pair#* }
+    refused "one of the two would be lost" $long --stop-map ${pair% *} --stop-map ${pair#* }
+    refused "one of the two would be lost" "$ggn" reconstruct "$data/scene0" -o ${pair% *} -r ${pair#* }
+done
+refused "--checkpoint both.exr: the same file as --output both.exr" $long --checkpoint both.exr -o both.exr
+refused "--output room.exr: the same file as --checkpoint room.exr" $long --checkpoint room.exr # the name that nobody gave
+t "names that differ are written" "$P" room.pbrt -q --spp 1 --preview real/new.png --stop-map way/other.png
+rm -r real way
+
+# --- what is kept for oneself replaces nothing but its like ---
+echo text >thesis.txt && cp "$here/../../scenes/textures/bricks.png" kept.png && : >empty.ckp
+for name in thesis.txt kept.png m.ggn; do
+    refused "$name: this is no checkpoint and would be replaced" $long --checkpoint $name
+done
+for name in thesis.txt kept.png; do
+    refused "$name: this is no model file and would be replaced" $train $name
+    refused "$name: this is no model file and would be replaced" "$ggn" convert m.ggn $name
+    refused "$name: this is no model file and would be replaced" "$ggn" baseline attributes -d "$data" -o $name
+done
+echo mine >new.ggn.ckpt
+refused "new.ggn.ckpt: this is no model file and would be replaced" $train new.ggn
+refused "m.ggn: this is an input" "$ggn" train -d "$data" --init m.ggn --out m.ggn
+cp m.ggn begin.ggn.png
+refused "begin.ggn.png: this is an input" "$ggn" train -d "$data" --init begin.ggn.png --out begin.ggn
+t "a checkpoint replaces a checkpoint, and an empty file" sh -c "for i in 1 2; do $P room.pbrt -q --spp 1 -o k.exr --checkpoint empty.ckp --checkpoint-every 0 || exit 1; done"
+refused "m.ggn: this is no checkpoint" "$P" room.pbrt -q -c ggn -p model=m.ggn --checkpoint m.ggn
+cp m.ggn m.png
+refused "m.png: this is an input (m.png)" "$P" room.pbrt -q -c ggn -p model=m.png --preview ./m.png
+oiiotool --pattern constant:color=1,1,1 4x4 3 -d half -o room.exr
+refused "room.exr: another program's image would be replaced; -o FILE.exr names the output" "$P" room.pbrt -q --spp 1
+t "  …where it was not named" "$P" room.pbrt -q --spp 1 -o room.exr
+t "  …and ours is" "$P" room.pbrt -q --spp 1
+refused "leave out -o, --preview, --report and --stop-map" "$P" room.pbrt -q --sequence s --preview p.png
+echo 'a;20;40;' >blocks.csv
+refused "./blocks.csv: this is an input" "$ggn" compare blocks.csv blocks.csv -o .
+echo '{}' >figures.json
+refused "./figures.json: this is an input" "$ggn" evaluate -d "$data" -O figures.json -o .
+
 # --- devices stay, links are followed ---
 mkfifo pipe.ggn
 ln -s /dev/null null.exr
@@ -105,6 +147,30 @@ wait_for term.err $pid
 kill -TERM $pid
 wait $pid
 t "SIGTERM is SIGINT: exit status 130" test $? -eq 130 -a -s term.exr
+"$P" room.pbrt -c null --spp-min 100000000 --spp-max 100000000 -o hup.exr --checkpoint hup.ckp 2>hup.err &
+pid=$!
+wait_for hup.err $pid
+kill -HUP $pid
+wait $pid
+t "and so is SIGHUP" test $? -eq 130 -a -s hup.exr -a -s hup.ckp
+(trap '' HUP; exec "$P" room.pbrt -c null --spp-min 100000000 --spp-max 100000000 -o nohup.exr 2>nohup.err) &
+pid=$!
+wait_for nohup.err $pid
+kill -HUP $pid
+lines=$(wc -l <nohup.err)
+until [ "$(wc -l <nohup.err)" -gt "$lines" ] || ! kill -0 $pid; do sleep 0.1; done
+t "  …but not under nohup" kill -0 $pid
+kill -TERM $pid; wait $pid
+mkfifo lines
+"$P" room.pbrt -c null --spp-min 100000000 --spp-max 100000000 -o pipe.exr --checkpoint pipe.ckp --checkpoint-every 0.1 2>lines &
+pid=$!
+head -n 1 lines >log # and nobody reads on
+until [ -s pipe.ckp ] || ! kill -0 $pid; do sleep 0.1; done
+rm -f pipe.ckp
+until [ -s pipe.ckp ] || ! kill -0 $pid; do sleep 0.1; done
+t "nobody reads its lines any more: it goes on" kill -TERM $pid
+wait $pid
+t "  …and ends as ever" test $? -eq 130 -a -s pipe.exr
 
 # --- one folder, one process ---
 record="$P room.pbrt --block 16 --levels linear:1000:1000000:1000 --sequence seq"

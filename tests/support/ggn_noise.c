@@ -155,7 +155,7 @@ void ggn_noise_view(const char *dir, const char *scene, const struct ggn_noise *
         labels[i] = (struct ggn_label){(uint32_t)i, fmin(t, l.cap), t >= l.cap};
     }
     assert_int_equal(seq_manifest_write(dir, &m, NULL), 0);
-    assert_int_equal(ggn_labels_write(dir, &l, NULL), 0);
+    assert_int_equal(ggn_labels_write(dir, &l, 1, NULL), 0);
     free(levels);
     free(labels);
     free(entries);

@@ -181,7 +181,7 @@ static int write_scene(const struct seqgen *g, struct pixels *p, const char *dir
     }
     labels.cap = levels[g->levels - 1];
     if (!rc)
-        rc = ggn_labels_write(dir, &labels, err);
+        rc = ggn_labels_write(dir, &labels, 1, err);
     return rc ? rc : seq_manifest_write(dir, &m, err);
 }
 

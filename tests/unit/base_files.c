@@ -26,6 +26,7 @@
 #include "base/inputs.h"
 #include "base/json.h"
 #include "base/lock.h"
+#include "base/outputs.h"
 #include "base/peers.h"
 #include "base/png.h"
 #include "base/threads.h"
@@ -261,6 +262,67 @@ static void inside_or_not(void **state)
             fail_msg("%s in %s", cases[i].path, cases[i].folder);
 }
 
+/* Two names, what they are of, and what was there before. */
+static void one_file_or_two(void **state)
+{
+    (void)state;
+    struct base_err err = {0};
+    char here[200];
+    assert_true(mkdir("place", 0777) == 0 && symlink("place", "way") == 0 && symlink("../later", "place/link") == 0);
+    put("place/there", "x");
+    assert_true(link("place/there", "twin") == 0 && symlink("place/there", "soft") == 0);
+    snprintf(here, sizeof here, "%s/new", dir);
+    static const char *const same[][2] = {{"new", "new"}, {"new", "./new"}, {"place/new", "way/new"}, {"way/../new", "new"},
+                                          {"place/there", "twin"}, {"soft", "way/there"}, {"soft", "twin"}, {"place/link", "later"},
+                                          {"way/link", "./later"}};
+    static const char *const other[][2] = {{"new", "place/new"}, {"new", "New"}, {"place/there", "place/new"}, {"place/there", "there"},
+                                           {"loop", "loop"}, {"missing/a", "missing/a"}};
+    for (size_t i = 0; i < sizeof same / sizeof same[0]; i++)
+        if (!base_file_is_same(same[i][0], same[i][1]) || !base_file_is_same(same[i][1], same[i][0]))
+            fail_msg("%s is %s", same[i][0], same[i][1]);
+    for (size_t i = 0; i < sizeof other / sizeof other[0]; i++)
+        if (base_file_is_same(other[i][0], other[i][1]) || base_file_is_same(other[i][1], other[i][0]))
+            fail_msg("%s is not %s", other[i][0], other[i][1]);
+    assert_true(base_file_is_same("new", here));
+
+    struct base_outputs out = {0};
+    assert_int_equal(base_outputs_add(&out, "preview", NULL, &err), 0);
+    assert_true(base_outputs_add(&out, "preview", "way/new", &err) == 0 && base_outputs_add(&out, "map", "new", &err) == 0);
+    says(base_outputs_add(&out, "report", "place/new", &err), BASE_EINVAL, &err,
+         "--report place/new: the same file as --preview way/new, one of the two would be lost");
+    says(base_outputs_add(&out, "report", "missing/x", &err), BASE_EIO, &err, "missing/x: cannot write there: No such file or directory");
+    assert_int_equal(out.count, 2);
+
+    struct base_inputs in = BASE_INPUTS_EMPTY;
+    assert_true(base_inputs_add(&in, "twin", &err) == 0 && base_outputs_protect(&out, &in, &err) == 0);
+    assert_int_equal(base_outputs_add(&out, "checkpoint", "soft", &err), 0);
+    says(base_outputs_protect(&out, &in, &err), BASE_EINVAL, &err, "soft: this is an input (twin), it would be overwritten");
+    static const char *const names[] = {"a.csv", "there", NULL};
+    assert_int_equal(base_outputs_protect_folder("place", NULL, &in, &err), 0);
+    says(base_outputs_protect_folder("way", names, &in, &err), BASE_EINVAL, &err, "way/there: this is an input (twin), it would be overwritten");
+    base_inputs_release(&in);
+    struct base_inputs data = BASE_INPUTS_EMPTY; /* a folder of them */
+    assert_int_equal(base_inputs_add(&data, "place", &err), 0);
+    says(base_outputs_protect(&out, &data, &err), BASE_EINVAL, &err, "way/new: this is inside its data, place");
+    mkdir("place/deep", 0777);
+    static const char *const in_place[] = {"place", "way/", "place/deep", "way/deep//", "place/none", "place/none/", "./place/deep/more"};
+    for (size_t i = 0; i < sizeof in_place / sizeof in_place[0]; i++)
+        if (base_outputs_protect_folder(in_place[i], NULL, &data, &err) != BASE_EINVAL && i < 6)
+            fail_msg("%s is in place", in_place[i]);
+    assert_int_equal(base_outputs_protect_folder(".", NULL, &data, &err), 0);
+    assert_int_equal(base_outputs_protect_folder("elsewhere", names, &data, &err), 0);
+    base_inputs_release(&data);
+
+    static const struct base_file_kind kind = {"diary", {'D', 'I', 'A', 'R', 'Y', '-', '-', '1'}};
+    put("diary", "DIARY--1 and more");
+    put("short", "DIARY--");
+    put("nothing", "");
+    assert_true(base_file_check_kind(NULL, &kind, &err) == 0 && base_file_check_kind("none", &kind, &err) == 0);
+    assert_true(base_file_check_kind("diary", &kind, &err) == 0 && base_file_check_kind("nothing", &kind, &err) == 0);
+    says(base_file_check_kind("short", &kind, &err), BASE_EINVAL, &err, "short: this is no diary and would be replaced; choose another name");
+    says(base_file_check_kind("soft", &kind, &err), BASE_EINVAL, &err, "soft: this is no diary and would be replaced; choose another name");
+}
+
 /* --- inputs -------------------------------------------------------------------------------------------------------------- */
 
 static void inputs_are_a_set(void **state)
@@ -463,6 +525,7 @@ int main(void)
         cmocka_unit_test(inputs_are_a_set),      cmocka_unit_test(one_process_holds_a_folder),
         cmocka_unit_test(json),                  cmocka_unit_test(small_floats),
         cmocka_unit_test(pictures),              cmocka_unit_test(what_is_said_of_processes),
+        cmocka_unit_test(one_file_or_two),
     };
     return cmocka_run_group_tests_name("files", tests, setup, teardown);
 }

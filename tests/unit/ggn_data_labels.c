@@ -56,7 +56,7 @@ static void round_trip(void **state)
     struct ggn_label entries[] = {{3, 120.5, 0}, {7, 10000, 1}};
     struct ggn_labels l = {.source = "observer", .detail = "tau \"x\"", .cap = 10000, .spread = 0.3, .n = 2, .labels = entries}, back;
     struct base_err err = {0};
-    assert_int_equal(ggn_labels_write(root, &l, &err), 0);
+    assert_int_equal(ggn_labels_write(root, &l, 0, &err), 0);
     if (ggn_labels_read(root, &back, &err) != 0)
         fail_msg("%s", err.text);
     assert_string_equal(back.source, "observer");
@@ -322,7 +322,7 @@ static void datasets_are_told_word_by_word(void **state)
         static const char *const views[] = {"a-view0", "c", "b-view0"};
         snprintf(path, sizeof path, "%s/%s", root, views[i]);
         snprintf(l.source, sizeof l.source, "%s", i == 1 ? "human" : "observer");
-        assert_int_equal(ggn_labels_write(path, &l, NULL), 0);
+        assert_int_equal(ggn_labels_write(path, &l, 1, NULL), 0);
         tell_dataset(f, "");
         if (i == 0)
             tell_dataset(f, "/c");

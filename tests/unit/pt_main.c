@@ -256,11 +256,18 @@ static void words_on_the_way(void **state)
     (void)state;
     struct pt_session s = {0};
     assert_false(pt_interrupted(NULL));
-    pt_catch_interrupt();
+    base_interrupt_catch();
     raise(SIGTERM);
     assert_true(pt_interrupted(NULL));
-    interrupt_seen = 0;
-    pt_catch_interrupt();
+    base_interrupted = 0;
+    base_interrupt_catch();
+    raise(SIGHUP);
+    assert_true(pt_interrupted(NULL));
+    signal(SIGHUP, SIG_IGN); /* nohup */
+    base_interrupted = 0;
+    base_interrupt_catch();
+    assert_true(raise(SIGHUP) == 0 && raise(SIGPIPE) == 0 && !pt_interrupted(NULL));
+    signal(SIGHUP, SIG_DFL);
     raise(SIGINT);
     assert_true(pt_interrupted(&s));
     signal(SIGINT, SIG_DFL);
@@ -454,15 +461,15 @@ static void between_two_slices(void **state)
     struct base_err err = {0};
     struct pt_session s = {.render = &render, .cli = {.checkpoint = "/missing/c", .checkpoint_every_s = 1000}};
     double before_s = base_clock_wall_s();
-    interrupt_seen = 0;
+    base_interrupted = 0;
     listen_to(stderr);
     s.checkpoint_at_s = before_s + 1e6;
     pt_action_after_slice(&s, &render, &err); /* too early */
     s.checkpoint_at_s = before_s;
-    interrupt_seen = 1;
+    base_interrupted = 1;
     pt_action_after_slice(&s, &render, &err); /* too late */
     assert_true(s.checkpoint_at_s == before_s);
-    interrupt_seen = 0;
+    base_interrupted = 0;
     render.criterion = NULL;
     assert_int_equal(pt_action_after_slice(&s, &render, &err), 0);
     double after_s = base_clock_wall_s();

@@ -1,0 +1,20 @@
+/*
+ * Being asked to end: SIGINT, SIGTERM and SIGHUP (the terminal or the connection is gone). A program that catches them ends
+ * its work where it can, leaves its outputs whole, and exits with status 130.
+ */
+#ifndef BASE_INTERRUPT_H
+#define BASE_INTERRUPT_H
+
+#include <signal.h>
+
+/* Not 0: somebody asked. */
+extern volatile sig_atomic_t base_interrupted;
+
+/* From here on the first signal of a kind asks and a second one kills. Under nohup SIGHUP stays ignored (a shell that
+ * ignores SIGINT for what it runs in the background means its own). SIGPIPE is ignored: whoever read what the program says
+ * may go away without ending it. */
+void base_interrupt_catch(void);
+/* For a process that another one tells when to end: all are ignored. */
+void base_interrupt_ignore(void);
+
+#endif
