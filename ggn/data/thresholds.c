@@ -8,6 +8,7 @@
 #include <cjson/cJSON.h>
 
 #include "base/files.h"
+#include "base/text.h"
 #include "base/unique.h"
 #include "data/image.h"
 
@@ -138,12 +139,19 @@ static int parse_json(const char *path, const char *text, size_t size, struct gg
         last = id->valueint > last ? id->valueint : last;
         columns += cJSON_IsNumber(y0) && y0->valuedouble == 0.0;
     }
-    struct ggn_view *v = last < 0 ? NULL : add_view(&t, cJSON_IsString(scene) ? scene->valuestring : path, last + 1);
+    const char *name = cJSON_IsString(scene) ? scene->valuestring : path, *dot = strrchr(name, '.');
+    char of_file[GGN_VIEW_NAME];
+    if (dot && strcmp(dot, ".pbrt") == 0) { /* as the stop map of that render calls it */
+        base_view_name(name, of_file, sizeof of_file);
+        name = of_file;
+    }
+    struct ggn_view *v = last < 0 ? NULL : add_view(&t, name, last + 1);
     if (!v) {
         rc = last < 0 ? base_fail(err, BASE_EINVAL, "%s: no blocks in it", path) : base_fail_nomem(err, path);
         goto out;
     }
     v->columns = columns;
+    v->unnamed = !cJSON_IsString(scene);
     cJSON_ArrayForEach(block, blocks) {
         const cJSON *id = cJSON_GetObjectItemCaseSensitive(block, "id");
         const cJSON *spp = cJSON_GetObjectItemCaseSensitive(block, "threshold");
@@ -183,6 +191,7 @@ static int read_exr(const char *path, int block, struct ggn_thresholds *out, str
         goto out;
     }
     v->columns = (int)columns;
+    v->unnamed = 1;
     for (int y = 0; y < image.height; y++)
         for (int x = 0; x < image.width; x++) {
             double *s = &v->spp[y / block * columns + x / block];

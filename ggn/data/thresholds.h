@@ -1,8 +1,8 @@
 /*
  * Thresholds (or stops) per block of one or more views, from any file that says them.
  *
- * CSV `name;t0;…;tN;` (one view per line) · a render's report JSON (`blocks[].spp`) · labels.json · an EXR with
- * `lull.spp.V`.
+ * CSV `name;t0;…;tN;` (one view per line) · a render's report JSON (`blocks[].spp`, called like the scene's file) ·
+ * labels.json · an EXR with `lull.spp.V`.
  */
 #ifndef GGN_DATA_THRESHOLDS_H
 #define GGN_DATA_THRESHOLDS_H
@@ -13,6 +13,7 @@ enum { GGN_VIEW_NAME = 128, GGN_VIEW_BLOCKS = 65536 };
 
 struct ggn_view {
     char name[GGN_VIEW_NAME];
+    int unnamed; /* the file does not say what its view is called: name is that of the file */
     int columns; /* blocks per row; 0 if the file does not say (then a square grid is assumed for pictures) */
     int n;
     double *spp; /* owns; [n], row-major, each > 0; NaN where the file has no value for the block */

@@ -24,7 +24,7 @@ static const struct ggn_view *partner(const struct ggn_thresholds *truth, int i,
         return strcmp(t->name, view) == 0 ? &model->views[0] : NULL;
     if (view && strcmp(t->name, view) != 0)
         return NULL;
-    if (truth->n == 1 && model->n == 1)
+    if (truth->n == 1 && model->n == 1 && (t->unnamed || model->views[0].unnamed))
         return &model->views[0];
     return ggn_thresholds_find(model, t->name);
 }

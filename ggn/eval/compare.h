@@ -21,8 +21,8 @@ struct ggn_pairing {
     double *truth, *model;  /* own; [n] */
 };
 
-/* Pairs views of equal name; when the model has a single view, `view` (may be NULL) names its partner, and two single views
- * are partners whatever they are called. Borrows from both until released. */
+/* Pairs views of equal name; when the model has a single view, `view` (may be NULL) names its partner, and of two single
+ * views one that its file does not name is the other's. Borrows from both until released. */
 int ggn_pairing_init(struct ggn_pairing *p, const struct ggn_thresholds *truth, const struct ggn_thresholds *model,
                      const char *view, struct base_err *err);
 void ggn_pairing_release(struct ggn_pairing *p);

@@ -35,6 +35,16 @@ oiiotool --pattern constant:color=300 8x4 1 --chnames lull.spp.V -d float -o "$t
     printf 'map.exr;100;600;\n' >"$tmp/e.csv" && $ggn compare "$tmp/e.csv" "$tmp/map.exr" -b 4 --json >"$tmp/out" 2>"$tmp/err" &&
     grep -q '"blocks": 2,' "$tmp/out" && grep -q '"samples_ratio": 0.857143' "$tmp/out"
 check "EXR stop map" $?
+printf 'room;100;600;\n' >"$tmp/room.csv"
+$ggn compare "$tmp/room.csv" "$tmp/map.exr" -b 4 >"$tmp/out" 2>"$tmp/err" && grep -qx "'room' against 'map.exr'" "$tmp/out"
+check "an EXR has no name: it goes with a single view" $?
+printf 'hall;100;600;\n' >"$tmp/hall.csv"
+fails "two single rows of different names" "no view has the same name on both sides (--view NAME names the partner" $ggn compare "$tmp/room.csv" "$tmp/hall.csv"
+$ggn compare "$tmp/room.csv" "$tmp/hall.csv" --view room >"$tmp/out" 2>"$tmp/err" && grep -qx "'room' against 'hall'" "$tmp/out"
+check "  …unless they are said to be a pair" $?
+printf '{"scene": "scenes/room.pbrt", "blocks": [{"id": 0, "y0": 0, "spp": 50}, {"id": 1, "y0": 0, "spp": 60}]}' >"$tmp/named.json"
+$ggn compare "$tmp/room.csv" "$tmp/named.json" >"$tmp/out" 2>"$tmp/err" && grep -qx "1 view in common" "$tmp/out"
+check "a report is called like its scene's file" $?
 fails "missing file" 'No such file' $ggn compare "$tmp/none.csv" "$tmp/m.csv"
 fails "no common view" 'same name' $ggn compare "$tmp/t.csv" "$tmp/e.csv" --cap 10
 fails "unknown view" "no view called 'zz'" $ggn compare "$tmp/t.csv" "$tmp/m.csv" --view zz

@@ -25,7 +25,7 @@ for name in 'a;b#c' '#1' '.x' "$latin"; do
     cp "$root/tests/cli/room.pbrt" "$name.pbrt"
     t "a scene called $(printf %s "$name" | tr -cd '[:print:]')" "$P" "$name.pbrt" $small --stop-map s.csv --report r.json
     t "  …its stop map can be compared" "$G" compare s.csv s.csv
-    t "  …with its report" "$G" compare s.csv r.json
+    t "  …with its report" "$G" compare s.csv r.json --view "$(cut -d";" -f1 s.csv)"
     t "  …which is UTF-8" python3 -c "import json; json.load(open('r.json', encoding='utf-8'))"
 done
 t "a recorded one" "$P" "$latin.pbrt" -q --size 20x20 --block 20 --levels linear:4:8:4 --sequence seq
