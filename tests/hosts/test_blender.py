@@ -1,12 +1,16 @@
 """Blender's Cycles as a host; run inside Blender or by a Python with the module bpy. BUILD names the build folder."""
+import contextlib
+import io
 import json
 import os
 import runpy
+import shutil
 import signal
 import subprocess
 import sys
 import tempfile
 import threading
+import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -17,10 +21,10 @@ import numpy as np  # noqa: E402
 
 import lull  # noqa: E402
 import tap  # noqa: E402
-from lull import Rect, exr, png  # noqa: E402
+from lull import Rect, checkpoint, exr, png  # noqa: E402
 from lull.blender import cli, view  # noqa: E402
 from lull.blender.cycles import Cycles, HostError  # noqa: E402
-from lull.blender.session import Session, Settings  # noqa: E402
+from lull.blender.session import Session, Settings, scene_output  # noqa: E402
 from tap import Skip, raises  # noqa: E402
 
 os.environ["LULL_PLUGIN_PATH"] = str(ROOT / os.environ.get("BUILD", "build") / "lib" / "lull")
@@ -55,12 +59,248 @@ def one_render(scene, spp, spp_max=4096):
 
 def command(*arguments, **named):
     """Runs the command line in this process: its status and its error text."""
-    import contextlib
-    import io
     error = io.StringIO()
     with contextlib.redirect_stderr(error):
         status = cli.main(list(arguments))
     return status, error.getvalue()
+
+
+class FolderGone:
+    """A folder that goes away with the first wave."""
+
+    def __init__(self, folder):
+        self.folder = folder
+
+    def __enter__(self):
+        self.render = Cycles.render
+        Cycles.render = lambda host, *arguments: (shutil.rmtree(self.folder, True), self.render(host, *arguments))[1]
+
+    def __exit__(self, *_):
+        Cycles.render = self.render
+
+
+class NothingRendered:
+    """Any wave is an error."""
+
+    def __enter__(self):
+        self.render, Cycles.render = Cycles.render, None
+
+    def __exit__(self, *_):
+        Cycles.render = self.render
+
+
+def saved(scene, name):
+    bpy.ops.wm.save_as_mainfile(filepath=tmp(name))
+    return tmp(name)
+
+
+def contents():
+    return {p: p.read_bytes() for p in Path(TMP.name).rglob("*") if p.is_file()}
+
+
+def start(*arguments, **environment):
+    """The package as a program of its own."""
+    return subprocess.Popen([os.environ.get("PYTHON", sys.executable), "-m", "lull.blender", *arguments], text=True,
+                            env={**os.environ, "PYTHONPATH": str(ROOT / "plugin-api/python"), **environment},
+                            stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+
+
+def test_lost_files():
+    """what would cost the user a file is refused before the first wave: inputs, other kinds, one file for two outputs"""
+    scene = cube(24, 24)
+    png.write(tmp("wood.png"), np.full((24, 24, 3), 99, np.uint8))
+    bpy.data.images.load(tmp("wood.png")).use_fake_user = True
+    png.write(tmp("painted.png"), np.full((24, 24, 3), 99, np.uint8))
+    blend = saved(scene, "keep.blend")
+    for name, target in (("link.exr", "keep.blend"), ("way", "."), ("far.png", "new.png")):
+        os.symlink(target, tmp(name))
+    Path(tmp("text.npz")).write_text("a letter")
+    before = contents()
+    for arguments, wanted in ((["-o", blend], "ends in .exr"), (["--checkpoint", blend], "this is an input"),
+                              (["--checkpoint", tmp("way/keep.blend")], "this is an input"),
+                              (["-o", tmp("link.exr")], "this is an input"),
+                              (["--mask", tmp("painted.png"), "--preview", tmp("painted.png")], "this is an input"),
+                              (["--preview", tmp("wood.png")], "this is an input"),
+                              (["-o", tmp("a.jpg"), "--report", tmp("a.jpg")], "ends in .exr"),
+                              (["--preview", tmp("a.png"), "--stop-map", tmp("a.png")], "one of the two would be lost"),
+                              (["--preview", tmp("a.png"), "--stop-map", tmp("way/a.png")], "one of the two would be lost"),
+                              (["--preview", tmp("new.png"), "--stop-map", tmp("far.png")], "one of the two would be lost"),
+                              (["-o", tmp("a.exr"), "--checkpoint", tmp("./a.exr")], "one of the two would be lost"),
+                              (["-o", tmp("nowhere/a.exr")], "cannot write there: No such file"),
+                              (["--frames", "1-2", "--report", tmp("nowhere/a.json")], "cannot write there: No such file"),
+                              (["--checkpoint", tmp("text.npz")], "this is no checkpoint and would be replaced")):
+        with NothingRendered():
+            status, text = command(blend, "-c", "fixed", "-q", *arguments)
+        assert status == 2 and wanted in text and text.count("\n") == 1, (arguments, status, text)
+        assert contents() == before, arguments
+
+
+def test_outputs_apart():
+    """an output that cannot be written after all keeps no other from being written, and is kept elsewhere itself"""
+    blend = saved(cube(24, 24), "apart.blend")
+    os.mkdir(tmp("gone"))
+    os.mkdir(tmp("spare"))
+    tempfile.tempdir = tmp("spare")
+    try:
+        with FolderGone(tmp("gone")):
+            status, text = command(blend, "-c", "fixed", "-q", "-o", tmp("gone/a.exr"), "--preview", tmp("apart.png"),
+                                   "--report", tmp("apart.json"))
+    finally:
+        tempfile.tempdir = None
+    kept = tmp(f"spare/lull-{os.getpid()}-a.exr")
+    assert status == 2 and f"kept as {kept}" in text and exr.read_layers(kept)[0]["R"].shape == (24, 24), text
+    assert os.path.getsize(tmp("apart.png")) > 50 and json.loads(Path(tmp("apart.json")).read_text())["blocks"]
+
+
+def in_memory():
+    """What lies in memory file systems."""
+    with open("/proc/mounts") as mounts:
+        folders = {line.split()[1] for line in mounts if line.split()[2] in ("tmpfs", "ramfs")} | {"/dev/shm"}
+    return {os.path.join(folder, name) for folder in folders if os.access(folder, os.R_OK) for name in os.listdir(folder)
+            if name.startswith(("lull", "wave", "blender"))}
+
+
+def test_signals():
+    """TERM, INT and HUP keep picture and checkpoint, status 130; kill -9 keeps the last checkpoint; nothing stays in memory"""
+    blend = saved(cube(48, 24), "signals.blend")
+    before = in_memory()
+    common = (blend, "-c", "null", "--block", "24", "-q", "--checkpoint-every", "0")
+    whole = start(*common, "--spp-max", "1600", "-o", tmp("whole.exr"))
+    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGKILL):
+        os.mkdir(tmp(f"tmp-{number}"))
+        state, picture = tmp(f"{number}.npz"), tmp(f"{number}.exr")
+        limit = "1600" if number == signal.SIGKILL else "10000000"
+        run = start(*common, "--spp-max", limit, "-o", picture, "--checkpoint", state, TMPDIR=tmp(f"tmp-{number}"))
+        while run.poll() is None and not os.path.exists(state):
+            time.sleep(.01)
+        run.send_signal(number)
+        _, text = run.communicate()
+        assert run.returncode == (-number if number == signal.SIGKILL else 130) and not text, (number, run.returncode, text)
+        assert checkpoint.is_one(state) and os.path.exists(picture) == (number != signal.SIGKILL), number
+        left = [p for p in Path(tmp(f"tmp-{number}")).rglob("*") if p.is_file() or number != signal.SIGKILL]
+        assert not left and in_memory() <= before, (number, left, in_memory() - before)
+    assert whole.wait() == 0
+    assert start(*common, "--spp-max", "1600", "-o", picture, "--checkpoint", state, "--resume").wait() == 0
+    assert Path(picture).read_bytes() == Path(tmp("whole.exr")).read_bytes()
+
+
+def test_identity():
+    """a checkpoint of another file, frame, camera, view or pattern is refused by name, and the pictures are not averaged"""
+    def changed(change, name="other.blend"):
+        scene = cube(24, 24)
+        change(scene)
+        return saved(scene, name)
+
+    blend, state = changed(lambda s: None, "mine.blend"), tmp("mine.npz")
+    common = ("-c", "null", "--spp-max", "32", "-q", "-o", tmp("id.exr"), "--checkpoint", state)
+    assert command(blend, *common) == (0, "")
+    kept = Path(state).read_bytes()
+
+    def refused(wanted, path, *more):
+        with NothingRendered():
+            status, text = command(path, *common, "--resume", "--spp-max", "64", *more)
+        assert status == 2 and f"its {wanted} is " in text and text.count("\n") == 1, (wanted, text)
+        assert Path(state).read_bytes() == kept
+
+    refused("files", changed(lambda s: setattr(bpy.data.objects["Light"].data, "energy", 1.)))
+    for wanted, owner, name, value in (("view", "view_settings", "exposure", 1.), ("view", "view_settings", "look", "None"),
+                                       ("seed", "cycles", "seed", 7)):
+        scene = cube(24, 24)
+        setattr(getattr(scene, owner), name, value)
+        bpy.ops.wm.save_as_mainfile(filepath=blend)  # under the same name
+        refused("files", blend)
+    bpy.ops.wm.open_mainfile(filepath=changed(lambda s: None, "mine.blend"))
+
+
+def test_identity_of_scene():
+    """what the samples depend on is told apart without the file's help too"""
+    def identity():
+        with Session(bpy.context.scene, Settings("null", spp_max=16, checkpoint=tmp("x.npz"))) as session:
+            return session.driver.identity
+
+    scene = cube(24, 24)
+    before = identity()
+    bpy.data.objects["Camera"].location.x += .01
+    bpy.context.view_layer.update()
+    scene.view_settings.gamma, scene.cycles.seed = 1.25, 3
+    scene.frame_current += 0
+    after = identity()
+    assert {n for n in before if before[n] != after[n]} >= {"camera", "view", "seed"}, after
+    scene.frame_set(2)
+    assert identity()["frame"] == "2" and {"files", "scene", "device", "renderer", "pattern", "view-layer"} <= after.keys()
+
+
+def test_scene_defaults():
+    """Max Samples, Time Limit and the output path are the scene's unless the command line says otherwise"""
+    scene = cube(24, 24)
+    scene.cycles.samples, scene.cycles.time_limit = 48, 100
+    assert scene_output(scene) == ""
+    with Session(scene, Settings("null")) as session:
+        assert (session.frame.spp_max, session.frame.time_budget_s) == (48, 100)
+    with Session(scene, Settings("null", spp_max=9, spp_min=1, time_budget_s=0)) as session:
+        assert (session.frame.spp_max, session.frame.time_budget_s) == (9, 0)
+    scene.render.filepath = "//shots/cube_"
+    blend = saved(scene, "defaults.blend")
+    assert command(blend, "-c", "null", "-q") == (0, "")
+    assert (exr.read_layers(tmp("shots/cube_0001.exr"))[0]["lull.spp.V"] == 48).all()
+    status, text = command(blend, "-c", "null", "-q", "--frames", "2-2", "--spp-max", "16")
+    assert status == 0 and (exr.read_layers(tmp("shots/cube_0002.exr"))[0]["lull.spp.V"] == 16).all(), text
+    Path(tmp("shots/cube_0001.exr")).write_text("another program's")
+    status, text = command(blend, "-c", "null", "-q")
+    assert status == 2 and "another program's image would be replaced" in text, text
+
+
+def test_engine():
+    """a scene that another engine renders is refused"""
+    scene = cube(24, 24)
+    scene.render.engine = "BLENDER_WORKBENCH"
+    raises(HostError, "Workbench, not with Cycles", Cycles, scene, 4)
+    eevee = "BLENDER_EEVEE_NEXT" if (4, 2) <= bpy.app.version < (5, 0) else "BLENDER_EEVEE"
+    scene.render.engine = eevee
+    blend = saved(scene, "eevee.blend")
+    with NothingRendered():
+        status, text = command(blend, "-c", "null", "-q", "-o", tmp("eevee.exr"))
+    assert status == 2 and "not with Cycles" in text and not os.path.exists(tmp("eevee.exr")), text
+
+
+def test_pattern():
+    """the user's sampling pattern is kept where waves of it add up to one render; else it is switched, and told"""
+    scene, kept = cube(24, 16), 0
+    names = ("SOBOL", "PROGRESSIVE_MULTI_JITTER", "SOBOL_BURLEY", "TABULATED_SOBOL", "BLUE_NOISE", "AUTOMATIC")
+    for name in names:
+        try:
+            scene.cycles.sampling_pattern = name
+        except TypeError:
+            continue  # another version's
+        with Cycles(scene, 600) as host:
+            own = host.pattern == name
+            rect = [Rect(0, 0, 24, 16)]
+            waves = [(0, 16), (16, 16), (32, 480), (512, 88)]
+            mean = sum(n * next(iter(host.render(rect, first, n, False))).astype(float) for first, n in waves) / 600
+            whole = next(iter(host.render(rect, 0, 600, False)))
+        assert scene.cycles.sampling_pattern == name and own == (not host.notes), (name, host.notes)
+        assert abs(mean - whole).max() < SAME * 10, (name, abs(mean - whole).max())
+        assert own or "sampling pattern is Sobol-Burley instead of the scene's" in host.notes[0]
+        kept += own
+    assert kept > 0
+
+
+def test_quote():
+    """the dial's cost is told at the first check and by --quote, coarser ones too; a render goes on from the quote"""
+    blend = saved(cube(48, 32), "quote.blend")
+    common = (blend, "--block", "16", "--spp-max", "256", "--visible", ".2")
+    output = io.StringIO()
+    with contextlib.redirect_stdout(output):
+        assert command(*common, "-q", "--quote", "--checkpoint", tmp("quote.npz")) == (0, "")
+    table = output.getvalue().splitlines()
+    assert "spp min / mean / max" in table[0] and [float(r.split()[0]) for r in table[1:]] == [.9, .5, .25, .2, .05], table
+    assert "chosen" in table[4] and not os.path.exists("quote.exr")
+    means = [float(r.split("/")[1].replace(",", "")) for r in table[1:]]
+    assert means == sorted(means) and means[0] < means[-1], table
+    assert command(*common, "-q", "--checkpoint", tmp("quote.npz"), "--resume", "-o", tmp("after.exr")) == (0, "")
+    status, text = command(*common, "-o", tmp("plain.exr"))
+    assert status == 0 and "visible 0.2 takes about" in text and "visible 0.9 would take" in text, text
+    assert Path(tmp("after.exr")).read_bytes() == Path(tmp("plain.exr")).read_bytes()
 
 
 def test_same_picture():
@@ -213,8 +453,10 @@ def test_resume():
     assert command(*common, "--spp-max", "64", "-o", tmp("on.exr"), *state, "--resume") == (0, "")
     whole, part, on = (Path(tmp(n + ".exr")).read_bytes() for n in ("whole", "part", "on"))
     assert whole == on != part
-    status, text = command(*common, "--spp-max", "64", "-o", tmp("lost.exr"), "--checkpoint", tmp("no-folder/run.npz"))
-    assert status == 2 and "no-folder" in text and os.path.exists(tmp("lost.exr"))  # the picture is kept all the same
+    os.mkdir(tmp("folder"))
+    with FolderGone(tmp("folder")):
+        status, text = command(*common, "--spp-max", "64", "-o", tmp("lost.exr"), "--checkpoint", tmp("folder/run.npz"))
+    assert status == 2 and "folder/run.npz" in text and os.path.exists(tmp("lost.exr"))  # the picture is kept all the same
     status, text = command(*common, "--resume")
     assert status == 2 and "--checkpoint" in text
 
@@ -289,7 +531,7 @@ def test_no_cycles():
 
 
 def test_interrupt():
-    """Ctrl-C keeps what is there, status 1"""
+    """Ctrl-C keeps what is there, status 130"""
     cube(200, 160)
     bpy.ops.wm.save_as_mainfile(filepath=tmp("cube.blend"))
     timer = threading.Timer(1.5, lambda: os.kill(os.getpid(), signal.SIGINT))
@@ -298,7 +540,7 @@ def test_interrupt():
                         tmp("i.json"), "-q")
     timer.cancel()
     report = json.loads(Path(tmp("i.json")).read_text())
-    assert status == 1 and report["interrupted"] and {b["reason"] for b in report["blocks"]} == {"interrupt"}
+    assert status == 130 and report["interrupted"] and {b["reason"] for b in report["blocks"]} == {"interrupt"}
     assert 0 < report["blocks"][0]["spp"] < 100000 and os.path.getsize(tmp("i.exr")) > 1000
 
 
@@ -308,8 +550,8 @@ def test_failing_render():
     with Session(scene, Settings("null", spp_max=256, block=24, output=tmp("k.exr"))) as session:
         session.driver.after_call = lambda d: setattr(scene, "camera", None)
         result = session.driver.run()
-        written = session.write(result)
-    assert result.outcome == "failed" and "camera" in str(result.exception) and written == [tmp("k.exr")]
+        written, failed = session.write(result)
+    assert result.outcome == "failed" and "camera" in str(result.exception) and written == [tmp("k.exr")] and not failed
     assert session.frame.blocks[0].spp == 16 and session.frame.mean().max() > 0
 
 
@@ -330,6 +572,11 @@ def test_view():
     assert (np.diff(values) > 0).all() and values[0] < .001 and values[3] < .9 and values[5] > .9, values
 
 
+def brightest(name):
+    image = bpy.data.images.get(name)
+    return max(image.pixels[:][::4], default=0) if image else 0
+
+
 def test_addon():
     """the package is an add-on: it installs from a zip, its operator renders, its panel is there"""
     if not bpy.app.background or not hasattr(bpy.ops.preferences, "addon_install"):
@@ -339,22 +586,32 @@ def test_addon():
     lull.register()
     try:
         scene.lull.criterion, scene.lull.block, scene.lull.folder = "halfbuf", 24, TMP.name
-        scene.lull.parameters, scene.lull.spp_max = "threshold=.02", 64
-        assert bpy.ops.lull.render() == {"FINISHED"} and "blocks converged" in scene.lull.state
+        scene.lull.parameters, scene.cycles.samples = "threshold=.02", 64
+        seen, render = [], Cycles.render
+        Cycles.render = lambda *arguments: (seen.append(brightest("Lull")), render(*arguments))[1]
+        try:
+            assert bpy.ops.lull.render() == {"FINISHED"} and "blocks converged" in scene.lull.state
+        finally:
+            Cycles.render = render
+        assert seen[0] == 0 and seen[-1] > .1 and brightest("Lull Stop Map") > 0, seen  # there while it renders
         assert "Lull Stop Map" in bpy.data.images and os.path.getsize(tmp("lull.exr")) > 1000
         scene.frame_start, scene.frame_end, scene.lull.folder = 1, 2, tmp("frames")
         os.mkdir(tmp("frames"))
         assert bpy.ops.lull.render(animation=True) == {"FINISHED"}
-        assert {"lull_0001.exr", "lull_0002.exr", "lull-report_0002.json"} <= set(os.listdir(tmp("frames")))
+        assert {"lull_0001.exr", "lull_0002.exr", "lull_0002-report.json"} <= set(os.listdir(tmp("frames")))
         scene.lull.criterion, scene.lull.visible, scene.lull.parameters = "observer", .5, "growth=2"
-        assert scene.lull.chosen("").parameters == {"visible": "0.5", "growth": "2"}
+        assert scene.lull.chosen(scene).parameters == {"visible": "0.5", "growth": "2"}
         scene.lull.parameters = "visible=.1"
-        assert scene.lull.chosen("").parameters == {"visible": ".1"}
-        scene.lull.parameters = "threshold"
-        try:
-            raise AssertionError(bpy.ops.lull.render())
-        except RuntimeError as error:
-            assert "expected KEY=VALUE" in str(error)
+        assert scene.lull.chosen(scene).parameters == {"visible": ".1"}
+        for name, value, wanted in (("parameters", "threshold", "expected KEY=VALUE"), ("parameters", "", "No such file"),
+                                    ("mask", tmp("lull.exr"), "this is an input")):
+            setattr(scene.lull, name, value)
+            scene.lull.folder = TMP.name if name == "mask" else tmp("mistyped") if not value else scene.lull.folder
+            try:
+                with NothingRendered():
+                    raise AssertionError(bpy.ops.lull.render())
+            except RuntimeError as error:
+                assert wanted in str(error), error
     finally:
         lull.unregister()
     code = ("import bpy; bpy.ops.preferences.addon_install(filepath=%r); bpy.ops.preferences.addon_enable(module='lull'); "

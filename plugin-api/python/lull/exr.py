@@ -61,13 +61,21 @@ def write(path: str, channels: Mapping[str, np.ndarray], size: tuple[int, int], 
 
 def read(path: str, wanted: Sequence[str] = ("R", "G", "B")) -> tuple[np.ndarray, tuple[int, int]]:
     """The wanted channels [h, w, len(wanted)] float32 of an uncompressed file, and its data window's origin (x, y)."""
+    channels, origin, _ = read_layers(path)
+    if missing := [name for name in wanted if name not in channels]:
+        raise ValueError(f"{path}: not a picture with the channels {', '.join(wanted)}: there is no {missing[0]}")
+    return np.stack([channels[name] for name in wanted], -1), origin
+
+
+def read_layers(path: str) -> tuple[dict[str, np.ndarray], tuple[int, int], dict[str, bytes]]:
+    """All channels by name, [h, w] float32, of a file that is uncompressed or that write() made; its data window's origin
+    (x, y); its header."""
     with open(path, "rb") as file:
         data = file.read()
     try:
-        return _decode(data, wanted)
-    except (ValueError, struct.error, KeyError, IndexError) as error:
-        what = f"an uncompressed scan-line EXR with the channels {', '.join(wanted)}"
-        raise ValueError(f"{path}: not {what}: {error}") from None
+        return _decode(data)
+    except (ValueError, struct.error, KeyError, IndexError, zlib.error) as error:
+        raise ValueError(f"{path}: not an uncompressed or ZIP-compressed scan-line EXR: {error}") from None
 
 
 def _header(data: bytes) -> tuple[dict[str, bytes], int]:
@@ -83,10 +91,25 @@ def _header(data: bytes) -> tuple[dict[str, bytes], int]:
     return attributes, at + 1
 
 
-def _decode(data: bytes, wanted: Sequence[str]) -> tuple[np.ndarray, tuple[int, int]]:
+def _unzip(data: bytes, size: int) -> bytes:
+    """What _zip made of `size` bytes."""
+    if len(data) == size:
+        return data
+    raw = np.frombuffer(zlib.decompress(data), np.uint8)
+    if len(raw) != size:
+        raise ValueError("a chunk of another size")
+    steps = raw.astype(np.int64)
+    steps[1:] -= 128
+    split = np.cumsum(steps).astype(np.uint8)
+    out = np.empty(size, np.uint8)
+    out[::2], out[1::2] = split[:(size + 1) // 2], split[(size + 1) // 2:]
+    return out.tobytes()
+
+
+def _decode(data: bytes) -> tuple[dict[str, np.ndarray], tuple[int, int], dict[str, bytes]]:
     head, at = _header(data)
-    if head["compression"] != b"\0":
-        raise ValueError("it is compressed")
+    if head["compression"] not in (b"\0", b"\2", b"\3"):
+        raise ValueError("its compression is another one")
     x0, y0, x1, y1 = struct.unpack("<4i", head["dataWindow"])
     width, height = x1 - x0 + 1, y1 - y0 + 1
     listed, places, column = head["channels"], {}, 0
@@ -97,12 +120,17 @@ def _decode(data: bytes, wanted: Sequence[str]) -> tuple[np.ndarray, tuple[int, 
         places[channel.decode()] = (column, "<f2" if kind == _HALF else "<f4" if kind == _FLOAT else "<u4")
         column += bytes_each * width
         listed = rest[16:]
-    # without compression every line has the same size: y, bytes, then the channels one after the other
-    lines = np.frombuffer(data, np.uint8, height * (8 + column), at + 8 * height).reshape(height, 8 + column)
-    order = np.ascontiguousarray(lines[:, :4]).view("<i4")[:, 0] - y0
-    out = np.empty((height, width, len(wanted)), np.float32)
-    for k, name in enumerate(wanted):
-        start, stored = places[name]
-        end = start + width * np.dtype(stored).itemsize
-        out[order, :, k] = np.ascontiguousarray(lines[:, 8 + start:8 + end]).view(stored)
-    return out, (x0, y0)
+    lines = {b"\0": 1, b"\2": 1, b"\3": _LINES}[head["compression"]]
+    chunks = -(-height // lines)
+    rows = np.zeros((height, column), np.uint8)
+    at += 8 * chunks
+    for _ in range(chunks):  # each: y, bytes, then for each line the channels one after the other
+        y, size = struct.unpack_from("<iI", data, at)
+        y -= y0
+        count = min(lines, height - y)
+        if y < 0 or count < 1 or at + 8 + size > len(data):
+            raise ValueError("a chunk lies outside")
+        rows[y:y + count] = np.frombuffer(_unzip(data[at + 8:at + 8 + size], count * column), np.uint8).reshape(count, column)
+        at += 8 + size
+    return {name: np.ascontiguousarray(rows[:, start:start + width * np.dtype(stored).itemsize]).view(stored).astype(np.float32)
+            for name, (start, stored) in places.items()}, (x0, y0), head

@@ -14,6 +14,7 @@ from . import exr, png, srgb
 from .blocks import REASONS
 from .driver import Driver
 from .files import replaced
+from .frame import Frame
 
 
 def write_exr(path: str, driver: Driver, scene: str = "", software: str = "lull for Python 1.0") -> None:
@@ -36,11 +37,25 @@ def write_exr(path: str, driver: Driver, scene: str = "", software: str = "lull 
         "lull:samples": float(driver.totals.samples), "software": software})
 
 
-def write_preview(path: str, driver: Driver) -> None:
-    """PNG: the display mapping of the frame if it has one, then the sRGB transfer."""
-    frame = driver.frame
+def is_ours(path: str) -> bool:
+    """Is this a picture of Lull's, or none at all? What is another program's must not be replaced unless somebody says so."""
+    try:
+        with open(path, "rb") as file:
+            begin = file.read(4096)
+    except OSError:
+        return True
+    return not begin or b"lull.spp" in begin
+
+
+def shown(frame: Frame) -> np.ndarray:
+    """[h, w, 3] uint8, cut to the crop: the display mapping of the frame if it has one, then the sRGB transfer."""
     mean = frame.cropped(frame.mean())
-    png.write(path, srgb.codes(frame.display(mean) if frame.display else mean))
+    return srgb.codes(frame.display(mean) if frame.display else mean)
+
+
+def write_preview(path: str, driver: Driver) -> None:
+    """PNG, as the frame is shown."""
+    png.write(path, shown(driver.frame))
 
 
 def _number(value: float) -> Optional[float]:

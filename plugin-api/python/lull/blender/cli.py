@@ -8,23 +8,31 @@ import os
 import shutil
 import sys
 from pathlib import Path
-from typing import Optional, Sequence
+from typing import NoReturn, Optional, Sequence
 
+from ..stopping import EXIT_STATUS, Stopping
 
 # As Blender names them
 DEVICES = ("CPU", "CUDA", "OPTIX", "HIP", "ONEAPI", "METAL")
 
 
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        print(f"lull: {message} (--help says more)", file=sys.stderr)
+        sys.exit(2)
+
+
 def parser() -> argparse.ArgumentParser:
-    p = argparse.ArgumentParser("python3 -m lull.blender", description="Render a Blender scene with Cycles, block by "
+    p = _Parser("python3 -m lull.blender", description="Render a Blender scene with Cycles, block by "
                                 "block, each until its noise can no longer be seen.")
     p.add_argument("file", nargs="?", help="the .blend file (inside Blender: default the open one)")
     p.add_argument("-c", "--criterion", default="observer", help="name or PATH[:ID] of a criterion (default observer)")
     p.add_argument("-p", "--param", action="append", default=[], metavar="KEY=VALUE", help="parameter of the criterion")
     p.add_argument("--visible", metavar="SHARE", help="stop when at most this share of viewers would still see noise")
     p.add_argument("--spp-min", type=int, default=16, metavar="N", help="samples before the first check (default 16)")
-    p.add_argument("--spp-max", type=int, default=4096, metavar="N", help="most samples of a block (default 4096)")
-    p.add_argument("--time-budget", type=float, default=0, metavar="SECONDS", help="per frame; 0 = no limit (default)")
+    p.add_argument("--spp-max", type=int, metavar="N", help="most samples of a block (default: the scene's Max Samples)")
+    p.add_argument("--time-budget", type=float, metavar="SECONDS", help="per frame; 0 = no limit (default: the scene's Time "
+                   "Limit)")
     p.add_argument("--block", type=int, metavar="N", help="block size in pixels (default: the criterion's own, else 200, "
                    "less where that would be fewer than 12 blocks)")
     p.add_argument("--mask", default="", metavar="FILE.png", help="lighter regions are rendered better")
@@ -32,14 +40,19 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--device", choices=DEVICES, help="what Cycles renders on (default: what the scene says)")
     p.add_argument("--scene", metavar="NAME", help="which scene of the file (default: the active one)")
     p.add_argument("-o", "--output", default="", metavar="FILE.exr", help="picture with layers for samples and noise "
-                   "(default: the .blend's name in the current folder, if nothing else is asked for)")
+                   "(default, if nothing else is asked for: where the scene's output path says, else the .blend's name in the "
+                   "current folder)")
     p.add_argument("--preview", default="", metavar="FILE.png", help="as it is shown (curve per channel)")
     p.add_argument("--stop-map", default="", metavar="FILE.png|FILE.csv", help="samples per block")
     p.add_argument("--report", default="", metavar="FILE.json", help="everything about the run")
-    p.add_argument("--checkpoint", default="", metavar="FILE.npz", help="keep the state there at the end, however it ends")
+    p.add_argument("--checkpoint", default="", metavar="FILE", help="keep the state there now and then, and when the render ends or is "
+                   "interrupted")
+    p.add_argument("--checkpoint-every", type=float, default=60, metavar="SECONDS", help="how often (default 60)")
     p.add_argument("--resume", action="store_true", help="go on from the checkpoint, if it is there; with a higher --spp-max "
                    "a finished picture gets more samples")
-    p.add_argument("-q", "--quiet", action="store_true", help="no progress")
+    p.add_argument("--quote", action="store_true", help="render a pilot of 128 samples or 30 seconds, print what the dial will "
+                   "cost at its own and at other settings, and end; a render can go on from its --checkpoint")
+    p.add_argument("-q", "--quiet", action="store_true", help="no progress and no notes")
     p.add_argument("--blender", default="blender", metavar="PROGRAM", help="which Blender to run (default: on PATH)")
     return p
 
@@ -82,26 +95,26 @@ def _frames(text: Optional[str], scene) -> list[Optional[int]]:
 
 
 def main(argv: Optional[Sequence[str]] = None) -> int:
-    """Inside Blender (options after `--`) or with bpy. Exit status: 0 done, 1 interrupted or failed, 2 bad input."""
+    """Inside Blender (options after `--`) or with bpy. Exit status: 0 done, 1 rendering failed, 2 bad input or an output could
+    not be written, 130 interrupted."""
     from ..library import LullError
     from .cycles import HostError
     if argv is None:
         argv = sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else []
     options = parser().parse_args(argv)
     try:
-        return _render(options)
+        with Stopping() as stopping:
+            return _render(options, stopping)
     except (HostError, LullError, ValueError, OSError, RuntimeError) as error:
         print(f"lull: {error}", file=sys.stderr)
         return 2
 
 
-def _render(options: argparse.Namespace) -> int:
+def _scene(options: argparse.Namespace):
+    """The scene that the options name, opened and set as they say."""
     import bpy
 
-    from ..criterion import load
-    from ..outputs import Progress
     from .cycles import choose_device
-    from .session import Session, Settings, numbered
     if options.file:
         bpy.ops.wm.open_mainfile(filepath=os.path.abspath(options.file))
     if options.scene and options.scene not in bpy.data.scenes:
@@ -110,39 +123,108 @@ def _render(options: argparse.Namespace) -> int:
     if options.device:
         choose_device(options.device)
         scene.cycles.device = "CPU" if options.device == "CPU" else "GPU"
-    if options.resume and not options.checkpoint:
-        raise ValueError("--resume needs --checkpoint FILE.npz")
+    return scene
+
+
+def _settings(options: argparse.Namespace, scene, frame: Optional[int]):
+    """Of one frame."""
+    import bpy
+
+    from .session import Settings, default_output
     bad = [pair for pair in options.param if "=" not in pair]
     if bad:
         raise ValueError(f"--param {bad[0]}: expected KEY=VALUE")
     parameters = dict(pair.split("=", 1) for pair in options.param)
     if options.visible is not None:
         parameters["visible"] = options.visible
-    output = options.output
-    if not (output or options.preview or options.stop_map or options.report):
-        output = Path(options.file or bpy.data.filepath or "untitled").stem + ".exr"
     settings = Settings(options.criterion, parameters, options.spp_min, options.spp_max, options.time_budget, options.block,
-                        mask=options.mask, output=output, preview=options.preview, stop_map=options.stop_map,
-                        report=options.report)
-    with load(settings.criterion, **parameters) as criterion:
-        for frame in _frames(options.frames, scene):
+                        mask=options.mask, output=options.output, preview=options.preview, stop_map=options.stop_map,
+                        report=options.report, checkpoint=options.checkpoint).numbered(frame)
+    if not (options.quote or settings.output or settings.preview or settings.stop_map or settings.report):
+        stem = Path(options.file or bpy.data.filepath or "untitled").stem
+        settings.output = default_output(scene, frame, f"{stem}.exr")
+    return settings
+
+
+def _render(options: argparse.Namespace, stopping: Stopping) -> int:
+    from ..criterion import load
+    from .session import check_files
+    if options.resume and not options.checkpoint:
+        raise ValueError("--resume needs --checkpoint FILE")
+    if not options.checkpoint_every >= 0:
+        raise ValueError(f"--checkpoint-every {options.checkpoint_every}: expected a number from 0")
+    scene = _scene(options)
+    frames = [(frame, _settings(options, scene, frame)) for frame in _frames(options.frames, scene)]
+    status = 0
+    with load(options.criterion, **frames[0][1].parameters) as criterion:
+        check_files([settings for _, settings in frames], criterion)
+        for frame, settings in frames:
             if frame is not None:
                 scene.frame_set(frame)
-            progress = None if options.quiet else Progress()
-            with Session(scene, settings, criterion, progress.show if progress else None) as session:
-                suffix = "" if frame is None else f"_{frame:04}"
-                result = session.run(options.checkpoint and numbered(options.checkpoint, suffix), options.resume)
-                written = session.write(result, suffix)
-            if progress:
-                progress.clear()
-            print("lull:", summary(session), "; ".join(written))
-            if session.unsaved:
-                raise session.unsaved
-            if result.exception:
-                print(f"lull: rendering failed, what was rendered is kept: {result.exception}", file=sys.stderr)
-            if result.outcome in ("interrupt", "failed"):
-                return 1
-    return 0
+            status = max(status, _render_frame(options, scene, settings, criterion, stopping))
+            if status in (1, EXIT_STATUS) or stopping.asked:
+                return EXIT_STATUS if stopping.asked and status in (0, EXIT_STATUS) else status
+    return status
+
+
+def _render_frame(options: argparse.Namespace, scene, settings, criterion, stopping: Stopping) -> int:
+    """The exit status of one frame."""
+    from .. import quote
+    from ..outputs import Progress
+    from .session import Session
+    progress = None if options.quiet else Progress()
+
+    def note(text: str) -> None:
+        if progress:
+            progress.clear()
+            print(f"lull: {text}", file=sys.stderr, flush=True)
+
+    with Session(scene, settings, criterion, progress.show if progress else None) as session:
+        stopping.then = session.driver.interrupt
+        session.begin(options.resume, options.checkpoint_every)
+        if stopping.asked:
+            session.driver.interrupt()
+        for text in session.notes:
+            note(text)
+        told = warned = False
+        while (result := session.step()) is None and not (options.quote and quote.pilot_done(session.driver)):
+            if session.quote and not told and not options.quote:
+                told = True
+                note(session.quote)
+            if session.unsaved and not warned:
+                warned = True
+                note(f"{session.unsaved}; the render goes on")
+        if options.quote:
+            return _tell_quote(session, result, progress)
+        written, failed = session.write(result)
+    if progress:
+        progress.clear()
+    print("lull:", summary(session), "; ".join(written))
+    return _end(session, result, failed)
+
+
+def _tell_quote(session, result, progress) -> int:
+    from .. import quote
+    if progress:
+        progress.clear()
+    if result is not None and result.outcome in ("interrupt", "failed"):
+        return _end(session, result, [])
+    print(quote.table(session.driver), flush=True)
+    if session.settings.checkpoint:
+        session.save()
+    return _end(session, result, [])
+
+
+def _end(session, result, failed: Sequence[str]) -> int:
+    """Says what went wrong; the exit status."""
+    for text in [*failed, *([str(session.unsaved)] if session.unsaved else [])]:
+        print(f"lull: {text}", file=sys.stderr)
+    if result is not None and result.exception:
+        print(f"lull: rendering failed, what was rendered is kept: {result.exception}", file=sys.stderr)
+        return 1
+    if failed or session.unsaved:
+        return 2
+    return EXIT_STATUS if result is not None and result.outcome == "interrupt" else 0
 
 
 def summary(session) -> str:

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Blender's Cycles as a host: rectangles of the current frame at ranges of samples, through the public API only.
 
-Relies on what Cycles does with persistent data, a fixed seed, a Sobol' pattern and a sample offset: samples [first, first +
-count) of a pixel are those that one long render would take, whatever border is rendered, so that waves add up to it. The
-pixels come back through an uncompressed EXR in memory-backed storage, because the Render Result cannot be read in background
-mode. Every setting that is touched is put back on exit.
+Relies on what Cycles does with persistent data, a fixed seed, a pattern that allows it and a sample offset: samples [first,
+first + count) of a pixel are those that one long render would take, whatever border is rendered, so that waves add up to it.
+The pixels come back through an uncompressed EXR, because the Render Result cannot be read in background mode; the file has no
+name and lies in memory, so that it is gone with the process however that ends. Every setting that is touched is put back on
+exit.
 """
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ import os
 import shutil
 import sys
 import tempfile
-from typing import Iterator, Sequence
+from typing import Iterator, Optional, Sequence
 
 import bpy
 import numpy as np
@@ -22,10 +23,9 @@ from .. import exr
 from ..blocks import merge
 from ..criterion import Rect
 
-# Sobol-Burley under its names in 3.x and 4.x; a tabulated pattern depends on the total number of samples, and is usable
-# where Cycles can be told that total apart from the subset to render (4.4 and later).
+# Sobol-Burley under its names in 3.x and 4.x: its waves add up to one render. The others' tables depend on the total number of
+# samples; they are usable where Cycles can be told that total apart from the subset to render (4.4 and later).
 PATTERNS = ("SOBOL", "SOBOL_BURLEY")
-SUBSET_PATTERNS = ("TABULATED_SOBOL",)
 
 
 @contextlib.contextmanager
@@ -45,8 +45,34 @@ def _silence() -> Iterator[None]:
         os.close(kept)
 
 
+class WaveFile:
+    """Where Blender writes a wave and we read it: a file without a name. Elsewhere than on Linux, in a temporary folder."""
+
+    def __init__(self) -> None:
+        self._folder, self._handle = "", -1
+        if hasattr(os, "memfd_create"):
+            self._handle = os.memfd_create("lull-wave")
+            self.path = f"/proc/self/fd/{self._handle}"
+        else:
+            self._folder = tempfile.mkdtemp(prefix="lull-")
+            self.path = os.path.join(self._folder, "wave.exr")
+
+    def close(self) -> None:
+        if self._folder:
+            shutil.rmtree(self._folder, ignore_errors=True)
+        elif self._handle >= 0:
+            os.close(self._handle)
+        self._folder, self._handle = "", -1
+
+
 class HostError(Exception):
     """The scene cannot be rendered; one line for people."""
+
+
+def _label(owner: object, name: str, value: str) -> str:
+    """How the interface calls a value of an enum."""
+    items = owner.bl_rna.properties[name].enum_items  # type: ignore[attr-defined]
+    return items[value].name if value in items else value.replace("_", " ").title()
 
 
 def _gpus():
@@ -72,11 +98,15 @@ def choose_device(name: str) -> None:
 
 
 class Cycles:
-    """Use as a context manager around everything that renders. scene: borrowed; spp_max: the most samples of a pixel."""
+    """Use as a context manager around everything that renders. scene: borrowed; spp_max: the most samples of a pixel.
+    notes: lines for people about what is done otherwise than the scene says."""
 
     def __init__(self, scene: bpy.types.Scene, spp_max: int):
         if not hasattr(scene, "cycles"):
             raise HostError("Cycles is not available: enable the add-on 'Cycles Render Engine' in the preferences")
+        if scene.render.engine != "CYCLES":
+            raise HostError(f"scene '{scene.name}' renders with {_label(scene.render, 'engine', scene.render.engine)}, not with "
+                            "Cycles: choose Cycles as its render engine, or another scene")
         if scene.camera is None:
             raise HostError(f"scene '{scene.name}' has no camera: add one, or set the scene's active camera")
         if scene.cycles.device == "GPU" and not _gpus().has_active_device():
@@ -90,8 +120,20 @@ class Cycles:
         self.width = render.resolution_x * render.resolution_percentage // 100
         self.height = render.resolution_y * render.resolution_percentage // 100
         self.threads = render.threads
+        self.notes: list[str] = []
+        self.layer = next(layer for layer in scene.view_layers if layer.use)
+        if others := [layer.name for layer in scene.view_layers if layer.use and layer != self.layer]:
+            self.notes.append(f"only the view layer '{self.layer.name}' is rendered, not {', '.join(others)}")
+        self.pattern = self._choose_pattern()
         self._touched: list[tuple[object, str, object]] = []
-        self._folder = ""
+        self._wave: Optional[WaveFile] = None
+
+    def device(self) -> str:
+        """What it renders on, by name."""
+        if self.scene.cycles.device == "CPU":
+            return "CPU"
+        gpus = _gpus()
+        return f"{gpus.compute_device_type}: {', '.join(d.name for d in gpus.devices if d.use)}"
 
     def crop(self) -> Rect:
         """The scene's own render region in pixels from the top, or the whole picture."""
@@ -105,23 +147,21 @@ class Cycles:
         return Rect(x0, y0, x1, y1)
 
     def __enter__(self) -> Cycles:
-        memory = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
-        self._folder = tempfile.mkdtemp(prefix="lull-", dir=memory)
         render, cycles = self.scene.render, self.scene.cycles
+        self._wave = WaveFile()
         try:
             self._set(render, engine="CYCLES", use_persistent_data=True, use_border=True, use_crop_to_border=True,
                       use_compositing=False, use_sequencer=False, use_overwrite=True, use_placeholder=False,
-                      use_file_extension=False, filepath=os.path.join(self._folder, "wave.exr"))
+                      use_file_extension=False, filepath=self._wave.path)
             for name in ("border_min_x", "border_min_y", "border_max_x", "border_max_y"):
                 self._set(render, **{name: getattr(render, name)})  # to be put back
             self._set(render.image_settings, media_type="IMAGE", file_format="OPEN_EXR", color_mode="RGB", color_depth="32",
                       exr_codec="NONE", color_management="FOLLOW_SCENE")
             self._set(cycles, use_adaptive_sampling=False, use_denoising=False, use_layer_samples="IGNORE", time_limit=0.0,
                       use_sample_subset=True, sample_offset=0, samples=1, sample_subset_length=1)
-            self._set_pattern()
-            first = next(layer for layer in self.scene.view_layers if layer.use)
-            for layer in self.scene.view_layers:  # only the first one is written to the file
-                self._set(layer, use=layer == first)
+            self._set(cycles, sampling_pattern=self.pattern)
+            for layer in self.scene.view_layers:
+                self._set(layer, use=layer == self.layer)
         except BaseException:
             self.__exit__()
             raise
@@ -134,20 +174,30 @@ class Cycles:
         for name, value in known.items():
             setattr(owner, name, value)
 
-    def _set_pattern(self) -> None:
+    def _choose_pattern(self) -> str:
+        """The scene's own sampling pattern if its waves add up to one render, else one whose waves do."""
         cycles = self.scene.cycles
-        for name in PATTERNS + (SUBSET_PATTERNS if hasattr(cycles, "use_sample_subset") else ()):
+        own = cycles.sampling_pattern
+        if own in PATTERNS or hasattr(cycles, "use_sample_subset"):
+            return own
+        for name in PATTERNS:
             try:
-                return self._set(cycles, sampling_pattern=name)
+                cycles.sampling_pattern = name
             except TypeError:
-                self._touched.pop()  # no such pattern in this version
+                continue  # no such pattern in this version
+            cycles.sampling_pattern = own
+            self.notes.append(f"the sampling pattern is {_label(cycles, 'sampling_pattern', name)} instead of the scene's "
+                              f"{_label(cycles, 'sampling_pattern', own)}, whose waves do not add up to one render")
+            return name
         raise HostError("this Cycles has no pattern whose waves add up to one render: use Blender 3.x, or 4.4 or later")
 
     def __exit__(self, *_) -> None:
         for owner, name, value in self._touched:  # in order: what a file format allows depends on the format
             setattr(owner, name, value)
         self._touched.clear()
-        shutil.rmtree(self._folder, ignore_errors=True)
+        if self._wave:
+            self._wave.close()
+            self._wave = None
 
     # --- rendering -----------------------------------------------------------------------------------------------------
 

@@ -3,27 +3,34 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, field
-from typing import Any, Callable, Optional
+import time
+import zlib
+from dataclasses import dataclass, field, replace
+from typing import Any, Callable, Optional, Sequence
 
 import bpy
+import numpy as np
 
-from .. import checkpoint, outputs, png, stopmap
+from .. import checkpoint, outputs, png, quote, stopmap
 from ..criterion import Criterion, load
 from ..driver import Driver, Result
+from ..files import Output, check_outputs, write_each
 from ..frame import Frame
 from .cycles import Cycles
-from .view import display_of, is_plain
+from .view import display_of, is_plain, view_text
+
+# Blender's own output path, which nobody has chosen
+_UNSET = ("", "/tmp/", "/tmp\\")
 
 
 @dataclass
 class Settings:
-    """What a user chooses. Files are named without a frame number; "" = not written."""
+    """What a user chooses for a frame. Files: "" = not written."""
     criterion: str = "observer"
     parameters: dict[str, str] = field(default_factory=dict)
     spp_min: int = 16
-    spp_max: int = 4096
-    time_budget_s: float = 0.0
+    spp_max: Optional[int] = None  # None: the scene's Max Samples
+    time_budget_s: Optional[float] = None  # None: the scene's Time Limit
     block: Optional[int] = None  # pixels; None: the criterion's own size
     wave: int = 16
     mask: str = ""
@@ -31,18 +38,85 @@ class Settings:
     preview: str = ""
     stop_map: str = ""
     report: str = ""
+    checkpoint: str = ""
+
+    def numbered(self, frame: Optional[int]) -> Settings:
+        """The same with the frame's number before the ending of every file."""
+        if frame is None:
+            return self
+        names = ("output", "preview", "stop_map", "report", "checkpoint")
+        return replace(self, **{name: _numbered(getattr(self, name), f"_{frame:04}") for name in names})
+
+    def outputs(self) -> list[Output]:
+        return [Output("--output", self.output, (".exr",)), Output("--preview", self.preview, (".png",)),
+                Output("--stop-map", self.stop_map, (".png", ".csv")), Output("--report", self.report, (".json",)),
+                Output("--checkpoint", self.checkpoint)]
 
 
-def numbered(path: str, suffix: str) -> str:
-    """The file's name with a suffix before its ending."""
+def _numbered(path: str, suffix: str) -> str:
     base, ending = os.path.splitext(path)
-    return base + suffix + ending
+    return base + suffix + ending if path else ""
+
+
+def scene_output(scene: bpy.types.Scene, frame: Optional[int] = None) -> str:
+    """Where Blender would write this frame, as an EXR; "" if the scene names no place of its own."""
+    render, frame = scene.render, scene.frame_current if frame is None else frame
+    if render.filepath in _UNSET:
+        return ""
+    path = bpy.path.abspath(render.frame_path(frame=frame))
+    if render.file_extension and path.lower().endswith(render.file_extension):
+        path = path[:-len(render.file_extension)]
+    return f"{path}_{frame:04}.exr" if render.is_movie_format else f"{path}.exr"
+
+
+def default_output(scene: bpy.types.Scene, frame: Optional[int], otherwise: str) -> str:
+    """The picture's name when nobody gave one: what the scene says, else `otherwise`. ValueError if another program's picture
+    is there."""
+    path = scene_output(scene, frame)
+    if path:
+        os.makedirs(os.path.dirname(path), exist_ok=True)  # as Blender does
+    else:
+        path = otherwise if frame is None else _numbered(otherwise, f"_{frame:04}")
+    if not outputs.is_ours(path):
+        raise ValueError(f"{path}: another program's image would be replaced; -o FILE.exr names the output")
+    return path
+
+
+def scene_inputs() -> list[str]:
+    """The files that the open scene is read from."""
+    paths = [bpy.data.filepath, *bpy.utils.blend_paths(absolute=True, packed=False, local=False)]
+    return sorted({os.path.realpath(p) for p in paths if p and os.path.isfile(p)})
+
+
+def check_files(frames: Sequence[Settings], criterion: Criterion) -> None:
+    """Before anything is rendered: OSError or ValueError for what cannot be written, or must not be."""
+    first = frames[0]
+    inputs = [*scene_inputs(), first.mask, criterion.info.path, *first.parameters.values()]
+    check_outputs([o for s in frames for o in s.outputs()], [path for path in inputs if path])
+    for path in {s.checkpoint for s in frames} - {""}:
+        if os.path.exists(path) and os.path.getsize(path) > 0 and not checkpoint.is_one(path):
+            raise ValueError(f"{path}: this is no checkpoint and would be replaced: choose another name")
+
+
+def _identity(scene: bpy.types.Scene, host: Cycles) -> dict[str, str]:
+    """What the samples depend on beside the frame's own settings, for the checkpoint."""
+    crc = 0
+    for path in scene_inputs():
+        with open(path, "rb") as file:
+            while data := file.read(1 << 20):
+                crc = zlib.crc32(data, crc)
+    camera, view = scene.camera, zlib.crc32(np.array(scene.camera.matrix_world, "<f4").tobytes())
+    return {"files": f"{os.path.basename(bpy.data.filepath) or 'unsaved'} {crc:08x}", "scene": scene.name,
+            "frame": str(scene.frame_current), "camera": f"{camera.name} {view:08x}", "view": view_text(scene),
+            "view-layer": host.layer.name, "pattern": host.pattern, "device": host.device(),
+            "renderer": f"Blender {bpy.app.version_string} {bpy.app.build_hash.decode(errors='replace')}"}
 
 
 class Session:
-    """The scene's current frame in the making. Use as a context manager; call run() or driver.step() inside.
+    """The frame that the scene is at, in the making. Use as a context manager; call run(), or step() from an event loop.
 
-    unsaved: why the checkpoint could not be written, if so.
+    notes: lines for people about what is done otherwise than the scene says. quote: what the dial costs and what coarser ones
+    would, one line, "" before the first check. unsaved: why the checkpoint could not be written, if so.
     """
 
     def __init__(self, scene: bpy.types.Scene, settings: Settings, criterion: Optional[Criterion] = None,
@@ -52,16 +126,23 @@ class Session:
         self._own = None if criterion else load(settings.criterion, **parameters)
         judge = criterion or self._own
         assert judge is not None
-        self.host = Cycles(scene, settings.spp_max)
+        spp_max = scene.cycles.samples if settings.spp_max is None else settings.spp_max
+        time_s = scene.cycles.time_limit if settings.time_budget_s is None else settings.time_budget_s
+        self.host = Cycles(scene, spp_max)
+        self.notes = self.host.notes
         exposure = 2.0 ** scene.view_settings.exposure if is_plain(scene) else 1.0
         self.frame = Frame(judge, self.host.width, self.host.height, block=settings.block,
-                           crop=self.host.crop(), spp_min=settings.spp_min, spp_max=settings.spp_max,
-                           time_budget_s=settings.time_budget_s, deterministic=settings.time_budget_s <= 0,
+                           crop=self.host.crop(), spp_min=min(settings.spp_min, spp_max) if settings.spp_max is None else
+                           settings.spp_min, spp_max=spp_max, time_budget_s=time_s, deterministic=time_s <= 0,
                            seed=scene.cycles.seed, exposure=exposure, display=display_of(scene),
                            mask=png.read_grey(settings.mask) if settings.mask else None)
         self.driver = Driver(self.frame, self.host.render, wave=settings.wave, threads=self.host.threads,
+                             identity=_identity(scene, self.host) if settings.checkpoint else None,
                              after_call=after_call)
+        self.quote = ""
         self.unsaved: Optional[OSError] = None
+        self._told = False
+        self._save_at_s = float("inf")
 
     def __enter__(self) -> Session:
         self.host.__enter__()
@@ -73,37 +154,49 @@ class Session:
         if self._own:
             self._own.close()
 
-    def run(self, state: str = "", resume: bool = False) -> Result:
-        """driver.run(), which keeps its state in the file `state`, and goes on from it if it is there; "" = no file."""
+    # --- rendering -----------------------------------------------------------------------------------------------------
+
+    def begin(self, resume: bool = False, every_s: float = 60.0) -> None:
+        """Goes on from the checkpoint, if it is there; keeps it from now on."""
+        state = self.settings.checkpoint
         if state and resume and os.path.exists(state):
             checkpoint.load(state, self.driver)
         if state:
-            self.driver.suspend = lambda _: self._save(state)
-        result = self.driver.run()
-        if state and result.outcome == "done":
-            self._save(state)
+            self.driver.suspend = lambda _: self.save()
+            self._every_s, self._save_at_s = every_s, time.monotonic() + every_s
+
+    def step(self) -> Optional[Result]:
+        """One call of the renderer or one round of checks; the end, or None."""
+        result = self.driver.step()
+        if not self._told and all(b.asked_spp > 0 or not b.active for b in self.frame.blocks):
+            self._told, self.quote = True, quote.line(self.driver)
+        if result is None and time.monotonic() >= self._save_at_s:
+            self.save()
+            self._save_at_s = time.monotonic() + self._every_s
+        if result is not None and result.outcome == "done" and self.settings.checkpoint:
+            self.save()
         return result
 
-    def _save(self, state: str) -> None:
+    def run(self) -> Result:
+        while (result := self.step()) is None:
+            pass
+        return result
+
+    def save(self) -> None:
         """The picture is worth more than its checkpoint: an error is kept for later."""
         try:
-            checkpoint.save(state, self.driver)
+            checkpoint.save(self.settings.checkpoint, self.driver)
+            self.unsaved = None
         except OSError as error:
             self.unsaved = error
 
-    def write(self, result: Result, suffix: str = "") -> list[str]:
-        """Writes the files of the settings; suffix: a frame's number. Returns their names."""
+    def write(self, result: Result) -> tuple[list[str], list[str]]:
+        """Writes the files of the settings. Returns their names, and a line for each that could not be written."""
         s, scene = self.settings, bpy.data.filepath or self.scene.name
         kernel = f"Cycles, Blender {bpy.app.version_string}"
         interrupted = result.outcome in ("interrupt", "failed")
-        writers = ((s.output, lambda p: outputs.write_exr(p, self.driver, scene, f"lull for Python 1.0; {kernel}")),
-                   (s.preview, lambda p: outputs.write_preview(p, self.driver)),
-                   (s.stop_map, lambda p: stopmap.write(p, self.frame.blocks, scene)),
-                   (s.report, lambda p: outputs.write_report(p, self.driver, scene, kernel, interrupted,
-                                                                       s.mask or None)))
-        written = []
-        for path, write in writers:
-            if path:
-                write(numbered(path, suffix))
-                written.append(numbered(path, suffix))
-        return written
+        return write_each((
+            (s.output, lambda p: outputs.write_exr(p, self.driver, scene, f"lull for Python 1.0; {kernel}")),
+            (s.preview, lambda p: outputs.write_preview(p, self.driver)),
+            (s.stop_map, lambda p: stopmap.write(p, self.frame.blocks, scene)),
+            (s.report, lambda p: outputs.write_report(p, self.driver, scene, kernel, interrupted, s.mask or None))))

@@ -1,20 +1,23 @@
 # SPDX-License-Identifier: MIT
-"""The add-on: Render properties → Lull, with settings per scene, a button, and the stop map as an image of Blender's."""
+"""The add-on: Render properties → Lull, with settings per scene, a button, and picture and stop map as images of Blender's."""
 import os
-import tempfile
+import time
 from typing import Optional
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
-from .. import outputs, stopmap
+from .. import outputs
+from ..criterion import load
 from ..library import LullError, criteria, search_path
+from . import shown
 from .cli import summary
 from .cycles import HostError
-from .session import Session, Settings
+from .session import Session, Settings, check_files, default_output
 
 REFUSED = (HostError, LullError, ValueError, OSError, RuntimeError)
 _items: list[tuple[str, str, str]] = []  # kept: Blender does not copy the texts of dynamic enums
+_running = False  # a render is in the making: its settings are not to be shown, since it lends some of the scene's
 _with_visible: set[str] = set()  # criteria whose dial is the share of viewers
 
 
@@ -37,27 +40,30 @@ class LullSettings(bpy.types.PropertyGroup):
     parameters: StringProperty(name="Parameters", description="KEY=VALUE pairs of the criterion, with spaces between; for "
                                "example first-spp=64")
     spp_min: IntProperty(name="Min Samples", default=16, min=1, description="Samples before the first decision")
-    spp_max: IntProperty(name="Max Samples", default=4096, min=1, description="Every block stops here")
-    time_budget_s: FloatProperty(name="Time Limit", default=0, min=0, subtype="TIME_ABSOLUTE", unit="TIME_ABSOLUTE",
-                                 description="Seconds for the frame, 0 = none; the first limit reached wins")
     block: IntProperty(name="Block Size", default=0, min=0, max=4096, subtype="PIXEL",
-                       description="Pixels; 0 = what the criterion was made for")
+                       description="Pixels; 0 = what the criterion was made for, less where that would be fewer than 12 blocks")
     mask: StringProperty(name="Mask", subtype="FILE_PATH", description="A PNG of the picture's size: lighter regions are "
                          "rendered better")
     folder: StringProperty(name="Output", subtype="DIR_PATH", description="Folder for picture, stop map and report; empty: "
-                           "a temporary one")
+                           "where the scene's output path says, else a temporary one")
     state: StringProperty(options={"SKIP_SAVE"})
 
-    def chosen(self, folder: str) -> Settings:
-        """As the session wants them; ValueError for a pair without '='."""
+    def chosen(self, scene: bpy.types.Scene, frame: Optional[int] = None) -> Settings:
+        """As the session wants them; ValueError for a pair without '=' or a name that is taken."""
         pairs = self.parameters.split()
         if bad := [p for p in pairs if "=" not in p]:
             raise ValueError(f"parameter {bad[0]}: expected KEY=VALUE")
         dial = {"visible": f"{self.visible:.6g}"} if self.criterion in _with_visible else {}
-        return Settings(self.criterion, {**dial, **dict(p.split("=", 1) for p in pairs)}, self.spp_min, self.spp_max,
-                        self.time_budget_s, self.block or None, mask=bpy.path.abspath(self.mask) if self.mask else "",
-                        output=os.path.join(folder, "lull.exr"), stop_map=os.path.join(folder, "lull-stop-map.png"),
-                        report=os.path.join(folder, "lull-report.json"))
+        settings = Settings(self.criterion, {**dial, **dict(p.split("=", 1) for p in pairs)}, self.spp_min,
+                            block=self.block or None, mask=bpy.path.abspath(self.mask) if self.mask else "")
+        if self.folder:
+            settings.output = os.path.join(bpy.path.abspath(self.folder), "lull.exr")
+            settings = settings.numbered(frame)
+        else:
+            settings.output = default_output(scene, frame, os.path.join(bpy.app.tempdir, "lull.exr"))
+        base = settings.output[:-len(".exr")]
+        settings.stop_map, settings.report = f"{base}-stop-map.png", f"{base}-report.json"
+        return settings
 
 
 class LULL_OT_render(bpy.types.Operator):
@@ -74,58 +80,85 @@ class LULL_OT_render(bpy.types.Operator):
     def poll(cls, context):
         return context.scene is not None and hasattr(context.scene, "cycles")
 
+    def _plan(self, context) -> bool:
+        """What is asked for, looked at before the first sample."""
+        scene = context.scene
+        frames = range(scene.frame_start, scene.frame_end + 1, scene.frame_step) if self.animation else [None]
+        try:
+            self._frames = [(frame, scene.lull.chosen(scene, frame)) for frame in frames]
+            if not self._frames:
+                raise ValueError("the scene's frame range is empty")
+            with load(scene.lull.criterion, **self._frames[0][1].parameters) as criterion:
+                check_files([settings for _, settings in self._frames], criterion)
+        except REFUSED as error:
+            self.report({"ERROR"}, str(error))
+            return False
+        return self._begin(context)
+
     def _begin(self, context) -> bool:
         """The next frame."""
         scene = context.scene
-        frame = next(self._frames)
-        self._suffix = "" if frame is None else f"_{frame:04}"
+        frame, settings = self._frames.pop(0)
         if frame is not None:
             scene.frame_set(frame)
         try:
-            self._session = Session(scene, scene.lull.chosen(self._folder))
-            self._session.__enter__()
+            session = Session(scene, settings)
+            session.__enter__()
         except REFUSED as error:
-            self._session = None
             self.report({"ERROR"}, str(error))
             return False
+        self._session, self._told, self._show_at_s = session, False, 0.0
+        session.begin()
+        for note in session.notes:
+            self.report({"WARNING"}, note)
         return True
 
-    def _plan(self, context) -> bool:
-        scene = context.scene
-        folder = scene.lull.folder
-        self._folder = bpy.path.abspath(folder) if folder else tempfile.mkdtemp(prefix="lull-")
-        frames = range(scene.frame_start, scene.frame_end + 1, scene.frame_step) if self.animation else [None]
-        self._left = len(frames)
-        self._frames = iter(frames)
-        return self._begin(context)
+    def _step(self, context):
+        """The end, or None; now and then the picture is shown."""
+        global _running
+        session = self._session
+        result = session.step()
+        if session.quote and not self._told:
+            self._told = True
+            self.report({"INFO"}, session.quote)
+        now_s = time.monotonic()
+        if result is None and now_s >= self._show_at_s:
+            shown.show_picture(session.frame)
+            if context.screen:
+                shown.show_in_editors(context.screen)
+            self._show_at_s = time.monotonic() + max(1.0, 20 * (time.monotonic() - now_s))  # a twentieth of the time
+        _running = result is None
+        context.scene.lull.state = "\n".join([*outputs.progress_text(session.driver).split("  "), *session.notes,
+                                              *session.quote.split("; ")])
+        return result
 
     def _end(self, context, result) -> bool:
         """Writes the frame; whether there is another one to render."""
         session, settings = self._session, context.scene.lull
         session.__exit__()
-        try:
-            written = session.write(result, self._suffix)
-        except OSError as error:
-            self.report({"ERROR"}, str(error))
-            return False
-        settings.state = summary(session)
-        for name, path in (("Lull", written[0]), ("Lull Stop Map", written[1])):
-            image = bpy.data.images.get(name) or bpy.data.images.new(name, 1, 1)
-            image.source, image.filepath = "FILE", path
-            image.reload()
+        shown.show_picture(session.frame)
+        shown.show_stops(session.frame)
+        written, failed = session.write(result)
+        for name, path in ((shown.PICTURE, session.settings.output), (shown.STOP_MAP, session.settings.stop_map)):
+            if path in written:
+                shown.keep(name, path)
+        settings.state = "\n".join([*summary(session).split(", "), *session.notes, *written])
+        for text in failed:
+            self.report({"ERROR"}, text)
         if result.exception:
             self.report({"ERROR"}, f"Rendering failed, what was rendered is kept: {result.exception}")
-        else:
-            self.report({"INFO"}, settings.state)
-        self._left -= 1
-        return self._left > 0 and result.outcome not in ("interrupt", "failed")
+        elif not failed:
+            self.report({"INFO"}, summary(session))
+        return bool(self._frames) and result.outcome not in ("interrupt", "failed")
 
     def execute(self, context):
         more = self._plan(context)
         if not more:
             return {"CANCELLED"}
         while more:
-            more = self._end(context, self._session.driver.run()) and self._begin(context)
+            while (result := self._step(context)) is None:
+                pass
+            more = self._end(context, result) and self._begin(context)
         return {"FINISHED"}
 
     def invoke(self, context, _event):
@@ -142,16 +175,21 @@ class LULL_OT_render(bpy.types.Operator):
             driver.interrupt()
         if event.type != "TIMER":
             return {"RUNNING_MODAL"}
-        result = driver.step()
-        text = outputs.progress_text(driver)
-        context.scene.lull.state = text
-        context.workspace.status_text_set(None if result else f"Lull: {text}   Esc: stop and keep")
+        result = self._step(context)
+        context.workspace.status_text_set(None if result else f"Lull: {outputs.progress_text(driver)}   Esc: stop and keep")
         for area in context.screen.areas:
             area.tag_redraw()
         if result is None or (self._end(context, result) and self._begin(context)):
             return {"RUNNING_MODAL"}
         context.window_manager.event_timer_remove(self._timer)
         return {"FINISHED"}
+
+    def cancel(self, context):
+        """Blender closes, or opens another file."""
+        global _running
+        _running = False
+        if self._session:
+            self._session.__exit__()
 
 
 class LULL_PT_render(bpy.types.Panel):
@@ -166,34 +204,39 @@ class LULL_PT_render(bpy.types.Panel):
         return context.engine in cls.COMPAT_ENGINES
 
     def draw(self, context):
-        layout, settings = self.layout, context.scene.lull
+        layout, settings, cycles = self.layout, context.scene.lull, context.scene.cycles
         layout.use_property_split, layout.use_property_decorate = True, False
-        dial = ("visible",) if settings.criterion in _with_visible else ()
-        for names in (("criterion", *dial, "parameters"), ("spp_min", "spp_max", "time_budget_s"),
-                      ("block", "mask", "folder")):
-            column = layout.column(align=True)
-            for name in names:
-                column.prop(settings, name)
-        layout.operator("lull.render", icon="RENDER_STILL")
-        layout.operator("lull.render", text="Render Animation", icon="RENDER_ANIMATION").animation = True
-        if settings.state:
-            for line in settings.state.replace("  ", "\n").splitlines():
-                layout.label(text=line)
-        if image := bpy.data.images.get("Lull Stop Map"):
-            image.preview_ensure()
-            layout.template_icon(icon_value=image.preview.icon_id, scale=10)
+        if _running:
+            layout.label(text="Esc: stop and keep", icon="INFO")
+        else:
+            dial = ("visible",) if settings.criterion in _with_visible else ()
+            for properties in (((settings, "criterion"), *((settings, d) for d in dial), (settings, "parameters")),
+                               ((settings, "spp_min"), (cycles, "samples"), (cycles, "time_limit")),
+                               ((settings, "block"), (settings, "mask"), (settings, "folder"))):
+                column = layout.column(align=True)
+                for owner, name in properties:
+                    column.prop(owner, name, **({"text": "Max Samples"} if name == "samples" else {}))
+            layout.operator("lull.render", icon="RENDER_STILL")
+            layout.operator("lull.render", text="Render Animation", icon="RENDER_ANIMATION").animation = True
+        for line in settings.state.splitlines():
+            layout.label(text=line)
+        for name in (shown.PICTURE, shown.STOP_MAP):
+            if icon := shown.icon(name):
+                layout.template_icon(icon_value=icon, scale=10)
 
 
 CLASSES = (LullSettings, LULL_OT_render, LULL_PT_render)
 
 
 def register() -> None:
+    shown.register()
     for c in CLASSES:
         bpy.utils.register_class(c)
     bpy.types.Scene.lull = PointerProperty(type=LullSettings)
 
 
 def unregister() -> None:
+    shown.unregister()
     del bpy.types.Scene.lull
     for c in reversed(CLASSES):
         bpy.utils.unregister_class(c)

@@ -26,6 +26,15 @@ def is_plain(scene: bpy.types.Scene) -> bool:
             view.look in ("None", "") and view.gamma == 1.0 and not view.use_curve_mapping)
 
 
+def view_text(scene: bpy.types.Scene) -> str:
+    """The settings in words, for people and for comparing."""
+    view = scene.view_settings
+    curves = [(round(p.location.x, 6), round(p.location.y, 6)) for c in view.curve_mapping.curves for p in c.points] \
+        if view.use_curve_mapping and view.curve_mapping else []
+    return (f"{scene.display_settings.display_device}, {view.view_transform}, look {view.look or 'None'}, exposure "
+            f"{view.exposure:g}, gamma {view.gamma:g}{f', curves {curves}' if curves else ''}")
+
+
 def display_of(scene: bpy.types.Scene) -> Optional[Callable[[np.ndarray], np.ndarray]]:
     """None if the view is plain; else linear radiance [..., 3] -> linear display values in [0, 1]."""
     if is_plain(scene):

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: MIT
+"""Pictures inside Blender: the render in the making as an image and as a small picture for the panel, and the stop map."""
+from __future__ import annotations
+
+from typing import Optional
+
+import bpy
+import bpy.utils.previews
+import numpy as np
+
+from .. import outputs, stopmap
+from ..frame import Frame
+
+PICTURE, STOP_MAP = "Lull", "Lull Stop Map"
+_SIDE = 256  # pixels of a small picture
+_small: Optional[bpy.utils.previews.ImagePreviewCollection] = None
+
+
+def _image(name: str, width: int, height: int, is_float: bool) -> bpy.types.Image:
+    """The image of this name, of this size and without a file."""
+    image = bpy.data.images.get(name) or bpy.data.images.new(name, width, height, float_buffer=is_float)
+    if image.source != "GENERATED" or tuple(image.size) != (width, height):
+        image.source, image.use_generated_float = "GENERATED", is_float
+        image.generated_width, image.generated_height = width, height
+    if is_float:
+        image.colorspace_settings.name = "Linear" if bpy.app.version < (4, 0) else "Linear Rec.709"
+        image.use_view_as_render = True
+    return image
+
+
+def _rgba(rgb: np.ndarray) -> np.ndarray:
+    """[h, w, 4] float32 from below, as Blender has it."""
+    return np.concatenate((rgb, np.ones_like(rgb[..., :1])), -1)[::-1].astype(np.float32)
+
+
+def _show_small(name: str, rgb: np.ndarray) -> None:
+    """rgb: [h, w, 3] display values in [0, 1]. The panel's pictures are square: the rest is transparent."""
+    if _small is None:
+        return
+    step = -(-max(rgb.shape[:2]) // _SIDE)
+    rgba, side = _rgba(rgb[::step, ::step]), -(-max(rgb.shape[:2]) // step)
+    square = np.zeros((side, side, 4), np.float32)
+    y, x = (side - rgba.shape[0]) // 2, (side - rgba.shape[1]) // 2
+    square[y:y + rgba.shape[0], x:x + rgba.shape[1]] = rgba
+    picture = _small.get(name) or _small.new(name)
+    picture.image_size = (side, side)
+    picture.image_pixels_float.foreach_set(square.ravel())
+
+
+def show_picture(frame: Frame) -> None:
+    """The frame as far as it is."""
+    mean = frame.cropped(frame.mean())
+    image = _image(PICTURE, mean.shape[1], mean.shape[0], True)
+    image.pixels.foreach_set(_rgba(mean).ravel())
+    image.update()
+    _show_small(PICTURE, outputs.shown(frame) / 255)
+
+
+def show_stops(frame: Frame) -> None:
+    """The blocks' samples."""
+    rgb = stopmap.draw(frame.blocks) / 255
+    image = _image(STOP_MAP, rgb.shape[1], rgb.shape[0], False)
+    image.pixels.foreach_set(_rgba(rgb).ravel())
+    image.update()
+    _show_small(STOP_MAP, rgb)
+
+
+def show_in_editors(screen: bpy.types.Screen) -> None:
+    """Image editors that show nothing, or Blender's own result, show the picture."""
+    for area in screen.areas:
+        if area.type == "IMAGE_EDITOR":
+            space = area.spaces.active
+            if space.image is None or space.image.type == "RENDER_RESULT":
+                space.image = bpy.data.images[PICTURE]
+
+
+def keep(name: str, path: str) -> None:
+    """The image comes from this file from now on, so that it is there when the .blend is opened again."""
+    image = bpy.data.images[name]
+    image.source, image.filepath = "FILE", path
+    image.reload()
+
+
+def icon(name: str) -> int:
+    """Of the small picture; 0 = there is none."""
+    return _small[name].icon_id if _small is not None and name in _small else 0
+
+
+def register() -> None:
+    global _small
+    _small = bpy.utils.previews.new()
+
+
+def unregister() -> None:
+    global _small
+    if _small is not None:
+        bpy.utils.previews.remove(_small)
+    _small = None
