@@ -297,6 +297,8 @@ static int do_report(const struct options *o, const struct ggn_study *study, str
     if (!rc)
         rc = ggn_study_people_init(&people, study, store, threads, err);
     if (!rc)
+        rc = ggn_study_people_estimate(&people, threads, err);
+    if (!rc)
         rc = ggn_study_report(out, &people, !o->no_pictures, err);
     ggn_study_people_release(&people);
     base_threads_destroy(threads);

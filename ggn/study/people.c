@@ -61,37 +61,6 @@ static int is_fast(const struct ggn_study_people *p, const struct ggn_study_tria
 
 /* --- two intervals --- */
 
-/* The blocks with enough choices, estimated together. */
-static int estimate_choices(const struct ggn_study_people *p, struct ggn_study_result *r, struct base_err *err)
-{
-    struct ggn_study_choice *sorted = malloc((size_t)(r->n_choices + 1) * sizeof *sorted); /* by cell */
-    struct ggn_study_curve *curves = calloc((size_t)p->n_cells + 1, sizeof *curves);
-    int *cells = malloc(((size_t)p->n_cells + 1) * sizeof *cells), n_curves = 0, used = 0;
-    int rc = sorted && curves && cells ? 0 : base_fail_nomem(err, "estimates");
-    for (int cell = 0; cell < p->n_cells && !rc; cell++) {
-        const struct ggn_study_block *b = ggn_study_cell_block(p, cell, NULL);
-        int first = used;
-        for (int i = 0; i < r->n_choices; i++)
-            if (r->choice_cells[i] == cell)
-                sorted[used++] = r->choices[i];
-        if (used - first < GGN_STUDY_MIN_TRIALS)
-            continue;
-        curves[n_curves] = (struct ggn_study_curve){.choices = sorted + first,
-                                                    .n = used - first,
-                                                    .x_min = log2(b->levels[0]),
-                                                    .x_max = log2(b->levels[b->n_levels - 1])};
-        cells[n_curves++] = cell;
-    }
-    if (!rc)
-        rc = ggn_study_psychometric(curves, n_curves, err);
-    for (int i = 0; i < n_curves && !rc; i++)
-        r->cells[cells[i]] = curves[i].estimate;
-    free(cells);
-    free(curves);
-    free(sorted);
-    return rc;
-}
-
 static int read_choices(const struct ggn_study_people *p, const struct input *in, struct ggn_study_result *r,
                         struct base_err *err)
 {
@@ -110,7 +79,7 @@ static int read_choices(const struct ggn_study_people *p, const struct input *in
         r->choices[r->n_choices] = (struct ggn_study_choice){x, s->side == 0, correct};
         r->choice_cells[r->n_choices++] = p->first[s->view] + s->block;
     }
-    return estimate_choices(p, r, err);
+    return 0;
 }
 
 /* --- adjustment --- */
@@ -308,5 +277,67 @@ int ggn_study_people_init(struct ggn_study_people *people, const struct ggn_stud
         ggn_study_people_release(&p);
     else
         *people = p;
+    return rc;
+}
+
+/* --- estimates of two intervals --- */
+
+/* The blocks with enough choices, estimated together. */
+static int estimate_choices(const struct ggn_study_people *p, struct ggn_study_result *r, struct base_err *err)
+{
+    struct ggn_study_choice *sorted = malloc((size_t)(r->n_choices + 1) * sizeof *sorted); /* by cell */
+    struct ggn_study_curve *curves = calloc((size_t)p->n_cells + 1, sizeof *curves);
+    int *cells = malloc(((size_t)p->n_cells + 1) * sizeof *cells), n_curves = 0, used = 0;
+    int rc = sorted && curves && cells ? 0 : base_fail_nomem(err, "estimates");
+    for (int cell = 0; cell < p->n_cells && !rc; cell++) {
+        const struct ggn_study_block *b = ggn_study_cell_block(p, cell, NULL);
+        int first = used;
+        for (int i = 0; i < r->n_choices; i++)
+            if (r->choice_cells[i] == cell)
+                sorted[used++] = r->choices[i];
+        if (used - first < GGN_STUDY_MIN_TRIALS)
+            continue;
+        curves[n_curves] = (struct ggn_study_curve){.choices = sorted + first,
+                                                    .n = used - first,
+                                                    .x_min = log2(b->levels[0]),
+                                                    .x_max = log2(b->levels[b->n_levels - 1])};
+        cells[n_curves++] = cell;
+    }
+    if (!rc)
+        rc = ggn_study_psychometric(curves, n_curves, err);
+    for (int i = 0; i < n_curves && !rc; i++)
+        r->cells[cells[i]] = curves[i].estimate;
+    free(cells);
+    free(curves);
+    free(sorted);
+    return rc;
+}
+
+struct estimates {
+    const struct ggn_study_people *people;
+    int *rc;               /* [n] */
+    struct base_err *errs; /* [n] */
+};
+
+static void work_estimate(void *data, long i, int worker)
+{
+    struct estimates *w = data;
+    (void)worker;
+    w->rc[i] = estimate_choices(w->people, &w->people->results[i], &w->errs[i]);
+}
+
+int ggn_study_people_estimate(struct ggn_study_people *p, struct base_threads *threads, struct base_err *err)
+{
+    if (p->study->task != GGN_STUDY_TWO_INTERVAL || p->n == 0)
+        return 0;
+    struct estimates w = {p, calloc((size_t)p->n, sizeof *w.rc), calloc((size_t)p->n, sizeof *w.errs)};
+    int rc = w.rc && w.errs ? 0 : base_fail_nomem(err, "estimates");
+    if (!rc)
+        base_threads_for(threads, p->n, work_estimate, &w);
+    for (int i = 0; i < p->n && !rc; i++)
+        if (w.rc[i])
+            rc = base_fail(err, w.rc[i], "%s", w.errs[i].text);
+    free(w.rc);
+    free(w.errs);
     return rc;
 }

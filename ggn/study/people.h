@@ -28,7 +28,7 @@ struct ggn_study_result { /* one person */
     double median_s;                  /* of an answer; NaN without any */
     char last[32];                    /* when the latest was stored: UTC, ISO 8601; empty without any */
     char excluded[96];                /* why; empty: counts */
-    struct ggn_study_estimate *cells; /* owns; [n_cells]; trials 0 where there is none */
+    struct ggn_study_estimate *cells; /* owns; [n_cells]; trials 0 where there is none, as before the estimate */
     struct ggn_study_choice *choices; /* owns; [n_choices]; 2ifc: all of them, for pictures */
     int *choice_cells;                /* owns; [n_choices] */
     int n_choices;
@@ -44,9 +44,11 @@ struct ggn_study_people {
     struct ggn_study_result *results; /* owns; in order of arrival */
 };
 
-/* Reads all trials and estimates; people in parallel. */
+/* Reads and judges all trials; people in parallel. Of two intervals there are no estimates yet. */
 int ggn_study_people_init(struct ggn_study_people *people, const struct ggn_study *study, struct ggn_study_store *store,
                           struct base_threads *threads, struct base_err *err);
+/* Estimates the thresholds of two intervals, the longest part of a report; people in parallel. */
+int ggn_study_people_estimate(struct ggn_study_people *people, struct base_threads *threads, struct base_err *err);
 void ggn_study_people_release(struct ggn_study_people *people);
 
 /* log2 of the highest level of a cell's block. */

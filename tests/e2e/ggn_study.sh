@@ -32,6 +32,8 @@ for i, slot in enumerate(ask(f"api/people/{me['key']}")["slots"]):
     ask(f"api/people/{me['key']}/trials", {"slot": i, "revision": 0, "level": level, "answer": 0, "rating": 0, "ms": 3000})
 END
 check "a simulated participant sets all blocks" $?
+"$bin/ggn" study status "$tmp/study" >"$tmp/out" 2>"$tmp/err" && grep -q "1 people, 1 finished" "$tmp/out"
+check "status, while it is served" $?
 kill $server && wait $server
 check "serve ends" $?
 "$bin/ggn" study report "$tmp/study" --no-pictures >"$tmp/out" 2>"$tmp/err" &&

@@ -77,7 +77,9 @@ static int estimates(struct base_err *err)
     struct base_threads *threads = base_threads_create(1, err);
     int rc = threads ? ggn_study_people_init(&people, &study, store, threads, err) : BASE_ENOMEM;
     if (!rc) {
-        rc = ggn_study_ceiling(&people, &ceiling, err);
+        rc = ggn_study_people_estimate(&people, threads, err);
+        if (!rc)
+            rc = ggn_study_ceiling(&people, &ceiling, err);
         ggn_study_people_release(&people);
     }
     base_threads_destroy(threads);

@@ -10,7 +10,8 @@ import { ASKED_BY, CONTACT, Client, Server, check, finish, ggn, makeConditions, 
 
 const root = process.argv[2];
 const SMALL = { width: 1280, height: 800 },
-    LARGE = { width: 1960, height: 1080 };
+    LARGE = { width: 1960, height: 1080 },
+    LEAST = { width: 1000, height: 600 }; // what the page lets in; texts alone, a picture of 800 pixels is scrolled there
 const SHOW_MS = 61; // of the study with two intervals
 const LEVELS = [16, 32, 64, 128, 256, 512, 1024, 2048, 4096];
 const outside = []; // requests that would leave this machine
@@ -270,6 +271,9 @@ async function adjustByKeys(page, server, shots) {
     for (const key of ['ArrowUp', 'ArrowLeft', 'ArrowLeft', 'ArrowLeft']) await large.keyboard.press(key);
     await adjustByKeys(large, server, 'large-adjustment');
     await large.context().close();
+    const least = await openPage(server.link, LEAST);
+    await enter(least, 'least', 'adjustment');
+    await least.context().close();
     await server.stop();
 }
 

@@ -65,6 +65,7 @@ static void read_people(struct ggn_study_people *p, const struct ggn_study *s, s
     struct base_threads *threads = base_threads_create(1, &err);
     assert_non_null(threads);
     assert_int_equal(ggn_study_people_init(p, s, store, threads, &err), 0);
+    assert_int_equal(ggn_study_people_estimate(p, threads, &err), 0);
     base_threads_destroy(threads);
 }
 
