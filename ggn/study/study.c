@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "base/files.h"
-#include "base/inputs.h"
 #include "base/json.h"
 
 enum { MAX_TEXT = 1 << 26 };
@@ -397,22 +396,14 @@ int ggn_study_write(const char *dir, const struct ggn_study *s, struct base_err 
 int ggn_study_protect(const char *dir, const char *output, struct base_err *err)
 {
     static const char *const own[] = {"study.json", "texts.json", "token", "study.db", "study.db-wal", "study.db-shm"};
-    struct base_inputs files = BASE_INPUTS_EMPTY;
-    const char *slash = strrchr(output, '/'), *name = slash ? slash + 1 : output;
     char path[4096];
-    int rc = base_file_join(path, dir, "stimuli", err), named = 0;
+    int rc = base_file_join(path, dir, "stimuli", err);
     if (!rc && base_file_is_inside(output, path))
         rc = base_fail(err, BASE_EINVAL, "%s: lies among the pictures that the study shows", output);
     for (size_t i = 0; i < sizeof own / sizeof own[0] && !rc; i++) {
-        named |= strcmp(name, own[i]) == 0;
         rc = base_file_join(path, dir, own[i], err);
-        if (!rc)
-            rc = base_inputs_add(&files, path, err);
+        if (!rc && base_file_is_same(output, path))
+            rc = base_fail(err, BASE_EINVAL, "%s: this is the study's own %s, it would be lost", output, own[i]);
     }
-    if (!rc)
-        rc = base_inputs_protect(&files, output, err);
-    if (!rc && named && base_file_is_inside(output, dir))
-        rc = base_fail(err, BASE_EINVAL, "%s: the study keeps this name for a file of its own", output);
-    base_inputs_release(&files);
     return rc;
 }

@@ -663,7 +663,7 @@ os.symlink(adjustment, os.path.join(TMP.name, "another"))
 for name in ("study.db", "study.json", "texts.json", "token", "study.db-wal", "study.db-shm", "stimuli/v0/b0-16.png", "stimuli/v0/new.json", "stimuli/x"):
     for path in (os.path.join(adjustment, name), os.path.join(TMP.name, "another", ".", name)):
         fails("export: not onto the study's own " + name, os.path.basename(name), "export", adjustment, "-o", path)
-fails("export: not onto it by a link", "this is an input", "export", adjustment, "-o", os.path.join(TMP.name, "elsewhere.json"))
+fails("export: not onto it by a link", "the study's own study.db", "export", adjustment, "-o", os.path.join(TMP.name, "elsewhere.json"))
 fails("report: not among the pictures", "lies among the pictures", "report", adjustment, "-n", "-o", os.path.join(adjustment, "stimuli", "v0"))
 check(bytes_of(adjustment) == kept_bytes, "  …and nothing in the folder has changed")
 inside = os.path.join(adjustment, "trials.json")
