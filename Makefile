@@ -61,6 +61,7 @@ INC_plugin-api         := $(API)
 INC_plugin-api_base    := $(BASE)
 INC_plugin-api_mpi     := $(BASE) $(MPI_CFLAGS)# the only folder that knows MPI
 INC_plugin-api_tools   := $(API) $(BASE)
+INC_plugin-api_host    := $(API) $(BASE)
 INC_pathtracer         := -Ipathtracer $(BASE) $(EXR_CFLAGS)
 INC_pathtracer_host    := $(INC_pathtracer) $(API)# pathtracer/render and the command: the only hosts of criteria
 INC_ggn                := -Iggn $(BASE) $(BLAS_CFLAGS)
@@ -69,10 +70,12 @@ INC_tests_pt           := -Itests -Itests/support $(INC_pathtracer_host)
 INC_tests_ggn          := -Itests -Itests/support $(INC_ggn_plugin)
 INC_tests_base         := -Itests -Itests/support $(BASE)
 INC_tests_api          := -Itests -Itests/support $(API)
+INC_tests_host         := $(INC_tests_api) $(BASE)# api_host_: the host library from inside
 
 # --- sources -------------------------------------------------------------------------------------------------------------
 BASE_SRC    := $(wildcard plugin-api/base/*.c plugin-api/sequence/*.c)
 LOADER_SRC  := $(wildcard plugin-api/src/*.c)
+HOST_SRC    := $(wildcard plugin-api/host/*.c)
 EXAMPLE_SRC := $(wildcard plugin-api/examples/*.c)
 TOOL_SRC    := $(wildcard plugin-api/tools/*.c)
 MPI_SRC     := $(wildcard plugin-api/mpi/*.c)
@@ -97,7 +100,8 @@ FUZZ_SRC    := $(filter-out tests/fuzz/replay.c,$(wildcard tests/fuzz/*.c))
 
 o = $(addprefix $(OBJ)/,$(addsuffix .o,$(1)) $(addsuffix .double.o,$(filter $(GGN_TWICE),$(1))))
 BASE_OBJ    := $(call o,$(BASE_SRC))
-PT_CORE_OBJ := $(call o,$(PT_SRC)) $(BASE_OBJ)
+# The path tracer is linked with the host library's objects: it starts without a search for the library, wherever it is moved.
+PT_CORE_OBJ := $(call o,$(PT_SRC) $(HOST_SRC)) $(BASE_OBJ)
 PT_OBJ      := $(PT_CORE_OBJ) $(call o,$(PT_IMAGES))
 LOADER_OBJ  := $(call o,$(LOADER_SRC))
 GGN_CORE_OBJ := $(call o,$(GGN_SRC)) $(BASE_OBJ)
@@ -107,6 +111,9 @@ GGN_STUDY_OBJ := $(call o,$(GGN_STUDY))
 
 PROGRAMS := $(if $(PT_MAIN),$(BIN)/pathtracer) $(if $(GGN_CLI),$(BIN)/ggn) $(if $(TOOL_SRC),$(BIN)/lull-check)
 MPI_MODULE := $(if $(MPI),$(OUT)/lib/lull-mpi.so)# loaded only by processes that a launcher has started
+# The host library for renderers (lull/host.h): the file has the major version in its name, programs link the other.
+HOST_LIB := $(OUT)/lib/liblull-host.so.1
+EXAMPLES := $(BIN)/host-example
 MODULES  := $(MPI_MODULE) $(OUT)/lib/lull-images.so $(OUT)/lib/ggn-images.so
 CRITERIA := $(EXAMPLE_SRC:plugin-api/examples/%.c=$(LIB)/%.so) $(if $(GGN_PLUGIN),$(LIB)/ggn.so)
 TESTS    := $(patsubst tests/%.c,$(OUT)/tests/%,$(TEST_SRC))
@@ -118,14 +125,14 @@ FUZZERS  := $(patsubst tests/fuzz/%.c,build/fuzz/%,$(FUZZ_SRC))
 .PHONY: all demo test bench cost asan tsan fuzz mutants host-model hdr-check abi-check install compdb clean help setup tests replay train-demo test-study test-hosts
 .SECONDARY:
 
-all: $(PROGRAMS) $(CRITERIA) $(MODULES) ## build the programs and the criteria
+all: $(PROGRAMS) $(CRITERIA) $(MODULES) $(HOST_LIB) $(EXAMPLES) ## build the programs and the criteria
 
 # --- compiling: one rule, flags by folder --------------------------------------------------------------------------------
 inc = $(or $(strip \
-  $(if $(filter plugin-api/%,$(1)),$(if $(filter plugin-api/base/% plugin-api/sequence/%,$(1)),$(INC_plugin-api_base),$(if $(filter plugin-api/tools/%,$(1)),$(INC_plugin-api_tools),$(if $(filter plugin-api/mpi/%,$(1)),$(INC_plugin-api_mpi),$(INC_plugin-api))))) \
+  $(if $(filter plugin-api/%,$(1)),$(if $(filter plugin-api/base/% plugin-api/sequence/%,$(1)),$(INC_plugin-api_base),$(if $(filter plugin-api/tools/%,$(1)),$(INC_plugin-api_tools),$(if $(filter plugin-api/host/%,$(1)),$(INC_plugin-api_host),$(if $(filter plugin-api/mpi/%,$(1)),$(INC_plugin-api_mpi),$(INC_plugin-api)))))) \
   $(if $(filter pathtracer/%,$(1)),$(if $(filter pathtracer/render/% $(PT_MAIN) $(wildcard pathtracer/*.h),$(1)),$(INC_pathtracer_host),$(INC_pathtracer))) \
   $(if $(filter ggn/%,$(1)),$(if $(filter ggn/plugin/%,$(1)),$(INC_ggn_plugin),$(INC_ggn))) \
-  $(if $(filter tests/%,$(1)),$(if $(filter pt_%,$(notdir $(1))),$(INC_tests_pt),$(if $(filter ggn_%,$(notdir $(1))),$(INC_tests_ggn),$(if $(filter base_%,$(notdir $(1))),$(INC_tests_base),$(INC_tests_api)))))),)
+  $(if $(filter tests/%,$(1)),$(if $(filter pt_%,$(notdir $(1))),$(INC_tests_pt),$(if $(filter ggn_%,$(notdir $(1))),$(INC_tests_ggn),$(if $(filter base_%,$(notdir $(1))),$(INC_tests_base),$(if $(filter api_host_%,$(notdir $(1))),$(INC_tests_host),$(INC_tests_api))))))),)
 # Kernels for one instruction set carry it in their name (x_avx2.c, x_avx512.c); they are reached by run-time dispatch only.
 ifneq ($(filter x86_64%,$(shell $(CC) -dumpmachine)),)
 isa = $(if $(filter %_avx2.c,$(1)),-mavx2 -mfma)$(if $(filter %_avx512.c,$(1)),-mavx512f -mavx512vl -mavx512bw -mavx512dq -mfma -mprefer-vector-width=512)$(if $(filter %_avx512bf16.c,$(1)),-mavx512f -mavx512vl -mavx512bw -mavx512dq -mavx512bf16 -mfma)
@@ -166,6 +173,14 @@ $(OUT)/lib/lull-images.so $(OUT)/lib/ggn-images.so:
 	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--exclude-libs,ALL $^ $(LDFLAGS_ALL) $(IMAGE_LIBS) -lz -lm -o $@
 $(OUT)/lib/lull-mpi.so: $(call o,$(MPI_SRC)) $(OBJ)/base.a
 	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--exclude-libs,ALL $^ $(LDFLAGS_ALL) $(MPI_LIBS) -lm -o $@
+$(HOST_LIB): $(call o,$(HOST_SRC)) $(LOADER_OBJ) $(OBJ)/base.a plugin-api/host.map
+	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--version-script=plugin-api/host.map -Wl,-z,defs -Wl,-soname,$(@F) \
+	    -Wl,--as-needed $(filter %.o %.a,$^) $(LDFLAGS_ALL) $(BASE_LIBS) -ldl -o $@
+	@ln -sf $(@F) $(@:.1=)
+# As a renderer would build it: the public headers and the library, nothing else.
+$(BIN)/host-example: plugin-api/examples/host.cpp $(wildcard plugin-api/include/lull/*.h) | $(HOST_LIB)
+	@mkdir -p $(@D); echo "  CXX  $@"; $(CXX) -std=c++11 $(WARN) $(OPT_$(MODE)) $(SAN_$(MODE)) $(CFLAGS) $(API) $< -L$(OUT)/lib \
+	    -Wl,-rpath,'$$ORIGIN/../lib' $(LDFLAGS) -llull-host -o $@
 # Of the networks the criteria take what they name: no image is read there, and no image library loaded.
 $(OBJ)/ggn.a: $(GGN_CORE_OBJ)
 	@rm -f $@; echo "  AR   $@"; $(AR) rcs $@ $^
@@ -191,6 +206,8 @@ $(OUT)/tests/$(1)/ggn_plugin%: $(OBJ)/tests/$(1)/ggn_plugin%.c.o $(GGN_PLUGIN_OB
 	$$(link) $$^ $$(LDFLAGS_ALL) $(GGN_LIBS) -lcmocka -o $$@
 $(OUT)/tests/$(1)/api_%: $(OBJ)/tests/$(1)/api_%.c.o $(LOADER_OBJ) $(SUPPORT_api)
 	$$(link) $$^ $$(LDFLAGS_ALL) -ldl -lm -lcmocka -o $$@
+$(OUT)/tests/$(1)/api_host%: $(OBJ)/tests/$(1)/api_host%.c.o $(call o,$(HOST_SRC)) $(LOADER_OBJ) $(OBJ)/base.a $(SUPPORT_api)
+	$$(link) $$^ $$(LDFLAGS_ALL) $(BASE_LIBS) -ldl -lcmocka -o $$@
 $(OUT)/tests/$(1)/base_%: $(OBJ)/tests/$(1)/base_%.c.o $(BASE_OBJ) $(SUPPORT_base)
 	$$(link) $$^ $$(LDFLAGS_ALL) $(BASE_LIBS) -lcmocka -o $$@
 endef
@@ -270,9 +287,9 @@ hdr-check: ## each header compiles alone (the ABI's as C99 and C++11), no includ
 	@scripts/check-floors
 	@$(foreach h,$(HEADERS),echo "extern int unused;" | $(CC) -std=c17 -D_POSIX_C_SOURCE=200809L $(WARNC) -Wno-unused-const-variable $(call inc,$(h)) \
 	    -include $(h) -x c -fsyntax-only - &&) true
-	@$(foreach h,criterion.h criterion_kit.h,$(CC) -std=c99 $(WARNC) $(API) -x c -fsyntax-only plugin-api/include/lull/$(h) &&) true
-	@$(foreach h,criterion.h criterion_kit.h,$(CXX) -std=c++11 $(WARN) $(API) -x c++ -fsyntax-only plugin-api/include/lull/$(h) &&) true
-abi-check: $(OUT)/tests/abi/api_layout ## the ABI's layout is the frozen one (plugin-api/layout-1.txt)
+	@$(foreach h,criterion.h criterion_kit.h host.h,$(CC) -std=c99 $(WARNC) $(API) -x c -fsyntax-only plugin-api/include/lull/$(h) &&) true
+	@$(foreach h,criterion.h criterion_kit.h host.h,$(CXX) -std=c++11 $(WARN) $(API) -x c++ -fsyntax-only plugin-api/include/lull/$(h) &&) true
+abi-check: $(OUT)/tests/abi/api_layout ## the layouts of the ABI and the host library are the frozen ones (plugin-api/*layout-1.txt)
 	@$<
 
 # --- running -------------------------------------------------------------------------------------------------------------
@@ -292,6 +309,8 @@ install: all ## install under $(DESTDIR)$(PREFIX)
 	install -m 755 $(PROGRAMS) $(DESTDIR)$(PREFIX)/bin
 	install -m 755 $(CRITERIA) $(DESTDIR)$(PREFIX)/lib/lull
 	install -m 755 $(MODULES) $(DESTDIR)$(PREFIX)/lib
+	install -m 755 $(HOST_LIB) $(DESTDIR)$(PREFIX)/lib
+	ln -sf $(notdir $(HOST_LIB)) $(DESTDIR)$(PREFIX)/lib/liblull-host.so
 	install -m 644 plugin-api/include/lull/*.h $(DESTDIR)$(PREFIX)/include/lull
 	install -m 644 $(wildcard docs/man/*.1) $(DESTDIR)$(PREFIX)/share/man/man1
 	install -m 644 $(wildcard docs/man/*.7) $(DESTDIR)$(PREFIX)/share/man/man7
@@ -299,10 +318,11 @@ install: all ## install under $(DESTDIR)$(PREFIX)
 	install -d $(DESTDIR)$(PREFIX)/share/lull/study/vendor
 	install -m 644 $(wildcard ggn/study/page/*.*) $(DESTDIR)$(PREFIX)/share/lull/study
 	install -m 644 $(wildcard ggn/study/page/vendor/*) $(DESTDIR)$(PREFIX)/share/lull/study/vendor
-	sed 's|@PREFIX@|$(PREFIX)|g' plugin-api/lull-criterion.pc.in > $(DESTDIR)$(PREFIX)/lib/pkgconfig/lull-criterion.pc
+	for name in lull-criterion lull-host; do \
+	    sed 's|@PREFIX@|$(PREFIX)|g' plugin-api/$$name.pc.in > $(DESTDIR)$(PREFIX)/lib/pkgconfig/$$name.pc || exit 1; done
 
 compdb: ## write compile_commands.json
-	@{ echo '['; sep=; for f in $(BASE_SRC) $(PT_SRC) $(PT_IMAGES) $(PT_MAIN) $(GGN_SRC) $(GGN_IMAGES) $(GGN_PLUGIN) $(GGN_STUDY) $(GGN_CLI) $(LOADER_SRC) $(EXAMPLE_SRC) $(TOOL_SRC) $(MPI_SRC); do \
+	@{ echo '['; sep=; for f in $(BASE_SRC) $(PT_SRC) $(PT_IMAGES) $(PT_MAIN) $(GGN_SRC) $(GGN_IMAGES) $(GGN_PLUGIN) $(GGN_STUDY) $(GGN_CLI) $(HOST_SRC) $(LOADER_SRC) $(EXAMPLE_SRC) $(TOOL_SRC) $(MPI_SRC); do \
 	  printf '%s' "$$sep"; $(MAKE) --no-print-directory -s compdb-one F=$$f; sep=,; done; echo ']'; } > compile_commands.json
 .PHONY: compdb-one
 compdb-one:

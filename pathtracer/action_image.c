@@ -105,23 +105,25 @@ static int write_outputs(struct pt_session *s, int was_interrupted, struct base_
 static void tell_summary(struct pt_session *s)
 {
     const struct pt_render *r = s->render;
-    uint32_t by_reason[PT_REASON_COUNT] = {0};
-    for (uint32_t i = 0; i < r->blocks.count; i++)
-        by_reason[r->blocks.list[i].reason]++;
+    uint32_t by_reason[LULL_REASON_COUNT] = {0};
+    for (uint32_t i = 0; i < r->blocks->count; i++)
+        by_reason[r->blocks->list[i].reason]++;
     double pixels = (double)r->film.pixels;
     char line[512];
     size_t used = (size_t)snprintf(line, sizeof line,
                                    "%.0f spp on average, %.1f s, %.2f Mpaths/s, criterion %.1f %%; blocks:",
-                                   (double)r->totals.samples / pixels, pt_render_elapsed_s(r),
-                                   (double)r->totals.paths / fmax(r->totals.render_s, 1e-9) * 1e-6,
-                                   100.0 * r->totals.criterion_s / fmax(pt_render_elapsed_s(r), 1e-9));
-    for (int i = 0; i < PT_REASON_COUNT && used < sizeof line; i++)
+                                   (double)r->totals->samples / pixels, lull_host_elapsed_s(r->frame),
+                                   (double)r->totals->paths / fmax(r->totals->render_s, 1e-9) * 1e-6,
+                                   100.0 * r->totals->criterion_s / fmax(lull_host_elapsed_s(r->frame), 1e-9));
+    for (int i = 0; i < LULL_REASON_COUNT && used < sizeof line; i++)
         if (by_reason[i] > 0)
-            used += (size_t)snprintf(line + used, sizeof line - used, " %u %s", by_reason[i], pt_block_reason_name(i));
+            used += (size_t)snprintf(line + used, sizeof line - used, " %u %s", by_reason[i], lull_host_reason(i));
     pt_note(s, line);
-    if (r->totals.dropped > 0) {
+    uint32_t kept = 0;
+    const struct lull_host_sample *dropped = lull_host_dropped(r->frame, &kept);
+    if (r->totals->dropped > 0 && kept > 0) {
         snprintf(line, sizeof line, "%llu samples were not finite and were dropped, the first seen at --debug-path %u,%u,%u",
-                 (unsigned long long)r->totals.dropped, r->dropped[0].x, r->dropped[0].y, r->dropped[0].sample);
+                 (unsigned long long)r->totals->dropped, dropped[0].x, dropped[0].y, dropped[0].sample);
         pt_say(s, line);
     }
 }

@@ -34,8 +34,8 @@ int pt_action_quote(struct pt_session *s, int *status, struct base_err *err)
     double load_s = base_clock_wall_s() - s->start_s;
     int rc = pt_action_open_render(s, err);
     if (!rc)
-        rc = pt_quote_create(s->render, s->criterion ? s->criterion->table : NULL, s->cli.params, s->cli.param_count,
-                             s->cli.mask ? &s->mask : NULL, pt_say, s, &s->quote, err);
+        rc = pt_quote_create(s->render, s->criterion ? lull_host_table(s->criterion) : NULL, s->cli.params,
+                             s->cli.param_count, pt_say, s, &s->quote, err);
     if (rc)
         return rc;
     struct pt_render_hooks hooks = {.slice = pt_action_after_slice, .judged = ask_quote, .interrupted = pt_interrupted,

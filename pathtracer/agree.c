@@ -1,11 +1,10 @@
 #include "agree.h"
 
 #include <stdio.h>
-#include <stdlib.h>
 #include <zlib.h>
 
 #include "base/version.h"
-#include "render/host_state.h"
+#include "render/host.h"
 
 int pt_agree_crc(const char *path, uint32_t *crc, struct base_err *err)
 {
@@ -43,7 +42,7 @@ int pt_agree_settings(struct pt_session *s, const struct pt_render_config *c, st
     used += (size_t)snprintf(s->settings + used, room - used, "fov=%.17g\nlook-at=", view->fov_deg);
     for (int k = 0; view->has_look_at && k < 9; k++)
         used += (size_t)snprintf(s->settings + used, room - used, "%.17g ", view->look_at_world[k]);
-    const struct lull_criterion *t = s->criterion ? s->criterion->table : NULL;
+    const struct lull_criterion *t = s->criterion ? lull_host_table(s->criterion) : NULL;
     used += (size_t)snprintf(s->settings + used, room - used, "\ncriterion=%s %s\n", t ? t->id : "none",
                              t ? t->version : "");
     if (used < room)
@@ -54,17 +53,23 @@ int pt_agree_settings(struct pt_session *s, const struct pt_render_config *c, st
     return used < room ? 0 : base_fail(err, BASE_EINVAL, "the criterion's parameters are too long");
 }
 
+static int32_t add_to_crc(const struct lull_writer *to, const void *data, uint64_t size)
+{
+    uint32_t *crc = to->context;
+    *crc = (uint32_t)crc32_z(*crc, data, (size_t)size);
+    return LULL_OK;
+}
+
 /* What every process of a job must agree about: the settings, and the model that the criterion starts with. */
 int pt_agree_job(const struct pt_session *s, char *text, size_t room, struct base_err *err)
 {
-    unsigned char *state = NULL;
-    size_t size = 0;
-    int rc = s->render && s->criterion ? pt_criterion_save(s->criterion, &state, &size, err) : 0;
-    if (rc)
-        return rc;
-    snprintf(text, room, "version=%s\n%scriterion-model-crc=%08x\n", BASE_VERSION, s->settings,
-             (unsigned)crc32_z(0, state, size));
-    free(state);
+    uint32_t crc = (uint32_t)crc32(0, NULL, 0);
+    struct lull_writer adder = {.struct_size = sizeof adder, .context = &crc, .write = add_to_crc};
+    struct lull_error e = {.struct_size = sizeof e};
+    int32_t code = s->render && s->criterion ? lull_host_save_history(s->criterion, &adder, &e) : LULL_OK;
+    if (code != LULL_OK)
+        return pt_host_fail(code, &e, err);
+    snprintf(text, room, "version=%s\n%scriterion-model-crc=%08x\n", BASE_VERSION, s->settings, (unsigned)crc);
     return 0;
 }
 

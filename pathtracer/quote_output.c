@@ -5,8 +5,7 @@
 #include <string.h>
 
 #include "base/json.h"
-#include "base/png.h"
-#include "image/stopmap.h"
+#include "render/output.h"
 #include "shade/bsdf_models.h"
 
 enum { DEAREST = 5, REPLAYED = 256 };
@@ -30,7 +29,7 @@ struct dear_block {
 };
 
 /* What the paths of a block meet: those of REPLAYED pixels spread over it, replayed by the tracing kernel. */
-static void take_census(const struct pt_render *r, const struct pt_block *b, struct dear_block *dear)
+static void take_census(const struct pt_render *r, const struct lull_host_block *b, struct dear_block *dear)
 {
     uint64_t met[PT_MET_COUNT] = {0}, all = 0, most = 0;
     uint32_t width = (uint32_t)(b->x1 - b->x0), pixels = width * (uint32_t)(b->y1 - b->y0);
@@ -65,7 +64,7 @@ static uint32_t find_dearest(const struct pt_quote *q, const struct pt_render *r
             out[at] = (struct dear_block){.index = i, .share = row->blocks[i].thread_s / row->thread_s};
     }
     for (uint32_t k = 0; k < n; k++)
-        take_census(r, &r->blocks.list[out[k].index], &out[k]);
+        take_census(r, &r->blocks->list[out[k].index], &out[k]);
     return n;
 }
 
@@ -124,8 +123,8 @@ static void print_dearest(FILE *out, const struct pt_quote *q, const struct pt_r
     const struct pt_quote_row *row = asked_row(q);
     fprintf(out, "\nblocks that take most of the time, as asked:\n");
     for (uint32_t k = 0; k < n; k++) {
-        const struct pt_block *b = &r->blocks.list[dear[k].index];
-        const struct pt_outlook_stop *stop = &row->blocks[dear[k].index].stop;
+        const struct lull_host_block *b = &r->blocks->list[dear[k].index];
+        const struct lull_host_stop_at *stop = &row->blocks[dear[k].index].stop;
         double paths = (double)b->spp * (double)(b->x1 - b->x0) * (double)(b->y1 - b->y0);
         char spp[32], low[32], high[32];
         fprintf(out, "  block %u (%d,%d to %d,%d): %.0f %%, %s spp (%s to %s), %.2f us per path of %.1f vertices, %.0f %% "
@@ -142,10 +141,10 @@ static void print_unmet(FILE *out, const struct pt_quote_row *row, const struct 
     if (row->unmet == 0)
         return;
     fprintf(out, "\n%u of %u blocks have not met their light yet (a longer --quote-pilot says more):", row->unmet,
-            r->blocks.count);
-    for (uint32_t i = 0; i < r->blocks.count; i++)
+            r->blocks->count);
+    for (uint32_t i = 0; i < r->blocks->count; i++)
         if (row->said[i].unmet)
-            fprintf(out, " %u", r->blocks.list[i].id);
+            fprintf(out, " %u", r->blocks->list[i].id);
     fprintf(out, "\n");
 }
 
@@ -161,11 +160,11 @@ void pt_quote_text(FILE *out, const struct pt_quote *q, const struct pt_render *
     if (asked->unknown > 0)
         fprintf(out, "criterion %s does not say when it expects to stop %u of %u blocks: those are counted with --spp-max, "
                 "so that all is at most\n",
-                r->criterion->table->id, asked->unknown, q->block_count);
+                lull_host_table(r->criterion)->id, asked->unknown, q->block_count);
     print_dearest(out, q, r);
     print_unmet(out, asked, r);
     fprintf(out, "\npilot: %.0f spp on average in %s, loading %s, %.1f of %d threads at work%s\n",
-            (double)r->totals.samples / (double)r->film.pixels, duration(pt_render_elapsed_s(r), took),
+            (double)r->totals->samples / (double)r->film.pixels, duration(lull_host_elapsed_s(r->frame), took),
             duration(info->load_s, load), r->busy_threads, q->threads, info->interrupted ? "; interrupted" : "");
     fprintf(out, "memory: film %.1f MB, scene %.1f MB\n", (double)r->film.bytes * 1e-6, (double)info->scene_bytes * 1e-6);
 }
@@ -200,7 +199,7 @@ static void add_row(cJSON *list, const struct pt_quote_row *row, uint32_t count,
         cJSON *block = base_json_object(blocks, NULL, failed);
         add_range(block, "spp", b->stop.spp, b->stop.low, b->stop.high, failed);
         add_range(block, "thread_s", b->thread_s, b->thread_low_s, b->thread_high_s, failed);
-        base_json_bool(block, "known", b->stop.known, failed);
+        base_json_bool(block, "known", b->stop.known != 0, failed);
         base_json_bool(block, "met_light", !row->said[i].unmet, failed);
     }
 }
@@ -208,8 +207,8 @@ static void add_row(cJSON *list, const struct pt_quote_row *row, uint32_t count,
 static void add_pilot(cJSON *root, const struct pt_render *r, const struct pt_quote_info *info, int *failed)
 {
     cJSON *o = base_json_object(root, "pilot", failed);
-    base_json_number(o, "spp_mean", (double)r->totals.samples / (double)r->film.pixels, failed);
-    base_json_number(o, "elapsed_s", pt_render_elapsed_s(r), failed);
+    base_json_number(o, "spp_mean", (double)r->totals->samples / (double)r->film.pixels, failed);
+    base_json_number(o, "elapsed_s", lull_host_elapsed_s(r->frame), failed);
     base_json_number(o, "load_s", info->load_s, failed);
     base_json_number(o, "busy_threads", r->busy_threads, failed);
     base_json_bool(o, "interrupted", info->interrupted, failed);
@@ -225,7 +224,7 @@ static void add_dearest(cJSON *root, const struct pt_quote *q, const struct pt_r
     cJSON *list = base_json_array(root, "dearest", failed);
     for (uint32_t k = 0; k < n; k++) {
         cJSON *o = base_json_object(list, NULL, failed);
-        base_json_number(o, "id", r->blocks.list[dear[k].index].id, failed);
+        base_json_number(o, "id", r->blocks->list[dear[k].index].id, failed);
         base_json_number(o, "share", dear[k].share, failed);
         base_json_number(o, "vertices_per_path", dear[k].bounces, failed);
         base_json_text(o, "mostly", dear[k].mostly, failed);
@@ -242,13 +241,13 @@ int pt_quote_json(FILE *out, const struct pt_quote *q, const struct pt_render *r
     base_json_number(root, "width", r->config.width, &failed);
     base_json_number(root, "height", r->config.height, &failed);
     base_json_number(root, "threads", q->threads, &failed);
-    base_json_text(root, "criterion", r->criterion ? r->criterion->table->id : NULL, &failed);
+    base_json_text(root, "criterion", r->criterion ? lull_host_table(r->criterion)->id : NULL, &failed);
     cJSON *rows = base_json_array(root, "rows", &failed);
     for (int i = 0; i < q->row_count; i++)
         add_row(rows, &q->rows[i], q->block_count, &failed);
     cJSON *blocks = base_json_array(root, "blocks", &failed);
     for (uint32_t i = 0; i < q->block_count; i++) {
-        const struct pt_block *b = &r->blocks.list[i];
+        const struct lull_host_block *b = &r->blocks->list[i];
         cJSON *o = base_json_object(blocks, NULL, &failed);
         base_json_number(o, "id", b->id, &failed);
         base_json_number(o, "x0", b->x0, &failed);
@@ -274,22 +273,16 @@ int pt_quote_json(FILE *out, const struct pt_quote *q, const struct pt_render *r
 int pt_quote_map(const char *path, const struct pt_quote *q, const struct pt_render *r, struct base_err *err)
 {
     const struct pt_quote_row *row = asked_row(q);
-    const struct pt_blocks *b = &r->blocks;
-    struct pt_stopmap_block *list = calloc(b->count, sizeof *list);
-    double most_s = 0.0;
-    if (!list)
+    struct lull_error e = {.struct_size = sizeof e};
+    double *values = calloc(q->block_count, sizeof *values), most_s = 0.0;
+    if (!values)
         return base_fail_nomem(err, "quote map");
-    for (uint32_t i = 0; i < b->count; i++)
+    for (uint32_t i = 0; i < q->block_count; i++)
         most_s = fmax(most_s, row->blocks[i].thread_s);
     int minutes = most_s >= 60.0;
-    for (uint32_t i = 0; i < b->count; i++)
-        list[i] = (struct pt_stopmap_block){b->list[i].x0, b->list[i].y0, b->list[i].x1, b->list[i].y1,
-                                            row->blocks[i].thread_s / (minutes ? 60.0 : 1.0)};
-    struct pt_stopmap map = {0};
-    int rc = pt_stopmap_draw(b->x0, b->y0, b->x1, b->y1, list, b->count, minutes ? "min" : "s", &map, err);
-    if (!rc)
-        rc = base_png_write(path, map.width, map.height, 3, map.rgb, err);
-    pt_stopmap_release(&map);
-    free(list);
-    return rc;
+    for (uint32_t i = 0; i < q->block_count; i++)
+        values[i] = row->blocks[i].thread_s / (minutes ? 60.0 : 1.0);
+    int32_t code = lull_host_value_map(r->blocks, values, minutes ? "min" : "s", path, &e);
+    free(values);
+    return code == LULL_OK ? 0 : pt_output_fail(code, &e, err);
 }

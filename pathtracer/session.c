@@ -52,7 +52,7 @@ void pt_session_release(struct pt_session *s)
 {
     pt_quote_destroy(s->quote);
     pt_render_destroy(s->render);
-    pt_criterion_destroy(s->criterion);
+    lull_host_close(s->criterion);
     pt_mask_release(&s->mask);
     pt_scene_destroy(s->scene);
     base_threads_destroy(s->threads);

@@ -24,7 +24,7 @@ struct pt_session {
     struct pt_scene *scene;
     struct pt_scene_defaults defaults;
     struct pt_mask mask;
-    struct pt_criterion *criterion;
+    struct lull_host_criterion *criterion;
     struct pt_render *render;
     struct pt_quote *quote;
     double start_s;         /* wall time of the program's start */

@@ -74,7 +74,7 @@ int pt_setup_criterion(struct pt_session *s, struct base_err *err)
     rc = pt_mask_read(cli->mask, s->defaults.width, s->defaults.height, &s->mask, err);
     if (!rc)
         rc = base_inputs_add(&s->judging, cli->mask, err);
-    return rc ? rc : pt_criterion_set_mask(s->criterion, &s->mask, cli->params, cli->param_count, err);
+    return rc;
 }
 
 /* A parameter may name a file: a model. */
@@ -123,6 +123,7 @@ int pt_setup_render(struct pt_session *s, struct base_err *err)
     int rc = pt_setup_config(s, &config, err);
     if (!rc)
         rc = pt_setup_criterion(s, err);
+    config.mask = s->mask.grey ? &s->mask : NULL;
     if (!rc && (!s->peers || s->peers->rank == 0)) /* the others write nothing */
         rc = check_outputs(s, err);
     if (!rc)

@@ -54,9 +54,9 @@ int pt_crew_sample(struct pt_crew *crew, struct base_threads *threads, const str
 
 /* Blocks about which the criterion is to be asked: the arguments of pt_criterion_evaluate. */
 struct pt_crew_question {
-    struct pt_criterion *criterion;
-    struct pt_film *film;
-    const struct pt_blocks *blocks;
+    struct lull_host_criterion *criterion;
+    struct lull_host_frame *frame;
+    const struct pt_film *film;
     const uint32_t *due;
     const uint8_t *final;
     uint32_t count;
@@ -67,7 +67,7 @@ struct pt_crew_question {
 
 /* Can others answer as well? Yes if the criterion keeps no history of its own, its answers are a function of the block's
  * pixels, and every member has opened the frame. No without crew (NULL). */
-int pt_crew_can_ask(const struct pt_crew *crew, const struct pt_criterion *criterion);
+int pt_crew_can_ask(const struct pt_crew *crew, const struct lull_host_criterion *criterion);
 /* pt_criterion_evaluate by everybody. Fails as pt_crew_sample; what the criterion itself fails with is *said, and costs all
  * decisions. *thread_s: processor seconds of the others. */
 int pt_crew_ask(struct pt_crew *crew, struct base_threads *threads, const struct pt_crew_question *question,

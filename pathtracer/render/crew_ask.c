@@ -16,24 +16,29 @@ struct asking {
     struct base_err *said, *err;
 };
 
-int pt_crew_can_ask(const struct pt_crew *crew, const struct pt_criterion *criterion)
+int pt_crew_can_ask(const struct pt_crew *crew, const struct lull_host_criterion *criterion)
 {
     const uint32_t pure = LULL_CAP_DETERMINISTIC | LULL_CAP_BATCH_INVARIANT;
     if (!crew || !crew->judges)
         return 0;
-    const struct lull_criterion *t = criterion->table;
+    const struct lull_criterion *t = lull_host_table(criterion);
     int history = t->get_extension && t->get_extension(LULL_EXT_STATE);
-    return !history && criterion->needs.halo == 0 && (t->capabilities & pure) == pure;
+    return !history && lull_host_needs(criterion)->halo == 0 && (t->capabilities & pure) == pure;
 }
 
-static struct pt_row row_of(const struct pt_block *b, int y)
+static const struct lull_host_blocks *blocks_of(const struct pt_crew_question *q)
+{
+    return lull_host_blocks_of(q->frame);
+}
+
+static struct pt_row row_of(const struct lull_host_block *b, int y)
 {
     return (struct pt_row){.y = y, .x0 = b->x0, .x1 = b->x1};
 }
 
 static size_t block_bytes(const struct asking *a, uint32_t k)
 {
-    const struct pt_block *b = &a->q->blocks->list[a->q->due[k]];
+    const struct lull_host_block *b = &blocks_of(a->q)->list[a->q->due[k]];
     struct pt_row row = row_of(b, b->y0);
     return sizeof(struct pt_crew_block) + (size_t)(b->y1 - b->y0) * pt_row_bytes(&row, a->q->film->planes);
 }
@@ -66,7 +71,7 @@ static int send_blocks(struct asking *a, int rank, uint32_t n)
     unsigned char *sums = (unsigned char *)(message->blocks + n);
     for (uint32_t k = 0; k < n; k++) {
         uint32_t at = a->next + k;
-        const struct pt_block *b = &q->blocks->list[q->due[at]];
+        const struct lull_host_block *b = &blocks_of(q)->list[q->due[at]];
         message->blocks[k] = (struct pt_crew_block){.index = q->due[at], .final = q->final[at], .block = *b};
         for (int y = b->y0; y < b->y1; y++) {
             struct pt_row row = row_of(b, y);
@@ -148,7 +153,7 @@ static void ask_here(struct asking *a, int threads)
     struct base_err err = {0};
     uint32_t n = share(a, threads), first = a->next;
     a->next += n;
-    if (n > 0 && pt_criterion_evaluate(q->criterion, q->film, q->blocks, q->due + first, n, q->final + first,
+    if (n > 0 && pt_criterion_evaluate(q->criterion, q->frame, q->film, q->due + first, n, q->final + first,
                                        q->decisions + first, &err) != 0 && !a->said->code)
         *a->said = err;
 }
@@ -167,7 +172,7 @@ int pt_crew_ask(struct pt_crew *crew, struct base_threads *threads, const struct
             rc = attend(&a, a.next < question->count ? 0.0 : 0.05);
     }
     for (uint32_t k = 0; k < question->count && said->code; k++)
-        question->decisions[k] = pt_criterion_undecided;
+        question->decisions[k] = lull_host_undecided();
     *thread_s = a.thread_s;
     return rc;
 }

@@ -224,8 +224,8 @@ static void judge(const struct pt_crew_tools *tools, struct pt_crew_ask *ask)
     const unsigned char *sums = (const unsigned char *)(ask->blocks + ask->count);
     double start_s = base_clock_process_s();
     for (uint32_t k = 0; k < ask->count; k++) {
-        const struct pt_block *b = &ask->blocks[k].block;
-        r->blocks.list[ask->blocks[k].index] = *b;
+        const struct lull_host_block *b = &ask->blocks[k].block;
+        r->blocks->list[ask->blocks[k].index] = *b;
         for (int y = b->y0; y < b->y1; y++) {
             struct pt_row row = {.y = y, .x0 = b->x0, .x1 = b->x1};
             pt_row_restore(&r->film, &row, sums);
@@ -242,7 +242,7 @@ static void judge(const struct pt_crew_tools *tools, struct pt_crew_ask *ask)
     }
     if (!due || !final || !decisions)
         base_fail_nomem(&err, "blocks to be judged");
-    else if (pt_criterion_evaluate(r->criterion, &r->film, &r->blocks, due, ask->count, final, decisions, &err) == 0)
+    else if (pt_criterion_evaluate(r->criterion, r->frame, &r->film, due, ask->count, final, decisions, &err) == 0)
         for (uint32_t k = 0; k < ask->count; k++)
             ask->blocks[k].decision = decisions[k];
     snprintf(ask->error, sizeof ask->error, "%s", err.text);

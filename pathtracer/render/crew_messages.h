@@ -34,7 +34,7 @@ struct pt_crew_rows {
 /* A block to be judged, and the answer. */
 struct pt_crew_block {
     uint32_t index, final; /* in the list of blocks; final: as for pt_criterion_evaluate */
-    struct pt_block block;
+    struct lull_host_block block;
     struct lull_decision decision;
 };
 

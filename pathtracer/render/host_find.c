@@ -32,23 +32,6 @@ int pt_criterion_find(const char *spec, struct base_inputs *inputs, void (*warn)
     return rc;
 }
 
-const char *pt_criterion_parameter(const struct lull_criterion *t, const char *name, const struct lull_pair *pairs,
-                                   uint32_t pair_count, const struct lull_param **found)
-{
-    const struct lull_param *p = NULL;
-    for (uint32_t i = 0; i < t->param_count && !p; i++) {
-        const struct lull_param *candidate = (const void *)((const char *)t->params + (size_t)i * t->param_stride);
-        p = strcmp(candidate->name, name) == 0 ? candidate : NULL;
-    }
-    const char *text = p ? p->default_value : NULL;
-    for (uint32_t i = 0; p && i < pair_count; i++)
-        if (strcmp(pairs[i].key, name) == 0)
-            text = pairs[i].value;
-    if (found)
-        *found = p;
-    return text;
-}
-
 struct listing {
     FILE *out;
     int count;

@@ -14,11 +14,6 @@
 int pt_criterion_find(const char *spec, struct base_inputs *inputs, void (*warn)(void *data, const char *line),
                       void *warn_data, const struct lull_criterion **out, struct base_err *err);
 
-/* What parameter `name` is set to: the last of pairs with that key, else the criterion's default, which may be NULL. NULL
- * too when it has no such parameter. *found, which may be NULL, gets the parameter itself. */
-const char *pt_criterion_parameter(const struct lull_criterion *table, const char *name, const struct lull_pair *pairs,
-                                   uint32_t pair_count, const struct lull_param **found);
-
 /* Every criterion that can be found, with its parameters, for people. Returns the number listed. */
 int pt_criterion_list(FILE *out, void (*warn)(void *data, const char *line), void *warn_data);
 

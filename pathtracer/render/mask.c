@@ -1,14 +1,9 @@
 #include "render/mask.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 
-#include "base/options.h"
 #include "image/oiio.h"
-#include "render/host_find.h"
-
-static const double WHITE_SCALE = 0.25;
 
 static float sample(const struct pt_oiio_image *image, size_t i)
 {
@@ -51,40 +46,9 @@ void pt_mask_release(struct pt_mask *mask)
     *mask = (struct pt_mask){0};
 }
 
-int pt_mask_step(const struct pt_mask *mask, const struct pt_block *b)
+struct lull_plane pt_mask_plane(const struct pt_mask *mask)
 {
-    float lightest = 0.0f;
-    for (int y = b->y0; y < b->y1; y++)
-        for (int x = b->x0; x < b->x1; x++)
-            lightest = fmaxf(lightest, mask->grey[(size_t)y * (size_t)mask->width + (size_t)x]);
-    return (int)(lightest * PT_MASK_STEPS + 0.5f);
-}
-
-double pt_mask_scale(int step)
-{
-    return pow(WHITE_SCALE, (double)step / PT_MASK_STEPS);
-}
-
-int pt_mask_dial(const struct lull_criterion *t, const struct lull_pair *pairs, uint32_t pair_count, int step,
-                 char value[32], struct lull_pair *pair, struct base_err *err)
-{
-    static const char *const dials[] = {"visible", "threshold"};
-    const char *known = NULL; /* a dial that has no value */
-    for (size_t d = 0; d < sizeof dials / sizeof dials[0]; d++) {
-        const struct lull_param *p;
-        const char *text = pt_criterion_parameter(t, dials[d], pairs, pair_count, &p);
-        double dial;
-        if (p && !text && !known)
-            known = dials[d];
-        if (!text || !base_parse_real(text, p->min, p->max, &dial))
-            continue;
-        dial *= pt_mask_scale(step);
-        snprintf(value, 32, "%.17g", fmin(fmax(dial, p->min), p->max));
-        *pair = (struct lull_pair){dials[d], value};
-        return 0;
-    }
-    if (known)
-        return base_fail(err, BASE_EINVAL, "criterion %s: --mask scales '%s', which has no value: give it with -p %s=VALUE",
-                         t->id, known, known);
-    return base_fail(err, BASE_EINVAL, "criterion %s has no dial 'visible' or 'threshold' for --mask to scale", t->id);
+    return (struct lull_plane){.data = mask->grey, .stride_x = sizeof *mask->grey,
+                               .stride_y = (int64_t)sizeof *mask->grey * mask->width, .stride_c = sizeof *mask->grey,
+                               .scale = 1.0, .type = LULL_TYPE_F32, .normaliser = LULL_NORM_ONE, .channels = 1};
 }

@@ -10,10 +10,9 @@
 #include "base/colour.h"
 #include "base/files.h"
 #include "base/png.h"
-#include "base/text.h"
 #include "base/version.h"
 #include "image/exr.h"
-#include "image/stopmap.h"
+#include "render/host.h"
 
 int pt_output_has_ending(const char *path, const char *ending)
 {
@@ -22,7 +21,7 @@ int pt_output_has_ending(const char *path, const char *ending)
 }
 
 /* The block that a pixel is in. Blocks of the list form a full rectangle of grid cells. */
-static const struct pt_block *block_at(const struct pt_blocks *b, int x, int y)
+static const struct lull_host_block *block_at(const struct lull_host_blocks *b, int x, int y)
 {
     int column = x / b->block_width - b->list[0].x0 / b->block_width;
     int row = y / b->block_height - b->list[0].y0 / b->block_height;
@@ -31,7 +30,6 @@ static const struct pt_block *block_at(const struct pt_blocks *b, int x, int y)
 
 /* --- EXR ------------------------------------------------------------------------------------------------------------ */
 
-enum { VIEW_NAME = 256 }; /* bytes; no file system has longer names */
 enum { R, G, B, SPP, P_NOISY, ERROR, REASON, FIRST_AOV, CHANNELS_MAX = FIRST_AOV + 7 };
 
 struct exr_source {
@@ -57,7 +55,7 @@ static void exr_row(void *data, int y, float *const *rows)
     const struct pt_render *r = source->render;
     int x0 = r->config.crop[0];
     for (int x = x0; x < r->config.crop[2]; x++) {
-        const struct pt_block *b = block_at(&r->blocks, x, y);
+        const struct lull_host_block *b = block_at(r->blocks, x, y);
         size_t i = pt_film_index(&r->film, x, y), k = (size_t)(x - x0);
         double rgb[3];
         pt_film_mean(&r->film, i, b->spp, rgb);
@@ -86,7 +84,7 @@ static void criterion_text(const struct pt_render *r, const struct pt_output_inf
         snprintf(text, room, "none");
         return;
     }
-    const struct lull_criterion *t = r->criterion->table;
+    const struct lull_criterion *t = lull_host_table(r->criterion);
     size_t used = (size_t)snprintf(text, room, "%s %s", t->id, t->version);
     for (uint32_t i = 0; i < info->param_count && used < room; i++)
         used += (size_t)snprintf(text + used, room - used, " %s=%s", info->params[i].key, info->params[i].value);
@@ -114,8 +112,8 @@ int pt_output_exr(const char *path, const struct pt_render *r, const struct pt_o
 
     char effects[512], criterion[2048], reasons[256];
     size_t used = 0;
-    for (int i = 0; i < PT_REASON_COUNT; i++)
-        used += (size_t)snprintf(reasons + used, sizeof reasons - used, "%s%d=%s", i ? " " : "", i, pt_block_reason_name(i));
+    for (int i = 0; i < LULL_REASON_COUNT; i++)
+        used += (size_t)snprintf(reasons + used, sizeof reasons - used, "%s%d=%s", i ? " " : "", i, lull_host_reason(i));
     char block[48];
     snprintf(block, sizeof block, "%dx%d", r->config.block_width, r->config.block_height);
     effect_names(info->effects, effects, sizeof effects);
@@ -127,9 +125,9 @@ int pt_output_exr(const char *path, const struct pt_render *r, const struct pt_o
         {"lull:reasons", reasons, 0.0},
         {"lull:block", block, 0.0},
         {"lull:seed", NULL, (double)r->config.integrator.seed},
-        {"lull:samples", NULL, (double)r->totals.samples},
+        {"lull:samples", NULL, (double)r->totals->samples},
         {"software", "lull pathtracer " BASE_VERSION, 0.0},
-        {"lull:seconds", NULL, pt_render_elapsed_s(r)}, /* last: left out of reproducible files */
+        {"lull:seconds", NULL, lull_host_elapsed_s(r->frame)}, /* last: left out of reproducible files */
     };
     struct exr_source source = {r, info->aov};
     const int *crop = r->config.crop;
@@ -180,7 +178,7 @@ int pt_output_preview(const char *path, const struct pt_render *r, struct base_e
     for (int y = crop[1]; y < crop[3]; y++) {
         for (int x = crop[0]; x < crop[2]; x++, out += 3) {
             double rgb[3];
-            pt_film_mean(&r->film, pt_film_index(&r->film, x, y), block_at(&r->blocks, x, y)->spp, rgb);
+            pt_film_mean(&r->film, pt_film_index(&r->film, x, y), block_at(r->blocks, x, y)->spp, rgb);
             for (int c = 0; c < 3; c++)
                 out[c] = base_srgb_code(rgb[c]);
         }
@@ -190,41 +188,50 @@ int pt_output_preview(const char *path, const struct pt_render *r, struct base_e
     return rc;
 }
 
-static int stop_map_png(const char *path, const struct pt_render *r, struct base_err *err)
+/* What could not be written is BASE_EIO. */
+int pt_output_fail(int32_t code, const struct lull_error *said, struct base_err *err)
 {
-    const struct pt_blocks *b = &r->blocks;
-    struct pt_stopmap_block *list = calloc(b->count, sizeof *list);
-    if (!list)
-        return base_fail_nomem(err, "stop map");
-    for (uint32_t i = 0; i < b->count; i++)
-        list[i] = (struct pt_stopmap_block){b->list[i].x0, b->list[i].y0, b->list[i].x1, b->list[i].y1,
-                                            (double)b->list[i].spp};
-    struct pt_stopmap map = {0};
-    int rc = pt_stopmap_draw(b->x0, b->y0, b->x1, b->y1, list, b->count, "spp", &map, err);
-    if (!rc)
-        rc = base_png_write(path, map.width, map.height, 3, map.rgb, err);
-    pt_stopmap_release(&map);
-    free(list);
-    return rc;
-}
-
-/* name;t0;…;t15; */
-static int stop_map_csv(const char *path, const struct pt_render *r, const char *scene, struct base_err *err)
-{
-    struct base_file_out out;
-    int rc = base_file_begin(&out, path, err);
-    if (rc)
-        return rc;
-    char name[VIEW_NAME];
-    base_view_name(scene, name, sizeof name);
-    fprintf(out.file, "%s;", name);
-    for (uint32_t i = 0; i < r->blocks.count; i++)
-        fprintf(out.file, "%llu;", (unsigned long long)r->blocks.list[i].spp);
-    fprintf(out.file, "\n");
-    return base_file_commit(&out, err);
+    return code == LULL_E_IO ? base_fail(err, BASE_EIO, "%s", said->message) : pt_host_fail(code, said, err);
 }
 
 int pt_output_stop_map(const char *path, const struct pt_render *r, const struct pt_output_info *info, struct base_err *err)
 {
-    return pt_output_has_ending(path, "csv") ? stop_map_csv(path, r, info->scene, err) : stop_map_png(path, r, err);
+    struct lull_error e = {.struct_size = sizeof e};
+    int32_t code = lull_host_stop_map(r->blocks, path, info->scene, &e);
+    return code == LULL_OK ? 0 : pt_output_fail(code, &e, err);
+}
+
+/* --- report --------------------------------------------------------------------------------------------------------- */
+
+int pt_output_report(const char *path, const struct pt_render *r, const struct pt_output_info *info, struct base_err *err)
+{
+    const char *effects[PT_FX_COUNT];
+    uint32_t n = 0;
+    for (int i = 0; i < PT_FX_COUNT; i++)
+        if (info->effects >> i & 1)
+            effects[n++] = pt_effects_name(i);
+    struct lull_error e = {.struct_size = sizeof e};
+    struct lull_host_report report = {
+        .struct_size = sizeof report,
+        .flags = info->interrupted ? LULL_REPORT_INTERRUPTED : 0,
+        .scene = info->scene,
+        .mask = info->mask,
+        .kernel = info->kernel,
+        .effects = effects,
+        .effect_count = n,
+        .threads = (uint32_t)info->threads,
+        .processes = (uint32_t)pt_crew_processes(r->config.crew),
+        .film_bytes = r->film.bytes,
+        .film_pixels = r->film.pixels,
+        .scene_bytes = info->scene_bytes >= 0 ? (double)info->scene_bytes : (double)NAN,
+    };
+    if (r->config.crew) {
+        const struct pt_crew_traffic *traffic = pt_crew_traffic(r->config.crew);
+        report.flags |= LULL_REPORT_MESSAGES;
+        report.messages = traffic->messages;
+        report.message_bytes = traffic->bytes;
+        report.message_wait_s = traffic->waiting_s;
+    }
+    int32_t code = lull_host_report_write(r->frame, &report, path, &e);
+    return code == LULL_OK ? 0 : pt_output_fail(code, &e, err);
 }

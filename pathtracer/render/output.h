@@ -34,6 +34,9 @@ int pt_output_stop_map(const char *path, const struct pt_render *render, const s
 int pt_output_report(const char *path, const struct pt_render *render, const struct pt_output_info *info,
                      struct base_err *err);
 
+/* A failure of the host library to write a file. */
+int pt_output_fail(int32_t code, const struct lull_error *said, struct base_err *err);
+
 /* `path` ends in `.ending`, whatever the case. */
 int pt_output_has_ending(const char *path, const char *ending);
 

@@ -6,8 +6,6 @@
 #include <unistd.h>
 
 #include "base/clock.h"
-#include "render/outlook.h"
-
 static const double LIVE_S = 0.2, FIRST_PLAIN_S = 2.0, PLAIN_S = 10.0;
 
 void pt_progress_init(struct pt_progress *p, FILE *out)
@@ -28,56 +26,25 @@ static void format_time(double s, char *text, size_t room)
         snprintf(text, room, "%ld:%02ld", t / 60, t % 60);
 }
 
-struct outlook {
-    double done_s, left_s; /* thread seconds */
-    double wall_s;         /* that what is left takes */
-    int known;             /* every active block has a prediction */
-    uint64_t low, high;    /* samples of the active blocks */
-    uint32_t active;
-};
-
-/* What is left of one active block. */
-static struct pt_outlook_work look_at(const struct pt_render *r, const struct pt_block *b, struct outlook *o)
+/* What is left, and wall seconds that it takes: INFINITY when nobody knows. */
+static struct lull_host_forecast look(const struct pt_render *r, double *wall_s)
 {
-    struct pt_outlook_stop stop = pt_outlook_of_block(b, r->config.uniform, r->config.spp_max);
-    double more = stop.spp - (double)b->spp, left_s = b->spp > 0 ? more * b->thread_s / (double)b->spp : 0.0;
-    o->active++;
-    o->low = b->spp < o->low ? b->spp : o->low;
-    o->high = b->spp > o->high ? b->spp : o->high;
-    o->known &= stop.known;
-    o->left_s += left_s;
-    if (!r->config.uniform && r->totals.checks > 0)
-        o->wall_s += pt_outlook_checks(b, stop.spp) * r->totals.criterion_s / (double)r->totals.checks;
-    return (struct pt_outlook_work){more, left_s, b->y1 - b->y0};
-}
-
-static struct outlook look(const struct pt_render *r)
-{
-    struct outlook o = {.known = 1, .low = UINT64_MAX};
-    struct pt_outlook_work *work = malloc(r->blocks.count * sizeof *work);
+    struct lull_host_forecast f = {.known = 1};
     int threads = pt_render_threads(r);
-    for (uint32_t i = 0; i < r->blocks.count && work; i++) {
-        const struct pt_block *b = &r->blocks.list[i];
-        o.done_s += b->thread_s;
-        if (b->reason != PT_REASON_NONE)
-            continue;
-        struct pt_outlook_work *one = &work[o.active];
-        *one = look_at(r, b, &o);
-    }
-    if (!work || r->busy_threads <= 0.0)
-        o.wall_s = INFINITY;
+    int32_t code = lull_host_outlook(r->blocks, r->totals, threads, &f, NULL);
+    if (code != LULL_OK || r->busy_threads <= 0.0)
+        *wall_s = INFINITY;
     else /* what keeps the threads from it now, other programs for one, will go on doing so */
-        o.wall_s += pt_outlook_wall_s(work, o.active, threads) * pt_outlook_busy(r->sampled_rows, threads) / r->busy_threads;
-    free(work);
-    return o;
+        *wall_s = f.check_s + f.sampling_s * lull_host_busy(r->sampled_rows, threads) / r->busy_threads;
+    return f;
 }
 
 void pt_progress_text(const struct pt_render *r, char *text, size_t room)
 {
-    struct outlook o = look(r);
-    double elapsed_s = pt_render_elapsed_s(r), left_s = o.wall_s;
+    double elapsed_s = r->totals->render_s + r->totals->criterion_s, left_s;
+    struct lull_host_forecast o = look(r, &left_s);
     double share = o.left_s > 0.0 ? o.done_s / (o.done_s + o.left_s) : 1.0;
-    int known = o.known;
+    int known = o.known != 0;
     if (r->config.time_budget_s > 0.0) {
         double budget_left_s = fmax(0.0, r->config.time_budget_s - elapsed_s);
         if (budget_left_s < left_s) {
@@ -91,7 +58,7 @@ void pt_progress_text(const struct pt_render *r, char *text, size_t room)
     if (o.active == 0)
         o.low = 0;
     snprintf(text, room, "%s%3.0f%%  %u of %u blocks active  spp %llu..%llu  %.2f Mpaths/s  ETA %s%s", known ? "" : ">=",
-             floor(100.0 * share), o.active, r->blocks.count, (unsigned long long)o.low, (unsigned long long)o.high,
+             floor(100.0 * share), o.active, r->blocks->count, (unsigned long long)o.low, (unsigned long long)o.high,
              r->samples_per_s * 1e-6, known || !isfinite(left_s) ? "" : "at most ", left);
 }
 

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 
 #include "base/options.h"
-#include "render/host_find.h"
+#include "render/host.h"
 
 /* --- rows -------------------------------------------------------------------------------------------------------------- */
 
@@ -22,23 +22,25 @@ static int add_row(struct pt_quote *q, double visible, int asked, struct base_er
 
 /* The row's own instance: the given parameters, and its share of viewers after them, which wins. */
 static int open_row(struct pt_quote_row *row, const struct pt_render *r, const struct lull_criterion *table,
-                    const struct lull_pair *pairs, uint32_t pair_count, const struct pt_mask *mask,
-                    void (*warn)(void *data, const char *line), void *warn_data, struct base_err *err)
+                    const struct lull_pair *pairs, uint32_t pair_count, void (*warn)(void *data, const char *line),
+                    void *warn_data, struct base_err *err)
 {
+    struct lull_error e = {.struct_size = sizeof e};
+    char value[32];
     uint32_t n = pair_count;
-    row->pairs = calloc(pair_count + 1, sizeof *row->pairs);
-    if (!row->pairs)
+    struct lull_pair *all = calloc((size_t)pair_count + 1, sizeof *all);
+    if (!all)
         return base_fail_nomem(err, "quote");
     for (uint32_t i = 0; i < pair_count; i++)
-        row->pairs[i] = pairs[i];
+        all[i] = pairs[i];
     if (!isnan(row->visible)) {
-        snprintf(row->value, sizeof row->value, "%.17g", row->visible);
-        row->pairs[n++] = (struct lull_pair){"visible", row->value};
+        snprintf(value, sizeof value, "%.17g", row->visible);
+        all[n++] = (struct lull_pair){"visible", value};
     }
-    int rc = pt_criterion_create(table, row->pairs, n, r->threads, warn, warn_data, &row->criterion, err);
-    if (!rc && mask)
-        rc = pt_criterion_set_mask(row->criterion, mask, row->pairs, n, err);
-    return rc ? rc : pt_render_open_frame(r, row->criterion, err);
+    int rc = pt_criterion_create(table, all, n, r->threads, warn, warn_data, &row->criterion, err);
+    free(all);
+    int32_t code = rc ? LULL_OK : lull_host_join(r->frame, row->criterion, &e);
+    return code == LULL_OK ? rc : pt_host_fail(code, &e, err);
 }
 
 /* Rows by falling share, the one that the options ask for among them; its share is NaN, and it comes first, when the
@@ -48,7 +50,7 @@ static int add_rows(struct pt_quote *q, const struct lull_criterion *table, cons
 {
     static const double shares[] = {0.5, 0.25, 0.05};
     const struct lull_param *dial = NULL;
-    const char *text = table ? pt_criterion_parameter(table, "visible", pairs, pair_count, &dial) : NULL;
+    const char *text = table ? lull_host_parameter(table, "visible", pairs, pair_count, &dial) : NULL;
     double asked;
     int met = !text || !base_parse_real(text, 0, 1, &asked);
     int rc = met ? add_row(q, (double)NAN, 1, err) : 0;
@@ -67,18 +69,18 @@ static int add_rows(struct pt_quote *q, const struct lull_criterion *table, cons
 }
 
 int pt_quote_create(const struct pt_render *r, const struct lull_criterion *table, const struct lull_pair *pairs,
-                    uint32_t pair_count, const struct pt_mask *mask, void (*warn)(void *data, const char *line),
-                    void *warn_data, struct pt_quote **out, struct base_err *err)
+                    uint32_t pair_count, void (*warn)(void *data, const char *line), void *warn_data,
+                    struct pt_quote **out, struct base_err *err)
 {
     struct pt_quote *q = calloc(1, sizeof *q);
     if (!q)
         return base_fail_nomem(err, "quote");
-    q->block_count = r->blocks.count;
+    q->block_count = r->blocks->count;
     q->threads = pt_render_threads(r);
     q->block_cost_s = calloc(q->block_count, sizeof *q->block_cost_s);
     int rc = q->block_cost_s ? add_rows(q, table, pairs, pair_count, err) : base_fail_nomem(err, "quote");
     for (int i = 0; i < q->row_count && table && !rc; i++)
-        rc = open_row(&q->rows[i], r, table, pairs, pair_count, mask, warn, warn_data, err);
+        rc = open_row(&q->rows[i], r, table, pairs, pair_count, warn, warn_data, err);
     if (rc) {
         pt_quote_destroy(q);
         return rc;
@@ -92,8 +94,7 @@ void pt_quote_destroy(struct pt_quote *q)
     if (!q)
         return;
     for (int i = 0; i < q->row_count; i++) {
-        pt_criterion_destroy(q->rows[i].criterion);
-        free(q->rows[i].pairs);
+        lull_host_close(q->rows[i].criterion);
         free(q->rows[i].said);
         free(q->rows[i].first);
         free(q->rows[i].blocks);
@@ -106,16 +107,17 @@ void pt_quote_destroy(struct pt_quote *q)
 
 /* A row that would have stopped the block at an earlier check has stopped it; where between the two checks follows from what
  * it expected at the first. */
-static void hear(struct pt_outlook_said *said, const struct pt_block *b, const struct lull_decision *d, uint64_t spp_min)
+static void hear(struct lull_host_said *said, const struct lull_host_block *b, const struct lull_decision *d,
+                 uint64_t spp_min)
 {
     if (said->stopped || b->spp <= said->spp)
         return;
     if (d->action == LULL_STOP && b->spp >= spp_min) {
         double expected = said->spp > 0 && isfinite(said->predicted) ? said->predicted : (double)b->spp;
         double stop = fmin(fmax(expected, (double)said->spp), (double)b->spp);
-        *said = (struct pt_outlook_said){.spp = b->spp, .predicted = fmax(stop, (double)spp_min), .stopped = 1};
+        *said = (struct lull_host_said){.spp = b->spp, .predicted = fmax(stop, (double)spp_min), .stopped = 1};
     } else {
-        *said = (struct pt_outlook_said){.spp = b->spp, .predicted = d->predicted_spp};
+        *said = (struct lull_host_said){.spp = b->spp, .predicted = d->predicted_spp};
     }
 }
 
@@ -125,9 +127,9 @@ static int ask_row(struct pt_quote_row *row, struct pt_render *r, const uint32_t
     uint8_t *final = calloc(count, 1);
     int rc = decisions && final ? 0 : base_fail_nomem(err, "quote");
     if (!rc)
-        rc = pt_criterion_evaluate(row->criterion, &r->film, &r->blocks, due, count, final, decisions, err);
+        rc = pt_criterion_evaluate(row->criterion, r->frame, &r->film, due, count, final, decisions, err);
     for (uint32_t k = 0; k < count && !rc; k++)
-        hear(&row->said[due[k]], &r->blocks.list[due[k]], &decisions[k], r->config.spp_min);
+        hear(&row->said[due[k]], &r->blocks->list[due[k]], &decisions[k], r->config.spp_min);
     for (uint32_t k = 0; k < count && !rc; k++)
         if (row->first[due[k]].spp == 0)
             row->first[due[k]] = row->said[due[k]];
@@ -149,7 +151,7 @@ static int ask_all(struct pt_quote *q, struct pt_render *r, struct base_err *err
     if (!due)
         return base_fail_nomem(err, "quote");
     for (uint32_t i = 0; i < q->block_count; i++)
-        if (r->blocks.list[i].spp > 0)
+        if (r->blocks->list[i].spp > 0)
             due[n++] = i;
     int rc = 0;
     for (int i = 0; i < q->row_count && n > 0 && !r->config.uniform && !rc; i++)
@@ -173,7 +175,7 @@ static int falling(const void *a, const void *b)
 
 /* Share of the squared luminance difference of the halves that the hundredth part of a block's pixels has that has most;
  * 0 without halves or differences. scratch: [pixels of the block] */
-static double tail_share(const struct pt_render *r, const struct pt_block *b, float *scratch)
+static double tail_share(const struct pt_render *r, const struct lull_host_block *b, float *scratch)
 {
     size_t n = 0;
     double all = 0.0, top = 0.0;
@@ -197,7 +199,7 @@ static double tail_share(const struct pt_render *r, const struct pt_block *b, fl
     return all > 0.0 ? top / all : 0.0;
 }
 
-static int grows(const struct pt_outlook_said *first, const struct pt_outlook_said *said)
+static int grows(const struct lull_host_said *first, const struct lull_host_said *said)
 {
     return first->spp > 0 && said->spp > first->spp && !said->stopped &&
            log2(said->predicted / first->predicted) > GROWTH * log2((double)said->spp / (double)first->spp);
@@ -210,9 +212,9 @@ static int find_unmet(struct pt_quote *q, const struct pt_render *r, struct base
     if (!scratch)
         return base_fail_nomem(err, "quote");
     for (uint32_t i = 0; i < q->block_count; i++) {
-        int tail = tail_share(r, &r->blocks.list[i], scratch) > TAIL_SHARE;
+        int tail = tail_share(r, &r->blocks->list[i], scratch) > TAIL_SHARE;
         for (int k = 0; k < q->row_count; k++) {
-            struct pt_outlook_said *said = &q->rows[k].said[i];
+            struct lull_host_said *said = &q->rows[k].said[i];
             said->unmet = !said->stopped && (tail || grows(&q->rows[k].first[i], said));
         }
     }
@@ -227,54 +229,54 @@ static void cost_blocks(struct pt_quote *q, const struct pt_render *r)
 {
     double thread_s = 0.0, samples = 0.0;
     for (uint32_t i = 0; i < q->block_count; i++) {
-        const struct pt_block *b = &r->blocks.list[i];
+        const struct lull_host_block *b = &r->blocks->list[i];
         thread_s += b->thread_s;
         samples += (double)b->spp * (double)(b->x1 - b->x0) * (double)(b->y1 - b->y0);
     }
     for (uint32_t i = 0; i < q->block_count; i++) {
-        const struct pt_block *b = &r->blocks.list[i];
+        const struct lull_host_block *b = &r->blocks->list[i];
         double pixels = (double)(b->x1 - b->x0) * (double)(b->y1 - b->y0);
         q->block_cost_s[i] = b->spp > 0 ? b->thread_s / (double)b->spp : pixels * thread_s / samples;
     }
 }
 
 static double wall_s(const struct pt_quote *q, const struct pt_render *r, const struct pt_quote_row *row, int which,
-                     struct pt_outlook_work *work)
+                     struct lull_host_work *work)
 {
     double checks = 0.0;
     for (uint32_t i = 0; i < q->block_count; i++) {
-        const struct pt_block *b = &r->blocks.list[i];
+        const struct lull_host_block *b = &r->blocks->list[i];
         const struct pt_quote_block *a = &row->blocks[i];
         const double spp[3] = {a->stop.spp, a->stop.low, a->stop.high};
-        work[i] = (struct pt_outlook_work){spp[which], spp[which] * q->block_cost_s[i], b->y1 - b->y0};
-        checks += r->config.uniform ? 0.0 : (double)b->checks + pt_outlook_checks(b, spp[which]);
+        work[i] = (struct lull_host_work){spp[which], spp[which] * q->block_cost_s[i], b->y1 - b->y0};
+        checks += r->config.uniform ? 0.0 : (double)b->checks + lull_host_expect_checks(b, spp[which]);
     }
-    return pt_outlook_wall_s(work, q->block_count, q->threads) + checks * q->check_s;
+    return lull_host_wall_s(work, q->block_count, q->threads) + checks * q->check_s;
 }
 
 /* The render's own blocks are where they are; another row's may have stopped before, or would go on. */
-static struct pt_outlook_stop stop_of(const struct pt_quote_row *row, const struct pt_render *r, uint32_t i)
+static struct lull_host_stop_at stop_of(const struct pt_quote_row *row, const struct pt_render *r, uint32_t i)
 {
-    const struct pt_block *b = &r->blocks.list[i];
+    const struct lull_host_block *b = &r->blocks->list[i];
     uint64_t most = r->config.spp_max;
     if (r->config.uniform)
-        return pt_outlook_of_block(b, 1, most);
+        return lull_host_expect_block(r->blocks, b);
     if (!row->asked)
-        return pt_outlook_stop(&row->said[i], 0, most);
-    if (b->reason == PT_REASON_CRITERION || b->reason == PT_REASON_SPP_MAX || b->reason == PT_REASON_DROPPED)
-        return pt_outlook_of_block(b, 0, most);
-    struct pt_outlook_said said = row->said[i];
+        return lull_host_expect(&row->said[i], 0, most);
+    if (b->reason == LULL_REASON_CRITERION || b->reason == LULL_REASON_SPP_MAX || b->reason == LULL_REASON_DROPPED)
+        return lull_host_expect_block(r->blocks, b);
+    struct lull_host_said said = row->said[i];
     if (said.stopped)
         said.predicted = (double)b->next_spp;
-    return pt_outlook_stop(&said, b->next_spp, most);
+    return lull_host_expect(&said, b->next_spp, most);
 }
 
-static void add_up(struct pt_quote *q, const struct pt_render *r, struct pt_quote_row *row, struct pt_outlook_work *work)
+static void add_up(struct pt_quote *q, const struct pt_render *r, struct pt_quote_row *row, struct lull_host_work *work)
 {
     double pixels = 0.0;
     row->spp_min = INFINITY;
     for (uint32_t i = 0; i < q->block_count; i++) {
-        const struct pt_block *b = &r->blocks.list[i];
+        const struct lull_host_block *b = &r->blocks->list[i];
         struct pt_quote_block *a = &row->blocks[i];
         double size = (double)(b->x1 - b->x0) * (double)(b->y1 - b->y0), cost_s = q->block_cost_s[i];
         a->stop = stop_of(row, r, i);
@@ -305,12 +307,12 @@ static void add_up(struct pt_quote *q, const struct pt_render *r, struct pt_quot
 
 int pt_quote_finish(struct pt_quote *q, struct pt_render *r, struct base_err *err)
 {
-    struct pt_outlook_work *work = calloc(q->block_count, sizeof *work);
+    struct lull_host_work *work = calloc(q->block_count, sizeof *work);
     int rc = work ? ask_all(q, r, err) : base_fail_nomem(err, "quote");
     if (!rc)
         rc = find_unmet(q, r, err);
     cost_blocks(q, r);
-    q->check_s = r->totals.checks > 0 ? r->totals.criterion_s / (double)r->totals.checks : 0.0;
+    q->check_s = r->totals->checks > 0 ? r->totals->criterion_s / (double)r->totals->checks : 0.0;
     for (int i = 0; i < q->row_count && !rc; i++)
         add_up(q, r, &q->rows[i], work);
     free(work);

@@ -8,24 +8,21 @@
 #ifndef PT_RENDER_QUOTE_H
 #define PT_RENDER_QUOTE_H
 
-#include "render/outlook.h"
 #include "render/render.h"
 
 enum { PT_QUOTE_ROWS = 4 };
 
 struct pt_quote_block {
-    struct pt_outlook_stop stop;
+    struct lull_host_stop_at stop;
     double thread_s, thread_low_s, thread_high_s; /* of sampling up to there, and to the ends of the interval */
 };
 
 struct pt_quote_row {
     double visible;            /* NaN: the criterion has no such parameter, or none is used */
     int asked;                 /* this is what a render with the given options does */
-    struct pt_criterion *criterion; /* owns; NULL: uniform */
-    char value[32];            /* of `visible` */
-    struct lull_pair *pairs;   /* owns */
-    struct pt_outlook_said *said; /* owns; [blocks] */
-    struct pt_outlook_said *first; /* owns; [blocks] what it said when it was asked first */
+    struct lull_host_criterion *criterion; /* owns; NULL: uniform */
+    struct lull_host_said *said; /* owns; [blocks] */
+    struct lull_host_said *first; /* owns; [blocks] what it said when it was asked first */
     /* The answer, of pt_quote_finish: */
     struct pt_quote_block *blocks; /* owns; [blocks] */
     double spp_min, spp_mean, spp_max;      /* samples per pixel: least block, all pixels, dearest block */
@@ -46,11 +43,10 @@ struct pt_quote {
 };
 
 /* Rows of visible 0.5, 0.25, 0.05, and of the given one if it is another; one row "as asked" where the criterion has no such
- * parameter or the render has no criterion (table NULL). pairs and mask, which may be NULL, are
- * borrowed until destroy, as the render's threads. */
+ * parameter or the render has no criterion (table NULL). The render's threads are borrowed until destroy. */
 int pt_quote_create(const struct pt_render *render, const struct lull_criterion *table, const struct lull_pair *pairs,
-                    uint32_t pair_count, const struct pt_mask *mask, void (*warn)(void *data, const char *line),
-                    void *warn_data, struct pt_quote **out, struct base_err *err);
+                    uint32_t pair_count, void (*warn)(void *data, const char *line), void *warn_data,
+                    struct pt_quote **out, struct base_err *err);
 void pt_quote_destroy(struct pt_quote *quote);
 
 /* The hook `judged` of the pilot. A row whose criterion fails keeps what it knew. */

@@ -41,25 +41,12 @@ struct pt_render_work {
     struct lull_decision *decisions; /* [blocks] */
 };
 
-uint32_t pt_render_active(const struct pt_render *r)
-{
-    uint32_t n = 0;
-    for (uint32_t i = 0; i < r->blocks.count; i++)
-        n += r->blocks.list[i].reason == PT_REASON_NONE;
-    return n;
-}
-
 int pt_render_threads(const struct pt_render *r)
 {
     return base_threads_count(r->threads) + pt_crew_threads(r->config.crew);
 }
 
-double pt_render_elapsed_s(const struct pt_render *r)
-{
-    return r->totals.render_s + r->totals.criterion_s;
-}
-
-static struct pt_render_work *work_create(const struct pt_blocks *blocks)
+static struct pt_render_work *work_create(const struct lull_host_blocks *blocks)
 {
     size_t rows = 0, n = blocks->count;
     for (uint32_t i = 0; i < n; i++)
@@ -89,37 +76,47 @@ static void work_destroy(struct pt_render_work *w)
     free(w);
 }
 
-int pt_render_open_frame(const struct pt_render *r, struct pt_criterion *criterion, struct base_err *err)
+/* film_planes: PT_FILM_* of its film. */
+static int begin_frame(struct pt_render *r, uint32_t film_planes, struct base_err *err)
 {
     const struct pt_render_config *c = &r->config;
-    struct pt_criterion_frame frame = {
-        .width = c->width,
-        .height = c->height,
+    struct lull_error e = {.struct_size = sizeof e};
+    struct lull_plane mask = c->mask ? pt_mask_plane(c->mask) : (struct lull_plane){0};
+    int deterministic = c->time_budget_s <= 0.0 && c->max_check_overhead <= 0.0;
+    int independent = c->integrator.sampler == PT_SAMPLER_INDEPENDENT;
+    struct lull_host_config config = {
+        .struct_size = sizeof config,
+        .flags = LULL_HOST_HALF_KNOWN | (c->uniform ? LULL_HOST_UNIFORM : 0) |
+                 (deterministic ? LULL_FRAME_DETERMINISTIC : 0) | (independent ? LULL_FRAME_INDEPENDENT : 0),
+        .width = (uint32_t)c->width,
+        .height = (uint32_t)c->height,
+        .block_width = (uint32_t)c->block_width,
+        .block_height = (uint32_t)c->block_height,
+        .crop = {c->crop[0], c->crop[1], c->crop[2], c->crop[3]},
+        .planes = pt_host_planes_of(film_planes),
+        .transfer = LULL_TRANSFER_SRGB,
+        .sample_clamp = isfinite(c->integrator.max_component) ? (double)c->integrator.max_component : 0.0,
         .spp_min = c->spp_min,
         .spp_max = c->spp_max,
         .seed = c->integrator.seed,
         .time_budget_s = c->time_budget_s,
-        .sample_clamp = isfinite(c->integrator.max_component) ? (double)c->integrator.max_component : 0.0,
-        .deterministic = c->time_budget_s <= 0.0 && c->max_check_overhead <= 0.0,
-        .independent = c->integrator.sampler == PT_SAMPLER_INDEPENDENT,
+        .max_check_overhead = c->max_check_overhead,
+        .max_seam = c->max_seam,
+        .mask = c->mask ? &mask : NULL,
     };
-    return pt_criterion_begin(criterion, &frame, &r->blocks, &r->film, err);
-}
-
-/* Samples at the first check. */
-static uint64_t first_check(const struct pt_render *r)
-{
-    uint64_t spp = r->config.spp_min;
-    if (r->config.uniform)
-        return r->config.spp_max;
-    uint64_t useful = r->criterion->needs.first_spp;
-    if (useful > spp)
-        spp = useful;
-    return spp < r->config.spp_max ? spp : r->config.spp_max;
+    int32_t code = lull_host_begin(&config, r->criterion, &r->frame, &e);
+    const struct lull_requirements *n = r->criterion ? lull_host_needs(r->criterion) : NULL;
+    if (code == LULL_E_UNSUPPORTED && n && !(n->flags & LULL_REQ_FLEXIBLE) && n->block_width > 0)
+        return base_fail(err, BASE_EINVAL, "%s: use --block %ux%u", e.message, n->block_width, n->block_height);
+    if (code != LULL_OK)
+        return pt_host_fail(code, &e, err);
+    r->blocks = lull_host_blocks_of(r->frame);
+    r->totals = lull_host_totals_of(r->frame);
+    return 0;
 }
 
 int pt_render_create(const struct pt_render_config *config, const struct pt_scene *scene, pt_kernel *kernel,
-                     struct base_threads *threads, struct pt_criterion *criterion, struct pt_render **out,
+                     struct base_threads *threads, struct lull_host_criterion *criterion, struct pt_render **out,
                      struct base_err *err)
 {
     struct pt_render *r = calloc(1, sizeof *r);
@@ -130,27 +127,20 @@ int pt_render_create(const struct pt_render_config *config, const struct pt_scen
     r->kernel = kernel;
     r->threads = threads;
     r->criterion = criterion;
-    uint32_t planes = config->planes | (criterion ? pt_host_film_planes(&criterion->needs) : 0);
+    uint32_t planes = config->planes | (criterion ? pt_host_film_planes(lull_host_needs(criterion)) : 0);
     r->config.integrator.want_aux = (planes & PT_FILM_AUX) != 0;
-    /* Without a judge nobody needs whole blocks. */
-    int clip = !criterion;
-    int rc = pt_blocks_init(&r->blocks, config->width, config->height, config->block_width, config->block_height,
-                            config->crop, clip, err);
+    int rc = begin_frame(r, planes, err);
     if (!rc)
-        rc = pt_film_init(&r->film, r->blocks.x0, r->blocks.y0, r->blocks.x1, r->blocks.y1, planes, err);
+        rc = pt_film_init(&r->film, r->blocks->x0, r->blocks->y0, r->blocks->x1, r->blocks->y1, planes, err);
     if (!rc) {
-        struct pt_render_work *w = r->work = work_create(&r->blocks);
+        struct pt_render_work *w = r->work = work_create(r->blocks);
         if (!w || !w->items || !w->order || !w->candidates || !w->due || !w->final || !w->decisions)
             rc = base_fail_nomem(err, "work list");
     }
-    if (!rc && criterion)
-        rc = pt_render_open_frame(r, criterion, err);
     if (rc) {
         pt_render_destroy(r);
         return rc;
     }
-    for (uint32_t i = 0; i < r->blocks.count; i++)
-        r->blocks.list[i].next_spp = first_check(r);
     *out = r;
     return 0;
 }
@@ -160,7 +150,7 @@ void pt_render_destroy(struct pt_render *r)
     if (!r)
         return;
     work_destroy(r->work);
-    pt_blocks_release(&r->blocks);
+    lull_host_end(r->frame);
     pt_film_release(&r->film);
     free(r);
 }
@@ -190,7 +180,7 @@ static int sample_rows(struct pt_render *r, const struct pt_render_hooks *hooks,
 }
 
 /* Samples up to which a block goes now. */
-static uint64_t goal(const struct pt_render *r, const struct pt_block *b)
+static uint64_t goal(const struct pt_render *r, const struct lull_host_block *b)
 {
     uint64_t most = r->config.pilot_spp;
     return most > 0 && b->next_spp > most ? most : b->next_spp;
@@ -218,10 +208,10 @@ static int by_turn(const void *a, const void *b)
 static uint32_t list_candidates(struct pt_render *r)
 {
     uint32_t n = 0;
-    for (uint32_t i = 0; i < r->blocks.count; i++) {
-        const struct pt_block *b = &r->blocks.list[i];
+    for (uint32_t i = 0; i < r->blocks->count; i++) {
+        const struct lull_host_block *b = &r->blocks->list[i];
         uint64_t end = goal(r, b);
-        if (b->reason != PT_REASON_NONE || b->spp >= end)
+        if (b->reason != LULL_REASON_NONE || b->spp >= end)
             continue;
         double per_spp_s = b->spp > 0 ? b->thread_s / (double)b->spp : 0.0, left = (double)(end - b->spp);
         r->work->candidates[n++] = (struct candidate){i, octave_of(b->spp), left * (per_spp_s > 0.0 ? per_spp_s : 1.0),
@@ -245,7 +235,7 @@ static void shuffle(struct pt_render_work *w, uint32_t state)
 static void list_block(struct pt_render *r, const struct candidate *c, double step)
 {
     struct pt_render_work *w = r->work;
-    const struct pt_block *b = &r->blocks.list[c->block];
+    const struct lull_host_block *b = &r->blocks->list[c->block];
     uint64_t end = goal(r, b), most = b->spp > LEAD_SPP ? b->spp : LEAD_SPP;
     most = step < (double)most ? (uint64_t)fmax(step, 1.0) : most;
     uint64_t to = end - b->spp > most ? b->spp + most : end;
@@ -265,7 +255,7 @@ static size_t list_items(struct pt_render *r, double span_s)
     int known = 1;
     while (chosen < n && rows < threads * ROWS_PER_THREAD) {
         const struct candidate *c = &w->candidates[chosen++];
-        rows += r->blocks.list[c->block].y1 - r->blocks.list[c->block].y0;
+        rows += r->blocks->list[c->block].y1 - r->blocks->list[c->block].y0;
         per_spp_s += c->per_spp_s;
         known &= c->per_spp_s > 0.0;
     }
@@ -285,7 +275,7 @@ static double gather(struct pt_render *r)
     double thread_s = 0.0;
     for (size_t k = 0; k < w->count; k++) {
         const struct pt_row *item = &w->items[k];
-        struct pt_block *b = &r->blocks.list[item->block];
+        struct lull_host_block *b = &r->blocks->list[item->block];
         uint64_t samples = (uint64_t)(b->x1 - b->x0) * (item->to - item->from);
         b->rays += item->rays;
         b->thread_s += item->thread_s;
@@ -293,13 +283,12 @@ static double gather(struct pt_render *r)
         b->dropped += item->dropped;
         if (item->y == b->y1 - 1)
             b->spp = item->to;
-        r->totals.samples += samples;
-        r->totals.paths += samples;
-        r->totals.rays += item->rays;
-        r->totals.dropped += item->dropped;
-        if (item->dropped > 0 && r->dropped_count < PT_DROPPED_KEPT)
-            r->dropped[r->dropped_count++] =
-                (struct pt_dropped_sample){item->first_x, (uint32_t)item->y, item->first_sample};
+        r->totals->samples += samples;
+        r->totals->paths += samples;
+        r->totals->rays += item->rays;
+        r->totals->dropped += item->dropped;
+        if (item->dropped > 0)
+            lull_host_drop(r->frame, item->first_x, (uint32_t)item->y, item->first_sample);
     }
     return thread_s;
 }
@@ -315,19 +304,19 @@ static int slice(struct pt_render *r, const struct pt_render_hooks *hooks, int *
 {
     double span_s = fmin(SLICE_S + SLICE_PER_MEMBER_S * pt_crew_threads(r->config.crew), LONGEST_SLICE_S);
     if (r->config.time_budget_s > 0.0)
-        span_s = fmax(0.01, fmin(span_s, r->config.time_budget_s - pt_render_elapsed_s(r)));
+        span_s = fmax(0.01, fmin(span_s, r->config.time_budget_s - lull_host_elapsed_s(r->frame)));
     *more = list_items(r, span_s) > 0;
     if (!*more)
         return 0;
-    uint64_t before = r->totals.samples;
+    uint64_t before = r->totals->samples;
     double start_s = base_clock_wall_s();
     int rc = sample_rows(r, hooks, err);
     double wall_s = base_clock_wall_s() - start_s;
-    r->totals.render_s += wall_s;
+    r->totals->render_s += wall_s;
     if (rc)
         return rc == PT_CREW_STOPPED ? 0 : rc;
     double thread_s = gather(r);
-    r->samples_per_s = recent(r->samples_per_s, (double)(r->totals.samples - before) / fmax(wall_s, 1e-6));
+    r->samples_per_s = recent(r->samples_per_s, (double)(r->totals->samples - before) / fmax(wall_s, 1e-6));
     r->busy_threads = recent(r->busy_threads, thread_s / fmax(wall_s, 1e-6));
     r->sampled_rows = (long)r->work->count;
     return 0;
@@ -335,38 +324,10 @@ static int slice(struct pt_render *r, const struct pt_render_hooks *hooks, int *
 
 /* --- checks --------------------------------------------------------------------------------------------------------- */
 
-static void note(struct pt_block *b, const struct lull_decision *d)
+/* A criterion that fails says so once. */
+static void warn_once(const struct pt_render *r, const struct pt_render_hooks *hooks, const char *line)
 {
-    b->checks++;
-    b->asked = 1;
-    b->asked_spp = b->spp;
-    b->p_noisy = d->p_noisy;
-    b->error = d->error;
-    b->predicted_spp = d->predicted_spp;
-}
-
-/* A block that dropped samples stops at the second STOP in a row, and never counts as converged. */
-static void settle(struct pt_render *r, struct pt_block *b, const struct lull_decision *d)
-{
-    int stop = d->action == LULL_STOP && b->spp >= r->config.spp_min;
-    b->stop_votes = stop ? b->stop_votes + 1 : 0;
-    if (r->config.uniform)
-        b->reason = PT_REASON_UNIFORM;
-    else if (stop && b->dropped == 0)
-        b->reason = PT_REASON_CRITERION;
-    else if (stop && b->stop_votes > 1)
-        b->reason = PT_REASON_DROPPED;
-    else if (b->spp >= r->config.spp_max)
-        b->reason = PT_REASON_SPP_MAX;
-    else {
-        b->reason = PT_REASON_NONE;
-        b->next_spp = pt_blocks_next_check(b->spp, d->next_spp, r->config.spp_max);
-    }
-}
-
-static void warn_once(struct pt_render *r, const struct pt_render_hooks *hooks, const char *line)
-{
-    if (r->totals.failed_checks++ == 0 && hooks->warn)
+    if (r->totals->failed_checks == 1 && hooks->warn)
         hooks->warn(hooks->data, line);
 }
 
@@ -374,112 +335,69 @@ static void warn_once(struct pt_render *r, const struct pt_render_hooks *hooks, 
 static int worth_sending(const struct pt_render *r, uint32_t count)
 {
     int threads = base_threads_count(r->threads);
-    double pixels = (double)r->blocks.block_width * (double)r->blocks.block_height;
+    double pixels = (double)r->blocks->block_width * (double)r->blocks->block_height;
     double send_s = pixels * (double)pt_film_pixel_bytes(r->film.planes) * SEND_BYTE_S;
-    return pt_crew_can_ask(r->config.crew, r->criterion) && count > (uint32_t)threads && r->asked > 0 &&
-           r->criterion_thread_s / (double)r->asked > send_s * threads;
+    return pt_crew_can_ask(r->config.crew, r->criterion) && count > (uint32_t)threads && r->totals->asked > 0 &&
+           r->totals->criterion_thread_s / (double)r->totals->asked > send_s * threads;
 }
 
-/* Asks about the `count` blocks of work->due and times it; by_crew: not only here. A criterion that fails leaves every
- * decision undecided. Not 0: nothing has come of it, as pt_crew_ask; only by the crew, else err is not used. */
-static int ask(struct pt_render *r, uint32_t count, int by_crew, const struct pt_render_hooks *hooks, struct base_err *err)
+/* Asks here about the `count` blocks of work->due. A criterion that fails leaves every decision undecided. */
+static void ask_here(struct pt_render *r, uint32_t count, const struct pt_render_hooks *hooks)
+{
+    const struct pt_render_work *w = r->work;
+    struct lull_error e = {.struct_size = sizeof e};
+    struct pt_host_view show;
+    if (lull_host_ask(r->frame, pt_host_show(&r->film, r->blocks, &show), w->due, w->final, count, w->decisions, &e) !=
+        LULL_OK)
+        warn_once(r, hooks, e.message);
+}
+
+/* The same by everybody. Not 0: nothing has come of it, as pt_crew_ask. */
+static int ask_crew(struct pt_render *r, uint32_t count, const struct pt_render_hooks *hooks, struct base_err *err)
 {
     struct pt_render_work *w = r->work;
-    struct pt_crew_question question = {r->criterion, &r->film,     &r->blocks,         w->due,     w->final,
+    struct pt_crew_question question = {r->criterion, r->frame,     &r->film,           w->due,     w->final,
                                         count,        w->decisions, hooks->interrupted, hooks->data};
     struct base_err said = {0};
     double others_s = 0.0, start_s = base_clock_wall_s(), start_cpu_s = base_clock_process_s();
-    int rc = 0; /* nothing else runs meanwhile: the process's seconds are those of the check */
-    if (by_crew)
-        rc = pt_crew_ask(r->config.crew, r->threads, &question, &others_s, &said, err);
-    else
-        pt_criterion_evaluate(r->criterion, &r->film, &r->blocks, w->due, count, w->final, w->decisions, &said);
-    r->totals.criterion_s += base_clock_wall_s() - start_s;
-    r->criterion_thread_s += base_clock_process_s() - start_cpu_s + others_s;
+    int rc = pt_crew_ask(r->config.crew, r->threads, &question, &others_s, &said, err);
+    r->totals->criterion_s += base_clock_wall_s() - start_s;
+    r->totals->criterion_thread_s += base_clock_process_s() - start_cpu_s + others_s;
     if (rc)
         return rc;
+    r->totals->checks += count;
+    r->totals->asked += count;
+    r->totals->failed_checks += said.code != 0;
     if (said.code)
         warn_once(r, hooks, said.text);
-    r->totals.checks += count;
-    r->asked += count;
     return 0;
-}
-
-/* Checks may take config.max_check_overhead of the elapsed time: beyond it they are left out until rendering caught up. */
-static int too_expensive(const struct pt_render *r)
-{
-    double share = r->config.max_check_overhead;
-    return share > 0.0 && r->totals.criterion_s > share * pt_render_elapsed_s(r);
 }
 
 /* All active blocks are at their next check. Not 0: it was given up on the way, and nothing has changed. */
 static int check(struct pt_render *r, const struct pt_render_hooks *hooks, struct base_err *err)
 {
     struct pt_render_work *w = r->work;
-    int reopens = r->criterion && !r->config.uniform &&
-                  (r->criterion->table->capabilities & LULL_CAP_REOPENS);
-    int skip = !r->criterion || too_expensive(r);
-    uint32_t n = 0, active = 0;
-    for (uint32_t i = 0; i < r->blocks.count; i++) {
-        struct pt_block *b = &r->blocks.list[i];
-        int is_active = b->reason == PT_REASON_NONE;
-        int again = reopens && b->reason == PT_REASON_CRITERION && b->spp < r->config.spp_max;
-        if (!is_active && !again)
-            continue;
-        int final = is_active && b->spp >= r->config.spp_max;
-        if (skip && !(final && r->criterion)) {
-            if (is_active)
-                settle(r, b, &pt_criterion_undecided);
-            r->totals.skipped_checks += r->criterion != NULL;
-            continue;
-        }
-        w->due[n] = i;
-        w->final[n++] = (uint8_t)final;
-        active += (uint32_t)is_active;
-    }
-    int rc = active > 0 ? ask(r, n, worth_sending(r, n), hooks, err) : 0;
-    if (rc || active == 0)
+    uint32_t n = lull_host_due(r->frame, w->due, w->final);
+    int rc = 0;
+    if (n > 0 && worth_sending(r, n))
+        rc = ask_crew(r, n, hooks, err);
+    else if (n > 0)
+        ask_here(r, n, hooks);
+    if (rc || n == 0)
         return rc;
     if (hooks->judged)
         hooks->judged(hooks->data, r, w->due, n);
-    for (uint32_t k = 0; k < n; k++) {
-        struct pt_block *b = &r->blocks.list[w->due[k]];
-        note(b, &w->decisions[k]);
-        settle(r, b, &w->decisions[k]);
-    }
+    lull_host_apply(r->frame, w->due, n, w->decisions);
     return 0;
-}
-
-/* Blocks still active get no more samples: the criterion is asked once more, for the report only. */
-static void close_blocks(struct pt_render *r, int reason, const struct pt_render_hooks *hooks)
-{
-    struct pt_render_work *w = r->work;
-    uint32_t n = 0;
-    for (uint32_t i = 0; i < r->blocks.count; i++) {
-        struct pt_block *b = &r->blocks.list[i];
-        if (b->reason != PT_REASON_NONE)
-            continue;
-        b->reason = reason;
-        if (b->spp == 0 || (b->asked && b->asked_spp == b->spp))
-            continue;
-        w->due[n] = i;
-        w->final[n++] = 1;
-    }
-    if (!r->criterion || n == 0)
-        return;
-    for (uint32_t k = 0; k < n; k++)
-        r->blocks.list[w->due[k]].reason = PT_REASON_NONE;
-    ask(r, n, 0, hooks, NULL);
-    for (uint32_t k = 0; k < n; k++) {
-        note(&r->blocks.list[w->due[k]], &w->decisions[k]);
-        r->blocks.list[w->due[k]].reason = reason;
-    }
 }
 
 static int suspend(struct pt_render *r, const struct pt_render_hooks *hooks, int reason, struct base_err *err)
 {
+    struct lull_error e = {.struct_size = sizeof e};
+    struct pt_host_view show;
     int rc = hooks->suspend ? hooks->suspend(hooks->data, r, err) : 0;
-    close_blocks(r, reason, hooks);
+    if (lull_host_stop(r->frame, reason, pt_host_show(&r->film, r->blocks, &show), &e) != LULL_OK)
+        warn_once(r, hooks, e.message);
     return rc;
 }
 
@@ -489,9 +407,7 @@ static int lost(struct pt_render *r, const struct pt_render_hooks *hooks, const 
     int rc = hooks->suspend ? hooks->suspend(hooks->data, r, err) : 0;
     if (hooks->warn)
         hooks->warn(hooks->data, why->text);
-    for (uint32_t i = 0; i < r->blocks.count; i++)
-        if (r->blocks.list[i].reason == PT_REASON_NONE)
-            r->blocks.list[i].reason = PT_REASON_INTERRUPT;
+    lull_host_stop(r->frame, LULL_REASON_INTERRUPT, NULL, NULL);
     return rc;
 }
 
@@ -499,8 +415,8 @@ static int lost(struct pt_render *r, const struct pt_render_hooks *hooks, const 
 static int pilot_is_over(const struct pt_render *r)
 {
     int held = 0;
-    for (uint32_t i = 0; i < r->blocks.count; i++)
-        held |= r->blocks.list[i].reason == PT_REASON_NONE && r->blocks.list[i].spp < r->blocks.list[i].next_spp;
+    for (uint32_t i = 0; i < r->blocks->count; i++)
+        held |= r->blocks->list[i].reason == LULL_REASON_NONE && r->blocks->list[i].spp < r->blocks->list[i].next_spp;
     return held;
 }
 
@@ -510,7 +426,7 @@ int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum
     struct base_err why = {0};
     int rc = 0, more = 0;
     *outcome = PT_RENDER_DONE;
-    while (pt_render_active(r) > 0) {
+    while (lull_host_active(r->blocks) > 0) {
         int given_up = slice(r, hooks, &more, &why);
         if (!given_up && !more) {
             if (pilot_is_over(r)) {
@@ -519,7 +435,7 @@ int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum
             }
             given_up = check(r, hooks, &why);
             if (!given_up && r->config.max_seam >= 1.0)
-                pt_blocks_reopen(&r->blocks, r->config.max_seam);
+                lull_host_reopen(r->blocks, r->config.max_seam);
             if (!given_up)
                 continue;
         }
@@ -532,15 +448,15 @@ int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum
             break;
         if (hooks->interrupted && hooks->interrupted(hooks->data)) {
             *outcome = PT_RENDER_INTERRUPTED;
-            rc = suspend(r, hooks, PT_REASON_INTERRUPT, err);
+            rc = suspend(r, hooks, LULL_REASON_INTERRUPT, err);
             break;
         }
-        if (r->config.time_budget_s > 0.0 && pt_render_elapsed_s(r) >= r->config.time_budget_s) {
+        if (lull_host_out_of_time(r->frame)) {
             *outcome = PT_RENDER_OUT_OF_TIME;
-            rc = suspend(r, hooks, PT_REASON_TIME, err);
+            rc = suspend(r, hooks, LULL_REASON_TIME, err);
             break;
         }
-        if (r->config.pilot_spp > 0 && pt_render_elapsed_s(r) >= r->config.pilot_s) {
+        if (r->config.pilot_spp > 0 && lull_host_elapsed_s(r->frame) >= r->config.pilot_s) {
             *outcome = PT_RENDER_PILOT;
             break;
         }
@@ -551,8 +467,8 @@ int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum
 int pt_render_advance(struct pt_render *r, uint64_t spp, const struct pt_render_hooks *hooks, int *stopped,
                       struct base_err *err)
 {
-    for (uint32_t i = 0; i < r->blocks.count; i++)
-        r->blocks.list[i].next_spp = spp;
+    for (uint32_t i = 0; i < r->blocks->count; i++)
+        r->blocks->list[i].next_spp = spp;
     for (;;) {
         int more = 0, rc = slice(r, hooks, &more, err);
         if (rc || !more)
@@ -571,11 +487,10 @@ void pt_render_judge(struct pt_render *r, const struct pt_render_hooks *hooks)
 {
     if (!r->criterion)
         return;
-    for (uint32_t i = 0; i < r->blocks.count; i++) {
+    for (uint32_t i = 0; i < r->blocks->count; i++) {
         r->work->due[i] = i;
         r->work->final[i] = 0;
     }
-    ask(r, r->blocks.count, 0, hooks, NULL);
-    for (uint32_t i = 0; i < r->blocks.count; i++)
-        note(&r->blocks.list[i], &r->work->decisions[i]);
+    ask_here(r, r->blocks->count, hooks);
+    lull_host_note(r->frame, r->work->due, r->blocks->count, r->work->decisions);
 }

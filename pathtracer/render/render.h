@@ -15,10 +15,10 @@
 #include "base/err.h"
 #include "base/threads.h"
 #include "integ/integrator.h"
-#include "render/blocks.h"
 #include "render/crew.h"
 #include "render/host.h"
 #include "render/film.h"
+#include "render/mask.h"
 
 struct pt_render_config {
     int width, height;       /* of the image, pixels */
@@ -30,38 +30,24 @@ struct pt_render_config {
     uint64_t pilot_spp;      /* not 0: pt_render_run ends, with the blocks still active, before one gets more samples … */
     double pilot_s;          /* … and after so many seconds */
     double max_check_overhead; /* share of the elapsed time that checks may take; 0 = no bound */
-    double max_seam;         /* most ratio of samples of neighbouring blocks, 0 = any (pt_blocks_reopen) */
+    double max_seam;         /* most ratio of samples of neighbouring blocks, 0 = any (lull_host_reopen) */
+    const struct pt_mask *mask; /* borrows for pt_render_create; NULL = none */
     uint32_t planes;         /* PT_FILM_* wanted besides those of the criterion */
     struct pt_integrator integrator; /* want_aux is set by the renderer */
     uint32_t order_seed;     /* not 0: work is handed out in a shuffled order (tests) */
     struct pt_crew *crew;    /* borrows; processes that help to sample, NULL: none */
 };
 
-struct pt_render_totals {
-    uint64_t samples, paths, rays, dropped;
-    double render_s, criterion_s; /* wall seconds */
-    uint64_t checks, failed_checks, skipped_checks;
-};
-
-/* The first dropped samples, so that their paths can be replayed with --debug-path. */
-struct pt_dropped_sample {
-    uint32_t x, y, sample;
-};
-enum { PT_DROPPED_KEPT = 16 };
-
 struct pt_render {
     struct pt_render_config config;
     const struct pt_scene *scene;     /* borrows */
     pt_kernel *kernel;
     struct base_threads *threads;       /* borrows */
-    struct pt_criterion *criterion;   /* borrows; NULL only with config.uniform */
+    struct lull_host_criterion *criterion;   /* borrows; NULL only with config.uniform */
     struct pt_film film;
-    struct pt_blocks blocks;
-    double criterion_thread_s; /* processor seconds of the checks of this run, all threads together */
-    uint64_t asked;            /* blocks that they were about */
-    struct pt_render_totals totals;
-    struct pt_dropped_sample dropped[PT_DROPPED_KEPT]; /* in no particular order */
-    uint32_t dropped_count;           /* entries used */
+    struct lull_host_frame *frame;    /* owns; decides: blocks, limits, who is asked */
+    struct lull_host_blocks *blocks;  /* of the frame, as the totals */
+    struct lull_host_totals *totals;
     struct pt_render_work *work;      /* owns; scratch of the slices */
     double samples_per_s;             /* recent, 0 = not known yet */
     double busy_threads;              /* likewise: thread seconds per wall second of sampling */
@@ -91,15 +77,12 @@ struct pt_render_hooks {
     void *data;
 };
 
-/* Allocates film and blocks and opens the criterion's frame. The config is copied; scene, threads and criterion are borrowed
+/* Allocates the film and begins a frame for the criterion. The config is copied; scene, threads and criterion are borrowed
  * until destroy. */
 int pt_render_create(const struct pt_render_config *config, const struct pt_scene *scene, pt_kernel *kernel,
-                     struct base_threads *threads, struct pt_criterion *criterion, struct pt_render **out,
+                     struct base_threads *threads, struct lull_host_criterion *criterion, struct pt_render **out,
                      struct base_err *err);
 void pt_render_destroy(struct pt_render *render);
-
-/* Opens a frame of this render for one more criterion, which must need no planes beyond those of the render's own. */
-int pt_render_open_frame(const struct pt_render *render, struct pt_criterion *criterion, struct base_err *err);
 
 /* Renders until all blocks are stopped, time is up, a pilot is over, or interrupted() says so. A pilot leaves the render
  * as it is between two slices: going on gives what it would have been without. */
@@ -112,8 +95,6 @@ int pt_render_advance(struct pt_render *render, uint64_t spp, const struct pt_re
 /* Asks the criterion, if there is one, about every block as it is and notes the answers; nothing is stopped. */
 void pt_render_judge(struct pt_render *render, const struct pt_render_hooks *hooks);
 
-uint32_t pt_render_active(const struct pt_render *render);
 int pt_render_threads(const struct pt_render *render); /* that sample, those of the crew too */
-double pt_render_elapsed_s(const struct pt_render *render); /* render_s + criterion_s */
 
 #endif

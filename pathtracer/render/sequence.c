@@ -79,10 +79,11 @@ struct recorder {
     const struct pt_scene *scene;
     pt_kernel *kernel;
     struct base_threads *threads;
-    struct pt_criterion *criterion;
+    struct lull_host_criterion *criterion;
     struct pt_render_hooks hooks;
     struct seq_manifest manifest; /* owns; room for every block of the grid */
-    struct pt_blocks grid;      /* owns; of the whole image */
+    struct lull_host_frame *whole;      /* owns; the grid of the whole image */
+    const struct lull_host_blocks *grid; /* of it */
     struct base_lock lock;      /* of the folder */
     uint8_t *chosen;            /* owns; [grid.count] */
     double *mean, *half, *difference, *moment2, *scratch; /* own; one block, planar */
@@ -152,7 +153,7 @@ static int resume(struct recorder *r, struct base_err *err)
         rc = base_fail(err, BASE_EINVAL, "%s: this sequence was begun with another %s; use another folder", path, member);
     for (uint32_t i = 0; i < old.n_blocks && !rc; i++) {
         struct seq_block b;
-        if (old.blocks[i].id >= r->grid.count || seq_manifest_read_block(r->config->directory, &old, i, &b, NULL) != 0)
+        if (old.blocks[i].id >= r->grid->count || seq_manifest_read_block(r->config->directory, &old, i, &b, NULL) != 0)
             continue; /* missing or damaged: it is made again */
         seq_block_release(&b);
         r->manifest.blocks[r->manifest.n_blocks++] = old.blocks[i];
@@ -164,17 +165,18 @@ static int resume(struct recorder *r, struct base_err *err)
 
 /* --- one block ------------------------------------------------------------------------------------------------------ */
 
-static int open_block(const struct recorder *r, const struct pt_block *b, int reference, struct pt_render **out,
+static int open_block(const struct recorder *r, const struct lull_host_block *b, int reference, struct pt_render **out,
                       struct base_err *err)
 {
     struct pt_render_config c = r->config->render;
     int crop[4] = {b->x0, b->y0, b->x1, b->y1};
-    struct pt_criterion *criterion = reference ? NULL : r->criterion;
+    struct lull_host_criterion *criterion = reference ? NULL : r->criterion;
     memcpy(c.crop, crop, sizeof crop);
     c.spp_min = c.spp_max = reference ? r->config->reference_spp : r->manifest.levels[r->manifest.n_levels - 1];
     c.uniform = 1;
     c.time_budget_s = 0.0;
     c.max_seam = 0.0;
+    c.mask = NULL;
     c.planes = PT_FILM_HALF | PT_FILM_MOMENT2;
     c.integrator.seed = (uint32_t)(reference ? r->manifest.reference_seed : r->manifest.seed);
     return pt_render_create(&c, r->scene, r->kernel, r->threads, criterion, out, err);
@@ -212,7 +214,7 @@ static void add_statistic(struct seq_stat *list, uint32_t *count, const char *na
 static int put_level(struct recorder *r, struct seq_builder *file, const struct pt_render *render, int reference, int full,
                      struct base_err *err)
 {
-    const struct pt_block *b = &render->blocks.list[0];
+    const struct lull_host_block *b = &render->blocks->list[0];
     struct seq_stat found[SEQ_STATISTICS], stats[SEQ_STATISTICS + 2];
     uint32_t n = 0;
     read_film(r, &render->film, b->spp);
@@ -224,7 +226,7 @@ static int put_level(struct recorder *r, struct seq_builder *file, const struct 
     add_statistic(stats, &n, "seconds", b->thread_s);
     if (render->criterion) {
         char name[64];
-        snprintf(name, sizeof name, "%.50s.error", render->criterion->table->id);
+        snprintf(name, sizeof name, "%.50s.error", lull_host_table(render->criterion)->id);
         add_statistic(stats, &n, name, b->error);
     }
     const struct seq_frame frame = {.spp = (uint32_t)b->spp, .half_spp = (uint32_t)pt_film_half_spp(b->spp),
@@ -233,7 +235,7 @@ static int put_level(struct recorder *r, struct seq_builder *file, const struct 
     return seq_builder_add(file, &frame, err);
 }
 
-static int record_levels(struct recorder *r, struct seq_builder *file, const struct pt_block *b, int *stopped,
+static int record_levels(struct recorder *r, struct seq_builder *file, const struct lull_host_block *b, int *stopped,
                          struct base_err *err)
 {
     const struct seq_manifest *m = &r->manifest;
@@ -250,12 +252,12 @@ static int record_levels(struct recorder *r, struct seq_builder *file, const str
         full_done |= full;
     }
     if (render)
-        r->dropped += render->totals.dropped;
+        r->dropped += render->totals->dropped;
     pt_render_destroy(render);
     return rc;
 }
 
-static int record_reference(struct recorder *r, struct seq_builder *file, const struct pt_block *b, int *stopped,
+static int record_reference(struct recorder *r, struct seq_builder *file, const struct lull_host_block *b, int *stopped,
                             struct base_err *err)
 {
     struct pt_render *render = NULL;
@@ -267,13 +269,13 @@ static int record_reference(struct recorder *r, struct seq_builder *file, const 
     if (!rc && !*stopped)
         rc = put_level(r, file, render, 1, 1, err);
     if (render)
-        r->dropped += render->totals.dropped;
+        r->dropped += render->totals->dropped;
     pt_render_destroy(render);
     return rc;
 }
 
 /* Writes the block's file and lists it. */
-static int finish_block(struct recorder *r, struct seq_builder *file, const struct pt_block *b, double seconds,
+static int finish_block(struct recorder *r, struct seq_builder *file, const struct lull_host_block *b, double seconds,
                         struct base_err *err)
 {
     char path[4096];
@@ -290,7 +292,7 @@ static int finish_block(struct recorder *r, struct seq_builder *file, const stru
     return seq_manifest_write(r->config->directory, &r->manifest, err);
 }
 
-static int record_block(struct recorder *r, const struct pt_block *b, int *stopped, struct base_err *err)
+static int record_block(struct recorder *r, const struct lull_host_block *b, int *stopped, struct base_err *err)
 {
     struct seq_builder file;
     double start_s = base_clock_wall_s();
@@ -310,10 +312,23 @@ static int record_block(struct recorder *r, const struct pt_block *b, int *stopp
 
 /* --- all blocks ----------------------------------------------------------------------------------------------------- */
 
+static int lay_grid(struct recorder *r, struct base_err *err)
+{
+    const struct pt_render_config *c = &r->config->render;
+    struct lull_error e = {.struct_size = sizeof e};
+    struct lull_host_config grid = {.struct_size = sizeof grid, .flags = LULL_HOST_UNIFORM, .width = (uint32_t)c->width,
+                                    .height = (uint32_t)c->height, .block_width = (uint32_t)c->block_width,
+                                    .block_height = (uint32_t)c->block_height, .spp_min = 1, .spp_max = 1};
+    int32_t code = lull_host_begin(&grid, NULL, &r->whole, &e);
+    if (code != LULL_OK)
+        return pt_host_fail(code, &e, err);
+    r->grid = lull_host_blocks_of(r->whole);
+    return 0;
+}
+
 static int prepare(struct recorder *r, struct base_err *err)
 {
     const struct pt_render_config *c = &r->config->render;
-    const int whole[4] = {0, 0, c->width, c->height};
     if (c->block_width != c->block_height)
         return base_fail(err, BASE_EINVAL, "--sequence records square blocks: --block N");
     r->manifest.levels = calloc(PT_SEQUENCE_MAX_LEVELS, sizeof *r->manifest.levels);
@@ -324,12 +339,12 @@ static int prepare(struct recorder *r, struct base_err *err)
     if (levels < 0)
         return levels;
     r->manifest.n_levels = (uint32_t)levels;
-    int rc = pt_blocks_init(&r->grid, c->width, c->height, c->block_width, c->block_height, whole, 0, err);
+    int rc = lay_grid(r, err);
     if (rc)
         return rc;
     size_t pixels = (size_t)c->block_width * (size_t)c->block_height;
-    r->chosen = calloc(r->grid.count, 1);
-    r->manifest.blocks = calloc(r->grid.count, sizeof *r->manifest.blocks);
+    r->chosen = calloc(r->grid->count, 1);
+    r->manifest.blocks = calloc(r->grid->count, sizeof *r->manifest.blocks);
     r->mean = calloc(pixels, 3 * sizeof(double));
     r->half = calloc(pixels, 3 * sizeof(double));
     r->difference = calloc(pixels, 3 * sizeof(double));
@@ -338,8 +353,8 @@ static int prepare(struct recorder *r, struct base_err *err)
     if (!r->chosen || !r->manifest.blocks || !r->mean || !r->half || !r->difference || !r->moment2 || !r->scratch)
         return base_fail_nomem(err, "sequence");
     if (!r->config->blocks)
-        memset(r->chosen, 1, r->grid.count);
-    else if ((rc = pt_sequence_choose(r->config->blocks, r->chosen, r->grid.count, err)) != 0)
+        memset(r->chosen, 1, r->grid->count);
+    else if ((rc = pt_sequence_choose(r->config->blocks, r->chosen, r->grid->count, err)) != 0)
         return rc;
     describe(r);
     if (mkdir(r->config->directory, 0777) != 0 && errno != EEXIST)
@@ -352,7 +367,7 @@ static void recorder_release(struct recorder *r)
 {
     base_lock_release(&r->lock);
     seq_manifest_release(&r->manifest);
-    pt_blocks_release(&r->grid);
+    lull_host_end(r->whole);
     free(r->chosen);
     free(r->mean);
     free(r->half);
@@ -365,14 +380,14 @@ static int record_chosen(struct recorder *r, int *stopped, struct base_err *err)
 {
     uint32_t todo = 0, done = 0;
     double start_s = base_clock_wall_s();
-    for (uint32_t i = 0; i < r->grid.count; i++)
+    for (uint32_t i = 0; i < r->grid->count; i++)
         todo += r->chosen[i];
     int rc = seq_manifest_write(r->config->directory, &r->manifest, err);
-    for (uint32_t i = 0; i < r->grid.count && !rc && !*stopped; i++) {
+    for (uint32_t i = 0; i < r->grid->count && !rc && !*stopped; i++) {
         if (!r->chosen[i])
             continue;
         char line[128];
-        rc = record_block(r, &r->grid.list[i], stopped, err);
+        rc = record_block(r, &r->grid->list[i], stopped, err);
         if (!rc && !*stopped && r->dropped > 0) {
             snprintf(line, sizeof line, "block %u: %llu samples were not finite and were dropped; manifest.json counts them",
                      i, (unsigned long long)r->dropped);
@@ -389,7 +404,7 @@ static int record_chosen(struct recorder *r, int *stopped, struct base_err *err)
 }
 
 int pt_sequence_record(const struct pt_sequence_config *config, const struct pt_scene *scene, pt_kernel *kernel,
-                       struct base_threads *threads, struct pt_criterion *criterion, int (*interrupted)(void *data),
+                       struct base_threads *threads, struct lull_host_criterion *criterion, int (*interrupted)(void *data),
                        void (*say)(void *data, const char *line), void *data, int *was_interrupted, struct base_err *err)
 {
     struct recorder r = {.config = config, .scene = scene, .kernel = kernel, .threads = threads, .criterion = criterion,

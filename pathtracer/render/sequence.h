@@ -34,7 +34,7 @@ int pt_sequence_choose(const char *text, uint8_t *chosen, uint32_t count, struct
 /* criterion may be NULL; else its `error` is recorded at every level. *interrupted is set when interrupted() said so: the
  * block being recorded is lost, all before it are safe. say gets a line per block. */
 int pt_sequence_record(const struct pt_sequence_config *config, const struct pt_scene *scene, pt_kernel *kernel,
-                       struct base_threads *threads, struct pt_criterion *criterion, int (*interrupted)(void *data),
+                       struct base_threads *threads, struct lull_host_criterion *criterion, int (*interrupted)(void *data),
                        void (*say)(void *data, const char *line), void *data, int *was_interrupted, struct base_err *err);
 
 #endif

@@ -1,6 +1,7 @@
 /*
- * The ABI's layout, field by field, against the frozen plugin-api/layout-1.txt. Run from the root of the source tree;
- * `api_layout --print` prints the present layout instead.
+ * The layouts of the ABI and of the host library, field by field, against the frozen plugin-api/layout-1.txt and
+ * plugin-api/host-layout-1.txt. Run from the root of the source tree; `api_layout --print` and --print-host print the present ones
+ * instead.
  */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -12,7 +13,7 @@
 
 #include <cmocka.h>
 
-#include <lull/criterion.h>
+#include <lull/host.h>
 
 struct field {
     const char *name;
@@ -72,16 +73,64 @@ LAYOUT(lull_writer, F(lull_writer, struct_size), F(lull_writer, flags), F(lull_w
 LAYOUT(lull_reader, F(lull_reader, struct_size), F(lull_reader, flags), F(lull_reader, context), F(lull_reader, read));
 LAYOUT(lull_state, F(lull_state, struct_size), F(lull_state, flags), F(lull_state, save), F(lull_state, load));
 
+LAYOUT(lull_host_services, F(lull_host_services, struct_size), F(lull_host_services, threads), F(lull_host_services, name),
+       F(lull_host_services, context), F(lull_host_services, log), F(lull_host_services, parallel_for),
+       F(lull_host_services, release));
+LAYOUT(lull_host_config, F(lull_host_config, struct_size), F(lull_host_config, flags), F(lull_host_config, width),
+       F(lull_host_config, height), F(lull_host_config, block_width), F(lull_host_config, block_height),
+       F(lull_host_config, crop), F(lull_host_config, layout), F(lull_host_config, layout_count),
+       F(lull_host_config, layout_stride), F(lull_host_config, planes), F(lull_host_config, transfer),
+       F(lull_host_config, gamma), F(lull_host_config, exposure), F(lull_host_config, sample_clamp),
+       F(lull_host_config, rgb_to_xyz), F(lull_host_config, spp_min), F(lull_host_config, spp_max), F(lull_host_config, seed),
+       F(lull_host_config, time_budget_s), F(lull_host_config, max_check_overhead), F(lull_host_config, max_seam),
+       F(lull_host_config, check_step), F(lull_host_config, mask));
+LAYOUT(lull_host_block, F(lull_host_block, id), F(lull_host_block, x0), F(lull_host_block, y0), F(lull_host_block, x1),
+       F(lull_host_block, y1), F(lull_host_block, reason), F(lull_host_block, spp), F(lull_host_block, half_spp),
+       F(lull_host_block, thread_s), F(lull_host_block, rays), F(lull_host_block, dropped), F(lull_host_block, next_spp),
+       F(lull_host_block, asked_spp), F(lull_host_block, p_noisy), F(lull_host_block, error),
+       F(lull_host_block, predicted_spp), F(lull_host_block, asked), F(lull_host_block, checks),
+       F(lull_host_block, stop_votes), F(lull_host_block, step));
+LAYOUT(lull_host_blocks, F(lull_host_blocks, struct_size), F(lull_host_blocks, count), F(lull_host_blocks, list),
+       F(lull_host_blocks, columns), F(lull_host_blocks, rows), F(lull_host_blocks, list_columns), F(lull_host_blocks, flags),
+       F(lull_host_blocks, block_width), F(lull_host_blocks, block_height), F(lull_host_blocks, x0), F(lull_host_blocks, y0),
+       F(lull_host_blocks, x1), F(lull_host_blocks, y1), F(lull_host_blocks, spp_min), F(lull_host_blocks, spp_max),
+       F(lull_host_blocks, check_step));
+LAYOUT(lull_host_totals, F(lull_host_totals, samples), F(lull_host_totals, paths), F(lull_host_totals, rays),
+       F(lull_host_totals, dropped), F(lull_host_totals, render_s), F(lull_host_totals, criterion_s),
+       F(lull_host_totals, checks), F(lull_host_totals, failed_checks), F(lull_host_totals, skipped_checks),
+       F(lull_host_totals, criterion_thread_s), F(lull_host_totals, asked));
+LAYOUT(lull_host_view, F(lull_host_view, struct_size), F(lull_host_view, plane_count), F(lull_host_view, x0),
+       F(lull_host_view, y0), F(lull_host_view, x1), F(lull_host_view, y1), F(lull_host_view, planes),
+       F(lull_host_view, dropped), F(lull_host_view, dropped_half));
+LAYOUT(lull_host_said, F(lull_host_said, spp), F(lull_host_said, predicted), F(lull_host_said, stopped),
+       F(lull_host_said, unmet));
+LAYOUT(lull_host_stop_at, F(lull_host_stop_at, spp), F(lull_host_stop_at, low), F(lull_host_stop_at, high),
+       F(lull_host_stop_at, known));
+LAYOUT(lull_host_work, F(lull_host_work, spp), F(lull_host_work, thread_s), F(lull_host_work, rows));
+LAYOUT(lull_host_forecast, F(lull_host_forecast, done_s), F(lull_host_forecast, left_s), F(lull_host_forecast, sampling_s),
+       F(lull_host_forecast, check_s), F(lull_host_forecast, low), F(lull_host_forecast, high), F(lull_host_forecast, active),
+       F(lull_host_forecast, known));
+LAYOUT(lull_host_sample, F(lull_host_sample, x), F(lull_host_sample, y), F(lull_host_sample, sample));
+LAYOUT(lull_host_report, F(lull_host_report, struct_size), F(lull_host_report, flags), F(lull_host_report, scene),
+       F(lull_host_report, mask), F(lull_host_report, kernel), F(lull_host_report, effects), F(lull_host_report, effect_count),
+       F(lull_host_report, threads), F(lull_host_report, processes), F(lull_host_report, zero), F(lull_host_report, messages),
+       F(lull_host_report, message_bytes), F(lull_host_report, message_wait_s), F(lull_host_report, film_bytes),
+       F(lull_host_report, film_pixels), F(lull_host_report, scene_bytes));
+
+/* The criterion's, then the host library's. */
 static const struct layout layouts[] = {
     ENTRY(lull_error),    ENTRY(lull_host),      ENTRY(lull_param),  ENTRY(lull_pair),   ENTRY(lull_requirements),
     ENTRY(lull_rect),     ENTRY(lull_frame),     ENTRY(lull_plane),  ENTRY(lull_block),  ENTRY(lull_view),
     ENTRY(lull_decision), ENTRY(lull_criterion), ENTRY(lull_writer), ENTRY(lull_reader), ENTRY(lull_state),
+    ENTRY(lull_host_services), ENTRY(lull_host_config),  ENTRY(lull_host_block), ENTRY(lull_host_blocks),
+    ENTRY(lull_host_totals),   ENTRY(lull_host_view),    ENTRY(lull_host_said),  ENTRY(lull_host_stop_at),
+    ENTRY(lull_host_work),     ENTRY(lull_host_forecast), ENTRY(lull_host_sample), ENTRY(lull_host_report),
 };
-enum { LAYOUTS = sizeof layouts / sizeof *layouts };
+enum { LAYOUTS = sizeof layouts / sizeof *layouts, OF_THE_ABI = 15 };
 
-static void print_layout(FILE *out)
+static void print_layout(FILE *out, int from, int to)
 {
-    for (int i = 0; i < LAYOUTS; i++) {
+    for (int i = from; i < to; i++) {
         fprintf(out, "struct %s %zu\n", layouts[i].name, layouts[i].size);
         for (size_t k = 0; k < layouts[i].count; k++)
             fprintf(out, "  %zu %zu %s\n", layouts[i].fields[k].offset, layouts[i].fields[k].size,
@@ -91,15 +140,14 @@ static void print_layout(FILE *out)
 
 /* --- tests ----------------------------------------------------------------------------------------------------------- */
 
-static void layout_is_the_frozen_one(void **state)
+static void compare_layout(const char *path, int from, int to)
 {
-    (void)state;
     char *present = NULL;
     size_t size = 0;
-    FILE *out = open_memstream(&present, &size), *in = fopen("plugin-api/layout-1.txt", "r");
+    FILE *out = open_memstream(&present, &size), *in = fopen(path, "r");
     assert_non_null(out);
     assert_non_null(in);
-    print_layout(out);
+    print_layout(out, from, to);
     fclose(out);
     char line[200];
     const char *at = present;
@@ -115,6 +163,13 @@ static void layout_is_the_frozen_one(void **state)
     assert_string_equal(at, "");
     fclose(in);
     free(present);
+}
+
+static void layout_is_the_frozen_one(void **state)
+{
+    (void)state;
+    compare_layout("plugin-api/layout-1.txt", 0, OF_THE_ABI);
+    compare_layout("plugin-api/host-layout-1.txt", OF_THE_ABI, LAYOUTS);
 }
 
 static void structs_have_no_padding(void **state)
@@ -135,8 +190,10 @@ static void structs_have_no_padding(void **state)
 static void growing_structs_begin_with_their_size(void **state)
 {
     (void)state;
-    static const char *const elements[] = {"lull_param", "lull_pair",  "lull_rect",
-                                           "lull_plane", "lull_block", "lull_decision"};
+    static const char *const elements[] = {"lull_param",       "lull_pair",          "lull_rect",       "lull_plane",
+                                           "lull_block",       "lull_decision",      "lull_host_block", "lull_host_totals",
+                                           "lull_host_said",   "lull_host_stop_at",  "lull_host_work",  "lull_host_forecast",
+                                           "lull_host_sample"};
     for (int i = 0; i < LAYOUTS; i++) {
         int is_element = 0;
         for (size_t k = 0; k < sizeof elements / sizeof *elements; k++)
@@ -185,15 +242,23 @@ static void numbers_are_frozen(void **state)
             assert_int_equal(enums[i][k], k);
     assert_int_equal(LULL_CAP_DETERMINISTIC | LULL_CAP_BATCH_INVARIANT | LULL_CAP_REOPENS, 7);
     assert_int_equal(LULL_FRAME_RESTART | LULL_FRAME_DETERMINISTIC | LULL_FRAME_INDEPENDENT | LULL_FRAME_SHARED, 15);
+    const int32_t reasons[] = {LULL_REASON_NONE, LULL_REASON_CRITERION, LULL_REASON_SPP_MAX, LULL_REASON_UNIFORM,
+                               LULL_REASON_TIME, LULL_REASON_INTERRUPT, LULL_REASON_DROPPED, LULL_REASON_COUNT};
+    for (int i = 0; i <= LULL_REASON_COUNT; i++)
+        assert_int_equal(reasons[i], i);
+    assert_int_equal(LULL_HOST_UNIFORM | LULL_HOST_HALF_KNOWN, 0x300);
+    assert_int_equal(LULL_REPORT_INTERRUPTED | LULL_REPORT_MESSAGES | LULL_REPORT_NO_RAYS, 7);
+    assert_int_equal(LULL_HOST_DROPPED_KEPT, 16);
 }
 
 int main(int argc, char **argv)
 {
-    if (argc > 1 && strcmp(argv[1], "--print") == 0) {
-        puts("# lull/criterion.h 1.0 where pointers have 8 bytes: each struct and its size, each field's offset and size.");
-        puts("# Frozen: lines may be added (a minor version appends fields), never changed. Made by tests/abi/api_layout "
-             "--print.");
-        print_layout(stdout);
+    const int host = argc > 1 && strcmp(argv[1], "--print-host") == 0;
+    if (host || (argc > 1 && strcmp(argv[1], "--print") == 0)) {
+        printf("# lull/%s 1.0 where pointers have 8 bytes: each struct and its size, each field's offset and size.\n"
+               "# Frozen: lines may be added (a minor version appends fields), never changed. Made by tests/abi/api_layout %s.\n",
+               host ? "host.h" : "criterion.h", argv[1]);
+        print_layout(stdout, host ? OF_THE_ABI : 0, host ? LAYOUTS : OF_THE_ABI);
         return 0;
     }
     const struct CMUnitTest tests[] = {

@@ -44,7 +44,7 @@ refused "text.png" $common --mask text.png
 refused "none.png" $common --mask none.png
 refused "takes the same samples" $scene -q --size 64x48 --spp 4 --mask mask.png -o x.exr
 refused "nor --mask" $scene -q --size 64x48 --block 16 --sequence seq --levels linear:4:8:4 --mask mask.png
-refused "-p visible=VALUE" $scene -q --size 64x48 -c ggn --mask mask.png
+refused "visible=VALUE" $scene -q --size 64x48 -c ggn --mask mask.png
 refused "no dial" $scene -q --size 64x48 -c fixed --mask mask.png
 echo "1..$n"
 exit $bad

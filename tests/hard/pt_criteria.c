@@ -42,7 +42,7 @@ static void four_blocks(const struct pt_scene *scene, const struct pt_integrator
     }
 }
 
-static struct pt_render *render(const char *criterion_id, struct pt_criterion **criterion, struct base_threads *pool)
+static struct pt_render *render(const char *criterion_id, struct lull_host_criterion **criterion, struct base_threads *pool)
 {
     struct pt_render_config config = {.width = 4 * BLOCK, .height = BLOCK, .crop = {0, 0, 4 * BLOCK, BLOCK}, .block_width = BLOCK,
                                       .block_height = BLOCK, .spp_min = FIRST_CHECK, .spp_max = 2000,
@@ -57,7 +57,7 @@ static struct pt_render *render(const char *criterion_id, struct pt_criterion **
         fail_msg("%s", err.text);
     assert_int_equal(pt_render_create(&config, NULL, four_blocks, pool, *criterion, &r, &err), 0);
     assert_int_equal(pt_render_run(r, &hooks, &outcome, &err), 0);
-    assert_int_equal(r->totals.failed_checks, 0);
+    assert_int_equal(r->totals->failed_checks, 0);
     return r;
 }
 
@@ -68,25 +68,25 @@ static void special_blocks(void **state)
     struct base_threads *pool = base_threads_create(2, &err);
     (void)state;
     for (int i = 0; i < 2; i++) {
-        struct pt_criterion *criterion = NULL;
+        struct lull_host_criterion *criterion = NULL;
         struct pt_render *r = render(ids[i], &criterion, pool);
-        const struct pt_block *b = r->blocks.list;
+        const struct lull_host_block *b = r->blocks->list;
         int broken = 0;
         for (size_t k = 0; k < 3 * r->film.pixels; k++)
             broken += !isfinite(r->film.color[k]);
         printf("# figure infinite: %d values of %zu are no number\n", broken, 3 * r->film.pixels);
         assert_int_equal(broken, 0);
         for (int k = 0; k < 2; k++) {
-            assert_int_equal(b[k].reason, PT_REASON_CRITERION);
+            assert_int_equal(b[k].reason, LULL_REASON_CRITERION);
             assert_int_equal(b[k].spp, FIRST_CHECK);
             assert_true(b[k].error >= 0.0 && b[k].error < 1e-6);
         }
         assert_true(b[2].spp > FIRST_CHECK);
         assert_true(isfinite(b[2].error));
-        assert_int_equal(b[3].reason, PT_REASON_DROPPED);
+        assert_int_equal(b[3].reason, LULL_REASON_DROPPED);
         assert_true(isfinite(b[3].error));
         pt_render_destroy(r);
-        pt_criterion_destroy(criterion);
+        lull_host_close(criterion);
     }
     base_threads_destroy(pool);
 }

@@ -46,7 +46,7 @@ static const char *in_folder(const char *name)
     return path;
 }
 
-static int open_render(struct pt_render **render, struct pt_criterion **criterion, struct base_err *err)
+static int open_render(struct pt_render **render, struct lull_host_criterion **criterion, struct base_err *err)
 {
     struct pt_render_config config = pt_fake_config();
     int rc = pt_criterion_create(pt_fake_criterion(), NULL, 0, pool, NULL, NULL, criterion, err);
@@ -60,7 +60,7 @@ static void creating(void **state)
     (void)state;
     for (long k = 1; k < 1000; k++) {
         struct pt_render *render = NULL;
-        struct pt_criterion *criterion = NULL;
+        struct lull_host_criterion *criterion = NULL;
         struct base_err err = {0};
         fail_arm(k);
         int rc = open_render(&render, &criterion, &err);
@@ -72,7 +72,7 @@ static void creating(void **state)
             failures++;
         }
         pt_render_destroy(render);
-        pt_criterion_destroy(criterion);
+        lull_host_close(criterion);
         if (!happened)
             break;
     }
@@ -83,7 +83,7 @@ static void creating(void **state)
 static void checking(void **state)
 {
     struct pt_render *render = NULL;
-    struct pt_criterion *criterion = NULL;
+    struct lull_host_criterion *criterion = NULL;
     struct base_err err = {0};
     struct pt_render_hooks hooks = {0};
     enum pt_render_outcome outcome;
@@ -92,11 +92,11 @@ static void checking(void **state)
     fail_arm(1); /* the first allocation of a running render is the list of patched pixels */
     assert_int_equal(pt_render_run(render, &hooks, &outcome, &err), 0);
     assert_true(fail_disarm());
-    assert_int_equal(render->totals.failed_checks, 1);
-    for (uint32_t i = 0; i < render->blocks.count; i++)
-        assert_int_not_equal(render->blocks.list[i].reason, PT_REASON_NONE);
+    assert_int_equal(render->totals->failed_checks, 1);
+    for (uint32_t i = 0; i < render->blocks->count; i++)
+        assert_int_not_equal(render->blocks->list[i].reason, LULL_REASON_NONE);
     pt_render_destroy(render);
-    pt_criterion_destroy(criterion);
+    lull_host_close(criterion);
 }
 
 static struct pt_output_info info = {.scene = "a.pbrt", .kernel = "k", .aov = PT_FILM_AUX, .effects = PT_FX_ALL};
@@ -168,7 +168,7 @@ static void fail_each_load(struct bytes whole)
     int failures = 0;
     for (long k = 1, happened = 1; happened; k++) {
         struct pt_render *render = NULL;
-        struct pt_criterion *criterion = NULL;
+        struct lull_host_criterion *criterion = NULL;
         struct base_err err = {0};
         assert_int_equal(open_render(&render, &criterion, &err), 0);
         fail_arm(k);
@@ -183,7 +183,7 @@ static void fail_each_load(struct bytes whole)
         }
         failures += rc != 0;
         pt_render_destroy(render);
-        pt_criterion_destroy(criterion);
+        lull_host_close(criterion);
         assert_true(k < 5000);
     }
     assert_true(failures > 0);
@@ -196,7 +196,7 @@ static void writing_and_reading(void **state)
         const char *file;
     } jobs[] = {{write_report, "r.json"}, {write_exr, "a.exr"}, {write_csv, "s.csv"}, {save_checkpoint, "c.ckp"}};
     struct pt_render *render = NULL;
-    struct pt_criterion *criterion = NULL;
+    struct lull_host_criterion *criterion = NULL;
     struct base_err err = {0};
     struct pt_render_hooks hooks = {0};
     enum pt_render_outcome outcome;
@@ -215,7 +215,7 @@ static void writing_and_reading(void **state)
     fail_each_load(whole);
     free(whole.data);
     pt_render_destroy(render);
-    pt_criterion_destroy(criterion);
+    lull_host_close(criterion);
 }
 
 static void say(void *data, const char *line)
@@ -267,7 +267,7 @@ static int quote(struct pt_render *render, int finishing, long k, int *happened,
     struct pt_quote *q = NULL;
     enum pt_render_outcome outcome;
     fail_arm(finishing ? LONG_MAX : k);
-    int rc = pt_quote_create(render, pt_fake_criterion(), NULL, 0, NULL, NULL, NULL, &q, err);
+    int rc = pt_quote_create(render, pt_fake_criterion(), NULL, 0, NULL, NULL, &q, err);
     *happened = fail_disarm();
     struct pt_render_hooks hooks = {.judged = ask_quote, .data = q};
     if (!rc && finishing) {
@@ -287,7 +287,7 @@ static void quoting(void **state)
     for (int finishing = 0; finishing < 2; finishing++) {
         for (long k = 1, happened = 1; k < 1000 && happened; k++) {
             struct pt_render *render = NULL;
-            struct pt_criterion *criterion = NULL;
+            struct lull_host_criterion *criterion = NULL;
             struct base_err err = {0};
             int was = 0;
             assert_int_equal(open_render(&render, &criterion, &err), 0);
@@ -302,7 +302,7 @@ static void quoting(void **state)
             failures += was;
             happened = was;
             pt_render_destroy(render);
-            pt_criterion_destroy(criterion);
+            lull_host_close(criterion);
         }
     }
     assert_in_range(failures, 12, 100);

@@ -92,15 +92,24 @@ static int32_t begin_frame(struct lull_instance *i, const struct lull_frame *fra
     return frame->block_count <= MAX_BLOCKS ? LULL_OK : LULL_E_UNSUPPORTED;
 }
 
-/* error: mean of red as the view says it, so that tests see normalisation and patching. */
+static const void *pixel(const struct lull_view *view, int plane, int x, int y)
+{
+    const struct lull_plane *p = &view->planes[plane];
+    return (const char *)p->data + (x - view->x0) * p->stride_x + (y - view->y0) * p->stride_y;
+}
+
+/* error: mean of red as the view says it, so that tests see normalisation and dropped samples. */
 static double mean_red(const struct lull_view *view, const struct lull_block *b)
 {
     const struct lull_plane *p = view->planes;
     double sum = 0.0;
     for (int y = b->y0; y < b->y1; y++)
-        for (int x = b->x0; x < b->x1; x++)
-            sum += *(const double *)(const void *)((const char *)p->data + (x - view->x0) * p->stride_x +
-                                                   (y - view->y0) * p->stride_y);
+        for (int x = b->x0; x < b->x1; x++) {
+            double red = *(const double *)pixel(view, LULL_PLANE_COLOR, x, y);
+            if (p->normaliser == LULL_NORM_WEIGHT)
+                red *= (double)b->spp / (double)*(const uint32_t *)pixel(view, LULL_PLANE_WEIGHT, x, y);
+            sum += red;
+        }
     return sum * p->scale / (double)b->spp / ((b->x1 - b->x0) * (b->y1 - b->y0));
 }
 
@@ -176,7 +185,7 @@ struct pt_render_config pt_fake_config(void)
 }
 
 int pt_fake_render(const struct pt_render_config *config, pt_kernel *kernel, int threads, const char *at,
-                   struct pt_render **render, struct pt_criterion **criterion, struct base_threads **pool)
+                   struct pt_render **render, struct lull_host_criterion **criterion, struct base_threads **pool)
 {
     struct lull_pair pair = {"at", at};
     struct pt_render_hooks hooks = {0};

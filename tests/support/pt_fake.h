@@ -23,6 +23,6 @@ struct pt_render_config pt_fake_config(void);
 
 /* Renders to the end. The caller destroys *render. at: as above, NULL for a uniform render. */
 int pt_fake_render(const struct pt_render_config *config, pt_kernel *kernel, int threads, const char *at,
-                   struct pt_render **render, struct pt_criterion **criterion, struct base_threads **pool);
+                   struct pt_render **render, struct lull_host_criterion **criterion, struct base_threads **pool);
 
 #endif

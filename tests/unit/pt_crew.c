@@ -131,7 +131,7 @@ static void *member_main(void *arg)
     if (m->behaviour == ABSENT)
         return NULL;
     struct pt_render_config config = pt_fake_config();
-    struct pt_criterion *criterion = NULL;
+    struct lull_host_criterion *criterion = NULL;
     struct lull_pair pair = {"at", "32"};
     struct base_threads *threads = base_threads_create(m->threads, &err);
     struct pt_crew_tools tools = {threads, {NULL, pt_fake_noise, NULL}, NULL};
@@ -144,7 +144,7 @@ static void *member_main(void *arg)
     else
         misbehave(m);
     pt_render_destroy(tools.render);
-    pt_criterion_destroy(criterion);
+    lull_host_close(criterion);
     base_threads_destroy(threads);
     return NULL;
 }
@@ -193,25 +193,25 @@ static void assert_same(const struct pt_render *a, const struct pt_render *b)
     assert_int_equal(n, pt_film_list_arrays(&b->film, y));
     for (int i = 0; i < n; i++)
         assert_memory_equal(x[i].data, y[i].data, x[i].bytes);
-    for (uint32_t i = 0; i < a->blocks.count; i++) {
-        const struct pt_block *p = &a->blocks.list[i], *q = &b->blocks.list[i];
+    for (uint32_t i = 0; i < a->blocks->count; i++) {
+        const struct lull_host_block *p = &a->blocks->list[i], *q = &b->blocks->list[i];
         assert_true(p->spp == q->spp && p->reason == q->reason && p->checks == q->checks && p->rays == q->rays);
         assert_true(p->dropped == q->dropped);
         assert_memory_equal(&p->error, &q->error, sizeof p->error);
     }
-    assert_true(a->totals.samples == b->totals.samples && a->totals.rays == b->totals.rays);
+    assert_true(a->totals->samples == b->totals->samples && a->totals->rays == b->totals->rays);
 }
 
 struct run {
     struct pt_render *render;
-    struct pt_criterion *criterion;
+    struct lull_host_criterion *criterion;
     struct base_threads *pool;
 };
 
 static void release(struct run *r)
 {
     pt_render_destroy(r->render);
-    pt_criterion_destroy(r->criterion);
+    lull_host_close(r->criterion);
     base_threads_destroy(r->pool);
 }
 

@@ -22,6 +22,7 @@
 #include "quote_output.c"
 
 #include "base/png.h"
+#include "host/frame.h"
 #include "image/oiio.h"
 #include "integ/integrator.h"
 #include "support/api_folders.h"
@@ -163,9 +164,9 @@ static void print_render(FILE *out, const struct pt_session *s)
     fprintf(out, "depth %d rr %d sampler %d strategy %d filter %d %g %g sigma %g clamp %g seed %u aux %d\n", i->max_depth, i->rr_depth, i->sampler,
             i->strategy, i->filter, (double)i->filter_x, (double)i->filter_y, (double)i->filter_sigma, (double)i->max_component, i->seed, i->want_aux);
     fprintf(out, "threads %d kernel %s effects %x output %s criterion %s", base_threads_count(s->threads), s->kernel_name, s->scene->effects,
-            s->cli.output ? s->cli.output : "none", s->criterion ? s->criterion->table->id : "none");
-    for (uint32_t k = 0; s->criterion && k < s->render->blocks.count; k++)
-        fprintf(out, " %d", s->criterion->step[k]);
+            s->cli.output ? s->cli.output : "none", s->criterion ? lull_host_table(s->criterion)->id : "none");
+    for (uint32_t k = 0; s->criterion && k < s->render->blocks->count; k++)
+        fprintf(out, " %d", (int)s->render->blocks->list[k].step);
     fprintf(out, "\n");
     for (size_t k = 0; k < s->scene_files.count; k++)
         fprintf(out, "read %s\n", s->scene_files.paths[k]);
@@ -292,14 +293,14 @@ static void words_on_the_way(void **state)
 static struct pt_scene *scene;
 static struct pt_render render;
 static struct pt_quote quote;
-static struct pt_block list[7];
+static struct lull_host_block *list;
 static struct pt_quote_block answers[3][7];
-static struct pt_outlook_said said[3][7];
+static struct lull_host_said said[3][7];
 static struct base_threads *pool;
 static double black[3]; /* of the first pixel */
 static uint32_t no_drops[1];
 static struct lull_criterion table;
-static struct pt_criterion criterion = {.table = &table};
+static struct lull_host_criterion *criterion;
 
 static void fill_row(struct pt_quote_row *row, int k, double visible)
 {
@@ -327,14 +328,28 @@ static int set_up_quote(void **state)
     scene = text_scene("Film \"rgb\" \"integer xresolution\" 24 \"integer yresolution\" 9 Camera \"perspective\" WorldBegin\n"
                        "Shape \"sphere\" \"float radius\" 5", NULL, NULL);
     pool = base_threads_create(2, &err);
+    struct lull_rect layout[7];
     for (int i = 0; i < 7; i++)
-        list[i] = (struct pt_block){.id = 10u + (uint32_t)i, .x0 = i % 3 * 8, .y0 = i / 3 * 4, .x1 = i % 3 * 8 + 8, .y1 = i < 6 ? i / 3 * 4 + 4 : 9,
-                                    .spp = i == 3 ? 0 : 16u + (uint32_t)i, .thread_s = i == 3 ? 0 : 0.001 * (i + 1)};
-    render = (struct pt_render){.config = config, .scene = scene, .threads = pool, .criterion = &criterion, .busy_threads = 1.84,
-                                .film = {.x1 = 24, .y1 = 9, .pixels = 200, .bytes = 34567890, .color = black, .dropped = no_drops},
-                                .blocks = {.list = list, .count = 7, .list_columns = 3, .block_width = 8, .block_height = 4},
-                                .totals = {.samples = 4321, .render_s = 50.5, .criterion_s = 60.75}};
+        layout[i] = (struct lull_rect){i % 3 * 8, i / 3 * 4, i % 3 * 8 + 8, i < 6 ? i / 3 * 4 + 4 : 9};
+    const struct lull_host_config laid = {.struct_size = sizeof laid, .width = 24, .height = 9, .layout = layout, .layout_count = 7,
+                                          .layout_stride = sizeof layout[0], .spp_min = 1, .spp_max = 1000};
+    struct lull_host_frame *frame;
+    table = *pt_fake_criterion();
     table.id = "law";
+    if (lull_host_create(NULL, &table, NULL, 0, &criterion, NULL) != LULL_OK || lull_host_begin(&laid, criterion, &frame, NULL) != LULL_OK)
+        return -1;
+    list = lull_host_blocks_of(frame)->list;
+    for (int i = 0; i < 7; i++) {
+        list[i].id = 10u + (uint32_t)i;
+        list[i].spp = i == 3 ? 0 : 16u + (uint32_t)i;
+        list[i].thread_s = i == 3 ? 0 : 0.001 * (i + 1);
+    }
+    render = (struct pt_render){.config = config, .scene = scene, .threads = pool, .criterion = criterion, .busy_threads = 1.84,
+                                .film = {.x1 = 24, .y1 = 9, .pixels = 200, .bytes = 34567890, .color = black, .dropped = no_drops},
+                                .frame = frame, .blocks = lull_host_blocks_of(frame), .totals = lull_host_totals_of(frame)};
+    render.totals->samples = 4321;
+    render.totals->render_s = 50.5;
+    render.totals->criterion_s = 60.75;
     static double costs[7] = {0.25, 0.5, 0.75, 1, 1.25, 1.5, 1.75};
     quote = (struct pt_quote){.row_count = 3, .threads = 2, .block_count = 7, .block_cost_s = costs, .check_s = 0.125};
     static const double visible[3] = {0.5, 0.125, 0.05};
@@ -346,6 +361,8 @@ static int set_up_quote(void **state)
 static int tear_down_quote(void **state)
 {
     (void)state;
+    lull_host_end(render.frame);
+    lull_host_close(criterion);
     pt_scene_destroy(scene);
     base_threads_destroy(pool);
     return 0;
@@ -363,7 +380,7 @@ static char *tell_quote(struct pt_approve_case *c)
     quote.rows[1].visible = strstr(c->text, "uniform") ? (double)NAN : strstr(c->text, "default") ? 0.25 : 0.125;
     quote.rows[1].unmet = strstr(c->text, "met") ? 0 : 1;
     quote.threads = strstr(c->text, "one-thread") ? 1 : 2;
-    render.criterion = strstr(c->text, "uniform") ? NULL : &criterion;
+    render.criterion = strstr(c->text, "uniform") ? NULL : criterion;
     if (strstr(c->text, "json"))
         assert_int_equal(pt_quote_json(out, &quote, &render, &info, &err), 0);
     else
@@ -436,21 +453,21 @@ static void the_last_line(void **state)
     (void)state;
     struct pt_session s = {.render = &render};
     for (int i = 0; i < 7; i++)
-        list[i].reason = i < 3 ? PT_REASON_CRITERION : i < 5 ? PT_REASON_SPP_MAX : PT_REASON_DROPPED;
-    render.totals.paths = 123456789;
-    render.totals.dropped = 12;
-    render.dropped[0] = (struct pt_dropped_sample){7, 8, 9};
+        list[i].reason = i < 3 ? LULL_REASON_CRITERION : i < 5 ? LULL_REASON_SPP_MAX : LULL_REASON_DROPPED;
+    render.totals->paths = 123456789;
+    render.totals->dropped = 12;
+    lull_host_drop(render.frame, 7, 8, 9);
     listen_to(stderr);
     tell_summary(&s);
     s.cli.quiet = 1;
     tell_summary(&s);
-    render.totals.dropped = 0;
+    render.totals->dropped = 0;
     tell_summary(&s);
     assert_string_equal(heard_on(stderr), "pathtracer: 22 spp on average, 111.2 s, 2.44 Mpaths/s, criterion 54.6 %; blocks: 3 criterion 2 spp-max 2 dropped\n"
                                           "pathtracer: 12 samples were not finite and were dropped, the first seen at --debug-path 7,8,9\n"
                                           "pathtracer: 12 samples were not finite and were dropped, the first seen at --debug-path 7,8,9\n");
     for (int i = 0; i < 7; i++)
-        list[i].reason = PT_REASON_NONE;
+        list[i].reason = LULL_REASON_NONE;
 }
 
 /* A checkpoint that fails is said and tried again after its time; previews come when three times as long has passed, a minute later at
@@ -526,25 +543,23 @@ static void quotes_as_pictures(void **state)
     struct base_err err = {0};
     char path[64];
     snprintf(path, sizeof path, "/tmp/pt_main_%ld.png", (long)getpid());
-    render.blocks.x1 = 24;
-    render.blocks.y1 = 9;
     quote.rows[1].visible = 0.125;
     for (int k = 0; k < 2; k++) {
-        struct pt_stopmap_block blocks[7];
-        struct pt_stopmap map;
+        struct lull_canvas map;
+        double values[7];
         struct pt_oiio_image image;
         for (int i = 0; i < 7; i++) {
             double value = answers[1][i].thread_s;
             answers[1][i].thread_s = k ? value * 60 / 9 : value; /* the dearest: 9 s, or just a minute */
-            blocks[i] = (struct pt_stopmap_block){list[i].x0, list[i].y0, list[i].x1, list[i].y1, answers[1][i].thread_s / (k ? 60 : 1)};
+            values[i] = answers[1][i].thread_s / (k ? 60 : 1);
         }
         assert_int_equal(pt_quote_map(path, &quote, &render, &err), 0);
-        assert_int_equal(pt_stopmap_draw(0, 0, 24, 9, blocks, 7, k ? "min" : "s", &map, &err), 0);
+        assert_int_equal(lull_host_paint(render.blocks, values, k ? "min" : "s", &map, NULL), 0);
         assert_int_equal(pt_oiio_read(path, &image, &err), 0);
         assert_true(image.width == map.width && image.height == map.height && image.channels == 3 && image.u8);
         assert_memory_equal(image.u8, map.rgb, (size_t)(3 * map.width * map.height));
         pt_oiio_release(&image);
-        pt_stopmap_release(&map);
+        free(map.rgb);
     }
     unlink(path);
     assert_int_equal(pt_quote_map("/missing/q.png", &quote, &render, &err), BASE_EIO);

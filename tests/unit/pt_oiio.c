@@ -12,10 +12,9 @@
 
 #include "base/files.h"
 #include "base/png.h"
+#include "host/frame.h"
 #include "image/exr.h"
-#include "image/font.h"
 #include "image/oiio.h"
-#include "image/stopmap.h"
 #include "support/pt_approve.h"
 
 static char dir[] = "/tmp/pt_oiio_XXXXXX";
@@ -215,14 +214,14 @@ enum { DRAWING_ROOM = 1 << 16 };
 
 static size_t letters(const char *words, char *out)
 {
-    struct pt_canvas canvas = {0};
+    struct lull_canvas canvas = {0};
     const uint8_t ink[3] = {1, 2, 3};
     uint8_t rgb[64 * 64 * 3] = {0};
     int x, y, scale, start;
     size_t n = 0;
     assert_int_equal(sscanf(words, "%d %d %d %d %d %n", &canvas.width, &canvas.height, &x, &y, &scale, &start), 5);
     canvas.rgb = rgb;
-    pt_font_draw(&canvas, x, y, scale, ink, words + start);
+    lull_font_draw(&canvas, x, y, scale, ink, words + start);
     for (int v = 0; v < canvas.height; v++) {
         out[n++] = ' ';
         for (int u = 0; u < canvas.width; u++) {
@@ -242,7 +241,7 @@ static size_t colours(const char *words, char *out)
     char *end;
     for (double t = strtod(words, &end); end != words; t = strtod(words, &end)) {
         uint8_t rgb[3];
-        pt_viridis(t, rgb);
+        lull_host_viridis(t, rgb);
         n += (size_t)sprintf(out + n, " #%02x%02x%02x", rgb[0], rgb[1], rgb[2]);
         words = end;
     }
@@ -263,15 +262,16 @@ static size_t tell_row(const uint8_t *row, int width, char *out)
 
 static size_t map_of_blocks(const char *words, char *out)
 {
-    struct pt_stopmap_block blocks[4], *b = blocks;
-    struct pt_stopmap map;
-    struct base_err err = {0};
+    struct lull_host_block list[4], *b = list;
+    struct lull_host_blocks blocks = {.list = list};
+    struct lull_canvas map;
+    double values[4];
     char unit[16];
-    int x0, y0, x1, y1, used;
-    assert_int_equal(sscanf(words, "%d %d %d %d %15s%n", &x0, &y0, &x1, &y1, unit, &used), 5);
-    for (words += used; sscanf(words, " %d,%d,%d,%d=%lf%n", &b->x0, &b->y0, &b->x1, &b->y1, &b->value, &used) == 5; words += used)
-        b++;
-    assert_int_equal(pt_stopmap_draw(x0, y0, x1, y1, blocks, (uint32_t)(b - blocks), unit, &map, &err), 0);
+    int used;
+    assert_int_equal(sscanf(words, "%d %d %d %d %15s%n", &blocks.x0, &blocks.y0, &blocks.x1, &blocks.y1, unit, &used), 5);
+    for (words += used; sscanf(words, " %d,%d,%d,%d=%lf%n", &b->x0, &b->y0, &b->x1, &b->y1, &values[blocks.count], &used) == 5; words += used, b++)
+        blocks.count++;
+    assert_int_equal(lull_host_paint(&blocks, values, unit, &map, NULL), LULL_OK);
     size_t n = (size_t)sprintf(out, " %d x %d\n", map.width, map.height), stride = 3 * (size_t)map.width;
     for (int y = 0, end; y < map.height; y = end) {
         const uint8_t *row = map.rgb + (size_t)y * stride;
@@ -280,8 +280,7 @@ static size_t map_of_blocks(const char *words, char *out)
         n += (size_t)sprintf(out + n, " %d:", y);
         n += tell_row(row, map.width, out + n);
     }
-    pt_stopmap_release(&map);
-    assert_null(map.rgb);
+    free(map.rgb);
     return n;
 }
 

@@ -20,7 +20,7 @@
 
 /* error = sqrt(40 (1 + column) / n), stopped at 2 visible: at 40 (1 + column) spp for visible = 0.5, at 4 times as many for
  * 0.25, at 100 times as many for 0.05. */
-static double law_spp(const struct pt_block *b, double visible)
+static double law_spp(const struct lull_host_block *b, double visible)
 {
     return 40.0 * (1 + b->x0 / 16) * 0.25 / (visible * visible);
 }
@@ -45,7 +45,7 @@ LULL_KIT_CRITERION(law_rule, law_params, 1, "law", "Law of noise", "1", "knows")
 
 struct run {
     struct base_threads *pool;
-    struct pt_criterion *criterion;
+    struct lull_host_criterion *criterion;
     struct pt_render *render;
     struct pt_quote *quote;
     struct lull_pair pair;
@@ -72,8 +72,7 @@ static void start(struct run *run, const char *visible, uint64_t pilot_spp)
         assert_int_equal(pt_criterion_create(table, &run->pair, 1, run->pool, NULL, NULL, &run->criterion, &err), 0);
     assert_int_equal(pt_render_create(&config, NULL, pt_fake_noise, run->pool, run->criterion, &run->render, &err), 0);
     if (pilot_spp > 0)
-        assert_int_equal(pt_quote_create(run->render, table, &run->pair, visible != NULL, NULL, NULL, NULL, &run->quote,
-                                         &err), 0);
+        assert_int_equal(pt_quote_create(run->render, table, &run->pair, visible != NULL, NULL, NULL, &run->quote, &err), 0);
 }
 
 static enum pt_render_outcome go(struct run *run)
@@ -89,7 +88,7 @@ static void end(struct run *run)
 {
     pt_quote_destroy(run->quote);
     pt_render_destroy(run->render);
-    pt_criterion_destroy(run->criterion);
+    lull_host_close(run->criterion);
     base_threads_destroy(run->pool);
 }
 
@@ -115,7 +114,7 @@ static void rows_follow_the_law(void **state)
         assert_int_equal(go(&real), PT_RENDER_DONE);
         assert_int_equal(row->asked, i == 1);
         for (uint32_t k = 0; k < pilot.quote->block_count; k++) {
-            const struct pt_block *b = &real.render->blocks.list[k];
+            const struct lull_host_block *b = &real.render->blocks->list[k];
             double law = fmin(law_spp(b, visible[i]), 10000.0), said = row->blocks[k].stop.spp;
             assert_true(row->blocks[k].stop.known);
             assert_true(said >= 0.999 * law && said <= fmax(1.1 * law + 1.0, 8.0));
@@ -135,13 +134,13 @@ static void sums_are_those_of_the_blocks(void **state)
     struct run pilot;
     start(&pilot, "0.25", 64);
     go(&pilot);
-    for (uint32_t i = 0; i < pilot.render->blocks.count; i++)
-        pilot.render->blocks.list[i].thread_s = 1e-3 * (1 + i) * (double)pilot.render->blocks.list[i].spp;
+    for (uint32_t i = 0; i < pilot.render->blocks->count; i++)
+        pilot.render->blocks->list[i].thread_s = 1e-3 * (1 + i) * (double)pilot.render->blocks->list[i].spp;
     assert_int_equal(pt_quote_finish(pilot.quote, pilot.render, &err), 0);
     const struct pt_quote_row *row = &pilot.quote->rows[1];
     double thread_s = 0.0, samples = 0.0;
     for (uint32_t i = 0; i < pilot.quote->block_count; i++) {
-        const struct pt_block *b = &pilot.render->blocks.list[i];
+        const struct lull_host_block *b = &pilot.render->blocks->list[i];
         thread_s += 1e-3 * (1 + i) * row->blocks[i].stop.spp;
         samples += (b->x1 - b->x0) * (b->y1 - b->y0) * row->blocks[i].stop.spp;
     }
@@ -177,8 +176,8 @@ static void uniform_needs_no_criterion(void **state)
     assert_int_equal(run.quote->row_count, 1);
     assert_true(run.quote->rows[0].spp_min == 10000.0 && run.quote->rows[0].spp_mean == 10000.0);
     assert_int_equal(run.quote->rows[0].unknown, 0);
-    for (uint32_t i = 0; i < run.render->blocks.count; i++)
-        assert_int_equal(run.render->blocks.list[i].spp, 16); /* no sample beyond the pilot */
+    for (uint32_t i = 0; i < run.render->blocks->count; i++)
+        assert_int_equal(run.render->blocks->list[i].spp, 16); /* no sample beyond the pilot */
     end(&run);
 }
 
@@ -197,8 +196,8 @@ static void a_pilot_loses_nothing(void **state)
     assert_int_equal(go(&parts), PT_RENDER_DONE);
     assert_memory_equal(whole.render->film.color, parts.render->film.color,
                         3 * whole.render->film.pixels * sizeof(double));
-    for (uint32_t i = 0; i < whole.render->blocks.count; i++)
-        assert_int_equal(whole.render->blocks.list[i].spp, parts.render->blocks.list[i].spp);
+    for (uint32_t i = 0; i < whole.render->blocks->count; i++)
+        assert_int_equal(whole.render->blocks->list[i].spp, parts.render->blocks->list[i].spp);
     end(&whole);
     end(&parts);
 }
@@ -207,15 +206,15 @@ static void a_pilot_loses_nothing(void **state)
 static void intervals_widen_with_distance(void **state)
 {
     (void)state;
-    struct pt_outlook_said said = {.spp = 10, .predicted = 40.0};
-    struct pt_outlook_stop far = pt_outlook_stop(&said, 10, 500);
+    struct lull_host_said said = {.spp = 10, .predicted = 40.0};
+    struct lull_host_stop_at far = lull_host_expect(&said, 10, 500);
     said.spp = 40;
-    struct pt_outlook_stop near = pt_outlook_stop(&said, 10, 500);
+    struct lull_host_stop_at near = lull_host_expect(&said, 10, 500);
     assert_true(far.spp == 40.0 && near.spp == 40.0);
     assert_true(near.low > far.low && far.low > 20.0 && near.high < far.high && far.high < 80.0);
     assert_true(near.low < 38.0 && near.high > 42.0);
     said.unmet = 1;
-    struct pt_outlook_stop unmet = pt_outlook_stop(&said, 30, 70);
+    struct lull_host_stop_at unmet = lull_host_expect(&said, 30, 70);
     assert_true(unmet.low == 30.0 && unmet.high == 70.0);
 }
 
@@ -247,7 +246,7 @@ static void a_pilot_ends_with_its_time(void **state)
     start(&run, "0.25", 64);
     run.render->config.pilot_s = 0;
     assert_int_equal(go(&run), PT_RENDER_PILOT);
-    assert_true(pt_render_active(run.render) == 12 && run.render->blocks.list[0].spp == 1 && run.render->totals.checks == 0);
+    assert_true(lull_host_active(run.render->blocks) == 12 && run.render->blocks->list[0].spp == 1 && run.render->totals->checks == 0);
     run.render->config.pilot_spp = 0; /* no pilot */
     assert_int_equal(go(&run), PT_RENDER_DONE);
     end(&run);
@@ -256,29 +255,29 @@ static void a_pilot_ends_with_its_time(void **state)
 static void stops_that_nobody_predicts(void **state)
 {
     (void)state;
-    struct pt_outlook_said said = {0};
-    struct pt_outlook_stop stop = pt_outlook_stop(&said, 20, 500);
+    struct lull_host_said said = {0};
+    struct lull_host_stop_at stop = lull_host_expect(&said, 20, 500);
     assert_true(!stop.known && stop.spp == 500.0 && stop.low == 20.0 && stop.high == 500.0);
-    said = (struct pt_outlook_said){.spp = 32, .predicted = (double)NAN};
-    assert_false(pt_outlook_stop(&said, 32, 500).known);
+    said = (struct lull_host_said){.spp = 32, .predicted = (double)NAN};
+    assert_false(lull_host_expect(&said, 32, 500).known);
     said.predicted = 1e9;
-    stop = pt_outlook_stop(&said, 32, 500);
+    stop = lull_host_expect(&said, 32, 500);
     assert_true(stop.known && stop.spp == 500.0);
     said.predicted = 3.0;
-    assert_true(pt_outlook_stop(&said, 32, 500).spp == 32.0);
+    assert_true(lull_host_expect(&said, 32, 500).spp == 32.0);
     said.stopped = 1;
-    assert_true(pt_outlook_stop(&said, 0, 500).spp == 3.0);
+    assert_true(lull_host_expect(&said, 0, 500).spp == 3.0);
 }
 
 /* 4 threads: while both blocks are active 3 rows keep 3 busy, the single row of the second keeps one. */
 static void the_last_blocks_leave_threads_idle(void **state)
 {
     (void)state;
-    struct pt_outlook_work work[2] = {{.spp = 300, .thread_s = 300, .rows = 1}, {.spp = 100, .thread_s = 200, .rows = 2}};
-    assert_true(fabs(pt_outlook_wall_s(work, 2, 4) - (100.0 * 3.0 / 3.0 + 200.0)) < 1e-9);
-    assert_true(fabs(pt_outlook_busy(5, 4) - 2.5) < 1e-12 && pt_outlook_busy(8, 4) == 4.0 && pt_outlook_busy(0, 4) == 0.0);
-    struct pt_outlook_work nothing = {.rows = 4};
-    assert_true(pt_outlook_wall_s(&nothing, 1, 2) == 0.0);
+    struct lull_host_work work[2] = {{.spp = 300, .thread_s = 300, .rows = 1}, {.spp = 100, .thread_s = 200, .rows = 2}};
+    assert_true(fabs(lull_host_wall_s(work, 2, 4) - (100.0 * 3.0 / 3.0 + 200.0)) < 1e-9);
+    assert_true(fabs(lull_host_busy(5, 4) - 2.5) < 1e-12 && lull_host_busy(8, 4) == 4.0 && lull_host_busy(0, 4) == 0.0);
+    struct lull_host_work nothing = {.rows = 4};
+    assert_true(lull_host_wall_s(&nothing, 1, 2) == 0.0);
 }
 
 /* Half of the interval is 0.15 octaves and 0.08 more for each octave ahead, a whole one where light is missing; never less than there is
@@ -287,7 +286,7 @@ static void outlooks_in_closed_form(void **state)
 {
     (void)state;
     static const struct {
-        struct pt_outlook_said said;
+        struct lull_host_said said;
         uint64_t spp;
         double stop, low, high;
         int known;
@@ -305,24 +304,25 @@ static void outlooks_in_closed_form(void **state)
         {{10, INFINITY, 0, 0}, 10, 500, 10, 500, 0},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        struct pt_outlook_stop s = pt_outlook_stop(&cases[i].said, cases[i].spp, 500);
+        struct lull_host_stop_at s = lull_host_expect(&cases[i].said, cases[i].spp, 500);
         if (!(fabs(s.spp - cases[i].stop) < 1e-9 && fabs(s.low / cases[i].low - 1) < 3e-4 && fabs(s.high / cases[i].high - 1) < 3e-4) ||
             s.known != cases[i].known)
-            fail_msg("case %zu: %g (%g to %g) %d", i, s.spp, s.low, s.high, s.known);
+            fail_msg("case %zu: %g (%g to %g) %d", i, s.spp, s.low, s.high, (int)s.known);
     }
-    struct pt_block b = {.spp = 30, .next_spp = 60, .asked = 1, .asked_spp = 20, .predicted_spp = 40};
-    struct pt_outlook_stop s = pt_outlook_of_block(&b, 0, 500);
+    struct lull_host_block b = {.spp = 30, .next_spp = 60, .asked = 1, .asked_spp = 20, .predicted_spp = 40};
+    struct lull_host_blocks blocks = {.spp_max = 500}, uniform = {.spp_max = 500, .flags = LULL_HOST_UNIFORM};
+    struct lull_host_stop_at s = lull_host_expect_block(&blocks, &b);
     assert_true(s.spp == 60 && fabs(s.low / (40 / exp2(0.23)) - 1) < 1e-12 && s.known); /* said at 20, an octave ahead */
-    assert_true(pt_outlook_of_block(&b, 1, 500).low == 500 && pt_outlook_of_block(&b, 1, 500).spp == 500);
-    assert_true(fabs(pt_outlook_checks(&b, 60) - 1) < 1e-12 && fabs(pt_outlook_checks(&b, 540) - 3) < 1e-12); /* threefold from check to check */
+    assert_true(lull_host_expect_block(&uniform, &b).low == 500 && lull_host_expect_block(&uniform, &b).spp == 500);
+    assert_true(fabs(lull_host_expect_checks(&b, 60) - 1) < 1e-12 && fabs(lull_host_expect_checks(&b, 540) - 3) < 1e-12); /* threefold from check to check */
     b.asked = 0;
-    assert_true(!pt_outlook_of_block(&b, 0, 500).known && fabs(pt_outlook_checks(&b, 60 * 2.25) - 3) < 1e-12);
+    assert_true(!lull_host_expect_block(&blocks, &b).known && fabs(lull_host_expect_checks(&b, 60 * 2.25) - 3) < 1e-12);
     b.asked = 1;
     b.asked_spp = 60;
-    assert_true(pt_outlook_checks(&b, 500) == 1); /* a ratio of 1 says nothing */
-    b.reason = PT_REASON_CRITERION;
-    s = pt_outlook_of_block(&b, 0, 500);
-    assert_true(s.spp == 30 && s.low == 30 && s.high == 30 && s.known && pt_outlook_checks(&b, 500) == 0);
+    assert_true(lull_host_expect_checks(&b, 500) == 1); /* a ratio of 1 says nothing */
+    b.reason = LULL_REASON_CRITERION;
+    s = lull_host_expect_block(&blocks, &b);
+    assert_true(s.spp == 30 && s.low == 30 && s.high == 30 && s.known && lull_host_expect_checks(&b, 500) == 0);
 }
 
 /* Every number of a quote after pilots of a known cost, but for what the clock says. "0.1 64": asked for, samples of the pilot. */
@@ -338,13 +338,13 @@ static char *quote_of(struct pt_approve_case *c)
     start(&run, visible[0] == '-' ? NULL : visible, pilot);
     fprintf(out, "outcome %d\n", go(&run));
     struct pt_render *r = run.render;
-    for (uint32_t i = 0; i < r->blocks.count; i++)
-        r->blocks.list[i].thread_s = 1e-3 * (1 + i) * (double)r->blocks.list[i].spp;
+    for (uint32_t i = 0; i < r->blocks->count; i++)
+        r->blocks->list[i].thread_s = 1e-3 * (1 + i) * (double)r->blocks->list[i].spp;
     if (strstr(c->text, "unasked"))
-        r->blocks.list[3].spp = 0;
+        r->blocks->list[3].spp = 0;
     for (int i = 0; i < run.quote->row_count && strstr(c->text, "unsaid"); i++)
-        run.quote->rows[i].said[2] = (struct pt_outlook_said){.spp = r->blocks.list[2].spp, .predicted = (double)NAN};
-    r->totals.criterion_s = 0.25 * (double)r->totals.checks;
+        run.quote->rows[i].said[2] = (struct lull_host_said){.spp = r->blocks->list[2].spp, .predicted = (double)NAN};
+    r->totals->criterion_s = 0.25 * (double)r->totals->checks;
     assert_int_equal(pt_quote_finish(run.quote, r, &err), 0);
     fprintf(out, "a check takes %.9g\n", run.quote->check_s);
     for (int i = 0; i < run.quote->row_count; i++) {
@@ -358,7 +358,7 @@ static char *quote_of(struct pt_approve_case *c)
             fprintf(out, "  block %u said %llu %.9g%s%s first %llu %.9g stop %.9g %.9g %.9g %d thread %.9g %.9g %.9g\n", k,
                     (unsigned long long)row->said[k].spp, row->said[k].predicted, row->said[k].stopped ? " stopped" : "",
                     row->said[k].unmet ? " unmet" : "", (unsigned long long)row->first[k].spp, row->first[k].predicted, b->stop.spp, b->stop.low,
-                    b->stop.high, b->stop.known, b->thread_s, b->thread_low_s, b->thread_high_s);
+                    b->stop.high, (int)b->stop.known, b->thread_s, b->thread_low_s, b->thread_high_s);
         }
     }
     end(&run);

@@ -17,7 +17,7 @@
 
 struct result {
     struct pt_render *render;
-    struct pt_criterion *criterion;
+    struct lull_host_criterion *criterion;
     struct base_threads *pool;
 };
 
@@ -31,7 +31,7 @@ static struct result render(const struct pt_render_config *config, pt_kernel *ke
 static void release(struct result *r)
 {
     pt_render_destroy(r->render);
-    pt_criterion_destroy(r->criterion);
+    lull_host_close(r->criterion);
     base_threads_destroy(r->pool);
     *r = (struct result){0};
 }
@@ -44,9 +44,9 @@ static void assert_same(const struct pt_render *a, const struct pt_render *b)
     assert_int_equal(n, pt_film_list_arrays(&b->film, y));
     for (int i = 0; i < n; i++)
         assert_memory_equal(x[i].data, y[i].data, x[i].bytes);
-    assert_int_equal(a->blocks.count, b->blocks.count);
-    for (uint32_t i = 0; i < a->blocks.count; i++) {
-        const struct pt_block *p = &a->blocks.list[i], *q = &b->blocks.list[i];
+    assert_int_equal(a->blocks->count, b->blocks->count);
+    for (uint32_t i = 0; i < a->blocks->count; i++) {
+        const struct lull_host_block *p = &a->blocks->list[i], *q = &b->blocks->list[i];
         assert_int_equal(p->spp, q->spp);
         assert_int_equal(p->reason, q->reason);
         assert_int_equal(p->checks, q->checks);
@@ -60,16 +60,16 @@ static void blocks_stop_where_the_criterion_says(void **state)
     (void)state;
     struct pt_render_config config = pt_fake_config();
     struct result r = render(&config, pt_fake_noise, 2, "32");
-    assert_int_equal(r.render->blocks.count, 12);
+    assert_int_equal(r.render->blocks->count, 12);
     for (uint32_t i = 0; i < 12; i++) {
-        const struct pt_block *b = &r.render->blocks.list[i];
+        const struct lull_host_block *b = &r.render->blocks->list[i];
         uint64_t at = 32 * (1 + i % 4);
         assert_in_range(b->spp, at, at + at / 5 + 1);
-        assert_int_equal(b->reason, PT_REASON_CRITERION);
+        assert_int_equal(b->reason, LULL_REASON_CRITERION);
         assert_true(fabs(b->error - 0.75) < 0.02);
     }
-    assert_int_equal(r.render->blocks.list[11].x1, 60);
-    assert_int_equal(r.render->blocks.list[11].y1, 44);
+    assert_int_equal(r.render->blocks->list[11].x1, 60);
+    assert_int_equal(r.render->blocks->list[11].y1, 44);
     release(&r);
 }
 
@@ -99,10 +99,10 @@ static void uniform_without_criterion(void **state)
     memcpy(config.crop, crop, sizeof crop);
     struct result r = render(&config, pt_fake_noise, 2, NULL);
     assert_int_equal(r.render->film.pixels, 27 * 11);
-    assert_int_equal(r.render->totals.samples, 27 * 11 * 50);
-    assert_int_equal(r.render->totals.rays, 3 * 27 * 11 * 50);
-    for (uint32_t i = 0; i < r.render->blocks.count; i++)
-        assert_int_equal(r.render->blocks.list[i].reason, PT_REASON_UNIFORM);
+    assert_int_equal(r.render->totals->samples, 27 * 11 * 50);
+    assert_int_equal(r.render->totals->rays, 3 * 27 * 11 * 50);
+    for (uint32_t i = 0; i < r.render->blocks->count; i++)
+        assert_int_equal(r.render->blocks->list[i].reason, LULL_REASON_UNIFORM);
     release(&r);
 }
 
@@ -115,8 +115,8 @@ static void crop_changes_no_decision(void **state)
     int crop[4] = {20, 20, 30, 25};
     memcpy(config.crop, crop, sizeof crop);
     struct result part = render(&config, pt_fake_noise, 2, "32");
-    assert_int_equal(part.render->blocks.count, 1);
-    const struct pt_block *p = &part.render->blocks.list[0], *w = &whole.render->blocks.list[5];
+    assert_int_equal(part.render->blocks->count, 1);
+    const struct lull_host_block *p = &part.render->blocks->list[0], *w = &whole.render->blocks->list[5];
     assert_int_equal(p->id, 5);
     assert_int_equal(p->spp, w->spp);
     assert_memory_equal(&p->error, &w->error, sizeof p->error);
@@ -132,9 +132,9 @@ static void spp_max_ends_a_block(void **state)
     config.spp_max = 100;
     struct result r = render(&config, pt_fake_noise, 2, "1000");
     for (uint32_t i = 0; i < 12; i++) {
-        assert_int_equal(r.render->blocks.list[i].spp, 100);
-        assert_int_equal(r.render->blocks.list[i].reason, PT_REASON_SPP_MAX);
-        assert_true(r.render->blocks.list[i].asked);
+        assert_int_equal(r.render->blocks->list[i].spp, 100);
+        assert_int_equal(r.render->blocks->list[i].reason, LULL_REASON_SPP_MAX);
+        assert_true(r.render->blocks->list[i].asked);
     }
     release(&r);
 }
@@ -146,14 +146,16 @@ static void dropped_samples_never_converge_nor_live_for_ever(void **state)
     pt_kernel *const kernels[] = {pt_fake_nan, pt_fake_all_nan};
     for (int k = 0; k < 2; k++) {
         struct result r = render(&config, kernels[k], 2, "16");
-        assert_true(r.render->totals.dropped > 0);
-        assert_true(r.render->dropped_count > 0);
-        assert_true(r.render->dropped[0].x < 8);
+        assert_true(r.render->totals->dropped > 0);
+        uint32_t kept;
+        const struct lull_host_sample *dropped = lull_host_dropped(r.render->frame, &kept);
+        assert_true(kept > 0);
+        assert_true(dropped[0].x < 8);
         if (k == 0)
-            assert_int_equal(r.render->dropped[0].sample % 97, 5);
+            assert_int_equal(dropped[0].sample % 97, 5);
         for (uint32_t i = 0; i < 12; i++) {
-            const struct pt_block *b = &r.render->blocks.list[i];
-            assert_int_equal(b->reason, b->x0 < 8 ? PT_REASON_DROPPED : PT_REASON_CRITERION);
+            const struct lull_host_block *b = &r.render->blocks->list[i];
+            assert_int_equal(b->reason, b->x0 < 8 ? LULL_REASON_DROPPED : LULL_REASON_CRITERION);
             assert_in_range(b->spp, 16, 120);
             if (k == 0)
                 assert_true(fabs(b->error - 0.75) < 0.02);
@@ -170,7 +172,7 @@ static void seams_are_bounded(void **state)
     struct pt_render_config config = pt_fake_config();
     config.max_seam = 1.5;
     struct result r = render(&config, pt_fake_noise, 2, "32");
-    const struct pt_blocks *b = &r.render->blocks;
+    const struct lull_host_blocks *b = r.render->blocks;
     for (uint32_t i = 0; i < b->count; i++) {
         if (i % 4 > 0)
             assert_true((double)b->list[i - 1].spp * 1.5 + 2 >= (double)b->list[i].spp);
@@ -208,10 +210,10 @@ static void time_budget_ends_a_render(void **state)
     struct result r = render(&config, pt_fake_noise, 2, "900000");
     int timed = 0;
     for (uint32_t i = 0; i < 12; i++)
-        timed += r.render->blocks.list[i].reason == PT_REASON_TIME;
+        timed += r.render->blocks->list[i].reason == LULL_REASON_TIME;
     assert_int_equal(timed, 12);
-    assert_true(r.render->blocks.list[0].asked);
-    assert_true(r.render->blocks.list[0].asked_spp == r.render->blocks.list[0].spp);
+    assert_true(r.render->blocks->list[0].asked);
+    assert_true(r.render->blocks->list[0].asked_spp == r.render->blocks->list[0].spp);
     release(&r);
 }
 
@@ -240,7 +242,7 @@ static void resumed_render_is_identical(void **state)
             assert_int_equal(outcome, part == 0 ? PT_RENDER_INTERRUPTED : PT_RENDER_DONE);
             if (part == 0) {
                 pt_render_destroy(r.render);
-                pt_criterion_destroy(r.criterion);
+                lull_host_close(r.criterion);
             }
         }
         assert_same(whole.render, r.render);
@@ -340,12 +342,12 @@ static void check_slice(const struct slice_case *c)
     assert_int_equal(pt_criterion_create(pt_fake_criterion(), NULL, 0, r.pool, NULL, NULL, &r.criterion, &err), 0);
     assert_int_equal(pt_render_create(&config, NULL, write_down, r.pool, r.criterion, &r.render, &err), 0);
     for (int i = 0; i < 3; i++) {
-        r.render->blocks.list[i].spp = c->spp[i];
-        r.render->blocks.list[i].next_spp = c->next[i];
-        r.render->blocks.list[i].thread_s = c->per_spp_s[i] * (double)c->spp[i];
+        r.render->blocks->list[i].spp = c->spp[i];
+        r.render->blocks->list[i].next_spp = c->next[i];
+        r.render->blocks->list[i].thread_s = c->per_spp_s[i] * (double)c->spp[i];
     }
     r.render->busy_threads = c->busy;
-    r.render->totals.render_s = c->elapsed_s;
+    r.render->totals->render_s = c->elapsed_s;
     row_count = 0;
     assert_int_equal(pt_render_run(r.render, &hooks, &outcome, &err), BASE_EINVAL);
     int k = 0;
@@ -357,12 +359,12 @@ static void check_slice(const struct slice_case *c)
         }
     assert_int_equal(k, row_count);
     for (int i = 0; i < 3; i++) {
-        const struct pt_block *b = &r.render->blocks.list[i];
+        const struct lull_host_block *b = &r.render->blocks->list[i];
         uint64_t end = c->to[i] ? c->to[i] : c->spp[i];
         assert_true(b->spp == end && b->rays == 3 * 256 * (end - c->spp[i]));
         assert_true(c->to[i] == 0 || b->thread_s > c->per_spp_s[i] * (double)c->spp[i]);
     }
-    const struct pt_render_totals *t = &r.render->totals;
+    const struct lull_host_totals *t = r.render->totals;
     assert_true(t->samples == samples && t->paths == samples && t->rays == 3 * samples && t->dropped == 0 && t->checks == 0);
     assert_true(t->render_s > c->elapsed_s && r.render->samples_per_s > 0 && r.render->sampled_rows == row_count);
     release(&r);
@@ -487,19 +489,19 @@ static void checks_may_be_too_dear(void **state)
         config.max_check_overhead = 0.5;
         assert_int_equal(pt_criterion_create(pt_fake_criterion(), NULL, 0, r.pool, NULL, NULL, &r.criterion, &err), 0);
         assert_int_equal(pt_render_create(&config, NULL, pt_fake_noise, r.pool, r.criterion, &r.render, &err), 0);
-        struct pt_block *b = r.render->blocks.list;
+        struct lull_host_block *b = r.render->blocks->list;
         for (int i = 0; i < 3; i++)
             b[i].spp = b[i].next_spp = i < 2 ? 20 : 30;
-        r.render->totals.render_s = 10;
-        r.render->totals.criterion_s = dear ? 11 : 9;
+        r.render->totals->render_s = 10;
+        r.render->totals->criterion_s = dear ? 11 : 9;
         assert_int_equal(pt_render_run(r.render, &hooks, &outcome, &err), BASE_EINVAL);
-        const struct pt_render_totals *t = &r.render->totals;
+        const struct lull_host_totals *t = r.render->totals;
         assert_true(t->checks == (dear ? 1 : 3) && t->skipped_checks == (dear ? 2 : 0) && t->failed_checks == 0 && !words[0]);
-        assert_true(r.render->asked == t->checks && t->criterion_s > (dear ? 11 : 9) && r.render->criterion_thread_s > 0);
+        assert_true(t->asked == t->checks && t->criterion_s > (dear ? 11 : 9) && t->criterion_thread_s > 0);
         for (int i = 0; i < 2; i++)
-            assert_true(b[i].reason == PT_REASON_NONE && b[i].next_spp == 23 && b[i].checks == (dear ? 0 : 1) && b[i].asked == b[i].checks &&
+            assert_true(b[i].reason == LULL_REASON_NONE && b[i].next_spp == 23 && b[i].checks == (dear ? 0 : 1) && b[i].asked == b[i].checks &&
                         b[i].asked_spp == (dear ? 0 : 20) && (dear || b[i].predicted_spp == 32 * (i + 1)));
-        assert_true(b[2].reason == PT_REASON_SPP_MAX && b[2].checks == 1);
+        assert_true(b[2].reason == LULL_REASON_SPP_MAX && b[2].checks == 1);
         release(&r);
     }
 }
@@ -514,8 +516,8 @@ static int always(void *data)
 static int look_before(void *data, struct pt_render *r, struct base_err *err)
 {
     (void)err;
-    *(int *)data += 10 + (int)pt_render_active(r);
-    assert_true(r->blocks.list[1].checks == 0 && r->totals.checks == 0);
+    *(int *)data += 10 + (int)lull_host_active(r->blocks);
+    assert_true(r->blocks->list[1].checks == 0 && r->totals->checks == 0);
     return 0;
 }
 
@@ -533,7 +535,7 @@ static void interrupted_blocks_are_asked_once_more(void **state)
     config.height = config.crop[3] = 16;
     assert_int_equal(pt_criterion_create(pt_fake_criterion(), NULL, 0, r.pool, NULL, NULL, &r.criterion, &err), 0);
     assert_int_equal(pt_render_create(&config, NULL, pt_fake_noise, r.pool, r.criterion, &r.render, &err), 0);
-    struct pt_block *b = r.render->blocks.list;
+    struct lull_host_block *b = r.render->blocks->list;
     for (int i = 0; i < 3; i++)
         b[i].spp = b[i].next_spp = 20;
     b[0].asked = 1;
@@ -541,13 +543,13 @@ static void interrupted_blocks_are_asked_once_more(void **state)
     b[1].next_spp = 100;
     b[1].asked = 1; /* once, at fewer samples */
     b[1].asked_spp = 20;
-    b[2].reason = PT_REASON_SPP_MAX;
+    b[2].reason = LULL_REASON_SPP_MAX;
     assert_int_equal(pt_render_run(r.render, &hooks, &outcome, &err), 0);
     assert_true(outcome == PT_RENDER_INTERRUPTED && looks == 12);
-    assert_true(b[0].reason == PT_REASON_INTERRUPT && b[0].checks == 0 && b[0].spp == 20 && isnan(b[0].error));
-    assert_true(b[1].reason == PT_REASON_INTERRUPT && b[1].checks == 1 && b[1].spp == 21 && b[1].asked_spp == 21 && b[1].predicted_spp == 64);
-    assert_true(b[2].reason == PT_REASON_SPP_MAX && b[2].checks == 0);
-    assert_true(r.render->totals.checks == 1 && pt_render_active(r.render) == 0);
+    assert_true(b[0].reason == LULL_REASON_INTERRUPT && b[0].checks == 0 && b[0].spp == 20 && isnan(b[0].error));
+    assert_true(b[1].reason == LULL_REASON_INTERRUPT && b[1].checks == 1 && b[1].spp == 21 && b[1].asked_spp == 21 && b[1].predicted_spp == 64);
+    assert_true(b[2].reason == LULL_REASON_SPP_MAX && b[2].checks == 0);
+    assert_true(r.render->totals->checks == 1 && lull_host_active(r.render->blocks) == 0);
     release(&r);
 }
 
@@ -575,7 +577,7 @@ static void the_order_of_work_follows_its_seed(void **state)
             assert_true(order[k][i] < 128 && !seen[order[k][i]]++ && rows[i].from == 0 && rows[i].to == 1);
         }
         for (int i = 0; i < 8; i++)
-            assert_int_equal(r.render->blocks.list[i].spp, 1);
+            assert_int_equal(r.render->blocks->list[i].spp, 1);
         release(&r);
     }
     int moved = 0, apart = 0;
@@ -601,7 +603,7 @@ static const unsigned char *word(const unsigned char *at, uint64_t expected)
     return piece(at, &expected, 8);
 }
 
-static const unsigned char *check_block_record(const unsigned char *at, const struct pt_block *b)
+static const unsigned char *check_block_record(const unsigned char *at, const struct lull_host_block *b)
 {
     at = word(word(word(word(word(at, b->spp), b->next_spp), b->asked_spp), b->rays), b->dropped);
     at = piece(piece(piece(piece(at, &b->p_noisy, 8), &b->error, 8), &b->predicted_spp, 8), &b->thread_s, 8);
@@ -639,7 +641,9 @@ static void checkpoints_have_a_layout(void **state)
     config.planes = PT_FILM_ALL;
     struct result r = render(&config, pt_fake_nan, 1, "16");
     const struct pt_film *f = &r.render->film;
-    assert_true(r.render->dropped_count > 0 && r.render->dropped_count <= PT_DROPPED_KEPT);
+    uint32_t kept;
+    const struct lull_host_sample *dropped = lull_host_dropped(r.render->frame, &kept);
+    assert_true(kept > 0 && kept <= LULL_HOST_DROPPED_KEPT);
     assert_int_equal(pt_checkpoint_save(path, r.render, "a=1\nb=2\n", &err), 0);
     assert_int_equal(base_file_read(path, 1 << 24, &bytes, &size, &err), 0);
     unsigned char *data = (unsigned char *)bytes;
@@ -652,12 +656,12 @@ static void checkpoints_have_a_layout(void **state)
     list = at;
     at = word(at, 12);
     for (int i = 0; i < 12; i++)
-        at = check_block_record(at, &r.render->blocks.list[i]);
-    const struct pt_render_totals *t = &r.render->totals;
+        at = check_block_record(at, &r.render->blocks->list[i]);
+    const struct lull_host_totals *t = r.render->totals;
     at = word(word(word(word(at, t->samples), t->paths), t->rays), t->dropped);
     at = piece(piece(at, &t->render_s, 8), &t->criterion_s, 8);
     drops = at = word(word(word(at, t->checks), t->failed_checks), t->skipped_checks);
-    history = at = piece(word(at, r.render->dropped_count), r.render->dropped, 12 * PT_DROPPED_KEPT);
+    history = at = piece(word(at, kept), dropped, 12 * LULL_HOST_DROPPED_KEPT);
     at = word(at, 4 * 64) + 4 * 64; /* the fake criterion's counts */
     assert_int_equal(at + 4 - data, size);
 
@@ -676,24 +680,24 @@ static void checkpoints_have_a_layout(void **state)
         {8, 8, size, "the checkpoint is too short"},
     };
     for (size_t i = 0; i < sizeof faults / sizeof faults[0]; i++) {
-        unsigned char kept[8];
-        memcpy(kept, data + faults[i].at, 8);
+        unsigned char before[8];
+        memcpy(before, data + faults[i].at, 8);
         put_word(data + faults[i].at, faults[i].good);
         expect_answer(path, data, size, r.render, "a=1\nb=2\n", NULL);
         put_word(data + faults[i].at, faults[i].bad);
         expect_answer(path, data, size, r.render, "a=1\nb=2\n", faults[i].words);
-        memcpy(data + faults[i].at, kept, 8);
+        memcpy(data + faults[i].at, before, 8);
     }
     unsigned char *reason = data + (list - data) + 8 + 72;
-    for (int32_t k = -1; k <= PT_REASON_COUNT; k++) {
+    for (int32_t k = -1; k <= LULL_REASON_COUNT; k++) {
         memcpy(reason, &k, 4);
         expect_answer(path, data, size, r.render, "a=1\nb=2\n",
-                      k < 0 || k == PT_REASON_COUNT ? "block 0 of the checkpoint makes no sense" : NULL);
+                      k < 0 || k == LULL_REASON_COUNT ? "block 0 of the checkpoint makes no sense" : NULL);
     }
     expect_answer(path, data, size, r.render, "a=1\nb=3\n", "made with b=2, but this render has b=3");
     expect_answer(path, data, size, r.render, "a=1\nb=", "made with b=2, but this render has b=");
-    expect_answer(path, data, size, r.render, "a=1\n", "made with other settings");
-    expect_answer(path, data, size, r.render, "a=1\nb=2\nc=3\n", "made with other settings");
+    expect_answer(path, data, size, r.render, "a=1\n", "made with b=2, but this render has no b");
+    expect_answer(path, data, size, r.render, "a=1\nb=2\nc=3\n", "made without c, but this render has c=3");
     expect_answer(path, data, (size_t)(history - data) + 4, r.render, "a=1\nb=2\n", "block 0 of the checkpoint makes no sense");
     *reason = 1;
     memset(reason + 1, 0, 3);

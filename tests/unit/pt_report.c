@@ -18,15 +18,15 @@
 #include "base/colour.h"
 #include "base/files.h"
 #include "base/version.h"
+#include "host/frame.h"
 #include "image/oiio.h"
-#include "image/stopmap.h"
 #include "render/output.h"
 #include "render/progress.h"
 #include "support/pt_approve.h"
 #include "support/pt_fake.h"
 
 static struct pt_render *render;
-static struct pt_criterion *criterion;
+static struct lull_host_criterion *criterion;
 static struct base_threads *pool;
 static char folder[] = "/tmp/pt_report_XXXXXX";
 static struct lull_pair param = {"at", "32"};
@@ -100,7 +100,7 @@ static int teardown(void **state)
 {
     (void)state;
     pt_render_destroy(render);
-    pt_criterion_destroy(criterion);
+    lull_host_close(criterion);
     base_threads_destroy(pool);
     static const char *const names[] = {"a.exr", "a.png", "s.png", "s.csv", "r.json"};
     for (int i = 0; i < 5; i++)
@@ -168,7 +168,7 @@ static void exr_holds_every_layer(void **state)
     const struct {
         const char *name;
         double value;
-    } figures[] = {{"lull:seed", 7}, {"lull:samples", (double)render->totals.samples}, {"lull:seconds", pt_render_elapsed_s(render)}};
+    } figures[] = {{"lull:seed", 7}, {"lull:samples", (double)render->totals->samples}, {"lull:seconds", lull_host_elapsed_s(render->frame)}};
     for (int i = 0; i < 3; i++) {
         double value = -1;
         assert_int_equal(exr_attr_get_double(file, 0, figures[i].name, &value), EXR_ERR_SUCCESS);
@@ -180,11 +180,11 @@ static void exr_holds_every_layer(void **state)
         read_channel(file, names[k], pixels);
         for (int y = 5; y < 40; y++)
             for (int x = 3; x < 60; x++) {
-                const struct pt_block *b = &render->blocks.list[y / 16 * 4 + x / 16];
+                const struct lull_host_block *b = &render->blocks->list[y / 16 * 4 + x / 16];
                 const struct sums s = sums_of(x, y, b->spp);
                 double n = (double)b->spp;
                 const double expected[14] = {s.radiance[0] / s.kept, s.radiance[1] / s.kept, s.radiance[2] / s.kept, s.kept,
-                                             x < 16 ? PT_REASON_DROPPED : PT_REASON_CRITERION, 1.0 / b->checks, b->error, s.albedo[0] / n, s.albedo[1] / n,
+                                             x < 16 ? LULL_REASON_DROPPED : LULL_REASON_CRITERION, 1.0 / b->checks, b->error, s.albedo[0] / n, s.albedo[1] / n,
                                              s.albedo[2] / n, s.normal[0] / n, s.normal[1] / n, s.normal[2] / n, s.depth / s.hits};
                 double got = (double)pixels[(y - 5) * 57 + x - 3];
                 if (!(fabs(got - expected[k]) <= 2e-7 * fabs(expected[k]))) /* the file holds floats */
@@ -203,7 +203,7 @@ static void exr_of_equal_renders_are_equal(void **state)
     info.reproducible = 1;
     assert_int_equal(pt_output_exr(in_folder("a.exr"), render, &info, &err), 0);
     assert_int_equal(base_file_read(in_folder("a.exr"), 1 << 24, &a, &na, &err), 0);
-    render->totals.render_s += 1.0;
+    render->totals->render_s += 1.0;
     assert_int_equal(pt_output_exr(in_folder("a.exr"), render, &info, &err), 0);
     assert_int_equal(base_file_read(in_folder("a.exr"), 1 << 24, &b, &nb, &err), 0);
     info.reproducible = 0;
@@ -236,7 +236,7 @@ static void preview_is_srgb(void **state)
     assert_int_equal(pt_output_preview(in_folder("a.png"), render, &err), 0);
     assert_int_equal(pt_oiio_read(in_folder("a.png"), &image, &err), 0);
     assert_true(image.width == 57 && image.height == 35 && image.channels == 3 && image.u8);
-    pt_film_mean(&render->film, pt_film_index(&render->film, 13, 15), render->blocks.list[0].spp, rgb);
+    pt_film_mean(&render->film, pt_film_index(&render->film, 13, 15), render->blocks->list[0].spp, rgb);
     for (int c = 0; c < 3; c++)
         assert_int_equal(image.u8[3 * (10 * 57 + 10) + c], base_srgb_code(rgb[c]));
     pt_oiio_release(&image);
@@ -261,14 +261,16 @@ static void stop_map_picture(void **state)
 {
     (void)state;
     struct base_err err = {0};
-    struct pt_stopmap map;
-    const struct pt_stopmap_block blocks[2] = {{0, 0, 200, 100, 32}, {200, 0, 400, 100, 10000}};
+    struct lull_canvas map;
+    struct lull_host_block list[2] = {{.x1 = 200, .y1 = 100}, {.x0 = 200, .x1 = 400, .y1 = 100}};
+    const struct lull_host_blocks blocks = {.list = list, .count = 2, .x1 = 400, .y1 = 100};
+    const double values[2] = {32, 10000};
     uint8_t low[3], high[3];
-    assert_int_equal(pt_stopmap_draw(0, 0, 400, 100, blocks, 2, "spp", &map, &err), 0);
+    assert_int_equal(lull_host_paint(&blocks, values, "spp", &map, NULL), 0);
     assert_int_equal(map.width, 400);
     assert_true(map.height > 100);
-    pt_viridis(0.0, low);
-    pt_viridis(1.0, high);
+    lull_host_viridis(0.0, low);
+    lull_host_viridis(1.0, high);
     assert_memory_equal(map.rgb + 3 * (5 * 400 + 5), low, 3);
     assert_memory_equal(map.rgb + 3 * (5 * 400 + 205), high, 3);
     int ink = 0;
@@ -276,7 +278,7 @@ static void stop_map_picture(void **state)
         for (int x = 0; x < 199; x++)
             ink += map.rgb[3 * (y * 400 + x)] == 255;
     assert_in_range(ink, 100, 2000);
-    pt_stopmap_release(&map);
+    free(map.rgb);
     assert_int_equal(pt_output_stop_map(in_folder("s.png"), render, &info, &err), 0);
 }
 
@@ -289,8 +291,8 @@ static void stop_map_table(void **state)
     assert_int_equal(pt_output_stop_map(in_folder("s.csv"), render, &info, &err), 0);
     assert_int_equal(base_file_read(in_folder("s.csv"), 4096, &text, &n, &err), 0);
     int used = snprintf(expected, sizeof expected, "fake-view1;");
-    for (uint32_t i = 0; i < render->blocks.count; i++)
-        used += snprintf(expected + used, sizeof expected - (size_t)used, "%llu;", (unsigned long long)render->blocks.list[i].spp);
+    for (uint32_t i = 0; i < render->blocks->count; i++)
+        used += snprintf(expected + used, sizeof expected - (size_t)used, "%llu;", (unsigned long long)render->blocks->list[i].spp);
     snprintf(expected + used, sizeof expected - (size_t)used, "\n");
     assert_string_equal(text, expected);
     free(text);
@@ -397,23 +399,25 @@ static char *report_of(struct pt_approve_case *c)
     size_t n;
     int alone = strstr(c->text, "uniform") != NULL;
     struct pt_render r = *render;
-    struct pt_block list[12];
+    struct lull_host_frame frame = *render->frame;
+    struct lull_host_block list[12];
     struct pt_output_info told = info;
-    memcpy(list, render->blocks.list, sizeof list);
+    memcpy(list, render->blocks->list, sizeof list);
     for (int i = 0; i < 12; i++) {
         list[i].thread_s = 0.25 * (i + 1);
-        list[i].reason = alone ? i % PT_REASON_COUNT : list[i].reason;
+        list[i].reason = alone ? i % LULL_REASON_COUNT : list[i].reason;
     }
-    r.blocks.list = list;
-    r.criterion_thread_s = 3.5;
-    r.totals.render_s = alone ? 0 : 8;
-    r.totals.criterion_s = 1.25;
-    r.dropped_count = alone ? 0 : 2;
-    r.dropped[0] = (struct pt_dropped_sample){1, 2, 3};
-    r.dropped[1] = (struct pt_dropped_sample){4, 5, 6};
+    r.frame = &frame;
+    frame.blocks.list = list;
+    frame.totals.criterion_thread_s = 3.5;
+    frame.totals.render_s = alone ? 0 : 8;
+    frame.totals.criterion_s = 1.25;
+    frame.dropped_count = 0;
+    for (uint32_t k = 0; k < 6 && !alone; k += 3)
+        lull_host_drop(&frame, k + 1, k + 2, k + 3);
     if (alone) {
-        r.criterion = NULL;
-        r.config.block_height = 8;
+        frame.criterion = NULL;
+        frame.blocks.block_height = 8;
         told = (struct pt_output_info){.scene = "a \"b\".pbrt", .mask = "m.png", .effects = PT_FX_ALL, .kernel = "k", .threads = 9, .scene_bytes = -1,
                                        .interrupted = 1};
     }
@@ -474,16 +478,17 @@ static void progress_is_honest(void **state)
     (void)state;
     char text[256];
     struct pt_render r = *render;
-    struct pt_block list[2] = {{.x1 = 10, .y1 = 10, .spp = 100, .next_spp = 120, .asked = 1, .asked_spp = 100,
+    struct lull_host_block list[2] = {{.x1 = 10, .y1 = 10, .spp = 100, .next_spp = 120, .asked = 1, .asked_spp = 100,
                                 .predicted_spp = 200, .thread_s = 30.0},
-                               {.x1 = 10, .y1 = 10, .spp = 50, .reason = PT_REASON_CRITERION, .thread_s = 10.0}};
-    r.blocks.list = list;
-    r.blocks.count = 2;
-    r.config.spp_max = 1000;
+                               {.x1 = 10, .y1 = 10, .spp = 50, .reason = LULL_REASON_CRITERION, .thread_s = 10.0}};
+    struct lull_host_blocks blocks = {.list = list, .count = 2, .spp_max = 1000};
+    struct lull_host_totals totals = *render->totals;
+    r.blocks = &blocks;
+    r.totals = &totals;
     r.samples_per_s = 1000.0;
     r.busy_threads = 1.5; /* of 2 */
     r.sampled_rows = 20;
-    r.totals.checks = 0;
+    r.totals->checks = 0;
     pt_progress_text(&r, text, sizeof text);
     assert_string_equal(text, " 57%  1 of 2 blocks active  spp 100..100  0.00 Mpaths/s  ETA 0:20");
     list[0].predicted_spp = (double)NAN;
@@ -497,27 +502,27 @@ static void progress_is_honest(void **state)
     list[0].thread_s = 3000.0; /* 903 · 3000 / 97 thread seconds of 1.5 threads */
     pt_progress_text(&r, text, sizeof text);
     assert_string_equal(text, ">=  9%  1 of 2 blocks active  spp 97..97  12.50 Mpaths/s  ETA at most 5:10:19");
-    r.totals.checks = 4; /* 2 s each: one at 120, 11.6 more in steps of 1.2 */
-    r.totals.criterion_s = 8.0;
+    r.totals->checks = 4; /* 2 s each: one at 120, 11.6 more in steps of 1.2 */
+    r.totals->criterion_s = 8.0;
     pt_progress_text(&r, text, sizeof text);
     assert_string_equal(text, ">=  9%  1 of 2 blocks active  spp 97..97  12.50 Mpaths/s  ETA at most 5:10:44");
-    r.config.uniform = 1; /* nobody is asked */
+    blocks.flags = LULL_HOST_UNIFORM; /* nobody is asked */
     pt_progress_text(&r, text, sizeof text);
     assert_string_equal(text, "  9%  1 of 2 blocks active  spp 97..97  12.50 Mpaths/s  ETA 5:10:19");
-    r.config.uniform = 0;
-    list[1].reason = PT_REASON_NONE;
+    blocks.flags = 0;
+    list[1].reason = LULL_REASON_NONE;
     list[0].predicted_spp = list[1].predicted_spp = 150.0;
     list[1].asked = 1;
     list[1].asked_spp = list[1].next_spp = 50;
     list[0].thread_s = 97.0;
     list[1].thread_s = 50.0;
-    r.totals.checks = 0;
+    r.totals->checks = 0;
     pt_progress_text(&r, text, sizeof text); /* 53 s and 100 s of thread time on 1.5 threads */
     assert_string_equal(text, " 49%  2 of 2 blocks active  spp 50..97  12.50 Mpaths/s  ETA 1:42");
-    r.config.time_budget_s = pt_render_elapsed_s(&r) + 4.0;
+    r.config.time_budget_s = totals.render_s + totals.criterion_s + 4.0;
     pt_progress_text(&r, text, sizeof text);
     assert_non_null(strstr(text, "0:04"));
-    r.totals.render_s = 92.0; /* 100 s with the criterion's */
+    r.totals->render_s = 92.0; /* 100 s with the criterion's */
     r.config.time_budget_s = 125.0;
     pt_progress_text(&r, text, sizeof text);
     assert_string_equal(text, " 80%  2 of 2 blocks active  spp 50..97  12.50 Mpaths/s  ETA 0:25");

@@ -151,7 +151,7 @@ static void check_said(int i, const char *begin, const char *end)
 }
 
 static pt_kernel *kernel = pt_fake_noise;
-static int record(const struct pt_sequence_config *config, struct pt_criterion *criterion, struct base_err *err)
+static int record(const struct pt_sequence_config *config, struct lull_host_criterion *criterion, struct base_err *err)
 {
     int stopped;
     static const struct pt_scene empty; /* the kernel here needs none */
@@ -217,7 +217,7 @@ static struct pt_render *render_block(int x0, int y0, int x1, int y1, uint32_t s
 /* Means from the film's sums: I, A of the half, D = (A - B)/2. */
 static void means(const struct pt_render *r, size_t i, double mean[3], double a[3], double d[3])
 {
-    const double spp = (double)r->blocks.list[0].spp, half = floor(spp / 2);
+    const double spp = (double)r->blocks->list[0].spp, half = floor(spp / 2);
     for (size_t c = 0; c < 3; c++) {
         const double all = r->film.color[3 * i + c], first = r->film.half[3 * i + c];
         mean[c] = all / spp;
@@ -240,7 +240,7 @@ static void check_statistics(const unsigned char *p, const struct pt_render *r)
     static const char *const names[6] = {"dammertz", "half_unsettled", "rse", "rse_unsettled", "tail999", "gini"};
     static double noise[256];
     const size_t n = r->film.pixels;
-    const double spp = (double)r->blocks.list[0].spp, pixels = (double)n;
+    const double spp = (double)r->blocks->list[0].spp, pixels = (double)n;
     double expected[6] = {0}, bright = 0, sum = 0;
     for (size_t i = 0; i < n; i++) {
         double mean[3], a[3], d[3];
@@ -355,7 +355,7 @@ static void recorded_folder(void **state)
 {
     (void)state;
     struct pt_sequence_config config = make_config();
-    struct pt_criterion *criterion = NULL;
+    struct lull_host_criterion *criterion = NULL;
     struct base_err err = {0};
     assert_int_equal(pt_criterion_create(pt_fake_criterion(), NULL, 0, pool, NULL, NULL, &criterion, &err), 0);
     lines_said = 0;
@@ -363,7 +363,7 @@ static void recorded_folder(void **state)
     assert_int_equal(lines_said, 2);
     check_said(0, "block 1 recorded, 1 of 2, ", " s left");
     check_said(1, "block 11 recorded, 2 of 2, ", ", 0 s left");
-    pt_criterion_destroy(criterion);
+    lull_host_close(criterion);
     check_block("block-00001.lseq", 16, 0, 32, 16, 1);
     check_block("block-00011.lseq", 48, 32, 60, 44, 1);
     cJSON *m = read_manifest();

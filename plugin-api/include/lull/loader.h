@@ -2,8 +2,9 @@
  *
  * lull/loader.h - the host's side: find, load and check criteria (lull/criterion.h).
  *
- * Not part of the ABI: a host compiles loader.c in. Stateless; a library once loaded is never unloaded (a criterion's
- * static tables live for ever, and unloading code that may have registered anything with the runtime is not safe).
+ * Not part of the ABI: liblull-host.so has it (lull/host.h), or a host compiles src/ in. Stateless; a library once loaded
+ * is never unloaded (a criterion's static tables live for ever, and unloading code that may have registered anything with
+ * the runtime is not safe).
  * Every library is loaded RTLD_NOW | RTLD_LOCAL, so that all its symbols resolve and none reaches other libraries.
  *
  * Threads: calls may overlap, but the check that loading changes neither the floating-point control register nor the
@@ -44,25 +45,25 @@ struct lull_found {
  * Returns LULL_OK and fills *found, or a LULL_E_ code with *found untouched and err (may be NULL) filled:
  * LULL_E_IO nothing there or not loadable, LULL_E_VERSION not an ABI 1 criterion, LULL_E_INVALID a broken table, LULL_E_KEY
  * the library holds no such id. */
-int32_t lull_open(const struct lull_search *search, const char *spec, struct lull_found *found, struct lull_error *err);
+LULL_EXPORT int32_t lull_open(const struct lull_search *search, const char *spec, struct lull_found *found,
+                              struct lull_error *err);
 
 /* Calls visit for every valid criterion of every *.so in the directories, in directory order and by name within one.
  * A library name that appeared in an earlier directory is skipped. Broken libraries are logged and skipped. Stops early
  * when visit returns not 0, and returns that; else LULL_OK or LULL_E_MEMORY. */
-int32_t lull_list(const struct lull_search *search, int32_t (*visit)(void *context, const struct lull_found *found),
-                  void *context);
+LULL_EXPORT int32_t lull_list(const struct lull_search *search,
+                              int32_t (*visit)(void *context, const struct lull_found *found), void *context);
 
 /* Does this table keep the promises that can be seen without calling it? LULL_OK, or a code with err (may be NULL) filled.
  */
-int32_t lull_table_check(const struct lull_criterion *criterion, struct lull_error *err);
+LULL_EXPORT int32_t lull_table_check(const struct lull_criterion *criterion, struct lull_error *err);
 
 /* Fills err (may be NULL) with code and a printf-formatted message, cut to fit, and returns code. For hosts and criteria
  * alike; honours err->struct_size. */
 #if defined(__GNUC__)
 __attribute__((format(printf, 3, 4)))
 #endif
-int32_t
-lull_error_set(struct lull_error *err, int32_t code, const char *format, ...);
+LULL_EXPORT int32_t lull_error_set(struct lull_error *err, int32_t code, const char *format, ...);
 
 #ifdef __cplusplus
 }

@@ -1,0 +1,102 @@
+#include "host/frame.h"
+
+#include <math.h>
+
+#include "base/clock.h"
+
+struct lull_decision lull_host_undecided(void)
+{
+    return (struct lull_decision){.action = LULL_CONTINUE, .p_noisy = (double)NAN, .predicted_spp = (double)NAN,
+                                  .error = (double)NAN};
+}
+
+static struct lull_block state_of(const struct lull_host_block *b, uint32_t index, int has_half)
+{
+    return (struct lull_block){.id = index, .flags = b->reason != LULL_REASON_NONE ? LULL_BLOCK_STOPPED : 0, .x0 = b->x0,
+                               .y0 = b->y0, .x1 = b->x1, .y1 = b->y1, .spp = b->spp,
+                               .half_spp = has_half ? b->half_spp : 0, .thread_s = b->thread_s};
+}
+
+/* Some of the blocks of a frame. */
+struct question {
+    const struct lull_host_blocks *blocks;
+    const uint32_t *due;
+    const uint8_t *final; /* may be NULL */
+    uint32_t count;
+    struct lull_decision *decisions;
+};
+
+/* Asks the instance of one step about those of the due blocks that are its own. */
+static int32_t evaluate_step(struct lull_host_criterion *c, uint32_t step, const struct lull_view *view,
+                             const struct question *q, struct lull_error *e)
+{
+    uint32_t n = 0;
+    for (uint32_t k = 0; k < q->count; k++) {
+        if (q->blocks->list[q->due[k]].step != step)
+            continue;
+        c->due[n] = c->all[q->due[k]];
+        if (q->final && q->final[k])
+            c->due[n].flags |= LULL_BLOCK_FINAL;
+        c->answers[n++] = q->decisions[k];
+    }
+    if (n == 0)
+        return LULL_OK;
+    int32_t code = c->table->evaluate(c->dialled[step], view, c->due, sizeof c->due[0], c->answers, sizeof c->answers[0], n,
+                                      e);
+    n = 0;
+    for (uint32_t k = 0; k < q->count && code == LULL_OK; k++)
+        if (q->blocks->list[q->due[k]].step == step)
+            q->decisions[k] = c->answers[n++];
+    return code;
+}
+
+static int32_t evaluate(struct lull_host_criterion *c, const struct question *q, const struct lull_host_view *v,
+                        const struct lull_plane *planes, struct lull_error *err)
+{
+    struct lull_view view = {.struct_size = sizeof view, .x0 = v->x0, .y0 = v->y0, .x1 = v->x1, .y1 = v->y1,
+                             .planes = planes, .plane_count = LULL_PLANE_COUNT, .plane_stride = sizeof planes[0],
+                             .all = c->all, .all_count = q->blocks->count, .all_stride = sizeof c->all[0],
+                             .elapsed_s = base_clock_wall_s() - c->begin_s};
+    struct lull_error e = {.struct_size = sizeof e};
+    int32_t code = LULL_OK;
+    for (uint32_t s = 0; s <= LULL_HOST_STEPS && code == LULL_OK; s++)
+        code = evaluate_step(c, s, &view, q, &e);
+    return code == LULL_OK ? code : lull_host_blame(c, "", code, &e, err);
+}
+
+int32_t lull_host_evaluate(struct lull_host_criterion *c, const struct lull_host_frame *f, const struct lull_host_view *view,
+                           const uint32_t *due, const uint8_t *final, uint32_t count, struct lull_decision *decisions,
+                           struct lull_error *err)
+{
+    const struct lull_host_blocks *b = &f->blocks;
+    const struct question q = {b, due, final, count, decisions};
+    struct lull_host_shown shown;
+    for (uint32_t k = 0; k < count; k++)
+        decisions[k] = lull_host_undecided();
+    if (!c->open || c->block_count != b->count)
+        return lull_error_set(err, LULL_E_STATE, "criterion %s: it has not been opened for this frame", c->table->id);
+    int32_t code = lull_host_show(b, view, lull_host_wants_counts(c), &shown, err);
+    if (code != LULL_OK)
+        return code;
+    for (uint32_t i = 0; i < b->count; i++)
+        c->all[i] = state_of(&b->list[i], i, shown.planes[LULL_PLANE_HALF].data != NULL);
+    code = evaluate(c, &q, view, shown.planes, err);
+    for (uint32_t k = 0; k < count && code != LULL_OK; k++)
+        decisions[k] = lull_host_undecided();
+    lull_host_hide(&shown);
+    return code;
+}
+
+int32_t lull_host_ask(struct lull_host_frame *f, const struct lull_host_view *view, const uint32_t *due,
+                      const uint8_t *final, uint32_t count, struct lull_decision *decisions, struct lull_error *err)
+{
+    double start_s = base_clock_wall_s(), start_cpu_s = base_clock_process_s();
+    int32_t code = lull_host_evaluate(f->criterion, f, view, due, final, count, decisions, err);
+    /* nothing else runs meanwhile: the process's seconds are those of the check */
+    f->totals.criterion_s += base_clock_wall_s() - start_s;
+    f->totals.criterion_thread_s += base_clock_process_s() - start_cpu_s;
+    f->totals.checks += count;
+    f->totals.asked += count;
+    f->totals.failed_checks += code != LULL_OK;
+    return code;
+}

@@ -1,0 +1,106 @@
+/* What the files of the host library share: an opened criterion and a frame. Private; the interface is lull/host.h. */
+#ifndef LULL_HOST_FRAME_H
+#define LULL_HOST_FRAME_H
+
+#include <lull/host.h>
+
+#include "base/err.h"
+#include "base/threads.h"
+#include "host/font.h"
+
+enum { LULL_HOST_STEPS = 8 }; /* of a mask */
+
+/* Planes that the library makes where a criterion requires one of them. */
+#define LULL_HOST_COUNTS (LULL_PLANE_BIT(LULL_PLANE_SPP) | LULL_PLANE_BIT(LULL_PLANE_WEIGHT))
+
+struct lull_host_criterion {
+    const struct lull_criterion *table;
+    struct lull_instance *dialled[LULL_HOST_STEPS + 1]; /* own; by step of the mask, NULL where no block is of that step */
+    struct lull_pair *pairs;          /* owns, as their text */
+    uint32_t pair_count;
+    struct lull_requirements needs;
+    struct lull_host_services offered; /* name: owns */
+    struct base_threads *threads;     /* owns; NULL: the renderer's own, or one */
+    struct lull_host host;            /* shows the services to the criterion */
+
+    /* Of its frame, if one is open: scratch of an evaluate, [block_count]. */
+    uint32_t block_count;
+    struct lull_block *all, *due;     /* own; the state of every block; of those that one instance is asked about */
+    struct lull_decision *answers;    /* owns */
+    double begin_s;
+    int open;
+};
+
+static inline int lull_host_wants_counts(const struct lull_host_criterion *c)
+{
+    return (c->needs.planes_required & LULL_HOST_COUNTS) != 0;
+}
+
+struct lull_host_frame {
+    struct lull_host_config config; /* layout and mask: NULL, they were read */
+    struct lull_host_criterion *criterion; /* borrows; may be NULL */
+    struct lull_host_blocks blocks;
+    struct lull_host_totals totals;
+    struct lull_host_sample dropped[LULL_HOST_DROPPED_KEPT];
+    uint32_t dropped_count;
+    uint32_t *due;                   /* owns; [blocks], as the next two: scratch of lull_host_check */
+    uint8_t *final;                  /* owns */
+    struct lull_decision *decisions; /* owns */
+};
+
+/* --- services.c ----------------------------------------------------------------------------------------------------- */
+
+/* Copies what is offered and makes criterion->host; criterion->table is set. */
+int32_t lull_host_offer(struct lull_host_criterion *criterion, const struct lull_host_services *services,
+                        struct lull_error *err);
+void lull_host_withdraw(struct lull_host_criterion *criterion);
+
+/* --- grid.c --------------------------------------------------------------------------------------------------------- */
+
+/* The blocks that the config asks for; clip: cut to its crop. needs: for the size of blocks; NULL: nobody is asked. */
+int32_t lull_host_lay_out(const struct lull_host_config *config, const struct lull_requirements *needs, int clip,
+                          struct lull_host_blocks *out, struct lull_error *err);
+
+/* --- mask.c --------------------------------------------------------------------------------------------------------- */
+
+/* Fills block.step of every block. Pixels that are no numbers are black, others are cut to [0, 1]. */
+int32_t lull_host_read_mask(const struct lull_plane *mask, struct lull_host_blocks *blocks, struct lull_error *err);
+/* Writes the dial's pair for a step: *pair points to static text and to `value`. */
+int32_t lull_host_scale_dial(const struct lull_criterion *table, const struct lull_pair *pairs, uint32_t pair_count,
+                             uint32_t step, char value[32], struct lull_pair *pair, struct lull_error *err);
+
+/* --- view.c --------------------------------------------------------------------------------------------------------- */
+
+/* A renderer's view as a criterion gets it. */
+struct lull_host_shown {
+    struct lull_plane planes[LULL_PLANE_COUNT];
+    uint32_t *spp;    /* owns, as the others; samples of each pixel, NULL: the view has them, or nobody wants them */
+    uint32_t *weight; /* samples of each pixel that are in COLOR, NULL: none was dropped */
+    double *half;     /* a HALF that makes up for the samples that it lacks, likewise */
+};
+/* counts: SPP and WEIGHT are made if the view does not have them. */
+int32_t lull_host_show(const struct lull_host_blocks *blocks, const struct lull_host_view *view, int counts,
+                       struct lull_host_shown *out, struct lull_error *err);
+void lull_host_hide(struct lull_host_shown *shown);
+
+/* --- stop_map.c ----------------------------------------------------------------------------------------------------- */
+
+/* The picture of lull_host_value_map; the caller frees out->rgb. */
+int32_t lull_host_paint(const struct lull_host_blocks *blocks, const double *values, const char *unit,
+                        struct lull_canvas *out, struct lull_error *err);
+
+/* --- state.c -------------------------------------------------------------------------------------------------------- */
+
+int32_t lull_host_load_history(struct lull_host_criterion *criterion, const void *data, uint64_t size,
+                               struct lull_error *err);
+
+/* --- failure.c ------------------------------------------------------------------------------------------------------ */
+
+/* "criterion ID: ", `what` and what the criterion said; returns its code. */
+int32_t lull_host_blame(const struct lull_host_criterion *criterion, const char *what, int32_t code,
+                        const struct lull_error *said, struct lull_error *err);
+/* A failure of plugin-api/base in the words of the ABI. */
+int32_t lull_host_translate(const struct base_err *said, struct lull_error *err);
+int32_t lull_host_no_memory(struct lull_error *err, const char *what);
+
+#endif

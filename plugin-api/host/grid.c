@@ -1,0 +1,111 @@
+#include "host/frame.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum { USUAL_BLOCK = 200 };
+
+static int32_t least(int32_t a, int32_t b) { return a < b ? a : b; }
+static int32_t most(int32_t a, int32_t b) { return a > b ? a : b; }
+
+static struct lull_host_block fresh(uint32_t id, struct lull_rect r)
+{
+    return (struct lull_host_block){.id = id, .x0 = r.x0, .y0 = r.y0, .x1 = r.x1, .y1 = r.y1, .p_noisy = (double)NAN,
+                                    .error = (double)NAN, .predicted_spp = (double)NAN};
+}
+
+static int is_inside(const struct lull_rect *r, const struct lull_host_config *g)
+{
+    return r->x0 >= 0 && r->x0 < r->x1 && r->x1 <= (int32_t)g->width && r->y0 >= 0 && r->y0 < r->y1 &&
+           r->y1 <= (int32_t)g->height;
+}
+
+static int32_t choose_size(const struct lull_host_config *g, const struct lull_requirements *needs,
+                           struct lull_host_blocks *b, struct lull_error *err)
+{
+    uint32_t own_width = needs && needs->block_width ? needs->block_width : USUAL_BLOCK;
+    uint32_t own_height = needs && needs->block_height ? needs->block_height : USUAL_BLOCK;
+    uint32_t width = g->block_width ? g->block_width : own_width, height = g->block_height ? g->block_height : own_height;
+    if (width > INT32_MAX || height > INT32_MAX)
+        return lull_error_set(err, LULL_E_INVALID, "blocks of %ux%u pixels are too large", width, height);
+    b->block_width = (int32_t)width;
+    b->block_height = (int32_t)height;
+    return LULL_OK;
+}
+
+static int32_t lay_grid(const struct lull_host_config *g, int clip, struct lull_host_blocks *b, struct lull_error *err)
+{
+    struct lull_rect crop = {g->crop[0], g->crop[1], g->crop[2], g->crop[3]};
+    const int32_t width = (int32_t)g->width, height = (int32_t)g->height, w = b->block_width, h = b->block_height;
+    if (crop.x0 == 0 && crop.y0 == 0 && crop.x1 == 0 && crop.y1 == 0)
+        crop = (struct lull_rect){0, 0, width, height};
+    if (!is_inside(&crop, g))
+        return lull_error_set(err, LULL_E_INVALID, "crop %d,%d,%d,%d: it must lie inside %ux%u pixels and not be empty",
+                              crop.x0, crop.y0, crop.x1, crop.y1, g->width, g->height);
+    b->columns = (uint32_t)((width - 1) / w + 1);
+    b->rows = (uint32_t)((height - 1) / h + 1);
+    int32_t c0 = crop.x0 / w, c1 = (crop.x1 - 1) / w + 1, r0 = crop.y0 / h, r1 = (crop.y1 - 1) / h + 1;
+    b->list_columns = (uint32_t)(c1 - c0);
+    b->count = b->list_columns * (uint32_t)(r1 - r0);
+    b->list = calloc(b->count, sizeof *b->list);
+    if (!b->list)
+        return lull_host_no_memory(err, "blocks");
+    struct lull_host_block *out = b->list;
+    for (int32_t r = r0; r < r1; r++) {
+        for (int32_t c = c0; c < c1; c++) {
+            struct lull_rect at = {c * w, r * h, least(width - c * w, w) + c * w, least(height - r * h, h) + r * h};
+            if (clip)
+                at = (struct lull_rect){most(at.x0, crop.x0), most(at.y0, crop.y0), least(at.x1, crop.x1),
+                                        least(at.y1, crop.y1)};
+            *out++ = fresh((uint32_t)r * b->columns + (uint32_t)c, at);
+        }
+    }
+    return LULL_OK;
+}
+
+static int32_t lay_own(const struct lull_host_config *g, struct lull_host_blocks *b, struct lull_error *err)
+{
+    if (g->layout_count == 0 || g->layout_stride < sizeof(struct lull_rect))
+        return lull_error_set(err, LULL_E_INVALID, "the layout has no blocks or a bad stride");
+    b->count = g->layout_count;
+    b->list = calloc(b->count, sizeof *b->list);
+    if (!b->list)
+        return lull_host_no_memory(err, "blocks");
+    for (uint32_t i = 0; i < b->count; i++) {
+        const struct lull_rect *r = (const void *)((const char *)g->layout + (size_t)i * g->layout_stride);
+        if (!is_inside(r, g))
+            return lull_error_set(err, LULL_E_INVALID,
+                                  "block %u (%d,%d,%d,%d) must lie inside %ux%u pixels and not be empty", i, r->x0, r->y0,
+                                  r->x1, r->y1, g->width, g->height);
+        b->list[i] = fresh(i, *r);
+    }
+    return LULL_OK;
+}
+
+int32_t lull_host_lay_out(const struct lull_host_config *g, const struct lull_requirements *needs, int clip,
+                          struct lull_host_blocks *out, struct lull_error *err)
+{
+    struct lull_host_blocks b = {.struct_size = sizeof b, .flags = g->flags & LULL_HOST_UNIFORM, .spp_min = g->spp_min,
+                                 .spp_max = g->spp_max, .check_step = g->check_step > 0 ? g->check_step : 1};
+    if (g->width < 1 || g->height < 1 || g->width > INT32_MAX || g->height > INT32_MAX)
+        return lull_error_set(err, LULL_E_INVALID, "a picture of %ux%u pixels: expected 1 to 2^31 - 1", g->width, g->height);
+    int32_t code = choose_size(g, needs, &b, err);
+    if (code == LULL_OK)
+        code = g->layout ? lay_own(g, &b, err) : lay_grid(g, clip, &b, err);
+    if (code != LULL_OK) {
+        free(b.list);
+        return code;
+    }
+    b.x0 = b.list[0].x0;
+    b.y0 = b.list[0].y0;
+    b.x1 = b.list[0].x1;
+    b.y1 = b.list[0].y1;
+    for (uint32_t i = 1; i < b.count; i++) {
+        b.x0 = least(b.x0, b.list[i].x0);
+        b.y0 = least(b.y0, b.list[i].y0);
+        b.x1 = most(b.x1, b.list[i].x1);
+        b.y1 = most(b.y1, b.list[i].y1);
+    }
+    *out = b;
+    return LULL_OK;
+}

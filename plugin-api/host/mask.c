@@ -1,0 +1,60 @@
+#include "host/frame.h"
+
+#include <math.h>
+#include <stdio.h>
+
+#include "base/options.h"
+
+static const double WHITE_SCALE = 0.25;
+
+static double grey_at(const struct lull_plane *mask, int32_t x, int32_t y)
+{
+    const void *e = (const char *)mask->data + x * mask->stride_x + y * mask->stride_y;
+    double grey = (mask->type == LULL_TYPE_F64 ? *(const double *)e : (double)*(const float *)e) * mask->scale;
+    return grey > 0.0 ? fmin(grey, 1.0) : 0.0;
+}
+
+int32_t lull_host_read_mask(const struct lull_plane *mask, struct lull_host_blocks *blocks, struct lull_error *err)
+{
+    if (!mask->data || mask->normaliser != LULL_NORM_ONE || mask->channels < 1 ||
+        (mask->type != LULL_TYPE_F32 && mask->type != LULL_TYPE_F64))
+        return lull_error_set(err, LULL_E_PLANE, "the mask: expected one channel of f32 or f64, LULL_NORM_ONE");
+    for (uint32_t i = 0; i < blocks->count; i++) {
+        struct lull_host_block *b = &blocks->list[i];
+        double lightest = 0.0;
+        for (int32_t y = b->y0; y < b->y1; y++)
+            for (int32_t x = b->x0; x < b->x1; x++)
+                lightest = fmax(lightest, grey_at(mask, x, y));
+        b->step = (uint32_t)(lightest * LULL_HOST_STEPS + 0.5);
+    }
+    return LULL_OK;
+}
+
+double lull_host_dial(uint32_t step)
+{
+    return pow(WHITE_SCALE, (double)step / LULL_HOST_STEPS);
+}
+
+int32_t lull_host_scale_dial(const struct lull_criterion *t, const struct lull_pair *pairs, uint32_t pair_count,
+                             uint32_t step, char value[32], struct lull_pair *pair, struct lull_error *err)
+{
+    static const char *const dials[] = {"visible", "threshold"};
+    const char *known = NULL; /* a dial that has no value */
+    for (size_t d = 0; d < sizeof dials / sizeof dials[0]; d++) {
+        const struct lull_param *p;
+        const char *text = lull_host_parameter(t, dials[d], pairs, pair_count, &p);
+        double dial;
+        if (p && !text && !known)
+            known = dials[d];
+        if (!text || !base_parse_real(text, p->min, p->max, &dial))
+            continue;
+        dial *= lull_host_dial(step);
+        snprintf(value, 32, "%.17g", fmin(fmax(dial, p->min), p->max));
+        *pair = (struct lull_pair){dials[d], value};
+        return LULL_OK;
+    }
+    if (known)
+        return lull_error_set(err, LULL_E_VALUE, "criterion %s: a mask scales '%s', which has no value: give one, %s=VALUE",
+                              t->id, known, known);
+    return lull_error_set(err, LULL_E_KEY, "criterion %s has no dial 'visible' or 'threshold' for a mask to scale", t->id);
+}

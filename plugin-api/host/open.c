@@ -1,0 +1,344 @@
+#include "host/frame.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "base/colour.h"
+
+static const uint64_t MOST_SPP = INT32_MAX;
+
+/* --- a criterion ---------------------------------------------------------------------------------------------------- */
+
+static void release_pairs(struct lull_host_criterion *c)
+{
+    for (uint32_t i = 0; c->pairs && i < c->pair_count; i++) {
+        free((void *)(uintptr_t)c->pairs[i].key);
+        free((void *)(uintptr_t)c->pairs[i].value);
+    }
+    free(c->pairs);
+}
+
+static int32_t copy_pairs(struct lull_host_criterion *c, const struct lull_pair *pairs, uint32_t count,
+                          struct lull_error *err)
+{
+    c->pairs = calloc((size_t)count + 1, sizeof *c->pairs);
+    if (!c->pairs)
+        return lull_host_no_memory(err, "criterion");
+    c->pair_count = count;
+    for (uint32_t i = 0; i < count; i++) {
+        c->pairs[i].key = strdup(pairs[i].key);
+        c->pairs[i].value = strdup(pairs[i].value);
+        if (!c->pairs[i].key || !c->pairs[i].value)
+            return lull_host_no_memory(err, "criterion");
+    }
+    return LULL_OK;
+}
+
+static void give_back(const struct lull_host_services *services)
+{
+    if (services && services->struct_size >= sizeof *services && services->release)
+        services->release(services->context);
+}
+
+int32_t lull_host_create(const struct lull_host_services *services, const struct lull_criterion *table,
+                         const struct lull_pair *pairs, uint32_t pair_count, struct lull_host_criterion **out,
+                         struct lull_error *err)
+{
+    struct lull_error e = {.struct_size = sizeof e};
+    struct lull_host_criterion *c = calloc(1, sizeof *c);
+    if (!c) {
+        give_back(services);
+        return lull_host_no_memory(err, "criterion");
+    }
+    c->table = table;
+    int32_t code = lull_host_offer(c, services, err);
+    if (code == LULL_OK)
+        code = copy_pairs(c, pairs, pair_count, err);
+    if (code == LULL_OK) {
+        code = table->create(&c->host, pairs, pair_count, sizeof *pairs, &c->dialled[0], &e);
+        c->needs.struct_size = sizeof c->needs;
+        if (code == LULL_OK)
+            code = table->requirements(c->dialled[0], &c->needs, &e);
+        if (code != LULL_OK)
+            lull_host_blame(c, "", code, &e, err);
+    }
+    if (code != LULL_OK) {
+        lull_host_close(c);
+        return code;
+    }
+    *out = c;
+    return LULL_OK;
+}
+
+int32_t lull_host_open(const struct lull_host_services *services, const char *spec, const struct lull_pair *pairs,
+                       uint32_t pair_count, struct lull_host_criterion **out, struct lull_error *err)
+{
+    struct lull_search search = {.log = services ? services->log : NULL, .log_context = services ? services->context : NULL};
+    struct lull_found found;
+    int32_t code = lull_open(&search, spec, &found, err);
+    if (code == LULL_OK)
+        return lull_host_create(services, found.criterion, pairs, pair_count, out, err);
+    give_back(services);
+    return code;
+}
+
+static void release_frame(struct lull_host_criterion *c)
+{
+    free(c->all);
+    free(c->due);
+    free(c->answers);
+    c->all = c->due = NULL;
+    c->answers = NULL;
+}
+
+void lull_host_close(struct lull_host_criterion *c)
+{
+    if (!c)
+        return;
+    for (int s = 0; s <= LULL_HOST_STEPS; s++) {
+        if (c->dialled[s] && c->open)
+            c->table->end_frame(c->dialled[s]);
+        if (c->dialled[s])
+            c->table->destroy(c->dialled[s]);
+    }
+    release_frame(c);
+    release_pairs(c);
+    lull_host_withdraw(c);
+    free(c);
+}
+
+const struct lull_criterion *lull_host_table(const struct lull_host_criterion *c)
+{
+    return c->table;
+}
+
+const struct lull_requirements *lull_host_needs(const struct lull_host_criterion *c)
+{
+    return &c->needs;
+}
+
+const char *lull_host_parameter(const struct lull_criterion *t, const char *name, const struct lull_pair *pairs,
+                                uint32_t pair_count, const struct lull_param **found)
+{
+    const struct lull_param *p = NULL;
+    for (uint32_t i = 0; i < t->param_count && !p; i++) {
+        const struct lull_param *candidate = (const void *)((const char *)t->params + (size_t)i * t->param_stride);
+        p = strcmp(candidate->name, name) == 0 ? candidate : NULL;
+    }
+    const char *text = p ? p->default_value : NULL;
+    for (uint32_t i = 0; p && i < pair_count; i++)
+        if (strcmp(pairs[i].key, name) == 0)
+            text = pairs[i].value;
+    if (found)
+        *found = p;
+    return text;
+}
+
+/* --- its frame ------------------------------------------------------------------------------------------------------ */
+
+/* An instance like the first one, its dial scaled for this step of the mask. */
+static int32_t create_dialled(struct lull_host_criterion *c, uint32_t step, struct lull_error *err)
+{
+    struct lull_error e = {.struct_size = sizeof e};
+    char value[32];
+    struct lull_pair *pairs = calloc((size_t)c->pair_count + 1, sizeof *pairs);
+    if (!pairs)
+        return lull_host_no_memory(err, "criterion");
+    memcpy(pairs, c->pairs, c->pair_count * sizeof *pairs);
+    int32_t code = lull_host_scale_dial(c->table, c->pairs, c->pair_count, step, value, &pairs[c->pair_count], err);
+    if (code == LULL_OK) { /* a later pair wins */
+        code = c->table->create(&c->host, pairs, c->pair_count + 1, sizeof *pairs, &c->dialled[step], &e);
+        if (code != LULL_OK)
+            lull_host_blame(c, "", code, &e, err);
+    }
+    free(pairs);
+    return code;
+}
+
+static int32_t allocate_frame(struct lull_host_criterion *c, const struct lull_host_blocks *b, struct lull_error *err)
+{
+    release_frame(c);
+    c->block_count = b->count;
+    c->all = calloc(b->count, sizeof *c->all);
+    c->due = calloc(b->count, sizeof *c->due);
+    c->answers = calloc(b->count, sizeof *c->answers);
+    return c->all && c->due && c->answers ? LULL_OK : lull_host_no_memory(err, "blocks of the criterion");
+}
+
+static int32_t fits(const struct lull_host_criterion *c, const struct lull_host_blocks *b, struct lull_error *err)
+{
+    const struct lull_requirements *n = &c->needs;
+    if ((n->flags & LULL_REQ_FLEXIBLE) || n->block_width == 0 || n->block_height == 0 || b->columns == 0 ||
+        ((int64_t)n->block_width == b->block_width && (int64_t)n->block_height == b->block_height))
+        return LULL_OK;
+    return lull_error_set(err, LULL_E_UNSUPPORTED, "criterion %s judges blocks of %ux%u pixels only", c->table->id,
+                          n->block_width, n->block_height);
+}
+
+static struct lull_frame describe(const struct lull_host_frame *f, const struct lull_host_criterion *c,
+                                  const struct lull_rect *rects)
+{
+    static const double srgb[9] = BASE_RGB_TO_XYZ;
+    const struct lull_host_config *g = &f->config;
+    const uint32_t told = LULL_FRAME_DETERMINISTIC | LULL_FRAME_INDEPENDENT | LULL_FRAME_SHARED;
+    struct lull_frame frame = {.struct_size = sizeof frame,
+                               .flags = (g->flags & told) | (c->open ? LULL_FRAME_RESTART : 0),
+                               .width = g->width,
+                               .height = g->height,
+                               .blocks = rects,
+                               .block_count = f->blocks.count,
+                               .block_stride = sizeof *rects,
+                               .planes = g->planes | (lull_host_wants_counts(c) ? LULL_HOST_COUNTS : 0),
+                               .transfer = g->transfer,
+                               .gamma = g->gamma,
+                               .exposure = g->exposure > 0.0 ? g->exposure : 1.0,
+                               .sample_clamp = g->sample_clamp,
+                               .time_budget_s = g->time_budget_s,
+                               .spp_min = g->spp_min,
+                               .spp_max = g->spp_max,
+                               .seed = g->seed};
+    int given = 0;
+    for (int i = 0; i < 9; i++)
+        given |= g->rgb_to_xyz[i] != 0.0;
+    memcpy(frame.rgb_to_xyz, given ? g->rgb_to_xyz : srgb, sizeof frame.rgb_to_xyz);
+    return frame;
+}
+
+static int32_t begin_instances(struct lull_host_criterion *c, const struct lull_host_frame *f, struct lull_error *err)
+{
+    const struct lull_host_blocks *b = &f->blocks;
+    struct lull_error e = {.struct_size = sizeof e};
+    struct lull_rect *rects = calloc(b->count, sizeof *rects);
+    if (!rects)
+        return lull_host_no_memory(err, "blocks of the criterion");
+    int32_t code = LULL_OK;
+    for (uint32_t i = 0; i < b->count && code == LULL_OK; i++) {
+        const struct lull_host_block *k = &b->list[i];
+        rects[i] = (struct lull_rect){k->x0, k->y0, k->x1, k->y1};
+        if (!c->dialled[k->step])
+            code = create_dialled(c, k->step, err);
+    }
+    struct lull_frame frame = describe(f, c, rects);
+    for (int s = 0; s <= LULL_HOST_STEPS && code == LULL_OK; s++) {
+        code = c->dialled[s] ? c->table->begin_frame(c->dialled[s], &frame, &e) : LULL_OK;
+        if (code != LULL_OK)
+            lull_host_blame(c, "", code, &e, err);
+    }
+    free(rects);
+    return code;
+}
+
+int32_t lull_host_join(const struct lull_host_frame *f, struct lull_host_criterion *c, struct lull_error *err)
+{
+    int32_t code = fits(c, &f->blocks, err);
+    if (code == LULL_OK)
+        code = allocate_frame(c, &f->blocks, err);
+    if (code == LULL_OK)
+        code = begin_instances(c, f, err);
+    if (code != LULL_OK)
+        return code;
+    c->open = 1;
+    c->begin_s = base_clock_wall_s();
+    return LULL_OK;
+}
+
+/* --- a frame -------------------------------------------------------------------------------------------------------- */
+
+static int32_t check_config(const struct lull_host_config *g, const struct lull_host_criterion *c, struct lull_error *err)
+{
+    if (g->struct_size < sizeof *g)
+        return lull_error_set(err, LULL_E_VERSION, "the config is smaller than in version 1.0");
+    if (!(1 <= g->spp_min && g->spp_min <= g->spp_max && g->spp_max <= MOST_SPP))
+        return lull_error_set(err, LULL_E_INVALID, "spp_min %llu, spp_max %llu: expected 1 <= spp_min <= spp_max < 2^31",
+                              (unsigned long long)g->spp_min, (unsigned long long)g->spp_max);
+    if (!(g->max_seam == 0.0 || g->max_seam >= 1.0))
+        return lull_error_set(err, LULL_E_INVALID, "max_seam %g: expected 0 or at least 1", g->max_seam);
+    if (!c && !(g->flags & LULL_HOST_UNIFORM))
+        return lull_error_set(err, LULL_E_INVALID,
+                              "without a criterion every block gets the same samples: UNIFORM is missing");
+    if (g->mask && (!c || (g->flags & LULL_HOST_UNIFORM)))
+        return lull_error_set(err, LULL_E_INVALID, "a mask has no effect where every block gets the same samples");
+    return LULL_OK;
+}
+
+/* Samples at the first check. */
+static uint64_t first_check(const struct lull_host_frame *f)
+{
+    const struct lull_host_config *g = &f->config;
+    if (g->flags & LULL_HOST_UNIFORM)
+        return g->spp_max;
+    uint64_t useful = f->criterion->needs.first_spp, spp = useful > g->spp_min ? useful : g->spp_min;
+    return lull_host_next_check(&f->blocks, spp - 1, spp);
+}
+
+/* A criterion without a dial is refused whatever the mask shows. */
+static int32_t read_mask(const struct lull_host_criterion *c, const struct lull_plane *mask, struct lull_host_blocks *b,
+                         struct lull_error *err)
+{
+    char value[32];
+    struct lull_pair dial;
+    int32_t code = lull_host_scale_dial(c->table, c->pairs, c->pair_count, 0, value, &dial, err);
+    return code == LULL_OK ? lull_host_read_mask(mask, b, err) : code;
+}
+
+static int32_t fill_frame(struct lull_host_frame *f, const struct lull_plane *mask, struct lull_error *err)
+{
+    struct lull_host_blocks *b = &f->blocks;
+    f->due = calloc(b->count, sizeof *f->due);
+    f->final = calloc(b->count, sizeof *f->final);
+    f->decisions = calloc(b->count, sizeof *f->decisions);
+    if (!f->due || !f->final || !f->decisions)
+        return lull_host_no_memory(err, "blocks");
+    int32_t code = mask ? read_mask(f->criterion, mask, b, err) : LULL_OK;
+    if (code == LULL_OK && f->criterion)
+        code = lull_host_join(f, f->criterion, err);
+    for (uint32_t i = 0; i < b->count && code == LULL_OK; i++)
+        b->list[i].next_spp = first_check(f);
+    return code;
+}
+
+int32_t lull_host_begin(const struct lull_host_config *config, struct lull_host_criterion *criterion,
+                        struct lull_host_frame **out, struct lull_error *err)
+{
+    int32_t code = check_config(config, criterion, err);
+    if (code != LULL_OK)
+        return code;
+    struct lull_host_frame *f = calloc(1, sizeof *f);
+    if (!f)
+        return lull_host_no_memory(err, "frame");
+    f->config = *config;
+    f->config.layout = NULL;
+    f->config.mask = NULL;
+    f->criterion = criterion;
+    code = lull_host_lay_out(config, criterion ? &criterion->needs : NULL, !criterion, &f->blocks, err);
+    if (code == LULL_OK)
+        code = fill_frame(f, config->mask, err);
+    if (code != LULL_OK) {
+        lull_host_end(f);
+        return code;
+    }
+    *out = f;
+    return LULL_OK;
+}
+
+void lull_host_end(struct lull_host_frame *f)
+{
+    if (!f)
+        return;
+    free(f->blocks.list);
+    free(f->due);
+    free(f->final);
+    free(f->decisions);
+    free(f);
+}
+
+struct lull_host_blocks *lull_host_blocks_of(struct lull_host_frame *f)
+{
+    return &f->blocks;
+}
+
+struct lull_host_totals *lull_host_totals_of(struct lull_host_frame *f)
+{
+    return &f->totals;
+}

@@ -1,0 +1,180 @@
+#include "host/frame.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/json.h"
+
+/* One number for square blocks, [width, height] for others. */
+static void add_block_size(cJSON *root, int32_t width, int32_t height, int *failed)
+{
+    if (width == height) {
+        base_json_number(root, "block", width, failed);
+        return;
+    }
+    cJSON *block = base_json_array(root, "block", failed);
+    base_json_number(block, NULL, width, failed);
+    base_json_number(block, NULL, height, failed);
+}
+
+static void add_criterion(cJSON *root, const struct lull_host_criterion *judge, int *failed)
+{
+    if (!judge) {
+        base_json_text(root, "criterion", NULL, failed);
+        return;
+    }
+    const struct lull_criterion *t = judge->table;
+    cJSON *c = base_json_object(root, "criterion", failed);
+    base_json_text(c, "id", t->id, failed);
+    base_json_text(c, "version", t->version, failed);
+    cJSON *params = base_json_object(c, "params", failed);
+    for (uint32_t i = 0; i < t->param_count; i++) {
+        const struct lull_param *p = (const void *)((const char *)t->params + (size_t)i * t->param_stride);
+        base_json_text(params, p->name, lull_host_parameter(t, p->name, judge->pairs, judge->pair_count, NULL), failed);
+    }
+}
+
+static void add_blocks(cJSON *root, const struct lull_host_frame *f, int *failed)
+{
+    cJSON *list = base_json_array(root, "blocks", failed);
+    for (uint32_t i = 0; i < f->blocks.count; i++) {
+        const struct lull_host_block *b = &f->blocks.list[i];
+        cJSON *o = base_json_object(list, NULL, failed);
+        base_json_number(o, "id", b->id, failed);
+        base_json_number(o, "x0", b->x0, failed);
+        base_json_number(o, "y0", b->y0, failed);
+        base_json_number(o, "x1", b->x1, failed);
+        base_json_number(o, "y1", b->y1, failed);
+        base_json_number(o, "spp", (double)b->spp, failed);
+        base_json_text(o, "reason", lull_host_reason(b->reason), failed);
+        base_json_number(o, "p_noisy", b->p_noisy, failed);
+        base_json_number(o, "error", b->error, failed);
+        base_json_number(o, "checks", b->checks, failed);
+        base_json_number(o, "thread_s", b->thread_s, failed);
+        base_json_number(o, "dial", f->criterion ? lull_host_dial(b->step) : (double)NAN, failed);
+    }
+}
+
+static double per_second(const struct lull_host_totals *t, uint64_t count)
+{
+    return t->render_s > 0.0 ? (double)count / t->render_s : (double)NAN;
+}
+
+static void add_totals(cJSON *root, const struct lull_host_totals *t, int has_rays, int *failed)
+{
+    cJSON *o = base_json_object(root, "totals", failed);
+    base_json_number(o, "samples", (double)t->samples, failed);
+    base_json_number(o, "render_s", t->render_s, failed);
+    base_json_number(o, "criterion_s", t->criterion_s, failed);
+    base_json_number(o, "criterion_thread_s", t->criterion_thread_s, failed);
+    base_json_number(o, "paths", (double)t->paths, failed);
+    base_json_number(o, "rays", has_rays ? (double)t->rays : (double)NAN, failed);
+    base_json_number(o, "paths_per_s", per_second(t, t->paths), failed);
+    base_json_number(o, "rays_per_s", has_rays ? per_second(t, t->rays) : (double)NAN, failed);
+    base_json_number(o, "dropped_samples", (double)t->dropped, failed);
+}
+
+/* How many took part, and what went between them. */
+static void add_processes(cJSON *root, const struct lull_host_report *r, int *failed)
+{
+    base_json_number(root, "processes", r->processes, failed);
+    if (!(r->flags & LULL_REPORT_MESSAGES))
+        return;
+    base_json_number(root, "messages", (double)r->messages, failed);
+    base_json_number(root, "message_bytes", (double)r->message_bytes, failed);
+    base_json_number(root, "message_wait_s", r->message_wait_s, failed);
+}
+
+/* The first few dropped samples, so that their paths can be replayed. */
+static void add_dropped(cJSON *root, const struct lull_host_frame *f, int *failed)
+{
+    cJSON *list = base_json_array(root, "dropped", failed);
+    for (uint32_t i = 0; i < f->dropped_count; i++) {
+        cJSON *o = base_json_object(list, NULL, failed);
+        base_json_number(o, "x", f->dropped[i].x, failed);
+        base_json_number(o, "y", f->dropped[i].y, failed);
+        base_json_number(o, "sample", f->dropped[i].sample, failed);
+    }
+}
+
+static void add_memory(cJSON *root, const struct lull_host_report *r, int *failed)
+{
+    cJSON *o = base_json_object(root, "memory", failed);
+    base_json_number(o, "film_bytes", (double)r->film_bytes, failed);
+    base_json_number(o, "film_bytes_per_pixel", (double)r->film_bytes / (double)r->film_pixels, failed);
+    base_json_number(o, "scene_bytes", r->scene_bytes, failed);
+}
+
+/* The caller deletes it. */
+static cJSON *make(const struct lull_host_frame *f, const struct lull_host_report *r, int *failed)
+{
+    cJSON *root = cJSON_CreateObject();
+    base_json_text(root, "scene", r->scene, failed);
+    base_json_number(root, "width", f->config.width, failed);
+    base_json_number(root, "height", f->config.height, failed);
+    add_block_size(root, f->blocks.block_width, f->blocks.block_height, failed);
+    base_json_number(root, "seed", (double)f->config.seed, failed);
+    base_json_number(root, "threads", r->threads, failed);
+    add_processes(root, r, failed);
+    add_criterion(root, f->criterion, failed);
+    base_json_text(root, "mask", r->mask, failed);
+    cJSON *effects = base_json_array(root, "effects", failed);
+    for (uint32_t i = 0; i < r->effect_count; i++)
+        base_json_text(effects, NULL, r->effects[i], failed);
+    add_blocks(root, f, failed);
+    add_totals(root, &f->totals, !(r->flags & LULL_REPORT_NO_RAYS), failed);
+    base_json_bool(root, "interrupted", (r->flags & LULL_REPORT_INTERRUPTED) != 0, failed);
+    base_json_text(root, "kernel", r->kernel, failed);
+    add_dropped(root, f, failed);
+    add_memory(root, r, failed);
+    return root;
+}
+
+static int32_t check_report(const struct lull_host_report *r, struct lull_error *err)
+{
+    return r->struct_size >= sizeof *r ? LULL_OK
+                                       : lull_error_set(err, LULL_E_VERSION, "the report is smaller than in version 1.0");
+}
+
+int32_t lull_host_report_write(const struct lull_host_frame *f, const struct lull_host_report *r, const char *path,
+                               struct lull_error *err)
+{
+    struct base_err e = {0};
+    int failed = 0;
+    int32_t code = check_report(r, err);
+    if (code != LULL_OK)
+        return code;
+    cJSON *root = make(f, r, &failed);
+    int rc = base_json_write(path, root, failed, &e);
+    cJSON_Delete(root);
+    return rc ? lull_host_translate(&e, err) : LULL_OK;
+}
+
+int32_t lull_host_report_text(const struct lull_host_frame *f, const struct lull_host_report *r,
+                              const struct lull_writer *writer, struct lull_error *err)
+{
+    int failed = 0;
+    int32_t code = check_report(r, err);
+    if (code != LULL_OK)
+        return code;
+    cJSON *root = make(f, r, &failed);
+    char *text = failed ? NULL : cJSON_Print(root);
+    cJSON_Delete(root);
+    if (!text)
+        return lull_host_no_memory(err, "report");
+    code = writer->write(writer, text, strlen(text));
+    cJSON_free(text);
+    return code == LULL_OK ? code : lull_error_set(err, code, "the report could not be written");
+}
+
+void lull_host_drop(struct lull_host_frame *f, uint32_t x, uint32_t y, uint32_t sample)
+{
+    if (f->dropped_count < LULL_HOST_DROPPED_KEPT)
+        f->dropped[f->dropped_count++] = (struct lull_host_sample){x, y, sample};
+}
+
+const struct lull_host_sample *lull_host_dropped(const struct lull_host_frame *f, uint32_t *count)
+{
+    *count = f->dropped_count;
+    return f->dropped;
+}

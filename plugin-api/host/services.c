@@ -1,0 +1,77 @@
+#include "host/frame.h"
+
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static void host_log(const struct lull_host *host, int32_t level, const char *text)
+{
+    const struct lull_host_criterion *c = host->context;
+    char line[600];
+    if (!c->offered.log)
+        return;
+    snprintf(line, sizeof line, "criterion %s: %s", c->table->id, text);
+    c->offered.log(c->offered.context, level, line);
+}
+
+struct job {
+    lull_task_fn fn;
+    void *arg;
+    uint64_t first;
+};
+
+static void run_task(void *data, long i, int worker)
+{
+    const struct job *job = data;
+    job->fn(job->arg, job->first + (uint64_t)i, (uint32_t)worker);
+}
+
+static int32_t host_parallel_for(const struct lull_host *host, uint64_t count, lull_task_fn fn, void *arg)
+{
+    const struct lull_host_criterion *c = host->context;
+    if (c->offered.parallel_for)
+        return c->offered.parallel_for(c->offered.context, count, fn, arg);
+    struct job job = {.fn = fn, .arg = arg};
+    for (; job.first < count;) {
+        uint64_t n = count - job.first < LONG_MAX / 2 ? count - job.first : LONG_MAX / 2;
+        if (c->threads)
+            base_threads_for(c->threads, (long)n, run_task, &job);
+        else
+            for (uint64_t i = 0; i < n; i++)
+                run_task(&job, (long)i, 0);
+        job.first += n;
+    }
+    return LULL_OK;
+}
+
+int32_t lull_host_offer(struct lull_host_criterion *c, const struct lull_host_services *services, struct lull_error *err)
+{
+    struct base_err e = {0};
+    if (services) {
+        if (services->struct_size < sizeof *services)
+            return lull_error_set(err, LULL_E_VERSION, "the services are smaller than in version 1.0");
+        c->offered = *services;
+        c->offered.name = services->name ? strdup(services->name) : NULL;
+        if (services->name && !c->offered.name)
+            return lull_host_no_memory(err, "criterion");
+    }
+    if (c->offered.threads > INT_MAX)
+        return lull_error_set(err, LULL_E_INVALID, "%u threads are too many", c->offered.threads);
+    c->offered.threads = c->offered.threads > 0 ? c->offered.threads : 1;
+    if (c->offered.threads > 1 && !c->offered.parallel_for &&
+        !(c->threads = base_threads_create((int)c->offered.threads, &e)))
+        return lull_host_translate(&e, err);
+    c->host = (struct lull_host){.struct_size = sizeof c->host, .api_minor = LULL_API_MINOR, .context = c,
+                                 .name = c->offered.name, .max_workers = c->offered.threads, .log = host_log,
+                                 .parallel_for = host_parallel_for};
+    return LULL_OK;
+}
+
+void lull_host_withdraw(struct lull_host_criterion *c)
+{
+    base_threads_destroy(c->threads);
+    if (c->offered.release)
+        c->offered.release(c->offered.context);
+    free((void *)(uintptr_t)c->offered.name);
+}

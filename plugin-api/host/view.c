@@ -1,0 +1,157 @@
+#include "host/frame.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/half.h"
+
+static size_t pixels_of(const struct lull_host_view *v)
+{
+    return (size_t)(v->x1 - v->x0) * (size_t)(v->y1 - v->y0);
+}
+
+/* Index of a pixel in an array over the view. */
+static size_t at(const struct lull_host_view *v, int32_t x, int32_t y)
+{
+    return (size_t)(y - v->y0) * (size_t)(v->x1 - v->x0) + (size_t)(x - v->x0);
+}
+
+/* An array over the view. */
+static struct lull_plane plane_of(const struct lull_host_view *v, const void *data, size_t size, uint32_t channels,
+                                  int32_t type, int32_t normaliser)
+{
+    int64_t pixel = (int64_t)(channels * size);
+    return (struct lull_plane){.data = data, .stride_x = pixel, .stride_y = pixel * (v->x1 - v->x0),
+                               .stride_c = (int64_t)size, .scale = 1.0, .type = type, .normaliser = normaliser,
+                               .channels = channels};
+}
+
+static double read_at(const struct lull_plane *p, const struct lull_host_view *v, int32_t x, int32_t y, int channel)
+{
+    const void *e = (const char *)p->data + (x - v->x0) * p->stride_x + (y - v->y0) * p->stride_y + channel * p->stride_c;
+    double value = 0.0;
+    if (p->type == LULL_TYPE_F64)
+        value = *(const double *)e;
+    else if (p->type == LULL_TYPE_F32)
+        value = (double)*(const float *)e;
+    else if (p->type == LULL_TYPE_F16)
+        value = (double)base_f16_to_f32(*(const uint16_t *)e);
+    else
+        value = (double)*(const uint32_t *)e;
+    return value * p->scale;
+}
+
+static int32_t check_view(const struct lull_host_blocks *b, const struct lull_host_view *v, struct lull_error *err)
+{
+    if (v->struct_size < sizeof *v)
+        return lull_error_set(err, LULL_E_VERSION, "the view is smaller than in version 1.0");
+    if (v->x0 > b->x0 || v->y0 > b->y0 || v->x1 < b->x1 || v->y1 < b->y1)
+        return lull_error_set(err, LULL_E_INVALID, "the view %d,%d,%d,%d does not hold the blocks, %d,%d,%d,%d", v->x0,
+                              v->y0, v->x1, v->y1, b->x0, b->y0, b->x1, b->y1);
+    if (v->dropped && v->plane_count > LULL_PLANE_WEIGHT && v->planes[LULL_PLANE_WEIGHT].data)
+        return lull_error_set(err, LULL_E_INVALID, "a view with a plane WEIGHT counts no dropped samples");
+    return LULL_OK;
+}
+
+static int32_t show_counts(const struct lull_host_blocks *b, const struct lull_host_view *v, struct lull_host_shown *s,
+                           struct lull_error *err)
+{
+    if (s->planes[LULL_PLANE_SPP].data && s->planes[LULL_PLANE_WEIGHT].data)
+        return LULL_OK;
+    s->spp = calloc(pixels_of(v), sizeof *s->spp);
+    if (!s->spp)
+        return lull_host_no_memory(err, "samples per pixel");
+    for (uint32_t i = 0; i < b->count; i++) {
+        const struct lull_host_block *k = &b->list[i];
+        for (int32_t y = k->y0; y < k->y1; y++)
+            for (int32_t x = k->x0; x < k->x1; x++)
+                s->spp[at(v, x, y)] = (uint32_t)k->spp;
+    }
+    static const int counts[2] = {LULL_PLANE_SPP, LULL_PLANE_WEIGHT};
+    for (int i = 0; i < 2; i++)
+        if (!s->planes[counts[i]].data)
+            s->planes[counts[i]] = plane_of(v, s->spp, sizeof *s->spp, 1, LULL_TYPE_U32, LULL_NORM_ONE);
+    return LULL_OK;
+}
+
+/* COLOR and MOMENT2 without the dropped samples: their sums are divided by those that are in them. A pixel that kept none is
+ * black, as its sum is. */
+static int32_t show_weights(const struct lull_host_blocks *b, const struct lull_host_view *v, struct lull_host_shown *s,
+                            struct lull_error *err)
+{
+    static const int sums[2] = {LULL_PLANE_COLOR, LULL_PLANE_MOMENT2};
+    s->weight = calloc(pixels_of(v), sizeof *s->weight);
+    if (!s->weight)
+        return lull_host_no_memory(err, "pixels with dropped samples");
+    for (uint32_t i = 0; i < b->count; i++) {
+        const struct lull_host_block *k = &b->list[i];
+        for (int32_t y = k->y0; y < k->y1; y++) {
+            for (int32_t x = k->x0; x < k->x1; x++) {
+                uint32_t spp = (uint32_t)k->spp, dropped = (uint32_t)read_at(v->dropped, v, x, y, 0);
+                s->weight[at(v, x, y)] = spp > dropped ? spp - dropped : spp;
+            }
+        }
+    }
+    s->planes[LULL_PLANE_WEIGHT] = plane_of(v, s->weight, sizeof *s->weight, 1, LULL_TYPE_U32, LULL_NORM_ONE);
+    for (int i = 0; i < 2; i++)
+        if (s->planes[sums[i]].data && s->planes[sums[i]].normaliser == LULL_NORM_SPP)
+            s->planes[sums[i]].normaliser = LULL_NORM_WEIGHT;
+    return LULL_OK;
+}
+
+/* HALF has another count, which no normaliser knows per pixel: a copy, its sums as if all samples had been kept. */
+static int32_t show_half(const struct lull_host_blocks *b, const struct lull_host_view *v, struct lull_host_shown *s,
+                         struct lull_error *err)
+{
+    struct lull_plane *plane = &s->planes[LULL_PLANE_HALF];
+    if (!v->dropped_half || !plane->data || plane->normaliser != LULL_NORM_HALF_SPP)
+        return LULL_OK;
+    s->half = calloc(pixels_of(v), 3 * sizeof *s->half);
+    if (!s->half)
+        return lull_host_no_memory(err, "pixels with dropped samples");
+    for (uint32_t i = 0; i < b->count; i++) {
+        const struct lull_host_block *k = &b->list[i];
+        for (int32_t y = k->y0; y < k->y1; y++) {
+            for (int32_t x = k->x0; x < k->x1; x++) {
+                uint64_t dropped = k->dropped > 0 ? (uint64_t)read_at(v->dropped_half, v, x, y, 0) : 0;
+                double up = k->half_spp > dropped ? (double)k->half_spp / (double)(k->half_spp - dropped) : 1.0;
+                for (int c = 0; c < 3; c++)
+                    s->half[3 * at(v, x, y) + (size_t)c] = read_at(plane, v, x, y, c) * up;
+            }
+        }
+    }
+    *plane = plane_of(v, s->half, sizeof *s->half, 3, LULL_TYPE_F64, LULL_NORM_HALF_SPP);
+    return LULL_OK;
+}
+
+int32_t lull_host_show(const struct lull_host_blocks *b, const struct lull_host_view *v, int counts,
+                       struct lull_host_shown *out, struct lull_error *err)
+{
+    struct lull_host_shown s = {0};
+    int32_t code = check_view(b, v, err);
+    if (code != LULL_OK)
+        return code;
+    int dropped = 0;
+    for (uint32_t i = 0; i < b->count; i++)
+        dropped |= v->dropped && b->list[i].dropped > 0;
+    for (uint32_t i = 0; i < v->plane_count && i < LULL_PLANE_COUNT; i++)
+        s.planes[i] = v->planes[i];
+    if (counts)
+        code = show_counts(b, v, &s, err);
+    if (code == LULL_OK && dropped)
+        code = show_weights(b, v, &s, err);
+    if (code == LULL_OK && dropped)
+        code = show_half(b, v, &s, err);
+    if (code != LULL_OK)
+        lull_host_hide(&s);
+    else
+        *out = s;
+    return code;
+}
+
+void lull_host_hide(struct lull_host_shown *s)
+{
+    free(s->spp);
+    free(s->weight);
+    free(s->half);
+}
