@@ -1,5 +1,6 @@
 """Blender's Cycles as a host; run inside Blender or by a Python with the module bpy. BUILD names the build folder."""
 import contextlib
+import dataclasses
 import io
 import json
 import os
@@ -54,7 +55,7 @@ def cube(width=70, height=46):
 def one_render(scene, spp, spp_max=4096):
     """The whole picture by a single call. spp_max as in the session: the tabulated pattern of new versions depends on it."""
     with Cycles(scene, spp_max) as host:
-        return next(iter(host.render([Rect(0, 0, host.width, host.height)], 0, spp, False)))
+        return next(iter(host.render([Rect(0, 0, host.width, host.height)], 0, spp, False)))["color"]
 
 
 def command(*arguments, **named):
@@ -273,14 +274,14 @@ def test_pattern():
         except TypeError:
             continue  # another version's
         with Cycles(scene, 600) as host:
-            own = host.pattern == name
+            own, notes = host.pattern == name, [n for n in host.notes if "pattern" in n]
             rect = [Rect(0, 0, 24, 16)]
             waves = [(0, 16), (16, 16), (32, 480), (512, 88)]
-            mean = sum(n * next(iter(host.render(rect, first, n, False))).astype(float) for first, n in waves) / 600
-            whole = next(iter(host.render(rect, 0, 600, False)))
-        assert scene.cycles.sampling_pattern == name and own == (not host.notes), (name, host.notes)
+            mean = sum(n * next(iter(host.render(rect, first, n, False)))["color"].astype(float) for first, n in waves) / 600
+            whole = next(iter(host.render(rect, 0, 600, False)))["color"]
+        assert scene.cycles.sampling_pattern == name and own == (not notes), (name, notes)
         assert abs(mean - whole).max() < SAME * 10, (name, abs(mean - whole).max())
-        assert own or "sampling pattern is Sobol-Burley instead of the scene's" in host.notes[0]
+        assert own or "sampling pattern is Sobol-Burley instead of the scene's" in notes[0]
         kept += own
     assert kept > 0
 
@@ -301,6 +302,92 @@ def test_quote():
     status, text = command(*common, "-o", tmp("plain.exr"))
     assert status == 0 and "visible 0.2 takes about" in text and "visible 0.9 would take" in text, text
     assert Path(tmp("after.exr")).read_bytes() == Path(tmp("plain.exr")).read_bytes()
+
+
+def colourful(width=40, height=30):
+    """The cube with a checker, indirect light, indices and every pass that this version has."""
+    scene = cube(width, height)
+    box, layer = bpy.data.objects["Cube"], scene.view_layers[0]
+    material = box.material_slots[0].material
+    shader = next(n for n in material.node_tree.nodes if n.type == "BSDF_PRINCIPLED")
+    checker = material.node_tree.nodes.new("ShaderNodeTexChecker")
+    checker.inputs["Scale"].default_value, checker.inputs["Color1"].default_value = 7, (.8, .3, .01, 1)
+    material.node_tree.links.new(checker.outputs["Color"], shader.inputs["Base Color"])
+    bpy.ops.mesh.primitive_plane_add(size=9, location=(0, 0, -1))
+    box.pass_index = material.pass_index = 3
+    scene.render.film_transparent = True
+    for owner in (layer, layer.cycles):
+        for name in dir(owner):
+            if name.startswith("use_pass_") and not owner.is_property_readonly(name):
+                with contextlib.suppress(AttributeError):
+                    setattr(owner, name, True)
+    layer.use_pass_diffuse_color = False  # the host has to switch it on, and to leave it out
+    return scene
+
+
+def test_passes():
+    """alpha and every pass of the view layer are those of one Cycles render, also after a resume; Blender finds them by name"""
+    scene = colourful()
+    settings = Settings("null", spp_max=48, block=20, output=tmp("passes.exr"), checkpoint=tmp("passes.npz"))
+    for spp in (32, 48):
+        with Session(scene, dataclasses.replace(settings, spp_max=spp)) as session:
+            session.begin(resume=True)
+            session.write(session.run())
+    assert any("Cryptomatte" in note for note in session.notes)
+    found, _, _ = exr.read_layers(tmp("passes.exr"))
+    layer = scene.view_layers[0]
+    layer.use_pass_diffuse_color = True
+    with Cycles(scene, 48) as host:
+        whole = Rect(0, 0, 40, 30)
+        wanted, early = host._render_area(whole, 0, 48), host._render_area(whole, 0, 16)
+    wanted.update({name: plane for name, plane in early.items() if name.startswith("Vector.")})  # of the first wave
+    compared = set()
+    for name, plane in wanted.items():
+        if f"{layer.name}.{name}" in found:
+            own, scale = found[f"{layer.name}.{name}"], max(1, abs(plane).max())
+            assert abs(own - plane).max() < 1e-5 * scale, (name, abs(own - plane).max(), scale)
+            compared.add(name.rpartition(".")[0])
+    left_out = {n.rpartition(".")[0] for n in wanted} - compared
+    assert all("Crypto" in n or n in ("DiffCol", "Diffuse Color", "Debug Sample Count", "Render Time") for n in left_out), left_out
+    assert {"Combined", "Depth", "Normal", "Mist"} <= compared and len(compared) > 20
+    assert (found["A"] == found[f"{layer.name}.Combined.A"]).all() and 0 < found["A"].mean() < 1
+    shown = passes_in_blender(tmp("passes.exr"))
+    assert set(shown["lull"]) == {"spp", "p_noisy", "error", "reason"} and {"Combined", "Mist", "Normal"} <= set(shown[layer.name])
+
+
+def test_told():
+    """what is not done as the scene says is told: denoising, the compositor, further view layers"""
+    scene = cube(24, 24)
+    scene.cycles.use_denoising = False
+    assert not [n for n in Cycles(scene, 4).notes if "pattern" not in n]
+    scene.cycles.use_denoising = True
+    scene.view_layers.new("Second")
+    if bpy.app.version < (5, 0):
+        scene.use_nodes = True
+    else:
+        scene.compositing_node_group = bpy.data.node_groups.new("c", "CompositorNodeTree")
+    blend = saved(scene, "told.blend")
+    status, text = command(blend, "-c", "null", "--spp-max", "16", "-o", tmp("told.exr"))
+    for wanted in ("not denoised", "compositor is not run", "only the view layer 'ViewLayer' is rendered, not Second"):
+        assert status == 0 and "lull: " in text and wanted in text, text
+    assert command(blend, "-c", "null", "--spp-max", "16", "-o", tmp("told.exr"), "-q") == (0, "")
+
+
+def passes_in_blender(path):
+    """The layers of a file and their passes, as a node of the compositor offers them."""
+    scene = bpy.context.scene
+    if bpy.app.version < (5, 0):
+        scene.use_nodes, tree = True, None
+        tree = scene.node_tree
+    else:
+        tree = bpy.data.node_groups.new("layers", "CompositorNodeTree")
+        scene.compositing_node_group = tree
+    node, out = tree.nodes.new("CompositorNodeImage"), {}
+    node.image = bpy.data.images.load(path)
+    for name in ("lull", scene.view_layers[0].name):
+        node.layer = name
+        out[name] = [o.name for o in node.outputs]
+    return out
 
 
 def test_same_picture():
@@ -353,7 +440,7 @@ def test_borders():
             for _ in range(12):
                 x0, x1 = sorted(rng.choice(width + 1, 2, False).tolist())
                 y0, y1 = sorted(rng.choice(height + 1, 2, False).tolist())
-                part = next(iter(host.render([Rect(x0, y0, x1, y1)], 0, 1, False)))
+                part = next(iter(host.render([Rect(x0, y0, x1, y1)], 0, 1, False)))["color"]
                 assert (part == whole[y0:y1, x0:x1]).all(), (width, height, x0, y0, x1, y1)
 
 
@@ -396,7 +483,7 @@ def test_region():
     render.use_border = False
     assert abs(one_render(scene, 32)[5:23, 28:35] - mean).max() < SAME * 10  # two waves: the first check
     render.use_border, render.border_max_x = True, render.border_min_x
-    raises(HostError, "holds no pixel", Cycles(scene, 4).crop)
+    raises(HostError, "holds no pixel", Cycles, scene, 4)
 
 
 def test_animation():

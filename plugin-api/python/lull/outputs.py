@@ -6,7 +6,7 @@ import json
 import math
 import sys
 import time
-from typing import Optional
+from typing import Mapping, Optional
 
 import numpy as np
 
@@ -17,9 +17,10 @@ from .files import replaced
 from .frame import Frame
 
 
-def write_exr(path: str, driver: Driver, scene: str = "", software: str = "lull for Python 1.0") -> None:
+def write_exr(path: str, driver: Driver, scene: str = "", software: str = "lull for Python 1.0",
+              more: Optional[Mapping[str, Optional[np.ndarray]]] = None) -> None:
     """R, G, B and the layer lull, which image programs show as spp, p_noisy, error and reason, then those of the frame; cut to
-    the crop."""
+    the crop. more: further channels over the frame's view, or instead of its layers; None leaves one out."""
     frame = driver.frame
     rgb = frame.cropped(frame.mean())
     channels = {"R": rgb[..., 0], "G": rgb[..., 1], "B": rgb[..., 2], "lull.spp.V": frame.cropped(frame.spp())}
@@ -28,6 +29,11 @@ def write_exr(path: str, driver: Driver, scene: str = "", software: str = "lull 
         channels[f"lull.{name}.V"] = frame.cropped(frame.per_pixel(value))
     for name in frame.layers:
         channels[name] = frame.cropped(frame.mean(name))
+    for name, plane in (more or {}).items():
+        if plane is None:
+            del channels[name]
+        else:
+            channels[name] = frame.cropped(plane)
     info = frame.criterion.info
     settings = "".join(f" {key}={value}" for key, value in frame.criterion.parameters.items())
     exr.write(path, channels, (frame.width, frame.height), frame.crop[:2], {

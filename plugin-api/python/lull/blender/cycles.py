@@ -22,6 +22,7 @@ import numpy as np
 from .. import exr
 from ..blocks import merge
 from ..criterion import Rect
+from .passes import Passes
 
 # Sobol-Burley under its names in 3.x and 4.x: its waves add up to one render. The others' tables depend on the total number of
 # samples; they are usable where Cycles can be told that total apart from the subset to render (4.4 and later).
@@ -43,6 +44,11 @@ def _silence() -> Iterator[None]:
     finally:
         os.dup2(kept, 1)
         os.close(kept)
+
+
+# Names of the colour passes by which Cycles divides light, in 4.x and in 5.x
+COLOURS = {"diffuse": {"DiffCol", "Diffuse Color"}, "glossy": {"GlossCol", "Glossy Color"},
+           "transmission": {"TransCol", "Transmission Color"}, "subsurface": {"SubsurfaceCol", "Subsurface Color"}}
 
 
 class WaveFile:
@@ -119,9 +125,16 @@ class Cycles:
         self.scene, self.spp_max = scene, spp_max
         self.width = render.resolution_x * render.resolution_percentage // 100
         self.height = render.resolution_y * render.resolution_percentage // 100
-        self.threads = render.threads
+        self.threads, self.crop = render.threads, self._region()
         self.notes: list[str] = []
         self.layer = next(layer for layer in scene.view_layers if layer.use)
+        if scene.cycles.use_denoising:
+            self.notes.append("the picture is not denoised; the Denoise node of the compositor can do that afterwards")
+        nodes = scene.compositing_node_group if hasattr(scene, "compositing_node_group") else scene.use_nodes
+        if nodes and render.use_compositing:
+            self.notes.append("the scene's compositor is not run: give it the picture by an Image node in place of Render Layers")
+        if any(getattr(self.layer, f"use_pass_cryptomatte_{kind}") for kind in ("object", "material", "asset")):
+            self.notes.append("Cryptomatte passes are left out: render them apart, a few samples are enough")
         if others := [layer.name for layer in scene.view_layers if layer.use and layer != self.layer]:
             self.notes.append(f"only the view layer '{self.layer.name}' is rendered, not {', '.join(others)}")
         self.pattern = self._choose_pattern()
@@ -135,7 +148,7 @@ class Cycles:
         gpus = _gpus()
         return f"{gpus.compute_device_type}: {', '.join(d.name for d in gpus.devices if d.use)}"
 
-    def crop(self) -> Rect:
+    def _region(self) -> Rect:
         """The scene's own render region in pixels from the top, or the whole picture."""
         r = self.scene.render
         if not r.use_border:
@@ -155,13 +168,16 @@ class Cycles:
                       use_file_extension=False, filepath=self._wave.path)
             for name in ("border_min_x", "border_min_y", "border_max_x", "border_max_y"):
                 self._set(render, **{name: getattr(render, name)})  # to be put back
-            self._set(render.image_settings, media_type="IMAGE", file_format="OPEN_EXR", color_mode="RGB", color_depth="32",
-                      exr_codec="NONE", color_management="FOLLOW_SCENE")
+            self._set(render.image_settings, media_type="MULTI_LAYER_IMAGE", file_format="OPEN_EXR_MULTILAYER",
+                      color_mode="RGBA", color_depth="32", exr_codec="NONE", use_exr_interleave=True,
+                      color_management="FOLLOW_SCENE")
             self._set(cycles, use_adaptive_sampling=False, use_denoising=False, use_layer_samples="IGNORE", time_limit=0.0,
                       use_sample_subset=True, sample_offset=0, samples=1, sample_subset_length=1)
             self._set(cycles, sampling_pattern=self.pattern)
             for layer in self.scene.view_layers:
                 self._set(layer, use=layer == self.layer)
+            self._set(self.layer, use_pass_combined=True)
+            self._find_passes()
         except BaseException:
             self.__exit__()
             raise
@@ -173,6 +189,19 @@ class Cycles:
         self._touched += [(owner, name, getattr(owner, name)) for name in known]  # before one changes another
         for name, value in known.items():
             setattr(owner, name, value)
+
+    def _find_passes(self) -> None:
+        """Switches on the colours by which Cycles divides light, and asks one sample of one pixel which passes there are."""
+        hidden = set()
+        for family, names in COLOURS.items():
+            colour = f"use_pass_{family}_color"
+            if not getattr(self.layer, colour) and (getattr(self.layer, f"use_pass_{family}_direct") or
+                                                    getattr(self.layer, f"use_pass_{family}_indirect")):
+                self._set(self.layer, **{colour: True})
+                hidden |= names
+        x, y = self.crop[:2]
+        channels = self._render_area(Rect(x, y, x + 1, y + 1), 0, 1)
+        self.passes = Passes(self.layer.name, channels, (self.width, self.height), hidden, self.scene.render.film_transparent)
 
     def _choose_pattern(self) -> str:
         """The scene's own sampling pattern if its waves add up to one render, else one whose waves do."""
@@ -201,14 +230,18 @@ class Cycles:
 
     # --- rendering -----------------------------------------------------------------------------------------------------
 
-    def render(self, rects: Sequence[Rect], first: int, count: int, _half: bool) -> Iterator[np.ndarray]:
-        """The driver's render function: the mean of samples [first, first + count), [h, w, 3] float32 per rectangle."""
+    def render(self, rects: Sequence[Rect], first: int, count: int, _half: bool) -> Iterator[dict[str, np.ndarray]]:
+        """The driver's render function: means of samples [first, first + count), float32, per rectangle: "color" [h, w, 3] and
+        the passes [h, w]."""
         areas = {area: self._render_area(area, first, count) for area in merge(rects)}
         for r in rects:
-            area, pixels = next((a, p) for a, p in areas.items() if a.x0 <= r.x0 < a.x1 and a.y0 <= r.y0 < a.y1)
-            yield pixels[r.y0 - area.y0:r.y1 - area.y0, r.x0 - area.x0:r.x1 - area.x0]
+            area, channels = next((a, c) for a, c in areas.items() if a.x0 <= r.x0 < a.x1 and a.y0 <= r.y0 < a.y1)
+            at = np.s_[r.y0 - area.y0:r.y1 - area.y0, r.x0 - area.x0:r.x1 - area.x0]
+            part = {name: plane[at] for name, plane in channels.items()}
+            yield {"color": np.stack([part[f"Combined.{c}"] for c in "RGB"], -1), **self.passes.sample(part, r, first)}
 
-    def _render_area(self, area: Rect, first: int, count: int) -> np.ndarray:
+    def _render_area(self, area: Rect, first: int, count: int) -> dict[str, np.ndarray]:
+        """The view layer's channels, [h, w] float32."""
         render, cycles = self.scene.render, self.scene.cycles
         # Blender cuts border · size down to whole pixels, in single precision: aim inside the pixel. Rows are from below.
         render.border_min_x, render.border_max_x = (area.x0 + 0.25) / self.width, (area.x1 + 0.25) / self.width
@@ -223,8 +256,10 @@ class Cycles:
             status = bpy.ops.render.render(write_still=True, scene=self.scene.name)
         if "FINISHED" not in status:
             raise HostError("Cycles did not finish the wave")
-        pixels, _ = exr.read(render.filepath)
-        if pixels.shape != (area.height, area.width, 3):
-            raise HostError(f"Cycles rendered {pixels.shape[1]}x{pixels.shape[0]} pixels for a border of "
-                            f"{area.width}x{area.height}")
-        return pixels
+        channels, _, _ = exr.read_layers(render.filepath)
+        own = f"{self.layer.name}."
+        channels = {name.removeprefix(own): plane for name, plane in channels.items() if name.startswith(own)}
+        shape = channels["Combined.R"].shape
+        if shape != (area.height, area.width):
+            raise HostError(f"Cycles rendered {shape[1]}x{shape[0]} pixels for a border of {area.width}x{area.height}")
+        return channels

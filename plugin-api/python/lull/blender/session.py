@@ -108,7 +108,8 @@ def _identity(scene: bpy.types.Scene, host: Cycles) -> dict[str, str]:
     camera, view = scene.camera, zlib.crc32(np.array(scene.camera.matrix_world, "<f4").tobytes())
     return {"files": f"{os.path.basename(bpy.data.filepath) or 'unsaved'} {crc:08x}", "scene": scene.name,
             "frame": str(scene.frame_current), "camera": f"{camera.name} {view:08x}", "view": view_text(scene),
-            "view-layer": host.layer.name, "pattern": host.pattern, "device": host.device(),
+            "view-layer": host.layer.name, "film": "transparent" if scene.render.film_transparent else "opaque",
+            "pattern": host.pattern, "device": host.device(),
             "renderer": f"Blender {bpy.app.version_string} {bpy.app.build_hash.decode(errors='replace')}"}
 
 
@@ -130,22 +131,24 @@ class Session:
         time_s = scene.cycles.time_limit if settings.time_budget_s is None else settings.time_budget_s
         self.host = Cycles(scene, spp_max)
         self.notes = self.host.notes
-        exposure = 2.0 ** scene.view_settings.exposure if is_plain(scene) else 1.0
-        self.frame = Frame(judge, self.host.width, self.host.height, block=settings.block,
-                           crop=self.host.crop(), spp_min=min(settings.spp_min, spp_max) if settings.spp_max is None else
-                           settings.spp_min, spp_max=spp_max, time_budget_s=time_s, deterministic=time_s <= 0,
-                           seed=scene.cycles.seed, exposure=exposure, display=display_of(scene),
-                           mask=png.read_grey(settings.mask) if settings.mask else None)
-        self.driver = Driver(self.frame, self.host.render, wave=settings.wave, threads=self.host.threads,
-                             identity=_identity(scene, self.host) if settings.checkpoint else None,
-                             after_call=after_call)
+        shown = {"exposure": 2.0 ** scene.view_settings.exposure if is_plain(scene) else 1.0, "display": display_of(scene)}
+        self.host.__enter__()
+        try:
+            self.frame = Frame(judge, self.host.width, self.host.height, block=settings.block, crop=self.host.crop,
+                               layers=self.host.passes.names, spp_max=spp_max, time_budget_s=time_s, deterministic=time_s <= 0,
+                               spp_min=min(settings.spp_min, spp_max) if settings.spp_max is None else settings.spp_min,
+                               mask=png.read_grey(settings.mask) if settings.mask else None, seed=scene.cycles.seed, **shown)
+            self.driver = Driver(self.frame, self.host.render, wave=settings.wave, threads=self.host.threads,
+                                 identity=_identity(scene, self.host) if settings.checkpoint else None, after_call=after_call)
+        except BaseException:
+            self.host.__exit__()
+            raise
         self.quote = ""
         self.unsaved: Optional[OSError] = None
         self._told = False
         self._save_at_s = float("inf")
 
     def __enter__(self) -> Session:
-        self.host.__enter__()
         return self
 
     def __exit__(self, *_) -> None:
@@ -161,6 +164,7 @@ class Session:
         state = self.settings.checkpoint
         if state and resume and os.path.exists(state):
             checkpoint.load(state, self.driver)
+            self.host.passes.remember(self.frame)
         if state:
             self.driver.suspend = lambda _: self.save()
             self._every_s, self._save_at_s = every_s, time.monotonic() + every_s
@@ -196,7 +200,8 @@ class Session:
         kernel = f"Cycles, Blender {bpy.app.version_string}"
         interrupted = result.outcome in ("interrupt", "failed")
         return write_each((
-            (s.output, lambda p: outputs.write_exr(p, self.driver, scene, f"lull for Python 1.0; {kernel}")),
+            (s.output, lambda p: outputs.write_exr(p, self.driver, scene, f"lull for Python 1.0; {kernel}",
+                                                    self.host.passes.finished(self.frame))),
             (s.preview, lambda p: outputs.write_preview(p, self.driver)),
             (s.stop_map, lambda p: stopmap.write(p, self.frame.blocks, scene)),
             (s.report, lambda p: outputs.write_report(p, self.driver, scene, kernel, interrupted, s.mask or None))))

@@ -103,7 +103,6 @@ class LULL_OT_render(bpy.types.Operator):
             scene.frame_set(frame)
         try:
             session = Session(scene, settings)
-            session.__enter__()
         except REFUSED as error:
             self.report({"ERROR"}, str(error))
             return False
