@@ -16,7 +16,7 @@ import numpy as np
 
 import lull
 import tap
-from lull import abi, blocks, checkpoint, exr, outputs, png, srgb, stopmap
+from lull import abi, blocks, checkpoint, exr, outputs, png, quote, srgb, stopmap
 from renderer import Noise, Playback
 from tap import raises
 
@@ -726,6 +726,26 @@ def test_weights():
         raises(ValueError, "layer", lull.Frame, lull.load("halfbuf"), 8, 8, layers=[name])
     result = run(host=lambda rects, *_: [np.zeros((16, 16, 3))], sigmas=[[0.]], weighted=True)[0]
     assert "no plane weight" in str(result.exception)
+
+
+def test_quote():
+    """what the dial costs is told from the first checks: about what the render then takes, coarser less, and it changes nothing"""
+    sigmas = [[.05, .2, .5, 1], [.3] * 4, [.1, .2, .3, .4]]
+    size = {"criterion": "observer", "sigmas": sigmas, "parameters": {}, "spp_max": 4096}
+    _, plain, _ = run(**size)
+    f = lull.Frame(lull.load("observer"), 64, 48, block=16, spp_max=4096)
+    d = lull.Driver(f, Noise(sigmas))
+    while not quote.pilot_done(d):
+        d.step()
+    rows = quote.rows(d)
+    assert [r.value for r in rows] == [.9, .5, .25, .05] and [r.chosen for r in rows] == [False, False, True, False]
+    assert all(a.spp[1] < b.spp[1] and a.time_s < b.time_s for a, b in zip(rows, rows[1:])), rows
+    assert d.run().outcome == "done" and [b.spp for b in f.blocks] == [b.spp for b in plain.blocks]
+    taken = d.totals.samples / f.view.pixels
+    assert .7 < rows[2].spp[1] / taken < 1.4, (rows[2], taken)
+    assert quote.line(d).startswith("visible 0.25 takes about ") and "; visible 0.9 would take about " in quote.line(d)
+    _, _, d = run("fixed", parameters={})
+    assert quote.rows(d) == [] and quote.line(d) == "" and "no dial" in quote.table(d)
 
 
 def test_merge():

@@ -180,7 +180,8 @@ class Frame:
 
     # --- asking --------------------------------------------------------------------------------------------------------
 
-    def _planes_now(self) -> dict[str, Plane]:
+    def planes_now(self) -> dict[str, Plane]:
+        """What a criterion is shown of the frame as it is."""
         spp = self.per_pixel(lambda b: b.spp, np.uint32)
         n = {name: spp for name in self.sums}
         n["half"] = self.per_pixel(lambda b: b.half_spp, np.uint32)
@@ -199,7 +200,7 @@ class Frame:
         last = dict(zip(due, final))
         states = [BlockState(b.rect, b.spp, b.half_spp, not b.active, last.get(i, False), b.thread_s)
                   for i, b in enumerate(self.blocks)]
-        planes = self._planes_now()
+        planes = self.planes_now()
         answers: dict[int, Decision] = {}
         elapsed_s = time.monotonic() - self._begin_s
         self._check_open()

@@ -39,7 +39,7 @@ def _predictions(driver: Driver, dial: str, value: float) -> list[float]:
     """Samples at which each block will stop, NaN where the criterion does not say."""
     frame = driver.frame
     states = [BlockState(b.rect, b.spp, b.half_spp, False, False, b.thread_s) for b in frame.blocks]
-    planes, ends = frame._planes_now(), [math.nan] * len(states)
+    planes, ends = frame.planes_now(), [math.nan] * len(states)
     for scale in set(frame.dials):
         parameter = frame.criterion.info.parameter(dial)
         judge: Criterion = frame.criterion.with_parameters(**{dial: min(max(value * scale, parameter.min), parameter.max)})
