@@ -26,7 +26,7 @@ static const struct base_option list[] = {
     {"json", 0, NULL, TO(json), .help = "one JSON object of medians instead of tables"},
     {"threads", 0, "N", TO(threads), 1, 1024, .help = "threads (all processors); with 1 the figures are processor time"},
     {"precision", 0, NULL, TO(precision), .words = ggn_precision_names,
-     .help = "of inference (f32); bf16 is f32 where the processor has no bfloat16"},
+     .help = "of inference (f32); bf16 is slow where the processor has no bfloat16"},
     {"rounds", 0, "N", TO(rounds), 1, MAX_ROUNDS, .help = "measurements per figure (9)"},
     {"batch", 0, "N", TO(batch), 1, 64, .help = "batch of the training figures, which are per image or sample (4)"},
     {0}};
@@ -306,8 +306,9 @@ static void print_figures(const struct bench *b, const double figure[N_FIGURES])
         return;
     }
     printf("{\"threads\": %d, \"isa\": \"%s\", \"precision\": \"%s\", \"batch\": %d", b->o.threads,
-           ggn_isa_name(b->r->kernels->isa), ggn_precision_names[b->o.precision && b->trainer->weights[0]->bf16],
-           b->o.batch);
+           ggn_isa_name(b->r->kernels->isa), ggn_precision_names[b->o.precision], b->o.batch);
+    if (b->o.precision == GGN_PRECISION_BF16)
+        printf(", \"bf16\": \"%s\"", ggn_precision_bf16_by());
     for (int f = 0; f < N_FIGURES; f++)
         printf(", \"%s\": %.3f", figure_name[f], figure[f]);
     printf("}\n");
@@ -325,7 +326,10 @@ int ggn_cmd_bench(int argc, char **argv)
     if (!rc)
         rc = setup(&b, &err);
     if (!rc && !b.o.json) {
-        printf("instruction set %s, %d threads\n\n", ggn_isa_name(b.r->kernels->isa), b.o.threads);
+        printf("instruction set %s, %d threads\n", ggn_isa_name(b.r->kernels->isa), b.o.threads);
+        if (b.o.precision == GGN_PRECISION_BF16)
+            printf("bfloat16 products by %s\n", ggn_precision_bf16_by());
+        putchar('\n');
         print_layers(&b, b.r, GGN_NET_R);
         print_layers(&b, b.m, GGN_NET_M);
         print_layers(&b, b.d, GGN_NET_D);

@@ -549,6 +549,8 @@ int ggn_cmd_cost(int argc, char **argv)
 
     int rc = base_options_parse(&options, argc, argv, &o, &err);
     j.split = (enum ggn_split)o.split;
+    if (!rc && o.precision == GGN_PRECISION_BF16)
+        fprintf(stderr, "%s: bfloat16 products by %s\n", argv[0], ggn_precision_bf16_by());
     if (!rc && !(threads = base_threads_create(o.threads, &err)))
         rc = err.code;
     if (!rc)

@@ -425,8 +425,8 @@ int ggn_cmd_evaluate(int argc, char **argv)
 
     if (base_options_parse(&options, argc, argv, &o, &err))
         return ggn_cmd_fail(argv[0], &err);
-    if (speaks && o.bf16 && !ggn_precision_has_bf16())
-        fprintf(stderr, "%s: this processor has no bfloat16 products: --bf16 judges in float\n", argv[0]);
+    if (speaks && o.bf16)
+        fprintf(stderr, "%s: bfloat16 products by %s\n", argv[0], ggn_precision_bf16_by());
     if (ggn_cmd_team)
         base_interrupt_catch(); /* that is how MPI says that a process has died */
     ggn_cmd_follow_rank_0();

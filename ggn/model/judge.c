@@ -15,9 +15,14 @@ struct ggn_judge {
 
 const char *const ggn_precision_names[] = {"f32", "bf16", NULL};
 
-int ggn_precision_has_bf16(void)
+const char *ggn_precision_bf16_by(void)
 {
-    return ggn_bf16_available();
+    return ggn_bf16_name();
+}
+
+int ggn_precision_is_slow(enum ggn_precision precision)
+{
+    return precision == GGN_PRECISION_BF16 && strcmp(ggn_bf16_name(), "software") == 0;
 }
 
 static int exec_flags(enum ggn_precision precision)

@@ -21,8 +21,9 @@ enum ggn_precision {
     GGN_PRECISION_F64 /* no judge's: model/exact.h */
 };
 extern const char *const ggn_precision_names[]; /* "f32", "bf16", NULL */
-/* Whether this processor has bfloat16 products; without them GGN_PRECISION_BF16 is f32. */
-int ggn_precision_has_bf16(void);
+/* How this processor makes bfloat16 products: "AVX512-BF16", or "software" (the same numbers, slowly). */
+const char *ggn_precision_bf16_by(void);
+int ggn_precision_is_slow(enum ggn_precision precision);
 
 struct ggn_judge;
 

@@ -4,7 +4,7 @@
 
 #include "nn/bf16.h"
 
-enum { L = 16, TILE_V = 3 };
+enum { L = GGN_BF16_PX_FEW, TILE_V = GGN_BF16_PX / L };
 
 typedef __m512 vf;
 #define INLINE static inline __attribute__((always_inline))
@@ -48,8 +48,8 @@ INLINE void tile(const struct ggn_conv *a, const uint32_t *w, const uint32_t *x,
             vf y = acc[o][v];
             if (a->slope != 1)
                 y = _mm512_max_ps(y, _mm512_mul_ps(_mm512_set1_ps(a->slope), y));
-            if (a->scale)
-                y = _mm512_fmadd_ps(y, _mm512_set1_ps(a->scale[oc + o]), _mm512_set1_ps(a->shift[oc + o]));
+            if (a->scale) /* not fused: the same bits as in software */
+                y = _mm512_add_ps(_mm512_mul_ps(y, _mm512_set1_ps(a->scale[oc + o])), _mm512_set1_ps(a->shift[oc + o]));
             _mm512_storeu_ps(a->y[oc + o] + p + v * L, y);
         }
 }
@@ -63,36 +63,17 @@ INLINE void tile(const struct ggn_conv *a, const uint32_t *w, const uint32_t *x,
 #define TILES(OT) TILE(OT, 1) TILE(OT, 3)
 TILES(1) TILES(2) TILES(3) TILES(4) TILES(5) TILES(6) TILES(7) TILES(8)
 
-void ggn_bf16_conv_avx512(const struct ggn_conv *a, const uint32_t *w, long p0, long p1, int oc0, int oc1,
-                          uint32_t *scratch)
+static void any_tile(const struct ggn_conv *a, const uint32_t *w, const uint32_t *x, long x_stride, int oc, long p, int ot,
+                     int n)
 {
     typedef void tile_fn(const struct ggn_conv *, const uint32_t *, const uint32_t *, long, int, long);
 #define ROW(NV) {tile_1_##NV, tile_2_##NV, tile_3_##NV, tile_4_##NV, tile_5_##NV, tile_6_##NV, tile_7_##NV, tile_8_##NV}
-    static tile_fn *const tiles[2][8] = {ROW(3), ROW(1)};
-    const long end = (long)a->h * a->row, pairs = (a->n_in + 1) / 2;
+    static tile_fn *const tiles[2][GGN_BF16_OC] = {ROW(3), ROW(1)};
 
-    if (p1 > end)
-        p1 = end;
-    /* rows above and below, and what the last register tile reads past its end */
-    const long x_stride = (p1 - p0 + 2L * a->row + 2 + TILE_V * L + L - 1) / L * L;
-    for (long i = 0; i < pairs; i++)
-        pair_channels(scratch + i * x_stride, a->x[2 * i] + p0 - a->row - 1,
-                      2 * i + 1 < a->n_in ? a->x[2 * i + 1] + p0 - a->row - 1 : NULL, p1 - p0 + 2L * a->row + 2);
-    for (long p = p0, n; p < p1; p += n) {
-        const int narrow = p1 - p <= L;
-        n = narrow ? L : TILE_V * L;
-        for (int oc = oc0, ot; oc < oc1; oc += ot) {
-            ot = oc1 - oc < 8 ? oc1 - oc : 8;
-            tiles[narrow][ot - 1](a, w + (long)oc * pairs * 9, scratch + (p - p0), x_stride, oc, p);
-        }
-        for (int o = oc0; o < oc1; o++) { /* the zeros of the layout */
-            for (long q = p + (a->w_px - p % a->row); q < p + n; q += a->row)
-                a->y[o][q] = 0;
-            for (long q = end > p ? end : p; q < p + n; q++)
-                a->y[o][q] = 0;
-        }
-    }
+    tiles[n == GGN_BF16_PX_FEW][ot - 1](a, w, x, x_stride, oc, p);
 }
+
+const struct ggn_bf16_form ggn_bf16_avx512 = {pair_channels, any_tile};
 
 #else
 typedef int ggn_no_bf16_here; /* ISO C forbids an empty file */

@@ -2,6 +2,7 @@
 #if defined(__x86_64__)
 #include <immintrin.h>
 
+#include "nn/bf16.h"
 #include "nn/real.h"
 
 #define TABLE ggn_kernels_avx2
@@ -17,6 +18,7 @@
 #define SET1(s) ((vf)_mm256_set1_ps(s))
 #define FMA(a, b, c) ((vf)_mm256_fmadd_ps((__m256)(a), (__m256)(b), (__m256)(c)))
 #define VSUM(v) ((((v)[0] + (v)[4]) + ((v)[2] + (v)[6])) + (((v)[1] + (v)[5]) + ((v)[3] + (v)[7])))
+#define FASTER_FORMS .bf16 = ggn_bf16_conv, .bf16_pack = ggn_bf16_pack,
 #endif
 
 #include "nn/kernels_body.h"

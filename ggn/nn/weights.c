@@ -4,7 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "nn/bf16.h"
 #include "nn/hash.h"
 #include "nn/real.h"
 #include "nn/winograd.h"
@@ -25,7 +24,7 @@ struct ggn_weights *ggn_weights_create(const struct ggn_graph *graph, const stru
     const struct ggn_kernels *k = kernels ? kernels : ggn_kernels_best();
     size_t wino = k->wino ? 4 * pack : 0;
     size_t bytes = (learned + 2 * stats + (flags & GGN_WEIGHTS_BACKWARD ? 2 : 1) * (pack + wino)) * sizeof(real);
-    size_t bf16 = flags & GGN_WEIGHTS_BF16 && k->bf16 && ggn_bf16_available() ? pack * sizeof(uint32_t) : 0;
+    size_t bf16 = flags & GGN_WEIGHTS_BF16 && k->bf16 ? pack * sizeof(uint32_t) : 0;
     char *memory = w ? calloc(1, bytes + bf16 + ALIGN) : NULL;
 
     if (!memory) {

@@ -14,7 +14,7 @@
 
 enum {
     GGN_WEIGHTS_BACKWARD = 1, /* also packed for the backward pass */
-    GGN_WEIGHTS_BF16 = 2      /* also packed in bfloat16, where the processor has it */
+    GGN_WEIGHTS_BF16 = 2      /* also packed in bfloat16; float only */
 };
 
 enum ggn_init {

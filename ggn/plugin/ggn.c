@@ -38,7 +38,7 @@ static const struct lull_param params[P_COUNT] = {
     [P_FIRST_SPP] = LULL_KIT_INT("first-spp", NULL, 1, 1e9,
                                  "samples per pixel of the first image of a window; without it the model's own"),
     [P_PRECISION] = LULL_KIT_CHOICE("precision", "f32", "f32|bf16",
-                                    "of the products in the networks; bf16 is f32 on processors without the instructions"),
+                                    "of the products in the networks; bf16 is slow on processors without the instructions"),
 };
 
 /* --- what it sees ------------------------------------------------------------------------------------------------------ */
@@ -220,6 +220,9 @@ static int32_t load_model(struct lull_instance *in, const char *path, struct lul
         in->half_wanted = "this model judges by half buffers too, which the host does not give: how well it decides without "
                           "them depends on how it was trained (ggn evaluate --no-pictures)";
     }
+    if (ggn_precision_is_slow((enum ggn_precision)in->kit.value[P_PRECISION]))
+        in->slow = "precision bf16: this processor has no instruction for such products, and software makes them slowly; "
+                   "f32 is faster";
     gp_windowed_hash(in, &in->kit.value[P_PRECISION], sizeof in->kit.value[P_PRECISION]);
     for (int net = 0; net < GGN_NETS; net++)
         gp_windowed_hash(in, model->weights[net]->params, model->graph[net].n_params * sizeof(float));

@@ -113,6 +113,8 @@ int32_t gp_windowed_begin_frame(struct lull_instance *in, const struct lull_fram
     const struct lull_host *host = in->kit.host;
     if (in->half_wanted && !(frame->planes & LULL_PLANE_BIT(LULL_PLANE_HALF)) && host && host->log)
         host->log(host, LULL_LOG_WARNING, in->half_wanted);
+    if (in->slow && host && host->log)
+        host->log(host, LULL_LOG_WARNING, in->slow);
     in->rule.spp_max = frame->spp_max;
     in->display = gp_display_of(&in->kit);
     return LULL_OK;

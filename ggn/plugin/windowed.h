@@ -41,6 +41,7 @@ struct lull_instance {
     const struct gp_sight *sight;
     void *model; /* owns, by sight->model_destroy */
     const char *half_wanted; /* logged when a frame has no half buffer; static text, NULL: nothing is lost */
+    const char *slow;        /* logged with each frame; static text, NULL: nothing is */
     struct ggn_stop_rule rule; /* the model's policy, with the parameters over it */
     uint32_t key; /* of saved state: a hash of model and policy */
     struct ggn_display display;

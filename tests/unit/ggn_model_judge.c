@@ -156,7 +156,7 @@ static void test_picture(void **state)
     (void)state;
 }
 
-/* bfloat16 has 8 bits: close to float, deterministic, and float itself where the processor lacks it. */
+/* bfloat16 has 8 bits: close to float, not the same, deterministic. */
 static void test_bf16(void **state)
 {
     struct ggn_model *m = make();
@@ -166,7 +166,7 @@ static void test_bf16(void **state)
     double exact = window_logit(f, 1), rounded = window_logit(b, 1), again = window_logit(b, 1);
     assert_memory_equal(&rounded, &again, sizeof again);
     assert_true(fabs(rounded - exact) < 0.1);
-    assert_int_equal(rounded != exact, ggn_precision_has_bf16());
+    assert_true(rounded != exact);
     ggn_judge_destroy(f);
     ggn_judge_destroy(b);
     ggn_model_destroy(m);
