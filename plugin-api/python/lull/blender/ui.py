@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The add-on: Render properties → Lull, with settings per scene, a button, and picture and stop map as images of Blender's."""
 import os
+import textwrap
 import time
 from typing import Optional
 
@@ -127,7 +128,7 @@ class LULL_OT_render(bpy.types.Operator):
                 shown.show_in_editors(context.screen)
             self._show_at_s = time.monotonic() + max(1.0, 20 * (time.monotonic() - now_s))  # a twentieth of the time
         _running = result is None
-        context.scene.lull.state = "\n".join([*outputs.progress_text(session.driver).split("  "), *session.notes,
+        context.scene.lull.state = "\n".join([outputs.progress_text(session.driver).strip(), *session.notes,
                                               *session.quote.split("; ")])
         return result
 
@@ -141,7 +142,7 @@ class LULL_OT_render(bpy.types.Operator):
         for name, path in ((shown.PICTURE, session.settings.output), (shown.STOP_MAP, session.settings.stop_map)):
             if path in written:
                 shown.keep(name, path)
-        settings.state = "\n".join([*summary(session).split(", "), *session.notes, *written])
+        settings.state = "\n".join([summary(session), *session.notes, *written])
         for text in failed:
             self.report({"ERROR"}, text)
         if result.exception:
@@ -217,11 +218,16 @@ class LULL_PT_render(bpy.types.Panel):
                     column.prop(owner, name, **({"text": "Max Samples"} if name == "samples" else {}))
             layout.operator("lull.render", icon="RENDER_STILL")
             layout.operator("lull.render", text="Render Animation", icon="RENDER_ANIMATION").animation = True
+        column = layout.column(align=True)
+        column.scale_y = 0.8
+        letters = max(20, int(context.region.width / (7 * context.preferences.system.ui_scale)) - 6)  # about, of a line
         for line in settings.state.splitlines():
-            layout.label(text=line)
+            for part in textwrap.wrap(line, letters):
+                column.label(text=part)
+        pictures = layout.row()
         for name in (shown.PICTURE, shown.STOP_MAP):
             if icon := shown.icon(name):
-                layout.template_icon(icon_value=icon, scale=10)
+                pictures.template_icon(icon_value=icon, scale=10)
 
 
 CLASSES = (LullSettings, LULL_OT_render, LULL_PT_render)
