@@ -155,11 +155,11 @@ int ggn_container_write(struct ggn_container *c, const char *path, struct base_e
     if (!file)
         return base_fail_nomem(err, "model file");
     rc = base_file_begin(&out, path, err);
-    if (!rc && fwrite(file, 1, size, out.file) != size)
-        rc = base_fail(err, BASE_EIO, "%s: cannot write", path);
-    if (!rc)
+    if (!rc) {
+        out.durable = 1; /* hours of training, also as a checkpoint */
+        fwrite(file, 1, size, out.file);
         rc = base_file_commit(&out, err);
-    base_file_abort(&out);
+    }
     free(file);
     return rc;
 }

@@ -2,6 +2,7 @@
 
 #include <openexr.h>
 
+#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -106,18 +107,25 @@ static exr_result_t write_pixels(exr_context_t file, const struct pt_exr_image *
     return rc;
 }
 
+struct sink {
+    int fd, reason; /* reason: errno of a write that failed; 0: none did */
+};
+
 /* The library jumps about in the file: its head comes last. */
 static int64_t write_at(exr_const_context_t file, void *data, const void *bytes, uint64_t size, uint64_t offset,
                         exr_stream_error_func_ptr_t fail)
 {
-    struct base_file_out *out = data;
+    struct sink *sink = data;
     (void)file;
     (void)fail;
     uint64_t done = 0;
     while (done < size) {
-        ssize_t n = pwrite(fileno(out->file), (const char *)bytes + done, (size_t)(size - done), (off_t)(offset + done));
-        if (n <= 0)
+        errno = EIO;
+        ssize_t n = pwrite(sink->fd, (const char *)bytes + done, (size_t)(size - done), (off_t)(offset + done));
+        if (n <= 0) {
+            sink->reason = errno;
             return -1;
+        }
         done += (uint64_t)n;
     }
     return (int64_t)size;
@@ -135,7 +143,8 @@ int pt_exr_write(const char *path, const struct pt_exr_image *image, struct base
     exr_context_t file = NULL;
     exr_context_initializer_t init = EXR_DEFAULT_CONTEXT_INITIALIZER;
     init.error_handler_fn = ignore_message;
-    init.user_data = &out;
+    struct sink sink = {.fd = fileno(out.file)};
+    init.user_data = &sink;
     init.write_fn = write_at;
     exr_result_t code = exr_start_write(&file, out.tmp_path, EXR_WRITE_FILE_DIRECTLY, &init);
     if (code == EXR_ERR_SUCCESS)
@@ -148,6 +157,8 @@ int pt_exr_write(const char *path, const struct pt_exr_image *image, struct base
     if (code == EXR_ERR_SUCCESS)
         return base_file_commit(&out, err);
     base_file_abort(&out);
+    if (sink.reason)
+        return base_fail(err, BASE_EIO, "%s: write failed: %s", path, strerror(sink.reason));
     if (code == EXR_ERR_OUT_OF_MEMORY)
         return base_fail_nomem(err, path);
     return base_fail(err, BASE_EIO, "%s: cannot write EXR: %s", path, exr_get_default_error_message(code));

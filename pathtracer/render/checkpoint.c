@@ -53,6 +53,7 @@ int pt_checkpoint_save(const char *path, const struct pt_render *r, const char *
     int rc = base_file_begin(&out, path, err);
     if (rc)
         return rc;
+    out.durable = 1;
     struct sink s = {.file = out.file, .crc = (uint32_t)crc32(0, NULL, 0)};
     put(&s, pt_checkpoint_kind.magic, sizeof pt_checkpoint_kind.magic);
     put_count(&s, strlen(settings));

@@ -191,7 +191,7 @@ int base_file_check_kind(const char *path, const struct base_file_kind *kind, st
     size_t n = fread(begin, 1, sizeof begin, f);
     fclose(f);
     if (n > 0 && (n < sizeof begin || memcmp(begin, kind->magic, sizeof begin) != 0))
-        return base_fail(err, BASE_EINVAL, "%s: this is no %s and would be replaced; choose another name", path, kind->name);
+        return base_fail(err, BASE_EINVAL, "%s: not a %s, it would be replaced; choose another name", path, kind->name);
     return 0;
 }
 
@@ -300,12 +300,32 @@ int base_file_begin(struct base_file_out *out, const char *path, struct base_err
     return 0;
 }
 
+/* Why a write failed whose errno is long gone: one more byte meets the same end. */
+static int find_reason(const struct base_file_out *out)
+{
+    errno = 0;
+    return write(fileno(out->file), "", 1) < 0 ? errno : EIO;
+}
+
+/* Where a folder cannot be synced, the file is in place all the same. */
+static void sync_folder(const char *path)
+{
+    char folder[PATH_ROOM + 4];
+    folder_of(path, folder);
+    int fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (fd >= 0) {
+        (void)!fsync(fd);
+        close(fd);
+    }
+}
+
 int base_file_commit(struct base_file_out *out, struct base_err *err)
 {
     int bad = ferror(out->file) != 0;
-    errno = 0;
+    errno = bad ? find_reason(out) : 0;
     bad |= fflush(out->file) != 0;
-    bad |= fsync(fileno(out->file)) != 0 && errno != EINVAL; /* EINVAL: a file system without fsync */
+    if (!bad) /* EINVAL: a file system without fsync */
+        bad = fsync(fileno(out->file)) != 0 && errno != EINVAL;
     int saved = errno;
     bad |= fclose(out->file) != 0;
     out->file = NULL;
@@ -313,7 +333,10 @@ int base_file_commit(struct base_file_out *out, struct base_err *err)
         unlink(out->tmp_path);
         return base_fail(err, BASE_EIO, "%s: write failed: %s", out->path, strerror(saved != 0 ? saved : EIO));
     }
-    return base_file_rename(out->tmp_path, out->path, err);
+    int rc = base_file_rename(out->tmp_path, out->path, err);
+    if (!rc && out->durable)
+        sync_folder(out->path);
+    return rc;
 }
 
 int base_file_write_line(const char *path, const char *text, struct base_err *err)

@@ -20,7 +20,7 @@ full() { # full NAME BLOCKS TARGET COMMAND…: fails when no file may exceed so 
     # through a pipe: the limit would hold for a log file too
     message=$( (trap '' XFSZ && ulimit -f "$blocks" && { "$@" 2>&1 >/dev/null; echo "exit $?"; }) | cat)
     n=$((n + 1))
-    if [ "$(echo "$message" | tail -n 1)" = "exit 2" ] && [ "$(echo "$message" | wc -l)" -eq 2 ] && echo "$message" | grep -qi 'writ\|large' &&
+    if [ "$(echo "$message" | tail -n 1)" = "exit 2" ] && [ "$(echo "$message" | wc -l)" -eq 2 ] && echo "$message" | grep -q 'File too large\|png: write failed' &&
         [ ! -e "$target" ] && [ -z "$(find "$tmp" -name '*.tmp*')" ] && [ "$before" = "$(sums)" ]; then
         echo "ok $n - $name"
     else

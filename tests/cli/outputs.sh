@@ -88,20 +88,20 @@ rm -r real way
 # --- what is kept for oneself replaces nothing but its like ---
 echo text >thesis.txt && cp "$here/../../scenes/textures/bricks.png" kept.png && : >empty.ckp
 for name in thesis.txt kept.png m.ggn; do
-    refused "$name: this is no checkpoint and would be replaced" $long --checkpoint $name
+    refused "$name: not a checkpoint, it would be replaced" $long --checkpoint $name
 done
 for name in thesis.txt kept.png; do
-    refused "$name: this is no model file and would be replaced" $train $name
-    refused "$name: this is no model file and would be replaced" "$ggn" convert m.ggn $name
-    refused "$name: this is no model file and would be replaced" "$ggn" baseline attributes -d "$data" -o $name
+    refused "$name: not a model file, it would be replaced" $train $name
+    refused "$name: not a model file, it would be replaced" "$ggn" convert m.ggn $name
+    refused "$name: not a model file, it would be replaced" "$ggn" baseline attributes -d "$data" -o $name
 done
 echo mine >new.ggn.ckpt
-refused "new.ggn.ckpt: this is no model file and would be replaced" $train new.ggn
+refused "new.ggn.ckpt: not a model file, it would be replaced" $train new.ggn
 refused "m.ggn: this is an input" "$ggn" train -d "$data" --init m.ggn --out m.ggn
 cp m.ggn begin.ggn.png
 refused "begin.ggn.png: this is an input" "$ggn" train -d "$data" --init begin.ggn.png --out begin.ggn
 t "a checkpoint replaces a checkpoint, and an empty file" sh -c "for i in 1 2; do $P room.pbrt -q --spp 1 -o k.exr --checkpoint empty.ckp --checkpoint-every 0 || exit 1; done"
-refused "m.ggn: this is no checkpoint" "$P" room.pbrt -q -c ggn -p model=m.ggn --checkpoint m.ggn
+refused "m.ggn: not a checkpoint" "$P" room.pbrt -q -c ggn -p model=m.ggn --checkpoint m.ggn
 cp m.ggn m.png
 refused "m.png: this is an input (m.png)" "$P" room.pbrt -q -c ggn -p model=m.png --preview ./m.png
 oiiotool --pattern constant:color=1,1,1 4x4 3 -d half -o room.exr

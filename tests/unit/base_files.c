@@ -1,5 +1,6 @@
 /* Files, the inputs of a result, folders that one process writes to, JSON, small floats, what is said of processes: each function in
  * closed cases, each refusal word for word. */
+#include <errno.h>
 #include <math.h>
 #include <setjmp.h>
 #include <signal.h>
@@ -218,6 +219,14 @@ static void a_failed_write_keeps_the_old_file(void **state)
     int rc = base_file_commit(&out, &err);
     setrlimit(RLIMIT_FSIZE, &before);
     says(rc, BASE_EIO, &err, "out: write failed: File too large");
+    static char big[100000]; /* fails before commit, which must still know why */
+    assert_int_equal(base_file_begin(&out, "out", &err), 0);
+    setrlimit(RLIMIT_FSIZE, &little);
+    assert_true(fwrite(big, 1, sizeof big, out.file) < sizeof big);
+    errno = 0;
+    rc = base_file_commit(&out, &err);
+    setrlimit(RLIMIT_FSIZE, &before);
+    says(rc, BASE_EIO, &err, "out: write failed: File too large");
     assert_string_equal(get("out"), "old");
     assert_int_equal(access(out.tmp_path, F_OK), -1);
 }
@@ -319,8 +328,8 @@ static void one_file_or_two(void **state)
     put("nothing", "");
     assert_true(base_file_check_kind(NULL, &kind, &err) == 0 && base_file_check_kind("none", &kind, &err) == 0);
     assert_true(base_file_check_kind("diary", &kind, &err) == 0 && base_file_check_kind("nothing", &kind, &err) == 0);
-    says(base_file_check_kind("short", &kind, &err), BASE_EINVAL, &err, "short: this is no diary and would be replaced; choose another name");
-    says(base_file_check_kind("soft", &kind, &err), BASE_EINVAL, &err, "soft: this is no diary and would be replaced; choose another name");
+    says(base_file_check_kind("short", &kind, &err), BASE_EINVAL, &err, "short: not a diary, it would be replaced; choose another name");
+    says(base_file_check_kind("soft", &kind, &err), BASE_EINVAL, &err, "soft: not a diary, it would be replaced; choose another name");
 }
 
 /* --- inputs -------------------------------------------------------------------------------------------------------------- */
