@@ -7,19 +7,20 @@
 struct teller {
     void (*warn)(void *data, const char *line);
     void *data;
+    int32_t level; /* of what is passed on, LULL_LOG_ */
 };
 
 static void tell(void *context, int32_t level, const char *text)
 {
     const struct teller *t = context;
-    if (t->warn && level <= LULL_LOG_WARNING)
+    if (t->warn && level <= t->level)
         t->warn(t->data, text);
 }
 
 int pt_criterion_find(const char *spec, struct base_inputs *inputs, void (*warn)(void *data, const char *line),
                       void *warn_data, const struct lull_criterion **out, struct base_err *err)
 {
-    struct teller teller = {warn, warn_data};
+    struct teller teller = {warn, warn_data, LULL_LOG_WARNING};
     struct lull_search search = {.log = tell, .log_context = &teller};
     struct lull_error e = {.struct_size = sizeof e};
     struct lull_found found;
@@ -63,7 +64,7 @@ static int32_t list_one(void *context, const struct lull_found *found)
 
 int pt_criterion_list(FILE *out, void (*warn)(void *data, const char *line), void *warn_data)
 {
-    struct teller teller = {warn, warn_data};
+    struct teller teller = {warn, warn_data, LULL_LOG_ERROR}; /* what loading does to this process, nobody asked */
     struct lull_search search = {.log = tell, .log_context = &teller};
     struct listing listing = {.out = out};
     lull_list(&search, list_one, &listing);

@@ -39,7 +39,20 @@ static struct lull_host_forecast look(const struct pt_render *r, double *wall_s)
     return f;
 }
 
-void pt_progress_text(const struct pt_render *r, char *text, size_t room)
+/* The share done, which never falls: a prediction that grows holds it where it was. What is only a lower bound says so, and
+ * says nothing while it is below a hundredth. */
+static void format_share(double *percent_shown, double share, int known, char *text, size_t room)
+{
+    double percent = floor(100.0 * share);
+    int is_bound = !known && percent >= *percent_shown;
+    *percent_shown = fmax(*percent_shown, percent);
+    if (is_bound && percent < 1.0)
+        snprintf(text, room, "  ?%%");
+    else
+        snprintf(text, room, "%s%3.0f%%", is_bound ? ">=" : "", *percent_shown);
+}
+
+void pt_progress_text(const struct pt_render *r, double *percent_shown, char *text, size_t room)
 {
     double elapsed_s = r->totals->render_s + r->totals->criterion_s, left_s;
     struct lull_host_forecast o = look(r, &left_s);
@@ -52,14 +65,15 @@ void pt_progress_text(const struct pt_render *r, char *text, size_t room)
             share = fmin(1.0, elapsed_s / r->config.time_budget_s);
         }
     }
-    char left[32] = "unknown";
+    char left[32] = "unknown", done[16];
+    format_share(percent_shown, share, known, done, sizeof done);
     if (isfinite(left_s))
         format_time(left_s, left, sizeof left);
     if (o.active == 0)
         o.low = 0;
-    snprintf(text, room, "%s%3.0f%%  %u of %u blocks active  spp %llu..%llu  %.2f Mpaths/s  ETA %s%s", known ? "" : ">=",
-             floor(100.0 * share), o.active, r->blocks->count, (unsigned long long)o.low, (unsigned long long)o.high,
-             r->samples_per_s * 1e-6, known || !isfinite(left_s) ? "" : "at most ", left);
+    snprintf(text, room, "%s  %u of %u blocks active  spp %llu..%llu  %.2f Mpaths/s  ETA %s%s", done, o.active,
+             r->blocks->count, (unsigned long long)o.low, (unsigned long long)o.high, r->samples_per_s * 1e-6,
+             known || !isfinite(left_s) ? "" : "at most ", left);
 }
 
 void pt_progress_update(struct pt_progress *p, const struct pt_render *r)
@@ -68,7 +82,10 @@ void pt_progress_update(struct pt_progress *p, const struct pt_render *r)
     if (!p->out || now_s < p->next_s)
         return;
     char text[256];
-    pt_progress_text(r, text, sizeof text);
+    if (r->totals->samples < p->samples)
+        p->percent = 0.0; /* another render */
+    p->samples = r->totals->samples;
+    pt_progress_text(r, &p->percent, text, sizeof text);
     if (p->terminal)
         fprintf(p->out, "\r%s\033[K", text);
     else

@@ -1,7 +1,7 @@
 /*
  * The live line of a render: share done, active blocks, their range of samples, speed, time left. On a terminal it is
  * redrawn in place, elsewhere it is a plain line now and then. What is not known is said so: without predictions of the
- * criterion, the share is a lower bound and the time an upper one. Where blocks stop is predicted as for
+ * criterion, the share is a lower bound ("?" below 1 %) and the time an upper one. Where blocks stop is predicted as for
  * --quote (outlook.h).
  */
 #ifndef PT_RENDER_PROGRESS_H
@@ -16,6 +16,8 @@ struct pt_progress {
     int terminal;
     double next_s;  /* wall time of the next line */
     int shown;      /* a live line stands on the screen */
+    double percent; /* of the work, as the last line said … */
+    uint64_t samples; /* … when the render had so many */
 };
 
 void pt_progress_init(struct pt_progress *progress, FILE *out);
@@ -24,7 +26,7 @@ void pt_progress_update(struct pt_progress *progress, const struct pt_render *re
 /* Clears the live line, so that other text may be printed. */
 void pt_progress_clear(struct pt_progress *progress);
 
-/* The line itself, without newline. */
-void pt_progress_text(const struct pt_render *render, char *text, size_t room);
+/* The line itself, without newline. *percent: what the line before said, at first 0; it never falls. */
+void pt_progress_text(const struct pt_render *render, double *percent, char *text, size_t room);
 
 #endif

@@ -269,7 +269,7 @@ int32_t lull_list(const struct lull_search *search, int32_t (*visit)(void *conte
         uint32_t count;
         struct lull_error err = {.struct_size = sizeof err};
         if (load_library(search, list.items[i].path, &entry, &count, &err) != LULL_OK) {
-            say(search, LULL_LOG_WARNING, "skipped: %s", err.message);
+            say(search, LULL_LOG_ERROR, "skipped: %s", err.message);
             continue;
         }
         snprintf(found->path, sizeof found->path, "%s", list.items[i].path);

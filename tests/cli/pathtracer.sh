@@ -14,6 +14,11 @@ t "--help" sh -c "$P --help | grep -q -- --time-budget"
 t "--usage" sh -c "$P --usage | grep -q -- --criterion"
 t "--version" sh -c "$P --version | grep -q 1.0"
 t "--list-criteria succeeds" "$P" --list-criteria
+"$P" --list-criteria 2>said >listed
+t "  …and says nothing besides" test ! -s said
+mkdir broken && echo text >broken/bad.so
+LULL_PLUGIN_PATH=$PWD/broken "$P" --list-criteria 2>said >listed
+t "  …but of a library that it skips" sh -c "[ \$(wc -l <said) -eq 1 ] && grep -q 'skipped: .*bad.so' said"
 t "--list-criteria names criteria and parameters" sh -c "$P --list-criteria | grep -q '^halfbuf ' && $P --list-criteria | grep -q -- '-p threshold='"
 
 t "--visible is a share that observer, ggn and the three baselines know" sh -c "[ \"\$($P --list-criteria | grep -c -e '-p visible=')\" = 5 ]"

@@ -439,6 +439,7 @@ static void progress_lines(void **state)
 {
     (void)state;
     struct pt_progress p;
+    double percent = 0;
     char line[300], expected[300], *text = NULL;
     size_t n;
     FILE *out = open_memstream(&text, &n), *null = fopen("/dev/null", "w");
@@ -446,7 +447,7 @@ static void progress_lines(void **state)
     pt_progress_init(&p, null);
     double now_s = base_clock_wall_s();
     assert_true(!p.terminal && p.next_s > now_s + 1 && p.next_s <= now_s + 2 && !p.shown);
-    pt_progress_text(render, line, sizeof line);
+    pt_progress_text(render, &percent, line, sizeof line);
     assert_string_equal(line + strlen(line) - 8, "ETA 0:00");
     for (int terminal = 0; terminal < 2; terminal++) {
         rewind(out);
@@ -476,6 +477,7 @@ static void progress_lines(void **state)
 static void progress_is_honest(void **state)
 {
     (void)state;
+    double percent = 0;
     char text[256];
     struct pt_render r = *render;
     struct lull_host_block list[2] = {{.x1 = 10, .y1 = 10, .spp = 100, .next_spp = 120, .asked = 1, .asked_spp = 100,
@@ -489,25 +491,36 @@ static void progress_is_honest(void **state)
     r.busy_threads = 1.5; /* of 2 */
     r.sampled_rows = 20;
     r.totals->checks = 0;
-    pt_progress_text(&r, text, sizeof text);
+    pt_progress_text(&r, &percent, text, sizeof text);
     assert_string_equal(text, " 57%  1 of 2 blocks active  spp 100..100  0.00 Mpaths/s  ETA 0:20");
+    list[0].predicted_spp = 400; /* a prediction grows */
+    pt_progress_text(&r, &percent, text, sizeof text);
+    assert_string_equal(text, " 57%  1 of 2 blocks active  spp 100..100  0.00 Mpaths/s  ETA 1:00");
     list[0].predicted_spp = (double)NAN;
-    pt_progress_text(&r, text, sizeof text);
+    pt_progress_text(&r, &percent, text, sizeof text);
+    assert_string_equal(text, " 57%  1 of 2 blocks active  spp 100..100  0.00 Mpaths/s  ETA at most 3:00");
+    percent = 0;
+    blocks.spp_max = 40100; /* 40 thread seconds of 12,040 */
+    pt_progress_text(&r, &percent, text, sizeof text);
+    assert_string_equal(text, "  ?%  1 of 2 blocks active  spp 100..100  0.00 Mpaths/s  ETA at most 2:13:20");
+    blocks.spp_max = 1000;
+    pt_progress_text(&r, &percent, text, sizeof text);
     assert_string_equal(text, ">= 12%  1 of 2 blocks active  spp 100..100  0.00 Mpaths/s  ETA at most 3:00");
+    percent = 0;
     r.samples_per_s = 12.5e6;
     list[0].spp = 97; /* 310 thread seconds of 310 + 903 · 300 / 97 */
     list[0].thread_s = 300.0;
-    pt_progress_text(&r, text, sizeof text);
+    pt_progress_text(&r, &percent, text, sizeof text);
     assert_string_equal(text, ">=  9%  1 of 2 blocks active  spp 97..97  12.50 Mpaths/s  ETA at most 31:02");
     list[0].thread_s = 3000.0; /* 903 · 3000 / 97 thread seconds of 1.5 threads */
-    pt_progress_text(&r, text, sizeof text);
+    pt_progress_text(&r, &percent, text, sizeof text);
     assert_string_equal(text, ">=  9%  1 of 2 blocks active  spp 97..97  12.50 Mpaths/s  ETA at most 5:10:19");
     r.totals->checks = 4; /* 2 s each: one at 120, 11.6 more in steps of 1.2 */
     r.totals->criterion_s = 8.0;
-    pt_progress_text(&r, text, sizeof text);
+    pt_progress_text(&r, &percent, text, sizeof text);
     assert_string_equal(text, ">=  9%  1 of 2 blocks active  spp 97..97  12.50 Mpaths/s  ETA at most 5:10:44");
     blocks.flags = LULL_HOST_UNIFORM; /* nobody is asked */
-    pt_progress_text(&r, text, sizeof text);
+    pt_progress_text(&r, &percent, text, sizeof text);
     assert_string_equal(text, "  9%  1 of 2 blocks active  spp 97..97  12.50 Mpaths/s  ETA 5:10:19");
     blocks.flags = 0;
     list[1].reason = LULL_REASON_NONE;
@@ -517,21 +530,21 @@ static void progress_is_honest(void **state)
     list[0].thread_s = 97.0;
     list[1].thread_s = 50.0;
     r.totals->checks = 0;
-    pt_progress_text(&r, text, sizeof text); /* 53 s and 100 s of thread time on 1.5 threads */
+    pt_progress_text(&r, &percent, text, sizeof text); /* 53 s and 100 s of thread time on 1.5 threads */
     assert_string_equal(text, " 49%  2 of 2 blocks active  spp 50..97  12.50 Mpaths/s  ETA 1:42");
     r.config.time_budget_s = totals.render_s + totals.criterion_s + 4.0;
-    pt_progress_text(&r, text, sizeof text);
+    pt_progress_text(&r, &percent, text, sizeof text);
     assert_non_null(strstr(text, "0:04"));
     r.totals->render_s = 92.0; /* 100 s with the criterion's */
     r.config.time_budget_s = 125.0;
-    pt_progress_text(&r, text, sizeof text);
+    pt_progress_text(&r, &percent, text, sizeof text);
     assert_string_equal(text, " 80%  2 of 2 blocks active  spp 50..97  12.50 Mpaths/s  ETA 0:25");
     r.config.time_budget_s = 80.0;
-    pt_progress_text(&r, text, sizeof text);
+    pt_progress_text(&r, &percent, text, sizeof text);
     assert_string_equal(text, "100%  2 of 2 blocks active  spp 50..97  12.50 Mpaths/s  ETA 0:00");
     r.config.time_budget_s = 0.0;
     r.busy_threads = 0.0;
-    pt_progress_text(&r, text, sizeof text);
+    pt_progress_text(&r, &percent, text, sizeof text);
     assert_non_null(strstr(text, "ETA unknown"));
 }
 
