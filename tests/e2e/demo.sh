@@ -55,5 +55,26 @@ t "its blocks differ by four times in samples at least" \
 t "three pictures side by side" sh -c "oiiotool --info $dir/own/three.png | grep -q ' 736 x *240'"
 t "the sky has no visible noise, a frame is round a block that has" sh -c "oiiotool $dir/own/visible.png --cut 50x50+5+5 --printstats |
     awk '/Stats Avg/ {exit !(\$3 < 0.05)}' && oiiotool $dir/own/visible.png --cut 240x1+0+121 --printstats | grep -q 'Stats Max: 1.0* 1.0* 1.0*'"
+# its price comes first, no clock ends it, Ctrl-C does and keeps what is there
+t "it has no limit" sh -c "! grep -n 'time-budget' scripts/demo"
+cat >"$dir/press.py" <<'P'
+# press.py FOLDER: the demo of an image that would take for ever, Ctrl-C once the preview is there
+import os, signal, subprocess, sys, time
+env = dict(os.environ, DEMO_DIR=sys.argv[1], DEMO_REFERENCE="",
+           DEMO_ARGS="--size 80x80 --block 20 -c null --spp-min 100000000 --spp-max 100000000")
+demo = subprocess.Popen(["scripts/demo"], env=env, start_new_session=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler))
+while not os.path.exists(sys.argv[1] + "/demo.png") and demo.poll() is None:
+    time.sleep(0.1)
+os.killpg(demo.pid, signal.SIGINT)
+said = demo.communicate()[0]
+files = sorted(os.listdir(sys.argv[1]))
+print(demo.returncode, files, said)
+price, picture = said.index("viewers who still see noise"), said.index("demo: rendering it")
+assert demo.returncode == 130 and price < picture < said.index("demo: interrupted")
+assert files == ["demo.exr", "demo.png", "report.json", "stop-map.csv", "stop-map.png"], files
+P
+t "Ctrl-C keeps what is there" python3 "$dir/press.py" "$dir/pressed"
+t "  …a whole image" oiiotool --info "$dir/pressed/demo.exr"
 echo "1..$n"
 exit $bad
