@@ -202,8 +202,30 @@ t "resumed and stopped at once" "$P" $endless --time-budget 0.0001 --resume --re
 t "  …where it was, and not at the beginning" holds "$(total before.json spp) > 6 * 4 && $(total after.json spp) >= $(total before.json spp)"
 t "--checkpoint-every" "$P" $long --checkpoint d.ckp --checkpoint-every 0.1 -o part.exr
 t "  …wrote one" test -s d.ckp
-refused "seed=" $long --checkpoint c.ckp --resume -o part2.exr --seed 9
-refused "criterion=" "$scene" -q --size 96x64 --block 32 -c fixed --spp-min 4 --spp-max 300 --checkpoint c.ckp --resume
+cat >options <<'O'
+size=96x64, but this render has size=96x65|--size 96x65
+crop=0,0,96,64, but this render has crop=0,0,90,60|--crop 0,0,90,60
+block=32x32, but this render has block=16x16|--block 16
+spp-min=4, but this render has spp-min=5|--spp-min 5
+spp-max=300, but this render has spp-max=301|--spp-max 301
+max-seam=0, but this render has max-seam=2|--max-seam 2
+aov=0, but this render has aov=|--aov depth
+seed=0, but this render has seed=9|--seed 9
+sampler=0, but this render has sampler=1|--sampler sobol
+integrator=0, but this render has integrator=1|--integrator bsdf-only
+filter=2:1.5x1.5:0.5, but this render has filter=0:0.5x0.5:0.5|--filter box
+light-selection=hierarchy, but this render has light-selection=power|--light-selection power
+max-depth=5, but this render has max-depth=4|--max-depth 4
+fov=0, but this render has fov=30|--fov 30
+look-at=, but this render has look-at=0 1 3 0 1 0 0 1 0|--look-at "0 1 3 0 1 0 0 1 0"
+criterion=null 1.0, but this render has criterion=fixed 1.0|-c fixed
+O
+while IFS='|' read -r words option; do # every option that makes another image is refused by its name
+    eval "refused \"made with \$words\" $long --checkpoint c.ckp --resume -o part2.exr $option"
+done <options
+"$P" $scene -q --spp-min 4 --spp-max 8 --checkpoint dial.ckp --checkpoint-every 0 -o part2.exr
+refused "dial.ckp: made without param, but this render has param=visible=0.5" "$scene" -q --spp-min 4 --spp-max 8 --checkpoint dial.ckp --resume --visible 0.5
+rm -f part2.exr
 head -c 5000 c.ckp >short.ckp
 refused "damaged or cut off" $long --checkpoint short.ckp --resume
 cp c.ckp flip.ckp && printf 'X' | dd of=flip.ckp bs=1 seek=3000 conv=notrunc 2>/dev/null

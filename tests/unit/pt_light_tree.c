@@ -150,6 +150,70 @@ static void lights_are_weighed(void **state)
     test_scene_end(&s);
 }
 
+/* Nine spots, side by side and down: outside of their cones the lamp far above is all that is left, at every level of the
+ * hierarchy; inside they are selected. An area light sends as far as a quarter turn from its normal. */
+static void cones_end(void **state)
+{
+    (void)state;
+    enum { SPOTS = 9 };
+    struct pt_scene s;
+    test_scene_begin(&s);
+    for (int i = 0; i < SPOTS; i++) {
+        struct pt_light spot = {.kind = PT_LIGHT_SPOT, .shape = -1, .image = -1, .emission = {3, 2, 1}, .direction = {0, 0, -1},
+                                .position = {0.001f * (float)i, 0, 0}, .cos_total = cosf(0.6f), .cos_start = cosf(0.2f)};
+        test_add_light(&s, &spot);
+    }
+    struct pt_light lamp = {.kind = PT_LIGHT_POINT, .shape = -1, .image = -1, .emission = {1, 1, 1}, .position = {0, 0, 50}};
+    test_add_light(&s, &lamp);
+    test_scene_finish(&s);
+    for (int degree = 0; degree < 180; degree += 3) {
+        float a = (float)degree * PT_PI / 180.0f, spots = 0;
+        struct pt_receiver at = {{5 * sinf(a), 0, -5 * cosf(a)}, {0, 0, 0}, PT_RECEIVER_VOLUME};
+        for (int e = 0; e < s.emitter_count; e++)
+            spots += s.lights[s.emitters[e].light].kind == PT_LIGHT_SPOT ? pt_light_tree_pmf(&s, &at, e) : 0;
+        if (fabsf(a - 0.6f) < 0.02f) /* where they end, some slack is allowed */
+            continue;
+        assert_true(a < 0.6f ? spots > 0.9f : spots == 0.0f);
+        for (int i = 0; i < 64; i++) {
+            float pmf;
+            int32_t e = pt_light_tree_pick(&s, &at, ((float)i + 0.5f) / 64, &pmf);
+            assert_true(e >= 0); /* nobody goes where nothing is left */
+        }
+    }
+    test_scene_end(&s);
+
+    test_scene_begin(&s);
+    int32_t black = test_add_diffuse(&s, v3_splat(0.0f));
+    for (int i = 0; i < 2; i++) /* towards +z */
+        test_add_area_light(&s, test_add_quad(&s, black, v3((float)i, 0, 0), v3(0.01f, 0, 0), v3(0, 0.01f, 0)), v3_splat(1.0f), 0);
+    test_scene_finish(&s);
+    for (int degree = 0; degree < 180; degree += 7) {
+        float a = (float)degree * PT_PI / 180.0f, sum = 0;
+        struct pt_receiver at = {{50 * sinf(a), 0, 50 * cosf(a)}, {0, 0, 0}, PT_RECEIVER_VOLUME};
+        for (int e = 0; e < s.emitter_count; e++)
+            sum += pt_light_tree_pmf(&s, &at, e);
+        assert_true(degree < 90 ? fabsf(sum - 1.0f) < 1e-5f : sum == 0.0f);
+    }
+    test_scene_end(&s);
+
+    test_scene_begin(&s); /* narrow and wide in one node: it is as wide as the widest */
+    black = test_add_diffuse(&s, v3_splat(0.0f));
+    for (int i = 0; i < 12; i++) {
+        pt_vec3 p = v3(0.001f * (float)i, 0, 0);
+        struct pt_light spot = {.kind = PT_LIGHT_SPOT, .shape = -1, .image = -1, .emission = {3, 2, 1}, .direction = {0, 0, 1},
+                                .position = p, .cos_total = 0.99f, .cos_start = 0.999f};
+        if (i % 2)
+            test_add_light(&s, &spot);
+        else
+            test_add_area_light(&s, test_add_quad(&s, black, p, v3(1e-4f, 0, 0), v3(0, 1e-4f, 0)), v3_splat(1.0f), 0);
+    }
+    test_scene_finish(&s);
+    const struct pt_receiver aside = {{5, 0, 2}, {0, 0, 0}, PT_RECEIVER_VOLUME};
+    for (int e = 0; e < s.emitter_count; e++)
+        assert_true((pt_light_tree_pmf(&s, &aside, e) > 0.0f) == (s.lights[s.emitters[e].light].kind == PT_LIGHT_AREA));
+    test_scene_end(&s);
+}
+
 static void power_has_no_hierarchy(void **state)
 {
     (void)state;
@@ -169,7 +233,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(frequencies_are_probabilities), cmocka_unit_test(nothing_that_arrives_is_cut_off),
-        cmocka_unit_test(lights_are_weighed), cmocka_unit_test(power_has_no_hierarchy),
+        cmocka_unit_test(lights_are_weighed), cmocka_unit_test(cones_end),
+        cmocka_unit_test(power_has_no_hierarchy),
     };
     print_message("seeds 3, 17, 23\n");
     return cmocka_run_group_tests(tests, NULL, NULL);

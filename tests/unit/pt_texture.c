@@ -5,7 +5,9 @@
 
 #include <cmocka.h>
 
+#include "scene/scene.h"
 #include "shade/texture.h"
+#include "support/pt_text_scene.h"
 
 static int near(float a, float b) { return fabsf(a - b) < 1e-5f; }
 static int near3(pt_vec3 a, float x, float y, float z) { return near(a.x, x) && near(a.y, y) && near(a.z, z); }
@@ -92,6 +94,37 @@ static void kinds_of_texture(void **state)
     assert_true(near(pt_texture_eval(&scene, 7, 0.5f, 0.25f).x, 0.7f));
 }
 
+/* Whatever reads coordinates reads them at (su u + du, sv v + dv), as the file says them. */
+static void scale_and_offset(void **state)
+{
+    (void)state;
+    struct pt_scene *s = world_scene(
+        "Texture \"plane\" \"spectrum\" \"bilerp\" \"rgb v00\" [0 0 0] \"rgb v01\" [1 1 1] \"rgb v10\" [2 2 2] \"rgb v11\" [3 3 3]\n"
+        "  \"float uscale\" 0.5 \"float vscale\" 0.25 \"float udelta\" 0.125 \"float vdelta\" 0.375\n"
+        "Material \"diffuse\" \"texture reflectance\" \"plane\" Shape \"sphere\"\n");
+    assert_int_equal(s->texture_count, 1);
+    const struct pt_texture *t = &s->textures[0];
+    assert_true(t->su == 0.5f && t->sv == 0.25f && t->du == 0.125f && t->dv == 0.375f);
+    static const float at[][2] = {{0, 0}, {1, 0}, {0, 1}, {0.5f, 0.75f}};
+    for (int i = 0; i < 4; i++) { /* 2 s + w on the plane through its corners */
+        float plane = 2.0f * (0.5f * at[i][0] + 0.125f) + (0.25f * at[i][1] + 0.375f);
+        assert_true(near(pt_texture_eval(s, 1, at[i][0], at[i][1]).y, plane));
+    }
+    pt_scene_destroy(s);
+    /* an image: texel (1, 0) of the lower row, from the centre of the upper left one and there by du and dv alone */
+    struct pt_texture moved = {.kind = PT_TEXTURE_IMAGE, .wrap = PT_WRAP_REPEAT, .scale = 1, .su = 1, .sv = 1, .du = 0.5f, .dv = -0.5f};
+    struct pt_scene scene = {.images = images, .textures = &moved, .image_count = 1, .texture_count = 1};
+    assert_true(near3(pt_texture_eval(&scene, 1, 0.25f, 0.75f), 1, 1, 1)); /* white */
+    moved.du = 0;
+    assert_true(near3(pt_texture_eval(&scene, 1, 0.25f, 0.75f), 0, 0, 1)); /* blue, below */
+    moved.dv = 0;
+    assert_true(near3(pt_texture_eval(&scene, 1, 0.25f, 0.75f), 1, 0, 0));
+    /* a checkerboard of half a square upwards */
+    struct pt_texture board = {.kind = PT_TEXTURE_CHECKERBOARD, .su = 1, .sv = 1, .dv = 0.5f, .in = {CONST(1.0f), CONST(2.0f)}};
+    scene.textures = &board;
+    assert_true(near(pt_texture_eval(&scene, 1, 0.5f, 0.4f).x, 1) && near(pt_texture_eval(&scene, 1, 0.5f, 0.6f).x, 2));
+}
+
 static void constants_never_enter_texture_code(void **state)
 {
     (void)state;
@@ -115,6 +148,7 @@ int main(void)
         cmocka_unit_test(bytes_are_linearised),
         cmocka_unit_test(bilinear_interpolates_between_centres),
         cmocka_unit_test(kinds_of_texture),
+        cmocka_unit_test(scale_and_offset),
         cmocka_unit_test(constants_never_enter_texture_code),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
