@@ -56,7 +56,7 @@ GGN_LIBS := -lopenblas -llapacke -lsvm -lcjson -lpng -lz -ldl -lm
 
 # --- include paths: the dependency arrows --------------------------------------------------------------------------------
 API := -Iplugin-api/include
-BASE := -Iplugin-api# "base/…" and "sequence/…": what both programs stand on; no part of the ABI
+BASE := -Iplugin-api# "base/…", "sequence/…" and "denoise/…": what both programs stand on; no part of the ABI
 INC_plugin-api         := $(API)
 INC_plugin-api_base    := $(BASE)
 INC_plugin-api_mpi     := $(BASE) $(MPI_CFLAGS)# the only folder that knows MPI
@@ -73,7 +73,7 @@ INC_tests_api          := -Itests -Itests/support $(API)
 INC_tests_host         := $(INC_tests_api) $(BASE)# api_host_: the host library from inside
 
 # --- sources -------------------------------------------------------------------------------------------------------------
-BASE_SRC    := $(wildcard plugin-api/base/*.c plugin-api/sequence/*.c)
+BASE_SRC    := $(wildcard plugin-api/base/*.c plugin-api/sequence/*.c plugin-api/denoise/*.c)
 LOADER_SRC  := $(wildcard plugin-api/src/*.c)
 HOST_SRC    := $(wildcard plugin-api/host/*.c)
 EXAMPLE_SRC := $(wildcard plugin-api/examples/*.c)
@@ -89,7 +89,7 @@ GGN_TWICE   := $(shell grep -ls '"nn/real.h"' ggn/nn/*.c ggn/model/*.c tests/sup
 GGN_PLUGIN  := $(wildcard ggn/plugin/*.c)
 GGN_STUDY   := $(wildcard ggn/study/*.c)# the only user of STUDY_LIBS: not in ggn.so
 GGN_CLI     := $(wildcard ggn/cli/*.c)
-# Tests name what they test by prefix: pt_ (path tracer), ggn_, api_ (plugin-api), base_ (plugin-api/base and sequence).
+# Tests name what they test by prefix: pt_ (path tracer), ggn_, api_ (plugin-api), base_ (plugin-api/base, sequence, denoise).
 TEST_SRC    := $(wildcard tests/unit/*.c tests/grad/*.c tests/golden/*.c tests/stat/*.c tests/abi/*.c tests/hard/*.c tests/oom/*.c)
 # The subset that also runs under ASan+UBSan in `make test`.
 SANE_SRC    := $(wildcard tests/unit/*.c tests/abi/*.c tests/oom/*.c)
@@ -129,7 +129,7 @@ all: $(PROGRAMS) $(CRITERIA) $(MODULES) $(HOST_LIB) $(EXAMPLES) ## build the pro
 
 # --- compiling: one rule, flags by folder --------------------------------------------------------------------------------
 inc = $(or $(strip \
-  $(if $(filter plugin-api/%,$(1)),$(if $(filter plugin-api/base/% plugin-api/sequence/%,$(1)),$(INC_plugin-api_base),$(if $(filter plugin-api/tools/%,$(1)),$(INC_plugin-api_tools),$(if $(filter plugin-api/host/%,$(1)),$(INC_plugin-api_host),$(if $(filter plugin-api/mpi/%,$(1)),$(INC_plugin-api_mpi),$(INC_plugin-api)))))) \
+  $(if $(filter plugin-api/%,$(1)),$(if $(filter plugin-api/base/% plugin-api/sequence/% plugin-api/denoise/%,$(1)),$(INC_plugin-api_base),$(if $(filter plugin-api/tools/%,$(1)),$(INC_plugin-api_tools),$(if $(filter plugin-api/host/%,$(1)),$(INC_plugin-api_host),$(if $(filter plugin-api/mpi/%,$(1)),$(INC_plugin-api_mpi),$(INC_plugin-api)))))) \
   $(if $(filter pathtracer/%,$(1)),$(if $(filter pathtracer/render/% $(PT_MAIN) $(wildcard pathtracer/*.h),$(1)),$(INC_pathtracer_host),$(INC_pathtracer))) \
   $(if $(filter ggn/%,$(1)),$(if $(filter ggn/plugin/%,$(1)),$(INC_ggn_plugin),$(INC_ggn))) \
   $(if $(filter tests/%,$(1)),$(if $(filter pt_%,$(notdir $(1))),$(INC_tests_pt),$(if $(filter ggn_%,$(notdir $(1))),$(INC_tests_ggn),$(if $(filter base_%,$(notdir $(1))),$(INC_tests_base),$(if $(filter api_host_%,$(notdir $(1))),$(INC_tests_host),$(INC_tests_api))))))),)
@@ -216,6 +216,11 @@ $(foreach d,unit grad golden stat abi hard oom,$(eval $(call test_rules,$(d))))
 $(TESTS) $(SANE): | $(OUT)/tests/lib
 $(OUT)/tests/lib: | $(MODULES)
 	@mkdir -p $(@D); ln -sfn ../lib $@
+# A denoiser whose answers are known, in the place of Open Image Denoise.
+OIDN_STUB := $(OUT)/tests/oidn-stub/libOpenImageDenoise.so.2
+$(OIDN_STUB): $(OBJ)/tests/stub/oidn.c.o
+	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared $< $(LDFLAGS_ALL) -lm -o $@
+$(TESTS) $(SANE): | $(OIDN_STUB)
 # Criteria for the tests of the loader and of lull-check, most of them broken on purpose.
 ABI_PLUGINS := $(patsubst tests/%.c,$(OUT)/tests/%.so,$(wildcard tests/abi/plugins/*.c))
 $(OUT)/tests/abi/plugins/%.so: $(OBJ)/tests/abi/plugins/%.c.o
@@ -238,7 +243,7 @@ $(OUT)/bench/ggn_%: $(OBJ)/tests/bench/ggn_%.c.o $(GGN_OBJ) $(SUPPORT_ggn)
 setup: ## install the Debian packages that are missing
 	@scripts/setup
 
-tests: $(TESTS) $(ABI_PLUGINS)
+tests: $(TESTS) $(ABI_PLUGINS) $(OIDN_STUB)
 replay: $(REPLAY)
 
 # `test` builds in sub-makes so that packages installed by setup are seen by pkg-config.

@@ -1,12 +1,15 @@
+#define _GNU_SOURCE /* dladdr */
 #include "denoise/oidn.h"
 
 #include <dlfcn.h>
+#include <float.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 /* Of the library's C interface, version 2: what is used here. */
 enum { DEVICE_CPU = 1, FORMAT_FLOAT3 = 3, ERROR_MEMORY = 4, ERROR_CANCELLED = 6, MAJOR_VERSION = 2 };
@@ -38,8 +41,8 @@ struct lull_oidn {
 };
 
 static const char *const how_to_get_it =
-    "scripts/setup --denoiser puts it into build/oidn; or install Open Image Denoise 2 or the Python package pyoidn, and give "
-    "its library by LULL_OIDN=FILE";
+    "scripts/setup --denoiser puts it into build/oidn; or install Open Image Denoise 2 and name its library by "
+    "LULL_OIDN=FILE";
 
 /* --- finding ----------------------------------------------------------------------------------------------------------- */
 
@@ -62,15 +65,24 @@ static void *open_at(const char *path)
     return library;
 }
 
-/* oidn/ beside the library that this code is in, or up to three folders above it. */
-static void *open_nearby(void)
+/* The file that this code is in; a program that was found by PATH only knows its own name. 0: no telling. */
+static int own_file(char *path, size_t room)
 {
     Dl_info here;
+    if (dladdr((const void *)&file_name, &here) && here.dli_fname && strchr(here.dli_fname, '/'))
+        return snprintf(path, room, "%s", here.dli_fname) < (int)room;
+    ssize_t n = readlink("/proc/self/exe", path, room - 1);
+    path[n > 0 ? n : 0] = '\0';
+    return n > 0;
+}
+
+/* oidn/ beside the file that this code is in, or up to three folders above it. */
+static void *open_nearby(void)
+{
     char folder[4096], path[4200];
     void *library = NULL;
-    if (!dladdr((const void *)&file_name, &here) || !here.dli_fname || strlen(here.dli_fname) >= sizeof folder)
+    if (!own_file(folder, sizeof folder))
         return NULL;
-    strcpy(folder, here.dli_fname);
     for (int up = 0; up < 4 && !library; up++) {
         char *slash = strrchr(folder, '/');
         if (!slash)
@@ -150,8 +162,10 @@ static int check(const struct lull_oidn *o, const char *doing, struct base_err *
 static int make_device(struct lull_oidn *o, int threads, struct base_err *err)
 {
     o->device = o->new_device(DEVICE_CPU); /* a GPU would give other bits */
-    if (!o->device)
-        return check(o, "make a device", err) ? err->code : base_fail(err, BASE_EINVAL, "Open Image Denoise has no CPU device");
+    if (!o->device) {
+        int why = check(o, "make a device", err);
+        return why ? why : base_fail(err, BASE_EINVAL, "Open Image Denoise has no CPU device");
+    }
     if (threads > 0)
         o->set_device_int(o->device, "numThreads", threads);
     o->set_device_bool(o->device, "setAffinity", false); /* the threads are the host's guests */
@@ -162,15 +176,14 @@ static int make_device(struct lull_oidn *o, int threads, struct base_err *err)
     int major = o->get_device_int(o->device, "versionMajor");
     snprintf(o->version, sizeof o->version, "%d.%d.%d", major, o->get_device_int(o->device, "versionMinor"),
              o->get_device_int(o->device, "versionPatch"));
-    return major == MAJOR_VERSION ? 0 : base_fail(err, BASE_EINVAL, "Open Image Denoise is of version %s: version 2 is needed",
-                                                  o->version);
+    if (major == MAJOR_VERSION)
+        return 0;
+    return base_fail(err, BASE_EINVAL, "Open Image Denoise is of version %s: version 2 is needed", o->version);
 }
 
 int lull_oidn_open(const char *path, int threads, struct lull_oidn **out, struct base_err *err)
 {
-    struct base_err own = {0};
     struct lull_oidn *o = calloc(1, sizeof *o);
-    err = err ? err : &own;
     if (!o)
         return base_fail_nomem(err, "Open Image Denoise");
     o->library = find(path, err);
@@ -220,48 +233,61 @@ static void clean(const float *from, size_t n, float lo, float hi, float *to)
     }
 }
 
-static void give(const struct lull_oidn *o, filter_t filter, const char *name, float *data, const struct lull_oidn_picture *p)
+static void give(const struct lull_oidn *o, filter_t filter, const char *name, float *data,
+                 const struct lull_oidn_picture *p)
 {
     o->set_image(filter, name, data, FORMAT_FLOAT3, (size_t)p->width, (size_t)p->height, 0, 3 * sizeof(float),
                  3 * sizeof(float) * (size_t)p->width);
 }
 
+/* copies: [3][n], what the filter reads. */
+static void set_up(const struct lull_oidn *o, filter_t filter, const struct lull_oidn_picture *p,
+                   enum lull_oidn_quality quality, float *copies, float *out)
+{
+    const size_t n = 3 * (size_t)p->width * (size_t)p->height;
+    clean(p->color, n, 0.0f, FLT_MAX, copies);
+    give(o, filter, "color", copies, p);
+    if (p->albedo) {
+        clean(p->albedo, n, 0.0f, 1.0f, copies + n);
+        give(o, filter, "albedo", copies + n, p);
+    }
+    if (p->albedo && p->normal) {
+        clean(p->normal, n, -1.0f, 1.0f, copies + 2 * n);
+        give(o, filter, "normal", copies + 2 * n, p);
+    }
+    give(o, filter, "output", out, p);
+    o->set_bool(filter, "hdr", true);
+    o->set_float(filter, "inputScale", (float)p->exposure); /* else an exposure of this very crop */
+    o->set_int(filter, "quality", (int)quality);
+}
+
+static int execute(const struct lull_oidn *o, filter_t filter, struct base_err *err)
+{
+    o->commit_filter(filter);
+    int rc = check(o, "prepare its filter", err);
+    if (rc)
+        return rc;
+    o->execute_filter(filter);
+    return check(o, "denoise", err);
+}
+
 int lull_oidn_run(struct lull_oidn *o, const struct lull_oidn_picture *p, enum lull_oidn_quality quality,
                   int (*cancelled)(void *data), void *data, float *out, struct base_err *err)
 {
-    const float most = 3.0e38f;
     const size_t n = 3 * (size_t)p->width * (size_t)p->height;
     struct cancel cancel = {cancelled, data};
-    struct base_err own = {0};
     float *copies = malloc(3 * n * sizeof *copies);
-    err = err ? err : &own;
     if (!copies)
         return base_fail_nomem(err, "denoising");
     filter_t filter = o->new_filter(o->device, "RT");
     int rc = check(o, "make its filter", err);
-    if (!rc && filter) {
-        clean(p->color, n, 0.0f, most, copies);
-        give(o, filter, "color", copies, p);
-        if (p->albedo) {
-            clean(p->albedo, n, 0.0f, 1.0f, copies + n);
-            give(o, filter, "albedo", copies + n, p);
-        }
-        if (p->albedo && p->normal) {
-            clean(p->normal, n, -1.0f, 1.0f, copies + 2 * n);
-            give(o, filter, "normal", copies + 2 * n, p);
-        }
-        give(o, filter, "output", out, p);
-        o->set_bool(filter, "hdr", true);
-        o->set_float(filter, "inputScale", (float)p->exposure); /* else an exposure of this very crop */
-        o->set_int(filter, "quality", quality);
+    if (!rc && !filter)
+        rc = base_fail(err, BASE_EINVAL, "Open Image Denoise makes no filter");
+    if (!rc) {
+        set_up(o, filter, p, quality, copies, out);
         if (cancelled)
             o->set_progress(filter, go_on, &cancel);
-        o->commit_filter(filter);
-        rc = check(o, "prepare its filter", err);
-        if (!rc) {
-            o->execute_filter(filter);
-            rc = check(o, "denoise", err);
-        }
+        rc = execute(o, filter, err);
     }
     if (filter)
         o->release_filter(filter);
@@ -270,4 +296,18 @@ int lull_oidn_run(struct lull_oidn *o, const struct lull_oidn_picture *p, enum l
             out[i] = copies[i];
     free(copies);
     return rc;
+}
+
+/* --- crops ------------------------------------------------------------------------------------------------------------- */
+
+struct lull_oidn_box lull_oidn_box_of(struct lull_oidn_box core, int halo, struct lull_oidn_box frame)
+{
+    struct lull_oidn_box b;
+    b.x0 = core.x0 - halo < frame.x0 ? frame.x0 : core.x0 - halo;
+    b.y0 = core.y0 - halo < frame.y0 ? frame.y0 : core.y0 - halo;
+    b.x0 -= (b.x0 - frame.x0) % LULL_OIDN_GRID;
+    b.y0 -= (b.y0 - frame.y0) % LULL_OIDN_GRID;
+    b.x1 = frame.x1 - core.x1 < halo ? frame.x1 : core.x1 + halo;
+    b.y1 = frame.y1 - core.y1 < halo ? frame.y1 : core.y1 + halo;
+    return b;
 }

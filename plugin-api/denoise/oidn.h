@@ -5,9 +5,9 @@
  * one), the loader's own path, and lib/ of the folder oidn beside the caller's library or above it (build/oidn, where
  * scripts/setup --denoiser puts it). One device holds the threads; filters are made per call.
  *
- * The same bits for every number of threads and every run on one processor. Bits differ between instruction sets. A crop
- * gives the bits of the whole picture inside if its corner lies on a multiple of LULL_OIDN_GRID of the frame and it has
- * LULL_OIDN_HALO pixels around (as far as the frame reaches); measured with 2.5.1.
+ * lull_oidn_run gives the same bits for every number of threads and for every run on one processor, but not for
+ * every instruction set. A crop gives the bits of the whole picture inside if its corner lies on a multiple of
+ * LULL_OIDN_GRID of the frame and it has LULL_OIDN_HALO pixels around (as far as the frame reaches); measured with 2.5.1.
  *
  * Calls on one struct lull_oidn must not overlap; different ones may.
  */
@@ -26,7 +26,7 @@ struct lull_oidn;
 struct lull_oidn_picture {
     int width, height;
     const float *color;           /* any exposure; negative values and what is no number count as 0 */
-    const float *albedo, *normal; /* of the first non-specular hit; [0, 1], [-1, 1]; each may be NULL, normal only with albedo */
+    const float *albedo, *normal; /* of the first non-specular hit, [0, 1], [-1, 1]; may be NULL, normal only with albedo */
     double exposure;              /* factor to where white is 1; > 0 */
 };
 
@@ -42,5 +42,12 @@ const char *lull_oidn_version(const struct lull_oidn *oidn);
  * undefined after a failure. */
 int lull_oidn_run(struct lull_oidn *oidn, const struct lull_oidn_picture *picture, enum lull_oidn_quality quality,
                   int (*cancelled)(void *data), void *data, float *out, struct base_err *err);
+
+struct lull_oidn_box { /* pixels, half open, none empty */
+    int x0, y0, x1, y1;
+};
+
+/* What to denoise for the pixels of `core`: `halo` pixels around as far as the frame reaches, the corner on its grid. */
+struct lull_oidn_box lull_oidn_box_of(struct lull_oidn_box core, int halo, struct lull_oidn_box frame);
 
 #endif

@@ -1,0 +1,22 @@
+/*
+ * A picture between the noisy and the denoised one: at each pixel alpha of the noisy, alpha = mse(F) / (mse(F) + var(M)),
+ * both pooled over the neighbourhood. Where the denoiser is right it is the denoised picture, where it is wrong the noisy
+ * one; if the two errors were independent and known, no mixture would be better. Pure functions, thread-safe; the same bits
+ * on every processor for the same inputs.
+ */
+#ifndef DENOISE_BLEND_H
+#define DENOISE_BLEND_H
+
+#include "denoise/estimate.h"
+
+/* Pools each map of the estimate in place (Gaussian of 3 px, cut off where the picture ends) and fills alpha
+ * [height][width]. scratch: [height][width]. */
+void lull_blend_weights(const struct lull_estimate *estimate, int width, int height, float *scratch, float *alpha);
+
+/* The pooled error of what is denoised, never below that on which the halves disagree. */
+float lull_blend_mse(const struct lull_estimate *pooled, size_t i);
+
+/* noisy, denoised, out: [n][3]; out may be either. Where `noisy` is no number, the denoised value. */
+void lull_blend(const float *noisy, const float *denoised, const float *alpha, size_t n, float *out);
+
+#endif

@@ -1,0 +1,209 @@
+/*
+ * The error of a denoised picture from two halves, and the blend: against the truth, which is known here, with denoisers whose
+ * errors are known.
+ */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "denoise/blend.h"
+
+enum { W = 160, H = 120, N = W * H };
+
+static float a[N], b[N], fa[N], fb[N], maps[3][N], scratch[N], alpha[N];
+static const struct lull_estimate estimate = {maps[0], maps[1], maps[2]};
+static uint64_t state;
+
+static double uniform(void) /* SplitMix64 */
+{
+    uint64_t z = state += UINT64_C(0x9e3779b97f4a7c15);
+    z = (z ^ (z >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);
+    z = (z ^ (z >> 27)) * UINT64_C(0x94d049bb133111eb);
+    return ((double)((z ^ (z >> 31)) >> 11) + 0.5) * 0x1p-53;
+}
+
+static double gauss(void)
+{
+    return sqrt(-2 * log(uniform())) * cos(6.283185307179586 * uniform());
+}
+
+static double mean(const float *map)
+{
+    double sum = 0;
+    for (int i = 0; i < N; i++)
+        sum += (double)map[i] / N;
+    return sum;
+}
+
+/* Square of the slope of L* at the luminance y, by differences. */
+static double unit(double y)
+{
+    double slope = 116 * (cbrt(y + 1e-6) - cbrt(y - 1e-6)) / 2e-6;
+    return slope * slope;
+}
+
+/* Halves of a flat picture, a share of the samples in the first; sigma is the deviation of the mean of all. */
+static void halves(double truth, double sigma, double share)
+{
+    state = 7;
+    for (int i = 0; i < N; i++) {
+        a[i] = (float)(truth + sigma / sqrt(share) * gauss());
+        b[i] = (float)(truth + sigma / sqrt(1 - share) * gauss());
+    }
+}
+
+static void measure(double share)
+{
+    struct lull_estimate_in in = {a, b, fa, fb, share};
+    lull_estimate_pixels(&in, N, &estimate);
+}
+
+#define assert_within(value, expected, tolerance)                                                                  \
+    do {                                                                                                           \
+        double got_ = (value), want_ = (expected), most_ = (tolerance);                                            \
+        if (!(fabs(got_ - want_) <= most_))                                                                        \
+            fail_msg("%s = %g, expected %g within %g", #value, got_, want_, most_);                                \
+    } while (0)
+
+/* A denoiser that does nothing has the error of the noise. */
+static void identity_has_the_noise(void **unused)
+{
+    (void)unused;
+    static const double shares[] = {0.5, 0.25};
+    for (int k = 0; k < 2; k++) {
+        const double sigma = 0.004, noise = sigma * sigma * unit(0.4);
+        halves(0.4, sigma, shares[k]);
+        memcpy(fa, a, sizeof a);
+        memcpy(fb, b, sizeof b);
+        measure(shares[k]);
+        assert_within(mean(maps[2]), noise, 0.03 * noise);
+        if (k == 0) {
+            assert_within(mean(maps[0]), noise, 0.03 * noise);
+            assert_within(mean(maps[1]), noise, 0.03 * noise);
+        }
+    }
+}
+
+/* One that always says the same is wrong by its bias, on which the halves agree, however strong the noise. */
+static void bias_is_seen_and_noise_is_not(void **unused)
+{
+    (void)unused;
+    static const double biases[] = {0, 0.01, 0.05};
+    for (size_t k = 0; k < 3; k++) {
+        const double sigma = 0.03, truth = 0.4, bias = biases[k], want = bias * bias * unit(truth + bias);
+        halves(truth, sigma, 0.5);
+        for (int i = 0; i < N; i++)
+            fa[i] = fb[i] = (float)(truth + bias);
+        measure(0.5);
+        /* (f - b)^2 has the deviation 2 bias s + sqrt(2) s^2 with s = sqrt(2) sigma; three standard errors of the mean */
+        const double s = sqrt(2) * sigma, deviation = (2 * bias * s + 1.5 * s * s) * unit(truth + bias);
+        assert_within(mean(maps[0]), want, 3 * deviation / sqrt(N));
+        assert_within(mean(maps[1]), 0, 0);
+    }
+}
+
+/* A mean of 2x1 pixels of stripes: known bias, and half the noise is left. */
+static void blur_has_both(void **unused)
+{
+    (void)unused;
+    const double sigma = 0.01, truth = 0.4, stripe = 0.006;
+    halves(truth, sigma, 0.5);
+    for (int i = 0; i < N; i++) {
+        a[i] += (float)(i % 2 ? stripe : -stripe);
+        b[i] += (float)(i % 2 ? stripe : -stripe);
+    }
+    for (int i = 0; i < N; i += 2) {
+        fa[i] = fa[i + 1] = 0.5f * (a[i] + a[i + 1]);
+        fb[i] = fb[i + 1] = 0.5f * (b[i] + b[i + 1]);
+    }
+    measure(0.5);
+    const double want = (stripe * stripe + sigma * sigma / 2) * unit(truth);
+    assert_within(mean(maps[0]), want, 0.06 * want);
+    assert_within(mean(maps[1]), sigma * sigma / 2 * unit(truth), 0.06 * want);
+}
+
+/* The larger error gets the smaller weight, by the local errors; and no weight leaves [0, 1]. */
+static void weights_follow_the_errors(void **unused)
+{
+    (void)unused;
+    const double sigma = 0.01;
+    halves(0.4, sigma, 0.5);
+    for (int i = 0; i < N; i++)
+        fa[i] = fb[i] = i % W < W / 2 ? 0.4f : 0.5f; /* right on the left, ten deviations off on the right */
+    measure(0.5);
+    lull_blend_weights(&estimate, W, H, scratch, alpha);
+    double left = 0, right = 0;
+    for (int i = 0; i < N; i++) {
+        assert_true(alpha[i] >= 0 && alpha[i] <= 1);
+        if (i % W < W / 2 - 10)
+            left += alpha[i] / (H * (W / 2.0 - 10));
+        else if (i % W >= W / 2 + 10)
+            right += alpha[i] / (H * (W / 2.0 - 10));
+    }
+    assert_true(left < 0.15);
+    assert_within(right, 100.0 / 101, 0.005);
+}
+
+static void mixture(void **unused)
+{
+    (void)unused;
+    float noisy[] = {1, 2, 3, NAN, 4, INFINITY}, denoised[] = {0, 0, 1, 5, 0, 7}, w[] = {0.5f, 0.25f};
+    lull_blend(noisy, denoised, w, 2, noisy);
+    static const float want[] = {0.5f, 1, 2, 5, 1, 7};
+    for (int i = 0; i < 6; i++)
+        assert_true(noisy[i] == want[i]);
+}
+
+/* Values of 10^6 and more, black, one hot pixel, pictures of one pixel and of one line: finite, and nothing written beside. */
+static void extremes(void **unused)
+{
+    (void)unused;
+    static const float values[] = {0, 1e-30f, 1, 1e6f, 1e30f, 3e38f};
+    static const int sides[][2] = {{1, 1}, {15, 15}, {1, 40}, {40, 1}};
+    for (size_t v = 0; v < 12; v++)
+        for (size_t s = 0; s < 4; s++) {
+            const int w = sides[s][0], h = sides[s][1], n = w * h;
+            for (int i = 0; i < N; i++) {
+                a[i] = b[i] = i % 3 ? values[v % 6] : 0;
+                fa[i] = fb[i] = v < 6 ? a[i] : 0; /* and a denoiser that sees black */
+            }
+            a[n / 2] = 3e38f;
+            memset(alpha, 7, sizeof alpha);
+            struct lull_estimate_in in = {a, b, fa, fb, 0.5};
+            lull_estimate_pixels(&in, (size_t)n, &estimate);
+            lull_blend_weights(&estimate, w, h, scratch, alpha);
+            for (int i = 0; i < n; i++)
+                assert_true(alpha[i] >= 0 && alpha[i] <= 1);
+            assert_true(alpha[n] > 1e-35f && alpha[n] < 1e-33f); /* bytes of 7 */
+        }
+}
+
+/* A hot pixel that one sample made is noise: the denoised picture is taken around it. */
+static void hot_pixel(void **unused)
+{
+    (void)unused;
+    for (int i = 0; i < N; i++)
+        a[i] = b[i] = fa[i] = fb[i] = 0.4f;
+    a[60 * W + 80] = 1e6f;
+    measure(0.5);
+    lull_blend_weights(&estimate, W, H, scratch, alpha);
+    assert_true(alpha[60 * W + 80] < 1e-6f && alpha[60 * W + 83] < 1e-6f);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(identity_has_the_noise), cmocka_unit_test(bias_is_seen_and_noise_is_not),
+        cmocka_unit_test(blur_has_both),          cmocka_unit_test(weights_follow_the_errors),
+        cmocka_unit_test(mixture),                cmocka_unit_test(extremes),
+        cmocka_unit_test(hot_pixel),
+    };
+    return cmocka_run_group_tests_name("denoise", tests, NULL, NULL);
+}
