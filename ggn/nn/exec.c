@@ -26,7 +26,7 @@ static size_t scratch_size(const struct ggn_graph *g, const struct ggn_kernels *
             continue;
         if (k->bf16 && flags & GGN_EXEC_BF16 && bf16 > need)
             need = bf16;
-        if (k->wino && ggn_wino_suits(c_in, v->c, v->h, v->w))
+        if (k->wino && ggn_wino_suits(c_in, v->c, v->h, v->w, k->lanes))
             need = wino > need ? wino : need;
         if (k->wino && flags & GGN_EXEC_GRADS && need < GGN_WINO_GRAD_SCRATCH)
             need = GGN_WINO_GRAD_SCRATCH;

@@ -27,7 +27,8 @@ static int input_planes(real **out, const struct ggn_task *t, real *base, long n
 static const real *wino_weights(const struct ggn_task *t, int c_in, int c_out, const real *all)
 {
     const struct ggn_value *v = &t->e->graph->value[t->l->out];
-    return all && t->l->kernel == 3 && ggn_wino_suits(c_in, c_out, v->h, v->w) ? all + 4 * t->l->pack : NULL;
+    const int suits = t->l->kernel == 3 && ggn_wino_suits(c_in, c_out, v->h, v->w, t->e->kernels->lanes);
+    return all && suits ? all + 4 * t->l->pack : NULL;
 }
 
 /* Cuts the work into pieces that depend on the shape only. `wino`: all Winograd weights of this direction or NULL. */
@@ -37,9 +38,9 @@ static long cut_conv(struct ggn_task *t, int c_in, int c_out, const real *wino)
 
     t->wino = t->bf16 ? NULL : wino_weights(t, c_in, c_out, wino);
     if (t->wino) {
-        t->px_blocks = ggn_wino_blocks(ggn_wino_tiles(v->h, v->w));
-        t->oc_groups = 1;
-        return (long)t->e->batch * t->px_blocks;
+        ggn_wino_cut(ggn_wino_tiles(v->h, v->w), c_out, &t->px_blocks, &t->oc_group);
+        t->oc_groups = (c_out + t->oc_group - 1) / t->oc_group;
+        return (long)t->e->batch * t->px_blocks * t->oc_groups;
     }
     long px = (long)v->h * v->row, tile = t->e->kernels->tile_px;
 
@@ -55,14 +56,15 @@ static void run_conv_piece(const struct ggn_task *t, const struct ggn_conv *conv
     const struct ggn_kernels *k = t->e->kernels;
     real *scratch = t->e->scratch + (size_t)worker * t->e->scratch_size;
 
+    const long part = i / t->oc_groups % t->px_blocks, p0 = part * t->px_block, p1 = p0 + t->px_block;
+    const int oc0 = (int)(i % t->oc_groups) * t->oc_group;
+    const int oc1 = oc0 + t->oc_group < conv->n_out ? oc0 + t->oc_group : conv->n_out;
     if (t->wino) {
-        const int tiles = ggn_wino_tiles(conv->h, conv->w_px), part = (int)(i % t->px_blocks);
-        k->wino(conv, t->wino, (int)((long)tiles * part / t->px_blocks), (int)((long)tiles * (part + 1) / t->px_blocks),
+        const long tiles = ggn_wino_tiles(conv->h, conv->w_px);
+        k->wino(conv, t->wino, (int)(tiles * part / t->px_blocks), (int)(tiles * (part + 1) / t->px_blocks), oc0, oc1,
                 scratch);
         return;
     }
-    long p0 = i / t->oc_groups % t->px_blocks * t->px_block, p1 = p0 + t->px_block;
-    int oc0 = (int)(i % t->oc_groups) * t->oc_group, oc1 = oc0 + t->oc_group < conv->n_out ? oc0 + t->oc_group : conv->n_out;
     if (t->bf16)
         k->bf16(conv, t->bf16, p0, p1, oc0, oc1, (uint32_t *)(void *)scratch);
     else
@@ -179,7 +181,7 @@ static long cut_weights(struct ggn_task *t)
     const struct ggn_value *v = &t->e->graph->value[t->l->out];
     const int n_in = ggn_layer_c_in(t->e->graph, t->l);
 
-    t->weights_by_wino = k->wino_grad && t->l->kernel == 3 && ggn_wino_suits(n_in, v->c, v->h, v->w);
+    t->weights_by_wino = k->wino_grad && t->l->kernel == 3 && ggn_wino_grad_suits(n_in, v->c, v->h, v->w, k->lanes);
     t->oc_group = t->weights_by_wino ? GGN_WINO_GRAD : k->tile_oc;
     t->ic_group = t->weights_by_wino ? GGN_WINO_GRAD : GGN_GRAD_IC;
     t->oc_groups = (v->c + t->oc_group - 1) / t->oc_group;

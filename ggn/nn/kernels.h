@@ -55,7 +55,7 @@ struct ggn_kernels {
      */
     void (*conv)(const struct ggn_conv *conv, long p0, long p1, int oc0, int oc1);
     /* Faster forms of a 3×3 convolution, NULL where there are none; see nn/winograd.h and nn/bf16.h. */
-    void (*wino)(const struct ggn_conv *conv, const real *u, int t0, int t1, real *scratch);
+    void (*wino)(const struct ggn_conv *conv, const real *u, int t0, int t1, int oc0, int oc1, real *scratch);
     void (*wino_grad)(const struct ggn_conv_grad *grad, real *scratch);
     void (*wino_pack)(real *u, const real *packed, int n_in, int n_out, int tile_oc);
     void (*bf16)(const struct ggn_conv *conv, const uint32_t *w, long p0, long p1, int oc0, int oc1, uint32_t *scratch);

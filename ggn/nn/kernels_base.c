@@ -2,7 +2,6 @@
 #include "nn/bf16.h"
 #include "nn/real.h"
 
-#define TABLE ggn_kernels_base
 #ifndef GGN_DOUBLE
 #define FASTER_FORMS .bf16 = ggn_bf16_conv, .bf16_pack = ggn_bf16_pack,
 #endif

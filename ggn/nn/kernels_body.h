@@ -1,9 +1,7 @@
 /*
  * The kernels, once per precision and instruction set. Without anything defined they are those of any processor; a file for
- * an instruction set defines ISA, TABLE (the name of its table), VECTOR_BYTES, TILE_OC (8 or 4 output channels in a register
- * tile), SET1, FMA, VSUM (sum of the lanes), KEEP and, where there are any, FASTER_FORMS. KEEP(v) makes the compiler hold v
- * in a register: left alone it folds a load that feeds three multiply-adds into each of them, and loads become the
- * bottleneck.
+ * an instruction set includes its vectors (nn/vector_*.h) and defines ISA, TABLE (the name of its table) and, where there
+ * are any, FASTER_FORMS.
  */
 #include <math.h>
 #include <stdint.h>
@@ -11,53 +9,22 @@
 
 #include "nn/graph.h"
 #include "nn/kernels.h"
+#include "nn/vector.h"
 
-#ifndef VECTOR_BYTES
-#define ISA GGN_ISA_BASE
-#define VECTOR_BYTES 16
-#define TILE_OC 4
-#define FMA(a, b, c) ((a) * (b) + (c))
-#define KEEP(v) ((void)(v))
-#ifdef GGN_DOUBLE
-#define SET1(s) ((vf){(s), (s)})
-#define VSUM(v) ((v)[0] + (v)[1])
-#else
-#define SET1(s) ((vf){(s), (s), (s), (s)})
-#define VSUM(v) (((v)[0] + (v)[2]) + ((v)[1] + (v)[3]))
-#endif
-#endif
 #ifndef TABLE
 #define TABLE ggn_kernels_base
+#define ISA GGN_ISA_BASE
 #endif
 #ifndef FASTER_FORMS
 #define FASTER_FORMS
 #endif
-
 #ifdef GGN_DOUBLE
-typedef int64_t lane_mask;
 #define SQRT sqrt
 #else
-typedef int32_t lane_mask;
 #define SQRT sqrtf
 #endif
-typedef real vf __attribute__((vector_size(VECTOR_BYTES)));
-typedef lane_mask vi __attribute__((vector_size(VECTOR_BYTES)));
-typedef vf vfu __attribute__((aligned(sizeof(real)), may_alias));
 
-enum {
-    VW = VECTOR_BYTES / (int)sizeof(real), /* lanes */
-    TILE_V = 3                             /* vectors of pixels in a register tile: 8·3 or 4·3 accumulators */
-};
-
-#define LOAD(p) ((vf) * (const vfu *)(p))
-#define STORE(p, v) (*(vfu *)(p) = (vfu)(v))
-#define INLINE static inline __attribute__((always_inline))
-
-INLINE vf vmax(vf a, vf b)
-{
-    vi m = (vi)(a > b);
-    return (vf)(((vi)a & m) | ((vi)b & ~m));
-}
+enum { TILE_V = 3 /* vectors of pixels in a register tile: 8·3 or 4·3 accumulators */ };
 
 INLINE real vsum(vf a)
 {
@@ -99,7 +66,7 @@ INLINE void conv_tile(const struct ggn_conv *a, const real *w, int oc, int i0, i
         for (int v = 0; v < nv; v++) {
             vf y = acc[o][v];
             if (last && a->slope != 1)
-                y = vmax(y, SET1(a->slope) * y);
+                y = VMAX(y, SET1(a->slope) * y);
             if (last && a->scale)
                 y = FMA(y, SET1(a->scale[oc + o]), SET1(a->shift[oc + o]));
             STORE(a->y[oc + o] + p + v * VW, y);
@@ -300,9 +267,15 @@ static void bn_grad(real *restrict dx, const real *restrict dy, const real *rest
 
 static void lrelu(real *restrict y, const real *restrict x, real slope, int h, int w, int row)
 {
-    for (int r = 0; r < h; r++, x += row, y += row)
-        for (int i = 0; i < w; i++)
+    for (int r = 0; r < h; r++, x += row, y += row) {
+        int i = 0;
+        for (; i + VW <= w; i += VW) {
+            vf v = LOAD(x + i);
+            STORE(y + i, vector_select(v > SET1(0), v, SET1(slope) * v));
+        }
+        for (; i < w; i++)
             y[i] = x[i] > 0 ? x[i] : slope * x[i];
+    }
 }
 
 static void lrelu_grad(real *restrict dx, const real *restrict dy, const real *restrict y, real slope, int add, int h, int w,
@@ -321,9 +294,8 @@ static double act_grad(real *dy, const real *y, real slope, int h, int w, int ro
         vf s = SET1(0);
         int i = 0;
         for (; i + VW <= w; i += VW) {
-            vf d = LOAD(dy + i), lo = SET1(slope) * d;
-            vi m = (vi)(LOAD(y + i) > SET1(0));
-            d = (vf)(((vi)d & m) | ((vi)lo & ~m));
+            vf d = LOAD(dy + i);
+            d = vector_select(LOAD(y + i) > SET1(0), d, SET1(slope) * d);
             s += d;
             STORE(dy + i, d);
         }
@@ -339,40 +311,48 @@ static double act_grad(real *dy, const real *y, real slope, int h, int w, int ro
 
 #ifndef GGN_DOUBLE
 /* e^x for |x| ≤ 87: 2^n · p(r), x = n ln 2 + r, p of degree 6 (Taylor on |r| ≤ ln 2 / 2: relative error below 2e-7). */
-INLINE float exp_real(float x)
+INLINE vf vector_exp(vf x)
 {
-    x = x > 87.0f ? 87.0f : x;
-    x = x < -87.0f ? -87.0f : x;
-    float shifted = x * 1.44269504f + 12582912.0f; /* 1.5·2²³: rounds to the nearest integer */
-    float n = shifted - 12582912.0f;
-    float r = (x - n * 0.693145752f) - n * 1.42860677e-6f;
-    float p = 1.0f / 720;
-    p = p * r + 1.0f / 120;
-    p = p * r + 1.0f / 24;
-    p = p * r + 1.0f / 6;
-    p = p * r + 0.5f;
-    p = p * r + 1.0f;
-    p = p * r + 1.0f;
+    x = vector_select(x > SET1(87.0f), SET1(87.0f), x);
+    x = vector_select(x < SET1(-87.0f), SET1(-87.0f), x);
+    vf shifted = x * SET1(1.44269504f) + SET1(12582912.0f); /* 1.5·2²³: rounds to the nearest integer */
+    vf n = shifted - SET1(12582912.0f);
+    vf r = (x - n * SET1(0.693145752f)) - n * SET1(1.42860677e-6f);
+    vf p = SET1(1.0f / 720);
+    p = p * r + SET1(1.0f / 120);
+    p = p * r + SET1(1.0f / 24);
+    p = p * r + SET1(1.0f / 6);
+    p = p * r + SET1(0.5f);
+    p = p * r + SET1(1.0f);
+    p = p * r + SET1(1.0f);
     /* the low bits of `shifted` are n; a NaN stays one through p */
-    uint32_t bits;
-    float scale;
-    memcpy(&bits, &shifted, sizeof bits);
-    bits = (bits + (127u - 0x4b400000u)) << 23;
-    memcpy(&scale, &bits, sizeof scale);
-    return p * scale;
+    return p * (vf)(((vi)shifted + (127 - 0x4b400000)) << 23);
 }
 #else
-INLINE double exp_real(double x)
+INLINE vf vector_exp(vf x)
 {
-    return exp(x);
+    for (int k = 0; k < VW; k++)
+        x[k] = exp(x[k]);
+    return x;
 }
 #endif
 
 static void sigmoid(real *restrict y, const real *restrict x, int h, int w, int row)
 {
     for (int r = 0; r < h; r++, x += row, y += row)
-        for (int i = 0; i < w; i++)
-            y[i] = 1 / (1 + exp_real(-x[i]));
+        for (int i = 0; i < w; i += VW) {
+            const size_t part = (size_t)(w - i < VW ? w - i : VW) * sizeof *x; /* columns behind the picture stay 0 */
+            vf v = SET1(0);
+            if (part == sizeof v)
+                v = LOAD(x + i);
+            else
+                memcpy(&v, x + i, part);
+            v = SET1(1) / (SET1(1) + vector_exp(-v));
+            if (part == sizeof v)
+                STORE(y + i, v);
+            else
+                memcpy(y + i, &v, part);
+        }
 }
 
 static void sigmoid_grad(real *restrict dx, const real *restrict dy, const real *restrict y, int add, int h, int w, int row)

@@ -130,7 +130,7 @@ static void pack_forms(struct ggn_weights *w, const struct ggn_layer *l)
         return;
     if (w->bf16)
         k->bf16_pack(w->bf16 + l->pack, w->pack + l->pack, c_in, v->c, k->tile_oc);
-    if (!w->wino || !ggn_wino_suits(c_in, v->c, v->h, v->w))
+    if (!w->wino || !ggn_wino_suits(c_in, v->c, v->h, v->w, k->lanes))
         return;
     k->wino_pack(w->wino + 4 * l->pack, w->pack + l->pack, c_in, v->c, k->tile_oc);
     if (w->wino_back)

@@ -2,10 +2,18 @@
 
 #include <string.h>
 
-int ggn_wino_suits(int n_in, int n_out, int h, int w)
+/* Measured: with fewer channels the transforms cost more than the products they save, with fewer tiles too many lanes are
+ * empty. 8 lanes pay sooner than 16: their products take twice the time, what moves values about does not. */
+int ggn_wino_suits(int n_in, int n_out, int h, int w, int lanes)
 {
-    /* measured: below about 14 × 14 channels the transforms cost more than the products they save */
-    return n_in >= 6 && n_out >= 6 && n_in * n_out >= 200 && ggn_wino_tiles(h, w) >= 24;
+    if (lanes > 8)
+        return n_in >= 6 && n_out >= 6 && n_in * n_out >= 200 && ggn_wino_tiles(h, w) >= 24;
+    return n_in >= 3 && n_out >= 3 && n_in * n_out >= 32 && ggn_wino_tiles(h, w) >= 9;
+}
+
+int ggn_wino_grad_suits(int n_in, int n_out, int h, int w, int lanes)
+{
+    return n_in >= 6 && n_out >= 6 && n_in * n_out >= 60 && ggn_wino_suits(n_in, n_out, h, w, lanes);
 }
 
 int ggn_wino_tiles(int h, int w)
@@ -13,10 +21,13 @@ int ggn_wino_tiles(int h, int w)
     return ((h + 3) / 4) * ((w + 3) / 4);
 }
 
-int ggn_wino_blocks(int tiles)
+void ggn_wino_cut(int tiles, int n_out, int *blocks, int *oc_group)
 {
-    int blocks = (tiles + GGN_WINO_TILES - 1) / GGN_WINO_TILES;
-    return blocks >= 4 ? blocks : tiles > GGN_WINO_TILES ? 4 : 2; /* something for every thread */
+    const int least = (tiles + GGN_WINO_TILES - 1) / GGN_WINO_TILES;
+
+    /* Something for every thread; where the tiles of one call suffice, no two tasks read the same weights. */
+    *blocks = least > 1 ? (least < 4 ? 4 : least) : n_out < 64 ? 2 : 1;
+    *oc_group = *blocks > 1 ? n_out : (n_out / 2 + GGN_TILE_MAX - 1) / GGN_TILE_MAX * GGN_TILE_MAX;
 }
 
 size_t ggn_wino_scratch(int n_in)
@@ -63,6 +74,8 @@ void ggn_wino_pack(float *u, const float *packed, int n_in, int n_out, int tile_
             float *to = u + (size_t)oc * (size_t)n_in + (size_t)(i * tile);
             if (tile == GGN_TILE_MAX)
                 pack_tile(to, stride, packed, GGN_TILE_MAX);
+            else if (tile == GGN_TILE_MAX / 2)
+                pack_tile(to, stride, packed, GGN_TILE_MAX / 2);
             else
                 pack_tile(to, stride, packed, tile);
         }

@@ -18,11 +18,12 @@ enum {
     GGN_WINO_GRAD_SCRATCH = 36 * (2 * GGN_WINO_GRAD_STRIDE + GGN_WINO_GRAD * GGN_WINO_GRAD) + 6 * 16 * GGN_WINO_GRAD_STRIP
 };
 
-/* Whether it pays for a convolution of this shape. */
-int ggn_wino_suits(int n_in, int n_out, int h, int w);
-/* Tiles, and into how many calls they are cut; both depend on the shape only. */
+/* Whether it pays for a convolution of this shape with vectors of so many lanes, and for the gradient of its weights. */
+int ggn_wino_suits(int n_in, int n_out, int h, int w, int lanes);
+int ggn_wino_grad_suits(int n_in, int n_out, int h, int w, int lanes);
 int ggn_wino_tiles(int h, int w);
-int ggn_wino_blocks(int tiles);
+/* How the work is cut, by the shape only: into how many blocks of tiles, and into groups of how many output channels. */
+void ggn_wino_cut(int tiles, int n_out, int *blocks, int *oc_group);
 /* Floats of scratch for one call. */
 size_t ggn_wino_scratch(int n_in);
 
@@ -30,9 +31,11 @@ size_t ggn_wino_scratch(int n_in);
 void ggn_wino_pack(float *u, const float *packed, int n_in, int n_out, int tile_oc);
 
 /* Tiles [t0, t1) of the convolution `a` (a->w is not read), at most GGN_WINO_TILES. */
-void ggn_wino_conv_avx512(const struct ggn_conv *a, const float *u, int t0, int t1, float *scratch);
+void ggn_wino_conv_avx2(const struct ggn_conv *a, const float *u, int t0, int t1, int oc0, int oc1, float *scratch);
+void ggn_wino_conv_avx512(const struct ggn_conv *a, const float *u, int t0, int t1, int oc0, int oc1, float *scratch);
 
 /* The gradient of the weights, by the adjoint of that algorithm. scratch: GGN_WINO_GRAD_SCRATCH floats. */
+void ggn_wino_grad_avx2(const struct ggn_conv_grad *grad, float *scratch);
 void ggn_wino_grad_avx512(const struct ggn_conv_grad *grad, float *scratch);
 
 #endif

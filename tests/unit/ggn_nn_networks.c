@@ -92,7 +92,7 @@ static void scratch(void **state)
                 struct ggn_exec *e = ggn_exec_create(&graph, kernels, 1, flags[m], NULL, NULL);
                 const int lanes = kernels->lanes, grads = flags[m] & GGN_EXEC_GRADS;
                 size_t need = (size_t)(kernels->tile_oc * GGN_GRAD_IC * 9 * lanes) * (grads != 0);
-                if (kernels->wino && in * out >= 200) {
+                if (kernels->wino && ggn_wino_suits(in, out, 30, wide ? 900 : 30, lanes)) {
                     size_t forward = ggn_wino_scratch(in), back = grads ? ggn_wino_scratch(out) : 0;
                     need = need > forward ? need : forward;
                     need = need > back ? need : back;
@@ -114,15 +114,28 @@ static void scratch(void **state)
 /* Which convolutions are worth the transforms, and how their tiles are shared out. */
 static void winograd(void **state)
 {
-    static const int suits[][5] = {{6, 34, 24, 16, 1}, {5, 200, 24, 16, 0}, {34, 6, 24, 16, 1}, {200, 5, 24, 16, 0}, {14, 14, 24, 16, 0},
-                                   {10, 20, 24, 16, 1}, {10, 20, 20, 16, 0}, {10, 20, 21, 13, 1}, {10, 20, 1, 96, 1}, {10, 20, 1, 92, 0}};
-    static const int blocks[][2] = {{24, 2}, {64, 2}, {65, 4}, {128, 4}, {256, 4}, {257, 5}, {2500, 40}};
+    /* the answers with 16 lanes and with 8, for the convolution and for its weights' gradient */
+    static const int suits[][7] = {{6, 34, 24, 16, 1, 1, 1}, {5, 200, 24, 16, 0, 1, 0}, {34, 6, 24, 16, 1, 1, 1}, {200, 5, 24, 16, 0, 1, 0},
+                                   {14, 14, 24, 16, 0, 1, 1}, {10, 20, 24, 16, 1, 1, 1}, {10, 20, 20, 16, 0, 1, 1}, {10, 20, 21, 13, 1, 1, 1},
+                                   {10, 20, 1, 96, 1, 1, 1}, {10, 20, 1, 92, 0, 1, 1}, {3, 11, 12, 12, 0, 1, 0}, {2, 40, 12, 12, 0, 0, 0},
+                                   {40, 2, 12, 12, 0, 0, 0}, {4, 8, 12, 12, 0, 1, 0}, {31, 1, 12, 12, 0, 0, 0}, {3, 10, 12, 12, 0, 0, 0},
+                                   {6, 10, 12, 12, 0, 1, 1}, {6, 9, 12, 12, 0, 1, 0}, {20, 20, 8, 16, 0, 0, 0}, {20, 20, 9, 9, 0, 1, 1}};
+    static const int cuts[][4] = {{24, 63, 2, 63}, {64, 63, 2, 63}, {64, 64, 1, 32}, {9, 80, 1, 40}, {9, 90, 1, 48}, {65, 64, 4, 64},
+                                  {128, 64, 4, 64}, {256, 20, 4, 20}, {257, 20, 5, 20}, {2500, 16, 40, 16}};
     (void)state;
 
     for (size_t i = 0; i < sizeof suits / sizeof suits[0]; i++)
-        assert_int_equal(ggn_wino_suits(suits[i][0], suits[i][1], suits[i][2], suits[i][3]), suits[i][4]);
-    for (size_t i = 0; i < sizeof blocks / sizeof blocks[0]; i++)
-        assert_int_equal(ggn_wino_blocks(blocks[i][0]), blocks[i][1]);
+        for (int k = 0; k < 2; k++) {
+            const int lanes = k ? 8 : 16, *s = suits[i];
+            assert_int_equal(ggn_wino_suits(s[0], s[1], s[2], s[3], lanes), s[4 + k]);
+            assert_int_equal(ggn_wino_grad_suits(s[0], s[1], s[2], s[3], lanes), k ? s[6] : s[4]);
+        }
+    for (size_t i = 0; i < sizeof cuts / sizeof cuts[0]; i++) {
+        int blocks, group;
+        ggn_wino_cut(cuts[i][0], cuts[i][1], &blocks, &group);
+        assert_int_equal(blocks, cuts[i][2]);
+        assert_int_equal(group, cuts[i][3]);
+    }
     assert_int_equal(ggn_wino_tiles(200, 197), 2500);
     assert_int_equal(ggn_wino_tiles(5, 4), 2);
 }
