@@ -5,13 +5,17 @@ export BUILD
 lines='^(ok|not ok|#|1\.\.)'
 if command -v blender >/dev/null; then
     . tests/hosts/find-python
-    PYTHON=$python blender -b --factory-startup -noaudio --python tests/hosts/test_blender.py 2>&1 | grep -E "$lines"
+    for t in blender blender_command; do
+        PYTHON=$python blender -b --factory-startup -noaudio --python tests/hosts/test_$t.py 2>&1 | grep -E "$lines"
+    done
 else
     echo "ok 1 - Blender # SKIP no blender: run make test-hosts"
 fi
 python=build/hosts/bpy/bin/python3
 if "$python" -c 'import bpy' 2>/dev/null; then
-    "$python" tests/hosts/test_blender.py 2>&1 | grep -E "$lines" | sed 's/ - / - bpy: /'
+    for t in blender blender_command; do
+        "$python" tests/hosts/test_$t.py 2>&1 | grep -E "$lines" | sed 's/ - / - bpy: /'
+    done
 else
     echo "ok 1 - the Python module bpy # SKIP not in build/hosts/bpy: run make test-hosts"
 fi

@@ -1,267 +1,25 @@
-"""Blender's Cycles as a host; run inside Blender or by a Python with the module bpy. BUILD names the build folder."""
+"""Blender's Cycles as a host: pictures, passes, the add-on; run inside Blender or by a Python with the module bpy. BUILD names the
+build folder."""
 import contextlib
 import dataclasses
-import io
-import json
 import os
 import runpy
-import shutil
-import signal
 import subprocess
 import sys
-import tempfile
-import threading
-import time
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "plugin-api" / "python"), str(ROOT / "tests" / "hosts")]
+sys.path.insert(0, str(Path(__file__).resolve().parent))
 
+from blender_host import ROOT, SAME, TMP, NothingRendered, cube, one_render, tmp  # noqa: E402
 import bpy  # noqa: E402
 import numpy as np  # noqa: E402
-
 import lull  # noqa: E402
 import tap  # noqa: E402
-from lull import Rect, checkpoint, exr, png  # noqa: E402
-from lull.blender import cli, view  # noqa: E402
+from lull import Rect, exr  # noqa: E402
+from lull.blender import view  # noqa: E402
 from lull.blender.cycles import Cycles, HostError  # noqa: E402
-from lull.blender.session import Session, Settings, scene_output  # noqa: E402
+from lull.blender.session import Session, Settings  # noqa: E402
 from tap import Skip, raises  # noqa: E402
-
-os.environ["LULL_PLUGIN_PATH"] = str(ROOT / os.environ.get("BUILD", "build") / "lib" / "lull")
-TMP = tempfile.TemporaryDirectory()
-# Waves are read back as 32-bit floats and summed in double: what is left is the rounding of each wave's mean.
-SAME = 2e-6
-
-
-def tmp(name):
-    return os.path.join(TMP.name, name)
-
-
-def cube(width=70, height=46):
-    """The default cube, which has moved a little by frame 2."""
-    bpy.ops.wm.read_factory_settings()
-    scene = bpy.context.scene
-    scene.render.engine = "CYCLES"
-    scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = width, height, 100
-    box = bpy.data.objects["Cube"]
-    for frame, angle in ((1, 0), (2, .5)):
-        box.rotation_euler.z = angle
-        box.keyframe_insert("rotation_euler", frame=frame)
-    scene.frame_set(1)
-    return scene
-
-
-def one_render(scene, spp, spp_max=4096):
-    """The whole picture by a single call. spp_max as in the session: the tabulated pattern of new versions depends on it."""
-    with Cycles(scene, spp_max) as host:
-        return next(iter(host.render([Rect(0, 0, host.width, host.height)], 0, spp, False)))["color"]
-
-
-def command(*arguments, **named):
-    """Runs the command line in this process: its status and its error text."""
-    error = io.StringIO()
-    with contextlib.redirect_stderr(error):
-        status = cli.main(list(arguments))
-    return status, error.getvalue()
-
-
-class FolderGone:
-    """A folder that goes away with the first wave."""
-
-    def __init__(self, folder):
-        self.folder = folder
-
-    def __enter__(self):
-        self.render = Cycles.render
-        Cycles.render = lambda host, *arguments: (shutil.rmtree(self.folder, True), self.render(host, *arguments))[1]
-
-    def __exit__(self, *_):
-        Cycles.render = self.render
-
-
-class NothingRendered:
-    """Any wave is an error."""
-
-    def __enter__(self):
-        self.render, Cycles.render = Cycles.render, None
-
-    def __exit__(self, *_):
-        Cycles.render = self.render
-
-
-def saved(scene, name):
-    bpy.ops.wm.save_as_mainfile(filepath=tmp(name))
-    return tmp(name)
-
-
-def contents():
-    return {p: p.read_bytes() for p in Path(TMP.name).rglob("*") if p.is_file()}
-
-
-def start(*arguments, **environment):
-    """The package as a program of its own."""
-    return subprocess.Popen([os.environ.get("PYTHON", sys.executable), "-m", "lull.blender", *arguments], text=True,
-                            env={**os.environ, "PYTHONPATH": str(ROOT / "plugin-api/python"), **environment},
-                            stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-
-
-def test_lost_files():
-    """what would cost the user a file is refused before the first wave: inputs, other kinds, one file for two outputs"""
-    scene = cube(24, 24)
-    png.write(tmp("wood.png"), np.full((24, 24, 3), 99, np.uint8))
-    bpy.data.images.load(tmp("wood.png")).use_fake_user = True
-    png.write(tmp("painted.png"), np.full((24, 24, 3), 99, np.uint8))
-    blend = saved(scene, "keep.blend")
-    for name, target in (("link.exr", "keep.blend"), ("way", "."), ("far.png", "new.png")):
-        os.symlink(target, tmp(name))
-    Path(tmp("text.npz")).write_text("a letter")
-    before = contents()
-    for arguments, wanted in ((["-o", blend], "ends in .exr"), (["--checkpoint", blend], "this is an input"),
-                              (["--checkpoint", tmp("way/keep.blend")], "this is an input"),
-                              (["-o", tmp("link.exr")], "this is an input"),
-                              (["--mask", tmp("painted.png"), "--preview", tmp("painted.png")], "this is an input"),
-                              (["--preview", tmp("wood.png")], "this is an input"),
-                              (["-o", tmp("a.jpg"), "--report", tmp("a.jpg")], "ends in .exr"),
-                              (["--preview", tmp("a.png"), "--stop-map", tmp("a.png")], "one of the two would be lost"),
-                              (["--preview", tmp("a.png"), "--stop-map", tmp("way/a.png")], "one of the two would be lost"),
-                              (["--preview", tmp("new.png"), "--stop-map", tmp("far.png")], "one of the two would be lost"),
-                              (["-o", tmp("a.exr"), "--checkpoint", tmp("./a.exr")], "one of the two would be lost"),
-                              (["-o", tmp("nowhere/a.exr")], "cannot write there: No such file"),
-                              (["--frames", "1-2", "--report", tmp("nowhere/a.json")], "cannot write there: No such file"),
-                              (["--checkpoint", tmp("text.npz")], "this is no checkpoint and would be replaced")):
-        with NothingRendered():
-            status, text = command(blend, "-c", "fixed", "-q", *arguments)
-        assert status == 2 and wanted in text and text.count("\n") == 1, (arguments, status, text)
-        assert contents() == before, arguments
-
-
-def test_outputs_apart():
-    """an output that cannot be written after all keeps no other from being written, and is kept elsewhere itself"""
-    blend = saved(cube(24, 24), "apart.blend")
-    os.mkdir(tmp("gone"))
-    os.mkdir(tmp("spare"))
-    tempfile.tempdir = tmp("spare")
-    try:
-        with FolderGone(tmp("gone")):
-            status, text = command(blend, "-c", "fixed", "-q", "-o", tmp("gone/a.exr"), "--preview", tmp("apart.png"),
-                                   "--report", tmp("apart.json"))
-    finally:
-        tempfile.tempdir = None
-    kept = tmp(f"spare/lull-{os.getpid()}-a.exr")
-    assert status == 2 and f"kept as {kept}" in text and exr.read_layers(kept)[0]["R"].shape == (24, 24), text
-    assert os.path.getsize(tmp("apart.png")) > 50 and json.loads(Path(tmp("apart.json")).read_text())["blocks"]
-
-
-def in_memory():
-    """What lies in memory file systems."""
-    with open("/proc/mounts") as mounts:
-        folders = {line.split()[1] for line in mounts if line.split()[2] in ("tmpfs", "ramfs")} | {"/dev/shm"}
-    return {os.path.join(folder, name) for folder in folders if os.access(folder, os.R_OK) for name in os.listdir(folder)
-            if name.startswith(("lull", "wave", "blender"))}
-
-
-def test_signals():
-    """TERM, INT and HUP keep picture and checkpoint, status 130; kill -9 keeps the last checkpoint; nothing stays in memory"""
-    blend = saved(cube(48, 24), "signals.blend")
-    before = in_memory()
-    common = (blend, "-c", "null", "--block", "24", "-q", "--checkpoint-every", "0")
-    whole = start(*common, "--spp-max", "1600", "-o", tmp("whole.exr"))
-    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGKILL):
-        os.mkdir(tmp(f"tmp-{number}"))
-        state, picture = tmp(f"{number}.npz"), tmp(f"{number}.exr")
-        limit = "1600" if number == signal.SIGKILL else "10000000"
-        run = start(*common, "--spp-max", limit, "-o", picture, "--checkpoint", state, TMPDIR=tmp(f"tmp-{number}"))
-        while run.poll() is None and not os.path.exists(state):
-            time.sleep(.01)
-        run.send_signal(number)
-        _, text = run.communicate()
-        assert run.returncode == (-number if number == signal.SIGKILL else 130) and not text, (number, run.returncode, text)
-        assert checkpoint.is_one(state) and os.path.exists(picture) == (number != signal.SIGKILL), number
-        left = [p for p in Path(tmp(f"tmp-{number}")).rglob("*") if p.is_file() or number != signal.SIGKILL]
-        assert not left and in_memory() <= before, (number, left, in_memory() - before)
-    assert whole.wait() == 0
-    assert start(*common, "--spp-max", "1600", "-o", picture, "--checkpoint", state, "--resume").wait() == 0
-    assert Path(picture).read_bytes() == Path(tmp("whole.exr")).read_bytes()
-
-
-def test_identity():
-    """a checkpoint of another file, frame, camera, view or pattern is refused by name, and the pictures are not averaged"""
-    def changed(change, name="other.blend"):
-        scene = cube(24, 24)
-        change(scene)
-        return saved(scene, name)
-
-    blend, state = changed(lambda s: None, "mine.blend"), tmp("mine.npz")
-    common = ("-c", "null", "--spp-max", "32", "-q", "-o", tmp("id.exr"), "--checkpoint", state)
-    assert command(blend, *common) == (0, "")
-    kept = Path(state).read_bytes()
-
-    def refused(wanted, path, *more):
-        with NothingRendered():
-            status, text = command(path, *common, "--resume", "--spp-max", "64", *more)
-        assert status == 2 and f"its {wanted} is " in text and text.count("\n") == 1, (wanted, text)
-        assert Path(state).read_bytes() == kept
-
-    refused("files", changed(lambda s: setattr(bpy.data.objects["Light"].data, "energy", 1.)))
-    for wanted, owner, name, value in (("view", "view_settings", "exposure", 1.), ("view", "view_settings", "look", "None"),
-                                       ("seed", "cycles", "seed", 7)):
-        scene = cube(24, 24)
-        setattr(getattr(scene, owner), name, value)
-        bpy.ops.wm.save_as_mainfile(filepath=blend)  # under the same name
-        refused("files", blend)
-    bpy.ops.wm.open_mainfile(filepath=changed(lambda s: None, "mine.blend"))
-
-
-def test_identity_of_scene():
-    """what the samples depend on is told apart without the file's help too"""
-    def identity():
-        with Session(bpy.context.scene, Settings("null", spp_max=16, checkpoint=tmp("x.npz"))) as session:
-            return session.driver.identity
-
-    scene = cube(24, 24)
-    before = identity()
-    bpy.data.objects["Camera"].location.x += .01
-    bpy.context.view_layer.update()
-    scene.view_settings.gamma, scene.cycles.seed = 1.25, 3
-    scene.frame_current += 0
-    after = identity()
-    assert {n for n in before if before[n] != after[n]} >= {"camera", "view", "seed"}, after
-    scene.frame_set(2)
-    assert identity()["frame"] == "2" and {"files", "scene", "device", "renderer", "pattern", "view-layer"} <= after.keys()
-
-
-def test_scene_defaults():
-    """Max Samples, Time Limit and the output path are the scene's unless the command line says otherwise"""
-    scene = cube(24, 24)
-    scene.cycles.samples, scene.cycles.time_limit = 48, 100
-    assert scene_output(scene) == ""
-    with Session(scene, Settings("null")) as session:
-        assert (session.frame.spp_max, session.frame.time_budget_s) == (48, 100)
-    with Session(scene, Settings("null", spp_max=9, spp_min=1, time_budget_s=0)) as session:
-        assert (session.frame.spp_max, session.frame.time_budget_s) == (9, 0)
-    scene.render.filepath = "//shots/cube_"
-    blend = saved(scene, "defaults.blend")
-    assert command(blend, "-c", "null", "-q") == (0, "")
-    assert (exr.read_layers(tmp("shots/cube_0001.exr"))[0]["lull.spp.V"] == 48).all()
-    status, text = command(blend, "-c", "null", "-q", "--frames", "2-2", "--spp-max", "16")
-    assert status == 0 and (exr.read_layers(tmp("shots/cube_0002.exr"))[0]["lull.spp.V"] == 16).all(), text
-    Path(tmp("shots/cube_0001.exr")).write_text("another program's")
-    status, text = command(blend, "-c", "null", "-q")
-    assert status == 2 and "another program's image would be replaced" in text, text
-
-
-def test_engine():
-    """a scene that another engine renders is refused"""
-    scene = cube(24, 24)
-    scene.render.engine = "BLENDER_WORKBENCH"
-    raises(HostError, "Workbench, not with Cycles", Cycles, scene, 4)
-    eevee = "BLENDER_EEVEE_NEXT" if (4, 2) <= bpy.app.version < (5, 0) else "BLENDER_EEVEE"
-    scene.render.engine = eevee
-    blend = saved(scene, "eevee.blend")
-    with NothingRendered():
-        status, text = command(blend, "-c", "null", "-q", "-o", tmp("eevee.exr"))
-    assert status == 2 and "not with Cycles" in text and not os.path.exists(tmp("eevee.exr")), text
 
 
 def test_pattern():
@@ -284,24 +42,6 @@ def test_pattern():
         assert own or "sampling pattern is Sobol-Burley instead of the scene's" in notes[0]
         kept += own
     assert kept > 0
-
-
-def test_quote():
-    """the dial's cost is told at the first check and by --quote, coarser ones too; a render goes on from the quote"""
-    blend = saved(cube(48, 32), "quote.blend")
-    common = (blend, "--block", "16", "--spp-max", "256", "--visible", ".2")
-    output = io.StringIO()
-    with contextlib.redirect_stdout(output):
-        assert command(*common, "-q", "--quote", "--checkpoint", tmp("quote.npz")) == (0, "")
-    table = output.getvalue().splitlines()
-    assert "spp min / mean / max" in table[0] and [float(r.split()[0]) for r in table[1:]] == [.9, .5, .25, .2, .05], table
-    assert "chosen" in table[4] and not os.path.exists("quote.exr")
-    means = [float(r.split("/")[1].replace(",", "")) for r in table[1:]]
-    assert means == sorted(means) and means[0] < means[-1], table
-    assert command(*common, "-q", "--checkpoint", tmp("quote.npz"), "--resume", "-o", tmp("after.exr")) == (0, "")
-    status, text = command(*common, "-o", tmp("plain.exr"))
-    assert status == 0 and "visible 0.2 takes about" in text and "visible 0.9 would take" in text, text
-    assert Path(tmp("after.exr")).read_bytes() == Path(tmp("plain.exr")).read_bytes()
 
 
 def colourful(width=40, height=30):
@@ -348,29 +88,12 @@ def test_passes():
             assert abs(own - plane).max() < 1e-5 * scale, (name, abs(own - plane).max(), scale)
             compared.add(name.rpartition(".")[0])
     left_out = {n.rpartition(".")[0] for n in wanted} - compared
+    assert left_out & {"DiffCol", "Diffuse Color"}  # switched on for the host's sake only
     assert all("Crypto" in n or n in ("DiffCol", "Diffuse Color", "Debug Sample Count", "Render Time") for n in left_out), left_out
     assert {"Combined", "Depth", "Normal", "Mist"} <= compared and len(compared) > 20
     assert (found["A"] == found[f"{layer.name}.Combined.A"]).all() and 0 < found["A"].mean() < 1
     shown = passes_in_blender(tmp("passes.exr"))
     assert set(shown["lull"]) == {"spp", "p_noisy", "error", "reason"} and {"Combined", "Mist", "Normal"} <= set(shown[layer.name])
-
-
-def test_told():
-    """what is not done as the scene says is told: denoising, the compositor, further view layers"""
-    scene = cube(24, 24)
-    scene.cycles.use_denoising = False
-    assert not [n for n in Cycles(scene, 4).notes if "pattern" not in n]
-    scene.cycles.use_denoising = True
-    scene.view_layers.new("Second")
-    if bpy.app.version < (5, 0):
-        scene.use_nodes = True
-    else:
-        scene.compositing_node_group = bpy.data.node_groups.new("c", "CompositorNodeTree")
-    blend = saved(scene, "told.blend")
-    status, text = command(blend, "-c", "null", "--spp-max", "16", "-o", tmp("told.exr"))
-    for wanted in ("not denoised", "compositor is not run", "only the view layer 'ViewLayer' is rendered, not Second"):
-        assert status == 0 and "lull: " in text and wanted in text, text
-    assert command(blend, "-c", "null", "--spp-max", "16", "-o", tmp("told.exr"), "-q") == (0, "")
 
 
 def passes_in_blender(path):
@@ -486,126 +209,6 @@ def test_region():
     raises(HostError, "holds no pixel", Cycles, scene, 4)
 
 
-def test_animation():
-    """the command renders frames of an animation, with the same dial, into numbered files"""
-    cube()
-    bpy.ops.wm.save_as_mainfile(filepath=tmp("cube.blend"))
-    status, text = command(tmp("cube.blend"), "-c", "halfbuf", "-p", "threshold=.02", "--frames", "1-2", "--block", "24",
-                           "-q", "--spp-max", "64", "-o", tmp("f.exr"), "--preview", tmp("f.png"), "--stop-map", tmp("f-map.png"),
-                           "--report", tmp("f.json"))
-    assert status == 0 and not text, text
-    first, second = (png.read_grey(tmp(f"f_000{k}.png")) for k in (1, 2))
-    assert abs(first - second).max() > .05
-    report = json.loads(Path(tmp("f_0002.json")).read_text())
-    assert report["kernel"].startswith("Cycles") and report["criterion"]["params"]["threshold"] == ".02"
-    assert all(os.path.getsize(tmp(f"f{ending}")) > 100 for ending in ("_0001.exr", "_0002.exr", "-map_0001.png"))
-
-
-def test_frames_of_scene():
-    """--frames all is the scene's own range, step by step"""
-    scene = cube(24, 24)
-    scene.frame_start, scene.frame_end, scene.frame_step = 1, 5, 2
-    bpy.ops.wm.save_as_mainfile(filepath=tmp("range.blend"))
-    status, text = command(tmp("range.blend"), "-c", "fixed", "--frames", "all", "-q", "--report", tmp("all.json"))
-    assert status == 0 and not text, text
-    assert sorted(p.name for p in Path(TMP.name).glob("all_*")) == ["all_0001.json", "all_0003.json", "all_0005.json"]
-
-
-def test_mask():
-    """a painted block gets more samples, and the report says why"""
-    cube(48, 24)
-    bpy.ops.wm.save_as_mainfile(filepath=tmp("cube.blend"))
-    painted = np.zeros((24, 48, 3), np.uint8)
-    painted[5, 7] = 255
-    png.write(tmp("mask.png"), painted)
-    blocks = []
-    for mask in ((), ("--mask", tmp("mask.png"))):
-        status, text = command(tmp("cube.blend"), "-c", "halfbuf", "-p", "threshold=.003", "--block", "24", "-q", "--report",
-                               tmp("m.json"), "--spp-max", "256", *mask)
-        assert status == 0, text
-        blocks.append([(b["spp"], b["dial"]) for b in json.loads(Path(tmp("m.json")).read_text())["blocks"]])
-    plain, masked = blocks
-    assert masked[0][0] > plain[0][0] and masked[1] == plain[1] and [b[1] for b in masked] == [.25, 1], blocks
-    assert json.loads(Path(tmp("m.json")).read_text())["mask"] == tmp("mask.png")
-
-
-def test_resume():
-    """a checkpoint goes on to the picture of an unbroken run"""
-    cube(48, 24)
-    bpy.ops.wm.save_as_mainfile(filepath=tmp("cube.blend"))
-    common = (tmp("cube.blend"), "-c", "null", "--block", "24", "-q")
-    state = ("--checkpoint", tmp("run.npz"))
-    assert command(*common, "--spp-max", "64", "-o", tmp("whole.exr")) == (0, "")
-    assert command(*common, "--spp-max", "32", "-o", tmp("part.exr"), *state) == (0, "")
-    assert command(*common, "--spp-max", "64", "-o", tmp("on.exr"), *state, "--resume") == (0, "")
-    whole, part, on = (Path(tmp(n + ".exr")).read_bytes() for n in ("whole", "part", "on"))
-    assert whole == on != part
-    os.mkdir(tmp("folder"))
-    with FolderGone(tmp("folder")):
-        status, text = command(*common, "--spp-max", "64", "-o", tmp("lost.exr"), "--checkpoint", tmp("folder/run.npz"))
-    assert status == 2 and "folder/run.npz" in text and os.path.exists(tmp("lost.exr"))  # the picture is kept all the same
-    status, text = command(*common, "--resume")
-    assert status == 2 and "--checkpoint" in text
-
-
-def test_bad_input():
-    """what cannot be rendered is said in one line, status 2, and nothing is written"""
-    cube()
-    bpy.ops.wm.save_as_mainfile(filepath=tmp("cube.blend"))
-    scene = cube()
-    scene.camera = None
-    bpy.ops.wm.save_as_mainfile(filepath=tmp("blind.blend"))
-    png.write(tmp("mask.png"), np.zeros((4, 4, 3), np.uint8))
-    out = tmp("bad.exr")
-    for arguments, wanted in (([tmp("blind.blend")], "no camera"),
-                              ([tmp("cube.blend"), "-c", "nobody"], "no criterion 'nobody'"),
-                              ([tmp("cube.blend"), "-c", "/none.so"], "no such file"),
-                              ([tmp("cube.blend"), "-c", "halfbuf", "-p", "x"], "KEY=VALUE"),
-                              ([tmp("cube.blend"), "-c", "halfbuf", "-p", "x=1"], "no parameter 'x'"),
-                              ([tmp("cube.blend"), "-c", "halfbuf", "--mask", tmp("mask.png")], "mask of shape (4, 4)"),
-                              ([tmp("cube.blend"), "-c", "halfbuf", "--mask", tmp("none.png")], "none.png"),
-                              ([tmp("cube.blend"), "-c", "halfbuf", "--frames", "b-a"], "--frames"),
-                              ([tmp("cube.blend"), "-c", "halfbuf", "--scene", "None"], "--scene"),
-                              ([tmp("cube.blend"), "-c", "halfbuf", "--spp-min", "9", "--spp-max", "3"], "spp_min"),
-                              ([tmp("none.blend")], "none.blend")):
-        status, text = command(*arguments, "-o", out, "-q")
-        assert status == 2 and wanted in text and len(text.strip().splitlines()) == 1, (arguments, status, text)
-        assert not os.path.exists(out)
-
-
-def test_device():
-    """a scene for a GPU that is not there is refused, not rendered on something else; --device chooses"""
-    if bpy.context.preferences.addons["cycles"].preferences.has_active_device():
-        raise Skip("a GPU is switched on")
-    scene = cube(24, 24)
-    scene.cycles.device = "GPU"
-    bpy.ops.wm.save_as_mainfile(filepath=tmp("gpu.blend"))
-    common = (tmp("gpu.blend"), "-c", "fixed", "-q", "-o", tmp("gpu.exr"))
-    for device, wanted in (((), "has none switched on"), (("--device", "CUDA"), "device CUDA"), (("--device", "METAL"), "METAL")):
-        status, text = command(*common, *device)
-        assert status == 2 and wanted in text and len(text.strip().splitlines()) == 1, (status, text)
-        assert not os.path.exists(tmp("gpu.exr"))
-    assert command(*common, "--device", "CPU") == (0, "") and os.path.exists(tmp("gpu.exr"))
-
-
-def test_programs():
-    """from a shell: the package as a program, and Blender itself with --python-expr"""
-    cube(24, 24)
-    bpy.ops.wm.save_as_mainfile(filepath=tmp("cube.blend"))
-    environment = {**os.environ, "PYTHONPATH": str(ROOT / "plugin-api/python")}
-    program = [os.environ.get("PYTHON", sys.executable), "-m", "lull.blender", tmp("cube.blend"), "-c", "fixed", "-q", "-o"]
-    expression = ["-b", tmp("cube.blend"), "-noaudio", "--python-use-system-env", "--python-expr",
-                  "from lull.blender import cli; cli.main()", "--", "-c", "fixed", "-q", "-o"]
-    starts = [program] + ([[bpy.app.binary_path, *expression]] if bpy.app.binary_path else [])
-    for n, start in enumerate(starts):
-        done = subprocess.run([*start, tmp(f"p{n}.exr")], env=environment, text=True, capture_output=True)
-        assert done.returncode == 0 and os.path.getsize(tmp(f"p{n}.exr")) > 1000, done.stderr
-    if bpy.app.binary_path:
-        done = subprocess.run([*program, tmp("p.exr"), "--blender", "no-blender"], env=environment, text=True,
-                              capture_output=True)
-        assert done.returncode == 2 and "no program 'no-blender'" in done.stderr and done.stderr.count("\n") == 1, done.stderr
-
-
 def test_no_cycles():
     """without Cycles, with stereo views or without a view layer the host says so"""
     scene = cube()
@@ -615,20 +218,6 @@ def test_no_cycles():
     scene.render.use_multiview = False
     scene.view_layers[0].use = False
     raises(HostError, "no view layer", Cycles, scene, 4)
-
-
-def test_interrupt():
-    """Ctrl-C keeps what is there, status 130"""
-    cube(200, 160)
-    bpy.ops.wm.save_as_mainfile(filepath=tmp("cube.blend"))
-    timer = threading.Timer(1.5, lambda: os.kill(os.getpid(), signal.SIGINT))
-    timer.start()
-    status, _ = command(tmp("cube.blend"), "-c", "null", "--spp-max", "100000", "-o", tmp("i.exr"), "--report",
-                        tmp("i.json"), "-q")
-    timer.cancel()
-    report = json.loads(Path(tmp("i.json")).read_text())
-    assert status == 130 and report["interrupted"] and {b["reason"] for b in report["blocks"]} == {"interrupt"}
-    assert 0 < report["blocks"][0]["spp"] < 100000 and os.path.getsize(tmp("i.exr")) > 1000
 
 
 def test_failing_render():
