@@ -51,7 +51,7 @@ def by_blocks(host, rects, found, waves):
     for n in waves:
         for i, r in enumerate(rects):
             (picture,), found["wave-s"][n, i] = cpu_seconds(list, host.render([r], WAVE * n, WAVE, False))
-            found["waves"][n, r.y0:r.y1, r.x0:r.x1] = picture
+            found["waves"][n, r.y0:r.y1, r.x0:r.x1] = picture["color"]
 
 
 def record(scene, out, width, height, block, spp, seed):

@@ -1,5 +1,5 @@
-"""Blender's Cycles as a host: pictures, passes, the add-on; run inside Blender or by a Python with the module bpy. BUILD names the
-build folder."""
+"""Blender's Cycles as a host: pictures, passes, the add-on; run inside Blender or by a Python with the module bpy. BUILD
+names the build folder."""
 import contextlib
 import dataclasses
 import os
@@ -66,7 +66,8 @@ def colourful(width=40, height=30):
 
 
 def test_passes():
-    """alpha and every pass of the view layer are those of one Cycles render, also after a resume; Blender finds them by name"""
+    """alpha and every pass of the view layer are those of one Cycles render, also after a resume; Blender finds them by
+    name"""
     scene = colourful()
     settings = Settings("null", spp_max=48, block=20, output=tmp("passes.exr"), checkpoint=tmp("passes.npz"))
     for spp in (32, 48):
@@ -89,11 +90,13 @@ def test_passes():
             compared.add(name.rpartition(".")[0])
     left_out = {n.rpartition(".")[0] for n in wanted} - compared
     assert left_out & {"DiffCol", "Diffuse Color"}  # switched on for the host's sake only
-    assert all("Crypto" in n or n in ("DiffCol", "Diffuse Color", "Debug Sample Count", "Render Time") for n in left_out), left_out
+    others = {"DiffCol", "Diffuse Color", "Debug Sample Count", "Render Time"}
+    assert all("Crypto" in n or n in others for n in left_out), left_out
     assert {"Combined", "Depth", "Normal", "Mist"} <= compared and len(compared) > 20
     assert (found["A"] == found[f"{layer.name}.Combined.A"]).all() and 0 < found["A"].mean() < 1
     shown = passes_in_blender(tmp("passes.exr"))
-    assert set(shown["lull"]) == {"spp", "p_noisy", "error", "reason"} and {"Combined", "Mist", "Normal"} <= set(shown[layer.name])
+    assert set(shown["lull"]) == {"spp", "p_noisy", "error", "reason"}
+    assert {"Combined", "Mist", "Normal"} <= set(shown[layer.name])
 
 
 def passes_in_blender(path):
@@ -140,7 +143,8 @@ def test_exported_scenes():
     """three scenes of ours: where blocks stopped, the picture is that of one Cycles render with the same samples"""
     for name, threshold in (("cornell-box", ".01"), ("soft-shadow", ".006"), ("glossy", ".02")):
         scene = exported(name)
-        with Session(scene, Settings("halfbuf", {"threshold": threshold, "tail-share": "1"}, block=24, spp_max=96)) as session:
+        settings = Settings("halfbuf", {"threshold": threshold, "tail-share": "1"}, block=24, spp_max=96)
+        with Session(scene, settings) as session:
             assert session.driver.run().outcome == "done"
             mean, blocks = session.frame.mean(), session.frame.blocks
         counts = sorted({b.spp for b in blocks})

@@ -83,7 +83,8 @@ def in_memory():
 
 
 def test_signals():
-    """TERM, INT and HUP keep picture and checkpoint, status 130; kill -9 keeps the last checkpoint; nothing stays in memory"""
+    """TERM, INT and HUP keep picture and checkpoint, status 130; kill -9 keeps the last checkpoint; nothing stays in
+    memory"""
     blend = saved(cube(48, 24), "signals.blend")
     before = in_memory()
     common = (blend, "-c", "null", "--block", "24", "-q", "--checkpoint-every", "0")
@@ -225,7 +226,8 @@ def test_animation():
     cube()
     bpy.ops.wm.save_as_mainfile(filepath=tmp("cube.blend"))
     status, text = command(tmp("cube.blend"), "-c", "halfbuf", "-p", "threshold=.02", "--frames", "1-2", "--block", "24",
-                           "-q", "--spp-max", "64", "-o", tmp("f.exr"), "--preview", tmp("f.png"), "--stop-map", tmp("f-map.png"),
+                           "-q", "--spp-max", "64", "-o", tmp("f.exr"), "--preview", tmp("f.png"), "--stop-map",
+                           tmp("f-map.png"),
                            "--report", tmp("f.json"))
     assert status == 0 and not text, text
     first, second = (png.read_grey(tmp(f"f_000{k}.png")) for k in (1, 2))
@@ -315,7 +317,8 @@ def test_device():
     scene.cycles.device = "GPU"
     bpy.ops.wm.save_as_mainfile(filepath=tmp("gpu.blend"))
     common = (tmp("gpu.blend"), "-c", "fixed", "-q", "-o", tmp("gpu.exr"))
-    for device, wanted in (((), "has none switched on"), (("--device", "CUDA"), "device CUDA"), (("--device", "METAL"), "METAL")):
+    for device, wanted in (((), "has none switched on"), (("--device", "CUDA"), "device CUDA"),
+                           (("--device", "METAL"), "METAL")):
         status, text = command(*common, *device)
         assert status == 2 and wanted in text and len(text.strip().splitlines()) == 1, (status, text)
         assert not os.path.exists(tmp("gpu.exr"))
@@ -337,7 +340,8 @@ def test_programs():
     if bpy.app.binary_path:
         done = subprocess.run([*program, tmp("p.exr"), "--blender", "no-blender"], env=environment, text=True,
                               capture_output=True)
-        assert done.returncode == 2 and "no program 'no-blender'" in done.stderr and done.stderr.count("\n") == 1, done.stderr
+        assert done.returncode == 2 and "no program 'no-blender'" in done.stderr, done.stderr
+        assert done.stderr.count("\n") == 1, done.stderr
 
 
 def test_interrupt():

@@ -1,4 +1,5 @@
-"""What the Python package writes: the same verdicts and words as the path tracer's, and files that are whole or as before."""
+"""What the Python package writes: the same verdicts and words as the path tracer's, and files that are whole or as
+before."""
 import os
 import signal
 import stat
@@ -82,7 +83,7 @@ def test_one_file_twice():
                           ("two/folder/x.png", "two/way/x.png"), ("two/folder/new.png", "two/far.png"),
                           ("two/there.png", "two/here.png")):
         options = [("--preview", first), ("--stop-map", second)]
-        text = "{} {}: the same file as {} {}, one of the two would be lost"  # of the two it names first the one it meets last
+        text = "{} {}: the same file as {} {}, one of the two would be lost"  # the path tracer meets the other one last
         assert verdict_of_package(options) == text.format("--stop-map", second, "--preview", first), options
         assert verdict_of_pathtracer(options) == text.format("--preview", first, "--stop-map", second), options
 

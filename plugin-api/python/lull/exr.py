@@ -130,7 +130,11 @@ def _decode(data: bytes) -> tuple[dict[str, np.ndarray], tuple[int, int], dict[s
         count = min(lines, height - y)
         if y < 0 or count < 1 or at + 8 + size > len(data):
             raise ValueError("a chunk lies outside")
-        rows[y:y + count] = np.frombuffer(_unzip(data[at + 8:at + 8 + size], count * column), np.uint8).reshape(count, column)
+        raw = _unzip(data[at + 8:at + 8 + size], count * column)
+        rows[y:y + count] = np.frombuffer(raw, np.uint8).reshape(count, column)
         at += 8 + size
-    return {name: np.ascontiguousarray(rows[:, start:start + width * np.dtype(stored).itemsize]).view(stored).astype(np.float32)
-            for name, (start, stored) in places.items()}, (x0, y0), head
+    channels = {}
+    for name, (start, stored) in places.items():
+        part = np.ascontiguousarray(rows[:, start:start + width * np.dtype(stored).itemsize])
+        channels[name] = part.view(stored).astype(np.float32)
+    return channels, (x0, y0), head

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Files that are written: known before the work whether they can be, and under their names only when they are complete.
 
-The rules and the words are the path tracer's (plugin-api/base/files.h, outputs.h): a symbolic link is followed, only a regular
-file is replaced, no two outputs are one file, none is an input. A temporary is locked while its process lives; those that a
-killed process left in a folder are removed when the next output there is checked.
+The rules and the words are the path tracer's (plugin-api/base/files.h, outputs.h): a symbolic link is followed, only a
+regular file is replaced, no two outputs are one file, none is an input. A temporary is locked while its process lives;
+those that a killed process left in a folder are removed when the next output there is checked.
 """
 from __future__ import annotations
 
@@ -41,7 +41,8 @@ def _target(path: str) -> str:
 
 
 def _sweep(folder: str) -> None:
-    """Removes the temporaries of processes that are gone. One on another machine, or in another container, holds its lock."""
+    """Removes the temporaries of processes that are gone. One on another machine, or in another container, holds its
+    lock."""
     for name in os.listdir(folder) if os.access(folder, os.R_OK) else ():
         pid, dash, _ = name[len(_PREFIX):].partition("-")
         if not name.startswith(_PREFIX) or not dash or not pid.isdigit():
@@ -91,8 +92,8 @@ def _same(a: str, b: str) -> bool:
 
 
 def check_outputs(outputs: Iterable[Output], inputs: Iterable[str] = ()) -> None:
-    """OSError or ValueError, one line, for the first one that cannot be written, is written twice, or is an input. Those whose
-    path is empty are none."""
+    """OSError or ValueError, one line, for the first one that cannot be written, is written twice, or is an input. Those
+    whose path is empty are none."""
     seen: list[tuple[Output, str]] = []
     read = [path for path in inputs if os.path.exists(path)]
     for o in (o for o in outputs if o.path):
@@ -101,8 +102,8 @@ def check_outputs(outputs: Iterable[Output], inputs: Iterable[str] = ()) -> None
         target = _checked(o.path)
         for other, there in seen:
             if _same(target, there):
-                raise ValueError(f"{o.option} {o.path}: the same file as {other.option} {other.path}, one of the two would be "
-                                 "lost")
+                raise ValueError(f"{o.option} {o.path}: the same file as {other.option} {other.path}, "
+                                 "one of the two would be lost")
         for path in read:
             if os.path.exists(target) and os.path.samefile(target, path):
                 raise ValueError(f"{o.path}: this is an input ({path}), it would be overwritten")

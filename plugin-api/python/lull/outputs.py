@@ -19,8 +19,8 @@ from .frame import Frame
 
 def write_exr(path: str, driver: Driver, scene: str = "", software: str = "lull for Python 1.0",
               more: Optional[Mapping[str, Optional[np.ndarray]]] = None) -> None:
-    """R, G, B and the layer lull, which image programs show as spp, p_noisy, error and reason, then those of the frame; cut to
-    the crop. more: further channels over the frame's view, or instead of its layers; None leaves one out."""
+    """R, G, B and the layer lull, which image programs show as spp, p_noisy, error and reason, then those of the frame;
+    cut to the crop. more: further channels over the frame's view, or instead of its layers; None leaves one out."""
     frame = driver.frame
     rgb = frame.cropped(frame.mean())
     channels = {"R": rgb[..., 0], "G": rgb[..., 1], "B": rgb[..., 2], "lull.spp.V": frame.cropped(frame.spp())}
@@ -44,7 +44,8 @@ def write_exr(path: str, driver: Driver, scene: str = "", software: str = "lull 
 
 
 def is_ours(path: str) -> bool:
-    """Is this a picture of Lull's, or none at all? What is another program's must not be replaced unless somebody says so."""
+    """Is this a picture of Lull's, or none at all? What is another program's must not be replaced unless somebody says
+    so."""
     try:
         with open(path, "rb") as file:
             begin = file.read(4096)

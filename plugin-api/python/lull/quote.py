@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What the criterion's dial will cost, told from the checks of a render that has begun: samples and time at its setting and at
-coarser and finer ones. As `pathtracer --quote` does, with one more instance of the criterion per setting, each asked about the
-blocks as they are; neither the frame nor the render's own instances change."""
+"""What the criterion's dial will cost, told from the checks of a render that has begun: samples and time at its setting
+and at coarser and finer ones. As `pathtracer --quote` does, with one more instance of the criterion per setting, each
+asked about the blocks as they are; neither the frame nor the render's own instances change."""
 from __future__ import annotations
 
 import math
@@ -62,7 +62,8 @@ def _settings(driver: Driver) -> list[tuple[float, str]]:
 
 
 def rows(driver: Driver) -> list[Row]:
-    """Coarse to fine; [] if the criterion has no dial or cannot be asked. Every active block has been checked once at least."""
+    """Coarse to fine; [] if the criterion has no dial or cannot be asked. Every active block has been checked once at
+    least."""
     frame, out = driver.frame, []
     try:
         parameter, chosen = dial_of(frame.criterion)
@@ -107,6 +108,7 @@ def line(driver: Driver) -> str:
     if own is None:
         return ""
     coarser = [r for r in found if r.value > own.value][::-1]
-    parts = [f"{r.dial} {r.value:g} would take {'at most ' if r.at_most else 'about '}{time_text(r.time_s)}" for r in coarser]
+    parts = [f"{r.dial} {r.value:g} would take {'at most ' if r.at_most else 'about '}{time_text(r.time_s)}"
+             for r in coarser]
     return (f"{own.dial} {own.value:g} takes {'at most' if own.at_most else 'about'} {time_text(own.time_s)}, "
             f"{own.spp[1]:,.0f} spp" + "".join(f"; {p}" for p in parts))

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Requests to stop, for programs: the first SIGINT, SIGTERM or SIGHUP asks for an end, a second one kills, as in the path tracer."""
+"""Requests to stop, for programs: the first SIGINT, SIGTERM or SIGHUP asks for an end, a second one kills, as in the path
+tracer."""
 from __future__ import annotations
 
 import signal

@@ -40,18 +40,18 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--device", choices=DEVICES, help="what Cycles renders on (default: what the scene says)")
     p.add_argument("--scene", metavar="NAME", help="which scene of the file (default: the active one)")
     p.add_argument("-o", "--output", default="", metavar="FILE.exr", help="picture with layers for samples and noise "
-                   "(default, if nothing else is asked for: where the scene's output path says, else the .blend's name in the "
-                   "current folder)")
+                   "(default, if nothing else is asked for: where the scene's output path says, else the .blend's name in "
+                   "the current folder)")
     p.add_argument("--preview", default="", metavar="FILE.png", help="as it is shown (curve per channel)")
     p.add_argument("--stop-map", default="", metavar="FILE.png|FILE.csv", help="samples per block")
     p.add_argument("--report", default="", metavar="FILE.json", help="everything about the run")
-    p.add_argument("--checkpoint", default="", metavar="FILE", help="keep the state there now and then, and when the render ends or is "
-                   "interrupted")
+    p.add_argument("--checkpoint", default="", metavar="FILE", help="keep the state there now and then, and when the "
+                   "render ends or is interrupted")
     p.add_argument("--checkpoint-every", type=float, default=60, metavar="SECONDS", help="how often (default 60)")
-    p.add_argument("--resume", action="store_true", help="go on from the checkpoint, if it is there; with a higher --spp-max "
-                   "a finished picture gets more samples")
-    p.add_argument("--quote", action="store_true", help="render a pilot of 128 samples or 30 seconds, print what the dial will "
-                   "cost at its own and at other settings, and end; a render can go on from its --checkpoint")
+    p.add_argument("--resume", action="store_true", help="go on from the checkpoint, if it is there; with a higher "
+                   "--spp-max a finished picture gets more samples")
+    p.add_argument("--quote", action="store_true", help="render a pilot of 128 samples or 30 seconds, print what the dial "
+                   "will cost at its own and at other settings, and end; a render can go on from its --checkpoint")
     p.add_argument("-q", "--quiet", action="store_true", help="no progress and no notes")
     p.add_argument("--blender", default="blender", metavar="PROGRAM", help="which Blender to run (default: on PATH)")
     return p
@@ -95,8 +95,8 @@ def _frames(text: Optional[str], scene) -> list[Optional[int]]:
 
 
 def main(argv: Optional[Sequence[str]] = None) -> int:
-    """Inside Blender (options after `--`) or with bpy. Exit status: 0 done, 1 rendering failed, 2 bad input or an output could
-    not be written, 130 interrupted."""
+    """Inside Blender (options after `--`) or with bpy. Exit status: 0 done, 1 rendering failed, 2 bad input or an output
+    could not be written, 130 interrupted."""
     from ..library import LullError
     from .cycles import HostError
     if argv is None:

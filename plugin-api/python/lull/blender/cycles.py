@@ -3,9 +3,9 @@
 
 Relies on what Cycles does with persistent data, a fixed seed, a pattern that allows it and a sample offset: samples [first,
 first + count) of a pixel are those that one long render would take, whatever border is rendered, so that waves add up to it.
-The pixels come back through an uncompressed EXR, because the Render Result cannot be read in background mode; the file has no
-name and lies in memory, so that it is gone with the process however that ends. Every setting that is touched is put back on
-exit.
+The pixels come back through an uncompressed EXR, because the Render Result cannot be read in background mode; the file has
+no name and lies in memory, so that it is gone with the process however that ends. Every setting that is touched is put
+back on exit.
 """
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from ..blocks import merge
 from ..criterion import Rect
 from .passes import Passes
 
-# Sobol-Burley under its names in 3.x and 4.x: its waves add up to one render. The others' tables depend on the total number of
-# samples; they are usable where Cycles can be told that total apart from the subset to render (4.4 and later).
+# Sobol-Burley under its names in 3.x and 4.x: its waves add up to one render. The others' tables depend on the total
+# number of samples; they are usable where Cycles can be told that total apart from the subset to render (4.4 and later).
 PATTERNS = ("SOBOL", "SOBOL_BURLEY")
 
 
@@ -111,12 +111,14 @@ class Cycles:
         if not hasattr(scene, "cycles"):
             raise HostError("Cycles is not available: enable the add-on 'Cycles Render Engine' in the preferences")
         if scene.render.engine != "CYCLES":
-            raise HostError(f"scene '{scene.name}' renders with {_label(scene.render, 'engine', scene.render.engine)}, not with "
-                            "Cycles: choose Cycles as its render engine, or another scene")
+            engine = _label(scene.render, "engine", scene.render.engine)
+            raise HostError(f"scene '{scene.name}' renders with {engine}, not with Cycles: choose Cycles as its "
+                            "render engine, or another scene")
         if scene.camera is None:
             raise HostError(f"scene '{scene.name}' has no camera: add one, or set the scene's active camera")
         if scene.cycles.device == "GPU" and not _gpus().has_active_device():
-            raise HostError(f"scene '{scene.name}' renders on a GPU and Cycles has none switched on: choose a device, or CPU")
+            raise HostError(f"scene '{scene.name}' renders on a GPU and Cycles has none switched on: choose a device, or "
+                            "CPU")
         render = scene.render
         if render.use_multiview:
             raise HostError(f"scene '{scene.name}' renders several views: turn stereoscopy off")
@@ -132,7 +134,8 @@ class Cycles:
             self.notes.append("the picture is not denoised; the Denoise node of the compositor can do that afterwards")
         nodes = scene.compositing_node_group if hasattr(scene, "compositing_node_group") else scene.use_nodes
         if nodes and render.use_compositing:
-            self.notes.append("the scene's compositor is not run: give it the picture by an Image node in place of Render Layers")
+            self.notes.append("the scene's compositor is not run: give it the picture by an Image node in place of Render "
+                              "Layers")
         if any(getattr(self.layer, f"use_pass_cryptomatte_{kind}") for kind in ("object", "material", "asset")):
             self.notes.append("Cryptomatte passes are left out: render them apart, a few samples are enough")
         if others := [layer.name for layer in scene.view_layers if layer.use and layer != self.layer]:
@@ -201,7 +204,8 @@ class Cycles:
                 hidden |= names
         x, y = self.crop[:2]
         channels = self._render_area(Rect(x, y, x + 1, y + 1), 0, 1)
-        self.passes = Passes(self.layer.name, channels, (self.width, self.height), hidden, self.scene.render.film_transparent)
+        self.passes = Passes(self.layer.name, channels, (self.width, self.height), hidden,
+                             self.scene.render.film_transparent)
 
     def _choose_pattern(self) -> str:
         """The scene's own sampling pattern if its waves add up to one render, else one whose waves do."""
@@ -231,8 +235,8 @@ class Cycles:
     # --- rendering -----------------------------------------------------------------------------------------------------
 
     def render(self, rects: Sequence[Rect], first: int, count: int, _half: bool) -> Iterator[dict[str, np.ndarray]]:
-        """The driver's render function: means of samples [first, first + count), float32, per rectangle: "color" [h, w, 3] and
-        the passes [h, w]."""
+        """The driver's render function: means of samples [first, first + count), float32, per rectangle: "color" [h, w, 3]
+        and the passes [h, w]."""
         areas = {area: self._render_area(area, first, count) for area in merge(rects)}
         for r in rects:
             area, channels = next((a, c) for a, c in areas.items() if a.x0 <= r.x0 < a.x1 and a.y0 <= r.y0 < a.y1)

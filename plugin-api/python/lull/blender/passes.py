@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The passes of a view layer, summed over waves: alpha and all that Cycles averages over samples, what it takes from the first
-sample or wave alone, and light that it divides by a colour. Cryptomatte, which ranks objects by their share, cannot be summed so."""
+"""The passes of a view layer, summed over waves: alpha and all that Cycles averages over samples, what it takes from the
+first sample or wave alone, and light that it divides by a colour. Cryptomatte, which ranks objects by their share, cannot
+be summed so; the shadow catcher's pass, a ratio of two that are not given, is the mean of the waves' ratios."""
 from __future__ import annotations
 
 import re
@@ -14,7 +15,8 @@ from ..frame import Frame
 # Under their names up to 4.x and in 5.x. Motion vectors are divided by how many samples met something, which no pass tells:
 # the first wave's are kept.
 _FIRST = {"Depth", "Position", "IndexOB", "IndexMA", "Object Index", "Material Index", "Vector"}
-_LIGHT = re.compile(r"(Diff|Gloss|Trans|Subsurface)(?:Dir|Ind)|((?:Diffuse|Glossy|Transmission|Subsurface) )(?:Direct|Indirect)")
+_LIGHT = re.compile(r"(Diff|Gloss|Trans|Subsurface)(?:Dir|Ind)|"
+                    r"((?:Diffuse|Glossy|Transmission|Subsurface) )(?:Direct|Indirect)")
 _LEFT_OUT = re.compile(r"Crypto.*|Debug Sample Count|Render Time|Noisy.*")
 
 
@@ -25,8 +27,8 @@ def _colour_of(name: str) -> Optional[str]:
 
 
 class Passes:
-    """names: what to give the frame as layers. prefix: the view layer's name in channels; channels: those of a wave without it;
-    colours: colour passes that the user has not switched on; transparent: the film is, alpha is wanted."""
+    """names: what to give the frame as layers. prefix: the view layer's name; channels: those of a wave, without it; size:
+    the picture's; hidden: passes that the user has not switched on; transparent: the film is, alpha is wanted."""
 
     def __init__(self, prefix: str, channels: Iterable[str], size: tuple[int, int], hidden: set[str], transparent: bool):
         kept = [c for c in channels if not _LEFT_OUT.fullmatch(c.rpartition(".")[0]) and not c.startswith("Combined.")]
@@ -66,8 +68,8 @@ class Passes:
             plane[v.y0:v.y1, v.x0:v.x1] = frame.mean(name)
 
     def finished(self, frame: Frame) -> dict[str, Optional[np.ndarray]]:
-        """Channels for the picture's file, over the view: light divided by its colour, the picture as the view layer's Combined,
-        which is what Blender looks for. None: summed for another one's sake only."""
+        """Channels for the picture's file, over the view: light divided by its colour, the picture as the view layer's
+        Combined, which is what Blender looks for. None: summed for another one's sake only."""
         means = {channel: frame.mean(name) for name, channel in self._kept.items()}
         out: dict[str, Optional[np.ndarray]] = {}
         for name, channel in self._kept.items():

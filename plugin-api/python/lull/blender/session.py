@@ -70,8 +70,8 @@ def scene_output(scene: bpy.types.Scene, frame: Optional[int] = None) -> str:
 
 
 def default_output(scene: bpy.types.Scene, frame: Optional[int], otherwise: str) -> str:
-    """The picture's name when nobody gave one: what the scene says, else `otherwise`. ValueError if another program's picture
-    is there."""
+    """The picture's name when nobody gave one: what the scene says, else `otherwise`. ValueError if another program's
+    picture is there."""
     path = scene_output(scene, frame)
     if path:
         os.makedirs(os.path.dirname(path), exist_ok=True)  # as Blender does
@@ -116,8 +116,8 @@ def _identity(scene: bpy.types.Scene, host: Cycles) -> dict[str, str]:
 class Session:
     """The frame that the scene is at, in the making. Use as a context manager; call run(), or step() from an event loop.
 
-    notes: lines for people about what is done otherwise than the scene says. quote: what the dial costs and what coarser ones
-    would, one line, "" before the first check. unsaved: why the checkpoint could not be written, if so.
+    notes: lines for people about what is done otherwise than the scene says. quote: what the dial costs and what coarser
+    ones would, one line, "" before the first check. unsaved: why the checkpoint could not be written, if so.
     """
 
     def __init__(self, scene: bpy.types.Scene, settings: Settings, criterion: Optional[Criterion] = None,
@@ -135,11 +135,13 @@ class Session:
         self.host.__enter__()
         try:
             self.frame = Frame(judge, self.host.width, self.host.height, block=settings.block, crop=self.host.crop,
-                               layers=self.host.passes.names, spp_max=spp_max, time_budget_s=time_s, deterministic=time_s <= 0,
+                               layers=self.host.passes.names, spp_max=spp_max, time_budget_s=time_s,
+                               deterministic=time_s <= 0,
                                spp_min=min(settings.spp_min, spp_max) if settings.spp_max is None else settings.spp_min,
                                mask=png.read_grey(settings.mask) if settings.mask else None, seed=scene.cycles.seed, **shown)
             self.driver = Driver(self.frame, self.host.render, wave=settings.wave, threads=self.host.threads,
-                                 identity=_identity(scene, self.host) if settings.checkpoint else None, after_call=after_call)
+                                 identity=_identity(scene, self.host) if settings.checkpoint else None,
+                                 after_call=after_call)
         except BaseException:
             self.host.__exit__()
             raise

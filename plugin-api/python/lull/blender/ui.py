@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The add-on: Render properties → Lull, with settings per scene, a button, and picture and stop map as images of Blender's."""
+"""The add-on: Render properties → Lull, with settings per scene, a button, and picture and stop map as images of
+Blender's."""
 import os
 import textwrap
 import time
@@ -42,7 +43,8 @@ class LullSettings(bpy.types.PropertyGroup):
                                "example first-spp=64")
     spp_min: IntProperty(name="Min Samples", default=16, min=1, description="Samples before the first decision")
     block: IntProperty(name="Block Size", default=0, min=0, max=4096, subtype="PIXEL",
-                       description="Pixels; 0 = what the criterion was made for, less where that would be fewer than 12 blocks")
+                       description="Pixels; 0 = what the criterion was made for, less where that would be fewer than 12 "
+                       "blocks")
     mask: StringProperty(name="Mask", subtype="FILE_PATH", description="A PNG of the picture's size: lighter regions are "
                          "rendered better")
     folder: StringProperty(name="Output", subtype="DIR_PATH", description="Folder for picture, stop map and report; empty: "
