@@ -3,7 +3,8 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { USUAL_BLOCK = 200 };
+/* Blocks by default: up to so many pixels wide, and small enough that a picture has so many. */
+enum { USUAL_BLOCK = 200, LEAST_DEFAULT = 16, ENOUGH_BLOCKS = 12 };
 
 static int32_t least(int32_t a, int32_t b) { return a < b ? a : b; }
 static int32_t most(int32_t a, int32_t b) { return a > b ? a : b; }
@@ -20,12 +21,47 @@ static int is_inside(const struct lull_rect *r, const struct lull_host_config *g
            r->y1 <= (int32_t)g->height;
 }
 
+static uint64_t count_of(const struct lull_host_config *g, uint32_t size)
+{
+    return (uint64_t)((g->width - 1) / size + 1) * ((g->height - 1) / size + 1);
+}
+
+/* No block at the edge is narrower than half of the others. */
+static int is_even(uint32_t length, uint32_t size)
+{
+    return length <= size || length % size == 0 || 2 * (length % size) >= size;
+}
+
+/* The block size, up to `largest`, with which the picture has enough blocks: the largest one that is even, if there is one. */
+static uint32_t default_size(const struct lull_host_config *g, uint32_t largest)
+{
+    uint32_t fine = 0;
+    if (count_of(g, largest) >= ENOUGH_BLOCKS)
+        return largest;
+    for (uint32_t size = largest - 1; size >= LEAST_DEFAULT; size--) {
+        if (count_of(g, size) < ENOUGH_BLOCKS)
+            continue;
+        if (is_even(g->width, size) && is_even(g->height, size))
+            return size;
+        fine = fine > 0 ? fine : size;
+    }
+    return fine > 0 ? fine : largest < LEAST_DEFAULT ? largest : LEAST_DEFAULT;
+}
+
 static int32_t choose_size(const struct lull_host_config *g, const struct lull_requirements *needs,
                            struct lull_host_blocks *b, struct lull_error *err)
 {
     uint32_t own_width = needs && needs->block_width ? needs->block_width : USUAL_BLOCK;
     uint32_t own_height = needs && needs->block_height ? needs->block_height : USUAL_BLOCK;
-    uint32_t width = g->block_width ? g->block_width : own_width, height = g->block_height ? g->block_height : own_height;
+    uint32_t width = g->block_width, height = g->block_height;
+    if (needs && needs->block_width && !(needs->flags & LULL_REQ_FLEXIBLE)) {
+        width = width ? width : own_width;
+        height = height ? height : own_height;
+    } else if (width == 0 || height == 0) {
+        uint32_t size = default_size(g, own_width < own_height ? own_width : own_height);
+        width = width ? width : size;
+        height = height ? height : size;
+    }
     if (width > INT32_MAX || height > INT32_MAX)
         return lull_error_set(err, LULL_E_INVALID, "blocks of %ux%u pixels are too large", width, height);
     b->block_width = (int32_t)width;

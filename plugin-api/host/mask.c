@@ -1,5 +1,6 @@
 #include "host/frame.h"
 
+#include <locale.h>
 #include <math.h>
 #include <stdio.h>
 
@@ -35,8 +36,8 @@ double lull_host_dial(uint32_t step)
     return pow(WHITE_SCALE, (double)step / LULL_HOST_STEPS);
 }
 
-int32_t lull_host_scale_dial(const struct lull_criterion *t, const struct lull_pair *pairs, uint32_t pair_count,
-                             uint32_t step, char value[32], struct lull_pair *pair, struct lull_error *err)
+static int32_t scale_dial(const struct lull_criterion *t, const struct lull_pair *pairs, uint32_t pair_count,
+                          uint32_t step, char value[32], struct lull_pair *pair, struct lull_error *err)
 {
     static const char *const dials[] = {"visible", "threshold"};
     const char *known = NULL; /* a dial that has no value */
@@ -57,4 +58,18 @@ int32_t lull_host_scale_dial(const struct lull_criterion *t, const struct lull_p
         return lull_error_set(err, LULL_E_VALUE, "criterion %s: a mask scales '%s', which has no value: give one, %s=VALUE",
                               t->id, known, known);
     return lull_error_set(err, LULL_E_KEY, "criterion %s has no dial 'visible' or 'threshold' for a mask to scale", t->id);
+}
+
+/* Numbers in text have the form of the C locale, whatever the renderer has set. */
+int32_t lull_host_scale_dial(const struct lull_criterion *t, const struct lull_pair *pairs, uint32_t pair_count,
+                             uint32_t step, char value[32], struct lull_pair *pair, struct lull_error *err)
+{
+    locale_t c = newlocale(LC_ALL_MASK, "C", (locale_t)0);
+    if (c == (locale_t)0)
+        return lull_host_no_memory(err, "mask");
+    locale_t before = uselocale(c);
+    int32_t code = scale_dial(t, pairs, pair_count, step, value, pair, err);
+    uselocale(before);
+    freelocale(c);
+    return code;
 }

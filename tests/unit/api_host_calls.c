@@ -27,6 +27,7 @@ static struct {
     struct lull_requirements needs;
     struct lull_decision answer[MOST]; /* by block */
     int32_t create, require, begin, evaluate, save, load; /* to be answered */
+    double fails_at; /* the dial of an instance that fails to evaluate */
     char calls[400];
     struct lull_frame frame;
     struct lull_rect rects[MOST];
@@ -122,7 +123,7 @@ static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, 
         decisions[k] = heard.answer[blocks[k].id];
     }
     note("; ");
-    return said(heard.evaluate, err);
+    return said(in->dial == heard.fails_at && in->dial > 0 ? LULL_E_INTERNAL : heard.evaluate, err);
 }
 
 static void end_frame(struct lull_instance *in)
@@ -293,15 +294,36 @@ static void grids(void **state)
     assert_int_equal(lull_host_begin(&config, criterion, &frame, &err), LULL_OK);
     assert_true(lull_host_blocks_of(frame)->count == 2 && lull_host_blocks_of(frame)->columns == 2 && lull_host_blocks_of(frame)->rows == 1);
     lull_host_end(frame);
-    config.block_width = config.block_height = 0; /* nobody cares */
-    assert_int_equal(lull_host_begin(&config, criterion, &frame, &err), LULL_OK);
-    assert_true(lull_host_blocks_of(frame)->block_width == 200 && lull_host_blocks_of(frame)->block_height == 200);
+    frame = NULL;
     tear_down();
     static const char *const names[] = {"none", "criterion", "spp-max", "uniform", "time", "interrupt", "dropped"};
     for (int i = 0; i < LULL_REASON_COUNT; i++)
         assert_string_equal(lull_host_reason(i), names[i]);
     assert_string_equal(lull_host_reason(LULL_REASON_COUNT), "unknown");
     assert_string_equal(lull_host_reason(-1), "unknown");
+}
+
+/* Nobody says how large: as the criterion was made, but at least 12 blocks of 16 pixels or more, even ones if there are. */
+static void blocks_by_default(void **state)
+{
+    (void)state;
+    static const struct {
+        uint32_t width, height, own, flags, size;
+    } cases[] = {{1920, 1080, 0, LULL_REQ_FLEXIBLE, 200}, {640, 480, 0, LULL_REQ_FLEXIBLE, 200}, {240, 160, 0, LULL_REQ_FLEXIBLE, 64},
+                 {512, 512, 0, LULL_REQ_FLEXIBLE, 146},   {100, 60, 200, LULL_REQ_FLEXIBLE, 22}, {8, 8, 0, LULL_REQ_FLEXIBLE, 16},
+                 {1920, 1080, 100, LULL_REQ_FLEXIBLE, 100}, {240, 160, 100, 0, 100},             {240, 160, 8, LULL_REQ_FLEXIBLE, 8}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        set_up(ALL_PLANES, 0);
+        criterion->needs.flags = cases[i].flags;
+        criterion->needs.block_width = criterion->needs.block_height = cases[i].own;
+        config = (struct lull_host_config){.struct_size = sizeof config, .width = cases[i].width, .height = cases[i].height, .spp_min = 1,
+                                           .spp_max = 9};
+        struct lull_host_blocks blocks = {0};
+        assert_int_equal(lull_host_lay_out(&config, &criterion->needs, 0, &blocks, &err), LULL_OK);
+        assert_true(blocks.block_width == (int32_t)cases[i].size && blocks.block_height == (int32_t)cases[i].size);
+        free(blocks.list);
+        tear_down();
+    }
 }
 
 /* Any rectangles: they keep their order, and who touches whom is seen. */
@@ -694,6 +716,16 @@ static void every_step_has_its_instance(void **state)
         assert_int_equal(lull_host_evaluate(criterion, frame, &view, due, final, 5, got, &err), LULL_OK);
         for (int k = 0; k < 5; k++)
             assert_true(got[k].error == due[k]);
+        heard.fails_at = 1; /* the second of those asked: the first one's answers do not count either */
+        heard.calls[strlen(heard.calls) - 1] = '\0';
+        char kept[sizeof heard.calls];
+        strcpy(kept, heard.calls);
+        heard.answer[0].action = LULL_STOP;
+        assert_int_equal(lull_host_evaluate(criterion, frame, &view, due, final, 5, got, &err), LULL_E_INTERNAL);
+        for (int k = 0; k < 5; k++)
+            assert_true(got[k].action == LULL_CONTINUE && isnan(got[k].error));
+        strcpy(heard.calls, kept);
+        note(" ");
         char bytes[20], *end = bytes;
         struct lull_writer writer = {.struct_size = sizeof writer, .context = &end, .write = gather};
         assert_int_equal(lull_host_save_history(criterion, &writer, &err), LULL_OK);
@@ -780,6 +812,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(grids),
+        cmocka_unit_test(blocks_by_default),
         cmocka_unit_test(layouts_of_ones_own),
         cmocka_unit_test(next_checks_and_seams),
         cmocka_unit_test(closed_blocks_are_extended),

@@ -121,6 +121,47 @@ static void a_render_opens_its_frame(void **state)
     lull_host_close(criterion);
 }
 
+static int32_t fail_to_evaluate(struct lull_instance *in, const struct lull_view *view, const struct lull_block *blocks,
+                                uint32_t block_stride, struct lull_decision *decisions, uint32_t decision_stride, uint32_t count,
+                                struct lull_error *err)
+{
+    (void)in, (void)view, (void)blocks, (void)block_stride, (void)decisions, (void)decision_stride, (void)count;
+    strcpy(err->message, "no such luck");
+    return err->code = LULL_E_INTERNAL;
+}
+
+static void keep_words(void *data, const char *line)
+{
+    strcat(strcat(data, line), "\n");
+}
+
+/* A criterion that fails is said so once, and every block gets its samples. */
+static void failures_are_told_once(void **state)
+{
+    (void)state;
+    struct base_err err = {0};
+    struct base_threads *pool = base_threads_create(1, &err);
+    struct lull_criterion table = *pt_fake_criterion();
+    struct lull_host_criterion *criterion;
+    struct pt_render *render = NULL;
+    char words[500] = "";
+    const struct pt_render_hooks hooks = {.warn = keep_words, .data = words};
+    enum pt_render_outcome outcome;
+    struct pt_render_config config = pt_fake_config();
+    table.evaluate = fail_to_evaluate;
+    config.spp_max = 20;
+    assert_int_equal(pt_criterion_create(&table, NULL, 0, NULL, NULL, NULL, &criterion, &err), 0);
+    assert_int_equal(pt_render_create(&config, NULL, pt_fake_noise, pool, criterion, &render, &err), 0);
+    assert_int_equal(pt_render_run(render, &hooks, &outcome, &err), 0);
+    assert_string_equal(words, "criterion fake: no such luck\n");
+    assert_true(render->totals->failed_checks > 1);
+    for (uint32_t i = 0; i < render->blocks->count; i++)
+        assert_true(render->blocks->list[i].spp == 20 && render->blocks->list[i].reason == LULL_REASON_SPP_MAX);
+    pt_render_destroy(render);
+    lull_host_close(criterion);
+    base_threads_destroy(pool);
+}
+
 /* --- what a criterion is offered ----------------------------------------------------------------------------------------- */
 
 static char warned[700];
@@ -293,7 +334,7 @@ static void criteria_by_name(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_film_is_shown), cmocka_unit_test(a_render_opens_its_frame), cmocka_unit_test(services),
+        cmocka_unit_test(the_film_is_shown), cmocka_unit_test(a_render_opens_its_frame), cmocka_unit_test(services), cmocka_unit_test(failures_are_told_once),
         cmocka_unit_test(masks_are_read),    cmocka_unit_test(criteria_by_name),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

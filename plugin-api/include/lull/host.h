@@ -93,7 +93,7 @@ struct lull_host_config {
     uint32_t width, height; /* of the whole picture, pixels */
 
     /* The blocks are a grid that starts at the upper left corner … */
-    uint32_t block_width, block_height; /* 0: what the criterion was made for, else 200 */
+    uint32_t block_width, block_height; /* 0: what the criterion was made for, or 200, or less for at least 12 blocks */
     int32_t crop[4]; /* x0, y0, x1, y1; all 0: none. Blocks that it touches are rendered whole; without a criterion they
                       * are cut to it, since nobody judges them */
     /* … or any disjoint rectangles inside the picture; NULL: the grid. */
