@@ -32,7 +32,7 @@ static int is_even(uint32_t length, uint32_t size)
     return length <= size || length % size == 0 || 2 * (length % size) >= size;
 }
 
-/* The block size, up to `largest`, with which the picture has enough blocks: the largest one that is even, if there is one. */
+/* The block size, up to `largest`, with which the picture has enough blocks: the largest even one, if there is one. */
 static uint32_t default_size(const struct lull_host_config *g, uint32_t largest)
 {
     uint32_t fine = 0;
