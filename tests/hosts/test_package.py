@@ -8,6 +8,7 @@ import pickle
 import re
 import signal
 import subprocess
+import sys
 import tempfile
 import warnings
 from pathlib import Path
@@ -654,6 +655,20 @@ def test_two_frames():
     raises(lull.LullError, "make a new Frame", frames[0].evaluate, [0])
 
 
+def test_no_numpy():
+    """without numpy there is one line that says what to do"""
+    os.makedirs(tmp("bare/numpy"))
+    Path(tmp("bare/numpy/__init__.py")).write_text("raise ImportError('none here')\n")
+    environment = {**os.environ, "PYTHONPATH": f"{tmp('bare')}:plugin-api/python"}
+    program = subprocess.run([sys.executable, "-m", "lull.blender", "x.blend"], env=environment, text=True, capture_output=True)
+    assert program.returncode == 2 and program.stdout == "", program
+    assert re.fullmatch(r"lull needs numpy.*: python3 -m pip install numpy\n", program.stderr), program.stderr
+    for module in ("lull", "lull.mitsuba"):
+        script = subprocess.run([sys.executable, "-c", f"import {module}"], env=environment, text=True, capture_output=True)
+        assert script.stderr.splitlines()[-1].startswith("ImportError: lull needs numpy"), script.stderr
+        assert "During handling" not in script.stderr, script.stderr
+
+
 def test_copies():
     """an instance cannot be copied, and a call while another one is under way is refused"""
     c = lull.load("halfbuf")
@@ -711,7 +726,7 @@ def test_weights():
         w, v = (np.array([s[0] * s[k] if k == 2 else s[k] for s in chosen]) for k in (2, 3))
         wanted = (w[..., None] * v).sum(0) / np.maximum(w.sum(0), 1e-30)[..., None]
         assert abs(f.mean(name) - wanted).max() < 1e-12
-        plane = f._planes_now()[name].array / (f.blocks[0].spp if name == "color" else f.blocks[0].half_spp)
+        plane = f.planes_now()[name].array / (f.blocks[0].spp if name == "color" else f.blocks[0].half_spp)
         assert abs(plane - wanted).max() < 1e-12
         assert name == "half" or abs(f.mean("alpha") - wanted[..., 0]).max() < 1e-12
     checkpoint.save(tmp("w.npz"), d)

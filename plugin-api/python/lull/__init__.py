@@ -11,6 +11,17 @@
 Low level: Criterion.begin_frame and evaluate with numpy arrays as they lie in memory (Plane). Ready hosts: lull.blender for
 Blender's Cycles, lull.mitsuba for Mitsuba 3. Needs numpy and the criteria's shared objects, nothing compiled.
 """
+import sys
+
+try:
+    import numpy  # noqa: F401
+except ImportError:
+    NEEDED = "lull needs numpy, which this Python does not have: python3 -m pip install numpy"
+    if sys.argv[:1] == ["-m"]:  # a program of the package, as which Python starts it: one line for people
+        print(NEEDED, file=sys.stderr)
+        sys.exit(2)
+    raise ImportError(NEEDED) from None
+
 from .blocks import Block, merge
 from .criterion import BlockState, Criterion, Decision, Needs, Plane, Rect, load
 from .driver import Driver, Result

@@ -6,12 +6,16 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
+import time
 import zipfile
+from typing import Optional
 
 import numpy as np
 
+from . import limits
 from .blocks import Block
-from .driver import Driver, Totals
+from .driver import Driver, Result, Totals
 from .files import replaced
 
 _STATE = {f.name for f in dataclasses.fields(Block)} - {"id", "rect", "column", "row"}
@@ -50,6 +54,12 @@ def is_one(path: str) -> bool:
         return False
 
 
+def check(path: str) -> None:
+    """ValueError for a file that would be replaced and is no checkpoint."""
+    if os.path.exists(path) and os.path.getsize(path) > 0 and not is_one(path):
+        raise ValueError(f"{path}: this is no checkpoint and would be replaced: choose another name")
+
+
 def load(path: str, driver: Driver) -> None:
     """Into a fresh driver of the same identity; ValueError names what differs. Blocks that were closed by a limit or an
     interrupt are active again as far as the limits of this driver allow."""
@@ -73,3 +83,30 @@ def load(path: str, driver: Driver) -> None:
         if b.reason in ("spp-max", "time", "interrupt", "uniform") and b.spp < frame.spp_max:
             b.reason, b.next_spp = "none", driver.at_wave(max(b.spp + 1, b.next_spp))
     driver.totals = Totals(**state["totals"])
+
+
+class Keeper:
+    """Keeps a driver's state in a file while it runs: every_s seconds apart, before active blocks are closed, and at the end
+    (finish). unsaved: why that failed last; the picture is worth more than its checkpoint."""
+
+    def __init__(self, path: str, driver: Driver, every_s: float = 60.0):
+        self.path, self.every_s, self.unsaved = path, limits.real("checkpoint_every_s", every_s, 0), None
+        self._saved_s = time.monotonic()
+        driver.suspend = self.save
+
+    def save(self, driver: Driver) -> None:
+        try:
+            save(self.path, driver)
+            self.unsaved: Optional[OSError] = None
+        except OSError as error:
+            self.unsaved = error
+        self._saved_s = time.monotonic()
+
+    def now_and_then(self, driver: Driver) -> None:
+        """For Driver.after_call. every_s 0: only at the end."""
+        if 0 < self.every_s <= time.monotonic() - self._saved_s:
+            self.save(driver)
+
+    def finish(self, driver: Driver, result: Result) -> None:
+        if result.outcome == "done":
+            self.save(driver)

@@ -3,39 +3,56 @@
 
     import mitsuba as mi
     mi.set_variant("llvm_ad_rgb")
-    picture = lull.mitsuba.render(mi.load_file("scene.xml"), "observer", spp_max=2048)
-    picture.image, picture.spp
+    picture = lull.mitsuba.render(mi.load_file("scene.xml"), "observer", spp_max=2048, checkpoint="scene.npz")
+    picture.image, picture.spp, picture.layers["A"]
+    print(lull.mitsuba.quote(scene, "observer"))       # what the dial costs, and coarser and finer ones
 
-Blocks are crops of the film. Each wave of each area has a seed of its own, so that waves are independent renders whose mean
-is the picture, and alternate waves make the half buffers. Use a sampler of independent samples: stratified ones stratify
-within a wave only. Splatting integrators (ptracer) do not work by crops.
+Blocks are crops of the film, rendered with a border as wide as the reconstruction filter reaches; the weights of the filter
+are summed with the samples, so that the picture is that of one long render with any filter. Each wave of each block has a
+seed of its own: waves are independent renders, alternate waves make the half buffers, and no sample depends on what else is
+rendered with it. Use a sampler of independent samples: stratified ones stratify within a wave only.
 """
 from __future__ import annotations
 
+import contextlib
+import os
+import re
 import struct
+import sys
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Callable, Iterator, Optional, Sequence, Union
 
 import numpy as np
 
-from .blocks import merge
+from . import checkpoint as checkpoints
+from . import limits, png
+from . import quote as quotes
 from .criterion import Criterion, Rect, load
 from .driver import Driver, Result
+from .files import Output, check_outputs
 from .frame import Frame
+
+# Planes that criteria can read, and the channels of an AOV of that name
+_AOVS = {"albedo": ("albedo.R", "albedo.G", "albedo.B"), "normal": ("normal.X", "normal.Y", "normal.Z"),
+         "depth": ("depth.T",)}
 
 
 @dataclass
 class Picture:
-    """What render gives back: image [height, width, 3] float64 linear, spp [height, width] uint32."""
+    """What render gives back: image [height, width, 3] float64 linear, spp [height, width] uint32, layers: alpha ("A") and
+    AOVs by the film's names, [height, width] float64. unsaved: why the checkpoint could not be written, if so."""
     image: np.ndarray
     spp: np.ndarray
     result: Result
     driver: Driver  # for lull.outputs and lull.checkpoint
+    layers: dict[str, np.ndarray] = field(default_factory=dict)
+    unsaved: Optional[OSError] = None
 
 
 class Film:
-    """One sensor's film, cropped to rectangles. Use as a context manager: the crop is put back."""
+    """One sensor's film, cropped to blocks. Use as a context manager: the crop is put back. layers: names of its channels
+    beside R, G and B; supplies: planes among them that criteria can read."""
 
     def __init__(self, scene: Any, sensor: int = 0, seed: int = 0):
         import mitsuba as mi
@@ -45,20 +62,55 @@ class Film:
         if not 0 <= sensor < len(sensors):
             raise ValueError(f"sensor {sensor}: the scene has {len(sensors)}")
         self._mi, self.scene, self.sensor, self.seed = mi, scene, sensors[sensor], seed
+        self.integrator = _checked_integrator(mi, scene)
         self._parameters = mi.traverse(self.sensor)
-        film = self.sensor.film()
-        self.width, self.height = (int(v) for v in film.size())
-        self.crop = Rect(*(int(v) for v in film.crop_offset()),
-                         *(int(o) + int(s) for o, s in zip(film.crop_offset(), film.crop_size())))
-        self.splats = film.rfilter().radius() > 0.5 + 1e-3  # neighbouring pixels share samples
+        self.film = self.sensor.film()
+        self.width, self.height = (int(v) for v in self.film.size())
+        self.crop = Rect(*(int(v) for v in self.film.crop_offset()),
+                         *(int(o) + int(s) for o, s in zip(self.film.crop_offset(), self.film.crop_size())))
+        self.splats = self.film.rfilter().radius() > 0.5 + 1e-3  # neighbouring pixels share samples
+        # a film that samples its own border does so for every crop
+        self.border = 0 if self.film.sample_border() else int(self.film.rfilter().border_size())
+        self._channels = self._find_channels()
+        self.layers = [name for name in self._channels if name not in ("R", "G", "B", "W")]
+        self.supplies = [plane for plane, names in _AOVS.items() if set(names) <= set(self.layers)]
 
-    def check_wave(self, wave: int) -> None:
-        """ValueError if the sampler does not take waves of this size."""
+    def _find_channels(self) -> list[str]:
+        """Of the film's sums, in order; ValueError if it makes other colours of them."""
+        self.film.prepare(self.integrator.aov_names())
+        names, shown = ([channel.name for channel in self.film.bitmap(raw=raw).struct_()] for raw in (True, False))
+        if shown[:3] != ["R", "G", "B"] or names[:3] != ["R", "G", "B"] or "W" not in names:
+            raise ValueError(f"the film has the channels {', '.join(shown)}: expected RGB, pixel_format rgb or rgba")
+        return names
+
+    def check_waves(self, wave: int, spp_max: int) -> None:
+        """ValueError if the sampler does not take waves of this size, or the one that is left at the end."""
+        wave, spp_max = limits.whole("wave", wave, 1, limits.MAX_SPP), limits.whole("spp_max", spp_max, 1, limits.MAX_SPP)
+        for count in {min(wave, spp_max), spp_max % wave or wave}:
+            self._check_wave(count)
+
+    def _check_wave(self, wave: int) -> None:
         sampler = self.sensor.sampler().clone()
         sampler.set_sample_count(wave)
         if sampler.sample_count() != wave:
             raise ValueError(f"the scene's sampler makes {sampler.sample_count()} samples of a wave of {wave}: use the "
-                             "sampler 'independent', or another wave")
+                             "sampler 'independent', or another wave and an spp_max that is a multiple of it")
+
+    def identity(self) -> dict[str, str]:
+        """What the samples depend on, for the checkpoint: Mitsuba, its settings, and every parameter of the scene."""
+        values = []
+        for name, value in self._mi.traverse(self.scene):
+            if not name.endswith(("film.crop_size", "film.crop_offset")):
+                array = np.array(getattr(value, "matrix", value))
+                values.append(zlib.crc32(str(value).encode() if array.dtype == object else array.tobytes()))
+        # a scene's parts change their order and addresses from run to run, its samplers their counts from wave to wave
+        text = re.sub(r"object_\d+|0x[0-9a-f]+", "", str(self.scene))
+        lines = sorted(t for t in text.splitlines() if not re.search(r"sample_count|wavefront|crop_", t))
+        crc = zlib.crc32("\n".join(lines).encode(), zlib.crc32(np.array(sorted(values), "<u4").tobytes()))
+        index = next(i for i, sensor in enumerate(self.scene.sensors()) if sensor == self.sensor)
+        return {"sensor": str(index), "integrator": " ".join(str(self.integrator).split()),
+                "filter": " ".join(str(self.film.rfilter()).split()), "sampler": self.sensor.sampler().class_name(),
+                "renderer": f"Mitsuba {self._mi.__version__} {self._mi.variant()}", "scene": f"crc {crc:08x}"}
 
     def _set_crop(self, rect: Rect) -> None:
         self._parameters["film.crop_size"] = [rect.width, rect.height]
@@ -71,42 +123,107 @@ class Film:
     def __exit__(self, *_) -> None:
         self._set_crop(self.crop)
 
-    def render(self, rects: Sequence[Rect], first: int, count: int, _half: bool) -> Iterator[np.ndarray]:
-        """The driver's render function: the mean of `count` samples, [h, w, 3] float32 per rectangle."""
-        areas = {area: self._render_area(area, first, count) for area in merge(rects)}
+    def render(self, rects: Sequence[Rect], first: int, count: int, _half: bool) -> Iterator[dict[str, np.ndarray]]:
+        """The driver's render function: for each rectangle the mean of `count` samples times their weight, by plane."""
+        self._check_wave(count)
         for r in rects:
-            area, pixels = next((a, p) for a, p in areas.items() if a.x0 <= r.x0 < a.x1 and a.y0 <= r.y0 < a.y1)
-            yield pixels[r.y0 - area.y0:r.y1 - area.y0, r.x0 - area.x0:r.x1 - area.x0]
+            yield self._render_block(r, first, count)
 
-    def _render_area(self, area: Rect, first: int, count: int) -> np.ndarray:
+    def _render_block(self, r: Rect, first: int, count: int) -> dict[str, np.ndarray]:
+        area = Rect(max(r.x0 - self.border, 0), max(r.y0 - self.border, 0), min(r.x1 + self.border, self.width),
+                    min(r.y1 + self.border, self.height))
         self._set_crop(area)
-        seed = zlib.crc32(struct.pack("<qqii", self.seed, first, area.x0, area.y0))
-        pixels = np.array(self._mi.render(self.scene, sensor=self.sensor, spp=count, seed=seed))
-        if pixels.ndim != 3 or pixels.shape[2] < 3:
-            raise ValueError(f"the film has {pixels.shape[2] if pixels.ndim == 3 else 1} channels: expected RGB")
-        return pixels[..., :3]
+        seed = zlib.crc32(struct.pack("<QQii", self.seed, first, r.x0, r.y0))
+        self.integrator.render(self.scene, self.sensor, seed=seed, spp=count, develop=False)
+        sums = np.array(self.film.develop(raw=True))[r.y0 - area.y0:r.y1 - area.y0, r.x0 - area.x0:r.x1 - area.x0]
+        means = dict(zip(self._channels, np.moveaxis(sums.astype(np.float64) / count, -1, 0)))
+        planes = {plane: np.stack([means[name] for name in names], -1) if len(names) > 1 else means[names[0]]
+                  for plane, names in _AOVS.items() if plane in self.supplies}
+        return {"color": np.stack([means[name] for name in "RGB"], -1), "weight": means["W"], **planes,
+                **{name: means[name] for name in self.layers}}
+
+
+def _checked_integrator(mi: Any, scene: Any) -> Any:
+    integrator = scene.integrator()
+    if integrator is None:
+        raise ValueError("the scene has no integrator: add one, such as path")
+    if isinstance(integrator, mi.AdjointIntegrator):
+        raise ValueError(f"the integrator {integrator.class_name()} (ptracer) splats light over the whole film, which cannot "
+                         "be rendered by blocks: use path or volpath")
+    return integrator
+
+
+def _tell(line: str) -> None:
+    print(f"lull: {line}", file=sys.stderr)
+
+
+def _cost_line(tell: Callable[[str], None]) -> Callable[[Driver], None]:
+    """An after_call that tells once, when every block was checked, what the dial costs."""
+    told = False
+
+    def look(driver: Driver) -> None:
+        nonlocal told
+        if not told and all(b.asked_spp > 0 or not b.active for b in driver.frame.blocks):
+            told = True
+            if line := quotes.line(driver):
+                tell(line)
+    return look
+
+
+def quote(scene: Any, criterion: Union[str, Criterion] = "observer", **settings: Any) -> str:
+    """A table of what the dial will cost, and coarser and finer ones, from a pilot of 128 samples or 30 seconds. settings:
+    as render takes them; with checkpoint=, render(…, resume=True) goes on from the pilot, and nothing is lost."""
+    def look(driver: Driver) -> None:
+        if quotes.pilot_done(driver):
+            driver.interrupt()
+    picture = render(scene, criterion, **{**settings, "after_call": look, "tell": None})
+    if picture.result.exception:
+        raise picture.result.exception
+    if picture.unsaved:
+        raise picture.unsaved
+    return quotes.table(picture.driver)
 
 
 def render(scene: Any, criterion: Union[str, Criterion] = "observer", *, sensor: int = 0, spp_min: int = 16,
            spp_max: int = 1024, time_budget_s: float = 0.0, block: Optional[int] = None, wave: int = 8, seed: int = 0,
-           mask: Optional[np.ndarray] = None, after_call: Optional[Callable[[Driver], None]] = None,
-           **parameters: Any) -> Picture:
+           mask: Union[np.ndarray, str, None] = None, checkpoint: str = "", resume: bool = False,
+           checkpoint_every_s: float = 60.0, after_call: Optional[Callable[[Driver], None]] = None,
+           tell: Optional[Callable[[str], None]] = _tell, **parameters: Any) -> Picture:
     """Renders a mi.Scene; each block until the criterion stops it.
 
-    criterion: a name, a path or a lull.Criterion; parameters are its own (threshold=…). The film's crop is kept to. An
-    exception while rendering is not raised: see Picture.result. Raises LullError and ValueError for bad input.
+    criterion: a name, a path or a lull.Criterion; parameters are its own (threshold=…). The film's crop is kept to. mask:
+    an array, or the path of a PNG (lull.mask). checkpoint: a file that keeps the state at the end, however it ends, and
+    every checkpoint_every_s seconds; resume: goes on from it, if it is there; with a higher spp_max a finished picture gets
+    more samples. tell: is given one line at the first check, what the dial costs and what coarser ones would (default: it is
+    printed to stderr; None: no line). An exception while rendering is not raised: see Picture.result. Raises LullError,
+    ValueError, TypeError and OSError for bad input, before anything is rendered.
     """
-    judge = criterion if isinstance(criterion, Criterion) else load(criterion, **parameters)
-    try:
-        with Film(scene, sensor, seed) as film:
-            film.check_wave(wave)
-            frame = Frame(judge, film.width, film.height, block=block, crop=film.crop, spp_min=spp_min, spp_max=spp_max,
-                          time_budget_s=time_budget_s, deterministic=time_budget_s <= 0, seed=seed, independent=True,
-                          shared=film.splats, mask=mask)
-            driver = Driver(frame, film.render, wave=wave, after_call=after_call)
-            result = driver.run()
-            frame.close()
-    finally:
-        if judge is not criterion:
-            judge.close()
-    return Picture(frame.cropped(frame.mean()), frame.cropped(frame.spp()), result, driver)
+    if resume and not checkpoint:
+        raise ValueError("resume: there is no checkpoint to go on from: name one with checkpoint=")
+    if checkpoint:
+        check_outputs([Output("checkpoint", checkpoint)], [mask] if isinstance(mask, str) else [])
+        checkpoints.check(checkpoint)
+    shades = png.read_grey(mask) if isinstance(mask, str) else mask
+    with contextlib.ExitStack() as stack:
+        judge = criterion if isinstance(criterion, Criterion) else stack.enter_context(load(criterion, **parameters))
+        film = stack.enter_context(Film(scene, sensor, seed))
+        film.check_waves(wave, spp_max)
+        frame = Frame(judge, film.width, film.height, block=block, crop=film.crop, spp_min=spp_min, spp_max=spp_max,
+                      time_budget_s=time_budget_s, deterministic=time_budget_s <= 0, seed=seed, independent=True,
+                      shared=film.splats, weighted=True, supplies=film.supplies, layers=film.layers, mask=shades)
+        stack.callback(frame.close)
+        driver = Driver(frame, film.render, wave=wave, identity=film.identity() if checkpoint else None)
+        hooks: list[Callable[[Driver], None]] = [after_call] if after_call else []
+        if tell:
+            hooks.append(_cost_line(tell))
+        kept = checkpoints.Keeper(checkpoint, driver, checkpoint_every_s) if checkpoint else None
+        if kept:
+            hooks.append(kept.now_and_then)
+        if resume and os.path.exists(checkpoint):
+            checkpoints.load(checkpoint, driver)
+        driver.after_call = lambda d: [hook(d) for hook in hooks] and None
+        result = driver.run()
+        if kept:
+            kept.finish(driver, result)
+    return Picture(frame.cropped(frame.mean()), frame.cropped(frame.spp()), result, driver,
+                   {name: frame.cropped(frame.mean(name)) for name in film.layers}, kept.unsaved if kept else None)
