@@ -16,7 +16,7 @@ import numpy as np  # noqa: E402
 import lull  # noqa: E402
 import tap  # noqa: E402
 from lull import Rect, exr  # noqa: E402
-from lull.blender import view  # noqa: E402
+from lull.blender import ui, view  # noqa: E402
 from lull.blender.cycles import Cycles, HostError  # noqa: E402
 from lull.blender.session import Session, Settings  # noqa: E402
 from tap import Skip, raises  # noqa: E402
@@ -252,6 +252,13 @@ def test_view():
     assert (np.diff(values) > 0).all() and values[0] < .001 and values[3] < .9 and values[5] > .9, values
 
 
+def one_line(call):
+    try:
+        call()
+    except RuntimeError as error:
+        raise RuntimeError(str(error).replace("\n", " ")) from None
+
+
 def brightest(name):
     image = bpy.data.images.get(name)
     return max(image.pixels[:][::4], default=0) if image else 0
@@ -283,6 +290,13 @@ def test_addon():
         assert scene.lull.chosen(scene).parameters == {"visible": "0.5", "growth": "2"}
         scene.lull.parameters = "visible=.1"
         assert scene.lull.chosen(scene).parameters == {"visible": ".1"}
+        step = Session.step
+        Session.step = lambda session: 1 / 0 if session.driver.totals.samples else step(session)
+        try:
+            raises(RuntimeError, "division", lambda: one_line(bpy.ops.lull.render))
+        finally:
+            Session.step = step
+        assert not ui._running and scene.render.engine == "CYCLES" and not scene.render.use_border
         for name, value, wanted in (("parameters", "threshold", "expected KEY=VALUE"), ("parameters", "", "No such file"),
                                     ("mask", tmp("lull.exr"), "this is an input")):
             setattr(scene.lull, name, value)

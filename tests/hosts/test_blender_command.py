@@ -332,7 +332,7 @@ def test_programs():
     environment = {**os.environ, "PYTHONPATH": str(ROOT / "plugin-api/python")}
     program = [os.environ.get("PYTHON", sys.executable), "-m", "lull.blender", tmp("cube.blend"), "-c", "fixed", "-q", "-o"]
     expression = ["-b", tmp("cube.blend"), "-noaudio", "--python-use-system-env", "--python-expr",
-                  "from lull.blender import cli; cli.main()", "--", "-c", "fixed", "-q", "-o"]
+                  "import sys; from lull.blender import cli; sys.exit(cli.main())", "--", "-c", "fixed", "-q", "-o"]
     starts = [program] + ([[bpy.app.binary_path, *expression]] if bpy.app.binary_path else [])
     for n, start in enumerate(starts):
         done = subprocess.run([*start, tmp(f"p{n}.exr")], env=environment, text=True, capture_output=True)

@@ -134,6 +134,14 @@ class LULL_OT_render(bpy.types.Operator):
                                               *session.quote.split("; ")])
         return result
 
+    def _step_or_cancel(self, context):
+        """An error of ours must not leave the scene's settings changed, nor the panel waiting."""
+        try:
+            return self._step(context)
+        except BaseException:
+            self.cancel(context)
+            raise
+
     def _end(self, context, result) -> bool:
         """Writes the frame; whether there is another one to render."""
         session, settings = self._session, context.scene.lull
@@ -158,7 +166,7 @@ class LULL_OT_render(bpy.types.Operator):
         if not more:
             return {"CANCELLED"}
         while more:
-            while (result := self._step(context)) is None:
+            while (result := self._step_or_cancel(context)) is None:
                 pass
             more = self._end(context, result) and self._begin(context)
         return {"FINISHED"}
@@ -177,7 +185,7 @@ class LULL_OT_render(bpy.types.Operator):
             driver.interrupt()
         if event.type != "TIMER":
             return {"RUNNING_MODAL"}
-        result = self._step(context)
+        result = self._step_or_cancel(context)
         context.workspace.status_text_set(None if result else f"Lull: {outputs.progress_text(driver)}   Esc: stop and keep")
         for area in context.screen.areas:
             area.tag_redraw()
