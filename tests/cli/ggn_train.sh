@@ -25,21 +25,24 @@ $ggn train $tiny --out "$tmp/b.ggn" --threads 1 -q 2>"$tmp/err" && cmp "$tmp/a.g
 check "the same bytes with one thread" $?
 $ggn train $tiny --out "$tmp/c.ggn" --seed 2 -q 2>"$tmp/err" && ! cmp -s "$tmp/a.ggn" "$tmp/c.ggn"
 check "other bytes with another seed" $?
-# Settings chosen so that three rules choose three epochs: the first has the best AUC, the second the lowest
-# loss of the calibrated probability, the third is the last.
-$ggn train $tiny --steps-denoiser 10 --steps 30 --lr 0.02 --seed 9 --out "$tmp/f.ggn" -q 2>"$tmp/err" &&
+# Twelve epochs at a rate that makes them go up and down: where depends on the last digits of float sums, hence on the processor. So the
+# first seed serves for which three rules choose three epochs: the best AUC, the lowest loss of the calibrated probability, the last.
+wild="$tiny --steps-denoiser 10 --epoch-steps 5 --lr 0.02 -q"
+for seed in $(seq 12); do
+    $ggn train $wild --steps 60 --patience 0 --seed "$seed" --out "$tmp/f.ggn" 2>"$tmp/err" || break
     awk -F, '$1 == "judge" && (low == "" || $5 < low) { low = $5; best = $2 } $1 == "judge" && $7 > high { high = $7; other = $2 }
-        END { if (best == other || best == $2) exit 1; print best }' "$tmp/f.ggn.csv" >"$tmp/best" 2>"$tmp/err" &&
-    grep -q "\"best_step\":[[:space:]]*$(cat "$tmp/best")," "$tmp/f.ggn.card.json"
+        END { if (best == other || best == $2) exit 1; print best }' "$tmp/f.ggn.csv" >"$tmp/best" 2>"$tmp/err" && break
+done
+[ -s "$tmp/best" ] && grep -q "\"best_step\":[[:space:]]*$(cat "$tmp/best")," "$tmp/f.ggn.card.json"
 check "the epoch with the lowest validation loss is kept, not the last, not the one with the best AUC" $?
 
-# the changed stops that are counted are those in which the tables of stops differ
-$ggn evaluate -d $data -m "$tmp/a.ggn" -m "$tmp/f.ggn" --retune --no-quality -o "$tmp/report" >"$tmp/out" 2>"$tmp/err" &&
-    for m in a f; do cut -d';' -f1-5 "$tmp/report/train-stops-${m}ggn.csv" >"$tmp/stops-$m"; done &&
-    changed=$(diff "$tmp/stops-a" "$tmp/stops-f" | grep -c '^>') && [ "$changed" -gt 0 ] &&
-    grep -q "^f.ggn: [1-9][0-9]* of [0-9]* verdicts and $changed of 9 stops differ from a.ggn" "$tmp/out"
+# The changed stops that are counted are those in which the tables of stops differ from those of a model that was trained well.
+$ggn evaluate -d $data -m "$tmp/a.ggn" -m tests/data/tiny.ggn --no-quality -o "$tmp/report" >"$tmp/out" 2>"$tmp/err" &&
+    for m in a tiny; do cut -d';' -f1-5 "$tmp/report/train-stops-${m}ggn.csv" >"$tmp/stops-$m"; done &&
+    changed=$(diff "$tmp/stops-a" "$tmp/stops-tiny" | grep -c '^>') && [ "$changed" -gt 0 ] &&
+    grep -q "^tiny.ggn: [1-9][0-9]* of [0-9]* verdicts and $changed of 9 stops differ from a.ggn" "$tmp/out"
 check "evaluate counts what another model decides differently" $?
-tr -d '\t\n' <"$tmp/report/figures.json" | grep -Eq "\"f.ggn\": *\{ *\"from\": *\"a.ggn\", *\"windows\": *[0-9]+, *\"verdicts_changed\": *[1-9][0-9]*, *\"blocks\": *9, *\"stops_changed\": *$changed, *\"p_moved_at_most\": *0"
+tr -d '\t\n' <"$tmp/report/figures.json" | grep -Eq "\"tiny.ggn\": *\{ *\"from\": *\"a.ggn\", *\"windows\": *[0-9]+, *\"verdicts_changed\": *[1-9][0-9]*, *\"blocks\": *9, *\"stops_changed\": *$changed, *\"p_moved_at_most\": *0\.[0-9]*[1-9]"
 check "  …in figures.json too" $?
 
 # interrupted once in each phase: as soon as the curves have so many rows
@@ -65,21 +68,33 @@ awk -F, 'NR > 1 {
 } END { exit bad || NR != 5 }' "$tmp/a.ggn.csv" >"$tmp/err"
 check "learning rates warm up and decay" $?
 
-# Without patience left: the epochs since the best one are counted through an interruption. The best is the fifth of the judge.
-long="$tiny --steps-denoiser 10 --epoch-steps 5 --steps 100 --lr 0.02 --patience 4 --seed 2 -q"
-$ggn train $long --out "$tmp/g.ggn" 2>"$tmp/err"
-for try in 1 2 3 4 5; do # the signal may come too late
-    rm -f "$tmp"/h.ggn*
-    $ggn train $long --out "$tmp/h.ggn" --resume 2>"$tmp/err" &
-    pid=$!
-    while kill -0 $pid 2>/dev/null && [ "$(cat "$tmp/h.ggn.csv" 2>/dev/null | wc -l)" -lt 9 ]; do sleep 0.01; done
-    kill -INT $pid 2>/dev/null
-    wait $pid
-    [ $? -eq 130 ] && break
+# interrupted LINES OUT ARGS…: a training that is interrupted as soon as its curves have so many lines; again if the signal came too late
+interrupted() {
+    lines=$1 out=$2
+    shift 2
+    for _ in $(seq 20); do
+        rm -f "$out" "$out".*
+        $ggn train "$@" --out "$out" 2>"$tmp/err" &
+        pid=$!
+        while kill -0 $pid 2>/dev/null && [ "$(cat "$out.csv" 2>/dev/null | wc -l)" -lt "$lines" ]; do sleep 0.01; done
+        kill -INT $pid 2>/dev/null
+        wait $pid
+        [ $? -eq 130 ] && [ ! -e "$out" ] && return
+    done
+    return 1
+}
+# Without patience left: the epochs since the best one are counted through an interruption. The first seed with which patience ends it.
+for seed in $(seq 12); do
+    $ggn train $wild --steps 100 --patience 4 --seed "$seed" --out "$tmp/g.ggn" 2>"$tmp/err" || break
+    [ "$(tail -n 1 "$tmp/g.ggn.csv" | cut -d, -f2)" -lt 100 ] && break
 done
-[ ! -e "$tmp/h.ggn" ] && $ggn train $long --out "$tmp/h.ggn" --resume 2>"$tmp/err" && cmp "$tmp/g.ggn" "$tmp/h.ggn" 2>"$tmp/err" &&
-    [ "$(tail -n 1 "$tmp/h.ggn.csv" | cut -d, -f1,2)" = "judge,45" ] && [ "$(wc -l <"$tmp/g.ggn.csv")" -eq "$(wc -l <"$tmp/h.ggn.csv")" ]
-check "patience ends a resumed run where it ends the other" $?
+awk -F, '$1 == "judge" && (low == "" || $5 < low) { low = $5; best = $2; line = NR } END { print line; exit !($2 < 100 && $2 == best + 4 * 5) }' "$tmp/g.ggn.csv" >"$tmp/best" 2>"$tmp/err"
+check "patience ends a run four epochs after its best" $?
+long="$wild --steps 100 --patience 4 --seed $seed"
+interrupted $(($(cat "$tmp/best") + 2)) "$tmp/h.ggn" $long && [ "$(wc -l <"$tmp/h.ggn.csv")" -lt "$(wc -l <"$tmp/g.ggn.csv")" ] &&
+    $ggn train $long --out "$tmp/h.ggn" --resume 2>"$tmp/err" && cmp "$tmp/g.ggn" "$tmp/h.ggn" 2>"$tmp/err" &&
+    [ "$(wc -l <"$tmp/g.ggn.csv")" -eq "$(wc -l <"$tmp/h.ggn.csv")" ]
+check "  …and a resumed run where it ends the other" $?
 
 cp "$tmp/a.ggn.ckpt" "$tmp/bad.ggn.ckpt"
 fails "a checkpoint of another run is refused" "other data or options" $ggn train $tiny --seed 3 --resume
@@ -101,16 +116,9 @@ check "preset paper" $?
 more="$tiny --picture 0.7 --average 8 --flips 0"
 $ggn train $more --out "$tmp/picture.ggn" -q 2>"$tmp/err" && $ggn inspect "$tmp/picture.ggn" 2>"$tmp/err" | grep -q "noise picture.*taken"
 check "a model with the noise picture" $?
-$ggn train $more --out "$tmp/resumed.ggn" --resume -q 2>"$tmp/err" &
-pid=$!
-for _ in $(seq 1000); do
-    [ "$(cat "$tmp/resumed.ggn.csv" 2>/dev/null | wc -l)" -ge 4 ] && break
-    sleep 0.01
-done
-kill -INT $pid && wait $pid
-rc=$?
-[ $rc -eq 130 ] && $ggn train $more --out "$tmp/resumed.ggn" --resume --threads 1 -q 2>"$tmp/err" && cmp "$tmp/picture.ggn" "$tmp/resumed.ggn" 2>"$tmp/err"
-check "the same bytes when interrupted and resumed, averaged weights included (first run ended with $rc)" $?
+interrupted 4 "$tmp/resumed.ggn" $more -q &&
+    $ggn train $more --out "$tmp/resumed.ggn" --resume --threads 1 -q 2>"$tmp/err" && cmp "$tmp/picture.ggn" "$tmp/resumed.ggn" 2>"$tmp/err"
+check "the same bytes when interrupted and resumed, averaged weights included" $?
 # half buffers at one level only: it lends the others theirs
 for no in "" --no-pictures; do
     $ggn evaluate -d $data -m "$tmp/picture.ggn" --no-quality --json $no >"$tmp/figures$no" 2>"$tmp/err" || break
