@@ -45,7 +45,7 @@ check "  …unless they are said to be a pair" $?
 printf '{"scene": "scenes/room.pbrt", "blocks": [{"id": 0, "y0": 0, "spp": 50}, {"id": 1, "y0": 0, "spp": 60}]}' >"$tmp/named.json"
 $ggn compare "$tmp/room.csv" "$tmp/named.json" >"$tmp/out" 2>"$tmp/err" && grep -qx "1 view in common" "$tmp/out"
 check "a report is called like its scene's file" $?
-fails "missing file" 'No such file' $ggn compare "$tmp/none.csv" "$tmp/m.csv"
+fails "missing file" 'none.csv: ' $ggn compare "$tmp/none.csv" "$tmp/m.csv"
 fails "no common view" 'same name' $ggn compare "$tmp/t.csv" "$tmp/e.csv" --cap 10
 fails "unknown view" "no view called 'zz'" $ggn compare "$tmp/t.csv" "$tmp/m.csv" --view zz
 printf 'a;1;2;\n' >"$tmp/short.csv"

@@ -17,7 +17,7 @@ d=$tmp/data/p3d_toy-view0_part6
 grep -q '"source":.*"human"' "$d/labels.json"
 check "imported thresholds are human labels" $?
 fails "import: nothing there" 'no NAME_' $ggn import-sin3d "$tmp/data" -o "$tmp/x"
-fails "import: missing folder" 'No such file' $ggn import-sin3d "$tmp/none" -o "$tmp/x"
+fails "import: missing folder" '/none: ' $ggn import-sin3d "$tmp/none" -o "$tmp/x"
 fails "import: thresholds that do not fit" '2 blocks, but 1' sh -c "printf 'p3d_toy-view0_part6;90;\n' >$tmp/one.csv; $ggn import-sin3d $tmp/sin3d -o $tmp/y --block 32 -t $tmp/one.csv"
 
 $ggn evaluate -d "$tmp/data" --json >"$tmp/out" 2>"$tmp/err" && grep -q '"labels":.*"human"' "$tmp/out" && grep -q '"-spp"' "$tmp/out" &&
@@ -27,7 +27,7 @@ $ggn evaluate -d "$tmp/data" -o "$tmp/report" >"$tmp/out" 2>"$tmp/err" && [ -s "
     [ -s "$tmp/report/train-heatmaps-spp.png" ] && [ "$(find "$tmp/report" -name '.tmp*' | wc -l)" -eq 0 ] && grep -q '^constant' "$tmp/out"
 check "evaluate: table and pictures" $?
 fails "evaluate: window longer than the levels" 'a window needs 9' $ggn evaluate -d "$tmp/data" -w 9
-fails "evaluate: no model file" 'No such file' $ggn evaluate -d "$tmp/data" -m "$tmp/none.ggn"
+fails "evaluate: no model file" 'none.ggn: ' $ggn evaluate -d "$tmp/data" -m "$tmp/none.ggn"
 fails "evaluate: not a model" 'human.csv' $ggn evaluate -d "$tmp/data" -m "$tmp/human.csv"
 
 cp "$d/labels.json" "$tmp/people.json"

@@ -32,7 +32,7 @@ wrong "scene 'a' is in train already (the split is by scene)" "$good" "test a/vi
 wrong "a/view0 is on line 1 already" "$good" "$good"
 refused "cannot read" --plan nowhere.plan data
 refused "--only calibration" --plan wrong.plan --only calibration data
-refused "unrecognized arguments: --nonsense" --nonsense
+refused "arguments: --nonsense" --nonsense
 printf '%s\n' "train a scenes/cornell-box.pbrt 1 cubic:1:2:1 0 5" >levels.plan
 t "what the renderer refuses ends with status 2" sh -c "'$M' --plan levels.plan levels 2>err; test \$? -eq 2 && grep -q -- '--levels cubic' err"
 

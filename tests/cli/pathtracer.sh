@@ -26,7 +26,7 @@ t "--visible sets the parameter" sh -c "$P $scene -q -c observer --visible 0.5 -
 
 # --- errors: one line, exit 2, nothing left behind ---
 refused "a scene file is needed"
-refused "No such file" nowhere.pbrt -q
+refused "nowhere.pbrt: " nowhere.pbrt -q
 refused "unknown option" "$scene" --nonsense
 refused "a value is needed" "$scene" --seed
 refused "one argument too many" "$scene" "$scene"
@@ -232,7 +232,7 @@ cp c.ckp flip.ckp && printf 'X' | dd of=flip.ckp bs=1 seek=3000 conv=notrunc 2>/
 refused "damaged or cut off" $long --checkpoint flip.ckp --resume
 cp "$scene" none-such.ckp
 refused "not a checkpoint" $long --checkpoint none-such.ckp --resume
-refused "No such file" $long --checkpoint none.ckp --resume
+refused "none.ckp: " $long --checkpoint none.ckp --resume
 
 # --- the shipped network, when it is there: its history goes through the checkpoint ---
 model=$here/../../ggn/models/lull-2.ggn

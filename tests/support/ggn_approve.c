@@ -9,8 +9,10 @@
 #include <string.h>
 
 #include "base/files.h"
+#include "support/base_foreign.h"
 
 static const double SMALL = 0.01; /* numbers below it are compared as parts of it */
+static const double ROUNDING = 1e-6; /* of numbers with decimals, at least: other last bits of pow, exp and sums */
 
 /* Whether a number begins at p, which is not inside of a word. */
 static int number_at(const char *text, const char *p)
@@ -35,6 +37,18 @@ static void fail_at(const char *name, const char *text, const char *at, const ch
              recorded_at);
 }
 
+/* How far a number with decimals that ends at `end` may be off at any tolerance: the last of three or more decimals turns with a
+ * last bit. */
+static double printed(const char *number, const char *end, double value)
+{
+    const char *point = memchr(number, '.', (size_t)(end - number));
+    if (!point)
+        return 0;
+    const long decimals = (long)strspn(point + 1, "0123456789");
+    const double unit = decimals >= 3 && point + 1 + decimals == end ? 1.01 * pow(10, (double)-decimals) : 0;
+    return fmax(unit, ROUNDING * fmax(fabs(value), SMALL));
+}
+
 static void compare(const char *name, const char *text, const char *recorded, double tolerance)
 {
     const char *p = text, *q = recorded;
@@ -43,7 +57,8 @@ static void compare(const char *name, const char *text, const char *recorded, do
         if (number_at(text, p) && number_at(recorded, q)) {
             char *p_end, *q_end;
             double got = strtod(p, &p_end), want = strtod(q, &q_end);
-            if (!(fabs(got - want) <= tolerance * fmax(fabs(want), SMALL)))
+            double near = fmax(printed(p, p_end, got), printed(q, q_end, want));
+            if (!(fabs(got - want) <= fmax(near, tolerance * fmax(fabs(want), SMALL))))
                 fail_at(name, text, p, recorded, q);
             p = p_end;
             q = q_end;
@@ -72,6 +87,8 @@ void ggn_approve(const char *name, const char *text, double tolerance)
     }
     if (base_file_read(path, 1 << 24, &recorded, &size, &err))
         fail_msg("%s", err.text);
-    compare(path, text, recorded, tolerance);
+    char *told = foreign_as_recorded(text);
+    compare(path, told, recorded, tolerance);
+    free(told);
     free(recorded);
 }

@@ -7,8 +7,8 @@
 #ifndef TESTS_SUPPORT_GGN_APPROVE_H
 #define TESTS_SUPPORT_GGN_APPROVE_H
 
-/* tolerance: of numbers, relative to the recorded one or to 0.01, whichever is larger. Fails the running cmocka test with the line that
- * differs. */
+/* tolerance: of numbers, relative to the recorded one or to 0.01, whichever is larger; at least 1e-6 of numbers with decimals, and one
+ * in the last of three or more. Fails the running cmocka test with the line that differs. */
 void ggn_approve(const char *name, const char *text, double tolerance);
 
 #endif

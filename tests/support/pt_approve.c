@@ -14,8 +14,17 @@
 #include <cmocka.h>
 
 #include "base/files.h"
+#include "support/base_foreign.h"
 
 static const double relative = 1e-5, absolute = 3e-7;
+
+/* A unit of the last digit of a decimal number that ends at `end`, which a last bit may turn; 0 for one of few digits. */
+static double last_digit(const char *number, const char *end)
+{
+    const char *point = memchr(number, '.', (size_t)(end - number));
+    const long decimals = point ? (long)strspn(point + 1, "0123456789") : 0;
+    return decimals >= 3 && point + 1 + decimals == end ? 1.01 * pow(10, (double)-decimals) : 0;
+}
 
 int pt_approve_same(const char *a, const char *b)
 {
@@ -26,7 +35,8 @@ int pt_approve_same(const char *a, const char *b)
             char *x, *y;
             double p = strtod(a, &x), q = strtod(b, &y);
             int whole = strspn(a, "-0123456789") == (size_t)(x - a) && strspn(b, "-0123456789") == (size_t)(y - b);
-            if (p != q && (whole || !(fabs(p - q) <= relative * fmax(fabs(p), fabs(q)) + absolute)))
+            double near = fmax(relative * fmax(fabs(p), fabs(q)) + absolute, fmax(last_digit(a, x), last_digit(b, y)));
+            if (p != q && (whole || !(fabs(p - q) <= near)))
                 return 0;
             a = x;
             b = y;
@@ -64,7 +74,7 @@ static void add_file_line(struct pt_approve_case *c, const char *line)
 /* Compares line by line with the recorded answer from `recorded` on; returns behind it. In `anew` goes the new one. */
 static char *compare(struct pt_approve_case *c, pt_approve_answer *answer, char *recorded, FILE *anew, int *wrong)
 {
-    char *text = answer(c), *save = NULL, *line = strtok_r(text, "\n", &save);
+    char *told_here = answer(c), *text = foreign_as_recorded(told_here), *save = NULL, *line = strtok_r(text, "\n", &save);
     int told = 0;
     for (; line || strncmp(recorded, "  ", 2) == 0; line = line ? strtok_r(NULL, "\n", &save) : NULL) {
         char expected[4096] = "";
@@ -81,6 +91,7 @@ static char *compare(struct pt_approve_case *c, pt_approve_answer *answer, char 
         if (told++ == 0)
             print_error("of %s  recorded: %s\n  now:      %s\n", c->text, expected, line ? line : "");
     }
+    free(told_here);
     free(text);
     memset(c, 0, sizeof *c);
     return recorded;

@@ -25,7 +25,8 @@ typedef char *pt_approve_answer(struct pt_approve_case *c);
 
 /* Fails the test, with the first difference of each case, unless the answers are those in the file. */
 void pt_approve(const char *path, pt_approve_answer *answer);
-/* The same characters and whole numbers; others may differ in the sixth digit: sums in another order, sines of another C library. */
+/* The same characters and whole numbers; others may differ in the sixth digit, or in the last one that is printed of three or more
+ * decimals: sums in another order, sines of another C library. */
 int pt_approve_same(const char *a, const char *b);
 
 #endif

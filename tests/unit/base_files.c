@@ -31,6 +31,7 @@
 #include "base/peers.h"
 #include "base/png.h"
 #include "base/threads.h"
+#include "support/base_foreign.h"
 
 static char dir[] = "/tmp/base_files.XXXXXX";
 
@@ -74,7 +75,9 @@ static void says(int rc, int code, const struct base_err *err, const char *forma
     va_end(args);
     assert_int_equal(rc, code);
     assert_int_equal(err->code, code);
-    assert_string_equal(err->text, line);
+    char *told = foreign_as_recorded(err->text);
+    assert_string_equal(told, line);
+    free(told);
 }
 
 /* --- reading ------------------------------------------------------------------------------------------------------------- */

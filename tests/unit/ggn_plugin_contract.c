@@ -5,6 +5,7 @@
  */
 #include "support/ggn_cmocka.h"
 
+#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -596,10 +597,12 @@ static void refusals(void **state)
     struct lull_pair pair = {"model", "/nonexistent.ggn"};
     (void)state;
 
+    char missing[128];
+    snprintf(missing, sizeof missing, "model: /nonexistent.ggn: %s", strerror(ENOENT));
     assert_int_equal(ggn_plugin_ggn.create(NULL, &pair, 1, sizeof pair, &in, &err), LULL_E_IO);
-    assert_string_equal(err.message, "model: /nonexistent.ggn: No such file or directory");
+    assert_string_equal(err.message, missing);
     assert_int_equal(ggn_plugin_noise_mask.create(NULL, &pair, 1, sizeof pair, &in, &err), LULL_E_IO);
-    assert_string_equal(err.message, "model: /nonexistent.ggn: No such file or directory");
+    assert_string_equal(err.message, missing);
     assert_int_equal(ggn_plugin_ggn.create(NULL, &pair, 1, sizeof pair, NULL, &err), LULL_E_INVALID);
     pair.value = network;
     assert_int_equal(ggn_plugin_attributes.create(NULL, &pair, 1, sizeof pair, &in, &err), LULL_E_IO);

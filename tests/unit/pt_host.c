@@ -1,4 +1,5 @@
 /* The path tracer as a host: its film as planes, its threads and words, masks from files, criteria by name. */
+#include <errno.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -240,7 +241,7 @@ static void masks_are_read(void **state)
     }
     unlink(path);
     assert_int_equal(pt_mask_read(path, 3, 2, &mask, &err), BASE_EINVAL); /* an input: not BASE_EIO */
-    snprintf(line, sizeof line, "%s: No such file or directory", path);
+    snprintf(line, sizeof line, "%s: %s", path, strerror(ENOENT));
     assert_string_equal(err.text, line);
     snprintf(path, sizeof path, "/tmp/pt_host_%ld.pfm", (long)getpid());
     static const float values[4] = {-0.5f, 0.25f, 7.0f, NAN};
