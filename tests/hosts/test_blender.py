@@ -1,5 +1,4 @@
-"""Blender's Cycles as a host: pictures, passes, the add-on; run inside Blender or by a Python with the module bpy. BUILD
-names the build folder."""
+"""Blender's Cycles as a host: pictures, passes, the add-on; run inside Blender or by a Python with the module bpy."""
 import contextlib
 import dataclasses
 import os
@@ -66,8 +65,7 @@ def colourful(width=40, height=30):
 
 
 def test_passes():
-    """alpha and every pass of the view layer are those of one Cycles render, also after a resume; Blender finds them by
-    name"""
+    """alpha and the view layer's passes are those of one render, also after a resume; Blender finds them by name"""
     scene = colourful()
     settings = Settings("null", spp_max=48, block=20, output=tmp("passes.exr"), checkpoint=tmp("passes.npz"))
     for spp in (32, 48):

@@ -83,8 +83,7 @@ def in_memory():
 
 
 def test_signals():
-    """TERM, INT and HUP keep picture and checkpoint, status 130; kill -9 keeps the last checkpoint; nothing stays in
-    memory"""
+    """TERM, INT and HUP keep picture and checkpoint (status 130), kill -9 the last checkpoint; nothing stays in memory"""
     blend = saved(cube(48, 24), "signals.blend")
     before = in_memory()
     common = (blend, "-c", "null", "--block", "24", "-q", "--checkpoint-every", "0")

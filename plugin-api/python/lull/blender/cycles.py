@@ -11,9 +11,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-import shutil
 import sys
-import tempfile
 from typing import Iterator, Optional, Sequence
 
 import bpy
@@ -23,6 +21,7 @@ from .. import exr
 from ..blocks import merge
 from ..criterion import Rect
 from .passes import Passes
+from .unnamed import UnnamedFile
 
 # Sobol-Burley under its names in 3.x and 4.x: its waves add up to one render. The others' tables depend on the total
 # number of samples; they are usable where Cycles can be told that total apart from the subset to render (4.4 and later).
@@ -49,26 +48,6 @@ def _silence() -> Iterator[None]:
 # Names of the colour passes by which Cycles divides light, in 4.x and in 5.x
 COLOURS = {"diffuse": {"DiffCol", "Diffuse Color"}, "glossy": {"GlossCol", "Glossy Color"},
            "transmission": {"TransCol", "Transmission Color"}, "subsurface": {"SubsurfaceCol", "Subsurface Color"}}
-
-
-class WaveFile:
-    """Where Blender writes a wave and we read it: a file without a name. Elsewhere than on Linux, in a temporary folder."""
-
-    def __init__(self) -> None:
-        self._folder, self._handle = "", -1
-        if hasattr(os, "memfd_create"):
-            self._handle = os.memfd_create("lull-wave")
-            self.path = f"/proc/self/fd/{self._handle}"
-        else:
-            self._folder = tempfile.mkdtemp(prefix="lull-")
-            self.path = os.path.join(self._folder, "wave.exr")
-
-    def close(self) -> None:
-        if self._folder:
-            shutil.rmtree(self._folder, ignore_errors=True)
-        elif self._handle >= 0:
-            os.close(self._handle)
-        self._folder, self._handle = "", -1
 
 
 class HostError(Exception):
@@ -142,7 +121,7 @@ class Cycles:
             self.notes.append(f"only the view layer '{self.layer.name}' is rendered, not {', '.join(others)}")
         self.pattern = self._choose_pattern()
         self._touched: list[tuple[object, str, object]] = []
-        self._wave: Optional[WaveFile] = None
+        self._wave: Optional[UnnamedFile] = None
 
     def device(self) -> str:
         """What it renders on, by name."""
@@ -164,7 +143,7 @@ class Cycles:
 
     def __enter__(self) -> Cycles:
         render, cycles = self.scene.render, self.scene.cycles
-        self._wave = WaveFile()
+        self._wave = UnnamedFile()
         try:
             self._set(render, engine="CYCLES", use_persistent_data=True, use_border=True, use_crop_to_border=True,
                       use_compositing=False, use_sequencer=False, use_overwrite=True, use_placeholder=False,

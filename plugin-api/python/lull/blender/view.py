@@ -7,14 +7,13 @@ colour out of highlights): the noise of luminance is judged as it is shown, that
 """
 from __future__ import annotations
 
-import os
-import tempfile
 from typing import Callable, Optional
 
 import bpy
 import numpy as np
 
 from .. import png
+from .unnamed import UnnamedFile
 
 LOW, HIGH, STEPS = -14.0, 8.0, 2048  # log2 of the darkest and the brightest grey of the ramp, and their number
 
@@ -59,10 +58,9 @@ def _save_ramp(scene: bpy.types.Scene, greys: np.ndarray) -> np.ndarray:
                             "color_management": "FOLLOW_SCENE"}.items():
             if name in before:
                 setattr(settings, name, value)
-        with tempfile.TemporaryDirectory(prefix="lull-") as folder:
-            path = os.path.join(folder, "ramp.png")
-            image.save_render(path, scene=scene)
-            return png.read_grey(path)[0]
+        with UnnamedFile() as file:
+            image.save_render(file.path, scene=scene)
+            return png.read_grey(file.path)[0]
     finally:
         bpy.data.images.remove(image)
         for name, value in before.items():
