@@ -1,6 +1,5 @@
 #include "render/host.h"
 
-#include <limits.h>
 #include <stdlib.h>
 
 #include "base/version.h"
@@ -25,27 +24,10 @@ static void tell(void *context, int32_t level, const char *text)
         s->warn(s->warn_data, text);
 }
 
-struct job {
-    lull_task_fn fn;
-    void *arg;
-    uint64_t first;
-};
-
-static void run_task(void *data, long i, int worker)
-{
-    const struct job *job = data;
-    job->fn(job->arg, job->first + (uint64_t)i, (uint32_t)worker);
-}
-
 static int32_t run_tasks(void *context, uint64_t count, lull_task_fn fn, void *arg)
 {
     const struct services *s = context;
-    struct job job = {.fn = fn, .arg = arg};
-    for (; job.first < count;) {
-        uint64_t n = count - job.first < LONG_MAX / 2 ? count - job.first : LONG_MAX / 2;
-        base_threads_for(s->threads, (long)n, run_task, &job);
-        job.first += n;
-    }
+    base_threads_tasks(s->threads, count, fn, arg);
     return LULL_OK;
 }
 
@@ -63,7 +45,7 @@ int pt_criterion_create(const struct lull_criterion *table, const struct lull_pa
                                           .name = "lull pathtracer " BASE_VERSION,
                                           .context = s,
                                           .log = tell,
-                                          .parallel_for = threads ? run_tasks : NULL,
+                                          .parallel_for = run_tasks,
                                           .release = free};
     int32_t code = lull_host_create(&services, table, pairs, pair_count, out, &e);
     return code == LULL_OK ? 0 : pt_host_fail(code, &e, err);

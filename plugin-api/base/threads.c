@@ -1,6 +1,7 @@
 #define _GNU_SOURCE /* sched_getaffinity */
 #include "base/threads.h"
 
+#include <limits.h>
 #include <pthread.h>
 #include <sched.h>
 #include <stdatomic.h>
@@ -191,4 +192,30 @@ void base_threads_for(struct base_threads *t, long n, void (*fn)(void *, long, i
     post(t);
     take_indices(t, 0);
     finish(t);
+}
+
+struct tasks {
+    void (*fn)(void *arg, uint64_t task, uint32_t worker);
+    void *arg;
+    uint64_t first;
+};
+
+static void run_task(void *data, long i, int worker)
+{
+    const struct tasks *t = data;
+    t->fn(t->arg, t->first + (uint64_t)i, (uint32_t)worker);
+}
+
+void base_threads_tasks(struct base_threads *threads, uint64_t count, void (*fn)(void *arg, uint64_t task, uint32_t worker),
+                        void *arg)
+{
+    struct tasks t = {.fn = fn, .arg = arg};
+    for (uint64_t n; t.first < count; t.first += n) {
+        n = count - t.first < LONG_MAX / 2 ? count - t.first : LONG_MAX / 2;
+        if (threads)
+            base_threads_for(threads, (long)n, run_task, &t);
+        else
+            for (uint64_t i = 0; i < n; i++)
+                run_task(&t, (long)i, 0);
+    }
 }

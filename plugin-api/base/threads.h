@@ -7,6 +7,8 @@
 #ifndef BASE_THREADS_H
 #define BASE_THREADS_H
 
+#include <stdint.h>
+
 #include "base/err.h"
 
 struct base_threads;
@@ -23,5 +25,9 @@ int base_threads_count(const struct base_threads *threads);
  * within microseconds cost a fraction of one: workers look for the next before they sleep, unless they outnumber the
  * processors. */
 void base_threads_for(struct base_threads *threads, long n, void (*fn)(void *data, long i, int worker), void *data);
+
+/* The same for any number of tasks, in the form that criteria know; threads NULL: here, as worker 0. */
+void base_threads_tasks(struct base_threads *threads, uint64_t count, void (*fn)(void *arg, uint64_t task, uint32_t worker),
+                        void *arg);
 
 #endif

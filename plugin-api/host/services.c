@@ -15,33 +15,12 @@ static void host_log(const struct lull_host *host, int32_t level, const char *te
     c->offered.log(c->offered.context, level, line);
 }
 
-struct job {
-    lull_task_fn fn;
-    void *arg;
-    uint64_t first;
-};
-
-static void run_task(void *data, long i, int worker)
-{
-    const struct job *job = data;
-    job->fn(job->arg, job->first + (uint64_t)i, (uint32_t)worker);
-}
-
 static int32_t host_parallel_for(const struct lull_host *host, uint64_t count, lull_task_fn fn, void *arg)
 {
     const struct lull_host_criterion *c = host->context;
     if (c->offered.parallel_for)
         return c->offered.parallel_for(c->offered.context, count, fn, arg);
-    struct job job = {.fn = fn, .arg = arg};
-    for (; job.first < count;) {
-        uint64_t n = count - job.first < LONG_MAX / 2 ? count - job.first : LONG_MAX / 2;
-        if (c->threads)
-            base_threads_for(c->threads, (long)n, run_task, &job);
-        else
-            for (uint64_t i = 0; i < n; i++)
-                run_task(&job, (long)i, 0);
-        job.first += n;
-    }
+    base_threads_tasks(c->threads, count, fn, arg);
     return LULL_OK;
 }
 

@@ -3,6 +3,7 @@
  * Loading: resolve a name to a file, see that the file is a complete ELF object, dlopen, take the entry, check its tables.
  * A file cut short would make dlopen die of SIGBUS, therefore the look at its headers first.
  */
+#define _GNU_SOURCE /* dladdr */
 #include <lull/loader.h>
 
 #include <dirent.h>
@@ -138,6 +139,19 @@ static const char *beside_program(char path[LULL_PATH_MAX])
     return path;
 }
 
+/* lull beside the host library, if that is where this code is: a renderer is installed elsewhere. */
+static const char *beside_library(char path[LULL_PATH_MAX])
+{
+    static const char here, name[] = "/liblull-host.so", tail[] = "/lull";
+    Dl_info info;
+    const char *slash = dladdr(&here, &info) != 0 && info.dli_fname ? strrchr(info.dli_fname, '/') : NULL;
+    if (!slash || strncmp(slash, name, strlen(name)) != 0 || (size_t)(slash - info.dli_fname) + sizeof tail > LULL_PATH_MAX)
+        return NULL;
+    memcpy(path, info.dli_fname, (size_t)(slash - info.dli_fname));
+    memcpy(path + (slash - info.dli_fname), tail, sizeof tail);
+    return path;
+}
+
 /* Walks the directories of a search, entries joined by ':' one by one. */
 struct dir_walk {
     const struct lull_search *search;
@@ -146,9 +160,11 @@ struct dir_walk {
     char own[LULL_PATH_MAX];
 };
 
+enum { USUAL_ENTRIES = 3 };
+
 static const char *usual_entry(struct dir_walk *walk, size_t index)
 {
-    return index == 0 ? getenv("LULL_PLUGIN_PATH") : beside_program(walk->own);
+    return index == 0 ? getenv("LULL_PLUGIN_PATH") : index == 1 ? beside_program(walk->own) : beside_library(walk->own);
 }
 
 static int next_dir(struct dir_walk *walk, char dir[LULL_PATH_MAX])
@@ -156,7 +172,7 @@ static int next_dir(struct dir_walk *walk, char dir[LULL_PATH_MAX])
     const struct lull_search *s = walk->search;
     for (;;) {
         while (!walk->rest || *walk->rest == '\0') {
-            if (!s || walk->index >= (s->dirs ? s->dir_count : 2))
+            if (!s || walk->index >= (s->dirs ? s->dir_count : USUAL_ENTRIES))
                 return 0;
             walk->rest = s->dirs ? s->dirs[walk->index] : usual_entry(walk, walk->index);
             walk->index++;
