@@ -6,7 +6,8 @@
 
 `render(rects, first, count, half)` renders the rectangles, all of them for the samples [first, first + count), and returns
 (or yields) for each, in order, the mean of these samples: [h, w, 3] floats, or a mapping of planes (see Frame.add). `half`
-says that the samples belong to half A; most hosts need not care.
+says that the samples belong to half A; most hosts need not care. Which rectangles come in one call follows the clock: what
+one of them gets must depend on the rectangle, first and count only.
 """
 from __future__ import annotations
 
