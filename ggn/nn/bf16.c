@@ -1,7 +1,5 @@
 #include "nn/bf16.h"
 
-#include <string.h>
-
 #include "base/half.h"
 #include "nn/isa.h"
 
@@ -9,25 +7,11 @@
 
 /* --- the instruction's arithmetic, in software ------------------------------------------------------------------------- */
 
-INLINE uint32_t bits_of(float x)
-{
-    uint32_t u;
-    memcpy(&u, &x, sizeof u);
-    return u;
-}
-
-INLINE float float_of(uint32_t u)
-{
-    float x;
-    memcpy(&x, &u, sizeof x);
-    return x;
-}
-
 /* Denormal numbers are zero, whatever goes in and whatever comes out. */
 INLINE float flushed(float x)
 {
-    uint32_t u = bits_of(x);
-    return float_of(u & 0x7f800000u ? u : u & 0x80000000u);
+    uint32_t u = base_f32_bits(x);
+    return base_f32_of_bits(u & 0x7f800000u ? u : u & 0x80000000u);
 }
 
 static uint32_t pair_of(float low, float high)
@@ -44,11 +28,11 @@ static void pair_channels(uint32_t *out, const float *x0, const float *x1, long 
 /* The product of two bfloat16 numbers is a float, so that each sum is rounded once, as in the instruction. */
 INLINE void add_pairs(float *acc, const uint32_t *x, uint32_t w, const int n)
 {
-    const float low = float_of(w << 16), high = float_of(w & 0xffff0000u);
+    const float low = base_f32_of_bits(w << 16), high = base_f32_of_bits(w & 0xffff0000u);
 
     for (int q = 0; q < n; q++) {
-        float y = flushed(acc[q] + high * float_of(x[q] & 0xffff0000u));
-        acc[q] = flushed(y + low * float_of(x[q] << 16));
+        float y = flushed(acc[q] + high * base_f32_of_bits(x[q] & 0xffff0000u));
+        acc[q] = flushed(y + low * base_f32_of_bits(x[q] << 16));
     }
 }
 

@@ -1,25 +1,10 @@
 #include "base/half.h"
 
 #include <math.h>
-#include <string.h>
-
-static uint32_t bits_of(float x)
-{
-    uint32_t u;
-    memcpy(&u, &x, sizeof u);
-    return u;
-}
-
-static float float_of(uint32_t u)
-{
-    float x;
-    memcpy(&x, &u, sizeof x);
-    return x;
-}
 
 uint16_t base_f32_to_bf16(float x)
 {
-    uint32_t u = bits_of(x);
+    uint32_t u = base_f32_bits(x);
     if ((u & 0x7fffffffu) > 0x7f800000u)
         return (uint16_t)(u >> 16 | 0x40);
     return (uint16_t)((u + 0x7fff + (u >> 16 & 1)) >> 16);
@@ -27,7 +12,7 @@ uint16_t base_f32_to_bf16(float x)
 
 float base_bf16_to_f32(uint16_t x)
 {
-    return float_of((uint32_t)x << 16);
+    return base_f32_of_bits((uint32_t)x << 16);
 }
 
 uint16_t base_f64_to_f16(double x)
@@ -57,10 +42,10 @@ float base_f16_to_f32(uint16_t x)
     uint32_t sign = (uint32_t)(x & 0x8000) << 16, e = x >> 10 & 31, m = x & 0x3ff;
 
     if (e == 31)
-        return float_of(sign | 0x7f800000u | m << 13);
+        return base_f32_of_bits(sign | 0x7f800000u | m << 13);
     if (e == 0) {
         float magnitude = (float)m / 16777216.0f;
         return sign ? -magnitude : magnitude;
     }
-    return float_of(sign | (e + 112) << 23 | m << 13);
+    return base_f32_of_bits(sign | (e + 112) << 23 | m << 13);
 }

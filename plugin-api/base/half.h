@@ -3,6 +3,22 @@
 #define BASE_HALF_H
 
 #include <stdint.h>
+#include <string.h>
+
+/* A float as its bits, and the other way round. */
+static inline uint32_t base_f32_bits(float x)
+{
+    uint32_t u;
+    memcpy(&u, &x, sizeof u);
+    return u;
+}
+
+static inline float base_f32_of_bits(uint32_t u)
+{
+    float x;
+    memcpy(&x, &u, sizeof x);
+    return x;
+}
 
 /* Rounds to nearest even; NaN stays NaN. */
 uint16_t base_f32_to_bf16(float x);
