@@ -90,14 +90,15 @@ class Keeper:
     (finish). unsaved: why that failed last; the picture is worth more than its checkpoint."""
 
     def __init__(self, path: str, driver: Driver, every_s: float = 60.0):
-        self.path, self.every_s, self.unsaved = path, limits.real("checkpoint_every_s", every_s, 0), None
+        self.path, self.every_s = path, limits.real("checkpoint_every_s", every_s, 0)
+        self.unsaved: Optional[OSError] = None
         self._saved_s = time.monotonic()
         driver.suspend = self.save
 
     def save(self, driver: Driver) -> None:
         try:
             save(self.path, driver)
-            self.unsaved: Optional[OSError] = None
+            self.unsaved = None
         except OSError as error:
             self.unsaved = error
         self._saved_s = time.monotonic()
