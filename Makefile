@@ -122,7 +122,7 @@ REPLAY   := $(patsubst tests/fuzz/%.c,$(OUT)/fuzz/replay-%,$(FUZZ_SRC))
 FUZZERS  := $(patsubst tests/fuzz/%.c,build/fuzz/%,$(FUZZ_SRC))
 
 .DEFAULT_GOAL := all
-.PHONY: all demo test bench cost asan tsan fuzz mutants host-model hdr-check abi-check install compdb clean help setup tests replay train-demo test-study test-hosts
+.PHONY: all demo test bench cost asan tsan fuzz mutants host-model hdr-check abi-check install compdb clean help setup tests replay train-demo test-study test-hosts test-clang
 .SECONDARY:
 
 all: $(PROGRAMS) $(CRITERIA) $(MODULES) $(HOST_LIB) $(EXAMPLES) ## build the programs and the criteria
@@ -225,6 +225,8 @@ $(TESTS) $(SANE): | $(OIDN_STUB)
 ABI_PLUGINS := $(patsubst tests/%.c,$(OUT)/tests/%.so,$(wildcard tests/abi/plugins/*.c))
 $(OUT)/tests/abi/plugins/%.so: $(OBJ)/tests/abi/plugins/%.c.o
 	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared $< $(LDFLAGS_ALL) -lm -o $@
+$(OUT)/tests/processors/embree_isa.so: $(OBJ)/tests/processors/embree_isa.c.o
+	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared $< $(LDFLAGS_ALL) -ldl -o $@
 $(patsubst tests/%.c,$(OUT)/tests/%,$(wildcard tests/abi/api_*.c)): | $(ABI_PLUGINS) $(CRITERIA)
 $(OUT)/fuzz/replay-pt_%: $(OBJ)/tests/fuzz/pt_%.c.o $(OBJ)/tests/fuzz/replay.c.o $(PT_OBJ) $(LOADER_OBJ)
 	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) $(IMAGE_LIBS) -o $@
@@ -243,7 +245,7 @@ $(OUT)/bench/ggn_%: $(OBJ)/tests/bench/ggn_%.c.o $(GGN_OBJ) $(SUPPORT_ggn)
 setup: ## install the Debian packages that are missing
 	@scripts/setup
 
-tests: $(TESTS) $(ABI_PLUGINS) $(OIDN_STUB)
+tests: $(TESTS) $(ABI_PLUGINS) $(OIDN_STUB) $(OUT)/tests/processors/embree_isa.so
 replay: $(REPLAY)
 
 # `test` builds in sub-makes so that packages installed by setup are seen by pkg-config.
@@ -251,7 +253,14 @@ test: setup ## build everything, run every test; closes with "N passed, N failed
 	@$(MAKE) --no-print-directory all tests
 	@$(MAKE) --no-print-directory MODE=asan all replay $(SANE)
 	@BUILD=build tests/run $(patsubst tests/%.c,build/tests/%,$(TEST_SRC)) $(SCRIPT_TEST) \
+	    --processors tests/processors/list \
 	    --asan $(SANE) --replay $(patsubst tests/fuzz/%.c,build/asan/fuzz/replay-%,$(FUZZ_SRC))
+
+CLANG_TEST := $(patsubst tests/%.c,build/clang/tests/%,$(filter tests/unit/% tests/golden/% tests/abi/%,$(TEST_SRC)))
+test-clang: ## build the product with clang, without a warning, into build/clang, and pass the unit, golden and ABI tests
+	@scripts/setup clang
+	@$(MAKE) --no-print-directory OUT=build/clang CC=clang CXX=clang++ CFLAGS="$(CFLAGS) -Werror" all $(CLANG_TEST)
+	@BUILD=build/clang tests/run $(CLANG_TEST)
 
 test-hosts: setup ## install Blender, Mitsuba and bpy as far as they can be had, and test Lull in them
 	@$(MAKE) --no-print-directory all $(ABI_PLUGINS)

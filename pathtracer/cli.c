@@ -134,7 +134,7 @@ static int set_filter(void *into, const char *value, struct base_err *err)
     size_t n = strcspn(value, ":");
     cli->filter = base_word_index(pt_filter_words, value, n);
     if (cli->filter < 0)
-        return expected(err, PT_FILTERS(PT_WORD_OR) + 1);
+        return expected(err, &(PT_FILTERS(PT_WORD_OR))[1]);
     if (value[n] == ':' && !base_parse_real(value + n + 1, 0.01, 16, &cli->filter_radius))
         return expected(err, "a radius from 0.01 to 16");
     return 0;
@@ -249,7 +249,7 @@ static const struct base_option options[] = {
      .help = "path: next-event estimation with multiple importance sampling (default); bsdf-only: brute force, for "
              "checking"},
     {"max-depth", 0, "N", TO(max_depth), -1, 1000000, .help = "Most bounces, instead of the scene's; -1 = unlimited"},
-    {"filter", 0, PT_FILTERS(PT_WORD_OR) "[:RADIUS]" + 1, .set = set_filter,
+    {"filter", 0, &(PT_FILTERS(PT_WORD_OR) "[:RADIUS]")[1], .set = set_filter,
      .help = "Pixel filter, instead of the scene's; radius in pixels"},
     {"seed", 0, "N", TO(seed), 0, UINT32_MAX, .help = "Seed of all random numbers (default 0)"},
     {"effects", 0, NULL, TO(all_effects), .words = effect_words, .help = "all: use the general kernel (same image, slower)"},

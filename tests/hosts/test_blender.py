@@ -9,7 +9,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from blender_host import ROOT, SAME, TMP, NothingRendered, cube, one_render, tmp  # noqa: E402
+from blender_host import ROOT, SAME, TMP, NothingRendered, cube, one_render, tmp, whole_picture  # noqa: E402
 import bpy  # noqa: E402
 import numpy as np  # noqa: E402
 import lull  # noqa: E402
@@ -145,10 +145,9 @@ def test_exported_scenes():
         with Session(scene, settings) as session:
             assert session.driver.run().outcome == "done"
             mean, blocks = session.frame.mean(), session.frame.blocks
-        counts = sorted({b.spp for b in blocks})
-        assert len(blocks) == 4 and len(counts) > 1, (name, counts)
-        for spp in counts:
-            whole = one_render(scene, spp, 96)
+            wholes = {spp: whole_picture(session.host, spp) for spp in sorted({b.spp for b in blocks})}
+        assert len(blocks) == 4 and len(wholes) > 1, (name, list(wholes))
+        for spp, whole in wholes.items():
             assert whole.std() > .01
             for r in (b.rect for b in blocks if b.spp == spp):
                 here = np.s_[r.y0:r.y1, r.x0:r.x1]
