@@ -26,7 +26,7 @@ bool in_half(uint64_t sample) { return sample / 8 % 2 == 0; }
 /* One sample: a gradient whose right part is noisy. */
 void sample(Film &film, int x, int y, uint64_t n)
 {
-    std::minstd_rand random(static_cast<unsigned>((x + y * width) * 9973 + n * 7 + 1));
+    std::minstd_rand random(static_cast<unsigned>(static_cast<uint64_t>(x + y * width) * 9973 + n * 7 + 1));
     random.discard(3);
     const float u = std::uniform_real_distribution<float>(-1, 1)(random), noise = x > width / 2 ? 0.3f * u : 0.03f * u;
     for (int c = 0; c < 3; c++) {

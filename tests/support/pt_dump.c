@@ -127,7 +127,8 @@ static void dump_materials(FILE *out, const struct pt_scene *s)
         input(out, "base-across", m->base_roughness_v);
         input(out, "eta", m->eta_rgb);
         const pt_vec3 k = m->k_rgb.value; /* the root of a difference: three digits are sure */
-        fprintf(out, v3_is_black(k) ? "" : " k=%.3g,%.3g,%.3g", (double)k.x, (double)k.y, (double)k.z);
+        if (!v3_is_black(k))
+            fprintf(out, " k=%.3g,%.3g,%.3g", (double)k.x, (double)k.y, (double)k.z);
         input(out, "thickness", m->thickness);
         input(out, "g", m->g);
         input(out, "albedo", m->albedo);

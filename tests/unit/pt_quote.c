@@ -329,7 +329,7 @@ static void outlooks_in_closed_form(void **state)
 static char *quote_of(struct pt_approve_case *c)
 {
     char *text = NULL, visible[16];
-    unsigned long pilot;
+    unsigned long pilot = 0;
     size_t size;
     struct base_err err = {0};
     struct run run;
