@@ -534,7 +534,7 @@ static void tell_textures(void)
     t[n++] = (struct pt_texture){.kind = PT_TEXTURE_SCALE, .in = {{.texture = 2}, CONST(0.3f)}};
     t[n++] = (struct pt_texture){.kind = PT_TEXTURE_MIX, .in = {{.texture = 2}, CONST(0.3f), {.texture = 1}}};
     t[n] = (struct pt_texture){
-        .kind = PT_TEXTURE_CHECKERBOARD, .su = 3, .sv = -2, .du = 0.5f, .in = {{.texture = n - 1}, CONST(0.3f)}};
+        .kind = PT_TEXTURE_CHECKERBOARD, .su = 3, .sv = -2, .du = 0.5f, .in = {{.texture = n}, CONST(0.3f)}};
     n++;
     t[n++] = (struct pt_texture){.kind = PT_TEXTURE_BILERP,
                                  .su = 0.5f,
