@@ -497,6 +497,13 @@ static void expect_text(const char *name, const char *expected)
 }
 
 /* The manifest word for word: what is always there, and what is there only if it says something. */
+/* Member by member: what lies between them is anything. */
+static int same_block(const struct seq_manifest_block *a, const struct seq_manifest_block *b)
+{
+    return a->id == b->id && a->x0 == b->x0 && a->y0 == b->y0 && a->x1 == b->x1 && a->y1 == b->y1 && strcmp(a->file, b->file) == 0 &&
+           a->bytes == b->bytes && a->crc32 == b->crc32 && a->seconds == b->seconds && a->dropped == b->dropped;
+}
+
 static void manifests_word_for_word(void **state)
 {
     (void)state;
@@ -534,7 +541,7 @@ static void manifests_word_for_word(void **state)
     assert_int_equal(seq_manifest_read(dir, &back, &err), 0);
     assert_null(seq_manifest_difference(&m, &back));
     assert_string_equal(back.source, "a/s.pbrt");
-    assert_true(back.n_blocks == 2 && memcmp(back.blocks, list, sizeof list) == 0);
+    assert_true(back.n_blocks == 2 && same_block(&back.blocks[0], &list[0]) && same_block(&back.blocks[1], &list[1]));
     seq_manifest_release(&back);
     assert_true(back.n_blocks == 0 && !back.blocks && !back.levels);
 }

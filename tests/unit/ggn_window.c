@@ -151,6 +151,9 @@ static void policy_travels_with_the_model(void **state)
 
     assert_non_null(model);
     assert_int_equal(ggn_policy_set(model, &p, &err), 0);
+    memcpy(&q, &p, sizeof q); /* what lies between members */
+    q.passes = 0;
+    q.first_spp = q.ratio = q.step_spp = q.scale = q.shift = q.threshold = q.gate_noise = q.slope = q.tail999 = q.gini = -1;
     assert_int_equal(ggn_policy_of(model, &q, &err), 0);
     assert_memory_equal(&p, &q, sizeof p);
     p.threshold = 1.5;
