@@ -76,86 +76,20 @@ int pt_film_list_arrays(const struct pt_film *film, struct pt_film_array out[PT_
     return n;
 }
 
-/* A sum as if all samples had been kept: sum / spp is the mean (pt_film_patch). */
-static double filled(double sum, uint64_t spp, uint32_t dropped)
-{
-    return spp > dropped ? sum * ((double)spp / (double)(spp - dropped)) : sum;
-}
-
-/* To the last bit what a criterion makes of the filled sums (lull_kit_read, which multiplies with 1/N): a recording has the
- * codes of one mean, a network those of the other. */
-static void mean_of(const double *sum, uint64_t spp, uint32_t dropped, double rgb[3])
-{
-    const double factor = spp > dropped ? 1.0 / (double)spp : 0.0;
-    for (int c = 0; c < 3; c++)
-        rgb[c] = filled(sum[c], spp, dropped) * factor;
-}
-
+/* Both means are to the last bit what a criterion makes of the sums (lull_kit_read, which multiplies with 1/N, of what the
+ * host library shows it): a recording has the codes of one mean, a network those of the other. */
 void pt_film_mean(const struct pt_film *f, size_t i, uint64_t spp, double rgb[3])
 {
-    mean_of(f->color + 3 * i, spp, f->dropped[i], rgb);
+    const double factor = spp > f->dropped[i] ? 1.0 / (double)(spp - f->dropped[i]) : 0.0;
+    for (size_t c = 0; c < 3; c++)
+        rgb[c] = f->color[3 * i + c] * factor;
 }
 
 void pt_film_half_mean(const struct pt_film *f, size_t i, uint64_t half_spp, double rgb[3])
 {
-    mean_of(f->half + 3 * i, half_spp, f->dropped_half[i], rgb);
-}
-
-struct pt_film_patch_pixel {
-    size_t index;
-    double color[3], half[3], moment2;
-};
-
-static void scale(double *sum, int n, uint64_t spp, uint32_t dropped)
-{
-    for (int c = 0; c < n; c++)
-        sum[c] = filled(sum[c], spp, dropped);
-}
-
-int pt_film_patch(struct pt_film *f, int x0, int y0, int x1, int y1, uint64_t spp, struct pt_film_patch *patch,
-                  struct base_err *err)
-{
-    uint64_t half_spp = pt_film_half_spp(spp);
-    for (int y = y0; y < y1; y++) {
-        for (int x = x0; x < x1; x++) {
-            size_t i = pt_film_index(f, x, y);
-            if (f->dropped[i] == 0)
-                continue;
-            if (patch->count == patch->room) {
-                size_t room = patch->room ? 2 * patch->room : 64;
-                struct pt_film_patch_pixel *grown = realloc(patch->pixels, room * sizeof *grown);
-                if (!grown)
-                    return base_fail_nomem(err, "pixels with dropped samples");
-                patch->pixels = grown;
-                patch->room = room;
-            }
-            struct pt_film_patch_pixel *p = &patch->pixels[patch->count++];
-            *p = (struct pt_film_patch_pixel){.index = i};
-            memcpy(p->color, f->color + 3 * i, sizeof p->color);
-            scale(f->color + 3 * i, 3, spp, f->dropped[i]);
-            if (f->half) {
-                memcpy(p->half, f->half + 3 * i, sizeof p->half);
-                scale(f->half + 3 * i, 3, half_spp, f->dropped_half[i]);
-            }
-            if (f->moment2) {
-                p->moment2 = f->moment2[i];
-                scale(f->moment2 + i, 1, spp, f->dropped[i]);
-            }
-        }
-    }
-    return 0;
-}
-
-void pt_film_unpatch(struct pt_film *f, struct pt_film_patch *patch)
-{
-    for (size_t k = 0; k < patch->count; k++) {
-        const struct pt_film_patch_pixel *p = &patch->pixels[k];
-        memcpy(f->color + 3 * p->index, p->color, sizeof p->color);
-        if (f->half)
-            memcpy(f->half + 3 * p->index, p->half, sizeof p->half);
-        if (f->moment2)
-            f->moment2[p->index] = p->moment2;
-    }
-    free(patch->pixels);
-    *patch = (struct pt_film_patch){0};
+    const uint32_t dropped = f->dropped_half[i];
+    const double factor = half_spp > dropped ? 1.0 / (double)half_spp : 0.0;
+    const double up = half_spp > dropped ? (double)half_spp / (double)(half_spp - dropped) : 1.0;
+    for (size_t c = 0; c < 3; c++)
+        rgb[c] = f->half[3 * i + c] * up * factor;
 }

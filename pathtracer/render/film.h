@@ -177,14 +177,4 @@ void pt_film_mean(const struct pt_film *film, size_t index, uint64_t spp, double
 /* Mean of half A, half_spp = pt_film_half_spp(spp). */
 void pt_film_half_mean(const struct pt_film *film, size_t index, uint64_t half_spp, double rgb[3]);
 
-/* Scales the sums of the pixels that dropped samples as if all samples had been kept, so that sum / spp is their mean, and
- * keeps the true sums. pt_film_unpatch puts them back, byte for byte. Pixels outside [x0, x1) x [y0, y1) are left alone. */
-struct pt_film_patch {
-    struct pt_film_patch_pixel *pixels; /* owns */
-    size_t count, room;
-};
-int pt_film_patch(struct pt_film *film, int x0, int y0, int x1, int y1, uint64_t spp, struct pt_film_patch *patch,
-                  struct base_err *err);
-void pt_film_unpatch(struct pt_film *film, struct pt_film_patch *patch);
-
 #endif

@@ -89,7 +89,7 @@ static void checking(void **state)
     enum pt_render_outcome outcome;
     (void)state;
     assert_int_equal(open_render(&render, &criterion, &err), 0);
-    fail_arm(1); /* the first allocation of a running render is the list of patched pixels */
+    fail_arm(1); /* the first allocation of a running render is what makes up for dropped samples */
     assert_int_equal(pt_render_run(render, &hooks, &outcome, &err), 0);
     assert_true(fail_disarm());
     assert_int_equal(render->totals->failed_checks, 1);
