@@ -73,7 +73,7 @@ int32_t lull_host_evaluate(struct lull_host_criterion *c, const struct lull_host
     struct lull_host_shown shown;
     for (uint32_t k = 0; k < count; k++)
         decisions[k] = lull_host_undecided();
-    if (!c->open || c->block_count != b->count)
+    if (c->frame != f || c->block_count != b->count)
         return lull_error_set(err, LULL_E_STATE, "criterion %s: it has not been opened for this frame", c->table->id);
     int32_t code = lull_host_show(b, view, lull_host_wants_counts(c), &shown, err);
     if (code != LULL_OK)

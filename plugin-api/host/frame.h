@@ -13,6 +13,8 @@ enum { LULL_HOST_STEPS = 8 }; /* of a mask */
 /* Planes that the library makes where a criterion requires one of them. */
 #define LULL_HOST_COUNTS (LULL_PLANE_BIT(LULL_PLANE_SPP) | LULL_PLANE_BIT(LULL_PLANE_WEIGHT))
 
+struct lull_host_frame;
+
 struct lull_host_criterion {
     const struct lull_criterion *table;
     struct lull_instance *dialled[LULL_HOST_STEPS + 1]; /* own; by step of the mask, NULL where no block is of that step */
@@ -24,6 +26,7 @@ struct lull_host_criterion {
     struct lull_host host;            /* shows the services to the criterion */
 
     /* Of its frame, if one is open: scratch of an evaluate, [block_count]. */
+    const struct lull_host_frame *frame; /* never followed, only compared; NULL after a failure */
     uint32_t block_count;
     struct lull_block *all, *due;     /* own; the state of every block; of those that one instance is asked about */
     struct lull_decision *answers;    /* owns */

@@ -232,6 +232,7 @@ static int32_t begin_instances(struct lull_host_criterion *c, const struct lull_
 int32_t lull_host_join(const struct lull_host_frame *f, struct lull_host_criterion *c, struct lull_error *err)
 {
     int32_t code = fits(c, &f->blocks, err);
+    c->frame = NULL;
     if (code == LULL_OK)
         code = allocate_frame(c, &f->blocks, err);
     if (code == LULL_OK)
@@ -239,6 +240,7 @@ int32_t lull_host_join(const struct lull_host_frame *f, struct lull_host_criteri
     if (code != LULL_OK)
         return code;
     c->open = 1;
+    c->frame = f;
     c->begin_s = base_clock_wall_s();
     return LULL_OK;
 }

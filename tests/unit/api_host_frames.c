@@ -292,6 +292,23 @@ static void the_first_limit_wins(void **state)
     end();
 }
 
+/* A criterion answers about the frame that was opened last, and about no other. */
+static void one_frame_at_a_time(void **state)
+{
+    (void)state;
+    struct lull_host_frame *second;
+    begin(0, 0);
+    assert_int_equal(lull_host_begin(&config, criterion, &second, &fault), LULL_OK);
+    was_due = 0;
+    assert_int_equal(lull_host_check(frame, &view, &fault), LULL_E_STATE);
+    assert_string_equal(fault.message, "criterion told: it has not been opened for this frame");
+    assert_int_equal(was_due, 0);
+    assert_int_equal(lull_host_check(second, &view, &fault), LULL_OK);
+    assert_int_equal(was_due, 15);
+    lull_host_end(second);
+    end();
+}
+
 /* --- outlook ------------------------------------------------------------------------------------------------------------- */
 
 static void a_frame_is_forecast(void **state)
@@ -506,6 +523,7 @@ int main(void)
         cmocka_unit_test(checks_may_be_too_dear),
         cmocka_unit_test(uniform_frames_are_asked_once),
         cmocka_unit_test(the_first_limit_wins),
+        cmocka_unit_test(one_frame_at_a_time),
         cmocka_unit_test(a_frame_is_forecast),
         cmocka_unit_test(states_go_on),
         cmocka_unit_test(bad_states_are_refused),

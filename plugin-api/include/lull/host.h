@@ -8,8 +8,8 @@
  * and state. Link with -llull-host (pkg-config lull-host). C99 and C++11; examples/host.cpp is the smallest host.
  *
  *     lull_host_open(NULL, "observer", NULL, 0, &criterion, &err)         which planes? lull_host_needs(criterion)
- *     lull_host_begin(&config, criterion, &frame, &err)                   limits, size; lull_host_blocks_of(frame)
- *     while (lull_host_active(frame) > 0) {
+ *     lull_host_begin(&config, criterion, &frame, &err)                   limits, size; blocks = lull_host_blocks_of(frame)
+ *     while (lull_host_active(blocks) > 0) {
  *         render each block whose reason is LULL_REASON_NONE up to its next_spp; write its spp, half_spp, thread_s
  *         lull_host_check(frame, &view, &err)                             asks about them; stops or schedules each
  *     }
@@ -177,7 +177,8 @@ struct lull_host_totals {
  * LULL_E_UNSUPPORTED when it judges blocks of another size only, LULL_E_INVALID for anything that makes no sense. */
 LULL_EXPORT int32_t lull_host_begin(const struct lull_host_config *config, struct lull_host_criterion *criterion,
                                     struct lull_host_frame **out, struct lull_error *err);
-/* Opens the frame for one more criterion, which can then be asked by lull_host_evaluate. After a failure it has none. */
+/* Opens the frame for one more criterion, which can then be asked by lull_host_evaluate. A criterion has one frame, the one
+ * that was opened last: it answers about no other. */
 LULL_EXPORT int32_t lull_host_join(const struct lull_host_frame *frame, struct lull_host_criterion *criterion,
                                    struct lull_error *err);
 /* Frees the frame; NULL is allowed. The criterion keeps its own history until its next frame, or until it is closed. */
@@ -344,7 +345,7 @@ struct lull_host_report {
     double scene_bytes;                /* NaN: not known */
 };
 
-/* The report as JSON, docs/man/pathtracer.1: to a file, replaced as a whole or not at all, or to a writer. */
+/* The report as JSON (pathtracer(1) says what is in it): to a file, replaced as a whole or not at all, or to a writer. */
 LULL_EXPORT int32_t lull_host_report_write(const struct lull_host_frame *frame, const struct lull_host_report *report,
                                            const char *path, struct lull_error *err);
 LULL_EXPORT int32_t lull_host_report_text(const struct lull_host_frame *frame, const struct lull_host_report *report,
