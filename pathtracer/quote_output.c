@@ -101,13 +101,9 @@ static void print_row(FILE *out, const struct pt_quote_row *row)
 {
     char who[32], least[32], mean[32], most[32], samples[112], time[32], low[32], high[32], from_to[80], wall[160];
     if (isnan(row->visible))
-        snprintf(who, sizeof who, "as asked");
+        snprintf(who, sizeof who, "%s", row->name);
     else
-        snprintf(who, sizeof who, "%3.3g %%  %s", 100 * row->visible,
-                 row->visible == 0.5    ? "draft"
-                 : row->visible == 0.25 ? "default"
-                 : row->visible == 0.05 ? "final"
-                                        : "as asked");
+        snprintf(who, sizeof who, "%3.3g %%  %s", 100 * row->visible, row->name);
     snprintf(samples, sizeof samples, "%6s / %6s / %7s", thousands(row->spp_min, 0, least),
              thousands(row->spp_mean, row->unknown > 0 || row->capped > 0, mean),
              thousands(row->spp_max, row->unknown > 0 || row->capped > 0, most));

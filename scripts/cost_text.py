@@ -104,7 +104,7 @@ def real_text(out):
     near = sum(abs(r["stop"] / r["replayed"] - 1) <= 0.1 for r in replayed)
     unexplained = sum(real_why(r) == "not explained" for r in replayed)
     soon = ["%s %d at %d of %.0f" % (r["scene"], r["block"], r["stop"], r["threshold"]) for r in rows
-            if (r["criterion"], r["params"]) == ("observer", "visible=0.25") and r["stop"] < 0.8 * r["threshold"]]
+            if (r["criterion"], r["params"]) == ("observer", "visible=0.35") and r["stop"] < 0.8 * r["threshold"]]
     early = (" Early at the default: %s: where few of a rare path's lights are met yet, the halves say less noise than there is, which simulated levels, made as "
              "Gaussian noise of the late halves, cannot show." % "; ".join(soon)) if soon else ""
     timed = [r["sampling_s"] / (1e-6 * r["recorded_us"] * r["stop"] * BLOCK) for r in rows]

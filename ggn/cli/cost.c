@@ -172,7 +172,7 @@ static void put_scenes(struct job *j, cJSON *root)
 static void put_threshold(struct job *j, cJSON *to, const struct ggn_curve *c)
 {
     int censored;
-    base_json_number(to, NULL, ggn_curve_threshold(c, ggn_observer_limit(&ggn_observer_default, c->texture), &censored),
+    base_json_number(to, NULL, ggn_curve_threshold(c, ggn_observer_default.level, &censored),
                      &j->failed);
 }
 
@@ -327,7 +327,7 @@ static int cost_errors(struct job *j, struct base_err *err)
 static int put_observer(struct job *j, const char *dial, double visible, double growth, struct base_err *err)
 {
     struct ggn_method m;
-    int available, rc = ggn_method_observer(&m, &j->set, j->o->observer, visible, growth, &available, err);
+    int available, rc = ggn_method_observer(&m, &j->set, j->o->observer, 1, visible, growth, &available, err);
     if (rc)
         return rc;
     if (available)
@@ -341,11 +341,11 @@ static int cost_observer(struct job *j, struct base_err *err)
     static const double growths[] = {1.05, 1.1, 1.25, 1.5, 2.0};
     int rc = 0;
     if (j->o->cadence > 0)
-        return put_observer(j, "growth", 0.25, j->o->cadence, err);
+        return put_observer(j, "growth", GGN_OBSERVER_VISIBLE, j->o->cadence, err);
     for (size_t i = 0; i < COUNT(shares) && !rc; i++)
         rc = put_observer(j, "visible", shares[i], GGN_OBSERVER_GROWTH, err);
     for (size_t i = 0; i < COUNT(growths) && !rc; i++)
-        rc = put_observer(j, "growth", 0.25, growths[i], err);
+        rc = put_observer(j, "growth", GGN_OBSERVER_VISIBLE, growths[i], err);
     return rc;
 }
 

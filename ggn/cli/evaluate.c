@@ -17,8 +17,9 @@
 #include "eval/tables.h"
 #include "eval/strips.h"
 #include "eval/trained.h"
+#include "observer/observer.h"
 
-enum { MAX_MODELS = 8, MAX_FILES = 8, MAX_METHODS = 9 + 2 * MAX_FILES + 2 * MAX_MODELS, MAX_ADJUSTED = 8 };
+enum { MAX_MODELS = 8, MAX_FILES = 8, MAX_METHODS = 10 + 2 * MAX_FILES + 2 * MAX_MODELS, MAX_ADJUSTED = 8 };
 
 struct options {
     const char *data, *out, *observer, *models[MAX_MODELS], *thresholds[MAX_FILES], *trained[MAX_FILES];
@@ -88,7 +89,7 @@ static const struct base_option list[] = {
      .help = "the observer's parameters, each view without itself (ggn label --calibrate); needed where there are people's "
              "views"},
     {"visible", 0, "SHARE", TO(visible), 1e-4, 0.9999,
-     .help = "share of viewers that may still see noise, for observer (0.25) and models (their own)"},
+     .help = "share of viewers that may still see noise, for observer (0.35) and models (their own)"},
     {"baseline", 0, "FILE", .set = add_trained, .input = BASE_FILE,
      .help = "a published baseline as ggn baseline trained it; may be repeated"},
     {"thresholds", 0, "CSV", .set = add_thresholds, .input = BASE_FILE,
@@ -261,13 +262,15 @@ static int add_observed(struct job *j, struct base_err *err)
     int available, rc = check_people(j, err);
     if (rc)
         return rc;
-    struct ggn_method *m = &j->methods[j->n];
-    rc = ggn_method_observer(m, &j->set, j->o->observer, j->o->visible > 0 ? j->o->visible : 0.25, GGN_OBSERVER_GROWTH,
-                             &available, err);
-    if (!rc && available)
-        j->n++;
-    else if (!rc)
-        ggn_method_release(m);
+    for (int halves = 1; halves >= 0 && !rc; halves--) {
+        struct ggn_method *m = &j->methods[j->n];
+        rc = ggn_method_observer(m, &j->set, j->o->observer, halves, j->o->visible > 0 ? j->o->visible : GGN_OBSERVER_VISIBLE,
+                                 GGN_OBSERVER_GROWTH, &available, err);
+        if (!rc && available)
+            j->n++;
+        else if (!rc)
+            ggn_method_release(m);
+    }
     for (int i = 0; i < j->o->n_thresholds && !rc; i++) {
         rc = ggn_method_thresholds(&j->methods[j->n], &j->set, j->o->thresholds[i], GGN_SPLIT_PEOPLE, &available, err);
         if (!rc)
@@ -356,8 +359,8 @@ static int report(struct job *j, int skipped, struct base_err *err)
         if (rc)
             break;
         if (!j->o->json)
-            ggn_report_table(stdout, &j->set, (enum ggn_split)split, j->methods, metrics, j->n);
-        if (!j->o->json && split == GGN_SPLIT_PEOPLE)
+            rc = ggn_report_table(stdout, &j->set, (enum ggn_split)split, j->methods, metrics, j->n, err);
+        if (!rc && !j->o->json && split == GGN_SPLIT_PEOPLE)
             rc = ggn_report_people(stdout, &j->set, j->methods, j->n, err);
         ggn_report_json(base_json_object(splits, ggn_split_names[split], &failed), j->methods, metrics, j->n, &failed);
         report_changes(j, (enum ggn_split)split, base_json_object(changes, ggn_split_names[split], &failed), &failed);

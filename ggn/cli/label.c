@@ -75,7 +75,7 @@ static int human_labels(const struct options *o, const struct ggn_thresholds *t,
                        ggn_dataset_tiles(v));
     if (rc)
         return rc;
-    struct ggn_labels l = {.source = "human", .cap = GGN_CURVE_CAP, .spread = o->spread > 0 ? o->spread : GGN_LABELS_SPREAD,
+    struct ggn_labels l = {.source = "human", .cap = GGN_LABELS_CAP, .spread = o->spread > 0 ? o->spread : GGN_LABELS_SPREAD,
                            .labels = malloc(m->n_blocks * sizeof *l.labels)};
     if (!l.labels)
         return base_fail_nomem(err, v->dir);
@@ -84,9 +84,9 @@ static int human_labels(const struct options *o, const struct ggn_thresholds *t,
         if (!(id < (uint32_t)row->n && row->spp[id] > 0))
             rc = base_fail(err, BASE_EINVAL, "%s: block %u has no threshold in '%s'", v->dir, id, row->name);
         else
-            l.labels[l.n++] = (struct ggn_label){id, fmin(row->spp[id], l.cap), row->spp[id] >= l.cap};
+            l.labels[l.n++] = (struct ggn_label){id, ggn_observer_from_study(row->spp[id]), row->spp[id] >= GGN_STUDY_CAP};
     }
-    snprintf(l.detail, sizeof l.detail, "thresholds of '%.200s'", row->name);
+    snprintf(l.detail, sizeof l.detail, "thresholds of '%.200s', as samples at which no noise is seen at all", row->name);
     if (rc)
         ggn_labels_release(&l);
     else
@@ -220,8 +220,8 @@ static int label(const struct options *o, struct base_threads *threads, struct b
 
 static void print_row(const struct ggn_calibration_row *r)
 {
-    printf("%-26.26s %6d %8.3f %+8.3f %9.0f%% %8.2f %8.3f %8.3f\n", r->name, r->blocks, r->median_abs_log2, r->median_log2,
-           100.0 * r->share_below, r->spearman, r->level, r->exponent);
+    printf("%-26.26s %6d %8.3f %8.3f %+8.3f %9.0f%% %8.2f %8.4f\n", r->name, r->blocks, r->median_abs_log2, r->mean_abs_log2,
+           r->median_log2, 100.0 * r->share_below, r->spearman, r->level);
 }
 
 static void print_calibration(const struct ggn_calibration *c)
@@ -231,8 +231,8 @@ static void print_calibration(const struct ggn_calibration *c)
     for (int i = 0; i < c->n_blocks; i++)
         printf("%-26.26s %5u %9.0f %9.0f\n", c->views[c->blocks[i].view].name, c->blocks[i].id, c->blocks[i].human,
                c->blocks[i].predicted);
-    printf("\n%-26s %6s %8s %8s %10s %8s %8s %8s\n", "log2(left out / human)", "blocks", "median||", "bias", "below 0.8",
-           "Spearman", "level", "exponent");
+    printf("\n%-26s %6s %8s %8s %8s %10s %8s %8s\n", "log2(left out / human)", "blocks", "median||", "mean||", "bias",
+           "below 0.8", "Spearman", "level");
     for (int v = 0; v < c->n_views; v++)
         print_row(&c->views[v]);
     print_row(&c->all);

@@ -12,7 +12,10 @@
 
 #include "base/err.h"
 
-enum { GGN_LABELS_TEXT = 512 };
+enum {
+    GGN_LABELS_TEXT = 512,
+    GGN_LABELS_CAP = 20000 /* spp; nothing is simulated beyond, and labels made from simulated levels end here */
+};
 
 struct ggn_label {
     uint32_t id;      /* the block */

@@ -12,7 +12,6 @@
 enum { MAX_LEVELS = 192 };
 static const double HIGHEST_SHARE = 0.7; /* of the reference's samples: nearer than that nothing but the reference is left */
 static const double JITTER = 0.04;       /* of the ratio between levels */
-static const double SIMULATED_END = 10000; /* spp, where there is no reference */
 static const double CLEAN_END = 0.4;     /* a threshold below this share of the last level needs no further levels */
 
 /* One block's source. */
@@ -215,14 +214,14 @@ static int extend_chain(const struct ggn_chains *set, struct ggn_chain *c, const
     return rc;
 }
 
-/* Without a reference: levels up to SIMULATED_END in place of the recorded ones. */
+/* Without a reference: levels up to GGN_LABELS_CAP in place of the recorded ones. */
 static int simulate_chain(const struct ggn_chains *set, struct ggn_chain *c, const struct source *s, double ratio,
                           int jittered, uint32_t seed, struct base_err *err)
 {
     double spp[MAX_LEVELS];
-    int n = choose_levels(spp, set->first_spp < 16 ? set->first_spp : 16, ratio, SIMULATED_END / ratio, jittered, seed);
+    int n = choose_levels(spp, set->first_spp < 16 ? set->first_spp : 16, ratio, GGN_LABELS_CAP / ratio, jittered, seed);
 
-    spp[n++] = SIMULATED_END;
+    spp[n++] = GGN_LABELS_CAP;
     float *noise = malloc(ggn_chains_values(set) * sizeof *noise);
     int rc = !noise            ? base_fail_nomem(err, "simulated images")
              : n > c->n_levels ? ggn_chain_grow(set, c, n, err)

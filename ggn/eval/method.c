@@ -274,13 +274,14 @@ static int threshold_figures(const struct ggn_method *m, const struct ggn_eval_s
         const struct ggn_eval_block *block = &s->blocks[b];
         if (block->split != split)
             continue;
-        early += m->stop[b] < 0.8 * block->label.threshold;
-        spent += m->stop[b];
-        needed += block->label.threshold;
+        const double stop = ggn_eval_compared(block, m->stop[b]), needs = ggn_eval_compared(block, block->label.threshold);
+        early += stop < 0.8 * needs;
+        spent += stop;
+        needed += needs;
         if (block->label.censored)
             continue;
-        t[n] = block->label.threshold;
-        t[(size_t)s->n_blocks + n++] = m->stop[b];
+        t[n] = needs;
+        t[(size_t)s->n_blocks + n++] = stop;
     }
     out->early_stop_rate = early / out->blocks;
     out->samples_ratio = spent / needed;

@@ -41,10 +41,11 @@ int ggn_method_halfbuf(struct ggn_method *m, const struct ggn_eval_set *s, int *
 int ggn_method_variance(struct ggn_method *m, const struct ggn_eval_set *s, int *available, struct base_err *err);
 /* The criterion `observer`: stops when at most the share `visible` of viewers would still see noise. growth: largest ratio
  * of samples between two checks (the criterion's default: GGN_OBSERVER_GROWTH). path: the observer's file, of which views
- * that had a part in the fit get the parameters without them; NULL: built in. */
+ * that had a part in the fit get the parameters without them; NULL: built in. halves 0: as in a host without half buffers.
+ */
 #define GGN_OBSERVER_GROWTH 1.5
-int ggn_method_observer(struct ggn_method *m, const struct ggn_eval_set *s, const char *path, double visible, double growth,
-                        int *available, struct base_err *err);
+int ggn_method_observer(struct ggn_method *m, const struct ggn_eval_set *s, const char *path, int halves, double visible,
+                        double growth, int *available, struct base_err *err);
 /* Thresholds from a file, matched by the view's name (SIN3D's own names end in _part6); available: it has every view of
  * `split`. Views that it does not have stop at their cap. BASE_EINVAL where a view has another number of thresholds than
  * blocks. */

@@ -10,27 +10,27 @@
 static const double FIRST_SPP = 16.0; /* the criterion's default */
 
 /* The criterion's error at spp, between cases in log-log, beyond them as at the nearest. */
-static double error_at(const struct ggn_observer *o, const struct ggn_eval_set *s, const struct ggn_eval_block *b,
-                       double spp)
+static double error_at(const struct ggn_observer *o, const struct ggn_eval_set *s, const double *seen,
+                       const struct ggn_eval_block *b, double spp)
 {
     size_t i = b->first;
     while (i + 2 < b->end && s->spp[i + 1] < spp)
         i++;
     size_t k = i + 1 < b->end ? i + 1 : i;
     size_t pixels = (size_t)s->chains.width * (size_t)s->chains.height;
-    double one = ggn_observer_error(o, s->visible[i], s->texture[i], pixels);
-    double other = ggn_observer_error(o, s->visible[k], s->texture[k], pixels);
+    double one = ggn_observer_error(o, seen[i], pixels);
+    double other = ggn_observer_error(o, seen[k], pixels);
     double t = spp <= s->spp[i] ? 0.0 : spp >= s->spp[k] ? 1.0 : log(spp / s->spp[i]) / log(s->spp[k] / s->spp[i]);
     return one > 0.0 && other > 0.0 ? one * pow(other / one, t) : one + t * (other - one);
 }
 
 /* Where the criterion stops, which asks at sample counts of its own. */
-static double replay(const struct ggn_observer *o, const struct ggn_eval_set *s, const struct ggn_eval_block *b,
-                     double stop_error, double growth, double *asked)
+static double replay(const struct ggn_observer *o, const struct ggn_eval_set *s, const double *seen,
+                     const struct ggn_eval_block *b, double stop_error, double growth, double *asked)
 {
     double spp = fmax(FIRST_SPP, s->spp[b->first]);
     for (*asked = 1.0; spp < b->cap; ++*asked) {
-        double ratio = error_at(o, s, b, spp) / stop_error;
+        double ratio = error_at(o, s, seen, b, spp) / stop_error;
         if (ratio <= 1.0)
             break;
         spp = ceil(ggn_observer_next(spp, spp * ratio * ratio, growth));
@@ -38,10 +38,11 @@ static double replay(const struct ggn_observer *o, const struct ggn_eval_set *s,
     return fmin(spp, b->cap);
 }
 
-int ggn_method_observer(struct ggn_method *m, const struct ggn_eval_set *s, const char *path, double visible, double growth,
-                        int *available, struct base_err *err)
+int ggn_method_observer(struct ggn_method *m, const struct ggn_eval_set *s, const char *path, int halves, double visible,
+                        double growth, int *available, struct base_err *err)
 {
-    int rc = ggn_method_init(m, s, "observer", 1, err), view = -1;
+    int rc = ggn_method_init(m, s, halves ? "observer" : "observer, no halves", 1, err), view = -1;
+    const double *seen = halves ? s->visible : s->looked;
     struct ggn_observer o = ggn_observer_default;
     size_t pixels = (size_t)s->chains.width * (size_t)s->chains.height;
     *available = 1;
@@ -53,14 +54,13 @@ int ggn_method_observer(struct ggn_method *m, const struct ggn_eval_set *s, cons
             rc = ggn_observer_read(path, s->chains.data.views[block->view].name, &o, err);
         view = block->view;
         for (size_t i = block->first; i < block->end; i++) {
-            m->score[i] = isnan(s->visible[i])
-                              ? (double)NAN
-                              : ggn_observer_p_noisy(&o, ggn_observer_error(&o, s->visible[i], s->texture[i], pixels));
-            *available &= !isnan(s->visible[i]);
+            m->score[i] =
+                isnan(seen[i]) ? (double)NAN : ggn_observer_p_noisy(&o, ggn_observer_error(&o, seen[i], pixels));
+            *available &= !isnan(seen[i]);
         }
         m->stop[b] = block->cap;
         if (*available)
-            m->stop[b] = replay(&o, s, block, ggn_observer_error_at(&o, visible), growth, &m->asked[b]);
+            m->stop[b] = replay(&o, s, seen, block, ggn_observer_error_at(&o, visible), growth, &m->asked[b]);
     }
     if (rc) {
         ggn_method_release(m);
@@ -90,7 +90,8 @@ int ggn_method_thresholds(struct ggn_method *m, const struct ggn_eval_set *s, co
             rc = base_fail(err, BASE_EINVAL, "%s: '%s' has %d thresholds, %s has %u blocks", path, row->name, row->n, v->dir,
                            ggn_dataset_tiles(v));
         else if (row && row->spp[id] > 0)
-            m->stop[b] = fmin(row->spp[id], block->cap);
+            m->stop[b] = fmin(block->split == GGN_SPLIT_PEOPLE ? ggn_observer_from_study(row->spp[id]) : row->spp[id],
+                              block->cap);
     }
     if (rc && m->stop)
         ggn_method_release(m);

@@ -9,6 +9,7 @@
 #include "nn/ssim.h"
 #include "observer/curve.h"
 #include "observer/flip.h"
+#include "observer/observer.h"
 
 void ggn_eval_set_release(struct ggn_eval_set *s)
 {
@@ -71,12 +72,17 @@ static int list_blocks(struct ggn_eval_set *s, int *skipped, struct base_err *er
     return 0;
 }
 
+double ggn_eval_compared(const struct ggn_eval_block *block, double spp)
+{
+    return block->split == GGN_SPLIT_PEOPLE ? ggn_observer_to_study(spp) : spp;
+}
+
 enum { COLUMNS = 11 };
 
 static int make_columns(struct ggn_eval_set *s, struct base_err *err)
 {
     double **columns[COLUMNS] = {&s->spp, &s->seconds, &s->dammertz, &s->half_unsettled, &s->rse, &s->rse_unsettled,
-                                 &s->flip, &s->ssim, &s->visible, &s->texture, &s->relmse};
+                                 &s->flip, &s->ssim, &s->visible, &s->looked, &s->relmse};
     double *all = malloc(COLUMNS * s->n * sizeof *all);
     s->noisy = malloc(s->n);
     s->spp = all;
@@ -290,13 +296,49 @@ static int fill_observed(struct ggn_eval_set *s, const struct ggn_eval_block *bl
     for (size_t i = block->first; i < block->end && !rc; i++) {
         const struct seq_record *r = simulated ? NULL : seq_level(p, (uint32_t)s->spp[i]);
         if (r && has_halves(r)) {
-            rc = ggn_curve_level(p, r, &s->visible[i], &s->texture[i], err);
+            rc = ggn_curve_level(p, r, &s->visible[i], err);
         } else if (known && !r) {
             s->visible[i] = ggn_curve_at(&curve, s->spp[i]);
-            s->texture[i] = curve.texture;
         }
     }
     ggn_curve_release(&curve);
+    return rc;
+}
+
+/* The recorded level that a host without halves would compare level k with: the last of at most half its samples; NULL:
+ * none. */
+static const struct seq_record *earlier_look(const struct seq_block *p, uint32_t k)
+{
+    uint32_t from = k;
+    while (from > 0 && 2 * p->levels[from].spp > p->levels[k].spp)
+        from--;
+    return 2 * p->levels[from].spp <= p->levels[k].spp ? &p->levels[from] : NULL;
+}
+
+/* What the observer sees without halves: from pairs of recorded levels; at other levels in the same ratio to what it sees
+ * with halves as at the nearest pair at or below, or at the first. */
+static int fill_looked(struct ggn_eval_set *s, const struct ggn_eval_block *block, const struct seq_block *p,
+                       struct base_err *err)
+{
+    size_t i = block->first;
+    double ratio = (double)NAN;
+    int rc = 0;
+    for (uint32_t k = 0; k < p->n_levels && !rc; k++) {
+        const struct seq_record *earlier = earlier_look(p, k);
+        double halves, looks;
+        if (!earlier || !has_halves(&p->levels[k]))
+            continue;
+        if (!isnan(ratio))
+            for (; i < block->end && s->spp[i] < p->levels[k].spp; i++)
+                s->looked[i] = ratio * s->visible[i];
+        rc = ggn_curve_level(p, &p->levels[k], &halves, err);
+        if (!rc)
+            rc = ggn_curve_looks(p, earlier, &p->levels[k], &looks, err);
+        if (!rc)
+            ratio = halves > 0.0 ? looks / halves : 1.0;
+    }
+    for (; i < block->end; i++)
+        s->looked[i] = ratio * s->visible[i];
     return rc;
 }
 
@@ -342,6 +384,8 @@ static int fill_statistics(struct ggn_eval_set *s, const struct ggn_eval_block *
         rc = extrapolate(s, block, i, &p, err);
     if (!rc)
         rc = fill_observed(s, block, &p, err);
+    if (!rc)
+        rc = fill_looked(s, block, &p, err);
     if (!rc)
         rc = fill_relmse(s, block, &p, err);
     seq_block_release(&p);

@@ -20,6 +20,10 @@ struct ggn_eval_block {
     size_t first, end; /* its cases */
 };
 
+/* spp as thresholds of this block are compared: those of views that people judged in samples of their study
+ * (observer/observer.h), all others as they are. */
+double ggn_eval_compared(const struct ggn_eval_block *block, double spp);
+
 struct ggn_eval_set {
     struct base_team *team;         /* borrows; NULL: alone */
     struct ggn_chains chains;       /* owns: the images, continued beyond the recording where possible */
@@ -30,8 +34,9 @@ struct ggn_eval_set {
     double *spp, *seconds;          /* own; [n]; seconds: thread time spent on the block so far, NaN if unknown */
     signed char *noisy;             /* owns; [n]: 1, 0, or -1 unknown */
     double *dammertz, *half_unsettled, *rse, *rse_unsettled; /* own; [n]; NaN where not recorded */
-    double *visible, *texture;      /* own; [n]: what the model observer sees (observer/visibility.h); NaN without half
+    double *visible;                /* own; [n]: noise that the model observer sees (observer/visibility.h); NaN without half
                                        buffers */
+    double *looked;                 /* owns; [n]: the same in a host without half buffers; NaN without levels to tell it */
     double *flip, *ssim;            /* own; [n]: against the block's reference, without one against the mean of its full
                                        level; NaN unless asked for */
     double *relmse;                 /* owns; [n]: variance over the squared mean, from the full level's halves; NaN

@@ -65,14 +65,43 @@ static void print_rows(FILE *f, const struct ggn_method *methods, const struct g
     }
 }
 
-void ggn_report_table(FILE *f, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *methods,
-                      const struct ggn_method_metrics *metrics, int n)
+/* 2 log2 of what is seen without halves over what is seen with them, at a block's threshold: octaves of samples. */
+static double shift_without_halves(const struct ggn_eval_set *s, const struct ggn_eval_block *b)
 {
-    (void)s;
+    size_t i = b->first;
+    while (i + 1 < b->end && s->spp[i] < b->label.threshold)
+        i++;
+    return 2.0 * log2(s->looked[i] / s->visible[i]);
+}
+
+static int print_without_halves(FILE *f, const struct ggn_eval_set *s, enum ggn_split split, struct base_err *err)
+{
+    double *shift = malloc(2 * (size_t)s->n_blocks * sizeof *shift), *size = shift ? shift + s->n_blocks : NULL;
+    size_t n = 0;
+    if (!shift)
+        return base_fail_nomem(err, "evaluation");
+    for (int b = 0; b < s->n_blocks; b++)
+        if (s->blocks[b].split == split && isfinite(shift_without_halves(s, &s->blocks[b]))) {
+            shift[n] = shift_without_halves(s, &s->blocks[b]);
+            size[n] = fabs(shift[n]);
+            n++;
+        }
+    if (n > 0)
+        fprintf(f, "observer without halves, at the thresholds of %zu blocks: shifted by %+.3f octaves in the median, "
+                "|shift| median %.3f, 90th percentile %.3f\n",
+                n, ggn_stats_quantile(shift, n, 0.5), ggn_stats_quantile(size, n, 0.5), ggn_stats_quantile(size, n, 0.9));
+    free(shift);
+    return 0;
+}
+
+int ggn_report_table(FILE *f, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *methods,
+                     const struct ggn_method_metrics *metrics, int n, struct base_err *err)
+{
     fprintf(f, "\n%s: %d blocks of %d scenes (%d censored), %zu windows\n", ggn_split_names[split], metrics[0].blocks,
             metrics[0].scenes, metrics[0].censored, metrics[0].cases);
     print_rows(f, methods, metrics, n, 0, 14);
     print_rows(f, methods, metrics, n, 14, 21);
+    return print_without_halves(f, s, split, err);
 }
 
 static void print_view(FILE *f, const struct ggn_eval_set *s, int view, const struct ggn_method *m, double *room)
@@ -84,9 +113,10 @@ static void print_view(FILE *f, const struct ggn_eval_set *s, int view, const st
         if (block->view != view)
             continue;
         blocks += 1.0;
-        early += m->stop[b] < 0.8 * block->label.threshold;
+        const double stop = ggn_eval_compared(block, m->stop[b]), needs = ggn_eval_compared(block, block->label.threshold);
+        early += stop < 0.8 * needs;
         if (!block->label.censored)
-            room[n++] = fabs(log2(m->stop[b] / block->label.threshold));
+            room[n++] = fabs(log2(stop / needs));
     }
     fprintf(f, "  %6.3f %6.3f     ", ggn_stats_quantile(room, n, 0.5), early / blocks);
 }

@@ -8,8 +8,9 @@
 
 struct cJSON;
 
-void ggn_report_table(FILE *f, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *methods,
-                      const struct ggn_method_metrics *metrics, int n);
+/* Every method's figures, and how far the observer is off without half buffers. BASE_ENOMEM only. */
+int ggn_report_table(FILE *f, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *methods,
+                     const struct ggn_method_metrics *metrics, int n, struct base_err *err);
 /* People's views one by one: for each method the median of |log2(stop/threshold)| over blocks whose thresholds are no caps,
  * and the share of blocks stopped below 0.8 of theirs. BASE_ENOMEM only. */
 int ggn_report_people(FILE *f, const struct ggn_eval_set *s, const struct ggn_method *methods, int n, struct base_err *err);

@@ -11,44 +11,69 @@
 struct evidence {
     const struct ggn_calibration_block *blocks; /* borrows */
     struct ggn_curve *curves;                   /* owns; [n] */
-    double *x, *y;                              /* own, one allocation; [n]; room for a fit */
+    double *x, *y, *answers;                    /* own, one allocation; [n]; room for figures */
     int n;
 };
 
-static double clamp_to_cap(double spp)
+/* In samples of the study. */
+static double prediction(const struct evidence *e, int i, double level)
 {
-    return spp < GGN_CURVE_CAP ? spp : GGN_CURVE_CAP;
+    int censored;
+    return ggn_observer_to_study(ggn_curve_threshold(&e->curves[i], level, &censored));
 }
 
-/* Fits on all blocks but those of view `skip` (-1: on all). */
-static int fit(struct evidence *e, int skip, struct ggn_observer *o, struct base_err *err)
+/* Sum of |log2(predicted / human)| over the blocks of all views but `skip`. */
+static double misfit(const struct evidence *e, int skip, double level)
 {
-    size_t n = 0;
-    double level;
+    double sum = 0.0;
+    for (int i = 0; i < e->n; i++)
+        if (e->blocks[i].view != skip)
+            sum += fabs(log2(prediction(e, i, level) / e->blocks[i].human));
+    return sum;
+}
+
+/* Fits on all blocks but those of view `skip` (-1: on all). A sum of absolute errors has its least value where one of them
+ * is 0, so the levels to try are what the blocks show at their own thresholds. */
+static int fit(const struct evidence *e, int skip, struct ggn_observer *o, struct base_err *err)
+{
+    double least = INFINITY;
     for (int i = 0; i < e->n; i++) {
-        if (e->blocks[i].view == skip || e->blocks[i].human >= GGN_CURVE_CAP)
+        if (e->blocks[i].view == skip || e->blocks[i].human >= GGN_STUDY_CAP)
             continue;
-        e->x[n] = log(e->curves[i].texture + GGN_OBSERVER_OFFSET);
-        e->y[n++] = log(fmax(ggn_curve_at(&e->curves[i], e->blocks[i].human), 1e-9));
+        double level = ggn_curve_at(&e->curves[i], ggn_observer_from_study(e->blocks[i].human));
+        double sum = level > 0.0 ? misfit(e, skip, level) : INFINITY;
+        if (sum < least) {
+            least = sum;
+            o->level = level;
+        }
     }
-    ggn_stats_line(e->x, e->y, n, &level, &o->exponent);
-    o->level = exp(level);
-    if (n < 3 || !isfinite(o->level) || !isfinite(o->exponent))
-        return base_fail(
-            err, BASE_EINVAL,
-            "calibration needs at least 3 blocks of different texture with thresholds below %d in the other views",
-            GGN_CURVE_CAP);
+    if (!isfinite(least))
+        return base_fail(err, BASE_EINVAL, "calibration needs a noisy block with a threshold below %d in the other views",
+                         GGN_STUDY_CAP);
     return 0;
 }
 
-static void predict(struct evidence *e, int view, const struct ggn_observer *o, struct ggn_calibration_block *blocks)
+/* answers: [n] gets what the observer says itself. */
+static void predict(const struct evidence *e, int view, const struct ggn_observer *o, struct ggn_calibration_block *blocks,
+                    double *answers)
 {
-    for (int i = 0; i < e->n; i++) {
-        int censored;
-        if (blocks[i].view == view)
-            blocks[i].predicted =
-                clamp_to_cap(ggn_curve_threshold(&e->curves[i], ggn_observer_limit(o, e->curves[i].texture), &censored));
-    }
+    for (int i = 0; i < e->n; i++)
+        if (blocks[i].view == view) {
+            int censored;
+            answers[i] = ggn_curve_threshold(&e->curves[i], o->level, &censored);
+            blocks[i].predicted = ggn_observer_to_study(answers[i]);
+        }
+}
+
+/* Half the way from the 16th to the 84th percentile of log2(answer / threshold) in samples of the observer, of the blocks
+ * whose threshold is known. answers is overwritten. */
+static double spread_of(const struct evidence *e, double *answers)
+{
+    size_t n = 0;
+    for (int i = 0; i < e->n; i++)
+        if (e->blocks[i].human < GGN_STUDY_CAP)
+            answers[n++] = log2(answers[i] / ggn_observer_from_study(e->blocks[i].human));
+    return 0.5 * (ggn_stats_quantile(answers, n, 0.84) - ggn_stats_quantile(answers, n, 0.16));
 }
 
 static double error_of(const struct ggn_calibration_block *b)
@@ -71,6 +96,7 @@ static int summarise(struct evidence *e, int from, int to, struct ggn_calibratio
         e->y[i] = fabs(e->x[i]);
         below += e->x[i] < log2(0.8);
     }
+    row->mean_abs_log2 = ggn_stats_mean(e->y, n);
     row->median_log2 = ggn_stats_quantile(e->x, n, 0.5);
     row->median_abs_log2 = ggn_stats_quantile(e->y, n, 0.5);
     row->share_below = (double)below / (double)n;
@@ -87,8 +113,8 @@ static int leave_each_out(struct evidence *e, const struct ggn_calibration_input
         rc = fit(e, v, &o, err);
         if (rc)
             break;
-        *row = (struct ggn_calibration_row){.name = inputs[v].view->name, .level = o.level, .exponent = o.exponent};
-        predict(e, v, &o, c->blocks);
+        *row = (struct ggn_calibration_row){.name = inputs[v].view->name, .level = o.level};
+        predict(e, v, &o, c->blocks, e->answers);
         int to = from;
         while (to < e->n && e->blocks[to].view == v)
             to++;
@@ -97,13 +123,10 @@ static int leave_each_out(struct evidence *e, const struct ggn_calibration_input
     }
     if (!rc)
         rc = fit(e, -1, &c->observer, err);
-    c->all = (struct ggn_calibration_row){
-        .name = "all, each view left out", .level = c->observer.level, .exponent = c->observer.exponent};
+    c->all = (struct ggn_calibration_row){.name = "all, each view left out", .level = c->observer.level};
     if (!rc)
         rc = summarise(e, 0, e->n, &c->all, err);
-    for (int i = 0; i < e->n && !rc; i++)
-        e->x[i] = error_of(&c->blocks[i]);
-    c->observer.spread = 0.5 * (ggn_stats_quantile(e->x, (size_t)e->n, 0.84) - ggn_stats_quantile(e->x, (size_t)e->n, 0.16));
+    c->observer.spread = spread_of(e, e->answers);
     return rc;
 }
 
@@ -123,7 +146,7 @@ static int add_view(const struct ggn_calibration_input *in, int view, enum ggn_c
     for (uint32_t i = 0; i < m->n_blocks && !rc; i++) {
         uint32_t id = m->blocks[i].id;
         double human = id < tiles ? in->human->spp[id] : (double)NAN;
-        blocks[e->n++] = (struct ggn_calibration_block){.view = view, .id = id, .human = clamp_to_cap(human)};
+        blocks[e->n++] = (struct ggn_calibration_block){.view = view, .id = id, .human = fmin(human, GGN_STUDY_CAP)};
         if (!(human > 0.0))
             rc = base_fail(err, BASE_EINVAL, "%s: block %u has no threshold in '%s'", in->view->dir, id, in->human->name);
     }
@@ -148,10 +171,11 @@ int ggn_calibrate(const struct ggn_calibration_input *inputs, int n, enum ggn_cu
         room += inputs[v].view->manifest.n_blocks;
     struct ggn_calibration c = {
         .n_views = n, .views = calloc((size_t)n, sizeof *c.views), .blocks = calloc(room, sizeof *c.blocks)};
-    struct evidence e = {.blocks = c.blocks, .curves = calloc(room, sizeof *e.curves), .x = malloc(2 * room * sizeof *e.x)};
+    struct evidence e = {.blocks = c.blocks, .curves = calloc(room, sizeof *e.curves), .x = malloc(3 * room * sizeof *e.x)};
     if (!c.views || !c.blocks || !e.curves || !e.x)
         rc = base_fail_nomem(err, "calibration");
     e.y = e.x ? e.x + room : NULL;
+    e.answers = e.x ? e.x + 2 * room : NULL;
     for (int v = 0; v < n && !rc; v++)
         rc = add_view(&inputs[v], v, source, threads, &e, c.blocks, err);
     c.n_blocks = e.n;
@@ -173,8 +197,8 @@ static void add_row(cJSON *to, const struct ggn_calibration_row *row, int *faile
     base_json_text(to, "name", row->name, failed);
     base_json_number(to, "blocks", row->blocks, failed);
     base_json_number(to, "level", row->level, failed);
-    base_json_number(to, "exponent", row->exponent, failed);
     base_json_number(to, "median_abs_log2", row->median_abs_log2, failed);
+    base_json_number(to, "mean_abs_log2", row->mean_abs_log2, failed);
     base_json_number(to, "median_log2", row->median_log2, failed);
     base_json_number(to, "share_below_0.8", row->share_below, failed);
     base_json_number(to, "spearman", row->spearman, failed);
@@ -185,7 +209,6 @@ int ggn_calibration_write(const char *path, const struct ggn_calibration *c, str
     cJSON *root = cJSON_CreateObject();
     int failed = !root;
     base_json_number(root, "level", c->observer.level, &failed);
-    base_json_number(root, "exponent", c->observer.exponent, &failed);
     base_json_number(root, "spread", c->observer.spread, &failed);
     cJSON *table = base_json_array(root, "each_view_left_out", &failed);
     for (int v = 0; v < c->n_views; v++)

@@ -1,9 +1,9 @@
 /*
  * Fitting the observer to human thresholds, judged on views that had no part in the fit.
  *
- * At a human threshold noise is just not visible: log(visible noise there) = log(level) + exponent * log(texture + 2), least
- * squares over the blocks of all views, those at the cap left out (nothing is known but that people still saw noise). Every
- * figure of the table is of a view that was left out of its own fit.
+ * The level is the one with the least sum of |log2(predicted / human)| over the blocks of all views. Predictions are
+ * compared in samples of the study (ggn_observer_to_study), cut at its highest count as people's answers are. Every figure
+ * of the table is of a view that was left out of its own fit.
  */
 #ifndef GGN_OBSERVER_CALIBRATE_H
 #define GGN_OBSERVER_CALIBRATE_H
@@ -22,19 +22,19 @@ struct ggn_calibration_input {
 struct ggn_calibration_block {
     int view;
     uint32_t id;
-    double human, predicted; /* spp, at most GGN_CURVE_CAP; predicted without this view */
+    double human, predicted; /* spp of the study, at most GGN_STUDY_CAP; predicted without this view */
 };
 
 struct ggn_calibration_row { /* of e = log2(predicted / human) */
     const char *name;        /* of the view; borrows */
     int blocks;
-    double level, exponent;  /* fitted without this view */
-    double median_abs_log2, median_log2, share_below; /* share_below: e < log2(0.8), noise left to be seen */
+    double level;            /* fitted without this view */
+    double median_abs_log2, mean_abs_log2, median_log2, share_below; /* share_below: e < log2(0.8), noise left to be seen */
     double spearman;
 };
 
 struct ggn_calibration {
-    struct ggn_observer observer; /* from all views; spread is half the way from the 16th to the 84th percentile of e */
+    struct ggn_observer observer; /* from all views; spread: of e among uncensored blocks, in samples of the observer */
     int n_views, n_blocks;
     struct ggn_calibration_row *views, all; /* owns; [n_views]; each view left out */
     struct ggn_calibration_block *blocks;   /* owns; [n_blocks], view by view */

@@ -4,47 +4,52 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "observer/observer.h"
 #include "observer/visibility.h"
 
 const char *const ggn_curve_sources[] = {"halves", "levels", NULL};
 
-/* Simulated levels: GGN_CURVE_CAP and quarter octaves below it, down to about 5 spp. */
-enum { SIMULATED = 45 };
+/* Simulated levels: GGN_LABELS_CAP and quarter octaves below it, down to about 5 spp. */
+enum { SIMULATED = 49 };
 
 static double simulated_spp(int i)
 {
-    return GGN_CURVE_CAP * exp2(0.25 * (i - (SIMULATED - 1)));
+    return GGN_LABELS_CAP * exp2(0.25 * (i - (SIMULATED - 1)));
 }
 
-/* Planes of one block. */
+/* What is looked at: a part of one block, or several blocks of one size side by side as one larger block. */
 struct planes {
-    const struct seq_block *block; /* borrows */
-    int x0, y0, width, height;        /* the part of it that is looked at */
-    size_t pixels;
-    float *mean, *difference, *work;  /* [3][P], linear; one allocation, `mean` owns it */
-    float *lightness[3];              /* [P] */
-    double *scratch;                  /* owns */
+    const struct seq_block *blocks;  /* borrows; [down][across] */
+    int across, down;
+    int x0, y0, width, height;       /* the part; whole where there are several blocks */
+    size_t pixels;                   /* of the part */
+    float *one;                      /* [3][pixels of one block] */
+    float *mean, *difference, *work; /* [3][P], linear; one allocation with the others, `one` owns it */
+    float *lightness[3];             /* [P] */
+    double *texture, *scratch;       /* [patches]; one allocation, `texture` owns it */
 };
 
 static void planes_release(struct planes *p)
 {
-    free(p->mean);
-    free(p->scratch);
+    free(p->one);
+    free(p->texture);
     *p = (struct planes){0};
 }
 
-/* Room for `across` x `down` such blocks. */
-static int planes_init(struct planes *p, const struct seq_block *block, int across, int down, struct base_err *err)
+/* The caller has set blocks, across, down and the part. */
+static int planes_allocate(struct planes *p, struct base_err *err)
 {
-    int width = across * (int)block->width, height = down * (int)block->height;
-    size_t n = (size_t)width * (size_t)height;
-    *p = (struct planes){.block = block, .width = width, .height = height, .pixels = n,
-                         .mean = malloc(12 * n * sizeof *p->mean),
-                         .scratch = malloc(ggn_visibility_scratch(width) * sizeof *p->scratch)};
-    if (!p->mean || !p->scratch) {
+    size_t n = (size_t)p->width * (size_t)p->height, whole = (size_t)p->blocks->width * p->blocks->height;
+    size_t patches = ggn_visible_patches(p->width, p->height);
+    p->pixels = n;
+    p->one = malloc((3 * whole + 12 * n) * sizeof *p->one);
+    p->texture = malloc((patches + ggn_visibility_scratch(p->width)) * sizeof *p->texture);
+    if (!p->one || !p->texture) {
         planes_release(p);
         return base_fail_nomem(err, "observer");
     }
+    p->scratch = p->texture + patches;
+    p->mean = p->one + 3 * whole;
     p->difference = p->mean + 3 * n;
     p->work = p->mean + 6 * n;
     for (int i = 0; i < 3; i++)
@@ -52,14 +57,25 @@ static int planes_init(struct planes *p, const struct seq_block *block, int acro
     return 0;
 }
 
-/* Leaves of planes [3][P] of the whole block the part that is looked at. */
-static void crop(const struct planes *p, float *planes)
+/* Room for `across` x `down` whole blocks. */
+static int planes_init(struct planes *p, const struct seq_block *blocks, int across, int down, struct base_err *err)
 {
-    const size_t row = p->block->width, all = row * p->block->height;
+    *p = (struct planes){.blocks = blocks, .across = across, .down = down, .width = across * (int)blocks->width,
+                         .height = down * (int)blocks->height};
+    return planes_allocate(p, err);
+}
+
+/* Puts p->one, of block k, where it belongs in planes [3][P]. */
+static void place(const struct planes *p, int k, float *to)
+{
+    const size_t w = p->blocks->width, h = p->blocks->height, row = (size_t)p->width;
+    const int alone = p->across * p->down == 1;
+    const size_t columns = alone ? row : w, rows = alone ? (size_t)p->height : h;
+    const size_t x = w * (size_t)(k % p->across), y = h * (size_t)(k / p->across);
     for (size_t c = 0; c < 3; c++)
-        for (int y = 0; y < p->height; y++)
-            memmove(planes + c * p->pixels + (size_t)y * (size_t)p->width,
-                    planes + c * all + (size_t)(p->y0 + y) * row + (size_t)p->x0, (size_t)p->width * sizeof *planes);
+        for (size_t i = 0; i < rows; i++)
+            memcpy(to + c * p->pixels + (y + i) * row + x, p->one + (c * h + (size_t)p->y0 + i) * w + (size_t)p->x0,
+                   columns * sizeof *to);
 }
 
 /* L* of mean + scale * difference. */
@@ -70,17 +86,23 @@ static void look(struct planes *p, double scale, float *lightness)
     ggn_visible_lightness(p->work, p->pixels, lightness);
 }
 
+static void look_at_halves(struct planes *p, double scale)
+{
+    look(p, scale, p->lightness[0]);
+    look(p, -scale, p->lightness[1]);
+}
+
 /* Visible noise of factor * (L*[0] - L*[1]), which ends up in place of L*[0]. */
 static double visible(struct planes *p, float factor)
 {
     for (size_t i = 0; i < p->pixels; i++)
         p->lightness[0][i] = factor * (p->lightness[0][i] - p->lightness[1][i]);
-    return ggn_visible_noise(p->lightness[0], p->width, p->height, p->scratch, NULL);
+    return ggn_visible_noise(p->lightness[0], p->width, p->height, p->texture, p->scratch, NULL);
 }
 
-static double texture(struct planes *p)
+static void see_texture(struct planes *p)
 {
-    return ggn_visible_texture(p->lightness[0], p->lightness[1], p->width, p->height, p->scratch);
+    ggn_visible_texture(p->lightness[0], p->lightness[1], p->width, p->height, p->scratch, p->texture);
 }
 
 /* The level whose half-buffer difference is kept in full. */
@@ -92,194 +114,235 @@ static const struct seq_record *full_level(const struct seq_block *b)
     return NULL;
 }
 
-/* Appends the levels above `beyond` spp that mean and difference at full_spp stand for. */
-static void add_simulated(struct ggn_curve *c, struct planes *p, double full_spp, double beyond)
+static int has_halves(const struct seq_record *r)
 {
-    if (c->n == 0) {
-        look(p, 1.0, p->lightness[0]);
-        look(p, -1.0, p->lightness[1]);
-        c->texture = texture(p);
-    }
-    for (int i = 0; i < SIMULATED; i++) {
-        double spp = simulated_spp(i), scale = sqrt(full_spp / spp);
-        if (spp <= beyond)
-            continue;
-        look(p, scale, p->lightness[0]);
-        look(p, -scale, p->lightness[1]);
-        c->spp[c->n] = spp;
-        c->visible[c->n++] = visible(p, 0.5f);
-    }
+    return r && (seq_has(r, SEQ_PLANE_HALF_LOG) || seq_has(r, SEQ_PLANE_HALF_F16));
 }
 
-/* Appends the levels that the block's halves stand for above `beyond` spp. */
-static int add_halves(struct ggn_curve *c, struct planes *p, double beyond, struct base_err *err)
+/* Half difference of all channels; where only that of the luminance was recorded, that, as grey. */
+static int read_difference(const struct seq_block *b, const struct seq_record *r, float *out, struct base_err *err)
 {
-    const struct seq_record *full = full_level(p->block);
-    int rc = seq_mean(p->block, full, p->mean, err);
-    if (!rc)
-        rc = seq_half(p->block, full, p->difference, err);
-    if (rc)
-        return rc;
-    crop(p, p->mean);
-    crop(p, p->difference);
-    add_simulated(c, p, full->spp, beyond);
+    const size_t n = (size_t)b->width * b->height;
+    if (seq_has(r, SEQ_PLANE_HALF_F16))
+        return seq_half(b, r, out, err);
+    int rc = seq_half_luminance(b, r, out, err);
+    memcpy(out + n, out, n * sizeof *out);
+    memcpy(out + 2 * n, out, n * sizeof *out);
+    return rc;
+}
+
+/* Mean and half difference of the level at spp, which every block has. */
+static int read_level(struct planes *p, uint32_t spp, struct base_err *err)
+{
+    int rc = 0;
+    for (int k = 0; k < p->across * p->down && !rc; k++) {
+        const struct seq_block *b = &p->blocks[k];
+        const struct seq_record *r = seq_level(b, spp);
+        rc = seq_mean(b, r, p->one, err);
+        place(p, k, p->mean);
+        if (!rc)
+            rc = read_difference(b, r, p->one, err);
+        place(p, k, p->difference);
+    }
+    return rc;
+}
+
+static int all_have_halves(const struct planes *p, uint32_t spp)
+{
+    for (int k = 0; k < p->across * p->down; k++)
+        if (!has_halves(seq_level(&p->blocks[k], spp)))
+            return 0;
+    return 1;
+}
+
+static void append(struct ggn_curve *c, double spp, double seen)
+{
+    c->spp[c->n] = spp;
+    c->visible[c->n++] = seen;
+}
+
+/* Levels below the full one, each from its own halves: the full level's noise made stronger would be symmetric, where that
+ * of few samples is skewed to bright. */
+static int add_recorded_halves(struct ggn_curve *c, struct planes *p, uint32_t full_spp, struct base_err *err)
+{
+    for (uint32_t i = 0; i < p->blocks->n_levels; i++) {
+        uint32_t spp = p->blocks->levels[i].spp;
+        if (spp >= full_spp || !all_have_halves(p, spp))
+            continue;
+        int rc = read_level(p, spp, err);
+        if (rc)
+            return rc;
+        look_at_halves(p, 1.0);
+        append(c, spp, visible(p, 0.5f));
+    }
     return 0;
 }
 
+/* Appends what halves say: recorded levels of a curve that is empty, the full level, and those above it and `beyond` spp
+ * that it stands for. */
+static int add_halves(struct ggn_curve *c, struct planes *p, double beyond, struct base_err *err)
+{
+    const uint32_t full = full_level(p->blocks)->spp;
+    const int first = c->n == 0;
+    int rc = read_level(p, full, err);
+    if (!rc && first) {
+        look_at_halves(p, 1.0);
+        see_texture(p);
+        rc = add_recorded_halves(c, p, full, err);
+        if (!rc)
+            rc = read_level(p, full, err);
+        look_at_halves(p, 1.0);
+        append(c, full, visible(p, 0.5f));
+        c->recorded = c->n;
+    }
+    for (int i = 0; i < SIMULATED && !rc; i++) {
+        double spp = simulated_spp(i);
+        if (spp <= full || spp <= beyond)
+            continue;
+        look_at_halves(p, sqrt(full / spp));
+        append(c, spp, visible(p, 0.5f));
+    }
+    return rc;
+}
+
+/* The picture at each recorded level against the reference. */
 static int add_levels(struct ggn_curve *c, struct planes *p, int independent, struct base_err *err)
 {
-    const struct seq_block *b = p->block;
+    const struct seq_block *b = p->blocks;
+    const struct seq_record *last = &b->levels[b->n_levels - 1];
     double n_r = b->reference->spp;
     int rc = seq_mean(b, b->reference, p->mean, err);
+    if (!rc)
+        rc = seq_mean(b, last, p->difference, err);
     if (rc)
         return rc;
     ggn_visible_lightness(p->mean, p->pixels, p->lightness[2]);
-    for (uint32_t level = 0; level < b->n_levels; level++) {
-        const struct seq_record *r = &b->levels[level];
+    ggn_visible_lightness(independent ? p->difference : p->mean, p->pixels, p->lightness[0]);
+    memcpy(p->lightness[1], p->lightness[2], p->pixels * sizeof(float));
+    see_texture(p);
+    for (const struct seq_record *r = b->levels; r <= last; r++) {
         rc = seq_mean(b, r, p->difference, err);
         if (rc)
             return rc;
-        if (level + 1 == b->n_levels) {
-            ggn_visible_lightness(independent ? p->difference : p->mean, p->pixels, p->lightness[0]);
-            ggn_visible_lightness(p->mean, p->pixels, p->lightness[1]);
-            c->texture = texture(p);
-        }
         for (size_t i = 0; i < 3 * p->pixels; i++)
             p->difference[i] -= p->mean[i];
         look(p, independent ? sqrt(n_r / (n_r + r->spp)) : 1.0, p->lightness[0]);
-        for (size_t i = 0; i < p->pixels; i++)
-            p->lightness[1][i] = p->lightness[2][i];
-        c->spp[c->n] = r->spp;
-        c->visible[c->n++] = visible(p, 1.0f);
+        memcpy(p->lightness[1], p->lightness[2], p->pixels * sizeof(float));
+        append(c, r->spp, visible(p, 1.0f));
     }
     c->recorded = c->n;
     return 0;
 }
 
+/* Room for every level that a curve of this block can have. */
+static int curve_init(struct ggn_curve *c, const struct seq_block *block, struct base_err *err)
+{
+    size_t room = SIMULATED + 1 + block->n_levels;
+    *c = (struct ggn_curve){.spp = malloc(room * sizeof *c->spp), .visible = malloc(room * sizeof *c->visible)};
+    return c->spp && c->visible ? 0 : base_fail_nomem(err, "observer");
+}
+
+/* Hands over the curve, or releases it. */
+static int finish(int rc, struct ggn_curve *c, struct planes *p, struct ggn_curve *out)
+{
+    planes_release(p);
+    if (rc)
+        ggn_curve_release(c);
+    else
+        *out = *c;
+    return rc;
+}
+
 int ggn_curve_make(const struct seq_block *block, enum ggn_curve_source source, int reference_independent,
                    struct ggn_curve *curve, struct base_err *err)
 {
+    struct ggn_curve c;
+    struct planes p = {0};
     if (source == GGN_FROM_HALVES && !full_level(block))
         return base_fail(err, BASE_EINVAL,
                          "block %u has no full level with a half-buffer difference: record one, or use --source levels",
                          block->id);
     if (source == GGN_FROM_LEVELS && !block->reference)
         return base_fail(err, BASE_EINVAL, "block %u has no reference: record one, or use --source halves", block->id);
-    size_t room = SIMULATED + block->n_levels;
-    struct ggn_curve c = {.spp = malloc(room * sizeof *c.spp), .visible = malloc(room * sizeof *c.visible)};
-    struct planes p = {0};
-    int rc = !c.spp || !c.visible ? base_fail_nomem(err, "observer") : planes_init(&p, block, 1, 1, err);
+    int rc = curve_init(&c, block, err);
+    if (!rc)
+        rc = planes_init(&p, block, 1, 1, err);
     if (!rc && source == GGN_FROM_LEVELS)
         rc = add_levels(&c, &p, reference_independent, err);
     if (!rc && (source == GGN_FROM_HALVES || (reference_independent && full_level(block))))
         rc = add_halves(&c, &p, c.n > 0 ? 1.07 * c.spp[c.n - 1] : 0.0, err);
-    if (rc)
-        ggn_curve_release(&c);
-    else
-        *curve = c;
-    planes_release(&p);
-    return rc;
+    return finish(rc, &c, &p, curve);
 }
 
 int ggn_curve_part(const struct seq_block *block, int x0, int y0, int width, int height, struct ggn_curve *curve,
                    struct base_err *err)
 {
+    struct ggn_curve c;
+    struct planes p = {.blocks = block, .across = 1, .down = 1, .x0 = x0, .y0 = y0, .width = width, .height = height};
     if (x0 < 0 || y0 < 0 || width < 1 || height < 1 || x0 + width > (int)block->width || y0 + height > (int)block->height)
         return base_fail(err, BASE_EINVAL, "block %u has no part %dx%d at %d, %d", block->id, width, height, x0, y0);
     if (!full_level(block))
         return base_fail(err, BASE_EINVAL, "block %u has no full level with a half-buffer difference", block->id);
-    struct ggn_curve c = {.spp = malloc(SIMULATED * sizeof *c.spp), .visible = malloc(SIMULATED * sizeof *c.visible)};
-    struct planes p = {0};
-    int rc = !c.spp || !c.visible ? base_fail_nomem(err, "observer") : planes_init(&p, block, 1, 1, err);
-    if (!rc) {
-        p.x0 = x0;
-        p.y0 = y0;
-        p.width = width;
-        p.height = height;
-        p.pixels = (size_t)width * (size_t)height;
+    int rc = curve_init(&c, block, err);
+    if (!rc)
+        rc = planes_allocate(&p, err);
+    if (!rc)
         rc = add_halves(&c, &p, 0.0, err);
-    }
-    if (rc)
-        ggn_curve_release(&c);
-    else
-        *curve = c;
-    planes_release(&p);
-    return rc;
-}
-
-/* Planes of one of several blocks of n pixels, at (x, y) of the joined ones. */
-static void paste(const struct planes *p, const float *from, size_t x, size_t y, float *to)
-{
-    size_t w = p->block->width, h = p->block->height, row = (size_t)p->width;
-    for (size_t c = 0; c < 3; c++)
-        for (size_t k = 0; k < h; k++)
-            memcpy(to + c * p->pixels + (y + k) * row + x, from + (c * h + k) * w, w * sizeof *to);
-}
-
-static int read_joined(struct planes *p, const struct seq_block *blocks, int across, int down, struct base_err *err)
-{
-    const size_t w = blocks->width, h = blocks->height;
-    float *one = malloc(3 * w * h * sizeof *one);
-    int rc = one ? 0 : base_fail_nomem(err, "observer");
-    for (int k = 0; k < across * down && !rc; k++) {
-        size_t x = w * (size_t)(k % across), y = h * (size_t)(k / across);
-        const struct seq_record *full = full_level(&blocks[k]);
-        rc = seq_mean(&blocks[k], full, one, err);
-        if (!rc)
-            paste(p, one, x, y, p->mean);
-        if (!rc)
-            rc = seq_half(&blocks[k], full, one, err);
-        if (!rc)
-            paste(p, one, x, y, p->difference);
-    }
-    free(one);
-    return rc;
+    return finish(rc, &c, &p, curve);
 }
 
 int ggn_curve_joined(const struct seq_block *blocks, int across, int down, struct ggn_curve *curve, struct base_err *err)
 {
+    struct ggn_curve c;
+    struct planes p = {0};
     for (int k = 0; k < across * down; k++) {
         const struct seq_record *full = full_level(&blocks[k]), *first = full_level(&blocks[0]);
         if (!full || full->spp != first->spp || blocks[k].width != blocks->width || blocks[k].height != blocks->height)
             return base_fail(err, BASE_EINVAL, "blocks %u and %u have no full levels of the same size and samples",
                              blocks[0].id, blocks[k].id);
     }
-    struct ggn_curve c = {.spp = malloc(SIMULATED * sizeof *c.spp), .visible = malloc(SIMULATED * sizeof *c.visible)};
-    struct planes p = {0};
-    int rc = !c.spp || !c.visible ? base_fail_nomem(err, "observer") : planes_init(&p, blocks, across, down, err);
+    int rc = curve_init(&c, blocks, err);
     if (!rc)
-        rc = read_joined(&p, blocks, across, down, err);
+        rc = planes_init(&p, blocks, across, down, err);
     if (!rc)
-        add_simulated(&c, &p, full_level(blocks)->spp, 0.0);
-    if (rc)
-        ggn_curve_release(&c);
-    else
-        *curve = c;
+        rc = add_halves(&c, &p, 0.0, err);
+    return finish(rc, &c, &p, curve);
+}
+
+/* What is seen of mean +- difference. */
+static double see_both(struct planes *p)
+{
+    look_at_halves(p, 1.0);
+    see_texture(p);
+    return visible(p, 0.5f);
+}
+
+int ggn_curve_level(const struct seq_block *block, const struct seq_record *level, double *visible_out, struct base_err *err)
+{
+    struct planes p;
+    int rc = planes_init(&p, block, 1, 1, err);
+    if (!rc)
+        rc = read_level(&p, level->spp, err);
+    if (!rc)
+        *visible_out = see_both(&p);
     planes_release(&p);
     return rc;
 }
 
-int ggn_curve_level(const struct seq_block *block, const struct seq_record *level, double *visible_out, double *texture_out,
-                    struct base_err *err)
+int ggn_curve_looks(const struct seq_block *block, const struct seq_record *earlier, const struct seq_record *level,
+                    double *visible_out, struct base_err *err)
 {
+    const double n1 = earlier->spp, n2 = level->spp;
     struct planes p;
     int rc = planes_init(&p, block, 1, 1, err);
-    if (rc)
-        return rc;
-    rc = seq_mean(block, level, p.mean, err);
-    if (!rc && seq_has(level, SEQ_PLANE_HALF_F16)) {
-        rc = seq_half(block, level, p.difference, err);
-    } else if (!rc) {
-        rc = seq_half_luminance(block, level, p.difference, err);
-        memcpy(p.difference + p.pixels, p.difference, p.pixels * sizeof(float));
-        memcpy(p.difference + 2 * p.pixels, p.difference, p.pixels * sizeof(float));
-    }
-    if (!rc) {
-        look(&p, 1.0, p.lightness[0]);
-        look(&p, -1.0, p.lightness[1]);
-        *texture_out = texture(&p);
-        *visible_out = visible(&p, 0.5f);
-    }
+    if (!rc)
+        rc = seq_mean(block, earlier, p.difference, err);
+    if (!rc)
+        rc = seq_mean(block, level, p.mean, err);
+    for (size_t i = 0; i < 3 * p.pixels && !rc; i++)
+        p.difference[i] = (float)sqrt(n1 / (n2 - n1)) * (p.mean[i] - p.difference[i]);
+    if (!rc)
+        *visible_out = see_both(&p);
     planes_release(&p);
     return rc;
 }
@@ -316,7 +379,7 @@ double ggn_curve_at(const struct ggn_curve *c, double spp)
 {
     int i = 0;
     if (spp <= c->spp[0])
-        return c->visible[0];
+        return c->visible[0] * sqrt(c->spp[0] / spp);
     if (spp >= c->spp[c->n - 1])
         return c->visible[c->n - 1];
     while (c->spp[i + 1] < spp)

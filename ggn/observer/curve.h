@@ -1,11 +1,12 @@
 /*
  * How visible the noise of a recorded block is at any number of samples.
  *
- * From two halves: M and D of the block's full level, recorded at n0 spp, give the look at n spp as M + sqrt(n0/n) D and its
- * twin with the other sign. Nothing else is needed, and every n up to GGN_CURVE_CAP can be asked about; it errs where rare
- * bright paths make the noise far from Gaussian (ggn/observer/README.md). From recorded levels: the picture I at n spp
- * against a reference R of n_r independent samples. I - R has the variance s^2 (1/n + 1/n_r), so it is scaled by sqrt(n_r /
- * (n_r + n)); texture is what the last level and R share. Where the block has halves too they go on beyond the last level.
+ * - From two halves: M and D of the block's full level, recorded at n0 spp, give the look at n spp as M + sqrt(n0/n) D and
+ *   its twin with the other sign, for n > n0 up to GGN_LABELS_CAP. Recorded levels below n0 are looked at by their own
+ *   halves. It errs where rare bright paths make the noise far from Gaussian (ggn/observer/README.md).
+ * - From recorded levels: the picture I at n spp against a reference R of n_r independent samples. I - R has the variance
+ *   s^2 (1/n + 1/n_r), so it is scaled by sqrt(n_r / (n_r + n)); texture is what the last level and R share. Where the block
+ *   has halves too they go on beyond the last level.
  */
 #ifndef GGN_OBSERVER_CURVE_H
 #define GGN_OBSERVER_CURVE_H
@@ -13,15 +14,12 @@
 #include "base/err.h"
 #include "sequence/block.h"
 
-enum { GGN_CURVE_CAP = 10000 }; /* spp; where the people of SIN3D stopped looking */
-
 enum ggn_curve_source { GGN_FROM_HALVES, GGN_FROM_LEVELS };
 extern const char *const ggn_curve_sources[]; /* "halves", "levels", NULL */
 
 struct ggn_curve {
     int n, recorded;       /* levels; the first so many are recorded ones */
     double *spp, *visible; /* own; [n]; spp rising; ggn_visible_noise at each */
-    double texture;
 };
 
 /* BASE_EINVAL: GGN_FROM_HALVES without a full level, GGN_FROM_LEVELS without a reference. */
@@ -35,15 +33,20 @@ int ggn_curve_part(const struct seq_block *block, int x0, int y0, int width, int
 int ggn_curve_joined(const struct seq_block *blocks, int across, int down, struct ggn_curve *curve, struct base_err *err);
 void ggn_curve_release(struct ggn_curve *curve);
 
-/* Noise and texture of one recorded level as the criterion `observer` sees them in the renderer: from the level's own two
- * halves (where only the luminance of their difference was recorded, that, as grey). BASE_EINVAL: not recorded. */
-int ggn_curve_level(const struct seq_block *block, const struct seq_record *level, double *visible, double *texture,
-                    struct base_err *err);
+/* Visible noise of one recorded level as the criterion `observer` sees it in the renderer: from the level's own two halves
+ * (where only the luminance of their difference was recorded, that, as grey). BASE_EINVAL: not recorded. */
+int ggn_curve_level(const struct seq_block *block, const struct seq_record *level, double *visible, struct base_err *err);
+
+/* The same of a host without halves: from the level and an earlier one of fewer samples, both running means of the same
+ * samples (plugin/looks.h says how). */
+int ggn_curve_looks(const struct seq_block *block, const struct seq_record *earlier, const struct seq_record *level,
+                    double *visible, struct base_err *err);
 
 /* Smallest spp from which the noise stays at or below `limit`, interpolated between levels in log-log. censored: still above
  * at the last level, which is then returned. A curve that starts below gives its first level. */
 double ggn_curve_threshold(const struct ggn_curve *curve, double limit, int *censored);
-/* Visible noise at spp, interpolated in log-log and clamped to the ends. */
+/* Visible noise at spp, interpolated in log-log; before the first level it is that level's, as 1/sqrt(spp) rises; beyond the
+ * last that level's. */
 double ggn_curve_at(const struct ggn_curve *curve, double spp);
 
 #endif

@@ -9,21 +9,32 @@
 
 #include "base/files.h"
 
-const struct ggn_observer ggn_observer_default = {.level = 0.249490, .exponent = 0.497347, .spread = 0.491476};
+static const double STUDY_REFERENCE = 20000.0; /* R */
 
-double ggn_observer_limit(const struct ggn_observer *o, double texture)
+const struct ggn_observer ggn_observer_default = {.level = 0.256801, .spread = 0.465799};
+
+static double min(double a, double b)
 {
-    return o->level * pow(texture + GGN_OBSERVER_OFFSET, o->exponent);
+    return a < b ? a : b;
 }
 
-/* Standard error of the pooled Gaussian noise of P pixels is this over sqrt(P), as a share of it: a fourth moment
- * scatters by
- * sqrt(96)/3, its root by a quarter of that, and the blur leaves about a third of the pixels independent. */
-static const double POOLING_ERROR = 1.4;
-
-double ggn_observer_error(const struct ggn_observer *o, double visible, double texture, size_t pixels)
+double ggn_observer_from_study(double spp)
 {
-    return (1.0 + POOLING_ERROR / sqrt((double)pixels)) * visible / ggn_observer_limit(o, texture);
+    return spp >= GGN_STUDY_CAP ? GGN_LABELS_CAP : 1.0 / (1.0 / spp - 1.0 / STUDY_REFERENCE);
+}
+
+double ggn_observer_to_study(double spp)
+{
+    return min(1.0 / (1.0 / spp + 1.0 / STUDY_REFERENCE), GGN_STUDY_CAP);
+}
+
+/* Standard error of the pooled Gaussian noise of P pixels is this over sqrt(P), as a share of it: a sixth moment scatters by
+ * sqrt(10170)/15, its root by a sixth of that, and the blur leaves about a third of the pixels independent. */
+static const double POOLING_ERROR = 1.94;
+
+double ggn_observer_error(const struct ggn_observer *o, double visible, size_t pixels)
+{
+    return (1.0 + POOLING_ERROR / sqrt((double)pixels)) * visible / o->level;
 }
 
 double ggn_observer_next(double spp, double predicted, double growth)
@@ -51,8 +62,8 @@ double ggn_observer_error_at(const struct ggn_observer *o, double share)
 
 void ggn_observer_describe(const struct ggn_observer *o, char *text, size_t room)
 {
-    snprintf(text, room, "model observer: noise in L* is seen above %.4f (texture + 2)^%.4f, spread %.2f octaves", o->level,
-             o->exponent, o->spread);
+    snprintf(text, room, "model observer: noise in L* is seen above %.4f sqrt(texture + 2) of a patch, spread %.2f octaves",
+             o->level, o->spread);
 }
 
 static int get(const cJSON *root, const char *name, double lo, double hi, double *out)
@@ -86,10 +97,13 @@ int ggn_observer_read(const char *path, const char *left_out, struct ggn_observe
         return rc;
     cJSON *root = cJSON_ParseWithLength(text, size);
     const cJSON *from = fit_without(root, left_out);
-    if (!get(from, "level", 1e-6, 1e3, &o.level) || !get(from, "exponent", -10, 10, &o.exponent) ||
-        !get(root, "spread", 1e-3, 10, &o.spread))
+    if (!get(from, "level", 1e-6, 1e3, &o.level) || !get(root, "spread", 1e-3, 10, &o.spread))
         rc = base_fail(err, BASE_EINVAL,
-                       "%s: level, exponent or spread is missing or out of range (ggn label --calibrate writes them)", path);
+                       "%s: level or spread is missing or out of range (ggn label --calibrate writes them)", path);
+    else if (cJSON_HasObjectItem(root, "exponent"))
+        rc = base_fail(err, BASE_EINVAL,
+                       "%s: an observer with two fitted numbers, of an earlier version: "
+                       "write it anew with ggn label --calibrate", path);
     else
         *out = o;
     cJSON_Delete(root);

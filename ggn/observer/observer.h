@@ -1,10 +1,14 @@
 /*
  * The model observer: stands in for people where there are no human thresholds, and is never called human.
  *
- * Noise of visibility v (observer/visibility.h) in a block of texture s is seen while v exceeds the limit level * (s +
- * 2)^exponent: busy pictures hide noise. The two parameters are fitted to people (observer/calibrate.h). People differ and
- * the observer errs: log2 of the samples at which a viewer stops seeing the noise is taken as normal around its answer, with
- * the deviation `spread`. Pure functions, thread-safe.
+ * Visible noise r (observer/visibility.h) is seen while it exceeds `level`, the one number that is fitted to people
+ * (observer/calibrate.h). People differ and the observer errs: log2 of the samples at which a viewer stops seeing the noise
+ * is taken as normal around its answer, with the deviation `spread`. Pure functions, thread-safe.
+ *
+ * The observer answers at how many samples no noise is seen at all. The study (SIN3D) asked another question: from how many
+ * on a picture looks like one of 10,000 samples, which contains the picture's own; its values are means of three people's
+ * answers, none above 10,000. Both bend thresholds towards 10,000. One conversion serves for both: n samples in the study
+ * are 1 / (1/n - 1/R) of the observer's, R = 20,000.
  */
 #ifndef GGN_OBSERVER_OBSERVER_H
 #define GGN_OBSERVER_OBSERVER_H
@@ -12,29 +16,37 @@
 #include <stddef.h>
 
 #include "base/err.h"
+#include "data/labels.h"
 
-#define GGN_OBSERVER_OFFSET 2.0 /* L*: texture far below it hides nothing */
+enum {
+    GGN_STUDY_CAP = 10000 /* spp; the study's highest count, where thresholds are censored: GGN_LABELS_CAP here */
+};
+
+/* The criterion's default share of viewers who may still see noise: the smallest at which views that people judged take no
+ * more than 1.15 of the samples (ggn/observer/README.md). */
+#define GGN_OBSERVER_VISIBLE 0.35
 
 struct ggn_observer {
-    double level, exponent;
+    double level;
     double spread; /* octaves of samples, > 0 */
 };
 
 /* What is used when no other is named; ggn/observer/observer.json says the same and how it came about. */
 extern const struct ggn_observer ggn_observer_default;
 
-/* The visible noise at which people stop seeing it in a block of this texture. */
-double ggn_observer_limit(const struct ggn_observer *observer, double texture);
-/* What the criterion `observer` calls error: visible noise over its limit, and one standard error of the pooling more, so
- * that luck in
- * the few pixels of a small block stops nothing: 0.7 % for 200x200 pixels. */
-double ggn_observer_error(const struct ggn_observer *observer, double visible, double texture, size_t pixels);
+/* A threshold of the study in samples of the observer, at most GGN_LABELS_CAP. spp > 0. */
+double ggn_observer_from_study(double spp);
+/* The study's threshold that an answer of the observer stands for, at most GGN_STUDY_CAP. spp > 0. */
+double ggn_observer_to_study(double spp);
+
+/* What the criterion `observer` calls error: visible noise over the level, and one standard error of the pooling more, so
+ * that luck in the few pixels of a small block stops nothing: 1 % for 200x200 pixels. */
+double ggn_observer_error(const struct ggn_observer *observer, double visible, size_t pixels);
 /* Where to ask again about a block whose error falls to stop_error at `predicted` spp: there, but within [1.04, growth]
  * times spp. */
 double ggn_observer_next(double spp, double predicted, double growth);
-/* Share of viewers who still see noise of `error` times the limit: the noise of a mean falls as 1/sqrt(spp), so that an
- * error of
- * 2 is two octaves of samples away. error >= 0. */
+/* Share of viewers who still see noise of `error` times the level: the noise of a mean falls as 1/sqrt(spp), so that an
+ * error of 2 is two octaves of samples away. error >= 0. */
 double ggn_observer_p_noisy(const struct ggn_observer *observer, double error);
 /* Its inverse: the error at which this share of viewers, in (0, 1), sees noise. */
 double ggn_observer_error_at(const struct ggn_observer *observer, double share);

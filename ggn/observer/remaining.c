@@ -8,7 +8,7 @@
 
 struct workspace { /* for one block; owns */
     float *rgb, *image, *reference, *seen;
-    double *scratch;
+    double *texture, *scratch;
 };
 
 static void release(struct workspace *w)
@@ -17,6 +17,7 @@ static void release(struct workspace *w)
     free(w->image);
     free(w->reference);
     free(w->seen);
+    free(w->texture);
     free(w->scratch);
 }
 
@@ -27,8 +28,9 @@ static int init(struct workspace *w, int width, int height, struct base_err *err
                             .image = malloc(n * sizeof *w->image),
                             .reference = malloc(n * sizeof *w->reference),
                             .seen = malloc(n * sizeof *w->seen),
+                            .texture = malloc(ggn_visible_patches(width, height) * sizeof *w->texture),
                             .scratch = malloc(ggn_visibility_scratch(width) * sizeof *w->scratch)};
-    if (w->rgb && w->image && w->reference && w->seen && w->scratch)
+    if (w->rgb && w->image && w->reference && w->seen && w->texture && w->scratch)
         return 0;
     release(w);
     return base_fail_nomem(err, "blocks of an image");
@@ -49,15 +51,15 @@ static void lightness_of(const struct ggn_image8 *image, const struct ggn_remain
 static void judge(const struct ggn_observer *observer, struct ggn_remaining *b, struct workspace *w, float *map, int stride)
 {
     size_t n = (size_t)b->width * (size_t)b->height;
-    double texture = ggn_visible_texture(w->reference, w->reference, b->width, b->height, w->scratch);
-    double limit = ggn_observer_limit(observer, texture);
+    ggn_visible_texture(w->reference, w->reference, b->width, b->height, w->scratch, w->texture);
     for (size_t i = 0; i < n; i++)
         w->image[i] -= w->reference[i];
-    b->error = ggn_visible_noise(w->image, b->width, b->height, w->scratch, map ? w->seen : NULL) / limit;
+    b->error = ggn_visible_noise(w->image, b->width, b->height, w->texture, w->scratch, map ? w->seen : NULL);
+    b->error /= observer->level;
     for (int y = 0; map && y < b->height; y++)
         for (int x = 0; x < b->width; x++)
             map[(size_t)(b->y + y) * (size_t)stride + (size_t)(b->x + x)] =
-                (float)(fabs((double)w->seen[(size_t)y * (size_t)b->width + (size_t)x]) / limit);
+                (float)(fabs((double)w->seen[(size_t)y * (size_t)b->width + (size_t)x]) / observer->level);
 }
 
 int ggn_remaining_count(int width, int height, int block)

@@ -14,14 +14,14 @@
 
 struct ggn_remaining {
     int x, y, width, height; /* pixels; from the top left corner */
-    double error;            /* visible noise over the limit: 1 is just not seen, 2 twice that */
+    double error;            /* visible noise over the level: 1 is just not seen, 2 twice that */
 };
 
 /* Blocks of side `block` >= 1 that cover width x height pixels, row by row; those at the right and bottom may be smaller. */
 int ggn_remaining_count(int width, int height, int block);
 
 /* image and reference of equal size. blocks: [ggn_remaining_count]. map: [height][width], each pixel's blurred difference
- * over its block's limit, or NULL. BASE_ENOMEM. */
+ * over its patch's limit, or NULL. BASE_ENOMEM. */
 int ggn_remaining(const struct ggn_observer *observer, const struct ggn_image8 *reference, const struct ggn_image8 *image,
                   int block, struct ggn_remaining *blocks, float *map, struct base_err *err);
 

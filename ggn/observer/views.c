@@ -57,7 +57,7 @@ int ggn_view_label(const struct ggn_observer *observer, const struct ggn_dataset
         const struct ggn_curve *c = &curves[i];
         struct ggn_label *label = &l.labels[i];
         label->id = view->manifest.blocks[i].id;
-        label->threshold = ggn_curve_threshold(c, ggn_observer_limit(observer, c->texture), &label->censored);
+        label->threshold = ggn_curve_threshold(c, observer->level, &label->censored);
         l.cap = fmax(l.cap, c->spp[c->n - 1]);
         ggn_curve_release(&curves[i]);
     }
@@ -90,9 +90,9 @@ static int check_block(const struct ggn_observer *o, struct ggn_curve *recorded,
     double *room = malloc((size_t)recorded->n * sizeof *room);
     if (!room)
         return base_fail_nomem(err, "check");
-    out->halves = ggn_curve_threshold(halves, ggn_observer_limit(o, halves->texture), &censored);
+    out->halves = ggn_curve_threshold(halves, o->level, &censored);
     recorded->n = recorded->recorded;
-    out->recorded = ggn_curve_threshold(recorded, ggn_observer_limit(o, recorded->texture), &out->beyond);
+    out->recorded = ggn_curve_threshold(recorded, o->level, &out->beyond);
     out->curve = curve_shift(recorded, halves, room);
     free(room);
     return 0;

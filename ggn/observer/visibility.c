@@ -6,7 +6,9 @@
 
 #include "base/colour.h"
 
-enum { RADIUS = 2, TAPS = 2 * RADIUS + 1, SUMS = 4 };
+enum { RADIUS = 2, TAPS = 2 * RADIUS + 1, SUMS = 4, PATCH = 100 };
+
+static const double TEXTURE_OFFSET = 2.0; /* L*: texture far below it hides nothing */
 
 /* exp(-k^2 / (2 * 0.7^2)) over the sum of all five taps, k = 0, 1, 2: a Gaussian of 0.7 px. */
 static const double blur[RADIUS + 1] = {0.569912492, 0.205423697, 0.009620057};
@@ -43,9 +45,40 @@ void ggn_visible_lightness(const float *rgb, size_t n, float *lightness)
     }
 }
 
+/* --- patches --- */
+
+static int parts(int side)
+{
+    return (side - 1) / PATCH + 1;
+}
+
+/* Where part k of a side begins; part k + 1 begins where it ends. */
+static int part_begin(int side, int k)
+{
+    return (int)((int64_t)side * k / parts(side));
+}
+
+size_t ggn_visible_patches(int width, int height)
+{
+    return (size_t)parts(width) * (size_t)parts(height);
+}
+
+/* Means over a row of patches from sums over the rows of each column, which are 0 afterwards. */
+static void patch_means(double *columns, int width, int rows, double *means)
+{
+    for (int k = 0; k < parts(width); k++) {
+        int begin = part_begin(width, k), end = part_begin(width, k + 1);
+        double sum = 0.0;
+        for (int x = begin; x < end; x++)
+            sum += columns[x];
+        means[k] = sum / ((double)(end - begin) * rows);
+    }
+    memset(columns, 0, (size_t)width * sizeof *columns);
+}
+
 size_t ggn_visibility_scratch(int width)
 {
-    return (SUMS + 1) * ((size_t)width + 2 * RADIUS);
+    return (SUMS + 1) * ((size_t)width + 2 * RADIUS) + (size_t)parts(width);
 }
 
 /* The row that stands at y + k - RADIUS; beyond the block its first or last. */
@@ -64,29 +97,54 @@ static void extend(double *column, int width)
     }
 }
 
-double ggn_visible_noise(const float *noise, int width, int height, double *scratch, float *blurred)
+/* One row of B, whose sixth power is added to the columns' sums. column: [RADIUS + width + RADIUS], blurred downwards. */
+static void blur_row(const double *column, int width, double *sixth, float *blurred)
 {
-    double *column = scratch, *fourth = scratch + width + 2 * RADIUS, sum = 0.0;
-    memset(fourth, 0, (size_t)width * sizeof *fourth);
-    for (int y = 0; y < height; y++) {
-        const float *row[TAPS];
-        for (int k = 0; k < TAPS; k++)
-            row[k] = row_at(noise, width, height, y + k - RADIUS);
-        for (int x = 0; x < width; x++)
-            column[RADIUS + x] = blur[2] * (double)(row[0][x] + row[4][x]) + blur[1] * (double)(row[1][x] + row[3][x]) +
-                                 blur[0] * (double)row[2][x];
-        extend(column, width);
-        for (int x = 0; x < width; x++) {
-            const double *c = column + x;
-            double seen = blur[2] * (c[0] + c[4]) + blur[1] * (c[1] + c[3]) + blur[0] * c[2];
-            fourth[x] += seen * seen * seen * seen;
-            if (blurred)
-                blurred[(size_t)y * (size_t)width + (size_t)x] = (float)seen;
-        }
+    for (int x = 0; x < width; x++) {
+        const double *c = column + x;
+        double seen = blur[2] * (c[0] + c[4]) + blur[1] * (c[1] + c[3]) + blur[0] * c[2], square = seen * seen;
+        sixth[x] += square * square * square;
+        if (blurred)
+            blurred[x] = (float)seen;
     }
-    for (int x = 0; x < width; x++)
-        sum += fourth[x];
-    return sqrt(sqrt(sum / ((double)width * height)));
+}
+
+/* Over the patches of one row of them: the sum of what is seen, and the blurred rows in units of what texture hides. */
+static double finish_patches(const double *means, const double *texture, int width, int rows, float *blurred)
+{
+    double sum = 0.0;
+    for (int k = 0; k < parts(width); k++) {
+        double unit = 1.0 / sqrt(texture[k] + TEXTURE_OFFSET);
+        sum += sqrt(cbrt(means[k])) * unit;
+        for (int y = 0; blurred && y < rows; y++)
+            for (int x = part_begin(width, k); x < part_begin(width, k + 1); x++)
+                blurred[(size_t)y * (size_t)width + (size_t)x] *= (float)unit;
+    }
+    return sum;
+}
+
+double ggn_visible_noise(const float *noise, int width, int height, const double *texture, double *scratch, float *blurred)
+{
+    const size_t row_size = (size_t)width, across = (size_t)parts(width);
+    double *column = scratch, *sixth = column + row_size + 2 * RADIUS, *means = sixth + row_size, sum = 0.0;
+    memset(sixth, 0, row_size * sizeof *sixth);
+    for (int j = 0; j < parts(height); j++) {
+        int begin = part_begin(height, j), end = part_begin(height, j + 1);
+        for (int y = begin; y < end; y++) {
+            const float *row[TAPS];
+            for (int k = 0; k < TAPS; k++)
+                row[k] = row_at(noise, width, height, y + k - RADIUS);
+            for (int x = 0; x < width; x++)
+                column[RADIUS + x] = blur[2] * (double)(row[0][x] + row[4][x]) + blur[1] * (double)(row[1][x] + row[3][x]) +
+                                     blur[0] * (double)row[2][x];
+            extend(column, width);
+            blur_row(column, width, sixth, blurred ? blurred + (size_t)y * row_size : NULL);
+        }
+        patch_means(sixth, width, end - begin, means);
+        sum += finish_patches(means, texture + (size_t)j * across, width, end - begin,
+                              blurred ? blurred + (size_t)begin * row_size : NULL);
+    }
+    return sum / (double)ggn_visible_patches(width, height);
 }
 
 /* Sums over five rows of a, b, a b and ((a - b) / 2)^2, each [RADIUS + width + RADIUS]. */
@@ -120,22 +178,23 @@ static inline double mean_of_window(const double *c)
     return (c[0] + c[1] + c[2] + c[3] + c[4]) * (1.0 / (TAPS * TAPS));
 }
 
-double ggn_visible_texture(const float *a, const float *b, int width, int height, double *scratch)
+void ggn_visible_texture(const float *a, const float *b, int width, int height, double *scratch, double *texture)
 {
     const size_t stride = (size_t)width + 2 * RADIUS;
     double *const columns[SUMS] = {scratch, scratch + stride, scratch + 2 * stride, scratch + 3 * stride};
-    double *deviation = scratch + SUMS * stride, sum = 0.0;
+    double *deviation = scratch + SUMS * stride;
     memset(deviation, 0, (size_t)width * sizeof *deviation);
-    for (int y = 0; y < height; y++) {
-        sum_rows(a, b, width, height, y, columns);
-        for (int x = 0; x < width; x++) {
-            double covariance =
-                mean_of_window(columns[2] + x) - mean_of_window(columns[0] + x) * mean_of_window(columns[1] + x);
-            double texture = covariance - (1.0 / TAPS) * mean_of_window(columns[3] + x);
-            deviation[x] += sqrt(texture > 0.0 ? texture : 0.0);
+    for (int j = 0; j < parts(height); j++) {
+        int begin = part_begin(height, j), end = part_begin(height, j + 1);
+        for (int y = begin; y < end; y++) {
+            sum_rows(a, b, width, height, y, columns);
+            for (int x = 0; x < width; x++) {
+                double covariance =
+                    mean_of_window(columns[2] + x) - mean_of_window(columns[0] + x) * mean_of_window(columns[1] + x);
+                double shared = covariance - (1.0 / TAPS) * mean_of_window(columns[3] + x);
+                deviation[x] += sqrt(shared > 0.0 ? shared : 0.0);
+            }
         }
+        patch_means(deviation, width, end - begin, texture + (size_t)j * (size_t)parts(width));
     }
-    for (int x = 0; x < width; x++)
-        sum += deviation[x];
-    return sum / ((double)width * height);
 }

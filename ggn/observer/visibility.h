@@ -1,14 +1,20 @@
 /*
  * How visible a block's noise is: the kernel that labels and the criterion share.
  *
- * It looks at two pictures A and B of the same block, means of equally many samples each, as CIE L*. What differs between
- * them is noise, what they have in common is texture; neither needs a converged picture: noise    N = (L*(A) - L*(B)) / 2,
- * as strong as that of their mean; visible  (mean over the block of |N blurred by a Gaussian of 0.7 px|^4)^(1/4): a few
- * bright pixels count, people see them; texture  mean over the block of sqrt(max(0, cov(L*(A), L*(B)) - mean(N^2) / 5)),
- * both over 5x5 px. Noise does not add to a covariance, but it scatters it, by 2/5 mean(N^2) in standard error, and the root
- * of what is left above 0 would not be 0 in the mean; with half that error taken off, what it adds is nearly gone. Beyond
- * the edges of a block its outermost pixels are repeated; a block may be as small as one pixel. Pure functions on memory of
- * the caller, thread-safe; the same bits on every machine (no call of the mathematical library but one root at the end).
+ * Two pictures A and B of the same block, means of equally many samples each, are looked at as CIE L*. What differs between
+ * them is noise, what they have in common is texture that hides it; neither needs a converged picture.
+ *
+ * - The block is split into patches of at most 100x100 px, each side into ceil(side / 100) parts: one texture for a block
+ *   of velvet and gold would hide the noise of the velvet.
+ * - Texture s of a patch: mean over it of sqrt(max(0, cov(L*(A), L*(B)) - mean(N^2) / 5)), both over 5x5 px. Noise does not
+ *   add to a covariance, but it scatters it, by 2/5 mean(N^2) in standard error, and the root of what is left above 0 would
+ *   not be 0 in the mean; with half that error taken off, what it adds is nearly gone.
+ * - Noise N = (L*(A) - L*(B)) / 2 is as strong as that of their mean. B is N blurred by a Gaussian of 0.7 px.
+ * - Visible noise r of the block: mean over its patches of (mean over the patch of B^6)^(1/6) / sqrt(s + 2). A norm of 6
+ *   lets a few bright pixels count: people see them. How r becomes an answer: observer/observer.h.
+ *
+ * Beyond the edges of a block its outermost pixels are repeated; a block may be as small as one pixel. Pure functions on
+ * memory of the caller, thread-safe; the same bits on every processor (square and cube roots only).
  */
 #ifndef GGN_OBSERVER_VISIBILITY_H
 #define GGN_OBSERVER_VISIBILITY_H
@@ -19,11 +25,13 @@
  * is 0. */
 void ggn_visible_lightness(const float *rgb, size_t n, float *lightness);
 
+/* Patches of a block, row by row. */
+size_t ggn_visible_patches(int width, int height);
 /* Doubles of scratch memory for blocks of this width. */
 size_t ggn_visibility_scratch(int width);
-/* noise: [height][width]. blurred: the same, what is left of it after the blur; or NULL. */
-double ggn_visible_noise(const float *noise, int width, int height, double *scratch, float *blurred);
-/* a, b: [height][width]. */
-double ggn_visible_texture(const float *a, const float *b, int width, int height, double *scratch);
+/* a, b: L* [height][width]. texture: [patches] gets s of each. */
+void ggn_visible_texture(const float *a, const float *b, int width, int height, double *scratch, double *texture);
+/* Returns r. noise: N [height][width]. texture: [patches]. blurred: [height][width] gets B / sqrt(s + 2), or NULL. */
+double ggn_visible_noise(const float *noise, int width, int height, const double *texture, double *scratch, float *blurred);
 
 #endif

@@ -1,9 +1,10 @@
 /*
- * The criterion "observer": the model observer (observer/observer.h) in the renderer. From COLOR and HALF it makes the means
- * of the two halves of a block's samples as a display shows them; what differs between them is noise, what they share is
- * texture that hides noise. `error` is the visible noise over the limit at which people stop seeing it, `p_noisy` the share
- * of viewers who still do; a block stops when that is at most `visible`. No model, no history: an answer follows from the
- * block's pixels alone.
+ * The criterion "observer": the model observer (observer/observer.h) in the renderer. It makes two pictures of a block whose
+ * difference is noise and which share the texture that hides noise, as a display shows them. With the plane HALF these are
+ * the means of the two halves of the samples: an answer follows from the block's pixels alone. Without it they are the mean
+ * plus and minus what an earlier look at the same mean says of its noise (plugin/looks.h). `error` is the visible noise over
+ * the level at which people stop seeing it, `p_noisy` the share of viewers who still do; a block stops when that is at most
+ * `visible`. No model.
  */
 #include <stdatomic.h>
 
@@ -11,31 +12,39 @@
 #include "observer/observer.h"
 #include "observer/visibility.h"
 #include "plugin/criteria.h"
+#include "plugin/looks.h"
 #include "plugin/translate.h"
 
+static const double FLOAT_STEP = 0x1p-22; /* looks that are nearer than their rounding are the same */
+
 enum { P_VISIBLE, P_FIRST_SPP, P_GROWTH, P_COUNT };
-enum { PLANES = LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_HALF) };
+enum { COLOR = LULL_PLANE_BIT(LULL_PLANE_COLOR), PLANES = COLOR | LULL_PLANE_BIT(LULL_PLANE_HALF) };
 
 static const struct lull_param params[P_COUNT] = {
     [P_VISIBLE] =
-        LULL_KIT_FLOAT("visible", "0.25", 1e-4, 0.9999, "stop when at most this share of viewers would still see noise"),
+        LULL_KIT_FLOAT("visible", "0.35", 1e-4, 0.9999, "stop when at most this share of viewers would still see noise"),
     [P_FIRST_SPP] = LULL_KIT_INT("first-spp", "16", 2, 1e15, "samples per pixel before the first judgement"),
     [P_GROWTH] = LULL_KIT_FLOAT("growth", "1.5", 1.01, 100, "largest ratio of samples between two checks of a block"),
 };
 
-struct worker { /* [3][P] linear light of each half, its L* */
+struct worker { /* [3][P] linear light of each half, its L*; [patches] */
     float *rgb[2], *lightness[2];
-    double *scratch;
+    double *texture, *scratch;
+};
+
+struct largest { /* of the blocks of a frame */
+    size_t pixels, patches;
+    int32_t width;
 };
 
 struct lull_instance {
     struct lull_kit kit;
     struct ggn_observer observer;
     double stop_error;
-    atomic_flag warned; /* of halves that are none: once per frame */
+    atomic_flag warned; /* of planes that say nothing about noise: once per frame */
+    struct gp_looks looks; /* of a frame without HALF */
     uint32_t workers;   /* of the open frame */
-    size_t pixels_max;  /* of its largest block */
-    int32_t width_max;  /* of its widest */
+    struct largest largest;
     struct worker *worker;
     float *pixels;   /* owns what the workers point into */
     double *scratch; /* likewise */
@@ -90,24 +99,56 @@ static int read_halves(const struct lull_kit *kit, const struct lull_view *view,
     return differ;
 }
 
-static double error_of(const struct lull_instance *in, const struct lull_block *b, struct worker *w)
+/* Fills w->rgb with the mean plus and minus its noise, as the look at `base` tells that; keeps the mean where `keep` is not
+ * NULL. A pixel that is or was no number takes the place of the one before it. Returns whether the looks differ anywhere. */
+static int read_looks(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *b,
+                      const float *base, uint64_t spp_base, float *keep, struct worker *w, struct lull_kit_tally *tally)
+{
+    const double before = (double)spp_base, scale = base ? sqrt(before / ((double)b->spp - before)) : 0;
+    const size_t plane = (size_t)lull_kit_pixels(b);
+    struct lull_kit_span s;
+    size_t at = 0;
+    int differ = 0;
+
+    for (lull_kit_span_begin(&s, view, b, COLOR); lull_kit_span_next(&s);)
+        for (int32_t i = 0; i < s.count; i++, at++) {
+            const double *m = s.value[LULL_PLANE_COLOR][i];
+            double d[3];
+            for (size_t c = 0; c < 3; c++) {
+                d[c] = base ? scale * (m[c] - (double)base[c * plane + at]) : 0;
+                if (keep)
+                    keep[c * plane + at] = (float)m[c];
+            }
+            int good = usable(d, m);
+            tally->valid += good;
+            tally->bad += !good;
+            for (size_t c = 0; c < 3; c++) {
+                float *one = &w->rgb[0][c * plane + at], *other = &w->rgb[1][c * plane + at];
+                *one = good ? shown(kit, m[c] + d[c]) : at ? one[-1] : 0;
+                *other = good ? shown(kit, m[c] - d[c]) : at ? other[-1] : 0;
+                differ |= good && fabs(d[c]) > FLOAT_STEP * scale * fabs(m[c]);
+            }
+        }
+    return differ;
+}
+
+/* split: of the two pictures' difference, to noise as strong as the mean's. */
+static double error_of(const struct lull_instance *in, const struct lull_block *b, double split, struct worker *w)
 {
     const int width = b->x1 - b->x0, height = b->y1 - b->y0;
     const size_t pixels = (size_t)lull_kit_pixels(b);
-    const double n = (double)b->spp, h = (double)b->half_spp;
-    const float split = (float)(sqrt(h * (n - h)) / n); /* 1/2 for equal halves: noise as strong as the mean's */
 
     for (int k = 0; k < 2; k++)
         ggn_visible_lightness(w->rgb[k], pixels, w->lightness[k]);
-    double texture = ggn_visible_texture(w->lightness[0], w->lightness[1], width, height, w->scratch);
+    ggn_visible_texture(w->lightness[0], w->lightness[1], width, height, w->scratch, w->texture);
     for (size_t i = 0; i < pixels; i++)
-        w->lightness[0][i] = split * (w->lightness[0][i] - w->lightness[1][i]);
-    double noise = ggn_visible_noise(w->lightness[0], width, height, w->scratch, NULL);
-    return ggn_observer_error(&in->observer, noise, texture, pixels);
+        w->lightness[0][i] = (float)split * (w->lightness[0][i] - w->lightness[1][i]);
+    double noise = ggn_visible_noise(w->lightness[0], width, height, w->texture, w->scratch, NULL);
+    return ggn_observer_error(&in->observer, noise, pixels);
 }
 
-/* A picture whose halves are the same everywhere has no noise, which is right for black or evenly lit blocks; one with
- * structure says that HALF is no half of the samples. */
+/* Two pictures that are the same everywhere show no noise, which is right for black or evenly lit blocks; structure says
+ * that the host has given the same samples twice. */
 static int has_structure(const struct worker *w, size_t pixels)
 {
     for (size_t c = 0; c < 3; c++)
@@ -124,6 +165,53 @@ static void warn(struct lull_instance *in, const char *what)
         host->log(host, LULL_LOG_WARNING, what);
 }
 
+/* What the two pictures of w say; differ: they are not the same everywhere. `same` is the warning if they should not be. */
+static double verdict_on(struct lull_instance *in, const struct lull_block *b, int differ, double split, const char *same,
+                         struct worker *w, struct lull_kit_tally *tally)
+{
+    if (differ)
+        return error_of(in, b, split, w);
+    if (!has_structure(w, (size_t)lull_kit_pixels(b)))
+        return 0;
+    warn(in, same);
+    tally->early = tally->bad = 1;
+    return (double)NAN;
+}
+
+static double judge_halves(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
+                           struct worker *w, struct lull_kit_tally *tally)
+{
+    const double n = (double)b->spp, h = (double)b->half_spp;
+
+    if (!b->half_spp || b->half_spp >= b->spp) {
+        warn(in, "observer: HALF holds none or all of a block's samples, so that noise cannot be told; no block is stopped "
+                 "by it");
+        tally->early = 1;
+        return (double)NAN;
+    }
+    int differ = read_halves(&in->kit, view, b, w, tally);
+    return verdict_on(in, b, differ, sqrt(h * (n - h)) / n, /* 1/2 for equal halves */
+                      "observer: COLOR and HALF are the same in a block that is not of one colour: HALF must hold a fixed "
+                      "half of the samples", w, tally);
+}
+
+static double judge_looks(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
+                          struct worker *w, struct lull_kit_tally *tally)
+{
+    uint64_t spp_base;
+    float *keep;
+    const float *base = gp_looks_begin(&in->looks, b->id, b->spp, &keep, &spp_base);
+    int differ = read_looks(&in->kit, view, b, base, spp_base, keep, w, tally);
+
+    if (!base) {
+        tally->early = 1;
+        return (double)NAN;
+    }
+    return verdict_on(in, b, differ, 0.5,
+                      "observer: COLOR has not changed since an earlier check of a block that is not of one colour: it "
+                      "must hold the mean of all samples", w, tally);
+}
+
 static void judge(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
                   struct lull_decision *d, uint32_t worker)
 {
@@ -131,26 +219,30 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
     struct lull_kit_tally tally = {0};
     double error = (double)NAN;
 
-    if (b->spp < in->kit.need.first_spp) {
+    if (b->spp < in->kit.need.first_spp)
         tally.early = 1;
-    } else if (!b->half_spp || b->half_spp >= b->spp) {
-        warn(in, "observer: HALF holds none or all of a block's samples, so that noise cannot be told; no block is stopped "
-                 "by it");
-        tally.early = 1;
-    } else if (read_halves(&in->kit, view, b, w, &tally)) {
-        error = error_of(in, b, w);
-    } else if (has_structure(w, (size_t)lull_kit_pixels(b))) {
-        warn(in, "observer: COLOR and HALF are the same in a block that is not of one colour: HALF must hold a fixed half "
-                 "of the samples");
-        tally.early = tally.bad = 1;
-    } else {
-        error = 0;
-    }
+    else
+        error = (in->looks.count ? judge_looks : judge_halves)(in, view, b, w, &tally);
     lull_kit_verdict(&in->kit, b, &tally, error, in->stop_error, 0, in->kit.value[P_GROWTH], d);
     if (d->action == LULL_CONTINUE && !isnan(d->predicted_spp)) /* the last steps are short: checks cost little here */
         lull_kit_continue(&in->kit, b, ggn_observer_next((double)b->spp, d->predicted_spp, in->kit.value[P_GROWTH]), d);
     if (!isnan(d->error))
         d->p_noisy = ggn_observer_p_noisy(&in->observer, d->error);
+}
+
+/* As lull_kit_evaluate; a call that failed leaves no trace in the looks. */
+static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, const struct lull_block *blocks,
+                        uint32_t block_stride, struct lull_decision *decisions, uint32_t decision_stride, uint32_t count,
+                        struct lull_error *err)
+{
+    int32_t status = lull_kit_evaluate(in, view, blocks, block_stride, decisions, decision_stride, count, err);
+
+    for (uint32_t i = 0; i < count && !status && in->looks.count; i++) {
+        const struct lull_block *b = lull_kit_at(blocks, block_stride, i);
+        if (b->spp >= in->kit.need.first_spp)
+            gp_looks_commit(&in->looks, b->id);
+    }
+    return status;
 }
 
 /* --- instance ---------------------------------------------------------------------------------------------------------- */
@@ -160,16 +252,18 @@ static void workers_release(struct lull_instance *in)
     free(in->worker);
     free(in->pixels);
     free(in->scratch);
+    gp_looks_release(&in->looks);
     in->worker = NULL;
     in->pixels = NULL;
     in->scratch = NULL;
     in->workers = 0;
 }
 
-/* Scratch memory for blocks of up to `pixels` pixels and `width` columns; replaces that of an open frame. */
-static int32_t workers_create(struct lull_instance *in, size_t pixels, int32_t width, struct lull_error *err)
+/* Scratch memory for blocks of up to this size; replaces that of an open frame. */
+static int32_t workers_create(struct lull_instance *in, const struct largest *most, struct lull_error *err)
 {
-    const size_t count = lull_kit_workers(&in->kit), doubles = ggn_visibility_scratch(width);
+    const size_t count = lull_kit_workers(&in->kit), pixels = most->pixels;
+    const size_t doubles = most->patches + ggn_visibility_scratch(most->width);
     const int fits = pixels <= PTRDIFF_MAX / (8 * sizeof(float)) / count;
     struct worker *worker = fits ? calloc(count, sizeof *worker) : NULL;
     float *planes = worker ? malloc(count * 8 * pixels * sizeof *planes) : NULL;
@@ -182,21 +276,26 @@ static int32_t workers_create(struct lull_instance *in, size_t pixels, int32_t w
     }
     for (size_t i = 0; i < count; i++) {
         float *at = planes + i * 8 * pixels;
-        worker[i] = (struct worker){{at, at + 3 * pixels}, {at + 6 * pixels, at + 7 * pixels}, scratch + i * doubles};
+        double *texture = scratch + i * doubles;
+        worker[i] = (struct worker){
+            {at, at + 3 * pixels}, {at + 6 * pixels, at + 7 * pixels}, texture, texture + most->patches};
     }
     workers_release(in);
     in->worker = worker;
     in->pixels = planes;
     in->scratch = scratch;
     in->workers = (uint32_t)count;
-    in->pixels_max = pixels;
-    in->width_max = width;
+    in->largest = *most;
     return LULL_OK;
 }
 
 static int32_t check_block(const struct lull_instance *in, const struct lull_block *b, struct lull_error *err)
 {
-    if ((size_t)lull_kit_pixels(b) > in->pixels_max || b->x1 - b->x0 > in->width_max)
+    const int32_t width = b->x1 - b->x0;
+    if ((size_t)lull_kit_pixels(b) > in->largest.pixels || width > in->largest.width ||
+        ggn_visible_patches(width, b->y1 - b->y0) > in->largest.patches)
+        return lull_kit_fail(err, LULL_E_INVALID, "evaluate: block %u is none of the frame's", b->id);
+    if (in->looks.count && (size_t)lull_kit_pixels(b) * 3 != gp_looks_values(&in->looks, b->id))
         return lull_kit_fail(err, LULL_E_INVALID, "evaluate: block %u is none of the frame's", b->id);
     return LULL_OK;
 }
@@ -221,22 +320,34 @@ static int32_t create(const struct lull_host *host, const struct lull_pair *pair
 
 static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *frame, struct lull_error *err)
 {
-    int32_t status = lull_kit_frame_check(in, frame, err), width = 1;
-    size_t pixels = 1;
+    int32_t status = lull_kit_frame_check(in, frame, err);
+    struct largest most = {.pixels = 1, .patches = 1, .width = 1};
 
     if (status)
         return status;
     for (uint32_t i = 0; i < frame->block_count; i++) {
         const struct lull_rect *r = lull_kit_rect(frame, i);
-        size_t n = (size_t)(r->x1 - r->x0) * (size_t)(r->y1 - r->y0);
-        pixels = n > pixels ? n : pixels;
-        width = r->x1 - r->x0 > width ? r->x1 - r->x0 : width;
+        const int32_t width = r->x1 - r->x0, height = r->y1 - r->y0;
+        const size_t pixels = (size_t)width * (size_t)height, patches = ggn_visible_patches(width, height);
+        most.pixels = pixels > most.pixels ? pixels : most.pixels;
+        most.patches = patches > most.patches ? patches : most.patches;
+        most.width = width > most.width ? width : most.width;
     }
-    status = workers_create(in, pixels, width, err);
-    if (status)
+    struct gp_looks looks = {0};
+    if (!(frame->planes & LULL_PLANE_BIT(LULL_PLANE_HALF)))
+        status = gp_looks_create(&looks, frame, err);
+    if (!status)
+        status = workers_create(in, &most, err);
+    if (status) {
+        gp_looks_release(&looks);
         return status;
+    }
+    in->looks = looks;
     atomic_flag_clear(&in->warned);
     lull_kit_frame_open(in, frame);
+    const struct lull_host *host = in->kit.host;
+    if (in->looks.count && host && host->log)
+        host->log(host, LULL_LOG_INFO, "observer: no plane HALF: noise is told from how the mean changes between checks");
     return LULL_OK;
 }
 
@@ -255,13 +366,33 @@ static void destroy(struct lull_instance *in)
 }
 
 static const struct lull_kit_rule rule = {
-    .planes_required = PLANES, .planes_used = PLANES, .first_spp = "first-spp", .judge = judge, .check = check_block};
+    .planes_required = COLOR, .planes_used = PLANES, .first_spp = "first-spp", .judge = judge, .check = check_block};
+
+/* --- state: of a frame with HALF there is none ------------------------------------------------------------------------- */
+
+static int32_t state_save(const struct lull_instance *in, const struct lull_writer *writer, struct lull_error *err)
+{
+    int32_t status = gp_save_check(in, writer, err);
+    return status ? status : gp_looks_save(&in->looks, writer, err);
+}
+
+static int32_t state_load(struct lull_instance *in, const struct lull_reader *reader, struct lull_error *err)
+{
+    int32_t status = gp_load_check(in, reader, err);
+    return status ? status : gp_looks_load(&in->looks, reader, err);
+}
+
+static const struct lull_state state = {.struct_size = sizeof state, .save = state_save, .load = state_load};
+
+static const void *get_extension(const char *id)
+{
+    return id && !strcmp(id, LULL_EXT_STATE) ? &state : NULL;
+}
 
 const struct lull_criterion ggn_plugin_observer = GP_TABLE(
-    .create = create, .begin_frame = begin_frame, .evaluate = lull_kit_evaluate, .end_frame = end_frame, .destroy = destroy,
-    .get_extension = lull_kit_get_extension, .id = "observer", .name = "Model observer",
-    .description = "Noise that people would see, from the two halves of the samples: their difference in lightness, "
-                   "slightly blurred and\n"
-                   "pooled so that a few bright pixels count, against a limit that rises with the block's texture. `error` "
-                   "is the visible\n"
-                   "noise over that limit (1 = just not visible), fitted to human thresholds.");
+    .create = create, .begin_frame = begin_frame, .evaluate = evaluate, .end_frame = end_frame, .destroy = destroy,
+    .get_extension = get_extension, .id = "observer", .name = "Model observer",
+    .description = "Noise that people would see, from the two halves of the samples, or, without half buffers, from how\n"
+                   "the mean changes between checks: lightness, slightly blurred and pooled so that a few bright pixels\n"
+                   "count, against a limit that rises with the texture. `error` is the visible noise over that limit\n"
+                   "(1 = just not visible), fitted to human thresholds.");

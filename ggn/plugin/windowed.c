@@ -226,28 +226,20 @@ static const struct lull_kit_rule rule = {
 
 static int32_t state_save(const struct lull_instance *in, const struct lull_writer *writer, struct lull_error *err)
 {
-    if (writer && !LULL_HAS(struct lull_writer, writer, write))
-        return lull_kit_fail(err, LULL_E_VERSION, "save: the host's struct is older than version 1.0");
-    if (!in || !writer || !writer->write)
-        return lull_kit_fail(err, LULL_E_INVALID, "save: an argument is missing");
-    if (!in->kit.block_count)
-        return lull_kit_fail(err, LULL_E_STATE, "save: no frame is open");
-    return gp_history_save(&in->history, in->key, writer, err);
+    int32_t status = gp_save_check(in, writer, err);
+    return status ? status : gp_history_save(&in->history, in->key, writer, err);
 }
 
 static int32_t state_load(struct lull_instance *in, const struct lull_reader *reader, struct lull_error *err)
 {
     struct gp_history history = {0};
+    int32_t status = gp_load_check(in, reader, err);
 
-    if (reader && !LULL_HAS(struct lull_reader, reader, read))
-        return lull_kit_fail(err, LULL_E_VERSION, "load: the host's struct is older than version 1.0");
-    if (!in || !reader || !reader->read)
-        return lull_kit_fail(err, LULL_E_INVALID, "load: an argument is missing");
-    if (!in->kit.block_count)
-        return lull_kit_fail(err, LULL_E_STATE, "load: no frame is open");
+    if (status)
+        return status;
     struct lull_frame frame = {
         .blocks = in->history.rect, .block_count = in->history.count, .block_stride = sizeof(struct lull_rect)};
-    int32_t status = gp_history_create(&history, in->rule.window, &frame, in->sight->slot, in, err);
+    status = gp_history_create(&history, in->rule.window, &frame, in->sight->slot, in, err);
     if (!status)
         status = gp_history_load(&history, &in->rule, in->key, reader, err);
     if (status) {

@@ -16,14 +16,27 @@ struct asking {
     struct base_err *said, *err;
 };
 
+static int32_t refuse_bytes(const struct lull_writer *writer, const void *data, uint64_t size)
+{
+    (void)writer;
+    (void)data;
+    return size > 0 ? LULL_E_IO : LULL_OK;
+}
+
+/* Do answers in the open frame hang on earlier ones? Then there is something to save. */
+static int has_history(const struct lull_host_criterion *criterion)
+{
+    const struct lull_writer writer = {.struct_size = sizeof writer, .write = refuse_bytes};
+    return lull_host_save_history(criterion, &writer, NULL) != LULL_OK;
+}
+
 int pt_crew_can_ask(const struct pt_crew *crew, const struct lull_host_criterion *criterion)
 {
     const uint32_t pure = LULL_CAP_DETERMINISTIC | LULL_CAP_BATCH_INVARIANT;
     if (!crew || !crew->judges)
         return 0;
     const struct lull_criterion *t = lull_host_table(criterion);
-    int history = t->get_extension && t->get_extension(LULL_EXT_STATE);
-    return !history && lull_host_needs(criterion)->halo == 0 && (t->capabilities & pure) == pure;
+    return !has_history(criterion) && lull_host_needs(criterion)->halo == 0 && (t->capabilities & pure) == pure;
 }
 
 static const struct lull_host_blocks *blocks_of(const struct pt_crew_question *q)

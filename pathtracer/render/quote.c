@@ -9,9 +9,10 @@
 
 /* --- rows -------------------------------------------------------------------------------------------------------------- */
 
-static int add_row(struct pt_quote *q, double visible, int asked, struct base_err *err)
+static int add_row(struct pt_quote *q, double visible, const char *name, int asked, struct base_err *err)
 {
     struct pt_quote_row *row = &q->rows[q->row_count++];
+    row->name = name;
     row->visible = visible;
     row->asked = asked;
     row->said = calloc(q->block_count, sizeof *row->said);
@@ -48,24 +49,30 @@ static int open_row(struct pt_quote_row *row, const struct pt_render *r, const s
 static int add_rows(struct pt_quote *q, const struct lull_criterion *table, const struct lull_pair *pairs,
                     uint32_t pair_count, struct base_err *err)
 {
-    static const double shares[] = {0.5, 0.25, 0.05};
+    struct {
+        double visible;
+        const char *name;
+    } shares[] = {{0.5, "draft"}, {0.25, "default"}, {0.05, "final"}};
     const struct lull_param *dial = NULL;
     const char *text = table ? lull_host_parameter(table, "visible", pairs, pair_count, &dial) : NULL;
     double asked;
     int met = !text || !base_parse_real(text, 0, 1, &asked);
-    int rc = met ? add_row(q, (double)NAN, 1, err) : 0;
+    int rc = met ? add_row(q, (double)NAN, "as asked", 1, err) : 0;
     if (!dial || rc)
         return rc;
     if (met)
         asked = -1.0;
+    if (!base_parse_real(dial->default_value, 0.05, 0.5, &shares[1].visible)) /* a model's own */
+        shares[1].name = "normal";
     for (size_t i = 0; i < sizeof shares / sizeof shares[0] && !rc; i++) {
-        if (!met && asked > shares[i])
-            rc = add_row(q, asked, met = 1, err);
-        met |= asked == shares[i];
+        const double share = shares[i].visible;
+        if (!met && asked > share)
+            rc = add_row(q, asked, "as asked", met = 1, err);
+        met |= asked == share;
         if (!rc)
-            rc = add_row(q, shares[i], asked == shares[i], err);
+            rc = add_row(q, share, shares[i].name, asked == share, err);
     }
-    return rc || met ? rc : add_row(q, asked, 1, err);
+    return rc || met ? rc : add_row(q, asked, "as asked", 1, err);
 }
 
 int pt_quote_create(const struct pt_render *r, const struct lull_criterion *table, const struct lull_pair *pairs,

@@ -22,6 +22,8 @@ struct lc {
     const struct lull_pair *pairs;          /* of the command line, given to every create */
     uint32_t pair_count;
     struct lull_requirements req; /* of an instance made with them */
+    int required_only;            /* frames supply no more planes than it requires */
+    uint32_t planes;              /* mask of those that frames supply */
     uint32_t workers;             /* threads for concurrent checks, at least 2 */
     uint64_t seed, misuse;        /* of the random calls outside the rules, and how many */
     int report_fd;

@@ -108,7 +108,7 @@ static void check_out_of_memory(struct lc *c)
     if (lc_film_init_for(&film, &c->req, 1, 0) != 0)
         return;
     struct lull_frame frame;
-    lc_film_frame(&film, &frame, c->req.planes_used);
+    lc_film_frame(&film, &frame, c->planes);
     double start = now_s();
     long k = 0;
     int done = 0;

@@ -52,7 +52,7 @@ static void check_order(struct lc *c)
         return;
     struct lc_film film;
     if (lc_film_init_for(&film, &c->req, 1, 0) == 0) {
-        struct lc_session unopened = {.check = c, .film = film, .instance = fresh, .planes = c->req.planes_used};
+        struct lc_session unopened = {.check = c, .film = film, .instance = fresh, .planes = c->planes};
         LC_EXPECT(c, evaluate_nothing(&unopened) == LULL_E_STATE, "evaluate before begin_frame is not refused");
         lc_film_release(&film);
     }
@@ -121,7 +121,7 @@ static void check_block_size(struct lc *c)
     int32_t w = (int32_t)c->req.block_width, h = (int32_t)c->req.block_height;
     if (instance && lc_film_init(&film, 2 * w + 10, 2 * h + 10, w + 5, h + 5, 1) == 0) {
         struct lull_frame frame;
-        lc_film_frame(&film, &frame, c->req.planes_used);
+        lc_film_frame(&film, &frame, c->planes);
         int32_t status = lc_begin(c, instance, &frame, NULL);
         LC_EXPECT(c, status == LULL_E_UNSUPPORTED || status == LULL_OK, "blocks of another size: %d", status);
         lc_film_release(&film);

@@ -172,7 +172,7 @@ static void check_missing(struct lc *c)
         if (!(c->req.planes_required & LULL_PLANE_BIT(p)))
             continue;
         struct lull_frame frame;
-        lc_film_frame(&film, &frame, c->req.planes_used & ~LULL_PLANE_BIT(p));
+        lc_film_frame(&film, &frame, c->planes & ~LULL_PLANE_BIT(p));
         struct lull_error err = {.struct_size = sizeof err};
         int32_t status = lc_begin(c, instance, &frame, &err);
         LC_EXPECT(c, status == LULL_E_PLANE, "begin_frame without %s: %d", lc_plane_names[p], status);

@@ -88,7 +88,7 @@ static void short_frame(struct lc *c, const struct short_structs *cut, struct lu
     for (uint32_t i = 0; i < film.block_count; i++)
         lc_film_advance(&film, i, c->req.first_spp + c->req.first_spp % 2 + 2);
     struct lull_frame frame;
-    lc_film_frame(&film, &frame, c->req.planes_used);
+    lc_film_frame(&film, &frame, c->planes);
     struct guarded rects, g;
     rects.at = lc_guard_alloc(film.block_count * sizeof *film.rects, &rects.mapped);
     if (rects.at) {

@@ -22,7 +22,7 @@ struct arguments {
     uint32_t workers;
     unsigned limit_s;
     uint64_t misuse, seed;
-    int quiet, list;
+    int quiet, list, required_only;
 };
 
 /* The first group needs no instance. */
@@ -68,6 +68,7 @@ static const struct base_option list[] = {
     {"param", 'p', "KEY=VALUE", .set = add_pair, .help = "Give the criterion this parameter (repeatable)"},
     {"only", 'o', "CHECK", .set = add_only, .help = "Run this check only (repeatable)"},
     {"list", 'l', NULL, TO(list), .help = "List the checks and exit"},
+    {"required-only", 'r', NULL, TO(required_only), .help = "Supply only the planes that it requires, as a poorer host does"},
     {"quiet", 'q', NULL, TO(quiet), .help = "Print failures and the last line only"},
     {"threads", 't', "N", TO(workers), 2, 32, .help = "Threads for the concurrent checks (4)"},
     {"limit", 'L', "SECONDS", TO(limit_s), 1, 100000, .help = "A check that takes longer has failed (120)"},
@@ -166,6 +167,7 @@ static int prepare(struct lc *c)
     c->req = (struct lull_requirements){.struct_size = sizeof c->req};
     status = c->criterion->requirements(instance, &c->req, &err);
     c->criterion->destroy(instance);
+    c->planes = c->required_only ? c->req.planes_required : c->req.planes_used;
     return LC_EXPECT(c, status == LULL_OK, "requirements failed (%d): %s", status, err.message) ? 0 : -1;
 }
 
@@ -268,7 +270,8 @@ static int check_criterion(const struct arguments *a, struct lc *c, const char *
 static int check_spec(const struct arguments *a, const char *spec, struct totals *t)
 {
     struct lc c = {
-        .pairs = a->pairs, .pair_count = a->pair_count, .workers = a->workers, .seed = a->seed, .misuse = a->misuse};
+        .pairs = a->pairs, .pair_count = a->pair_count, .workers = a->workers, .seed = a->seed, .misuse = a->misuse,
+        .required_only = a->required_only};
     struct lc_report *r = malloc(sizeof *r);
     if (!r || lc_child_run(&c, find, spec, a->limit_s, r) != 0) {
         free(r);

@@ -326,7 +326,7 @@ int lc_session_open_film(struct lc_session *s, struct lc *c, const struct lc_man
 {
     *s = (struct lc_session){.check = c, .manner = *manner, .film = *film};
     *film = (struct lc_film){0};
-    s->planes = manner->required_only ? c->req.planes_required : c->req.planes_used;
+    s->planes = manner->required_only ? c->req.planes_required : c->planes;
     s->instance = lc_create(c, manner->host);
     if (s->instance && begin(s, 0) == 0)
         return 0;

@@ -62,7 +62,7 @@ fails "label --human: unknown view" 'no thresholds for' $ggn label "$tmp/data" -
 fails "label --check without half buffers" 'no full level' $ggn label "$tmp/data" --check
 fails "label without half buffers" 'use --source levels' $ggn label "$tmp/data" --replace-human
 fails "label --calibrate with one view" 'at least 2 views' $ggn label "$tmp/data" --calibrate "$tmp/human.csv"
-fails "label: bad observer" 'level, exponent or spread' sh -c "echo '{}' >$tmp/o.json; $ggn label $tmp/data -O $tmp/o.json"
+fails "label: bad observer" 'level or spread' sh -c "echo '{}' >$tmp/o.json; $ggn label $tmp/data -O $tmp/o.json"
 
 $ggn reconstruct "$d" -o "$tmp/r.png" -r "$tmp/ref.png" --json >"$tmp/out" 2>"$tmp/err" && grep -q '"mean_spp": 130.00' "$tmp/out" && [ -s "$tmp/r.png" ]
 check "reconstruct at the labels (100 and 160)" $?

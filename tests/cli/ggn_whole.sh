@@ -68,7 +68,7 @@ for word in "" frobnicate importsin3d import_sin3d -x; do says bounds $word; don
 for word in "" frobnicate -x; do says bounds study $word; done
 
 # --- labels --------------------------------------------------------------------------------------------------------------------
-printf '{"level": 0.25, "exponent": 0.5, "spread": 0.4, "each_view_left_out": [{"name": "four", "level": 0.2, "exponent": 0.45}, {"name": "five", "level": 0.3, "exponent": 0.6}]}\n' >"$tmp/o.json"
+printf '{"level": 0.25, "spread": 0.4, "each_view_left_out": [{"name": "four", "level": 0.2}, {"name": "five", "level": 0.3}]}\n' >"$tmp/o.json"
 labels() { # labels NAME ARGUMENTS...: of a fresh copy
     rm -rf "$tmp/l" && cp -r $recorded "$tmp/l"
     run "$@"

@@ -81,6 +81,7 @@ all() { # all CHECKER LIBDIR WHERE CHECK...: each criterion of the build
         [ "$checker" = "$check" ] && [ "${so##*/}" != ggn.so ] && continue # above
         [ "${so##*/}" = ggn.so ] || { t "${so##*/} keeps the contract$where" "$checker" -q "$so"; continue; }
         t "observer keeps the contract$where" "$checker" -q "$so:observer"
+        t "observer keeps it without half buffers$where" "$checker" -q -r "$so:observer"
         for k in svd-entropy attributes noise-mask; do
             # shellcheck disable=SC2046
             t "$k keeps the contract$where" "$checker" -q $(of $k $few state repeat batch shapes evaluate-allocates) "$so:$k"

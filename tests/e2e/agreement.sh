@@ -14,8 +14,8 @@ record "$tmp/human/views/one" one 1 0 tests/cli/room.pbrt && record "$tmp/human/
 check "recorded" $?
 printf 'one_part6;300;900;\ntwo_part6;30;10000;\n' >"$tmp/human/human-thresholds.csv"
 cp "$tmp/human/human-thresholds.csv" "$tmp/human/SVD-Entropy-thresholds.csv"
-view() { printf '{"name": "%s", "level": 0.25, "exponent": 0.5}' "$1"; }
-printf '{"level": 0.25, "exponent": 0.5, "spread": 0.4, "each_view_left_out": [%s, %s]}\n' "$(view one)" "$(view two)" >"$tmp/o.json"
+view() { printf '{"name": "%s", "level": 0.25}' "$1"; }
+printf '{"level": 0.25, "spread": 0.4, "each_view_left_out": [%s, %s]}\n' "$(view one)" "$(view two)" >"$tmp/o.json"
 agreement --data "$tmp/none" && [ "$(grep -c 'Against' "$tmp/table")" -eq 1 ] && grep -q '^| 4 blocks, 1 censored ' "$tmp/table"
 check "no recordings: people alone" $?
 find "$tmp/data" -type f -exec sha256sum {} + | sort >"$tmp/before"

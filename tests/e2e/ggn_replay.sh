@@ -77,8 +77,9 @@ baseline svd-entropy SVDentropyLSTM first-spp=1 visible=0.5
 [ "$(awk '$2 < 250' "$tmp/attributes" | wc -l)" -ge 1 ] && [ "$(awk '$3 > 0' "$tmp/attributes" | wc -l)" -eq 6 ]
 check "the attributes stop blocks" $?
 
-# watch SHARE: the default criterion in a render against the recording's replay. Measured: errors differ by up to 2 %, which is up
-# to 4 % in samples; a check that falls on the other side of the limit moves a stop by its step, at most 6 %.
+# watch SHARE: the default criterion in a render against the recording's replay. Blocks that get all samples are judged at the same
+# count, from halves that the recording rounds: measured, shares differ by up to 0.0001. Others are judged at counts of the render's
+# own, between recorded levels: a bright sample that a replay sees one level later moves the stop by one step, at most 1.5.
 watch() {
     $render --spp-max 250 --visible "$1" --report "$tmp/report.json" </dev/null 2>"$tmp/err" &&
         "$BUILD/bin/ggn" evaluate --data "$tmp/data" --visible "$1" --recorded --no-quality -o "$tmp/out" >"$tmp/log" 2>"$tmp/err"
@@ -86,16 +87,17 @@ watch() {
     awk '/"id":[[:space:]]*"/ { which = $2 } /"id":/ { id = $2 + 0 } /"spp":/ { spp = $2 + 0 } /"p_noisy":/ { print id, spp, $2 + 0, which }' "$tmp/report.json" >"$tmp/rendered"
     awk -F';' 'NR > 1 { print $2, $5, $6 + 0 }' "$tmp"/out/*-stops-observer.csv >"$tmp/replayed"
     paste "$tmp/rendered" "$tmp/replayed" | tee "$tmp/err" | awk '{
-        if ($1 != $5 || $4 != "\"observer\"," || $6 / $2 > 1.1 || $2 / $6 > 1.1 || $7 - $3 > 0.1 || $3 - $7 > 0.1) bad = 1
+        if ($1 != $5 || $4 != "\"observer\"," || $6 / $2 > 1.5 || $2 / $6 > 1.5 || $7 - $3 > 0.1 || $3 - $7 > 0.1) bad = 1
+        if ($2 == 250 && $6 == 250 && ($7 - $3 > 0.001 || $3 - $7 > 0.001)) bad = 1
         if ($2 < 250 && $3 > '"$1"') bad = 1 # it stopped with more viewers than asked for
     } END { exit bad || NR != 6 }'
     check "observer, visible $1: nearly the same stop and p for every block" $?
     cp "$tmp/rendered" "$tmp/watched-$1"
 }
-watch 0.9
-watch 0.97
-[ "$(awk '$2 < 250' "$tmp/watched-0.9" | wc -l)" -ge 4 ] && [ "$(awk '$2 == 250' "$tmp/watched-0.9" | wc -l)" -ge 1 ] &&
-    paste "$tmp/watched-0.9" "$tmp/watched-0.97" | awk '$6 > $2 || $6 < 16 { bad = 1 } $6 < $2 { n++ } END { exit bad || n < 5 }'
+watch 0.985
+watch 0.9995
+[ "$(awk '$2 < 250' "$tmp/watched-0.985" | wc -l)" -ge 4 ] && [ "$(awk '$2 == 250' "$tmp/watched-0.985" | wc -l)" -ge 1 ] &&
+    paste "$tmp/watched-0.985" "$tmp/watched-0.9995" | awk '$6 > $2 || $6 < 16 { bad = 1 } $6 < $2 { n++ } END { exit bad || n < 5 }'
 check "blocks stop or do not, and sooner when more viewers may see noise" $?
 echo "1..$n"
 exit $bad

@@ -245,7 +245,7 @@ def test_quote():
         assert p.result.outcome == "done" and 128 <= p.spp.min() <= p.spp.max() <= 2048
         mean = float(next(t for t in table.splitlines() if "<- chosen" in t).split("/")[1].replace(",", ""))
         assert .5 < mean / p.spp.mean() < 2, (mean, p.spp.mean())  # it predicts, it does not know
-        assert len(lines) == 1 and lines[0].startswith("visible 0.25 takes "), lines
+        assert len(lines) == 1 and lines[0].startswith("visible 0.35 takes "), lines
         assert "visible 0.5 would take " in lines[0], lines
 
 

@@ -304,7 +304,7 @@ static struct lull_host_criterion *criterion;
 
 static void fill_row(struct pt_quote_row *row, int k, double visible)
 {
-    *row = (struct pt_quote_row){.visible = visible, .asked = k == 1, .blocks = answers[k], .said = said[k], .spp_min = 12.4 + k,
+    *row = (struct pt_quote_row){.visible = visible, .name = (const char *const[]){"draft", "as asked", "final"}[k], .asked = k == 1, .blocks = answers[k], .said = said[k], .spp_min = 12.4 + k,
                                  .spp_mean = 1234.6 * (k + 1), .spp_max = 99999.5 * (k + 1), .spp_mean_low = 1000 + k, .spp_mean_high = 2000 + k,
                                  .thread_s = 40 + k, .thread_low_s = 30 + k, .thread_high_s = 60 + k, .against_uniform = 0.25 * (k + 1),
                                  .unmet = (uint32_t)k, .capped = k == 2 ? 5 : 0};
@@ -378,6 +378,7 @@ static char *tell_quote(struct pt_approve_case *c)
     assert_non_null(out);
     quote.rows[1].unknown = strstr(c->text, "unknown") ? 2 : 0;
     quote.rows[1].visible = strstr(c->text, "uniform") ? (double)NAN : strstr(c->text, "default") ? 0.25 : 0.125;
+    quote.rows[1].name = strstr(c->text, "default") ? "default" : "as asked";
     quote.rows[1].unmet = strstr(c->text, "met") ? 0 : 1;
     quote.threads = strstr(c->text, "one-thread") ? 1 : 2;
     render.criterion = strstr(c->text, "uniform") ? NULL : criterion;

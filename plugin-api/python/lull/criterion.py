@@ -127,7 +127,7 @@ def _text(value: object) -> str:
 
 def load(spec: str = "observer", *, threads: Optional[int] = None, log: Optional[Callable[[int, str], None]] = None,
          **parameters: object) -> Criterion:
-    """Makes an instance: load("observer", visible=0.25), load("./mine.so"), load("lib.so:id", first_spp=32).
+    """Makes an instance: load("observer", visible=0.35), load("./mine.so"), load("lib.so:id", first_spp=32).
 
     threads: workers that it may use, default all processors. log(level, text): its messages, default a Python warning for
     errors and warnings. Parameters' underscores stand for hyphens. Raises LullError.

@@ -13,7 +13,7 @@ from .library import LullError
 from .mask import dial_of
 
 # The dial `visible` by name, coarse to fine; other dials are asked at twice and at four times their value.
-NAMED = {0.9: "coarse", 0.5: "draft", 0.25: "default", 0.05: "final"}
+NAMED = {0.9: "coarse", 0.5: "draft", 0.35: "default", 0.05: "final"}
 
 
 @dataclass
