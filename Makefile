@@ -114,7 +114,8 @@ MPI_MODULE := $(if $(MPI),$(OUT)/lib/lull-mpi.so)# loaded only by processes that
 # The host library for renderers (lull/host.h): the file has the major version in its name, programs link the other.
 HOST_LIB := $(OUT)/lib/liblull-host.so.1
 EXAMPLES := $(BIN)/host-example
-MODULES  := $(MPI_MODULE) $(OUT)/lib/lull-images.so $(OUT)/lib/ggn-images.so
+DENOISER := $(OUT)/lib/lull-denoiser# a program that denoise/oidn.h runs
+MODULES  := $(DENOISER) $(MPI_MODULE) $(OUT)/lib/lull-images.so $(OUT)/lib/ggn-images.so
 CRITERIA := $(EXAMPLE_SRC:plugin-api/examples/%.c=$(LIB)/%.so) $(if $(GGN_PLUGIN),$(LIB)/ggn.so)
 TESTS    := $(patsubst tests/%.c,$(OUT)/tests/%,$(TEST_SRC))
 SANE     := $(patsubst tests/%.c,build/asan/tests/%,$(SANE_SRC))
@@ -171,6 +172,8 @@ $(OUT)/lib/lull-images.so: $(call o,$(PT_IMAGES)) $(OBJ)/base.a
 $(OUT)/lib/ggn-images.so: $(call o,$(GGN_IMAGES)) $(OBJ)/base.a
 $(OUT)/lib/lull-images.so $(OUT)/lib/ggn-images.so:
 	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--exclude-libs,ALL $^ $(LDFLAGS_ALL) $(IMAGE_LIBS) -lz -lm -o $@
+$(DENOISER): $(call o,$(wildcard plugin-api/denoise/program/*.c)) $(OBJ)/base.a
+	$(link) $^ $(LDFLAGS_ALL) -ldl -lm -o $@
 $(OUT)/lib/lull-mpi.so: $(call o,$(MPI_SRC)) $(OBJ)/base.a
 	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--exclude-libs,ALL $^ $(LDFLAGS_ALL) $(MPI_LIBS) -lm -o $@
 $(HOST_LIB): $(call o,$(HOST_SRC)) $(LOADER_OBJ) $(OBJ)/base.a plugin-api/host.map

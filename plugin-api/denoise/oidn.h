@@ -1,53 +1,61 @@
 /*
- * Open Image Denoise 2, found when it is asked for: nothing is linked, nothing else needs it.
+ * Open Image Denoise 2, in a process of its own: nothing is linked, nothing else needs it.
  *
- * The library is looked for, in this order: the path given, the environment's LULL_OIDN (each a file, or a folder that holds
- * one), the loader's own path, and lib/ of the folder oidn beside the caller's library or above it (build/oidn, where
- * scripts/setup --denoiser puts it). One device holds the threads; filters are made per call.
+ * The library starts a thread for each device, allocates while it works and, out of memory, ends the process that it is in.
+ * None of that may happen to a host of criteria, so each run is one of the program lib/lull-denoiser (denoise/program), with
+ * pictures in shared memory; whatever happens there is an error here. It looks for the library, in this order: the path
+ * given, the environment's LULL_OIDN (each a file, or a folder that holds one), the loader's own path, and lib/ of a folder
+ * oidn beside the program or up to three folders above it (build/oidn, where scripts/setup --denoiser puts it).
  *
- * lull_oidn_run gives the same bits for every number of threads and for every run on one processor, but not for
- * every instruction set. A crop gives the bits of the whole picture inside if its corner lies on a multiple of
- * LULL_OIDN_GRID of the frame and it has LULL_OIDN_HALO pixels around (as far as the frame reaches); measured with 2.5.1.
+ * The same bits for every number of threads and for every run on one processor, but not for every instruction set. A crop
+ * gives the bits of the whole picture inside if its corner lies on a multiple of LULL_OIDN_GRID of the frame and it has
+ * LULL_OIDN_HALO pixels around (as far as the frame reaches); measured with 2.5.1.
  *
  * Calls on one struct lull_oidn must not overlap; different ones may.
  */
 #ifndef DENOISE_OIDN_H
 #define DENOISE_OIDN_H
 
+#include <stdint.h>
+
 #include "base/err.h"
 
-enum { LULL_OIDN_GRID = 16, LULL_OIDN_HALO = 96 };
+enum { LULL_OIDN_GRID = 16, LULL_OIDN_HALO = 96, LULL_OIDN_COLORS = 2 };
 
 enum lull_oidn_quality { LULL_OIDN_FAST = 4, LULL_OIDN_BALANCED = 5, LULL_OIDN_HIGH = 6 }; /* the library's own numbers */
 
 struct lull_oidn;
 
-/* Interleaved float pictures [height][width][3], linear. */
-struct lull_oidn_picture {
-    int width, height;
-    const float *color;           /* any exposure; negative values and what is no number count as 0 */
-    const float *albedo, *normal; /* of the first non-specular hit, [0, 1], [-1, 1]; may be NULL, normal only with albedo */
-    double exposure;              /* factor to where white is 1; > 0 */
+struct lull_oidn_form { /* of the pictures; all of one size */
+    int32_t width, height;
+    int32_t albedo, normal; /* whether there are such pictures; normal only with albedo */
+    int32_t quality;        /* LULL_OIDN_ */
+    int32_t threads;        /* 0: all processors */
+    float exposure;         /* factor to where white is 1; > 0 */
 };
 
-/* threads: of the device; 0: all processors. *out is owned by the caller. BASE_EINVAL: not found (one line says how to get
- * it), of another major version, or its device cannot be made. */
-int lull_oidn_open(const char *path, int threads, struct lull_oidn **out, struct base_err *err);
+/* Interleaved float pictures [height][width][3], linear. */
+struct lull_oidn_pictures {
+    const float *color[LULL_OIDN_COLORS]; /* any exposure; negative and no number count as 0; NULL: not given */
+    const float *albedo;                  /* of the first non-specular hit, in [0, 1] */
+    const float *normal;                  /* there, in [-1, 1] */
+    float *out[LULL_OIDN_COLORS];         /* of each color, in its units; finite everywhere */
+};
+
+/* *out is owned by the caller. BASE_EINVAL: no lull-denoiser; no library (one line says how to get it), one of another major
+ * version, or one whose device cannot be made. */
+int lull_oidn_open(const char *library, struct lull_oidn **out, struct base_err *err);
 void lull_oidn_close(struct lull_oidn *oidn);
 /* "2.5.1". */
 const char *lull_oidn_version(const struct lull_oidn *oidn);
 
-/* Denoises into out, [height][width][3], in the units of color; finite everywhere. cancelled(data) is asked now and then;
- * not 0 ends the call with BASE_EINVAL "cancelled". BASE_ENOMEM; BASE_EINVAL: the library's own error, in its words. out is
- * undefined after a failure. */
-int lull_oidn_run(struct lull_oidn *oidn, const struct lull_oidn_picture *picture, enum lull_oidn_quality quality,
-                  int (*cancelled)(void *data), void *data, float *out, struct base_err *err);
+/* Takes the memory that pictures of this form need, 72 bytes a pixel; the program takes some 600 more while it runs. */
+int lull_oidn_prepare(struct lull_oidn *oidn, const struct lull_oidn_form *form, struct base_err *err);
 
-struct lull_oidn_box { /* pixels, half open, none empty */
-    int x0, y0, x1, y1;
-};
-
-/* What to denoise for the pixels of `core`: `halo` pixels around as far as the frame reaches, the corner on its grid. */
-struct lull_oidn_box lull_oidn_box_of(struct lull_oidn_box core, int halo, struct lull_oidn_box frame);
+/* Denoises each color of the prepared form. cancelled(data), which may be NULL, is asked 50 times a second; not 0 ends the
+ * program and the call, with BASE_EINVAL "cancelled". Allocates nothing. BASE_ENOMEM; BASE_EIO: the program cannot be run;
+ * BASE_EINVAL: the library's own error, in its words, or that the program died. out is undefined after a failure. */
+int lull_oidn_run(struct lull_oidn *oidn, const struct lull_oidn_pictures *pictures, int (*cancelled)(void *data),
+                  void *data, struct base_err *err);
 
 #endif

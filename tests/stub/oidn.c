@@ -3,8 +3,7 @@
  * plugin-api/denoise calls, with the library's names and types. OIDN_STUB, read when a device is made, says what it does:
  *
  *     identity (also if not set), box (mean of 5x5 pixels), constant (0.5), nan (every third value), version (3.0.1),
- *     no-device, commit (fails when a filter is committed), memory (fails when one is executed), endless (asks for progress
- *     until it is cancelled)
+ *     no-device, commit (fails when a filter is committed), crash (there), memory (fails when one is executed), endless
  *
  * It also refuses what the real library would take in silence and get wrong: pictures that are not finite, no inputScale.
  */
@@ -14,11 +13,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
-enum { IDENTITY, BOX, CONSTANT, BAD_NUMBERS, VERSION, NO_DEVICE, COMMIT, MEMORY, ENDLESS, KINDS };
-enum { INVALID_ARGUMENT = 2, INVALID_OPERATION = 3, OUT_OF_MEMORY = 4, CANCELLED = 6 };
+enum { IDENTITY, BOX, CONSTANT, BAD_NUMBERS, VERSION, NO_DEVICE, COMMIT, MEMORY, ENDLESS, CRASH, KINDS };
+enum { INVALID_ARGUMENT = 2, INVALID_OPERATION = 3, OUT_OF_MEMORY = 4 };
 static const char *const kinds[KINDS] = {"identity", "box", "constant", "nan", "version", "no-device", "commit", "memory",
-                                         "endless"};
+                                         "endless", "crash"};
 
 struct device {
     int kind, error;
@@ -33,8 +33,6 @@ struct filter {
     struct image color, albedo, normal, output;
     bool hdr;
     float scale;
-    bool (*progress)(void *data, double share);
-    void *progress_data;
 };
 
 #define STUB __attribute__((visibility("default")))
@@ -52,7 +50,6 @@ STUB void oidnSetSharedFilterImage(void *filter, const char *name, void *data, i
 STUB void oidnSetFilterBool(void *filter, const char *name, bool value);
 STUB void oidnSetFilterInt(void *filter, const char *name, int value);
 STUB void oidnSetFilterFloat(void *filter, const char *name, float value);
-STUB void oidnSetFilterProgressMonitorFunction(void *filter, bool (*progress)(void *data, double share), void *data);
 STUB void oidnCommitFilter(void *filter);
 STUB void oidnExecuteFilter(void *filter);
 
@@ -162,12 +159,6 @@ void oidnSetFilterFloat(void *filter, const char *name, float value)
         ((struct filter *)filter)->scale = value;
 }
 
-void oidnSetFilterProgressMonitorFunction(void *filter, bool (*progress)(void *data, double share), void *data)
-{
-    ((struct filter *)filter)->progress = progress;
-    ((struct filter *)filter)->progress_data = data;
-}
-
 static int within(const struct image *i, float lo, float hi)
 {
     for (size_t k = 0; i->data && k < 3 * i->width * i->height; k++)
@@ -179,6 +170,8 @@ static int within(const struct image *i, float lo, float hi)
 void oidnCommitFilter(void *filter)
 {
     const struct filter *f = filter;
+    if (f->device->kind == CRASH)
+        abort();
     if (f->device->kind == COMMIT)
         fail(f->device, INVALID_OPERATION, "the stub was told to refuse");
     else if (!f->hdr || !(f->scale > 0))
@@ -205,11 +198,8 @@ void oidnExecuteFilter(void *filter)
         fail(f->device, INVALID_ARGUMENT, "a picture is not finite or out of its range");
     if (kind == MEMORY)
         fail(f->device, OUT_OF_MEMORY, "the stub was told to have none");
-    if (f->progress && !f->progress(f->progress_data, 0))
-        fail(f->device, CANCELLED, "cancelled");
-    while (kind == ENDLESS && f->progress && !f->device->error)
-        if (!f->progress(f->progress_data, 0.5))
-            fail(f->device, CANCELLED, "cancelled");
+    while (kind == ENDLESS)
+        pause();
     for (size_t y = 0, k = 0; y < in->height && !f->device->error; y++)
         for (size_t x = 0; x < in->width; x++)
             for (size_t c = 0; c < 3; c++, k++)

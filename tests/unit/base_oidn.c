@@ -19,12 +19,14 @@
 
 static char stub[2048];
 
+static const struct lull_oidn_form pixel = {.width = 1, .height = 1, .quality = LULL_OIDN_HIGH, .threads = 1, .exposure = 1};
+
 static struct lull_oidn *open_stub(const char *kind)
 {
     struct base_err err = {0};
     struct lull_oidn *o = NULL;
     setenv("OIDN_STUB", kind, 1);
-    if (lull_oidn_open(stub, 1, &o, &err))
+    if (lull_oidn_open(stub, &o, &err))
         fail_msg("%s", err.text);
     return o;
 }
@@ -34,7 +36,7 @@ static void refuses(const char *path, const char *kind, const char *text)
     struct base_err err = {0};
     struct lull_oidn *o = NULL;
     setenv("OIDN_STUB", kind, 1);
-    assert_int_equal(lull_oidn_open(path, 1, &o, &err), BASE_EINVAL);
+    assert_int_equal(lull_oidn_open(path, &o, &err), BASE_EINVAL);
     assert_null(o);
     if (!strstr(err.text, text))
         fail_msg("'%s' does not say '%s'", err.text, text);
@@ -49,13 +51,13 @@ static void finding(void **unused)
     struct lull_oidn *o = NULL;
     lull_oidn_close(open_stub("identity"));
     snprintf(file, sizeof file, "%s/libOpenImageDenoise.so.2", stub);
-    assert_int_equal(lull_oidn_open(file, 1, &o, &err), 0);
+    assert_int_equal(lull_oidn_open(file, &o, &err), 0);
     assert_string_equal(lull_oidn_version(o), "2.5.1");
     lull_oidn_close(o);
     refuses("/no/such/folder", "identity", "/no/such/folder: no Open Image Denoise 2 there");
     refuses("/proc/self/exe", "identity", "no Open Image Denoise 2 there");
     setenv("LULL_OIDN", stub, 1);
-    assert_int_equal(lull_oidn_open(NULL, 1, &o, &err), 0);
+    assert_int_equal(lull_oidn_open(NULL, &o, &err), 0);
     lull_oidn_close(o);
     setenv("LULL_OIDN", "/no/such", 1);
     refuses(NULL, "identity", "/no/such: no Open Image Denoise 2 there");
@@ -71,15 +73,18 @@ static void failures(void **unused)
         const char *kind, *text;
         int code;
     } runs[] = {{"commit", "cannot prepare its filter: the stub was told to refuse (error 3)", BASE_EINVAL},
-                {"memory", "out of memory", BASE_ENOMEM}};
-    for (size_t i = 0; i < 2; i++) {
+                {"memory", "out of memory", BASE_ENOMEM},
+                {"crash", "ended its process", BASE_EINVAL}};
+    for (size_t i = 0; i < 3; i++) {
         struct lull_oidn *o = open_stub(runs[i].kind);
         float color[3] = {1, 2, 3}, out[3];
-        struct lull_oidn_picture p = {.width = 1, .height = 1, .color = color, .exposure = 1};
-        struct base_err err = {0};
-        assert_int_equal(lull_oidn_run(o, &p, LULL_OIDN_HIGH, NULL, NULL, out, &err), runs[i].code);
-        assert_non_null(strstr(err.text, runs[i].text));
-        assert_int_equal(lull_oidn_run(o, &p, LULL_OIDN_HIGH, NULL, NULL, out, NULL), runs[i].code);
+        struct lull_oidn_pictures p = {.color = {color}, .out = {out}};
+        assert_int_equal(lull_oidn_prepare(o, &pixel, NULL), 0);
+        for (int k = 0; k < 2; k++) {
+            struct base_err err = {0};
+            assert_int_equal(lull_oidn_run(o, &p, NULL, NULL, k ? NULL : &err), runs[i].code);
+            assert_true(k || strstr(err.text, runs[i].text));
+        }
         lull_oidn_close(o);
     }
 }
@@ -94,10 +99,14 @@ static void cancelling(void **unused)
     (void)unused;
     struct lull_oidn *o = open_stub("endless");
     float color[3] = {1, 2, 3}, out[3];
-    struct lull_oidn_picture p = {.width = 1, .height = 1, .color = color, .exposure = 1};
+    struct lull_oidn_pictures p = {.color = {color}, .out = {out}};
     struct base_err err = {0};
     int asked = 0;
-    assert_int_equal(lull_oidn_run(o, &p, LULL_OIDN_HIGH, third_time, &asked, out, &err), BASE_EINVAL);
+    assert_int_equal(lull_oidn_run(o, &p, third_time, &asked, &err), BASE_EINVAL);
+    assert_string_equal(err.text, "Open Image Denoise is not prepared");
+    err.code = 0;
+    assert_int_equal(lull_oidn_prepare(o, &pixel, &err), 0);
+    assert_int_equal(lull_oidn_run(o, &p, third_time, &asked, &err), BASE_EINVAL);
     assert_string_equal(err.text, "cancelled");
     assert_int_equal(asked, 3);
     lull_oidn_close(o);
@@ -108,52 +117,32 @@ static void bad_numbers(void **unused)
 {
     (void)unused;
     enum { W = 15, H = 15, N = 3 * W * H };
-    static float color[N], albedo[N], normal[N], out[N];
+    static float color[N], albedo[N], normal[N], out[N], other[N];
     for (int i = 0; i < N; i++) {
         color[i] = i % 5 == 0 ? NAN : i % 7 == 0 ? INFINITY : i % 11 == 0 ? -1.0f : 1e6f;
         albedo[i] = i % 3 ? 2.0f : NAN;
         normal[i] = i % 3 ? -3.0f : INFINITY;
     }
-    struct lull_oidn_picture p = {W, H, color, albedo, normal, 0.5};
+    struct lull_oidn_pictures p = {{color, color}, albedo, normal, {out, other}};
+    struct lull_oidn_form form = {W, H, 1, 1, LULL_OIDN_FAST, 1, 0.5f};
     static const char *const kinds[] = {"identity", "nan"};
     for (size_t k = 0; k < 2; k++) {
         struct lull_oidn *o = open_stub(kinds[k]);
         struct base_err err = {0};
-        if (lull_oidn_run(o, &p, LULL_OIDN_FAST, NULL, NULL, out, &err))
+        if (lull_oidn_prepare(o, &form, &err) || lull_oidn_run(o, &p, NULL, NULL, &err))
             fail_msg("%s", err.text);
         for (int i = 0; i < N; i++)
             assert_true(out[i] == (color[i] == 1e6f ? 1e6f : 0.0f));
+        assert_memory_equal(out, other, sizeof out);
         lull_oidn_close(o);
     }
-}
-
-/* Inside the frame, on its grid, with the halo where the frame reaches. */
-static void boxes(void **unused)
-{
-    (void)unused;
-    static const struct lull_oidn_box frames[] = {{0, 0, 1000, 700}, {5, 7, 5 + 403, 7 + 391}, {0, 0, 1, 1}, {3, 3, 18, 18}};
-    for (size_t f = 0; f < 4; f++)
-        for (int y = frames[f].y0; y < frames[f].y1; y += 97)
-            for (int x = frames[f].x0; x < frames[f].x1; x += 97)
-                for (int halo = 0; halo <= 96; halo += 32) {
-                    const struct lull_oidn_box t = frames[f];
-                    struct lull_oidn_box core = {x, y, x + 97 < t.x1 ? x + 97 : t.x1, y + 97 < t.y1 ? y + 97 : t.y1};
-                    struct lull_oidn_box b = lull_oidn_box_of(core, halo, t);
-                    assert_true(b.x0 >= t.x0 && b.y0 >= t.y0 && b.x1 <= t.x1 && b.y1 <= t.y1);
-                    assert_int_equal((b.x0 - t.x0) % LULL_OIDN_GRID, 0);
-                    assert_int_equal((b.y0 - t.y0) % LULL_OIDN_GRID, 0);
-                    assert_true(b.x0 == t.x0 || (core.x0 - b.x0 >= halo && core.x0 - b.x0 < halo + LULL_OIDN_GRID));
-                    assert_true(b.y0 == t.y0 || (core.y0 - b.y0 >= halo && core.y0 - b.y0 < halo + LULL_OIDN_GRID));
-                    assert_true(b.x1 == t.x1 || b.x1 == core.x1 + halo);
-                    assert_true(b.y1 == t.y1 || b.y1 == core.y1 + halo);
-                }
 }
 
 /* --- the real library -------------------------------------------------------------------------------------------------- */
 
 static char real[4096]; /* LULL_OIDN as it was */
 
-static struct lull_oidn *open_real(int threads)
+static struct lull_oidn *open_real(void)
 {
     struct base_err err = {0};
     struct lull_oidn *o = NULL;
@@ -161,7 +150,7 @@ static struct lull_oidn *open_real(int threads)
         setenv("LULL_OIDN", real, 1);
     else
         unsetenv("LULL_OIDN");
-    if (lull_oidn_open(NULL, threads, &o, &err)) {
+    if (lull_oidn_open(NULL, &o, &err)) {
         print_message("skipped: %s\n", err.text);
         skip();
     }
@@ -176,26 +165,27 @@ static float next(void)
     return (float)(seed >> 8) * 0x1p-24f;
 }
 
-static void denoise(struct lull_oidn *o, const struct lull_oidn_picture *p, float *out)
+static void denoise(struct lull_oidn *o, const float *color, int width, int height, int threads, float *out)
 {
+    struct lull_oidn_form form = {width, height, 0, 0, LULL_OIDN_HIGH, threads, 1.0f};
+    struct lull_oidn_pictures p = {.color = {color}, .out = {out}};
     struct base_err err = {0};
-    if (lull_oidn_run(o, p, LULL_OIDN_HIGH, NULL, NULL, out, &err))
+    if (lull_oidn_prepare(o, &form, &err) || lull_oidn_run(o, &p, NULL, NULL, &err))
         fail_msg("%s", err.text);
 }
 
-/* Less noise; the same bits for two threads, for a crop on the grid with its halo, and (after scaling) for another exposure. */
+/* Less noise; the same bits for two threads and for a crop on the grid with its halo; small pictures. */
 static void real_library(void **unused)
 {
     (void)unused;
     enum { W = 352, H = 272, N = 3 * W * H };
-    struct lull_oidn *one = open_real(1), *two = open_real(2);
+    struct lull_oidn *o = open_real();
     float *color = malloc(4 * N * sizeof *color), *out = color + N, *again = out + N, *part = again + N;
     assert_non_null(color);
     for (int i = 0; i < N; i++)
         color[i] = 0.5f + 0.2f * (next() - 0.5f) + ((i / 3 % W) / 40 % 2 ? 0.2f : 0.0f);
-    struct lull_oidn_picture p = {.width = W, .height = H, .color = color, .exposure = 1};
-    denoise(one, &p, out);
-    denoise(two, &p, again);
+    denoise(o, color, W, H, 1, out);
+    denoise(o, color, W, H, 2, again);
     assert_memory_equal(out, again, N * sizeof *out);
     double noise = 0, left = 0;
     for (int i = 0; i < N; i++) {
@@ -205,25 +195,20 @@ static void real_library(void **unused)
     }
     assert_true(left < 0.1 * noise);
 
-    struct lull_oidn_box frame = {0, 0, W, H}, core = {203, 150, W, H}, b = lull_oidn_box_of(core, LULL_OIDN_HALO, frame);
-    const int w = b.x1 - b.x0;
-    for (int y = b.y0; y < b.y1; y++)
-        memcpy(part + (y - b.y0) * w * 3, color + (y * W + b.x0) * 3, (size_t)w * 3 * sizeof *part);
-    p = (struct lull_oidn_picture){.width = w, .height = b.y1 - b.y0, .color = part, .exposure = 1};
-    assert_true(b.x0 > 0 && b.y0 > 0);
-    denoise(one, &p, again);
-    for (int y = core.y0; y < core.y1; y++)
-        assert_memory_equal(again + ((y - b.y0) * w + core.x0 - b.x0) * 3, out + (y * W + core.x0) * 3,
-                            (size_t)(core.x1 - core.x0) * 3 * sizeof *out);
+    /* the pixels from (203, 150) on; 96 and 48 are the multiples of 16 with the halo before them */
+    enum { X = 203, Y = 150, X0 = 96, Y0 = 48, CUT_W = W - X0, CUT_H = H - Y0 };
+    assert_true(X - X0 >= LULL_OIDN_HALO && Y - Y0 >= LULL_OIDN_HALO && X0 % LULL_OIDN_GRID + Y0 % LULL_OIDN_GRID == 0);
+    for (int y = 0; y < CUT_H; y++)
+        memcpy(part + y * CUT_W * 3, color + ((y + Y0) * W + X0) * 3, CUT_W * 3 * sizeof *part);
+    denoise(o, part, CUT_W, CUT_H, 1, again);
+    for (int y = Y; y < H; y++)
+        assert_memory_equal(again + ((y - Y0) * CUT_W + X - X0) * 3, out + (y * W + X) * 3, (W - X) * 3 * sizeof *out);
 
     static const int sides[][2] = {{1, 1}, {15, 15}, {1, 200}, {37, 3}};
-    for (size_t s = 0; s < 4; s++) {
-        p = (struct lull_oidn_picture){.width = sides[s][0], .height = sides[s][1], .color = color, .exposure = 1e-6};
-        denoise(one, &p, again);
-    }
+    for (size_t s = 0; s < 4; s++)
+        denoise(o, color, sides[s][0], sides[s][1], 1, again);
     free(color);
-    lull_oidn_close(one);
-    lull_oidn_close(two);
+    lull_oidn_close(o);
 }
 
 int main(void)
@@ -235,7 +220,7 @@ int main(void)
         return 1;
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(finding),     cmocka_unit_test(failures), cmocka_unit_test(cancelling),
-        cmocka_unit_test(bad_numbers), cmocka_unit_test(boxes),    cmocka_unit_test(real_library),
+        cmocka_unit_test(bad_numbers), cmocka_unit_test(real_library),
     };
     return cmocka_run_group_tests_name("oidn", tests, NULL, NULL);
 }

@@ -1,0 +1,218 @@
+#include "denoise/program/library.h"
+
+#include <dlfcn.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+/* Of the library's C interface, version 2: what is used here. */
+enum { DEVICE_CPU = 1, FORMAT_FLOAT3 = 3, ERROR_MEMORY = 4, MAJOR_VERSION = 2 };
+typedef void *device_t;
+typedef void *filter_t;
+
+struct library {
+    void *handle;
+    device_t device;
+    device_t (*new_device)(int type);
+    void (*commit_device)(device_t device);
+    void (*release_device)(device_t device);
+    void (*set_device_int)(device_t device, const char *name, int value);
+    void (*set_device_bool)(device_t device, const char *name, bool value);
+    int (*get_device_int)(device_t device, const char *name);
+    int (*get_device_error)(device_t device, const char **text);
+    filter_t (*new_filter)(device_t device, const char *type);
+    void (*release_filter)(filter_t filter);
+    void (*set_image)(filter_t filter, const char *name, void *data, int format, size_t width, size_t height, size_t offset,
+                      size_t pixel_stride, size_t row_stride);
+    void (*set_bool)(filter_t filter, const char *name, bool value);
+    void (*set_int)(filter_t filter, const char *name, int value);
+    void (*set_float)(filter_t filter, const char *name, float value);
+    void (*commit_filter)(filter_t filter);
+    void (*execute_filter)(filter_t filter);
+};
+
+static const char *const how_to_get_it =
+    "scripts/setup --denoiser puts it into build/oidn; or install Open Image Denoise 2 and name its library by "
+    "LULL_OIDN=FILE";
+
+/* --- finding ----------------------------------------------------------------------------------------------------------- */
+
+static const char *const file_name = "libOpenImageDenoise.so.2";
+
+/* path: the library or a folder that holds it, itself or in lib/. */
+static void *open_at(const char *path)
+{
+    static const char *const forms[] = {"%s/%s", "%s/lib/%s"};
+    struct stat s;
+    char full[4096];
+    void *library = NULL;
+    if (stat(path, &s) != 0)
+        return NULL;
+    if (!S_ISDIR(s.st_mode))
+        return dlopen(path, RTLD_NOW | RTLD_LOCAL);
+    for (size_t i = 0; i < 2 && !library; i++)
+        if (snprintf(full, sizeof full, forms[i], path, file_name) < (int)sizeof full && stat(full, &s) == 0)
+            library = dlopen(full, RTLD_NOW | RTLD_LOCAL);
+    return library;
+}
+
+/* oidn/ beside this program, or up to three folders above it. */
+static void *open_nearby(void)
+{
+    char folder[4096], path[4200];
+    void *library = NULL;
+    ssize_t n = readlink("/proc/self/exe", folder, sizeof folder - 1);
+    if (n <= 0)
+        return NULL;
+    folder[n] = '\0';
+    for (int up = 0; up < 4 && !library; up++) {
+        char *slash = strrchr(folder, '/');
+        if (!slash)
+            break;
+        *slash = '\0';
+        snprintf(path, sizeof path, "%s/oidn", folder);
+        library = open_at(path);
+    }
+    return library;
+}
+
+static void *find(const char *path, struct base_err *err)
+{
+    const char *named = *path ? path : getenv("LULL_OIDN");
+    if (named && *named) {
+        void *library = open_at(named);
+        if (!library) {
+            const char *why = dlerror();
+            base_fail(err, BASE_EINVAL, "%s: no Open Image Denoise 2 there (%s)", named, why ? why : "no such file");
+        }
+        return library;
+    }
+    void *library = dlopen(file_name, RTLD_NOW | RTLD_LOCAL);
+    library = library ? library : open_nearby();
+    if (!library)
+        base_fail(err, BASE_EINVAL, "no Open Image Denoise: %s", how_to_get_it);
+    return library;
+}
+
+/* --- device ------------------------------------------------------------------------------------------------------------ */
+
+static int take_symbols(struct library *o, struct base_err *err)
+{
+    const struct {
+        const char *name;
+        void *to;
+    } symbols[] = {{"oidnNewDevice", &o->new_device},
+                   {"oidnCommitDevice", &o->commit_device},
+                   {"oidnReleaseDevice", &o->release_device},
+                   {"oidnSetDeviceInt", &o->set_device_int},
+                   {"oidnSetDeviceBool", &o->set_device_bool},
+                   {"oidnGetDeviceInt", &o->get_device_int},
+                   {"oidnGetDeviceError", &o->get_device_error},
+                   {"oidnNewFilter", &o->new_filter},
+                   {"oidnReleaseFilter", &o->release_filter},
+                   {"oidnSetSharedFilterImage", &o->set_image},
+                   {"oidnSetFilterBool", &o->set_bool},
+                   {"oidnSetFilterInt", &o->set_int},
+                   {"oidnSetFilterFloat", &o->set_float},
+                   {"oidnCommitFilter", &o->commit_filter},
+                   {"oidnExecuteFilter", &o->execute_filter}};
+    for (size_t i = 0; i < sizeof symbols / sizeof symbols[0]; i++) {
+        void *symbol = dlsym(o->handle, symbols[i].name);
+        if (!symbol)
+            return base_fail(err, BASE_EINVAL, "Open Image Denoise: the library has no %s: version 2 is needed",
+                             symbols[i].name);
+        memcpy(symbols[i].to, &symbol, sizeof symbol); /* POSIX: a function's address fits a void * */
+    }
+    return 0;
+}
+
+/* The library's last error on this thread, and its words; 0: none. */
+static int check(const struct library *o, const char *doing, struct base_err *err)
+{
+    const char *text = NULL;
+    int code = o->get_device_error(o->device, &text);
+    if (code == 0)
+        return 0;
+    if (code == ERROR_MEMORY)
+        return base_fail_nomem(err, "Open Image Denoise");
+    return base_fail(err, BASE_EINVAL, "Open Image Denoise cannot %s: %s (error %d)", doing,
+                     text && *text ? text : "it says no more", code);
+}
+
+static int make_device(struct library *o, struct shared *s, struct base_err *err)
+{
+    o->device = o->new_device(DEVICE_CPU); /* a GPU would give other bits */
+    if (!o->device) {
+        int why = check(o, "make a device", err);
+        return why ? why : base_fail(err, BASE_EINVAL, "Open Image Denoise has no CPU device");
+    }
+    if (s->form.threads > 0)
+        o->set_device_int(o->device, "numThreads", s->form.threads);
+    o->set_device_bool(o->device, "setAffinity", false); /* the threads are the host's guests */
+    o->commit_device(o->device);
+    int rc = check(o, "make a device", err);
+    if (rc)
+        return rc;
+    int major = o->get_device_int(o->device, "versionMajor");
+    snprintf(s->version, sizeof s->version, "%d.%d.%d", major, o->get_device_int(o->device, "versionMinor"),
+             o->get_device_int(o->device, "versionPatch"));
+    if (major == MAJOR_VERSION)
+        return 0;
+    return base_fail(err, BASE_EINVAL, "Open Image Denoise is of version %s: version 2 is needed", s->version);
+}
+
+/* --- filter ------------------------------------------------------------------------------------------------------------ */
+
+static void give(const struct library *o, filter_t filter, const char *name, struct shared *s, int which)
+{
+    const size_t width = (size_t)s->form.width, height = (size_t)s->form.height, pixel = 3 * sizeof(float);
+    o->set_image(filter, name, shared_picture(s, which), FORMAT_FLOAT3, width, height, 0, pixel, pixel * width);
+}
+
+static int run(const struct library *o, filter_t filter, struct shared *s, int which, struct base_err *err)
+{
+    give(o, filter, "color", s, SHARED_COLOR + which);
+    give(o, filter, "output", s, SHARED_OUT + which);
+    o->commit_filter(filter);
+    int rc = check(o, "prepare its filter", err);
+    if (rc)
+        return rc;
+    o->execute_filter(filter);
+    return check(o, "denoise", err);
+}
+
+static int run_all(const struct library *o, struct shared *s, struct base_err *err)
+{
+    filter_t filter = o->new_filter(o->device, "RT");
+    int rc = check(o, "make its filter", err);
+    if (rc || !filter)
+        return rc ? rc : base_fail(err, BASE_EINVAL, "Open Image Denoise makes no filter");
+    if (s->form.albedo)
+        give(o, filter, "albedo", s, SHARED_ALBEDO);
+    if (s->form.albedo && s->form.normal)
+        give(o, filter, "normal", s, SHARED_NORMAL);
+    o->set_bool(filter, "hdr", true);
+    o->set_float(filter, "inputScale", s->form.exposure); /* else an exposure of this very crop */
+    o->set_int(filter, "quality", s->form.quality);
+    for (int i = 0; i < s->colors && !rc; i++)
+        rc = run(o, filter, s, i, err);
+    o->release_filter(filter);
+    return rc;
+}
+
+/* The library stays loaded: its threads outlive their device for a moment. */
+int library_denoise(const char *path, struct shared *s, struct base_err *err)
+{
+    struct library o = {.handle = find(path, err)};
+    int rc = o.handle ? take_symbols(&o, err) : BASE_EINVAL;
+    if (!rc)
+        rc = make_device(&o, s, err);
+    if (!rc && s->form.width > 0)
+        rc = run_all(&o, s, err);
+    if (o.device)
+        o.release_device(o.device);
+    return rc;
+}
