@@ -86,8 +86,9 @@ GGN_SRC     := $(filter-out ggn/plugin/% ggn/study/% ggn/cli/%,$(wildcard ggn/*/
 GGN_IMAGES  := $(wildcard ggn/*/*.cpp)# as PT_IMAGES
 # What includes nn/real.h itself is compiled for float and, with GGN_DOUBLE, for double.
 GGN_TWICE   := $(shell grep -ls '"nn/real.h"' ggn/nn/*.c ggn/model/*.c tests/support/*.c)
-GGN_PLUGIN  := $(wildcard ggn/plugin/*.c)
-GGN_STUDY   := $(wildcard ggn/study/*.c)# the only user of STUDY_LIBS: not in ggn.so
+GGN_ENTRIES := $(wildcard ggn/plugin/entry_*.c)# one a library of criteria: entry_NAME.c makes NAME.so
+GGN_PLUGIN  := $(filter-out $(GGN_ENTRIES),$(wildcard ggn/plugin/*.c))
+GGN_STUDY   := $(wildcard ggn/study/*.c)# the only user of STUDY_LIBS
 GGN_CLI     := $(wildcard ggn/cli/*.c)
 # Tests name what they test by prefix: pt_ (path tracer), ggn_, api_ (plugin-api), base_ (plugin-api/base, sequence, denoise).
 TEST_SRC    := $(wildcard tests/unit/*.c tests/grad/*.c tests/golden/*.c tests/stat/*.c tests/abi/*.c tests/hard/*.c tests/oom/*.c)
@@ -116,7 +117,7 @@ HOST_LIB := $(OUT)/lib/liblull-host.so.1
 EXAMPLES := $(BIN)/host-example
 DENOISER := $(OUT)/lib/lull-denoiser# a program that denoise/oidn.h runs
 MODULES  := $(DENOISER) $(MPI_MODULE) $(OUT)/lib/lull-images.so $(OUT)/lib/ggn-images.so
-CRITERIA := $(EXAMPLE_SRC:plugin-api/examples/%.c=$(LIB)/%.so) $(if $(GGN_PLUGIN),$(LIB)/ggn.so)
+CRITERIA := $(EXAMPLE_SRC:plugin-api/examples/%.c=$(LIB)/%.so) $(GGN_ENTRIES:ggn/plugin/entry_%.c=$(LIB)/%.so)
 TESTS    := $(patsubst tests/%.c,$(OUT)/tests/%,$(TEST_SRC))
 SANE     := $(patsubst tests/%.c,build/asan/tests/%,$(SANE_SRC))
 REPLAY   := $(patsubst tests/fuzz/%.c,$(OUT)/fuzz/replay-%,$(FUZZ_SRC))
@@ -187,7 +188,10 @@ $(BIN)/host-example: plugin-api/examples/host.cpp $(wildcard plugin-api/include/
 # Of the networks the criteria take what they name: no image is read there, and no image library loaded.
 $(OBJ)/ggn.a: $(GGN_CORE_OBJ)
 	@rm -f $@; echo "  AR   $@"; $(AR) rcs $@ $^
-$(LIB)/ggn.so: $(GGN_PLUGIN_OBJ) $(OBJ)/ggn.a plugin-api/plugin.map
+$(OBJ)/ggn-plugin.a: $(GGN_PLUGIN_OBJ)
+	@rm -f $@; echo "  AR   $@"; $(AR) rcs $@ $^
+# Each with what its criteria name and the libraries that those need: observer.so the mathematical one, ggn.so no BLAS.
+$(GGN_ENTRIES:ggn/plugin/entry_%.c=$(LIB)/%.so): $(LIB)/%.so: $(OBJ)/ggn/plugin/entry_%.c.o $(OBJ)/ggn-plugin.a $(OBJ)/ggn.a plugin-api/plugin.map
 	$(so) $(filter %.o %.a,$^) $(LDFLAGS_ALL) -Wl,--as-needed $(GGN_LIBS) -o $@
 $(LIB)/%.so: $(OBJ)/plugin-api/examples/%.c.o plugin-api/plugin.map
 	$(so) $(filter %.o,$^) $(LDFLAGS_ALL) -lm -o $@
@@ -339,7 +343,7 @@ install: all ## install under $(DESTDIR)$(PREFIX)
 	    sed 's|@PREFIX@|$(PREFIX)|g' plugin-api/$$name.pc.in > $(DESTDIR)$(PREFIX)/lib/pkgconfig/$$name.pc || exit 1; done
 
 compdb: ## write compile_commands.json
-	@{ echo '['; sep=; for f in $(BASE_SRC) $(PT_SRC) $(PT_IMAGES) $(PT_MAIN) $(GGN_SRC) $(GGN_IMAGES) $(GGN_PLUGIN) $(GGN_STUDY) $(GGN_CLI) $(HOST_SRC) $(LOADER_SRC) $(EXAMPLE_SRC) $(TOOL_SRC) $(MPI_SRC); do \
+	@{ echo '['; sep=; for f in $(BASE_SRC) $(PT_SRC) $(PT_IMAGES) $(PT_MAIN) $(GGN_SRC) $(GGN_IMAGES) $(GGN_PLUGIN) $(GGN_ENTRIES) $(GGN_STUDY) $(GGN_CLI) $(HOST_SRC) $(LOADER_SRC) $(EXAMPLE_SRC) $(TOOL_SRC) $(MPI_SRC); do \
 	  printf '%s' "$$sep"; $(MAKE) --no-print-directory -s compdb-one F=$$f; sep=,; done; echo ']'; } > compile_commands.json
 .PHONY: compdb-one
 compdb-one:

@@ -262,10 +262,10 @@ static int add_observed(struct job *j, struct base_err *err)
     int available, rc = check_people(j, err);
     if (rc)
         return rc;
+    const double visible = j->o->visible > 0 ? j->o->visible : GGN_OBSERVER_VISIBLE;
     for (int halves = 1; halves >= 0 && !rc; halves--) {
         struct ggn_method *m = &j->methods[j->n];
-        rc = ggn_method_observer(m, &j->set, j->o->observer, halves, j->o->visible > 0 ? j->o->visible : GGN_OBSERVER_VISIBLE,
-                                 GGN_OBSERVER_GROWTH, &available, err);
+        rc = ggn_method_observer(m, &j->set, j->o->observer, halves, visible, GGN_OBSERVER_GROWTH, &available, err);
         if (!rc && available)
             j->n++;
         else if (!rc)

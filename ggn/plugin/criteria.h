@@ -1,7 +1,8 @@
 /*
- * The criteria of ggn.so, in the order of lull_criterion_entry_v1's index, and what their tables have in common.
+ * The criteria of ggn, and what their tables have in common. entry_NAME.c lists those of the library NAME.so.
  *
- * To add one: declare its table here and append it to the list in entry.c (an index, once released, keeps its criterion).
+ * To add one: declare its table here and append it to the list of a library (an index, once released, keeps its criterion),
+ * or begin a library of its own where it needs others than those there do.
  */
 #ifndef GGN_PLUGIN_CRITERIA_H
 #define GGN_PLUGIN_CRITERIA_H
@@ -21,5 +22,13 @@ extern const struct lull_criterion ggn_plugin_noise_mask;  /* id "noise-mask" */
      .param_count = P_COUNT, .param_stride = sizeof(struct lull_param), .thread_level = LULL_THREADS_INSTANCE, \
      .capabilities = LULL_CAP_DETERMINISTIC | LULL_CAP_BATCH_INVARIANT, .requirements = lull_kit_requirements, \
      __VA_ARGS__}
+
+/* The library's one exported function, over the tables given. */
+#define GP_ENTRY(...) \
+    LULL_EXPORT const struct lull_criterion *lull_criterion_entry_v1(uint32_t index) \
+    { \
+        static const struct lull_criterion *const criteria[] = {__VA_ARGS__}; \
+        return index < sizeof criteria / sizeof criteria[0] ? criteria[index] : NULL; \
+    }
 
 #endif

@@ -19,8 +19,8 @@ struct pt_quote_block {
 
 struct pt_quote_row {
     double visible;            /* NaN: the criterion has no such parameter, or none is used */
-    const char *name;          /* borrows static text: "draft", "default", "final", "as asked"; "normal": the criterion has no
-                                  default of its own */
+    const char *name;          /* borrows static text: "draft", "default", "final", "as asked"; "normal": the criterion names
+                                  no default */
     int asked;                 /* this is what a render with the given options does */
     struct lull_host_criterion *criterion; /* owns; NULL: uniform */
     struct lull_host_said *said; /* owns; [blocks] */
@@ -44,9 +44,9 @@ struct pt_quote {
     double check_s;            /* wall seconds that the criterion takes for one block */
 };
 
-/* Rows of visible 0.5, of the criterion's default (0.25 if it names none) and of 0.05, and of the given one if it is another;
- * one row "as asked" where the criterion has no such parameter or the render has no criterion (table NULL). The render's
- * threads are borrowed until destroy. */
+/* Rows of visible 0.5, of the criterion's default (0.25 if it names none) and of 0.05, and of the given one if it is
+ * another; one row "as asked" where the criterion has no such parameter or the render has no criterion (table NULL). The
+ * render's threads are borrowed until destroy. */
 int pt_quote_create(const struct pt_render *render, const struct lull_criterion *table, const struct lull_pair *pairs,
                     uint32_t pair_count, void (*warn)(void *data, const char *line), void *warn_data,
                     struct pt_quote **out, struct base_err *err);

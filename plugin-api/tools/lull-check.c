@@ -68,7 +68,7 @@ static const struct base_option list[] = {
     {"param", 'p', "KEY=VALUE", .set = add_pair, .help = "Give the criterion this parameter (repeatable)"},
     {"only", 'o', "CHECK", .set = add_only, .help = "Run this check only (repeatable)"},
     {"list", 'l', NULL, TO(list), .help = "List the checks and exit"},
-    {"required-only", 'r', NULL, TO(required_only), .help = "Supply only the planes that it requires, as a poorer host does"},
+    {"required-only", 'r', NULL, TO(required_only), .help = "Supply only the planes that it requires, as poorer hosts do"},
     {"quiet", 'q', NULL, TO(quiet), .help = "Print failures and the last line only"},
     {"threads", 't', "N", TO(workers), 2, 32, .help = "Threads for the concurrent checks (4)"},
     {"limit", 'L', "SECONDS", TO(limit_s), 1, 100000, .help = "A check that takes longer has failed (120)"},

@@ -384,8 +384,8 @@ static const struct {
     const char *library, *id;
     long usual_calls;
 } shipped[] = {
-    {"null", "null", 600},       {"fixed", "fixed", 600}, {"halfbuf", "halfbuf", 600}, {"variance", "variance", 600}, {"ggn", "observer", 600},
-    {"ggn", "ggn", 120},   {"ggn", "attributes", 30}, {"ggn", "noise-mask", 30}, /* svd-entropy has no model yet */
+    {"null", "null", 600},       {"fixed", "fixed", 600}, {"halfbuf", "halfbuf", 600}, {"variance", "variance", 600}, {"observer", "observer", 600},
+    {"ggn", "ggn", 120},   {"baselines", "attributes", 30}, {"baselines", "noise-mask", 30}, /* svd-entropy has no model yet */
 };
 
 static void nothing_within_the_rules_breaks_a_criterion(void **unused)

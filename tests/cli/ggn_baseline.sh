@@ -29,7 +29,7 @@ refused "an output that cannot be" "/nonexistent" attributes -d $data -o /nonexi
 [ ! -e "$tmp/x.ggn" ]
 check "nothing is left behind" $?
 criterion() { # criterion ID MODEL: as create answers
-    "$BUILD/bin/lull-check" -q -o table "$BUILD/lib/lull/ggn.so:$1" -p model="$2" >"$tmp/out" 2>"$tmp/err"
+    "$BUILD/bin/lull-check" -q -o table "$BUILD/lib/lull/baselines.so:$1" -p model="$2" >"$tmp/out" 2>"$tmp/err"
     rc=$?
 }
 criterion attributes "$tmp/noise-mask.ggn"

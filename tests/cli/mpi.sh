@@ -29,7 +29,7 @@ same_images "a crop" "$scene" --size 64x48 --block 16 --crop 20,10,40,30 -c vari
 same_images "one block" "$scene" --size 24x24 --block 24 -c halfbuf --spp-min 8 --spp-max 64
 same_images "one pixel" "$scene" --size 1x1 --spp 40
 same_images "seams re-opened" "$scene" --size 48x32 --block 8 -c halfbuf --spp-min 8 --spp-max 128 --max-seam 1.5
-[ ! -f "${here}/../../${BUILD:-build}/lib/lull/ggn.so" ] ||
+[ ! -f "${here}/../../${BUILD:-build}/lib/lull/observer.so" ] ||
     same_images "the default criterion" "$scene" --size 48x32 --block 24 --spp-min 8 --spp-max 48
 t "a quote by three processes" sh -c "mpirun --oversubscribe -n 3 $P $scene -q --size 64x48 --block 32 --quote --quote-pilot 16:5 | grep -q 'against uniform'"
 t "a recording" "$P" "$scene" -q --size 64x48 --block 32 --sequence one --levels geometric:4:16:2 --reference-spp 8 --blocks 0,3

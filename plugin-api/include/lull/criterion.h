@@ -365,7 +365,8 @@ typedef const struct lull_criterion *(*lull_entry_fn)(uint32_t index);
 /* An id is a name, a slash and a revision; it never changes its meaning, also not when a draft becomes stable. */
 
 /* lull.state/1, of the criterion: save and load the history of the open frame, for checkpoint and resume. A criterion
- * without history needs it not; one that keeps none in this frame writes nothing. After load the answers are those of the saved instance, bit for bit if DETERMINISTIC. */
+ * without history needs it not; one that keeps none in this frame writes nothing. After load the answers are those of the
+ * saved instance, bit for bit if DETERMINISTIC. */
 #define LULL_EXT_STATE "lull.state/1"
 
 /* Made by the host for one save or load. */

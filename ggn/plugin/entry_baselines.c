@@ -1,0 +1,3 @@
+#include "plugin/criteria.h"
+
+GP_ENTRY(&ggn_plugin_svd_entropy, &ggn_plugin_attributes, &ggn_plugin_noise_mask)
