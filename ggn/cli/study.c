@@ -229,6 +229,8 @@ static int serve(const struct options *o, struct base_err *err)
         rc = keep_token(o->args[0], token, err);
     if (!rc)
         rc = ggn_study_store_open(o->args[0], study.id, 1, &store, err);
+    if (!rc)
+        rc = ggn_study_store_sync_behind(store, err);
     if (!rc) {
         struct ggn_study_site site = {
             .dir = o->args[0], .page_dir = page, .token = address.loopback ? NULL : token, .study = &study, .store = store};
@@ -247,7 +249,8 @@ static int run_serve(int argc, char **argv)
         .args_doc = "DIR",
         ARGS(1),
         .doc =
-            "Serves the study until interrupted and prints its link. Every trial is on the disk before it is acknowledged."};
+            "Serves the study until interrupted and prints its link. However the server ends, no trial that it acknowledged "
+            "is lost; a power cut may take those of the last moment, which are asked again."};
     struct options o = {.listen = "127.0.0.1"};
     struct base_err err = {0};
     int rc = base_options_parse(&options, argc, argv, &o, &err);

@@ -249,8 +249,9 @@ int ggn_study_serve(const struct ggn_study_site *site, const struct ggn_study_ad
     printf(a->ipv6 ? "http://[%s]:%d/%s%s\n" : "http://%s:%d/%s%s\n", a->host, port, site->token ? site->token : "",
            site->token ? "/" : "");
     fflush(stdout);
-    while (!*stop)
+    int rc = 0;
+    while (!*stop && (rc = ggn_study_store_check(site->store, err)) == 0)
         nanosleep(&(struct timespec){.tv_nsec = 100000000}, NULL);
     MHD_stop_daemon(daemon); /* closes the socket */
-    return 0;
+    return rc;
 }

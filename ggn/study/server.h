@@ -1,5 +1,6 @@
 /*
- * Serves a study over HTTP until told to stop. One thread answers everybody; nothing outside is ever asked for anything.
+ * Serves a study over HTTP until told to stop. One thread answers everybody and must never wait for the disk to sync
+ * (ggn_study_store_sync_behind); nothing outside is ever asked for anything.
  */
 #ifndef GGN_STUDY_SERVER_H
 #define GGN_STUDY_SERVER_H
@@ -19,7 +20,8 @@ enum { GGN_STUDY_PORT = 8737 };
 /* Numbers only, no names: nothing is looked up. */
 int ggn_study_address_parse(const char *text, struct ggn_study_address *address, struct base_err *err);
 
-/* Prints the link on stdout once it answers, refusals on stderr, and returns when *stop is set (checked ten times a second).
+/* Prints the link on stdout once it answers, refusals on stderr, and returns when *stop is set or the store
+ * cannot be synced any more (both checked ten times a second).
  * site->hosts is ignored: on a loopback address it is the address itself, else anything, since then there is a token. */
 int ggn_study_serve(const struct ggn_study_site *site, const struct ggn_study_address *address,
                     const volatile sig_atomic_t *stop, struct base_err *err);

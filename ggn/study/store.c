@@ -8,9 +8,11 @@
 #include <sqlite3.h>
 
 #include "base/files.h"
+#include "study/syncer.h"
 
 struct ggn_study_store {
     sqlite3 *db;
+    struct ggn_study_syncer *syncer; /* NULL: every commit waits for the disk */
     char path[4096];
 };
 
@@ -138,9 +140,40 @@ int ggn_study_store_open(const char *dir, const char *study_id, int create, stru
 
 void ggn_study_store_close(struct ggn_study_store *store)
 {
-    if (store)
+    if (store) {
+        ggn_study_syncer_stop(store->syncer);
         sqlite3_close(store->db);
+    }
     free(store);
+}
+
+/* Called after each commit, in place of SQLite's own check whether to copy the log into the file. */
+static int on_commit(void *data, sqlite3 *db, const char *name, int pages)
+{
+    struct ggn_study_store *s = data;
+    (void)db, (void)name, (void)pages;
+    ggn_study_syncer_want(s->syncer);
+    return SQLITE_OK;
+}
+
+/* NORMAL alone would still sync inside some requests: where the log is copied into the file, and where the first commit
+ * after that begins the log anew. So both are done here: the log is emptied, then begun by setting what is set already, and
+ * grows from then on. */
+int ggn_study_store_sync_behind(struct ggn_study_store *s, struct base_err *err)
+{
+    char log[sizeof s->path + 4];
+    int rc = run(s, "PRAGMA wal_checkpoint(TRUNCATE); PRAGMA user_version=0; PRAGMA synchronous=NORMAL;", err);
+    snprintf(log, sizeof log, "%s-wal", s->path);
+    if (!rc)
+        rc = ggn_study_syncer_start(log, &s->syncer, err);
+    if (!rc)
+        sqlite3_wal_hook(s->db, on_commit, s);
+    return rc;
+}
+
+int ggn_study_store_check(struct ggn_study_store *s, struct base_err *err)
+{
+    return s->syncer ? ggn_study_syncer_check(s->syncer, err) : 0;
 }
 
 int ggn_study_store_begin(struct ggn_study_store *s, struct base_err *err)

@@ -1,8 +1,10 @@
 /*
- * People and their trials: DIR/study.db (SQLite, write-ahead log, every trial on the disk before it is acknowledged).
+ * People and their trials: DIR/study.db (SQLite, write-ahead log). A change is on the disk before the call returns, except
+ * while it is served (below).
  *
  * A trial is (slot, revision): a slot of the person's plan, and how often it was done again (adjustment only). Trials are
- * added and never changed; the last revision counts. One thread per store; several processes may have the same file open.
+ * added and never changed; the last revision counts. One thread per store unless said; several processes may have the same
+ * file open.
  */
 #ifndef GGN_STUDY_STORE_H
 #define GGN_STUDY_STORE_H
@@ -41,7 +43,17 @@ struct ggn_study_trial {
  * dir NULL: in memory, for tests. */
 int ggn_study_store_open(const char *dir, const char *study_id, int create, struct ggn_study_store **store,
                          struct base_err *err);
+/* Waits until everything is on the disk or the disk fails. */
 void ggn_study_store_close(struct ggn_study_store *store);
+
+/* For a store in a folder, before it is served: from now on no call waits for the disk, except for one after another process
+ * has imported or deleted. A change is in the system's hands when the call returns, so that the end of the process, however
+ * it comes, loses nothing; it is synced to the disk right after, together with all others that came meanwhile. A power cut
+ * loses what had not been synced, whole changes from the latest on. The log grows until the store is closed: about 5 KB a
+ * trial. */
+int ggn_study_store_sync_behind(struct ggn_study_store *store, struct base_err *err);
+/* 0, or why syncing failed. Any thread. */
+int ggn_study_store_check(struct ggn_study_store *store, struct base_err *err);
 
 /* Everything between begin and commit is on the disk together or not at all. */
 int ggn_study_store_begin(struct ggn_study_store *store, struct base_err *err);

@@ -1,5 +1,5 @@
-/* Preloaded: writes each fsync, rename and unlink of a program, and the mode in which it creates a file, into the file that CALLS names;
- * FAIL=fsync or FAIL=rename makes that call fail with EIO. */
+/* Preloaded: writes each fsync, fdatasync, rename and unlink of a program into the file that CALLS names; FAIL=fsync or FAIL=rename
+ * makes that call fail with EIO. While there is a file that HOLD names, fsync and fdatasync wait; where it has text in it, they fail. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <sys/types.h>
 #include <unistd.h>
 
@@ -45,14 +46,28 @@ static const char *name_of(int fd)
     return strrchr(path, '/') ? strrchr(path, '/') + 1 : path;
 }
 
-int fsync(int fd)
+static int sync_as(const char *call, int fd)
 {
-    int (*real)(int) = (int (*)(int))dlsym(RTLD_NEXT, "fsync");
-    int bad = fails("fsync");
-    tell("fsync %s%s\n", name_of(fd), bad ? " fails" : "");
+    int (*real)(int) = (int (*)(int))dlsym(RTLD_NEXT, call);
+    const char *hold = getenv("HOLD");
+    struct stat info;
+    int held = hold && stat(hold, &info) == 0, bad = fails(call) || (held && info.st_size > 0);
+    tell("%s %s%s\n", call, name_of(fd), bad ? " fails" : held ? " waits" : "");
+    while (held && !bad && stat(hold, &info) == 0)
+        usleep(10000);
     if (bad)
         errno = EIO;
     return bad ? -1 : real(fd);
+}
+
+int fsync(int fd)
+{
+    return sync_as("fsync", fd);
+}
+
+int fdatasync(int fd)
+{
+    return sync_as("fdatasync", fd);
 }
 
 int rename(const char *from, const char *to)

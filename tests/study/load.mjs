@@ -1,5 +1,4 @@
-// Load: 50 simulated participants at once. Nothing is lost; the times of answers are told, and judge nothing: every trial is synced to
-// the disk by itself, so that a disk which others write to makes all wait (p99 15 to 50 ms, 0.7 to 1.7 s beside a package manager).
+// Load: 50 simulated participants at once. Nothing is lost; the times of answers are told, and `scripts/bench --only study` judges them.
 // usage: GGN=… node load.mjs FOLDER
 import fs from 'node:fs';
 import path from 'node:path';
