@@ -87,7 +87,7 @@ GGN_IMAGES  := $(wildcard ggn/*/*.cpp)# as PT_IMAGES
 # What includes nn/real.h itself is compiled for float and, with GGN_DOUBLE, for double.
 GGN_TWICE   := $(shell grep -ls '"nn/real.h"' ggn/nn/*.c ggn/model/*.c tests/support/*.c)
 GGN_ENTRIES := $(wildcard ggn/plugin/entry_*.c)# one a library of criteria: entry_NAME.c makes NAME.so
-GGN_PLUGIN  := $(filter-out $(GGN_ENTRIES),$(wildcard ggn/plugin/*.c))
+GGN_PLUGIN  := $(filter-out $(GGN_ENTRIES),$(wildcard ggn/plugin/*.c ggn/plugin/*/*.c))
 GGN_STUDY   := $(wildcard ggn/study/*.c)# the only user of STUDY_LIBS
 GGN_CLI     := $(wildcard ggn/cli/*.c)
 # Tests name what they test by prefix: pt_ (path tracer), ggn_, api_ (plugin-api), base_ (plugin-api/base, sequence, denoise).
@@ -193,6 +193,7 @@ $(OBJ)/ggn-plugin.a: $(GGN_PLUGIN_OBJ)
 # Each with what its criteria name and the libraries that those need: observer.so the mathematical one, ggn.so no BLAS.
 $(GGN_ENTRIES:ggn/plugin/entry_%.c=$(LIB)/%.so): $(LIB)/%.so: $(OBJ)/ggn/plugin/entry_%.c.o $(OBJ)/ggn-plugin.a $(OBJ)/ggn.a plugin-api/plugin.map
 	$(so) $(filter %.o %.a,$^) $(LDFLAGS_ALL) -Wl,--as-needed $(GGN_LIBS) -o $@
+$(LIB)/denoised.so: | $(DENOISER)
 $(LIB)/%.so: $(OBJ)/plugin-api/examples/%.c.o plugin-api/plugin.map
 	$(so) $(filter %.o,$^) $(LDFLAGS_ALL) -lm -o $@
 

@@ -63,6 +63,16 @@ size_t ggn_visible_patches(int width, int height)
     return (size_t)parts(width) * (size_t)parts(height);
 }
 
+double ggn_visible_patch(int width, int height, size_t k, const double *texture, int rect[4])
+{
+    const int x = (int)(k % (size_t)parts(width)), y = (int)(k / (size_t)parts(width));
+    rect[0] = part_begin(width, x);
+    rect[1] = part_begin(height, y);
+    rect[2] = part_begin(width, x + 1);
+    rect[3] = part_begin(height, y + 1);
+    return texture[k] + TEXTURE_OFFSET;
+}
+
 /* Means over a row of patches from sums over the rows of each column, which are 0 afterwards. */
 static void patch_means(double *columns, int width, int rows, double *means)
 {

@@ -27,6 +27,8 @@ void ggn_visible_lightness(const float *rgb, size_t n, float *lightness);
 
 /* Patches of a block, row by row. */
 size_t ggn_visible_patches(int width, int height);
+/* Pixels [x0, x1) x [y0, y1) of patch k as x0, y0, x1, y1; returns s + 2, what noise is divided by the root of. */
+double ggn_visible_patch(int width, int height, size_t k, const double *texture, int rect[4]);
 /* Doubles of scratch memory for blocks of this width. */
 size_t ggn_visibility_scratch(int width);
 /* a, b: L* [height][width]. texture: [patches] gets s of each. */

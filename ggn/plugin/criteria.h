@@ -11,6 +11,7 @@
 
 extern const struct lull_criterion ggn_plugin_ggn;         /* id "ggn" */
 extern const struct lull_criterion ggn_plugin_observer;    /* id "observer" */
+extern const struct lull_criterion ggn_plugin_denoised;    /* id "denoised" */
 extern const struct lull_criterion ggn_plugin_svd_entropy; /* id "svd-entropy" */
 extern const struct lull_criterion ggn_plugin_attributes;  /* id "attributes" */
 extern const struct lull_criterion ggn_plugin_noise_mask;  /* id "noise-mask" */

@@ -8,7 +8,6 @@
  */
 #include <stdatomic.h>
 
-#include "base/colour.h"
 #include "observer/observer.h"
 #include "observer/visibility.h"
 #include "plugin/criteria.h"
@@ -52,21 +51,6 @@ struct lull_instance {
 
 /* --- one block --------------------------------------------------------------------------------------------------------- */
 
-/* The light that a display sends, in [0, 1], relative to its white. */
-static float shown(const struct lull_kit *kit, double radiance)
-{
-    double v = kit->exposure * radiance;
-    if (!(v > 0))
-        return 0;
-    if (v >= 1)
-        return 1;
-    if (kit->transfer == LULL_TRANSFER_LINEAR)
-        v = base_srgb_eotf(v);
-    else if (kit->transfer == LULL_TRANSFER_GAMMA && isfinite(kit->gamma) && kit->gamma > 0)
-        v = base_srgb_eotf(pow(v, 1 / kit->gamma));
-    return (float)v;
-}
-
 static int usable(const double a[3], const double m[3])
 {
     return isfinite(a[0]) && isfinite(a[1]) && isfinite(a[2]) && isfinite(m[0]) && isfinite(m[1]) && isfinite(m[2]);
@@ -91,8 +75,8 @@ static int read_halves(const struct lull_kit *kit, const struct lull_view *view,
             tally->bad += !good;
             for (size_t c = 0; c < 3; c++) {
                 float *one = &w->rgb[0][c * plane + at], *other = &w->rgb[1][c * plane + at];
-                *one = good ? shown(kit, a[c]) : at ? one[-1] : 0;
-                *other = good ? shown(kit, (n * m[c] - h * a[c]) / (n - h)) : at ? other[-1] : 0;
+                *one = good ? gp_shown(kit, a[c]) : at ? one[-1] : 0;
+                *other = good ? gp_shown(kit, (n * m[c] - h * a[c]) / (n - h)) : at ? other[-1] : 0;
                 differ |= good && a[c] != m[c];
             }
         }
@@ -124,8 +108,8 @@ static int read_looks(const struct lull_kit *kit, const struct lull_view *view, 
             tally->bad += !good;
             for (size_t c = 0; c < 3; c++) {
                 float *one = &w->rgb[0][c * plane + at], *other = &w->rgb[1][c * plane + at];
-                *one = good ? shown(kit, m[c] + d[c]) : at ? one[-1] : 0;
-                *other = good ? shown(kit, m[c] - d[c]) : at ? other[-1] : 0;
+                *one = good ? gp_shown(kit, m[c] + d[c]) : at ? one[-1] : 0;
+                *other = good ? gp_shown(kit, m[c] - d[c]) : at ? other[-1] : 0;
                 differ |= good && fabs(d[c]) > FLOAT_STEP * scale * fabs(m[c]);
             }
         }

@@ -1,5 +1,7 @@
 #include "plugin/translate.h"
 
+#include "base/colour.h"
+
 int32_t gp_fail_from(struct lull_error *err, const char *what, const struct base_err *from)
 {
     int32_t code = from->code == BASE_ENOMEM ? LULL_E_MEMORY : LULL_E_IO;
@@ -34,4 +36,18 @@ int32_t gp_load_check(const struct lull_instance *in, const struct lull_reader *
     if (!in || !reader || !reader->read)
         return lull_kit_fail(err, LULL_E_INVALID, "load: an argument is missing");
     return lull_kit_read_of(in)->block_count ? LULL_OK : lull_kit_fail(err, LULL_E_STATE, "load: no frame is open");
+}
+
+float gp_shown(const struct lull_kit *kit, double radiance)
+{
+    double v = kit->exposure * radiance;
+    if (!(v > 0))
+        return 0;
+    if (v >= 1)
+        return 1;
+    if (kit->transfer == LULL_TRANSFER_LINEAR)
+        v = base_srgb_eotf(v);
+    else if (kit->transfer == LULL_TRANSFER_GAMMA && isfinite(kit->gamma) && kit->gamma > 0)
+        v = base_srgb_eotf(pow(v, 1 / kit->gamma));
+    return (float)v;
 }

@@ -17,6 +17,7 @@ needs() { # needs LIBRARY NAME...: exactly these, beside the C library and the s
     [ "$got" = "$(printf '%s\n' "$@" | sort | tr '\n' ' ')" ]
 }
 t "observer.so needs the mathematical library" needs observer.so libm
+t "denoised.so needs the mathematical library, and no denoiser" needs denoised.so libm
 t "ggn.so needs no BLAS" needs ggn.so libcjson libm
 t "baselines.so needs OpenBLAS, LAPACKE and libsvm" needs baselines.so libcjson liblapacke libm libopenblas libsvm
 for k in fixed halfbuf variance; do t "$k.so needs the mathematical library" needs $k.so libm; done

@@ -21,7 +21,7 @@ LULL_PLUGIN_PATH=$PWD/broken "$P" --list-criteria 2>said >listed
 t "  …but of a library that it skips" sh -c "[ \$(wc -l <said) -eq 1 ] && grep -q 'skipped: .*bad.so' said"
 t "--list-criteria names criteria and parameters" sh -c "$P --list-criteria | grep -q '^halfbuf ' && $P --list-criteria | grep -q -- '-p threshold='"
 
-t "--visible is a share that observer, ggn and the three baselines know" sh -c "[ \"\$($P --list-criteria | grep -c -e '-p visible=')\" = 5 ]"
+t "--visible is a share that observer, denoised, ggn and the three baselines know" sh -c "[ \"\$($P --list-criteria | grep -c -e '-p visible=')\" = 6 ]"
 t "--visible sets the parameter" sh -c "$P $scene -q -c observer --visible 0.5 --spp 32 --report visible.json && grep -q '\"visible\":.*\"0.5\"' visible.json"
 
 # --- errors: one line, exit 2, nothing left behind ---

@@ -1,0 +1,373 @@
+/*
+ * The criterion "denoised", of denoised.so: when is the picture good that people keep, which is denoised? Each look denoises
+ * both halves of a block's samples and estimates how visible the error of the kept picture is (plugin/denoised/look.h), by
+ * what the halves disagree on and by what each, denoised, says of the other, noisy one. `error` is the larger of the two
+ * over the level at which people stop seeing it; a block stops when two looks in a row find it low enough for `visible`.
+ *
+ * The history of a block is its last look: asked again at the same samples it answers the same, though its neighbours, which
+ * the denoiser sees too, may have changed.
+ */
+#include <stdatomic.h>
+
+#include "observer/observer.h"
+#include "plugin/criteria.h"
+#include "plugin/denoised/look.h"
+#include "plugin/translate.h"
+
+static const double LEAST_STEP = 1.4142135623730951, CONFIRM_STEP = 1.25; /* of samples, from look to look */
+
+enum { P_VISIBLE, P_FIRST_SPP, P_GROWTH, P_PICTURE, P_QUALITY, P_LIBRARY, P_COUNT };
+enum {
+    REQUIRED = LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_HALF),
+    AUXILIARY = LULL_PLANE_BIT(LULL_PLANE_ALBEDO) | LULL_PLANE_BIT(LULL_PLANE_NORMAL)
+};
+
+static const struct lull_param params[P_COUNT] = {
+    [P_VISIBLE] = LULL_KIT_FLOAT("visible", "0.35", 1e-4, 0.9999,
+                                 "stop when at most this share of viewers would still see an error of the denoised picture"),
+    [P_FIRST_SPP] = LULL_KIT_INT("first-spp", "32", 2, 1e15, "samples per pixel before the first judgement"),
+    [P_GROWTH] = LULL_KIT_FLOAT("growth", "2", 1.5, 100, "largest ratio of samples between two looks at a block"),
+    [P_PICTURE] = LULL_KIT_CHOICE("picture", "blend", "blend|denoised",
+                                  "what is kept: the blend of noisy and denoised picture, or the denoised one alone"),
+    [P_QUALITY] = LULL_KIT_CHOICE("quality", "high", "fast|balanced|high", "of the denoiser"),
+    [P_LIBRARY] = LULL_KIT_FILE("library", NULL,
+                                "Open Image Denoise, or a folder that holds it; else LULL_OIDN and the usual places"),
+};
+
+struct past { /* what is remembered of a block; saved as it is, without padding */
+    uint64_t spp; /* of the last look; 0: none */
+    uint64_t next_spp;
+    double p_noisy, predicted_spp, error, halves, crossed; /* the last two in units of `error` */
+    int32_t action;
+    uint32_t flags, low, zero; /* low: the look found an error that is low enough */
+};
+
+struct lull_instance {
+    struct lull_kit kit;
+    struct ggn_observer observer;
+    double stop_error;
+    char *library;      /* owns; NULL: the usual places */
+    atomic_flag warned; /* of halves that are none: once per frame */
+    struct gd_form form; /* of the open frame, as all below */
+    uint32_t workers;
+    struct gd_look *look;        /* owns, [workers] */
+    struct lull_rect *rect;      /* owns, [blocks] */
+    struct past *past, *pending; /* own, [blocks] */
+};
+
+/* --- one block --------------------------------------------------------------------------------------------------------- */
+
+static void warn(struct lull_instance *in, const char *what)
+{
+    const struct lull_host *host = in->kit.host;
+    if (host && host->log && !atomic_flag_test_and_set(&in->warned))
+        host->log(host, LULL_LOG_WARNING, what);
+}
+
+/* The larger of both errors, NaN where there is none; *now gets both. */
+static double error_of(struct lull_instance *in, struct gd_look *look, const struct lull_view *view,
+                       const struct lull_block *b, struct lull_kit_tally *tally, struct past *now)
+{
+    const size_t pixels = (size_t)lull_kit_pixels(b);
+    struct gd_errors e;
+    if (!gd_look_read(look, &in->form, &in->kit, view, b, tally)) {
+        if (!gd_look_structure(look, &in->form, b))
+            return now->halves = now->crossed = 0;
+        warn(in, "denoised: COLOR and HALF are the same in a block that is not of one colour: HALF must hold a fixed half "
+                 "of the samples");
+        tally->early = tally->bad = 1;
+        return (double)NAN;
+    }
+    if (gd_look_judge(look, &in->form, &in->kit, b, in->kit.value[P_PICTURE] == 0, &e))
+        return (double)NAN; /* evaluate finds it in look->err */
+    now->halves = ggn_observer_error(&in->observer, e.halves, pixels);
+    now->crossed = ggn_observer_error(&in->observer, e.crossed, pixels);
+    return fmax(now->halves, now->crossed);
+}
+
+/* Looks double, because they are dear; what has been found once is looked at again soon. */
+static void decide(const struct lull_instance *in, const struct lull_block *b, const struct lull_kit_tally *tally,
+                   double error, struct past *now, struct lull_decision *d)
+{
+    const double spp = (double)b->spp, growth = in->kit.value[P_GROWTH];
+    const int low_before = now->low != 0;
+    lull_kit_verdict(&in->kit, b, tally, error, in->stop_error, 0, growth, d);
+    now->low = !isnan(d->error) && d->action == LULL_STOP;
+    if (now->low && !low_before) {
+        lull_kit_continue(&in->kit, b, CONFIRM_STEP * spp, d);
+        d->predicted_spp = (double)d->next_spp;
+    } else if (d->action == LULL_CONTINUE && !isnan(d->predicted_spp)) {
+        lull_kit_continue(&in->kit, b, fmin(fmax(d->predicted_spp, LEAST_STEP * spp), growth * spp), d);
+    }
+    if (!isnan(d->error))
+        d->p_noisy = ggn_observer_p_noisy(&in->observer, d->error);
+}
+
+static void judge(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
+                  struct lull_decision *d, uint32_t worker)
+{
+    struct gd_look *look = &in->look[worker < in->workers ? worker : 0];
+    struct past *now = &in->pending[b->id];
+    struct lull_kit_tally tally = {0};
+    double error = (double)NAN;
+
+    *now = in->past[b->id];
+    if (now->spp != b->spp || b->spp == 0) {
+        now->halves = now->crossed = (double)NAN;
+        if (b->spp < in->kit.need.first_spp) {
+            tally.early = 1;
+        } else if (!b->half_spp || b->half_spp >= b->spp) {
+            warn(in, "denoised: HALF holds none or all of a block's samples, so that errors cannot be told; no block is "
+                     "stopped by it");
+            tally.early = 1;
+        } else {
+            error = error_of(in, look, view, b, &tally, now);
+        }
+        decide(in, b, &tally, error, now, d);
+        *now = (struct past){b->spp, d->next_spp, d->p_noisy, d->predicted_spp, d->error, now->halves,
+                             now->crossed, d->action, d->flags, now->low, 0};
+    }
+    d->action = now->action;
+    d->flags = now->flags;
+    d->next_spp = now->next_spp;
+    d->p_noisy = now->p_noisy;
+    d->predicted_spp = now->predicted_spp;
+    d->error = now->error;
+}
+
+static void tell(const struct lull_instance *in, const struct lull_block *b, const struct past *now)
+{
+    const struct lull_host *host = in->kit.host;
+    char line[160];
+    if (!host || !host->log || isnan(now->error))
+        return;
+    snprintf(line, sizeof line, "denoised: block %u at %llu spp: error %.2f by its halves, %.2f crossed; stops at %.2f",
+             b->id, (unsigned long long)b->spp, now->halves, now->crossed, in->stop_error);
+    host->log(host, LULL_LOG_DEBUG, line);
+}
+
+static int32_t fail_of(const struct lull_instance *in, const struct gd_look *look, struct lull_error *err)
+{
+    const struct lull_host *host = in->kit.host;
+    int32_t code = look->err.code == BASE_ENOMEM ? LULL_E_MEMORY : LULL_E_INTERNAL;
+    if (host && host->cancelled && host->cancelled(host))
+        code = LULL_E_CANCELLED;
+    return lull_kit_fail(err, code, "evaluate: %.400s", look->err.text);
+}
+
+/* As lull_kit_evaluate; fails when a block could not be denoised. A call that failed leaves no trace. */
+static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, const struct lull_block *blocks,
+                        uint32_t block_stride, struct lull_decision *decisions, uint32_t decision_stride, uint32_t count,
+                        struct lull_error *err)
+{
+    for (uint32_t i = 0; in && i < in->workers; i++)
+        in->look[i].err.code = 0;
+    int32_t status = lull_kit_evaluate(in, view, blocks, block_stride, decisions, decision_stride, count, err);
+    for (uint32_t i = 0; !status && i < in->workers; i++)
+        if (in->look[i].err.code)
+            status = fail_of(in, &in->look[i], err);
+    for (uint32_t i = 0; i < count && !status; i++) {
+        const struct lull_block *b = lull_kit_at(blocks, block_stride, i);
+        const int again = in->past[b->id].spp == b->spp;
+        in->past[b->id] = in->pending[b->id];
+        if (!again)
+            tell(in, b, &in->past[b->id]);
+    }
+    return status;
+}
+
+/* --- instance ---------------------------------------------------------------------------------------------------------- */
+
+static void frame_release(struct lull_instance *in)
+{
+    for (uint32_t i = 0; in->look && i < in->workers; i++)
+        gd_look_release(&in->look[i]);
+    free(in->look);
+    free(in->rect);
+    free(in->past);
+    in->look = NULL;
+    in->rect = NULL;
+    in->past = in->pending = NULL;
+    in->workers = 0;
+}
+
+/* Fills *fresh with what a frame needs. */
+static int32_t frame_create(const struct lull_instance *in, const struct lull_frame *frame, struct lull_instance *fresh,
+                            struct lull_error *err)
+{
+    const size_t n = frame->block_count;
+    struct base_err why = {0};
+    fresh->form = gd_form_of(frame, (enum lull_oidn_quality)(LULL_OIDN_FAST + (int)in->kit.value[P_QUALITY]));
+    fresh->look = calloc(lull_kit_workers(&in->kit), sizeof *fresh->look);
+    fresh->rect = malloc(n * sizeof *fresh->rect);
+    fresh->past = calloc(2 * n, sizeof *fresh->past);
+    if (!fresh->look || !fresh->rect || !fresh->past)
+        base_fail_nomem(&why, "the blocks");
+    fresh->pending = fresh->past ? fresh->past + n : NULL;
+    for (uint32_t i = 0; !why.code && i < n; i++)
+        fresh->rect[i] = *lull_kit_rect(frame, i);
+    for (uint32_t i = 0; !why.code && i < lull_kit_workers(&in->kit); i++)
+        if (!gd_look_create(&fresh->look[i], &fresh->form, in->library, &why))
+            fresh->workers = i + 1;
+    if (!why.code)
+        return LULL_OK;
+    frame_release(fresh);
+    return lull_kit_fail(err, why.code == BASE_ENOMEM ? LULL_E_MEMORY : LULL_E_INTERNAL, "begin_frame: %.400s", why.text);
+}
+
+static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *frame, struct lull_error *err)
+{
+    struct lull_instance fresh = {0};
+    int32_t status = lull_kit_frame_check(in, frame, err);
+    if (!status)
+        status = frame_create(in, frame, &fresh, err);
+    if (status)
+        return status;
+    frame_release(in);
+    in->form = fresh.form;
+    in->workers = fresh.workers;
+    in->look = fresh.look;
+    in->rect = fresh.rect;
+    in->past = fresh.past;
+    in->pending = fresh.pending;
+    atomic_flag_clear(&in->warned);
+    lull_kit_frame_open(in, frame);
+    const struct lull_host *host = in->kit.host;
+    if (host && host->log && (frame->planes & AUXILIARY) != AUXILIARY)
+        host->log(host, LULL_LOG_WARNING, "denoised: without the planes ALBEDO and NORMAL the denoiser blurs textures: "
+                                          "blocks take more samples");
+    if (host && host->log && (frame->flags & LULL_FRAME_SHARED))
+        host->log(host, LULL_LOG_WARNING, "denoised: the filter gives neighbouring pixels the same samples: the denoiser "
+                                          "takes their noise for structure; use a filter within the pixel");
+    return LULL_OK;
+}
+
+static void end_frame(struct lull_instance *in)
+{
+    if (!in)
+        return;
+    frame_release(in);
+    lull_kit_end_frame(in);
+}
+
+static void destroy(struct lull_instance *in)
+{
+    end_frame(in);
+    if (in)
+        free(in->library);
+    lull_kit_destroy(in);
+}
+
+static int32_t check_block(const struct lull_instance *in, const struct lull_block *b, struct lull_error *err)
+{
+    const struct lull_rect *r = &in->rect[b->id];
+    if (b->x0 != r->x0 || b->y0 != r->y0 || b->x1 != r->x1 || b->y1 != r->y1)
+        return lull_kit_fail(err, LULL_E_INVALID, "evaluate: block %u is none of the frame's", b->id);
+    if (b->spp < in->past[b->id].spp)
+        return lull_kit_fail(err, LULL_E_INVALID, "evaluate: block %u has fewer samples than before", b->id);
+    return LULL_OK;
+}
+
+static const struct lull_kit_rule rule = {.planes_required = REQUIRED,
+                                          .planes_used = REQUIRED | AUXILIARY,
+                                          .first_spp = "first-spp",
+                                          .judge = judge,
+                                          .check = check_block};
+
+static int32_t create(const struct lull_host *host, const struct lull_pair *pairs, uint32_t pair_count, uint32_t pair_stride,
+                      struct lull_instance **instance, struct lull_error *err)
+{
+    const char *text[LULL_KIT_PARAM_MAX];
+    struct lull_instance *in = NULL;
+    struct lull_oidn *oidn = NULL;
+    struct base_err why = {0};
+    int32_t status = lull_kit_create(&rule, &ggn_plugin_denoised, sizeof *in, host, pairs, pair_count, pair_stride, text,
+                                     instance ? &in : NULL, err);
+    if (status)
+        return status;
+    in->library = text[P_LIBRARY] ? strdup(text[P_LIBRARY]) : NULL;
+    if (text[P_LIBRARY] && !in->library)
+        status = lull_kit_fail(err, LULL_E_MEMORY, "create: out of memory");
+    else if (lull_oidn_open(in->library, &oidn, &why)) /* else only begin_frame would find that there is none */
+        status = lull_kit_fail(err, why.code == BASE_ENOMEM ? LULL_E_MEMORY : LULL_E_VALUE, "library: %.400s", why.text);
+    lull_oidn_close(oidn);
+    if (status) {
+        destroy(in);
+        return status;
+    }
+    atomic_flag_clear(&in->warned);
+    in->observer = ggn_observer_default;
+    in->stop_error = ggn_observer_error_at(&in->observer, in->kit.value[P_VISIBLE]);
+    in->kit.need.halo = GD_REACH;
+    in->kit.need.checks_hint = 5;
+    in->kit.need.bytes_per_block = 2 * sizeof(struct past) + sizeof(struct lull_rect);
+    *instance = in;
+    return LULL_OK;
+}
+
+/* --- state ------------------------------------------------------------------------------------------------------------- */
+
+struct state_header {
+    char magic[8];
+    uint64_t blocks;
+};
+
+static struct state_header header_of(const struct lull_instance *in)
+{
+    return (struct state_header){{'d', 'e', 'n', 'o', 'i', 's', 'e', '1'}, in->kit.block_count};
+}
+
+static int32_t state_save(const struct lull_instance *in, const struct lull_writer *writer, struct lull_error *err)
+{
+    int32_t status = gp_save_check(in, writer, err);
+    if (status)
+        return status;
+    const struct state_header header = header_of(in);
+    status = writer->write(writer, &header, sizeof header);
+    if (!status)
+        status = writer->write(writer, in->past, in->kit.block_count * sizeof *in->past);
+    return status ? lull_kit_fail(err, status, "save: the host could not write it") : LULL_OK;
+}
+
+static int plausible(const struct past *p)
+{
+    const double numbers[] = {p->predicted_spp, p->error, p->halves, p->crossed};
+    for (size_t i = 0; i < 4; i++)
+        if (!isnan(numbers[i]) && !(numbers[i] >= 0))
+            return 0;
+    return (isnan(p->p_noisy) || (p->p_noisy >= 0 && p->p_noisy <= 1)) &&
+           (p->action == LULL_STOP || p->action == LULL_CONTINUE) && p->low <= 1 && !p->zero &&
+           !(p->flags & ~(LULL_DECISION_TOO_EARLY | LULL_DECISION_BAD_INPUT)) && (!p->next_spp || p->next_spp > p->spp);
+}
+
+static int32_t state_load(struct lull_instance *in, const struct lull_reader *reader, struct lull_error *err)
+{
+    int32_t status = gp_load_check(in, reader, err);
+    struct state_header header, wanted;
+    if (status)
+        return status;
+    wanted = header_of(in);
+    if (reader->read(reader, &header, sizeof header) != LULL_OK || memcmp(&header, &wanted, sizeof header) != 0)
+        return lull_kit_fail(err, LULL_E_IO, "load: the state is that of another criterion or frame");
+    if (reader->read(reader, in->pending, in->kit.block_count * sizeof *in->pending) != LULL_OK)
+        return lull_kit_fail(err, LULL_E_IO, "load: the state ends early");
+    for (uint32_t i = 0; i < in->kit.block_count; i++)
+        if (!plausible(&in->pending[i]))
+            return lull_kit_fail(err, LULL_E_IO, "load: the state of block %u is none", i);
+    memcpy(in->past, in->pending, in->kit.block_count * sizeof *in->past);
+    return LULL_OK;
+}
+
+static const struct lull_state state = {.struct_size = sizeof state, .save = state_save, .load = state_load};
+
+static const void *get_extension(const char *id)
+{
+    return id && !strcmp(id, LULL_EXT_STATE) ? &state : NULL;
+}
+
+const struct lull_criterion ggn_plugin_denoised = GP_TABLE(
+    .create = create, .begin_frame = begin_frame, .evaluate = evaluate, .end_frame = end_frame, .destroy = destroy,
+    .get_extension = get_extension, .id = "denoised", .name = "Denoised picture",
+    .description = "Error that people would see in the denoised picture, its bias included: both halves of the samples are\n"
+                   "denoised (Open Image Denoise) and held against each other and against the other half, noisy. `error`\n"
+                   "is the larger of the two over the limit of the model observer (1 = just not visible).");

@@ -1,0 +1,327 @@
+#include "plugin/denoised/look.h"
+
+#include "base/colour.h"
+#include "denoise/blend.h"
+#include "observer/visibility.h"
+#include "plugin/translate.h"
+
+enum { HALF_A, HALF_B, ALBEDO, NORMAL, DENOISED_A, DENOISED_B, BOXES };
+enum { TILE = 25 };
+
+/* --- memory ------------------------------------------------------------------------------------------------------------ */
+
+static int32_t most(int32_t a, int32_t b)
+{
+    return a > b ? a : b;
+}
+
+static int32_t least(int32_t a, int32_t b)
+{
+    return a < b ? a : b;
+}
+
+struct gd_form gd_form_of(const struct lull_frame *frame, enum lull_oidn_quality quality)
+{
+    struct gd_form form = {.area = *lull_kit_rect(frame, 0)};
+    for (uint32_t i = 0; i < frame->block_count; i++) {
+        const struct lull_rect *r = lull_kit_rect(frame, i);
+        form.area = (struct lull_rect){least(form.area.x0, r->x0), least(form.area.y0, r->y0), most(form.area.x1, r->x1),
+                                       most(form.area.y1, r->y1)};
+        form.width = most(form.width, r->x1 - r->x0);
+        form.height = most(form.height, r->y1 - r->y0);
+    }
+    form.box.width = least(form.width + GD_REACH + GD_HALO, form.area.x1 - form.area.x0);
+    form.box.height = least(form.height + GD_REACH + GD_HALO, form.area.y1 - form.area.y0);
+    form.box.albedo = (frame->planes & LULL_PLANE_BIT(LULL_PLANE_ALBEDO)) != 0;
+    form.box.normal = form.box.albedo && (frame->planes & LULL_PLANE_BIT(LULL_PLANE_NORMAL)) != 0;
+    form.box.quality = (int32_t)quality;
+    form.box.threads = 1;
+    form.box.exposure = isfinite(frame->exposure) && frame->exposure > 0 ? (float)frame->exposure : 1.0f;
+    return form;
+}
+
+int gd_look_create(struct gd_look *look, const struct gd_form *form, const char *library, struct base_err *err)
+{
+    const size_t pixels = (size_t)form->width * (size_t)form->height;
+    const size_t patches = ggn_visible_patches(form->width, form->height);
+    const size_t box = 3 * (size_t)form->box.width * (size_t)form->box.height, planes = 3 + 4 + 4 + 7;
+    const size_t doubles = patches + ggn_visibility_scratch(form->width);
+    struct gd_look l = {0};
+    if (box > PTRDIFF_MAX / 64 / sizeof(double)) /* pixels is less */
+        return base_fail_nomem(err, "the pictures of a block");
+    l.memory = malloc(doubles * sizeof(double) + (BOXES * box + planes * pixels) * sizeof(float));
+    if (!l.memory)
+        return base_fail_nomem(err, "the pictures of a block");
+    l.texture = l.memory;
+    l.rows = l.texture + patches;
+    float *at = (float *)(l.texture + doubles);
+    for (int i = 0; i < BOXES; i++, at += box)
+        l.box[i] = at;
+    l.rgb = at;
+    at += 3 * pixels;
+    float **const maps[] = {&l.light[0],     &l.light[1],     &l.light[2],     &l.light[3], &l.lightness[0], &l.lightness[1],
+                            &l.lightness[2], &l.lightness[3], &l.maps[0],      &l.maps[1],  &l.maps[2],      &l.crossed,
+                            &l.agreed,       &l.scratch,      &l.alpha};
+    for (size_t i = 0; i < sizeof maps / sizeof maps[0]; i++, at += pixels)
+        *maps[i] = at;
+    int rc = lull_oidn_open(library, &l.oidn, err);
+    if (!rc)
+        rc = lull_oidn_prepare(l.oidn, &form->box, err);
+    if (rc)
+        gd_look_release(&l);
+    else
+        *look = l;
+    return rc;
+}
+
+void gd_look_release(struct gd_look *look)
+{
+    lull_oidn_close(look->oidn);
+    free(look->memory);
+    *look = (struct gd_look){0};
+}
+
+/* --- reading ----------------------------------------------------------------------------------------------------------- */
+
+/* Where along one side a box begins: its corner is on the denoiser's grid, and it holds the block and its halo. */
+static int32_t corner(int32_t area0, int32_t area1, int32_t box, int32_t block0)
+{
+    int32_t from = block0 - GD_HALO - area0;
+    if (box == area1 - area0)
+        return area0;
+    return area0 + (from >= 0 ? from / LULL_OIDN_GRID : -((-from + LULL_OIDN_GRID - 1) / LULL_OIDN_GRID)) * LULL_OIDN_GRID;
+}
+
+static struct lull_rect box_of(const struct gd_form *form, const struct lull_block *b)
+{
+    const int32_t x0 = corner(form->area.x0, form->area.x1, form->box.width, b->x0);
+    const int32_t y0 = corner(form->area.y0, form->area.y1, form->box.height, b->y0);
+    return (struct lull_rect){x0, y0, x0 + form->box.width, y0 + form->box.height};
+}
+
+static struct lull_rect common(struct lull_rect a, struct lull_rect b)
+{
+    return (struct lull_rect){most(a.x0, b.x0), most(a.y0, b.y0), least(a.x1, b.x1), least(a.y1, b.y1)};
+}
+
+static int finite3(const float v[3])
+{
+    return isfinite(v[0]) && isfinite(v[1]) && isfinite(v[2]);
+}
+
+/* The pixels of `rect`, which are of block b, go into the box. What is no number is as the pixel to the left. */
+static int read_part(struct gd_look *look, struct lull_rect box, struct lull_rect rect, const struct lull_view *view,
+                     const struct lull_block *b, uint32_t planes, struct lull_kit_tally *tally)
+{
+    const double n = (double)b->spp, h = (double)b->half_spp;
+    const int split = b->half_spp > 0 && b->half_spp < b->spp;
+    struct lull_block part = *b;
+    struct lull_kit_span s;
+    int differ = 0;
+    part.x0 = rect.x0, part.y0 = rect.y0, part.x1 = rect.x1, part.y1 = rect.y1;
+    if (rect.x0 >= rect.x1 || rect.y0 >= rect.y1)
+        return 0;
+    for (lull_kit_span_begin(&s, view, &part, planes); lull_kit_span_next(&s);)
+        for (int32_t i = 0; i < s.count; i++) {
+            const size_t at = 3 * ((size_t)(s.y - box.y0) * (size_t)(box.x1 - box.x0) + (size_t)(s.x + i - box.x0));
+            const double *m = s.value[LULL_PLANE_COLOR][i], *half = s.value[LULL_PLANE_HALF][i];
+            float a[3], rest[3];
+            for (int c = 0; c < 3; c++) {
+                a[c] = (float)(split ? half[c] : m[c]);
+                rest[c] = (float)(split ? (n * m[c] - h * half[c]) / (n - h) : m[c]);
+                differ |= split && half[c] != m[c] && isfinite(half[c]) && isfinite(m[c]);
+            }
+            const int good = finite3(a) && finite3(rest), before = s.x + i > rect.x0;
+            tally->valid += good;
+            tally->bad += !good;
+            for (size_t c = 0; c < 3; c++) {
+                look->box[HALF_A][at + c] = good ? a[c] : before ? look->box[HALF_A][at + c - 3] : 0.0f;
+                look->box[HALF_B][at + c] = good ? rest[c] : before ? look->box[HALF_B][at + c - 3] : 0.0f;
+                if (s.planes & LULL_PLANE_BIT(LULL_PLANE_ALBEDO))
+                    look->box[ALBEDO][at + c] = (float)s.value[LULL_PLANE_ALBEDO][i][c];
+                if (s.planes & LULL_PLANE_BIT(LULL_PLANE_NORMAL))
+                    look->box[NORMAL][at + c] = (float)s.value[LULL_PLANE_NORMAL][i][c];
+            }
+        }
+    return differ;
+}
+
+/* Beyond `known` a box repeats its outermost pixels. */
+static void repeat_edges(float *picture, struct lull_rect box, struct lull_rect known)
+{
+    const size_t width = (size_t)(box.x1 - box.x0);
+    for (int32_t y = box.y0; y < box.y1; y++)
+        for (int32_t x = box.x0; x < box.x1; x++) {
+            const int32_t u = most(known.x0, least(x, known.x1 - 1)), v = most(known.y0, least(y, known.y1 - 1));
+            if (u != x || v != y)
+                memcpy(picture + 3 * ((size_t)(y - box.y0) * width + (size_t)(x - box.x0)),
+                       picture + 3 * ((size_t)(v - box.y0) * width + (size_t)(u - box.x0)), 3 * sizeof *picture);
+        }
+}
+
+int gd_look_read(struct gd_look *look, const struct gd_form *form, const struct lull_kit *kit, const struct lull_view *view,
+                 const struct lull_block *b, struct lull_kit_tally *tally)
+{
+    const struct lull_rect box = box_of(form, b), core = {b->x0, b->y0, b->x1, b->y1};
+    const uint32_t planes = kit->need.planes_required | (form->box.albedo ? LULL_PLANE_BIT(LULL_PLANE_ALBEDO) : 0) |
+                            (form->box.normal ? LULL_PLANE_BIT(LULL_PLANE_NORMAL) : 0);
+    struct lull_rect known = core;
+    struct lull_kit_tally around = {0};
+    memset(look->box[0], 0, 4 * 3 * (size_t)form->box.width * (size_t)form->box.height * sizeof(float));
+    if (view->all) {
+        known = (struct lull_rect){b->x0 - GD_REACH, b->y0 - GD_REACH, b->x1 + GD_REACH, b->y1 + GD_REACH};
+        known = common(common(known, form->area), box);
+    }
+    for (uint32_t i = 0; view->all && i < view->all_count; i++) {
+        const struct lull_block *other = lull_kit_at(view->all, view->all_stride, i);
+        const struct lull_rect r = {other->x0, other->y0, other->x1, other->y1};
+        if (other->id != b->id && other->spp > 0)
+            read_part(look, box, common(r, known), view, other, planes, &around);
+    }
+    int differ = read_part(look, box, core, view, b, planes, tally);
+    for (int i = HALF_A; i <= NORMAL; i++)
+        repeat_edges(look->box[i], box, known);
+    return differ;
+}
+
+/* The block's part of a box as a display shows it; its luminance and L*, [P]. */
+static void show(struct gd_look *look, int which, struct lull_rect box, const struct lull_block *b,
+                 const struct lull_kit *kit, float *light, float *lightness)
+{
+    const size_t width = (size_t)(b->x1 - b->x0), pixels = (size_t)lull_kit_pixels(b), row = (size_t)(box.x1 - box.x0);
+    for (size_t y = 0, at = 0; y < pixels / width; y++) {
+        const float *from = look->box[which] + 3 * ((y + (size_t)(b->y0 - box.y0)) * row + (size_t)(b->x0 - box.x0));
+        for (size_t x = 0; x < width; x++, at++, from += 3) {
+            for (size_t c = 0; c < 3; c++)
+                look->rgb[c * pixels + at] = gp_shown(kit, (double)from[c]);
+            light[at] = (float)base_luminance((double)look->rgb[at], (double)look->rgb[pixels + at],
+                                              (double)look->rgb[2 * pixels + at]);
+        }
+    }
+    ggn_visible_lightness(look->rgb, pixels, lightness);
+}
+
+int gd_look_structure(const struct gd_look *look, const struct gd_form *form, const struct lull_block *b)
+{
+    const struct lull_rect box = box_of(form, b);
+    const size_t row = 3 * (size_t)(box.x1 - box.x0), bytes = 3 * sizeof(float);
+    const float *first = look->box[HALF_A] + (size_t)(b->y0 - box.y0) * row + 3 * (size_t)(b->x0 - box.x0);
+    for (int32_t y = 0; y < b->y1 - b->y0; y++)
+        for (int32_t x = 0; x < b->x1 - b->x0; x++)
+            if (memcmp(first, first + (size_t)y * row + 3 * (size_t)x, bytes) != 0)
+                return 1;
+    return 0;
+}
+
+/* --- judging ----------------------------------------------------------------------------------------------------------- */
+
+struct sums {
+    double n, q, square, agreed;
+};
+
+/* Squares of visible error, in units of what texture hides, over [x0, x1) x [y0, y1). unit: of the denoised part. */
+static struct sums sum_over(const struct gd_look *l, const float *raw, int width, const int r[4], double unit)
+{
+    struct sums s = {0};
+    for (int y = r[1]; y < r[3]; y++)
+        for (int x = r[0]; x < r[2]; x++) {
+            const size_t i = (size_t)y * (size_t)width + (size_t)x;
+            const double alpha = (double)l->alpha[i], noise = alpha * alpha * (double)raw[i] * (double)raw[i];
+            const double rest = (1.0 - alpha) * (1.0 - alpha) * unit, q = rest * (double)l->crossed[i] + noise;
+            s.n += 1.0;
+            s.q += q;
+            s.square += q * q;
+            s.agreed += rest * (double)l->agreed[i] + noise;
+        }
+    return s;
+}
+
+static double standard_error(const struct sums *s)
+{
+    const double mean = s->q / s->n;
+    return s->n > 1.0 ? sqrt(fmax(0.0, s->square / s->n - mean * mean) / s->n) : fabs(mean);
+}
+
+static double cube(double v)
+{
+    return v > 0.0 ? v * v * v : 0.0;
+}
+
+/* Mean of sixth powers of the error over a patch, for errors that are Gaussian inside it or inside its tiles. */
+static double sixth_moment(const struct gd_look *l, const float *raw, int width, const int patch[4], double unit)
+{
+    struct sums whole = {0};
+    double tiles = 0.0;
+    for (int y = patch[1]; y < patch[3]; y += TILE)
+        for (int x = patch[0]; x < patch[2]; x += TILE) {
+            const int tile[4] = {x, y, least(x + TILE, patch[2]), least(y + TILE, patch[3])};
+            const struct sums s = sum_over(l, raw, width, tile, unit);
+            whole.n += s.n, whole.q += s.q, whole.square += s.square, whole.agreed += s.agreed;
+            tiles += s.n * cube(s.q / s.n - 2.0 * standard_error(&s));
+        }
+    const double safe = fmax(whole.q / whole.n + standard_error(&whole), whole.agreed / whole.n);
+    return 15.0 * fmax(cube(safe), tiles / whole.n);
+}
+
+/* raw: noise of the mean as the observer sees it, in units of what texture hides. */
+static double crossed_error(const struct gd_look *l, const float *raw, int width, int height)
+{
+    const size_t patches = ggn_visible_patches(width, height);
+    double sum = 0.0;
+    for (size_t k = 0; k < patches; k++) {
+        int patch[4];
+        const double hidden = ggn_visible_patch(width, height, k, l->texture, patch);
+        sum += sqrt(cbrt(sixth_moment(l, raw, width, patch, 1.0 / hidden)));
+    }
+    return sum / (double)patches;
+}
+
+static int cancelled(void *data)
+{
+    const struct lull_host *host = *(const struct lull_host **)data;
+    return host->cancelled(host);
+}
+
+static int denoise(struct gd_look *look, const struct lull_kit *kit)
+{
+    const struct lull_host *host = kit->host;
+    const struct lull_oidn_pictures p = {{look->box[HALF_A], look->box[HALF_B]}, look->box[ALBEDO], look->box[NORMAL],
+                                         {look->box[DENOISED_A], look->box[DENOISED_B]}};
+    return lull_oidn_run(look->oidn, &p, host && host->cancelled ? cancelled : NULL, &host, &look->err);
+}
+
+int gd_look_judge(struct gd_look *l, const struct gd_form *form, const struct lull_kit *kit, const struct lull_block *b,
+                  int blend, struct gd_errors *errors)
+{
+    static const int shown[] = {HALF_A, HALF_B, DENOISED_A, DENOISED_B};
+    const struct lull_rect box = box_of(form, b);
+    const int width = b->x1 - b->x0, height = b->y1 - b->y0;
+    const size_t pixels = (size_t)lull_kit_pixels(b);
+    const double n = (double)b->spp, h = (double)b->half_spp;
+    const float split = (float)(sqrt(h * (n - h)) / n); /* to noise as strong as the mean's */
+    const struct lull_estimate estimate = {l->maps[0], l->maps[1], l->maps[2]};
+
+    l->err = (struct base_err){0};
+    if (denoise(l, kit))
+        return l->err.code;
+    for (size_t k = 0; k < 4; k++)
+        show(l, shown[k], box, b, kit, l->light[k], l->lightness[k]);
+    struct lull_estimate_in in = {l->light[0], l->light[1], l->light[2], l->light[3], h / n};
+    lull_estimate_pixels(&in, pixels, &estimate);
+    memcpy(l->crossed, estimate.denoised, pixels * sizeof *l->crossed);
+    memcpy(l->agreed, estimate.agreed, pixels * sizeof *l->agreed);
+    lull_blend_weights(&estimate, width, height, l->scratch, l->alpha);
+    if (!blend)
+        memset(l->alpha, 0, pixels * sizeof *l->alpha);
+
+    ggn_visible_texture(l->lightness[2], l->lightness[3], width, height, l->rows, l->texture);
+    for (size_t i = 0; i < pixels; i++) {
+        const float raw = split * (l->lightness[0][i] - l->lightness[1][i]);
+        l->lightness[0][i] = raw;
+        l->lightness[2][i] = l->alpha[i] * raw + (1.0f - l->alpha[i]) * 0.5f * (l->lightness[2][i] - l->lightness[3][i]);
+    }
+    errors->halves = ggn_visible_noise(l->lightness[2], width, height, l->texture, l->rows, NULL);
+    ggn_visible_noise(l->lightness[0], width, height, l->texture, l->rows, l->lightness[1]);
+    errors->crossed = crossed_error(l, l->lightness[1], width, height);
+    return 0;
+}

@@ -1,0 +1,3 @@
+#include "plugin/criteria.h"
+
+GP_ENTRY(&ggn_plugin_denoised)
