@@ -601,6 +601,40 @@ static void calibration(void **state)
     assert_int_equal(system(command), 0);
 }
 
+/* The people of three views see from 0.3, mostly 0.4 and 0.5 on: without the third, most see from 0.3 on; with it, 0.4 is the
+ * nearest to all. */
+static void left_out(void **state)
+{
+    (void)state;
+    char dir[] = "/tmp/ggn_observer.XXXXXX", command[64];
+    const struct ggn_observer people[] = {{0.3, 0.3}, {0.4, 0.3}, {0.5, 0.3}};
+    struct ggn_dataset data;
+    struct ggn_view human[VIEWS];
+    struct ggn_calibration_input inputs[VIEWS];
+    struct ggn_calibration c;
+    assert_non_null(mkdtemp(dir));
+    make_views(dir, &people[0], &data, human);
+    struct base_threads *threads = base_threads_create(2, NULL);
+    for (int v = 0; v < VIEWS; v++) {
+        struct ggn_labels l;
+        assert_int_equal(ggn_view_label(&people[v], &data.views[v], GGN_FROM_HALVES, threads, &l, NULL), 0);
+        for (int i = v == 1 ? 1 : 0; i < BLOCKS; i++)
+            human[v].spp[i] = ggn_observer_to_study(l.labels[i].threshold);
+        ggn_labels_release(&l);
+        inputs[v] = (struct ggn_calibration_input){&data.views[v], &human[v]};
+    }
+    assert_int_equal(ggn_calibrate(inputs, VIEWS, GGN_FROM_HALVES, threads, &c, NULL), 0);
+    assert_near(c.views[2].level, 0.3, 0.01);
+    assert_near(c.observer.level, 0.4, 0.01);
+    ggn_calibration_release(&c);
+    base_threads_destroy(threads);
+    for (int v = 0; v < VIEWS; v++)
+        free(human[v].spp);
+    ggn_dataset_release(&data);
+    snprintf(command, sizeof command, "rm -r %s", dir);
+    assert_int_equal(system(command), 0);
+}
+
 static void parameters(void **state)
 {
     (void)state;
@@ -896,7 +930,7 @@ int main(void)
         cmocka_unit_test(apart),           cmocka_unit_test(people),
         cmocka_unit_test(thresholds),      cmocka_unit_test(scaling),
         cmocka_unit_test(noisy_reference), cmocka_unit_test(beyond_the_last_level),
-        cmocka_unit_test(needs), cmocka_unit_test(parts), cmocka_unit_test(joined),           cmocka_unit_test(calibration),
+        cmocka_unit_test(needs), cmocka_unit_test(parts), cmocka_unit_test(joined),           cmocka_unit_test(calibration), cmocka_unit_test(left_out),
         cmocka_unit_test(parameters),      cmocka_unit_test(built_in),
         cmocka_unit_test(trials),          cmocka_unit_test(laws),
         cmocka_unit_test(levels_of_curves), cmocka_unit_test(levels_by_hand), cmocka_unit_test(refusals),
