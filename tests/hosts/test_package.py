@@ -263,8 +263,11 @@ def test_limits():
     """the first limit wins: samples, time, minimum"""
     _, f, _ = run(sigmas=[[5.]], spp_max=100)
     assert [(b.spp, b.reason) for b in f.blocks] == [(100, "spp-max")]
-    result, f, d = run(sigmas=[[5.]], spp_max=10 ** 6, time_budget_s=.3)
-    assert result.outcome == "time" and f.blocks[0].reason == "time" and .3 <= d.totals.elapsed_s < 2
+    after = []  # seconds after each call: the first one that is past the budget is the last
+    result, f, d = run(sigmas=[[5.]], spp_max=2 ** 31 - 1, time_budget_s=.3,
+                       driver={"after_call": lambda d: after.append(d.totals.elapsed_s)})
+    assert result.outcome == "time" and f.blocks[0].reason == "time" and after[-1] >= .3
+    assert all(s < .3 for s in after[:-1]), len(after)
     _, f, _ = run(sigmas=[[.001]], spp_min=128)
     assert f.blocks[0].spp == 128
     assert run(sigmas=[[.001]], spp_min=1)[1].blocks[0].spp == 32  # two waves: one of each half
@@ -632,6 +635,31 @@ def test_progress():
         d.step()
     form = r"(>=)?\s*\d+%  \d+ of \d+ blocks active  spp \d+\.\.\d+  \d+\.\d\d Mpaths/s  ETA (at most )?(\d+:\d\d|unknown)"
     assert re.fullmatch(form, outputs.progress_text(d)), outputs.progress_text(d)
+
+
+def test_progress_is_honest():
+    """progress never goes back, a bound is called one, and one below a hundredth is not told"""
+    f = lull.Frame(lull.load("halfbuf", threshold=.001), 32, 16, block=16, spp_max=1000)
+    d = lull.Driver(f, Noise(SIGMAS))
+    a, b = f.blocks
+    a.spp, a.next_spp, a.asked_spp, a.predicted_spp = 100, 120, 100, 200.
+    b.spp, b.reason = 50, "criterion"
+
+    def told():
+        return outputs.progress_text(d).partition("  1 of 2")[0]
+    assert told() == " 60%", told()
+    a.predicted_spp = 400.  # a prediction grows
+    assert told() == " 60%", told()
+    a.predicted_spp = np.nan
+    assert told() == " 60%", told()
+    d.percent_told, f.spp_max = 0, 40000
+    assert told() == "  ?%", told()
+    f.spp_max = 1000
+    assert told() == ">= 14%", told()
+    f.spp_max = 2000
+    assert told() == " 14%", told()
+    d.uniform = True
+    assert told() == " 14%", told()
 
 
 def test_two_frames():

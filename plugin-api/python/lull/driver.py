@@ -89,6 +89,7 @@ class Driver:
         self.identity = self._identity(identity or {})
         self.totals = Totals()
         self.samples_per_s = 0.0  # recent, 0 = not known yet
+        self.percent_told = 0  # of the work, by the progress line, which never goes back
         self.interrupted = False
         first = frame.spp_max if uniform else frame.first_spp
         for b in frame.blocks:

@@ -107,6 +107,15 @@ def _clock(seconds: float) -> str:
     return f"{t // 3600}:{t // 60 % 60:02}:{t % 60:02}" if t >= 3600 else f"{t // 60}:{t % 60:02}"
 
 
+def _share(driver: Driver, share: float, known: bool) -> str:
+    """The share done, which never falls: a prediction that grows holds it where it was. What is only a lower bound says so,
+    and says nothing while it is below a hundredth."""
+    percent = math.floor(100 * share)
+    bound = not known and percent >= driver.percent_told
+    driver.percent_told = max(driver.percent_told, percent)
+    return "  ?%" if bound and percent < 1 else f"{'>=' if bound else ''}{driver.percent_told:3}%"
+
+
 def progress_text(driver: Driver) -> str:
     """Share done, active blocks, their range of samples, speed, time left; without the criterion's predictions a bound."""
     frame, done, expected, known = driver.frame, 0.0, 0.0, True
@@ -127,7 +136,7 @@ def progress_text(driver: Driver) -> str:
             left_s, share = budget_left_s, min(1.0, driver.totals.elapsed_s / frame.time_budget_s)
     low, high = min((b.spp for b in active), default=0), max((b.spp for b in active), default=0)
     left = _clock(left_s) if math.isfinite(left_s) else "unknown"
-    return (f"{'' if known else '>='}{math.floor(100 * share):3}%  {len(active)} of {len(frame.blocks)} blocks active  "
+    return (f"{_share(driver, share, known)}  {len(active)} of {len(frame.blocks)} blocks active  "
             f"spp {low}..{high}  {driver.samples_per_s * 1e-6:.2f} Mpaths/s  "
             f"ETA {'' if known or not math.isfinite(left_s) else 'at most '}{left}")
 
