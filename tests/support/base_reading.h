@@ -1,4 +1,4 @@
-/* How the time of reading grows with what is read: the kinds of input, for a test of the growth and for the plot in docs/. */
+/* How the time of reading grows with what is read: the kinds of input, for a test that all of it is read, `make bench` and the plot in docs/. */
 #ifndef TESTS_SUPPORT_BASE_READING_H
 #define TESTS_SUPPORT_BASE_READING_H
 
@@ -14,7 +14,7 @@ struct base_reading {
     double (*read_s)(char *copy, size_t size, size_t items);
 };
 
-/* 0 where eight times the input takes no more than some twenty times as long, for each kind; says what it found. */
+/* 0 where each kind's smallest input and one of eight times the items are read; says what was refused. */
 int base_reading_check(const struct base_reading *readings, size_t count);
 
 /* One line `name;items;bytes;seconds` to stdout for each size, doubled while the next takes less than `limit_s`. 1: refused. */
