@@ -91,7 +91,7 @@ static double denoise(struct ggn_trainer *t)
 
 static void test_learns(void **state)
 {
-    struct ggn_trainer *t = make(GGN_PRESET_LULL, 4e-3, NULL);
+    struct ggn_trainer *t = make(GGN_PRESET_LULL, 1e-3, NULL); /* four times as fast the cross-entropy jumps up and down */
     double first = denoise(t), first_bce = judge(t), last = 0, last_bce = 0;
 
     for (int i = 0; i < 40; i++) {
