@@ -74,7 +74,7 @@ t "a time budget: the frame ends, the criterion too" ends
 t "  …and it is told the budget" grep -q '^begin .* budget 0.2 ' diary
 "$P" "$scene" -q --size 48x32 --block 16 -c "$D:diary" --spp-min 50000 --spp-max 100000 -o b.exr --checkpoint b.ckp --checkpoint-every 0 2>said &
 pid=$!
-i=0; while [ ! -s b.ckp ] && [ $i -lt 600 ]; do sleep 0.1; i=$((i + 1)); done
+until [ -s b.ckp ] || ! kill -0 $pid; do sleep 0.1; done
 kill -INT $pid; wait $pid
 t "interrupted: status 130" test $? -eq 130
 t "  …the criterion has ended" sh -c "tail -n 1 diary | grep -qx destroy"

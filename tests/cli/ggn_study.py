@@ -138,7 +138,7 @@ class Server:
         self.port = int(self.authority.rsplit(":", 1)[1])
 
     def request(self, method, address, body=None, headers=None, prefix=None, host=None):
-        c = http.client.HTTPConnection("127.0.0.1", self.port, timeout=20)
+        c = http.client.HTTPConnection("127.0.0.1", self.port)
         h = {"Host": host or self.authority}
         if body is not None:
             h["Content-Type"] = "application/json"
@@ -194,11 +194,12 @@ class Server:
         return status, json.loads(raw)
 
     def raw(self, data):
-        with socket.create_connection(("127.0.0.1", self.port), timeout=2) as s:
+        with socket.create_connection(("127.0.0.1", self.port)) as s:
             s.sendall(data)
+            s.shutdown(socket.SHUT_WR)  # nothing more comes: who waits for it need not until its own time is over
             try:
                 return s.recv(65536)
-            except TimeoutError:  # waits for more, until its own time is over
+            except ConnectionResetError:
                 return b""
 
     def refusals(self):
@@ -211,7 +212,7 @@ class Server:
             keep("refused", line)
         self.child.send_signal(sig)
         self.child.stdout.close()
-        return self.child.wait(20)
+        return self.child.wait()
 
 
 def contents(folder):

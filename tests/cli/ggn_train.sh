@@ -49,10 +49,7 @@ check "  …in figures.json too" $?
 for rows in 2 4; do
     $ggn train $tiny --out "$tmp/d.ggn" --resume -q 2>"$tmp/err" &
     pid=$!
-    for _ in $(seq 1000); do
-        [ "$(cat "$tmp/d.ggn.csv" 2>/dev/null | wc -l)" -ge "$rows" ] && break
-        sleep 0.01
-    done
+    while kill -0 $pid 2>/dev/null && [ "$(cat "$tmp/d.ggn.csv" 2>/dev/null | wc -l)" -lt "$rows" ]; do sleep 0.01; done
     kill -INT $pid
     wait $pid
     echo "status $?" >>"$tmp/interrupted"

@@ -16,15 +16,15 @@ t() { # t DESCRIPTION COMMAND...: passes when the command succeeds
     if "$@" >log 2>&1; then echo "ok $n - $what"; else echo "not ok $n - $what"; sed 's/^/# /' log; bad=1; fi
 }
 sums() { find . -type f ! -name log ! -name out ! -name err -exec cksum {} + | sort; }
-refused() { # refused TEXT COMMAND...: at once, exit status 2, one line on stderr that contains TEXT, no file made or changed
+refused() { # refused TEXT COMMAND...: exit status 2, one line on stderr that contains TEXT, no file made or changed
     n=$((n + 1)); text=$1; shift
     before=$(sums)
-    timeout -k 1 10 "$@" >out 2>err </dev/null; status=$?
+    "$@" >out 2>err </dev/null; status=$?
     if [ $status -eq 2 ] && [ "$(wc -l <err)" -eq 1 ] && grep -qF -- "$text" err && [ "$before" = "$(sums)" ]; then
         echo "ok $n - refused: $*"
     else echo "not ok $n - refused: $* (status $status)"; sed 's/^/# /' err; bad=1; fi
 }
-# More than ten seconds of work: a refusal comes before it.
+# Work that does not end while tests are waited for: a refusal comes before it.
 long="$P room.pbrt -q -c null --spp-min 100000000 --spp-max 100000000"
 train="$ggn train -d $data --crop 32 --batch 64 --steps-denoiser 100000 -q --out"
 
@@ -193,13 +193,13 @@ refused "without a reference" "$ggn" reconstruct free -s stops.csv -o built2.png
 
 # --- what a killed run leaves, the next one removes ---
 mkdir kill && cd kill || exit 2
-(exec sleep 300) & stranger=$!
+(exec sleep infinity) & stranger=$!
 : >.tmp-lull$stranger-0.room.exr      # its process lives
 : >.tmp-lull4194303-0.room.exr        # nobody's: above every process id
 : >.tmp-lull4194303-1.room.png.gp
 : >.tmp-lull4194303-2.locked
 : >.tmp4194303.foreign
-flock .tmp-lull4194303-2.locked sleep 300 & locker=$!
+flock .tmp-lull4194303-2.locked sleep infinity & locker=$!
 until ! flock -n .tmp-lull4194303-2.locked true; do sleep 0.1; done
 t "a run beside leftovers" "$P" ../room.pbrt -q --spp 1 -o a.exr
 t "  …removes them" test "$(ls -A | wc -l)" -eq 5 # with the log
@@ -226,8 +226,8 @@ if [ -c /dev/full ]; then
 fi
 
 # --- a preview while rendering ---
-"$P" room.pbrt -q -c null --spp-max 100000000 --time-budget 120 --preview early.png & early=$!
-for i in $(seq 300); do [ -s early.png ] && break; sleep 0.2; done
+"$P" room.pbrt -q -c null --spp-max 100000000 --preview early.png & early=$!
+until [ -s early.png ] || ! kill -0 $early; do sleep 0.2; done
 t "a preview is there while the render goes on" sh -c "kill -0 $early && oiiotool --info early.png"
 kill -INT $early; wait $early
 t "  …and one of the end" oiiotool --info early.png

@@ -28,6 +28,7 @@ const browser = await chromium.launch({ executablePath: process.env.CHROMIUM, ar
 
 async function openPage(link, viewport, options = {}) {
     const context = await browser.newContext({ viewport, screen: viewport, ...options });
+    context.setDefaultTimeout(0); // LIMIT_S of tests/run is the limit
     const page = await context.newPage();
     page.on('request', (r) => {
         if (!/^(http:\/\/127\.0\.0\.1:|blob:|data:)/.test(r.url())) outside.push(r.url());
@@ -43,7 +44,7 @@ async function openPage(link, viewport, options = {}) {
 const looker = new Looker(browser, path.join(root, 'shots'));
 const look = (...what) => looker.look(...what);
 const state = (page, ...names) =>
-    page.waitForFunction((n) => n.includes(document.body.dataset.state), names, { timeout: 30000 });
+    page.waitForFunction((n) => n.includes(document.body.dataset.state), names);
 const title = (page, words) => page.getByRole('heading', { name: words }).waitFor();
 
 // What the pages before the trials say, by task where it differs.

@@ -24,7 +24,7 @@ struct base_room {
     pthread_cond_t arrival;
     struct base_peer list[BASE_ROOM_MAX];
     struct seat seats[BASE_ROOM_MAX];
-    int count, aborted;
+    int count, aborted, in_vain;
 };
 
 static int post(struct base_peers *face, int rank, void *data, size_t size, struct base_err *err)
@@ -64,6 +64,8 @@ static int collect(struct base_peers *face, double wait_s, int *rank, void **dat
     struct letter *letter = seat->first;
     if (letter)
         seat->first = letter->next;
+    else
+        room->in_vain += wait_s > 0.0;
     pthread_mutex_unlock(&room->lock);
     if (!letter)
         return 0;
@@ -119,6 +121,14 @@ int base_room_aborted(struct base_room *room)
 {
     pthread_mutex_lock(&room->lock);
     int n = room->aborted;
+    pthread_mutex_unlock(&room->lock);
+    return n;
+}
+
+int base_room_in_vain(struct base_room *room)
+{
+    pthread_mutex_lock(&room->lock);
+    int n = room->in_vain;
     pthread_mutex_unlock(&room->lock);
     return n;
 }

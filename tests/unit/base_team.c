@@ -274,7 +274,8 @@ static void who_is_silent_is_given_up(void **state)
     base_team_watch(team, 0.2, NULL);
     assert_int_equal(base_team_gather_items(team, items, sizeof items[0], 3), BASE_EIO);
     double waited_s = base_team_traffic(team).waiting_s;
-    assert_true(waited_s > 0.2 && waited_s < 1.9); /* not a tenth and not ten times, on a busy machine too */
+    assert_true(waited_s > 0.2);
+    assert_true(base_room_in_vain(room) <= 6); /* each 0.05 s or more: given up as soon as its time was over */
     assert_int_equal(base_team_gather_items(team, items, sizeof items[0], 3), BASE_EIO); /* for good */
     assert_true(base_team_traffic(team).waiting_s == waited_s);
     base_team_failed(team, &err);

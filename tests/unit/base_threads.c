@@ -14,7 +14,7 @@ struct job {
     atomic_int taken[INDICES], inside[THREADS];
     atomic_int twice; /* two threads as one worker at the same time */
     atomic_int who;   /* bit per worker that took an index */
-    int nap_ns;
+    int everybody; /* bits of all workers: each task waits until all of them have come; 0: none waits */
 };
 
 static void take(void *data, long i, int worker)
@@ -23,8 +23,8 @@ static void take(void *data, long i, int worker)
     if (atomic_fetch_add(&j->inside[worker], 1) != 0)
         atomic_store(&j->twice, 1);
     atomic_fetch_or(&j->who, 1 << worker);
-    if (j->nap_ns > 0)
-        nanosleep(&(struct timespec){.tv_nsec = j->nap_ns}, NULL);
+    while ((atomic_load(&j->who) & j->everybody) != j->everybody)
+        nanosleep(&(struct timespec){.tv_nsec = 100000}, NULL);
     atomic_fetch_add(&j->taken[i], 1);
     atomic_fetch_sub(&j->inside[worker], 1);
 }
@@ -43,7 +43,7 @@ static void expect_once(struct base_threads *t, struct job *j, long n)
 static void each_index_once(void **state)
 {
     struct base_err err = {0};
-    struct job j = {.nap_ns = 0};
+    struct job j = {.everybody = 0};
     (void)state;
     for (int threads = 1; threads <= THREADS; threads++) {
         struct base_threads *t = base_threads_create(threads, &err);
@@ -57,19 +57,19 @@ static void each_index_once(void **state)
     }
 }
 
-/* Long enough tasks are shared out, also to workers that slept. */
+/* Tasks that wait for each other are shared out, also to workers that slept. */
 static void all_workers_take_part(void **state)
 {
     struct base_err err = {0};
     struct base_threads *t = base_threads_create(THREADS, &err);
-    struct job j = {.nap_ns = 5000000};
+    struct job j = {.everybody = (1 << THREADS) - 1};
     (void)state;
     assert_non_null(t);
     for (int k = 0; k < 3; k++) {
         atomic_store(&j.who, 0);
         nanosleep(&(struct timespec){.tv_nsec = 5000000}, NULL);
         expect_once(t, &j, INDICES);
-        assert_int_equal(atomic_load(&j.who), (1 << THREADS) - 1);
+        assert_int_equal(atomic_load(&j.who), j.everybody);
     }
     base_threads_destroy(t);
 }
