@@ -1,4 +1,5 @@
-/* How the time of reading grows with what is read: the kinds of input, for a test that all of it is read, `make bench` and the plot in docs/. */
+/* How the time of reading grows with what is read: the kinds of input, for a test that all of it is read,
+ * for `make bench` and for the plot in docs/. */
 #ifndef TESTS_SUPPORT_BASE_READING_H
 #define TESTS_SUPPORT_BASE_READING_H
 
