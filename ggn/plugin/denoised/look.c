@@ -20,6 +20,12 @@ static int32_t least(int32_t a, int32_t b)
     return a < b ? a : b;
 }
 
+/* A side with what is looked at around it, as far as the frame's blocks reach: 0 < side <= area. */
+static int32_t widened(int32_t side, int32_t area)
+{
+    return area - side > GD_REACH + GD_HALO ? side + GD_REACH + GD_HALO : area;
+}
+
 struct gd_form gd_form_of(const struct lull_frame *frame, enum lull_oidn_quality quality)
 {
     struct gd_form form = {.area = *lull_kit_rect(frame, 0)};
@@ -30,8 +36,8 @@ struct gd_form gd_form_of(const struct lull_frame *frame, enum lull_oidn_quality
         form.width = most(form.width, r->x1 - r->x0);
         form.height = most(form.height, r->y1 - r->y0);
     }
-    form.box.width = least(form.width + GD_REACH + GD_HALO, form.area.x1 - form.area.x0);
-    form.box.height = least(form.height + GD_REACH + GD_HALO, form.area.y1 - form.area.y0);
+    form.box.width = widened(form.width, form.area.x1 - form.area.x0);
+    form.box.height = widened(form.height, form.area.y1 - form.area.y0);
     form.box.albedo = (frame->planes & LULL_PLANE_BIT(LULL_PLANE_ALBEDO)) != 0;
     form.box.normal = form.box.albedo && (frame->planes & LULL_PLANE_BIT(LULL_PLANE_NORMAL)) != 0;
     form.box.quality = (int32_t)quality;
@@ -47,7 +53,7 @@ int gd_look_create(struct gd_look *look, const struct gd_form *form, const char 
     const size_t box = 3 * (size_t)form->box.width * (size_t)form->box.height, planes = 3 + 4 + 4 + 7;
     const size_t doubles = patches + ggn_visibility_scratch(form->width);
     struct gd_look l = {0};
-    if (box > PTRDIFF_MAX / 64 / sizeof(double)) /* pixels is less */
+    if (box > PTRDIFF_MAX / 64 / sizeof(double) || form->area.x1 > INT32_MAX / 2 || form->area.y1 > INT32_MAX / 2)
         return base_fail_nomem(err, "the pictures of a block");
     l.memory = malloc(doubles * sizeof(double) + (BOXES * box + planes * pixels) * sizeof(float));
     if (!l.memory)
