@@ -143,14 +143,6 @@ int ggn_chain_grow(const struct ggn_chains *set, struct ggn_chain *c, int levels
     return 0;
 }
 
-const struct seq_record *ggn_chains_full_level(const struct seq_block *b)
-{
-    for (uint32_t i = 0; i < b->n_levels; i++)
-        if (seq_has(&b->levels[i], SEQ_PLANE_HALF_F16))
-            return &b->levels[i];
-    return NULL;
-}
-
 void ggn_chain_set_picture(const struct ggn_chains *set, struct ggn_chain *c, int k, const float *mean, const float *d,
                            double scale)
 {
@@ -183,7 +175,7 @@ static int recorded_picture(const struct ggn_chains *set, struct ggn_chain *c, i
                             const struct seq_record *r, const struct halves *h, struct base_err *err)
 {
     const size_t pixels = ggn_chains_values(set) / 3;
-    const int own = seq_has(r, SEQ_PLANE_HALF_LOG) || seq_has(r, SEQ_PLANE_HALF_F16);
+    const int own = seq_has_halves(r);
     const struct seq_record *from = own ? r : h->full;
 
     c->has_picture[k] = 0;
@@ -226,7 +218,7 @@ static int fill_chain(const struct ggn_chains *set, struct ggn_chain *c, const s
                       const struct ggn_chains_options *o, struct base_err *err)
 {
     const size_t values = ggn_chains_values(set);
-    struct halves h = {.full = ggn_chains_full_level(b)};
+    struct halves h = {.full = seq_full_level(b)};
     const struct seq_record *reference = b->reference || !o->mean_for_reference ? b->reference : h.full;
     float *memory = set->pictures ? malloc((values + values / 3) * sizeof *memory) : NULL;
     int rc = set->pictures && !memory ? base_fail_nomem(err, "noise pictures")

@@ -78,8 +78,6 @@ size_t ggn_chains_values(const struct ggn_chains *set);
 
 /* Makes room for n levels, or for more. */
 int ggn_chain_grow(const struct ggn_chains *set, struct ggn_chain *chain, int n, struct base_err *err);
-/* The full level of a block, the one with all of its half difference; NULL without. */
-const struct seq_record *ggn_chains_full_level(const struct seq_block *block);
 /* With set->pictures: the noise picture of level k, from the luminance of its mean and of a half difference D (linear,
  * [H][W]) whose noise is that of `scale`⁻² times fewer samples: scale = √(N/n) takes D from N samples to n. */
 void ggn_chain_set_picture(const struct ggn_chains *set, struct ggn_chain *chain, int k, const float *mean, const float *d,

@@ -131,7 +131,7 @@ static int read_source(const struct ggn_chains *set, const struct ggn_chain *c, 
     rc = seq_manifest_read_block(v->dir, &v->manifest, index, &b, err);
     if (rc)
         return rc;
-    const struct seq_record *full = ggn_chains_full_level(&b);
+    const struct seq_record *full = seq_full_level(&b);
     if (full) {
         const struct seq_record *reference = with_reference ? b.reference : NULL;
         s->n_full = full->spp;

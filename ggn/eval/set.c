@@ -183,14 +183,6 @@ static void interleave(const uint8_t *planar, size_t pixels, uint8_t *rgb)
             rgb[3 * i + c] = planar[c * pixels + i];
 }
 
-static const struct seq_record *full_level(const struct seq_block *p)
-{
-    for (uint32_t i = 0; i < p->n_levels; i++)
-        if (seq_has(&p->levels[i], SEQ_PLANE_HALF_F16))
-            return &p->levels[i];
-    return NULL;
-}
-
 /* Planar codes of what a block is compared with: its reference; without one the mean of its full level, from which its
  * simulated levels were made. *known 0: neither is there. */
 static int comparison(const struct ggn_eval_set *s, const struct ggn_eval_block *block, uint8_t *codes, int *known,
@@ -207,7 +199,7 @@ static int comparison(const struct ggn_eval_set *s, const struct ggn_eval_block 
     int rc = seq_manifest_read_block(v->dir, &v->manifest, block->index, &p, err);
     if (rc)
         return rc;
-    const struct seq_record *full = full_level(&p);
+    const struct seq_record *full = seq_full_level(&p);
     *known = full != NULL;
     if (full)
         rc = seq_display_planar(&p, full, codes, err);
@@ -280,31 +272,6 @@ static int extrapolate(struct ggn_eval_set *s, const struct ggn_eval_block *bloc
     return rc;
 }
 
-static int has_halves(const struct seq_record *r)
-{
-    return seq_has(r, SEQ_PLANE_HALF_LOG) || seq_has(r, SEQ_PLANE_HALF_F16);
-}
-
-/* What the observer sees: at recorded levels from their own halves, at all others from the two of the full level. */
-static int fill_observed(struct ggn_eval_set *s, const struct ggn_eval_block *block, const struct seq_block *p,
-                         struct base_err *err)
-{
-    int simulated = s->chains.chains[block->chain].simulated, rc = 0, known = full_level(p) != NULL;
-    struct ggn_curve curve = {0};
-    if (known)
-        rc = ggn_curve_make(p, GGN_FROM_HALVES, 1, &curve, err);
-    for (size_t i = block->first; i < block->end && !rc; i++) {
-        const struct seq_record *r = simulated ? NULL : seq_level(p, (uint32_t)s->spp[i]);
-        if (r && has_halves(r)) {
-            rc = ggn_curve_level(p, r, &s->visible[i], err);
-        } else if (known && !r) {
-            s->visible[i] = ggn_curve_at(&curve, s->spp[i]);
-        }
-    }
-    ggn_curve_release(&curve);
-    return rc;
-}
-
 /* The recorded level that a host without halves would compare level k with: the last of at most half its samples; NULL:
  * none. */
 static const struct seq_record *earlier_look(const struct seq_block *p, uint32_t k)
@@ -315,30 +282,75 @@ static const struct seq_record *earlier_look(const struct seq_block *p, uint32_t
     return 2 * p->levels[from].spp <= p->levels[k].spp ? &p->levels[from] : NULL;
 }
 
-/* What the observer sees without halves: from pairs of recorded levels; at other levels in the same ratio to what it sees
- * with halves as at the nearest pair at or below, or at the first. */
-static int fill_looked(struct ggn_eval_set *s, const struct ggn_eval_block *block, const struct seq_block *p,
-                       struct base_err *err)
+/* What the observer sees of each recorded level, from its own halves and without them; NaN: no telling. */
+struct seen {
+    double *halves, *looks; /* [n_levels] */
+};
+
+static int see_levels(const struct seq_block *p, const struct seen *seen, struct base_err *err)
+{
+    int rc = 0;
+    for (uint32_t k = 0; k < p->n_levels && !rc; k++) {
+        const struct seq_record *r = &p->levels[k], *earlier = earlier_look(p, k);
+        seen->halves[k] = seen->looks[k] = (double)NAN;
+        if (seq_has_halves(r))
+            rc = ggn_curve_level(p, r, &seen->halves[k], err);
+        if (!rc && seq_has_halves(r) && earlier)
+            rc = ggn_curve_looks(p, earlier, r, &seen->looks[k], err);
+    }
+    return rc;
+}
+
+/* At recorded levels from their own halves, at all others from the two of the full level. */
+static int fill_visible(struct ggn_eval_set *s, const struct ggn_eval_block *block, const struct seq_block *p,
+                        const struct seen *seen, struct base_err *err)
+{
+    int simulated = s->chains.chains[block->chain].simulated, rc = 0, known = seq_full_level(p) != NULL;
+    struct ggn_curve curve = {0};
+    if (known)
+        rc = ggn_curve_make(p, GGN_FROM_HALVES, 1, &curve, err);
+    for (size_t i = block->first; i < block->end && !rc; i++) {
+        const struct seq_record *r = simulated ? NULL : seq_level(p, (uint32_t)s->spp[i]);
+        if (r && seq_has_halves(r))
+            s->visible[i] = seen->halves[r - p->levels];
+        else if (known && !r)
+            s->visible[i] = ggn_curve_at(&curve, s->spp[i]);
+    }
+    ggn_curve_release(&curve);
+    return rc;
+}
+
+/* Without halves: in the same ratio to what is seen with them as at the nearest recorded level that knows it, at or below,
+ * or else at the first. */
+static void fill_looked(struct ggn_eval_set *s, const struct ggn_eval_block *block, const struct seq_block *p,
+                        const struct seen *seen)
 {
     size_t i = block->first;
     double ratio = (double)NAN;
-    int rc = 0;
-    for (uint32_t k = 0; k < p->n_levels && !rc; k++) {
-        const struct seq_record *earlier = earlier_look(p, k);
-        double halves, looks;
-        if (!earlier || !has_halves(&p->levels[k]))
+    for (uint32_t k = 0; k < p->n_levels; k++) {
+        if (isnan(seen->looks[k]))
             continue;
-        if (!isnan(ratio))
-            for (; i < block->end && s->spp[i] < p->levels[k].spp; i++)
-                s->looked[i] = ratio * s->visible[i];
-        rc = ggn_curve_level(p, &p->levels[k], &halves, err);
-        if (!rc)
-            rc = ggn_curve_looks(p, earlier, &p->levels[k], &looks, err);
-        if (!rc)
-            ratio = halves > 0.0 ? looks / halves : 1.0;
+        for (; !isnan(ratio) && i < block->end && s->spp[i] < p->levels[k].spp; i++)
+            s->looked[i] = ratio * s->visible[i];
+        ratio = seen->halves[k] > 0.0 ? seen->looks[k] / seen->halves[k] : 1.0;
     }
     for (; i < block->end; i++)
         s->looked[i] = ratio * s->visible[i];
+}
+
+static int fill_observed(struct ggn_eval_set *s, const struct ggn_eval_block *block, const struct seq_block *p,
+                         struct base_err *err)
+{
+    double *memory = malloc(2 * p->n_levels * sizeof *memory);
+    if (!memory)
+        return base_fail_nomem(err, "evaluation");
+    const struct seen seen = {memory, memory + p->n_levels};
+    int rc = see_levels(p, &seen, err);
+    if (!rc)
+        rc = fill_visible(s, block, p, &seen, err);
+    if (!rc)
+        fill_looked(s, block, p, &seen);
+    free(memory);
     return rc;
 }
 
@@ -347,7 +359,7 @@ static int fill_looked(struct ggn_eval_set *s, const struct ggn_eval_block *bloc
 static int fill_relmse(struct ggn_eval_set *s, const struct ggn_eval_block *block, const struct seq_block *p,
                        struct base_err *err)
 {
-    const struct seq_record *full = full_level(p);
+    const struct seq_record *full = seq_full_level(p);
     size_t values = 3 * (size_t)p->width * p->height;
     if (!full)
         return 0;
@@ -380,12 +392,10 @@ static int fill_statistics(struct ggn_eval_set *s, const struct ggn_eval_block *
         s->rse_unsettled[i] = seq_stat(r, "rse_unsettled");
     }
     const struct seq_record *last = &p.levels[p.n_levels - 1];
-    if (i < block->end && has_halves(last))
+    if (i < block->end && seq_has_halves(last))
         rc = extrapolate(s, block, i, &p, err);
     if (!rc)
         rc = fill_observed(s, block, &p, err);
-    if (!rc)
-        rc = fill_looked(s, block, &p, err);
     if (!rc)
         rc = fill_relmse(s, block, &p, err);
     seq_block_release(&p);

@@ -105,20 +105,6 @@ static void see_texture(struct planes *p)
     ggn_visible_texture(p->lightness[0], p->lightness[1], p->width, p->height, p->scratch, p->texture);
 }
 
-/* The level whose half-buffer difference is kept in full. */
-static const struct seq_record *full_level(const struct seq_block *b)
-{
-    for (uint32_t i = 0; i < b->n_levels; i++)
-        if (seq_has(&b->levels[i], SEQ_PLANE_HALF_F16))
-            return &b->levels[i];
-    return NULL;
-}
-
-static int has_halves(const struct seq_record *r)
-{
-    return r && (seq_has(r, SEQ_PLANE_HALF_LOG) || seq_has(r, SEQ_PLANE_HALF_F16));
-}
-
 /* Half difference of all channels; where only that of the luminance was recorded, that, as grey. */
 static int read_difference(const struct seq_block *b, const struct seq_record *r, float *out, struct base_err *err)
 {
@@ -149,9 +135,11 @@ static int read_level(struct planes *p, uint32_t spp, struct base_err *err)
 
 static int all_have_halves(const struct planes *p, uint32_t spp)
 {
-    for (int k = 0; k < p->across * p->down; k++)
-        if (!has_halves(seq_level(&p->blocks[k], spp)))
+    for (int k = 0; k < p->across * p->down; k++) {
+        const struct seq_record *r = seq_level(&p->blocks[k], spp);
+        if (!r || !seq_has_halves(r))
             return 0;
+    }
     return 1;
 }
 
@@ -182,7 +170,7 @@ static int add_recorded_halves(struct ggn_curve *c, struct planes *p, uint32_t f
  * that it stands for. */
 static int add_halves(struct ggn_curve *c, struct planes *p, double beyond, struct base_err *err)
 {
-    const uint32_t full = full_level(p->blocks)->spp;
+    const uint32_t full = seq_full_level(p->blocks)->spp;
     const int first = c->n == 0;
     int rc = read_level(p, full, err);
     if (!rc && first) {
@@ -258,7 +246,7 @@ int ggn_curve_make(const struct seq_block *block, enum ggn_curve_source source, 
 {
     struct ggn_curve c;
     struct planes p = {0};
-    if (source == GGN_FROM_HALVES && !full_level(block))
+    if (source == GGN_FROM_HALVES && !seq_full_level(block))
         return base_fail(err, BASE_EINVAL,
                          "block %u has no full level with a half-buffer difference: record one, or use --source levels",
                          block->id);
@@ -269,7 +257,7 @@ int ggn_curve_make(const struct seq_block *block, enum ggn_curve_source source, 
         rc = planes_init(&p, block, 1, 1, err);
     if (!rc && source == GGN_FROM_LEVELS)
         rc = add_levels(&c, &p, reference_independent, err);
-    if (!rc && (source == GGN_FROM_HALVES || (reference_independent && full_level(block))))
+    if (!rc && (source == GGN_FROM_HALVES || (reference_independent && seq_full_level(block))))
         rc = add_halves(&c, &p, c.n > 0 ? 1.07 * c.spp[c.n - 1] : 0.0, err);
     return finish(rc, &c, &p, curve);
 }
@@ -281,7 +269,7 @@ int ggn_curve_part(const struct seq_block *block, int x0, int y0, int width, int
     struct planes p = {.blocks = block, .across = 1, .down = 1, .x0 = x0, .y0 = y0, .width = width, .height = height};
     if (x0 < 0 || y0 < 0 || width < 1 || height < 1 || x0 + width > (int)block->width || y0 + height > (int)block->height)
         return base_fail(err, BASE_EINVAL, "block %u has no part %dx%d at %d, %d", block->id, width, height, x0, y0);
-    if (!full_level(block))
+    if (!seq_full_level(block))
         return base_fail(err, BASE_EINVAL, "block %u has no full level with a half-buffer difference", block->id);
     int rc = curve_init(&c, block, err);
     if (!rc)
@@ -296,7 +284,7 @@ int ggn_curve_joined(const struct seq_block *blocks, int across, int down, struc
     struct ggn_curve c;
     struct planes p = {0};
     for (int k = 0; k < across * down; k++) {
-        const struct seq_record *full = full_level(&blocks[k]), *first = full_level(&blocks[0]);
+        const struct seq_record *full = seq_full_level(&blocks[k]), *first = seq_full_level(&blocks[0]);
         if (!full || full->spp != first->spp || blocks[k].width != blocks->width || blocks[k].height != blocks->height)
             return base_fail(err, BASE_EINVAL, "blocks %u and %u have no full levels of the same size and samples",
                              blocks[0].id, blocks[k].id);

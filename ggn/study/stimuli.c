@@ -37,19 +37,10 @@ static int simulated_levels(double beyond, double *spp)
     return n + 1;
 }
 
-/* The level whose half-buffer difference is kept in full. */
-static const struct seq_record *full_level(const struct seq_block *b)
-{
-    for (uint32_t i = 0; i < b->n_levels; i++)
-        if (seq_has(&b->levels[i], SEQ_PLANE_HALF_F16))
-            return &b->levels[i];
-    return NULL;
-}
-
 /* Whether halves stand for levels beyond the last recorded one; up to a tenth of an octave is not worth simulating. */
 static int extends(const struct seq_block *b, int reference_independent)
 {
-    return reference_independent && b->reference && full_level(b) &&
+    return reference_independent && b->reference && seq_full_level(b) &&
            1.07 * b->levels[b->n_levels - 1].spp < GGN_SIMULATED_CAP && seq_has(b->reference, SEQ_PLANE_MEAN_F16);
 }
 
@@ -57,7 +48,7 @@ static int extends(const struct seq_block *b, int reference_independent)
 static int init_halves(struct ggn_stimuli *s, struct base_err *err)
 {
     const struct seq_block *b = s->block;
-    const struct seq_record *full = full_level(b);
+    const struct seq_record *full = seq_full_level(b);
     if (!full)
         return base_fail(err, BASE_EINVAL, "block %u has neither a reference nor a full level with a half-buffer difference",
                          b->id);
@@ -76,8 +67,8 @@ static int init_recorded(struct ggn_stimuli *s, int reference_independent, int e
     s->scale = reference_independent && seq_has(b->reference, SEQ_PLANE_MEAN_F16);
     int rc = s->scale ? seq_mean(b, b->reference, s->base, err) : 0;
     if (!rc && extend) {
-        s->spp0 = full_level(b)->spp;
-        rc = seq_half(b, full_level(b), s->difference, err);
+        s->spp0 = seq_full_level(b)->spp;
+        rc = seq_half(b, seq_full_level(b), s->difference, err);
     }
     return !rc ? seq_display(b, b->reference, s->converged, err) : rc;
 }

@@ -184,6 +184,19 @@ int seq_has(const struct seq_record *r, enum seq_plane_number plane)
     return find_plane(r, plane) != NULL;
 }
 
+int seq_has_halves(const struct seq_record *r)
+{
+    return seq_has(r, SEQ_PLANE_HALF_LOG) || seq_has(r, SEQ_PLANE_HALF_F16);
+}
+
+const struct seq_record *seq_full_level(const struct seq_block *b)
+{
+    for (uint32_t i = 0; i < b->n_levels; i++)
+        if (seq_has(&b->levels[i], SEQ_PLANE_HALF_F16))
+            return &b->levels[i];
+    return NULL;
+}
+
 double seq_stat(const struct seq_record *r, const char *name)
 {
     for (uint32_t i = 0; i < r->n_stats; i++)

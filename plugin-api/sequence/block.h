@@ -59,6 +59,10 @@ int seq_mean(const struct seq_block *b, const struct seq_record *r, float *rgb /
 int seq_half_luminance(const struct seq_block *b, const struct seq_record *r, float *y /* [P] */, struct base_err *err);
 int seq_half(const struct seq_block *b, const struct seq_record *r, float *rgb /* [3][P] */, struct base_err *err);
 int seq_has(const struct seq_record *r, enum seq_plane_number plane);
+/* Is the half-buffer difference there, of all channels or of the luminance alone? */
+int seq_has_halves(const struct seq_record *r);
+/* The level whose half-buffer difference is of all channels; NULL: none. */
+const struct seq_record *seq_full_level(const struct seq_block *b);
 /* NaN when the record does not have the statistic. */
 double seq_stat(const struct seq_record *r, const char *name);
 /* The level with this spp, or NULL. */

@@ -431,6 +431,11 @@ static void joined(void **state)
     assert_true(two.spp[AT] > full_of(&b[0])->spp);
     assert_near(seen_by_hand(pair[0], pair[1], 2 * W, H, sqrt(full_of(&b[0])->spp / two.spp[AT])), two.visible[AT],
                 1e-5 * two.visible[AT]);
+    const int levels_of_both = two.recorded;
+    ggn_curve_release(&two);
+    b[1].levels[0].spp += 1; /* one has no such level: it is left out */
+    assert_int_equal(ggn_curve_joined(b, 2, 1, &two, &err), 0);
+    assert_int_equal(two.recorded, levels_of_both - 1);
     ggn_curve_release(&two);
     b[1].levels[full_of(&b[1]) - b[1].levels].spp += 1; /* another level than the first block's */
     assert_int_equal(ggn_curve_joined(b, 2, 1, &two, &err), BASE_EINVAL);
