@@ -12,8 +12,8 @@ from .driver import Driver
 from .library import LullError
 from .mask import dial_of
 
-# The dial `visible` by name, coarse to fine; other dials are asked at twice and at four times their value.
-NAMED = {0.9: "coarse", 0.5: "draft", 0.35: "default", 0.05: "final"}
+# The dial `visible` by name, with the criterion's own default; other dials are asked at twice and at four times their value.
+NAMED = {0.9: "coarse", 0.5: "draft", 0.05: "final"}
 
 
 @dataclass
@@ -57,6 +57,8 @@ def _predictions(driver: Driver, dial: str, value: float) -> list[float]:
 def _settings(driver: Driver) -> list[tuple[float, str]]:
     parameter, value = dial_of(driver.frame.criterion)
     names = dict(NAMED) if parameter.name == "visible" else {4 * value: "coarse", 2 * value: "draft"}
+    if parameter.name == "visible" and parameter.default is not None:
+        names.setdefault(float(parameter.default), "default")
     names.setdefault(value, "chosen")
     return sorted(((v, name) for v, name in names.items() if parameter.min <= v <= parameter.max), reverse=True)
 
