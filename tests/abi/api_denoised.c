@@ -18,6 +18,7 @@
 #include <lull/loader.h>
 
 #include "support/api_folders.h"
+#include "support/splitmix.h"
 
 enum { W = 230, H = 210, PIXELS = W * H, BLOCKS = 4 };
 
@@ -25,26 +26,13 @@ static double color[PIXELS][3], half[PIXELS][3], albedo[PIXELS][3];
 static char criteria[2048], stub[2048];
 static uint64_t state;
 
-static double uniform(void) /* SplitMix64 */
-{
-    uint64_t z = state += UINT64_C(0x9e3779b97f4a7c15);
-    z = (z ^ (z >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);
-    z = (z ^ (z >> 27)) * UINT64_C(0x94d049bb133111eb);
-    return ((double)((z ^ (z >> 31)) >> 11) + 0.5) * 0x1p-53;
-}
-
-static double gauss(void)
-{
-    return sqrt(-2 * log(uniform())) * cos(6.283185307179586 * uniform());
-}
-
 /* Grey, with stripes of one pixel, and Gaussian noise whose deviation in the mean of all samples is sigma. */
 static void make(double grey, double stripe, double sigma)
 {
     state = 5;
     for (int i = 0; i < PIXELS; i++) {
-        double truth = grey + (i % W % 2 ? stripe : -stripe), a = truth + sqrt(2) * sigma * gauss();
-        double b = truth + sqrt(2) * sigma * gauss();
+        double truth = grey + (i % W % 2 ? stripe : -stripe), a = truth + sqrt(2) * sigma * splitmix_gauss(&state);
+        double b = truth + sqrt(2) * sigma * splitmix_gauss(&state);
         for (int c = 0; c < 3; c++) {
             half[i][c] = a;
             color[i][c] = (a + b) / 2;

@@ -18,6 +18,7 @@
 #include <lull/loader.h>
 
 #include "support/api_folders.h"
+#include "support/splitmix.h"
 
 enum { SIDE = 200, PIXELS = SIDE * SIDE };
 
@@ -30,19 +31,6 @@ struct picture {
 static uint64_t state;
 static char criteria[2048];
 
-static double uniform(void) /* SplitMix64 */
-{
-    uint64_t z = state += UINT64_C(0x9e3779b97f4a7c15);
-    z = (z ^ (z >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);
-    z = (z ^ (z >> 27)) * UINT64_C(0x94d049bb133111eb);
-    return ((double)((z ^ (z >> 31)) >> 11) + 0.5) * 0x1p-53;
-}
-
-static double gauss(void)
-{
-    return sqrt(-2 * log(uniform())) * cos(6.283185307179586 * uniform());
-}
-
 /* grey + texture * +-1 per pixel, with Gaussian noise of sigma per sample; half_spp of the spp samples are in the half. */
 static void make(struct picture *p, uint64_t spp, uint64_t half_spp, double grey, double texture, double sigma,
                  uint64_t seed)
@@ -50,10 +38,10 @@ static void make(struct picture *p, uint64_t spp, uint64_t half_spp, double grey
     double n = (double)spp, h = (double)half_spp;
     state = 99;
     for (int i = 0; i < p->w * p->h; i++)
-        p->color[i][0] = grey + (uniform() < 0.5 ? -texture : texture); /* the same picture for every seed */
+        p->color[i][0] = grey + (splitmix_uniform(&state) < 0.5 ? -texture : texture); /* the same picture for every seed */
     state = seed * 1000;
     for (int i = 0; i < p->w * p->h; i++) {
-        double truth = p->color[i][0], a = truth + sigma / sqrt(h) * gauss(), b = truth + sigma / sqrt(n - h) * gauss();
+        double truth = p->color[i][0], a = truth + sigma / sqrt(h) * splitmix_gauss(&state), b = truth + sigma / sqrt(n - h) * splitmix_gauss(&state);
         for (int c = 0; c < 3; c++) {
             p->half[i][c] = a;
             p->color[i][c] = (h * a + (n - h) * b) / n;

@@ -14,25 +14,13 @@
 #include <cmocka.h>
 
 #include "denoise/blend.h"
+#include "support/splitmix.h"
 
 enum { W = 160, H = 120, N = W * H };
 
 static float a[N], b[N], fa[N], fb[N], maps[3][N], scratch[N], alpha[N];
 static const struct lull_estimate estimate = {maps[0], maps[1], maps[2]};
 static uint64_t state;
-
-static double uniform(void) /* SplitMix64 */
-{
-    uint64_t z = state += UINT64_C(0x9e3779b97f4a7c15);
-    z = (z ^ (z >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);
-    z = (z ^ (z >> 27)) * UINT64_C(0x94d049bb133111eb);
-    return ((double)((z ^ (z >> 31)) >> 11) + 0.5) * 0x1p-53;
-}
-
-static double gauss(void)
-{
-    return sqrt(-2 * log(uniform())) * cos(6.283185307179586 * uniform());
-}
 
 static double mean(const float *map)
 {
@@ -54,8 +42,8 @@ static void halves(double truth, double sigma, double share)
 {
     state = 7;
     for (int i = 0; i < N; i++) {
-        a[i] = (float)(truth + sigma / sqrt(share) * gauss());
-        b[i] = (float)(truth + sigma / sqrt(1 - share) * gauss());
+        a[i] = (float)(truth + sigma / sqrt(share) * splitmix_gauss(&state));
+        b[i] = (float)(truth + sigma / sqrt(1 - share) * splitmix_gauss(&state));
     }
 }
 
