@@ -17,6 +17,7 @@
 #include <lull/loader.h>
 
 #include "support/api_folders.h"
+#include "support/splitmix.h"
 
 enum { W = 200, H = 200, PIXELS = W * H };
 
@@ -28,14 +29,6 @@ struct render {
     uint64_t random;
     int with_pixel_spp;
 };
-
-static double uniform(struct render *r) /* SplitMix64 */
-{
-    uint64_t z = r->random += UINT64_C(0x9e3779b97f4a7c15);
-    z = (z ^ (z >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);
-    z = (z ^ (z >> 27)) * UINT64_C(0x94d049bb133111eb);
-    return (double)((z ^ (z >> 31)) >> 11) * 0x1p-53;
-}
 
 /* rgb_to_xyz's second row is (0.25, 0.5, 0.25) below: simple numbers for exact expectations. */
 static double luminance(const double rgb[3])
@@ -79,19 +72,19 @@ static void constant(struct render *r, int pixel, double rgb[3])
 static void coin(struct render *r, int pixel, double rgb[3])
 {
     (void)pixel;
-    rgb[0] = rgb[1] = rgb[2] = uniform(r) < 0.5;
+    rgb[0] = rgb[1] = rgb[2] = splitmix_uniform(&r->random) < 0.5;
 }
 
 static void firefly_on_black(struct render *r, int pixel, double rgb[3])
 {
     (void)pixel;
-    rgb[0] = rgb[1] = rgb[2] = uniform(r) < 1e-5 ? 1000 : 0;
+    rgb[0] = rgb[1] = rgb[2] = splitmix_uniform(&r->random) < 1e-5 ? 1000 : 0;
 }
 
 static void firefly_on_grey(struct render *r, int pixel, double rgb[3])
 {
     (void)pixel;
-    rgb[0] = rgb[1] = rgb[2] = uniform(r) < 1e-5 ? 1000 : 0.5;
+    rgb[0] = rgb[1] = rgb[2] = splitmix_uniform(&r->random) < 1e-5 ? 1000 : 0.5;
 }
 
 /* --- asking ---------------------------------------------------------------------------------------------------------- */
@@ -359,7 +352,7 @@ static void halfbuf_allows_for_other_splits(void **state)
     quarter->random = 99;
     for (int i = 0; i < PIXELS; i++)
         for (int s = 0; s < 256; s++) {
-            double v = uniform(quarter) < 0.5;
+            double v = splitmix_uniform(&quarter->random) < 0.5;
             for (int c = 0; c < 3; c++) {
                 quarter->color[i][c] += v;
                 quarter->half[i][c] += s % 4 == 0 ? v : 0;

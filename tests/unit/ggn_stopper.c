@@ -8,6 +8,7 @@
 #include <cmocka.h>
 
 #include "model/stopper.h"
+#include "support/splitmix.h"
 
 struct show {
     double noise, logit, tail999, gini;
@@ -298,11 +299,8 @@ static int oracle_ask(const struct ggn_stop_rule *rule, struct oracle *o, uint64
 
 static double draw(void)
 {
-    static uint64_t state = 7; /* SplitMix64 */
-    uint64_t z = state += UINT64_C(0x9e3779b97f4a7c15);
-    z = (z ^ (z >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);
-    z = (z ^ (z >> 27)) * UINT64_C(0x94d049bb133111eb);
-    return (double)((z ^ (z >> 31)) >> 11) * 0x1p-53;
+    static uint64_t state = 7;
+    return splitmix_uniform(&state);
 }
 
 static int close_to(double a, double b)
