@@ -110,7 +110,7 @@ GGN_OBJ     := $(GGN_CORE_OBJ) $(call o,$(GGN_IMAGES))
 GGN_PLUGIN_OBJ := $(call o,$(GGN_PLUGIN))
 GGN_STUDY_OBJ := $(call o,$(GGN_STUDY))
 
-PROGRAMS := $(if $(PT_MAIN),$(BIN)/pathtracer) $(if $(GGN_CLI),$(BIN)/ggn) $(if $(TOOL_SRC),$(BIN)/lull-check)
+PROGRAMS := $(if $(PT_MAIN),$(BIN)/lull-render) $(if $(GGN_CLI),$(BIN)/ggn) $(if $(TOOL_SRC),$(BIN)/lull-check)
 MPI_MODULE := $(if $(MPI),$(OUT)/lib/lull-mpi.so)# loaded only by processes that a launcher has started
 # The host library for renderers (lull/host.h): the file has the major version in its name, programs link the other.
 HOST_LIB := $(OUT)/lib/liblull-host.so.1
@@ -160,7 +160,7 @@ LINKER := $(if $(shell command -v ld.gold),-fuse-ld=gold)
 link = @mkdir -p $(@D); echo "  LD   $@"; $(CC) $(LINKER)
 so   = @mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--version-script=plugin-api/plugin.map -Wl,-z,defs
 
-$(BIN)/pathtracer: $(call o,$(PT_MAIN)) $(PT_CORE_OBJ) $(LOADER_OBJ) | $(OUT)/lib/lull-images.so
+$(BIN)/lull-render: $(call o,$(PT_MAIN)) $(PT_CORE_OBJ) $(LOADER_OBJ) | $(OUT)/lib/lull-images.so
 	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) -o $@
 $(BIN)/ggn: $(call o,$(GGN_CLI)) $(GGN_STUDY_OBJ) $(GGN_CORE_OBJ) | $(OUT)/lib/ggn-images.so
 	$(link) $^ $(LDFLAGS_ALL) $(STUDY_LIBS) $(GGN_LIBS) -o $@
@@ -300,7 +300,7 @@ build/fuzz/ggn_%: $(OBJ)/tests/fuzz/ggn_%.c.o $(GGN_OBJ)
 mutants: ## plant single-line faults and see that the tests notice (hours; resumes)
 	@scripts/mutants $(MUTANTS_FLAGS) $(TEST_SRC) $(SCRIPT_TEST)
 
-host-model: $(BIN)/pathtracer $(CRITERIA) ## 1,000 runs that are interrupted, killed or out of disk, against a model of what must be there
+host-model: $(BIN)/lull-render $(CRITERIA) ## 1,000 runs that are interrupted, killed or out of disk, against a model of what must be there
 	@tests/model/host.py $(MODEL_FLAGS)
 
 # Every header compiles alone; the ABI header also as C99 and C++11.

@@ -1,4 +1,4 @@
-/* The command line of `pathtracer`, parsed and checked as far as it can be without the scene. */
+/* The command line of `lull-render`, parsed and checked as far as it can be without the scene. */
 #ifndef PT_CLI_H
 #define PT_CLI_H
 

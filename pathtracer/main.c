@@ -82,12 +82,12 @@ int main(int argc, char **argv)
     }
     if (rc) {
         pt_progress_clear(&s.progress);
-        fprintf(stderr, "pathtracer: %s\n", err.text);
+        fprintf(stderr, "lull-render: %s\n", err.text);
         status = rc == BASE_EINVAL || rc == BASE_EIO ? PT_EXIT_BAD_INPUT : PT_EXIT_FAILED;
     }
     pt_session_release(&s);
     if ((fflush(stdout) != 0 || ferror(stdout)) && status == 0) {
-        fprintf(stderr, "pathtracer: cannot write standard output\n");
+        fprintf(stderr, "lull-render: cannot write standard output\n");
         status = PT_EXIT_BAD_INPUT;
     }
     pt_crew_dismiss(s.crew, status);

@@ -12,7 +12,7 @@ void pt_say(void *data, const char *line)
     if (s->peers && s->peers->rank > 0)
         return;
     pt_progress_clear(&s->progress);
-    fprintf(stderr, "pathtracer: %s\n", line);
+    fprintf(stderr, "lull-render: %s\n", line);
 }
 
 /* Notes are for people at the terminal; -q has none. */

@@ -42,7 +42,7 @@ int pt_criterion_create(const struct lull_criterion *table, const struct lull_pa
     *s = (struct services){threads, warn, warn_data};
     struct lull_host_services services = {.struct_size = sizeof services,
                                           .threads = threads ? (uint32_t)base_threads_count(threads) : 1,
-                                          .name = "lull pathtracer " BASE_VERSION,
+                                          .name = "lull-render " BASE_VERSION,
                                           .context = s,
                                           .log = tell,
                                           .parallel_for = run_tasks,

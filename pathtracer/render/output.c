@@ -126,7 +126,7 @@ int pt_output_exr(const char *path, const struct pt_render *r, const struct pt_o
         {"lull:block", block, 0.0},
         {"lull:seed", NULL, (double)r->config.integrator.seed},
         {"lull:samples", NULL, (double)r->totals->samples},
-        {"software", "lull pathtracer " BASE_VERSION, 0.0},
+        {"software", "lull-render " BASE_VERSION, 0.0},
         {"lull:seconds", NULL, lull_host_elapsed_s(r->frame)}, /* last: left out of reproducible files */
     };
     struct exr_source source = {r, info->aov};

@@ -119,7 +119,7 @@ static void describe(struct recorder *r)
     name_view(c, m->scene, m->camera, sizeof m->scene);
     snprintf(m->source, sizeof m->source, "%s", c->scene_path);
     snprintf(m->renderer, sizeof m->renderer,
-             "lull pathtracer " BASE_VERSION ", %s sampler, %s, filter %s %g, max depth %d, clamp %g%s",
+             "lull-render " BASE_VERSION ", %s sampler, %s, filter %s %g, max depth %d, clamp %g%s",
              pt_sampler_words[i->sampler], pt_strategy_words[i->strategy], pt_filter_words[i->filter],
              (double)i->filter_x, i->max_depth, (double)i->max_component, r->scene->light_tree ? ", light hierarchy" : "");
     m->source_crc32 = c->scene_crc;

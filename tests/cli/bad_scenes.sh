@@ -21,7 +21,7 @@ case $expected in
 [0-9]*:*) place="$scene:${expected%%:*}:" words=${expected#*: } ;;
 *) place='' words=$expected ;;
 esac
-"$bin/pathtracer" --spp 1 -o "$tmp/out/x.exr" --preview "$tmp/out/x.png" --report "$tmp/out/x.json" "$scene" \
+"$bin/lull-render" --spp 1 -o "$tmp/out/x.exr" --preview "$tmp/out/x.png" --report "$tmp/out/x.json" "$scene" \
     >"$tmp/stdout" 2>"$tmp/stderr" </dev/null
 rc=$?
 lines=$(wc -l <"$tmp/stderr") why=

@@ -1,7 +1,7 @@
 #!/bin/sh
 # What the path tracer does with a criterion, written down by one that decides by a known rule (abi/plugins/diary.c): its life, when it
 # is asked about which block, what it sees, what becomes of its answers.
-. "$(dirname "$0")/pathtracer_setup"
+. "$(dirname "$0")/lull_render_setup"
 D=${P%/bin/*}/tests/abi/plugins/diary.so
 export LULL_DIARY="$dir/diary"
 
@@ -42,10 +42,10 @@ for b in range(6):
 spps = [b["spp"] for b in report["blocks"]]
 assert stops.strip().split(";")[1:-1] == [str(s) for s in spps], stops
 lines = said.split("\n")[:-1]
-assert all(l == lines[0] for l in lines[:-1]) and lines[0].startswith("pathtracer: criterion diary") and lines[0].endswith(": watch out"), said
+assert all(l == lines[0] for l in lines[:-1]) and lines[0].startswith("lull-render: criterion diary") and lines[0].endswith(": watch out"), said
 reasons = [b["reason"] for b in report["blocks"]]
 tail = "blocks:" + "".join(" %d %s" % (reasons.count(r), r) for r in ("criterion", "spp-max") if r in reasons)
-assert lines[-1].startswith("pathtracer: %.0f spp on average, " % (sum(spps) / 6)) and lines[-1].endswith(tail), lines[-1]
+assert lines[-1].startswith("lull-render: %.0f spp on average, " % (sum(spps) / 6)) and lines[-1].endswith(tail), lines[-1]
 P
 run() { # run CRITERION ARGUMENTS...
     criterion=$1; shift

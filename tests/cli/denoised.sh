@@ -1,6 +1,6 @@
 #!/bin/sh
 # The criterion denoised in the path tracer, with the denoiser of tests/stub: threads, order, resume, and what is said without it.
-. "$(dirname "$0")/pathtracer_setup"
+. "$(dirname "$0")/lull_render_setup"
 LULL_OIDN=$(cd "$here/../../${BUILD:-build}/tests/oidn-stub" && pwd)
 export LULL_OIDN OIDN_STUB=box
 den="$scene -q --size 150x100 --block 50 -c denoised -p first-spp=8 -p visible=0.9 --spp-max 300 --reproducible"

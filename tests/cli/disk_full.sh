@@ -4,7 +4,7 @@
 set -u
 cd "$(dirname "$0")/../.." || exit 2
 build=${BUILD:-build}
-ggn=$build/bin/ggn pathtracer=$build/bin/pathtracer
+ggn=$build/bin/ggn render=$build/bin/lull-render
 n=0 failed=0
 tmp=$(mktemp -d) || exit 2
 trap 'rm -rf "$tmp"' EXIT
@@ -36,11 +36,11 @@ full "train" 1 "$tmp/out/model.ggn" "$ggn" train --data "$data" --kr 3 --km 3 --
     --steps 4 --epoch-steps 2 --out "$tmp/out/model.ggn" -q
 full "flip" 0 "$tmp/out/map.png" "$ggn" flip scenes/textures/bricks.png scenes/textures/bricks.png -o "$tmp/out/map.png"
 full "evaluate" 1 "$tmp/out/figures.json" "$ggn" evaluate --data "$data" --no-quality -o "$tmp/out"
-full "pathtracer: an image" 8 "$tmp/out/room.exr" "$pathtracer" -q tests/cli/room.pbrt --size 64x64 --spp 4 --criterion null \
+full "lull-render: an image" 8 "$tmp/out/room.exr" "$render" -q tests/cli/room.pbrt --size 64x64 --spp 4 --criterion null \
     -o "$tmp/out/room.exr"
-full "pathtracer: a preview" 0 "$tmp/out/room.png" "$pathtracer" -q tests/cli/room.pbrt --size 64x64 --spp 4 --criterion null \
+full "lull-render: a preview" 0 "$tmp/out/room.png" "$render" -q tests/cli/room.pbrt --size 64x64 --spp 4 --criterion null \
     --preview "$tmp/out/room.png"
-full "pathtracer: a sequence" 8 "$tmp/sequence/block-00000.lseq" "$pathtracer" -q tests/cli/room.pbrt --size 64x64 --block 64 \
+full "lull-render: a sequence" 8 "$tmp/sequence/block-00000.lseq" "$render" -q tests/cli/room.pbrt --size 64x64 --block 64 \
     --levels linear:4:8:4 --reference-spp 8 --sequence "$tmp/sequence"
 echo "1..$n"
 exit $failed

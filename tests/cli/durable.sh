@@ -1,10 +1,10 @@
 #!/bin/sh
 # How files come into place: synced, then renamed over the old one, which is never removed before; with the mode that the umask says.
 # A preloaded library writes the calls down and can make one of them fail.
-. "$(dirname "$0")/pathtracer_setup"
+. "$(dirname "$0")/lull_render_setup"
 case ${BUILD:-build} in *asan | *tsan) echo "ok 1 # SKIP a sanitizer wants to be loaded first"; exit 0 ;; esac
 ${CC:-cc} -shared -fPIC -O1 -o calls.so "$here/durable.c" -ldl || exit 2
-G=${P%pathtracer}ggn data=$here/../data/train-demo model=$here/../data/tiny.ggn
+G=${P%lull-render}ggn data=$here/../data/train-demo model=$here/../data/tiny.ggn
 umask 022
 
 written() { # written FAIL STATUS COMMAND…: the command ends so; its calls are in `calls`

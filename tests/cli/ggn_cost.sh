@@ -66,7 +66,7 @@ run -d $data --split train --scores --precision f64 -m ggn/models/lull-2.ggn
 [ $rc = 2 ] && one_line && grep -q "network's size, 200x200" "$tmp/err"
 check "double precision of blocks that are not the network's size: one line and exit 2" $?
 mkdir -p "$tmp/whole/train" && cp -R $data/scene? "$tmp/whole/train" || exit 2
-$BUILD/bin/pathtracer -q tests/cli/room.pbrt --name room --size 80x80 --block 40 --sampler independent --levels geometric:4:16:1.26 \
+$BUILD/bin/lull-render -q tests/cli/room.pbrt --name room --size 80x80 --block 40 --sampler independent --levels geometric:4:16:1.26 \
     --sequence "$tmp/whole/train/room" && "$ggn" label "$tmp/whole/train/room" >/dev/null
 run -d "$tmp/whole" --split train --sizes --no-quality -o "$tmp/sizes.json"
 run -d "$tmp/whole" --split train --sizes --recorded --no-quality -o "$tmp/known.json" && python3 - "$tmp/sizes.json" "$tmp/known.json" >"$tmp/err" 2>&1 <<'P'

@@ -92,7 +92,7 @@ KEPT="$tmp/kept" PATH="$tmp/path:$PATH" $ggn evaluate -d "$tmp/early" -m "$tmp/m
 check "strips: of a block that is converged from the start" $?
 # A recording so short that the network judges no window of it: the other pictures are drawn, by gnuplot itself.
 mkdir "$tmp/short"
-$bin/pathtracer tests/cli/room.pbrt -q --size 80x80 --block 40 --sampler independent --levels geometric:4:16:1.35 --reference-spp 0 \
+$bin/lull-render tests/cli/room.pbrt -q --size 80x80 --block 40 --sampler independent --levels geometric:4:16:1.35 --reference-spp 0 \
     --sequence "$tmp/short/view" --name view 2>"$tmp/err" &&
     printf '{"format": "lull-labels", "version": 1, "source": "observer", "detail": "made up", "cap": 10000, "spread": 0.15, "blocks": [%s]}' \
         "$(for id in 0 1 2 3; do printf '%s{"id": %d, "threshold": 20, "censored": false}' "$([ $id = 0 ] || echo ,)" $id; done)" \

@@ -3,7 +3,7 @@
 set -u
 here=$(cd "$(dirname "$0")" && pwd)
 bin=$(cd "${BUILD:-build}" && pwd)/bin
-P=$bin/pathtracer ggn=$bin/ggn
+P=$bin/lull-render ggn=$bin/ggn
 dir=$(mktemp -d) || exit 2
 trap 'rm -rf "$dir"' EXIT
 cd "$dir" || exit 2

@@ -1,6 +1,6 @@
 #!/bin/sh
 # --light-selection: what the default is, where it changes an image, who remembers it.
-. "$(dirname "$0")/pathtracer_setup"
+. "$(dirname "$0")/lull_render_setup"
 many=$here/../../scenes/many-lights.pbrt one=$here/../../scenes/cornell-box.pbrt
 image() { # image FILE SCENE OPTIONS...
     out=$1 from=$2; shift 2

@@ -1,6 +1,6 @@
 #!/bin/sh
 # scripts/make-dataset with tiny plans: order, resuming after an interrupt, cameras, plans that are wrong.
-. "$(dirname "$0")/pathtracer_setup"
+. "$(dirname "$0")/lull_render_setup"
 BUILD=${P%/bin/*}
 export BUILD
 M=$here/../../scripts/make-dataset

@@ -1,6 +1,6 @@
 #!/bin/sh
 # Rendering by several processes: the bytes of one, whatever their number; what goes wrong with one of them.
-. "$(dirname "$0")/pathtracer_setup"
+. "$(dirname "$0")/lull_render_setup"
 . "$here/mpi_setup"
 same() { cmp "$1" "$2"; }
 # The report without times, and without what says how many sampled.
@@ -112,7 +112,7 @@ t "without mpirun there is one process" "$P" "$scene" -q --spp 2 --report alone.
 t "  …and it needs no MPI library" sh -c "! ldd $P | grep -qi libmpi"
 t "--version says which MPI there is" sh -c "$P --version | grep -q '^MPI: .*[0-9]'"
 mkdir -p bare/bin bare/lib && cp "$P" bare/bin/ && cp -r "${P%/bin/*}/lib/lull" bare/lib/
-t "--version of a program built without" sh -c "bare/bin/pathtracer --version | grep -q '^MPI: none'"
-t "which runs alone" bare/bin/pathtracer "$scene" -q --spp 2 -o a.exr
-mpi_refused "build it with MPI" 1 env OMPI_COMM_WORLD_SIZE=2 bare/bin/pathtracer "$scene" -q --spp 2 -o a.exr
+t "--version of a program built without" sh -c "bare/bin/lull-render --version | grep -q '^MPI: none'"
+t "which runs alone" bare/bin/lull-render "$scene" -q --spp 2 -o a.exr
+mpi_refused "build it with MPI" 1 env OMPI_COMM_WORLD_SIZE=2 bare/bin/lull-render "$scene" -q --spp 2 -o a.exr
 exit $bad

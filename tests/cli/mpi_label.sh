@@ -1,6 +1,6 @@
 #!/bin/sh
 # ggn label by several processes: views are shared out; what goes wrong is said once, and commands that share nothing refuse.
-. "$(dirname "$0")/pathtracer_setup"
+. "$(dirname "$0")/lull_render_setup"
 . "$here/mpi_setup"
 G=${P%/*}/ggn
 same() { cmp "$1" "$2"; }

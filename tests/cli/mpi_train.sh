@@ -1,7 +1,7 @@
 #!/bin/sh
 # ggn train and ggn evaluate by several processes: the bytes of one, whatever their number; a process that dies or hangs; the checkpoint
 # of some resumed by others; processes that do not have the same.
-. "$(dirname "$0")/pathtracer_setup"
+. "$(dirname "$0")/lull_render_setup"
 . "$here/mpi_setup"
 G=${P%/*}/ggn
 says='ggn [a-z]*'

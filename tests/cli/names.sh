@@ -4,7 +4,7 @@
 set -u
 cd "$(dirname "$0")/../.." || exit 2
 root=$PWD build=$PWD/${BUILD:-build}
-P=$build/bin/pathtracer G=$build/bin/ggn
+P=$build/bin/lull-render G=$build/bin/ggn
 dir=$(mktemp -d) || exit 2
 trap 'rm -rf "$dir"' EXIT
 cd "$dir" || exit 2

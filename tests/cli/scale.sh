@@ -1,6 +1,6 @@
 #!/bin/sh
 # scripts/scale: a recording in, times for numbers of cores out; what cannot be read is named.
-. "$(dirname "$0")/pathtracer_setup"
+. "$(dirname "$0")/lull_render_setup"
 M=$here/../../scripts/scale
 refuses() { # refuses TEXT ARGUMENTS...: exit status 2, one line that contains TEXT
     n=$((n + 1)); text=$1; shift
@@ -30,8 +30,8 @@ t "a dear criterion is better asked everywhere" python3 -c '
 import json
 assert json.load(open("dear.1"))[0]["seconds"] < json.load(open("dear.2"))[0]["seconds"]'
 export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_plm=isolated # as in mpi_setup
-t "this machine: measured beside predicted, for 1 to 8 processes" sh -c "'$M' --here $scene --size 40x40 --spp 2 --pathtracer $P | grep -c '^| [1248] |' \
+t "this machine: measured beside predicted, for 1 to 8 processes" sh -c "'$M' --here $scene --size 40x40 --spp 2 --program $P | grep -c '^| [1248] |' \
     | grep -qx $(command -v mpirun >/dev/null 2>&1 && [ -f "${P%/bin/*}/lib/lull-mpi.so" ] && echo 4 || echo 0)"
 refuses "a recording or --here SCENE is needed"
-refuses "nowhere.pbrt" --here nowhere.pbrt --pathtracer "$P"
+refuses "nowhere.pbrt" --here nowhere.pbrt --program "$P"
 exit $bad

@@ -21,15 +21,15 @@ for c in $commands; do
     check "ggn $c --help, and its manual page names every option" $?
     refused "nonsense" "$bin/ggn" "$c" --nonsense
 done
-for p in ggn lull-check pathtracer; do
+for p in ggn lull-check lull-render; do
     "$bin/$p" --version >"$tmp/out" 2>"$tmp/err" && grep -qx "$p (Lull) $("$bin/ggn" --version | sed 's/.* //')" "$tmp/out"
     check "$p --version is the project's" $?
 done
 # What the path tracer says of itself, as recorded; anew with RECORD=1, and then to be read.
-{ "$bin/pathtracer" --help && "$bin/pathtracer" --usage; } >"$tmp/out" 2>"$tmp/err"
-[ -z "${RECORD:-}" ] || cp "$tmp/out" tests/golden/pathtracer/help.txt
-diff "$tmp/out" tests/golden/pathtracer/help.txt >"$tmp/err"
-check "pathtracer --help and --usage are those that were recorded" $?
+{ "$bin/lull-render" --help && "$bin/lull-render" --usage; } >"$tmp/out" 2>"$tmp/err"
+[ -z "${RECORD:-}" ] || cp "$tmp/out" tests/golden/lull-render/help.txt
+diff "$tmp/out" tests/golden/lull-render/help.txt >"$tmp/err"
+check "lull-render --help and --usage are those that were recorded" $?
 refused "a command is needed" "$bin/ggn"
 refused "frobnicate" "$bin/ggn" frobnicate
 refused "--window 99: expected an integer from 2 to 16" "$bin/ggn" train -d x -o y --window 99

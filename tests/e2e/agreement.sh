@@ -5,7 +5,7 @@ agreement() { scripts/agreement --human "$tmp/human" --rendered "$tmp/rendered" 
 record() { # record FOLDER NAME SEED REFERENCE-SPP SCENE [OPTION ...]
     folder=$1 name=$2 seed=$3 reference=$4 scene=$5
     shift 5
-    "$BUILD/bin/pathtracer" -q "$scene" --size 400x200 --sampler independent --levels geometric:4:24:1.3 --seed "$seed" \
+    "$BUILD/bin/lull-render" -q "$scene" --size 400x200 --sampler independent --levels geometric:4:24:1.3 --seed "$seed" \
         --reference-spp "$reference" --sequence "$folder" --name "$name" "$@" >"$tmp/table" 2>"$tmp/err"
 }
 mkdir -p "$tmp/human/views" "$tmp/data/test" "$tmp/rendered"

@@ -48,7 +48,7 @@ oiiotool scenes/demo-reference.png --resize 240x240 -o "$dir/reference.png"
 t "the demo's own scene runs" env DEMO_DIR="$dir/own" DEMO_REFERENCE="$dir/reference.png" DEMO_BLOCK=60 DEMO_ARGS="--size 240x240 --block 60 --spp-max 400 --seed 3 -q" scripts/demo
 t "the default criterion stopped blocks" grep -q '"reason":[[:space:]]*"criterion"' "$dir/own/report.json"
 used=$(tr -d ' \t\n' <"$dir/own/report.json" | sed -n 's/.*"criterion":{"id":"\([a-z-]*\)".*/\1/p')
-named=$("${BUILD:-build}/bin/pathtracer" --help | tr -s ' \n' ' ' | sed -n 's/.*shared object; default \([a-z-]*\) .*/\1/p')
+named=$("${BUILD:-build}/bin/lull-render" --help | tr -s ' \n' ' ' | sed -n 's/.*shared object; default \([a-z-]*\) .*/\1/p')
 t "  …which is $used, as --help names it" test -n "$used" -a "$used" = "$named"
 t "its blocks differ by four times in samples at least" \
     sh -c "tr ';' '\n' <$dir/own/stop-map.csv | sed 1d | grep . | sort -n | awk 'NR == 1 {a = \$1} {b = \$1} END {exit !(b >= 4 * a)}'"

@@ -9,7 +9,7 @@
     --steps 60 --epoch-steps 20 --out "$tmp/tiny.ggn" -q 2>"$tmp/err"
 check "a tiny model" $?
 
-render="$BUILD/bin/pathtracer -q scenes/cornell-box.pbrt --size 120x80 --block 40 --sampler independent"
+render="$BUILD/bin/lull-render -q scenes/cornell-box.pbrt --size 120x80 --block 40 --sampler independent"
 mkdir "$tmp/data"
 $render --levels linear:1:250:1 --reference-spp 0 --sequence "$tmp/data/view" --name view </dev/null 2>"$tmp/err"
 check "every sample count from 1 to 250 recorded" $?

@@ -2,7 +2,7 @@
 # What the path tracer writes, ggn reads: recorded sequences through label, evaluate and reconstruct; stop maps through compare.
 . "$(dirname "$0")/../cli/ggn_setup"
 lib=$BUILD/lib/lull
-"$bin/pathtracer" -q scenes/cornell-box.pbrt --size 64x32 --block 32 --sampler independent --levels geometric:20:400:1.35 --reference-spp 512 \
+"$bin/lull-render" -q scenes/cornell-box.pbrt --size 64x32 --block 32 --sampler independent --levels geometric:20:400:1.35 --reference-spp 512 \
     --sequence "$tmp/data" --name toy >"$tmp/out" 2>"$tmp/err"
 check "record two blocks" $?
 "$bin/ggn" label "$tmp/data" >"$tmp/out" 2>"$tmp/err" && grep -q '2 blocks labelled by the model observer' "$tmp/out"
@@ -14,7 +14,7 @@ check "evaluate has the criteria's recorded errors" $?
 # Views that people judged: levels from their halves to 10,000 spp, the observer without the view, thresholds of others beside it.
 mkdir -p "$tmp/judged/people"
 for v in one two; do
-    "$bin/pathtracer" -q scenes/cornell-box.pbrt --size 64x32 --block 32 --sampler independent --levels linear:64:384:320 \
+    "$bin/lull-render" -q scenes/cornell-box.pbrt --size 64x32 --block 32 --sampler independent --levels linear:64:384:320 \
         --sequence "$tmp/judged/people/$v" --name "toy-$v" >"$tmp/out" 2>"$tmp/err"
 done
 printf 'one_part6;300;900;\ntwo;500;10000;\n' >"$tmp/people.csv"
@@ -51,11 +51,11 @@ fails "calibration without thresholds" "no thresholds for 'one'" "$bin/ggn" labe
 "$bin/ggn" reconstruct "$tmp/data" -o "$tmp/r.png" --json >"$tmp/out" 2>"$tmp/err" && grep -q '"blocks": 2' "$tmp/out"
 check "reconstruct" $?
 cp -r "$tmp/data" "$tmp/again"
-"$bin/pathtracer" -q scenes/cornell-box.pbrt --size 64x32 --block 32 --sampler independent --levels geometric:20:400:1.35 --reference-spp 512 \
+"$bin/lull-render" -q scenes/cornell-box.pbrt --size 64x32 --block 32 --sampler independent --levels geometric:20:400:1.35 --reference-spp 512 \
     --sequence "$tmp/again" --name toy >"$tmp/out" 2>"$tmp/err" && cmp -s "$tmp/data/block-00001.lseq" "$tmp/again/block-00001.lseq"
 check "recording again keeps what is there" $?
 
-"$bin/pathtracer" -q scenes/cornell-box.pbrt --size 48x48 --block 16 -c "$lib/halfbuf.so" -p threshold=0.05 --spp-max 64 -o "$tmp/a.exr" \
+"$bin/lull-render" -q scenes/cornell-box.pbrt --size 48x48 --block 16 -c "$lib/halfbuf.so" -p threshold=0.05 --spp-max 64 -o "$tmp/a.exr" \
     --report "$tmp/a.json" --stop-map "$tmp/a.csv" >"$tmp/out" 2>"$tmp/err"
 check "render with a stop map" $?
 for f in a.exr a.json; do

@@ -5,7 +5,7 @@ server=
 trap 'kill $server 2>/dev/null; rm -rf "$tmp"' EXIT
 mkdir "$tmp/data"
 for scene in cornell-box demo; do
-    "$bin/pathtracer" -q scenes/$scene.pbrt --size 64x32 --block 32 --sampler independent --levels geometric:20:400:1.35 \
+    "$bin/lull-render" -q scenes/$scene.pbrt --size 64x32 --block 32 --sampler independent --levels geometric:20:400:1.35 \
         --reference-spp 512 --sequence "$tmp/data/$scene" --name $scene >"$tmp/out" 2>"$tmp/err"
     check "record $scene" $?
 done

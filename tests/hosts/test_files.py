@@ -13,7 +13,7 @@ import tap
 from lull.files import Output, check_outputs, replaced, write_each
 from tap import Skip, raises
 
-PATHTRACER = os.path.abspath(f"{os.environ.get('BUILD', 'build')}/bin/pathtracer")
+RENDER = os.path.abspath(f"{os.environ.get('BUILD', 'build')}/bin/lull-render")
 ROOM = os.path.abspath("tests/cli/room.pbrt")
 TMP = tempfile.TemporaryDirectory()
 os.chdir(TMP.name)
@@ -26,12 +26,12 @@ def write(path, text="new"):
         file.write(text.encode())
 
 
-def verdict_of_pathtracer(options):
+def verdict_of_lull_render(options):
     """Its line without the program's name, or "" when it renders."""
-    done = subprocess.run([PATHTRACER, "room.pbrt", "-q", "--size", "8x8", "--spp", "1", *(t for o in options for t in o)],
+    done = subprocess.run([RENDER, "room.pbrt", "-q", "--size", "8x8", "--spp", "1", *(t for o in options for t in o)],
                           capture_output=True, text=True)
     assert done.returncode in (0, 2), done.stderr
-    return done.stderr.strip().removeprefix("pathtracer: ")
+    return done.stderr.strip().removeprefix("lull-render: ")
 
 
 def verdict_of_package(options):
@@ -42,7 +42,7 @@ def verdict_of_package(options):
     return ""
 
 
-def test_same_verdicts_as_pathtracer():
+def test_same_verdicts_as_lull_render():
     """the path tracer refuses the same outputs in the same words"""
     Path("room.pbrt").write_bytes(Path(ROOM).read_bytes())
     for name in ("folder", "folder.exr", "folder.png"):
@@ -66,7 +66,7 @@ def test_same_verdicts_as_pathtracer():
                     [("--checkpoint", "room.pbrt")], [("--checkpoint", "room.ckp")], [("--checkpoint", "other.ckp")],
                     [("--preview", "x.png"), ("--stop-map", "y.png")],
                     [("--preview", "folder/x.png"), ("--stop-map", "x3.png")]):
-        own, wanted = verdict_of_package(options), verdict_of_pathtracer(options)
+        own, wanted = verdict_of_package(options), verdict_of_lull_render(options)
         assert own == wanted, (options, own, wanted)
         assert "\n" not in own
     assert Path("room.pbrt").read_bytes() == Path(ROOM).read_bytes()
@@ -85,7 +85,7 @@ def test_one_file_twice():
         options = [("--preview", first), ("--stop-map", second)]
         text = "{} {}: the same file as {} {}, one of the two would be lost"  # the path tracer meets the other one last
         assert verdict_of_package(options) == text.format("--stop-map", second, "--preview", first), options
-        assert verdict_of_pathtracer(options) == text.format("--preview", first, "--stop-map", second), options
+        assert verdict_of_lull_render(options) == text.format("--preview", first, "--stop-map", second), options
 
 
 def test_replaced():

@@ -103,7 +103,7 @@ def test_stops():
     with tempfile.TemporaryDirectory() as folder:
         for seed in seeds:
             report = os.path.join(folder, "r.json")
-            subprocess.run([f"{BUILD}/bin/pathtracer", "tests/hosts/scenes/box.pbrt", "-q", "--block", "48", "-c", "halfbuf",
+            subprocess.run([f"{BUILD}/bin/lull-render", "tests/hosts/scenes/box.pbrt", "-q", "--block", "48", "-c", "halfbuf",
                             *pairs, "--spp-max", "1024", "--seed", str(seed), "--report", report], check=True)
             stops.append([b["spp"] for b in json.loads(Path(report).read_text())["blocks"]])
     wanted, own = (np.mean(s, 0) for s in (stops, [[b.spp for b in p.driver.frame.blocks] for p in pictures]))

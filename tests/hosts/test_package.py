@@ -22,7 +22,7 @@ from renderer import Noise, Playback
 from tap import raises
 
 BUILD = os.environ.get("BUILD", "build")
-LIB, PLUGINS, PATHTRACER = f"{BUILD}/lib/lull", f"{BUILD}/tests/abi/plugins", f"{BUILD}/bin/pathtracer"
+LIB, PLUGINS, RENDER = f"{BUILD}/lib/lull", f"{BUILD}/tests/abi/plugins", f"{BUILD}/bin/lull-render"
 os.environ["LULL_PLUGIN_PATH"] = LIB
 SIGMAS = [[.01, .2], [.5, 1.]]
 TMP = tempfile.TemporaryDirectory()
@@ -157,7 +157,7 @@ def test_sums():
         assert abs(f.sums["half"][part] / b.half_spp - np.mean([noise.sample(b.rect, s) for s in half], 0)).max() < 1e-12
 
 
-def test_halves_of_pathtracer():
+def test_halves_of_lull_render():
     """with waves of four the halves are the path tracer's"""
     from lull.driver import in_half
     for sample in list(range(0, 600)) + [10007, 1 << 20, (1 << 31) - 1]:
@@ -178,17 +178,17 @@ def test_independence():
     assert repr(answers[0]) == repr(answers[1])
 
 
-def test_same_stops_as_pathtracer():
+def test_same_stops_as_lull_render():
     """on the path tracer's recorded sequences the driver stops every block where the path tracer does"""
     for criterion, parameters in (("halfbuf", {"threshold": .01}), ("ggn", {}), ("observer", {}), ("null", {})):
         options = ["--spp-min", "20", "--spp-max", "700"]
         seed, scene = 5, "scenes/cornell-box.pbrt"
         pairs = [a for k, v in parameters.items() for a in ("-p", f"{k}={v}")]
-        subprocess.run([PATHTRACER, scene, "-q", "--size", "96x80", "--block", "48", "--seed", str(seed), "-c", criterion,
+        subprocess.run([RENDER, scene, "-q", "--size", "96x80", "--block", "48", "--seed", str(seed), "-c", criterion,
                         *pairs, *options, "--report", tmp("pt.json"), "--stop-map", tmp("pt.csv")], check=True)
         wanted = json.loads(Path(tmp("pt.json")).read_text())
         f = lull.Frame(lull.load(criterion, **parameters), 96, 80, block=48, seed=seed, spp_min=20, spp_max=700)
-        d = Playback(f, PATHTRACER, scene, [])
+        d = Playback(f, RENDER, scene, [])
         assert d.run().outcome == "done"
         stops = [(b["spp"], b["reason"], b["checks"]) for b in wanted["blocks"]]
         mine = [(b.spp, b.reason, b.checks) for b in f.blocks]
@@ -210,18 +210,18 @@ def test_same_stops_as_pathtracer():
         assert criterion == "observer" or Path(tmp("own.csv")).read_text() == Path(tmp("pt.csv")).read_text()
 
 
-def test_mask_of_pathtracer():
+def test_mask_of_lull_render():
     """a mask does in the driver what --mask does in the path tracer, and both reports say so alike"""
     mask = np.zeros((80, 96))
     mask[7, 50], mask[60, 3] = 1, .4
     png.write(tmp("mask.png"), np.dstack([(255 * mask).round().astype(np.uint8)] * 3))
     for criterion, dial, value in (("halfbuf", "threshold", .03), ("ggn", "visible", .9)):
-        subprocess.run([PATHTRACER, "scenes/cornell-box.pbrt", "-q", "--size", "96x80", "--block", "48", "-c", criterion, "-p",
+        subprocess.run([RENDER, "scenes/cornell-box.pbrt", "-q", "--size", "96x80", "--block", "48", "-c", criterion, "-p",
                         f"{dial}={value}", "--spp-max", "1500", "--mask", tmp("mask.png"), "--report", tmp("mask.json")],
                        check=True)
         wanted = json.loads(Path(tmp("mask.json")).read_text())
         f = lull.Frame(lull.load(criterion, **{dial: value}), 96, 80, block=48, spp_max=1500, mask=png.read_grey(tmp("mask.png")))
-        d = Playback(f, PATHTRACER, "scenes/cornell-box.pbrt", [])
+        d = Playback(f, RENDER, "scenes/cornell-box.pbrt", [])
         assert d.run().outcome == "done"
         own = outputs.report(d, mask=tmp("mask.png"))
         seen = [[(b["spp"], b["dial"]) for b in r["blocks"]] for r in (own, wanted)]
@@ -231,7 +231,7 @@ def test_mask_of_pathtracer():
 
 def test_stop_map():
     """the stop map is the path tracer's, pixel by pixel"""
-    subprocess.run([PATHTRACER, "scenes/cornell-box.pbrt", "-q", "--size", "300x180", "--block", "60", "-c", "halfbuf",
+    subprocess.run([RENDER, "scenes/cornell-box.pbrt", "-q", "--size", "300x180", "--block", "60", "-c", "halfbuf",
                     "-p", "threshold=.03", "--spp-max", "300", "--stop-map", tmp("pt.png"), "--stop-map",
                     tmp("pt.csv")], check=True)
     grid = blocks.grid(300, 180, 60, 60)

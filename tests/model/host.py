@@ -266,7 +266,7 @@ def main():
     parser.add_argument("--runs", type=int, default=1000, help="runs of the path tracer, in histories of two to six (1000)")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--keep", metavar="DIR", help="copy the folder of a history that fails there")
-    parser.add_argument("--bin", default=os.path.join(ROOT, os.environ.get("BUILD", "build"), "bin", "pathtracer"))
+    parser.add_argument("--bin", default=os.path.join(ROOT, os.environ.get("BUILD", "build"), "bin", "lull-render"))
     o = parser.parse_args()
     known, runs, i, failed, counts = {}, 0, 0, 0, {}
     while runs < o.runs:

@@ -189,7 +189,7 @@ static void services(void **state)
     assert_int_equal(pt_criterion_create(pt_fake_criterion(), NULL, 0, threads, NULL, NULL, &busy, &err), 0);
     const struct lull_host *alone = &few->host, *many = &busy->host;
     assert_true(alone->max_workers == 1 && many->max_workers == 3);
-    assert_string_equal(alone->name, "lull pathtracer " BASE_VERSION);
+    assert_string_equal(alone->name, "lull-render " BASE_VERSION);
     alone->log(alone, LULL_LOG_INFO, "psst");
     assert_string_equal(warned, "");
     alone->log(alone, LULL_LOG_WARNING, "mind the gap");
@@ -329,7 +329,7 @@ static char *listed(struct pt_approve_case *c)
 static void criteria_by_name(void **state)
 {
     (void)state;
-    pt_approve("tests/golden/pathtracer/criteria.txt", listed);
+    pt_approve("tests/golden/lull-render/criteria.txt", listed);
 }
 
 int main(void)

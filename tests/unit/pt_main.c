@@ -93,7 +93,7 @@ static void print_cli(FILE *out, const struct pt_cli *c)
 static int split_words(struct pt_approve_case *c, char **argv)
 {
     int argc = 1;
-    strcpy(c->options, "pathtracer");
+    strcpy(c->options, "lull-render");
     argv[0] = c->options;
     for (char *at = c->text; *at != '\0' && argc < 127;) {
         at += strspn(at, " \n");
@@ -130,7 +130,7 @@ static char *parse_words(struct pt_approve_case *c)
 static void command_lines(void **state)
 {
     (void)state;
-    pt_approve("tests/golden/pathtracer/command_lines.txt", parse_words);
+    pt_approve("tests/golden/lull-render/command_lines.txt", parse_words);
 }
 
 /* --- what is made of it -------------------------------------------------------------------------------------------------- */
@@ -221,7 +221,7 @@ static void renders(void **state)
     write_files();
     assert_int_equal(chdir(at), 0);
     assert_true(api_folder(criteria, sizeof criteria, API_CRITERIA) == 0 && setenv("LULL_PLUGIN_PATH", criteria, 1) == 0);
-    pt_approve("tests/golden/pathtracer/renders.txt", make_render);
+    pt_approve("tests/golden/lull-render/renders.txt", make_render);
     unsetenv("LULL_PLUGIN_PATH");
     snprintf(command, sizeof command, "rm -r %s", folder);
     assert_int_equal(system(command), 0);
@@ -283,7 +283,7 @@ static void words_on_the_way(void **state)
     pt_say(&s, "from somebody else");
     other.rank = 0;
     pt_say(&s, "from rank 0");
-    assert_string_equal(heard_on(stderr), "pathtracer: a line\npathtracer: a note\npathtracer: from rank 0\n");
+    assert_string_equal(heard_on(stderr), "lull-render: a line\nlull-render: a note\nlull-render: from rank 0\n");
 }
 
 /* --- quotes ------------------------------------------------------------------------------------------------------------- */
@@ -393,7 +393,7 @@ static char *tell_quote(struct pt_approve_case *c)
 static void quotes(void **state)
 {
     (void)state;
-    pt_approve("tests/golden/pathtracer/quotes.txt", tell_quote);
+    pt_approve("tests/golden/lull-render/quotes.txt", tell_quote);
 }
 
 /* --- at the end of a render --------------------------------------------------------------------------------------------- */
@@ -464,9 +464,9 @@ static void the_last_line(void **state)
     tell_summary(&s);
     render.totals->dropped = 0;
     tell_summary(&s);
-    assert_string_equal(heard_on(stderr), "pathtracer: 22 spp on average, 111.2 s, 2.44 Mpaths/s, criterion 54.6 %; blocks: 3 criterion 2 spp-max 2 dropped\n"
-                                          "pathtracer: 12 samples were not finite and were dropped, the first seen at --debug-path 7,8,9\n"
-                                          "pathtracer: 12 samples were not finite and were dropped, the first seen at --debug-path 7,8,9\n");
+    assert_string_equal(heard_on(stderr), "lull-render: 22 spp on average, 111.2 s, 2.44 Mpaths/s, criterion 54.6 %; blocks: 3 criterion 2 spp-max 2 dropped\n"
+                                          "lull-render: 12 samples were not finite and were dropped, the first seen at --debug-path 7,8,9\n"
+                                          "lull-render: 12 samples were not finite and were dropped, the first seen at --debug-path 7,8,9\n");
     for (int i = 0; i < 7; i++)
         list[i].reason = LULL_REASON_NONE;
 }
@@ -492,7 +492,7 @@ static void between_two_slices(void **state)
     assert_int_equal(pt_action_after_slice(&s, &render, &err), 0);
     double after_s = base_clock_wall_s();
     assert_true(s.checkpoint_at_s >= before_s + 1000 && s.checkpoint_at_s <= after_s + 1000);
-    assert_string_equal(heard_on(stderr), "pathtracer: no checkpoint, the render goes on: /missing/c: cannot write there: No such file or directory\n");
+    assert_string_equal(heard_on(stderr), "lull-render: no checkpoint, the render goes on: /missing/c: cannot write there: No such file or directory\n");
     assert_int_equal(pt_action_suspend(&s, &render, &err), BASE_EIO);
     s.cli.checkpoint = NULL;
     assert_int_equal(pt_action_suspend(&s, &render, &err), 0);
@@ -534,7 +534,7 @@ static char *explain_it(struct pt_approve_case *c)
 static void explanations(void **state)
 {
     (void)state;
-    pt_approve("tests/golden/pathtracer/explanations.txt", explain_it);
+    pt_approve("tests/golden/lull-render/explanations.txt", explain_it);
 }
 
 /* The picture of a quote is that of its blocks' times, in minutes when the dearest takes one. */

@@ -370,7 +370,7 @@ static char *quote_of(struct pt_approve_case *c)
 static void quotes_in_every_number(void **state)
 {
     (void)state;
-    pt_approve("tests/golden/pathtracer/quote_numbers.txt", quote_of);
+    pt_approve("tests/golden/lull-render/quote_numbers.txt", quote_of);
 }
 
 int main(void)

@@ -159,7 +159,7 @@ static void exr_holds_every_layer(void **state)
     assert_int_equal(exr_attr_get_string(file, 0, "lull:block", &length, &text), EXR_ERR_SUCCESS);
     assert_string_equal(text, "16x16");
     static const char *const words[][2] = {
-        {"lull:scene", "dir/fake-view1.pbrt"}, {"software", "lull pathtracer " BASE_VERSION},
+        {"lull:scene", "dir/fake-view1.pbrt"}, {"software", "lull-render " BASE_VERSION},
         {"lull:reasons", "0=none 1=criterion 2=spp-max 3=uniform 4=time 5=interrupt 6=dropped"}};
     for (int i = 0; i < 3; i++) {
         assert_int_equal(exr_attr_get_string(file, 0, words[i][0], &length, &text), EXR_ERR_SUCCESS);
@@ -431,7 +431,7 @@ static char *report_of(struct pt_approve_case *c)
 static void report_word_for_word(void **state)
 {
     (void)state;
-    pt_approve("tests/golden/pathtracer/report.txt", report_of);
+    pt_approve("tests/golden/lull-render/report.txt", report_of);
 }
 
 /* Redrawn in place on a terminal, a line now and then elsewhere, nothing without a file. */

@@ -1,7 +1,7 @@
 /*
  * Numbers of the functions that scattering, lights, media, textures and quadrics are made of, at ordinary places and at
  * every edge: cosines of 0, total reflection, ends of intervals, directions along an axis, points inside and beside. What
- * they are is in golden/pathtracer/values.txt (support/pt_approve.h says how to record). Sameness only: that the numbers are
+ * they are is in golden/lull-render/values.txt (support/pt_approve.h says how to record). Sameness only: that the numbers are
  * right is said by stat/, and by closed forms in the other programs of unit/.
  */
 #include <setjmp.h>
@@ -602,7 +602,7 @@ static char *tell(struct pt_approve_case *c)
 static void values(void **state)
 {
     (void)state;
-    pt_approve("tests/golden/pathtracer/values.txt", tell);
+    pt_approve("tests/golden/lull-render/values.txt", tell);
 }
 
 int main(void)

@@ -345,7 +345,7 @@ struct lull_host_report {
     double scene_bytes;                /* NaN: not known */
 };
 
-/* The report as JSON (pathtracer(1) says what is in it): to a file, replaced as a whole or not at all, or to a writer. */
+/* The report as JSON (lull-render(1) says what is in it): to a file, replaced as a whole or not at all, or to a writer. */
 LULL_EXPORT int32_t lull_host_report_write(const struct lull_host_frame *frame, const struct lull_host_report *report,
                                            const char *path, struct lull_error *err);
 LULL_EXPORT int32_t lull_host_report_text(const struct lull_host_frame *frame, const struct lull_host_report *report,

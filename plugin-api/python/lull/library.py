@@ -58,9 +58,9 @@ class Info:
 
 
 def search_path() -> list[str]:
-    """Where names are looked up: LULL_PLUGIN_PATH, ../lib/lull beside a `pathtracer` on PATH, the usual prefixes."""
+    """Where names are looked up: LULL_PLUGIN_PATH, ../lib/lull beside a `lull-render` on PATH, the usual prefixes."""
     folders = [f for f in os.environ.get("LULL_PLUGIN_PATH", "").split(os.pathsep) if f]
-    program = shutil.which("pathtracer")
+    program = shutil.which("lull-render")
     prefixes = [Path(program).resolve().parents[1]] if program else []
     prefixes += [Path(sys.prefix), Path("/usr/local"), Path("/usr")]
     folders += [str(prefix / "lib" / "lull") for prefix in prefixes]

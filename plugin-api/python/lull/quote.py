@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """What the criterion's dial will cost, told from the checks of a render that has begun: samples and time at its setting
-and at coarser and finer ones. As `pathtracer --quote` does, with one more instance of the criterion per setting, each
+and at coarser and finer ones. As `lull-render --quote` does, with one more instance of the criterion per setting, each
 asked about the blocks as they are; neither the frame nor the render's own instances change."""
 from __future__ import annotations
 

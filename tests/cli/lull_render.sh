@@ -1,6 +1,6 @@
 #!/bin/sh
-# The command line of pathtracer: every option, every error, interrupting and going on.
-. "$(dirname "$0")/pathtracer_setup"
+# The command line of lull-render: every option, every error, interrupting and going on.
+. "$(dirname "$0")/lull_render_setup"
 layers() { oiiotool --info -v "$1" | grep -F 'channel list' | grep -qF "$2"; }
 same() { cmp "$1" "$2"; }
 differ() { ! cmp -s "$1" "$2"; }

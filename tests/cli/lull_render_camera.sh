@@ -1,6 +1,6 @@
 #!/bin/sh
-# pathtracer --look-at and --fov: the same picture as a file with that camera, refusals, and what a resumed run must notice.
-. "$(dirname "$0")/pathtracer_setup"
+# lull-render --look-at and --fov: the same picture as a file with that camera, refusals, and what a resumed run must notice.
+. "$(dirname "$0")/lull_render_setup"
 same() { oiiotool --fail 0 --warn 0 "$1" "$2" --diff; }
 differ() { ! same "$1" "$2"; }
 shot() { out=$1; shift; "$P" -q --spp 8 -o "$out" "$@"; }

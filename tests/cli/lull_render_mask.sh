@@ -1,6 +1,6 @@
 #!/bin/sh
-# pathtracer --mask: painted blocks get more samples, the others the same; refusals, and what a resumed run must notice.
-. "$(dirname "$0")/pathtracer_setup"
+# lull-render --mask: painted blocks get more samples, the others the same; refusals, and what a resumed run must notice.
+. "$(dirname "$0")/lull_render_setup"
 common="$scene -q --size 64x48 --block 16 -c halfbuf -p threshold=0.02 --spp-max 4000"
 counts() { cut -d';' -f2- "$1" | tr ';' '\n' | grep .; }
 # block 5 is touched by one white pixel, block 6 by a grey one: 4^-1 and 4^-0.5 of the dial

@@ -1,6 +1,6 @@
 #!/bin/sh
-# pathtracer --quote: what it prints, draws and refuses, and that its pilot loses nothing.
-. "$(dirname "$0")/pathtracer_setup"
+# lull-render --quote: what it prints, draws and refuses, and that its pilot loses nothing.
+. "$(dirname "$0")/lull_render_setup"
 json() { python3 -c "import json; q = json.load(open('$1')); rows = q['rows']; assert $2, [r['spp_mean'] for r in rows]"; }
 
 quote="$scene -q --size 64x48 --block 16 --spp-max 2000 -t 2"
