@@ -305,12 +305,13 @@ host-model: $(BIN)/lull-render $(CRITERIA) ## 1,000 runs that are interrupted, k
 
 # Every header compiles alone; the ABI header also as C99 and C++11.
 HEADERS := $(shell find pathtracer ggn plugin-api tests -name '*.h' 2>/dev/null)
-hdr-check: ## each header compiles alone (the ABI's as C99 and C++11), no include goes up, no long function or line, …
+hdr-check: ## each header compiles alone (the ABI's as C99 and C++11), no include goes up, no long function or line, layout by clang-format 14, …
 	@scripts/check-floors
 	@$(foreach h,$(HEADERS),echo "extern int unused;" | $(CC) -std=c17 -D_POSIX_C_SOURCE=200809L $(WARNC) -Wno-unused-const-variable $(call inc,$(h)) $(call isa,$(h:.h=.c)) \
 	    -include $(h) -x c -fsyntax-only - &&) true
 	@$(foreach h,criterion.h criterion_kit.h host.h,$(CC) -std=c99 $(WARNC) $(API) -x c -fsyntax-only plugin-api/include/lull/$(h) &&) true
 	@$(foreach h,criterion.h criterion_kit.h host.h,$(CXX) -std=c++11 $(WARN) $(API) -x c++ -fsyntax-only plugin-api/include/lull/$(h) &&) true
+	@! clang-format --version 2>/dev/null | grep -q 'version 14' || clang-format --dry-run -Werror $$(git ls-files '*.[ch]' '*.cpp')
 abi-check: $(OUT)/tests/abi/api_layout ## the layouts of the ABI and the host library are the frozen ones (plugin-api/*layout-1.txt)
 	@$<
 

@@ -90,10 +90,17 @@ static void write_or_keep(const struct pt_session *s, writer *write, const char 
 static int write_outputs(struct pt_session *s, int was_interrupted, struct base_err *err)
 {
     const struct pt_cli *cli = &s->cli;
-    struct pt_output_info info = {.scene = cli->scene, .params = cli->params, .param_count = cli->param_count,
-                                  .mask = cli->mask, .effects = s->scene->effects, .kernel = s->kernel_name,
-                                  .threads = pt_render_threads(s->render), .reproducible = cli->reproducible,
-                                  .aov = cli->aov, .scene_bytes = s->scene->stats.bytes, .interrupted = was_interrupted};
+    struct pt_output_info info = {.scene = cli->scene,
+                                  .params = cli->params,
+                                  .param_count = cli->param_count,
+                                  .mask = cli->mask,
+                                  .effects = s->scene->effects,
+                                  .kernel = s->kernel_name,
+                                  .threads = pt_render_threads(s->render),
+                                  .reproducible = cli->reproducible,
+                                  .aov = cli->aov,
+                                  .scene_bytes = s->scene->stats.bytes,
+                                  .interrupted = was_interrupted};
     write_or_keep(s, pt_output_exr, cli->output, &info, err);
     write_or_keep(s, write_preview, cli->preview, &info, err);
     for (int i = 0; i < cli->stop_map_count; i++)
@@ -110,11 +117,11 @@ static void tell_summary(struct pt_session *s)
         by_reason[r->blocks->list[i].reason]++;
     double pixels = (double)r->film.pixels;
     char line[512];
-    size_t used = (size_t)snprintf(line, sizeof line,
-                                   "%.0f spp on average, %.1f s, %.2f Mpaths/s, criterion %.1f %%; blocks:",
-                                   (double)r->totals->samples / pixels, lull_host_elapsed_s(r->frame),
-                                   (double)r->totals->paths / fmax(r->totals->render_s, 1e-9) * 1e-6,
-                                   100.0 * r->totals->criterion_s / fmax(lull_host_elapsed_s(r->frame), 1e-9));
+    size_t used = (size_t)snprintf(
+        line, sizeof line,
+        "%.0f spp on average, %.1f s, %.2f Mpaths/s, criterion %.1f %%; blocks:", (double)r->totals->samples / pixels,
+        lull_host_elapsed_s(r->frame), (double)r->totals->paths / fmax(r->totals->render_s, 1e-9) * 1e-6,
+        100.0 * r->totals->criterion_s / fmax(lull_host_elapsed_s(r->frame), 1e-9));
     for (int i = 0; i < LULL_REASON_COUNT && used < sizeof line; i++)
         if (by_reason[i] > 0)
             used += (size_t)snprintf(line + used, sizeof line - used, " %u %s", by_reason[i], lull_host_reason(i));
@@ -152,8 +159,11 @@ int pt_action_image(struct pt_session *s, int *status, struct base_err *err)
     int rc = pt_action_open_render(s, err);
     if (rc)
         return rc;
-    struct pt_render_hooks hooks = {.slice = after_slice_of_image, .interrupted = pt_interrupted,
-                                    .suspend = pt_action_suspend, .warn = pt_say, .data = s};
+    struct pt_render_hooks hooks = {.slice = after_slice_of_image,
+                                    .interrupted = pt_interrupted,
+                                    .suspend = pt_action_suspend,
+                                    .warn = pt_say,
+                                    .data = s};
     s->checkpoint_at_s = base_clock_wall_s() + s->cli.checkpoint_every_s;
     rc = pt_render_run(s->render, &hooks, &outcome, err);
     pt_progress_clear(&s->progress);

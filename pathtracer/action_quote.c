@@ -19,8 +19,12 @@ static int tell_quote(struct pt_session *s, double load_s, int was_interrupted, 
     int rc = pt_quote_finish(s->quote, s->render, err);
     if (rc)
         return rc;
-    struct pt_quote_info info = {.scene = cli->scene, .params = cli->params, .param_count = cli->param_count,
-                                 .scene_bytes = s->scene->stats.bytes, .load_s = load_s, .interrupted = was_interrupted};
+    struct pt_quote_info info = {.scene = cli->scene,
+                                 .params = cli->params,
+                                 .param_count = cli->param_count,
+                                 .scene_bytes = s->scene->stats.bytes,
+                                 .load_s = load_s,
+                                 .interrupted = was_interrupted};
     if (cli->json)
         rc = pt_quote_json(stdout, s->quote, s->render, &info, err);
     else
@@ -38,8 +42,12 @@ int pt_action_quote(struct pt_session *s, int *status, struct base_err *err)
                              s->cli.param_count, pt_say, s, &s->quote, err);
     if (rc)
         return rc;
-    struct pt_render_hooks hooks = {.slice = pt_action_after_slice, .judged = ask_quote, .interrupted = pt_interrupted,
-                                    .suspend = pt_action_suspend, .warn = pt_say, .data = s};
+    struct pt_render_hooks hooks = {.slice = pt_action_after_slice,
+                                    .judged = ask_quote,
+                                    .interrupted = pt_interrupted,
+                                    .suspend = pt_action_suspend,
+                                    .warn = pt_say,
+                                    .data = s};
     s->checkpoint_at_s = base_clock_wall_s() + s->cli.checkpoint_every_s;
     rc = pt_render_run(s->render, &hooks, &outcome, err);
     pt_progress_clear(&s->progress);

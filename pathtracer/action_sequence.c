@@ -15,10 +15,14 @@ int pt_action_open_sequence(struct pt_session *s, struct pt_render_config *confi
 
 int pt_action_sequence(struct pt_session *s, int *status, struct base_err *err)
 {
-    struct pt_sequence_config config = {.directory = s->cli.sequence, .levels = s->cli.levels,
+    struct pt_sequence_config config = {.directory = s->cli.sequence,
+                                        .levels = s->cli.levels,
                                         .blocks = s->cli.sequence_blocks,
-                                        .reference_spp = s->cli.reference_spp, .scene_path = s->cli.scene,
-                                        .name = s->cli.name, .view = s->cli.view, .quiet = s->cli.quiet,
+                                        .reference_spp = s->cli.reference_spp,
+                                        .scene_path = s->cli.scene,
+                                        .name = s->cli.name,
+                                        .view = s->cli.view,
+                                        .quiet = s->cli.quiet,
                                         .slice = pt_action_after_slice};
     int rc = pt_action_open_sequence(s, &config.render, err);
     if (!rc)

@@ -28,28 +28,30 @@ int pt_agree_settings(struct pt_session *s, const struct pt_render_config *c, st
     if (rc)
         return rc;
     const struct pt_integrator *i = &c->integrator;
-    size_t room = sizeof s->settings, used = (size_t)snprintf(
-        s->settings, room,
-        "scene-crc=%08x\nsize=%dx%d\ncrop=%d,%d,%d,%d\nblock=%dx%d\nspp-min=%llu\nspp-max=%llu\nuniform=%d\nmax-seam=%g\n"
-        "aov=%u\nseed=%u\nsampler=%d\nintegrator=%d\nfilter=%d:%gx%g:%g\n"
-        "light-selection=%s\nmax-depth=%d\nrr-depth=%d\nclamp=%g\n",
-        scene_crc, c->width, c->height, c->crop[0], c->crop[1], c->crop[2], c->crop[3], c->block_width, c->block_height,
-        (unsigned long long)c->spp_min, (unsigned long long)c->spp_max, c->uniform, c->max_seam, c->planes, i->seed,
-        i->sampler, i->strategy, i->filter, (double)i->filter_x, (double)i->filter_y, (double)i->filter_sigma,
-        pt_light_selection_words[s->cli.light_selection], i->max_depth,
-        i->rr_depth, (double)i->max_component);
+    size_t room = sizeof s->settings,
+           used = (size_t)snprintf(s->settings, room,
+                                   "scene-crc=%08x\nsize=%dx%d\ncrop=%d,%d,%d,%d\nblock=%dx%d\nspp-min=%llu\nspp-max=%"
+                                   "llu\nuniform=%d\nmax-seam=%g\n"
+                                   "aov=%u\nseed=%u\nsampler=%d\nintegrator=%d\nfilter=%d:%gx%g:%g\n"
+                                   "light-selection=%s\nmax-depth=%d\nrr-depth=%d\nclamp=%g\n",
+                                   scene_crc, c->width, c->height, c->crop[0], c->crop[1], c->crop[2], c->crop[3],
+                                   c->block_width, c->block_height, (unsigned long long)c->spp_min,
+                                   (unsigned long long)c->spp_max, c->uniform, c->max_seam, c->planes, i->seed, i->sampler,
+                                   i->strategy, i->filter, (double)i->filter_x, (double)i->filter_y, (double)i->filter_sigma,
+                                   pt_light_selection_words[s->cli.light_selection], i->max_depth, i->rr_depth,
+                                   (double)i->max_component);
     const struct pt_view *view = &s->cli.view;
     used += (size_t)snprintf(s->settings + used, room - used, "fov=%.17g\nlook-at=", view->fov_deg);
     for (int k = 0; view->has_look_at && k < 9; k++)
         used += (size_t)snprintf(s->settings + used, room - used, "%.17g ", view->look_at_world[k]);
     const struct lull_criterion *t = s->criterion ? lull_host_table(s->criterion) : NULL;
-    used += (size_t)snprintf(s->settings + used, room - used, "\ncriterion=%s %s\n", t ? t->id : "none",
-                             t ? t->version : "");
+    used +=
+        (size_t)snprintf(s->settings + used, room - used, "\ncriterion=%s %s\n", t ? t->id : "none", t ? t->version : "");
     if (used < room)
         used += (size_t)snprintf(s->settings + used, room - used, "plugin-and-mask-crc=%08x\n", judging_crc);
     for (uint32_t k = 0; k < s->cli.param_count && used < room; k++)
-        used += (size_t)snprintf(s->settings + used, room - used, "param=%s=%s\n", s->cli.params[k].key,
-                                 s->cli.params[k].value);
+        used +=
+            (size_t)snprintf(s->settings + used, room - used, "param=%s=%s\n", s->cli.params[k].key, s->cli.params[k].value);
     return used < room ? 0 : base_fail(err, BASE_EINVAL, "the criterion's parameters are too long");
 }
 

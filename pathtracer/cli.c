@@ -13,10 +13,7 @@
 
 /* --- values of several parts ------------------------------------------------------------------------------------------ */
 
-static int expected(struct base_err *err, const char *what)
-{
-    return base_fail(err, BASE_EINVAL, "expected %s", what);
-}
+static int expected(struct base_err *err, const char *what) { return base_fail(err, BASE_EINVAL, "expected %s", what); }
 
 /* n integers in [low, high] with one separator character between them. */
 static int get_list(const char *text, char separator, int n, int64_t low, int64_t high, int *out)
@@ -376,8 +373,14 @@ int pt_cli_parse(struct pt_cli *cli, int argc, char **argv, struct base_err *err
         .uses_peers = 1,
         .outputs = offsetof(struct pt_cli, outputs),
     };
-    *cli = (struct pt_cli){.block_width = 200, .block_height = 200, .checkpoint_every_s = 60.0, .rank_timeout_s = 120.0,
-                           .sampler = -1, .strategy = -1, .filter = -1, .max_depth = PT_CLI_SCENES_DEPTH};
+    *cli = (struct pt_cli){.block_width = 200,
+                           .block_height = 200,
+                           .checkpoint_every_s = 60.0,
+                           .rank_timeout_s = 120.0,
+                           .sampler = -1,
+                           .strategy = -1,
+                           .filter = -1,
+                           .max_depth = PT_CLI_SCENES_DEPTH};
     int rc = base_options_parse(&command, argc, argv, cli, err);
     if (!rc)
         rc = check_together(cli, err);

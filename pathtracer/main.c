@@ -45,17 +45,11 @@ static int run(struct pt_session *s, int *status, struct base_err *err)
         return rc;
     base_interrupt_catch();
     switch (s->cli.action) {
-    case PT_CLI_EXPLAIN:
-        explain(s);
-        return 0;
-    case PT_CLI_DEBUG_PATH:
-        return debug_path(s, err);
-    case PT_CLI_QUOTE:
-        return pt_action_quote(s, status, err);
-    case PT_CLI_SEQUENCE:
-        return pt_action_sequence(s, status, err);
-    default:
-        return pt_action_image(s, status, err);
+    case PT_CLI_EXPLAIN: explain(s); return 0;
+    case PT_CLI_DEBUG_PATH: return debug_path(s, err);
+    case PT_CLI_QUOTE: return pt_action_quote(s, status, err);
+    case PT_CLI_SEQUENCE: return pt_action_sequence(s, status, err);
+    default: return pt_action_image(s, status, err);
     }
 }
 

@@ -22,9 +22,9 @@ static const struct pt_quote_row *asked_row(const struct pt_quote *q)
 
 struct dear_block {
     uint32_t index;
-    double share;            /* of the time of all blocks */
-    double bounces;          /* vertices per path */
-    const char *mostly;      /* what most of them are */
+    double share;       /* of the time of all blocks */
+    double bounces;     /* vertices per path */
+    const char *mostly; /* what most of them are */
     double mostly_share;
 };
 
@@ -123,7 +123,8 @@ static void print_dearest(FILE *out, const struct pt_quote *q, const struct pt_r
         const struct lull_host_stop_at *stop = &row->blocks[dear[k].index].stop;
         double paths = (double)b->spp * (double)(b->x1 - b->x0) * (double)(b->y1 - b->y0);
         char spp[32], low[32], high[32];
-        fprintf(out, "  block %u (%d,%d to %d,%d): %.0f %%, %s spp (%s to %s), %.2f us per path of %.1f vertices, %.0f %% "
+        fprintf(out,
+                "  block %u (%d,%d to %d,%d): %.0f %%, %s spp (%s to %s), %.2f us per path of %.1f vertices, %.0f %% "
                 "of them %s\n",
                 b->id, b->x0, b->y0, b->x1, b->y1, 100 * dear[k].share, thousands(stop->spp, 0, spp),
                 thousands(stop->low, 0, low), thousands(stop->high, 0, high), paths > 0 ? b->thread_s / paths * 1e6 : 0.0,
@@ -154,7 +155,8 @@ void pt_quote_text(FILE *out, const struct pt_quote *q, const struct pt_render *
     for (int i = 0; i < q->row_count; i++)
         print_row(out, &q->rows[i]);
     if (asked->unknown > 0)
-        fprintf(out, "criterion %s does not say when it expects to stop %u of %u blocks: those are counted with --spp-max, "
+        fprintf(out,
+                "criterion %s does not say when it expects to stop %u of %u blocks: those are counted with --spp-max, "
                 "so that all is at most\n",
                 lull_host_table(r->criterion)->id, asked->unknown, q->block_count);
     print_dearest(out, q, r);

@@ -8,20 +8,20 @@
 #include "render/quote.h"
 
 struct pt_quote_info {
-    const char *scene;           /* path of the scene file */
+    const char *scene;              /* path of the scene file */
     const struct lull_pair *params; /* of the criterion, as given */
     uint32_t param_count;
-    int64_t scene_bytes;         /* memory of the scene */
-    double load_s;               /* wall seconds until the first sample */
-    int interrupted;             /* the pilot was */
+    int64_t scene_bytes; /* memory of the scene */
+    double load_s;       /* wall seconds until the first sample */
+    int interrupted;     /* the pilot was */
 };
 
 /* The table for people and what stands out. The quote is finished; paths of the dearest blocks are replayed. */
 void pt_quote_text(FILE *out, const struct pt_quote *quote, const struct pt_render *render,
                    const struct pt_quote_info *info);
 /* The same and every block. */
-int pt_quote_json(FILE *out, const struct pt_quote *quote, const struct pt_render *render,
-                  const struct pt_quote_info *info, struct base_err *err);
+int pt_quote_json(FILE *out, const struct pt_quote *quote, const struct pt_render *render, const struct pt_quote_info *info,
+                  struct base_err *err);
 /* Predicted time of each block of the row as asked: thread seconds, or minutes when they are long. */
 int pt_quote_map(const char *path, const struct pt_quote *quote, const struct pt_render *render, struct base_err *err);
 

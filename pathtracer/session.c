@@ -25,10 +25,16 @@ void pt_note(void *data, const char *line)
 
 static int load_scene(struct pt_session *s, struct base_err *err)
 {
-    struct pt_load_options options = {.strict = s->cli.strict, .width = s->cli.width, .height = s->cli.height,
-                                      .view = s->cli.view, .light_selection = s->cli.light_selection,
+    struct pt_load_options options = {.strict = s->cli.strict,
+                                      .width = s->cli.width,
+                                      .height = s->cli.height,
+                                      .view = s->cli.view,
+                                      .light_selection = s->cli.light_selection,
                                       .forced = s->cli.all_effects ? PT_FX_ALL : 0,
-                                      .quiet = s->cli.quiet, .inputs = &s->scene_files, .warn = pt_note, .warn_data = s};
+                                      .quiet = s->cli.quiet,
+                                      .inputs = &s->scene_files,
+                                      .warn = pt_note,
+                                      .warn_data = s};
     int rc = pt_scene_load(s->cli.scene, &options, &s->scene, &s->defaults, err);
     if (rc)
         return rc;

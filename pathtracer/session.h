@@ -18,8 +18,8 @@
 struct pt_session {
     struct pt_cli cli;
     struct base_inputs scene_files, judging; /* what was read; judging: plugin and mask */
-    struct base_peers *peers;  /* NULL: this process is alone */
-    struct pt_crew *crew;      /* of rank 0 */
+    struct base_peers *peers;                /* NULL: this process is alone */
+    struct pt_crew *crew;                    /* of rank 0 */
     struct base_threads *threads;
     struct pt_scene *scene;
     struct pt_scene_defaults defaults;
@@ -27,7 +27,7 @@ struct pt_session {
     struct lull_host_criterion *criterion;
     struct pt_render *render;
     struct pt_quote *quote;
-    double start_s;         /* wall time of the program's start */
+    double start_s; /* wall time of the program's start */
     struct pt_progress progress;
     pt_kernel *kernel;
     const char *kernel_name;

@@ -30,8 +30,8 @@ int ggn_baseline_init(struct ggn_baseline *b, enum ggn_baseline_kind kind, int w
     if (window < 1 || window > GGN_WINDOW_MAX)
         return base_fail(err, BASE_EINVAL, "%s: windows of %d images; it takes 1 to %d", ggn_baseline_names[kind], window,
                          GGN_WINDOW_MAX);
-    *b = (struct ggn_baseline){.kind = kind, .width = width, .height = height, .window = window,
-                               .policy = ggn_policy_default()};
+    *b = (struct ggn_baseline){
+        .kind = kind, .width = width, .height = height, .window = window, .policy = ggn_policy_default()};
     b->features = kind == GGN_SVD_ENTROPY      ? ggn_svd_entropy_count(width, height)
                   : kind == GGN_ATTRIBUTES_SVM ? GGN_ATTRIBUTES
                                                : GGN_MASK_FEATURES;
@@ -298,7 +298,7 @@ static void look_at_tile(struct ggn_baseline_reader *r, const uint8_t *rgb, doub
     double *l = r->lightness;
 
     ggn_lightness(rgb, pixels, l);
-    int rc = b->kind == GGN_SVD_ENTROPY ? ggn_svd_entropy(l, b->width, b->height, b->first, GGN_SUB_BLOCK, look, NULL)
+    int rc = b->kind == GGN_SVD_ENTROPY      ? ggn_svd_entropy(l, b->width, b->height, b->first, GGN_SUB_BLOCK, look, NULL)
              : b->kind == GGN_ATTRIBUTES_SVM ? ggn_attributes(l, b->width, b->height, l + pixels, look, NULL)
                                              : ggn_noise_mask(l, b->width, b->height, l + pixels, look, NULL);
     for (int i = 0; i < b->features && rc; i++)

@@ -22,8 +22,8 @@ enum ggn_baseline_kind {
     GGN_MASK_SVM,       /* noise mask + SVM (Takouachet et al. 2017) */
     GGN_BASELINES
 };
-extern const char *const ggn_baseline_names[GGN_BASELINES + 1];  /* "svd-entropy", "attributes", "noise-mask", NULL */
-extern const char *const ggn_baseline_titles[GGN_BASELINES];     /* for tables */
+extern const char *const ggn_baseline_names[GGN_BASELINES + 1]; /* "svd-entropy", "attributes", "noise-mask", NULL */
+extern const char *const ggn_baseline_titles[GGN_BASELINES];    /* for tables */
 
 struct ggn_baseline {
     enum ggn_baseline_kind kind;
@@ -32,7 +32,7 @@ struct ggn_baseline {
     int first;         /* SVD-entropy: number of the first singular value, 0 or 5 */
     int features;      /* numbers per tile and image */
     struct ggn_policy policy;
-    float *lstm; /* owns; [ggn_lstm_parameters(features)]; NULL: not trained, or an SVM */
+    float *lstm;        /* owns; [ggn_lstm_parameters(features)]; NULL: not trained, or an SVM */
     struct ggn_svm svm; /* empty: not trained, or an LSTM */
 };
 

@@ -20,10 +20,7 @@ void ggn_lightness(const uint8_t *rgb, size_t pixels, double *l)
     }
 }
 
-int ggn_svd_entropy_count(int w, int h)
-{
-    return (w / GGN_SUB_BLOCK) * (h / GGN_SUB_BLOCK);
-}
+int ggn_svd_entropy_count(int w, int h) { return (w / GGN_SUB_BLOCK) * (h / GGN_SUB_BLOCK); }
 
 /* Entropy of the squared singular values s[first..last), normalised to [0,1]. */
 static double entropy(const double *s, int first, int last)

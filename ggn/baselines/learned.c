@@ -76,8 +76,8 @@ static void cases_release(struct cases *c)
     free(c->label);
 }
 
-static int list_cases(struct cases *c, const struct ggn_baseline *b, const struct ggn_looks *t,
-                      const struct ggn_eval_set *s, enum ggn_split split, struct base_err *err)
+static int list_cases(struct cases *c, const struct ggn_baseline *b, const struct ggn_looks *t, const struct ggn_eval_set *s,
+                      enum ggn_split split, struct base_err *err)
 {
     size_t room = s->n > 0 ? s->n : 1, skipped = (size_t)(s->window - b->window);
     *c = (struct cases){.window = malloc(room * sizeof *c->window), .label = malloc(room)};
@@ -164,8 +164,8 @@ static void set_cadence(struct ggn_baseline *b, const struct ggn_eval_set *s)
         b->policy.first_spp = ggn_policy_next(&b->policy, b->policy.first_spp);
 }
 
-int ggn_baseline_train(struct ggn_baseline *b, const struct ggn_looks *t, const struct ggn_eval_set *s,
-                       enum ggn_split split, int epochs, struct base_err *err)
+int ggn_baseline_train(struct ggn_baseline *b, const struct ggn_looks *t, const struct ggn_eval_set *s, enum ggn_split split,
+                       int epochs, struct base_err *err)
 {
     struct cases c;
     size_t positive = 0;

@@ -12,25 +12,25 @@ static const float dropout = 0.4f;
 
 struct layer {
     int in, out;
-    size_t w, u, b;  /* offsets of W [4·out, in], U [4·out, out], b [4·out] in the parameters; gates in the order i, f, g, o
+    size_t w, u, b; /* offsets of W [4·out, in], U [4·out, out], b [4·out] in the parameters; gates in the order i, f, g, o
                         */
-    float *z;        /* [steps][batch][4·out]: gates after their activation; then d loss / d pre-activation */
+    float *z;       /* [steps][batch][4·out]: gates after their activation; then d loss / d pre-activation */
     float *c, *s, *h; /* [steps][batch][out]: cell, sigmoid(cell), output (before dropout) */
-    float *x;        /* [steps][batch][in]: what came in (after dropout) */
-    float *dx;       /* the same shape: d loss / d x */
-    float *mask;     /* [steps][batch][out]: dropout of the output, 0 or 1/(1-p) */
+    float *x;         /* [steps][batch][in]: what came in (after dropout) */
+    float *dx;        /* the same shape: d loss / d x */
+    float *mask;      /* [steps][batch][out]: dropout of the output, 0 or 1/(1-p) */
 };
 
 struct ggn_lstm {
     int inputs, steps, batch; /* batch: sequences at a time, 1 or BATCH */
     uint32_t seed, calls;
-    size_t n, dense;        /* parameters; offset of the last unit's [32] weights and bias */
+    size_t n, dense; /* parameters; offset of the last unit's [32] weights and bias */
     long adam_steps;
-    float *owned;            /* p, grad, m, v, [n] each; NULL: a reader, whose p is borrowed and that has no others */
+    float *owned; /* p, grad, m, v, [n] each; NULL: a reader, whose p is borrowed and that has no others */
     const float *p;
     float *grad, *m, *v;
-    float *activations;      /* owns what the layers point to */
-    float *dh, *dc;          /* [batch][512] scratch of the backward pass */
+    float *activations; /* owns what the layers point to */
+    float *dh, *dc;     /* [batch][512] scratch of the backward pass */
     struct layer layers[LAYERS];
 };
 
@@ -44,15 +44,9 @@ static uint32_t hash(uint32_t k, uint32_t s)
     return h ^ h >> 16;
 }
 
-static float uniform(uint32_t k, uint32_t s)
-{
-    return (float)hash(k, s) / 4294967296.0f;
-}
+static float uniform(uint32_t k, uint32_t s) { return (float)hash(k, s) / 4294967296.0f; }
 
-static float sigmoid(float x)
-{
-    return 1.0f / (1.0f + expf(-x));
-}
+static float sigmoid(float x) { return 1.0f / (1.0f + expf(-x)); }
 
 static float hard_sigmoid(float x)
 {
@@ -183,10 +177,7 @@ struct ggn_lstm *ggn_lstm_reader(int inputs, int steps, const float *weights, st
     return create(inputs, steps, 1, weights, err);
 }
 
-float *ggn_lstm_weights(struct ggn_lstm *l)
-{
-    return l->owned;
-}
+float *ggn_lstm_weights(struct ggn_lstm *l) { return l->owned; }
 
 /* Z = X·Wᵀ + H₋·Uᵀ + b; i, f, o = hard sigmoid, g = sigmoid; c = f∘c₋ + i∘g; h = o∘sigmoid(c). */
 static void forward_step(const struct ggn_lstm *l, const struct layer *y, int t, int batch)
@@ -226,8 +217,9 @@ static void forward(struct ggn_lstm *l, int batch, int training, float *logit)
             forward_step(l, y, t, batch);
         l->calls += training != 0;
         for (size_t i = 0; i < n; i++)
-            y->mask[i] = !training ? 1.0f : uniform((uint32_t)i,
-                                                    l->seed + 1000 + l->calls) < dropout ? 0.0f : 1.0f / (1.0f - dropout);
+            y->mask[i] = !training                                                   ? 1.0f
+                         : uniform((uint32_t)i, l->seed + 1000 + l->calls) < dropout ? 0.0f
+                                                                                     : 1.0f / (1.0f - dropout);
         for (size_t i = 0; i < n && k + 1 < LAYERS; i++)
             l->layers[k + 1].x[i] = y->h[i] * y->mask[i];
     }
@@ -241,10 +233,7 @@ static void forward(struct ggn_lstm *l, int batch, int training, float *logit)
 }
 
 /* Slope of the hard sigmoid from its value: flat at both ends. */
-static float hard_slope(float y)
-{
-    return y > 0.0f && y < 1.0f ? 0.2f : 0.0f;
-}
+static float hard_slope(float y) { return y > 0.0f && y < 1.0f ? 0.2f : 0.0f; }
 
 /* One step back: dh (in l->dh) and dc (in l->dc) come from step t+1 and leave for t-1; z becomes d loss / d pre-activation.
  * */
@@ -338,10 +327,7 @@ static void adam(struct ggn_lstm *l)
 }
 
 /* max(z, 0) − y·z + log(1 + e^−|z|) */
-static double cross_entropy(double z, int y)
-{
-    return fmax(z, 0.0) - y * z + log1p(exp(-fabs(z)));
-}
+static double cross_entropy(double z, int y) { return fmax(z, 0.0) - y * z + log1p(exp(-fabs(z))); }
 
 double ggn_lstm_epoch(struct ggn_lstm *l, const double *const *sequences, const unsigned char *label, size_t n,
                       uint32_t epoch)

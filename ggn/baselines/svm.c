@@ -36,10 +36,7 @@ int ggn_svm_init(struct ggn_svm *svm, int features, int n_support, struct base_e
     return 0;
 }
 
-static void be_quiet(const char *text)
-{
-    (void)text;
-}
+static void be_quiet(const char *text) { (void)text; }
 
 /* Mean and 1/deviation of each feature: [features] each. */
 static void fit_scale(double *mean, double *scale, const double *x, size_t n, size_t features)
@@ -109,9 +106,16 @@ int ggn_svm_train(struct ggn_svm *svm, const double *x, const unsigned char *lab
     int labels[2] = {1, 0};
     double weights[2] = {0.5 * (double)n / (double)positive, 0.5 * (double)n / (double)(n - positive)};
     struct svm_problem problem = {.l = (int)n, .y = y, .x = rows};
-    struct svm_parameter parameter = {.svm_type = C_SVC, .kernel_type = RBF, .gamma = gamma / features, .C = c,
-                                      .cache_size = 100, .eps = 1e-3, .shrinking = 1,
-                                      .nr_weight = 2, .weight_label = labels, .weight = weights};
+    struct svm_parameter parameter = {.svm_type = C_SVC,
+                                      .kernel_type = RBF,
+                                      .gamma = gamma / features,
+                                      .C = c,
+                                      .cache_size = 100,
+                                      .eps = 1e-3,
+                                      .shrinking = 1,
+                                      .nr_weight = 2,
+                                      .weight_label = labels,
+                                      .weight = weights};
     svm_set_print_string_function(be_quiet);
     struct svm_model *model = svm_train(&problem, &parameter);
     rc = !model ? base_fail_nomem(err, "SVM") : take_over(svm, model, mean, mean + d, rows, features, err);

@@ -13,7 +13,7 @@ enum { GGN_SVM_FEATURES = 256 }; /* at most */
 struct ggn_svm {
     int features, n_support;
     double gamma, rho;
-    float *values; /* owns what follows, one after the other */
+    float *values;       /* owns what follows, one after the other */
     float *mean, *scale; /* [features] */
     float *coefficient;  /* [n_support] */
     float *support;      /* [n_support][features], standardised */

@@ -22,8 +22,9 @@ static const struct base_option list[] = {
     {"output", 'o', "FILE", TO(out), .needed = 1, .output = BASE_FILE, .kind = &ggn_container_kind,
      .help = "the model, for -p model=FILE (needed)"},
     {"epochs", 0, "N", TO(epochs), 1, 1024, .help = "epochs of svd-entropy's LSTM (30, as published)"},
-    {"early", 0, "RATE", TO(early), 0, 1, .help = "early-stop rate that the threshold is tuned for on the training scenes "
-                                                  "(0.05)"},
+    {"early", 0, "RATE", TO(early), 0, 1,
+     .help = "early-stop rate that the threshold is tuned for on the training scenes "
+             "(0.05)"},
     {"ratio", 0, "R", TO(ratio), 1, 16, .help = "thin the levels to this ratio of samples; else keep all"},
     {"window", 'w', "S", TO(window), 2, 16, .help = "images that svd-entropy judges together (6)"},
     {"type", 't', NULL, TO(type), .words = ggn_type_names, .help = "type of the stored weights (f32)"},
@@ -107,9 +108,9 @@ int ggn_cmd_baseline(int argc, char **argv)
     if (!rc && !(threads = base_threads_create(o.threads, &err)))
         rc = err.code;
     if (!rc)
-        rc = ggn_eval_set_load(
-            &set, &(struct ggn_eval_options){.dir = o.data, .window = o.window, .ratio = o.ratio, .seed = 1}, threads,
-            &skipped, &err);
+        rc = ggn_eval_set_load(&set,
+                               &(struct ggn_eval_options){.dir = o.data, .window = o.window, .ratio = o.ratio, .seed = 1},
+                               threads, &skipped, &err);
     if (!rc)
         rc = train(&o, kind, &set, threads, &err);
     ggn_eval_set_release(&set);

@@ -35,19 +35,29 @@ struct bench {
     struct options o;
     struct base_threads *threads;
     struct ggn_trainer *trainer;
-    struct ggn_exec *r, *m, *d; /* inference */
+    struct ggn_exec *r, *m, *d;          /* inference */
     struct ggn_exec *(*alone)[GGN_NETS]; /* [threads] the same for each thread: criteria decide about blocks side by side */
-    float *planes;                  /* random pictures */
+    float *planes;                       /* random pictures */
     const float *noisy[64 * 3 * GGN_WINDOW_MAX], *reference[64 * 3], *picture[64];
 };
 
-enum { DENOISER, GENERATOR, DISCRIMINATOR, DECISION, BLOCKS_TOGETHER, BLOCKS_ALONE, DENOISER_TRAIN,
-       GENERATOR_TRAIN, TRAIN_SAMPLE, SGEMM, N_FIGURES };
+enum {
+    DENOISER,
+    GENERATOR,
+    DISCRIMINATOR,
+    DECISION,
+    BLOCKS_TOGETHER,
+    BLOCKS_ALONE,
+    DENOISER_TRAIN,
+    GENERATOR_TRAIN,
+    TRAIN_SAMPLE,
+    SGEMM,
+    N_FIGURES
+};
 
 static const char *const figure_name[N_FIGURES] = {
-    "denoiser_forward_ms", "generator_forward_ms", "discriminator_forward_ms", "decision_ms",
-    "blocks_16_ms",        "blocks_16_alone_ms",
-    "denoiser_train_ms",   "generator_train_ms",   "train_sample_ms",          "sgemm_gflops",
+    "denoiser_forward_ms", "generator_forward_ms", "discriminator_forward_ms", "decision_ms",     "blocks_16_ms",
+    "blocks_16_alone_ms",  "denoiser_train_ms",    "generator_train_ms",       "train_sample_ms", "sgemm_gflops",
 };
 
 /* The published sizes or those of a model; both presets are measured as the mended one, whose steps are simpler. */
@@ -136,10 +146,7 @@ static void release(struct bench *b)
 }
 
 /* On one thread the processor's time, which other jobs on the machine change little. */
-static double now_s(const struct bench *b)
-{
-    return b->o.threads == 1 ? base_clock_thread_s() : base_clock_wall_s();
-}
+static double now_s(const struct bench *b) { return b->o.threads == 1 ? base_clock_thread_s() : base_clock_wall_s(); }
 
 static double forward_ms(struct bench *b, struct ggn_exec *e, int net)
 {
@@ -185,8 +192,8 @@ static double denoiser_train_ms(struct bench *b, struct base_err *err)
 static double judge_train_ms(struct bench *b, struct base_err *err)
 {
     double label[64], bce, start = now_s(b);
-    struct ggn_batch batch = {.count = b->o.batch, .noisy = b->noisy, .denoised = b->noisy, .label = label,
-                              .picture = b->picture};
+    struct ggn_batch batch = {
+        .count = b->o.batch, .noisy = b->noisy, .denoised = b->noisy, .label = label, .picture = b->picture};
 
     for (int i = 0; i < b->o.batch; i++)
         label[i] = i & 1;
@@ -316,8 +323,7 @@ static void print_figures(const struct bench *b, const double figure[N_FIGURES])
 
 int ggn_cmd_bench(int argc, char **argv)
 {
-    static const struct base_options options = {
-        .list = list, .doc = "Measures inference and training of the networks."};
+    static const struct base_options options = {.list = list, .doc = "Measures inference and training of the networks."};
     struct bench b = {.o = {.threads = base_threads_available(), .rounds = 9, .batch = 4}};
     double figure[N_FIGURES];
     struct base_err err = {0};

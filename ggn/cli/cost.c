@@ -19,8 +19,7 @@ enum { MAX_FILES = 16 };
 
 struct options {
     const char *data, *out, *observer, *models[MAX_FILES], *baselines[MAX_FILES], *thresholds[MAX_FILES];
-    int n_models, n_baselines, n_thresholds, split, threads, no_quality, recorded, sizes, scores, precision,
-        no_pictures;
+    int n_models, n_baselines, n_thresholds, split, threads, no_quality, recorded, sizes, scores, precision, no_pictures;
     double ratio, cadence;
 };
 
@@ -94,10 +93,19 @@ static void put_cost(cJSON *to, const struct ggn_cost *c, int *failed)
     const struct {
         const char *key;
         double value;
-    } fields[] = {{"samples", c->samples}, {"sampling_s", c->sampling_s}, {"checks_cheap", c->cheap},
-                  {"checks_full", c->full}, {"noisy", c->noisy}, {"early", c->early}, {"worst", c->worst},
-                  {"uniform_spp", c->uniform_spp}, {"time_ratio", c->time_ratio}, {"samples_ratio", c->samples_ratio},
-                  {"flip", c->flip}, {"flip_worst", c->flip_worst}, {"relmse", c->relmse}};
+    } fields[] = {{"samples", c->samples},
+                  {"sampling_s", c->sampling_s},
+                  {"checks_cheap", c->cheap},
+                  {"checks_full", c->full},
+                  {"noisy", c->noisy},
+                  {"early", c->early},
+                  {"worst", c->worst},
+                  {"uniform_spp", c->uniform_spp},
+                  {"time_ratio", c->time_ratio},
+                  {"samples_ratio", c->samples_ratio},
+                  {"flip", c->flip},
+                  {"flip_worst", c->flip_worst},
+                  {"relmse", c->relmse}};
     base_json_number(to, "blocks", c->blocks, failed);
     for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++)
         base_json_number(to, fields[i].key, fields[i].value, failed);
@@ -172,8 +180,7 @@ static void put_scenes(struct job *j, cJSON *root)
 static void put_threshold(struct job *j, cJSON *to, const struct ggn_curve *c)
 {
     int censored;
-    base_json_number(to, NULL, ggn_curve_threshold(c, ggn_observer_default.level, &censored),
-                     &j->failed);
+    base_json_number(to, NULL, ggn_curve_threshold(c, ggn_observer_default.level, &censored), &j->failed);
 }
 
 /* The list of a scene's parts of `side` pixels, empty when nothing has been put into it. */
@@ -307,8 +314,8 @@ static int cost_errors(struct job *j, struct base_err *err)
     static const double halfbuf[] = {0.03, 0.021, 0.015, 0.011, 0.0075, 0.0053, 0.004, 0.0028, 0.002, 0.0014, 0.001};
     for (int k = 0; k < 2; k++) {
         struct ggn_method m;
-        int available, rc = k ? ggn_method_halfbuf(&m, &j->set, &available, err)
-                              : ggn_method_variance(&m, &j->set, &available, err);
+        int available,
+            rc = k ? ggn_method_halfbuf(&m, &j->set, &available, err) : ggn_method_variance(&m, &j->set, &available, err);
         if (rc)
             return rc;
         const double *dial = k ? halfbuf : variance, own = k ? 0.004 : 0.03; /* the criteria's defaults */
@@ -557,10 +564,15 @@ int ggn_cmd_cost(int argc, char **argv)
         rc = look_at_models(&o, &pictures, &window, &err);
     if (!rc)
         rc = ggn_eval_set_load(&j.set,
-                               &(struct ggn_eval_options){.dir = o.data, .window = window, .quality = !o.no_quality,
+                               &(struct ggn_eval_options){.dir = o.data,
+                                                          .window = window,
+                                                          .quality = !o.no_quality,
                                                           .no_ssim = 1,
-                                                          .recorded = o.recorded, .ratio = o.ratio, .seed = 1,
-                                                          .cadence = o.cadence, .pictures = pictures},
+                                                          .recorded = o.recorded,
+                                                          .ratio = o.ratio,
+                                                          .seed = 1,
+                                                          .cadence = o.cadence,
+                                                          .pictures = pictures},
                                threads, &skipped, &err);
     for (int b = 0; o.recorded && b < j.set.n_blocks; b++) /* whose thresholds lie beyond: nothing is known there */
         if (j.set.blocks[b].label.censored)

@@ -393,8 +393,15 @@ static int load(struct job *j, struct base_threads *threads, int *skipped, struc
         files[n++] = o->trained[i];
     if (o->observer)
         files[n++] = o->observer;
-    struct ggn_eval_options eo = {.dir = o->data, .window = window, .quality = !o->no_quality, .recorded = o->recorded,
-                                  .ratio = o->ratio, .seed = 1, .team = ggn_cmd_team, .files = files, .n_files = n};
+    struct ggn_eval_options eo = {.dir = o->data,
+                                  .window = window,
+                                  .quality = !o->no_quality,
+                                  .recorded = o->recorded,
+                                  .ratio = o->ratio,
+                                  .seed = 1,
+                                  .team = ggn_cmd_team,
+                                  .files = files,
+                                  .n_files = n};
     for (int i = 0; i < o->n_models && !rc && !o->no_pictures; i++)
         eo.pictures |= j->models[i]->hyper.picture;
     return rc ? rc : ggn_eval_set_load(&j->set, &eo, threads, skipped, err);

@@ -61,7 +61,7 @@ int ggn_cmd_flip(int argc, char **argv)
         ggn_cmd_tell_clipped(argv[0], o.paths[i], images[i].clipped);
     if (images[0].width != images[1].width || images[0].height != images[1].height) {
         rc = base_fail(&err, BASE_EINVAL, "%s is %dx%d, %s is %dx%d: the sizes must be equal", o.paths[0], images[0].width,
-                      images[0].height, o.paths[1], images[1].width, images[1].height);
+                       images[0].height, o.paths[1], images[1].width, images[1].height);
         goto out;
     }
     if (o.map_path) {

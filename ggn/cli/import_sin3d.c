@@ -52,10 +52,7 @@ static int import_one(const struct options *o, const struct ggn_sin3d_options *s
     return rc;
 }
 
-static int compare_names(const void *a, const void *b)
-{
-    return strcmp(*(char *const *)a, *(char *const *)b);
-}
+static int compare_names(const void *a, const void *b) { return strcmp(*(char *const *)a, *(char *const *)b); }
 
 /* Every view folder in the root, in order of name. */
 static int import_all(const struct options *o, const struct ggn_sin3d_options *so, struct base_err *err)

@@ -12,10 +12,9 @@ struct options {
 };
 
 #define TO(member) BASE_TO(struct options, member)
-static const struct base_option list[] = {
-    {"json", 'j', NULL, TO(json), .help = "print the description as stored (JSON)"},
-    {"tensors", 't', NULL, TO(tensors), .help = "list the tensors too"},
-    {0}};
+static const struct base_option list[] = {{"json", 'j', NULL, TO(json), .help = "print the description as stored (JSON)"},
+                                          {"tensors", 't', NULL, TO(tensors), .help = "list the tensors too"},
+                                          {0}};
 
 static void print_tensors(const struct ggn_container *c)
 {
@@ -59,13 +58,12 @@ static int print_model(const struct ggn_model *m, const struct ggn_container *c,
 
 int ggn_cmd_inspect(int argc, char **argv)
 {
-    static const struct base_options options = {
-        .list = list,
-        .args_doc = "FILE",
-        .args_min = 1,
-        .args_max = 1,
-        .args = offsetof(struct options, path),
-        .doc = "Prints what a model file (.ggn) holds and checks it."};
+    static const struct base_options options = {.list = list,
+                                                .args_doc = "FILE",
+                                                .args_min = 1,
+                                                .args_max = 1,
+                                                .args = offsetof(struct options, path),
+                                                .doc = "Prints what a model file (.ggn) holds and checks it."};
     struct options o = {0};
     struct ggn_container c;
     struct ggn_model *model = NULL;

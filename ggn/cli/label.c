@@ -75,7 +75,9 @@ static int human_labels(const struct options *o, const struct ggn_thresholds *t,
                        ggn_dataset_tiles(v));
     if (rc)
         return rc;
-    struct ggn_labels l = {.source = "human", .cap = GGN_LABELS_CAP, .spread = o->spread > 0 ? o->spread : GGN_LABELS_SPREAD,
+    struct ggn_labels l = {.source = "human",
+                           .cap = GGN_LABELS_CAP,
+                           .spread = o->spread > 0 ? o->spread : GGN_LABELS_SPREAD,
                            .labels = malloc(m->n_blocks * sizeof *l.labels)};
     if (!l.labels)
         return base_fail_nomem(err, v->dir);

@@ -23,10 +23,7 @@ struct base_team *ggn_cmd_team;
 
 static char last_words[512]; /* what a process other than rank 0 would have said */
 
-int ggn_cmd_is_mine(long i)
-{
-    return i % base_team_count(ggn_cmd_team) == base_team_rank(ggn_cmd_team);
-}
+int ggn_cmd_is_mine(long i) { return i % base_team_count(ggn_cmd_team) == base_team_rank(ggn_cmd_team); }
 
 void ggn_cmd_follow_rank_0(void)
 {
@@ -37,8 +34,8 @@ void ggn_cmd_follow_rank_0(void)
 void ggn_cmd_tell_clipped(const char *command, const char *path, size_t clipped)
 {
     if (clipped > 0)
-        fprintf(stderr, "%s: %s: %zu pixels are NaN, infinite or negative; they are compared as black or white\n",
-                command, path, clipped);
+        fprintf(stderr, "%s: %s: %zu pixels are NaN, infinite or negative; they are compared as black or white\n", command,
+                path, clipped);
 }
 
 int ggn_cmd_fail(const char *command, const struct base_err *err)

@@ -30,7 +30,7 @@ static const struct base_option list[] = {
 struct picture {
     uint8_t *taken, *reference; /* own; [height][width][3] */
     double samples, worst_flip;
-    int blocks, beyond;         /* beyond: stops after the last level, which was taken instead */
+    int blocks, beyond; /* beyond: stops after the last level, which was taken instead */
     uint32_t worst_block;
 };
 

@@ -362,8 +362,7 @@ static int do_export(const struct options *o, const struct ggn_study *study, str
 }
 
 static const struct base_option export_list[] = {
-    {"output", 'o', "FILE", TO(out), .needed = 1, .output = BASE_FILE, .help = "the file to write (required)"},
-    {0}};
+    {"output", 'o', "FILE", TO(out), .needed = 1, .output = BASE_FILE, .help = "the file to write (required)"}, {0}};
 
 static int run_export(int argc, char **argv)
 {

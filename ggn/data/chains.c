@@ -9,10 +9,7 @@
 
 enum { MAX_CHAINS = 1 << 16 };
 
-size_t ggn_chains_values(const struct ggn_chains *set)
-{
-    return 3 * (size_t)set->width * (size_t)set->height;
-}
+size_t ggn_chains_values(const struct ggn_chains *set) { return 3 * (size_t)set->width * (size_t)set->height; }
 
 void ggn_chains_release(struct ggn_chains *set)
 {
@@ -221,8 +218,8 @@ static int fill_chain(const struct ggn_chains *set, struct ggn_chain *c, const s
     struct halves h = {.full = seq_full_level(b)};
     const struct seq_record *reference = b->reference || !o->mean_for_reference ? b->reference : h.full;
     float *memory = set->pictures ? malloc((values + values / 3) * sizeof *memory) : NULL;
-    int rc = set->pictures && !memory ? base_fail_nomem(err, "noise pictures")
-                                      : ggn_chain_grow(set, c, (int)b->n_levels, err);
+    int rc =
+        set->pictures && !memory ? base_fail_nomem(err, "noise pictures") : ggn_chain_grow(set, c, (int)b->n_levels, err);
 
     h.mean = memory;
     h.d = memory ? memory + values : NULL;

@@ -15,20 +15,20 @@
 
 struct ggn_chain {
     int view, scene, synthetic;
-    int simulated;        /* the recording had no reference: all levels are made from its two halves */
+    int simulated; /* the recording had no reference: all levels are made from its two halves */
     enum ggn_split split;
     uint32_t block;
     int n_levels;
-    double *spp;          /* [n_levels], rising */
-    uint8_t *noisy;       /* [n_levels][3][H][W] display codes */
-    uint16_t *denoised;   /* the same, 16-bit fixed point; NULL until needed */
-    uint8_t *reference;   /* [3][H][W] display codes; NULL without; a synthetic chain shares its original's */
+    double *spp;        /* [n_levels], rising */
+    uint8_t *noisy;     /* [n_levels][3][H][W] display codes */
+    uint16_t *denoised; /* the same, 16-bit fixed point; NULL until needed */
+    uint8_t *reference; /* [3][H][W] display codes; NULL without; a synthetic chain shares its original's */
     /* with set->pictures: the noise pictures (model/window.h), [n_levels][H][W], and whether a level has one */
     uint8_t *picture, *has_picture;
     double *tail999, *gini; /* [n_levels], NaN where not recorded */
     int has_label;
     struct ggn_label label;
-    double spread;        /* octaves, for soft labels */
+    double spread; /* octaves, for soft labels */
 };
 
 struct ggn_chains {
@@ -41,16 +41,16 @@ struct ggn_chains {
 };
 
 struct ggn_chains_options {
-    const char *dir;        /* a data set (data/dataset.h) */
+    const char *dir; /* a data set (data/dataset.h) */
     /* comma-separated scenes: over the data set's split; NULL: the split, or every fifth scene without */
     const char *validation;
-    const char *test;       /* likewise; NULL: the split, or none */
-    double ratio;           /* thin the levels to at least this ratio; 0: keep all */
-    int pictures;           /* also make the noise pictures */
+    const char *test; /* likewise; NULL: the split, or none */
+    double ratio;     /* thin the levels to at least this ratio; 0: keep all */
+    int pictures;     /* also make the noise pictures */
     /* where there is no reference, the mean of the full level stands for it: as noisy as that many samples are, which
      * levels recorded below it share */
     int mean_for_reference;
-    int with_test;          /* read the pixels of the test scenes and of the people's views too (training never does) */
+    int with_test; /* read the pixels of the test scenes and of the people's views too (training never does) */
 };
 
 /* Reads and checks everything. BASE_EINVAL names the file that does not fit. */

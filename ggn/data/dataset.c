@@ -92,7 +92,7 @@ static int scan_all(const char *path, struct ggn_dataset *d, struct base_err *er
             if (strcmp(d->views[i].manifest.scene, d->views[k].manifest.scene) == 0 &&
                 d->views[i].split != d->views[k].split)
                 rc = base_fail(err, BASE_EINVAL, "%s: scene '%s' is in %s and in %s", path, d->views[i].manifest.scene,
-                              ggn_split_names[d->views[k].split], ggn_split_names[d->views[i].split]);
+                               ggn_split_names[d->views[k].split], ggn_split_names[d->views[i].split]);
     if (!rc && d->n == 0)
         rc = base_fail(err, BASE_EINVAL, "%s: no recorded sequence in it (no manifest.json)", path);
     return rc;
@@ -102,7 +102,7 @@ static int apply_split(const char *path, const cJSON *root, struct ggn_dataset *
 {
     for (int s = 0; s < GGN_SPLIT_NONE; s++) {
         const cJSON *list = cJSON_GetObjectItemCaseSensitive(root, ggn_split_names[s]), *v;
-        cJSON_ArrayForEach(v, list) {
+        cJSON_ArrayForEach (v, list) {
             if (!cJSON_IsString(v))
                 return base_fail(err, BASE_EINVAL, "%s: %s: a scene is a string", path, ggn_split_names[s]);
             for (int i = 0; i < d->n; i++) {
@@ -111,7 +111,7 @@ static int apply_split(const char *path, const cJSON *root, struct ggn_dataset *
                     continue;
                 if (view->split != GGN_SPLIT_NONE && view->split != (enum ggn_split)s)
                     return base_fail(err, BASE_EINVAL, "%s: scene '%s' is in %s and in %s", path, v->valuestring,
-                                    ggn_split_names[view->split], ggn_split_names[s]);
+                                     ggn_split_names[view->split], ggn_split_names[s]);
                 view->split = (enum ggn_split)s;
             }
         }

@@ -10,14 +10,14 @@ static int library(const char *path, const struct ggn_oiio_library **out, struct
 {
     const struct ggn_oiio_library *linked = &ggn_oiio_library;
     *out = linked ? linked : base_module_symbol("ggn-images.so", "ggn_oiio_library", 0);
-    return *out ? 0 : base_fail(err, BASE_EIO, "%s: images cannot be read: lib/ggn-images.so, which belongs beside this "
-                                               "program's bin/, or OpenImageIO cannot be loaded", path);
+    return *out ? 0
+                : base_fail(err, BASE_EIO,
+                            "%s: images cannot be read: lib/ggn-images.so, which belongs beside this "
+                            "program's bin/, or OpenImageIO cannot be loaded",
+                            path);
 }
 
-static int is_light(float v)
-{
-    return isfinite(v) && v >= 0.0f;
-}
+static int is_light(float v) { return isfinite(v) && v >= 0.0f; }
 
 /* Light as a display shows it. */
 static int encode(const char *path, const struct ggn_imagef *linear, struct ggn_image8 *image, struct base_err *err)

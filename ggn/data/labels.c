@@ -61,7 +61,7 @@ static int parse_entries(const char *path, const cJSON *blocks, struct ggn_label
     l->labels = malloc((size_t)n * sizeof *l->labels);
     if (!l->labels)
         return base_fail_nomem(err, path);
-    cJSON_ArrayForEach(v, blocks) {
+    cJSON_ArrayForEach (v, blocks) {
         const cJSON *id = cJSON_GetObjectItemCaseSensitive(v, "id");
         struct ggn_label *label = &l->labels[l->n];
         if (!cJSON_IsNumber(id) || !(id->valuedouble >= 0 && id->valuedouble < UINT32_MAX) ||

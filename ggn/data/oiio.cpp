@@ -17,7 +17,8 @@ extern "C" {
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
-namespace {
+namespace
+{
 
 using OIIO::ImageInput;
 using OIIO::ImageSpec;

@@ -158,7 +158,7 @@ static int read_picture(const struct view *v, const struct level *level, struct 
 struct row {
     int columns, block, y0;
     struct seq_builder *builders; /* [columns] */
-    uint8_t *display;                 /* [3][block^2] */
+    uint8_t *display;             /* [3][block^2] */
     double *mean;
 };
 
@@ -181,8 +181,8 @@ static int add_picture(struct row *row, const struct picture *p, uint32_t spp, i
     int rc = 0;
     for (int c = 0; c < row->columns && !rc; c++) {
         cut_block(p, c * row->block, row->y0, row->block, row->display, row->mean);
-        struct seq_frame f = {.spp = spp, .is_reference = is_reference, .display = row->display,
-                                  .mean = p->linear.data ? row->mean : NULL};
+        struct seq_frame f = {
+            .spp = spp, .is_reference = is_reference, .display = row->display, .mean = p->linear.data ? row->mean : NULL};
         rc = seq_builder_add(&row->builders[c], &f, err);
     }
     return rc;

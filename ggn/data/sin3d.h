@@ -9,9 +9,9 @@
 #include "data/thresholds.h"
 
 struct ggn_sin3d_options {
-    int block;          /* pixels */
-    int allow_gaps;     /* take levels that are not evenly spaced */
-    const struct ggn_thresholds *thresholds; /* may be NULL */
+    int block;                                                        /* pixels */
+    int allow_gaps;                                                   /* take levels that are not evenly spaced */
+    const struct ggn_thresholds *thresholds;                          /* may be NULL */
     void (*progress)(void *data, const char *view, int done, int of); /* may be NULL */
     void *data;
 };

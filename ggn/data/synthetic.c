@@ -16,7 +16,7 @@ static const double CLEAN_END = 0.4;     /* a threshold below this share of the 
 
 /* One block's source. */
 struct source {
-    float *base, *d, *last; /* [3][P] linear: the converged image, the half-buffer difference, the last recorded level */
+    float *base, *d, *last;    /* [3][P] linear: the converged image, the half-buffer difference, the last recorded level */
     float *d_luminance, *mean; /* [P]: of d; of the level that is being made */
     /* n_reference infinite: `base` is the mean of the full level and stands for the converged image */
     double n_full, n_reference;
@@ -223,9 +223,7 @@ static int simulate_chain(const struct ggn_chains *set, struct ggn_chain *c, con
 
     spp[n++] = GGN_LABELS_CAP;
     float *noise = malloc(ggn_chains_values(set) * sizeof *noise);
-    int rc = !noise            ? base_fail_nomem(err, "simulated images")
-             : n > c->n_levels ? ggn_chain_grow(set, c, n, err)
-                               : 0;
+    int rc = !noise ? base_fail_nomem(err, "simulated images") : n > c->n_levels ? ggn_chain_grow(set, c, n, err) : 0;
     if (!rc) {
         c->n_levels = n;
         c->simulated = 1;

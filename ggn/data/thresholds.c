@@ -129,7 +129,7 @@ static int parse_json(const char *path, const char *text, size_t size, struct gg
         goto out;
     }
     const cJSON *block;
-    cJSON_ArrayForEach(block, blocks) {
+    cJSON_ArrayForEach (block, blocks) {
         const cJSON *id = cJSON_GetObjectItemCaseSensitive(block, "id");
         const cJSON *y0 = cJSON_GetObjectItemCaseSensitive(block, "y0");
         if (!cJSON_IsNumber(id) || !(id->valuedouble >= 0 && id->valuedouble < GGN_VIEW_BLOCKS)) {
@@ -152,7 +152,7 @@ static int parse_json(const char *path, const char *text, size_t size, struct gg
     }
     v->columns = columns;
     v->unnamed = !cJSON_IsString(scene);
-    cJSON_ArrayForEach(block, blocks) {
+    cJSON_ArrayForEach (block, blocks) {
         const cJSON *id = cJSON_GetObjectItemCaseSensitive(block, "id");
         const cJSON *spp = cJSON_GetObjectItemCaseSensitive(block, "threshold");
         if (!spp)

@@ -124,10 +124,7 @@ int ggn_windows_draw(const struct ggn_windows *w, uint64_t step, int i, uint32_t
 
 /* --- pixels --- */
 
-struct ggn_augment ggn_augment_none(void)
-{
-    return (struct ggn_augment){.gain = {1, 1, 1}};
-}
+struct ggn_augment ggn_augment_none(void) { return (struct ggn_augment){.gain = {1, 1, 1}}; }
 
 struct ggn_augment ggn_augment_draw(uint64_t step, int i, uint32_t seed, const struct ggn_augment_options *o)
 {
@@ -146,8 +143,7 @@ struct ggn_augment ggn_augment_draw(uint64_t step, int i, uint32_t seed, const s
 static void gain_table(float gain, float table[256])
 {
     for (int i = 0; i < 256; i++)
-        table[i] = gain == 1 ? (float)i / 255
-                             : (float)base_srgb_oetf(fmin((double)gain * base_srgb_linear[i], 1));
+        table[i] = gain == 1 ? (float)i / 255 : (float)base_srgb_oetf(fmin((double)gain * base_srgb_linear[i], 1));
 }
 
 /* Where the pixel of row y of the result comes from: src[start + x · step]. */

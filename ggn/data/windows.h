@@ -19,7 +19,7 @@ struct ggn_window {
 
 struct ggn_windows {
     const struct ggn_chains *set; /* borrows */
-    int length;                    /* S */
+    int length;                   /* S */
     int n;
     struct ggn_window *list; /* owns; ordered by chain, then by level */
     int *first;              /* [n_chains + 1] */
@@ -49,8 +49,8 @@ struct ggn_augment {
 };
 struct ggn_augment ggn_augment_none(void);
 struct ggn_augment_options {
-    int flips;      /* flips and rotations */
-    int square;     /* the images are */
+    int flips;  /* flips and rotations */
+    int square; /* the images are */
     /* exposure up to ±jitter/2 octaves, white balance up to ±jitter/8: little enough for the label to hold */
     double jitter;
     double picture; /* share of samples that keep their noise picture */

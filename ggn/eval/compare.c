@@ -62,7 +62,7 @@ int ggn_pairing_init(struct ggn_pairing *out, const struct ggn_thresholds *truth
     if (p.n == 0)
         rc = base_fail(err, BASE_EINVAL,
                        view ? "no view called '%s' to compare" : "no view has the same name on both sides%s",
-                      view ? view : " (--view NAME names the partner of a single view)");
+                       view ? view : " (--view NAME names the partner of a single view)");
 out:
     if (rc) {
         ggn_pairing_release(&p);
@@ -147,7 +147,7 @@ int ggn_plot_scatter(const char *path, const double *truth, const double *model,
           "set yrange [lo:hi]\nset xtics (20,50,100,200,500,1000,2000,5000,10000,20000,50000,100000)\n"
           "set ytics (20,50,100,200,500,1000,2000,5000,10000,20000,50000,100000)\n"
           "plot x lc '#444444' lw 1 title 'equal', 2*x dt 2 lc '#999999' title 'one octave', x/2 dt 2 lc '#999999' notitle",
-              s);
+          s);
     if (!isnan(b))
         fprintf(s, ", 2**(%.9g + %.9g*log(x)/log(2)) lc '#d95f02' lw 2 title 'regression in log2, r = %.3f'", a, b, r);
     fputs(", $d with points pt 7 ps 0.6 lc '#801f77b4' title 'blocks'\n", s);
@@ -169,7 +169,8 @@ int ggn_plot_errors(const char *path, const double *truth, const double *model, 
           "set xrange [-4.1:4.1]\nset yrange [0:*]\n"
           "set arrow 1 from 0, graph 0 to 0, graph 1 nohead lc '#444444' dt 2\n"
           "set arrow 2 from -0.3219, graph 0 to -0.3219, graph 1 nohead lc '#d62728'\n"
-          "set label 1 'early stop' at -0.36, graph 0.96 right tc '#d62728'\n$d << EOD\n", s);
+          "set label 1 'early stop' at -0.36, graph 0.96 right tc '#d62728'\n$d << EOD\n",
+          s);
     for (size_t i = 0; i < n; i++) {
         double e = log2(model[i] / truth[i]);
         fprintf(s, "%.6g\n", e < -4.0 ? -4.0 : e > 4.0 ? 4.0 : e);
@@ -202,8 +203,10 @@ int ggn_plot_heatmaps(const char *path, const struct ggn_pairing *p, const char 
         hi = fmax(hi, fmax(p->truth[i], p->model[i]));
     }
     ggn_plot_palette(s, GGN_VIRIDIS);
-    fprintf(s, "set logscale cb\nset cbrange [%g:%g]\nunset grid\nunset tics\nunset border\nset cbtics\n"
-               "set multiplot layout %d,%d title ", lo, hi > lo ? hi : 2.0 * lo, down, across);
+    fprintf(s,
+            "set logscale cb\nset cbrange [%g:%g]\nunset grid\nunset tics\nunset border\nset cbtics\n"
+            "set multiplot layout %d,%d title ",
+            lo, hi > lo ? hi : 2.0 * lo, down, across);
     char title[256];
     snprintf(title, sizeof title, "threshold (spp) per block: left %.90s, right %.90s", truth_name, model_name);
     ggn_plot_quote(s, title);

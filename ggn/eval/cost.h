@@ -23,13 +23,13 @@ void ggn_cost_checks(const struct ggn_method *m, const struct ggn_eval_set *s, s
 /* One setting on one scene; sums over its blocks where not said otherwise. */
 struct ggn_cost {
     int blocks;
-    double samples;    /* per pixel, mean over the blocks */
-    double sampling_s; /* thread seconds of sampling, mean over the blocks */
-    double cheap, full; /* checks, mean over the blocks */
-    double noisy;      /* share of blocks that stop below T */
-    double early;      /* share that stops below 0.8 T */
-    double worst;      /* visible difference of the worst block, 1: just visible */
-    double uniform_spp; /* samples everywhere that make the worst block as good */
+    double samples;                   /* per pixel, mean over the blocks */
+    double sampling_s;                /* thread seconds of sampling, mean over the blocks */
+    double cheap, full;               /* checks, mean over the blocks */
+    double noisy;                     /* share of blocks that stop below T */
+    double early;                     /* share that stops below 0.8 T */
+    double worst;                     /* visible difference of the worst block, 1: just visible */
+    double uniform_spp;               /* samples everywhere that make the worst block as good */
     double time_ratio, samples_ratio; /* sampling alone, against those uniform samples */
     double flip, flip_worst, relmse;  /* NaN: not known */
 };

@@ -128,10 +128,7 @@ double ggn_method_verdict(const struct ggn_method *m, size_t i)
     return m->verdict ? m->verdict[i] : m->score ? m->score[i] : (double)NAN;
 }
 
-static int is_held(const struct ggn_method *m, size_t i, double limit)
-{
-    return m->guard && m->guard[i] > limit;
-}
+static int is_held(const struct ggn_method *m, size_t i, double limit) { return m->guard && m->guard[i] > limit; }
 
 int ggn_method_passes(const struct ggn_method *m, size_t i)
 {
@@ -203,8 +200,9 @@ int ggn_method_tune(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn
             double cut = k == TRIES ? nextafter(scores[n - 1], INFINITY) : scores[(size_t)k * n / TRIES], early, samples;
             cost_of(m, s, split, cut, limits[g], &early, &samples);
             int fits = early <= early_rate, fitted = best_early <= early_rate;
-            if (fits != fitted ? fits : (fits ? samples < best_samples : early < best_early ||
-                                         (early == best_early && samples < best_samples))) {
+            if (fits != fitted ? fits
+                               : (fits ? samples < best_samples
+                                       : early < best_early || (early == best_early && samples < best_samples))) {
                 best_early = early;
                 best_samples = samples;
                 m->cut = cut;
@@ -350,13 +348,27 @@ int ggn_method_measure(const struct ggn_method *m, const struct ggn_eval_set *s,
                        struct ggn_method_metrics *out, struct base_err *err)
 {
     const double nan = (double)NAN;
-    struct ggn_method_metrics r = {.auc = nan, .auc_scene_mean = nan, .accuracy = nan, .best_accuracy = nan,
-                                   .uniform_spp = nan, .time_vs_uniform = nan, .samples_vs_uniform = nan};
-    r.agreement = (struct ggn_agreement){.pearson_r = nan, .pearson_r_below_cap = nan, .spearman = nan,
-                                         .spearman_below_cap = nan, .mae = nan,
-                                         .mae_below_cap = nan, .rmse = nan, .share_below = nan, .early_stop_rate = nan,
+    struct ggn_method_metrics r = {.auc = nan,
+                                   .auc_scene_mean = nan,
+                                   .accuracy = nan,
+                                   .best_accuracy = nan,
+                                   .uniform_spp = nan,
+                                   .time_vs_uniform = nan,
+                                   .samples_vs_uniform = nan};
+    r.agreement = (struct ggn_agreement){.pearson_r = nan,
+                                         .pearson_r_below_cap = nan,
+                                         .spearman = nan,
+                                         .spearman_below_cap = nan,
+                                         .mae = nan,
+                                         .mae_below_cap = nan,
+                                         .rmse = nan,
+                                         .share_below = nan,
+                                         .early_stop_rate = nan,
                                          .samples_ratio = nan,
-                                         .median_abs_log2 = nan, .median_log2 = nan, .iqr_log2 = nan, .within_half = nan,
+                                         .median_abs_log2 = nan,
+                                         .median_log2 = nan,
+                                         .iqr_log2 = nan,
+                                         .within_half = nan,
                                          .within_one = nan};
     r.blocks = ggn_eval_count(s, split);
     if (r.blocks == 0)

@@ -22,11 +22,11 @@ struct ggn_method {
     const double *guard; /* own_guard or borrowed from the set; [cases]; the block is held back while it exceeds guard_limit;
                             NULL: none */
     double guard_limit;
-    int passes;          /* cases in a row below the cut that stop a block, >= 1 */
-    double cut;          /* the block goes on while score >= cut */
-    double *stop;        /* owns; [blocks], spp */
-    double *asked;       /* owns; [blocks]: checks until there, of a method that asks at counts of its own; else NULL */
-    int is_oracle;       /* it looked at the answers */
+    int passes;    /* cases in a row below the cut that stop a block, >= 1 */
+    double cut;    /* the block goes on while score >= cut */
+    double *stop;  /* owns; [blocks], spp */
+    double *asked; /* owns; [blocks]: checks until there, of a method that asks at counts of its own; else NULL */
+    int is_oracle; /* it looked at the answers */
 };
 
 void ggn_method_release(struct ggn_method *m);
@@ -68,14 +68,14 @@ int ggn_method_tune(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn
 
 struct ggn_method_metrics {
     int blocks, censored, scenes;
-    size_t cases;                  /* with a known label */
-    double auc, auc_scene_mean;    /* pooled over all cases; mean of the scenes that have both classes */
-    double accuracy;               /* of "score >= cut" */
+    size_t cases;               /* with a known label */
+    double auc, auc_scene_mean; /* pooled over all cases; mean of the scenes that have both classes */
+    double accuracy;            /* of "score >= cut" */
     double best_accuracy;
     struct ggn_agreement agreement; /* on blocks that are not censored */
     double early_stop_rate;         /* on all blocks: a censored one counts when it stops below 0.8 of the cap */
     double samples_ratio;           /* on all blocks */
-    double flip_mean, flip_worst, ssim_mean, ssim_worst; /* at the stop, over blocks */
+    double flip_mean, flip_worst, ssim_mean, ssim_worst;     /* at the stop, over blocks */
     double uniform_spp, time_vs_uniform, samples_vs_uniform; /* uniform sampling whose worst block is as good (FLIP) */
 };
 

@@ -54,8 +54,7 @@ int ggn_method_observer(struct ggn_method *m, const struct ggn_eval_set *s, cons
             rc = ggn_observer_read(path, s->chains.data.views[block->view].name, &o, err);
         view = block->view;
         for (size_t i = block->first; i < block->end; i++) {
-            m->score[i] =
-                isnan(seen[i]) ? (double)NAN : ggn_observer_p_noisy(&o, ggn_observer_error(&o, seen[i], pixels));
+            m->score[i] = isnan(seen[i]) ? (double)NAN : ggn_observer_p_noisy(&o, ggn_observer_error(&o, seen[i], pixels));
             *available &= !isnan(seen[i]);
         }
         m->stop[b] = block->cap;
@@ -90,8 +89,8 @@ int ggn_method_thresholds(struct ggn_method *m, const struct ggn_eval_set *s, co
             rc = base_fail(err, BASE_EINVAL, "%s: '%s' has %d thresholds, %s has %u blocks", path, row->name, row->n, v->dir,
                            ggn_dataset_tiles(v));
         else if (row && row->spp[id] > 0)
-            m->stop[b] = fmin(block->split == GGN_SPLIT_PEOPLE ? ggn_observer_from_study(row->spp[id]) : row->spp[id],
-                              block->cap);
+            m->stop[b] =
+                fmin(block->split == GGN_SPLIT_PEOPLE ? ggn_observer_from_study(row->spp[id]) : row->spp[id], block->cap);
     }
     if (rc && m->stop)
         ggn_method_release(m);

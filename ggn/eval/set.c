@@ -56,9 +56,14 @@ static int list_blocks(struct ggn_eval_set *s, int *skipped, struct base_err *er
             return base_fail(err, BASE_EINVAL, "%s: %d level%s, a window needs %d", view->dir, c->n_levels,
                              c->n_levels == 1 ? "" : "s", s->window);
         size_t cases = (size_t)(c->n_levels - s->window + 1);
-        struct ggn_eval_block b = {.chain = i, .view = c->view, .scene = scene_index(d, c->view),
+        struct ggn_eval_block b = {.chain = i,
+                                   .view = c->view,
+                                   .scene = scene_index(d, c->view),
                                    .index = manifest_index(&view->manifest, c->block),
-                                   .split = view->split, .label = c->label, .cap = c->spp[c->n_levels - 1], .first = s->n,
+                                   .split = view->split,
+                                   .label = c->label,
+                                   .cap = c->spp[c->n_levels - 1],
+                                   .first = s->n,
                                    .end = s->n + cases};
         if (b.label.threshold >= b.cap) {
             b.label.threshold = b.cap;
@@ -81,8 +86,8 @@ enum { COLUMNS = 11 };
 
 static int make_columns(struct ggn_eval_set *s, struct base_err *err)
 {
-    double **columns[COLUMNS] = {&s->spp, &s->seconds, &s->dammertz, &s->half_unsettled, &s->rse, &s->rse_unsettled,
-                                 &s->flip, &s->ssim, &s->visible, &s->looked, &s->relmse};
+    double **columns[COLUMNS] = {&s->spp,  &s->seconds, &s->dammertz, &s->half_unsettled, &s->rse,   &s->rse_unsettled,
+                                 &s->flip, &s->ssim,    &s->visible,  &s->looked,         &s->relmse};
     double *all = malloc(COLUMNS * s->n * sizeof *all);
     s->noisy = malloc(s->n);
     s->spp = all;
@@ -122,12 +127,14 @@ static void each_block(void *data, long i, int worker)
 }
 
 int ggn_eval_each_block(const struct ggn_eval_set *set, struct base_threads *threads,
-                        int (*fn)(void *data, int block, int worker, struct base_err *err), void *data,
-                        struct base_err *err)
+                        int (*fn)(void *data, int block, int worker, struct base_err *err), void *data, struct base_err *err)
 {
     int n = set->n_blocks, rc = 0, rank = base_team_rank(set->team);
-    struct each e = {.first = base_team_first(set->team, n, rank), .fn = fn, .data = data,
-                     .rc = calloc((size_t)n, sizeof(int)), .errs = calloc((size_t)n, sizeof(struct base_err))};
+    struct each e = {.first = base_team_first(set->team, n, rank),
+                     .fn = fn,
+                     .data = data,
+                     .rc = calloc((size_t)n, sizeof(int)),
+                     .errs = calloc((size_t)n, sizeof(struct base_err))};
     if (!e.rc || !e.errs)
         rc = base_fail_nomem(err, "evaluation");
     else

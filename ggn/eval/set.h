@@ -10,14 +10,14 @@
 #include "data/chains.h"
 
 struct ggn_eval_block {
-    int chain;         /* index into chains.chains */
-    int view;          /* index into chains.data.views */
-    int scene;         /* index that equal scene names share */
-    uint32_t index;    /* in the view's manifest */
+    int chain;      /* index into chains.chains */
+    int view;       /* index into chains.data.views */
+    int scene;      /* index that equal scene names share */
+    uint32_t index; /* in the view's manifest */
     enum ggn_split split;
     struct ggn_label label; /* thresholds beyond the last level are censored there */
-    double cap;        /* last level, spp */
-    size_t first, end; /* its cases */
+    double cap;             /* last level, spp */
+    size_t first, end;      /* its cases */
 };
 
 /* spp as thresholds of this block are compared: those of views that people judged in samples of their study
@@ -25,35 +25,35 @@ struct ggn_eval_block {
 double ggn_eval_compared(const struct ggn_eval_block *block, double spp);
 
 struct ggn_eval_set {
-    struct base_team *team;         /* borrows; NULL: alone */
-    struct ggn_chains chains;       /* owns: the images, continued beyond the recording where possible */
-    int window;                     /* S: the first S-1 levels of a block make no case */
+    struct base_team *team;   /* borrows; NULL: alone */
+    struct ggn_chains chains; /* owns: the images, continued beyond the recording where possible */
+    int window;               /* S: the first S-1 levels of a block make no case */
     int n_blocks, n_scenes;
-    struct ggn_eval_block *blocks;  /* owns; ordered by view, then as the manifest lists them */
-    size_t n;                       /* cases */
-    double *spp, *seconds;          /* own; [n]; seconds: thread time spent on the block so far, NaN if unknown */
-    signed char *noisy;             /* owns; [n]: 1, 0, or -1 unknown */
+    struct ggn_eval_block *blocks; /* owns; ordered by view, then as the manifest lists them */
+    size_t n;                      /* cases */
+    double *spp, *seconds;         /* own; [n]; seconds: thread time spent on the block so far, NaN if unknown */
+    signed char *noisy;            /* owns; [n]: 1, 0, or -1 unknown */
     double *dammertz, *half_unsettled, *rse, *rse_unsettled; /* own; [n]; NaN where not recorded */
-    double *visible;                /* own; [n]: noise that the model observer sees (observer/visibility.h); NaN without half
+    double *visible;     /* own; [n]: noise that the model observer sees (observer/visibility.h); NaN without half
                                        buffers */
-    double *looked;                 /* owns; [n]: the same in a host without half buffers; NaN without levels to tell it */
-    double *flip, *ssim;            /* own; [n]: against the block's reference, without one against the mean of its full
+    double *looked;      /* owns; [n]: the same in a host without half buffers; NaN without levels to tell it */
+    double *flip, *ssim; /* own; [n]: against the block's reference, without one against the mean of its full
                                        level; NaN unless asked for */
-    double *relmse;                 /* owns; [n]: variance over the squared mean, from the full level's halves; NaN
+    double *relmse;      /* owns; [n]: variance over the squared mean, from the full level's halves; NaN
                                        without */
 };
 
 struct ggn_eval_options {
-    const char *dir;  /* data set */
-    int window;       /* S */
-    int quality;      /* also compute FLIP and SSIM of every case ... */
-    int no_ssim;      /* ... but SSIM, which takes longer */
-    int recorded;     /* only recorded levels; else each block goes on to about 0.7 of its reference's samples
+    const char *dir;          /* data set */
+    int window;               /* S */
+    int quality;              /* also compute FLIP and SSIM of every case ... */
+    int no_ssim;              /* ... but SSIM, which takes longer */
+    int recorded;             /* only recorded levels; else each block goes on to about 0.7 of its reference's samples
                          (ggn_chains_extend) */
-    double ratio;     /* thin the levels to at least this ratio; 0: keep all */
-    double cadence;   /* > 1: simulate all levels, this far apart (ggn_chains_simulate); 0: no */
-    uint32_t seed;    /* of the continuation */
-    int pictures;     /* also make the noise pictures (data/chains.h) */
+    double ratio;             /* thin the levels to at least this ratio; 0: keep all */
+    double cadence;           /* > 1: simulate all levels, this far apart (ggn_chains_simulate); 0: no */
+    uint32_t seed;            /* of the continuation */
+    int pictures;             /* also make the noise pictures (data/chains.h) */
     struct base_team *team;   /* the processes that share out the blocks, all with the same data; NULL: alone */
     const char *const *files; /* [n_files] what else must be the same for all of them (data/agree.h) */
     int n_files;

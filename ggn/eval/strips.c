@@ -36,8 +36,7 @@ static int finish_strips(struct strips *s, const char *path, int width, int heig
         rc = ggn_plot_begin(&plot, path, width, height_each * s->n + 20, err);
     if (!rc && s->n > 0) {
         fprintf(plot.script,
-                "unset tics\nunset border\nset size ratio -1\nset yrange [] reverse\nset multiplot layout %d,1\n",
-                s->n);
+                "unset tics\nunset border\nset size ratio -1\nset yrange [] reverse\nset multiplot layout %d,1\n", s->n);
         for (int i = 0; i < s->n; i++) {
             fputs("set title ", plot.script);
             ggn_plot_quote(plot.script, s->title[i]);
@@ -140,8 +139,8 @@ static void put_map(uint8_t *strip, int tiles, int k, const float *a, const floa
 
 /* The window that ends at `level` of a block, as a strip. */
 static int feature_strip(const struct ggn_eval_set *s, const struct ggn_eval_block *b, int level,
-                         const struct ggn_policy *policy,
-                         struct ggn_viewer *v, const char *path, struct strips *strips, struct base_err *err)
+                         const struct ggn_policy *policy, struct ggn_viewer *v, const char *path, struct strips *strips,
+                         struct base_err *err)
 {
     const struct ggn_chain *c = &s->chains.chains[b->chain];
     int w = s->chains.width, h = s->chains.height, row;

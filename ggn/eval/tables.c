@@ -53,12 +53,12 @@ static void print_rows(FILE *f, const struct ggn_method *methods, const struct g
         fprintf(f, "%-30.30s", methods[i].name);
         column = 0;
 #define CELL(key, head, format, value) \
-        if (column >= from && column < to) { \
-            char text[32]; \
-            snprintf(text, sizeof text, format, value); \
-            fprintf(f, " %9s", isnan(value) ? "-" : text); \
-        } \
-        column++;
+    if (column >= from && column < to) { \
+        char text[32]; \
+        snprintf(text, sizeof text, format, value); \
+        fprintf(f, " %9s", isnan(value) ? "-" : text); \
+    } \
+    column++;
         COLUMNS(CELL)
 #undef CELL
         fputc('\n', f);
@@ -87,7 +87,8 @@ static int print_without_halves(FILE *f, const struct ggn_eval_set *s, enum ggn_
             n++;
         }
     if (n > 0)
-        fprintf(f, "observer without halves, at the thresholds of %zu blocks: shifted by %+.3f octaves in the median, "
+        fprintf(f,
+                "observer without halves, at the thresholds of %zu blocks: shifted by %+.3f octaves in the median, "
                 "|shift| median %.3f, 90th percentile %.3f\n",
                 n, ggn_stats_quantile(shift, n, 0.5), ggn_stats_quantile(size, n, 0.5), ggn_stats_quantile(size, n, 0.9));
     free(shift);

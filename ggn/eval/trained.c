@@ -58,8 +58,8 @@ static int init_method(struct ggn_method *m, const struct ggn_eval_set *s, const
 }
 
 int ggn_eval_trained(struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_model *model,
-                     const struct ggn_policy *policy,
-                     const char *name, enum ggn_precision precision, struct base_threads *threads, struct base_err *err)
+                     const struct ggn_policy *policy, const char *name, enum ggn_precision precision,
+                     struct base_threads *threads, struct base_err *err)
 {
     int workers = base_threads_count(threads), made = 0, window = model->hyper.window;
     struct run r = {.set = s, .method = m, .rule = {.policy = *policy, .window = window}};

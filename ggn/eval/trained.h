@@ -11,7 +11,7 @@
  * would spare it; stops are those of the rule (model/stopper.h, data/replay.h), with gate and guard as the policy says.
  */
 int ggn_eval_trained(struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_model *model,
-                     const struct ggn_policy *policy,
-                     const char *name, enum ggn_precision precision, struct base_threads *threads, struct base_err *err);
+                     const struct ggn_policy *policy, const char *name, enum ggn_precision precision,
+                     struct base_threads *threads, struct base_err *err);
 
 #endif

@@ -89,10 +89,7 @@ static uint16_t *denoised(struct ggn_viewer *v, int level, const int *needed, in
     return v->denoised[spare];
 }
 
-const uint16_t *ggn_viewer_denoise(struct ggn_viewer *v, int level)
-{
-    return denoised(v, level, &level, 1);
-}
+const uint16_t *ggn_viewer_denoise(struct ggn_viewer *v, int level) { return denoised(v, level, &level, 1); }
 
 double ggn_viewer_logit(void *viewer, const int *levels)
 {

@@ -28,12 +28,12 @@ int ggn_stats_best_cut(const double *score, const unsigned char *label, size_t n
 struct ggn_agreement {
     size_t blocks, below_cap; /* below_cap: blocks whose true threshold is below the cap */
     double pearson_r, pearson_r_below_cap, spearman, spearman_below_cap;
-    double mae, mae_below_cap, rmse;      /* spp */
-    double share_below;                   /* share of blocks with predicted < true */
-    double early_stop_rate;               /* share with predicted < 0.8 true: noise left to be seen */
-    double samples_ratio;                 /* sum of predicted / sum of true */
+    double mae, mae_below_cap, rmse;               /* spp */
+    double share_below;                            /* share of blocks with predicted < true */
+    double early_stop_rate;                        /* share with predicted < 0.8 true: noise left to be seen */
+    double samples_ratio;                          /* sum of predicted / sum of true */
     double median_abs_log2, median_log2, iqr_log2; /* of log2(predicted / true) */
-    double within_half, within_one;       /* share with |log2| <= 1/2, 1 */
+    double within_half, within_one;                /* share with |log2| <= 1/2, 1 */
 };
 
 /* truth, predicted: [n], all > 0. Thresholds at the cap are censored: they enter the `_below_cap` figures not at all. */

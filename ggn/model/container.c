@@ -86,10 +86,7 @@ static void encode(unsigned char *p, const struct ggn_entry *e)
     }
 }
 
-static size_t aligned(size_t n)
-{
-    return (n + ALIGN - 1) / ALIGN * ALIGN;
-}
+static size_t aligned(size_t n) { return (n + ALIGN - 1) / ALIGN * ALIGN; }
 
 /* The whole file in memory; NULL without memory. */
 static unsigned char *assemble(struct ggn_container *c, size_t *size)

@@ -40,8 +40,8 @@ static int add_network(struct ggn_exact *e, int net, const float *learned, struc
     return e->exec[net] ? 0 : err->code;
 }
 
-struct ggn_exact *ggn_exact_create(const struct ggn_hyper *hyper, const struct ggn_graph *graph,
-                                   const float *const *learned, struct base_err *err)
+struct ggn_exact *ggn_exact_create(const struct ggn_hyper *hyper, const struct ggn_graph *graph, const float *const *learned,
+                                   struct base_err *err)
 {
     struct ggn_exact *e = calloc(1, sizeof *e);
 
@@ -65,10 +65,7 @@ static real *plane(const struct ggn_exact *e, int net, int value, int c)
     return ggn_exec_plane(e->exec[net], value, 0, c);
 }
 
-static int last(const struct ggn_exact *e, int net)
-{
-    return e->graph[net].n_values - 1;
-}
+static int last(const struct ggn_exact *e, int net) { return e->graph[net].n_values - 1; }
 
 /* Plane c of input `net`: codes · scale; codes NULL: `scale` everywhere. */
 static void load(const struct ggn_exact *e, int net, int c, const uint8_t *codes, const uint16_t *fixed, double scale)

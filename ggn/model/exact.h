@@ -15,8 +15,8 @@ struct ggn_exact;
 
 /* graph, learned: [GGN_NETS]; learned: parameters and running statistics as struct ggn_weights of floats holds them
  * (params, [n_learned]). NULL on failure. */
-struct ggn_exact *ggn_exact_create(const struct ggn_hyper *hyper, const struct ggn_graph *graph,
-                                   const float *const *learned, struct base_err *err);
+struct ggn_exact *ggn_exact_create(const struct ggn_hyper *hyper, const struct ggn_graph *graph, const float *const *learned,
+                                   struct base_err *err);
 void ggn_exact_destroy(struct ggn_exact *exact);
 
 /* As ggn_judge_denoise and ggn_judge_logit. */

@@ -34,15 +34,9 @@ static void add_plane(struct moments *m, const real *x, const struct ggn_value *
         }
 }
 
-static double mean_of(const struct moments *m)
-{
-    return m->sum / m->count;
-}
+static double mean_of(const struct moments *m) { return m->sum / m->count; }
 
-static double std_of(const struct moments *m)
-{
-    return sqrt(m->sum_sq / m->count - mean_of(m) * mean_of(m));
-}
+static double std_of(const struct moments *m) { return sqrt(m->sum_sq / m->count - mean_of(m) * mean_of(m)); }
 
 static void fill_windows(struct state *s)
 {

@@ -15,20 +15,14 @@ struct ggn_judge {
 
 const char *const ggn_precision_names[] = {"f32", "bf16", NULL};
 
-const char *ggn_precision_bf16_by(void)
-{
-    return ggn_bf16_name();
-}
+const char *ggn_precision_bf16_by(void) { return ggn_bf16_name(); }
 
 int ggn_precision_is_slow(enum ggn_precision precision)
 {
     return precision == GGN_PRECISION_BF16 && strcmp(ggn_bf16_name(), "software") == 0;
 }
 
-static int exec_flags(enum ggn_precision precision)
-{
-    return precision == GGN_PRECISION_BF16 ? GGN_EXEC_BF16 : 0;
-}
+static int exec_flags(enum ggn_precision precision) { return precision == GGN_PRECISION_BF16 ? GGN_EXEC_BF16 : 0; }
 
 size_t ggn_judge_bytes(const struct ggn_model *model, enum ggn_precision precision, int threads)
 {
@@ -68,10 +62,7 @@ void ggn_judge_destroy(struct ggn_judge *j)
     free(j);
 }
 
-static const struct ggn_value *input(const struct ggn_judge *j, int net)
-{
-    return &j->model->graph[net].value[0];
-}
+static const struct ggn_value *input(const struct ggn_judge *j, int net) { return &j->model->graph[net].value[0]; }
 
 static const struct ggn_value *output(const struct ggn_judge *j, int net)
 {
@@ -83,10 +74,7 @@ static float *output_plane(const struct ggn_judge *j, int net)
     return ggn_exec_plane(j->exec[net], j->model->graph[net].n_values - 1, 0, 0);
 }
 
-static void forward(struct ggn_judge *j, int net)
-{
-    ggn_exec_forward(j->exec[net], j->model->weights[net], 1, GGN_EVAL);
-}
+static void forward(struct ggn_judge *j, int net) { ggn_exec_forward(j->exec[net], j->model->weights[net], 1, GGN_EVAL); }
 
 void ggn_judge_denoise(struct ggn_judge *j, const uint8_t *noisy, uint16_t *denoised, int width, int height)
 {

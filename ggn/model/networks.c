@@ -26,7 +26,7 @@ int ggn_hyper_check(const struct ggn_hyper *p, struct base_err *err)
     for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++)
         if (fields[i].value < fields[i].min || fields[i].value > fields[i].max)
             return base_fail(err, BASE_EINVAL, "hyper-parameter %s = %d is not in %d..%d", fields[i].name, fields[i].value,
-                            fields[i].min, fields[i].max);
+                             fields[i].min, fields[i].max);
     return 0;
 }
 

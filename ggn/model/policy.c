@@ -45,7 +45,7 @@ int ggn_policy_check(const struct ggn_policy *p, struct base_err *err)
         double v = get(p, i);
         if (!(v >= fields[i].min && v <= fields[i].max))
             return base_fail(err, BASE_EINVAL, "policy: %s = %g is not in %g..%g", fields[i].name, v, fields[i].min,
-                            fields[i].max);
+                             fields[i].max);
     }
     if (p->passes < 1 || p->passes > PASSES_MAX)
         return base_fail(err, BASE_EINVAL, "policy: passes = %d is not in 1..%d", p->passes, PASSES_MAX);
@@ -84,10 +84,7 @@ int ggn_policy_tail_holds(const struct ggn_policy *p, double tail999, double gin
     return (p->tail999 > 0 && tail999 > p->tail999) || (p->gini > 0 && gini > p->gini && tail999 > CALM_TAIL);
 }
 
-void ggn_policy_without_halves(struct ggn_policy *p)
-{
-    p->tail999 = p->gini = 0;
-}
+void ggn_policy_without_halves(struct ggn_policy *p) { p->tail999 = p->gini = 0; }
 
 double ggn_policy_p(const struct ggn_policy *p, double logit)
 {

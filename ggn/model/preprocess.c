@@ -47,7 +47,4 @@ uint8_t ggn_preprocess(double linear, const struct ggn_display *display, struct 
     return display->transfer == GGN_TRANSFER_SRGB ? base_srgb_code(value) : (uint8_t)code_by_formula(value, display);
 }
 
-long ggn_pixel_counts_bad(const struct ggn_pixel_counts *counts)
-{
-    return counts->nan + counts->infinite + counts->huge;
-}
+long ggn_pixel_counts_bad(const struct ggn_pixel_counts *counts) { return counts->nan + counts->infinite + counts->huge; }

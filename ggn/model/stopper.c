@@ -3,10 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-static uint64_t to_spp(double spp)
-{
-    return spp >= 1e18 ? UINT64_C(1000000000000000000) : (uint64_t)spp;
-}
+static uint64_t to_spp(double spp) { return spp >= 1e18 ? UINT64_C(1000000000000000000) : (uint64_t)spp; }
 
 /* Asks at so many samples, but later than now; 2^64 - 1 samples make that 0: when the host likes. */
 static void ask_at(struct ggn_stopper *s, uint64_t spp)
@@ -116,10 +113,7 @@ void ggn_stopper_judge(const struct ggn_stop_rule *rule, struct ggn_stopper *s, 
     v->predicted_spp = fmax(ggn_policy_predict(p, v->p, p->threshold, spp), (double)v->next_spp);
 }
 
-static int unknown_or_positive(double value)
-{
-    return isnan(value) || (value >= 0 && isfinite(value));
-}
+static int unknown_or_positive(double value) { return isnan(value) || (value >= 0 && isfinite(value)); }
 
 /* Only the last check can have said it, and stops are about samples that were taken. */
 static int verdict_valid(const struct ggn_stopper *s)

@@ -50,8 +50,8 @@ struct ggn_stopper {
 /* What the window shows whose newest image is the one asked about. */
 struct ggn_evidence {
     void *data;
-    double (*noise)(void *data); /* ggn_window_noise of oldest and newest image */
-    double (*logit)(void *data); /* the network's, of a full window */
+    double (*noise)(void *data);                            /* ggn_window_noise of oldest and newest image */
+    double (*logit)(void *data);                            /* the network's, of a full window */
     int (*tail)(void *data, double *tail999, double *gini); /* of the newest image's half buffer; 0: not known */
 };
 

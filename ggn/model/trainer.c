@@ -11,10 +11,7 @@
 
 enum { N_STATE = 5 };
 
-static int part_of(int net)
-{
-    return net == GGN_NET_R ? GGN_TRAIN_R : GGN_TRAIN_MD;
-}
+static int part_of(int net) { return net == GGN_NET_R ? GGN_TRAIN_R : GGN_TRAIN_MD; }
 
 real *ggn_trainer_state(struct ggn_trainer *t, int net, int i, size_t *count)
 {
@@ -171,10 +168,7 @@ static double grad_l2(const struct ggn_trainer *t, int net, size_t n)
     return sqrt(sum);
 }
 
-static void zero_grad(struct ggn_trainer *t, int net)
-{
-    memset(t->grad[net], 0, t->graph[net].n_params * sizeof(real));
-}
+static void zero_grad(struct ggn_trainer *t, int net) { memset(t->grad[net], 0, t->graph[net].n_params * sizeof(real)); }
 
 /* After a divergence: back to the last good state, and say which tensor went wrong first. */
 static int diverged(struct ggn_trainer *t, int net, double value, const char *what, struct base_err *err)

@@ -22,10 +22,7 @@ uint8_t ggn_picture_code(double mean, double difference, const struct ggn_displa
     return (uint8_t)(a > b ? a - b : b - a);
 }
 
-int ggn_tile_count(int size, int tile)
-{
-    return size <= tile ? 1 : (size + tile - 1) / tile;
-}
+int ggn_tile_count(int size, int tile) { return size <= tile ? 1 : (size + tile - 1) / tile; }
 
 int ggn_tile_start(int size, int tile, int index)
 {
@@ -51,27 +48,27 @@ int ggn_fixed_is_finite(const uint16_t *values, size_t count)
     return highest < GGN_FIXED_NAN;
 }
 
-#define TILE_LOAD(NAME, TYPE)                                                                                               \
-    static void NAME##_one(const TYPE *src, int width, int height, int x0, int y0, int tile_w, int tile_h, float scale,     \
-                           float *dst, size_t dst_row)                                                                      \
-    {                                                                                                                       \
-        int inside = width - x0 < tile_w ? width - x0 : tile_w;                                                             \
-                                                                                                                            \
-        for (int y = 0; y < tile_h; y++) {                                                                                  \
-            const TYPE *from = src + (size_t)reflect(y0 + y, height) * (size_t)width;                                       \
-            float *to = dst + (size_t)y * dst_row;                                                                          \
-            for (int x = 0; x < inside; x++)                                                                                \
-                to[x] = (float)from[x0 + x] * scale;                                                                        \
-            for (int x = inside; x < tile_w; x++)                                                                           \
-                to[x] = (float)from[reflect(x0 + x, width)] * scale;                                                        \
-        }                                                                                                                   \
-    }                                                                                                                       \
-    void NAME(const TYPE *src, int width, int height, int x0, int y0, int tile_w, int tile_h, float scale, float *dst,      \
-              size_t dst_row, size_t dst_plane)                                                                             \
-    {                                                                                                                       \
-        for (size_t c = 0; c < 3; c++)                                                                                      \
-            NAME##_one(src + c * (size_t)height * (size_t)width, width, height, x0, y0, tile_w, tile_h, scale,              \
-                       dst + c * dst_plane, dst_row);                                                                       \
+#define TILE_LOAD(NAME, TYPE) \
+    static void NAME##_one(const TYPE *src, int width, int height, int x0, int y0, int tile_w, int tile_h, float scale, \
+                           float *dst, size_t dst_row) \
+    { \
+        int inside = width - x0 < tile_w ? width - x0 : tile_w; \
+\
+        for (int y = 0; y < tile_h; y++) { \
+            const TYPE *from = src + (size_t)reflect(y0 + y, height) * (size_t)width; \
+            float *to = dst + (size_t)y * dst_row; \
+            for (int x = 0; x < inside; x++) \
+                to[x] = (float)from[x0 + x] * scale; \
+            for (int x = inside; x < tile_w; x++) \
+                to[x] = (float)from[reflect(x0 + x, width)] * scale; \
+        } \
+    } \
+    void NAME(const TYPE *src, int width, int height, int x0, int y0, int tile_w, int tile_h, float scale, float *dst, \
+              size_t dst_row, size_t dst_plane) \
+    { \
+        for (size_t c = 0; c < 3; c++) \
+            NAME##_one(src + c * (size_t)height * (size_t)width, width, height, x0, y0, tile_w, tile_h, scale, \
+                       dst + c * dst_plane, dst_row); \
     }
 TILE_LOAD(ggn_tile_load_u8, uint8_t)
 TILE_LOAD(ggn_tile_load_u16, uint16_t)

@@ -22,8 +22,8 @@ static void pair_channels(uint32_t *out, const float *x0, const float *x1, long 
     }
 }
 
-INLINE void tile(const struct ggn_conv *a, const uint32_t *w, const uint32_t *x, long x_stride, int oc, long p,
-                 const int ot, const int nv)
+INLINE void tile(const struct ggn_conv *a, const uint32_t *w, const uint32_t *x, long x_stride, int oc, long p, const int ot,
+                 const int nv)
 {
     vf acc[8][TILE_V];
 
@@ -54,20 +54,30 @@ INLINE void tile(const struct ggn_conv *a, const uint32_t *w, const uint32_t *x,
         }
 }
 
-#define TILE(OT, NV)                                                                                                        \
+#define TILE(OT, NV) \
     static void tile_##OT##_##NV(const struct ggn_conv *a, const uint32_t *w, const uint32_t *x, long x_stride, int oc, \
-                                 long p)                                                                                    \
-    {                                                                                                                       \
-        tile(a, w, x, x_stride, oc, p, OT, NV);                                                                             \
+                                 long p) \
+    { \
+        tile(a, w, x, x_stride, oc, p, OT, NV); \
     }
 #define TILES(OT) TILE(OT, 1) TILE(OT, 3)
-TILES(1) TILES(2) TILES(3) TILES(4) TILES(5) TILES(6) TILES(7) TILES(8)
+TILES(1)
+TILES(2)
+TILES(3)
+TILES(4)
+TILES(5)
+TILES(6)
+TILES(7)
+TILES(8)
 
 static void any_tile(const struct ggn_conv *a, const uint32_t *w, const uint32_t *x, long x_stride, int oc, long p, int ot,
                      int n)
 {
     typedef void tile_fn(const struct ggn_conv *, const uint32_t *, const uint32_t *, long, int, long);
-#define ROW(NV) {tile_1_##NV, tile_2_##NV, tile_3_##NV, tile_4_##NV, tile_5_##NV, tile_6_##NV, tile_7_##NV, tile_8_##NV}
+#define ROW(NV) \
+    { \
+        tile_1_##NV, tile_2_##NV, tile_3_##NV, tile_4_##NV, tile_5_##NV, tile_6_##NV, tile_7_##NV, tile_8_##NV \
+    }
     static tile_fn *const tiles[2][GGN_BF16_OC] = {ROW(3), ROW(1)};
 
     tiles[n == GGN_BF16_PX_FEW][ot - 1](a, w, x, x_stride, oc, p);

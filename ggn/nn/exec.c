@@ -82,10 +82,7 @@ static size_t leaf_size(const struct ggn_graph *g, int flags)
     return most;
 }
 
-static size_t sum_values(const struct ggn_graph *g, int capacity)
-{
-    return 2 * most_normed(g) * (size_t)capacity;
-}
+static size_t sum_values(const struct ggn_graph *g, int capacity) { return 2 * most_normed(g) * (size_t)capacity; }
 
 static size_t total_size(const struct ggn_graph *g, const struct ggn_kernels *k, int capacity, int flags, int workers)
 {
@@ -135,8 +132,14 @@ struct ggn_exec *ggn_exec_create_shared(const struct ggn_graph *graph, const str
     char *memory = e ? calloc(1, bytes + ALIGN_BYTES) : NULL;
 
     if (e)
-        *e = (struct ggn_exec){.graph = graph, .kernels = k, .threads = threads, .capacity = here, .flags = flags,
-                               .team = team, .images = images, .memory = memory,
+        *e = (struct ggn_exec){.graph = graph,
+                               .kernels = k,
+                               .threads = threads,
+                               .capacity = here,
+                               .flags = flags,
+                               .team = team,
+                               .images = images,
+                               .memory = memory,
                                .sums = malloc((sums + 1) * sizeof *e->sums),
                                .nodes = malloc((nodes + 1) * sizeof *e->nodes)};
     if (!memory || !e->sums || !e->nodes) {
@@ -164,15 +167,9 @@ void ggn_exec_destroy(struct ggn_exec *e)
     free(e);
 }
 
-real *ggn_exec_plane(const struct ggn_exec *e, int value, int n, int c)
-{
-    return ggn_plane_in(e, e->acts, value, n, c);
-}
+real *ggn_exec_plane(const struct ggn_exec *e, int value, int n, int c) { return ggn_plane_in(e, e->acts, value, n, c); }
 
-real *ggn_exec_grad(const struct ggn_exec *e, int value, int n, int c)
-{
-    return ggn_plane_in(e, e->grads, value, n, c);
-}
+real *ggn_exec_grad(const struct ggn_exec *e, int value, int n, int c) { return ggn_plane_in(e, e->grads, value, n, c); }
 
 void ggn_plane_copy(const struct ggn_value *v, real *to, const real *from, int row)
 {

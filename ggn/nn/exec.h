@@ -34,11 +34,11 @@ enum {
 struct ggn_exec {
     const struct ggn_graph *graph;
     const struct ggn_kernels *kernels;
-    struct base_threads *threads; /* NULL: the calling thread alone */
-    int capacity, batch, flags; /* images of this process: most; of the last forward pass */
-    struct base_team *team;     /* borrows; NULL: alone */
-    int images;                 /* of one sample: samples are what a team shares out */
-    int first, total;           /* of the batch in all processes: images before those of this one; images */
+    struct base_threads *threads;              /* NULL: the calling thread alone */
+    int capacity, batch, flags;                /* images of this process: most; of the last forward pass */
+    struct base_team *team;                    /* borrows; NULL: alone */
+    int images;                                /* of one sample: samples are what a team shares out */
+    int first, total;                          /* of the batch in all processes: images before those of this one; images */
     enum ggn_mode mode;                        /* of the last forward pass */
     uint32_t dropout_seed;                     /* masks are a function of it; change it between passes */
     size_t offset[GGN_MAX_LAYERS + 1], n_acts; /* where each value starts in one image's activations; their total */
@@ -46,11 +46,11 @@ struct ggn_exec {
     real *bn_mean, *bn_inv;                    /* [n_stats] of the last training-mode pass */
     real *scratch;                             /* [workers][scratch_size] */
     size_t scratch_size;
-    void *memory;    /* owns */
-    double *sums;    /* owns; [total][channels][2] of one batch norm, image by image */
-    real *nodes;     /* owns; [n_nodes][n_params] gradients of nodes */
+    void *memory;     /* owns */
+    double *sums;     /* owns; [total][channels][2] of one batch norm, image by image */
+    real *nodes;      /* owns; [n_nodes][n_params] gradients of nodes */
     real *node_grads; /* of the backward pass under way: nodes, or the caller's where there is one node and nobody else */
-    real *leaves;    /* [capacity][leaf_size] the weights' gradient of each image, one convolution at a time */
+    real *leaves;     /* [capacity][leaf_size] the weights' gradient of each image, one convolution at a time */
     size_t leaf_size;
     struct ggn_node node[GGN_NODES_MAX]; /* of this process's images */
     int n_nodes;

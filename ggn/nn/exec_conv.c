@@ -269,10 +269,7 @@ static void conv_weight_sum(void *data, long i, int worker)
     (void)worker;
 }
 
-static int needs_input_grad(const struct ggn_task *t)
-{
-    return t->l->in != 0 || (t->e->flags & GGN_EXEC_INPUT_GRAD);
-}
+static int needs_input_grad(const struct ggn_task *t) { return t->l->in != 0 || (t->e->flags & GGN_EXEC_INPUT_GRAD); }
 
 static void conv_backward(struct ggn_task *t)
 {

@@ -173,24 +173,24 @@ static struct pair pair_of(const struct ggn_task *t, long i)
 }
 
 /* A layer of one task per image and channel of the input. */
-#define PLANE_LAYER(name, forward, backward)                                                                                \
-    PLANE_PASS(name##_forward, forward)                                                                                     \
-    PLANE_PASS(name##_backward, backward)                                                                                   \
+#define PLANE_LAYER(name, forward, backward) \
+    PLANE_PASS(name##_forward, forward) \
+    PLANE_PASS(name##_backward, backward) \
     const struct ggn_layer_passes GGN_LAYER(name) = {name##_forward, name##_backward};
 
-#define PLANE_PASS(name, body)                                                                                              \
-    static void name##_plane(void *data, long i, int worker)                                                                \
-    {                                                                                                                       \
-        const struct ggn_task *t = data;                                                                                    \
-        const struct ggn_kernels *k = t->e->kernels;                                                                        \
-        struct pair p = pair_of(t, i);                                                                                      \
-        body;                                                                                                               \
-        (void)worker;                                                                                                       \
-        (void)k;                                                                                                            \
-    }                                                                                                                       \
-    static void name(struct ggn_task *t)                                                                                    \
-    {                                                                                                                       \
-        ggn_task_run(t, (long)t->e->batch * t->e->graph->value[t->l->in].c, name##_plane);                                  \
+#define PLANE_PASS(name, body) \
+    static void name##_plane(void *data, long i, int worker) \
+    { \
+        const struct ggn_task *t = data; \
+        const struct ggn_kernels *k = t->e->kernels; \
+        struct pair p = pair_of(t, i); \
+        body; \
+        (void)worker; \
+        (void)k; \
+    } \
+    static void name(struct ggn_task *t) \
+    { \
+        ggn_task_run(t, (long)t->e->batch * t->e->graph->value[t->l->in].c, name##_plane); \
     }
 
 PLANE_LAYER(lrelu, k->lrelu(p.y, p.x, (real)t->l->slope, p.in->h, p.in->w, p.in->row),
@@ -308,10 +308,7 @@ static void linear_unit(void *data, long o, int worker)
     (void)worker;
 }
 
-static void linear_forward(struct ggn_task *t)
-{
-    ggn_task_run(t, t->e->graph->value[t->l->out].c, linear_unit);
-}
+static void linear_forward(struct ggn_task *t) { ggn_task_run(t, t->e->graph->value[t->l->out].c, linear_unit); }
 
 /* dW[o] += Σ_n dY[n][o]·X[n], db[o] += Σ_n dY[n][o] */
 static void linear_weight_back(void *data, long o, int worker)

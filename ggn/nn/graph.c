@@ -3,10 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
-static size_t round_up(size_t n, size_t to)
-{
-    return (n + to - 1) / to * to;
-}
+static size_t round_up(size_t n, size_t to) { return (n + to - 1) / to * to; }
 
 static int add_value(struct ggn_graph *g, int c, int h, int w, int flat)
 {
@@ -147,15 +144,9 @@ static int add_same_shape(struct ggn_graph *g, enum ggn_op op, int in, double sl
     return l->out = add_value(g, g->value[in].c, g->value[in].h, g->value[in].w, g->value[in].flat);
 }
 
-int ggn_graph_lrelu(struct ggn_graph *g, int in, double slope)
-{
-    return add_same_shape(g, GGN_OP_LRELU, in, slope, 0);
-}
+int ggn_graph_lrelu(struct ggn_graph *g, int in, double slope) { return add_same_shape(g, GGN_OP_LRELU, in, slope, 0); }
 
-int ggn_graph_sigmoid(struct ggn_graph *g, int in)
-{
-    return add_same_shape(g, GGN_OP_SIGMOID, in, 1, 0);
-}
+int ggn_graph_sigmoid(struct ggn_graph *g, int in) { return add_same_shape(g, GGN_OP_SIGMOID, in, 1, 0); }
 
 int ggn_graph_dropout(struct ggn_graph *g, int in, double p)
 {
@@ -207,10 +198,7 @@ int ggn_graph_linear(struct ggn_graph *g, int in, int c_out)
     return l->out = add_value(g, c_out, 1, 1, 1);
 }
 
-void ggn_graph_mark(struct ggn_graph *g, int value, const char *stage)
-{
-    g->value[value].stage = stage;
-}
+void ggn_graph_mark(struct ggn_graph *g, int value, const char *stage) { g->value[value].stage = stage; }
 
 int ggn_graph_end(struct ggn_graph *g, struct base_err *err)
 {

@@ -41,16 +41,16 @@ struct ggn_value {
  * planes of the windows of a strided 3×3 convolution. BN: batch normalisation per channel. MAXPOOL: kernel 2 stride 2, or
  * kernel 3 stride 2 pad 1. UP: bilinear ×2, half-pixel centres, then pad_y zero rows on top and pad_x zero columns on the
  * left. FLATTEN: planes → vector in (C, H, W) order. */
-#define GGN_OPS(OP)                                                                                                         \
-    OP(CONV, conv, "conv")                                                                                                  \
-    OP(IM2COL, im2col, "im2col")                                                                                            \
-    OP(BN, bn, "batch norm")                                                                                                \
-    OP(LRELU, lrelu, "leaky relu")                                                                                          \
-    OP(SIGMOID, sigmoid, "sigmoid")                                                                                         \
-    OP(MAXPOOL, maxpool, "max pool")                                                                                        \
-    OP(UP, up, "upsample")                                                                                                  \
-    OP(FLATTEN, flatten, "flatten")                                                                                         \
-    OP(LINEAR, linear, "linear")                                                                                            \
+#define GGN_OPS(OP) \
+    OP(CONV, conv, "conv") \
+    OP(IM2COL, im2col, "im2col") \
+    OP(BN, bn, "batch norm") \
+    OP(LRELU, lrelu, "leaky relu") \
+    OP(SIGMOID, sigmoid, "sigmoid") \
+    OP(MAXPOOL, maxpool, "max pool") \
+    OP(UP, up, "upsample") \
+    OP(FLATTEN, flatten, "flatten") \
+    OP(LINEAR, linear, "linear") \
     OP(DROPOUT, dropout, "dropout")
 
 #define GGN_OP_ENUMERATE(op, name, text) GGN_OP_##op,

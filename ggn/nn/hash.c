@@ -11,7 +11,4 @@ uint32_t ggn_hash(uint32_t k, uint32_t s)
     return h ^ (h >> 16);
 }
 
-double ggn_hash_unit(uint32_t k, uint32_t s)
-{
-    return ggn_hash(k, s) / 4294967296.0;
-}
+double ggn_hash_unit(uint32_t k, uint32_t s) { return ggn_hash(k, s) / 4294967296.0; }

@@ -5,10 +5,7 @@
 
 static const char *const names[GGN_ISA_COUNT] = {"base", "avx2", "avx512"};
 
-const char *ggn_isa_name(enum ggn_isa isa)
-{
-    return names[isa];
-}
+const char *ggn_isa_name(enum ggn_isa isa) { return names[isa]; }
 
 int ggn_isa_available(enum ggn_isa isa)
 {

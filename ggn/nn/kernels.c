@@ -16,7 +16,4 @@ const struct ggn_kernels *ggn_kernels_for(enum ggn_isa isa)
     return ggn_isa_available(isa) ? table[isa] : NULL;
 }
 
-const struct ggn_kernels *ggn_kernels_best(void)
-{
-    return ggn_kernels_for(ggn_isa_best());
-}
+const struct ggn_kernels *ggn_kernels_best(void) { return ggn_kernels_for(ggn_isa_best()); }

@@ -13,8 +13,8 @@
 #include "nn/real.h"
 
 enum {
-    GGN_TILE_MAX = 8, /* most output channels of a register tile */
-    GGN_GRAD_IC = 16, /* input channels whose weight gradient one task accumulates */
+    GGN_TILE_MAX = 8,   /* most output channels of a register tile */
+    GGN_GRAD_IC = 16,   /* input channels whose weight gradient one task accumulates */
     GGN_WINO_GRAD = 32, /* input and output channels of a task where Winograd's algorithm is used */
     GGN_SSIM_RADIUS = 5
 };
@@ -40,7 +40,7 @@ struct ggn_conv_grad {
     const real *const *dy; /* [n_out] */
     int n_in, n_out;       /* <= GGN_WINO_GRAD */
     int h, w_px, row;
-    real *dw;            /* of o, i at dw + o·o_step + i·i_step: nine taps, from the last to the first if `mirrored` */
+    real *dw; /* of o, i at dw + o·o_step + i·i_step: nine taps, from the last to the first if `mirrored` */
     long o_step, i_step;
     int mirrored;
 };

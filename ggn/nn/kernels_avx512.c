@@ -8,8 +8,8 @@
 #define TABLE ggn_kernels_avx512
 #define ISA GGN_ISA_AVX512
 #ifndef GGN_DOUBLE
-#define FASTER_FORMS                                                                                                        \
-    .wino = ggn_wino_conv_avx512, .wino_grad = ggn_wino_grad_avx512, .wino_pack = ggn_wino_pack,                            \
+#define FASTER_FORMS \
+    .wino = ggn_wino_conv_avx512, .wino_grad = ggn_wino_grad_avx512, .wino_pack = ggn_wino_pack, \
     .bf16 = ggn_bf16_conv_avx512, .bf16_pack = ggn_bf16_pack,
 #endif
 

@@ -26,10 +26,7 @@
 
 enum { TILE_V = 3 /* vectors of pixels in a register tile: 8·3 or 4·3 accumulators */ };
 
-INLINE real vsum(vf a)
-{
-    return VSUM(a);
-}
+INLINE real vsum(vf a) { return VSUM(a); }
 
 /* --- convolution ------------------------------------------------------------------------------------------------------ */
 
@@ -73,19 +70,30 @@ INLINE void conv_tile(const struct ggn_conv *a, const real *w, int oc, int i0, i
         }
 }
 
-#define CONV_TILE(OT, NV, TAPS)                                                                                             \
-    static void conv_tile_##OT##_##NV##_##TAPS(const struct ggn_conv *a, const real *w, int oc, int i0, int i1, long p)     \
-    {                                                                                                                       \
-        conv_tile(a, w, oc, i0, i1, p, OT, NV, TAPS);                                                                       \
+#define CONV_TILE(OT, NV, TAPS) \
+    static void conv_tile_##OT##_##NV##_##TAPS(const struct ggn_conv *a, const real *w, int oc, int i0, int i1, long p) \
+    { \
+        conv_tile(a, w, oc, i0, i1, p, OT, NV, TAPS); \
     }
 #define CONV_TILES(OT) CONV_TILE(OT, 3, 9) CONV_TILE(OT, 1, 9) CONV_TILE(OT, 3, 1) CONV_TILE(OT, 1, 1)
-CONV_TILES(1) CONV_TILES(2) CONV_TILES(3) CONV_TILES(4)
+CONV_TILES(1)
+CONV_TILES(2)
+CONV_TILES(3)
+CONV_TILES(4)
 #if TILE_OC == 8
-CONV_TILES(5) CONV_TILES(6) CONV_TILES(7) CONV_TILES(8)
-#define EACH_TILE(NAME, END) {NAME##1##END, NAME##2##END, NAME##3##END, NAME##4##END, \
-                              NAME##5##END, NAME##6##END, NAME##7##END, NAME##8##END}
+CONV_TILES(5)
+CONV_TILES(6)
+CONV_TILES(7)
+CONV_TILES(8)
+#define EACH_TILE(NAME, END) \
+    { \
+        NAME##1##END, NAME##2##END, NAME##3##END, NAME##4##END, NAME##5##END, NAME##6##END, NAME##7##END, NAME##8##END \
+    }
 #else
-#define EACH_TILE(NAME, END) {NAME##1##END, NAME##2##END, NAME##3##END, NAME##4##END}
+#define EACH_TILE(NAME, END) \
+    { \
+        NAME##1##END, NAME##2##END, NAME##3##END, NAME##4##END \
+    }
 #endif
 
 typedef void conv_tile_fn(const struct ggn_conv *a, const real *w, int oc, int i0, int i1, long p);
@@ -153,15 +161,21 @@ INLINE void grad_tile(real *acc, const real *x, const real *const *dy, long p0, 
             STORE(acc + (t * ot + o) * VW, sum[t][o]);
 }
 
-#define GRAD_TILE(OT, NT)                                                                                                   \
-    static void grad_tile_##OT##_##NT(real *acc, const real *x, const real *const *dy, long p0, long p1)                    \
-    {                                                                                                                       \
-        grad_tile(acc, x, dy, p0, p1, OT, NT);                                                                              \
+#define GRAD_TILE(OT, NT) \
+    static void grad_tile_##OT##_##NT(real *acc, const real *x, const real *const *dy, long p0, long p1) \
+    { \
+        grad_tile(acc, x, dy, p0, p1, OT, NT); \
     }
 #define GRAD_TILES(OT) GRAD_TILE(OT, 3) GRAD_TILE(OT, 1)
-GRAD_TILES(1) GRAD_TILES(2) GRAD_TILES(3) GRAD_TILES(4)
+GRAD_TILES(1)
+GRAD_TILES(2)
+GRAD_TILES(3)
+GRAD_TILES(4)
 #if TILE_OC == 8
-GRAD_TILES(5) GRAD_TILES(6) GRAD_TILES(7) GRAD_TILES(8)
+GRAD_TILES(5)
+GRAD_TILES(6)
+GRAD_TILES(7)
+GRAD_TILES(8)
 #endif
 
 static void conv_grad(real *acc, const real *const *x, int n_in, const real *const *dy, int ot, int taps, int row, long p0,

@@ -70,15 +70,9 @@ static inline size_t ggn_conv_weights(const struct ggn_graph *g, const struct gg
 }
 
 /* Where image n leaves the gradient of the weights of the present layer, laid out as they are. */
-static inline real *ggn_leaf(const struct ggn_task *t, long n)
-{
-    return t->e->leaves + (size_t)n * t->e->leaf_size;
-}
+static inline real *ggn_leaf(const struct ggn_task *t, long n) { return t->e->leaves + (size_t)n * t->e->leaf_size; }
 
 /* The i-th image of node k, as this process numbers its images. */
-static inline int ggn_node_image(const struct ggn_task *t, int k, int i)
-{
-    return t->e->node[k].first - t->e->first + i;
-}
+static inline int ggn_node_image(const struct ggn_task *t, int k, int i) { return t->e->node[k].first - t->e->first + i; }
 
 #endif

@@ -2,10 +2,7 @@
 
 #include <math.h>
 
-double ggn_bce(double logit, double label)
-{
-    return fmax(logit, 0) - label * logit + log1p(exp(-fabs(logit)));
-}
+double ggn_bce(double logit, double label) { return fmax(logit, 0) - label * logit + log1p(exp(-fabs(logit))); }
 
 double ggn_sigmoid(double logit)
 {
@@ -13,7 +10,4 @@ double ggn_sigmoid(double logit)
     return logit >= 0 ? 1 / (1 + e) : e / (1 + e);
 }
 
-double ggn_bce_grad(double logit, double label)
-{
-    return ggn_sigmoid(logit) - label;
-}
+double ggn_bce_grad(double logit, double label) { return ggn_sigmoid(logit) - label; }

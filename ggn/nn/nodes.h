@@ -14,9 +14,9 @@
 #include "nn/real.h"
 
 enum {
-    GGN_TREE_DEPTH = 13,           /* images of a batch: below 2^12 */
+    GGN_TREE_DEPTH = 13, /* images of a batch: below 2^12 */
     GGN_NODES_MAX = 2 * GGN_TREE_DEPTH,
-    GGN_TREE_WIDTH = 1024          /* elements summed at a time */
+    GGN_TREE_WIDTH = 1024 /* elements summed at a time */
 };
 
 struct ggn_node {

@@ -59,9 +59,6 @@ typedef double real;
 #endif
 
 /* The larger one; a NaN where there is one. */
-static inline real ggn_larger(real a, real b)
-{
-    return a > b || a != a ? a : b;
-}
+static inline real ggn_larger(real a, real b) { return a > b || a != a ? a : b; }
 
 #endif

@@ -48,10 +48,7 @@ enum { VW = VECTOR_BYTES / (int)sizeof(real) /* lanes */ };
 #define INLINE static inline __attribute__((always_inline))
 
 /* a in the lanes where m is −1, b where it is 0. */
-INLINE vf vector_select(vi m, vf a, vf b)
-{
-    return (vf)(((vi)a & m) | ((vi)b & ~m));
-}
+INLINE vf vector_select(vi m, vf a, vf b) { return (vf)(((vi)a & m) | ((vi)b & ~m)); }
 
 #ifndef VMAX
 #define VMAX(a, b) vector_select((a) > (b), a, b)

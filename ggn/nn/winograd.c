@@ -16,10 +16,7 @@ int ggn_wino_grad_suits(int n_in, int n_out, int h, int w, int lanes)
     return n_in >= 6 && n_out >= 6 && n_in * n_out >= 60 && ggn_wino_suits(n_in, n_out, h, w, lanes);
 }
 
-int ggn_wino_tiles(int h, int w)
-{
-    return ((h + 3) / 4) * ((w + 3) / 4);
-}
+int ggn_wino_tiles(int h, int w) { return ((h + 3) / 4) * ((w + 3) / 4); }
 
 void ggn_wino_cut(int tiles, int n_out, int *blocks, int *oc_group)
 {

@@ -60,10 +60,7 @@ INLINE __m256i lanes_before(int n)
 }
 
 /* The first n values at p, 0 in the other lanes. */
-INLINE vf load_part(const float *p, int n)
-{
-    return n >= VW ? LOAD(p) : (vf)_mm256_maskload_ps(p, lanes_before(n));
-}
+INLINE vf load_part(const float *p, int n) { return n >= VW ? LOAD(p) : (vf)_mm256_maskload_ps(p, lanes_before(n)); }
 
 /* The first n lanes. */
 INLINE void store_part(float *p, int n, vf v)

@@ -38,10 +38,7 @@ INLINE void interleave4(vf p[4])
 }
 
 /* Lanes 1 to 15 of v, then `next`. */
-INLINE vf shift_in(vf v, float next)
-{
-    return (vf)_mm512_alignr_epi32((__m512i)SET1(next), (__m512i)v, 1);
-}
+INLINE vf shift_in(vf v, float next) { return (vf)_mm512_alignr_epi32((__m512i)SET1(next), (__m512i)v, 1); }
 
 /* m[c] = lane c of the vectors m[0..15]. */
 INLINE void transpose(vf m[16])
@@ -71,16 +68,10 @@ INLINE void transpose(vf m[16])
 }
 
 /* The first n values at p, 0 in the other lanes. */
-INLINE vf load_part(const float *p, int n)
-{
-    return _mm512_maskz_loadu_ps((__mmask16)((1u << n) - 1), p);
-}
+INLINE vf load_part(const float *p, int n) { return _mm512_maskz_loadu_ps((__mmask16)((1u << n) - 1), p); }
 
 /* The first n lanes. */
-INLINE void store_part(float *p, int n, vf v)
-{
-    _mm512_mask_storeu_ps(p, (__mmask16)((1u << n) - 1), v);
-}
+INLINE void store_part(float *p, int n, vf v) { _mm512_mask_storeu_ps(p, (__mmask16)((1u << n) - 1), v); }
 
 #include "nn/winograd_body.h"
 

@@ -123,8 +123,8 @@ INLINE void multiply_tile(float *m, const float *u, const float *v, int n_in, in
     UNROLL
     for (int o = 0; o < ot; o++)
         UNROLL
-        for (int k = 0; k < nv; k++)
-            acc[o][k] = SET1(0);
+    for (int k = 0; k < nv; k++)
+        acc[o][k] = SET1(0);
     for (int i = 0; i < n_in; i++, u += ot, v += lanes) {
         vf x[3];
         for (int k = 0; k < nv; k++)
@@ -139,19 +139,25 @@ INLINE void multiply_tile(float *m, const float *u, const float *v, int n_in, in
     UNROLL
     for (int o = 0; o < ot; o++)
         UNROLL
-        for (int k = 0; k < nv; k++)
-            STORE(m + (long)o * XI * GGN_WINO_TILES + k * L, acc[o][k]);
+    for (int k = 0; k < nv; k++)
+        STORE(m + (long)o * XI * GGN_WINO_TILES + k * L, acc[o][k]);
 }
 
-#define TILE(OT, NV)                                                                                                        \
-    static void multiply_##OT##_##NV(float *m, const float *u, const float *v, int n_in, int lanes)                         \
-    {                                                                                                                       \
-        multiply_tile(m, u, v, n_in, lanes, OT, NV);                                                                        \
+#define TILE(OT, NV) \
+    static void multiply_##OT##_##NV(float *m, const float *u, const float *v, int n_in, int lanes) \
+    { \
+        multiply_tile(m, u, v, n_in, lanes, OT, NV); \
     }
 #define TILES(OT) TILE(OT, 1) TILE(OT, 2) TILE(OT, 3)
-TILES(1) TILES(2) TILES(3) TILES(4)
+TILES(1)
+TILES(2)
+TILES(3)
+TILES(4)
 #if TILE_OC == 8
-TILES(5) TILES(6) TILES(7) TILES(8)
+TILES(5)
+TILES(6)
+TILES(7)
+TILES(8)
 #endif
 
 /* All 36 products for output channels [oc0, oc1). */
@@ -159,11 +165,20 @@ static void multiply(float *m, const float *u, const float *v, const struct ggn_
                      int oc1)
 {
     typedef void tile_fn(float *, const float *, const float *, int, int);
-#define ROW(OT) {multiply_##OT##_1, multiply_##OT##_2, multiply_##OT##_3}
+#define ROW(OT) \
+    { \
+        multiply_##OT##_1, multiply_##OT##_2, multiply_##OT##_3 \
+    }
     static tile_fn *const tiles[TILE_OC][3] = {
-        ROW(1), ROW(2), ROW(3), ROW(4),
+        ROW(1),
+        ROW(2),
+        ROW(3),
+        ROW(4),
 #if TILE_OC == 8
-        ROW(5), ROW(6), ROW(7), ROW(8),
+        ROW(5),
+        ROW(6),
+        ROW(7),
+        ROW(8),
 #endif
     };
     const int vectors = b->lanes / L;
@@ -358,8 +373,8 @@ INLINE void accumulate_tile(float *u, const float *m, const float *v, int tiles,
     UNROLL
     for (int o = 0; o < ot; o++)
         UNROLL
-        for (int k = 0; k < nv; k++)
-            acc[o][k] = LOAD(u + o * CHANNELS + k * L);
+    for (int k = 0; k < nv; k++)
+        acc[o][k] = LOAD(u + o * CHANNELS + k * L);
     for (int t = 0; t < tiles; t++, m += CHANNELS, v += CHANNELS) {
         vf x[3];
         for (int k = 0; k < nv; k++)
@@ -373,8 +388,8 @@ INLINE void accumulate_tile(float *u, const float *m, const float *v, int tiles,
     UNROLL
     for (int o = 0; o < ot; o++)
         UNROLL
-        for (int k = 0; k < nv; k++)
-            STORE(u + o * CHANNELS + k * L, acc[o][k]);
+    for (int k = 0; k < nv; k++)
+        STORE(u + o * CHANNELS + k * L, acc[o][k]);
 }
 
 /* All input channels of `ot` output channels. */
@@ -450,14 +465,17 @@ static void write_weights(const struct ggn_conv_grad *g, const float *u, int o, 
 void WINO(grad)(const struct ggn_conv_grad *g, float *scratch)
 {
     const int tiles_x = (g->w_px + 3) / 4, tiles_y = (g->h + 3) / 4;
-    const int parts = (tiles_x + GRAD_TILES - 1) / GRAD_TILES, rows = tiles_x < GRAD_TILES ? GRAD_TILES / tiles_x : 1;
+    const int parts = (tiles_x + GRAD_TILES - 1) / GRAD_TILES
+    , rows = tiles_x < GRAD_TILES
+    ? GRAD_TILES
+    / tiles_x : 1;
     float *v = scratch, *m = v + XI * STRIDE, *u = m + XI * STRIDE, *strip = u + XI * CHANNELS * CHANNELS;
 
     memset(u, 0, (size_t)(XI * CHANNELS * CHANNELS) * sizeof *u);
     for (int ty = 0; ty < tiles_y; ty += rows)
         for (int part = 0; part < parts; part++) {
-            struct tile_block b = {.ty0 = ty, .rows = tiles_y - ty < rows ? tiles_y - ty : rows,
-                                   .tx0 = tiles_x * part / parts};
+            struct tile_block b = {
+                .ty0 = ty, .rows = tiles_y - ty < rows ? tiles_y - ty : rows, .tx0 = tiles_x * part / parts};
             b.n = tiles_x * (part + 1) / parts - b.tx0;
             transform_block(v, g->x, g->n_in, g, &b, strip, 6);
             transform_block(m, g->dy, g->n_out, g, &b, strip, 4);

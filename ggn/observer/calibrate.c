@@ -76,10 +76,7 @@ static double spread_of(const struct evidence *e, double *answers)
     return 0.5 * (ggn_stats_quantile(answers, n, 0.84) - ggn_stats_quantile(answers, n, 0.16));
 }
 
-static double error_of(const struct ggn_calibration_block *b)
-{
-    return log2(b->predicted / b->human);
-}
+static double error_of(const struct ggn_calibration_block *b) { return log2(b->predicted / b->human); }
 
 /* Figures over blocks[from, to). */
 static int summarise(struct evidence *e, int from, int to, struct ggn_calibration_row *row, struct base_err *err)

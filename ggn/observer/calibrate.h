@@ -28,7 +28,7 @@ struct ggn_calibration_block {
 struct ggn_calibration_row { /* of e = log2(predicted / human) */
     const char *name;        /* of the view; borrows */
     int blocks;
-    double level;            /* fitted without this view */
+    double level;                                                    /* fitted without this view */
     double median_abs_log2, mean_abs_log2, median_log2, share_below; /* share_below: e < log2(0.8), noise left to be seen */
     double spearman;
 };

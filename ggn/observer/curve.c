@@ -12,14 +12,11 @@ const char *const ggn_curve_sources[] = {"halves", "levels", NULL};
 /* Simulated levels: GGN_LABELS_CAP and quarter octaves below it, down to about 5 spp. */
 enum { SIMULATED = 49 };
 
-static double simulated_spp(int i)
-{
-    return GGN_LABELS_CAP * exp2(0.25 * (i - (SIMULATED - 1)));
-}
+static double simulated_spp(int i) { return GGN_LABELS_CAP * exp2(0.25 * (i - (SIMULATED - 1))); }
 
 /* What is looked at: a part of one block, or several blocks of one size side by side as one larger block. */
 struct planes {
-    const struct seq_block *blocks;  /* borrows; [down][across] */
+    const struct seq_block *blocks; /* borrows; [down][across] */
     int across, down;
     int x0, y0, width, height;       /* the part; whole where there are several blocks */
     size_t pixels;                   /* of the part */
@@ -60,7 +57,10 @@ static int planes_allocate(struct planes *p, struct base_err *err)
 /* Room for `across` x `down` whole blocks. */
 static int planes_init(struct planes *p, const struct seq_block *blocks, int across, int down, struct base_err *err)
 {
-    *p = (struct planes){.blocks = blocks, .across = across, .down = down, .width = across * (int)blocks->width,
+    *p = (struct planes){.blocks = blocks,
+                         .across = across,
+                         .down = down,
+                         .width = across * (int)blocks->width,
                          .height = down * (int)blocks->height};
     return planes_allocate(p, err);
 }

@@ -8,7 +8,6 @@
 
 static const double pi = 3.14159265358979323846;
 
-
 /* Linear sRGB to XYZ in rationals (primaries and white of Rec. 709), rows X, Y, Z; the FLIP authors' matrix. */
 static const double rgb_to_xyz[3][3] = {
     {10135552.0 / 24577794.0, 8788810.0 / 24577794.0, 4435075.0 / 24577794.0},
@@ -29,7 +28,8 @@ static void invert3(double m[3][3], double inv[3][3])
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
             inv[j][i] = (m[(i + 1) % 3][(j + 1) % 3] * m[(i + 2) % 3][(j + 2) % 3] -
-                         m[(i + 1) % 3][(j + 2) % 3] * m[(i + 2) % 3][(j + 1) % 3]) / det;
+                         m[(i + 1) % 3][(j + 2) % 3] * m[(i + 2) % 3][(j + 1) % 3]) /
+                        det;
 }
 
 static void colour_init(struct colour *c)
@@ -90,10 +90,7 @@ static void csf_taps(double b, double ppd, int radius, float *w, double *sum)
     }
 }
 
-static int clamp_index(int i, int n)
-{
-    return i < 0 ? 0 : i >= n ? n - 1 : i;
-}
+static int clamp_index(int i, int n) { return i < 0 ? 0 : i >= n ? n - 1 : i; }
 
 /* One row: interior columns tap by tap (the inner loop runs over columns, so it vectorises), border columns one by one. */
 static void convolve_row(const float *in, float *out, int w, const float *wx, int radius)

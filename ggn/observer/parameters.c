@@ -27,7 +27,7 @@ static int get(const cJSON *root, const char *name, double lo, double hi, double
 static const cJSON *fit_without(const cJSON *root, const char *left_out)
 {
     const cJSON *row;
-    cJSON_ArrayForEach(row, cJSON_GetObjectItemCaseSensitive(root, "each_view_left_out")) {
+    cJSON_ArrayForEach (row, cJSON_GetObjectItemCaseSensitive(root, "each_view_left_out")) {
         const cJSON *name = cJSON_GetObjectItemCaseSensitive(row, "name");
         if (left_out && cJSON_IsString(name) && strcmp(name->valuestring, left_out) == 0)
             return row;
@@ -51,7 +51,8 @@ int ggn_observer_read(const char *path, const char *left_out, struct ggn_observe
     else if (cJSON_HasObjectItem(root, "exponent"))
         rc = base_fail(err, BASE_EINVAL,
                        "%s: an observer with two fitted numbers, of an earlier version: "
-                       "write it anew with ggn label --calibrate", path);
+                       "write it anew with ggn label --calibrate",
+                       path);
     else
         *out = o;
     cJSON_Delete(root);

@@ -62,10 +62,7 @@ static void judge(const struct ggn_observer *observer, struct ggn_remaining *b, 
                 (float)(fabs((double)w->seen[(size_t)y * (size_t)b->width + (size_t)x]) / observer->level);
 }
 
-int ggn_remaining_count(int width, int height, int block)
-{
-    return ((width - 1) / block + 1) * ((height - 1) / block + 1);
-}
+int ggn_remaining_count(int width, int height, int block) { return ((width - 1) / block + 1) * ((height - 1) / block + 1); }
 
 int ggn_remaining(const struct ggn_observer *observer, const struct ggn_image8 *reference, const struct ggn_image8 *image,
                   int block, struct ggn_remaining *blocks, float *map, struct base_err *err)

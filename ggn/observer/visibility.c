@@ -28,10 +28,7 @@ static inline float cube_root(float y)
     return r;
 }
 
-static inline float clamp01(float v)
-{
-    return v > 0.0f ? (v < 1.0f ? v : 1.0f) : 0.0f;
-}
+static inline float clamp01(float v) { return v > 0.0f ? (v < 1.0f ? v : 1.0f) : 0.0f; }
 
 void ggn_visible_lightness(const float *rgb, size_t n, float *lightness)
 {
@@ -47,21 +44,12 @@ void ggn_visible_lightness(const float *rgb, size_t n, float *lightness)
 
 /* --- patches --- */
 
-static int parts(int side)
-{
-    return (side - 1) / PATCH + 1;
-}
+static int parts(int side) { return (side - 1) / PATCH + 1; }
 
 /* Where part k of a side begins; part k + 1 begins where it ends. */
-static int part_begin(int side, int k)
-{
-    return (int)((int64_t)side * k / parts(side));
-}
+static int part_begin(int side, int k) { return (int)((int64_t)side * k / parts(side)); }
 
-size_t ggn_visible_patches(int width, int height)
-{
-    return (size_t)parts(width) * (size_t)parts(height);
-}
+size_t ggn_visible_patches(int width, int height) { return (size_t)parts(width) * (size_t)parts(height); }
 
 double ggn_visible_patch(int width, int height, size_t k, const double *texture, int rect[4])
 {
@@ -86,10 +74,7 @@ static void patch_means(double *columns, int width, int rows, double *means)
     memset(columns, 0, (size_t)width * sizeof *columns);
 }
 
-size_t ggn_visibility_scratch(int width)
-{
-    return (SUMS + 1) * ((size_t)width + 2 * RADIUS) + (size_t)parts(width);
-}
+size_t ggn_visibility_scratch(int width) { return (SUMS + 1) * ((size_t)width + 2 * RADIUS) + (size_t)parts(width); }
 
 /* The row that stands at y + k - RADIUS; beyond the block its first or last. */
 static const float *row_at(const float *image, int width, int height, int y)
@@ -183,10 +168,7 @@ static void sum_rows(const float *a, const float *b, int width, int height, int 
         extend(columns[c], width);
 }
 
-static inline double mean_of_window(const double *c)
-{
-    return (c[0] + c[1] + c[2] + c[3] + c[4]) * (1.0 / (TAPS * TAPS));
-}
+static inline double mean_of_window(const double *c) { return (c[0] + c[1] + c[2] + c[3] + c[4]) * (1.0 / (TAPS * TAPS)); }
 
 void ggn_visible_texture(const float *a, const float *b, int width, int height, double *scratch, double *texture)
 {

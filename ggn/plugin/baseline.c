@@ -18,8 +18,7 @@ static const struct lull_param params[P_COUNT] = {
     [P_VISIBLE] = LULL_KIT_FLOAT("visible", NULL, 0, 1,
                                  "stop when the probability that noise is still seen is less than this; without it the "
                                  "model's own"),
-    [P_PASSES] = LULL_KIT_INT("passes", NULL, 1, 16,
-                              "checks in a row that must be below that; without it the model's own"),
+    [P_PASSES] = LULL_KIT_INT("passes", NULL, 1, 16, "checks in a row that must be below that; without it the model's own"),
     [P_FIRST_SPP] = LULL_KIT_INT("first-spp", NULL, 1, 1e9,
                                  "samples per pixel of the first image that is looked at; without it the model's own"),
 };
@@ -105,8 +104,8 @@ static int no_tail(void *data, double *tail999, double *gini)
     return 0;
 }
 
-static const struct gp_sight sight = {slot_of, worker_create, worker_destroy, model_destroy, take,
-                                      {NULL, no_noise, window_logit, no_tail}};
+static const struct gp_sight sight = {slot_of,       worker_create, worker_destroy,
+                                      model_destroy, take,          {NULL, no_noise, window_logit, no_tail}};
 
 static void hash_model(struct lull_instance *in, const struct ggn_baseline *b)
 {
@@ -148,8 +147,8 @@ static int32_t create(enum ggn_baseline_kind kind, const struct lull_criterion *
 {
     const char *text[LULL_KIT_PARAM_MAX];
     struct lull_instance *in = NULL;
-    int32_t status = gp_windowed_create(&sight, table, host, pairs, pair_count, pair_stride, text, instance ? &in : NULL,
-                                        err);
+    int32_t status =
+        gp_windowed_create(&sight, table, host, pairs, pair_count, pair_stride, text, instance ? &in : NULL, err);
 
     if (!status)
         status = load_model(in, kind, text[P_MODEL], err);

@@ -26,8 +26,8 @@ static const struct lull_param params[P_COUNT] = {
     [P_VISIBLE] = LULL_KIT_FLOAT("visible", NULL, 0, 1,
                                  "stop when less than this share of viewers would still see noise; without it the model's "
                                  "own"),
-    [P_PASSES] = LULL_KIT_INT("passes", NULL, 1, 16,
-                              "checks in a row that must be below that share; without it the model's own"),
+    [P_PASSES] =
+        LULL_KIT_INT("passes", NULL, 1, 16, "checks in a row that must be below that share; without it the model's own"),
     [P_GATE] = LULL_KIT_BOOL("gate", "1", "spare the network while a block is plainly noisy (p_noisy is then not given)"),
     [P_TAIL] = LULL_KIT_FLOAT("tail", NULL, 0, 1e30,
                               "do not stop while the 99.9th percentile of the half-buffer difference exceeds this many "
@@ -86,10 +86,7 @@ static void *worker_create(const struct lull_instance *in, size_t pixels, struct
     return NULL;
 }
 
-static void model_destroy(void *model)
-{
-    ggn_model_destroy(model);
-}
+static void model_destroy(void *model) { ggn_model_destroy(model); }
 
 static long take(const struct gp_look *l, uint32_t slot)
 {
@@ -192,8 +189,8 @@ static int tail_statistics(void *data, double *tail999, double *gini)
     return 1;
 }
 
-static const struct gp_sight sight = {slot_of, worker_create, worker_destroy, model_destroy, take,
-                                      {NULL, window_noise, window_logit, tail_statistics}};
+static const struct gp_sight sight = {slot_of,       worker_create, worker_destroy,
+                                      model_destroy, take,          {NULL, window_noise, window_logit, tail_statistics}};
 
 /* --- instance ---------------------------------------------------------------------------------------------------------- */
 
@@ -235,8 +232,8 @@ static int32_t create(const struct lull_host *host, const struct lull_pair *pair
 {
     const char *text[LULL_KIT_PARAM_MAX];
     struct lull_instance *in = NULL;
-    int32_t status = gp_windowed_create(&sight, &ggn_plugin_ggn, host, pairs, pair_count, pair_stride, text,
-                                        instance ? &in : NULL, err);
+    int32_t status =
+        gp_windowed_create(&sight, &ggn_plugin_ggn, host, pairs, pair_count, pair_stride, text, instance ? &in : NULL, err);
 
     if (!status)
         status = load_model(in, text[P_MODEL], err);
@@ -249,6 +246,7 @@ static int32_t create(const struct lull_host *host, const struct lull_pair *pair
 }
 
 const struct lull_criterion ggn_plugin_ggn = GP_WINDOWED_TABLE(
-    .create = create, .id = "ggn", .name = "Guided-Generative Network",
-    .description = "Probability that a viewer still sees noise in the block, from the last images of it (Buisine, Teytaud,\n"
-                   "Delepoulle, Renaud 2022). `error` is the root mean square of the noise in display units (1 = white).");
+        .create = create, .id = "ggn", .name = "Guided-Generative Network",
+        .description =
+            "Probability that a viewer still sees noise in the block, from the last images of it (Buisine, Teytaud,\n"
+            "Delepoulle, Renaud 2022). `error` is the root mean square of the noise in display units (1 = white).");

@@ -2,10 +2,7 @@
 
 #include <lull/criterion_kit.h>
 
-static size_t slot_bytes(struct gp_slot slot)
-{
-    return (slot.made + slot.kept + 63) & ~(size_t)63;
-}
+static size_t slot_bytes(struct gp_slot slot) { return (slot.made + slot.kept + 63) & ~(size_t)63; }
 
 uint64_t gp_history_block_bytes(int window, struct gp_slot slot)
 {

@@ -32,11 +32,11 @@ struct gp_head {
 };
 
 struct gp_history {
-    int window;                   /* S */
-    uint32_t count;               /* blocks */
-    struct lull_rect *rect;       /* owns, with everything below, as one allocation */
-    size_t *at;                   /* offset of the block's slots in `bytes` */
-    struct gp_slot *slot;         /* of each block */
+    int window;             /* S */
+    uint32_t count;         /* blocks */
+    struct lull_rect *rect; /* owns, with everything below, as one allocation */
+    size_t *at;             /* offset of the block's slots in `bytes` */
+    struct gp_slot *slot;   /* of each block */
     struct gp_head *head, *pending;
     unsigned char *bytes;
     void *memory;

@@ -60,10 +60,7 @@ void gp_looks_release(struct gp_looks *looks)
     *looks = (struct gp_looks){0};
 }
 
-size_t gp_looks_values(const struct gp_looks *l, uint32_t id)
-{
-    return l->at[id + 1] - l->at[id];
-}
+size_t gp_looks_values(const struct gp_looks *l, uint32_t id) { return l->at[id + 1] - l->at[id]; }
 
 static float *pixels_of(const struct gp_looks *l, uint32_t id, uint32_t slot)
 {
@@ -89,10 +86,7 @@ const float *gp_looks_begin(struct gp_looks *l, uint32_t id, uint64_t spp, float
     return *spp_base < spp ? pixels_of(l, id, h->slot[which]) : NULL;
 }
 
-void gp_looks_commit(struct gp_looks *l, uint32_t id)
-{
-    l->head[id] = l->pending[id];
-}
+void gp_looks_commit(struct gp_looks *l, uint32_t id) { l->head[id] = l->pending[id]; }
 
 /* --- state ------------------------------------------------------------------------------------------------------------- */
 

@@ -23,12 +23,12 @@ struct gp_look_head {
 };
 
 struct gp_looks {
-    uint32_t count; /* blocks; 0: nothing is remembered */
-    size_t values;  /* of all blocks' single looks */
-    size_t *at;     /* [count + 1]; where a block's slots begin, in values of single looks */
+    uint32_t count;                      /* blocks; 0: nothing is remembered */
+    size_t values;                       /* of all blocks' single looks */
+    size_t *at;                          /* [count + 1]; where a block's slots begin, in values of single looks */
     struct gp_look_head *head, *pending; /* [count] */
-    float *pixels;  /* three slots of [3][P] of each block */
-    void *memory;   /* owns all of it */
+    float *pixels;                       /* three slots of [3][P] of each block */
+    void *memory;                        /* owns all of it */
 };
 
 /* For the blocks of a checked frame. LULL_E_MEMORY leaves *looks as it was. */

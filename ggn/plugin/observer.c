@@ -40,9 +40,9 @@ struct lull_instance {
     struct lull_kit kit;
     struct ggn_observer observer;
     double stop_error;
-    atomic_flag warned; /* of planes that say nothing about noise: once per frame */
+    atomic_flag warned;    /* of planes that say nothing about noise: once per frame */
     struct gp_looks looks; /* of a frame without HALF */
-    uint32_t workers;   /* of the open frame */
+    uint32_t workers;      /* of the open frame */
     struct largest largest;
     struct worker *worker;
     float *pixels;   /* owns what the workers point into */
@@ -176,7 +176,8 @@ static double judge_halves(struct lull_instance *in, const struct lull_view *vie
     int differ = read_halves(&in->kit, view, b, w, tally);
     return verdict_on(in, b, differ, sqrt(h * (n - h)) / n, /* 1/2 for equal halves */
                       "observer: COLOR and HALF are the same in a block that is not of one colour: HALF must hold a fixed "
-                      "half of the samples", w, tally);
+                      "half of the samples",
+                      w, tally);
 }
 
 static double judge_looks(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
@@ -193,7 +194,8 @@ static double judge_looks(struct lull_instance *in, const struct lull_view *view
     }
     return verdict_on(in, b, differ, 0.5,
                       "observer: COLOR has not changed since an earlier check of a block that is not of one colour: it "
-                      "must hold the mean of all samples", w, tally);
+                      "must hold the mean of all samples",
+                      w, tally);
 }
 
 static void judge(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
@@ -261,8 +263,8 @@ static int32_t workers_create(struct lull_instance *in, const struct largest *mo
     for (size_t i = 0; i < count; i++) {
         float *at = planes + i * 8 * pixels;
         double *texture = scratch + i * doubles;
-        worker[i] = (struct worker){
-            {at, at + 3 * pixels}, {at + 6 * pixels, at + 7 * pixels}, texture, texture + most->patches};
+        worker[i] =
+            (struct worker){{at, at + 3 * pixels}, {at + 6 * pixels, at + 7 * pixels}, texture, texture + most->patches};
     }
     workers_release(in);
     in->worker = worker;
@@ -368,15 +370,13 @@ static int32_t state_load(struct lull_instance *in, const struct lull_reader *re
 
 static const struct lull_state state = {.struct_size = sizeof state, .save = state_save, .load = state_load};
 
-static const void *get_extension(const char *id)
-{
-    return id && !strcmp(id, LULL_EXT_STATE) ? &state : NULL;
-}
+static const void *get_extension(const char *id) { return id && !strcmp(id, LULL_EXT_STATE) ? &state : NULL; }
 
-const struct lull_criterion ggn_plugin_observer = GP_TABLE(
-    .create = create, .begin_frame = begin_frame, .evaluate = evaluate, .end_frame = end_frame, .destroy = destroy,
-    .get_extension = get_extension, .id = "observer", .name = "Model observer",
-    .description = "Noise that people would see, from the two halves of the samples, or, without half buffers, from how\n"
-                   "the mean changes between checks: lightness, slightly blurred and pooled so that a few bright pixels\n"
-                   "count, against a limit that rises with the texture. `error` is the visible noise over that limit\n"
-                   "(1 = just not visible), fitted to human thresholds.");
+const struct lull_criterion ggn_plugin_observer =
+    GP_TABLE(.create = create, .begin_frame = begin_frame, .evaluate = evaluate, .end_frame = end_frame, .destroy = destroy,
+             .get_extension = get_extension, .id = "observer", .name = "Model observer",
+             .description =
+                 "Noise that people would see, from the two halves of the samples, or, without half buffers, from how\n"
+                 "the mean changes between checks: lightness, slightly blurred and pooled so that a few bright pixels\n"
+                 "count, against a limit that rises with the texture. `error` is the visible noise over that limit\n"
+                 "(1 = just not visible), fitted to human thresholds.");

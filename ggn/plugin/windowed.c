@@ -10,8 +10,8 @@ int32_t gp_windowed_create(const struct gp_sight *sight, const struct lull_crite
                            const struct lull_pair *pairs, uint32_t pair_count, uint32_t pair_stride, const char **text,
                            struct lull_instance **instance, struct lull_error *err)
 {
-    int32_t status = lull_kit_create(&rule, table, sizeof **instance, host, pairs, pair_count, pair_stride, text, instance,
-                                     err);
+    int32_t status =
+        lull_kit_create(&rule, table, sizeof **instance, host, pairs, pair_count, pair_stride, text, instance, err);
 
     if (status)
         return status;
@@ -36,8 +36,8 @@ void gp_windowed_ready(struct lull_instance *in, const struct lull_param *params
     for (uint32_t i = 0; i < count; i++)
         if (!isnan(in->kit.value[i]))
             ggn_policy_adjust(policy, params[i].name, in->kit.value[i]);
-    const double numbers[] = {policy->threshold, policy->passes,  policy->gate_noise,
-                              policy->tail999,   policy->gini,    policy->first_spp};
+    const double numbers[] = {policy->threshold, policy->passes, policy->gate_noise,
+                              policy->tail999,   policy->gini,   policy->first_spp};
     gp_windowed_hash(in, numbers, sizeof numbers);
     if (policy->tail999 > 0 || policy->gini > 0)
         need->planes_used |= LULL_PLANE_BIT(LULL_PLANE_HALF);
@@ -253,7 +253,4 @@ static int32_t state_load(struct lull_instance *in, const struct lull_reader *re
 
 static const struct lull_state state = {.struct_size = sizeof state, .save = state_save, .load = state_load};
 
-const void *gp_windowed_get_extension(const char *id)
-{
-    return id && !strcmp(id, LULL_EXT_STATE) ? &state : NULL;
-}
+const void *gp_windowed_get_extension(const char *id) { return id && !strcmp(id, LULL_EXT_STATE) ? &state : NULL; }

@@ -39,11 +39,11 @@ struct gp_sight {
 struct lull_instance {
     struct lull_kit kit;
     const struct gp_sight *sight;
-    void *model; /* owns, by sight->model_destroy */
-    const char *half_wanted; /* logged when a frame has no half buffer; static text, NULL: nothing is lost */
-    const char *slow;        /* logged with each frame; static text, NULL: nothing is */
+    void *model;               /* owns, by sight->model_destroy */
+    const char *half_wanted;   /* logged when a frame has no half buffer; static text, NULL: nothing is lost */
+    const char *slow;          /* logged with each frame; static text, NULL: nothing is */
     struct ggn_stop_rule rule; /* the model's policy, with the parameters over it */
-    uint32_t key; /* of saved state: a hash of model and policy */
+    uint32_t key;              /* of saved state: a hash of model and policy */
     struct ggn_display display;
     struct gp_history history; /* of the open frame */
     uint32_t workers;
@@ -72,8 +72,7 @@ const void *gp_windowed_get_extension(const char *id);
 
 /* Table of such a criterion; see GP_TABLE. */
 #define GP_WINDOWED_TABLE(...) \
-    GP_TABLE(.begin_frame = gp_windowed_begin_frame, .evaluate = gp_windowed_evaluate, \
-             .end_frame = gp_windowed_end_frame, .destroy = gp_windowed_destroy, \
-             .get_extension = gp_windowed_get_extension, __VA_ARGS__)
+    GP_TABLE(.begin_frame = gp_windowed_begin_frame, .evaluate = gp_windowed_evaluate, .end_frame = gp_windowed_end_frame, \
+             .destroy = gp_windowed_destroy, .get_extension = gp_windowed_get_extension, __VA_ARGS__)
 
 #endif

@@ -45,10 +45,7 @@ static void send_json(struct ggn_study_response *r, cJSON *o, int failed)
 }
 
 /* A failure of the machine, not of the request. */
-static void send_failure(struct ggn_study_response *r, const struct base_err *err)
-{
-    ggn_study_refuse(r, 500, err->text);
-}
+static void send_failure(struct ggn_study_response *r, const struct base_err *err) { ggn_study_refuse(r, 500, err->text); }
 
 /* --- files --- */
 

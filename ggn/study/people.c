@@ -54,10 +54,7 @@ struct work {
 };
 
 /* Nobody can have looked in so short a time. Catch trials count all the same. */
-static int is_fast(const struct ggn_study_people *p, const struct ggn_study_trial *t)
-{
-    return t->ms < p->study->min_ms;
-}
+static int is_fast(const struct ggn_study_people *p, const struct ggn_study_trial *t) { return t->ms < p->study->min_ms; }
 
 /* --- two intervals --- */
 

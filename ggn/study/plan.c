@@ -13,10 +13,7 @@ static uint64_t next_random(uint64_t *state)
 }
 
 /* Uniform in [0, n); the bias of the remainder is below n / 2^64. */
-static int below(uint64_t *state, int n)
-{
-    return (int)(next_random(state) % (uint64_t)n);
-}
+static int below(uint64_t *state, int n) { return (int)(next_random(state) % (uint64_t)n); }
 
 static void shuffle(uint64_t *state, int *x, int n)
 {

@@ -23,10 +23,7 @@ static double spread_given(int b, int p)
     return b == p ? own_spread : b == p - 1 || b == p + 1 ? (1.0 - own_spread) / neighbours : 0.0;
 }
 
-double ggn_study_normal(double z)
-{
-    return 0.5 * erfc(-z * 0.70710678118654752440);
-}
+double ggn_study_normal(double z) { return 0.5 * erfc(-z * 0.70710678118654752440); }
 
 /* By halving; tails beyond 1e-15 do not matter here. */
 double ggn_study_normal_quantile(double p)
@@ -43,10 +40,7 @@ double ggn_study_normal_quantile(double p)
     return 0.5 * (lo + hi);
 }
 
-double ggn_study_p_correct(double x, double t, double spread)
-{
-    return 0.5 + 0.5 * ggn_study_normal((t - x) / spread);
-}
+double ggn_study_p_correct(double x, double t, double spread) { return 0.5 + 0.5 * ggn_study_normal((t - x) / spread); }
 
 double ggn_study_t975(int df)
 {
@@ -146,10 +140,7 @@ static int steps(const struct ggn_study_curve *c)
     return (int)ceil((c->x_max - c->x_min + 2 * MARGIN) * STEPS_PER_OCTAVE) + 1;
 }
 
-static double step_t(const struct ggn_study_curve *c, int i)
-{
-    return c->x_min - MARGIN + (double)i / STEPS_PER_OCTAVE;
-}
+static double step_t(const struct ggn_study_curve *c, int i) { return c->x_min - MARGIN + (double)i / STEPS_PER_OCTAVE; }
 
 /* log of the block's evidence, sum over t and over its own spread, for each spread and habit of the person; to or from what
  * is known. */

@@ -21,10 +21,7 @@ static int begin(struct base_file_out *out, const char *dir, const char *name, s
 }
 
 /* Samples per pixel of octaves; "nan" where unknown. */
-static double spp(double octaves)
-{
-    return exp2(octaves);
-}
+static double spp(double octaves) { return exp2(octaves); }
 
 static int write_people(const char *dir, const struct ggn_study_people *p, struct base_err *err)
 {

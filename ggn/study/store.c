@@ -46,10 +46,7 @@ static int prepare(struct ggn_study_store *s, const char *sql, sqlite3_stmt **st
     return sqlite3_prepare_v2(s->db, sql, -1, statement, NULL) == SQLITE_OK ? 0 : fail_sql(s, err);
 }
 
-static void bind_text(sqlite3_stmt *st, int i, const char *text)
-{
-    sqlite3_bind_text(st, i, text, -1, SQLITE_STATIC);
-}
+static void bind_text(sqlite3_stmt *st, int i, const char *text) { sqlite3_bind_text(st, i, text, -1, SQLITE_STATIC); }
 
 static void copy_text(sqlite3_stmt *st, int column, char *out, size_t room)
 {
@@ -176,20 +173,11 @@ int ggn_study_store_check(struct ggn_study_store *s, struct base_err *err)
     return s->syncer ? ggn_study_syncer_check(s->syncer, err) : 0;
 }
 
-int ggn_study_store_begin(struct ggn_study_store *s, struct base_err *err)
-{
-    return run(s, "BEGIN IMMEDIATE", err);
-}
+int ggn_study_store_begin(struct ggn_study_store *s, struct base_err *err) { return run(s, "BEGIN IMMEDIATE", err); }
 
-int ggn_study_store_commit(struct ggn_study_store *s, struct base_err *err)
-{
-    return run(s, "COMMIT", err);
-}
+int ggn_study_store_commit(struct ggn_study_store *s, struct base_err *err) { return run(s, "COMMIT", err); }
 
-void ggn_study_store_rollback(struct ggn_study_store *s)
-{
-    run(s, "ROLLBACK", NULL);
-}
+void ggn_study_store_rollback(struct ggn_study_store *s) { run(s, "ROLLBACK", NULL); }
 
 /* --- people --- */
 

@@ -142,8 +142,7 @@ static int read_block(const struct reader *r, const cJSON *o, const struct ggn_s
     b->levels = malloc((size_t)cJSON_GetArraySize(levels) * sizeof *b->levels);
     if (!b->levels)
         return base_fail_nomem(r->err, r->path);
-    cJSON_ArrayForEach(level, levels)
-    {
+    cJSON_ArrayForEach (level, levels) {
         double spp = cJSON_IsNumber(level) ? level->valuedouble : 0.0;
         if (!(spp >= 1.0 && spp <= 1e9) || floor(spp) != spp || (b->n_levels > 0 && spp <= b->levels[b->n_levels - 1]))
             return base_fail(r->err, BASE_EINVAL, "%s: levels of block %u must be rising whole numbers from 1", r->path,
@@ -168,8 +167,7 @@ static int read_view(const struct reader *r, const cJSON *o, enum ggn_study_task
     view->blocks = calloc((size_t)cJSON_GetArraySize(blocks), sizeof *view->blocks);
     if (!view->blocks)
         return base_fail_nomem(r->err, r->path);
-    cJSON_ArrayForEach(block, blocks)
-    {
+    cJSON_ArrayForEach (block, blocks) {
         struct ggn_study_block *b = &view->blocks[view->n_blocks++];
         rc = read_block(r, block, view, b);
         if (!rc && view->n_blocks > 1 && b->id <= b[-1].id)
@@ -188,8 +186,7 @@ static int read_views(const struct reader *r, const cJSON *root, struct ggn_stud
     s->views = calloc((size_t)cJSON_GetArraySize(views), sizeof *s->views);
     if (!s->views)
         return base_fail_nomem(r->err, r->path);
-    cJSON_ArrayForEach(view, views)
-    {
+    cJSON_ArrayForEach (view, views) {
         struct ggn_study_view *v = &s->views[s->n_views++];
         int rc = read_view(r, view, s->task, v);
         if (!rc && ggn_study_find_view(s, v->name) != s->n_views - 1)
@@ -208,8 +205,7 @@ static int read_conditions(const struct reader *r, const cJSON *root, struct ggn
     s->conditions = calloc((size_t)cJSON_GetArraySize(conditions), sizeof *s->conditions);
     if (!s->conditions)
         return base_fail_nomem(r->err, r->path);
-    cJSON_ArrayForEach(condition, conditions)
-    {
+    cJSON_ArrayForEach (condition, conditions) {
         int rc = plain_name(r, condition, s->conditions[s->n_conditions]);
         if (rc)
             return rc;

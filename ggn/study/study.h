@@ -14,7 +14,7 @@
 #include "base/err.h"
 
 enum {
-    GGN_STUDY_NAME = 96, /* bytes of a name, the NUL included */
+    GGN_STUDY_NAME = 96,  /* bytes of a name, the NUL included */
     GGN_STUDY_LINE = 200, /* bytes of who asks and of their address, the NUL included */
     GGN_STUDY_MAX_VIEWS = 1024,
     GGN_STUDY_MAX_BLOCKS = 4096, /* of one view */
@@ -49,11 +49,11 @@ struct ggn_study {
     int trials;    /* per block, catch trials included (two-interval) */
     int repeats;   /* settings per block (adjustment), judgements per picture (validation) */
     double catch_share;
-    int show_ms, gap_ms;                    /* two-interval: each interval, and the blank between them */
-    int break_every;                        /* trials between offered breaks; 0: none */
-    double min_catch_passed, max_untouched; /* exclusion rules, shares: see FORMAT.md */
-    double min_ms;   /* an answer in less time is left out: nobody can have looked */
-    double max_fast; /* nor does somebody count of whose answers a larger share is */
+    int show_ms, gap_ms;                                    /* two-interval: each interval, and the blank between them */
+    int break_every;                                        /* trials between offered breaks; 0: none */
+    double min_catch_passed, max_untouched;                 /* exclusion rules, shares: see FORMAT.md */
+    double min_ms;                                          /* an answer in less time is left out: nobody can have looked */
+    double max_fast;                                        /* nor does somebody count of whose answers a larger share is */
     char asked_by[GGN_STUDY_LINE], contact[GGN_STUDY_LINE]; /* UTF-8, who asks and where; empty in old studies */
     int n_views;
     struct ggn_study_view *views;       /* owns */

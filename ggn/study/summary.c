@@ -5,10 +5,7 @@
 
 #include "figures/stats.h"
 
-static int counts(const struct ggn_study_result *r)
-{
-    return r->excluded[0] == '\0';
-}
+static int counts(const struct ggn_study_result *r) { return r->excluded[0] == '\0'; }
 
 /* A person's estimate in a cell, not beyond the highest level; NaN without one. */
 static double estimate(const struct ggn_study_people *p, int person, int cell)

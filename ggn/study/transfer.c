@@ -155,8 +155,7 @@ static int import_trials(const struct reader *r, const cJSON *list, const struct
     struct ggn_study_trial trial;
     const cJSON *o;
     int rc = ggn_study_plan_init(&plan, r->study, p->seed, r->err);
-    cJSON_ArrayForEach(o, list)
-    {
+    cJSON_ArrayForEach (o, list) {
         if (!rc && !read_trial(r, o, &plan, &trial))
             rc = base_fail(r->err, BASE_EINVAL, "%s: person %s has a trial that this study cannot have", r->path, p->id);
         if (!rc) {
@@ -220,8 +219,7 @@ int ggn_study_import(const struct ggn_study *study, struct ggn_study_store *stor
         cJSON_Delete(root);
         return rc;
     }
-    cJSON_ArrayForEach(o, list)
-    {
+    cJSON_ArrayForEach (o, list) {
         if (!rc)
             rc = import_person(&r, o);
         n++;

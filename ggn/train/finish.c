@@ -62,8 +62,7 @@ static cJSON *describe_data(const struct ggn_session *s, int *failed)
     }
     base_json_number(o, "training_blocks", ggn_chains_count(&s->set, GGN_SPLIT_TRAIN, 1), failed);
     base_json_number(o, "synthetic_chains",
-                     ggn_chains_count(&s->set, GGN_SPLIT_TRAIN, 0) - ggn_chains_count(&s->set, GGN_SPLIT_TRAIN, 1),
-                     failed);
+                     ggn_chains_count(&s->set, GGN_SPLIT_TRAIN, 0) - ggn_chains_count(&s->set, GGN_SPLIT_TRAIN, 1), failed);
     base_json_number(o, "validation_blocks", ggn_chains_count(&s->set, GGN_SPLIT_VALIDATION, 1), failed);
     base_json_number(o, "training_windows", s->train.n, failed);
     base_json_number(o, "validation_windows", s->validation.n, failed);

@@ -24,8 +24,8 @@ void ggn_checks_release(struct ggn_checks *checks);
 /* What stopping after so many passes below t does to these blocks. */
 struct ggn_stopping {
     int blocks;
-    double early_rate;    /* share stopped below 0.8 of the true threshold */
-    double samples_ratio; /* samples spent / samples at the true thresholds */
+    double early_rate;                     /* share stopped below 0.8 of the true threshold */
+    double samples_ratio;                  /* samples spent / samples at the true thresholds */
     double median_abs_log2, mean_abs_log2; /* of stop / true threshold */
 };
 int ggn_calibrate_stopping(const struct ggn_checks *checks, int passes, double t, struct ggn_stopping *out,

@@ -43,8 +43,8 @@ static struct crop draw_crop(const struct ggn_session *s, enum ggn_split split, 
     c.x0 = (int)(draw(23, step, i, seed) * (s->set.width - size + 1));
     c.y0 = (int)(draw(24, step, i, seed) * (s->set.height - size + 1));
     if (split == GGN_SPLIT_TRAIN)
-        c.augment = ggn_augment_draw(step, i, seed ^ 1,
-                                     &(struct ggn_augment_options){s->plan->flips, 1, s->plan->jitter, 0});
+        c.augment =
+            ggn_augment_draw(step, i, seed ^ 1, &(struct ggn_augment_options){s->plan->flips, 1, s->plan->jitter, 0});
     return c;
 }
 

@@ -19,10 +19,7 @@ static size_t sample_values(const struct ggn_session *s)
     return (2 * (size_t)s->hyper.window + 1) * ggn_chains_values(&s->set);
 }
 
-static size_t window_values(const struct ggn_session *s)
-{
-    return (size_t)s->hyper.window * ggn_chains_values(&s->set);
-}
+static size_t window_values(const struct ggn_session *s) { return (size_t)s->hyper.window * ggn_chains_values(&s->set); }
 
 static float difference(const struct ggn_session *s)
 {
@@ -36,7 +33,7 @@ struct fill {
     const struct ggn_windows *windows;
     const int *index; /* of the windows */
     uint64_t step;
-    int first;        /* place of the first of them in the batch */
+    int first; /* place of the first of them in the batch */
     int augment, denoised;
 };
 
@@ -287,7 +284,12 @@ static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, doub
         label[i] = s->train.list[index[i]].label;
     }
     int mine, first = ggn_session_first(s, n, &mine);
-    struct fill f = {.s = s, .windows = &s->train, .index = index + first, .step = step, .first = first, .augment = !paper,
+    struct fill f = {.s = s,
+                     .windows = &s->train,
+                     .index = index + first,
+                     .step = step,
+                     .first = first,
+                     .augment = !paper,
                      .denoised = !paper};
     struct ggn_batch b = fill_batch(s, &f, mine);
     b.count = n;

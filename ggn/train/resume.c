@@ -14,34 +14,12 @@ enum { N_ROW = 9 };
 uint32_t ggn_resume_key(const struct ggn_session *s)
 {
     const struct ggn_train_plan *p = s->plan;
-    const double numbers[] = {(double)p->preset,
-                              p->window,
-                              p->k_r,
-                              p->k_m,
-                              p->k_d,
-                              p->crop,
-                              p->batch_r,
-                              p->batch,
-                              p->steps_r,
-                              p->steps,
-                              p->epochs,
-                              p->epoch_steps,
-                              p->patience,
-                              p->lr_r,
-                              p->lr,
-                              p->difference,
-                              p->soft_labels,
-                              p->flips,
-                              p->jitter,
-                              p->picture,
-                              p->average,
-                              p->synthetic,
-                              p->extend,
-                              p->validation_windows,
-                              p->seed,
-                              s->set.width,
-                              s->set.height,
-                              s->set.n};
+    const double numbers[] = {
+        (double)p->preset, p->window,    p->k_r,        p->k_m,        p->k_d,         p->crop,
+        p->batch_r,        p->batch,     p->steps_r,    p->steps,      p->epochs,      p->epoch_steps,
+        p->patience,       p->lr_r,      p->lr,         p->difference, p->soft_labels, p->flips,
+        p->jitter,         p->picture,   p->average,    p->synthetic,  p->extend,      p->validation_windows,
+        p->seed,           s->set.width, s->set.height, s->set.n};
     uLong crc = crc32(0, (const Bytef *)numbers, sizeof numbers);
 
     for (int i = 0; i < s->set.n; i++) {
@@ -135,15 +113,9 @@ static char *describe(struct ggn_session *s)
     return text;
 }
 
-static double number(const cJSON *item)
-{
-    return cJSON_IsNumber(item) ? item->valuedouble : (double)NAN;
-}
+static double number(const cJSON *item) { return cJSON_IsNumber(item) ? item->valuedouble : (double)NAN; }
 
-static double field(const cJSON *root, const char *name)
-{
-    return number(cJSON_GetObjectItemCaseSensitive(root, name));
-}
+static double field(const cJSON *root, const char *name) { return number(cJSON_GetObjectItemCaseSensitive(root, name)); }
 
 static int restore(struct ggn_session *s, const cJSON *root, const char *path, struct base_err *err)
 {
@@ -165,8 +137,7 @@ static int restore(struct ggn_session *s, const cJSON *root, const char *path, s
     s->trainer->adam_t[1] = (uint64_t)field(root, "t1");
     s->trainer->adam_t[2] = (uint64_t)field(root, "t2");
     ggn_log_release(&s->log);
-    cJSON_ArrayForEach(row, cJSON_GetObjectItemCaseSensitive(root, "log"))
-    {
+    cJSON_ArrayForEach (row, cJSON_GetObjectItemCaseSensitive(root, "log")) {
         struct ggn_log_row r = {.phase = (int)number(cJSON_GetArrayItem(row, 0)) != 0};
         for (int k = 1; k < N_ROW; k++)
             *row_field(&r, k) = number(cJSON_GetArrayItem(row, k));

@@ -26,8 +26,8 @@ struct ggn_train_plan {
     double lr_r, lr;
     double difference; /* preset lull: see ggn_train_fold */
     int soft_labels;
-    int flips;              /* see ggn_augment_options */
-    double jitter;          /* octaves of exposure; see ggn_augment_options */
+    int flips;     /* see ggn_augment_options */
+    double jitter; /* octaves of exposure; see ggn_augment_options */
     /* preset lull: share of windows that come with the noise picture of their newest image; 0: networks without that input
      */
     double picture;

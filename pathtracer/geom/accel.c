@@ -11,10 +11,10 @@
 struct pt_accel {
     RTCDevice device;
     RTCScene world;
-    RTCScene *objects;        /* [object_count], owns */
-    RTCGeometry *instances;   /* [instance_count], borrows from `world` */
+    RTCScene *objects;      /* [object_count], owns */
+    RTCGeometry *instances; /* [instance_count], borrows from `world` */
     int32_t object_count;
-    int packet;               /* rays that go together: the processor's own width, 1 = one by one */
+    int packet; /* rays that go together: the processor's own width, 1 = one by one */
     atomic_llong bytes;
 };
 
@@ -289,11 +289,18 @@ long long pt_accel_bytes(const struct pt_scene *scene) { return scene->accel ? a
 
 static inline struct RTCRay make_ray(const struct pt_ray *ray)
 {
-    return (struct RTCRay){.org_x = ray->origin.x,    .org_y = ray->origin.y,    .org_z = ray->origin.z,
+    return (struct RTCRay){.org_x = ray->origin.x,
+                           .org_y = ray->origin.y,
+                           .org_z = ray->origin.z,
                            .tnear = ray->t_min,
-                           .dir_x = ray->direction.x, .dir_y = ray->direction.y, .dir_z = ray->direction.z,
+                           .dir_x = ray->direction.x,
+                           .dir_y = ray->direction.y,
+                           .dir_z = ray->direction.z,
                            .time = ray->time,
-                           .tfar = ray->t_max,        .mask = ~0u,               .id = 0,                   .flags = 0};
+                           .tfar = ray->t_max,
+                           .mask = ~0u,
+                           .id = 0,
+                           .flags = 0};
 }
 
 /* Embree's ids as ours. */

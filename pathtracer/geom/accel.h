@@ -20,16 +20,16 @@ long long pt_accel_bytes(const struct pt_scene *scene);
 struct pt_ray {
     pt_vec3 origin, direction;
     float t_min, t_max;
-    float time;               /* in [0, 1] over the shutter */
+    float time; /* in [0, 1] over the shutter */
 };
 
 struct pt_hit {
     float t;
-    float u, v;               /* mesh: weights of corners 1 and 2 */
-    int32_t shape;            /* id, -1 = nothing was hit */
-    int32_t primitive;        /* mesh: triangle */
-    int32_t instance;         /* id, -1 = a shape of the world */
-    pt_vec3 geometric;        /* mesh: unnormalised normal in the shape's space (right-hand rule, before flip_normal);
+    float u, v;        /* mesh: weights of corners 1 and 2 */
+    int32_t shape;     /* id, -1 = nothing was hit */
+    int32_t primitive; /* mesh: triangle */
+    int32_t instance;  /* id, -1 = a shape of the world */
+    pt_vec3 geometric; /* mesh: unnormalised normal in the shape's space (right-hand rule, before flip_normal);
                                  quadric: the hit point in the quadric's own space */
 };
 

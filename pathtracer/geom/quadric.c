@@ -139,7 +139,7 @@ void pt_quadric_uv(const struct pt_quadric *q, pt_vec3 p_quadric, float *u, floa
     *u = (float)(angle_of(x, y) / (double)q->phi_max);
     if (q->kind == PT_QUADRIC_SPHERE) {
         double lo = acos(fmin(1.0, fmax(-1.0, (double)q->z_min / r))),
-            hi = acos(fmin(1.0, fmax(-1.0, (double)q->z_max / r)));
+               hi = acos(fmin(1.0, fmax(-1.0, (double)q->z_max / r)));
         *v = (float)((acos(fmin(1.0, fmax(-1.0, z / r))) - lo) / (hi - lo));
         dv = v3((float)(z * c * (hi - lo)), (float)(z * s * (hi - lo)), (float)(-rho * (hi - lo)));
     } else if (q->kind == PT_QUADRIC_CYLINDER) {

@@ -17,8 +17,8 @@ void pt_quadric_bounds(const struct pt_quadric *q, pt_vec3 *lower, pt_vec3 *uppe
 
 /* The surface at a point of the quadric's own space; the result is in the space of to_render. */
 struct pt_quadric_point {
-    pt_vec3 p, error;    /* error: absolute bound on the rounding of p, per axis */
-    pt_vec3 n;           /* unnormalised: away from the centre or axis; disk: +z */
+    pt_vec3 p, error; /* error: absolute bound on the rounding of p, per axis */
+    pt_vec3 n;        /* unnormalised: away from the centre or axis; disk: +z */
 };
 void pt_quadric_at(const struct pt_quadric *q, pt_vec3 p_quadric, struct pt_quadric_point *out);
 

@@ -34,7 +34,7 @@ static exr_result_t write_header(exr_context_t file, const struct pt_exr_image *
     int part = 0;
     exr_result_t rc = exr_add_part(file, "lull", EXR_STORAGE_SCANLINE, &part);
     exr_attr_box2i_t display = box(0, 0, image->width, image->height),
-        stored = box(image->x0, image->y0, image->x1, image->y1);
+                     stored = box(image->x0, image->y0, image->x1, image->y1);
     exr_attr_v2f_t centre;
     centre.x = centre.y = 0.0f;
     if (rc == EXR_ERR_SUCCESS)
@@ -45,7 +45,7 @@ static exr_result_t write_header(exr_context_t file, const struct pt_exr_image *
     for (int i = 0; i < image->attribute_count && rc == EXR_ERR_SUCCESS; i++) {
         const struct pt_exr_attribute *a = &image->attributes[i];
         rc = a->text ? exr_attr_set_string(file, part, a->name, a->text)
-                             : exr_attr_set_double(file, part, a->name, a->number);
+                     : exr_attr_set_double(file, part, a->name, a->number);
     }
     return rc == EXR_ERR_SUCCESS ? exr_write_header(file) : rc;
 }

@@ -14,9 +14,9 @@ struct pt_exr_attribute {
 };
 
 struct pt_exr_image {
-    int width, height;     /* display window: the whole picture */
-    int x0, y0, x1, y1;    /* data window: what is stored, end exclusive */
-    int channel_count;     /* 1 … 64 */
+    int width, height;           /* display window: the whole picture */
+    int x0, y0, x1, y1;          /* data window: what is stored, end exclusive */
+    int channel_count;           /* 1 … 64 */
     const char *const *channels; /* unique names */
     int attribute_count;
     const struct pt_exr_attribute *attributes;

@@ -13,8 +13,10 @@ static const struct pt_oiio_library *library(void)
 
 static int no_library(const char *name, struct base_err *err)
 {
-    return base_fail(err, BASE_EIO, "%s: images cannot be read: lib/lull-images.so, which belongs beside this program's "
-                                    "bin/, or OpenImageIO cannot be loaded", name);
+    return base_fail(err, BASE_EIO,
+                     "%s: images cannot be read: lib/lull-images.so, which belongs beside this program's "
+                     "bin/, or OpenImageIO cannot be loaded",
+                     name);
 }
 
 int pt_oiio_read(const char *path, struct pt_oiio_image *out, struct base_err *err)

@@ -19,7 +19,8 @@ extern "C" {
 #include "base/files.h"
 }
 
-namespace {
+namespace
+{
 
 constexpr long long max_pixels = 1LL << 28;
 
@@ -46,8 +47,7 @@ int read_pixels(OIIO::ImageInput &input, const char *name, pt_oiio_image *out, b
     const int channels = std::min(spec.nchannels, 4);
     if (spec.width <= 0 || spec.height <= 0 || channels <= 0 || spec.depth > 1)
         return base_fail(err, BASE_EINVAL, "%s: not a 2-D image (%dx%dx%d, %d channels)", name, spec.width, spec.height,
-                         spec.depth,
-                       spec.nchannels);
+                         spec.depth, spec.nchannels);
     if (static_cast<long long>(spec.width) * spec.height > max_pixels)
         return base_fail(err, BASE_EINVAL, "%s: %dx%d pixels, more than the 2^28 an image may have", name, spec.width,
                          spec.height);
@@ -63,7 +63,11 @@ int read_pixels(OIIO::ImageInput &input, const char *name, pt_oiio_image *out, b
         std::free(pixels);
         return base_fail(err, BASE_EINVAL, "%s: %s", name, one_line(input.geterror()).c_str());
     }
-    *out = pt_oiio_image{width, height, channels, is_float, bytes ? static_cast<uint8_t *>(pixels) : nullptr,
+    *out = pt_oiio_image{width,
+                         height,
+                         channels,
+                         is_float,
+                         bytes ? static_cast<uint8_t *>(pixels) : nullptr,
                          bytes ? nullptr : static_cast<float *>(pixels)};
     return 0;
 }

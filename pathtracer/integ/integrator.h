@@ -17,11 +17,11 @@
 struct pt_scene;
 
 struct pt_path_result {
-    pt_vec3 radiance;      /* linear Rec.709 RGB after the film's exposure scale; may be non-finite: the film decides */
-    pt_vec3 albedo;        /* first non-specular surface: directional-hemispherical reflectance estimate in [0,1] */
-    pt_vec3 normal_world;  /* shading normal at the first hit, facing the camera */
-    float depth;           /* distance along the camera ray to the first hit, scene units; INFINITY when none */
-    uint32_t rays;         /* intersection and occlusion queries */
+    pt_vec3 radiance;     /* linear Rec.709 RGB after the film's exposure scale; may be non-finite: the film decides */
+    pt_vec3 albedo;       /* first non-specular surface: directional-hemispherical reflectance estimate in [0,1] */
+    pt_vec3 normal_world; /* shading normal at the first hit, facing the camera */
+    float depth;          /* distance along the camera ray to the first hit, scene units; INFINITY when none */
+    uint32_t rays;        /* intersection and occlusion queries */
 };
 
 /* The most paths that a kernel traces together. */
@@ -29,8 +29,8 @@ enum { PT_RUN = 64 };
 
 /* Sample `sample` (from 0) of the pixels (x, y) … (x + count - 1, y) of the full image, whatever the crop; out: [count],
  * 1 <= count <= PT_RUN. */
-typedef void pt_kernel(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y,
-                       int count, uint32_t sample, struct pt_path_result *out);
+typedef void pt_kernel(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y, int count,
+                       uint32_t sample, struct pt_path_result *out);
 
 /* The smallest compiled kernel that covers `needed`; *covers (may be NULL) gets its effect set, *name a static name. */
 pt_kernel *pt_kernel_select(pt_effects needed, pt_effects *covers, const char **name);

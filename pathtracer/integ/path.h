@@ -36,9 +36,9 @@
  * wait. */
 struct pt_light_plan {
     struct pt_light_sample light;
-    pt_vec3 add;         /* to the path's radiance; black: no shadow ray needed */
+    pt_vec3 add; /* to the path's radiance; black: no shadow ray needed */
     pt_vec3 origin;
-    int32_t medium;      /* the shadow ray starts in it */
+    int32_t medium; /* the shadow ray starts in it */
 };
 
 struct pt_path {
@@ -49,10 +49,10 @@ struct pt_path {
     struct pt_ray ray;
     pt_vec3 throughput, radiance;
     struct pt_receiver prev; /* last vertex, and … */
-    float pdf_prev;      /* … density of the direction taken there; 0: no other strategy could have found what comes next */
-    float eta_scale;     /* undoes in the roulette what refraction did to the throughput */
-    int32_t medium;      /* the ray is in it, -1 = vacuum */
-    int32_t depth;       /* bounces so far */
+    float pdf_prev;  /* … density of the direction taken there; 0: no other strategy could have found what comes next */
+    float eta_scale; /* undoes in the roulette what refraction did to the throughput */
+    int32_t medium;  /* the ray is in it, -1 = vacuum */
+    int32_t depth;   /* bounces so far */
     uint32_t rays;
     struct pt_hit hit;          /* what the ray has met first */
     struct pt_light_plan plan;  /* of the last vertex */
@@ -122,9 +122,9 @@ PT_KERNEL_INLINE pt_vec3 pt_path_transmittance(pt_effects fx, struct pt_path *pa
             return v3_splat(0.0f);
         float end = found ? hit.t : ray->t_max;
         if ((fx & PT_FX_MEDIA) && medium >= 0)
-            through = v3_mul(through, pt_medium_transmittance(&scene->media[medium],
-                                                              v3_madd(ray->origin, ray->t_min, ray->direction),
-                                                              unit, (end - ray->t_min) * length, &rng));
+            through = v3_mul(through,
+                             pt_medium_transmittance(&scene->media[medium], v3_madd(ray->origin, ray->t_min, ray->direction),
+                                                     unit, (end - ray->t_min) * length, &rng));
         if (!found || v3_is_black(through))
             return through;
         if ((fx & PT_FX_MEDIA) && interface && !alpha) {
@@ -290,8 +290,8 @@ PT_KERNEL_INLINE void pt_path_aux(pt_effects fx, const struct pt_path *path, con
 
 /* The next direction: its ray replaces the path's. 0: the path ends. */
 PT_KERNEL_INLINE int pt_path_scatter(pt_effects fx, struct pt_path *path, const struct pt_place *at,
-                                     const struct pt_frame *frame,
-                                     const struct pt_bsdf *bsdf, pt_vec3 wo, struct pt_sample2 u)
+                                     const struct pt_frame *frame, const struct pt_bsdf *bsdf, pt_vec3 wo,
+                                     struct pt_sample2 u)
 {
     struct pt_bsdf_sample next;
     float u_lobe = fx & PT_FX_BSDF ? pt_sampler_1d(&path->sampler, PT_DIM_BSDF_LOBE) : 0.0f;
@@ -307,8 +307,8 @@ PT_KERNEL_INLINE int pt_path_scatter(pt_effects fx, struct pt_path *path, const 
     pt_vec3 wi = pt_frame_to_world(frame, next.wi);
     if (fx & PT_FX_MEDIA)
         path->medium = pt_medium_towards(at, wi, path->medium);
-    path->ray = (struct pt_ray){pt_offset_point(at->p, at->s.n_geometric, at->error, wi), wi, 0.0f, INFINITY,
-                                path->ray.time};
+    path->ray =
+        (struct pt_ray){pt_offset_point(at->p, at->s.n_geometric, at->error, wi), wi, 0.0f, INFINITY, path->ray.time};
     path->depth++;
     return pt_path_survives(path);
 }
@@ -327,7 +327,7 @@ PT_KERNEL_INLINE int pt_path_bounce(pt_effects fx, struct pt_path *path, const s
 {
     /* these need nothing of the hit: asked for first, they are worked out while its data arrive */
     struct pt_sample2 u_bsdf = pt_sampler_2d(&path->sampler, PT_DIM_BSDF),
-        u_light = pt_sampler_2d(&path->sampler, PT_DIM_LIGHT);
+                      u_light = pt_sampler_2d(&path->sampler, PT_DIM_LIGHT);
     float u_mix = fx & PT_FX_MIX ? pt_sampler_1d(&path->sampler, PT_DIM_MIX) : 0.0f;
     const struct pt_material *material = pt_material_resolve(fx, path->scene, at->shape->material, &at->s, u_mix);
     struct pt_frame frame = pt_material_frame(fx, path->scene, material, &at->s);

@@ -132,11 +132,11 @@ PT_KERNEL_INLINE void pt_run_sample(pt_effects fx, const struct pt_scene *scene,
 }
 
 /* The whole of a file kernel_NAME.c: the kernel of the list PT_KERNELS (kernel_sets.h) for its effect set. */
-#define PT_KERNEL_DEFINE(name, set)                                                                                        \
-    void pt_kernel_##name(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y,      \
-                          int count, uint32_t sample, struct pt_path_result *out)                                          \
-    {                                                                                                                      \
-        pt_run_sample(set, scene, settings, x, y, count, sample, NULL, out);                                               \
+#define PT_KERNEL_DEFINE(name, set) \
+    void pt_kernel_##name(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y, \
+                          int count, uint32_t sample, struct pt_path_result *out) \
+    { \
+        pt_run_sample(set, scene, settings, x, y, count, sample, NULL, out); \
     }
 
 #endif

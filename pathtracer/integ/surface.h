@@ -11,7 +11,7 @@
 #include "shade/material.h"
 
 struct pt_place {
-    pt_vec3 p, error;        /* render space; bound on the rounding of p, per axis */
+    pt_vec3 p, error; /* render space; bound on the rounding of p, per axis */
     struct pt_surface s;
     const struct pt_shape *shape;
     int32_t primitive;
@@ -86,8 +86,8 @@ static inline void pt_place_mesh(pt_effects fx, const struct pt_scene *scene, co
     pt_vec3 a = k.a->p, b = k.b->p, c = k.c->p;
     struct pt_surface *s = &at->s;
     at->p = pt_corners_mix(a, b, c, hit->u, hit->v);
-    at->error = v3_scale(v3(pt_max3_abs(a.x, b.x, c.x), pt_max3_abs(a.y, b.y, c.y), pt_max3_abs(a.z, b.z, c.z)),
-                         PT_OFFSET_ERROR);
+    at->error =
+        v3_scale(v3(pt_max3_abs(a.x, b.x, c.x), pt_max3_abs(a.y, b.y, c.y), pt_max3_abs(a.z, b.z, c.z)), PT_OFFSET_ERROR);
     pt_vec3 n = v3_norm(hit->geometric);
     if (mesh->has_normals) {
         pt_vec3 ns = v3_norm(pt_corners_mix(k.a->n, k.b->n, k.c->n, hit->u, hit->v));

@@ -17,7 +17,8 @@ void pt_trace_surface(struct pt_trace *trace, const struct pt_place *at, const s
 {
     char text[384];
     pt_vec3 p = at->p, n = at->s.n_geometric, t = throughput;
-    snprintf(text, sizeof text, "%d: %s at (%g, %g, %g) normal (%g, %g, %g) material %d primitive %d "
+    snprintf(text, sizeof text,
+             "%d: %s at (%g, %g, %g) normal (%g, %g, %g) material %d primitive %d "
              "throughput (%g, %g, %g)",
              ++trace->vertex, pt_bsdf_models[bsdf->kind].words, (double)p.x, (double)p.y, (double)p.z, (double)n.x,
              (double)n.y, (double)n.z, (int)at->shape->material, (int)at->primitive, (double)t.x, (double)t.y, (double)t.z);

@@ -16,8 +16,8 @@ int pt_builder_init(struct pt_builder *b, struct pt_scene *scene, struct pt_scen
                     const struct pt_load_options *options, const struct pt_source *source, struct base_err *err)
 {
     *b = (struct pt_builder){.scene = scene, .defaults = defaults, .options = options, .source = source};
-    b->diag = (struct pt_diag){.err = err, .strict = options->strict, .warn = options->warn,
-                               .warn_data = options->warn_data};
+    b->diag =
+        (struct pt_diag){.err = err, .strict = options->strict, .warn = options->warn, .warn_data = options->warn_data};
     b->camera_medium = b->open_object = b->default_material = -1;
     b->transform_times[1] = b->shutter[1] = 1;
     b->camera_ctm[0] = b->camera_ctm[1] = pt_xform_identity();
@@ -38,9 +38,9 @@ int pt_builder_init(struct pt_builder *b, struct pt_scene *scene, struct pt_scen
 
 void pt_builder_release(struct pt_builder *b)
 {
-    struct pt_list *lists[] = {&b->images,  &b->textures,      &b->materials,     &b->material_infos, &b->meshes,
+    struct pt_list *lists[] = {&b->images,   &b->textures,     &b->materials,     &b->material_infos, &b->meshes,
                                &b->quadrics, &b->world_shapes, &b->object_shapes, &b->objects,        &b->instances,
-                               &b->lights,  &b->media,         &b->medium_infos};
+                               &b->lights,   &b->media,        &b->medium_infos};
     struct pt_names *names[] = {&b->float_textures, &b->colour_textures, &b->named_materials,
                                 &b->media_names,    &b->object_names,    &b->image_names};
     for (size_t i = 0; i < sizeof lists / sizeof lists[0]; i++)

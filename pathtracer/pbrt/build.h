@@ -26,7 +26,7 @@ struct pt_list {
 struct pt_area_light {
     int on, two_sided;
     pt_vec3 emission;
-    double power;        /* lumens over the whole shape; <= 0: emission stands as it is */
+    double power; /* lumens over the whole shape; <= 0: emission stands as it is */
     struct pt_loc loc;
 };
 
@@ -34,23 +34,29 @@ enum pt_attribute { PT_ATTR_SHAPE, PT_ATTR_LIGHT, PT_ATTR_MATERIAL, PT_ATTR_MEDI
 
 /* The graphics state of pbrt. */
 struct pt_state {
-    struct pt_xform ctm[2];      /* at the start and end time */
-    unsigned active;             /* bit 0: start, bit 1: end */
+    struct pt_xform ctm[2]; /* at the start and end time */
+    unsigned active;        /* bit 0: start, bit 1: end */
     int32_t material;
     struct pt_area_light area;
     int reverse_orientation;
     int32_t medium_in, medium_out;
-    int colour_space;            /* enum pt_colour_space */
+    int colour_space;                                  /* enum pt_colour_space */
     const struct pt_params *attributes[PT_ATTR_COUNT]; /* borrows, NULL = none */
 };
 
 /* Header directives, kept until WorldBegin. */
-enum pt_header { PT_HEADER_FILM, PT_HEADER_CAMERA, PT_HEADER_SAMPLER, PT_HEADER_INTEGRATOR, PT_HEADER_FILTER,
-                PT_HEADER_COUNT };
+enum pt_header {
+    PT_HEADER_FILM,
+    PT_HEADER_CAMERA,
+    PT_HEADER_SAMPLER,
+    PT_HEADER_INTEGRATOR,
+    PT_HEADER_FILTER,
+    PT_HEADER_COUNT
+};
 
 struct pt_material_info {
     struct pt_loc loc;
-    int has_opacity;             /* of v3's uber: becomes the alpha of shapes */
+    int has_opacity; /* of v3's uber: becomes the alpha of shapes */
     struct pt_input opacity;
     int used;
 };
@@ -60,28 +66,28 @@ struct pt_medium_info {
 };
 
 struct pt_builder {
-    struct pt_scene *scene;                  /* being made; its arena is in use from the start */
+    struct pt_scene *scene; /* being made; its arena is in use from the start */
     struct pt_scene_defaults *defaults;
     const struct pt_load_options *options;
     const struct pt_source *source;
     struct pt_diag diag;
-    char directory[1024];                    /* of the main file, "" or ending in '/' */
-    int is_v3;                               /* Film "image": v3 meanings of defaults and lights */
+    char directory[1024]; /* of the main file, "" or ending in '/' */
+    int is_v3;            /* Film "image": v3 meanings of defaults and lights */
 
     struct pt_params header[PT_HEADER_COUNT]; /* kind "" = not given */
     struct pt_xform camera_ctm[2];
     int32_t camera_medium;
     double transform_times[2], shutter[2];
-    double origin[3];                        /* of render space, in the world */
+    double origin[3]; /* of render space, in the world */
 
     struct pt_list images, textures, materials, material_infos, meshes, quadrics, world_shapes, object_shapes, objects,
         instances, lights, media, medium_infos;
     struct pt_names float_textures, colour_textures, named_materials, media_names, object_names, image_names;
 
-    int32_t open_object;                     /* between ObjectBegin and ObjectEnd, else -1 */
-    double (*object_offsets)[3];             /* owns: origin of each object's space in the space it was defined in */
+    int32_t open_object;         /* between ObjectBegin and ObjectEnd, else -1 */
+    double (*object_offsets)[3]; /* owns: origin of each object's space in the space it was defined in */
     size_t object_offset_room;
-    int32_t default_material;                /* grey diffuse, made on first use; -1 before */
+    int32_t default_material; /* grey diffuse, made on first use; -1 before */
     int32_t mix_depth;
 };
 

@@ -116,7 +116,7 @@ static void build_filter(struct pt_builder *b)
         pt_diag_fail(&b->diag, p->loc, "unknown filter \"%s\" (expected box, triangle, gaussian, mitchell or sinc)", kind);
     }
     double x = pt_params_float_in(p, "xradius", fallback, 1e-3, 100),
-        y = pt_params_float_in(p, "yradius", fallback, 1e-3, 100);
+           y = pt_params_float_in(p, "yradius", fallback, 1e-3, 100);
     it->filter_x = (float)pt_params_float_in(p, "xwidth", x, 1e-3, 100);
     it->filter_y = (float)pt_params_float_in(p, "ywidth", y, 1e-3, 100);
     it->filter_sigma = (float)sigma;
@@ -127,8 +127,8 @@ static void build_filter(struct pt_builder *b)
 
 static void build_sampler(struct pt_builder *b)
 {
-    static const char *const low_discrepancy[] = {"sobol", "zsobol", "paddedsobol", "halton", "pmj02bn", "02sequence",
-                                                  "lowdiscrepancy", "stratified", "maxmindist", NULL};
+    static const char *const low_discrepancy[] = {"sobol",      "zsobol",         "paddedsobol", "halton",     "pmj02bn",
+                                                  "02sequence", "lowdiscrepancy", "stratified",  "maxmindist", NULL};
     static const char *const random[] = {"independent", "random", "mlt", NULL};
     struct pt_params *p = begin(b, PT_HEADER_SAMPLER, "zsobol");
     const char *kind = pt_params_kind(p);
@@ -146,8 +146,8 @@ static void build_sampler(struct pt_builder *b)
 static void build_integrator(struct pt_builder *b)
 {
     static const char *const same[] = {"path", "volpath", "simplepath", "simplevolpath", NULL};
-    static const char *const other[] = {"bdpt", "mlt", "sppm", "lightpath", "randomwalk", "ao", "function", "whitted",
-                                        "directlighting", "ambientocclusion", NULL};
+    static const char *const other[] = {"bdpt",     "mlt",     "sppm",           "lightpath",        "randomwalk", "ao",
+                                        "function", "whitted", "directlighting", "ambientocclusion", NULL};
     struct pt_params *p = begin(b, PT_HEADER_INTEGRATOR, b->is_v3 ? "path" : "volpath");
     struct pt_integrator *it = &b->defaults->integrator;
     const char *kind = pt_params_kind(p);

@@ -21,10 +21,7 @@ static pt_vec3 scaled_colour(struct pt_builder *b, const struct pt_state *s, str
 }
 
 /* Luminance of a colour, never 0. */
-static double luminance(pt_vec3 c)
-{
-    return fmax((double)v3_luminance(c), 1e-30);
-}
+static double luminance(pt_vec3 c) { return fmax((double)v3_luminance(c), 1e-30); }
 
 static void place(struct pt_builder *b, const struct pt_xform *ctm, const double p[3], pt_vec3 *out)
 {
@@ -53,7 +50,7 @@ struct context {
     struct pt_builder *b;
     const struct pt_state *s;
     struct pt_params *p;
-    struct pt_xform ctm;    /* at shutter open */
+    struct pt_xform ctm; /* at shutter open */
     struct pt_light *light;
 };
 
@@ -73,7 +70,7 @@ static void make_spot(struct context *c)
 {
     double from[3] = {0, 0, 0}, to[3] = {0, 0, 1}, power = pt_params_float(c->p, "power", -1);
     double cone = pt_params_float_in(c->p, "coneangle", 30, 1e-3, 180),
-        delta = pt_params_float_in(c->p, "conedeltaangle", 5, 0, 180);
+           delta = pt_params_float_in(c->p, "conedeltaangle", 5, 0, 180);
     double cos_total = cos(cone * pi / 180), cos_start = cos(fmax(cone - delta, 0) * pi / 180);
     c->light->kind = PT_LIGHT_SPOT;
     c->light->emission = scaled_colour(c->b, c->s, c->p, "I");
@@ -231,8 +228,12 @@ int pt_build_light(struct pt_builder *b, const struct pt_state *s, struct pt_par
     static const struct {
         const char *kind;
         void (*make)(struct context *c);
-    } kinds[] = {{"point", make_point},           {"spot", make_spot},         {"distant", make_distant},
-                 {"infinite", make_infinite},     {"exinfinite", make_infinite}, {"projection", make_projection},
+    } kinds[] = {{"point", make_point},
+                 {"spot", make_spot},
+                 {"distant", make_distant},
+                 {"infinite", make_infinite},
+                 {"exinfinite", make_infinite},
+                 {"projection", make_projection},
                  {"goniometric", make_goniometric}};
     struct pt_light light = {.kind = -1, .shape = -1, .image = -1};
     struct pt_xform at[2];
@@ -275,8 +276,8 @@ int pt_build_area_light(struct pt_builder *b, const struct pt_state *s, struct p
 
 int32_t pt_build_shape_light(struct pt_builder *b, const struct pt_area_light *source, double area)
 {
-    struct pt_light light = {.kind = PT_LIGHT_AREA, .two_sided = source->two_sided, .image = -1,
-                             .emission = source->emission};
+    struct pt_light light = {
+        .kind = PT_LIGHT_AREA, .two_sided = source->two_sided, .image = -1, .emission = source->emission};
     light.shape = (int32_t)b->world_shapes.count;
     if (source->power > 0 && area > 0)
         light.emission = v3_scale(light.emission, (float)(source->power / ((source->two_sided ? 2 : 1) * area * pi)));

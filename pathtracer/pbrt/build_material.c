@@ -106,12 +106,8 @@ static void read_model(struct context *c, const struct pt_bsdf_model *model)
     for (const struct pt_bsdf_read *r = model->reads; r->kind != PT_READ_END; r++) {
         struct pt_input *in = (struct pt_input *)((char *)c->m + r->field);
         switch (r->kind) {
-        case PT_READ_COLOUR:
-            *in = colour(c, r->name, (float)r->fallback);
-            break;
-        case PT_READ_NUMBER:
-            *in = pt_build_float_input(c->b, c->p, r->name, r->fallback);
-            break;
+        case PT_READ_COLOUR: *in = colour(c, r->name, (float)r->fallback); break;
+        case PT_READ_NUMBER: *in = pt_build_float_input(c->b, c->p, r->name, r->fallback); break;
         case PT_READ_ROUGHNESS:
             read_roughness(c->b, c->p, r->name, r->fallback, &c->m->roughness_u, &c->m->roughness_v);
             c->m->remap_roughness = pt_params_bool(c->p, "remaproughness", 1);
@@ -119,12 +115,8 @@ static void read_model(struct context *c, const struct pt_bsdf_model *model)
         case PT_READ_BASE_ROUGHNESS:
             read_roughness(c->b, c->p, r->name, r->fallback, &c->m->base_roughness_u, &c->m->base_roughness_v);
             break;
-        case PT_READ_INDEX:
-            c->m->eta = (float)pt_build_index(c->b, c->p, r->name, r->fallback);
-            break;
-        case PT_READ_METAL:
-            read_metal(c, r->name);
-            break;
+        case PT_READ_INDEX: c->m->eta = (float)pt_build_index(c->b, c->p, r->name, r->fallback); break;
+        case PT_READ_METAL: read_metal(c, r->name); break;
         case PT_READ_SCALE:
             scale_colours(c, model->reads, (double)(float)pt_params_float_in(c->p, r->name, r->fallback, 0, 1e6));
             break;
@@ -132,8 +124,7 @@ static void read_model(struct context *c, const struct pt_bsdf_model *model)
             if (pt_params_find(c->p, r->name) && pt_params_float(c->p, r->name, 0) != 0)
                 pt_diag_warn(&c->b->diag, c->p->loc, "%s of a %s material is ignored", r->name, model->words);
             break;
-        default:
-            pt_params_ignore(c->p, r->name);
+        default: pt_params_ignore(c->p, r->name);
         }
     }
     /* Index-matched: nothing is bent or reflected, and light sampling may look through it. */
@@ -154,10 +145,7 @@ static void make_mix(struct context *c)
     c->m->mix_amount = pt_build_float_input(c->b, c->p, "amount", 0.5);
 }
 
-static void make_interface(struct context *c)
-{
-    (void)c;
-}
+static void make_interface(struct context *c) { (void)c; }
 
 /* Not simulated: a coated diffuse surface of about its colour. */
 static void make_subsurface(struct context *c)
@@ -234,8 +222,10 @@ int32_t pt_build_material(struct pt_builder *b, const struct pt_state *s, const 
     struct context c = {b, s, p, kind, &m};
     pt_params_ignore(p, "type");
     if (!build_v4(&c) && !pt_build_material_v3(b, s, kind, p, &m, &info)) {
-        pt_diag_fail(&b->diag, p->loc, "unknown material \"%s\" (expected diffuse, coateddiffuse, conductor, dielectric, "
-                     "mix …)", kind);
+        pt_diag_fail(&b->diag, p->loc,
+                     "unknown material \"%s\" (expected diffuse, coateddiffuse, conductor, dielectric, "
+                     "mix …)",
+                     kind);
         return -1;
     }
     if (!m.bump)

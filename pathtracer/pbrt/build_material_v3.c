@@ -18,10 +18,7 @@ static struct pt_input colour(struct context *c, const char *name, float fallbac
     return pt_build_colour_input(c->b, c->s, c->p, name, PT_USE_REFLECTANCE, v3_splat(fallback));
 }
 
-static int is_black(struct pt_input in)
-{
-    return !in.texture && v3_is_black(in.value);
-}
+static int is_black(struct pt_input in) { return !in.texture && v3_is_black(in.value); }
 
 static void clear_coat(struct context *c)
 {
@@ -57,7 +54,7 @@ static void make_plastic(struct context *c)
 static void make_uber(struct context *c)
 {
     struct pt_input kd = colour(c, "Kd", 0.25f), ks = colour(c, "Ks", 0.25f), kr = colour(c, "Kr", 0),
-        kt = colour(c, "Kt", 0);
+                    kt = colour(c, "Kt", 0);
     double eta = index_of(c, 1.5);
     pt_build_roughness(c->b, c->p, 0.1, 1, c->m);
     c->m->eta = (float)eta;
@@ -65,8 +62,9 @@ static void make_uber(struct context *c)
     if (opacity) {
         struct pt_input o = colour(c, "opacity", 1);
         c->info->has_opacity = o.texture || v3_luminance(o.value) < 1;
-        c->info->opacity = o.texture ? o : pt_input_constant((double)v3_luminance(o.value), (double)v3_luminance(o.value),
-                                                                  (double)v3_luminance(o.value));
+        c->info->opacity = o.texture ? o
+                                     : pt_input_constant((double)v3_luminance(o.value), (double)v3_luminance(o.value),
+                                                         (double)v3_luminance(o.value));
     }
     if (!is_black(kt) && is_black(kd)) {
         c->m->kind = PT_BSDF_DIELECTRIC;
@@ -184,11 +182,19 @@ int pt_build_material_v3(struct pt_builder *b, const struct pt_state *s, const c
     static const struct {
         const char *name;
         void (*make)(struct context *c);
-    } kinds[] = {{"matte", make_matte},       {"plastic", make_plastic},         {"substrate", make_plastic},
-                 {"uber", make_uber},         {"metal", make_metal},             {"mirror", make_mirror},
-                 {"glass", make_glass},       {"translucent", make_translucent}, {"mix", make_mix},
-                 {"shinymetal", make_shiny_metal}, {"kdsubsurface", make_kd_subsurface},
-                 {"disney", make_disney},     {"fourier", make_fourier}};
+    } kinds[] = {{"matte", make_matte},
+                 {"plastic", make_plastic},
+                 {"substrate", make_plastic},
+                 {"uber", make_uber},
+                 {"metal", make_metal},
+                 {"mirror", make_mirror},
+                 {"glass", make_glass},
+                 {"translucent", make_translucent},
+                 {"mix", make_mix},
+                 {"shinymetal", make_shiny_metal},
+                 {"kdsubsurface", make_kd_subsurface},
+                 {"disney", make_disney},
+                 {"fourier", make_fourier}};
     struct context c = {b, s, p, kind, m, info};
     for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
         if (strcmp(kinds[i].name, kind) == 0) {

@@ -13,9 +13,9 @@ static const double pi = 3.14159265358979323846;
 static const double far_away = 1e4;
 
 struct placement {
-    struct pt_xform xform;  /* the shape's own space → where its vertices are stored */
-    int animated;           /* stored as it is; `at` places it */
-    struct pt_xform at[2];  /* own → world at shutter open and close */
+    struct pt_xform xform; /* the shape's own space → where its vertices are stored */
+    int animated;          /* stored as it is; `at` places it */
+    struct pt_xform at[2]; /* own → world at shutter open and close */
 };
 
 /* --- where a shape goes ------------------------------------------------------------------------------------------------ */
@@ -109,10 +109,7 @@ static int add_shape(struct pt_builder *b, const struct pt_state *s, struct pt_p
 
 /* --- meshes ------------------------------------------------------------------------------------------------------------ */
 
-static double value(const double *d, const float *f, size_t i)
-{
-    return d ? d[i] : (double)f[i];
-}
+static double value(const double *d, const float *f, size_t i) { return d ? d[i] : (double)f[i]; }
 
 /* Vertices in double, stored in float. 0 when one is not finite there. */
 static int store_positions(const struct pt_soup *soup, const struct pt_xform *t, struct pt_vertex *out)
@@ -293,8 +290,12 @@ static int make_ply_mesh(struct pt_builder *b, const struct pt_state *s, struct 
         pt_diag_warn(&b->diag, pt_params_find(p, "displacement")->loc, "displacement of a plymesh's vertices is ignored");
         pt_params_ignore(p, "displacement edgelength");
     }
-    struct pt_soup soup = {.vertex_count = ply.vertex_count, .triangle_count = ply.triangle_count, .pf = ply.positions,
-                           .nf = ply.normals, .uvf = ply.uvs, .indices = ply.indices};
+    struct pt_soup soup = {.vertex_count = ply.vertex_count,
+                           .triangle_count = ply.triangle_count,
+                           .pf = ply.positions,
+                           .nf = ply.normals,
+                           .uvf = ply.uvs,
+                           .indices = ply.indices};
     pt_build_mesh(b, s, p, &soup);
     pt_ply_release(&ply);
     return b->diag.rc;
@@ -345,8 +346,8 @@ static int make_disk(struct pt_builder *b, const struct pt_state *s, struct pt_p
     double inner = pt_params_float_in(p, "innerradius", 0, 0, 1e30);
     if (!(inner < r))
         return pt_diag_fail(&b->diag, p->loc, "innerradius %g is not below radius %g", inner, r);
-    struct pt_quadric q = {.kind = PT_QUADRIC_DISK, .radius = (float)r, .inner_radius = (float)inner, .z_min = (float)h,
-                           .z_max = (float)h};
+    struct pt_quadric q = {
+        .kind = PT_QUADRIC_DISK, .radius = (float)r, .inner_radius = (float)inner, .z_min = (float)h, .z_max = (float)h};
     return add_quadric(b, s, p, &q);
 }
 
@@ -356,8 +357,8 @@ static int make_cylinder(struct pt_builder *b, const struct pt_state *s, struct 
     double z0 = pt_params_float(p, "zmin", -1), z1 = pt_params_float(p, "zmax", 1);
     if (z0 == z1)
         return pt_diag_fail(&b->diag, p->loc, "zmin and zmax are both %g", z0);
-    struct pt_quadric q = {.kind = PT_QUADRIC_CYLINDER, .radius = (float)r, .z_min = (float)fmin(z0, z1),
-                           .z_max = (float)fmax(z0, z1)};
+    struct pt_quadric q = {
+        .kind = PT_QUADRIC_CYLINDER, .radius = (float)r, .z_min = (float)fmin(z0, z1), .z_max = (float)fmax(z0, z1)};
     return add_quadric(b, s, p, &q);
 }
 
@@ -375,10 +376,18 @@ int pt_build_shape(struct pt_builder *b, const struct pt_state *s, struct pt_par
     static const struct {
         const char *kind;
         int (*make)(struct pt_builder *b, const struct pt_state *s, struct pt_params *p);
-    } kinds[] = {{"plymesh", make_ply_mesh},   {"trianglemesh", make_triangle_mesh}, {"sphere", make_sphere},
-                 {"disk", make_disk},          {"cylinder", make_cylinder},          {"loopsubdiv", pt_build_loop_subdiv},
-                 {"bilinearmesh", pt_build_bilinear}, {"curve", pt_build_curve},     {"heightfield", pt_build_height_field},
-                 {"cone", pt_build_revolved},  {"paraboloid", pt_build_revolved},    {"hyperboloid", pt_build_revolved},
+    } kinds[] = {{"plymesh", make_ply_mesh},
+                 {"trianglemesh", make_triangle_mesh},
+                 {"sphere", make_sphere},
+                 {"disk", make_disk},
+                 {"cylinder", make_cylinder},
+                 {"loopsubdiv", pt_build_loop_subdiv},
+                 {"bilinearmesh", pt_build_bilinear},
+                 {"curve", pt_build_curve},
+                 {"heightfield", pt_build_height_field},
+                 {"cone", pt_build_revolved},
+                 {"paraboloid", pt_build_revolved},
+                 {"hyperboloid", pt_build_revolved},
                  {"nurbs", make_nurbs}};
     for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
         if (strcmp(kinds[i].kind, pt_params_kind(p)) == 0)

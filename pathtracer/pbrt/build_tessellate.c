@@ -9,8 +9,8 @@ static const double pi = 3.14159265358979323846;
 
 /* Vertices and triangles under construction. */
 struct grower {
-    double *p, *n, *uv;        /* owns */
-    uint32_t *indices;         /* owns */
+    double *p, *n, *uv; /* owns */
+    uint32_t *indices;  /* owns */
     size_t vertices, p_room, n_room, uv_room, corners, index_room;
 };
 
@@ -48,8 +48,12 @@ static int add_quad(struct grower *g, size_t a, size_t b, size_t c, size_t d)
 
 static int finish(struct grower *g, int ok, struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
 {
-    struct pt_soup soup = {.vertex_count = g->vertices, .triangle_count = g->corners / 3, .pd = g->p, .nd = g->n,
-                           .uvd = g->uv, .indices = g->indices};
+    struct pt_soup soup = {.vertex_count = g->vertices,
+                           .triangle_count = g->corners / 3,
+                           .pd = g->p,
+                           .nd = g->n,
+                           .uvd = g->uv,
+                           .indices = g->indices};
     if (!ok)
         pt_diag_nomem(&b->diag, "a shape");
     else
@@ -92,8 +96,8 @@ int pt_build_bilinear(struct pt_builder *b, const struct pt_state *s, struct pt_
     int ok = 1;
     if (b->diag.rc)
         return b->diag.rc;
-    if (!P || (!indices && vertices != 4) || (indices && count % 4 != 0) ||
-        (uv && uv_count != vertices) || (N && n_count != vertices))
+    if (!P || (!indices && vertices != 4) || (indices && count % 4 != 0) || (uv && uv_count != vertices) ||
+        (N && n_count != vertices))
         return pt_diag_fail(&b->diag, p->loc,
                             "a bilinearmesh needs \"point3 P\", four indices per patch, uv and N per vertex");
     if (!indices) {
@@ -272,7 +276,7 @@ int pt_build_revolved(struct pt_builder *b, const struct pt_state *s, struct pt_
 {
     const char *kind = pt_params_kind(p);
     double radius = pt_params_float_in(p, "radius", 1, 1e-30, 1e30),
-        phi = pt_params_float_in(p, "phimax", 360, 1e-3, 360) * pi / 180;
+           phi = pt_params_float_in(p, "phimax", 360, 1e-3, 360) * pi / 180;
     double height = pt_params_float(p, "height", 1), z0 = pt_params_float(p, "zmin", 0), z1 = pt_params_float(p, "zmax", 1);
     double p1[3] = {0, 0, 0}, p2[3] = {1, 1, 1};
     struct grower g = {0};

@@ -16,10 +16,7 @@ struct pt_input pt_input_constant(double r, double g, double b)
 }
 
 /* Of the texture with this id; black after a failure (-1). */
-static struct pt_input input_of(int32_t id)
-{
-    return (struct pt_input){.texture = id + 1};
-}
+static struct pt_input input_of(int32_t id) { return (struct pt_input){.texture = id + 1}; }
 
 /* --- images ----------------------------------------------------------------------------------------------------------- */
 
@@ -176,10 +173,7 @@ struct pt_input pt_build_colour_input(struct pt_builder *b, const struct pt_stat
     return (struct pt_input){0, fallback};
 }
 
-static int32_t add_texture(struct pt_builder *b, const struct pt_texture *t)
-{
-    return pt_list_add(b, &b->textures, t);
-}
+static int32_t add_texture(struct pt_builder *b, const struct pt_texture *t) { return pt_list_add(b, &b->textures, t); }
 
 struct pt_input pt_input_product(struct pt_builder *b, struct pt_input x, struct pt_input y)
 {
@@ -308,11 +302,11 @@ static void make_imagemap(struct context *c, struct pt_texture *t)
         encoding = pt_params_bool(p, "gamma", 1) ? "sRGB" : "linear";
     else
         pt_params_ignore(p, "gamma");
-    t->wrap = strcmp(wrap, "repeat") == 0               ? PT_WRAP_REPEAT
-              : strcmp(wrap, "black") == 0              ? PT_WRAP_BLACK
-              : strcmp(wrap, "clamp") == 0              ? PT_WRAP_CLAMP
-              : strcmp(wrap, "octahedralsphere") == 0   ? PT_WRAP_OCTAHEDRAL
-                                                        : -1;
+    t->wrap = strcmp(wrap, "repeat") == 0             ? PT_WRAP_REPEAT
+              : strcmp(wrap, "black") == 0            ? PT_WRAP_BLACK
+              : strcmp(wrap, "clamp") == 0            ? PT_WRAP_CLAMP
+              : strcmp(wrap, "octahedralsphere") == 0 ? PT_WRAP_OCTAHEDRAL
+                                                      : -1;
     if (t->wrap < 0)
         pt_diag_fail(&c->b->diag, pt_params_find(p, "wrap")->loc, "unknown wrap \"%.40s\" (expected repeat, black or clamp)",
                      wrap);
@@ -348,10 +342,20 @@ int pt_build_texture(struct pt_builder *b, const struct pt_state *s, const char 
     static const struct {
         const char *kind;
         void (*make)(struct context *c, struct pt_texture *t);
-    } kinds[] = {{"imagemap", make_imagemap}, {"scale", make_scale},   {"mix", make_mix},       {"constant", make_constant},
-                 {"checkerboard", make_checkerboard}, {"bilerp", make_bilerp}, {"directionmix", make_direction_mix},
-                 {"dots", make_stand_in}, {"fbm", make_stand_in},      {"wrinkled", make_stand_in}, {"windy", make_stand_in},
-                 {"marble", make_stand_in}, {"ptex", make_stand_in},   {"uv", make_stand_in}};
+    } kinds[] = {{"imagemap", make_imagemap},
+                 {"scale", make_scale},
+                 {"mix", make_mix},
+                 {"constant", make_constant},
+                 {"checkerboard", make_checkerboard},
+                 {"bilerp", make_bilerp},
+                 {"directionmix", make_direction_mix},
+                 {"dots", make_stand_in},
+                 {"fbm", make_stand_in},
+                 {"wrinkled", make_stand_in},
+                 {"windy", make_stand_in},
+                 {"marble", make_stand_in},
+                 {"ptex", make_stand_in},
+                 {"uv", make_stand_in}};
     int is_float = strcmp(class_name, "float") == 0;
     if (!is_float && strcmp(class_name, "spectrum") != 0 && strcmp(class_name, "color") != 0 &&
         strcmp(class_name, "rgb") != 0)
@@ -363,8 +367,9 @@ int pt_build_texture(struct pt_builder *b, const struct pt_state *s, const char 
         if (strcmp(kinds[i].kind, pt_params_kind(p)) == 0)
             kinds[i].make(&c, &t);
     if (t.kind < 0)
-        return pt_diag_fail(&b->diag, p->loc, "unknown texture class \"%s\" (expected imagemap, scale, mix, "
-                                              "constant, checkerboard …)",
+        return pt_diag_fail(&b->diag, p->loc,
+                            "unknown texture class \"%s\" (expected imagemap, scale, mix, "
+                            "constant, checkerboard …)",
                             pt_params_kind(p));
     pt_params_check_used(p);
     if (b->diag.rc)

@@ -88,7 +88,4 @@ void pt_diag_warn(struct pt_diag *diag, struct pt_loc loc, const char *format, .
         diag->warn(diag->warn_data, line);
 }
 
-void pt_diag_release(struct pt_diag *diag)
-{
-    pt_names_release(&diag->said);
-}
+void pt_diag_release(struct pt_diag *diag) { pt_names_release(&diag->said); }

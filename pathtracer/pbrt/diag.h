@@ -19,9 +19,9 @@ struct pt_loc {
 };
 
 struct pt_diag {
-    struct base_err *err;  /* may be NULL */
-    int rc;              /* 0 until the first failure */
-    int strict;          /* warnings are failures */
+    struct base_err *err;                       /* may be NULL */
+    int rc;                                     /* 0 until the first failure */
+    int strict;                                 /* warnings are failures */
     void (*warn)(void *data, const char *line); /* may be NULL */
     void *warn_data;
     struct pt_names said; /* owns: texts of the warnings given, each once */

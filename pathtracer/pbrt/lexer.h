@@ -14,13 +14,13 @@
 #include "pbrt/source.h"
 
 enum pt_token_kind {
-    PT_TOKEN_END,        /* of the outermost file */
-    PT_TOKEN_FILE_END,   /* of a file included with `scoped` */
-    PT_TOKEN_WORD,       /* directive, number, true, false … */
-    PT_TOKEN_STRING,     /* quotes removed, escapes resolved */
-    PT_TOKEN_OPEN,       /* [ */
-    PT_TOKEN_CLOSE,      /* ] */
-    PT_TOKEN_BAD         /* the diag has failed */
+    PT_TOKEN_END,      /* of the outermost file */
+    PT_TOKEN_FILE_END, /* of a file included with `scoped` */
+    PT_TOKEN_WORD,     /* directive, number, true, false … */
+    PT_TOKEN_STRING,   /* quotes removed, escapes resolved */
+    PT_TOKEN_OPEN,     /* [ */
+    PT_TOKEN_CLOSE,    /* ] */
+    PT_TOKEN_BAD       /* the diag has failed */
 };
 struct pt_token {
     int kind;
@@ -30,22 +30,22 @@ struct pt_token {
 };
 
 struct pt_lexer_file {
-    char *bytes;         /* owns */
+    char *bytes; /* owns */
     char *at, *end, *line_start;
-    struct pt_loc loc;   /* file and the current line */
-    struct pt_loc from;  /* where it was included */
+    struct pt_loc loc;  /* file and the current line */
+    struct pt_loc from; /* where it was included */
     int scoped;
 };
 
 enum { PT_LEXER_DEPTH = 32 };
 
 struct pt_lexer {
-    const struct pt_source *source;   /* borrows */
-    struct pt_diag *diag;             /* borrows */
-    struct pt_arena *arena;           /* borrows; file names in places outlive the lexer there */
+    const struct pt_source *source; /* borrows */
+    struct pt_diag *diag;           /* borrows */
+    struct pt_arena *arena;         /* borrows; file names in places outlive the lexer there */
     struct pt_lexer_file stack[PT_LEXER_DEPTH];
     int depth;
-    struct pt_token ahead;            /* looked at, not yet taken */
+    struct pt_token ahead; /* looked at, not yet taken */
     int has_ahead;
 };
 

@@ -10,18 +10,18 @@
  * medium and handedness stay the file's, and so does what the file places in the space of its camera. */
 struct pt_view {
     int has_look_at;
-    double look_at_world[9];  /* eye, point looked at, up, as for LookAt; not degenerate */
-    double fov_deg;           /* over the screen range [-1, 1] (the short side), (0, 180); 0 = the file's */
+    double look_at_world[9]; /* eye, point looked at, up, as for LookAt; not degenerate */
+    double fov_deg;          /* over the screen range [-1, 1] (the short side), (0, 180); 0 = the file's */
 };
 
 struct pt_load_options {
-    int strict;           /* unsupported features are errors, not warnings */
-    int width, height;    /* > 0: replaces the film's resolution before the camera is set up (--size) */
+    int strict;        /* unsupported features are errors, not warnings */
+    int width, height; /* > 0: replaces the film's resolution before the camera is set up (--size) */
     struct pt_view view;
-    int light_selection;  /* enum pt_light_selection */
-    pt_effects forced;    /* effects to turn on whether needed or not (--effects=all) */
-    struct base_inputs *inputs; /* gets every file that is read; may be NULL */
-    int quiet;            /* no progress notes */
+    int light_selection;                        /* enum pt_light_selection */
+    pt_effects forced;                          /* effects to turn on whether needed or not (--effects=all) */
+    struct base_inputs *inputs;                 /* gets every file that is read; may be NULL */
+    int quiet;                                  /* no progress notes */
     void (*warn)(void *data, const char *line); /* one line per warning or note; may be NULL */
     void *warn_data;
 };
@@ -29,10 +29,10 @@ struct pt_load_options {
 /* What the file says about the image and how to render it; the command line may override it. */
 struct pt_scene_defaults {
     int width, height;
-    int crop[4];                      /* x0, y0, x1, y1 in pixels, end exclusive */
-    int spp;                          /* pixelsamples of the file's sampler, 0 if it has none */
-    char film_path[1024];             /* "filename" of the film, "" if none */
-    struct pt_integrator integrator;  /* from Integrator, Sampler, PixelFilter, Film */
+    int crop[4];                     /* x0, y0, x1, y1 in pixels, end exclusive */
+    int spp;                         /* pixelsamples of the file's sampler, 0 if it has none */
+    char film_path[1024];            /* "filename" of the film, "" if none */
+    struct pt_integrator integrator; /* from Integrator, Sampler, PixelFilter, Film */
 };
 
 #endif

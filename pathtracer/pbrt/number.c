@@ -16,10 +16,7 @@ struct decimal {
     int negative, exact; /* exact: no digit was dropped */
 };
 
-static int is_digit(char c)
-{
-    return c >= '0' && c <= '9';
-}
+static int is_digit(char c) { return c >= '0' && c <= '9'; }
 
 /* 1 when text[0, n) is a decimal number and nothing else. */
 static int scan(const char *text, size_t n, struct decimal *d)

@@ -11,12 +11,12 @@ static const struct {
     const char *name;
     int type;
 } type_names[] = {
-    {"integer", PT_PARAM_INTEGER},   {"float", PT_PARAM_FLOAT},       {"point2", PT_PARAM_POINT2},
-    {"vector2", PT_PARAM_VECTOR2},   {"point3", PT_PARAM_POINT3},     {"vector3", PT_PARAM_VECTOR3},
-    {"point", PT_PARAM_POINT3},      {"vector", PT_PARAM_VECTOR3},    {"normal", PT_PARAM_NORMAL},
-    {"normal3", PT_PARAM_NORMAL},    {"bool", PT_PARAM_BOOL},         {"string", PT_PARAM_STRING},
-    {"texture", PT_PARAM_TEXTURE},   {"rgb", PT_PARAM_RGB},           {"color", PT_PARAM_RGB},
-    {"xyz", PT_PARAM_XYZ},           {"spectrum", PT_PARAM_SPECTRUM}, {"blackbody", PT_PARAM_BLACKBODY},
+    {"integer", PT_PARAM_INTEGER}, {"float", PT_PARAM_FLOAT},       {"point2", PT_PARAM_POINT2},
+    {"vector2", PT_PARAM_VECTOR2}, {"point3", PT_PARAM_POINT3},     {"vector3", PT_PARAM_VECTOR3},
+    {"point", PT_PARAM_POINT3},    {"vector", PT_PARAM_VECTOR3},    {"normal", PT_PARAM_NORMAL},
+    {"normal3", PT_PARAM_NORMAL},  {"bool", PT_PARAM_BOOL},         {"string", PT_PARAM_STRING},
+    {"texture", PT_PARAM_TEXTURE}, {"rgb", PT_PARAM_RGB},           {"color", PT_PARAM_RGB},
+    {"xyz", PT_PARAM_XYZ},         {"spectrum", PT_PARAM_SPECTRUM}, {"blackbody", PT_PARAM_BLACKBODY},
 };
 
 /* Names that pbrt gives a meaning somewhere: out of place they change nothing, so they warn; any other name is a mistake. */
@@ -91,10 +91,7 @@ size_t pt_params_keep(struct pt_params *params, const char *text, size_t length)
     return at;
 }
 
-const char *pt_params_kind(const struct pt_params *params)
-{
-    return params->text ? params->text + params->kind : "";
-}
+const char *pt_params_kind(const struct pt_params *params) { return params->text ? params->text + params->kind : ""; }
 
 const char *pt_param_name(const struct pt_params *params, const struct pt_param *param)
 {
@@ -107,10 +104,7 @@ const char *pt_params_string_at(const struct pt_params *params, const struct pt_
 }
 
 /* Tokens are quoted in messages up to this length. */
-static int clip(size_t length)
-{
-    return length < 40 ? (int)length : 40;
-}
+static int clip(size_t length) { return length < 40 ? (int)length : 40; }
 
 /* --- reading ---------------------------------------------------------------------------------------------------------- */
 
@@ -143,10 +137,7 @@ static int read_declaration(struct pt_params *params, const struct pt_token *t, 
     return params->diag->rc;
 }
 
-static int wants_text(int type)
-{
-    return type == PT_PARAM_STRING || type == PT_PARAM_TEXTURE;
-}
+static int wants_text(int type) { return type == PT_PARAM_STRING || type == PT_PARAM_TEXTURE; }
 
 static int add_number(struct pt_params *params, struct pt_param *p, double value)
 {
@@ -206,9 +197,9 @@ static int read_values(struct pt_params *params, struct pt_lexer *lexer, struct 
         return add_value(params, p, &t);
     }
     if (t.kind != PT_TOKEN_OPEN)
-        return t.kind == PT_TOKEN_BAD ? params->diag->rc
-                                      : pt_diag_fail(params->diag, t.loc, "parameter \"%s\" has no value",
-                                                     pt_param_name(params, p));
+        return t.kind == PT_TOKEN_BAD
+                   ? params->diag->rc
+                   : pt_diag_fail(params->diag, t.loc, "parameter \"%s\" has no value", pt_param_name(params, p));
     struct pt_loc open = t.loc;
     if (pt_lexer_peek(lexer).kind == PT_TOKEN_STRING && p->type == PT_PARAM_SPECTRUM)
         p->first = params->string_count;

@@ -14,32 +14,43 @@
 #include "pbrt/lexer.h"
 
 enum pt_param_type {
-    PT_PARAM_INTEGER, PT_PARAM_FLOAT, PT_PARAM_POINT2, PT_PARAM_VECTOR2, PT_PARAM_POINT3, PT_PARAM_VECTOR3,
-    PT_PARAM_NORMAL, PT_PARAM_BOOL, PT_PARAM_STRING, PT_PARAM_TEXTURE, PT_PARAM_RGB, PT_PARAM_XYZ, PT_PARAM_SPECTRUM,
+    PT_PARAM_INTEGER,
+    PT_PARAM_FLOAT,
+    PT_PARAM_POINT2,
+    PT_PARAM_VECTOR2,
+    PT_PARAM_POINT3,
+    PT_PARAM_VECTOR3,
+    PT_PARAM_NORMAL,
+    PT_PARAM_BOOL,
+    PT_PARAM_STRING,
+    PT_PARAM_TEXTURE,
+    PT_PARAM_RGB,
+    PT_PARAM_XYZ,
+    PT_PARAM_SPECTRUM,
     PT_PARAM_BLACKBODY
 };
 
 struct pt_param {
-    size_t name;          /* offset in text */
-    int type;             /* enum pt_param_type */
-    int is_text;          /* values are strings (always for STRING, TEXTURE; SPECTRUM by name) */
+    size_t name; /* offset in text */
+    int type;    /* enum pt_param_type */
+    int is_text; /* values are strings (always for STRING, TEXTURE; SPECTRUM by name) */
     int used;
-    int inherited;        /* from an Attribute directive: not an error when unused */
-    size_t first, count;  /* range in numbers, or in strings */
+    int inherited;       /* from an Attribute directive: not an error when unused */
+    size_t first, count; /* range in numbers, or in strings */
     struct pt_loc loc;
 };
 
 struct pt_params {
-    struct pt_diag *diag;     /* borrows */
-    struct pt_loc loc;        /* of the directive */
-    size_t kind;              /* offset in text of what the directive names: "trianglemesh", "diffuse" … */
-    struct pt_param *items;   /* owns */
+    struct pt_diag *diag;   /* borrows */
+    struct pt_loc loc;      /* of the directive */
+    size_t kind;            /* offset in text of what the directive names: "trianglemesh", "diffuse" … */
+    struct pt_param *items; /* owns */
     size_t count, room;
-    double *numbers;          /* owns */
+    double *numbers; /* owns */
     size_t number_count, number_room;
-    size_t *strings;          /* owns: offsets in text */
+    size_t *strings; /* owns: offsets in text */
     size_t string_count, string_room;
-    char *text;               /* owns: names and strings, each with its end mark */
+    char *text; /* owns: names and strings, each with its end mark */
     size_t text_count, text_room;
 };
 

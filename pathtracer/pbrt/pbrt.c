@@ -112,20 +112,11 @@ static int do_attribute_begin(struct parser *p, struct pt_loc loc)
     return rc ? rc : push(p, 'A', loc);
 }
 
-static int do_attribute_end(struct parser *p, struct pt_loc loc)
-{
-    return pop(p, 'A', loc, "AttributeEnd");
-}
+static int do_attribute_end(struct parser *p, struct pt_loc loc) { return pop(p, 'A', loc, "AttributeEnd"); }
 
-static int do_transform_begin(struct parser *p, struct pt_loc loc)
-{
-    return push(p, 'T', loc);
-}
+static int do_transform_begin(struct parser *p, struct pt_loc loc) { return push(p, 'T', loc); }
 
-static int do_transform_end(struct parser *p, struct pt_loc loc)
-{
-    return pop(p, 'T', loc, "TransformEnd");
-}
+static int do_transform_end(struct parser *p, struct pt_loc loc) { return pop(p, 'T', loc, "TransformEnd"); }
 
 static int do_object_begin(struct parser *p, struct pt_loc loc)
 {
@@ -196,10 +187,7 @@ static int do_camera(struct parser *p, struct pt_loc loc)
     return pt_parser_save_system(p, "camera", inverse);
 }
 
-static int do_sampler(struct parser *p, struct pt_loc loc)
-{
-    return read_header(p, loc, PT_HEADER_SAMPLER, "Sampler");
-}
+static int do_sampler(struct parser *p, struct pt_loc loc) { return read_header(p, loc, PT_HEADER_SAMPLER, "Sampler"); }
 
 static int do_integrator(struct parser *p, struct pt_loc loc)
 {
@@ -211,10 +199,7 @@ static int do_pixel_filter(struct parser *p, struct pt_loc loc)
     return read_header(p, loc, PT_HEADER_FILTER, "PixelFilter");
 }
 
-static int do_accelerator(struct parser *p, struct pt_loc loc)
-{
-    return read_entity(p, loc, -1); /* the choice is ours */
-}
+static int do_accelerator(struct parser *p, struct pt_loc loc) { return read_entity(p, loc, -1); /* the choice is ours */ }
 
 static int do_world_begin(struct parser *p, struct pt_loc loc)
 {
@@ -336,8 +321,8 @@ static int do_medium_interface(struct parser *p, struct pt_loc loc)
     if (rc)
         return rc;
     strcpy(outside, inside);
-    if (pt_lexer_peek(&p->lexer).kind == PT_TOKEN_STRING && (rc = pt_parser_read_string(p, "medium name", outside,
-                                                                                        sizeof outside)) != 0)
+    if (pt_lexer_peek(&p->lexer).kind == PT_TOKEN_STRING &&
+        (rc = pt_parser_read_string(p, "medium name", outside, sizeof outside)) != 0)
         return rc;
     p->state.medium_in = pt_build_medium_ref(p->b, inside, loc);
     p->state.medium_out = pt_build_medium_ref(p->b, outside, loc);
@@ -410,10 +395,7 @@ static int include(struct parser *p, struct pt_loc loc, int scoped)
     return pt_lexer_include(&p->lexer, path, loc, scoped);
 }
 
-static int do_include(struct parser *p, struct pt_loc loc)
-{
-    return include(p, loc, 0);
-}
+static int do_include(struct parser *p, struct pt_loc loc) { return include(p, loc, 0); }
 
 static int do_import(struct parser *p, struct pt_loc loc)
 {
@@ -527,8 +509,8 @@ int pt_pbrt_read(struct pt_builder *b, const char *path)
     p->frames.size = sizeof(struct frame);
     p->systems.size = sizeof(struct pt_xform[2]);
     p->attributes.size = sizeof(struct pt_params *);
-    p->state = (struct pt_state){.ctm = {pt_xform_identity(), pt_xform_identity()},
-                                 .active = 3, .material = -1, .medium_in = -1, .medium_out = -1};
+    p->state = (struct pt_state){
+        .ctm = {pt_xform_identity(), pt_xform_identity()}, .active = 3, .material = -1, .medium_in = -1, .medium_out = -1};
     int rc = pt_lexer_include(&p->lexer, path, (struct pt_loc){NULL, 0, 0}, 0);
     if (!rc)
         rc = run(p);

@@ -10,7 +10,7 @@ enum { NAME_MAX_BYTES = 1024, STATE_DEPTH = 1024 };
 
 struct frame {
     struct pt_state state;
-    char kind;           /* 'A'ttribute, 'T'ransform, 'O'bject, 'I'mport */
+    char kind; /* 'A'ttribute, 'T'ransform, 'O'bject, 'I'mport */
     struct pt_loc loc;
 };
 
@@ -18,11 +18,11 @@ struct parser {
     struct pt_builder *b;
     struct pt_lexer lexer;
     struct pt_state state;
-    struct pt_list frames;       /* struct frame */
-    struct pt_list systems;      /* struct pt_xform[2]: named coordinate systems */
+    struct pt_list frames;  /* struct frame */
+    struct pt_list systems; /* struct pt_xform[2]: named coordinate systems */
     struct pt_names system_names;
-    struct pt_params params;     /* of the current directive */
-    struct pt_list attributes;   /* struct pt_params *: owns what states point to */
+    struct pt_params params;   /* of the current directive */
+    struct pt_list attributes; /* struct pt_params *: owns what states point to */
     int in_world, ended;
 };
 

@@ -75,15 +75,9 @@ static int do_matrix(struct parser *p, struct pt_loc loc, const char *name, int 
     return concat(p, loc, &t, replace);
 }
 
-static int do_transform(struct parser *p, struct pt_loc loc)
-{
-    return do_matrix(p, loc, "Transform", 1);
-}
+static int do_transform(struct parser *p, struct pt_loc loc) { return do_matrix(p, loc, "Transform", 1); }
 
-static int do_concat_transform(struct parser *p, struct pt_loc loc)
-{
-    return do_matrix(p, loc, "ConcatTransform", 0);
-}
+static int do_concat_transform(struct parser *p, struct pt_loc loc) { return do_matrix(p, loc, "ConcatTransform", 0); }
 
 int pt_parser_save_system(struct parser *p, const char *name, const struct pt_xform ctm[2])
 {

@@ -11,10 +11,10 @@ static const uint8_t type_bytes[] = {0, 1, 1, 2, 2, 4, 4, 4, 8};
 static const struct {
     const char *name;
     enum ply_type type;
-} type_names[] = {{"char", T_I8},    {"int8", T_I8},    {"uchar", T_U8},  {"uint8", T_U8},    {"short", T_I16},
-                  {"int16", T_I16},
-                  {"ushort", T_U16}, {"uint16", T_U16}, {"int", T_I32},   {"int32", T_I32},   {"uint", T_U32},
-                  {"uint32", T_U32}, {"float", T_F32},  {"float32", T_F32}, {"double", T_F64}, {"float64", T_F64}};
+} type_names[] = {{"char", T_I8},   {"int8", T_I8},     {"uchar", T_U8},   {"uint8", T_U8},
+                  {"short", T_I16}, {"int16", T_I16},   {"ushort", T_U16}, {"uint16", T_U16},
+                  {"int", T_I32},   {"int32", T_I32},   {"uint", T_U32},   {"uint32", T_U32},
+                  {"float", T_F32}, {"float32", T_F32}, {"double", T_F64}, {"float64", T_F64}};
 
 /* What a property means to us. */
 enum role { R_SKIP, R_X, R_Y, R_Z, R_NX, R_NY, R_NZ, R_U, R_V, R_INDICES };
@@ -87,9 +87,9 @@ static enum role role_of(const struct element *e, const char *name, int is_list)
     static const struct {
         const char *name;
         enum role role;
-    } roles[] = {{"x", R_X},   {"y", R_Y},   {"z", R_Z},   {"nx", R_NX}, {"ny", R_NY},        {"nz", R_NZ},       {"u", R_U},
-                 {"v", R_V},   {"s", R_U},   {"t", R_V},   {"texture_u", R_U}, {"texture_v", R_V}, {"texture_s", R_U},
-                 {"texture_t", R_V}};
+    } roles[] = {{"x", R_X},         {"y", R_Y},         {"z", R_Z},         {"nx", R_NX},      {"ny", R_NY},
+                 {"nz", R_NZ},       {"u", R_U},         {"v", R_V},         {"s", R_U},        {"t", R_V},
+                 {"texture_u", R_U}, {"texture_v", R_V}, {"texture_s", R_U}, {"texture_t", R_V}};
     if (strcmp(e->name, "face") == 0 && is_list)
         return strcmp(name, "vertex_indices") == 0 || strcmp(name, "vertex_index") == 0 ? R_INDICES : R_SKIP;
     if (strcmp(e->name, "vertex") == 0 && !is_list)
@@ -168,10 +168,7 @@ static int read_header(struct reader *r)
 
 /* --- values ----------------------------------------------------------------------------------------------------------- */
 
-static int truncated(struct reader *r)
-{
-    return base_fail(r->err, BASE_EINVAL, "%s: truncated PLY file", r->name);
-}
+static int truncated(struct reader *r) { return base_fail(r->err, BASE_EINVAL, "%s: truncated PLY file", r->name); }
 
 static int ascii_value(struct reader *r, double *out)
 {
@@ -196,7 +193,14 @@ static double decode(const char *at, enum ply_type type, int swap)
     for (int i = 0; i < n; i++)
         b[i] = (unsigned char)at[swap ? n - 1 - i : i];
     union {
-        int8_t i8; uint8_t u8; int16_t i16; uint16_t u16; int32_t i32; uint32_t u32; float f32; double f64;
+        int8_t i8;
+        uint8_t u8;
+        int16_t i16;
+        uint16_t u16;
+        int32_t i32;
+        uint32_t u32;
+        float f32;
+        double f64;
     } v;
     memcpy(&v, b, (size_t)n);
     switch (type) {
@@ -228,16 +232,21 @@ static int store_vertex_value(struct reader *r, uint64_t i, enum role role, doub
 {
     struct pt_ply *p = r->ply;
     switch (role) {
-    case R_X: case R_Y: case R_Z:
+    case R_X:
+    case R_Y:
+    case R_Z:
         if (!isfinite((float)v))
             return base_fail(r->err, BASE_EINVAL, "%s: vertex %llu is not finite", r->name, (unsigned long long)i);
         p->positions[3 * i + (uint64_t)(role - R_X)] = (float)v;
         break;
-    case R_NX: case R_NY: case R_NZ:
+    case R_NX:
+    case R_NY:
+    case R_NZ:
         if (p->normals)
             p->normals[3 * i + (uint64_t)(role - R_NX)] = isfinite((float)v) ? (float)v : 0.0f;
         break;
-    case R_U: case R_V:
+    case R_U:
+    case R_V:
         if (p->uvs)
             p->uvs[2 * i + (uint64_t)(role - R_U)] = isfinite((float)v) ? (float)v : 0.0f;
         break;
@@ -285,7 +294,7 @@ static int read_list(struct reader *r, const struct property *p)
             continue;
         if (!(value >= 0 && value < (double)r->ply->vertex_count) || value != floor(value))
             return base_fail(r->err, BASE_EINVAL, "%s: vertex index %.0f out of range (expected 0 to %lld)", r->name, value,
-                           (long long)r->ply->vertex_count - 1);
+                             (long long)r->ply->vertex_count - 1);
         uint32_t index = (uint32_t)value;
         if (k == 0)
             first = index;

@@ -11,11 +11,11 @@
 
 struct pt_ply {
     uint32_t vertex_count, triangle_count;
-    float *positions;   /* owns: [vertex_count][3], finite */
-    float *normals;     /* owns: [vertex_count][3] or NULL */
-    float *uvs;         /* owns: [vertex_count][2] or NULL */
-    uint32_t *indices;  /* owns: [triangle_count][3], each < vertex_count */
-    uint32_t polygons;  /* faces of more than four corners, cut into fans */
+    float *positions;  /* owns: [vertex_count][3], finite */
+    float *normals;    /* owns: [vertex_count][3] or NULL */
+    float *uvs;        /* owns: [vertex_count][2] or NULL */
+    uint32_t *indices; /* owns: [triangle_count][3], each < vertex_count */
+    uint32_t polygons; /* faces of more than four corners, cut into fans */
 };
 
 /* Parses bytes[0, size). Faces with more than three corners become fans. Fails with BASE_EINVAL and `name: what is wrong`

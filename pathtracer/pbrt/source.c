@@ -81,10 +81,7 @@ static int read_file(void *data, const char *path, char **bytes, size_t *size, s
     return rc;
 }
 
-struct pt_source pt_source_files(struct base_inputs *inputs)
-{
-    return (struct pt_source){read_file, note_file, inputs, 1};
-}
+struct pt_source pt_source_files(struct base_inputs *inputs) { return (struct pt_source){read_file, note_file, inputs, 1}; }
 
 static int read_single(void *data, const char *path, char **bytes, size_t *size, struct base_err *err)
 {

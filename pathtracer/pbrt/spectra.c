@@ -15,22 +15,15 @@ static double cie_x(double nm)
 {
     return 1.056 * lobe(nm, 599.8, 37.9, 31.0) + 0.362 * lobe(nm, 442.0, 16.0, 26.7) - 0.065 * lobe(nm, 501.1, 20.4, 26.2);
 }
-static double cie_y(double nm)
-{
-    return 0.821 * lobe(nm, 568.8, 46.9, 40.5) + 0.286 * lobe(nm, 530.9, 16.3, 31.1);
-}
-static double cie_z(double nm)
-{
-    return 1.217 * lobe(nm, 437.0, 11.8, 36.0) + 0.681 * lobe(nm, 459.0, 26.0, 13.8);
-}
+static double cie_y(double nm) { return 0.821 * lobe(nm, 568.8, 46.9, 40.5) + 0.286 * lobe(nm, 530.9, 16.3, 31.1); }
+static double cie_z(double nm) { return 1.217 * lobe(nm, 437.0, 11.8, 36.0) + 0.681 * lobe(nm, 459.0, 26.0, 13.8); }
 
 /* CIE standard illuminant D65 every 10 nm from 380 nm (CIE 15). */
-static const double d65_10nm[] = {49.9755, 54.6482, 82.7549, 91.486,  93.4318, 86.6823, 104.865, 117.008, 117.812, 114.861,
-                                  115.923,
-                                  108.811, 109.354, 107.802, 104.79,  107.689, 104.405, 104.046, 100.0,   96.3342, 95.788,
-                                  88.6856,
-                                  90.0062, 89.5991, 87.6987, 83.2886, 83.6992, 80.0268, 80.2146, 82.2778, 78.2842, 69.7213,
-                                  71.6091, 74.349,  61.604,  69.8856, 75.087,  63.5927, 46.4182, 66.8054, 63.3828};
+static const double d65_10nm[] = {49.9755, 54.6482, 82.7549, 91.486,  93.4318, 86.6823, 104.865, 117.008, 117.812,
+                                  114.861, 115.923, 108.811, 109.354, 107.802, 104.79,  107.689, 104.405, 104.046,
+                                  100.0,   96.3342, 95.788,  88.6856, 90.0062, 89.5991, 87.6987, 83.2886, 83.6992,
+                                  80.0268, 80.2146, 82.2778, 78.2842, 69.7213, 71.6091, 74.349,  61.604,  69.8856,
+                                  75.087,  63.5927, 46.4182, 66.8054, 63.3828};
 
 /* Lynch and Hunter 1985 in Palik's Handbook of Optical Constants of Solids: photon energy eV; n and k. */
 static const struct {
@@ -162,9 +155,9 @@ double pt_glass_index(const char *name)
     static const struct {
         const char *name;
         double nd;
-    } glasses[] = {{"glass-BK7", 1.5168},   {"glass-BAF10", 1.67003}, {"glass-FK51A", 1.48656}, {"glass-LASF9", 1.85025},
-                   {"glass-F5", 1.67270},   {"glass-SF5", 1.67270},   {"glass-F10", 1.72825},   {"glass-SF10", 1.72825},
-                   {"glass-F11", 1.78472},  {"glass-SF11", 1.78472}};
+    } glasses[] = {{"glass-BK7", 1.5168},  {"glass-BAF10", 1.67003}, {"glass-FK51A", 1.48656}, {"glass-LASF9", 1.85025},
+                   {"glass-F5", 1.67270},  {"glass-SF5", 1.67270},   {"glass-F10", 1.72825},   {"glass-SF10", 1.72825},
+                   {"glass-F11", 1.78472}, {"glass-SF11", 1.78472}};
     for (size_t i = 0; i < sizeof glasses / sizeof glasses[0]; i++)
         if (strcmp(glasses[i].name, name) == 0)
             return glasses[i].nd;
@@ -177,11 +170,11 @@ int pt_illuminant_named(const char *name, pt_vec3 *rgb)
     static const struct {
         const char *name;
         double x, y;
-    } lights[] = {{"stdillum-A", 0.44757, 0.40745},  {"stdillum-D50", 0.34567, 0.35850}, {"stdillum-D65", 0.31271, 0.32902},
-                  {"stdillum-F1", 0.3131, 0.3371},   {"stdillum-F2", 0.3721, 0.3751},    {"stdillum-F3", 0.4091, 0.3941},
-                  {"stdillum-F4", 0.4402, 0.4031},   {"stdillum-F5", 0.3138, 0.3452},    {"stdillum-F6", 0.3779, 0.3882},
-                  {"stdillum-F7", 0.3129, 0.3292},   {"stdillum-F8", 0.3458, 0.3586},    {"stdillum-F9", 0.3741, 0.3727},
-                  {"stdillum-F10", 0.3458, 0.3588},  {"stdillum-F11", 0.3805, 0.3769},   {"stdillum-F12", 0.4370, 0.4042},
+    } lights[] = {{"stdillum-A", 0.44757, 0.40745},   {"stdillum-D50", 0.34567, 0.35850}, {"stdillum-D65", 0.31271, 0.32902},
+                  {"stdillum-F1", 0.3131, 0.3371},    {"stdillum-F2", 0.3721, 0.3751},    {"stdillum-F3", 0.4091, 0.3941},
+                  {"stdillum-F4", 0.4402, 0.4031},    {"stdillum-F5", 0.3138, 0.3452},    {"stdillum-F6", 0.3779, 0.3882},
+                  {"stdillum-F7", 0.3129, 0.3292},    {"stdillum-F8", 0.3458, 0.3586},    {"stdillum-F9", 0.3741, 0.3727},
+                  {"stdillum-F10", 0.3458, 0.3588},   {"stdillum-F11", 0.3805, 0.3769},   {"stdillum-F12", 0.4370, 0.4042},
                   {"illum-acesD60", 0.32168, 0.33767}};
     for (size_t i = 0; i < sizeof lights / sizeof lights[0]; i++)
         if (strcmp(lights[i].name, name) == 0) {
@@ -202,10 +195,7 @@ pt_vec3 pt_xyz_to_rgb(double x, double y, double z)
               (float)(0.0556434 * x - 0.2040259 * y + 1.0572252 * z));
 }
 
-static double d65_at(int i)
-{
-    return i % 2 == 0 ? d65_10nm[i / 2] : 0.5 * (d65_10nm[i / 2] + d65_10nm[i / 2 + 1]);
-}
+static double d65_at(int i) { return i % 2 == 0 ? d65_10nm[i / 2] : 0.5 * (d65_10nm[i / 2] + d65_10nm[i / 2 + 1]); }
 
 /* ∫ spd(λ) light(λ) (x̄, ȳ, z̄)(λ) dλ, and ∫ ȳ light; light = D65 or 1. */
 static void integrate(const struct pt_spd *spd, int under_d65, double xyz[3], double *y_of_light)
@@ -226,7 +216,7 @@ pt_vec3 pt_spd_reflectance_rgb(const struct pt_spd *spd)
     integrate(spd, 1, xyz, &y);
     integrate(NULL, 1, white, &y);
     pt_vec3 rgb = pt_xyz_to_rgb(xyz[0] / y, xyz[1] / y, xyz[2] / y),
-        w = pt_xyz_to_rgb(white[0] / y, white[1] / y, white[2] / y);
+            w = pt_xyz_to_rgb(white[0] / y, white[1] / y, white[2] / y);
     /* The fitted curves put white 1 % off: scale so that white is white. */
     return v3(rgb.x / w.x, rgb.y / w.y, rgb.z / w.z);
 }

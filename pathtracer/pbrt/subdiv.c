@@ -11,14 +11,14 @@ static const size_t max_triangles = (size_t)1 << 22;
 
 struct mesh {
     size_t vertices, triangles;
-    double *p;             /* [vertices][3], owns */
-    uint32_t *v;           /* [triangles][3], owns */
+    double *p;   /* [vertices][3], owns */
+    uint32_t *v; /* [triangles][3], owns */
 };
 
 /* Half edges: corner c of triangle t starts edge 3t + c towards the next corner. */
 struct topology {
-    int32_t *twin;         /* opposite half edge, -1 on a boundary */
-    int32_t *start;        /* a half edge leaving each vertex, the one on its boundary if it has any; -1 = unused vertex */
+    int32_t *twin;  /* opposite half edge, -1 on a boundary */
+    int32_t *start; /* a half edge leaving each vertex, the one on its boundary if it has any; -1 = unused vertex */
 };
 
 struct edge {
@@ -36,14 +36,8 @@ static int compare_edges(const void *a, const void *b)
     return x->half < y->half ? -1 : x->half > y->half;
 }
 
-static int32_t next_half(int32_t h)
-{
-    return h % 3 == 2 ? h - 2 : h + 1;
-}
-static int32_t previous_half(int32_t h)
-{
-    return h % 3 == 0 ? h + 2 : h - 1;
-}
+static int32_t next_half(int32_t h) { return h % 3 == 2 ? h - 2 : h + 1; }
+static int32_t previous_half(int32_t h) { return h % 3 == 0 ? h + 2 : h - 1; }
 
 static int build_topology(const struct mesh *m, struct topology *t)
 {
@@ -102,10 +96,7 @@ static int ring_of(const struct mesh *m, const struct topology *t, size_t v, uin
     }
 }
 
-static double loop_beta(int valence)
-{
-    return valence == 3 ? 3.0 / 16 : 3.0 / (8.0 * valence);
-}
+static double loop_beta(int valence) { return valence == 3 ? 3.0 / 16 : 3.0 / (8.0 * valence); }
 
 static void weighted_ring(const struct mesh *m, size_t v, const uint32_t *ring, int count, double beta, double out[3])
 {
@@ -141,8 +132,8 @@ static void odd_vertex(const struct mesh *m, const struct topology *t, int32_t h
     int32_t twin = t->twin[h];
     for (size_t k = 0; k < 3; k++) {
         double sum = m->p[3 * a + k] + m->p[3 * b + k];
-        out[k] = twin < 0 ? sum / 2
-                          : 3.0 / 8 * sum + (m->p[3 * c + k] + m->p[3 * (size_t)m->v[previous_half(twin)] + k]) / 8;
+        out[k] =
+            twin < 0 ? sum / 2 : 3.0 / 8 * sum + (m->p[3 * c + k] + m->p[3 * (size_t)m->v[previous_half(twin)] + k]) / 8;
     }
 }
 
@@ -287,8 +278,8 @@ int pt_build_loop_subdiv(struct pt_builder *b, const struct pt_state *s, struct 
         pt_diag_nomem(&b->diag, "a subdivision surface");
         goto out;
     }
-    struct pt_soup soup = {.vertex_count = m.vertices, .triangle_count = m.triangles, .pd = m.p, .nd = normals,
-                           .indices = m.v};
+    struct pt_soup soup = {
+        .vertex_count = m.vertices, .triangle_count = m.triangles, .pd = m.p, .nd = normals, .indices = m.v};
     pt_build_mesh(b, s, p, &soup);
 out:
     free(m.p);

@@ -3,18 +3,15 @@
 #include <math.h>
 #include <string.h>
 
-struct pt_xform pt_xform_identity(void)
-{
-    return (struct pt_xform){{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
-}
+struct pt_xform pt_xform_identity(void) { return (struct pt_xform){{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}}; }
 
 struct pt_xform pt_xform_mul(const struct pt_xform *a, const struct pt_xform *b)
 {
     struct pt_xform r;
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 4; j++)
-            r.m[i][j] = a->m[i][0] * b->m[0][j] + a->m[i][1] * b->m[1][j] + a->m[i][2] * b->m[2][j] +
-                        (j == 3 ? a->m[i][3] : 0);
+            r.m[i][j] =
+                a->m[i][0] * b->m[0][j] + a->m[i][1] * b->m[1][j] + a->m[i][2] * b->m[2][j] + (j == 3 ? a->m[i][3] : 0);
     return r;
 }
 
@@ -65,8 +62,7 @@ int pt_xform_look_at(const double eye[3], const double look[3], const double up[
     if (x[0] * x[0] + x[1] * x[1] + x[2] * x[2] < 1e-18 || !normalize(x))
         return 0;
     cross(z, x, y);
-    struct pt_xform camera_to_world = {
-        {{x[0], y[0], z[0], eye[0]}, {x[1], y[1], z[1], eye[1]}, {x[2], y[2], z[2], eye[2]}}};
+    struct pt_xform camera_to_world = {{{x[0], y[0], z[0], eye[0]}, {x[1], y[1], z[1], eye[1]}, {x[2], y[2], z[2], eye[2]}}};
     return pt_xform_invert(&camera_to_world, out);
 }
 
@@ -127,10 +123,7 @@ void pt_xform_vector(const struct pt_xform *t, const double v[3], double out[3])
     memcpy(out, r, sizeof r);
 }
 
-int pt_xform_equal(const struct pt_xform *a, const struct pt_xform *b)
-{
-    return memcmp(a, b, sizeof *a) == 0;
-}
+int pt_xform_equal(const struct pt_xform *a, const struct pt_xform *b) { return memcmp(a, b, sizeof *a) == 0; }
 
 /* Linear part = rotation · stretch, by averaging with the inverse transpose. */
 static void polar(const struct pt_xform *t, struct pt_xform *rotation, struct pt_xform *stretch)

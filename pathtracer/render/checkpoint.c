@@ -36,10 +36,7 @@ static void put(struct sink *s, const void *data, size_t size)
         fwrite(data, 1, size, s->file);
 }
 
-static void put_count(struct sink *s, uint64_t n)
-{
-    put(s, &n, sizeof n);
-}
+static void put_count(struct sink *s, uint64_t n) { put(s, &n, sizeof n); }
 
 static int32_t put_state(const struct lull_writer *writer, const void *data, uint64_t size)
 {

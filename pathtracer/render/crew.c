@@ -18,13 +18,13 @@ static const double LOOK_EVERY_S = 0.001;
 struct sampling {
     struct pt_crew *crew;
     const struct pt_crew_slice *slice;
-    atomic_size_t next;      /* in slice->order */
-    atomic_int stop;         /* give up: interrupted or failed */
-    size_t away;             /* rows with members */
-    unsigned char *before;   /* owns; [count][stride] the sums of each row that was begun */
-    unsigned char *begun;    /* owns; [count] */
+    atomic_size_t next;    /* in slice->order */
+    atomic_int stop;       /* give up: interrupted or failed */
+    size_t away;           /* rows with members */
+    unsigned char *before; /* owns; [count][stride] the sums of each row that was begun */
+    unsigned char *begun;  /* owns; [count] */
     size_t stride;
-    double look_s;           /* wall time of the next look for messages */
+    double look_s; /* wall time of the next look for messages */
     int rc;
     struct base_err *err;
 };
@@ -46,25 +46,13 @@ int pt_crew_create(struct base_peers *peers, double timeout_s, struct pt_crew **
     return 0;
 }
 
-int pt_crew_processes(const struct pt_crew *crew)
-{
-    return crew ? crew->peers->count : 1;
-}
+int pt_crew_processes(const struct pt_crew *crew) { return crew ? crew->peers->count : 1; }
 
-int pt_crew_threads(const struct pt_crew *crew)
-{
-    return crew ? crew->threads : 0;
-}
+int pt_crew_threads(const struct pt_crew *crew) { return crew ? crew->threads : 0; }
 
-const struct pt_crew_traffic *pt_crew_traffic(const struct pt_crew *crew)
-{
-    return &crew->traffic;
-}
+const struct pt_crew_traffic *pt_crew_traffic(const struct pt_crew *crew) { return &crew->traffic; }
 
-static const char *name_of(const struct pt_crew *crew, int rank)
-{
-    return crew->peers->list[rank].name;
-}
+static const char *name_of(const struct pt_crew *crew, int rank) { return crew->peers->list[rank].name; }
 
 int pt_crew_nonsense(const struct pt_crew *crew, int rank, struct base_err *err)
 {
@@ -240,8 +228,8 @@ static int send_rows(struct sampling *s, int rank, size_t first, size_t n)
     struct pt_crew_rows *message = malloc(size);
     if (!message)
         return base_fail_nomem(s->err, "messages");
-    *message = (struct pt_crew_rows){PT_CREW_ROWS, s->crew->serial, slice->film->planes, (uint32_t)n,
-                                     *slice->maker.integrator};
+    *message =
+        (struct pt_crew_rows){PT_CREW_ROWS, s->crew->serial, slice->film->planes, (uint32_t)n, *slice->maker.integrator};
     unsigned char *sums = (unsigned char *)(message->rows + n);
     for (size_t i = 0; i < n; i++) {
         const struct pt_row *row = &slice->rows[slice->order[first + i]];
@@ -369,8 +357,8 @@ static void undo(struct sampling *s)
         if (!s->begun[i])
             continue;
         pt_row_restore(s->slice->film, row, s->before + i * s->stride);
-        *row = (struct pt_row){.block = row->block, .y = row->y, .x0 = row->x0, .x1 = row->x1, .from = row->from,
-                               .to = row->to};
+        *row = (struct pt_row){
+            .block = row->block, .y = row->y, .x0 = row->x0, .x1 = row->x1, .from = row->from, .to = row->to};
     }
 }
 

@@ -39,10 +39,7 @@ int pt_crew_can_ask(const struct pt_crew *crew, const struct lull_host_criterion
     return !has_history(criterion) && lull_host_needs(criterion)->halo == 0 && (t->capabilities & pure) == pure;
 }
 
-static const struct lull_host_blocks *blocks_of(const struct pt_crew_question *q)
-{
-    return lull_host_blocks_of(q->frame);
-}
+static const struct lull_host_blocks *blocks_of(const struct pt_crew_question *q) { return lull_host_blocks_of(q->frame); }
 
 static struct pt_row row_of(const struct lull_host_block *b, int y)
 {
@@ -166,8 +163,10 @@ static void ask_here(struct asking *a, int threads)
     struct base_err err = {0};
     uint32_t n = share(a, threads), first = a->next;
     a->next += n;
-    if (n > 0 && pt_criterion_evaluate(q->criterion, q->frame, q->film, q->due + first, n, q->final + first,
-                                       q->decisions + first, &err) != 0 && !a->said->code)
+    if (n > 0 &&
+        pt_criterion_evaluate(q->criterion, q->frame, q->film, q->due + first, n, q->final + first, q->decisions + first,
+                              &err) != 0 &&
+        !a->said->code)
         *a->said = err;
 }
 

@@ -18,8 +18,8 @@ struct parcel {
     struct parcel *next;
     struct pt_crew_rows *rows; /* owns */
     size_t size;
-    unsigned char *sums;       /* in rows: of the row that is begun next */
-    uint32_t begun, done;      /* rows */
+    unsigned char *sums;  /* in rows: of the row that is begun next */
+    uint32_t begun, done; /* rows */
 };
 
 struct member {
@@ -27,12 +27,12 @@ struct member {
     const struct pt_crew_tools *tools;
     pthread_mutex_t lock;
     pthread_cond_t work;
-    struct parcel *first, *last; /* guarded by lock, with all below: parcels in the order of their arrival */
-    int over;                    /* rank 0 has said so, or something has failed */
+    struct parcel *first, *last;               /* guarded by lock, with all below: parcels in the order of their arrival */
+    int over;                                  /* rank 0 has said so, or something has failed */
     struct pt_crew_ask *asks[PT_CREW_PARCELS]; /* own; blocks to be judged, for which the threads leave the rows */
     int ask_count;
     struct base_err failed;
-    double look_s;               /* wall time of the next look for messages; of the thread that serves */
+    double look_s; /* wall time of the next look for messages; of the thread that serves */
 };
 
 static int send_text(struct base_peers *peers, uint32_t kind, const struct pt_crew_tools *tools, const char *text,
@@ -42,7 +42,8 @@ static int send_text(struct base_peers *peers, uint32_t kind, const struct pt_cr
     struct pt_crew_hello *hello = malloc(size);
     if (!hello)
         return base_fail_nomem(err, "messages");
-    *hello = (struct pt_crew_hello){.kind = kind, .threads = tools ? (uint32_t)base_threads_count(tools->threads) : 0,
+    *hello = (struct pt_crew_hello){.kind = kind,
+                                    .threads = tools ? (uint32_t)base_threads_count(tools->threads) : 0,
                                     .judges = tools && tools->render && tools->render->criterion};
     memcpy(hello->text, text, strlen(text));
     return base_peers_send(peers, 0, hello, size, err);

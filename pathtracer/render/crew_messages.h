@@ -21,7 +21,7 @@ enum pt_crew_kind {
 struct pt_crew_hello {
     uint32_t kind, threads;
     uint32_t judges, zero; /* judges: it has opened the criterion's frame */
-    char text[]; /* the rest of the message, without terminator */
+    char text[];           /* the rest of the message, without terminator */
 };
 
 struct pt_crew_rows {
@@ -41,9 +41,9 @@ struct pt_crew_block {
 struct pt_crew_ask {
     uint32_t kind, serial;
     uint32_t planes, count;
-    double thread_s;                /* answer: processor seconds that it took */
-    char error[512];                /* answer: why the criterion failed; empty: it did not */
-    struct pt_crew_block blocks[];  /* [count]; in the question followed by the sums of each, row by row */
+    double thread_s;               /* answer: processor seconds that it took */
+    char error[512];               /* answer: why the criterion failed; empty: it did not */
+    struct pt_crew_block blocks[]; /* [count]; in the question followed by the sums of each, row by row */
 };
 
 /* --- rank 0's view ---------------------------------------------------------------------------------------------------- */
@@ -62,9 +62,9 @@ struct pt_crew {
     double timeout_s;
     struct pt_crew_mate *mates; /* owns; [peers->count], 0 unused */
     int threads;
-    int judges;               /* all of them have opened the criterion's frame */
+    int judges; /* all of them have opened the criterion's frame */
     uint32_t serial;
-    int lost;                 /* a member is gone: nobody can be sent home */
+    int lost; /* a member is gone: nobody can be sent home */
     struct pt_crew_traffic traffic;
 };
 

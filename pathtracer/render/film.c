@@ -28,10 +28,7 @@ static void *get_array(const struct pt_film *film, int i)
     return p;
 }
 
-static int wanted(uint32_t planes, int i)
-{
-    return arrays[i].plane == 0 || (planes & arrays[i].plane) != 0;
-}
+static int wanted(uint32_t planes, int i) { return arrays[i].plane == 0 || (planes & arrays[i].plane) != 0; }
 
 size_t pt_film_pixel_bytes(uint32_t planes)
 {

@@ -19,9 +19,9 @@
 #include "integ/integrator.h"
 
 enum {
-    PT_FILM_COLOR = 1,    /* always there */
-    PT_FILM_HALF = 2,     /* radiance of half A */
-    PT_FILM_MOMENT2 = 4,  /* squared luminance */
+    PT_FILM_COLOR = 1,   /* always there */
+    PT_FILM_HALF = 2,    /* radiance of half A */
+    PT_FILM_MOMENT2 = 4, /* squared luminance */
     PT_FILM_ALBEDO = 8,
     PT_FILM_NORMAL = 16,
     PT_FILM_DEPTH = 32,
@@ -30,19 +30,19 @@ enum {
 #define PT_FILM_AUX (PT_FILM_ALBEDO | PT_FILM_NORMAL | PT_FILM_DEPTH)
 
 struct pt_film {
-    int x0, y0, x1, y1; /* the part of the image that is kept, end exclusive */
-    uint32_t planes;    /* PT_FILM_* */
-    size_t pixels;      /* (x1-x0)(y1-y0); the arrays below are in rows from the top, owned, NULL when not in planes */
-    double *color;      /* [pixels, 3] sums */
-    double *half;       /* [pixels, 3] sums over half A */
-    double *moment2;    /* [pixels] sums */
-    double *albedo;     /* [pixels, 3] sums */
-    double *normal;     /* [pixels, 3] sums */
-    double *depth;      /* [pixels] mean over the samples that hit something */
+    int x0, y0, x1, y1;     /* the part of the image that is kept, end exclusive */
+    uint32_t planes;        /* PT_FILM_* */
+    size_t pixels;          /* (x1-x0)(y1-y0); the arrays below are in rows from the top, owned, NULL when not in planes */
+    double *color;          /* [pixels, 3] sums */
+    double *half;           /* [pixels, 3] sums over half A */
+    double *moment2;        /* [pixels] sums */
+    double *albedo;         /* [pixels, 3] sums */
+    double *normal;         /* [pixels, 3] sums */
+    double *depth;          /* [pixels] mean over the samples that hit something */
     uint32_t *depth_hits;   /* [pixels] samples in depth */
     uint32_t *dropped;      /* [pixels] */
     uint32_t *dropped_half; /* [pixels] of half A; with PT_FILM_HALF */
-    size_t bytes;       /* of all arrays */
+    size_t bytes;           /* of all arrays */
 };
 
 /* One pixel of the film while it is being sampled. */
@@ -68,10 +68,7 @@ static inline size_t pt_film_index(const struct pt_film *film, int x, int y)
  * 2k+1), so that half of it would be no better than random numbers and the difference of the halves would overstate the
  * noise (measured: by 1.4 against 1.2 with groups of four). Bit 2 takes part: two successive groups are split. The mask
  * leaves out bits, because the parity of all of them is the first digit of Sobol dimension 1. */
-static inline int pt_film_in_half(uint32_t sample)
-{
-    return !__builtin_parity(sample & UINT32_C(0x7D29F06C));
-}
+static inline int pt_film_in_half(uint32_t sample) { return !__builtin_parity(sample & UINT32_C(0x7D29F06C)); }
 /* How many of the samples [0, spp) are in half A: within two of spp / 2. */
 static inline uint64_t pt_film_half_spp(uint64_t spp)
 {

@@ -3,8 +3,10 @@
 static const struct {
     int abi;
     uint32_t film;
-} map[] = {{LULL_PLANE_HALF, PT_FILM_HALF},     {LULL_PLANE_MOMENT2, PT_FILM_MOMENT2},
-           {LULL_PLANE_ALBEDO, PT_FILM_ALBEDO}, {LULL_PLANE_NORMAL, PT_FILM_NORMAL},
+} map[] = {{LULL_PLANE_HALF, PT_FILM_HALF},
+           {LULL_PLANE_MOMENT2, PT_FILM_MOMENT2},
+           {LULL_PLANE_ALBEDO, PT_FILM_ALBEDO},
+           {LULL_PLANE_NORMAL, PT_FILM_NORMAL},
            {LULL_PLANE_DEPTH, PT_FILM_DEPTH}};
 
 uint32_t pt_host_film_planes(const struct lull_requirements *needs)
@@ -32,8 +34,13 @@ static struct lull_plane plane_of(const struct pt_film *film, const void *data, 
     int64_t pixel = (int64_t)(channels * size);
     if (!data)
         return (struct lull_plane){0};
-    return (struct lull_plane){.data = data, .stride_x = pixel, .stride_y = pixel * (film->x1 - film->x0),
-                               .stride_c = (int64_t)size, .scale = 1.0, .type = type, .normaliser = normaliser,
+    return (struct lull_plane){.data = data,
+                               .stride_x = pixel,
+                               .stride_y = pixel * (film->x1 - film->x0),
+                               .stride_c = (int64_t)size,
+                               .scale = 1.0,
+                               .type = type,
+                               .normaliser = normaliser,
                                .channels = channels};
 }
 
@@ -59,8 +66,13 @@ const struct lull_host_view *pt_host_show(const struct pt_film *film, struct lul
     v->planes[LULL_PLANE_ALBEDO] = sums(film, film->albedo, 3, LULL_NORM_SPP);
     v->planes[LULL_PLANE_NORMAL] = sums(film, film->normal, 3, LULL_NORM_SPP);
     v->planes[LULL_PLANE_DEPTH] = sums(film, film->depth, 1, LULL_NORM_ONE);
-    v->view = (struct lull_host_view){.struct_size = sizeof v->view, .plane_count = LULL_PLANE_COUNT, .x0 = film->x0,
-                                      .y0 = film->y0, .x1 = film->x1, .y1 = film->y1, .planes = v->planes,
+    v->view = (struct lull_host_view){.struct_size = sizeof v->view,
+                                      .plane_count = LULL_PLANE_COUNT,
+                                      .x0 = film->x0,
+                                      .y0 = film->y0,
+                                      .x1 = film->x1,
+                                      .y1 = film->y1,
+                                      .planes = v->planes,
                                       .dropped = &v->dropped,
                                       .dropped_half = film->dropped_half ? &v->dropped_half : NULL};
     return &v->view;

@@ -48,7 +48,12 @@ void pt_mask_release(struct pt_mask *mask)
 
 struct lull_plane pt_mask_plane(const struct pt_mask *mask)
 {
-    return (struct lull_plane){.data = mask->grey, .stride_x = sizeof *mask->grey,
-                               .stride_y = (int64_t)sizeof *mask->grey * mask->width, .stride_c = sizeof *mask->grey,
-                               .scale = 1.0, .type = LULL_TYPE_F32, .normaliser = LULL_NORM_ONE, .channels = 1};
+    return (struct lull_plane){.data = mask->grey,
+                               .stride_x = sizeof *mask->grey,
+                               .stride_y = (int64_t)sizeof *mask->grey * mask->width,
+                               .stride_c = sizeof *mask->grey,
+                               .scale = 1.0,
+                               .type = LULL_TYPE_F32,
+                               .normaliser = LULL_NORM_ONE,
+                               .channels = 1};
 }

@@ -92,8 +92,9 @@ static void criterion_text(const struct pt_render *r, const struct pt_output_inf
 
 int pt_output_exr(const char *path, const struct pt_render *r, const struct pt_output_info *info, struct base_err *err)
 {
-    static const char *const base[FIRST_AOV] = {"R", "G", "B", "lull.spp.V", "lull.p_noisy.V",
-                                                "lull.error.V", "lull.reason.V"}; /* V: a value, as Blender wants to know */
+    /* V: a value, as Blender wants to know */
+    static const char *const base[FIRST_AOV] = {
+        "R", "G", "B", "lull.spp.V", "lull.p_noisy.V", "lull.error.V", "lull.reason.V"};
     const char *channels[CHANNELS_MAX];
     int n = FIRST_AOV;
     memcpy(channels, base, sizeof base);

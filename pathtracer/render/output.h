@@ -9,16 +9,16 @@
 #include "render/render.h"
 
 struct pt_output_info {
-    const char *scene;           /* path of the scene file */
+    const char *scene;              /* path of the scene file */
     const struct lull_pair *params; /* of the criterion, as given */
     uint32_t param_count;
-    const char *mask;            /* path of the picture that scales the dial; NULL = none */
-    pt_effects effects;          /* what the scene calls for */
-    const char *kernel;          /* name of the kernel that rendered it */
-    int threads;            /* of all processes */
-    int reproducible;            /* leave times out of the EXR, so that equal renders are equal files */
-    uint32_t aov;                /* PT_FILM_ALBEDO | NORMAL | DEPTH to be written */
-    int64_t scene_bytes;         /* memory of the scene; < 0 = not known */
+    const char *mask;    /* path of the picture that scales the dial; NULL = none */
+    pt_effects effects;  /* what the scene calls for */
+    const char *kernel;  /* name of the kernel that rendered it */
+    int threads;         /* of all processes */
+    int reproducible;    /* leave times out of the EXR, so that equal renders are equal files */
+    uint32_t aov;        /* PT_FILM_ALBEDO | NORMAL | DEPTH to be written */
+    int64_t scene_bytes; /* memory of the scene; < 0 = not known */
     int interrupted;
 };
 

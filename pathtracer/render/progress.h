@@ -12,11 +12,11 @@
 #include "render/render.h"
 
 struct pt_progress {
-    FILE *out;      /* NULL: silent */
+    FILE *out; /* NULL: silent */
     int terminal;
-    double next_s;  /* wall time of the next line */
-    int shown;      /* a live line stands on the screen */
-    double percent; /* of the work, as the last line said … */
+    double next_s;    /* wall time of the next line */
+    int shown;        /* a live line stands on the screen */
+    double percent;   /* of the work, as the last line said … */
     uint64_t samples; /* … when the render had so many */
 };
 

@@ -76,8 +76,8 @@ static int add_rows(struct pt_quote *q, const struct lull_criterion *table, cons
 }
 
 int pt_quote_create(const struct pt_render *r, const struct lull_criterion *table, const struct lull_pair *pairs,
-                    uint32_t pair_count, void (*warn)(void *data, const char *line), void *warn_data,
-                    struct pt_quote **out, struct base_err *err)
+                    uint32_t pair_count, void (*warn)(void *data, const char *line), void *warn_data, struct pt_quote **out,
+                    struct base_err *err)
 {
     struct pt_quote *q = calloc(1, sizeof *q);
     if (!q)

@@ -26,25 +26,22 @@ enum { LEAD_SPP = 8 };
 /* A block that is to be sampled. */
 struct candidate {
     uint32_t block;
-    int octave;      /* of its samples: who has few goes first */
-    double left_s;   /* thread seconds to its check, for want of better its samples to there */
+    int octave;       /* of its samples: who has few goes first */
+    double left_s;    /* thread seconds to its check, for want of better its samples to there */
     double per_spp_s; /* thread seconds per sample of all its pixels; 0 = not known */
 };
 
 struct pt_render_work {
     struct pt_row *items; /* [rows of all blocks] */
-    uint32_t *order;     /* [rows of all blocks] item to be done n-th */
+    uint32_t *order;      /* [rows of all blocks] item to be done n-th */
     size_t count;
-    struct candidate *candidates; /* [blocks] */
-    uint32_t *due;       /* [blocks] */
-    uint8_t *final;      /* [blocks] */
+    struct candidate *candidates;    /* [blocks] */
+    uint32_t *due;                   /* [blocks] */
+    uint8_t *final;                  /* [blocks] */
     struct lull_decision *decisions; /* [blocks] */
 };
 
-int pt_render_threads(const struct pt_render *r)
-{
-    return base_threads_count(r->threads) + pt_crew_threads(r->config.crew);
-}
+int pt_render_threads(const struct pt_render *r) { return base_threads_count(r->threads) + pt_crew_threads(r->config.crew); }
 
 static struct pt_render_work *work_create(const struct lull_host_blocks *blocks)
 {
@@ -173,8 +170,12 @@ static int sample_rows(struct pt_render *r, const struct pt_render_hooks *hooks,
         base_threads_for(r->threads, (long)w->count, sample_row, r);
         return 0;
     }
-    struct pt_crew_slice slice = {.maker = {r->scene, r->kernel, &r->config.integrator}, .film = &r->film, .rows = w->items,
-                                  .order = w->order, .count = w->count, .interrupted = hooks->interrupted,
+    struct pt_crew_slice slice = {.maker = {r->scene, r->kernel, &r->config.integrator},
+                                  .film = &r->film,
+                                  .rows = w->items,
+                                  .order = w->order,
+                                  .count = w->count,
+                                  .interrupted = hooks->interrupted,
                                   .data = hooks->data};
     return pt_crew_sample(r->config.crew, r->threads, &slice, err);
 }
@@ -214,8 +215,8 @@ static uint32_t list_candidates(struct pt_render *r)
         if (b->reason != LULL_REASON_NONE || b->spp >= end)
             continue;
         double per_spp_s = b->spp > 0 ? b->thread_s / (double)b->spp : 0.0, left = (double)(end - b->spp);
-        r->work->candidates[n++] = (struct candidate){i, octave_of(b->spp), left * (per_spp_s > 0.0 ? per_spp_s : 1.0),
-                                                      per_spp_s};
+        r->work->candidates[n++] =
+            (struct candidate){i, octave_of(b->spp), left * (per_spp_s > 0.0 ? per_spp_s : 1.0), per_spp_s};
     }
     qsort(r->work->candidates, n, sizeof r->work->candidates[0], by_turn);
     return n;
@@ -241,8 +242,8 @@ static void list_block(struct pt_render *r, const struct candidate *c, double st
     uint64_t to = end - b->spp > most ? b->spp + most : end;
     for (int y = b->y0; y < b->y1; y++) {
         w->order[w->count] = (uint32_t)w->count;
-        w->items[w->count++] = (struct pt_row){.block = c->block, .y = y, .x0 = b->x0, .x1 = b->x1,
-                                               .from = (uint32_t)b->spp, .to = (uint32_t)to};
+        w->items[w->count++] = (struct pt_row){
+            .block = c->block, .y = y, .x0 = b->x0, .x1 = b->x1, .from = (uint32_t)b->spp, .to = (uint32_t)to};
     }
 }
 
@@ -293,10 +294,7 @@ static double gather(struct pt_render *r)
     return thread_s;
 }
 
-static double recent(double before, double now)
-{
-    return before > 0.0 ? 0.7 * before + 0.3 * now : now;
-}
+static double recent(double before, double now) { return before > 0.0 ? 0.7 * before + 0.3 * now : now; }
 
 /* Samples about SLICE_S worth, less when the time budget ends sooner. *more is 0 when every block is at its check. After a
  * failure, as when it was interrupted on the way, everything is as before. */

@@ -21,37 +21,37 @@
 #include "render/mask.h"
 
 struct pt_render_config {
-    int width, height;       /* of the image, pixels */
-    int crop[4];             /* x0, y0, x1, y1, end exclusive, not empty, inside the image */
+    int width, height; /* of the image, pixels */
+    int crop[4];       /* x0, y0, x1, y1, end exclusive, not empty, inside the image */
     int block_width, block_height;
     uint64_t spp_min, spp_max; /* 1 <= spp_min <= spp_max <= 2^31 - 1; equal: uniform */
-    int uniform;             /* every block gets spp_max samples; a criterion is asked once at the end */
-    double time_budget_s;    /* 0 = none */
-    uint64_t pilot_spp;      /* not 0: pt_render_run ends, with the blocks still active, before one gets more samples … */
-    double pilot_s;          /* … and after so many seconds */
-    double max_check_overhead; /* share of the elapsed time that checks may take; 0 = no bound */
-    double max_seam;         /* most ratio of samples of neighbouring blocks, 0 = any (lull_host_reopen) */
-    const struct pt_mask *mask; /* borrows for pt_render_create; NULL = none */
-    uint32_t planes;         /* PT_FILM_* wanted besides those of the criterion */
+    int uniform;               /* every block gets spp_max samples; a criterion is asked once at the end */
+    double time_budget_s;      /* 0 = none */
+    uint64_t pilot_spp; /* not 0: pt_render_run ends, with the blocks still active, before one gets more samples … */
+    double pilot_s;     /* … and after so many seconds */
+    double max_check_overhead;       /* share of the elapsed time that checks may take; 0 = no bound */
+    double max_seam;                 /* most ratio of samples of neighbouring blocks, 0 = any (lull_host_reopen) */
+    const struct pt_mask *mask;      /* borrows for pt_render_create; NULL = none */
+    uint32_t planes;                 /* PT_FILM_* wanted besides those of the criterion */
     struct pt_integrator integrator; /* want_aux is set by the renderer */
-    uint32_t order_seed;     /* not 0: work is handed out in a shuffled order (tests) */
-    struct pt_crew *crew;    /* borrows; processes that help to sample, NULL: none */
+    uint32_t order_seed;             /* not 0: work is handed out in a shuffled order (tests) */
+    struct pt_crew *crew;            /* borrows; processes that help to sample, NULL: none */
 };
 
 struct pt_render {
     struct pt_render_config config;
-    const struct pt_scene *scene;     /* borrows */
+    const struct pt_scene *scene; /* borrows */
     pt_kernel *kernel;
-    struct base_threads *threads;       /* borrows */
-    struct lull_host_criterion *criterion;   /* borrows; NULL only with config.uniform */
+    struct base_threads *threads;          /* borrows */
+    struct lull_host_criterion *criterion; /* borrows; NULL only with config.uniform */
     struct pt_film film;
-    struct lull_host_frame *frame;    /* owns; decides: blocks, limits, who is asked */
-    struct lull_host_blocks *blocks;  /* of the frame, as the totals */
+    struct lull_host_frame *frame;   /* owns; decides: blocks, limits, who is asked */
+    struct lull_host_blocks *blocks; /* of the frame, as the totals */
     struct lull_host_totals *totals;
-    struct pt_render_work *work;      /* owns; scratch of the slices */
-    double samples_per_s;             /* recent, 0 = not known yet */
-    double busy_threads;              /* likewise: thread seconds per wall second of sampling */
-    long sampled_rows;                /* what those threads had to share */
+    struct pt_render_work *work; /* owns; scratch of the slices */
+    double samples_per_s;        /* recent, 0 = not known yet */
+    double busy_threads;         /* likewise: thread seconds per wall second of sampling */
+    long sampled_rows;           /* what those threads had to share */
 };
 
 enum pt_render_outcome {

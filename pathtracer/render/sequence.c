@@ -81,11 +81,11 @@ struct recorder {
     struct base_threads *threads;
     struct lull_host_criterion *criterion;
     struct pt_render_hooks hooks;
-    struct seq_manifest manifest; /* owns; room for every block of the grid */
-    struct lull_host_frame *whole;      /* owns; the grid of the whole image */
-    const struct lull_host_blocks *grid; /* of it */
-    struct base_lock lock;      /* of the folder */
-    uint8_t *chosen;            /* owns; [grid.count] */
+    struct seq_manifest manifest;                         /* owns; room for every block of the grid */
+    struct lull_host_frame *whole;                        /* owns; the grid of the whole image */
+    const struct lull_host_blocks *grid;                  /* of it */
+    struct base_lock lock;                                /* of the folder */
+    uint8_t *chosen;                                      /* owns; [grid.count] */
     double *mean, *half, *difference, *moment2, *scratch; /* own; one block, planar */
 };
 
@@ -120,8 +120,8 @@ static void describe(struct recorder *r)
     snprintf(m->source, sizeof m->source, "%s", c->scene_path);
     snprintf(m->renderer, sizeof m->renderer,
              "lull-render " BASE_VERSION ", %s sampler, %s, filter %s %g, max depth %d, clamp %g%s",
-             pt_sampler_words[i->sampler], pt_strategy_words[i->strategy], pt_filter_words[i->filter],
-             (double)i->filter_x, i->max_depth, (double)i->max_component, r->scene->light_tree ? ", light hierarchy" : "");
+             pt_sampler_words[i->sampler], pt_strategy_words[i->strategy], pt_filter_words[i->filter], (double)i->filter_x,
+             i->max_depth, (double)i->max_component, r->scene->light_tree ? ", light hierarchy" : "");
     m->source_crc32 = c->scene_crc;
     m->inputs_crc32 = c->inputs_crc;
     m->has_look_at = c->view.has_look_at;
@@ -195,8 +195,7 @@ static void read_film(struct recorder *r, const struct pt_film *f, uint64_t spp)
         for (size_t c = 0; c < 3; c++) {
             r->mean[c * f->pixels + i] = mean[c];
             r->half[c * f->pixels + i] = a[c];
-            r->difference[c * f->pixels + i] =
-                both ? (a[c] - (f->color[3 * i + c] - f->half[3 * i + c]) / n_b) / 2.0 : 0.0;
+            r->difference[c * f->pixels + i] = both ? (a[c] - (f->color[3 * i + c] - f->half[3 * i + c]) / n_b) / 2.0 : 0.0;
         }
         r->moment2[i] = n > 0.0 ? f->moment2[i] / n : 0.0;
     }
@@ -229,9 +228,14 @@ static int put_level(struct recorder *r, struct seq_builder *file, const struct 
         snprintf(name, sizeof name, "%.50s.error", lull_host_table(render->criterion)->id);
         add_statistic(stats, &n, name, b->error);
     }
-    const struct seq_frame frame = {.spp = (uint32_t)b->spp, .half_spp = (uint32_t)pt_film_half_spp(b->spp),
-                                    .is_reference = reference, .full = full, .mean = r->mean, .half = r->difference,
-                                    .stats = stats, .n_stats = n};
+    const struct seq_frame frame = {.spp = (uint32_t)b->spp,
+                                    .half_spp = (uint32_t)pt_film_half_spp(b->spp),
+                                    .is_reference = reference,
+                                    .full = full,
+                                    .mean = r->mean,
+                                    .half = r->difference,
+                                    .stats = stats,
+                                    .n_stats = n};
     return seq_builder_add(file, &frame, err);
 }
 
@@ -279,8 +283,13 @@ static int finish_block(struct recorder *r, struct seq_builder *file, const stru
                         struct base_err *err)
 {
     char path[4096];
-    struct seq_manifest_block entry = {.id = b->id, .x0 = (uint32_t)b->x0, .y0 = (uint32_t)b->y0, .x1 = (uint32_t)b->x1,
-                                       .y1 = (uint32_t)b->y1, .bytes = file->size, .seconds = seconds,
+    struct seq_manifest_block entry = {.id = b->id,
+                                       .x0 = (uint32_t)b->x0,
+                                       .y0 = (uint32_t)b->y0,
+                                       .x1 = (uint32_t)b->x1,
+                                       .y1 = (uint32_t)b->y1,
+                                       .bytes = file->size,
+                                       .seconds = seconds,
                                        .dropped = r->dropped};
     snprintf(entry.file, sizeof entry.file, "block-%05u.lseq", b->id);
     int rc = base_file_join(path, r->config->directory, entry.file, err);
@@ -316,9 +325,14 @@ static int lay_grid(struct recorder *r, struct base_err *err)
 {
     const struct pt_render_config *c = &r->config->render;
     struct lull_error e = {.struct_size = sizeof e};
-    struct lull_host_config grid = {.struct_size = sizeof grid, .flags = LULL_HOST_UNIFORM, .width = (uint32_t)c->width,
-                                    .height = (uint32_t)c->height, .block_width = (uint32_t)c->block_width,
-                                    .block_height = (uint32_t)c->block_height, .spp_min = 1, .spp_max = 1};
+    struct lull_host_config grid = {.struct_size = sizeof grid,
+                                    .flags = LULL_HOST_UNIFORM,
+                                    .width = (uint32_t)c->width,
+                                    .height = (uint32_t)c->height,
+                                    .block_width = (uint32_t)c->block_width,
+                                    .block_height = (uint32_t)c->block_height,
+                                    .spp_min = 1,
+                                    .spp_max = 1};
     int32_t code = lull_host_begin(&grid, NULL, &r->whole, &e);
     if (code != LULL_OK)
         return pt_host_fail(code, &e, err);
@@ -334,8 +348,8 @@ static int prepare(struct recorder *r, struct base_err *err)
     r->manifest.levels = calloc(PT_SEQUENCE_MAX_LEVELS, sizeof *r->manifest.levels);
     if (!r->manifest.levels)
         return base_fail_nomem(err, "levels");
-    int levels = pt_sequence_levels(r->config->levels ? r->config->levels : "geometric:20:10000:1.15", r->manifest.levels,
-                                    err);
+    int levels =
+        pt_sequence_levels(r->config->levels ? r->config->levels : "geometric:20:10000:1.15", r->manifest.levels, err);
     if (levels < 0)
         return levels;
     r->manifest.n_levels = (uint32_t)levels;
@@ -407,7 +421,11 @@ int pt_sequence_record(const struct pt_sequence_config *config, const struct pt_
                        struct base_threads *threads, struct lull_host_criterion *criterion, int (*interrupted)(void *data),
                        void (*say)(void *data, const char *line), void *data, int *was_interrupted, struct base_err *err)
 {
-    struct recorder r = {.config = config, .scene = scene, .kernel = kernel, .threads = threads, .criterion = criterion,
+    struct recorder r = {.config = config,
+                         .scene = scene,
+                         .kernel = kernel,
+                         .threads = threads,
+                         .criterion = criterion,
                          .hooks = {.slice = config->slice, .interrupted = interrupted, .warn = say, .data = data}};
     *was_interrupted = 0;
     int rc = prepare(&r, err);

@@ -13,12 +13,12 @@
 enum { PT_SEQUENCE_MAX_LEVELS = 4000 };
 
 struct pt_sequence_config {
-    const char *directory;      /* made when it is not there */
-    const char *levels;         /* "geometric:20:10000:1.15", "linear:20:10000:20"; NULL = the first of these */
-    const char *blocks;         /* "0,3,5-8"; NULL = all */
-    const char *name;           /* "SCENE" or "SCENE/VIEW"; NULL = by the scene file's name */
-    struct pt_view view;        /* that replaced the scene's camera */
-    uint64_t reference_spp;     /* 0 = no reference */
+    const char *directory;  /* made when it is not there */
+    const char *levels;     /* "geometric:20:10000:1.15", "linear:20:10000:20"; NULL = the first of these */
+    const char *blocks;     /* "0,3,5-8"; NULL = all */
+    const char *name;       /* "SCENE" or "SCENE/VIEW"; NULL = by the scene file's name */
+    struct pt_view view;    /* that replaced the scene's camera */
+    uint64_t reference_spp; /* 0 = no reference */
     const char *scene_path;
     uint32_t scene_crc, inputs_crc; /* of the scene file; of every file that was read */
     int quiet;

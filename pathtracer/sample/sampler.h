@@ -17,32 +17,29 @@
 
 #include "sample/rng.h"
 
-enum {
-    PT_DIMS_PER_VERTEX = 16,
-    PT_SOBOL_BLOCKS = 3
-};
+enum { PT_DIMS_PER_VERTEX = 16, PT_SOBOL_BLOCKS = 3 };
 
 enum pt_camera_dim { PT_DIM_PIXEL = 0, PT_DIM_LENS = 2, PT_DIM_TIME = 4 };
 enum pt_vertex_dim {
-    PT_DIM_BSDF = 0,        /* pair: direction */
-    PT_DIM_LIGHT = 2,       /* pair: point on the light */
-    PT_DIM_LIGHT_PICK = 4,  /* which emitter */
+    PT_DIM_BSDF = 0,       /* pair: direction */
+    PT_DIM_LIGHT = 2,      /* pair: point on the light */
+    PT_DIM_LIGHT_PICK = 4, /* which emitter */
     PT_DIM_BSDF_LOBE = 5,
     PT_DIM_ROULETTE = 6,
-    PT_DIM_MEDIUM = 7,      /* distance, or the key of a null-collision stream */
-    PT_DIM_PHASE = 8,       /* pair */
-    PT_DIM_ALPHA = 10,      /* key of the stream for pass-through decisions of the scattered ray */
-    PT_DIM_SHADOW = 11,     /* key: alpha and transmittance of the shadow ray */
-    PT_DIM_MIX = 12,        /* key: choice of mix materials, walks inside coatings */
-    PT_DIM_BSDF_WALK = 13   /* key: streams inside bsdf evaluation */
+    PT_DIM_MEDIUM = 7,    /* distance, or the key of a null-collision stream */
+    PT_DIM_PHASE = 8,     /* pair */
+    PT_DIM_ALPHA = 10,    /* key of the stream for pass-through decisions of the scattered ray */
+    PT_DIM_SHADOW = 11,   /* key: alpha and transmittance of the shadow ray */
+    PT_DIM_MIX = 12,      /* key: choice of mix materials, walks inside coatings */
+    PT_DIM_BSDF_WALK = 13 /* key: streams inside bsdf evaluation */
 };
 
 struct pt_sampler {
     uint32_t index_reversed; /* Sobol: sample index, bits reversed */
     uint32_t sobol;
-    uint32_t base;           /* first dimension of the current block */
-    uint32_t pixel_key;      /* of (seed, pixel) */
-    uint32_t path_key;       /* of (seed, pixel, sample) */
+    uint32_t base;      /* first dimension of the current block */
+    uint32_t pixel_key; /* of (seed, pixel) */
+    uint32_t path_key;  /* of (seed, pixel, sample) */
 };
 
 static inline uint32_t pt_reverse_bits(uint32_t x)

@@ -16,11 +16,11 @@ typedef uint32_t pt_effects;
     X(ALPHA, "alpha", "the ray goes on behind a hit that is let through; shadow rays become closest-hit queries") \
     X(BUMP, "bump", "two or three more lookups at each hit, a new frame") /* bump (displacement) and normal maps */ \
     X(SPECULAR, "specular", "a test at each hit: no light sampling, no density there") /* delta reflection */ \
-    X(GLOSSY, "glossy", "a microfacet normal, its density for each light sample") /* rough (microfacet) reflection */ \
+    X(GLOSSY, "glossy", "a microfacet normal, its density for each light sample")      /* rough (microfacet) reflection */ \
     /* dielectric, thin dielectric, diffuse transmission */ \
     X(TRANSMISSION, "transmission", "a Fresnel choice, refraction; more bounces until a path ends") \
     X(COATED, "coated", "two lobes or a walk through the layer, also for each light sample") /* layered coatings */ \
-    X(MIX, "mix", "a lookup and a random choice at each hit") /* mix materials */ \
+    X(MIX, "mix", "a lookup and a random choice at each hit")                                /* mix materials */ \
     /* infinite lights, constant or image */ \
     X(ENVIRONMENT, "environment", "a table search per light sample, a lookup per escaping ray") \
     X(DELTA_LIGHT, "delta-light", "no density to weigh by; cheap") /* point, spot, distant lights */ \
@@ -32,11 +32,11 @@ typedef uint32_t pt_effects;
     X(ABSORPTION, "absorption", "an exponential per segment, a stack of media") \
     /* media that scatter */ \
     X(SCATTERING, "scattering", "a distance sample per segment, a light sample per collision; many more bounces") \
-    X(GRID_MEDIUM, "grid-medium", "tracking by many small steps, three lookups each") /* media of varying density */ \
-    X(DEFOCUS, "defocus", "two random numbers per camera ray") /* depth of field */ \
+    X(GRID_MEDIUM, "grid-medium", "tracking by many small steps, three lookups each")  /* media of varying density */ \
+    X(DEFOCUS, "defocus", "two random numbers per camera ray")                         /* depth of field */ \
     X(MOTION, "motion", "one random number per path, interpolation in each ray query") /* motion blur */ \
-    X(INSTANCES, "instances", "a change of space per ray and hit") /* object instances */ \
-    X(INTERFACE, "interface", "shadow rays cross surfaces one by one") /* surfaces that only bound media */
+    X(INSTANCES, "instances", "a change of space per ray and hit")                     /* object instances */ \
+    X(INTERFACE, "interface", "shadow rays cross surfaces one by one")                 /* surfaces that only bound media */
 
 /* PT_FX_ID is a bit, PT_FX_INDEX_ID its number. */
 #define PT_FX_INDEX(id, name, cost) PT_FX_INDEX_##id,

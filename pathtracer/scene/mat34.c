@@ -11,7 +11,7 @@ int pt_mat34_invert(const struct pt_mat34 *t, struct pt_mat34 *inv)
         return 0;
     double r[9] = {c00 * s, (a[2] * a[9] - a[1] * a[10]) * s, (a[1] * a[6] - a[2] * a[5]) * s,
                    c01 * s, (a[0] * a[10] - a[2] * a[8]) * s, (a[2] * a[4] - a[0] * a[6]) * s,
-                   c02 * s, (a[1] * a[8] - a[0] * a[9]) * s, (a[0] * a[5] - a[1] * a[4]) * s};
+                   c02 * s, (a[1] * a[8] - a[0] * a[9]) * s,  (a[0] * a[5] - a[1] * a[4]) * s};
     for (int i = 0; i < 3; i++) {
         for (int j = 0; j < 3; j++)
             inv->m[4 * i + j] = (float)r[3 * i + j];

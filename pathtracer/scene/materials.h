@@ -28,31 +28,31 @@
 enum pt_bsdf_kind { PT_BSDFS(PT_BSDF_ID) PT_BSDF_COUNT };
 
 enum pt_material_kind { /* a model, or */
-    PT_MATERIAL_MIX = PT_BSDF_COUNT,
-    PT_MATERIAL_INTERFACE /* bounds media only: light passes */
+                        PT_MATERIAL_MIX = PT_BSDF_COUNT,
+                        PT_MATERIAL_INTERFACE /* bounds media only: light passes */
 };
 
 /* A number or colour that may be textured. */
 struct pt_input {
-    int32_t texture;         /* 0: `value`; else number of the texture: pt_scene.textures[number - 1] */
-    pt_vec3 value;           /* a float input has it in x (and y, z equal to x) */
+    int32_t texture; /* 0: `value`; else number of the texture: pt_scene.textures[number - 1] */
+    pt_vec3 value;   /* a float input has it in x (and y, z equal to x) */
 };
 
 struct pt_material {
-    int32_t kind;                 /* enum pt_bsdf_kind or pt_material_kind */
-    int32_t remap_roughness;      /* GGX alpha = sqrt(roughness) as in pbrt-v4; 0: alpha = roughness */
-    int32_t conductor_by_colour;  /* conductor (or base of a coated one) given by reflectance instead of eta and k */
-    int32_t bump;                 /* number of the displacement texture (scene units), 0 = none */
-    int32_t normal_map;           /* number of a texture with rgb = (n + 1)/2 in tangent space, 0 = none */
-    int32_t mix_a, mix_b;         /* ids of materials, MIX only; smaller than this one's */
-    struct pt_input mix_amount;   /* float: share of mix_b */
+    int32_t kind;                /* enum pt_bsdf_kind or pt_material_kind */
+    int32_t remap_roughness;     /* GGX alpha = sqrt(roughness) as in pbrt-v4; 0: alpha = roughness */
+    int32_t conductor_by_colour; /* conductor (or base of a coated one) given by reflectance instead of eta and k */
+    int32_t bump;                /* number of the displacement texture (scene units), 0 = none */
+    int32_t normal_map;          /* number of a texture with rgb = (n + 1)/2 in tangent space, 0 = none */
+    int32_t mix_a, mix_b;        /* ids of materials, MIX only; smaller than this one's */
+    struct pt_input mix_amount;  /* float: share of mix_b */
     struct pt_input reflectance, transmittance;
     struct pt_input roughness_u, roughness_v;
     struct pt_input base_roughness_u, base_roughness_v; /* coated conductor: the metal */
     struct pt_input eta_rgb, k_rgb;                     /* conductor */
     struct pt_input thickness, g, albedo;               /* coatings */
-    float eta;                    /* dielectric interface, inside / outside */
-    const float *coat_table;      /* see pt_bsdf.coat_table; made by shade/, in the arena or static; NULL = none */
+    float eta;                                          /* dielectric interface, inside / outside */
+    const float *coat_table; /* see pt_bsdf.coat_table; made by shade/, in the arena or static; NULL = none */
 };
 
 #endif

@@ -32,18 +32,18 @@ enum pt_camera_kind { PT_CAMERA_PERSPECTIVE, PT_CAMERA_ORTHOGRAPHIC };
 
 struct pt_camera {
     /* filled by the builder */
-    int32_t kind;               /* enum pt_camera_kind */
-    int32_t width, height;      /* of the full image, pixels */
-    float fov_deg;              /* perspective: full angle over the screen coordinate range [-1, 1] */
-    float screen[4];            /* x0, x1, y0, y1 of the screen window; short side is [-1, 1] by default; y up */
-    float lens_radius;          /* scene units; 0 = pinhole */
-    float focal_distance;       /* scene units along +z of the camera */
+    int32_t kind;                 /* enum pt_camera_kind */
+    int32_t width, height;        /* of the full image, pixels */
+    float fov_deg;                /* perspective: full angle over the screen coordinate range [-1, 1] */
+    float screen[4];              /* x0, x1, y0, y1 of the screen window; short side is [-1, 1] by default; y up */
+    float lens_radius;            /* scene units; 0 = pinhole */
+    float focal_distance;         /* scene units along +z of the camera */
     struct pt_mat34 to_render[2]; /* camera (+x right, +y up, +z forward; may be left-handed) → render, at shutter open/close
                                      */
-    int32_t animated;           /* to_render[1] counts */
-    int32_t medium;             /* the camera lies in it, -1 = vacuum */
+    int32_t animated;             /* to_render[1] counts */
+    int32_t medium;               /* the camera lies in it, -1 = vacuum */
     /* derived by pt_camera_init */
-    float x0, dx, y0, dy;       /* z = 1 (perspective) or z = 0 (orthographic) plane: x = x0 + dx·raster_x, likewise y */
+    float x0, dx, y0, dy; /* z = 1 (perspective) or z = 0 (orthographic) plane: x = x0 + dx·raster_x, likewise y */
 };
 
 /* --- textures --------------------------------------------------------------------------------------------------------- */
@@ -53,11 +53,11 @@ enum pt_pixel_type { PT_PIXEL_U8_SRGB, PT_PIXEL_U8_LINEAR, PT_PIXEL_FLOAT };
 
 /* An image in memory, row 0 on top. Shared by textures that name the same file with the same encoding. */
 struct pt_image_map {
-    int32_t width, height;   /* >= 1 */
-    int32_t channels;        /* 1, 3 or 4 (rgb + alpha), interleaved */
-    int32_t type;            /* enum pt_pixel_type */
-    float gamma;             /* U8_LINEAR only: exponent that linearises; 1 = as is */
-    const void *pixels;      /* width · height · channels values */
+    int32_t width, height; /* >= 1 */
+    int32_t channels;      /* 1, 3 or 4 (rgb + alpha), interleaved */
+    int32_t type;          /* enum pt_pixel_type */
+    float gamma;           /* U8_LINEAR only: exponent that linearises; 1 = as is */
+    const void *pixels;    /* width · height · channels values */
 };
 
 enum pt_texture_kind {
@@ -70,21 +70,21 @@ enum pt_texture_kind {
 };
 
 struct pt_texture {
-    int32_t kind;            /* enum pt_texture_kind */
-    int32_t image;           /* id, IMAGE only */
-    int32_t wrap;            /* enum pt_wrap, IMAGE only */
-    int32_t invert;          /* IMAGE only: 1 - value, before scale; never below 0 */
-    int32_t channel;         /* IMAGE: 0 = colour (rgb or grey); read as a float: -1 = average of rgb, 3 = alpha */
-    float scale;             /* IMAGE only */
-    float su, sv, du, dv;    /* s = su·u + du, t = sv·v + dv */
-    struct pt_input in[4];   /* numbers below this texture's own: the array is in dependency order */
+    int32_t kind;          /* enum pt_texture_kind */
+    int32_t image;         /* id, IMAGE only */
+    int32_t wrap;          /* enum pt_wrap, IMAGE only */
+    int32_t invert;        /* IMAGE only: 1 - value, before scale; never below 0 */
+    int32_t channel;       /* IMAGE: 0 = colour (rgb or grey); read as a float: -1 = average of rgb, 3 = alpha */
+    float scale;           /* IMAGE only */
+    float su, sv, du, dv;  /* s = su·u + du, t = sv·v + dv */
+    struct pt_input in[4]; /* numbers below this texture's own: the array is in dependency order */
 };
 
 /* --- shapes ----------------------------------------------------------------------------------------------------------- */
 
 /* All that a hit reads of a corner lies in one cache line. */
 struct pt_vertex {
-    pt_vec3 p, n;              /* n: shading normal, any length, already negated for a shape with reverse orientation */
+    pt_vec3 p, n; /* n: shading normal, any length, already negated for a shape with reverse orientation */
     float u, v;
 };
 _Static_assert(sizeof(struct pt_vertex) == 32, "a vertex is half a cache line");
@@ -92,33 +92,33 @@ _Static_assert(sizeof(struct pt_vertex) == 32, "a vertex is half a cache line");
 struct pt_mesh {
     uint32_t vertex_count, triangle_count;
     const struct pt_vertex *vertices; /* [vertex_count], each within one cache line */
-    const uint32_t *indices;   /* [triangle_count][3], each < vertex_count */
-    int32_t has_normals;       /* they decide the side of the geometric normal */
-    int32_t has_uvs;           /* else (0,0), (1,0), (1,1) at the three corners of a triangle */
+    const uint32_t *indices;          /* [triangle_count][3], each < vertex_count */
+    int32_t has_normals;              /* they decide the side of the geometric normal */
+    int32_t has_uvs;                  /* else (0,0), (1,0), (1,1) at the three corners of a triangle */
 };
 
 enum pt_quadric_kind { PT_QUADRIC_SPHERE, PT_QUADRIC_DISK, PT_QUADRIC_CYLINDER };
 
 struct pt_quadric {
-    int32_t kind;                        /* enum pt_quadric_kind */
-    float radius, inner_radius;          /* inner: disk only */
-    float z_min, z_max;                  /* sphere (clip, -radius and radius = whole), cylinder; disk: height in z_min */
-    float phi_max;                       /* radians, 2π = whole */
+    int32_t kind;                           /* enum pt_quadric_kind */
+    float radius, inner_radius;             /* inner: disk only */
+    float z_min, z_max;                     /* sphere (clip, -radius and radius = whole), cylinder; disk: height in z_min */
+    float phi_max;                          /* radians, 2π = whole */
     struct pt_mat34 to_render, from_render; /* quadric's own space ↔ render (or the object's) space */
 };
 
 enum pt_shape_kind { PT_SHAPE_MESH, PT_SHAPE_QUADRIC };
 
 struct pt_shape {
-    int32_t kind;              /* enum pt_shape_kind */
-    int32_t data;              /* id in meshes or quadrics */
-    int32_t material;          /* id, never -1 */
-    int32_t light;             /* id of the area light it carries, -1 = none; always -1 in objects */
+    int32_t kind;                  /* enum pt_shape_kind */
+    int32_t data;                  /* id in meshes or quadrics */
+    int32_t material;              /* id, never -1 */
+    int32_t light;                 /* id of the area light it carries, -1 = none; always -1 in objects */
     int32_t medium_in, medium_out; /* on the side against / along the geometric normal; equal = the ray keeps its medium */
-    int32_t flip_normal;       /* the geometric normal is against the right-hand rule (reverse orientation XOR a transform
+    int32_t flip_normal;   /* the geometric normal is against the right-hand rule (reverse orientation XOR a transform
                                   that swaps handedness): pbrt's meaning for lights and media */
-    int32_t has_alpha;         /* `alpha` is not constant 1 */
-    struct pt_input alpha;     /* float: probability that a hit counts */
+    int32_t has_alpha;     /* `alpha` is not constant 1 */
+    struct pt_input alpha; /* float: probability that a hit counts */
 };
 
 /* A group of shapes that instances place; its shapes are consecutive and in the object's own space. */
@@ -128,15 +128,15 @@ struct pt_object {
 /* A shape that moves by itself is an object of one shape with one animated instance. */
 struct pt_instance {
     int32_t object;
-    int32_t animated;               /* to_render[1] counts: interpolated as translation, rotation (slerp), scale over the
+    int32_t animated;             /* to_render[1] counts: interpolated as translation, rotation (slerp), scale over the
                                        shutter */
-    struct pt_mat34 to_render[2];   /* object → render at shutter open and close */
+    struct pt_mat34 to_render[2]; /* object → render at shutter open and close */
 };
 
 /* --- lights ----------------------------------------------------------------------------------------------------------- */
 
 enum pt_light_kind {
-    PT_LIGHT_AREA,          /* every shape that names it */
+    PT_LIGHT_AREA, /* every shape that names it */
     PT_LIGHT_ENV_CONSTANT,
     PT_LIGHT_ENV_IMAGE,
     PT_LIGHT_DISTANT,
@@ -147,22 +147,22 @@ enum pt_env_map { PT_ENV_LATLONG, PT_ENV_EQUAL_AREA };
 
 struct pt_light {
     /* filled by the builder */
-    int32_t kind;              /* enum pt_light_kind */
-    int32_t two_sided;         /* AREA */
-    int32_t shape;             /* AREA: the shape; one light per shape */
-    int32_t image;             /* ENV_IMAGE: id of a FLOAT image map of 3 channels */
-    int32_t mapping;           /* ENV_IMAGE: enum pt_env_map. LATLONG: z up, u = φ/2π from +x, v = θ/π from +z (row 0) */
-    pt_vec3 emission;          /* AREA, ENV: radiance (ENV_IMAGE: factor on the image); POINT, SPOT: intensity W/sr;
+    int32_t kind;      /* enum pt_light_kind */
+    int32_t two_sided; /* AREA */
+    int32_t shape;     /* AREA: the shape; one light per shape */
+    int32_t image;     /* ENV_IMAGE: id of a FLOAT image map of 3 channels */
+    int32_t mapping;   /* ENV_IMAGE: enum pt_env_map. LATLONG: z up, u = φ/2π from +x, v = θ/π from +z (row 0) */
+    pt_vec3 emission;  /* AREA, ENV: radiance (ENV_IMAGE: factor on the image); POINT, SPOT: intensity W/sr;
                                   DISTANT: irradiance on a surface facing it. All scales applied */
-    pt_vec3 position;          /* POINT, SPOT */
-    pt_vec3 direction;         /* SPOT: axis; DISTANT: the way the light travels; unit */
-    float cos_total, cos_start; /* SPOT: full darkness beyond, full light within */
-    struct pt_mat34 from_render; /* ENV_IMAGE: render → light space, rotation only */
-    int32_t has_portal;        /* ENV: … through which its light mostly comes */
+    pt_vec3 position;  /* POINT, SPOT */
+    pt_vec3 direction; /* SPOT: axis; DISTANT: the way the light travels; unit */
+    float cos_total, cos_start;         /* SPOT: full darkness beyond, full light within */
+    struct pt_mat34 from_render;        /* ENV_IMAGE: render → light space, rotation only */
+    int32_t has_portal;                 /* ENV: … through which its light mostly comes */
     pt_vec3 portal, portal_u, portal_v; /* a corner of it and its edges, render space */
     /* derived by pt_lights_build */
-    int32_t first_emitter;     /* AREA: emitter of primitive 0 */
-    float emitter_pmf;         /* other kinds: probability that next-event estimation selects this light */
+    int32_t first_emitter; /* AREA: emitter of primitive 0 */
+    float emitter_pmf;     /* other kinds: probability that next-event estimation selects this light */
 };
 
 /* What next-event estimation selects: a whole light, or one triangle of an area light. Derived by pt_lights_build. */
@@ -189,27 +189,27 @@ struct pt_light_node {
     float radius[PT_LIGHT_FAN];                                                   /* of it, > 0 */
     float axis_x[PT_LIGHT_FAN], axis_y[PT_LIGHT_FAN], axis_z[PT_LIGHT_FAN];       /* unit, of a cone around all normals */
     float cos_normals[PT_LIGHT_FAN], sin_normals[PT_LIGHT_FAN];                   /* its half angle */
-    float cos_emission[PT_LIGHT_FAN];    /* nothing is emitted further than this off a normal */
-    float intensity[PT_LIGHT_FAN];       /* luminance times projected area, share of all children; 0: no child */
-    int32_t two_sided[PT_LIGHT_FAN];     /* -1 or 0: a mask */
-    int32_t child[PT_LIGHT_FAN];         /* a node, or ~emitter */
-    int32_t parent;                      /* its place, PT_LIGHT_FAN · node + slot; -1 = this is the root */
+    float cos_emission[PT_LIGHT_FAN]; /* nothing is emitted further than this off a normal */
+    float intensity[PT_LIGHT_FAN];    /* luminance times projected area, share of all children; 0: no child */
+    int32_t two_sided[PT_LIGHT_FAN];  /* -1 or 0: a mask */
+    int32_t child[PT_LIGHT_FAN];      /* a node, or ~emitter */
+    int32_t parent;                   /* its place, PT_LIGHT_FAN · node + slot; -1 = this is the root */
 };
 
 struct pt_light_tree {
-    struct pt_light_node *nodes;  /* [0] is the root */
+    struct pt_light_node *nodes; /* [0] is the root */
     int32_t node_count;
-    int32_t *places;              /* [emitter_count] PT_LIGHT_FAN · node + slot, -1 = in no node */
-    float share;                  /* probability that the hierarchy is asked rather than a light at infinity */
-    int32_t *far;                 /* emitters at infinity, each as likely as the others */
+    int32_t *places; /* [emitter_count] PT_LIGHT_FAN · node + slot, -1 = in no node */
+    float share;     /* probability that the hierarchy is asked rather than a light at infinity */
+    int32_t *far;    /* emitters at infinity, each as likely as the others */
     int32_t far_count;
 };
 
 /* 2D piecewise-constant distribution over an environment image as cumulative sums from 0 to 1; derived. */
 struct pt_env_distribution {
     int32_t width, height;
-    const float *rows;         /* [height + 1] */
-    const float *columns;      /* [height][width + 1] */
+    const float *rows;    /* [height + 1] */
+    const float *columns; /* [height][width + 1] */
     /* where to start looking in a cumulative sum of n cells for u: at guide[floor(u · n)] (Chen & Asau 1974) */
     const uint16_t *row_guide;    /* [height] */
     const uint16_t *column_guide; /* [height][width] */
@@ -220,30 +220,30 @@ struct pt_env_distribution {
 enum pt_medium_kind { PT_MEDIUM_HOMOGENEOUS, PT_MEDIUM_GRID };
 
 struct pt_medium {
-    int32_t kind;               /* enum pt_medium_kind */
-    float g;                    /* Henyey–Greenstein asymmetry */
-    pt_vec3 sigma_a, sigma_s;   /* 1 / scene unit, scale applied; GRID: at density 1 */
-    pt_vec3 emission;           /* radiance emitted per unit absorption (σa·Le), GRID: at density 1 */
+    int32_t kind;             /* enum pt_medium_kind */
+    float g;                  /* Henyey–Greenstein asymmetry */
+    pt_vec3 sigma_a, sigma_s; /* 1 / scene unit, scale applied; GRID: at density 1 */
+    pt_vec3 emission;         /* radiance emitted per unit absorption (σa·Le), GRID: at density 1 */
     /* GRID: density at the centres of cells of the box [0,1]³ of the grid's space, trilinear, 0 outside */
     int32_t nx, ny, nz;
-    const float *density;       /* [nz][ny][nx], >= 0 */
+    const float *density;        /* [nz][ny][nx], >= 0 */
     struct pt_mat34 from_render; /* render → grid's unit box */
-    int32_t mx, my, mz;         /* majorant cells; made by shade/medium */
-    const float *majorant;      /* [mz][my][mx] largest density in each */
+    int32_t mx, my, mz;          /* majorant cells; made by shade/medium */
+    const float *majorant;       /* [mz][my][mx] largest density in each */
 };
 
 /* --- the scene -------------------------------------------------------------------------------------------------------- */
 
 /* Why an effect is in the scene's set, for --explain. */
 struct pt_effect_reason {
-    int on;           /* in the set */
-    int line;         /* first scene line that asks for it, 0 if forced or none */
+    int on;   /* in the set */
+    int line; /* first scene line that asks for it, 0 if forced or none */
     char file[256];
 };
 
 struct pt_scene_stats {
     long long triangles, quadrics, instances, lights, materials, textures;
-    long long bytes;          /* memory of the scene, acceleration structure included */
+    long long bytes; /* memory of the scene, acceleration structure included */
     double parse_s, build_s, accel_s, texture_s;
 };
 
@@ -256,26 +256,26 @@ struct pt_scene {
     struct pt_material *materials;
     struct pt_mesh *meshes;
     struct pt_quadric *quadrics;
-    struct pt_shape *shapes;       /* [0, world_shape_count): in render space; then the objects' */
+    struct pt_shape *shapes; /* [0, world_shape_count): in render space; then the objects' */
     struct pt_object *objects;
     struct pt_instance *instances;
     struct pt_light *lights;
     struct pt_medium *media;
     int32_t image_count, texture_count, material_count, mesh_count, quadric_count;
     int32_t shape_count, world_shape_count, object_count, instance_count, light_count, medium_count;
-    int32_t light_selection;       /* enum pt_light_selection: what is wanted where there are enough lights */
-    float radiance_scale;          /* the film's exposure: factor from radiance to pixel value */
-    pt_effects effects;            /* needed or forced */
+    int32_t light_selection; /* enum pt_light_selection: what is wanted where there are enough lights */
+    float radiance_scale;    /* the film's exposure: factor from radiance to pixel value */
+    pt_effects effects;      /* needed or forced */
 
     /* derived by pt_accel_build */
-    struct pt_accel *accel;        /* owns; released by pt_accel_release */
+    struct pt_accel *accel;         /* owns; released by pt_accel_release */
     pt_vec3 bounds_min, bounds_max; /* of all shapes; 0 when there are none */
 
     /* derived by pt_lights_build */
     struct pt_emitter *emitters;
     int32_t emitter_count;
     struct pt_light_tree *light_tree; /* NULL: emitters are selected by power */
-    int32_t *env_lights;           /* ids of ENV_* lights */
+    int32_t *env_lights;              /* ids of ENV_* lights */
     int32_t env_light_count;
     struct pt_env_distribution *env_distributions; /* [light_count] or NULL; used for ENV_IMAGE */
 

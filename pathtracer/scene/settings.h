@@ -10,7 +10,7 @@
 /* X(ID, word) */
 #define PT_SAMPLERS(X) X(INDEPENDENT, "independent") X(SOBOL, "sobol")
 #define PT_STRATEGIES(X) \
-    X(MIS, "path") /* next-event estimation and BSDF sampling, power heuristic */ \
+    X(MIS, "path")            /* next-event estimation and BSDF sampling, power heuristic */ \
     X(BSDF_ONLY, "bsdf-only") /* brute force: emission is met by BSDF sampling only; the oracle of tests */
 #define PT_LIGHT_SELECTIONS(X) \
     X(HIERARCHY, "hierarchy") /* by distance, orientation and cosine too, where that is worth its time; else by power */ \
@@ -28,20 +28,20 @@ enum pt_filter_kind { PT_FILTERS(PT_FILTER_ID) };
 
 /* The words by the enumerations above, NULL after the last; and all of them as one text, "|box|triangle|gaussian". */
 extern const char *const pt_sampler_words[], *const pt_strategy_words[], *const pt_light_selection_words[],
-    *const pt_filter_words[];
+                                                                             *const pt_filter_words[];
 #define PT_WORD_OR(id, word) "|" word
 
 struct pt_integrator {
-    int32_t max_depth;      /* most surface/medium bounces; < 0 = unlimited */
-    int32_t rr_depth;       /* Russian roulette from this bounce on */
-    int32_t sampler;        /* enum pt_sampler_kind */
-    int32_t strategy;       /* enum pt_strategy */
-    int32_t filter;         /* enum pt_filter_kind: sampled by importance, so no sample touches a neighbouring pixel */
+    int32_t max_depth;        /* most surface/medium bounces; < 0 = unlimited */
+    int32_t rr_depth;         /* Russian roulette from this bounce on */
+    int32_t sampler;          /* enum pt_sampler_kind */
+    int32_t strategy;         /* enum pt_strategy */
+    int32_t filter;           /* enum pt_filter_kind: sampled by importance, so no sample touches a neighbouring pixel */
     float filter_x, filter_y; /* radii in pixels; 0.5 = box of one pixel */
-    float filter_sigma;     /* Gaussian only, pixels */
-    float max_component;    /* radiance clamp of one sample (pbrt maxcomponentvalue); INFINITY = none */
+    float filter_sigma;       /* Gaussian only, pixels */
+    float max_component;      /* radiance clamp of one sample (pbrt maxcomponentvalue); INFINITY = none */
     uint32_t seed;
-    int32_t want_aux;       /* fill albedo, normal_world, depth */
+    int32_t want_aux; /* fill albedo, normal_world, depth */
 };
 
 #endif

@@ -24,8 +24,10 @@ static inline pt_vec3 v3_mul(pt_vec3 a, pt_vec3 b) { return (pt_vec3){a.x * b.x,
 static inline pt_vec3 v3_scale(pt_vec3 a, float s) { return (pt_vec3){a.x * s, a.y * s, a.z * s}; }
 static inline pt_vec3 v3_neg(pt_vec3 a) { return (pt_vec3){-a.x, -a.y, -a.z}; }
 /* a + s b */
-static inline pt_vec3 v3_madd(pt_vec3 a, float s, pt_vec3 b) { return (pt_vec3){a.x + s * b.x, a.y + s * b.y,
-                                                                                a.z + s * b.z}; }
+static inline pt_vec3 v3_madd(pt_vec3 a, float s, pt_vec3 b)
+{
+    return (pt_vec3){a.x + s * b.x, a.y + s * b.y, a.z + s * b.z};
+}
 static inline float v3_dot(pt_vec3 a, pt_vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 static inline pt_vec3 v3_cross(pt_vec3 a, pt_vec3 b)
 {

@@ -24,24 +24,24 @@
 
 /* Which fields count depends on kind; the others may hold anything. */
 struct pt_bsdf {
-    int32_t kind;             /* enum pt_bsdf_kind */
-    float alpha_x, alpha_y;   /* GGX roughness of the (outer) interface, after any remapping; 0 = smooth */
-    float eta;                /* index of refraction inside / outside along +z of the (outer) interface; 1 = matched */
-    pt_vec3 reflectance;      /* diffuse albedo, or conductor reflectance when given as colour */
-    pt_vec3 transmittance;    /* diffuse transmission */
-    pt_vec3 eta_rgb, k_rgb;   /* complex index of the conductor relative to the medium it lies in */
+    int32_t kind;           /* enum pt_bsdf_kind */
+    float alpha_x, alpha_y; /* GGX roughness of the (outer) interface, after any remapping; 0 = smooth */
+    float eta;              /* index of refraction inside / outside along +z of the (outer) interface; 1 = matched */
+    pt_vec3 reflectance;    /* diffuse albedo, or conductor reflectance when given as colour */
+    pt_vec3 transmittance;  /* diffuse transmission */
+    pt_vec3 eta_rgb, k_rgb; /* complex index of the conductor relative to the medium it lies in */
     float base_alpha_x, base_alpha_y; /* coated conductor: roughness of the metal */
-    float thickness, g;       /* coatings: thickness of the layer, Henyey–Greenstein asymmetry inside */
-    pt_vec3 albedo;           /* coatings: single-scattering albedo of the layer; black = clear */
-    uint32_t walk_key;        /* coatings: any number, new for every path vertex (models that are evaluated stochastically)
+    float thickness, g;               /* coatings: thickness of the layer, Henyey–Greenstein asymmetry inside */
+    pt_vec3 albedo;                   /* coatings: single-scattering albedo of the layer; black = clear */
+    uint32_t walk_key;       /* coatings: any number, new for every path vertex (models that are evaluated stochastically)
                                  */
-    const float *coat_table;  /* borrows until scene release: table of the coating (coat_table.h), may be NULL but for coated
+    const float *coat_table; /* borrows until scene release: table of the coating (coat_table.h), may be NULL but for coated
                                  diffuse */
 };
 
 enum {
-    PT_SCATTER_DELTA = 1,    /* pdf is a density on a discrete set: no MIS, no next-event estimation */
-    PT_SCATTER_TRANSMIT = 2  /* wi on the other side */
+    PT_SCATTER_DELTA = 1,   /* pdf is a density on a discrete set: no MIS, no next-event estimation */
+    PT_SCATTER_TRANSMIT = 2 /* wi on the other side */
 };
 
 struct pt_bsdf_sample {
@@ -66,12 +66,18 @@ enum pt_bsdf_read_kind {
     PT_READ_IGNORED         /* changes nothing here; several names with spaces between them */
 };
 struct pt_bsdf_read {
-    int kind;             /* enum pt_bsdf_read_kind */
+    int kind; /* enum pt_bsdf_read_kind */
     const char *name;
-    double fallback;      /* when the file does not say */
-    size_t field;         /* offset of a pt_input in pt_material */
+    double fallback; /* when the file does not say */
+    size_t field;    /* offset of a pt_input in pt_material */
 };
-#define PT_READ(kind, name, fallback) {PT_READ_##kind, name, fallback, 0}
-#define PT_READ_INTO(field, kind, name, fallback) {PT_READ_##kind, name, fallback, offsetof(struct pt_material, field)}
+#define PT_READ(kind, name, fallback) \
+    { \
+        PT_READ_##kind, name, fallback, 0 \
+    }
+#define PT_READ_INTO(field, kind, name, fallback) \
+    { \
+        PT_READ_##kind, name, fallback, offsetof(struct pt_material, field) \
+    }
 
 #endif

@@ -4,9 +4,12 @@
 
 #include "shade/coat_walk.h"
 
-static const struct pt_bsdf_read pt_coated_conductor_reads[] = {
-    PT_READ(ROUGHNESS, "interface.", 0), PT_READ(BASE_ROUGHNESS, "conductor.", 0), PT_READ(INDEX, "interface.eta", 1.5),
-    PT_READ(METAL, "conductor.", 0), PT_COAT_READS, {0}};
+static const struct pt_bsdf_read pt_coated_conductor_reads[] = {PT_READ(ROUGHNESS, "interface.", 0),
+                                                                PT_READ(BASE_ROUGHNESS, "conductor.", 0),
+                                                                PT_READ(INDEX, "interface.eta", 1.5),
+                                                                PT_READ(METAL, "conductor.", 0),
+                                                                PT_COAT_READS,
+                                                                {0}};
 
 static inline void pt_coated_conductor_closure(pt_effects fx, const struct pt_scene *scene, const struct pt_material *m,
                                                const struct pt_surface *s, struct pt_bsdf *b)

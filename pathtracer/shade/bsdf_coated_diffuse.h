@@ -17,9 +17,11 @@
 #include "shade/coat_table.h"
 #include "shade/coat_walk.h"
 
-static const struct pt_bsdf_read pt_coated_diffuse_reads[] = {
-    PT_READ_INTO(reflectance, COLOUR, "reflectance", 0.5), PT_READ(ROUGHNESS, "", 0), PT_READ(INDEX, "eta", 1.5),
-        PT_COAT_READS, {0}};
+static const struct pt_bsdf_read pt_coated_diffuse_reads[] = {PT_READ_INTO(reflectance, COLOUR, "reflectance", 0.5),
+                                                              PT_READ(ROUGHNESS, "", 0),
+                                                              PT_READ(INDEX, "eta", 1.5),
+                                                              PT_COAT_READS,
+                                                              {0}};
 
 static inline void pt_coated_diffuse_closure(pt_effects fx, const struct pt_scene *scene, const struct pt_material *m,
                                              const struct pt_surface *s, struct pt_bsdf *b)

@@ -60,8 +60,8 @@ static inline int pt_conductor_sample_rough(const struct pt_bsdf *b, pt_vec3 wo,
     if (!(wo.z * wi.z > 0.0f))
         return 0;
     out->wi = v3_norm(wi);
-    out->weight = v3_scale(pt_fresnel_conductor_rgb(fabsf(om), b->eta_rgb, b->k_rgb),
-                           pt_ggx_g2_over_g1(wo, out->wi, ax, ay));
+    out->weight =
+        v3_scale(pt_fresnel_conductor_rgb(fabsf(om), b->eta_rgb, b->k_rgb), pt_ggx_g2_over_g1(wo, out->wi, ax, ay));
     out->pdf_solid = 0.5f * pt_ggx_d(m, ax, ay) / (fabsf(wo.z) + pt_ggx_stretch(wo, ax, ay));
     out->eta_scale = 1.0f;
     out->flags = 0;

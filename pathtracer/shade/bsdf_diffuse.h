@@ -8,9 +8,7 @@
 #include "shade/warp.h"
 
 static const struct pt_bsdf_read pt_diffuse_reads[] = {
-    PT_READ_INTO(reflectance, COLOUR, "reflectance", 0.5),
-    PT_READ(UNSUPPORTED, "sigma", 0),
-    {0}};
+    PT_READ_INTO(reflectance, COLOUR, "reflectance", 0.5), PT_READ(UNSUPPORTED, "sigma", 0), {0}};
 
 static inline void pt_diffuse_closure(pt_effects fx, const struct pt_scene *scene, const struct pt_material *m,
                                       const struct pt_surface *s, struct pt_bsdf *b)

@@ -51,7 +51,7 @@ static inline int pt_bsdf_has_smooth(pt_effects fx, const struct pt_bsdf *b)
 static inline int pt_bsdf_transmits(pt_effects fx, const struct pt_bsdf *b)
 {
 #define PT_BSDF_CASE(id, name, file_name, words, needs) \
-    if (((needs) & PT_FX_TRANSMISSION) && PT_BSDF_IS(id, needs)) \
+    if (((needs)&PT_FX_TRANSMISSION) && PT_BSDF_IS(id, needs)) \
         return 1;
     PT_BSDFS(PT_BSDF_CASE)
 #undef PT_BSDF_CASE

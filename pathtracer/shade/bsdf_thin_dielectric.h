@@ -5,9 +5,7 @@
 #include "shade/inputs.h"
 
 static const struct pt_bsdf_read pt_thin_dielectric_reads[] = {
-    PT_READ(INDEX, "eta", 1.5),
-    PT_READ(IGNORED, "roughness uroughness vroughness remaproughness", 0),
-    {0}};
+    PT_READ(INDEX, "eta", 1.5), PT_READ(IGNORED, "roughness uroughness vroughness remaproughness", 0), {0}};
 
 static inline void pt_thin_dielectric_closure(pt_effects fx, const struct pt_scene *scene, const struct pt_material *m,
                                               const struct pt_surface *s, struct pt_bsdf *b)

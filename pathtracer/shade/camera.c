@@ -83,9 +83,9 @@ void pt_camera_transform_at(const struct pt_camera *camera, float time, struct p
     for (int i = 0; i < 6; i++)
         s[i] = (1.0f - time) * a.stretch[i] + time * b.stretch[i];
     float w = q[0], x = q[1], y = q[2], z = q[3];
-    float r[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w),
-                  2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w),
-                  2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)};
+    float r[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - z * w),     2 * (x * z + y * w),
+                  2 * (x * y + z * w),     1 - 2 * (x * x + z * z), 2 * (y * z - x * w),
+                  2 * (x * z - y * w),     2 * (y * z + x * w),     1 - 2 * (x * x + y * y)};
     pt_vec3 t = v3_madd(v3_scale(a.translation, 1.0f - time), time, b.translation);
     const float translation[3] = {t.x, t.y, t.z};
     for (int i = 0; i < 3; i++) {
@@ -120,9 +120,9 @@ static float tent(float u, float r)
 static float erf_inverse(float x)
 {
     static const float central[] = {2.81022636e-08f, 3.43273939e-07f, -3.5233877e-06f, -4.39150654e-06f, 0.00021858087f,
-                                    -0.00125372503f, -0.00417768164f, 0.246640727f, 1.50140941f};
+                                    -0.00125372503f, -0.00417768164f, 0.246640727f,    1.50140941f};
     static const float tail[] = {-0.000200214257f, 0.000100950558f, 0.00134934322f, -0.00367342844f, 0.00573950773f,
-                                 -0.0076224613f, 0.00943887047f, 1.00167406f, 2.83297682f};
+                                 -0.0076224613f,   0.00943887047f,  1.00167406f,    2.83297682f};
     float w = -logf((1.0f - x) * (1.0f + x));
     const float *c = w < 5.0f ? central : tail;
     w = w < 5.0f ? w - 2.5f : sqrtf(w) - 3.0f;
@@ -150,8 +150,6 @@ void pt_filter_sample(const struct pt_integrator *settings, float u0, float u1, 
         *dx = truncated_gaussian(u0, settings->filter_x, settings->filter_sigma);
         *dy = truncated_gaussian(u1, settings->filter_y, settings->filter_sigma);
         break;
-    default:
-        *dx = (2.0f * u0 - 1.0f) * settings->filter_x;
-        *dy = (2.0f * u1 - 1.0f) * settings->filter_y;
+    default: *dx = (2.0f * u0 - 1.0f) * settings->filter_x; *dy = (2.0f * u1 - 1.0f) * settings->filter_y;
     }
 }

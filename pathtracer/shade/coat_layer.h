@@ -27,8 +27,11 @@ struct pt_layer_ray {
 static inline struct pt_bsdf pt_layer_base(const struct pt_bsdf *b)
 {
     struct pt_bsdf base = {.kind = b->kind == PT_BSDF_COATED_CONDUCTOR ? PT_BSDF_CONDUCTOR : PT_BSDF_DIFFUSE,
-                           .alpha_x = b->base_alpha_x, .alpha_y = b->base_alpha_y, .reflectance = b->reflectance,
-                           .eta_rgb = b->eta_rgb, .k_rgb = b->k_rgb};
+                           .alpha_x = b->base_alpha_x,
+                           .alpha_y = b->base_alpha_y,
+                           .reflectance = b->reflectance,
+                           .eta_rgb = b->eta_rgb,
+                           .k_rgb = b->k_rgb};
     return base;
 }
 
@@ -50,8 +53,7 @@ static inline int pt_layer_transmit(const struct pt_bsdf *b, pt_vec3 wo, float u
     if (!smooth) {
         float denom = im + om * inv_etap;
         out->weight *= pt_ggx_g2_over_g1(wo, out->wi, b->alpha_x, b->alpha_y);
-        out->pdf_solid =
-            pt_ggx_visible_pdf(wo, m, b->alpha_x, b->alpha_y) * fabsf(im) / fmaxf(denom * denom, 1e-20f);
+        out->pdf_solid = pt_ggx_visible_pdf(wo, m, b->alpha_x, b->alpha_y) * fabsf(im) / fmaxf(denom * denom, 1e-20f);
     }
     return 1;
 }
@@ -103,11 +105,11 @@ static inline float pt_layer_mis(float a, float b)
 
 /* State of one walk; the interface lies at z = thickness, the base at 0. */
 struct pt_layer_walk {
-    const struct pt_bsdf *top;   /* eta and alpha of the interface */
+    const struct pt_bsdf *top; /* eta and alpha of the interface */
     struct pt_bsdf base;
-    struct pt_layer_ray exit;    /* from the far end: wi refracted into the layer */
-    pt_vec3 wi;                  /* outside */
-    pt_vec3 w, beta, f;          /* current direction (along the walk), throughput, result */
+    struct pt_layer_ray exit; /* from the far end: wi refracted into the layer */
+    pt_vec3 wi;               /* outside */
+    pt_vec3 w, beta, f;       /* current direction (along the walk), throughput, result */
     float z;
     int top_delta;
 };
@@ -116,8 +118,8 @@ struct pt_layer_walk {
 static inline void pt_layer_connect(struct pt_layer_walk *k, pt_vec3 scattered, float pdf)
 {
     float weight = k->top_delta ? 1.0f : pt_layer_mis(k->exit.pdf_solid, pdf);
-    float through = weight * k->exit.weight / fabsf(k->exit.wi.z) *
-                    pt_layer_extinction(k->top->thickness - k->z, k->exit.wi.z);
+    float through =
+        weight * k->exit.weight / fabsf(k->exit.wi.z) * pt_layer_extinction(k->top->thickness - k->z, k->exit.wi.z);
     k->f = v3_madd(k->f, through, v3_mul(k->beta, scattered));
 }
 

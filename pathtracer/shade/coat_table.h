@@ -15,7 +15,7 @@
 enum {
     PT_COAT_NODES = 32,
     PT_COAT_ROW = 1 + 2 * PT_COAT_NODES,
-    PT_COAT_HEADER = 3,      /* rows, smallest sqrt(alpha), rows - 1 over the range of sqrt(alpha) */
+    PT_COAT_HEADER = 3,        /* rows, smallest sqrt(alpha), rows - 1 over the range of sqrt(alpha) */
     PT_COAT_TEXTURED_ROWS = 12 /* rows when the roughness varies over the surface */
 };
 

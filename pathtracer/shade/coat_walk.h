@@ -80,19 +80,19 @@ static inline int pt_coat_walk_is_delta(const struct pt_bsdf *b)
 
 /* wo.z, wi.z > 0 */
 static inline float pt_coat_walk_pdf(const struct pt_bsdf *b, const struct pt_coat_lobes *l, pt_vec3 wo, pt_vec3 wi,
-                                       pt_vec3 m)
+                                     pt_vec3 m)
 {
     float pdf = l->cosine * wi.z * PT_INV_PI;
     if (!pt_dielectric_is_smooth(b))
-        pdf += l->interface * 0.5f * pt_ggx_d(m, b->alpha_x, b->alpha_y) /
-               (wo.z + pt_ggx_stretch(wo, b->alpha_x, b->alpha_y));
+        pdf +=
+            l->interface * 0.5f * pt_ggx_d(m, b->alpha_x, b->alpha_y) / (wo.z + pt_ggx_stretch(wo, b->alpha_x, b->alpha_y));
     if (l->metal_x > 0.0f)
         pdf += l->metal * 0.5f * pt_ggx_d(m, l->metal_x, l->metal_y) / (wo.z + pt_ggx_stretch(wo, l->metal_x, l->metal_y));
     return pdf;
 }
 
 __attribute__((noinline, unused)) static pt_vec3 pt_coat_walk_eval(const struct pt_bsdf *b, pt_vec3 wo, pt_vec3 wi,
-                                                                      float *pdf_solid)
+                                                                   float *pdf_solid)
 {
     *pdf_solid = 0.0f;
     if (!(wo.z * wi.z > 0.0f) || pt_coat_walk_is_delta(b))
@@ -127,8 +127,8 @@ static inline pt_vec3 pt_coated_mirror(const struct pt_bsdf *b, float mu)
     return v3_madd(v3_splat(r), t2, sum);
 }
 
-__attribute__((noinline, unused)) static int pt_coat_walk_sample(const struct pt_bsdf *b, pt_vec3 wo, float u_lobe,
-                                                                    float u0, float u1, struct pt_bsdf_sample *out)
+__attribute__((noinline, unused)) static int pt_coat_walk_sample(const struct pt_bsdf *b, pt_vec3 wo, float u_lobe, float u0,
+                                                                 float u1, struct pt_bsdf_sample *out)
 {
     if (wo.z == 0.0f)
         return 0;

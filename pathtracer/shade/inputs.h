@@ -12,10 +12,10 @@
 
 /* A place on a surface. Normals are unit and on the side that pbrt calls outside, whatever side the ray comes from. */
 struct pt_surface {
-    float u, v;          /* texture coordinates */
+    float u, v; /* texture coordinates */
     pt_vec3 n_geometric;
     pt_vec3 n_shading;
-    pt_vec3 dpdu, dpdv;  /* need only be set when pt_material_needs_tangents */
+    pt_vec3 dpdu, dpdv; /* need only be set when pt_material_needs_tangents */
 };
 
 static inline pt_vec3 pt_clamp_unit(pt_vec3 c)

@@ -45,8 +45,8 @@ static float area_of(const struct pt_quadric *q)
 static float area_scale(const struct pt_quadric *q, pt_vec3 n)
 {
     const float *m = q->to_render.m;
-    float det = m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) +
-                m[2] * (m[4] * m[9] - m[5] * m[8]);
+    float det =
+        m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) + m[2] * (m[4] * m[9] - m[5] * m[8]);
     return fabsf(det) * v3_len(pt_mat34_normal(&q->from_render, n));
 }
 
@@ -99,7 +99,7 @@ static int sample_cone(const struct pt_light *light, const struct pt_shape *shap
 {
     pt_vec3 to_centre = v3_sub(centre, p_ref);
     float dist = v3_len(to_centre), h = u0 * one_minus_cos, cos_theta = 1.0f - h, sin2 = h * (2.0f - h),
-        phi = 2.0f * PT_PI * u1;
+          phi = 2.0f * PT_PI * u1;
     float sin_theta = sqrtf(sin2);
     struct pt_frame frame = pt_frame_from_normal(v3_scale(to_centre, 1.0f / dist));
     out->wi = pt_frame_to_world(&frame, v3(sin_theta * cosf(phi), sin_theta * sinf(phi), cos_theta));

@@ -73,19 +73,13 @@ static double power_of(const struct pt_scene *scene, const struct pt_light *ligh
     pt_vec3 d = v3_sub(scene->bounds_max, scene->bounds_min);
     double disk = pi * 0.25 * (double)v3_dot(d, d);
     switch (light->kind) {
-    case PT_LIGHT_AREA:
-        return pi * area * l * (light->two_sided ? 2.0 : 1.0);
+    case PT_LIGHT_AREA: return pi * area * l * (light->two_sided ? 2.0 : 1.0);
     case PT_LIGHT_ENV_IMAGE:
-    case PT_LIGHT_ENV_CONSTANT:
-        return 4.0 * pi * disk * (double)pt_light_env_mean(scene, light);
-    case PT_LIGHT_DISTANT:
-        return disk * l;
-    case PT_LIGHT_SPOT:
-        return 2.0 * pi * l * (1.0 - 0.5 * (double)(light->cos_total + light->cos_start));
-    case PT_LIGHT_POINT:
-        return 4.0 * pi * l;
-    default:
-        return 0.0;
+    case PT_LIGHT_ENV_CONSTANT: return 4.0 * pi * disk * (double)pt_light_env_mean(scene, light);
+    case PT_LIGHT_DISTANT: return disk * l;
+    case PT_LIGHT_SPOT: return 2.0 * pi * l * (1.0 - 0.5 * (double)(light->cos_total + light->cos_start));
+    case PT_LIGHT_POINT: return 4.0 * pi * l;
+    default: return 0.0;
     }
 }
 
@@ -120,8 +114,8 @@ static int by_value(const void *a, const void *b)
 
 /* What the lights at infinity and the others share of the probability. */
 struct shares {
-    double far;  /* of each emitter at infinity that emits at all */
-    double near; /* of all others together */
+    double far;   /* of each emitter at infinity that emits at all */
+    double near;  /* of all others together */
     double power; /* of those */
     int far_count, near_lights;
 };
@@ -153,9 +147,9 @@ static void balance(const struct pt_scene *scene, const struct shares *s, double
         for (int32_t k = 0; k < count; k++)
             sum += w[k];
         for (int32_t k = 0; k < count && sum > 0.0; k++)
-            w[k] = at_infinity(light) ? s->far
-                                      : s->near * (w[k] / s->power * (1.0 - UNIFORM_SHARE) +
-                                                   w[k] / sum * UNIFORM_SHARE / s->near_lights);
+            w[k] = at_infinity(light)
+                       ? s->far
+                       : s->near * (w[k] / s->power * (1.0 - UNIFORM_SHARE) + w[k] / sum * UNIFORM_SHARE / s->near_lights);
     }
 }
 
@@ -164,7 +158,7 @@ static int make_table(struct pt_scene *scene, double *weights, struct pt_arena *
     int32_t n = scene->emitter_count;
     float *q = pt_arena_alloc(scratch, (size_t)n, sizeof *q);
     int32_t *alias = pt_arena_alloc(scratch, (size_t)n, sizeof *alias),
-        *work = pt_arena_alloc(scratch, (size_t)n, sizeof *work);
+            *work = pt_arena_alloc(scratch, (size_t)n, sizeof *work);
     if (!q || !alias || !work)
         return 0;
     double sum = 0.0;
@@ -208,8 +202,8 @@ static int bound_emitter(const struct pt_scene *scene, const struct pt_emitter *
     const struct pt_light *light = &scene->lights[e->light];
     const struct pt_shape *shape = light->kind == PT_LIGHT_AREA ? &scene->shapes[light->shape] : NULL;
     double pi = (double)PT_PI;
-    *out = (struct pt_light_bounds){light->position, light->position, {0.0f, 0.0f, 1.0f}, PT_PI, 0.5f * PT_PI,
-                                    light->two_sided, 0.0};
+    *out = (struct pt_light_bounds){
+        light->position, light->position, {0.0f, 0.0f, 1.0f}, PT_PI, 0.5f * PT_PI, light->two_sided, 0.0};
     if (e->primitive >= 0) {
         pt_vec3 b = v3_add(e->p0, e->e1), c = v3_add(e->p0, e->e2);
         out->lower = least(e->p0, least(b, c));

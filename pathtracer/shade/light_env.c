@@ -91,8 +91,8 @@ static int32_t invert_cdf(const float *cdf, const uint16_t *guide, int32_t n, fl
 static const float *pixel_at(const struct pt_scene *scene, const struct pt_light *light, float s, float t)
 {
     const struct pt_image_map *map = &scene->images[light->image];
-    return (const float *)map->pixels + 3 * ((size_t)cell(t, map->height) * (size_t)map->width + (size_t)cell(s,
-                                                                                                              map->width));
+    return (const float *)map->pixels +
+           3 * ((size_t)cell(t, map->height) * (size_t)map->width + (size_t)cell(s, map->width));
 }
 
 pt_vec3 pt_light_env_image_eval(const struct pt_scene *scene, const struct pt_light *light, pt_vec3 w)

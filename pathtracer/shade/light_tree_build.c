@@ -19,7 +19,7 @@ struct cluster {
 
 struct build {
     const struct pt_light_bounds *bounds;
-    int32_t *order;           /* [count] into bounds */
+    int32_t *order; /* [count] into bounds */
 };
 
 static float angle_between(pt_vec3 a, pt_vec3 b) { return acosf(fminf(1.0f, fmaxf(-1.0f, v3_dot(a, b)))); }
@@ -197,8 +197,7 @@ static int fan_out(const struct build *build, struct cluster all, struct cluster
     while (n < PT_LIGHT_FAN) {
         int dearest = -1;
         for (int k = 0; k < n; k++)
-            if (children[k].end - children[k].begin > 1 &&
-                (dearest < 0 || cost(&children[k]) > cost(&children[dearest])))
+            if (children[k].end - children[k].begin > 1 && (dearest < 0 || cost(&children[k]) > cost(&children[dearest])))
                 dearest = k;
         if (dearest < 0)
             break;

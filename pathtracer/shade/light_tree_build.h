@@ -6,12 +6,12 @@
 
 /* What the hierarchy knows of an emitter. */
 struct pt_light_bounds {
-    pt_vec3 lower, upper;  /* finite */
-    pt_vec3 axis;          /* unit: of the cone around its normals */
-    float normals_rad;     /* half angle of that cone, π = any direction */
-    float emission_rad;    /* nothing is emitted further than this off a normal */
+    pt_vec3 lower, upper; /* finite */
+    pt_vec3 axis;         /* unit: of the cone around its normals */
+    float normals_rad;    /* half angle of that cone, π = any direction */
+    float emission_rad;   /* nothing is emitted further than this off a normal */
     int32_t two_sided;
-    double intensity;      /* > 0: luminance times projected area, greatest over directions */
+    double intensity; /* > 0: luminance times projected area, greatest over directions */
 };
 
 /* Makes tree->nodes and tree->places in `arena` from bounds[k] of emitter ids[k], k < count, of `emitter_count` in all;

@@ -17,8 +17,8 @@ extern _Thread_local unsigned long long pt_medium_queries;
 struct pt_medium_event {
     int32_t scattered; /* 1: a collision scatters at t < t_max; 0: t_max was reached */
     float t;
-    pt_vec3 weight;    /* factor on the path's throughput: σs T / p or T / p; black: the path is over */
-    pt_vec3 emitted;   /* radiance emitted towards the origin along the way, to be multiplied by the throughput before it */
+    pt_vec3 weight;  /* factor on the path's throughput: σs T / p or T / p; black: the path is over */
+    pt_vec3 emitted; /* radiance emitted towards the origin along the way, to be multiplied by the throughput before it */
 };
 
 /* Makes the majorants of grid media in the scene's arena. Call once after media are filled. */

@@ -80,10 +80,10 @@ int pt_medium_grid_build(struct pt_medium *m, struct pt_arena *arena, struct bas
 struct walk {
     pt_vec3 origin, direction; /* in the unit box; t as outside */
     float t, t_end;
-    float next[3], delta[3];   /* t of the next face per axis, t between faces */
+    float next[3], delta[3]; /* t of the next face per axis, t between faces */
     int index[3], step[3], count[3];
-    float majorant;            /* of the current cell, 1/scene unit */
-    float sigma;               /* largest extinction channel at density 1 */
+    float majorant; /* of the current cell, 1/scene unit */
+    float sigma;    /* largest extinction channel at density 1 */
 };
 
 static void walk_load(struct walk *w, const struct pt_medium *m)

@@ -112,10 +112,8 @@ pt_vec3 pt_texture_eval(const struct pt_scene *scene, int32_t number, float u, f
     float s = t->su * u + t->du, w = t->sv * v + t->dv;
     pt_texture_lookups++;
     switch (t->kind) {
-    case PT_TEXTURE_IMAGE:
-        return eval_image(scene, t, s, w);
-    case PT_TEXTURE_SCALE:
-        return v3_mul(eval_input(scene, &t->in[0], u, v), eval_input(scene, &t->in[1], u, v));
+    case PT_TEXTURE_IMAGE: return eval_image(scene, t, s, w);
+    case PT_TEXTURE_SCALE: return v3_mul(eval_input(scene, &t->in[0], u, v), eval_input(scene, &t->in[1], u, v));
     case PT_TEXTURE_MIX: {
         pt_vec3 amount = eval_input(scene, &t->in[2], u, v);
         pt_vec3 a = eval_input(scene, &t->in[0], u, v), b = eval_input(scene, &t->in[1], u, v);
@@ -128,12 +126,11 @@ pt_vec3 pt_texture_eval(const struct pt_scene *scene, int32_t number, float u, f
     }
     case PT_TEXTURE_BILERP: {
         pt_vec3 low = v3_madd(v3_scale(eval_input(scene, &t->in[0], u, v), 1.0f - w), w, eval_input(scene, &t->in[1], u, v));
-        pt_vec3 high = v3_madd(v3_scale(eval_input(scene, &t->in[2], u, v), 1.0f - w), w,
-                               eval_input(scene, &t->in[3], u, v));
+        pt_vec3 high =
+            v3_madd(v3_scale(eval_input(scene, &t->in[2], u, v), 1.0f - w), w, eval_input(scene, &t->in[3], u, v));
         return v3_madd(v3_scale(low, 1.0f - s), s, high);
     }
-    default:
-        return t->in[0].value;
+    default: return t->in[0].value;
     }
 }
 

@@ -9,10 +9,7 @@ static inline uint32_t base_get_u32(const uint8_t *p)
     return (uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
 }
 
-static inline uint64_t base_get_u64(const uint8_t *p)
-{
-    return base_get_u32(p) | (uint64_t)base_get_u32(p + 4) << 32;
-}
+static inline uint64_t base_get_u64(const uint8_t *p) { return base_get_u32(p) | (uint64_t)base_get_u32(p + 4) << 32; }
 
 static inline void base_put_u32(uint8_t *p, uint32_t v)
 {

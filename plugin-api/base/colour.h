@@ -14,8 +14,11 @@ extern "C" {
 
 /* Row major, XYZ = M · RGB, white (0.9504700, 1, 1.0888300). All luminances of the project have the weights of row 2: the
  * mean of a film and its second moment must agree to the last digit, or a pixel without noise gets an error. */
-#define BASE_RGB_TO_XYZ                                                                                                    \
-    {0.4124564, 0.3575761, 0.1804375, BASE_LUMINANCE_R, BASE_LUMINANCE_G, BASE_LUMINANCE_B, 0.0193339, 0.1191920, 0.9503041}
+#define BASE_RGB_TO_XYZ \
+    { \
+        0.4124564, 0.3575761, 0.1804375, BASE_LUMINANCE_R, BASE_LUMINANCE_G, BASE_LUMINANCE_B, 0.0193339, 0.1191920, \
+            0.9503041 \
+    }
 #define BASE_LUMINANCE_R 0.2126729
 #define BASE_LUMINANCE_G 0.7151522
 #define BASE_LUMINANCE_B 0.0721750

@@ -2,6 +2,7 @@
 
 #include "base/colour.h"
 
+/* clang-format off */
 /* Both tables of what a code stands for have the same numbers: X(0.5) is one of them. */
 #define LINEAR(X) \
     X(0.0), X(0.0003035269835488375), X(0.000607053967097675), X(0.0009105809506465125), X(0.00121410793419535),       \

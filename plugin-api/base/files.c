@@ -56,7 +56,7 @@ int base_file_read(const char *path, size_t max_size, char **data, size_t *size,
     }
     if ((unsigned long long)st.st_size > max_size) {
         rc = base_fail(err, BASE_EINVAL, "%s: %lld bytes, more than the %zu this kind of file may have", path,
-                     (long long)st.st_size, max_size);
+                       (long long)st.st_size, max_size);
         goto out;
     }
     size_t n = (size_t)st.st_size;

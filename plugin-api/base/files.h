@@ -46,9 +46,9 @@ int base_file_is_same(const char *a, const char *b);
 int base_file_is_inside(const char *path, const char *folder);
 
 struct base_file_out {
-    FILE *file;         /* open for writing between begin and commit/abort */
-    int durable;        /* set after begin: the folder is synced too, so that the new file is there after a power failure */
-    char path[4096];    /* the final name, links followed */
+    FILE *file;      /* open for writing between begin and commit/abort */
+    int durable;     /* set after begin: the folder is synced too, so that the new file is there after a power failure */
+    char path[4096]; /* the final name, links followed */
     char tmp_path[4128];
 };
 

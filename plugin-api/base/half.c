@@ -10,10 +10,7 @@ uint16_t base_f32_to_bf16(float x)
     return (uint16_t)((u + 0x7fff + (u >> 16 & 1)) >> 16);
 }
 
-float base_bf16_to_f32(uint16_t x)
-{
-    return base_f32_of_bits((uint32_t)x << 16);
-}
+float base_bf16_to_f32(uint16_t x) { return base_f32_of_bits((uint32_t)x << 16); }
 
 uint16_t base_f64_to_f16(double x)
 {
@@ -32,10 +29,7 @@ uint16_t base_f64_to_f16(double x)
     return (uint16_t)(sign | ((exponent + 13) * 1024 + (int)nearbyint(ldexp(a, 11 - exponent))));
 }
 
-uint16_t base_f32_to_f16(float x)
-{
-    return base_f64_to_f16((double)x);
-}
+uint16_t base_f32_to_f16(float x) { return base_f64_to_f16((double)x); }
 
 float base_f16_to_f32(uint16_t x)
 {

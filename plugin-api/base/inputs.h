@@ -17,7 +17,10 @@ struct base_inputs {
     size_t count, room;
 };
 
-#define BASE_INPUTS_EMPTY {.lock = PTHREAD_MUTEX_INITIALIZER}
+#define BASE_INPUTS_EMPTY \
+    { \
+        .lock = PTHREAD_MUTEX_INITIALIZER \
+    }
 
 /* Copies `path`. A path that is there already is no error. */
 int base_inputs_add(struct base_inputs *inputs, const char *path, struct base_err *err);

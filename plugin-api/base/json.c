@@ -29,25 +29,13 @@ void base_json_text(cJSON *to, const char *key, const char *text, int *failed)
     add(to, key, item, failed);
 }
 
-void base_json_bool(cJSON *to, const char *key, int value, int *failed)
-{
-    add(to, key, cJSON_CreateBool(value), failed);
-}
+void base_json_bool(cJSON *to, const char *key, int value, int *failed) { add(to, key, cJSON_CreateBool(value), failed); }
 
-cJSON *base_json_object(cJSON *to, const char *key, int *failed)
-{
-    return add(to, key, cJSON_CreateObject(), failed);
-}
+cJSON *base_json_object(cJSON *to, const char *key, int *failed) { return add(to, key, cJSON_CreateObject(), failed); }
 
-cJSON *base_json_array(cJSON *to, const char *key, int *failed)
-{
-    return add(to, key, cJSON_CreateArray(), failed);
-}
+cJSON *base_json_array(cJSON *to, const char *key, int *failed) { return add(to, key, cJSON_CreateArray(), failed); }
 
-void base_json_item(cJSON *to, const char *key, cJSON *item, int *failed)
-{
-    add(to, key, item, failed);
-}
+void base_json_item(cJSON *to, const char *key, cJSON *item, int *failed) { add(to, key, item, failed); }
 
 int base_json_write(const char *path, const cJSON *root, int failed, struct base_err *err)
 {

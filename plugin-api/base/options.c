@@ -47,10 +47,7 @@ int base_word_index(const char *const *words, const char *text, size_t length)
     return -1;
 }
 
-static int is_flag(const struct base_option *o)
-{
-    return !o->arg && !o->words;
-}
+static int is_flag(const struct base_option *o) { return !o->arg && !o->words; }
 
 /* "a, b or c", each after `before` */
 static void list_words(const struct base_option *o, const char *before, char *text, size_t room)
@@ -58,8 +55,11 @@ static void list_words(const struct base_option *o, const char *before, char *te
     size_t used = 0;
     text[0] = '\0';
     for (int i = 0; o->words[i] && used < room; i++)
-        used += (size_t)snprintf(text + used, room - used, "%s%s%s", i == 0 ? "" : o->words[i + 1] ? ", " : " or ", before,
-                                 o->words[i]);
+        used += (size_t)snprintf(text + used, room - used, "%s%s%s",
+                                 i == 0            ? ""
+                                 : o->words[i + 1] ? ", "
+                                                   : " or ",
+                                 before, o->words[i]);
 }
 
 static int has_ending(const struct base_option *o, const char *name)
@@ -160,14 +160,20 @@ static void print_help(const struct base_options *options, const char *program, 
     int n = 0, group = 0;
     for (const struct base_option *o = options->list; o->name || o->help; o++, n++) {
         group += !o->name;
-        rows[n] = (struct argp_option){.name = o->name, .doc = o->help, .group = group,
-                                       .key = !o->name ? 0 : o->key ? o->key : KEY_LONG + n,
+        rows[n] = (struct argp_option){.name = o->name,
+                                       .doc = o->help,
+                                       .group = group,
+                                       .key = !o->name ? 0
+                                              : o->key ? o->key
+                                                       : KEY_LONG + n,
                                        .arg = value_name(o, names[n], sizeof names[n]),
                                        .flags = o->hidden ? OPTION_HIDDEN : 0};
     }
     rows[n++] = (struct argp_option){.name = "help", .key = '?', .doc = "Print this and exit", .group = -1};
     rows[n++] = (struct argp_option){.name = "usage", .key = KEY_USAGE, .doc = "Print a short usage and exit", .group = -1};
-    rows[n] = (struct argp_option){.name = "version", .doc = "Print the version and exit", .group = -1,
+    rows[n] = (struct argp_option){.name = "version",
+                                   .doc = "Print the version and exit",
+                                   .group = -1,
                                    .key = find(options->list, 'V') ? KEY_VERSION : 'V'};
     const struct argp argp = {.options = rows, .args_doc = options->args_doc, .doc = options->doc};
     argp_help(&argp, stdout, flags, (char *)(size_t)program);

@@ -27,42 +27,44 @@ struct base_store {
     size_t offset; /* in the struct that base_options_parse fills */
 };
 
+/* clang-format off */
 #define BASE_TO(struct_type, member)                                                                                        \
     {_Generic(((struct_type *)0)->member, int: BASE_STORE_INT, uint32_t: BASE_STORE_U32, uint64_t: BASE_STORE_U64,          \
               double: BASE_STORE_REAL, const char *: BASE_STORE_TEXT), offsetof(struct_type, member)}
+/* clang-format on */
 
 enum base_path { BASE_NO_PATH, BASE_FILE, BASE_FOLDER };
 enum base_args { BASE_ARGS_PATHS, BASE_ARGS_FILES, BASE_ARGS_WORDS };
 
 struct base_option {
-    const char *name;       /* long name without dashes; NULL: `help` is the heading of the rows that follow */
-    int key;                /* short name, a letter, or 0 */
-    const char *arg;        /* what --help calls the value; NULL: a flag, or the words */
+    const char *name; /* long name without dashes; NULL: `help` is the heading of the rows that follow */
+    int key;          /* short name, a letter, or 0 */
+    const char *arg;  /* what --help calls the value; NULL: a flag, or the words */
     struct base_store to;
-    double min, max;        /* of a number, both allowed; a flag stores `min`, or 1 if that is 0 */
+    double min, max; /* of a number, both allowed; a flag stores `min`, or 1 if that is 0 */
     const char *help;
     const char *const *words; /* ends with NULL. An integer: what may be said. Text: endings of a file's name */
     /* For all else: reads value (NULL for a flag) into the struct. Its error says what was expected; the option is put
      * before it. Out of memory is passed on as it is. */
     int (*set)(void *into, const char *value, struct base_err *err);
-    int needed, hidden;     /* needed: text only; without it the command line is refused */
-    enum base_path input;   /* the value is read, if it is there: no output may take its place or go into its folder */
-    enum base_path output;  /* the value is written: refused when it cannot be, is an input, or is written twice */
+    int needed, hidden;    /* needed: text only; without it the command line is refused */
+    enum base_path input;  /* the value is read, if it is there: no output may take its place or go into its folder */
+    enum base_path output; /* the value is written: refused when it cannot be, is an input, or is written twice */
     const struct base_file_kind *kind; /* of a file: refused when one of another kind is there; NULL: any is replaced */
-    const char *const *files; /* of a folder: names written there that an input might have; ends with NULL */
+    const char *const *files;          /* of a folder: names written there that an input might have; ends with NULL */
 };
 
 struct base_options {
-    const char *doc;        /* what the command does, and after "\v" what is printed below the options */
-    const char *args_doc;   /* "SCENE.pbrt", "REFERENCE TEST", NULL if there are no arguments */
+    const char *doc;                /* what the command does, and after "\v" what is printed below the options */
+    const char *args_doc;           /* "SCENE.pbrt", "REFERENCE TEST", NULL if there are no arguments */
     const struct base_option *list; /* ends with {0} */
-    int args_min, args_max; /* arguments that are no options */
-    size_t args;            /* offset of their const char *[args_max], borrowed from argv */
-    int args_output;        /* which of them, from 1, names a file to be written; 0: none */
-    int uses_peers;         /* --version says which MPI there is */
-    size_t arg_count;       /* offset of an int that gets their number; 0: nobody asks */
-    enum base_args args_are; /* all but args_output: read, as files or folders or as files only; or mere words */
-    size_t outputs;         /* offset of a struct base_outputs that gets the files to be written; 0: nobody asks */
+    int args_min, args_max;         /* arguments that are no options */
+    size_t args;                    /* offset of their const char *[args_max], borrowed from argv */
+    int args_output;                /* which of them, from 1, names a file to be written; 0: none */
+    int uses_peers;                 /* --version says which MPI there is */
+    size_t arg_count;               /* offset of an int that gets their number; 0: nobody asks */
+    enum base_args args_are;        /* all but args_output: read, as files or folders or as files only; or mere words */
+    size_t outputs;                 /* offset of a struct base_outputs that gets the files to be written; 0: nobody asks */
 };
 
 /* Fills *into from argv (whose order it may change); what is not on the command line stays as it was. --help, --usage and

@@ -39,8 +39,9 @@ int base_peers_open(struct base_peers **out, struct base_err *err)
     void *symbol = base_module_symbol(MODULE, "base_peers_open_mpi", 1); /* MPI libraries load parts of themselves */
     memcpy(&open, &symbol, sizeof open);
     if (!open)
-        return base_fail(err, BASE_EINVAL, "started by an MPI launcher, but this program has no MPI (its lib/lull-mpi.so): "
-                                           "build it with MPI installed, or start it without the launcher");
+        return base_fail(err, BASE_EINVAL,
+                         "started by an MPI launcher, but this program has no MPI (its lib/lull-mpi.so): "
+                         "build it with MPI installed, or start it without the launcher");
     return open(out, err);
 }
 
@@ -50,10 +51,7 @@ void base_peers_close(struct base_peers *peers)
         peers->calls->close(peers);
 }
 
-void base_peers_abort(struct base_peers *peers, int status)
-{
-    peers->calls->abort(peers, status);
-}
+void base_peers_abort(struct base_peers *peers, int status) { peers->calls->abort(peers, status); }
 
 int base_peers_send(struct base_peers *peers, int rank, void *data, size_t size, struct base_err *err)
 {

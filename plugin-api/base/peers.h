@@ -24,8 +24,8 @@ struct base_peer {
 };
 
 struct base_peers {
-    int rank, count;              /* count >= 2: who is alone has no peers */
-    const struct base_peer *list; /* [count]; read-only */
+    int rank, count;                      /* count >= 2: who is alone has no peers */
+    const struct base_peer *list;         /* [count]; read-only */
     const struct base_peers_calls *calls; /* private to base/peers.c and the implementation */
     void *context;                        /* likewise */
 };

@@ -11,7 +11,9 @@ int base_png_write(const char *path, int32_t width, int32_t height, int channels
     if (width < 1 || height < 1 || channels < 1 || channels > 4 || width > (INT32_MAX - 1) / channels)
         return base_fail(err, BASE_EINVAL, "%s: cannot write %dx%d pixels of %d channels as PNG", path, width, height,
                          channels);
-    png_image image = {.version = PNG_IMAGE_VERSION, .width = (png_uint_32)width, .height = (png_uint_32)height,
+    png_image image = {.version = PNG_IMAGE_VERSION,
+                       .width = (png_uint_32)width,
+                       .height = (png_uint_32)height,
                        .format = formats[channels - 1]};
     struct base_file_out file;
     int rc = base_file_begin(&file, path, err);

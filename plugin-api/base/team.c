@@ -29,10 +29,10 @@ struct base_team {
     double timeout_s;         /* 0: no limit */
     const volatile sig_atomic_t *interrupted;
     uint32_t call;
-    int lost;                 /* somebody is gone for good: there is no orderly end */
-    int over;                 /* of a member: rank 0 has said the end */
-    struct farewell *ended;   /* owns; [count] at rank 0: what was heard */
-    unsigned char *gone;      /* owns; [count] at rank 0: who has said BYE */
+    int lost;                     /* somebody is gone for good: there is no orderly end */
+    int over;                     /* of a member: rank 0 has said the end */
+    struct farewell *ended;       /* owns; [count] at rank 0: what was heard */
+    unsigned char *gone;          /* owns; [count] at rank 0: who has said BYE */
     struct base_team_part *parts; /* owns, with their data; [count] of the last call of collect */
     struct base_team_traffic traffic;
     struct base_err failed;
@@ -93,35 +93,20 @@ void base_team_watch(struct base_team *t, double timeout_s, const volatile sig_a
     t->interrupted = interrupted;
 }
 
-int base_team_rank(const struct base_team *t)
-{
-    return t ? t->peers->rank : 0;
-}
+int base_team_rank(const struct base_team *t) { return t ? t->peers->rank : 0; }
 
-int base_team_count(const struct base_team *t)
-{
-    return t ? t->peers->count : 1;
-}
+int base_team_count(const struct base_team *t) { return t ? t->peers->count : 1; }
 
-int base_team_threads(const struct base_team *t)
-{
-    return base_peers_threads(t ? t->peers : NULL);
-}
+int base_team_threads(const struct base_team *t) { return base_peers_threads(t ? t->peers : NULL); }
 
 struct base_team_traffic base_team_traffic(const struct base_team *t)
 {
     return t ? t->traffic : (struct base_team_traffic){0};
 }
 
-long base_team_first(const struct base_team *t, long n, int rank)
-{
-    return n * rank / base_team_count(t);
-}
+long base_team_first(const struct base_team *t, long n, int rank) { return n * rank / base_team_count(t); }
 
-long base_team_most(const struct base_team *t, long n)
-{
-    return (n + base_team_count(t) - 1) / base_team_count(t);
-}
+long base_team_most(const struct base_team *t, long n) { return (n + base_team_count(t) - 1) / base_team_count(t); }
 
 int base_team_failed(const struct base_team *t, struct base_err *err)
 {

@@ -148,10 +148,7 @@ void base_threads_destroy(struct base_threads *t)
     free(t);
 }
 
-int base_threads_count(const struct base_threads *t)
-{
-    return t->count;
-}
+int base_threads_count(const struct base_threads *t) { return t->count; }
 
 static void post(struct base_threads *t)
 {

@@ -31,10 +31,7 @@ static void pool(float *map, int width, int height, float *scratch)
         pool_line(scratch + x, height, (size_t)width, map + x);
 }
 
-float lull_blend_mse(const struct lull_estimate *pooled, size_t i)
-{
-    return fmaxf(pooled->denoised[i], pooled->agreed[i]);
-}
+float lull_blend_mse(const struct lull_estimate *pooled, size_t i) { return fmaxf(pooled->denoised[i], pooled->agreed[i]); }
 
 void lull_blend_weights(const struct lull_estimate *estimate, int width, int height, float *scratch, float *alpha)
 {

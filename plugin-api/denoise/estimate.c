@@ -13,10 +13,7 @@ static double lightness_slope(double y)
     return y > knee ? 116.0 / (3.0 * root * root) : 24389.0 / 27.0;
 }
 
-static float bounded(double v)
-{
-    return (float)(v < MOST ? (v > -MOST ? v : -MOST) : MOST);
-}
+static float bounded(double v) { return (float)(v < MOST ? (v > -MOST ? v : -MOST) : MOST); }
 
 void lull_estimate_pixels(const struct lull_estimate_in *in, size_t n, const struct lull_estimate *out)
 {

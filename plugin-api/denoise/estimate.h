@@ -16,10 +16,10 @@
 
 #include <stddef.h>
 
-struct lull_estimate_in {    /* luminance, 1 = the display's white; [n]; finite */
-    const float *a, *b;      /* the halves */
-    const float *fa, *fb;    /* denoised */
-    double share;            /* of all samples that are in A, in (0, 1) */
+struct lull_estimate_in { /* luminance, 1 = the display's white; [n]; finite */
+    const float *a, *b;   /* the halves */
+    const float *fa, *fb; /* denoised */
+    double share;         /* of all samples that are in A, in (0, 1) */
 };
 
 struct lull_estimate { /* squares of L*; [n] each, the caller's */

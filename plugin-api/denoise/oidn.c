@@ -29,7 +29,7 @@ struct lull_oidn {
     char version[32];
     int memory_fd;
     posix_spawn_file_actions_t actions; /* if shared is not NULL */
-    struct shared *shared; /* NULL: nothing is prepared */
+    struct shared *shared;              /* NULL: nothing is prepared */
     size_t bytes;
 };
 
@@ -168,10 +168,7 @@ void lull_oidn_close(struct lull_oidn *o)
     free(o);
 }
 
-const char *lull_oidn_version(const struct lull_oidn *o)
-{
-    return o->version;
-}
+const char *lull_oidn_version(const struct lull_oidn *o) { return o->version; }
 
 /* --- pictures ---------------------------------------------------------------------------------------------------------- */
 

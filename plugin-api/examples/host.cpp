@@ -12,7 +12,8 @@
 #include <random>
 #include <vector>
 
-namespace {
+namespace
+{
 
 const int width = 320, height = 180;
 
@@ -92,7 +93,7 @@ int main(int argc, char **argv)
         return fail(err);
 
     Film film;
-    const lull_plane planes[LULL_PLANE_COUNT] = {plane(film.color, LULL_NORM_SPP), {}, {}, {},
+    const lull_plane planes[LULL_PLANE_COUNT] = {plane(film.color, LULL_NORM_SPP),     {}, {}, {},
                                                  plane(film.half, LULL_NORM_HALF_SPP), {}, {}, {}};
     const lull_host_view view = {sizeof view, LULL_PLANE_COUNT, 0, 0, width, height, planes, nullptr, nullptr};
     const lull_host_blocks &blocks = *lull_host_blocks_of(frame);

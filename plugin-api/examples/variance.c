@@ -14,12 +14,12 @@ enum { THRESHOLD, FLOOR, TAIL_ERROR, TAIL_SHARE, FIRST_SPP, GROWTH, PARAM_COUNT 
 enum { PLANES = LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_MOMENT2) };
 
 static const struct lull_param params[PARAM_COUNT] = {
-    [THRESHOLD] = LULL_KIT_FLOAT("threshold", "0.03", 0, 1e6,
-                                 "stop when the block's relative standard error is at most this"),
-    [FLOOR] = LULL_KIT_FLOAT("floor", "0.02", 1e-6, 1e6,
-                             "luminance (1 = display white) below which errors count as absolute"),
-    [TAIL_ERROR] = LULL_KIT_FLOAT("tail-error", "0.5", 1e-6, 1e30,
-                                  "a pixel with a larger relative standard error is not settled"),
+    [THRESHOLD] =
+        LULL_KIT_FLOAT("threshold", "0.03", 0, 1e6, "stop when the block's relative standard error is at most this"),
+    [FLOOR] =
+        LULL_KIT_FLOAT("floor", "0.02", 1e-6, 1e6, "luminance (1 = display white) below which errors count as absolute"),
+    [TAIL_ERROR] =
+        LULL_KIT_FLOAT("tail-error", "0.5", 1e-6, 1e30, "a pixel with a larger relative standard error is not settled"),
     [TAIL_SHARE] = LULL_KIT_FLOAT("tail-share", "0", 0, 1, "share of pixels that need not be settled when the block stops"),
     [FIRST_SPP] = LULL_KIT_INT("first-spp", "16", 2, 1e15, "samples per pixel before the first judgement"),
     [GROWTH] = LULL_KIT_FLOAT("growth", "1.5", 1.01, 100, "largest ratio of samples between two checks of a block"),

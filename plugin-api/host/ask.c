@@ -6,15 +6,21 @@
 
 struct lull_decision lull_host_undecided(void)
 {
-    return (struct lull_decision){.action = LULL_CONTINUE, .p_noisy = (double)NAN, .predicted_spp = (double)NAN,
-                                  .error = (double)NAN};
+    return (struct lull_decision){
+        .action = LULL_CONTINUE, .p_noisy = (double)NAN, .predicted_spp = (double)NAN, .error = (double)NAN};
 }
 
 static struct lull_block state_of(const struct lull_host_block *b, uint32_t index, int has_half)
 {
-    return (struct lull_block){.id = index, .flags = b->reason != LULL_REASON_NONE ? LULL_BLOCK_STOPPED : 0, .x0 = b->x0,
-                               .y0 = b->y0, .x1 = b->x1, .y1 = b->y1, .spp = b->spp,
-                               .half_spp = has_half ? b->half_spp : 0, .thread_s = b->thread_s};
+    return (struct lull_block){.id = index,
+                               .flags = b->reason != LULL_REASON_NONE ? LULL_BLOCK_STOPPED : 0,
+                               .x0 = b->x0,
+                               .y0 = b->y0,
+                               .x1 = b->x1,
+                               .y1 = b->y1,
+                               .spp = b->spp,
+                               .half_spp = has_half ? b->half_spp : 0,
+                               .thread_s = b->thread_s};
 }
 
 /* Some of the blocks of a frame. */
@@ -41,8 +47,8 @@ static int32_t evaluate_step(struct lull_host_criterion *c, uint32_t step, const
     }
     if (n == 0)
         return LULL_OK;
-    int32_t code = c->table->evaluate(c->dialled[step], view, c->due, sizeof c->due[0], c->answers, sizeof c->answers[0], n,
-                                      e);
+    int32_t code =
+        c->table->evaluate(c->dialled[step], view, c->due, sizeof c->due[0], c->answers, sizeof c->answers[0], n, e);
     n = 0;
     for (uint32_t k = 0; k < q->count && code == LULL_OK; k++)
         if (q->blocks->list[q->due[k]].step == step)
@@ -53,9 +59,17 @@ static int32_t evaluate_step(struct lull_host_criterion *c, uint32_t step, const
 static int32_t evaluate(struct lull_host_criterion *c, const struct question *q, const struct lull_host_view *v,
                         const struct lull_plane *planes, struct lull_error *err)
 {
-    struct lull_view view = {.struct_size = sizeof view, .x0 = v->x0, .y0 = v->y0, .x1 = v->x1, .y1 = v->y1,
-                             .planes = planes, .plane_count = LULL_PLANE_COUNT, .plane_stride = sizeof planes[0],
-                             .all = c->all, .all_count = q->blocks->count, .all_stride = sizeof c->all[0],
+    struct lull_view view = {.struct_size = sizeof view,
+                             .x0 = v->x0,
+                             .y0 = v->y0,
+                             .x1 = v->x1,
+                             .y1 = v->y1,
+                             .planes = planes,
+                             .plane_count = LULL_PLANE_COUNT,
+                             .plane_stride = sizeof planes[0],
+                             .all = c->all,
+                             .all_count = q->blocks->count,
+                             .all_stride = sizeof c->all[0],
                              .elapsed_s = base_clock_wall_s() - c->begin_s};
     struct lull_error e = {.struct_size = sizeof e};
     int32_t code = LULL_OK;

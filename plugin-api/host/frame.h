@@ -18,18 +18,18 @@ struct lull_host_frame;
 struct lull_host_criterion {
     const struct lull_criterion *table;
     struct lull_instance *dialled[LULL_HOST_STEPS + 1]; /* own; by step of the mask, NULL where no block is of that step */
-    struct lull_pair *pairs;          /* owns, as their text */
+    struct lull_pair *pairs;                            /* owns, as their text */
     uint32_t pair_count;
     struct lull_requirements needs;
     struct lull_host_services offered; /* name: owns */
-    struct base_threads *threads;     /* owns; NULL: the renderer's own, or one */
-    struct lull_host host;            /* shows the services to the criterion */
+    struct base_threads *threads;      /* owns; NULL: the renderer's own, or one */
+    struct lull_host host;             /* shows the services to the criterion */
 
     /* Of its frame, if one is open: scratch of an evaluate, [block_count]. */
     const struct lull_host_frame *frame; /* never followed, only compared; NULL after a failure */
     uint32_t block_count;
-    struct lull_block *all, *due;     /* own; the state of every block; of those that one instance is asked about */
-    struct lull_decision *answers;    /* owns */
+    struct lull_block *all, *due;  /* own; the state of every block; of those that one instance is asked about */
+    struct lull_decision *answers; /* owns */
     double begin_s;
     int open;
 };
@@ -40,7 +40,7 @@ static inline int lull_host_wants_counts(const struct lull_host_criterion *c)
 }
 
 struct lull_host_frame {
-    struct lull_host_config config; /* layout and mask: NULL, they were read */
+    struct lull_host_config config;        /* layout and mask: NULL, they were read */
     struct lull_host_criterion *criterion; /* borrows; may be NULL */
     struct lull_host_blocks blocks;
     struct lull_host_totals totals;

@@ -11,8 +11,14 @@ static int32_t most(int32_t a, int32_t b) { return a > b ? a : b; }
 
 static struct lull_host_block fresh(uint32_t id, struct lull_rect r)
 {
-    return (struct lull_host_block){.id = id, .x0 = r.x0, .y0 = r.y0, .x1 = r.x1, .y1 = r.y1, .p_noisy = (double)NAN,
-                                    .error = (double)NAN, .predicted_spp = (double)NAN};
+    return (struct lull_host_block){.id = id,
+                                    .x0 = r.x0,
+                                    .y0 = r.y0,
+                                    .x1 = r.x1,
+                                    .y1 = r.y1,
+                                    .p_noisy = (double)NAN,
+                                    .error = (double)NAN,
+                                    .predicted_spp = (double)NAN};
 }
 
 static int is_inside(const struct lull_rect *r, const struct lull_host_config *g)
@@ -121,8 +127,11 @@ static int32_t lay_own(const struct lull_host_config *g, struct lull_host_blocks
 int32_t lull_host_lay_out(const struct lull_host_config *g, const struct lull_requirements *needs, int clip,
                           struct lull_host_blocks *out, struct lull_error *err)
 {
-    struct lull_host_blocks b = {.struct_size = sizeof b, .flags = g->flags & LULL_HOST_UNIFORM, .spp_min = g->spp_min,
-                                 .spp_max = g->spp_max, .check_step = g->check_step > 0 ? g->check_step : 1};
+    struct lull_host_blocks b = {.struct_size = sizeof b,
+                                 .flags = g->flags & LULL_HOST_UNIFORM,
+                                 .spp_min = g->spp_min,
+                                 .spp_max = g->spp_max,
+                                 .check_step = g->check_step > 0 ? g->check_step : 1};
     if (g->width < 1 || g->height < 1 || g->width > INT32_MAX || g->height > INT32_MAX)
         return lull_error_set(err, LULL_E_INVALID, "a picture of %ux%u pixels: expected 1 to 2^31 - 1", g->width, g->height);
     int32_t code = choose_size(g, needs, &b, err);

@@ -9,7 +9,7 @@ struct lines {
 };
 
 struct line {
-    const char *text; /* NULL: there is none */
+    const char *text;   /* NULL: there is none */
     size_t length, key; /* of the whole line; of what stands before '=' */
 };
 

@@ -31,13 +31,10 @@ int32_t lull_host_read_mask(const struct lull_plane *mask, struct lull_host_bloc
     return LULL_OK;
 }
 
-double lull_host_dial(uint32_t step)
-{
-    return pow(WHITE_SCALE, (double)step / LULL_HOST_STEPS);
-}
+double lull_host_dial(uint32_t step) { return pow(WHITE_SCALE, (double)step / LULL_HOST_STEPS); }
 
-static int32_t scale_dial(const struct lull_criterion *t, const struct lull_pair *pairs, uint32_t pair_count,
-                          uint32_t step, char value[32], struct lull_pair *pair, struct lull_error *err)
+static int32_t scale_dial(const struct lull_criterion *t, const struct lull_pair *pairs, uint32_t pair_count, uint32_t step,
+                          char value[32], struct lull_pair *pair, struct lull_error *err)
 {
     static const char *const dials[] = {"visible", "threshold"};
     const char *known = NULL; /* a dial that has no value */

@@ -108,15 +108,9 @@ void lull_host_close(struct lull_host_criterion *c)
     free(c);
 }
 
-const struct lull_criterion *lull_host_table(const struct lull_host_criterion *c)
-{
-    return c->table;
-}
+const struct lull_criterion *lull_host_table(const struct lull_host_criterion *c) { return c->table; }
 
-const struct lull_requirements *lull_host_needs(const struct lull_host_criterion *c)
-{
-    return &c->needs;
-}
+const struct lull_requirements *lull_host_needs(const struct lull_host_criterion *c) { return &c->needs; }
 
 const char *lull_host_parameter(const struct lull_criterion *t, const char *name, const struct lull_pair *pairs,
                                 uint32_t pair_count, const struct lull_param **found)
@@ -335,12 +329,6 @@ void lull_host_end(struct lull_host_frame *f)
     free(f);
 }
 
-struct lull_host_blocks *lull_host_blocks_of(struct lull_host_frame *f)
-{
-    return &f->blocks;
-}
+struct lull_host_blocks *lull_host_blocks_of(struct lull_host_frame *f) { return &f->blocks; }
 
-struct lull_host_totals *lull_host_totals_of(struct lull_host_frame *f)
-{
-    return &f->totals;
-}
+struct lull_host_totals *lull_host_totals_of(struct lull_host_frame *f) { return &f->totals; }

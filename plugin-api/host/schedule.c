@@ -8,8 +8,8 @@ static const double CHECK_RATIO = 1.15;
 
 const char *lull_host_reason(int32_t reason)
 {
-    static const char *const names[LULL_REASON_COUNT] = {"none", "criterion", "spp-max", "uniform", "time", "interrupt",
-                                                         "dropped"};
+    static const char *const names[LULL_REASON_COUNT] = {"none", "criterion", "spp-max", "uniform",
+                                                         "time", "interrupt", "dropped"};
     return reason >= 0 && reason < LULL_REASON_COUNT ? names[reason] : "unknown";
 }
 
@@ -21,10 +21,7 @@ uint32_t lull_host_active(const struct lull_host_blocks *b)
     return n;
 }
 
-double lull_host_elapsed_s(const struct lull_host_frame *f)
-{
-    return f->totals.render_s + f->totals.criterion_s;
-}
+double lull_host_elapsed_s(const struct lull_host_frame *f) { return f->totals.render_s + f->totals.criterion_s; }
 
 int32_t lull_host_out_of_time(const struct lull_host_frame *f)
 {
@@ -101,8 +98,8 @@ uint32_t lull_host_extend(struct lull_host_blocks *b)
         if (!limit || block->spp >= b->spp_max)
             continue;
         block->reason = LULL_REASON_NONE;
-        block->next_spp = lull_host_next_check(b, block->spp, block->next_spp > block->spp ? block->next_spp
-                                                                                           : block->spp + 1);
+        block->next_spp =
+            lull_host_next_check(b, block->spp, block->next_spp > block->spp ? block->next_spp : block->spp + 1);
         reopened++;
     }
     return reopened;
@@ -160,8 +157,8 @@ uint32_t lull_host_due(struct lull_host_frame *f, uint32_t *due, uint8_t *final)
 {
     const struct lull_decision undecided = lull_host_undecided();
     struct lull_host_blocks *blocks = &f->blocks;
-    int reopens = f->criterion && !(blocks->flags & LULL_HOST_UNIFORM) &&
-                  (f->criterion->table->capabilities & LULL_CAP_REOPENS);
+    int reopens =
+        f->criterion && !(blocks->flags & LULL_HOST_UNIFORM) && (f->criterion->table->capabilities & LULL_CAP_REOPENS);
     int skip = !f->criterion || too_expensive(f);
     uint32_t n = 0, active = 0;
     for (uint32_t i = 0; i < blocks->count; i++) {

@@ -41,8 +41,12 @@ int32_t lull_host_offer(struct lull_host_criterion *c, const struct lull_host_se
     if (c->offered.threads > 1 && !c->offered.parallel_for &&
         !(c->threads = base_threads_create((int)c->offered.threads, &e)))
         return lull_host_translate(&e, err);
-    c->host = (struct lull_host){.struct_size = sizeof c->host, .api_minor = LULL_API_MINOR, .context = c,
-                                 .name = c->offered.name, .max_workers = c->offered.threads, .log = host_log,
+    c->host = (struct lull_host){.struct_size = sizeof c->host,
+                                 .api_minor = LULL_API_MINOR,
+                                 .context = c,
+                                 .name = c->offered.name,
+                                 .max_workers = c->offered.threads,
+                                 .log = host_log,
                                  .parallel_for = host_parallel_for};
     return LULL_OK;
 }

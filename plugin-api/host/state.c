@@ -83,9 +83,9 @@ int32_t lull_host_load_history(struct lull_host_criterion *c, const void *data, 
 {
     const struct lull_state *state = state_extension(c);
     if (!state)
-        return size == 0 ? LULL_OK
-                         : lull_error_set(err, LULL_E_IO, "criterion %s keeps no state, but the checkpoint has one",
-                                          c->table->id);
+        return size == 0
+                   ? LULL_OK
+                   : lull_error_set(err, LULL_E_IO, "criterion %s keeps no state, but the checkpoint has one", c->table->id);
     struct const_bytes b = {.data = data, .size = (size_t)size};
     struct lull_reader reader = {.struct_size = sizeof reader, .context = &b, .read = read_bytes};
     struct lull_error e = {.struct_size = sizeof e};
@@ -114,19 +114,16 @@ static void put(struct sink *s, const void *data, size_t size)
         s->code = s->writer->write(s->writer, data, size);
 }
 
-static void put_count(struct sink *s, uint64_t n)
-{
-    put(s, &n, sizeof n);
-}
+static void put_count(struct sink *s, uint64_t n) { put(s, &n, sizeof n); }
 
 static void put_frame(struct sink *s, const struct lull_host_frame *f, const struct bytes *history)
 {
     put_count(s, f->blocks.count);
     for (uint32_t i = 0; i < f->blocks.count; i++) {
         const struct lull_host_block *b = &f->blocks.list[i];
-        struct block_record record = {b->spp,   b->next_spp,      b->asked_spp, b->rays,   b->dropped, b->p_noisy,
-                                      b->error, b->predicted_spp, b->thread_s,  b->reason, b->checks,  b->stop_votes,
-                                      b->asked};
+        struct block_record record = {b->spp,     b->next_spp,   b->asked_spp,     b->rays,     b->dropped,
+                                      b->p_noisy, b->error,      b->predicted_spp, b->thread_s, b->reason,
+                                      b->checks,  b->stop_votes, b->asked};
         put(s, &record, sizeof record);
     }
     put(s, &f->totals, sizeof(struct totals_record));

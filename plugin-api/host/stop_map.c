@@ -31,10 +31,7 @@ void lull_host_viridis(double t, uint8_t rgb[3])
 }
 
 /* Nothing has no place on a logarithmic scale. */
-static double positive(double value)
-{
-    return value > 0.0 ? value : 1.0;
-}
+static double positive(double value) { return value > 0.0 ? value : 1.0; }
 
 static double scale_of(double value, double low, double high)
 {

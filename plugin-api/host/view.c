@@ -5,10 +5,7 @@
 
 #include "base/half.h"
 
-static size_t pixels_of(const struct lull_host_view *v)
-{
-    return (size_t)(v->x1 - v->x0) * (size_t)(v->y1 - v->y0);
-}
+static size_t pixels_of(const struct lull_host_view *v) { return (size_t)(v->x1 - v->x0) * (size_t)(v->y1 - v->y0); }
 
 /* Index of a pixel in an array over the view. */
 static size_t at(const struct lull_host_view *v, int32_t x, int32_t y)
@@ -21,8 +18,13 @@ static struct lull_plane plane_of(const struct lull_host_view *v, const void *da
                                   int32_t type, int32_t normaliser)
 {
     int64_t pixel = (int64_t)(channels * size);
-    return (struct lull_plane){.data = data, .stride_x = pixel, .stride_y = pixel * (v->x1 - v->x0),
-                               .stride_c = (int64_t)size, .scale = 1.0, .type = type, .normaliser = normaliser,
+    return (struct lull_plane){.data = data,
+                               .stride_x = pixel,
+                               .stride_y = pixel * (v->x1 - v->x0),
+                               .stride_c = (int64_t)size,
+                               .scale = 1.0,
+                               .type = type,
+                               .normaliser = normaliser,
                                .channels = channels};
 }
 

@@ -31,7 +31,7 @@ struct peers {
     struct base_peers face; /* first: what callers see */
     struct base_peer *list; /* owns; [count] */
     MPI_Comm world;
-    struct parcel *sent;    /* owns; [room] */
+    struct parcel *sent; /* owns; [room] */
     size_t count, room;
     struct arrival coming;
 };

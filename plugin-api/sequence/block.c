@@ -33,8 +33,11 @@ static int parse_planes(const char *path, const struct seq_block *b, const uint8
         struct seq_plane *s = &r->planes[i];
         if (end - p < SEQ_PLANE_HEADER)
             return base_fail(err, BASE_EINVAL, "%s: %u spp: plane %u is cut short", path, r->spp, i);
-        *s = (struct seq_plane){.plane = base_get_u32(p), .filter = base_get_u32(p + 4), .raw_bytes = base_get_u32(p + 8),
-                                .stored_bytes = base_get_u32(p + 12), .stored = p + SEQ_PLANE_HEADER};
+        *s = (struct seq_plane){.plane = base_get_u32(p),
+                                .filter = base_get_u32(p + 4),
+                                .raw_bytes = base_get_u32(p + 8),
+                                .stored_bytes = base_get_u32(p + 12),
+                                .stored = p + SEQ_PLANE_HEADER};
         p += SEQ_PLANE_HEADER;
         if ((size_t)(end - p) < s->stored_bytes)
             return base_fail(err, BASE_EINVAL, "%s: %u spp: plane %u is cut short", path, r->spp, i);
@@ -66,15 +69,16 @@ static int parse_record(const char *path, struct seq_block *b, uint32_t index, u
     if (b->size - *at - SEQ_RECORD_HEADER < payload)
         return base_fail(err, BASE_EINVAL, "%s: truncated: %u of %u images", path, index, count);
     struct seq_record *r = &b->levels[index];
-    *r = (struct seq_record){.spp = base_get_u32(p + 4), .half_spp = base_get_u32(p + 8), .n_stats = base_get_u32(p + 12),
+    *r = (struct seq_record){.spp = base_get_u32(p + 4),
+                             .half_spp = base_get_u32(p + 8),
+                             .n_stats = base_get_u32(p + 12),
                              .n_planes = base_get_u32(p + 16)};
     p += SEQ_RECORD_HEADER;
     if (seq_crc(p, payload) != base_get_u32(p - 8))
         return base_fail(err, BASE_EINVAL, "%s: image at %u spp is damaged (CRC)", path, r->spp);
     if ((kind != SEQ_KIND_LEVEL && kind != SEQ_KIND_REFERENCE) || (kind == SEQ_KIND_REFERENCE && index + 1 != count) ||
-        r->spp == 0 ||
-        r->half_spp > r->spp || r->n_stats > SEQ_MAX_STATS || r->n_planes < 1 || r->n_planes > SEQ_MAX_PLANES ||
-        (size_t)r->n_stats * SEQ_STAT_BYTES > payload) {
+        r->spp == 0 || r->half_spp > r->spp || r->n_stats > SEQ_MAX_STATS || r->n_planes < 1 ||
+        r->n_planes > SEQ_MAX_PLANES || (size_t)r->n_stats * SEQ_STAT_BYTES > payload) {
         r->n_stats = 0;
         return base_fail(err, BASE_EINVAL, "%s: header of image %u makes no sense", path, index);
     }
@@ -104,9 +108,12 @@ static int parse_header(const char *path, const uint8_t *p, size_t size, struct 
         return base_fail(err, BASE_EINVAL, "%s: version %u of the format is not known", path, base_get_u32(p + 8));
     if (seq_crc(p, 60) != base_get_u32(p + 60))
         return base_fail(err, BASE_EINVAL, "%s: the header is damaged (CRC)", path);
-    *b = (struct seq_block){.width = base_get_u32(p + 16), .height = base_get_u32(p + 20),
-                            .x0 = (int32_t)base_get_u32(p + 24), .y0 = (int32_t)base_get_u32(p + 28),
-                            .id = base_get_u32(p + 32), .seed = base_get_u64(p + 40)};
+    *b = (struct seq_block){.width = base_get_u32(p + 16),
+                            .height = base_get_u32(p + 20),
+                            .x0 = (int32_t)base_get_u32(p + 24),
+                            .y0 = (int32_t)base_get_u32(p + 28),
+                            .id = base_get_u32(p + 32),
+                            .seed = base_get_u64(p + 40)};
     *count = base_get_u32(p + 36);
     if (b->width < 1 || b->width > SEQ_MAX_SIDE || b->height < 1 || b->height > SEQ_MAX_SIDE || *count < 1 ||
         *count > SEQ_MAX_RECORDS)
@@ -179,15 +186,9 @@ static const struct seq_plane *find_plane(const struct seq_record *r, enum seq_p
     return NULL;
 }
 
-int seq_has(const struct seq_record *r, enum seq_plane_number plane)
-{
-    return find_plane(r, plane) != NULL;
-}
+int seq_has(const struct seq_record *r, enum seq_plane_number plane) { return find_plane(r, plane) != NULL; }
 
-int seq_has_halves(const struct seq_record *r)
-{
-    return seq_has(r, SEQ_PLANE_HALF_LOG) || seq_has(r, SEQ_PLANE_HALF_F16);
-}
+int seq_has_halves(const struct seq_record *r) { return seq_has(r, SEQ_PLANE_HALF_LOG) || seq_has(r, SEQ_PLANE_HALF_F16); }
 
 const struct seq_record *seq_full_level(const struct seq_block *b)
 {
@@ -214,8 +215,8 @@ const struct seq_record *seq_level(const struct seq_block *b, uint32_t spp)
 }
 
 /* Inflates a plane and undoes its filters. raw has the plane's raw size. */
-static int load_plane(const struct seq_block *b, const struct seq_record *r, enum seq_plane_number plane,
-                      uint8_t *raw, struct base_err *err)
+static int load_plane(const struct seq_block *b, const struct seq_record *r, enum seq_plane_number plane, uint8_t *raw,
+                      struct base_err *err)
 {
     const struct seq_plane *s = find_plane(r, plane);
     if (!s)
@@ -228,8 +229,8 @@ static int load_plane(const struct seq_block *b, const struct seq_record *r, enu
 }
 
 /* As load_plane, into memory of its own. NULL on failure. */
-static uint8_t *load_plane_new(const struct seq_block *b, const struct seq_record *r, enum seq_plane_number plane,
-                               int *rc, struct base_err *err)
+static uint8_t *load_plane_new(const struct seq_block *b, const struct seq_record *r, enum seq_plane_number plane, int *rc,
+                               struct base_err *err)
 {
     uint8_t *raw = malloc(seq_plane_raw_bytes((uint32_t)plane, b->width, b->height));
     *rc = !raw ? base_fail_nomem(err, "plane") : load_plane(b, r, plane, raw, err);
@@ -258,8 +259,8 @@ int seq_display(const struct seq_block *b, const struct seq_record *r, uint8_t *
     return 0;
 }
 
-static int load_f16(const struct seq_block *b, const struct seq_record *r, enum seq_plane_number plane,
-                    float *out, struct base_err *err)
+static int load_f16(const struct seq_block *b, const struct seq_record *r, enum seq_plane_number plane, float *out,
+                    struct base_err *err)
 {
     int rc;
     size_t n = 3 * (size_t)b->width * b->height;
@@ -333,4 +334,3 @@ int seq_half_luminance(const struct seq_block *b, const struct seq_record *r, fl
     free(rgb);
     return rc;
 }
-

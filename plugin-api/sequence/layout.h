@@ -18,9 +18,6 @@ enum {
     SEQ_KIND_REFERENCE = 2
 };
 
-static inline uint32_t seq_crc(const uint8_t *bytes, size_t size)
-{
-    return (uint32_t)crc32_z(0, bytes, size);
-}
+static inline uint32_t seq_crc(const uint8_t *bytes, size_t size) { return (uint32_t)crc32_z(0, bytes, size); }
 
 #endif

@@ -59,7 +59,7 @@ static int get_levels(const char *path, const cJSON *root, struct seq_manifest *
     m->levels = malloc((size_t)n * sizeof *m->levels);
     if (!m->levels)
         return base_fail_nomem(err, path);
-    cJSON_ArrayForEach(v, levels) {
+    cJSON_ArrayForEach (v, levels) {
         if (!cJSON_IsNumber(v) || !(v->valuedouble >= 1 && v->valuedouble <= MAX_SPP) ||
             (m->n_levels > 0 && v->valuedouble <= m->levels[m->n_levels - 1]))
             return base_fail(err, BASE_EINVAL, "%s: level %u does not rise", path, m->n_levels);
@@ -77,12 +77,17 @@ static int get_block(const cJSON *o, const struct seq_manifest *m, struct seq_ma
     if (!get_number(o, "id", 0, UINT32_MAX, &id) || !get_number(o, "x0", 0, m->width - 1.0, &x0) ||
         !get_number(o, "y0", 0, m->height - 1.0, &y0) || !get_number(o, "x1", x0 + 1, m->width, &x1) ||
         !get_number(o, "y1", y0 + 1, m->height, &y1) || !get_number(o, "bytes", 1, 1 << 30, &bytes) ||
-        (cJSON_HasObjectItem(o, "dropped") && !get_number(o, "dropped", 0, 1e15, &dropped)) ||
-        !get_crc(o, "crc32", &crc) || !cJSON_IsString(file) || strlen(file->valuestring) >= sizeof b->file ||
-        strchr(file->valuestring, '/') || file->valuestring[0] == '.' || file->valuestring[0] == '\0')
+        (cJSON_HasObjectItem(o, "dropped") && !get_number(o, "dropped", 0, 1e15, &dropped)) || !get_crc(o, "crc32", &crc) ||
+        !cJSON_IsString(file) || strlen(file->valuestring) >= sizeof b->file || strchr(file->valuestring, '/') ||
+        file->valuestring[0] == '.' || file->valuestring[0] == '\0')
         return 0;
-    *b = (struct seq_manifest_block){.id = (uint32_t)id, .x0 = (uint32_t)x0, .y0 = (uint32_t)y0, .x1 = (uint32_t)x1,
-                                     .y1 = (uint32_t)y1, .bytes = (uint64_t)bytes, .crc32 = crc,
+    *b = (struct seq_manifest_block){.id = (uint32_t)id,
+                                     .x0 = (uint32_t)x0,
+                                     .y0 = (uint32_t)y0,
+                                     .x1 = (uint32_t)x1,
+                                     .y1 = (uint32_t)y1,
+                                     .bytes = (uint64_t)bytes,
+                                     .crc32 = crc,
                                      .seconds = cJSON_IsNumber(seconds) ? seconds->valuedouble : 0.0,
                                      .dropped = (uint64_t)dropped};
     strcpy(b->file, file->valuestring);
@@ -98,7 +103,7 @@ static int get_blocks(const char *path, const cJSON *root, struct seq_manifest *
     m->blocks = malloc((n > 0 ? (size_t)n : 1) * sizeof *m->blocks);
     if (!m->blocks)
         return base_fail_nomem(err, path);
-    cJSON_ArrayForEach(v, blocks) {
+    cJSON_ArrayForEach (v, blocks) {
         if (!get_block(v, m, &m->blocks[m->n_blocks]))
             return base_fail(err, BASE_EINVAL, "%s: entry %u of blocks is not usable", path, m->n_blocks);
         m->n_blocks++;
@@ -118,7 +123,7 @@ static int get_view(const char *path, const cJSON *root, struct seq_manifest *m,
     int n = 0;
     if (look_at && (!cJSON_IsArray(look_at) || cJSON_GetArraySize(look_at) != 9))
         return base_fail(err, BASE_EINVAL, "%s: look_at is not nine numbers", path);
-    cJSON_ArrayForEach(v, look_at) {
+    cJSON_ArrayForEach (v, look_at) {
         if (!cJSON_IsNumber(v))
             return base_fail(err, BASE_EINVAL, "%s: look_at is not nine numbers", path);
         m->look_at[n++] = v->valuedouble;

@@ -17,15 +17,15 @@ struct seq_manifest_block {
     char file[64]; /* a plain name inside the folder */
     uint64_t bytes;
     uint32_t crc32;
-    double seconds; /* wall time that recording it took; 0: not known */
+    double seconds;   /* wall time that recording it took; 0: not known */
     uint64_t dropped; /* samples, of levels and reference, that were not finite and count as not taken */
 };
 
 struct seq_manifest {
     char scene[SEQ_MANIFEST_NAME], camera[SEQ_MANIFEST_NAME], renderer[SEQ_MANIFEST_NAME];
     char source[SEQ_MANIFEST_PATH];
-    uint32_t source_crc32;         /* 0: not known */
-    uint32_t inputs_crc32;         /* of the source and every file it named (base/inputs.h); 0: not known */
+    uint32_t source_crc32; /* 0: not known */
+    uint32_t inputs_crc32; /* of the source and every file it named (base/inputs.h); 0: not known */
     int has_look_at;
     double look_at[9];             /* eye, point looked at, up: instead of the source's camera, with has_look_at */
     double fov_deg;                /* 0: the source's */

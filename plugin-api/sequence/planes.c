@@ -12,15 +12,11 @@ size_t seq_plane_raw_bytes(uint32_t plane, uint32_t width, uint32_t height)
     size_t pixels = (size_t)width * height;
     switch (plane) {
     case SEQ_PLANE_DISPLAY:
-    case SEQ_PLANE_FINE:
-        return 3 * pixels;
-    case SEQ_PLANE_HALF_LOG:
-        return pixels;
+    case SEQ_PLANE_FINE: return 3 * pixels;
+    case SEQ_PLANE_HALF_LOG: return pixels;
     case SEQ_PLANE_MEAN_F16:
-    case SEQ_PLANE_HALF_F16:
-        return 6 * pixels;
-    default:
-        return 0;
+    case SEQ_PLANE_HALF_F16: return 6 * pixels;
+    default: return 0;
     }
 }
 
@@ -28,13 +24,10 @@ uint32_t seq_plane_filters(uint32_t plane)
 {
     switch (plane) {
     case SEQ_PLANE_DISPLAY:
-    case SEQ_PLANE_FINE:
-        return SEQ_FILTER_AVERAGE | SEQ_FILTER_GREEN;
+    case SEQ_PLANE_FINE: return SEQ_FILTER_AVERAGE | SEQ_FILTER_GREEN;
     case SEQ_PLANE_MEAN_F16:
-    case SEQ_PLANE_HALF_F16:
-        return SEQ_FILTER_SHUFFLE;
-    default:
-        return 0;
+    case SEQ_PLANE_HALF_F16: return SEQ_FILTER_SHUFFLE;
+    default: return 0;
     }
 }
 
@@ -83,8 +76,7 @@ static void green(uint8_t *data, size_t pixels, int undo)
         }
 }
 
-int seq_plane_unfilter(uint32_t plane, uint32_t filter, uint8_t *data, uint32_t width, uint32_t height,
-                       struct base_err *err)
+int seq_plane_unfilter(uint32_t plane, uint32_t filter, uint8_t *data, uint32_t width, uint32_t height, struct base_err *err)
 {
     size_t pixels = (size_t)width * height;
     if ((filter & ~seq_plane_filters(plane)) != 0)
@@ -114,10 +106,7 @@ int seq_plane_filter(uint32_t plane, uint32_t filter, uint8_t *data, uint32_t wi
     return 0;
 }
 
-uint16_t seq_half_float(double value)
-{
-    return isnan(value) ? 0 : base_f64_to_f16(fmin(fmax(value, -65504.0), 65504.0));
-}
+uint16_t seq_half_float(double value) { return isnan(value) ? 0 : base_f64_to_f16(fmin(fmax(value, -65504.0), 65504.0)); }
 
 uint8_t seq_fine_encode(uint8_t display, double x)
 {

@@ -10,7 +10,7 @@
 struct seq_tail {
     /* 99.9th percentile of the noise, element ceil(0.999 n) of the sorted values, over max(mean luminance, 1e-4) */
     double tail999;
-    double gini;    /* Gini coefficient of the noise: Σ (2i − n − 1) a_i / (n Σ a_i), a sorted ascending, i from 1 */
+    double gini; /* Gini coefficient of the noise: Σ (2i − n − 1) a_i / (n Σ a_i), a sorted ascending, i from 1 */
 };
 
 /* noise: |Y(D)| of n pixels, D the half-buffer difference that has the variance of the mean; finite; sorted in place. n 0:

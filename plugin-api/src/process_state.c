@@ -9,15 +9,9 @@
 
 enum { MXCSR_STATUS = 0x3f }; /* sticky exception flags: any arithmetic sets them */
 
-static unsigned long long fp_control_get(void)
-{
-    return _mm_getcsr() & ~(unsigned)MXCSR_STATUS;
-}
+static unsigned long long fp_control_get(void) { return _mm_getcsr() & ~(unsigned)MXCSR_STATUS; }
 
-static void fp_control_set(unsigned long long value)
-{
-    _mm_setcsr((unsigned)value | (_mm_getcsr() & MXCSR_STATUS));
-}
+static void fp_control_set(unsigned long long value) { _mm_setcsr((unsigned)value | (_mm_getcsr() & MXCSR_STATUS)); }
 #elif defined(__aarch64__)
 static unsigned long long fp_control_get(void)
 {
@@ -26,20 +20,11 @@ static unsigned long long fp_control_get(void)
     return value;
 }
 
-static void fp_control_set(unsigned long long value)
-{
-    __asm__ volatile("msr fpcr, %0" : : "r"(value));
-}
+static void fp_control_set(unsigned long long value) { __asm__ volatile("msr fpcr, %0" : : "r"(value)); }
 #else
-static unsigned long long fp_control_get(void)
-{
-    return 0;
-}
+static unsigned long long fp_control_get(void) { return 0; }
 
-static void fp_control_set(unsigned long long value)
-{
-    (void)value;
-}
+static void fp_control_set(unsigned long long value) { (void)value; }
 #endif
 
 void lull_process_state_read(struct lull_process_state *state)
@@ -54,7 +39,4 @@ void lull_process_state_read(struct lull_process_state *state)
     closedir(tasks);
 }
 
-void lull_process_state_restore(const struct lull_process_state *state)
-{
-    fp_control_set(state->fp_control);
-}
+void lull_process_state_restore(const struct lull_process_state *state) { fp_control_set(state->fp_control); }

@@ -51,8 +51,8 @@ int32_t lull_table_check(const struct lull_criterion *c, struct lull_error *err)
         return lull_error_set(err, LULL_E_INVALID, "its id is not of the form [a-z0-9.-]+");
     if (!c->name || !c->version || !c->description)
         return lull_error_set(err, LULL_E_INVALID, "%s: name, version or description is missing", c->id);
-    if (!c->create || !c->requirements || !c->begin_frame || !c->evaluate ||
-        !c->end_frame || !c->destroy || !c->get_extension)
+    if (!c->create || !c->requirements || !c->begin_frame || !c->evaluate || !c->end_frame || !c->destroy ||
+        !c->get_extension)
         return lull_error_set(err, LULL_E_INVALID, "%s: a function is missing", c->id);
     if (c->thread_level < LULL_THREADS_NONE || c->thread_level > LULL_THREADS_FULL)
         return lull_error_set(err, LULL_E_INVALID, "%s: unknown thread level %d", c->id, c->thread_level);

@@ -47,31 +47,16 @@ static int refused(void)
 
 #define INTERPOSE __attribute__((visibility("default"), used))
 
-INTERPOSE void *malloc(size_t size)
-{
-    return refused() ? NULL : __libc_malloc(size);
-}
+INTERPOSE void *malloc(size_t size) { return refused() ? NULL : __libc_malloc(size); }
 
-INTERPOSE void *calloc(size_t count, size_t size)
-{
-    return refused() ? NULL : __libc_calloc(count, size);
-}
+INTERPOSE void *calloc(size_t count, size_t size) { return refused() ? NULL : __libc_calloc(count, size); }
 
-INTERPOSE void *realloc(void *memory, size_t size)
-{
-    return refused() ? NULL : __libc_realloc(memory, size);
-}
+INTERPOSE void *realloc(void *memory, size_t size) { return refused() ? NULL : __libc_realloc(memory, size); }
 
-INTERPOSE void *aligned_alloc(size_t alignment, size_t size)
-{
-    return refused() ? NULL : __libc_memalign(alignment, size);
-}
+INTERPOSE void *aligned_alloc(size_t alignment, size_t size) { return refused() ? NULL : __libc_memalign(alignment, size); }
 
 INTERPOSE void *memalign(size_t alignment, size_t size);
-INTERPOSE void *memalign(size_t alignment, size_t size)
-{
-    return refused() ? NULL : __libc_memalign(alignment, size);
-}
+INTERPOSE void *memalign(size_t alignment, size_t size) { return refused() ? NULL : __libc_memalign(alignment, size); }
 
 INTERPOSE int posix_memalign(void **memory, size_t alignment, size_t size)
 {
@@ -82,30 +67,15 @@ INTERPOSE int posix_memalign(void **memory, size_t alignment, size_t size)
     return 0;
 }
 
-long lc_alloc_count(void)
-{
-    return atomic_load(&allocations);
-}
+long lc_alloc_count(void) { return atomic_load(&allocations); }
 
-void lc_alloc_fail_after(long k)
-{
-    atomic_store(&left, k);
-}
+void lc_alloc_fail_after(long k) { atomic_store(&left, k); }
 #else
 /* AddressSanitizer ends the process when it is asked for more memory than there is; malloc returns NULL. */
 __attribute__((visibility("default"), used)) const char *__asan_default_options(void);
-const char *__asan_default_options(void)
-{
-    return "allocator_may_return_null=1";
-}
+const char *__asan_default_options(void) { return "allocator_may_return_null=1"; }
 
-long lc_alloc_count(void)
-{
-    return -1;
-}
+long lc_alloc_count(void) { return -1; }
 
-void lc_alloc_fail_after(long k)
-{
-    (void)k;
-}
+void lc_alloc_fail_after(long k) { (void)k; }
 #endif

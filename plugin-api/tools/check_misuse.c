@@ -94,10 +94,7 @@ static void wrong(struct misuse *m, uint32_t codes, const char *what)
         m->codes |= codes;
 }
 
-static uint32_t too_small(struct misuse *m, size_t size)
-{
-    return 8 * draw(m, (uint32_t)(size / 8));
-}
+static uint32_t too_small(struct misuse *m, size_t size) { return 8 * draw(m, (uint32_t)(size / 8)); }
 
 /* --- one call ---------------------------------------------------------------------------------------------------------- */
 
@@ -221,31 +218,20 @@ static void spoil_value(struct misuse *m, struct create_call *k)
 static void spoil_create(struct misuse *m, struct create_call *k)
 {
     switch (draw(m, 8)) {
-    case 0:
-        wrong(m, INVALID, "no place for the instance"), k->no_place = 1;
-        break;
+    case 0: wrong(m, INVALID, "no place for the instance"), k->no_place = 1; break;
     case 1:
         wrong(m, INVALID, "pairs at NULL"), k->no_pairs = 1;
         k->pair_count += k->pair_count == 0;
         break;
-    case 2:
-        wrong(m, INVALID, "no key"), add_pair(k, NULL, "1");
-        break;
-    case 3:
-        wrong(m, INVALID | CODE(LULL_E_KEY), "no value"), add_pair(k, "no-such-parameter", NULL);
-        break;
-    case 4:
-        wrong(m, VERSION, "a short host"), k->host_size = too_small(m, sizeof k->host);
-        break;
+    case 2: wrong(m, INVALID, "no key"), add_pair(k, NULL, "1"); break;
+    case 3: wrong(m, INVALID | CODE(LULL_E_KEY), "no value"), add_pair(k, "no-such-parameter", NULL); break;
+    case 4: wrong(m, VERSION, "a short host"), k->host_size = too_small(m, sizeof k->host); break;
     case 5:
         wrong(m, SIZE, "a short stride of the pairs"), k->pair_stride = too_small(m, sizeof *k->pairs);
         k->pair_count += k->pair_count == 0;
         break;
-    case 6:
-        wrong(m, CODE(LULL_E_KEY), "an unknown key"), add_pair(k, gibberish(m, k), "1");
-        break;
-    default:
-        spoil_value(m, k);
+    case 6: wrong(m, CODE(LULL_E_KEY), "an unknown key"), add_pair(k, gibberish(m, k), "1"); break;
+    default: spoil_value(m, k);
     }
 }
 
@@ -304,23 +290,12 @@ struct frame_call {
 static void spoil_rect(struct misuse *m, const struct lull_frame *f, struct lull_rect *r)
 {
     switch (draw(m, 6)) {
-    case 0:
-        wrong(m, INVALID, "an empty block"), r->x1 = r->x0;
-        break;
-    case 1:
-        wrong(m, INVALID, "a block upside down"), r->y1 = INT32_MIN;
-        break;
-    case 2:
-        wrong(m, INVALID, "a block beyond the right edge"), r->x1 = (int32_t)f->width + 1;
-        break;
-    case 3:
-        wrong(m, INVALID, "a block below the picture"), r->y1 = draw(m, 2) ? (int32_t)f->height + 1 : INT32_MAX;
-        break;
-    case 4:
-        wrong(m, INVALID, "a block above the picture"), r->y0 = draw(m, 2) ? -1 : INT32_MIN;
-        break;
-    default:
-        wrong(m, INVALID, "a block left of the picture"), r->x0 = -1 - (int32_t)draw(m, INT_MAX);
+    case 0: wrong(m, INVALID, "an empty block"), r->x1 = r->x0; break;
+    case 1: wrong(m, INVALID, "a block upside down"), r->y1 = INT32_MIN; break;
+    case 2: wrong(m, INVALID, "a block beyond the right edge"), r->x1 = (int32_t)f->width + 1; break;
+    case 3: wrong(m, INVALID, "a block below the picture"), r->y1 = draw(m, 2) ? (int32_t)f->height + 1 : INT32_MAX; break;
+    case 4: wrong(m, INVALID, "a block above the picture"), r->y0 = draw(m, 2) ? -1 : INT32_MIN; break;
+    default: wrong(m, INVALID, "a block left of the picture"), r->x0 = -1 - (int32_t)draw(m, INT_MAX);
     }
 }
 
@@ -328,32 +303,15 @@ static void spoil_frame(struct misuse *m, struct frame_call *k)
 {
     const uint32_t needed = m->check->req.planes_required;
     switch (draw(m, needed ? 9 : 8)) {
-    case 0:
-        wrong(m, INVALID, "no instance"), m->instance = NULL;
-        break;
-    case 1:
-        wrong(m, INVALID, "no frame"), k->no_frame = 1;
-        break;
-    case 2:
-        wrong(m, VERSION, "a short frame"), k->size = too_small(m, sizeof k->frame);
-        break;
-    case 3:
-        wrong(m, INVALID, "blocks at NULL"), k->no_blocks = 1;
-        break;
-    case 4:
-        wrong(m, INVALID, "no blocks"), k->frame.block_count = 0;
-        break;
-    case 5:
-        wrong(m, SIZE, "a short stride of the blocks"), k->frame.block_stride = too_small(m, sizeof *k->rects);
-        break;
-    case 6:
-        wrong(m, INVALID, "an empty picture"), k->frame.width = 0;
-        break;
-    case 7:
-        spoil_rect(m, &k->frame, &k->rects[draw(m, k->frame.block_count + (k->frame.block_count == 0))]);
-        break;
-    default:
-        wrong(m, PLANE, "planes missing"), k->frame.planes &= ~needed;
+    case 0: wrong(m, INVALID, "no instance"), m->instance = NULL; break;
+    case 1: wrong(m, INVALID, "no frame"), k->no_frame = 1; break;
+    case 2: wrong(m, VERSION, "a short frame"), k->size = too_small(m, sizeof k->frame); break;
+    case 3: wrong(m, INVALID, "blocks at NULL"), k->no_blocks = 1; break;
+    case 4: wrong(m, INVALID, "no blocks"), k->frame.block_count = 0; break;
+    case 5: wrong(m, SIZE, "a short stride of the blocks"), k->frame.block_stride = too_small(m, sizeof *k->rects); break;
+    case 6: wrong(m, INVALID, "an empty picture"), k->frame.width = 0; break;
+    case 7: spoil_rect(m, &k->frame, &k->rects[draw(m, k->frame.block_count + (k->frame.block_count == 0))]); break;
+    default: wrong(m, PLANE, "planes missing"), k->frame.planes &= ~needed;
     }
 }
 
@@ -369,24 +327,14 @@ static void loosen_frame(struct misuse *m, struct frame_call *k)
 {
     struct lull_frame *f = &k->frame;
     switch (draw(m, 8)) {
-    case 0:
-        wrong(m, MAY, "blocks that overlap"), k->rects[0] = k->rects[f->block_count - 1];
-        break;
-    case 1:
-        wrong(m, MAY, "an exposure of nonsense"), f->exposure = nonsense(m);
-        break;
-    case 2:
-        wrong(m, MAY, "an unknown transfer"), f->transfer = (int32_t)draw(m, 5) + 3, f->gamma = nonsense(m);
-        break;
+    case 0: wrong(m, MAY, "blocks that overlap"), k->rects[0] = k->rects[f->block_count - 1]; break;
+    case 1: wrong(m, MAY, "an exposure of nonsense"), f->exposure = nonsense(m); break;
+    case 2: wrong(m, MAY, "an unknown transfer"), f->transfer = (int32_t)draw(m, 5) + 3, f->gamma = nonsense(m); break;
     case 3:
         wrong(m, MAY, "limits that contradict"), f->spp_min = 1 + draw(m, 1000), f->spp_max = draw(m, (uint32_t)f->spp_min);
         break;
-    case 4:
-        wrong(m, MAY, "a matrix of nonsense"), f->rgb_to_xyz[draw(m, 9)] = nonsense(m);
-        break;
-    case 5:
-        wrong(m, MAY, "times of nonsense"), f->time_budget_s = nonsense(m), f->sample_clamp = nonsense(m);
-        break;
+    case 4: wrong(m, MAY, "a matrix of nonsense"), f->rgb_to_xyz[draw(m, 9)] = nonsense(m); break;
+    case 5: wrong(m, MAY, "times of nonsense"), f->time_budget_s = nonsense(m), f->sample_clamp = nonsense(m); break;
     case 6:
         wrong(m, MAY, "unknown flags and planes"), f->flags |= 1u << (4 + draw(m, 28)), f->planes |= 1u << (8 + draw(m, 24));
         break;
@@ -452,21 +400,15 @@ static void spoil_plane(struct misuse *m, struct evaluate_call *k)
         plane = (plane + 1) % LULL_PLANE_COUNT;
     struct lull_plane *p = &k->planes[plane];
     switch (draw(m, 7)) {
-    case 0:
-        wrong(m, PLANE, "a plane at NULL"), p->data = NULL;
-        break;
-    case 1:
-        wrong(m, PLANE, "too few planes"), k->view.plane_count = draw(m, plane + 1);
-        break;
+    case 0: wrong(m, PLANE, "a plane at NULL"), p->data = NULL; break;
+    case 1: wrong(m, PLANE, "too few planes"), k->view.plane_count = draw(m, plane + 1); break;
     case 2:
         wrong(m, PLANE, "a plane of an unknown type"), p->type = draw(m, 2) ? 4 + (int32_t)draw(m, INT_MAX - 4) : -1;
         break;
     case 3:
         wrong(m, PLANE, "a plane of an unknown normaliser"), p->normaliser = draw(m, 2) ? 4 + (int32_t)draw(m, 99) : INT_MIN;
         break;
-    case 4:
-        wrong(m, PLANE, "a plane of too few channels"), p->channels = draw(m, lc_plane_channels[plane]);
-        break;
+    case 4: wrong(m, PLANE, "a plane of too few channels"), p->channels = draw(m, lc_plane_channels[plane]); break;
     case 5:
         wrong(m, PLANE, "a plane of a scale that is none"), p->scale = scales[draw(m, sizeof scales / sizeof *scales)];
         break;
@@ -485,20 +427,11 @@ static void spoil_block(struct misuse *m, struct evaluate_call *k)
     case 0:
         wrong(m, INVALID, "a block that the frame has not"), b->id = m->s.film.block_count + (far ? 1000000 * some : 0);
         break;
-    case 1:
-        wrong(m, INVALID, "block 4294967295"), b->id = UINT32_MAX;
-        break;
-    case 2:
-        wrong(m, INVALID, "an empty block"), b->y1 = b->y0;
-        break;
-    case 3:
-        wrong(m, INVALID, "a block from right to left"), b->x0 = b->x1 + (int32_t)some;
-        break;
-    case 4:
-        wrong(m, INVALID, "a block beyond the view"), b->y1 = far ? INT32_MAX : v->y1 + 1;
-        break;
-    default:
-        wrong(m, INVALID, "a view that does not hold a block"), *(some % 2 ? &v->x1 : &v->y1) = far ? INT32_MIN : 0;
+    case 1: wrong(m, INVALID, "block 4294967295"), b->id = UINT32_MAX; break;
+    case 2: wrong(m, INVALID, "an empty block"), b->y1 = b->y0; break;
+    case 3: wrong(m, INVALID, "a block from right to left"), b->x0 = b->x1 + (int32_t)some; break;
+    case 4: wrong(m, INVALID, "a block beyond the view"), b->y1 = far ? INT32_MAX : v->y1 + 1; break;
+    default: wrong(m, INVALID, "a view that does not hold a block"), *(some % 2 ? &v->x1 : &v->y1) = far ? INT32_MIN : 0;
     }
 }
 
@@ -506,41 +439,24 @@ static void spoil_evaluate(struct misuse *m, struct evaluate_call *k)
 {
     const uint32_t needed = m->check->req.planes_required;
     switch (draw(m, needed ? 14 : 9)) {
-    case 0:
-        wrong(m, INVALID, "no instance"), m->instance = NULL;
-        break;
-    case 1:
-        wrong(m, INVALID, "no view"), k->no_view = 1;
-        break;
-    case 2:
-        wrong(m, INVALID, "blocks at NULL"), k->no_blocks = 1;
-        break;
-    case 3:
-        wrong(m, INVALID, "decisions at NULL"), k->no_decisions = 1;
-        break;
-    case 4:
-        wrong(m, VERSION, "a short view"), k->size = too_small(m, sizeof k->view);
-        break;
-    case 5:
-        wrong(m, SIZE, "a short stride of the blocks"), k->block_stride = too_small(m, sizeof *k->blocks);
-        break;
+    case 0: wrong(m, INVALID, "no instance"), m->instance = NULL; break;
+    case 1: wrong(m, INVALID, "no view"), k->no_view = 1; break;
+    case 2: wrong(m, INVALID, "blocks at NULL"), k->no_blocks = 1; break;
+    case 3: wrong(m, INVALID, "decisions at NULL"), k->no_decisions = 1; break;
+    case 4: wrong(m, VERSION, "a short view"), k->size = too_small(m, sizeof k->view); break;
+    case 5: wrong(m, SIZE, "a short stride of the blocks"), k->block_stride = too_small(m, sizeof *k->blocks); break;
     case 6:
         wrong(m, SIZE, "a short stride of the decisions");
         k->decision_stride = too_small(m, sizeof(struct lull_decision));
         break;
-    case 9:
-        wrong(m, INVALID | PLANE, "planes at NULL"), k->no_planes = 1;
-        break;
+    case 9: wrong(m, INVALID | PLANE, "planes at NULL"), k->no_planes = 1; break;
     case 10:
         wrong(m, SIZE | PLANE, "a short stride of the planes"), k->view.plane_stride = too_small(m, sizeof *k->planes);
         break;
     case 11:
     case 12:
-    case 13:
-        spoil_plane(m, k);
-        break;
-    default:
-        spoil_block(m, k);
+    case 13: spoil_plane(m, k); break;
+    default: spoil_block(m, k);
     }
 }
 
@@ -555,24 +471,12 @@ static void loosen_evaluate(struct misuse *m, struct evaluate_call *k)
         wrong(m, MAY, "a block of another rectangle");
         b->x0 = v->x0, b->y0 = v->y0, b->x1 = v->x1 - (int32_t)draw(m, 2), b->y1 = v->y1;
         break;
-    case 1:
-        wrong(m, MAY, "fewer samples than before"), b->spp /= 2, b->half_spp = b->spp / 2;
-        break;
-    case 2:
-        wrong(m, MAY, "more samples than can be"), b->spp = UINT64_MAX >> draw(m, 16), b->half_spp = b->spp / 2;
-        break;
-    case 3:
-        wrong(m, MAY, "more samples in HALF than in all"), b->half_spp = b->spp + 1 + draw(m, 1000);
-        break;
-    case 4:
-        wrong(m, MAY, "a block twice"), *b = k->blocks[0];
-        break;
-    case 5:
-        wrong(m, MAY, "unknown flags"), b->flags = 1u << (2 + draw(m, 30)), v->flags = 1u << draw(m, 32);
-        break;
-    case 6:
-        wrong(m, MAY, "times of nonsense"), b->thread_s = nonsense(m), v->elapsed_s = nonsense(m);
-        break;
+    case 1: wrong(m, MAY, "fewer samples than before"), b->spp /= 2, b->half_spp = b->spp / 2; break;
+    case 2: wrong(m, MAY, "more samples than can be"), b->spp = UINT64_MAX >> draw(m, 16), b->half_spp = b->spp / 2; break;
+    case 3: wrong(m, MAY, "more samples in HALF than in all"), b->half_spp = b->spp + 1 + draw(m, 1000); break;
+    case 4: wrong(m, MAY, "a block twice"), *b = k->blocks[0]; break;
+    case 5: wrong(m, MAY, "unknown flags"), b->flags = 1u << (2 + draw(m, 30)), v->flags = 1u << draw(m, 32); break;
+    case 6: wrong(m, MAY, "times of nonsense"), b->thread_s = nonsense(m), v->elapsed_s = nonsense(m); break;
     default:
         wrong(m, MAY, "states of all blocks that are none"), v->all_stride = 0, v->all_count = draw(m, 2) ? 1 : v->all_count;
         if (draw(m, 2))

@@ -134,24 +134,12 @@ static int32_t ask_spoilt(struct lc *c, unsigned plane, enum spoil spoil)
     if (s.film.block_count <= 16 && lc_session_image(&s, &image) == 0) {
         struct lull_plane *p = lc_image_plane(&image, plane);
         switch (spoil) {
-        case SPOIL_ABSENT:
-            p->data = NULL;
-            break;
-        case SPOIL_CUT:
-            image.view.plane_count = plane;
-            break;
-        case SPOIL_TYPE:
-            p->type = 99;
-            break;
-        case SPOIL_NORMALISER:
-            p->normaliser = -1;
-            break;
-        case SPOIL_CHANNELS:
-            p->channels = lc_plane_channels[plane] - 1;
-            break;
-        default:
-            p->normaliser = LULL_NORM_WEIGHT;
-            lc_image_plane(&image, LULL_PLANE_WEIGHT)->data = NULL;
+        case SPOIL_ABSENT: p->data = NULL; break;
+        case SPOIL_CUT: image.view.plane_count = plane; break;
+        case SPOIL_TYPE: p->type = 99; break;
+        case SPOIL_NORMALISER: p->normaliser = -1; break;
+        case SPOIL_CHANNELS: p->channels = lc_plane_channels[plane] - 1; break;
+        default: p->normaliser = LULL_NORM_WEIGHT; lc_image_plane(&image, LULL_PLANE_WEIGHT)->data = NULL;
         }
         status = lc_session_ask(&s, &image, &id, 1, decision, &err);
         lc_image_release(&image);

@@ -27,10 +27,7 @@ static int guarded_init(struct lc *c, struct guarded *g, const void *from, size_
     return 0;
 }
 
-static void guarded_release(struct guarded *g)
-{
-    lc_guard_free(g->at, g->mapped);
-}
+static void guarded_release(struct guarded *g) { lc_guard_free(g->at, g->mapped); }
 
 /* Every struct that the host passes, each of so many bytes fewer than in version 1.0. */
 struct short_structs {

@@ -38,13 +38,13 @@ static void report_line(struct lc *c, char kind, const char *format, va_list arg
     pthread_mutex_unlock(&report_mutex);
 }
 
-#define REPORT_FUNCTION(name, kind)                                                                                         \
-    void name(struct lc *c, const char *format, ...)                                                                        \
-    {                                                                                                                       \
-        va_list args;                                                                                                       \
-        va_start(args, format);                                                                                             \
-        report_line(c, kind, format, args);                                                                                 \
-        va_end(args);                                                                                                       \
+#define REPORT_FUNCTION(name, kind) \
+    void name(struct lc *c, const char *format, ...) \
+    { \
+        va_list args; \
+        va_start(args, format); \
+        report_line(c, kind, format, args); \
+        va_end(args); \
     }
 REPORT_FUNCTION(lc_fail, 'F')
 REPORT_FUNCTION(lc_note, 'N')

@@ -207,10 +207,7 @@ void lc_guard_free(void *memory, size_t mapped)
 
 /* --- image ----------------------------------------------------------------------------------------------------------- */
 
-static size_t type_size(int32_t type)
-{
-    return type == LULL_TYPE_F64 ? 8 : type == LULL_TYPE_F16 ? 2 : 4;
-}
+static size_t type_size(int32_t type) { return type == LULL_TYPE_F64 ? 8 : type == LULL_TYPE_F16 ? 2 : 4; }
 
 static void store(char *at, int32_t type, double v)
 {
@@ -220,9 +217,7 @@ static void store(char *at, int32_t type, double v)
         memcpy(at, &h, sizeof h);
         break;
     }
-    case LULL_TYPE_F64:
-        memcpy(at, &v, sizeof v);
-        break;
+    case LULL_TYPE_F64: memcpy(at, &v, sizeof v); break;
     case LULL_TYPE_U32: {
         uint32_t u = v > 0 && v < 4294967295.0 ? (uint32_t)llrint(v) : 0;
         memcpy(at, &u, sizeof u);

@@ -269,9 +269,12 @@ static int check_criterion(const struct arguments *a, struct lc *c, const char *
 
 static int check_spec(const struct arguments *a, const char *spec, struct totals *t)
 {
-    struct lc c = {
-        .pairs = a->pairs, .pair_count = a->pair_count, .workers = a->workers, .seed = a->seed, .misuse = a->misuse,
-        .required_only = a->required_only};
+    struct lc c = {.pairs = a->pairs,
+                   .pair_count = a->pair_count,
+                   .workers = a->workers,
+                   .seed = a->seed,
+                   .misuse = a->misuse,
+                   .required_only = a->required_only};
     struct lc_report *r = malloc(sizeof *r);
     if (!r || lc_child_run(&c, find, spec, a->limit_s, r) != 0) {
         free(r);

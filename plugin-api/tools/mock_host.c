@@ -89,10 +89,7 @@ static void log_line(const struct lull_host *host, int32_t level, const char *te
         lc_fail(h->check, "log: not one line of a known level");
 }
 
-static int32_t cancelled(const struct lull_host *host)
-{
-    return ((const struct lc_host *)host->context)->cancel;
-}
+static int32_t cancelled(const struct lull_host *host) { return ((const struct lc_host *)host->context)->cancel; }
 
 static const void *get_extension(const struct lull_host *host, const char *id)
 {

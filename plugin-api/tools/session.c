@@ -17,10 +17,7 @@ static double now_s(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-int lc_deterministic(const struct lc *c)
-{
-    return (c->criterion->capabilities & LULL_CAP_DETERMINISTIC) != 0;
-}
+int lc_deterministic(const struct lc *c) { return (c->criterion->capabilities & LULL_CAP_DETERMINISTIC) != 0; }
 
 void lc_fp_check(struct lc *c, const struct lull_process_state *before, const char *call)
 {

@@ -31,10 +31,7 @@ struct render {
 };
 
 /* rgb_to_xyz's second row is (0.25, 0.5, 0.25) below: simple numbers for exact expectations. */
-static double luminance(const double rgb[3])
-{
-    return 0.25 * rgb[0] + 0.5 * rgb[1] + 0.25 * rgb[2];
-}
+static double luminance(const double rgb[3]) { return 0.25 * rgb[0] + 0.5 * rgb[1] + 0.25 * rgb[2]; }
 
 typedef void (*sample_fn)(struct render *r, int pixel, double rgb[3]);
 

@@ -164,10 +164,7 @@ static void start(struct session *s, const char *kind, const char *picture)
     begin(s, W, H, picture, GIVEN, 0);
 }
 
-static void end(struct session *s)
-{
-    s->criterion->destroy(s->in);
-}
+static void end(struct session *s) { s->criterion->destroy(s->in); }
 
 /* --- what is seen ------------------------------------------------------------------------------------------------------ */
 
@@ -385,11 +382,11 @@ int main(void)
     if (api_folder(criteria, sizeof criteria, API_CRITERIA) != 0 || api_folder(stub, sizeof stub, "../oidn-stub") != 0)
         return 1;
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(two_looks_stop), cmocka_unit_test(stripes_below_the_noise),
-        cmocka_unit_test(a_small_place),  cmocka_unit_test(the_blend_is_no_worse_than_the_noise),
-        cmocka_unit_test(hard_pixels),    cmocka_unit_test(sizes),
+        cmocka_unit_test(two_looks_stop),    cmocka_unit_test(stripes_below_the_noise),
+        cmocka_unit_test(a_small_place),     cmocka_unit_test(the_blend_is_no_worse_than_the_noise),
+        cmocka_unit_test(hard_pixels),       cmocka_unit_test(sizes),
         cmocka_unit_test(failing_denoisers), cmocka_unit_test(no_library),
-        cmocka_unit_test(warns_once),     cmocka_unit_test(neighbours),
+        cmocka_unit_test(warns_once),        cmocka_unit_test(neighbours),
     };
     return cmocka_run_group_tests_name("denoised_criterion", tests, NULL, NULL);
 }

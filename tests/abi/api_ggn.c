@@ -36,8 +36,15 @@ static const char *warned(const char *model, uint32_t planes)
     struct lull_instance *in = NULL;
     struct lull_pair pair = {"model", model};
     struct lull_rect rect = {0, 0, SIDE, SIDE};
-    struct lull_frame frame = {.struct_size = sizeof frame, .width = SIDE, .height = SIDE, .blocks = &rect, .block_count = 1,
-                               .block_stride = sizeof rect, .planes = planes, .exposure = 1, .transfer = LULL_TRANSFER_SRGB,
+    struct lull_frame frame = {.struct_size = sizeof frame,
+                               .width = SIDE,
+                               .height = SIDE,
+                               .blocks = &rect,
+                               .block_count = 1,
+                               .block_stride = sizeof rect,
+                               .planes = planes,
+                               .exposure = 1,
+                               .transfer = LULL_TRANSFER_SRGB,
                                .rgb_to_xyz = {0, 0, 0, 0.2, 0.7, 0.1, 0, 0, 0}};
     warning[0] = '\0';
     if (lull_open(&search, "ggn", &found, &err) != LULL_OK ||
@@ -61,10 +68,11 @@ static void a_missing_half_is_told(void **state)
 /* The last value that each parameter takes, and the first that it does not. */
 static void ends_of_ranges(void **state)
 {
-    static const char *const cases[][3] = {{"first-spp", "1", "0"},  {"first-spp", "1000000000", "1000000001"}, {"visible", "1", "1.01"},
-                                           {"visible", "0", "-0.1"}, {"passes", "1", "0"},                      {"gate", "0", "-1"},
-                                           {"tail", "0", "-0.1"},    {"gini", "2", "2.01"},                     {"gini", "0", "-0.1"},
-                                           {"precision", "bf16", "f16"}};
+    static const char *const cases[][3] = {{"first-spp", "1", "0"},  {"first-spp", "1000000000", "1000000001"},
+                                           {"visible", "1", "1.01"}, {"visible", "0", "-0.1"},
+                                           {"passes", "1", "0"},     {"gate", "0", "-1"},
+                                           {"tail", "0", "-0.1"},    {"gini", "2", "2.01"},
+                                           {"gini", "0", "-0.1"},    {"precision", "bf16", "f16"}};
     const char *dirs[] = {criteria};
     struct lull_search search = {.dirs = dirs, .dir_count = 1};
     struct lull_found found;

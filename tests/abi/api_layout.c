@@ -27,14 +27,14 @@ struct layout {
     size_t count;
 };
 
-#define F(T, field)                                                                                                         \
-    {                                                                                                                       \
-#field, offsetof(struct T, field), sizeof(((struct T *)0)->field)                                                   \
+#define F(T, field) \
+    { \
+#field, offsetof(struct T, field), sizeof(((struct T *)0)->field) \
     }
 #define LAYOUT(T, ...) static const struct field T##_fields[] = {__VA_ARGS__}
-#define ENTRY(T)                                                                                                            \
-    {                                                                                                                       \
-#T, sizeof(struct T), T##_fields, sizeof T##_fields / sizeof *T##_fields                                            \
+#define ENTRY(T) \
+    { \
+#T, sizeof(struct T), T##_fields, sizeof T##_fields / sizeof *T##_fields \
     }
 
 LAYOUT(lull_error, F(lull_error, struct_size), F(lull_error, code), F(lull_error, message));
@@ -81,9 +81,9 @@ LAYOUT(lull_host_config, F(lull_host_config, struct_size), F(lull_host_config, f
        F(lull_host_config, crop), F(lull_host_config, layout), F(lull_host_config, layout_count),
        F(lull_host_config, layout_stride), F(lull_host_config, planes), F(lull_host_config, transfer),
        F(lull_host_config, gamma), F(lull_host_config, exposure), F(lull_host_config, sample_clamp),
-       F(lull_host_config, rgb_to_xyz), F(lull_host_config, spp_min), F(lull_host_config, spp_max), F(lull_host_config, seed),
-       F(lull_host_config, time_budget_s), F(lull_host_config, max_check_overhead), F(lull_host_config, max_seam),
-       F(lull_host_config, check_step), F(lull_host_config, mask));
+       F(lull_host_config, rgb_to_xyz), F(lull_host_config, spp_min), F(lull_host_config, spp_max),
+       F(lull_host_config, seed), F(lull_host_config, time_budget_s), F(lull_host_config, max_check_overhead),
+       F(lull_host_config, max_seam), F(lull_host_config, check_step), F(lull_host_config, mask));
 LAYOUT(lull_host_block, F(lull_host_block, id), F(lull_host_block, x0), F(lull_host_block, y0), F(lull_host_block, x1),
        F(lull_host_block, y1), F(lull_host_block, reason), F(lull_host_block, spp), F(lull_host_block, half_spp),
        F(lull_host_block, thread_s), F(lull_host_block, rays), F(lull_host_block, dropped), F(lull_host_block, next_spp),
@@ -91,10 +91,10 @@ LAYOUT(lull_host_block, F(lull_host_block, id), F(lull_host_block, x0), F(lull_h
        F(lull_host_block, predicted_spp), F(lull_host_block, asked), F(lull_host_block, checks),
        F(lull_host_block, stop_votes), F(lull_host_block, step));
 LAYOUT(lull_host_blocks, F(lull_host_blocks, struct_size), F(lull_host_blocks, count), F(lull_host_blocks, list),
-       F(lull_host_blocks, columns), F(lull_host_blocks, rows), F(lull_host_blocks, list_columns), F(lull_host_blocks, flags),
-       F(lull_host_blocks, block_width), F(lull_host_blocks, block_height), F(lull_host_blocks, x0), F(lull_host_blocks, y0),
-       F(lull_host_blocks, x1), F(lull_host_blocks, y1), F(lull_host_blocks, spp_min), F(lull_host_blocks, spp_max),
-       F(lull_host_blocks, check_step));
+       F(lull_host_blocks, columns), F(lull_host_blocks, rows), F(lull_host_blocks, list_columns),
+       F(lull_host_blocks, flags), F(lull_host_blocks, block_width), F(lull_host_blocks, block_height),
+       F(lull_host_blocks, x0), F(lull_host_blocks, y0), F(lull_host_blocks, x1), F(lull_host_blocks, y1),
+       F(lull_host_blocks, spp_min), F(lull_host_blocks, spp_max), F(lull_host_blocks, check_step));
 LAYOUT(lull_host_totals, F(lull_host_totals, samples), F(lull_host_totals, paths), F(lull_host_totals, rays),
        F(lull_host_totals, dropped), F(lull_host_totals, render_s), F(lull_host_totals, criterion_s),
        F(lull_host_totals, checks), F(lull_host_totals, failed_checks), F(lull_host_totals, skipped_checks),
@@ -108,23 +108,25 @@ LAYOUT(lull_host_stop_at, F(lull_host_stop_at, spp), F(lull_host_stop_at, low), 
        F(lull_host_stop_at, known));
 LAYOUT(lull_host_work, F(lull_host_work, spp), F(lull_host_work, thread_s), F(lull_host_work, rows));
 LAYOUT(lull_host_forecast, F(lull_host_forecast, done_s), F(lull_host_forecast, left_s), F(lull_host_forecast, sampling_s),
-       F(lull_host_forecast, check_s), F(lull_host_forecast, low), F(lull_host_forecast, high), F(lull_host_forecast, active),
-       F(lull_host_forecast, known));
+       F(lull_host_forecast, check_s), F(lull_host_forecast, low), F(lull_host_forecast, high),
+       F(lull_host_forecast, active), F(lull_host_forecast, known));
 LAYOUT(lull_host_sample, F(lull_host_sample, x), F(lull_host_sample, y), F(lull_host_sample, sample));
 LAYOUT(lull_host_report, F(lull_host_report, struct_size), F(lull_host_report, flags), F(lull_host_report, scene),
-       F(lull_host_report, mask), F(lull_host_report, kernel), F(lull_host_report, effects), F(lull_host_report, effect_count),
-       F(lull_host_report, threads), F(lull_host_report, processes), F(lull_host_report, zero), F(lull_host_report, messages),
-       F(lull_host_report, message_bytes), F(lull_host_report, message_wait_s), F(lull_host_report, film_bytes),
-       F(lull_host_report, film_pixels), F(lull_host_report, scene_bytes));
+       F(lull_host_report, mask), F(lull_host_report, kernel), F(lull_host_report, effects),
+       F(lull_host_report, effect_count), F(lull_host_report, threads), F(lull_host_report, processes),
+       F(lull_host_report, zero), F(lull_host_report, messages), F(lull_host_report, message_bytes),
+       F(lull_host_report, message_wait_s), F(lull_host_report, film_bytes), F(lull_host_report, film_pixels),
+       F(lull_host_report, scene_bytes));
 
 /* The criterion's, then the host library's. */
 static const struct layout layouts[] = {
-    ENTRY(lull_error),    ENTRY(lull_host),      ENTRY(lull_param),  ENTRY(lull_pair),   ENTRY(lull_requirements),
-    ENTRY(lull_rect),     ENTRY(lull_frame),     ENTRY(lull_plane),  ENTRY(lull_block),  ENTRY(lull_view),
-    ENTRY(lull_decision), ENTRY(lull_criterion), ENTRY(lull_writer), ENTRY(lull_reader), ENTRY(lull_state),
-    ENTRY(lull_host_services), ENTRY(lull_host_config),  ENTRY(lull_host_block), ENTRY(lull_host_blocks),
-    ENTRY(lull_host_totals),   ENTRY(lull_host_view),    ENTRY(lull_host_said),  ENTRY(lull_host_stop_at),
-    ENTRY(lull_host_work),     ENTRY(lull_host_forecast), ENTRY(lull_host_sample), ENTRY(lull_host_report),
+    ENTRY(lull_error),         ENTRY(lull_host),        ENTRY(lull_param),        ENTRY(lull_pair),
+    ENTRY(lull_requirements),  ENTRY(lull_rect),        ENTRY(lull_frame),        ENTRY(lull_plane),
+    ENTRY(lull_block),         ENTRY(lull_view),        ENTRY(lull_decision),     ENTRY(lull_criterion),
+    ENTRY(lull_writer),        ENTRY(lull_reader),      ENTRY(lull_state),        ENTRY(lull_host_services),
+    ENTRY(lull_host_config),   ENTRY(lull_host_block),  ENTRY(lull_host_blocks),  ENTRY(lull_host_totals),
+    ENTRY(lull_host_view),     ENTRY(lull_host_said),   ENTRY(lull_host_stop_at), ENTRY(lull_host_work),
+    ENTRY(lull_host_forecast), ENTRY(lull_host_sample), ENTRY(lull_host_report),
 };
 enum { LAYOUTS = sizeof layouts / sizeof *layouts, OF_THE_ABI = 15 };
 
@@ -190,9 +192,9 @@ static void structs_have_no_padding(void **state)
 static void growing_structs_begin_with_their_size(void **state)
 {
     (void)state;
-    static const char *const elements[] = {"lull_param",       "lull_pair",          "lull_rect",       "lull_plane",
-                                           "lull_block",       "lull_decision",      "lull_host_block", "lull_host_totals",
-                                           "lull_host_said",   "lull_host_stop_at",  "lull_host_work",  "lull_host_forecast",
+    static const char *const elements[] = {"lull_param",      "lull_pair",         "lull_rect",       "lull_plane",
+                                           "lull_block",      "lull_decision",     "lull_host_block", "lull_host_totals",
+                                           "lull_host_said",  "lull_host_stop_at", "lull_host_work",  "lull_host_forecast",
                                            "lull_host_sample"};
     for (int i = 0; i < LAYOUTS; i++) {
         int is_element = 0;
@@ -256,7 +258,8 @@ int main(int argc, char **argv)
     const int host = argc > 1 && strcmp(argv[1], "--print-host") == 0;
     if (host || (argc > 1 && strcmp(argv[1], "--print") == 0)) {
         printf("# lull/%s 1.0 where pointers have 8 bytes: each struct and its size, each field's offset and size.\n"
-               "# Frozen: lines may be added (a minor version appends fields), never changed. Made by tests/abi/api_layout %s.\n",
+               "# Frozen: lines may be added (a minor version appends fields), never changed. Made by tests/abi/api_layout "
+               "%s.\n",
                host ? "host.h" : "criterion.h", argv[1]);
         print_layout(stdout, host ? OF_THE_ABI : 0, host ? LAYOUTS : OF_THE_ABI);
         return 0;

@@ -285,9 +285,9 @@ static void tables_are_checked(void **state)
     struct lull_criterion bad = good;
     bad.struct_size = sizeof bad - 1;
     assert_int_equal(lull_table_check(&bad, &err), LULL_E_VERSION);
-#define REFUSED(change)                                                                                                     \
-    bad = good;                                                                                                             \
-    change;                                                                                                                 \
+#define REFUSED(change) \
+    bad = good; \
+    change; \
     assert_int_equal(lull_table_check(&bad, &err), LULL_E_INVALID)
     REFUSED(bad.id = NULL);
     REFUSED(bad.id = "");
@@ -308,12 +308,12 @@ static void tables_are_checked(void **state)
     REFUSED(bad.params = NULL);
     REFUSED(bad.param_stride = 8);
     struct lull_param params[2], *p = params;
-#define PARAM_REFUSED(change)                                                                                               \
-    params[0] = params[1] = good.params[0];                                                                                 \
-    params[1].name = "other";                                                                                               \
-    bad = good, bad.params = params, bad.param_count = 2;                                                                   \
-    assert_int_equal(lull_table_check(&bad, &err), LULL_OK);                                                                \
-    change;                                                                                                                 \
+#define PARAM_REFUSED(change) \
+    params[0] = params[1] = good.params[0]; \
+    params[1].name = "other"; \
+    bad = good, bad.params = params, bad.param_count = 2; \
+    assert_int_equal(lull_table_check(&bad, &err), LULL_OK); \
+    change; \
     assert_int_equal(lull_table_check(&bad, &err), LULL_E_INVALID)
     PARAM_REFUSED(p->name = NULL);
     PARAM_REFUSED(p->name = "has space");
@@ -340,13 +340,13 @@ static void tables_word_for_word(void **state)
     good.params = two;
     good.param_count = 2;
     good.param_stride = sizeof two[0];
-#define SAYS(change, words)                                                                                                 \
-    two[0] = two[1] = (struct lull_param){.name = "a-0", .help = "h", .type = LULL_PARAM_INT, .min = 3, .max = 3};          \
-    two[1].name = "b";                                                                                                      \
-    bad = good;                                                                                                             \
-    change;                                                                                                                 \
-    err.message[0] = '\0';                                                                                                  \
-    assert_int_equal(lull_table_check(&bad, &err) == LULL_OK, words[0] == '\0');                                            \
+#define SAYS(change, words) \
+    two[0] = two[1] = (struct lull_param){.name = "a-0", .help = "h", .type = LULL_PARAM_INT, .min = 3, .max = 3}; \
+    two[1].name = "b"; \
+    bad = good; \
+    change; \
+    err.message[0] = '\0'; \
+    assert_int_equal(lull_table_check(&bad, &err) == LULL_OK, words[0] == '\0'); \
     assert_string_equal(err.message, words)
     SAYS((void)p, "");
     assert_int_equal(lull_table_check(NULL, &err), LULL_E_INVALID);
@@ -435,7 +435,8 @@ int main(void)
         cmocka_unit_test(broken_libraries_are_refused),
         cmocka_unit_test(cut_libraries_are_refused),
         cmocka_unit_test(side_effects_of_loading_are_told),
-        cmocka_unit_test(tables_are_checked), cmocka_unit_test(tables_word_for_word),
+        cmocka_unit_test(tables_are_checked),
+        cmocka_unit_test(tables_word_for_word),
         cmocka_unit_test(errors_fit_the_callers_struct),
     };
     int failed = cmocka_run_group_tests(tests, NULL, NULL);

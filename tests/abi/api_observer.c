@@ -41,7 +41,8 @@ static void make(struct picture *p, uint64_t spp, uint64_t half_spp, double grey
         p->color[i][0] = grey + (splitmix_uniform(&state) < 0.5 ? -texture : texture); /* the same picture for every seed */
     state = seed * 1000;
     for (int i = 0; i < p->w * p->h; i++) {
-        double truth = p->color[i][0], a = truth + sigma / sqrt(h) * splitmix_gauss(&state), b = truth + sigma / sqrt(n - h) * splitmix_gauss(&state);
+        double truth = p->color[i][0], a = truth + sigma / sqrt(h) * splitmix_gauss(&state),
+               b = truth + sigma / sqrt(n - h) * splitmix_gauss(&state);
         for (int c = 0; c < 3; c++) {
             p->half[i][c] = a;
             p->color[i][c] = (h * a + (n - h) * b) / n;
@@ -126,11 +127,11 @@ static struct picture *picture_new(int w, int h)
     return p;
 }
 
-#define assert_within(value, expected, share)                                                                        \
-    do {                                                                                                             \
-        double got_ = (value), want_ = (expected);                                                                   \
-        if (!(fabs(got_ - want_) <= (share) * fabs(want_)))                                                          \
-            fail_msg("%s = %g, expected %g within %g %%", #value, got_, want_, 100 * (share));                       \
+#define assert_within(value, expected, share) \
+    do { \
+        double got_ = (value), want_ = (expected); \
+        if (!(fabs(got_ - want_) <= (share)*fabs(want_))) \
+            fail_msg("%s = %g, expected %g within %g %%", #value, got_, want_, 100 * (share)); \
     } while (0)
 
 /* --- tests ----------------------------------------------------------------------------------------------------------- */
@@ -265,7 +266,7 @@ static void sizes(void **unused)
             least = fmin(least, e);
         }
         double narrow = side[i][0] == 1 || side[i][1] == 1 ? 2 : 1; /* there is less to blur over */
-        assert_true(pixels < 200 || least > 0.95 * error); /* one standard error is added: luck stops no block */
+        assert_true(pixels < 200 || least > 0.95 * error);          /* one standard error is added: luck stops no block */
         assert_true(sum > 0.9 * error &&
                     sum < narrow * (1 + 5 / sqrt(pixels)) * error); /* few pixels err towards more samples */
         free(p);

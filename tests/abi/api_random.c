@@ -39,7 +39,8 @@ static uint32_t draw(uint32_t below) /* SplitMix64 */
 /* A number as renders have them, seldom one that they should not have. */
 static double number(void)
 {
-    static const double odd[] = {(double)NAN, (double)INFINITY, -(double)INFINITY, -1, 1e30, -1e30, 1e-42, 0, 65504, 4294967295.0};
+    static const double odd[] = {(double)NAN, (double)INFINITY, -(double)INFINITY, -1, 1e30, -1e30, 1e-42, 0,
+                                 65504,       4294967295.0};
     if (draw(40) == 0 && !calm)
         return odd[draw(sizeof odd / sizeof *odd)];
     return calm ? 0.5 + 1e-6 * (double)draw(1000) : (double)draw(1000) / 500;
@@ -51,8 +52,14 @@ static void store(char *at, int32_t type)
     float f = (float)d;
     uint32_t u = draw(2) || calm ? draw(1000) : UINT32_MAX - draw(3);
     uint16_t h = calm ? 0x3800 : (uint16_t)draw(65536);
-    memcpy(at, type == LULL_TYPE_F64 ? (void *)&d : type == LULL_TYPE_F16 ? (void *)&h : type == LULL_TYPE_U32 ? (void *)&u : (void *)&f,
-           type == LULL_TYPE_F64 ? 8 : type == LULL_TYPE_F16 ? 2 : 4);
+    memcpy(at,
+           type == LULL_TYPE_F64   ? (void *)&d
+           : type == LULL_TYPE_F16 ? (void *)&h
+           : type == LULL_TYPE_U32 ? (void *)&u
+                                   : (void *)&f,
+           type == LULL_TYPE_F64   ? 8
+           : type == LULL_TYPE_F16 ? 2
+                                   : 4);
 }
 
 /* A plane of w by h pixels in memory of exactly its size, in any order of its dimensions and directions. The caller frees. */
@@ -66,7 +73,10 @@ static void *random_plane(struct lull_plane *p, unsigned plane, int64_t w, int64
     const int *nest = order[draw(6)];
     int counted = plane == LULL_PLANE_SPP || plane == LULL_PLANE_WEIGHT;
     int32_t type = types[draw(calm ? 3 : 4)];
-    int64_t extent[3] = {channels[plane] + draw(2), w, h}, stride[3], size = type == LULL_TYPE_F64 ? 8 : type == LULL_TYPE_F16 ? 2 : 4;
+    int64_t extent[3] = {channels[plane] + draw(2), w, h}, stride[3],
+            size = type == LULL_TYPE_F64   ? 8
+                   : type == LULL_TYPE_F16 ? 2
+                                           : 4;
     int64_t bytes = size, offset = 0;
     for (int i = 0; i < 3; i++) {
         stride[nest[i]] = bytes;
@@ -81,8 +91,12 @@ static void *random_plane(struct lull_plane *p, unsigned plane, int64_t w, int64
             offset += stride[i] * (extent[i] - 1);
             stride[i] = -stride[i];
         }
-    *p = (struct lull_plane){.data = memory + offset, .stride_c = stride[0], .stride_x = stride[1], .stride_y = stride[2],
-                             .scale = draw(2) || calm ? 1 : 0.25, .type = type,
+    *p = (struct lull_plane){.data = memory + offset,
+                             .stride_c = stride[0],
+                             .stride_x = stride[1],
+                             .stride_y = stride[2],
+                             .scale = draw(2) || calm ? 1 : 0.25,
+                             .type = type,
                              .normaliser = counted || calm ? LULL_NORM_ONE : normalisers[draw(3)],
                              .channels = (uint32_t)extent[0]};
     return memory;
@@ -114,7 +128,11 @@ static void random_tiling(struct picture *p)
             p->rects[p->count++] = (struct lull_rect){p->x1, p->y1, p->x1 + width[i], p->y1 + height[j]};
     }
     for (uint32_t i = 0; i < p->count; i++)
-        p->blocks[i] = (struct lull_block){.id = i, .x0 = p->rects[i].x0, .y0 = p->rects[i].y0, .x1 = p->rects[i].x1, .y1 = p->rects[i].y1,
+        p->blocks[i] = (struct lull_block){.id = i,
+                                           .x0 = p->rects[i].x0,
+                                           .y0 = p->rects[i].y0,
+                                           .x1 = p->rects[i].x1,
+                                           .y1 = p->rects[i].y1,
                                            .thread_s = (double)NAN};
 }
 
@@ -122,18 +140,21 @@ static void check_decision(const char *id, const struct lull_block *b, const str
 {
     int good = (d->action == LULL_CONTINUE || d->action == LULL_STOP) && (d->action == LULL_CONTINUE || b->spp > 0) &&
                (d->action == LULL_STOP || d->next_spp == 0 || d->next_spp > b->spp) &&
-               (isnan(d->p_noisy) || (d->p_noisy >= 0 && d->p_noisy <= 1)) && (isnan(d->error) || (d->error >= 0 && isfinite(d->error))) &&
+               (isnan(d->p_noisy) || (d->p_noisy >= 0 && d->p_noisy <= 1)) &&
+               (isnan(d->error) || (d->error >= 0 && isfinite(d->error))) &&
                (isnan(d->predicted_spp) || (d->predicted_spp >= 0 && isfinite(d->predicted_spp)));
     if (!good)
-        fail_msg("%s: block %u at %llu spp: action %d, next %llu, p %g, error %g, predicted %g", id, b->id, (unsigned long long)b->spp,
-                 d->action, (unsigned long long)d->next_spp, d->p_noisy, d->error, d->predicted_spp);
+        fail_msg("%s: block %u at %llu spp: action %d, next %llu, p %g, error %g, predicted %g", id, b->id,
+                 (unsigned long long)b->spp, d->action, (unsigned long long)d->next_spp, d->p_noisy, d->error,
+                 d->predicted_spp);
 }
 
 /* One call; what it answers is checked, then it is repeated at times: the same question has the same answer. */
-static void call_evaluate(const struct lull_criterion *c, struct lull_instance *in, const struct lull_view *view, const char *blocks,
-                          uint32_t block_stride, uint32_t count)
+static void call_evaluate(const struct lull_criterion *c, struct lull_instance *in, const struct lull_view *view,
+                          const char *blocks, uint32_t block_stride, uint32_t count)
 {
-    const struct lull_decision preset = {.action = LULL_CONTINUE, .p_noisy = (double)NAN, .predicted_spp = (double)NAN, .error = (double)NAN};
+    const struct lull_decision preset = {
+        .action = LULL_CONTINUE, .p_noisy = (double)NAN, .predicted_spp = (double)NAN, .error = (double)NAN};
     uint32_t stride = (uint32_t)sizeof preset + 8 * draw(3), times = 1 + (draw(4) == 0);
     size_t bytes = (size_t)count * stride;
     char *decisions = calloc(1, bytes + (bytes == 0)), *first = calloc(1, bytes + (bytes == 0));
@@ -171,15 +192,23 @@ static void random_evaluate(const struct lull_criterion *c, struct lull_instance
 {
     void *memory[LULL_PLANE_COUNT] = {0};
     struct lull_plane planes[LULL_PLANE_COUNT] = {{0}};
-    struct lull_view view = {.struct_size = sizeof view, .x0 = p->x0, .y0 = p->y0, .x1 = p->x1, .y1 = p->y1, .planes = planes,
-                             .plane_count = LULL_PLANE_COUNT, .plane_stride = sizeof *planes, .elapsed_s = (double)NAN};
+    struct lull_view view = {.struct_size = sizeof view,
+                             .x0 = p->x0,
+                             .y0 = p->y0,
+                             .x1 = p->x1,
+                             .y1 = p->y1,
+                             .planes = planes,
+                             .plane_count = LULL_PLANE_COUNT,
+                             .plane_stride = sizeof *planes,
+                             .elapsed_s = (double)NAN};
     uint32_t stride = (uint32_t)sizeof(struct lull_block) + 8 * draw(3), count = draw(50) == 0 ? 0 : 1 + draw(p->count);
     uint32_t first = draw(p->count);
     char *blocks = malloc((size_t)count * stride + (count == 0));
     assert_non_null(blocks);
     for (unsigned k = 0; k < LULL_PLANE_COUNT; k++)
         if (p->planes & LULL_PLANE_BIT(k))
-            memory[k] = random_plane(&planes[k], k, p->x1 - p->x0, p->y1 - p->y0, (p->planes & LULL_PLANE_BIT(LULL_PLANE_WEIGHT)) != 0);
+            memory[k] = random_plane(&planes[k], k, p->x1 - p->x0, p->y1 - p->y0,
+                                     (p->planes & LULL_PLANE_BIT(LULL_PLANE_WEIGHT)) != 0);
     for (uint32_t i = 0; i < count; i++) {
         struct lull_block *b = &p->blocks[(first + i) % p->count];
         b->spp += draw(5) == 0 ? 0 : draw(3) ? 16 + b->spp / 2 : 1 + draw(1u << draw(20));
@@ -215,7 +244,8 @@ static int32_t seldom(const struct lull_host *h)
     return draw(500) == 0;
 }
 
-static const struct lull_host host = {.struct_size = sizeof host, .max_workers = MOST_WORKERS, .parallel_for = any_order, .cancelled = seldom};
+static const struct lull_host host = {
+    .struct_size = sizeof host, .max_workers = MOST_WORKERS, .parallel_for = any_order, .cancelled = seldom};
 
 /* --- parameters -------------------------------------------------------------------------------------------------------------- */
 
@@ -359,10 +389,20 @@ static long random_life(const struct lull_criterion *c)
     for (uint32_t frame = 1 + draw(3), open = 0; frame > 0; frame--) {
         random_tiling(&p);
         p.planes = need.planes_required | (draw(256) & ((1u << LULL_PLANE_COUNT) - 1));
-        struct lull_frame f = {.struct_size = sizeof f, .flags = (open ? LULL_FRAME_RESTART : 0) | (draw(8) & ~LULL_FRAME_RESTART),
-                               .width = (uint32_t)p.x1, .height = (uint32_t)p.y1, .blocks = p.rects, .block_count = p.count,
-                               .block_stride = sizeof *p.rects, .planes = p.planes, .transfer = (int32_t)draw(4), .gamma = 2.2,
-                               .exposure = draw(2) ? 1 : 0.3, .sample_clamp = draw(2) * 10, .spp_min = 1, .spp_max = UINT64_C(1) << 40,
+        struct lull_frame f = {.struct_size = sizeof f,
+                               .flags = (open ? LULL_FRAME_RESTART : 0) | (draw(8) & ~LULL_FRAME_RESTART),
+                               .width = (uint32_t)p.x1,
+                               .height = (uint32_t)p.y1,
+                               .blocks = p.rects,
+                               .block_count = p.count,
+                               .block_stride = sizeof *p.rects,
+                               .planes = p.planes,
+                               .transfer = (int32_t)draw(4),
+                               .gamma = 2.2,
+                               .exposure = draw(2) ? 1 : 0.3,
+                               .sample_clamp = draw(2) * 10,
+                               .spp_min = 1,
+                               .spp_max = UINT64_C(1) << 40,
                                .rgb_to_xyz = {0.41, 0.36, 0.18, 0.21, 0.72, 0.07, 0.02, 0.12, 0.95}};
         begin(c, in, &f);
         calm = draw(3) == 0;
@@ -384,14 +424,16 @@ static const struct {
     const char *library, *id;
     long usual_calls;
 } shipped[] = {
-    {"null", "null", 600},       {"fixed", "fixed", 600}, {"halfbuf", "halfbuf", 600}, {"variance", "variance", 600}, {"observer", "observer", 600},
-    {"ggn", "ggn", 120},   {"baselines", "attributes", 30}, {"baselines", "noise-mask", 30}, /* svd-entropy has no model yet */
-    {"denoised", "denoised", 100}, /* with the denoiser of tests/stub */
+    {"null", "null", 600},           {"fixed", "fixed", 600},         {"halfbuf", "halfbuf", 600},
+    {"variance", "variance", 600},   {"observer", "observer", 600},   {"ggn", "ggn", 120},
+    {"baselines", "attributes", 30}, {"baselines", "noise-mask", 30}, /* svd-entropy has no model yet */
+    {"denoised", "denoised", 100},                                    /* with the denoiser of tests/stub */
 };
 
 static void nothing_within_the_rules_breaks_a_criterion(void **unused)
 {
-    const char *wanted = getenv("API_RANDOM_CALLS"), *only = getenv("API_RANDOM_CRITERION"), *seed = getenv("API_RANDOM_SEED");
+    const char *wanted = getenv("API_RANDOM_CALLS"), *only = getenv("API_RANDOM_CRITERION"),
+               *seed = getenv("API_RANDOM_SEED");
     long all = 0;
     (void)unused;
     for (size_t i = 0; i < sizeof shipped / sizeof *shipped; i++) {

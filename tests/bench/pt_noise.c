@@ -25,15 +25,21 @@ enum { TILES = 8, MODES = 2, SEEDS_MAX = 64 };
 struct mode {
     struct pt_scene *scene;
     pt_kernel *kernel;
-    double *sum, *sum2;                          /* [pixels] over seeds, of the luminance of a pixel's mean */
-    double tile[TILES * TILES][SEEDS_MAX];       /* mean of each tile by seed */
+    double *sum, *sum2;                    /* [pixels] over seeds, of the luminance of a pixel's mean */
+    double tile[TILES * TILES][SEEDS_MAX]; /* mean of each tile by seed */
     double time_s;
 };
 
 static int width = 96, height = 96, seeds = 12, spp = 4;
 static struct mode modes[MODES];
 
-static int tile_of(int x, int y) { return y * TILES / height * TILES + x * TILES / width; }
+static int tile_of(int x, int y)
+{
+    return y * TILES
+    / height *TILES
+    +x *TILES
+    / width;
+}
 
 static void render(struct mode *m, const struct pt_integrator *settings, int seed)
 {
@@ -112,10 +118,11 @@ static void print_result(const char *path)
     }
     qsort(ratios, (size_t)n, sizeof *ratios, by_value);
     double variance = n ? ratios[n / 2] : 1.0, averaged = n ? relative[1] / relative[0] : 1.0;
-    printf("{\"scene\":\"%s\",\"emitters\":%d,\"two_ways\":true,\"us_per_path\":%.3f,\"time\":%.3f,\"variance\":%.3f,\"gain\":%.3f,"
+    printf("{\"scene\":\"%s\",\"emitters\":%d,\"two_ways\":true,\"us_per_path\":%.3f,\"time\":%.3f,\"variance\":%.3f,"
+           "\"gain\":%.3f,"
            "\"gain_mean\":%.3f,\"z\":%.2f}\n",
-           path, modes[0].scene->emitter_count,
-           1e6 * modes[0].time_s / ((double)width * height * spp * seeds), time, variance, time * variance, time * averaged, worst);
+           path, modes[0].scene->emitter_count, 1e6 * modes[0].time_s / ((double)width * height * spp * seeds), time,
+           variance, time * variance, time * averaged, worst);
 }
 
 /* 1 when there was a portal. */
@@ -147,7 +154,9 @@ int main(int argc, char **argv)
         struct mode *m = &modes[k];
         struct pt_scene_defaults defaults;
         struct base_err err = {0};
-        struct pt_load_options options = {.width = width, .height = height, .quiet = 1,
+        struct pt_load_options options = {.width = width,
+                                          .height = height,
+                                          .quiet = 1,
                                           .light_selection = k ? PT_LIGHT_SELECTION_POWER : PT_LIGHT_SELECTION_HIERARCHY};
         if (pt_scene_load(argv[1], &options, &m->scene, &defaults, &err) != 0) {
             fprintf(stderr, "%s\n", err.text);

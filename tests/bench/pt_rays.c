@@ -24,7 +24,7 @@ static struct recorded_ray {
     struct pt_ray ray;
     int occlusion, coherent;
     int group; /* rays from this one on that went together; 0: not the first of them */
-} *recorded;
+} * recorded;
 static size_t ray_count;
 
 static void record(const struct pt_ray *ray, int occlusion, int coherent, int group)
@@ -40,7 +40,7 @@ static int intersect_recorded(const struct pt_scene *scene, const struct pt_ray 
 }
 
 static void intersect_many_recorded(const struct pt_scene *scene, const struct pt_ray *const *r, int count, int coherent,
-                                      struct pt_hit *const *hits)
+                                    struct pt_hit *const *hits)
 {
     for (int i = 0; i < count; i++)
         record(r[i], 0, coherent, i == 0 ? count : 0);
@@ -107,7 +107,7 @@ static unsigned long long replay_single(const struct pt_scene *scene)
     for (size_t i = 0; i < ray_count; i++) {
         struct pt_hit hit;
         hits += (unsigned)(recorded[i].occlusion ? pt_accel_occluded(scene, &recorded[i].ray)
-                                             : pt_accel_intersect(scene, &recorded[i].ray, &hit));
+                                                 : pt_accel_intersect(scene, &recorded[i].ray, &hit));
     }
     return hits;
 }
@@ -166,7 +166,8 @@ static void measure(const struct pt_scene *scene, const struct pt_integrator *se
         together_s[i] = (double)ray_count / (t3 - t2);
         share[i] = rays_s[i] / only_s[i];
     }
-    printf("{\"kernel\":\"%s\",\"paths_per_s\":%.0f,\"rays_per_s\":%.0f,\"ray_only_per_s\":%.0f,\"share\":%.3f,\"together_per_s\":%.0f,\"hits\":%llu}\n",
+    printf("{\"kernel\":\"%s\",\"paths_per_s\":%.0f,\"rays_per_s\":%.0f,\"ray_only_per_s\":%.0f,\"share\":%.3f,\"together_"
+           "per_s\":%.0f,\"hits\":%llu}\n",
            name, median(paths_s, rounds), median(rays_s, rounds), median(only_s, rounds), median(share, rounds),
            median(together_s, rounds), sink);
 }

@@ -60,15 +60,9 @@ static int sync_as(const char *call, int fd)
     return bad ? -1 : real(fd);
 }
 
-int fsync(int fd)
-{
-    return sync_as("fsync", fd);
-}
+int fsync(int fd) { return sync_as("fsync", fd); }
 
-int fdatasync(int fd)
-{
-    return sync_as("fdatasync", fd);
-}
+int fdatasync(int fd) { return sync_as("fdatasync", fd); }
 
 int rename(const char *from, const char *to)
 {

@@ -12,8 +12,8 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-static void no_kernel(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y,
-                      int count, uint32_t sample, struct pt_path_result *out)
+static void no_kernel(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y, int count,
+                      uint32_t sample, struct pt_path_result *out)
 {
     (void)scene, (void)settings, (void)x, (void)y, (void)sample;
     for (int i = 0; i < count; i++)
@@ -36,8 +36,15 @@ static const char *write_file(const uint8_t *data, size_t size)
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    struct pt_render_config config = {.width = 4, .height = 3, .crop = {0, 0, 4, 3}, .block_width = 2, .block_height = 2,
-                                      .spp_min = 4, .spp_max = 4, .uniform = 1, .planes = PT_FILM_HALF};
+    struct pt_render_config config = {.width = 4,
+                                      .height = 3,
+                                      .crop = {0, 0, 4, 3},
+                                      .block_width = 2,
+                                      .block_height = 2,
+                                      .spp_min = 4,
+                                      .spp_max = 4,
+                                      .uniform = 1,
+                                      .planes = PT_FILM_HALF};
     struct pt_render *render = NULL;
     struct base_err err = {0};
     struct base_threads *threads = base_threads_create(1, &err);

@@ -17,8 +17,9 @@ struct input {
 static const struct {
     const char *end, *text;
 } others[] = {
-    {".ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
-             "property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"},
+    {".ply",
+     "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
+     "property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"},
     {".spd", "400 0.5 # comment\n700 1.5\n"},
     {".pbrt", "Shape \"sphere\" \"float radius\" 2\n"},
 };

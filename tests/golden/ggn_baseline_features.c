@@ -54,8 +54,13 @@ static void attributes(void **state)
 {
     (void)state;
     double a[GGN_ATTRIBUTES];
-    static const struct { int index; double mean, deviation; } golden[] = {
-        {0, 8.824568150, 5.850814836}, {3, 7.920462968, 5.261391390}, {9, 9.200309384, 6.720253924}, {10, 7.952331544, 5.181926634}};
+    static const struct {
+        int index;
+        double mean, deviation;
+    } golden[] = {{0, 8.824568150, 5.850814836},
+                  {3, 7.920462968, 5.261391390},
+                  {9, 9.200309384, 6.720253924},
+                  {10, 7.952331544, 5.181926634}};
     assert_int_equal(ggn_attributes(l, W, W, scratch, a, NULL), 0);
     for (size_t i = 0; i < 4; i++) { /* box 3; Gaussian 3 with sigma 1; median 5; Wiener 3 */
         assert_near(a[2 * golden[i].index], golden[i].mean, 1e-6);
@@ -169,10 +174,7 @@ static void wiener_again(const double *p, int r, double *out)
         out[i] = mean[i] + fmax(1 - noise / variance[i], 0) * (p[i] - mean[i]) * (variance[i] > noise);
 }
 
-static double soft(double v, double t)
-{
-    return fabs(v) > t ? v - copysign(t, v) : 0;
-}
+static double soft(double v, double t) { return fabs(v) > t ? v - copysign(t, v) : 0; }
 
 static void haar_again(const double *p, double *out)
 {
@@ -187,7 +189,8 @@ static void haar_again(const double *p, double *out)
             t = diagonal[n / 2] / 0.6745 * sqrt(2 * log(OP));
         }
         for (int k = 0; k < (OW / 2) * (OH / 2); k++) {
-            const int first = k / (OW / 2) * 2 * OW + k % (OW / 2) * 2, places[] = {first, first + 1, first + OW, first + OW + 1};
+            const int first = k / (OW / 2) * 2 * OW + k % (OW / 2) * 2,
+                      places[] = {first, first + 1, first + OW, first + OW + 1};
             double c[4] = {0};
             for (int b = 0; b < 4; b++)
                 for (int i = 0; i < 4; i++)
@@ -224,7 +227,8 @@ static void cells(const double *p, const double *got)
         double sum = 0;
         int n = 0;
         for (int i = 0; i < OP; i++)
-            if (i % OW >= cell % 8 * OW / 8 && i % OW < (cell % 8 + 1) * OW / 8 && i / OW >= cell / 8 * OH / 8 && i / OW < (cell / 8 + 1) * OH / 8) {
+            if (i % OW >= cell % 8 * OW / 8 && i % OW < (cell % 8 + 1) * OW / 8 && i / OW >= cell / 8 * OH / 8 &&
+                i / OW < (cell / 8 + 1) * OH / 8) {
                 sum += fabs(p[i] - smooth[i]);
                 n++;
             }
@@ -239,8 +243,8 @@ static void filters_by_definition(void **state)
     double p[OP], f[OP], a[GGN_ATTRIBUTES], mask[GGN_MASK_FEATURES];
     static const double sigmas[] = {0.5, 1, 1.5};
     for (int i = 0; i < OP; i++)
-        p[i] = 40 + 8 * sin(0.4 * (i % OW)) * cos(0.3 * (i / OW)) + 12 * (ggn_hash_unit((uint32_t)i, 1) - 0.5) * (i / OW > 6) +
-               (i % 53 == 0 ? 40 : 0) + (i % OW > 12 ? 15 : 0);
+        p[i] = 40 + 8 * sin(0.4 * (i % OW)) * cos(0.3 * (i / OW)) +
+               12 * (ggn_hash_unit((uint32_t)i, 1) - 0.5) * (i / OW > 6) + (i % 53 == 0 ? 40 : 0) + (i % OW > 12 ? 15 : 0);
     assert_int_equal(ggn_attributes(p, OW, OH, scratch, a, NULL), 0);
     for (int r = 1; r <= 2; r++) {
         filtered(p, BOX, r, 0, 1, f);
@@ -312,7 +316,8 @@ static void lightness_and_order(void **state)
     assert_near(h[0], 0, 0);
     assert_int_equal(ggn_svd_entropy(one, 20, 20, 19, 20, h, &err), BASE_EINVAL);
     assert_string_equal(err.text, "SVD-entropy of singular values 19 to 20 of a 20x20 block");
-    assert_true(ggn_svd_entropy(one, 20, 20, -1, 5, h, NULL) && ggn_svd_entropy(one, 20, 20, 0, 21, h, NULL) && ggn_svd_entropy(one, 20, 19, 0, 20, h, NULL));
+    assert_true(ggn_svd_entropy(one, 20, 20, -1, 5, h, NULL) && ggn_svd_entropy(one, 20, 20, 0, 21, h, NULL) &&
+                ggn_svd_entropy(one, 20, 19, 0, 20, h, NULL));
     assert_int_equal(ggn_attributes(one, 3, 2, scratch, got, &err), BASE_EINVAL);
     assert_string_equal(err.text, "attributes of a 3x2 block");
     assert_int_equal(ggn_attributes(one, 2, 3, scratch, got, &err), BASE_EINVAL);
@@ -325,7 +330,11 @@ static void lightness_and_order(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(svd_entropy), cmocka_unit_test(attributes), cmocka_unit_test(degenerate), cmocka_unit_test(monotone),
-                                       cmocka_unit_test(filters_by_definition), cmocka_unit_test(lightness_and_order)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(svd_entropy),
+                                       cmocka_unit_test(attributes),
+                                       cmocka_unit_test(degenerate),
+                                       cmocka_unit_test(monotone),
+                                       cmocka_unit_test(filters_by_definition),
+                                       cmocka_unit_test(lightness_and_order)};
     return cmocka_run_group_tests_name("baseline_features", tests, setup, NULL);
 }

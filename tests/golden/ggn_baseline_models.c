@@ -38,7 +38,8 @@ static void gradients(void **state)
     double sequence[STEPS * IN];
     struct ggn_lstm *l = ggn_lstm_create(IN, STEPS, 5, NULL);
     size_t n = ggn_lstm_parameters(IN);
-    float *grad = malloc(n * sizeof *grad), *other = malloc(n * sizeof *other), *keep = malloc(n * sizeof *keep), *p = ggn_lstm_weights(l);
+    float *grad = malloc(n * sizeof *grad), *other = malloc(n * sizeof *other), *keep = malloc(n * sizeof *keep),
+          *p = ggn_lstm_weights(l);
     for (int i = 0; i < STEPS * IN; i++)
         sequence[i] = ggn_noise_gauss((uint32_t)i, 3);
     /* Larger weights, so that no gate sits in the linear middle of its sigmoid. */
@@ -51,7 +52,8 @@ static void gradients(void **state)
         double slope = 0.0, loss[2];
         for (int side = 0; side < 2; side++) {
             for (size_t i = 0; i < n; i++)
-                p[i] = keep[i] + (float)((side == 0 ? -h : h) * (ggn_noise_hash((uint32_t)i, d) & 1 ? 1.0 : -1.0) / sqrt((double)n) * 30.0);
+                p[i] = keep[i] + (float)((side == 0 ? -h : h) * (ggn_noise_hash((uint32_t)i, d) & 1 ? 1.0 : -1.0) /
+                                         sqrt((double)n) * 30.0);
             loss[side] = ggn_lstm_gradient(l, sequence, 1, other);
         }
         for (size_t i = 0; i < n; i++)
@@ -179,7 +181,8 @@ static void stored(void **state)
         cJSON *from = cJSON_CreateObject();
         assert_int_equal(ggn_baseline_save(&a, path, GGN_F32, from, &err), 0);
         cJSON_Delete(from);
-        assert_int_equal(ggn_baseline_load(&b, path, (enum ggn_baseline_kind)((kind + 1) % GGN_BASELINES), &err), BASE_EINVAL);
+        assert_int_equal(ggn_baseline_load(&b, path, (enum ggn_baseline_kind)((kind + 1) % GGN_BASELINES), &err),
+                         BASE_EINVAL);
         assert_non_null(strstr(err.text, "not a baseline for"));
         assert_int_equal(ggn_baseline_load(&b, path, (enum ggn_baseline_kind)kind, &err), 0);
         assert_int_equal(b.kind, kind);
@@ -197,20 +200,11 @@ static void stored(void **state)
 
 /* --- the LSTM by its equations -------------------------------------------------------------------------------------------- */
 
-static double unit(uint32_t k, uint32_t s)
-{
-    return (double)((float)ggn_noise_hash(k, s) / 4294967296.0f);
-}
+static double unit(uint32_t k, uint32_t s) { return (double)((float)ggn_noise_hash(k, s) / 4294967296.0f); }
 
-static double logistic(double x)
-{
-    return 1 / (1 + exp(-x));
-}
+static double logistic(double x) { return 1 / (1 + exp(-x)); }
 
-static double gate(double x)
-{
-    return fmin(fmax(0.2 * x + 0.5, 0), 1);
-}
+static double gate(double x) { return fmin(fmax(0.2 * x + 0.5, 0), 1); }
 
 /* i, f, o = gate(W x + U h + b), g = logistic(…); c = f c + i g; h = o logistic(c); three layers, one unit. p as the weights lie: W, U, b
  * of each layer, then the unit's. masks: [3] dropout of each layer's outputs of one sequence, [steps][out], NULL: none. */
@@ -325,7 +319,8 @@ static void first_epoch(void **state)
             for (int t = 0; t < STEPS; t++)
                 for (int k = 0; k < widths[layer]; k++) {
                     const uint32_t element = (uint32_t)((t * BATCH + r) * widths[layer] + k);
-                    masks[layer][t * widths[layer] + k] = unit(element, SEED + 1000 + 1 + (uint32_t)layer) < 0.4 ? 0 : 1 / 0.6;
+                    masks[layer][t * widths[layer] + k] =
+                        unit(element, SEED + 1000 + 1 + (uint32_t)layer) < 0.4 ? 0 : 1 / 0.6;
                 }
         const int y = label[order[r]];
         double z = forward_again(before, IN, STEPS, x[order[r]], mask);
@@ -431,7 +426,8 @@ static void scores(void **state)
         assert_near(ggn_svm_score(&s, v), want, 1e-12);
         assert_int_equal(want > 0, v[0] > 112 || want > 0);
     }
-    assert_true(ggn_svm_score(&s, (const double[]){140, 0, 5}) > 0.5 && ggn_svm_score(&s, (const double[]){90, 0, 5}) < -0.5);
+    assert_true(ggn_svm_score(&s, (const double[]){140, 0, 5}) > 0.5 &&
+                ggn_svm_score(&s, (const double[]){90, 0, 5}) < -0.5);
     assert_int_equal(ggn_svm_values(&s), 2 * D + s.n_support * (1 + D));
     ggn_svm_release(&s);
     memset(label, 0, sizeof label);
@@ -454,23 +450,27 @@ static void new_baselines(void **state)
     for (int kind = 0; kind < GGN_BASELINES; kind++) {
         struct ggn_baseline b;
         struct base_err err = {0};
-        const int sizes[][3] = {{least[kind], 4096, 1}, {4096, least[kind], 1}, {least[kind] - 1, 50, 0}, {50, least[kind] - 1, 0}, {4097, 50, 0}, {50, 4097, 0}};
+        const int sizes[][3] = {{least[kind], 4096, 1},   {4096, least[kind], 1}, {least[kind] - 1, 50, 0},
+                                {50, least[kind] - 1, 0}, {4097, 50, 0},          {50, 4097, 0}};
         char want[128];
         for (int i = 0; i < 6; i++) {
-            assert_int_equal(ggn_baseline_init(&b, (enum ggn_baseline_kind)kind, sizes[i][0], sizes[i][1], 6, &err), sizes[i][2] ? 0 : BASE_EINVAL);
-            snprintf(want, sizeof want, "%s: blocks of %dx%d pixels; it takes %d to 4096", ggn_baseline_names[kind], sizes[i][0], sizes[i][1],
-                     least[kind]);
+            assert_int_equal(ggn_baseline_init(&b, (enum ggn_baseline_kind)kind, sizes[i][0], sizes[i][1], 6, &err),
+                             sizes[i][2] ? 0 : BASE_EINVAL);
+            snprintf(want, sizeof want, "%s: blocks of %dx%d pixels; it takes %d to 4096", ggn_baseline_names[kind],
+                     sizes[i][0], sizes[i][1], least[kind]);
             if (!sizes[i][2])
                 assert_string_equal(err.text, want);
         }
         for (int window = 0; window <= 17; window++) {
-            assert_int_equal(ggn_baseline_init(&b, (enum ggn_baseline_kind)kind, 65, 45, window, &err), window > 0 && window < 17 ? 0 : BASE_EINVAL);
+            assert_int_equal(ggn_baseline_init(&b, (enum ggn_baseline_kind)kind, 65, 45, window, &err),
+                             window > 0 && window < 17 ? 0 : BASE_EINVAL);
             snprintf(want, sizeof want, "%s: windows of %d images; it takes 1 to 16", ggn_baseline_names[kind], window);
             if (window == 0 || window == 17)
                 assert_string_equal(err.text, want);
         }
         assert_int_equal(ggn_baseline_init(&b, (enum ggn_baseline_kind)kind, 65, 45, 4, &err), 0);
-        assert_true(b.kind == (enum ggn_baseline_kind)kind && b.width == 65 && b.height == 45 && b.first == 0 && !b.lstm && !b.svm.values);
+        assert_true(b.kind == (enum ggn_baseline_kind)kind && b.width == 65 && b.height == 45 && b.first == 0 && !b.lstm &&
+                    !b.svm.values);
         assert_int_equal(b.window, kind == GGN_SVD_ENTROPY ? 4 : 1);
         assert_int_equal(b.features, kind == GGN_SVD_ENTROPY ? 6 : kind == GGN_ATTRIBUTES_SVM ? 26 : 128);
         assert_true(b.policy.passes == 1 && b.policy.threshold == 0.5 && b.policy.ratio == 1.15 && b.policy.first_spp == 20);
@@ -494,7 +494,9 @@ static void forged(const char *path, const char *from, const char *to, const cha
     for (int i = 0; i < c.n_entries; i++) {
         const struct ggn_entry *e = &c.entry[i];
         const int dim[] = {(int)e->dim[0], (int)e->dim[1]};
-        assert_int_equal(ggn_container_add(&other, e->name, GGN_F32, e->rank, dim, (const float *)(const void *)(c.data + e->offset), NULL), 0);
+        assert_int_equal(ggn_container_add(&other, e->name, GGN_F32, e->rank, dim,
+                                           (const float *)(const void *)(c.data + e->offset), NULL),
+                         0);
     }
     char forged_path[] = "/tmp/ggn_forged.XXXXXX";
     close(mkstemp(forged_path));
@@ -527,13 +529,15 @@ static void described(void **state)
         text = flat = c.json;
         for (char *at = text; (*flat = *at) != '\0'; at++)
             flat += !strchr("\n\t ", *at);
-        assert_string_equal(text, kind ? "{\"kind\":\"baseline\",\"method\":\"attributes\",\"width\":24,\"height\":24,\"window\":1,\"first\":0,"
-                                         "\"support\":5,\"gamma\":0.125,\"rho\":0.33333333333333331,\"policy\":{\"first_spp\":20,\"ratio\":1.25,"
-                                         "\"step_spp\":0,\"scale\":1,\"shift\":0,\"threshold\":0.3,\"gate_noise\":0,\"slope\":0,\"tail999\":0,"
-                                         "\"gini\":0,\"passes\":1},\"provenance\":{\"blocks\":7}}"
-                                       : "{\"kind\":\"baseline\",\"method\":\"svd-entropy\",\"width\":24,\"height\":24,\"window\":3,\"first\":5,"
-                                         "\"policy\":{\"first_spp\":20,\"ratio\":1.25,\"step_spp\":0,\"scale\":1,\"shift\":0,\"threshold\":0.3,"
-                                         "\"gate_noise\":0,\"slope\":0,\"tail999\":0,\"gini\":0,\"passes\":1},\"provenance\":{\"blocks\":7}}");
+        assert_string_equal(
+            text,
+            kind ? "{\"kind\":\"baseline\",\"method\":\"attributes\",\"width\":24,\"height\":24,\"window\":1,\"first\":0,"
+                   "\"support\":5,\"gamma\":0.125,\"rho\":0.33333333333333331,\"policy\":{\"first_spp\":20,\"ratio\":1.25,"
+                   "\"step_spp\":0,\"scale\":1,\"shift\":0,\"threshold\":0.3,\"gate_noise\":0,\"slope\":0,\"tail999\":0,"
+                   "\"gini\":0,\"passes\":1},\"provenance\":{\"blocks\":7}}"
+                 : "{\"kind\":\"baseline\",\"method\":\"svd-entropy\",\"width\":24,\"height\":24,\"window\":3,\"first\":5,"
+                   "\"policy\":{\"first_spp\":20,\"ratio\":1.25,\"step_spp\":0,\"scale\":1,\"shift\":0,\"threshold\":0.3,"
+                   "\"gate_noise\":0,\"slope\":0,\"tail999\":0,\"gini\":0,\"passes\":1},\"provenance\":{\"blocks\":7}}");
         static const char *const names[] = {"mean", "scale", "coefficient", "support"};
         assert_int_equal(c.n_entries, kind ? 4 : 1);
         for (int i = 0; i < c.n_entries; i++) {
@@ -564,7 +568,8 @@ static void described(void **state)
     forged(path, "\"first\":\t0", "\"first\":\t18", "");
     forged(path, "\"first\":\t0", "\"first\":\t19", "'first' is missing or not a number in 0..18");
     forged(path, "\"support\":\t5", "\"support\":\t0", "'support' is missing or not a number in 1..1.04858e+06");
-    forged(path, "\"support\":\t5", "\"support\":\t4", "tensor 'coefficient' does not have the shape that the network asks for");
+    forged(path, "\"support\":\t5", "\"support\":\t4",
+           "tensor 'coefficient' does not have the shape that the network asks for");
     forged(path, "\"support\":\t5", "\"support\":\t1000", "the file is too small for 1000 vectors");
     forged(path, "\"gamma\":\t0.125", "\"gamma\":\t1e-12", "");
     forged(path, "\"gamma\":\t0.125", "\"gamma\":\t0", "'gamma' is missing or not a number in 1e-12..1e+12");
@@ -575,7 +580,8 @@ static void described(void **state)
     assert_int_equal(ggn_baseline_save(&b, path, GGN_F32, from, NULL), 0);
     cJSON_Delete(from);
     ggn_baseline_release(&b);
-    forged(path, "\"width\":\t24,\n\t\"height\":\t24", "\"width\":4000,\"height\":4000", "the file is too small for a network of this size");
+    forged(path, "\"width\":\t24,\n\t\"height\":\t24", "\"width\":4000,\"height\":4000",
+           "the file is too small for a network of this size");
     forged(path, "\"width\":\t24", "\"width\":\t40", "tensor 'lstm' does not have the shape that the network asks for");
     unlink(path);
 }
@@ -623,8 +629,8 @@ static void looks_at_tiles(void **state)
 static void put_method(FILE *f, const struct ggn_method *m, const struct ggn_baseline *b, const struct ggn_eval_set *s)
 {
     const struct ggn_policy *p = &b->policy;
-    fprintf(f, "=== %s: passes %d; first %g ratio %g step %g, %d vectors\n", m->name, m->passes, p->first_spp, p->ratio, p->step_spp,
-            b->svm.n_support);
+    fprintf(f, "=== %s: passes %d; first %g ratio %g step %g, %d vectors\n", m->name, m->passes, p->first_spp, p->ratio,
+            p->step_spp, b->svm.n_support);
     if (!b->lstm) /* in two epochs an LSTM learns nothing that could be told apart */
         fprintf(f, "cut %.5g scale %.4f shift %.4f threshold %.5g\n", m->cut, p->scale, p->shift, p->threshold);
     for (int k = 0; k < s->n_blocks; k++) {
@@ -671,7 +677,8 @@ static void learned_from_scenes(void **state)
             struct ggn_method m;
             struct ggn_baseline b;
             char want[96];
-            int rc = ggn_method_learned(&m, &b, &set, (enum ggn_baseline_kind)kind, (enum ggn_split)split, 0.2, 2, threads, &err);
+            int rc =
+                ggn_method_learned(&m, &b, &set, (enum ggn_baseline_kind)kind, (enum ggn_split)split, 0.2, 2, threads, &err);
             snprintf(want, sizeof want, "%s: the split 'test' lacks one of the classes", ggn_baseline_titles[kind]);
             assert_int_equal(rc, split == GGN_SPLIT_TEST ? BASE_EINVAL : 0);
             if (rc) {
@@ -696,9 +703,18 @@ static void learned_from_scenes(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(size), cmocka_unit_test(gradients), cmocka_unit_test(learns), cmocka_unit_test(svm), cmocka_unit_test(stored),
-                                       cmocka_unit_test(lstm_by_equations), cmocka_unit_test(first_epoch), cmocka_unit_test(recorded_epochs),
-                                       cmocka_unit_test(scores), cmocka_unit_test(new_baselines), cmocka_unit_test(described),
-                                       cmocka_unit_test(looks_at_tiles), cmocka_unit_test(learned_from_scenes)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(size),
+                                       cmocka_unit_test(gradients),
+                                       cmocka_unit_test(learns),
+                                       cmocka_unit_test(svm),
+                                       cmocka_unit_test(stored),
+                                       cmocka_unit_test(lstm_by_equations),
+                                       cmocka_unit_test(first_epoch),
+                                       cmocka_unit_test(recorded_epochs),
+                                       cmocka_unit_test(scores),
+                                       cmocka_unit_test(new_baselines),
+                                       cmocka_unit_test(described),
+                                       cmocka_unit_test(looks_at_tiles),
+                                       cmocka_unit_test(learned_from_scenes)};
     return cmocka_run_group_tests_name("baseline_models", tests, NULL, NULL);
 }

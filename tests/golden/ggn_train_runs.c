@@ -278,7 +278,8 @@ static void approve(void **state)
 
 static void presets(void **state)
 {
-    struct ggn_train_plan all = full("all"), plain = small("plain", GGN_PRESET_LULL), paper = small("paper", GGN_PRESET_PAPER);
+    struct ggn_train_plan all = full("all"), plain = small("plain", GGN_PRESET_LULL),
+                          paper = small("paper", GGN_PRESET_PAPER);
     struct ggn_train_plan again = full("again");
     (void)state;
     run("all", all);
@@ -696,9 +697,9 @@ static void keys_of_runs(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(presets),     cmocka_unit_test(divergences), cmocka_unit_test(resuming),
-                                       cmocka_unit_test(plans),       cmocka_unit_test(checkpoints), cmocka_unit_test(keys_of_runs), cmocka_unit_test(processes),
-                                       cmocka_unit_test(nothing_stays),
-                                       cmocka_unit_test(approve)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(presets),   cmocka_unit_test(divergences),   cmocka_unit_test(resuming),
+        cmocka_unit_test(plans),     cmocka_unit_test(checkpoints),   cmocka_unit_test(keys_of_runs),
+        cmocka_unit_test(processes), cmocka_unit_test(nothing_stays), cmocka_unit_test(approve)};
     return cmocka_run_group_tests(tests, setup, teardown);
 }

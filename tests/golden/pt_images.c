@@ -33,16 +33,17 @@ enum { WIDTH = 11, HEIGHT = 7, PIXELS = WIDTH * HEIGHT, SPP = 32 };
 static const char file_name[] = "tests/golden/pt_images.txt";
 
 #define PLANES(X) \
-    X(radiance.x) X(radiance.y) X(radiance.z) X(albedo.x) X(albedo.y) X(albedo.z) X(normal_world.x) X(normal_world.y) \
-    X(normal_world.z) X(depth) X(rays)
+    X(radiance.x) \
+    X(radiance.y) \
+    X(radiance.z) X(albedo.x) X(albedo.y) X(albedo.z) X(normal_world.x) X(normal_world.y) X(normal_world.z) X(depth) X(rays)
 #define PLANE_NAME(member) #member,
 static const char *const plane_names[] = {PLANES(PLANE_NAME)};
 enum { PLANE_COUNT = sizeof plane_names / sizeof *plane_names };
 
 struct picture {
     double plane[PLANE_COUNT][PIXELS];
-    char made[200];               /* what was made of the scene, in words and whole numbers */
-    uint64_t met[PT_MET_COUNT];   /* vertices of one path in each pixel, by what they are */
+    char made[200];             /* what was made of the scene, in words and whole numbers */
+    uint64_t met[PT_MET_COUNT]; /* vertices of one path in each pixel, by what they are */
 };
 
 /* A value may be off by this share of itself and of the plane's mean: five digits are recorded. */
@@ -275,10 +276,7 @@ static void write_picture(FILE *file, const char *name, const struct picture *p)
 
 /* --- comparing -------------------------------------------------------------------------------------------------------- */
 
-static int is_off(double got, double want, double mean)
-{
-    return !(fabs(got - want) <= TOLERANCE * (fabs(want) + mean));
-}
+static int is_off(double got, double want, double mean) { return !(fabs(got - want) <= TOLERANCE * (fabs(want) + mean)); }
 
 static double mean_of(const double *plane)
 {
@@ -412,7 +410,8 @@ static int record_anew(void)
     FILE *out = fopen(file_name, "w");
     if (!out)
         return 1;
-    fprintf(out, "# Made by RECORD=1 build/tests/golden/pt_images: %d x %d pixels, %d samples, row by row. See pt_images.c.\n",
+    fprintf(out,
+            "# Made by RECORD=1 build/tests/golden/pt_images: %d x %d pixels, %d samples, row by row. See pt_images.c.\n",
             WIDTH, HEIGHT, SPP);
     fprintf(out, "rounding %016llx\n", (unsigned long long)rounding_here());
     check_folder("scenes/*.pbrt", out);
@@ -424,8 +423,10 @@ static int record_anew(void)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(scenes_keep_their_pictures), cmocka_unit_test(small_scenes_keep_their_pictures),
-        cmocka_unit_test(options_keep_their_pictures), cmocka_unit_test(all_were_looked_at),
+        cmocka_unit_test(scenes_keep_their_pictures),
+        cmocka_unit_test(small_scenes_keep_their_pictures),
+        cmocka_unit_test(options_keep_their_pictures),
+        cmocka_unit_test(all_were_looked_at),
     };
     if (getenv("RECORD"))
         return record_anew();

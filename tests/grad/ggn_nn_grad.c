@@ -23,10 +23,7 @@ static struct ggn_exec *e;
 static double *params_grad, mean0[4096], var0[4096];
 static int batch, out;
 
-static double rnd(uint32_t k, uint32_t s)
-{
-    return 2 * ggn_hash_unit(k, s) - 1;
-}
+static double rnd(uint32_t k, uint32_t s) { return 2 * ggn_hash_unit(k, s) - 1; }
 
 /* The loss Σ r·y with fixed random r; running statistics are put back, so that it is a function. */
 static double loss(int backward, uint32_t seed)
@@ -127,17 +124,17 @@ static void check(const char *what, int images, uint32_t seed)
 enum { SHAPES = 6 };
 static const int shape[SHAPES][3] = {{1, 1, 1}, {3, 1, 7}, {2, 5, 3}, {9, 4, 4}, {5, 13, 9}, {17, 3, 26}};
 
-#define FOR_SHAPES(name, build)                                                                                             \
-    static void name(void **state)                                                                                          \
-    {                                                                                                                       \
-        for (int s = 0; s < SHAPES; s++) {                                                                                  \
-            const int c = shape[s][0], h = shape[s][1], w = shape[s][2];                                                    \
-            ggn_graph_begin(&graph, #name, c, h, w);                                                                        \
-            ggn_graph_stage(&graph, "a");                                                                                   \
-            build;                                                                                                          \
-            check(#name, 1 + s % 3, (uint32_t)(100 * s + 1));                                                               \
-        }                                                                                                                   \
-        (void)state;                                                                                                        \
+#define FOR_SHAPES(name, build) \
+    static void name(void **state) \
+    { \
+        for (int s = 0; s < SHAPES; s++) { \
+            const int c = shape[s][0], h = shape[s][1], w = shape[s][2]; \
+            ggn_graph_begin(&graph, #name, c, h, w); \
+            ggn_graph_stage(&graph, "a"); \
+            build; \
+            check(#name, 1 + s % 3, (uint32_t)(100 * s + 1)); \
+        } \
+        (void)state; \
     }
 
 /* A layer that is read twice, so that gradients are added up, and one that joins. */

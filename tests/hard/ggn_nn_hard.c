@@ -19,7 +19,8 @@
 #include <xmmintrin.h>
 #endif
 
-static const struct ggn_hyper hyper = {.preset = GGN_PRESET_LULL, .height = 32, .width = 32, .window = 3, .k_r = 4, .k_m = 4, .k_d = 3};
+static const struct ggn_hyper hyper = {
+    .preset = GGN_PRESET_LULL, .height = 32, .width = 32, .window = 3, .k_r = 4, .k_m = 4, .k_d = 3};
 enum { SIDE = 32, AREA = SIDE * SIDE, BYTES = 3 * AREA };
 
 static struct ggn_model *make(void)
@@ -118,7 +119,8 @@ static void test_blocks(void **state)
 {
     static const struct {
         float (*block)(int, int), (*as)(int, int);
-    } cases[] = {{constant, constant}, {black, black}, {white, full}, {firefly, white_pixel}, {equal_images, equal_images}, {broken, repaired}};
+    } cases[] = {{constant, constant},         {black, black},    {white, full}, {firefly, white_pixel},
+                 {equal_images, equal_images}, {broken, repaired}};
     enum { CASES = sizeof cases / sizeof *cases };
     struct ggn_model *m = make();
     double p[CASES];
@@ -172,12 +174,14 @@ static void check_nan_in_pool(int kernel, enum ggn_isa isa)
     assert_true(w && e);
     for (int at = 0; at < H * W; at++) {
         for (int i = 0; i < H * W; i++)
-            ggn_exec_plane(e, 0, 0, 0)[i / W * g.value[0].row + i % W] = i == at ? NAN : (float)ggn_hash_unit((uint32_t)i, 1);
+            ggn_exec_plane(e, 0, 0, 0)[i / W * g.value[0].row + i % W] =
+                i == at ? NAN : (float)ggn_hash_unit((uint32_t)i, 1);
         ggn_exec_forward(e, w, 1, GGN_EVAL);
         for (int y = 0; y < g.value[1].h; y++)
             for (int x = 0; x < g.value[1].w; x++) {
                 const int first_y = 2 * y - (kernel == 3), first_x = 2 * x - (kernel == 3);
-                const int met = at / W >= first_y && at / W < first_y + kernel && at % W >= first_x && at % W < first_x + kernel;
+                const int met =
+                    at / W >= first_y && at / W < first_y + kernel && at % W >= first_x && at % W < first_x + kernel;
                 assert_int_equal(isnan(ggn_exec_plane(e, 1, 0, 0)[y * g.value[1].row + x]) != 0, met);
             }
     }
@@ -317,7 +321,8 @@ static void test_batch_norm_of_tiny_variances(void **state)
     ggn_weights_pack(w, NULL);
     for (int c = 0; c < g.value[0].c; c++)
         for (int k = 0; k < AREA; k++)
-            ggn_exec_plane(e, 0, 0, c)[k / SIDE * g.value[0].row + k % SIDE] = (float)ggn_hash_unit((uint32_t)k, (uint32_t)c);
+            ggn_exec_plane(e, 0, 0, c)[k / SIDE * g.value[0].row + k % SIDE] =
+                (float)ggn_hash_unit((uint32_t)k, (uint32_t)c);
     ggn_exec_forward(e, w, 1, GGN_EVAL);
     for (int i = 0; i < g.n_layers; i++) {
         const struct ggn_layer *l = &g.layer[i];
@@ -327,7 +332,8 @@ static void test_batch_norm_of_tiny_variances(void **state)
             for (int y = 0; y < v->h; y++)
                 for (int x = 0; x < v->w; x++) {
                     size_t at = (size_t)(y * v->row + x), k = (size_t)c;
-                    double in = (double)ggn_exec_plane(e, l->in, 0, c)[at], out = (double)ggn_exec_plane(e, l->out, 0, c)[at];
+                    double in = (double)ggn_exec_plane(e, l->in, 0, c)[at],
+                           out = (double)ggn_exec_plane(e, l->out, 0, c)[at];
                     double mean = (double)w->mean[l->stats + k], sd = sqrt((double)w->var[l->stats + k] + 1e-5);
                     double want = (double)w->params[l->weight + k] * (in - mean) / sd + (double)w->params[l->bias + k];
                     /* scale and shift are floats, and their difference may be small */
@@ -475,10 +481,17 @@ static void test_many_adam_steps(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_blocks),     cmocka_unit_test(test_flush_to_zero),
-        cmocka_unit_test(test_overflowing_weights), cmocka_unit_test(test_nan_in_pools), cmocka_unit_test(test_bce_extremes),
-        cmocka_unit_test(test_ssim_flat),  cmocka_unit_test(test_zero_variance), cmocka_unit_test(test_batch_norm_of_tiny_variances), cmocka_unit_test(test_equal_labels),
-        cmocka_unit_test(test_divergence), cmocka_unit_test(test_nan_data),      cmocka_unit_test(test_many_adam_steps)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_blocks),
+                                       cmocka_unit_test(test_flush_to_zero),
+                                       cmocka_unit_test(test_overflowing_weights),
+                                       cmocka_unit_test(test_nan_in_pools),
+                                       cmocka_unit_test(test_bce_extremes),
+                                       cmocka_unit_test(test_ssim_flat),
+                                       cmocka_unit_test(test_zero_variance),
+                                       cmocka_unit_test(test_batch_norm_of_tiny_variances),
+                                       cmocka_unit_test(test_equal_labels),
+                                       cmocka_unit_test(test_divergence),
+                                       cmocka_unit_test(test_nan_data),
+                                       cmocka_unit_test(test_many_adam_steps)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -41,7 +41,8 @@ static void check(const struct pt_bsdf *b, const char *what, float p0, float p1,
         pt_vec3 f = pt_bsdf_eval(PT_FX_ALL, b, wo, s.wi, &pdf), other = pt_sample_sphere(u0, u1);
         ok = ok && v3_is_finite(f) && isfinite(pdf) && pdf >= 0.0f && f.x >= 0.0f;
         f = pt_bsdf_eval(PT_FX_ALL, b, wo, other, &pdf);
-        ok = ok && v3_is_finite(f) && isfinite(pdf) && pdf >= 0.0f && f.x >= 0.0f && v3_is_finite(pt_bsdf_albedo(PT_FX_ALL, b, wo));
+        ok = ok && v3_is_finite(f) && isfinite(pdf) && pdf >= 0.0f && f.x >= 0.0f &&
+             v3_is_finite(pt_bsdf_albedo(PT_FX_ALL, b, wo));
         if (!ok)
             fail_msg("%s %g %g, cos %g: wi %g %g %g weight %g pdf %g flags %u; f %g pdf %g", what, (double)p0, (double)p1,
                      (double)mu, (double)s.wi.x, (double)s.wi.y, (double)s.wi.z, (double)s.weight.x, (double)s.pdf_solid,
@@ -51,7 +52,11 @@ static void check(const struct pt_bsdf *b, const char *what, float p0, float p1,
         fail_msg("%s %g %g, cos %g: albedo %g", what, (double)p0, (double)p1, (double)mu, sum / SAMPLES);
 }
 
-enum { ALPHAS = sizeof alphas / sizeof alphas[0], COSINES = sizeof cosines / sizeof cosines[0], ETAS = sizeof etas / sizeof etas[0] };
+enum {
+    ALPHAS = sizeof alphas / sizeof alphas[0],
+    COSINES = sizeof cosines / sizeof cosines[0],
+    ETAS = sizeof etas / sizeof etas[0]
+};
 
 static void conductors(void **state)
 {
@@ -125,9 +130,14 @@ static void total_internal_reflection_reflects_all(void **state)
 static void along_the_surface_nothing_is_sampled(void **state)
 {
     (void)state;
-    struct pt_bsdf all[] = {bsdf_conductor(0.0f, 0.0f), bsdf_conductor(0.3f, 0.3f), bsdf_dielectric(0.0f, 0.0f, 1.5f),
-                            bsdf_thin(1.5f), bsdf_coated_diffuse(0.0f, 1.5f, 1.0f, 0.01f), bsdf_coated_diffuse(0.3f, 1.5f, 1.0f, 0.01f),
-                            bsdf_coated_conductor(0.0f, 0.0f), bsdf_coated_conductor(0.3f, 0.2f)};
+    struct pt_bsdf all[] = {bsdf_conductor(0.0f, 0.0f),
+                            bsdf_conductor(0.3f, 0.3f),
+                            bsdf_dielectric(0.0f, 0.0f, 1.5f),
+                            bsdf_thin(1.5f),
+                            bsdf_coated_diffuse(0.0f, 1.5f, 1.0f, 0.01f),
+                            bsdf_coated_diffuse(0.3f, 1.5f, 1.0f, 0.01f),
+                            bsdf_coated_conductor(0.0f, 0.0f),
+                            bsdf_coated_conductor(0.3f, 0.2f)};
     for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
         struct pt_bsdf_sample s = {0};
         if (pt_bsdf_sample(PT_FX_ALL, &all[i], v3(0.6f, 0.8f, 0.0f), 0.4f, 0.3f, 0.7f, &s))

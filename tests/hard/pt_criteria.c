@@ -26,8 +26,8 @@ static uint32_t mix(uint32_t v)
 }
 
 /* Block 0 black, block 1 constant, block 2 with fireflies on 0.2, block 3 infinite in one of 50 samples. */
-static void four_blocks(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y, int count,
-                        uint32_t sample, struct pt_path_result *out)
+static void four_blocks(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y,
+                        int count, uint32_t sample, struct pt_path_result *out)
 {
     (void)scene, (void)settings;
     for (int i = 0; i < count; i++, x++, out++) {
@@ -44,8 +44,13 @@ static void four_blocks(const struct pt_scene *scene, const struct pt_integrator
 
 static struct pt_render *render(const char *criterion_id, struct lull_host_criterion **criterion, struct base_threads *pool)
 {
-    struct pt_render_config config = {.width = 4 * BLOCK, .height = BLOCK, .crop = {0, 0, 4 * BLOCK, BLOCK}, .block_width = BLOCK,
-                                      .block_height = BLOCK, .spp_min = FIRST_CHECK, .spp_max = 2000,
+    struct pt_render_config config = {.width = 4 * BLOCK,
+                                      .height = BLOCK,
+                                      .crop = {0, 0, 4 * BLOCK, BLOCK},
+                                      .block_width = BLOCK,
+                                      .block_height = BLOCK,
+                                      .spp_min = FIRST_CHECK,
+                                      .spp_max = 2000,
                                       .integrator = {.max_component = INFINITY}};
     struct pt_render *r = NULL;
     struct pt_render_hooks hooks = {0};
@@ -94,8 +99,15 @@ static void special_blocks(void **state)
 /* 10^6 samples per pixel through the whole loop: the mean is exact to 10^-6. */
 static void million_samples(void **state)
 {
-    struct pt_render_config config = {.width = 2, .height = 1, .crop = {0, 0, 2, 1}, .block_width = 16, .block_height = 16,
-                                      .spp_min = 1000000, .spp_max = 1000000, .uniform = 1, .planes = PT_FILM_ALL,
+    struct pt_render_config config = {.width = 2,
+                                      .height = 1,
+                                      .crop = {0, 0, 2, 1},
+                                      .block_width = 16,
+                                      .block_height = 16,
+                                      .spp_min = 1000000,
+                                      .spp_max = 1000000,
+                                      .uniform = 1,
+                                      .planes = PT_FILM_ALL,
                                       .integrator = {.max_component = INFINITY}};
     struct pt_render *r = NULL;
     struct pt_render_hooks hooks = {0};

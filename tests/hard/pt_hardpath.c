@@ -77,7 +77,8 @@ static void point_light(void **state)
     test_camera(&scene, v3(0, 1e-2f, 0), v3(0, 0, 0), v3(0, 0, 1), 0.1f, 4);
     int32_t grey = test_add_diffuse(&scene, v3_splat(0.5f));
     test_add_quad(&scene, grey, v3(-10, 0, -10), v3(0, 0, 20), v3(20, 0, 0));
-    struct pt_light point = {.kind = PT_LIGHT_POINT, .shape = -1, .image = -1, .emission = {7, 7, 7}, .position = {0, 2.0f - 1e-2f, 0}};
+    struct pt_light point = {
+        .kind = PT_LIGHT_POINT, .shape = -1, .image = -1, .emission = {7, 7, 7}, .position = {0, 2.0f - 1e-2f, 0}};
     test_add_light(&scene, &point);
     test_scene_finish(&scene);
     struct pt_integrator settings = test_integrator(1);
@@ -136,7 +137,8 @@ static void scale_and_shift(void **state)
     static const struct {
         float scale;
         pt_vec3 shift;
-    } cases[] = {{1e-4f, {0, 0, 0}}, {1e4f, {0, 0, 0}}, {1.0f, {1e5f, 0, 0}}, {1.0f, {-1e5f, 1e5f, 1e5f}}, {1e4f, {1e5f, -1e5f, 0}}};
+    } cases[] = {
+        {1e-4f, {0, 0, 0}}, {1e4f, {0, 0, 0}}, {1.0f, {1e5f, 0, 0}}, {1.0f, {-1e5f, 1e5f, 1e5f}}, {1e4f, {1e5f, -1e5f, 0}}};
     static double base[SIZE * SIZE], base_var[SIZE * SIZE], mean[SIZE * SIZE], var[SIZE * SIZE];
     struct pt_scene scene;
     struct pt_integrator settings = test_integrator(5);
@@ -271,7 +273,8 @@ static void matched_and_total(void **state)
     glass = test_add_material(&scene, PT_BSDF_DIELECTRIC);
     int32_t black = test_add_diffuse(&scene, v3_splat(0.0f));
     test_add_quad(&scene, glass, v3(-50, 0, -50), v3(0, 0, 100), v3(100, 0, 0));
-    test_add_area_light(&scene, test_add_quad(&scene, black, v3(-50, -20, 6), v3(0, 20, 0), v3(100, 0, 0)), v3_splat(2.0f), 1);
+    test_add_area_light(&scene, test_add_quad(&scene, black, v3(-50, -20, 6), v3(0, 20, 0), v3(100, 0, 0)), v3_splat(2.0f),
+                        1);
     struct pt_light sky = {.kind = PT_LIGHT_ENV_CONSTANT, .shape = -1, .image = -1, .emission = {1, 1, 1}};
     test_add_light(&scene, &sky);
     test_scene_finish(&scene);
@@ -327,9 +330,12 @@ static void bad_emission(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(closed_furnace), cmocka_unit_test(sphere_light), cmocka_unit_test(point_light),
-        cmocka_unit_test(lights_of_extreme_size), cmocka_unit_test(scale_and_shift), cmocka_unit_test(duplicated_and_degenerate),
-        cmocka_unit_test(coplanar_light), cmocka_unit_test(grazing), cmocka_unit_test(matched_and_total), cmocka_unit_test(bad_emission), cmocka_unit_test(endless_mirrors),
+        cmocka_unit_test(closed_furnace),    cmocka_unit_test(sphere_light),
+        cmocka_unit_test(point_light),       cmocka_unit_test(lights_of_extreme_size),
+        cmocka_unit_test(scale_and_shift),   cmocka_unit_test(duplicated_and_degenerate),
+        cmocka_unit_test(coplanar_light),    cmocka_unit_test(grazing),
+        cmocka_unit_test(matched_and_total), cmocka_unit_test(bad_emission),
+        cmocka_unit_test(endless_mirrors),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

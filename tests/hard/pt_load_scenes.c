@@ -98,7 +98,8 @@ static void one_scene_at_all_scales(void **state)
     static const struct {
         const char *path;
         float scale;
-    } others[] = {{"scenes/hard-scale-small.pbrt", 1e-4f}, {"scenes/hard-scale-large.pbrt", 1e4f}, {"scenes/hard-shift.pbrt", 1}};
+    } others[] = {
+        {"scenes/hard-scale-small.pbrt", 1e-4f}, {"scenes/hard-scale-large.pbrt", 1e4f}, {"scenes/hard-shift.pbrt", 1}};
     const float tolerance = 2e-6f; /* of coordinates up to 8: a few units in the last place of float */
     struct pt_scene *one = load("scenes/hard-scale-one.pbrt");
     assert_non_null(one);
@@ -108,10 +109,11 @@ static void one_scene_at_all_scales(void **state)
         assert_int_equal(other->mesh_count, one->mesh_count);
         for (int32_t i = 0; i < one->mesh_count; i++)
             for (uint32_t v = 0; v < one->meshes[i].vertex_count; v++) {
-                pt_vec3 a = one->meshes[i].vertices[v].p, b = v3_scale(other->meshes[i].vertices[v].p, 1.0f / others[k].scale);
+                pt_vec3 a = one->meshes[i].vertices[v].p,
+                        b = v3_scale(other->meshes[i].vertices[v].p, 1.0f / others[k].scale);
                 if (!(fabsf(a.x - b.x) <= tolerance && fabsf(a.y - b.y) <= tolerance && fabsf(a.z - b.z) <= tolerance))
-                    fail_msg("%s: mesh %d vertex %u is %.9g %.9g %.9g, expected %.9g %.9g %.9g", others[k].path, (int)i, (unsigned)v,
-                             (double)b.x, (double)b.y, (double)b.z, (double)a.x, (double)a.y, (double)a.z);
+                    fail_msg("%s: mesh %d vertex %u is %.9g %.9g %.9g, expected %.9g %.9g %.9g", others[k].path, (int)i,
+                             (unsigned)v, (double)b.x, (double)b.y, (double)b.z, (double)a.x, (double)a.y, (double)a.z);
             }
         pt_scene_destroy(other);
     }
@@ -120,6 +122,7 @@ static void one_scene_at_all_scales(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(ours), cmocka_unit_test(other_peoples), cmocka_unit_test(one_scene_at_all_scales)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(ours), cmocka_unit_test(other_peoples),
+                                       cmocka_unit_test(one_scene_at_all_scales)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

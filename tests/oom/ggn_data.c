@@ -56,7 +56,13 @@ static int write_block(struct base_err *err)
     struct seq_builder w = {0};
     int rc = seq_builder_init(&w, W, H, 0, 0, 0, 1, err);
     for (uint32_t i = 0; i < 3 && !rc; i++) {
-        struct seq_frame f = {.spp = 100u << i, .half_spp = 50, .is_reference = i == 2, .full = i == 1, .display = display, .mean = mean, .half = half};
+        struct seq_frame f = {.spp = 100u << i,
+                              .half_spp = 50,
+                              .is_reference = i == 2,
+                              .full = i == 1,
+                              .display = display,
+                              .mean = mean,
+                              .half = half};
         rc = seq_builder_add(&w, &f, err);
     }
     if (!rc)
@@ -86,9 +92,18 @@ static int read_block(struct base_err *err)
 static int texts(struct base_err *err)
 {
     uint32_t levels[] = {100, 200};
-    struct seq_manifest_block entries[] = {{.id = 0, .x1 = W, .y1 = H, .file = "block-00000.lseq", .bytes = 10}, {.id = 1, .x0 = W, .x1 = 2 * W, .y1 = H, .file = "b", .bytes = 10}};
+    struct seq_manifest_block entries[] = {{.id = 0, .x1 = W, .y1 = H, .file = "block-00000.lseq", .bytes = 10},
+                                           {.id = 1, .x0 = W, .x1 = 2 * W, .y1 = H, .file = "b", .bytes = 10}};
     struct ggn_label list[] = {{0, 120, 0}, {1, 200, 1}};
-    struct seq_manifest m = {.scene = "s", .width = 2 * W, .height = H, .block = W, .n_levels = 2, .levels = levels, .n_blocks = 2, .blocks = entries}, m2;
+    struct seq_manifest m = {.scene = "s",
+                             .width = 2 * W,
+                             .height = H,
+                             .block = W,
+                             .n_levels = 2,
+                             .levels = levels,
+                             .n_blocks = 2,
+                             .blocks = entries},
+                        m2;
     struct ggn_labels l = {.source = "observer", .cap = 200, .spread = 0.25, .n = 2, .labels = list}, l2;
     int rc = seq_manifest_write(dir, &m, err);
     if (!rc)
@@ -148,8 +163,16 @@ static int label(struct base_err *err)
     struct stat st;
     uint32_t levels[] = {100, 200};
     struct seq_manifest_block entry = {.id = 0, .x1 = W, .y1 = H, .file = "block-00000.lseq", .crc32 = block_crc};
-    struct ggn_dataset_view view = {.manifest = {.scene = "s", .width = W, .height = H, .block = W, .n_levels = 2, .levels = levels,
-                                                 .reference_spp = 400, .reference_independent = 1, .n_blocks = 1, .blocks = &entry}};
+    struct ggn_dataset_view view = {.manifest = {.scene = "s",
+                                                 .width = W,
+                                                 .height = H,
+                                                 .block = W,
+                                                 .n_levels = 2,
+                                                 .levels = levels,
+                                                 .reference_spp = 400,
+                                                 .reference_independent = 1,
+                                                 .n_blocks = 1,
+                                                 .blocks = &entry}};
     const struct ggn_observer *model = &ggn_observer_default;
     struct ggn_labels l;
     struct base_threads *threads = base_threads_create(1, err);
@@ -217,6 +240,7 @@ static void observer(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(blocks), cmocka_unit_test(json), cmocka_unit_test(small_inputs), cmocka_unit_test(observer)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(blocks), cmocka_unit_test(json), cmocka_unit_test(small_inputs),
+                                       cmocka_unit_test(observer)};
     return cmocka_run_group_tests_name("oom_data", tests, setup, teardown);
 }

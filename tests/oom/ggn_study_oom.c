@@ -197,7 +197,7 @@ static void a_request(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(a_study), cmocka_unit_test(a_report), cmocka_unit_test(a_transfer), cmocka_unit_test(a_block),
-                                       cmocka_unit_test(a_request)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(a_study), cmocka_unit_test(a_report), cmocka_unit_test(a_transfer),
+                                       cmocka_unit_test(a_block), cmocka_unit_test(a_request)};
     return cmocka_run_group_tests_name("oom_study", tests, setup, teardown);
 }

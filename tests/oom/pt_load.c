@@ -15,15 +15,19 @@
 
 static const char text[] =
     "Film \"rgb\" \"integer xresolution\" 8 Camera \"perspective\" WorldBegin\n"
-    "Texture \"t\" \"spectrum\" \"checkerboard\" MakeNamedMaterial \"m\" \"string type\" \"diffuse\" \"texture reflectance\" \"t\"\n"
+    "Texture \"t\" \"spectrum\" \"checkerboard\" MakeNamedMaterial \"m\" \"string type\" \"diffuse\" \"texture "
+    "reflectance\" \"t\"\n"
     "MakeNamedMedium \"fog\" \"string type\" \"uniformgrid\" \"float density\" [ 1 2 ] \"integer nx\" 2\n"
     "MediumInterface \"fog\" \"\" Attribute \"shape\" \"float alpha\" 0.5 NamedMaterial \"m\"\n"
     "LightSource \"point\" AttributeBegin AreaLightSource \"diffuse\" Shape \"sphere\" AttributeEnd\n"
-    "ObjectBegin \"o\" Shape \"trianglemesh\" \"integer indices\" [ 0 1 2 ] \"point3 P\" [ 0 0 0 1 0 0 0 1 0 ] \"normal N\" [ 0 0 1 0 0 1 0 0 1 ] "
+    "ObjectBegin \"o\" Shape \"trianglemesh\" \"integer indices\" [ 0 1 2 ] \"point3 P\" [ 0 0 0 1 0 0 0 1 0 ] \"normal N\" "
+    "[ 0 0 1 0 0 1 0 0 1 ] "
     "\"point2 uv\" [ 0 0 1 0 0 1 ] ObjectEnd ObjectInstance \"o\"\n"
     "Shape \"loopsubdiv\" \"integer levels\" 1 \"integer indices\" [ 0 1 2 ] \"point3 P\" [ 0 0 0 1 0 0 0 1 0 ]\n"
-    "Shape \"curve\" \"point3 P\" [ 0 0 0 1 0 0 1 1 0 0 1 1 ] Shape \"cone\" Shape \"bilinearmesh\" \"point3 P\" [ 0 0 0 1 0 0 0 1 0 1 1 1 ]\n"
-    "ActiveTransform EndTime Translate 1 0 0 ActiveTransform All Shape \"disk\" CoordinateSystem \"here\" Material \"hair\"\n";
+    "Shape \"curve\" \"point3 P\" [ 0 0 0 1 0 0 1 1 0 0 1 1 ] Shape \"cone\" Shape \"bilinearmesh\" \"point3 P\" [ 0 0 0 1 "
+    "0 0 0 1 0 1 1 1 ]\n"
+    "ActiveTransform EndTime Translate 1 0 0 ActiveTransform All Shape \"disk\" CoordinateSystem \"here\" Material "
+    "\"hair\"\n";
 
 enum { MORE_THAN_IT_TAKES = 20000 };
 
@@ -68,9 +72,10 @@ static void reading(void **state)
 static void ply(void **state)
 {
     (void)state;
-    static const char bytes[] = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty float nx\n"
-                                "property float ny\nproperty float nz\nproperty float u\nproperty float v\nelement face 1\n"
-                                "property list uchar int vertex_indices\nend_header\n0 0 0 0 0 1 0 0\n1 0 0 0 0 1 0 0\n0 1 0 0 0 1 0 0\n3 0 1 2\n";
+    static const char bytes[] =
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty float nx\n"
+        "property float ny\nproperty float nz\nproperty float u\nproperty float v\nelement face 1\n"
+        "property list uchar int vertex_indices\nend_header\n0 0 0 0 0 1 0 0\n1 0 0 0 0 1 0 0\n0 1 0 0 0 1 0 0\n3 0 1 2\n";
     struct pt_ply out;
     struct base_err err = {0};
     int failures = 0;

@@ -105,10 +105,7 @@ static int write_report(struct pt_render *r, struct base_err *err)
 {
     return pt_output_report(in_folder("r.json"), r, &info, err);
 }
-static int write_exr(struct pt_render *r, struct base_err *err)
-{
-    return pt_output_exr(in_folder("a.exr"), r, &info, err);
-}
+static int write_exr(struct pt_render *r, struct base_err *err) { return pt_output_exr(in_folder("a.exr"), r, &info, err); }
 static int write_csv(struct pt_render *r, struct base_err *err)
 {
     return pt_output_stop_map(in_folder("s.csv"), r, &info, err);
@@ -144,7 +141,8 @@ static void assert_same_file(const char *name, struct bytes expected)
 }
 
 /* Each allocation of the job fails once: an error and no file or, where a library did without, the whole file. */
-static void fail_each(struct pt_render *render, int (*job)(struct pt_render *, struct base_err *), const char *name, struct bytes whole)
+static void fail_each(struct pt_render *render, int (*job)(struct pt_render *, struct base_err *), const char *name,
+                      struct bytes whole)
 {
     for (long k = 1, happened = 1; happened; k++) {
         struct base_err err = {0};
@@ -226,8 +224,13 @@ static void say(void *data, const char *line)
 
 static void recording(void **state)
 {
-    struct pt_sequence_config config = {.directory = in_folder("seq"), .levels = "linear:2:4:2", .blocks = "3", .reference_spp = 2,
-                                        .scene_path = "a.pbrt", .quiet = 1, .render = pt_fake_config()};
+    struct pt_sequence_config config = {.directory = in_folder("seq"),
+                                        .levels = "linear:2:4:2",
+                                        .blocks = "3",
+                                        .reference_spp = 2,
+                                        .scene_path = "a.pbrt",
+                                        .quiet = 1,
+                                        .render = pt_fake_config()};
     char directory[128];
     (void)state;
     snprintf(directory, sizeof directory, "%s", config.directory);
@@ -294,7 +297,7 @@ static void quoting(void **state)
             render->config.pilot_spp = 40;
             render->config.pilot_s = 1e9;
             int rc = quote(render, finishing, k, &was, &err);
-            if (was && !rc) /* the C library sorts without room of its own */
+            if (was && !rc)                              /* the C library sorts without room of its own */
                 assert_true(finishing && silent++ < 12); /* blocks */
             else
                 assert_int_equal(rc, was ? BASE_ENOMEM : 0);
@@ -310,7 +313,8 @@ static void quoting(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(creating), cmocka_unit_test(checking), cmocka_unit_test(writing_and_reading),
-                                       cmocka_unit_test(recording), cmocka_unit_test(quoting)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(creating), cmocka_unit_test(checking),
+                                       cmocka_unit_test(writing_and_reading), cmocka_unit_test(recording),
+                                       cmocka_unit_test(quoting)};
     return cmocka_run_group_tests(tests, setup, teardown);
 }

@@ -96,8 +96,8 @@ static void samples_follow_the_density(void **state)
             double p_delta = delta_pdf[0] + delta_pdf[1], mass = chi2_mass(&c), p = chi2_p_value(&c);
             if (p < limit || mass + p_delta > 1.005 ||
                 fabs(delta / c.samples - p_delta) > 5.0 * sqrt(p_delta * fabs(1.0 - p_delta) / c.samples) + 1e-6)
-                fail_msg("%s, cos %g: p = %g, density integrates to %g, delta %g of %g", cases[i].name, (double)cosines[k], p,
-                         mass, delta / c.samples, p_delta);
+                fail_msg("%s, cos %g: p = %g, density integrates to %g, delta %g of %g", cases[i].name, (double)cosines[k],
+                         p, mass, delta / c.samples, p_delta);
         }
     }
 }
@@ -115,8 +115,9 @@ static int coarse_cell(pt_vec3 w)
 static void walked_samples_follow_the_value(void **state)
 {
     (void)state;
-    const struct pt_bsdf models[] = {bsdf_coated_conductor(0.0f, 0.2f), bsdf_coated_conductor(0.3f, 0.2f), bsdf_coated_conductor(0.3f, 0.0f),
-                                     bsdf_scattering_coat(0.2f, 0.9f, 0.5f, 0.3f), bsdf_scattering_coat(0.0f, 0.5f, 1.0f, -0.4f)};
+    const struct pt_bsdf models[] = {bsdf_coated_conductor(0.0f, 0.2f), bsdf_coated_conductor(0.3f, 0.2f),
+                                     bsdf_coated_conductor(0.3f, 0.0f), bsdf_scattering_coat(0.2f, 0.9f, 0.5f, 0.3f),
+                                     bsdf_scattering_coat(0.0f, 0.5f, 1.0f, -0.4f)};
     for (int i = 0; i < 5; i++) {
         struct pt_bsdf b = models[i];
         struct pt_rng rng = pt_rng_make((uint64_t)(SEED + i));
@@ -152,7 +153,10 @@ static void walked_samples_follow_the_value(void **state)
 }
 
 /* Relative, or absolute for small numbers. */
-static int near(float a, float b, float tolerance) { return fabsf(a - b) <= tolerance * fmaxf(fmaxf(fabsf(a), fabsf(b)), 1e-3f); }
+static int near(float a, float b, float tolerance)
+{
+    return fabsf(a - b) <= tolerance * fmaxf(fmaxf(fabsf(a), fabsf(b)), 1e-3f);
+}
 
 static void weights_are_f_cos_over_pdf(void **state)
 {
@@ -306,7 +310,8 @@ static void visible_normals_agree_with_plain_ones(void **state)
                 if (om > 0.0f && wi.z > 0.0f) {
                     double a = (double)alpha, ti = sqrt(1.0 - (double)(wi.z * wi.z)) / (double)wi.z;
                     double to = sqrt(fmax(0.0, 1.0 - (double)(mu * mu))) / (double)mu;
-                    double g2 = 1.0 / (1.0 + 0.5 * (sqrt(1.0 + a * a * ti * ti) - 1.0) + 0.5 * (sqrt(1.0 + a * a * to * to) - 1.0));
+                    double g2 =
+                        1.0 / (1.0 + 0.5 * (sqrt(1.0 + a * a * ti * ti) - 1.0) + 0.5 * (sqrt(1.0 + a * a * to * to) - 1.0));
                     sum += g2 * (double)(om / (mu * m.z));
                 }
             }
@@ -320,10 +325,13 @@ static void visible_normals_agree_with_plain_ones(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(samples_follow_the_density), cmocka_unit_test(weights_are_f_cos_over_pdf),
+        cmocka_unit_test(samples_follow_the_density),
+        cmocka_unit_test(weights_are_f_cos_over_pdf),
         cmocka_unit_test(walked_samples_follow_the_value),
-        cmocka_unit_test(scattering_is_reciprocal),   cmocka_unit_test(energy_is_never_created),
-        cmocka_unit_test(white_furnace),              cmocka_unit_test(visible_normals_agree_with_plain_ones),
+        cmocka_unit_test(scattering_is_reciprocal),
+        cmocka_unit_test(energy_is_never_created),
+        cmocka_unit_test(white_furnace),
+        cmocka_unit_test(visible_normals_agree_with_plain_ones),
     };
     print_message("seed %d\n", SEED);
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -38,7 +38,8 @@ static void begin(struct bench *b, float alpha, float eta)
     s->materials[glass].roughness_u.value = s->materials[glass].roughness_v.value = v3_splat(alpha);
     b->screen = test_add_quad(s, film, v3(-1, -1, 0), v3(2, 0, 0), v3(0, 2, 0));
     b->ball = test_add_sphere(s, glass, v3(0.1f, 0, -1.5f), 0.6f);
-    int32_t lamp = test_add_quad(s, black, v3(-lamp_half, -lamp_half, -lamp_height), v3(2 * lamp_half, 0, 0), v3(0, 2 * lamp_half, 0));
+    int32_t lamp =
+        test_add_quad(s, black, v3(-lamp_half, -lamp_half, -lamp_height), v3(2 * lamp_half, 0, 0), v3(0, 2 * lamp_half, 0));
     test_add_area_light(s, lamp, v3_splat(1.0f), 0);
     test_scene_finish(s);
 }
@@ -98,7 +99,8 @@ static void compare(float alpha, float eta)
     double paths = (double)(mean.x * PT_PI), error = hypot(photon_error, path_error * (double)PT_PI);
     assert_true(caustic > 0.05 * photons); /* there is a caustic to speak of */
     if (fabs(paths - photons) > 4.0 * error || error > 0.02 * photons)
-        fail_msg("alpha %g eta %g: paths %g, photons %g ± %g (caustic %g)", (double)alpha, (double)eta, paths, photons, error, caustic);
+        fail_msg("alpha %g eta %g: paths %g, photons %g ± %g (caustic %g)", (double)alpha, (double)eta, paths, photons,
+                 error, caustic);
     test_scene_end(&b.scene);
 }
 
@@ -120,7 +122,8 @@ static void air_bubble(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(glass_ball), cmocka_unit_test(frosted_ball), cmocka_unit_test(air_bubble)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(glass_ball), cmocka_unit_test(frosted_ball),
+                                       cmocka_unit_test(air_bubble)};
     print_message("seed %d\n", SEED);
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

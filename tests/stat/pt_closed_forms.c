@@ -14,9 +14,9 @@
 enum { SIZE = 8, SPP = 4096 };
 
 /* One scene unit is one pixel: pixel (i, j) is x from i - 4 to i - 3 and, downwards, y from 4 - j to 3 - j. The camera looks along +z. */
-#define HEAD(filter, more)                                                                                                    \
-    "Film \"rgb\" \"integer xresolution\" 8 \"integer yresolution\" 8 PixelFilter " filter more                                 \
-    " Camera \"orthographic\" \"float screenwindow\" [ -4 4 -4 4 ] \"float shutteropen\" 0 \"float shutterclose\" 1\n"           \
+#define HEAD(filter, more) \
+    "Film \"rgb\" \"integer xresolution\" 8 \"integer yresolution\" 8 PixelFilter " filter more \
+    " Camera \"orthographic\" \"float screenwindow\" [ -4 4 -4 4 ] \"float shutteropen\" 0 \"float shutterclose\" 1\n" \
     "Integrator \"path\" \"integer maxdepth\" 1\nWorldBegin\n"
 #define BOX "\"box\" \"float xradius\" .5 \"float yradius\" .5"
 /* A rectangle in the plane z, seen from the camera's side. */
@@ -138,11 +138,14 @@ static double moving(int x, int y)
 static void unsharp_and_moving_edges(void **state)
 {
     (void)state;
-    check_image("Film \"rgb\" \"integer xresolution\" 8 \"integer yresolution\" 8 PixelFilter " BOX
-                " Camera \"orthographic\" \"float screenwindow\" [ -4 4 -4 4 ] \"float lensradius\" 2 \"float focaldistance\" 10\n"
-                "Integrator \"path\" \"integer maxdepth\" 1\nWorldBegin\n" LEFT_OF_EDGE, unsharp, CAMERA_ERROR);
+    check_image(
+        "Film \"rgb\" \"integer xresolution\" 8 \"integer yresolution\" 8 PixelFilter " BOX
+        " Camera \"orthographic\" \"float screenwindow\" [ -4 4 -4 4 ] \"float lensradius\" 2 \"float focaldistance\" 10\n"
+        "Integrator \"path\" \"integer maxdepth\" 1\nWorldBegin\n" LEFT_OF_EDGE,
+        unsharp, CAMERA_ERROR);
     check_image(HEAD(BOX, "") "LightSource \"infinite\" \"rgb L\" [ 1 1 1 ]\n"
-                "ActiveTransform EndTime Translate 1 0 0 ActiveTransform All " BLACK QUAD "[ -50 -50 5  .3 -50 5  .3 50 5  -50 50 5 ]",
+                              "ActiveTransform EndTime Translate 1 0 0 ActiveTransform All " BLACK QUAD
+                              "[ -50 -50 5  .3 -50 5  .3 50 5  -50 50 5 ]",
                 moving, CAMERA_ERROR);
 }
 
@@ -167,9 +170,12 @@ static void texture_offsets(void **state)
 {
     (void)state;
     check_image(HEAD(BOX, "") "LightSource \"infinite\" \"rgb L\" [ 1 1 1 ]\n"
-                "Texture \"t\" \"spectrum\" \"checkerboard\" \"float uscale\" 4 \"float udelta\" .3 \"float vscale\" 2 \"float vdelta\" -.7 "
-                "\"rgb tex1\" [ 0 0 0 ] \"rgb tex2\" [ 1 1 1 ]\n"
-                "Material \"diffuse\" \"texture reflectance\" \"t\" " QUAD "[ -4 -4 5  4 -4 5  4 4 5  -4 4 5 ]", squares, SOBOL_ERROR);
+                              "Texture \"t\" \"spectrum\" \"checkerboard\" \"float uscale\" 4 \"float udelta\" .3 \"float "
+                              "vscale\" 2 \"float vdelta\" -.7 "
+                              "\"rgb tex1\" [ 0 0 0 ] \"rgb tex2\" [ 1 1 1 ]\n"
+                              "Material \"diffuse\" \"texture reflectance\" \"t\" " QUAD
+                              "[ -4 -4 5  4 -4 5  4 4 5  -4 4 5 ]",
+                squares, SOBOL_ERROR);
 }
 
 /* --- light that gets through --------------------------------------------------------------------------------------------- */
@@ -181,21 +187,24 @@ static void half_transparent_to_the_eye(void **state)
 {
     (void)state;
     check_image(HEAD(BOX, "") BLACK "AttributeBegin " GLOW QUAD "[ -50 -50 9  50 -50 9  50 50 9  -50 50 9 ] AttributeEnd\n"
-                "Shape \"trianglemesh\" \"float alpha\" .3 \"integer indices\" [ 0 2 1 0 3 2 ] "
-                "\"point3 P\" [ -50 -50 5  0 -50 5  0 50 5  -50 50 5 ]", glow_through, CHANCE_ERROR);
+                                    "Shape \"trianglemesh\" \"float alpha\" .3 \"integer indices\" [ 0 2 1 0 3 2 ] "
+                                    "\"point3 P\" [ -50 -50 5  0 -50 5  0 50 5  -50 50 5 ]",
+                glow_through, CHANCE_ERROR);
 }
 
 /* Parallel light along +z with the irradiance π: a white plane facing it has the radiance 1. */
-#define SUN "LightSource \"distant\" \"point3 from\" [ 0 0 0 ] \"point3 to\" [ 0 0 1 ] \"rgb L\" [ 3.14159265 3.14159265 3.14159265 ]\n"
+#define SUN \
+    "LightSource \"distant\" \"point3 from\" [ 0 0 0 ] \"point3 to\" [ 0 0 1 ] \"rgb L\" [ 3.14159265 3.14159265 " \
+    "3.14159265 ]\n"
 #define FLOOR WHITE QUAD "[ -50 -50 5  50 -50 5  50 50 5  -50 50 5 ]\n"
 
 /* The sheet is behind the camera, so only shadow rays meet it. */
 static void half_transparent_to_light(void **state)
 {
     (void)state;
-    check_image(HEAD(BOX, "") SUN FLOOR
-                "Shape \"trianglemesh\" \"float alpha\" .3 \"integer indices\" [ 0 2 1 0 3 2 ] "
-                "\"point3 P\" [ -50 -50 -5  0 -50 -5  0 50 -5  -50 50 -5 ]", glow_through, CHANCE_ERROR);
+    check_image(HEAD(BOX, "") SUN FLOOR "Shape \"trianglemesh\" \"float alpha\" .3 \"integer indices\" [ 0 2 1 0 3 2 ] "
+                                        "\"point3 P\" [ -50 -50 -5  0 -50 -5  0 50 -5  -50 50 -5 ]",
+                glow_through, CHANCE_ERROR);
 }
 
 /* At time t the shadow reaches from the left to x = -3 + 6t: pixel column x is lit while it has not come. */
@@ -211,9 +220,11 @@ static double lit_share(int x, int y)
 static void moving_shadow(void **state)
 {
     (void)state;
-    check_image(HEAD(BOX, "") SUN FLOOR BLACK
-                "ActiveTransform StartTime Translate -3 0 0 ActiveTransform EndTime Translate 3 0 0 ActiveTransform All "
-                QUAD "[ -50 -50 -5  0 -50 -5  0 50 -5  -50 50 -5 ]", lit_share, CHANCE_ERROR);
+    check_image(
+        HEAD(BOX, "") SUN FLOOR BLACK
+        "ActiveTransform StartTime Translate -3 0 0 ActiveTransform EndTime Translate 3 0 0 ActiveTransform All " QUAD
+        "[ -50 -50 -5  0 -50 -5  0 50 -5  -50 50 -5 ]",
+        lit_share, CHANCE_ERROR);
 }
 
 /* --- normals of sheared instances ---------------------------------------------------------------------------------------- */
@@ -229,9 +240,11 @@ static void sheared_instances(void **state)
     for (int i = 0; i < 2; i++) {
         char text[1500];
         snprintf(text, sizeof text,
-                 HEAD(BOX, "") SUN WHITE "ObjectBegin \"o\" Shape \"trianglemesh\" %s \"integer indices\" [ 0 2 1 0 3 2 ] "
+                 HEAD(BOX, "") SUN WHITE
+                 "ObjectBegin \"o\" Shape \"trianglemesh\" %s \"integer indices\" [ 0 2 1 0 3 2 ] "
                  "\"point3 P\" [ -6 -6 0  6 -6 0  6 6 0  -6 6 0 ] ObjectEnd\n"
-                 "Translate 0 0 9 Transform [ 1 0 .5 0  0 1 0 0  0 0 1 0  0 0 9 1 ] ObjectInstance \"o\"", normals[i]);
+                 "Translate 0 0 9 Transform [ 1 0 .5 0  0 1 0 0  0 0 1 0  0 0 9 1 ] ObjectInstance \"o\"",
+                 normals[i]);
         check_image(text, tilted, 1e-4);
     }
 }
@@ -246,10 +259,13 @@ static void shadows_of_what_is_close_to_the_light(void **state)
 {
     (void)state;
 #define SHUTTER(z) BLACK QUAD "[ -50 -50 " z "  50 -50 " z "  50 50 " z "  -50 50 " z " ]\n"
-    check_image(HEAD(BOX, "") FLOOR SHUTTER("-94.98")
-                "LightSource \"point\" \"rgb I\" [ 1e4 1e4 1e4 ] \"point3 from\" [ 0 0 -95 ]", dark, 0.0);
-    check_image(HEAD(BOX, "") FLOOR SHUTTER("-94.98") BLACK "AreaLightSource \"diffuse\" \"rgb L\" [ 1e4 1e4 1e4 ] \"bool twosided\" true "
-                QUAD "[ -1 -1 -95  1 -1 -95  1 1 -95  -1 1 -95 ]", dark, 0.0);
+    check_image(HEAD(BOX, "")
+                    FLOOR SHUTTER("-94.98") "LightSource \"point\" \"rgb I\" [ 1e4 1e4 1e4 ] \"point3 from\" [ 0 0 -95 ]",
+                dark, 0.0);
+    check_image(HEAD(BOX, "") FLOOR SHUTTER("-94.98") BLACK
+                "AreaLightSource \"diffuse\" \"rgb L\" [ 1e4 1e4 1e4 ] \"bool twosided\" true " QUAD
+                "[ -1 -1 -95  1 -1 -95  1 1 -95  -1 1 -95 ]",
+                dark, 0.0);
     check_image(HEAD(BOX, "") FLOOR SUN SHUTTER("-1e6"), dark, 0.0);
 }
 

@@ -91,10 +91,11 @@ static void coated_metal_starts_from_its_first_bounce(void **state)
     b.thickness = 0.0f;
     struct pt_bsdf metal = pt_layer_base(&b);
     pt_vec3 wo = case_direction(0.9f), wi = v3_norm(v3(-0.2f, 0.3f, 0.9f));
-    float cos_o, cos_i, pdf, fo = pt_fresnel_dielectric_t(wo.z, b.eta, &cos_o), fi = pt_fresnel_dielectric_t(wi.z, b.eta, &cos_i);
+    float cos_o, cos_i, pdf, fo = pt_fresnel_dielectric_t(wo.z, b.eta, &cos_o),
+                             fi = pt_fresnel_dielectric_t(wi.z, b.eta, &cos_i);
     pt_vec3 inner_o = v3(wo.x / b.eta, wo.y / b.eta, cos_o), inner_i = v3(wi.x / b.eta, wi.y / b.eta, cos_i);
-    double first = (double)((1.0f - fo) * (1.0f - fi) / (b.eta * b.eta) * pt_conductor_eval(PT_FX_ALL, &metal, inner_o, inner_i, &pdf).x /
-                            inner_i.z * wi.z);
+    double first = (double)((1.0f - fo) * (1.0f - fi) / (b.eta * b.eta) *
+                            pt_conductor_eval(PT_FX_ALL, &metal, inner_o, inner_i, &pdf).x / inner_i.z * wi.z);
     double error, f = mean_f(b, wo, wi, 100000, &error);
     if (!(f > first - 4.0 * error && f < 1.12 * first + 4.0 * error))
         fail_msg("first bounce %g, walk %g ± %g", first, f, error);
@@ -137,10 +138,8 @@ static void blended_rows_agree_with_single_ones(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(factored_coating_agrees_with_the_walk),
-        cmocka_unit_test(clear_and_scattering_layers_meet),
-        cmocka_unit_test(coated_metal_starts_from_its_first_bounce),
-        cmocka_unit_test(coated_mirror_is_bounded),
+        cmocka_unit_test(factored_coating_agrees_with_the_walk),     cmocka_unit_test(clear_and_scattering_layers_meet),
+        cmocka_unit_test(coated_metal_starts_from_its_first_bounce), cmocka_unit_test(coated_mirror_is_bounded),
         cmocka_unit_test(blended_rows_agree_with_single_ones),
     };
     print_message("seed %d\n", SEED);

@@ -20,8 +20,10 @@ enum { SIZE = 20, SPP = 3 };
 
 static int same(const struct pt_path_result *a, const struct pt_path_result *b)
 {
-    return memcmp(&a->radiance, &b->radiance, sizeof a->radiance) == 0 && memcmp(&a->albedo, &b->albedo, sizeof a->albedo) == 0 &&
-           memcmp(&a->normal_world, &b->normal_world, sizeof a->normal_world) == 0 && memcmp(&a->depth, &b->depth, sizeof a->depth) == 0;
+    return memcmp(&a->radiance, &b->radiance, sizeof a->radiance) == 0 &&
+           memcmp(&a->albedo, &b->albedo, sizeof a->albedo) == 0 &&
+           memcmp(&a->normal_world, &b->normal_world, sizeof a->normal_world) == 0 &&
+           memcmp(&a->depth, &b->depth, sizeof a->depth) == 0;
 }
 
 static struct pt_scene *load(const char *path, struct pt_scene_defaults *defaults)
@@ -73,9 +75,10 @@ static void all_scenes(void **state)
 }
 
 /* One scene for each thing that draws numbers. */
-static const char *const drawing[] = {"alpha", "bump", "caustics", "coated", "cornell-box", "defocus", "delta-lights", "environment", "fog",
-                                      "glass", "glossy", "image-texture", "indirect", "instances", "many-lights", "mix", "motion",
-                                      "nested-smoke", "quadrics", "sky-image", "smoke", "soft-shadow", "texture"};
+static const char *const drawing[] = {
+    "alpha",  "bump",         "caustics", "coated",        "cornell-box", "defocus",     "delta-lights", "environment",
+    "fog",    "glass",        "glossy",   "image-texture", "indirect",    "instances",   "many-lights",  "mix",
+    "motion", "nested-smoke", "quadrics", "sky-image",     "smoke",       "soft-shadow", "texture"};
 enum { SCENES = sizeof drawing / sizeof *drawing, Z_SPP = 64 };
 /* 23 normal variables pass 4.5 in one of 6,000 tries. */
 static const double Z_BOUND = 4.5;

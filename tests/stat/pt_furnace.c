@@ -11,7 +11,8 @@
 
 static void add_environment(struct pt_scene *scene, float radiance)
 {
-    struct pt_light light = {.kind = PT_LIGHT_ENV_CONSTANT, .shape = -1, .image = -1, .emission = {radiance, radiance, radiance}};
+    struct pt_light light = {
+        .kind = PT_LIGHT_ENV_CONSTANT, .shape = -1, .image = -1, .emission = {radiance, radiance, radiance}};
     test_add_light(scene, &light);
 }
 
@@ -46,9 +47,11 @@ static double metal_albedo(double cos_o, double alpha)
     enum { NU = 100, NP = 48 };
     double sin_o = sqrt(1.0 - cos_o * cos_o), sum = 0.0;
     for (int i = 0; i < NU; i++) {
-        double u = (i + 0.5) / NU, cos_h = sqrt((1.0 - u) / (1.0 + (alpha * alpha - 1.0) * u)), sin_h = sqrt(1.0 - cos_h * cos_h);
+        double u = (i + 0.5) / NU, cos_h = sqrt((1.0 - u) / (1.0 + (alpha * alpha - 1.0) * u)),
+               sin_h = sqrt(1.0 - cos_h * cos_h);
         for (int k = 0; k < NP; k++) {
-            double oh = sin_o * sin_h * cos(2.0 * 3.14159265358979 * (k + 0.5) / NP) + cos_o * cos_h, cos_i = 2.0 * oh * cos_h - cos_o;
+            double oh = sin_o * sin_h * cos(2.0 * 3.14159265358979 * (k + 0.5) / NP) + cos_o * cos_h,
+                   cos_i = 2.0 * oh * cos_h - cos_o;
             if (oh > 0.0 && cos_i > 0.0)
                 sum += oh / (cos_o * cos_h * (1.0 + smith_lambda(cos_o, alpha) + smith_lambda(cos_i, alpha))) / (NU * NP);
         }
@@ -108,11 +111,15 @@ struct d3 {
     double x, y, z;
 };
 static double d3_dot(struct d3 a, struct d3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-static struct d3 d3_mix(double s, struct d3 a, double t, struct d3 b) { return (struct d3){s * a.x + t * b.x, s * a.y + t * b.y, s * a.z + t * b.z}; }
+static struct d3 d3_mix(double s, struct d3 a, double t, struct d3 b)
+{
+    return (struct d3){s * a.x + t * b.x, s * a.y + t * b.y, s * a.z + t * b.z};
+}
 
 static struct d3 draw_normal(double alpha, struct rng48 *r)
 {
-    double u = uniform(r), c = sqrt((1.0 - u) / (1.0 + (alpha * alpha - 1.0) * u)), s = sqrt(1.0 - c * c), turn = 2.0 * 3.14159265358979 * uniform(r);
+    double u = uniform(r), c = sqrt((1.0 - u) / (1.0 + (alpha * alpha - 1.0) * u)), s = sqrt(1.0 - c * c),
+           turn = 2.0 * 3.14159265358979 * uniform(r);
     return (struct d3){s * cos(turn), s * sin(turn), c};
 }
 
@@ -252,9 +259,12 @@ static void coatings_lose_what_their_walk_loses(void **state)
 {
     (void)state;
     static const struct coating cases[] = {
-        {"coated diffuse", 0.0, 0.0, 1.5, 0.01, 0},       {"thick coat on diffuse", 0.0, 0.0, 1.5, 0.3, 0},
-        {"coated diffuse, dense", 0.0, 0.0, 1.9, 0.01, 0}, {"rough coat on diffuse", 0.3, 0.0, 1.5, 0.05, 0},
-        {"coated metal", 0.0, 0.0, 1.5, 0.05, 1},          {"coat on rough metal", 0.0, 0.3, 1.5, 0.01, 1},
+        {"coated diffuse", 0.0, 0.0, 1.5, 0.01, 0},
+        {"thick coat on diffuse", 0.0, 0.0, 1.5, 0.3, 0},
+        {"coated diffuse, dense", 0.0, 0.0, 1.9, 0.01, 0},
+        {"rough coat on diffuse", 0.3, 0.0, 1.5, 0.05, 0},
+        {"coated metal", 0.0, 0.0, 1.5, 0.05, 1},
+        {"coat on rough metal", 0.0, 0.3, 1.5, 0.01, 1},
         {"rough coat on rough metal", 0.3, 0.2, 1.5, 0.01, 1},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
@@ -330,7 +340,8 @@ static void medium_furnace(void **state)
         struct pt_scene scene;
         sphere_scene(&scene);
         int32_t id = test_add_material(&scene, PT_MATERIAL_INTERFACE);
-        int32_t medium = test_add_medium(&scene, v3_splat(0.0f), i == 2 ? v3(0.5f, 2.0f, 8.0f) : v3_splat(3.0f), i == 0 ? 0.0f : 0.8f);
+        int32_t medium =
+            test_add_medium(&scene, v3_splat(0.0f), i == 2 ? v3(0.5f, 2.0f, 8.0f) : v3_splat(3.0f), i == 0 ? 0.0f : 0.8f);
         int32_t box = test_add_box(&scene, id, v3(-1, -1, -1), v3(1, 1, 1), 0);
         scene.shapes[box].medium_in = medium;
         test_scene_finish(&scene);
@@ -367,7 +378,8 @@ static void beer_lambert_on_shadow_rays(void **state)
     struct pt_scene scene;
     test_scene_begin(&scene);
     test_camera(&scene, v3(0, 0, -4), v3(0, 0, 4), v3(0, 1, 0), 1e-3f, 4);
-    struct pt_light point = {.kind = PT_LIGHT_POINT, .shape = -1, .image = -1, .emission = {16, 16, 16}, .position = {0, 0, 0}};
+    struct pt_light point = {
+        .kind = PT_LIGHT_POINT, .shape = -1, .image = -1, .emission = {16, 16, 16}, .position = {0, 0, 0}};
     test_add_light(&scene, &point); /* at the camera: render space is recentred there */
     int32_t id = test_add_material(&scene, PT_MATERIAL_INTERFACE), white = test_add_diffuse(&scene, v3_splat(1.0f));
     int32_t outer = test_add_medium(&scene, v3(0.1f, 0.2f, 0.5f), v3_splat(0.0f), 0.0f);
@@ -398,7 +410,8 @@ static void light_in_a_white_sphere(void **state)
     const double rho = 0.7, at = 0.75, pi = 3.14159265358979, edge = tan(20.0 * pi / 180.0);
     double direct = 0.0;
     for (int i = 0; i < SIZE * FINE * SIZE * FINE; i++) {
-        struct d3 p = {edge * (2.0 * (i % (SIZE * FINE) + 0.5) / (SIZE * FINE) - 1.0), edge * (2.0 * (i / (SIZE * FINE) + 0.5) / (SIZE * FINE) - 1.0), 1};
+        struct d3 p = {edge * (2.0 * (i % (SIZE * FINE) + 0.5) / (SIZE * FINE) - 1.0),
+                       edge * (2.0 * (i / (SIZE * FINE) + 0.5) / (SIZE * FINE) - 1.0), 1};
         p = d3_mix(1.0 / sqrt(d3_dot(p, p)), p, 0.0, p);
         struct d3 l = {at - p.x, -p.y, -p.z};
         double d2 = d3_dot(l, l);
@@ -410,13 +423,15 @@ static void light_in_a_white_sphere(void **state)
         double error;
         test_scene_begin(&scene);
         test_camera(&scene, v3(0, 0, 0), v3(0, 0, 1), v3(0, 1, 0), 40.0f, SIZE);
-        struct pt_light point = {.kind = PT_LIGHT_POINT, .shape = -1, .image = -1, .emission = {1, 1, 1}, .position = {(float)at, 0, 0}};
+        struct pt_light point = {
+            .kind = PT_LIGHT_POINT, .shape = -1, .image = -1, .emission = {1, 1, 1}, .position = {(float)at, 0, 0}};
         test_add_light(&scene, &point);
         test_add_sphere(&scene, test_add_diffuse(&scene, v3_splat((float)rho)), v3(0, 0, 0), 1.0f);
         test_scene_finish(&scene);
         struct pt_integrator settings = test_integrator(-1);
         settings.sampler = sampler;
-        double y = (double)v3_luminance(test_mean(&scene, &settings, pt_kernel_select(scene.effects, NULL, NULL), SPP, &error));
+        double y =
+            (double)v3_luminance(test_mean(&scene, &settings, pt_kernel_select(scene.effects, NULL, NULL), SPP, &error));
         if (!(fabs(y - want) <= 4.0 * error + 1e-3 * want))
             fail_msg("sampler %d: %.5f ± %.5f, not %.5f", sampler, y, error, want);
         test_scene_end(&scene);
@@ -426,10 +441,14 @@ static void light_in_a_white_sphere(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(rough_metals_lose_what_one_reflection_loses), cmocka_unit_test(rough_glass_loses_what_single_reflections_lose),
-        cmocka_unit_test(coatings_lose_what_their_walk_loses), cmocka_unit_test(every_bsdf),
-        cmocka_unit_test(medium_furnace), cmocka_unit_test(beer_lambert),
-        cmocka_unit_test(beer_lambert_on_shadow_rays), cmocka_unit_test(light_in_a_white_sphere),
+        cmocka_unit_test(rough_metals_lose_what_one_reflection_loses),
+        cmocka_unit_test(rough_glass_loses_what_single_reflections_lose),
+        cmocka_unit_test(coatings_lose_what_their_walk_loses),
+        cmocka_unit_test(every_bsdf),
+        cmocka_unit_test(medium_furnace),
+        cmocka_unit_test(beer_lambert),
+        cmocka_unit_test(beer_lambert_on_shadow_rays),
+        cmocka_unit_test(light_in_a_white_sphere),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -16,10 +16,7 @@
 
 enum { SIZE = 24, SPP = 128, REFERENCE_SPP = 2048 };
 
-static double luminance(const double *rgb)
-{
-    return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
-}
+static double luminance(const double *rgb) { return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]; }
 
 static int ascending(const void *a, const void *b)
 {

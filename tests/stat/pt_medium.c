@@ -28,7 +28,8 @@ static void absorption_is_beer_lambert(void **state)
     assert_int_equal(e.scattered, 0);
     assert_true(rng.state == untouched.state);
     pt_vec3 tr = pt_medium_transmittance(&m, v3_splat(0.0f), v3(0, 0, 1), 1.5f, &rng);
-    assert_true(fabs((double)e.weight.x - exp(-0.75)) < 1e-6 && e.weight.y == 1.0f && fabs((double)e.weight.z - exp(-3.0)) < 1e-6);
+    assert_true(fabs((double)e.weight.x - exp(-0.75)) < 1e-6 && e.weight.y == 1.0f &&
+                fabs((double)e.weight.z - exp(-3.0)) < 1e-6);
     assert_true(tr.x == e.weight.x && tr.y == e.weight.y && tr.z == e.weight.z);
     /* nothing comes from infinitely far, but through a channel that does not absorb */
     tr = pt_medium_transmittance(&m, v3_splat(0.0f), v3(0, 0, 1), INFINITY, &rng);
@@ -71,15 +72,16 @@ static void check_closed_form(const struct tally *t, pt_vec3 sigma_a, pt_vec3 si
         double st = (double)(a[c] + s[c]), tr = exp(-st * d), inside = st > 0.0 ? (1.0 - tr) / st : d;
         if (fabs(t->through[c] - tr) > tolerance || fabs(t->scattered[c] - (double)s[c] * inside) > tolerance ||
             fabs(t->emitted[c] - (double)l[c] * inside) > 2.0 * tolerance)
-            fail_msg("channel %d: through %g (%g), scattered %g (%g), emitted %g (%g)", c, t->through[c], tr, t->scattered[c],
-                     (double)s[c] * inside, t->emitted[c], (double)l[c] * inside);
+            fail_msg("channel %d: through %g (%g), scattered %g (%g), emitted %g (%g)", c, t->through[c], tr,
+                     t->scattered[c], (double)s[c] * inside, t->emitted[c], (double)l[c] * inside);
     }
 }
 
 static void homogeneous_sampling_is_unbiased(void **state)
 {
     (void)state;
-    const pt_vec3 absorb[] = {{0, 0, 0}, {0.1f, 0.5f, 2.0f}, {0, 1, 0}}, scatter[] = {{1, 1, 1}, {0.7f, 0.7f, 0.1f}, {3, 0, 0.2f}};
+    const pt_vec3 absorb[] = {{0, 0, 0}, {0.1f, 0.5f, 2.0f}, {0, 1, 0}},
+                  scatter[] = {{1, 1, 1}, {0.7f, 0.7f, 0.1f}, {3, 0, 0.2f}};
     for (int i = 0; i < 3; i++) {
         struct pt_medium m = homogeneous(absorb[i], scatter[i]);
         m.emission = v3(0.3f, 0.0f, 1.0f);
@@ -91,8 +93,14 @@ static void homogeneous_sampling_is_unbiased(void **state)
 
 static struct pt_medium grid(struct pt_arena *arena, const float *density, int nx, int ny, int nz, pt_vec3 a, pt_vec3 s)
 {
-    struct pt_medium m = {.kind = PT_MEDIUM_GRID, .sigma_a = a, .sigma_s = s, .nx = nx, .ny = ny, .nz = nz,
-                          .density = density, .from_render = identity};
+    struct pt_medium m = {.kind = PT_MEDIUM_GRID,
+                          .sigma_a = a,
+                          .sigma_s = s,
+                          .nx = nx,
+                          .ny = ny,
+                          .nz = nz,
+                          .density = density,
+                          .from_render = identity};
     assert_int_equal(pt_medium_grid_build(&m, arena, NULL), 0);
     return m;
 }
@@ -146,7 +154,12 @@ static void tracking_through_a_varying_grid_is_unbiased(void **state)
     struct tally t;
     run(&m, o, d, (float)length, SAMPLES, &t);
     for (int c = 0; c < 3; c++) {
-        double st = (double)(c == 0 ? a.x + s.x : c == 1 ? a.y + s.y : a.z + s.z), sc = (double)(c == 0 ? s.x : c == 1 ? s.y : s.z);
+        double st = (double)(c == 0   ? a.x + s.x
+                             : c == 1 ? a.y + s.y
+                                      : a.z + s.z),
+               sc = (double)(c == 0   ? s.x
+                             : c == 1 ? s.y
+                                      : s.z);
         double expected = exp(-st * depth), scattered = sc / st * (1.0 - expected);
         const double tolerance = 6.0 / sqrt(SAMPLES);
         if (fabs(ratio[c] - expected) > tolerance || fabs(t.through[c] - expected) > tolerance ||
@@ -202,12 +215,9 @@ static void rays_that_miss_the_grid_pass(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(absorption_is_beer_lambert),
-        cmocka_unit_test(homogeneous_sampling_is_unbiased),
-        cmocka_unit_test(constant_grid_equals_homogeneous),
-        cmocka_unit_test(tracking_through_a_varying_grid_is_unbiased),
-        cmocka_unit_test(majorant_bounds_the_density),
-        cmocka_unit_test(rays_that_miss_the_grid_pass),
+        cmocka_unit_test(absorption_is_beer_lambert),       cmocka_unit_test(homogeneous_sampling_is_unbiased),
+        cmocka_unit_test(constant_grid_equals_homogeneous), cmocka_unit_test(tracking_through_a_varying_grid_is_unbiased),
+        cmocka_unit_test(majorant_bounds_the_density),      cmocka_unit_test(rays_that_miss_the_grid_pass),
     };
     print_message("seed %d\n", SEED);
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -48,7 +48,8 @@ static void lossless_media_vanish(void **state)
         begin(&scene, 25.0f);
         int32_t id = test_add_material(&scene, i == 2 ? PT_BSDF_DIELECTRIC : PT_MATERIAL_INTERFACE);
         int32_t shape = test_add_sphere(&scene, id, v3(0, 0, 0), 1.0f);
-        int32_t medium = test_add_medium(&scene, v3_splat(0.0f), i == 1 ? v3(0.5f, 2.0f, 1.0f) : v3_splat(2.0f), i == 1 ? 0.7f : -0.3f);
+        int32_t medium =
+            test_add_medium(&scene, v3_splat(0.0f), i == 1 ? v3(0.5f, 2.0f, 1.0f) : v3_splat(2.0f), i == 1 ? 0.7f : -0.3f);
         if (i == 3) {
             scene.media[medium].kind = PT_MEDIUM_GRID;
             scene.media[medium].nx = scene.media[medium].ny = scene.media[medium].nz = 2;
@@ -116,7 +117,8 @@ static void light_sampling_changes_no_mean(void **state)
 static void portals_change_no_mean(void **state)
 {
     (void)state;
-    static const float sky[3 * 8] = {1, 1, 2, 1, 1, 2, 20, 18, 15, 1, 1, 2, 0.2f, 0.2f, 0.1f, 0.2f, 0.2f, 0.1f, 0.3f, 0.2f, 0.1f, 0, 0, 0};
+    static const float sky[3 * 8] = {1,    1,    2,    1,    1,    2,    20,   18,   15,   1, 1, 2,
+                                     0.2f, 0.2f, 0.1f, 0.2f, 0.2f, 0.1f, 0.3f, 0.2f, 0.1f, 0, 0, 0};
     for (int image = 0; image < 2; image++) {
         double mean[3], error[3];
         for (int way = 0; way < 3; way++) {
@@ -141,13 +143,15 @@ static void portals_change_no_mean(void **state)
             light.portal_v = v3(0, 0, 1.8f);
             test_add_light(&scene, &light);
             test_scene_finish(&scene);
-            mean[way] = (double)v3_luminance(render(&scene, 4, way < 2 ? PT_STRATEGY_MIS : PT_STRATEGY_BSDF_ONLY, 1600, &error[way]));
+            mean[way] = (double)v3_luminance(
+                render(&scene, 4, way < 2 ? PT_STRATEGY_MIS : PT_STRATEGY_BSDF_ONLY, 1600, &error[way]));
             test_scene_end(&scene);
         }
         assert_true(mean[2] > 0.01 && error[0] < 0.02 * mean[0]);
         for (int way = 0; way < 2; way++)
             if (fabs(mean[way] - mean[2]) > 4.0 * hypot(error[way], error[2]))
-                fail_msg("image %d: %g ± %g %s portal, %g ± %g by chance", image, mean[way], error[way], way ? "without" : "with", mean[2], error[2]);
+                fail_msg("image %d: %g ± %g %s portal, %g ± %g by chance", image, mean[way], error[way],
+                         way ? "without" : "with", mean[2], error[2]);
     }
 }
 

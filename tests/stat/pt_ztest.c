@@ -76,7 +76,8 @@ static void judge(const char *name)
     for (int i = 0; i < TILES * TILES; i++)
         for (int c = 0; c < 3; c++) {
             double ma = a[i][c].sum / a[i][c].n, mb = b[i][c].sum / b[i][c].n;
-            double va = (a[i][c].sum2 / a[i][c].n - ma * ma) / a[i][c].n, vb = (b[i][c].sum2 / b[i][c].n - mb * mb) / b[i][c].n;
+            double va = (a[i][c].sum2 / a[i][c].n - ma * ma) / a[i][c].n,
+                   vb = (b[i][c].sum2 / b[i][c].n - mb * mb) / b[i][c].n;
             double spread = sqrt(fmax(va + vb, 1e-20));
             worst = fmax(worst, fabs(ma - mb) / fmax(spread, 1e-6 * fmax(ma, mb)));
         }
@@ -142,7 +143,10 @@ static void environment(void **state)
     for (int i = 0; i < 3 * W * H; i++)
         px[i] = 0.2f + (i / 3 == 2 * W + 5 ? 12.0f : 0.0f) + 0.1f * (float)(i % 3);
     scene.images[scene.image_count++] = (struct pt_image_map){W, H, 3, PT_PIXEL_FLOAT, 1.0f, px};
-    struct pt_light sky = {.kind = PT_LIGHT_ENV_IMAGE, .shape = -1, .mapping = PT_ENV_LATLONG, .emission = {1, 1, 1},
+    struct pt_light sky = {.kind = PT_LIGHT_ENV_IMAGE,
+                           .shape = -1,
+                           .mapping = PT_ENV_LATLONG,
+                           .emission = {1, 1, 1},
                            .from_render = {{1, 0, 0, 0, 0, 0, 1, 0, 0, -1, 0, 0}}};
     test_add_light(&scene, &sky);
     test_scene_finish(&scene);
@@ -175,7 +179,8 @@ static void lamps(struct pt_scene *scene)
     test_scene_begin(scene);
     test_camera(scene, v3(0, 2, -6), v3(0, 1.0f, 0), v3(0, 1, 0), 40.0f, 32);
     int32_t floor = test_add_diffuse(scene, v3(0.7f, 0.6f, 0.5f)), black = test_add_diffuse(scene, v3_splat(0.0f));
-    int32_t paper = test_add_material(scene, PT_BSDF_DIFFUSE_TRANSMISSION), metal = test_add_material(scene, PT_BSDF_CONDUCTOR);
+    int32_t paper = test_add_material(scene, PT_BSDF_DIFFUSE_TRANSMISSION),
+            metal = test_add_material(scene, PT_BSDF_CONDUCTOR);
     scene->materials[metal].roughness_u = scene->materials[metal].roughness_v = grey(0.35f);
     test_add_quad(scene, floor, v3(-4, 0, -4), v3(0, 0, 8), v3(8, 0, 0));
     test_add_quad(scene, metal, v3(-4, 0, 3), v3(0, 4, 0), v3(8, 0, 0));
@@ -185,7 +190,8 @@ static void lamps(struct pt_scene *scene)
         pt_vec3 p = v3(-3.0f + 0.75f * (float)i, i % 2 ? 3.0f : 1.2f, i % 3 ? 2.0f : -0.5f);
         pt_vec3 x = v3(0.5f, 0, 0), z = v3(0, 0.1f * (float)i, 0.5f);
         float power = i == 4 ? 0.0f : 1.0f + (float)(i % 4);
-        test_add_area_light(scene, test_add_quad(scene, black, p, i % 4 ? x : z, i % 4 ? z : x), v3(power, 2, power), i % 3 == 1);
+        test_add_area_light(scene, test_add_quad(scene, black, p, i % 4 ? x : z, i % 4 ? z : x), v3(power, 2, power),
+                            i % 3 == 1);
     }
     for (int i = 0; i < 4; i++) {
         int32_t id = test_add_sphere(scene, black, v3(-2.0f + 1.3f * (float)i, 0.5f + 0.3f * (float)i, 1.0f), 0.25f);
@@ -233,9 +239,16 @@ static void delta_lights_by_both_selections(void **state)
         struct pt_scene scene;
         lamps(&scene);
         for (int i = 0; i < 6; i++) {
-            struct pt_light light = {.kind = i < 3 ? PT_LIGHT_POINT : i < 5 ? PT_LIGHT_SPOT : PT_LIGHT_DISTANT, .shape = -1,
-                                     .image = -1, .emission = {1.0f + (float)i, 2, 1}, .position = v3((float)i - 2.5f, 0, 7),
-                                     .direction = v3_norm(v3(0.2f, -1.0f, 0.1f)), .cos_total = 0.75f, .cos_start = 0.85f};
+            struct pt_light light = {.kind = i < 3   ? PT_LIGHT_POINT
+                                             : i < 5 ? PT_LIGHT_SPOT
+                                                     : PT_LIGHT_DISTANT,
+                                     .shape = -1,
+                                     .image = -1,
+                                     .emission = {1.0f + (float)i, 2, 1},
+                                     .position = v3((float)i - 2.5f, 0, 7),
+                                     .direction = v3_norm(v3(0.2f, -1.0f, 0.1f)),
+                                     .cos_total = 0.75f,
+                                     .cos_start = 0.85f};
             test_add_light(&scene, &light);
         }
         int32_t hidden = test_add_quad(&scene, 1, v3(-0.5f, 1, 4), v3(0, 1, 0), v3(-1, 0, 0));
@@ -289,8 +302,13 @@ static void scenes_by_both_selections(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(cornell), cmocka_unit_test(glossy), cmocka_unit_test(environment), cmocka_unit_test(fog),
-        cmocka_unit_test(many_lights), cmocka_unit_test(many_lights_in_fog), cmocka_unit_test(delta_lights_by_both_selections),
+        cmocka_unit_test(cornell),
+        cmocka_unit_test(glossy),
+        cmocka_unit_test(environment),
+        cmocka_unit_test(fog),
+        cmocka_unit_test(many_lights),
+        cmocka_unit_test(many_lights_in_fog),
+        cmocka_unit_test(delta_lights_by_both_selections),
         cmocka_unit_test(scenes_by_both_selections),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -17,8 +17,8 @@
 
 enum { IDENTITY, BOX, CONSTANT, BAD_NUMBERS, VERSION, NO_DEVICE, COMMIT, MEMORY, ENDLESS, CRASH, KINDS };
 enum { INVALID_ARGUMENT = 2, INVALID_OPERATION = 3, OUT_OF_MEMORY = 4 };
-static const char *const kinds[KINDS] = {"identity", "box", "constant", "nan", "version", "no-device", "commit", "memory",
-                                         "endless", "crash"};
+static const char *const kinds[KINDS] = {"identity",  "box",    "constant", "nan",     "version",
+                                         "no-device", "commit", "memory",   "endless", "crash"};
 
 struct device {
     int kind, error;
@@ -74,15 +74,9 @@ void *oidnNewDevice(int type)
     return NULL;
 }
 
-void oidnCommitDevice(void *device)
-{
-    (void)device;
-}
+void oidnCommitDevice(void *device) { (void)device; }
 
-void oidnReleaseDevice(void *device)
-{
-    free(device);
-}
+void oidnReleaseDevice(void *device) { free(device); }
 
 void oidnSetDeviceInt(void *device, const char *name, int value)
 {
@@ -123,10 +117,7 @@ void *oidnNewFilter(void *device, const char *type)
     return f;
 }
 
-void oidnReleaseFilter(void *filter)
-{
-    free(filter);
-}
+void oidnReleaseFilter(void *filter) { free(filter); }
 
 void oidnSetSharedFilterImage(void *filter, const char *name, void *data, int format, size_t width, size_t height,
                               size_t offset, size_t pixel_stride, size_t row_stride)
@@ -203,8 +194,8 @@ void oidnExecuteFilter(void *filter)
     for (size_t y = 0, k = 0; y < in->height && !f->device->error; y++)
         for (size_t x = 0; x < in->width; x++)
             for (size_t c = 0; c < 3; c++, k++)
-                f->output.data[k] = kind == BOX                          ? mean_at(in, x, y, c)
-                                    : kind == CONSTANT                   ? 0.5f
-                                    : kind == BAD_NUMBERS && k % 3 == 0  ? NAN
-                                                                         : in->data[k];
+                f->output.data[k] = kind == BOX                         ? mean_at(in, x, y, c)
+                                    : kind == CONSTANT                  ? 0.5f
+                                    : kind == BAD_NUMBERS && k % 3 == 0 ? NAN
+                                                                        : in->data[k];
 }

@@ -9,8 +9,13 @@
 static const struct {
     int code;
     const char *recorded; /* GNU */
-} errors[] = {{ENOENT, "No such file or directory"}, {EACCES, "Permission denied"}, {ENOTDIR, "Not a directory"},
-              {EISDIR, "Is a directory"}, {EEXIST, "File exists"}, {ENOSPC, "No space left on device"}, {ENOTEMPTY, "Directory not empty"}};
+} errors[] = {{ENOENT, "No such file or directory"},
+              {EACCES, "Permission denied"},
+              {ENOTDIR, "Not a directory"},
+              {EISDIR, "Is a directory"},
+              {EEXIST, "File exists"},
+              {ENOSPC, "No space left on device"},
+              {ENOTEMPTY, "Directory not empty"}};
 
 static char *with(const char *text, const char *from, const char *to)
 {

@@ -47,7 +47,8 @@ int base_reading_table(const struct base_reading *readings, size_t count, double
 {
     for (size_t i = 0; i < count; i++) {
         double s = 0;
-        for (size_t items = readings[i].items; 2 * s < limit_s && (!readings[i].most || items <= readings[i].most); items *= 2) {
+        for (size_t items = readings[i].items; 2 * s < limit_s && (!readings[i].most || items <= readings[i].most);
+             items *= 2) {
             size_t size;
             s = reading_s(&readings[i], items, 3, &size);
             if (s < 0) {

@@ -76,10 +76,7 @@ static int collect(struct base_peers *face, double wait_s, int *rank, void **dat
     return 1;
 }
 
-static void leave(struct base_peers *face)
-{
-    (void)face;
-}
+static void leave(struct base_peers *face) { (void)face; }
 
 static void count_abort(struct base_peers *face, int status)
 {
@@ -90,10 +87,7 @@ static void count_abort(struct base_peers *face, int status)
     pthread_mutex_unlock(&room->lock);
 }
 
-static const char *version(void)
-{
-    return "threads";
-}
+static const char *version(void) { return "threads"; }
 
 struct base_room *base_room_create(int count)
 {
@@ -112,10 +106,7 @@ struct base_room *base_room_create(int count)
     return room;
 }
 
-struct base_peers *base_room_of(struct base_room *room, int rank)
-{
-    return &room->seats[rank].face;
-}
+struct base_peers *base_room_of(struct base_room *room, int rank) { return &room->seats[rank].face; }
 
 int base_room_aborted(struct base_room *room)
 {

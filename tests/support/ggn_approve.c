@@ -11,7 +11,7 @@
 #include "base/files.h"
 #include "support/base_foreign.h"
 
-static const double SMALL = 0.01; /* numbers below it are compared as parts of it */
+static const double SMALL = 0.01;    /* numbers below it are compared as parts of it */
 static const double ROUNDING = 1e-6; /* of numbers with decimals, at least: other last bits of pow, exp and sums */
 
 /* Whether a number begins at p, which is not inside of a word. */
@@ -33,8 +33,8 @@ static void fail_at(const char *name, const char *text, const char *at, const ch
         at--;
     while (recorded_at > recorded && recorded_at[-1] != '\n')
         recorded_at--;
-    fail_msg("line %d of %s:\n  is       %.*s\n  recorded %.*s", line, name, (int)strcspn(at, "\n"), at, (int)strcspn(recorded_at, "\n"),
-             recorded_at);
+    fail_msg("line %d of %s:\n  is       %.*s\n  recorded %.*s", line, name, (int)strcspn(at, "\n"), at,
+             (int)strcspn(recorded_at, "\n"), recorded_at);
 }
 
 /* How far a number with decimals that ends at `end` may be off at any tolerance: the last of three or more decimals turns with a

@@ -76,10 +76,21 @@ static void add_frame(struct seq_builder *w, const struct film *f, const struct 
         dammertz += 3.0 * fabs(half[p]) / sqrt(fmax(total, 1e-3)) / pixels;
         rse += n->sigma * n->sigma / f->spp / fmax(total * total / 9.0, 4e-4) / pixels;
     }
-    struct seq_stat stats[] = {{"dammertz", dammertz}, {"half_unsettled", 0.0}, {"rse", sqrt(rse)}, {"rse_unsettled", 0.0}, {"seconds", 1e-3 * f->spp},
-                               {"tail999", n->tail / sqrt(f->spp)}, {"gini", 0.3 + 0.1 * n->sigma}};
-    struct seq_frame frame = {.spp = f->spp, .half_spp = f->spp / 2, .is_reference = is_reference, .full = full, .display = display,
-                                  .mean = mean, .half = is_reference ? NULL : half, .stats = stats, .n_stats = is_reference ? 0 : n->tail > 0.0 ? 7 : 5};
+    struct seq_stat stats[] = {
+        {"dammertz", dammertz},        {"half_unsettled", 0.0},    {"rse", sqrt(rse)},
+        {"rse_unsettled", 0.0},        {"seconds", 1e-3 * f->spp}, {"tail999", n->tail / sqrt(f->spp)},
+        {"gini", 0.3 + 0.1 * n->sigma}};
+    struct seq_frame frame = {.spp = f->spp,
+                              .half_spp = f->spp / 2,
+                              .is_reference = is_reference,
+                              .full = full,
+                              .display = display,
+                              .mean = mean,
+                              .half = is_reference ? NULL : half,
+                              .stats = stats,
+                              .n_stats = is_reference    ? 0
+                                         : n->tail > 0.0 ? 7
+                                                         : 5};
     assert_int_equal(seq_builder_add(w, &frame, NULL), 0);
     free(display);
     free(half);
@@ -125,7 +136,8 @@ struct seq_block ggn_noise_block(const struct ggn_noise *noise)
     return b;
 }
 
-void ggn_noise_view(const char *dir, const char *scene, const struct ggn_noise *noise, const double *sigma, int n, double samples_per_variance)
+void ggn_noise_view(const char *dir, const char *scene, const struct ggn_noise *noise, const double *sigma, int n,
+                    double samples_per_variance)
 {
     struct seq_manifest_block *entries = calloc((size_t)n, sizeof *entries);
     struct ggn_label *labels = calloc((size_t)n, sizeof *labels);
@@ -134,15 +146,26 @@ void ggn_noise_view(const char *dir, const char *scene, const struct ggn_noise *
     uint32_t *levels = malloc(noise->n_levels * sizeof *levels);
     assert_true(entries && labels && levels);
     memcpy(levels, noise->levels, noise->n_levels * sizeof *levels);
-    struct seq_manifest m = {.width = noise->width * (uint32_t)n, .height = noise->height, .block = noise->width, .reference_spp = noise->reference_spp,
-                             .reference_independent = 1, .n_levels = noise->n_levels, .levels = levels, .n_blocks = (uint32_t)n, .blocks = entries};
-    struct ggn_labels l = {.source = "observer", .cap = levels[noise->n_levels - 1], .spread = 0.25, .n = (uint32_t)n, .labels = labels};
+    struct seq_manifest m = {.width = noise->width * (uint32_t)n,
+                             .height = noise->height,
+                             .block = noise->width,
+                             .reference_spp = noise->reference_spp,
+                             .reference_independent = 1,
+                             .n_levels = noise->n_levels,
+                             .levels = levels,
+                             .n_blocks = (uint32_t)n,
+                             .blocks = entries};
+    struct ggn_labels l = {
+        .source = "observer", .cap = levels[noise->n_levels - 1], .spread = 0.25, .n = (uint32_t)n, .labels = labels};
     snprintf(m.scene, sizeof m.scene, "%s", scene);
     mkdir(dir, 0777);
     for (int i = 0; i < n; i++) {
         struct seq_builder w;
         struct seq_manifest_block *e = &entries[i];
-        *e = (struct seq_manifest_block){.id = (uint32_t)i, .x0 = (uint32_t)i * noise->width, .x1 = (uint32_t)(i + 1) * noise->width, .y1 = noise->height};
+        *e = (struct seq_manifest_block){.id = (uint32_t)i,
+                                         .x0 = (uint32_t)i * noise->width,
+                                         .x1 = (uint32_t)(i + 1) * noise->width,
+                                         .y1 = noise->height};
         one.sigma = sigma[i];
         one.seed = noise->seed * 100 + (uint32_t)i;
         build(&w, &one, (int32_t)e->x0, e->id);

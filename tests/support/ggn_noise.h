@@ -26,6 +26,7 @@ struct seq_block ggn_noise_block(const struct ggn_noise *noise);
 
 /* Writes DIR (made if missing) with one block per sigma[i], in a row, and labels where noise of sigma^2 stops being visible:
  * threshold = samples_per_variance * sigma^2, censored at the last level. */
-void ggn_noise_view(const char *dir, const char *scene, const struct ggn_noise *noise, const double *sigma, int n, double samples_per_variance);
+void ggn_noise_view(const char *dir, const char *scene, const struct ggn_noise *noise, const double *sigma, int n,
+                    double samples_per_variance);
 
 #endif

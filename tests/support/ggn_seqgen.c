@@ -19,14 +19,22 @@ enum { MAX_LEVELS = 64 };
 
 struct seqgen seqgen_default(void)
 {
-    return (struct seqgen){.side = 40, .scenes = 4, .validation = 1, .blocks = 3, .first = 10, .ratio = 1.35, .levels = 14,
-                           .reference_spp = 4096, .tau = 0.012, .seed = 4};
+    return (struct seqgen){.side = 40,
+                           .scenes = 4,
+                           .validation = 1,
+                           .blocks = 3,
+                           .first = 10,
+                           .ratio = 1.35,
+                           .levels = 14,
+                           .reference_spp = 4096,
+                           .tau = 0.012,
+                           .seed = 4};
 }
 
 struct pixels {
-    size_t n;               /* 3·side² */
-    float *clean, *sigma;   /* linear; standard deviation of one sample */
-    float *sum, *half;      /* of the samples so far, of the first half of each step */
+    size_t n;             /* 3·side² */
+    float *clean, *sigma; /* linear; standard deviation of one sample */
+    float *sum, *half;    /* of the samples so far, of the first half of each step */
     double *mean, *difference;
     uint8_t *display;
 };
@@ -89,7 +97,8 @@ static void accumulate(struct pixels *p, double count, uint32_t seed)
 
     for (size_t i = 0; i < p->n; i++)
         for (uint32_t side = 0; side < 2; side++) {
-            double z = 0.7071 * (normal((uint32_t)(i % plane), seed + side) + normal((uint32_t)(i + plane), seed + 7 + side));
+            double z =
+                0.7071 * (normal((uint32_t)(i % plane), seed + side) + normal((uint32_t)(i + plane), seed + 7 + side));
             float s = (float)(0.5 * count * (double)p->clean[i] + sqrt(0.5 * count) * (double)p->sigma[i] * z);
             p->sum[i] += s;
             p->half[i] += side ? 0 : s;
@@ -117,21 +126,26 @@ static double threshold_of(const struct seqgen *g, const struct pixels *p)
     return fmax(sum / (double)p->n / (g->tau * g->tau), 1);
 }
 
-static int write_block(const struct seqgen *g, struct pixels *p, const char *dir, int scene, int block, struct seq_manifest_block *b,
-                       const uint32_t *levels, struct base_err *err)
+static int write_block(const struct seqgen *g, struct pixels *p, const char *dir, int scene, int block,
+                       struct seq_manifest_block *b, const uint32_t *levels, struct base_err *err)
 {
     struct seq_builder w;
     char path[4200];
     uint32_t seed = ggn_hash((uint32_t)(1000 * scene + block), g->seed + 1), done = 0;
-    int full = 0, rc = seq_builder_init(&w, (uint32_t)g->side, (uint32_t)g->side, block * g->side, 0, (uint32_t)block, g->seed, err);
+    int full = 0,
+        rc = seq_builder_init(&w, (uint32_t)g->side, (uint32_t)g->side, block * g->side, 0, (uint32_t)block, g->seed, err);
 
     for (int i = 0; !rc && i < g->levels; i++) {
         accumulate(p, levels[i] - done, ggn_hash((uint32_t)i, seed));
         done = levels[i];
         develop(p, done);
         int is_full = !full && (done >= 320 || i == g->levels - 1);
-        struct seq_frame frame = {.spp = done, .half_spp = done / 2, .full = is_full, .display = p->display,
-                                      .mean = is_full ? p->mean : NULL, .half = is_full ? p->difference : NULL};
+        struct seq_frame frame = {.spp = done,
+                                  .half_spp = done / 2,
+                                  .full = is_full,
+                                  .display = p->display,
+                                  .mean = is_full ? p->mean : NULL,
+                                  .half = is_full ? p->difference : NULL};
         full |= is_full;
         rc = seq_builder_add(&w, &frame, err);
     }
@@ -140,11 +154,15 @@ static int write_block(const struct seqgen *g, struct pixels *p, const char *dir
         memset(p->half, 0, p->n * sizeof *p->half);
         accumulate(p, g->reference_spp, ggn_hash(99, seed));
         develop(p, g->reference_spp);
-        struct seq_frame frame = {.spp = g->reference_spp, .is_reference = 1, .full = 1, .display = p->display, .mean = p->mean};
+        struct seq_frame frame = {
+            .spp = g->reference_spp, .is_reference = 1, .full = 1, .display = p->display, .mean = p->mean};
         rc = seq_builder_add(&w, &frame, err);
     }
-    *b = (struct seq_manifest_block){.id = (uint32_t)block, .x0 = (uint32_t)(block * g->side), .x1 = (uint32_t)((block + 1) * g->side),
-                                     .y1 = (uint32_t)g->side, .bytes = w.size};
+    *b = (struct seq_manifest_block){.id = (uint32_t)block,
+                                     .x0 = (uint32_t)(block * g->side),
+                                     .x1 = (uint32_t)((block + 1) * g->side),
+                                     .y1 = (uint32_t)g->side,
+                                     .bytes = w.size};
     snprintf(b->file, sizeof b->file, "block-%05d.lseq", block);
     snprintf(path, sizeof path, "%s/%s", dir, b->file);
     if (!rc)
@@ -159,12 +177,23 @@ static int write_scene(const struct seqgen *g, struct pixels *p, const char *dir
     uint32_t levels[MAX_LEVELS];
     struct seq_manifest_block blocks[64];
     struct ggn_label label[64];
-    struct seq_manifest m = {.width = (uint32_t)(g->side * g->blocks), .height = (uint32_t)g->side, .block = (uint32_t)g->side,
-                             .seed = g->seed, .reference_seed = g->seed + 1, .reference_spp = g->reference_spp,
-                             .reference_independent = 1, .n_levels = (uint32_t)g->levels, .n_blocks = (uint32_t)g->blocks,
-                             .levels = levels, .blocks = blocks};
-    struct ggn_labels labels = {.source = "observer", .detail = "generated: noise below a fixed rms", .cap = 0, .spread = 0.15,
-                                .n = (uint32_t)g->blocks, .labels = label};
+    struct seq_manifest m = {.width = (uint32_t)(g->side * g->blocks),
+                             .height = (uint32_t)g->side,
+                             .block = (uint32_t)g->side,
+                             .seed = g->seed,
+                             .reference_seed = g->seed + 1,
+                             .reference_spp = g->reference_spp,
+                             .reference_independent = 1,
+                             .n_levels = (uint32_t)g->levels,
+                             .n_blocks = (uint32_t)g->blocks,
+                             .levels = levels,
+                             .blocks = blocks};
+    struct ggn_labels labels = {.source = "observer",
+                                .detail = "generated: noise below a fixed rms",
+                                .cap = 0,
+                                .spread = 0.15,
+                                .n = (uint32_t)g->blocks,
+                                .labels = label};
     int rc = 0;
 
     snprintf(m.scene, sizeof m.scene, "scene%d", scene);

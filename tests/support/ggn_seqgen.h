@@ -10,13 +10,13 @@
 #include "base/err.h"
 
 struct seqgen {
-    int side;             /* of a block, pixels */
+    int side;                     /* of a block, pixels */
     int scenes, validation, test; /* the last `test` scenes are for testing, the `validation` before them for validation */
-    int blocks;           /* per scene, side by side */
-    double first, ratio;  /* levels */
+    int blocks;                   /* per scene, side by side */
+    double first, ratio;          /* levels */
     int levels;
     unsigned reference_spp; /* 0: no reference */
-    double tau;           /* rms noise in display units at which it stops being visible */
+    double tau;             /* rms noise in display units at which it stops being visible */
     unsigned seed;
 };
 

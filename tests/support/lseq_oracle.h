@@ -8,10 +8,7 @@
 #include <math.h>
 #include <stdint.h>
 
-static inline double oracle_eotf(double v)
-{
-    return v <= 0.04045 ? v / 12.92 : pow((v + 0.055) / 1.055, 2.4);
-}
+static inline double oracle_eotf(double v) { return v <= 0.04045 ? v / 12.92 : pow((v + 0.055) / 1.055, 2.4); }
 
 /* Display code: the bin [eotf((d - 1/2)/255), eotf((d + 1/2)/255)) that x is in. */
 static inline int oracle_display(double x)

@@ -138,4 +138,3 @@ void pt_approve(const char *path, pt_approve_answer *answer)
     free(made);
     free(bytes);
 }
-

@@ -42,7 +42,10 @@ static inline struct pt_bsdf bsdf_diffuse(float r)
 static inline struct pt_bsdf bsdf_conductor(float ax, float ay)
 {
     /* gold, roughly */
-    return (struct pt_bsdf){.kind = PT_BSDF_CONDUCTOR, .alpha_x = ax, .alpha_y = ay, .eta_rgb = v3(0.14f, 0.37f, 1.44f),
+    return (struct pt_bsdf){.kind = PT_BSDF_CONDUCTOR,
+                            .alpha_x = ax,
+                            .alpha_y = ay,
+                            .eta_rgb = v3(0.14f, 0.37f, 1.44f),
                             .k_rgb = v3(3.98f, 2.39f, 1.60f)};
 }
 /* Reflects everything. */
@@ -57,12 +60,17 @@ static inline struct pt_bsdf bsdf_dielectric(float ax, float ay, float eta)
 static inline struct pt_bsdf bsdf_thin(float eta) { return (struct pt_bsdf){.kind = PT_BSDF_THIN_DIELECTRIC, .eta = eta}; }
 static inline struct pt_bsdf bsdf_diffuse_transmission(float r, float t)
 {
-    return (struct pt_bsdf){.kind = PT_BSDF_DIFFUSE_TRANSMISSION, .reflectance = v3(r, 0.5f * r, r), .transmittance = v3_splat(t)};
+    return (struct pt_bsdf){
+        .kind = PT_BSDF_DIFFUSE_TRANSMISSION, .reflectance = v3(r, 0.5f * r, r), .transmittance = v3_splat(t)};
 }
 static inline struct pt_bsdf bsdf_coated_diffuse(float alpha, float eta, float r, float thickness)
 {
-    return (struct pt_bsdf){.kind = PT_BSDF_COATED_DIFFUSE, .alpha_x = alpha, .alpha_y = alpha, .eta = eta,
-                            .reflectance = v3(r, 0.5f * r, 0.1f * r), .thickness = thickness,
+    return (struct pt_bsdf){.kind = PT_BSDF_COATED_DIFFUSE,
+                            .alpha_x = alpha,
+                            .alpha_y = alpha,
+                            .eta = eta,
+                            .reflectance = v3(r, 0.5f * r, 0.1f * r),
+                            .thickness = thickness,
                             .coat_table = case_table(eta, alpha, thickness)};
 }
 static inline struct pt_bsdf bsdf_coated_conductor(float alpha, float base_alpha)

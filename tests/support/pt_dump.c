@@ -46,8 +46,8 @@ void pt_dump_header(FILE *out, const struct pt_scene *scene, const struct pt_sce
 {
     const struct pt_integrator *i = &d->integrator;
     const struct pt_camera *c = &scene->camera;
-    fprintf(out, "film %dx%d crop %d %d %d %d spp %d file \"%s\" scale %.7g\n", d->width, d->height, d->crop[0], d->crop[1], d->crop[2],
-            d->crop[3], d->spp, d->film_path, (double)scene->radiance_scale);
+    fprintf(out, "film %dx%d crop %d %d %d %d spp %d file \"%s\" scale %.7g\n", d->width, d->height, d->crop[0], d->crop[1],
+            d->crop[2], d->crop[3], d->spp, d->film_path, (double)scene->radiance_scale);
     fprintf(out, "filter %s %.7g %.7g sigma %.7g\n", pt_filter_words[i->filter], (double)i->filter_x, (double)i->filter_y,
             (double)i->filter_sigma);
     fprintf(out, "integrator %s %s depth %d rr %d clamp %.7g seed %u aux %d lights %s\n", pt_strategy_words[i->strategy],
@@ -79,7 +79,8 @@ static void dump_images(FILE *out, const struct pt_scene *s)
     static const char *const types[] = {"srgb", "linear", "float"};
     for (int32_t k = 0; k < s->image_count; k++) {
         const struct pt_image_map *m = &s->images[k];
-        fprintf(out, "image %d %dx%dx%d %s gamma %.7g:", k, m->width, m->height, m->channels, types[m->type], (double)m->gamma);
+        fprintf(out, "image %d %dx%dx%d %s gamma %.7g:", k, m->width, m->height, m->channels, types[m->type],
+                (double)m->gamma);
         for (size_t i = 0; i < (size_t)(m->width * m->height * m->channels); i++)
             fprintf(out, " %.7g", pixel(m, i));
         fprintf(out, "\n");
@@ -107,8 +108,8 @@ static void dump_textures(FILE *out, const struct pt_scene *s)
 
 static void dump_materials(FILE *out, const struct pt_scene *s)
 {
-    static const char *const kinds[] = {"diffuse", "conductor", "dielectric", "thin", "transmission", "coated-diffuse", "coated-conductor",
-                                        "mix", "interface"};
+    static const char *const kinds[] = {"diffuse",        "conductor",        "dielectric", "thin",     "transmission",
+                                        "coated-diffuse", "coated-conductor", "mix",        "interface"};
     for (int32_t id = 0; id < s->material_count; id++) {
         const struct pt_material *m = &s->materials[id];
         fprintf(out, "material %d %s", id, kinds[m->kind]);
@@ -151,7 +152,8 @@ static void dump_vertex(FILE *out, uint32_t i, const float v[8])
 /* All of a short mesh; of a long one every few vertices and triangles, and sums in which each counts differently. */
 static void dump_mesh(FILE *out, int32_t id, const struct pt_mesh *m)
 {
-    uint32_t step = m->vertex_count > WHOLE ? m->vertex_count / 5 : 1, every = m->triangle_count > WHOLE ? m->triangle_count / 5 : 1;
+    uint32_t step = m->vertex_count > WHOLE ? m->vertex_count / 5 : 1,
+             every = m->triangle_count > WHOLE ? m->triangle_count / 5 : 1;
     double sums[8] = {0}, corners = 0;
     fprintf(out, "mesh %d %u %u normals %d uvs %d:", id, m->vertex_count, m->triangle_count, m->has_normals, m->has_uvs);
     for (uint32_t i = 0; i < 3 * m->triangle_count; i++) {
@@ -181,8 +183,8 @@ static void dump_quadrics(FILE *out, const struct pt_scene *s)
     static const char *const kinds[] = {"sphere", "disk", "cylinder"};
     for (int32_t k = 0; k < s->quadric_count; k++) {
         const struct pt_quadric *q = &s->quadrics[k];
-        fprintf(out, "quadric %d %s %.7g hole %.7g z %.7g %.7g phi %.7g", k, kinds[q->kind], (double)q->radius, (double)q->inner_radius,
-                (double)q->z_min, (double)q->z_max, (double)q->phi_max);
+        fprintf(out, "quadric %d %s %.7g hole %.7g z %.7g %.7g phi %.7g", k, kinds[q->kind], (double)q->radius,
+                (double)q->inner_radius, (double)q->z_min, (double)q->z_max, (double)q->phi_max);
         matrix(out, "to", &q->to_render);
         matrix(out, "from", &q->from_render);
         fprintf(out, "\n");
@@ -280,8 +282,8 @@ void pt_dump_world(FILE *out, const struct pt_scene *s)
     for (int i = 0; i < PT_FX_COUNT; i++) {
         const struct pt_effect_reason *r = &s->effect_reasons[i];
         if ((s->effects >> i & 1) || r->on || r->line > 0)
-            fprintf(out, "effect %s%s%s %s:%d\n", pt_effects_name(i), s->effects >> i & 1 ? "" : " off", r->on ? "" : " without reason", r->file,
-                    r->line);
+            fprintf(out, "effect %s%s%s %s:%d\n", pt_effects_name(i), s->effects >> i & 1 ? "" : " off",
+                    r->on ? "" : " without reason", r->file, r->line);
     }
     if (s->shape_count > 0) {
         fprintf(out, "bounds");
@@ -290,6 +292,6 @@ void pt_dump_world(FILE *out, const struct pt_scene *s)
         fprintf(out, "\n");
     }
     const struct pt_scene_stats *t = &s->stats;
-    fprintf(out, "counts %lld triangles %lld quadrics %lld instances %lld lights %lld materials %lld textures\n", t->triangles, t->quadrics,
-            t->instances, t->lights, t->materials, t->textures);
+    fprintf(out, "counts %lld triangles %lld quadrics %lld instances %lld lights %lld materials %lld textures\n",
+            t->triangles, t->quadrics, t->instances, t->lights, t->materials, t->textures);
 }

@@ -19,8 +19,11 @@ void pt_fake_noise(const struct pt_scene *scene, const struct pt_integrator *set
     (void)scene;
     for (int i = 0; i < count; i++, x++) {
         float u = (float)(hash(hash(hash(settings->seed + x) + y) + sample) >> 8) * 0x1p-24f;
-        out[i] = (struct pt_path_result){.radiance = v3(0.5f + 0.5f * u, 0.25f, (float)x / 1000.0f), .albedo = v3_splat(0.5f),
-                                         .normal_world = v3(0, 0, 1), .depth = 2.0f, .rays = 3};
+        out[i] = (struct pt_path_result){.radiance = v3(0.5f + 0.5f * u, 0.25f, (float)x / 1000.0f),
+                                         .albedo = v3_splat(0.5f),
+                                         .normal_world = v3(0, 0, 1),
+                                         .depth = 2.0f,
+                                         .rays = 3};
     }
 }
 
@@ -69,7 +72,8 @@ static int32_t create(const struct lull_host *host, const struct lull_pair *pair
         return LULL_E_MEMORY;
     i->at = 32;
     for (uint32_t k = 0; k < count; k++)
-        i->at = strtoull(((const struct lull_pair *)(const void *)((const char *)pairs + (size_t)k * stride))->value, NULL, 10);
+        i->at =
+            strtoull(((const struct lull_pair *)(const void *)((const char *)pairs + (size_t)k * stride))->value, NULL, 10);
     *out = i;
     return LULL_OK;
 }
@@ -113,10 +117,7 @@ static double mean_red(const struct lull_view *view, const struct lull_block *b)
     return sum * p->scale / (double)b->spp / ((b->x1 - b->x0) * (b->y1 - b->y0));
 }
 
-static uint64_t column_factor(const struct lull_block *b)
-{
-    return 1 + (uint64_t)(b->x0 / 16) % 4;
-}
+static uint64_t column_factor(const struct lull_block *b) { return 1 + (uint64_t)(b->x0 / 16) % 4; }
 
 static int32_t evaluate(struct lull_instance *i, const struct lull_view *view, const struct lull_block *blocks,
                         uint32_t block_stride, struct lull_decision *decisions, uint32_t decision_stride, uint32_t count,
@@ -136,15 +137,9 @@ static int32_t evaluate(struct lull_instance *i, const struct lull_view *view, c
     return LULL_OK;
 }
 
-static void end_frame(struct lull_instance *i)
-{
-    (void)i;
-}
+static void end_frame(struct lull_instance *i) { (void)i; }
 
-static void destroy(struct lull_instance *i)
-{
-    free(i);
-}
+static void destroy(struct lull_instance *i) { free(i); }
 
 static int32_t save(const struct lull_instance *i, const struct lull_writer *writer, struct lull_error *err)
 {
@@ -167,12 +162,23 @@ static const void *get_extension(const char *id)
 const struct lull_criterion *pt_fake_criterion(void)
 {
     static const struct lull_param params[] = {{.name = "at", .help = "spp", .default_value = "32", .min = 1, .max = 1e6}};
-    static const struct lull_criterion table = {
-        .struct_size = sizeof table, .id = "fake", .name = "fake", .version = "1", .description = "stops at N",
-        .params = params, .param_count = 1, .param_stride = sizeof params[0], .thread_level = LULL_THREADS_INSTANCE,
-        .capabilities = LULL_CAP_DETERMINISTIC | LULL_CAP_BATCH_INVARIANT, .create = create, .requirements = requirements,
-        .begin_frame = begin_frame, .evaluate = evaluate, .end_frame = end_frame, .destroy = destroy,
-        .get_extension = get_extension};
+    static const struct lull_criterion table = {.struct_size = sizeof table,
+                                                .id = "fake",
+                                                .name = "fake",
+                                                .version = "1",
+                                                .description = "stops at N",
+                                                .params = params,
+                                                .param_count = 1,
+                                                .param_stride = sizeof params[0],
+                                                .thread_level = LULL_THREADS_INSTANCE,
+                                                .capabilities = LULL_CAP_DETERMINISTIC | LULL_CAP_BATCH_INVARIANT,
+                                                .create = create,
+                                                .requirements = requirements,
+                                                .begin_frame = begin_frame,
+                                                .evaluate = evaluate,
+                                                .end_frame = end_frame,
+                                                .destroy = destroy,
+                                                .get_extension = get_extension};
     return &table;
 }
 
@@ -180,8 +186,14 @@ const struct lull_criterion *pt_fake_criterion(void)
 
 struct pt_render_config pt_fake_config(void)
 {
-    return (struct pt_render_config){.width = 60, .height = 44, .crop = {0, 0, 60, 44}, .block_width = 16, .block_height = 16,
-                                     .spp_min = 8, .spp_max = 256, .integrator = {.seed = 7, .max_component = INFINITY}};
+    return (struct pt_render_config){.width = 60,
+                                     .height = 44,
+                                     .crop = {0, 0, 60, 44},
+                                     .block_width = 16,
+                                     .block_height = 16,
+                                     .spp_min = 8,
+                                     .spp_max = 256,
+                                     .integrator = {.seed = 7, .max_component = INFINITY}};
 }
 
 int pt_fake_render(const struct pt_render_config *config, pt_kernel *kernel, int threads, const char *at,

@@ -70,12 +70,14 @@ static double read_scene(char *text, size_t size, size_t items)
 
 static char *spheres(size_t items, size_t *size)
 {
-    return repeat("WorldBegin\n", "AttributeBegin\nTranslate %zu 0 0\nShape \"sphere\" \"float radius\" 2\nAttributeEnd\n", "", items, size);
+    return repeat("WorldBegin\n", "AttributeBegin\nTranslate %zu 0 0\nShape \"sphere\" \"float radius\" 2\nAttributeEnd\n",
+                  "", items, size);
 }
 
 static char *numbers(size_t items, size_t *size)
 {
-    return repeat("WorldBegin\nShape \"trianglemesh\" \"point3 P\" [", "%zu 0 0 0 %zu 0 0 0 1.25 ", "] \"integer indices\" [ 0 1 2 ]\n", items, size);
+    return repeat("WorldBegin\nShape \"trianglemesh\" \"point3 P\" [", "%zu 0 0 0 %zu 0 0 0 1.25 ",
+                  "] \"integer indices\" [ 0 1 2 ]\n", items, size);
 }
 
 static char *materials(size_t items, size_t *size)
@@ -89,25 +91,29 @@ static char *materials(size_t items, size_t *size)
 
 static char *objects(size_t items, size_t *size)
 {
-    return repeat("WorldBegin\n", "ObjectBegin \"o%zu\"\nShape \"sphere\"\nObjectEnd\nObjectInstance \"o%zu\"\n", "", items, size);
+    return repeat("WorldBegin\n", "ObjectBegin \"o%zu\"\nShape \"sphere\"\nObjectEnd\nObjectInstance \"o%zu\"\n", "", items,
+                  size);
 }
 
 static char *spaces(size_t items, size_t *size)
 {
-    return repeat("WorldBegin\n", "Translate 0 0 1\nCoordinateSystem \"c%zu\"\nCoordSysTransform \"c%zu\"\n", "", items, size);
+    return repeat("WorldBegin\n", "Translate 0 0 1\nCoordinateSystem \"c%zu\"\nCoordSysTransform \"c%zu\"\n", "", items,
+                  size);
 }
 
 static char *media(size_t items, size_t *size)
 {
-    return repeat("WorldBegin\n",
-                  "MakeNamedMedium \"f%zu\" \"string type\" \"homogeneous\" \"rgb sigma_a\" [ 1 2 3 ]\nMediumInterface \"f%zu\" \"\"\n"
-                  "Shape \"sphere\"\n",
-                  "", items, size);
+    return repeat(
+        "WorldBegin\n",
+        "MakeNamedMedium \"f%zu\" \"string type\" \"homogeneous\" \"rgb sigma_a\" [ 1 2 3 ]\nMediumInterface \"f%zu\" \"\"\n"
+        "Shape \"sphere\"\n",
+        "", items, size);
 }
 
 static char *lights(size_t items, size_t *size)
 {
-    return repeat("WorldBegin\n", "LightSource \"point\" \"point3 from\" [ %zu 1 2 ] \"rgb I\" [ 1 2 3 ]\n", "", items, size);
+    return repeat("WorldBegin\n", "LightSource \"point\" \"point3 from\" [ %zu 1 2 ] \"rgb I\" [ 1 2 3 ]\n", "", items,
+                  size);
 }
 
 /* --- meshes ------------------------------------------------------------------------------------------------------------------ */
@@ -130,10 +136,11 @@ static double read_ply(char *bytes, size_t size, size_t items)
 
 static int ply_header(char *to, size_t room, const char *format, size_t vertices, size_t faces)
 {
-    return snprintf(to, room,
-                    "ply\nformat %s 1.0\nelement vertex %zu\nproperty float x\nproperty float y\nproperty float z\nelement face %zu\n"
-                    "property list %s int vertex_indices\nend_header\n",
-                    format, vertices, faces, faces == 1 ? "int" : "uchar");
+    return snprintf(
+        to, room,
+        "ply\nformat %s 1.0\nelement vertex %zu\nproperty float x\nproperty float y\nproperty float z\nelement face %zu\n"
+        "property list %s int vertex_indices\nend_header\n",
+        format, vertices, faces, faces == 1 ? "int" : "uchar");
 }
 
 /* As many triangles as vertices. */
@@ -239,8 +246,15 @@ static char *png(size_t items, size_t *size)
 /* A render of 64 pixels by `items`, in blocks of 16 × 16. */
 static struct pt_render *render_of(size_t items, struct base_threads *threads)
 {
-    struct pt_render_config config = {.width = 64, .height = (int32_t)items, .crop = {0, 0, 64, (int32_t)items}, .block_width = 16,
-                                      .block_height = 16, .spp_min = 4, .spp_max = 4, .uniform = 1, .planes = PT_FILM_HALF};
+    struct pt_render_config config = {.width = 64,
+                                      .height = (int32_t)items,
+                                      .crop = {0, 0, 64, (int32_t)items},
+                                      .block_width = 16,
+                                      .block_height = 16,
+                                      .spp_min = 4,
+                                      .spp_max = 4,
+                                      .uniform = 1,
+                                      .planes = PT_FILM_HALF};
     struct pt_render *r = NULL;
     return threads && pt_render_create(&config, NULL, pt_fake_noise, threads, NULL, &r, NULL) == 0 ? r : NULL;
 }
@@ -315,7 +329,8 @@ static double read_levels(char *bytes, size_t size, size_t items)
         return -1;
     }
     for (uint32_t i = 0; i < b.n_levels; i++)
-        if (seq_display(&b, &b.levels[i], display, &err) || seq_mean(&b, &b.levels[i], values, &err) || !seq_level(&b, i + 1))
+        if (seq_display(&b, &b.levels[i], display, &err) || seq_mean(&b, &b.levels[i], values, &err) ||
+            !seq_level(&b, i + 1))
             fprintf(stderr, "%s\n", err.text);
     if (b.n_levels == items)
         s = base_clock_thread_s() - start_s;
@@ -325,10 +340,12 @@ static double read_levels(char *bytes, size_t size, size_t items)
 
 static char *manifest(size_t items, size_t *size)
 {
-    return repeat("{\"format\":\"lull-sequence\",\"version\":1,\"scene\":\"s\",\"camera\":\"c\",\"renderer\":\"r\",\"source\":\"s.pbrt\","
+    return repeat("{\"format\":\"lull-sequence\",\"version\":1,\"scene\":\"s\",\"camera\":\"c\",\"renderer\":\"r\","
+                  "\"source\":\"s.pbrt\","
                   "\"source_crc32\":\"00000000\",\"width\":16,\"height\":16,\"block\":16,\"seed\":1,\"reference_seed\":2,"
                   "\"reference_spp\":0,\"reference_independent\":false,\"levels\":[1],"
-                  "\"blocks\":[{\"id\":1048576,\"file\":\"f\",\"x0\":0,\"y0\":0,\"x1\":16,\"y1\":16,\"bytes\":1,\"crc32\":\"00000000\"}",
+                  "\"blocks\":[{\"id\":1048576,\"file\":\"f\",\"x0\":0,\"y0\":0,\"x1\":16,\"y1\":16,\"bytes\":1,\"crc32\":"
+                  "\"00000000\"}",
                   ",{\"id\":%zu,\"file\":\"block-%zu.lseq\",\"x0\":0,\"y0\":0,\"x1\":16,\"y1\":16,\"bytes\":1,"
                   "\"crc32\":\"00000000\"}",
                   "]}\n", items, size);

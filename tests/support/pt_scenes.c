@@ -54,8 +54,9 @@ void test_scene_finish(struct pt_scene *scene)
                           (scene->shapes[i].kind == PT_SHAPE_QUADRIC ? PT_FX_QUADRIC : 0) |
                           (scene->shapes[i].has_alpha ? PT_FX_ALPHA | PT_FX_TEXTURE : 0);
     for (int32_t i = 0; i < scene->light_count; i++)
-        scene->effects |= scene->lights[i].kind == PT_LIGHT_AREA ? 0
-                          : scene->lights[i].kind <= PT_LIGHT_ENV_IMAGE ? PT_FX_ENVIRONMENT : PT_FX_DELTA_LIGHT;
+        scene->effects |= scene->lights[i].kind == PT_LIGHT_AREA        ? 0
+                          : scene->lights[i].kind <= PT_LIGHT_ENV_IMAGE ? PT_FX_ENVIRONMENT
+                                                                        : PT_FX_DELTA_LIGHT;
     for (int32_t i = 0; i < scene->medium_count; i++)
         scene->effects |= pt_medium_effects(scene, i);
     scene->effects |= (scene->light_count > 1 ? PT_FX_MANY_LIGHTS : 0) | (scene->instance_count ? PT_FX_INSTANCES : 0) |
@@ -95,10 +96,14 @@ int32_t test_add_material(struct pt_scene *scene, int32_t kind)
 {
     assert(scene->material_count < TEST_ROOM);
     struct pt_material *m = &scene->materials[scene->material_count];
-    *m = (struct pt_material){.kind = kind, .mix_amount = constant(0.5f, 0.5f, 0.5f),
-                              .reflectance = constant(0.5f, 0.5f, 0.5f), .transmittance = constant(0.25f, 0.25f, 0.25f),
-                              .eta_rgb = constant(0.2f, 0.9f, 1.1f), .k_rgb = constant(3.9f, 2.4f, 2.2f),
-                              .thickness = constant(0.01f, 0.01f, 0.01f), .eta = 1.5f};
+    *m = (struct pt_material){.kind = kind,
+                              .mix_amount = constant(0.5f, 0.5f, 0.5f),
+                              .reflectance = constant(0.5f, 0.5f, 0.5f),
+                              .transmittance = constant(0.25f, 0.25f, 0.25f),
+                              .eta_rgb = constant(0.2f, 0.9f, 1.1f),
+                              .k_rgb = constant(3.9f, 2.4f, 2.2f),
+                              .thickness = constant(0.01f, 0.01f, 0.01f),
+                              .eta = 1.5f};
     return scene->material_count++;
 }
 
@@ -112,8 +117,13 @@ int32_t test_add_diffuse(struct pt_scene *scene, pt_vec3 reflectance)
 static int32_t add_shape(struct pt_scene *scene, int32_t kind, int32_t data, int32_t material)
 {
     assert(scene->shape_count < TEST_ROOM);
-    scene->shapes[scene->shape_count] = (struct pt_shape){.kind = kind, .data = data, .material = material, .light = -1,
-                                                          .medium_in = -1, .medium_out = -1, .alpha = constant(1, 1, 1)};
+    scene->shapes[scene->shape_count] = (struct pt_shape){.kind = kind,
+                                                          .data = data,
+                                                          .material = material,
+                                                          .light = -1,
+                                                          .medium_in = -1,
+                                                          .medium_out = -1,
+                                                          .alpha = constant(1, 1, 1)};
     return scene->shape_count++;
 }
 
@@ -144,7 +154,11 @@ int32_t test_add_sphere(struct pt_scene *scene, int32_t material, pt_vec3 centre
 {
     pt_vec3 c = v3_sub(centre, eye_of(scene));
     struct pt_quadric *q = &scene->quadrics[scene->quadric_count];
-    *q = (struct pt_quadric){.kind = PT_QUADRIC_SPHERE, .radius = radius, .z_min = -radius, .z_max = radius, .phi_max = 2.0f * PT_PI,
+    *q = (struct pt_quadric){.kind = PT_QUADRIC_SPHERE,
+                             .radius = radius,
+                             .z_min = -radius,
+                             .z_max = radius,
+                             .phi_max = 2.0f * PT_PI,
                              .to_render = {{1, 0, 0, c.x, 0, 1, 0, c.y, 0, 0, 1, c.z}},
                              .from_render = {{1, 0, 0, -c.x, 0, 1, 0, -c.y, 0, 0, 1, -c.z}}};
     return add_shape(scene, PT_SHAPE_QUADRIC, scene->quadric_count++, material);
@@ -159,13 +173,15 @@ int32_t test_add_light(struct pt_scene *scene, const struct pt_light *light)
 
 int32_t test_add_area_light(struct pt_scene *scene, int32_t shape, pt_vec3 radiance, int two_sided)
 {
-    struct pt_light light = {.kind = PT_LIGHT_AREA, .shape = shape, .emission = radiance, .two_sided = two_sided, .image = -1};
+    struct pt_light light = {
+        .kind = PT_LIGHT_AREA, .shape = shape, .emission = radiance, .two_sided = two_sided, .image = -1};
     return scene->shapes[shape].light = test_add_light(scene, &light);
 }
 
 int32_t test_add_medium(struct pt_scene *scene, pt_vec3 sigma_a, pt_vec3 sigma_s, float g)
 {
-    scene->media[scene->medium_count] = (struct pt_medium){.kind = PT_MEDIUM_HOMOGENEOUS, .sigma_a = sigma_a, .sigma_s = sigma_s, .g = g};
+    scene->media[scene->medium_count] =
+        (struct pt_medium){.kind = PT_MEDIUM_HOMOGENEOUS, .sigma_a = sigma_a, .sigma_s = sigma_s, .g = g};
     return scene->medium_count++;
 }
 
@@ -188,7 +204,8 @@ int32_t test_add_box(struct pt_scene *scene, int32_t material, pt_vec3 lo, pt_ve
 static pt_vec3 place(pt_vec3 p, float scale, pt_vec3 shift) { return v3_madd(shift, scale, p); }
 
 /* A box of the given half size, turned by `angle` about the vertical axis. */
-static void add_block(struct pt_scene *scene, int32_t material, pt_vec3 centre, pt_vec3 half, float angle, float scale, pt_vec3 shift)
+static void add_block(struct pt_scene *scene, int32_t material, pt_vec3 centre, pt_vec3 half, float angle, float scale,
+                      pt_vec3 shift)
 {
     static const uint32_t outward[36] = {0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5, 0, 1, 5, 0, 5, 4,
                                          2, 6, 7, 2, 7, 3, 0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6};
@@ -209,9 +226,10 @@ static void add_wall(struct pt_scene *scene, int32_t material, pt_vec3 p, pt_vec
 void test_cornell(struct pt_scene *scene, int size, float scale, pt_vec3 shift)
 {
     test_scene_begin(scene);
-    test_camera(scene, place(v3(0.0f, 1.0f, 6.8f), scale, shift), place(v3(0.0f, 1.0f, 0.0f), scale, shift), v3(0.0f, 1.0f, 0.0f),
-                19.5f, size);
-    int32_t white = test_add_diffuse(scene, v3(0.725f, 0.71f, 0.68f)), red = test_add_diffuse(scene, v3(0.63f, 0.065f, 0.05f));
+    test_camera(scene, place(v3(0.0f, 1.0f, 6.8f), scale, shift), place(v3(0.0f, 1.0f, 0.0f), scale, shift),
+                v3(0.0f, 1.0f, 0.0f), 19.5f, size);
+    int32_t white = test_add_diffuse(scene, v3(0.725f, 0.71f, 0.68f)),
+            red = test_add_diffuse(scene, v3(0.63f, 0.065f, 0.05f));
     int32_t green = test_add_diffuse(scene, v3(0.14f, 0.45f, 0.091f));
     add_wall(scene, white, v3(-1, 0, -1), v3(0, 0, 2), v3(2, 0, 0), scale, shift);
     add_wall(scene, white, v3(-1, 2, -1), v3(2, 0, 0), v3(0, 0, 2), scale, shift);
@@ -221,17 +239,24 @@ void test_cornell(struct pt_scene *scene, int size, float scale, pt_vec3 shift)
     add_block(scene, white, v3(0.33f, 0.3f, 0.37f), v3(0.3f, 0.3f, 0.3f), -0.29f, scale, shift);
     add_block(scene, white, v3(-0.33f, 0.6f, -0.29f), v3(0.3f, 0.6f, 0.3f), 0.32f, scale, shift);
     int32_t black = test_add_diffuse(scene, v3_splat(0.0f));
-    int32_t lamp = test_add_quad(scene, black, place(v3(-0.24f, 1.98f, -0.22f), scale, shift), v3_scale(v3(0.47f, 0, 0), scale),
-                                 v3_scale(v3(0, 0, 0.38f), scale));
+    int32_t lamp = test_add_quad(scene, black, place(v3(-0.24f, 1.98f, -0.22f), scale, shift),
+                                 v3_scale(v3(0.47f, 0, 0), scale), v3_scale(v3(0, 0, 0.38f), scale));
     test_add_area_light(scene, lamp, v3(17.0f, 12.0f, 4.0f), 0);
     test_scene_finish(scene);
 }
 
 struct pt_integrator test_integrator(int max_depth)
 {
-    return (struct pt_integrator){.max_depth = max_depth, .rr_depth = 3, .sampler = PT_SAMPLER_INDEPENDENT, .strategy = PT_STRATEGY_MIS,
-                                  .filter = PT_FILTER_BOX, .filter_x = 0.5f, .filter_y = 0.5f, .filter_sigma = 0.5f,
-                                  .max_component = INFINITY, .seed = 1};
+    return (struct pt_integrator){.max_depth = max_depth,
+                                  .rr_depth = 3,
+                                  .sampler = PT_SAMPLER_INDEPENDENT,
+                                  .strategy = PT_STRATEGY_MIS,
+                                  .filter = PT_FILTER_BOX,
+                                  .filter_x = 0.5f,
+                                  .filter_y = 0.5f,
+                                  .filter_sigma = 0.5f,
+                                  .max_component = INFINITY,
+                                  .seed = 1};
 }
 
 pt_vec3 test_mean(const struct pt_scene *scene, const struct pt_integrator *settings, pt_kernel *kernel, uint32_t spp,

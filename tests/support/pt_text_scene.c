@@ -24,7 +24,8 @@ static int load(const char *text, int strict, int *warnings, struct pt_scene **s
     int ignored = 0;
     struct pt_source_single single = {"t.pbrt", text, strlen(text)};
     struct pt_source source = pt_source_from_memory(&single);
-    struct pt_load_options options = {.strict = strict, .quiet = 1, .warn = count_warning, .warn_data = warnings ? warnings : &ignored};
+    struct pt_load_options options = {
+        .strict = strict, .quiet = 1, .warn = count_warning, .warn_data = warnings ? warnings : &ignored};
     return pt_scene_load_source("t.pbrt", &source, &options, scene, defaults, err);
 }
 
@@ -55,7 +56,8 @@ int text_scene_error(const char *text, int strict, struct base_err *err)
 
 struct pt_scene *world_scene(const char *body)
 {
-    static const char head[] = "Film \"rgb\" \"integer xresolution\" 8 \"integer yresolution\" 8 Camera \"perspective\"\nWorldBegin\n";
+    static const char head[] =
+        "Film \"rgb\" \"integer xresolution\" 8 \"integer yresolution\" 8 Camera \"perspective\"\nWorldBegin\n";
     char *text = malloc(sizeof head + strlen(body));
     assert_non_null(text);
     strcpy(text, head);

@@ -25,9 +25,9 @@ struct lull_instance {
 
 static struct {
     struct lull_requirements needs;
-    struct lull_decision answer[MOST]; /* by block */
+    struct lull_decision answer[MOST];                    /* by block */
     int32_t create, require, begin, evaluate, save, load; /* to be answered */
-    double fails_at; /* the dial of an instance that fails to evaluate */
+    double fails_at;                                      /* the dial of an instance that fails to evaluate */
     char calls[400];
     struct lull_frame frame;
     struct lull_rect rects[MOST];
@@ -59,8 +59,8 @@ static int32_t said(int32_t code, struct lull_error *err)
     return code;
 }
 
-static int32_t create(const struct lull_host *host, const struct lull_pair *pairs, uint32_t count, uint32_t stride, struct lull_instance **out,
-                      struct lull_error *err)
+static int32_t create(const struct lull_host *host, const struct lull_pair *pairs, uint32_t count, uint32_t stride,
+                      struct lull_instance **out, struct lull_error *err)
 {
     if (heard.create != LULL_OK)
         return said(heard.create, err);
@@ -99,8 +99,9 @@ static double at(const struct lull_view *seen, int plane, int x, int y, int chan
     return p->type == LULL_TYPE_U32 ? (double)*(const uint32_t *)(const void *)data : *(const double *)(const void *)data;
 }
 
-static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, const struct lull_block *blocks, uint32_t block_stride,
-                        struct lull_decision *decisions, uint32_t decision_stride, uint32_t count, struct lull_error *err)
+static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, const struct lull_block *blocks,
+                        uint32_t block_stride, struct lull_decision *decisions, uint32_t decision_stride, uint32_t count,
+                        struct lull_error *err)
 {
     assert_true(block_stride == sizeof *blocks && decision_stride == sizeof *decisions);
     heard.view = *view;
@@ -126,10 +127,7 @@ static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, 
     return said(in->dial == heard.fails_at && in->dial > 0 ? LULL_E_INTERNAL : heard.evaluate, err);
 }
 
-static void end_frame(struct lull_instance *in)
-{
-    note("end %g; ", in->dial);
-}
+static void end_frame(struct lull_instance *in) { note("end %g; ", in->dial); }
 
 static void destroy(struct lull_instance *in)
 {
@@ -167,10 +165,21 @@ static const void *get_extension(const char *id)
 static const struct lull_param parameters[] = {
     {.name = "visible", .help = "h", .min = 0.001, .max = 1, .type = LULL_PARAM_FLOAT},
     {.name = "threshold", .help = "h", .default_value = "0.5", .min = 0.25, .max = 4, .type = LULL_PARAM_FLOAT}};
-static struct lull_criterion table = {.struct_size = sizeof table, .id = "logger", .name = "l", .version = "3", .description = "d",
-                                      .params = parameters, .param_count = 2, .param_stride = sizeof parameters[0],
-                                      .create = create, .requirements = requirements, .begin_frame = begin_frame, .evaluate = evaluate,
-                                      .end_frame = end_frame, .destroy = destroy, .get_extension = get_extension};
+static struct lull_criterion table = {.struct_size = sizeof table,
+                                      .id = "logger",
+                                      .name = "l",
+                                      .version = "3",
+                                      .description = "d",
+                                      .params = parameters,
+                                      .param_count = 2,
+                                      .param_stride = sizeof parameters[0],
+                                      .create = create,
+                                      .requirements = requirements,
+                                      .begin_frame = begin_frame,
+                                      .evaluate = evaluate,
+                                      .end_frame = end_frame,
+                                      .destroy = destroy,
+                                      .get_extension = get_extension};
 
 /* --- a film with blocks ------------------------------------------------------------------------------------------------- */
 
@@ -199,14 +208,20 @@ static void release(void *context)
     released++;
 }
 
-static const struct lull_host_services services = {.struct_size = sizeof services, .name = "a test", .context = &config, .log = keep,
-                                                   .release = release};
+static const struct lull_host_services services = {
+    .struct_size = sizeof services, .name = "a test", .context = &config, .log = keep, .release = release};
 
 static struct lull_plane plane_at(const void *data, uint32_t channels, size_t size, int32_t type, int32_t normaliser)
 {
     const int64_t pixel = (int64_t)(channels * size);
-    return (struct lull_plane){.data = data, .stride_x = pixel, .stride_y = WIDTH * pixel, .stride_c = (int64_t)size, .scale = 1,
-                               .type = type, .normaliser = normaliser, .channels = channels};
+    return (struct lull_plane){.data = data,
+                               .stride_x = pixel,
+                               .stride_y = WIDTH * pixel,
+                               .stride_c = (int64_t)size,
+                               .scale = 1,
+                               .type = type,
+                               .normaliser = normaliser,
+                               .channels = channels};
 }
 
 /* 20 x 14 pixels in blocks of 8 x 6, of which a crop touches the last two columns; every sum of its own. The planes are those of a
@@ -216,18 +231,37 @@ static void set_up(uint32_t supplied, uint32_t required)
     static const struct {
         uint32_t channels;
         int32_t normaliser;
-    } form[LULL_PLANE_COUNT] = {{3, LULL_NORM_SPP}, {0, 0}, {0, 0}, {1, LULL_NORM_SPP}, {3, LULL_NORM_HALF_SPP},
-                                {3, LULL_NORM_SPP}, {3, LULL_NORM_SPP}, {1, LULL_NORM_ONE}};
+    } form[LULL_PLANE_COUNT] = {{3, LULL_NORM_SPP},
+                                {0, 0},
+                                {0, 0},
+                                {1, LULL_NORM_SPP},
+                                {3, LULL_NORM_HALF_SPP},
+                                {3, LULL_NORM_SPP},
+                                {3, LULL_NORM_SPP},
+                                {1, LULL_NORM_ONE}};
     memset(&heard, 0, sizeof heard);
     memset(lost, 0, sizeof lost);
     memset(lost_half, 0, sizeof lost_half);
     memset(planes, 0, sizeof planes);
     err = (struct lull_error){.struct_size = sizeof err};
-    heard.needs = (struct lull_requirements){.struct_size = sizeof heard.needs, .flags = LULL_REQ_FLEXIBLE, .planes_required = required,
+    heard.needs = (struct lull_requirements){.struct_size = sizeof heard.needs,
+                                             .flags = LULL_REQ_FLEXIBLE,
+                                             .planes_required = required,
                                              .planes_used = ALL_PLANES};
-    config = (struct lull_host_config){.struct_size = sizeof config, .flags = LULL_FRAME_DETERMINISTIC, .width = 20, .height = 14,
-                                       .block_width = 8, .block_height = 6, .crop = {9, 1, 20, 13}, .planes = supplied, .spp_min = 3,
-                                       .spp_max = 90, .seed = 77, .time_budget_s = 2.5, .sample_clamp = 6, .transfer = LULL_TRANSFER_SRGB};
+    config = (struct lull_host_config){.struct_size = sizeof config,
+                                       .flags = LULL_FRAME_DETERMINISTIC,
+                                       .width = 20,
+                                       .height = 14,
+                                       .block_width = 8,
+                                       .block_height = 6,
+                                       .crop = {9, 1, 20, 13},
+                                       .planes = supplied,
+                                       .spp_min = 3,
+                                       .spp_max = 90,
+                                       .seed = 77,
+                                       .time_budget_s = 2.5,
+                                       .sample_clamp = 6,
+                                       .transfer = LULL_TRANSFER_SRGB};
     for (int k = 0; k < LULL_PLANE_COUNT; k++) {
         for (int i = 0; i < 3 * PIXELS; i++)
             sums[k][i] = 1000.0 * (k + 1) + i;
@@ -236,8 +270,14 @@ static void set_up(uint32_t supplied, uint32_t required)
     }
     lost_plane = plane_at(lost, 1, 4, LULL_TYPE_U32, LULL_NORM_ONE);
     lost_half_plane = plane_at(lost_half, 1, 4, LULL_TYPE_U32, LULL_NORM_ONE);
-    view = (struct lull_host_view){.struct_size = sizeof view, .plane_count = LULL_PLANE_COUNT, .x0 = 8, .x1 = 20, .y1 = 14, .planes = planes,
-                                   .dropped = &lost_plane, .dropped_half = &lost_half_plane};
+    view = (struct lull_host_view){.struct_size = sizeof view,
+                                   .plane_count = LULL_PLANE_COUNT,
+                                   .x0 = 8,
+                                   .x1 = 20,
+                                   .y1 = 14,
+                                   .planes = planes,
+                                   .dropped = &lost_plane,
+                                   .dropped_half = &lost_half_plane};
     assert_int_equal(lull_host_create(&services, &table, NULL, 0, &criterion, &err), LULL_OK);
 }
 
@@ -276,23 +316,32 @@ static void grids(void **state)
         config.flags = clip ? LULL_HOST_UNIFORM : 0;
         assert_int_equal(lull_host_begin(&config, clip ? NULL : criterion, &frame, &err), LULL_OK);
         const struct lull_host_blocks *b = lull_host_blocks_of(frame);
-        assert_true(b->count == 6 && b->columns == 3 && b->rows == 3 && b->list_columns == 2 && b->block_width == 8 && b->block_height == 6);
+        assert_true(b->count == 6 && b->columns == 3 && b->rows == 3 && b->list_columns == 2 && b->block_width == 8 &&
+                    b->block_height == 6);
         assert_true(b->struct_size == sizeof *b && b->spp_min == 3 && b->spp_max == 90 && b->check_step == 1);
         for (int i = 0; i < 6; i++) {
             const struct lull_host_block *p = &b->list[i];
             const int *r = rects[i];
-            assert_true(p->id == (uint32_t)r[0] && p->x0 == (clip && r[1] < 9 ? 9 : r[1]) && p->y0 == (clip && r[2] < 1 ? 1 : r[2]));
+            assert_true(p->id == (uint32_t)r[0] && p->x0 == (clip && r[1] < 9 ? 9 : r[1]) &&
+                        p->y0 == (clip && r[2] < 1 ? 1 : r[2]));
             assert_true(p->x1 == r[3] && p->y1 == (clip && r[4] > 13 ? 13 : r[4]));
-            assert_true(isnan(p->p_noisy) && isnan(p->error) && isnan(p->predicted_spp) && p->spp == 0 && p->reason == LULL_REASON_NONE);
+            assert_true(isnan(p->p_noisy) && isnan(p->error) && isnan(p->predicted_spp) && p->spp == 0 &&
+                        p->reason == LULL_REASON_NONE);
             assert_int_equal(p->next_spp, clip ? 90 : 3);
         }
         assert_true(b->x0 == (clip ? 9 : 8) && b->y0 == clip && b->x1 == 20 && b->y1 == (clip ? 13 : 14));
         lull_host_end(frame);
     }
-    config = (struct lull_host_config){.struct_size = sizeof config, .width = 16, .height = 6, .block_width = 8, .block_height = 6,
-                                       .spp_min = 1, .spp_max = 9}; /* whole blocks, no crop: one column is not two */
+    config = (struct lull_host_config){.struct_size = sizeof config,
+                                       .width = 16,
+                                       .height = 6,
+                                       .block_width = 8,
+                                       .block_height = 6,
+                                       .spp_min = 1,
+                                       .spp_max = 9}; /* whole blocks, no crop: one column is not two */
     assert_int_equal(lull_host_begin(&config, criterion, &frame, &err), LULL_OK);
-    assert_true(lull_host_blocks_of(frame)->count == 2 && lull_host_blocks_of(frame)->columns == 2 && lull_host_blocks_of(frame)->rows == 1);
+    assert_true(lull_host_blocks_of(frame)->count == 2 && lull_host_blocks_of(frame)->columns == 2 &&
+                lull_host_blocks_of(frame)->rows == 1);
     lull_host_end(frame);
     frame = NULL;
     tear_down();
@@ -309,15 +358,17 @@ static void blocks_by_default(void **state)
     (void)state;
     static const struct {
         uint32_t width, height, own, flags, size;
-    } cases[] = {{1920, 1080, 0, LULL_REQ_FLEXIBLE, 200}, {640, 480, 0, LULL_REQ_FLEXIBLE, 200}, {240, 160, 0, LULL_REQ_FLEXIBLE, 64},
-                 {512, 512, 0, LULL_REQ_FLEXIBLE, 146},   {100, 60, 200, LULL_REQ_FLEXIBLE, 22}, {8, 8, 0, LULL_REQ_FLEXIBLE, 16},
-                 {1920, 1080, 100, LULL_REQ_FLEXIBLE, 100}, {240, 160, 100, 0, 100},             {240, 160, 8, LULL_REQ_FLEXIBLE, 8}};
+    } cases[] = {{1920, 1080, 0, LULL_REQ_FLEXIBLE, 200},   {640, 480, 0, LULL_REQ_FLEXIBLE, 200},
+                 {240, 160, 0, LULL_REQ_FLEXIBLE, 64},      {512, 512, 0, LULL_REQ_FLEXIBLE, 146},
+                 {100, 60, 200, LULL_REQ_FLEXIBLE, 22},     {8, 8, 0, LULL_REQ_FLEXIBLE, 16},
+                 {1920, 1080, 100, LULL_REQ_FLEXIBLE, 100}, {240, 160, 100, 0, 100},
+                 {240, 160, 8, LULL_REQ_FLEXIBLE, 8}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         set_up(ALL_PLANES, 0);
         criterion->needs.flags = cases[i].flags;
         criterion->needs.block_width = criterion->needs.block_height = cases[i].own;
-        config = (struct lull_host_config){.struct_size = sizeof config, .width = cases[i].width, .height = cases[i].height, .spp_min = 1,
-                                           .spp_max = 9};
+        config = (struct lull_host_config){
+            .struct_size = sizeof config, .width = cases[i].width, .height = cases[i].height, .spp_min = 1, .spp_max = 9};
         struct lull_host_blocks blocks = {0};
         assert_int_equal(lull_host_lay_out(&config, &criterion->needs, 0, &blocks, &err), LULL_OK);
         assert_true(blocks.block_width == (int32_t)cases[i].size && blocks.block_height == (int32_t)cases[i].size);
@@ -335,8 +386,14 @@ static void layouts_of_ones_own(void **state)
         int32_t more[2];
     } layout[4] = {{.r = {4, 0, 8, 4}}, {.r = {0, 0, 4, 8}}, {.r = {4, 4, 8, 8}}, {.r = {10, 9, 12, 10}}};
     set_up(ALL_PLANES, 0);
-    config = (struct lull_host_config){.struct_size = sizeof config, .width = 12, .height = 10, .layout = &layout[0].r, .layout_count = 4,
-                                       .layout_stride = sizeof layout[0], .spp_min = 1, .spp_max = 1000};
+    config = (struct lull_host_config){.struct_size = sizeof config,
+                                       .width = 12,
+                                       .height = 10,
+                                       .layout = &layout[0].r,
+                                       .layout_count = 4,
+                                       .layout_stride = sizeof layout[0],
+                                       .spp_min = 1,
+                                       .spp_max = 1000};
     assert_int_equal(lull_host_begin(&config, criterion, &frame, &err), LULL_OK);
     struct lull_host_blocks *b = lull_host_blocks_of(frame);
     assert_true(b->count == 4 && b->columns == 0 && b->x0 == 0 && b->y0 == 0 && b->x1 == 12 && b->y1 == 10);
@@ -361,10 +418,10 @@ static void layouts_of_ones_own(void **state)
 static void next_checks_and_seams(void **state)
 {
     (void)state;
-    static const uint64_t cases[][5] = {{100, 0, 1000, 115, 1}, {100, 101, 1000, 101, 1}, {100, 100, 1000, 115, 1}, {3, 0, 99, 4, 1},
-                                        {1, 0, 99, 2, 1},       {100, 0, 114, 114, 1},    {100, 500, 200, 200, 1},  {0, 0, 9, 1, 1},
-                                        {20, 0, 99, 23, 1},     {20, 0, 99, 32, 16},      {20, 64, 99, 64, 16},     {90, 0, 99, 99, 16},
-                                        {20, 0, 99, 23, 0}};
+    static const uint64_t cases[][5] = {
+        {100, 0, 1000, 115, 1}, {100, 101, 1000, 101, 1}, {100, 100, 1000, 115, 1}, {3, 0, 99, 4, 1},   {1, 0, 99, 2, 1},
+        {100, 0, 114, 114, 1},  {100, 500, 200, 200, 1},  {0, 0, 9, 1, 1},          {20, 0, 99, 23, 1}, {20, 0, 99, 32, 16},
+        {20, 64, 99, 64, 16},   {90, 0, 99, 99, 16},      {20, 0, 99, 23, 0}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         struct lull_host_blocks b = {.spp_max = cases[i][2], .check_step = cases[i][4]};
         assert_int_equal(lull_host_next_check(&b, cases[i][0], cases[i][1]), cases[i][3]);
@@ -375,7 +432,8 @@ static void next_checks_and_seams(void **state)
     static const uint64_t spp[6] = {10, 20, 100, 30, 25, 50}, need[6] = {0, 50, 0, 0, 0, 0};
     for (int from = 0; from < 2; from++) {
         for (int i = 0; i < 6; i++)
-            list[i] = (struct lull_host_block){.spp = spp[i], .next_spp = 7, .reason = from ? LULL_REASON_DROPPED : LULL_REASON_CRITERION};
+            list[i] = (struct lull_host_block){
+                .spp = spp[i], .next_spp = 7, .reason = from ? LULL_REASON_DROPPED : LULL_REASON_CRITERION};
         list[0].reason = LULL_REASON_SPP_MAX; /* has what it may have */
         assert_int_equal(lull_host_reopen(&b, 2.0), 1);
         for (int i = 0; i < 6; i++) {
@@ -397,7 +455,8 @@ static void closed_blocks_are_extended(void **state)
     struct lull_host_block list[LULL_REASON_COUNT];
     struct lull_host_blocks b = {.list = list, .count = LULL_REASON_COUNT, .spp_max = 99, .check_step = 16};
     for (int i = 0; i < LULL_REASON_COUNT; i++)
-        list[i] = (struct lull_host_block){.reason = i, .spp = i == LULL_REASON_INTERRUPT ? 99 : 20, .next_spp = i == LULL_REASON_TIME ? 40 : 20};
+        list[i] = (struct lull_host_block){
+            .reason = i, .spp = i == LULL_REASON_INTERRUPT ? 99 : 20, .next_spp = i == LULL_REASON_TIME ? 40 : 20};
     assert_int_equal(lull_host_extend(&b), 3);
     static const uint64_t next[LULL_REASON_COUNT] = {20, 20, 32, 32, 48, 20, 20};
     for (int i = 0; i < LULL_REASON_COUNT; i++) {
@@ -426,7 +485,8 @@ static void configs_that_make_no_sense(void **state)
         {0, 20, 8, 9, 3, 90, 0, LULL_E_INVALID, "crop 9,1,9,13: it must lie inside 20x14 pixels and not be empty"},
         {0, 20, 8, 20, 0, 90, 0, LULL_E_INVALID, "spp_min 0, spp_max 90: expected 1 <= spp_min <= spp_max < 2^31"},
         {0, 20, 8, 20, 91, 90, 0, LULL_E_INVALID, "spp_min 91, spp_max 90: expected 1 <= spp_min <= spp_max < 2^31"},
-        {0, 20, 8, 20, 3, UINT64_C(1) << 31, 0, LULL_E_INVALID, "spp_min 3, spp_max 2147483648: expected 1 <= spp_min <= spp_max < 2^31"},
+        {0, 20, 8, 20, 3, UINT64_C(1) << 31, 0, LULL_E_INVALID,
+         "spp_min 3, spp_max 2147483648: expected 1 <= spp_min <= spp_max < 2^31"},
         {0, 20, 8, 20, 3, 90, 0.5, LULL_E_INVALID, "max_seam 0.5: expected 0 or at least 1"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
@@ -465,10 +525,12 @@ static void a_frame_is_described(void **state)
         assert_true(f->width == 20 && f->height == 14 && f->block_count == 6 && f->block_stride == sizeof(struct lull_rect));
         for (int i = 0; i < 6; i++) {
             const struct lull_host_block *b = &list[i];
-            assert_true(heard.rects[i].x0 == b->x0 && heard.rects[i].y0 == b->y0 && heard.rects[i].x1 == b->x1 && heard.rects[i].y1 == b->y1);
+            assert_true(heard.rects[i].x0 == b->x0 && heard.rects[i].y0 == b->y0 && heard.rects[i].x1 == b->x1 &&
+                        heard.rects[i].y1 == b->y1);
         }
         assert_int_equal(f->planes, ALL_PLANES);
-        assert_true(f->transfer == LULL_TRANSFER_SRGB && f->exposure == (again ? 2 : 1) && f->gamma == 0 && f->sample_clamp == 6);
+        assert_true(f->transfer == LULL_TRANSFER_SRGB && f->exposure == (again ? 2 : 1) && f->gamma == 0 &&
+                    f->sample_clamp == 6);
         assert_true(f->time_budget_s == 2.5 && f->spp_min == 3 && f->spp_max == 90 && f->seed == 77);
         assert_true(again ? f->rgb_to_xyz[4] == 1 && f->rgb_to_xyz[0] == 0 : memcmp(f->rgb_to_xyz, xyz, sizeof xyz) == 0);
         config.flags = LULL_FRAME_INDEPENDENT;
@@ -484,8 +546,10 @@ static void a_frame_is_described(void **state)
 static void check_plane(int i, const void *data, int channels, int bytes, int type, int normaliser)
 {
     const struct lull_plane *p = &heard.planes[i];
-    assert_true((!data || p->data == data) && p->data && p->stride_x == channels * bytes && p->stride_y == 12 * channels * bytes);
-    assert_true(p->stride_c == bytes && p->scale == 1 && p->type == type && p->normaliser == normaliser && p->channels == (uint32_t)channels);
+    assert_true((!data || p->data == data) && p->data && p->stride_x == channels * bytes &&
+                p->stride_y == 12 * channels * bytes);
+    assert_true(p->stride_c == bytes && p->scale == 1 && p->type == type && p->normaliser == normaliser &&
+                p->channels == (uint32_t)channels);
     assert_int_equal(p->flags, 0);
 }
 
@@ -502,7 +566,8 @@ static void a_view_is_described(void **state)
     struct lull_host_block *list = begin();
     list[2].reason = LULL_REASON_CRITERION;
     assert_int_equal(lull_host_evaluate(criterion, frame, &view, due, final, 3, got, &err), LULL_OK);
-    assert_true(heard.view.x0 == 8 && heard.view.y0 == 0 && heard.view.x1 == 20 && heard.view.y1 == 14 && heard.view.elapsed_s >= 0);
+    assert_true(heard.view.x0 == 8 && heard.view.y0 == 0 && heard.view.x1 == 20 && heard.view.y1 == 14 &&
+                heard.view.elapsed_s >= 0);
     assert_true(heard.view.plane_count == LULL_PLANE_COUNT && heard.view.plane_stride == sizeof(struct lull_plane));
     assert_true(heard.view.all_count == 6 && heard.view.all_stride == sizeof(struct lull_block));
     check_plane(LULL_PLANE_COLOR, sums[LULL_PLANE_COLOR], 3, 8, LULL_TYPE_F64, LULL_NORM_SPP);
@@ -517,12 +582,14 @@ static void a_view_is_described(void **state)
     for (uint32_t i = 0; i < 6; i++) {
         const struct lull_block *b = &heard.all[i];
         const struct lull_host_block *p = &list[i];
-        assert_true(b->id == i && b->flags == (i == 2 ? LULL_BLOCK_STOPPED : 0) && b->spp == 10 + i && b->half_spp == 4 + i / 2);
+        assert_true(b->id == i && b->flags == (i == 2 ? LULL_BLOCK_STOPPED : 0) && b->spp == 10 + i &&
+                    b->half_spp == 4 + i / 2);
         assert_true(b->x0 == p->x0 && b->y0 == p->y0 && b->x1 == p->x1 && b->y1 == p->y1 && b->thread_s == 0.5 + i);
     }
-    assert_true(heard.count == 3 && heard.due[1].flags == (LULL_BLOCK_STOPPED | LULL_BLOCK_FINAL) && heard.due[2].flags == 0);
-    assert_true(heard.preset.action == LULL_CONTINUE && heard.preset.next_spp == 0 && isnan(heard.preset.error) && isnan(heard.preset.p_noisy) &&
-                isnan(heard.preset.predicted_spp));
+    assert_true(heard.count == 3 && heard.due[1].flags == (LULL_BLOCK_STOPPED | LULL_BLOCK_FINAL) &&
+                heard.due[2].flags == 0);
+    assert_true(heard.preset.action == LULL_CONTINUE && heard.preset.next_spp == 0 && isnan(heard.preset.error) &&
+                isnan(heard.preset.p_noisy) && isnan(heard.preset.predicted_spp));
     assert_true(got[0].action == LULL_STOP && got[1].error == 2 && got[2].next_spp == 40 && got[2].p_noisy == 0.5);
     assert_true(lull_host_totals_of(frame)->checks == 0); /* nothing is noted */
     view.x0 = 9;
@@ -617,8 +684,12 @@ static void what_a_criterion_fails_with(void **state)
     static const struct {
         uint32_t flags, width, height;
         int32_t code;
-    } sizes[] = {{0, 8, 6, LULL_OK}, {0, 8, 7, LULL_E_UNSUPPORTED}, {0, 7, 6, LULL_E_UNSUPPORTED}, {LULL_REQ_FLEXIBLE, 7, 7, LULL_OK},
-                 {0, 0, 7, LULL_OK}, {0, 7, 0, LULL_OK}};
+    } sizes[] = {{0, 8, 6, LULL_OK},
+                 {0, 8, 7, LULL_E_UNSUPPORTED},
+                 {0, 7, 6, LULL_E_UNSUPPORTED},
+                 {LULL_REQ_FLEXIBLE, 7, 7, LULL_OK},
+                 {0, 0, 7, LULL_OK},
+                 {0, 7, 0, LULL_OK}};
     for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
         criterion->needs.flags = sizes[i].flags;
         criterion->needs.block_width = sizes[i].width;
@@ -654,7 +725,8 @@ static void dials(void **state)
     struct lull_criterion less = table;
     less.param_count = 1;
     assert_int_equal(lull_host_scale_dial(&less, NULL, 0, 0, value, &dial, &err), LULL_E_VALUE);
-    assert_string_equal(err.message, "criterion logger: a mask scales 'visible', which has no value: give one, visible=VALUE");
+    assert_string_equal(err.message,
+                        "criterion logger: a mask scales 'visible', which has no value: give one, visible=VALUE");
     less.param_count = 0;
     assert_int_equal(lull_host_scale_dial(&less, NULL, 0, 0, value, &dial, &err), LULL_E_KEY);
     assert_string_equal(err.message, "criterion logger has no dial 'visible' or 'threshold' for a mask to scale");
@@ -699,7 +771,13 @@ static void every_step_has_its_instance(void **state)
             f64[20 * points[k].y + points[k].x] = points[k].grey;
         }
         const struct lull_plane masks[2] = {
-            {.data = f32 + 20 * 13, .stride_x = 4, .stride_y = -80, .stride_c = 4, .scale = 1, .type = LULL_TYPE_F32, .channels = 1},
+            {.data = f32 + 20 * 13,
+             .stride_x = 4,
+             .stride_y = -80,
+             .stride_c = 4,
+             .scale = 1,
+             .type = LULL_TYPE_F32,
+             .channels = 1},
             {.data = f64, .stride_x = 8, .stride_y = 160, .stride_c = 8, .scale = 1, .type = LULL_TYPE_F64, .channels = 1}};
         const struct lull_pair pair = {"threshold", "2"};
         set_up(ALL_PLANES, 0);
@@ -734,8 +812,10 @@ static void every_step_has_its_instance(void **state)
         assert_memory_equal(bytes, expected, 9);
         assert_int_equal(lull_host_load_history(criterion, bytes, 9, &err), LULL_OK);
         tear_down();
-        assert_string_equal(heard.calls, "create 2 of 1; create 1 of 2; create 1.18921 of 2; begin 2; begin 1.18921; begin 1; "
-                                         "ask 2 of 0 1 4!; ask 1 of 2 5; end 2; destroy 2; end 1.18921; destroy 1.18921; end 1; destroy 1; ");
+        assert_string_equal(
+            heard.calls,
+            "create 2 of 1; create 1 of 2; create 1.18921 of 2; begin 2; begin 1.18921; begin 1; "
+            "ask 2 of 0 1 4!; ask 1 of 2 5; end 2; destroy 2; end 1.18921; destroy 1.18921; end 1; destroy 1; ");
     }
 }
 
@@ -786,8 +866,10 @@ static void offers(void **state)
     set_up(ALL_PLANES, 0);
     assert_int_equal(lull_host_create(&three, &table, NULL, 0, &busy, &err), LULL_OK);
     assert_int_equal(lull_host_create(NULL, &table, NULL, 0, &silent, &err), LULL_OK);
-    const struct lull_host *alone = criterion->dialled[0]->host, *many = busy->dialled[0]->host, *none = silent->dialled[0]->host;
-    assert_true(alone->struct_size == sizeof *alone && alone->api_minor == LULL_API_MINOR && alone->max_workers == 1 && many->max_workers == 3);
+    const struct lull_host *alone = criterion->dialled[0]->host, *many = busy->dialled[0]->host,
+                           *none = silent->dialled[0]->host;
+    assert_true(alone->struct_size == sizeof *alone && alone->api_minor == LULL_API_MINOR && alone->max_workers == 1 &&
+                many->max_workers == 3);
     assert_true(alone->flags == 0 && !alone->cancelled && !alone->get_extension && none->max_workers == 1 && !none->name);
     assert_string_equal(alone->name, "a test");
     alone->log(alone, LULL_LOG_INFO, "psst");

@@ -25,8 +25,8 @@ static struct lull_decision answer[BLOCKS];
 static int32_t evaluate_code;
 static uint32_t was_due, was_final; /* masks of blocks */
 
-static int32_t create(const struct lull_host *host, const struct lull_pair *pairs, uint32_t count, uint32_t stride, struct lull_instance **out,
-                      struct lull_error *err)
+static int32_t create(const struct lull_host *host, const struct lull_pair *pairs, uint32_t count, uint32_t stride,
+                      struct lull_instance **out, struct lull_error *err)
 {
     (void)host, (void)pairs, (void)count, (void)stride, (void)err;
     *out = calloc(1, sizeof **out);
@@ -49,8 +49,9 @@ static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *op
     return LULL_OK;
 }
 
-static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, const struct lull_block *blocks, uint32_t block_stride,
-                        struct lull_decision *decisions, uint32_t decision_stride, uint32_t count, struct lull_error *err)
+static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, const struct lull_block *blocks,
+                        uint32_t block_stride, struct lull_decision *decisions, uint32_t decision_stride, uint32_t count,
+                        struct lull_error *err)
 {
     (void)view, (void)block_stride, (void)decision_stride, (void)err;
     for (uint32_t k = 0; k < count; k++) {
@@ -62,15 +63,9 @@ static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, 
     return evaluate_code;
 }
 
-static void end_frame(struct lull_instance *in)
-{
-    (void)in;
-}
+static void end_frame(struct lull_instance *in) { (void)in; }
 
-static void destroy(struct lull_instance *in)
-{
-    free(in);
-}
+static void destroy(struct lull_instance *in) { free(in); }
 
 static int32_t save(const struct lull_instance *in, const struct lull_writer *writer, struct lull_error *err)
 {
@@ -90,15 +85,30 @@ static const void *get_extension(const char *id)
     return strcmp(id, LULL_EXT_STATE) == 0 ? &state : NULL;
 }
 
-static struct lull_criterion table = {.struct_size = sizeof table, .id = "told", .name = "t", .version = "1", .description = "d",
-                                      .create = create, .requirements = requirements, .begin_frame = begin_frame, .evaluate = evaluate,
-                                      .end_frame = end_frame, .destroy = destroy, .get_extension = get_extension};
+static struct lull_criterion table = {.struct_size = sizeof table,
+                                      .id = "told",
+                                      .name = "t",
+                                      .version = "1",
+                                      .description = "d",
+                                      .create = create,
+                                      .requirements = requirements,
+                                      .begin_frame = begin_frame,
+                                      .evaluate = evaluate,
+                                      .end_frame = end_frame,
+                                      .destroy = destroy,
+                                      .get_extension = get_extension};
 
 /* --- a frame of 2 x 2 blocks --------------------------------------------------------------------------------------------- */
 
 static float color[8 * 8 * 3];
-static const struct lull_plane planes[1] = {{.data = color, .stride_x = 12, .stride_y = 96, .stride_c = 4, .scale = 1,
-                                             .type = LULL_TYPE_F32, .normaliser = LULL_NORM_SPP, .channels = 3}};
+static const struct lull_plane planes[1] = {{.data = color,
+                                             .stride_x = 12,
+                                             .stride_y = 96,
+                                             .stride_c = 4,
+                                             .scale = 1,
+                                             .type = LULL_TYPE_F32,
+                                             .normaliser = LULL_NORM_SPP,
+                                             .channels = 3}};
 static const struct lull_host_view view = {.struct_size = sizeof view, .plane_count = 1, .x1 = 8, .y1 = 8, .planes = planes};
 static struct lull_host_config config;
 static struct lull_host_criterion *criterion;
@@ -109,8 +119,15 @@ static struct lull_error fault;
 
 static void begin(uint32_t capabilities, uint32_t flags)
 {
-    config = (struct lull_host_config){.struct_size = sizeof config, .flags = flags, .width = 8, .height = 8, .block_width = 4,
-                                       .block_height = 4, .planes = LULL_PLANE_BIT(LULL_PLANE_COLOR), .spp_min = 10, .spp_max = 100};
+    config = (struct lull_host_config){.struct_size = sizeof config,
+                                       .flags = flags,
+                                       .width = 8,
+                                       .height = 8,
+                                       .block_width = 4,
+                                       .block_height = 4,
+                                       .planes = LULL_PLANE_BIT(LULL_PLANE_COLOR),
+                                       .spp_min = 10,
+                                       .spp_max = 100};
     fault = (struct lull_error){.struct_size = sizeof fault};
     table.capabilities = capabilities;
     evaluate_code = LULL_OK;
@@ -160,7 +177,8 @@ static void blocks_stop_one_by_one(void **state)
     expect(1, LULL_REASON_NONE, 40);
     expect(2, LULL_REASON_NONE, 14); /* one STOP is not enough for who dropped samples */
     expect(3, LULL_REASON_NONE, 14);
-    assert_true(list[2].asked && list[2].asked_spp == 12 && list[2].error == 2 && list[2].p_noisy == 0.25 && list[2].stop_votes == 1);
+    assert_true(list[2].asked && list[2].asked_spp == 12 && list[2].error == 2 && list[2].p_noisy == 0.25 &&
+                list[2].stop_votes == 1);
     assert_true(totals->checks == 4 && totals->asked == 4 && totals->failed_checks == 0 && totals->criterion_s > 0);
     answer[3].next_spp = 1000; /* beyond the end */
     check(14, 0);
@@ -330,7 +348,8 @@ static void a_frame_is_forecast(void **state)
     totals->criterion_s = 2;
     assert_int_equal(lull_host_outlook(lull_host_blocks_of(frame), totals, 1, &f, &fault), LULL_OK);
     assert_true(f.active == 3 && f.known == 1 && f.low == 20 && f.high == 30 && f.done_s == 8);
-    assert_true(fabs(f.left_s - (2 + 2 + 2.0 / 3)) < 1e-12 && fabs(f.sampling_s - f.left_s) < 1e-12 && fabs(f.check_s - 1.5) < 1e-12);
+    assert_true(fabs(f.left_s - (2 + 2 + 2.0 / 3)) < 1e-12 && fabs(f.sampling_s - f.left_s) < 1e-12 &&
+                fabs(f.check_s - 1.5) < 1e-12);
     list[1].predicted_spp = (double)NAN;
     assert_int_equal(lull_host_outlook(lull_host_blocks_of(frame), totals, 1, &f, &fault), LULL_OK);
     assert_true(f.known == 0 && fabs(f.left_s - (2 + 8 + 2.0 / 3)) < 1e-12);
@@ -390,7 +409,8 @@ static void states_go_on(void **state)
         const struct lull_host_totals before = *totals;
         struct lull_host_block were[BLOCKS];
         memcpy(were, list, sizeof were);
-        assert_int_equal(b.size, 8 + BLOCKS * 88 + 72 + 8 + 192 + 8 + sizeof(struct lull_instance) + (known ? 0 : 8 * BLOCKS));
+        assert_int_equal(b.size,
+                         8 + BLOCKS * 88 + 72 + 8 + 192 + 8 + sizeof(struct lull_instance) + (known ? 0 : 8 * BLOCKS));
         end();
         begin(0, known ? LULL_HOST_HALF_KNOWN : 0);
         assert_int_equal(lull_host_load(frame, b.data, b.size, "x.ckp", &fault), LULL_OK);
@@ -494,7 +514,10 @@ static void reports_as_text(void **state)
     begin(0, 0);
     struct bytes b = {.size = 0};
     struct lull_writer writer = {.struct_size = sizeof writer, .context = &b, .write = gather};
-    struct lull_host_report report = {.struct_size = sizeof report, .flags = LULL_REPORT_NO_RAYS, .processes = 1, .film_pixels = 64,
+    struct lull_host_report report = {.struct_size = sizeof report,
+                                      .flags = LULL_REPORT_NO_RAYS,
+                                      .processes = 1,
+                                      .film_pixels = 64,
                                       .scene_bytes = (double)NAN};
     frame->blocks.count = 1; /* short */
     assert_int_equal(lull_host_report_text(frame, &report, &writer, &fault), LULL_OK);
@@ -516,18 +539,12 @@ static void reports_as_text(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(blocks_stop_one_by_one),
-        cmocka_unit_test(nobody_stops_before_the_least),
-        cmocka_unit_test(a_criterion_may_reopen),
-        cmocka_unit_test(seams_are_mended_at_a_check),
-        cmocka_unit_test(checks_may_be_too_dear),
-        cmocka_unit_test(uniform_frames_are_asked_once),
-        cmocka_unit_test(the_first_limit_wins),
-        cmocka_unit_test(one_frame_at_a_time),
-        cmocka_unit_test(a_frame_is_forecast),
-        cmocka_unit_test(states_go_on),
-        cmocka_unit_test(bad_states_are_refused),
-        cmocka_unit_test(identities_by_name),
+        cmocka_unit_test(blocks_stop_one_by_one), cmocka_unit_test(nobody_stops_before_the_least),
+        cmocka_unit_test(a_criterion_may_reopen), cmocka_unit_test(seams_are_mended_at_a_check),
+        cmocka_unit_test(checks_may_be_too_dear), cmocka_unit_test(uniform_frames_are_asked_once),
+        cmocka_unit_test(the_first_limit_wins),   cmocka_unit_test(one_frame_at_a_time),
+        cmocka_unit_test(a_frame_is_forecast),    cmocka_unit_test(states_go_on),
+        cmocka_unit_test(bad_states_are_refused), cmocka_unit_test(identities_by_name),
         cmocka_unit_test(reports_as_text),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -18,10 +18,7 @@ struct whole {
     uint32_t limb[LIMBS]; /* lowest first */
 };
 
-static struct whole whole(uint64_t v)
-{
-    return (struct whole){{(uint32_t)v, (uint32_t)(v >> 32)}};
-}
+static struct whole whole(uint64_t v) { return (struct whole){{(uint32_t)v, (uint32_t)(v >> 32)}}; }
 
 static struct whole times(struct whole a, uint64_t factor)
 {
@@ -81,7 +78,8 @@ static int reaches(double x, uint64_t code)
     uint64_t m = parts(x, &shift);
     if (x <= 0.0031308) /* 255 · 12.92 x >= code - 1/2 */
         return against(m, shift, 1, 100 * (2 * code - 1), 510 * 1292) >= 0;
-    return against(m, shift, 5, 1000 * (2 * code - 1) + 55 * 510, 510 * 1055) >= 0; /* x^5 >= (((code - 1/2)/255 + 0.055)/1.055)^12 */
+    return against(m, shift, 5, 1000 * (2 * code - 1) + 55 * 510, 510 * 1055) >=
+           0; /* x^5 >= (((code - 1/2)/255 + 0.055)/1.055)^12 */
 }
 
 static void limits_are_exact(void **state)
@@ -147,7 +145,8 @@ static void light_of_codes_is_exact(void **state)
         int shift;
         const uint64_t m = parts(base_srgb_linear[code], &shift);
         const int linear = code <= 10; /* 0.04045 · 255 = 10.3 */
-        const uint64_t p = linear ? 100 * (uint64_t)code : 1000 * (uint64_t)code + 55 * 255, q = linear ? 255 * 1292 : 255 * 1055;
+        const uint64_t p = linear ? 100 * (uint64_t)code : 1000 * (uint64_t)code + 55 * 255,
+                       q = linear ? 255 * 1292 : 255 * 1055;
         assert_true(against(2 * m - 1, shift + 1, linear ? 1 : 5, p, q) < 0);
         assert_true(against(2 * m + 1, shift + 1, linear ? 1 : 5, p, q) > 0);
         assert_true(base_srgb_linear_f32[code] == (float)base_srgb_linear[code]);

@@ -53,11 +53,11 @@ static void measure(double share)
     lull_estimate_pixels(&in, N, &estimate);
 }
 
-#define assert_within(value, expected, tolerance)                                                                  \
-    do {                                                                                                           \
-        double got_ = (value), want_ = (expected), most_ = (tolerance);                                            \
-        if (!(fabs(got_ - want_) <= most_))                                                                        \
-            fail_msg("%s = %g, expected %g within %g", #value, got_, want_, most_);                                \
+#define assert_within(value, expected, tolerance) \
+    do { \
+        double got_ = (value), want_ = (expected), most_ = (tolerance); \
+        if (!(fabs(got_ - want_) <= most_)) \
+            fail_msg("%s = %g, expected %g within %g", #value, got_, want_, most_); \
     } while (0)
 
 /* A denoiser that does nothing has the error of the noise. */
@@ -188,9 +188,12 @@ static void hot_pixel(void **unused)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(identity_has_the_noise), cmocka_unit_test(bias_is_seen_and_noise_is_not),
-        cmocka_unit_test(blur_has_both),          cmocka_unit_test(weights_follow_the_errors),
-        cmocka_unit_test(mixture),                cmocka_unit_test(extremes),
+        cmocka_unit_test(identity_has_the_noise),
+        cmocka_unit_test(bias_is_seen_and_noise_is_not),
+        cmocka_unit_test(blur_has_both),
+        cmocka_unit_test(weights_follow_the_errors),
+        cmocka_unit_test(mixture),
+        cmocka_unit_test(extremes),
         cmocka_unit_test(hot_pixel),
     };
     return cmocka_run_group_tests_name("denoise", tests, NULL, NULL);

@@ -94,7 +94,8 @@ static void whole_files(void **state)
     assert_true(size == 5 && memcmp(data, "ab\ncd", 6) == 0);
     free(data);
     data = NULL;
-    says(base_file_read("five", 4, &data, &size, &err), BASE_EINVAL, &err, "five: 5 bytes, more than the 4 this kind of file may have");
+    says(base_file_read("five", 4, &data, &size, &err), BASE_EINVAL, &err,
+         "five: 5 bytes, more than the 4 this kind of file may have");
     put("none", "");
     assert_int_equal(base_file_read("none", 0, &data, &size, &err), 0);
     assert_true(size == 0 && data[0] == '\0');
@@ -123,8 +124,10 @@ static void what_cannot_be_written(void **state)
     assert_int_equal(base_file_check_output("folder/new", &err), 0);
     says(base_file_check_output("folder/", &err), BASE_EINVAL, &err, "folder/: not the name of a file");
     says(base_file_check_output("folder", &err), BASE_EINVAL, &err, "folder: cannot write there: it is a folder");
-    says(base_file_check_output("fifo", &err), BASE_EINVAL, &err, "fifo: cannot write there: it is no regular file and would be replaced");
-    says(base_file_check_output("missing/new", &err), BASE_EIO, &err, "missing/new: cannot write there: No such file or directory");
+    says(base_file_check_output("fifo", &err), BASE_EINVAL, &err,
+         "fifo: cannot write there: it is no regular file and would be replaced");
+    says(base_file_check_output("missing/new", &err), BASE_EIO, &err,
+         "missing/new: cannot write there: No such file or directory");
     says(base_file_check_output("five/new", &err), BASE_EIO, &err, "five/new: cannot write there: Not a directory");
     assert_int_equal(symlink("loop", "loop"), 0);
     says(base_file_check_output("loop", &err), BASE_EINVAL, &err, "loop: Too many levels of symbolic links");
@@ -146,7 +149,8 @@ static void what_cannot_be_written(void **state)
     assert_int_equal(base_file_tmp_name("folder/x.png", tmp, sizeof tmp, &err), 0);
     snprintf(name, sizeof name, "folder/.tmp-lull%ld-0.x.png", (long)getpid());
     assert_string_equal(tmp, name);
-    says(base_file_tmp_name("folder/x.png", tmp, strlen(name), &err), BASE_EINVAL, &err, "folder/x.png...: the path is too long");
+    says(base_file_tmp_name("folder/x.png", tmp, strlen(name), &err), BASE_EINVAL, &err,
+         "folder/x.png...: the path is too long");
     assert_int_equal(base_file_tmp_name("folder/x.png", tmp, strlen(name) + 1, &err), 0);
     put(tmp, "made");
     assert_int_equal(base_file_rename(tmp, "folder/x.png", &err), 0);
@@ -240,7 +244,11 @@ static void leftovers_of_the_dead_are_swept(void **state)
     struct base_err err = {0};
     char own[64];
     snprintf(own, sizeof own, "folder/.tmp-lull%ld-7.x", (long)getpid());
-    const char *const kept[] = {own, "folder/.tmp-lullx", "folder/.tmp-lull-5-x", "folder/.tmp-lull999999999x", "folder/tmp-lull999999999-0.x",
+    const char *const kept[] = {own,
+                                "folder/.tmp-lullx",
+                                "folder/.tmp-lull-5-x",
+                                "folder/.tmp-lull999999999x",
+                                "folder/tmp-lull999999999-0.x",
                                 "folder/.tmp-lull999999999-1.locked"};
     static const char *const swept[] = {"folder/.tmp-lull999999999-0.x", "folder/.tmp-lull999999998-3."};
     for (size_t i = 0; i < 6; i++)
@@ -266,9 +274,18 @@ static void inside_or_not(void **state)
     static const struct {
         const char *path, *folder;
         int inside;
-    } cases[] = {{"folder/x", "folder", 1},  {"folder/deep/x", "folder", 1}, {"x", "folder", 0},      {"folder/../x", "folder", 0},
-                 {"folder/deep/../x", "folder", 1}, {"x", ".", 1},           {"folder/x", "folder/deep", 0}, {"x", "/", 1},
-                 {"x", "missing", 0},        {"missing/x", ".", 0},          {"folder/back", "folder", 1}, {"loop", ".", 0}};
+    } cases[] = {{"folder/x", "folder", 1},
+                 {"folder/deep/x", "folder", 1},
+                 {"x", "folder", 0},
+                 {"folder/../x", "folder", 0},
+                 {"folder/deep/../x", "folder", 1},
+                 {"x", ".", 1},
+                 {"folder/x", "folder/deep", 0},
+                 {"x", "/", 1},
+                 {"x", "missing", 0},
+                 {"missing/x", ".", 0},
+                 {"folder/back", "folder", 1},
+                 {"loop", ".", 0}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++)
         if (base_file_is_inside(cases[i].path, cases[i].folder) != cases[i].inside)
             fail_msg("%s in %s", cases[i].path, cases[i].folder);
@@ -284,11 +301,11 @@ static void one_file_or_two(void **state)
     put("place/there", "x");
     assert_true(link("place/there", "twin") == 0 && symlink("place/there", "soft") == 0);
     snprintf(here, sizeof here, "%s/new", dir);
-    static const char *const same[][2] = {{"new", "new"}, {"new", "./new"}, {"place/new", "way/new"}, {"way/../new", "new"},
-                                          {"place/there", "twin"}, {"soft", "way/there"}, {"soft", "twin"}, {"place/link", "later"},
-                                          {"way/link", "./later"}};
-    static const char *const other[][2] = {{"new", "place/new"}, {"new", "New"}, {"place/there", "place/new"}, {"place/there", "there"},
-                                           {"loop", "loop"}, {"missing/a", "missing/a"}};
+    static const char *const same[][2] = {{"new", "new"},        {"new", "./new"},        {"place/new", "way/new"},
+                                          {"way/../new", "new"}, {"place/there", "twin"}, {"soft", "way/there"},
+                                          {"soft", "twin"},      {"place/link", "later"}, {"way/link", "./later"}};
+    static const char *const other[][2] = {{"new", "place/new"},     {"new", "New"},   {"place/there", "place/new"},
+                                           {"place/there", "there"}, {"loop", "loop"}, {"missing/a", "missing/a"}};
     for (size_t i = 0; i < sizeof same / sizeof same[0]; i++)
         if (!base_file_is_same(same[i][0], same[i][1]) || !base_file_is_same(same[i][1], same[i][0]))
             fail_msg("%s is %s", same[i][0], same[i][1]);
@@ -302,7 +319,8 @@ static void one_file_or_two(void **state)
     assert_true(base_outputs_add(&out, "preview", "way/new", &err) == 0 && base_outputs_add(&out, "map", "new", &err) == 0);
     says(base_outputs_add(&out, "report", "place/new", &err), BASE_EINVAL, &err,
          "--report place/new: the same file as --preview way/new, one of the two would be lost");
-    says(base_outputs_add(&out, "report", "missing/x", &err), BASE_EIO, &err, "missing/x: cannot write there: No such file or directory");
+    says(base_outputs_add(&out, "report", "missing/x", &err), BASE_EIO, &err,
+         "missing/x: cannot write there: No such file or directory");
     assert_int_equal(out.count, 2);
 
     struct base_inputs in = BASE_INPUTS_EMPTY;
@@ -311,13 +329,15 @@ static void one_file_or_two(void **state)
     says(base_outputs_protect(&out, &in, &err), BASE_EINVAL, &err, "soft: this is an input (twin), it would be overwritten");
     static const char *const names[] = {"a.csv", "there", NULL};
     assert_int_equal(base_outputs_protect_folder("place", NULL, &in, &err), 0);
-    says(base_outputs_protect_folder("way", names, &in, &err), BASE_EINVAL, &err, "way/there: this is an input (twin), it would be overwritten");
+    says(base_outputs_protect_folder("way", names, &in, &err), BASE_EINVAL, &err,
+         "way/there: this is an input (twin), it would be overwritten");
     base_inputs_release(&in);
     struct base_inputs data = BASE_INPUTS_EMPTY; /* a folder of them */
     assert_int_equal(base_inputs_add(&data, "place", &err), 0);
     says(base_outputs_protect(&out, &data, &err), BASE_EINVAL, &err, "way/new: this is inside its data, place");
     mkdir("place/deep", 0777);
-    static const char *const in_place[] = {"place", "way/", "place/deep", "way/deep//", "place/none", "place/none/", "./place/deep/more"};
+    static const char *const in_place[] = {"place",      "way/",        "place/deep",       "way/deep//",
+                                           "place/none", "place/none/", "./place/deep/more"};
     for (size_t i = 0; i < sizeof in_place / sizeof in_place[0]; i++)
         if (base_outputs_protect_folder(in_place[i], NULL, &data, &err) != BASE_EINVAL && i < 6)
             fail_msg("%s is in place", in_place[i]);
@@ -331,8 +351,10 @@ static void one_file_or_two(void **state)
     put("nothing", "");
     assert_true(base_file_check_kind(NULL, &kind, &err) == 0 && base_file_check_kind("none", &kind, &err) == 0);
     assert_true(base_file_check_kind("diary", &kind, &err) == 0 && base_file_check_kind("nothing", &kind, &err) == 0);
-    says(base_file_check_kind("short", &kind, &err), BASE_EINVAL, &err, "short: not a diary, it would be replaced; choose another name");
-    says(base_file_check_kind("soft", &kind, &err), BASE_EINVAL, &err, "soft: not a diary, it would be replaced; choose another name");
+    says(base_file_check_kind("short", &kind, &err), BASE_EINVAL, &err,
+         "short: not a diary, it would be replaced; choose another name");
+    says(base_file_check_kind("soft", &kind, &err), BASE_EINVAL, &err,
+         "soft: not a diary, it would be replaced; choose another name");
 }
 
 /* --- inputs -------------------------------------------------------------------------------------------------------------- */
@@ -365,7 +387,8 @@ static void inputs_are_a_set(void **state)
     put("b", big);
     put("a", "first");
     assert_true(base_inputs_add(&in, "b", &err) == 0 && base_inputs_add(&in, "a", &err) == 0);
-    uint32_t expected = (uint32_t)crc32(crc32(0, (const unsigned char *)"first", 5), (const unsigned char *)big, sizeof big - 1);
+    uint32_t expected =
+        (uint32_t)crc32(crc32(0, (const unsigned char *)"first", 5), (const unsigned char *)big, sizeof big - 1);
     assert_int_equal(base_inputs_crc32(&in, &crc, &err), 0);
     assert_int_equal(crc, expected);
     assert_int_equal(base_inputs_protect(&in, NULL, &err), 0);
@@ -436,8 +459,9 @@ static void json(void **state)
     base_json_item(root, "i", cJSON_CreateNumber(7), &failed);
     assert_int_equal(failed, 0);
     assert_int_equal(base_json_write("j", root, 0, &err), 0);
-    assert_string_equal(get("j"), "{\n\t\"a\":\t0.25,\n\t\"n\":\tnull,\n\t\"t\":\t\"l?t \\\"q\\\"\",\n\t\"no\":\tnull,\n\t\"y\":\ttrue,\n"
-                                  "\t\"l\":\t[null, {\n\t\t\t\"x\":\t3\n\t\t}],\n\t\"i\":\t7\n}\n");
+    assert_string_equal(
+        get("j"), "{\n\t\"a\":\t0.25,\n\t\"n\":\tnull,\n\t\"t\":\t\"l?t \\\"q\\\"\",\n\t\"no\":\tnull,\n\t\"y\":\ttrue,\n"
+                  "\t\"l\":\t[null, {\n\t\t\t\"x\":\t3\n\t\t}],\n\t\"i\":\t7\n}\n");
     says(base_json_write("j", root, 1, &err), BASE_ENOMEM, &err, "out of memory (j)");
     assert_null(base_json_object(NULL, "x", &failed)); /* into what could not be made */
     assert_int_equal(failed, 1);
@@ -455,15 +479,28 @@ static void small_floats(void **state)
     static const struct {
         float x;
         uint16_t bits;
-    } cases[] = {{0, 0}, {-0.0f, 0x8000}, {1, 0x3f80}, {-2.5f, 0xc020}, {1.00390625f, 0x3f80}, {1.01171875f, 0x3f82}, {1.0039064f, 0x3f81},
-                 {INFINITY, 0x7f80}, {-INFINITY, 0xff80}, {3.4028235e38f, 0x7f80}, {3.38e38f, 0x7f7e}};
+    } cases[] = {{0, 0},
+                 {-0.0f, 0x8000},
+                 {1, 0x3f80},
+                 {-2.5f, 0xc020},
+                 {1.00390625f, 0x3f80},
+                 {1.01171875f, 0x3f82},
+                 {1.0039064f, 0x3f81},
+                 {INFINITY, 0x7f80},
+                 {-INFINITY, 0xff80},
+                 {3.4028235e38f, 0x7f80},
+                 {3.38e38f, 0x7f7e}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++)
         assert_int_equal(base_f32_to_bf16(cases[i].x), cases[i].bits);
     assert_true(base_bf16_to_f32(0x4049) == 3.140625f && isnan(base_bf16_to_f32(base_f32_to_bf16(NAN))));
-    assert_true(base_f16_to_f32(0x7c00) == INFINITY && base_f16_to_f32(0xfc00) == -INFINITY && isnan(base_f16_to_f32(0x7c01)));
-    assert_true(base_f16_to_f32(0x8001) == -0x1p-24f && base_f16_to_f32(0x0400) == 0x1p-14f && signbit(base_f16_to_f32(0x8000)));
-    assert_true(base_f64_to_f16((double)NAN) == 0x7e00 && base_f64_to_f16(-(double)INFINITY) == 0xfc00 && base_f64_to_f16(0x1p-25) == 0);
-    assert_true(base_f64_to_f16(0x1.8p-24) == 2 && base_f64_to_f16(0x1.ff8p-15) == 0x3ff && base_f64_to_f16(0x1.ffcp-15) == 0x400);
+    assert_true(base_f16_to_f32(0x7c00) == INFINITY && base_f16_to_f32(0xfc00) == -INFINITY &&
+                isnan(base_f16_to_f32(0x7c01)));
+    assert_true(base_f16_to_f32(0x8001) == -0x1p-24f && base_f16_to_f32(0x0400) == 0x1p-14f &&
+                signbit(base_f16_to_f32(0x8000)));
+    assert_true(base_f64_to_f16((double)NAN) == 0x7e00 && base_f64_to_f16(-(double)INFINITY) == 0xfc00 &&
+                base_f64_to_f16(0x1p-25) == 0);
+    assert_true(base_f64_to_f16(0x1.8p-24) == 2 && base_f64_to_f16(0x1.ff8p-15) == 0x3ff &&
+                base_f64_to_f16(0x1.ffcp-15) == 0x400);
     assert_true(base_f32_to_f16(1.0f) == 0x3c00 && base_f64_to_f16(65519.99) == 0x7bff && base_f64_to_f16(-65520) == 0xfc00);
     static const uint8_t bytes[9] = {1, 2, 3, 0x84, 5, 6, 7, 0x88, 9};
     uint8_t out[8];
@@ -472,9 +509,12 @@ static void small_floats(void **state)
     assert_memory_equal(out, bytes, 4);
     base_put_u64(out, 0x8807060584030201u);
     assert_memory_equal(out, bytes, 8);
-    assert_true(base_luminance(1, 0, 0) == 0.2126729 && base_luminance(0, 1, 0) == 0.7151522 && base_luminance(0, 0, 1) == 0.0721750);
-    assert_true(fabs(base_srgb_oetf(0.0031308) - 0.04045) < 1e-5 && fabs(base_srgb_oetf(0.5) - 0.7353570) < 1e-6 && fabs(base_srgb_oetf(0.001) - 0.01292) < 1e-15);
-    assert_true(fabs(base_srgb_eotf(0.5) - 0.2140411) < 1e-6 && fabs(base_srgb_eotf(0.01292) - 0.001) < 1e-15 && base_srgb_eotf(1) == 1);
+    assert_true(base_luminance(1, 0, 0) == 0.2126729 && base_luminance(0, 1, 0) == 0.7151522 &&
+                base_luminance(0, 0, 1) == 0.0721750);
+    assert_true(fabs(base_srgb_oetf(0.0031308) - 0.04045) < 1e-5 && fabs(base_srgb_oetf(0.5) - 0.7353570) < 1e-6 &&
+                fabs(base_srgb_oetf(0.001) - 0.01292) < 1e-15);
+    assert_true(fabs(base_srgb_eotf(0.5) - 0.2140411) < 1e-6 && fabs(base_srgb_eotf(0.01292) - 0.001) < 1e-15 &&
+                base_srgb_eotf(1) == 1);
 }
 
 static void pictures(void **state)
@@ -516,7 +556,8 @@ static void what_is_said_of_processes(void **state)
          "rank 1 has b=3, but rank 0 has b=2: give all hosts the same files");
     says(base_peers_differ(&peers, 2, "a=1\nbc=3", "a=1\nb=3", &err), BASE_EINVAL, &err,
          "rank 2 has bc=3, but rank 0 has b=3: give all hosts the same files");
-    says(base_peers_differ(&peers, 2, "a=1\nb=3\n", "a=1\n", &err), BASE_EINVAL, &err, "rank 2 has other settings than rank 0");
+    says(base_peers_differ(&peers, 2, "a=1\nb=3\n", "a=1\n", &err), BASE_EINVAL, &err,
+         "rank 2 has other settings than rank 0");
     long processors = sysconf(_SC_NPROCESSORS_ONLN);
     int available = base_threads_available();
     assert_int_equal(base_peers_threads(NULL), available);
@@ -531,12 +572,18 @@ static void what_is_said_of_processes(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(whole_files),           cmocka_unit_test(what_cannot_be_written),
-        cmocka_unit_test(outputs_appear_when_they_are_whole), cmocka_unit_test(a_failed_write_keeps_the_old_file),
-        cmocka_unit_test(leftovers_of_the_dead_are_swept),    cmocka_unit_test(inside_or_not),
-        cmocka_unit_test(inputs_are_a_set),      cmocka_unit_test(one_process_holds_a_folder),
-        cmocka_unit_test(json),                  cmocka_unit_test(small_floats),
-        cmocka_unit_test(pictures),              cmocka_unit_test(what_is_said_of_processes),
+        cmocka_unit_test(whole_files),
+        cmocka_unit_test(what_cannot_be_written),
+        cmocka_unit_test(outputs_appear_when_they_are_whole),
+        cmocka_unit_test(a_failed_write_keeps_the_old_file),
+        cmocka_unit_test(leftovers_of_the_dead_are_swept),
+        cmocka_unit_test(inside_or_not),
+        cmocka_unit_test(inputs_are_a_set),
+        cmocka_unit_test(one_process_holds_a_folder),
+        cmocka_unit_test(json),
+        cmocka_unit_test(small_floats),
+        cmocka_unit_test(pictures),
+        cmocka_unit_test(what_is_said_of_processes),
         cmocka_unit_test(one_file_or_two),
     };
     return cmocka_run_group_tests_name("files", tests, setup, teardown);

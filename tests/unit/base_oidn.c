@@ -89,10 +89,7 @@ static void failures(void **unused)
     }
 }
 
-static int third_time(void *data)
-{
-    return ++*(int *)data == 3;
-}
+static int third_time(void *data) { return ++*(int *)data == 3; }
 
 static void cancelling(void **unused)
 {
@@ -219,7 +216,7 @@ int main(void)
     if (api_folder(stub, sizeof stub, "../oidn-stub") != 0)
         return 1;
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(finding),     cmocka_unit_test(failures), cmocka_unit_test(cancelling),
+        cmocka_unit_test(finding),     cmocka_unit_test(failures),     cmocka_unit_test(cancelling),
         cmocka_unit_test(bad_numbers), cmocka_unit_test(real_library),
     };
     return cmocka_run_group_tests_name("oidn", tests, NULL, NULL);

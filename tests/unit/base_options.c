@@ -44,8 +44,12 @@ static const struct base_option list[] = {
     {"param", 'p', "KEY=VALUE", .set = add_pair, .help = "something else"},
     {"secret", 0, NULL, BASE_TO(struct settings, json), .hidden = 1, .help = "not listed"},
     {0}};
-static const struct base_options options = {.doc = "Tries.\vAnd ends.", .args_doc = "A [B]", .list = list, .args_min = 1,
-                                            .args_max = 2, .args = offsetof(struct settings, files),
+static const struct base_options options = {.doc = "Tries.\vAnd ends.",
+                                            .args_doc = "A [B]",
+                                            .list = list,
+                                            .args_min = 1,
+                                            .args_max = 2,
+                                            .args = offsetof(struct settings, files),
                                             .arg_count = offsetof(struct settings, file_count)};
 
 /* Splits the line at spaces. */
@@ -70,9 +74,12 @@ static void values(void **state)
     (void)state;
     struct settings s;
     struct base_err err;
-    assert_int_equal(parse("a -w 3 --seed=4294967295 b --spp 1000000000000 --ratio 1.5 -k bf16 -j --explain -o x.png -p a=1 -pb=2",
-                           &s, &err), 0);
-    assert_true(s.window == 3 && s.seed == UINT32_MAX && s.spp == 1000000000000u && s.ratio == 1.5 && s.kind == 2 && s.json == 1);
+    assert_int_equal(
+        parse("a -w 3 --seed=4294967295 b --spp 1000000000000 --ratio 1.5 -k bf16 -j --explain -o x.png -p a=1 -pb=2", &s,
+              &err),
+        0);
+    assert_true(s.window == 3 && s.seed == UINT32_MAX && s.spp == 1000000000000u && s.ratio == 1.5 && s.kind == 2 &&
+                s.json == 1);
     assert_true(s.action == 7 && s.pairs == 2 && s.file_count == 2);
     assert_string_equal(s.files[0], "a");
     assert_string_equal(s.files[1], "b");
@@ -124,7 +131,8 @@ static void refusals(void **state)
 static void own_letter(void **state)
 {
     (void)state;
-    static const struct base_option own[] = {{"views", 'V', "N", BASE_TO(struct settings, window), 0, 9, .help = "views"}, {0}};
+    static const struct base_option own[] = {{"views", 'V', "N", BASE_TO(struct settings, window), 0, 9, .help = "views"},
+                                             {0}};
     static const struct base_options with_own = {.doc = "", .list = own};
     char *argv[] = {(char[]){"try"}, (char[]){"-V4"}, NULL};
     struct settings s = {0};
@@ -165,8 +173,8 @@ static void help_and_version(void **state)
     printed("-V", text, sizeof text);
     assert_string_equal(text, "try (Lull) " BASE_VERSION "\n");
     printed("-j --help --nothing", text, sizeof text);
-    static const char *const parts[] = {"Usage: try this [OPTION...] A [B]", "Tries.", "All kinds:", "-w, --window=N",
-                                        "--kind=f32|f16|bf16", "And ends."};
+    static const char *const parts[] = {
+        "Usage: try this [OPTION...] A [B]", "Tries.", "All kinds:", "-w, --window=N", "--kind=f32|f16|bf16", "And ends."};
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
         assert_non_null(strstr(text, parts[i]));
     assert_null(strstr(text, "--secret"));

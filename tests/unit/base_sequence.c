@@ -90,7 +90,8 @@ static void statistics(void **state)
     double scratch[4];
     struct seq_stat s[SEQ_STATISTICS];
     seq_statistics(mean, half, d, m2, 4, 5, scratch, s);
-    static const char *const names[SEQ_STATISTICS] = {"dammertz", "half_unsettled", "rse", "rse_unsettled", "tail999", "gini"};
+    static const char *const names[SEQ_STATISTICS] = {"dammertz",      "half_unsettled", "rse",
+                                                      "rse_unsettled", "tail999",        "gini"};
     for (int i = 0; i < SEQ_STATISTICS; i++)
         assert_string_equal(s[i].name, names[i]);
     assert_near(s[SEQ_DAMMERTZ].value, 0.5 / 2.0 / 4.0, 1e-12);
@@ -142,9 +143,15 @@ static void build(struct seq_builder *w)
     assert_int_equal(seq_builder_init(w, W, H, 400, 200, 9, 77, NULL), 0);
     for (uint32_t i = 0; i < 4; i++) {
         fill((int)i);
-        struct seq_frame f = {.spp = i < 3 ? 20u << i : 4096u, .half_spp = 10, .is_reference = i == 3, .full = i == 1,
-                                  .display = i == 2 ? NULL : display, .mean = mean, .half = half,
-                              .stats = stats, .n_stats = 2};
+        struct seq_frame f = {.spp = i < 3 ? 20u << i : 4096u,
+                              .half_spp = 10,
+                              .is_reference = i == 3,
+                              .full = i == 1,
+                              .display = i == 2 ? NULL : display,
+                              .mean = mean,
+                              .half = half,
+                              .stats = stats,
+                              .n_stats = 2};
         assert_int_equal(seq_builder_add(w, &f, NULL), 0);
     }
 }
@@ -201,7 +208,8 @@ static void round_trip(void **state)
         assert_int_equal(bytes[3 * 5 + 2], display[2 * P + 5]);
         seq_mean(&b, r, floats, NULL);
         for (int k = 0; k < 3 * P; k++)
-            assert_near((double)floats[k], mean[k], i == 0 || i == 2 ? (display[k] == 255 ? 0.022 * mean[k] : 0.0006) : 0.0005);
+            assert_near((double)floats[k], mean[k],
+                        i == 0 || i == 2 ? (display[k] == 255 ? 0.022 * mean[k] : 0.0006) : 0.0005);
         seq_half_luminance(&b, r, floats, NULL);
         for (int k = 0; k < P; k++) {
             double y = base_luminance(half[k], half[P + k], half[2 * P + k]);
@@ -294,7 +302,7 @@ static void limits_of_blocks(void **state)
         {36, 0, "a block of 37x21 pixels with 0 images"},
         {36, 4097, "a block of 37x21 pixels with 4097 images"},
         {36, (uint32_t)((size - FIRST) / SEQ_RECORD_HEADER) + 1, NULL}, /* told below: it depends on zlib */
-        {36, 5, "header of image 3 makes no sense"}, /* a reference that is not the last */
+        {36, 5, "header of image 3 makes no sense"},                    /* a reference that is not the last */
         {36, 3, "bytes after the last image"},
         {24, 0xfffffff0u, NULL},
         {32, 77, NULL},
@@ -343,7 +351,9 @@ static void limits_of_blocks(void **state)
     static const struct {
         size_t at;
         const char *words;
-    } damaged[] = {{40, "the header is damaged (CRC)"}, {FIRST + 8, "header of image 0 is damaged (CRC)"}, {PLANE + 20, "image at 20 spp is damaged (CRC)"}};
+    } damaged[] = {{40, "the header is damaged (CRC)"},
+                   {FIRST + 8, "header of image 0 is damaged (CRC)"},
+                   {PLANE + 20, "image at 20 spp is damaged (CRC)"}};
     for (int i = 0; i < 3; i++) {
         bytes[damaged[i].at] ^= 1;
         expect_block(bytes, size, damaged[i].words);
@@ -374,8 +384,11 @@ static void builder_limits(void **state)
     }
     assert_int_equal(seq_builder_init(&w, W, H, 0, 0, 0, 0, &err), 0);
     static const struct seq_stat stats[SEQ_MAX_STATS + 1];
-    const struct seq_frame frames[] = {{.spp = 0, .display = display}, {.spp = 7}, {.spp = 7, .display = display, .stats = stats, .n_stats = SEQ_MAX_STATS + 1},
-                                       {.spp = 7, .display = display, .stats = stats, .n_stats = SEQ_MAX_STATS}, {.spp = 8, .mean = mean}};
+    const struct seq_frame frames[] = {{.spp = 0, .display = display},
+                                       {.spp = 7},
+                                       {.spp = 7, .display = display, .stats = stats, .n_stats = SEQ_MAX_STATS + 1},
+                                       {.spp = 7, .display = display, .stats = stats, .n_stats = SEQ_MAX_STATS},
+                                       {.spp = 8, .mean = mean}};
     for (int i = 0; i < 5; i++)
         assert_int_equal(seq_builder_add(&w, &frames[i], &err), i < 3 ? BASE_EINVAL : 0);
     assert_string_equal(err.text, "image at 7 spp cannot be added to the sequence");
@@ -398,9 +411,19 @@ static void manifest(void **state)
 {
     (void)state;
     uint32_t levels[] = {20, 40, 80, 160};
-    struct seq_manifest_block entry = {.id = 9, .x0 = 400, .y0 = 200, .x1 = 400 + W, .y1 = 200 + H, .file = "block-00009.lseq"};
-    struct seq_manifest m = {.scene = "a \"scene\"", .width = 800, .height = 600, .block = 200, .reference_spp = 4096,
-                             .reference_independent = 1, .n_levels = 3, .levels = levels, .n_blocks = 1, .blocks = &entry}, back;
+    struct seq_manifest_block entry = {
+        .id = 9, .x0 = 400, .y0 = 200, .x1 = 400 + W, .y1 = 200 + H, .file = "block-00009.lseq"};
+    struct seq_manifest m = {.scene = "a \"scene\"",
+                             .width = 800,
+                             .height = 600,
+                             .block = 200,
+                             .reference_spp = 4096,
+                             .reference_independent = 1,
+                             .n_levels = 3,
+                             .levels = levels,
+                             .n_blocks = 1,
+                             .blocks = &entry},
+                        back;
     struct seq_builder w;
     struct seq_block b;
     struct base_err err = {0};
@@ -424,7 +447,8 @@ static void manifest(void **state)
     back.blocks[0].bytes++;
     expect_unread(&back, "not the file that the manifest lists (size or CRC)");
     back.blocks[0].bytes--;
-    uint32_t *const places[] = {&back.blocks[0].x1, &back.blocks[0].y1, &back.blocks[0].x0, &back.blocks[0].y0, &back.blocks[0].id};
+    uint32_t *const places[] = {&back.blocks[0].x1, &back.blocks[0].y1, &back.blocks[0].x0, &back.blocks[0].y0,
+                                &back.blocks[0].id};
     for (int i = 0; i < 5; i++) {
         ++*places[i];
         back.blocks[0].x1 += i == 2; /* the same size, elsewhere */
@@ -447,10 +471,24 @@ static void differences(void **state)
 {
     (void)state;
     uint32_t levels[] = {20, 40}, other[] = {20, 41};
-    const struct seq_manifest m = {.scene = "s", .source = "a/s.pbrt", .source_crc32 = 7, .inputs_crc32 = 8, .camera = "view0", .renderer = "r",
-                                   .has_look_at = 1, .look_at = {0.1, 2, 3, 4, 5, 6, 7, 8, 1.0 / 3}, .fov_deg = 33.3, .width = 64,
-                                   .height = 48, .block = 16, .seed = 1, .reference_seed = 2, .reference_spp = 9,
-                                   .reference_independent = 1, .n_levels = 2, .levels = levels};
+    const struct seq_manifest m = {.scene = "s",
+                                   .source = "a/s.pbrt",
+                                   .source_crc32 = 7,
+                                   .inputs_crc32 = 8,
+                                   .camera = "view0",
+                                   .renderer = "r",
+                                   .has_look_at = 1,
+                                   .look_at = {0.1, 2, 3, 4, 5, 6, 7, 8, 1.0 / 3},
+                                   .fov_deg = 33.3,
+                                   .width = 64,
+                                   .height = 48,
+                                   .block = 16,
+                                   .seed = 1,
+                                   .reference_seed = 2,
+                                   .reference_spp = 9,
+                                   .reference_independent = 1,
+                                   .n_levels = 2,
+                                   .levels = levels};
     struct seq_manifest back;
     struct base_err err = {0};
     assert_int_equal(seq_manifest_write(dir, &m, &err), 0);
@@ -463,8 +501,8 @@ static void differences(void **state)
     n.inputs_crc32 = 0; /* recorded before it was noted */
     assert_null(seq_manifest_difference(&m, &n));
 #define DIFFERS(change, member) \
-    n = m;                      \
-    change;                     \
+    n = m; \
+    change; \
     assert_string_equal(seq_manifest_difference(&m, &n), member)
     DIFFERS(n.scene[0] = 't', "scene");
     DIFFERS(n.source_crc32++, "source_crc32");
@@ -500,8 +538,9 @@ static void expect_text(const char *name, const char *expected)
 /* Member by member: what lies between them is anything. */
 static int same_block(const struct seq_manifest_block *a, const struct seq_manifest_block *b)
 {
-    return a->id == b->id && a->x0 == b->x0 && a->y0 == b->y0 && a->x1 == b->x1 && a->y1 == b->y1 && strcmp(a->file, b->file) == 0 &&
-           a->bytes == b->bytes && a->crc32 == b->crc32 && a->seconds == b->seconds && a->dropped == b->dropped;
+    return a->id == b->id && a->x0 == b->x0 && a->y0 == b->y0 && a->x1 == b->x1 && a->y1 == b->y1 &&
+           strcmp(a->file, b->file) == 0 && a->bytes == b->bytes && a->crc32 == b->crc32 && a->seconds == b->seconds &&
+           a->dropped == b->dropped;
 }
 
 static void manifests_word_for_word(void **state)
@@ -509,16 +548,39 @@ static void manifests_word_for_word(void **state)
     (void)state;
     uint32_t levels[] = {20, 40};
     struct base_err err = {0};
-    struct seq_manifest_block list[2] = {{.id = 3, .x0 = 16, .y0 = 0, .x1 = 32, .y1 = 16, .file = "block-00003.lseq", .bytes = 1234, .crc32 = 0xabc},
-                                         {.id = 4, .x0 = 32, .y0 = 1, .x1 = 40, .y1 = 9, .file = "f", .bytes = 5, .crc32 = 0xfedcba98u, .seconds = 1.5,
-                                          .dropped = 17}};
-    struct seq_manifest m = {.scene = "s", .source = "a/s.pbrt", .camera = "view0", .renderer = "r", .width = 64, .height = 48, .block = 16,
-                             .seed = 1, .reference_seed = 2, .reference_spp = 9, .reference_independent = 1, .n_levels = 2, .levels = levels},
+    struct seq_manifest_block list[2] = {
+        {.id = 3, .x0 = 16, .y0 = 0, .x1 = 32, .y1 = 16, .file = "block-00003.lseq", .bytes = 1234, .crc32 = 0xabc},
+        {.id = 4,
+         .x0 = 32,
+         .y0 = 1,
+         .x1 = 40,
+         .y1 = 9,
+         .file = "f",
+         .bytes = 5,
+         .crc32 = 0xfedcba98u,
+         .seconds = 1.5,
+         .dropped = 17}};
+    struct seq_manifest m = {.scene = "s",
+                             .source = "a/s.pbrt",
+                             .camera = "view0",
+                             .renderer = "r",
+                             .width = 64,
+                             .height = 48,
+                             .block = 16,
+                             .seed = 1,
+                             .reference_seed = 2,
+                             .reference_spp = 9,
+                             .reference_independent = 1,
+                             .n_levels = 2,
+                             .levels = levels},
                         back;
     assert_int_equal(seq_manifest_write(dir, &m, &err), 0);
-    expect_text("manifest.json", "{\n\t\"format\":\t\"lull-sequence\",\n\t\"version\":\t1,\n\t\"scene\":\t\"s\",\n\t\"source\":\t\"a/s.pbrt\",\n"
-                                 "\t\"camera\":\t\"view0\",\n\t\"renderer\":\t\"r\",\n\t\"width\":\t64,\n\t\"height\":\t48,\n\t\"block\":\t16,\n"
-                                 "\t\"seed\":\t1,\n\t\"reference_seed\":\t2,\n\t\"reference_spp\":\t9,\n\t\"levels\":\t[20, 40],\n\t\"blocks\":\t[]\n}\n");
+    expect_text(
+        "manifest.json",
+        "{\n\t\"format\":\t\"lull-sequence\",\n\t\"version\":\t1,\n\t\"scene\":\t\"s\",\n\t\"source\":\t\"a/s.pbrt\",\n"
+        "\t\"camera\":\t\"view0\",\n\t\"renderer\":\t\"r\",\n\t\"width\":\t64,\n\t\"height\":\t48,\n\t\"block\":\t16,\n"
+        "\t\"seed\":\t1,\n\t\"reference_seed\":\t2,\n\t\"reference_spp\":\t9,\n\t\"levels\":\t[20, "
+        "40],\n\t\"blocks\":\t[]\n}\n");
     m.source_crc32 = 0x12;
     m.inputs_crc32 = 0x345;
     m.has_look_at = 1;
@@ -529,15 +591,22 @@ static void manifests_word_for_word(void **state)
     m.n_blocks = 2;
     m.blocks = list;
     assert_int_equal(seq_manifest_write(dir, &m, &err), 0);
-    expect_text("manifest.json",
-                "{\n\t\"format\":\t\"lull-sequence\",\n\t\"version\":\t1,\n\t\"scene\":\t\"s\",\n\t\"source\":\t\"a/s.pbrt\",\n"
-                "\t\"source_crc32\":\t\"00000012\",\n\t\"inputs_crc32\":\t\"00000345\",\n\t\"camera\":\t\"view0\",\n"
-                "\t\"look_at\":\t[0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5, 8.5],\n\t\"fov\":\t33.25,\n\t\"renderer\":\t\"r\",\n\t\"width\":\t64,\n"
-                "\t\"height\":\t48,\n\t\"block\":\t16,\n\t\"seed\":\t1,\n\t\"reference_seed\":\t2,\n\t\"reference_spp\":\t9,\n"
-                "\t\"reference_independent\":\tfalse,\n\t\"levels\":\t[20, 40],\n\t\"blocks\":\t[{\n\t\t\t\"id\":\t3,\n\t\t\t\"x0\":\t16,\n\t\t\t\"y0\":\t0,\n"
-                "\t\t\t\"x1\":\t32,\n\t\t\t\"y1\":\t16,\n\t\t\t\"file\":\t\"block-00003.lseq\",\n\t\t\t\"bytes\":\t1234,\n\t\t\t\"crc32\":\t\"00000abc\"\n"
-                "\t\t}, {\n\t\t\t\"id\":\t4,\n\t\t\t\"x0\":\t32,\n\t\t\t\"y0\":\t1,\n\t\t\t\"x1\":\t40,\n\t\t\t\"y1\":\t9,\n\t\t\t\"file\":\t\"f\",\n"
-                "\t\t\t\"bytes\":\t5,\n\t\t\t\"crc32\":\t\"fedcba98\",\n\t\t\t\"seconds\":\t1.5,\n\t\t\t\"dropped\":\t17\n\t\t}]\n}\n");
+    expect_text(
+        "manifest.json",
+        "{\n\t\"format\":\t\"lull-sequence\",\n\t\"version\":\t1,\n\t\"scene\":\t\"s\",\n\t\"source\":\t\"a/s.pbrt\",\n"
+        "\t\"source_crc32\":\t\"00000012\",\n\t\"inputs_crc32\":\t\"00000345\",\n\t\"camera\":\t\"view0\",\n"
+        "\t\"look_at\":\t[0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5, "
+        "8.5],\n\t\"fov\":\t33.25,\n\t\"renderer\":\t\"r\",\n\t\"width\":\t64,\n"
+        "\t\"height\":\t48,\n\t\"block\":\t16,\n\t\"seed\":\t1,\n\t\"reference_seed\":\t2,\n\t\"reference_spp\":\t9,\n"
+        "\t\"reference_independent\":\tfalse,\n\t\"levels\":\t[20, "
+        "40],\n\t\"blocks\":\t[{\n\t\t\t\"id\":\t3,\n\t\t\t\"x0\":\t16,\n\t\t\t\"y0\":\t0,\n"
+        "\t\t\t\"x1\":\t32,\n\t\t\t\"y1\":\t16,\n\t\t\t\"file\":\t\"block-00003.lseq\",\n\t\t\t\"bytes\":\t1234,"
+        "\n\t\t\t\"crc32\":\t\"00000abc\"\n"
+        "\t\t}, "
+        "{\n\t\t\t\"id\":\t4,\n\t\t\t\"x0\":\t32,\n\t\t\t\"y0\":\t1,\n\t\t\t\"x1\":\t40,\n\t\t\t\"y1\":\t9,\n\t\t\t\"file\":"
+        "\t\"f\",\n"
+        "\t\t\t\"bytes\":\t5,\n\t\t\t\"crc32\":\t\"fedcba98\",\n\t\t\t\"seconds\":\t1.5,\n\t\t\t\"dropped\":\t17\n\t\t}]\n}"
+        "\n");
     assert_int_equal(seq_manifest_read(dir, &back, &err), 0);
     assert_null(seq_manifest_difference(&m, &back));
     assert_string_equal(back.source, "a/s.pbrt");
@@ -550,9 +619,10 @@ static void manifests_word_for_word(void **state)
 static void limits_of_manifests(void **state)
 {
     (void)state;
-    static const char good[] = "{\"format\":\"lull-sequence\",\"version\":1,\"scene\":\"s\",\"width\":1048576,\"height\":1048576,\"block\":4096,"
-                               "\"reference_spp\":2147483647,\"levels\":[1,2147483647],\"blocks\":[{\"id\":4294967295,\"x0\":0,\"y0\":0,\"x1\":1,"
-                               "\"y1\":1048576,\"file\":\"x\",\"bytes\":1073741824,\"crc32\":\"0000000f\",\"dropped\":0}]}";
+    static const char good[] =
+        "{\"format\":\"lull-sequence\",\"version\":1,\"scene\":\"s\",\"width\":1048576,\"height\":1048576,\"block\":4096,"
+        "\"reference_spp\":2147483647,\"levels\":[1,2147483647],\"blocks\":[{\"id\":4294967295,\"x0\":0,\"y0\":0,\"x1\":1,"
+        "\"y1\":1048576,\"file\":\"x\",\"bytes\":1073741824,\"crc32\":\"0000000f\",\"dropped\":0}]}";
     static const struct {
         const char *from, *to, *words;
     } cases[] = {
@@ -617,14 +687,22 @@ static void bad_manifests(void **state)
 {
     (void)state;
     static const char *const bad[] = {
-        "", "{}", "[1]", "{\"format\":\"lull-sequence\"}",
-        "{\"format\":\"lull-sequence\",\"version\":2,\"scene\":\"s\",\"width\":8,\"height\":8,\"block\":8,\"levels\":[1],\"blocks\":[]}",
+        "",
+        "{}",
+        "[1]",
+        "{\"format\":\"lull-sequence\"}",
+        "{\"format\":\"lull-sequence\",\"version\":2,\"scene\":\"s\",\"width\":8,\"height\":8,\"block\":8,\"levels\":[1],"
+        "\"blocks\":[]}",
         "{\"format\":\"lull-sequence\",\"version\":1,\"width\":8,\"height\":8,\"block\":8,\"levels\":[1],\"blocks\":[]}",
-        "{\"format\":\"lull-sequence\",\"version\":1,\"scene\":\"s\",\"width\":8,\"height\":8,\"block\":8,\"levels\":[],\"blocks\":[]}",
-        "{\"format\":\"lull-sequence\",\"version\":1,\"scene\":\"s\",\"width\":8,\"height\":8,\"block\":8,\"levels\":[2,2],\"blocks\":[]}",
-        "{\"format\":\"lull-sequence\",\"version\":1,\"scene\":\"s\",\"width\":8,\"height\":8,\"block\":8,\"levels\":[2],\"blocks\":"
+        "{\"format\":\"lull-sequence\",\"version\":1,\"scene\":\"s\",\"width\":8,\"height\":8,\"block\":8,\"levels\":[],"
+        "\"blocks\":[]}",
+        "{\"format\":\"lull-sequence\",\"version\":1,\"scene\":\"s\",\"width\":8,\"height\":8,\"block\":8,\"levels\":[2,2],"
+        "\"blocks\":[]}",
+        "{\"format\":\"lull-sequence\",\"version\":1,\"scene\":\"s\",\"width\":8,\"height\":8,\"block\":8,\"levels\":[2],"
+        "\"blocks\":"
         "[{\"id\":0,\"x0\":0,\"y0\":0,\"x1\":8,\"y1\":8,\"file\":\"../x\",\"bytes\":9,\"crc32\":\"00000000\"}]}",
-        "{\"format\":\"lull-sequence\",\"version\":1,\"scene\":\"s\",\"width\":8,\"height\":8,\"block\":8,\"levels\":[2],\"blocks\":"
+        "{\"format\":\"lull-sequence\",\"version\":1,\"scene\":\"s\",\"width\":8,\"height\":8,\"block\":8,\"levels\":[2],"
+        "\"blocks\":"
         "[{\"id\":0,\"x0\":0,\"y0\":0,\"x1\":9,\"y1\":8,\"file\":\"x\",\"bytes\":9,\"crc32\":\"00000000\"}]}",
     };
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
@@ -642,11 +720,13 @@ static void a_block_is_listed_once(void **state)
         struct seq_manifest m;
         struct base_err err = {0};
         char text[512];
-        int n = snprintf(text, sizeof text,
-                         "{\"format\":\"lull-sequence\",\"version\":1,\"scene\":\"s\",\"width\":8,\"height\":8,\"block\":8,\"levels\":[2],"
-                         "\"blocks\":[{\"id\":2,\"x0\":0,\"y0\":0,\"x1\":8,\"y1\":8,\"file\":\"x\",\"bytes\":9,\"crc32\":\"00000000\"},"
-                         "{\"id\":%d,\"x0\":0,\"y0\":0,\"x1\":8,\"y1\":8,\"file\":\"y\",\"bytes\":9,\"crc32\":\"00000000\"}]}",
-                         second);
+        int n = snprintf(
+            text, sizeof text,
+            "{\"format\":\"lull-sequence\",\"version\":1,\"scene\":\"s\",\"width\":8,\"height\":8,\"block\":8,\"levels\":[2]"
+            ","
+            "\"blocks\":[{\"id\":2,\"x0\":0,\"y0\":0,\"x1\":8,\"y1\":8,\"file\":\"x\",\"bytes\":9,\"crc32\":\"00000000\"},"
+            "{\"id\":%d,\"x0\":0,\"y0\":0,\"x1\":8,\"y1\":8,\"file\":\"y\",\"bytes\":9,\"crc32\":\"00000000\"}]}",
+            second);
         assert_int_equal(seq_manifest_parse("m.json", text, (size_t)n, &m, &err), second == 3 ? 0 : BASE_EINVAL);
         if (second == 3)
             seq_manifest_release(&m);
@@ -658,10 +738,20 @@ static void a_block_is_listed_once(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(half_floats), cmocka_unit_test(codings), cmocka_unit_test(statistics), cmocka_unit_test(filters),
-        cmocka_unit_test(round_trip), cmocka_unit_test(differences),
-        cmocka_unit_test(damage), cmocka_unit_test(limits_of_blocks), cmocka_unit_test(builder_limits), cmocka_unit_test(manifest), cmocka_unit_test(bad_manifests), cmocka_unit_test(a_block_is_listed_once),
-        cmocka_unit_test(manifests_word_for_word), cmocka_unit_test(limits_of_manifests),
+        cmocka_unit_test(half_floats),
+        cmocka_unit_test(codings),
+        cmocka_unit_test(statistics),
+        cmocka_unit_test(filters),
+        cmocka_unit_test(round_trip),
+        cmocka_unit_test(differences),
+        cmocka_unit_test(damage),
+        cmocka_unit_test(limits_of_blocks),
+        cmocka_unit_test(builder_limits),
+        cmocka_unit_test(manifest),
+        cmocka_unit_test(bad_manifests),
+        cmocka_unit_test(a_block_is_listed_once),
+        cmocka_unit_test(manifests_word_for_word),
+        cmocka_unit_test(limits_of_manifests),
     };
     return cmocka_run_group_tests_name("sequence", tests, setup, teardown);
 }

@@ -21,7 +21,7 @@ struct seat {
     struct base_err err;
     void (*work)(struct seat *seat);
     int rc, status;
-    int heard; /* calls of which rank 0 has all parts */
+    int heard;        /* calls of which rank 0 has all parts */
     const char *said; /* last words */
     pthread_t thread;
 };
@@ -52,10 +52,7 @@ static void together(struct seat *seats, int count, void (*work)(struct seat *se
     base_room_destroy(room);
 }
 
-static void nap(int ms)
-{
-    nanosleep(&(struct timespec){.tv_nsec = ms * 1000000L}, NULL);
-}
+static void nap(int ms) { nanosleep(&(struct timespec){.tv_nsec = ms * 1000000L}, NULL); }
 
 /* Each fills its items; low ranks are late. */
 static void share_items(struct seat *s)
@@ -138,8 +135,10 @@ static void counted(struct seat *s)
         s->rc |= base_team_tell(s->team, mine, size);
         after = base_team_traffic(s->team);
         uint64_t bytes = after.bytes - before.bytes, messages = after.messages - before.messages;
-        uint64_t others = base_team_rank(s->team) == 0 ? 2 : 1; /* a part comes from or goes to each, and the word likewise */
-        s->rc |= messages < 2 * others || messages > 4 * others || bytes < 2 * others * size || bytes > 2 * others * size + 64 * messages;
+        uint64_t others =
+            base_team_rank(s->team) == 0 ? 2 : 1; /* a part comes from or goes to each, and the word likewise */
+        s->rc |= messages < 2 * others || messages > 4 * others || bytes < 2 * others * size ||
+                 bytes > 2 * others * size + 64 * messages;
         s->rc |= !(after.waiting_s >= before.waiting_s);
     }
 }
@@ -289,11 +288,15 @@ static void who_is_silent_is_given_up(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(everybody_has_all_items_in_order), cmocka_unit_test(nobody_else_is_a_team_too),
-        cmocka_unit_test(rank_0_gets_parts_of_any_size_and_is_heard), cmocka_unit_test(traffic_is_counted_both_ways),
-        cmocka_unit_test(who_differs_is_named_with_the_line), cmocka_unit_test(who_is_out_of_step_is_found),
+        cmocka_unit_test(everybody_has_all_items_in_order),
+        cmocka_unit_test(nobody_else_is_a_team_too),
+        cmocka_unit_test(rank_0_gets_parts_of_any_size_and_is_heard),
+        cmocka_unit_test(traffic_is_counted_both_ways),
+        cmocka_unit_test(who_differs_is_named_with_the_line),
+        cmocka_unit_test(who_is_out_of_step_is_found),
         cmocka_unit_test(who_has_given_its_part_may_go),
-        cmocka_unit_test(who_ends_early_says_why), cmocka_unit_test(the_job_has_the_status_of_who_failed),
+        cmocka_unit_test(who_ends_early_says_why),
+        cmocka_unit_test(the_job_has_the_status_of_who_failed),
         cmocka_unit_test(who_is_silent_is_given_up),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -38,10 +38,20 @@ static void characters(void **state)
 
 static void view_names(void **state)
 {
-    static const char *const cases[][2] = {{"scenes/room.pbrt", "room"}, {"room", "room"},       {"a.b.pbrt", "a.b"},
-                                           {"a;b#c.pbrt", "a_b_c"},      {".pbrt", "_pbrt"},     {"x/.hidden.pbrt", "_hidden"},
-                                           {"l\xe4t.pbrt", "l_t"},       {"\xc3\xa4.pbrt", "\xc3\xa4"}, {"a\nb\"\x7f.pbrt", "a_b__"},
-                                           {"my room.pbrt", "my room"}, {"a~.pbrt", "a~"}, {"a\x1f.pbrt", "a_"}, {"folder/", "_"},             {"", "_"}};
+    static const char *const cases[][2] = {{"scenes/room.pbrt", "room"},
+                                           {"room", "room"},
+                                           {"a.b.pbrt", "a.b"},
+                                           {"a;b#c.pbrt", "a_b_c"},
+                                           {".pbrt", "_pbrt"},
+                                           {"x/.hidden.pbrt", "_hidden"},
+                                           {"l\xe4t.pbrt", "l_t"},
+                                           {"\xc3\xa4.pbrt", "\xc3\xa4"},
+                                           {"a\nb\"\x7f.pbrt", "a_b__"},
+                                           {"my room.pbrt", "my room"},
+                                           {"a~.pbrt", "a~"},
+                                           {"a\x1f.pbrt", "a_"},
+                                           {"folder/", "_"},
+                                           {"", "_"}};
     char name[64];
     (void)state;
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {

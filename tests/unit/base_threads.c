@@ -14,7 +14,7 @@ struct job {
     atomic_int taken[INDICES], inside[THREADS];
     atomic_int twice; /* two threads as one worker at the same time */
     atomic_int who;   /* bit per worker that took an index */
-    int everybody; /* bits of all workers: each task waits until all of them have come; 0: none waits */
+    int everybody;    /* bits of all workers: each task waits until all of them have come; 0: none waits */
 };
 
 static void take(void *data, long i, int worker)

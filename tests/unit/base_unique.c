@@ -56,6 +56,7 @@ static void a_list_of_none_or_one_repeats_nothing(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(each_repetition_is_found), cmocka_unit_test(a_list_of_none_or_one_repeats_nothing)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(each_repetition_is_found),
+                                       cmocka_unit_test(a_list_of_none_or_one_repeats_nothing)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -54,7 +54,13 @@ static void round_trip(void **state)
 {
     (void)state;
     struct ggn_label entries[] = {{3, 120.5, 0}, {7, 10000, 1}};
-    struct ggn_labels l = {.source = "observer", .detail = "tau \"x\"", .cap = 10000, .spread = 0.3, .n = 2, .labels = entries}, back;
+    struct ggn_labels l = {.source = "observer",
+                           .detail = "tau \"x\"",
+                           .cap = 10000,
+                           .spread = 0.3,
+                           .n = 2,
+                           .labels = entries},
+                      back;
     struct base_err err = {0};
     assert_int_equal(ggn_labels_write(root, &l, 0, &err), 0);
     if (ggn_labels_read(root, &back, &err) != 0)
@@ -66,11 +72,14 @@ static void round_trip(void **state)
     assert_null(ggn_labels_find(&back, 4));
     ggn_labels_release(&back);
     static const char *const bad[] = {
-        "", "{}", "{\"format\":\"lull-labels\",\"source\":\"people\",\"cap\":1,\"spread\":1,\"blocks\":[{\"id\":0,\"threshold\":1}]}",
+        "",
+        "{}",
+        "{\"format\":\"lull-labels\",\"source\":\"people\",\"cap\":1,\"spread\":1,\"blocks\":[{\"id\":0,\"threshold\":1}]}",
         "{\"format\":\"lull-labels\",\"source\":\"human\",\"spread\":1,\"blocks\":[{\"id\":0,\"threshold\":1}]}",
         "{\"format\":\"lull-labels\",\"source\":\"human\",\"cap\":1,\"spread\":1,\"blocks\":[]}",
         "{\"format\":\"lull-labels\",\"source\":\"human\",\"cap\":1,\"spread\":1,\"blocks\":[{\"id\":0,\"threshold\":-1}]}",
-        "{\"format\":\"lull-labels\",\"source\":\"human\",\"cap\":1,\"spread\":1,\"blocks\":[{\"id\":0,\"threshold\":1},{\"id\":0,\"threshold\":1}]}",
+        "{\"format\":\"lull-labels\",\"source\":\"human\",\"cap\":1,\"spread\":1,\"blocks\":[{\"id\":0,\"threshold\":1},{"
+        "\"id\":0,\"threshold\":1}]}",
     };
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
         if (ggn_labels_parse("l.json", bad[i], strlen(bad[i]), &back, &err) != BASE_EINVAL)
@@ -94,7 +103,8 @@ static void add_view(const char *name, const char *scene)
 {
     char dir[256];
     uint32_t level = 20;
-    struct seq_manifest m = {.width = 8, .height = 8, .block = 8, .n_levels = 1, .levels = &level, .reference_independent = 1};
+    struct seq_manifest m = {
+        .width = 8, .height = 8, .block = 8, .n_levels = 1, .levels = &level, .reference_independent = 1};
     snprintf(m.scene, sizeof m.scene, "%s", scene);
     snprintf(dir, sizeof dir, "%s/%s", root, name);
     mkdir(dir, 0777);
@@ -124,8 +134,8 @@ static void splits(void **state)
         fail_msg("%s", err.text);
     assert_int_equal(d.n, 4);
     assert_string_equal(d.views[0].name, "a-view0");
-    assert_true(d.views[0].split == GGN_SPLIT_TRAIN && d.views[1].split == GGN_SPLIT_TRAIN && d.views[2].split == GGN_SPLIT_TEST &&
-                d.views[3].split == GGN_SPLIT_NONE);
+    assert_true(d.views[0].split == GGN_SPLIT_TRAIN && d.views[1].split == GGN_SPLIT_TRAIN &&
+                d.views[2].split == GGN_SPLIT_TEST && d.views[3].split == GGN_SPLIT_NONE);
     ggn_dataset_release(&d);
     write_split("{\"train\": [\"a\"], \"test\": [\"a\"]}");
     assert_int_equal(ggn_dataset_open(root, &d, &err), BASE_EINVAL);
@@ -152,7 +162,9 @@ static void split_folders(void **state)
         fail_msg("%s", err.text);
     assert_int_equal(d.n, 3);
     for (int i = 0; i < 3; i++)
-        assert_int_equal(d.views[i].split, d.views[i].name[0] == 'x' ? GGN_SPLIT_TRAIN : d.views[i].name[0] == 'y' ? GGN_SPLIT_TEST : GGN_SPLIT_NONE);
+        assert_int_equal(d.views[i].split, d.views[i].name[0] == 'x'   ? GGN_SPLIT_TRAIN
+                                           : d.views[i].name[0] == 'y' ? GGN_SPLIT_TEST
+                                                                       : GGN_SPLIT_NONE);
     ggn_dataset_release(&d);
     add_view("test/x-view1", "x");
     assert_int_equal(ggn_dataset_open(root, &d, &err), BASE_EINVAL);
@@ -173,14 +185,36 @@ static void put_file(const char *name, const char *contents)
 
 static void labels_are_told_word_by_word(void **state)
 {
-    static const char *const cases[][2] = {
-        {"", ""}, {"{", "["}, {"lull-labels", "lull-label"}, {"\"format\":\"lull-labels\"", "\"format\":7"}, {"\"human\"", "\"people\""}, {"\"human\"", "\"observer\""},
-        {"\"human\"", "7"}, {"\"detail\":\"d\"", "\"detail\":7"}, {"\"cap\":900", "\"cup\":900"}, {"\"cap\":900", "\"cap\":0"}, {"\"cap\":900", "\"cap\":-1"}, {"\"cap\":900", "\"cap\":\"900\""},
-        {"\"cap\":900", "\"cap\":999999999999"}, {"\"cap\":900", "\"cap\":1e12"}, {"\"spread\":0.5", "\"spread\":null"}, {"\"blocks\":[", "\"blocks\":7,\"x\":["}, {"\"blocks\":[", "\"blocks\":[],\"x\":["},
-        {"\"blocks\":[", "\"blocks\":[7,"}, {"\"id\":4", "\"id\":-1"}, {"\"id\":4", "\"id\":4294967294"}, {"\"id\":4", "\"id\":4294967295"}, {"\"id\":4", "\"id\":\"4\""}, {"\"id\":4", "\"id\":2"},
-        {"\"threshold\":77", "\"threshold\":0"}, {"\"threshold\":77", "\"threshold\":999999999999"}, {"\"threshold\":77", "\"threshold\":1e12"}, {"\"threshold\":77", "\"thresh\":1"},
-        {"\"censored\":true", "\"censored\":1"}};
-    static const char whole[] = "{\"format\":\"lull-labels\",\"source\":\"human\",\"detail\":\"d\",\"cap\":900,\"spread\":0.5,\"blocks\":[{\"id\":2,\"threshold\":50},"
+    static const char *const cases[][2] = {{"", ""},
+                                           {"{", "["},
+                                           {"lull-labels", "lull-label"},
+                                           {"\"format\":\"lull-labels\"", "\"format\":7"},
+                                           {"\"human\"", "\"people\""},
+                                           {"\"human\"", "\"observer\""},
+                                           {"\"human\"", "7"},
+                                           {"\"detail\":\"d\"", "\"detail\":7"},
+                                           {"\"cap\":900", "\"cup\":900"},
+                                           {"\"cap\":900", "\"cap\":0"},
+                                           {"\"cap\":900", "\"cap\":-1"},
+                                           {"\"cap\":900", "\"cap\":\"900\""},
+                                           {"\"cap\":900", "\"cap\":999999999999"},
+                                           {"\"cap\":900", "\"cap\":1e12"},
+                                           {"\"spread\":0.5", "\"spread\":null"},
+                                           {"\"blocks\":[", "\"blocks\":7,\"x\":["},
+                                           {"\"blocks\":[", "\"blocks\":[],\"x\":["},
+                                           {"\"blocks\":[", "\"blocks\":[7,"},
+                                           {"\"id\":4", "\"id\":-1"},
+                                           {"\"id\":4", "\"id\":4294967294"},
+                                           {"\"id\":4", "\"id\":4294967295"},
+                                           {"\"id\":4", "\"id\":\"4\""},
+                                           {"\"id\":4", "\"id\":2"},
+                                           {"\"threshold\":77", "\"threshold\":0"},
+                                           {"\"threshold\":77", "\"threshold\":999999999999"},
+                                           {"\"threshold\":77", "\"threshold\":1e12"},
+                                           {"\"threshold\":77", "\"thresh\":1"},
+                                           {"\"censored\":true", "\"censored\":1"}};
+    static const char whole[] = "{\"format\":\"lull-labels\",\"source\":\"human\",\"detail\":\"d\",\"cap\":900,\"spread\":0."
+                                "5,\"blocks\":[{\"id\":2,\"threshold\":50},"
                                 "{\"id\":4,\"threshold\":77,\"censored\":true}]}";
     struct transcript t;
     FILE *f = transcript_begin(&t);
@@ -205,7 +239,8 @@ static void labels_are_told_word_by_word(void **state)
     for (int censored = 0; censored < 2; censored++)
         for (double spp = 700; spp < 1400; spp *= 1.1) {
             struct ggn_label label = {1, 1000, censored};
-            fprintf(f, "%.1f: %d %.6f %.6f\n", spp, ggn_label_noisy(&label, spp), ggn_label_p_noisy(&label, spp, 0.25), ggn_label_p_noisy(&label, spp, 0.5));
+            fprintf(f, "%.1f: %d %.6f %.6f\n", spp, ggn_label_noisy(&label, spp), ggn_label_p_noisy(&label, spp, 0.25),
+                    ggn_label_p_noisy(&label, spp, 0.5));
         }
     transcript_end(&t, "data-labels");
 }
@@ -241,13 +276,51 @@ static void tell_table(FILE *f, const char *name, const char *contents)
 
 static void thresholds_are_told_word_by_word(void **state)
 {
-    static const char *const tables[] = {"", "\n# a\n", "a", ";1", "a;", "a;;", "a;1", "a;1;", "a;1;2", "a;1;;2", "a;1;2;;", "a;x", "a;1x", "a;1 ;2", "a; 1;2", "a;0", "a;-1", "a;1e12", "a;999999999999", "a;nan", "a;inf",
-                                         "a;1\nb;2;3;\r\n", "a;1\n\nb", "a;1\nb;2;\na;3;", "p;1\np_part6;2", "p_part6;2\nb;1", "#a;1\nb;1"};
-    static const char *const reports[] = {"", "{}", "{\"blocks\":[]}", "{\"blocks\":{}}", "{\"blocks\":[{\"id\":0,\"spp\":5}]}", "{\"scene\":7,\"blocks\":[{\"id\":1,\"spp\":5,\"y0\":0}]}",
-                                          "{\"scene\":\"b\",\"blocks\":[{\"id\":3,\"spp\":5,\"threshold\":6,\"y0\":1},{\"id\":0,\"spp\":2,\"y0\":0},{\"id\":1,\"spp\":3,\"y0\":0}]}",
-                                          "{\"blocks\":[{\"id\":-1,\"spp\":5}]}", "{\"blocks\":[{\"id\":\"0\",\"spp\":5}]}", "{\"blocks\":[{\"id\":65535,\"spp\":5}]}", "{\"blocks\":[{\"id\":65536,\"spp\":5}]}",
-                                          "{\"blocks\":[{\"id\":0}]}", "{\"blocks\":[{\"id\":0,\"spp\":0}]}", "{\"blocks\":[{\"id\":0,\"spp\":1e12}]}", "{\"blocks\":[{\"id\":0,\"spp\":999999999999}]}",
-                                          "{\"blocks\":[{\"id\":0,\"threshold\":\"1\",\"spp\":5}]}", "{\"blocks\":[{\"id\":7,\"spp\":-5}]}"};
+    static const char *const tables[] = {"",
+                                         "\n# a\n",
+                                         "a",
+                                         ";1",
+                                         "a;",
+                                         "a;;",
+                                         "a;1",
+                                         "a;1;",
+                                         "a;1;2",
+                                         "a;1;;2",
+                                         "a;1;2;;",
+                                         "a;x",
+                                         "a;1x",
+                                         "a;1 ;2",
+                                         "a; 1;2",
+                                         "a;0",
+                                         "a;-1",
+                                         "a;1e12",
+                                         "a;999999999999",
+                                         "a;nan",
+                                         "a;inf",
+                                         "a;1\nb;2;3;\r\n",
+                                         "a;1\n\nb",
+                                         "a;1\nb;2;\na;3;",
+                                         "p;1\np_part6;2",
+                                         "p_part6;2\nb;1",
+                                         "#a;1\nb;1"};
+    static const char *const reports[] = {"",
+                                          "{}",
+                                          "{\"blocks\":[]}",
+                                          "{\"blocks\":{}}",
+                                          "{\"blocks\":[{\"id\":0,\"spp\":5}]}",
+                                          "{\"scene\":7,\"blocks\":[{\"id\":1,\"spp\":5,\"y0\":0}]}",
+                                          "{\"scene\":\"b\",\"blocks\":[{\"id\":3,\"spp\":5,\"threshold\":6,\"y0\":1},{"
+                                          "\"id\":0,\"spp\":2,\"y0\":0},{\"id\":1,\"spp\":3,\"y0\":0}]}",
+                                          "{\"blocks\":[{\"id\":-1,\"spp\":5}]}",
+                                          "{\"blocks\":[{\"id\":\"0\",\"spp\":5}]}",
+                                          "{\"blocks\":[{\"id\":65535,\"spp\":5}]}",
+                                          "{\"blocks\":[{\"id\":65536,\"spp\":5}]}",
+                                          "{\"blocks\":[{\"id\":0}]}",
+                                          "{\"blocks\":[{\"id\":0,\"spp\":0}]}",
+                                          "{\"blocks\":[{\"id\":0,\"spp\":1e12}]}",
+                                          "{\"blocks\":[{\"id\":0,\"spp\":999999999999}]}",
+                                          "{\"blocks\":[{\"id\":0,\"threshold\":\"1\",\"spp\":5}]}",
+                                          "{\"blocks\":[{\"id\":7,\"spp\":-5}]}"};
     struct transcript t;
     FILE *f = transcript_begin(&t);
     (void)state;
@@ -286,16 +359,24 @@ static void tell_dataset(FILE *f, const char *name)
     }
     fprintf(f, "%s: labels %s:", name, ggn_dataset_label_source(&d));
     for (int i = 0; i < d.n; i++)
-        fprintf(f, " %s (%s, %s, %s, %u tiles)", d.views[i].name, d.views[i].manifest.scene, ggn_split_names[d.views[i].split],
-                d.views[i].has_labels ? d.views[i].labels.source : "-", ggn_dataset_tiles(&d.views[i]));
+        fprintf(f, " %s (%s, %s, %s, %u tiles)", d.views[i].name, d.views[i].manifest.scene,
+                ggn_split_names[d.views[i].split], d.views[i].has_labels ? d.views[i].labels.source : "-",
+                ggn_dataset_tiles(&d.views[i]));
     fputc('\n', f);
     ggn_dataset_release(&d);
 }
 
 static void datasets_are_told_word_by_word(void **state)
 {
-    static const char *const splits[] = {"{\"train\": [\"a\"], \"people\": [\"b\", \"unknown\"]}", "{\"train\": [\"a\"], \"test\": [\"a\"]}", "{\"train\": [7]}", "{\"train\": \"a\"}", "{\"validation\": [\"c\", \"c\"]}",
-                                         "[]", "", "{}", "{\"none\": [\"a\"], \"test\": [\"c\", \"a\", \"b\"]}"};
+    static const char *const splits[] = {"{\"train\": [\"a\"], \"people\": [\"b\", \"unknown\"]}",
+                                         "{\"train\": [\"a\"], \"test\": [\"a\"]}",
+                                         "{\"train\": [7]}",
+                                         "{\"train\": \"a\"}",
+                                         "{\"validation\": [\"c\", \"c\"]}",
+                                         "[]",
+                                         "",
+                                         "{}",
+                                         "{\"none\": [\"a\"], \"test\": [\"c\", \"a\", \"b\"]}"};
     struct ggn_label entry = {0, 5, 0};
     struct ggn_labels l = {.source = "observer", .cap = 10, .spread = 1, .n = 1, .labels = &entry};
     struct transcript t;
@@ -355,7 +436,10 @@ static void scenes_are_held_out(void **state)
     for (int n = 1; n <= 13; n++) {
         struct ggn_chains set;
         const struct ggn_chains_options o = {.dir = dir, .validation = n == 4 ? "s2" : NULL};
-        snprintf(command, sizeof command, "cp -r tests/data/recorded/test/three %s/s%02d && sed -i 's/\"scene\":.*/\"scene\": \"s%d\",/' %s/s%02d/manifest.json", dir, n, n - n / 6, dir, n);
+        snprintf(command, sizeof command,
+                 "cp -r tests/data/recorded/test/three %s/s%02d && sed -i 's/\"scene\":.*/\"scene\": \"s%d\",/' "
+                 "%s/s%02d/manifest.json",
+                 dir, n, n - n / 6, dir, n);
         assert_int_equal(system(command), 0);
         assert_int_equal(ggn_chains_load(&set, &o, NULL), 0);
         fprintf(f, "%d scenes:", set.n_scenes);
@@ -388,12 +472,14 @@ static void print_codes(FILE *f, const char *what, const uint8_t *codes, size_t 
 static void print_chains(FILE *f, const struct ggn_chains *set)
 {
     const size_t values = ggn_chains_values(set);
-    fprintf(f, "%d chains of %d scenes, %dx%d, first %g, ratio %.9g, step %g; %d %d to train\n", set->n, set->n_scenes, set->width, set->height,
-            set->first_spp, set->ratio, set->step_spp, ggn_chains_count(set, GGN_SPLIT_TRAIN, 0), ggn_chains_count(set, GGN_SPLIT_TRAIN, 1));
+    fprintf(f, "%d chains of %d scenes, %dx%d, first %g, ratio %.9g, step %g; %d %d to train\n", set->n, set->n_scenes,
+            set->width, set->height, set->first_spp, set->ratio, set->step_spp, ggn_chains_count(set, GGN_SPLIT_TRAIN, 0),
+            ggn_chains_count(set, GGN_SPLIT_TRAIN, 1));
     for (int i = 0; i < set->n; i++) {
         const struct ggn_chain *c = &set->chains[i];
-        fprintf(f, "%d: view %d scene %d %s block %u%s%s, label %d %g %d %g;", i, c->view, c->scene, ggn_split_names[c->split], c->block,
-                c->synthetic ? " synthetic" : "", c->simulated ? " simulated" : "", c->has_label, c->label.threshold, c->label.censored, c->spread);
+        fprintf(f, "%d: view %d scene %d %s block %u%s%s, label %d %g %d %g;", i, c->view, c->scene,
+                ggn_split_names[c->split], c->block, c->synthetic ? " synthetic" : "", c->simulated ? " simulated" : "",
+                c->has_label, c->label.threshold, c->label.censored, c->spread);
         print_codes(f, "reference", c->reference, values);
         fputc('\n', f);
         for (int k = 0; k < c->n_levels; k += 1 + (i % 3)) {
@@ -409,9 +495,12 @@ static void print_chains(FILE *f, const struct ggn_chains *set)
 static void chains_are_as_they_were(void **state)
 {
     static const struct ggn_chains_options options[] = {
-        {.dir = "tests/data/recorded", .with_test = 1, .pictures = 1}, {.dir = "tests/data/recorded", .ratio = 2, .mean_for_reference = 1},
-        {.dir = "tests/data/recorded", .validation = "one", .test = "two,three"}, {.dir = "tests/data/recorded", .validation = "one,none"},
-        {.dir = "tests/data/train-demo", .validation = "scene1", .pictures = 1, .ratio = 3}, {.dir = "tests/data/recorded/train/one-view1"}};
+        {.dir = "tests/data/recorded", .with_test = 1, .pictures = 1},
+        {.dir = "tests/data/recorded", .ratio = 2, .mean_for_reference = 1},
+        {.dir = "tests/data/recorded", .validation = "one", .test = "two,three"},
+        {.dir = "tests/data/recorded", .validation = "one,none"},
+        {.dir = "tests/data/train-demo", .validation = "scene1", .pictures = 1, .ratio = 3},
+        {.dir = "tests/data/recorded/train/one-view1"}};
     struct transcript t;
     FILE *f = transcript_begin(&t);
     (void)state;
@@ -430,7 +519,11 @@ static void chains_are_as_they_were(void **state)
         struct ggn_chains set;
         const struct ggn_chains_options o = {.dir = "tests/data/recorded", .with_test = 1, .pictures = how != 1};
         assert_int_equal(ggn_chains_load(&set, &o, NULL), 0);
-        fprintf(f, "--- %s\n", how == 0 ? "synthetic" : how == 1 ? "extended" : how == 2 ? "simulated, 1.9" : "synthetic, linear");
+        fprintf(f, "--- %s\n",
+                how == 0   ? "synthetic"
+                : how == 1 ? "extended"
+                : how == 2 ? "simulated, 1.9"
+                           : "synthetic, linear");
         set.ratio = how == 3 ? 0 : set.ratio;
         if (how == 0 || how == 3)
             assert_int_equal(ggn_chains_add_synthetic(&set, 2, 5, NULL), 0);
@@ -448,10 +541,11 @@ static void print_windows(FILE *f, const struct ggn_chains *set, const struct gg
 {
     struct ggn_windows w;
     assert_int_equal(ggn_windows_create(&w, set, o, NULL), 0);
-    fprintf(f, "%s, %d images%s%s%s: %d windows\n", ggn_split_names[o->split], o->length, o->soft ? ", soft" : "", o->synthetic ? ", synthetic" : "",
-            o->label_first ? ", first" : "", w.n);
+    fprintf(f, "%s, %d images%s%s%s: %d windows\n", ggn_split_names[o->split], o->length, o->soft ? ", soft" : "",
+            o->synthetic ? ", synthetic" : "", o->label_first ? ", first" : "", w.n);
     for (int i = 0; i < w.n; i++)
-        fprintf(f, " %d.%d:%d %.4f %.4f%s", w.list[i].chain, w.list[i].last, w.list[i].noisy, w.list[i].label, w.list[i].octave, i % 6 == 5 || i + 1 == w.n ? "\n" : "");
+        fprintf(f, " %d.%d:%d %.4f %.4f%s", w.list[i].chain, w.list[i].last, w.list[i].noisy, w.list[i].label,
+                w.list[i].octave, i % 6 == 5 || i + 1 == w.n ? "\n" : "");
     for (int i = 0; i <= set->n; i++)
         fprintf(f, "%s%d", i ? " " : "first: ", w.first[i]);
     fputs("\ndrawn:", f);
@@ -485,17 +579,29 @@ static void windows_are_as_they_were(void **state)
     assert_int_equal(ggn_chains_load(&set, &o, NULL), 0);
     assert_int_equal(ggn_chains_add_synthetic(&set, 1, 5, NULL), 0);
     for (int i = 0; i < 8; i++)
-        print_windows(f, &set, &(struct ggn_window_options){.split = i & 1 ? GGN_SPLIT_VALIDATION : GGN_SPLIT_TRAIN, .length = i < 6 ? 4 : 9, .soft = i & 2, .synthetic = i & 4, .label_first = i == 5});
+        print_windows(f, &set,
+                      &(struct ggn_window_options){.split = i & 1 ? GGN_SPLIT_VALIDATION : GGN_SPLIT_TRAIN,
+                                                   .length = i < 6 ? 4 : 9,
+                                                   .soft = i & 2,
+                                                   .synthetic = i & 4,
+                                                   .label_first = i == 5});
     for (int i = 0; i < 12; i++) {
-        struct ggn_augment a = ggn_augment_draw((uint64_t)i << (i % 3 * 16), i % 4, 9, &(struct ggn_augment_options){.flips = i < 9, .square = i < 7, .jitter = i < 11 ? 0.6 : 0, .picture = 0.5});
-        fprintf(f, "augment %d%d%d %d %.5f %.5f %.5f\n", a.flip_x, a.flip_y, a.transpose, a.blind, (double)a.gain[0], (double)a.gain[1], (double)a.gain[2]);
+        struct ggn_augment a = ggn_augment_draw(
+            (uint64_t)i << (i % 3 * 16), i % 4, 9,
+            &(struct ggn_augment_options){.flips = i < 9, .square = i < 7, .jitter = i < 11 ? 0.6 : 0, .picture = 0.5});
+        fprintf(f, "augment %d%d%d %d %.5f %.5f %.5f\n", a.flip_x, a.flip_y, a.transpose, a.blind, (double)a.gain[0],
+                (double)a.gain[1], (double)a.gain[2]);
     }
     struct ggn_chain *c = &set.chains[2];
     for (size_t i = 0; i < (size_t)c->n_levels * 3 * P; i++)
         denoised[i] = (uint16_t)(c->noisy[i] * 250u + i % 257u);
     c->denoised = denoised;
     for (int i = 0; i < 16; i++) {
-        struct ggn_augment a = {.flip_x = i & 1, .flip_y = i >> 1 & 1, .transpose = i >> 2 & 1, .gain = {i < 8 ? 1 : 1.3f, 1, i < 8 ? 1 : 0.8f}, .blind = i == 15};
+        struct ggn_augment a = {.flip_x = i & 1,
+                                .flip_y = i >> 1 & 1,
+                                .transpose = i >> 2 & 1,
+                                .gain = {i < 8 ? 1 : 1.3f, 1, i < 8 ? 1 : 0.8f},
+                                .blind = i == 15};
         fprintf(f, "planes %d:", i);
         ggn_window_planes(c, 5, 4, SIDE, SIDE, 0, &a, i < 4 ? 0 : 8, planes);
         print_planes(f, "noisy", planes, 12 * P);
@@ -515,9 +621,16 @@ static void windows_are_as_they_were(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(probabilities), cmocka_unit_test(round_trip), cmocka_unit_test(a_view_is_listed_once), cmocka_unit_test(splits), cmocka_unit_test(split_folders),
-                                       cmocka_unit_test(labels_are_told_word_by_word), cmocka_unit_test(thresholds_are_told_word_by_word),
-                                       cmocka_unit_test(datasets_are_told_word_by_word), cmocka_unit_test(chains_are_as_they_were), cmocka_unit_test(scenes_are_held_out),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(probabilities),
+                                       cmocka_unit_test(round_trip),
+                                       cmocka_unit_test(a_view_is_listed_once),
+                                       cmocka_unit_test(splits),
+                                       cmocka_unit_test(split_folders),
+                                       cmocka_unit_test(labels_are_told_word_by_word),
+                                       cmocka_unit_test(thresholds_are_told_word_by_word),
+                                       cmocka_unit_test(datasets_are_told_word_by_word),
+                                       cmocka_unit_test(chains_are_as_they_were),
+                                       cmocka_unit_test(scenes_are_held_out),
                                        cmocka_unit_test(windows_are_as_they_were)};
     return cmocka_run_group_tests_name("data_labels", tests, setup, teardown);
 }

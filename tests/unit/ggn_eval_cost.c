@@ -10,8 +10,8 @@
 enum { B = 3, LEVELS = 4, N = B * LEVELS };
 static double spp[N], seconds[N], flip[N], relmse[N], score[N];
 static struct ggn_eval_block blocks[B];
-static struct ggn_eval_set set = {.n_blocks = B, .n_scenes = 1, .n = N, .blocks = blocks, .spp = spp, .seconds = seconds,
-                                  .flip = flip, .relmse = relmse};
+static struct ggn_eval_set set = {
+    .n_blocks = B, .n_scenes = 1, .n = N, .blocks = blocks, .spp = spp, .seconds = seconds, .flip = flip, .relmse = relmse};
 static const double thresholds[B] = {100, 400, 1600}, rates[B] = {1e-3, 2e-3, 4e-3}; /* seconds per sample */
 
 static int setup(void **state)
@@ -19,12 +19,12 @@ static int setup(void **state)
     (void)state;
     set.chains.width = set.chains.height = 10;
     for (int b = 0; b < B; b++) {
-        blocks[b] = (struct ggn_eval_block){.split = GGN_SPLIT_TEST, .first = (size_t)(b * LEVELS),
-                                            .end = (size_t)((b + 1) * LEVELS), .cap = 6400};
+        blocks[b] = (struct ggn_eval_block){
+            .split = GGN_SPLIT_TEST, .first = (size_t)(b * LEVELS), .end = (size_t)((b + 1) * LEVELS), .cap = 6400};
         blocks[b].label.threshold = thresholds[b];
         for (int i = 0; i < LEVELS; i++) {
             size_t k = (size_t)(b * LEVELS + i);
-            spp[k] = 100 << (2 * i); /* 100 400 1600 6400 */
+            spp[k] = 100 << (2 * i);                              /* 100 400 1600 6400 */
             seconds[k] = i < 2 ? rates[b] * spp[k] : (double)NAN; /* recorded that far */
             flip[k] = 1.0 / sqrt(spp[k]);
             relmse[k] = 2.0 / spp[k];

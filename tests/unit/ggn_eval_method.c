@@ -75,7 +75,7 @@ static void cases(void **state)
     assert_int_equal(set.n_blocks, 3 * BLOCKS);
     assert_int_equal(set.n, 3 * BLOCKS * (LEVELS - WINDOW + 1));
     const struct ggn_eval_block *b = &set.blocks[0];
-    assert_near(set.spp[b->first], 40, 0); /* the first window ends at the second level */
+    assert_near(set.spp[b->first], 40, 0);    /* the first window ends at the second level */
     assert_int_equal(set.noisy[b->first], 1); /* threshold 50 */
     assert_int_equal(set.noisy[b->first + 1], 0);
     const struct ggn_eval_block *capped = &set.blocks[4];
@@ -187,7 +187,8 @@ static void continued(void **state)
     struct ggn_eval_set more, again;
     struct base_err err = {0};
     int skipped;
-    if (ggn_eval_set_load(&more, &o, threads, &skipped, &err) != 0 || ggn_eval_set_load(&again, &o, threads, &skipped, &err) != 0)
+    if (ggn_eval_set_load(&more, &o, threads, &skipped, &err) != 0 ||
+        ggn_eval_set_load(&again, &o, threads, &skipped, &err) != 0)
         fail_msg("%s", err.text);
     assert_int_equal(more.n_blocks, set.n_blocks);
     assert_near(more.blocks[4].cap, 1280, 0);
@@ -199,7 +200,8 @@ static void continued(void **state)
         if (i < known)
             assert_near(more.dammertz[b->first + i], set.dammertz[recorded->first + i], 0);
         if (i > 0)
-            assert_true(more.dammertz[b->first + i] < more.dammertz[b->first + i - 1] && more.flip[b->first + i] < more.flip[b->first + i - 1]);
+            assert_true(more.dammertz[b->first + i] < more.dammertz[b->first + i - 1] &&
+                        more.flip[b->first + i] < more.flip[b->first + i - 1]);
     }
     for (size_t i = 0; i < more.n; i++)
         assert_true(more.flip[i] == again.flip[i]);
@@ -345,7 +347,8 @@ static void figures(void **state)
         for (size_t i = set.blocks[b].first; i < set.blocks[b].end; i++)
             set.seconds[i] *= 1.0 + b;
     assert_int_equal(ggn_method_measure(&m, &set, GGN_SPLIT_TEST, &f, NULL), 0);
-    double needed = 0, spent = 0, time = 0, early = 0, flip = 0, ssim = 0, worst = 0, least = 1, right = 0, cases = 0, pairs = 0, won = 0;
+    double needed = 0, spent = 0, time = 0, early = 0, flip = 0, ssim = 0, worst = 0, least = 1, right = 0, cases = 0,
+           pairs = 0, won = 0;
     for (int b = 10; b < 15; b++) {
         const struct ggn_eval_block *block = &set.blocks[b];
         size_t at = block->first;
@@ -471,8 +474,16 @@ static void beyond_the_recording(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(cases), cmocka_unit_test(informed_scores), cmocka_unit_test(fixed_stops), cmocka_unit_test(decisions), cmocka_unit_test(continued), cmocka_unit_test(network),
-        cmocka_unit_test(one_class), cmocka_unit_test(tuned_cuts_are_the_best), cmocka_unit_test(figures), cmocka_unit_test(errors_of_the_criteria),
+        cmocka_unit_test(cases),
+        cmocka_unit_test(informed_scores),
+        cmocka_unit_test(fixed_stops),
+        cmocka_unit_test(decisions),
+        cmocka_unit_test(continued),
+        cmocka_unit_test(network),
+        cmocka_unit_test(one_class),
+        cmocka_unit_test(tuned_cuts_are_the_best),
+        cmocka_unit_test(figures),
+        cmocka_unit_test(errors_of_the_criteria),
         cmocka_unit_test(beyond_the_recording),
     };
     return cmocka_run_group_tests_name("eval_method", tests, setup, teardown);

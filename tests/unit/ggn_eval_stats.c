@@ -68,7 +68,7 @@ static void agreement(void **state)
     assert_int_equal(a.below_cap, 3);
     assert_near(a.mae, 610.0 / 4, 1e-9);
     assert_near(a.mae_below_cap, 610.0 / 3, 1e-9);
-    assert_near(a.rmse, 189.80252896102306, 1e-9); /* sqrt(144100 / 4) */
+    assert_near(a.rmse, 189.80252896102306, 1e-9);       /* sqrt(144100 / 4) */
     assert_near(a.pearson_r, 0.9992308294157498, 1e-12); /* Python's, of the definition */
     assert_near(a.pearson_r_below_cap, 0.9957550460225943, 1e-12);
     assert_near(a.spearman, 1.0, 1e-12);
@@ -93,7 +93,8 @@ static void check_model(const char *path, const double want[9])
     assert_int_equal(p.n_views, 40);
     assert_int_equal(p.n, 640);
     assert_int_equal(ggn_stats_agreement(p.truth, p.model, p.n, 10000, &a, &err), 0);
-    const double got[9] = {a.pearson_r_below_cap, a.pearson_r, a.spearman, a.mae, a.mae_below_cap, a.rmse, a.share_below, a.samples_ratio, 0};
+    const double got[9] = {a.pearson_r_below_cap, a.pearson_r,     a.spearman, a.mae, a.mae_below_cap, a.rmse,
+                           a.share_below,         a.samples_ratio, 0};
     for (int i = 0; i < 8; i++)
         assert_near(got[i], want[i], i >= 3 && i <= 5 ? 0.0501 : 0.0000501);
     ggn_pairing_release(&p);
@@ -110,8 +111,10 @@ static void published_table(void **state)
         skip();
     }
     fclose(f);
-    check_model("../shared/human/SVD-Entropy-thresholds.csv", (double[9]){0.7083, 0.7666, 0.7766, 1580.8, 1512.9, 2159.2, 0.4438, 0.9373, 0});
-    check_model("../shared/human/26-attributes-thresholds.csv", (double[9]){0.6187, 0.6862, 0.6995, 1875.3, 1907.4, 2522.4, 0.3750, 1.0667, 0});
+    check_model("../shared/human/SVD-Entropy-thresholds.csv",
+                (double[9]){0.7083, 0.7666, 0.7766, 1580.8, 1512.9, 2159.2, 0.4438, 0.9373, 0});
+    check_model("../shared/human/26-attributes-thresholds.csv",
+                (double[9]){0.6187, 0.6862, 0.6995, 1875.3, 1907.4, 2522.4, 0.3750, 1.0667, 0});
 }
 
 static int parse(const char *text, struct ggn_thresholds *t, struct base_err *err)
@@ -135,7 +138,8 @@ static void csv(void **state)
     assert_near(ggn_thresholds_find(&t, "b")->spp[0], 7, 0);
     assert_null(ggn_thresholds_find(&t, "c"));
     ggn_thresholds_release(&t);
-    static const char *const bad[] = {"", "a", "a;", ";1;", "a;x;", "a;1;;", "a;-1;", "a;nan;", "a;inf;", "a;1 2;", "a;1;\na;2;", "a;0;"};
+    static const char *const bad[] = {"",      "a",      "a;",     ";1;",    "a;x;",       "a;1;;",
+                                      "a;-1;", "a;nan;", "a;inf;", "a;1 2;", "a;1;\na;2;", "a;0;"};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
         err = (struct base_err){0};
         if (parse(bad[i], &t, &err) != BASE_EINVAL || err.text[0] == '\0')
@@ -147,8 +151,8 @@ static void csv(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(correlations), cmocka_unit_test(quantiles), cmocka_unit_test(roc),
-        cmocka_unit_test(agreement), cmocka_unit_test(published_table), cmocka_unit_test(csv),
+        cmocka_unit_test(correlations), cmocka_unit_test(quantiles),       cmocka_unit_test(roc),
+        cmocka_unit_test(agreement),    cmocka_unit_test(published_table), cmocka_unit_test(csv),
     };
     return cmocka_run_group_tests_name("eval_stats", tests, NULL, NULL);
 }

@@ -30,7 +30,10 @@ static struct ggn_image8 read_level(int spp)
 static void published_figures(void **state)
 {
     (void)state;
-    static const struct { int spp; double mean; } golden[] = {{500, 0.043397}, {1000, 0.033533}, {2000, 0.025407}, {5000, 0.016180}, {9500, 0.007630}};
+    static const struct {
+        int spp;
+        double mean;
+    } golden[] = {{500, 0.043397}, {1000, 0.033533}, {2000, 0.025407}, {5000, 0.016180}, {9500, 0.007630}};
     char path[128];
     snprintf(path, sizeof path, sequence, 10000);
     FILE *f = fopen(path, "rb");

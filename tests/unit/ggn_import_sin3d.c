@@ -43,10 +43,7 @@ static int teardown(void **state)
     return 0;
 }
 
-static uint8_t value_at(int spp, int x, int y, int c)
-{
-    return (uint8_t)((unsigned)(spp + 7 * x + 13 * y + 50 * c) % 256u);
-}
+static uint8_t value_at(int spp, int x, int y, int c) { return (uint8_t)((unsigned)(spp + 7 * x + 13 * y + 50 * c) % 256u); }
 
 static void write_level(const char *dir, int spp, int side)
 {
@@ -200,8 +197,10 @@ static void bad_layouts(void **state)
 static void scene_names(void **state)
 {
     (void)state;
-    static const char *const pairs[][2] = {{"p3d_kitchen-view1_part6", "p3d_kitchen"}, {"p3d_living-room-3-view0", "p3d_living-room-3"},
-                                           {"p3d_low_table_2spheric_view0", "p3d_low_table_2spheric"}, {"p3d_arcsphere", "p3d_arcsphere"}};
+    static const char *const pairs[][2] = {{"p3d_kitchen-view1_part6", "p3d_kitchen"},
+                                           {"p3d_living-room-3-view0", "p3d_living-room-3"},
+                                           {"p3d_low_table_2spheric_view0", "p3d_low_table_2spheric"},
+                                           {"p3d_arcsphere", "p3d_arcsphere"}};
     for (size_t i = 0; i < 4; i++) {
         char scene[64];
         ggn_sin3d_scene(pairs[i][0], scene, sizeof scene);
@@ -329,8 +328,10 @@ static void put(const char *format, const char *name, const char *contents)
 /* Which names are levels of a view. */
 static void names_of_levels(FILE *f)
 {
-    static const char *const names[] = {"a_00020.png", "a_20.rawls", "a_20.PNG", "a_20.jpg", "_20.png", "b_7.png", "a20.png", "a_.png", "a_0.png", "a_000.png", "a_123456789.png",
-                                        "a_1234567890.png", "a_20", "a_20.png.bak", ".a_20.png", "a_2x.png", "a-b_c_20.png", "a_20.png.png"};
+    static const char *const names[] = {"a_00020.png",     "a_20.rawls",       "a_20.PNG",    "a_20.jpg",     "_20.png",
+                                        "b_7.png",         "a20.png",          "a_.png",      "a_0.png",      "a_000.png",
+                                        "a_123456789.png", "a_1234567890.png", "a_20",        "a_20.png.bak", ".a_20.png",
+                                        "a_2x.png",        "a-b_c_20.png",     "a_20.png.png"};
     char dir[600], name[300];
     for (size_t i = 0; i < sizeof names / sizeof names[0] + 3; i++) {
         size_t more = i - sizeof names / sizeof names[0];
@@ -363,12 +364,13 @@ static void tell_import(FILE *f, const char *name, const char *dir, const char *
         return;
     }
     assert_int_equal(seq_manifest_read(out, &m, NULL), 0);
-    fprintf(f, "labelled %d; %s of %s by %s, %ux%u in %u, reference %u %d, levels", labelled, m.scene, m.source, m.renderer, m.width, m.height, m.block, m.reference_spp,
-            m.reference_independent);
+    fprintf(f, "labelled %d; %s of %s by %s, %ux%u in %u, reference %u %d, levels", labelled, m.scene, m.source, m.renderer,
+            m.width, m.height, m.block, m.reference_spp, m.reference_independent);
     for (uint32_t i = 0; i < m.n_levels; i++)
         fprintf(f, " %u", m.levels[i]);
     for (uint32_t i = 0; i < m.n_blocks; i++)
-        fprintf(f, "; %u %s %u,%u..%u,%u", m.blocks[i].id, m.blocks[i].file, m.blocks[i].x0, m.blocks[i].y0, m.blocks[i].x1, m.blocks[i].y1);
+        fprintf(f, "; %u %s %u,%u..%u,%u", m.blocks[i].id, m.blocks[i].file, m.blocks[i].x0, m.blocks[i].y0, m.blocks[i].x1,
+                m.blocks[i].y1);
     fputc('\n', f);
     seq_manifest_release(&m);
     if (!labelled)
@@ -393,10 +395,21 @@ static void views_are_told_word_by_word(void **state)
         const char *name, *thresholds;
         void (*spoil)(const char *dir);
         int block, gaps;
-    } cases[] = {{"whole", "p3d_toy-view2;1;2;3;4\np3d_toy-view2_part6;40;99.5;100;101\n", keep, BLOCK, 0}, {"named", "other;1\np3d_toy-view2;1;2;3;4\nnamed;5;6;7;8", keep, BLOCK, 0},
-                 {"folder", "x;1\nfolder;5;6;7;8", keep, BLOCK, 0}, {"nobody", "x;1", keep, BLOCK, 0}, {"few", "few;5;6;7", keep, BLOCK, 0}, {"large", "large;7", keep, SIDE, 0},
-                 {"odd5", "odd5;1", keep, 5, 0}, {"drop", NULL, drop_level, BLOCK, 0}, {"second", NULL, second_gone, BLOCK, 0}, {"early", NULL, early, BLOCK, 0}, {"gaps", NULL, early, BLOCK, 1},
-                 {"mix", NULL, mix_sizes, BLOCK, 0}, {"one", NULL, one_level, BLOCK, 0}, {"stranger2", NULL, stranger, BLOCK, 0}, {"twice", NULL, twice, BLOCK, 0},
+    } cases[] = {{"whole", "p3d_toy-view2;1;2;3;4\np3d_toy-view2_part6;40;99.5;100;101\n", keep, BLOCK, 0},
+                 {"named", "other;1\np3d_toy-view2;1;2;3;4\nnamed;5;6;7;8", keep, BLOCK, 0},
+                 {"folder", "x;1\nfolder;5;6;7;8", keep, BLOCK, 0},
+                 {"nobody", "x;1", keep, BLOCK, 0},
+                 {"few", "few;5;6;7", keep, BLOCK, 0},
+                 {"large", "large;7", keep, SIDE, 0},
+                 {"odd5", "odd5;1", keep, 5, 0},
+                 {"drop", NULL, drop_level, BLOCK, 0},
+                 {"second", NULL, second_gone, BLOCK, 0},
+                 {"early", NULL, early, BLOCK, 0},
+                 {"gaps", NULL, early, BLOCK, 1},
+                 {"mix", NULL, mix_sizes, BLOCK, 0},
+                 {"one", NULL, one_level, BLOCK, 0},
+                 {"stranger2", NULL, stranger, BLOCK, 0},
+                 {"twice", NULL, twice, BLOCK, 0},
                  {"kind", NULL, other_kind, BLOCK, 0}};
     struct transcript t;
     FILE *f = transcript_begin(&t);
@@ -404,7 +417,8 @@ static void views_are_told_word_by_word(void **state)
     (void)state;
     names_of_levels(f);
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        struct ggn_sin3d_options o = {.block = cases[i].block, .allow_gaps = cases[i].gaps, .progress = i == 0 ? tell_progress : NULL, .data = f};
+        struct ggn_sin3d_options o = {
+            .block = cases[i].block, .allow_gaps = cases[i].gaps, .progress = i == 0 ? tell_progress : NULL, .data = f};
         struct ggn_thresholds thresholds = {0};
         char csv[200];
         const char *dir = make_view(cases[i].name);
@@ -450,8 +464,9 @@ static void tell_rawls(FILE *f, const char *what, long value, const char *file, 
 
 static void rawls_are_told_word_by_word(void **state)
 {
-    static const uint32_t sizes[][3] = {{2, 2, 1}, {2, 2, 3}, {2, 2, 2}, {2, 2, 4}, {2, 2, 0}, {0, 2, 3}, {2, 0, 3}, {32768, 1, 1}, {32769, 1, 1}, {1, 32768, 1}, {1, 32769, 1}, {32768, 4096, 3},
-                                        {32768, 4097, 3}, {3, 1, 3}, {1, 4, 3}};
+    static const uint32_t sizes[][3] = {{2, 2, 1},     {2, 2, 3},        {2, 2, 2},        {2, 2, 4},     {2, 2, 0},
+                                        {0, 2, 3},     {2, 0, 3},        {32768, 1, 1},    {32769, 1, 1}, {1, 32768, 1},
+                                        {1, 32769, 1}, {32768, 4096, 3}, {32768, 4097, 3}, {3, 1, 3},     {1, 4, 3}};
     float v[12] = {0, 0.5f, 1, 2, -1, 3.25f, 7, 8, 9, 10, 11, 1e-3f};
     char file[512], last[256] = "";
     struct transcript t;
@@ -515,7 +530,8 @@ static void print_image(FILE *f, const char *name)
 
 static void pictures_of_others(void **state)
 {
-    static const char *const names[] = {"none.png", "grey.png", "grey-alpha.png", "rgba.png", "mixed.exr", "xyz.exr", "two.exr", "parts.exr", "half.exr", "folder.png"};
+    static const char *const names[] = {"none.png", "grey.png", "grey-alpha.png", "rgba.png", "mixed.exr",
+                                        "xyz.exr",  "two.exr",  "parts.exr",      "half.exr", "folder.png"};
     struct transcript t;
     FILE *f = transcript_begin(&t);
     char path[600], command[2000];
@@ -523,10 +539,15 @@ static void pictures_of_others(void **state)
     struct ggn_image8 image;
     (void)state;
     snprintf(command, sizeof command,
-             "cd %s && mkdir folder.png && oiiotool --pattern constant:color=0.3 2x1 1 -d uint8 -o grey.png --pattern constant:color=0.3,0.5 2x1 2 --chnames Y,A -d uint8 -o grey-alpha.png "
-             "--pattern constant:color=0.1,0.2,0.3,0.5 2x1 4 -d uint8 -o rgba.png --pattern constant:color=9,0.2,0.3,0.4,8 2x1 5 --chnames AA,G,B,R,Z -d float -o mixed.exr "
-             "--pattern constant:color=0.1,0.2,-0.3,0.4 2x1 4 --chnames x1,x2,x3,x4 -d float -o xyz.exr --pattern constant:color=0.7,0.2 2x1 2 --chnames a1,lull.spp -d float -o two.exr "
-             "--pattern constant:color=0.25,2,1 3x2 3 -d half -o half.exr --pattern constant:color=7,5 3x2 2 --chnames other,lull.spp -d float --siappend -o parts.exr >/dev/null 2>&1", root);
+             "cd %s && mkdir folder.png && oiiotool --pattern constant:color=0.3 2x1 1 -d uint8 -o grey.png --pattern "
+             "constant:color=0.3,0.5 2x1 2 --chnames Y,A -d uint8 -o grey-alpha.png "
+             "--pattern constant:color=0.1,0.2,0.3,0.5 2x1 4 -d uint8 -o rgba.png --pattern constant:color=9,0.2,0.3,0.4,8 "
+             "2x1 5 --chnames AA,G,B,R,Z -d float -o mixed.exr "
+             "--pattern constant:color=0.1,0.2,-0.3,0.4 2x1 4 --chnames x1,x2,x3,x4 -d float -o xyz.exr --pattern "
+             "constant:color=0.7,0.2 2x1 2 --chnames a1,lull.spp -d float -o two.exr "
+             "--pattern constant:color=0.25,2,1 3x2 3 -d half -o half.exr --pattern constant:color=7,5 3x2 2 --chnames "
+             "other,lull.spp -d float --siappend -o parts.exr >/dev/null 2>&1",
+             root);
     if (system(command) != 0)
         fail_msg("oiiotool failed");
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++)
@@ -548,9 +569,16 @@ static void pictures_of_others(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(layout), cmocka_unit_test(resume), cmocka_unit_test(bad_layouts), cmocka_unit_test(scene_names),
-        cmocka_unit_test(rawls), cmocka_unit_test(rawls_layout), cmocka_unit_test(real_sequence),
-        cmocka_unit_test(views_are_told_word_by_word), cmocka_unit_test(rawls_are_told_word_by_word), cmocka_unit_test(pictures_of_others),
+        cmocka_unit_test(layout),
+        cmocka_unit_test(resume),
+        cmocka_unit_test(bad_layouts),
+        cmocka_unit_test(scene_names),
+        cmocka_unit_test(rawls),
+        cmocka_unit_test(rawls_layout),
+        cmocka_unit_test(real_sequence),
+        cmocka_unit_test(views_are_told_word_by_word),
+        cmocka_unit_test(rawls_are_told_word_by_word),
+        cmocka_unit_test(pictures_of_others),
     };
     return cmocka_run_group_tests_name("import_sin3d", tests, setup, teardown);
 }

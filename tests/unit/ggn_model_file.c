@@ -399,8 +399,10 @@ static void parsed(int at, int bytes, uint64_t value, const char *want)
 
 static void test_refused_containers(void **state)
 {
-    static const char shape[] = "n: tensor 'a/one' has an impossible shape", outside[] = "n: tensor 'a/one' lies outside of the file";
-    static const char kind[] = "n: tensor 'a/one' has an unknown type or rank", table[] = "n: the tensor table lies outside of the file";
+    static const char shape[] = "n: tensor 'a/one' has an impossible shape",
+                      outside[] = "n: tensor 'a/one' lies outside of the file";
+    static const char kind[] = "n: tensor 'a/one' has an unknown type or rank",
+                      table[] = "n: the tensor table lies outside of the file";
     static const char description[] = "n: the description lies outside of the file";
     const int e = AT_ENTRY;
 
@@ -495,9 +497,10 @@ static void test_names_and_values(void **state)
 
 /* --- the description ------------------------------------------------------------------------------------------------------ */
 
-static const char described[] = "{\"kind\":\"model\",\"preset\":\"lull\",\"height\":16,\"width\":17,\"window\":2,\"k_r\":3,\"k_m\":4,\"k_d\":5,"
-                                "\"picture\":1,\"calibration\":{\"scale\":2,\"shift\":-1,\"threshold\":0.25,\"spacing\":1.5,"
-                                "\"consecutive\":3},\"provenance\":{\"seed\":7}}";
+static const char described[] =
+    "{\"kind\":\"model\",\"preset\":\"lull\",\"height\":16,\"width\":17,\"window\":2,\"k_r\":3,\"k_m\":4,\"k_d\":5,"
+    "\"picture\":1,\"calibration\":{\"scale\":2,\"shift\":-1,\"threshold\":0.25,\"spacing\":1.5,"
+    "\"consecutive\":3},\"provenance\":{\"seed\":7}}";
 
 /* The description with one text for another: what parsing says ("": it reads it). */
 static void describe(const char *from, const char *to, const char *want)
@@ -592,7 +595,8 @@ static void test_refused_models(void **state)
         const struct ggn_entry *e = &c.entry[i < c.n_entries ? i : 0];
         const int dim[] = {(int)e->dim[0], (int)e->dim[1], (int)e->dim[2], (int)e->dim[3]};
         const float *values = (const float *)(const void *)(c.data + e->offset);
-        assert_int_equal(ggn_container_add(&more, i < c.n_entries ? e->name : "more", GGN_F32, e->rank, dim, values, NULL), 0);
+        assert_int_equal(ggn_container_add(&more, i < c.n_entries ? e->name : "more", GGN_F32, e->rank, dim, values, NULL),
+                         0);
     }
     assert_int_equal(ggn_container_write(&more, path, NULL), 0);
     snprintf(want, sizeof want, "%s: %d tensors where the networks have %d", path, c.n_entries + 1, c.n_entries);
@@ -609,12 +613,20 @@ static void test_refused_models(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_round_trip), cmocka_unit_test(test_truncated),
-                                       cmocka_unit_test(test_bit_flips),  cmocka_unit_test(test_forged),
-                                       cmocka_unit_test(test_not_finite), cmocka_unit_test(test_too_large),
-                                       cmocka_unit_test(test_paths),      cmocka_unit_test(test_half_floats),
-                                       cmocka_unit_test(test_picture),    cmocka_unit_test(test_layout),
-                                       cmocka_unit_test(test_refused_containers), cmocka_unit_test(test_names_and_values), cmocka_unit_test(test_longest_description),
-                                       cmocka_unit_test(test_descriptions), cmocka_unit_test(test_refused_models)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_round_trip),
+                                       cmocka_unit_test(test_truncated),
+                                       cmocka_unit_test(test_bit_flips),
+                                       cmocka_unit_test(test_forged),
+                                       cmocka_unit_test(test_not_finite),
+                                       cmocka_unit_test(test_too_large),
+                                       cmocka_unit_test(test_paths),
+                                       cmocka_unit_test(test_half_floats),
+                                       cmocka_unit_test(test_picture),
+                                       cmocka_unit_test(test_layout),
+                                       cmocka_unit_test(test_refused_containers),
+                                       cmocka_unit_test(test_names_and_values),
+                                       cmocka_unit_test(test_longest_description),
+                                       cmocka_unit_test(test_descriptions),
+                                       cmocka_unit_test(test_refused_models)};
     return cmocka_run_group_tests(tests, setup, teardown);
 }

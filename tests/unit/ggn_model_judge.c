@@ -51,16 +51,14 @@ static double picture_logit(struct ggn_judge *j, uint32_t first, const uint8_t *
     return logit;
 }
 
-static double window_logit(struct ggn_judge *j, uint32_t first)
-{
-    return picture_logit(j, first, NULL);
-}
+static double window_logit(struct ggn_judge *j, uint32_t first) { return picture_logit(j, first, NULL); }
 
 /* The answer depends on the window alone: not on the judge, nor on what it judged before. */
 static void test_no_memory(void **state)
 {
     struct ggn_model *m = make();
-    struct ggn_judge *a = ggn_judge_create(m, GGN_PRECISION_F32, NULL, NULL), *b = ggn_judge_create(m, GGN_PRECISION_F32, NULL, NULL);
+    struct ggn_judge *a = ggn_judge_create(m, GGN_PRECISION_F32, NULL, NULL),
+                     *b = ggn_judge_create(m, GGN_PRECISION_F32, NULL, NULL);
 
     assert_true(a && b);
     double before = window_logit(a, 1), used = window_logit(a, 5), fresh = window_logit(b, 5);
@@ -99,8 +97,7 @@ static void compare_with_networks(const uint8_t *picture)
     ggn_exec_forward(gen, m->weights[GGN_NET_M], 2, GGN_EVAL);
     for (int c = 0; c < 2; c++)
         for (int y = 0; y < 24; y++)
-            memcpy(ggn_exec_plane(dis, 0, 0, c) + y * 34, ggn_exec_plane(gen, out, c, 0) + y * 34,
-                   33 * sizeof(float));
+            memcpy(ggn_exec_plane(dis, 0, 0, c) + y * 34, ggn_exec_plane(gen, out, c, 0) + y * 34, 33 * sizeof(float));
     for (int k = 0; k < 2 * AREA; k++) { /* its maps, to a few roundings of a float */
         int row;
         const float *map = ggn_judge_feature_map(j, k / AREA, &row);
@@ -160,7 +157,8 @@ static void test_picture(void **state)
 static void test_bf16(void **state)
 {
     struct ggn_model *m = make();
-    struct ggn_judge *f = ggn_judge_create(m, GGN_PRECISION_F32, NULL, NULL), *b = ggn_judge_create(m, GGN_PRECISION_BF16, NULL, NULL);
+    struct ggn_judge *f = ggn_judge_create(m, GGN_PRECISION_F32, NULL, NULL),
+                     *b = ggn_judge_create(m, GGN_PRECISION_BF16, NULL, NULL);
 
     assert_true(f && b);
     double exact = window_logit(f, 1), rounded = window_logit(b, 1), again = window_logit(b, 1);
@@ -185,14 +183,12 @@ static void test_memory_bounds(void **state)
     (void)state;
 }
 
-static double srgb(double v)
-{
-    return v <= 0.0031308 ? 12.92 * v : 1.055 * pow(v, 1 / 2.4) - 0.055;
-}
+static double srgb(double v) { return v <= 0.0031308 ? 12.92 * v : 1.055 * pow(v, 1 / 2.4) - 0.055; }
 
 static void test_srgb(void **state)
 {
-    const struct ggn_display brighter = {GGN_TRANSFER_SRGB, 0, 1.5}, gamma = {GGN_TRANSFER_GAMMA, 2.2, 1}, linear = {GGN_TRANSFER_LINEAR, 0, 2};
+    const struct ggn_display brighter = {GGN_TRANSFER_SRGB, 0, 1.5}, gamma = {GGN_TRANSFER_GAMMA, 2.2, 1},
+                             linear = {GGN_TRANSFER_LINEAR, 0, 2};
 
     for (int i = 0; i < 20000; i++) {
         float v[3] = {(float)(i / 19000.0), (float)pow(2, -20 + i / 900.0), (float)ggn_hash_unit((uint32_t)i, 1)};
@@ -235,7 +231,8 @@ static void test_exact(void **state)
     for (int k = 0; k < AREA; k++)
         picture[k] = (uint8_t)(k % 7);
     for (int with = 0; with < 2; with++) {
-        double exact = ggn_exact_logit(e, n, w, with ? picture : NULL), judged = ggn_judge_logit(j, n, w, with ? picture : NULL, 33, 24);
+        double exact = ggn_exact_logit(e, n, w, with ? picture : NULL),
+               judged = ggn_judge_logit(j, n, w, with ? picture : NULL, 33, 24);
         if (!(fabs(exact - judged) < 1e-4 * fmax(1, fabs(judged))))
             fail_msg("picture %d: double %.12g, judge %.12g", with, exact, judged);
         differ += exact != judged;
@@ -287,7 +284,8 @@ static int begin_of(int n, int tile, int k)
 
 /* The block cut into images of the network's size, each judged alone: the highest logit, and what the last tile that covers a pixel makes
  * of it. */
-static double tile_by_tile(struct ggn_judge *j, uint8_t noisy[3][MOST], const uint8_t *picture, int w, int h, uint16_t denoised[3][MOST])
+static double tile_by_tile(struct ggn_judge *j, uint8_t noisy[3][MOST], const uint8_t *picture, int w, int h,
+                           uint16_t denoised[3][MOST])
 {
     static uint8_t cut[3][BYTES], small[AREA];
     static uint16_t out[3][BYTES];
@@ -391,9 +389,10 @@ static void test_exact_without_numbers(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_no_memory),     cmocka_unit_test(test_against_networks), cmocka_unit_test(test_picture),
-                                       cmocka_unit_test(test_memory_bounds), cmocka_unit_test(test_bf16), cmocka_unit_test(test_exact),
-                                       cmocka_unit_test(test_srgb),          cmocka_unit_test(test_cleaning),
-                                       cmocka_unit_test(test_tiles), cmocka_unit_test(test_exact_without_numbers)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_no_memory), cmocka_unit_test(test_against_networks),
+                                       cmocka_unit_test(test_picture),   cmocka_unit_test(test_memory_bounds),
+                                       cmocka_unit_test(test_bf16),      cmocka_unit_test(test_exact),
+                                       cmocka_unit_test(test_srgb),      cmocka_unit_test(test_cleaning),
+                                       cmocka_unit_test(test_tiles),     cmocka_unit_test(test_exact_without_numbers)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -47,7 +47,7 @@ static int setup(void **state)
 static int with_picture; /* of the networks that are made next */
 
 static struct ggn_trainer *make_one_of(enum ggn_preset preset, double lr, struct base_threads *threads,
-                                        struct base_team *team)
+                                       struct base_team *team)
 {
     struct ggn_hyper hyper = {preset, H, W, WINDOW, 4, 6, 4, with_picture};
     struct ggn_train_options options = ggn_train_options_default(preset);
@@ -208,7 +208,8 @@ static void check_adam(const struct ggn_trainer *t, int net, const float *before
         double want = was - o->lr[net] * (m[i] / c1) / (sqrt(v[i] / c2) + o->eps);
         /* rounding of the parameter, and of moments that are sums of floats */
         if (!(fabs((double)t->weights[net]->params[i] - want) <= 2e-7 * fabs(was) + 2e-5 * o->lr[net]))
-            fail_msg("net %d, step %d, parameter %zu: %.9g, not %.9g", net, step, i, (double)t->weights[net]->params[i], want);
+            fail_msg("net %d, step %d, parameter %zu: %.9g, not %.9g", net, step, i, (double)t->weights[net]->params[i],
+                     want);
     }
     assert_true(sqrt(norm2) <= o->clip * (1 + 1e-5) && norm2 > 0);
 }
@@ -292,7 +293,10 @@ static void test_copy(void **state)
 static void test_refusals(void **state)
 {
     struct ggn_hyper hyper = {GGN_PRESET_LULL, H, W, WINDOW, 4, 6, 4, 0};
-    struct ggn_batch batch = {.count = BATCH, .noisy = data.p_noisy, .denoised = data.p_denoised, .reference = data.p_reference,
+    struct ggn_batch batch = {.count = BATCH,
+                              .noisy = data.p_noisy,
+                              .denoised = data.p_denoised,
+                              .reference = data.p_reference,
                               .label = data.label};
     struct ggn_paper_record record;
     struct base_err err = {0};
@@ -313,7 +317,8 @@ static void test_refusals(void **state)
             snprintf(want, sizeof want, "a batch of %d is not in 1..%d", batch.count, BATCH);
             assert_int_equal(ggn_trainer_judge_step(t, &batch, &loss, NULL, &err), BASE_EINVAL);
             assert_string_equal(err.text, want);
-            assert_int_equal(ggn_trainer_denoiser_step(t, data.p_first, data.p_reference, batch.count, &loss, &err), BASE_EINVAL);
+            assert_int_equal(ggn_trainer_denoiser_step(t, data.p_first, data.p_reference, batch.count, &loss, &err),
+                             BASE_EINVAL);
             assert_string_equal(err.text, want);
         }
         batch.count = BATCH;
@@ -409,10 +414,15 @@ static int take_steps(struct process *p)
     int rc = 0;
 
     for (int step = 0; step < 3 && !rc; step++) {
-        const int count = step == 1 ? BATCH - 1 : BATCH, first = (int)base_team_first(p->team, count, base_team_rank(p->team));
+        const int count = step == 1 ? BATCH - 1 : BATCH,
+                  first = (int)base_team_first(p->team, count, base_team_rank(p->team));
         const float *const none[BATCH] = {NULL};
-        struct ggn_batch b = {.count = count, .noisy = data.p_noisy + first * PLANES, .label = data.label, .picture = none,
-                              .denoised = data.p_denoised + first * PLANES, .reference = data.p_reference + 3 * first};
+        struct ggn_batch b = {.count = count,
+                              .noisy = data.p_noisy + first * PLANES,
+                              .label = data.label,
+                              .picture = none,
+                              .denoised = data.p_denoised + first * PLANES,
+                              .reference = data.p_reference + 3 * first};
         struct ggn_paper_record record;
         if (p->preset == GGN_PRESET_PAPER) {
             rc = ggn_trainer_paper_step(p->trainer, &b, &record, &err);
@@ -479,8 +489,14 @@ static void test_processes(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_learns), cmocka_unit_test(test_learns_from_the_picture), cmocka_unit_test(test_resume_and_threads),
-                                       cmocka_unit_test(test_adam), cmocka_unit_test(test_paper), cmocka_unit_test(test_copy),
-                                       cmocka_unit_test(test_processes), cmocka_unit_test(test_refusals), cmocka_unit_test(test_clip_and_explode)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_learns),
+                                       cmocka_unit_test(test_learns_from_the_picture),
+                                       cmocka_unit_test(test_resume_and_threads),
+                                       cmocka_unit_test(test_adam),
+                                       cmocka_unit_test(test_paper),
+                                       cmocka_unit_test(test_copy),
+                                       cmocka_unit_test(test_processes),
+                                       cmocka_unit_test(test_refusals),
+                                       cmocka_unit_test(test_clip_and_explode)};
     return cmocka_run_group_tests(tests, setup, NULL);
 }

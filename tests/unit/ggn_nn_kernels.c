@@ -17,10 +17,7 @@
 
 static const double F32_TOLERANCE = 2e-5, F64_TOLERANCE = 1e-12; /* of sums of up to some thousand products of order 1 */
 
-static double rnd(uint32_t k, uint32_t s)
-{
-    return 2 * ggn_hash_unit(k, s) - 1;
-}
+static double rnd(uint32_t k, uint32_t s) { return 2 * ggn_hash_unit(k, s) - 1; }
 
 /* Oracle values of one random convolution. */
 struct oracle {
@@ -149,8 +146,8 @@ static void test_large_convolutions(void **state)
 }
 
 /* A convolution with bfloat16 products, and if `bn` a batch norm: [c_out][h][w], on one instruction set. Owned by the caller. */
-static float *bf16_forward(const struct ggn_naive_conv *c, const float *weight, const float *bias, const float *x, double slope,
-                           int bn, enum ggn_isa isa)
+static float *bf16_forward(const struct ggn_naive_conv *c, const float *weight, const float *bias, const float *x,
+                           double slope, int bn, enum ggn_isa isa)
 {
     static struct ggn_graph g;
     const int area = c->h * c->w, row = c->w + 1;
@@ -457,7 +454,8 @@ static void compare(const char *what, enum ggn_isa isa, int w, double tolerance)
 {
     for (int i = 0; i < ROOM; i++)
         if (!(fabs((double)got[i] - wanted[i]) <= tolerance * fmax(1, fabs(wanted[i]))))
-            fail_msg("%s on %s, width %d, element %d: %.9g, not %.9g", what, ggn_isa_name(isa), w, i, (double)got[i], wanted[i]);
+            fail_msg("%s on %s, width %d, element %d: %.9g, not %.9g", what, ggn_isa_name(isa), w, i, (double)got[i],
+                     wanted[i]);
 }
 
 static void scalar(const char *what, enum ggn_isa isa, int w, double value, double want)
@@ -516,7 +514,8 @@ static void check_plane(const struct ggn_kernels *k, int h, int w)
     k->lrelu(got, ka, 0.2f, h, w, row);
     compare("lrelu", k->isa, w, F32_TOLERANCE);
     for (int i = 0; i < h * w; i++)
-        wanted[i / w * row + i % w] = 1 / (1 + exp(-100 * (double)(kc[i / w * row + i % w] = 100 * ka[i / w * row + i % w]) / 100));
+        wanted[i / w * row + i % w] =
+            1 / (1 + exp(-100 * (double)(kc[i / w * row + i % w] = 100 * ka[i / w * row + i % w]) / 100));
     k->sigmoid(got, kc, h, w, row);
     compare("sigmoid", k->isa, w, 3e-7);
     for (int i = 0; i < h * w; i++) {
@@ -585,7 +584,8 @@ static void check_up(const struct ggn_kernels *k, int h, int w)
             double *to = &wanted[i / w * row + i % w];
             *to = add ? *to : 0;
             for (int p = 0; p < 4 * h * w; p++)
-                *to += tent(p / (2 * w), i / w, h) * tent(p % (2 * w), i % w, w) * (double)kb[p / (2 * w) * row_y + p % (2 * w)];
+                *to += tent(p / (2 * w), i / w, h) * tent(p % (2 * w), i % w, w) *
+                       (double)kb[p / (2 * w) * row_y + p % (2 * w)];
         }
         k->up_grad(got, kb, add, h, w, row_y, row);
         compare("up_grad", k->isa, w, F32_TOLERANCE);
@@ -644,7 +644,8 @@ static void test_input_gradient_is_left_alone(void **state)
         for (int wanted_too = 0; wanted_too < 2; wanted_too++) {
             build(&g, net);
             struct ggn_weights *w = ggn_weights_create(&g, NULL, GGN_WEIGHTS_BACKWARD, NULL);
-            struct ggn_exec *e = ggn_exec_create(&g, NULL, 1, GGN_EXEC_GRADS | (wanted_too ? GGN_EXEC_INPUT_GRAD : 0), NULL, NULL);
+            struct ggn_exec *e =
+                ggn_exec_create(&g, NULL, 1, GGN_EXEC_GRADS | (wanted_too ? GGN_EXEC_INPUT_GRAD : 0), NULL, NULL);
             float *grad = calloc(g.n_params, sizeof *grad);
             const struct ggn_value *in = &g.value[0], *out = &g.value[g.n_values - 1];
             assert_true(w && e && grad);
@@ -657,7 +658,8 @@ static void test_input_gradient_is_left_alone(void **state)
                 ggn_exec_grad(e, g.n_values - 1, 0, k / (out->h * out->w))[k / out->w % out->h * out->row + k % out->w] = 1;
             ggn_exec_backward(e, w, grad);
             for (int k = 0; k < in->c * in->h * in->w; k++)
-                assert_int_equal(ggn_exec_grad(e, 0, 0, k / (in->h * in->w))[k / in->w % in->h * in->row + k % in->w] != SENTINEL,
+                assert_int_equal(ggn_exec_grad(e, 0, 0, k / (in->h * in->w))[k / in->w % in->h * in->row + k % in->w] !=
+                                     SENTINEL,
                                  wanted_too);
             ggn_weights_destroy(w);
             ggn_exec_destroy(e);
@@ -704,9 +706,9 @@ static void test_ssim(void **state)
             }
             for (int k = 0; k < 5; k++)
                 sum[k] /= sum[5];
-            total += (2 * sum[0] * sum[1] + 1e-4) * (2 * (sum[4] - sum[0] * sum[1]) + 9e-4) /
-                     ((sum[0] * sum[0] + sum[1] * sum[1] + 1e-4) *
-                      (sum[2] - sum[0] * sum[0] + sum[3] - sum[1] * sum[1] + 9e-4));
+            total +=
+                (2 * sum[0] * sum[1] + 1e-4) * (2 * (sum[4] - sum[0] * sum[1]) + 9e-4) /
+                ((sum[0] * sum[0] + sum[1] * sum[1] + 1e-4) * (sum[2] - sum[0] * sum[0] + sum[3] - sum[1] * sum[1] + 9e-4));
         }
         each = ggn_ssim_mean(s, px + n, py + n, NULL, 1, ROW, 0);
         assert_true(fabs(each - total / (H * W)) < 1e-5);
@@ -719,7 +721,8 @@ static void test_ssim(void **state)
     x[66][5 * ROW + 3] = old + 0.01f;
     double high = ggn_ssim_mean(s, px, py, NULL, N, ROW, 0);
     x[66][5 * ROW + 3] = old - 0.01f;
-    assert_true(fabs((high - ggn_ssim_mean(s, px, py, NULL, N, ROW, 0)) / 0.02 * 3 - (double)kept) < 0.02 * fabs((double)kept));
+    assert_true(fabs((high - ggn_ssim_mean(s, px, py, NULL, N, ROW, 0)) / 0.02 * 3 - (double)kept) <
+                0.02 * fabs((double)kept));
     ggn_ssim_destroy(s);
     ggn_ssim_destroy(both);
     base_threads_destroy(threads);
@@ -728,11 +731,16 @@ static void test_ssim(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_convolutions),       cmocka_unit_test(test_large_convolutions),
-                                       cmocka_unit_test(test_bf16), cmocka_unit_test(test_bf16_bits),               cmocka_unit_test(test_row_ends),
-                                       cmocka_unit_test(test_instruction_sets),   cmocka_unit_test(test_threads_same_bytes),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_convolutions),
+                                       cmocka_unit_test(test_large_convolutions),
+                                       cmocka_unit_test(test_bf16),
+                                       cmocka_unit_test(test_bf16_bits),
+                                       cmocka_unit_test(test_row_ends),
+                                       cmocka_unit_test(test_instruction_sets),
+                                       cmocka_unit_test(test_threads_same_bytes),
                                        cmocka_unit_test(test_batch_same_bytes),
-                                       cmocka_unit_test(test_planes),             cmocka_unit_test(test_input_gradient_is_left_alone),
+                                       cmocka_unit_test(test_planes),
+                                       cmocka_unit_test(test_input_gradient_is_left_alone),
                                        cmocka_unit_test(test_ssim)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

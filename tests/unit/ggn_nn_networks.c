@@ -24,24 +24,29 @@ static void put_graph(FILE *f, const struct ggn_graph *g)
     static const char nothing[] = "-";
     size_t offset[GGN_MAX_LAYERS + 1];
 
-    fprintf(f, "=== %s: params %zu stats %zu learned %zu pack %zu acts %zu, for inference %zu, %.0f multiplications\n", g->name,
-            g->n_params, g->n_stats, g->n_learned, g->n_pack, g->n_acts, ggn_graph_place(g, offset), ggn_graph_mac(g));
+    fprintf(f, "=== %s: params %zu stats %zu learned %zu pack %zu acts %zu, for inference %zu, %.0f multiplications\n",
+            g->name, g->n_params, g->n_stats, g->n_learned, g->n_pack, g->n_acts, ggn_graph_place(g, offset),
+            ggn_graph_mac(g));
     for (int i = 0; i < g->n_values; i++) {
         const struct ggn_value *v = &g->value[i];
-        fprintf(f, "value %d: %d x %d x %d flat %d row %d origin %zu plane %zu size %zu at %zu, %zu, used %d, %s\n", i, v->c, v->h, v->w,
-                v->flat, v->row, v->origin, v->plane, v->size, v->offset, offset[i], v->uses, v->stage ? v->stage : nothing);
+        fprintf(f, "value %d: %d x %d x %d flat %d row %d origin %zu plane %zu size %zu at %zu, %zu, used %d, %s\n", i, v->c,
+                v->h, v->w, v->flat, v->row, v->origin, v->plane, v->size, v->offset, offset[i], v->uses,
+                v->stage ? v->stage : nothing);
     }
     for (int i = 0; i < g->n_layers; i++) {
         const struct ggn_layer *l = &g->layer[i];
-        fprintf(f, "layer %d: %s %d %d to %d kernel %d stride %d pad %d, %d, %d transposed %d slope %g drop %g weight %zu bias %zu "
-                "pack %zu stats %zu add %d %d, in %d, %.0f multiplications, %s\n", i, ggn_op_name(l->op), l->in, l->in2, l->out, l->kernel,
-                l->stride, l->pad, l->pad_y, l->pad_x, l->transposed, l->slope, l->drop, l->weight, l->bias, l->pack, l->stats, l->add_in,
-                l->add_in2, ggn_layer_c_in(g, l), ggn_layer_mac(g, i), l->stage);
+        fprintf(
+            f,
+            "layer %d: %s %d %d to %d kernel %d stride %d pad %d, %d, %d transposed %d slope %g drop %g weight %zu bias %zu "
+            "pack %zu stats %zu add %d %d, in %d, %.0f multiplications, %s\n",
+            i, ggn_op_name(l->op), l->in, l->in2, l->out, l->kernel, l->stride, l->pad, l->pad_y, l->pad_x, l->transposed,
+            l->slope, l->drop, l->weight, l->bias, l->pack, l->stats, l->add_in, l->add_in2, ggn_layer_c_in(g, l),
+            ggn_layer_mac(g, i), l->stage);
     }
     for (int i = 0; i < g->n_tensors; i++) {
         const struct ggn_tensor *t = &g->tensor[i];
-        fprintf(f, "tensor %d: %s [%d: %d %d %d %d] at %zu, %zu, layer %d bias %d bn %d\n", i, t->name, t->ndim, t->dim[0], t->dim[1],
-                t->dim[2], t->dim[3], t->offset, t->count, t->layer, t->is_bias, t->is_bn);
+        fprintf(f, "tensor %d: %s [%d: %d %d %d %d] at %zu, %zu, layer %d bias %d bn %d\n", i, t->name, t->ndim, t->dim[0],
+                t->dim[1], t->dim[2], t->dim[3], t->offset, t->count, t->layer, t->is_bias, t->is_bn);
     }
 }
 
@@ -99,7 +104,8 @@ static void scratch(void **state)
                 }
                 if (kernels->wino_grad && grads && need < GGN_WINO_GRAD_SCRATCH)
                     need = GGN_WINO_GRAD_SCRATCH;
-                if (kernels->bf16 && flags[m] == GGN_EXEC_BF16 && need < ggn_bf16_scratch(in, graph.value[1].row, 16L * kernels->tile_px))
+                if (kernels->bf16 && flags[m] == GGN_EXEC_BF16 &&
+                    need < ggn_bf16_scratch(in, graph.value[1].row, 16L * kernels->tile_px))
                     need = ggn_bf16_scratch(in, graph.value[1].row, 16L * kernels->tile_px);
                 assert_true(e && e->scratch_size >= need && e->scratch_size % 16 == 0);
                 /* one worker's does not reach into the other's, nor the last one's into the statistics */
@@ -115,13 +121,14 @@ static void scratch(void **state)
 static void winograd(void **state)
 {
     /* the answers with 16 lanes and with 8, for the convolution and for its weights' gradient */
-    static const int suits[][7] = {{6, 34, 24, 16, 1, 1, 1}, {5, 200, 24, 16, 0, 1, 0}, {34, 6, 24, 16, 1, 1, 1}, {200, 5, 24, 16, 0, 1, 0},
-                                   {14, 14, 24, 16, 0, 1, 1}, {10, 20, 24, 16, 1, 1, 1}, {10, 20, 20, 16, 0, 1, 1}, {10, 20, 21, 13, 1, 1, 1},
-                                   {10, 20, 1, 96, 1, 1, 1}, {10, 20, 1, 92, 0, 1, 1}, {3, 11, 12, 12, 0, 1, 0}, {2, 40, 12, 12, 0, 0, 0},
-                                   {40, 2, 12, 12, 0, 0, 0}, {4, 8, 12, 12, 0, 1, 0}, {31, 1, 12, 12, 0, 0, 0}, {3, 10, 12, 12, 0, 0, 0},
-                                   {6, 10, 12, 12, 0, 1, 1}, {6, 9, 12, 12, 0, 1, 0}, {20, 20, 8, 16, 0, 0, 0}, {20, 20, 9, 9, 0, 1, 1}};
-    static const int cuts[][4] = {{24, 63, 2, 63}, {64, 63, 2, 63}, {64, 64, 1, 32}, {9, 80, 1, 40}, {9, 90, 1, 48}, {65, 64, 4, 64},
-                                  {128, 64, 4, 64}, {256, 20, 4, 20}, {257, 20, 5, 20}, {2500, 16, 40, 16}};
+    static const int suits[][7] = {
+        {6, 34, 24, 16, 1, 1, 1},  {5, 200, 24, 16, 0, 1, 0}, {34, 6, 24, 16, 1, 1, 1},  {200, 5, 24, 16, 0, 1, 0},
+        {14, 14, 24, 16, 0, 1, 1}, {10, 20, 24, 16, 1, 1, 1}, {10, 20, 20, 16, 0, 1, 1}, {10, 20, 21, 13, 1, 1, 1},
+        {10, 20, 1, 96, 1, 1, 1},  {10, 20, 1, 92, 0, 1, 1},  {3, 11, 12, 12, 0, 1, 0},  {2, 40, 12, 12, 0, 0, 0},
+        {40, 2, 12, 12, 0, 0, 0},  {4, 8, 12, 12, 0, 1, 0},   {31, 1, 12, 12, 0, 0, 0},  {3, 10, 12, 12, 0, 0, 0},
+        {6, 10, 12, 12, 0, 1, 1},  {6, 9, 12, 12, 0, 1, 0},   {20, 20, 8, 16, 0, 0, 0},  {20, 20, 9, 9, 0, 1, 1}};
+    static const int cuts[][4] = {{24, 63, 2, 63}, {64, 63, 2, 63},  {64, 64, 1, 32},  {9, 80, 1, 40},   {9, 90, 1, 48},
+                                  {65, 64, 4, 64}, {128, 64, 4, 64}, {256, 20, 4, 20}, {257, 20, 5, 20}, {2500, 16, 40, 16}};
     (void)state;
 
     for (size_t i = 0; i < sizeof suits / sizeof suits[0]; i++)
@@ -142,14 +149,12 @@ static void winograd(void **state)
 
 /* --- first weights --------------------------------------------------------------------------------------------------------------------- */
 
-static double uniform(size_t k, uint32_t seed)
-{
-    return 2 * ggn_hash_unit((uint32_t)k, seed) - 1;
-}
+static double uniform(size_t k, uint32_t seed) { return 2 * ggn_hash_unit((uint32_t)k, seed) - 1; }
 
 static double normal(size_t k, uint32_t seed)
 {
-    return sqrt(-2 * log(1 - ggn_hash_unit(2 * (uint32_t)k, seed))) * cos(2 * 3.141592653589793 * ggn_hash_unit(2 * (uint32_t)k + 1, seed));
+    return sqrt(-2 * log(1 - ggn_hash_unit(2 * (uint32_t)k, seed))) *
+           cos(2 * 3.141592653589793 * ggn_hash_unit(2 * (uint32_t)k + 1, seed));
 }
 
 /* What element k of a tensor begins as; fan: inputs of one of its outputs. */
@@ -159,16 +164,16 @@ static double initial(const struct ggn_tensor *t, enum ggn_init init, double fan
 
     switch (init) {
     case GGN_INIT_HASH:
-        return t->is_bias ? 0.1 * uniform(k, seed) : t->is_bn ? 1 + 0.1 * uniform(k, seed) : uniform(k, seed) * sqrt(6 / fan);
-    case GGN_INIT_PAPER:
-        return t->is_bn ? weight : uniform(k, seed) / sqrt(fan);
+        return t->is_bias ? 0.1 * uniform(k, seed)
+               : t->is_bn ? 1 + 0.1 * uniform(k, seed)
+                          : uniform(k, seed) * sqrt(6 / fan);
+    case GGN_INIT_PAPER: return t->is_bn ? weight : uniform(k, seed) / sqrt(fan);
     case GGN_INIT_GAN:
-        return t->is_bn && weight           ? 1 + 0.02 * normal(k, seed)
-               : t->is_bn                   ? 0
-               : weight && t->ndim == 4       ? 0.02 * normal(k, seed)
-                                            : uniform(k, seed) / sqrt(fan);
-    case GGN_INIT_HE:
-        return t->is_bn ? weight : weight ? normal(k, seed) * sqrt(2 / ((1 + 0.04) * fan)) : 0;
+        return t->is_bn && weight       ? 1 + 0.02 * normal(k, seed)
+               : t->is_bn               ? 0
+               : weight && t->ndim == 4 ? 0.02 * normal(k, seed)
+                                        : uniform(k, seed) / sqrt(fan);
+    case GGN_INIT_HE: return t->is_bn ? weight : weight ? normal(k, seed) * sqrt(2 / ((1 + 0.04) * fan)) : 0;
     }
     return (double)NAN;
 }
@@ -193,7 +198,8 @@ static void first_weights(void **state)
                 if (t->ndim > 1)
                     fan = t->dim[in] * (t->ndim == 4 ? t->dim[2] * t->dim[3] : 1);
                 for (size_t k = 0; k < t->count; k++) {
-                    double got = (double)w->params[t->offset + k], want = initial(t, (enum ggn_init)init, fan, k, 40 + (uint32_t)i);
+                    double got = (double)w->params[t->offset + k],
+                           want = initial(t, (enum ggn_init)init, fan, k, 40 + (uint32_t)i);
                     if (!(fabs(got - want) <= 1e-6 * fmax(1, fabs(want))))
                         fail_msg("%s, %s[%zu]: %g, not %g", graph.name, t->name, k, got, want);
                 }
@@ -215,10 +221,18 @@ static void packed(void **state)
         struct ggn_weights *w = ggn_weights_create(&graph, NULL, back ? GGN_WEIGHTS_BACKWARD : 0, NULL);
         assert_non_null(w);
         assert_true((w->pack_back != NULL) == back && w->bf16 == NULL && (size_t)w->params % 64 == 0);
-        const float *const starts[] = {w->params + graph.n_params + 2 * graph.n_stats, w->scale, w->scale + graph.n_stats, w->shift,
-                                       w->shift + graph.n_stats, w->pack, w->pack + graph.n_pack, w->wino ? w->wino : w->pack_back,
-                                       w->wino ? w->wino + 4 * graph.n_pack : NULL, w->wino ? w->pack_back : NULL,
-                                       back ? w->pack_back + graph.n_pack : NULL, w->wino_back};
+        const float *const starts[] = {w->params + graph.n_params + 2 * graph.n_stats,
+                                       w->scale,
+                                       w->scale + graph.n_stats,
+                                       w->shift,
+                                       w->shift + graph.n_stats,
+                                       w->pack,
+                                       w->pack + graph.n_pack,
+                                       w->wino ? w->wino : w->pack_back,
+                                       w->wino ? w->wino + 4 * graph.n_pack : NULL,
+                                       w->wino ? w->pack_back : NULL,
+                                       back ? w->pack_back + graph.n_pack : NULL,
+                                       w->wino_back};
         for (size_t i = 1; i < sizeof starts / sizeof starts[0]; i++)
             assert_true(!starts[i] || !starts[i - 1] || starts[i] >= starts[i - 1]);
         for (size_t i = 0; i < graph.n_stats; i++)
@@ -234,7 +248,8 @@ static void packed(void **state)
                 const struct ggn_layer *l = &graph.layer[i];
                 double scale = (double)w->params[l->weight + c] / sqrt((double)w->var[l->stats + c] + 1e-5);
                 double shift = (double)w->params[l->bias + c] - scale * (double)w->mean[l->stats + c];
-                assert_true(fabs((double)w->scale[l->stats + c] - scale) < 1e-6 && fabs((double)w->shift[l->stats + c] - shift) < 1e-6);
+                assert_true(fabs((double)w->scale[l->stats + c] - scale) < 1e-6 &&
+                            fabs((double)w->shift[l->stats + c] - shift) < 1e-6);
             }
         ggn_weights_destroy(w);
     }
@@ -280,20 +295,23 @@ static void ranges(void **state)
         const char *name;
         size_t at;
         int min, max;
-    } fields[] = {{"preset", offsetof(struct ggn_hyper, preset), 0, 1},  {"height", offsetof(struct ggn_hyper, height), 16, 1024},
-                  {"width", offsetof(struct ggn_hyper, width), 16, 1024}, {"window", offsetof(struct ggn_hyper, window), 1, 16},
-                  {"k_r", offsetof(struct ggn_hyper, k_r), 1, 128},      {"k_m", offsetof(struct ggn_hyper, k_m), 1, 128},
-                  {"k_d", offsetof(struct ggn_hyper, k_d), 1, 64},       {"picture", offsetof(struct ggn_hyper, picture), 0, 1}};
+    } fields[] = {
+        {"preset", offsetof(struct ggn_hyper, preset), 0, 1},   {"height", offsetof(struct ggn_hyper, height), 16, 1024},
+        {"width", offsetof(struct ggn_hyper, width), 16, 1024}, {"window", offsetof(struct ggn_hyper, window), 1, 16},
+        {"k_r", offsetof(struct ggn_hyper, k_r), 1, 128},       {"k_m", offsetof(struct ggn_hyper, k_m), 1, 128},
+        {"k_d", offsetof(struct ggn_hyper, k_d), 1, 64},        {"picture", offsetof(struct ggn_hyper, picture), 0, 1}};
     (void)state;
 
     for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++)
-        for (int value = fields[i].min - 1; value <= fields[i].max + 1; value += value == fields[i].min ? fields[i].max - value : 1) {
+        for (int value = fields[i].min - 1; value <= fields[i].max + 1;
+             value += value == fields[i].min ? fields[i].max - value : 1) {
             struct ggn_hyper h = {GGN_PRESET_LULL, 20, 20, 2, 3, 3, 3, 0};
             struct base_err err = {0};
             char want[96];
             memcpy((char *)&h + fields[i].at, &value, sizeof value);
             int good = value >= fields[i].min && value <= fields[i].max, rc = ggn_hyper_check(&h, &err);
-            snprintf(want, sizeof want, "hyper-parameter %s = %d is not in %d..%d", fields[i].name, value, fields[i].min, fields[i].max);
+            snprintf(want, sizeof want, "hyper-parameter %s = %d is not in %d..%d", fields[i].name, value, fields[i].min,
+                     fields[i].max);
             if (good)
                 assert_int_equal(rc, 0);
             else
@@ -301,7 +319,8 @@ static void ranges(void **state)
             assert_int_equal(ggn_network_build(&graph, GGN_NET_D, &h, NULL), rc);
         }
     const struct ggn_hyper d = ggn_hyper_default(GGN_PRESET_LULL);
-    assert_true(d.preset == GGN_PRESET_LULL && d.height == 200 && d.width == 200 && d.window == 6 && d.k_r == 16 && d.k_m == 20);
+    assert_true(d.preset == GGN_PRESET_LULL && d.height == 200 && d.width == 200 && d.window == 6 && d.k_r == 16 &&
+                d.k_m == 20);
     assert_true(d.k_d == 64 && d.picture == 0);
 }
 
@@ -364,8 +383,9 @@ static void graphs(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(structure), cmocka_unit_test(scratch), cmocka_unit_test(winograd),          cmocka_unit_test(first_weights),
-                                       cmocka_unit_test(packed),    cmocka_unit_test(instruction_sets), cmocka_unit_test(ranges),
-                                       cmocka_unit_test(graphs)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(structure), cmocka_unit_test(scratch),
+                                       cmocka_unit_test(winograd),  cmocka_unit_test(first_weights),
+                                       cmocka_unit_test(packed),    cmocka_unit_test(instruction_sets),
+                                       cmocka_unit_test(ranges),    cmocka_unit_test(graphs)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

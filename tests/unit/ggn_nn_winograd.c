@@ -39,10 +39,7 @@ static double *room(size_t n)
     return p;
 }
 
-static double value(size_t i, uint32_t seed)
-{
-    return (double)(float)(2 * ggn_hash_unit((uint32_t)i, seed) - 1);
-}
+static double value(size_t i, uint32_t seed) { return (double)(float)(2 * ggn_hash_unit((uint32_t)i, seed) - 1); }
 
 static void put(const struct work *w, float *plane, const double *from)
 {
@@ -131,8 +128,17 @@ static float *pack(const struct work *w, const struct ggn_kernels *k)
 static void run(const struct work *w, const struct ggn_kernels *k, int parts, int group, const unsigned char *add)
 {
     float bias[MOST], *u = pack(w, k), *scratch = malloc(ggn_wino_scratch(w->c.c_in) * sizeof *scratch);
-    struct ggn_conv conv = {.x = w->x, .y = w->y, .bias = bias, .add = add, .n_in = w->c.c_in, .n_out = w->c.c_out, .taps = 9,
-                            .h = w->c.h, .w_px = w->c.w, .row = w->c.w + 1, .slope = 0.25f};
+    struct ggn_conv conv = {.x = w->x,
+                            .y = w->y,
+                            .bias = bias,
+                            .add = add,
+                            .n_in = w->c.c_in,
+                            .n_out = w->c.c_out,
+                            .taps = 9,
+                            .h = w->c.h,
+                            .w_px = w->c.w,
+                            .row = w->c.w + 1,
+                            .slope = 0.25f};
     const int tiles = ggn_wino_tiles(w->c.h, w->c.w);
 
     assert_non_null(scratch);
@@ -144,8 +150,8 @@ static void run(const struct work *w, const struct ggn_kernels *k, int parts, in
     }
     for (int p = 0; p < parts; p++)
         for (int oc = 0; oc < w->c.c_out; oc += group)
-            k->wino(&conv, u, tiles * p / parts, tiles * (p + 1) / parts, oc, oc + group < w->c.c_out ? oc + group : w->c.c_out,
-                    scratch);
+            k->wino(&conv, u, tiles * p / parts, tiles * (p + 1) / parts, oc,
+                    oc + group < w->c.c_out ? oc + group : w->c.c_out, scratch);
     free(u);
     free(scratch);
 }
@@ -196,10 +202,16 @@ static void run_gradient(const struct work *w, const struct ggn_kernels *k, int 
     assert_non_null(scratch);
     for (int o = 0; o < n_out; o += GGN_WINO_GRAD)
         for (int i = 0; i < n_in; i += GGN_WINO_GRAD) {
-            const struct ggn_conv_grad g = {.x = w->x + i, .dy = (const float *const *)w->y + o, .h = w->c.h, .w_px = w->c.w,
+            const struct ggn_conv_grad g = {.x = w->x + i,
+                                            .dy = (const float *const *)w->y + o,
+                                            .h = w->c.h,
+                                            .w_px = w->c.w,
                                             .n_in = n_in - i < GGN_WINO_GRAD ? n_in - i : GGN_WINO_GRAD,
                                             .n_out = n_out - o < GGN_WINO_GRAD ? n_out - o : GGN_WINO_GRAD,
-                                            .row = w->c.w + 1, .dw = dw + (o * n_in + i) * 9, .o_step = 9L * n_in, .i_step = 9,
+                                            .row = w->c.w + 1,
+                                            .dw = dw + (o * n_in + i) * 9,
+                                            .o_step = 9L * n_in,
+                                            .i_step = 9,
                                             .mirrored = mirrored};
             k->wino_grad(&g, scratch);
         }

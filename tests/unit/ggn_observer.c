@@ -36,10 +36,7 @@ static struct seq_block make_block(double sigma, double texture, uint32_t seed, 
 
 /* --- the kernel --- */
 
-static double naive_lightness(double y)
-{
-    return y > 216.0 / 24389.0 ? 116.0 * cbrt(y) - 16.0 : y * 24389.0 / 27.0;
-}
+static double naive_lightness(double y) { return y > 216.0 / 24389.0 ? 116.0 * cbrt(y) - 16.0 : y * 24389.0 / 27.0; }
 
 static void lightness(void **state)
 {
@@ -67,10 +64,7 @@ static float pixel(const float *image, int w, int h, int x, int y)
     return image[y * w + x];
 }
 
-static int ends_of(int side, int k)
-{
-    return side * k / ((side + 99) / 100);
-}
+static int ends_of(int side, int k) { return side * k / ((side + 99) / 100); }
 
 /* Mean over a patch of values [h][w]. */
 static double patch_mean(const double *values, int w, int h, int patch)
@@ -175,8 +169,8 @@ static void remaining_noise(void **state)
 static void kernel(void **state)
 {
     (void)state;
-    static const int sizes[][2] = {{W, H}, {1, 1}, {1, 7}, {3, 2}, {5, 5}, {200, 1}, {41, 17},
-                                   {101, 30}, {205, 37}, {7, 350}, {100, 60}};
+    static const int sizes[][2] = {{W, H},   {1, 1},    {1, 7},    {3, 2},   {5, 5},   {200, 1},
+                                   {41, 17}, {101, 30}, {205, 37}, {7, 350}, {100, 60}};
     static float a[P], b[P], noise[P];
     static double scratch[5 * 300], texture[8], naive[8];
     for (size_t k = 0; k < sizeof sizes / sizeof sizes[0]; k++) {
@@ -399,7 +393,8 @@ static void parts(void **state)
             cut[1][c * PW * PH + k] = d[at];
         }
     assert_true(part.spp[AT] > full->spp);
-    assert_near(seen_by_hand(cut[0], cut[1], PW, PH, sqrt(full->spp / part.spp[AT])), part.visible[AT], 1e-5 * part.visible[AT]);
+    assert_near(seen_by_hand(cut[0], cut[1], PW, PH, sqrt(full->spp / part.spp[AT])), part.visible[AT],
+                1e-5 * part.visible[AT]);
     assert_int_equal(ggn_curve_part(&b, X, Y, W, PH, &all, &err), BASE_EINVAL);
     assert_non_null(strstr(err.text, "has no part"));
     ggn_curve_release(&whole);
@@ -499,8 +494,8 @@ static void checks(void **state)
     struct base_threads *threads = base_threads_create(2, NULL);
     assert_int_equal(ggn_view_check(&ggn_observer_default, &data.views[0], threads, found, &err), 0);
     for (int i = 0; i < 3; i++)
-        fprintf(f, "block %u: halves %.6g recorded %.6g beyond %d curve %.6g\n", found[i].id, found[i].halves, found[i].recorded,
-                found[i].beyond, found[i].curve);
+        fprintf(f, "block %u: halves %.6g recorded %.6g beyond %d curve %.6g\n", found[i].id, found[i].halves,
+                found[i].recorded, found[i].beyond, found[i].curve);
     assert_int_equal(ggn_view_label(&ggn_observer_default, &data.views[0], GGN_FROM_LEVELS, threads, &l, &err), 0);
     fprintf(f, "%s, cap %g, spread %g\n", l.detail, l.cap, l.spread);
     for (uint32_t i = 0; i < l.n; i++)
@@ -516,7 +511,8 @@ static void checks(void **state)
 }
 
 /* All that is written about a calibration, and about the labels of a view, as recorded. */
-static void record(const char *path, const struct ggn_dataset_view *view, const struct ggn_calibration *c, struct base_threads *threads)
+static void record(const char *path, const struct ggn_dataset_view *view, const struct ggn_calibration *c,
+                   struct base_threads *threads)
 {
     struct base_err err = {0};
     struct ggn_labels l;
@@ -527,8 +523,8 @@ static void record(const char *path, const struct ggn_dataset_view *view, const 
     fputs(text, f);
     free(text);
     for (int i = 0; i < c->n_blocks; i++)
-        fprintf(f, "view %d block %u: people %.6g, the others' observer %.6g\n", c->blocks[i].view, c->blocks[i].id, c->blocks[i].human,
-                c->blocks[i].predicted);
+        fprintf(f, "view %d block %u: people %.6g, the others' observer %.6g\n", c->blocks[i].view, c->blocks[i].id,
+                c->blocks[i].human, c->blocks[i].predicted);
     assert_int_equal(ggn_view_label(&c->observer, view, GGN_FROM_HALVES, threads, &l, &err), 0);
     fprintf(f, "%s: %s, cap %g, spread %g\n", l.source, l.detail, l.cap, l.spread);
     for (uint32_t i = 0; i < l.n; i++)
@@ -709,7 +705,8 @@ static void laws(void **state)
     assert_near(ggn_observer_next(100, 90, 1.5), 104, 1e-12);
     assert_near(ggn_observer_next(100, 90, 1.02), 102, 1e-12);
     ggn_observer_describe(&o, text, sizeof text);
-    assert_string_equal(text, "model observer: noise in L* is seen above 0.3000 sqrt(texture + 2) of a patch, spread 0.40 octaves");
+    assert_string_equal(
+        text, "model observer: noise in L* is seen above 0.3000 sqrt(texture + 2) of a patch, spread 0.40 octaves");
     /* 0.7 px: exp(-k^2 / 0.98) of five taps */
     static float impulse[15 * 15], seen[15 * 15];
     static double scratch[5 * 20];
@@ -812,7 +809,8 @@ static void refusals(void **state)
     struct seq_block b = make_block(0.3, 0.0, 7, 0);
     assert_int_equal(ggn_curve_make(&b, GGN_FROM_LEVELS, 1, &c, &err), BASE_EINVAL);
     assert_string_equal(err.text, "block 7 has no reference: record one, or use --source halves");
-    static const int parts_of[][5] = {{0, 0, W, H, 1}, {-1, 0, 5, 5, 0}, {0, -1, 5, 5, 0}, {0, 0, 0, 5, 0}, {0, 0, 5, 0, 0}, {W - 5, 0, 5, H, 1},
+    static const int parts_of[][5] = {{0, 0, W, H, 1},     {-1, 0, 5, 5, 0},    {0, -1, 5, 5, 0},
+                                      {0, 0, 0, 5, 0},     {0, 0, 5, 0, 0},     {W - 5, 0, 5, H, 1},
                                       {W - 4, 0, 5, 5, 0}, {0, H - 4, 5, 5, 0}, {W - 1, H - 1, 1, 1, 1}};
     for (size_t i = 0; i < sizeof parts_of / sizeof parts_of[0]; i++) {
         const int *p = parts_of[i];
@@ -830,7 +828,8 @@ static void refusals(void **state)
             if (b.levels[l].planes[p].plane == SEQ_PLANE_HALF_F16)
                 b.levels[l].n_planes = p;
     assert_int_equal(ggn_curve_make(&b, GGN_FROM_HALVES, 1, &c, &err), BASE_EINVAL);
-    assert_string_equal(err.text, "block 7 has no full level with a half-buffer difference: record one, or use --source levels");
+    assert_string_equal(err.text,
+                        "block 7 has no full level with a half-buffer difference: record one, or use --source levels");
     assert_int_equal(ggn_curve_part(&b, 0, 0, 5, 5, &c, &err), BASE_EINVAL);
     assert_string_equal(err.text, "block 7 has no full level with a half-buffer difference");
     struct seq_block two[2] = {make_block(0.3, 0.0, 8, 0), b};
@@ -847,11 +846,17 @@ static void parameter_files(void **state)
     static const struct {
         const char *text;
         int good;
-    } files[] = {{"{\"level\":1e-6,\"spread\":1e-3}", 1},   {"{\"level\":1e3,\"spread\":10}", 1},
-                 {"{\"level\":9e-7,\"spread\":1}", 0},      {"{\"level\":1001,\"spread\":1}", 0},
-                 {"{\"level\":1,\"spread\":9e-4}", 0},      {"{\"level\":1,\"spread\":10.1}", 0},
-                 {"{\"level\":\"1\",\"spread\":1}", 0},     {"[]", 0},
-                 {"{\"level\":1,\"spread\":1,\"each_view_left_out\":[{\"name\":\"a\",\"level\":2},{\"name\":\"b\",\"level\":5}]}", 2}};
+    } files[] = {
+        {"{\"level\":1e-6,\"spread\":1e-3}", 1},
+        {"{\"level\":1e3,\"spread\":10}", 1},
+        {"{\"level\":9e-7,\"spread\":1}", 0},
+        {"{\"level\":1001,\"spread\":1}", 0},
+        {"{\"level\":1,\"spread\":9e-4}", 0},
+        {"{\"level\":1,\"spread\":10.1}", 0},
+        {"{\"level\":\"1\",\"spread\":1}", 0},
+        {"[]", 0},
+        {"{\"level\":1,\"spread\":1,\"each_view_left_out\":[{\"name\":\"a\",\"level\":2},{\"name\":\"b\",\"level\":5}]}",
+         2}};
     char path[] = "/tmp/ggn_parameters.XXXXXX", want[160];
     struct base_err err = {0};
     struct ggn_observer o;
@@ -880,8 +885,9 @@ static void parameter_files(void **state)
 static void trials_by_hand(void **state)
 {
     (void)state;
-    static const char text[] = "0.0;1.0;1\n0.0;2.0;1\n0.0;3.0;0\n255.0;4.0;1\n255.0;6.0;0\r\n0;2;0 \t\n256;1;1\n-1;1;1\n1;0;1\n1;1e6;1\n"
-                               "1;5;2\n1;5;0.5\n1;5\n1,5,1\n1;5;1;\n3;999999;0";
+    static const char text[] =
+        "0.0;1.0;1\n0.0;2.0;1\n0.0;3.0;0\n255.0;4.0;1\n255.0;6.0;0\r\n0;2;0 \t\n256;1;1\n-1;1;1\n1;0;1\n1;1e6;1\n"
+        "1;5;2\n1;5;0.5\n1;5\n1,5,1\n1;5;1;\n3;999999;0";
     static const struct {
         int block;
         double level;
@@ -930,16 +936,30 @@ static void trials_by_hand(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(lightness),       cmocka_unit_test(kernel),
+        cmocka_unit_test(lightness),
+        cmocka_unit_test(kernel),
         cmocka_unit_test(remaining_noise),
-        cmocka_unit_test(apart),           cmocka_unit_test(people),
-        cmocka_unit_test(thresholds),      cmocka_unit_test(scaling),
-        cmocka_unit_test(noisy_reference), cmocka_unit_test(beyond_the_last_level),
-        cmocka_unit_test(needs), cmocka_unit_test(parts), cmocka_unit_test(joined),           cmocka_unit_test(calibration), cmocka_unit_test(left_out),
-        cmocka_unit_test(parameters),      cmocka_unit_test(built_in),
-        cmocka_unit_test(trials),          cmocka_unit_test(laws),
-        cmocka_unit_test(levels_of_curves), cmocka_unit_test(levels_by_hand), cmocka_unit_test(refusals),
-        cmocka_unit_test(parameter_files), cmocka_unit_test(trials_by_hand), cmocka_unit_test(checks),
+        cmocka_unit_test(apart),
+        cmocka_unit_test(people),
+        cmocka_unit_test(thresholds),
+        cmocka_unit_test(scaling),
+        cmocka_unit_test(noisy_reference),
+        cmocka_unit_test(beyond_the_last_level),
+        cmocka_unit_test(needs),
+        cmocka_unit_test(parts),
+        cmocka_unit_test(joined),
+        cmocka_unit_test(calibration),
+        cmocka_unit_test(left_out),
+        cmocka_unit_test(parameters),
+        cmocka_unit_test(built_in),
+        cmocka_unit_test(trials),
+        cmocka_unit_test(laws),
+        cmocka_unit_test(levels_of_curves),
+        cmocka_unit_test(levels_by_hand),
+        cmocka_unit_test(refusals),
+        cmocka_unit_test(parameter_files),
+        cmocka_unit_test(trials_by_hand),
+        cmocka_unit_test(checks),
     };
     return cmocka_run_group_tests_name("observer", tests, NULL, NULL);
 }

@@ -56,10 +56,7 @@ static void render(uint64_t spp)
         }
 }
 
-static double luminance(const float rgb[3])
-{
-    return 0.2 * (double)rgb[0] + 0.7 * (double)rgb[1] + 0.1 * (double)rgb[2];
-}
+static double luminance(const float rgb[3]) { return 0.2 * (double)rgb[0] + 0.7 * (double)rgb[1] + 0.1 * (double)rgb[2]; }
 
 /* --- host ------------------------------------------------------------------------------------------------------------------------------ */
 
@@ -67,10 +64,20 @@ static struct lull_frame frame_of(uint32_t planes, const struct ggn_display *dis
 {
     static const int32_t transfers[] = {LULL_TRANSFER_SRGB, LULL_TRANSFER_LINEAR, LULL_TRANSFER_GAMMA};
 
-    return (struct lull_frame){.struct_size = sizeof(struct lull_frame), .width = WIDTH, .height = HEIGHT, .blocks = rects,
-                               .block_count = BLOCKS, .block_stride = sizeof rects[0], .planes = planes, .exposure = display->exposure,
-                               .transfer = transfers[display->transfer == GGN_TRANSFER_LINEAR ? 1 : display->transfer == GGN_TRANSFER_GAMMA ? 2 : 0],
-                               .gamma = display->gamma, .spp_max = spp_max, .rgb_to_xyz = {0, 0, 0, 0.2, 0.7, 0.1, 0, 0, 0}};
+    return (struct lull_frame){.struct_size = sizeof(struct lull_frame),
+                               .width = WIDTH,
+                               .height = HEIGHT,
+                               .blocks = rects,
+                               .block_count = BLOCKS,
+                               .block_stride = sizeof rects[0],
+                               .planes = planes,
+                               .exposure = display->exposure,
+                               .transfer = transfers[display->transfer == GGN_TRANSFER_LINEAR  ? 1
+                                                     : display->transfer == GGN_TRANSFER_GAMMA ? 2
+                                                                                               : 0],
+                               .gamma = display->gamma,
+                               .spp_max = spp_max,
+                               .rgb_to_xyz = {0, 0, 0, 0.2, 0.7, 0.1, 0, 0, 0}};
 }
 
 static const struct ggn_display usual = {GGN_TRANSFER_SRGB, 2.2, 1};
@@ -92,26 +99,39 @@ static struct lull_instance *created(const struct lull_criterion *c, const char 
     struct lull_error err = {.struct_size = sizeof err};
     struct lull_instance *in = NULL;
 
-    if (c->create(&hosts[next++ % 2], pairs, (uint32_t)((path != NULL) + (key != NULL)), sizeof pairs[0], &in, &err) != LULL_OK)
+    if (c->create(&hosts[next++ % 2], pairs, (uint32_t)((path != NULL) + (key != NULL)), sizeof pairs[0], &in, &err) !=
+        LULL_OK)
         fail_msg("%s", err.message);
     return in;
 }
 
-static int32_t evaluate(const struct lull_criterion *c, struct lull_instance *in, uint64_t spp, uint32_t ids, struct lull_decision *d)
+static int32_t evaluate(const struct lull_criterion *c, struct lull_instance *in, uint64_t spp, uint32_t ids,
+                        struct lull_decision *d)
 {
     struct lull_plane planes[LULL_PLANE_COUNT] = {
         [LULL_PLANE_COLOR] = {color, 12, 12 * WIDTH, 4, 1, LULL_TYPE_F32, LULL_NORM_ONE, 3, 0},
         [LULL_PLANE_HALF] = {half, 12, 12 * WIDTH, 4, 1, LULL_TYPE_F32, LULL_NORM_ONE, 3, 0}};
-    const struct lull_view view = {.struct_size = sizeof view, .x1 = WIDTH, .y1 = HEIGHT, .planes = planes, .plane_count = LULL_PLANE_COUNT,
-                                   .plane_stride = sizeof planes[0], .elapsed_s = (double)NAN};
+    const struct lull_view view = {.struct_size = sizeof view,
+                                   .x1 = WIDTH,
+                                   .y1 = HEIGHT,
+                                   .planes = planes,
+                                   .plane_count = LULL_PLANE_COUNT,
+                                   .plane_stride = sizeof planes[0],
+                                   .elapsed_s = (double)NAN};
     struct lull_block blocks[BLOCKS];
     struct lull_error err = {.struct_size = sizeof err};
     uint32_t n = 0;
 
     for (uint32_t id = 0; id < BLOCKS; id++)
         if (ids >> id & 1)
-            blocks[n++] = (struct lull_block){.id = id, .x0 = rects[id].x0, .y0 = rects[id].y0, .x1 = rects[id].x1, .y1 = rects[id].y1,
-                                              .spp = spp, .half_spp = spp * 3 / 8, .thread_s = (double)NAN};
+            blocks[n++] = (struct lull_block){.id = id,
+                                              .x0 = rects[id].x0,
+                                              .y0 = rects[id].y0,
+                                              .x1 = rects[id].x1,
+                                              .y1 = rects[id].y1,
+                                              .spp = spp,
+                                              .half_spp = spp * 3 / 8,
+                                              .thread_s = (double)NAN};
     for (uint32_t i = 0; i < n; i++)
         d[i] = (struct lull_decision){.p_noisy = (double)NAN, .predicted_spp = (double)NAN, .error = (double)NAN};
     if (n && spp == UINT64_MAX)
@@ -131,23 +151,17 @@ struct other {
     uint8_t codes[GGN_WINDOW_MAX][VALUES];
 };
 
-static int across(const struct other *o)
-{
-    return o->r->x1 - o->r->x0;
-}
+static int across(const struct other *o) { return o->r->x1 - o->r->x0; }
 
-static int down(const struct other *o)
-{
-    return o->r->y1 - o->r->y0;
-}
+static int down(const struct other *o) { return o->r->y1 - o->r->y0; }
 
 static double other_noise(void *data)
 {
     const struct other *o = data;
     const struct ggn_stopper *s = &o->stopper;
 
-    return o->is_network ? ggn_window_noise(o->codes[0], o->codes[o->images - 1], (size_t)(3 * across(o) * down(o)), (double)s->spp[0],
-                                            (double)s->spp[s->used - 1])
+    return o->is_network ? ggn_window_noise(o->codes[0], o->codes[o->images - 1], (size_t)(3 * across(o) * down(o)),
+                                            (double)s->spp[0], (double)s->spp[s->used - 1])
                          : (double)NAN;
 }
 
@@ -214,10 +228,7 @@ static void other_ask(struct other *o, uint64_t spp)
     ggn_stopper_judge(&o->rule, &o->stopper, &evidence);
 }
 
-static int same_number(double a, double b)
-{
-    return isnan(a) ? isnan(b) : fabs(a - b) <= 1e-9 * fmax(1, fabs(b));
-}
+static int same_number(double a, double b) { return isnan(a) ? isnan(b) : fabs(a - b) <= 1e-9 * fmax(1, fabs(b)); }
 
 static void same(const struct lull_decision *d, const struct ggn_verdict *v, uint32_t id, uint64_t spp)
 {
@@ -225,8 +236,8 @@ static void same(const struct lull_decision *d, const struct ggn_verdict *v, uin
         d->next_spp != v->next_spp || !same_number(d->p_noisy, v->p) || !same_number(d->predicted_spp, v->predicted_spp) ||
         !same_number(d->error, v->noise))
         fail_msg("block %u at %llu: action %d flags %u next %llu p %g predicted %g error %g, not %u %u %llu %g %g %g", id,
-                 (unsigned long long)spp, d->action, d->flags, (unsigned long long)d->next_spp, d->p_noisy, d->predicted_spp, d->error,
-                 v->stop, v->too_early, (unsigned long long)v->next_spp, v->p, v->predicted_spp, v->noise);
+                 (unsigned long long)spp, d->action, d->flags, (unsigned long long)d->next_spp, d->p_noisy, d->predicted_spp,
+                 d->error, v->stop, v->too_early, (unsigned long long)v->next_spp, v->p, v->predicted_spp, v->noise);
 }
 
 /* --- state ----------------------------------------------------------------------------------------------------------------------------- */
@@ -282,8 +293,8 @@ static const char *load(const struct lull_criterion *c, struct lull_instance *in
 /* --- tests ----------------------------------------------------------------------------------------------------------------------------- */
 
 /* All levels of all blocks; every second batch in another order of calls, a failed call and a repeated one between. */
-static void follow(const struct lull_criterion *c, const char *path, int is_network, const struct ggn_display *display, uint64_t spp_max,
-                   const struct ggn_policy *p)
+static void follow(const struct lull_criterion *c, const char *path, int is_network, const struct ggn_display *display,
+                   uint64_t spp_max, const struct ggn_policy *p)
 {
     static struct other others[BLOCKS];
     struct lull_instance *in = created(c, path, NULL, NULL), *other = created(c, path, NULL, NULL);
@@ -298,8 +309,10 @@ static void follow(const struct lull_criterion *c, const char *path, int is_netw
         assert_int_equal(c->begin_frame(other, &frame, NULL), LULL_OK);
         frame.flags = LULL_FRAME_RESTART;
         for (int id = 0; id < BLOCKS; id++)
-            others[id] = (struct other){.rule = {.policy = *p, .window = is_network ? WINDOW : 1, .spp_max = spp_max}, .display = *display,
-                                        .r = &rects[id], .is_network = is_network};
+            others[id] = (struct other){.rule = {.policy = *p, .window = is_network ? WINDOW : 1, .spp_max = spp_max},
+                                        .display = *display,
+                                        .r = &rects[id],
+                                        .is_network = is_network};
         static const uint64_t levels[] = {4, 8, 9, 16, 16, 32, 40, 64, 128, 256, 512, 1024};
         for (size_t k = 0; k < sizeof levels / sizeof levels[0]; k++) {
             struct lull_decision d[BLOCKS], twice[BLOCKS];
@@ -339,7 +352,8 @@ static void follow(const struct lull_criterion *c, const char *path, int is_netw
 
 static void answers_of_the_network(void **state)
 {
-    static const struct ggn_display displays[] = {{GGN_TRANSFER_SRGB, 2.2, 1}, {GGN_TRANSFER_GAMMA, 1.8, 2}, {GGN_TRANSFER_LINEAR, 2.2, 0.5}};
+    static const struct ggn_display displays[] = {
+        {GGN_TRANSFER_SRGB, 2.2, 1}, {GGN_TRANSFER_GAMMA, 1.8, 2}, {GGN_TRANSFER_LINEAR, 2.2, 0.5}};
     size_t used = 0;
     (void)state;
 
@@ -359,12 +373,13 @@ static void answers_of_a_baseline(void **state)
 /* What is saved: a header, then of each block its place, its head and the kept bytes; no other criterion's, model's or setting's. */
 static void states(void **state)
 {
-    static const char *const settings[][2] = {{"visible", "0.4"}, {"passes", "2"}, {"gate", "0"}, {"tail", "3"}, {"gini", "0.7"},
-                                              {"first-spp", "9"}, {"precision", "bf16"}, {NULL, NULL}};
+    static const char *const settings[][2] = {{"visible", "0.4"}, {"passes", "2"},    {"gate", "0"},         {"tail", "3"},
+                                              {"gini", "0.7"},    {"first-spp", "9"}, {"precision", "bf16"}, {NULL, NULL}};
     static const char foreign[] = "state: saved by another criterion, model, parameter set or frame";
     const struct lull_criterion *c = &ggn_plugin_ggn;
     const struct lull_frame frame = frame_of(0xff, &usual, 0);
-    struct lull_instance *in = created(c, network, NULL, NULL), *svms = created(&ggn_plugin_attributes, attributes, NULL, NULL);
+    struct lull_instance *in = created(c, network, NULL, NULL),
+                         *svms = created(&ggn_plugin_attributes, attributes, NULL, NULL);
     struct lull_decision d[BLOCKS];
     const size_t head = sizeof(struct ggn_stopper) + (GGN_WINDOW_MAX + 1) * 4 + 12;
     size_t want = 24;
@@ -390,7 +405,9 @@ static void states(void **state)
     }
     save(c, in);
     for (int id = 0; id < BLOCKS; id++)
-        want += sizeof rects[0] + head + (size_t)(id == 0 ? 2 : id == 1) * (size_t)(3 * (rects[id].x1 - rects[id].x0) * (rects[id].y1 - rects[id].y0));
+        want +=
+            sizeof rects[0] + head +
+            (size_t)(id == 0 ? 2 : id == 1) * (size_t)(3 * (rects[id].x1 - rects[id].x0) * (rects[id].y1 - rects[id].y0));
     assert_int_equal(saved_size, want);
     assert_memory_equal(saved, "GGNSTAT2", 8);
     const uint32_t numbers[] = {BLOCKS, WINDOW, (uint32_t)head};
@@ -442,7 +459,8 @@ static void impossible_heads(void **state)
     const struct lull_frame frame = frame_of(0xff, &usual, 0);
     struct lull_instance *in = created(c, network, NULL, NULL);
     struct lull_decision d[BLOCKS];
-    const size_t order = 24 + sizeof rects[0] + sizeof(struct ggn_stopper), made = order + (GGN_WINDOW_MAX + 1) * 4, bad = made + 4;
+    const size_t order = 24 + sizeof rects[0] + sizeof(struct ggn_stopper), made = order + (GGN_WINDOW_MAX + 1) * 4,
+                 bad = made + 4;
     static const uint32_t cases[][3] = {{0, 3, 0}, {4, 0, 0}, {8, 3, 0}, {8, 2, 1}, {12, 7, 1}};
     (void)state;
 
@@ -506,13 +524,15 @@ static double error_by_hand(const struct lull_rect *r, float light[2][VALUES], d
     ggn_visible_texture(l[0], l[1], w, height, scratch, &texture);
     for (int i = 0; i < pixels; i++)
         l[0][i] = (float)split * (l[0][i] - l[1][i]);
-    return (1 + 1.94 / sqrt(pixels)) * ggn_visible_noise(l[0], w, height, &texture, scratch, NULL) / ggn_observer_default.level;
+    return (1 + 1.94 / sqrt(pixels)) * ggn_visible_noise(l[0], w, height, &texture, scratch, NULL) /
+           ggn_observer_default.level;
 }
 
 /* Every answer of the observer by the formulas of its header, for halves that are unequal. */
 static void answers_of_the_observer(void **state)
 {
-    static const struct ggn_display displays[] = {{GGN_TRANSFER_SRGB, 2.2, 1}, {GGN_TRANSFER_GAMMA, 1.8, 2}, {GGN_TRANSFER_LINEAR, 2.2, 0.5}};
+    static const struct ggn_display displays[] = {
+        {GGN_TRANSFER_SRGB, 2.2, 1}, {GGN_TRANSFER_GAMMA, 1.8, 2}, {GGN_TRANSFER_LINEAR, 2.2, 0.5}};
     const struct lull_criterion *c = &ggn_plugin_observer;
     const double stop = ggn_observer_error_at(&ggn_observer_default, GGN_OBSERVER_VISIBLE);
     int stopped = 0, went_on = 0;
@@ -542,7 +562,8 @@ static void answers_of_the_observer(void **state)
                 }
                 const double error = error_by_hand(r, light, sqrt(h * (n - h)) / n);
                 assert_true(fabs(d[id].error / error - 1) < 1e-6 && d[id].flags == 0);
-                assert_true(fabs(d[id].p_noisy - 0.5 * erfc(-2 * log2(error) / (ggn_observer_default.spread * sqrt(2)))) < 1e-6);
+                assert_true(fabs(d[id].p_noisy - 0.5 * erfc(-2 * log2(error) / (ggn_observer_default.spread * sqrt(2)))) <
+                            1e-6);
                 assert_int_equal(d[id].action, error <= stop ? LULL_STOP : LULL_CONTINUE);
                 double predicted = error <= stop ? n : n * (error / stop) * (error / stop);
                 assert_true(fabs(d[id].predicted_spp / predicted - 1) < 1e-5);
@@ -601,7 +622,9 @@ static void answers_from_looks(void **state)
             }
             const double error = error_by_hand(r, light, 0.5);
             assert_true(fabs(d[id].error / error - 1) < 1e-5 && d[id].flags == 0);
-            assert_int_equal(d[id].action, error <= ggn_observer_error_at(&ggn_observer_default, GGN_OBSERVER_VISIBLE) ? LULL_STOP : LULL_CONTINUE);
+            assert_int_equal(d[id].action, error <= ggn_observer_error_at(&ggn_observer_default, GGN_OBSERVER_VISIBLE)
+                                               ? LULL_STOP
+                                               : LULL_CONTINUE);
         }
     }
     c->destroy(in);
@@ -621,7 +644,8 @@ static void fireflies(void **state)
             assert_int_equal(c->begin_frame(in, &frame, NULL), LULL_OK);
             for (uint64_t spp = 256; spp <= 1024; spp *= 4) {
                 for (int i = 0; i < HEIGHT * WIDTH * 3; i++)
-                    (&color[0][0][0])[i] = (&half[0][0][0])[i] = 0.4f + 1e-4f * (float)ggn_hash_unit((uint32_t)i, (uint32_t)spp);
+                    (&color[0][0][0])[i] = (&half[0][0][0])[i] =
+                        0.4f + 1e-4f * (float)ggn_hash_unit((uint32_t)i, (uint32_t)spp);
                 for (int ch = 0; ch < 3 && hot && spp == 1024; ch++) {
                     color[8][9][ch] += 300.0f / 1024;
                     half[8][9][ch] += 300.0f / 384;
@@ -647,12 +671,12 @@ static void tables(void **state)
                                                        &ggn_plugin_attributes, &ggn_plugin_noise_mask};
     for (uint32_t i = 0; i < sizeof all / sizeof all[0]; i++) {
         const struct lull_criterion *c = all[i];
-        fprintf(f, "=== %u %s: %s, version %s\n%s\nthreads %d capabilities %u\n", i, c->id, c->name, c->version, c->description,
-                c->thread_level, (unsigned)c->capabilities);
+        fprintf(f, "=== %u %s: %s, version %s\n%s\nthreads %d capabilities %u\n", i, c->id, c->name, c->version,
+                c->description, c->thread_level, (unsigned)c->capabilities);
         for (uint32_t k = 0; k < c->param_count; k++) {
             const struct lull_param *p = &c->params[k];
-            fprintf(f, "%s: type %d default %s in %g to %g of %s: %s\n", p->name, p->type, p->default_value ? p->default_value : "-", p->min,
-                    p->max, p->choices ? p->choices : "-", p->help);
+            fprintf(f, "%s: type %d default %s in %g to %g of %s: %s\n", p->name, p->type,
+                    p->default_value ? p->default_value : "-", p->min, p->max, p->choices ? p->choices : "-", p->help);
         }
         const char *path = i == 0 ? network : i == 3 ? attributes : NULL;
         if (i == 2 || i == 4)
@@ -660,9 +684,9 @@ static void tables(void **state)
         struct lull_instance *in = created(c, path, NULL, NULL);
         struct lull_requirements need = {.struct_size = sizeof need};
         assert_int_equal(c->requirements(in, &need, NULL), LULL_OK);
-        fprintf(f, "needs planes %u, uses %u, %ux%u, halo %u, about %u checks from %llu on, %llu bytes\n", need.planes_required,
-                need.planes_used, need.block_width, need.block_height, need.halo, need.checks_hint, (unsigned long long)need.first_spp,
-                (unsigned long long)need.bytes_per_block);
+        fprintf(f, "needs planes %u, uses %u, %ux%u, halo %u, about %u checks from %llu on, %llu bytes\n",
+                need.planes_required, need.planes_used, need.block_width, need.block_height, need.halo, need.checks_hint,
+                (unsigned long long)need.first_spp, (unsigned long long)need.bytes_per_block);
         c->destroy(in);
     }
     fclose(f);
@@ -715,7 +739,8 @@ static void refusals(void **state)
     assert_int_equal(access(found, R_OK), 0);
     assert_int_equal(gp_model_find("no-such.ggn", "GGN_TEST_MODEL", found, sizeof found), 0);
     assert_int_equal(strncmp(found, "no no-such.ggn beside ", 22), 0);
-    const char *places = ", in ../share/lull, ../../share/lull or the source tree's ggn/models; give model=FILE or set GGN_TEST_MODEL";
+    const char *places =
+        ", in ../share/lull, ../../share/lull or the source tree's ggn/models; give model=FILE or set GGN_TEST_MODEL";
     assert_string_equal(found + strlen(found) - strlen(places), places);
     assert_int_equal(gp_model_find("no-such.ggn", NULL, found, sizeof found), 0);
     assert_string_equal(found + strlen(found) - 16, " give model=FILE");
@@ -771,9 +796,15 @@ static int teardown(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(answers_of_the_network), cmocka_unit_test(answers_of_a_baseline),
-                                       cmocka_unit_test(states),                 cmocka_unit_test(impossible_heads),
-                                       cmocka_unit_test(broken_pixels),          cmocka_unit_test(answers_of_the_observer), cmocka_unit_test(answers_from_looks), cmocka_unit_test(fireflies),
-                                       cmocka_unit_test(tables),                 cmocka_unit_test(refusals)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(answers_of_the_network),
+                                       cmocka_unit_test(answers_of_a_baseline),
+                                       cmocka_unit_test(states),
+                                       cmocka_unit_test(impossible_heads),
+                                       cmocka_unit_test(broken_pixels),
+                                       cmocka_unit_test(answers_of_the_observer),
+                                       cmocka_unit_test(answers_from_looks),
+                                       cmocka_unit_test(fireflies),
+                                       cmocka_unit_test(tables),
+                                       cmocka_unit_test(refusals)};
     return cmocka_run_group_tests(tests, setup, teardown);
 }

@@ -61,10 +61,7 @@ static uint8_t code(double linear)
     return (uint8_t)floor(255 * (v <= 0.0031308 ? 12.92 * v : 1.055 * pow(v, 1 / 2.4) - 0.055) + 0.5);
 }
 
-static double luminance(const float rgb[3])
-{
-    return 0.2 * (double)rgb[0] + 0.7 * (double)rgb[1] + 0.1 * (double)rgb[2];
-}
+static double luminance(const float rgb[3]) { return 0.2 * (double)rgb[0] + 0.7 * (double)rgb[1] + 0.1 * (double)rgb[2]; }
 
 /* p of the networks, with the picture of 16 samples of which `h` are in HALF; h 0: without one. */
 static double expected(double h)
@@ -101,9 +98,16 @@ static double asked(uint64_t half_spp, int with_half)
     struct lull_requirements need = {.struct_size = sizeof need};
     struct lull_instance *in = NULL;
     struct lull_rect rect = {0, 0, W, H};
-    struct lull_frame frame = {.struct_size = sizeof frame, .width = W, .height = H, .blocks = &rect, .block_count = 1,
-                               .block_stride = sizeof rect, .planes = with_half ? 0xff : 0xff & ~LULL_PLANE_BIT(LULL_PLANE_HALF),
-                               .exposure = 1, .transfer = LULL_TRANSFER_SRGB, .gamma = 2.2,
+    struct lull_frame frame = {.struct_size = sizeof frame,
+                               .width = W,
+                               .height = H,
+                               .blocks = &rect,
+                               .block_count = 1,
+                               .block_stride = sizeof rect,
+                               .planes = with_half ? 0xff : 0xff & ~LULL_PLANE_BIT(LULL_PLANE_HALF),
+                               .exposure = 1,
+                               .transfer = LULL_TRANSFER_SRGB,
+                               .gamma = 2.2,
                                .rgb_to_xyz = {0, 0, 0, 0.2, 0.7, 0.1, 0, 0, 0}};
     struct lull_decision d = {.p_noisy = (double)NAN};
 
@@ -117,9 +121,15 @@ static double asked(uint64_t half_spp, int with_half)
             [LULL_PLANE_COLOR] = {color[k], 12, 12 * W, 4, 1, LULL_TYPE_F32, LULL_NORM_ONE, 3, 0}};
         if (with_half)
             planes[LULL_PLANE_HALF] = (struct lull_plane){half, 12, 12 * W, 4, 1, LULL_TYPE_F32, LULL_NORM_ONE, 3, 0};
-        struct lull_block block = {.x1 = W, .y1 = H, .spp = (uint64_t)(8 << k), .half_spp = half_spp, .thread_s = (double)NAN};
-        struct lull_view view = {.struct_size = sizeof view, .x1 = W, .y1 = H, .planes = planes, .plane_count = LULL_PLANE_COUNT,
-                                 .plane_stride = sizeof planes[0], .elapsed_s = (double)NAN};
+        struct lull_block block = {
+            .x1 = W, .y1 = H, .spp = (uint64_t)(8 << k), .half_spp = half_spp, .thread_s = (double)NAN};
+        struct lull_view view = {.struct_size = sizeof view,
+                                 .x1 = W,
+                                 .y1 = H,
+                                 .planes = planes,
+                                 .plane_count = LULL_PLANE_COUNT,
+                                 .plane_stride = sizeof planes[0],
+                                 .elapsed_s = (double)NAN};
         if (criterion->evaluate(in, &view, &block, sizeof block, &d, sizeof d, 1, &err) != LULL_OK)
             fail_msg("%s", err.message);
     }

@@ -15,10 +15,7 @@ struct show {
     int has_tail, asked; /* how often the network was */
 };
 
-static double noise(void *data)
-{
-    return ((struct show *)data)->noise;
-}
+static double noise(void *data) { return ((struct show *)data)->noise; }
 
 static double logit(void *data)
 {
@@ -186,8 +183,13 @@ static void it_asks_again_later_however_many_samples_there_are(void **state)
 static void a_damaged_stopper_is_told(void **state)
 {
     struct ggn_stop_rule rule = make_rule();
-    struct ggn_stopper good = {.spp = {10, 15, 23}, .used = 3, .regular = 3, .asked_spp = 23, .leapt = 1,
-                               .verdict = {.next_spp = 24, .p = 1, .predicted_spp = 0, .noise = (double)NAN}}, bad = good;
+    struct ggn_stopper good = {.spp = {10, 15, 23},
+                               .used = 3,
+                               .regular = 3,
+                               .asked_spp = 23,
+                               .leapt = 1,
+                               .verdict = {.next_spp = 24, .p = 1, .predicted_spp = 0, .noise = (double)NAN}},
+                       bad = good;
     (void)state;
     assert_true(ggn_stopper_valid(&rule, &good));
 #define BAD(change) (bad = good, bad.change, assert_false(ggn_stopper_valid(&rule, &bad)))
@@ -282,7 +284,8 @@ static int oracle_ask(const struct ggn_stop_rule *rule, struct oracle *o, uint64
     if (!o->too_early) {
         o->p = isfinite(show->logit) ? 1 / (1 + exp(-(p->scale * show->logit + p->shift))) : 1;
         o->passes = o->p < p->threshold ? o->passes + 1 : 0;
-        int held = (p->tail999 > 0 && show->tail999 > p->tail999) || (p->gini > 0 && show->gini > p->gini && show->tail999 > 0.2);
+        int held =
+            (p->tail999 > 0 && show->tail999 > p->tail999) || (p->gini > 0 && show->gini > p->gini && show->tail999 > 0.2);
         o->stop = o->passes >= p->passes && !(held && show->has_tail);
     }
     if (o->stop)
@@ -303,17 +306,15 @@ static double draw(void)
     return splitmix_uniform(&state);
 }
 
-static int close_to(double a, double b)
-{
-    return isnan(a) ? isnan(b) : fabs(a - b) <= 1e-9 * fmax(1, fabs(b));
-}
+static int close_to(double a, double b) { return isnan(a) ? isnan(b) : fabs(a - b) <= 1e-9 * fmax(1, fabs(b)); }
 
 static void same(const struct ggn_stop_rule *rule, const struct ggn_stopper *s, const struct oracle *o)
 {
     const struct ggn_verdict *v = &s->verdict;
 
     assert_true(s->asked_spp == o->asked && (int)s->used == o->used && (int)s->regular == o->regular);
-    assert_true((int)s->passes == o->passes && (int)s->leapt == o->leapt && !memcmp(s->spp, o->spp, s->used * sizeof *s->spp));
+    assert_true((int)s->passes == o->passes && (int)s->leapt == o->leapt &&
+                !memcmp(s->spp, o->spp, s->used * sizeof *s->spp));
     assert_true((int)v->stop == o->stop && (int)v->too_early == o->too_early && (v->stop || v->next_spp == o->next));
     if (!close_to(v->p, o->p) || !close_to(v->predicted_spp, o->predicted) || !close_to(v->noise, o->noise))
         fail_msg("at %llu: p %g for %g, predicted %g for %g, noise %g for %g", (unsigned long long)o->asked, v->p, o->p,
@@ -344,11 +345,16 @@ static void any_history_is_that_of_the_words(void **state)
         struct ggn_stopper s = {0};
         struct oracle o = {.next = (uint64_t)p->first_spp};
         for (int k = 0; k < 25 && !s.verdict.stop; k++) {
-            struct show show = {.noise = draw() < 0.3 ? 0.5 : 4 * draw() * draw(), .logit = draw() < 0.05 ? (double)INFINITY : 4 * draw() - 3,
-                                .tail999 = draw() < 0.1 ? 1 : 1.5 * draw() * draw(), .gini = draw() < 0.1 ? 0.5 : draw(),
+            struct show show = {.noise = draw() < 0.3 ? 0.5 : 4 * draw() * draw(),
+                                .logit = draw() < 0.05 ? (double)INFINITY : 4 * draw() - 3,
+                                .tail999 = draw() < 0.1 ? 1 : 1.5 * draw() * draw(),
+                                .gini = draw() < 0.1 ? 0.5 : draw(),
                                 .has_tail = draw() < 0.7};
             double how = draw(), last = s.used ? (double)s.spp[s.used - 1] : 0;
-            uint64_t spp = how < 0.6 ? o.next : how < 0.7 ? o.next + 1 : how < 0.8 ? s.asked_spp : (uint64_t)ceil((last + (double)o.next) / 2);
+            uint64_t spp = how < 0.6   ? o.next
+                           : how < 0.7 ? o.next + 1
+                           : how < 0.8 ? s.asked_spp
+                                       : (uint64_t)ceil((last + (double)o.next) / 2);
             spp = spp > s.asked_spp ? spp : s.asked_spp;
             int looked = ask(&rule, &s, spp, &show);
             assert_int_equal(looked, oracle_ask(&rule, &o, spp, &show));

@@ -390,15 +390,17 @@ static void tokens(void **state)
     assert_int_equal(ggn_study_token(a, 7, &err), 0);
     assert_int_equal(strlen(a), 7);
     assert_true(ggn_study_token_equal("abc", "abc") && ggn_study_token_equal("", ""));
-    assert_true(!ggn_study_token_equal("abc", "abd") && !ggn_study_token_equal("abc", "bbc") && !ggn_study_token_equal("abc", "ab") && !ggn_study_token_equal("ab", "abc"));
+    assert_true(!ggn_study_token_equal("abc", "abd") && !ggn_study_token_equal("abc", "bbc") &&
+                !ggn_study_token_equal("abc", "ab") && !ggn_study_token_equal("ab", "abc"));
     assert_true(!ggn_study_token_equal("ab", "ba")); /* differences do not cancel */
 }
 
 /* --- transcripts: every answer, every line, every slot --- */
 
-static const char *const other_view[2] = {"\"views\":[", "\"views\":[{\"name\":\"w\",\"width\":30,\"height\":20,\"blocks\":["
-                                                        "{\"id\":3,\"x0\":0,\"y0\":0,\"x1\":30,\"y1\":10,\"levels\":[1,2,4,8,1000000000]},"
-                                                        "{\"id\":4,\"x0\":5,\"y0\":5,\"x1\":30,\"y1\":20,\"levels\":[20]}]},"};
+static const char *const other_view[2] = {"\"views\":[",
+                                          "\"views\":[{\"name\":\"w\",\"width\":30,\"height\":20,\"blocks\":["
+                                          "{\"id\":3,\"x0\":0,\"y0\":0,\"x1\":30,\"y1\":10,\"levels\":[1,2,4,8,1000000000]},"
+                                          "{\"id\":4,\"x0\":5,\"y0\":5,\"x1\":30,\"y1\":20,\"levels\":[20]}]},"};
 
 static void print_plan(FILE *f, const struct ggn_study *s, uint64_t seed)
 {
@@ -407,8 +409,8 @@ static void print_plan(FILE *f, const struct ggn_study *s, uint64_t seed)
     fprintf(f, "%s, seed %d: %d of %d\n", ggn_study_task_names[s->task], (int)seed, p.n, ggn_study_plan_count(s));
     for (int i = 0; i < p.n; i++) {
         const struct ggn_study_slot *t = &p.slots[i];
-        fprintf(f, " %d.%d:%d,%d%c%d.%d%s", t->view, t->block, t->condition, t->screen, "AB"[t->side], t->start, (int)t->catch_trial,
-                i % 12 == 11 || i + 1 == p.n ? "\n" : "");
+        fprintf(f, " %d.%d:%d,%d%c%d.%d%s", t->view, t->block, t->condition, t->screen, "AB"[t->side], t -> start,
+                (int)t -> catch_trial, i % 12 == 11 || i + 1 == p.n ? "\n" : "");
     }
     ggn_study_plan_release(&p);
 }
@@ -439,8 +441,11 @@ static void plans_are_as_they_were(void **state)
     }
     for (int views = 1000; views <= 1001; views++) {
         struct ggn_study_plan p = {0};
-        s = (struct ggn_study){.task = GGN_STUDY_VALIDATION, .n_views = views, .views = calloc((size_t)views, sizeof *s.views),
-                               .n_conditions = 2, .repeats = 100};
+        s = (struct ggn_study){.task = GGN_STUDY_VALIDATION,
+                               .n_views = views,
+                               .views = calloc((size_t)views, sizeof *s.views),
+                               .n_conditions = 2,
+                               .repeats = 100};
         int rc = ggn_study_plan_init(&p, &s, 1, &err);
         fprintf(f, "%d views: %d; %d %s\n", views, ggn_study_plan_count(&s), p.n, rc ? err.text : "");
         s.catch_share = 0.001;
@@ -453,26 +458,76 @@ static void plans_are_as_they_were(void **state)
 
 static void studies_are_refused_in_these_words(void **state)
 {
-    static const char *const cases[][2] = {
-        {"lull-study", "lull-sequence"}, {"\"version\":1", "\"version\":0"}, {"\"version\":1", "\"version\":2"}, {"\"id\":\"0123", "\"id\":\"x123"},
-        {"\"id\":\"0123", "\"id\":\"00123"}, {"\"id\":\"0123", "\"id\":\"123"}, {"\"seed\":7", "\"seed\":-1"}, {"\"seed\":7", "\"seed\":9007199254740991"},
-        {"\"seed\":7", "\"seed\":9007199254740992"}, {"\"trials\":20", "\"trials\":x"}, {"\"trials\":20", "\"trials\":0"}, {"\"trials\":20", "\"trials\":1000"},
-        {"\"trials\":20", "\"trials\":1001"}, {"\"trials\":20", "\"trials\":2.5"}, {"\"repeats\":3", "\"repeats\":0"}, {"\"catch_share\":0.1", "\"catch_share\":-0.1"},
-        {"\"catch_share\":0.1", "\"catch_share\":0.5"}, {"\"catch_share\":0.1", "\"catch_share\":0.51"}, {"\"show_ms\":700", "\"show_ms\":0"},
-        {"\"gap_ms\":400", "\"gap_ms\":0"}, {"\"break_every\":60", "\"break_every\":-1"}, {"\"min_catch_passed\":0.75", "\"min_catch_passed\":1.01"},
-        {"\"max_untouched\":0.5", "\"max_untouched\":null"}, {"\"task\":\"", "\"task\":\"x"}, {"\"conditions\":[\"a\",\"b\"]", "\"conditions\":[]"},
-        {"\"conditions\":[\"a\",\"b\"]", "\"conditions\":[\"a\",\"\"]"}, {"\"conditions\":[\"a\",\"b\"]", "\"conditions\":[\"a b\"]"},
-        {"\"name\":\"v\"", "\"name\":\"../v\""}, {"\"name\":\"v\"", "\"name\":\".v\""}, {"\"name\":\"v\"", "\"name\":7"}, {"\"width\":40", "\"width\":0"},
-        {"\"width\":40", "\"width\":32769"}, {"\"height\":10", "\"height\":9"}, {"\"views\":[", "\"views\":[{\"name\":\"v\",\"width\":1,\"height\":1,\"blocks\":["
-        "{\"id\":0,\"x0\":0,\"y0\":0,\"x1\":1,\"y1\":1,\"levels\":[1]}]},"}, {"\"views\":[{", "\"views\":[1,{"}, {"\"blocks\":[", "\"blocks\":[7,"},
-        {"\"blocks\":[", "\"other\":["}, {"\"views\":[", "\"views\":[],\"x\":["}, {"\"x1\":40", "\"x1\":41"}, {"\"x1\":40", "\"x1\":30"}, {"\"x0\":30", "\"x0\":-1"},
-        {"\"y0\":0", "\"y0\":10"}, {"\"y0\":0", "\"y0\":9"}, {"\"y1\":10", "\"y1\":0"}, {"\"id\":5", "\"id\":2"}, {"\"id\":5", "\"id\":3"}, {"\"id\":5", "\"id\":32769"},
-        {"[16,64,512]", "[16,64,64]"}, {"[16,64,512]", "[16,64,65]"}, {"[16,64,512]", "[]"}, {"[16,64,512]", "[0,64]"}, {"[16,64,512]", "[1,64]"},
-        {"[16,64,512]", "[16,1000000000]"}, {"[16,64,512]", "[16,1000000001]"}, {"[16,64,512]", "[16.5]"}, {"[16,64,512]", "[\"16\"]"}, {"]}]}", ""}, {"{", "["},
-        {"\"trials\"", "\"min_ms\":-1,\"trials\""}, {"\"trials\"", "\"min_ms\":60000,\"trials\""}, {"\"trials\"", "\"min_ms\":60001,\"trials\""},
-        {"\"trials\"", "\"max_fast\":1.01,\"trials\""}, {"\"trials\"", "\"max_fast\":true,\"trials\""}, {"\"trials\"", "\"asked_by\":\"Ada\",\"trials\""},
-        {"\"trials\"", "\"asked_by\":7,\"trials\""}, {"\"trials\"", "\"asked_by\":\"  \",\"trials\""}, {"\"trials\"", "\"contact\":\"a\\nb\",\"trials\""},
-        {"\"trials\"", "\"contact\":\"a\\u007fb\",\"trials\""}};
+    static const char *const cases[][2] = {{"lull-study", "lull-sequence"},
+                                           {"\"version\":1", "\"version\":0"},
+                                           {"\"version\":1", "\"version\":2"},
+                                           {"\"id\":\"0123", "\"id\":\"x123"},
+                                           {"\"id\":\"0123", "\"id\":\"00123"},
+                                           {"\"id\":\"0123", "\"id\":\"123"},
+                                           {"\"seed\":7", "\"seed\":-1"},
+                                           {"\"seed\":7", "\"seed\":9007199254740991"},
+                                           {"\"seed\":7", "\"seed\":9007199254740992"},
+                                           {"\"trials\":20", "\"trials\":x"},
+                                           {"\"trials\":20", "\"trials\":0"},
+                                           {"\"trials\":20", "\"trials\":1000"},
+                                           {"\"trials\":20", "\"trials\":1001"},
+                                           {"\"trials\":20", "\"trials\":2.5"},
+                                           {"\"repeats\":3", "\"repeats\":0"},
+                                           {"\"catch_share\":0.1", "\"catch_share\":-0.1"},
+                                           {"\"catch_share\":0.1", "\"catch_share\":0.5"},
+                                           {"\"catch_share\":0.1", "\"catch_share\":0.51"},
+                                           {"\"show_ms\":700", "\"show_ms\":0"},
+                                           {"\"gap_ms\":400", "\"gap_ms\":0"},
+                                           {"\"break_every\":60", "\"break_every\":-1"},
+                                           {"\"min_catch_passed\":0.75", "\"min_catch_passed\":1.01"},
+                                           {"\"max_untouched\":0.5", "\"max_untouched\":null"},
+                                           {"\"task\":\"", "\"task\":\"x"},
+                                           {"\"conditions\":[\"a\",\"b\"]", "\"conditions\":[]"},
+                                           {"\"conditions\":[\"a\",\"b\"]", "\"conditions\":[\"a\",\"\"]"},
+                                           {"\"conditions\":[\"a\",\"b\"]", "\"conditions\":[\"a b\"]"},
+                                           {"\"name\":\"v\"", "\"name\":\"../v\""},
+                                           {"\"name\":\"v\"", "\"name\":\".v\""},
+                                           {"\"name\":\"v\"", "\"name\":7"},
+                                           {"\"width\":40", "\"width\":0"},
+                                           {"\"width\":40", "\"width\":32769"},
+                                           {"\"height\":10", "\"height\":9"},
+                                           {"\"views\":[",
+                                            "\"views\":[{\"name\":\"v\",\"width\":1,\"height\":1,\"blocks\":["
+                                            "{\"id\":0,\"x0\":0,\"y0\":0,\"x1\":1,\"y1\":1,\"levels\":[1]}]},"},
+                                           {"\"views\":[{", "\"views\":[1,{"},
+                                           {"\"blocks\":[", "\"blocks\":[7,"},
+                                           {"\"blocks\":[", "\"other\":["},
+                                           {"\"views\":[", "\"views\":[],\"x\":["},
+                                           {"\"x1\":40", "\"x1\":41"},
+                                           {"\"x1\":40", "\"x1\":30"},
+                                           {"\"x0\":30", "\"x0\":-1"},
+                                           {"\"y0\":0", "\"y0\":10"},
+                                           {"\"y0\":0", "\"y0\":9"},
+                                           {"\"y1\":10", "\"y1\":0"},
+                                           {"\"id\":5", "\"id\":2"},
+                                           {"\"id\":5", "\"id\":3"},
+                                           {"\"id\":5", "\"id\":32769"},
+                                           {"[16,64,512]", "[16,64,64]"},
+                                           {"[16,64,512]", "[16,64,65]"},
+                                           {"[16,64,512]", "[]"},
+                                           {"[16,64,512]", "[0,64]"},
+                                           {"[16,64,512]", "[1,64]"},
+                                           {"[16,64,512]", "[16,1000000000]"},
+                                           {"[16,64,512]", "[16,1000000001]"},
+                                           {"[16,64,512]", "[16.5]"},
+                                           {"[16,64,512]", "[\"16\"]"},
+                                           {"]}]}", ""},
+                                           {"{", "["},
+                                           {"\"trials\"", "\"min_ms\":-1,\"trials\""},
+                                           {"\"trials\"", "\"min_ms\":60000,\"trials\""},
+                                           {"\"trials\"", "\"min_ms\":60001,\"trials\""},
+                                           {"\"trials\"", "\"max_fast\":1.01,\"trials\""},
+                                           {"\"trials\"", "\"max_fast\":true,\"trials\""},
+                                           {"\"trials\"", "\"asked_by\":\"Ada\",\"trials\""},
+                                           {"\"trials\"", "\"asked_by\":7,\"trials\""},
+                                           {"\"trials\"", "\"asked_by\":\"  \",\"trials\""},
+                                           {"\"trials\"", "\"contact\":\"a\\nb\",\"trials\""},
+                                           {"\"trials\"", "\"contact\":\"a\\u007fb\",\"trials\""}};
     struct transcript t;
     FILE *f = transcript_begin(&t);
     (void)state;
@@ -501,7 +556,8 @@ static void asker_init(struct asker *a, FILE *f, int task)
 {
     *a = (struct asker){.f = f, .store = open_store(NULL)};
     parse(ggn_study_task_names[task], &a->study);
-    a->site = (struct ggn_study_site){.dir = "tests/none", .page_dir = "ggn/study/page", .study = &a->study, .store = a->store};
+    a->site =
+        (struct ggn_study_site){.dir = "tests/none", .page_dir = "ggn/study/page", .study = &a->study, .store = a->store};
     fprintf(f, "--- %s\n", ggn_study_task_names[task]);
 }
 
@@ -516,8 +572,8 @@ static void ask_with(struct asker *a, struct ggn_study_request q)
     struct ggn_study_response r;
     q.size = q.body ? strlen(q.body) : 0;
     ggn_study_answer(&a->site, &q, &r);
-    fprintf(a->f, "%s %.80s %.100s\n  %d %s%s%s%s%s\n", q.method, q.path, q.body ? q.body : "", r.status, r.type, r.keep ? ", kept " : " ",
-            r.fd >= 0 ? "a file" : r.body, r.why[0] ? ", logged: " : "", r.why);
+    fprintf(a->f, "%s %.80s %.100s\n  %d %s%s%s%s%s\n", q.method, q.path, q.body ? q.body : "", r.status, r.type,
+            r.keep ? ", kept " : " ", r.fd >= 0 ? "a file" : r.body, r.why[0] ? ", logged: " : "", r.why);
     if (r.fd >= 0)
         close(r.fd);
     else
@@ -527,7 +583,8 @@ static void ask_with(struct asker *a, struct ggn_study_request q)
 
 static void post(struct asker *a, const char *path, const char *body)
 {
-    ask_with(a, (struct ggn_study_request){.method = "POST", .path = path, .content_type = "application/json", .body = body});
+    ask_with(a,
+             (struct ggn_study_request){.method = "POST", .path = path, .content_type = "application/json", .body = body});
 }
 
 /* A person with a plan of their own; their link is `%032x` of the number. */
@@ -576,8 +633,8 @@ static void print_trials(struct asker *a, int64_t row)
     assert_int_equal(ggn_study_store_trials(a->store, row, &trials, &n, NULL), 0);
     for (int i = 0; i < n; i++) {
         const struct ggn_study_trial *t = &trials[i];
-        fprintf(a->f, "    stored %d.%d level %u answer %d rating %d ms %g layout '%s'%s\n", t->slot, t->revision, t->level, t->answer, t->rating,
-                t->ms, t->layout, strlen(t->at) == 20 ? "" : ", no time");
+        fprintf(a->f, "    stored %d.%d level %u answer %d rating %d ms %g layout '%s'%s\n", t->slot, t->revision, t->level,
+                t->answer, t->rating, t->ms, t->layout, strlen(t->at) == 20 ? "" : ", no time");
     }
     free(trials);
 }
@@ -585,13 +642,54 @@ static void print_trials(struct asker *a, int64_t row)
 /* Each field at its bounds, in each task. */
 static void trials_are_answered_word_by_word(void **state)
 {
-    static const char *const values[][2] = {
-        {"none", ""}, {"slot", NULL}, {"slot", "-1"}, {"slot", "0.5"}, {"slot", "\"0\""}, {"slot", "1"}, {"slot", "7"}, {"slot", "8"}, {"slot", "11"},
-        {"slot", "12"}, {"slot", "79"}, {"slot", "80"}, {"revision", NULL}, {"revision", "-1"}, {"revision", "1"}, {"revision", "1000"},
-        {"revision", "1001"}, {"level", NULL}, {"level", "0"}, {"level", "63"}, {"level", "16"}, {"level", "256"}, {"level", "512"}, {"level", "64.5"},
-        {"level", "-64"}, {"level", "4294967360"}, {"answer", NULL}, {"answer", "-1"}, {"answer", "0"}, {"answer", "1"}, {"answer", "2"}, {"answer", "3"},
-        {"rating", NULL}, {"rating", "-1"}, {"rating", "0"}, {"rating", "1"}, {"rating", "5"}, {"rating", "6"}, {"ms", NULL}, {"ms", "-0.5"}, {"ms", "0"},
-        {"ms", "86400000"}, {"ms", "86400000.5"}, {"ms", "\"1\""}, {"layout", NULL}, {"layout", "\"flip\""}, {"layout", "\"above\""}, {"layout", "7"}};
+    static const char *const values[][2] = {{"none", ""},
+                                            {"slot", NULL},
+                                            {"slot", "-1"},
+                                            {"slot", "0.5"},
+                                            {"slot", "\"0\""},
+                                            {"slot", "1"},
+                                            {"slot", "7"},
+                                            {"slot", "8"},
+                                            {"slot", "11"},
+                                            {"slot", "12"},
+                                            {"slot", "79"},
+                                            {"slot", "80"},
+                                            {"revision", NULL},
+                                            {"revision", "-1"},
+                                            {"revision", "1"},
+                                            {"revision", "1000"},
+                                            {"revision", "1001"},
+                                            {"level", NULL},
+                                            {"level", "0"},
+                                            {"level", "63"},
+                                            {"level", "16"},
+                                            {"level", "256"},
+                                            {"level", "512"},
+                                            {"level", "64.5"},
+                                            {"level", "-64"},
+                                            {"level", "4294967360"},
+                                            {"answer", NULL},
+                                            {"answer", "-1"},
+                                            {"answer", "0"},
+                                            {"answer", "1"},
+                                            {"answer", "2"},
+                                            {"answer", "3"},
+                                            {"rating", NULL},
+                                            {"rating", "-1"},
+                                            {"rating", "0"},
+                                            {"rating", "1"},
+                                            {"rating", "5"},
+                                            {"rating", "6"},
+                                            {"ms", NULL},
+                                            {"ms", "-0.5"},
+                                            {"ms", "0"},
+                                            {"ms", "86400000"},
+                                            {"ms", "86400000.5"},
+                                            {"ms", "\"1\""},
+                                            {"layout", NULL},
+                                            {"layout", "\"flip\""},
+                                            {"layout", "\"above\""},
+                                            {"layout", "7"}};
     struct transcript t;
     FILE *f = transcript_begin(&t);
     (void)state;
@@ -611,7 +709,8 @@ static void trials_are_answered_word_by_word(void **state)
 /* Whose turn it is: in the plan's order, or in any order within the screens reached. */
 static void turns_are_kept(void **state)
 {
-    static const int order[][2] = {{1, 0}, {5, 0}, {2, 0}, {2, 2}, {2, 1}, {2, 1}, {0, 0}, {0, 0}, {1, 0}, {1, 1}, {3, 0}, {9, 0}, {5, 0}, {8, 0}, {4, 0}, {0, 1},
+    static const int order[][2] = {{1, 0}, {5, 0}, {2, 0}, {2, 2}, {2, 1},  {2, 1},  {0, 0},  {0, 0},
+                                   {1, 0}, {1, 1}, {3, 0}, {9, 0}, {5, 0},  {8, 0},  {4, 0},  {0, 1},
                                    {6, 0}, {7, 0}, {9, 0}, {8, 0}, {10, 0}, {11, 0}, {11, 1}, {11, 3}};
     struct transcript t;
     FILE *f = transcript_begin(&t);
@@ -622,8 +721,8 @@ static void turns_are_kept(void **state)
         asker_init(&a, f, task);
         int64_t row = somebody(&a);
         for (size_t i = 0; i < sizeof order / sizeof order[0]; i++) {
-            snprintf(body, sizeof body, "{\"slot\":%d,\"revision\":%d,\"level\":64,\"answer\":%d,\"ms\":%d}", order[i][0], task ? 0 : order[i][1], task ? 2 : 0,
-                     (int)i);
+            snprintf(body, sizeof body, "{\"slot\":%d,\"revision\":%d,\"level\":64,\"answer\":%d,\"ms\":%d}", order[i][0],
+                     task ? 0 : order[i][1], task ? 2 : 0, (int)i);
             post_trial(&a, body);
         }
         for (int slot = 0; slot < 4 && task; slot++) {
@@ -641,15 +740,44 @@ static void turns_are_kept(void **state)
 /* Addresses, methods, where a request comes from, and sizes at their bounds. */
 static void requests_are_answered_word_by_word(void **state)
 {
-    static const char *const gets[] = {"", "/", "/index.html", "/main.js", "main.js", "/none.js", "/study.css", "/vendor/jspsych.js", "/vendor", "/vendor/", "/a/b/c.js", "/texts.json",
-                                       "/stimuli/v0/x.png", "/stimuli/x.png", "/stimuli", "/README.md", "/.hidden.js", "/api/study", "/api/people", "/api/people/",
-                                       "/api/people/00000000000000000000000000000001", "/api/people/00000000000000000000000000000001/",
-                                       "/api/people/00000000000000000000000000000001/trials", "/api/people/0000000000000000000000000000001",
-                                       "/api/people/000000000000000000000000000000001", "/api/people/00000000000000000000000000000001x"};
+    static const char *const gets[] = {"",
+                                       "/",
+                                       "/index.html",
+                                       "/main.js",
+                                       "main.js",
+                                       "/none.js",
+                                       "/study.css",
+                                       "/vendor/jspsych.js",
+                                       "/vendor",
+                                       "/vendor/",
+                                       "/a/b/c.js",
+                                       "/texts.json",
+                                       "/stimuli/v0/x.png",
+                                       "/stimuli/x.png",
+                                       "/stimuli",
+                                       "/README.md",
+                                       "/.hidden.js",
+                                       "/api/study",
+                                       "/api/people",
+                                       "/api/people/",
+                                       "/api/people/00000000000000000000000000000001",
+                                       "/api/people/00000000000000000000000000000001/",
+                                       "/api/people/00000000000000000000000000000001/trials",
+                                       "/api/people/0000000000000000000000000000001",
+                                       "/api/people/000000000000000000000000000000001",
+                                       "/api/people/00000000000000000000000000000001x"};
     static const char *const posts[][2] = {
-        {"/api/people", "{}"}, {"/api/people", "{\"consent\":1}"}, {"/api/people", "[]"}, {"/api/people", "{"}, {"/api/people", NULL}, {"/api/peoples", "{}"}, {"/main.js", "{}"},
-        {"/api/people/00000000000000000000000000000001", "{}"}, {"/api/people/00000000000000000000000000000001/profiles", "{}"},
-        {"/api/people/00000000000000000000000000000002/profile", "{}"}, {"/api/people/00000000000000000000000000000001/profile", " { \"a\" : [1, 2.50] } "}};
+        {"/api/people", "{}"},
+        {"/api/people", "{\"consent\":1}"},
+        {"/api/people", "[]"},
+        {"/api/people", "{"},
+        {"/api/people", NULL},
+        {"/api/peoples", "{}"},
+        {"/main.js", "{}"},
+        {"/api/people/00000000000000000000000000000001", "{}"},
+        {"/api/people/00000000000000000000000000000001/profiles", "{}"},
+        {"/api/people/00000000000000000000000000000002/profile", "{}"},
+        {"/api/people/00000000000000000000000000000001/profile", " { \"a\" : [1, 2.50] } "}};
     const char *const hosts[] = {"one:1", "two:2", NULL};
     struct transcript t;
     struct asker a;
@@ -668,18 +796,24 @@ static void requests_are_answered_word_by_word(void **state)
     }
     ask_with(&a, (struct ggn_study_request){.method = "HEAD", .path = "/api/study"});
     ask_with(&a, (struct ggn_study_request){.method = "PUT", .path = "/api/study"});
-    const struct ggn_study_request from[] = {
-        {.content_type = NULL}, {.content_type = "application/jso"}, {.content_type = "application/json; charset=utf-8"}, {.content_type = "text/json"},
-        {.content_type = "application/json", .fetch_site = "same-site"}, {.content_type = "application/json", .fetch_site = "same-origin"},
-        {.content_type = "application/json", .origin = "http://one:1", .host = "one:1"}, {.content_type = "application/json", .origin = "http://one:1"},
-        {.content_type = "application/json", .origin = "null", .host = "one:1"}, {.content_type = "application/json", .origin = "http://two:2", .host = "one:1"},
-        {.content_type = "application/json", .host = "two:2"}, {.content_type = "application/json", .host = "two"}};
+    const struct ggn_study_request from[] = {{.content_type = NULL},
+                                             {.content_type = "application/jso"},
+                                             {.content_type = "application/json; charset=utf-8"},
+                                             {.content_type = "text/json"},
+                                             {.content_type = "application/json", .fetch_site = "same-site"},
+                                             {.content_type = "application/json", .fetch_site = "same-origin"},
+                                             {.content_type = "application/json", .origin = "http://one:1", .host = "one:1"},
+                                             {.content_type = "application/json", .origin = "http://one:1"},
+                                             {.content_type = "application/json", .origin = "null", .host = "one:1"},
+                                             {.content_type = "application/json", .origin = "http://two:2", .host = "one:1"},
+                                             {.content_type = "application/json", .host = "two:2"},
+                                             {.content_type = "application/json", .host = "two"}};
     for (int known = 0; known < 2; known++) {
         a.site.hosts = known ? hosts : NULL;
         for (size_t i = 0; i < sizeof from / sizeof from[0]; i++) {
             struct ggn_study_request q = from[i];
-            fprintf(a.f, "host %s, origin %s, %s, %s: ", q.host ? q.host : "-", q.origin ? q.origin : "-", q.fetch_site ? q.fetch_site : "-",
-                    q.content_type ? q.content_type : "-");
+            fprintf(a.f, "host %s, origin %s, %s, %s: ", q.host ? q.host : "-", q.origin ? q.origin : "-",
+                    q.fetch_site ? q.fetch_site : "-", q.content_type ? q.content_type : "-");
             q.method = "POST";
             q.path = "/api/people";
             q.body = "{\"consent\":false}";
@@ -701,16 +835,44 @@ static void requests_are_answered_word_by_word(void **state)
 static void imports_are_answered_word_by_word(void **state)
 {
     static const char *const cases[][2] = {
-        {"", ""}, {"lull-study-trials", "lull-study"}, {"\"study\":\t\"0", "\"study\":\t\"1"}, {"\"people\":\t[", "\"people\":\t{"}, {"\"id\":\t\"0000000a", "\"id\":\t\"0000000g"},
-        {"\"id\":\t\"0000000a", "\"id\":\t\"00000000a"}, {"\"id\":\t\"0000000a", "\"id\":\t\"000000a"}, {"\"id\":\t\"0000000a", "\"id\":\t\"0000000b"},
-        {"\"created\":\t\"2024-01-01T00:00:00Z", "\"created\":\t\"0123456789012345678901234567890"}, {"\"created\":\t\"2024-01-01T00:00:00Z", "\"created\":\t\"01234567890123456789012345678901"},
-        {"\"created\"", "\"made\""}, {"\"seed\":\t", "\"seed\":\t-"}, {"\"seed\":\t", "\"seed\":\t0.5"}, {"\"seed\":\t", "\"sed\":\t"}, {"\"profile\":\t{", "\"profile\":\t[{"},
-        {"\"trials\":\t[", "\"trials\":\t7,\"x\":\t["}, {"\"slot\":\t0", "\"slot\":\t-1"}, {"\"slot\":\t0", "\"slot\":\t79"}, {"\"slot\":\t0", "\"slot\":\t80"}, {"\"slot\":\t0", "\"slot\":\t0.5"},
-        {"\"slot\":\t0", "\"slot\":\t1"}, {"\"revision\":\t0", "\"revision\":\t1000"}, {"\"revision\":\t0", "\"revision\":\t1001"}, {"\"revision\":\t0", "\"revision\":\t-1"},
-        {"\"level\":\t64", "\"level\":\t16"}, {"\"level\":\t64", "\"level\":\t65"}, {"\"level\":\t64", "\"level\":\t4294967360"}, {"\"answer\":\t1", "\"answer\":\t0"},
-        {"\"answer\":\t1", "\"answer\":\t3"}, {"\"rating\":\t0", "\"rating\":\t5"}, {"\"rating\":\t0", "\"rating\":\t6"}, {"\"ms\":\t0.5", "\"ms\":\t86400000"}, {"\"ms\":\t0.5", "\"ms\":\t86400001"},
-        {"\"ms\":\t0.5", "\"ms\":\t-1"}, {"\"layout\":\t\"", "\"layout\":\t\"012345678901234"}, {"\"layout\":\t\"", "\"layout\":\t\"0123456789012345"},
-        {"\"at\":\t\"2024-01-01T00:00:00Z", "\"at\":\t\"0123456789012345678901234567890"}, {"\"at\":\t\"2024-01-01T00:00:00Z", "\"at\":\t\"01234567890123456789012345678901"}};
+        {"", ""},
+        {"lull-study-trials", "lull-study"},
+        {"\"study\":\t\"0", "\"study\":\t\"1"},
+        {"\"people\":\t[", "\"people\":\t{"},
+        {"\"id\":\t\"0000000a", "\"id\":\t\"0000000g"},
+        {"\"id\":\t\"0000000a", "\"id\":\t\"00000000a"},
+        {"\"id\":\t\"0000000a", "\"id\":\t\"000000a"},
+        {"\"id\":\t\"0000000a", "\"id\":\t\"0000000b"},
+        {"\"created\":\t\"2024-01-01T00:00:00Z", "\"created\":\t\"0123456789012345678901234567890"},
+        {"\"created\":\t\"2024-01-01T00:00:00Z", "\"created\":\t\"01234567890123456789012345678901"},
+        {"\"created\"", "\"made\""},
+        {"\"seed\":\t", "\"seed\":\t-"},
+        {"\"seed\":\t", "\"seed\":\t0.5"},
+        {"\"seed\":\t", "\"sed\":\t"},
+        {"\"profile\":\t{", "\"profile\":\t[{"},
+        {"\"trials\":\t[", "\"trials\":\t7,\"x\":\t["},
+        {"\"slot\":\t0", "\"slot\":\t-1"},
+        {"\"slot\":\t0", "\"slot\":\t79"},
+        {"\"slot\":\t0", "\"slot\":\t80"},
+        {"\"slot\":\t0", "\"slot\":\t0.5"},
+        {"\"slot\":\t0", "\"slot\":\t1"},
+        {"\"revision\":\t0", "\"revision\":\t1000"},
+        {"\"revision\":\t0", "\"revision\":\t1001"},
+        {"\"revision\":\t0", "\"revision\":\t-1"},
+        {"\"level\":\t64", "\"level\":\t16"},
+        {"\"level\":\t64", "\"level\":\t65"},
+        {"\"level\":\t64", "\"level\":\t4294967360"},
+        {"\"answer\":\t1", "\"answer\":\t0"},
+        {"\"answer\":\t1", "\"answer\":\t3"},
+        {"\"rating\":\t0", "\"rating\":\t5"},
+        {"\"rating\":\t0", "\"rating\":\t6"},
+        {"\"ms\":\t0.5", "\"ms\":\t86400000"},
+        {"\"ms\":\t0.5", "\"ms\":\t86400001"},
+        {"\"ms\":\t0.5", "\"ms\":\t-1"},
+        {"\"layout\":\t\"", "\"layout\":\t\"012345678901234"},
+        {"\"layout\":\t\"", "\"layout\":\t\"0123456789012345"},
+        {"\"at\":\t\"2024-01-01T00:00:00Z", "\"at\":\t\"0123456789012345678901234567890"},
+        {"\"at\":\t\"2024-01-01T00:00:00Z", "\"at\":\t\"01234567890123456789012345678901"}};
     char dir[] = "/tmp/ggn_study_XXXXXX", path[64], again[64], *exported, *bytes;
     struct transcript t;
     struct asker a;

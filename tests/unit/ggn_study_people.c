@@ -79,15 +79,9 @@ static struct ggn_study_store *open_store(void)
 
 /* --- who was right --- */
 
-static uint32_t level_of(const struct ggn_study_slot *slot, int k)
-{
-    return slot->catch_trial ? 0 : 16u << k % LEVELS;
-}
+static uint32_t level_of(const struct ggn_study_slot *slot, int k) { return slot->catch_trial ? 0 : 16u << k % LEVELS; }
 
-static int noisy(const struct ggn_study_slot *slot) /* the interval, from 1 */
-{
-    return slot->side == 0 ? 1 : 2;
-}
+static int noisy(const struct ggn_study_slot *slot) /* the interval, from 1 */ { return slot->side == 0 ? 1 : 2; }
 
 /* Sees the noise below 2^8 samples and nothing above: there, and for 256 itself, says "first" whatever is shown. */
 static void answer_by_sight(const struct ggn_study_slot *slot, int i, int k, struct ggn_study_trial *t)
@@ -186,7 +180,8 @@ static void catch_trials_of_a_validation_have_two_sides(void **state)
     assert_string_equal(p.results[1].excluded, "1 of 2 catch trials passed");
     for (int j = 0; j < p.results[0].n_judgements; j++) {
         const struct ggn_study_judgement *found = &p.results[0].judgements[j];
-        assert_true(found->condition < 0 || (found->same == (found->condition == 0) && found->rating == (found->same ? 5 : 2)));
+        assert_true(found->condition < 0 ||
+                    (found->same == (found->condition == 0) && found->rating == (found->same ? 5 : 2)));
     }
     ggn_study_people_release(&p);
     ggn_study_store_close(store);

@@ -28,8 +28,8 @@ static void quantiles_are_those_of_the_tables(void **state)
     NEAR(ggn_study_t975(31), 1.959964 + (pow(1.959964, 3) + 1.959964) / 124.0, 1e-5);
     NEAR(ggn_study_normal(-1.0), 0.158655254, 1e-9);
     NEAR(ggn_study_normal_quantile(0.001), -3.090232306, 1e-8);
-    NEAR(ggn_study_normal_quantile(0.0), -7.941345326, 1e-6); /* of 1e-15 */
-    NEAR(ggn_study_normal_quantile(1.0), 7.941345326, 0.1); /* 1 - 1e-15 is rounded */
+    NEAR(ggn_study_normal_quantile(0.0), -7.941345326, 1e-6);    /* of 1e-15 */
+    NEAR(ggn_study_normal_quantile(1.0), 7.941345326, 0.1);      /* 1 - 1e-15 is rounded */
     NEAR(ggn_study_p_correct(5.0, 6.0, 0.5), 0.988624934, 1e-8); /* half and half of 0.977249868 */
 }
 
@@ -184,7 +184,8 @@ static void estimates_are_those_of_the_joint_posterior(void **state)
     for (int b = 0; b < JOINT; b++) {
         for (int i = 0; i < 14; i++) { /* around the threshold, with slips */
             double x = threshold[b] - 1.5 + 0.25 * i;
-            choices[b][i] = (struct ggn_study_choice){x, (i + b) % 2, x < threshold[b] + (i % 3 == b ? 0.9 : -0.4) || i % 5 == 0};
+            choices[b][i] =
+                (struct ggn_study_choice){x, (i + b) % 2, x < threshold[b] + (i % 3 == b ? 0.9 : -0.4) || i % 5 == 0};
         }
         c[b] = (struct ggn_study_curve){choices[b], 14, 4.0, 10.0, {0}};
         for (int i = 0; i < n; i++)
@@ -223,7 +224,8 @@ static void estimates_are_those_of_the_joint_posterior(void **state)
         }
         NEAR(c[b].estimate.se, sqrt(var), 1e-3); /* the product's d comes from a table */
         assert_quantiles(&c[b].estimate, w, n, of_s);
-        assert_true(below <= 0.5 && below > 0.5 - 1.05 * w[(int)((c[b].estimate.t - 2.0) * 12 + 0.5)] / sum); /* the median's cell */
+        assert_true(below <= 0.5 &&
+                    below > 0.5 - 1.05 * w[(int)((c[b].estimate.t - 2.0) * 12 + 0.5)] / sum); /* the median's cell */
     }
 }
 
@@ -359,7 +361,8 @@ int main(void)
         cmocka_unit_test(wilson_is_wilson),
         cmocka_unit_test(a_curve_comes_back),
         cmocka_unit_test(blocks_help_each_other),
-        cmocka_unit_test(estimates_are_those_of_the_joint_posterior), cmocka_unit_test(slips_in_catch_trials_are_lapses),
+        cmocka_unit_test(estimates_are_those_of_the_joint_posterior),
+        cmocka_unit_test(slips_in_catch_trials_are_lapses),
         cmocka_unit_test(guessing_tells_nothing),
         cmocka_unit_test(thresholds_are_means_over_people_that_count),
         cmocka_unit_test(the_noise_ceiling_is_between_people),

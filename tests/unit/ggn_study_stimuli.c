@@ -146,7 +146,8 @@ static void near_the_cap_nothing_is_added(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(recorded_then_simulated), cmocka_unit_test(without_a_reference_all_are_simulated),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(recorded_then_simulated),
+                                       cmocka_unit_test(without_a_reference_all_are_simulated),
                                        cmocka_unit_test(near_the_cap_nothing_is_added)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

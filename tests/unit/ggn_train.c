@@ -107,7 +107,8 @@ static void extended_levels_continue_the_recording(void **state)
         double e[2] = {0, 0};
         for (size_t v = 0; v < values; v++) {
             /* a level and the next share samples: so do their errors */
-            double a = c->noisy[13 * values + v] - c->noisy[12 * values + v], b = c->noisy[14 * values + v] - c->noisy[13 * values + v];
+            double a = c->noisy[13 * values + v] - c->noisy[12 * values + v],
+                   b = c->noisy[14 * values + v] - c->noisy[13 * values + v];
             e[0] += a * a / (1 / c->spp[12] - 1 / c->spp[13]);
             e[1] += b * b / (1 / c->spp[13] - 1 / c->spp[14]);
         }
@@ -137,7 +138,8 @@ static void simulated_levels_lie_as_far_apart_as_asked(void **state)
             const int end = c->n_levels - 1;
             double low = 0, high = 0;
             int half = 0;
-            assert_true(c->simulated && c->spp[0] == first && c->spp[end] <= GGN_LABELS_CAP && c->spp[end] * wanted[t] > GGN_LABELS_CAP && isnan(c->tail999[0]));
+            assert_true(c->simulated && c->spp[0] == first && c->spp[end] <= GGN_LABELS_CAP &&
+                        c->spp[end] * wanted[t] > GGN_LABELS_CAP && isnan(c->tail999[0]));
             for (int k = 1; k < end; k++)
                 assert_true(c->spp[k] == fmax(c->spp[k - 1] + 1, floor(c->spp[k - 1] * wanted[t] + 0.5)));
             while (c->spp[half] < 100)
@@ -213,7 +215,8 @@ static void compare_picture(const struct ggn_chains *set, const struct ggn_chain
     assert_int_equal(c->has_picture[k], h > 0);
     int largest = 0;
     for (size_t p = 0; p < pixels && h > 0; p++) {
-        double y = 0.2126729 * (double)mean[p] + 0.7151522 * (double)mean[pixels + p] + 0.0721750 * (double)mean[2 * pixels + p];
+        double y =
+            0.2126729 * (double)mean[p] + 0.7151522 * (double)mean[pixels + p] + 0.0721750 * (double)mean[2 * pixels + p];
         int want = abs(code(y + even * sqrt(n / r->spp) * (double)d[p]) - code(y)), got = c->picture[(size_t)k * pixels + p];
         assert_true(abs(got - want) <= 1); /* a value between two codes may be rounded either way */
         largest = want > largest ? want : largest;
@@ -317,7 +320,8 @@ static void pictures_are_augmented_with_their_window(void **state)
     a.blind = 1;
     assert_int_equal(ggn_picture_plane(c, 3, set.width, set.height, &a, plane), 0);
     for (int i = 0; i < 1000; i++) {
-        struct ggn_augment without = ggn_augment_draw((uint64_t)i, 1, 5, &half), with = ggn_augment_draw((uint64_t)i, 1, 5, &all);
+        struct ggn_augment without = ggn_augment_draw((uint64_t)i, 1, 5, &half),
+                           with = ggn_augment_draw((uint64_t)i, 1, 5, &all);
         assert_false(with.blind || without.flip_x || without.flip_y || without.transpose || with.transpose);
         blind += without.blind;
         flips += with.flip_x;
@@ -368,7 +372,8 @@ static void augmentation_moves_whole_windows(void **state)
 /* The generator on differences and the folded one on plain images give the same map. */
 static void folding_keeps_the_function(void **state)
 {
-    struct ggn_hyper hyper = {.preset = GGN_PRESET_LULL, .height = 32, .width = 32, .window = 3, .k_r = 3, .k_m = 3, .k_d = 2};
+    struct ggn_hyper hyper = {
+        .preset = GGN_PRESET_LULL, .height = 32, .width = 32, .window = 3, .k_r = 3, .k_m = 3, .k_d = 2};
     struct ggn_graph *g = malloc(sizeof *g);
     struct base_err err = {0};
     float out[2][32 * 32], before[1];
@@ -391,7 +396,8 @@ static void folding_keeps_the_function(void **state)
                 }
         ggn_exec_forward(e, w, 1, GGN_EVAL);
         for (int y = 0; y < 32; y++)
-            memcpy(out[fold] + 32 * y, ggn_exec_plane(e, g->n_values - 1, 0, 0) + y * g->value[g->n_values - 1].row, 32 * sizeof(float));
+            memcpy(out[fold] + 32 * y, ggn_exec_plane(e, g->n_values - 1, 0, 0) + y * g->value[g->n_values - 1].row,
+                   32 * sizeof(float));
     }
     for (int i = 0; i < 32 * 32; i++)
         assert_float_equal(out[0][i], out[1][i], 1e-4);
@@ -406,7 +412,8 @@ static void folding_keeps_the_function(void **state)
 /* The denoiser begins as sigmoid(4·(x − 1/2)), up to what the random channels add. */
 static void the_denoiser_begins_near_its_input(void **state)
 {
-    struct ggn_hyper hyper = {.preset = GGN_PRESET_LULL, .height = 32, .width = 32, .window = 6, .k_r = 8, .k_m = 3, .k_d = 2};
+    struct ggn_hyper hyper = {
+        .preset = GGN_PRESET_LULL, .height = 32, .width = 32, .window = 6, .k_r = 8, .k_m = 3, .k_d = 2};
     struct ggn_graph *g = malloc(sizeof *g);
     struct base_err err = {0};
     double error = 0;
@@ -425,8 +432,10 @@ static void the_denoiser_begins_near_its_input(void **state)
                     if (!pass)
                         ggn_exec_plane(e, 0, 0, k)[y * g->value[0].row + x] = (float)v;
                     else
-                        error += fabs((double)ggn_exec_plane(e, g->n_values - 1, 0, k)[y * g->value[g->n_values - 1].row + x] -
-                                      1 / (1 + exp(2 - 4 * v))) / (3 * 32 * 32);
+                        error +=
+                            fabs((double)ggn_exec_plane(e, g->n_values - 1, 0, k)[y * g->value[g->n_values - 1].row + x] -
+                                 1 / (1 + exp(2 - 4 * v))) /
+                            (3 * 32 * 32);
                 }
         if (!pass)
             ggn_exec_forward(e, w, 1, GGN_EVAL);
@@ -568,7 +577,8 @@ static void learning_rates(void **state)
     for (int k = 0; k < 4; k++)
         for (double step = 0; step <= steps[k]; step += steps[k] / 10 + (steps[k] == 0)) {
             struct ggn_session s = {.progress.divergences = k};
-            double t = steps[k] > 0 ? floor(step) / steps[k] : 0, ramp = fmin(1, (floor(step) + 1) / fmax(20, steps[k] / 50));
+            double t = steps[k] > 0 ? floor(step) / steps[k] : 0,
+                   ramp = fmin(1, (floor(step) + 1) / fmax(20, steps[k] / 50));
             double want = 3 * ramp * (0.02 + 0.98 * (0.5 + 0.5 * cos(3.141592653589793 * t))) / pow(2, k);
             double got = ggn_session_lr(&s, 3, (uint64_t)step, (uint64_t)steps[k]);
             if (!(fabs(got - want) <= 1e-12))
@@ -658,8 +668,21 @@ static void stopping_by_hand(void **state)
     static double spp[] = {10, 20, 40, 80};
     struct ggn_chain chains[4];
     /* the third stops at no level at 0.5; the second never */
-    struct ggn_seen seen[16] = {{.p = 0.9}, {.p = 0.4}, {.p = 0.3}, {.p = 0.05}, {.p = 0.6}, {.p = 0.6}, {.p = 0.7}, {.p = 0.6},
-                                {.p = 0}, {.p = 0}, {.p = 0}, {.p = 0}, {.p = 0.4, .is_held = 1}, {.p = 0.6}, {.p = 0.2},
+    struct ggn_seen seen[16] = {{.p = 0.9},
+                                {.p = 0.4},
+                                {.p = 0.3},
+                                {.p = 0.05},
+                                {.p = 0.6},
+                                {.p = 0.6},
+                                {.p = 0.7},
+                                {.p = 0.6},
+                                {.p = 0},
+                                {.p = 0},
+                                {.p = 0},
+                                {.p = 0},
+                                {.p = 0.4, .is_held = 1},
+                                {.p = 0.6},
+                                {.p = 0.2},
                                 {.p = 0.1}};
     static const double truth[] = {25, 200, 30, 30};
     int first[] = {0, 1, 2, 2, 3};
@@ -689,8 +712,9 @@ static void stopping_by_hand(void **state)
     chains[3].label.threshold = 40;
     struct ggn_policy p = ggn_policy_default();
     assert_int_equal(ggn_calibrate_threshold(&checks, 0, &p, &got, &err), 0);
-    assert_true(p.threshold == 0.41 && p.passes == 1 && got.mean_abs_log2 == 0 && got.samples_ratio == 1); /* p < t, not p <= t */
-    chains[0].label.threshold = 50; /* 40 is four fifths of it, which is not early; 20, better for two passes, is */
+    assert_true(p.threshold == 0.41 && p.passes == 1 && got.mean_abs_log2 == 0 &&
+                got.samples_ratio == 1); /* p < t, not p <= t */
+    chains[0].label.threshold = 50;      /* 40 is four fifths of it, which is not early; 20, better for two passes, is */
     assert_int_equal(ggn_calibrate_threshold(&checks, 0, &p, &got, &err), 0);
     assert_true(p.threshold == 0.31 && p.passes == 1 && fabs(got.mean_abs_log2 - log2(1.25) / 3) < 1e-12);
     (void)state;
@@ -753,24 +777,31 @@ static void learning_curves(void **state)
 
     assert_true(close(mkstemp(path)) == 0);
     for (int i = 0; i < 9; i++) {
-        struct ggn_log_row r = {.phase = i > 6, .step = 10 * i, .loss = 1.0 / (i + 1), .accuracy = (double)NAN,
-                                .validation_loss = i + 0.5, .validation_accuracy = 0.25, .validation_auc = 0.75, .lr = 1e-3,
+        struct ggn_log_row r = {.phase = i > 6,
+                                .step = 10 * i,
+                                .loss = 1.0 / (i + 1),
+                                .accuracy = (double)NAN,
+                                .validation_loss = i + 0.5,
+                                .validation_accuracy = 0.25,
+                                .validation_auc = 0.75,
+                                .lr = 1e-3,
                                 .seconds = 0.06 * i};
         *(i % 3 ? &r.validation_auc : &r.lr) = (double)NAN;
         assert_int_equal(ggn_log_add(&log, &r, &err), 0);
     }
     assert_int_equal(ggn_log_write_csv(&log, path, &err), 0);
     assert_int_equal(base_file_read(path, 1 << 16, &text, &size, &err), 0);
-    assert_string_equal(text, "phase,step,loss,accuracy,validation_loss,validation_accuracy,validation_auc,learning_rate,seconds\n"
-                              "denoiser,0,1,,0.5,0.25,0.75,,0.0\n"
-                              "denoiser,10,0.5,,1.5,0.25,,0.001,0.1\n"
-                              "denoiser,20,0.333333333,,2.5,0.25,,0.001,0.1\n"
-                              "denoiser,30,0.25,,3.5,0.25,0.75,,0.2\n"
-                              "denoiser,40,0.2,,4.5,0.25,,0.001,0.2\n"
-                              "denoiser,50,0.166666667,,5.5,0.25,,0.001,0.3\n"
-                              "denoiser,60,0.142857143,,6.5,0.25,0.75,,0.4\n"
-                              "judge,70,0.125,,7.5,0.25,,0.001,0.4\n"
-                              "judge,80,0.111111111,,8.5,0.25,,0.001,0.5\n");
+    assert_string_equal(text,
+                        "phase,step,loss,accuracy,validation_loss,validation_accuracy,validation_auc,learning_rate,seconds\n"
+                        "denoiser,0,1,,0.5,0.25,0.75,,0.0\n"
+                        "denoiser,10,0.5,,1.5,0.25,,0.001,0.1\n"
+                        "denoiser,20,0.333333333,,2.5,0.25,,0.001,0.1\n"
+                        "denoiser,30,0.25,,3.5,0.25,0.75,,0.2\n"
+                        "denoiser,40,0.2,,4.5,0.25,,0.001,0.2\n"
+                        "denoiser,50,0.166666667,,5.5,0.25,,0.001,0.3\n"
+                        "denoiser,60,0.142857143,,6.5,0.25,0.75,,0.4\n"
+                        "judge,70,0.125,,7.5,0.25,,0.001,0.4\n"
+                        "judge,80,0.111111111,,8.5,0.25,,0.001,0.5\n");
     free(text);
     ggn_log_release(&log);
     assert_true(log.n == 0 && !log.rows);

@@ -143,16 +143,27 @@ static void tail_statistics_match_their_definition(void **state)
 
 static void policy_travels_with_the_model(void **state)
 {
-    struct ggn_hyper hyper = {.preset = GGN_PRESET_LULL, .height = 16, .width = 16, .window = 2, .k_r = 1, .k_m = 1, .k_d = 1};
+    struct ggn_hyper hyper = {
+        .preset = GGN_PRESET_LULL, .height = 16, .width = 16, .window = 2, .k_r = 1, .k_m = 1, .k_d = 1};
     struct base_err err = {0};
     struct ggn_model *model = ggn_model_create(&hyper, &err);
-    struct ggn_policy p = {.first_spp = 12, .ratio = 1.25, .scale = 0.7, .shift = -0.3, .threshold = 0.4, .passes = 3,
-                           .gate_noise = 0.02, .slope = 5, .tail999 = 2, .gini = 0.9}, q;
+    struct ggn_policy p = {.first_spp = 12,
+                           .ratio = 1.25,
+                           .scale = 0.7,
+                           .shift = -0.3,
+                           .threshold = 0.4,
+                           .passes = 3,
+                           .gate_noise = 0.02,
+                           .slope = 5,
+                           .tail999 = 2,
+                           .gini = 0.9},
+                      q;
 
     assert_non_null(model);
     assert_int_equal(ggn_policy_set(model, &p, &err), 0);
     assert_int_equal(ggn_policy_of(model, &q, &err), 0);
-    assert_true(q.first_spp == p.first_spp && q.ratio == p.ratio && q.step_spp == p.step_spp && q.scale == p.scale && q.shift == p.shift);
+    assert_true(q.first_spp == p.first_spp && q.ratio == p.ratio && q.step_spp == p.step_spp && q.scale == p.scale &&
+                q.shift == p.shift);
     assert_true(q.threshold == p.threshold && q.passes == p.passes && q.gate_noise == p.gate_noise && q.slope == p.slope);
     assert_true(q.tail999 == p.tail999 && q.gini == p.gini);
     p.threshold = 1.5;
@@ -191,7 +202,7 @@ static void codes_are_those_of_the_pictures(void **state)
     for (int code = 1; code < 256; code++) {
         const double limit = base_srgb_limit[code];
         const float near = (float)limit;
-        const double values[6] = {limit, nextafter(limit, 0), nextafter(limit, 1),
+        const double values[6] = {limit,        nextafter(limit, 0),         nextafter(limit, 1),
                                   (double)near, (double)nextafterf(near, 0), (double)nextafterf(near, 1)};
         assert_int_equal(ggn_preprocess(values[1], NULL, NULL), code - 1);
         for (int i = 0; i < 6; i++) {
@@ -233,14 +244,16 @@ static void tiles_begin_anywhere(void **state)
                 assert_int_equal(back[i], x >= 0 && x < TW && y >= 0 && y < TH ? wide[i] : 0);
             }
         }
-    static const int starts[][4] = {{10, 10, 1, 0}, {9, 10, 1, 0}, {11, 10, 2, 1}, {20, 10, 2, 10}, {21, 10, 3, 11}, {29, 10, 3, 19}};
+    static const int starts[][4] = {{10, 10, 1, 0},  {9, 10, 1, 0},   {11, 10, 2, 1},
+                                    {20, 10, 2, 10}, {21, 10, 3, 11}, {29, 10, 3, 19}};
     for (size_t i = 0; i < sizeof starts / sizeof starts[0]; i++) {
         assert_int_equal(ggn_tile_count(starts[i][0], starts[i][1]), starts[i][2]);
         assert_int_equal(ggn_tile_start(starts[i][0], starts[i][1], starts[i][2] - 1), starts[i][3]);
     }
     assert_int_equal(ggn_tile_start(29, 10, 1), 9);
     /* codes: half up; all of 1 and beyond is 65534, less than 0 is 0 */
-    const float v[] = {0.49999f / 65535, 0.50001f / 65535, 1.6f / 65535, -3, 1, 65533.9f / 65535, (float)NAN, 2e30f, -(float)INFINITY};
+    const float v[] = {0.49999f / 65535, 0.50001f / 65535, 1.6f / 65535, -3, 1, 65533.9f / 65535, (float)NAN, 2e30f,
+                       -(float)INFINITY};
     static const uint16_t codes[] = {0, 1, 2, 0, 65534, 65534, 65535, 65534, 0};
     float planes[27] = {0};
     memcpy(planes, v, sizeof v);
@@ -258,11 +271,16 @@ static const struct {
     const char *name;
     size_t at;
     double min, max;
-} limits[] = {{"first_spp", offsetof(struct ggn_policy, first_spp), 1, 1e9}, {"ratio", offsetof(struct ggn_policy, ratio), 0, 100},
-              {"step_spp", offsetof(struct ggn_policy, step_spp), 0, 1e9},   {"scale", offsetof(struct ggn_policy, scale), 1e-6, 1e6},
-              {"shift", offsetof(struct ggn_policy, shift), -1e6, 1e6},      {"threshold", offsetof(struct ggn_policy, threshold), 0, 1},
-              {"gate_noise", offsetof(struct ggn_policy, gate_noise), 0, 1e6}, {"slope", offsetof(struct ggn_policy, slope), 0, 1e6},
-              {"tail999", offsetof(struct ggn_policy, tail999), 0, 1e30},    {"gini", offsetof(struct ggn_policy, gini), 0, 2}};
+} limits[] = {{"first_spp", offsetof(struct ggn_policy, first_spp), 1, 1e9},
+              {"ratio", offsetof(struct ggn_policy, ratio), 0, 100},
+              {"step_spp", offsetof(struct ggn_policy, step_spp), 0, 1e9},
+              {"scale", offsetof(struct ggn_policy, scale), 1e-6, 1e6},
+              {"shift", offsetof(struct ggn_policy, shift), -1e6, 1e6},
+              {"threshold", offsetof(struct ggn_policy, threshold), 0, 1},
+              {"gate_noise", offsetof(struct ggn_policy, gate_noise), 0, 1e6},
+              {"slope", offsetof(struct ggn_policy, slope), 0, 1e6},
+              {"tail999", offsetof(struct ggn_policy, tail999), 0, 1e30},
+              {"gini", offsetof(struct ggn_policy, gini), 0, 2}};
 
 static void same_policy(const struct ggn_policy *a, const struct ggn_policy *b)
 {
@@ -276,13 +294,15 @@ static void policies_have_limits(void **state)
     for (size_t i = 0; i < sizeof limits / sizeof limits[0]; i++)
         for (int k = 0; k < 5; k++) {
             const double span = limits[i].max - limits[i].min;
-            const double values[] = {limits[i].min, limits[i].max, limits[i].min - 1e-3 * span, limits[i].max + 1e-3 * span, (double)NAN};
+            const double values[] = {limits[i].min, limits[i].max, limits[i].min - 1e-3 * span, limits[i].max + 1e-3 * span,
+                                     (double)NAN};
             struct ggn_policy p = ggn_policy_default();
             struct base_err err = {0};
             char want[128];
             p.step_spp = 1;
             memcpy((char *)&p + limits[i].at, &values[k], sizeof values[k]);
-            snprintf(want, sizeof want, "policy: %s = %g is not in %g..%g", limits[i].name, values[k], limits[i].min, limits[i].max);
+            snprintf(want, sizeof want, "policy: %s = %g is not in %g..%g", limits[i].name, values[k], limits[i].min,
+                     limits[i].max);
             assert_int_equal(ggn_policy_check(&p, &err), k < 2 ? 0 : BASE_EINVAL);
             if (k >= 2)
                 assert_string_equal(err.text, want);
@@ -297,7 +317,8 @@ static void policies_have_limits(void **state)
     }
     struct ggn_policy p = ggn_policy_default();
     struct base_err err = {0};
-    assert_true(p.first_spp == 20 && p.ratio == 1.15 && p.step_spp == 0 && p.scale == 1 && p.shift == 0 && p.threshold == 0.5);
+    assert_true(p.first_spp == 20 && p.ratio == 1.15 && p.step_spp == 0 && p.scale == 1 && p.shift == 0 &&
+                p.threshold == 0.5);
     assert_true(p.passes == 2 && p.gate_noise == 0 && p.slope == 0 && p.tail999 == 0 && p.gini == 0);
     p.ratio = 1.001;
     p.step_spp = 1;
@@ -313,8 +334,17 @@ static void policies_have_limits(void **state)
 /* What users may set, and what follows from it. */
 static void policies_are_adjusted(void **state)
 {
-    struct ggn_policy p = {.first_spp = 12, .ratio = 1.25, .scale = 2, .shift = -1, .threshold = 0.25, .passes = 3, .gate_noise = 0.02,
-                           .slope = 2, .tail999 = 2, .gini = 0.9}, was = p;
+    struct ggn_policy p = {.first_spp = 12,
+                           .ratio = 1.25,
+                           .scale = 2,
+                           .shift = -1,
+                           .threshold = 0.25,
+                           .passes = 3,
+                           .gate_noise = 0.02,
+                           .slope = 2,
+                           .tail999 = 2,
+                           .gini = 0.9},
+                      was = p;
 
     assert_true(ggn_policy_adjust(&p, "visible", 0.1) && p.threshold == 0.1);
     assert_true(ggn_policy_adjust(&p, "tail", 7) && p.tail999 == 7);
@@ -331,7 +361,8 @@ static void policies_are_adjusted(void **state)
     assert_true(p.tail999 == 0 && p.gini == 0 && p.threshold == 0.1);
     p = was;
     assert_true(fabs(ggn_policy_p(&p, 0.5) - 0.5) < 1e-15 && fabs(ggn_policy_p(&p, 1) - 1 / (1 + exp(-1))) < 1e-15);
-    assert_true(ggn_policy_p(&p, (double)INFINITY) == 1 && ggn_policy_p(&p, -(double)INFINITY) == 1 && ggn_policy_p(&p, (double)NAN) == 1);
+    assert_true(ggn_policy_p(&p, (double)INFINITY) == 1 && ggn_policy_p(&p, -(double)INFINITY) == 1 &&
+                ggn_policy_p(&p, (double)NAN) == 1);
     assert_true(ggn_policy_next(&p, 10) == 13 && ggn_policy_next(&p, 9) == 11 && ggn_policy_next(&p, 2) == 3);
     p.ratio = 1.001;
     p.step_spp = 7;
@@ -362,8 +393,17 @@ static void policies_are_adjusted(void **state)
 /* As JSON, whole; what is missing keeps its default, but for passes. */
 static void policies_are_written_down(void **state)
 {
-    const struct ggn_policy p = {.first_spp = 12, .ratio = 1.25, .step_spp = 3, .scale = 2, .shift = -1, .threshold = 0.25, .passes = 3,
-                                 .gate_noise = 0.5, .slope = 4, .tail999 = 6, .gini = 0.75};
+    const struct ggn_policy p = {.first_spp = 12,
+                                 .ratio = 1.25,
+                                 .step_spp = 3,
+                                 .scale = 2,
+                                 .shift = -1,
+                                 .threshold = 0.25,
+                                 .passes = 3,
+                                 .gate_noise = 0.5,
+                                 .slope = 4,
+                                 .tail999 = 6,
+                                 .gini = 0.75};
     struct ggn_policy q = {.scale = 77};
     struct base_err err = {0};
     cJSON *root = cJSON_CreateObject();
@@ -371,8 +411,10 @@ static void policies_are_written_down(void **state)
 
     ggn_policy_print(root, &p, &failed);
     char *text = cJSON_PrintUnformatted(root);
-    assert_string_equal(text, "{\"first_spp\":12,\"ratio\":1.25,\"step_spp\":3,\"scale\":2,\"shift\":-1,\"threshold\":0.25,\"gate_noise\":0.5,"
-                              "\"slope\":4,\"tail999\":6,\"gini\":0.75,\"passes\":3}");
+    assert_string_equal(
+        text,
+        "{\"first_spp\":12,\"ratio\":1.25,\"step_spp\":3,\"scale\":2,\"shift\":-1,\"threshold\":0.25,\"gate_noise\":0.5,"
+        "\"slope\":4,\"tail999\":6,\"gini\":0.75,\"passes\":3}");
     assert_false(failed);
     assert_int_equal(ggn_policy_parse(root, &q, &err), 0);
     same_policy(&p, &q);
@@ -395,7 +437,9 @@ static void policies_are_written_down(void **state)
 static void policies_of_models(void **state)
 {
     struct ggn_hyper hyper = {GGN_PRESET_LULL, 16, 16, 2, 1, 1, 1, 0};
-    struct ggn_policy p = {.first_spp = 12, .step_spp = 3, .scale = 2, .shift = -1, .threshold = 0.25, .passes = 3, .gini = 0.75}, q;
+    struct ggn_policy
+        p = {.first_spp = 12, .step_spp = 3, .scale = 2, .shift = -1, .threshold = 0.25, .passes = 3, .gini = 0.75},
+        q;
     struct ggn_model *m = ggn_model_create(&hyper, NULL);
 
     assert_non_null(m);
@@ -410,8 +454,9 @@ static void policies_of_models(void **state)
     assert_true(m->calibration.scale == 2 && m->calibration.shift == -1 && m->calibration.threshold == 0.25);
     assert_true(m->calibration.consecutive == 3 && m->calibration.spacing == 1);
     char *text = cJSON_PrintUnformatted(m->provenance);
-    assert_string_equal(text, "{\"policy\":{\"first_spp\":12,\"ratio\":0,\"step_spp\":3,\"gate_noise\":0,\"slope\":0,\"tail999\":0,"
-                              "\"gini\":0.75}}");
+    assert_string_equal(
+        text, "{\"policy\":{\"first_spp\":12,\"ratio\":0,\"step_spp\":3,\"gate_noise\":0,\"slope\":0,\"tail999\":0,"
+              "\"gini\":0.75}}");
     free(text);
     assert_int_equal(ggn_policy_of(m, &q, NULL), 0);
     same_policy(&p, &q);
@@ -429,7 +474,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(tail_guard),
         cmocka_unit_test(noise_is_that_of_the_newest_image),
-        cmocka_unit_test(noise_pictures_are_differences_of_codes), cmocka_unit_test(tiles_cover_and_reflect),
+        cmocka_unit_test(noise_pictures_are_differences_of_codes),
+        cmocka_unit_test(tiles_cover_and_reflect),
         cmocka_unit_test(tail_statistics_match_their_definition),
         cmocka_unit_test(policy_travels_with_the_model),
         cmocka_unit_test(codes_are_those_of_the_pictures),

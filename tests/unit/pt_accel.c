@@ -154,7 +154,8 @@ static void quadric_surfaces(void **state)
             surface_point(&q, u, v, p);
             pt_vec3 own = v3((float)p[0], (float)p[1], (float)p[2]), at = pt_mat34_point(&q.to_render, own), du, dv;
             float gu, gv;
-            assert_true(at.x >= lower.x && at.y >= lower.y && at.z >= lower.z && at.x <= upper.x && at.y <= upper.y && at.z <= upper.z);
+            assert_true(at.x >= lower.x && at.y >= lower.y && at.z >= lower.z && at.x <= upper.x && at.y <= upper.y &&
+                        at.z <= upper.z);
             seen_lower = v3(fminf(seen_lower.x, at.x), fminf(seen_lower.y, at.y), fminf(seen_lower.z, at.z));
             seen_upper = v3(fmaxf(seen_upper.x, at.x), fmaxf(seen_upper.y, at.y), fmaxf(seen_upper.z, at.z));
             pt_quadric_uv(&q, own, &gu, &gv, &du, &dv);
@@ -168,7 +169,9 @@ static void quadric_surfaces(void **state)
                     d[which][c] = (a[c] - b[c]) / 2e-6;
             }
             for (int which = 0; which < 2; which++)
-                assert_vec_near(which ? dv : du, pt_mat34_vector(&q.to_render, v3((float)d[which][0], (float)d[which][1], (float)d[which][2])), 2e-3f);
+                assert_vec_near(
+                    which ? dv : du,
+                    pt_mat34_vector(&q.to_render, v3((float)d[which][0], (float)d[which][1], (float)d[which][2])), 2e-3f);
         }
         pt_vec3 room = v3_sub(upper, lower), used = v3_sub(seen_upper, seen_lower);
         assert_true(room.x < 4.0f * used.x + 0.1f && room.y < 4.0f * used.y + 0.1f && room.z < 4.0f * used.z + 0.1f);
@@ -313,7 +316,8 @@ static void many_rays_are_as_single_ones(void **state)
 static void matrices_invert(void **state)
 {
     (void)state;
-    struct pt_mat34 t = {{1, 2, 0.5f, 3, -1, 0.25f, 4, 5, 0.5f, 0.75f, -2, 7}}, inv, flat = {{1, 2, 3, 0, 2, 4, 6, 0, 0, 0, 1, 0}};
+    struct pt_mat34 t = {{1, 2, 0.5f, 3, -1, 0.25f, 4, 5, 0.5f, 0.75f, -2, 7}}, inv,
+                    flat = {{1, 2, 3, 0, 2, 4, 6, 0, 0, 0, 1, 0}};
     assert_int_equal(pt_mat34_invert(&t, &inv), 1);
     pt_vec3 p = v3(0.3f, -4.0f, 2.0f);
     assert_vec_near(pt_mat34_point(&inv, pt_mat34_point(&t, p)), p, 1e-5f);
@@ -362,10 +366,16 @@ static void arenas_give_room(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(triangles_have_right_hand_normals), cmocka_unit_test(empty_scene_has_no_hits),
-        cmocka_unit_test(bounds_of_a_sheet), cmocka_unit_test(quadrics), cmocka_unit_test(quadric_surfaces), cmocka_unit_test(instances),
-        cmocka_unit_test(meshes_are_watertight), cmocka_unit_test(many_rays_are_as_single_ones),
-        cmocka_unit_test(matrices_invert), cmocka_unit_test(arenas_give_room),
+        cmocka_unit_test(triangles_have_right_hand_normals),
+        cmocka_unit_test(empty_scene_has_no_hits),
+        cmocka_unit_test(bounds_of_a_sheet),
+        cmocka_unit_test(quadrics),
+        cmocka_unit_test(quadric_surfaces),
+        cmocka_unit_test(instances),
+        cmocka_unit_test(meshes_are_watertight),
+        cmocka_unit_test(many_rays_are_as_single_ones),
+        cmocka_unit_test(matrices_invert),
+        cmocka_unit_test(arenas_give_room),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -25,7 +25,8 @@
 
 static size_t chunk(unsigned char *out, const char *type, const unsigned char *data, size_t n)
 {
-    const unsigned char length[4] = {(unsigned char)(n >> 24), (unsigned char)(n >> 16), (unsigned char)(n >> 8), (unsigned char)n};
+    const unsigned char length[4] = {(unsigned char)(n >> 24), (unsigned char)(n >> 16), (unsigned char)(n >> 8),
+                                     (unsigned char)n};
     memcpy(out, length, 4);
     memcpy(out + 4, type, 4);
     memcpy(out + 8, data, n);
@@ -57,7 +58,8 @@ static size_t make_png(const char *name, unsigned char *out)
     }
     uLongf size = sizeof packed;
     assert_int_equal(compress(packed, &size, rows, n), Z_OK);
-    const unsigned char head[13] = {0, 0, 0, (unsigned char)width, 0, 0, 0, (unsigned char)height, deep ? 16 : 8, colour[channels], 0, 0, 0};
+    const unsigned char head[13] = {
+        0, 0, 0, (unsigned char)width, 0, 0, 0, (unsigned char)height, deep ? 16 : 8, colour[channels], 0, 0, 0};
     memcpy(out, "\x89PNG\r\n\x1a\n", 8);
     size_t at = 8 + chunk(out + 8, "IHDR", head, 13);
     at += chunk(out + at, "IDAT", packed, size);
@@ -91,10 +93,7 @@ static int read_beside(void *data, const char *path, char **bytes, size_t *size,
 
 /* --- the answer ------------------------------------------------------------------------------------------------------- */
 
-static void tell(void *data, const char *line)
-{
-    fprintf(data, "%s\n", line);
-}
+static void tell(void *data, const char *line) { fprintf(data, "%s\n", line); }
 
 static void read_options(const char *text, struct pt_load_options *o)
 {

@@ -12,10 +12,14 @@
 
 static int near(float a, float b) { return fabsf(a - b) < 1e-5f; }
 
-#define CONST(v) {.value = {v, v, v}}
+#define CONST(v) \
+    { \
+        .value = { v, v, v } \
+    }
 #define ROUGH(r) .roughness_u = CONST(r), .roughness_v = CONST(r)
-#define PLAIN .reflectance = CONST(0.5f), .transmittance = CONST(0.25f), .thickness = CONST(0.01f), .eta_rgb = CONST(0.2f), \
-        .k_rgb = CONST(3.0f), .eta = 1.5f
+#define PLAIN \
+    .reflectance = CONST(0.5f), .transmittance = CONST(0.25f), .thickness = CONST(0.01f), .eta_rgb = CONST(0.2f), \
+    .k_rgb = CONST(3.0f), .eta = 1.5f
 
 static void fresnel_of_glass(void **state)
 {
@@ -37,7 +41,8 @@ static void fresnel_of_metal(void **state)
     (void)state;
     for (float mu = 0.0f; mu <= 1.0f; mu += 0.1f) {
         double complex n = 0.37 + 2.39 * I, s2 = 1.0 - (double)(mu * mu), ct = csqrt(1.0 - s2 / (n * n));
-        double complex rp = (n * (double)mu - ct) / (n * (double)mu + ct), rs = ((double)mu - n * ct) / ((double)mu + n * ct);
+        double complex rp = (n * (double)mu - ct) / (n * (double)mu + ct),
+                       rs = ((double)mu - n * ct) / ((double)mu + n * ct);
         double expected = 0.5 * (cabs(rp) * cabs(rp) + cabs(rs) * cabs(rs));
         assert_true(fabs(expected - (double)pt_fresnel_conductor(mu, 0.37f, 2.39f)) < 1e-5);
         assert_true(fabs((double)(pt_fresnel_conductor(mu, 1.5f, 0.0f) - pt_fresnel_dielectric(mu, 1.5f))) < 1e-5);
@@ -59,27 +64,34 @@ static void models_have_their_closed_forms(void **state)
     assert_true(near(s.pdf_solid, 0.08f / 1.04f) && s.flags == PT_SCATTER_DELTA && s.wi.z == 1.0f);
     assert_int_equal(pt_bsdf_sample(PT_FX_ALL, &thin, wo, 0.99f, 0, 0, &s), 1);
     assert_true(s.wi.x == -wo.x && s.wi.z == -wo.z && (s.flags & PT_SCATTER_TRANSMIT)); /* neither bent … */
-    assert_true(s.weight.x == 1.0f && s.eta_scale == 1.0f);                              /* … nor compressed */
+    assert_true(s.weight.x == 1.0f && s.eta_scale == 1.0f);                             /* … nor compressed */
     /* Snell's law, and radiance compressed by 1/n² */
     struct pt_bsdf glass = {.kind = PT_BSDF_DIELECTRIC, .eta = 1.5f};
     assert_int_equal(pt_bsdf_sample(PT_FX_ALL, &glass, wo, 0.99f, 0, 0, &s), 1);
     assert_true(near(s.wi.x, -0.4f) && near(s.wi.z, -sqrtf(1.0f - 0.16f)) && near(s.weight.x, 1.0f / 2.25f));
     /* sides of a translucent film */
-    struct pt_bsdf film = {.kind = PT_BSDF_DIFFUSE_TRANSMISSION, .reflectance = {0.2f, 0.2f, 0.2f}, .transmittance = {0.6f, 0.6f, 0.6f}};
+    struct pt_bsdf film = {
+        .kind = PT_BSDF_DIFFUSE_TRANSMISSION, .reflectance = {0.2f, 0.2f, 0.2f}, .transmittance = {0.6f, 0.6f, 0.6f}};
     assert_true(near(pt_bsdf_eval(PT_FX_ALL, &film, wo, wi, &pdf).x, 0.2f * 0.6f * PT_INV_PI));
     assert_true(near(pt_bsdf_eval(PT_FX_ALL, &film, wo, v3_neg(wi), &pdf).x, 0.6f * 0.6f * PT_INV_PI));
     /* a coat of matched index only absorbs, once each way */
     float table[PT_COAT_HEADER + 2 * PT_COAT_ROW];
     pt_coat_table_build(table, 1, 1.0f, 0.3f, 0.0f, 0.0f);
-    struct pt_bsdf coat = {.kind = PT_BSDF_COATED_DIFFUSE, .eta = 1.0f, .thickness = 0.3f, .reflectance = {0.5f, 0.5f, 0.5f}, .coat_table = table};
+    struct pt_bsdf coat = {.kind = PT_BSDF_COATED_DIFFUSE,
+                           .eta = 1.0f,
+                           .thickness = 0.3f,
+                           .reflectance = {0.5f, 0.5f, 0.5f},
+                           .coat_table = table};
     float expected = 0.5f * PT_INV_PI * 0.6f * expf(-0.3f / 0.8f) * expf(-0.3f / 0.6f);
     assert_true(near(pt_bsdf_eval(PT_FX_ALL, &coat, wo, wi, &pdf).x, expected));
     /* and over a mirror likewise: Rc exp(-2t) at normal incidence */
-    struct pt_bsdf mirror = {.kind = PT_BSDF_COATED_CONDUCTOR, .eta = 1.0f, .thickness = 0.3f, .eta_rgb = {1, 1, 1}, .k_rgb = {2, 2, 2}};
+    struct pt_bsdf mirror = {
+        .kind = PT_BSDF_COATED_CONDUCTOR, .eta = 1.0f, .thickness = 0.3f, .eta_rgb = {1, 1, 1}, .k_rgb = {2, 2, 2}};
     assert_int_equal(pt_bsdf_sample(PT_FX_ALL, &mirror, up, 0.5f, 0, 0, &s), 1);
     assert_true(near(s.weight.x, 0.5f * expf(-0.6f))); /* k² / (4 + k²) = 1/2 */
     /* the peak of a GGX lobe: F / (4 π alpha²) at normal incidence, where nothing shadows */
-    struct pt_bsdf metal = {.kind = PT_BSDF_CONDUCTOR, .alpha_x = 0.2f, .alpha_y = 0.5f, .eta_rgb = {1, 1, 1}, .k_rgb = {2, 2, 2}};
+    struct pt_bsdf metal = {
+        .kind = PT_BSDF_CONDUCTOR, .alpha_x = 0.2f, .alpha_y = 0.5f, .eta_rgb = {1, 1, 1}, .k_rgb = {2, 2, 2}};
     assert_true(near(pt_bsdf_eval(PT_FX_ALL, &metal, up, up, &pdf).x, 0.5f / (4.0f * PT_PI * 0.1f)));
     assert_true(near(pdf, 1.0f / (4.0f * PT_PI * 0.1f)));
 }
@@ -93,9 +105,11 @@ static void roughness_is_remapped_as_in_pbrt(void **state)
         float roughness;
         int remap;
         float alpha;
-    } cases[] = {{0.25f, 1, 0.5f}, {0.25f, 0, 0.25f}, {0.0f, 1, 0.0f}, {5e-4f, 0, 0.0f}, {2e-3f, 0, 2e-3f}, {4.0f, 0, 1.0f}, {-1.0f, 1, 0.0f}};
+    } cases[] = {{0.25f, 1, 0.5f},  {0.25f, 0, 0.25f}, {0.0f, 1, 0.0f}, {5e-4f, 0, 0.0f},
+                 {2e-3f, 0, 2e-3f}, {4.0f, 0, 1.0f},   {-1.0f, 1, 0.0f}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        struct pt_material m = {.kind = PT_BSDF_CONDUCTOR, .remap_roughness = cases[i].remap, PLAIN, ROUGH(cases[i].roughness)};
+        struct pt_material m = {
+            .kind = PT_BSDF_CONDUCTOR, .remap_roughness = cases[i].remap, PLAIN, ROUGH(cases[i].roughness)};
         struct pt_bsdf b;
         pt_material_bsdf(PT_FX_ALL, &scene, &m, &s, &b);
         assert_int_equal(b.kind, PT_BSDF_CONDUCTOR);
@@ -116,8 +130,13 @@ static void effects_are_those_the_closure_needs(void **state)
         {.kind = PT_MATERIAL_INTERFACE, PLAIN},
     };
     struct pt_scene scene = {.materials = materials, .material_count = 7};
-    const pt_effects expected[] = {0, PT_FX_SPECULAR, PT_FX_GLOSSY, PT_FX_TRANSMISSION | PT_FX_SPECULAR,
-                                   PT_FX_COATED | PT_FX_GLOSSY, PT_FX_MIX | PT_FX_TEXTURE | PT_FX_COATED | PT_FX_GLOSSY, PT_FX_INTERFACE};
+    const pt_effects expected[] = {0,
+                                   PT_FX_SPECULAR,
+                                   PT_FX_GLOSSY,
+                                   PT_FX_TRANSMISSION | PT_FX_SPECULAR,
+                                   PT_FX_COATED | PT_FX_GLOSSY,
+                                   PT_FX_MIX | PT_FX_TEXTURE | PT_FX_COATED | PT_FX_GLOSSY,
+                                   PT_FX_INTERFACE};
     for (int i = 0; i < 7; i++)
         assert_int_equal(pt_material_effects(&scene, i), expected[i]);
     assert_int_equal(pt_materials_build(&scene, NULL), 0);
@@ -130,7 +149,8 @@ static void effects_are_those_the_closure_needs(void **state)
         pt_material_bsdf(PT_FX_ALL, &scene, &materials[i], &s, &wide);
         for (float u = 0.0f; u < 1.0f; u += 0.09f) {
             pt_vec3 wo = v3_norm(v3(0.3f, 0.1f, u - 0.5f));
-            int ra = pt_bsdf_sample(expected[i], &narrow, wo, u, 0.3f, u, &a), rb = pt_bsdf_sample(PT_FX_ALL, &wide, wo, u, 0.3f, u, &b);
+            int ra = pt_bsdf_sample(expected[i], &narrow, wo, u, 0.3f, u, &a),
+                rb = pt_bsdf_sample(PT_FX_ALL, &wide, wo, u, 0.3f, u, &b);
             assert_int_equal(ra, rb);
             if (ra)
                 assert_memory_equal(&a, &b, sizeof a);
@@ -144,9 +164,13 @@ static void effects_are_those_the_closure_needs(void **state)
 static void effects_of_every_model(void **state)
 {
     (void)state;
-    static const pt_effects plain[PT_BSDF_COUNT] = {
-        0, PT_FX_SPECULAR, PT_FX_TRANSMISSION | PT_FX_SPECULAR, PT_FX_TRANSMISSION | PT_FX_SPECULAR, PT_FX_TRANSMISSION,
-        PT_FX_COATED | PT_FX_SPECULAR, PT_FX_COATED | PT_FX_SPECULAR};
+    static const pt_effects plain[PT_BSDF_COUNT] = {0,
+                                                    PT_FX_SPECULAR,
+                                                    PT_FX_TRANSMISSION | PT_FX_SPECULAR,
+                                                    PT_FX_TRANSMISSION | PT_FX_SPECULAR,
+                                                    PT_FX_TRANSMISSION,
+                                                    PT_FX_COATED | PT_FX_SPECULAR,
+                                                    PT_FX_COATED | PT_FX_SPECULAR};
     /* which of reflectance, transmittance, roughness, roughness of the base, eta, k, thickness, g, albedo it reads */
     static const char *const reads[PT_BSDF_COUNT] = {"r", "aek", "a", "", "rt", "ratgs", "abtgsek"};
     static const int coated[PT_BSDF_COUNT] = {[PT_BSDF_COATED_DIFFUSE] = 1, [PT_BSDF_COATED_CONDUCTOR] = 1};
@@ -192,8 +216,10 @@ static void effects_of_every_model(void **state)
             m.roughness_v.value.x = remap ? 0.98e-6f : 0.98e-3f;
             assert_int_equal(pt_material_effects(&scene, 0), plain[kind]);
             m.roughness_v.value.x = remap ? 1.02e-6f : 1e-3f;
-            pt_effects rough = !strchr(reads[kind], 'a') ? plain[kind] : kind == PT_BSDF_COATED_CONDUCTOR ? plain[kind] | PT_FX_GLOSSY
-                               : (plain[kind] & ~(pt_effects)PT_FX_SPECULAR) | PT_FX_GLOSSY;
+            pt_effects rough = !strchr(reads[kind], 'a') ? plain[kind]
+                               : kind == PT_BSDF_COATED_CONDUCTOR
+                                   ? plain[kind] | PT_FX_GLOSSY
+                                   : (plain[kind] & ~(pt_effects)PT_FX_SPECULAR) | PT_FX_GLOSSY;
             assert_int_equal(pt_material_effects(&scene, 0), rough);
             m.roughness_v.value.x = 0;
         }
@@ -247,15 +273,21 @@ static void bump_tips_the_normal(void **state)
 {
     (void)state;
     static const float slope[2] = {0.0f, 0.5f};
-    struct pt_image_map image = {.width = 2, .height = 1, .channels = 1, .type = PT_PIXEL_FLOAT, .gamma = 1, .pixels = slope};
-    struct pt_texture texture = {.kind = PT_TEXTURE_IMAGE, .wrap = PT_WRAP_CLAMP, .scale = 1, .su = 0.1f, .sv = 0.1f, .du = 0.4f};
+    struct pt_image_map image = {
+        .width = 2, .height = 1, .channels = 1, .type = PT_PIXEL_FLOAT, .gamma = 1, .pixels = slope};
+    struct pt_texture texture = {
+        .kind = PT_TEXTURE_IMAGE, .wrap = PT_WRAP_CLAMP, .scale = 1, .su = 0.1f, .sv = 0.1f, .du = 0.4f};
     struct pt_scene scene = {.images = &image, .textures = &texture, .image_count = 1, .texture_count = 1};
     struct pt_material m = {.kind = PT_BSDF_DIFFUSE, PLAIN, ROUGH(0.0f)};
     m.bump = 1;
     /* height = 0.5 · (2 · (0.1 u + 0.4) - 0.5) between the texel centres: slope 0.1 per u; 2 scene units per u */
     for (int side = -1; side <= 1; side += 2) {
-        struct pt_surface s = {.u = 0.0f, .v = 0.0f, .n_geometric = {0, 0, (float)side}, .n_shading = {0, 0, (float)side},
-                               .dpdu = {2, 0, 0}, .dpdv = {0, 2, 0}};
+        struct pt_surface s = {.u = 0.0f,
+                               .v = 0.0f,
+                               .n_geometric = {0, 0, (float)side},
+                               .n_shading = {0, 0, (float)side},
+                               .dpdu = {2, 0, 0},
+                               .dpdv = {0, 2, 0}};
         struct pt_frame f = pt_material_frame(PT_FX_ALL, &scene, &m, &s);
         /* one texel of step leaves the ramp half-way: a secant */
         assert_true(f.n.z * (float)side > 0.9f && f.n.x < 0.0f && fabsf(f.n.y) < 1e-6f);
@@ -269,7 +301,8 @@ static void normal_maps_are_in_tangent_space(void **state)
 {
     (void)state;
     static const float texel[3] = {0.8f, 0.5f, 0.9f}; /* (0.6, 0, 0.8) */
-    struct pt_image_map image = {.width = 1, .height = 1, .channels = 3, .type = PT_PIXEL_FLOAT, .gamma = 1, .pixels = texel};
+    struct pt_image_map image = {
+        .width = 1, .height = 1, .channels = 3, .type = PT_PIXEL_FLOAT, .gamma = 1, .pixels = texel};
     struct pt_texture texture = {.kind = PT_TEXTURE_IMAGE, .wrap = PT_WRAP_REPEAT, .scale = 1, .su = 1, .sv = 1};
     struct pt_scene scene = {.images = &image, .textures = &texture, .image_count = 1, .texture_count = 1};
     struct pt_material m = {.kind = PT_BSDF_DIFFUSE, PLAIN, ROUGH(0.0f)};

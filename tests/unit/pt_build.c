@@ -24,16 +24,18 @@ static void film_and_camera(void **state)
 {
     (void)state;
     struct pt_scene_defaults d;
-    struct pt_scene *s = text_scene("Film \"rgb\" \"integer xresolution\" 60 \"integer yresolution\" 40 \"float iso\" 150 "
-                                    "\"float exposuretime\" 2 \"float cropwindow\" [ 0.5 1 0.25 0.75 ] \"float maxcomponentvalue\" 9\n"
-                                    "PixelFilter \"triangle\" \"float xradius\" 1 \"float yradius\" 1.5\n"
-                                    "Sampler \"independent\" \"integer pixelsamples\" 7 Integrator \"volpath\" \"integer maxdepth\" 65\n"
-                                    "LookAt 1 2 3  1 2 13  0 1 0 Camera \"perspective\" \"float fov\" 50 \"float lensradius\" 0.1 "
-                                    "\"float focaldistance\" 4\nWorldBegin\n",
-                                    &d, NULL);
+    struct pt_scene *s =
+        text_scene("Film \"rgb\" \"integer xresolution\" 60 \"integer yresolution\" 40 \"float iso\" 150 "
+                   "\"float exposuretime\" 2 \"float cropwindow\" [ 0.5 1 0.25 0.75 ] \"float maxcomponentvalue\" 9\n"
+                   "PixelFilter \"triangle\" \"float xradius\" 1 \"float yradius\" 1.5\n"
+                   "Sampler \"independent\" \"integer pixelsamples\" 7 Integrator \"volpath\" \"integer maxdepth\" 65\n"
+                   "LookAt 1 2 3  1 2 13  0 1 0 Camera \"perspective\" \"float fov\" 50 \"float lensradius\" 0.1 "
+                   "\"float focaldistance\" 4\nWorldBegin\n",
+                   &d, NULL);
     assert_true(d.width == 60 && d.height == 40 && d.spp == 7 && d.integrator.max_depth == 65);
     assert_true(d.crop[0] == 30 && d.crop[1] == 10 && d.crop[2] == 60 && d.crop[3] == 30);
-    assert_true(d.integrator.filter == PT_FILTER_TRIANGLE && d.integrator.filter_y == 1.5f && d.integrator.max_component == 9);
+    assert_true(d.integrator.filter == PT_FILTER_TRIANGLE && d.integrator.filter_y == 1.5f &&
+                d.integrator.max_component == 9);
     assert_int_equal(d.integrator.sampler, PT_SAMPLER_INDEPENDENT);
     near(s->radiance_scale, 3, 1e-6);
     near(s->camera.fov_deg, 50, 0);
@@ -55,9 +57,10 @@ static void far_from_the_origin(void **state)
 {
     (void)state;
     /* the object is defined where it stands */
-    static const char format[] = "LookAt %d 0 -5  %d 0 0  0 1 0 Camera \"perspective\" WorldBegin\n"
-                                 "Translate %d 0 0 Shape \"trianglemesh\" " TRIANGLE
-                                 " ObjectBegin \"o\" Shape \"trianglemesh\" " TRIANGLE " ObjectEnd Identity ObjectInstance \"o\"";
+    static const char format[] =
+        "LookAt %d 0 -5  %d 0 0  0 1 0 Camera \"perspective\" WorldBegin\n"
+        "Translate %d 0 0 Shape \"trianglemesh\" " TRIANGLE " ObjectBegin \"o\" Shape \"trianglemesh\" " TRIANGLE
+        " ObjectEnd Identity ObjectInstance \"o\"";
     char text[1024];
     struct pt_scene *s[2];
     for (int i = 0; i < 2; i++) {
@@ -82,11 +85,13 @@ static void far_from_the_origin(void **state)
 static void orientation(void **state)
 {
     (void)state;
-    struct pt_scene *s = world_scene("Shape \"trianglemesh\" " TRIANGLE "\n AttributeBegin ReverseOrientation Shape \"trianglemesh\" " TRIANGLE
-                                     " \"normal N\" [ 0 0 1 0 0 1 0 0 1 ] AttributeEnd\nScale -1 1 1 Shape \"trianglemesh\" " TRIANGLE
-                                     " ReverseOrientation Shape \"sphere\"");
+    struct pt_scene *s = world_scene(
+        "Shape \"trianglemesh\" " TRIANGLE "\n AttributeBegin ReverseOrientation Shape \"trianglemesh\" " TRIANGLE
+        " \"normal N\" [ 0 0 1 0 0 1 0 0 1 ] AttributeEnd\nScale -1 1 1 Shape \"trianglemesh\" " TRIANGLE
+        " ReverseOrientation Shape \"sphere\"");
     assert_int_equal(s->shape_count, 4);
-    assert_true(!s->shapes[0].flip_normal && s->shapes[1].flip_normal && s->shapes[2].flip_normal && !s->shapes[3].flip_normal);
+    assert_true(!s->shapes[0].flip_normal && s->shapes[1].flip_normal && s->shapes[2].flip_normal &&
+                !s->shapes[3].flip_normal);
     near(s->meshes[1].vertices[0].n.z, -1, 0); /* reversed orientation negates the given normals */
     pt_scene_destroy(s);
 }
@@ -104,7 +109,8 @@ static void lights(void **state)
         "LightSource \"point\" \"rgb I\" [ 0 0 0 ]\n"
         "AttributeBegin AreaLightSource \"diffuse\" \"float power\" 10 Translate 5 0 0 Shape \"sphere\" AttributeEnd");
     assert_int_equal(s->light_count, 6); /* the black one is gone */
-    assert_true(s->lights[0].kind == PT_LIGHT_AREA && s->lights[0].shape == 0 && s->lights[0].two_sided && s->shapes[0].light == 0);
+    assert_true(s->lights[0].kind == PT_LIGHT_AREA && s->lights[0].shape == 0 && s->lights[0].two_sided &&
+                s->shapes[0].light == 0);
     near(s->lights[0].emission.z, 6, 1e-6);
     near(s->lights[1].emission.x, 1, 1e-6); /* Φ / 4π */
     near(s->lights[1].position.y, 2, 1e-6);
@@ -117,7 +123,8 @@ static void lights(void **state)
     assert_true(s->effects == (PT_FX_DELTA_LIGHT | PT_FX_ENVIRONMENT | PT_FX_MANY_LIGHTS | PT_FX_QUADRIC));
     pt_scene_destroy(s);
     /* v3: [T scale], absolute */
-    s = text_scene("Film \"image\" WorldBegin LightSource \"infinite\" \"blackbody L\" [ 5000 3 ] \"rgb scale\" [ 2 2 2 ]", NULL, NULL);
+    s = text_scene("Film \"image\" WorldBegin LightSource \"infinite\" \"blackbody L\" [ 5000 3 ] \"rgb scale\" [ 2 2 2 ]",
+                   NULL, NULL);
     assert_true(v3_luminance(s->lights[0].emission) > 5 && v3_luminance(s->lights[0].emission) < 6);
     pt_scene_destroy(s);
 }
@@ -131,7 +138,8 @@ static void materials_of_both_versions(void **state)
         "MakeNamedMaterial \"c\" \"string type\" [ \"glass\" ] \"float index\" [ 1.3 ]\n"
         "MakeNamedMaterial \"d\" \"string type\" \"mirror\"\n"
         "MakeNamedMaterial \"e\" \"string type\" \"metal\" \"float roughness\" 0.1\n"
-        "MakeNamedMaterial \"f\" \"string type\" \"mix\" \"string namedmaterial1\" \"a\" \"string namedmaterial2\" \"d\" \"rgb amount\" [ .2 .2 .2 ]\n"
+        "MakeNamedMaterial \"f\" \"string type\" \"mix\" \"string namedmaterial1\" \"a\" \"string namedmaterial2\" \"d\" "
+        "\"rgb amount\" [ .2 .2 .2 ]\n"
         "MakeNamedMaterial \"g\" \"string type\" \"mix\" \"string materials\" [ \"a\" \"d\" ] \"float amount\" 0.2\n"
         "Material \"coateddiffuse\" \"float roughness\" 0.25 Shape \"sphere\"\n"
         "Material \"conductor\" \"spectrum eta\" \"metal-Au-eta\" \"string k\" [ \"metal-Au-k\" ] Shape \"sphere\"\n"
@@ -160,13 +168,14 @@ static void materials_of_both_versions(void **state)
 static void textures(void **state)
 {
     (void)state;
-    struct pt_scene *s = world_scene(
-        "Texture \"one\" \"spectrum\" \"constant\" \"rgb value\" [ .2 .4 .6 ]\n"
-        "Texture \"half\" \"spectrum\" \"scale\" \"texture tex\" \"one\" \"float scale\" 0.5\n"
-        "Texture \"check\" \"spectrum\" \"checkerboard\" \"texture tex1\" \"half\" \"rgb tex2\" [ 1 1 1 ] \"float uscale\" 8\n"
-        "Texture \"mask\" \"float\" \"checkerboard\"\n"
-        "Material \"diffuse\" \"texture reflectance\" \"half\" Shape \"sphere\"\n"
-        "Material \"diffuse\" \"texture reflectance\" \"check\" Shape \"sphere\" \"texture alpha\" \"mask\"");
+    struct pt_scene *s =
+        world_scene("Texture \"one\" \"spectrum\" \"constant\" \"rgb value\" [ .2 .4 .6 ]\n"
+                    "Texture \"half\" \"spectrum\" \"scale\" \"texture tex\" \"one\" \"float scale\" 0.5\n"
+                    "Texture \"check\" \"spectrum\" \"checkerboard\" \"texture tex1\" \"half\" \"rgb tex2\" [ 1 1 1 ] "
+                    "\"float uscale\" 8\n"
+                    "Texture \"mask\" \"float\" \"checkerboard\"\n"
+                    "Material \"diffuse\" \"texture reflectance\" \"half\" Shape \"sphere\"\n"
+                    "Material \"diffuse\" \"texture reflectance\" \"check\" Shape \"sphere\" \"texture alpha\" \"mask\"");
     /* constants fold: nothing is looked up for them */
     assert_int_equal(s->materials[0].reflectance.texture, 0);
     near(s->materials[0].reflectance.value.z, 0.3, 1e-6);
@@ -181,13 +190,14 @@ static void media(void **state)
 {
     (void)state;
     int warnings = 0;
-    struct pt_scene *s = text_scene("MediumInterface \"\" \"fog\" Camera \"perspective\" WorldBegin\n"
-                                    "MakeNamedMedium \"fog\" \"string type\" \"homogeneous\" \"rgb sigma_a\" [ 1 2 3 ] "
-                                    "\"rgb sigma_s\" [ 0 0 0 ] \"float scale\" 0.5 \"float Lescale\" 3\n" /* which scales nothing without Le */
-                                    "MakeNamedMedium \"smoke\" \"string type\" \"uniformgrid\" \"integer nx\" 2 \"float density\" [ 1 3 ] "
-                                    "\"point3 p0\" [ -1 -1 -1 ] \"point3 p1\" [ 1 1 1 ]\n"
-                                    "MediumInterface \"smoke\" \"fog\" Material \"interface\" Shape \"sphere\"",
-                                    NULL, &warnings);
+    struct pt_scene *s = text_scene(
+        "MediumInterface \"\" \"fog\" Camera \"perspective\" WorldBegin\n"
+        "MakeNamedMedium \"fog\" \"string type\" \"homogeneous\" \"rgb sigma_a\" [ 1 2 3 ] "
+        "\"rgb sigma_s\" [ 0 0 0 ] \"float scale\" 0.5 \"float Lescale\" 3\n" /* which scales nothing without Le */
+        "MakeNamedMedium \"smoke\" \"string type\" \"uniformgrid\" \"integer nx\" 2 \"float density\" [ 1 3 ] "
+        "\"point3 p0\" [ -1 -1 -1 ] \"point3 p1\" [ 1 1 1 ]\n"
+        "MediumInterface \"smoke\" \"fog\" Material \"interface\" Shape \"sphere\"",
+        NULL, &warnings);
     assert_int_equal(warnings, 0);
     assert_int_equal(s->camera.medium, 0); /* named before it was made */
     near(s->media[0].sigma_a.z, 1.5, 1e-6);
@@ -205,13 +215,15 @@ static void media(void **state)
 static void instances_and_motion(void **state)
 {
     (void)state;
-    struct pt_scene *s = world_scene("ObjectBegin \"o\" Translate 1 0 0 Shape \"sphere\" Shape \"trianglemesh\" " TRIANGLE " ObjectEnd\n"
-                                     "Shape \"disk\"\nTranslate 0 5 0 ObjectInstance \"o\"\n"
-                                     "ActiveTransform EndTime Translate 0 2 0 ActiveTransform All ObjectInstance \"o\" Shape \"sphere\"");
+    struct pt_scene *s =
+        world_scene("ObjectBegin \"o\" Translate 1 0 0 Shape \"sphere\" Shape \"trianglemesh\" " TRIANGLE " ObjectEnd\n"
+                    "Shape \"disk\"\nTranslate 0 5 0 ObjectInstance \"o\"\n"
+                    "ActiveTransform EndTime Translate 0 2 0 ActiveTransform All ObjectInstance \"o\" Shape \"sphere\"");
     assert_true(s->world_shape_count == 1 && s->shape_count == 4 && s->object_count == 2 && s->instance_count == 3);
     assert_true(s->objects[0].first_shape == 1 && s->objects[0].shape_count == 2);
     near(s->quadrics[0].to_render.m[3], 1, 0);
-    assert_true(!s->instances[0].animated && s->instances[1].animated && s->instances[2].animated && s->instances[2].object == 1);
+    assert_true(!s->instances[0].animated && s->instances[1].animated && s->instances[2].animated &&
+                s->instances[2].object == 1);
     near(s->instances[0].to_render[0].m[7], 5, 0);
     near(s->instances[1].to_render[1].m[7], 7, 0);
     assert_true((s->effects & (PT_FX_MOTION | PT_FX_INSTANCES)) == (PT_FX_MOTION | PT_FX_INSTANCES));
@@ -222,9 +234,10 @@ static void instances_and_motion(void **state)
 static void part_of_the_motion(void **state)
 {
     (void)state;
-    struct pt_scene *s = text_scene("TransformTimes 0 4 Camera \"perspective\" \"float shutteropen\" 1 \"float shutterclose\" 2 WorldBegin\n"
-                                    "ActiveTransform EndTime Translate 0 0 8 Rotate 80 0 1 0 ActiveTransform All Shape \"sphere\"",
-                                    NULL, NULL);
+    struct pt_scene *s =
+        text_scene("TransformTimes 0 4 Camera \"perspective\" \"float shutteropen\" 1 \"float shutterclose\" 2 WorldBegin\n"
+                   "ActiveTransform EndTime Translate 0 0 8 Rotate 80 0 1 0 ActiveTransform All Shape \"sphere\"",
+                   NULL, NULL);
     const struct pt_instance *i = &s->instances[0];
     near(i->to_render[0].m[11], 2, 1e-5);
     near(i->to_render[1].m[11], 4, 1e-5);
@@ -236,9 +249,10 @@ static void part_of_the_motion(void **state)
 static void graphics_state(void **state)
 {
     (void)state;
-    struct pt_scene *s = world_scene("AttributeBegin Translate 1 0 0 Attribute \"shape\" \"float radius\" 3 Shape \"sphere\" AttributeEnd\n"
-                                     "Shape \"sphere\" TransformBegin Scale 2 2 2 CoordinateSystem \"twice\" TransformEnd\n"
-                                     "CoordSysTransform \"twice\" Shape \"sphere\" \"float radius\" 5\nCoordSysTransform \"camera\" Shape \"sphere\"");
+    struct pt_scene *s = world_scene(
+        "AttributeBegin Translate 1 0 0 Attribute \"shape\" \"float radius\" 3 Shape \"sphere\" AttributeEnd\n"
+        "Shape \"sphere\" TransformBegin Scale 2 2 2 CoordinateSystem \"twice\" TransformEnd\n"
+        "CoordSysTransform \"twice\" Shape \"sphere\" \"float radius\" 5\nCoordSysTransform \"camera\" Shape \"sphere\"");
     near(s->quadrics[0].radius, 3, 0);
     near(s->quadrics[0].to_render.m[3], 1, 0);
     near(s->quadrics[1].radius, 1, 0);
@@ -251,7 +265,8 @@ static void graphics_state(void **state)
 static void warnings_come_once_and_strict_refuses(void **state)
 {
     (void)state;
-    static const char text[] = "WorldBegin\nMaterial \"hair\" Material \"hair\"\nMaterial \"measured\" \"string filename\" \"x\"";
+    static const char text[] =
+        "WorldBegin\nMaterial \"hair\" Material \"hair\"\nMaterial \"measured\" \"string filename\" \"x\"";
     int warnings = 0;
     struct base_err err;
     pt_scene_destroy(text_scene(text, NULL, &warnings));
@@ -267,8 +282,10 @@ static void tessellated(void **state)
     struct pt_scene *s = world_scene(
         "Shape \"loopsubdiv\" \"integer levels\" 4 \"integer indices\" [ 0 2 4 2 1 4 1 3 4 3 0 4 2 0 5 1 2 5 3 1 5 0 3 5 ] "
         "\"point3 P\" [ 1 0 0 -1 0 0 0 1 0 0 -1 0 0 0 1 0 0 -1 ]\n"
-        "Shape \"loopsubdiv\" \"integer levels\" 2 \"integer indices\" [ 0 1 2 0 2 3 ] \"point3 P\" [ 0 0 0 1 0 0 1 1 0 0 1 0 ]\n"
-        "Shape \"bilinearmesh\" \"point3 P\" [ 0 0 0 1 0 0 0 1 0 1 1 0 ]\nShape \"bilinearmesh\" \"point3 P\" [ 0 0 0 1 0 0 0 1 0 1 1 1 ]\n"
+        "Shape \"loopsubdiv\" \"integer levels\" 2 \"integer indices\" [ 0 1 2 0 2 3 ] \"point3 P\" [ 0 0 0 1 0 0 1 1 0 0 1 "
+        "0 ]\n"
+        "Shape \"bilinearmesh\" \"point3 P\" [ 0 0 0 1 0 0 0 1 0 1 1 0 ]\nShape \"bilinearmesh\" \"point3 P\" [ 0 0 0 1 0 0 "
+        "0 1 0 1 1 1 ]\n"
         "Shape \"curve\" \"float width\" 0.1 \"point3 P\" [ 0 0 0 1 0 0 2 0 0 3 0 0 ]\nShape \"cone\" \"float height\" 2\n"
         "Shape \"heightfield\" \"integer nu\" 2 \"integer nv\" 2 \"float Pz\" [ 0 0 1 1 ]");
     assert_int_equal(s->mesh_count, 7);
@@ -294,8 +311,10 @@ static void pixel_bounds(void **state)
 {
     (void)state;
     struct pt_scene_defaults d;
-    struct pt_scene *s = text_scene("Film \"rgb\" \"integer xresolution\" 100 \"integer yresolution\" 100 \"integer pixelbounds\" [ 10 20 30 60 ] "
-                                    "WorldBegin", &d, NULL);
+    struct pt_scene *s = text_scene(
+        "Film \"rgb\" \"integer xresolution\" 100 \"integer yresolution\" 100 \"integer pixelbounds\" [ 10 20 30 60 ] "
+        "WorldBegin",
+        &d, NULL);
     assert_true(d.crop[0] == 10 && d.crop[2] == 20 && d.crop[1] == 30 && d.crop[3] == 60);
     pt_scene_destroy(s);
 }
@@ -304,15 +323,17 @@ static void pixel_bounds(void **state)
 static void portals(void **state)
 {
     (void)state;
-    struct pt_scene *s = text_scene("LookAt 1 2 3  1 2 13  0 1 0 Camera \"perspective\" WorldBegin AttributeBegin Rotate -90 1 0 0\n"
-                                    "LightSource \"infinite\" \"rgb L\" [ 1 1 1 ] "
-                                    "\"point3 portal\" [ -2 1 0.5  -2 1 2.5  -2 -2 2.5  -2 -2 0.5 ]\nAttributeEnd\n"
-                                    "LightSource \"infinite\" \"rgb L\" [ 1 1 1 ]", NULL, NULL);
+    struct pt_scene *s =
+        text_scene("LookAt 1 2 3  1 2 13  0 1 0 Camera \"perspective\" WorldBegin AttributeBegin Rotate -90 1 0 0\n"
+                   "LightSource \"infinite\" \"rgb L\" [ 1 1 1 ] "
+                   "\"point3 portal\" [ -2 1 0.5  -2 1 2.5  -2 -2 2.5  -2 -2 0.5 ]\nAttributeEnd\n"
+                   "LightSource \"infinite\" \"rgb L\" [ 1 1 1 ]",
+                   NULL, NULL);
     const struct pt_light *light = &s->lights[0];
     assert_true(light->has_portal && !s->lights[1].has_portal);
     /* (x, y, z) of the light is (x, z, -y) of the world, and that less (1, 2, 3) where the camera is the origin */
     const float expected[9] = {-3, -1.5f, -4, 0, 2, 0, 0, 0, 3};
-    const float got[9] = {light->portal.x, light->portal.y, light->portal.z, light->portal_u.x, light->portal_u.y,
+    const float got[9] = {light->portal.x,   light->portal.y,   light->portal.z,   light->portal_u.x, light->portal_u.y,
                           light->portal_u.z, light->portal_v.x, light->portal_v.y, light->portal_v.z};
     for (int i = 0; i < 9; i++)
         near(got[i], (double)expected[i], 1e-6);
@@ -323,11 +344,19 @@ static void portals(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(film_and_camera), cmocka_unit_test(far_from_the_origin), cmocka_unit_test(orientation), cmocka_unit_test(lights),
-        cmocka_unit_test(materials_of_both_versions), cmocka_unit_test(textures), cmocka_unit_test(media),
-        cmocka_unit_test(instances_and_motion), cmocka_unit_test(part_of_the_motion), cmocka_unit_test(graphics_state),
-        cmocka_unit_test(warnings_come_once_and_strict_refuses), cmocka_unit_test(tessellated),
-        cmocka_unit_test(pixel_bounds), cmocka_unit_test(portals)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(film_and_camera),
+                                       cmocka_unit_test(far_from_the_origin),
+                                       cmocka_unit_test(orientation),
+                                       cmocka_unit_test(lights),
+                                       cmocka_unit_test(materials_of_both_versions),
+                                       cmocka_unit_test(textures),
+                                       cmocka_unit_test(media),
+                                       cmocka_unit_test(instances_and_motion),
+                                       cmocka_unit_test(part_of_the_motion),
+                                       cmocka_unit_test(graphics_state),
+                                       cmocka_unit_test(warnings_come_once_and_strict_refuses),
+                                       cmocka_unit_test(tessellated),
+                                       cmocka_unit_test(pixel_bounds),
+                                       cmocka_unit_test(portals)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

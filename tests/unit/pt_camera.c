@@ -13,7 +13,8 @@
 static void assert_vec_near(pt_vec3 a, pt_vec3 b, float tolerance)
 {
     if (!(v3_len(v3_sub(a, b)) <= tolerance))
-        fail_msg("(%g, %g, %g) is not (%g, %g, %g)", (double)a.x, (double)a.y, (double)a.z, (double)b.x, (double)b.y, (double)b.z);
+        fail_msg("(%g, %g, %g) is not (%g, %g, %g)", (double)a.x, (double)a.y, (double)a.z, (double)b.x, (double)b.y,
+                 (double)b.z);
 }
 
 static struct pt_camera square_camera(void)

@@ -162,8 +162,8 @@ static void assemble(struct stage *stage, int count, int threads, enum behaviour
     *stage = (struct stage){.room = base_room_create(count), .count = count};
     assert_non_null(stage->room);
     for (int i = 1; i < count; i++) {
-        stage->members[i] = (struct member){.peers = base_room_of(stage->room, i), .threads = threads,
-                                            .behaviour = i == count - 1 ? last : WORKS};
+        stage->members[i] = (struct member){
+            .peers = base_room_of(stage->room, i), .threads = threads, .behaviour = i == count - 1 ? last : WORKS};
         assert_int_equal(pthread_create(&stage->members[i].thread, NULL, member_main, &stage->members[i]), 0);
     }
     assert_int_equal(pt_crew_create(base_room_of(stage->room, 0), timeout_s, &stage->crew, &err), 0);
@@ -255,7 +255,8 @@ static void same_bytes(const struct lull_criterion *table)
         assert_same(one.render, many.render);
         const struct pt_crew_traffic *traffic = pt_crew_traffic(stage.crew); /* every parcel comes back, and is as large */
         assert_true(traffic->messages >= 2 && traffic->messages < 1000000 && traffic->messages % 2 == 0);
-        assert_true(traffic->bytes >= traffic->messages * sizeof(struct pt_crew_rows) && traffic->bytes < 1000000000 && traffic->bytes % 2 == 0);
+        assert_true(traffic->bytes >= traffic->messages * sizeof(struct pt_crew_rows) && traffic->bytes < 1000000000 &&
+                    traffic->bytes % 2 == 0);
         assert_true(traffic->waiting_s >= 0 && traffic->waiting_s < 1000);
         part(&stage, 0);
         release(&many);

@@ -13,7 +13,8 @@
 
 static struct pt_path_result sample_of(float r, float g, float b)
 {
-    return (struct pt_path_result){.radiance = v3(r, g, b), .albedo = v3_splat(0.5f), .normal_world = v3(0, 1, 0), .depth = 3.0f};
+    return (struct pt_path_result){
+        .radiance = v3(r, g, b), .albedo = v3_splat(0.5f), .normal_world = v3(0, 1, 0), .depth = 3.0f};
 }
 
 static void half_is_balanced(void **state)
@@ -151,8 +152,12 @@ static void a_criterion_reads_the_mean(void **state)
         struct lull_host_shown shown;
         assert_int_equal(lull_host_show(&blocks, pt_host_show(&film, &blocks, &film_view), 0, &shown, NULL), LULL_OK);
         assert_int_equal(shown.planes[LULL_PLANE_COLOR].normaliser, dropped ? LULL_NORM_WEIGHT : LULL_NORM_SPP);
-        const struct lull_view view = {.struct_size = sizeof view, .x1 = PIXELS, .y1 = 1, .planes = shown.planes,
-                                       .plane_count = LULL_PLANE_COUNT, .plane_stride = sizeof shown.planes[0]};
+        const struct lull_view view = {.struct_size = sizeof view,
+                                       .x1 = PIXELS,
+                                       .y1 = 1,
+                                       .planes = shown.planes,
+                                       .plane_count = LULL_PLANE_COUNT,
+                                       .plane_stride = sizeof shown.planes[0]};
         const struct lull_block block = {.x1 = PIXELS, .y1 = 1, .spp = spp, .half_spp = half_spp};
         lull_kit_read(&view, &shown.planes[LULL_PLANE_COLOR], &block, 0, 0, PIXELS, 3, got);
         assert_memory_equal(got, want, sizeof got);
@@ -198,10 +203,14 @@ static void halves_drop_apart(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(half_is_balanced),       cmocka_unit_test(half_is_spread),
-        cmocka_unit_test(planes_on_demand),       cmocka_unit_test(sums_survive_load_and_store),
-        cmocka_unit_test(million_samples_of_a_constant), cmocka_unit_test(non_finite_samples_are_dropped),
-        cmocka_unit_test(halves_drop_apart), cmocka_unit_test(a_criterion_reads_the_mean),
+        cmocka_unit_test(half_is_balanced),
+        cmocka_unit_test(half_is_spread),
+        cmocka_unit_test(planes_on_demand),
+        cmocka_unit_test(sums_survive_load_and_store),
+        cmocka_unit_test(million_samples_of_a_constant),
+        cmocka_unit_test(non_finite_samples_are_dropped),
+        cmocka_unit_test(halves_drop_apart),
+        cmocka_unit_test(a_criterion_reads_the_mean),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -32,8 +32,10 @@ static void check_plane(const struct lull_plane *p, const void *data, int channe
         assert_true(!p->data && p->channels == 0 && p->scale == 0);
         return;
     }
-    assert_true(p->data == data && p->stride_x == channels * bytes && p->stride_y == 12 * channels * bytes && p->stride_c == bytes);
-    assert_true(p->scale == 1 && p->type == type && p->normaliser == normaliser && p->channels == (uint32_t)channels && p->flags == 0);
+    assert_true(p->data == data && p->stride_x == channels * bytes && p->stride_y == 12 * channels * bytes &&
+                p->stride_c == bytes);
+    assert_true(p->scale == 1 && p->type == type && p->normaliser == normaliser && p->channels == (uint32_t)channels &&
+                p->flags == 0);
 }
 
 static void the_film_is_shown(void **state)
@@ -48,7 +50,8 @@ static void the_film_is_shown(void **state)
         struct pt_host_view show;
         assert_int_equal(pt_film_init(&film, 8, 0, 20, 14, planes[k], &err), 0);
         const struct lull_host_view *v = pt_host_show(&film, &blocks, &show);
-        assert_true(v == &show.view && v->struct_size == sizeof *v && v->plane_count == LULL_PLANE_COUNT && v->planes == show.planes);
+        assert_true(v == &show.view && v->struct_size == sizeof *v && v->plane_count == LULL_PLANE_COUNT &&
+                    v->planes == show.planes);
         assert_true(v->x0 == 8 && v->y0 == 0 && v->x1 == 20 && v->y1 == 14);
         check_plane(&v->planes[LULL_PLANE_COLOR], film.color, 3, 8, LULL_TYPE_F64, LULL_NORM_SPP);
         check_plane(&v->planes[LULL_PLANE_HALF], film.half, 3, 8, LULL_TYPE_F64, LULL_NORM_HALF_SPP);
@@ -70,8 +73,13 @@ static void the_film_is_shown(void **state)
     }
     static const struct {
         uint32_t abi, film;
-    } map[] = {{LULL_PLANE_COLOR, 0}, {LULL_PLANE_WEIGHT, 0}, {LULL_PLANE_SPP, 0}, {LULL_PLANE_HALF, PT_FILM_HALF},
-               {LULL_PLANE_MOMENT2, PT_FILM_MOMENT2}, {LULL_PLANE_ALBEDO, PT_FILM_ALBEDO}, {LULL_PLANE_NORMAL, PT_FILM_NORMAL},
+    } map[] = {{LULL_PLANE_COLOR, 0},
+               {LULL_PLANE_WEIGHT, 0},
+               {LULL_PLANE_SPP, 0},
+               {LULL_PLANE_HALF, PT_FILM_HALF},
+               {LULL_PLANE_MOMENT2, PT_FILM_MOMENT2},
+               {LULL_PLANE_ALBEDO, PT_FILM_ALBEDO},
+               {LULL_PLANE_NORMAL, PT_FILM_NORMAL},
                {LULL_PLANE_DEPTH, PT_FILM_DEPTH}};
     for (size_t k = 0; k < sizeof map / sizeof map[0]; k++) {
         struct lull_requirements needs = {.planes_used = LULL_PLANE_BIT(map[k].abi)};
@@ -109,9 +117,12 @@ static void a_render_opens_its_frame(void **state)
         assert_int_equal(opened.flags & ~LULL_FRAME_RESTART, k == 0   ? LULL_FRAME_DETERMINISTIC
                                                              : k == 3 ? LULL_FRAME_DETERMINISTIC | LULL_FRAME_INDEPENDENT
                                                                       : 0);
-        assert_true(opened.width == 60 && opened.height == 44 && opened.spp_min == 8 && opened.spp_max == 256 && opened.seed == 7);
-        assert_true(opened.sample_clamp == (k == 3 ? 6 : 0) && opened.time_budget_s == (k == 1 ? 5 : 0) && opened.transfer == LULL_TRANSFER_SRGB);
-        assert_int_equal(opened.planes & ~LULL_HOST_COUNTS, pt_host_planes_of(pt_host_film_planes(lull_host_needs(criterion))));
+        assert_true(opened.width == 60 && opened.height == 44 && opened.spp_min == 8 && opened.spp_max == 256 &&
+                    opened.seed == 7);
+        assert_true(opened.sample_clamp == (k == 3 ? 6 : 0) && opened.time_budget_s == (k == 1 ? 5 : 0) &&
+                    opened.transfer == LULL_TRANSFER_SRGB);
+        assert_int_equal(opened.planes & ~LULL_HOST_COUNTS,
+                         pt_host_planes_of(pt_host_film_planes(lull_host_needs(criterion))));
         pt_render_destroy(render);
     }
     struct pt_render_config config = pt_fake_config();
@@ -123,18 +134,15 @@ static void a_render_opens_its_frame(void **state)
 }
 
 static int32_t fail_to_evaluate(struct lull_instance *in, const struct lull_view *view, const struct lull_block *blocks,
-                                uint32_t block_stride, struct lull_decision *decisions, uint32_t decision_stride, uint32_t count,
-                                struct lull_error *err)
+                                uint32_t block_stride, struct lull_decision *decisions, uint32_t decision_stride,
+                                uint32_t count, struct lull_error *err)
 {
     (void)in, (void)view, (void)blocks, (void)block_stride, (void)decisions, (void)decision_stride, (void)count;
     strcpy(err->message, "no such luck");
     return err->code = LULL_E_INTERNAL;
 }
 
-static void keep_words(void *data, const char *line)
-{
-    strcat(strcat(data, line), "\n");
-}
+static void keep_words(void *data, const char *line) { strcat(strcat(data, line), "\n"); }
 
 /* A criterion that fails is said so once, and every block gets its samples. */
 static void failures_are_told_once(void **state)
@@ -220,7 +228,8 @@ static void masks_are_read(void **state)
     struct base_err err = {0};
     char path[64], line[200];
     struct pt_mask mask;
-    static const uint8_t pixels[24] = {0, 30, 255, 51, 102, 102, 255, 255, 255, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+    static const uint8_t pixels[24] = {0, 30, 255, 51, 102, 102, 255, 255, 255, 1,  2,  3,
+                                       4, 5,  6,   7,  8,   9,   10,  11,  12,  13, 14, 15};
     snprintf(path, sizeof path, "/tmp/pt_host_%ld.png", (long)getpid());
     for (int channels = 1; channels <= 4; channels++) {
         assert_int_equal(base_png_write(path, 3, 2, channels, pixels, &err), 0);
@@ -250,7 +259,8 @@ static void masks_are_read(void **state)
     assert_int_equal(pt_mask_read(path, 4, 1, &mask, &err), 0);
     assert_true(mask.grey[0] == 0 && mask.grey[1] == 0.25f && mask.grey[2] == 1 && mask.grey[3] == 0);
     const struct lull_plane p = pt_mask_plane(&mask);
-    assert_true(p.data == mask.grey && p.stride_x == 4 && p.stride_y == 16 && p.scale == 1 && p.type == LULL_TYPE_F32 && p.channels == 1);
+    assert_true(p.data == mask.grey && p.stride_x == 4 && p.stride_y == 16 && p.scale == 1 && p.type == LULL_TYPE_F32 &&
+                p.channels == 1);
     pt_mask_release(&mask);
     unlink(path);
 }
@@ -290,7 +300,8 @@ static char *listed(struct pt_approve_case *c)
     struct base_inputs inputs = BASE_INPUTS_EMPTY;
     const struct lull_criterion *found = NULL;
     (void)c;
-    assert_true(mkdtemp(folder) && api_folder(built, sizeof built, API_CRITERIA) == 0 && setenv("LULL_PLUGIN_PATH", folder, 1) == 0);
+    assert_true(mkdtemp(folder) && api_folder(built, sizeof built, API_CRITERIA) == 0 &&
+                setenv("LULL_PLUGIN_PATH", folder, 1) == 0);
     for (int i = 0; i < 3; i++) {
         snprintf(from, sizeof from, "%s/%s", i < 2 ? built : "/dev/null", i < 2 ? names[i] : "");
         snprintf(path[i], sizeof path[i], "%s/%s", folder, names[i]);
@@ -335,7 +346,8 @@ static void criteria_by_name(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_film_is_shown), cmocka_unit_test(a_render_opens_its_frame), cmocka_unit_test(services), cmocka_unit_test(failures_are_told_once),
+        cmocka_unit_test(the_film_is_shown), cmocka_unit_test(a_render_opens_its_frame),
+        cmocka_unit_test(services),          cmocka_unit_test(failures_are_told_once),
         cmocka_unit_test(masks_are_read),    cmocka_unit_test(criteria_by_name),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

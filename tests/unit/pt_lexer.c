@@ -124,9 +124,10 @@ static void include_loops(void **state)
 static void parameter_spellings(void **state)
 {
     (void)state;
-    struct files files = {{"a"}, {"\"float a\" 2 \"float b\" [ 3 ] \"bool c\" true \"bool d\" [ \"false\" ] \"string e\" \"x\" "
-                                   "\"string f\" [ \"y\" \"z\" ] \"point p\" [ 1 2 3 ] \"float uv\" [ 0 1 2 3 ] "
-                                   "\"integer i\" [ 1 -2 ] # \"float broken\" 1.2.3\n \"spectrum s\" \"metal-Cu-k\""}};
+    struct files files = {{"a"},
+                          {"\"float a\" 2 \"float b\" [ 3 ] \"bool c\" true \"bool d\" [ \"false\" ] \"string e\" \"x\" "
+                           "\"string f\" [ \"y\" \"z\" ] \"point p\" [ 1 2 3 ] \"float uv\" [ 0 1 2 3 ] "
+                           "\"integer i\" [ 1 -2 ] # \"float broken\" 1.2.3\n \"spectrum s\" \"metal-Cu-k\""}};
     struct fixture x;
     struct pt_params p = {0};
     double xyz[3];
@@ -156,7 +157,9 @@ static void parameter_spellings(void **state)
 static void characters(void **state)
 {
     (void)state;
-    struct files files = {{"a"}, {"\xef\xbb\xbf" "ab[cd]ef\"g\"hi#j\n\vk\fl\tm\rn\r\n\"\\n\\r\\t\\b\\f\\\\\\'\\\"\" o"}};
+    struct files files = {{"a"},
+                          {"\xef\xbb\xbf"
+                           "ab[cd]ef\"g\"hi#j\n\vk\fl\tm\rn\r\n\"\\n\\r\\t\\b\\f\\\\\\'\\\"\" o"}};
     struct fixture x;
     open_files(&x, &files);
     expect(&x, PT_TOKEN_WORD, "ab", 1, 1);
@@ -211,7 +214,8 @@ static void include_depth(void **state)
     for (int i = 0; i <= PT_LEXER_DEPTH; i++) {
         char name[16];
         snprintf(name, sizeof name, "f%d", i);
-        assert_int_equal(pt_lexer_include(&x.lexer, name, (struct pt_loc){"f", 7, 8}, i % 2), i < PT_LEXER_DEPTH ? 0 : BASE_EINVAL);
+        assert_int_equal(pt_lexer_include(&x.lexer, name, (struct pt_loc){"f", 7, 8}, i % 2),
+                         i < PT_LEXER_DEPTH ? 0 : BASE_EINVAL);
     }
     assert_string_equal(x.err.text, "f:7:8: files include each other more than 32 levels deep");
     for (int i = PT_LEXER_DEPTH - 1; i >= 0; i--) {
@@ -250,9 +254,22 @@ static void names(void **state)
 static void numbers(void **state)
 {
     (void)state;
-    static const char *const good[] = {"0", "-1", "+.5", "3.", "1e-008", "-4.37114e-008", "123456789012345678901234567890", "4.9e-324",
-                                       "0.1", "2.2250738585072011e-308", "1.7976931348623157e308", "00012", "1E+5", "9007199254740993"};
-    static const char *const bad[] = {"", "-", ".", "e5", "1e", "1e+", "1.2.3", "0x10", "nan", "inf", "1,5", "1e999", "--1", "1 "};
+    static const char *const good[] = {"0",
+                                       "-1",
+                                       "+.5",
+                                       "3.",
+                                       "1e-008",
+                                       "-4.37114e-008",
+                                       "123456789012345678901234567890",
+                                       "4.9e-324",
+                                       "0.1",
+                                       "2.2250738585072011e-308",
+                                       "1.7976931348623157e308",
+                                       "00012",
+                                       "1E+5",
+                                       "9007199254740993"};
+    static const char *const bad[] = {"",     "-",   ".",   "e5",  "1e",    "1e+", "1.2.3",
+                                      "0x10", "nan", "inf", "1,5", "1e999", "--1", "1 "};
     double v;
     for (size_t i = 0; i < sizeof good / sizeof good[0]; i++) {
         assert_int_equal(pt_number_parse(good[i], strlen(good[i]), &v), 1);
@@ -289,8 +306,14 @@ static void numbers_in_other_locales(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(tokens_and_places), cmocka_unit_test(list_across_files),
-                                       cmocka_unit_test(include_loops), cmocka_unit_test(characters), cmocka_unit_test(names), cmocka_unit_test(include_depth),     cmocka_unit_test(parameter_spellings),
-                                       cmocka_unit_test(numbers),           cmocka_unit_test(numbers_in_other_locales)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(tokens_and_places),
+                                       cmocka_unit_test(list_across_files),
+                                       cmocka_unit_test(include_loops),
+                                       cmocka_unit_test(characters),
+                                       cmocka_unit_test(names),
+                                       cmocka_unit_test(include_depth),
+                                       cmocka_unit_test(parameter_spellings),
+                                       cmocka_unit_test(numbers),
+                                       cmocka_unit_test(numbers_in_other_locales)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

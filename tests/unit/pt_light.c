@@ -72,7 +72,8 @@ static void lamps_without_power(void **state)
     test_scene_begin(&scene);
     int32_t black = test_add_diffuse(&scene, v3_splat(0.0f));
     for (int i = 0; i < 2; i++)
-        test_add_area_light(&scene, test_add_quad(&scene, black, v3((float)i, 0, 1), v3(0, 2, 0), v3(0, 1, 0)), v3(1, 2, 3), 0);
+        test_add_area_light(&scene, test_add_quad(&scene, black, v3((float)i, 0, 1), v3(0, 2, 0), v3(0, 1, 0)), v3(1, 2, 3),
+                            0);
     test_scene_finish(&scene);
     assert_int_equal(scene.emitter_count, 4);
     assert_null(scene.light_tree);
@@ -206,7 +207,11 @@ static void build_env(struct pt_scene *s, int32_t mapping, int32_t width, int32_
     for (int i = 0; i < 3 * width * height; i++)
         px[i] = pt_rng_float(&rng) * (i % 37 == 0 ? 10.0f : 1.0f);
     s->images[s->image_count++] = (struct pt_image_map){width, height, 3, PT_PIXEL_FLOAT, 1.0f, px};
-    struct pt_light light = {.kind = PT_LIGHT_ENV_IMAGE, .shape = -1, .image = 0, .mapping = mapping, .emission = {1, 1, 2},
+    struct pt_light light = {.kind = PT_LIGHT_ENV_IMAGE,
+                             .shape = -1,
+                             .image = 0,
+                             .mapping = mapping,
+                             .emission = {1, 1, 2},
                              .from_render = {{0, 0, 1, 0, 0, 1, 0, 0, -1, 0, 0, 0}}};
     test_add_light(s, &light);
 }
@@ -236,15 +241,51 @@ static void build_constant_portal(struct pt_scene *s)
     add_portal(s);
 }
 
-static void quads(void **state) { (void)state; run(build_quad, 1); }
-static void sphere_outside(void **state) { (void)state; run(build_sphere, 1); }
-static void portal_of_an_image(void **state) { (void)state; run(build_latlong_portal, 1); }
-static void portal_of_a_constant(void **state) { (void)state; run(build_constant_portal, 1); }
-static void ellipsoid(void **state) { (void)state; run(build_ellipsoid, 0); }
-static void cylinder(void **state) { (void)state; run(build_cylinder, 0); }
-static void disk(void **state) { (void)state; run(build_disk, 1); }
-static void latlong(void **state) { (void)state; run(build_latlong, 1); }
-static void equal_area(void **state) { (void)state; run(build_equal_area, 1); }
+static void quads(void **state)
+{
+    (void)state;
+    run(build_quad, 1);
+}
+static void sphere_outside(void **state)
+{
+    (void)state;
+    run(build_sphere, 1);
+}
+static void portal_of_an_image(void **state)
+{
+    (void)state;
+    run(build_latlong_portal, 1);
+}
+static void portal_of_a_constant(void **state)
+{
+    (void)state;
+    run(build_constant_portal, 1);
+}
+static void ellipsoid(void **state)
+{
+    (void)state;
+    run(build_ellipsoid, 0);
+}
+static void cylinder(void **state)
+{
+    (void)state;
+    run(build_cylinder, 0);
+}
+static void disk(void **state)
+{
+    (void)state;
+    run(build_disk, 1);
+}
+static void latlong(void **state)
+{
+    (void)state;
+    run(build_latlong, 1);
+}
+static void equal_area(void **state)
+{
+    (void)state;
+    run(build_equal_area, 1);
+}
 
 /* From inside, an emitting sphere turned inwards fills all directions. */
 static void sphere_inside(void **state)
@@ -289,14 +330,23 @@ static void only_spheres_are_cones(void **state)
     static const struct {
         float columns[9], z_min, z_max, phi_max;
         int cone;
-    } cases[] = {{{2, 0, 0, 0, 2, 0, 0, 0, 2}, -1, 1, 6.2831853f, 1},          {{2, 0, 0, 0, 0, 2, 0, -2, 0}, -2, 3, 6.2831853f, 1},
-                 {{2, 0, 0, 0, 2.01f, 0, 0, 0, 2}, -1, 1, 6.2831853f, 0},      {{2, 0, 0, 0, 2, 0, 0, 0, 2.01f}, -1, 1, 6.2831853f, 0},
-                 {{1.92f, 0.56f, 0, 0.56f, 1.92f, 0, 0, 0, 2}, -1, 1, 6.2831853f, 0}, {{1.92f, 0, 0.56f, 0, 2, 0, 0.56f, 0, 1.92f}, -1, 1, 6.2831853f, 0},
-                 {{2, 0, 0, 0, 1.92f, 0.56f, 0, 0.56f, 1.92f}, -1, 1, 6.2831853f, 0}, {{2, 0, 0, 0, 2, 0, 0, 0, 2}, -0.99f, 1, 6.2831853f, 0},
-                 {{2, 0, 0, 0, 2, 0, 0, 0, 2}, -1, 0.99f, 6.2831853f, 0},      {{2, 0, 0, 0, 2, 0, 0, 0, 2}, -1, 1, 6.28f, 0}};
+    } cases[] = {{{2, 0, 0, 0, 2, 0, 0, 0, 2}, -1, 1, 6.2831853f, 1},
+                 {{2, 0, 0, 0, 0, 2, 0, -2, 0}, -2, 3, 6.2831853f, 1},
+                 {{2, 0, 0, 0, 2.01f, 0, 0, 0, 2}, -1, 1, 6.2831853f, 0},
+                 {{2, 0, 0, 0, 2, 0, 0, 0, 2.01f}, -1, 1, 6.2831853f, 0},
+                 {{1.92f, 0.56f, 0, 0.56f, 1.92f, 0, 0, 0, 2}, -1, 1, 6.2831853f, 0},
+                 {{1.92f, 0, 0.56f, 0, 2, 0, 0.56f, 0, 1.92f}, -1, 1, 6.2831853f, 0},
+                 {{2, 0, 0, 0, 1.92f, 0.56f, 0, 0.56f, 1.92f}, -1, 1, 6.2831853f, 0},
+                 {{2, 0, 0, 0, 2, 0, 0, 0, 2}, -0.99f, 1, 6.2831853f, 0},
+                 {{2, 0, 0, 0, 2, 0, 0, 0, 2}, -1, 0.99f, 6.2831853f, 0},
+                 {{2, 0, 0, 0, 2, 0, 0, 0, 2}, -1, 1, 6.28f, 0}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         const float *c = cases[i].columns;
-        struct pt_quadric q = {.kind = PT_QUADRIC_SPHERE, .radius = 1, .z_min = cases[i].z_min, .z_max = cases[i].z_max, .phi_max = cases[i].phi_max};
+        struct pt_quadric q = {.kind = PT_QUADRIC_SPHERE,
+                               .radius = 1,
+                               .z_min = cases[i].z_min,
+                               .z_max = cases[i].z_max,
+                               .phi_max = cases[i].phi_max};
         set_transform(&q, (struct pt_mat34){{c[0], c[3], c[6], 5, c[1], c[4], c[7], 0, c[2], c[5], c[8], 0}});
         struct pt_scene scene = {.quadrics = &q};
         const struct pt_shape shape = {.kind = PT_SHAPE_QUADRIC};
@@ -342,7 +392,9 @@ static void skies_are_looked_up_where_they_are(void **state)
     static float pixels[W * H * 3];
     struct pt_scene scene = {0};
     struct pt_image_map map = {W, H, 3, PT_PIXEL_FLOAT, 1, pixels};
-    struct pt_light light = {.kind = PT_LIGHT_ENV_IMAGE, .emission = {1, 10, 100}, .mapping = PT_ENV_LATLONG,
+    struct pt_light light = {.kind = PT_LIGHT_ENV_IMAGE,
+                             .emission = {1, 10, 100},
+                             .mapping = PT_ENV_LATLONG,
                              .from_render = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}}};
     scene.images = &map;
     for (int i = 0; i < W * H * 3; i++)
@@ -350,19 +402,23 @@ static void skies_are_looked_up_where_they_are(void **state)
     for (int y = 0; y < H; y++)
         for (int x = 0; x < W; x++) {
             double theta = (y + 0.5) / H * PI, phi = (x + 0.5) / W * 2 * PI;
-            pt_vec3 got = pt_light_env_image_eval(&scene, &light, v3((float)(sin(theta) * cos(phi)), (float)(sin(theta) * sin(phi)), (float)cos(theta)));
+            pt_vec3 got = pt_light_env_image_eval(
+                &scene, &light, v3((float)(sin(theta) * cos(phi)), (float)(sin(theta) * sin(phi)), (float)cos(theta)));
             float first = (float)(3 * (y * W + x) + 1);
             assert_true(got.x == first && got.y == 10 * (first + 1) && got.z == 100 * (first + 2));
         }
     assert_true(pt_light_env_image_eval(&scene, &light, v3(0, 0, 1)).x == 1);
     assert_true(pt_light_env_image_eval(&scene, &light, v3(0, 0, -1)).x == 3 * W * (H - 1) + 1);
-    assert_true(pt_light_env_image_eval(&scene, &light, v3(1, -1e-9f, 0)).x == 3 * (H / 2 * W + W - 1) + 1); /* a whole turn */
+    assert_true(pt_light_env_image_eval(&scene, &light, v3(1, -1e-9f, 0)).x ==
+                3 * (H / 2 * W + W - 1) + 1); /* a whole turn */
     /* Clarberg's square: the upper pole in the middle, the lower in the corners, axes on the edges' middles */
     static const struct {
         pt_vec3 w;
         int x, y;
-    } known[] = {{{0, 0, 1}, 4, 4}, {{0.01f, 0.01f, -1}, 7, 7}, {{-0.01f, 0.01f, -1}, 0, 7}, {{-0.01f, -0.01f, -1}, 0, 0}, {{1, 0.01f, 0}, 7, 4},
-                 {{0.01f, 1, 0}, 4, 7}, {{-1, -0.01f, 0}, 0, 3}, {{-0.01f, -1, 0}, 3, 0}, {{0.5f, 0.5f, 0.1f}, 5, 5}, {{0.5f, 0.5f, -0.1f}, 6, 6}};
+    } known[] = {
+        {{0, 0, 1}, 4, 4},          {{0.01f, 0.01f, -1}, 7, 7}, {{-0.01f, 0.01f, -1}, 0, 7}, {{-0.01f, -0.01f, -1}, 0, 0},
+        {{1, 0.01f, 0}, 7, 4},      {{0.01f, 1, 0}, 4, 7},      {{-1, -0.01f, 0}, 0, 3},     {{-0.01f, -1, 0}, 3, 0},
+        {{0.5f, 0.5f, 0.1f}, 5, 5}, {{0.5f, 0.5f, -0.1f}, 6, 6}};
     map.width = map.height = 8;
     light.mapping = PT_ENV_EQUAL_AREA;
     for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
@@ -377,8 +433,12 @@ static void delta_lights(void **state)
 {
     (void)state;
     struct pt_light point = {.kind = PT_LIGHT_POINT, .emission = {8, 8, 8}, .position = {0, 0, 2}};
-    struct pt_light spot = {.kind = PT_LIGHT_SPOT, .emission = {8, 8, 8}, .position = {0, 0, 2}, .direction = {0, 0, -1},
-                            .cos_total = 0.8f, .cos_start = 0.9f};
+    struct pt_light spot = {.kind = PT_LIGHT_SPOT,
+                            .emission = {8, 8, 8},
+                            .position = {0, 0, 2},
+                            .direction = {0, 0, -1},
+                            .cos_total = 0.8f,
+                            .cos_start = 0.9f};
     struct pt_light distant = {.kind = PT_LIGHT_DISTANT, .emission = {3, 3, 3}, .direction = {0, 0, -1}};
     struct pt_light_sample s;
     assert_int_equal(pt_light_delta_sample(&point, 0.5f, v3(0, 0, 0), &s), 1);
@@ -406,7 +466,11 @@ static void tables_are_as_fine_as_the_image_asks(void **state)
         for (int i = 0; i < 3 * W * H; i++) /* even; every other pixel dark; one pixel that outshines all others */
             px[i] = kind == 1 && i / 3 % 2 ? 0.0f : kind == 2 && i / 3 == 100 * W + 300 ? 1e6f : 1.0f;
         scene.images[scene.image_count++] = (struct pt_image_map){W, H, 3, PT_PIXEL_FLOAT, 1.0f, px};
-        struct pt_light light = {.kind = PT_LIGHT_ENV_IMAGE, .shape = -1, .image = 0, .mapping = PT_ENV_LATLONG, .emission = {1, 1, 1},
+        struct pt_light light = {.kind = PT_LIGHT_ENV_IMAGE,
+                                 .shape = -1,
+                                 .image = 0,
+                                 .mapping = PT_ENV_LATLONG,
+                                 .emission = {1, 1, 1},
                                  .from_render = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}}};
         test_add_light(&scene, &light);
         test_scene_finish(&scene);
@@ -422,12 +486,24 @@ static void tables_are_as_fine_as_the_image_asks(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(alias_table_keeps_probabilities), cmocka_unit_test(alias_tables_of_any_weights), cmocka_unit_test(lamps_without_power),
-        cmocka_unit_test(quads),     cmocka_unit_test(sphere_outside),
-        cmocka_unit_test(sphere_inside),                   cmocka_unit_test(ellipsoid), cmocka_unit_test(cylinder),
-        cmocka_unit_test(disk),                            cmocka_unit_test(latlong),   cmocka_unit_test(equal_area),
-        cmocka_unit_test(portal_of_an_image),              cmocka_unit_test(portal_of_a_constant),
-        cmocka_unit_test(delta_lights), cmocka_unit_test(sphere_lights_itself), cmocka_unit_test(only_spheres_are_cones), cmocka_unit_test(normals_say_which_side_emits), cmocka_unit_test(skies_are_looked_up_where_they_are),
+        cmocka_unit_test(alias_table_keeps_probabilities),
+        cmocka_unit_test(alias_tables_of_any_weights),
+        cmocka_unit_test(lamps_without_power),
+        cmocka_unit_test(quads),
+        cmocka_unit_test(sphere_outside),
+        cmocka_unit_test(sphere_inside),
+        cmocka_unit_test(ellipsoid),
+        cmocka_unit_test(cylinder),
+        cmocka_unit_test(disk),
+        cmocka_unit_test(latlong),
+        cmocka_unit_test(equal_area),
+        cmocka_unit_test(portal_of_an_image),
+        cmocka_unit_test(portal_of_a_constant),
+        cmocka_unit_test(delta_lights),
+        cmocka_unit_test(sphere_lights_itself),
+        cmocka_unit_test(only_spheres_are_cones),
+        cmocka_unit_test(normals_say_which_side_emits),
+        cmocka_unit_test(skies_are_looked_up_where_they_are),
         cmocka_unit_test(tables_are_as_fine_as_the_image_asks),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -23,8 +23,13 @@ static pt_vec3 somewhere(struct pt_rng *rng, float size)
 
 static void add_delta_light(struct pt_scene *s, struct pt_rng *rng, int32_t kind)
 {
-    struct pt_light light = {.kind = kind, .shape = -1, .image = -1, .emission = {3, 2, 1}, .position = somewhere(rng, 4.0f),
-                             .direction = pt_sample_sphere(pt_rng_float(rng), pt_rng_float(rng)), .cos_total = 0.6f,
+    struct pt_light light = {.kind = kind,
+                             .shape = -1,
+                             .image = -1,
+                             .emission = {3, 2, 1},
+                             .position = somewhere(rng, 4.0f),
+                             .direction = pt_sample_sphere(pt_rng_float(rng), pt_rng_float(rng)),
+                             .cos_total = 0.6f,
                              .cos_start = 0.8f};
     test_add_light(s, &light);
 }
@@ -36,7 +41,8 @@ static void build_all_kinds(struct pt_scene *s)
     int32_t black = test_add_diffuse(s, v3_splat(0.0f));
     for (int i = 0; i < 40; i++) {
         float size = powf(10.0f, between(&rng, -3.0f, 0.3f));
-        pt_vec3 p = somewhere(&rng, 4.0f), a = v3_scale(somewhere(&rng, 1.0f), size), b = v3_scale(somewhere(&rng, 1.0f), size);
+        pt_vec3 p = somewhere(&rng, 4.0f), a = v3_scale(somewhere(&rng, 1.0f), size),
+                b = v3_scale(somewhere(&rng, 1.0f), size);
         float power = i == 7 ? INFINITY : i == 8 ? 0.0f : powf(10.0f, between(&rng, -2.0f, 2.0f));
         int32_t quad = test_add_quad(s, black, p, a, b);
         test_add_area_light(s, quad, v3_splat(power), i % 3 == 0);
@@ -47,7 +53,8 @@ static void build_all_kinds(struct pt_scene *s)
         int32_t id = test_add_sphere(s, black, somewhere(&rng, 4.0f), between(&rng, 0.01f, 0.6f));
         struct pt_quadric *q = &s->quadrics[s->shapes[id].data];
         if (i == 1)
-            *q = (struct pt_quadric){.kind = PT_QUADRIC_DISK, .radius = 0.7f, .phi_max = 6.2831853f, .to_render = q->to_render};
+            *q = (struct pt_quadric){
+                .kind = PT_QUADRIC_DISK, .radius = 0.7f, .phi_max = 6.2831853f, .to_render = q->to_render};
         for (int k = 0; k < 3; k++)
             q->to_render.m[4 * k + 2] *= i > 1 ? 1.7f : 1.0f;
         assert_int_equal(pt_mat34_invert(&q->to_render, &q->from_render), 1);
@@ -101,7 +108,8 @@ static void check_frequencies(const struct pt_scene *s, const struct pt_receiver
         int far = s->lights[s->emitters[e].light].kind == PT_LIGHT_DISTANT;
         count[e]++;
         assert_true(pmf > 0.0f);
-        assert_true(far ? fabsf(pmf / s->emitters[e].pmf - 1.0f) < 1e-5f : fabsf(pt_light_tree_pmf(s, at, e) / pmf - 1.0f) < 1e-5f);
+        assert_true(far ? fabsf(pmf / s->emitters[e].pmf - 1.0f) < 1e-5f
+                        : fabsf(pt_light_tree_pmf(s, at, e) / pmf - 1.0f) < 1e-5f);
     }
     for (int e = 0; e < s->emitter_count && !none; e++) {
         int far = s->lights[s->emitters[e].light].kind == PT_LIGHT_DISTANT;
@@ -118,10 +126,12 @@ static void check_support(const struct pt_scene *s, const struct pt_receiver *at
     for (int e = 0; e < s->emitter_count; e++)
         for (int i = 0; i < 50; i++) {
             struct pt_light_sample sample;
-            if (!pt_light_sample_emitter(PT_FX_ALL, s, &s->emitters[e], at->p, pt_rng_float(&rng), pt_rng_float(&rng), &sample))
+            if (!pt_light_sample_emitter(PT_FX_ALL, s, &s->emitters[e], at->p, pt_rng_float(&rng), pt_rng_float(&rng),
+                                         &sample))
                 continue;
             float cosine = v3_dot(at->n, sample.wi);
-            int arrives = at->kind == PT_RECEIVER_VOLUME || (at->kind == PT_RECEIVER_SURFACE ? cosine > 0.0f : cosine != 0.0f);
+            int arrives =
+                at->kind == PT_RECEIVER_VOLUME || (at->kind == PT_RECEIVER_SURFACE ? cosine > 0.0f : cosine != 0.0f);
             if (sample.finite && arrives && !v3_is_black(sample.radiance) && !(pt_light_tree_pmf(s, at, e) > 0.0f))
                 fail_msg("emitter %d (light of kind %d) is cut off at cosine %g", e, s->lights[s->emitters[e].light].kind,
                          (double)cosine);
@@ -159,8 +169,14 @@ static void cones_end(void **state)
     struct pt_scene s;
     test_scene_begin(&s);
     for (int i = 0; i < SPOTS; i++) {
-        struct pt_light spot = {.kind = PT_LIGHT_SPOT, .shape = -1, .image = -1, .emission = {3, 2, 1}, .direction = {0, 0, -1},
-                                .position = {0.001f * (float)i, 0, 0}, .cos_total = cosf(0.6f), .cos_start = cosf(0.2f)};
+        struct pt_light spot = {.kind = PT_LIGHT_SPOT,
+                                .shape = -1,
+                                .image = -1,
+                                .emission = {3, 2, 1},
+                                .direction = {0, 0, -1},
+                                .position = {0.001f * (float)i, 0, 0},
+                                .cos_total = cosf(0.6f),
+                                .cos_start = cosf(0.2f)};
         test_add_light(&s, &spot);
     }
     struct pt_light lamp = {.kind = PT_LIGHT_POINT, .shape = -1, .image = -1, .emission = {1, 1, 1}, .position = {0, 0, 50}};
@@ -185,7 +201,8 @@ static void cones_end(void **state)
     test_scene_begin(&s);
     int32_t black = test_add_diffuse(&s, v3_splat(0.0f));
     for (int i = 0; i < 2; i++) /* towards +z */
-        test_add_area_light(&s, test_add_quad(&s, black, v3((float)i, 0, 0), v3(0.01f, 0, 0), v3(0, 0.01f, 0)), v3_splat(1.0f), 0);
+        test_add_area_light(&s, test_add_quad(&s, black, v3((float)i, 0, 0), v3(0.01f, 0, 0), v3(0, 0.01f, 0)),
+                            v3_splat(1.0f), 0);
     test_scene_finish(&s);
     for (int degree = 0; degree < 180; degree += 7) {
         float a = (float)degree * PT_PI / 180.0f, sum = 0;
@@ -200,8 +217,14 @@ static void cones_end(void **state)
     black = test_add_diffuse(&s, v3_splat(0.0f));
     for (int i = 0; i < 12; i++) {
         pt_vec3 p = v3(0.001f * (float)i, 0, 0);
-        struct pt_light spot = {.kind = PT_LIGHT_SPOT, .shape = -1, .image = -1, .emission = {3, 2, 1}, .direction = {0, 0, 1},
-                                .position = p, .cos_total = 0.99f, .cos_start = 0.999f};
+        struct pt_light spot = {.kind = PT_LIGHT_SPOT,
+                                .shape = -1,
+                                .image = -1,
+                                .emission = {3, 2, 1},
+                                .direction = {0, 0, 1},
+                                .position = p,
+                                .cos_total = 0.99f,
+                                .cos_start = 0.999f};
         if (i % 2)
             test_add_light(&s, &spot);
         else
@@ -226,14 +249,24 @@ static void power_has_no_hierarchy(void **state)
     test_scene_end(&s);
 }
 
-static void frequencies_are_probabilities(void **state) { (void)state; run(check_frequencies); }
-static void nothing_that_arrives_is_cut_off(void **state) { (void)state; run(check_support); }
+static void frequencies_are_probabilities(void **state)
+{
+    (void)state;
+    run(check_frequencies);
+}
+static void nothing_that_arrives_is_cut_off(void **state)
+{
+    (void)state;
+    run(check_support);
+}
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(frequencies_are_probabilities), cmocka_unit_test(nothing_that_arrives_is_cut_off),
-        cmocka_unit_test(lights_are_weighed), cmocka_unit_test(cones_end),
+        cmocka_unit_test(frequencies_are_probabilities),
+        cmocka_unit_test(nothing_that_arrives_is_cut_off),
+        cmocka_unit_test(lights_are_weighed),
+        cmocka_unit_test(cones_end),
         cmocka_unit_test(power_has_no_hierarchy),
     };
     print_message("seeds 3, 17, 23\n");

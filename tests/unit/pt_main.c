@@ -64,22 +64,46 @@ static void print_cli(FILE *out, const struct pt_cli *c)
     static const char *const actions[] = {"render", "list", "explain", "debug", "sequence", "quote"};
     const struct {
         const char *name, *text;
-    } texts[] = {{"criterion", c->criterion}, {"mask", c->mask}, {"output", c->output}, {"preview", c->preview}, {"report", c->report},
-                 {"checkpoint", c->checkpoint}, {"quote-map", c->quote_map}, {"sequence", c->sequence}, {"levels", c->levels},
+    } texts[] = {{"criterion", c->criterion},    {"mask", c->mask},         {"output", c->output},
+                 {"preview", c->preview},        {"report", c->report},     {"checkpoint", c->checkpoint},
+                 {"quote-map", c->quote_map},    {"sequence", c->sequence}, {"levels", c->levels},
                  {"blocks", c->sequence_blocks}, {"name", c->name}};
     const struct {
         const char *name;
         double value, usual;
-    } numbers[] = {{"block", c->block_width, 200}, {"by", c->block_height, 200}, {"spp-min", (double)c->spp_min, 16},
-                   {"spp-max", (double)c->spp_max, 10000}, {"spp", (double)c->spp, 0}, {"budget", c->time_budget_s, 0},
-                   {"overhead", c->max_check_overhead, 0}, {"seam", c->max_seam, 0}, {"width", c->width, 0}, {"height", c->height, 0},
-                   {"fov", c->view.fov_deg, 0}, {"threads", c->threads, 0}, {"rank-timeout", c->rank_timeout_s, 120}, {"seed", c->seed, 0},
-                   {"every", c->checkpoint_every_s, 60}, {"resume", c->resume, 0}, {"quote", c->quote, 0},
-                   {"pilot-spp", (double)c->pilot_spp, 0}, {"pilot-s", c->pilot_s, 0}, {"json", c->json, 0},
-                   {"effects", c->all_effects, 0}, {"strict", c->strict, 0}, {"quiet", c->quiet, 0}, {"reproducible", c->reproducible, 0},
-                   {"selection", c->light_selection, 0}, {"sampler", c->sampler, -1}, {"strategy", c->strategy, -1},
-                   {"filter", c->filter, -1}, {"radius", c->filter_radius, 0}, {"depth", c->max_depth, -2}, {"aov", c->aov, 0},
-                   {"order", c->order_seed, 0}, {"reference", (double)c->reference_spp, 0}};
+    } numbers[] = {{"block", c->block_width, 200},
+                   {"by", c->block_height, 200},
+                   {"spp-min", (double)c->spp_min, 16},
+                   {"spp-max", (double)c->spp_max, 10000},
+                   {"spp", (double)c->spp, 0},
+                   {"budget", c->time_budget_s, 0},
+                   {"overhead", c->max_check_overhead, 0},
+                   {"seam", c->max_seam, 0},
+                   {"width", c->width, 0},
+                   {"height", c->height, 0},
+                   {"fov", c->view.fov_deg, 0},
+                   {"threads", c->threads, 0},
+                   {"rank-timeout", c->rank_timeout_s, 120},
+                   {"seed", c->seed, 0},
+                   {"every", c->checkpoint_every_s, 60},
+                   {"resume", c->resume, 0},
+                   {"quote", c->quote, 0},
+                   {"pilot-spp", (double)c->pilot_spp, 0},
+                   {"pilot-s", c->pilot_s, 0},
+                   {"json", c->json, 0},
+                   {"effects", c->all_effects, 0},
+                   {"strict", c->strict, 0},
+                   {"quiet", c->quiet, 0},
+                   {"reproducible", c->reproducible, 0},
+                   {"selection", c->light_selection, 0},
+                   {"sampler", c->sampler, -1},
+                   {"strategy", c->strategy, -1},
+                   {"filter", c->filter, -1},
+                   {"radius", c->filter_radius, 0},
+                   {"depth", c->max_depth, -2},
+                   {"aov", c->aov, 0},
+                   {"order", c->order_seed, 0},
+                   {"reference", (double)c->reference_spp, 0}};
     fprintf(out, "%s %s ", actions[c->action], c->scene ? c->scene : "nothing");
     for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++)
         print_text(out, texts[i].name, texts[i].text);
@@ -143,10 +167,14 @@ static void write_files(void)
     uint8_t grey[24 * 9];
     for (int i = 0; i < 24 * 9; i++)
         grey[i] = i % 24 < 8 ? 255 : 0;
-    assert_int_equal(base_file_write_line("s.pbrt", "Film \"rgb\" \"integer xresolution\" 24 \"integer yresolution\" 9 "
-                                                    "\"float cropwindow\" [ 0.25 1 0 0.5 ] \"float maxcomponentvalue\" 40\n"
-                                                    "PixelFilter \"triangle\" \"float yradius\" 1.5 Integrator \"path\" \"integer maxdepth\" 7\n"
-                                                    "Sampler \"independent\" Camera \"perspective\" WorldBegin Include \"i.pbrt\"", &err), 0);
+    assert_int_equal(
+        base_file_write_line("s.pbrt",
+                             "Film \"rgb\" \"integer xresolution\" 24 \"integer yresolution\" 9 "
+                             "\"float cropwindow\" [ 0.25 1 0 0.5 ] \"float maxcomponentvalue\" 40\n"
+                             "PixelFilter \"triangle\" \"float yradius\" 1.5 Integrator \"path\" \"integer maxdepth\" 7\n"
+                             "Sampler \"independent\" Camera \"perspective\" WorldBegin Include \"i.pbrt\"",
+                             &err),
+        0);
     assert_int_equal(base_file_write_line("i.pbrt", "Material \"hair\" Shape \"sphere\" \"float radius\" 5", &err), 0);
     assert_int_equal(base_file_write_line("bad.pbrt", "WorldBegin Include \"missing.pbrt\"", &err), 0);
     assert_int_equal(base_png_write("mask.png", 24, 9, 1, grey, &err), 0);
@@ -157,14 +185,19 @@ static void print_render(FILE *out, const struct pt_session *s)
 {
     const struct pt_render_config *c = &s->render->config;
     const struct pt_integrator *i = &c->integrator;
-    fprintf(out, "%dx%d crop %d %d %d %d block %dx%d spp %llu to %llu%s budget %g overhead %g seam %g planes %u order %u pilot %llu %g\n", c->width,
-            c->height, c->crop[0], c->crop[1], c->crop[2], c->crop[3], c->block_width, c->block_height, (unsigned long long)c->spp_min,
-            (unsigned long long)c->spp_max, c->uniform ? " everywhere" : "", c->time_budget_s, c->max_check_overhead, c->max_seam, c->planes,
-            c->order_seed, (unsigned long long)c->pilot_spp, c->pilot_s);
-    fprintf(out, "depth %d rr %d sampler %d strategy %d filter %d %g %g sigma %g clamp %g seed %u aux %d\n", i->max_depth, i->rr_depth, i->sampler,
-            i->strategy, i->filter, (double)i->filter_x, (double)i->filter_y, (double)i->filter_sigma, (double)i->max_component, i->seed, i->want_aux);
-    fprintf(out, "threads %d kernel %s effects %x output %s criterion %s", base_threads_count(s->threads), s->kernel_name, s->scene->effects,
-            s->cli.output ? s->cli.output : "none", s->criterion ? lull_host_table(s->criterion)->id : "none");
+    fprintf(out,
+            "%dx%d crop %d %d %d %d block %dx%d spp %llu to %llu%s budget %g overhead %g seam %g planes %u order %u pilot "
+            "%llu %g\n",
+            c->width, c->height, c->crop[0], c->crop[1], c->crop[2], c->crop[3], c->block_width, c->block_height,
+            (unsigned long long)c->spp_min, (unsigned long long)c->spp_max, c->uniform ? " everywhere" : "",
+            c->time_budget_s, c->max_check_overhead, c->max_seam, c->planes, c->order_seed, (unsigned long long)c->pilot_spp,
+            c->pilot_s);
+    fprintf(out, "depth %d rr %d sampler %d strategy %d filter %d %g %g sigma %g clamp %g seed %u aux %d\n", i->max_depth,
+            i->rr_depth, i->sampler, i->strategy, i->filter, (double)i->filter_x, (double)i->filter_y,
+            (double)i->filter_sigma, (double)i->max_component, i->seed, i->want_aux);
+    fprintf(out, "threads %d kernel %s effects %x output %s criterion %s", base_threads_count(s->threads), s->kernel_name,
+            s->scene->effects, s->cli.output ? s->cli.output : "none",
+            s->criterion ? lull_host_table(s->criterion)->id : "none");
     for (uint32_t k = 0; s->criterion && k < s->render->blocks->count; k++)
         fprintf(out, " %d", (int)s->render->blocks->list[k].step);
     fprintf(out, "\n");
@@ -304,17 +337,30 @@ static struct lull_host_criterion *criterion;
 
 static void fill_row(struct pt_quote_row *row, int k, double visible)
 {
-    *row = (struct pt_quote_row){.visible = visible, .name = (const char *const[]){"draft", "as asked", "final"}[k], .asked = k == 1, .blocks = answers[k], .said = said[k], .spp_min = 12.4 + k,
-                                 .spp_mean = 1234.6 * (k + 1), .spp_max = 99999.5 * (k + 1), .spp_mean_low = 1000 + k, .spp_mean_high = 2000 + k,
-                                 .thread_s = 40 + k, .thread_low_s = 30 + k, .thread_high_s = 60 + k, .against_uniform = 0.25 * (k + 1),
-                                 .unmet = (uint32_t)k, .capped = k == 2 ? 5 : 0};
+    *row = (struct pt_quote_row){.visible = visible,
+                                 .name = (const char *const[]){"draft", "as asked", "final"}[k],
+                                 .asked = k == 1,
+                                 .blocks = answers[k],
+                                 .said = said[k],
+                                 .spp_min = 12.4 + k,
+                                 .spp_mean = 1234.6 * (k + 1),
+                                 .spp_max = 99999.5 * (k + 1),
+                                 .spp_mean_low = 1000 + k,
+                                 .spp_mean_high = 2000 + k,
+                                 .thread_s = 40 + k,
+                                 .thread_low_s = 30 + k,
+                                 .thread_high_s = 60 + k,
+                                 .against_uniform = 0.25 * (k + 1),
+                                 .unmet = (uint32_t)k,
+                                 .capped = k == 2 ? 5 : 0};
     const double walls[3][3] = {{9.94, 0.04, 9.96}, {99.4, 99.6, 9.96 * 60}, {99.4 * 60, 99.6 * 60, 123456}};
     row->wall_s = walls[k][0];
     row->wall_low_s = walls[k][1];
     row->wall_high_s = walls[k][2];
     for (int i = 0; i < 7; i++) {
         static const double share[7] = {3, 9, 1, 7, 5, 9, 2};
-        answers[k][i] = (struct pt_quote_block){{100.0 * (i + 1) + k, 90.0 * (i + 1), 12345.0 * (i + 1), i != 2}, share[i], share[i] / 2, share[i] * 2};
+        answers[k][i] = (struct pt_quote_block){
+            {100.0 * (i + 1) + k, 90.0 * (i + 1), 12345.0 * (i + 1), i != 2}, share[i], share[i] / 2, share[i] * 2};
         said[k][i].unmet = k > 0 && i < 2 * k;
     }
 }
@@ -323,20 +369,32 @@ static int set_up_quote(void **state)
 {
     (void)state;
     struct base_err err = {0};
-    const struct pt_render_config config = {.width = 24, .height = 9, .block_width = 8, .block_height = 4,
+    const struct pt_render_config config = {.width = 24,
+                                            .height = 9,
+                                            .block_width = 8,
+                                            .block_height = 4,
                                             .integrator = {.max_depth = 2, .rr_depth = 9, .max_component = INFINITY}};
-    scene = text_scene("Film \"rgb\" \"integer xresolution\" 24 \"integer yresolution\" 9 Camera \"perspective\" WorldBegin\n"
-                       "Shape \"sphere\" \"float radius\" 5", NULL, NULL);
+    scene =
+        text_scene("Film \"rgb\" \"integer xresolution\" 24 \"integer yresolution\" 9 Camera \"perspective\" WorldBegin\n"
+                   "Shape \"sphere\" \"float radius\" 5",
+                   NULL, NULL);
     pool = base_threads_create(2, &err);
     struct lull_rect layout[7];
     for (int i = 0; i < 7; i++)
         layout[i] = (struct lull_rect){i % 3 * 8, i / 3 * 4, i % 3 * 8 + 8, i < 6 ? i / 3 * 4 + 4 : 9};
-    const struct lull_host_config laid = {.struct_size = sizeof laid, .width = 24, .height = 9, .layout = layout, .layout_count = 7,
-                                          .layout_stride = sizeof layout[0], .spp_min = 1, .spp_max = 1000};
+    const struct lull_host_config laid = {.struct_size = sizeof laid,
+                                          .width = 24,
+                                          .height = 9,
+                                          .layout = layout,
+                                          .layout_count = 7,
+                                          .layout_stride = sizeof layout[0],
+                                          .spp_min = 1,
+                                          .spp_max = 1000};
     struct lull_host_frame *frame;
     table = *pt_fake_criterion();
     table.id = "law";
-    if (lull_host_create(NULL, &table, NULL, 0, &criterion, NULL) != LULL_OK || lull_host_begin(&laid, criterion, &frame, NULL) != LULL_OK)
+    if (lull_host_create(NULL, &table, NULL, 0, &criterion, NULL) != LULL_OK ||
+        lull_host_begin(&laid, criterion, &frame, NULL) != LULL_OK)
         return -1;
     list = lull_host_blocks_of(frame)->list;
     for (int i = 0; i < 7; i++) {
@@ -344,9 +402,16 @@ static int set_up_quote(void **state)
         list[i].spp = i == 3 ? 0 : 16u + (uint32_t)i;
         list[i].thread_s = i == 3 ? 0 : 0.001 * (i + 1);
     }
-    render = (struct pt_render){.config = config, .scene = scene, .threads = pool, .criterion = criterion, .busy_threads = 1.84,
-                                .film = {.x1 = 24, .y1 = 9, .pixels = 200, .bytes = 34567890, .color = black, .dropped = no_drops},
-                                .frame = frame, .blocks = lull_host_blocks_of(frame), .totals = lull_host_totals_of(frame)};
+    render = (struct pt_render){
+        .config = config,
+        .scene = scene,
+        .threads = pool,
+        .criterion = criterion,
+        .busy_threads = 1.84,
+        .film = {.x1 = 24, .y1 = 9, .pixels = 200, .bytes = 34567890, .color = black, .dropped = no_drops},
+        .frame = frame,
+        .blocks = lull_host_blocks_of(frame),
+        .totals = lull_host_totals_of(frame)};
     render.totals->samples = 4321;
     render.totals->render_s = 50.5;
     render.totals->criterion_s = 60.75;
@@ -373,7 +438,10 @@ static char *tell_quote(struct pt_approve_case *c)
     char *text = NULL;
     size_t size;
     struct base_err err = {0};
-    const struct pt_quote_info info = {.scene = "dir/a.pbrt", .scene_bytes = 98765432, .load_s = 12.3456, .interrupted = strstr(c->text, "interrupted") != NULL};
+    const struct pt_quote_info info = {.scene = "dir/a.pbrt",
+                                       .scene_bytes = 98765432,
+                                       .load_s = 12.3456,
+                                       .interrupted = strstr(c->text, "interrupted") != NULL};
     FILE *out = open_memstream(&text, &size);
     assert_non_null(out);
     quote.rows[1].unknown = strstr(c->text, "unknown") ? 2 : 0;
@@ -401,7 +469,8 @@ static void quotes(void **state)
 static char *written[3];
 static int write_count, fails_until;
 
-static int write_nothing(const char *path, const struct pt_render *r, const struct pt_output_info *info_of, struct base_err *err)
+static int write_nothing(const char *path, const struct pt_render *r, const struct pt_output_info *info_of,
+                         struct base_err *err)
 {
     (void)r;
     (void)info_of;
@@ -464,9 +533,11 @@ static void the_last_line(void **state)
     tell_summary(&s);
     render.totals->dropped = 0;
     tell_summary(&s);
-    assert_string_equal(heard_on(stderr), "lull-render: 22 spp on average, 111.2 s, 2.44 Mpaths/s, criterion 54.6 %; blocks: 3 criterion 2 spp-max 2 dropped\n"
-                                          "lull-render: 12 samples were not finite and were dropped, the first seen at --debug-path 7,8,9\n"
-                                          "lull-render: 12 samples were not finite and were dropped, the first seen at --debug-path 7,8,9\n");
+    assert_string_equal(
+        heard_on(stderr),
+        "lull-render: 22 spp on average, 111.2 s, 2.44 Mpaths/s, criterion 54.6 %; blocks: 3 criterion 2 spp-max 2 dropped\n"
+        "lull-render: 12 samples were not finite and were dropped, the first seen at --debug-path 7,8,9\n"
+        "lull-render: 12 samples were not finite and were dropped, the first seen at --debug-path 7,8,9\n");
     for (int i = 0; i < 7; i++)
         list[i].reason = LULL_REASON_NONE;
 }
@@ -492,7 +563,9 @@ static void between_two_slices(void **state)
     assert_int_equal(pt_action_after_slice(&s, &render, &err), 0);
     double after_s = base_clock_wall_s();
     assert_true(s.checkpoint_at_s >= before_s + 1000 && s.checkpoint_at_s <= after_s + 1000);
-    assert_string_equal(heard_on(stderr), "lull-render: no checkpoint, the render goes on: /missing/c: cannot write there: No such file or directory\n");
+    assert_string_equal(
+        heard_on(stderr),
+        "lull-render: no checkpoint, the render goes on: /missing/c: cannot write there: No such file or directory\n");
     assert_int_equal(pt_action_suspend(&s, &render, &err), BASE_EIO);
     s.cli.checkpoint = NULL;
     assert_int_equal(pt_action_suspend(&s, &render, &err), 0);
@@ -524,7 +597,10 @@ static char *explain_it(struct pt_approve_case *c)
     char *text = strdup(heard_on(stdout)), *time = strstr(text, "time: "), *end = time ? strchr(time, '\n') : NULL;
     double us, ratio;
     assert_non_null(end);
-    assert_int_equal(sscanf(time, "time: %lf us per path and thread; the general kernel takes %lf times as long for the same image", &us, &ratio), 2);
+    assert_int_equal(
+        sscanf(time, "time: %lf us per path and thread; the general kernel takes %lf times as long for the same image", &us,
+               &ratio),
+        2);
     assert_true(us > 0 && ratio > 0);
     memmove(time + 6, end, strlen(end) + 1);
     pt_scene_destroy(s);
@@ -573,23 +649,27 @@ static void durations_and_thousands(void **state)
     static const struct {
         double s;
         const char *words;
-    } times[] = {{0, "0.0 s"}, {9.94, "9.9 s"}, {9.95, "10 s"}, {99.4, "99 s"}, {99.5, "1.7 min"}, {9.94 * 60, "9.9 min"}, {9.95 * 60, "10 min"},
-                 {99.4 * 60, "99 min"}, {99.5 * 60, "1.7 h"}, {36000, "10.0 h"}};
+    } times[] = {{0, "0.0 s"},         {9.94, "9.9 s"},        {9.95, "10 s"},        {99.4, "99 s"},
+                 {99.5, "1.7 min"},    {9.94 * 60, "9.9 min"}, {9.95 * 60, "10 min"}, {99.4 * 60, "99 min"},
+                 {99.5 * 60, "1.7 h"}, {36000, "10.0 h"}};
     for (size_t i = 0; i < sizeof times / sizeof times[0]; i++)
         assert_string_equal(duration(times[i].s, text), times[i].words);
     static const struct {
         double value;
         int more;
         const char *words;
-    } numbers[] = {{0, 0, "0"}, {999.4, 0, "999"}, {1000, 0, "1,000"}, {999999, 1, "999,999+"}, {1234567, 0, "1,234,567"}, {12, 1, "12+"}};
+    } numbers[] = {{0, 0, "0"},   {999.4, 0, "999"}, {1000, 0, "1,000"}, {999999, 1, "999,999+"}, {1234567, 0, "1,234,567"},
+                   {12, 1, "12+"}};
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)
         assert_string_equal(thousands(numbers[i].value, numbers[i].more, text), numbers[i].words);
 }
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(command_lines), cmocka_unit_test(renders), cmocka_unit_test(words_on_the_way), cmocka_unit_test(quotes),
-                                       cmocka_unit_test(outputs_are_kept), cmocka_unit_test(the_last_line), cmocka_unit_test(between_two_slices),
-                                       cmocka_unit_test(explanations), cmocka_unit_test(quotes_as_pictures), cmocka_unit_test(durations_and_thousands)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(command_lines),      cmocka_unit_test(renders),
+                                       cmocka_unit_test(words_on_the_way),   cmocka_unit_test(quotes),
+                                       cmocka_unit_test(outputs_are_kept),   cmocka_unit_test(the_last_line),
+                                       cmocka_unit_test(between_two_slices), cmocka_unit_test(explanations),
+                                       cmocka_unit_test(quotes_as_pictures), cmocka_unit_test(durations_and_thousands)};
     return cmocka_run_group_tests(tests, set_up_quote, tear_down_quote);
 }

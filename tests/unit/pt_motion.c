@@ -54,16 +54,21 @@ static struct pt_mat34 matrix_at(const struct way *w, double t)
 /* Every combination of axis, first angle and turn: all cases of the conversion to quaternions, near and far apart. */
 static int next_way(int *k, struct way *w)
 {
-    static const double axes[][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0.2, -0.1}, {0.1, 1, 0.2}, {-0.2, 0.1, 1}, {1, 1, 1}};
+    static const double axes[][3] = {{1, 0, 0},     {0, 1, 0},      {0, 0, 1}, {1, 0.2, -0.1},
+                                     {0.1, 1, 0.2}, {-0.2, 0.1, 1}, {1, 1, 1}};
     static const double first[] = {0, 0.3, 1.9, 2.6, 3.0, -2.8}, turn[] = {0, 0.028, 0.4, 1.5, 3.0};
     int a = *k % 7, f = *k / 7 % 6, t = *k / 42;
     if (t >= 5)
         return 0;
     ++*k;
-    *w = (struct way){{axes[a][0], axes[a][1], axes[a][2]}, {first[f], first[f] + turn[t]}, {{0.5, -1, 2}, {1.5, 2, 1}},
+    *w = (struct way){{axes[a][0], axes[a][1], axes[a][2]},
+                      {first[f], first[f] + turn[t]},
+                      {{0.5, -1, 2}, {1.5, 2, 1}},
                       {{1, 0, 0, 1, 0, 1}, {1, 0, 0, 1, 0, 1}}};
     if (*k % 2)
-        *w = (struct way){{axes[a][0], axes[a][1], axes[a][2]}, {first[f], first[f] + turn[t]}, {{0.5, -1, 2}, {1.5, 2, 1}},
+        *w = (struct way){{axes[a][0], axes[a][1], axes[a][2]},
+                          {first[f], first[f] + turn[t]},
+                          {{0.5, -1, 2}, {1.5, 2, 1}},
                           {{2, 0.3, -0.2, 1.5, 0.1, 1}, {1, -0.3, 0.2, 0.5, -0.1, 1.25}}};
     return 1;
 }

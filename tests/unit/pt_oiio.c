@@ -136,7 +136,8 @@ static void check_exr_header(exr_context_t file, int count)
     assert_int_equal(channels->num_channels, count);
     for (int i = 0; i < count; i++) {
         const exr_attr_chlist_entry_t *e = &channels->entries[i];
-        assert_true(e->pixel_type == EXR_PIXEL_FLOAT && e->p_linear == EXR_PERCEPTUALLY_LINEAR && e->x_sampling == 1 && e->y_sampling == 1);
+        assert_true(e->pixel_type == EXR_PIXEL_FLOAT && e->p_linear == EXR_PERCEPTUALLY_LINEAR && e->x_sampling == 1 &&
+                    e->y_sampling == 1);
     }
     assert_int_equal(exr_get_compression(file, 0, &compression), EXR_ERR_SUCCESS);
     assert_int_equal(exr_get_lineorder(file, 0, &order), EXR_ERR_SUCCESS);
@@ -191,7 +192,8 @@ static void exr_channels(void **state)
         snprintf(renamed, sizeof renamed, "%s.exr", path);
         assert_int_equal(rename(path, renamed), 0);
         assert_int_equal(pt_oiio_read(renamed, &read, &err), 0);
-        assert_true(read.width == 3 && read.height == 37 && read.channels == (count < 4 ? count : 4) && read.is_float_file && !read.u8);
+        assert_true(read.width == 3 && read.height == 37 && read.channels == (count < 4 ? count : 4) && read.is_float_file &&
+                    !read.u8);
         for (int i = 0; i < 3 * 37 * read.channels; i++) {
             int place = i % read.channels, wanted = 0; /* the file sorts by name: which of ours is the place-th */
             for (int c = 0; c < count; c++) {
@@ -269,7 +271,9 @@ static size_t map_of_blocks(const char *words, char *out)
     char unit[16];
     int used;
     assert_int_equal(sscanf(words, "%d %d %d %d %15s%n", &blocks.x0, &blocks.y0, &blocks.x1, &blocks.y1, unit, &used), 5);
-    for (words += used; sscanf(words, " %d,%d,%d,%d=%lf%n", &b->x0, &b->y0, &b->x1, &b->y1, &values[blocks.count], &used) == 5; words += used, b++)
+    for (words += used;
+         sscanf(words, " %d,%d,%d,%d=%lf%n", &b->x0, &b->y0, &b->x1, &b->y1, &values[blocks.count], &used) == 5;
+         words += used, b++)
         blocks.count++;
     assert_int_equal(lull_host_paint(&blocks, values, unit, &map, NULL), LULL_OK);
     size_t n = (size_t)sprintf(out, " %d x %d\n", map.width, map.height), stride = 3 * (size_t)map.width;
@@ -307,7 +311,8 @@ static void drawings(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(drawings), cmocka_unit_test(exr_channels), cmocka_unit_test(png_round_trip), cmocka_unit_test(png_of_many_sizes),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(drawings), cmocka_unit_test(exr_channels),
+                                       cmocka_unit_test(png_round_trip), cmocka_unit_test(png_of_many_sizes),
                                        cmocka_unit_test(refusals)};
     return cmocka_run_group_tests(tests, make_dir, remove_dir);
 }

@@ -45,18 +45,23 @@ static void film_filter_and_sampler(void **state)
         {"WorldBegin", 1280, 720, 16, PT_SAMPLER_SOBOL, PT_FILTER_GAUSSIAN, 1.5, 1.5, 0.5, 1},
         {V3, 640, 480, 16, PT_SAMPLER_SOBOL, PT_FILTER_BOX, 0.5, 0.5, 0.5, 1},
         {"PixelFilter \"gaussian\" " V3, 640, 480, 16, PT_SAMPLER_SOBOL, PT_FILTER_GAUSSIAN, 2, 2, 0.5, 1},
-        {"PixelFilter \"gaussian\" \"float alpha\" 8 \"float ywidth\" 3 " V3, 640, 480, 16, PT_SAMPLER_SOBOL, PT_FILTER_GAUSSIAN, 2, 3, 0.25, 1},
-        {"PixelFilter \"gaussian\" \"float xradius\" 2.5 \"float sigma\" 0.7 WorldBegin", 1280, 720, 16, PT_SAMPLER_SOBOL, PT_FILTER_GAUSSIAN, 2.5,
-         1.5, 0.7, 1},
-        {"PixelFilter \"triangle\" \"float yradius\" 1 WorldBegin", 1280, 720, 16, PT_SAMPLER_SOBOL, PT_FILTER_TRIANGLE, 2, 1, 0.5, 1},
-        {"PixelFilter \"mitchell\" \"float B\" 0.3 \"float C\" 0.3 WorldBegin", 1280, 720, 16, PT_SAMPLER_SOBOL, PT_FILTER_GAUSSIAN, 2, 2, 0.5, 1},
-        {"PixelFilter \"sinc\" \"float tau\" 3 WorldBegin", 1280, 720, 16, PT_SAMPLER_SOBOL, PT_FILTER_GAUSSIAN, 2, 2, 0.5, 1},
+        {"PixelFilter \"gaussian\" \"float alpha\" 8 \"float ywidth\" 3 " V3, 640, 480, 16, PT_SAMPLER_SOBOL,
+         PT_FILTER_GAUSSIAN, 2, 3, 0.25, 1},
+        {"PixelFilter \"gaussian\" \"float xradius\" 2.5 \"float sigma\" 0.7 WorldBegin", 1280, 720, 16, PT_SAMPLER_SOBOL,
+         PT_FILTER_GAUSSIAN, 2.5, 1.5, 0.7, 1},
+        {"PixelFilter \"triangle\" \"float yradius\" 1 WorldBegin", 1280, 720, 16, PT_SAMPLER_SOBOL, PT_FILTER_TRIANGLE, 2,
+         1, 0.5, 1},
+        {"PixelFilter \"mitchell\" \"float B\" 0.3 \"float C\" 0.3 WorldBegin", 1280, 720, 16, PT_SAMPLER_SOBOL,
+         PT_FILTER_GAUSSIAN, 2, 2, 0.5, 1},
+        {"PixelFilter \"sinc\" \"float tau\" 3 WorldBegin", 1280, 720, 16, PT_SAMPLER_SOBOL, PT_FILTER_GAUSSIAN, 2, 2, 0.5,
+         1},
         {"Sampler \"stratified\" WorldBegin", 1280, 720, 16, PT_SAMPLER_SOBOL, PT_FILTER_GAUSSIAN, 1.5, 1.5, 0.5, 1},
-        {"Sampler \"stratified\" \"integer xsamples\" 3 \"integer ysamples\" 5 WorldBegin", 1280, 720, 15, PT_SAMPLER_SOBOL, PT_FILTER_GAUSSIAN,
-         1.5, 1.5, 0.5, 1},
-        {"Sampler \"random\" \"integer pixelsamples\" 9 WorldBegin", 1280, 720, 9, PT_SAMPLER_INDEPENDENT, PT_FILTER_GAUSSIAN, 1.5, 1.5, 0.5, 1},
-        {"Film \"rgb\" \"float iso\" 200 \"float exposuretime\" 0.25 \"float scale\" 7 WorldBegin", 1280, 720, 16, PT_SAMPLER_SOBOL,
-         PT_FILTER_GAUSSIAN, 1.5, 1.5, 0.5, 0.5},
+        {"Sampler \"stratified\" \"integer xsamples\" 3 \"integer ysamples\" 5 WorldBegin", 1280, 720, 15, PT_SAMPLER_SOBOL,
+         PT_FILTER_GAUSSIAN, 1.5, 1.5, 0.5, 1},
+        {"Sampler \"random\" \"integer pixelsamples\" 9 WorldBegin", 1280, 720, 9, PT_SAMPLER_INDEPENDENT,
+         PT_FILTER_GAUSSIAN, 1.5, 1.5, 0.5, 1},
+        {"Film \"rgb\" \"float iso\" 200 \"float exposuretime\" 0.25 \"float scale\" 7 WorldBegin", 1280, 720, 16,
+         PT_SAMPLER_SOBOL, PT_FILTER_GAUSSIAN, 1.5, 1.5, 0.5, 0.5},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         struct pt_scene_defaults d;
@@ -76,8 +81,10 @@ static void film_filter_and_sampler(void **state)
         pt_scene_destroy(s);
     }
     struct pt_scene_defaults d;
-    pt_scene_destroy(text_scene("Film \"image\" \"float maxsampleluminance\" 12 \"string filename\" \"x.exr\" Sampler \"halton\" \"integer seed\" 77 "
-                                "Integrator \"path\" \"integer maxdepth\" -1 WorldBegin", &d, NULL));
+    pt_scene_destroy(text_scene("Film \"image\" \"float maxsampleluminance\" 12 \"string filename\" \"x.exr\" Sampler "
+                                "\"halton\" \"integer seed\" 77 "
+                                "Integrator \"path\" \"integer maxdepth\" -1 WorldBegin",
+                                &d, NULL));
     assert_true(d.integrator.max_component == 12 && d.integrator.seed == 77 && d.integrator.max_depth == -1);
     assert_string_equal(d.film_path, "x.exr");
 }
@@ -85,14 +92,16 @@ static void film_filter_and_sampler(void **state)
 static void camera(void **state)
 {
     (void)state;
-    struct pt_scene *s = text_scene("Film \"rgb\" \"integer xresolution\" 30 \"integer yresolution\" 60 WorldBegin", NULL, NULL);
+    struct pt_scene *s =
+        text_scene("Film \"rgb\" \"integer xresolution\" 30 \"integer yresolution\" 60 WorldBegin", NULL, NULL);
     const struct pt_camera *c = &s->camera;
     assert_true(c->kind == PT_CAMERA_PERSPECTIVE && c->fov_deg == 90 && c->lens_radius == 0 && c->focal_distance == 1e6f);
     assert_true(c->screen[0] == -1 && c->screen[1] == 1 && c->screen[2] == -2 && c->screen[3] == 2);
     assert_true(!c->animated && c->medium == -1);
     pt_scene_destroy(s);
     s = text_scene("Film \"rgb\" \"integer xresolution\" 30 \"integer yresolution\" 60 "
-                   "Camera \"orthographic\" \"float screenwindow\" [ -3 4 -5 6 ] \"float lensradius\" 2 \"float focaldistance\" 7 WorldBegin",
+                   "Camera \"orthographic\" \"float screenwindow\" [ -3 4 -5 6 ] \"float lensradius\" 2 \"float "
+                   "focaldistance\" 7 WorldBegin",
                    NULL, NULL);
     c = &s->camera;
     assert_true(c->kind == PT_CAMERA_ORTHOGRAPHIC && c->fov_deg == 0 && c->lens_radius == 2 && c->focal_distance == 7);
@@ -109,7 +118,8 @@ static void lights(void **state)
     struct pt_scene *s = world_scene(
         "LightSource \"point\" LightSource \"spot\" LightSource \"distant\" LightSource \"infinite\"\n"
         "LightSource \"spot\" \"float coneangle\" 60 \"float conedeltaangle\" 20 \"float power\" 10 \"rgb I\" [ 2 2 2 ]\n"
-        "LightSource \"spot\" \"float conedeltaangle\" 0 \"float coneangle\" 0.001 LightSource \"spot\" \"float conedeltaangle\" 180 \"float coneangle\" 180\n"
+        "LightSource \"spot\" \"float conedeltaangle\" 0 \"float coneangle\" 0.001 LightSource \"spot\" \"float "
+        "conedeltaangle\" 180 \"float coneangle\" 180\n"
         "LightSource \"distant\" \"rgb L\" [ 1 2 3 ] \"float illuminance\" 5 \"float scale\" 2\n"
         "LightSource \"infinite\" \"rgb L\" [ 3 3 3 ] \"float illuminance\" 6\n"
         "LightSource \"point\" \"rgb I\" [ 1 2 4 ] \"rgb scale\" [ 3 2 1 ] \"float power\" 8\n"
@@ -168,7 +178,8 @@ static void environment_map(void **state)
 {
     (void)state;
     /* display codes 0, 128 and 255 of a PNG are linear light 0, 0.2159 and 1; grey images are grey */
-    static const uint8_t wide[] = {0, 128, 255, 255, 128, 0, 128, 128, 128, 0, 0, 0, 10, 10, 10, 255, 255, 255, 1, 2, 3, 128, 0, 255};
+    static const uint8_t wide[] = {0,  128, 255, 255, 128, 0,   128, 128, 128, 0,   0, 0,
+                                   10, 10,  10,  255, 255, 255, 1,   2,   3,   128, 0, 255};
     static const uint8_t grey[] = {128, 0, 255, 10};
     char dir[] = "/tmp/pt_parameters_XXXXXX", path[64], file[64], text[256];
     struct base_err err = {0};
@@ -176,7 +187,8 @@ static void environment_map(void **state)
     for (int k = 0; k < 2; k++) {
         snprintf(path, sizeof path, "%s/%d.png", dir, k);
         assert_int_equal(k ? base_png_write(path, 2, 2, 1, grey, &err) : base_png_write(path, 4, 2, 3, wide, &err), 0);
-        snprintf(text, sizeof text, "WorldBegin LightSource \"infinite\" \"string filename\" \"%d.png\" \"float scale\" 3", k);
+        snprintf(text, sizeof text, "WorldBegin LightSource \"infinite\" \"string filename\" \"%d.png\" \"float scale\" 3",
+                 k);
         snprintf(file, sizeof file, "%s/s.pbrt", dir);
         assert_int_equal(base_file_write_line(file, text, &err), 0);
         struct pt_scene *s = NULL;
@@ -205,11 +217,13 @@ static void environment_map(void **state)
 static void media(void **state)
 {
     (void)state;
-    struct pt_scene *s = world_scene(
-        "MakeNamedMedium \"milk\" MakeNamedMedium \"skin\" \"string preset\" \"Skin2\" \"float scale\" 2 \"float g\" -0.9999\n"
-        "MakeNamedMedium \"grid\" \"string type\" \"uniformgrid\" \"float density\" 5\n"
-        "MakeNamedMedium \"fire\" \"rgb sigma_a\" [ 1 2 3 ] \"rgb sigma_s\" [ 4 5 6 ] \"float scale\" 0.5 \"rgb Le\" [ 2 2 1 ] \"float Lescale\" 3\n"
-        "MediumInterface \"milk\" \"skin\" Shape \"sphere\" MediumInterface \"grid\" \"fire\" Shape \"sphere\"");
+    struct pt_scene *s =
+        world_scene("MakeNamedMedium \"milk\" MakeNamedMedium \"skin\" \"string preset\" \"Skin2\" \"float scale\" 2 "
+                    "\"float g\" -0.9999\n"
+                    "MakeNamedMedium \"grid\" \"string type\" \"uniformgrid\" \"float density\" 5\n"
+                    "MakeNamedMedium \"fire\" \"rgb sigma_a\" [ 1 2 3 ] \"rgb sigma_s\" [ 4 5 6 ] \"float scale\" 0.5 \"rgb "
+                    "Le\" [ 2 2 1 ] \"float Lescale\" 3\n"
+                    "MediumInterface \"milk\" \"skin\" Shape \"sphere\" MediumInterface \"grid\" \"fire\" Shape \"sphere\"");
     const struct pt_medium *m = s->media;
     near3(m[0].sigma_a, 0.0011, 0.0024, 0.014);
     near3(m[0].sigma_s, 2.55, 3.21, 3.77);
@@ -233,13 +247,14 @@ static void media_by_name(void **state)
     static const struct {
         const char *name;
         double s[3], a[3];
-    } table[] = {{"Apple", {2.29, 2.39, 1.97}, {0.0030, 0.0034, 0.046}},      {"Chicken1", {0.15, 0.21, 0.38}, {0.015, 0.077, 0.19}},
-                 {"Chicken2", {0.19, 0.25, 0.32}, {0.018, 0.088, 0.20}},      {"Cream", {7.38, 5.47, 3.15}, {0.0002, 0.0028, 0.0163}},
-                 {"Ketchup", {0.18, 0.07, 0.03}, {0.061, 0.97, 1.45}},        {"Marble", {2.19, 2.62, 3.00}, {0.0021, 0.0041, 0.0071}},
-                 {"Potato", {0.68, 0.70, 0.55}, {0.0024, 0.0090, 0.12}},      {"Skimmilk", {0.70, 1.22, 1.90}, {0.0014, 0.0025, 0.0142}},
-                 {"Skin1", {0.74, 0.88, 1.01}, {0.032, 0.17, 0.48}},          {"Skin2", {1.09, 1.59, 1.79}, {0.013, 0.070, 0.145}},
-                 {"Spectralon", {11.6, 20.4, 14.9}, {0, 0, 0}},               {"Wholemilk", {2.55, 3.21, 3.77}, {0.0011, 0.0024, 0.014}},
-                 {"unknown", {2.55, 3.21, 3.77}, {0.0011, 0.0024, 0.014}}};
+    } table[] = {
+        {"Apple", {2.29, 2.39, 1.97}, {0.0030, 0.0034, 0.046}},  {"Chicken1", {0.15, 0.21, 0.38}, {0.015, 0.077, 0.19}},
+        {"Chicken2", {0.19, 0.25, 0.32}, {0.018, 0.088, 0.20}},  {"Cream", {7.38, 5.47, 3.15}, {0.0002, 0.0028, 0.0163}},
+        {"Ketchup", {0.18, 0.07, 0.03}, {0.061, 0.97, 1.45}},    {"Marble", {2.19, 2.62, 3.00}, {0.0021, 0.0041, 0.0071}},
+        {"Potato", {0.68, 0.70, 0.55}, {0.0024, 0.0090, 0.12}},  {"Skimmilk", {0.70, 1.22, 1.90}, {0.0014, 0.0025, 0.0142}},
+        {"Skin1", {0.74, 0.88, 1.01}, {0.032, 0.17, 0.48}},      {"Skin2", {1.09, 1.59, 1.79}, {0.013, 0.070, 0.145}},
+        {"Spectralon", {11.6, 20.4, 14.9}, {0, 0, 0}},           {"Wholemilk", {2.55, 3.21, 3.77}, {0.0011, 0.0024, 0.014}},
+        {"unknown", {2.55, 3.21, 3.77}, {0.0011, 0.0024, 0.014}}};
     for (size_t i = 0; i < sizeof table / sizeof table[0]; i++) {
         char text[160];
         int warnings = 0;
@@ -259,18 +274,25 @@ static void materials(void **state)
     struct pt_scene *s = world_scene(
         "MakeNamedMaterial \"a\" \"string type\" \"diffuse\" MakeNamedMaterial \"b\" \"string type\" \"coateddiffuse\"\n"
         "MakeNamedMaterial \"c\" \"string type\" \"conductor\" MakeNamedMaterial \"d\" \"string type\" \"dielectric\"\n"
-        "MakeNamedMaterial \"e\" \"string type\" \"thindielectric\" MakeNamedMaterial \"f\" \"string type\" \"diffusetransmission\"\n"
-        "MakeNamedMaterial \"g\" \"string type\" \"coatedconductor\" MakeNamedMaterial \"h\" \"string type\" \"mix\" \"string materials\" [ \"a\" \"b\" ]\n"
-        "MakeNamedMaterial \"i\" \"string type\" \"diffusetransmission\" \"rgb reflectance\" [ 0.1 0.2 0.3 ] \"float scale\" 2\n"
-        "MakeNamedMaterial \"j\" \"string type\" \"dielectric\" \"spectrum eta\" \"glass-F11\" \"float uroughness\" 0.2 \"float roughness\" 0.3\n"
+        "MakeNamedMaterial \"e\" \"string type\" \"thindielectric\" MakeNamedMaterial \"f\" \"string type\" "
+        "\"diffusetransmission\"\n"
+        "MakeNamedMaterial \"g\" \"string type\" \"coatedconductor\" MakeNamedMaterial \"h\" \"string type\" \"mix\" "
+        "\"string materials\" [ \"a\" \"b\" ]\n"
+        "MakeNamedMaterial \"i\" \"string type\" \"diffusetransmission\" \"rgb reflectance\" [ 0.1 0.2 0.3 ] \"float "
+        "scale\" 2\n"
+        "MakeNamedMaterial \"j\" \"string type\" \"dielectric\" \"spectrum eta\" \"glass-F11\" \"float uroughness\" 0.2 "
+        "\"float roughness\" 0.3\n"
         "MakeNamedMaterial \"k\" \"string type\" \"dielectric\" \"rgb eta\" [ 1.1 1.2 1.3 ]\n"
         "MakeNamedMaterial \"l\" \"string type\" \"dielectric\" \"spectrum eta\" [ 300 1.4 900 1.4 ]\n"
-        "MakeNamedMaterial \"m\" \"string type\" \"coatedconductor\" \"float interface.roughness\" 0.4 \"float conductor.vroughness\" 0.2 "
-        "\"float interface.eta\" 1.3 \"rgb reflectance\" [ 0.1 0.2 0.3 ] \"float thickness\" 0.5 \"float g\" 0.25 \"rgb albedo\" [ 0.1 0.2 0.3 ]\n"
+        "MakeNamedMaterial \"m\" \"string type\" \"coatedconductor\" \"float interface.roughness\" 0.4 \"float "
+        "conductor.vroughness\" 0.2 "
+        "\"float interface.eta\" 1.3 \"rgb reflectance\" [ 0.1 0.2 0.3 ] \"float thickness\" 0.5 \"float g\" 0.25 \"rgb "
+        "albedo\" [ 0.1 0.2 0.3 ]\n"
         "MakeNamedMaterial \"n\" \"string type\" \"dielectric\" \"float eta\" 1\n");
     const struct pt_material *m = s->materials;
-    static const int kinds[] = {PT_BSDF_DIFFUSE, PT_BSDF_COATED_DIFFUSE, PT_BSDF_CONDUCTOR, PT_BSDF_DIELECTRIC,
-                                PT_BSDF_THIN_DIELECTRIC, PT_BSDF_DIFFUSE_TRANSMISSION, PT_BSDF_COATED_CONDUCTOR};
+    static const int kinds[] = {PT_BSDF_DIFFUSE,         PT_BSDF_COATED_DIFFUSE,  PT_BSDF_CONDUCTOR,
+                                PT_BSDF_DIELECTRIC,      PT_BSDF_THIN_DIELECTRIC, PT_BSDF_DIFFUSE_TRANSMISSION,
+                                PT_BSDF_COATED_CONDUCTOR};
     for (int i = 0; i < 7; i++)
         assert_int_equal(m[i].kind, kinds[i]);
     near3(m[0].reflectance.value, 0.5, 0.5, 0.5);
@@ -297,7 +319,8 @@ static void materials(void **state)
     near((double)m[11].eta, 1.4, 1e-4);
     near((double)m[12].roughness_v.value.x, 0.4, 1e-6);
     assert_true(m[12].base_roughness_u.value.x == 0 && m[12].base_roughness_v.value.x == 0.2f);
-    assert_true(m[12].eta == 1.3f && m[12].conductor_by_colour && m[12].thickness.value.x == 0.5f && m[12].g.value.x == 0.25f);
+    assert_true(m[12].eta == 1.3f && m[12].conductor_by_colour && m[12].thickness.value.x == 0.5f &&
+                m[12].g.value.x == 0.25f);
     near3(m[12].albedo.value, 0.1, 0.2, 0.3);
     near3(m[12].reflectance.value, 0.1, 0.2, 0.3);
     assert_int_equal(m[13].kind, PT_MATERIAL_INTERFACE);
@@ -314,16 +337,20 @@ static double v3_alpha(double roughness)
 static void materials_of_version_3(void **state)
 {
     (void)state;
-    struct pt_scene *s = text_scene(V3
+    struct pt_scene *s = text_scene(
+        V3
         "MakeNamedMaterial \"a\" \"string type\" \"matte\" MakeNamedMaterial \"b\" \"string type\" \"plastic\"\n"
         "MakeNamedMaterial \"c\" \"string type\" \"substrate\" MakeNamedMaterial \"d\" \"string type\" \"uber\"\n"
         "MakeNamedMaterial \"e\" \"string type\" \"metal\" MakeNamedMaterial \"f\" \"string type\" \"mirror\"\n"
         "MakeNamedMaterial \"g\" \"string type\" \"shinymetal\" MakeNamedMaterial \"h\" \"string type\" \"glass\"\n"
-        "MakeNamedMaterial \"i\" \"string type\" \"translucent\" \"rgb Kd\" [ .8 .6 .4 ] \"rgb transmit\" [ .5 .25 1 ] \"rgb Ks\" [ 0 0 0 ]\n"
+        "MakeNamedMaterial \"i\" \"string type\" \"translucent\" \"rgb Kd\" [ .8 .6 .4 ] \"rgb transmit\" [ .5 .25 1 ] "
+        "\"rgb Ks\" [ 0 0 0 ]\n"
         "MakeNamedMaterial \"j\" \"string type\" \"plastic\" \"rgb Ks\" [ 0 0 0 ]\n"
         "MakeNamedMaterial \"k\" \"string type\" \"uber\" \"rgb Kd\" [ 0 0 0 ] \"rgb Kt\" [ 1 1 1 ] \"float index\" 1.25\n"
-        "MakeNamedMaterial \"l\" \"string type\" \"uber\" \"rgb Kd\" [ 0 0 0 ] \"rgb Ks\" [ 0 0 0 ] \"rgb Kr\" [ .1 .2 .3 ]\n"
-        "MakeNamedMaterial \"m\" \"string type\" \"glass\" \"float uroughness\" 0.2 \"float vroughness\" 0.05 \"float eta\" 1.7\n",
+        "MakeNamedMaterial \"l\" \"string type\" \"uber\" \"rgb Kd\" [ 0 0 0 ] \"rgb Ks\" [ 0 0 0 ] \"rgb Kr\" [ .1 .2 .3 "
+        "]\n"
+        "MakeNamedMaterial \"m\" \"string type\" \"glass\" \"float uroughness\" 0.2 \"float vroughness\" 0.05 \"float eta\" "
+        "1.7\n",
         NULL, NULL);
     const struct pt_material *m = s->materials;
     const double rough = v3_alpha(0.1);
@@ -358,17 +385,20 @@ static void materials_of_version_3(void **state)
 static void shapes(void **state)
 {
     (void)state;
-    struct pt_scene *s = world_scene("Shape \"sphere\" Shape \"disk\" Shape \"cylinder\" Shape \"sphere\" \"float radius\" 2 \"float zmin\" -9 "
-                                     "\"float zmax\" 1 \"float phimax\" 90 Shape \"disk\" \"float height\" 3\n"
-                                     "Shape \"trianglemesh\" \"point3 P\" [ 0 0 1  1 0 1  0 1 1 ] \"point2 uv\" [ 0 0 1 0 .5 1 ]\n"
-                                     "Shape \"trianglemesh\" \"point3 P\" [ 0 0 1  1 0 1  0 1 1 ] \"float st\" [ 0 0 1 0 .25 1 ]");
+    struct pt_scene *s = world_scene(
+        "Shape \"sphere\" Shape \"disk\" Shape \"cylinder\" Shape \"sphere\" \"float radius\" 2 \"float zmin\" -9 "
+        "\"float zmax\" 1 \"float phimax\" 90 Shape \"disk\" \"float height\" 3\n"
+        "Shape \"trianglemesh\" \"point3 P\" [ 0 0 1  1 0 1  0 1 1 ] \"point2 uv\" [ 0 0 1 0 .5 1 ]\n"
+        "Shape \"trianglemesh\" \"point3 P\" [ 0 0 1  1 0 1  0 1 1 ] \"float st\" [ 0 0 1 0 .25 1 ]");
     const struct pt_quadric *q = s->quadrics;
-    assert_true(q[0].radius == 1 && q[0].z_min == -1 && q[0].z_max == 1 && q[1].radius == 1 && q[1].inner_radius == 0 && q[1].z_min == 0);
+    assert_true(q[0].radius == 1 && q[0].z_min == -1 && q[0].z_max == 1 && q[1].radius == 1 && q[1].inner_radius == 0 &&
+                q[1].z_min == 0);
     assert_true(q[2].radius == 1 && q[2].z_min == -1 && q[2].z_max == 1);
     assert_true(q[3].z_min == -2 && q[3].z_max == 1 && q[4].z_min == 3);
     near((double)q[0].phi_max, 2 * pi, 1e-6);
     near((double)q[3].phi_max, pi / 2, 1e-6);
-    assert_true(s->meshes[0].triangle_count == 1 && s->meshes[0].has_uvs && s->meshes[0].vertices[2].u == 0.5f && s->meshes[1].vertices[2].u == 0.25f);
+    assert_true(s->meshes[0].triangle_count == 1 && s->meshes[0].has_uvs && s->meshes[0].vertices[2].u == 0.5f &&
+                s->meshes[1].vertices[2].u == 0.25f);
     near3(s->materials[s->shapes[0].material].reflectance.value, 0.5, 0.5, 0.5);
     pt_scene_destroy(s);
 }
@@ -384,16 +414,22 @@ static void read_over(void **state)
         {"Film \"rgb\" \"float diagonal\" 50 \"bool savefp16\" true \"string type\" \"x\" WorldBegin", 0},
         {"Film \"rgb\" \"string sensor\" \"cie1931\" \"float whitebalance\" 0 WorldBegin", 0},
         {"Sampler \"halton\" \"string randomization\" \"owen\" \"integer dimensions\" 4 \"bool jitter\" true WorldBegin", 0},
-        {"Integrator \"path\" \"string lightsampler\" \"bvh\" \"float rrthreshold\" 1 \"bool regularize\" false WorldBegin", 0},
+        {"Integrator \"path\" \"string lightsampler\" \"bvh\" \"float rrthreshold\" 1 \"bool regularize\" false WorldBegin",
+         0},
         {"WorldBegin LightSource \"point\" \"integer nsamples\" 4 \"integer samples\" 4", 0},
         {"WorldBegin AreaLightSource \"diffuse\" \"integer nsamples\" 4 \"integer samples\" 4", 0},
         {"WorldBegin Material \"coateddiffuse\" \"integer maxdepth\" 10 \"integer nsamples\" 1", 0},
         {"WorldBegin Material \"thindielectric\" \"float roughness\" 0 \"bool remaproughness\" true", 0},
         {"WorldBegin Material \"diffuse\" \"float sigma\" 0 \"string type\" \"diffuse\"", 0},
         {"WorldBegin MakeNamedMedium \"m\" \"float Lescale\" 2", 0},
-        {"WorldBegin MakeNamedMedium \"m\" \"string type\" \"uniformgrid\" \"float density\" 1 \"float temperaturescale\" 1", 0},
-        {"WorldBegin Shape \"trianglemesh\" \"point3 P\" [ 0 0 1  1 0 1  0 1 1 ] \"vector3 S\" [ 1 0 0 1 0 0 1 0 0 ] \"integer faceIndices\" 0", 0},
-        {"WorldBegin Shape \"curve\" \"point3 P\" [ 0 0 0 1 0 0 2 0 0 3 0 0 ] \"string type\" \"flat\" \"normal N\" [ 0 0 1 0 0 1 ] \"integer splitdepth\" 3", 1},
+        {"WorldBegin MakeNamedMedium \"m\" \"string type\" \"uniformgrid\" \"float density\" 1 \"float temperaturescale\" 1",
+         0},
+        {"WorldBegin Shape \"trianglemesh\" \"point3 P\" [ 0 0 1  1 0 1  0 1 1 ] \"vector3 S\" [ 1 0 0 1 0 0 1 0 0 ] "
+         "\"integer faceIndices\" 0",
+         0},
+        {"WorldBegin Shape \"curve\" \"point3 P\" [ 0 0 0 1 0 0 2 0 0 3 0 0 ] \"string type\" \"flat\" \"normal N\" [ 0 0 1 "
+         "0 0 1 ] \"integer splitdepth\" 3",
+         1},
         {V3 "Material \"mirror\" \"float roughness\" 0 \"bool remaproughness\" true", 0},
         {V3 "Material \"shinymetal\" \"rgb Ks\" [ 1 1 1 ]", 0},
     };
@@ -459,10 +495,12 @@ static void counted(void **state)
     struct pt_scene *s = world_scene(
         "Texture \"t\" \"spectrum\" \"checkerboard\" Material \"diffuse\" \"texture reflectance\" \"t\"\n"
         "Shape \"trianglemesh\" \"integer indices\" [ 0 1 2 0 2 3 ] \"point3 P\" [ 0 0 5 2 0 5 2 1 5 0 1 5 ]\n"
-        "Material \"conductor\" Shape \"trianglemesh\" \"point3 P\" [ 0 0 1  1 0 1  0 1 1 ] Shape \"sphere\" Shape \"disk\" Shape \"disk\"\n"
+        "Material \"conductor\" Shape \"trianglemesh\" \"point3 P\" [ 0 0 1  1 0 1  0 1 1 ] Shape \"sphere\" Shape \"disk\" "
+        "Shape \"disk\"\n"
         "ObjectBegin \"o\" Shape \"sphere\" ObjectEnd ObjectInstance \"o\" ObjectInstance \"o\" LightSource \"point\"");
     const struct pt_scene_stats *c = &s->stats;
-    assert_true(c->triangles == 3 && c->quadrics == 4 && c->instances == 2 && c->lights == 1 && c->materials == 2 && c->textures == 1);
+    assert_true(c->triangles == 3 && c->quadrics == 4 && c->instances == 2 && c->lights == 1 && c->materials == 2 &&
+                c->textures == 1);
     assert_true(c->bytes > 1000);
     pt_scene_destroy(s);
 }
@@ -489,10 +527,19 @@ static void times_add_up(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(film_filter_and_sampler), cmocka_unit_test(camera), cmocka_unit_test(lights), cmocka_unit_test(area_lights),
-        cmocka_unit_test(environment_map), cmocka_unit_test(media), cmocka_unit_test(media_by_name), cmocka_unit_test(materials),
-        cmocka_unit_test(materials_of_version_3),
-        cmocka_unit_test(shapes), cmocka_unit_test(read_over), cmocka_unit_test(ends_of_ranges), cmocka_unit_test(counted), cmocka_unit_test(times_add_up)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(film_filter_and_sampler),
+                                       cmocka_unit_test(camera),
+                                       cmocka_unit_test(lights),
+                                       cmocka_unit_test(area_lights),
+                                       cmocka_unit_test(environment_map),
+                                       cmocka_unit_test(media),
+                                       cmocka_unit_test(media_by_name),
+                                       cmocka_unit_test(materials),
+                                       cmocka_unit_test(materials_of_version_3),
+                                       cmocka_unit_test(shapes),
+                                       cmocka_unit_test(read_over),
+                                       cmocka_unit_test(ends_of_ranges),
+                                       cmocka_unit_test(counted),
+                                       cmocka_unit_test(times_add_up)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

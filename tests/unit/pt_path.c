@@ -106,7 +106,8 @@ static void diffuse_kernel_is_exact(void **state)
     struct pt_scene scene;
     test_cornell(&scene, 24, 1.0f, v3_splat(0.0f));
     assert_true(pt_kernel_select(scene.effects, NULL, NULL) == pt_kernel_diffuse);
-    compare_kernels(&scene, (pt_kernel *const[]){pt_kernel_diffuse, pt_kernel_specular, pt_kernel_surfaces, pt_kernel_no_media}, 4);
+    compare_kernels(&scene,
+                    (pt_kernel *const[]){pt_kernel_diffuse, pt_kernel_specular, pt_kernel_surfaces, pt_kernel_no_media}, 4);
     test_scene_end(&scene);
 }
 
@@ -237,7 +238,8 @@ static void trace_says_what_it_is_told(void **state)
     const char *const *expected = lines;
     struct pt_trace trace = {.line = next_line, .data = &expected};
     const struct pt_shape shape = {.material = 3};
-    const struct pt_place at = {.p = {7, 8, 9}, .s = {.n_geometric = {0.5f, -1, 0.25f}, .n_shading = {9, 9, 9}}, .shape = &shape, .primitive = 11};
+    const struct pt_place at = {
+        .p = {7, 8, 9}, .s = {.n_geometric = {0.5f, -1, 0.25f}, .n_shading = {9, 9, 9}}, .shape = &shape, .primitive = 11};
     const struct pt_ray ray = {{1, -2, 3.5f}, {4, 5e-7f, -6}, 0, 100, 0.25f};
     const struct pt_bsdf metal = {.kind = PT_BSDF_CONDUCTOR}, pane = {.kind = PT_BSDF_THIN_DIELECTRIC};
     pt_trace_camera(&trace, &ray);
@@ -261,7 +263,11 @@ static void texels_are_fetched_that_are_read(void **state)
     static const float floats[W * H * 4];
     static const uint8_t bytes[W * H * 4];
     for (int k = 0; k < 6; k++) {
-        struct pt_image_map image = {W, H, k % 3 == 0 ? 1 : k % 3 + 2, k < 3 ? PT_PIXEL_FLOAT : PT_PIXEL_U8_SRGB, 1,
+        struct pt_image_map image = {W,
+                                     H,
+                                     k % 3 == 0 ? 1 : k % 3 + 2,
+                                     k < 3 ? PT_PIXEL_FLOAT : PT_PIXEL_U8_SRGB,
+                                     1,
                                      k < 3 ? (const void *)floats : (const void *)bytes};
         struct pt_texture t[2] = {{.kind = PT_TEXTURE_CHECKERBOARD},
                                   {.kind = PT_TEXTURE_IMAGE, .scale = 1, .su = 2, .sv = -3, .du = 0.125f, .dv = 0.5f}};
@@ -304,7 +310,8 @@ static void hits_are_fetched_in_waves(void **state)
     scene.images[scene.image_count++] = (struct pt_image_map){4, 4, 1, PT_PIXEL_FLOAT, 1, texels};
     scene.textures[scene.texture_count++] = (struct pt_texture){.kind = PT_TEXTURE_IMAGE, .scale = 1, .su = 1, .sv = 1};
     scene.materials[textured].reflectance.texture = 1;
-    int32_t a = test_add_mesh(&scene, plain, corners, 4, twice[0], 2), b = test_add_mesh(&scene, textured, corners, 4, twice[1], 2);
+    int32_t a = test_add_mesh(&scene, plain, corners, 4, twice[0], 2),
+            b = test_add_mesh(&scene, textured, corners, 4, twice[1], 2);
     int32_t ball = test_add_sphere(&scene, textured, v3(0, 0, 0), 1);
     const int32_t met[4] = {b, -1, ball, a};
     for (int i = 0; i < 4; i++) {
@@ -314,8 +321,9 @@ static void hits_are_fetched_in_waves(void **state)
     }
     const struct pt_mesh *first = &scene.meshes[scene.shapes[b].data], *second = &scene.meshes[scene.shapes[a].data];
     /* without texture coordinates u = 0.75, v = 0.5: texel 2.5 across, 1.5 down */
-    const void *expected[10] = {first->indices + 3, second->indices + 3, first->vertices + 1, first->vertices + 3, first->vertices,
-                                second->vertices, second->vertices + 2, second->vertices + 3, texels + 4 + 2, texels + 8 + 2};
+    const void *expected[10] = {first->indices + 3, second->indices + 3, first->vertices + 1,  first->vertices + 3,
+                                first->vertices,    second->vertices,    second->vertices + 2, second->vertices + 3,
+                                texels + 4 + 2,     texels + 8 + 2};
     for (int k = 0; k < 4; k++) {
         scene.stats.triangles = k == 0 ? PT_FETCH_TRIANGLES - 1 : PT_FETCH_TRIANGLES;
         fetched_count = 0;
@@ -331,9 +339,11 @@ static void hits_are_fetched_in_waves(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(diffuse_kernel_is_exact), cmocka_unit_test(surface_kernels_are_exact), cmocka_unit_test(selection_covers), cmocka_unit_test(media_kernel_is_exact),
-        cmocka_unit_test(absent_effects_run_no_code), cmocka_unit_test(planes), cmocka_unit_test(trace_says_what_it_is_told), cmocka_unit_test(texels_are_fetched_that_are_read),
-        cmocka_unit_test(hits_are_fetched_in_waves), cmocka_unit_test(trace_tells_the_same_path),
+        cmocka_unit_test(diffuse_kernel_is_exact),    cmocka_unit_test(surface_kernels_are_exact),
+        cmocka_unit_test(selection_covers),           cmocka_unit_test(media_kernel_is_exact),
+        cmocka_unit_test(absent_effects_run_no_code), cmocka_unit_test(planes),
+        cmocka_unit_test(trace_says_what_it_is_told), cmocka_unit_test(texels_are_fetched_that_are_read),
+        cmocka_unit_test(hits_are_fetched_in_waves),  cmocka_unit_test(trace_tells_the_same_path),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

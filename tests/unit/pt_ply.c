@@ -11,10 +11,11 @@
 
 #include "pbrt/ply.h"
 
-static const char ascii[] = "ply\nformat ascii 1.0\ncomment two faces\nelement vertex 4\nproperty float x\nproperty float y\n"
-                            "property float z\nproperty uchar red\nproperty float s\nproperty float t\nelement face 2\n"
-                            "property uchar flag\nproperty list uchar int vertex_index\nend_header\n"
-                            "0 0 0 255 0 0\n1 0 0 255 1 0\n1 1 0.5 255 1 1\n0 1 0 255 0 1\n7 4 0 1 2 3\n7 3 0 1 2\n";
+static const char ascii[] =
+    "ply\nformat ascii 1.0\ncomment two faces\nelement vertex 4\nproperty float x\nproperty float y\n"
+    "property float z\nproperty uchar red\nproperty float s\nproperty float t\nelement face 2\n"
+    "property uchar flag\nproperty list uchar int vertex_index\nend_header\n"
+    "0 0 0 255 0 0\n1 0 0 255 1 0\n1 1 0.5 255 1 1\n0 1 0 255 0 1\n7 4 0 1 2 3\n7 3 0 1 2\n";
 
 static void check(const struct pt_ply *p)
 {
@@ -52,8 +53,8 @@ static size_t binary(char *out, int big)
     char header[1024];
     snprintf(header, sizeof header, "%.*s", (int)(end - ascii), ascii);
     char *format = strstr(header, "ascii");
-    size_t n = (size_t)snprintf(out, 1024, "%.*s%s%s", (int)(format - header), header, big ? "binary_big_endian" : "binary_little_endian",
-                                format + 5);
+    size_t n = (size_t)snprintf(out, 1024, "%.*s%s%s", (int)(format - header), header,
+                                big ? "binary_big_endian" : "binary_little_endian", format + 5);
     for (int i = 0; i < 4; i++)
         for (int k = 0; k < 5; k++) {
             if (k == 3)
@@ -115,14 +116,16 @@ static void numbers_of_every_type(void **state)
         struct pt_ply ply;
         struct base_err err = {0};
         int indices = type < 6 ? type : 4;
-        size_t n = (size_t)snprintf(bytes, sizeof bytes,
-                                    "ply\r\nformat binary_%s_endian 1.0\nelement vertex 2\nproperty float x\nproperty %s y\nproperty float z\n"
-                                    "property %s nx\nproperty float ny\nproperty float nz\nproperty float u\nproperty %s v\nelement face 1\n"
-                                    "property list %s %s vertex_index\nend_header\n",
-                                    big ? "big" : "little", names[name][type], names[name][type], names[name][type], names[name][indices],
-                                    names[name][indices]);
+        size_t n = (size_t)snprintf(
+            bytes, sizeof bytes,
+            "ply\r\nformat binary_%s_endian 1.0\nelement vertex 2\nproperty float x\nproperty %s y\nproperty float z\n"
+            "property %s nx\nproperty float ny\nproperty float nz\nproperty float u\nproperty %s v\nelement face 1\n"
+            "property list %s %s vertex_index\nend_header\n",
+            big ? "big" : "little", names[name][type], names[name][type], names[name][type], names[name][indices],
+            names[name][indices]);
         for (int i = 0; i < 2; i++) {
-            n = put_number(bytes, put_number(bytes, put_number(bytes, n, 6, 1 + i, big), type, values[type], big), 6, 3, big);
+            n = put_number(bytes, put_number(bytes, put_number(bytes, n, 6, 1 + i, big), type, values[type], big), 6, 3,
+                           big);
             n = put_number(bytes, put_number(bytes, put_number(bytes, n, type, values[type], big), 6, 5, big), 6, 6, big);
             n = put_number(bytes, put_number(bytes, n, 6, 7, big), type, values[type], big);
         }
@@ -144,6 +147,7 @@ static void numbers_of_every_type(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(reads_ascii), cmocka_unit_test(reads_binary), cmocka_unit_test(numbers_of_every_type)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(reads_ascii), cmocka_unit_test(reads_binary),
+                                       cmocka_unit_test(numbers_of_every_type)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -195,8 +195,7 @@ static void a_pilot_loses_nothing(void **state)
     assert_int_equal(pt_quote_finish(parts.quote, parts.render, &err), 0);
     parts.render->config.pilot_spp = 0;
     assert_int_equal(go(&parts), PT_RENDER_DONE);
-    assert_memory_equal(whole.render->film.color, parts.render->film.color,
-                        3 * whole.render->film.pixels * sizeof(double));
+    assert_memory_equal(whole.render->film.color, parts.render->film.color, 3 * whole.render->film.pixels * sizeof(double));
     for (uint32_t i = 0; i < whole.render->blocks->count; i++)
         assert_int_equal(whole.render->blocks->list[i].spp, parts.render->blocks->list[i].spp);
     end(&whole);
@@ -247,7 +246,8 @@ static void a_pilot_ends_with_its_time(void **state)
     start(&run, "0.25", 64);
     run.render->config.pilot_s = 0;
     assert_int_equal(go(&run), PT_RENDER_PILOT);
-    assert_true(lull_host_active(run.render->blocks) == 12 && run.render->blocks->list[0].spp == 1 && run.render->totals->checks == 0);
+    assert_true(lull_host_active(run.render->blocks) == 12 && run.render->blocks->list[0].spp == 1 &&
+                run.render->totals->checks == 0);
     run.render->config.pilot_spp = 0; /* no pilot */
     assert_int_equal(go(&run), PT_RENDER_DONE);
     end(&run);
@@ -292,21 +292,19 @@ static void outlooks_in_closed_form(void **state)
         double stop, low, high;
         int known;
     } cases[] = {
-        {{10, 40, 0, 0}, 10, 40, 32.266, 49.588, 1},     /* 2^0.31 */
-        {{40, 40, 0, 0}, 10, 40, 36.050, 44.383, 1},     /* 2^0.15 */
-        {{80, 40, 0, 0}, 10, 40, 36.050, 44.383, 1},     /* no narrower than that */
-        {{10, 40, 0, 1}, 10, 40, 20, 80, 1},
-        {{10, 40, 0, 0}, 45, 45, 45, 55.786, 1},
-        {{10, 400, 0, 0}, 10, 400, 268.37, 500, 1},       /* 2^(0.15 + 0.08 log2 40) = 1.4905, capped */
-        {{10, 0.5, 0, 0}, 0, 1, 0.90125, 1.10957, 1},    /* one sample at least */
-        {{10, 900, 1, 0}, 10, 500, 500, 500, 1},
-        {{10, 7, 1, 0}, 10, 7, 7, 7, 1},
-        {{0, 40, 0, 0}, 10, 500, 10, 500, 0},
-        {{10, INFINITY, 0, 0}, 10, 500, 10, 500, 0},
+        {{10, 40, 0, 0}, 10, 40, 32.266, 49.588, 1}, /* 2^0.31 */
+        {{40, 40, 0, 0}, 10, 40, 36.050, 44.383, 1}, /* 2^0.15 */
+        {{80, 40, 0, 0}, 10, 40, 36.050, 44.383, 1}, /* no narrower than that */
+        {{10, 40, 0, 1}, 10, 40, 20, 80, 1},          {{10, 40, 0, 0}, 45, 45, 45, 55.786, 1},
+        {{10, 400, 0, 0}, 10, 400, 268.37, 500, 1},   /* 2^(0.15 + 0.08 log2 40) = 1.4905, capped */
+        {{10, 0.5, 0, 0}, 0, 1, 0.90125, 1.10957, 1}, /* one sample at least */
+        {{10, 900, 1, 0}, 10, 500, 500, 500, 1},      {{10, 7, 1, 0}, 10, 7, 7, 7, 1},
+        {{0, 40, 0, 0}, 10, 500, 10, 500, 0},         {{10, INFINITY, 0, 0}, 10, 500, 10, 500, 0},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         struct lull_host_stop_at s = lull_host_expect(&cases[i].said, cases[i].spp, 500);
-        if (!(fabs(s.spp - cases[i].stop) < 1e-9 && fabs(s.low / cases[i].low - 1) < 3e-4 && fabs(s.high / cases[i].high - 1) < 3e-4) ||
+        if (!(fabs(s.spp - cases[i].stop) < 1e-9 && fabs(s.low / cases[i].low - 1) < 3e-4 &&
+              fabs(s.high / cases[i].high - 1) < 3e-4) ||
             s.known != cases[i].known)
             fail_msg("case %zu: %g (%g to %g) %d", i, s.spp, s.low, s.high, (int)s.known);
     }
@@ -315,7 +313,8 @@ static void outlooks_in_closed_form(void **state)
     struct lull_host_stop_at s = lull_host_expect_block(&blocks, &b);
     assert_true(s.spp == 60 && fabs(s.low / (40 / exp2(0.23)) - 1) < 1e-12 && s.known); /* said at 20, an octave ahead */
     assert_true(lull_host_expect_block(&uniform, &b).low == 500 && lull_host_expect_block(&uniform, &b).spp == 500);
-    assert_true(fabs(lull_host_expect_checks(&b, 60) - 1) < 1e-12 && fabs(lull_host_expect_checks(&b, 540) - 3) < 1e-12); /* threefold from check to check */
+    assert_true(fabs(lull_host_expect_checks(&b, 60) - 1) < 1e-12 &&
+                fabs(lull_host_expect_checks(&b, 540) - 3) < 1e-12); /* threefold from check to check */
     b.asked = 0;
     assert_true(!lull_host_expect_block(&blocks, &b).known && fabs(lull_host_expect_checks(&b, 60 * 2.25) - 3) < 1e-12);
     b.asked = 1;
@@ -350,16 +349,20 @@ static char *quote_of(struct pt_approve_case *c)
     fprintf(out, "a check takes %.9g\n", run.quote->check_s);
     for (int i = 0; i < run.quote->row_count; i++) {
         const struct pt_quote_row *row = &run.quote->rows[i];
-        fprintf(out, "row %g asked %d spp %.9g %.9g %.9g from %.9g to %.9g thread %.9g %.9g %.9g wall %.9g %.9g %.9g of uniform %.9g", row->visible,
-                row->asked, row->spp_min, row->spp_mean, row->spp_max, row->spp_mean_low, row->spp_mean_high, row->thread_s, row->thread_low_s,
-                row->thread_high_s, row->wall_s, row->wall_low_s, row->wall_high_s, row->against_uniform);
+        fprintf(
+            out,
+            "row %g asked %d spp %.9g %.9g %.9g from %.9g to %.9g thread %.9g %.9g %.9g wall %.9g %.9g %.9g of uniform %.9g",
+            row->visible, row->asked, row->spp_min, row->spp_mean, row->spp_max, row->spp_mean_low, row->spp_mean_high,
+            row->thread_s, row->thread_low_s, row->thread_high_s, row->wall_s, row->wall_low_s, row->wall_high_s,
+            row->against_uniform);
         fprintf(out, " unknown %u unmet %u capped %u\n", row->unknown, row->unmet, row->capped);
         for (uint32_t k = 0; k < run.quote->block_count; k++) {
             const struct pt_quote_block *b = &row->blocks[k];
             fprintf(out, "  block %u said %llu %.9g%s%s first %llu %.9g stop %.9g %.9g %.9g %d thread %.9g %.9g %.9g\n", k,
                     (unsigned long long)row->said[k].spp, row->said[k].predicted, row->said[k].stopped ? " stopped" : "",
-                    row->said[k].unmet ? " unmet" : "", (unsigned long long)row->first[k].spp, row->first[k].predicted, b->stop.spp, b->stop.low,
-                    b->stop.high, (int)b->stop.known, b->thread_s, b->thread_low_s, b->thread_high_s);
+                    row->said[k].unmet ? " unmet" : "", (unsigned long long)row->first[k].spp, row->first[k].predicted,
+                    b->stop.spp, b->stop.low, b->stop.high, (int)b->stop.known, b->thread_s, b->thread_low_s,
+                    b->thread_high_s);
         }
     }
     end(&run);
@@ -376,12 +379,17 @@ static void quotes_in_every_number(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(rows_follow_the_law), cmocka_unit_test(sums_are_those_of_the_blocks),
-        cmocka_unit_test(what_was_asked_has_a_row), cmocka_unit_test(uniform_needs_no_criterion),
-        cmocka_unit_test(a_pilot_loses_nothing), cmocka_unit_test(stops_that_nobody_predicts),
-        cmocka_unit_test(intervals_widen_with_distance), cmocka_unit_test(light_that_few_pixels_met_is_told),
+        cmocka_unit_test(rows_follow_the_law),
+        cmocka_unit_test(sums_are_those_of_the_blocks),
+        cmocka_unit_test(what_was_asked_has_a_row),
+        cmocka_unit_test(uniform_needs_no_criterion),
+        cmocka_unit_test(a_pilot_loses_nothing),
+        cmocka_unit_test(stops_that_nobody_predicts),
+        cmocka_unit_test(intervals_widen_with_distance),
+        cmocka_unit_test(light_that_few_pixels_met_is_told),
         cmocka_unit_test(the_last_blocks_leave_threads_idle),
-        cmocka_unit_test(outlooks_in_closed_form), cmocka_unit_test(quotes_in_every_number),
+        cmocka_unit_test(outlooks_in_closed_form),
+        cmocka_unit_test(quotes_in_every_number),
         cmocka_unit_test(a_pilot_ends_with_its_time),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

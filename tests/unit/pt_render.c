@@ -412,8 +412,9 @@ static void tell_place(const struct pt_scene *scene, const struct pt_integrator 
     runs[run_count].sample = sample;
     runs[run_count++].count = count;
     for (int i = 0; i < count; i++)
-        out[i] = (struct pt_path_result){.radiance = v3((float)x + (float)i, (float)y, sample == 7 && (x + (uint32_t)i) % 50 == 49 ? NAN : (float)sample),
-                                         .rays = 2};
+        out[i] = (struct pt_path_result){
+            .radiance = v3((float)x + (float)i, (float)y, sample == 7 && (x + (uint32_t)i) % 50 == 49 ? NAN : (float)sample),
+            .rays = 2};
 }
 
 /* A row is sampled in runs of neighbours, each pixel once for each sample; what is saved of it is restored. */
@@ -434,15 +435,18 @@ static void rows_are_cut_into_runs(void **state)
         for (int k = 0; k < per_sample; k++)
             for (uint32_t s = 5; s < 8; s++, n++) {
                 int left = width - k * PT_RUN;
-                assert_true(runs[n].x == 3 + (uint32_t)(k * PT_RUN) && runs[n].y == 6 && runs[n].sample == s && runs[n].count == (left < PT_RUN ? left : PT_RUN));
+                assert_true(runs[n].x == 3 + (uint32_t)(k * PT_RUN) && runs[n].y == 6 && runs[n].sample == s &&
+                            runs[n].count == (left < PT_RUN ? left : PT_RUN));
             }
-        assert_true(row.rays == 6 * (uint64_t)width && row.dropped == 2 && row.first_x == 49 && row.first_sample == 7 && row.thread_s >= 0);
+        assert_true(row.rays == 6 * (uint64_t)width && row.dropped == 2 && row.first_x == 49 && row.first_sample == 7 &&
+                    row.thread_s >= 0);
         for (int y = 5; y < 8; y++)
             for (int x = 1; x < 140; x++) {
                 size_t i = pt_film_index(&film, x, y);
                 int inside = y == 6 && x >= 3 && x < 3 + width, bad = inside && x % 50 == 49;
                 double n_kept = inside ? 3 - bad : 0;
-                assert_true(film.color[3 * i] == n_kept * x && film.color[3 * i + 1] == n_kept * 6 && film.dropped[i] == (uint32_t)bad);
+                assert_true(film.color[3 * i] == n_kept * x && film.color[3 * i + 1] == n_kept * 6 &&
+                            film.dropped[i] == (uint32_t)bad);
                 assert_true(film.color[3 * i + 2] == (inside ? 5 + 6 + (bad ? 0 : 7) : 0));
             }
         size_t bytes = pt_row_bytes(&row, film.planes);
@@ -467,10 +471,7 @@ static void rows_are_cut_into_runs(void **state)
     }
 }
 
-static void keep_words(void *data, const char *line)
-{
-    strcpy(data, line);
-}
+static void keep_words(void *data, const char *line) { strcpy(data, line); }
 
 /* Half of the time may go to checks: at 9 of 19 seconds they are asked for, at 11 of 21 left out, except of who gets no more samples. */
 static void checks_may_be_too_dear(void **state)
@@ -496,11 +497,13 @@ static void checks_may_be_too_dear(void **state)
         r.render->totals->criterion_s = dear ? 11 : 9;
         assert_int_equal(pt_render_run(r.render, &hooks, &outcome, &err), BASE_EINVAL);
         const struct lull_host_totals *t = r.render->totals;
-        assert_true(t->checks == (dear ? 1 : 3) && t->skipped_checks == (dear ? 2 : 0) && t->failed_checks == 0 && !words[0]);
+        assert_true(t->checks == (dear ? 1 : 3) && t->skipped_checks == (dear ? 2 : 0) && t->failed_checks == 0 &&
+                    !words[0]);
         assert_true(t->asked == t->checks && t->criterion_s > (dear ? 11 : 9) && t->criterion_thread_s > 0);
         for (int i = 0; i < 2; i++)
-            assert_true(b[i].reason == LULL_REASON_NONE && b[i].next_spp == 23 && b[i].checks == (dear ? 0 : 1) && b[i].asked == b[i].checks &&
-                        b[i].asked_spp == (dear ? 0 : 20) && (dear || b[i].predicted_spp == 32 * (i + 1)));
+            assert_true(b[i].reason == LULL_REASON_NONE && b[i].next_spp == 23 && b[i].checks == (dear ? 0 : 1) &&
+                        b[i].asked == b[i].checks && b[i].asked_spp == (dear ? 0 : 20) &&
+                        (dear || b[i].predicted_spp == 32 * (i + 1)));
         assert_true(b[2].reason == LULL_REASON_SPP_MAX && b[2].checks == 1);
         release(&r);
     }
@@ -547,7 +550,8 @@ static void interrupted_blocks_are_asked_once_more(void **state)
     assert_int_equal(pt_render_run(r.render, &hooks, &outcome, &err), 0);
     assert_true(outcome == PT_RENDER_INTERRUPTED && looks == 12);
     assert_true(b[0].reason == LULL_REASON_INTERRUPT && b[0].checks == 0 && b[0].spp == 20 && isnan(b[0].error));
-    assert_true(b[1].reason == LULL_REASON_INTERRUPT && b[1].checks == 1 && b[1].spp == 21 && b[1].asked_spp == 21 && b[1].predicted_spp == 64);
+    assert_true(b[1].reason == LULL_REASON_INTERRUPT && b[1].checks == 1 && b[1].spp == 21 && b[1].asked_spp == 21 &&
+                b[1].predicted_spp == 64);
     assert_true(b[2].reason == LULL_REASON_SPP_MAX && b[2].checks == 0);
     assert_true(r.render->totals->checks == 1 && lull_host_active(r.render->blocks) == 0);
     release(&r);
@@ -598,10 +602,7 @@ static const unsigned char *piece(const unsigned char *at, const void *expected,
     return at + n;
 }
 
-static const unsigned char *word(const unsigned char *at, uint64_t expected)
-{
-    return piece(at, &expected, 8);
-}
+static const unsigned char *word(const unsigned char *at, uint64_t expected) { return piece(at, &expected, 8); }
 
 static const unsigned char *check_block_record(const unsigned char *at, const struct lull_host_block *b)
 {
@@ -611,7 +612,8 @@ static const unsigned char *check_block_record(const unsigned char *at, const st
 }
 
 /* Writes the bytes with a good checksum and wants this answer. */
-static void expect_answer(const char *path, unsigned char *data, size_t n, struct pt_render *r, const char *settings, const char *words)
+static void expect_answer(const char *path, unsigned char *data, size_t n, struct pt_render *r, const char *settings,
+                          const char *words)
 {
     struct base_err err = {0};
     char line[256];
@@ -625,10 +627,7 @@ static void expect_answer(const char *path, unsigned char *data, size_t n, struc
         fail_msg("%d \"%s\", expected \"%s\"", rc, err.text, line);
 }
 
-static void put_word(unsigned char *at, uint64_t value)
-{
-    memcpy(at, &value, 8);
-}
+static void put_word(unsigned char *at, uint64_t value) { memcpy(at, &value, 8); }
 
 static void checkpoints_have_a_layout(void **state)
 {
@@ -647,7 +646,8 @@ static void checkpoints_have_a_layout(void **state)
     assert_int_equal(pt_checkpoint_save(path, r.render, "a=1\nb=2\n", &err), 0);
     assert_int_equal(base_file_read(path, 1 << 24, &bytes, &size, &err), 0);
     unsigned char *data = (unsigned char *)bytes;
-    const unsigned char *at = piece(word(piece(data, "LULLCKP1", 8), 8), "a=1\nb=2\n", 8), *film = at, *list, *drops, *history;
+    const unsigned char *at = piece(word(piece(data, "LULLCKP1", 8), 8), "a=1\nb=2\n", 8), *film = at, *list, *drops,
+                        *history;
     at = word(at, f->bytes);
     assert_int_equal(f->bytes, f->pixels * 124);
     at = piece(piece(piece(at, f->color, 24 * f->pixels), f->half, 24 * f->pixels), f->moment2, 8 * f->pixels);
@@ -698,7 +698,8 @@ static void checkpoints_have_a_layout(void **state)
     expect_answer(path, data, size, r.render, "a=1\nb=", "made with b=2, but this render has b=");
     expect_answer(path, data, size, r.render, "a=1\n", "made with b=2, but this render has no b");
     expect_answer(path, data, size, r.render, "a=1\nb=2\nc=3\n", "made without c, but this render has c=3");
-    expect_answer(path, data, (size_t)(history - data) + 4, r.render, "a=1\nb=2\n", "block 0 of the checkpoint makes no sense");
+    expect_answer(path, data, (size_t)(history - data) + 4, r.render, "a=1\nb=2\n",
+                  "block 0 of the checkpoint makes no sense");
     *reason = 1;
     memset(reason + 1, 0, 3);
     expect_answer(path, data, (size_t)(history - data) + 4, r.render, "a=1\nb=2\n", "the checkpoint is too short");

@@ -88,8 +88,13 @@ static int setup(void **state)
     int crop[4] = {3, 5, 60, 40};
     memcpy(config.crop, crop, sizeof crop);
     config.planes = PT_FILM_AUX;
-    info = (struct pt_output_info){.scene = "dir/fake-view1.pbrt", .params = &param, .param_count = 1,
-                                   .effects = PT_FX_ALPHA | PT_FX_MOTION, .kernel = "fake", .threads = 2, .aov = PT_FILM_AUX,
+    info = (struct pt_output_info){.scene = "dir/fake-view1.pbrt",
+                                   .params = &param,
+                                   .param_count = 1,
+                                   .effects = PT_FX_ALPHA | PT_FX_MOTION,
+                                   .kernel = "fake",
+                                   .threads = 2,
+                                   .aov = PT_FILM_AUX,
                                    .scene_bytes = 1000};
     if (!mkdtemp(folder))
         return -1;
@@ -119,7 +124,8 @@ static void read_channel(exr_context_t file, const char *name, float *out)
     for (int y = 5; y < 40; y += lines) {
         exr_chunk_info_t chunk;
         assert_int_equal(exr_read_scanline_chunk_info(file, 0, y, &chunk), EXR_ERR_SUCCESS);
-        assert_int_equal(y == 5 ? exr_decoding_initialize(file, 0, &chunk, &pipe) : exr_decoding_update(file, 0, &chunk, &pipe), 0);
+        assert_int_equal(
+            y == 5 ? exr_decoding_initialize(file, 0, &chunk, &pipe) : exr_decoding_update(file, 0, &chunk, &pipe), 0);
         for (int c = 0; c < pipe.channel_count; c++) {
             int wanted = strcmp(pipe.channels[c].channel_name, name) == 0;
             found += wanted;
@@ -159,7 +165,8 @@ static void exr_holds_every_layer(void **state)
     assert_int_equal(exr_attr_get_string(file, 0, "lull:block", &length, &text), EXR_ERR_SUCCESS);
     assert_string_equal(text, "16x16");
     static const char *const words[][2] = {
-        {"lull:scene", "dir/fake-view1.pbrt"}, {"software", "lull-render " BASE_VERSION},
+        {"lull:scene", "dir/fake-view1.pbrt"},
+        {"software", "lull-render " BASE_VERSION},
         {"lull:reasons", "0=none 1=criterion 2=spp-max 3=uniform 4=time 5=interrupt 6=dropped"}};
     for (int i = 0; i < 3; i++) {
         assert_int_equal(exr_attr_get_string(file, 0, words[i][0], &length, &text), EXR_ERR_SUCCESS);
@@ -168,14 +175,17 @@ static void exr_holds_every_layer(void **state)
     const struct {
         const char *name;
         double value;
-    } figures[] = {{"lull:seed", 7}, {"lull:samples", (double)render->totals->samples}, {"lull:seconds", lull_host_elapsed_s(render->frame)}};
+    } figures[] = {{"lull:seed", 7},
+                   {"lull:samples", (double)render->totals->samples},
+                   {"lull:seconds", lull_host_elapsed_s(render->frame)}};
     for (int i = 0; i < 3; i++) {
         double value = -1;
         assert_int_equal(exr_attr_get_double(file, 0, figures[i].name, &value), EXR_ERR_SUCCESS);
         assert_true(value == figures[i].value);
     }
-    static const char *const names[] = {"R", "G", "B", "lull.spp.V", "lull.reason.V", "lull.p_noisy.V", "lull.error.V",
-                                        "albedo.R", "albedo.G", "albedo.B", "normal.X", "normal.Y", "normal.Z", "depth.Z"};
+    static const char *const names[] = {
+        "R",        "G",        "B",        "lull.spp.V", "lull.reason.V", "lull.p_noisy.V", "lull.error.V",
+        "albedo.R", "albedo.G", "albedo.B", "normal.X",   "normal.Y",      "normal.Z",       "depth.Z"};
     for (int k = 0; k < 14; k++) {
         read_channel(file, names[k], pixels);
         for (int y = 5; y < 40; y++)
@@ -183,9 +193,20 @@ static void exr_holds_every_layer(void **state)
                 const struct lull_host_block *b = &render->blocks->list[y / 16 * 4 + x / 16];
                 const struct sums s = sums_of(x, y, b->spp);
                 double n = (double)b->spp;
-                const double expected[14] = {s.radiance[0] / s.kept, s.radiance[1] / s.kept, s.radiance[2] / s.kept, s.kept,
-                                             x < 16 ? LULL_REASON_DROPPED : LULL_REASON_CRITERION, 1.0 / b->checks, b->error, s.albedo[0] / n, s.albedo[1] / n,
-                                             s.albedo[2] / n, s.normal[0] / n, s.normal[1] / n, s.normal[2] / n, s.depth / s.hits};
+                const double expected[14] = {s.radiance[0] / s.kept,
+                                             s.radiance[1] / s.kept,
+                                             s.radiance[2] / s.kept,
+                                             s.kept,
+                                             x < 16 ? LULL_REASON_DROPPED : LULL_REASON_CRITERION,
+                                             1.0 / b->checks,
+                                             b->error,
+                                             s.albedo[0] / n,
+                                             s.albedo[1] / n,
+                                             s.albedo[2] / n,
+                                             s.normal[0] / n,
+                                             s.normal[1] / n,
+                                             s.normal[2] / n,
+                                             s.depth / s.hits};
                 double got = (double)pixels[(y - 5) * 57 + x - 3];
                 if (!(fabs(got - expected[k]) <= 2e-7 * fabs(expected[k]))) /* the file holds floats */
                     fail_msg("%s of pixel %d, %d is %.9g, not %.9g", names[k], x, y, got, expected[k]);
@@ -292,7 +313,8 @@ static void stop_map_table(void **state)
     assert_int_equal(base_file_read(in_folder("s.csv"), 4096, &text, &n, &err), 0);
     int used = snprintf(expected, sizeof expected, "fake-view1;");
     for (uint32_t i = 0; i < render->blocks->count; i++)
-        used += snprintf(expected + used, sizeof expected - (size_t)used, "%llu;", (unsigned long long)render->blocks->list[i].spp);
+        used += snprintf(expected + used, sizeof expected - (size_t)used, "%llu;",
+                         (unsigned long long)render->blocks->list[i].spp);
     snprintf(expected + used, sizeof expected - (size_t)used, "\n");
     assert_string_equal(text, expected);
     free(text);
@@ -320,7 +342,8 @@ static void check_block(const cJSON *b, int id, struct sums *all, double *sample
 {
     int x0 = id % 4 * 16, y0 = id / 4 * 16, x1 = x0 + 16 < 60 ? x0 + 16 : 60, y1 = y0 + 16 < 44 ? y0 + 16 : 44;
     double spp = number(b, "spp"), red = 0.0;
-    assert_true(number(b, "id") == id && number(b, "x0") == x0 && number(b, "y0") == y0 && number(b, "x1") == x1 && number(b, "y1") == y1);
+    assert_true(number(b, "id") == id && number(b, "x0") == x0 && number(b, "y0") == y0 && number(b, "x1") == x1 &&
+                number(b, "y1") == y1);
     int at = 32 * (1 + id % 4), dropped = x0 == 0; /* those ask twice */
     assert_true(spp >= at && spp < (dropped ? 4 : 2) * at);
     for (int y = y0; y < y1; y++)
@@ -346,14 +369,14 @@ static void check_totals(const cJSON *root, const struct sums *all, double sampl
     assert_true(number(t, "render_s") > 0.0 && number(t, "criterion_s") > 0.0);
     assert_true(fabs(number(t, "paths_per_s") * number(t, "render_s") / samples - 1.0) < 1e-6);
     assert_true(fabs(number(t, "rays_per_s") * number(t, "render_s") / all->rays - 1.0) < 1e-6);
-    cJSON_ArrayForEach(d, cJSON_GetObjectItem(root, "blocks")) threads_s += number(d, "thread_s");
+    cJSON_ArrayForEach (d, cJSON_GetObjectItem(root, "blocks"))
+        threads_s += number(d, "thread_s");
     assert_true(threads_s <= 2.0 * number(t, "render_s"));
     assert_true(cJSON_GetArraySize(cJSON_GetObjectItem(root, "dropped")) > 0);
-    cJSON_ArrayForEach(d, cJSON_GetObjectItem(root, "dropped"))
-    {
+    cJSON_ArrayForEach (d, cJSON_GetObjectItem(root, "dropped")) {
         struct pt_path_result r;
-        varied(NULL, &render->config.integrator, (uint32_t)number(d, "x"), (uint32_t)number(d, "y"), 1, (uint32_t)number(d, "sample"),
-               &r);
+        varied(NULL, &render->config.integrator, (uint32_t)number(d, "x"), (uint32_t)number(d, "y"), 1,
+               (uint32_t)number(d, "sample"), &r);
         assert_false(v3_is_finite(r.radiance));
     }
 }
@@ -372,7 +395,8 @@ static void report_is_what_happened(void **state)
     assert_non_null(root);
     assert_string_equal(words(root, "scene"), "dir/fake-view1.pbrt");
     assert_string_equal(words(root, "kernel"), "fake");
-    assert_true(number(root, "width") == 60 && number(root, "height") == 44 && number(root, "block") == 16 && number(root, "seed") == 7);
+    assert_true(number(root, "width") == 60 && number(root, "height") == 44 && number(root, "block") == 16 &&
+                number(root, "seed") == 7);
     assert_true(number(root, "threads") == 2 && cJSON_IsFalse(cJSON_GetObjectItem(root, "interrupted")));
     const cJSON *by = cJSON_GetObjectItem(root, "criterion"), *effects = cJSON_GetObjectItem(root, "effects");
     assert_string_equal(words(by, "id"), "fake");
@@ -386,7 +410,8 @@ static void report_is_what_happened(void **state)
     for (int id = 0; id < 12; id++)
         check_block(cJSON_GetArrayItem(blocks, id), id, &all, &samples);
     check_totals(root, &all, samples);
-    assert_true(number(memory, "film_bytes_per_pixel") == 124 && number(memory, "film_bytes") == 124 * 60 * 44 && number(memory, "scene_bytes") == 1000);
+    assert_true(number(memory, "film_bytes_per_pixel") == 124 && number(memory, "film_bytes") == 124 * 60 * 44 &&
+                number(memory, "scene_bytes") == 1000);
     cJSON_Delete(root);
     free(text);
 }
@@ -418,7 +443,12 @@ static char *report_of(struct pt_approve_case *c)
     if (alone) {
         frame.criterion = NULL;
         frame.blocks.block_height = 8;
-        told = (struct pt_output_info){.scene = "a \"b\".pbrt", .mask = "m.png", .effects = PT_FX_ALL, .kernel = "k", .threads = 9, .scene_bytes = -1,
+        told = (struct pt_output_info){.scene = "a \"b\".pbrt",
+                                       .mask = "m.png",
+                                       .effects = PT_FX_ALL,
+                                       .kernel = "k",
+                                       .threads = 9,
+                                       .scene_bytes = -1,
                                        .interrupted = 1};
     }
     if (strstr(c->text, "empty"))
@@ -481,9 +511,15 @@ static void progress_is_honest(void **state)
     double percent = 0;
     char text[256];
     struct pt_render r = *render;
-    struct lull_host_block list[2] = {{.x1 = 10, .y1 = 10, .spp = 100, .next_spp = 120, .asked = 1, .asked_spp = 100,
-                                .predicted_spp = 200, .thread_s = 30.0},
-                               {.x1 = 10, .y1 = 10, .spp = 50, .reason = LULL_REASON_CRITERION, .thread_s = 10.0}};
+    struct lull_host_block list[2] = {{.x1 = 10,
+                                       .y1 = 10,
+                                       .spp = 100,
+                                       .next_spp = 120,
+                                       .asked = 1,
+                                       .asked_spp = 100,
+                                       .predicted_spp = 200,
+                                       .thread_s = 30.0},
+                                      {.x1 = 10, .y1 = 10, .spp = 50, .reason = LULL_REASON_CRITERION, .thread_s = 10.0}};
     struct lull_host_blocks blocks = {.list = list, .count = 2, .spp_max = 1000};
     struct lull_host_totals totals = *render->totals;
     r.blocks = &blocks;
@@ -552,10 +588,16 @@ static void progress_is_honest(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(exr_holds_every_layer), cmocka_unit_test(exr_of_equal_renders_are_equal),
-        cmocka_unit_test(unwritable_folder_is_one_line), cmocka_unit_test(preview_is_srgb),
-        cmocka_unit_test(srgb_codes), cmocka_unit_test(stop_map_picture), cmocka_unit_test(stop_map_table),
-        cmocka_unit_test(report_is_what_happened), cmocka_unit_test(report_word_for_word), cmocka_unit_test(progress_is_honest),
+        cmocka_unit_test(exr_holds_every_layer),
+        cmocka_unit_test(exr_of_equal_renders_are_equal),
+        cmocka_unit_test(unwritable_folder_is_one_line),
+        cmocka_unit_test(preview_is_srgb),
+        cmocka_unit_test(srgb_codes),
+        cmocka_unit_test(stop_map_picture),
+        cmocka_unit_test(stop_map_table),
+        cmocka_unit_test(report_is_what_happened),
+        cmocka_unit_test(report_word_for_word),
+        cmocka_unit_test(progress_is_honest),
         cmocka_unit_test(progress_lines),
     };
     return cmocka_run_group_tests(tests, setup, teardown);

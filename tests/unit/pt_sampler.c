@@ -63,8 +63,9 @@ static void single_numbers_are_stratified(void **state)
 /* What a vertex and the camera draw, and how many dimensions from there. */
 static const struct {
     uint32_t dim, width;
-} vertex_dims[] = {{PT_DIM_BSDF, 2}, {PT_DIM_LIGHT, 2}, {PT_DIM_LIGHT_PICK, 1}, {PT_DIM_BSDF_LOBE, 1}, {PT_DIM_ROULETTE, 1}, {PT_DIM_MEDIUM, 1},
-                   {PT_DIM_PHASE, 2}, {PT_DIM_ALPHA, 1}, {PT_DIM_SHADOW, 1}, {PT_DIM_MIX, 1}, {PT_DIM_BSDF_WALK, 1}},
+} vertex_dims[] = {{PT_DIM_BSDF, 2},     {PT_DIM_LIGHT, 2},  {PT_DIM_LIGHT_PICK, 1}, {PT_DIM_BSDF_LOBE, 1},
+                   {PT_DIM_ROULETTE, 1}, {PT_DIM_MEDIUM, 1}, {PT_DIM_PHASE, 2},      {PT_DIM_ALPHA, 1},
+                   {PT_DIM_SHADOW, 1},   {PT_DIM_MIX, 1},    {PT_DIM_BSDF_WALK, 1}},
   camera_dims[] = {{PT_DIM_PIXEL, 2}, {PT_DIM_LENS, 2}, {PT_DIM_TIME, 1}};
 
 static void no_dimension_has_two_uses(void **state)
@@ -90,11 +91,13 @@ static int draw_all(int kind, float (*u)[N_SAMPLES])
     for (uint32_t block = 0; block < N_BLOCKS; block++) {
         size_t uses = block ? sizeof vertex_dims / sizeof *vertex_dims : sizeof camera_dims / sizeof *camera_dims;
         for (size_t k = 0; k < uses; k++) {
-            uint32_t dim = block ? vertex_dims[k].dim : camera_dims[k].dim, width = block ? vertex_dims[k].width : camera_dims[k].width;
+            uint32_t dim = block ? vertex_dims[k].dim : camera_dims[k].dim,
+                     width = block ? vertex_dims[k].width : camera_dims[k].width;
             for (uint32_t i = 0; i < N_SAMPLES; i++) {
                 struct pt_sampler s = pt_sampler_make(kind, 1, i % 64, i / 64 % 4, i / 256);
                 pt_sampler_block(&s, block);
-                struct pt_sample2 p = width == 2 ? pt_sampler_2d(&s, dim) : (struct pt_sample2){pt_sampler_1d(&s, dim), 0.0f};
+                struct pt_sample2 p =
+                    width == 2 ? pt_sampler_2d(&s, dim) : (struct pt_sample2){pt_sampler_1d(&s, dim), 0.0f};
                 u[n][i] = (p.x - 0.5f) * sqrtf(12.0f);
                 if (width == 2)
                     u[n + 1][i] = (p.y - 0.5f) * sqrtf(12.0f);
@@ -202,9 +205,10 @@ static void streams_are_uniform(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(second_dimension_is_sobol),       cmocka_unit_test(pairs_are_nets),
-        cmocka_unit_test(single_numbers_are_stratified), cmocka_unit_test(no_dimension_has_two_uses), cmocka_unit_test(dimensions_are_independent),     cmocka_unit_test(numbers_depend_on_their_key_only),
-        cmocka_unit_test(streams_are_uniform),             cmocka_unit_test(no_two_streams_begin_alike),
+        cmocka_unit_test(second_dimension_is_sobol),     cmocka_unit_test(pairs_are_nets),
+        cmocka_unit_test(single_numbers_are_stratified), cmocka_unit_test(no_dimension_has_two_uses),
+        cmocka_unit_test(dimensions_are_independent),    cmocka_unit_test(numbers_depend_on_their_key_only),
+        cmocka_unit_test(streams_are_uniform),           cmocka_unit_test(no_two_streams_begin_alike),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -59,8 +59,21 @@ static void levels(void **state)
     assert_string_equal(err.text, "--levels cubic:1:2:3: expected geometric:FIRST:LAST:RATIO or linear:FIRST:LAST:STEP");
     pt_sequence_levels("linear:2:1:1", spp, &err);
     assert_string_equal(err.text, "--levels linear:2:1:1: expected 1 <= FIRST <= LAST, RATIO >= 1.001, STEP >= 1");
-    static const char *const bad[] = {"geometric:1:9:1.0009", "linear:1:9:0.9", "linear:0.9:9:1", "linear:1:1000000001:900000000", "", "linear", "linear:1:2", "cubic:1:2:3", "linear:0:5:1", "linear:5:1:1", "geometric:1:9:1",
-                                      "linear:1:9:1:2", "linear:1:9:nan", "linear:1:100000:1", "geometric:1:inf:2"};
+    static const char *const bad[] = {"geometric:1:9:1.0009",
+                                      "linear:1:9:0.9",
+                                      "linear:0.9:9:1",
+                                      "linear:1:1000000001:900000000",
+                                      "",
+                                      "linear",
+                                      "linear:1:2",
+                                      "cubic:1:2:3",
+                                      "linear:0:5:1",
+                                      "linear:5:1:1",
+                                      "geometric:1:9:1",
+                                      "linear:1:9:1:2",
+                                      "linear:1:9:nan",
+                                      "linear:1:100000:1",
+                                      "geometric:1:inf:2"};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
         assert_int_equal(pt_sequence_levels(bad[i], spp, &err), BASE_EINVAL);
 }
@@ -129,8 +142,13 @@ static int teardown(void **state)
 
 static struct pt_sequence_config make_config(void)
 {
-    return (struct pt_sequence_config){.directory = folder, .levels = "linear:16:352:112", .blocks = "1,11", .reference_spp = 64,
-                                       .scene_path = "x/room-view3.pbrt", .scene_crc = 0xabc, .render = pt_fake_config()};
+    return (struct pt_sequence_config){.directory = folder,
+                                       .levels = "linear:16:352:112",
+                                       .blocks = "1,11",
+                                       .reference_spp = 64,
+                                       .scene_path = "x/room-view3.pbrt",
+                                       .scene_crc = 0xabc,
+                                       .render = pt_fake_config()};
 }
 
 static int lines_said;
@@ -247,7 +265,8 @@ static void check_statistics(const unsigned char *p, const struct pt_render *r)
         means(r, i, mean, a, d);
         const double y = luminance(mean), m2 = r->film.moment2[i] / spp;
         const double e = sqrt(fmax(m2 - y * y, 0) / (spp - 1)) / fmax(fabs(y), 0.02);
-        expected[0] += (fabs(mean[0] - a[0]) + fabs(mean[1] - a[1]) + fabs(mean[2] - a[2])) / sqrt(mean[0] + mean[1] + mean[2]) / pixels;
+        expected[0] += (fabs(mean[0] - a[0]) + fabs(mean[1] - a[1]) + fabs(mean[2] - a[2])) /
+                       sqrt(mean[0] + mean[1] + mean[2]) / pixels;
         expected[1] += (fabs(y - luminance(a)) > 0.5 * fmax(fabs(y), 0.02)) / pixels;
         expected[2] += e * e / pixels;
         expected[3] += (e > 0.5) / pixels;
@@ -510,8 +529,12 @@ static void going_on(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(levels), cmocka_unit_test(block_lists), cmocka_unit_test(noise_free_colours_have_no_error),
-        cmocka_unit_test(recorded_folder), cmocka_unit_test(dropped_samples_are_counted), cmocka_unit_test(a_block_is_recorded_whole_or_not),
+        cmocka_unit_test(levels),
+        cmocka_unit_test(block_lists),
+        cmocka_unit_test(noise_free_colours_have_no_error),
+        cmocka_unit_test(recorded_folder),
+        cmocka_unit_test(dropped_samples_are_counted),
+        cmocka_unit_test(a_block_is_recorded_whole_or_not),
         cmocka_unit_test(going_on),
     };
     return cmocka_run_group_tests(tests, setup, teardown);

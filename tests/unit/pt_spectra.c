@@ -30,7 +30,8 @@ static void white_reflectance(void **state)
     for (int i = 0; i <= 4; i++) {
         pt_spd_constant(i / 4.0, &spd);
         pt_vec3 c = pt_spd_reflectance_rgb(&spd);
-        assert_true(fabsf(c.x - (float)i / 4) < 1e-5f && fabsf(c.y - (float)i / 4) < 1e-5f && fabsf(c.z - (float)i / 4) < 1e-5f);
+        assert_true(fabsf(c.x - (float)i / 4) < 1e-5f && fabsf(c.y - (float)i / 4) < 1e-5f &&
+                    fabsf(c.z - (float)i / 4) < 1e-5f);
     }
     const double red[] = {600, 0, 610, 1};
     pt_spd_from_pairs(red, 2, 1, &spd);
@@ -42,7 +43,8 @@ static void white_reflectance(void **state)
 static void black_bodies(void **state)
 {
     (void)state;
-    static const double known[][3] = {{2856, 0.4476, 0.4074}, {4000, 0.3805, 0.3768}, {6500, 0.3135, 0.3237}, {10000, 0.2807, 0.2884}};
+    static const double known[][3] = {
+        {2856, 0.4476, 0.4074}, {4000, 0.3805, 0.3768}, {6500, 0.3135, 0.3237}, {10000, 0.2807, 0.2884}};
     for (int i = 0; i < 4; i++) {
         struct pt_spd spd;
         double x, y;
@@ -54,10 +56,7 @@ static void black_bodies(void **state)
     }
 }
 
-static float fresnel(float n, float k)
-{
-    return ((n - 1) * (n - 1) + k * k) / ((n + 1) * (n + 1) + k * k);
-}
+static float fresnel(float n, float k) { return ((n - 1) * (n - 1) + k * k) / ((n + 1) * (n + 1) + k * k); }
 
 /* Reflectances at normal incidence as tables of metals give them: silver is white, gold and copper are not. */
 static void metals(void **state)
@@ -65,9 +64,12 @@ static void metals(void **state)
     (void)state;
     struct pt_spd eta, k;
     pt_vec3 n, kk;
-    static const char *const names[][2] = {{"metal-Ag-eta", "metal-Ag-k"}, {"metal-Au-eta", "metal-Au-k"}, {"metal-Cu-eta", "metal-Cu-k"},
+    static const char *const names[][2] = {{"metal-Ag-eta", "metal-Ag-k"},
+                                           {"metal-Au-eta", "metal-Au-k"},
+                                           {"metal-Cu-eta", "metal-Cu-k"},
                                            {"metal-Al-eta", "metal-Al-k"}};
-    static const float r[][3] = {{0.97f, 0.96f, 0.93f}, {0.9999f, 0.78f, 0.33f}, {0.955f, 0.64f, 0.54f}, {0.91f, 0.92f, 0.92f}};
+    static const float r[][3] = {
+        {0.97f, 0.96f, 0.93f}, {0.9999f, 0.78f, 0.33f}, {0.955f, 0.64f, 0.54f}, {0.91f, 0.92f, 0.92f}};
     for (int i = 0; i < 4; i++) {
         assert_int_equal(pt_spd_named(names[i][0], &eta), 1);
         assert_int_equal(pt_spd_named(names[i][1], &k), 1);
@@ -131,7 +133,11 @@ static void colour_spaces(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(white_reflectance), cmocka_unit_test(black_bodies), cmocka_unit_test(metals),
-                                       cmocka_unit_test(lists), cmocka_unit_test(what_absorbs_nothing), cmocka_unit_test(colour_spaces)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(white_reflectance),
+                                       cmocka_unit_test(black_bodies),
+                                       cmocka_unit_test(metals),
+                                       cmocka_unit_test(lists),
+                                       cmocka_unit_test(what_absorbs_nothing),
+                                       cmocka_unit_test(colour_spaces)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

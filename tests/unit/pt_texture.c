@@ -41,7 +41,8 @@ static void bytes_are_linearised(void **state)
 {
     (void)state;
     /* sRGB 188 is the code of about one half */
-    pt_vec3 srgb = pt_image_texel(&images[2], PT_WRAP_REPEAT, 0, 0, 0), lin = pt_image_texel(&images[3], PT_WRAP_REPEAT, 0, 0, 0);
+    pt_vec3 srgb = pt_image_texel(&images[2], PT_WRAP_REPEAT, 0, 0, 0),
+            lin = pt_image_texel(&images[3], PT_WRAP_REPEAT, 0, 0, 0);
     assert_true(fabsf(srgb.x - 0.5029f) < 1e-4f);
     assert_true(near(lin.x, (188.0f / 255.0f) * (188.0f / 255.0f)));
     /* alpha is never encoded */
@@ -64,7 +65,10 @@ static void bilinear_interpolates_between_centres(void **state)
         assert_true(v3_is_finite(pt_image_bilinear(r, PT_WRAP_REPEAT, 0, odd[i], odd[i])));
 }
 
-#define CONST(v) {.value = {v, v, v}}
+#define CONST(v) \
+    { \
+        .value = { v, v, v } \
+    }
 
 static void kinds_of_texture(void **state)
 {
@@ -98,10 +102,11 @@ static void kinds_of_texture(void **state)
 static void scale_and_offset(void **state)
 {
     (void)state;
-    struct pt_scene *s = world_scene(
-        "Texture \"plane\" \"spectrum\" \"bilerp\" \"rgb v00\" [0 0 0] \"rgb v01\" [1 1 1] \"rgb v10\" [2 2 2] \"rgb v11\" [3 3 3]\n"
-        "  \"float uscale\" 0.5 \"float vscale\" 0.25 \"float udelta\" 0.125 \"float vdelta\" 0.375\n"
-        "Material \"diffuse\" \"texture reflectance\" \"plane\" Shape \"sphere\"\n");
+    struct pt_scene *s =
+        world_scene("Texture \"plane\" \"spectrum\" \"bilerp\" \"rgb v00\" [0 0 0] \"rgb v01\" [1 1 1] \"rgb v10\" [2 2 2] "
+                    "\"rgb v11\" [3 3 3]\n"
+                    "  \"float uscale\" 0.5 \"float vscale\" 0.25 \"float udelta\" 0.125 \"float vdelta\" 0.375\n"
+                    "Material \"diffuse\" \"texture reflectance\" \"plane\" Shape \"sphere\"\n");
     assert_int_equal(s->texture_count, 1);
     const struct pt_texture *t = &s->textures[0];
     assert_true(t->su == 0.5f && t->sv == 0.25f && t->du == 0.125f && t->dv == 0.375f);
@@ -112,7 +117,8 @@ static void scale_and_offset(void **state)
     }
     pt_scene_destroy(s);
     /* an image: texel (1, 0) of the lower row, from the centre of the upper left one and there by du and dv alone */
-    struct pt_texture moved = {.kind = PT_TEXTURE_IMAGE, .wrap = PT_WRAP_REPEAT, .scale = 1, .su = 1, .sv = 1, .du = 0.5f, .dv = -0.5f};
+    struct pt_texture moved = {
+        .kind = PT_TEXTURE_IMAGE, .wrap = PT_WRAP_REPEAT, .scale = 1, .su = 1, .sv = 1, .du = 0.5f, .dv = -0.5f};
     struct pt_scene scene = {.images = images, .textures = &moved, .image_count = 1, .texture_count = 1};
     assert_true(near3(pt_texture_eval(&scene, 1, 0.25f, 0.75f), 1, 1, 1)); /* white */
     moved.du = 0;
@@ -120,7 +126,8 @@ static void scale_and_offset(void **state)
     moved.dv = 0;
     assert_true(near3(pt_texture_eval(&scene, 1, 0.25f, 0.75f), 1, 0, 0));
     /* a checkerboard of half a square upwards */
-    struct pt_texture board = {.kind = PT_TEXTURE_CHECKERBOARD, .su = 1, .sv = 1, .dv = 0.5f, .in = {CONST(1.0f), CONST(2.0f)}};
+    struct pt_texture board = {
+        .kind = PT_TEXTURE_CHECKERBOARD, .su = 1, .sv = 1, .dv = 0.5f, .in = {CONST(1.0f), CONST(2.0f)}};
     scene.textures = &board;
     assert_true(near(pt_texture_eval(&scene, 1, 0.5f, 0.4f).x, 1) && near(pt_texture_eval(&scene, 1, 0.5f, 0.6f).x, 2));
 }

@@ -32,10 +32,7 @@
 
 static FILE *out;
 
-static void number(float x)
-{
-    fprintf(out, " %.7g", x == 0.0f ? 0.0 : (double)x);
-}
+static void number(float x) { fprintf(out, " %.7g", x == 0.0f ? 0.0 : (double)x); }
 static void vector(pt_vec3 v)
 {
     number(v.x);
@@ -501,9 +498,9 @@ static void tell_lights(void)
 
 /* --- textures --------------------------------------------------------------------------------------------------------- */
 
-#define CONST(v)                                                                                                            \
-    {                                                                                                                       \
-        .value = { v, 2 * v, 3 * v }                                                                                        \
+#define CONST(v) \
+    { \
+        .value = { v, 2 * v, 3 * v } \
     }
 
 static void tell_textures(void)

@@ -30,11 +30,11 @@ static const struct lull_param params[P_COUNT] = {
     [P_PICTURE] = LULL_KIT_CHOICE("picture", "blend", "blend|denoised",
                                   "what is kept: the blend of noisy and denoised picture, or the denoised one alone"),
     [P_QUALITY] = LULL_KIT_CHOICE("quality", "high", "fast|balanced|high", "of the denoiser"),
-    [P_LIBRARY] = LULL_KIT_FILE("library", NULL,
-                                "Open Image Denoise, or a folder that holds it; else LULL_OIDN and the usual places"),
+    [P_LIBRARY] =
+        LULL_KIT_FILE("library", NULL, "Open Image Denoise, or a folder that holds it; else LULL_OIDN and the usual places"),
 };
 
-struct past { /* what is remembered of a block; saved as it is, without padding */
+struct past {     /* what is remembered of a block; saved as it is, without padding */
     uint64_t spp; /* of the last look; 0: none */
     uint64_t next_spp;
     double p_noisy, predicted_spp, error, halves, crossed; /* the last two in units of `error` */
@@ -46,8 +46,8 @@ struct lull_instance {
     struct lull_kit kit;
     struct ggn_observer observer;
     double stop_error;
-    char *library;      /* owns; NULL: the usual places */
-    atomic_flag warned; /* of halves that are none: once per frame */
+    char *library;       /* owns; NULL: the usual places */
+    atomic_flag warned;  /* of halves that are none: once per frame */
     struct gd_form form; /* of the open frame, as all below */
     uint32_t workers;
     struct gd_look *look;        /* owns, [workers] */
@@ -124,8 +124,8 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
             error = error_of(in, look, view, b, &tally, now);
         }
         decide(in, b, &tally, error, now, d);
-        *now = (struct past){b->spp, d->next_spp, d->p_noisy, d->predicted_spp, d->error, now->halves,
-                             now->crossed, d->action, d->flags, now->low, 0};
+        *now = (struct past){b->spp,       d->next_spp, d->p_noisy, d->predicted_spp, d->error, now->halves,
+                             now->crossed, d->action,   d->flags,   now->low,         0};
     }
     d->action = now->action;
     d->flags = now->flags;
@@ -234,11 +234,13 @@ static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *fr
     lull_kit_frame_open(in, frame);
     const struct lull_host *host = in->kit.host;
     if (host && host->log && (frame->planes & AUXILIARY) != AUXILIARY)
-        host->log(host, LULL_LOG_WARNING, "denoised: without the planes ALBEDO and NORMAL the denoiser blurs textures: "
-                                          "blocks take more samples");
+        host->log(host, LULL_LOG_WARNING,
+                  "denoised: without the planes ALBEDO and NORMAL the denoiser blurs textures: "
+                  "blocks take more samples");
     if (host && host->log && (frame->flags & LULL_FRAME_SHARED))
-        host->log(host, LULL_LOG_WARNING, "denoised: the filter gives neighbouring pixels the same samples: the denoiser "
-                                          "takes their noise for structure; use a filter within the pixel");
+        host->log(host, LULL_LOG_WARNING,
+                  "denoised: the filter gives neighbouring pixels the same samples: the denoiser "
+                  "takes their noise for structure; use a filter within the pixel");
     return LULL_OK;
 }
 
@@ -360,14 +362,12 @@ static int32_t state_load(struct lull_instance *in, const struct lull_reader *re
 
 static const struct lull_state state = {.struct_size = sizeof state, .save = state_save, .load = state_load};
 
-static const void *get_extension(const char *id)
-{
-    return id && !strcmp(id, LULL_EXT_STATE) ? &state : NULL;
-}
+static const void *get_extension(const char *id) { return id && !strcmp(id, LULL_EXT_STATE) ? &state : NULL; }
 
-const struct lull_criterion ggn_plugin_denoised = GP_TABLE(
-    .create = create, .begin_frame = begin_frame, .evaluate = evaluate, .end_frame = end_frame, .destroy = destroy,
-    .get_extension = get_extension, .id = "denoised", .name = "Denoised picture",
-    .description = "Error that people would see in the denoised picture, its bias included: both halves of the samples are\n"
-                   "denoised (Open Image Denoise) and held against each other and against the other half, noisy. `error`\n"
-                   "is the larger of the two over the limit of the model observer (1 = just not visible).");
+const struct lull_criterion ggn_plugin_denoised =
+    GP_TABLE(.create = create, .begin_frame = begin_frame, .evaluate = evaluate, .end_frame = end_frame, .destroy = destroy,
+             .get_extension = get_extension, .id = "denoised", .name = "Denoised picture",
+             .description =
+                 "Error that people would see in the denoised picture, its bias included: both halves of the samples are\n"
+                 "denoised (Open Image Denoise) and held against each other and against the other half, noisy. `error`\n"
+                 "is the larger of the two over the limit of the model observer (1 = just not visible).");

@@ -10,15 +10,9 @@ enum { TILE = 25 };
 
 /* --- memory ------------------------------------------------------------------------------------------------------------ */
 
-static int32_t most(int32_t a, int32_t b)
-{
-    return a > b ? a : b;
-}
+static int32_t most(int32_t a, int32_t b) { return a > b ? a : b; }
 
-static int32_t least(int32_t a, int32_t b)
-{
-    return a < b ? a : b;
-}
+static int32_t least(int32_t a, int32_t b) { return a < b ? a : b; }
 
 /* A side with what is looked at around it, as far as the frame's blocks reach: 0 < side <= area. */
 static int32_t widened(int32_t side, int32_t area)
@@ -65,9 +59,9 @@ int gd_look_create(struct gd_look *look, const struct gd_form *form, const char 
         l.box[i] = at;
     l.rgb = at;
     at += 3 * pixels;
-    float **const maps[] = {&l.light[0],     &l.light[1],     &l.light[2],     &l.light[3], &l.lightness[0], &l.lightness[1],
-                            &l.lightness[2], &l.lightness[3], &l.maps[0],      &l.maps[1],  &l.maps[2],      &l.crossed,
-                            &l.agreed,       &l.scratch,      &l.alpha};
+    float **const maps[] = {&l.light[0],     &l.light[1],     &l.light[2],     &l.light[3], &l.lightness[0],
+                            &l.lightness[1], &l.lightness[2], &l.lightness[3], &l.maps[0],  &l.maps[1],
+                            &l.maps[2],      &l.crossed,      &l.agreed,       &l.scratch,  &l.alpha};
     for (size_t i = 0; i < sizeof maps / sizeof maps[0]; i++, at += pixels)
         *maps[i] = at;
     int rc = lull_oidn_open(library, &l.oidn, err);
@@ -110,10 +104,7 @@ static struct lull_rect common(struct lull_rect a, struct lull_rect b)
     return (struct lull_rect){most(a.x0, b.x0), most(a.y0, b.y0), least(a.x1, b.x1), least(a.y1, b.y1)};
 }
 
-static int finite3(const float v[3])
-{
-    return isfinite(v[0]) && isfinite(v[1]) && isfinite(v[2]);
-}
+static int finite3(const float v[3]) { return isfinite(v[0]) && isfinite(v[1]) && isfinite(v[2]); }
 
 /* The pixels of `rect`, which are of block b, go into the box. What is no number is as the pixel to the left. */
 static int read_part(struct gd_look *look, struct lull_rect box, struct lull_rect rect, const struct lull_view *view,
@@ -248,10 +239,7 @@ static double standard_error(const struct sums *s)
     return s->n > 1.0 ? sqrt(fmax(0.0, s->square / s->n - mean * mean) / s->n) : fabs(mean);
 }
 
-static double cube(double v)
-{
-    return v > 0.0 ? v * v * v : 0.0;
-}
+static double cube(double v) { return v > 0.0 ? v * v * v : 0.0; }
 
 /* Mean of sixth powers of the error over a patch, for errors that are Gaussian inside it or inside its tiles. */
 static double sixth_moment(const struct gd_look *l, const float *raw, int width, const int patch[4], double unit)
@@ -291,7 +279,9 @@ static int cancelled(void *data)
 static int denoise(struct gd_look *look, const struct lull_kit *kit)
 {
     const struct lull_host *host = kit->host;
-    const struct lull_oidn_pictures p = {{look->box[HALF_A], look->box[HALF_B]}, look->box[ALBEDO], look->box[NORMAL],
+    const struct lull_oidn_pictures p = {{look->box[HALF_A], look->box[HALF_B]},
+                                         look->box[ALBEDO],
+                                         look->box[NORMAL],
                                          {look->box[DENOISED_A], look->box[DENOISED_B]}};
     return lull_oidn_run(look->oidn, &p, host && host->cancelled ? cancelled : NULL, &host, &look->err);
 }

@@ -24,9 +24,9 @@
 /* Pixels around a block that the denoiser is shown, and the most that lie there because the corner is on its grid. */
 enum { GD_HALO = 32, GD_REACH = GD_HALO + LULL_OIDN_GRID - 1 };
 
-struct gd_form { /* of a frame */
-    struct lull_rect area;    /* around all blocks */
-    int32_t width, height;    /* of the largest blocks */
+struct gd_form {               /* of a frame */
+    struct lull_rect area;     /* around all blocks */
+    int32_t width, height;     /* of the largest blocks */
     struct lull_oidn_form box; /* what is denoised for a block, of any size */
 };
 
@@ -41,10 +41,10 @@ struct gd_look {
     float *light[4];     /* [P]: displayed luminance of A, B and both denoised */
     float *lightness[4]; /* [P]: L* of the same */
     float *maps[3], *crossed, *agreed, *scratch, *alpha; /* [P] */
-    double *texture;     /* [patches] */
-    double *rows;        /* scratch of observer/visibility.h */
-    void *memory;        /* owns all of the above but oidn */
-    struct base_err err; /* of the last look */
+    double *texture;                                     /* [patches] */
+    double *rows;                                        /* scratch of observer/visibility.h */
+    void *memory;                                        /* owns all of the above but oidn */
+    struct base_err err;                                 /* of the last look */
 };
 
 /* frame: checked. quality: of struct lull_oidn_form. */

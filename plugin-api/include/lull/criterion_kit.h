@@ -55,15 +55,12 @@ struct lull_kit {
     int32_t transfer;     /* LULL_TRANSFER_ */
     uint64_t spp_max;     /* 0 = no limit */
     double picture_pixels;
-    double exposure;     /* 1 if the host gave nonsense */
+    double exposure; /* 1 if the host gave nonsense */
     double gamma;
     double luminance[3]; /* weights of R, G, B; equal ones if the host gave nonsense */
 };
 
-static inline struct lull_kit *lull_kit_of(struct lull_instance *in)
-{
-    return (struct lull_kit *)(void *)in;
-}
+static inline struct lull_kit *lull_kit_of(struct lull_instance *in) { return (struct lull_kit *)(void *)in; }
 
 static inline const struct lull_kit *lull_kit_read_of(const struct lull_instance *in)
 {
@@ -98,11 +95,26 @@ lull_kit_fail(struct lull_error *err, int32_t code, const char *format, ...)
 /* --- parameters ---------------------------------------------------------------------------------------------------- */
 
 /* Elements of a parameter table. `preset` is the default's text. */
-#define LULL_KIT_INT(name, preset, min, max, help) {name, help, preset, NULL, min, max, LULL_PARAM_INT, 0}
-#define LULL_KIT_FLOAT(name, preset, min, max, help) {name, help, preset, NULL, min, max, LULL_PARAM_FLOAT, 0}
-#define LULL_KIT_BOOL(name, preset, help) {name, help, preset, NULL, 0, 0, LULL_PARAM_BOOL, 0}
-#define LULL_KIT_CHOICE(name, preset, choices, help) {name, help, preset, choices, 0, 0, LULL_PARAM_CHOICE, 0}
-#define LULL_KIT_FILE(name, preset, help) {name, help, preset, NULL, 0, 0, LULL_PARAM_FILE, 0}
+#define LULL_KIT_INT(name, preset, min, max, help) \
+    { \
+        name, help, preset, NULL, min, max, LULL_PARAM_INT, 0 \
+    }
+#define LULL_KIT_FLOAT(name, preset, min, max, help) \
+    { \
+        name, help, preset, NULL, min, max, LULL_PARAM_FLOAT, 0 \
+    }
+#define LULL_KIT_BOOL(name, preset, help) \
+    { \
+        name, help, preset, NULL, 0, 0, LULL_PARAM_BOOL, 0 \
+    }
+#define LULL_KIT_CHOICE(name, preset, choices, help) \
+    { \
+        name, help, preset, choices, 0, 0, LULL_PARAM_CHOICE, 0 \
+    }
+#define LULL_KIT_FILE(name, preset, help) \
+    { \
+        name, help, preset, NULL, 0, 0, LULL_PARAM_FILE, 0 \
+    }
 
 /* A decimal number that fills the whole text; 0 if it is none. Not strtod, which follows the process's locale. */
 static inline int lull_kit_number(const char *text, double *out)
@@ -244,10 +256,7 @@ static inline int32_t lull_kit_create(const struct lull_kit_rule *rule, const st
     return LULL_OK;
 }
 
-static inline void lull_kit_destroy(struct lull_instance *in)
-{
-    free(in);
-}
+static inline void lull_kit_destroy(struct lull_instance *in) { free(in); }
 
 static inline int32_t lull_kit_requirements(const struct lull_instance *in, struct lull_requirements *req,
                                             struct lull_error *err)
@@ -376,18 +385,10 @@ static inline double lull_kit_stored(const char *at, int32_t type)
     double f64;
     uint32_t u32;
     switch (type) {
-    case LULL_TYPE_F32:
-        memcpy(&f32, at, sizeof f32);
-        return (double)f32;
-    case LULL_TYPE_F16:
-        memcpy(&f16, at, sizeof f16);
-        return lull_kit_half_float(f16);
-    case LULL_TYPE_F64:
-        memcpy(&f64, at, sizeof f64);
-        return f64;
-    default:
-        memcpy(&u32, at, sizeof u32);
-        return u32;
+    case LULL_TYPE_F32: memcpy(&f32, at, sizeof f32); return (double)f32;
+    case LULL_TYPE_F16: memcpy(&f16, at, sizeof f16); return lull_kit_half_float(f16);
+    case LULL_TYPE_F64: memcpy(&f64, at, sizeof f64); return f64;
+    default: memcpy(&u32, at, sizeof u32); return u32;
     }
 }
 
@@ -400,8 +401,8 @@ static inline const char *lull_kit_address(const struct lull_view *view, const s
 /* Estimates of `count` pixels of row y from x on, all inside the view and, for their N, of this block: out[pixel][channel].
  * Where there is no estimate (N = 0) comes NaN; where the host stored NaN or an infinity, that. */
 static inline void lull_kit_read(const struct lull_view *view, const struct lull_plane *plane,
-                                 const struct lull_block *block,
-                                 int32_t x, int32_t y, int32_t count, uint32_t channels, double (*out)[3])
+                                 const struct lull_block *block, int32_t x, int32_t y, int32_t count, uint32_t channels,
+                                 double (*out)[3])
 {
     const struct lull_plane *weight = plane->normaliser == LULL_NORM_WEIGHT ? lull_kit_plane(view, LULL_PLANE_WEIGHT) : NULL;
     double n = plane->normaliser == LULL_NORM_SPP        ? (double)block->spp
@@ -552,16 +553,15 @@ static inline void lull_kit_task(void *arg, uint64_t task, uint32_t worker)
 {
     const struct lull_kit_batch *b = (const struct lull_kit_batch *)arg;
     struct lull_decision *decision = (struct lull_decision *)(void *)((char *)b->decisions + task * b->decision_stride);
-    lull_kit_read_of(b->in)->rule->judge(b->in, b->view, (const struct lull_block *)lull_kit_at(b->blocks, b->block_stride,
-                                                                                                task),
-                                         decision, worker);
+    lull_kit_read_of(b->in)->rule->judge(
+        b->in, b->view, (const struct lull_block *)lull_kit_at(b->blocks, b->block_stride, task), decision, worker);
 }
 
 /* Checks everything, then judges block by block, on the host's workers if it has any. */
 static inline int32_t lull_kit_evaluate(struct lull_instance *in, const struct lull_view *view,
-                                        const struct lull_block *blocks,
-                                        uint32_t block_stride, struct lull_decision *decisions, uint32_t decision_stride,
-                                        uint32_t count, struct lull_error *err)
+                                        const struct lull_block *blocks, uint32_t block_stride,
+                                        struct lull_decision *decisions, uint32_t decision_stride, uint32_t count,
+                                        struct lull_error *err)
 {
     struct lull_kit_batch batch = {in, view, blocks, decisions, block_stride, decision_stride, count};
     int32_t status = lull_kit_batch_check(&batch, err);
@@ -579,10 +579,7 @@ static inline int32_t lull_kit_evaluate(struct lull_instance *in, const struct l
 
 /* --- answers ------------------------------------------------------------------------------------------------------- */
 
-static inline uint64_t lull_kit_spp(double spp)
-{
-    return spp >= 1e18 ? UINT64_C(1000000000000000000) : (uint64_t)spp;
-}
+static inline uint64_t lull_kit_spp(double spp) { return spp >= 1e18 ? UINT64_C(1000000000000000000) : (uint64_t)spp; }
 
 /* CONTINUE, next check at `next` samples: rounded up, later than now, within the host's limit. More samples than a double
  * or lull_kit_spp can count: when the host likes. */
@@ -612,9 +609,8 @@ struct lull_kit_tally {
  * next check is where the block is expected to stop, but at least a tenth and at most `growth` times more samples than now,
  * so that the checks of a block stay a logarithmic number. */
 static inline void lull_kit_verdict(const struct lull_kit *kit, const struct lull_block *block,
-                                    const struct lull_kit_tally *tally,
-                                    double error, double threshold, double tail_share, double growth,
-                                    struct lull_decision *decision)
+                                    const struct lull_kit_tally *tally, double error, double threshold, double tail_share,
+                                    double growth, struct lull_decision *decision)
 {
     double spp = (double)block->spp, predicted = (double)NAN;
     decision->flags = tally->bad > 0 ? LULL_DECISION_BAD_INPUT : 0;
@@ -646,24 +642,37 @@ static inline void lull_kit_verdict(const struct lull_kit *kit, const struct lul
 
 /* A library of one criterion without history: everything but its parameters, its struct lull_kit_rule and its judge. Its
  * instance is a struct lull_kit (lull_kit_of). `params` is the table and `count` its length (NULL, 0 without). */
-#define LULL_KIT_CRITERION(rule, params, count, id, name, version, description)                                             \
-    static int32_t lull_kit_own_create(const struct lull_host *, const struct lull_pair *, uint32_t, uint32_t,              \
-                                       struct lull_instance **, struct lull_error *);                                       \
-    static const struct lull_criterion lull_kit_own_table = {                                                               \
-        sizeof(struct lull_criterion), LULL_API_MINOR, id, name, version, description, params, count,                       \
-        sizeof(struct lull_param), LULL_THREADS_FULL, LULL_CAP_DETERMINISTIC | LULL_CAP_BATCH_INVARIANT,                    \
-        lull_kit_own_create, lull_kit_requirements, lull_kit_begin_frame, lull_kit_evaluate, lull_kit_end_frame,            \
-        lull_kit_destroy, lull_kit_get_extension};                                                                          \
-    static int32_t lull_kit_own_create(const struct lull_host *host, const struct lull_pair *pairs, uint32_t pair_count,    \
-                                       uint32_t pair_stride, struct lull_instance **instance, struct lull_error *err)       \
-    {                                                                                                                       \
+#define LULL_KIT_CRITERION(rule, params, count, id, name, version, description) \
+    static int32_t lull_kit_own_create(const struct lull_host *, const struct lull_pair *, uint32_t, uint32_t, \
+                                       struct lull_instance **, struct lull_error *); \
+    static const struct lull_criterion lull_kit_own_table = {sizeof(struct lull_criterion), \
+                                                             LULL_API_MINOR, \
+                                                             id, \
+                                                             name, \
+                                                             version, \
+                                                             description, \
+                                                             params, \
+                                                             count, \
+                                                             sizeof(struct lull_param), \
+                                                             LULL_THREADS_FULL, \
+                                                             LULL_CAP_DETERMINISTIC | LULL_CAP_BATCH_INVARIANT, \
+                                                             lull_kit_own_create, \
+                                                             lull_kit_requirements, \
+                                                             lull_kit_begin_frame, \
+                                                             lull_kit_evaluate, \
+                                                             lull_kit_end_frame, \
+                                                             lull_kit_destroy, \
+                                                             lull_kit_get_extension}; \
+    static int32_t lull_kit_own_create(const struct lull_host *host, const struct lull_pair *pairs, uint32_t pair_count, \
+                                       uint32_t pair_stride, struct lull_instance **instance, struct lull_error *err) \
+    { \
         return lull_kit_create(&(rule), &lull_kit_own_table, sizeof(struct lull_kit), host, pairs, pair_count, pair_stride, \
-                               NULL, instance, err);                                                                        \
-    }                                                                                                                       \
-    const struct lull_criterion *lull_criterion_entry_v1(uint32_t index)                                                    \
-    {                                                                                                                       \
-        return index == 0 ? &lull_kit_own_table : NULL;                                                                     \
-    }                                                                                                                       \
+                               NULL, instance, err); \
+    } \
+    const struct lull_criterion *lull_criterion_entry_v1(uint32_t index) \
+    { \
+        return index == 0 ? &lull_kit_own_table : NULL; \
+    } \
     struct lull_instance
 
 #endif

@@ -83,7 +83,7 @@ LULL_EXPORT const char *lull_host_parameter(const struct lull_criterion *table, 
 
 /* --- open: a frame -------------------------------------------------------------------------------------------------- */
 
-#define LULL_HOST_UNIFORM UINT32_C(0x100)   /* every block gets spp_max samples, and is asked about once at the end */
+#define LULL_HOST_UNIFORM UINT32_C(0x100)    /* every block gets spp_max samples, and is asked about once at the end */
 #define LULL_HOST_HALF_KNOWN UINT32_C(0x200) /* half_spp follows from spp: the renderer sets it, and no state holds it */
 
 /* Copied by lull_host_begin. Everything that may be 0 is so in a zeroed struct. */
@@ -100,10 +100,10 @@ struct lull_host_config {
     const struct lull_rect *layout;
     uint32_t layout_count, layout_stride; /* stride: bytes */
 
-    uint32_t planes;           /* mask of the planes that every view will hold, COLOR among them */
-    int32_t transfer;          /* LULL_TRANSFER_, and gamma, exposure, sample_clamp, rgb_to_xyz: as in struct lull_frame */
+    uint32_t planes;  /* mask of the planes that every view will hold, COLOR among them */
+    int32_t transfer; /* LULL_TRANSFER_, and gamma, exposure, sample_clamp, rgb_to_xyz: as in struct lull_frame */
     double gamma;
-    double exposure;           /* 0 reads as 1 */
+    double exposure; /* 0 reads as 1 */
     double sample_clamp;
     double rgb_to_xyz[9];      /* all 0: linear sRGB */
     uint64_t spp_min, spp_max; /* 1 <= spp_min <= spp_max <= 2^31 - 1 */
@@ -122,10 +122,10 @@ struct lull_host_config {
 #define LULL_REASON_NONE 0      /* the block is active: it gets samples */
 #define LULL_REASON_CRITERION 1 /* the criterion said stop */
 #define LULL_REASON_SPP_MAX 2
-#define LULL_REASON_UNIFORM 3   /* it has the samples that all were to get */
+#define LULL_REASON_UNIFORM 3 /* it has the samples that all were to get */
 #define LULL_REASON_TIME 4
 #define LULL_REASON_INTERRUPT 5
-#define LULL_REASON_DROPPED 6   /* the criterion said stop twice, but samples were dropped: not called converged */
+#define LULL_REASON_DROPPED 6 /* the criterion said stop twice, but samples were dropped: not called converged */
 #define LULL_REASON_COUNT 7
 
 /* "none", "criterion", "spp-max", …; "unknown" for other numbers. Static text. */
@@ -142,13 +142,13 @@ struct lull_host_block {
     uint64_t rays;          /* the renderer's own count; not read */
     uint64_t dropped;       /* samples, of all its pixels, that were left out for a value that is not finite */
 
-    uint64_t next_spp;      /* where the next check is: > spp while the block is to be rendered */
-    uint64_t asked_spp;     /* samples at the last answer */
+    uint64_t next_spp;                    /* where the next check is: > spp while the block is to be rendered */
+    uint64_t asked_spp;                   /* samples at the last answer */
     double p_noisy, error, predicted_spp; /* of the last answer; NaN: not known */
-    uint32_t asked;         /* there is an answer */
+    uint32_t asked;                       /* there is an answer */
     uint32_t checks;
-    uint32_t stop_votes;    /* STOP answers in a row */
-    uint32_t step;          /* of the mask, in eighths: its dial is scaled by 4^(-step / 8) */
+    uint32_t stop_votes; /* STOP answers in a row */
+    uint32_t step;       /* of the mask, in eighths: its dial is scaled by 4^(-step / 8) */
 };
 
 /* The blocks of a frame and their limits. Made by the library; tests make some by hand. */
@@ -160,7 +160,7 @@ struct lull_host_blocks {
     uint32_t list_columns;        /* of the part that is in the list, which is a rectangle of blocks */
     uint32_t flags;               /* LULL_HOST_UNIFORM */
     int32_t block_width, block_height;
-    int32_t x0, y0, x1, y1;       /* the smallest rectangle that holds them */
+    int32_t x0, y0, x1, y1; /* the smallest rectangle that holds them */
     uint64_t spp_min, spp_max, check_step;
 };
 
@@ -169,8 +169,8 @@ struct lull_host_totals {
     uint64_t samples, paths, rays, dropped;
     double render_s, criterion_s; /* wall seconds of rendering, which the renderer adds up, and of the checks */
     uint64_t checks, failed_checks, skipped_checks;
-    double criterion_thread_s;    /* processor seconds of the checks of this process, all its threads together */
-    uint64_t asked;               /* blocks that these were about */
+    double criterion_thread_s; /* processor seconds of the checks of this process, all its threads together */
+    uint64_t asked;            /* blocks that these were about */
 };
 
 /* Lays out the blocks and opens the criterion's frame. criterion: borrowed until end; NULL: nobody is asked (UNIFORM).
@@ -333,16 +333,16 @@ LULL_EXPORT const struct lull_host_sample *lull_host_dropped(const struct lull_h
 /* What the library cannot know. Text may be NULL: null in the report. */
 struct lull_host_report {
     uint32_t struct_size;
-    uint32_t flags; /* LULL_REPORT_ */
+    uint32_t flags;                    /* LULL_REPORT_ */
     const char *scene, *mask, *kernel; /* paths; name of the code that sampled */
     const char *const *effects;        /* [effect_count] that the scene calls for */
     uint32_t effect_count;
-    uint32_t threads, processes;       /* of all processes */
+    uint32_t threads, processes; /* of all processes */
     uint32_t zero;
-    uint64_t messages, message_bytes;  /* between the processes */
+    uint64_t messages, message_bytes; /* between the processes */
     double message_wait_s;
     uint64_t film_bytes, film_pixels;
-    double scene_bytes;                /* NaN: not known */
+    double scene_bytes; /* NaN: not known */
 };
 
 /* The report as JSON (lull-render(1) says what is in it): to a file, replaced as a whole or not at all, or to a writer. */

@@ -63,7 +63,8 @@ LULL_EXPORT int32_t lull_table_check(const struct lull_criterion *criterion, str
 #if defined(__GNUC__)
 __attribute__((format(printf, 3, 4)))
 #endif
-LULL_EXPORT int32_t lull_error_set(struct lull_error *err, int32_t code, const char *format, ...);
+LULL_EXPORT int32_t
+lull_error_set(struct lull_error *err, int32_t code, const char *format, ...);
 
 #ifdef __cplusplus
 }

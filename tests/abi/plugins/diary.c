@@ -47,8 +47,10 @@ static int32_t create_reopening(const struct lull_host *host, const struct lull_
 static int32_t requirements(const struct lull_instance *in, struct lull_requirements *req, struct lull_error *err)
 {
     (void)in, (void)err;
-    *req = (struct lull_requirements){.struct_size = req->struct_size, .planes_required = LULL_PLANE_BIT(LULL_PLANE_COLOR),
-                                      .planes_used = LULL_PLANE_BIT(LULL_PLANE_COLOR), .first_spp = 4};
+    *req = (struct lull_requirements){.struct_size = req->struct_size,
+                                      .planes_required = LULL_PLANE_BIT(LULL_PLANE_COLOR),
+                                      .planes_used = LULL_PLANE_BIT(LULL_PLANE_COLOR),
+                                      .first_spp = 4};
     return LULL_OK;
 }
 
@@ -56,8 +58,8 @@ static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *f,
 {
     (void)err;
     in->frame_is_open = 1;
-    fprintf(in->file, "begin %ux%u blocks %u min %llu max %llu seed %llu budget %g clamp %g exposure %g flags %u\n", f->width,
-            f->height, f->block_count, (unsigned long long)f->spp_min, (unsigned long long)f->spp_max,
+    fprintf(in->file, "begin %ux%u blocks %u min %llu max %llu seed %llu budget %g clamp %g exposure %g flags %u\n",
+            f->width, f->height, f->block_count, (unsigned long long)f->spp_min, (unsigned long long)f->spp_max,
             (unsigned long long)f->seed, f->time_budget_s, f->sample_clamp, f->exposure, f->flags);
     return LULL_OK;
 }
@@ -90,8 +92,8 @@ static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, 
         int again = in->reopens && (b->flags & LULL_BLOCK_STOPPED) && !in->opened[b->id % 4096];
         if (again)
             in->opened[b->id % 4096] = 1;
-        fprintf(in->file, "ask %u spp %llu flags %u at %d,%d,%d,%d red %.9g\n", b->id, (unsigned long long)b->spp, b->flags, b->x0,
-                b->y0, b->x1, b->y1, red_of(view, b));
+        fprintf(in->file, "ask %u spp %llu flags %u at %d,%d,%d,%d red %.9g\n", b->id, (unsigned long long)b->spp, b->flags,
+                b->x0, b->y0, b->x1, b->y1, red_of(view, b));
         d->action = b->spp >= end && !again ? LULL_STOP : LULL_CONTINUE;
         d->next_spp = d->action == LULL_CONTINUE ? b->spp + 8 : 0;
         d->p_noisy = 1.0 / (double)(b->id + 2);
@@ -128,15 +130,14 @@ static const void *get_extension(const char *id)
 }
 
 #define DIARY(the_id, the_create, caps) \
-    {.struct_size = sizeof(struct lull_criterion), .api_minor = LULL_API_MINOR, .id = the_id, .name = "diary", .version = "1", \
-     .description = "writes down what is done with it", .thread_level = LULL_THREADS_INSTANCE, .capabilities = caps, \
-     .create = the_create, .requirements = requirements, .begin_frame = begin_frame, .evaluate = evaluate, \
-     .end_frame = end_frame, .destroy = destroy, .get_extension = get_extension}
+    { \
+        .struct_size = sizeof(struct lull_criterion), .api_minor = LULL_API_MINOR, .id = the_id, .name = "diary", \
+        .version = "1", .description = "writes down what is done with it", .thread_level = LULL_THREADS_INSTANCE, \
+        .capabilities = caps, .create = the_create, .requirements = requirements, .begin_frame = begin_frame, \
+        .evaluate = evaluate, .end_frame = end_frame, .destroy = destroy, .get_extension = get_extension \
+    }
 
 static const struct lull_criterion diaries[2] = {DIARY("diary", create, LULL_CAP_DETERMINISTIC),
                                                  DIARY("diary-reopens", create_reopening, LULL_CAP_REOPENS)};
 
-const struct lull_criterion *lull_criterion_entry_v1(uint32_t index)
-{
-    return index < 2 ? &diaries[index] : NULL;
-}
+const struct lull_criterion *lull_criterion_entry_v1(uint32_t index) { return index < 2 ? &diaries[index] : NULL; }

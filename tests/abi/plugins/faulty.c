@@ -95,10 +95,7 @@ struct lull_instance {
 static struct history global_history[1024];
 static double shared_scratch[2];
 
-static enum fault fault_of(const struct lull_instance *in)
-{
-    return in ? (enum fault)(int)in->kit.value[FAULT] : NONE;
-}
+static enum fault fault_of(const struct lull_instance *in) { return in ? (enum fault)(int)in->kit.value[FAULT] : NONE; }
 
 /* --- pixels ---------------------------------------------------------------------------------------------------------- */
 
@@ -160,9 +157,7 @@ static void misbehave(const struct lull_instance *in, const struct lull_block *b
 {
     switch (fault_of(in)) {
 #if defined(__SSE__)
-    case FP_CONTROL:
-        _mm_setcsr(_mm_getcsr() | 0x8040);
-        break;
+    case FP_CONTROL: _mm_setcsr(_mm_getcsr() | 0x8040); break;
 #endif
     case PRINTS:
         puts("hello");
@@ -180,11 +175,8 @@ static void misbehave(const struct lull_instance *in, const struct lull_block *b
     case HANGS:
         for (;;)
             pause();
-    case RACE:
-        shared_scratch[0] += 1;
-        break;
-    default:
-        break;
+    case RACE: shared_scratch[0] += 1; break;
+    default: break;
     }
 }
 
@@ -221,10 +213,7 @@ static void remember(const struct lull_instance *in, const struct lull_view *vie
 }
 
 /* 0, when the host likes, beyond what can be counted. */
-static uint64_t later(uint64_t spp)
-{
-    return spp < UINT64_MAX / 2 ? spp + spp / 2 + 2 : 0;
-}
+static uint64_t later(uint64_t spp) { return spp < UINT64_MAX / 2 ? spp + spp / 2 + 2 : 0; }
 
 static void judge(struct lull_instance *in, const struct lull_view *view, const struct lull_block *block,
                   struct lull_decision *d, uint32_t worker)
@@ -398,14 +387,12 @@ static int32_t misanswer(struct lull_instance *in, const struct lull_view *view,
         if (err && err->struct_size == sizeof *err)
             err->message[0] = '\0';
         return status;
-    case POSITIVE:
-        return status == LULL_E_PLANE ? 5 : status;
+    case POSITIVE: return status == LULL_E_PLANE ? 5 : status;
     case SPINS:
         while (status == LULL_E_INVALID && blocks && block_stride >= sizeof *blocks && blocks->x0 > blocks->x1)
             pause(); /* it would go from x0 on until it meets x1 */
         return status;
-    default:
-        return status;
+    default: return status;
     }
 }
 
@@ -499,10 +486,7 @@ static int32_t load(struct lull_instance *in, const struct lull_reader *reader, 
 
 static const struct lull_state state = {.struct_size = sizeof state, .save = save, .load = load};
 
-static const void *get_extension(const char *id)
-{
-    return strcmp(id, LULL_EXT_STATE) == 0 ? &state : NULL;
-}
+static const void *get_extension(const char *id) { return strcmp(id, LULL_EXT_STATE) == 0 ? &state : NULL; }
 
 static const struct lull_criterion criterion = {
     .struct_size = sizeof(struct lull_criterion),
@@ -525,7 +509,4 @@ static const struct lull_criterion criterion = {
     .get_extension = get_extension,
 };
 
-const struct lull_criterion *lull_criterion_entry_v1(uint32_t index)
-{
-    return index == 0 ? &criterion : NULL;
-}
+const struct lull_criterion *lull_criterion_entry_v1(uint32_t index) { return index == 0 ? &criterion : NULL; }

@@ -14,7 +14,4 @@ __attribute__((constructor)) static void loaded(void)
 #endif
 }
 
-const struct lull_criterion *lull_criterion_entry_v1(uint32_t index)
-{
-    return index == 0 ? &stub : NULL;
-}
+const struct lull_criterion *lull_criterion_entry_v1(uint32_t index) { return index == 0 ? &stub : NULL; }

@@ -2,7 +2,4 @@
 #include <lull/criterion.h>
 
 LULL_EXPORT int something_else(void);
-int something_else(void)
-{
-    return 1;
-}
+int something_else(void) { return 1; }

@@ -101,10 +101,7 @@ static uint64_t hash(uint64_t h, const void *data, size_t size)
     return h * UINT64_C(0x9e3779b97f4a7c15);
 }
 
-static uint64_t hash_number(uint64_t h, double number)
-{
-    return hash(h, &number, sizeof number);
-}
+static uint64_t hash_number(uint64_t h, double number) { return hash(h, &number, sizeof number); }
 
 static uint64_t hash_block(uint64_t h, const struct lull_block *b)
 {

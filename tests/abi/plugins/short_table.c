@@ -3,7 +3,4 @@
 
 static const struct lull_criterion stub = {.struct_size = 32, .id = "short-table"};
 
-const struct lull_criterion *lull_criterion_entry_v1(uint32_t index)
-{
-    return index == 0 ? &stub : NULL;
-}
+const struct lull_criterion *lull_criterion_entry_v1(uint32_t index) { return index == 0 ? &stub : NULL; }

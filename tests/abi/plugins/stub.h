@@ -34,10 +34,7 @@ static inline int32_t stub_evaluate(struct lull_instance *in, const struct lull_
     return LULL_E_UNSUPPORTED;
 }
 
-static inline void stub_end(struct lull_instance *in)
-{
-    (void)in;
-}
+static inline void stub_end(struct lull_instance *in) { (void)in; }
 
 static inline const void *stub_extension(const char *id)
 {
@@ -45,12 +42,12 @@ static inline const void *stub_extension(const char *id)
     return NULL;
 }
 
-#define STUB(the_id)                                                                                                        \
-    {                                                                                                                       \
-        .struct_size = sizeof(struct lull_criterion), .api_minor = LULL_API_MINOR, .id = the_id, .name = "stub",            \
-        .version = "1", .description = "does nothing", .create = stub_create, .requirements = stub_requirements,            \
-        .begin_frame = stub_begin, .evaluate = stub_evaluate, .end_frame = stub_end, .destroy = stub_end,                   \
-        .get_extension = stub_extension                                                                                     \
+#define STUB(the_id) \
+    { \
+        .struct_size = sizeof(struct lull_criterion), .api_minor = LULL_API_MINOR, .id = the_id, .name = "stub", \
+        .version = "1", .description = "does nothing", .create = stub_create, .requirements = stub_requirements, \
+        .begin_frame = stub_begin, .evaluate = stub_evaluate, .end_frame = stub_end, .destroy = stub_end, \
+        .get_extension = stub_extension \
     }
 
 #endif

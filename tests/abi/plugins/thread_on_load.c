@@ -19,7 +19,4 @@ __attribute__((constructor)) static void loaded(void)
         pthread_detach(thread);
 }
 
-const struct lull_criterion *lull_criterion_entry_v1(uint32_t index)
-{
-    return index == 0 ? &stub : NULL;
-}
+const struct lull_criterion *lull_criterion_entry_v1(uint32_t index) { return index == 0 ? &stub : NULL; }

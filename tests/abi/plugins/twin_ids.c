@@ -3,7 +3,4 @@
 
 static const struct lull_criterion stubs[2] = {STUB("twin"), STUB("twin")};
 
-const struct lull_criterion *lull_criterion_entry_v1(uint32_t index)
-{
-    return index < 2 ? &stubs[index] : NULL;
-}
+const struct lull_criterion *lull_criterion_entry_v1(uint32_t index) { return index < 2 ? &stubs[index] : NULL; }
