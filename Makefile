@@ -63,7 +63,7 @@ INC_plugin-api_mpi     := $(BASE) $(MPI_CFLAGS)# the only folder that knows MPI
 INC_plugin-api_tools   := $(API) $(BASE)
 INC_plugin-api_host    := $(API) $(BASE)
 INC_pathtracer         := -Ipathtracer $(BASE) $(EXR_CFLAGS)
-INC_pathtracer_host    := $(INC_pathtracer) $(API)# pathtracer/render and the command: the only hosts of criteria
+INC_pathtracer_host    := $(INC_pathtracer) $(API)# pathtracer/render and pathtracer/app: the only hosts of criteria
 INC_ggn                := -Iggn $(BASE) $(BLAS_CFLAGS)
 INC_ggn_plugin         := $(INC_ggn) $(API)# ggn/plugin: the only folder of ggn that knows the ABI
 INC_tests_pt           := -Itests -Itests/support $(INC_pathtracer_host)
@@ -79,9 +79,9 @@ HOST_SRC    := $(wildcard plugin-api/host/*.c)
 EXAMPLE_SRC := $(wildcard plugin-api/examples/*.c)
 TOOL_SRC    := $(wildcard plugin-api/tools/*.c)
 MPI_SRC     := $(wildcard plugin-api/mpi/*.c)
-PT_SRC      := $(wildcard pathtracer/*/*.c)
+PT_SRC      := $(filter-out pathtracer/app/%,$(wildcard pathtracer/*/*.c))
 PT_IMAGES   := $(wildcard pathtracer/*/*.cpp)# in a shared object of their own; fuzz targets and benchmarks link them
-PT_MAIN     := $(wildcard pathtracer/*.c)
+PT_MAIN     := $(wildcard pathtracer/app/*.c)
 GGN_SRC     := $(filter-out ggn/plugin/% ggn/study/% ggn/cli/%,$(wildcard ggn/*/*.c))
 GGN_IMAGES  := $(wildcard ggn/*/*.cpp)# as PT_IMAGES
 # What includes nn/real.h itself is compiled for float and, with GGN_DOUBLE, for double.
@@ -132,7 +132,7 @@ all: $(PROGRAMS) $(CRITERIA) $(MODULES) $(HOST_LIB) $(EXAMPLES) ## build the pro
 # --- compiling: one rule, flags by folder --------------------------------------------------------------------------------
 inc = $(or $(strip \
   $(if $(filter plugin-api/%,$(1)),$(if $(filter plugin-api/base/% plugin-api/sequence/% plugin-api/denoise/%,$(1)),$(INC_plugin-api_base),$(if $(filter plugin-api/tools/%,$(1)),$(INC_plugin-api_tools),$(if $(filter plugin-api/host/%,$(1)),$(INC_plugin-api_host),$(if $(filter plugin-api/mpi/%,$(1)),$(INC_plugin-api_mpi),$(INC_plugin-api)))))) \
-  $(if $(filter pathtracer/%,$(1)),$(if $(filter pathtracer/render/% $(PT_MAIN) $(wildcard pathtracer/*.h),$(1)),$(INC_pathtracer_host),$(INC_pathtracer))) \
+  $(if $(filter pathtracer/%,$(1)),$(if $(filter pathtracer/app/% pathtracer/render/%,$(1)),$(INC_pathtracer_host),$(INC_pathtracer))) \
   $(if $(filter ggn/%,$(1)),$(if $(filter ggn/plugin/%,$(1)),$(INC_ggn_plugin),$(INC_ggn))) \
   $(if $(filter tests/%,$(1)),$(if $(filter pt_%,$(notdir $(1))),$(INC_tests_pt),$(if $(filter ggn_%,$(notdir $(1))),$(INC_tests_ggn),$(if $(filter base_%,$(notdir $(1))),$(INC_tests_base),$(if $(filter api_host_%,$(notdir $(1))),$(INC_tests_host),$(INC_tests_api))))))),)
 # Kernels for one instruction set carry it in their name (x_avx2.c, x_avx512.c); they are reached by run-time dispatch only.

@@ -12,14 +12,14 @@
 
 #include <cmocka.h>
 
-#include "action_image.c"
-#include "agree.c"
-#include "explain.c"
-#include "session.c"
-#include "setup.c"
+#include "app/action_image.c"
+#include "app/agree.c"
+#include "app/explain.c"
+#include "app/session.c"
+#include "app/setup.c"
 
-#include "cli.c"
-#include "quote_output.c"
+#include "app/cli.c"
+#include "app/quote_output.c"
 
 #include "base/png.h"
 #include "host/frame.h"
