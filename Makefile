@@ -1,7 +1,7 @@
 # Lull: one non-recursive Makefile. `make help` lists the targets.
 #
 # Sources are found by folder, so that a new file needs no line here. What a file may include is decided by the -I flags of
-# its folder: that is how the dependency arrows of the README are enforced (an illegal include does not compile).
+# its folder: that is how the dependency arrows of CONTRIBUTING.md are enforced (an illegal include does not compile).
 #
 #   MODE=release|debug|asan|tsan   objects and results of each mode live apart (release: build/, others: build/MODE/)
 #   DESTDIR PREFIX CC CXX CFLAGS LDFLAGS are honoured; CFLAGS and LDFLAGS are appended to the project's own.
