@@ -88,7 +88,8 @@ GGN_IMAGES  := $(wildcard ggn/*/*.cpp)# as PT_IMAGES
 GGN_TWICE   := $(shell grep -ls '"nn/real.h"' ggn/nn/*.c ggn/model/*.c tests/support/*.c)
 GGN_ENTRIES := $(wildcard ggn/plugin/entry_*.c)# one a library of criteria: entry_NAME.c makes NAME.so
 GGN_PLUGIN  := $(filter-out $(GGN_ENTRIES),$(wildcard ggn/plugin/*.c ggn/plugin/*/*.c))
-GGN_STUDY   := $(wildcard ggn/study/*.c)# the only user of STUDY_LIBS
+STUDY_MAIN  := ggn/study/main.c
+STUDY_SRC   := $(filter-out $(STUDY_MAIN),$(wildcard ggn/study/*.c))# the only users of STUDY_LIBS
 GGN_CLI     := $(wildcard ggn/cli/*.c)
 # Tests name what they test by prefix: pt_ (path tracer), ggn_, api_ (plugin-api), base_ (plugin-api/base, sequence, denoise).
 TEST_SRC    := $(wildcard tests/unit/*.c tests/grad/*.c tests/golden/*.c tests/stat/*.c tests/abi/*.c tests/hard/*.c tests/oom/*.c)
@@ -108,9 +109,9 @@ LOADER_OBJ  := $(call o,$(LOADER_SRC))
 GGN_CORE_OBJ := $(call o,$(GGN_SRC)) $(BASE_OBJ)
 GGN_OBJ     := $(GGN_CORE_OBJ) $(call o,$(GGN_IMAGES))
 GGN_PLUGIN_OBJ := $(call o,$(GGN_PLUGIN))
-GGN_STUDY_OBJ := $(call o,$(GGN_STUDY))
+STUDY_OBJ   := $(call o,$(STUDY_SRC))
 
-PROGRAMS := $(if $(PT_MAIN),$(BIN)/lull-render) $(if $(GGN_CLI),$(BIN)/ggn) $(if $(TOOL_SRC),$(BIN)/lull-check)
+PROGRAMS := $(if $(PT_MAIN),$(BIN)/lull-render) $(if $(GGN_CLI),$(BIN)/ggn) $(BIN)/lull-study $(if $(TOOL_SRC),$(BIN)/lull-check)
 MPI_MODULE := $(if $(MPI),$(OUT)/lib/lull-mpi.so)# loaded only by processes that a launcher has started
 # The host library for renderers (lull/host.h): the file has the major version in its name, programs link the other.
 HOST_LIB := $(OUT)/lib/liblull-host.so.1
@@ -162,8 +163,11 @@ so   = @mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--version-script=plu
 
 $(BIN)/lull-render: $(call o,$(PT_MAIN)) $(PT_CORE_OBJ) $(LOADER_OBJ) | $(OUT)/lib/lull-images.so
 	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) -o $@
-$(BIN)/ggn: $(call o,$(GGN_CLI)) $(GGN_STUDY_OBJ) $(GGN_CORE_OBJ) | $(OUT)/lib/ggn-images.so
-	$(link) $^ $(LDFLAGS_ALL) $(STUDY_LIBS) $(GGN_LIBS) -o $@
+$(BIN)/ggn: $(call o,$(GGN_CLI)) $(GGN_CORE_OBJ) | $(OUT)/lib/ggn-images.so
+	$(link) $^ $(LDFLAGS_ALL) $(GGN_LIBS) -o $@
+# Of the rest of ggn the study takes what it names, and no network is among it.
+$(BIN)/lull-study: $(call o,$(STUDY_MAIN)) $(STUDY_OBJ) $(OBJ)/ggn.a | $(OUT)/lib/ggn-images.so
+	$(link) $^ $(LDFLAGS_ALL) -Wl,--as-needed $(STUDY_LIBS) $(GGN_LIBS) -o $@
 # Of what both programs stand on the checker takes what it names.
 $(OBJ)/base.a: $(BASE_OBJ)
 	@rm -f $@; echo "  AR   $@"; $(AR) rcs $@ $^
@@ -208,7 +212,7 @@ $(OUT)/tests/$(1)/pt_%: $(OBJ)/tests/$(1)/pt_%.c.o $(PT_CORE_OBJ) $(LOADER_OBJ) 
 	$$(link) $$^ $$(LDFLAGS_ALL) $(PT_LIBS) -lcmocka -o $$@
 $(OUT)/tests/$(1)/ggn_%: $(OBJ)/tests/$(1)/ggn_%.c.o $(GGN_CORE_OBJ) $(SUPPORT_ggn)
 	$$(link) $$^ $$(LDFLAGS_ALL) $(GGN_LIBS) -lcmocka -o $$@
-$(OUT)/tests/$(1)/ggn_study%: $(OBJ)/tests/$(1)/ggn_study%.c.o $(GGN_STUDY_OBJ) $(GGN_CORE_OBJ) $(SUPPORT_ggn)
+$(OUT)/tests/$(1)/ggn_study%: $(OBJ)/tests/$(1)/ggn_study%.c.o $(STUDY_OBJ) $(GGN_CORE_OBJ) $(SUPPORT_ggn)
 	$$(link) $$^ $$(LDFLAGS_ALL) $(STUDY_LIBS) $(GGN_LIBS) -lcmocka -o $$@
 $(OUT)/tests/$(1)/ggn_plugin%: $(OBJ)/tests/$(1)/ggn_plugin%.c.o $(GGN_PLUGIN_OBJ) $(GGN_CORE_OBJ) $(SUPPORT_ggn)
 	$$(link) $$^ $$(LDFLAGS_ALL) $(GGN_LIBS) -lcmocka -o $$@
@@ -238,7 +242,7 @@ $(OUT)/tests/processors/embree_isa.so: $(OBJ)/tests/processors/embree_isa.c.o
 $(patsubst tests/%.c,$(OUT)/tests/%,$(wildcard tests/abi/api_*.c)): | $(ABI_PLUGINS) $(CRITERIA)
 $(OUT)/fuzz/replay-pt_%: $(OBJ)/tests/fuzz/pt_%.c.o $(OBJ)/tests/fuzz/replay.c.o $(PT_OBJ) $(LOADER_OBJ)
 	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) $(IMAGE_LIBS) -o $@
-$(OUT)/fuzz/replay-ggn_study%: $(OBJ)/tests/fuzz/ggn_study%.c.o $(OBJ)/tests/fuzz/replay.c.o $(GGN_STUDY_OBJ) $(GGN_OBJ)
+$(OUT)/fuzz/replay-ggn_study%: $(OBJ)/tests/fuzz/ggn_study%.c.o $(OBJ)/tests/fuzz/replay.c.o $(STUDY_OBJ) $(GGN_OBJ)
 	$(link) $^ $(LDFLAGS_ALL) $(STUDY_LIBS) $(GGN_LIBS) $(IMAGE_LIBS) -o $@
 $(OUT)/fuzz/replay-ggn_%: $(OBJ)/tests/fuzz/ggn_%.c.o $(OBJ)/tests/fuzz/replay.c.o $(GGN_OBJ)
 	$(link) $^ $(LDFLAGS_ALL) $(GGN_LIBS) $(IMAGE_LIBS) -o $@
@@ -279,8 +283,8 @@ asan tsan: ## run the unit and ABI tests under the sanitizer
 	@$(MAKE) --no-print-directory MODE=$@ all tests
 	@BUILD=build/$@ tests/run --$@ $(patsubst tests/%.c,build/$@/tests/%,$(SANE_SRC)) $(if $(filter tsan,$@),$(wildcard tests/tsan/*.sh))
 
-test-study: setup ## the page of ggn study in Chromium, simulated participants, load; installs what it can, skips the rest with a reason
-	@$(MAKE) --no-print-directory $(BIN)/ggn
+test-study: setup ## the page of lull-study in Chromium, simulated participants, load; installs what it can, skips the rest with a reason
+	@$(MAKE) --no-print-directory $(BIN)/lull-study
 	@BUILD=build tests/run $(filter-out %/node.sh,$(wildcard tests/study/*.sh))
 
 FUZZ_SECONDS ?= 60
@@ -292,7 +296,7 @@ fuzz: ## fuzz each target for FUZZ_SECONDS (default 60) under ASan+UBSan; needs 
 fuzzers: $(FUZZERS)
 build/fuzz/pt_%: $(OBJ)/tests/fuzz/pt_%.c.o $(PT_OBJ) $(LOADER_OBJ)
 	$(link) -fsanitize=fuzzer $^ $(LDFLAGS_ALL) $(PT_LIBS) $(IMAGE_LIBS) -o $@
-build/fuzz/ggn_study%: $(OBJ)/tests/fuzz/ggn_study%.c.o $(GGN_STUDY_OBJ) $(GGN_OBJ)
+build/fuzz/ggn_study%: $(OBJ)/tests/fuzz/ggn_study%.c.o $(STUDY_OBJ) $(GGN_OBJ)
 	$(link) -fsanitize=fuzzer $^ $(LDFLAGS_ALL) $(STUDY_LIBS) $(GGN_LIBS) $(IMAGE_LIBS) -o $@
 build/fuzz/ggn_%: $(OBJ)/tests/fuzz/ggn_%.c.o $(GGN_OBJ)
 	$(link) -fsanitize=fuzzer $^ $(LDFLAGS_ALL) $(GGN_LIBS) $(IMAGE_LIBS) -o $@
@@ -345,7 +349,7 @@ install: all ## install under $(DESTDIR)$(PREFIX)
 	    sed 's|@PREFIX@|$(PREFIX)|g' plugin-api/$$name.pc.in > $(DESTDIR)$(PREFIX)/lib/pkgconfig/$$name.pc || exit 1; done
 
 compdb: ## write compile_commands.json
-	@{ echo '['; sep=; for f in $(BASE_SRC) $(PT_SRC) $(PT_IMAGES) $(PT_MAIN) $(GGN_SRC) $(GGN_IMAGES) $(GGN_PLUGIN) $(GGN_ENTRIES) $(GGN_STUDY) $(GGN_CLI) $(HOST_SRC) $(LOADER_SRC) $(EXAMPLE_SRC) $(TOOL_SRC) $(MPI_SRC); do \
+	@{ echo '['; sep=; for f in $(BASE_SRC) $(PT_SRC) $(PT_IMAGES) $(PT_MAIN) $(GGN_SRC) $(GGN_IMAGES) $(GGN_PLUGIN) $(GGN_ENTRIES) $(STUDY_SRC) $(STUDY_MAIN) $(GGN_CLI) $(HOST_SRC) $(LOADER_SRC) $(EXAMPLE_SRC) $(TOOL_SRC) $(MPI_SRC); do \
 	  printf '%s' "$$sep"; $(MAKE) --no-print-directory -s compdb-one F=$$f; sep=,; done; echo ']'; } > compile_commands.json
 .PHONY: compdb-one
 compdb-one:

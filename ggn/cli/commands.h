@@ -29,8 +29,7 @@
     X(baseline, "train a published model before the network, as a criterion") \
     X(evaluate, "figures of models and baselines on recorded sequences") \
     X(cost, "what accuracy costs each criterion on recorded sequences") \
-    X(reconstruct, "the picture with each block at its threshold") \
-    X(study, "ask people for thresholds and judgements, on a local page")
+    X(reconstruct, "the picture with each block at its threshold")
 
 #define GGN_DECLARE_COMMAND(name, help) int ggn_cmd_##name(int argc, char **argv);
 GGN_COMMANDS(GGN_DECLARE_COMMAND)

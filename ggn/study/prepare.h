@@ -12,7 +12,7 @@
 #include "base/threads.h"
 #include "study/study.h"
 
-struct ggn_study_request_views { /* what `ggn study init` was told; all borrowed */
+struct ggn_study_request_views { /* what `lull-study init` was told; all borrowed */
     const char *dir;             /* to be made; must not hold a study */
     const char *page_dir;        /* its texts.en.json becomes DIR/texts.json */
     const char *const *views;    /* folders; a view's name is the folder's */

@@ -115,7 +115,7 @@ int ggn_study_store_open(const char *dir, const char *study_id, int create, stru
     }
     int flags = SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX | (create ? SQLITE_OPEN_CREATE : 0);
     if (dir && !create && access(s->path, F_OK) != 0)
-        rc = base_fail(err, BASE_EINVAL, "%s: nobody has taken part yet: `ggn study serve %s` first", s->path, dir);
+        rc = base_fail(err, BASE_EINVAL, "%s: nobody has taken part yet: `lull-study serve %s` first", s->path, dir);
     else if (sqlite3_open_v2(s->path, &s->db, flags, NULL) != SQLITE_OK)
         rc = fail_sql(s, err);
     if (!rc)

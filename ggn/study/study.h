@@ -1,7 +1,7 @@
 /*
  * The definition of one study: what is shown, how often, and what counts. DIR/study.json; its form is ggn/study/FORMAT.md.
  *
- * A study is written once by `ggn study init` and read by everything else. Beside it lie DIR/texts.json (what the page
+ * A study is written once by `lull-study init` and read by everything else. Beside it lie DIR/texts.json (what the page
  * says), DIR/stimuli (lossless pictures) and DIR/study.db (people and trials, ggn/study/store.h). Immutable after reading,
  * so any number of threads may read one object.
  */

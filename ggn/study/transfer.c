@@ -210,7 +210,7 @@ int ggn_study_import(const struct ggn_study *study, struct ggn_study_store *stor
     const cJSON *list = cJSON_GetObjectItemCaseSensitive(root, "people"), *o;
     free(text);
     if (!cJSON_IsString(format) || strcmp(format->valuestring, "lull-study-trials") != 0 || !cJSON_IsArray(list))
-        rc = base_fail(err, BASE_EINVAL, "%s: not a file of `ggn study export`", path);
+        rc = base_fail(err, BASE_EINVAL, "%s: not a file of `lull-study export`", path);
     else if (!cJSON_IsString(id) || strcmp(id->valuestring, study->id) != 0)
         rc = base_fail(err, BASE_EINVAL, "%s: trials of another study", path);
     else

@@ -34,10 +34,8 @@ d=$tmp/d one=$tmp/d/train/one-view0
 
 # --- options: help, and both bounds of every number ----------------------------------------------------------------------------
 says help --help
-for command in bench golden inspect convert flip visible compare import-sin3d label train baseline evaluate cost reconstruct study \
-    "study init" "study serve" "study status" "study report" "study export" "study import" "study delete"; do
-    # shellcheck disable=SC2086
-    says help $command --help
+for command in bench golden inspect convert flip visible compare import-sin3d label train baseline evaluate cost reconstruct; do
+    says help "$command" --help
 done
 while read -r command options; do
     for option in $options; do says bounds "$command" "--$option=x"; done
@@ -55,7 +53,6 @@ baseline epochs early ratio window type threads
 evaluate visible early epochs ratio window threads
 cost split precision ratio cadence threads
 END
-for option in task method trials repeats catch show gap break-every spacing spp-min spp-max block seed; do says bounds study init "--$option=x"; done
 for value in passes=1 =1 passes passes=x none=1 visible=1.5 sixteen-letters-.=1; do says bounds evaluate -d none -p "$value"; done
 says bounds evaluate -d none $(printf -- '-p passes=1 %.0s' 1 2 3 4 5 6 7 8 9)
 says bounds evaluate -d none $(printf -- '-m m %.0s' 1 2 3 4 5 6 7 8 9)
@@ -65,7 +62,6 @@ for option in model baseline thresholds; do # shellcheck disable=SC2046
     says bounds cost -d none $(printf -- "--$option m %.0s" 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17)
 done
 for word in "" frobnicate importsin3d import_sin3d -x; do says bounds $word; done
-for word in "" frobnicate -x; do says bounds study $word; done
 
 # --- labels --------------------------------------------------------------------------------------------------------------------
 printf '{"level": 0.25, "spread": 0.4, "each_view_left_out": [{"name": "four", "level": 0.2}, {"name": "five", "level": 0.3}]}\n' >"$tmp/o.json"

@@ -1,5 +1,6 @@
 #!/bin/sh
 # What each criterion brings into a host: the libraries that it is linked with, and that opening one by its name opens no other.
+# What ggn and lull-study are linked with: the page and the data base of a study are no part of ggn, BLAS and libsvm none of a study.
 BUILD=${BUILD:-build} n=0 bad=0
 lib=$BUILD/lib/lull
 err=$(mktemp) || exit 2
@@ -10,17 +11,19 @@ t() { # t TITLE COMMAND...
     n=$((n + 1))
     if "$@" >"$err" 2>&1; then echo "ok $n - $title"; else bad=1; echo "not ok $n - $title"; sed 's/^/# /' "$err"; fi
 }
-needs() { # needs LIBRARY NAME...: exactly these, beside the C library and the sanitizers'
-    got=$(objdump -p "$lib/$1" | awk '/NEEDED/ { print $2 }' | grep -vE '^lib(c|asan|ubsan)[.]so' | sed 's/[.]so.*//' | sort | tr '\n' ' ')
+needs() { # needs FILE NAME...: exactly these, beside the C library and the sanitizers'
+    got=$(objdump -p "$1" | awk '/NEEDED/ { print $2 }' | grep -vE '^lib(c|asan|ubsan)[.]so' | sed 's/[.]so.*//' | sort | tr '\n' ' ')
     shift
     echo "linked with: $got"
     [ "$got" = "$(printf '%s\n' "$@" | sort | tr '\n' ' ')" ]
 }
-t "observer.so needs the mathematical library" needs observer.so libm
-t "denoised.so needs the mathematical library, and no denoiser" needs denoised.so libm
-t "ggn.so needs no BLAS" needs ggn.so libcjson libm
-t "baselines.so needs OpenBLAS, LAPACKE and libsvm" needs baselines.so libcjson liblapacke libm libopenblas libsvm
-for k in fixed halfbuf variance; do t "$k.so needs the mathematical library" needs $k.so libm; done
+t "observer.so needs the mathematical library" needs "$lib/observer.so" libm
+t "denoised.so needs the mathematical library, and no denoiser" needs "$lib/denoised.so" libm
+t "ggn.so needs no BLAS" needs "$lib/ggn.so" libcjson libm
+t "baselines.so needs OpenBLAS, LAPACKE and libsvm" needs "$lib/baselines.so" libcjson liblapacke libm libopenblas libsvm
+for k in fixed halfbuf variance; do t "$k.so needs the mathematical library" needs "$lib/$k.so" libm; done
+t "lull-study needs libmicrohttpd and SQLite, no BLAS" needs "$BUILD/bin/lull-study" libcjson libm libmicrohttpd libpng16 libsqlite3 libz
+t "ggn needs neither" needs "$BUILD/bin/ggn" libcjson liblapacke libm libopenblas libpng16 libsvm libz
 only() { # only NAME: opened by it, NAME.so is the one library of criteria that is loaded
     LD_DEBUG=files "$BUILD/bin/lull-check" -q -o table "$1" 2>&1 | sed -n 's|.*calling init: .*/\([a-z_-]*[.]so\)$|\1|p' | sort -u >"$err.names"
     loaded=$(grep -xE "$(ls "$lib" | tr '\n' '|' | sed 's/|$//')" "$err.names" | tr '\n' ' ')

@@ -1,12 +1,12 @@
 // A real browser goes through every task to the end, at two window sizes, once with the keyboard alone; reload, a second tab,
 // a lost connection and a killed server lose nothing. Every page is looked at as it stands on the screen (look.mjs), and its
 // screenshot is left beside the studies.
-// usage: GGN=… CHROMIUM=… node browser.mjs FOLDER
+// usage: LULL_STUDY=… CHROMIUM=… node browser.mjs FOLDER
 import fs from 'node:fs';
 import path from 'node:path';
 import { chromium } from 'playwright-core';
 import { Looker } from './look.mjs';
-import { ASKED_BY, CONTACT, Client, Server, check, finish, ggn, makeConditions, makeLevels } from './support.mjs';
+import { ASKED_BY, CONTACT, Client, Server, check, finish, lullStudy, makeConditions, makeLevels } from './support.mjs';
 
 const root = process.argv[2];
 const SMALL = { width: 1280, height: 800 },
@@ -130,7 +130,7 @@ const stored = async (server, key) => (await new Client(server.link).get(`api/pe
 
 async function study(name, ...args) {
     const dir = path.join(root, name);
-    ggn('init', dir, ...args);
+    lullStudy('init', dir, ...args);
     return new Server(dir).start();
 }
 

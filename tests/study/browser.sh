@@ -1,5 +1,5 @@
 #!/bin/sh
-# All tasks of `ggn study` in a real browser; screenshots in build/study-test/browser/shots.
+# All tasks of `lull-study` in a real browser; screenshots in build/study-test/browser/shots.
 . "$(dirname "$0")/node.sh"
 need chromium chromium
 if [ ! -d "$work/node_modules/playwright-core" ]; then

@@ -1,8 +1,8 @@
 // Load: 50 simulated participants at once. Nothing is lost; the times of answers are told, and `scripts/bench --only study` judges them.
-// usage: GGN=… node load.mjs FOLDER
+// usage: LULL_STUDY=… node load.mjs FOLDER
 import fs from 'node:fs';
 import path from 'node:path';
-import { Client, Server, check, finish, ggn, makeLevels, random } from './support.mjs';
+import { Client, Server, check, finish, lullStudy, makeLevels, random } from './support.mjs';
 
 const root = process.argv[2];
 const PARTICIPANTS = 50;
@@ -10,7 +10,7 @@ const PARTICIPANTS = 50;
 fs.rmSync(root, { recursive: true, force: true });
 fs.mkdirSync(root, { recursive: true });
 makeLevels(path.join(root, 'view'), 400, 200, [16, 64, 256, 1024]);
-ggn(
+lullStudy(
     'init',
     path.join(root, 'study'),
     '--task',

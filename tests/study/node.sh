@@ -12,5 +12,5 @@ need() { # need COMMAND PACKAGE
 }
 need node nodejs
 mkdir -p "$work" && cp tests/study/*.mjs "$work" || exit 2
-GGN=$PWD/${BUILD:-build}/bin/ggn PAGE=$PWD/ggn/study/page
-export GGN PAGE
+LULL_STUDY=$PWD/${BUILD:-build}/bin/lull-study PAGE=$PWD/ggn/study/page
+export LULL_STUDY PAGE

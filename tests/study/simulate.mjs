@@ -1,10 +1,10 @@
 // Simulated participants, never called people: known psychometric curves go through the page's own QUEST+ and the server's
-// HTTP, and `ggn study report` must give their thresholds back: bias below 0.1 octave, 95 ± 2 % of the intervals right. Seeded.
-// usage: GGN=… node simulate.mjs FOLDER [RUNS]
+// HTTP, and `lull-study report` must give their thresholds back: bias below 0.1 octave, 95 ± 2 % of the intervals right. Seeded.
+// usage: LULL_STUDY=… node simulate.mjs FOLDER [RUNS]
 import fs from 'node:fs';
 import path from 'node:path';
 import { pathToFileURL } from 'node:url';
-import { Client, Server, check, finish, ggn, random, writePng } from './support.mjs';
+import { Client, Server, check, finish, lullStudy, random, writePng } from './support.mjs';
 
 console.log = (
     (log) =>
@@ -31,7 +31,7 @@ function makeView(name, blocks) {
 
 async function study(name, blocks, ...args) {
     const dir = path.join(root, name);
-    ggn('init', dir, '--task', 'thresholds', '--views', makeView(`view-${name}`, blocks), '--block', '8', ...args);
+    lullStudy('init', dir, '--task', 'thresholds', '--views', makeView(`view-${name}`, blocks), '--block', '8', ...args);
     return new Server(dir).start();
 }
 
@@ -101,7 +101,7 @@ function readCsv(file) {
 // Estimates of a study against the truth: {id: {curve, t: [octaves by block]}}.
 function judge(dir, truth, what) {
     fs.writeFileSync(path.join(dir, 'truth.json'), JSON.stringify(truth));
-    const out = ggn('report', dir, '--no-pictures');
+    const out = lullStudy('report', dir, '--no-pictures');
     const errors = [],
         groups = {};
     for (const row of readCsv(path.join(dir, 'report', 'estimates.csv'))) {
@@ -222,7 +222,7 @@ function judge(dir, truth, what) {
     }
     client.close();
     await server.stop();
-    ggn('report', path.join(root, 'catch'), '--no-pictures');
+    lullStudy('report', path.join(root, 'catch'), '--no-pictures');
     const rows = readCsv(path.join(root, 'catch', 'report', 'people.csv'));
     const found = rows.filter((r) => bad.has(r.person) && r.excluded).length,
         wronged = rows.filter((r) => good.has(r.person) && r.excluded).length;

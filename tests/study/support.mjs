@@ -1,4 +1,4 @@
-// What the tests of `ggn study` share: TAP, pictures to show, a server to talk to, and its kill and restart.
+// What the tests of `lull-study` share: TAP, pictures to show, a server to talk to, and its kill and restart.
 import { execFileSync, spawn } from 'node:child_process';
 import fs from 'node:fs';
 import http from 'node:http';
@@ -117,10 +117,10 @@ export function makeConditions(folder, width, height, sigmas) {
 // init: who asks is said for the caller
 export const ASKED_BY = 'Ada Example, Test Lab',
     CONTACT = 'room 7, or tests@lab.example';
-export const ggn = (verb, ...args) =>
+export const lullStudy = (verb, ...args) =>
     execFileSync(
-        process.env.GGN,
-        ['study', verb, ...args, ...(verb === 'init' ? ['--asked-by', ASKED_BY, '--contact', CONTACT] : [])],
+        process.env.LULL_STUDY,
+        [verb, ...args, ...(verb === 'init' ? ['--asked-by', ASKED_BY, '--contact', CONTACT] : [])],
         { encoding: 'utf8' },
     );
 
@@ -131,7 +131,7 @@ export class Server {
         this.log = '';
     }
     async start() {
-        this.child = spawn(process.env.GGN, ['study', 'serve', this.dir, '--listen', this.listen], {
+        this.child = spawn(process.env.LULL_STUDY, ['serve', this.dir, '--listen', this.listen], {
             stdio: ['ignore', 'pipe', 'pipe'],
         });
         process.once('exit', () => this.child.kill('SIGKILL')); // also when a test ends in the middle

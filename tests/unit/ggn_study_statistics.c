@@ -1,4 +1,4 @@
-/* The statistics of `ggn study report` against published values, closed forms and data whose answer is known. */
+/* The statistics of `lull-study report` against published values, closed forms and data whose answer is known. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,4 +1,4 @@
-"""A study served while the disk does not sync (ggn_study_disk.sh). Speaks TAP. PATIENCE is there only so that a server which hangs ends
+"""A study served while the disk does not sync (lull_study_disk.sh). Speaks TAP. PATIENCE is there only so that a server which hangs ends
 the test."""
 
 import atexit
@@ -10,7 +10,7 @@ import sys
 import time
 import urllib.request
 
-GGN, TMP = sys.argv[1:]
+PROGRAM, TMP = sys.argv[1:]
 STUDY, HOLD, CALLS = (os.path.join(TMP, name) for name in ("study", "hold", "calls"))
 PATIENCE = 120  # seconds
 numbers = itertools.count(1)
@@ -31,7 +31,7 @@ class Server:
     def __init__(self):
         env = {**os.environ, "LD_PRELOAD": os.path.join(TMP, "calls.so"), "CALLS": CALLS, "HOLD": HOLD}
         self.child = subprocess.Popen(
-            [GGN, "study", "serve", STUDY, "--listen", "127.0.0.1:0"], env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            [PROGRAM, "serve", STUDY, "--listen", "127.0.0.1:0"], env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
         atexit.register(self.child.kill)
         self.link = self.child.stdout.readline().strip()

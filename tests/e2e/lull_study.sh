@@ -9,12 +9,12 @@ for scene in cornell-box demo; do
         --reference-spp 512 --sequence "$tmp/data/$scene" --name $scene >"$tmp/out" 2>"$tmp/err"
     check "record $scene" $?
 done
-"$bin/ggn" study init "$tmp/study" --task thresholds --views "$tmp/data/cornell-box" "$tmp/data/demo" --repeats 1 \
+"$bin/lull-study" init "$tmp/study" --task thresholds --views "$tmp/data/cornell-box" "$tmp/data/demo" --repeats 1 \
     --asked-by "Ada Example" --contact ada@lab.example \
     >"$tmp/out" 2>"$tmp/err" &&
     [ "$(find "$tmp/study/stimuli" -name 'b0-10000.png' -o -name 'b0-9*.png' | wc -l)" -ge 2 ]
 check "init: levels up to 10,000 from the halves" $?
-"$bin/ggn" study serve "$tmp/study" --listen 127.0.0.1:0 >"$tmp/link" 2>"$tmp/err" &
+"$bin/lull-study" serve "$tmp/study" --listen 127.0.0.1:0 >"$tmp/link" 2>"$tmp/err" &
 server=$!
 while [ ! -s "$tmp/link" ] && kill -0 $server 2>/dev/null; do sleep 0.1; done
 python3 - "$(cat "$tmp/link")" >"$tmp/out" 2>"$tmp/err" <<'END'
@@ -32,11 +32,11 @@ for i, slot in enumerate(ask(f"api/people/{me['key']}")["slots"]):
     ask(f"api/people/{me['key']}/trials", {"slot": i, "revision": 0, "level": level, "answer": 0, "rating": 0, "ms": 3000})
 END
 check "a simulated participant sets all blocks" $?
-"$bin/ggn" study status "$tmp/study" >"$tmp/out" 2>"$tmp/err" && grep -q "1 people, 1 finished" "$tmp/out"
+"$bin/lull-study" status "$tmp/study" >"$tmp/out" 2>"$tmp/err" && grep -q "1 people, 1 finished" "$tmp/out"
 check "status, while it is served" $?
 kill $server && wait $server
 check "serve ends" $?
-"$bin/ggn" study report "$tmp/study" --no-pictures >"$tmp/out" 2>"$tmp/err" &&
+"$bin/lull-study" report "$tmp/study" --no-pictures >"$tmp/out" 2>"$tmp/err" &&
     [ "$(wc -l <"$tmp/study/report/thresholds.csv")" -eq 2 ]
 check "report" $?
 "$bin/ggn" label "$tmp/data" --human "$tmp/study/report/thresholds.csv" >"$tmp/out" 2>"$tmp/err" &&

@@ -1,4 +1,4 @@
-"""`ggn study` over raw HTTP: what is refused changes nothing and is logged; what is stored comes back. Speaks TAP.
+"""`lull-study` over raw HTTP: what is refused changes nothing and is logged; what is stored comes back. Speaks TAP.
 
 Every command, request and answer, what is stored, the exports and the reports are kept as they come and compared whole at the end
 (tests/golden/whole/study.txt; whole.py says how to record anew). gnuplot is one that hands its script back as the picture."""
@@ -19,7 +19,8 @@ import zlib
 sys.dont_write_bytecode = True
 import whole
 
-GGN = sys.argv[1]
+PROGRAM = sys.argv[1]
+GGN = os.path.join(os.path.dirname(PROGRAM), "ggn")
 TMP = tempfile.TemporaryDirectory()
 count = 0
 failed = 0
@@ -40,7 +41,7 @@ def keep(section, text):
     for regex, word in (
         (re.escape(TMP.name), "TMP"),
         (re.escape(whole.ROOT), "TREE"),
-        (re.escape(GGN), "ggn"),
+        (re.escape(PROGRAM), "lull-study"),
         (r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ", "TIME"),
         (r"\b(?!0{32})[0-9a-f]{32}\b", "HEX32"),
         (r"(127\.0\.0\.1|0\.0\.0\.0)(:|, port )\d{2,}", r"\1\2PORT"),
@@ -104,19 +105,19 @@ def view(name, pictures, width=32, height=16):
 ASKING = ["--asked-by", "Ada Example, Test Lab", "--contact", "room 7, or ada@lab.example"]
 
 
-def ggn(*args):
+def lull_study(*args):
     if args[:1] == ("init",) and "--asked-by" not in args and "--contact" not in args:
         args = (*args, *ASKING)
-    r = subprocess.run([GGN, "study", *args], capture_output=True, text=True)
+    r = subprocess.run([PROGRAM, *args], capture_output=True, text=True)
     if len(args) < 100:
-        keep("commands", "$ ggn study %s\n%s%sexit %d\n" % (" ".join(args), r.stdout, r.stderr, r.returncode))
+        keep("commands", "$ lull-study %s\n%s%sexit %d\n" % (" ".join(args), r.stdout, r.stderr, r.returncode))
     return r
 
 
 def fails(name, pattern, *args):
-    r = ggn(*args)
+    r = lull_study(*args)
     check(
-        r.returncode == 2 and any(line.startswith("ggn study ") and pattern in line for line in r.stderr.split("\n")),
+        r.returncode == 2 and any(line.startswith("lull-study ") and pattern in line for line in r.stderr.split("\n")),
         name,
         f"{r.returncode} {r.stderr}",
     )
@@ -128,7 +129,7 @@ class Server:
     def __init__(self, folder, listen="127.0.0.1:0"):
         self.log = open(os.path.join(TMP.name, "serve.log"), "w")
         self.child = subprocess.Popen(
-            [GGN, "study", "serve", folder, "--listen", listen], stdout=subprocess.PIPE, stderr=self.log, text=True
+            [PROGRAM, "serve", folder, "--listen", listen], stdout=subprocess.PIPE, stderr=self.log, text=True
         )
         atexit.register(self.child.kill)  # also when a test ends in the middle
         self.link = self.child.stdout.readline().strip()
@@ -257,7 +258,7 @@ init = [
     "--catch",
     "0.2",
 ]
-r = ggn(*init)
+r = lull_study(*init)
 check(r.returncode == 0 and "20 trials for each person" in r.stdout, "init from pictures", r.stderr)
 definition = json.load(open(os.path.join(study, "study.json")))
 check(
@@ -328,7 +329,7 @@ os.makedirs(named)
 for length in (95, 96):
     with open(os.path.join(named, "study.json"), "w") as f:
         json.dump({**definition, "views": [{**definition["views"][0], "name": "n" * length}]}, f)
-    r = ggn("report", named)
+    r = lull_study("report", named)
     told = "a name must be 1 … 95 letters" in r.stderr
     check(r.returncode == 2 and told == (length == 96), f"a name of {length} letters", r.stderr)
 fails(
@@ -561,10 +562,10 @@ fails(
     "report: nobody took part",
     "nobody has taken part yet",
     "report",
-    (lambda d: (ggn("init", d, *init[2:]), d)[1])(os.path.join(TMP.name, "fresh")),
+    (lambda d: (lull_study("init", d, *init[2:]), d)[1])(os.path.join(TMP.name, "fresh")),
 )
 adjustment = os.path.join(TMP.name, "adjustment")
-ggn("init", adjustment, "--task", "thresholds", "--views", levels, "--block", "16")
+lull_study("init", adjustment, "--task", "thresholds", "--views", levels, "--block", "16")
 server = Server(adjustment)
 codes = []
 for levels_set in ((64, 256), (16, 256), (1024, 1024)):
@@ -594,7 +595,7 @@ server.json(
 server.stop()
 keep_contents(study)
 keep_contents(adjustment)
-r = ggn("report", adjustment)
+r = lull_study("report", adjustment)
 keep_files("reported-adjustment", os.path.join(adjustment, "report"))
 report = os.path.join(adjustment, "report")
 lines = open(os.path.join(report, "blocks.csv")).read().split("\n")
@@ -639,7 +640,7 @@ check(
     "report: two blocks are too few for a noise ceiling, and it says so",
 )
 exported = os.path.join(TMP.name, "trials.json")
-r = ggn("export", adjustment, "-o", exported)
+r = lull_study("export", adjustment, "-o", exported)
 check(
     r.returncode == 0
     and len(json.load(open(exported))["people"]) == 3
@@ -668,7 +669,7 @@ fails("export: not onto it by a link", "the study's own study.db", "export", adj
 fails("report: not among the pictures", "lies among the pictures", "report", adjustment, "-n", "-o", os.path.join(adjustment, "stimuli", "v0"))
 check(bytes_of(adjustment) == kept_bytes, "  …and nothing in the folder has changed")
 inside = os.path.join(adjustment, "trials.json")
-check(ggn("export", adjustment, "-o", inside).returncode == 0 and open(inside).read() == open(exported).read(), "export: beside them")
+check(lull_study("export", adjustment, "-o", inside).returncode == 0 and open(inside).read() == open(exported).read(), "export: beside them")
 os.remove(inside)
 copy = os.path.join(TMP.name, "copy")
 os.makedirs(copy)
@@ -676,15 +677,15 @@ for name in ("study.json", "texts.json"):
     with open(os.path.join(adjustment, name)) as f, open(os.path.join(copy, name), "w") as g:
         g.write(f.read())
 keep_export(exported)
-check(ggn("import", copy, exported).returncode == 0, "import into a copy of the study")
-ggn("export", copy, "-o", exported + "2")
+check(lull_study("import", copy, exported).returncode == 0, "import into a copy of the study")
+lull_study("export", copy, "-o", exported + "2")
 check(open(exported).read() == open(exported + "2").read(), "and out again: the same bytes")
 fails("import: nobody twice", "is in the study already", "import", copy, exported)
 fails("import: another study", "trials of another study", "import", study, exported)
 fails("delete: nobody has that code", "nobody has the code", "delete", adjustment, "zzzzzzzz")
 check(
-    ggn("delete", adjustment, codes[2]).returncode == 0
-    and ggn("report", adjustment, "-n").returncode == 0
+    lull_study("delete", adjustment, codes[2]).returncode == 0
+    and lull_study("report", adjustment, "-n").returncode == 0
     and codes[2] not in open(os.path.join(report, "people.csv")).read(),
     "delete: gone from the next report",
 )
@@ -692,7 +693,7 @@ check(len(contents(adjustment)[1]) == 8, "delete: the others' trials stay")
 # --- a validation ---
 validation = os.path.join(TMP.name, "validation")
 rooms = [view(name, ["reference", "lull", "fixed"], 24, 24) for name in ("room", "hall")]
-ggn("init", validation, "--task", "validation", "--views", *rooms, "--repeats", "5", "--catch", "0.2")
+lull_study("init", validation, "--task", "validation", "--views", *rooms, "--repeats", "5", "--catch", "0.2")
 server = Server(validation)
 
 
@@ -727,9 +728,9 @@ for name, bad in (
 server.stop()
 keep_contents(validation)
 keep_files("made", validation)
-r = ggn("report", validation)
+r = lull_study("report", validation)
 keep_files("reported-validation", os.path.join(validation, "report"))
-ggn("export", validation, "-o", exported)
+lull_study("export", validation, "-o", exported)
 keep_export(exported)
 report = os.path.join(validation, "report")
 rows = [line.strip().split(";") for line in open(os.path.join(report, "judgements.csv"))]
@@ -761,15 +762,27 @@ check(
     "validation: report.json says who does not count, and how many people it takes",
     found,
 )
-check(ggn().returncode == 2 and ggn("taste", study).returncode == 2 and ggn("--help").returncode == 0, "usage")
+
+# --- the command line: help, and both bounds of every number ---
+check(lull_study().returncode == 2 and lull_study("taste", study).returncode == 2 and lull_study("-x").returncode == 2, "usage")
+VERBS = ("init", "serve", "status", "report", "export", "import", "delete")
+for verb in ((), *((v,) for v in VERBS)):
+    check(lull_study(*verb, "--help").returncode == 0, " ".join((*verb, "--help")))
+manual = open(os.path.join(whole.ROOT, "docs", "man", "lull-study.1")).read().replace("\\", "")
+for verb in VERBS:
+    said = subprocess.run([PROGRAM, verb, "--help"], capture_output=True, text=True).stdout
+    options = set(re.findall("--[a-z][a-z-]*", said)) - {"--help", "--usage", "--version"}
+    check(options <= set(re.findall("--[a-z][a-z-]*", manual)) and ".B lull-study " + verb in manual, f"{verb}: in the manual page", options)
+for option in "trials repeats catch show gap break-every spacing spp-min spp-max block seed task method".split():
+    fails(f"--{option}=x", f"--{option} x: expected", "init", f"--{option}=x")
 
 # --- two intervals and settings of several people, with their reports ---
 wide = view("wide", ["reference", "n-16", "n-64", "n-256", "n-1024"], 40, 20)
 choices = os.path.join(TMP.name, "choices")
-ggn("init", choices, "--task=thresholds", "--method=2ifc", "--views", wide, levels, "--block=20", "--trials=12", "--catch=0.2", "--seed=5",
+lull_study("init", choices, "--task=thresholds", "--method=2ifc", "--views", wide, levels, "--block=20", "--trials=12", "--catch=0.2", "--seed=5",
     "--show=300", "--gap=200", "--break-every=7")
 settings = os.path.join(TMP.name, "settings")
-ggn("init", settings, "--task=thresholds", "--views", wide, levels, "--block=10", "--repeats=3", "--spp-min=17", "--seed=6")
+lull_study("init", settings, "--task=thresholds", "--views", wide, levels, "--block=10", "--repeats=3", "--spp-min=17", "--seed=6")
 for folder, people in ((choices, 3), (settings, 4)):
     server = Server(folder)
     studied = server.json("GET", "api/study")[1]
@@ -790,21 +803,21 @@ for folder, people in ((choices, 3), (settings, 4)):
             status, got = server.json("POST", f"api/people/{key}/trials", body)
     server.stop()
     keep_contents(folder)
-    ggn("report", folder, "-o", folder + "-report")
+    lull_study("report", folder, "-o", folder + "-report")
     keep_files("reported-" + os.path.basename(folder), folder + "-report")
-    ggn("export", folder, "-o", exported)
+    lull_study("export", folder, "-o", exported)
     keep_export(exported)
 for folder, gone in ((choices, (-3, -1)), (validation, (-3, -2, -1))):  # who is left: one who went away; one of whom no spread is known
     people = [row[1] for row in contents(folder)[0]]
     for i in gone:
-        ggn("delete", folder, people[i])
-    ggn("report", folder, "-o", folder + "-left")
+        lull_study("delete", folder, people[i])
+    lull_study("report", folder, "-o", folder + "-left")
     keep_files("left-" + os.path.basename(folder), folder + "-left")
-ggn("report", study)  # too few trials for a threshold
+lull_study("report", study)  # too few trials for a threshold
 keep_files("left-study", os.path.join(study, "report"))
 recorded = os.path.join(whole.ROOT, "tests", "data", "recorded")
 sequence = os.path.join(TMP.name, "sequence")
-ggn("init", sequence, "--task=thresholds", "--views", os.path.join(recorded, "train", "one-view0"), os.path.join(recorded, "validation", "two"),
+lull_study("init", sequence, "--task=thresholds", "--views", os.path.join(recorded, "train", "one-view0"), os.path.join(recorded, "validation", "two"),
     "--spacing=0.9", "--spp-min=12", "--spp-max=2000")
 made = json.load(open(os.path.join(sequence, "study.json")))
 keep("sequence", json.dumps({**made, "id": ""}, indent=1) + "\n" + "\n".join(
@@ -812,7 +825,7 @@ keep("sequence", json.dumps({**made, "id": ""}, indent=1) + "\n" + "\n".join(
 
 # --- how it stands ---
 quick = os.path.join(TMP.name, "quick")
-ggn("init", quick, "--task=thresholds", "--views", levels, "--block=16", "--repeats=5")
+lull_study("init", quick, "--task=thresholds", "--views", levels, "--block=16", "--repeats=5")
 server = Server(quick)
 for fast in (1, 2):  # of ten settings
     person = server.json("POST", "api/people", {"consent": True})[1]
@@ -821,7 +834,7 @@ for fast in (1, 2):  # of ten settings
         body = {"slot": i, "revision": 0, "level": 16 if i < fast else 256, "answer": 0, "rating": 0, "ms": ms}
         server.json("POST", f"api/people/{person['key']}/trials", body)
 third = server.json("POST", "api/people", {"consent": True})[1]["id"]
-r = ggn("status", quick)
+r = lull_study("status", quick)
 lines = r.stdout.split("\n")
 check(
     r.returncode == 0
@@ -833,7 +846,7 @@ check(
     r.stdout + r.stderr,
 )
 server.stop()
-r = ggn("report", quick, "-n")
+r = lull_study("report", quick, "-n")
 keep_files("reported-quick", os.path.join(quick, "report"))
 rows = [line.split(";") for line in open(os.path.join(quick, "report", "blocks.csv")).read().split("\n")[1:3]]
 check(
@@ -845,7 +858,7 @@ fails("status: nobody took part", "nobody has taken part yet", "status", os.path
 
 # --- what an init, a server and a store refuse ---
 def init_fails(name, *args):
-    r = ggn("init", os.path.join(TMP.name, name), *args)
+    r = lull_study("init", os.path.join(TMP.name, name), *args)
     check(r.returncode == 2 and not os.path.exists(os.path.join(TMP.name, name, "study.json")), "init refuses: " + name, r.stderr)
 
 
@@ -867,7 +880,7 @@ init_fails("no-files", "--task=thresholds", "--views", os.path.join(TMP.name, "u
 mixed = view("mixed", ["n-300", "reference", "heavy", "n-20", "20", "x1000", "n-25", "notes", "n-2", "n-5000"], 16, 16)
 open(os.path.join(mixed, ".hidden-7.png"), "w").close()
 open(os.path.join(mixed, "plain"), "w").close()
-ggn("init", os.path.join(TMP.name, "chosen"), "--task", "thresholds", "--views", mixed, "--block", "16", "--spp-min", "2", "--spp-max", "5000", "--spacing", "0.5")
+lull_study("init", os.path.join(TMP.name, "chosen"), "--task", "thresholds", "--views", mixed, "--block", "16", "--spp-min", "2", "--spp-max", "5000", "--spacing", "0.5")
 keep_files("chosen", os.path.join(TMP.name, "chosen"))
 for name, token in (("short", "0" * 31 + "\n"), ("bare", "0" * 32), ("long", "0" * 33 + "\n"), ("capitals", "A" * 32 + "\n")):
     with open(os.path.join(study, "token"), "w") as f:

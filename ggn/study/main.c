@@ -1,4 +1,4 @@
-/* `ggn study VERB DIR`: thresholds and judgements from people, on a page served from this machine. */
+/* `lull-study VERB DIR`: thresholds and judgements from people, on a page served from this machine. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,7 +8,6 @@
 #include "base/interrupt.h"
 #include "base/options.h"
 #include "base/threads.h"
-#include "cli/commands.h"
 #include "study/page_path.h"
 #include "study/plan.h"
 #include "study/prepare.h"
@@ -17,6 +16,15 @@
 #include "study/status.h"
 #include "study/token.h"
 #include "study/transfer.h"
+
+enum { EXIT_BAD_INPUT = 2 }; /* or bad usage, or an output could not be written; 1: out of memory */
+
+/* Prints "lull-study VERB: text" on stderr and returns the exit status that err->code stands for. */
+static int fail(const char *command, const struct base_err *err)
+{
+    fprintf(stderr, "%s: %s\n", command, err->text);
+    return err->code == BASE_EINVAL || err->code == BASE_EIO ? EXIT_BAD_INPUT : EXIT_FAILURE;
+}
 
 /* --- init --- */
 
@@ -155,8 +163,10 @@ static int run_init(int argc, char **argv)
     struct init_options *o = calloc(1, sizeof *o);
     struct ggn_study study = {.min_catch_passed = 0.75, .max_untouched = 0.5, .max_fast = 0.1};
     struct base_err err = {0};
-    if (!o)
-        return base_fail_nomem(&err, "options") ? ggn_cmd_fail(argv[0], &err) : 0;
+    if (!o) {
+        base_fail_nomem(&err, "options");
+        return fail(argv[0], &err);
+    }
     *o = (struct init_options){.task = -1,
                                .method = -1,
                                .break_every = 60,
@@ -170,11 +180,11 @@ static int run_init(int argc, char **argv)
     if (!rc)
         rc = init(o, &study, &err);
     if (!rc)
-        printf("%s: %d view%s, %d trials for each person; `ggn study serve %s` opens it\n", o->args[0], study.n_views,
+        printf("%s: %d view%s, %d trials for each person; `lull-study serve %s` opens it\n", o->args[0], study.n_views,
                study.n_views == 1 ? "" : "s", ggn_study_plan_count(&study), o->args[0]);
     ggn_study_release(&study);
     free(o);
-    return rc ? ggn_cmd_fail(argv[0], &err) : GGN_EXIT_OK;
+    return rc ? fail(argv[0], &err) : EXIT_SUCCESS;
 }
 
 /* --- the other verbs: a folder, and an option or an argument more --- */
@@ -256,7 +266,7 @@ static int run_serve(int argc, char **argv)
     int rc = base_options_parse(&options, argc, argv, &o, &err);
     if (!rc)
         rc = serve(&o, &err);
-    return rc ? ggn_cmd_fail(argv[0], &err) : GGN_EXIT_OK;
+    return rc ? fail(argv[0], &err) : EXIT_SUCCESS;
 }
 
 /* --- what was collected --- */
@@ -280,7 +290,7 @@ static int with_store(const struct base_options *options, int argc, char **argv,
         rc = work(&o, &study, store, &err);
     ggn_study_store_close(store);
     ggn_study_release(&study);
-    return rc ? ggn_cmd_fail(argv[0], &err) : GGN_EXIT_OK;
+    return rc ? fail(argv[0], &err) : EXIT_SUCCESS;
 }
 
 static int do_report(const struct options *o, const struct ggn_study *study, struct ggn_study_store *store,
@@ -438,8 +448,8 @@ static const struct verb verbs[] = {
 };
 enum { N_VERBS = sizeof verbs / sizeof verbs[0] };
 
-/* `ggn study` with options only. */
-static int study_options(int argc, char **argv)
+/* `lull-study` with options only. */
+static int main_options(int argc, char **argv)
 {
     char doc[1024];
     size_t used =
@@ -449,26 +459,37 @@ static int study_options(int argc, char **argv)
     for (int i = 0; i < N_VERBS && used < sizeof doc; i++)
         used += (size_t)snprintf(doc + used, sizeof doc - used, "  %-8s %s\n", verbs[i].name, verbs[i].help);
     if (used < sizeof doc)
-        snprintf(doc + used, sizeof doc - used, "\n`ggn study VERB --help` says more.");
+        snprintf(doc + used, sizeof doc - used, "\n`lull-study VERB --help` says more.");
     struct base_options options = {.doc = doc, .args_doc = "VERB DIR [OPTION...]", .list = no_options};
     struct base_err err = {0};
     if (!base_options_parse(&options, argc, argv, NULL, &err))
-        base_fail(&err, BASE_EINVAL, "a verb is needed (ggn study --help lists them)");
-    return ggn_cmd_fail(argv[0], &err);
+        base_fail(&err, BASE_EINVAL, "a verb is needed (lull-study --help lists them)");
+    return fail("lull-study", &err);
 }
 
-int ggn_cmd_study(int argc, char **argv)
+/* Runs the verb of argv[1], which then reads "lull-study VERB". */
+static int run(int argc, char **argv)
 {
-    char name[64];
     struct base_err err = {0};
-    if (argc < 2 || argv[1][0] == '-')
-        return study_options(argc, argv);
     for (int i = 0; i < N_VERBS; i++)
         if (strcmp(argv[1], verbs[i].name) == 0) {
-            snprintf(name, sizeof name, "ggn study %s", verbs[i].name);
+            char name[64];
+            snprintf(name, sizeof name, "lull-study %s", verbs[i].name);
             argv[1] = name;
             return verbs[i].run(argc - 1, argv + 1);
         }
-    base_fail(&err, BASE_EINVAL, "%.64s: unknown verb (ggn study --help lists them)", argv[1]);
-    return ggn_cmd_fail(argv[0], &err);
+    base_fail(&err, BASE_EINVAL, "%.64s: unknown verb (lull-study --help lists them)", argv[1]);
+    return fail("lull-study", &err);
+}
+
+int main(int argc, char **argv)
+{
+    if (argc < 2 || argv[1][0] == '-')
+        return main_options(argc, argv);
+    int status = run(argc, argv);
+    if (fflush(stdout) || ferror(stdout)) {
+        fprintf(stderr, "lull-study: cannot write standard output\n");
+        return status ? status : EXIT_BAD_INPUT;
+    }
+    return status;
 }
