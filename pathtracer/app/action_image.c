@@ -16,11 +16,8 @@
 static void save_now_and_then(struct pt_session *s, const struct pt_render *render)
 {
     struct base_err why = {0};
-    char line[640];
-    if (pt_checkpoint_save(s->cli.checkpoint, render, s->settings, &why) != 0) {
-        snprintf(line, sizeof line, "no checkpoint, the render goes on: %s", why.text);
-        pt_say(s, line);
-    }
+    if (pt_checkpoint_save(s->cli.checkpoint, render, s->settings, &why) != 0)
+        base_log_say(&s->log, "no checkpoint, the render goes on: %s", why.text);
     s->checkpoint_at_s = base_clock_wall_s() + s->cli.checkpoint_every_s;
 }
 
@@ -125,14 +122,12 @@ static void tell_summary(struct pt_session *s)
     for (int i = 0; i < LULL_REASON_COUNT && used < sizeof line; i++)
         if (by_reason[i] > 0)
             used += (size_t)snprintf(line + used, sizeof line - used, " %u %s", by_reason[i], lull_host_reason(i));
-    pt_note(s, line);
+    base_log_note(&s->log, "%s", line);
     uint32_t kept = 0;
     const struct lull_host_sample *dropped = lull_host_dropped(r->frame, &kept);
-    if (r->totals->dropped > 0 && kept > 0) {
-        snprintf(line, sizeof line, "%llu samples were not finite and were dropped, the first seen at --debug-path %u,%u,%u",
-                 (unsigned long long)r->totals->dropped, dropped[0].x, dropped[0].y, dropped[0].sample);
-        pt_say(s, line);
-    }
+    if (r->totals->dropped > 0 && kept > 0)
+        base_log_say(&s->log, "%llu samples were not finite and were dropped, the first seen at --debug-path %u,%u,%u",
+                     (unsigned long long)r->totals->dropped, dropped[0].x, dropped[0].y, dropped[0].sample);
 }
 
 /* …and as far as a checkpoint to be resumed had come. */
@@ -162,15 +157,15 @@ int pt_action_image(struct pt_session *s, int *status, struct base_err *err)
     struct pt_render_hooks hooks = {.slice = after_slice_of_image,
                                     .interrupted = pt_interrupted,
                                     .suspend = pt_action_suspend,
-                                    .warn = pt_say,
+                                    .log = &s->log,
                                     .data = s};
     s->checkpoint_at_s = base_clock_wall_s() + s->cli.checkpoint_every_s;
     rc = pt_render_run(s->render, &hooks, &outcome, err);
-    pt_progress_clear(&s->progress);
+    base_log_clear(&s->log);
     struct base_err write_err = {0};
     if (write_outputs(s, pt_action_status(outcome) != 0, &write_err) != 0) {
         if (rc)
-            pt_say(s, write_err.text); /* besides the render's own error: it tells where the image is */
+            base_log_say(&s->log, "%s", write_err.text); /* besides the render's own error: it tells where the image is */
         else
             rc = base_fail(err, write_err.code, "%s", write_err.text);
         return rc;

@@ -39,18 +39,18 @@ int pt_action_quote(struct pt_session *s, int *status, struct base_err *err)
     int rc = pt_action_open_render(s, err);
     if (!rc)
         rc = pt_quote_create(s->render, s->criterion ? lull_host_table(s->criterion) : NULL, s->cli.params,
-                             s->cli.param_count, pt_say, s, &s->quote, err);
+                             s->cli.param_count, &s->log, &s->quote, err);
     if (rc)
         return rc;
     struct pt_render_hooks hooks = {.slice = pt_action_after_slice,
                                     .judged = ask_quote,
                                     .interrupted = pt_interrupted,
                                     .suspend = pt_action_suspend,
-                                    .warn = pt_say,
+                                    .log = &s->log,
                                     .data = s};
     s->checkpoint_at_s = base_clock_wall_s() + s->cli.checkpoint_every_s;
     rc = pt_render_run(s->render, &hooks, &outcome, err);
-    pt_progress_clear(&s->progress);
+    base_log_clear(&s->log);
     if (!rc && s->cli.checkpoint && pt_action_status(outcome) == 0)
         rc = pt_checkpoint_save(s->cli.checkpoint, s->render, s->settings, err);
     if (!rc && outcome != PT_RENDER_LOST)

@@ -21,9 +21,9 @@ int pt_action_sequence(struct pt_session *s, int *status, struct base_err *err)
                                         .reference_spp = s->cli.reference_spp,
                                         .scene_path = s->cli.scene,
                                         .name = s->cli.name,
-                                        .view = s->cli.view,
-                                        .quiet = s->cli.quiet,
-                                        .slice = pt_action_after_slice};
+                                        .view = s->cli.view};
+    const struct pt_render_hooks hooks = {
+        .slice = pt_action_after_slice, .interrupted = pt_interrupted, .log = &s->log, .data = s};
     int rc = pt_action_open_sequence(s, &config.render, err);
     if (!rc)
         rc = pt_agree_crc(s->cli.scene, &config.scene_crc, err);
@@ -34,9 +34,8 @@ int pt_action_sequence(struct pt_session *s, int *status, struct base_err *err)
     if (rc)
         return rc;
     int was_interrupted = 0;
-    rc = pt_sequence_record(&config, s->scene, s->kernel, s->threads, s->criterion, pt_interrupted, pt_say, s,
-                            &was_interrupted, err);
-    pt_progress_clear(&s->progress);
+    rc = pt_sequence_record(&config, s->scene, s->kernel, s->threads, s->criterion, &hooks, &was_interrupted, err);
+    base_log_clear(&s->log);
     *status = was_interrupted ? PT_EXIT_INTERRUPTED : 0;
     return rc;
 }

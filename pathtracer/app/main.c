@@ -15,12 +15,6 @@ static void explain(struct pt_session *s)
     pt_explain(s->scene, &s->defaults, &integrator, s->cli.scene);
 }
 
-static void print_line(void *data, const char *text)
-{
-    (void)data;
-    puts(text);
-}
-
 static int debug_path(struct pt_session *s, struct base_err *err)
 {
     struct pt_integrator integrator = s->defaults.integrator;
@@ -29,14 +23,14 @@ static int debug_path(struct pt_session *s, struct base_err *err)
     if (at[0] >= s->defaults.width || at[1] >= s->defaults.height)
         return base_fail(err, BASE_EINVAL, "--debug-path %d,%d,%d: the image has %dx%d pixels", at[0], at[1], at[2],
                          s->defaults.width, s->defaults.height);
-    pt_kernel_trace(s->scene, &integrator, (uint32_t)at[0], (uint32_t)at[1], (uint32_t)at[2], print_line, NULL);
+    pt_kernel_trace(s->scene, &integrator, (uint32_t)at[0], (uint32_t)at[1], (uint32_t)at[2], stdout);
     return 0;
 }
 
 static int run(struct pt_session *s, int *status, struct base_err *err)
 {
     if (s->cli.action == PT_CLI_LIST_CRITERIA) {
-        if (pt_criterion_list(stdout, pt_note, s) == 0)
+        if (pt_criterion_list(stdout, &s->log) == 0)
             return base_fail(err, BASE_EINVAL, "no criterion was found (LULL_PLUGIN_PATH names more folders to look in)");
         return 0;
     }
@@ -62,6 +56,8 @@ int main(int argc, char **argv)
     int rc = pt_cli_parse(&s.cli, argc, argv, &err);
     if (base_peers_open(&s.peers, rc ? &peers_err : &err) != 0 && !rc)
         rc = err.code;
+    if (!s.peers || s.peers->rank == 0)
+        base_log_init(&s.log, stderr, "lull-render", s.cli.quiet);
     if (s.peers && s.peers->rank > 0) {
         rc = pt_member_serve(&s, rc, &err);
         pt_session_release(&s);
@@ -71,17 +67,16 @@ int main(int argc, char **argv)
     if (s.peers && pt_crew_create(s.peers, s.cli.rank_timeout_s, &s.crew, rc ? &peers_err : &err) != 0 && !rc)
         rc = err.code;
     if (!rc) {
-        pt_progress_init(&s.progress, s.cli.quiet ? NULL : stderr);
+        pt_progress_init(&s.progress, &s.log);
         rc = run(&s, &status, &err);
     }
     if (rc) {
-        pt_progress_clear(&s.progress);
-        fprintf(stderr, "lull-render: %s\n", err.text);
+        base_log_say(&s.log, "%s", err.text);
         status = rc == BASE_EINVAL || rc == BASE_EIO ? PT_EXIT_BAD_INPUT : PT_EXIT_FAILED;
     }
     pt_session_release(&s);
     if ((fflush(stdout) != 0 || ferror(stdout)) && status == 0) {
-        fprintf(stderr, "lull-render: cannot write standard output\n");
+        base_log_say(&s.log, "cannot write standard output");
         status = PT_EXIT_BAD_INPUT;
     }
     pt_crew_dismiss(s.crew, status);

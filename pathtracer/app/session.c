@@ -1,27 +1,7 @@
 #include "session.h"
 
-#include <stdio.h>
-
 #include "base/interrupt.h"
 #include "pbrt/load.h"
-
-/* Of several processes rank 0 speaks. */
-void pt_say(void *data, const char *line)
-{
-    struct pt_session *s = data;
-    if (s->peers && s->peers->rank > 0)
-        return;
-    pt_progress_clear(&s->progress);
-    fprintf(stderr, "lull-render: %s\n", line);
-}
-
-/* Notes are for people at the terminal; -q has none. */
-void pt_note(void *data, const char *line)
-{
-    struct pt_session *s = data;
-    if (!s->cli.quiet)
-        pt_say(data, line);
-}
 
 static int load_scene(struct pt_session *s, struct base_err *err)
 {
@@ -31,10 +11,8 @@ static int load_scene(struct pt_session *s, struct base_err *err)
                                       .view = s->cli.view,
                                       .light_selection = s->cli.light_selection,
                                       .forced = s->cli.all_effects ? PT_FX_ALL : 0,
-                                      .quiet = s->cli.quiet,
                                       .inputs = &s->scene_files,
-                                      .warn = pt_note,
-                                      .warn_data = s};
+                                      .log = &s->log};
     int rc = pt_scene_load(s->cli.scene, &options, &s->scene, &s->defaults, err);
     if (rc)
         return rc;

@@ -18,6 +18,7 @@
 struct pt_session {
     struct pt_cli cli;
     struct base_inputs scene_files, judging; /* what was read; judging: plugin and mask */
+    struct base_log log;                     /* of rank 0; silent elsewhere */
     struct base_peers *peers;                /* NULL: this process is alone */
     struct pt_crew *crew;                    /* of rank 0 */
     struct base_threads *threads;
@@ -41,10 +42,6 @@ struct pt_session {
 int pt_session_open(struct pt_session *session, struct base_err *err);
 /* All but peers and crew. */
 void pt_session_release(struct pt_session *session);
-
-/* A line on stderr, from rank 0 only; data: the session. A note is for people at the terminal: -q has none. */
-void pt_say(void *data, const char *line);
-void pt_note(void *data, const char *line);
 
 /* base_interrupted as a hook; data: not used. */
 int pt_interrupted(void *data);

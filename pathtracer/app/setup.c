@@ -66,9 +66,9 @@ int pt_setup_criterion(struct pt_session *s, struct base_err *err)
     if (!cli->criterion && cli->spp > 0)
         return 0;
     const struct lull_criterion *table;
-    int rc = pt_criterion_find(spec, &s->judging, pt_note, s, &table, err);
+    int rc = pt_criterion_find(spec, &s->judging, &s->log, &table, err);
     if (!rc)
-        rc = pt_criterion_create(table, cli->params, cli->param_count, s->threads, pt_note, s, &s->criterion, err);
+        rc = pt_criterion_create(table, cli->params, cli->param_count, s->threads, &s->log, &s->criterion, err);
     if (rc || !cli->mask)
         return rc;
     rc = pt_mask_read(cli->mask, s->defaults.width, s->defaults.height, &s->mask, err);

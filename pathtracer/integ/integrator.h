@@ -8,6 +8,7 @@
 #define PT_INTEG_INTEGRATOR_H
 
 #include <stdint.h>
+#include <stdio.h>
 
 #include "scene/effects.h"
 #include "scene/materials.h"
@@ -44,6 +45,6 @@ void pt_kernel_census(const struct pt_scene *scene, const struct pt_integrator *
 
 /* One path vertex by vertex in words on `out` (--debug-path). */
 void pt_kernel_trace(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y,
-                     uint32_t sample, void (*line)(void *data, const char *text), void *data);
+                     uint32_t sample, FILE *out);
 
 #endif

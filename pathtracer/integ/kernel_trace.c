@@ -2,23 +2,17 @@
 #include "integ/run.h"
 
 void pt_kernel_trace(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y,
-                     uint32_t sample, void (*line)(void *data, const char *text), void *data)
+                     uint32_t sample, FILE *out)
 {
-    struct pt_trace trace = {.line = line, .data = data};
+    struct pt_trace trace = {.out = out};
     struct pt_path_result result;
     pt_run_sample(PT_FX_ALL, scene, settings, x, y, 1, sample, &trace, &result);
-}
-
-static void no_line(void *data, const char *text)
-{
-    (void)data;
-    (void)text;
 }
 
 void pt_kernel_census(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y,
                       uint32_t sample, uint64_t *met)
 {
-    struct pt_trace trace = {.line = no_line};
+    struct pt_trace trace = {0};
     struct pt_path_result result;
     pt_run_sample(PT_FX_ALL, scene, settings, x, y, 1, sample, &trace, &result);
     for (int i = 0; i < PT_MET_COUNT; i++)

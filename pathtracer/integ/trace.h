@@ -2,12 +2,13 @@
 #ifndef PT_INTEG_TRACE_H
 #define PT_INTEG_TRACE_H
 
+#include <stdio.h>
+
 #include "integ/integrator.h"
 #include "integ/surface.h"
 
 struct pt_trace {
-    void (*line)(void *data, const char *text); /* borrows text during the call */
-    void *data;
+    FILE *out; /* gets the lines; NULL: nobody reads them */
     int vertex;
     uint32_t met[PT_MET_COUNT]; /* vertices so far, by what they are */
 };

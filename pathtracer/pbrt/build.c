@@ -16,8 +16,7 @@ int pt_builder_init(struct pt_builder *b, struct pt_scene *scene, struct pt_scen
                     const struct pt_load_options *options, const struct pt_source *source, struct base_err *err)
 {
     *b = (struct pt_builder){.scene = scene, .defaults = defaults, .options = options, .source = source};
-    b->diag =
-        (struct pt_diag){.err = err, .strict = options->strict, .warn = options->warn, .warn_data = options->warn_data};
+    b->diag = (struct pt_diag){.err = err, .strict = options->strict, .log = options->log};
     b->camera_medium = b->open_object = b->default_material = -1;
     b->transform_times[1] = b->shutter[1] = 1;
     b->camera_ctm[0] = b->camera_ctm[1] = pt_xform_identity();

@@ -61,7 +61,7 @@ int pt_diag_nomem(struct pt_diag *diag, const char *what)
 
 void pt_diag_warn(struct pt_diag *diag, struct pt_loc loc, const char *format, ...)
 {
-    char text[TEXT_MAX], line[TEXT_MAX + 256];
+    char text[TEXT_MAX];
     va_list args;
     va_start(args, format);
     vsnprintf(text, sizeof text, format, args);
@@ -81,11 +81,9 @@ void pt_diag_warn(struct pt_diag *diag, struct pt_loc loc, const char *format, .
     snprintf(file, sizeof file, "%s", loc.file ? loc.file : "scene");
     make_one_line(file);
     if (loc.line > 0)
-        snprintf(line, sizeof line, "%s:%d: warning: %s", file, loc.line, text);
+        base_log_note(diag->log, "%s:%d: warning: %s", file, loc.line, text);
     else
-        snprintf(line, sizeof line, "%s: warning: %s", file, text);
-    if (diag->warn)
-        diag->warn(diag->warn_data, line);
+        base_log_note(diag->log, "%s: warning: %s", file, text);
 }
 
 void pt_diag_release(struct pt_diag *diag) { pt_names_release(&diag->said); }

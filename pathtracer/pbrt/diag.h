@@ -10,6 +10,7 @@
 #include <stdint.h>
 
 #include "base/err.h"
+#include "base/log.h"
 #include "pbrt/names.h"
 
 /* A place in a text file, 1-based; line 0 = the file as a whole, file NULL = no place. */
@@ -19,11 +20,10 @@ struct pt_loc {
 };
 
 struct pt_diag {
-    struct base_err *err;                       /* may be NULL */
-    int rc;                                     /* 0 until the first failure */
-    int strict;                                 /* warnings are failures */
-    void (*warn)(void *data, const char *line); /* may be NULL */
-    void *warn_data;
+    struct base_err *err; /* may be NULL */
+    int rc;               /* 0 until the first failure */
+    int strict;           /* warnings are failures */
+    struct base_log *log; /* may be NULL */
     struct pt_names said; /* owns: texts of the warnings given, each once */
 };
 
@@ -35,7 +35,7 @@ int pt_diag_fail_code(struct pt_diag *diag, int code, struct pt_loc loc, const c
     __attribute__((format(printf, 4, 5)));
 /* Out of memory while making `what`. */
 int pt_diag_nomem(struct pt_diag *diag, const char *what);
-/* Something is approximated or ignored: `file:line: warning: text`, each text once. A failure when strict. */
+/* Something is approximated or ignored: `file:line: warning: text`, a note, each text once. A failure when strict. */
 void pt_diag_warn(struct pt_diag *diag, struct pt_loc loc, const char *format, ...) __attribute__((format(printf, 3, 4)));
 void pt_diag_release(struct pt_diag *diag);
 

@@ -22,17 +22,15 @@ void pt_scene_destroy(struct pt_scene *scene)
 }
 
 /* Says where the time went when a person would have noticed it. */
-static void note_slow_load(const char *path, const struct pt_load_options *options, const struct pt_scene_stats *stats)
+static void note_slow_load(struct base_log *log, const char *path, const struct pt_scene_stats *stats)
 {
     const double noticeable_s = 3;
     double total_s = stats->parse_s + stats->texture_s + stats->build_s + stats->accel_s;
-    char line[512];
-    if (!options || options->quiet || !options->warn || total_s < noticeable_s)
-        return;
-    snprintf(line, sizeof line,
-             "%.200s: loaded in %.1f s: text and meshes %.1f, textures %.1f, acceleration structure %.1f, the rest %.1f",
-             path, total_s, stats->parse_s, stats->texture_s, stats->accel_s, stats->build_s);
-    options->warn(options->warn_data, line);
+    if (total_s >= noticeable_s)
+        base_log_note(log,
+                      "%.200s: loaded in %.1f s: text and meshes %.1f, textures %.1f, acceleration structure %.1f, the rest "
+                      "%.1f",
+                      path, total_s, stats->parse_s, stats->texture_s, stats->accel_s, stats->build_s);
 }
 
 int pt_scene_load_source(const char *path, const struct pt_source *source, const struct pt_load_options *options,
@@ -63,7 +61,7 @@ int pt_scene_load_source(const char *path, const struct pt_source *source, const
         rc = pt_builder_finish(b);
     scene->stats.build_s = base_clock_wall_s() - start_s - scene->stats.accel_s;
     if (!rc) {
-        note_slow_load(path, options, &scene->stats);
+        note_slow_load(b->options->log, path, &scene->stats);
         *out = scene;
         *defaults = found;
         scene = NULL;

@@ -3,6 +3,7 @@
 #define PT_PBRT_LOAD_OPTIONS_H
 
 #include "base/inputs.h"
+#include "base/log.h"
 #include "scene/effects.h"
 #include "scene/settings.h"
 
@@ -18,12 +19,10 @@ struct pt_load_options {
     int strict;        /* unsupported features are errors, not warnings */
     int width, height; /* > 0: replaces the film's resolution before the camera is set up (--size) */
     struct pt_view view;
-    int light_selection;                        /* enum pt_light_selection */
-    pt_effects forced;                          /* effects to turn on whether needed or not (--effects=all) */
-    struct base_inputs *inputs;                 /* gets every file that is read; may be NULL */
-    int quiet;                                  /* no progress notes */
-    void (*warn)(void *data, const char *line); /* one line per warning or note; may be NULL */
-    void *warn_data;
+    int light_selection;        /* enum pt_light_selection */
+    pt_effects forced;          /* effects to turn on whether needed or not (--effects=all) */
+    struct base_inputs *inputs; /* gets every file that is read; may be NULL */
+    struct base_log *log;       /* notes of warnings and of a slow load; may be NULL */
 };
 
 /* What the file says about the image and how to render it; the command line may override it. */

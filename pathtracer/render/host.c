@@ -13,15 +13,14 @@ int pt_host_fail(int32_t code, const struct lull_error *said, struct base_err *e
 /* What a criterion's services stand on; lives as long as it. */
 struct services {
     struct base_threads *threads;
-    void (*warn)(void *data, const char *line);
-    void *warn_data;
+    struct base_log *log;
 };
 
 static void tell(void *context, int32_t level, const char *text)
 {
     const struct services *s = context;
-    if (s->warn && level <= LULL_LOG_WARNING)
-        s->warn(s->warn_data, text);
+    if (level <= LULL_LOG_WARNING)
+        base_log_note(s->log, "%s", text);
 }
 
 static int32_t run_tasks(void *context, uint64_t count, lull_task_fn fn, void *arg)
@@ -32,14 +31,14 @@ static int32_t run_tasks(void *context, uint64_t count, lull_task_fn fn, void *a
 }
 
 int pt_criterion_create(const struct lull_criterion *table, const struct lull_pair *pairs, uint32_t pair_count,
-                        struct base_threads *threads, void (*warn)(void *data, const char *line), void *warn_data,
-                        struct lull_host_criterion **out, struct base_err *err)
+                        struct base_threads *threads, struct base_log *log, struct lull_host_criterion **out,
+                        struct base_err *err)
 {
     struct lull_error e = {.struct_size = sizeof e};
     struct services *s = malloc(sizeof *s);
     if (!s)
         return base_fail_nomem(err, "criterion");
-    *s = (struct services){threads, warn, warn_data};
+    *s = (struct services){threads, log};
     struct lull_host_services services = {.struct_size = sizeof services,
                                           .threads = threads ? (uint32_t)base_threads_count(threads) : 1,
                                           .name = "lull-render " BASE_VERSION,

@@ -5,22 +5,21 @@
 #include <string.h>
 
 struct teller {
-    void (*warn)(void *data, const char *line);
-    void *data;
+    struct base_log *log;
     int32_t level; /* of what is passed on, LULL_LOG_ */
 };
 
 static void tell(void *context, int32_t level, const char *text)
 {
     const struct teller *t = context;
-    if (t->warn && level <= t->level)
-        t->warn(t->data, text);
+    if (level <= t->level)
+        base_log_note(t->log, "%s", text);
 }
 
-int pt_criterion_find(const char *spec, struct base_inputs *inputs, void (*warn)(void *data, const char *line),
-                      void *warn_data, const struct lull_criterion **out, struct base_err *err)
+int pt_criterion_find(const char *spec, struct base_inputs *inputs, struct base_log *log, const struct lull_criterion **out,
+                      struct base_err *err)
 {
-    struct teller teller = {warn, warn_data, LULL_LOG_WARNING};
+    struct teller teller = {log, LULL_LOG_WARNING};
     struct lull_search search = {.log = tell, .log_context = &teller};
     struct lull_error e = {.struct_size = sizeof e};
     struct lull_found found;
@@ -62,9 +61,9 @@ static int32_t list_one(void *context, const struct lull_found *found)
     return LULL_OK;
 }
 
-int pt_criterion_list(FILE *out, void (*warn)(void *data, const char *line), void *warn_data)
+int pt_criterion_list(FILE *out, struct base_log *log)
 {
-    struct teller teller = {warn, warn_data, LULL_LOG_ERROR}; /* what loading does to this process, nobody asked */
+    struct teller teller = {log, LULL_LOG_ERROR}; /* what loading does to this process, nobody asked */
     struct lull_search search = {.log = tell, .log_context = &teller};
     struct listing listing = {.out = out};
     lull_list(&search, list_one, &listing);

@@ -8,13 +8,9 @@
 #include "base/clock.h"
 static const double LIVE_S = 0.2, FIRST_PLAIN_S = 2.0, PLAIN_S = 10.0;
 
-void pt_progress_init(struct pt_progress *p, FILE *out)
+void pt_progress_init(struct pt_progress *p, struct base_log *log)
 {
-    *p = (struct pt_progress){.out = out};
-    if (!out)
-        return;
-    p->terminal = isatty(fileno(out)) == 1;
-    p->next_s = base_clock_wall_s() + (p->terminal ? 0.0 : FIRST_PLAIN_S);
+    *p = (struct pt_progress){.log = log, .next_s = base_clock_wall_s() + (log->terminal ? 0.0 : FIRST_PLAIN_S)};
 }
 
 static void format_time(double s, char *text, size_t room)
@@ -79,27 +75,13 @@ void pt_progress_text(const struct pt_render *r, double *percent_shown, char *te
 void pt_progress_update(struct pt_progress *p, const struct pt_render *r)
 {
     double now_s = base_clock_wall_s();
-    if (!p->out || now_s < p->next_s)
+    if (!p->log || p->log->quiet || now_s < p->next_s)
         return;
     char text[256];
     if (r->totals->samples < p->samples)
         p->percent = 0.0; /* another render */
     p->samples = r->totals->samples;
     pt_progress_text(r, &p->percent, text, sizeof text);
-    if (p->terminal)
-        fprintf(p->out, "\r%s\033[K", text);
-    else
-        fprintf(p->out, "%s\n", text);
-    fflush(p->out);
-    p->shown = p->terminal;
-    p->next_s = now_s + (p->terminal ? LIVE_S : PLAIN_S);
-}
-
-void pt_progress_clear(struct pt_progress *p)
-{
-    if (p->out && p->shown) {
-        fputs("\r\033[K", p->out);
-        fflush(p->out);
-    }
-    p->shown = 0;
+    base_log_live(p->log, text);
+    p->next_s = now_s + (p->log->terminal ? LIVE_S : PLAIN_S);
 }

@@ -7,24 +7,19 @@
 #ifndef PT_RENDER_PROGRESS_H
 #define PT_RENDER_PROGRESS_H
 
-#include <stdio.h>
-
+#include "base/log.h"
 #include "render/render.h"
 
 struct pt_progress {
-    FILE *out; /* NULL: silent */
-    int terminal;
-    double next_s;    /* wall time of the next line */
-    int shown;        /* a live line stands on the screen */
-    double percent;   /* of the work, as the last line said … */
-    uint64_t samples; /* … when the render had so many */
+    struct base_log *log; /* borrows */
+    double next_s;        /* wall time of the next line */
+    double percent;       /* of the work, as the last line said … */
+    uint64_t samples;     /* … when the render had so many */
 };
 
-void pt_progress_init(struct pt_progress *progress, FILE *out);
+void pt_progress_init(struct pt_progress *progress, struct base_log *log);
 /* Shows a line if it is time for one. */
 void pt_progress_update(struct pt_progress *progress, const struct pt_render *render);
-/* Clears the live line, so that other text may be printed. */
-void pt_progress_clear(struct pt_progress *progress);
 
 /* The line itself, without newline. *percent: what the line before said, at first 0; it never falls. */
 void pt_progress_text(const struct pt_render *render, double *percent, char *text, size_t room);

@@ -23,8 +23,7 @@ static int add_row(struct pt_quote *q, double visible, const char *name, int ask
 
 /* The row's own instance: the given parameters, and its share of viewers after them, which wins. */
 static int open_row(struct pt_quote_row *row, const struct pt_render *r, const struct lull_criterion *table,
-                    const struct lull_pair *pairs, uint32_t pair_count, void (*warn)(void *data, const char *line),
-                    void *warn_data, struct base_err *err)
+                    const struct lull_pair *pairs, uint32_t pair_count, struct base_log *log, struct base_err *err)
 {
     struct lull_error e = {.struct_size = sizeof e};
     char value[32];
@@ -38,7 +37,7 @@ static int open_row(struct pt_quote_row *row, const struct pt_render *r, const s
         snprintf(value, sizeof value, "%.17g", row->visible);
         all[n++] = (struct lull_pair){"visible", value};
     }
-    int rc = pt_criterion_create(table, all, n, r->threads, warn, warn_data, &row->criterion, err);
+    int rc = pt_criterion_create(table, all, n, r->threads, log, &row->criterion, err);
     free(all);
     int32_t code = rc ? LULL_OK : lull_host_join(r->frame, row->criterion, &e);
     return code == LULL_OK ? rc : pt_host_fail(code, &e, err);
@@ -76,8 +75,7 @@ static int add_rows(struct pt_quote *q, const struct lull_criterion *table, cons
 }
 
 int pt_quote_create(const struct pt_render *r, const struct lull_criterion *table, const struct lull_pair *pairs,
-                    uint32_t pair_count, void (*warn)(void *data, const char *line), void *warn_data, struct pt_quote **out,
-                    struct base_err *err)
+                    uint32_t pair_count, struct base_log *log, struct pt_quote **out, struct base_err *err)
 {
     struct pt_quote *q = calloc(1, sizeof *q);
     if (!q)
@@ -87,7 +85,7 @@ int pt_quote_create(const struct pt_render *r, const struct lull_criterion *tabl
     q->block_cost_s = calloc(q->block_count, sizeof *q->block_cost_s);
     int rc = q->block_cost_s ? add_rows(q, table, pairs, pair_count, err) : base_fail_nomem(err, "quote");
     for (int i = 0; i < q->row_count && table && !rc; i++)
-        rc = open_row(&q->rows[i], r, table, pairs, pair_count, warn, warn_data, err);
+        rc = open_row(&q->rows[i], r, table, pairs, pair_count, log, err);
     if (rc) {
         pt_quote_destroy(q);
         return rc;

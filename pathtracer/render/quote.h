@@ -48,8 +48,7 @@ struct pt_quote {
  * another; one row "as asked" where the criterion has no such parameter or the render has no criterion (table NULL). The
  * render's threads are borrowed until destroy. */
 int pt_quote_create(const struct pt_render *render, const struct lull_criterion *table, const struct lull_pair *pairs,
-                    uint32_t pair_count, void (*warn)(void *data, const char *line), void *warn_data, struct pt_quote **out,
-                    struct base_err *err);
+                    uint32_t pair_count, struct base_log *log, struct pt_quote **out, struct base_err *err);
 void pt_quote_destroy(struct pt_quote *quote);
 
 /* The hook `judged` of the pilot. A row whose criterion fails keeps what it knew. */

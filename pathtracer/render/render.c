@@ -325,8 +325,8 @@ static int slice(struct pt_render *r, const struct pt_render_hooks *hooks, int *
 /* A criterion that fails says so once. */
 static void warn_once(const struct pt_render *r, const struct pt_render_hooks *hooks, const char *line)
 {
-    if (r->totals->failed_checks == 1 && hooks->warn)
-        hooks->warn(hooks->data, line);
+    if (r->totals->failed_checks == 1)
+        base_log_say(hooks->log, "%s", line);
 }
 
 /* Whether a block is better sent to the crew than asked about here: if its checks so far took longer than that. */
@@ -403,8 +403,7 @@ static int suspend(struct pt_render *r, const struct pt_render_hooks *hooks, int
 static int lost(struct pt_render *r, const struct pt_render_hooks *hooks, const struct base_err *why, struct base_err *err)
 {
     int rc = hooks->suspend ? hooks->suspend(hooks->data, r, err) : 0;
-    if (hooks->warn)
-        hooks->warn(hooks->data, why->text);
+    base_log_say(hooks->log, "%s", why->text);
     lull_host_stop(r->frame, LULL_REASON_INTERRUPT, NULL, NULL);
     return rc;
 }

@@ -13,6 +13,7 @@
 #include <stdint.h>
 
 #include "base/err.h"
+#include "base/log.h"
 #include "base/threads.h"
 #include "integ/integrator.h"
 #include "render/crew.h"
@@ -59,7 +60,7 @@ enum pt_render_outcome {
     PT_RENDER_OUT_OF_TIME,
     PT_RENDER_INTERRUPTED,
     PT_RENDER_PILOT,
-    PT_RENDER_LOST /* a process of the crew: ended as if interrupted, and hooks.warn was told why */
+    PT_RENDER_LOST /* a process of the crew: ended as if interrupted, and hooks.log was told why */
 };
 
 struct pt_render_hooks {
@@ -73,7 +74,7 @@ struct pt_render_hooks {
     /* Called once before the blocks still active are closed for time or interrupt, while everything is as a later run needs
      * it to go on. May be NULL. */
     int (*suspend)(void *data, struct pt_render *render, struct base_err *err);
-    void (*warn)(void *data, const char *line); /* may be NULL */
+    struct base_log *log; /* may be NULL */
     void *data;
 };
 

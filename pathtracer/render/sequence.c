@@ -80,7 +80,7 @@ struct recorder {
     pt_kernel *kernel;
     struct base_threads *threads;
     struct lull_host_criterion *criterion;
-    struct pt_render_hooks hooks;
+    const struct pt_render_hooks *hooks;
     struct seq_manifest manifest;                         /* owns; room for every block of the grid */
     struct lull_host_frame *whole;                        /* owns; the grid of the whole image */
     const struct lull_host_blocks *grid;                  /* of it */
@@ -248,10 +248,10 @@ static int record_levels(struct recorder *r, struct seq_builder *file, const str
     int rc = open_block(r, b, 0, &render, err);
     for (uint32_t k = 0; k < m->n_levels && !rc; k++) {
         int full = !full_done && (m->levels[k] >= FULL_LEVEL_SPP || k + 1 == m->n_levels);
-        rc = pt_render_advance(render, m->levels[k], &r->hooks, stopped, err);
+        rc = pt_render_advance(render, m->levels[k], r->hooks, stopped, err);
         if (rc || *stopped)
             break;
-        pt_render_judge(render, &r->hooks);
+        pt_render_judge(render, r->hooks);
         rc = put_level(r, file, render, 0, full, err);
         full_done |= full;
     }
@@ -269,7 +269,7 @@ static int record_reference(struct recorder *r, struct seq_builder *file, const 
         return 0;
     int rc = open_block(r, b, 1, &render, err);
     if (!rc)
-        rc = pt_render_advance(render, r->config->reference_spp, &r->hooks, stopped, err);
+        rc = pt_render_advance(render, r->config->reference_spp, r->hooks, stopped, err);
     if (!rc && !*stopped)
         rc = put_level(r, file, render, 1, 1, err);
     if (render)
@@ -400,33 +400,25 @@ static int record_chosen(struct recorder *r, int *stopped, struct base_err *err)
     for (uint32_t i = 0; i < r->grid->count && !rc && !*stopped; i++) {
         if (!r->chosen[i])
             continue;
-        char line[128];
         rc = record_block(r, &r->grid->list[i], stopped, err);
-        if (!rc && !*stopped && r->dropped > 0) {
-            snprintf(line, sizeof line, "block %u: %llu samples were not finite and were dropped; manifest.json counts them",
-                     i, (unsigned long long)r->dropped);
-            r->hooks.warn(r->hooks.data, line);
-        }
-        if (rc || *stopped || r->config->quiet)
+        if (rc || *stopped)
             continue;
+        if (r->dropped > 0)
+            base_log_say(r->hooks->log, "block %u: %llu samples were not finite and were dropped; manifest.json counts them",
+                         i, (unsigned long long)r->dropped);
         double each_s = (base_clock_wall_s() - start_s) / ++done;
-        snprintf(line, sizeof line, "block %u recorded, %u of %u, %.1f s each, %.0f s left", i, done, todo, each_s,
-                 each_s * (todo - done));
-        r->hooks.warn(r->hooks.data, line);
+        base_log_note(r->hooks->log, "block %u recorded, %u of %u, %.1f s each, %.0f s left", i, done, todo, each_s,
+                      each_s * (todo - done));
     }
     return rc;
 }
 
 int pt_sequence_record(const struct pt_sequence_config *config, const struct pt_scene *scene, pt_kernel *kernel,
-                       struct base_threads *threads, struct lull_host_criterion *criterion, int (*interrupted)(void *data),
-                       void (*say)(void *data, const char *line), void *data, int *was_interrupted, struct base_err *err)
+                       struct base_threads *threads, struct lull_host_criterion *criterion,
+                       const struct pt_render_hooks *hooks, int *was_interrupted, struct base_err *err)
 {
-    struct recorder r = {.config = config,
-                         .scene = scene,
-                         .kernel = kernel,
-                         .threads = threads,
-                         .criterion = criterion,
-                         .hooks = {.slice = config->slice, .interrupted = interrupted, .warn = say, .data = data}};
+    struct recorder r = {
+        .config = config, .scene = scene, .kernel = kernel, .threads = threads, .criterion = criterion, .hooks = hooks};
     *was_interrupted = 0;
     int rc = prepare(&r, err);
     if (!rc)

@@ -21,8 +21,6 @@ struct pt_sequence_config {
     uint64_t reference_spp; /* 0 = no reference */
     const char *scene_path;
     uint32_t scene_crc, inputs_crc; /* of the scene file; of every file that was read */
-    int quiet;
-    int (*slice)(void *data, struct pt_render *render, struct base_err *err); /* as in pt_render_hooks; may be NULL */
     struct pt_render_config render; /* size, block, integrator; the rest is set here */
 };
 
@@ -31,10 +29,11 @@ int pt_sequence_levels(const char *text, uint32_t spp[PT_SEQUENCE_MAX_LEVELS], s
 /* Marks the listed ids in chosen[0 … count). */
 int pt_sequence_choose(const char *text, uint8_t *chosen, uint32_t count, struct base_err *err);
 
-/* criterion may be NULL; else its `error` is recorded at every level. *interrupted is set when interrupted() said so: the
- * block being recorded is lost, all before it are safe. say gets a line per block. */
+/* criterion may be NULL; else its `error` is recorded at every level. *was_interrupted is set when
+ * hooks->interrupted() said so: the block being recorded is lost, all before it are safe. Of the hooks slice, interrupted
+ * and log are used; a note is made of each block. */
 int pt_sequence_record(const struct pt_sequence_config *config, const struct pt_scene *scene, pt_kernel *kernel,
-                       struct base_threads *threads, struct lull_host_criterion *criterion, int (*interrupted)(void *data),
-                       void (*say)(void *data, const char *line), void *data, int *was_interrupted, struct base_err *err);
+                       struct base_threads *threads, struct lull_host_criterion *criterion,
+                       const struct pt_render_hooks *hooks, int *was_interrupted, struct base_err *err);
 
 #endif

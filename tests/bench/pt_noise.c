@@ -156,7 +156,6 @@ int main(int argc, char **argv)
         struct base_err err = {0};
         struct pt_load_options options = {.width = width,
                                           .height = height,
-                                          .quiet = 1,
                                           .light_selection = k ? PT_LIGHT_SELECTION_POWER : PT_LIGHT_SELECTION_HIERARCHY};
         if (pt_scene_load(argv[1], &options, &m->scene, &defaults, &err) != 0) {
             fprintf(stderr, "%s\n", err.text);

@@ -190,7 +190,7 @@ int main(int argc, char **argv)
     } else {
         struct pt_scene_defaults defaults;
         struct base_err err = {0};
-        struct pt_load_options options = {.width = (int)w.width, .height = (int)w.height, .quiet = 1};
+        struct pt_load_options options = {.width = (int)w.width, .height = (int)w.height};
         if (pt_scene_load(argv[1], &options, &scene, &defaults, &err) != 0) {
             fprintf(stderr, "%s\n", err.text);
             return 2;

@@ -98,7 +98,7 @@ static void draw(const char *path, const struct way *way, struct picture *out)
     struct pt_scene *scene = NULL;
     struct pt_scene_defaults defaults;
     struct base_err err = {0};
-    struct pt_load_options options = {.width = WIDTH, .height = HEIGHT, .quiet = 1};
+    struct pt_load_options options = {.width = WIDTH, .height = HEIGHT};
     if (way) {
         options.view = way->view;
         options.light_selection = way->selection >= 0 ? way->selection : 0;

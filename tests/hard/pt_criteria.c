@@ -57,8 +57,8 @@ static struct pt_render *render(const char *criterion_id, struct lull_host_crite
     enum pt_render_outcome outcome;
     struct base_err err = {0};
     const struct lull_criterion *table;
-    if (pt_criterion_find(criterion_id, NULL, NULL, NULL, &table, &err) != 0 ||
-        pt_criterion_create(table, NULL, 0, pool, NULL, NULL, criterion, &err) != 0)
+    if (pt_criterion_find(criterion_id, NULL, NULL, &table, &err) != 0 ||
+        pt_criterion_create(table, NULL, 0, pool, NULL, criterion, &err) != 0)
         fail_msg("%s", err.text);
     assert_int_equal(pt_render_create(&config, NULL, four_blocks, pool, *criterion, &r, &err), 0);
     assert_int_equal(pt_render_run(r, &hooks, &outcome, &err), 0);

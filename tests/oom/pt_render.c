@@ -49,7 +49,7 @@ static const char *in_folder(const char *name)
 static int open_render(struct pt_render **render, struct lull_host_criterion **criterion, struct base_err *err)
 {
     struct pt_render_config config = pt_fake_config();
-    int rc = pt_criterion_create(pt_fake_criterion(), NULL, 0, pool, NULL, NULL, criterion, err);
+    int rc = pt_criterion_create(pt_fake_criterion(), NULL, 0, pool, NULL, criterion, err);
     config.planes = PT_FILM_ALL;
     return !rc ? pt_render_create(&config, NULL, pt_fake_nan, pool, *criterion, render, err) : rc;
 }
@@ -216,12 +216,6 @@ static void writing_and_reading(void **state)
     lull_host_close(criterion);
 }
 
-static void say(void *data, const char *line)
-{
-    (void)data;
-    (void)line;
-}
-
 static void recording(void **state)
 {
     struct pt_sequence_config config = {.directory = in_folder("seq"),
@@ -229,7 +223,6 @@ static void recording(void **state)
                                         .blocks = "3",
                                         .reference_spp = 2,
                                         .scene_path = "a.pbrt",
-                                        .quiet = 1,
                                         .render = pt_fake_config()};
     char directory[128];
     (void)state;
@@ -243,8 +236,9 @@ static void recording(void **state)
         snprintf(manifest, sizeof manifest, "%s/manifest.json", directory);
         unlink(manifest);
         fail_arm(k);
+        static const struct pt_render_hooks no_hooks;
         static const struct pt_scene empty; /* the kernel here needs none */
-        int rc = pt_sequence_record(&config, &empty, pt_fake_noise, pool, NULL, NULL, say, NULL, &stopped, &err);
+        int rc = pt_sequence_record(&config, &empty, pt_fake_noise, pool, NULL, &no_hooks, &stopped, &err);
         int happened = fail_disarm();
         if (!happened) {
             assert_int_equal(rc, 0);
@@ -270,7 +264,7 @@ static int quote(struct pt_render *render, int finishing, long k, int *happened,
     struct pt_quote *q = NULL;
     enum pt_render_outcome outcome;
     fail_arm(finishing ? LONG_MAX : k);
-    int rc = pt_quote_create(render, pt_fake_criterion(), NULL, 0, NULL, NULL, &q, err);
+    int rc = pt_quote_create(render, pt_fake_criterion(), NULL, 0, NULL, &q, err);
     *happened = fail_disarm();
     struct pt_render_hooks hooks = {.judged = ask_quote, .data = q};
     if (!rc && finishing) {

@@ -30,7 +30,7 @@ static struct pt_scene *load(const char *path, struct pt_scene_defaults *default
 {
     struct pt_scene *scene = NULL;
     struct base_err err = {0};
-    const struct pt_load_options options = {.width = SIZE, .height = SIZE, .quiet = 1};
+    const struct pt_load_options options = {.width = SIZE, .height = SIZE};
     if (pt_scene_load(path, &options, &scene, defaults, &err) != 0)
         fail_msg("%s", err.text);
     return scene;

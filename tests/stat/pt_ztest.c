@@ -265,7 +265,7 @@ static void delta_lights_by_both_selections(void **state)
 static struct pt_scene *load(const char *path, int32_t selection)
 {
     enum { SIZE = 32 };
-    const struct pt_load_options options = {.width = SIZE, .height = SIZE, .quiet = 1, .light_selection = selection};
+    const struct pt_load_options options = {.width = SIZE, .height = SIZE, .light_selection = selection};
     struct pt_scene_defaults defaults;
     struct pt_scene *scene = NULL;
     struct base_err err = {0};

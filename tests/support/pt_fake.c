@@ -207,7 +207,7 @@ int pt_fake_render(const struct pt_render_config *config, pt_kernel *kernel, int
     *pool = base_threads_create(threads, &err);
     int rc = *pool ? 0 : BASE_ENOMEM;
     if (!rc && at)
-        rc = pt_criterion_create(pt_fake_criterion(), &pair, 1, *pool, NULL, NULL, criterion, &err);
+        rc = pt_criterion_create(pt_fake_criterion(), &pair, 1, *pool, NULL, criterion, &err);
     if (!rc)
         rc = pt_render_create(config, NULL, kernel, *pool, *criterion, render, &err);
     return !rc ? pt_render_run(*render, &hooks, &outcome, &err) : rc;

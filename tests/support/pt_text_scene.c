@@ -11,22 +11,21 @@
 #include <cmocka.h>
 
 #include "pbrt/load.h"
-
-static void count_warning(void *data, const char *line)
-{
-    assert_null(strchr(line, '\n'));
-    ++*(int *)data;
-}
+#include "support/pt_heard.h"
 
 static int load(const char *text, int strict, int *warnings, struct pt_scene **scene, struct pt_scene_defaults *defaults,
                 struct base_err *err)
 {
-    int ignored = 0;
+    struct heard heard;
     struct pt_source_single single = {"t.pbrt", text, strlen(text)};
     struct pt_source source = pt_source_from_memory(&single);
-    struct pt_load_options options = {
-        .strict = strict, .quiet = 1, .warn = count_warning, .warn_data = warnings ? warnings : &ignored};
-    return pt_scene_load_source("t.pbrt", &source, &options, scene, defaults, err);
+    struct pt_load_options options = {.strict = strict, .log = &heard.log};
+    hear_begin(&heard);
+    int rc = pt_scene_load_source("t.pbrt", &source, &options, scene, defaults, err);
+    if (warnings)
+        *warnings += heard_lines(&heard);
+    hear_end(&heard);
+    return rc;
 }
 
 struct pt_scene *text_scene(const char *text, struct pt_scene_defaults *defaults, int *warnings)

@@ -93,8 +93,6 @@ static int read_beside(void *data, const char *path, char **bytes, size_t *size,
 
 /* --- the answer ------------------------------------------------------------------------------------------------------- */
 
-static void tell(void *data, const char *line) { fprintf(data, "%s\n", line); }
-
 static void read_options(const char *text, struct pt_load_options *o)
 {
     const char *at;
@@ -121,7 +119,8 @@ static char *answer(struct pt_approve_case *c)
     FILE *out = open_memstream(&text, &size);
     assert_non_null(out);
     struct pt_source source = {read_beside, NULL, c, 0};
-    struct pt_load_options options = {.quiet = 1, .warn = tell, .warn_data = out}; /* no word of how long it took */
+    struct base_log log = {.out = out};
+    struct pt_load_options options = {.log = &log};
     struct pt_scene *scene = NULL;
     struct pt_scene_defaults defaults;
     struct base_err err = {0};

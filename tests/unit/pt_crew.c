@@ -18,6 +18,7 @@
 #include "render/crew_member.h"
 #include "render/crew_messages.h"
 #include "support/pt_fake.h"
+#include "support/pt_heard.h"
 #include "support/base_room.h"
 
 /* DEAF: it samples, but does not answer when the criterion is to be asked. LIES: what it says of its rows is wrong. */
@@ -136,7 +137,7 @@ static void *member_main(void *arg)
     struct base_threads *threads = base_threads_create(m->threads, &err);
     struct pt_crew_tools tools = {threads, {NULL, pt_fake_noise, NULL}, NULL};
     config.planes = PT_FILM_ALL;
-    pt_criterion_create(&pure, &pair, 1, threads, NULL, NULL, &criterion, &err);
+    pt_criterion_create(&pure, &pair, 1, threads, NULL, &criterion, &err);
     pt_render_create(&config, NULL, pt_fake_noise, threads, criterion, &tools.render, &err);
     pt_crew_member_join(m->peers, &tools, m->behaviour == OTHER_SETTINGS ? "a=1\nb=3\n" : "a=1\nb=2\n", &err);
     if (m->behaviour == WORKS || m->behaviour == OTHER_SETTINGS)
@@ -220,7 +221,7 @@ static void create(struct run *r, const struct pt_render_config *config, const s
     struct base_err err = {0};
     struct lull_pair pair = {"at", "32"};
     r->pool = base_threads_create(threads, &err);
-    assert_int_equal(pt_criterion_create(table, &pair, 1, r->pool, NULL, NULL, &r->criterion, &err), 0);
+    assert_int_equal(pt_criterion_create(table, &pair, 1, r->pool, NULL, &r->criterion, &err), 0);
     assert_int_equal(pt_render_create(config, NULL, pt_fake_noise, r->pool, r->criterion, &r->render, &err), 0);
 }
 
@@ -313,16 +314,9 @@ static void rows_of_different_widths(void **state)
 /* --- faults ------------------------------------------------------------------------------------------------------------- */
 
 struct watch {
-    char line[512];
     const char *checkpoint;
     int left; /* interrupted() says yes from the time that 1 is left; 0: never */
 };
-
-static void keep_line(void *data, const char *line)
-{
-    struct watch *w = data;
-    strncpy(w->line, line, sizeof w->line - 1);
-}
 
 static int save(void *data, struct pt_render *r, struct base_err *err)
 {
@@ -344,7 +338,9 @@ static void ends_well(const struct lull_criterion *table, enum behaviour last, i
     struct base_err err = {0};
     enum pt_render_outcome outcome;
     struct watch watch = {.checkpoint = "/tmp/pt_crew_test.ckp", .left = interrupt_after};
-    const struct pt_render_hooks hooks = {.interrupted = count_down, .suspend = save, .warn = keep_line, .data = &watch};
+    struct heard heard;
+    hear_begin(&heard);
+    const struct pt_render_hooks hooks = {.interrupted = count_down, .suspend = save, .log = &heard.log, .data = &watch};
     struct run one = {0}, lost = {0}, rest = {0};
     struct stage stage;
     config.planes = PT_FILM_ALL;
@@ -361,12 +357,13 @@ static void ends_well(const struct lull_criterion *table, enum behaviour last, i
     assert_int_equal(pt_checkpoint_load(watch.checkpoint, rest.render, "settings\n", &err), 0);
     finish(&rest);
     if (words)
-        assert_non_null(strstr(watch.line, words));
+        assert_non_null(strstr(heard.text, words));
     assert_same(one.render, rest.render);
     release(&one);
     release(&lost);
     release(&rest);
     remove(watch.checkpoint);
+    hear_end(&heard);
 }
 
 static void a_silent_member_is_named_and_nothing_is_lost(void **state)

@@ -23,6 +23,7 @@
 #include "support/api_folders.h"
 #include "support/pt_approve.h"
 #include "support/pt_fake.h"
+#include "support/pt_heard.h"
 
 /* --- the film ----------------------------------------------------------------------------------------------------------- */
 
@@ -106,7 +107,7 @@ static void a_render_opens_its_frame(void **state)
     struct lull_host_criterion *criterion;
     struct pt_render *render = NULL;
     table.begin_frame = open_frame;
-    assert_int_equal(pt_criterion_create(&table, NULL, 0, NULL, NULL, NULL, &criterion, &err), 0);
+    assert_int_equal(pt_criterion_create(&table, NULL, 0, NULL, NULL, &criterion, &err), 0);
     for (int k = 0; k < 4; k++) {
         struct pt_render_config config = pt_fake_config();
         config.time_budget_s = k == 1 ? 5 : 0;
@@ -142,8 +143,6 @@ static int32_t fail_to_evaluate(struct lull_instance *in, const struct lull_view
     return err->code = LULL_E_INTERNAL;
 }
 
-static void keep_words(void *data, const char *line) { strcat(strcat(data, line), "\n"); }
-
 /* A criterion that fails is said so once, and every block gets its samples. */
 static void failures_are_told_once(void **state)
 {
@@ -153,16 +152,18 @@ static void failures_are_told_once(void **state)
     struct lull_criterion table = *pt_fake_criterion();
     struct lull_host_criterion *criterion;
     struct pt_render *render = NULL;
-    char words[500] = "";
-    const struct pt_render_hooks hooks = {.warn = keep_words, .data = words};
+    struct heard heard;
+    const struct pt_render_hooks hooks = {.log = &heard.log};
     enum pt_render_outcome outcome;
     struct pt_render_config config = pt_fake_config();
+    hear_begin(&heard);
     table.evaluate = fail_to_evaluate;
     config.spp_max = 20;
-    assert_int_equal(pt_criterion_create(&table, NULL, 0, NULL, NULL, NULL, &criterion, &err), 0);
+    assert_int_equal(pt_criterion_create(&table, NULL, 0, NULL, NULL, &criterion, &err), 0);
     assert_int_equal(pt_render_create(&config, NULL, pt_fake_noise, pool, criterion, &render, &err), 0);
     assert_int_equal(pt_render_run(render, &hooks, &outcome, &err), 0);
-    assert_string_equal(words, "criterion fake: no such luck\n");
+    assert_string_equal(heard.text, "criterion fake: no such luck\n");
+    hear_end(&heard);
     assert_true(render->totals->failed_checks > 1);
     for (uint32_t i = 0; i < render->blocks->count; i++)
         assert_true(render->blocks->list[i].spp == 20 && render->blocks->list[i].reason == LULL_REASON_SPP_MAX);
@@ -172,14 +173,6 @@ static void failures_are_told_once(void **state)
 }
 
 /* --- what a criterion is offered ----------------------------------------------------------------------------------------- */
-
-static char warned[700];
-
-static void warn(void *data, const char *line)
-{
-    assert_ptr_equal(data, &opened);
-    strcpy(warned, line);
-}
 
 static void count_task(void *arg, uint64_t task, uint32_t worker)
 {
@@ -192,17 +185,20 @@ static void services(void **state)
     (void)state;
     struct base_err err = {0};
     struct base_threads *threads = base_threads_create(3, &err);
+    struct heard heard;
+    hear_begin(&heard);
     struct lull_host_criterion *few = NULL, *busy = NULL;
-    assert_int_equal(pt_criterion_create(pt_fake_criterion(), NULL, 0, NULL, warn, &opened, &few, &err), 0);
-    assert_int_equal(pt_criterion_create(pt_fake_criterion(), NULL, 0, threads, NULL, NULL, &busy, &err), 0);
+    assert_int_equal(pt_criterion_create(pt_fake_criterion(), NULL, 0, NULL, &heard.log, &few, &err), 0);
+    assert_int_equal(pt_criterion_create(pt_fake_criterion(), NULL, 0, threads, NULL, &busy, &err), 0);
     const struct lull_host *alone = &few->host, *many = &busy->host;
     assert_true(alone->max_workers == 1 && many->max_workers == 3);
     assert_string_equal(alone->name, "lull-render " BASE_VERSION);
     alone->log(alone, LULL_LOG_INFO, "psst");
-    assert_string_equal(warned, "");
+    assert_string_equal(heard.text, "");
     alone->log(alone, LULL_LOG_WARNING, "mind the gap");
-    assert_string_equal(warned, "criterion fake: mind the gap");
+    assert_string_equal(heard.text, "criterion fake: mind the gap\n");
     many->log(many, LULL_LOG_ERROR, "nobody hears it");
+    hear_end(&heard);
     for (int k = 0; k < 2; k++) {
         int done[20] = {0};
         const struct lull_host *host = k ? many : alone;
@@ -267,13 +263,14 @@ static void masks_are_read(void **state)
 
 /* --- criteria by name ---------------------------------------------------------------------------------------------------- */
 
-static char lines[1000];
-
-static void keep_line(void *data, const char *line)
+/* The lines on what was skipped: the build's own may have something to say too. */
+static void print_skipped(FILE *out, const char *text)
 {
-    assert_ptr_equal(data, lines);
-    if (strncmp(line, "skipped: ", 9) == 0) /* the build's own may have something to say too */
-        snprintf(lines + strlen(lines), sizeof lines - strlen(lines), "%s\n", line);
+    for (size_t n; *text != '\0'; text += n) {
+        n = strcspn(text, "\n") + 1;
+        if (strncmp(text, "skipped: ", 9) == 0)
+            fprintf(out, "%.*s", (int)n, text);
+    }
 }
 
 /* What is printed of the first two criteria: the build's own follow, if it has some. */
@@ -310,19 +307,22 @@ static char *listed(struct pt_approve_case *c)
     }
     FILE *out = fopen(path[2], "w");
     assert_true(out && fclose(out) == 0);
-    lines[0] = '\0';
+    struct heard heard;
+    hear_begin(&heard);
     assert_non_null(out = open_memstream(&text, &size));
-    int count = pt_criterion_list(out, keep_line, lines);
+    int count = pt_criterion_list(out, &heard.log);
     fclose(out);
     char *all = text;
     assert_non_null(out = open_memstream(&text, &size));
     print_first_two(out, all, count);
     free(all);
-    assert_int_equal(pt_criterion_find("halfbuf", &inputs, keep_line, lines, &found, &err), 0);
+    assert_int_equal(pt_criterion_find("halfbuf", &inputs, &heard.log, &found, &err), 0);
     fprintf(out, "found %s; an input is %s\n", found->id, inputs.paths[0]);
-    int rc = pt_criterion_find("nobody", &inputs, keep_line, lines, &found, &err);
-    fprintf(out, "%d: %s; %zu input\n%s", rc, err.text, inputs.count, lines);
-    assert_int_equal(pt_criterion_find("fixed", NULL, NULL, NULL, &found, &err), 0);
+    int rc = pt_criterion_find("nobody", &inputs, &heard.log, &found, &err);
+    fprintf(out, "%d: %s; %zu input\n", rc, err.text, inputs.count);
+    print_skipped(out, heard.text);
+    hear_end(&heard);
+    assert_int_equal(pt_criterion_find("fixed", NULL, NULL, &found, &err), 0);
     assert_string_equal(found->id, "fixed");
     fclose(out);
     base_inputs_release(&inputs);

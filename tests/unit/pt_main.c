@@ -307,16 +307,17 @@ static void words_on_the_way(void **state)
     signal(SIGINT, SIG_DFL);
     signal(SIGTERM, SIG_DFL);
     listen_to(stderr);
-    pt_say(&s, "a line");
-    pt_note(&s, "a note");
-    s.cli.quiet = 1;
-    pt_note(&s, "a quiet note");
-    struct base_peers other = {.rank = 1};
-    s.peers = &other;
-    pt_say(&s, "from somebody else");
-    other.rank = 0;
-    pt_say(&s, "from rank 0");
-    assert_string_equal(heard_on(stderr), "lull-render: a line\nlull-render: a note\nlull-render: from rank 0\n");
+    struct base_log log, silent = {0};
+    base_log_init(&log, stderr, "lull-render", 0);
+    base_log_say(&log, "a %s", "line");
+    base_log_note(&log, "a %s", "note");
+    log.quiet = 1;
+    base_log_note(&log, "a quiet note");
+    base_log_say(&log, "a word");
+    base_log_say(&silent, "from somebody else");
+    base_log_say(NULL, "from nobody");
+    base_log_note(NULL, "from nobody");
+    assert_string_equal(heard_on(stderr), "lull-render: a line\nlull-render: a note\nlull-render: a word\n");
 }
 
 /* --- quotes ------------------------------------------------------------------------------------------------------------- */
@@ -528,8 +529,9 @@ static void the_last_line(void **state)
     render.totals->dropped = 12;
     lull_host_drop(render.frame, 7, 8, 9);
     listen_to(stderr);
+    base_log_init(&s.log, stderr, "lull-render", 0);
     tell_summary(&s);
-    s.cli.quiet = 1;
+    s.log.quiet = 1;
     tell_summary(&s);
     render.totals->dropped = 0;
     tell_summary(&s);
@@ -552,6 +554,7 @@ static void between_two_slices(void **state)
     double before_s = base_clock_wall_s();
     base_interrupted = 0;
     listen_to(stderr);
+    base_log_init(&s.log, stderr, "lull-render", 0);
     s.checkpoint_at_s = before_s + 1e6;
     pt_action_after_slice(&s, &render, &err); /* too early */
     s.checkpoint_at_s = before_s;

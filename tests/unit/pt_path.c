@@ -22,6 +22,7 @@ static void note_fetch(const void *address) { fetched[fetched_count++ % 64] = ad
 #include "shade/bsdf.h"
 #include "shade/medium.h"
 #include "shade/texture.h"
+#include "support/pt_heard.h"
 #include "support/pt_scenes.h"
 
 static struct pt_input grey(float x) { return (struct pt_input){0, {x, x, x}}; }
@@ -185,18 +186,6 @@ static void planes(void **state)
     test_scene_end(&scene);
 }
 
-struct lines {
-    int count;
-    char last[256];
-};
-
-static void keep_line(void *data, const char *text)
-{
-    struct lines *lines = data;
-    lines->count++;
-    strncpy(lines->last, text, sizeof lines->last - 1);
-}
-
 /* The traced path ends with the value that the kernel returns. */
 static void trace_tells_the_same_path(void **state)
 {
@@ -204,39 +193,35 @@ static void trace_tells_the_same_path(void **state)
     struct pt_scene scene;
     struct pt_integrator settings = test_integrator(4);
     struct pt_path_result r;
-    struct lines lines = {0};
+    struct heard heard;
     char expected[256];
     rich_scene(&scene, 1);
     pt_kernel_all(&scene, &settings, 12, 14, 1, 3, &r);
-    pt_kernel_trace(&scene, &settings, 12, 14, 3, keep_line, &lines);
-    snprintf(expected, sizeof expected, "end: pixel value (%g, %g, %g)", (double)r.radiance.x, (double)r.radiance.y,
+    hear_begin(&heard);
+    pt_kernel_trace(&scene, &settings, 12, 14, 3, heard.log.out);
+    hear_end(&heard);
+    snprintf(expected, sizeof expected, "\nend: pixel value (%g, %g, %g)\n", (double)r.radiance.x, (double)r.radiance.y,
              (double)r.radiance.z);
-    assert_string_equal(lines.last, expected);
-    assert_true(lines.count >= 3);
+    assert_string_equal(heard.text + strlen(heard.text) - strlen(expected), expected);
+    assert_true(heard_lines(&heard) >= 3);
     test_scene_end(&scene);
-}
-
-static void next_line(void *data, const char *text)
-{
-    const char ***expected = data;
-    assert_string_equal(text, *(*expected)++);
 }
 
 /* Every line of --debug-path, word for word, and what it counts. */
 static void trace_says_what_it_is_told(void **state)
 {
     (void)state;
-    static const char *const lines[] = {
-        "camera: origin (1, -2, 3.5) direction (4, 5e-07, -6) time 0.25",
-        "1: conductor at (7, 8, 9) normal (0.5, -1, 0.25) material 3 primitive 11 throughput (0.1, 0.2, 0.3)",
-        "   light towards (-1, 2, 0.125) adds (10, 20, 30)",
-        "   emission met, weight 0.75, adds (11, 21, 31)",
-        "2: scattered in medium 4 at (0.1, 0.2, 0.3) throughput (0.4, 0.5, 0.6)",
-        "3: thin dielectric at (7, 8, 9) normal (0.5, -1, 0.25) material 3 primitive 11 throughput (1, 1, 1)",
-        "end: pixel value (12, 22, 32)",
-    };
-    const char *const *expected = lines;
-    struct pt_trace trace = {.line = next_line, .data = &expected};
+    static const char lines[] =
+        "camera: origin (1, -2, 3.5) direction (4, 5e-07, -6) time 0.25\n"
+        "1: conductor at (7, 8, 9) normal (0.5, -1, 0.25) material 3 primitive 11 throughput (0.1, 0.2, 0.3)\n"
+        "   light towards (-1, 2, 0.125) adds (10, 20, 30)\n"
+        "   emission met, weight 0.75, adds (11, 21, 31)\n"
+        "2: scattered in medium 4 at (0.1, 0.2, 0.3) throughput (0.4, 0.5, 0.6)\n"
+        "3: thin dielectric at (7, 8, 9) normal (0.5, -1, 0.25) material 3 primitive 11 throughput (1, 1, 1)\n"
+        "end: pixel value (12, 22, 32)\n";
+    struct heard heard;
+    hear_begin(&heard);
+    struct pt_trace trace = {.out = heard.log.out};
     const struct pt_shape shape = {.material = 3};
     const struct pt_place at = {
         .p = {7, 8, 9}, .s = {.n_geometric = {0.5f, -1, 0.25f}, .n_shading = {9, 9, 9}}, .shape = &shape, .primitive = 11};
@@ -249,7 +234,8 @@ static void trace_says_what_it_is_told(void **state)
     pt_trace_scatter(&trace, 4, v3(0.1f, 0.2f, 0.3f), v3(0.4f, 0.5f, 0.6f));
     pt_trace_surface(&trace, &at, &pane, v3_splat(1));
     pt_trace_end(&trace, v3(12, 22, 32));
-    assert_ptr_equal(expected, lines + 7);
+    hear_end(&heard);
+    assert_string_equal(heard.text, lines);
     assert_int_equal(trace.vertex, 3);
     for (int i = 0; i < PT_MET_COUNT; i++)
         assert_int_equal(trace.met[i], i == PT_BSDF_CONDUCTOR || i == PT_BSDF_THIN_DIELECTRIC || i == PT_MET_MEDIUM);

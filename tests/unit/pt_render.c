@@ -14,6 +14,7 @@
 
 #include "render/checkpoint.h"
 #include "support/pt_fake.h"
+#include "support/pt_heard.h"
 
 struct result {
     struct pt_render *render;
@@ -234,7 +235,7 @@ static void resumed_render_is_identical(void **state)
         struct result r = {.pool = base_threads_create(2, &err)};
         struct lull_pair pair = {"at", "32"};
         for (int part = 0; part < 2; part++) {
-            assert_int_equal(pt_criterion_create(pt_fake_criterion(), &pair, 1, r.pool, NULL, NULL, &r.criterion, &err), 0);
+            assert_int_equal(pt_criterion_create(pt_fake_criterion(), &pair, 1, r.pool, NULL, &r.criterion, &err), 0);
             assert_int_equal(pt_render_create(&config, NULL, pt_fake_nan, r.pool, r.criterion, &r.render, &err), 0);
             if (part == 1)
                 assert_int_equal(pt_checkpoint_load(path, r.render, "a=1\nb=2\n", &err), 0);
@@ -339,7 +340,7 @@ static void check_slice(const struct slice_case *c)
     config.time_budget_s = c->budget_s;
     config.pilot_spp = c->pilot;
     config.pilot_s = 1e9;
-    assert_int_equal(pt_criterion_create(pt_fake_criterion(), NULL, 0, r.pool, NULL, NULL, &r.criterion, &err), 0);
+    assert_int_equal(pt_criterion_create(pt_fake_criterion(), NULL, 0, r.pool, NULL, &r.criterion, &err), 0);
     assert_int_equal(pt_render_create(&config, NULL, write_down, r.pool, r.criterion, &r.render, &err), 0);
     for (int i = 0; i < 3; i++) {
         r.render->blocks->list[i].spp = c->spp[i];
@@ -471,8 +472,6 @@ static void rows_are_cut_into_runs(void **state)
     }
 }
 
-static void keep_words(void *data, const char *line) { strcpy(data, line); }
-
 /* Half of the time may go to checks: at 9 of 19 seconds they are asked for, at 11 of 21 left out, except of who gets no more samples. */
 static void checks_may_be_too_dear(void **state)
 {
@@ -481,14 +480,15 @@ static void checks_may_be_too_dear(void **state)
         struct pt_render_config config = pt_fake_config();
         struct base_err err = {0};
         enum pt_render_outcome outcome;
-        char words[256] = "";
-        const struct pt_render_hooks hooks = {.slice = enough, .warn = keep_words, .data = words};
+        struct heard heard;
+        const struct pt_render_hooks hooks = {.slice = enough, .log = &heard.log};
         struct result r = {.pool = base_threads_create(1, &err)};
+        hear_begin(&heard);
         config.width = config.crop[2] = 48;
         config.height = config.crop[3] = 16;
         config.spp_max = 30;
         config.max_check_overhead = 0.5;
-        assert_int_equal(pt_criterion_create(pt_fake_criterion(), NULL, 0, r.pool, NULL, NULL, &r.criterion, &err), 0);
+        assert_int_equal(pt_criterion_create(pt_fake_criterion(), NULL, 0, r.pool, NULL, &r.criterion, &err), 0);
         assert_int_equal(pt_render_create(&config, NULL, pt_fake_noise, r.pool, r.criterion, &r.render, &err), 0);
         struct lull_host_block *b = r.render->blocks->list;
         for (int i = 0; i < 3; i++)
@@ -498,7 +498,8 @@ static void checks_may_be_too_dear(void **state)
         assert_int_equal(pt_render_run(r.render, &hooks, &outcome, &err), BASE_EINVAL);
         const struct lull_host_totals *t = r.render->totals;
         assert_true(t->checks == (dear ? 1 : 3) && t->skipped_checks == (dear ? 2 : 0) && t->failed_checks == 0 &&
-                    !words[0]);
+                    !heard.text[0]);
+        hear_end(&heard);
         assert_true(t->asked == t->checks && t->criterion_s > (dear ? 11 : 9) && t->criterion_thread_s > 0);
         for (int i = 0; i < 2; i++)
             assert_true(b[i].reason == LULL_REASON_NONE && b[i].next_spp == 23 && b[i].checks == (dear ? 0 : 1) &&
@@ -536,7 +537,7 @@ static void interrupted_blocks_are_asked_once_more(void **state)
     struct result r = {.pool = base_threads_create(1, &err)};
     config.width = config.crop[2] = 48;
     config.height = config.crop[3] = 16;
-    assert_int_equal(pt_criterion_create(pt_fake_criterion(), NULL, 0, r.pool, NULL, NULL, &r.criterion, &err), 0);
+    assert_int_equal(pt_criterion_create(pt_fake_criterion(), NULL, 0, r.pool, NULL, &r.criterion, &err), 0);
     assert_int_equal(pt_render_create(&config, NULL, pt_fake_noise, r.pool, r.criterion, &r.render, &err), 0);
     struct lull_host_block *b = r.render->blocks->list;
     for (int i = 0; i < 3; i++)
@@ -571,7 +572,7 @@ static void the_order_of_work_follows_its_seed(void **state)
         struct result r = {.pool = base_threads_create(1, &err)};
         uint8_t seen[128] = {0};
         config.order_seed = seeds[k];
-        assert_int_equal(pt_criterion_create(pt_fake_criterion(), NULL, 0, r.pool, NULL, NULL, &r.criterion, &err), 0);
+        assert_int_equal(pt_criterion_create(pt_fake_criterion(), NULL, 0, r.pool, NULL, &r.criterion, &err), 0);
         assert_int_equal(pt_render_create(&config, NULL, write_down, r.pool, r.criterion, &r.render, &err), 0);
         row_count = 0;
         assert_int_equal(pt_render_run(r.render, &hooks, &outcome, &err), BASE_EINVAL);

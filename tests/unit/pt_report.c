@@ -469,37 +469,43 @@ static void progress_lines(void **state)
 {
     (void)state;
     struct pt_progress p;
+    struct base_log log;
     double percent = 0;
     char line[300], expected[300], *text = NULL;
     size_t n;
     FILE *out = open_memstream(&text, &n), *null = fopen("/dev/null", "w");
     assert_true(out && null);
     double before_s = base_clock_wall_s();
-    pt_progress_init(&p, null);
-    assert_true(!p.terminal && p.next_s >= before_s + 2 && p.next_s <= base_clock_wall_s() + 2 && !p.shown);
+    base_log_init(&log, null, "name", 0);
+    pt_progress_init(&p, &log);
+    assert_true(!log.terminal && p.next_s >= before_s + 2 && p.next_s <= base_clock_wall_s() + 2 && !log.live);
     pt_progress_text(render, &percent, line, sizeof line);
     assert_string_equal(line + strlen(line) - 8, "ETA 0:00");
     for (int terminal = 0; terminal < 2; terminal++) {
         rewind(out);
         before_s = base_clock_wall_s();
-        p = (struct pt_progress){.out = out, .terminal = terminal, .next_s = before_s + 1e6};
+        log = (struct base_log){.out = out, .name = "name", .terminal = terminal};
+        p = (struct pt_progress){.log = &log, .next_s = before_s + 1e6};
         pt_progress_update(&p, render); /* too early */
         p.next_s = 0;
         pt_progress_update(&p, render);
         const double pause_s = terminal ? 0.2 : 10;
-        assert_true(p.shown == terminal && p.next_s >= before_s + pause_s && p.next_s <= base_clock_wall_s() + pause_s);
-        pt_progress_clear(&p);
-        pt_progress_clear(&p); /* once is enough */
+        assert_true(log.live == terminal && p.next_s >= before_s + pause_s && p.next_s <= base_clock_wall_s() + pause_s);
+        base_log_clear(&log);
+        base_log_clear(&log); /* once is enough */
         snprintf(expected, sizeof expected, terminal ? "\r%s\033[K\r\033[K" : "%s\n", line);
         fputc('|', out);
         fflush(out);
         assert_memory_equal(text, expected, strlen(expected));
         assert_int_equal(text[strlen(expected)], '|');
-        assert_false(p.shown);
+        assert_false(log.live);
     }
-    p = (struct pt_progress){.shown = 1};
+    log = (struct base_log){.out = out, .quiet = 1};
+    p = (struct pt_progress){.log = &log};
+    long at = ftell(out);
     pt_progress_update(&p, render);
-    pt_progress_clear(&p);
+    base_log_clear(&log);
+    assert_int_equal(ftell(out), at);
     fclose(out);
     fclose(null);
     free(text);

@@ -23,6 +23,7 @@
 #include "sequence/statistics.h"
 #include "support/lseq_oracle.h"
 #include "support/pt_fake.h"
+#include "support/pt_heard.h"
 
 static void levels(void **state)
 {
@@ -151,21 +152,19 @@ static struct pt_sequence_config make_config(void)
                                        .render = pt_fake_config()};
 }
 
-static int lines_said;
-static char said[8][160];
-static void say(void *data, const char *line)
-{
-    (void)data;
-    snprintf(said[lines_said++ % 8], sizeof said[0], "%s", line);
-}
+static struct heard heard;
+static struct pt_render_hooks hooks = {.log = &heard.log};
 
 /* "…, 0.1 s each, 3 s left" after what is known. */
 static void check_said(int i, const char *begin, const char *end)
 {
     double each_s, left_s;
-    assert_memory_equal(said[i], begin, strlen(begin));
-    assert_int_equal(sscanf(said[i] + strlen(begin), "%lf s each, %lf s left", &each_s, &left_s), 2);
-    assert_string_equal(said[i] + strlen(said[i]) - strlen(end), end);
+    const char *said = heard.text;
+    for (; i > 0; i--)
+        said = strchr(said, '\n') + 1;
+    assert_memory_equal(said, begin, strlen(begin));
+    assert_int_equal(sscanf(said + strlen(begin), "%lf s each, %lf s left", &each_s, &left_s), 2);
+    assert_memory_equal(strchr(said, '\n') - strlen(end), end, strlen(end));
 }
 
 static pt_kernel *kernel = pt_fake_noise;
@@ -173,7 +172,7 @@ static int record(const struct pt_sequence_config *config, struct lull_host_crit
 {
     int stopped;
     static const struct pt_scene empty; /* the kernel here needs none */
-    return pt_sequence_record(config, &empty, kernel, pool, criterion, NULL, say, NULL, &stopped, err);
+    return pt_sequence_record(config, &empty, kernel, pool, criterion, &hooks, &stopped, err);
 }
 
 static uint32_t u32(const unsigned char *p)
@@ -376,12 +375,13 @@ static void recorded_folder(void **state)
     struct pt_sequence_config config = make_config();
     struct lull_host_criterion *criterion = NULL;
     struct base_err err = {0};
-    assert_int_equal(pt_criterion_create(pt_fake_criterion(), NULL, 0, pool, NULL, NULL, &criterion, &err), 0);
-    lines_said = 0;
+    assert_int_equal(pt_criterion_create(pt_fake_criterion(), NULL, 0, pool, NULL, &criterion, &err), 0);
+    hear_begin(&heard);
     assert_int_equal(record(&config, criterion, &err), 0);
-    assert_int_equal(lines_said, 2);
+    assert_int_equal(heard_lines(&heard), 2);
     check_said(0, "block 1 recorded, 1 of 2, ", " s left");
     check_said(1, "block 11 recorded, 2 of 2, ", ", 0 s left");
+    hear_end(&heard);
     lull_host_close(criterion);
     check_block("block-00001.lseq", 16, 0, 32, 16, 1);
     check_block("block-00011.lseq", 48, 32, 60, 44, 1);
@@ -413,13 +413,14 @@ static void dropped_samples_are_counted(void **state)
     assert_non_null(mkdtemp(own));
     config.directory = own;
     config.blocks = "0,1";
-    config.quiet = 1;
     kernel = pt_fake_nan;
-    lines_said = 0;
+    hear_begin(&heard);
+    heard.log.quiet = 1;
     assert_int_equal(record(&config, NULL, &err), 0);
     kernel = pt_fake_noise;
-    assert_int_equal(lines_said, 1);
-    assert_string_equal(said[0], "block 0: 640 samples were not finite and were dropped; manifest.json counts them");
+    assert_int_equal(heard_lines(&heard), 1);
+    assert_string_equal(heard.text, "block 0: 640 samples were not finite and were dropped; manifest.json counts them\n");
+    hear_end(&heard);
     struct seq_manifest m;
     assert_int_equal(seq_manifest_read(own, &m, &err), 0);
     assert_int_equal(m.blocks[0].dropped, 8 * 16 * (4 + 1));
@@ -460,16 +461,15 @@ static void a_block_is_recorded_whole_or_not(void **state)
     assert_non_null(mkdtemp(own));
     config.directory = own;
     config.blocks = "0";
-    config.quiet = 1;
     for (int k = 0; k < 5; k++) {
         struct seq_manifest m;
         struct base_err err = {0};
         int stopped = 7;
-        config.slice = k < 4 ? end_there : NULL;
+        const struct pt_render_hooks ends = {.slice = k < 4 ? end_there : NULL, .interrupted = stop_there};
         ending.spp_max = k % 2 ? 64 : 352;
         ending.fails = k < 2;
         ending.stop = 0;
-        int rc = pt_sequence_record(&config, &empty, kernel, pool, NULL, stop_there, say, NULL, &stopped, &err);
+        int rc = pt_sequence_record(&config, &empty, kernel, pool, NULL, &ends, &stopped, &err);
         assert_int_equal(rc, k < 2 ? BASE_EIO : 0);
         assert_int_equal(stopped, k == 2 || k == 3);
         if (k < 2)
@@ -493,11 +493,12 @@ static void going_on(void **state)
     char path[128];
     snprintf(path, sizeof path, "%s/block-00001.lseq", folder);
     stat(path, &before);
-    lines_said = 0;
+    hear_begin(&heard);
     config.blocks = "1,2,11";
     assert_int_equal(record(&config, NULL, &err), 0);
-    assert_int_equal(lines_said, 1);
+    assert_int_equal(heard_lines(&heard), 1);
     check_said(0, "block 2 recorded, 1 of 1, ", ", 0 s left");
+    hear_end(&heard);
     stat(path, &after);
     assert_true(before.st_ino == after.st_ino);
     check_block("block-00002.lseq", 32, 0, 48, 16, 0);
@@ -506,9 +507,10 @@ static void going_on(void **state)
     fseek(f, 100, SEEK_SET);
     fputc('x', f);
     fclose(f);
-    lines_said = 0;
+    hear_begin(&heard);
     assert_int_equal(record(&config, NULL, &err), 0);
-    assert_int_equal(lines_said, 1);
+    assert_int_equal(heard_lines(&heard), 1);
+    hear_end(&heard);
     check_block("block-00001.lseq", 16, 0, 32, 16, 0);
     cJSON *m = read_manifest();
     assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(m, "blocks")), 3);
