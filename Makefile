@@ -206,7 +206,7 @@ $(LIB)/%.so: $(OBJ)/plugin-api/examples/%.c.o plugin-api/plugin.map
 SUPPORT_pt  := $(call o,$(filter-out tests/support/ggn_%,$(wildcard tests/support/*.c)))
 SUPPORT_ggn := $(call o,$(filter-out tests/support/pt_%,$(wildcard tests/support/*.c)))
 SUPPORT_api := $(call o,$(filter-out tests/support/pt_% tests/support/ggn_% tests/support/base_%,$(wildcard tests/support/*.c)))
-SUPPORT_base := $(call o,$(wildcard tests/support/base_*.c) tests/support/open_files.c)
+SUPPORT_base := $(call o,$(wildcard tests/support/base_*.c) tests/support/open_files.c tests/support/foreign.c)
 define test_rules
 $(OUT)/tests/$(1)/pt_%: $(OBJ)/tests/$(1)/pt_%.c.o $(PT_CORE_OBJ) $(LOADER_OBJ) $(SUPPORT_pt)
 	$$(link) $$^ $$(LDFLAGS_ALL) $(PT_LIBS) -lcmocka -o $$@

@@ -12,7 +12,7 @@
 #include <stddef.h>
 #include <cmocka.h>
 
-#include "support/ggn_approve.h"
+#include "support/approve.h"
 #include "support/ggn_near.h"
 #include "support/ggn_noise.h"
 
@@ -367,7 +367,7 @@ static void recorded_epochs(void **state)
         fputc('\n', f);
     }
     fclose(f);
-    ggn_approve("ggn_baseline_epochs", text, 2e-3);
+    approve_text("tests/golden/ggn_baseline_epochs.txt", text);
     free(text);
     ggn_lstm_destroy(l);
 }
@@ -629,7 +629,7 @@ static void looks_at_tiles(void **state)
 static void put_method(FILE *f, const struct ggn_method *m, const struct ggn_baseline *b, const struct ggn_eval_set *s)
 {
     const struct ggn_policy *p = &b->policy;
-    fprintf(f, "=== %s: passes %d; first %g ratio %g step %g, %d vectors\n", m->name, m->passes, p->first_spp, p->ratio,
+    fprintf(f, "> %s: passes %d; first %g ratio %g step %g, %d vectors\n", m->name, m->passes, p->first_spp, p->ratio,
             p->step_spp, b->svm.n_support);
     if (!b->lstm) /* in two epochs an LSTM learns nothing that could be told apart */
         fprintf(f, "cut %.5g scale %.4f shift %.4f threshold %.5g\n", m->cut, p->scale, p->shift, p->threshold);
@@ -692,7 +692,7 @@ static void learned_from_scenes(void **state)
             ggn_baseline_release(&b);
         }
     fclose(report);
-    ggn_approve("ggn_baseline_learned", text, 5e-3);
+    approve_text("tests/golden/ggn_baseline_learned.txt", text);
     free(text);
     ggn_eval_set_release(&set);
     base_threads_destroy(threads);

@@ -24,14 +24,11 @@
 #include "model/container.h"
 #include "model/model.h"
 #include "support/base_room.h"
-#include "support/ggn_approve.h"
+#include "support/approve.h"
 #include "support/ggn_heap.h"
 #include "support/ggn_noise.h"
 #include "train/resume.h"
 #include "train/train.h"
-
-/* Numbers of tens of steps whose every product was rounded in the same order everywhere; exp and cos may differ in the last bit. */
-static const double TOLERANCE = 2e-4;
 
 enum { WIDTH = 24, HEIGHT = 20 };
 
@@ -249,7 +246,7 @@ static void run(const char *name, struct ggn_train_plan plan)
 
     plan.progress = open_memstream(&said, &size);
     plan.out = path_of(name, "");
-    fprintf(report, "=== %s\n", name);
+    fprintf(report, "> %s\n", name);
     int rc = ggn_train(&plan, &err);
     assert_int_equal(fclose(plan.progress), 0);
     put(said);
@@ -267,13 +264,13 @@ static void run(const char *name, struct ggn_train_plan plan)
     put_model(path_of(name, ""));
 }
 
-static void approve(void **state)
+static void approve_reports(void **state)
 {
     (void)state;
     fflush(report);
     for (char *nan; (nan = strstr(reported, "-nan")) != NULL;) /* whose sign depends on the compiler */
         memmove(nan, nan + 1, strlen(nan));
-    ggn_approve("ggn_train_runs", reported, TOLERANCE);
+    approve_text("tests/golden/ggn_train_runs.txt", reported);
 }
 
 static void presets(void **state)
@@ -472,7 +469,7 @@ static void together(const char *name, struct ggn_train_plan plan, int count, co
     assert_true(sizes[0] == sizes[1] && !memcmp(alone, shared, sizes[0]));
     const char *traffic = strstr(said, " processes: ");
     assert_non_null(traffic);
-    fprintf(report, "=== %s, shared by %.*s\n", name, (int)strcspn(traffic, "w") + 1, traffic - 1);
+    fprintf(report, "> %s, shared by %.*s\n", name, (int)strcspn(traffic, "w") + 1, traffic - 1);
     free(said);
     free(alone);
     free(shared);
@@ -536,7 +533,7 @@ static void plans(void **state)
     snprintf(loud, sizeof loud, "%s/loud", dir);
     make_views(quiet, 512, 0.01);
     make_views(loud, 512, 1e5);
-    fputs("=== plans\n", report);
+    fputs("> plans\n", report);
     TRY(good, batch = 0);
     TRY(good, batch = 1);
     TRY(good, batch = 1025);
@@ -610,7 +607,7 @@ static void forge(const char *from, const char *to)
 static void checkpoints(void **state)
 {
     (void)state;
-    fputs("=== checkpoints\n", report);
+    fputs("> checkpoints\n", report);
     forge("\"kind\":\"training\"", "\"kind\":\"model\"");
     forge("\"kind\":\"training\"", "\"kind\":1");
     forge("\"phase\":1", "\"phase\":2");
@@ -700,6 +697,6 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(presets),   cmocka_unit_test(divergences),   cmocka_unit_test(resuming),
         cmocka_unit_test(plans),     cmocka_unit_test(checkpoints),   cmocka_unit_test(keys_of_runs),
-        cmocka_unit_test(processes), cmocka_unit_test(nothing_stays), cmocka_unit_test(approve)};
+        cmocka_unit_test(processes), cmocka_unit_test(nothing_stays), cmocka_unit_test(approve_reports)};
     return cmocka_run_group_tests(tests, setup, teardown);
 }

@@ -1,5 +1,5 @@
 /*
- * A transcript: what a test was told, line by line, compared whole with tests/golden/whole/NAME.txt as support/ggn_approve.h does.
+ * A transcript: what a test was told, line by line, compared whole with tests/golden/whole/NAME.txt (support/approve.h).
  */
 #ifndef TESTS_GGN_TRANSCRIPT_H
 #define TESTS_GGN_TRANSCRIPT_H
@@ -14,7 +14,7 @@
 
 #include <cmocka.h>
 
-#include "support/ggn_approve.h"
+#include "support/approve.h"
 
 struct transcript {
     FILE *file; /* write here */
@@ -55,10 +55,10 @@ static inline void transcript_hide(struct transcript *t, const char *what, const
 
 static inline void transcript_end(struct transcript *t, const char *name)
 {
-    char whole[128];
-    snprintf(whole, sizeof whole, "whole/%s", name);
+    char path[128];
+    snprintf(path, sizeof path, "tests/golden/whole/%s.txt", name);
     fclose(t->file);
-    ggn_approve(whole, t->text, 0);
+    approve_text(path, t->text);
     free(t->text);
 }
 

@@ -31,7 +31,7 @@
 #include "base/peers.h"
 #include "base/png.h"
 #include "base/threads.h"
-#include "support/base_foreign.h"
+#include "support/foreign.h"
 
 static char dir[] = "/tmp/base_files.XXXXXX";
 

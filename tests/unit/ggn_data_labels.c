@@ -507,7 +507,7 @@ static void chains_are_as_they_were(void **state)
     for (size_t i = 0; i < sizeof options / sizeof options[0]; i++) {
         struct ggn_chains set;
         struct base_err err = {0};
-        fprintf(f, "--- options %zu\n", i);
+        fprintf(f, "> options %zu\n", i);
         if (ggn_chains_load(&set, &options[i], &err)) {
             fprintf(f, "%s\n", err.text);
             continue;
@@ -519,7 +519,7 @@ static void chains_are_as_they_were(void **state)
         struct ggn_chains set;
         const struct ggn_chains_options o = {.dir = "tests/data/recorded", .with_test = 1, .pictures = how != 1};
         assert_int_equal(ggn_chains_load(&set, &o, NULL), 0);
-        fprintf(f, "--- %s\n",
+        fprintf(f, "> %s\n",
                 how == 0   ? "synthetic"
                 : how == 1 ? "extended"
                 : how == 2 ? "simulated, 1.9"

@@ -15,7 +15,7 @@
 #include "nn/exec.h"
 #include "nn/hash.h"
 #include "nn/winograd.h"
-#include "support/ggn_approve.h"
+#include "support/approve.h"
 
 static struct ggn_graph graph;
 
@@ -24,7 +24,7 @@ static void put_graph(FILE *f, const struct ggn_graph *g)
     static const char nothing[] = "-";
     size_t offset[GGN_MAX_LAYERS + 1];
 
-    fprintf(f, "=== %s: params %zu stats %zu learned %zu pack %zu acts %zu, for inference %zu, %.0f multiplications\n",
+    fprintf(f, "> %s: params %zu stats %zu learned %zu pack %zu acts %zu, for inference %zu, %.0f multiplications\n",
             g->name, g->n_params, g->n_stats, g->n_learned, g->n_pack, g->n_acts, ggn_graph_place(g, offset),
             ggn_graph_mac(g));
     for (int i = 0; i < g->n_values; i++) {
@@ -77,7 +77,7 @@ static void structure(void **state)
     ggn_model_destroy(model);
     unsetenv("GGN_ISA");
     fclose(f);
-    ggn_approve("ggn_nn_networks", text, 0);
+    approve_text("tests/golden/ggn_nn_networks.txt", text);
     free(text);
 }
 

@@ -12,7 +12,7 @@
 #include <stddef.h>
 #include <cmocka.h>
 
-#include "support/ggn_approve.h"
+#include "support/approve.h"
 #include "support/ggn_near.h"
 #include "support/ggn_noise.h"
 
@@ -501,7 +501,7 @@ static void checks(void **state)
     for (uint32_t i = 0; i < l.n; i++)
         fprintf(f, "block %u: %.6g censored %d\n", l.labels[i].id, l.labels[i].threshold, l.labels[i].censored);
     fclose(f);
-    ggn_approve("ggn_observer_checks", report, 1e-4);
+    approve_text("tests/golden/ggn_observer_checks.txt", report);
     free(report);
     ggn_labels_release(&l);
     base_threads_destroy(threads);
@@ -531,7 +531,7 @@ static void record(const char *path, const struct ggn_dataset_view *view, const 
         fprintf(f, "block %u: %.6g censored %d\n", l.labels[i].id, l.labels[i].threshold, l.labels[i].censored);
     ggn_labels_release(&l);
     fclose(f);
-    ggn_approve("ggn_observer_calibration", report, 1e-4);
+    approve_text("tests/golden/ggn_observer_calibration.txt", report);
     free(report);
 }
 

@@ -27,7 +27,7 @@
 #include "plugin/model_path.h"
 #include "plugin/windowed.h"
 #include "sequence/tail.h"
-#include "support/ggn_approve.h"
+#include "support/approve.h"
 #include "support/ggn_heap.h"
 
 enum { WIDTH = 60, HEIGHT = 44, BLOCKS = 3, WINDOW = 2, VALUES = 3 * 24 * 30 };
@@ -671,7 +671,7 @@ static void tables(void **state)
                                                        &ggn_plugin_attributes, &ggn_plugin_noise_mask};
     for (uint32_t i = 0; i < sizeof all / sizeof all[0]; i++) {
         const struct lull_criterion *c = all[i];
-        fprintf(f, "=== %u %s: %s, version %s\n%s\nthreads %d capabilities %u\n", i, c->id, c->name, c->version,
+        fprintf(f, "> %u %s: %s, version %s\n%s\nthreads %d capabilities %u\n", i, c->id, c->name, c->version,
                 c->description, c->thread_level, (unsigned)c->capabilities);
         for (uint32_t k = 0; k < c->param_count; k++) {
             const struct lull_param *p = &c->params[k];
@@ -690,7 +690,7 @@ static void tables(void **state)
         c->destroy(in);
     }
     fclose(f);
-    ggn_approve("ggn_plugin_tables", text, 0);
+    approve_text("tests/golden/ggn_plugin_tables.txt", text);
     free(text);
 }
 

@@ -558,7 +558,7 @@ static void asker_init(struct asker *a, FILE *f, int task)
     parse(ggn_study_task_names[task], &a->study);
     a->site =
         (struct ggn_study_site){.dir = "tests/none", .page_dir = "ggn/study/page", .study = &a->study, .store = a->store};
-    fprintf(f, "--- %s\n", ggn_study_task_names[task]);
+    fprintf(f, "> %s\n", ggn_study_task_names[task]);
 }
 
 static void asker_release(struct asker *a)

@@ -1,6 +1,6 @@
 /*
  * Small scenes and all that the loader makes of them: the files of tests/golden/pbrt hold each scene's text and the recorded
- * answer, which is its warnings, then its one-line error or the whole renderable (support/pt_approve.h says how to record).
+ * answer, which is its warnings, then its one-line error or the whole renderable (support/approve.h says how to record).
  *
  * Options: strict, size=8x4, fov=, look-at=a,b,…, effects, power, only-warnings. The header (film … camera) is part of the answer of
  * scenes that do not begin with WorldBegin. Pictures named WxHxC.png exist with 8 bits, deep-WxHxC.png with 16; an alpha channel is
@@ -18,7 +18,7 @@
 
 #include <cmocka.h>
 
-#include "support/pt_approve.h"
+#include "support/approve.h"
 #include "support/pt_dump.h"
 
 /* --- files beside a scene --------------------------------------------------------------------------------------------- */
@@ -68,14 +68,14 @@ static size_t make_png(const char *name, unsigned char *out)
 
 static int read_beside(void *data, const char *path, char **bytes, size_t *size, struct base_err *err)
 {
-    const struct pt_approve_case *c = data;
+    const struct approve_case *c = data;
     unsigned char png[2048];
     const void *found = NULL;
     if (strcmp(path, "d/t.pbrt") == 0) {
         found = c->text;
         *size = strlen(c->text);
     }
-    for (int i = 0; i < PT_APPROVE_FILES && !found; i++)
+    for (int i = 0; i < APPROVE_FILES && !found; i++)
         if (c->files[i].name[0] != '\0' && strncmp(path, "d/", 2) == 0 && strcmp(path + 2, c->files[i].name) == 0) {
             found = c->files[i].text;
             *size = strlen(c->files[i].text);
@@ -112,7 +112,7 @@ static void read_options(const char *text, struct pt_load_options *o)
 }
 
 /* malloc'ed */
-static char *answer(struct pt_approve_case *c)
+static char *answer(struct approve_case *c)
 {
     char *text = NULL;
     size_t size = 0;
@@ -142,7 +142,7 @@ static char *answer(struct pt_approve_case *c)
     static void name(void **state) \
     { \
         (void)state; \
-        pt_approve("tests/golden/pbrt/" #name ".txt", answer); \
+        approve_cases("tests/golden/pbrt/" #name ".txt", answer); \
     }
 CHECK(header)
 CHECK(transforms)

@@ -21,7 +21,7 @@
 #include "render/host_planes.h"
 #include "render/mask.h"
 #include "support/api_folders.h"
-#include "support/pt_approve.h"
+#include "support/approve.h"
 #include "support/pt_fake.h"
 #include "support/pt_heard.h"
 
@@ -288,7 +288,7 @@ static void print_first_two(FILE *out, const char *text, int count)
 }
 
 /* A folder with two criteria and something that is none; its name is CRITERIA in what is said. */
-static char *listed(struct pt_approve_case *c)
+static char *listed(struct approve_case *c)
 {
     char folder[] = "/tmp/pt_host_XXXXXX", built[2048], from[2200], path[3][64], *text = NULL, *at;
     static const char *const names[3] = {"fixed.so", "halfbuf.so", "none.so"};
@@ -340,7 +340,7 @@ static char *listed(struct pt_approve_case *c)
 static void criteria_by_name(void **state)
 {
     (void)state;
-    pt_approve("tests/golden/lull-render/criteria.txt", listed);
+    approve_cases("tests/golden/lull-render/criteria.txt", listed);
 }
 
 int main(void)

@@ -26,7 +26,7 @@
 #include "image/oiio.h"
 #include "integ/integrator.h"
 #include "support/api_folders.h"
-#include "support/pt_approve.h"
+#include "support/approve.h"
 #include "support/pt_fake.h"
 #include "support/pt_text_scene.h"
 
@@ -114,7 +114,7 @@ static void print_cli(FILE *out, const struct pt_cli *c)
 }
 
 /* The words of the case, "a b" being one, into argv[128]. */
-static int split_words(struct pt_approve_case *c, char **argv)
+static int split_words(struct approve_case *c, char **argv)
 {
     int argc = 1;
     strcpy(c->options, "lull-render");
@@ -132,7 +132,7 @@ static int split_words(struct pt_approve_case *c, char **argv)
     return argc;
 }
 
-static char *parse_words(struct pt_approve_case *c)
+static char *parse_words(struct approve_case *c)
 {
     char *argv[128], *text = NULL;
     size_t size;
@@ -154,7 +154,7 @@ static char *parse_words(struct pt_approve_case *c)
 static void command_lines(void **state)
 {
     (void)state;
-    pt_approve("tests/golden/lull-render/command_lines.txt", parse_words);
+    approve_cases("tests/golden/lull-render/command_lines.txt", parse_words);
 }
 
 /* --- what is made of it -------------------------------------------------------------------------------------------------- */
@@ -217,7 +217,7 @@ static void print_settings(FILE *out, char *text)
     fprintf(out, "%s", text);
 }
 
-static char *make_render(struct pt_approve_case *c)
+static char *make_render(struct approve_case *c)
 {
     char *argv[128], *text = NULL, at[4096], job[PT_AGREE_JOB];
     size_t size;
@@ -254,7 +254,7 @@ static void renders(void **state)
     write_files();
     assert_int_equal(chdir(at), 0);
     assert_true(api_folder(criteria, sizeof criteria, API_CRITERIA) == 0 && setenv("LULL_PLUGIN_PATH", criteria, 1) == 0);
-    pt_approve("tests/golden/lull-render/renders.txt", make_render);
+    approve_cases("tests/golden/lull-render/renders.txt", make_render);
     unsetenv("LULL_PLUGIN_PATH");
     snprintf(command, sizeof command, "rm -r %s", folder);
     assert_int_equal(system(command), 0);
@@ -434,7 +434,7 @@ static int tear_down_quote(void **state)
     return 0;
 }
 
-static char *tell_quote(struct pt_approve_case *c)
+static char *tell_quote(struct approve_case *c)
 {
     char *text = NULL;
     size_t size;
@@ -462,7 +462,7 @@ static char *tell_quote(struct pt_approve_case *c)
 static void quotes(void **state)
 {
     (void)state;
-    pt_approve("tests/golden/lull-render/quotes.txt", tell_quote);
+    approve_cases("tests/golden/lull-render/quotes.txt", tell_quote);
 }
 
 /* --- at the end of a render --------------------------------------------------------------------------------------------- */
@@ -590,7 +590,7 @@ static void between_two_slices(void **state)
 }
 
 /* --explain, but for the times. */
-static char *explain_it(struct pt_approve_case *c)
+static char *explain_it(struct approve_case *c)
 {
     struct pt_scene_defaults defaults;
     struct pt_scene *s = text_scene(c->text, &defaults, NULL);
@@ -613,7 +613,7 @@ static char *explain_it(struct pt_approve_case *c)
 static void explanations(void **state)
 {
     (void)state;
-    pt_approve("tests/golden/lull-render/explanations.txt", explain_it);
+    approve_cases("tests/golden/lull-render/explanations.txt", explain_it);
 }
 
 /* The picture of a quote is that of its blocks' times, in minutes when the dearest takes one. */

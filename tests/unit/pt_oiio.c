@@ -15,7 +15,7 @@
 #include "host/frame.h"
 #include "image/exr.h"
 #include "image/oiio.h"
-#include "support/pt_approve.h"
+#include "support/approve.h"
 
 static char dir[] = "/tmp/pt_oiio_XXXXXX";
 
@@ -288,7 +288,7 @@ static size_t map_of_blocks(const char *words, char *out)
     return n;
 }
 
-static char *draw(struct pt_approve_case *c)
+static char *draw(struct approve_case *c)
 {
     static const struct {
         const char *name;
@@ -306,7 +306,7 @@ static char *draw(struct pt_approve_case *c)
 static void drawings(void **state)
 {
     (void)state;
-    pt_approve("tests/golden/image/drawings.txt", draw);
+    approve_cases("tests/golden/image/drawings.txt", draw);
 }
 
 int main(void)

@@ -13,7 +13,7 @@
 #include <lull/criterion_kit.h>
 
 #include "render/quote.h"
-#include "support/pt_approve.h"
+#include "support/approve.h"
 #include "support/pt_fake.h"
 
 /* --- a criterion that knows the law ------------------------------------------------------------------------------------ */
@@ -326,7 +326,7 @@ static void outlooks_in_closed_form(void **state)
 }
 
 /* Every number of a quote after pilots of a known cost, but for what the clock says. "0.1 64": asked for, samples of the pilot. */
-static char *quote_of(struct pt_approve_case *c)
+static char *quote_of(struct approve_case *c)
 {
     char *text = NULL, visible[16];
     unsigned long pilot = 0;
@@ -373,7 +373,7 @@ static char *quote_of(struct pt_approve_case *c)
 static void quotes_in_every_number(void **state)
 {
     (void)state;
-    pt_approve("tests/golden/lull-render/quote_numbers.txt", quote_of);
+    approve_cases("tests/golden/lull-render/quote_numbers.txt", quote_of);
 }
 
 int main(void)

@@ -22,7 +22,7 @@
 #include "image/oiio.h"
 #include "render/output.h"
 #include "render/progress.h"
-#include "support/pt_approve.h"
+#include "support/approve.h"
 #include "support/pt_fake.h"
 
 static struct pt_render *render;
@@ -417,7 +417,7 @@ static void report_is_what_happened(void **state)
 }
 
 /* The report of the render with times that are known. */
-static char *report_of(struct pt_approve_case *c)
+static char *report_of(struct approve_case *c)
 {
     struct base_err err = {0};
     char *text;
@@ -461,7 +461,7 @@ static char *report_of(struct pt_approve_case *c)
 static void report_word_for_word(void **state)
 {
     (void)state;
-    pt_approve("tests/golden/lull-render/report.txt", report_of);
+    approve_cases("tests/golden/lull-render/report.txt", report_of);
 }
 
 /* Redrawn in place on a terminal, a line now and then elsewhere, nothing without a file. */

@@ -1,7 +1,7 @@
 /*
  * Numbers of the functions that scattering, lights, media, textures and quadrics are made of, at ordinary places and at
  * every edge: cosines of 0, total reflection, ends of intervals, directions along an axis, points inside and beside. What
- * they are is in golden/lull-render/values.txt (support/pt_approve.h says how to record). Sameness only: that the numbers are
+ * they are is in golden/lull-render/values.txt (support/approve.h says how to record). Sameness only: that the numbers are
  * right is said by stat/, and by closed forms in the other programs of unit/.
  */
 #include <setjmp.h>
@@ -22,7 +22,7 @@
 #include "shade/camera.h"
 #include "shade/light_select.h"
 #include "shade/medium.h"
-#include "support/pt_approve.h"
+#include "support/approve.h"
 #include "support/pt_bsdf_cases.h"
 #include "support/pt_scenes.h"
 
@@ -582,7 +582,7 @@ static const struct table {
               {"quadrics", tell_quadrics}, {"lights", tell_lights},
               {"textures", tell_textures}, {"samplers", tell_samplers}};
 
-static char *tell(struct pt_approve_case *c)
+static char *tell(struct approve_case *c)
 {
     char *text = NULL;
     size_t size;
@@ -599,7 +599,7 @@ static char *tell(struct pt_approve_case *c)
 static void values(void **state)
 {
     (void)state;
-    pt_approve("tests/golden/lull-render/values.txt", tell);
+    approve_cases("tests/golden/lull-render/values.txt", tell);
 }
 
 int main(void)

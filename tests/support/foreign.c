@@ -1,4 +1,4 @@
-#include "support/base_foreign.h"
+#include "support/foreign.h"
 
 #include <assert.h>
 #include <errno.h>
@@ -38,5 +38,8 @@ char *foreign_as_recorded(const char *text)
         free(now);
         now = next;
     }
-    return now;
+    char *told =
+        now ? with(now, "file is encrypted or is not a database", "file is not a database") : NULL; /* SQLite's words */
+    free(now);
+    return told;
 }
