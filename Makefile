@@ -125,7 +125,7 @@ REPLAY   := $(patsubst tests/fuzz/%.c,$(OUT)/fuzz/replay-%,$(FUZZ_SRC))
 FUZZERS  := $(patsubst tests/fuzz/%.c,build/fuzz/%,$(FUZZ_SRC))
 
 .DEFAULT_GOAL := all
-.PHONY: all demo test bench cost asan tsan fuzz mutants host-model hdr-check abi-check install compdb clean help setup tests replay train-demo test-study test-hosts test-clang
+.PHONY: all demo test bench cost asan tsan fuzz mutants host-model hdr-check abi-check install man compdb clean help setup tests replay train-demo test-study test-hosts test-clang
 .SECONDARY:
 
 all: $(PROGRAMS) $(CRITERIA) $(MODULES) $(HOST_LIB) $(EXAMPLES) ## build the programs and the criteria
@@ -347,6 +347,9 @@ install: all ## install under $(DESTDIR)$(PREFIX)
 	install -m 644 $(wildcard ggn/study/page/vendor/*) $(DESTDIR)$(PREFIX)/share/lull/study/vendor
 	for name in lull-criterion lull-host; do \
 	    sed 's|@PREFIX@|$(PREFIX)|g' plugin-api/$$name.pc.in > $(DESTDIR)$(PREFIX)/lib/pkgconfig/$$name.pc || exit 1; done
+
+man: all ## write docs/man/*.1 from --help and docs/man/*.h2m (needs help2man)
+	@docs/man/write
 
 compdb: ## write compile_commands.json
 	@{ echo '['; sep=; for f in $(BASE_SRC) $(PT_SRC) $(PT_IMAGES) $(PT_MAIN) $(GGN_SRC) $(GGN_IMAGES) $(GGN_PLUGIN) $(GGN_ENTRIES) $(STUDY_SRC) $(STUDY_MAIN) $(GGN_CLI) $(HOST_SRC) $(LOADER_SRC) $(EXAMPLE_SRC) $(TOOL_SRC) $(MPI_SRC); do \
