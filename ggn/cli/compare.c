@@ -9,6 +9,7 @@
 #include "base/options.h"
 #include "cli/commands.h"
 #include "eval/compare.h"
+#include "sequence/simulate.h"
 
 struct options {
     const char *paths[2];
@@ -63,7 +64,7 @@ int ggn_cmd_compare(int argc, char **argv)
         .args = offsetof(struct options, paths),
         .doc = "How well the stops or thresholds in MODEL agree with those in REFERENCE (people first). Both may be CSV "
                "(name;t0;…), a render's report JSON, or an EXR with the channel lull.spp.V."};
-    struct options o = {.cap = 10000.0, .block = 200};
+    struct options o = {.cap = SEQ_STUDY_CAP, .block = 200};
     struct ggn_thresholds sides[2] = {{0}, {0}};
     struct ggn_pairing pairing = {0};
     struct ggn_agreement figures;

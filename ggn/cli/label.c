@@ -76,7 +76,7 @@ static int human_labels(const struct options *o, const struct ggn_thresholds *t,
     if (rc)
         return rc;
     struct ggn_labels l = {.source = "human",
-                           .cap = GGN_LABELS_CAP,
+                           .cap = SEQ_SIMULATED_CAP,
                            .spread = o->spread > 0 ? o->spread : GGN_LABELS_SPREAD,
                            .labels = malloc(m->n_blocks * sizeof *l.labels)};
     if (!l.labels)
@@ -86,7 +86,7 @@ static int human_labels(const struct options *o, const struct ggn_thresholds *t,
         if (!(id < (uint32_t)row->n && row->spp[id] > 0))
             rc = base_fail(err, BASE_EINVAL, "%s: block %u has no threshold in '%s'", v->dir, id, row->name);
         else
-            l.labels[l.n++] = (struct ggn_label){id, ggn_observer_from_study(row->spp[id]), row->spp[id] >= GGN_STUDY_CAP};
+            l.labels[l.n++] = (struct ggn_label){id, ggn_observer_from_study(row->spp[id]), row->spp[id] >= SEQ_STUDY_CAP};
     }
     snprintf(l.detail, sizeof l.detail, "thresholds of '%.200s', as samples at which no noise is seen at all", row->name);
     if (rc)

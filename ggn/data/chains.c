@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/colour.h"
 #include "model/window.h"
+#include "sequence/simulate.h"
 
 enum { MAX_CHAINS = 1 << 16 };
 
@@ -151,42 +151,29 @@ void ggn_chain_set_picture(const struct ggn_chains *set, struct ggn_chain *c, in
         out[p] = ggn_picture_code((double)mean[p], scale * (double)d[p], NULL);
 }
 
-/* Scratch for noise pictures of recorded levels: linear mean [3][P], luminance of D [P]. */
+/* Scratch for noise pictures of recorded levels: luminance of the mean and of D, [P] each. */
 struct halves {
     const struct seq_record *full; /* NULL: no level has halves of all channels */
     float *mean, *d;
 };
-
-/* D = (A − B)/2 of a record, h of its n samples in A, as noise of the variance of the mean: σ²/4·(1/h + 1/(n − h)) is larger
- * than σ²/n where the halves are unequal, as they are for the first samples. 0: one half is empty, and D no difference. */
-static double half_scale(const struct seq_record *r)
-{
-    const double n = r->spp, h = r->half_spp;
-
-    return 2 * sqrt(h * (n - h)) / n;
-}
 
 /* From the level's own halves. Where none are recorded, from those of the full level: their noise has another draw, the
  * same strength in the mean, and bright paths spread out that few samples meet one by one. */
 static int recorded_picture(const struct ggn_chains *set, struct ggn_chain *c, int k, const struct seq_block *b,
                             const struct seq_record *r, const struct halves *h, struct base_err *err)
 {
-    const size_t pixels = ggn_chains_values(set) / 3;
-    const int own = seq_has_halves(r);
-    const struct seq_record *from = own ? r : h->full;
+    const struct seq_record *from = seq_has_halves(r) ? r : h->full;
+    const double scale = from ? seq_half_scale(from->spp, from->half_spp) : 0;
 
     c->has_picture[k] = 0;
-    if (!set->pictures || !from || half_scale(from) == 0)
+    if (!set->pictures || scale == 0)
         return 0;
-    int rc = seq_mean(b, r, h->mean, err);
+    int rc = seq_mean_luminance(b, r, h->mean, err);
     if (!rc)
         rc = seq_half_luminance(b, from, h->d, err);
-    if (rc)
-        return rc;
-    for (size_t p = 0; p < pixels; p++)
-        h->mean[p] = (float)base_luminance((double)h->mean[p], (double)h->mean[pixels + p], (double)h->mean[2 * pixels + p]);
-    ggn_chain_set_picture(set, c, k, h->mean, h->d, half_scale(from) * sqrt((double)from->spp / r->spp));
-    return 0;
+    if (!rc)
+        ggn_chain_set_picture(set, c, k, h->mean, h->d, scale * seq_noise_scale(from->spp, r->spp));
+    return rc;
 }
 
 static int fill_levels(const struct ggn_chains *set, struct ggn_chain *c, const struct seq_block *b, double ratio,
@@ -217,12 +204,12 @@ static int fill_chain(const struct ggn_chains *set, struct ggn_chain *c, const s
     const size_t values = ggn_chains_values(set);
     struct halves h = {.full = seq_full_level(b)};
     const struct seq_record *reference = b->reference || !o->mean_for_reference ? b->reference : h.full;
-    float *memory = set->pictures ? malloc((values + values / 3) * sizeof *memory) : NULL;
+    float *memory = set->pictures ? malloc(2 * (values / 3) * sizeof *memory) : NULL;
     int rc =
         set->pictures && !memory ? base_fail_nomem(err, "noise pictures") : ggn_chain_grow(set, c, (int)b->n_levels, err);
 
     h.mean = memory;
-    h.d = memory ? memory + values : NULL;
+    h.d = memory ? memory + values / 3 : NULL;
     if (!rc)
         rc = fill_levels(set, c, b, o->ratio, &h, err);
     free(memory);

@@ -63,12 +63,12 @@ int ggn_chains_add_synthetic(struct ggn_chains *set, int per_chain, uint32_t see
 
 /* Continues recorded chains of all splits that end near or before their threshold, up to 0.7 of the reference's samples
  * beyond the last level: the reference's samples go on where the recording stopped, their running mean simulated from the
- * half buffers. Where there is no reference but a full level, the whole chain is made anew, up to GGN_LABELS_CAP: its mean
- * stands for the converged image. */
+ * half buffers. Where there is no reference but a full level, the whole chain is made anew, up to SEQ_SIMULATED_CAP: its
+ * mean stands for the converged image. */
 int ggn_chains_extend(struct ggn_chains *set, uint32_t seed, struct base_err *err);
 
-/* Makes every labelled chain that has a full level anew, its levels `ratio` > 1 apart and up to GGN_LABELS_CAP: from the two
- * halves alone, so that chains with and without a reference are made alike. The same seed gives the same chains. */
+/* Makes every labelled chain that has a full level anew, its levels `ratio` > 1 apart and up to SEQ_SIMULATED_CAP: from
+ * the two halves alone, so that chains with and without a reference are made alike. The same seed gives the same chains. */
 int ggn_chains_simulate(struct ggn_chains *set, double ratio, uint32_t seed, struct base_err *err);
 
 /* Chains of a split, real ones only if real_only. */

@@ -12,10 +12,7 @@
 
 #include "base/err.h"
 
-enum {
-    GGN_LABELS_TEXT = 512,
-    GGN_LABELS_CAP = 20000 /* spp; nothing is simulated beyond, and labels made from simulated levels end here */
-};
+enum { GGN_LABELS_TEXT = 512 };
 
 struct ggn_label {
     uint32_t id;      /* the block */

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "model/window.h"
+#include "sequence/simulate.h"
 
 /* The rule at one level. */
 struct look {
@@ -43,7 +44,7 @@ static int tail_statistics(void *data, double *tail999, double *gini)
         k--;
     if (!c->tail999 || isnan(c->tail999[k]))
         return 0;
-    *tail999 = c->tail999[k] * sqrt(c->spp[k] / c->spp[last]);
+    *tail999 = c->tail999[k] * seq_noise_scale(c->spp[k], c->spp[last]);
     *gini = c->gini[k];
     return 1;
 }

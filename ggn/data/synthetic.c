@@ -8,6 +8,7 @@
 #include "model/preprocess.h"
 #include "nn/hash.h"
 #include "data/chains.h"
+#include "sequence/simulate.h"
 
 enum { MAX_LEVELS = 192 };
 static const double HIGHEST_SHARE = 0.7; /* of the reference's samples: nearer than that nothing but the reference is left */
@@ -22,12 +23,13 @@ struct source {
     double n_full, n_reference;
 };
 
-static int choose_levels(double *spp, double first, double ratio, double highest, int jittered, uint32_t seed)
+/* Up to `highest` beyond `from`, each rounded to whole samples before it is multiplied. */
+static int choose_levels(double *spp, double from, double first, double ratio, double highest, int jittered, uint32_t seed)
 {
     int n = 0;
 
-    for (double s = floor(first * (jittered ? 1 + 0.1 * ggn_hash_unit(0, seed) : 1) + 0.5); n < MAX_LEVELS && s <= highest;
-         n++) {
+    for (double s = floor(first * (jittered ? 1 + 0.1 * ggn_hash_unit(0, seed) : 1) + 0.5);
+         n < MAX_LEVELS && s - from <= highest; n++) {
         double off = jittered ? JITTER * (2 * ggn_hash_unit((uint32_t)n + 1, seed) - 1) : 0;
         spp[n] = s;
         s = fmax(s + 1, floor(s * ratio * (1 + off) + 0.5));
@@ -41,7 +43,7 @@ static int choose_levels(double *spp, double first, double ratio, double highest
  */
 static void step_down(const struct source *s, size_t pixels, double n, double above, uint32_t seed, float *noise)
 {
-    const float step = (float)sqrt(s->n_full * (1 / n - 1 / above));
+    const float step = (float)sqrt(s->n_full * (1 / n - 1 / above)); /* seq_noise_scale, where above is infinite */
 
     for (size_t p = 0; p < pixels; p++) {
         float signed_step = ggn_hash((uint32_t)p, seed) & 1 ? step : -step;
@@ -68,7 +70,7 @@ static void fill_level(const struct ggn_chains *set, struct ggn_chain *c, int k,
         }
         s->mean[p] = (float)base_luminance(rgb[0], rgb[1], rgb[2]);
     }
-    ggn_chain_set_picture(set, c, k, s->mean, s->d_luminance, sqrt(s->n_full / c->spp[k]));
+    ggn_chain_set_picture(set, c, k, s->mean, s->d_luminance, seq_noise_scale(s->n_full, c->spp[k]));
 }
 
 static void fill_levels(const struct ggn_chains *set, struct ggn_chain *c, const struct source *s, float *noise,
@@ -96,7 +98,7 @@ static int make_chain(struct ggn_chains *set, const struct ggn_chain *real, stru
     double spp[MAX_LEVELS];
     float *noise = malloc(ggn_chains_values(set) * sizeof *noise);
     const double ratio = set->ratio > 1.01 ? set->ratio : 1.15;
-    int n = choose_levels(spp, set->first_spp, ratio, HIGHEST_SHARE * s->n_reference, 1, seed);
+    int n = choose_levels(spp, 0, set->first_spp, ratio, HIGHEST_SHARE * s->n_reference, 1, seed);
 
     *c = *real;
     c->synthetic = 1;
@@ -192,12 +194,7 @@ static int extend_chain(const struct ggn_chains *set, struct ggn_chain *c, const
     const int first = c->n_levels;
     const double n0 = c->spp[first - 1], ratio = set->ratio > 1.01 ? set->ratio : 1.15;
     double spp[MAX_LEVELS];
-    int n = 0;
-
-    for (double next = floor(n0 * ratio + 0.5); n < MAX_LEVELS && next - n0 <= HIGHEST_SHARE * s->n_reference; n++) {
-        spp[n] = next;
-        next = floor(next * ratio + 0.5);
-    }
+    int n = choose_levels(spp, n0, n0 * ratio, ratio, HIGHEST_SHARE * s->n_reference, 0, seed);
     float *noise = calloc(values, sizeof *noise);
     int rc = noise ? ggn_chain_grow(set, c, first + n, err) : base_fail_nomem(err, "synthetic images");
     for (int k = n - 1; !rc && k >= 0; k--) {
@@ -214,14 +211,15 @@ static int extend_chain(const struct ggn_chains *set, struct ggn_chain *c, const
     return rc;
 }
 
-/* Without a reference: levels up to GGN_LABELS_CAP in place of the recorded ones. */
+/* Without a reference: levels up to SEQ_SIMULATED_CAP in place of the recorded ones. */
 static int simulate_chain(const struct ggn_chains *set, struct ggn_chain *c, const struct source *s, double ratio,
                           int jittered, uint32_t seed, struct base_err *err)
 {
     double spp[MAX_LEVELS];
-    int n = choose_levels(spp, set->first_spp < 16 ? set->first_spp : 16, ratio, GGN_LABELS_CAP / ratio, jittered, seed);
+    int n =
+        choose_levels(spp, 0, set->first_spp < 16 ? set->first_spp : 16, ratio, SEQ_SIMULATED_CAP / ratio, jittered, seed);
 
-    spp[n++] = GGN_LABELS_CAP;
+    spp[n++] = SEQ_SIMULATED_CAP;
     float *noise = malloc(ggn_chains_values(set) * sizeof *noise);
     int rc = !noise ? base_fail_nomem(err, "simulated images") : n > c->n_levels ? ggn_chain_grow(set, c, n, err) : 0;
     if (!rc) {

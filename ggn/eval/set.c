@@ -4,12 +4,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/colour.h"
 #include "data/agree.h"
 #include "nn/ssim.h"
 #include "observer/curve.h"
 #include "observer/flip.h"
 #include "observer/observer.h"
+#include "sequence/simulate.h"
+#include "sequence/tail.h"
 
 void ggn_eval_set_release(struct ggn_eval_set *s)
 {
@@ -244,13 +245,12 @@ out:
     return rc;
 }
 
-/* Share of pixels that the tail guard of halfbuf would call unsettled at `scale` times the last recorded half-buffer
- * difference. */
+/* Share of pixels that are unsettled at `scale` times the last recorded half-buffer difference. */
 static double unsettled_share(const float *y, const float *d, size_t pixels, double scale)
 {
     size_t n = 0;
     for (size_t i = 0; i < pixels; i++)
-        n += scale * fabs((double)d[i]) > 0.5 * fmax(fabs((double)y[i]), 0.02);
+        n += (size_t)seq_is_unsettled(scale * fabs((double)d[i]), (double)y[i]);
     return (double)n / (double)pixels;
 }
 
@@ -261,18 +261,16 @@ static int extrapolate(struct ggn_eval_set *s, const struct ggn_eval_block *bloc
     const struct seq_record *last = &p->levels[p->n_levels - 1];
     size_t pixels = (size_t)p->width * p->height;
     double half = seq_stat(last, "half_unsettled");
-    float *planes = malloc(4 * pixels * sizeof *planes);
-    int rc = !planes ? base_fail_nomem(err, "evaluation") : seq_mean(p, last, planes, err);
+    float *planes = malloc(2 * pixels * sizeof *planes);
+    int rc = !planes ? base_fail_nomem(err, "evaluation") : seq_mean_luminance(p, last, planes, err);
     if (!rc)
-        rc = seq_half_luminance(p, last, planes + 3 * pixels, err);
-    for (size_t i = 0; i < pixels && !rc; i++)
-        planes[i] = (float)base_luminance((double)planes[i], (double)planes[pixels + i], (double)planes[2 * pixels + i]);
+        rc = seq_half_luminance(p, last, planes + pixels, err);
     for (size_t i = from; i < block->end && !rc; i++) {
-        double scale = sqrt(last->spp / s->spp[i]);
+        double scale = seq_noise_scale(last->spp, s->spp[i]);
         s->seconds[i] = seq_stat(last, "seconds") * s->spp[i] / last->spp;
         s->dammertz[i] = scale * seq_stat(last, "dammertz");
         s->rse[i] = scale * seq_stat(last, "rse");
-        s->half_unsettled[i] = unsettled_share(planes, planes + 3 * pixels, pixels, scale);
+        s->half_unsettled[i] = unsettled_share(planes, planes + pixels, pixels, scale);
         s->rse_unsettled[i] = half > 0.0 ? seq_stat(last, "rse_unsettled") * s->half_unsettled[i] / half : 0.0;
     }
     free(planes);
@@ -371,9 +369,7 @@ static int fill_relmse(struct ggn_eval_set *s, const struct ggn_eval_block *bloc
     if (!full)
         return 0;
     float *mean = malloc(2 * values * sizeof *mean), *d = mean ? mean + values : NULL;
-    int rc = mean ? seq_mean(p, full, mean, err) : base_fail_nomem(err, "evaluation");
-    if (!rc)
-        rc = seq_half(p, full, d, err);
+    int rc = mean ? seq_halves(p, full, mean, d, err) : base_fail_nomem(err, "evaluation");
     double sum = 0.0;
     for (size_t i = 0; i < values && !rc; i++)
         sum += (double)(d[i] * d[i]) / ((double)(mean[i] * mean[i]) + 0.01);

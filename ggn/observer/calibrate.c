@@ -38,7 +38,7 @@ static int fit(const struct evidence *e, int skip, struct ggn_observer *o, struc
 {
     double least = INFINITY;
     for (int i = 0; i < e->n; i++) {
-        if (e->blocks[i].view == skip || e->blocks[i].human >= GGN_STUDY_CAP)
+        if (e->blocks[i].view == skip || e->blocks[i].human >= SEQ_STUDY_CAP)
             continue;
         double level = ggn_curve_at(&e->curves[i], ggn_observer_from_study(e->blocks[i].human));
         double sum = level > 0.0 ? misfit(e, skip, level) : INFINITY;
@@ -49,7 +49,7 @@ static int fit(const struct evidence *e, int skip, struct ggn_observer *o, struc
     }
     if (!isfinite(least))
         return base_fail(err, BASE_EINVAL, "calibration needs a noisy block with a threshold below %d in the other views",
-                         GGN_STUDY_CAP);
+                         SEQ_STUDY_CAP);
     return 0;
 }
 
@@ -71,7 +71,7 @@ static double spread_of(const struct evidence *e, double *answers)
 {
     size_t n = 0;
     for (int i = 0; i < e->n; i++)
-        if (e->blocks[i].human < GGN_STUDY_CAP)
+        if (e->blocks[i].human < SEQ_STUDY_CAP)
             answers[n++] = log2(answers[i] / ggn_observer_from_study(e->blocks[i].human));
     return 0.5 * (ggn_stats_quantile(answers, n, 0.84) - ggn_stats_quantile(answers, n, 0.16));
 }
@@ -143,7 +143,7 @@ static int add_view(const struct ggn_calibration_input *in, int view, enum ggn_c
     for (uint32_t i = 0; i < m->n_blocks && !rc; i++) {
         uint32_t id = m->blocks[i].id;
         double human = id < tiles ? in->human->spp[id] : (double)NAN;
-        blocks[e->n++] = (struct ggn_calibration_block){.view = view, .id = id, .human = fmin(human, GGN_STUDY_CAP)};
+        blocks[e->n++] = (struct ggn_calibration_block){.view = view, .id = id, .human = fmin(human, SEQ_STUDY_CAP)};
         if (!(human > 0.0))
             rc = base_fail(err, BASE_EINVAL, "%s: block %u has no threshold in '%s'", in->view->dir, id, in->human->name);
     }

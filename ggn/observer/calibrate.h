@@ -22,7 +22,7 @@ struct ggn_calibration_input {
 struct ggn_calibration_block {
     int view;
     uint32_t id;
-    double human, predicted; /* spp of the study, at most GGN_STUDY_CAP; predicted without this view */
+    double human, predicted; /* spp of the study, at most SEQ_STUDY_CAP; predicted without this view */
 };
 
 struct ggn_calibration_row { /* of e = log2(predicted / human) */

@@ -4,15 +4,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "observer/observer.h"
 #include "observer/visibility.h"
+#include "sequence/simulate.h"
 
 const char *const ggn_curve_sources[] = {"halves", "levels", NULL};
 
-/* Simulated levels: GGN_LABELS_CAP and quarter octaves below it, down to about 5 spp. */
+/* Simulated levels: SEQ_SIMULATED_CAP and quarter octaves below it, down to about 5 spp. */
 enum { SIMULATED = 49 };
 
-static double simulated_spp(int i) { return GGN_LABELS_CAP * exp2(0.25 * (i - (SIMULATED - 1))); }
+static double simulated_spp(int i) { return SEQ_SIMULATED_CAP * exp2(0.25 * (i - (SIMULATED - 1))); }
 
 /* What is looked at: a part of one block, or several blocks of one size side by side as one larger block. */
 struct planes {
@@ -20,7 +20,7 @@ struct planes {
     int across, down;
     int x0, y0, width, height;       /* the part; whole where there are several blocks */
     size_t pixels;                   /* of the part */
-    float *one;                      /* [3][pixels of one block] */
+    float *one;                      /* [2][3][pixels of one block]: mean and half difference */
     float *mean, *difference, *work; /* [3][P], linear; one allocation with the others, `one` owns it */
     float *lightness[3];             /* [P] */
     double *texture, *scratch;       /* [patches]; one allocation, `texture` owns it */
@@ -39,14 +39,14 @@ static int planes_allocate(struct planes *p, struct base_err *err)
     size_t n = (size_t)p->width * (size_t)p->height, whole = (size_t)p->blocks->width * p->blocks->height;
     size_t patches = ggn_visible_patches(p->width, p->height);
     p->pixels = n;
-    p->one = malloc((3 * whole + 12 * n) * sizeof *p->one);
+    p->one = malloc((6 * whole + 12 * n) * sizeof *p->one);
     p->texture = malloc((patches + ggn_visibility_scratch(p->width)) * sizeof *p->texture);
     if (!p->one || !p->texture) {
         planes_release(p);
         return base_fail_nomem(err, "observer");
     }
     p->scratch = p->texture + patches;
-    p->mean = p->one + 3 * whole;
+    p->mean = p->one + 6 * whole;
     p->difference = p->mean + 3 * n;
     p->work = p->mean + 6 * n;
     for (int i = 0; i < 3; i++)
@@ -65,8 +65,8 @@ static int planes_init(struct planes *p, const struct seq_block *blocks, int acr
     return planes_allocate(p, err);
 }
 
-/* Puts p->one, of block k, where it belongs in planes [3][P]. */
-static void place(const struct planes *p, int k, float *to)
+/* Puts part `which` of p->one, of block k, where it belongs in planes [3][P]. */
+static void place(const struct planes *p, int k, size_t which, float *to)
 {
     const size_t w = p->blocks->width, h = p->blocks->height, row = (size_t)p->width;
     const int alone = p->across * p->down == 1;
@@ -74,15 +74,14 @@ static void place(const struct planes *p, int k, float *to)
     const size_t x = w * (size_t)(k % p->across), y = h * (size_t)(k / p->across);
     for (size_t c = 0; c < 3; c++)
         for (size_t i = 0; i < rows; i++)
-            memcpy(to + c * p->pixels + (y + i) * row + x, p->one + (c * h + (size_t)p->y0 + i) * w + (size_t)p->x0,
-                   columns * sizeof *to);
+            memcpy(to + c * p->pixels + (y + i) * row + x,
+                   p->one + ((3 * which + c) * h + (size_t)p->y0 + i) * w + (size_t)p->x0, columns * sizeof *to);
 }
 
 /* L* of mean + scale * difference. */
 static void look(struct planes *p, double scale, float *lightness)
 {
-    for (size_t i = 0; i < 3 * p->pixels; i++)
-        p->work[i] = p->mean[i] + (float)scale * p->difference[i];
+    seq_simulate(p->mean, p->difference, 3 * p->pixels, scale, p->work);
     ggn_visible_lightness(p->work, p->pixels, lightness);
 }
 
@@ -105,32 +104,18 @@ static void see_texture(struct planes *p)
     ggn_visible_texture(p->lightness[0], p->lightness[1], p->width, p->height, p->scratch, p->texture);
 }
 
-/* Half difference of all channels; where only that of the luminance was recorded, that, as grey. */
-static int read_difference(const struct seq_block *b, const struct seq_record *r, float *out, struct base_err *err)
-{
-    const size_t n = (size_t)b->width * b->height;
-    if (seq_has(r, SEQ_PLANE_HALF_F16))
-        return seq_half(b, r, out, err);
-    int rc = seq_half_luminance(b, r, out, err);
-    memcpy(out + n, out, n * sizeof *out);
-    memcpy(out + 2 * n, out, n * sizeof *out);
-    return rc;
-}
-
 /* Mean and half difference of the level at spp, which every block has. */
 static int read_level(struct planes *p, uint32_t spp, struct base_err *err)
 {
-    int rc = 0;
-    for (int k = 0; k < p->across * p->down && !rc; k++) {
+    for (int k = 0; k < p->across * p->down; k++) {
         const struct seq_block *b = &p->blocks[k];
-        const struct seq_record *r = seq_level(b, spp);
-        rc = seq_mean(b, r, p->one, err);
-        place(p, k, p->mean);
-        if (!rc)
-            rc = read_difference(b, r, p->one, err);
-        place(p, k, p->difference);
+        int rc = seq_halves(b, seq_level(b, spp), p->one, p->one + 3 * (size_t)b->width * b->height, err);
+        if (rc)
+            return rc;
+        place(p, k, 0, p->mean);
+        place(p, k, 1, p->difference);
     }
-    return rc;
+    return 0;
 }
 
 static int all_have_halves(const struct planes *p, uint32_t spp)
@@ -187,7 +172,7 @@ static int add_halves(struct ggn_curve *c, struct planes *p, double beyond, stru
         double spp = simulated_spp(i);
         if (spp <= full || spp <= beyond)
             continue;
-        look_at_halves(p, sqrt(full / spp));
+        look_at_halves(p, seq_noise_scale(full, spp));
         append(c, spp, visible(p, 0.5f));
     }
     return rc;
@@ -214,7 +199,7 @@ static int add_levels(struct ggn_curve *c, struct planes *p, int independent, st
             return rc;
         for (size_t i = 0; i < 3 * p->pixels; i++)
             p->difference[i] -= p->mean[i];
-        look(p, independent ? sqrt(n_r / (n_r + r->spp)) : 1.0, p->lightness[0]);
+        look(p, independent ? seq_reference_scale(n_r, r->spp) : 1.0, p->lightness[0]);
         memcpy(p->lightness[1], p->lightness[2], p->pixels * sizeof(float));
         append(c, r->spp, visible(p, 1.0f));
     }
@@ -320,7 +305,6 @@ int ggn_curve_level(const struct seq_block *block, const struct seq_record *leve
 int ggn_curve_looks(const struct seq_block *block, const struct seq_record *earlier, const struct seq_record *level,
                     double *visible_out, struct base_err *err)
 {
-    const double n1 = earlier->spp, n2 = level->spp;
     struct planes p;
     int rc = planes_init(&p, block, 1, 1, err);
     if (!rc)
@@ -328,7 +312,7 @@ int ggn_curve_looks(const struct seq_block *block, const struct seq_record *earl
     if (!rc)
         rc = seq_mean(block, level, p.mean, err);
     for (size_t i = 0; i < 3 * p.pixels && !rc; i++)
-        p.difference[i] = (float)sqrt(n1 / (n2 - n1)) * (p.mean[i] - p.difference[i]);
+        p.difference[i] = (float)seq_look_scale(earlier->spp, level->spp) * (p.mean[i] - p.difference[i]);
     if (!rc)
         *visible_out = see_both(&p);
     planes_release(&p);
@@ -367,7 +351,7 @@ double ggn_curve_at(const struct ggn_curve *c, double spp)
 {
     int i = 0;
     if (spp <= c->spp[0])
-        return c->visible[0] * sqrt(c->spp[0] / spp);
+        return c->visible[0] * seq_noise_scale(c->spp[0], spp);
     if (spp >= c->spp[c->n - 1])
         return c->visible[c->n - 1];
     while (c->spp[i + 1] < spp)

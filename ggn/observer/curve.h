@@ -2,7 +2,7 @@
  * How visible the noise of a recorded block is at any number of samples.
  *
  * - From two halves: M and D of the block's full level, recorded at n0 spp, give the look at n spp as M + sqrt(n0/n) D and
- *   its twin with the other sign, for n > n0 up to GGN_LABELS_CAP. Recorded levels below n0 are looked at by their own
+ *   its twin with the other sign, for n > n0 up to SEQ_SIMULATED_CAP. Recorded levels below n0 are looked at by their own
  *   halves. It errs where rare bright paths make the noise far from Gaussian (ggn/observer/README.md).
  * - From recorded levels: the picture I at n spp against a reference R of n_r independent samples. I - R has the variance
  *   s^2 (1/n + 1/n_r), so it is scaled by sqrt(n_r / (n_r + n)); texture is what the last level and R share. Where the block

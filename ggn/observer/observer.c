@@ -10,10 +10,10 @@ static double min(double a, double b) { return a < b ? a : b; }
 
 double ggn_observer_from_study(double spp)
 {
-    return spp >= GGN_STUDY_CAP ? GGN_LABELS_CAP : 1.0 / (1.0 / spp - 1.0 / STUDY_REFERENCE);
+    return spp >= SEQ_STUDY_CAP ? SEQ_SIMULATED_CAP : 1.0 / (1.0 / spp - 1.0 / STUDY_REFERENCE);
 }
 
-double ggn_observer_to_study(double spp) { return min(1.0 / (1.0 / spp + 1.0 / STUDY_REFERENCE), GGN_STUDY_CAP); }
+double ggn_observer_to_study(double spp) { return min(1.0 / (1.0 / spp + 1.0 / STUDY_REFERENCE), SEQ_STUDY_CAP); }
 
 /* Standard error of the pooled Gaussian noise of P pixels is this over sqrt(P), as a share of it: a sixth moment scatters by
  * sqrt(10170)/15, its root by a sixth of that, and the blur leaves about a third of the pixels independent. */

@@ -16,11 +16,7 @@
 #include <stddef.h>
 
 #include "base/err.h"
-#include "data/labels.h"
-
-enum {
-    GGN_STUDY_CAP = 10000 /* spp; the study's highest count, where thresholds are censored: GGN_LABELS_CAP here */
-};
+#include "sequence/simulate.h"
 
 /* The criterion's default share of viewers who may still see noise: the smallest at which views that people judged take no
  * more than 1.15 of the samples (ggn/observer/README.md). */
@@ -34,9 +30,10 @@ struct ggn_observer {
 /* What is used when no other is named; ggn/observer/observer.json says the same and how it came about. */
 extern const struct ggn_observer ggn_observer_default;
 
-/* A threshold of the study in samples of the observer, at most GGN_LABELS_CAP. spp > 0. */
+/* A threshold of the study in samples of the observer; one that is censored there, at SEQ_STUDY_CAP, is SEQ_SIMULATED_CAP.
+ * spp > 0. */
 double ggn_observer_from_study(double spp);
-/* The study's threshold that an answer of the observer stands for, at most GGN_STUDY_CAP. spp > 0. */
+/* The study's threshold that an answer of the observer stands for, at most SEQ_STUDY_CAP. spp > 0. */
 double ggn_observer_to_study(double spp);
 
 /* What the criterion `observer` calls error: visible noise over the level, and one standard error of the pooling more, so

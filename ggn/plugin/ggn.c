@@ -15,6 +15,7 @@
 #include "plugin/model_path.h"
 #include "plugin/translate.h"
 #include "plugin/windowed.h"
+#include "sequence/simulate.h"
 #include "sequence/tail.h"
 
 enum { P_MODEL, P_VISIBLE, P_PASSES, P_GATE, P_TAIL, P_GINI, P_FIRST_SPP, P_PRECISION, P_COUNT };
@@ -106,15 +107,15 @@ static double window_noise(void *data)
                             (double)s->spp[s->used - 1]);
 }
 
-/* D = (A − I)·√(h/(n − h)) of n samples, h of them in HALF: noise of the variance of the mean. *split is that root. 0: the
- * view has no half buffer with part of the samples. */
+/* *split takes A − I, of n samples, the first h of them in A, to noise of the variance of the mean. 0: the view has no half
+ * buffer with part of the samples. */
 static int has_half(const struct gp_look *l, double *split)
 {
     const double n = (double)l->block->spp, h = (double)l->block->half_spp;
 
     if (!lull_kit_plane(l->view, LULL_PLANE_HALF) || h <= 0 || h >= n)
         return 0;
-    *split = sqrt(h / (n - h));
+    *split = seq_look_scale(h, n);
     return 1;
 }
 

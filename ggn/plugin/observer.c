@@ -13,6 +13,7 @@
 #include "plugin/criteria.h"
 #include "plugin/looks.h"
 #include "plugin/translate.h"
+#include "sequence/simulate.h"
 
 static const double FLOAT_STEP = 0x1p-22; /* looks that are nearer than their rounding are the same */
 
@@ -88,7 +89,7 @@ static int read_halves(const struct lull_kit *kit, const struct lull_view *view,
 static int read_looks(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *b,
                       const float *base, uint64_t spp_base, float *keep, struct worker *w, struct lull_kit_tally *tally)
 {
-    const double before = (double)spp_base, scale = base ? sqrt(before / ((double)b->spp - before)) : 0;
+    const double scale = base ? seq_look_scale((double)spp_base, (double)b->spp) : 0;
     const size_t plane = (size_t)lull_kit_pixels(b);
     struct lull_kit_span s;
     size_t at = 0;
@@ -165,8 +166,6 @@ static double verdict_on(struct lull_instance *in, const struct lull_block *b, i
 static double judge_halves(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
                            struct worker *w, struct lull_kit_tally *tally)
 {
-    const double n = (double)b->spp, h = (double)b->half_spp;
-
     if (!b->half_spp || b->half_spp >= b->spp) {
         warn(in, "observer: HALF holds none or all of a block's samples, so that noise cannot be told; no block is stopped "
                  "by it");
@@ -174,7 +173,7 @@ static double judge_halves(struct lull_instance *in, const struct lull_view *vie
         return (double)NAN;
     }
     int differ = read_halves(&in->kit, view, b, w, tally);
-    return verdict_on(in, b, differ, sqrt(h * (n - h)) / n, /* 1/2 for equal halves */
+    return verdict_on(in, b, differ, 0.5 * seq_half_scale((double)b->spp, (double)b->half_spp),
                       "observer: COLOR and HALF are the same in a block that is not of one colour: HALF must hold a fixed "
                       "half of the samples",
                       w, tally);

@@ -1,9 +1,11 @@
 #include "study/stimuli.h"
 
-#include <math.h>
 #include <stdlib.h>
 
 #include "model/preprocess.h"
+#include "sequence/simulate.h"
+
+enum { MAX_SIMULATED = 64 };
 
 void ggn_stimuli_release(struct ggn_stimuli *s)
 {
@@ -22,26 +24,22 @@ static void encode(const float *linear, size_t pixels, uint8_t *rgb)
             rgb[3 * i + c] = ggn_preprocess((double)linear[c * pixels + i], NULL, NULL);
 }
 
-/* Sample counts above `beyond` that halves stand for. spp may be NULL; returns their number. */
-static int simulated_levels(double beyond, double *spp)
+/* Sample counts above `beyond` that halves stand for; returns their number. */
+static int simulated_levels(double beyond, double spp[MAX_SIMULATED])
 {
+    uint32_t all[MAX_SIMULATED];
     int n = 0;
-    for (double v = 20.0; v < GGN_SIMULATED_CAP; v *= 1.15)
-        if (round(v) > beyond) {
-            if (spp)
-                spp[n] = round(v);
-            n++;
-        }
-    if (spp)
-        spp[n] = GGN_SIMULATED_CAP;
-    return n + 1;
+    for (int i = 0, count = seq_levels(20, SEQ_STUDY_CAP, 1.15, 1, all, MAX_SIMULATED); i < count; i++)
+        if (all[i] > beyond)
+            spp[n++] = all[i];
+    return n;
 }
 
 /* Whether halves stand for levels beyond the last recorded one; up to a tenth of an octave is not worth simulating. */
 static int extends(const struct seq_block *b, int reference_independent)
 {
     return reference_independent && b->reference && seq_full_level(b) &&
-           1.07 * b->levels[b->n_levels - 1].spp < GGN_SIMULATED_CAP && seq_has(b->reference, SEQ_PLANE_MEAN_F16);
+           1.07 * b->levels[b->n_levels - 1].spp < SEQ_STUDY_CAP && seq_has(b->reference, SEQ_PLANE_MEAN_F16);
 }
 
 /* Without a reference: the mean of the full level stands for the converged image. */
@@ -53,9 +51,7 @@ static int init_halves(struct ggn_stimuli *s, struct base_err *err)
         return base_fail(err, BASE_EINVAL, "block %u has neither a reference nor a full level with a half-buffer difference",
                          b->id);
     s->spp0 = full->spp;
-    int rc = seq_half(b, full, s->difference, err);
-    if (!rc)
-        rc = seq_mean(b, full, s->base, err);
+    int rc = seq_halves(b, full, s->base, s->difference, err);
     if (!rc)
         encode(s->base, (size_t)b->width * b->height, s->converged);
     return rc;
@@ -78,8 +74,8 @@ int ggn_stimuli_init(struct ggn_stimuli *out, const struct seq_block *block, int
     size_t pixels = (size_t)block->width * block->height;
     struct ggn_stimuli s = {.block = block, .recorded = block->reference ? (int)block->n_levels : 0};
     int extend = extends(block, reference_independent);
-    double beyond = s.recorded > 0 ? 1.07 * block->levels[s.recorded - 1].spp : 0.0;
-    s.n = s.recorded + (extend || s.recorded == 0 ? simulated_levels(beyond, NULL) : 0);
+    double beyond = s.recorded > 0 ? 1.07 * block->levels[s.recorded - 1].spp : 0.0, simulated[MAX_SIMULATED];
+    s.n = s.recorded + (extend || s.recorded == 0 ? simulated_levels(beyond, simulated) : 0);
     s.spp = malloc((size_t)s.n * sizeof *s.spp);
     s.base = malloc(3 * pixels * sizeof(float));
     s.difference = malloc(3 * pixels * sizeof(float));
@@ -98,8 +94,8 @@ int ggn_stimuli_init(struct ggn_stimuli *out, const struct seq_block *block, int
     }
     for (int i = 0; i < s.recorded; i++)
         s.spp[i] = block->levels[i].spp;
-    if (s.n > s.recorded)
-        simulated_levels(beyond, s.spp + s.recorded);
+    for (int i = s.recorded; i < s.n; i++)
+        s.spp[i] = simulated[i - s.recorded];
     *out = s;
     return 0;
 }
@@ -109,20 +105,18 @@ int ggn_stimuli_make(struct ggn_stimuli *s, int level, uint8_t *test, struct bas
     const struct seq_block *b = s->block;
     size_t pixels = (size_t)b->width * b->height;
     if (level >= s->recorded) {
-        float scale = (float)sqrt(s->spp0 / s->spp[level]);
-        for (size_t i = 0; i < 3 * pixels; i++)
-            s->work[i] = s->base[i] + scale * s->difference[i];
+        seq_simulate(s->base, s->difference, 3 * pixels, seq_noise_scale(s->spp0, s->spp[level]), s->work);
         encode(s->work, pixels, test);
         return 0;
     }
     const struct seq_record *r = &b->levels[level];
     if (s->scale && (seq_has(r, SEQ_PLANE_MEAN_F16) || seq_has(r, SEQ_PLANE_FINE))) {
-        float scale = (float)sqrt((double)b->reference->spp / ((double)b->reference->spp + r->spp));
         int rc = seq_mean(b, r, s->work, err);
         if (rc)
             return rc;
         for (size_t i = 0; i < 3 * pixels; i++)
-            s->work[i] = s->base[i] + scale * (s->work[i] - s->base[i]);
+            s->work[i] -= s->base[i];
+        seq_simulate(s->base, s->work, 3 * pixels, seq_reference_scale(b->reference->spp, r->spp), s->work);
     } else {
         return seq_display(b, r, test, err);
     }

@@ -15,8 +15,6 @@
 #include "base/err.h"
 #include "sequence/block.h"
 
-enum { GGN_SIMULATED_CAP = 10000 }; /* the last sample count that is simulated */
-
 struct ggn_stimuli {
     const struct seq_block *block; /* borrows */
     int recorded;                  /* the first so many are recorded levels, the others simulated */

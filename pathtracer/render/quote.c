@@ -6,6 +6,7 @@
 
 #include "base/options.h"
 #include "render/host.h"
+#include "sequence/tail.h"
 
 /* --- rows -------------------------------------------------------------------------------------------------------------- */
 
@@ -168,22 +169,14 @@ static int ask_all(struct pt_quote *q, struct pt_render *r, struct base_err *err
 /* --- light that is rare --- */
 
 /* One pixel in a hundred with more than this share of the squared difference of the halves (8 % in normal noise) … */
-static const double TAIL_SHARE = 0.6;
+static const double MOST_TOP_SHARE = 0.6;
 /* … or predicted samples that grow by half as many octaves as the samples do: noise that more samples find more of. */
 static const double GROWTH = 0.5;
 
-static int falling(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x < y) - (x > y);
-}
-
-/* Share of the squared luminance difference of the halves that the hundredth part of a block's pixels has that has most;
- * 0 without halves or differences. scratch: [pixels of the block] */
-static double tail_share(const struct pt_render *r, const struct lull_host_block *b, float *scratch)
+/* Of the halves' luminance difference, where what is no number is 0; 0 without halves. scratch: [pixels of the block] */
+static double top_share(const struct pt_render *r, const struct lull_host_block *b, double *scratch)
 {
     size_t n = 0;
-    double all = 0.0, top = 0.0;
     uint64_t half_spp = pt_film_half_spp(b->spp);
     if (!(r->film.planes & PT_FILM_HALF) || half_spp == 0 || half_spp == b->spp)
         return 0.0;
@@ -194,14 +187,9 @@ static double tail_share(const struct pt_render *r, const struct lull_host_block
             pt_film_mean(&r->film, at, b->spp, m);
             pt_film_half_mean(&r->film, at, half_spp, a);
             double d = base_luminance(a[0] - m[0], a[1] - m[1], a[2] - m[2]);
-            scratch[n++] = isfinite(d) ? (float)(d * d) : 0.0f;
+            scratch[n++] = isfinite(d) ? fabs(d) : 0.0;
         }
-    qsort(scratch, n, sizeof *scratch, falling);
-    for (size_t i = 0; i < n; i++) {
-        all += (double)scratch[i];
-        top += i < (n + 99) / 100 ? (double)scratch[i] : 0.0;
-    }
-    return all > 0.0 ? top / all : 0.0;
+    return seq_tail_of(scratch, n, 0.0).top_share;
 }
 
 static int grows(const struct lull_host_said *first, const struct lull_host_said *said)
@@ -213,11 +201,11 @@ static int grows(const struct lull_host_said *first, const struct lull_host_said
 static int find_unmet(struct pt_quote *q, const struct pt_render *r, struct base_err *err)
 {
     size_t most = (size_t)r->config.block_width * (size_t)r->config.block_height;
-    float *scratch = malloc(most * sizeof *scratch);
+    double *scratch = malloc(most * sizeof *scratch);
     if (!scratch)
         return base_fail_nomem(err, "quote");
     for (uint32_t i = 0; i < q->block_count; i++) {
-        int tail = tail_share(r, &r->blocks->list[i], scratch) > TAIL_SHARE;
+        int tail = top_share(r, &r->blocks->list[i], scratch) > MOST_TOP_SHARE;
         for (int k = 0; k < q->row_count; k++) {
             struct lull_host_said *said = &q->rows[k].said[i];
             said->unmet = !said->stopped && (tail || grows(&q->rows[k].first[i], said));

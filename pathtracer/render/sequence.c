@@ -13,6 +13,7 @@
 #include "base/version.h"
 #include "sequence/builder.h"
 #include "sequence/manifest.h"
+#include "sequence/simulate.h"
 #include "sequence/statistics.h"
 #include "scene/scene.h"
 
@@ -28,24 +29,15 @@ int pt_sequence_levels(const char *text, uint32_t spp[PT_SEQUENCE_MAX_LEVELS], s
 {
     char kind[16], end;
     double first, last, step;
-    int geometric, n = 0;
+    int geometric;
     if (sscanf(text, "%15[a-z]:%lf:%lf:%lf%c", kind, &first, &last, &step, &end) != 4 ||
         (!(geometric = strcmp(kind, "geometric") == 0) && strcmp(kind, "linear") != 0))
         return base_fail(err, BASE_EINVAL, "--levels %s: expected geometric:FIRST:LAST:RATIO or linear:FIRST:LAST:STEP",
                          text);
     if (!(first >= 1.0 && last >= first && last <= 1e9) || !(geometric ? step >= 1.001 : step >= 1.0))
         return base_fail(err, BASE_EINVAL, "--levels %s: expected 1 <= FIRST <= LAST, RATIO >= 1.001, STEP >= 1", text);
-    for (double at = first; at <= last * (1.0 + 1e-9); at = geometric ? at * step : at + step) {
-        uint32_t level = (uint32_t)lround(at);
-        if (n > 0 && level <= spp[n - 1])
-            continue;
-        if (n >= PT_SEQUENCE_MAX_LEVELS - 1)
-            return base_fail(err, BASE_EINVAL, "--levels %s: more than %d levels", text, PT_SEQUENCE_MAX_LEVELS - 1);
-        spp[n++] = level;
-    }
-    if (spp[n - 1] < (uint32_t)last)
-        spp[n++] = (uint32_t)last;
-    return n;
+    const int room = PT_SEQUENCE_MAX_LEVELS - 1, n = seq_levels(first, last, step, geometric, spp, room);
+    return n <= room ? n : base_fail(err, BASE_EINVAL, "--levels %s: more than %d levels", text, room);
 }
 
 int pt_sequence_choose(const char *text, uint8_t *chosen, uint32_t count, struct base_err *err)

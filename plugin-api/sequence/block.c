@@ -309,28 +309,37 @@ int seq_half(const struct seq_block *b, const struct seq_record *r, float *rgb, 
     return load_f16(b, r, SEQ_PLANE_HALF_F16, rgb, err);
 }
 
-int seq_half_luminance(const struct seq_block *b, const struct seq_record *r, float *y, struct base_err *err)
+/* Luminance of what `read` gives of a record. */
+static int read_luminance(int (*read)(const struct seq_block *, const struct seq_record *, float *, struct base_err *),
+                          const struct seq_block *b, const struct seq_record *r, float *y, struct base_err *err)
 {
-    int rc;
     size_t pixels = (size_t)b->width * b->height;
-    if (!seq_has(r, SEQ_PLANE_HALF_F16)) {
-        uint8_t *code = load_plane_new(b, r, SEQ_PLANE_HALF_LOG, &rc, err);
-        if (!code)
-            return rc;
-        float table[256];
-        for (int i = 0; i < 256; i++)
-            table[i] = (float)seq_half_log_decode((uint8_t)i);
-        for (size_t i = 0; i < pixels; i++)
-            y[i] = table[code[i]];
-        free(code);
-        return 0;
-    }
     float *rgb = malloc(3 * pixels * sizeof *rgb);
-    if (!rgb)
-        return base_fail_nomem(err, "half buffer");
-    rc = load_f16(b, r, SEQ_PLANE_HALF_F16, rgb, err);
+    int rc = rgb ? read(b, r, rgb, err) : base_fail_nomem(err, "luminance");
     for (size_t i = 0; i < pixels && !rc; i++)
         y[i] = (float)base_luminance((double)rgb[i], (double)rgb[pixels + i], (double)rgb[2 * pixels + i]);
     free(rgb);
     return rc;
+}
+
+int seq_mean_luminance(const struct seq_block *b, const struct seq_record *r, float *y, struct base_err *err)
+{
+    return read_luminance(seq_mean, b, r, y, err);
+}
+
+int seq_half_luminance(const struct seq_block *b, const struct seq_record *r, float *y, struct base_err *err)
+{
+    int rc;
+    if (seq_has(r, SEQ_PLANE_HALF_F16))
+        return read_luminance(seq_half, b, r, y, err);
+    uint8_t *code = load_plane_new(b, r, SEQ_PLANE_HALF_LOG, &rc, err);
+    if (!code)
+        return rc;
+    float table[256];
+    for (int i = 0; i < 256; i++)
+        table[i] = (float)seq_half_log_decode((uint8_t)i);
+    for (size_t i = 0; i < (size_t)b->width * b->height; i++)
+        y[i] = table[code[i]];
+    free(code);
+    return 0;
 }

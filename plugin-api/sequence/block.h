@@ -55,6 +55,7 @@ int seq_display_planar(const struct seq_block *b, const struct seq_record *r, ui
 int seq_display(const struct seq_block *b, const struct seq_record *r, uint8_t *rgb /* [P][3] */, struct base_err *err);
 /* Linear mean, finite. From MEAN_F16, else DISPLAY + FINE, else DISPLAY alone (then within half a code, and at most 1). */
 int seq_mean(const struct seq_block *b, const struct seq_record *r, float *rgb /* [3][P] */, struct base_err *err);
+int seq_mean_luminance(const struct seq_block *b, const struct seq_record *r, float *y /* [P] */, struct base_err *err);
 /* Linear half-buffer difference D: luminance from HALF_F16 or HALF_LOG; all channels from HALF_F16 only. */
 int seq_half_luminance(const struct seq_block *b, const struct seq_record *r, float *y /* [P] */, struct base_err *err);
 int seq_half(const struct seq_block *b, const struct seq_record *r, float *rgb /* [3][P] */, struct base_err *err);

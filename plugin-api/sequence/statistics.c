@@ -5,9 +5,6 @@
 #include "base/colour.h"
 #include "sequence/tail.h"
 
-/* What the criteria halfbuf and variance call a settled pixel by default. */
-static const double tail_error = 0.5, floor_y = 0.02;
-
 /* Of pixel i of a planar image. */
 static double luminance(const double *rgb, size_t pixels, size_t i)
 {
@@ -33,12 +30,13 @@ void seq_statistics(const double *mean, const double *half_mean, const double *h
     double n = (double)pixels, sum_y = 0.0, sum_e = 0.0;
     size_t half_unsettled = 0, rse_unsettled = 0;
     for (size_t i = 0; i < pixels; i++) {
-        double y = luminance(mean, pixels, i), level = fmax(fabs(y), floor_y);
-        double e = spp > 1 ? sqrt(fmax(moment2[i] - y * y, 0.0) / (double)(spp - 1)) / level : 0.0;
+        double y = luminance(mean, pixels, i);
+        double e =
+            spp > 1 ? sqrt(fmax(moment2[i] - y * y, 0.0) / (double)(spp - 1)) / fmax(fabs(y), SEQ_UNSETTLED_FLOOR) : 0.0;
         sum_y += y;
         sum_e += e * e;
-        rse_unsettled += e > tail_error;
-        half_unsettled += fabs(y - luminance(half_mean, pixels, i)) > tail_error * level;
+        rse_unsettled += e > SEQ_UNSETTLED_ERROR;
+        half_unsettled += (size_t)seq_is_unsettled(fabs(y - luminance(half_mean, pixels, i)), y);
         scratch[i] = fabs(luminance(half, pixels, i));
     }
     struct seq_tail tail = seq_tail_of(scratch, pixels, sum_y / n);

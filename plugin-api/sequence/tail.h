@@ -1,20 +1,37 @@
 /*
- * Whether a block's noise sits in few pixels: what the tail guard of the criterion ggn looks at, and what recorded sequences
- * keep of it. Pure function, any thread, allocates nothing.
+ * Noise that sits in few pixels: the *tail* of a block's noise. Rare bright paths, each met by one sample or none, make it;
+ * a mean over all pixels hides it. Pure functions, any thread, allocate nothing.
+ *
+ * - The criterion ggn is held back by tail999 and gini (ggn_policy_tail_holds).
+ * - The criteria halfbuf and variance are held back by the share of unsettled pixels.
+ * - A quote takes top_share for light that was not met yet (pathtracer/render/quote.h).
+ * - Recorded sequences keep tail999, gini and the shares of unsettled pixels (FORMAT.md).
  */
 #ifndef SEQUENCE_TAIL_H
 #define SEQUENCE_TAIL_H
 
+#include <math.h>
 #include <stddef.h>
 
 struct seq_tail {
     /* 99.9th percentile of the noise, element ceil(0.999 n) of the sorted values, over max(mean luminance, 1e-4) */
     double tail999;
-    double gini; /* Gini coefficient of the noise: Σ (2i − n − 1) a_i / (n Σ a_i), a sorted ascending, i from 1 */
+    double gini;      /* Gini coefficient of the noise: Σ (2i − n − 1) a_i / (n Σ a_i), a sorted ascending, i from 1 */
+    double top_share; /* of Σ a_i², in [0, 1]: what the noisiest ceil(n / 100) values have; 0.08 in Gaussian noise */
 };
 
-/* noise: |Y(D)| of n pixels, D the half-buffer difference that has the variance of the mean; finite; sorted in place. n 0:
- * zeros. */
+/* noise: |Y(D)| of n pixels, D the half-buffer difference that has the variance of the mean (gini and top_share: any
+ * multiple of it); finite; sorted in place. n 0, or noise that is 0: zeros. */
 struct seq_tail seq_tail_of(double *noise, size_t n, double mean_luminance);
+
+/* A pixel is unsettled while its luminance may still move by more than this share of itself, or of the least luminance that
+ * counts (1: display white): the defaults of the criteria halfbuf and variance. */
+#define SEQ_UNSETTLED_ERROR 0.5
+#define SEQ_UNSETTLED_FLOOR 0.02
+/* difference: of the means of two buffers, or a standard error, >= 0; y: the pixel's luminance. */
+static inline int seq_is_unsettled(double difference, double y)
+{
+    return difference > SEQ_UNSETTLED_ERROR * fmax(fabs(y), SEQ_UNSETTLED_FLOOR);
+}
 
 #endif

@@ -18,6 +18,7 @@
 #include "base/half.h"
 #include "sequence/builder.h"
 #include "sequence/manifest.h"
+#include "sequence/simulate.h"
 #include "sequence/statistics.h"
 #include "sequence/layout.h"
 #include "support/ggn_near.h"
@@ -219,6 +220,59 @@ static void round_trip(void **state)
     }
     seq_block_release(&b);
     seq_builder_release(&w);
+}
+
+/* M and D of a level, and pictures of other sample counts made of them. */
+static void other_counts(void **state)
+{
+    (void)state;
+    struct seq_builder w;
+    struct seq_block b;
+    uint32_t crc;
+    static float m[3 * P], d[3 * P], wanted[3 * P], y[P];
+    build(&w);
+    assert_int_equal(seq_builder_write(&w, block_path, &crc, NULL), 0);
+    assert_int_equal(seq_block_read(block_path, &b, NULL), 0);
+    for (int i = 0; i < 2; i++) { /* luminance of D alone, and all of it */
+        assert_int_equal(seq_halves(&b, &b.levels[i], m, d, NULL), 0);
+        assert_int_equal(seq_mean(&b, &b.levels[i], wanted, NULL), 0);
+        assert_memory_equal(m, wanted, sizeof m);
+        assert_int_equal(i ? seq_half(&b, &b.levels[1], wanted, NULL) : seq_half_luminance(&b, &b.levels[0], wanted, NULL),
+                         0);
+        for (int k = 0; k < 3 * P; k++)
+            assert_true(d[k] == wanted[i ? k : k % P]);
+        assert_int_equal(seq_mean_luminance(&b, &b.levels[i], y, NULL), 0);
+        for (int k = 0; k < P; k++)
+            assert_near((double)y[k], base_luminance((double)m[k], (double)m[P + k], (double)m[2 * P + k]), 1e-6);
+    }
+    for (int k = 0; k < 3 * P; k++)
+        wanted[k] = m[k] - 0.5f * d[k];
+    seq_simulate(m, d, 3 * P, -seq_noise_scale(40, 160), d); /* in place */
+    assert_memory_equal(d, wanted, sizeof d);
+    seq_block_release(&b);
+    seq_builder_release(&w);
+
+    /* squares of the scales against the variances that they are there for, of samples of variance 1 */
+    const double n = 23, h = 7, r = 100;
+    assert_near(pow(seq_half_scale(n, h), 2) * (1 / h + 1 / (n - h)) / 4, 1 / n, 1e-15);
+    assert_near(pow(seq_look_scale(h, n), 2) * (1 / h - 1 / n), 1 / n, 1e-15);
+    assert_near(pow(seq_reference_scale(r, n), 2) * (1 / n + 1 / r), 1 / n, 1e-15);
+    assert_near(pow(seq_noise_scale(h, n), 2) / h, 1 / n, 1e-15);
+    assert_true(seq_half_scale(16, 8) == 1 && seq_half_scale(5, 0) == 0 && seq_half_scale(5, 5) == 0);
+}
+
+static void sample_counts(void **state)
+{
+    (void)state;
+    uint32_t spp[8];
+    const uint32_t geometric[] = {2, 3, 4, 5, 8, 9}, linear[] = {3, 7, 10};
+    assert_int_equal(seq_levels(2, 9, 1.4, 1, spp, 8), 6); /* 2, 2.8, 3.92, 5.49, 7.68 and the end */
+    assert_memory_equal(spp, geometric, sizeof geometric);
+    assert_int_equal(seq_levels(3, 10.5, 4, 0, spp, 3), 3);
+    assert_memory_equal(spp, linear, sizeof linear);
+    assert_int_equal(seq_levels(3, 10.5, 4, 0, spp, 2), 3); /* no room for the end, … */
+    assert_int_equal(seq_levels(3, 11, 4, 0, spp, 2), 3);   /* … which is a step here */
+    assert_int_equal(seq_levels(1, 5, 1.01, 1, spp, 8), 5); /* each once */
 }
 
 /* Any truncation and any single damaged byte is noticed. */
@@ -743,6 +797,8 @@ int main(void)
         cmocka_unit_test(statistics),
         cmocka_unit_test(filters),
         cmocka_unit_test(round_trip),
+        cmocka_unit_test(other_counts),
+        cmocka_unit_test(sample_counts),
         cmocka_unit_test(differences),
         cmocka_unit_test(damage),
         cmocka_unit_test(limits_of_blocks),

@@ -17,6 +17,7 @@
 #include "ggn_noise.h"
 #include "ggn_seqgen.h"
 #include "sequence/manifest.h"
+#include "sequence/simulate.h"
 #include "nn/exec.h"
 #include "train/fit_policy.h"
 #include "train/session.h"
@@ -138,8 +139,8 @@ static void simulated_levels_lie_as_far_apart_as_asked(void **state)
             const int end = c->n_levels - 1;
             double low = 0, high = 0;
             int half = 0;
-            assert_true(c->simulated && c->spp[0] == first && c->spp[end] <= GGN_LABELS_CAP &&
-                        c->spp[end] * wanted[t] > GGN_LABELS_CAP && isnan(c->tail999[0]));
+            assert_true(c->simulated && c->spp[0] == first && c->spp[end] <= SEQ_SIMULATED_CAP &&
+                        c->spp[end] * wanted[t] > SEQ_SIMULATED_CAP && isnan(c->tail999[0]));
             for (int k = 1; k < end; k++)
                 assert_true(c->spp[k] == fmax(c->spp[k - 1] + 1, floor(c->spp[k - 1] * wanted[t] + 0.5)));
             while (c->spp[half] < 100)

@@ -121,23 +121,26 @@ static void tail_statistics_match_their_definition(void **state)
     static double a[P], sorted[P];
 
     for (int heavy = 0; heavy < 2; heavy++) {
-        double sum = 0, weighted = 0;
+        double sum = 0, weighted = 0, squares = 0, top = 0;
         for (uint32_t i = 0; i < P; i++)
             sorted[i] = a[i] = fabs(ggn_hash_unit(i, 3) - 0.5) * (heavy && i % 500 == 0 ? 300 : 0.2);
         qsort(sorted, P, sizeof sorted[0], by_value);
         for (int i = 0; i < P; i++) {
             sum += sorted[i];
             weighted += (2.0 * (i + 1) - P - 1) * sorted[i];
+            squares += sorted[i] * sorted[i];
+            top += i >= P - P / 100 ? sorted[i] * sorted[i] : 0;
         }
         struct seq_tail tail = seq_tail_of(a, P, 0.4);
         assert_true(tail.tail999 == sorted[(int)ceil(0.999 * P) - 1] / 0.4);
         assert_true(tail.gini == weighted / (P * sum));
+        assert_true(tail.top_share == top / squares && (tail.top_share > 0.9) == heavy);
         assert_memory_equal(a, sorted, sizeof a);
     }
     double zero[10] = {0}, one = 2;
     struct seq_tail black = seq_tail_of(zero, 10, 0), single = seq_tail_of(&one, 1, 4), none = seq_tail_of(&one, 0, 1);
-    assert_true(black.gini == 0 && black.tail999 == 0 && none.tail999 == 0);
-    assert_true(single.gini == 0 && single.tail999 == 0.5);
+    assert_true(black.gini == 0 && black.tail999 == 0 && black.top_share == 0 && none.tail999 == 0);
+    assert_true(single.gini == 0 && single.tail999 == 0.5 && single.top_share == 1);
     (void)state;
 }
 

@@ -4,6 +4,7 @@
 #include "denoise/blend.h"
 #include "observer/visibility.h"
 #include "plugin/translate.h"
+#include "sequence/simulate.h"
 
 enum { HALF_A, HALF_B, ALBEDO, NORMAL, DENOISED_A, DENOISED_B, BOXES };
 enum { TILE = 25 };
@@ -294,7 +295,7 @@ int gd_look_judge(struct gd_look *l, const struct gd_form *form, const struct lu
     const int width = b->x1 - b->x0, height = b->y1 - b->y0;
     const size_t pixels = (size_t)lull_kit_pixels(b);
     const double n = (double)b->spp, h = (double)b->half_spp;
-    const float split = (float)(sqrt(h * (n - h)) / n); /* to noise as strong as the mean's */
+    const float split = (float)(0.5 * seq_half_scale(n, h)); /* to noise as strong as the mean's */
     const struct lull_estimate estimate = {l->maps[0], l->maps[1], l->maps[2]};
 
     l->err = (struct base_err){0};
