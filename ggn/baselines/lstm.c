@@ -12,8 +12,7 @@ static const float dropout = 0.4f;
 
 struct layer {
     int in, out;
-    size_t w, u, b; /* offsets of W [4·out, in], U [4·out, out], b [4·out] in the parameters; gates in the order i, f, g, o
-                        */
+    size_t w, u, b; /* offsets in the parameters: W [4·out, in], U [4·out, out], b [4·out]; gates in the order i, f, g, o */
     float *z;       /* [steps][batch][4·out]: gates after their activation; then d loss / d pre-activation */
     float *c, *s, *h; /* [steps][batch][out]: cell, sigmoid(cell), output (before dropout) */
     float *x;         /* [steps][batch][in]: what came in (after dropout) */

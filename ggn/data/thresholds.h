@@ -1,8 +1,10 @@
 /*
- * Thresholds (or stops) per block of one or more views, from any file that says them.
+ * Thresholds (or stops) per block of one or more views, from any file that holds them:
  *
- * CSV `name;t0;…;tN;` (one view per line) · a render's report JSON (`blocks[].spp`, called like the scene's file) ·
- * labels.json · an EXR with `lull.spp.V`.
+ * - CSV `name;t0;…;tN;`, one view per line;
+ * - a render's report JSON: `blocks[].spp`, the view is named like the scene's file;
+ * - labels.json;
+ * - an EXR with `lull.spp.V`.
  */
 #ifndef GGN_DATA_THRESHOLDS_H
 #define GGN_DATA_THRESHOLDS_H

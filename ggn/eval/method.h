@@ -61,8 +61,8 @@ int ggn_method_scores(struct ggn_method *m, const struct ggn_eval_set *s, const 
 /* Sets stop from verdict, guard, passes and cut, as the stopping rule ends (ggn_stopper_pass). */
 void ggn_method_run(struct ggn_method *m, const struct ggn_eval_set *s);
 /* Chooses the cut on the blocks of `split`: the one that spends fewest samples with at most `early_rate` of the blocks
- * stopped below
- * 0.8 of their threshold; if none does, the smallest early rate. The limit of a guard is chosen with it. Then runs. */
+ * stopped below 0.8 of their threshold; if none does, the smallest early rate. The limit of a guard is chosen with it. Then
+ * runs. */
 int ggn_method_tune(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, double early_rate,
                     struct base_err *err);
 

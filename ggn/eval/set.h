@@ -34,13 +34,10 @@ struct ggn_eval_set {
     double *spp, *seconds;         /* own; [n]; seconds: thread time spent on the block so far, NaN if unknown */
     signed char *noisy;            /* owns; [n]: 1, 0, or -1 unknown */
     double *dammertz, *half_unsettled, *rse, *rse_unsettled; /* own; [n]; NaN where not recorded */
-    double *visible;     /* own; [n]: noise that the model observer sees (observer/visibility.h); NaN without half
-                                       buffers */
+    double *visible;     /* owns; [n]: noise that the model observer sees (observer/visibility.h); NaN without halves */
     double *looked;      /* owns; [n]: the same in a host without half buffers; NaN without levels to tell it */
-    double *flip, *ssim; /* own; [n]: against the block's reference, without one against the mean of its full
-                                       level; NaN unless asked for */
-    double *relmse;      /* owns; [n]: variance over the squared mean, from the full level's halves; NaN
-                                       without */
+    double *flip, *ssim; /* own; [n]: against the reference, else the mean of the full level; NaN unless asked for */
+    double *relmse;      /* owns; [n]: variance over the squared mean, from the full level's halves; NaN without */
 };
 
 struct ggn_eval_options {
@@ -48,8 +45,7 @@ struct ggn_eval_options {
     int window;               /* S */
     int quality;              /* also compute FLIP and SSIM of every case ... */
     int no_ssim;              /* ... but SSIM, which takes longer */
-    int recorded;             /* only recorded levels; else each block goes on to about 0.7 of its reference's samples
-                         (ggn_chains_extend) */
+    int recorded;             /* only recorded levels; else each block goes on as ggn_chains_extend says */
     double ratio;             /* thin the levels to at least this ratio; 0: keep all */
     double cadence;           /* > 1: simulate all levels, this far apart (ggn_chains_simulate); 0: no */
     uint32_t seed;            /* of the continuation */

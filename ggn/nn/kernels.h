@@ -51,8 +51,7 @@ struct ggn_kernels {
     int tile_oc; /* output channels of the largest register tile: 8 or 4 */
     int tile_px; /* pixels of a register tile; tasks start at multiples of it */
 
-    /* Elements [p0, p1) of the flat planes, p0 a multiple of tile_px, output channels [oc0, oc1), oc0 a multiple of tile_oc.
-     */
+    /* Elements [p0, p1) of the flat planes, output channels [oc0, oc1); p0 is a multiple of tile_px, oc0 of tile_oc. */
     void (*conv)(const struct ggn_conv *conv, long p0, long p1, int oc0, int oc1);
     /* Faster forms of a 3×3 convolution, NULL where there are none; see nn/winograd.h and nn/bf16.h. */
     void (*wino)(const struct ggn_conv *conv, const real *u, int t0, int t1, int oc0, int oc1, real *scratch);

@@ -1,17 +1,17 @@
 /*
  * How visible a block's noise is: the kernel that labels and the criterion share.
  *
- * Two pictures A and B of the same block, means of equally many samples each, are looked at as CIE L*. What differs between
- * them is noise, what they have in common is texture that hides it; neither needs a converged picture.
+ * Two images A and B of the same block, means of equally many samples each, are compared in CIE L*. Their difference is
+ * noise, their common part is texture that hides it; neither needs a converged image.
  *
- * - The block is split into patches of at most 100x100 px, each side into ceil(side / 100) parts: one texture for a block
- *   of velvet and gold would hide the noise of the velvet.
- * - Texture s of a patch: mean over it of sqrt(max(0, cov(L*(A), L*(B)) - mean(N^2) / 5)), both over 5x5 px. Noise does not
- *   add to a covariance, but it scatters it, by 2/5 mean(N^2) in standard error, and the root of what is left above 0 would
- *   not be 0 in the mean; with half that error taken off, what it adds is nearly gone.
- * - Noise N = (L*(A) - L*(B)) / 2 is as strong as that of their mean. B is N blurred by a Gaussian of 0.7 px.
- * - Visible noise r of the block: mean over its patches of (mean over the patch of B^6)^(1/6) / sqrt(s + 2). A norm of 6
- *   lets a few bright pixels count: people see them. How r becomes an answer: observer/observer.h.
+ * - Patches: each side of the block is split into ceil(side / 100) parts, so that a patch has at most 100x100 px. One
+ *   texture for a block of velvet and gold would hide the noise of the velvet.
+ * - Noise N = (L*(A) - L*(B)) / 2 is as strong as that of their mean. G is N blurred by a Gaussian of 0.7 px.
+ * - Texture s of a patch: the mean over it of sqrt(max(0, cov(L*(A), L*(B)) - mean(N^2) / 5)), both over 5x5 px. Noise adds
+ *   nothing to a covariance, but scatters it by 2/5 mean(N^2) in standard error, and the root of the part above 0 is not 0
+ *   in the mean. Half that error is taken off, so that next to nothing is added.
+ * - Visible noise r of the block: the mean over its patches of (mean over the patch of G^6)^(1/6) / sqrt(s + 2). A norm of
+ *   6 lets a few bright pixels count, because people see them. observer/observer.h turns r into an answer.
  *
  * Beyond the edges of a block its outermost pixels are repeated; a block may be as small as one pixel. Pure functions on
  * memory of the caller, thread-safe; the same bits on every processor (square and cube roots only).
@@ -33,7 +33,7 @@ double ggn_visible_patch(int width, int height, size_t k, const double *texture,
 size_t ggn_visibility_scratch(int width);
 /* a, b: L* [height][width]. texture: [patches] gets s of each. */
 void ggn_visible_texture(const float *a, const float *b, int width, int height, double *scratch, double *texture);
-/* Returns r. noise: N [height][width]. texture: [patches]. blurred: [height][width] gets B / sqrt(s + 2), or NULL. */
+/* Returns r. noise: N [height][width]. texture: [patches]. blurred: [height][width] gets G / sqrt(s + 2), or NULL. */
 double ggn_visible_noise(const float *noise, int width, int height, const double *texture, double *scratch, float *blurred);
 
 #endif

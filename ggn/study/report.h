@@ -1,10 +1,13 @@
 /*
  * The report of a study: CSV, JSON and pictures in a folder.
  *
- * Thresholds: thresholds.csv (`ggn label --human`, `ggn compare`: one line per view of which all blocks are known),
- * thresholds-VIEW.json (the same per view, any blocks), blocks.csv, estimates.csv (per person), people.csv, report.json,
- * thresholds.png, people.png, and for two intervals curves.png. Validation: people.csv, judgements.csv, scenes.csv,
- * report.json, shares.png. Columns: ggn/study/FORMAT.md.
+ * Of thresholds:
+ * - thresholds.csv, one line per view of which all blocks are known, for `ggn label --human` and `ggn compare`;
+ * - thresholds-VIEW.json, the same per view with any blocks;
+ * - blocks.csv, estimates.csv (per person), people.csv, report.json;
+ * - thresholds.png, people.png, and for two intervals curves.png.
+ *
+ * Of a validation: people.csv, judgements.csv, scenes.csv, report.json, shares.png. Columns: ggn/study/FORMAT.md.
  */
 #ifndef GGN_STUDY_REPORT_H
 #define GGN_STUDY_REPORT_H

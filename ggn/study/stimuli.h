@@ -1,7 +1,10 @@
 /*
- * The pictures of one recorded block that people are shown: the converged one, and the one at each of `n` sample counts: the
- * recorded levels, and beyond the last one (or, without a reference, for all of 20, 23, ... 10,000 spp, each 1.15 times the
- * one before) what two halves stand for: the converged picture + sqrt(spp0 / n) times the half-buffer difference at spp0.
+ * The pictures of one recorded block that people are shown:
+ *
+ * - the converged one;
+ * - the recorded levels;
+ * - beyond the last level, or without a reference at all of 20, 23, ... 10,000 spp (each 1.15 times the one before), levels
+ *   made from the two halves: the converged picture + sqrt(spp0 / n) times the half-buffer difference at spp0.
  *
  * A reference of n_r independent samples has noise of its own: I_n - R has the variance s^2 (1/n + 1/n_r), not s^2/n.
  * Scaling that linear difference by sqrt(n_r/(n_r + n)) gives it the variance that I_n has against a perfect reference.

@@ -131,8 +131,7 @@ static int export(struct ggn_session *s, const struct ggn_policy *policy, const 
     base_json_item(model->provenance, "data", describe_data(s, &failed), &failed);
     base_json_item(model->provenance, "validation", describe_validation(stopping, auc, accuracy, &failed), &failed);
     int rc = failed ? base_fail_nomem(err, "description of the run") : ggn_policy_set(model, policy, err);
-    /* f32: half floats change a verdict now and then (counted in ggn/models/README.md); `ggn convert` is for who takes that
-     */
+    /* f32: half floats change a verdict now and then (ggn/models/README.md counts them); `ggn convert` makes them. */
     if (!rc)
         rc = ggn_model_save(model, s->plan->out, GGN_F32, err);
     if (!rc)

@@ -1,10 +1,11 @@
 /*
  * Training from recorded sequences to a model file.
  *
- * Preset lull trains in two phases, because no gradient crosses between them: first the denoiser R on crops (1 − SSIM to the
- * reference), then generator M and discriminator D (cross-entropy) on windows whose denoised images are computed once.
- * Preset paper follows the published iteration. Both end with the best epoch on the validation scenes, a calibration and the
- * choice of the stopping threshold there.
+ * - Preset lull trains in two phases, because no gradient crosses between them: first the denoiser R on crops (1 − SSIM to
+ *   the reference), then generator M and discriminator D (cross-entropy) on windows whose denoised images are computed once.
+ * - Preset paper follows the published iteration.
+ *
+ * Both end with the best epoch on the validation scenes, a calibration and the choice of the stopping threshold there.
  *
  * Everything drawn is a function of (seed, step), sums have a fixed order: the same data, options and seed give the same
  * model bytes for any number of threads and of processes that share the batches, also when a run is interrupted and resumed.

@@ -26,11 +26,9 @@ struct ggn_train_plan {
     double lr_r, lr;
     double difference; /* preset lull: see ggn_train_fold */
     int soft_labels;
-    int flips;     /* see ggn_augment_options */
-    double jitter; /* octaves of exposure; see ggn_augment_options */
-    /* preset lull: share of windows that come with the noise picture of their newest image; 0: networks without that input
-     */
-    double picture;
+    int flips;              /* see ggn_augment_options */
+    double jitter;          /* octaves of exposure; see ggn_augment_options */
+    double picture;         /* preset lull: share of windows that come with the noise picture; 0: networks without it */
     int average;            /* preset lull: steps over which the weights of M and D are averaged; 0: none */
     int synthetic;          /* synthetic chains per block */
     int extend;             /* continue recorded chains beyond their last level, see ggn_chains_extend */

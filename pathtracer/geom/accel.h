@@ -30,7 +30,7 @@ struct pt_hit {
     int32_t primitive; /* mesh: triangle */
     int32_t instance;  /* id, -1 = a shape of the world */
     pt_vec3 geometric; /* mesh: unnormalised normal in the shape's space (right-hand rule, before flip_normal);
-                                 quadric: the hit point in the quadric's own space */
+                          quadric: the hit point in the quadric's own space */
 };
 
 /* t_min for going on behind a hit at t: the hit's own distance is known to a few roundings only. */

@@ -19,8 +19,7 @@ struct pt_quote_block {
 
 struct pt_quote_row {
     double visible;   /* NaN: the criterion has no such parameter, or none is used */
-    const char *name; /* borrows static text: "draft", "default", "final", "as asked"; "normal": the criterion names
-                                  no default */
+    const char *name; /* borrows static text: "draft", "default", "final", "as asked"; "normal": there is no default */
     int asked;        /* this is what a render with the given options does */
     struct lull_host_criterion *criterion; /* owns; NULL: uniform */
     struct lull_host_said *said;           /* owns; [blocks] */

@@ -5,9 +5,8 @@
  * Dimensions come in blocks of PT_DIMS_PER_VERTEX: block 0 is the camera, block k + 1 the k-th vertex.
  *
  * - Independent: a hash of (path key, dimension).
- * - Sobol: the first two Sobol' dimensions, padded: every pair of dimensions has its own Owen shuffle of the sample index
- * and
- *   its own Owen scrambles (Burley 2020, "Practical Hash-based Owen Scrambling"). Blocks beyond PT_SOBOL_BLOCKS fall back to
+ * - Sobol: the first two Sobol' dimensions, padded. Every pair of dimensions has its own Owen shuffle of the sample index
+ *   and its own Owen scrambles (Burley 2020, "Practical Hash-based Owen Scrambling"). Blocks beyond PT_SOBOL_BLOCKS get
  *   independent numbers: stratification no longer shows there and costs time.
  */
 #ifndef PT_SAMPLE_SAMPLER_H

@@ -32,16 +32,16 @@ enum pt_camera_kind { PT_CAMERA_PERSPECTIVE, PT_CAMERA_ORTHOGRAPHIC };
 
 struct pt_camera {
     /* filled by the builder */
-    int32_t kind;                 /* enum pt_camera_kind */
-    int32_t width, height;        /* of the full image, pixels */
-    float fov_deg;                /* perspective: full angle over the screen coordinate range [-1, 1] */
-    float screen[4];              /* x0, x1, y0, y1 of the screen window; short side is [-1, 1] by default; y up */
-    float lens_radius;            /* scene units; 0 = pinhole */
-    float focal_distance;         /* scene units along +z of the camera */
-    struct pt_mat34 to_render[2]; /* camera (+x right, +y up, +z forward; may be left-handed) → render, at shutter open/close
-                                     */
-    int32_t animated;             /* to_render[1] counts */
-    int32_t medium;               /* the camera lies in it, -1 = vacuum */
+    int32_t kind;          /* enum pt_camera_kind */
+    int32_t width, height; /* of the full image, pixels */
+    float fov_deg;         /* perspective: full angle over the screen coordinate range [-1, 1] */
+    float screen[4];       /* x0, x1, y0, y1 of the screen window; short side is [-1, 1] by default; y up */
+    float lens_radius;     /* scene units; 0 = pinhole */
+    float focal_distance;  /* scene units along +z of the camera */
+    struct pt_mat34
+        to_render[2]; /* camera (x right, y up, z forward; may be left-handed) → render, at shutter open, close */
+    int32_t animated; /* to_render[1] counts */
+    int32_t medium;   /* the camera lies in it, -1 = vacuum */
     /* derived by pt_camera_init */
     float x0, dx, y0, dy; /* z = 1 (perspective) or z = 0 (orthographic) plane: x = x0 + dx·raster_x, likewise y */
 };
@@ -116,7 +116,7 @@ struct pt_shape {
     int32_t light;                 /* id of the area light it carries, -1 = none; always -1 in objects */
     int32_t medium_in, medium_out; /* on the side against / along the geometric normal; equal = the ray keeps its medium */
     int32_t flip_normal;   /* the geometric normal is against the right-hand rule (reverse orientation XOR a transform
-                                  that swaps handedness): pbrt's meaning for lights and media */
+                              that swaps handedness): pbrt's meaning for lights and media */
     int32_t has_alpha;     /* `alpha` is not constant 1 */
     struct pt_input alpha; /* float: probability that a hit counts */
 };
@@ -129,7 +129,7 @@ struct pt_object {
 struct pt_instance {
     int32_t object;
     int32_t animated;             /* to_render[1] counts: interpolated as translation, rotation (slerp), scale over the
-                                       shutter */
+                                     shutter */
     struct pt_mat34 to_render[2]; /* object → render at shutter open and close */
 };
 
@@ -153,7 +153,7 @@ struct pt_light {
     int32_t image;     /* ENV_IMAGE: id of a FLOAT image map of 3 channels */
     int32_t mapping;   /* ENV_IMAGE: enum pt_env_map. LATLONG: z up, u = φ/2π from +x, v = θ/π from +z (row 0) */
     pt_vec3 emission;  /* AREA, ENV: radiance (ENV_IMAGE: factor on the image); POINT, SPOT: intensity W/sr;
-                                  DISTANT: irradiance on a surface facing it. All scales applied */
+                          DISTANT: irradiance on a surface facing it. All scales applied */
     pt_vec3 position;  /* POINT, SPOT */
     pt_vec3 direction; /* SPOT: axis; DISTANT: the way the light travels; unit */
     float cos_total, cos_start;         /* SPOT: full darkness beyond, full light within */

@@ -1,6 +1,12 @@
 /*
- * Lights: selection, sampling towards a point, emission met by chance, and the densities that multiple importance sampling
- * needs for both. All densities are per solid angle at the reference point and include the probability of the selection.
+ * Lights, as the kernel uses them:
+ *
+ * - selection of one of many;
+ * - sampling of a direction towards it;
+ * - emission that a path meets by chance;
+ * - the densities of both, for multiple importance sampling: per solid angle at the reference point, with the probability
+ *   of the selection.
+ *
  * Pure, thread-safe, no allocation.
  *
  * A constant environment without a portal is never selected: sampling the BSDF or phase function is already the better
@@ -25,15 +31,13 @@ struct pt_receiver {
 
 struct pt_light_sample {
     pt_vec3 wi;          /* unit, from the reference point to the light */
-    pt_vec3 radiance;    /* arriving along wi when nothing is in between; for a DELTA light: irradiance on a facing surface
-                            */
+    pt_vec3 radiance;    /* arriving along wi when nothing is in between; DELTA: irradiance on a facing surface */
     float inv_pdf_solid; /* 1 / density: kept so that the kernel need not divide; delta: 1 / probability of the selection */
-    const float *pixel;  /* environment image: `radiance` is still to be multiplied by this RGB,
-        which is read (a cache miss, as
-                            a rule) only when the light turns out to be visible; else NULL */
-    int delta;           /* no other strategy can find it */
-    int finite;          /* `target` counts; else the light is at infinity along wi */
-    pt_vec3 target;      /* point on the light, already moved off its surface towards the reference side */
+    const float *pixel; /* environment image, else NULL: RGB still to be multiplied into `radiance`; read only when the light
+                            turns out to be visible, because it is a cache miss as a rule */
+    int delta;          /* no other strategy can find it */
+    int finite;         /* `target` counts; else the light is at infinity along wi */
+    pt_vec3 target;     /* point on the light, already moved off its surface towards the reference side */
 };
 
 #endif

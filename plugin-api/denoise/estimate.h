@@ -1,7 +1,7 @@
 /*
  * How wrong a denoised picture is, from two halves of the samples and no reference.
  *
- * A and B are the means of the halves, M that of all samples, F the denoiser. B is unbiased and knows nothing of F(A), so
+ * A and B are the means of the halves, M that of all samples, F the denoiser. B is unbiased and independent of F(A), so
  *
  *     mse(F(A)) = E (F(A) - B)^2 - var(B),     var(B) from (A - B)^2
  *

@@ -6,11 +6,13 @@
  * The picture that is kept lies between the mean M of all samples and its denoised form F(M), M with the weight alpha of
  * denoise/blend.h, or F(M) alone.
  *
- * - halves: what the two halves' pictures disagree by. Bias, which they share, is not in it.
- * - crossed: from each denoised half against the other, noisy one; bias is in it. It is noise itself, so it is averaged:
- *   over each patch of the observer, with one standard error more, so that luck stops nothing; and over tiles of 25 px with
- *   two standard errors less, so that a small place where the denoiser fails is seen where it is beyond doubt. The larger of
- *   the two counts. Errors are taken as Gaussian inside: a sixth moment is 15 cubes of the mean square.
+ * - halves: the difference of the two denoised halves. Bias, which they share, is not in it.
+ * - crossed: the difference of each denoised half from the other, noisy one. Bias is in it. It is noise itself, so it is
+ *   averaged twice, and the larger result counts:
+ *   - over each patch of the observer, with one standard error more, so that luck stops nothing;
+ *   - over tiles of 25 px, with two standard errors less, so that a small place where the denoiser fails counts where it is
+ *     beyond doubt.
+ *   Errors are taken as Gaussian inside: a sixth moment is 15 cubes of the mean square.
  *
  * One struct gd_look per worker; nothing is allocated after gd_look_create.
  */
