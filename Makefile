@@ -56,7 +56,7 @@ GGN_LIBS := -lopenblas -llapacke -lsvm -lcjson -lpng -lz -ldl -lm
 
 # --- include paths: the dependency arrows --------------------------------------------------------------------------------
 API := -Iplugin-api/include
-BASE := -Iplugin-api# "base/…", "sequence/…" and "denoise/…": what both programs stand on; no part of the ABI
+BASE := -Iplugin-api# "base/…", "job/…", "sequence/…" and "denoise/…": what both programs stand on; no part of the ABI
 INC_plugin-api         := $(API)
 INC_plugin-api_base    := $(BASE)
 INC_plugin-api_mpi     := $(BASE) $(MPI_CFLAGS)# the only folder that knows MPI
@@ -73,7 +73,7 @@ INC_tests_api          := -Itests -Itests/support $(API)
 INC_tests_host         := $(INC_tests_api) $(BASE)# api_host_: the host library from inside
 
 # --- sources -------------------------------------------------------------------------------------------------------------
-BASE_SRC    := $(wildcard plugin-api/base/*.c plugin-api/sequence/*.c plugin-api/denoise/*.c)
+BASE_SRC    := $(wildcard plugin-api/base/*.c plugin-api/job/*.c plugin-api/sequence/*.c plugin-api/denoise/*.c)
 LOADER_SRC  := $(wildcard plugin-api/src/*.c)
 HOST_SRC    := $(wildcard plugin-api/host/*.c)
 EXAMPLE_SRC := $(wildcard plugin-api/examples/*.c)
@@ -132,7 +132,7 @@ all: $(PROGRAMS) $(CRITERIA) $(MODULES) $(HOST_LIB) $(EXAMPLES) ## build the pro
 
 # --- compiling: one rule, flags by folder --------------------------------------------------------------------------------
 inc = $(or $(strip \
-  $(if $(filter plugin-api/%,$(1)),$(if $(filter plugin-api/base/% plugin-api/sequence/% plugin-api/denoise/%,$(1)),$(INC_plugin-api_base),$(if $(filter plugin-api/tools/%,$(1)),$(INC_plugin-api_tools),$(if $(filter plugin-api/host/%,$(1)),$(INC_plugin-api_host),$(if $(filter plugin-api/mpi/%,$(1)),$(INC_plugin-api_mpi),$(INC_plugin-api)))))) \
+  $(if $(filter plugin-api/%,$(1)),$(if $(filter plugin-api/base/% plugin-api/job/% plugin-api/sequence/% plugin-api/denoise/%,$(1)),$(INC_plugin-api_base),$(if $(filter plugin-api/tools/%,$(1)),$(INC_plugin-api_tools),$(if $(filter plugin-api/host/%,$(1)),$(INC_plugin-api_host),$(if $(filter plugin-api/mpi/%,$(1)),$(INC_plugin-api_mpi),$(INC_plugin-api)))))) \
   $(if $(filter pathtracer/%,$(1)),$(if $(filter pathtracer/app/% pathtracer/render/%,$(1)),$(INC_pathtracer_host),$(INC_pathtracer))) \
   $(if $(filter ggn/%,$(1)),$(if $(filter ggn/plugin/%,$(1)),$(INC_ggn_plugin),$(INC_ggn))) \
   $(if $(filter tests/%,$(1)),$(if $(filter pt_%,$(notdir $(1))),$(INC_tests_pt),$(if $(filter ggn_%,$(notdir $(1))),$(INC_tests_ggn),$(if $(filter base_%,$(notdir $(1))),$(INC_tests_base),$(if $(filter api_host_%,$(notdir $(1))),$(INC_tests_host),$(INC_tests_api))))))),)

@@ -135,7 +135,7 @@ int pt_action_open_render(struct pt_session *s, struct base_err *err)
 {
     int rc = pt_setup_render(s, err);
     if (!rc)
-        rc = pt_agree_greet(s, err);
+        rc = pt_agree_handshake(s, err);
     if (!rc && s->cli.resume)
         rc = pt_checkpoint_load(s->cli.checkpoint, s->render, s->settings, err);
     if (rc == BASE_EIO)

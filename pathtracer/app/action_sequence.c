@@ -30,7 +30,7 @@ int pt_action_sequence(struct pt_session *s, int *status, struct base_err *err)
     if (!rc)
         rc = base_inputs_crc32(&s->scene_files, &config.inputs_crc, err);
     if (!rc)
-        rc = pt_agree_greet(s, err);
+        rc = pt_agree_handshake(s, err);
     if (rc)
         return rc;
     int was_interrupted = 0;

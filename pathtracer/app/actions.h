@@ -13,7 +13,7 @@ int pt_action_sequence(struct pt_session *session, int *status, struct base_err 
 
 /* The settings of a recording, besides what pt_sequence_record does; every process. */
 int pt_action_open_sequence(struct pt_session *session, struct pt_render_config *config, struct base_err *err);
-/* The render and the crew, as far as a checkpoint to be resumed had come. */
+/* The render and its workers, as far as a checkpoint to be resumed had come. */
 int pt_action_open_render(struct pt_session *session, struct base_err *err);
 int pt_action_status(enum pt_render_outcome outcome);
 

@@ -20,7 +20,7 @@ int pt_agree_crc(const char *path, uint32_t *crc, struct base_err *err)
 int pt_agree_settings(struct pt_session *s, const struct pt_render_config *c, struct base_err *err)
 {
     uint32_t scene_crc = 0, judging_crc = 0;
-    if (!s->cli.checkpoint && !s->peers)
+    if (!s->cli.checkpoint && !s->job)
         return 0;
     int rc = base_inputs_crc32(&s->scene_files, &scene_crc, err);
     if (!rc)
@@ -62,7 +62,6 @@ static int32_t add_to_crc(const struct lull_writer *to, const void *data, uint64
     return LULL_OK;
 }
 
-/* What every process of a job must agree about: the settings, and the model that the criterion starts with. */
 int pt_agree_job(const struct pt_session *s, char *text, size_t room, struct base_err *err)
 {
     uint32_t crc = (uint32_t)crc32(0, NULL, 0);
@@ -75,10 +74,9 @@ int pt_agree_job(const struct pt_session *s, char *text, size_t room, struct bas
     return 0;
 }
 
-/* Rank 0, ready to begin. */
-int pt_agree_greet(const struct pt_session *s, struct base_err *err)
+int pt_agree_handshake(const struct pt_session *s, struct base_err *err)
 {
     char text[PT_AGREE_JOB];
-    int rc = s->crew ? pt_agree_job(s, text, sizeof text, err) : 0;
-    return rc || !s->crew ? rc : pt_crew_greet(s->crew, text, err);
+    int rc = s->job ? pt_agree_job(s, text, sizeof text, err) : 0;
+    return rc ? rc : job_handshake(s->job, text, base_threads_count(s->threads), s->render && s->criterion, err);
 }

@@ -12,7 +12,7 @@ int pt_agree_crc(const char *path, uint32_t *crc, struct base_err *err);
 int pt_agree_settings(struct pt_session *session, const struct pt_render_config *config, struct base_err *err);
 /* The settings and the model that the criterion starts with; text [room], room PT_AGREE_JOB. */
 int pt_agree_job(const struct pt_session *session, char *text, size_t room, struct base_err *err);
-/* Rank 0, ready to begin: waits for the crew and refuses who differs. Nothing without crew. */
-int pt_agree_greet(const struct pt_session *session, struct base_err *err);
+/* Every process of a job, ready to begin: rank 0 waits for all and refuses who differs. Nothing without a job. */
+int pt_agree_handshake(const struct pt_session *session, struct base_err *err);
 
 #endif

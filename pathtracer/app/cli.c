@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/options.h"
+#include "job/job.h"
 #include "pbrt/xform.h"
 #include "render/checkpoint.h"
 #include "render/film.h"
@@ -370,7 +371,7 @@ int pt_cli_parse(struct pt_cli *cli, int argc, char **argv, struct base_err *err
         .args_max = 1,
         .args = offsetof(struct pt_cli, scene),
         .args_are = BASE_ARGS_FILES,
-        .uses_peers = 1,
+        .mpi_version = job_mpi_version,
         .outputs = offsetof(struct pt_cli, outputs),
     };
     *cli = (struct pt_cli){.block_width = 200,

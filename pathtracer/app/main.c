@@ -4,9 +4,9 @@
 #include "base/clock.h"
 #include "base/interrupt.h"
 #include "explain.h"
-#include "member.h"
 #include "render/host_find.h"
 #include "setup.h"
+#include "worker.h"
 
 static void explain(struct pt_session *s)
 {
@@ -50,23 +50,18 @@ static int run(struct pt_session *s, int *status, struct base_err *err)
 int main(int argc, char **argv)
 {
     static struct pt_session s = {.scene_files = BASE_INPUTS_EMPTY, .judging = BASE_INPUTS_EMPTY};
-    struct base_err err = {0}, peers_err = {0};
+    struct base_err err = {0}, job_err = {0};
     int status = 0;
     s.start_s = base_clock_wall_s();
     int rc = pt_cli_parse(&s.cli, argc, argv, &err);
-    if (base_peers_open(&s.peers, rc ? &peers_err : &err) != 0 && !rc)
+    if (job_open(&s.job, rc ? &job_err : &err) != 0 && !rc)
         rc = err.code;
-    if (!s.peers || s.peers->rank == 0)
+    if (job_rank(s.job) == 0)
         base_log_init(&s.log, stderr, "lull-render", s.cli.quiet);
-    if (s.peers && s.peers->rank > 0) {
-        rc = pt_member_serve(&s, rc, &err);
-        pt_session_release(&s);
-        base_peers_close(s.peers);
-        return rc ? PT_EXIT_FAILED : 0;
-    }
-    if (s.peers && pt_crew_create(s.peers, s.cli.rank_timeout_s, &s.crew, rc ? &peers_err : &err) != 0 && !rc)
-        rc = err.code;
-    if (!rc) {
+    job_watch(s.job, s.cli.rank_timeout_s, &base_interrupted);
+    if (!rc && job_rank(s.job) > 0) {
+        rc = pt_worker_run(&s, &err);
+    } else if (!rc) {
         pt_progress_init(&s.progress, &s.log);
         rc = run(&s, &status, &err);
     }
@@ -79,7 +74,8 @@ int main(int argc, char **argv)
         base_log_say(&s.log, "cannot write standard output");
         status = PT_EXIT_BAD_INPUT;
     }
-    pt_crew_dismiss(s.crew, status);
-    base_peers_close(s.peers);
-    return status;
+    int all = job_close(s.job, status, err.text, &job_err);
+    if (all != status && job_err.code)
+        base_log_say(&s.log, "%s", job_err.text);
+    return all;
 }

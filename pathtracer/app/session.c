@@ -23,7 +23,7 @@ static int load_scene(struct pt_session *s, struct base_err *err)
 /* Threads and scene. */
 int pt_session_open(struct pt_session *s, struct base_err *err)
 {
-    s->threads = base_threads_create(s->cli.threads > 0 ? s->cli.threads : base_peers_threads(s->peers), err);
+    s->threads = base_threads_create(s->cli.threads > 0 ? s->cli.threads : job_threads(s->job), err);
     if (!s->threads)
         return BASE_ENOMEM;
     int rc = load_scene(s, err);

@@ -6,10 +6,9 @@
 #define PT_SESSION_H
 
 #include "base/inputs.h"
-#include "base/peers.h"
 #include "cli.h"
 #include "integ/integrator.h"
-#include "render/crew.h"
+#include "job/job.h"
 #include "render/progress.h"
 #include "render/quote.h"
 #include "render/render.h"
@@ -19,8 +18,7 @@ struct pt_session {
     struct pt_cli cli;
     struct base_inputs scene_files, judging; /* what was read; judging: plugin and mask */
     struct base_log log;                     /* of rank 0; silent elsewhere */
-    struct base_peers *peers;                /* NULL: this process is alone */
-    struct pt_crew *crew;                    /* of rank 0 */
+    struct job *job;                         /* NULL: this process is alone */
     struct base_threads *threads;
     struct pt_scene *scene;
     struct pt_scene_defaults defaults;
@@ -40,7 +38,7 @@ struct pt_session {
 
 /* Makes threads and scene. BASE_EINVAL when the scene or a file of it is not as it should be. */
 int pt_session_open(struct pt_session *session, struct base_err *err);
-/* All but peers and crew. */
+/* All but the job. */
 void pt_session_release(struct pt_session *session);
 
 /* base_interrupted as a hook; data: not used. */

@@ -49,7 +49,7 @@ int pt_setup_config(const struct pt_session *s, struct pt_render_config *config,
         .order_seed = cli->order_seed,
         .pilot_spp = cli->pilot_spp,
         .pilot_s = cli->pilot_s,
-        .crew = s->crew,
+        .job = job_rank(s->job) == 0 ? s->job : NULL,
     };
     memcpy(config->crop, cli->has_crop ? cli->crop : s->defaults.crop, sizeof config->crop);
     pt_setup_override(cli, &config->integrator);
@@ -124,7 +124,7 @@ int pt_setup_render(struct pt_session *s, struct base_err *err)
     if (!rc)
         rc = pt_setup_criterion(s, err);
     config.mask = s->mask.grey ? &s->mask : NULL;
-    if (!rc && (!s->peers || s->peers->rank == 0)) /* the others write nothing */
+    if (!rc && job_rank(s->job) == 0) /* the others write nothing */
         rc = check_outputs(s, err);
     if (!rc)
         rc = pt_agree_settings(s, &config, err);

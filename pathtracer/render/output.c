@@ -221,17 +221,17 @@ int pt_output_report(const char *path, const struct pt_render *r, const struct p
         .effects = effects,
         .effect_count = n,
         .threads = (uint32_t)info->threads,
-        .processes = (uint32_t)pt_crew_processes(r->config.crew),
+        .processes = (uint32_t)job_count(r->config.job),
         .film_bytes = r->film.bytes,
         .film_pixels = r->film.pixels,
         .scene_bytes = info->scene_bytes >= 0 ? (double)info->scene_bytes : (double)NAN,
     };
-    if (r->config.crew) {
-        const struct pt_crew_traffic *traffic = pt_crew_traffic(r->config.crew);
+    if (r->config.job) {
+        const struct job_traffic traffic = job_traffic(r->config.job);
         report.flags |= LULL_REPORT_MESSAGES;
-        report.messages = traffic->messages;
-        report.message_bytes = traffic->bytes;
-        report.message_wait_s = traffic->waiting_s;
+        report.messages = traffic.messages;
+        report.message_bytes = traffic.bytes;
+        report.message_wait_s = traffic.waiting_s;
     }
     int32_t code = lull_host_report_write(r->frame, &report, path, &e);
     return code == LULL_OK ? 0 : pt_output_fail(code, &e, err);

@@ -5,15 +5,16 @@
 #include <string.h>
 
 #include "base/clock.h"
+#include "render/farm.h"
 #include "render/host_planes.h"
 
 /* Length of a slice: short enough for a live line, an interrupt and a time budget, long enough that its barrier costs
  * nothing. */
 static const double SLICE_S = 0.25;
-/* A crew makes it longer by so much for each of its threads, up to a limit: what rank 0 sends in a slice grows with the
+/* Workers make it longer by so much for each of their threads, up to a limit: what rank 0 sends in a slice grows with the
  * threads, and should take a small part of it. */
-static const double SLICE_PER_MEMBER_S = 0.004, LONGEST_SLICE_S = 5.0;
-/* What a byte costs rank 0 that it sends to a member (measured: docs/scale.md). */
+static const double SLICE_PER_WORKER_S = 0.004, LONGEST_SLICE_S = 5.0;
+/* What a byte costs rank 0 that it sends to a worker (measured: docs/scale.md). */
 static const double SEND_BYTE_S = 4e-10;
 
 /* Rows that each thread has to choose from in a slice: few enough that a block is sampled in one go, enough that threads and
@@ -41,7 +42,10 @@ struct pt_render_work {
     struct lull_decision *decisions; /* [blocks] */
 };
 
-int pt_render_threads(const struct pt_render *r) { return base_threads_count(r->threads) + pt_crew_threads(r->config.crew); }
+int pt_render_threads(const struct pt_render *r)
+{
+    return base_threads_count(r->threads) + job_worker_threads(r->config.job);
+}
 
 static struct pt_render_work *work_create(const struct lull_host_blocks *blocks)
 {
@@ -162,22 +166,17 @@ static void sample_row(void *data, long n, int worker)
     pt_row_sample(&maker, &r->film, &r->work->items[r->work->order[n]]);
 }
 
-/* All rows of the slice. Not 0: none of them, as pt_crew_sample. */
-static int sample_rows(struct pt_render *r, const struct pt_render_hooks *hooks, struct base_err *err)
+/* All rows of the slice. Not 0: none of them, as pt_farm_sample. */
+static int sample_rows(struct pt_render *r, struct base_err *err)
 {
     const struct pt_render_work *w = r->work;
-    if (!r->config.crew) {
+    if (!r->config.job) {
         base_threads_for(r->threads, (long)w->count, sample_row, r);
         return 0;
     }
-    struct pt_crew_slice slice = {.maker = {r->scene, r->kernel, &r->config.integrator},
-                                  .film = &r->film,
-                                  .rows = w->items,
-                                  .order = w->order,
-                                  .count = w->count,
-                                  .interrupted = hooks->interrupted,
-                                  .data = hooks->data};
-    return pt_crew_sample(r->config.crew, r->threads, &slice, err);
+    const struct pt_farm_slice slice = {
+        {r->scene, r->kernel, &r->config.integrator}, &r->film, w->items, w->order, w->count};
+    return pt_farm_sample(r->config.job, r->threads, &slice, err);
 }
 
 /* Samples up to which a block goes now. */
@@ -298,9 +297,9 @@ static double recent(double before, double now) { return before > 0.0 ? 0.7 * be
 
 /* Samples about SLICE_S worth, less when the time budget ends sooner. *more is 0 when every block is at its check. After a
  * failure, as when it was interrupted on the way, everything is as before. */
-static int slice(struct pt_render *r, const struct pt_render_hooks *hooks, int *more, struct base_err *err)
+static int slice(struct pt_render *r, int *more, struct base_err *err)
 {
-    double span_s = fmin(SLICE_S + SLICE_PER_MEMBER_S * pt_crew_threads(r->config.crew), LONGEST_SLICE_S);
+    double span_s = fmin(SLICE_S + SLICE_PER_WORKER_S * job_worker_threads(r->config.job), LONGEST_SLICE_S);
     if (r->config.time_budget_s > 0.0)
         span_s = fmax(0.01, fmin(span_s, r->config.time_budget_s - lull_host_elapsed_s(r->frame)));
     *more = list_items(r, span_s) > 0;
@@ -308,11 +307,11 @@ static int slice(struct pt_render *r, const struct pt_render_hooks *hooks, int *
         return 0;
     uint64_t before = r->totals->samples;
     double start_s = base_clock_wall_s();
-    int rc = sample_rows(r, hooks, err);
+    int rc = sample_rows(r, err);
     double wall_s = base_clock_wall_s() - start_s;
     r->totals->render_s += wall_s;
     if (rc)
-        return rc == PT_CREW_STOPPED ? 0 : rc;
+        return rc == JOB_STOPPED ? 0 : rc;
     double thread_s = gather(r);
     r->samples_per_s = recent(r->samples_per_s, (double)(r->totals->samples - before) / fmax(wall_s, 1e-6));
     r->busy_threads = recent(r->busy_threads, thread_s / fmax(wall_s, 1e-6));
@@ -329,13 +328,13 @@ static void warn_once(const struct pt_render *r, const struct pt_render_hooks *h
         base_log_say(hooks->log, "%s", line);
 }
 
-/* Whether a block is better sent to the crew than asked about here: if its checks so far took longer than that. */
+/* Whether a block is better sent to a worker than asked about here: if its checks so far took longer than that. */
 static int worth_sending(const struct pt_render *r, uint32_t count)
 {
     int threads = base_threads_count(r->threads);
     double pixels = (double)r->blocks->block_width * (double)r->blocks->block_height;
     double send_s = pixels * (double)pt_film_pixel_bytes(r->film.planes) * SEND_BYTE_S;
-    return pt_crew_can_ask(r->config.crew, r->criterion) && count > (uint32_t)threads && r->totals->asked > 0 &&
+    return pt_farm_can_ask(r->config.job, r->criterion) && count > (uint32_t)threads && r->totals->asked > 0 &&
            r->totals->criterion_thread_s / (double)r->totals->asked > send_s * threads;
 }
 
@@ -350,15 +349,14 @@ static void ask_here(struct pt_render *r, uint32_t count, const struct pt_render
         warn_once(r, hooks, e.message);
 }
 
-/* The same by everybody. Not 0: nothing has come of it, as pt_crew_ask. */
-static int ask_crew(struct pt_render *r, uint32_t count, const struct pt_render_hooks *hooks, struct base_err *err)
+/* The same by all processes. Not 0: nothing has come of it, as pt_farm_ask. */
+static int ask_all(struct pt_render *r, uint32_t count, const struct pt_render_hooks *hooks, struct base_err *err)
 {
     struct pt_render_work *w = r->work;
-    struct pt_crew_question question = {r->criterion, r->frame,     &r->film,           w->due,     w->final,
-                                        count,        w->decisions, hooks->interrupted, hooks->data};
+    const struct pt_farm_question question = {r->criterion, r->frame, &r->film, w->due, w->final, count, w->decisions};
     struct base_err said = {0};
     double others_s = 0.0, start_s = base_clock_wall_s(), start_cpu_s = base_clock_process_s();
-    int rc = pt_crew_ask(r->config.crew, r->threads, &question, &others_s, &said, err);
+    int rc = pt_farm_ask(r->config.job, r->threads, &question, &others_s, &said, err);
     r->totals->criterion_s += base_clock_wall_s() - start_s;
     r->totals->criterion_thread_s += base_clock_process_s() - start_cpu_s + others_s;
     if (rc)
@@ -378,7 +376,7 @@ static int check(struct pt_render *r, const struct pt_render_hooks *hooks, struc
     uint32_t n = lull_host_due(r->frame, w->due, w->final);
     int rc = 0;
     if (n > 0 && worth_sending(r, n))
-        rc = ask_crew(r, n, hooks, err);
+        rc = ask_all(r, n, hooks, err);
     else if (n > 0)
         ask_here(r, n, hooks);
     if (rc || n == 0)
@@ -424,7 +422,7 @@ int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum
     int rc = 0, more = 0;
     *outcome = PT_RENDER_DONE;
     while (lull_host_active(r->blocks) > 0) {
-        int given_up = slice(r, hooks, &more, &why);
+        int given_up = slice(r, &more, &why);
         if (!given_up && !more) {
             if (pilot_is_over(r)) {
                 *outcome = PT_RENDER_PILOT;
@@ -467,7 +465,7 @@ int pt_render_advance(struct pt_render *r, uint64_t spp, const struct pt_render_
     for (uint32_t i = 0; i < r->blocks->count; i++)
         r->blocks->list[i].next_spp = spp;
     for (;;) {
-        int more = 0, rc = slice(r, hooks, &more, err);
+        int more = 0, rc = slice(r, &more, err);
         if (rc || !more)
             return rc;
         rc = hooks->slice ? hooks->slice(hooks->data, r, err) : 0;

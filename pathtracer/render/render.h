@@ -16,7 +16,7 @@
 #include "base/log.h"
 #include "base/threads.h"
 #include "integ/integrator.h"
-#include "render/crew.h"
+#include "job/job.h"
 #include "render/host.h"
 #include "render/film.h"
 #include "render/mask.h"
@@ -36,7 +36,7 @@ struct pt_render_config {
     uint32_t planes;                 /* PT_FILM_* wanted besides those of the criterion */
     struct pt_integrator integrator; /* want_aux is set by the renderer */
     uint32_t order_seed;             /* not 0: work is handed out in a shuffled order (tests) */
-    struct pt_crew *crew;            /* borrows; processes that help to sample, NULL: none */
+    struct job *job;                 /* borrows; whose workers help to sample, NULL: none */
 };
 
 struct pt_render {
@@ -60,7 +60,7 @@ enum pt_render_outcome {
     PT_RENDER_OUT_OF_TIME,
     PT_RENDER_INTERRUPTED,
     PT_RENDER_PILOT,
-    PT_RENDER_LOST /* a process of the crew: ended as if interrupted, and hooks.log was told why */
+    PT_RENDER_LOST /* a worker: ended as if interrupted, and hooks.log was told why */
 };
 
 struct pt_render_hooks {
@@ -96,6 +96,6 @@ int pt_render_advance(struct pt_render *render, uint64_t spp, const struct pt_re
 /* Asks the criterion, if there is one, about every block as it is and notes the answers; nothing is stopped. */
 void pt_render_judge(struct pt_render *render, const struct pt_render_hooks *hooks);
 
-int pt_render_threads(const struct pt_render *render); /* that sample, those of the crew too */
+int pt_render_threads(const struct pt_render *render); /* that sample, those of workers too */
 
 #endif

@@ -21,7 +21,7 @@ struct pt_row {
     uint64_t rays;
     double thread_s;
     uint32_t dropped, first_x, first_sample; /* the first dropped sample of the row */
-    uint32_t place;                          /* of the row among those of the slice, where it travels; else 0 */
+    uint32_t zero;
 };
 
 /* What every row of a render is sampled with; borrows. */

@@ -11,7 +11,6 @@
 
 #include "base/inputs.h"
 #include "base/outputs.h"
-#include "base/peers.h"
 #include "base/version.h"
 
 enum { EXIT_UNWRITTEN = 2, MAX_OPTIONS = 96, KEY_LONG = 256, KEY_USAGE = KEY_LONG + MAX_OPTIONS, KEY_HELP, KEY_VERSION };
@@ -183,8 +182,8 @@ _Noreturn static void answer(const struct base_options *options, const char *pro
 {
     if (key == KEY_VERSION) {
         printf("%.*s (Lull) %s\n", (int)strcspn(program, " "), program, BASE_VERSION);
-        if (options->uses_peers)
-            printf("MPI: %s\n", base_peers_version());
+        if (options->mpi_version)
+            printf("MPI: %s\n", options->mpi_version());
     } else if (key == KEY_USAGE)
         print_help(options, program, ARGP_HELP_USAGE);
     else

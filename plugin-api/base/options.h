@@ -55,16 +55,16 @@ struct base_option {
 };
 
 struct base_options {
-    const char *doc;                /* what the command does, and after "\v" what is printed below the options */
-    const char *args_doc;           /* "SCENE.pbrt", "REFERENCE TEST", NULL if there are no arguments */
-    const struct base_option *list; /* ends with {0} */
-    int args_min, args_max;         /* arguments that are no options */
-    size_t args;                    /* offset of their const char *[args_max], borrowed from argv */
-    int args_output;                /* which of them, from 1, names a file to be written; 0: none */
-    int uses_peers;                 /* --version says which MPI there is */
-    size_t arg_count;               /* offset of an int that gets their number; 0: nobody asks */
-    enum base_args args_are;        /* all but args_output: read, as files or folders or as files only; or mere words */
-    size_t outputs;                 /* offset of a struct base_outputs that gets the files to be written; 0: nobody asks */
+    const char *doc;                  /* what the command does, and after "\v" what is printed below the options */
+    const char *args_doc;             /* "SCENE.pbrt", "REFERENCE TEST", NULL if there are no arguments */
+    const struct base_option *list;   /* ends with {0} */
+    int args_min, args_max;           /* arguments that are no options */
+    size_t args;                      /* offset of their const char *[args_max], borrowed from argv */
+    int args_output;                  /* which of them, from 1, names a file to be written; 0: none */
+    const char *(*mpi_version)(void); /* --version says which MPI there is; may be NULL */
+    size_t arg_count;                 /* offset of an int that gets their number; 0: nobody asks */
+    enum base_args args_are;          /* all but args_output: read, as files or folders or as files only; or mere words */
+    size_t outputs;                   /* offset of a struct base_outputs that gets the files to be written; 0: nobody asks */
 };
 
 /* Fills *into from argv (whose order it may change); what is not on the command line stays as it was. --help, --usage and

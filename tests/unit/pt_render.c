@@ -13,6 +13,7 @@
 #include "base/files.h"
 
 #include "render/checkpoint.h"
+#include "render/rows.h"
 #include "support/pt_fake.h"
 #include "support/pt_heard.h"
 

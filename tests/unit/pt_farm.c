@@ -1,4 +1,4 @@
-/* The crew with threads for processes: the film of one process, and every way in which a member can fail. */
+/* A render's farm with threads for processes: the film of one process, and every way in which a worker can fail. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -15,20 +15,38 @@
 
 #include "base/clock.h"
 #include "render/checkpoint.h"
-#include "render/crew_member.h"
-#include "render/crew_messages.h"
+#include "job/message.h"
+#include "render/farm.h"
+#include "render/render.h"
 #include "support/pt_fake.h"
 #include "support/pt_heard.h"
-#include "support/base_room.h"
+#include "support/base_transport.h"
 
 /* DEAF: it samples, but does not answer when the criterion is to be asked. LIES: what it says of its rows is wrong. */
 enum behaviour { WORKS, SILENT, BABBLES, FAILS, DEAF, LIES, OTHER_SETTINGS, ABSENT };
-enum { LIE_ROW, LIE_LEFT, LIE_RIGHT, LIE_PLACE, LIE_PLANES, LIE_COUNT, LIE_SIZE, LIE_KINDS };
+enum { LIE_ROW, LIE_LEFT, LIE_RIGHT, LIE_FIRST, LIE_SERIAL, LIE_COUNT, LIE_SIZE, LIE_KINDS };
 static int lie;
+
+/* Set by the main thread, in which rank 0 serves its workers, after so many calls of a kernel or a criterion; 0: never. */
+static volatile sig_atomic_t interrupted;
+static _Thread_local int calls_left;
+
+static void count_call(void)
+{
+    if (calls_left > 0 && --calls_left == 0)
+        interrupted = 1;
+}
+
+static void counted_noise(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y,
+                          int count, uint32_t sample, struct pt_path_result *out)
+{
+    pt_fake_noise(scene, settings, x, y, count, sample, out);
+    count_call();
+}
 
 /* The fake criterion without history, which others may ask too; how many blocks they did ask about. */
 static struct lull_criterion pure;
-static _Thread_local int is_member;
+static _Thread_local int is_worker;
 static atomic_int asked_elsewhere;
 
 static int32_t pure_evaluate(struct lull_instance *i, const struct lull_view *view, const struct lull_block *blocks,
@@ -38,10 +56,11 @@ static int32_t pure_evaluate(struct lull_instance *i, const struct lull_view *vi
     int32_t code = pt_fake_criterion()->evaluate(i, view, blocks, block_stride, decisions, decision_stride, count, err);
     for (uint32_t k = 0; k < count; k++)
         decisions[k].p_noisy = 0.25;
+    count_call();
     double start_s = base_clock_thread_s();
     while (base_clock_thread_s() - start_s < 0.0005 * count) /* dear enough to be sent */
         continue;
-    if (is_member)
+    if (is_worker)
         atomic_fetch_add(&asked_elsewhere, (int)count);
     return code;
 }
@@ -52,137 +71,153 @@ static const void *no_extension(const char *id)
     return NULL;
 }
 
-struct member {
+struct worker {
     pthread_t thread;
-    struct base_peers *peers;
+    struct job_transport *transport;
     enum behaviour behaviour;
     int threads;
 };
 
-static void send_words(struct base_peers *peers, uint32_t kind, const char *words)
+static void send_words(struct job_transport *to, uint32_t kind, const char *words)
 {
     struct base_err err = {0};
-    struct pt_crew_hello *hello = calloc(1, sizeof *hello + strlen(words));
-    hello->kind = kind;
-    memcpy(hello->text, words, strlen(words));
-    base_peers_send(peers, 0, hello, sizeof *hello + strlen(words), &err);
+    struct job_farewell *f = calloc(1, sizeof *f);
+    *f = (struct job_farewell){.head.kind = kind, .status = words[0] != '\0' ? 2 : 0};
+    strncpy(f->text, words, sizeof f->text - 1);
+    to->calls->send(to, 0, f, sizeof *f, &err);
 }
 
-static void sample(struct member *m, struct pt_crew_rows *rows, size_t size)
+/* Items of rows are answered in their own form: the row, then its sums. */
+static void sample(struct worker *w, struct job_task *task, size_t size)
 {
-    unsigned char *sums = (unsigned char *)(rows->rows + rows->count);
-    const struct pt_row_maker maker = {NULL, pt_fake_noise, &rows->integrator};
+    const uint32_t planes = *(const uint32_t *)job_task_common(task);
+    const struct pt_integrator *integrator = (const struct pt_integrator *)((const uint32_t *)job_task_common(task) + 1);
+    const struct pt_row_maker maker = {NULL, pt_fake_noise, integrator};
     struct base_err err = {0};
-    for (uint32_t i = 0; i < rows->count; i++) {
-        struct pt_row *row = &rows->rows[i];
+    for (uint32_t i = 0; i < task->count; i++) {
+        struct pt_row *row = job_task_item(task, i);
+        unsigned char *sums = (unsigned char *)(row + 1);
         struct pt_film film;
-        pt_film_init(&film, row->x0, row->y, row->x1, row->y + 1, rows->planes, &err);
+        pt_film_init(&film, row->x0, row->y, row->x1, row->y + 1, planes, &err);
         pt_row_restore(&film, row, sums);
         pt_row_sample(&maker, &film, row);
         pt_row_save(&film, row, sums);
-        sums += pt_row_bytes(row, rows->planes);
         pt_film_release(&film);
     }
-    if (m->behaviour == LIES) {
-        rows->rows[0].y += lie == LIE_ROW;
-        rows->rows[0].x0 += lie == LIE_LEFT;
-        rows->rows[0].x1 -= lie == LIE_RIGHT;
-        rows->rows[0].place += lie == LIE_PLACE ? 1000000 : 0;
-        rows->planes ^= lie == LIE_PLANES ? PT_FILM_DEPTH : 0;
-        rows->count += lie == LIE_COUNT ? 1000000 : 0;
+    struct pt_row *first = job_task_item(task, 0);
+    if (w->behaviour == LIES) {
+        first->y += lie == LIE_ROW;
+        first->x0 += lie == LIE_LEFT;
+        first->x1 -= lie == LIE_RIGHT;
+        task->first += lie == LIE_FIRST ? 1000000 : 0;
+        task->serial += lie == LIE_SERIAL;
+        task->count += lie == LIE_COUNT ? 1000000 : 0;
         size -= lie == LIE_SIZE;
     }
-    base_peers_send(m->peers, 0, rows, size, &err);
+    task->kind = JOB_ANSWER;
+    memmove(task->bytes, task->bytes + task->common_bytes, size - sizeof *task - task->common_bytes);
+    w->transport->calls->send(w->transport, 0, task, size - task->common_bytes, &err);
 }
 
-/* Takes what comes until rank 0 says that it is over; answers the first rows as it is told to. */
-static void misbehave(struct member *m)
+/* Takes what comes until rank 0 says that it is over; answers the first task as it is told to. */
+static void misbehave(struct worker *w)
 {
+    struct job_transport *t = w->transport;
     for (int over = 0, answered = 0; !over;) {
         int rank;
         void *data;
         size_t size;
         struct base_err err = {0};
-        if (base_peers_receive(m->peers, 0.05, &rank, &data, &size, &err) <= 0) {
-            if ((m->behaviour == SILENT || m->behaviour == DEAF) && answered)
+        if (t->calls->receive(t, 0.05, &rank, &data, &size, &err) <= 0) {
+            if ((w->behaviour == SILENT || w->behaviour == DEAF) && answered)
                 return; /* rank 0 gives it up: nobody will say anything any more */
             continue;
         }
-        const struct pt_crew_rows *rows = data;
-        if ((m->behaviour == DEAF || m->behaviour == LIES) && rows->kind == PT_CREW_ROWS) {
-            sample(m, data, size);
+        struct job_task *task = data;
+        if ((w->behaviour == DEAF || w->behaviour == LIES) && task->kind == JOB_TASK && !task->whole) {
+            sample(w, task, size);
             continue;
         }
-        over = rows->kind == PT_CREW_END;
-        if (!over && m->behaviour == BABBLES && !answered)
-            send_words(m->peers, PT_CREW_ROWS, "what is this");
-        if (!over && m->behaviour == FAILS && !answered)
-            send_words(m->peers, PT_CREW_FAILED, "no more paper");
+        over = task->kind == JOB_END;
+        if (!over && w->behaviour == BABBLES && !answered)
+            send_words(t, JOB_ANSWER, "what is this");
+        if (!over && w->behaviour == FAILS && !answered)
+            send_words(t, JOB_FAREWELL, "no more paper");
         answered = 1;
         free(data);
     }
-    send_words(m->peers, PT_CREW_BYE, "");
+    send_words(t, JOB_FAREWELL, "");
 }
 
-static void *member_main(void *arg)
+static void *worker_main(void *arg)
 {
-    struct member *m = arg;
+    struct worker *w = arg;
     struct base_err err = {0};
-    is_member = 1;
-    if (m->behaviour == ABSENT)
+    struct job *job;
+    is_worker = 1;
+    if (w->behaviour == ABSENT)
         return NULL;
     struct pt_render_config config = pt_fake_config();
     struct lull_host_criterion *criterion = NULL;
     struct lull_pair pair = {"at", "32"};
-    struct base_threads *threads = base_threads_create(m->threads, &err);
-    struct pt_crew_tools tools = {threads, {NULL, pt_fake_noise, NULL}, NULL};
+    struct base_threads *threads = base_threads_create(w->threads, &err);
+    struct pt_render *render;
     config.planes = PT_FILM_ALL;
     pt_criterion_create(&pure, &pair, 1, threads, NULL, &criterion, &err);
-    pt_render_create(&config, NULL, pt_fake_noise, threads, criterion, &tools.render, &err);
-    pt_crew_member_join(m->peers, &tools, m->behaviour == OTHER_SETTINGS ? "a=1\nb=3\n" : "a=1\nb=2\n", &err);
-    if (m->behaviour == WORKS || m->behaviour == OTHER_SETTINGS)
-        pt_crew_member_serve(m->peers, &tools, &err);
-    else
-        misbehave(m);
-    pt_render_destroy(tools.render);
+    pt_render_create(&config, NULL, pt_fake_noise, threads, criterion, &render, &err);
+    const struct pt_farm_tools tools = {{NULL, pt_fake_noise, NULL}, criterion, render->frame, &render->film};
+    job_create(w->transport, &job, &err);
+    job_handshake(job, w->behaviour == OTHER_SETTINGS ? "a=1\nb=3\n" : "a=1\nb=2\n", w->threads, 1, &err);
+    if (w->behaviour == WORKS || w->behaviour == OTHER_SETTINGS) {
+        pt_farm_serve(job, threads, &tools, &err);
+        job_close(job, 0, "", &err);
+    } else {
+        misbehave(w);
+        free(job->workers);
+        free(job);
+    }
+    pt_render_destroy(render);
     lull_host_close(criterion);
     base_threads_destroy(threads);
     return NULL;
 }
 
 struct stage {
-    struct base_room *room;
-    struct member members[BASE_ROOM_MAX];
+    struct base_transport *transport;
+    struct worker workers[BASE_TRANSPORT_MAX];
     int count;
-    struct pt_crew *crew;
+    struct job *job;
 };
 
 static void assemble(struct stage *stage, int count, int threads, enum behaviour last, double timeout_s)
 {
     struct base_err err = {0};
-    *stage = (struct stage){.room = base_room_create(count), .count = count};
-    assert_non_null(stage->room);
+    *stage = (struct stage){.transport = base_transport_create(count), .count = count};
+    assert_non_null(stage->transport);
     for (int i = 1; i < count; i++) {
-        stage->members[i] = (struct member){
-            .peers = base_room_of(stage->room, i), .threads = threads, .behaviour = i == count - 1 ? last : WORKS};
-        assert_int_equal(pthread_create(&stage->members[i].thread, NULL, member_main, &stage->members[i]), 0);
+        stage->workers[i] = (struct worker){.transport = base_transport_of(stage->transport, i),
+                                            .threads = threads,
+                                            .behaviour = i == count - 1 ? last : WORKS};
+        assert_int_equal(pthread_create(&stage->workers[i].thread, NULL, worker_main, &stage->workers[i]), 0);
     }
-    assert_int_equal(pt_crew_create(base_room_of(stage->room, 0), timeout_s, &stage->crew, &err), 0);
+    assert_int_equal(job_create(base_transport_of(stage->transport, 0), &stage->job, &err), 0);
+    job_watch(stage->job, timeout_s, &interrupted);
 }
 
-/* lost: the crew cannot be sent home, so that the test does it. */
+/* lost: the workers cannot be told the end, so that the test does it. */
 static void part(struct stage *stage, int lost)
 {
-    pt_crew_dismiss(stage->crew, 2);
-    assert_int_equal(base_room_aborted(stage->room), lost);
+    struct base_err err = {0};
+    job_close(stage->job, 2, "", &err);
+    assert_int_equal(base_transport_aborted(stage->transport), lost);
     for (int i = 1; i < stage->count; i++) {
-        struct base_err err = {0};
-        uint32_t *end = malloc(sizeof *end);
-        *end = PT_CREW_END;
-        base_peers_send(base_room_of(stage->room, 0), i, end, sizeof *end, &err); /* nobody reads it who was dismissed */
-        pthread_join(stage->members[i].thread, NULL);
+        struct job_transport *t = base_transport_of(stage->transport, 0);
+        struct job_message *end = malloc(sizeof *end);
+        *end = (struct job_message){JOB_END, 2};
+        t->calls->send(t, i, end, sizeof *end, &err); /* nobody reads it who has ended */
+        pthread_join(stage->workers[i].thread, NULL);
     }
-    base_room_destroy(stage->room);
+    base_transport_destroy(stage->transport);
 }
 
 /* --- same bytes --------------------------------------------------------------------------------------------------------- */
@@ -222,7 +257,7 @@ static void create(struct run *r, const struct pt_render_config *config, const s
     struct lull_pair pair = {"at", "32"};
     r->pool = base_threads_create(threads, &err);
     assert_int_equal(pt_criterion_create(table, &pair, 1, r->pool, NULL, &r->criterion, &err), 0);
-    assert_int_equal(pt_render_create(config, NULL, pt_fake_noise, r->pool, r->criterion, &r->render, &err), 0);
+    assert_int_equal(pt_render_create(config, NULL, counted_noise, r->pool, r->criterion, &r->render, &err), 0);
 }
 
 static void finish(const struct run *r)
@@ -247,18 +282,18 @@ static void same_bytes(const struct lull_criterion *table)
         struct stage stage;
         struct run many = {0};
         assemble(&stage, sizes[i][0], sizes[i][1], WORKS, 60.0);
-        assert_int_equal(pt_crew_greet(stage.crew, "a=1\nb=2\n", &err), 0);
-        assert_int_equal(pt_crew_threads(stage.crew), (sizes[i][0] - 1) * sizes[i][1]);
-        config.crew = stage.crew;
+        assert_int_equal(job_handshake(stage.job, "a=1\nb=2\n", 1, 1, &err), 0);
+        assert_int_equal(job_worker_threads(stage.job), (sizes[i][0] - 1) * sizes[i][1]);
+        config.job = stage.job;
         config.order_seed = i == 3 ? 99 : 0;
         create(&many, &config, table, sizes[i][2]);
         finish(&many);
         assert_same(one.render, many.render);
-        const struct pt_crew_traffic *traffic = pt_crew_traffic(stage.crew); /* every parcel comes back, and is as large */
-        assert_true(traffic->messages >= 2 && traffic->messages < 1000000 && traffic->messages % 2 == 0);
-        assert_true(traffic->bytes >= traffic->messages * sizeof(struct pt_crew_rows) && traffic->bytes < 1000000000 &&
-                    traffic->bytes % 2 == 0);
-        assert_true(traffic->waiting_s >= 0 && traffic->waiting_s < 1000);
+        const struct job_traffic traffic = job_traffic(stage.job); /* every task is answered; hello from each */
+        const uint64_t tasks = traffic.messages - (uint64_t)(sizes[i][0] - 1);
+        assert_true(tasks >= 2 && tasks < 1000000 && tasks % 2 == 0);
+        assert_true(traffic.bytes >= tasks * sizeof(struct job_task) && traffic.bytes < 1000000000);
+        assert_true(traffic.waiting_s >= 0 && traffic.waiting_s < 1000);
         part(&stage, 0);
         release(&many);
     }
@@ -298,9 +333,9 @@ static void rows_of_different_widths(void **state)
     config.spp_min = config.spp_max = 40;
     config.planes = PT_FILM_ALL;
     assemble(&stage, 3, 1, WORKS, 60.0);
-    assert_int_equal(pt_crew_greet(stage.crew, "a=1\nb=2\n", &err), 0);
+    assert_int_equal(job_handshake(stage.job, "a=1\nb=2\n", 1, 1, &err), 0);
     for (int i = 0; i < 2; i++) {
-        config.crew = i ? stage.crew : NULL;
+        config.job = i ? stage.job : NULL;
         assert_int_equal(pt_render_create(&config, NULL, pt_fake_noise, pool, NULL, &renders[i], &err), 0);
         assert_int_equal(pt_render_run(renders[i], &none, &outcome, &err), 0);
     }
@@ -315,7 +350,6 @@ static void rows_of_different_widths(void **state)
 
 struct watch {
     const char *checkpoint;
-    int left; /* interrupted() says yes from the time that 1 is left; 0: never */
 };
 
 static int save(void *data, struct pt_render *r, struct base_err *err)
@@ -324,23 +358,22 @@ static int save(void *data, struct pt_render *r, struct base_err *err)
     return pt_checkpoint_save(w->checkpoint, r, "settings\n", err);
 }
 
-static int count_down(void *data)
+static int is_interrupted(void *data)
 {
-    struct watch *w = data;
-    w->left -= w->left > 1;
-    return w->left == 1;
+    (void)data;
+    return interrupted != 0;
 }
 
-/* Renders with a crew until it is lost or interrupted; the checkpoint then goes on alone to the bytes of one process. */
+/* Renders with workers until one is lost or it is interrupted after so many calls of the main thread; the checkpoint then goes on alone to the bytes of one process. */
 static void ends_well(const struct lull_criterion *table, enum behaviour last, int interrupt_after, const char *words)
 {
     struct pt_render_config config = pt_fake_config();
     struct base_err err = {0};
     enum pt_render_outcome outcome;
-    struct watch watch = {.checkpoint = "/tmp/pt_crew_test.ckp", .left = interrupt_after};
+    struct watch watch = {.checkpoint = "/tmp/pt_farm_test.ckp"};
     struct heard heard;
     hear_begin(&heard);
-    const struct pt_render_hooks hooks = {.interrupted = count_down, .suspend = save, .log = &heard.log, .data = &watch};
+    const struct pt_render_hooks hooks = {.interrupted = is_interrupted, .suspend = save, .log = &heard.log, .data = &watch};
     struct run one = {0}, lost = {0}, rest = {0};
     struct stage stage;
     config.planes = PT_FILM_ALL;
@@ -348,8 +381,10 @@ static void ends_well(const struct lull_criterion *table, enum behaviour last, i
     finish(&one);
     create(&rest, &config, table, 2);
     assemble(&stage, 3, 1, last, last == SILENT || last == DEAF ? 2.0 : 60.0); /* machines may be busy */
-    assert_int_equal(pt_crew_greet(stage.crew, "a=1\nb=2\n", &err), 0);
-    config.crew = stage.crew;
+    assert_int_equal(job_handshake(stage.job, "a=1\nb=2\n", 1, 1, &err), 0);
+    config.job = stage.job;
+    interrupted = 0;
+    calls_left = interrupt_after;
     create(&lost, &config, table, 2);
     assert_int_equal(pt_render_run(lost.render, &hooks, &outcome, &err), 0);
     assert_int_equal(outcome, words ? PT_RENDER_LOST : PT_RENDER_INTERRUPTED);
@@ -366,32 +401,32 @@ static void ends_well(const struct lull_criterion *table, enum behaviour last, i
     hear_end(&heard);
 }
 
-static void a_silent_member_is_named_and_nothing_is_lost(void **state)
+static void a_silent_worker_is_named_and_nothing_is_lost(void **state)
 {
     (void)state;
     ends_well(pt_fake_criterion(), SILENT, 0, "rank 2 on host here has not answered for 2 s");
 }
 
-static void a_member_that_is_silent_when_asked_is_named(void **state)
+static void a_worker_that_is_silent_when_asked_is_named(void **state)
 {
     (void)state;
     ends_well(&pure, DEAF, 0, "rank 2 on host here has not answered for 2 s");
 }
 
-static void a_member_that_makes_no_sense_is_named(void **state)
+static void a_worker_that_makes_no_sense_is_named(void **state)
 {
     (void)state;
     ends_well(pt_fake_criterion(), BABBLES, 0, "rank 2 on host here said something that makes no sense");
 }
 
-static void a_member_whose_rows_are_not_those_sent_is_named(void **state)
+static void a_worker_whose_rows_are_not_those_sent_is_named(void **state)
 {
     (void)state;
     for (lie = 0; lie < LIE_KINDS; lie++)
         ends_well(pt_fake_criterion(), LIES, 0, "rank 2 on host here said something that makes no sense");
 }
 
-static void a_member_that_fails_says_why(void **state)
+static void a_worker_that_fails_says_why(void **state)
 {
     (void)state;
     ends_well(pt_fake_criterion(), FAILS, 0, "rank 2 on host here: no more paper");
@@ -400,8 +435,10 @@ static void a_member_that_fails_says_why(void **state)
 static void an_interruption_leaves_the_slice_undone(void **state)
 {
     (void)state;
-    for (int after = 2; after < 60; after += 11)
-        ends_well(after % 2 ? &pure : pt_fake_criterion(), WORKS, after, NULL);
+    for (int after = 2; after < 20; after += 3) { /* calls of the criterion, and of the kernel */
+        ends_well(&pure, WORKS, after, NULL);
+        ends_well(pt_fake_criterion(), WORKS, 200 * after, NULL);
+    }
 }
 
 static void other_settings_are_refused_by_name(void **state)
@@ -410,7 +447,7 @@ static void other_settings_are_refused_by_name(void **state)
     struct stage stage;
     struct base_err err = {0};
     assemble(&stage, 3, 1, OTHER_SETTINGS, 60.0);
-    assert_int_equal(pt_crew_greet(stage.crew, "a=1\nb=2\n", &err), BASE_EINVAL);
+    assert_int_equal(job_handshake(stage.job, "a=1\nb=2\n", 1, 1, &err), BASE_EINVAL);
     assert_non_null(strstr(err.text, "rank 2 on host here has b=3, but rank 0 has b=2"));
     part(&stage, 0);
 }
@@ -422,7 +459,7 @@ static void who_never_says_hello_is_named(void **state)
     struct base_err err = {0};
     alarm(60); /* waiting for ever is a failure */
     assemble(&stage, 3, 1, ABSENT, 2.0);
-    assert_int_not_equal(pt_crew_greet(stage.crew, "a=1\nb=2\n", &err), 0);
+    assert_int_not_equal(job_handshake(stage.job, "a=1\nb=2\n", 1, 1, &err), 0);
     assert_non_null(strstr(err.text, "rank 2 on host here has not answered for 2 s"));
     part(&stage, 1);
     alarm(0);
@@ -437,11 +474,11 @@ int main(void)
         cmocka_unit_test(any_number_of_processes_gives_the_bytes_of_one),
         cmocka_unit_test(a_criterion_without_history_is_asked_by_all),
         cmocka_unit_test(rows_of_different_widths),
-        cmocka_unit_test(a_member_that_is_silent_when_asked_is_named),
-        cmocka_unit_test(a_silent_member_is_named_and_nothing_is_lost),
-        cmocka_unit_test(a_member_that_makes_no_sense_is_named),
-        cmocka_unit_test(a_member_whose_rows_are_not_those_sent_is_named),
-        cmocka_unit_test(a_member_that_fails_says_why),
+        cmocka_unit_test(a_worker_that_is_silent_when_asked_is_named),
+        cmocka_unit_test(a_silent_worker_is_named_and_nothing_is_lost),
+        cmocka_unit_test(a_worker_that_makes_no_sense_is_named),
+        cmocka_unit_test(a_worker_whose_rows_are_not_those_sent_is_named),
+        cmocka_unit_test(a_worker_that_fails_says_why),
         cmocka_unit_test(an_interruption_leaves_the_slice_undone),
         cmocka_unit_test(other_settings_are_refused_by_name),
         cmocka_unit_test(who_never_says_hello_is_named),
