@@ -247,7 +247,7 @@ $(OUT)/fuzz/replay-ggn_study%: $(OBJ)/tests/fuzz/ggn_study%.c.o $(OBJ)/tests/fuz
 $(OUT)/fuzz/replay-ggn_%: $(OBJ)/tests/fuzz/ggn_%.c.o $(OBJ)/tests/fuzz/replay.c.o $(GGN_OBJ)
 	$(link) $^ $(LDFLAGS_ALL) $(GGN_LIBS) $(IMAGE_LIBS) -o $@
 
-# Measuring programs; scripts/bench runs them.
+# Measuring programs; scripts/lab bench runs them.
 BENCHES := $(patsubst tests/bench/%.c,$(OUT)/bench/%,$(wildcard tests/bench/*.c))
 $(OUT)/bench/pt_%: $(OBJ)/tests/bench/pt_%.c.o $(PT_OBJ) $(LOADER_OBJ) $(SUPPORT_pt)
 	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) $(IMAGE_LIBS) -lcmocka -o $@
@@ -324,9 +324,9 @@ demo: setup ## install what is missing, build, render a scene with per-block sto
 	@$(MAKE) --no-print-directory all
 	@scripts/demo
 bench: all $(BENCHES) ## measure speed as ratios, interleaved, against the peers that are installed; the table in docs/speed.md
-	@scripts/bench --into docs/speed.md
+	@scripts/lab bench --write
 cost: all ## measure what accuracy costs each criterion, from recordings in data/ (docs/cost.md)
-	@scripts/cost
+	@scripts/lab cost
 train-demo: all ## train a tiny model on a tiny bundled data set and show that it learns
 	@scripts/train-demo
 

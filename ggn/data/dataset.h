@@ -3,7 +3,7 @@
  *
  * DATA/NAME/manifest.json (+ labels.json) for each view, and DATA/split.json:
  *     { "train": ["scene", …], "validation": ["scene", …], "test": ["scene", …] }
- * Instead of split.json the views may lie in DATA/train, DATA/validation, DATA/test and DATA/people (scripts/make-dataset
+ * Instead of split.json the views may lie in DATA/train, DATA/validation, DATA/test and DATA/people (scripts/lab data-set
  * does so). A scene is on one side only; scenes that are on none are used by nobody. DATA may also be one sequence itself.
  */
 #ifndef GGN_DATA_DATASET_H

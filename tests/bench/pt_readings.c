@@ -1,4 +1,4 @@
-/* Processor time of reading against size, as a table: `name;items;bytes;seconds`. scripts/reading-time draws it.
+/* Processor time of reading against size, as a table: `name;items;bytes;seconds`. scripts/lab bench --only reading draws it.
  *
  *   build/bench/pt_readings [SECONDS]     up to inputs that take about so long (0.3)
  */

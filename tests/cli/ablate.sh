@@ -1,7 +1,7 @@
 #!/bin/sh
-# scripts/ablate with a tiny plan: a line for each variant, nothing trained twice, a changed plan is refused.
+# scripts/lab ablation with a tiny plan: a line for each variant, nothing trained twice, a changed plan is refused.
 . "$(dirname "$0")/ggn_setup"
-ablate() { scripts/ablate --data tests/data/train-demo --out "$tmp/out" "$@" >"$tmp/table" 2>"$tmp/err"; }
+ablate() { scripts/lab ablation --data tests/data/train-demo --out "$tmp/out" "$@" >"$tmp/table" 2>"$tmp/err"; }
 
 cat >"$tmp/plan" <<'END'
 # two variants

@@ -40,7 +40,7 @@ same_but_seconds() { [ "$(wc -c <"$1")" = "$(wc -c <"$2")" ] && [ "$(cmp -l "$1"
 for f in one/*.lseq; do t "  …the same ${f#one/} but for times" same_but_seconds "$f" "many/${f#one/}"; done
 
 printf 'train room %s 1 linear:1:2:1 0 0\n' "$scene" >tiny.plan
-t "a data set, each view by all processes" env BUILD="${P%/bin/*}" "$here/../../scripts/make-dataset" --plan tiny.plan \
+t "a data set, each view by all processes" env BUILD="${P%/bin/*}" "$here/../../scripts/lab" data-set --plan tiny.plan \
     --launcher "mpirun --oversubscribe -n 2" set
 t "  …the view is there" test -s set/train/room/block-00000.lseq
 

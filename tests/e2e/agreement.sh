@@ -1,7 +1,7 @@
 #!/bin/sh
-# scripts/agreement: people's views and a test scene through to the tables, with the numbers of ggn evaluate.
+# scripts/lab agreement: people's views and a test scene through to the tables, with the numbers of ggn evaluate.
 . "$(dirname "$0")/../cli/ggn_setup"
-agreement() { scripts/agreement --human "$tmp/human" --rendered "$tmp/rendered" --observer "$tmp/o.json" --out "$tmp/out" "$@" >"$tmp/table" 2>"$tmp/err"; }
+agreement() { scripts/lab agreement --human "$tmp/human" --rendered "$tmp/rendered" --observer "$tmp/o.json" --out "$tmp/out" "$@" >"$tmp/table" 2>"$tmp/err"; }
 record() { # record FOLDER NAME SEED REFERENCE-SPP SCENE [OPTION ...]
     folder=$1 name=$2 seed=$3 reference=$4 scene=$5
     shift 5
@@ -16,11 +16,11 @@ printf 'one_part6;300;900;\ntwo_part6;30;10000;\n' >"$tmp/human/human-thresholds
 cp "$tmp/human/human-thresholds.csv" "$tmp/human/SVD-Entropy-thresholds.csv"
 view() { printf '{"name": "%s", "level": 0.25}' "$1"; }
 printf '{"level": 0.25, "spread": 0.4, "each_view_left_out": [%s, %s]}\n' "$(view one)" "$(view two)" >"$tmp/o.json"
-agreement --data "$tmp/none" && [ "$(grep -c 'Against' "$tmp/table")" -eq 1 ] && grep -q '^| 4 blocks, 1 censored ' "$tmp/table"
-check "no recordings: people alone" $?
+agreement --data "$tmp/none" && [ "$(grep -c 'Against' "$tmp/table")" -eq 2 ] && [ "$(grep -c '^| 4 blocks, 1 censored ' "$tmp/table")" -eq 2 ]
+check "no recordings: people alone, with several values of --visible" $?
 find "$tmp/data" -type f -exec sha256sum {} + | sort >"$tmp/before"
-agreement --data "$tmp/data" && [ "$(grep -c 'Against' "$tmp/table")" -eq 4 ]
-check "four tables" $?
+agreement --data "$tmp/data" && [ "$(grep -c 'Against' "$tmp/table")" -eq 5 ]
+check "five tables" $?
 find "$tmp/data" -type f -exec sha256sum {} + | sort | cmp -s - "$tmp/before"
 check "the recordings are left as they were" $?
 grep -q '^| SVD-Entropy-thresholds.csv |  | 0 % | 1.00 | 0.00 | +0.00 | 100 % | 1.00 |' "$tmp/table"
@@ -33,7 +33,8 @@ python3 - "$tmp/table" "$tmp/out/agreement.json" <<'EOF' 2>"$tmp/err"
 import json, sys
 lines = [l for l in open(sys.argv[1], encoding="utf-8") if l.startswith("| observer |")]
 r = json.load(open(sys.argv[2]))
-rows = list(r.values())
+assert r["people"]["rows"]["observer"] == r["visible"]["rows"]["observer, `--visible 0.35`"]
+rows = [t["rows"] for name, t in r.items() if name != "visible"]
 assert len(lines) == len(rows) == 4, lines
 for line, row in zip(lines, (r["observer"] for r in rows)):
     cell = [c.strip() for c in line.split("|")[2:-1]]
@@ -42,7 +43,7 @@ assert rows[2]["observer"]["samples_ratio"] < rows[1]["observer"]["samples_ratio
 EOF
 check "the figures are those of ggn evaluate, and the dial turns" $?
 record "$tmp/rendered/two" two 5 0 tests/cli/room.pbrt --levels geometric:4:60:1.3 --blocks 1 && agreement --data "$tmp/none" &&
-    [ "$(grep -c 'Against' "$tmp/table")" -eq 3 ] && [ "$(grep -c '^| 1 blocks, 1 censored ' "$tmp/table")" -eq 2 ] &&
+    [ "$(grep -c 'Against' "$tmp/table")" -eq 4 ] && [ "$(grep -c '^| 1 blocks, 1 censored ' "$tmp/table")" -eq 2 ] &&
     [ "$(grep -c '^| observer |' "$tmp/table")" -eq 3 ] && [ "$(grep -c '^| halfbuf |' "$tmp/table")" -eq 1 ]
 check "rendered blocks of people's views beside the same blocks made from halves" $?
 python3 - "$tmp/out" <<'EOF' 2>"$tmp/err"

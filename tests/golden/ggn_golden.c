@@ -1,5 +1,5 @@
 /* The golden values of the design (double 1e-6, float 1e-4 relative) and one published training iteration, whose figures
- * were checked against PyTorch 1.13 in double precision (scripts/bench-ggn --check). */
+ * were checked against PyTorch 1.13 in double precision (scripts/lab networks --check). */
 #include "support/ggn_cmocka.h"
 
 #include <math.h>

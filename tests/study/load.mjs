@@ -1,4 +1,4 @@
-// Load: 50 simulated participants at once. Nothing is lost; the times of answers are told, and `scripts/bench --only study` judges them.
+// Load: 50 simulated participants at once. Nothing is lost; the times of answers are told, and `scripts/lab bench --only study` judges them.
 // usage: LULL_STUDY=… node load.mjs FOLDER
 import fs from 'node:fs';
 import path from 'node:path';

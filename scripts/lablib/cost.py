@@ -1,22 +1,22 @@
-#!/usr/bin/env python3
-"""What accuracy costs: every criterion over the range of its dials, on recorded test blocks, and what of it holds in real renders.
+"""What accuracy costs: every criterion over the range of its parameters, on recorded test blocks and in real renders.
 
-  scripts/cost [--data DIR] [--render DIR [--plan FILE]] [--people DIR] [--model FILE]... [--baseline FILE]... [--only STEPS]
-               [--threads N] [--out DIR]
+usage: scripts/lab cost [--data DIR] [--render DIR [--plan FILE]] [--people DIR] [--model FILE]... [--baseline FILE]... [--only STEPS]
+                        [--threads N] [--rounds N] [--real-scenes N] [--out DIR]
 
-Writes cost.json, cost.md and cost-*.png into DIR (docs). DATA (data) holds recordings as scripts/make-dataset makes them; its test
-views are replayed, of its validation views the block sizes are measured. --render DIR makes the test views anew there first, as
---plan (scripts/dataset.plan) says (hours). People's views come from ../shared/human. STEPS, some of replay, recorded, judge, early,
-price, real, grow, sizes, cadence, people, precision, guards, draw (all, separated by commas), keep what cost.json has of the others.
+  --data DIR     recordings as `lab data-set` makes them (default data): its test views are replayed, of its validation views the
+                 block sizes are measured
+  --render DIR   make the test views anew there first, as --plan (scripts/dataset.plan) says (hours)
+  --people DIR   views that people judged (default ../shared/human)
+  --model FILE   networks: those of ggn/models, the newest of which is the default, and what lies in BUILD/cost/models (others, such as
+                 those of `lab ablation` and one of the published preset; not shipped)
+  --baseline FILE  those of ggn/models and BUILD/cost/*.ggn (svd-entropy.ggn is not shipped: `ggn baseline svd-entropy`)
+  --only STEPS   some of replay, recorded, judge, early, price, real, grow, sizes, cadence, people, precision, guards, draw (default all,
+                 separated by commas); what is there of the others is kept
+  --rounds N --real-scenes N   of price (2), of real (3)
+  --out DIR      results/cost.json, cost.md and cost-*.png go there (default docs)
 
-Networks: those of ggn/models, the newest of which is the default, and what lies in BUILD/cost/models (others, such as those of scripts/ablate
-and one of the published preset; not shipped). Baselines: those of ggn/models and BUILD/cost/*.ggn (svd-entropy.ggn is not shipped:
-`ggn baseline svd-entropy`).
-
-Times are processor seconds of all threads, so that a busy machine disturbs them less; prices of checks are measured in this run, in
-real renders. Needs gnuplot and oiiotool. BUILD names another build folder than build."""
-import argparse
-import datetime
+Every step is kept as soon as it is done: interrupted, --only goes on with the others. Times are processor seconds of all threads, so
+that a busy machine disturbs them less; prices of checks are measured in this run, in real renders. Needs gnuplot and oiiotool."""
 import glob
 import json
 import os
@@ -24,31 +24,27 @@ import re
 import resource
 import statistics
 import subprocess
-import sys
 
-sys.dont_write_bytecode = True
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from cost_figures import DEFAULTS, bare, draw  # noqa: E402
-from recordings import link_views, people_views  # noqa: E402
-from cost_text import page  # noqa: E402
+from lablib import tool
+from lablib.cost_figures import bare, draw
+from lablib.recordings import link_views, manifest_of, people_views
+from lablib.tool import BUILD, GGN, RENDER, ROOT, Refused, ggn, run
 
-ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-BUILD = os.path.join(ROOT, os.environ.get("BUILD", "build"))
 WORK = os.path.join(BUILD, "cost")
-SHARED = os.path.join(ROOT, "..", "shared")
 CADENCES = (1.05, 1.15, 1.2565, 1.5, 2)
 
 
-def run(*command, **environment):
-    done = subprocess.run([str(c) for c in command], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT,
-                          env={**os.environ, **environment})
-    if done.returncode:
-        raise SystemExit("cost: %s\n%s" % (" ".join(map(str, command)), done.stderr.strip()[-800:]))
-    return done.stdout
-
-
-def ggn(*arguments):
-    return run(os.path.join(BUILD, "bin", "ggn"), *arguments)
+def options(parser):
+    for name, default in (("--data", os.path.join(ROOT, "data")), ("--people", os.path.join(tool.SHARED, "human")), ("--out", tool.DOCS)):
+        parser.add_argument(name, type=tool.path, default=default)
+    parser.add_argument("--render", type=tool.path)
+    parser.add_argument("--plan", type=tool.path)
+    parser.add_argument("--model", type=tool.path, action="append")
+    parser.add_argument("--baseline", type=tool.path, action="append")
+    parser.add_argument("--only", default=",".join((*STEPS, "draw")))
+    parser.add_argument("--threads", type=int, default=tool.THREADS)
+    parser.add_argument("--rounds", type=int, default=2)
+    parser.add_argument("--real-scenes", type=int, default=3)
 
 
 def shipped(o):
@@ -67,14 +63,24 @@ KEYS = ("blocks", "samples", "sampling_s", "checks_cheap", "checks_full", "noisy
         "flip", "relmse")
 
 
-def slim(data):
+def defaults():
+    """{criterion: [parameter, value]}: what a user gets who says nothing else, as the renderer tells it."""
+    return {name: [parameter, tool.default(name, parameter)] for name, parameter in
+            (("observer", "visible"), ("variance", "threshold"), ("halfbuf", "threshold"))}
+
+
+def real_points(out):
+    return (("observer", "visible", 0.5), ("observer", *out["defaults"]["observer"]), ("variance", "threshold", 0.08))
+
+
+def slim(data, out):
     """What the page needs: stops of the defaults alone, figures as lists in the order of `keys`, of networks that are not shipped
     few settings."""
     data["keys"] = KEYS
     data["points"] = [p for p in data["points"] if not p["criterion"].startswith(("paper", "window")) or p["dial"] in ("own", "visible")]
     for p in data["points"]:
-        if p["dial"] != "own" and p["criterion"] != "limit" and DEFAULTS.get(bare(p["criterion"])) != (p["dial"], p["value"]) \
-                and (p["criterion"], p["dial"], p["value"]) not in REAL_POINTS:
+        if p["dial"] != "own" and p["criterion"] != "limit" and out["defaults"].get(bare(p["criterion"])) != [p["dial"], p["value"]] \
+                and (p["criterion"], p["dial"], p["value"]) not in real_points(out):
             del p["stops"]
         p["scenes"] = {s: [f[k] for k in KEYS] for s, f in p["scenes"].items()}
     return data
@@ -89,19 +95,18 @@ def inspected(model):
             "picture": "not taken" not in text}
 
 
-def cost_of(folder, *options):
-    return slim(json.loads(ggn("cost", "-d", os.path.join(WORK, folder), *options)))
+def cost_of(out, folder, *options):
+    return slim(json.loads(ggn("cost", "-d", os.path.join(WORK, folder), *options)), out)
 
 
 def replay(o, out):
     """The test views, labelled by the observer."""
     views = link_views(os.path.join(o.data, "test"), os.path.join(WORK, "data/test"))
     ggn("label", "--threads", o.threads, *views)
-    out["sets"]["test"] = cost_of("data", "--sizes", "--threads", o.threads, *baselines(o))
+    out["sets"]["test"] = cost_of(out, "data", "--sizes", "--threads", o.threads, *baselines(o))
     out["references"], foreign = {}, set()
     for view in views:
-        with open(os.path.join(view, "manifest.json")) as file:
-            manifest = json.load(file)
+        manifest = manifest_of(view)
         spp = str(manifest["reference_spp"])
         out["references"][spp] = out["references"].get(spp, 0) + len(manifest["blocks"])
         if manifest["blocks"] and not manifest["source"].startswith("scenes/"):
@@ -111,13 +116,13 @@ def replay(o, out):
 
 def recorded(o, out):
     """Nothing simulated: the observer asks the halves that each level really had, and not those that gave the block its threshold."""
-    out["sets"]["recorded"] = cost_of("data", "--recorded", "--no-quality", "--threads", o.threads, *baselines(o))
+    out["sets"]["recorded"] = cost_of(out, "data", "--recorded", "--no-quality", "--threads", o.threads, *baselines(o))
 
 
 def judged(o, out, name, *options, folder="data"):
     """Adds what networks do to a set that is there without them."""
     of_network = lambda p: ".ggn" in p["criterion"]
-    points = cost_of(folder, "--threads", o.threads, *options)["points"]
+    points = cost_of(out, folder, "--threads", o.threads, *options)["points"]
     new = {p["criterion"] for p in points if of_network(p)}
     out["sets"][name]["points"] = [p for p in out["sets"][name]["points"] if p["criterion"] not in new] + [p for p in points if of_network(p)]
 
@@ -125,7 +130,7 @@ def judged(o, out, name, *options, folder="data"):
 def introduce(o, out):
     """What the page says of a network besides its figures; of every one that a step has measured."""
     out.setdefault("networks", {}).update({os.path.basename(m): inspected(m) for m in o.model})
-    out.setdefault("commits", {}).update({os.path.basename(m): run("git", "log", "-1", "--format=%h", "--", m).strip() for m in o.model})
+    out.setdefault("commits", {}).update({os.path.basename(m): tool.commit("--", m) for m in o.model})
 
 
 def judge(o, out):
@@ -140,8 +145,7 @@ def judge(o, out):
 def pictured(block, spp, panel):
     """One recorded block as it was at spp; returns its pixels."""
     view = os.path.join(WORK, "data", "test", block["view"])
-    with open(os.path.join(view, "manifest.json")) as file:
-        manifest = json.load(file)
+    manifest = manifest_of(view)
     where = next(b for b in manifest["blocks"] if b["id"] == block["id"])
     table, whole = os.path.join(WORK, "stops.csv"), os.path.join(WORK, "whole.png")
     with open(table, "w") as stops:
@@ -160,13 +164,13 @@ def noisiest(early, last):
     return max(((x, y) for y in range(0, 151, 25) for x in range(0, 151, 25)), key=lambda at: difference(*at))
 
 
-def failures(points, blocks):
+def failures(points, blocks, defaults):
     """(criterion, stops, block): a caustic without the guard against rare bright paths; of each default the block, another each
     time, that it leaves noisiest, if it stops that early."""
     rows = []
     for p in points:
         name = bare(p["criterion"])
-        if "stops" not in p or p["criterion"].startswith(("limit", "window", "paper")) or not (p["dial"] == "own" or DEFAULTS.get(name) == (p["dial"], p["value"])):
+        if "stops" not in p or p["criterion"].startswith(("limit", "window", "paper")) or not (p["dial"] == "own" or defaults.get(name) == [p["dial"], p["value"]]):
             continue
         caustic = [b for b in blocks if b["scene"] == "caustic-glass"]
         if p["criterion"] == "halfbuf, no guard" and caustic:
@@ -183,9 +187,9 @@ def early(o, out):
     """Recorded blocks as they were when a criterion stopped them, beside the observer's stop and the last level."""
     data, panels = out["sets"]["recorded"], []
     blocks = [dict(b, scene=scene) for scene, s in data["scenes"].items() for b in s["blocks"]]
-    observer = next(p for p in data["points"] if (p["criterion"], p["dial"], p["value"]) == ("observer", "visible", 0.25))["stops"]
+    observer = next(p for p in data["points"] if (p["criterion"], p["dial"], p["value"]) == ("observer", *out["defaults"]["observer"]))["stops"]
     out["early"] = []
-    for criterion, stops, block in failures(data["points"], blocks):
+    for criterion, stops, block in failures(data["points"], blocks, out["defaults"]):
         place, last = block["place"], block["cap"]
         files = [os.path.join(WORK, "panel%d.ppm" % (len(panels) + k)) for k in range(3)]
         pixels = [pictured(block, min(spp, last), file) for spp, file in zip((stops[place], observer[place], last), files)]
@@ -204,10 +208,8 @@ def few_views(o):
     taken, count = set(), set()
     test = os.path.join(o.data, "test")
     for name in sorted(os.listdir(test)):
-        path = os.path.join(test, name, "manifest.json")
-        if os.path.exists(path):
-            with open(path) as file:
-                manifest = json.load(file)
+        if os.path.exists(os.path.join(test, name, "manifest.json")):
+            manifest = manifest_of(os.path.join(test, name))
             if manifest["scene"] not in count and manifest["blocks"]:
                 count.add(manifest["scene"])
                 taken.add(name)
@@ -219,11 +221,11 @@ def cadence(o, out):
     """Some blocks of every scene: all networks, and levels made anew from the halves, at every ratio alike, everybody asked as often."""
     few_views(o)
     introduce(o, out)
-    out["sets"]["few"] = cost_of("few", "--recorded", "--no-quality", "--threads", o.threads, *networks(o))
+    out["sets"]["few"] = cost_of(out, "few", "--recorded", "--no-quality", "--threads", o.threads, *networks(o))
     out["cadence"] = {}
     for ratio in CADENCES:
         asked = baselines(o) if ratio > 1.2 else []  # an answer of `attributes` takes longer than the network's
-        out["cadence"]["%g" % ratio] = cost_of("few", "--cadence", ratio, "--no-quality", "--threads", o.threads, "-m", o.model[0], *asked)
+        out["cadence"]["%g" % ratio] = cost_of(out, "few", "--cadence", ratio, "--no-quality", "--threads", o.threads, "-m", o.model[0], *asked)
 
 
 def sizes(o, out):
@@ -242,18 +244,17 @@ def people(o, out):
     views = os.path.join(o.people, "views")
     if not os.path.isdir(views):
         return
-    people_views(o.people, views, os.path.join(WORK, "people/people"), ggn)
+    people_views(o.people, views, os.path.join(WORK, "people/people"))
     published = [x for k in ("SVD-Entropy", "26-attributes") for x in ("--thresholds", os.path.join(o.people, k + "-thresholds.csv"))]
     options = ("--split", "people", "--no-quality", "-O", "ggn/observer/observer.json")
-    out["sets"]["people"] = cost_of("people", *options, "--sizes", "--threads", o.threads, *shipped(o), *baselines(o), *published)
+    out["sets"]["people"] = cost_of(out, "people", *options, "--sizes", "--threads", o.threads, *shipped(o), *baselines(o), *published)
     judged(o, out, "people", *options, "--no-pictures", *shipped(o), folder="people")
 
 
 def report_of(*arguments):
     path = os.path.join(WORK, "report.json")
-    run(os.path.join(BUILD, "bin", "lull-render"), "-q", "--report", path, "-o", os.path.join(WORK, "out.exr"), *arguments)
-    with open(path) as file:
-        report = json.load(file)
+    run(RENDER, "-q", "--report", path, "-o", os.path.join(WORK, "out.exr"), *arguments)
+    report = tool.load(path)
     totals = report["totals"]
     totals["sampling_thread_s"] = sum(b["thread_s"] for b in report["blocks"])
     totals["checks"] = sum(b["checks"] for b in report["blocks"])
@@ -327,9 +328,6 @@ def camera_of(manifest):
     return command + (["--fov", manifest["fov"]] if manifest.get("fov") else [])
 
 
-REAL_POINTS = (("observer", "visible", 0.5), ("observer", "visible", 0.25), ("variance", "threshold", 0.08))
-
-
 def replayed_stop(out, point, block):
     """From the recorded levels alone; None: the block's threshold lies beyond them."""
     data = out["sets"]["recorded"]
@@ -342,20 +340,19 @@ def replayed_stop(out, point, block):
 
 def real(o, out):
     """Recorded blocks rendered again under a criterion: the same samples, so that stops can be compared one by one."""
-    out["real"], out["real_revision"] = [], run("git", "rev-parse", "--short", "HEAD").strip()
+    out["real"], out["real_revision"] = [], tool.commit()
     test = os.path.join(o.data, "test")
     # the cheapest blocks that are no trivial ones, one of each scene
     ready = sorted((b["threshold"] * b["us_per_path"], scene, b) for scene, s in out["sets"]["test"]["scenes"].items() for b in s["blocks"]
                    if b["threshold"] >= 25)
     seen = set()
     for _, scene, recorded in ready:
-        with open(os.path.join(test, recorded["view"], "manifest.json")) as file:
-            manifest = json.load(file)
+        manifest = manifest_of(os.path.join(test, recorded["view"]))
         if len(seen) == o.real_scenes or scene in seen or not os.path.exists(os.path.join(ROOT, manifest["source"])):
             continue
         seen.add(scene)
         view, block = recorded["view"], next(b for b in manifest["blocks"] if b["id"] == recorded["id"])
-        for point in REAL_POINTS:
+        for point in real_points(out):
             totals = report_of(manifest["source"], "--size", "%dx%d" % (manifest["width"], manifest["height"]), "--crop",
                                "%d,%d,%d,%d" % (block["x0"], block["y0"], block["x1"], block["y1"]), "--sampler", "independent",
                                "--light-selection", "power", "--threads", 1, "--spp-max", 4096, "-c", point[0], "-p", "%s=%g" % point[1:], *camera_of(manifest))
@@ -388,8 +385,8 @@ def grow(o, out):
 # --- precision and stability ---------------------------------------------------------------------------------------------------
 
 
-def golden(*options, **environment):
-    return json.loads(run(os.path.join(BUILD, "bin", "ggn"), "golden", "--threads", "1", *options, **environment))["p"]
+def golden(isa, *options):
+    return json.loads(ggn("golden", "--threads", "1", *options, env={"GGN_ISA": isa}))["p"]
 
 
 def pictures_of(program, *options):
@@ -401,7 +398,6 @@ def pictures_of(program, *options):
             out = os.path.join(WORK, "picture.exr")
             run(program, "-q", path, "--reproducible", "--size", "48x48", "--block", 16, "--spp-max", 64, "-c", "variance", "-p", "threshold=0.2", "-o", out, *options)
             found[scene] = [line for line in run("oiiotool", "--info", "--hash", out).splitlines() if "SHA-1" in line]
-    return found
 
 
 def other_builds():
@@ -418,9 +414,9 @@ def flushing():
     return path
 
 
-def scores(o, folder, model, *options, program=None, **environment):
-    text = run(program or os.path.join(BUILD, "bin", "ggn"), "cost", "-d", os.path.join(WORK, folder), "--recorded", "--no-quality", "--scores",
-               "--threads", o.threads, "-m", model, *options, **environment)
+def scores(o, folder, model, *options, program=GGN, env=None):
+    text = run(program, "cost", "-d", os.path.join(WORK, folder), "--recorded", "--no-quality", "--scores",
+               "--threads", o.threads, "-m", model, *options, env=env)
     return json.loads(text)["points"][0]
 
 
@@ -441,15 +437,15 @@ def decisions(o, builds):
     own = scores(o, "data", model)
     rows = [changes(name, own, scores(o, "data", *a, **k)) for name, a, k in (
         ("double instead of float", (model, "--precision", "f64"), {}),
-        ("AVX2: Winograd's algorithm in more layers", (model,), {"GGN_ISA": "avx2"}),
+        ("AVX2: Winograd's algorithm in more layers", (model,), {"env": {"GGN_ISA": "avx2"}}),
         ("bfloat16 products", (model, "--precision", "bf16"), {}),
         ("weights stored as half floats", (half,), {}),
-        ("flush-to-zero, denormals-are-zero", (model,), {"LD_PRELOAD": flushing()}),
+        ("flush-to-zero, denormals-are-zero", (model,), {"env": {"LD_PRELOAD": flushing()}}),
         ("-O2", (model,), {"program": os.path.join(builds["-O2"], "bin", "ggn")}))]
     few_views(o)  # what is slow
     own = scores(o, "few", model)
     return rows + [changes(name, own, scores(o, "few", model, **k)) for name, k in (
-        ("baseline x86-64: direct convolution", {"GGN_ISA": "base"}),
+        ("baseline x86-64: direct convolution", {"env": {"GGN_ISA": "base"}}),
         ("-O0", {"program": os.path.join(builds["-O0"], "bin", "ggn")}))]
 
 
@@ -459,11 +455,11 @@ def precision(o, out):
     out["golden"] = []
     for name, options, isa in (("float, AVX-512: Winograd", ("--float",), "avx512"), ("float, AVX2: Winograd", ("--float",), "avx2"),
                                ("float, baseline x86-64", ("--float",), "base"), ("bfloat16 products", ("--bf16",), "avx512")):
-        p = golden(*options, GGN_ISA=isa)
+        p = golden(isa, *options)
         out["golden"].append({"name": name, "p_moved": max(abs(a - b) for a, b in zip(p, exact)), "windows": len(p)})
     builds = other_builds()
     out["decisions"] = {"model": os.path.basename(o.model[0]), "rows": decisions(o, builds)}
-    render = os.path.join(BUILD, "bin", "lull-render")
+    render = RENDER
     same = pictures_of(render, "--threads", 1)
     out["images"] = []
     for name, program, options in [("two threads", render, ("--threads", 2)), ("the general kernel (--effects=all)", render, ("--effects=all",)),
@@ -477,8 +473,7 @@ def guards(o, out):
     """Hard cases without what guards them (scripts/guards)."""
     path = os.path.join(WORK, "guards.json")
     run(os.path.join(ROOT, "scripts", "guards"), "--json", path)
-    with open(path) as file:
-        out["guards"] = json.load(file)
+    out["guards"] = tool.load(path)
 
 
 STEPS = {"replay": replay, "recorded": recorded, "judge": judge, "early": early, "price": price, "real": real, "grow": grow, "sizes": sizes,
@@ -494,51 +489,31 @@ def rounded(value):
     return float("%.4g" % value) if isinstance(value, float) else value
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--data", default="data")
-    parser.add_argument("--render", metavar="DIR")
-    parser.add_argument("--plan")
-    parser.add_argument("--people", default=os.path.join(SHARED, "human"))
-    parser.add_argument("--model", action="append")
-    parser.add_argument("--baseline", action="append")
-    parser.add_argument("--out", default=os.path.join(ROOT, "docs"))
-    parser.add_argument("--only", default=",".join((*STEPS, "draw")))
-    parser.add_argument("--threads", type=int, default=len(os.sched_getaffinity(0)))
-    parser.add_argument("--rounds", type=int, default=2)
-    parser.add_argument("--real-scenes", type=int, default=3)
-    o = parser.parse_args()
+def main(o):
     steps = o.only.split(",")
     if set(steps) - {*STEPS, "draw"}:
-        raise SystemExit("cost: --only: expected some of " + ",".join((*STEPS, "draw")))
+        raise Refused("--only: expected some of " + ",".join((*STEPS, "draw")))
     if o.render:
-        o.data = os.path.abspath(o.render)
-        run(os.path.join(ROOT, "scripts", "make-dataset"), "--only", "test", *(["--plan", os.path.abspath(o.plan)] if o.plan else []), o.data)
-    o.data, o.out = os.path.abspath(o.data), os.path.abspath(o.out)
+        o.data = o.render
+        run(os.path.join(ROOT, "scripts", "lab"), "data-set", "--only", "test", *(["--plan", o.plan] if o.plan else []), o.data)
     os.makedirs(WORK, exist_ok=True)
+    os.makedirs(os.path.join(o.out, "results"), exist_ok=True)
     o.model = o.model or [*sorted((os.path.relpath(m, ROOT) for m in glob.glob(os.path.join(ROOT, "ggn/models/lull-*.ggn"))), reverse=True),
                           *sorted(glob.glob(os.path.join(WORK, "models", "*.ggn")))]
     o.baseline = o.baseline if o.baseline is not None else [
         p for k in ("svd-entropy", "attributes", "noise-mask") for p in (os.path.join("ggn/models", k + ".ggn"), os.path.join(WORK, k + ".ggn"))
         if os.path.exists(os.path.join(ROOT, p))]
-    path = os.path.join(o.out, "cost.json")
-    out = {"sets": {}}
-    if os.path.exists(path) and set(steps) != {*STEPS, "draw"}:
-        with open(path) as file:
-            out = json.load(file)
+    every = set(steps) == {*STEPS, "draw"}
+    out = {"sets": {}} if every else tool.results(o.out, "cost") or {"sets": {}}
+    if steps != ["draw"]:
+        out["defaults"] = defaults()
     for step, function in STEPS.items():
         if step in steps:
             function(o, out)
             print("cost: %s done" % step, flush=True)
-            out["date"] = datetime.date.today().isoformat()
-            with open(path + ".tmp", "w") as file:
-                json.dump(rounded(out), file, separators=(",", ":"))
-            os.replace(path + ".tmp", path)
+            out["measured"] = tool.measured(level=tool.observer_law(), visible=out["defaults"]["observer"][1])
+            tool.save(rounded(out), o.out, "results", "cost.json", separators=(",", ":"))
     if "draw" in steps:
         draw(o.out, out)
-        with open(os.path.join(o.out, "cost.md"), "w") as file:
-            file.write(page(out))
-
-
-if __name__ == "__main__":
-    main()
+        from lablib import pages
+        pages.fill(o.out)

@@ -1,17 +1,17 @@
-#!/usr/bin/env python3
-"""Measure speed and noise as ratios, interleaved in one run, and print one table: ours, what it is held against, the share.
+"""Speed and noise as ratios, interleaved in one run, held against peers, limits and what is wanted.
 
-  scripts/bench [--rounds N] [--quick] [--only peers,host,rays,noise,start,networks,avx2,study,reading,limits] [--into docs/speed.md]
+usage: scripts/lab bench [--rounds N] [--quick] [--only PARTS] [--write [DIR]]
 
-Peers are used when they are installed: Blender's Cycles (package blender) and Embree's sample path tracer (embree-tools). Every
-figure is the median over the rounds; rates are per processor second and a ratio is the median of the ratios within the rounds,
-so that a busy machine disturbs them less; seconds of starting are wall time and want a quiet one. Scenes of ../shared are
-measured when that folder is there. docs/speed.md keeps a dated run: --into puts the table there, between the two comments that
-mark its place, with date and machine.
-"""
-import argparse
+  --rounds N   the figures are medians over so many (default 3)
+  --quick      fewer samples: rougher figures
+  --only PARTS some of peers,host,rays,noise,start,networks,avx2,study,reading,limits
+  --write [DIR]  keep what was measured in DIR/results/bench.json, beside the parts that were measured before, and fill the pages of
+               DIR (default docs); the part reading also draws DIR/reading-time.png
+
+Peers are used when they are installed: Blender's Cycles (package blender), Embree's sample path tracer (embree-tools), PyTorch. Rates
+are per processor second and a ratio is the median of the ratios within the rounds, so that a busy machine disturbs them less; seconds
+of starting are wall time and want a quiet one. Scenes of ../shared are measured when that folder is there."""
 import array
-import datetime
 import json
 import math
 import os
@@ -23,27 +23,35 @@ import sys
 import tempfile
 import time
 
-ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-BUILD = os.path.join(ROOT, os.environ.get("BUILD", "build"))
-RENDER = os.path.join(BUILD, "bin", "lull-render")
-GGN = os.path.join(BUILD, "bin", "ggn")
+from lablib import reading, tables, tool
+from lablib.tool import BUILD, GGN, RENDER, ROOT, THREADS
+
 RAYS = os.path.join(BUILD, "bench", "pt_rays")
 NOISE = os.path.join(BUILD, "bench", "pt_noise")
 BOX = os.path.join(ROOT, "scenes", "cornell-box.pbrt")
-SHARED = os.path.join(ROOT, "..", "shared", "scenes")
-THREADS = len(os.sched_getaffinity(0))
-LOAD = os.getloadavg()[0]
-BEGIN, END = "<!-- bench begins -->", "<!-- bench ends -->"  # the table's place in a document
+SHARED = os.path.join(tool.SHARED, "scenes")
 
 
-def cpu_seconds(command, **options):
+def options(parser):
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--only")
+    tool.writes(parser)
+
+
+def cpu_seconds(command, **how):
     """Processor seconds (all threads) of a command, and what it printed."""
     before = os.times()
-    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, **options)
+    text = answer(command, **how)
     after = os.times()
+    return after.children_user + after.children_system - before.children_user - before.children_system, text
+
+
+def answer(command, **how):
+    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, **how)
     if done.returncode != 0:
-        raise SystemExit("failed: " + " ".join(command))
-    return after.children_user + after.children_system - before.children_user - before.children_system, done.stdout
+        raise tool.Refused("failed: " + " ".join(command))
+    return done.stdout
 
 
 def ours(scratch, *options):
@@ -82,56 +90,62 @@ def embree(frames):
 
 def embree_tool():
     """Embree's sample path tracer, of the package embree-tools."""
-    tool = shutil.which("pathtracer")
-    return tool if tool and os.path.exists("/usr/share/doc/embree3/models/cornell_box.ecs") else None
+    found = shutil.which("pathtracer")
+    return found if found and os.path.exists("/usr/share/doc/embree3/models/cornell_box.ecs") else None
 
 
 def rays(scene, size, depth, passes):
     """Kernel against the ray-only loop, one thread."""
-    command = [RAYS, scene, size, str(passes), str(depth)]
-    return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+    return json.loads(answer([RAYS, scene, size, str(passes), str(depth)]))
 
 
 def median(values):
     return statistics.median(values) if values else float("nan")
 
 
-TABLE = []
+ROWS = []  # of the part that is being measured
 
 
 def row(name, value, want=None, unit="", limit=None, most=False):
-    """One line of the table: a figure, what it is held against (`limit`, same unit), what is wanted (at most, with `most`)."""
-    reached = "" if want is None else ("yes" if (value <= want if most else value >= want) else "**no**")
-    TABLE.append("| %s | %.3g%s | %s | %s | %s | %s |" % (
-        name, value, unit, "" if limit is None else "%.3g%s" % (limit, unit), "" if limit is None else "%.0f %%" % (100 * value / limit),
-        "" if want is None else "%s %g" % ("<=" if most else ">=", want), reached))
+    """A figure, what it is held against (`limit`, same unit), what is wanted (at most, with `most`)."""
+    told = {"name": name, "value": value, "unit": unit, "limit": limit, "want": want, "most": most}
+    ROWS.append({k: v for k, v in told.items() if v or k == "value"})
     print("bench: %s: %.3f%s" % (name, value, unit), file=sys.stderr, flush=True)
 
 
 def missing(what, why):
-    TABLE.append("| %s | not measured: %s | | | | |" % (what, why))
+    ROWS.append({"name": what, "missing": why})
 
 
-def machine():
-    with open("/proc/cpuinfo") as f:
-        model = re.search(r"model name\s*: (.*)", f.read())
-    commit = subprocess.run(["git", "-C", ROOT, "rev-parse", "--short", "HEAD"], stdout=subprocess.PIPE, text=True).stdout.strip()
-    return "%s, %s, %d processors, load before %.2f, commit %s" % (
-        datetime.date.today().strftime("%-d %B %Y"), model[1] if model else "processor unknown", THREADS, LOAD, commit or "unknown")
+def cells(r):
+    if "missing" in r:
+        return [r["name"], "not measured: " + r["missing"], "", "", "", ""]
+    unit, limit, want = r.get("unit", ""), r.get("limit"), r.get("want")
+    reached = "" if want is None else ("yes" if (r["value"] <= want if r.get("most") else r["value"] >= want) else "**no**")
+    return [r["name"], "%.3g%s" % (r["value"], unit), "" if limit is None else "%.3g%s" % (limit, unit),
+            "" if limit is None else "%.0f %%" % (100 * r["value"] / limit),
+            "" if want is None else "%s %g" % ("<=" if r.get("most") else ">=", want), reached]
 
 
-def print_table(into):
-    text = "%s.\n\n| what | ours | peer or limit | share of it | wanted | reached |\n|---|---|---|---|---|---|\n%s\n" % (
-        machine(), "\n".join(TABLE))
-    print(text)
-    if into:
-        with open(into) as f:
-            head, begin, rest = f.read().partition(BEGIN)
-            _, end, tail = rest.partition(END)
-        if not begin or not end:
-            raise SystemExit("%s: has no place for the table (%s … %s)" % (into, BEGIN, END))
-        with open(into, "w") as f:
-            f.write(head + BEGIN + "\n" + text + END + tail)
+def machine(parts, part):
+    m = parts[part]["measured"]
+    return "%s, load before %.2f" % (tables.told(m), m["load"])
+
+
+def page(parts):
+    """Machine and table; what was measured in another run than the first part says so in its row."""
+    first, rows = machine(parts, next(iter(parts))), []
+    for name, part in parts.items():
+        other = "" if machine(parts, name) == first else " (%s)" % machine(parts, name)
+        rows += [[r["name"] + other, *cells(r)[1:]] for r in part["rows"]]
+    return "%s.\n\n%s" % (first, tables.table(("what", "ours", "peer or limit", "share of it", "wanted", "reached"), rows))
+
+
+def value(parts, name, below="", has="", form="%.2f"):
+    """A figure of the table by the beginning of its row's name (and words of it, `has`); `below`: of the next row with these words."""
+    rows = [r for part in parts.values() for r in part["rows"]]
+    at = next(i for i, r in enumerate(rows) if r["name"].startswith(name) and has in r["name"])
+    return form % next(r for r in rows[at:] if below in r["name"])["value"]
 
 
 def bench_peers(rounds, quick):
@@ -221,8 +235,7 @@ def bench_noise(quick):
     scenes = [(name, os.path.join(ROOT, "scenes", name + ".pbrt")) for name in NOISE_SCENES]
     scenes += [(os.path.basename(name)[:-5], os.path.join(SHARED, name)) for name in NOISE_SHARED if os.path.exists(os.path.join(SHARED, name))]
     for name, scene in scenes:
-        found = json.loads(subprocess.run([NOISE, scene, "64x64", "2" if quick else "32", "4"],
-                                          check=True, capture_output=True, text=True).stdout)
+        found = json.loads(answer([NOISE, scene, "64x64", "2" if quick else "32", "4"]))
         if not found["two_ways"]:
             gains.append(1.0)  # rendered as before
             continue
@@ -290,11 +303,11 @@ def bench_start(rounds):
 
 
 def bench_networks(rounds, isa=None):
-    """scripts/bench-ggn compares with PyTorch; its lines become rows. isa: what both sides are held to."""
+    """`lab networks` compares with PyTorch; its lines become rows. isa: what both sides are held to."""
     model = os.path.join(ROOT, "ggn", "models", "lull-2.ggn")
     for widths, options in (("published widths", []), ("widths of lull-2", ["--model", model])):
-        text = subprocess.run([os.path.join(ROOT, "scripts", "bench-ggn"), "--json", "--rounds", str(rounds), "--threads", "2",
-                               *(["--isa", isa] if isa else []), *options], check=True, capture_output=True, text=True).stdout
+        text = answer([os.path.join(ROOT, "scripts", "lab"), "networks", "--json", "--rounds", str(rounds), "--threads", "2",
+                       *(["--isa", isa] if isa else []), *options])
         if not text.startswith("{"):
             return missing("networks against PyTorch", text.strip())
         found = json.loads(text)
@@ -323,13 +336,13 @@ def bench_study(rounds):
     row("  99th percentile", median([w[1] for w in waits]), 100, " ms", most=True)
 
 
-def bench_reading():
-    """How processor time grows with what is read: 1 is linear, 2 quadratic (scripts/reading-time)."""
-    with tempfile.TemporaryDirectory() as scratch:
-        text = subprocess.run([os.path.join(ROOT, "scripts", "reading-time"), "--seconds", "0.1", "--out", os.path.join(scratch, "p.png")],
-                              check=True, capture_output=True, text=True).stdout
-    for name, exponent in re.findall(r"^(.*?) +([0-9.]+), \d+ inputs", text, re.M):
-        row("reading %s: time grows with the size to the power" % name, float(exponent), 1.45, most=True)
+def bench_reading(docs):
+    """How processor time grows with what is read: 1 is linear, 2 quadratic."""
+    kinds = reading.measured(0.3 if docs else 0.1)
+    for name, points in kinds.items():
+        row("reading %s: time grows with the size to the power" % name, reading.exponent(points), 1.45, most=True)
+    if docs:
+        reading.draw(kinds, docs, "reading-time.png")
 
 
 def bench_limits():
@@ -340,10 +353,9 @@ def bench_limits():
         subprocess.run([*common, "--time-budget", "1", "--report", report, "-o", os.path.join(scratch, "a.exr")], check=True)
         with open(report) as f:
             row("--time-budget 1: rendering, wall", json.load(f)["totals"]["render_s"], 4.0, " s", most=True)
-    pilot = subprocess.run([RENDER, BOX, "-q", "--quote", "--json", "--quote-pilot", "100000:0.3"], check=True,
-                           capture_output=True, text=True)
-    row("--quote-pilot 100000:0.3: the pilot, wall", json.loads(pilot.stdout)["pilot"]["elapsed_s"], 5.0, " s", most=True)
-    text = subprocess.run([GGN, "bench", "--rounds=3", "--batch=2", "--threads=1"], check=True, capture_output=True, text=True).stdout
+    pilot = json.loads(answer([RENDER, BOX, "-q", "--quote", "--json", "--quote-pilot", "100000:0.3"]))["pilot"]
+    row("--quote-pilot 100000:0.3: the pilot, wall", pilot["elapsed_s"], 5.0, " s", most=True)
+    text = answer([GGN, "bench", "--rounds=3", "--batch=2", "--threads=1"])
     ms = {name: float(value) for name, value in re.findall(r"^(\w+)_ms +([0-9.]+)$", text, re.M)}
     row("ggn bench: sgemm", float(re.search(r"^sgemm_gflops +([0-9.]+)$", text, re.M)[1]), 0.5, " GFLOP/s")
     for name, parts in (("decision", {"denoiser_forward": 1, "generator_forward": 2, "discriminator_forward": 1}),
@@ -363,40 +375,34 @@ NEEDS = {"peers": ["bin/lull-render"], "host": ["bin/lull-render"], "rays": ["be
 
 def build(parts):
     """Makes what the parts run, or says why it cannot be."""
-    build_dir = os.environ.get("BUILD", "build")
-    targets = sorted({"%s/%s" % (build_dir, n) for part in parts for n in NEEDS[part]})
+    targets = sorted({"%s/%s" % (os.environ.get("BUILD", "build"), n) for part in parts for n in NEEDS[part]})
     done = subprocess.run(["make", "-C", ROOT, "--no-print-directory", *targets], stdout=sys.stderr)
     if done.returncode != 0:
-        raise SystemExit("bench: %s cannot be made (make %s)" % (", ".join(parts), " ".join(targets)))
+        raise tool.Refused("%s cannot be made (make %s)" % (", ".join(parts), " ".join(targets)))
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--quick", action="store_true", help="fewer samples: rougher figures")
-    parser.add_argument("--into", metavar="FILE", help="write the table into this document too")
-    parser.add_argument("--only", metavar="PARTS", help="some parts only, with commas between them")
-    args = parser.parse_args()
-    parts = {"peers": lambda: bench_peers(args.rounds, args.quick), "host": lambda: bench_host(args.rounds, args.quick),
-             "rays": lambda: bench_rays(args.rounds, args.quick), "noise": lambda: bench_noise(args.quick),
-             "start": lambda: bench_start(args.rounds), "networks": lambda: bench_networks(args.rounds),
-             "avx2": lambda: bench_networks(args.rounds, "avx2"), "study": lambda: bench_study(args.rounds),
-             "reading": bench_reading, "limits": bench_limits}
-    chosen = args.only.split(",") if args.only else list(parts)
+def main(o):
+    parts = {"peers": lambda: bench_peers(o.rounds, o.quick), "host": lambda: bench_host(o.rounds, o.quick),
+             "rays": lambda: bench_rays(o.rounds, o.quick), "noise": lambda: bench_noise(o.quick),
+             "start": lambda: bench_start(o.rounds), "networks": lambda: bench_networks(o.rounds),
+             "avx2": lambda: bench_networks(o.rounds, "avx2"), "study": lambda: bench_study(o.rounds),
+             "reading": lambda: bench_reading(o.write), "limits": bench_limits}
+    chosen = o.only.split(",") if o.only else list(parts)
     for name in chosen:
         if name not in parts:
-            parser.error("--only %s: expected some of %s" % (name, ",".join(parts)))
+            raise tool.Refused("--only %s: expected some of %s" % (name, ",".join(parts)))
+    told, found, failed = tool.measured(load=os.getloadavg()[0]), {}, 0
     build(chosen)
-    failed = 0
     for name in chosen:
+        ROWS.clear()
         try:
             parts[name]()
-        except (SystemExit, subprocess.CalledProcessError, OSError, ValueError, TypeError) as e:
+        except (tool.Refused, subprocess.CalledProcessError, OSError, ValueError, TypeError) as e:
             missing(name, str(e))  # the rest of the table is worth having
             failed = 1
-    print_table(args.into)
+        found[name] = {"measured": told, "rows": list(ROWS)}
+    print(page(found))
+    if o.write:
+        before = tool.results(o.write, "bench")
+        tool.store(o.write, "bench", {name: found.get(name) or before[name] for name in parts if name in found or name in before})
     return failed
-
-
-if __name__ == "__main__":
-    sys.exit(main())

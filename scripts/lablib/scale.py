@@ -1,8 +1,7 @@
-#!/usr/bin/env python3
-"""How long would a frame take on 1 ... 10,000 cores? A discrete-event model of `mpirun lull-render` (docs/scale.md), fed with
-what blocks of recorded views cost and where they stop, and with measured costs of messages and of checks.
+"""How long a frame takes on 1 ... 10,000 cores: a discrete-event model of `mpirun lull-render` (docs/scale.md).
 
-usage: scale [OPTION...] RECORDING...      RECORDING: a folder of lull-render --sequence that ggn label has labelled
+usage: scripts/lab scale [OPTION...] RECORDING...      RECORDING: a folder of lull-render --sequence that ggn label has labelled
+
   --measured FILE   costs of messages and checks (default: scripts/scale.json)
   --frames LIST     WxH, comma separated (default 1920x1080,3840x2160,15360x8640)
   --cores LIST      (default 1,2,4,8,16,64,256,1024,4096,10000)
@@ -14,8 +13,9 @@ usage: scale [OPTION...] RECORDING...      RECORDING: a folder of lull-render --
   --here SCENE      no recordings: render SCENE with 1, 2, 4 and 8 processes of this machine and compare with the model,
                     which is fed with the blocks of the first; wants a machine with nothing else to do
   --size WxH --spp N --program FILE     of --here (800x600, 256, build/bin/lull-render)
-exit status: 0 done, 2 wrong usage or unreadable input"""
-import argparse
+  --write [DIR]     keep the table in DIR/results/scale.json, as `frames`, `work` (with --work) or `here`, and fill the pages of DIR
+
+The model is fed with what blocks of recorded views cost and where they stop, and with measured costs of messages and of checks."""
 import heapq
 import json
 import math
@@ -25,6 +25,9 @@ import subprocess
 import sys
 import tempfile
 
+from lablib import plots, tables, tool
+from lablib.tool import Refused
+
 # As in pathtracer/render/render.c, plugin-api/job/message.h and farm.c.
 SLICE_S, SLICE_PER_MEMBER_S, LONGEST_SLICE_S, ROWS_PER_THREAD = 0.25, 0.004, 5.0, 128
 PARCELS, MOST_ROWS, SHARES = 2, 32, 4
@@ -32,13 +35,10 @@ BLOCK, SPP_MIN, SPP_MAX = 200, 16, 10000
 SLICES_SIMULATED = 6  # of a wave; the others go at their mean speed
 
 
-class Bad(Exception):
-    pass
-
-
 def last_level(path):
     """(samples per pixel, thread seconds until then) of a recorded block's last level (plugin-api/sequence/FORMAT.md)."""
-    data, at, found = open(path, "rb").read(), 64, None
+    with open(path, "rb") as file:
+        data, at, found = file.read(), 64, None
     for _ in range(struct.unpack_from("<I", data, 36)[0]):
         kind, spp, _, statistics, _, payload, _, _ = struct.unpack_from("<8I", data, at)
         for k in range(statistics):
@@ -47,7 +47,7 @@ def last_level(path):
                 found = (spp, value)
         at += 32 + payload
     if not found:
-        raise Bad(f"{path}: no level with its seconds")
+        raise Refused(f"{path}: no level with its seconds")
     return found
 
 
@@ -56,15 +56,13 @@ def read_blocks(folders):
     blocks = []
     for folder in folders:
         try:
-            manifest = json.load(open(os.path.join(folder, "manifest.json"), encoding="utf-8"))
-            labels = json.load(open(os.path.join(folder, "labels.json"), encoding="utf-8"))
-            stops = {b["id"]: b["threshold"] for b in labels["blocks"]}
-            for b in manifest["blocks"]:
+            stops = {b["id"]: b["threshold"] for b in tool.load(folder, "labels.json")["blocks"]}
+            for b in tool.load(folder, "manifest.json")["blocks"]:
                 if b["id"] in stops:
                     spp, seconds = last_level(os.path.join(folder, b["file"]))
                     blocks.append((seconds / spp, min(max(stops[b["id"]], SPP_MIN), SPP_MAX)))
         except (OSError, ValueError, KeyError, struct.error) as why:
-            raise Bad(f"{folder}: {why}") from why
+            raise Refused(f"{folder}: {why}") from why
     return blocks
 
 
@@ -168,15 +166,15 @@ def render(blocks, machine, ratio):
     return wall + checks, checks
 
 
-def predict(arguments, recorded, measured):
+def predict(o, recorded, measured):
     rows = []
-    for frame in arguments.frames.split(","):
+    for frame in o.frames.split(","):
         width, height = (int(n) for n in frame.split("x"))
         count = math.ceil(width / BLOCK) * math.ceil(height / BLOCK)
-        blocks = [(c * arguments.work, n) for c, n in (recorded[i * 7919 % len(recorded)] for i in range(count))]
+        blocks = [(c * o.work, n) for c, n in (recorded[i * 7919 % len(recorded)] for i in range(count))]
         work = None
-        for cores in (int(n) for n in arguments.cores.split(",")):
-            machine = Machine(cores, arguments.threads, measured, not arguments.at_rank_0)
+        for cores in (int(n) for n in o.cores.split(",")):
+            machine = Machine(cores, o.threads, measured, not o.at_rank_0)
             wall, checks = render(blocks, machine, measured["check_ratio"])
             if work is None:
                 alone, one_checks = render(blocks, Machine(1, 1, measured, False), measured["check_ratio"])
@@ -198,24 +196,24 @@ class Shared(Machine):
         return super().slice_s(rows, row_s * self.slower)
 
 
-def run_here(arguments, processes, folder):
+def run_here(o, processes, folder):
     """The report of a uniform render by so many processes of one thread."""
     report = os.path.join(folder, "report.json")
-    command = [arguments.program, arguments.here, "-q", "--size", arguments.size, "--spp", str(arguments.spp), "-t", "1",
+    command = [o.program, o.here, "-q", "--size", o.size, "--spp", str(o.spp), "-t", "1",
                "-o", os.path.join(folder, "image.exr"), "--report", report]
     if processes > 1:
         command = ["mpirun", "--oversubscribe", "--bind-to", "none", "-n", str(processes)] + command
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode != 0:
-        raise Bad(f"{' '.join(command)}: {done.stderr.strip().splitlines()[0] if done.stderr.strip() else 'failed'}")
-    return json.load(open(report, encoding="utf-8"))
+        raise Refused(f"{' '.join(command)}: {done.stderr.strip().splitlines()[0] if done.stderr.strip() else 'failed'}")
+    return tool.load(report)
 
 
-def compare_here(arguments, measured):
+def compare_here(o, measured):
     cores, rows, work = len(os.sched_getaffinity(0)), [], None
     with tempfile.TemporaryDirectory() as folder:
         for processes in (1, 2, 4, 8):
-            report = run_here(arguments, processes, folder)
+            report = run_here(o, processes, folder)
             seconds = report["totals"]["render_s"]
             # thread seconds and rows of each block, and what one process needs beside sampling
             if work is None:
@@ -229,66 +227,62 @@ def compare_here(arguments, measured):
     return rows
 
 
-def show_here(rows):
-    print("| processes of one thread | cores | measured, s | predicted, s | predicted / measured |")
-    print("|---|---|---|---|---|")
-    for r in rows:
-        print(f"| {r['processes']} | {r['cores']} | {r['measured_s']:.2f} | {r['predicted_s']:.2f} | {r['ratio']:.3f} |")
+HERE = ("processes of one thread", "cores", "measured, s", "predicted, s", "predicted / measured")
+FRAMES = ("frame", "cores", "time, s", "efficiency", "criterion, of the time", "rank 0 serves, of the time", "GB sent")
 
 
-def show_table(rows):
-    print("| frame | cores | time, s | efficiency | criterion, of the time | rank 0 serves, of the time | GB sent |")
-    print("|---|---|---|---|---|---|---|")
-    for r in rows:
-        print(f"| {r['frame']} | {r['cores']:,} | {r['seconds']:,.4g} | {100 * r['efficiency']:.0f} % "
-              f"| {100 * r['criterion']:.1f} % | {100 * r['rank0']:.1f} % | {r['bytes'] / 1e9:,.3g} |")
+def table(rows):
+    if "processes" in rows[0]:
+        return tables.table(HERE, [[str(r["processes"]), str(r["cores"]), "%.2f" % r["measured_s"], "%.2f" % r["predicted_s"], "%.3f" % r["ratio"]]
+                                   for r in rows])
+    return tables.table(FRAMES, [[r["frame"], f"{r['cores']:,}", f"{r['seconds']:,.4g}", f"{100 * r['efficiency']:.0f} %",
+                                  f"{100 * r['criterion']:.1f} %", f"{100 * r['rank0']:.1f} %", f"{r['bytes'] / 1e9:,.3g}"] for r in rows])
+
+
+def page(results, name):
+    """One of the tables, and who measured it."""
+    return "%s.\n\n%s" % (tables.told(results[name]["measured"]), table(results[name]["rows"]))
 
 
 def draw(rows, path):
-    script = ["set terminal pngcairo size 900,500", f"set output '{path}'", "set logscale x", "set xlabel 'cores'",
-              "set ylabel 'efficiency'", "set yrange [0:1.05]", "set key bottom left", "set grid"]
     frames = list(dict.fromkeys(r["frame"] for r in rows))
-    for i, f in enumerate(frames):
-        script += [f"$d{i} << EOD"] + [f"{r['cores']} {r['efficiency']}" for r in rows if r["frame"] == f] + ["EOD"]
-    script.append("plot " + ", ".join(f"$d{i} with linespoints lw 2 title '{f}'" for i, f in enumerate(frames)))
-    subprocess.run(["gnuplot"], input="\n".join(script), text=True, check=True)
+    blocks = "".join(plots.data(f"d{i}", [(r["cores"], r["efficiency"]) for r in rows if r["frame"] == f]) for i, f in enumerate(frames))
+    plots.plot(os.path.dirname(path), os.path.basename(path), (900, 500), blocks + "set logscale x\nset xlabel 'cores'\nset ylabel 'efficiency'\n"
+               "set yrange [0:1.05]\nset key bottom left\nset grid\nplot "
+               + ", ".join(f"$d{i} with linespoints lw 2 title '{f}'" for i, f in enumerate(frames)) + "\n")
 
 
-def main():
-    parser = argparse.ArgumentParser(add_help=False)
+def options(parser):
     parser.add_argument("recordings", nargs="*")
     parser.add_argument("--here")
     parser.add_argument("--size", default="800x600")
     parser.add_argument("--spp", type=int, default=256)
-    parser.add_argument("--program", default="build/bin/lull-render")
-    parser.add_argument("--measured", default=os.path.join(os.path.dirname(os.path.abspath(__file__)), "scale.json"))
+    parser.add_argument("--program", default=tool.RENDER)
+    parser.add_argument("--measured", default=os.path.join(tool.ROOT, "scripts", "scale.json"))
     parser.add_argument("--frames", default="1920x1080,3840x2160,15360x8640")
     parser.add_argument("--cores", default="1,2,4,8,16,64,256,1024,4096,10000")
     parser.add_argument("--threads", type=int, default=64)
     parser.add_argument("--work", type=float, default=1.0)
     parser.add_argument("--at-rank-0", action="store_true")
-    parser.add_argument("--png")
+    parser.add_argument("--png", type=tool.path)
     parser.add_argument("--json", action="store_true")
-    if "--help" in sys.argv:
-        print(__doc__)
-        return 0
-    arguments = parser.parse_args()
+    tool.writes(parser)
+
+
+def main(o):
+    measured = tool.load(o.measured)
+    if not o.here and not o.recordings:
+        raise Refused("a recording or --here SCENE is needed (see --help)")
     try:
-        measured = json.load(open(arguments.measured, encoding="utf-8"))
-        if not arguments.here and not arguments.recordings:
-            raise Bad("a recording or --here SCENE is needed (--help says more)")
-        rows = (compare_here(arguments, measured) if arguments.here
-                else predict(arguments, read_blocks(arguments.recordings), measured))
-    except (OSError, ValueError, KeyError, Bad) as why:
-        print(f"scale: {why}", file=sys.stderr)
-        return 2
-    if arguments.json:
+        rows = compare_here(o, measured) if o.here else predict(o, read_blocks(o.recordings), measured)
+    except (ValueError, KeyError) as why:
+        raise Refused(str(why)) from why
+    if o.json:
         json.dump(rows, sys.stdout, indent=1)
     else:
-        (show_here if arguments.here else show_table)(rows)
-    if arguments.png:
-        draw(rows, arguments.png)
-    return 0
-
-
-sys.exit(main())
+        print(table(rows), end="")
+    if o.png:
+        draw(rows, o.png)
+    if o.write:
+        name = "here" if o.here else "frames" if o.work == 1 else "work"
+        tool.store(o.write, "scale", {**tool.results(o.write, "scale"), name: {"measured": tool.measured(), "rows": rows}})

@@ -1,12 +1,9 @@
-"""Figures and pictures of docs/cost.md from what scripts/cost measured (docs/cost.json)."""
+"""Figures and pictures of docs/cost.md from what `lab cost` measured (docs/results/cost.json)."""
 import math
-import os
 import statistics
-import subprocess
 
-# Where a setting is what a user gets who says nothing else; of models that are named otherwise: their own.
-# Dials as they were by default when docs/cost.json was measured: change them before the next measurement (observer: 0.35).
-DEFAULTS = {"observer": ("visible", 0.25), "variance": ("threshold", 0.03), "halfbuf": ("threshold", 0.004)}
+from lablib.plots import data, plot
+
 DRAWN = ("uniform", "variance", "halfbuf", "observer", "lull-2.ggn", "paper.ggn", "svd-entropy", "attributes", "noise-mask")
 COLOURS = dict(zip(DRAWN, ("#999999", "#8c564b", "#e377c2", "#d62728", "#1f77b4", "#9467bd", "#2ca02c", "#bcbd22", "#ff7f0e")))
 BLOCK = 200 * 200
@@ -38,8 +35,8 @@ def points_of(out, name):
 
 
 def points_in(out, data):
-    """[(criterion, dial, value, {scene: figures})] with what the checks cost: check_s, total_s, overhead, total_ratio, and
-    to_limit, the time against that of stopping every block exactly at its threshold."""
+    """[(criterion, parameter, value, {scene: figures}, whether it is what a user gets who says nothing else)] with what the checks
+    cost: check_s, total_s, overhead, total_ratio, and to_limit, the time against that of stopping every block exactly at its threshold."""
     named = lambda scenes: {scene: dict(zip(data["keys"], f)) for scene, f in scenes.items()}
     limit = named(next(p for p in data["points"] if p["criterion"] == "limit")["scenes"])
     points = []
@@ -62,14 +59,18 @@ def points_in(out, data):
                 f["to_limit"] = f["samples"] / limit[scene]["samples"]
             f["limit"] = limit[scene]["time_ratio"] if f["sampling_s"] else limit[scene]["samples_ratio"]
             scenes[scene] = f
-        points.append((p["criterion"], p["dial"], p["value"], scenes))
+        points.append((p["criterion"], p["dial"], p["value"], scenes, is_own(out, p["criterion"], p["dial"], p["value"])))
     return points
 
 
+def is_own(out, criterion, dial, value):
+    """Of criteria whose defaults the renderer told: those; of models: their own."""
+    wanted = out["defaults"].get(criterion)
+    return [dial, value] == wanted if wanted else dial == "own"
+
+
 def is_default(point):
-    criterion, dial, value, _ = point
-    wanted = DEFAULTS.get(criterion)
-    return (dial, value) == wanted if wanted else dial == "own"
+    return point[4]
 
 
 def over_scenes(point, key, how=median):
@@ -79,16 +80,6 @@ def over_scenes(point, key, how=median):
 # --- pictures ---------------------------------------------------------------------------------------------------------------
 
 
-def plot(folder, name, size, script):
-    path = os.path.join(folder, name)
-    head = ("set encoding utf8\nset terminal pngcairo size %d,%d noenhanced font 'sans,11' background '#ffffff'\nset output '%s'\n"
-            "set border lc '#444444'\nset grid lc '#dddddd'\nset key noenhanced\nset datafile missing 'nan'\n" % (*size, path + ".tmp"))
-    done = subprocess.run(["gnuplot"], input=head + script, text=True, capture_output=True)
-    if done.returncode:
-        raise SystemExit("cost: %s: %s" % (name, done.stderr.strip()[-500:]))
-    os.replace(path + ".tmp", path)
-
-
 def curves(points, x, y, dials=("visible", "threshold", "spp"), how=median):
     """gnuplot data blocks and their plot clauses: a line for each criterion over its dial, its default as a filled point."""
     blocks, clauses = [], []
@@ -96,13 +87,12 @@ def curves(points, x, y, dials=("visible", "threshold", "spp"), how=median):
         mine = [p for p in points if p[0] == criterion and p[1] in dials and p[3]]
         if not mine:
             continue
-        name = "$d%d" % len(blocks)
-        rows = "\n".join("%g %g" % (over_scenes(p, x), over_scenes(p, y, how)) for p in mine)
-        blocks.append("%s << E\n%s\nE\n" % (name, rows))
-        clauses.append("%s using 1:2 with linespoints pt 6 ps 0.6 lw 2 lc '%s' title '%s'" % (name, COLOURS[criterion], criterion))
+        name = "d%d" % len(blocks)
+        blocks.append(data(name, [(over_scenes(p, x), over_scenes(p, y, how)) for p in mine]))
+        clauses.append("$%s using 1:2 with linespoints pt 6 ps 0.6 lw 2 lc '%s' title '%s'" % (name, COLOURS[criterion], criterion))
         for p in points:
             if p[0] == criterion and is_default(p):
-                blocks.append("$s%d << E\n%g %g\nE\n" % (len(blocks), over_scenes(p, x), over_scenes(p, y, how)))
+                blocks.append(data("s%d" % len(blocks), [(over_scenes(p, x), over_scenes(p, y, how))]))
                 clauses.append("$s%d using 1:2 with points pt 7 ps 1.6 lc '%s' notitle" % (len(blocks) - 1, COLOURS[criterion]))
     return "".join(blocks), clauses
 
@@ -127,7 +117,7 @@ def draw_frontiers(folder, points, name, x, title, panels):
 
 
 def draw_ratio(folder, points):
-    points = [(*p[:3], {scene: f for scene, f in p[3].items() if f["blocks"] > 1}) for p in points]  # alone, a block is its own uniform
+    points = [(*p[:3], {scene: f for scene, f in p[3].items() if f["blocks"] > 1}, p[4]) for p in points]  # alone, a block is its own uniform
     blocks, clauses = curves([p for p in points if p[0] != "uniform"], "worst", "total_ratio")
     limit = next(p for p in points if p[0] == "limit")
     script = ("%sset logscale xy\nset xlabel 'visible difference of the worst block (1: just visible)'\n"
@@ -157,8 +147,8 @@ def draw_paths(folder, points):
     share, total, defaults = "", "", [p for p in points if p[0] in DRAWN and is_default(p) and p[0] != "uniform"]
     for n, p in enumerate(defaults):
         spent, samples = median([f["check_s"] for f in p[3].values()]), over_scenes(p, "samples")
-        share += "$a%d << E\n%s\nE\n" % (n, "\n".join("%g %g" % (us, spent / (spent + samples * BLOCK * us * 1e-6)) for us in steps))
-        total += "$b%d << E\n%s\nE\n" % (n, "\n".join("%g %g" % (us, at_path_cost(p, us)) for us in steps))
+        share += data("a%d" % n, [(us, spent / (spent + samples * BLOCK * us * 1e-6)) for us in steps])
+        total += data("b%d" % n, [(us, at_path_cost(p, us)) for us in steps])
     lines = lambda letter: ", ".join("$%s%d using 1:2 with lines lw 2 lc '%s' title '%s'" % (letter, n, COLOURS[p[0]], p[0])
                                      for n, p in enumerate(defaults))
     limit = next(p for p in points if p[0] == "limit")
@@ -190,19 +180,19 @@ def draw_growth(folder, out, points):
     if not observer:
         return
     bound = over_scenes(next(p for p in points if p[0] == "limit"), "limit")
-    data = lambda rows: "\n".join("%d %g %g" % (g["side"]**2, g["criterion_s"], g["sampling_s"]) for g in rows)
-    script = ("$o << E\n%s\nE\n$n << E\n%s\nE\nset multiplot layout 1,2\nset logscale xy\nset xlabel 'pixels, in blocks of 200x200'\n"
+    block = lambda name, rows: data(name, [(g["side"]**2, g["criterion_s"], g["sampling_s"]) for g in rows])
+    script = ("%s%sset multiplot layout 1,2\nset logscale xy\nset xlabel 'pixels, in blocks of 200x200'\n"
               "set ylabel 'thread seconds'\nset key left\nset format x '10^{%%T}'\nset termoption enhanced\n"
               "plot $o using 1:3 with linespoints pt 6 lw 2 lc '#999999' title 'sampling, %d spp', "
               "$o using 1:($3*%g) with lines dt 2 lc '#000000' title 'what the limit leaves of it', "
               "$o using 1:2 with linespoints pt 7 lw 2 lc '#d62728' title 'checks of observer', "
               "$n using 1:2 with linespoints pt 7 lw 2 lc '#1f77b4' title 'checks of ggn (%d spp)'\nset format x '%%g'\n"
-              % (data(observer), data(network), observer[0]["spp"], bound, network[0]["spp"] if network else 0))
+              % (block("o", observer), block("n", network), observer[0]["spp"], bound, network[0]["spp"] if network else 0))
     clauses, blocks = [], ""
     for n, (name, title) in enumerate((("test", "test scenes"), ("people", "views that people judged"), ("validation", "validation views"))):
         found = [(side, median(r), min(r), max(r)) for side, r in limits_by_side(out, name).items() if r]
         if found:
-            blocks += "$l%d << E\n%s\nE\n" % (n, "\n".join("%g %g %g %g" % (float(s) * (0.97 + 0.03 * n), m, a, b) for s, m, a, b in found))
+            blocks += data("l%d" % n, [(float(s) * (0.97 + 0.03 * n), m, a, b) for s, m, a, b in found])
             clauses.append("$l%d using 1:2:3:4 with yerrorlines pt 7 lw 2 lc '%s' title '%s'"
                            % (n, ("#000000", "#d62728", "#1f77b4")[n], title))
     if clauses:

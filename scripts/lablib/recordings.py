@@ -1,12 +1,13 @@
-"""Recordings that scripts may label: copies of views whose blocks are links, so that nothing is written where the recordings lie."""
+"""Recordings that jobs may label: copies of views whose blocks are links, so that nothing is written where the recordings lie."""
 import json
 import os
 import shutil
 
+from lablib.tool import ggn, load
+
 
 def manifest_of(view):
-    with open(os.path.join(view, "manifest.json"), encoding="utf-8") as file:
-        return json.load(file)
+    return load(view, "manifest.json")
 
 
 def link_views(source, target, wanted=None, blocks=None):
@@ -30,8 +31,8 @@ def link_views(source, target, wanted=None, blocks=None):
     return copies
 
 
-def people_views(human, source, target, ggn, blocks=None):
-    """The same for views that people judged, labelled with their thresholds of `human`/human-thresholds.csv by `ggn(*arguments)`."""
+def people_views(human, source, target, blocks=None):
+    """The same for views that people judged, labelled with their thresholds of `human`/human-thresholds.csv."""
     views = link_views(source, target, blocks, blocks)
     for view in views:
         ggn("label", "--human", os.path.join(human, "human-thresholds.csv"), "--view", os.path.basename(view) + "_part6", view)

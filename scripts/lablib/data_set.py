@@ -1,32 +1,51 @@
-#!/usr/bin/env python3
 """Renders the block sequences that the models are trained, validated and tested on, as scripts/dataset.plan says.
 
-usage: make-dataset [--plan FILE] [--only SPLIT] [--threads N] [--launcher COMMAND] [--list] [DIR]     (default DIR: data)
+usage: scripts/lab data-set [--plan FILE] [--only SPLIT] [--threads N] [--launcher COMMAND] [--list | --csv | --histogram] [DIR]
 
+  DIR            where they are (default data)
   --plan FILE    instead of scripts/dataset.plan
   --only SPLIT   only train, validation, test or people
   --threads N    threads of the renderer (default: all processors)
   --launcher COMMAND   starts the renderer's processes, e.g. "mpirun -n 8 --hostfile HOSTS"
   --list         print what would be rendered, in order, with planned minutes, and exit
+  --csv          print what is there: what was rendered, its checksums, the thresholds. scripts/dataset.csv lists what was rendered
+                 of scripts/dataset.plan, ggn/models/*.data.csv what a model was trained on; the data themselves are not kept
+  --histogram    print how many blocks of each split have their threshold in which octave
 
 The splits advance evenly. Of each, the faster half of its views comes first, and a half in four rounds, each a quarter of
 every view: whenever it is stopped, what there is covers many scenes.
 Resumable: stop it whenever you like (the block in hand is lost, all before it are safe) and run it again; finished blocks
 are skipped. After each step it tells the time to go for the whole plan, measured from what was rendered in this run. Scenes
-that are not here (../shared) are left out. BUILD names another build folder than build.
+that are not here (../shared) are left out.
 
 A line of the plan, fields apart by blanks, # begins a comment:
   SPLIT SCENE[/VIEW] FILE MINUTES LEVELS REFERENCE-SPP BLOCKS [EX EY EZ AX AY AZ UX UY UZ FOV]
 MINUTES are those of two idle cores; the last ten numbers replace the file's camera (lull-render --look-at, --fov).
 Exit status: 0 all done, 2 bad plan or a scene that cannot be rendered, 130 interrupted."""
-import argparse, json, os, shlex, signal, subprocess, sys, time
+import csv
+import os
+import shlex
+import signal
+import subprocess
+import sys
+import time
+
+from lablib import tool
+from lablib.tool import Refused
 
 SIZE = "800x800"
 SPLITS = ("train", "validation", "test", "people")
+EDGES = [20 * 2 ** k for k in range(9)]  # spp; the last column of the histogram ends at the cap
 
 
-class BadPlan(Exception):
-    pass
+def options(parser):
+    for option in ("--only", "--threads", "--launcher"):
+        parser.add_argument(option)
+    parser.add_argument("--plan", default=os.path.join(tool.ROOT, "scripts", "dataset.plan"))
+    shown = parser.add_mutually_exclusive_group()
+    for option in ("--list", "--csv", "--histogram"):
+        shown.add_argument(option, action="store_true")
+    parser.add_argument("dir", nargs="?", type=tool.path, default=os.path.join(tool.ROOT, "data"))
 
 
 def parse_blocks(text):
@@ -41,21 +60,21 @@ def parse_blocks(text):
 
 def parse_entry(where, fields):
     if len(fields) not in (7, 17):
-        raise BadPlan(f"{where}: {len(fields)} fields (expected 7, or 17 with a camera)")
+        raise Refused(f"{where}: {len(fields)} fields (expected 7, or 17 with a camera)")
     entry = dict(zip("split name file minutes levels reference blocks".split(), fields), camera=fields[7:])
     if entry["split"] not in SPLITS:
-        raise BadPlan(f"{where}: split '{fields[0]}' (expected one of {', '.join(SPLITS)})")
+        raise Refused(f"{where}: split '{fields[0]}' (expected one of {', '.join(SPLITS)})")
     try:
         entry["ids"] = parse_blocks(entry["blocks"])
     except ValueError:
-        raise BadPlan(f"{where}: blocks '{fields[6]}' (expected a list like 0,3,8-11)")
+        raise Refused(f"{where}: blocks '{fields[6]}' (expected a list like 0,3,8-11)")
     for key, least in (("minutes", 0.001), ("reference", 0)):
         try:
             entry[key] = (float if key == "minutes" else int)(entry[key])
             if not least <= entry[key] < 1e9:
                 raise ValueError
         except ValueError:
-            raise BadPlan(f"{where}: {key} '{fields[3 if key == 'minutes' else 5]}' (expected a number)")
+            raise Refused(f"{where}: {key} '{fields[3 if key == 'minutes' else 5]}' (expected a number)")
     return entry
 
 
@@ -70,9 +89,9 @@ def read_plan(path):
             entry = parse_entry(where, fields)
             scene = entry["name"].split("/")[0]
             if split_of.setdefault(scene, entry["split"]) != entry["split"]:
-                raise BadPlan(f"{where}: scene '{scene}' is in {split_of[scene]} already (the split is by scene)")
+                raise Refused(f"{where}: scene '{scene}' is in {split_of[scene]} already (the split is by scene)")
             if entry["name"] in folders:
-                raise BadPlan(f"{where}: {entry['name']} is on line {folders[entry['name']]} already")
+                raise Refused(f"{where}: {entry['name']} is on line {folders[entry['name']]} already")
             folders[entry["name"]] = number
             entries.append(entry)
     return entries
@@ -116,16 +135,14 @@ def listed(ids):
 def missing(root, entry, ids):
     """Those of the blocks that the manifest does not list; lull-render itself checks that the others are whole."""
     try:
-        with open(os.path.join(folder_of(root, entry), "manifest.json"), encoding="utf-8") as f:
-            there = {b["id"] for b in json.load(f)["blocks"]}
-    except (OSError, ValueError, KeyError, TypeError):
+        there = {b["id"] for b in tool.load(folder_of(root, entry), "manifest.json")["blocks"]}
+    except (OSError, Refused, KeyError, TypeError):
         there = set()
     return [b for b in ids if b not in there]
 
 
 def command_of(root, entry, ids, threads, launcher):
-    program = os.path.join(os.environ.get("BUILD", "build"), "bin", "lull-render")
-    command = launcher + [program, "-q", entry["file"], "--size", SIZE, "--sampler", "independent", "--light-selection", "power", "--name", entry["name"],
+    command = launcher + [tool.RENDER, "-q", entry["file"], "--size", SIZE, "--sampler", "independent", "--light-selection", "power", "--name", entry["name"],
                "--levels", entry["levels"], "--reference-spp", str(entry["reference"]), "--blocks", listed(ids),
                "--sequence", folder_of(root, entry)]
     if entry["camera"]:
@@ -138,7 +155,7 @@ def hours(minutes):
 
 
 def say(text):
-    print("make-dataset: " + text, flush=True)
+    print("lab data-set: " + text, flush=True)
 
 
 def minutes_to_go(root, steps):
@@ -150,7 +167,7 @@ def render(root, steps, threads, launcher, interrupted):
     planned = wall = 0.0
     for index, (entry, ids, minutes) in enumerate(steps):
         before, start = minutes_to_go(root, [(entry, ids, minutes)]), time.monotonic()
-        status = subprocess.run(command_of(root, entry, ids, threads, launcher), stdin=subprocess.DEVNULL).returncode
+        status = subprocess.run(command_of(root, entry, ids, threads, launcher), stdin=subprocess.DEVNULL, cwd=tool.ROOT).returncode
         if status != 0 or interrupted:
             return status
         if before > 0:
@@ -163,28 +180,69 @@ def render(root, steps, threads, launcher, interrupted):
     return 0
 
 
-def main():
-    parser = argparse.ArgumentParser(add_help=False)
-    for option in ("--plan", "--only", "--threads", "--launcher"):
-        parser.add_argument(option)
-    parser.add_argument("--list", action="store_true")
-    parser.add_argument("--help", action="store_true")
-    parser.add_argument("dir", nargs="?", default="data")
-    parser.error = lambda text: sys.exit(fail(f"{text} (see --help)"))
-    o = parser.parse_args()
-    if o.help:
-        print(__doc__)
-        return 0
-    root = os.path.abspath(o.dir)
-    plan = os.path.abspath(o.plan) if o.plan else "scripts/dataset.plan"
-    os.chdir(os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
+def views(root):
+    for split in SPLITS[:3]:
+        folder = os.path.join(root, split)
+        for name in sorted(os.listdir(folder)) if os.path.isdir(folder) else ():
+            if os.path.exists(os.path.join(folder, name, "manifest.json")):
+                yield split, os.path.join(folder, name)
+
+
+def read(path):
+    """The manifest, labels by block, and who says so."""
+    manifest = tool.load(path, "manifest.json")
+    if not os.path.exists(os.path.join(path, "labels.json")):
+        return manifest, {}, "none"
+    data = tool.load(path, "labels.json")
+    return manifest, {b["id"]: b for b in data["blocks"]}, data["source"]
+
+
+def list_blocks(root):
+    out = csv.writer(sys.stdout, delimiter=";", lineterminator="\n")
+    out.writerow("split scene view scene_crc32 block levels last_spp reference_spp sequence_crc32 label threshold "
+                 "censored".split())
+    for split, path in views(root):
+        manifest, labels, source = read(path)
+        for b in sorted(manifest["blocks"], key=lambda b: b["id"]):
+            label = labels.get(b["id"])
+            out.writerow([split, manifest["scene"], manifest["camera"], manifest["source_crc32"], b["id"],
+                          len(manifest["levels"]), manifest["levels"][-1], manifest["reference_spp"], b["crc32"],
+                          source if label else "none", round(label["threshold"], 1) if label else "",
+                          int(label["censored"]) if label else ""])
+
+
+def octave(label):
+    """Index of the histogram's column."""
+    return len(EDGES) + 1 if label["censored"] else sum(label["threshold"] >= e for e in EDGES)
+
+
+def histogram(root):
+    columns = ["<20"] + [f"-{e}" for e in EDGES[1:]] + ["-10000", "beyond"]
+    counts = {s: [0] * len(columns) for s in SPLITS[:3]}
+    scenes = {s: set() for s in SPLITS[:3]}
+    for split, path in views(root):
+        manifest, labels, _ = read(path)
+        for b in manifest["blocks"]:
+            if b["id"] in labels:
+                counts[split][octave(labels[b["id"]])] += 1
+                scenes[split].add(manifest["scene"])
+    print(f"{'threshold, spp':<16}" + "".join(f"{c:>8}" for c in columns) + "  blocks scenes")
+    for s in SPLITS[:3]:
+        print(f"{s:<16}" + "".join(f"{n:8}" for n in counts[s]) + f"{sum(counts[s]):8}{len(scenes[s]):7}")
+
+
+def main(o):
+    if o.csv or o.histogram:
+        if not os.path.isdir(o.dir):
+            raise Refused(f"{o.dir} is not a folder")
+        return (histogram if o.histogram else list_blocks)(o.dir)
     if o.only and o.only not in SPLITS:
-        return fail(f"--only {o.only}: expected one of {', '.join(SPLITS)}")
+        raise Refused(f"--only {o.only}: expected one of {', '.join(SPLITS)}")
     try:
-        entries = [e for e in read_plan(plan) if o.only in (None, e["split"])]
-    except (OSError, UnicodeDecodeError, BadPlan) as e:
-        return fail(f"cannot read {plan}: {e}" if not isinstance(e, BadPlan) else str(e))
-    here = [e for e in entries if os.access(e["file"], os.R_OK)]
+        entries = [e for e in read_plan(o.plan) if o.only in (None, e["split"])]
+    except (OSError, UnicodeDecodeError) as e:
+        raise Refused(f"cannot read {o.plan}: {e}") from e
+    here = [e for e in entries if os.access(os.path.join(tool.ROOT, e["file"]), os.R_OK)]
     for e in entries:
         if e not in here:
             say(f"{e['file']} is not here, {e['name']} is left out")
@@ -192,24 +250,16 @@ def main():
     if o.list:
         signal.signal(signal.SIGPIPE, signal.SIG_DFL)
         for e, ids, minutes in steps:
-            left = len(missing(root, e, ids))
+            left = len(missing(o.dir, e, ids))
             print(f"{e['split']:<10} {minutes:6.2f} min {left:2d} of {len(ids)} blocks missing  {e['name']} {listed(ids)}")
-        print(f"to go: {hours(minutes_to_go(root, steps))} of two idle cores")
+        print(f"to go: {hours(minutes_to_go(o.dir, steps))} of two idle cores")
         return 0
     for split in {e["split"] for e in here}:
-        os.makedirs(os.path.join(root, split), exist_ok=True)
+        os.makedirs(os.path.join(o.dir, split), exist_ok=True)
     interrupted = []
     signal.signal(signal.SIGINT, lambda *_: interrupted.append(1))  # a terminal sends it to the renderer, too
-    status = render(root, steps, o.threads, shlex.split(o.launcher or ""), interrupted)
+    status = render(o.dir, steps, o.threads, shlex.split(o.launcher or ""), interrupted)
     if interrupted or status == 130:
         say("interrupted; run it again to go on")
         return 130
     return 0 if status == 0 else 2
-
-
-def fail(text):
-    print("make-dataset: " + text, file=sys.stderr)
-    return 2
-
-
-sys.exit(main())

@@ -1,26 +1,11 @@
-#!/usr/bin/python3
-"""Compares `ggn` with PyTorch on the same networks.
+"""The published networks in PyTorch, their golden values and times."""
+import math
+import time
 
-usage: bench-ggn [--check] [--json] [--isa avx2] [--model FILE] [--rounds N] [--threads N]
-  (default)  interleaved timings of denoiser, generator, discriminator, one decision and training, as ratios ours / PyTorch
-  --json     {"isa": [ours, PyTorch's], "times": a list of [name, ours in ms, PyTorch in ms or null]}
-  --isa      holds both sides to AVX2, whatever the processor has
-  --model    networks of the widths of this model, as told by the card beside it, instead of the published ones
-  --check    golden values and one published training iteration in double precision against PyTorch, for several seeds
-Skips with a message when Debian's python3-torch is not installed. BUILD names the build folder (default build).
-"""
-import argparse, json, math, os, re, statistics, subprocess, sys, time
-
-try:
-    import numpy as np, torch
-    from torch import nn
-    import torch.nn.functional as F
-except ImportError as e:
-    print(f"bench-ggn: PyTorch is not installed ({e}); nothing compared")
-    sys.exit(0)
-
-ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-GGN = os.path.join(ROOT, os.environ.get("BUILD", "build"), "bin", "ggn")
+import numpy as np
+import torch
+import torch.nn.functional as F
+from torch import nn
 
 
 def lrelu():
@@ -150,7 +135,7 @@ def l2(params):
     return math.sqrt(sum(float((p.grad**2).sum()) for p in params if p.grad is not None))
 
 
-def torch_golden(br, bm, bd):
+def golden(br, bm, bd):
     r, m, d = R().double(), M().double(), D(dropout=False).double()
     for net, base in ((r, br), (m, bm), (d, bd)):
         hash_weights(net, base)
@@ -206,36 +191,7 @@ def torch_golden(br, bm, bd):
     return out
 
 
-def flatten(j, path=""):
-    if isinstance(j, dict):
-        for k, v in j.items():
-            yield from flatten(v, f"{path}.{k}" if path else k)
-    elif isinstance(j, list):
-        for k, v in enumerate(j):
-            yield from flatten(v, f"{path}[{k}]")
-    else:
-        yield path, j
-
-
-def check():
-    worst = {}
-    for seeds in ((100, 300, 500), (1, 2, 3)):
-        want = dict(flatten(torch_golden(*seeds)))
-        for flag, tolerance in ((None, 1e-6), ("--float", None)):
-            cmd = [GGN, "golden", "--train-step"] + [f"--base-{n}={s}" for n, s in zip("rmd", seeds)] + ([flag] if flag else [])
-            got = dict(flatten(json.loads(subprocess.run(cmd, check=True, capture_output=True).stdout)))
-            for key, v in want.items():
-                error = abs(got[key] - v) / max(abs(v), 1e-3)
-                kind = flag or "double"
-                if tolerance and error > tolerance:
-                    print(f"{kind} seeds {seeds}: {key} = {got[key]}, PyTorch {v} (relative {error:.2g})")
-                worst[kind] = max(worst.get(kind, 0), error)
-    for kind, error in worst.items():
-        print(f"{kind}: largest relative difference to PyTorch {error:.3g}")
-    return 0 if worst["double"] <= 1e-6 else 1
-
-
-def torch_times(threads, widths):
+def times(threads, widths):
     torch.set_num_threads(threads)
     torch.manual_seed(1)
     r, m, d = (net(*k) for net, k in zip((R, M, D), widths))
@@ -269,51 +225,3 @@ def torch_times(threads, widths):
     out["generator_train_ms"] = timed(train_m) / 4
     out["train_sample_ms"] = 6 * out["denoiser_train_ms"] + 2 * out["generator_train_ms"] + 3 * out["discriminator_forward_ms"]
     return out
-
-
-def bench(rounds, threads, model, as_json):
-    widths = [(), (), ()]
-    if model:
-        with open(model + ".card.json") as f:
-            card = json.load(f)
-        widths = [(card[k],) for k in ("k_r", "k_m", "k_d")]
-    torch_times(threads, widths)
-    ours, theirs = [], []
-    for _ in range(rounds):
-        theirs.append(torch_times(threads, widths))
-        cmd = [GGN, "bench", "--json", f"--threads={threads}", "--rounds=3", *(["--model=" + model] if model else [])]
-        ours.append(json.loads(subprocess.run(cmd, check=True, capture_output=True).stdout))
-    isa = [ours[0]["isa"], re.search(r"CPU capability usage: (\S+)", torch.__config__.show())[1].lower()]
-    if as_json:
-        times = [[key, *(statistics.median(t[key] for t in ts) for ts in (ours, theirs))] for key in theirs[0]]
-        alone = [[key, statistics.median(t[key] for t in ours), None] for key in ("blocks_16_ms", "blocks_16_alone_ms")]
-        print(json.dumps({"isa": isa, "times": times + alone}))
-        return 0
-    print(f"instruction sets: ggn {isa[0]}, PyTorch {isa[1]}")
-    print(f"{'':26}{'ggn ms':>10}{'PyTorch ms':>12}{'ratio':>8}")
-    for key in theirs[0]:
-        a, b = (statistics.median(t[key] for t in ts) for ts in (ours, theirs))
-        print(f"{key:26}{a:10.2f}{b:12.2f}{a / b:8.2f}")
-
-
-# What the libraries of both sides look at when they are loaded.
-HELD = {"avx2": {"GGN_ISA": "avx2", "ATEN_CPU_CAPABILITY": "avx2", "ONEDNN_MAX_CPU_ISA": "AVX2", "OPENBLAS_CORETYPE": "Haswell"}}
-
-
-def main():
-    p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    p.add_argument("--check", action="store_true")
-    p.add_argument("--json", action="store_true")
-    p.add_argument("--isa", choices=list(HELD))
-    p.add_argument("--model")
-    p.add_argument("--rounds", type=int, default=5)
-    p.add_argument("--threads", type=int, default=2)
-    a = p.parse_args()
-    held = HELD.get(a.isa, {})
-    if any(os.environ.get(name) != value for name, value in held.items()):
-        os.execve(sys.executable, [sys.executable, *sys.argv], {**os.environ, **held})
-    return check() if a.check else bench(a.rounds, a.threads, a.model, a.json)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,0 +1,110 @@
+"""Trains the variants of a plan and says what each is worth on the validation scenes.
+
+usage: scripts/lab ablation [--data DIR] [--out DIR] [--table] [--write [DIR]] [PLAN]     (default: scripts/ablate.plan, data, build/ablate)
+
+  --table        train nothing: the table of what is there already
+  --write [DIR]  keep the table in DIR/results/ablation.json and fill the pages (default docs)
+
+A line of the plan is `NAME  OPTIONS of ggn train`; `common` holds those that all share, `#` begins a comment. Every run is a
+`ggn train --resume` at nice 10 on one thread: interrupted, the same command goes on with it. What was trained with other options or
+another seed is refused, not mixed in. Figures are of the validation scenes at the threshold that ggn train chooses there: good for
+comparing variants, not for claims. Times are processor time of one thread."""
+import json
+import os
+import resource
+import subprocess
+
+from lablib import tables, tool
+from lablib.tool import GGN, Refused, ggn
+
+HEAD = ("variant", "options", "AUC", "median \\|log2\\|", "early", "samples", "best step", "ms per decision", "ms per training window",
+        "minutes trained", "KB as f16")
+
+
+def options(parser):
+    parser.add_argument("plan", nargs="?", default=os.path.join(tool.ROOT, "scripts", "ablate.plan"))
+    parser.add_argument("--data", type=tool.path, default=os.path.join(tool.ROOT, "data"))
+    parser.add_argument("--out", type=tool.path, default=os.path.join(tool.BUILD, "ablate"))
+    parser.add_argument("--table", action="store_true")
+    tool.writes(parser)
+
+
+def read_plan(path):
+    common, lines = [], []
+    with open(path, encoding="utf-8") as f:
+        for line in f:
+            words = line.split("#")[0].split()
+            if words and words[0] == "common":
+                common = words[1:]
+            elif words:
+                lines.append((words[0], words[1:]))
+    return common, lines
+
+
+def spent(path, more=0.0):
+    """Processor seconds of all runs of a variant."""
+    before = tool.load(path) if os.path.exists(path) else 0.0
+    if more:
+        tool.save(round(before + more, 1), path)
+    return before + more
+
+
+def train(options, data, model):
+    note, text = model + ".options", " ".join(options + ["--data", data]) + "\n"
+    if os.path.exists(note):
+        with open(note, encoding="utf-8") as f:
+            if f.read() != text:
+                raise Refused("%s: trained with other options; remove it or give it another name" % model)
+    with open(note, "w", encoding="utf-8") as f:
+        f.write(text)
+    if os.path.exists(model):
+        return True
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    ok = subprocess.run(["nice", "-n", "10", GGN, "train", "--data", data, "--out", model, "--resume", "--threads", "1"] +
+                        options).returncode == 0
+    spent(model + ".cpu", resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before)
+    return ok
+
+
+def row(name, options, model):
+    card, half = tool.load(model + ".card.json"), model + ".f16"
+    ms = json.loads(ggn("bench", "--model", model, "--threads", 1, "--rounds", 9, "--batch", 4, "--json"))
+    window = json.loads(ggn("inspect", "--json", model))["window"]
+    ggn("convert", model, half)
+    size = os.path.getsize(half)
+    os.remove(half)
+    v = card["validation"]
+    return {"name": name, "options": " ".join(options), **{k: v[k] for k in ("auc", "median_abs_log2", "early_stop_rate", "samples_ratio")},
+            "best_step": card["training"]["best_step"], "decision_ms": ms["decision_ms"],
+            "step_ms": ms["train_sample_ms"] - window * ms["denoiser_train_ms"], "minutes": spent(model + ".cpu") / 60, "kb": size // 1000}
+
+
+def table(rows, auc="%.4f", early="%.1f %%", times="%.1f"):
+    keys = (("auc", auc), ("median_abs_log2", "%.2f"), ("early_stop_rate", early), ("samples_ratio", "%.2f"), ("best_step", "%d"),
+            ("decision_ms", times), ("step_ms", times), ("minutes", "%.1f"), ("kb", "%d"))
+    shown = lambda r, key: 100 * r[key] if key == "early_stop_rate" else r.get(key)
+    return tables.table(HEAD, [[r["name"], r["options"], *[tables.figure(shown(r, key), form) for key, form in keys]] for r in rows])
+
+
+def page(results):
+    return "%s; all with `%s`.\n\n%s" % (tables.told(results["measured"]), results["common"], table(results["rows"], "%.3f", "%.0f %%", "%.0f"))
+
+
+def main(o):
+    if not os.path.isfile(o.plan):
+        raise Refused("%s: no such plan" % o.plan)
+    common, lines = read_plan(o.plan)
+    os.makedirs(o.out, exist_ok=True)
+    rows, failed = [], []
+    for name, options in lines:
+        model = os.path.join(o.out, name + ".ggn")
+        if not o.table and not train(common + options, o.data, model):
+            failed.append(name)
+        elif os.path.exists(model):
+            rows.append(row(name, options, model))
+    print("all with `%s`\n" % " ".join(common))
+    print(table(rows), end="")
+    if o.write:
+        tool.store(o.write, "ablation", {"measured": tool.measured(), "common": " ".join(common), "rows": rows})
+    if failed:
+        raise Refused("not trained: " + ", ".join(failed))

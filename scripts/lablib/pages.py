@@ -1,0 +1,88 @@
+"""Fills the pages of docs/ from the figures in docs/results/.
+
+usage: scripts/lab pages [--check] [--docs DIR]
+
+  --check     write nothing; say, one line each, what is not what the templates make of the figures, and which figures of the tables
+              stand in README.md by hand
+  --docs DIR  pages and figures (default docs)
+
+scripts/lablib/templates/NAME.md makes the whole page NAME.md, where that or results/NAME.json is. In every other page, what stands between `<!-- lab: EXPRESSION -->` and
+`<!-- lab: end -->` is the value of the expression (`bench.page()`: the text that the job bench makes of its figures)."""
+import glob
+import os
+import re
+import sys
+
+from lablib import agreement, ablation, bench, cost_page, quote_accuracy, references, scale, tool
+
+TEMPLATES = os.path.join(tool.ROOT, "scripts", "lablib", "templates")
+OTHERS = ("ggn/README.md", "ggn/observer/README.md")  # pages outside docs/ that show figures
+PLACE = re.compile(r"(<!-- lab: (?!end -->)(.*?) -->\n).*?(<!-- lab: end -->)", re.S)
+
+
+def options(parser):
+    parser.add_argument("--check", action="store_true")
+    parser.add_argument("--docs", type=tool.path, default=tool.DOCS)
+
+
+class Job:
+    """What templates see of a job: its figures as `results`, and its functions of them."""
+
+    def __init__(self, module, results):
+        self.module, self.results = module, results
+
+    def __getattr__(self, name):
+        return lambda *more, **named: getattr(self.module, name)(self.results, *more, **named)
+
+
+def made(docs):
+    """[(path of a page, its text as the templates make it)]"""
+    try:
+        import jinja2
+    except ImportError:
+        raise tool.Refused("jinja2 is missing: apt-get install python3-jinja2") from None
+    env = jinja2.Environment(loader=jinja2.FileSystemLoader(TEMPLATES), trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
+                             undefined=jinja2.StrictUndefined)
+    jobs = {name: Job(module, tool.results(docs, name)) for name, module in (
+        ("agreement", agreement), ("ablation", ablation), ("bench", bench), ("cost", cost_page), ("quote", quote_accuracy),
+        ("references", references), ("scale", scale))}
+    value = lambda found: found[1] + env.compile_expression(found[2], undefined_to_none=False)(**jobs) + found[3]
+    pages = []
+    for name in sorted(glob.glob(os.path.join(docs, "*.md"))) + [os.path.join(docs, "..", other) for other in OTHERS]:
+        if os.path.exists(name):
+            with open(name, encoding="utf-8") as file:
+                text = file.read()
+            pages.append((name, PLACE.sub(value, text)))
+    whole = {name: env.get_template(name) for name in sorted(os.listdir(TEMPLATES))}
+    return pages + [(os.path.join(docs, name), template.render(jobs)) for name, template in whole.items()
+                    if any(os.path.exists(os.path.join(docs, *there)) for there in ((name,), ("results", name[:-3] + ".json")))]
+
+
+def fill(docs):
+    for name, text in made(docs):
+        with open(name + ".tmp", "w", encoding="utf-8") as file:
+            file.write(text)
+        os.replace(name + ".tmp", name)
+
+
+def by_hand(docs):
+    """Figures of the tables of results.md that README.md tells too; defaults of options are no such figures."""
+    decimals = lambda text: re.findall(r"(?<![\w.`-])\d+\.\d\d+(?![\w.])", text)
+    with open(os.path.join(docs, "results.md"), encoding="utf-8") as file:
+        figures = {x for line in file if line.startswith("| ") for x in decimals(line)}
+    with open(os.path.join(docs, "..", "README.md"), encoding="utf-8") as file:
+        text = re.sub(r"```.*?```|`[^`]*`", "", file.read(), flags=re.S)
+    return sorted(figures & set(decimals(text)))
+
+
+def main(o):
+    if not o.check:
+        return fill(o.docs)
+    wrong = []
+    for name, text in made(o.docs):
+        with open(name, encoding="utf-8") as file:
+            if file.read() != text:
+                wrong.append("%s is not what its template makes of the figures: scripts/lab pages" % os.path.relpath(name, tool.ROOT))
+    wrong += ["README.md tells %s, a figure of docs/results.md" % x for x in by_hand(o.docs)]
+    print("".join("lab pages: %s\n" % line for line in wrong), end="", file=sys.stderr)
+    return 1 if wrong else 0
