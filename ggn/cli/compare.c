@@ -37,12 +37,7 @@ static int write_outputs(const struct options *o, const struct ggn_pairing *p, c
     struct base_file_out out;
     if (mkdir(o->dir, 0777) != 0 && errno != EEXIST)
         return base_fail(err, BASE_EIO, "%s: %s", o->dir, strerror(errno));
-    const char *names[2];
-    for (int i = 0; i < 2; i++) {
-        const char *slash = strrchr(o->paths[i], '/');
-        names[i] = slash ? slash + 1 : o->paths[i];
-    }
-    int rc = ggn_compare_pictures(o->dir, p, names[0], names[1], err);
+    int rc = ggn_compare_pictures(o->dir, p, base_file_name(o->paths[0]), base_file_name(o->paths[1]), err);
     snprintf(path, sizeof path, "%s/summary.json", o->dir);
     if (!rc)
         rc = base_file_begin(&out, path, err);

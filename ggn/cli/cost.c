@@ -6,6 +6,7 @@
 
 #include <cjson/cJSON.h>
 
+#include "base/files.h"
 #include "base/json.h"
 #include "base/options.h"
 #include "baselines/learned.h"
@@ -23,32 +24,6 @@ struct options {
     double ratio, cadence;
 };
 
-static int add_file(const char **list, int *n, const char *path, struct base_err *err)
-{
-    if (*n == MAX_FILES)
-        return base_fail(err, BASE_EINVAL, "more than %d files", MAX_FILES);
-    list[(*n)++] = path;
-    return 0;
-}
-
-static int add_model(void *into, const char *path, struct base_err *err)
-{
-    struct options *o = into;
-    return add_file(o->models, &o->n_models, path, err);
-}
-
-static int add_thresholds(void *into, const char *path, struct base_err *err)
-{
-    struct options *o = into;
-    return add_file(o->thresholds, &o->n_thresholds, path, err);
-}
-
-static int add_baseline(void *into, const char *path, struct base_err *err)
-{
-    struct options *o = into;
-    return add_file(o->baselines, &o->n_baselines, path, err);
-}
-
 static const char *const precisions[] = {"f32", "bf16", "f64", NULL}; /* enum ggn_precision */
 static const char *const split_words[] = {"train", "validation", "test", "people", "none", NULL};
 
@@ -56,9 +31,11 @@ static const char *const split_words[] = {"train", "validation", "test", "people
 static const struct base_option list[] = {
     {"data", 'd', "DATA", TO(data), .input = BASE_FOLDER, .needed = 1, .help = "labelled data set (needed)"},
     {"split", 0, NULL, TO(split), .words = split_words, .help = "which of its views (test)"},
-    {"model", 'm', "FILE", .set = add_model, .input = BASE_FILE, .help = "trained network (.ggn); may be repeated"},
-    {"baseline", 0, "FILE", .set = add_baseline, .input = BASE_FILE, .help = "what ggn baseline wrote; may be repeated"},
-    {"thresholds", 0, "CSV", .set = add_thresholds, .input = BASE_FILE,
+    {"model", 'm', "FILE", BASE_TO_LIST(struct options, models, n_models, "files"), .input = BASE_FILE,
+     .help = "trained network (.ggn); may be repeated"},
+    {"baseline", 0, "FILE", BASE_TO_LIST(struct options, baselines, n_baselines, "files"), .input = BASE_FILE,
+     .help = "what ggn baseline wrote; may be repeated"},
+    {"thresholds", 0, "CSV", BASE_TO_LIST(struct options, thresholds, n_thresholds, "files"), .input = BASE_FILE,
      .help = "stop where this file says (published thresholds); may be repeated"},
     {"observer", 'O', "FILE", TO(observer), .input = BASE_FILE,
      .help = "the observer's parameters, each view without itself"},
@@ -406,9 +383,8 @@ static int cost_models(struct job *j, struct base_threads *threads, struct base_
         struct ggn_model *model = NULL;
         struct ggn_policy policy;
         struct ggn_method m;
-        const char *slash = strrchr(j->o->models[i], '/');
         char name[GGN_METHOD_NAME];
-        snprintf(name, sizeof name, "%.32s%s%s%s", slash ? slash + 1 : j->o->models[i], j->o->precision ? " " : "",
+        snprintf(name, sizeof name, "%.32s%s%s%s", base_file_name(j->o->models[i]), j->o->precision ? " " : "",
                  j->o->precision ? precisions[j->o->precision] : "", j->o->no_pictures ? ", no halves" : "");
         rc = ggn_model_load(j->o->models[i], &model, err);
         if (!rc)
@@ -477,18 +453,6 @@ static int cost_thresholds(struct job *j, struct base_err *err)
     return rc;
 }
 
-static int write_all(struct job *j, cJSON *root, struct base_err *err)
-{
-    if (j->o->out)
-        return base_json_write(j->o->out, root, j->failed, err);
-    char *text = j->failed ? NULL : cJSON_Print(root);
-    if (!text)
-        return base_fail_nomem(err, "cost");
-    puts(text);
-    cJSON_free(text);
-    return 0;
-}
-
 /* Whether a model takes the noise picture, and the longest window. */
 static int look_at_models(const struct options *o, int *pictures, int *window, struct base_err *err)
 {
@@ -534,7 +498,7 @@ static int cost(struct job *j, struct base_threads *threads, struct base_err *er
     if (!rc && !j->o->scores)
         rc = cost_thresholds(j, err);
     if (!rc)
-        rc = write_all(j, root, err);
+        rc = base_json_write(j->o->out, root, j->failed, err);
     cJSON_Delete(root);
     free(j->checks);
     free(j->stop);

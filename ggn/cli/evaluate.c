@@ -33,33 +33,6 @@ struct options {
     } adjusted[MAX_ADJUSTED]; /* of the models' policies */
 };
 
-static int add_model(void *into, const char *path, struct base_err *err)
-{
-    struct options *o = into;
-    if (o->n_models == MAX_MODELS)
-        return base_fail(err, BASE_EINVAL, "more than %d models", MAX_MODELS);
-    o->models[o->n_models++] = path;
-    return 0;
-}
-
-static int add_thresholds(void *into, const char *path, struct base_err *err)
-{
-    struct options *o = into;
-    if (o->n_thresholds == MAX_FILES)
-        return base_fail(err, BASE_EINVAL, "more than %d files of thresholds", MAX_FILES);
-    o->thresholds[o->n_thresholds++] = path;
-    return 0;
-}
-
-static int add_trained(void *into, const char *path, struct base_err *err)
-{
-    struct options *o = into;
-    if (o->n_trained == MAX_FILES)
-        return base_fail(err, BASE_EINVAL, "more than %d baselines", MAX_FILES);
-    o->trained[o->n_trained++] = path;
-    return 0;
-}
-
 static int add_adjusted(void *into, const char *arg, struct base_err *err)
 {
     struct options *o = into;
@@ -84,16 +57,17 @@ static const struct base_option list[] = {
     {.help = "What is measured:"},
     {"data", 'd', "DATA", TO(data), .input = BASE_FOLDER, .needed = 1,
      .help = "labelled data set: a folder of sequences with split.json (needed)"},
-    {"model", 'm', "FILE", .set = add_model, .input = BASE_FILE, .help = "trained model (.ggn); may be repeated"},
+    {"model", 'm', "FILE", BASE_TO_LIST(struct options, models, n_models, "models"), .input = BASE_FILE,
+     .help = "trained model (.ggn); may be repeated"},
     {"observer", 'O', "FILE", TO(observer), .input = BASE_FILE,
      .help = "the observer's parameters, each view without itself (ggn label --calibrate); needed where there are people's "
              "views"},
     {"visible", 0, "SHARE", TO(visible), 1e-4, 0.9999,
      .help = "share of viewers that may still see noise, for observer (0.35) and models (their own)"},
-    {"baseline", 0, "FILE", .set = add_trained, .input = BASE_FILE,
+    {"baseline", 0, "FILE", BASE_TO_LIST(struct options, trained, n_trained, "baselines"), .input = BASE_FILE,
      .help = "a published baseline as ggn baseline trained it; may be repeated"},
-    {"thresholds", 0, "CSV", .set = add_thresholds, .input = BASE_FILE,
-     .help = "a published model's thresholds of people's views; may be repeated"},
+    {"thresholds", 0, "CSV", BASE_TO_LIST(struct options, thresholds, n_thresholds, "files of thresholds"),
+     .input = BASE_FILE, .help = "a published model's thresholds of people's views; may be repeated"},
     {"param", 'p', "KEY=NUMBER", .set = add_adjusted,
      .help = "judge as the criterion does with this parameter: visible, passes, gate, tail, gini, first-spp"},
     {.help = "What comes out:"},
@@ -222,10 +196,10 @@ static int add_models(struct job *j, struct base_threads *threads, struct base_e
 {
     int rc = 0, precisions = j->o->bf16 ? 2 : 1;
     for (int i = 0; i < precisions * j->o->n_models && !rc; i++) {
-        const char *path = j->o->models[i / precisions], *slash = strrchr(path, '/');
+        const char *path = j->o->models[i / precisions];
         enum ggn_precision precision = i % precisions ? GGN_PRECISION_BF16 : GGN_PRECISION_F32;
         char name[GGN_METHOD_NAME];
-        snprintf(name, sizeof name, "%.40s%s", slash ? slash + 1 : path, precision == GGN_PRECISION_BF16 ? " bf16" : "");
+        snprintf(name, sizeof name, "%.40s%s", base_file_name(path), precision == GGN_PRECISION_BF16 ? " bf16" : "");
         struct ggn_policy policy;
         rc = policy_of(j->o, j->models[i / precisions], &policy, err);
         if (!rc)
@@ -329,17 +303,11 @@ static int pictures(const struct job *j, enum ggn_split split, struct base_err *
     return !rc ? ggn_eval_feature_picture(path, &j->set, j->models[0], split, err) : rc;
 }
 
-static int write_json(const struct options *o, const char *text, struct base_err *err)
-{
-    char path[4096];
-    int rc = base_file_join(path, o->out, "figures.json", err);
-    return !rc ? base_file_write_line(path, text, err) : rc;
-}
-
 static int report(struct job *j, int skipped, struct base_err *err)
 {
     struct ggn_method_metrics metrics[MAX_METHODS];
     cJSON *root = cJSON_CreateObject();
+    char path[4096];
     int failed = 0;
     base_json_text(root, "data", j->o->data, &failed);
     base_json_text(root, "labels", ggn_dataset_label_source(&j->set.chains.data), &failed);
@@ -367,15 +335,11 @@ static int report(struct job *j, int skipped, struct base_err *err)
         if (j->o->out)
             rc = pictures(j, (enum ggn_split)split, err);
     }
-    char *text = !rc && !failed ? cJSON_Print(root) : NULL;
-    cJSON_Delete(root);
-    if (!rc && !text)
-        rc = base_fail_nomem(err, "report");
     if (!rc && j->o->json)
-        puts(text);
-    if (!rc && j->o->out)
-        rc = write_json(j->o, text, err);
-    cJSON_free(text);
+        rc = base_json_write(NULL, root, failed, err);
+    if (!rc && j->o->out && !(rc = base_file_join(path, j->o->out, "figures.json", err)))
+        rc = base_json_write(path, root, failed, err);
+    cJSON_Delete(root);
     return rc;
 }
 

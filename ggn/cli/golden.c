@@ -117,13 +117,7 @@ int ggn_cmd_golden(int argc, char **argv)
 
     int failed = 0;
     cJSON *json = to_json(&golden, o.train_step, o.bf16, &failed);
-    char *text = failed ? NULL : cJSON_Print(json);
+    rc = base_json_write(NULL, json, failed, &err);
     cJSON_Delete(json);
-    if (!text) {
-        base_fail_nomem(&err, "JSON");
-        return ggn_cmd_fail(argv[0], &err);
-    }
-    puts(text);
-    cJSON_free(text);
-    return GGN_EXIT_OK;
+    return rc ? ggn_cmd_fail(argv[0], &err) : GGN_EXIT_OK;
 }

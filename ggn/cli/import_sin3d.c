@@ -41,8 +41,7 @@ static int import_one(const struct options *o, const struct ggn_sin3d_options *s
     snprintf(copy, sizeof copy, "%s", dir);
     for (size_t n = strlen(copy); n > 1 && copy[n - 1] == '/';)
         copy[--n] = '\0';
-    const char *slash = strrchr(copy, '/');
-    int rc = base_file_join(out, o->out, slash ? slash + 1 : copy, err);
+    int rc = base_file_join(out, o->out, base_file_name(copy), err);
     if (!rc && base_file_is_same(out, copy))
         rc = base_fail(err, BASE_EINVAL, "%s: this is the view itself; --output names another folder", out);
     if (!rc)

@@ -9,6 +9,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/files.h"
 #include "data/image.h"
 #include "data/labels.h"
 #include "sequence/builder.h"
@@ -306,13 +307,12 @@ static int attach_thresholds(const struct view *v, const char *out, const struct
                              const struct ggn_thresholds *t, int *labelled, struct base_err *err)
 {
     char with_part[GGN_VIEW_NAME + 8];
-    const char *slash = strrchr(v->dir, '/');
     snprintf(with_part, sizeof with_part, "%s_part6", v->prefix);
     const struct ggn_view *row = !t ? NULL : ggn_thresholds_find(t, with_part);
     if (t && !row)
         row = ggn_thresholds_find(t, v->prefix);
     if (t && !row)
-        row = ggn_thresholds_find(t, slash ? slash + 1 : v->dir);
+        row = ggn_thresholds_find(t, base_file_name(v->dir));
     *labelled = row != NULL;
     if (!row)
         return 0;

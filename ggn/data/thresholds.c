@@ -180,12 +180,11 @@ static int read_exr(const char *path, int block, struct ggn_thresholds *out, str
     if (rc)
         return rc;
     long columns = (image.width + block - 1) / block, rows = (image.height + block - 1) / block;
-    const char *slash = strrchr(path, '/');
     if (columns * rows > GGN_VIEW_BLOCKS) {
         rc = base_fail(err, BASE_EINVAL, "%s: %ld blocks of %d pixels", path, columns * rows, block);
         goto out;
     }
-    struct ggn_view *v = add_view(&t, slash ? slash + 1 : path, (int)(columns * rows));
+    struct ggn_view *v = add_view(&t, base_file_name(path), (int)(columns * rows));
     if (!v) {
         rc = base_fail_nomem(err, path);
         goto out;

@@ -76,9 +76,9 @@ static void write_or_keep(const struct pt_session *s, writer *write, const char 
     if (!path || write(path, s->render, info, &why) == 0)
         return;
     *err = why;
-    const char *folder = getenv("TMPDIR"), *slash = strrchr(path, '/');
+    const char *folder = getenv("TMPDIR");
     int n = snprintf(kept, sizeof kept, "%s/lull-%ld-%s", folder && folder[0] != '\0' ? folder : "/tmp", (long)getpid(),
-                     slash ? slash + 1 : path);
+                     base_file_name(path));
     if (n < (int)sizeof kept && write(kept, s->render, info, &again) == 0)
         base_fail(err, why.code, "%.320s; kept as %.160s", why.text, kept);
 }

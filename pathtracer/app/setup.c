@@ -97,8 +97,7 @@ static int check_outputs(struct pt_session *s, struct base_err *err)
     struct pt_cli *cli = &s->cli;
     int rc = 0;
     if (!cli->quote && !cli->output && !cli->preview && !cli->report && cli->stop_map_count == 0) {
-        const char *slash = strrchr(cli->scene, '/'), *name = slash ? slash + 1 : cli->scene;
-        const char *dot = strrchr(name, '.');
+        const char *name = base_file_name(cli->scene), *dot = strrchr(name, '.');
         int n = dot ? (int)(dot - name) : (int)strlen(name);
         if (n > (int)sizeof s->default_output - 8)
             return base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", cli->scene);

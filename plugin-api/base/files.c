@@ -86,7 +86,7 @@ static int too_long(const char *path, struct base_err *err)
     return base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", path);
 }
 
-static const char *base_name(const char *path)
+const char *base_file_name(const char *path)
 {
     const char *slash = strrchr(path, '/');
     return slash ? slash + 1 : path;
@@ -104,7 +104,7 @@ static int follow(const char *path, char *target, struct base_err *err)
         if (n < 0)
             return 0;
         link[n] = '\0';
-        int folder = link[0] == '/' ? 0 : (int)(base_name(target) - target);
+        int folder = link[0] == '/' ? 0 : (int)(base_file_name(target) - target);
         if (snprintf(whole, sizeof whole, "%.*s%s", folder, target, link) >= PATH_ROOM)
             return too_long(path, err);
         strcpy(target, whole);
@@ -114,7 +114,7 @@ static int follow(const char *path, char *target, struct base_err *err)
 
 static void folder_of(const char *path, char *folder)
 {
-    size_t n = (size_t)(base_name(path) - path);
+    size_t n = (size_t)(base_file_name(path) - path);
     memcpy(folder, path, n);
     strcpy(folder + n, n > 0 ? "" : "./");
 }
@@ -157,7 +157,7 @@ static int check_output(const char *path, char *target, struct base_err *err)
     int rc = follow(path, target, err);
     if (rc)
         return rc;
-    if (base_name(target)[0] == '\0')
+    if (base_file_name(target)[0] == '\0')
         return base_fail(err, BASE_EINVAL, "%s: not the name of a file", path);
     folder_of(target, folder);
     if (access(folder, W_OK | X_OK) != 0)
@@ -202,7 +202,7 @@ int base_file_is_same(const char *a, const char *b)
     if (follow(a, target_a, NULL) != 0 || follow(b, target_b, NULL) != 0)
         return 0;
     int has_a = stat(target_a, &at_a) == 0, has_b = stat(target_b, &at_b) == 0;
-    if (!has_a && !has_b && strcmp(base_name(target_a), base_name(target_b)) == 0) { /* then by their folders */
+    if (!has_a && !has_b && strcmp(base_file_name(target_a), base_file_name(target_b)) == 0) { /* then by their folders */
         folder_of(target_a, folder);
         has_a = stat(folder, &at_a) == 0;
         folder_of(target_b, folder);
@@ -230,7 +230,7 @@ int base_file_is_inside(const char *path, const char *folder)
 /* The n-th name for a temporary beside `target`. A long name is cut at the front: the temporary's fits where it does. */
 static int name_tmp(const char *target, int n, char *tmp_path, size_t room, struct base_err *err)
 {
-    const char *base = base_name(target);
+    const char *base = base_file_name(target);
     size_t length = strlen(base);
     int used = snprintf(tmp_path, room, "%.*s%s%ld-%d.%s", (int)(base - target), target, TMP_PREFIX, (long)getpid(), n,
                         length > NAME_KEPT ? base + length - NAME_KEPT : base);

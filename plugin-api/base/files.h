@@ -23,6 +23,8 @@ int base_file_check_input(const char *path, struct base_err *err);
  * and anything but regular files are refused (BASE_EINVAL). */
 int base_file_read(const char *path, size_t max_size, char **data, size_t *size, struct base_err *err);
 
+/* What stands behind the last '/' of a path; borrows. */
+const char *base_file_name(const char *path);
 /* DIR/NAME; path has room for 4096 bytes. */
 int base_file_join(char *path, const char *dir, const char *name, struct base_err *err);
 

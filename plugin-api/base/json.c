@@ -39,15 +39,10 @@ void base_json_item(cJSON *to, const char *key, cJSON *item, int *failed) { add(
 
 int base_json_write(const char *path, const cJSON *root, int failed, struct base_err *err)
 {
-    struct base_file_out out;
     char *text = failed ? NULL : cJSON_Print(root);
-    if (!text)
-        return base_fail_nomem(err, path);
-    int rc = base_file_begin(&out, path, err);
-    if (!rc) {
-        fprintf(out.file, "%s\n", text);
-        rc = base_file_commit(&out, err);
-    }
+    int rc = !text ? base_fail_nomem(err, path ? path : "JSON") : path ? base_file_write_line(path, text, err) : 0;
+    if (!rc && !path)
+        puts(text);
     cJSON_free(text);
     return rc;
 }

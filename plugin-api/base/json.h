@@ -21,7 +21,7 @@ cJSON *base_json_array(cJSON *to, const char *key, int *failed);
 /* Puts item, which may be NULL (an earlier failure), into `to`, which owns it from here on. */
 void base_json_item(cJSON *to, const char *key, cJSON *item, int *failed);
 
-/* Writes root as text, atomically, unless failed. root stays the caller's. */
+/* Writes root as text, unless failed: atomically, or (path NULL) to standard output. root stays the caller's. */
 int base_json_write(const char *path, const cJSON *root, int failed, struct base_err *err);
 
 #endif

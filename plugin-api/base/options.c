@@ -97,6 +97,12 @@ static int store(const struct base_option *o, void *into, const char *value)
     void *at = (char *)into + o->to.offset;
     if (o->to.type == BASE_STORE_REAL)
         return base_parse_real(value, o->min, o->max, at);
+    if (o->to.type == BASE_STORE_TEXTS) {
+        int *n = (int *)(void *)((char *)into + o->to.count), full = *n == o->to.room;
+        if (!full)
+            ((const char **)at)[(*n)++] = value;
+        return !full;
+    }
     if (o->to.type != BASE_STORE_TEXT)
         return store_integer(o, at, value);
     if (o->words && !has_ending(o, value))
@@ -113,6 +119,8 @@ static int bad_value(const struct base_option *o, const char *value, struct base
         return base_fail(err, BASE_EINVAL, "--%s %s: expected %s%s", o->name, value,
                          o->to.type == BASE_STORE_TEXT ? "a name that ends in " : "", words);
     }
+    if (o->to.type == BASE_STORE_TEXTS)
+        return base_fail(err, BASE_EINVAL, "--%s %s: more than %d %s", o->name, value, o->to.room, o->to.things);
     if (o->to.type == BASE_STORE_REAL)
         return base_fail(err, BASE_EINVAL, "--%s %s: expected a number from %g to %g", o->name, value, o->min, o->max);
     return base_fail(err, BASE_EINVAL, "--%s %s: expected an integer from %.0f to %.0f", o->name, value, o->min, o->max);
@@ -318,7 +326,7 @@ static int parse(const struct base_options *options, int argc, char **argv, void
                  struct base_err *err)
 {
     struct getopt_form form;
-    const char *slash = strrchr(argv[0], '/'), *program = slash ? slash + 1 : argv[0];
+    const char *program = base_file_name(argv[0]);
     to_getopt(options->list, &form);
     optind = 0;
     opterr = 0;

@@ -20,17 +20,33 @@
 #include "base/err.h"
 #include "base/files.h"
 
-enum base_store_type { BASE_STORE_NONE, BASE_STORE_INT, BASE_STORE_U32, BASE_STORE_U64, BASE_STORE_REAL, BASE_STORE_TEXT };
+enum base_store_type {
+    BASE_STORE_NONE,
+    BASE_STORE_INT,
+    BASE_STORE_U32,
+    BASE_STORE_U64,
+    BASE_STORE_REAL,
+    BASE_STORE_TEXT,
+    BASE_STORE_TEXTS
+};
 
 struct base_store {
     enum base_store_type type;
     size_t offset; /* in the struct that base_options_parse fills */
+    /* of BASE_STORE_TEXTS: offset of the int that counts them, room, and what so many are called */
+    size_t count;
+    int room;
+    const char *things;
 };
 
 /* clang-format off */
 #define BASE_TO(struct_type, member)                                                                                        \
     {_Generic(((struct_type *)0)->member, int: BASE_STORE_INT, uint32_t: BASE_STORE_U32, uint64_t: BASE_STORE_U64,          \
-              double: BASE_STORE_REAL, const char *: BASE_STORE_TEXT), offsetof(struct_type, member)}
+              double: BASE_STORE_REAL, const char *: BASE_STORE_TEXT), offsetof(struct_type, member), 0, 0, NULL}
+/* For an option that may be repeated: a const char *member[…] and the int that counts how many are there. */
+#define BASE_TO_LIST(struct_type, member, number, things)                                                                   \
+    {BASE_STORE_TEXTS, offsetof(struct_type, member), offsetof(struct_type, number),                                        \
+     (int)(sizeof ((struct_type *)0)->member / sizeof(const char *)), things}
 /* clang-format on */
 
 enum base_path { BASE_NO_PATH, BASE_FILE, BASE_FOLDER };

@@ -2,6 +2,8 @@
 
 #include <string.h>
 
+#include "base/files.h"
+
 int base_utf8_length(const char *s)
 {
     const unsigned char *u = (const unsigned char *)s;
@@ -31,7 +33,7 @@ void base_utf8_mend(char *s)
 
 void base_view_name(const char *path, char *name, size_t room)
 {
-    const char *slash = strrchr(path, '/'), *at = slash ? slash + 1 : path, *dot = strrchr(at, '.');
+    const char *at = base_file_name(path), *dot = strrchr(at, '.');
     const char *end = dot && dot != at ? dot : at + strlen(at);
     char *out = name, *limit = name + room - 1;
     while (at < end) {
