@@ -8,6 +8,7 @@
 #include "base/clock.h"
 #include "base/options.h"
 #include "cli/commands.h"
+#include "figures/stats.h"
 #include "model/judge.h"
 #include "model/stopper.h"
 #include "model/trainer.h"
@@ -225,18 +226,6 @@ static double sgemm_gflops(const struct bench *b, float *memory)
     return 2e-9 * SGEMM_N * SGEMM_N * SGEMM_N / elapsed;
 }
 
-static int compare(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-static double median(double *value, int n)
-{
-    qsort(value, (size_t)n, sizeof *value, compare);
-    return n % 2 ? value[n / 2] : (value[n / 2 - 1] + value[n / 2]) / 2;
-}
-
 static int measure(struct bench *b, double figure[N_FIGURES], struct base_err *err)
 {
     double sample[N_FIGURES][MAX_ROUNDS];
@@ -262,7 +251,8 @@ static int measure(struct bench *b, double figure[N_FIGURES], struct base_err *e
         sample[TRAIN_SAMPLE][k] = b->trainer->hyper.window * sample[DENOISER_TRAIN][k] + judge_train_ms(b, err);
     }
     for (int f = 0; f < N_FIGURES; f++)
-        figure[f] = median(sample[f], f >= DENOISER_TRAIN && f <= TRAIN_SAMPLE ? (b->o.rounds + 2) / 3 : b->o.rounds);
+        figure[f] = ggn_stats_quantile(
+            sample[f], (size_t)(f >= DENOISER_TRAIN && f <= TRAIN_SAMPLE ? (b->o.rounds + 2) / 3 : b->o.rounds), 0.5);
     free(gemm);
     return err->code;
 }

@@ -65,14 +65,8 @@ static int scene_of(const struct ggn_dataset *data, int view)
 {
     int n = 0;
 
-    for (int i = 0; i < view; i++) {
-        int first = 1;
-        for (int k = 0; k < i && first; k++)
-            first = strcmp(data->views[k].manifest.scene, data->views[i].manifest.scene) != 0;
-        if (!strcmp(data->views[i].manifest.scene, data->views[view].manifest.scene))
-            return n;
-        n += first;
-    }
+    for (int i = 0, first = ggn_dataset_first(data, view); i < first; i++)
+        n += ggn_dataset_first(data, i) == i;
     return n;
 }
 

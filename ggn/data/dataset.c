@@ -147,12 +147,18 @@ int ggn_dataset_open(const char *path, struct ggn_dataset *data, struct base_err
         return rc;
     }
     qsort(d.views, (size_t)d.n, sizeof *d.views, compare_views);
-    for (int i = 0; i < d.n; i++) {
-        const char *slash = strrchr(d.views[i].dir, '/');
-        d.views[i].name = slash ? slash + 1 : d.views[i].dir;
-    }
+    for (int i = 0; i < d.n; i++)
+        d.views[i].name = base_file_name(d.views[i].dir);
     *data = d;
     return 0;
+}
+
+int ggn_dataset_first(const struct ggn_dataset *data, int view)
+{
+    int i = 0;
+    while (strcmp(data->views[i].manifest.scene, data->views[view].manifest.scene) != 0)
+        i++;
+    return i;
 }
 
 uint32_t ggn_dataset_tiles(const struct ggn_dataset_view *view)

@@ -33,6 +33,8 @@ struct ggn_dataset {
 int ggn_dataset_open(const char *path, struct ggn_dataset *data, struct base_err *err);
 void ggn_dataset_release(struct ggn_dataset *data);
 
+/* The first view of this view's scene: the same index for all views of a scene. */
+int ggn_dataset_first(const struct ggn_dataset *data, int view);
 /* How many blocks the view has when it is whole: thresholds for it are as many. */
 uint32_t ggn_dataset_tiles(const struct ggn_dataset_view *view);
 

@@ -122,12 +122,10 @@ static int read_source(const struct ggn_chains *set, const struct ggn_chain *c, 
 {
     const struct ggn_dataset_view *v = &set->data.views[c->view];
     struct seq_block b = {0};
-    uint32_t index = 0;
+    const uint32_t index = seq_manifest_find(&v->manifest, c->block);
     int rc = 0;
 
     *usable = 0;
-    while (index < v->manifest.n_blocks && v->manifest.blocks[index].id != c->block)
-        index++;
     if (index == v->manifest.n_blocks || !v->manifest.reference_independent)
         return 0;
     rc = seq_manifest_read_block(v->dir, &v->manifest, index, &b, err);

@@ -152,12 +152,6 @@ void ggn_method_run(struct ggn_method *m, const struct ggn_eval_set *s)
         m->stop[b] = stop_of(m, s, &s->blocks[b], m->cut, m->guard_limit);
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* Early stops and samples of one cut on a split. */
 static void cost_of(const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, double cut, double limit,
                     double *early, double *samples)
@@ -192,7 +186,7 @@ int ggn_method_tune(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn
         free(scores);
         return base_fail(err, BASE_EINVAL, "%s: nothing to tune on in the split '%s'", m->name, ggn_split_names[split]);
     }
-    qsort(scores, n, sizeof *scores, compare_doubles);
+    ggn_stats_sort(scores, n);
     static const double limits[] = {0.0, 1e-4, 1e-3, 1e-2, INFINITY};
     double best_early = INFINITY, best_samples = INFINITY;
     for (int k = 0; k <= TRIES; k++)
@@ -283,9 +277,7 @@ static int threshold_figures(const struct ggn_method *m, const struct ggn_eval_s
     }
     out->early_stop_rate = early / out->blocks;
     out->samples_ratio = spent / needed;
-    int rc = 0;
-    if (n > 0)
-        rc = ggn_stats_agreement(t, t + s->n_blocks, n, INFINITY, &out->agreement, err);
+    int rc = ggn_stats_agreement(t, t + s->n_blocks, n, INFINITY, &out->agreement, err);
     free(t);
     return rc;
 }
@@ -355,21 +347,6 @@ int ggn_method_measure(const struct ggn_method *m, const struct ggn_eval_set *s,
                                    .uniform_spp = nan,
                                    .time_vs_uniform = nan,
                                    .samples_vs_uniform = nan};
-    r.agreement = (struct ggn_agreement){.pearson_r = nan,
-                                         .pearson_r_below_cap = nan,
-                                         .spearman = nan,
-                                         .spearman_below_cap = nan,
-                                         .mae = nan,
-                                         .mae_below_cap = nan,
-                                         .rmse = nan,
-                                         .share_below = nan,
-                                         .early_stop_rate = nan,
-                                         .samples_ratio = nan,
-                                         .median_abs_log2 = nan,
-                                         .median_log2 = nan,
-                                         .iqr_log2 = nan,
-                                         .within_half = nan,
-                                         .within_one = nan};
     r.blocks = ggn_eval_count(s, split);
     if (r.blocks == 0)
         return base_fail(err, BASE_EINVAL, "no labelled block in the split '%s'", ggn_split_names[split]);

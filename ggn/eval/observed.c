@@ -3,8 +3,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/files.h"
 #include "data/thresholds.h"
 #include "eval/method.h"
+#include "observer/curve.h"
 #include "observer/observer.h"
 
 static const double FIRST_SPP = 16.0; /* the criterion's default */
@@ -20,8 +22,7 @@ static double error_at(const struct ggn_observer *o, const struct ggn_eval_set *
     size_t pixels = (size_t)s->chains.width * (size_t)s->chains.height;
     double one = ggn_observer_error(o, seen[i], pixels);
     double other = ggn_observer_error(o, seen[k], pixels);
-    double t = spp <= s->spp[i] ? 0.0 : spp >= s->spp[k] ? 1.0 : log(spp / s->spp[i]) / log(s->spp[k] / s->spp[i]);
-    return one > 0.0 && other > 0.0 ? one * pow(other / one, t) : one + t * (other - one);
+    return ggn_curve_between(s->spp[i], one, s->spp[k], other, spp);
 }
 
 /* Where the criterion stops, which asks at sample counts of its own. */
@@ -72,11 +73,10 @@ int ggn_method_observer(struct ggn_method *m, const struct ggn_eval_set *s, cons
 int ggn_method_thresholds(struct ggn_method *m, const struct ggn_eval_set *s, const char *path, enum ggn_split split,
                           int *available, struct base_err *err)
 {
-    const char *slash = strrchr(path, '/');
     struct ggn_thresholds t = {0};
     int rc = ggn_thresholds_read(path, 200, &t, err);
     if (!rc)
-        rc = ggn_method_init(m, s, slash ? slash + 1 : path, 0, err);
+        rc = ggn_method_init(m, s, base_file_name(path), 0, err);
     *available = 1;
     for (int b = 0; b < s->n_blocks && !rc; b++) {
         const struct ggn_eval_block *block = &s->blocks[b];

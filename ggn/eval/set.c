@@ -21,22 +21,6 @@ void ggn_eval_set_release(struct ggn_eval_set *s)
     *s = (struct ggn_eval_set){0};
 }
 
-static int scene_index(const struct ggn_dataset *d, int view)
-{
-    for (int i = 0; i < view; i++)
-        if (strcmp(d->views[i].manifest.scene, d->views[view].manifest.scene) == 0)
-            return i;
-    return view;
-}
-
-static uint32_t manifest_index(const struct seq_manifest *m, uint32_t id)
-{
-    uint32_t i = 0;
-    while (i < m->n_blocks && m->blocks[i].id != id)
-        i++;
-    return i;
-}
-
 /* Lists the labelled blocks and counts the cases. */
 static int list_blocks(struct ggn_eval_set *s, int *skipped, struct base_err *err)
 {
@@ -59,8 +43,8 @@ static int list_blocks(struct ggn_eval_set *s, int *skipped, struct base_err *er
         size_t cases = (size_t)(c->n_levels - s->window + 1);
         struct ggn_eval_block b = {.chain = i,
                                    .view = c->view,
-                                   .scene = scene_index(d, c->view),
-                                   .index = manifest_index(&view->manifest, c->block),
+                                   .scene = ggn_dataset_first(d, c->view),
+                                   .index = seq_manifest_find(&view->manifest, c->block),
                                    .split = view->split,
                                    .label = c->label,
                                    .cap = c->spp[c->n_levels - 1],

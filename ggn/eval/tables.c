@@ -311,8 +311,7 @@ static int make_maps(struct ggn_thresholds *t, const struct ggn_eval_set *s, enu
     if (!t->views)
         return base_fail_nomem(err, "maps");
     for (int v = 0; v < s->chains.data.n; v++) {
-        const struct seq_manifest *m = &s->chains.data.views[v].manifest;
-        uint32_t blocks = (m->width + m->block - 1) / m->block * ((m->height + m->block - 1) / m->block);
+        uint32_t blocks = ggn_dataset_tiles(&s->chains.data.views[v]);
         int used = 0;
         for (int b = 0; b < s->n_blocks; b++)
             used |= s->blocks[b].view == v && s->blocks[b].split == split;

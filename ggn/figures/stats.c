@@ -18,11 +18,13 @@ static int compare_doubles(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
+void ggn_stats_sort(double *x, size_t n) { qsort(x, n, sizeof *x, compare_doubles); }
+
 double ggn_stats_quantile(double *x, size_t n, double q)
 {
     if (n == 0)
         return (double)NAN;
-    qsort(x, n, sizeof *x, compare_doubles);
+    ggn_stats_sort(x, n);
     double at = q * (double)(n - 1);
     size_t i = (size_t)at;
     if (i + 1 >= n)
@@ -176,9 +178,7 @@ int ggn_stats_agreement(const double *truth, const double *predicted, size_t n, 
                         struct base_err *err)
 {
     struct ggn_agreement a = {.blocks = n};
-    if (n == 0)
-        return base_fail(err, BASE_EINVAL, "no blocks to compare");
-    double *t = malloc(2 * n * sizeof *t);
+    double *t = malloc((n > 0 ? 2 * n : 1) * sizeof *t);
     if (!t)
         return base_fail_nomem(err, "statistics");
     double *p = t + n, sum_t = 0.0, sum_p = 0.0, absolute = 0.0, square = 0.0, absolute_below = 0.0;

@@ -9,6 +9,7 @@
 #include "base/err.h"
 
 double ggn_stats_mean(const double *x, size_t n);
+void ggn_stats_sort(double *x, size_t n); /* rising */
 /* Quantile q in [0,1] of x, linear between order statistics. Sorts x. */
 double ggn_stats_quantile(double *x, size_t n, double q);
 double ggn_stats_pearson(const double *x, const double *y, size_t n);
@@ -36,7 +37,8 @@ struct ggn_agreement {
     double within_half, within_one;                /* share with |log2| <= 1/2, 1 */
 };
 
-/* truth, predicted: [n], all > 0. Thresholds at the cap are censored: they enter the `_below_cap` figures not at all. */
+/* truth, predicted: [n], all > 0; n 0: every figure is NaN. Thresholds at the cap are censored: they enter the `_below_cap`
+ * figures not at all. */
 int ggn_stats_agreement(const double *truth, const double *predicted, size_t n, double cap, struct ggn_agreement *out,
                         struct base_err *err);
 

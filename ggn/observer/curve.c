@@ -347,6 +347,12 @@ double ggn_curve_threshold(const struct ggn_curve *c, double limit, int *censore
     return log_cross(c->spp[last], c->visible[last], c->spp[last + 1], c->visible[last + 1], limit);
 }
 
+double ggn_curve_between(double x0, double y0, double x1, double y1, double x)
+{
+    double t = x <= x0 ? 0.0 : x >= x1 ? 1.0 : log(x / x0) / log(x1 / x0);
+    return y0 > 0.0 && y1 > 0.0 ? y0 * pow(y1 / y0, t) : y0 + t * (y1 - y0);
+}
+
 double ggn_curve_at(const struct ggn_curve *c, double spp)
 {
     int i = 0;
@@ -356,6 +362,5 @@ double ggn_curve_at(const struct ggn_curve *c, double spp)
         return c->visible[c->n - 1];
     while (c->spp[i + 1] < spp)
         i++;
-    double t = log(spp / c->spp[i]) / log(c->spp[i + 1] / c->spp[i]), a = c->visible[i], b = c->visible[i + 1];
-    return a > 0.0 && b > 0.0 ? a * pow(b / a, t) : a + t * (b - a);
+    return ggn_curve_between(c->spp[i], c->visible[i], c->spp[i + 1], c->visible[i + 1], spp);
 }

@@ -53,10 +53,7 @@ static cJSON *describe_data(const struct ggn_session *s, int *failed)
     for (int split = 0; split < GGN_SPLIT_NONE; split++) {
         cJSON *list = base_json_array(o, ggn_split_names[split], failed);
         for (int i = 0; i < s->set.data.n; i++) {
-            int first = s->set.data.views[i].split == (enum ggn_split)split;
-            for (int k = 0; k < i && first; k++)
-                first = strcmp(s->set.data.views[k].manifest.scene, s->set.data.views[i].manifest.scene) != 0;
-            if (first)
+            if (s->set.data.views[i].split == (enum ggn_split)split && ggn_dataset_first(&s->set.data, i) == i)
                 base_json_text(list, NULL, s->set.data.views[i].manifest.scene, failed);
         }
     }

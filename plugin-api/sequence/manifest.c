@@ -313,6 +313,14 @@ const char *seq_manifest_difference(const struct seq_manifest *a, const struct s
 
 /* --- blocks --- */
 
+uint32_t seq_manifest_find(const struct seq_manifest *m, uint32_t id)
+{
+    uint32_t i = 0;
+    while (i < m->n_blocks && m->blocks[i].id != id)
+        i++;
+    return i;
+}
+
 int seq_manifest_read_block(const char *dir, const struct seq_manifest *m, uint32_t index, struct seq_block *block,
                             struct base_err *err)
 {

@@ -49,6 +49,8 @@ void seq_manifest_release(struct seq_manifest *m);
  * decides. */
 const char *seq_manifest_difference(const struct seq_manifest *a, const struct seq_manifest *b);
 
+/* Index of the block with this id; n_blocks: it is not listed. */
+uint32_t seq_manifest_find(const struct seq_manifest *m, uint32_t id);
 /* Reads a block that the manifest lists and holds it against the manifest: size, CRC, rectangle, no level missing. */
 int seq_manifest_read_block(const char *dir, const struct seq_manifest *m, uint32_t index, struct seq_block *block,
                             struct base_err *err);
