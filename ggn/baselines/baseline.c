@@ -286,45 +286,45 @@ static int tiles(const struct ggn_baseline *b, int width, int height)
     return ggn_tile_count(width, b->width) * ggn_tile_count(height, b->height);
 }
 
-size_t ggn_baseline_look_size(const struct ggn_baseline *b, int width, int height)
+size_t ggn_baseline_feature_count(const struct ggn_baseline *b, int width, int height)
 {
     return (size_t)tiles(b, width, height) * (size_t)b->features;
 }
 
-static void look_at_tile(struct ggn_baseline_reader *r, const uint8_t *rgb, double *look)
+static void extract_tile(struct ggn_baseline_reader *r, const uint8_t *rgb, double *features)
 {
     const struct ggn_baseline *b = r->b;
     const size_t pixels = (size_t)b->width * (size_t)b->height;
     double *l = r->lightness;
 
     ggn_lightness(rgb, pixels, l);
-    int rc = b->kind == GGN_SVD_ENTROPY      ? ggn_svd_entropy(l, b->width, b->height, b->first, GGN_SUB_BLOCK, look, NULL)
-             : b->kind == GGN_ATTRIBUTES_SVM ? ggn_attributes(l, b->width, b->height, l + pixels, look, NULL)
-                                             : ggn_noise_mask(l, b->width, b->height, l + pixels, look, NULL);
+    int rc = b->kind == GGN_SVD_ENTROPY ? ggn_svd_entropy(l, b->width, b->height, b->first, GGN_SUB_BLOCK, features, NULL)
+             : b->kind == GGN_ATTRIBUTES_SVM ? ggn_attributes(l, b->width, b->height, l + pixels, features, NULL)
+                                             : ggn_noise_mask(l, b->width, b->height, l + pixels, features, NULL);
     for (int i = 0; i < b->features && rc; i++)
-        look[i] = (double)NAN;
+        features[i] = (double)NAN;
 }
 
-void ggn_baseline_look(struct ggn_baseline_reader *r, const uint8_t *rgb, int width, int height, double *look)
+void ggn_baseline_extract(struct ggn_baseline_reader *r, const uint8_t *rgb, int width, int height, double *features)
 {
     const struct ggn_baseline *b = r->b;
     const size_t row = (size_t)b->width, values = 3 * row * (size_t)b->height;
     const int across = ggn_tile_count(width, b->width), n = tiles(b, width, height);
 
     if (width == b->width && height == b->height) {
-        look_at_tile(r, rgb, look);
+        extract_tile(r, rgb, features);
         return;
     }
-    for (int i = 0; i < n; i++, look += b->features) {
+    for (int i = 0; i < n; i++, features += b->features) {
         ggn_tile_load_u8(rgb, width, height, ggn_tile_start(width, b->width, i % across),
                          ggn_tile_start(height, b->height, i / across), b->width, b->height, 1, r->tile, row, values / 3);
         for (size_t k = 0; k < values; k++)
             r->codes[k] = (uint8_t)r->tile[k];
-        look_at_tile(r, r->codes, look);
+        extract_tile(r, r->codes, features);
     }
 }
 
-double ggn_baseline_logit(struct ggn_baseline_reader *r, const double *const *looks, int width, int height)
+double ggn_baseline_logit(struct ggn_baseline_reader *r, const double *const *features, int width, int height)
 {
     const struct ggn_baseline *b = r->b;
     const double *steps[GGN_WINDOW_MAX];
@@ -332,7 +332,7 @@ double ggn_baseline_logit(struct ggn_baseline_reader *r, const double *const *lo
 
     for (int i = 0; i < tiles(b, width, height); i++) {
         for (int k = 0; k < b->window; k++)
-            steps[k] = looks[k] + (size_t)i * (size_t)b->features;
+            steps[k] = features[k] + (size_t)i * (size_t)b->features;
         double logit = b->kind == GGN_SVD_ENTROPY ? ggn_lstm_logit(r->lstm, steps) : ggn_svm_score(&b->svm, steps[0]);
         most = isnan(logit) || isnan(most) ? (double)NAN : fmax(most, logit);
     }

@@ -1,10 +1,10 @@
 /*
- * A published model before the network, trained: what it looks at, its weights, and how its answer stops a block. Evaluation
- * (baselines/learned.h) and the criteria of the same names (plugin/baseline.c) both judge through this.
+ * A published model before the network, trained: its features of an image, its weights, and how its answer stops a block.
+ * Evaluation (baselines/learned.h) and the criteria of the same names (plugin/baseline.c) both use it.
  *
- * A block is seen as numbers per image ("look"): of its own pixels where it has the size the baseline was trained on, else
- * of tiles of that size (model/window.h), of which the noisiest speaks for the block. The SVMs judge the newest image alone,
- * the LSTM a window. Stored as a .ggn file (model/container.h) of "kind": "baseline".
+ * The features of an image are numbers: of the block's own pixels where it has the size the baseline was trained on, else of
+ * tiles of that size (model/window.h), of which the noisiest counts. The SVMs use the newest image alone, the LSTM a window.
+ * Stored as a .ggn file (model/container.h) of "kind": "baseline".
  *
  * A baseline is read-only once made: any number of threads and readers. A reader is one worker's scratch; after create it
  * allocates nothing.
@@ -51,17 +51,17 @@ int ggn_baseline_load(struct ggn_baseline *b, const char *path, enum ggn_baselin
 int ggn_baseline_load_memory(struct ggn_baseline *b, const char *name, const void *data, size_t size,
                              enum ggn_baseline_kind kind, struct base_err *err);
 
-/* Numbers in the look at one image of width x height: tiles times features. */
-size_t ggn_baseline_look_size(const struct ggn_baseline *b, int width, int height);
+/* Features of one image of width x height: tiles times b->features. */
+size_t ggn_baseline_feature_count(const struct ggn_baseline *b, int width, int height);
 
 struct ggn_baseline_reader;
-/* NULL on failure. Borrows the baseline. An untrained one's reader can look, not judge. */
+/* NULL on failure. Borrows the baseline. An untrained one's reader extracts features only. */
 struct ggn_baseline_reader *ggn_baseline_reader_create(const struct ggn_baseline *b, struct base_err *err);
 void ggn_baseline_reader_destroy(struct ggn_baseline_reader *reader);
-/* rgb: [3][height][width] display codes. look: [ggn_baseline_look_size]; NaN where there are no features to be had. */
-void ggn_baseline_look(struct ggn_baseline_reader *reader, const uint8_t *rgb, int width, int height, double *look);
-/* looks: of b->window images of width x height, noisiest first. Logit of "still noisy", before the policy's calibration; NaN
- * if a look has one. */
-double ggn_baseline_logit(struct ggn_baseline_reader *reader, const double *const *looks, int width, int height);
+/* rgb: [3][height][width] display codes. features: [ggn_baseline_feature_count]; NaN where there are none. */
+void ggn_baseline_extract(struct ggn_baseline_reader *reader, const uint8_t *rgb, int width, int height, double *features);
+/* features: of b->window images of width x height, noisiest first. Logit of "still noisy", before the policy's
+ * calibration; NaN if a feature is NaN. */
+double ggn_baseline_logit(struct ggn_baseline_reader *reader, const double *const *features, int width, int height);
 
 #endif

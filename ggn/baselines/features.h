@@ -1,5 +1,5 @@
 /*
- * What the published models before the network look at: numbers from the L channel (CIELAB) of one block. Pure functions,
+ * Features of the published models before the network: numbers from the L channel (CIELAB) of one block. Pure functions,
  * thread-safe, without allocation. scratch: [GGN_FEATURE_SCRATCH][h][w], overwritten.
  */
 #ifndef GGN_BASELINES_FEATURES_H

@@ -8,24 +8,24 @@
 #include "data/replay.h"
 #include "train/fit_policy.h"
 
-/* --- looks --- */
+/* --- features --- */
 
-void ggn_looks_release(struct ggn_looks *t)
+void ggn_feature_set_release(struct ggn_feature_set *t)
 {
     free(t->first);
     free(t->x);
-    *t = (struct ggn_looks){0};
+    *t = (struct ggn_feature_set){0};
 }
 
-struct looking {
+struct extraction {
     const struct ggn_baseline *baseline;
     const struct ggn_eval_set *set;
-    const struct ggn_looks *looks;
+    const struct ggn_feature_set *features;
 };
 
-static int look_at_block(void *data, int index, int worker, struct base_err *err)
+static int extract_block(void *data, int index, int worker, struct base_err *err)
 {
-    const struct looking *j = data;
+    const struct extraction *j = data;
     const struct ggn_chain *c = &j->set->chains.chains[j->set->blocks[index].chain];
     int w = j->set->chains.width, h = j->set->chains.height;
     struct ggn_baseline_reader *r = ggn_baseline_reader_create(j->baseline, err);
@@ -33,19 +33,19 @@ static int look_at_block(void *data, int index, int worker, struct base_err *err
     if (!r)
         return err->code;
     for (int i = 0; i < c->n_levels; i++)
-        ggn_baseline_look(r, c->noisy + ggn_chains_values(&j->set->chains) * (size_t)i, w, h,
-                          j->looks->x + (j->looks->first[index] + (size_t)i) * j->looks->size);
+        ggn_baseline_extract(r, c->noisy + ggn_chains_values(&j->set->chains) * (size_t)i, w, h,
+                             j->features->x + (j->features->first[index] + (size_t)i) * j->features->size);
     ggn_baseline_reader_destroy(r);
     return 0;
 }
 
-int ggn_looks_make(struct ggn_looks *t, const struct ggn_baseline *b, const struct ggn_eval_set *s,
-                   struct base_threads *threads, struct base_err *err)
+int ggn_feature_set_make(struct ggn_feature_set *t, const struct ggn_baseline *b, const struct ggn_eval_set *s,
+                         struct base_threads *threads, struct base_err *err)
 {
-    struct looking j = {b, s, t};
+    struct extraction j = {b, s, t};
     size_t rows = 0;
-    *t = (struct ggn_looks){.size = ggn_baseline_look_size(b, s->chains.width, s->chains.height),
-                            .first = malloc(((size_t)s->n_blocks + 1) * sizeof *t->first)};
+    *t = (struct ggn_feature_set){.size = ggn_baseline_feature_count(b, s->chains.width, s->chains.height),
+                                  .first = malloc(((size_t)s->n_blocks + 1) * sizeof *t->first)};
     for (int k = 0; k < s->n_blocks && t->first; k++) {
         t->first[k] = rows;
         rows += (size_t)s->chains.chains[s->blocks[k].chain].n_levels;
@@ -53,17 +53,17 @@ int ggn_looks_make(struct ggn_looks *t, const struct ggn_baseline *b, const stru
     if (t->first)
         t->first[s->n_blocks] = rows;
     t->x = malloc(rows * t->size * sizeof *t->x);
-    int rc = !t->first || !t->x ? base_fail_nomem(err, "baseline") : ggn_eval_each_block(s, threads, look_at_block, &j, err);
+    int rc = !t->first || !t->x ? base_fail_nomem(err, "baseline") : ggn_eval_each_block(s, threads, extract_block, &j, err);
     if (!rc)
         rc = ggn_eval_share(s, t->x, t->size * sizeof *t->x, t->first, err);
     if (rc)
-        ggn_looks_release(t);
+        ggn_feature_set_release(t);
     return rc;
 }
 
 /* --- training --- */
 
-/* The cases of a split that have a label: where their window's looks begin, [window][size] one after the other. */
+/* The cases of a split that have a label: where their window's features begin, [window][size] one after the other. */
 struct cases {
     size_t n;
     const double **window;
@@ -76,8 +76,8 @@ static void cases_release(struct cases *c)
     free(c->label);
 }
 
-static int list_cases(struct cases *c, const struct ggn_baseline *b, const struct ggn_looks *t, const struct ggn_eval_set *s,
-                      enum ggn_split split, struct base_err *err)
+static int list_cases(struct cases *c, const struct ggn_baseline *b, const struct ggn_feature_set *t,
+                      const struct ggn_eval_set *s, enum ggn_split split, struct base_err *err)
 {
     size_t room = s->n > 0 ? s->n : 1, skipped = (size_t)(s->window - b->window);
     *c = (struct cases){.window = malloc(room * sizeof *c->window), .label = malloc(room)};
@@ -122,8 +122,8 @@ static int train_svm(struct ggn_baseline *b, const struct cases *c, size_t size,
     return rc;
 }
 
-static int calibrate(struct ggn_baseline *b, const struct ggn_looks *t, const struct ggn_eval_set *s, enum ggn_split split,
-                     struct base_err *err)
+static int calibrate(struct ggn_baseline *b, const struct ggn_feature_set *t, const struct ggn_eval_set *s,
+                     enum ggn_split split, struct base_err *err)
 {
     struct cases c;
     enum ggn_split on = ggn_eval_count(s, GGN_SPLIT_VALIDATION) > 0 ? GGN_SPLIT_VALIDATION : split;
@@ -135,10 +135,10 @@ static int calibrate(struct ggn_baseline *b, const struct ggn_looks *t, const st
     rc = !r ? err->code : !logit || !label ? base_fail_nomem(err, "baseline") : 0;
     int n = 0;
     for (size_t i = 0; i < c.n && !rc; i++) {
-        const double *looks[GGN_WINDOW_MAX];
+        const double *features[GGN_WINDOW_MAX];
         for (int k = 0; k < b->window; k++)
-            looks[k] = c.window[i] + (size_t)k * t->size;
-        double l = ggn_baseline_logit(r, looks, s->chains.width, s->chains.height);
+            features[k] = c.window[i] + (size_t)k * t->size;
+        double l = ggn_baseline_logit(r, features, s->chains.width, s->chains.height);
         if (isfinite(l)) {
             logit[n] = l;
             label[n++] = c.label[i];
@@ -164,8 +164,8 @@ static void set_cadence(struct ggn_baseline *b, const struct ggn_eval_set *s)
         b->policy.first_spp = ggn_policy_next(&b->policy, b->policy.first_spp);
 }
 
-int ggn_baseline_train(struct ggn_baseline *b, const struct ggn_looks *t, const struct ggn_eval_set *s, enum ggn_split split,
-                       int epochs, struct base_err *err)
+int ggn_baseline_train(struct ggn_baseline *b, const struct ggn_feature_set *t, const struct ggn_eval_set *s,
+                       enum ggn_split split, int epochs, struct base_err *err)
 {
     struct cases c;
     size_t positive = 0;
@@ -189,23 +189,23 @@ int ggn_baseline_train(struct ggn_baseline *b, const struct ggn_looks *t, const 
 struct judging {
     const struct ggn_eval_set *set;
     const struct ggn_baseline *baseline;
-    const struct ggn_looks *looks;
+    const struct ggn_feature_set *features;
     struct ggn_method *method;
 };
 
 struct one_block {
     const struct judging *j;
     struct ggn_baseline_reader *reader;
-    const double *first; /* look at its level 0 */
+    const double *first; /* features of its level 0 */
 };
 
 static double window_logit(void *data, const int *levels)
 {
     const struct one_block *o = data;
-    const double *looks[GGN_WINDOW_MAX];
+    const double *features[GGN_WINDOW_MAX];
     for (int k = 0; k < o->j->baseline->window; k++)
-        looks[k] = o->first + (size_t)levels[k] * o->j->looks->size;
-    return ggn_baseline_logit(o->reader, looks, o->j->set->chains.width, o->j->set->chains.height);
+        features[k] = o->first + (size_t)levels[k] * o->j->features->size;
+    return ggn_baseline_logit(o->reader, features, o->j->set->chains.width, o->j->set->chains.height);
 }
 
 static int judge_block(void *data, int index, int worker, struct base_err *err)
@@ -215,7 +215,7 @@ static int judge_block(void *data, int index, int worker, struct base_err *err)
     const struct ggn_chain *c = &j->set->chains.chains[b->chain];
     const struct ggn_stop_rule rule = {.policy = j->baseline->policy, .window = j->baseline->window};
     struct one_block one = {j, ggn_baseline_reader_create(j->baseline, err),
-                            j->looks->x + j->looks->first[index] * j->looks->size};
+                            j->features->x + j->features->first[index] * j->features->size};
     struct ggn_seen *seen = malloc((size_t)c->n_levels * sizeof *seen);
     int rc = !one.reader ? err->code : !seen ? base_fail_nomem(err, j->method->name) : 0;
     (void)worker;
@@ -229,9 +229,9 @@ static int judge_block(void *data, int index, int worker, struct base_err *err)
 }
 
 int ggn_method_baseline(struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_baseline *b,
-                        const struct ggn_looks *looks, struct base_threads *threads, struct base_err *err)
+                        const struct ggn_feature_set *features, struct base_threads *threads, struct base_err *err)
 {
-    struct judging j = {s, b, looks, m};
+    struct judging j = {s, b, features, m};
     int rc = ggn_method_init(m, s, ggn_baseline_titles[b->kind], 1, err);
     if (rc)
         return rc;
@@ -251,18 +251,18 @@ int ggn_method_learned(struct ggn_method *m, struct ggn_baseline *b, const struc
                        enum ggn_baseline_kind kind, enum ggn_split split, double early, int epochs,
                        struct base_threads *threads, struct base_err *err)
 {
-    struct ggn_looks looks = {0};
+    struct ggn_feature_set features = {0};
     *b = (struct ggn_baseline){0};
     int rc = ggn_baseline_init(b, kind, s->chains.width, s->chains.height, s->window, err), made = 0;
     if (!rc)
-        rc = ggn_looks_make(&looks, b, s, threads, err);
+        rc = ggn_feature_set_make(&features, b, s, threads, err);
     if (!rc)
-        rc = ggn_baseline_train(b, &looks, s, split, epochs, err);
+        rc = ggn_baseline_train(b, &features, s, split, epochs, err);
     if (!rc)
-        made = !(rc = ggn_method_baseline(m, s, b, &looks, threads, err));
+        made = !(rc = ggn_method_baseline(m, s, b, &features, threads, err));
     if (!rc && !(rc = ggn_method_tune(m, s, split, early, err)))
         b->policy.threshold = fmin(m->cut, 1);
-    ggn_looks_release(&looks);
+    ggn_feature_set_release(&features);
     if (rc && made)
         ggn_method_release(m);
     if (rc)

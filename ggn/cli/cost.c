@@ -410,7 +410,7 @@ static int cost_baselines(struct job *j, struct base_threads *threads, struct ba
     int rc = 0;
     for (int i = 0; i < j->o->n_baselines && !rc; i++) {
         struct ggn_baseline b;
-        struct ggn_looks looks = {0};
+        struct ggn_feature_set features = {0};
         struct ggn_method m;
         rc = ggn_baseline_load(&b, j->o->baselines[i], GGN_BASELINES, err);
         if (rc)
@@ -419,8 +419,8 @@ static int cost_baselines(struct job *j, struct base_threads *threads, struct ba
             b.policy.ratio = j->o->cadence;
         rc = b.window > j->set.window ? base_fail(err, BASE_EINVAL, "%s: it judges %d images, windows here have %d",
                                                   j->o->baselines[i], b.window, j->set.window)
-                                      : ggn_looks_make(&looks, &b, &j->set, threads, err);
-        if (!rc && !(rc = ggn_method_baseline(&m, &j->set, &b, &looks, threads, err))) {
+                                      : ggn_feature_set_make(&features, &b, &j->set, threads, err);
+        if (!rc && !(rc = ggn_method_baseline(&m, &j->set, &b, &features, threads, err))) {
             snprintf(m.name, sizeof m.name, "%s", ggn_baseline_names[b.kind]);
             put_method(j, "own", m.cut, &m);
             if (!(j->o->cadence > 0)) {
@@ -429,7 +429,7 @@ static int cost_baselines(struct job *j, struct base_threads *threads, struct ba
             }
             ggn_method_release(&m);
         }
-        ggn_looks_release(&looks);
+        ggn_feature_set_release(&features);
         ggn_baseline_release(&b);
     }
     return rc;

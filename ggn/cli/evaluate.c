@@ -150,7 +150,7 @@ static void adjust(const struct options *o, struct ggn_policy *policy)
 static int add_baseline_file(struct job *j, const char *path, struct base_threads *threads, struct base_err *err)
 {
     struct ggn_baseline b;
-    struct ggn_looks looks = {0};
+    struct ggn_feature_set features = {0};
     int rc = ggn_baseline_load(&b, path, GGN_BASELINES, err);
     if (rc)
         return rc;
@@ -159,10 +159,10 @@ static int add_baseline_file(struct job *j, const char *path, struct base_thread
         rc = base_fail(err, BASE_EINVAL, "%s: it judges %d images, windows here have %d (--window)", path, b.window,
                        j->set.window);
     if (!rc)
-        rc = ggn_looks_make(&looks, &b, &j->set, threads, err);
-    if (!rc && !(rc = ggn_method_baseline(&j->methods[j->n], &j->set, &b, &looks, threads, err)))
+        rc = ggn_feature_set_make(&features, &b, &j->set, threads, err);
+    if (!rc && !(rc = ggn_method_baseline(&j->methods[j->n], &j->set, &b, &features, threads, err)))
         j->n++;
-    ggn_looks_release(&looks);
+    ggn_feature_set_release(&features);
     ggn_baseline_release(&b);
     return rc;
 }

@@ -26,12 +26,12 @@ struct ggn_method {
     double cut;    /* the block goes on while score >= cut */
     double *stop;  /* owns; [blocks], spp */
     double *asked; /* owns; [blocks]: checks until there, of a method that asks at counts of its own; else NULL */
-    int is_oracle; /* it looked at the answers */
+    int is_oracle; /* it knows the answers */
 };
 
 void ggn_method_release(struct ggn_method *m);
 
-/* Trivial baselines. score = -spp (looks at no pixel); the median threshold of the training blocks; the mean threshold of
+/* Trivial baselines. score = -spp (reads no pixel); the median threshold of the training blocks; the mean threshold of
  * the block's own scene (an oracle). GGN_SPLIT_NONE stands for training when there are no training blocks. */
 int ggn_method_spp(struct ggn_method *m, const struct ggn_eval_set *s, struct base_err *err);
 int ggn_method_constant(struct ggn_method *m, const struct ggn_eval_set *s, struct base_err *err);

@@ -43,7 +43,7 @@ int ggn_method_observer(struct ggn_method *m, const struct ggn_eval_set *s, cons
                         double growth, int *available, struct base_err *err)
 {
     int rc = ggn_method_init(m, s, halves ? "observer" : "observer, no halves", 1, err), view = -1;
-    const double *seen = halves ? s->visible : s->looked;
+    const double *seen = halves ? s->visible : s->visible_means;
     struct ggn_observer o = ggn_observer_default;
     size_t pixels = (size_t)s->chains.width * (size_t)s->chains.height;
     *available = 1;

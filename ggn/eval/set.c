@@ -72,7 +72,7 @@ enum { COLUMNS = 11 };
 static int make_columns(struct ggn_eval_set *s, struct base_err *err)
 {
     double **columns[COLUMNS] = {&s->spp,  &s->seconds, &s->dammertz, &s->half_unsettled, &s->rse,   &s->rse_unsettled,
-                                 &s->flip, &s->ssim,    &s->visible,  &s->looked,         &s->relmse};
+                                 &s->flip, &s->ssim,    &s->visible,  &s->visible_means,  &s->relmse};
     double *all = malloc(COLUMNS * s->n * sizeof *all);
     s->noisy = malloc(s->n);
     s->spp = all;
@@ -273,7 +273,7 @@ static const struct seq_record *earlier_look(const struct seq_block *p, uint32_t
 
 /* What the observer sees of each recorded level, from its own halves and without them; NaN: no telling. */
 struct seen {
-    double *halves, *looks; /* [n_levels] */
+    double *halves, *means; /* [n_levels] */
 };
 
 static int see_levels(const struct seq_block *p, const struct seen *seen, struct base_err *err)
@@ -281,11 +281,11 @@ static int see_levels(const struct seq_block *p, const struct seen *seen, struct
     int rc = 0;
     for (uint32_t k = 0; k < p->n_levels && !rc; k++) {
         const struct seq_record *r = &p->levels[k], *earlier = earlier_look(p, k);
-        seen->halves[k] = seen->looks[k] = (double)NAN;
+        seen->halves[k] = seen->means[k] = (double)NAN;
         if (seq_has_halves(r))
             rc = ggn_curve_level(p, r, &seen->halves[k], err);
         if (!rc && seq_has_halves(r) && earlier)
-            rc = ggn_curve_looks(p, earlier, r, &seen->looks[k], err);
+            rc = ggn_curve_means(p, earlier, r, &seen->means[k], err);
     }
     return rc;
 }
@@ -311,20 +311,20 @@ static int fill_visible(struct ggn_eval_set *s, const struct ggn_eval_block *blo
 
 /* Without halves: in the same ratio to what is seen with them as at the nearest recorded level that knows it, at or below,
  * or else at the first. */
-static void fill_looked(struct ggn_eval_set *s, const struct ggn_eval_block *block, const struct seq_block *p,
-                        const struct seen *seen)
+static void fill_visible_means(struct ggn_eval_set *s, const struct ggn_eval_block *block, const struct seq_block *p,
+                               const struct seen *seen)
 {
     size_t i = block->first;
     double ratio = (double)NAN;
     for (uint32_t k = 0; k < p->n_levels; k++) {
-        if (isnan(seen->looks[k]))
+        if (isnan(seen->means[k]))
             continue;
         for (; !isnan(ratio) && i < block->end && s->spp[i] < p->levels[k].spp; i++)
-            s->looked[i] = ratio * s->visible[i];
-        ratio = seen->halves[k] > 0.0 ? seen->looks[k] / seen->halves[k] : 1.0;
+            s->visible_means[i] = ratio * s->visible[i];
+        ratio = seen->halves[k] > 0.0 ? seen->means[k] / seen->halves[k] : 1.0;
     }
     for (; i < block->end; i++)
-        s->looked[i] = ratio * s->visible[i];
+        s->visible_means[i] = ratio * s->visible[i];
 }
 
 static int fill_observed(struct ggn_eval_set *s, const struct ggn_eval_block *block, const struct seq_block *p,
@@ -338,7 +338,7 @@ static int fill_observed(struct ggn_eval_set *s, const struct ggn_eval_block *bl
     if (!rc)
         rc = fill_visible(s, block, p, &seen, err);
     if (!rc)
-        fill_looked(s, block, p, &seen);
+        fill_visible_means(s, block, p, &seen);
     free(memory);
     return rc;
 }

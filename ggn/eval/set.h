@@ -34,10 +34,10 @@ struct ggn_eval_set {
     double *spp, *seconds;         /* own; [n]; seconds: thread time spent on the block so far, NaN if unknown */
     signed char *noisy;            /* owns; [n]: 1, 0, or -1 unknown */
     double *dammertz, *half_unsettled, *rse, *rse_unsettled; /* own; [n]; NaN where not recorded */
-    double *visible;     /* owns; [n]: noise that the model observer sees (observer/visibility.h); NaN without halves */
-    double *looked;      /* owns; [n]: the same in a host without half buffers; NaN without levels to tell it */
-    double *flip, *ssim; /* own; [n]: against the reference, else the mean of the full level; NaN unless asked for */
-    double *relmse;      /* owns; [n]: variance over the squared mean, from the full level's halves; NaN without */
+    double *visible;       /* owns; [n]: noise that the model observer sees (observer/visibility.h); NaN without halves */
+    double *visible_means; /* owns; [n]: the same in a host without half buffers; NaN without levels to tell it */
+    double *flip, *ssim;   /* own; [n]: against the reference, else the mean of the full level; NaN unless asked for */
+    double *relmse;        /* owns; [n]: variance over the squared mean, from the full level's halves; NaN without */
 };
 
 struct ggn_eval_options {

@@ -71,7 +71,7 @@ static double shift_without_halves(const struct ggn_eval_set *s, const struct gg
     size_t i = b->first;
     while (i + 1 < b->end && s->spp[i] < b->label.threshold)
         i++;
-    return 2.0 * log2(s->looked[i] / s->visible[i]);
+    return 2.0 * log2(s->visible_means[i] / s->visible[i]);
 }
 
 static int print_without_halves(FILE *f, const struct ggn_eval_set *s, enum ggn_split split, struct base_err *err)

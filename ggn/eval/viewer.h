@@ -13,7 +13,7 @@ struct ggn_viewed {
 };
 
 struct ggn_viewer {
-    struct ggn_judge *judge;       /* owns; NULL: exact looks instead */
+    struct ggn_judge *judge;       /* owns; NULL: exact networks instead */
     struct ggn_exact *exact;       /* owns; of GGN_PRECISION_F64 */
     const struct ggn_chains *set;  /* borrows */
     const struct ggn_chain *chain; /* borrows; the block */

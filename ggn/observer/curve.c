@@ -14,7 +14,7 @@ enum { SIMULATED = 49 };
 
 static double simulated_spp(int i) { return SEQ_SIMULATED_CAP * exp2(0.25 * (i - (SIMULATED - 1))); }
 
-/* What is looked at: a part of one block, or several blocks of one size side by side as one larger block. */
+/* What is measured: a part of one block, or several blocks of one size side by side as one larger block. */
 struct planes {
     const struct seq_block *blocks; /* borrows; [down][across] */
     int across, down;
@@ -79,16 +79,16 @@ static void place(const struct planes *p, int k, size_t which, float *to)
 }
 
 /* L* of mean + scale * difference. */
-static void look(struct planes *p, double scale, float *lightness)
+static void lightness_at(struct planes *p, double scale, float *lightness)
 {
     seq_simulate(p->mean, p->difference, 3 * p->pixels, scale, p->work);
     ggn_visible_lightness(p->work, p->pixels, lightness);
 }
 
-static void look_at_halves(struct planes *p, double scale)
+static void read_halves(struct planes *p, double scale)
 {
-    look(p, scale, p->lightness[0]);
-    look(p, -scale, p->lightness[1]);
+    lightness_at(p, scale, p->lightness[0]);
+    lightness_at(p, -scale, p->lightness[1]);
 }
 
 /* Visible noise of factor * (L*[0] - L*[1]), which ends up in place of L*[0]. */
@@ -145,7 +145,7 @@ static int add_recorded_halves(struct ggn_curve *c, struct planes *p, uint32_t f
         int rc = read_level(p, spp, err);
         if (rc)
             return rc;
-        look_at_halves(p, 1.0);
+        read_halves(p, 1.0);
         append(c, spp, visible(p, 0.5f));
     }
     return 0;
@@ -159,12 +159,12 @@ static int add_halves(struct ggn_curve *c, struct planes *p, double beyond, stru
     const int first = c->n == 0;
     int rc = read_level(p, full, err);
     if (!rc && first) {
-        look_at_halves(p, 1.0);
+        read_halves(p, 1.0);
         see_texture(p);
         rc = add_recorded_halves(c, p, full, err);
         if (!rc)
             rc = read_level(p, full, err);
-        look_at_halves(p, 1.0);
+        read_halves(p, 1.0);
         append(c, full, visible(p, 0.5f));
         c->recorded = c->n;
     }
@@ -172,7 +172,7 @@ static int add_halves(struct ggn_curve *c, struct planes *p, double beyond, stru
         double spp = simulated_spp(i);
         if (spp <= full || spp <= beyond)
             continue;
-        look_at_halves(p, seq_noise_scale(full, spp));
+        read_halves(p, seq_noise_scale(full, spp));
         append(c, spp, visible(p, 0.5f));
     }
     return rc;
@@ -199,7 +199,7 @@ static int add_levels(struct ggn_curve *c, struct planes *p, int independent, st
             return rc;
         for (size_t i = 0; i < 3 * p->pixels; i++)
             p->difference[i] -= p->mean[i];
-        look(p, independent ? seq_reference_scale(n_r, r->spp) : 1.0, p->lightness[0]);
+        lightness_at(p, independent ? seq_reference_scale(n_r, r->spp) : 1.0, p->lightness[0]);
         memcpy(p->lightness[1], p->lightness[2], p->pixels * sizeof(float));
         append(c, r->spp, visible(p, 1.0f));
     }
@@ -285,7 +285,7 @@ int ggn_curve_joined(const struct seq_block *blocks, int across, int down, struc
 /* What is seen of mean +- difference. */
 static double see_both(struct planes *p)
 {
-    look_at_halves(p, 1.0);
+    read_halves(p, 1.0);
     see_texture(p);
     return visible(p, 0.5f);
 }
@@ -302,7 +302,7 @@ int ggn_curve_level(const struct seq_block *block, const struct seq_record *leve
     return rc;
 }
 
-int ggn_curve_looks(const struct seq_block *block, const struct seq_record *earlier, const struct seq_record *level,
+int ggn_curve_means(const struct seq_block *block, const struct seq_record *earlier, const struct seq_record *level,
                     double *visible_out, struct base_err *err)
 {
     struct planes p;
@@ -312,7 +312,7 @@ int ggn_curve_looks(const struct seq_block *block, const struct seq_record *earl
     if (!rc)
         rc = seq_mean(block, level, p.mean, err);
     for (size_t i = 0; i < 3 * p.pixels && !rc; i++)
-        p.difference[i] = (float)seq_look_scale(earlier->spp, level->spp) * (p.mean[i] - p.difference[i]);
+        p.difference[i] = (float)seq_means_scale(earlier->spp, level->spp) * (p.mean[i] - p.difference[i]);
     if (!rc)
         *visible_out = see_both(&p);
     planes_release(&p);

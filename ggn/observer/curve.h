@@ -1,8 +1,8 @@
 /*
  * How visible the noise of a recorded block is at any number of samples.
  *
- * - From two halves: M and D of the block's full level, recorded at n0 spp, give the look at n spp as M + sqrt(n0/n) D and
- *   its twin with the other sign, for n > n0 up to SEQ_SIMULATED_CAP. Recorded levels below n0 are looked at by their own
+ * - From two halves: M and D of the block's full level, recorded at n0 spp, give two halves at n spp as M + sqrt(n0/n) D and
+ *   the same with the other sign, for n > n0 up to SEQ_SIMULATED_CAP. Recorded levels below n0 are measured by their own
  *   halves. It errs where rare bright paths make the noise far from Gaussian (ggn/observer/README.md).
  * - From recorded levels: the picture I at n spp against a reference R of n_r independent samples. I - R has the variance
  *   s^2 (1/n + 1/n_r), so it is scaled by sqrt(n_r / (n_r + n)); texture is what the last level and R share. Where the block
@@ -38,8 +38,8 @@ void ggn_curve_release(struct ggn_curve *curve);
 int ggn_curve_level(const struct seq_block *block, const struct seq_record *level, double *visible, struct base_err *err);
 
 /* The same of a host without halves: from the level and an earlier one of fewer samples, both running means of the same
- * samples (plugin/looks.h says how). */
-int ggn_curve_looks(const struct seq_block *block, const struct seq_record *earlier, const struct seq_record *level,
+ * samples (plugin/means.h says how). */
+int ggn_curve_means(const struct seq_block *block, const struct seq_record *earlier, const struct seq_record *level,
                     double *visible, struct base_err *err);
 
 /* Smallest spp from which the noise stays at or below `limit`, interpolated between levels in log-log. censored: still above

@@ -20,7 +20,7 @@ static const struct lull_param params[P_COUNT] = {
                                  "model's own"),
     [P_PASSES] = LULL_KIT_INT("passes", NULL, 1, 16, "checks in a row that must be below that; without it the model's own"),
     [P_FIRST_SPP] = LULL_KIT_INT("first-spp", NULL, 1, 1e9,
-                                 "samples per pixel of the first image that is looked at; without it the model's own"),
+                                 "samples per pixel of the first image that counts; without it the model's own"),
 };
 
 struct worker {
@@ -32,7 +32,7 @@ static struct gp_slot slot_of(const void *of, int32_t width, int32_t height)
 {
     const struct lull_instance *in = of;
 
-    return (struct gp_slot){.kept = sizeof(double) * ggn_baseline_look_size(in->model, width, height)};
+    return (struct gp_slot){.kept = sizeof(double) * ggn_baseline_feature_count(in->model, width, height)};
 }
 
 static void worker_destroy(void *data)
@@ -67,13 +67,14 @@ static void model_destroy(void *model)
     free(model);
 }
 
-static long take(const struct gp_look *l, uint32_t slot)
+static long read_image(const struct gp_block_view *seen, uint32_t slot)
 {
-    const struct worker *w = l->worker;
-    const struct lull_block *b = l->block;
-    long broken = gp_windowed_read(l, w->codes);
+    const struct worker *w = seen->worker;
+    const struct lull_block *b = seen->block;
+    long broken = gp_windowed_read(seen, w->codes);
 
-    ggn_baseline_look(w->reader, w->codes, b->x1 - b->x0, b->y1 - b->y0, gp_history_kept(&l->in->history, b->id, slot));
+    ggn_baseline_extract(w->reader, w->codes, b->x1 - b->x0, b->y1 - b->y0,
+                         gp_history_kept(&seen->in->history, b->id, slot));
     return broken;
 }
 
@@ -86,14 +87,14 @@ static double no_noise(void *data)
 
 static double window_logit(void *data)
 {
-    const struct gp_look *l = data;
-    const struct worker *w = l->worker;
-    const struct lull_block *b = l->block;
-    const double *looks[GGN_WINDOW_MAX];
+    const struct gp_block_view *seen = data;
+    const struct worker *w = seen->worker;
+    const struct lull_block *b = seen->block;
+    const double *features[GGN_WINDOW_MAX];
 
-    for (int i = 0; i < l->in->rule.window; i++)
-        looks[i] = gp_history_kept(&l->in->history, b->id, l->head->order[i]);
-    return ggn_baseline_logit(w->reader, looks, b->x1 - b->x0, b->y1 - b->y0);
+    for (int i = 0; i < seen->in->rule.window; i++)
+        features[i] = gp_history_kept(&seen->in->history, b->id, seen->head->order[i]);
+    return ggn_baseline_logit(w->reader, features, b->x1 - b->x0, b->y1 - b->y0);
 }
 
 static int no_tail(void *data, double *tail999, double *gini)
@@ -104,8 +105,8 @@ static int no_tail(void *data, double *tail999, double *gini)
     return 0;
 }
 
-static const struct gp_sight sight = {slot_of,       worker_create, worker_destroy,
-                                      model_destroy, take,          {NULL, no_noise, window_logit, no_tail}};
+static const struct gp_block_view_ops ops = {slot_of,       worker_create, worker_destroy,
+                                             model_destroy, read_image,    {NULL, no_noise, window_logit, no_tail}};
 
 static void hash_model(struct lull_instance *in, const struct ggn_baseline *b)
 {
@@ -147,8 +148,7 @@ static int32_t create(enum ggn_baseline_kind kind, const struct lull_criterion *
 {
     const char *text[LULL_KIT_PARAM_MAX];
     struct lull_instance *in = NULL;
-    int32_t status =
-        gp_windowed_create(&sight, table, host, pairs, pair_count, pair_stride, text, instance ? &in : NULL, err);
+    int32_t status = gp_windowed_create(&ops, table, host, pairs, pair_count, pair_stride, text, instance ? &in : NULL, err);
 
     if (!status)
         status = load_model(in, kind, text[P_MODEL], err);
@@ -160,7 +160,7 @@ static int32_t create(enum ggn_baseline_kind kind, const struct lull_criterion *
     return LULL_OK;
 }
 
-/* X(kind, member of criteria.h, id, name, what it looks at) */
+/* X(kind, member of criteria.h, id, name, its features) */
 #define BASELINES(X) \
     X(GGN_SVD_ENTROPY, svd_entropy, "svd-entropy", "SVD-entropy LSTM", \
       "the entropy of the singular values of\n20x20 pixels over six images, by an LSTM (Buisine et al. 2021)") \

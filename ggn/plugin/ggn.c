@@ -5,7 +5,7 @@
  *
  * Two cheap statistics stand beside the network. The *gate* compares the window's oldest and newest image: while their
  * difference says that the noise is far above what the model ever called clean in training, the block is plainly noisy and
- * the network is not asked; it says when to ask again. The *tail guard* looks at the half buffer: a block whose noise sits
+ * the network is not asked; it says when to ask again. The *tail guard* reads the half buffer: a block whose noise sits
  * in a few pixels has not met its rare bright paths often enough for any judgement by eye, and is not stopped.
  *
  * A model may also take the noise picture that the half buffer shows; without half buffer it judges without.
@@ -89,55 +89,55 @@ static void *worker_create(const struct lull_instance *in, size_t pixels, struct
 
 static void model_destroy(void *model) { ggn_model_destroy(model); }
 
-static long take(const struct gp_look *l, uint32_t slot)
+static long read_image(const struct gp_block_view *seen, uint32_t slot)
 {
-    return gp_windowed_read(l, gp_history_kept(&l->in->history, l->block->id, slot));
+    return gp_windowed_read(seen, gp_history_kept(&seen->in->history, seen->block->id, slot));
 }
 
 static double window_noise(void *data)
 {
-    const struct gp_look *l = data;
-    const struct gp_history *h = &l->in->history;
-    const struct ggn_stopper *s = &l->head->stopper;
-    const struct lull_block *b = l->block;
+    const struct gp_block_view *seen = data;
+    const struct gp_history *h = &seen->in->history;
+    const struct ggn_stopper *s = &seen->head->stopper;
+    const struct lull_block *b = seen->block;
     size_t values = 3 * (size_t)(b->x1 - b->x0) * (size_t)(b->y1 - b->y0);
 
-    return ggn_window_noise(gp_history_kept(h, b->id, l->head->order[0]),
-                            gp_history_kept(h, b->id, l->head->order[s->used - 1]), values, (double)s->spp[0],
+    return ggn_window_noise(gp_history_kept(h, b->id, seen->head->order[0]),
+                            gp_history_kept(h, b->id, seen->head->order[s->used - 1]), values, (double)s->spp[0],
                             (double)s->spp[s->used - 1]);
 }
 
 /* *split takes A − I, of n samples, the first h of them in A, to noise of the variance of the mean. 0: the view has no half
  * buffer with part of the samples. */
-static int has_half(const struct gp_look *l, double *split)
+static int has_half(const struct gp_block_view *seen, double *split)
 {
-    const double n = (double)l->block->spp, h = (double)l->block->half_spp;
+    const double n = (double)seen->block->spp, h = (double)seen->block->half_spp;
 
-    if (!lull_kit_plane(l->view, LULL_PLANE_HALF) || h <= 0 || h >= n)
+    if (!lull_kit_plane(seen->view, LULL_PLANE_HALF) || h <= 0 || h >= n)
         return 0;
-    *split = seq_look_scale(h, n);
+    *split = seq_means_scale(h, n);
     return 1;
 }
 
 static const uint32_t HALVES = LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_HALF);
 
 /* The noise picture of the block as it is now, NULL: it has none. */
-static const uint8_t *read_picture(const struct gp_look *l)
+static const uint8_t *read_picture(const struct gp_block_view *seen)
 {
-    const struct lull_kit *kit = &l->in->kit;
-    const struct ggn_model *model = l->in->model;
-    const struct worker *worker = l->worker;
+    const struct lull_kit *kit = &seen->in->kit;
+    const struct ggn_model *model = seen->in->model;
+    const struct worker *worker = seen->worker;
     uint8_t *to = worker->picture;
     struct lull_kit_span s;
     double split;
 
-    if (!model->hyper.picture || !has_half(l, &split))
+    if (!model->hyper.picture || !has_half(seen, &split))
         return NULL;
-    for (lull_kit_span_begin(&s, l->view, l->block, HALVES); lull_kit_span_next(&s);)
+    for (lull_kit_span_begin(&s, seen->view, seen->block, HALVES); lull_kit_span_next(&s);)
         for (int32_t i = 0; i < s.count; i++) {
             double mean = lull_kit_luminance(kit, s.value[LULL_PLANE_COLOR][i]);
             double half = lull_kit_luminance(kit, s.value[LULL_PLANE_HALF][i]);
-            *to++ = ggn_picture_code(mean, split * (half - mean), &l->in->display);
+            *to++ = ggn_picture_code(mean, split * (half - mean), &seen->in->display);
         }
     return worker->picture;
 }
@@ -145,37 +145,37 @@ static const uint8_t *read_picture(const struct gp_look *l)
 /* Denoises the images that have not been denoised yet. */
 static double window_logit(void *data)
 {
-    const struct gp_look *l = data;
-    const struct gp_history *history = &l->in->history;
-    const struct worker *worker = l->worker;
+    const struct gp_block_view *seen = data;
+    const struct gp_history *history = &seen->in->history;
+    const struct worker *worker = seen->worker;
     const uint8_t *noisy[GGN_WINDOW_MAX];
     const uint16_t *denoised[GGN_WINDOW_MAX];
-    const struct lull_block *b = l->block;
+    const struct lull_block *b = seen->block;
     int w = b->x1 - b->x0, h = b->y1 - b->y0;
 
-    for (int i = 0; i < l->in->rule.window; i++) {
-        uint32_t slot = l->head->order[i];
+    for (int i = 0; i < seen->in->rule.window; i++) {
+        uint32_t slot = seen->head->order[i];
         uint16_t *to = gp_history_made(history, b->id, slot);
         noisy[i] = gp_history_kept(history, b->id, slot);
         denoised[i] = to;
-        if (!(l->head->made >> slot & 1))
+        if (!(seen->head->made >> slot & 1))
             ggn_judge_denoise(worker->judge, noisy[i], to, w, h);
-        l->head->made |= UINT32_C(1) << slot;
+        seen->head->made |= UINT32_C(1) << slot;
     }
-    return ggn_judge_logit(worker->judge, noisy, denoised, read_picture(l), w, h);
+    return ggn_judge_logit(worker->judge, noisy, denoised, read_picture(seen), w, h);
 }
 
 static int tail_statistics(void *data, double *tail999, double *gini)
 {
-    const struct gp_look *l = data;
-    const struct lull_kit *kit = &l->in->kit;
-    double *noise = ((const struct worker *)l->worker)->noise, sum = 0, split;
+    const struct gp_block_view *seen = data;
+    const struct lull_kit *kit = &seen->in->kit;
+    double *noise = ((const struct worker *)seen->worker)->noise, sum = 0, split;
     struct lull_kit_span s;
     size_t count = 0;
 
-    if (!has_half(l, &split))
+    if (!has_half(seen, &split))
         return 0;
-    for (lull_kit_span_begin(&s, l->view, l->block, HALVES); lull_kit_span_next(&s);)
+    for (lull_kit_span_begin(&s, seen->view, seen->block, HALVES); lull_kit_span_next(&s);)
         for (int32_t i = 0; i < s.count; i++) {
             double luminance = lull_kit_luminance(kit, s.value[LULL_PLANE_COLOR][i]);
             double d = split * (lull_kit_luminance(kit, s.value[LULL_PLANE_HALF][i]) - luminance);
@@ -190,8 +190,8 @@ static int tail_statistics(void *data, double *tail999, double *gini)
     return 1;
 }
 
-static const struct gp_sight sight = {slot_of,       worker_create, worker_destroy,
-                                      model_destroy, take,          {NULL, window_noise, window_logit, tail_statistics}};
+static const struct gp_block_view_ops ops = {
+    slot_of, worker_create, worker_destroy, model_destroy, read_image, {NULL, window_noise, window_logit, tail_statistics}};
 
 /* --- instance ---------------------------------------------------------------------------------------------------------- */
 
@@ -234,7 +234,7 @@ static int32_t create(const struct lull_host *host, const struct lull_pair *pair
     const char *text[LULL_KIT_PARAM_MAX];
     struct lull_instance *in = NULL;
     int32_t status =
-        gp_windowed_create(&sight, &ggn_plugin_ggn, host, pairs, pair_count, pair_stride, text, instance ? &in : NULL, err);
+        gp_windowed_create(&ops, &ggn_plugin_ggn, host, pairs, pair_count, pair_stride, text, instance ? &in : NULL, err);
 
     if (!status)
         status = load_model(in, text[P_MODEL], err);

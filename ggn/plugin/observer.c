@@ -1,21 +1,21 @@
 /*
- * The criterion "observer": the model observer (observer/observer.h) in the renderer. It makes two pictures of a block whose
- * difference is noise and which share the texture that hides noise, as a display shows them. With the plane HALF these are
- * the means of the two halves of the samples: an answer follows from the block's pixels alone. Without it they are the mean
- * plus and minus what an earlier look at the same mean says of its noise (plugin/looks.h). `error` is the visible noise over
- * the level at which people stop seeing it, `p_noisy` the share of viewers who still do; a block stops when that is at most
- * `visible`. No model.
+ * The criterion "observer": the model observer (observer/observer.h) in the renderer. It makes two images of a block, as a
+ * display shows them: their difference is noise, their common part the texture that hides noise. With the plane HALF they
+ * are the means of the two halves of the samples, and an answer follows from the block's pixels alone. Without it they are
+ * the mean plus and minus the noise that an earlier value of the same mean shows (plugin/means.h). `error` is the visible
+ * noise over the level at which people stop seeing it, `p_noisy` the share of viewers who still do; a block stops when that
+ * is at most `visible`. No model.
  */
 #include <stdatomic.h>
 
 #include "observer/observer.h"
 #include "observer/visibility.h"
 #include "plugin/criteria.h"
-#include "plugin/looks.h"
+#include "plugin/means.h"
 #include "plugin/translate.h"
 #include "sequence/simulate.h"
 
-static const double FLOAT_STEP = 0x1p-22; /* looks that are nearer than their rounding are the same */
+static const double FLOAT_STEP = 0x1p-22; /* means that are nearer than their rounding are the same */
 
 enum { P_VISIBLE, P_FIRST_SPP, P_GROWTH, P_COUNT };
 enum { COLOR = LULL_PLANE_BIT(LULL_PLANE_COLOR), PLANES = COLOR | LULL_PLANE_BIT(LULL_PLANE_HALF) };
@@ -42,7 +42,7 @@ struct lull_instance {
     struct ggn_observer observer;
     double stop_error;
     atomic_flag warned;    /* of planes that say nothing about noise: once per frame */
-    struct gp_looks looks; /* of a frame without HALF */
+    struct gp_means means; /* of a frame without HALF */
     uint32_t workers;      /* of the open frame */
     struct largest largest;
     struct worker *worker;
@@ -84,12 +84,12 @@ static int read_halves(const struct lull_kit *kit, const struct lull_view *view,
     return differ;
 }
 
-/* Fills w->rgb with the mean plus and minus its noise, as the look at `base` tells that; keeps the mean where `keep` is not
- * NULL. A pixel that is or was no number takes the place of the one before it. Returns whether the looks differ anywhere. */
-static int read_looks(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *b,
+/* Fills w->rgb with the mean plus and minus its noise, as the earlier mean `base` tells; keeps the mean where `keep` is not
+ * NULL. A pixel that is or was no number takes the place of the one before it. Returns whether the means differ anywhere. */
+static int read_means(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *b,
                       const float *base, uint64_t spp_base, float *keep, struct worker *w, struct lull_kit_tally *tally)
 {
-    const double scale = base ? seq_look_scale((double)spp_base, (double)b->spp) : 0;
+    const double scale = base ? seq_means_scale((double)spp_base, (double)b->spp) : 0;
     const size_t plane = (size_t)lull_kit_pixels(b);
     struct lull_kit_span s;
     size_t at = 0;
@@ -163,8 +163,8 @@ static double verdict_on(struct lull_instance *in, const struct lull_block *b, i
     return (double)NAN;
 }
 
-static double judge_halves(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
-                           struct worker *w, struct lull_kit_tally *tally)
+static double error_of_halves(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
+                              struct worker *w, struct lull_kit_tally *tally)
 {
     if (!b->half_spp || b->half_spp >= b->spp) {
         warn(in, "observer: HALF holds none or all of a block's samples, so that noise cannot be told; no block is stopped "
@@ -179,13 +179,13 @@ static double judge_halves(struct lull_instance *in, const struct lull_view *vie
                       w, tally);
 }
 
-static double judge_looks(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
-                          struct worker *w, struct lull_kit_tally *tally)
+static double error_of_means(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
+                             struct worker *w, struct lull_kit_tally *tally)
 {
     uint64_t spp_base;
     float *keep;
-    const float *base = gp_looks_begin(&in->looks, b->id, b->spp, &keep, &spp_base);
-    int differ = read_looks(&in->kit, view, b, base, spp_base, keep, w, tally);
+    const float *base = gp_means_begin(&in->means, b->id, b->spp, &keep, &spp_base);
+    int differ = read_means(&in->kit, view, b, base, spp_base, keep, w, tally);
 
     if (!base) {
         tally->early = 1;
@@ -207,7 +207,7 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
     if (b->spp < in->kit.need.first_spp)
         tally.early = 1;
     else
-        error = (in->looks.count ? judge_looks : judge_halves)(in, view, b, w, &tally);
+        error = (in->means.count ? error_of_means : error_of_halves)(in, view, b, w, &tally);
     lull_kit_verdict(&in->kit, b, &tally, error, in->stop_error, 0, in->kit.value[P_GROWTH], d);
     if (d->action == LULL_CONTINUE && !isnan(d->predicted_spp)) /* the last steps are short: checks cost little here */
         lull_kit_continue(&in->kit, b, ggn_observer_next((double)b->spp, d->predicted_spp, in->kit.value[P_GROWTH]), d);
@@ -215,17 +215,17 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
         d->p_noisy = ggn_observer_p_noisy(&in->observer, d->error);
 }
 
-/* As lull_kit_evaluate; a call that failed leaves no trace in the looks. */
+/* As lull_kit_evaluate; a call that failed leaves no trace in the means. */
 static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, const struct lull_block *blocks,
                         uint32_t block_stride, struct lull_decision *decisions, uint32_t decision_stride, uint32_t count,
                         struct lull_error *err)
 {
     int32_t status = lull_kit_evaluate(in, view, blocks, block_stride, decisions, decision_stride, count, err);
 
-    for (uint32_t i = 0; i < count && !status && in->looks.count; i++) {
+    for (uint32_t i = 0; i < count && !status && in->means.count; i++) {
         const struct lull_block *b = lull_kit_at(blocks, block_stride, i);
         if (b->spp >= in->kit.need.first_spp)
-            gp_looks_commit(&in->looks, b->id);
+            gp_means_commit(&in->means, b->id);
     }
     return status;
 }
@@ -237,7 +237,7 @@ static void workers_release(struct lull_instance *in)
     free(in->worker);
     free(in->pixels);
     free(in->scratch);
-    gp_looks_release(&in->looks);
+    gp_means_release(&in->means);
     in->worker = NULL;
     in->pixels = NULL;
     in->scratch = NULL;
@@ -280,7 +280,7 @@ static int32_t check_block(const struct lull_instance *in, const struct lull_blo
     if ((size_t)lull_kit_pixels(b) > in->largest.pixels || width > in->largest.width ||
         ggn_visible_patches(width, b->y1 - b->y0) > in->largest.patches)
         return lull_kit_fail(err, LULL_E_INVALID, "evaluate: block %u is none of the frame's", b->id);
-    if (in->looks.count && (size_t)lull_kit_pixels(b) * 3 != gp_looks_values(&in->looks, b->id))
+    if (in->means.count && (size_t)lull_kit_pixels(b) * 3 != gp_means_values(&in->means, b->id))
         return lull_kit_fail(err, LULL_E_INVALID, "evaluate: block %u is none of the frame's", b->id);
     return LULL_OK;
 }
@@ -318,20 +318,20 @@ static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *fr
         most.patches = patches > most.patches ? patches : most.patches;
         most.width = width > most.width ? width : most.width;
     }
-    struct gp_looks looks = {0};
+    struct gp_means means = {0};
     if (!(frame->planes & LULL_PLANE_BIT(LULL_PLANE_HALF)))
-        status = gp_looks_create(&looks, frame, err);
+        status = gp_means_create(&means, frame, err);
     if (!status)
         status = workers_create(in, &most, err);
     if (status) {
-        gp_looks_release(&looks);
+        gp_means_release(&means);
         return status;
     }
-    in->looks = looks;
+    in->means = means;
     atomic_flag_clear(&in->warned);
     lull_kit_frame_open(in, frame);
     const struct lull_host *host = in->kit.host;
-    if (in->looks.count && host && host->log)
+    if (in->means.count && host && host->log)
         host->log(host, LULL_LOG_INFO, "observer: no plane HALF: noise is told from how the mean changes between checks");
     return LULL_OK;
 }
@@ -358,13 +358,13 @@ static const struct lull_kit_rule rule = {
 static int32_t state_save(const struct lull_instance *in, const struct lull_writer *writer, struct lull_error *err)
 {
     int32_t status = gp_save_check(in, writer, err);
-    return status ? status : gp_looks_save(&in->looks, writer, err);
+    return status ? status : gp_means_save(&in->means, writer, err);
 }
 
 static int32_t state_load(struct lull_instance *in, const struct lull_reader *reader, struct lull_error *err)
 {
     int32_t status = gp_load_check(in, reader, err);
-    return status ? status : gp_looks_load(&in->looks, reader, err);
+    return status ? status : gp_means_load(&in->means, reader, err);
 }
 
 static const struct lull_state state = {.struct_size = sizeof state, .save = state_save, .load = state_load};

@@ -6,16 +6,16 @@
 
 static const struct lull_kit_rule rule;
 
-int32_t gp_windowed_create(const struct gp_sight *sight, const struct lull_criterion *table, const struct lull_host *host,
-                           const struct lull_pair *pairs, uint32_t pair_count, uint32_t pair_stride, const char **text,
-                           struct lull_instance **instance, struct lull_error *err)
+int32_t gp_windowed_create(const struct gp_block_view_ops *ops, const struct lull_criterion *table,
+                           const struct lull_host *host, const struct lull_pair *pairs, uint32_t pair_count,
+                           uint32_t pair_stride, const char **text, struct lull_instance **instance, struct lull_error *err)
 {
     int32_t status =
         lull_kit_create(&rule, table, sizeof **instance, host, pairs, pair_count, pair_stride, text, instance, err);
 
     if (status)
         return status;
-    (*instance)->sight = sight;
+    (*instance)->ops = ops;
     (*instance)->key = UINT32_C(2166136261);
     return LULL_OK;
 }
@@ -45,13 +45,13 @@ void gp_windowed_ready(struct lull_instance *in, const struct lull_param *params
     need->block_height = (uint32_t)height;
     need->checks_hint = policy->ratio > 1.001 ? (uint32_t)(log(200) / log(policy->ratio)) : 100;
     need->first_spp = (uint64_t)policy->first_spp;
-    need->bytes_per_block = gp_history_block_bytes(in->rule.window, in->sight->slot(in, width, height));
+    need->bytes_per_block = gp_history_block_bytes(in->rule.window, in->ops->slot(in, width, height));
 }
 
-static void workers_release(const struct gp_sight *sight, void **worker, uint32_t count)
+static void workers_release(const struct gp_block_view_ops *ops, void **worker, uint32_t count)
 {
     for (uint32_t i = 0; worker && i < count; i++)
-        sight->worker_destroy(worker[i]);
+        ops->worker_destroy(worker[i]);
     free(worker);
 }
 
@@ -76,11 +76,11 @@ static int32_t workers_create(const struct lull_instance *in, uint32_t count, si
     int good = worker != NULL;
 
     for (uint32_t i = 0; i < count && good; i++)
-        good = (worker[i] = in->sight->worker_create(in, pixels, &error)) != NULL;
+        good = (worker[i] = in->ops->worker_create(in, pixels, &error)) != NULL;
     *out = worker;
     if (good)
         return LULL_OK;
-    workers_release(in->sight, worker, count);
+    workers_release(in->ops, worker, count);
     return gp_fail_from(err, "begin_frame", &error);
 }
 
@@ -99,13 +99,13 @@ int32_t gp_windowed_begin_frame(struct lull_instance *in, const struct lull_fram
     status = workers_create(in, count, pixels, &worker, err);
     if (status)
         return status;
-    status = gp_history_create(&history, in->rule.window, frame, in->sight->slot, in, err);
+    status = gp_history_create(&history, in->rule.window, frame, in->ops->slot, in, err);
     if (status) {
-        workers_release(in->sight, worker, count);
+        workers_release(in->ops, worker, count);
         return status;
     }
     gp_history_release(&in->history);
-    workers_release(in->sight, in->worker, in->workers);
+    workers_release(in->ops, in->worker, in->workers);
     in->history = history;
     in->worker = worker;
     in->workers = count;
@@ -125,7 +125,7 @@ void gp_windowed_end_frame(struct lull_instance *in)
     if (!in)
         return;
     gp_history_release(&in->history);
-    workers_release(in->sight, in->worker, in->workers);
+    workers_release(in->ops, in->worker, in->workers);
     in->worker = NULL;
     in->workers = 0;
     lull_kit_end_frame(in);
@@ -136,43 +136,43 @@ void gp_windowed_destroy(struct lull_instance *in)
     if (!in)
         return;
     gp_windowed_end_frame(in);
-    in->sight->model_destroy(in->model);
+    in->ops->model_destroy(in->model);
     lull_kit_destroy(in);
 }
 
 /* --- evaluate ---------------------------------------------------------------------------------------------------------- */
 
-long gp_windowed_read(const struct gp_look *l, uint8_t *out)
+long gp_windowed_read(const struct gp_block_view *seen, uint8_t *out)
 {
-    const struct lull_block *b = l->block;
+    const struct lull_block *b = seen->block;
     const size_t w = (size_t)(b->x1 - b->x0), plane = w * (size_t)(b->y1 - b->y0);
     struct ggn_pixel_counts counts = {0};
     struct lull_kit_span s;
 
-    for (lull_kit_span_begin(&s, l->view, b, LULL_PLANE_BIT(LULL_PLANE_COLOR)); lull_kit_span_next(&s);) {
+    for (lull_kit_span_begin(&s, seen->view, b, LULL_PLANE_BIT(LULL_PLANE_COLOR)); lull_kit_span_next(&s);) {
         uint8_t *to = out + (size_t)(s.y - b->y0) * w + (size_t)(s.x - b->x0);
         for (int32_t i = 0; i < s.count; i++)
             for (int c = 0; c < 3; c++)
                 to[(size_t)c * plane + (size_t)i] =
-                    ggn_preprocess(s.value[LULL_PLANE_COLOR][i][c], &l->in->display, &counts);
+                    ggn_preprocess(s.value[LULL_PLANE_COLOR][i][c], &seen->in->display, &counts);
     }
     return ggn_pixel_counts_bad(&counts);
 }
 
 /* Fills in->history.pending[b->id] with the verdict on a checked block. */
-static void look_at(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b, uint32_t worker)
+static void read_block(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b, uint32_t worker)
 {
     struct gp_head *head = &in->history.pending[b->id];
-    struct gp_look look = {in, view, b, head, in->worker[worker < in->workers ? worker : 0]};
-    struct ggn_evidence evidence = in->sight->evidence;
+    struct gp_block_view seen = {in, view, b, head, in->worker[worker < in->workers ? worker : 0]};
+    struct ggn_evidence evidence = in->ops->evidence;
 
-    evidence.data = &look;
+    evidence.data = &seen;
     *head = in->history.head[b->id];
     uint32_t before = head->stopper.used;
     if (!ggn_stopper_ask(&in->rule, &head->stopper, b->spp))
         return;
     uint32_t slot = gp_head_push(head, in->rule.window, before);
-    head->bad = in->sight->take(&look, slot) > 0;
+    head->bad = in->ops->read(&seen, slot) > 0;
     ggn_stopper_judge(&in->rule, &head->stopper, &evidence);
 }
 
@@ -182,7 +182,7 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
     const struct gp_head *head = &in->history.pending[b->id];
     const struct ggn_verdict *v = &head->stopper.verdict;
 
-    look_at(in, view, b, worker);
+    read_block(in, view, b, worker);
     d->action = v->stop ? LULL_STOP : LULL_CONTINUE;
     d->flags = (v->too_early ? LULL_DECISION_TOO_EARLY : 0) | (head->bad ? LULL_DECISION_BAD_INPUT : 0);
     d->next_spp = v->next_spp;
@@ -239,7 +239,7 @@ static int32_t state_load(struct lull_instance *in, const struct lull_reader *re
         return status;
     struct lull_frame frame = {
         .blocks = in->history.rect, .block_count = in->history.count, .block_stride = sizeof(struct lull_rect)};
-    status = gp_history_create(&history, in->rule.window, &frame, in->sight->slot, in, err);
+    status = gp_history_create(&history, in->rule.window, &frame, in->ops->slot, in, err);
     if (!status)
         status = gp_history_load(&history, &in->rule, in->key, reader, err);
     if (status) {

@@ -1,6 +1,6 @@
 /*
  * Criteria that judge a window of a block's last images by the one stopping rule (model/stopper.h): the whole contract with
- * the host but for their parameters, their model and what they see in an image. ggn and the baselines are such criteria.
+ * the host but for their parameters, their model and what they keep of an image. ggn and the baselines are such criteria.
  *
  * The instance's history is kept only if a whole evaluate call has succeeded; a block asked about again at the same spp gets
  * the same answer. Tasks on different blocks may run at the same time, each with its own worker.
@@ -14,8 +14,8 @@
 #include "base/err.h"
 #include "model/preprocess.h"
 
-/* One look at one block. */
-struct gp_look {
+/* One block at one check. */
+struct gp_block_view {
     struct lull_instance *in;
     const struct lull_view *view;
     const struct lull_block *block;
@@ -23,8 +23,8 @@ struct gp_look {
     void *worker;
 };
 
-/* What such a criterion sees; static. */
-struct gp_sight {
+/* What such a criterion keeps of a block and computes from it; static. */
+struct gp_block_view_ops {
     /* What its slots hold; of: the instance. */
     struct gp_slot (*slot)(const void *of, int32_t width, int32_t height);
     /* Scratch of one worker for blocks of up to `pixels`. NULL on failure. */
@@ -32,14 +32,14 @@ struct gp_sight {
     void (*worker_destroy)(void *worker); /* NULL is allowed */
     void (*model_destroy)(void *model);   /* NULL is allowed */
     /* Puts what is kept of the block's image into `slot`; returns how many values of it were broken. */
-    long (*take)(const struct gp_look *look, uint32_t slot);
-    struct ggn_evidence evidence; /* its functions are given a struct gp_look */
+    long (*read)(const struct gp_block_view *seen, uint32_t slot);
+    struct ggn_evidence evidence; /* its functions are given a struct gp_block_view */
 };
 
 struct lull_instance {
     struct lull_kit kit;
-    const struct gp_sight *sight;
-    void *model;               /* owns, by sight->model_destroy */
+    const struct gp_block_view_ops *ops;
+    void *model;               /* owns, by ops->model_destroy */
     const char *half_wanted;   /* logged when a frame has no half buffer; static text, NULL: nothing is lost */
     const char *slow;          /* logged with each frame; static text, NULL: nothing is */
     struct ggn_stop_rule rule; /* the model's policy, with the parameters over it */
@@ -51,16 +51,16 @@ struct lull_instance {
 };
 
 /* create, up to the model: an instance with its parameters and no model yet. text: see lull_kit_values. */
-int32_t gp_windowed_create(const struct gp_sight *sight, const struct lull_criterion *table, const struct lull_host *host,
-                           const struct lull_pair *pairs, uint32_t pair_count, uint32_t pair_stride, const char **text,
-                           struct lull_instance **instance, struct lull_error *err);
+int32_t gp_windowed_create(const struct gp_block_view_ops *ops, const struct lull_criterion *table,
+                           const struct lull_host *host, const struct lull_pair *pairs, uint32_t pair_count,
+                           uint32_t pair_stride, const char **text, struct lull_instance **instance, struct lull_error *err);
 /* create, after the model: parameters over the policy, requirements, the key. width, height: blocks that the model was made
  * for. */
 void gp_windowed_ready(struct lull_instance *in, const struct lull_param *params, uint32_t count, int width, int height);
 /* Part of the key: any bytes that decide about answers. */
 void gp_windowed_hash(struct lull_instance *in, const void *data, size_t size);
-/* Display codes of the look's block, [3][height][width]; returns how many values were broken. */
-long gp_windowed_read(const struct gp_look *look, uint8_t *out);
+/* Display codes of the block, [3][height][width]; returns how many values were broken. */
+long gp_windowed_read(const struct gp_block_view *seen, uint8_t *out);
 
 int32_t gp_windowed_begin_frame(struct lull_instance *in, const struct lull_frame *frame, struct lull_error *err);
 int32_t gp_windowed_evaluate(struct lull_instance *in, const struct lull_view *view, const struct lull_block *blocks,

@@ -29,7 +29,7 @@ static inline double seq_half_scale(double spp, double half_spp) { return 2 * sq
 
 /* Takes the difference of two means of the same samples, of the first `earlier` and of all `spp` > earlier, to the variance
  * of the mean of all: it has s^2 (1/n1 - 1/n2), and is uncorrelated with the second mean. */
-static inline double seq_look_scale(double earlier, double spp) { return sqrt(earlier / (spp - earlier)); }
+static inline double seq_means_scale(double earlier, double spp) { return sqrt(earlier / (spp - earlier)); }
 
 /* Takes the difference of a mean of spp samples to one of reference_spp others, of variance s^2 (1/n + 1/n_r), to that of
  * the mean of spp alone: against a perfect reference. */

@@ -10,7 +10,7 @@ def sections(path):
     heads = re.findall(r"^#+ (.*)$", open(path, encoding="utf-8").read(), re.M)
     return {re.sub(r"[^\w\- ]", "", h.strip().lower()).replace(" ", "-") for h in heads}
 def links():
-    for page in (f for f in FILES if f.endswith(".md")):
+    for page in (f for f in FILES if f.endswith(".md") and "/templates/" not in f):
         text = re.sub(r"```.*?```", "", open(page, encoding="utf-8").read(), flags=re.S)
         for target in re.findall(r"\]\(([^)\s]+)\)", text):
             path, _, section = target.partition("#")

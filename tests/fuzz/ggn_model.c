@@ -64,13 +64,13 @@ static void judge_by(const struct ggn_baseline *b)
     struct ggn_baseline_reader *r = ggn_baseline_reader_create(b, NULL);
     const int w = b->width + 3, h = b->height; /* two tiles */
     uint8_t *codes = calloc(3 * (size_t)w * (size_t)h, 1);
-    double *look = calloc(ggn_baseline_look_size(b, w, h), sizeof *look);
+    double *look = calloc(ggn_baseline_feature_count(b, w, h), sizeof *look);
     const double *looks[GGN_WINDOW_MAX];
 
     for (int i = 0; i < b->window; i++)
         looks[i] = look;
     if (r && codes && look) {
-        ggn_baseline_look(r, codes, w, h, look);
+        ggn_baseline_extract(r, codes, w, h, look);
         ggn_baseline_logit(r, looks, w, h);
     }
     ggn_baseline_reader_destroy(r);

@@ -157,11 +157,11 @@ static double logit_of(const struct ggn_baseline *b, int w, int h, uint32_t seed
     const double *looks[3] = {look[0], look[1], look[2]};
     struct ggn_baseline_reader *r = ggn_baseline_reader_create(b, NULL);
     assert_non_null(r);
-    assert_true(ggn_baseline_look_size(b, w, h) <= 4 * 128);
+    assert_true(ggn_baseline_feature_count(b, w, h) <= 4 * 128);
     for (uint32_t i = 0; i < 3; i++) {
         for (int k = 0; k < 3 * w * h; k++)
             rgb[k] = (uint8_t)(128.0 + 30.0 * ggn_noise_gauss((uint32_t)k, seed + i));
-        ggn_baseline_look(r, rgb, w, h, look[i]);
+        ggn_baseline_extract(r, rgb, w, h, look[i]);
     }
     double logit = ggn_baseline_logit(r, looks, w, h);
     ggn_baseline_reader_destroy(r);
@@ -474,8 +474,8 @@ static void new_baselines(void **state)
         assert_int_equal(b.window, kind == GGN_SVD_ENTROPY ? 4 : 1);
         assert_int_equal(b.features, kind == GGN_SVD_ENTROPY ? 6 : kind == GGN_ATTRIBUTES_SVM ? 26 : 128);
         assert_true(b.policy.passes == 1 && b.policy.threshold == 0.5 && b.policy.ratio == 1.15 && b.policy.first_spp == 20);
-        assert_int_equal(ggn_baseline_look_size(&b, 65, 45), b.features);
-        assert_int_equal(ggn_baseline_look_size(&b, 66, 91), 6 * b.features);
+        assert_int_equal(ggn_baseline_feature_count(&b, 65, 45), b.features);
+        assert_int_equal(ggn_baseline_feature_count(&b, 66, 91), 6 * b.features);
     }
 }
 
@@ -601,12 +601,12 @@ static void looks_at_tiles(void **state)
         struct ggn_baseline_reader *r = ggn_baseline_reader_create(&b, NULL);
         for (int i = 0; i < 3 * W * H; i++)
             rgb[i] = (uint8_t)(128.0 + 30.0 * ggn_noise_gauss((uint32_t)i, 5) * (i % W > 20 ? 2 : 1));
-        ggn_baseline_look(r, rgb, W, H, look);
-        assert_int_equal(ggn_baseline_look_size(&b, W, H), 4 * b.features);
+        ggn_baseline_extract(r, rgb, W, H, look);
+        assert_int_equal(ggn_baseline_feature_count(&b, W, H), 4 * b.features);
         for (int k = 0; k < 4; k++) {
             for (int i = 0; i < 3 * 24 * 24; i++)
                 tile[i] = rgb[i / 576 * W * H + (starts[k][1] + i % 576 / 24) * W + starts[k][0] + i % 24];
-            ggn_baseline_look(r, tile, 24, 24, part);
+            ggn_baseline_extract(r, tile, 24, 24, part);
             assert_memory_equal(part, look + k * b.features, (size_t)b.features * sizeof *part);
             memcpy(stale + k * b.features, part, (size_t)b.features * sizeof *part);
             const double *alone[] = {part, part, part};

@@ -255,7 +255,7 @@ static void other_counts(void **state)
     /* squares of the scales against the variances that they are there for, of samples of variance 1 */
     const double n = 23, h = 7, r = 100;
     assert_near(pow(seq_half_scale(n, h), 2) * (1 / h + 1 / (n - h)) / 4, 1 / n, 1e-15);
-    assert_near(pow(seq_look_scale(h, n), 2) * (1 / h - 1 / n), 1 / n, 1e-15);
+    assert_near(pow(seq_means_scale(h, n), 2) * (1 / h - 1 / n), 1 / n, 1e-15);
     assert_near(pow(seq_reference_scale(r, n), 2) * (1 / n + 1 / r), 1 / n, 1e-15);
     assert_near(pow(seq_noise_scale(h, n), 2) / h, 1 / n, 1e-15);
     assert_true(seq_half_scale(16, 8) == 1 && seq_half_scale(5, 0) == 0 && seq_half_scale(5, 5) == 0);

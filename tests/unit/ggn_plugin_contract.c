@@ -173,7 +173,7 @@ static double other_logit(void *data)
     if (!o->is_network) {
         struct ggn_baseline_reader *r = ggn_baseline_reader_create(&svm, NULL);
         const double *looks[] = {look};
-        ggn_baseline_look(r, o->codes[o->images - 1], across(o), down(o), look);
+        ggn_baseline_extract(r, o->codes[o->images - 1], across(o), down(o), look);
         logit = ggn_baseline_logit(r, looks, across(o), down(o));
         ggn_baseline_reader_destroy(r);
         return logit;
@@ -582,9 +582,9 @@ static void answers_of_the_observer(void **state)
     c->end_frame(NULL);
 }
 
-/* Without HALF: each answer from the mean and the look that the header of plugin/looks.h names, asked twice, and after a call
+/* Without HALF: each answer from the mean and the look that the header of plugin/means.h names, asked twice, and after a call
  * that failed. */
-static void answers_from_looks(void **state)
+static void answers_from_means(void **state)
 {
     static const uint64_t spp[] = {8, 16, 24, 40, 100, 101, 4096}, base[] = {0, 0, 16, 16, 40, 40, 100};
     enum { COUNT = sizeof spp / sizeof spp[0] };
@@ -802,7 +802,7 @@ int main(void)
                                        cmocka_unit_test(impossible_heads),
                                        cmocka_unit_test(broken_pixels),
                                        cmocka_unit_test(answers_of_the_observer),
-                                       cmocka_unit_test(answers_from_looks),
+                                       cmocka_unit_test(answers_from_means),
                                        cmocka_unit_test(fireflies),
                                        cmocka_unit_test(tables),
                                        cmocka_unit_test(refusals)};

@@ -1,20 +1,21 @@
 /*
- * The criterion "denoised", of denoised.so: when is the picture good that people keep, which is denoised? Each look denoises
- * both halves of a block's samples and estimates how visible the error of the kept picture is (plugin/denoised/look.h), by
- * what the halves disagree on and by what each, denoised, says of the other, noisy one. `error` is the larger of the two
- * over the level at which people stop seeing it; a block stops when two looks in a row find it low enough for `visible`.
+ * The criterion "denoised", of denoised.so: when is the picture good that people keep, which is denoised? Each check
+ * denoises both halves of a block's samples and estimates how visible the error of the kept picture is
+ * (plugin/denoised/block_view.h): from the difference of the denoised halves, and from that of each from the other, noisy
+ * one. `error` is the larger of the two over the level at which people stop seeing it; a block stops when two checks in a
+ * row find it low enough for `visible`.
  *
- * The history of a block is its last look: asked again at the same samples it answers the same, though its neighbours, which
- * the denoiser sees too, may have changed.
+ * The history of a block is its last check: asked again at the same samples it answers the same, though its neighbours,
+ * which the denoiser reads too, may have changed.
  */
 #include <stdatomic.h>
 
 #include "observer/observer.h"
 #include "plugin/criteria.h"
-#include "plugin/denoised/look.h"
+#include "plugin/denoised/block_view.h"
 #include "plugin/translate.h"
 
-static const double LEAST_STEP = 1.4142135623730951, CONFIRM_STEP = 1.25; /* of samples, from look to look */
+static const double LEAST_STEP = 1.4142135623730951, CONFIRM_STEP = 1.25; /* of samples, from check to check */
 
 enum { P_VISIBLE, P_FIRST_SPP, P_GROWTH, P_PICTURE, P_QUALITY, P_LIBRARY, P_COUNT };
 enum {
@@ -26,7 +27,7 @@ static const struct lull_param params[P_COUNT] = {
     [P_VISIBLE] = LULL_KIT_FLOAT("visible", "0.35", 1e-4, 0.9999,
                                  "stop when at most this share of viewers would still see an error of the denoised picture"),
     [P_FIRST_SPP] = LULL_KIT_INT("first-spp", "32", 2, 1e15, "samples per pixel before the first judgement"),
-    [P_GROWTH] = LULL_KIT_FLOAT("growth", "2", 1.5, 100, "largest ratio of samples between two looks at a block"),
+    [P_GROWTH] = LULL_KIT_FLOAT("growth", "2", 1.5, 100, "largest ratio of samples between two checks of a block"),
     [P_PICTURE] = LULL_KIT_CHOICE("picture", "blend", "blend|denoised",
                                   "what is kept: the blend of noisy and denoised picture, or the denoised one alone"),
     [P_QUALITY] = LULL_KIT_CHOICE("quality", "high", "fast|balanced|high", "of the denoiser"),
@@ -35,11 +36,11 @@ static const struct lull_param params[P_COUNT] = {
 };
 
 struct past {     /* what is remembered of a block; saved as it is, without padding */
-    uint64_t spp; /* of the last look; 0: none */
+    uint64_t spp; /* of the last check; 0: none */
     uint64_t next_spp;
     double p_noisy, predicted_spp, error, halves, crossed; /* the last two in units of `error` */
     int32_t action;
-    uint32_t flags, low, zero; /* low: the look found an error that is low enough */
+    uint32_t flags, low, zero; /* low: the check found an error that is low enough */
 };
 
 struct lull_instance {
@@ -50,7 +51,7 @@ struct lull_instance {
     atomic_flag warned;  /* of halves that are none: once per frame */
     struct gd_form form; /* of the open frame, as all below */
     uint32_t workers;
-    struct gd_look *look;        /* owns, [workers] */
+    struct gd_block_view *seen;  /* owns, [workers] */
     struct lull_rect *rect;      /* owns, [blocks] */
     struct past *past, *pending; /* own, [blocks] */
 };
@@ -65,27 +66,27 @@ static void warn(struct lull_instance *in, const char *what)
 }
 
 /* The larger of both errors, NaN where there is none; *now gets both. */
-static double error_of(struct lull_instance *in, struct gd_look *look, const struct lull_view *view,
+static double error_of(struct lull_instance *in, struct gd_block_view *seen, const struct lull_view *view,
                        const struct lull_block *b, struct lull_kit_tally *tally, struct past *now)
 {
     const size_t pixels = (size_t)lull_kit_pixels(b);
     struct gd_errors e;
-    if (!gd_look_read(look, &in->form, &in->kit, view, b, tally)) {
-        if (!gd_look_structure(look, &in->form, b))
+    if (!gd_block_view_read(seen, &in->form, &in->kit, view, b, tally)) {
+        if (!gd_block_view_structure(seen, &in->form, b))
             return now->halves = now->crossed = 0;
         warn(in, "denoised: COLOR and HALF are the same in a block that is not of one colour: HALF must hold a fixed half "
                  "of the samples");
         tally->early = tally->bad = 1;
         return (double)NAN;
     }
-    if (gd_look_judge(look, &in->form, &in->kit, b, in->kit.value[P_PICTURE] == 0, &e))
-        return (double)NAN; /* evaluate finds it in look->err */
+    if (gd_block_view_errors(seen, &in->form, &in->kit, b, in->kit.value[P_PICTURE] == 0, &e))
+        return (double)NAN; /* evaluate finds it in seen->err */
     now->halves = ggn_observer_error(&in->observer, e.halves, pixels);
     now->crossed = ggn_observer_error(&in->observer, e.crossed, pixels);
     return fmax(now->halves, now->crossed);
 }
 
-/* Looks double, because they are dear; what has been found once is looked at again soon. */
+/* Samples double from check to check, because checks are dear; a low error is checked again soon. */
 static void decide(const struct lull_instance *in, const struct lull_block *b, const struct lull_kit_tally *tally,
                    double error, struct past *now, struct lull_decision *d)
 {
@@ -106,7 +107,7 @@ static void decide(const struct lull_instance *in, const struct lull_block *b, c
 static void judge(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
                   struct lull_decision *d, uint32_t worker)
 {
-    struct gd_look *look = &in->look[worker < in->workers ? worker : 0];
+    struct gd_block_view *seen = &in->seen[worker < in->workers ? worker : 0];
     struct past *now = &in->pending[b->id];
     struct lull_kit_tally tally = {0};
     double error = (double)NAN;
@@ -121,7 +122,7 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
                      "stopped by it");
             tally.early = 1;
         } else {
-            error = error_of(in, look, view, b, &tally, now);
+            error = error_of(in, seen, view, b, &tally, now);
         }
         decide(in, b, &tally, error, now, d);
         *now = (struct past){b->spp,       d->next_spp, d->p_noisy, d->predicted_spp, d->error, now->halves,
@@ -146,13 +147,13 @@ static void tell(const struct lull_instance *in, const struct lull_block *b, con
     host->log(host, LULL_LOG_DEBUG, line);
 }
 
-static int32_t fail_of(const struct lull_instance *in, const struct gd_look *look, struct lull_error *err)
+static int32_t fail_of(const struct lull_instance *in, const struct gd_block_view *seen, struct lull_error *err)
 {
     const struct lull_host *host = in->kit.host;
-    int32_t code = look->err.code == BASE_ENOMEM ? LULL_E_MEMORY : LULL_E_INTERNAL;
+    int32_t code = seen->err.code == BASE_ENOMEM ? LULL_E_MEMORY : LULL_E_INTERNAL;
     if (host && host->cancelled && host->cancelled(host))
         code = LULL_E_CANCELLED;
-    return lull_kit_fail(err, code, "evaluate: %.400s", look->err.text);
+    return lull_kit_fail(err, code, "evaluate: %.400s", seen->err.text);
 }
 
 /* As lull_kit_evaluate; fails when a block could not be denoised. A call that failed leaves no trace. */
@@ -161,11 +162,11 @@ static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, 
                         struct lull_error *err)
 {
     for (uint32_t i = 0; in && i < in->workers; i++)
-        in->look[i].err.code = 0;
+        in->seen[i].err.code = 0;
     int32_t status = lull_kit_evaluate(in, view, blocks, block_stride, decisions, decision_stride, count, err);
     for (uint32_t i = 0; !status && i < in->workers; i++)
-        if (in->look[i].err.code)
-            status = fail_of(in, &in->look[i], err);
+        if (in->seen[i].err.code)
+            status = fail_of(in, &in->seen[i], err);
     for (uint32_t i = 0; i < count && !status; i++) {
         const struct lull_block *b = lull_kit_at(blocks, block_stride, i);
         const int again = in->past[b->id].spp == b->spp;
@@ -180,12 +181,12 @@ static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, 
 
 static void frame_release(struct lull_instance *in)
 {
-    for (uint32_t i = 0; in->look && i < in->workers; i++)
-        gd_look_release(&in->look[i]);
-    free(in->look);
+    for (uint32_t i = 0; in->seen && i < in->workers; i++)
+        gd_block_view_release(&in->seen[i]);
+    free(in->seen);
     free(in->rect);
     free(in->past);
-    in->look = NULL;
+    in->seen = NULL;
     in->rect = NULL;
     in->past = in->pending = NULL;
     in->workers = 0;
@@ -198,16 +199,16 @@ static int32_t frame_create(const struct lull_instance *in, const struct lull_fr
     const size_t n = frame->block_count;
     struct base_err why = {0};
     fresh->form = gd_form_of(frame, (enum lull_oidn_quality)(LULL_OIDN_FAST + (int)in->kit.value[P_QUALITY]));
-    fresh->look = calloc(lull_kit_workers(&in->kit), sizeof *fresh->look);
+    fresh->seen = calloc(lull_kit_workers(&in->kit), sizeof *fresh->seen);
     fresh->rect = malloc(n * sizeof *fresh->rect);
     fresh->past = calloc(2 * n, sizeof *fresh->past);
-    if (!fresh->look || !fresh->rect || !fresh->past)
+    if (!fresh->seen || !fresh->rect || !fresh->past)
         base_fail_nomem(&why, "the blocks");
     fresh->pending = fresh->past ? fresh->past + n : NULL;
     for (uint32_t i = 0; !why.code && i < n; i++)
         fresh->rect[i] = *lull_kit_rect(frame, i);
     for (uint32_t i = 0; !why.code && i < lull_kit_workers(&in->kit); i++)
-        if (!gd_look_create(&fresh->look[i], &fresh->form, in->library, &why))
+        if (!gd_block_view_create(&fresh->seen[i], &fresh->form, in->library, &why))
             fresh->workers = i + 1;
     if (!why.code)
         return LULL_OK;
@@ -226,7 +227,7 @@ static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *fr
     frame_release(in);
     in->form = fresh.form;
     in->workers = fresh.workers;
-    in->look = fresh.look;
+    in->seen = fresh.seen;
     in->rect = fresh.rect;
     in->past = fresh.past;
     in->pending = fresh.pending;

@@ -1,4 +1,4 @@
-#include "plugin/denoised/look.h"
+#include "plugin/denoised/block_view.h"
 
 #include "base/colour.h"
 #include "denoise/blend.h"
@@ -15,7 +15,7 @@ static int32_t most(int32_t a, int32_t b) { return a > b ? a : b; }
 
 static int32_t least(int32_t a, int32_t b) { return a < b ? a : b; }
 
-/* A side with what is looked at around it, as far as the frame's blocks reach: 0 < side <= area. */
+/* A side with what is denoised around it, as far as the frame's blocks reach: 0 < side <= area. */
 static int32_t widened(int32_t side, int32_t area)
 {
     return area - side > GD_REACH + GD_HALO ? side + GD_REACH + GD_HALO : area;
@@ -41,13 +41,13 @@ struct gd_form gd_form_of(const struct lull_frame *frame, enum lull_oidn_quality
     return form;
 }
 
-int gd_look_create(struct gd_look *look, const struct gd_form *form, const char *library, struct base_err *err)
+int gd_block_view_create(struct gd_block_view *seen, const struct gd_form *form, const char *library, struct base_err *err)
 {
     const size_t pixels = (size_t)form->width * (size_t)form->height;
     const size_t patches = ggn_visible_patches(form->width, form->height);
     const size_t box = 3 * (size_t)form->box.width * (size_t)form->box.height, planes = 3 + 4 + 4 + 7;
     const size_t doubles = patches + ggn_visibility_scratch(form->width);
-    struct gd_look l = {0};
+    struct gd_block_view l = {0};
     if (box > PTRDIFF_MAX / 64 / sizeof(double) || form->area.x1 > INT32_MAX / 2 || form->area.y1 > INT32_MAX / 2)
         return base_fail_nomem(err, "the pictures of a block");
     l.memory = malloc(doubles * sizeof(double) + (BOXES * box + planes * pixels) * sizeof(float));
@@ -69,17 +69,17 @@ int gd_look_create(struct gd_look *look, const struct gd_form *form, const char 
     if (!rc)
         rc = lull_oidn_prepare(l.oidn, &form->box, err);
     if (rc)
-        gd_look_release(&l);
+        gd_block_view_release(&l);
     else
-        *look = l;
+        *seen = l;
     return rc;
 }
 
-void gd_look_release(struct gd_look *look)
+void gd_block_view_release(struct gd_block_view *seen)
 {
-    lull_oidn_close(look->oidn);
-    free(look->memory);
-    *look = (struct gd_look){0};
+    lull_oidn_close(seen->oidn);
+    free(seen->memory);
+    *seen = (struct gd_block_view){0};
 }
 
 /* --- reading ----------------------------------------------------------------------------------------------------------- */
@@ -108,7 +108,7 @@ static struct lull_rect common(struct lull_rect a, struct lull_rect b)
 static int finite3(const float v[3]) { return isfinite(v[0]) && isfinite(v[1]) && isfinite(v[2]); }
 
 /* The pixels of `rect`, which are of block b, go into the box. What is no number is as the pixel to the left. */
-static int read_part(struct gd_look *look, struct lull_rect box, struct lull_rect rect, const struct lull_view *view,
+static int read_part(struct gd_block_view *seen, struct lull_rect box, struct lull_rect rect, const struct lull_view *view,
                      const struct lull_block *b, uint32_t planes, struct lull_kit_tally *tally)
 {
     const double n = (double)b->spp, h = (double)b->half_spp;
@@ -133,12 +133,12 @@ static int read_part(struct gd_look *look, struct lull_rect box, struct lull_rec
             tally->valid += good;
             tally->bad += !good;
             for (size_t c = 0; c < 3; c++) {
-                look->box[HALF_A][at + c] = good ? a[c] : before ? look->box[HALF_A][at + c - 3] : 0.0f;
-                look->box[HALF_B][at + c] = good ? rest[c] : before ? look->box[HALF_B][at + c - 3] : 0.0f;
+                seen->box[HALF_A][at + c] = good ? a[c] : before ? seen->box[HALF_A][at + c - 3] : 0.0f;
+                seen->box[HALF_B][at + c] = good ? rest[c] : before ? seen->box[HALF_B][at + c - 3] : 0.0f;
                 if (s.planes & LULL_PLANE_BIT(LULL_PLANE_ALBEDO))
-                    look->box[ALBEDO][at + c] = (float)s.value[LULL_PLANE_ALBEDO][i][c];
+                    seen->box[ALBEDO][at + c] = (float)s.value[LULL_PLANE_ALBEDO][i][c];
                 if (s.planes & LULL_PLANE_BIT(LULL_PLANE_NORMAL))
-                    look->box[NORMAL][at + c] = (float)s.value[LULL_PLANE_NORMAL][i][c];
+                    seen->box[NORMAL][at + c] = (float)s.value[LULL_PLANE_NORMAL][i][c];
             }
         }
     return differ;
@@ -157,15 +157,15 @@ static void repeat_edges(float *picture, struct lull_rect box, struct lull_rect 
         }
 }
 
-int gd_look_read(struct gd_look *look, const struct gd_form *form, const struct lull_kit *kit, const struct lull_view *view,
-                 const struct lull_block *b, struct lull_kit_tally *tally)
+int gd_block_view_read(struct gd_block_view *seen, const struct gd_form *form, const struct lull_kit *kit,
+                       const struct lull_view *view, const struct lull_block *b, struct lull_kit_tally *tally)
 {
     const struct lull_rect box = box_of(form, b), core = {b->x0, b->y0, b->x1, b->y1};
     const uint32_t planes = kit->need.planes_required | (form->box.albedo ? LULL_PLANE_BIT(LULL_PLANE_ALBEDO) : 0) |
                             (form->box.normal ? LULL_PLANE_BIT(LULL_PLANE_NORMAL) : 0);
     struct lull_rect known = core;
     struct lull_kit_tally around = {0};
-    memset(look->box[0], 0, 4 * 3 * (size_t)form->box.width * (size_t)form->box.height * sizeof(float));
+    memset(seen->box[0], 0, 4 * 3 * (size_t)form->box.width * (size_t)form->box.height * sizeof(float));
     if (view->all) {
         known = (struct lull_rect){b->x0 - GD_REACH, b->y0 - GD_REACH, b->x1 + GD_REACH, b->y1 + GD_REACH};
         known = common(common(known, form->area), box);
@@ -174,36 +174,36 @@ int gd_look_read(struct gd_look *look, const struct gd_form *form, const struct 
         const struct lull_block *other = lull_kit_at(view->all, view->all_stride, i);
         const struct lull_rect r = {other->x0, other->y0, other->x1, other->y1};
         if (other->id != b->id && other->spp > 0)
-            read_part(look, box, common(r, known), view, other, planes, &around);
+            read_part(seen, box, common(r, known), view, other, planes, &around);
     }
-    int differ = read_part(look, box, core, view, b, planes, tally);
+    int differ = read_part(seen, box, core, view, b, planes, tally);
     for (int i = HALF_A; i <= NORMAL; i++)
-        repeat_edges(look->box[i], box, known);
+        repeat_edges(seen->box[i], box, known);
     return differ;
 }
 
 /* The block's part of a box as a display shows it; its luminance and L*, [P]. */
-static void show(struct gd_look *look, int which, struct lull_rect box, const struct lull_block *b,
+static void show(struct gd_block_view *seen, int which, struct lull_rect box, const struct lull_block *b,
                  const struct lull_kit *kit, float *light, float *lightness)
 {
     const size_t width = (size_t)(b->x1 - b->x0), pixels = (size_t)lull_kit_pixels(b), row = (size_t)(box.x1 - box.x0);
     for (size_t y = 0, at = 0; y < pixels / width; y++) {
-        const float *from = look->box[which] + 3 * ((y + (size_t)(b->y0 - box.y0)) * row + (size_t)(b->x0 - box.x0));
+        const float *from = seen->box[which] + 3 * ((y + (size_t)(b->y0 - box.y0)) * row + (size_t)(b->x0 - box.x0));
         for (size_t x = 0; x < width; x++, at++, from += 3) {
             for (size_t c = 0; c < 3; c++)
-                look->rgb[c * pixels + at] = gp_shown(kit, (double)from[c]);
-            light[at] = (float)base_luminance((double)look->rgb[at], (double)look->rgb[pixels + at],
-                                              (double)look->rgb[2 * pixels + at]);
+                seen->rgb[c * pixels + at] = gp_shown(kit, (double)from[c]);
+            light[at] = (float)base_luminance((double)seen->rgb[at], (double)seen->rgb[pixels + at],
+                                              (double)seen->rgb[2 * pixels + at]);
         }
     }
-    ggn_visible_lightness(look->rgb, pixels, lightness);
+    ggn_visible_lightness(seen->rgb, pixels, lightness);
 }
 
-int gd_look_structure(const struct gd_look *look, const struct gd_form *form, const struct lull_block *b)
+int gd_block_view_structure(const struct gd_block_view *seen, const struct gd_form *form, const struct lull_block *b)
 {
     const struct lull_rect box = box_of(form, b);
     const size_t row = 3 * (size_t)(box.x1 - box.x0), bytes = 3 * sizeof(float);
-    const float *first = look->box[HALF_A] + (size_t)(b->y0 - box.y0) * row + 3 * (size_t)(b->x0 - box.x0);
+    const float *first = seen->box[HALF_A] + (size_t)(b->y0 - box.y0) * row + 3 * (size_t)(b->x0 - box.x0);
     for (int32_t y = 0; y < b->y1 - b->y0; y++)
         for (int32_t x = 0; x < b->x1 - b->x0; x++)
             if (memcmp(first, first + (size_t)y * row + 3 * (size_t)x, bytes) != 0)
@@ -218,7 +218,7 @@ struct sums {
 };
 
 /* Squares of visible error, in units of what texture hides, over [x0, x1) x [y0, y1). unit: of the denoised part. */
-static struct sums sum_over(const struct gd_look *l, const float *raw, int width, const int r[4], double unit)
+static struct sums sum_over(const struct gd_block_view *l, const float *raw, int width, const int r[4], double unit)
 {
     struct sums s = {0};
     for (int y = r[1]; y < r[3]; y++)
@@ -243,7 +243,7 @@ static double standard_error(const struct sums *s)
 static double cube(double v) { return v > 0.0 ? v * v * v : 0.0; }
 
 /* Mean of sixth powers of the error over a patch, for errors that are Gaussian inside it or inside its tiles. */
-static double sixth_moment(const struct gd_look *l, const float *raw, int width, const int patch[4], double unit)
+static double sixth_moment(const struct gd_block_view *l, const float *raw, int width, const int patch[4], double unit)
 {
     struct sums whole = {0};
     double tiles = 0.0;
@@ -259,7 +259,7 @@ static double sixth_moment(const struct gd_look *l, const float *raw, int width,
 }
 
 /* raw: noise of the mean as the observer sees it, in units of what texture hides. */
-static double crossed_error(const struct gd_look *l, const float *raw, int width, int height)
+static double crossed_error(const struct gd_block_view *l, const float *raw, int width, int height)
 {
     const size_t patches = ggn_visible_patches(width, height);
     double sum = 0.0;
@@ -277,18 +277,18 @@ static int cancelled(void *data)
     return host->cancelled(host);
 }
 
-static int denoise(struct gd_look *look, const struct lull_kit *kit)
+static int denoise(struct gd_block_view *seen, const struct lull_kit *kit)
 {
     const struct lull_host *host = kit->host;
-    const struct lull_oidn_pictures p = {{look->box[HALF_A], look->box[HALF_B]},
-                                         look->box[ALBEDO],
-                                         look->box[NORMAL],
-                                         {look->box[DENOISED_A], look->box[DENOISED_B]}};
-    return lull_oidn_run(look->oidn, &p, host && host->cancelled ? cancelled : NULL, &host, &look->err);
+    const struct lull_oidn_pictures p = {{seen->box[HALF_A], seen->box[HALF_B]},
+                                         seen->box[ALBEDO],
+                                         seen->box[NORMAL],
+                                         {seen->box[DENOISED_A], seen->box[DENOISED_B]}};
+    return lull_oidn_run(seen->oidn, &p, host && host->cancelled ? cancelled : NULL, &host, &seen->err);
 }
 
-int gd_look_judge(struct gd_look *l, const struct gd_form *form, const struct lull_kit *kit, const struct lull_block *b,
-                  int blend, struct gd_errors *errors)
+int gd_block_view_errors(struct gd_block_view *l, const struct gd_form *form, const struct lull_kit *kit,
+                         const struct lull_block *b, int blend, struct gd_errors *errors)
 {
     static const int shown[] = {HALF_A, HALF_B, DENOISED_A, DENOISED_B};
     const struct lull_rect box = box_of(form, b);

@@ -1,5 +1,5 @@
 /*
- * One look at a block of a picture that will be denoised: both halves of its samples are denoised, with what lies around,
+ * The view of a block of a picture that will be denoised: both halves of its samples are denoised, with what lies around,
  * and two estimates say how visible the error is of the picture that will be kept (denoise/estimate.h,
  * observer/visibility.h).
  *
@@ -14,10 +14,10 @@
  *     beyond doubt.
  *   Errors are taken as Gaussian inside: a sixth moment is 15 cubes of the mean square.
  *
- * One struct gd_look per worker; nothing is allocated after gd_look_create.
+ * One struct gd_block_view per worker; nothing is allocated after gd_block_view_create.
  */
-#ifndef GGN_PLUGIN_DENOISED_LOOK_H
-#define GGN_PLUGIN_DENOISED_LOOK_H
+#ifndef GGN_PLUGIN_DENOISED_BLOCK_VIEW_H
+#define GGN_PLUGIN_DENOISED_BLOCK_VIEW_H
 
 #include <lull/criterion_kit.h>
 
@@ -36,7 +36,7 @@ struct gd_errors { /* visible noise r */
     double halves, crossed;
 };
 
-struct gd_look {
+struct gd_block_view {
     struct lull_oidn *oidn;
     float *box[6];       /* [box][3]: half A, half B, albedo, normal, denoised A, denoised B */
     float *rgb;          /* [3][P], displayed light */
@@ -46,23 +46,24 @@ struct gd_look {
     double *texture;                                     /* [patches] */
     double *rows;                                        /* scratch of observer/visibility.h */
     void *memory;                                        /* owns all of the above but oidn */
-    struct base_err err;                                 /* of the last look */
+    struct base_err err;                                 /* of the last call that failed */
 };
 
 /* frame: checked. quality: of struct lull_oidn_form. */
 struct gd_form gd_form_of(const struct lull_frame *frame, enum lull_oidn_quality quality);
 
 /* library: as for lull_oidn_open. */
-int gd_look_create(struct gd_look *look, const struct gd_form *form, const char *library, struct base_err *err);
-void gd_look_release(struct gd_look *look);
+int gd_block_view_create(struct gd_block_view *seen, const struct gd_form *form, const char *library, struct base_err *err);
+void gd_block_view_release(struct gd_block_view *seen);
 
 /* Reads a block of 0 < half_spp < spp and its surroundings. Returns whether the halves differ anywhere in the block. */
-int gd_look_read(struct gd_look *look, const struct gd_form *form, const struct lull_kit *kit, const struct lull_view *view,
-                 const struct lull_block *block, struct lull_kit_tally *tally);
-/* Denoises what was read and judges it. blend: the picture kept is the blend. 0, or a negative code and look->err. */
-int gd_look_judge(struct gd_look *look, const struct gd_form *form, const struct lull_kit *kit,
-                  const struct lull_block *block, int blend, struct gd_errors *errors);
+int gd_block_view_read(struct gd_block_view *seen, const struct gd_form *form, const struct lull_kit *kit,
+                       const struct lull_view *view, const struct lull_block *block, struct lull_kit_tally *tally);
+/* Denoises what was read and estimates its error. blend: the picture kept is the blend. 0, or a negative code and
+ * seen->err. */
+int gd_block_view_errors(struct gd_block_view *seen, const struct gd_form *form, const struct lull_kit *kit,
+                         const struct lull_block *block, int blend, struct gd_errors *errors);
 /* Whether the block that was read shows more than one colour. */
-int gd_look_structure(const struct gd_look *look, const struct gd_form *form, const struct lull_block *block);
+int gd_block_view_structure(const struct gd_block_view *seen, const struct gd_form *form, const struct lull_block *block);
 
 #endif
