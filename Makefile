@@ -56,7 +56,7 @@ GGN_LIBS := -lopenblas -llapacke -lsvm -lcjson -lpng -lz -ldl -lm
 
 # --- include paths: the dependency arrows --------------------------------------------------------------------------------
 API := -Iplugin-api/include
-BASE := -Iplugin-api# "base/…", "job/…", "sequence/…" and "denoise/…": what both programs stand on; no part of the ABI
+BASE := -Iplugin-api# "base/…", "job/…", "picture/…", "sequence/…" and "denoise/…": what all programs stand on; no part of the ABI
 INC_plugin-api         := $(API)
 INC_plugin-api_base    := $(BASE)
 INC_plugin-api_mpi     := $(BASE) $(MPI_CFLAGS)# the only folder that knows MPI
@@ -73,17 +73,16 @@ INC_tests_api          := -Itests -Itests/support $(API)
 INC_tests_host         := $(INC_tests_api) $(BASE)# api_host_: the host library from inside
 
 # --- sources -------------------------------------------------------------------------------------------------------------
-BASE_SRC    := $(wildcard plugin-api/base/*.c plugin-api/job/*.c plugin-api/sequence/*.c plugin-api/denoise/*.c)
+BASE_SRC    := $(wildcard plugin-api/base/*.c plugin-api/job/*.c plugin-api/picture/*.c plugin-api/sequence/*.c plugin-api/denoise/*.c)
+IMAGES_SRC  := plugin-api/picture/oiio.cpp# in a shared object of its own; fuzz targets and benchmarks link it
 LOADER_SRC  := $(wildcard plugin-api/src/*.c)
 HOST_SRC    := $(wildcard plugin-api/host/*.c)
 EXAMPLE_SRC := $(wildcard plugin-api/examples/*.c)
 TOOL_SRC    := $(wildcard plugin-api/tools/*.c)
 MPI_SRC     := $(wildcard plugin-api/mpi/*.c)
 PT_SRC      := $(filter-out pathtracer/app/%,$(wildcard pathtracer/*/*.c))
-PT_IMAGES   := $(wildcard pathtracer/*/*.cpp)# in a shared object of their own; fuzz targets and benchmarks link them
 PT_MAIN     := $(wildcard pathtracer/app/*.c)
 GGN_SRC     := $(filter-out ggn/plugin/% ggn/study/% ggn/cli/%,$(wildcard ggn/*/*.c))
-GGN_IMAGES  := $(wildcard ggn/*/*.cpp)# as PT_IMAGES
 # What includes nn/real.h itself is compiled for float and, with GGN_DOUBLE, for double.
 GGN_TWICE   := $(shell grep -ls '"nn/real.h"' ggn/nn/*.c ggn/model/*.c tests/support/*.c)
 GGN_ENTRIES := $(wildcard ggn/plugin/entry_*.c)# one a library of criteria: entry_NAME.c makes NAME.so
@@ -104,10 +103,10 @@ o = $(addprefix $(OBJ)/,$(addsuffix .o,$(1)) $(addsuffix .double.o,$(filter $(GG
 BASE_OBJ    := $(call o,$(BASE_SRC))
 # The path tracer is linked with the host library's objects: it starts without a search for the library, wherever it is moved.
 PT_CORE_OBJ := $(call o,$(PT_SRC) $(HOST_SRC)) $(BASE_OBJ)
-PT_OBJ      := $(PT_CORE_OBJ) $(call o,$(PT_IMAGES))
+PT_OBJ      := $(PT_CORE_OBJ) $(call o,$(IMAGES_SRC))
 LOADER_OBJ  := $(call o,$(LOADER_SRC))
 GGN_CORE_OBJ := $(call o,$(GGN_SRC)) $(BASE_OBJ)
-GGN_OBJ     := $(GGN_CORE_OBJ) $(call o,$(GGN_IMAGES))
+GGN_OBJ     := $(GGN_CORE_OBJ) $(call o,$(IMAGES_SRC))
 GGN_PLUGIN_OBJ := $(call o,$(GGN_PLUGIN))
 STUDY_OBJ   := $(call o,$(STUDY_SRC))
 
@@ -117,7 +116,7 @@ MPI_MODULE := $(if $(MPI),$(OUT)/lib/lull-mpi.so)# loaded only by processes that
 HOST_LIB := $(OUT)/lib/liblull-host.so.1
 EXAMPLES := $(BIN)/host-example
 DENOISER := $(OUT)/lib/lull-denoiser# a program that denoise/oidn.h runs
-MODULES  := $(DENOISER) $(MPI_MODULE) $(OUT)/lib/lull-images.so $(OUT)/lib/ggn-images.so
+MODULES  := $(DENOISER) $(MPI_MODULE) $(OUT)/lib/lull-images.so
 CRITERIA := $(EXAMPLE_SRC:plugin-api/examples/%.c=$(LIB)/%.so) $(GGN_ENTRIES:ggn/plugin/entry_%.c=$(LIB)/%.so)
 TESTS    := $(patsubst tests/%.c,$(OUT)/tests/%,$(TEST_SRC))
 SANE     := $(patsubst tests/%.c,build/asan/tests/%,$(SANE_SRC))
@@ -132,7 +131,7 @@ all: $(PROGRAMS) $(CRITERIA) $(MODULES) $(HOST_LIB) $(EXAMPLES) ## build the pro
 
 # --- compiling: one rule, flags by folder --------------------------------------------------------------------------------
 inc = $(or $(strip \
-  $(if $(filter plugin-api/%,$(1)),$(if $(filter plugin-api/base/% plugin-api/job/% plugin-api/sequence/% plugin-api/denoise/%,$(1)),$(INC_plugin-api_base),$(if $(filter plugin-api/tools/%,$(1)),$(INC_plugin-api_tools),$(if $(filter plugin-api/host/%,$(1)),$(INC_plugin-api_host),$(if $(filter plugin-api/mpi/%,$(1)),$(INC_plugin-api_mpi),$(INC_plugin-api)))))) \
+  $(if $(filter plugin-api/%,$(1)),$(if $(filter plugin-api/base/% plugin-api/job/% plugin-api/picture/% plugin-api/sequence/% plugin-api/denoise/%,$(1)),$(INC_plugin-api_base),$(if $(filter plugin-api/tools/%,$(1)),$(INC_plugin-api_tools),$(if $(filter plugin-api/host/%,$(1)),$(INC_plugin-api_host),$(if $(filter plugin-api/mpi/%,$(1)),$(INC_plugin-api_mpi),$(INC_plugin-api)))))) \
   $(if $(filter pathtracer/%,$(1)),$(if $(filter pathtracer/app/% pathtracer/render/%,$(1)),$(INC_pathtracer_host),$(INC_pathtracer))) \
   $(if $(filter ggn/%,$(1)),$(if $(filter ggn/plugin/%,$(1)),$(INC_ggn_plugin),$(INC_ggn))) \
   $(if $(filter tests/%,$(1)),$(if $(filter pt_%,$(notdir $(1))),$(INC_tests_pt),$(if $(filter ggn_%,$(notdir $(1))),$(INC_tests_ggn),$(if $(filter base_%,$(notdir $(1))),$(INC_tests_base),$(if $(filter api_host_%,$(notdir $(1))),$(INC_tests_host),$(INC_tests_api))))))),)
@@ -163,19 +162,17 @@ so   = @mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--version-script=plu
 
 $(BIN)/lull-render: $(call o,$(PT_MAIN)) $(PT_CORE_OBJ) $(LOADER_OBJ) | $(OUT)/lib/lull-images.so
 	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) -o $@
-$(BIN)/ggn: $(call o,$(GGN_CLI)) $(GGN_CORE_OBJ) | $(OUT)/lib/ggn-images.so
+$(BIN)/ggn: $(call o,$(GGN_CLI)) $(GGN_CORE_OBJ) | $(OUT)/lib/lull-images.so
 	$(link) $^ $(LDFLAGS_ALL) $(GGN_LIBS) -o $@
 # Of the rest of ggn the study takes what it names, and no network is among it.
-$(BIN)/lull-study: $(call o,$(STUDY_MAIN)) $(STUDY_OBJ) $(OBJ)/ggn.a | $(OUT)/lib/ggn-images.so
+$(BIN)/lull-study: $(call o,$(STUDY_MAIN)) $(STUDY_OBJ) $(OBJ)/ggn.a | $(OUT)/lib/lull-images.so
 	$(link) $^ $(LDFLAGS_ALL) -Wl,--as-needed $(STUDY_LIBS) $(GGN_LIBS) -o $@
 # Of what both programs stand on the checker takes what it names.
 $(OBJ)/base.a: $(BASE_OBJ)
 	@rm -f $@; echo "  AR   $@"; $(AR) rcs $@ $^
 $(BIN)/lull-check: $(call o,$(TOOL_SRC)) $(LOADER_OBJ) $(OBJ)/base.a
 	$(link) $^ $(LDFLAGS_ALL) -ldl -lm -o $@
-$(OUT)/lib/lull-images.so: $(call o,$(PT_IMAGES)) $(OBJ)/base.a
-$(OUT)/lib/ggn-images.so: $(call o,$(GGN_IMAGES)) $(OBJ)/base.a
-$(OUT)/lib/lull-images.so $(OUT)/lib/ggn-images.so:
+$(OUT)/lib/lull-images.so: $(call o,$(IMAGES_SRC)) $(OBJ)/base.a
 	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--exclude-libs,ALL $^ $(LDFLAGS_ALL) $(IMAGE_LIBS) -lz -lm -o $@
 $(DENOISER): $(call o,$(wildcard plugin-api/denoise/program/*.c)) $(OBJ)/base.a
 	$(link) $^ $(LDFLAGS_ALL) -ldl -lm -o $@
@@ -352,7 +349,7 @@ man: all ## write docs/man/*.1 from --help and docs/man/*.h2m (needs help2man)
 	@docs/man/write
 
 compdb: ## write compile_commands.json
-	@{ echo '['; sep=; for f in $(BASE_SRC) $(PT_SRC) $(PT_IMAGES) $(PT_MAIN) $(GGN_SRC) $(GGN_IMAGES) $(GGN_PLUGIN) $(GGN_ENTRIES) $(STUDY_SRC) $(STUDY_MAIN) $(GGN_CLI) $(HOST_SRC) $(LOADER_SRC) $(EXAMPLE_SRC) $(TOOL_SRC) $(MPI_SRC); do \
+	@{ echo '['; sep=; for f in $(BASE_SRC) $(PT_SRC) $(IMAGES_SRC) $(PT_MAIN) $(GGN_SRC) $(GGN_PLUGIN) $(GGN_ENTRIES) $(STUDY_SRC) $(STUDY_MAIN) $(GGN_CLI) $(HOST_SRC) $(LOADER_SRC) $(EXAMPLE_SRC) $(TOOL_SRC) $(MPI_SRC); do \
 	  printf '%s' "$$sep"; $(MAKE) --no-print-directory -s compdb-one F=$$f; sep=,; done; echo ']'; } > compile_commands.json
 .PHONY: compdb-one
 compdb-one:

@@ -4,8 +4,10 @@
 
 #include "base/options.h"
 #include "cli/commands.h"
-#include "data/image.h"
+#include "picture/read.h"
 #include "observer/flip.h"
+#include "picture/colour_map.h"
+#include "picture/png.h"
 
 struct options {
     const char *paths[2];
@@ -14,10 +16,11 @@ struct options {
     int json;
 };
 
+static const char *const pictures[] = {"png", NULL}; /* endings */
 #define TO(member) BASE_TO(struct options, member)
 static const struct base_option list[] = {
     {"json", 'j', NULL, TO(json), .help = "print {\"mean\": …, \"max\": …}"},
-    {"output", 'o', "MAP.png", TO(map_path), .output = BASE_FILE,
+    {"output", 'o', "MAP.png", TO(map_path), .output = BASE_FILE, .words = pictures,
      .help = "write the error map as a picture (magma, black 0 … white 1)"},
     {"ppd", 'p', "N", TO(ppd), 1, 1000, .help = "pixels per degree of the viewer (67.02)"},
     {0}};
@@ -29,8 +32,8 @@ static int write_map(const char *path, const float *map, int width, int height, 
     if (!rgb)
         return base_fail_nomem(err, path);
     for (size_t i = 0; i < n; i++)
-        ggn_colormap_rgb(GGN_MAGMA, (double)map[i], rgb + 3 * i);
-    int rc = ggn_image8_write_png(path, rgb, width, height, err);
+        pic_colour(PIC_MAGMA, (double)map[i], rgb + 3 * i);
+    int rc = pic_write_png(path, width, height, 3, rgb, err);
     free(rgb);
     return rc;
 }
@@ -47,14 +50,14 @@ int ggn_cmd_flip(int argc, char **argv)
         .doc =
             "Visible difference of two display images: LDR-FLIP (Andersson et al. 2020), mean and maximum over the pixels."};
     struct options o = {.ppd = GGN_FLIP_PPD};
-    struct ggn_image8 images[2] = {{0}, {0}};
+    struct pic_image images[2] = {{0}, {0}};
     struct ggn_flip_stats stats;
     struct base_err err = {0};
     float *map = NULL;
 
     int rc = base_options_parse(&options, argc, argv, &o, &err);
     for (int i = 0; i < 2 && !rc; i++)
-        rc = ggn_image8_read(o.paths[i], &images[i], &err);
+        rc = pic_read_display(o.paths[i], &images[i], &err);
     if (rc)
         goto out;
     for (int i = 0; i < 2; i++)
@@ -71,14 +74,14 @@ int ggn_cmd_flip(int argc, char **argv)
             goto out;
         }
     }
-    rc = ggn_flip(images[0].data, images[1].data, images[0].width, images[0].height, o.ppd, map, &stats, &err);
+    rc = ggn_flip(images[0].u8, images[1].u8, images[0].width, images[0].height, o.ppd, map, &stats, &err);
     if (!rc && map)
         rc = write_map(o.map_path, map, images[0].width, images[0].height, &err);
     if (!rc)
         printf(o.json ? "{\"mean\": %.6f, \"max\": %.6f}\n" : "mean %.6f\nmax  %.6f\n", stats.mean, stats.max);
 out:
     free(map);
-    ggn_image8_release(&images[0]);
-    ggn_image8_release(&images[1]);
+    pic_release(&images[0]);
+    pic_release(&images[1]);
     return !rc ? GGN_EXIT_OK : ggn_cmd_fail(argv[0], &err);
 }

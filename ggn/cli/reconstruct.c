@@ -6,24 +6,26 @@
 
 #include "base/options.h"
 #include "cli/commands.h"
-#include "data/image.h"
+#include "picture/image.h"
 #include "data/labels.h"
 #include "sequence/manifest.h"
 #include "data/thresholds.h"
 #include "observer/flip.h"
+#include "picture/png.h"
 
 struct options {
     const char *dir, *stops, *view, *out, *reference;
     int json;
 };
 
+static const char *const pictures[] = {"png", NULL}; /* endings */
 #define TO(member) BASE_TO(struct options, member)
 static const struct base_option list[] = {
     {"stops", 's', "FILE", TO(stops), .input = BASE_FILE,
      .help = "stops or thresholds per block: CSV, report JSON or EXR stop map (the sequence's labels)"},
     {"view", 'v', "NAME", TO(view), .help = "row of the CSV"},
-    {"output", 'o', "OUT.png", TO(out), .needed = 1, .output = BASE_FILE, .help = "the picture (needed)"},
-    {"reference", 'r', "REF.png", TO(reference), .output = BASE_FILE, .help = "write the reference too"},
+    {"output", 'o', "OUT.png", TO(out), .needed = 1, .output = BASE_FILE, .words = pictures, .help = "the picture (needed)"},
+    {"reference", 'r', "REF.png", TO(reference), .output = BASE_FILE, .words = pictures, .help = "write the reference too"},
     {"json", 'j', NULL, TO(json), .help = "print the figures as JSON"},
     {0}};
 
@@ -95,7 +97,7 @@ static int build(const struct options *o, const struct seq_manifest *m, const st
 {
     size_t pixels = (size_t)m->width * m->height;
     int rc = 0;
-    if (pixels > GGN_IMAGE_MAX_PIXELS)
+    if (pixels > PIC_MAX_PIXELS)
         return base_fail(err, BASE_EINVAL, "%s: %ux%u is too large", o->dir, m->width, m->height);
     p->taken = calloc(3, pixels);
     p->reference = calloc(3, pixels);
@@ -115,9 +117,9 @@ static int build(const struct options *o, const struct seq_manifest *m, const st
     if (!rc && m->n_blocks == 0)
         rc = base_fail(err, BASE_EINVAL, "%s: no finished block in it", o->dir);
     if (!rc)
-        rc = ggn_image8_write_png(o->out, p->taken, (int)m->width, (int)m->height, err);
+        rc = pic_write_png(o->out, (int)m->width, (int)m->height, 3, p->taken, err);
     if (!rc && o->reference)
-        rc = ggn_image8_write_png(o->reference, p->reference, (int)m->width, (int)m->height, err);
+        rc = pic_write_png(o->reference, (int)m->width, (int)m->height, 3, p->reference, err);
     return rc;
 }
 

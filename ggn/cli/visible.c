@@ -4,8 +4,10 @@
 
 #include "base/options.h"
 #include "cli/commands.h"
-#include "data/image.h"
+#include "picture/read.h"
 #include "observer/remaining.h"
+#include "picture/colour_map.h"
+#include "picture/png.h"
 
 struct options {
     const char *paths[2];
@@ -13,13 +15,14 @@ struct options {
     int block, json;
 };
 
+static const char *const pictures[] = {"png", NULL}; /* endings */
 #define TO(member) BASE_TO(struct options, member)
 static const struct base_option list[] = {
     {"block", 'b', "PIXELS", TO(block), 1, 32768, .help = "side of the blocks in pixels (200)"},
     {"json", 'j', NULL, TO(json), .help = "print one JSON object, with every block"},
     {"observer", 'O', "FILE", TO(observer_path), .input = BASE_FILE,
      .help = "parameters of the observer (those this was built with)"},
-    {"output", 'o', "MAP.png", TO(map_path), .output = BASE_FILE,
+    {"output", 'o', "MAP.png", TO(map_path), .output = BASE_FILE, .words = pictures,
      .help = "write where: black nothing, light yellow twice what is just seen; blocks with visible noise are framed"},
     {0}};
 
@@ -85,16 +88,16 @@ static int write_map(const char *path, const float *map, int width, int height, 
     if (!rgb)
         return base_fail_nomem(err, path);
     for (size_t i = 0; i < n; i++)
-        ggn_colormap_rgb(GGN_MAGMA, 0.5 * (double)map[i], rgb + 3 * i);
+        pic_colour(PIC_MAGMA, 0.5 * (double)map[i], rgb + 3 * i);
     for (int i = 0; i < r->count; i++)
         if (r->blocks[i].error > 1.0)
             frame(rgb, width, r->blocks + i);
-    int rc = ggn_image8_write_png(path, rgb, width, height, err);
+    int rc = pic_write_png(path, width, height, 3, rgb, err);
     free(rgb);
     return rc;
 }
 
-static int run(const struct options *o, const struct ggn_image8 images[2], struct base_err *err)
+static int run(const struct options *o, const struct pic_image images[2], struct base_err *err)
 {
     int width = images[1].width, height = images[1].height, count = ggn_remaining_count(width, height, o->block);
     struct ggn_observer observer = ggn_observer_default;
@@ -133,16 +136,16 @@ int ggn_cmd_visible(int argc, char **argv)
         .doc = "Where the noise of an image is still seen, against a reference of the same view: the model observer's error "
                "of each block, 1 where noise is just not seen, and the share of viewers who see it."};
     struct options o = {.block = 200};
-    struct ggn_image8 images[2] = {{0}, {0}};
+    struct pic_image images[2] = {{0}, {0}};
     struct base_err err = {0};
     int rc = base_options_parse(&options, argc, argv, &o, &err);
     for (int i = 0; i < 2 && !rc; i++)
-        rc = ggn_image8_read(o.paths[i], &images[i], &err);
+        rc = pic_read_display(o.paths[i], &images[i], &err);
     for (int i = 0; i < 2 && !rc; i++)
         ggn_cmd_tell_clipped(argv[0], o.paths[i], images[i].clipped);
     if (!rc)
         rc = run(&o, images, &err);
-    ggn_image8_release(&images[0]);
-    ggn_image8_release(&images[1]);
+    pic_release(&images[0]);
+    pic_release(&images[1]);
     return !rc ? GGN_EXIT_OK : ggn_cmd_fail(argv[0], &err);
 }

@@ -37,7 +37,7 @@ static int read_rows(const char *path, const char *p, uint32_t width, uint32_t h
     return 0;
 }
 
-int ggn_rawls_parse(const char *path, const char *data, size_t size, struct ggn_imagef *image, struct base_err *err)
+int ggn_rawls_parse(const char *path, const char *data, size_t size, struct pic_image *image, struct base_err *err)
 {
     static const char head[] = "IHDR\n12\n", comments[] = "\nCOMMENTS\n";
     const size_t fixed = sizeof head - 1 + 12 + sizeof comments - 1;
@@ -45,8 +45,8 @@ int ggn_rawls_parse(const char *path, const char *data, size_t size, struct ggn_
         return base_fail(err, BASE_EINVAL, "%s: not a rawls image", path);
     const uint8_t *start = (const uint8_t *)data;
     uint32_t width = base_get_u32(start + 8), height = base_get_u32(start + 12), channels = base_get_u32(start + 16);
-    if (width < 1 || height < 1 || width > GGN_IMAGE_MAX_SIDE || height > GGN_IMAGE_MAX_SIDE ||
-        (size_t)width * height > GGN_IMAGE_MAX_PIXELS || (channels != 1 && channels != 3))
+    if (width < 1 || height < 1 || width > PIC_MAX_SIDE || height > PIC_MAX_SIDE ||
+        (size_t)width * height > PIC_MAX_PIXELS || (channels != 1 && channels != 3))
         return base_fail(err, BASE_EINVAL, "%s: %ux%u with %u channels cannot be used", path, width, height, channels);
     const char *end = data + size, *p = find_data(data + fixed, end);
     p = p ? memchr(p, '\n', (size_t)(end - p)) : NULL; /* the line with the size says nothing new */
@@ -61,11 +61,11 @@ int ggn_rawls_parse(const char *path, const char *data, size_t size, struct ggn_
         free(out);
         return rc;
     }
-    *image = (struct ggn_imagef){(int)width, (int)height, 3, out};
+    *image = (struct pic_image){.width = (int)width, .height = (int)height, .channels = 3, .is_float_file = 1, .f32 = out};
     return 0;
 }
 
-int ggn_rawls_read(const char *path, struct ggn_imagef *image, struct base_err *err)
+int ggn_rawls_read(const char *path, struct pic_image *image, struct base_err *err)
 {
     char *data;
     size_t size;

@@ -10,12 +10,11 @@
 #include <unistd.h>
 
 #include "base/files.h"
-#include "data/image.h"
 #include "data/labels.h"
+#include "picture/read.h"
 #include "sequence/builder.h"
 #include "sequence/manifest.h"
 #include "data/rawls.h"
-#include "model/preprocess.h"
 
 struct level {
     uint32_t spp;
@@ -122,37 +121,17 @@ void ggn_sin3d_scene(const char *view, char *scene, size_t room)
     snprintf(scene, room, "%.*s", cut ? (int)(cut - view) : (int)strlen(view), view);
 }
 
-/* One level as display image and, from float files, linear values. */
-struct picture {
-    struct ggn_image8 display;
-    struct ggn_imagef linear; /* data NULL for 8-bit files */
-};
-
-static void release_picture(struct picture *p)
-{
-    ggn_image8_release(&p->display);
-    ggn_imagef_release(&p->linear);
-}
-
-static int read_picture(const struct view *v, const struct level *level, struct picture *p, struct base_err *err)
+/* One level: codes and, from files of floats, linear values. */
+static int read_picture(const struct view *v, const struct level *level, struct pic_image *p, struct base_err *err)
 {
     char path[4400];
     snprintf(path, sizeof path, "%s/%s", v->dir, level->file);
-    *p = (struct picture){0};
     if (!v->is_rawls)
-        return ggn_image8_read(path, &p->display, err);
-    int rc = ggn_rawls_read(path, &p->linear, err);
-    if (rc)
-        return rc;
-    size_t n = 3 * (size_t)p->linear.width * (size_t)p->linear.height;
-    p->display = (struct ggn_image8){.width = p->linear.width, .height = p->linear.height, .data = malloc(n)};
-    if (!p->display.data) {
-        release_picture(p);
-        return base_fail_nomem(err, path);
-    }
-    for (size_t i = 0; i < n; i++)
-        p->display.data[i] = ggn_preprocess((double)p->linear.data[i], NULL, NULL);
-    return 0;
+        return pic_read_display(path, p, err);
+    int rc = ggn_rawls_read(path, p, err);
+    if (!rc && (rc = pic_encode(path, p, err)) != 0)
+        pic_release(p);
+    return rc;
 }
 
 /* Work on one row of blocks: all its builders fill level by level, so that each image is read once per row. */
@@ -163,27 +142,27 @@ struct row {
     double *mean;
 };
 
-static void cut_block(const struct picture *p, int x0, int y0, int block, uint8_t *display, double *mean)
+static void cut_block(const struct pic_image *p, int x0, int y0, int block, uint8_t *display, double *mean)
 {
     size_t pixels = (size_t)block * (size_t)block;
     for (int y = 0; y < block; y++)
         for (int x = 0; x < block; x++)
             for (size_t c = 0; c < 3; c++) {
-                size_t from = ((size_t)(y0 + y) * (size_t)p->display.width + (size_t)(x0 + x)) * 3 + c;
+                size_t from = ((size_t)(y0 + y) * (size_t)p->width + (size_t)(x0 + x)) * 3 + c;
                 size_t to = c * pixels + (size_t)y * (size_t)block + (size_t)x;
-                display[to] = p->display.data[from];
-                if (p->linear.data)
-                    mean[to] = (double)p->linear.data[from];
+                display[to] = p->u8[from];
+                if (p->f32)
+                    mean[to] = (double)p->f32[from];
             }
 }
 
-static int add_picture(struct row *row, const struct picture *p, uint32_t spp, int is_reference, struct base_err *err)
+static int add_picture(struct row *row, const struct pic_image *p, uint32_t spp, int is_reference, struct base_err *err)
 {
     int rc = 0;
     for (int c = 0; c < row->columns && !rc; c++) {
         cut_block(p, c * row->block, row->y0, row->block, row->display, row->mean);
         struct seq_frame f = {
-            .spp = spp, .is_reference = is_reference, .display = row->display, .mean = p->linear.data ? row->mean : NULL};
+            .spp = spp, .is_reference = is_reference, .display = row->display, .mean = p->f32 ? row->mean : NULL};
         rc = seq_builder_add(&row->builders[c], &f, err);
     }
     return rc;
@@ -194,18 +173,18 @@ static int fill_row(const struct view *v, const struct seq_manifest *m, struct r
 {
     int rc = 0;
     for (int i = 0; i < v->n && !rc; i++) {
-        struct picture p;
+        struct pic_image p;
         rc = read_picture(v, &v->levels[i], &p, err);
         if (rc)
             return rc;
-        if ((uint32_t)p.display.width != m->width || (uint32_t)p.display.height != m->height)
-            rc = base_fail(err, BASE_EINVAL, "%s/%s: %dx%d, the other levels are %ux%u", v->dir, v->levels[i].file,
-                           p.display.width, p.display.height, m->width, m->height);
+        if ((uint32_t)p.width != m->width || (uint32_t)p.height != m->height)
+            rc = base_fail(err, BASE_EINVAL, "%s/%s: %dx%d, the other levels are %ux%u", v->dir, v->levels[i].file, p.width,
+                           p.height, m->width, m->height);
         if (!rc)
             rc = add_picture(row, &p, v->levels[i].spp, 0, err);
         if (!rc && i + 1 == v->n)
             rc = add_picture(row, &p, v->levels[i].spp, 1, err);
-        release_picture(&p);
+        pic_release(&p);
         if (o->progress)
             o->progress(o->data, v->prefix, base + i + 1, (int)(m->height / m->block) * v->n);
     }
@@ -252,17 +231,17 @@ static int import_row(const struct view *v, const char *out, struct seq_manifest
 static int init_manifest(const struct view *v, const struct ggn_sin3d_options *o, struct seq_manifest *m,
                          struct base_err *err)
 {
-    struct picture first;
+    struct pic_image first;
     int rc = read_picture(v, &v->levels[0], &first, err);
     if (rc)
         return rc;
-    *m = (struct seq_manifest){.width = (uint32_t)first.display.width,
-                               .height = (uint32_t)first.display.height,
+    *m = (struct seq_manifest){.width = (uint32_t)first.width,
+                               .height = (uint32_t)first.height,
                                .block = (uint32_t)o->block,
                                .reference_spp = v->levels[v->n - 1].spp,
                                .reference_independent = 0,
                                .n_levels = (uint32_t)v->n};
-    release_picture(&first);
+    pic_release(&first);
     ggn_sin3d_scene(v->prefix, m->scene, sizeof m->scene);
     snprintf(m->source, sizeof m->source, "%.255s", v->prefix);
     snprintf(m->renderer, sizeof m->renderer, "SIN3D (imported)");

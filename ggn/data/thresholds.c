@@ -10,7 +10,7 @@
 #include "base/files.h"
 #include "base/text.h"
 #include "base/unique.h"
-#include "data/image.h"
+#include "picture/read.h"
 
 enum { MAX_TEXT = 1 << 26, MAX_VIEWS = 1 << 20 };
 
@@ -174,9 +174,9 @@ out:
 /* One value per block: the largest in the block (a block is one value; the largest forgives borders that are filtered). */
 static int read_exr(const char *path, int block, struct ggn_thresholds *out, struct base_err *err)
 {
-    struct ggn_imagef image;
+    struct pic_image image;
     struct ggn_thresholds t = {0};
-    int rc = ggn_imagef_read_channel(path, "lull.spp.V", &image, err);
+    int rc = pic_read_channel(path, "lull.spp.V", &image, err);
     if (rc)
         return rc;
     long columns = (image.width + block - 1) / block, rows = (image.height + block - 1) / block;
@@ -194,7 +194,7 @@ static int read_exr(const char *path, int block, struct ggn_thresholds *out, str
     for (int y = 0; y < image.height; y++)
         for (int x = 0; x < image.width; x++) {
             double *s = &v->spp[y / block * columns + x / block];
-            double value = (double)image.data[(size_t)y * (size_t)image.width + (size_t)x];
+            double value = (double)image.f32[(size_t)y * (size_t)image.width + (size_t)x];
             if (!(*s >= value))
                 *s = value;
         }
@@ -207,7 +207,7 @@ static int read_exr(const char *path, int block, struct ggn_thresholds *out, str
     }
 out:
     ggn_thresholds_release(&t);
-    ggn_imagef_release(&image);
+    pic_release(&image);
     return rc;
 }
 

@@ -202,7 +202,7 @@ int ggn_plot_heatmaps(const char *path, const struct ggn_pairing *p, const char 
         lo = fmin(lo, fmin(p->truth[i], p->model[i]));
         hi = fmax(hi, fmax(p->truth[i], p->model[i]));
     }
-    ggn_plot_palette(s, GGN_VIRIDIS);
+    ggn_plot_palette(s, PIC_VIRIDIS);
     fprintf(s,
             "set logscale cb\nset cbrange [%g:%g]\nunset grid\nunset tics\nunset border\nset cbtics\n"
             "set multiplot layout %d,%d title ",

@@ -7,11 +7,12 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "data/image.h"
 #include "eval/viewer.h"
 #include "figures/plot.h"
 #include "model/policy.h"
 #include "nn/ssim.h"
+#include "picture/colour_map.h"
+#include "picture/png.h"
 
 enum { STRIPS = 4 };
 struct strips {
@@ -23,7 +24,7 @@ struct strips {
 static int add_strip(struct strips *s, const char *path, const uint8_t *rgb, int w, int h, struct base_err *err)
 {
     snprintf(s->file[s->n], sizeof s->file[0], "%.4000s.part%d.png", path, s->n);
-    int rc = ggn_image8_write_png(s->file[s->n], rgb, w, h, err);
+    int rc = pic_write_png(s->file[s->n], w, h, 3, rgb, err);
     s->n += !rc;
     return rc;
 }
@@ -133,7 +134,7 @@ static void put_map(uint8_t *strip, int tiles, int k, const float *a, const floa
     for (size_t i = 0; i < w * h; i++) {
         float v = b ? fabsf(a[i] - b[i]) : a[i];
         uint8_t *at = strip + 3 * (i / w * (size_t)tiles * w + (size_t)k * w + i % w);
-        ggn_colormap_rgb(b ? GGN_MAGMA : GGN_VIRIDIS, hi > lo ? (double)((v - lo) / (hi - lo)) : 0.0, at);
+        pic_colour(b ? PIC_MAGMA : PIC_VIRIDIS, hi > lo ? (double)((v - lo) / (hi - lo)) : 0.0, at);
     }
 }
 

@@ -22,12 +22,12 @@ void ggn_plot_quote(FILE *script, const char *text)
     putc('\'', script);
 }
 
-void ggn_plot_palette(FILE *script, enum ggn_colormap map)
+void ggn_plot_palette(FILE *script, enum pic_colour_map map)
 {
     fputs("set palette defined (", script);
     for (int i = 0; i <= 8; i++) {
         uint8_t rgb[3];
-        ggn_colormap_rgb(map, i / 8.0, rgb);
+        pic_colour(map, i / 8.0, rgb);
         fprintf(script, "%s%d '#%02x%02x%02x'", i > 0 ? "," : "", i, rgb[0], rgb[1], rgb[2]);
     }
     fputs(")\n", script);

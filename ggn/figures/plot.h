@@ -10,7 +10,7 @@
 #include <stdio.h>
 
 #include "base/err.h"
-#include "data/image.h"
+#include "picture/colour_map.h"
 
 struct ggn_plot {
     FILE *script; /* write here between begin and end */
@@ -24,7 +24,7 @@ int ggn_plot_end(struct ggn_plot *plot, int run, struct base_err *err);
 
 /* Writes text as a single-quoted gnuplot string without enhanced-text surprises (quotes doubled, underscores kept). */
 void ggn_plot_quote(FILE *script, const char *text);
-/* Sets the palette to GGN_VIRIDIS or GGN_MAGMA of data/image.h. */
-void ggn_plot_palette(FILE *script, enum ggn_colormap map);
+/* Sets the palette to a colour map. */
+void ggn_plot_palette(FILE *script, enum pic_colour_map map);
 
 #endif

@@ -36,11 +36,11 @@ static int init(struct workspace *w, int width, int height, struct base_err *err
     return base_fail_nomem(err, "blocks of an image");
 }
 
-static void lightness_of(const struct ggn_image8 *image, const struct ggn_remaining *b, float *rgb, float *lightness)
+static void lightness_of(const struct pic_image *image, const struct ggn_remaining *b, float *rgb, float *lightness)
 {
     size_t n = (size_t)b->width * (size_t)b->height, i = 0;
     for (int y = 0; y < b->height; y++) {
-        const uint8_t *row = image->data + 3 * ((size_t)(b->y + y) * (size_t)image->width + (size_t)b->x);
+        const uint8_t *row = image->u8 + 3 * ((size_t)(b->y + y) * (size_t)image->width + (size_t)b->x);
         for (int x = 0; x < b->width; x++, i++)
             for (int c = 0; c < 3; c++)
                 rgb[(size_t)c * n + i] = base_srgb_linear_f32[row[3 * x + c]];
@@ -64,7 +64,7 @@ static void judge(const struct ggn_observer *observer, struct ggn_remaining *b, 
 
 int ggn_remaining_count(int width, int height, int block) { return ((width - 1) / block + 1) * ((height - 1) / block + 1); }
 
-int ggn_remaining(const struct ggn_observer *observer, const struct ggn_image8 *reference, const struct ggn_image8 *image,
+int ggn_remaining(const struct ggn_observer *observer, const struct pic_image *reference, const struct pic_image *image,
                   int block, struct ggn_remaining *blocks, float *map, struct base_err *err)
 {
     struct workspace w;

@@ -9,7 +9,7 @@
 #define GGN_OBSERVER_REMAINING_H
 
 #include "base/err.h"
-#include "data/image.h"
+#include "picture/image.h"
 #include "observer/observer.h"
 
 struct ggn_remaining {
@@ -22,7 +22,7 @@ int ggn_remaining_count(int width, int height, int block);
 
 /* image and reference of equal size. blocks: [ggn_remaining_count]. map: [height][width], each pixel's blurred difference
  * over its patch's limit, or NULL. BASE_ENOMEM. */
-int ggn_remaining(const struct ggn_observer *observer, const struct ggn_image8 *reference, const struct ggn_image8 *image,
+int ggn_remaining(const struct ggn_observer *observer, const struct pic_image *reference, const struct pic_image *image,
                   int block, struct ggn_remaining *blocks, float *map, struct base_err *err);
 
 #endif

@@ -10,11 +10,12 @@
 #include <unistd.h>
 
 #include "base/files.h"
-#include "data/image.h"
+#include "picture/read.h"
 #include "sequence/manifest.h"
 #include "study/plan.h"
 #include "study/stimuli.h"
 #include "study/token.h"
+#include "picture/png.h"
 
 static int make_dir(const char *path, struct base_err *err)
 {
@@ -36,7 +37,7 @@ static int write_block(const char *dir, int view, const struct ggn_study_block *
     char name[64], path[4096];
     snprintf(name, sizeof name, "b%u-%s", b->id, what);
     int rc = picture_path(path, dir, view, name, err);
-    return !rc ? ggn_image8_write_png(path, rgb, (int)(b->x1 - b->x0), (int)(b->y1 - b->y0), err) : rc;
+    return !rc ? pic_write_png(path, (int)(b->x1 - b->x0), (int)(b->y1 - b->y0), 3, rgb, err) : rc;
 }
 
 /* Whether a level of so many samples is taken after those that the block has. */
@@ -234,24 +235,24 @@ static int list_pictures(const char *folder, struct picture **pictures, int *n, 
     return 0;
 }
 
-static int read_picture(const char *folder, const char *name, const struct ggn_study_view *view, struct ggn_image8 *image,
+static int read_picture(const char *folder, const char *name, const struct ggn_study_view *view, struct pic_image *image,
                         struct base_err *err)
 {
     char path[4096];
     int rc = base_file_join(path, folder, name, err);
     if (!rc)
-        rc = ggn_image8_read(path, image, err);
+        rc = pic_read_display(path, image, err);
     if (!rc && view->width && ((uint32_t)image->width != view->width || (uint32_t)image->height != view->height)) {
         rc = base_fail(err, BASE_EINVAL, "%s: %dx%d pixels, the reference has %ux%u", path, image->width, image->height,
                        view->width, view->height);
-        ggn_image8_release(image);
+        pic_release(image);
     }
     return rc;
 }
 
 /* The picture called reference; its size becomes the view's. */
 static int read_reference(const char *folder, const struct picture *list, int n, struct ggn_study_view *view,
-                          struct ggn_image8 *image, struct base_err *err)
+                          struct pic_image *image, struct base_err *err)
 {
     for (int i = 0; i < n; i++)
         if (strcmp(list[i].stem, "reference") == 0) {
@@ -265,7 +266,7 @@ static int read_reference(const char *folder, const struct picture *list, int n,
 
 /* The picture cut into blocks; what NULL: it is the reference. */
 static int write_crops(const struct ggn_study_request_views *q, int index, const struct ggn_study_view *view,
-                       const char *what, const struct ggn_image8 *image, struct base_err *err)
+                       const char *what, const struct pic_image *image, struct base_err *err)
 {
     int rc = 0;
     for (int i = 0; i < view->n_blocks && !rc; i++) {
@@ -275,7 +276,7 @@ static int write_crops(const struct ggn_study_request_views *q, int index, const
         if (!rgb)
             return base_fail_nomem(err, q->views[index]);
         for (size_t y = 0; y < h; y++)
-            memcpy(rgb + 3 * w * y, image->data + 3 * ((b->y0 + y) * view->width + b->x0), 3 * w);
+            memcpy(rgb + 3 * w * y, image->u8 + 3 * ((b->y0 + y) * view->width + b->x0), 3 * w);
         rc = what ? write_block(q->dir, index, b, what, rgb, err) : write_reference(q->dir, index, b, rgb, err);
         free(rgb);
     }
@@ -307,7 +308,7 @@ static int cut_blocks(const struct ggn_study_request_views *q, struct ggn_study_
 }
 
 static int prepare_levels(const struct ggn_study_request_views *q, int index, const struct picture *list, int n,
-                          const struct ggn_image8 *reference, struct ggn_study_view *view, struct base_err *err)
+                          const struct pic_image *reference, struct ggn_study_view *view, struct base_err *err)
 {
     char what[32];
     const char *folder = q->views[index];
@@ -315,7 +316,7 @@ static int prepare_levels(const struct ggn_study_request_views *q, int index, co
     if (!rc)
         rc = write_crops(q, index, view, NULL, reference, err);
     for (int i = 0; i < n && !rc; i++) {
-        struct ggn_image8 image;
+        struct pic_image image;
         if (list[i].spp < 1.0 || !takes(q, &view->blocks[0], list[i].spp))
             continue;
         rc = read_picture(folder, list[i].name, view, &image, err);
@@ -323,7 +324,7 @@ static int prepare_levels(const struct ggn_study_request_views *q, int index, co
             break;
         snprintf(what, sizeof what, "%.0f", list[i].spp);
         rc = write_crops(q, index, view, what, &image, err);
-        ggn_image8_release(&image);
+        pic_release(&image);
         for (int b = 0; b < view->n_blocks; b++)
             view->blocks[b].levels[view->blocks[b].n_levels++] = (uint32_t)list[i].spp;
     }
@@ -350,23 +351,23 @@ static int know_condition(struct ggn_study *s, int index, const char *name, cons
 }
 
 static int prepare_conditions(const struct ggn_study_request_views *q, int index, const struct picture *list, int n,
-                              const struct ggn_image8 *reference, struct ggn_study *s, struct base_err *err)
+                              const struct pic_image *reference, struct ggn_study *s, struct base_err *err)
 {
     char path[4096];
     const char *folder = q->views[index];
     uint8_t *noisy = NULL;
     int found = 0, rc = picture_path(path, q->dir, index, "reference", err);
     if (!rc)
-        rc = ggn_image8_write_png(path, reference->data, reference->width, reference->height, err);
+        rc = pic_write_png(path, reference->width, reference->height, 3, reference->u8, err);
     if (!rc)
         rc = picture_path(path, q->dir, index, "heavy", err);
     if (!rc)
-        rc = make_heavy(reference->data, 3 * (size_t)reference->width * (size_t)reference->height, &noisy, err);
+        rc = make_heavy(reference->u8, 3 * (size_t)reference->width * (size_t)reference->height, &noisy, err);
     if (!rc)
-        rc = ggn_image8_write_png(path, noisy, reference->width, reference->height, err);
+        rc = pic_write_png(path, reference->width, reference->height, 3, noisy, err);
     free(noisy);
     for (int i = 0; i < n && !rc; i++) {
-        struct ggn_image8 image;
+        struct pic_image image;
         if (strcmp(list[i].stem, "reference") == 0 || strcmp(list[i].stem, "heavy") == 0)
             continue;
         rc = know_condition(s, index, list[i].stem, folder, err);
@@ -376,8 +377,8 @@ static int prepare_conditions(const struct ggn_study_request_views *q, int index
             rc = read_picture(folder, list[i].name, &s->views[index], &image, err);
         if (rc)
             break;
-        rc = ggn_image8_write_png(path, image.data, image.width, image.height, err);
-        ggn_image8_release(&image);
+        rc = pic_write_png(path, image.width, image.height, 3, image.u8, err);
+        pic_release(&image);
         found++;
     }
     if (!rc && (found == 0 || found != s->n_conditions))
@@ -389,7 +390,7 @@ static int prepare_conditions(const struct ggn_study_request_views *q, int index
 static int prepare_folder(const struct ggn_study_request_views *q, int index, struct ggn_study *s, struct base_err *err)
 {
     struct picture *list = NULL;
-    struct ggn_image8 reference;
+    struct pic_image reference;
     struct ggn_study_view *view = &s->views[index];
     int n = 0, rc = list_pictures(q->views[index], &list, &n, err);
     if (rc)
@@ -398,7 +399,7 @@ static int prepare_folder(const struct ggn_study_request_views *q, int index, st
     if (!rc) {
         rc = s->task == GGN_STUDY_VALIDATION ? prepare_conditions(q, index, list, n, &reference, s, err)
                                              : prepare_levels(q, index, list, n, &reference, view, err);
-        ggn_image8_release(&reference);
+        pic_release(&reference);
     }
     free(list);
     return rc;

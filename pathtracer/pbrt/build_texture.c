@@ -6,7 +6,7 @@
 
 #include "base/clock.h"
 #include "base/colour.h"
-#include "image/oiio.h"
+#include "picture/read.h"
 #include "pbrt/build.h"
 #include "pbrt/number.h"
 
@@ -36,7 +36,7 @@ static double parse_encoding(const char *encoding)
 
 /* Two channels (grey and alpha) become four, alpha that is 1 everywhere goes: the renderer knows 1, 3 and 4 channels.
  * Returns the channels to keep per pixel; `from` maps them. */
-static int choose_channels(const struct pt_oiio_image *image, int from[4])
+static int choose_channels(const struct pic_image *image, int from[4])
 {
     size_t n = (size_t)image->width * (size_t)image->height, c = (size_t)image->channels;
     for (int k = 0; k < 4; k++)
@@ -54,7 +54,7 @@ static int choose_channels(const struct pt_oiio_image *image, int from[4])
     return opaque ? 3 : 4;
 }
 
-static int convert(struct pt_builder *b, const struct pt_oiio_image *image, double encoding, struct pt_image_map *out)
+static int convert(struct pt_builder *b, const struct pic_image *image, double encoding, struct pt_image_map *out)
 {
     int from[4], channels = choose_channels(image, from);
     size_t n = (size_t)image->width * (size_t)image->height, c = (size_t)image->channels, k = (size_t)channels;
@@ -86,7 +86,7 @@ int32_t pt_build_image_map(struct pt_builder *b, struct pt_loc loc, const char *
 {
     char path[2048], key[2200];
     double code = parse_encoding(encoding), start_s = base_clock_wall_s();
-    struct pt_oiio_image image = {0};
+    struct pic_image image = {0};
     struct pt_image_map map;
     struct base_err err = {0};
     int32_t id = -1;
@@ -106,13 +106,13 @@ int32_t pt_build_image_map(struct pt_builder *b, struct pt_loc loc, const char *
     if (b->source->files) {
         rc = b->source->note(b->source->data, path, &err);
         if (!rc)
-            rc = pt_oiio_read(path, &image, &err);
+            rc = pic_read(path, &image, &err);
     } else {
         char *bytes = NULL;
         size_t size = 0;
         rc = b->source->read(b->source->data, path, &bytes, &size, &err);
         if (!rc)
-            rc = pt_oiio_read_memory(path, bytes, size, &image, &err);
+            rc = pic_read_memory(path, bytes, size, &image, &err);
         free(bytes);
     }
     if (rc)
@@ -120,7 +120,7 @@ int32_t pt_build_image_map(struct pt_builder *b, struct pt_loc loc, const char *
     else if (convert(b, &image, code, &map) == 0 && (id = pt_list_add(b, &b->images, &map)) >= 0 &&
              pt_names_set(&b->image_names, key, id) != 0)
         pt_diag_nomem(&b->diag, "a texture");
-    pt_oiio_release(&image);
+    pic_release(&image);
     b->scene->stats.texture_s += base_clock_wall_s() - start_s;
     return !b->diag.rc ? id : -1;
 }

@@ -3,9 +3,9 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "image/oiio.h"
+#include "picture/read.h"
 
-static float sample(const struct pt_oiio_image *image, size_t i)
+static float sample(const struct pic_image *image, size_t i)
 {
     float v = image->u8 ? (float)image->u8[i] / 255.0f : image->f32[i];
     return v > 0.0f ? fminf(v, 1.0f) : 0.0f;
@@ -13,8 +13,8 @@ static float sample(const struct pt_oiio_image *image, size_t i)
 
 int pt_mask_read(const char *path, int width, int height, struct pt_mask *out, struct base_err *err)
 {
-    struct pt_oiio_image image;
-    int rc = pt_oiio_read(path, &image, err);
+    struct pic_image image;
+    int rc = pic_read(path, &image, err);
     if (rc)
         return rc == BASE_EIO ? (err->code = BASE_EINVAL) : rc;
     if (image.width != width || image.height != height) {
@@ -36,7 +36,7 @@ int pt_mask_read(const char *path, int width, int height, struct pt_mask *out, s
     }
     *out = (struct pt_mask){width, height, grey};
 out:
-    pt_oiio_release(&image);
+    pic_release(&image);
     return rc;
 }
 

@@ -9,7 +9,7 @@
 
 #include "base/colour.h"
 #include "base/files.h"
-#include "base/png.h"
+#include "picture/png.h"
 #include "base/version.h"
 #include "image/exr.h"
 #include "render/host.h"
@@ -184,7 +184,7 @@ int pt_output_preview(const char *path, const struct pt_render *r, struct base_e
                 out[c] = base_srgb_code(rgb[c]);
         }
     }
-    int rc = base_png_write(path, width, height, 3, pixels, err);
+    int rc = pic_write_png(path, width, height, 3, pixels, err);
     free(pixels);
     return rc;
 }

@@ -6,7 +6,7 @@
 
 #include "base/err.h"
 #include "base/threads.h"
-#include "host/font.h"
+#include "picture/font.h"
 
 enum { LULL_HOST_STEPS = 8 }; /* of a mask */
 
@@ -90,7 +90,7 @@ void lull_host_hide(struct lull_host_shown *shown);
 
 /* The picture of lull_host_value_map; the caller frees out->rgb. */
 int32_t lull_host_paint(const struct lull_host_blocks *blocks, const double *values, const char *unit,
-                        struct lull_canvas *out, struct lull_error *err);
+                        struct pic_canvas *out, struct lull_error *err);
 
 /* --- state.c -------------------------------------------------------------------------------------------------------- */
 

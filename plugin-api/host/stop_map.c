@@ -7,28 +7,14 @@
 #include <strings.h>
 
 #include "base/files.h"
-#include "base/png.h"
+#include "picture/colour_map.h"
+#include "picture/png.h"
 #include "base/text.h"
 
 enum { VIEW_NAME = 256 }; /* bytes; no file system has longer names */
 enum { LEGEND_HEIGHT = 44, MIN_BLOCK_PX = 48, MAX_ENLARGE = 16, MIN_WIDTH = 160 };
 
-void lull_host_viridis(double t, uint8_t rgb[3])
-{
-    /* Smith and van der Walt's viridis (2015), at 17 even steps; linear in between is closer than an eye can tell. */
-    static const uint8_t stops[17][3] = {
-        {68, 1, 84},    {72, 21, 104},  {72, 40, 120},  {69, 58, 130},  {62, 74, 137},  {55, 91, 141},
-        {48, 106, 142}, {42, 121, 142}, {33, 145, 140}, {31, 154, 138}, {34, 168, 132}, {53, 183, 121},
-        {83, 197, 104}, {122, 209, 81}, {165, 219, 54}, {210, 226, 27}, {253, 231, 37},
-    };
-    t = t > 0.0 ? fmin(t, 1.0) : 0.0;
-    int i = (int)(t * 16.0);
-    if (i > 15)
-        i = 15;
-    double f = t * 16.0 - i;
-    for (int c = 0; c < 3; c++)
-        rgb[c] = (uint8_t)lround((1.0 - f) * stops[i][c] + f * stops[i + 1][c]);
-}
+void lull_host_viridis(double t, uint8_t rgb[3]) { pic_colour(PIC_VIRIDIS, t, rgb); }
 
 /* Nothing has no place on a logarithmic scale. */
 static double positive(double value) { return value > 0.0 ? value : 1.0; }
@@ -50,13 +36,13 @@ static const uint8_t *ink(const uint8_t rgb[3])
     return 2 * rgb[0] + 5 * rgb[1] + rgb[2] > 8 * 120 ? black : white;
 }
 
-static void put(const struct lull_canvas *c, int x, int y, const uint8_t rgb[3])
+static void put(const struct pic_canvas *c, int x, int y, const uint8_t rgb[3])
 {
     memcpy(c->rgb + 3 * ((size_t)y * (size_t)c->width + (size_t)x), rgb, 3);
 }
 
 /* digits: of the longest number, so that all are written in the same size. */
-static void paint_block(const struct lull_canvas *canvas, int x0, int y0, int x1, int y1, double value, double t, int digits)
+static void paint_block(const struct pic_canvas *canvas, int x0, int y0, int x1, int y1, double value, double t, int digits)
 {
     uint8_t colour[3], edge[3];
     lull_host_viridis(t, colour);
@@ -68,15 +54,15 @@ static void paint_block(const struct lull_canvas *canvas, int x0, int y0, int x1
     char text[24];
     int length = format(value, text);
     for (int scale = 4; scale >= 1; scale--) {
-        int w = (length * LULL_FONT_WIDTH - 1) * scale, h = LULL_FONT_HEIGHT * scale;
-        if ((digits * LULL_FONT_WIDTH - 1) * scale * 5 > (x1 - x0) * 4 || h * 3 > (y1 - y0) * 2)
+        int w = (length * PIC_FONT_WIDTH - 1) * scale, h = PIC_FONT_HEIGHT * scale;
+        if ((digits * PIC_FONT_WIDTH - 1) * scale * 5 > (x1 - x0) * 4 || h * 3 > (y1 - y0) * 2)
             continue;
-        lull_font_draw(canvas, (x0 + x1 - w) / 2, (y0 + y1 - h) / 2, scale, ink(colour), text);
+        pic_draw_text(canvas, (x0 + x1 - w) / 2, (y0 + y1 - h) / 2, scale, ink(colour), text);
         break;
     }
 }
 
-static void paint_legend(const struct lull_canvas *canvas, int top, double low, double high, const char *unit)
+static void paint_legend(const struct pic_canvas *canvas, int top, double low, double high, const char *unit)
 {
     static const uint8_t paper[3] = {255, 255, 255}, black[3] = {0, 0, 0};
     int margin = 8, left = margin, right = canvas->width - margin;
@@ -96,9 +82,9 @@ static void paint_legend(const struct lull_canvas *canvas, int top, double low, 
         char number[24];
         double value = low * pow(high / low, at[i]);
         format(high > 99.0 ? round(value) : value, number);
-        int n = snprintf(text, sizeof text, i == 0 ? "%s %s" : "%s", number, unit) * LULL_FONT_WIDTH * 2;
+        int n = snprintf(text, sizeof text, i == 0 ? "%s %s" : "%s", number, unit) * PIC_FONT_WIDTH * 2;
         int x = left + (int)(at[i] * (right - left - n));
-        lull_font_draw(canvas, x, top + 25, 2, black, text);
+        pic_draw_text(canvas, x, top + 25, 2, black, text);
     }
 }
 
@@ -108,7 +94,7 @@ struct map {
     const double *values;
     int enlarge, digits; /* digits: of the longest number */
     double low, high;    /* of the values */
-    struct lull_canvas canvas;
+    struct pic_canvas canvas;
 };
 
 /* Small blocks are enlarged until their numbers fit. */
@@ -134,7 +120,7 @@ static void measure(struct map *m)
     m->canvas.height = (b->y1 - b->y0) * m->enlarge + LEGEND_HEIGHT;
 }
 
-int32_t lull_host_paint(const struct lull_host_blocks *b, const double *values, const char *unit, struct lull_canvas *out,
+int32_t lull_host_paint(const struct lull_host_blocks *b, const double *values, const char *unit, struct pic_canvas *out,
                         struct lull_error *err)
 {
     struct map m = {.blocks = b, .values = values};
@@ -156,11 +142,11 @@ int32_t lull_host_value_map(const struct lull_host_blocks *b, const double *valu
                             struct lull_error *err)
 {
     struct base_err e = {0};
-    struct lull_canvas map;
+    struct pic_canvas map;
     int32_t code = lull_host_paint(b, values, unit, &map, err);
     if (code != LULL_OK)
         return code;
-    int rc = base_png_write(path, map.width, map.height, 3, map.rgb, &e);
+    int rc = pic_write_png(path, map.width, map.height, 3, map.rgb, &e);
     free(map.rgb);
     return rc ? lull_host_translate(&e, err) : LULL_OK;
 }

@@ -40,12 +40,12 @@ finds "the ABI seen from elsewhere" \
 echo '#include "../../ggn/nn/n.h"' | plant pathtracer/shade/b.c
 echo 'int n;' | plant ggn/nn/n.h
 finds "one program in the other" \
-    "pathtracer/shade/b.c:1: pathtracer includes ggn: both stand on plugin-api/base, job and sequence only"
+    "pathtracer/shade/b.c:1: pathtracer includes ggn: both stand on plugin-api/base, job, picture and sequence only"
 echo '#include "host/frame.h"' | plant pathtracer/shade/b.c
 echo 'int f;' | plant plugin-api/host/frame.h
 echo 'floors: host include base' | plant plugin-api/README.md
 finds "the host library from inside" \
-    "pathtracer/shade/b.c:1: pathtracer includes plugin-api: both stand on plugin-api/base, job and sequence only"
+    "pathtracer/shade/b.c:1: pathtracer includes plugin-api: both stand on plugin-api/base, job, picture and sequence only"
 : | plant pathtracer/shade/b.c
 echo '#include <lull/host.h>' | plant ggn/plugin/h.c
 echo 'int h;' | plant plugin-api/include/lull/host.h

@@ -26,7 +26,7 @@ for cxx in g++ clang++; do
     t "$cxx, C++11, no padding" $cxx -std=c++11 $flags -Wold-style-cast -Wpadded -xc++ $header
 done
 # What the header and the loader's declare, what the version script lists and what the library exports are one list.
-sed -n 's/^LULL_EXPORT .*[ *]\(lull_[a-z_]*\)(.*/\1/p' $header plugin-api/include/lull/loader.h | sort >"$tmp/declared"
+sed -n -e "s/^LULL_EXPORT .*[ *]\(lull_[a-z_]*\)(.*/\1/p" -e "s/^\(lull_[a-z_]*\)(.*/\1/p" $header plugin-api/include/lull/loader.h | sort >"$tmp/declared"
 sed -n 's/^ *\(lull_[a-z_]*\);$/\1/p' plugin-api/host.map | sort >"$tmp/listed"
 nm -D --defined-only "$lib" | awk '$2 != "A" { sub("@.*", "", $3); print $3 }' | sort >"$tmp/exported"
 t "exports what the headers declare" diff "$tmp/declared" "$tmp/exported"

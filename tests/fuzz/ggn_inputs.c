@@ -6,6 +6,7 @@
 #include "data/labels.h"
 #include "data/rawls.h"
 #include "data/thresholds.h"
+#include "picture/read.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
@@ -34,10 +35,10 @@ static void try_labels(const char *text, size_t size)
 
 static void try_rawls(const char *bytes, size_t size)
 {
-    struct ggn_imagef image;
+    struct pic_image image;
     struct base_err err = {0};
     if (ggn_rawls_parse("fuzz", bytes, size, &image, &err) == 0)
-        ggn_imagef_release(&image);
+        pic_release(&image);
     else if (err.text[0] == '\0')
         abort();
 }

@@ -1,5 +1,6 @@
 /*
- * Image files for textures, from memory. The first byte selects the format. OpenImageIO and the codecs behind it are not
+ * Image files from memory. The first byte selects the format and what is wanted: the pixels as stored (textures), what a display
+ * shows, one channel. OpenImageIO and the codecs behind it are not
  * built with the sanitizer: what is checked is our use of them, and that damage comes back as one line. Headers that claim
  * many pixels, though no more than may be, are passed by: filling them would take nearly all of the time.
  */
@@ -7,7 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "image/oiio.h"
+#include "picture/oiio.h"
+#include "picture/read.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
@@ -38,16 +40,21 @@ static double claimed(unsigned format, const uint8_t *p, size_t size)
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    enum { FEW = 1 << 12, MOST = 1 << 28 }; /* pt_oiio's own limit is the second */
+    enum { FEW = 1 << 12, MOST = PIC_MAX_PIXELS }; /* the reader's own limit is the second */
     static const char *const names[] = {"t.png", "t.tga", "t.hdr", "t.jpg"};
-    struct pt_oiio_image image = {0};
+    struct pic_image image = {0};
     struct base_err err = {0};
     if (size == 0)
         return 0;
     double pixels = claimed(data[0] % 4, data + 1, size - 1);
     if (pixels > FEW && pixels <= MOST)
         return 0;
-    if (pt_oiio_read_memory(names[data[0] % 4], data + 1, size - 1, &image, &err) != 0) {
+    const struct pic_request request = {.wanted = (enum pic_wanted)(data[0] / 4 % 3),
+                                        .name = names[data[0] % 4],
+                                        .data = data + 1,
+                                        .size = size - 1,
+                                        .channel = "R"};
+    if (pic_library.read(&request, &image, &err) != 0) {
         if (err.text[0] == '\0' || strchr(err.text, '\n'))
             abort();
         return 0;
@@ -58,6 +65,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         sum += image.u8 ? (float)image.u8[i] : image.f32[i];
     volatile float seen = sum;
     (void)seen;
-    pt_oiio_release(&image);
+    pic_release(&image);
     return 0;
 }

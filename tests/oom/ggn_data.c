@@ -13,6 +13,7 @@
 #include "data/labels.h"
 #include "sequence/manifest.h"
 #include "data/rawls.h"
+#include "picture/read.h"
 #include "data/thresholds.h"
 #include "figures/stats.h"
 #include "observer/curve.h"
@@ -124,7 +125,7 @@ static int tables(struct base_err *err)
     char text[] = "a;1;2;\nb;3;4;\nc;5;6;\n";
     static const char rawls_image[] = "IHDR\n12\n\1\0\0\0\1\0\0\0\1\0\0\0\nCOMMENTS\nDATA\n4\n\0\0\0\0\n";
     struct ggn_thresholds t;
-    struct ggn_imagef image;
+    struct pic_image image;
     struct ggn_agreement a;
     const double x[] = {1, 2, 3}, y[] = {2, 1, 4};
     int rc = ggn_thresholds_parse_csv("t.csv", text, &t, err);
@@ -134,7 +135,7 @@ static int tables(struct base_err *err)
     rc = ggn_rawls_parse("r", rawls_image, sizeof rawls_image - 1, &image, err);
     if (rc)
         return rc;
-    ggn_imagef_release(&image);
+    pic_release(&image);
     return ggn_stats_agreement(x, y, 3, 10, &a, err);
 }
 

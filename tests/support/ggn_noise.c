@@ -12,7 +12,6 @@
 #include <setjmp.h>
 #include <cmocka.h>
 
-#include "data/image.h"
 #include "data/labels.h"
 #include "sequence/builder.h"
 #include "sequence/manifest.h"

@@ -8,7 +8,6 @@
 #include <sys/stat.h>
 
 #include "base/files.h"
-#include "data/image.h"
 #include "data/labels.h"
 #include "sequence/builder.h"
 #include "sequence/manifest.h"

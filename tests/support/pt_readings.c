@@ -7,8 +7,8 @@
 
 #include "base/clock.h"
 #include "base/files.h"
-#include "base/png.h"
-#include "image/oiio.h"
+#include "picture/png.h"
+#include "picture/read.h"
 #include "pbrt/build.h"
 #include "pbrt/pbrt.h"
 #include "pbrt/ply.h"
@@ -186,14 +186,14 @@ static char *ply_polygon(size_t items, size_t *size) { return ply_binary_of(item
 /* Rows of 64 pixels. */
 static double read_image(const char *name, char *bytes, size_t size)
 {
-    struct pt_oiio_image image = {0};
+    struct pic_image image = {0};
     struct base_err err = {0};
     double start_s = base_clock_thread_s(), s;
-    int rc = pt_oiio_read_memory(name, bytes, size, &image, &err);
+    int rc = pic_read_memory(name, bytes, size, &image, &err);
     s = base_clock_thread_s() - start_s;
     if (rc)
         fprintf(stderr, "%s\n", err.text);
-    pt_oiio_release(&image);
+    pic_release(&image);
     free(bytes);
     return rc ? -1 : s;
 }
@@ -236,7 +236,7 @@ static char *png(size_t items, size_t *size)
 {
     char *pixels = tga(items, size), *bytes = NULL;
     if (pixels)
-        bytes = taken(scratch(), base_png_write(scratch(), 64, (int32_t)items, 3, (uint8_t *)pixels + 18, NULL), size);
+        bytes = taken(scratch(), pic_write_png(scratch(), 64, (int32_t)items, 3, (uint8_t *)pixels + 18, NULL), size);
     free(pixels);
     return bytes;
 }

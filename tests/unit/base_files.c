@@ -29,7 +29,7 @@
 #include "base/lock.h"
 #include "base/outputs.h"
 #include "base/peers.h"
-#include "base/png.h"
+#include "picture/png.h"
 #include "base/threads.h"
 #include "support/foreign.h"
 
@@ -526,7 +526,7 @@ static void pictures(void **state)
     for (int channels = 1; channels <= 4; channels++) {
         char *bytes;
         size_t size;
-        assert_int_equal(base_png_write("p.png", 2, 1, channels, pixels, &err), 0);
+        assert_int_equal(pic_write_png("p.png", 2, 1, channels, pixels, &err), 0);
         assert_int_equal(base_file_read("p.png", 1 << 16, &bytes, &size, &err), 0);
         assert_memory_equal(bytes, "\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\2\0\0\0\1\x08", 25);
         assert_int_equal(bytes[25], colour[channels]);
@@ -534,7 +534,7 @@ static void pictures(void **state)
     }
     static const int bad[][3] = {{0, 1, 1}, {1, 0, 1}, {1, 1, 0}, {1, 1, 5}, {INT32_MAX, 1, 1}, {INT32_MAX / 3, 1, 4}};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
-        says(base_png_write("q.png", bad[i][0], bad[i][1], bad[i][2], pixels, &err), BASE_EINVAL, &err,
+        says(pic_write_png("q.png", bad[i][0], bad[i][1], bad[i][2], pixels, &err), BASE_EINVAL, &err,
              "q.png: cannot write %dx%d pixels of %d channels as PNG", bad[i][0], bad[i][1], bad[i][2]);
     assert_int_equal(access("q.png", F_OK), -1);
 }

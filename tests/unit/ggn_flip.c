@@ -11,18 +11,18 @@
 
 #include "support/ggn_near.h"
 
-#include "data/image.h"
+#include "picture/read.h"
 #include "observer/flip.h"
 
 static const char sequence[] = "../shared/sequences/cornell-box/p3d_cornel-box-view0_%05d.png";
 
-static struct ggn_image8 read_level(int spp)
+static struct pic_image read_level(int spp)
 {
     char path[128];
-    struct ggn_image8 image;
+    struct pic_image image;
     struct base_err err = {0};
     snprintf(path, sizeof path, sequence, spp);
-    if (ggn_image8_read(path, &image, &err) != 0)
+    if (pic_read_display(path, &image, &err) != 0)
         fail_msg("%s", err.text);
     return image;
 }
@@ -42,17 +42,17 @@ static void published_figures(void **state)
         skip();
     }
     fclose(f);
-    struct ggn_image8 reference = read_level(10000);
+    struct pic_image reference = read_level(10000);
     for (size_t i = 0; i < sizeof golden / sizeof golden[0]; i++) {
-        struct ggn_image8 test = read_level(golden[i].spp);
+        struct pic_image test = read_level(golden[i].spp);
         struct ggn_flip_stats s;
-        assert_int_equal(ggn_flip(reference.data, test.data, 800, 800, GGN_FLIP_PPD, NULL, &s, NULL), 0);
+        assert_int_equal(ggn_flip(reference.u8, test.u8, 800, 800, GGN_FLIP_PPD, NULL, &s, NULL), 0);
         assert_near(s.mean, golden[i].mean, 1e-6);
         if (golden[i].spp == 500)
             assert_near(s.max, 0.570340, 1e-6);
-        ggn_image8_release(&test);
+        pic_release(&test);
     }
-    ggn_image8_release(&reference);
+    pic_release(&reference);
 }
 
 /* A smooth picture and the same with noise, from a fixed hash. */

@@ -14,10 +14,11 @@
 #include "support/ggn_near.h"
 
 #include "data/dataset.h"
-#include "data/image.h"
+#include "picture/read.h"
 #include "data/rawls.h"
 #include "data/sin3d.h"
 #include "support/ggn_transcript.h"
+#include "picture/png.h"
 
 enum { SIDE = 16, BLOCK = 8, LEVELS = 5 };
 
@@ -52,7 +53,7 @@ static void write_level(const char *dir, int spp, int side)
     for (int i = 0; i < side * side * 3; i++)
         rgb[i] = value_at(spp, i / 3 % side, i / 3 / side, i % 3);
     snprintf(path, sizeof path, "%s/p3d_toy-view2_%05d.png", dir, spp);
-    assert_int_equal(ggn_image8_write_png(path, rgb, side, side, NULL), 0);
+    assert_int_equal(pic_write_png(path, side, side, 3, rgb, NULL), 0);
 }
 
 static const char *make_view(const char *name)
@@ -228,15 +229,15 @@ static void rawls(void **state)
     (void)state;
     float v[12] = {0, 0.5f, 1, 2, -1, 3.25f, 7, 8, 9, 10, 11, 1e-3f};
     char file[512];
-    struct ggn_imagef image;
+    struct pic_image image;
     struct base_err err = {0};
     size_t n = make_rawls(file, 2, 2, 3, v);
     assert_int_equal(ggn_rawls_parse("x", file, n, &image, &err), 0);
     assert_true(image.width == 2 && image.height == 2 && image.channels == 3);
-    assert_memory_equal(image.data, v, sizeof v);
-    ggn_imagef_release(&image);
+    assert_memory_equal(image.f32, v, sizeof v);
+    pic_release(&image);
     assert_int_equal(ggn_rawls_parse("x", file, n - 1, &image, &err), 0); /* the last newline may be missing */
-    ggn_imagef_release(&image);
+    pic_release(&image);
     for (size_t i = 0; i < n - 1; i++) {
         char *cut = malloc(i + 1);
         memcpy(cut, file, i);
@@ -246,8 +247,8 @@ static void rawls(void **state)
     }
     n = make_rawls(file, 3, 2, 1, v);
     assert_int_equal(ggn_rawls_parse("x", file, n, &image, &err), 0);
-    assert_near((double)image.data[3 * 5 + 2], 3.25, 0);
-    ggn_imagef_release(&image);
+    assert_near((double)image.f32[3 * 5 + 2], 3.25, 0);
+    pic_release(&image);
     v[7] = NAN;
     n = make_rawls(file, 2, 2, 3, v);
     assert_int_equal(ggn_rawls_parse("x", file, n, &image, &err), BASE_EINVAL);
@@ -446,7 +447,7 @@ static void views_are_told_word_by_word(void **state)
 /* A line for each run of equal answers. */
 static void tell_rawls(FILE *f, const char *what, long value, const char *file, size_t n, char last[256])
 {
-    struct ggn_imagef image;
+    struct pic_image image;
     struct base_err err = {0};
     int rc = ggn_rawls_parse("x", file, n, &image, &err);
     char text[256] = "";
@@ -454,9 +455,9 @@ static void tell_rawls(FILE *f, const char *what, long value, const char *file, 
     if (rc)
         snprintf(text, sizeof text, "%.200s", err.text);
     for (int i = 0; i < 12 && !rc && i < 3 * image.width * image.height; i++)
-        used += (size_t)snprintf(text + used, sizeof text - used, " %g", (double)image.data[i]);
+        used += (size_t)snprintf(text + used, sizeof text - used, " %g", (double)image.f32[i]);
     if (!rc)
-        ggn_imagef_release(&image);
+        pic_release(&image);
     if (strcmp(text, last) != 0)
         fprintf(f, "%s %ld: %s\n", what, value, text);
     strcpy(last, text);
@@ -500,31 +501,31 @@ static void rawls_are_told_word_by_word(void **state)
 
 static void print_image(FILE *f, const char *name)
 {
-    struct ggn_image8 image;
-    struct ggn_imagef channel;
+    struct pic_image image;
+    struct pic_image channel;
     struct base_err err = {0};
     char path[600];
     snprintf(path, sizeof path, "%s/%s", root, name);
     fprintf(f, "%s: ", name);
-    if (ggn_image8_read(path, &image, &err)) {
+    if (pic_read_display(path, &image, &err)) {
         fprintf(f, "%s\n", err.text);
     } else {
         fprintf(f, "%dx%d, %zu clipped:", image.width, image.height, image.clipped);
         for (int i = 0; i < 3 * image.width * image.height && i < 18; i++)
-            fprintf(f, " %d", image.data[i]);
+            fprintf(f, " %d", image.u8[i]);
         fputc('\n', f);
-        ggn_image8_release(&image);
+        pic_release(&image);
     }
     if (!strstr(name, ".exr"))
         return;
-    if (ggn_imagef_read_channel(path, "lull.spp", &channel, &err)) {
+    if (pic_read_channel(path, "lull.spp", &channel, &err)) {
         fprintf(f, "  %s\n", err.text);
     } else {
         fprintf(f, "  %dx%d, %d channel:", channel.width, channel.height, channel.channels);
         for (int i = 0; i < channel.width * channel.height; i++)
-            fprintf(f, " %g", (double)channel.data[i]);
+            fprintf(f, " %g", (double)channel.f32[i]);
         fputc('\n', f);
-        ggn_imagef_release(&channel);
+        pic_release(&channel);
     }
 }
 
@@ -536,7 +537,7 @@ static void pictures_of_others(void **state)
     FILE *f = transcript_begin(&t);
     char path[600], command[2000];
     struct base_err err = {0};
-    struct ggn_image8 image;
+    struct pic_image image;
     (void)state;
     snprintf(command, sizeof command,
              "cd %s && mkdir folder.png && oiiotool --pattern constant:color=0.3 2x1 1 -d uint8 -o grey.png --pattern "
@@ -558,7 +559,7 @@ static void pictures_of_others(void **state)
     for (int i = 0; i < 2; i++) {
         put("%s/%s", i ? "garbage.webp" : "garbage.jpg", "garbage garbage garbage garbage garbage\n");
         snprintf(path, sizeof path, "%s/garbage.%s", root, i ? "webp" : "jpg");
-        assert_int_equal(ggn_image8_read(path, &image, &err), BASE_EINVAL);
+        assert_int_equal(pic_read_display(path, &image, &err), BASE_EINVAL);
         assert_int_equal(strncmp(err.text, path, strlen(path)), 0);
         assert_null(strchr(err.text, '\n'));
         if (i ? strstr(err.text + 1, path) != NULL : strncmp(err.text + strlen(path), ": ", 2) != 0)

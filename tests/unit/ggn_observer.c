@@ -144,7 +144,8 @@ static void remaining_noise(void **state)
         codes[0][i] = (uint8_t)(120 + 100 * sin(0.1 * (i % (3 * WIDTH))));
         codes[1][i] = (uint8_t)(codes[0][i] + (i % 41 == 0 && i > 3 * WIDTH * BLOCK ? 30 : 0));
     }
-    struct ggn_image8 reference = {WIDTH, HEIGHT, codes[0], 0}, image = {WIDTH, HEIGHT, codes[1], 0};
+    struct pic_image reference = {.width = WIDTH, .height = HEIGHT, .channels = 3, .u8 = codes[0]}, image = reference;
+    image.u8 = codes[1];
     assert_int_equal(ggn_remaining_count(WIDTH, HEIGHT, BLOCK), COUNT);
     assert_int_equal(ggn_remaining(&ggn_observer_default, &reference, &image, BLOCK, blocks, map, &err), 0);
     for (int k = 0; k < COUNT; k++) {

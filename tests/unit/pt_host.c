@@ -14,7 +14,7 @@
 #include <cmocka.h>
 
 #include "base/files.h"
-#include "base/png.h"
+#include "picture/png.h"
 #include "base/version.h"
 #include "host/frame.h"
 #include "render/host_find.h"
@@ -228,7 +228,7 @@ static void masks_are_read(void **state)
                                        4, 5,  6,   7,  8,   9,   10,  11,  12,  13, 14, 15};
     snprintf(path, sizeof path, "/tmp/pt_host_%ld.png", (long)getpid());
     for (int channels = 1; channels <= 4; channels++) {
-        assert_int_equal(base_png_write(path, 3, 2, channels, pixels, &err), 0);
+        assert_int_equal(pic_write_png(path, 3, 2, channels, pixels, &err), 0);
         assert_int_equal(pt_mask_read(path, 3, 2, &mask, &err), 0);
         assert_true(mask.width == 3 && mask.height == 2);
         for (int i = 0; i < 6; i++) {

@@ -21,9 +21,9 @@
 #include "app/cli.c"
 #include "app/quote_output.c"
 
-#include "base/png.h"
+#include "picture/png.h"
 #include "host/frame.h"
-#include "image/oiio.h"
+#include "picture/read.h"
 #include "integ/integrator.h"
 #include "support/api_folders.h"
 #include "support/approve.h"
@@ -177,8 +177,8 @@ static void write_files(void)
         0);
     assert_int_equal(base_file_write_line("i.pbrt", "Material \"hair\" Shape \"sphere\" \"float radius\" 5", &err), 0);
     assert_int_equal(base_file_write_line("bad.pbrt", "WorldBegin Include \"missing.pbrt\"", &err), 0);
-    assert_int_equal(base_png_write("mask.png", 24, 9, 1, grey, &err), 0);
-    assert_int_equal(base_png_write("small.png", 2, 2, 1, grey, &err), 0);
+    assert_int_equal(pic_write_png("mask.png", 24, 9, 1, grey, &err), 0);
+    assert_int_equal(pic_write_png("small.png", 2, 2, 1, grey, &err), 0);
 }
 
 static void print_render(FILE *out, const struct pt_session *s)
@@ -625,9 +625,9 @@ static void quotes_as_pictures(void **state)
     snprintf(path, sizeof path, "/tmp/pt_main_%ld.png", (long)getpid());
     quote.rows[1].visible = 0.125;
     for (int k = 0; k < 2; k++) {
-        struct lull_canvas map;
+        struct pic_canvas map;
         double values[7];
-        struct pt_oiio_image image;
+        struct pic_image image;
         for (int i = 0; i < 7; i++) {
             double value = answers[1][i].thread_s;
             answers[1][i].thread_s = k ? value * 60 / 9 : value; /* the dearest: 9 s, or just a minute */
@@ -635,10 +635,10 @@ static void quotes_as_pictures(void **state)
         }
         assert_int_equal(pt_quote_map(path, &quote, &render, &err), 0);
         assert_int_equal(lull_host_paint(render.blocks, values, k ? "min" : "s", &map, NULL), 0);
-        assert_int_equal(pt_oiio_read(path, &image, &err), 0);
+        assert_int_equal(pic_read(path, &image, &err), 0);
         assert_true(image.width == map.width && image.height == map.height && image.channels == 3 && image.u8);
         assert_memory_equal(image.u8, map.rgb, (size_t)(3 * map.width * map.height));
-        pt_oiio_release(&image);
+        pic_release(&image);
         free(map.rgb);
     }
     unlink(path);

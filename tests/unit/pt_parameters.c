@@ -15,7 +15,7 @@
 
 #include "base/clock.h"
 #include "base/files.h"
-#include "base/png.h"
+#include "picture/png.h"
 #include "pt_text_scene.h"
 
 #define V3 "Film \"image\" WorldBegin "
@@ -186,7 +186,7 @@ static void environment_map(void **state)
     assert_non_null(mkdtemp(dir));
     for (int k = 0; k < 2; k++) {
         snprintf(path, sizeof path, "%s/%d.png", dir, k);
-        assert_int_equal(k ? base_png_write(path, 2, 2, 1, grey, &err) : base_png_write(path, 4, 2, 3, wide, &err), 0);
+        assert_int_equal(k ? pic_write_png(path, 2, 2, 1, grey, &err) : pic_write_png(path, 4, 2, 3, wide, &err), 0);
         snprintf(text, sizeof text, "WorldBegin LightSource \"infinite\" \"string filename\" \"%d.png\" \"float scale\" 3",
                  k);
         snprintf(file, sizeof file, "%s/s.pbrt", dir);

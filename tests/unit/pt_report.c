@@ -19,7 +19,7 @@
 #include "base/files.h"
 #include "base/version.h"
 #include "host/frame.h"
-#include "image/oiio.h"
+#include "picture/read.h"
 #include "render/output.h"
 #include "render/progress.h"
 #include "support/approve.h"
@@ -252,15 +252,15 @@ static void preview_is_srgb(void **state)
 {
     (void)state;
     struct base_err err = {0};
-    struct pt_oiio_image image;
+    struct pic_image image;
     double rgb[3];
     assert_int_equal(pt_output_preview(in_folder("a.png"), render, &err), 0);
-    assert_int_equal(pt_oiio_read(in_folder("a.png"), &image, &err), 0);
+    assert_int_equal(pic_read(in_folder("a.png"), &image, &err), 0);
     assert_true(image.width == 57 && image.height == 35 && image.channels == 3 && image.u8);
     pt_film_mean(&render->film, pt_film_index(&render->film, 13, 15), render->blocks->list[0].spp, rgb);
     for (int c = 0; c < 3; c++)
         assert_int_equal(image.u8[3 * (10 * 57 + 10) + c], base_srgb_code(rgb[c]));
-    pt_oiio_release(&image);
+    pic_release(&image);
 }
 
 static void srgb_codes(void **state)
@@ -282,7 +282,7 @@ static void stop_map_picture(void **state)
 {
     (void)state;
     struct base_err err = {0};
-    struct lull_canvas map;
+    struct pic_canvas map;
     struct lull_host_block list[2] = {{.x1 = 200, .y1 = 100}, {.x0 = 200, .x1 = 400, .y1 = 100}};
     const struct lull_host_blocks blocks = {.list = list, .count = 2, .x1 = 400, .y1 = 100};
     const double values[2] = {32, 10000};

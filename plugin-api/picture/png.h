@@ -1,8 +1,8 @@
 /*
  * Writing PNG pictures (ISO/IEC 15948), so that a program need not load an image library to leave one behind. Thread-safe.
  */
-#ifndef BASE_PNG_H
-#define BASE_PNG_H
+#ifndef PICTURE_PNG_H
+#define PICTURE_PNG_H
 
 #include <stdint.h>
 
@@ -11,7 +11,7 @@
 /* Writes sRGB-encoded 8-bit pixels, top row first, `channels` (1 grey, 2 grey and alpha, 3 RGB, 4 RGBA, alpha never
  * premultiplied) interleaved, to a temporary beside `path` and renames it. BASE_EINVAL for no pixels or other channels,
  * BASE_EIO, BASE_ENOMEM. */
-int base_png_write(const char *path, int32_t width, int32_t height, int channels, const uint8_t *pixels,
-                   struct base_err *err);
+int pic_write_png(const char *path, int32_t width, int32_t height, int channels, const uint8_t *pixels,
+                  struct base_err *err);
 
 #endif

@@ -1,11 +1,11 @@
-#include "host/font.h"
+#include "picture/font.h"
 
 #include <string.h>
 
 /* Seven rows per glyph, five bits each, leftmost pixel in bit 4. */
 static const struct glyph {
     char c;
-    uint8_t rows[LULL_FONT_HEIGHT];
+    uint8_t rows[PIC_FONT_HEIGHT];
 } glyphs[] = {
     {'0', {0x0e, 0x11, 0x13, 0x15, 0x19, 0x11, 0x0e}}, {'1', {0x04, 0x0c, 0x04, 0x04, 0x04, 0x04, 0x0e}},
     {'2', {0x0e, 0x11, 0x01, 0x02, 0x04, 0x08, 0x1f}}, {'3', {0x1f, 0x02, 0x04, 0x02, 0x01, 0x11, 0x0e}},
@@ -29,21 +29,21 @@ static const uint8_t *find(char c)
     return NULL;
 }
 
-static void fill(const struct lull_canvas *canvas, int x, int y, int size, const uint8_t rgb[3])
+static void fill(const struct pic_canvas *canvas, int x, int y, int size, const uint8_t rgb[3])
 {
     for (int v = y < 0 ? 0 : y; v < y + size && v < canvas->height; v++)
         for (int u = x < 0 ? 0 : x; u < x + size && u < canvas->width; u++)
             memcpy(canvas->rgb + 3 * ((size_t)v * (size_t)canvas->width + (size_t)u), rgb, 3);
 }
 
-void lull_font_draw(const struct lull_canvas *canvas, int x, int y, int scale, const uint8_t rgb[3], const char *text)
+void pic_draw_text(const struct pic_canvas *canvas, int x, int y, int scale, const uint8_t rgb[3], const char *text)
 {
-    for (; *text != '\0'; text++, x += LULL_FONT_WIDTH * scale) {
+    for (; *text != '\0'; text++, x += PIC_FONT_WIDTH * scale) {
         const uint8_t *rows = find(*text);
         if (!rows)
             continue;
-        for (int row = 0; row < LULL_FONT_HEIGHT; row++)
-            for (int column = 0; column < LULL_FONT_WIDTH - 1; column++)
+        for (int row = 0; row < PIC_FONT_HEIGHT; row++)
+            for (int column = 0; column < PIC_FONT_WIDTH - 1; column++)
                 if (rows[row] >> (4 - column) & 1)
                     fill(canvas, x + column * scale, y + row * scale, scale, rgb);
     }

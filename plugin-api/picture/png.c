@@ -1,11 +1,10 @@
-#include "base/png.h"
+#include "picture/png.h"
 
 #include <png.h>
 
 #include "base/files.h"
 
-int base_png_write(const char *path, int32_t width, int32_t height, int channels, const uint8_t *pixels,
-                   struct base_err *err)
+int pic_write_png(const char *path, int32_t width, int32_t height, int channels, const uint8_t *pixels, struct base_err *err)
 {
     static const png_uint_32 formats[] = {PNG_FORMAT_GRAY, PNG_FORMAT_GA, PNG_FORMAT_RGB, PNG_FORMAT_RGBA};
     if (width < 1 || height < 1 || channels < 1 || channels > 4 || width > (INT32_MAX - 1) / channels)

@@ -1,0 +1,73 @@
+#include "picture/read.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "base/colour.h"
+#include "base/module.h"
+#include "picture/oiio.h"
+
+static int answer(const struct pic_request *request, struct pic_image *out, struct base_err *err)
+{
+    const struct pic_library *linked = &pic_library;
+    const struct pic_library *l = linked ? linked : base_module_symbol("lull-images.so", "pic_library", 0);
+    return l ? l->read(request, out, err)
+             : base_fail(err, BASE_EIO,
+                         "%s: images cannot be read: lib/lull-images.so, which belongs beside this program's bin/, or "
+                         "OpenImageIO cannot be loaded",
+                         request->name);
+}
+
+int pic_read(const char *path, struct pic_image *out, struct base_err *err)
+{
+    return answer(&(struct pic_request){.wanted = PIC_STORED, .name = path}, out, err);
+}
+
+int pic_read_memory(const char *name, const void *data, size_t size, struct pic_image *out, struct base_err *err)
+{
+    return answer(&(struct pic_request){.wanted = PIC_STORED, .name = name, .data = data ? data : "", .size = size}, out,
+                  err);
+}
+
+int pic_read_channel(const char *path, const char *channel, struct pic_image *out, struct base_err *err)
+{
+    return answer(&(struct pic_request){.wanted = PIC_CHANNEL, .name = path, .channel = channel}, out, err);
+}
+
+static int is_light(float v) { return isfinite(v) && v >= 0.0f; }
+
+int pic_encode(const char *name, struct pic_image *image, struct base_err *err)
+{
+    const size_t n = (size_t)image->width * (size_t)image->height;
+    image->u8 = malloc(n * 3);
+    if (!image->u8)
+        return base_fail_nomem(err, name);
+    for (size_t i = 0; i < n; i++) {
+        const float *rgb = image->f32 + 3 * i;
+        for (size_t c = 0; c < 3; c++)
+            image->u8[3 * i + c] = base_srgb_code((double)rgb[c]);
+        image->clipped += !(is_light(rgb[0]) && is_light(rgb[1]) && is_light(rgb[2]));
+    }
+    return 0;
+}
+
+int pic_read_display(const char *path, struct pic_image *out, struct base_err *err)
+{
+    struct pic_image image;
+    int rc = answer(&(struct pic_request){.wanted = PIC_DISPLAY, .name = path}, &image, err);
+    if (!rc && image.f32) {
+        rc = pic_encode(path, &image, err);
+        free(image.f32);
+        image.f32 = NULL;
+    }
+    if (!rc)
+        *out = image;
+    return rc;
+}
+
+void pic_release(struct pic_image *image)
+{
+    free(image->u8);
+    free(image->f32);
+    *image = (struct pic_image){0};
+}

@@ -1,0 +1,34 @@
+/*
+ * Image files in: the only door to OpenImageIO, which lies in a shared object of its own (picture/oiio.h). Whatever it reads
+ * is accepted: EXR, HDR, PFM, PNG, JPEG, TGA, TIFF …
+ *
+ * All functions fail
+ * - with BASE_EIO when the file cannot be opened, or lib/lull-images.so cannot be loaded;
+ * - with BASE_EINVAL when the file is no image, is damaged, or has more pixels than an image may have;
+ * - with BASE_ENOMEM.
+ * Then *out stays as it was. Thread-safe on distinct images.
+ */
+#ifndef PICTURE_READ_H
+#define PICTURE_READ_H
+
+#include "base/err.h"
+#include "picture/image.h"
+
+/* The first part of the file as it is stored: codes of an 8-bit file, else values; its first four channels. */
+int pic_read(const char *path, struct pic_image *out, struct base_err *err);
+/* The same from memory; `name` only tells the format by its extension and names the image in errors. Formats that
+ * OpenImageIO reads from files alone are refused (BASE_EINVAL). */
+int pic_read_memory(const char *name, const void *data, size_t size, struct pic_image *out, struct base_err *err);
+/* The sRGB codes that a display shows, three channels, found by name. Those of integers come as they are, those of light are
+ * made by pic_encode. Grey is repeated, alpha is dropped. */
+int pic_read_display(const char *path, struct pic_image *out, struct base_err *err);
+/* The values of one channel, found by name ("lull.spp.V") in any part of the file. BASE_EINVAL if there is none. */
+int pic_read_channel(const char *path, const char *channel, struct pic_image *out, struct base_err *err);
+
+/* Gives an RGB image of linear light (f32, Rec. 709 primaries) its codes too. `name` names it in errors. */
+int pic_encode(const char *name, struct pic_image *image, struct base_err *err);
+
+/* Frees the pixels and zeroes *image. */
+void pic_release(struct pic_image *image);
+
+#endif
