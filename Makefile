@@ -80,8 +80,8 @@ HOST_SRC    := $(wildcard plugin-api/host/*.c)
 EXAMPLE_SRC := $(wildcard plugin-api/examples/*.c)
 TOOL_SRC    := $(wildcard plugin-api/tools/*.c)
 MPI_SRC     := $(wildcard plugin-api/mpi/*.c)
-PT_SRC      := $(filter-out pathtracer/app/%,$(wildcard pathtracer/*/*.c))
-PT_MAIN     := $(wildcard pathtracer/app/*.c)
+PT_MAIN     := pathtracer/app/main.c
+PT_SRC      := $(filter-out $(PT_MAIN),$(wildcard pathtracer/*/*.c))
 GGN_SRC     := $(filter-out ggn/plugin/% ggn/study/% ggn/cli/%,$(wildcard ggn/*/*.c))
 # What includes nn/real.h itself is compiled for float and, with GGN_DOUBLE, for double.
 GGN_TWICE   := $(shell grep -ls '"nn/real.h"' ggn/nn/*.c ggn/model/*.c tests/support/*.c)

@@ -43,15 +43,15 @@ static int set_block(void *into, const char *value, struct base_err *err)
         v[1] = v[0];
     else if (!get_list(value, 'x', 2, 1, 4096, v))
         return expected(err, "N or WxH, each from 1 to 4096");
-    cli->block_width = v[0];
-    cli->block_height = v[1];
+    cli->render.block_width = v[0];
+    cli->render.block_height = v[1];
     return 0;
 }
 
 static int set_seam(void *into, const char *value, struct base_err *err)
 {
     struct pt_cli *cli = into;
-    if (strcmp(value, "0") != 0 && !base_parse_real(value, 1, 1e6, &cli->max_seam))
+    if (strcmp(value, "0") != 0 && !base_parse_real(value, 1, 1e6, &cli->render.max_seam))
         return expected(err, "0 or a number from 1 to 1e+06");
     return 0;
 }
@@ -64,15 +64,16 @@ static int set_size(void *into, const char *value, struct base_err *err)
         return expected(err, "WxH, each from 1 to 32768");
     if ((double)v[0] * v[1] > PT_CLI_MAX_PIXELS)
         return expected(err, "WxH of at most 2^28 pixels in all");
-    cli->width = v[0];
-    cli->height = v[1];
+    cli->load.width = v[0];
+    cli->load.height = v[1];
     return 0;
 }
 
 static int set_crop(void *into, const char *value, struct base_err *err)
 {
     struct pt_cli *cli = into;
-    if (!get_list(value, ',', 4, 0, 32768, cli->crop) || cli->crop[0] >= cli->crop[2] || cli->crop[1] >= cli->crop[3])
+    if (!get_list(value, ',', 4, 0, 32768, cli->render.crop) || cli->render.crop[0] >= cli->render.crop[2] ||
+        cli->render.crop[1] >= cli->render.crop[3])
         return expected(err, "X0,Y0,X1,Y1 in pixels with X0 < X1 and Y0 < Y1");
     cli->has_crop = 1;
     return 0;
@@ -81,7 +82,7 @@ static int set_crop(void *into, const char *value, struct base_err *err)
 static int set_look_at(void *into, const char *value, struct base_err *err)
 {
     static const double far = 1e9; /* what single precision can still tell apart from the scene */
-    struct pt_view *view = &((struct pt_cli *)into)->view;
+    struct pt_view *view = &((struct pt_cli *)into)->load.view;
     double *v = view->look_at_world;
     const char *at = value;
     struct pt_xform unused;
@@ -101,18 +102,18 @@ static int set_look_at(void *into, const char *value, struct base_err *err)
 
 static int set_param(void *into, const char *value, struct base_err *err)
 {
-    struct pt_cli *cli = into;
+    struct pt_cli_params *params = &((struct pt_cli *)into)->params;
     const char *equals = strchr(value, '=');
     if (!equals || equals == value)
         return expected(err, "KEY=VALUE");
-    if (cli->param_count == PT_CLI_MAX_PARAMS)
+    if (params->count == PT_CLI_MAX_PARAMS)
         return base_fail(err, BASE_EINVAL, "more than %d parameters", PT_CLI_MAX_PARAMS);
     char *text = strdup(value);
     if (!text)
         return base_fail_nomem(err, "parameters");
     text[equals - value] = '\0';
-    cli->param_text[cli->param_count] = text;
-    cli->params[cli->param_count++] = (struct lull_pair){text, text + (equals - value) + 1};
+    params->text[params->count] = text;
+    params->list[params->count++] = (struct lull_pair){text, text + (equals - value) + 1};
     return 0;
 }
 
@@ -128,13 +129,15 @@ static int set_visible(void *into, const char *value, struct base_err *err)
 
 static int set_filter(void *into, const char *value, struct base_err *err)
 {
-    struct pt_cli *cli = into;
+    struct pt_integrator *by = &((struct pt_cli *)into)->render.integrator;
     size_t n = strcspn(value, ":");
-    cli->filter = base_word_index(pt_filter_words, value, n);
-    if (cli->filter < 0)
+    double radius = 0;
+    by->filter = base_word_index(pt_filter_words, value, n);
+    if (by->filter < 0)
         return expected(err, &(PT_FILTERS(PT_WORD_OR))[1]);
-    if (value[n] == ':' && !base_parse_real(value + n + 1, 0.01, 16, &cli->filter_radius))
+    if (value[n] == ':' && !base_parse_real(value + n + 1, 0.01, 16, &radius))
         return expected(err, "a radius from 0.01 to 16");
+    by->filter_x = (float)radius;
     return 0;
 }
 
@@ -147,7 +150,7 @@ static int set_aov(void *into, const char *value, struct base_err *err)
         int i = base_word_index(planes, value, n);
         if (i < 0)
             return expected(err, "a list of albedo, normal, depth");
-        cli->aov |= (uint32_t)PT_FILM_ALBEDO << i;
+        cli->render.planes |= (uint32_t)PT_FILM_ALBEDO << i;
         if (value[n] == '\0')
             return 0;
     }
@@ -155,12 +158,12 @@ static int set_aov(void *into, const char *value, struct base_err *err)
 
 static int set_stop_map(void *into, const char *value, struct base_err *err)
 {
-    struct pt_cli *cli = into;
+    struct pt_image_files *files = &((struct pt_cli *)into)->files;
     if (!pt_output_has_ending(value, "png") && !pt_output_has_ending(value, "csv"))
         return expected(err, "a name that ends in .png or .csv");
-    if (cli->stop_map_count == PT_CLI_MAX_STOP_MAPS)
+    if (files->stop_map_count == PT_CLI_MAX_STOP_MAPS)
         return base_fail(err, BASE_EINVAL, "more than %d stop maps", PT_CLI_MAX_STOP_MAPS);
-    cli->stop_maps[cli->stop_map_count++] = value;
+    files->stop_maps[files->stop_map_count++] = value;
     return 0;
 }
 
@@ -170,14 +173,6 @@ static int set_debug_path(void *into, const char *value, struct base_err *err)
     if (!get_list(value, ',', 3, 0, INT32_MAX, cli->debug))
         return expected(err, "X,Y,SAMPLE");
     cli->action = PT_CLI_DEBUG_PATH;
-    return 0;
-}
-
-static int set_sequence(void *into, const char *value, struct base_err *err)
-{
-    struct pt_cli *cli = into;
-    (void)err;
-    cli->sequence = value;
     return 0;
 }
 
@@ -191,8 +186,8 @@ static int set_quote_pilot(void *into, const char *value, struct base_err *err)
         memcpy(spp, value, length);
         spp[length] = '\0';
         if (base_parse_integer(spp, 1, INT32_MAX, &n) &&
-            (value[length] == '\0' || base_parse_real(value + length + 1, 0.01, 1e9, &cli->pilot_s))) {
-            cli->pilot_spp = (uint64_t)n;
+            (value[length] == '\0' || base_parse_real(value + length + 1, 0.01, 1e9, &cli->render.pilot_s))) {
+            cli->render.pilot_spp = (uint64_t)n;
             return 0;
         }
     }
@@ -219,13 +214,14 @@ static const struct base_option options[] = {
     {"param", 'p', "KEY=VALUE", .set = set_param, .help = "Parameter of the criterion; may be repeated"},
     {"list-criteria", 0, NULL, TO(action), PT_CLI_LIST_CRITERIA,
      .help = "List the criteria that are found and their parameters, and exit"},
-    {"spp-min", 0, "N", TO(spp_min), 1, INT32_MAX, .help = "Samples per pixel before the first check (default 16)"},
-    {"spp-max", 0, "N", TO(spp_max), 1, INT32_MAX, .help = "Samples per pixel at which every block stops (default 10000)"},
+    {"spp-min", 0, "N", TO(render.spp_min), 1, INT32_MAX, .help = "Samples per pixel before the first check (default 16)"},
+    {"spp-max", 0, "N", TO(render.spp_max), 1, INT32_MAX,
+     .help = "Samples per pixel at which every block stops (default 10000)"},
     {"spp", 0, "N", TO(spp), 1, INT32_MAX,
      .help = "The same number of samples everywhere; a criterion, if given, is asked once at the end"},
-    {"time-budget", 0, "SECONDS", TO(time_budget_s), 0, 1e9, .help = "Stop after so long; 0 = no limit (default)"},
+    {"time-budget", 0, "SECONDS", TO(render.time_budget_s), 0, 1e9, .help = "Stop after so long; 0 = no limit (default)"},
     {"block", 0, "N|WxH", .set = set_block, .help = "Block size in pixels (default 200)"},
-    {"max-check-overhead", 0, "SHARE", TO(max_check_overhead), 0, 1,
+    {"max-check-overhead", 0, "SHARE", TO(render.max_check_overhead), 0, 1,
      .help = "Leave out checks while they took more than this share of the time, e.g. 0.03; 0 = no bound (default). With a "
              "bound, as with a time budget, the result depends on the clock"},
     {"max-seam", 0, "RATIO", .set = set_seam,
@@ -238,40 +234,41 @@ static const struct base_option options[] = {
              "image"},
     {"look-at", 0, "\"EX EY EZ AX AY AZ UX UY UZ\"", .set = set_look_at,
      .help = "Look from E at A with U up, in the scene's world, instead of through the scene's camera"},
-    {"fov", 0, "DEGREES", TO(view.fov_deg), 1e-3, 179.9,
+    {"fov", 0, "DEGREES", TO(load.view.fov_deg), 1e-3, 179.9,
      .help = "Field of view over the image's short side, instead of the scene's"},
-    {"light-selection", 0, NULL, TO(light_selection), .words = pt_light_selection_words,
+    {"light-selection", 0, NULL, TO(load.light_selection), .words = pt_light_selection_words,
      .help = "How next-event estimation picks among many lights (default hierarchy: by distance and orientation too)"},
-    {"sampler", 0, NULL, TO(sampler), .words = pt_sampler_words, .help = "Instead of the scene's"},
-    {"integrator", 0, NULL, TO(strategy), .words = pt_strategy_words,
+    {"sampler", 0, NULL, TO(render.integrator.sampler), .words = pt_sampler_words, .help = "Instead of the scene's"},
+    {"integrator", 0, NULL, TO(render.integrator.strategy), .words = pt_strategy_words,
      .help = "path: next-event estimation with multiple importance sampling (default); bsdf-only: brute force, for "
              "checking"},
-    {"max-depth", 0, "N", TO(max_depth), -1, 1000000, .help = "Most bounces, instead of the scene's; -1 = unlimited"},
+    {"max-depth", 0, "N", TO(render.integrator.max_depth), -1, 1000000,
+     .help = "Most bounces, instead of the scene's; -1 = unlimited"},
     {"filter", 0, &(PT_FILTERS(PT_WORD_OR) "[:RADIUS]")[1], .set = set_filter,
      .help = "Pixel filter, instead of the scene's; radius in pixels"},
-    {"seed", 0, "N", TO(seed), 0, UINT32_MAX, .help = "Seed of all random numbers (default 0)"},
+    {"seed", 0, "N", TO(render.integrator.seed), 0, UINT32_MAX, .help = "Seed of all random numbers (default 0)"},
     {"effects", 0, NULL, TO(all_effects), .words = effect_words, .help = "all: use the general kernel (same image, slower)"},
-    {"strict", 0, NULL, TO(strict), .help = "Unsupported scene features are errors"},
+    {"strict", 0, NULL, TO(load.strict), .help = "Unsupported scene features are errors"},
     {"threads", 't', "N", TO(threads), 1, 1024,
      .help = "Worker threads (default: all processors; of several processes on a host, their share)"},
     {"rank-timeout", 0, "SECONDS", TO(rank_timeout_s), 0.1, 1e6,
      .help = "Under mpirun: give up when a process has owed an answer for so long (default 120)"},
     {.help = "What to write:"},
-    {"output", 'o', "FILE.exr", TO(output), .output = BASE_FILE, .words = exr,
+    {"output", 'o', "FILE.exr", TO(files.output), .output = BASE_FILE, .words = exr,
      .help = "Multi-layer EXR (default: the scene's name in the current folder, if nothing else is asked for)"},
-    {"preview", 0, "FILE.png", TO(preview), .output = BASE_FILE, .words = png,
+    {"preview", 0, "FILE.png", TO(files.preview), .output = BASE_FILE, .words = png,
      .help = "The image as sRGB, also while rendering"},
     {"stop-map", 0, "FILE.png|FILE.csv", .set = set_stop_map, .output = BASE_FILE,
      .help = "Samples per block as a picture or a table; may be repeated"},
-    {"report", 0, "FILE.json", TO(report), .output = BASE_FILE, .words = json, .help = "Everything about the run"},
+    {"report", 0, "FILE.json", TO(files.report), .output = BASE_FILE, .words = json, .help = "Everything about the run"},
     {"aov", 0, "LIST", .set = set_aov, .help = "More layers: albedo,normal,depth"},
-    {"reproducible", 0, NULL, TO(reproducible), .help = "Leave times out of the EXR: equal renders are equal files"},
+    {"reproducible", 0, NULL, TO(files.reproducible), .help = "Leave times out of the EXR: equal renders are equal files"},
     {"quiet", 'q', NULL, TO(quiet), .help = "No progress, no notes"},
     {.help = "Interrupting and going on:"},
-    {"checkpoint", 0, "FILE", TO(checkpoint), .output = BASE_FILE, .kind = &pt_checkpoint_kind,
+    {"checkpoint", 0, "FILE", TO(checkpoint.path), .output = BASE_FILE, .kind = &pt_checkpoint_kind,
      .help = "Save the state of the render now and then, and when it is interrupted"},
-    {"checkpoint-every", 0, "SECONDS", TO(checkpoint_every_s), 0, 1e9, .help = "How often (default 60)"},
-    {"resume", 0, NULL, TO(resume), .help = "Go on from the checkpoint"},
+    {"checkpoint-every", 0, "SECONDS", TO(checkpoint.every_s), 0, 1e9, .help = "How often (default 60)"},
+    {"resume", 0, NULL, TO(checkpoint.resume), .help = "Go on from the checkpoint"},
     {.help = "What it will cost:"},
     {"quote", 0, NULL, TO(quote),
      .help = "Render a pilot only, say what samples and time the whole image will take, and exit; a --checkpoint of the "
@@ -286,77 +283,112 @@ static const struct base_option options[] = {
      .help = "Print the scene's effects, why, and the kernel chosen, and exit"},
     {"debug-path", 0, "X,Y,SAMPLE", .set = set_debug_path, .help = "Print one path vertex by vertex, and exit"},
     {.help = "Recording block sequences (for training and evaluation):"},
-    {"sequence", 0, "DIR", .set = set_sequence,
+    {"sequence", 0, "DIR", TO(sequence.directory),
      .help = "Record blocks at rising sample counts into DIR; run again to go on"},
-    {"levels", 0, "KIND:FIRST:LAST:STEP", TO(levels), .help = "geometric:20:10000:1.15 (default) or linear:20:10000:20"},
-    {"blocks", 0, "LIST", TO(sequence_blocks), .help = "Only these blocks, e.g. 0,3,8-11"},
-    {"reference-spp", 0, "N", TO(reference_spp), 0, INT32_MAX,
+    {"levels", 0, "KIND:FIRST:LAST:STEP", TO(sequence.levels),
+     .help = "geometric:20:10000:1.15 (default) or linear:20:10000:20"},
+    {"blocks", 0, "LIST", TO(sequence.blocks), .help = "Only these blocks, e.g. 0,3,8-11"},
+    {"reference-spp", 0, "N", TO(sequence.reference_spp), 0, INT32_MAX,
      .help = "Samples of the reference, which are independent (default 0: no reference)"},
-    {"name", 0, "SCENE[/VIEW]", TO(name), .help = "Scene and view in the manifest (default: by the file's name)"},
-    {"order-seed", 0, "N", TO(order_seed), 0, UINT32_MAX, .hidden = 1, .help = ""},
+    {"name", 0, "SCENE[/VIEW]", TO(sequence.name), .help = "Scene and view in the manifest (default: by the file's name)"},
+    {"order-seed", 0, "N", TO(render.order_seed), 0, UINT32_MAX, .hidden = 1, .help = ""},
     {0}};
 
 /* --- the whole ------------------------------------------------------------------------------------------------------ */
 
+int pt_cli_samples(const struct pt_cli *cli)
+{
+    return cli->action == PT_CLI_RENDER || cli->action == PT_CLI_QUOTE || cli->action == PT_CLI_SEQUENCE;
+}
+
+int pt_cli_writes_image(const struct pt_cli *cli)
+{
+    const struct pt_image_files *files = &cli->files;
+    return files->output || files->preview || files->report || files->stop_map_count > 0;
+}
+
 static int check_quote(struct pt_cli *cli, struct base_err *err)
 {
+    struct pt_render_config *r = &cli->render;
     if (cli->action != PT_CLI_RENDER)
         return base_fail(err, BASE_EINVAL, "--quote goes with none of --explain, --debug-path and --sequence");
-    if (cli->output || cli->preview || cli->report || cli->stop_map_count > 0)
+    if (pt_cli_writes_image(cli))
         return base_fail(err, BASE_EINVAL, "--quote writes no image: leave out -o, --preview, --report and --stop-map");
-    if (cli->resume || cli->time_budget_s > 0)
+    if (cli->checkpoint.resume || r->time_budget_s > 0)
         return base_fail(err, BASE_EINVAL, "--quote goes with neither --resume nor --time-budget (--quote-pilot bounds it)");
-    if (cli->max_seam > 0)
+    if (r->max_seam > 0)
         return base_fail(err, BASE_EINVAL, "--quote does not know what --max-seam re-opens: leave it out");
-    if (cli->pilot_spp == 0)
-        cli->pilot_spp = 128;
-    if (cli->pilot_s <= 0)
-        cli->pilot_s = 30.0;
+    if (r->pilot_spp == 0)
+        r->pilot_spp = 128;
+    if (r->pilot_s <= 0)
+        r->pilot_s = 30.0;
     cli->action = PT_CLI_QUOTE;
     return 0;
 }
 
 static int check_no_quote(const struct pt_cli *cli, struct base_err *err)
 {
-    if (cli->pilot_spp > 0 || cli->quote_map || cli->json)
+    if (cli->render.pilot_spp > 0 || cli->quote_map || cli->json)
         return base_fail(err, BASE_EINVAL, "--quote-pilot, --quote-map and --json belong to --quote");
+    return 0;
+}
+
+static int check_sequence(struct pt_cli *cli, struct base_err *err)
+{
+    if (cli->spp > 0 || cli->checkpoint.path || cli->has_crop || cli->mask)
+        return base_fail(err, BASE_EINVAL, "--sequence goes with neither --spp, --checkpoint, --crop nor --mask");
+    if (pt_cli_writes_image(cli))
+        return base_fail(err, BASE_EINVAL, "--sequence writes no image: leave out -o, --preview, --report and --stop-map");
+    if (cli->action != PT_CLI_RENDER)
+        return base_fail(err, BASE_EINVAL, "--sequence records blocks: leave out what only looks at the scene or a path");
+    cli->action = PT_CLI_SEQUENCE;
+    return 0;
+}
+
+static int check_no_sequence(const struct pt_cli *cli, struct base_err *err)
+{
+    const struct pt_sequence_config *q = &cli->sequence;
+    if (q->levels || q->blocks || q->reference_spp > 0 || q->name)
+        return base_fail(err, BASE_EINVAL, "--levels, --blocks, --reference-spp and --name belong to --sequence DIR");
+    return 0;
+}
+
+static int check_samples(struct pt_cli *cli, struct base_err *err)
+{
+    struct pt_render_config *r = &cli->render;
+    if (cli->spp > 0 && (r->spp_min > 0 || r->spp_max > 0))
+        return base_fail(err, BASE_EINVAL, "--spp takes the same samples everywhere: leave out --spp-min and --spp-max");
+    r->uniform = cli->spp > 0;
+    if (!r->spp_min)
+        r->spp_min = r->uniform ? cli->spp : 16;
+    if (!r->spp_max)
+        r->spp_max = r->uniform ? cli->spp : 10000;
+    if (r->spp_min > r->spp_max)
+        return base_fail(err, BASE_EINVAL, "--spp-min %llu is above --spp-max %llu", (unsigned long long)r->spp_min,
+                         (unsigned long long)r->spp_max);
     return 0;
 }
 
 static int check_together(struct pt_cli *cli, struct base_err *err)
 {
-    int has_bounds = cli->spp_min > 0 || cli->spp_max > 0;
     if (cli->action == PT_CLI_LIST_CRITERIA)
         return 0;
     if (!cli->scene)
         return base_fail(err, BASE_EINVAL, "a scene file is needed (--help says more)");
-    if (cli->spp > 0 && has_bounds)
-        return base_fail(err, BASE_EINVAL, "--spp takes the same samples everywhere: leave out --spp-min and --spp-max");
-    if (!cli->spp_min)
-        cli->spp_min = 16;
-    if (!cli->spp_max)
-        cli->spp_max = 10000;
-    if (cli->spp_min > cli->spp_max)
-        return base_fail(err, BASE_EINVAL, "--spp-min %llu is above --spp-max %llu", (unsigned long long)cli->spp_min,
-                         (unsigned long long)cli->spp_max);
-    if (cli->resume && !cli->checkpoint)
+    if (check_samples(cli, err) != 0)
+        return BASE_EINVAL;
+    if (cli->checkpoint.resume && !cli->checkpoint.path)
         return base_fail(err, BASE_EINVAL, "--resume needs --checkpoint FILE");
-    if (!cli->sequence && (cli->levels || cli->sequence_blocks || cli->reference_spp > 0 || cli->name))
-        return base_fail(err, BASE_EINVAL, "--levels, --blocks, --reference-spp and --name belong to --sequence DIR");
-    if (cli->sequence && (cli->spp > 0 || cli->checkpoint || cli->has_crop || cli->mask))
-        return base_fail(err, BASE_EINVAL, "--sequence goes with neither --spp, --checkpoint, --crop nor --mask");
-    if (cli->sequence && (cli->output || cli->preview || cli->report || cli->stop_map_count > 0))
-        return base_fail(err, BASE_EINVAL, "--sequence writes no image: leave out -o, --preview, --report and --stop-map");
-    if (cli->sequence && cli->action != PT_CLI_RENDER)
-        return base_fail(err, BASE_EINVAL, "--sequence records blocks: leave out what only looks at the scene or a path");
-    if (cli->sequence)
-        cli->action = PT_CLI_SEQUENCE;
+    if (cli->sequence.directory ? check_sequence(cli, err) != 0 : check_no_sequence(cli, err) != 0)
+        return BASE_EINVAL;
     if (cli->mask && cli->spp > 0)
         return base_fail(err, BASE_EINVAL, "--mask %s: --spp takes the same samples everywhere", cli->mask);
     if (cli->quote ? check_quote(cli, err) != 0 : check_no_quote(cli, err) != 0)
         return BASE_EINVAL;
-    if (cli->param_count > 0 && cli->spp > 0 && !cli->criterion)
-        return base_fail(err, BASE_EINVAL, "-p %s=%s: no criterion is used", cli->params[0].key, cli->params[0].value);
+    if (cli->params.count > 0 && cli->spp > 0 && !cli->criterion)
+        return base_fail(err, BASE_EINVAL, "-p %s=%s: no criterion is used", cli->params.list[0].key,
+                         cli->params.list[0].value);
+    cli->load.forced = cli->all_effects ? PT_FX_ALL : 0;
     return 0;
 }
 
@@ -374,14 +406,12 @@ int pt_cli_parse(struct pt_cli *cli, int argc, char **argv, struct base_err *err
         .mpi_version = job_mpi_version,
         .outputs = offsetof(struct pt_cli, outputs),
     };
-    *cli = (struct pt_cli){.block_width = 200,
-                           .block_height = 200,
-                           .checkpoint_every_s = 60.0,
-                           .rank_timeout_s = 120.0,
-                           .sampler = -1,
-                           .strategy = -1,
-                           .filter = -1,
-                           .max_depth = PT_CLI_SCENES_DEPTH};
+    *cli = (struct pt_cli){
+        .render = {.block_width = 200,
+                   .block_height = 200,
+                   .integrator = {.sampler = -1, .strategy = -1, .filter = -1, .max_depth = PT_CLI_SCENES_DEPTH}},
+        .checkpoint = {.every_s = 60.0},
+        .rank_timeout_s = 120.0};
     int rc = base_options_parse(&command, argc, argv, cli, err);
     if (!rc)
         rc = check_together(cli, err);
@@ -392,7 +422,7 @@ int pt_cli_parse(struct pt_cli *cli, int argc, char **argv, struct base_err *err
 
 void pt_cli_release(struct pt_cli *cli)
 {
-    for (uint32_t i = 0; i < cli->param_count; i++)
-        free(cli->param_text[i]);
-    cli->param_count = 0;
+    for (uint32_t i = 0; i < cli->params.count; i++)
+        free(cli->params.text[i]);
+    cli->params.count = 0;
 }

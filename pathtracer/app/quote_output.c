@@ -70,7 +70,7 @@ static uint32_t find_dearest(const struct pt_quote *q, const struct pt_render *r
 
 /* --- text -------------------------------------------------------------------------------------------------------------- */
 
-static const char *duration(double s, char text[32])
+const char *pt_quote_duration(double s, char text[32])
 {
     if (s < 99.5)
         snprintf(text, 32, s < 9.95 ? "%.1f s" : "%.0f s", s);
@@ -82,7 +82,7 @@ static const char *duration(double s, char text[32])
 }
 
 /* 12,345; with + where --spp-max ended it. */
-static const char *thousands(double value, int more, char text[32])
+const char *pt_quote_thousands(double value, int more, char text[32])
 {
     char digits[24];
     int n = snprintf(digits, sizeof digits, "%.0f", value), used = 0;
@@ -104,11 +104,12 @@ static void print_row(FILE *out, const struct pt_quote_row *row)
         snprintf(who, sizeof who, "%s", row->name);
     else
         snprintf(who, sizeof who, "%3.3g %%  %s", 100 * row->visible, row->name);
-    snprintf(samples, sizeof samples, "%6s / %6s / %7s", thousands(row->spp_min, 0, least),
-             thousands(row->spp_mean, row->unknown > 0 || row->capped > 0, mean),
-             thousands(row->spp_max, row->unknown > 0 || row->capped > 0, most));
-    snprintf(from_to, sizeof from_to, "(%s to %s)", duration(row->wall_low_s, low), duration(row->wall_high_s, high));
-    snprintf(wall, sizeof wall, "%-8s %s", duration(row->wall_s, time), from_to);
+    snprintf(samples, sizeof samples, "%6s / %6s / %7s", pt_quote_thousands(row->spp_min, 0, least),
+             pt_quote_thousands(row->spp_mean, row->unknown > 0 || row->capped > 0, mean),
+             pt_quote_thousands(row->spp_max, row->unknown > 0 || row->capped > 0, most));
+    snprintf(from_to, sizeof from_to, "(%s to %s)", pt_quote_duration(row->wall_low_s, low),
+             pt_quote_duration(row->wall_high_s, high));
+    snprintf(wall, sizeof wall, "%-8s %s", pt_quote_duration(row->wall_s, time), from_to);
     fprintf(out, "%-26s  %-26s  %-30s  %.2f x\n", who, samples, wall, row->against_uniform);
 }
 
@@ -126,9 +127,9 @@ static void print_dearest(FILE *out, const struct pt_quote *q, const struct pt_r
         fprintf(out,
                 "  block %u (%d,%d to %d,%d): %.0f %%, %s spp (%s to %s), %.2f us per path of %.1f vertices, %.0f %% "
                 "of them %s\n",
-                b->id, b->x0, b->y0, b->x1, b->y1, 100 * dear[k].share, thousands(stop->spp, 0, spp),
-                thousands(stop->low, 0, low), thousands(stop->high, 0, high), paths > 0 ? b->thread_s / paths * 1e6 : 0.0,
-                dear[k].bounces, 100 * dear[k].mostly_share, dear[k].mostly);
+                b->id, b->x0, b->y0, b->x1, b->y1, 100 * dear[k].share, pt_quote_thousands(stop->spp, 0, spp),
+                pt_quote_thousands(stop->low, 0, low), pt_quote_thousands(stop->high, 0, high),
+                paths > 0 ? b->thread_s / paths * 1e6 : 0.0, dear[k].bounces, 100 * dear[k].mostly_share, dear[k].mostly);
     }
 }
 
@@ -162,8 +163,8 @@ void pt_quote_text(FILE *out, const struct pt_quote *q, const struct pt_render *
     print_dearest(out, q, r);
     print_unmet(out, asked, r);
     fprintf(out, "\npilot: %.0f spp on average in %s, loading %s, %.1f of %d threads at work%s\n",
-            (double)r->totals->samples / (double)r->film.pixels, duration(lull_host_elapsed_s(r->frame), took),
-            duration(info->load_s, load), r->busy_threads, q->threads, info->interrupted ? "; interrupted" : "");
+            (double)r->totals->samples / (double)r->film.pixels, pt_quote_duration(lull_host_elapsed_s(r->frame), took),
+            pt_quote_duration(info->load_s, load), r->busy_threads, q->threads, info->interrupted ? "; interrupted" : "");
     fprintf(out, "memory: film %.1f MB, scene %.1f MB\n", (double)r->film.bytes * 1e-6, (double)info->scene_bytes * 1e-6);
 }
 

@@ -8,9 +8,7 @@
 #include "render/quote.h"
 
 struct pt_quote_info {
-    const char *scene;              /* path of the scene file */
-    const struct lull_pair *params; /* of the criterion, as given */
-    uint32_t param_count;
+    const char *scene;   /* path of the scene file */
     int64_t scene_bytes; /* memory of the scene */
     double load_s;       /* wall seconds until the first sample */
     int interrupted;     /* the pilot was */
@@ -24,5 +22,9 @@ int pt_quote_json(FILE *out, const struct pt_quote *quote, const struct pt_rende
                   struct base_err *err);
 /* Predicted time of each block of the row as asked: thread seconds, or minutes when they are long. */
 int pt_quote_map(const char *path, const struct pt_quote *quote, const struct pt_render *render, struct base_err *err);
+
+/* "9.9 s", "1.7 min", "12 h"; "12,345", and "12,345+" where there may be more. Both return text. */
+const char *pt_quote_duration(double s, char text[32]);
+const char *pt_quote_thousands(double value, int more, char text[32]);
 
 #endif

@@ -32,11 +32,6 @@ static const struct lull_host_block *block_at(const struct lull_host_blocks *b, 
 
 enum { R, G, B, SPP, P_NOISY, ERROR, REASON, FIRST_AOV, CHANNELS_MAX = FIRST_AOV + 7 };
 
-struct exr_source {
-    const struct pt_render *render;
-    uint32_t aov;
-};
-
 static void aov_pixel(const struct pt_film *f, uint32_t aov, size_t i, uint64_t spp, size_t x, float *const *rows)
 {
     int c = FIRST_AOV;
@@ -51,8 +46,7 @@ static void aov_pixel(const struct pt_film *f, uint32_t aov, size_t i, uint64_t 
 
 static void exr_row(void *data, int y, float *const *rows)
 {
-    const struct exr_source *source = data;
-    const struct pt_render *r = source->render;
+    const struct pt_render *r = data;
     int x0 = r->config.crop[0];
     for (int x = x0; x < r->config.crop[2]; x++) {
         const struct lull_host_block *b = block_at(r->blocks, x, y);
@@ -65,7 +59,7 @@ static void exr_row(void *data, int y, float *const *rows)
         rows[P_NOISY][k] = (float)b->p_noisy;
         rows[ERROR][k] = (float)b->error;
         rows[REASON][k] = (float)b->reason;
-        aov_pixel(&r->film, source->aov, i, b->spp, k, rows);
+        aov_pixel(&r->film, r->config.planes, i, b->spp, k, rows);
     }
 }
 
@@ -98,17 +92,17 @@ int pt_output_exr(const char *path, const struct pt_render *r, const struct pt_o
     const char *channels[CHANNELS_MAX];
     int n = FIRST_AOV;
     memcpy(channels, base, sizeof base);
-    if (info->aov & PT_FILM_ALBEDO) {
+    if (r->config.planes & PT_FILM_ALBEDO) {
         channels[n++] = "albedo.R";
         channels[n++] = "albedo.G";
         channels[n++] = "albedo.B";
     }
-    if (info->aov & PT_FILM_NORMAL) {
+    if (r->config.planes & PT_FILM_NORMAL) {
         channels[n++] = "normal.X";
         channels[n++] = "normal.Y";
         channels[n++] = "normal.Z";
     }
-    if (info->aov & PT_FILM_DEPTH)
+    if (r->config.planes & PT_FILM_DEPTH)
         channels[n++] = "depth.Z";
 
     char effects[512], criterion[2048], reasons[256];
@@ -130,7 +124,6 @@ int pt_output_exr(const char *path, const struct pt_render *r, const struct pt_o
         {"software", "lull-render " BASE_VERSION, 0.0},
         {"lull:seconds", NULL, lull_host_elapsed_s(r->frame)}, /* last: left out of reproducible files */
     };
-    struct exr_source source = {r, info->aov};
     const int *crop = r->config.crop;
     struct pt_exr_image image = {
         .width = r->config.width,
@@ -144,7 +137,7 @@ int pt_output_exr(const char *path, const struct pt_render *r, const struct pt_o
         .attribute_count = (int)(sizeof attributes / sizeof attributes[0]) - (info->reproducible ? 1 : 0),
         .attributes = attributes,
         .row = exr_row,
-        .data = &source,
+        .data = (void *)(uintptr_t)r,
     };
     return pt_exr_write(path, &image, err);
 }
@@ -168,8 +161,9 @@ int pt_output_is_ours(const char *path)
 
 /* --- pictures ------------------------------------------------------------------------------------------------------- */
 
-int pt_output_preview(const char *path, const struct pt_render *r, struct base_err *err)
+int pt_output_preview(const char *path, const struct pt_render *r, const struct pt_output_info *info, struct base_err *err)
 {
+    (void)info;
     const int *crop = r->config.crop;
     int width = crop[2] - crop[0], height = crop[3] - crop[1];
     uint8_t *pixels = malloc((size_t)width * (size_t)height * 3);
@@ -220,7 +214,7 @@ int pt_output_report(const char *path, const struct pt_render *r, const struct p
         .kernel = info->kernel,
         .effects = effects,
         .effect_count = n,
-        .threads = (uint32_t)info->threads,
+        .threads = (uint32_t)pt_render_threads(r),
         .processes = (uint32_t)job_count(r->config.job),
         .film_bytes = r->film.bytes,
         .film_pixels = r->film.pixels,
@@ -235,4 +229,19 @@ int pt_output_report(const char *path, const struct pt_render *r, const struct p
     }
     int32_t code = lull_host_report_write(r->frame, &report, path, &e);
     return code == LULL_OK ? 0 : pt_output_fail(code, &e, err);
+}
+
+void pt_output_or_keep(pt_output_writer *write, const char *path, const struct pt_render *r,
+                       const struct pt_output_info *info, struct base_err *err)
+{
+    struct base_err why = {0}, again = {0};
+    char kept[4096];
+    if (!path || write(path, r, info, &why) == 0)
+        return;
+    *err = why;
+    const char *folder = getenv("TMPDIR");
+    int n = snprintf(kept, sizeof kept, "%s/lull-%ld-%s", folder && folder[0] != '\0' ? folder : "/tmp", (long)getpid(),
+                     base_file_name(path));
+    if (n < (int)sizeof kept && write(kept, r, info, &again) == 0)
+        base_fail(err, why.code, "%.320s; kept as %.160s", why.text, kept);
 }

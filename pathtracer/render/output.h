@@ -15,24 +15,28 @@ struct pt_output_info {
     const char *mask;    /* path of the picture that scales the dial; NULL = none */
     pt_effects effects;  /* what the scene calls for */
     const char *kernel;  /* name of the kernel that rendered it */
-    int threads;         /* of all processes */
     int reproducible;    /* leave times out of the EXR, so that equal renders are equal files */
-    uint32_t aov;        /* PT_FILM_ALBEDO | NORMAL | DEPTH to be written */
     int64_t scene_bytes; /* memory of the scene; < 0 = not known */
     int interrupted;
 };
 
-/* RGB, lull.spp.V, lull.p_noisy.V, lull.error.V, lull.reason.V and the AOVs, cropped as the config says. */
-int pt_output_exr(const char *path, const struct pt_render *render, const struct pt_output_info *info, struct base_err *err);
+/* What the functions below are. */
+typedef int pt_output_writer(const char *path, const struct pt_render *render, const struct pt_output_info *info,
+                             struct base_err *err);
+
+/* RGB, lull.spp.V, lull.p_noisy.V, lull.error.V, lull.reason.V and the config's AOVs, cropped as it says. */
+pt_output_writer pt_output_exr;
 /* 0 when there is a file at `path` that is not such an EXR. */
 int pt_output_is_ours(const char *path);
-/* sRGB, 8 bits. */
-int pt_output_preview(const char *path, const struct pt_render *render, struct base_err *err);
+/* sRGB, 8 bits; needs no info. */
+pt_output_writer pt_output_preview;
 /* PNG or CSV by the name's ending. */
-int pt_output_stop_map(const char *path, const struct pt_render *render, const struct pt_output_info *info,
-                       struct base_err *err);
-int pt_output_report(const char *path, const struct pt_render *render, const struct pt_output_info *info,
-                     struct base_err *err);
+pt_output_writer pt_output_stop_map, pt_output_report;
+
+/* What cannot be written to `path` (NULL: not asked for) is kept where temporary files go. On failure err says so; on
+ * success it stays. */
+void pt_output_or_keep(pt_output_writer *write, const char *path, const struct pt_render *render,
+                       const struct pt_output_info *info, struct base_err *err);
 
 /* A failure of the host library to write a file. */
 int pt_output_fail(int32_t code, const struct lull_error *said, struct base_err *err);

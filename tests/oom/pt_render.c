@@ -99,7 +99,7 @@ static void checking(void **state)
     lull_host_close(criterion);
 }
 
-static struct pt_output_info info = {.scene = "a.pbrt", .kernel = "k", .aov = PT_FILM_AUX, .effects = PT_FX_ALL};
+static struct pt_output_info info = {.scene = "a.pbrt", .kernel = "k", .effects = PT_FX_ALL};
 
 static int write_report(struct pt_render *r, struct base_err *err)
 {

@@ -1,33 +1,33 @@
-/* The command line, what is made of it, the words of a quote. They belong to the program and are in no library: their files are read in
- * here. */
+/* The program lull-render: its command line, what is opened for it, the words of a quote, what goes on beside a render. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
 
 #include <math.h>
+#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
 #include <cmocka.h>
 
-#include "app/action_image.c"
-#include "app/agree.c"
-#include "app/explain.c"
-#include "app/session.c"
-#include "app/setup.c"
-
-#include "app/cli.c"
-#include "app/quote_output.c"
-
-#include "picture/png.h"
+#include "app/actions.h"
+#include "app/agree.h"
+#include "app/quote_output.h"
+#include "app/watch.h"
+#include "base/clock.h"
+#include "base/files.h"
+#include "base/interrupt.h"
 #include "host/frame.h"
-#include "picture/read.h"
 #include "integ/integrator.h"
+#include "picture/png.h"
+#include "picture/read.h"
+#include "render/output.h"
 #include "support/api_folders.h"
 #include "support/approve.h"
 #include "support/pt_fake.h"
+#include "support/pt_heard.h"
 #include "support/pt_text_scene.h"
 
 /* --- command lines ------------------------------------------------------------------------------------------------------ */
@@ -48,13 +48,13 @@ static void print_number(FILE *out, const char *name, double value, double usual
 static void print_several(FILE *out, const struct pt_cli *c)
 {
     if (c->has_crop)
-        fprintf(out, "crop=%d,%d,%d,%d ", c->crop[0], c->crop[1], c->crop[2], c->crop[3]);
-    for (int i = 0; c->view.has_look_at && i < 9; i++)
-        fprintf(out, "%s%g", i ? "," : "look-at=", c->view.look_at_world[i]);
-    for (uint32_t i = 0; i < c->param_count; i++)
-        fprintf(out, "param %s is %s; ", c->params[i].key, c->params[i].value);
-    for (int i = 0; i < c->stop_map_count; i++)
-        print_text(out, "stop-map", c->stop_maps[i]);
+        fprintf(out, "crop=%d,%d,%d,%d ", c->render.crop[0], c->render.crop[1], c->render.crop[2], c->render.crop[3]);
+    for (int i = 0; c->load.view.has_look_at && i < 9; i++)
+        fprintf(out, "%s%g", i ? "," : "look-at=", c->load.view.look_at_world[i]);
+    for (uint32_t i = 0; i < c->params.count; i++)
+        fprintf(out, "param %s is %s; ", c->params.list[i].key, c->params.list[i].value);
+    for (int i = 0; i < c->files.stop_map_count; i++)
+        print_text(out, "stop-map", c->files.stop_maps[i]);
     if (c->action == PT_CLI_DEBUG_PATH)
         fprintf(out, "debug=%d,%d,%d ", c->debug[0], c->debug[1], c->debug[2]);
 }
@@ -64,46 +64,48 @@ static void print_cli(FILE *out, const struct pt_cli *c)
     static const char *const actions[] = {"render", "list", "explain", "debug", "sequence", "quote"};
     const struct {
         const char *name, *text;
-    } texts[] = {{"criterion", c->criterion},    {"mask", c->mask},         {"output", c->output},
-                 {"preview", c->preview},        {"report", c->report},     {"checkpoint", c->checkpoint},
-                 {"quote-map", c->quote_map},    {"sequence", c->sequence}, {"levels", c->levels},
-                 {"blocks", c->sequence_blocks}, {"name", c->name}};
+    } texts[] = {{"criterion", c->criterion},    {"mask", c->mask},
+                 {"output", c->files.output},    {"preview", c->files.preview},
+                 {"report", c->files.report},    {"checkpoint", c->checkpoint.path},
+                 {"quote-map", c->quote_map},    {"sequence", c->sequence.directory},
+                 {"levels", c->sequence.levels}, {"blocks", c->sequence.blocks},
+                 {"name", c->sequence.name}};
     const struct {
         const char *name;
         double value, usual;
-    } numbers[] = {{"block", c->block_width, 200},
-                   {"by", c->block_height, 200},
-                   {"spp-min", (double)c->spp_min, 16},
-                   {"spp-max", (double)c->spp_max, 10000},
+    } numbers[] = {{"block", c->render.block_width, 200},
+                   {"by", c->render.block_height, 200},
+                   {"spp-min", c->render.uniform ? 16 : (double)c->render.spp_min, 16},
+                   {"spp-max", c->render.uniform ? 10000 : (double)c->render.spp_max, 10000},
                    {"spp", (double)c->spp, 0},
-                   {"budget", c->time_budget_s, 0},
-                   {"overhead", c->max_check_overhead, 0},
-                   {"seam", c->max_seam, 0},
-                   {"width", c->width, 0},
-                   {"height", c->height, 0},
-                   {"fov", c->view.fov_deg, 0},
+                   {"budget", c->render.time_budget_s, 0},
+                   {"overhead", c->render.max_check_overhead, 0},
+                   {"seam", c->render.max_seam, 0},
+                   {"width", c->load.width, 0},
+                   {"height", c->load.height, 0},
+                   {"fov", c->load.view.fov_deg, 0},
                    {"threads", c->threads, 0},
                    {"rank-timeout", c->rank_timeout_s, 120},
-                   {"seed", c->seed, 0},
-                   {"every", c->checkpoint_every_s, 60},
-                   {"resume", c->resume, 0},
+                   {"seed", c->render.integrator.seed, 0},
+                   {"every", c->checkpoint.every_s, 60},
+                   {"resume", c->checkpoint.resume, 0},
                    {"quote", c->quote, 0},
-                   {"pilot-spp", (double)c->pilot_spp, 0},
-                   {"pilot-s", c->pilot_s, 0},
+                   {"pilot-spp", (double)c->render.pilot_spp, 0},
+                   {"pilot-s", c->render.pilot_s, 0},
                    {"json", c->json, 0},
                    {"effects", c->all_effects, 0},
-                   {"strict", c->strict, 0},
+                   {"strict", c->load.strict, 0},
                    {"quiet", c->quiet, 0},
-                   {"reproducible", c->reproducible, 0},
-                   {"selection", c->light_selection, 0},
-                   {"sampler", c->sampler, -1},
-                   {"strategy", c->strategy, -1},
-                   {"filter", c->filter, -1},
-                   {"radius", c->filter_radius, 0},
-                   {"depth", c->max_depth, -2},
-                   {"aov", c->aov, 0},
-                   {"order", c->order_seed, 0},
-                   {"reference", (double)c->reference_spp, 0}};
+                   {"reproducible", c->files.reproducible, 0},
+                   {"selection", c->load.light_selection, 0},
+                   {"sampler", c->render.integrator.sampler, -1},
+                   {"strategy", c->render.integrator.strategy, -1},
+                   {"filter", c->render.integrator.filter, -1},
+                   {"radius", (double)c->render.integrator.filter_x, 0},
+                   {"depth", c->render.integrator.max_depth, -2},
+                   {"aov", c->render.planes, 0},
+                   {"order", c->render.order_seed, 0},
+                   {"reference", (double)c->sequence.reference_spp, 0}};
     fprintf(out, "%s %s ", actions[c->action], c->scene ? c->scene : "nothing");
     for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++)
         print_text(out, texts[i].name, texts[i].text);
@@ -181,7 +183,7 @@ static void write_files(void)
     assert_int_equal(pic_write_png("small.png", 2, 2, 1, grey, &err), 0);
 }
 
-static void print_render(FILE *out, const struct pt_session *s)
+static void print_render(FILE *out, const struct pt_cli *cli, const struct pt_open *s)
 {
     const struct pt_render_config *c = &s->render->config;
     const struct pt_integrator *i = &c->integrator;
@@ -196,7 +198,7 @@ static void print_render(FILE *out, const struct pt_session *s)
             i->rr_depth, i->sampler, i->strategy, i->filter, (double)i->filter_x, (double)i->filter_y,
             (double)i->filter_sigma, (double)i->max_component, i->seed, i->want_aux);
     fprintf(out, "threads %d kernel %s effects %x output %s criterion %s", base_threads_count(s->threads), s->kernel_name,
-            s->scene->effects, s->cli.output ? s->cli.output : "none",
+            s->scene->effects, cli->files.output ? cli->files.output : "none",
             s->criterion ? lull_host_table(s->criterion)->id : "none");
     for (uint32_t k = 0; s->criterion && k < s->render->blocks->count; k++)
         fprintf(out, " %d", (int)s->render->blocks->list[k].step);
@@ -222,25 +224,27 @@ static char *make_render(struct approve_case *c)
     char *argv[128], *text = NULL, at[4096], job[PT_AGREE_JOB];
     size_t size;
     struct base_err err = {0};
-    static struct pt_session s;
-    s = (struct pt_session){.scene_files = BASE_INPUTS_EMPTY, .judging = BASE_INPUTS_EMPTY};
+    static struct pt_cli cli;
+    static struct pt_open open;
     int argc = split_words(c, argv);
     FILE *out = open_memstream(&text, &size);
     assert_true(out && getcwd(at, sizeof at) && chdir(folder) == 0);
-    int rc = pt_cli_parse(&s.cli, argc, argv, &err);
+    open = (struct pt_open){0};
+    int rc = pt_cli_parse(&cli, argc, argv, &err);
     if (!rc)
-        rc = pt_session_open(&s, &err);
+        rc = pt_open_scene(&cli, NULL, NULL, &open, &err);
     if (!rc)
-        rc = pt_setup_render(&s, &err);
+        rc = pt_open_render(&cli, NULL, NULL, &open, &err);
     if (!rc)
-        print_render(out, &s);
-    if (!rc && s.cli.checkpoint)
-        rc = pt_agree_job(&s, job, sizeof job, &err);
-    if (!rc && s.cli.checkpoint)
+        print_render(out, &cli, &open);
+    if (!rc && cli.checkpoint.path)
+        rc = pt_agree_job(&open, job, sizeof job, &err);
+    if (!rc && cli.checkpoint.path)
         print_settings(out, job);
     if (rc)
         fprintf(out, "%d: %s\n", rc, err.text);
-    pt_session_release(&s);
+    pt_open_release(&open);
+    pt_cli_release(&cli);
     fclose(out);
     assert_int_equal(chdir(at), 0);
     return text;
@@ -288,22 +292,21 @@ static const char *heard_on(FILE *stream)
 static void words_on_the_way(void **state)
 {
     (void)state;
-    struct pt_session s = {0};
-    assert_false(pt_interrupted(NULL));
+    assert_false(base_interrupted);
     base_interrupt_catch();
     raise(SIGTERM);
-    assert_true(pt_interrupted(NULL));
+    assert_true(base_interrupted);
     base_interrupted = 0;
     base_interrupt_catch();
     raise(SIGHUP);
-    assert_true(pt_interrupted(NULL));
+    assert_true(base_interrupted);
     signal(SIGHUP, SIG_IGN); /* nohup */
     base_interrupted = 0;
     base_interrupt_catch();
-    assert_true(raise(SIGHUP) == 0 && raise(SIGPIPE) == 0 && !pt_interrupted(NULL));
+    assert_true(raise(SIGHUP) == 0 && raise(SIGPIPE) == 0 && !base_interrupted);
     signal(SIGHUP, SIG_DFL);
     raise(SIGINT);
-    assert_true(pt_interrupted(&s));
+    assert_true(base_interrupted);
     signal(SIGINT, SIG_DFL);
     signal(SIGTERM, SIG_DFL);
     listen_to(stderr);
@@ -484,19 +487,18 @@ static int write_nothing(const char *path, const struct pt_render *r, const stru
 static void outputs_are_kept(void **state)
 {
     (void)state;
-    struct pt_session s = {0};
     const struct pt_output_info none = {0};
     char line[300], name[100];
     struct base_err err = {0};
     setenv("TMPDIR", "/elsewhere", 1);
-    write_or_keep(&s, write_nothing, NULL, &none, &err);
+    pt_output_or_keep(write_nothing, NULL, NULL, &none, &err);
     assert_int_equal(write_count, 0);
-    write_or_keep(&s, write_nothing, "a/b.exr", &none, &err);
+    pt_output_or_keep(write_nothing, "a/b.exr", NULL, &none, &err);
     assert_true(write_count == 1 && err.code == 0);
     for (int k = 1; k < 3; k++) { /* at first only here, then there too */
         write_count = 0;
         fails_until = k;
-        write_or_keep(&s, write_nothing, "a/b.exr", &none, &err);
+        pt_output_or_keep(write_nothing, "a/b.exr", NULL, &none, &err);
         assert_int_equal(write_count, 2);
         snprintf(name, sizeof name, "/elsewhere/lull-%ld-b.exr", (long)getpid());
         assert_string_equal(written[1], name);
@@ -506,7 +508,7 @@ static void outputs_are_kept(void **state)
     }
     setenv("TMPDIR", "", 1);
     write_count = 0;
-    write_or_keep(&s, write_nothing, "b.exr", &none, &err);
+    pt_output_or_keep(write_nothing, "b.exr", NULL, &none, &err);
     snprintf(name, sizeof name, "/tmp/lull-%ld-b.exr", (long)getpid());
     assert_string_equal(written[1], name);
     unsetenv("TMPDIR");
@@ -522,21 +524,22 @@ static void outputs_are_kept(void **state)
 static void the_last_line(void **state)
 {
     (void)state;
-    struct pt_session s = {.render = &render};
+    struct heard heard;
     for (int i = 0; i < 7; i++)
         list[i].reason = i < 3 ? LULL_REASON_CRITERION : i < 5 ? LULL_REASON_SPP_MAX : LULL_REASON_DROPPED;
     render.totals->paths = 123456789;
     render.totals->dropped = 12;
     lull_host_drop(render.frame, 7, 8, 9);
-    listen_to(stderr);
-    base_log_init(&s.log, stderr, "lull-render", 0);
-    tell_summary(&s);
-    s.log.quiet = 1;
-    tell_summary(&s);
+    hear_begin(&heard);
+    heard.log.name = "lull-render";
+    pt_action_summary(&render, &heard.log);
+    heard.log.quiet = 1;
+    pt_action_summary(&render, &heard.log);
     render.totals->dropped = 0;
-    tell_summary(&s);
+    pt_action_summary(&render, &heard.log);
+    hear_end(&heard);
     assert_string_equal(
-        heard_on(stderr),
+        heard.text,
         "lull-render: 22 spp on average, 111.2 s, 2.44 Mpaths/s, criterion 54.6 %; blocks: 3 criterion 2 spp-max 2 dropped\n"
         "lull-render: 12 samples were not finite and were dropped, the first seen at --debug-path 7,8,9\n"
         "lull-render: 12 samples were not finite and were dropped, the first seen at --debug-path 7,8,9\n");
@@ -550,53 +553,62 @@ static void between_two_slices(void **state)
 {
     (void)state;
     struct base_err err = {0};
-    struct pt_session s = {.render = &render, .cli = {.checkpoint = "/missing/c", .checkpoint_every_s = 1000}};
+    struct pt_open open = {.render = &render};
+    struct pt_checkpoint_plan plan = {.path = "/missing/c", .every_s = 1000};
+    struct heard heard;
+    struct pt_watch w;
     double before_s = base_clock_wall_s();
+    hear_begin(&heard);
+    heard.log.quiet = 1;
+    pt_watch_init(&w, &open, &plan, NULL, &heard.log);
+    assert_true(w.checkpoint_at_s >= before_s + 1000 && w.checkpoint_at_s <= base_clock_wall_s() + 1000);
+    const struct pt_render_hooks hooks = pt_watch_hooks(&w);
     base_interrupted = 0;
-    listen_to(stderr);
-    base_log_init(&s.log, stderr, "lull-render", 0);
-    s.checkpoint_at_s = before_s + 1e6;
-    pt_action_after_slice(&s, &render, &err); /* too early */
-    s.checkpoint_at_s = before_s;
+    w.checkpoint_at_s = before_s + 1e6;
+    hooks.slice(hooks.data, &render, &err); /* too early */
+    w.checkpoint_at_s = before_s;
     base_interrupted = 1;
-    pt_action_after_slice(&s, &render, &err); /* too late */
-    assert_true(s.checkpoint_at_s == before_s);
+    assert_true(hooks.interrupted(hooks.data));
+    hooks.slice(hooks.data, &render, &err); /* too late */
+    assert_true(w.checkpoint_at_s == before_s);
     base_interrupted = 0;
+    assert_false(hooks.interrupted(hooks.data));
     render.criterion = NULL;
-    assert_int_equal(pt_action_after_slice(&s, &render, &err), 0);
+    assert_int_equal(hooks.slice(hooks.data, &render, &err), 0);
     double after_s = base_clock_wall_s();
-    assert_true(s.checkpoint_at_s >= before_s + 1000 && s.checkpoint_at_s <= after_s + 1000);
-    assert_string_equal(
-        heard_on(stderr),
-        "lull-render: no checkpoint, the render goes on: /missing/c: cannot write there: No such file or directory\n");
-    assert_int_equal(pt_action_suspend(&s, &render, &err), BASE_EIO);
-    s.cli.checkpoint = NULL;
-    assert_int_equal(pt_action_suspend(&s, &render, &err), 0);
+    assert_true(w.checkpoint_at_s >= before_s + 1000 && w.checkpoint_at_s <= after_s + 1000);
+    assert_string_equal(heard.text,
+                        "no checkpoint, the render goes on: /missing/c: cannot write there: No such file or directory\n");
+    hear_end(&heard);
+    assert_int_equal(hooks.suspend(hooks.data, &render, &err), BASE_EIO);
+    plan.path = NULL;
+    assert_int_equal(hooks.suspend(hooks.data, &render, &err), 0);
     static const double waits[2][2] = {{15, 45}, {100, 60}};
-    s.cli.preview = "/missing/p.png";
+    w.preview = "/missing/p.png";
     render.config.crop[2] = render.config.crop[3] = 1;
     for (int i = 0; i < 2; i++) {
         before_s = base_clock_wall_s();
-        s.start_s = before_s - waits[i][0];
-        s.preview_at_s = before_s + 1e6;
-        after_slice_of_image(&s, &render, &err);
-        assert_true(s.preview_at_s == before_s + 1e6);
-        s.preview_at_s = 0;
-        after_slice_of_image(&s, &render, &err);
+        open.start_s = before_s - waits[i][0];
+        w.preview_at_s = before_s + 1e6;
+        hooks.slice(hooks.data, &render, &err);
+        assert_true(w.preview_at_s == before_s + 1e6);
+        w.preview_at_s = 0;
+        hooks.slice(hooks.data, &render, &err);
         after_s = base_clock_wall_s();
-        assert_true(s.preview_at_s >= before_s + waits[i][1]);
-        assert_true(s.preview_at_s <= after_s + fmax(waits[i][1] + 4 * (after_s - before_s), 100 * (after_s - before_s)));
+        assert_true(w.preview_at_s >= before_s + waits[i][1]);
+        assert_true(w.preview_at_s <= after_s + fmax(waits[i][1] + 4 * (after_s - before_s), 100 * (after_s - before_s)));
     }
 }
 
 /* --explain, but for the times. */
 static char *explain_it(struct approve_case *c)
 {
-    struct pt_scene_defaults defaults;
-    struct pt_scene *s = text_scene(c->text, &defaults, NULL);
+    struct pt_scene_defaults found;
+    struct pt_scene *s = text_scene(c->text, &found, NULL);
+    const struct pt_render_config config = {.width = found.width, .height = found.height, .integrator = found.integrator};
     s->stats.bytes = 12345678;
     listen_to(stdout);
-    pt_explain(s, &defaults, &defaults.integrator, "t.pbrt");
+    pt_action_explain(s, &config, "t.pbrt");
     char *text = strdup(heard_on(stdout)), *time = strstr(text, "time: "), *end = time ? strchr(time, '\n') : NULL;
     double us, ratio;
     assert_non_null(end);
@@ -656,7 +668,7 @@ static void durations_and_thousands(void **state)
                  {99.5, "1.7 min"},    {9.94 * 60, "9.9 min"}, {9.95 * 60, "10 min"}, {99.4 * 60, "99 min"},
                  {99.5 * 60, "1.7 h"}, {36000, "10.0 h"}};
     for (size_t i = 0; i < sizeof times / sizeof times[0]; i++)
-        assert_string_equal(duration(times[i].s, text), times[i].words);
+        assert_string_equal(pt_quote_duration(times[i].s, text), times[i].words);
     static const struct {
         double value;
         int more;
@@ -664,7 +676,7 @@ static void durations_and_thousands(void **state)
     } numbers[] = {{0, 0, "0"},   {999.4, 0, "999"}, {1000, 0, "1,000"}, {999999, 1, "999,999+"}, {1234567, 0, "1,234,567"},
                    {12, 1, "12+"}};
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)
-        assert_string_equal(thousands(numbers[i].value, numbers[i].more, text), numbers[i].words);
+        assert_string_equal(pt_quote_thousands(numbers[i].value, numbers[i].more, text), numbers[i].words);
 }
 
 int main(void)

@@ -93,8 +93,6 @@ static int setup(void **state)
                                    .param_count = 1,
                                    .effects = PT_FX_ALPHA | PT_FX_MOTION,
                                    .kernel = "fake",
-                                   .threads = 2,
-                                   .aov = PT_FILM_AUX,
                                    .scene_bytes = 1000};
     if (!mkdtemp(folder))
         return -1;
@@ -242,7 +240,7 @@ static void unwritable_folder_is_one_line(void **state)
     assert_non_null(strstr(err.text, "/nowhere/a.exr"));
     assert_null(strchr(err.text, '\n'));
     assert_int_equal(pt_output_report("/nowhere/a.json", render, &info, &err), BASE_EIO);
-    assert_int_not_equal(pt_output_preview("/nowhere/a.png", render, &err), 0);
+    assert_int_not_equal(pt_output_preview("/nowhere/a.png", render, NULL, &err), 0);
     assert_int_equal(pt_output_stop_map("/nowhere/a.csv", render, &info, &err), BASE_EIO);
 }
 
@@ -254,7 +252,7 @@ static void preview_is_srgb(void **state)
     struct base_err err = {0};
     struct pic_image image;
     double rgb[3];
-    assert_int_equal(pt_output_preview(in_folder("a.png"), render, &err), 0);
+    assert_int_equal(pt_output_preview(in_folder("a.png"), render, NULL, &err), 0);
     assert_int_equal(pic_read(in_folder("a.png"), &image, &err), 0);
     assert_true(image.width == 57 && image.height == 35 && image.channels == 3 && image.u8);
     pt_film_mean(&render->film, pt_film_index(&render->film, 13, 15), render->blocks->list[0].spp, rgb);
@@ -443,17 +441,19 @@ static char *report_of(struct approve_case *c)
     if (alone) {
         frame.criterion = NULL;
         frame.blocks.block_height = 8;
+        r.threads = base_threads_create(9, &err);
         told = (struct pt_output_info){.scene = "a \"b\".pbrt",
                                        .mask = "m.png",
                                        .effects = PT_FX_ALL,
                                        .kernel = "k",
-                                       .threads = 9,
                                        .scene_bytes = -1,
                                        .interrupted = 1};
     }
     if (strstr(c->text, "empty"))
         told.scene_bytes = 0;
     assert_int_equal(pt_output_report(in_folder("r.json"), &r, &told, &err), 0);
+    if (alone)
+        base_threads_destroy(r.threads);
     assert_int_equal(base_file_read(in_folder("r.json"), 1 << 20, &text, &n, &err), 0);
     return text;
 }

@@ -1,0 +1,192 @@
+#include "open.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "base/files.h"
+#include "pbrt/load.h"
+#include "render/host_find.h"
+#include "render/output.h"
+
+/* The criterion when none is named. */
+static const char DEFAULT_CRITERION[] = "observer";
+
+/* --- scene ---------------------------------------------------------------------------------------------------------- */
+
+/* What the command line puts over the scene's integrator. */
+static void override(const struct pt_integrator *by, struct pt_integrator *i)
+{
+    i->seed = by->seed;
+    if (by->sampler >= 0)
+        i->sampler = by->sampler;
+    if (by->strategy >= 0)
+        i->strategy = by->strategy;
+    if (by->max_depth != PT_CLI_SCENES_DEPTH)
+        i->max_depth = by->max_depth;
+    if (by->filter >= 0) {
+        static const float usual_radius[3] = {0.5f, 1.0f, 1.5f};
+        i->filter = by->filter;
+        i->filter_x = i->filter_y = by->filter_x > 0 ? by->filter_x : usual_radius[by->filter];
+        i->filter_sigma = 0.5f;
+    }
+}
+
+int pt_open_scene(const struct pt_cli *cli, struct job *job, struct base_log *log, struct pt_open *o, struct base_err *err)
+{
+    struct pt_load_options options = cli->load;
+    struct pt_scene_defaults found;
+    *o = (struct pt_open){.start_s = base_clock_wall_s(), .scene_files = BASE_INPUTS_EMPTY, .judging = BASE_INPUTS_EMPTY};
+    o->threads = base_threads_create(cli->threads > 0 ? cli->threads : job_threads(job), err);
+    if (!o->threads)
+        return BASE_ENOMEM;
+    options.inputs = &o->scene_files;
+    options.log = log;
+    int rc = pt_scene_load(cli->scene, &options, &o->scene, &found, err);
+    if (rc)
+        return rc == BASE_EIO ? (err->code = BASE_EINVAL) : rc; /* the scene and its files are inputs */
+    o->kernel = pt_kernel_select(o->scene->effects, NULL, &o->kernel_name);
+    o->config = cli->render;
+    o->config.width = found.width;
+    o->config.height = found.height;
+    if (!cli->has_crop)
+        memcpy(o->config.crop, found.crop, sizeof found.crop);
+    o->config.integrator = found.integrator;
+    override(&cli->render.integrator, &o->config.integrator);
+    o->load_s = base_clock_wall_s() - o->start_s;
+    return 0;
+}
+
+/* --- criterion ------------------------------------------------------------------------------------------------------ */
+
+static int open_criterion(const struct pt_cli *cli, struct base_log *log, struct pt_open *o, struct base_err *err)
+{
+    const char *spec = cli->criterion ? cli->criterion : DEFAULT_CRITERION;
+    const struct lull_criterion *table;
+    int rc = pt_criterion_find(spec, &o->judging, log, &table, err);
+    if (!rc)
+        rc = pt_criterion_create(table, cli->params.list, cli->params.count, o->threads, log, &o->criterion, err);
+    if (rc || !cli->mask)
+        return rc;
+    rc = pt_mask_read(cli->mask, o->config.width, o->config.height, &o->mask, err);
+    if (!rc)
+        rc = base_inputs_add(&o->judging, cli->mask, err);
+    o->config.mask = &o->mask;
+    return rc;
+}
+
+/* --- outputs -------------------------------------------------------------------------------------------------------- */
+
+/* A parameter may name a file: a model. */
+static int protect_parameters(const struct pt_cli *cli, struct base_err *err)
+{
+    struct base_inputs named = BASE_INPUTS_EMPTY;
+    int rc = 0;
+    for (uint32_t i = 0; i < cli->params.count && !rc; i++)
+        if (base_file_check_input(cli->params.list[i].value, NULL) == 0)
+            rc = base_inputs_add(&named, cli->params.list[i].value, err);
+    if (!rc)
+        rc = base_outputs_protect(&cli->outputs, &named, err);
+    base_inputs_release(&named);
+    return rc;
+}
+
+/* By the scene's name in the current folder. */
+static int name_output(struct pt_cli *cli, struct base_err *err)
+{
+    struct pt_image_files *files = &cli->files;
+    const char *name = base_file_name(cli->scene), *dot = strrchr(name, '.');
+    int n = dot ? (int)(dot - name) : (int)strlen(name);
+    if (n > (int)sizeof files->default_output - 8)
+        return base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", cli->scene);
+    snprintf(files->default_output, sizeof files->default_output, "%.*s.exr", n, name);
+    files->output = files->default_output;
+    int rc = base_outputs_add(&cli->outputs, "output", files->output, err);
+    if (!rc && !pt_output_is_ours(files->output)) /* nobody asked for this name */
+        rc = base_fail(err, BASE_EINVAL, "%s: another program's image would be replaced; -o FILE.exr names the output",
+                       files->output);
+    return rc;
+}
+
+/* Outputs that would overwrite what the image is made from, or each other, are found out before the work. */
+static int check_outputs(struct pt_cli *cli, const struct pt_open *o, struct base_err *err)
+{
+    int rc = cli->action == PT_CLI_RENDER && !pt_cli_writes_image(cli) ? name_output(cli, err) : 0;
+    if (!rc)
+        rc = base_outputs_protect(&cli->outputs, &o->scene_files, err);
+    if (!rc)
+        rc = base_outputs_protect(&cli->outputs, &o->judging, err);
+    return rc ? rc : protect_parameters(cli, err);
+}
+
+/* --- settings ------------------------------------------------------------------------------------------------------- */
+
+/* Everything that decides the bytes of the image, and nothing else, as lines of key=value. A criterion's model is in its
+ * saved state. */
+static int write_settings(const struct pt_cli *cli, struct pt_open *o, struct base_err *err)
+{
+    uint32_t scene_crc = 0, judging_crc = 0;
+    int rc = base_inputs_crc32(&o->scene_files, &scene_crc, err);
+    if (!rc)
+        rc = base_inputs_crc32(&o->judging, &judging_crc, err);
+    if (rc)
+        return rc;
+    const struct pt_render_config *c = &o->config;
+    const struct pt_integrator *i = &c->integrator;
+    size_t room = sizeof o->settings,
+           used = (size_t)snprintf(o->settings, room,
+                                   "scene-crc=%08x\nsize=%dx%d\ncrop=%d,%d,%d,%d\nblock=%dx%d\nspp-min=%llu\nspp-max=%"
+                                   "llu\nuniform=%d\nmax-seam=%g\n"
+                                   "aov=%u\nseed=%u\nsampler=%d\nintegrator=%d\nfilter=%d:%gx%g:%g\n"
+                                   "light-selection=%s\nmax-depth=%d\nrr-depth=%d\nclamp=%g\n",
+                                   scene_crc, c->width, c->height, c->crop[0], c->crop[1], c->crop[2], c->crop[3],
+                                   c->block_width, c->block_height, (unsigned long long)c->spp_min,
+                                   (unsigned long long)c->spp_max, c->uniform, c->max_seam, c->planes, i->seed, i->sampler,
+                                   i->strategy, i->filter, (double)i->filter_x, (double)i->filter_y, (double)i->filter_sigma,
+                                   pt_light_selection_words[cli->load.light_selection], i->max_depth, i->rr_depth,
+                                   (double)i->max_component);
+    const struct pt_view *view = &cli->load.view;
+    used += (size_t)snprintf(o->settings + used, room - used, "fov=%.17g\nlook-at=", view->fov_deg);
+    for (int k = 0; view->has_look_at && k < 9; k++)
+        used += (size_t)snprintf(o->settings + used, room - used, "%.17g ", view->look_at_world[k]);
+    const struct lull_criterion *t = o->criterion ? lull_host_table(o->criterion) : NULL;
+    used +=
+        (size_t)snprintf(o->settings + used, room - used, "\ncriterion=%s %s\n", t ? t->id : "none", t ? t->version : "");
+    if (used < room)
+        used += (size_t)snprintf(o->settings + used, room - used, "plugin-and-mask-crc=%08x\n", judging_crc);
+    for (uint32_t k = 0; k < cli->params.count && used < room; k++)
+        used += (size_t)snprintf(o->settings + used, room - used, "param=%s=%s\n", cli->params.list[k].key,
+                                 cli->params.list[k].value);
+    return used < room ? 0 : base_fail(err, BASE_EINVAL, "the criterion's parameters are too long");
+}
+
+/* --- render --------------------------------------------------------------------------------------------------------- */
+
+int pt_open_render(struct pt_cli *cli, struct job *job, struct base_log *log, struct pt_open *o, struct base_err *err)
+{
+    const int records = cli->action == PT_CLI_SEQUENCE;
+    struct pt_render_config *c = &o->config;
+    int rc = 0;
+    c->job = job_rank(job) == 0 ? job : NULL;
+    if (c->crop[2] > c->width || c->crop[3] > c->height)
+        return base_fail(err, BASE_EINVAL, "--crop %d,%d,%d,%d: the image has %dx%d pixels", c->crop[0], c->crop[1],
+                         c->crop[2], c->crop[3], c->width, c->height);
+    if (cli->criterion || !(records || c->uniform))
+        rc = open_criterion(cli, log, o, err);
+    if (!rc && !records && job_rank(job) == 0) /* the others write nothing */
+        rc = check_outputs(cli, o, err);
+    if (!rc && (cli->checkpoint.path || job))
+        rc = write_settings(cli, o, err);
+    return rc || records ? rc : pt_render_create(c, o->scene, o->kernel, o->threads, o->criterion, &o->render, err);
+}
+
+void pt_open_release(struct pt_open *o)
+{
+    pt_render_destroy(o->render);
+    lull_host_close(o->criterion);
+    pt_mask_release(&o->mask);
+    pt_scene_destroy(o->scene);
+    base_threads_destroy(o->threads);
+    base_inputs_release(&o->scene_files);
+    base_inputs_release(&o->judging);
+}

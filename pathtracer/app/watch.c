@@ -1,0 +1,70 @@
+#include "watch.h"
+
+#include <math.h>
+
+#include "base/clock.h"
+#include "base/interrupt.h"
+#include "render/checkpoint.h"
+#include "render/output.h"
+
+void pt_watch_init(struct pt_watch *w, const struct pt_open *open, const struct pt_checkpoint_plan *checkpoint,
+                   const char *preview, struct base_log *log)
+{
+    *w = (struct pt_watch){.log = log,
+                           .open = open,
+                           .checkpoint = checkpoint,
+                           .preview = preview,
+                           .checkpoint_at_s = base_clock_wall_s() + checkpoint->every_s};
+    pt_progress_init(&w->progress, log);
+}
+
+/* A checkpoint that fails on the way costs nothing yet: the next one may succeed. */
+static void save_now_and_then(struct pt_watch *w, const struct pt_render *render)
+{
+    struct base_err why = {0};
+    if (pt_checkpoint_save(w->checkpoint->path, render, w->open->settings, &why) != 0)
+        base_log_say(w->log, "no checkpoint, the render goes on: %s", why.text);
+    w->checkpoint_at_s = base_clock_wall_s() + w->checkpoint->every_s;
+}
+
+/* The picture so far: after the first slice, then when three times as long has passed, at most so often that it takes a
+ * hundredth of the time. One that cannot be written costs nothing yet: the last one is what fails. */
+static void show_preview(struct pt_watch *w, const struct pt_render *render)
+{
+    const double ratio = 3.0, longest_s = 60.0, share = 0.01;
+    struct base_err ignored = {0};
+    double begin_s = base_clock_wall_s();
+    pt_output_preview(w->preview, render, NULL, &ignored);
+    double now_s = base_clock_wall_s();
+    w->preview_at_s = now_s + fmax(fmin(ratio * (now_s - w->open->start_s), longest_s), (now_s - begin_s) / share);
+}
+
+static int after_slice(void *data, struct pt_render *render, struct base_err *err)
+{
+    struct pt_watch *w = data;
+    (void)err;
+    if (w->preview && !base_interrupted && base_clock_wall_s() >= w->preview_at_s)
+        show_preview(w, render);
+    pt_progress_update(&w->progress, render);
+    if (w->checkpoint->path && !base_interrupted && base_clock_wall_s() >= w->checkpoint_at_s)
+        save_now_and_then(w, render);
+    return 0;
+}
+
+static int is_interrupted(void *data)
+{
+    (void)data;
+    return base_interrupted != 0;
+}
+
+static int suspend(void *data, struct pt_render *render, struct base_err *err)
+{
+    const struct pt_watch *w = data;
+    return w->checkpoint->path ? pt_checkpoint_save(w->checkpoint->path, render, w->open->settings, err) : 0;
+}
+
+struct pt_render_hooks pt_watch_hooks(struct pt_watch *w)
+{
+    return (struct pt_render_hooks){
+        .slice = after_slice, .interrupted = is_interrupted, .suspend = suspend, .log = w->log, .data = w};
+}
