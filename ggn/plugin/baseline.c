@@ -5,7 +5,6 @@
  */
 #include "baselines/baseline.h"
 #include "baselines/lstm.h"
-#include "plugin/model_path.h"
 #include "plugin/translate.h"
 #include "plugin/windowed.h"
 
@@ -105,9 +104,6 @@ static int no_tail(void *data, double *tail999, double *gini)
     return 0;
 }
 
-static const struct gp_block_view_ops ops = {slot_of,       worker_create, worker_destroy,
-                                             model_destroy, read_image,    {NULL, no_noise, window_logit, no_tail}};
-
 static void hash_model(struct lull_instance *in, const struct ggn_baseline *b)
 {
     const struct ggn_svm *s = &b->svm;
@@ -119,22 +115,15 @@ static void hash_model(struct lull_instance *in, const struct ggn_baseline *b)
         gp_windowed_hash(in, s->values, sizeof *s->values * ggn_svm_values(s));
 }
 
-static int32_t load_model(struct lull_instance *in, enum ggn_baseline_kind kind, const char *path, struct lull_error *err)
+static int32_t load(struct lull_instance *in, int kind, const char *path, struct lull_error *err)
 {
     struct base_err error = {0};
     struct ggn_baseline *b = calloc(1, sizeof *b);
-    char name[64], found[5000];
 
     in->model = b;
     if (!b)
         return lull_kit_fail(err, LULL_E_MEMORY, "create: out of memory");
-    snprintf(name, sizeof name, "%s.ggn", ggn_baseline_names[kind]);
-    if (!path) {
-        if (!gp_model_find(name, NULL, found, sizeof found))
-            return lull_kit_fail(err, LULL_E_VALUE, "model: %.480s", found);
-        path = found;
-    }
-    if (ggn_baseline_load(b, path, kind, &error))
+    if (ggn_baseline_load(b, path, (enum ggn_baseline_kind)kind, &error))
         return gp_fail_from(err, "model", &error);
     in->rule = (struct ggn_stop_rule){.policy = b->policy, .window = b->window};
     hash_model(in, b);
@@ -142,23 +131,13 @@ static int32_t load_model(struct lull_instance *in, enum ggn_baseline_kind kind,
     return LULL_OK;
 }
 
-static int32_t create(enum ggn_baseline_kind kind, const struct lull_criterion *table, const struct lull_host *host,
-                      const struct lull_pair *pairs, uint32_t pair_count, uint32_t pair_stride,
-                      struct lull_instance **instance, struct lull_error *err)
-{
-    const char *text[LULL_KIT_PARAM_MAX];
-    struct lull_instance *in = NULL;
-    int32_t status = gp_windowed_create(&ops, table, host, pairs, pair_count, pair_stride, text, instance ? &in : NULL, err);
-
-    if (!status)
-        status = load_model(in, kind, text[P_MODEL], err);
-    if (status) {
-        gp_windowed_destroy(in);
-        return status;
-    }
-    *instance = in;
-    return LULL_OK;
-}
+static const struct gp_block_view_ops ops = {.load = load,
+                                             .slot = slot_of,
+                                             .worker_create = worker_create,
+                                             .worker_destroy = worker_destroy,
+                                             .model_destroy = model_destroy,
+                                             .read = read_image,
+                                             .evidence = {NULL, no_noise, window_logit, no_tail}};
 
 /* X(kind, member of criteria.h, id, name, its features) */
 #define BASELINES(X) \
@@ -173,7 +152,7 @@ static int32_t create(enum ggn_baseline_kind kind, const struct lull_criterion *
     static int32_t create_##member(const struct lull_host *host, const struct lull_pair *pairs, uint32_t pair_count, \
                                    uint32_t pair_stride, struct lull_instance **instance, struct lull_error *err) \
     { \
-        return create(kind, &ggn_plugin_##member, host, pairs, pair_count, pair_stride, instance, err); \
+        return gp_windowed_create(&ops, kind, &ggn_plugin_##member, host, pairs, pair_count, pair_stride, instance, err); \
     } \
     const struct lull_criterion ggn_plugin_##member = \
         GP_WINDOWED_TABLE(.create = create_##member, .id = identity, .name = title, \

@@ -12,7 +12,6 @@
  */
 #include "model/judge.h"
 #include "model/window.h"
-#include "plugin/model_path.h"
 #include "plugin/translate.h"
 #include "plugin/windowed.h"
 #include "sequence/simulate.h"
@@ -111,11 +110,9 @@ static double window_noise(void *data)
  * buffer with part of the samples. */
 static int has_half(const struct gp_block_view *seen, double *split)
 {
-    const double n = (double)seen->block->spp, h = (double)seen->block->half_spp;
-
-    if (!lull_kit_plane(seen->view, LULL_PLANE_HALF) || h <= 0 || h >= n)
+    if (!lull_kit_plane(seen->view, LULL_PLANE_HALF) || !gp_has_halves(seen->block))
         return 0;
-    *split = seq_means_scale(h, n);
+    *split = seq_means_scale((double)seen->block->half_spp, (double)seen->block->spp);
     return 1;
 }
 
@@ -190,22 +187,14 @@ static int tail_statistics(void *data, double *tail999, double *gini)
     return 1;
 }
 
-static const struct gp_block_view_ops ops = {
-    slot_of, worker_create, worker_destroy, model_destroy, read_image, {NULL, window_noise, window_logit, tail_statistics}};
-
 /* --- instance ---------------------------------------------------------------------------------------------------------- */
 
-static int32_t load_model(struct lull_instance *in, const char *path, struct lull_error *err)
+static int32_t load(struct lull_instance *in, int kind, const char *path, struct lull_error *err)
 {
     struct base_err error = {0};
     struct ggn_model *model = NULL;
-    char found[5000];
+    (void)kind;
 
-    if (!path) {
-        if (!gp_model_find("lull-2.ggn", "LULL_MODEL", found, sizeof found))
-            return lull_kit_fail(err, LULL_E_VALUE, "model: %.480s", found);
-        path = found;
-    }
     int rc = ggn_model_load(path, &model, &error);
     in->model = model;
     if (rc || ggn_policy_of(model, &in->rule.policy, &error))
@@ -228,22 +217,20 @@ static int32_t load_model(struct lull_instance *in, const char *path, struct lul
     return LULL_OK;
 }
 
+static const struct gp_block_view_ops ops = {.model = "lull-2",
+                                             .variable = "LULL_MODEL",
+                                             .load = load,
+                                             .slot = slot_of,
+                                             .worker_create = worker_create,
+                                             .worker_destroy = worker_destroy,
+                                             .model_destroy = model_destroy,
+                                             .read = read_image,
+                                             .evidence = {NULL, window_noise, window_logit, tail_statistics}};
+
 static int32_t create(const struct lull_host *host, const struct lull_pair *pairs, uint32_t pair_count, uint32_t pair_stride,
                       struct lull_instance **instance, struct lull_error *err)
 {
-    const char *text[LULL_KIT_PARAM_MAX];
-    struct lull_instance *in = NULL;
-    int32_t status =
-        gp_windowed_create(&ops, &ggn_plugin_ggn, host, pairs, pair_count, pair_stride, text, instance ? &in : NULL, err);
-
-    if (!status)
-        status = load_model(in, text[P_MODEL], err);
-    if (status) {
-        gp_windowed_destroy(in);
-        return status;
-    }
-    *instance = in;
-    return LULL_OK;
+    return gp_windowed_create(&ops, 0, &ggn_plugin_ggn, host, pairs, pair_count, pair_stride, instance, err);
 }
 
 const struct lull_criterion ggn_plugin_ggn = GP_WINDOWED_TABLE(

@@ -6,8 +6,6 @@
  * noise over the level at which people stop seeing it, `p_noisy` the share of viewers who still do; a block stops when that
  * is at most `visible`. No model.
  */
-#include <stdatomic.h>
-
 #include "observer/observer.h"
 #include "observer/visibility.h"
 #include "plugin/criteria.h"
@@ -132,8 +130,6 @@ static double error_of(const struct lull_instance *in, const struct lull_block *
     return ggn_observer_error(&in->observer, noise, pixels);
 }
 
-/* Two pictures that are the same everywhere show no noise, which is right for black or evenly lit blocks; structure says
- * that the host has given the same samples twice. */
 static int has_structure(const struct worker *w, size_t pixels)
 {
     for (size_t c = 0; c < 3; c++)
@@ -143,32 +139,23 @@ static int has_structure(const struct worker *w, size_t pixels)
     return 0;
 }
 
-static void warn(struct lull_instance *in, const char *what)
-{
-    const struct lull_host *host = in->kit.host;
-    if (host && host->log && !atomic_flag_test_and_set(&in->warned))
-        host->log(host, LULL_LOG_WARNING, what);
-}
-
 /* What the two pictures of w say; differ: they are not the same everywhere. `same` is the warning if they should not be. */
 static double verdict_on(struct lull_instance *in, const struct lull_block *b, int differ, double split, const char *same,
                          struct worker *w, struct lull_kit_tally *tally)
 {
     if (differ)
         return error_of(in, b, split, w);
-    if (!has_structure(w, (size_t)lull_kit_pixels(b)))
-        return 0;
-    warn(in, same);
-    tally->early = tally->bad = 1;
-    return (double)NAN;
+    return gp_error_of_same(&in->kit, has_structure(w, (size_t)lull_kit_pixels(b)), &in->warned, same, tally);
 }
 
 static double error_of_halves(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
                               struct worker *w, struct lull_kit_tally *tally)
 {
-    if (!b->half_spp || b->half_spp >= b->spp) {
-        warn(in, "observer: HALF holds none or all of a block's samples, so that noise cannot be told; no block is stopped "
-                 "by it");
+    if (!gp_has_halves(b)) {
+        gp_warn_once(
+            &in->kit, &in->warned,
+            "observer: HALF holds none or all of a block's samples, so that noise cannot be told; no block is stopped "
+            "by it");
         tally->early = 1;
         return (double)NAN;
     }
@@ -330,9 +317,8 @@ static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *fr
     in->means = means;
     atomic_flag_clear(&in->warned);
     lull_kit_frame_open(in, frame);
-    const struct lull_host *host = in->kit.host;
-    if (in->means.count && host && host->log)
-        host->log(host, LULL_LOG_INFO, "observer: no plane HALF: noise is told from how the mean changes between checks");
+    if (in->means.count)
+        gp_log(&in->kit, LULL_LOG_INFO, "observer: no plane HALF: noise is told from how the mean changes between checks");
     return LULL_OK;
 }
 

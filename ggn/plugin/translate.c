@@ -9,6 +9,37 @@ int32_t gp_fail_from(struct lull_error *err, const char *what, const struct base
     return lull_kit_fail(err, code, "%s: %.400s", what, from->text);
 }
 
+void gp_log(const struct lull_kit *kit, int32_t level, const char *text)
+{
+    if (kit->host && kit->host->log)
+        kit->host->log(kit->host, level, text);
+}
+
+void gp_warn_once(const struct lull_kit *kit, atomic_flag *warned, const char *text)
+{
+    if (kit->host && kit->host->log && !atomic_flag_test_and_set(warned))
+        gp_log(kit, LULL_LOG_WARNING, text);
+}
+
+double gp_error_of_same(const struct lull_kit *kit, int has_structure, atomic_flag *warned, const char *text,
+                        struct lull_kit_tally *tally)
+{
+    if (!has_structure)
+        return 0;
+    gp_warn_once(kit, warned, text);
+    tally->early = tally->bad = 1;
+    return (double)NAN;
+}
+
+int32_t gp_check_block(const struct lull_block *b, const struct lull_rect *r, uint64_t spp_before, struct lull_error *err)
+{
+    if (b->x0 != r->x0 || b->y0 != r->y0 || b->x1 != r->x1 || b->y1 != r->y1)
+        return lull_kit_fail(err, LULL_E_INVALID, "evaluate: block %u is none of the frame's", b->id);
+    if (b->spp < spp_before)
+        return lull_kit_fail(err, LULL_E_INVALID, "evaluate: block %u has fewer samples than before", b->id);
+    return LULL_OK;
+}
+
 struct ggn_display gp_display_of(const struct lull_kit *kit)
 {
     struct ggn_display d = {GGN_TRANSFER_SRGB, kit->gamma, kit->exposure};

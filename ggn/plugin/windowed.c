@@ -1,22 +1,45 @@
 #include "plugin/windowed.h"
 
+#include "plugin/model_path.h"
 #include "plugin/translate.h"
 
 /* --- instance ---------------------------------------------------------------------------------------------------------- */
 
 static const struct lull_kit_rule rule;
 
-int32_t gp_windowed_create(const struct gp_block_view_ops *ops, const struct lull_criterion *table,
-                           const struct lull_host *host, const struct lull_pair *pairs, uint32_t pair_count,
-                           uint32_t pair_stride, const char **text, struct lull_instance **instance, struct lull_error *err)
+/* The model that the first parameter names, or the default one. */
+static int32_t load_model(struct lull_instance *in, int kind, const char *id, const char *path, struct lull_error *err)
 {
+    char name[64], found[5000];
+
+    if (!path) {
+        snprintf(name, sizeof name, "%s.ggn", in->ops->model ? in->ops->model : id);
+        if (!gp_model_find(name, in->ops->variable, found, sizeof found))
+            return lull_kit_fail(err, LULL_E_VALUE, "model: %.480s", found);
+        path = found;
+    }
+    return in->ops->load(in, kind, path, err);
+}
+
+int32_t gp_windowed_create(const struct gp_block_view_ops *ops, int kind, const struct lull_criterion *table,
+                           const struct lull_host *host, const struct lull_pair *pairs, uint32_t pair_count,
+                           uint32_t pair_stride, struct lull_instance **instance, struct lull_error *err)
+{
+    const char *text[LULL_KIT_PARAM_MAX];
+    struct lull_instance *in = NULL;
     int32_t status =
-        lull_kit_create(&rule, table, sizeof **instance, host, pairs, pair_count, pair_stride, text, instance, err);
+        lull_kit_create(&rule, table, sizeof *in, host, pairs, pair_count, pair_stride, text, instance ? &in : NULL, err);
 
     if (status)
         return status;
-    (*instance)->ops = ops;
-    (*instance)->key = UINT32_C(2166136261);
+    in->ops = ops;
+    in->key = UINT32_C(2166136261);
+    status = load_model(in, kind, table->id, text[0], err);
+    if (status) {
+        gp_windowed_destroy(in);
+        return status;
+    }
+    *instance = in;
     return LULL_OK;
 }
 
@@ -110,11 +133,10 @@ int32_t gp_windowed_begin_frame(struct lull_instance *in, const struct lull_fram
     in->worker = worker;
     in->workers = count;
     lull_kit_frame_open(in, frame);
-    const struct lull_host *host = in->kit.host;
-    if (in->half_wanted && !(frame->planes & LULL_PLANE_BIT(LULL_PLANE_HALF)) && host && host->log)
-        host->log(host, LULL_LOG_WARNING, in->half_wanted);
-    if (in->slow && host && host->log)
-        host->log(host, LULL_LOG_WARNING, in->slow);
+    if (in->half_wanted && !(frame->planes & LULL_PLANE_BIT(LULL_PLANE_HALF)))
+        gp_log(&in->kit, LULL_LOG_WARNING, in->half_wanted);
+    if (in->slow)
+        gp_log(&in->kit, LULL_LOG_WARNING, in->slow);
     in->rule.spp_max = frame->spp_max;
     in->display = gp_display_of(&in->kit);
     return LULL_OK;
@@ -193,13 +215,7 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
 
 static int32_t check_block(const struct lull_instance *in, const struct lull_block *b, struct lull_error *err)
 {
-    const struct lull_rect *r = &in->history.rect[b->id];
-
-    if (b->x0 != r->x0 || b->y0 != r->y0 || b->x1 != r->x1 || b->y1 != r->y1)
-        return lull_kit_fail(err, LULL_E_INVALID, "evaluate: block %u is none of the frame's", b->id);
-    if (b->spp < in->history.head[b->id].stopper.asked_spp)
-        return lull_kit_fail(err, LULL_E_INVALID, "evaluate: block %u has fewer samples than before", b->id);
-    return LULL_OK;
+    return gp_check_block(b, &in->history.rect[b->id], in->history.head[b->id].stopper.asked_spp, err);
 }
 
 int32_t gp_windowed_evaluate(struct lull_instance *in, const struct lull_view *view, const struct lull_block *blocks,

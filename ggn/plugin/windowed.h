@@ -25,6 +25,10 @@ struct gp_block_view {
 
 /* What such a criterion keeps of a block and computes from it; static. */
 struct gp_block_view_ops {
+    const char *model,
+        *variable; /* MODEL.ggn by default (NULL: named as the criterion), or what this variable names (NULL: none) */
+    /* Reads the model file: in->model, in->rule, gp_windowed_ready. What it made before it failed is destroyed. */
+    int32_t (*load)(struct lull_instance *in, int kind, const char *path, struct lull_error *err);
     /* What its slots hold; of: the instance. */
     struct gp_slot (*slot)(const void *of, int32_t width, int32_t height);
     /* Scratch of one worker for blocks of up to `pixels`. NULL on failure. */
@@ -50,11 +54,11 @@ struct lull_instance {
     void **worker;
 };
 
-/* create, up to the model: an instance with its parameters and no model yet. text: see lull_kit_values. */
-int32_t gp_windowed_create(const struct gp_block_view_ops *ops, const struct lull_criterion *table,
+/* create of such a criterion, whose first parameter is the file of its model. kind: for ops->load. */
+int32_t gp_windowed_create(const struct gp_block_view_ops *ops, int kind, const struct lull_criterion *table,
                            const struct lull_host *host, const struct lull_pair *pairs, uint32_t pair_count,
-                           uint32_t pair_stride, const char **text, struct lull_instance **instance, struct lull_error *err);
-/* create, after the model: parameters over the policy, requirements, the key. width, height: blocks that the model was made
+                           uint32_t pair_stride, struct lull_instance **instance, struct lull_error *err);
+/* The end of ops->load: parameters over the policy, requirements, the key. width, height: blocks that the model was made
  * for. */
 void gp_windowed_ready(struct lull_instance *in, const struct lull_param *params, uint32_t count, int width, int height);
 /* Part of the key: any bytes that decide about answers. */

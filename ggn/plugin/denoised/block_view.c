@@ -112,7 +112,7 @@ static int read_part(struct gd_block_view *seen, struct lull_rect box, struct lu
                      const struct lull_block *b, uint32_t planes, struct lull_kit_tally *tally)
 {
     const double n = (double)b->spp, h = (double)b->half_spp;
-    const int split = b->half_spp > 0 && b->half_spp < b->spp;
+    const int split = gp_has_halves(b);
     struct lull_block part = *b;
     struct lull_kit_span s;
     int differ = 0;

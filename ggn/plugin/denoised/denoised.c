@@ -8,8 +8,6 @@
  * The history of a block is its last check: asked again at the same samples it answers the same, though its neighbours,
  * which the denoiser reads too, may have changed.
  */
-#include <stdatomic.h>
-
 #include "observer/observer.h"
 #include "plugin/criteria.h"
 #include "plugin/denoised/block_view.h"
@@ -58,27 +56,18 @@ struct lull_instance {
 
 /* --- one block --------------------------------------------------------------------------------------------------------- */
 
-static void warn(struct lull_instance *in, const char *what)
-{
-    const struct lull_host *host = in->kit.host;
-    if (host && host->log && !atomic_flag_test_and_set(&in->warned))
-        host->log(host, LULL_LOG_WARNING, what);
-}
-
 /* The larger of both errors, NaN where there is none; *now gets both. */
 static double error_of(struct lull_instance *in, struct gd_block_view *seen, const struct lull_view *view,
                        const struct lull_block *b, struct lull_kit_tally *tally, struct past *now)
 {
     const size_t pixels = (size_t)lull_kit_pixels(b);
     struct gd_errors e;
-    if (!gd_block_view_read(seen, &in->form, &in->kit, view, b, tally)) {
-        if (!gd_block_view_structure(seen, &in->form, b))
-            return now->halves = now->crossed = 0;
-        warn(in, "denoised: COLOR and HALF are the same in a block that is not of one colour: HALF must hold a fixed half "
-                 "of the samples");
-        tally->early = tally->bad = 1;
-        return (double)NAN;
-    }
+    if (!gd_block_view_read(seen, &in->form, &in->kit, view, b, tally))
+        return now->halves = now->crossed =
+                   gp_error_of_same(&in->kit, gd_block_view_structure(seen, &in->form, b), &in->warned,
+                                    "denoised: COLOR and HALF are the same in a block that is not of one colour: HALF must "
+                                    "hold a fixed half of the samples",
+                                    tally);
     if (gd_block_view_errors(seen, &in->form, &in->kit, b, in->kit.value[P_PICTURE] == 0, &e))
         return (double)NAN; /* evaluate finds it in seen->err */
     now->halves = ggn_observer_error(&in->observer, e.halves, pixels);
@@ -117,9 +106,10 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
         now->halves = now->crossed = (double)NAN;
         if (b->spp < in->kit.need.first_spp) {
             tally.early = 1;
-        } else if (!b->half_spp || b->half_spp >= b->spp) {
-            warn(in, "denoised: HALF holds none or all of a block's samples, so that errors cannot be told; no block is "
-                     "stopped by it");
+        } else if (!gp_has_halves(b)) {
+            gp_warn_once(&in->kit, &in->warned,
+                         "denoised: HALF holds none or all of a block's samples, so that errors cannot be told; no block is "
+                         "stopped by it");
             tally.early = 1;
         } else {
             error = error_of(in, seen, view, b, &tally, now);
@@ -138,13 +128,12 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
 
 static void tell(const struct lull_instance *in, const struct lull_block *b, const struct past *now)
 {
-    const struct lull_host *host = in->kit.host;
     char line[160];
-    if (!host || !host->log || isnan(now->error))
+    if (isnan(now->error))
         return;
     snprintf(line, sizeof line, "denoised: block %u at %llu spp: error %.2f by its halves, %.2f crossed; stops at %.2f",
              b->id, (unsigned long long)b->spp, now->halves, now->crossed, in->stop_error);
-    host->log(host, LULL_LOG_DEBUG, line);
+    gp_log(&in->kit, LULL_LOG_DEBUG, line);
 }
 
 static int32_t fail_of(const struct lull_instance *in, const struct gd_block_view *seen, struct lull_error *err)
@@ -233,15 +222,14 @@ static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *fr
     in->pending = fresh.pending;
     atomic_flag_clear(&in->warned);
     lull_kit_frame_open(in, frame);
-    const struct lull_host *host = in->kit.host;
-    if (host && host->log && (frame->planes & AUXILIARY) != AUXILIARY)
-        host->log(host, LULL_LOG_WARNING,
-                  "denoised: without the planes ALBEDO and NORMAL the denoiser blurs textures: "
-                  "blocks take more samples");
-    if (host && host->log && (frame->flags & LULL_FRAME_SHARED))
-        host->log(host, LULL_LOG_WARNING,
-                  "denoised: the filter gives neighbouring pixels the same samples: the denoiser "
-                  "takes their noise for structure; use a filter within the pixel");
+    if ((frame->planes & AUXILIARY) != AUXILIARY)
+        gp_log(&in->kit, LULL_LOG_WARNING,
+               "denoised: without the planes ALBEDO and NORMAL the denoiser blurs textures: "
+               "blocks take more samples");
+    if (frame->flags & LULL_FRAME_SHARED)
+        gp_log(&in->kit, LULL_LOG_WARNING,
+               "denoised: the filter gives neighbouring pixels the same samples: the denoiser "
+               "takes their noise for structure; use a filter within the pixel");
     return LULL_OK;
 }
 
@@ -263,12 +251,7 @@ static void destroy(struct lull_instance *in)
 
 static int32_t check_block(const struct lull_instance *in, const struct lull_block *b, struct lull_error *err)
 {
-    const struct lull_rect *r = &in->rect[b->id];
-    if (b->x0 != r->x0 || b->y0 != r->y0 || b->x1 != r->x1 || b->y1 != r->y1)
-        return lull_kit_fail(err, LULL_E_INVALID, "evaluate: block %u is none of the frame's", b->id);
-    if (b->spp < in->past[b->id].spp)
-        return lull_kit_fail(err, LULL_E_INVALID, "evaluate: block %u has fewer samples than before", b->id);
-    return LULL_OK;
+    return gp_check_block(b, &in->rect[b->id], in->past[b->id].spp, err);
 }
 
 static const struct lull_kit_rule rule = {.planes_required = REQUIRED,
