@@ -510,7 +510,7 @@ int ggn_cmd_cost(int argc, char **argv)
     static const struct base_options options = {
         .list = list,
         .doc = "Replays recorded blocks through every criterion over the range of its dials and writes, scene by scene, "
-               "what was spent until the blocks stop and how good the picture is then, as JSON. scripts/cost puts "
+               "what was spent until the blocks stop and how good the picture is then, as JSON. scripts/lab cost puts "
                "measured prices on the checks and draws it."};
     struct options o = {.split = GGN_SPLIT_TEST, .threads = base_threads_available()};
     struct job j = {.o = &o};

@@ -505,13 +505,13 @@ def main(o):
         if os.path.exists(os.path.join(ROOT, p))]
     every = set(steps) == {*STEPS, "draw"}
     out = {"sets": {}} if every else tool.results(o.out, "cost") or {"sets": {}}
-    if steps != ["draw"]:
+    if "defaults" not in out:  # one measurement, one set of defaults
         out["defaults"] = defaults()
     for step, function in STEPS.items():
         if step in steps:
             function(o, out)
             print("cost: %s done" % step, flush=True)
-            out["measured"] = tool.measured(level=tool.observer_law(), visible=out["defaults"]["observer"][1])
+            out.setdefault("measured", {})[step] = tool.measured(level=tool.observer_law(), visible=out["defaults"]["observer"][1])
             tool.save(rounded(out), o.out, "results", "cost.json", separators=(",", ":"))
     if "draw" in steps:
         draw(o.out, out)
