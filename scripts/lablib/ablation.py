@@ -1,10 +1,5 @@
 """Trains the variants of a plan and says what each is worth on the validation scenes.
 
-usage: scripts/lab ablation [--data DIR] [--out DIR] [--table] [--write [DIR]] [PLAN]     (default: scripts/ablate.plan, data, build/ablate)
-
-  --table        train nothing: the table of what is there already
-  --write [DIR]  keep the table in DIR/results/ablation.json and fill the pages (default docs)
-
 A line of the plan is `NAME  OPTIONS of ggn train`; `common` holds those that all share, `#` begins a comment. Every run is a
 `ggn train --resume` at nice 10 on one thread: interrupted, the same command goes on with it. What was trained with other options or
 another seed is refused, not mixed in. Figures are of the validation scenes at the threshold that ggn train chooses there: good for
@@ -22,10 +17,10 @@ HEAD = ("variant", "options", "AUC", "median \\|log2\\|", "early", "samples", "b
 
 
 def options(parser):
-    parser.add_argument("plan", nargs="?", default=os.path.join(tool.ROOT, "scripts", "ablate.plan"))
+    parser.add_argument("plan", nargs="?", default=os.path.join(tool.ROOT, "scripts", "ablate.plan"), help="scripts/ablate.plan")
     parser.add_argument("--data", type=tool.path, default=os.path.join(tool.ROOT, "data"))
-    parser.add_argument("--out", type=tool.path, default=os.path.join(tool.BUILD, "ablate"))
-    parser.add_argument("--table", action="store_true")
+    parser.add_argument("--out", type=tool.path, default=os.path.join(tool.BUILD, "ablate"), help="build/ablate")
+    parser.add_argument("--table", action="store_true", help="train nothing: the table of what is there already")
     tool.writes(parser)
 
 

@@ -1,22 +1,10 @@
 """How well the criteria agree with people, and with the observer's labels on the test scenes.
 
-usage: scripts/lab agreement [--data DIR] [--human DIR] [--rendered DIR] [--observer FILE] [--out DIR] [--threads N] [-m FILE ...] [--write [DIR]]
-
-  --data DIR    recordings of `lab data-set`: its test scenes are judged, on its validation scenes the cuts of the criteria
-                without a meaning of their own are tuned (default ../data; where there is none, only the people's tables)
-  --human DIR   views that people judged: human-thresholds.csv and views/ (default ../shared/human)
-  --rendered DIR  blocks of those views that `lab data-set` rendered past their thresholds as scripts/people.plan says
-                (default ../data-people/people; where there is none, no table)
-  --observer FILE  its parameters, with those of each view left out (default ggn/observer/observer.json)
-  --out DIR     labelled copies and agreement.json (default build/agreement)
-  --threads N   (default: all processors)
-  -m FILE       a model; may be repeated (default ggn/models/lull-2.ggn)
-  --write [DIR] keep the tables in DIR/results/agreement.json and fill the pages of DIR (default docs)
-
-Tables in Markdown: people and the test scenes as the criteria stop by default, each view of people judged by an observer fitted to
-the others; people with other values of --visible; the test scenes with --visible 0.5, since labels are the samples at which half of
-the viewers see noise, for those that know this parameter; and the observer at 0.5 on the test blocks with a reference, against
-labels from the rendered levels. 20 minutes of processor time, 2 for the people's tables."""
+Prints tables in Markdown: people and the test scenes as the criteria stop by default, each view of people judged by an observer fitted
+to the others; people with other values of --visible; the test scenes with --visible 0.5, since labels are the samples at which half of
+the viewers see noise, for those that know this parameter; and the observer at 0.5 on the test blocks with a reference, against labels
+from the rendered levels. On the validation scenes the cuts of criteria without a meaning of their own are tuned. 20 minutes of processor
+time, 2 for the people's tables."""
 import json
 import math
 import os
@@ -38,12 +26,16 @@ TITLES = {"people": "people", "visible": "people, the observer at other values o
 
 
 def options(parser):
-    for name, default in (("--data", os.path.join(tool.ROOT, "../data")), ("--human", os.path.join(tool.SHARED, "human")),
-                          ("--rendered", os.path.join(tool.ROOT, "../data-people/people")),
-                          ("--observer", os.path.join(tool.ROOT, "ggn/observer/observer.json")), ("--out", os.path.join(tool.BUILD, "agreement"))):
-        parser.add_argument(name, type=tool.path, default=default)
+    for name, default, text in (
+            ("--data", os.path.join(tool.ROOT, "../data"), "recordings of lab data-set (../data); where there are none, only people's tables"),
+            ("--human", os.path.join(tool.SHARED, "human"), "human-thresholds.csv and views/ that people judged (../shared/human)"),
+            ("--rendered", os.path.join(tool.ROOT, "../data-people/people"),
+             "blocks of those that were rendered past their thresholds, as scripts/people.plan says (../data-people/people); may be absent"),
+            ("--observer", os.path.join(tool.ROOT, "ggn/observer/observer.json"), "its parameters, with those of each view left out"),
+            ("--out", os.path.join(tool.BUILD, "agreement"), "labelled copies and agreement.json (build/agreement)")):
+        parser.add_argument(name, type=tool.path, default=default, metavar="PATH", help=text)
     parser.add_argument("--threads", type=int, default=tool.THREADS)
-    parser.add_argument("-m", dest="model", type=tool.path, action="append")
+    parser.add_argument("-m", dest="model", type=tool.path, action="append", help="may be repeated (ggn/models/lull-2.ggn)")
     tool.writes(parser)
 
 

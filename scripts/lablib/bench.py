@@ -1,16 +1,9 @@
 """Speed and noise as ratios, interleaved in one run, held against peers, limits and what is wanted.
 
-usage: scripts/lab bench [--rounds N] [--quick] [--only PARTS] [--write [DIR]]
-
-  --rounds N   the figures are medians over so many (default 3)
-  --quick      fewer samples: rougher figures
-  --only PARTS some of peers,host,rays,noise,start,networks,avx2,study,reading,limits
-  --write [DIR]  keep what was measured in DIR/results/bench.json, beside the parts that were measured before, and fill the pages of
-               DIR (default docs); the part reading also draws DIR/reading-time.png
-
 Peers are used when they are installed: Blender's Cycles (package blender), Embree's sample path tracer (embree-tools), PyTorch. Rates
 are per processor second and a ratio is the median of the ratios within the rounds, so that a busy machine disturbs them less; seconds
-of starting are wall time and want a quiet one. Scenes of ../shared are measured when that folder is there."""
+of starting are wall time and want a quiet one. Scenes of ../shared are measured when that folder is there. Parts that are not measured
+keep their figures."""
 import array
 import json
 import math
@@ -33,10 +26,10 @@ SHARED = os.path.join(tool.SHARED, "scenes")
 
 
 def options(parser):
-    parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--only")
-    tool.writes(parser)
+    parser.add_argument("--rounds", type=int, default=3, help="figures are medians over so many (3)")
+    parser.add_argument("--quick", action="store_true", help="fewer samples: rougher figures")
+    parser.add_argument("--only", metavar="PARTS", help="some of " + ",".join(NEEDS))
+    tool.writes(parser, "; the part reading draws DIR/reading-time.png, too")
 
 
 def cpu_seconds(command, **how):

@@ -1,22 +1,9 @@
 """What accuracy costs: every criterion over the range of its parameters, on recorded test blocks and in real renders.
 
-usage: scripts/lab cost [--data DIR] [--render DIR [--plan FILE]] [--people DIR] [--model FILE]... [--baseline FILE]... [--only STEPS]
-                        [--threads N] [--rounds N] [--real-scenes N] [--out DIR]
-
-  --data DIR     recordings as `lab data-set` makes them (default data): its test views are replayed, of its validation views the
-                 block sizes are measured
-  --render DIR   make the test views anew there first, as --plan (scripts/dataset.plan) says (hours)
-  --people DIR   views that people judged (default ../shared/human)
-  --model FILE   networks: those of ggn/models, the newest of which is the default, and what lies in BUILD/cost/models (others, such as
-                 those of `lab ablation` and one of the published preset; not shipped)
-  --baseline FILE  those of ggn/models and BUILD/cost/*.ggn (svd-entropy.ggn is not shipped: `ggn baseline svd-entropy`)
-  --only STEPS   some of replay, recorded, judge, early, price, real, grow, sizes, cadence, people, precision, guards, draw (default all,
-                 separated by commas); what is there of the others is kept
-  --rounds N --real-scenes N   of price (2), of real (3)
-  --out DIR      results/cost.json, cost.md and cost-*.png go there (default docs)
-
 Every step is kept as soon as it is done: interrupted, --only goes on with the others. Times are processor seconds of all threads, so
-that a busy machine disturbs them less; prices of checks are measured in this run, in real renders. Needs gnuplot and oiiotool."""
+that a busy machine disturbs them less; prices of checks are measured in this run, in real renders. Networks that are not shipped (of
+lab ablation, of the published preset) and baselines that are not (`ggn baseline svd-entropy`) are taken from BUILD/cost/models and
+BUILD/cost. Needs gnuplot and oiiotool."""
 import glob
 import json
 import os
@@ -35,16 +22,18 @@ CADENCES = (1.05, 1.15, 1.2565, 1.5, 2)
 
 
 def options(parser):
-    for name, default in (("--data", os.path.join(ROOT, "data")), ("--people", os.path.join(tool.SHARED, "human")), ("--out", tool.DOCS)):
-        parser.add_argument(name, type=tool.path, default=default)
-    parser.add_argument("--render", type=tool.path)
-    parser.add_argument("--plan", type=tool.path)
-    parser.add_argument("--model", type=tool.path, action="append")
-    parser.add_argument("--baseline", type=tool.path, action="append")
-    parser.add_argument("--only", default=",".join((*STEPS, "draw")))
+    parser.add_argument("--data", type=tool.path, default=os.path.join(ROOT, "data"),
+                        help="recordings of lab data-set (data): test views are replayed, of validation views block sizes are measured")
+    parser.add_argument("--render", type=tool.path, metavar="DIR", help="make the test views anew there first (hours)")
+    parser.add_argument("--plan", type=tool.path, help="of --render (scripts/dataset.plan)")
+    parser.add_argument("--people", type=tool.path, default=os.path.join(tool.SHARED, "human"), help="../shared/human")
+    parser.add_argument("--model", type=tool.path, action="append", help="networks, the default first (ggn/models, BUILD/cost/models)")
+    parser.add_argument("--baseline", type=tool.path, action="append", help="(ggn/models, BUILD/cost)")
+    parser.add_argument("--only", default=",".join((*STEPS, "draw")), metavar="STEPS", help="some of %(default)s; the others' figures are kept")
     parser.add_argument("--threads", type=int, default=tool.THREADS)
-    parser.add_argument("--rounds", type=int, default=2)
-    parser.add_argument("--real-scenes", type=int, default=3)
+    parser.add_argument("--rounds", type=int, default=2, help="of price (2)")
+    parser.add_argument("--real-scenes", type=int, default=3, help="of real (3)")
+    parser.add_argument("--out", type=tool.path, default=tool.DOCS, help="for results/cost.json, cost.md and cost-*.png (docs)")
 
 
 def shipped(o):

@@ -46,6 +46,7 @@ def points_in(out, data):
         network = out.get("networks", {}).get(bare(p["criterion"]).replace(" bf16", ""))
         scenes = {}
         for scene, f in named(p["scenes"]).items():
+            f["checks"] = f["checks_full"] + f["checks_cheap"]
             f["check_s"] = f["checks_full"] * full + f["checks_cheap"] * cheap
             if network and f["checks_full"] > 0:  # a first window has all of its images denoised, later ones one
                 f["check_s"] += (network["window"] - 1) * network["denoiser"] * full

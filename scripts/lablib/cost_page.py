@@ -7,9 +7,28 @@ from lablib.cost_figures import (BLOCK, SIDES, find, is_default, limits_by_side,
 from lablib.tables import figure, percent, table
 
 NAMED = {0.5, 0.1, 0.02, 0.113, 0.0075, 0.0015, 64, 256, 1024, 4096}
-HEADS = ["setting", "samples", "time / limit", "time / uniform", "noisy", "early", "worst", "FLIP", "relMSE", "checks' share"]
-DIAL_HEADS = ["setting", "samples", "time / limit", "noisy", "early", "worst", "asked", "spared by the gate"]
 BASELINES = ("svd-entropy", "attributes", "noise-mask")
+# Columns of a setting over scenes: which figure, how it is summed up, and its form.
+COLUMNS = {"samples": ("samples", median, "%.0f"), "time / limit": ("to_limit", median, "%.2f"), "time / uniform": ("total_ratio", median, "%.2f"),
+           "noisy": ("noisy", mean, "%"), "early": ("early", mean, "%"), "worst": ("worst", median, "%.2f"), "FLIP": ("flip", mean, "%.3f"),
+           "relMSE": ("relmse", median, "%.4f"), "checks' share": ("overhead", lambda v: 100 * median(v), "%.2f %%"),
+           "asked": ("checks_full", mean, "%.1f"), "spared by the gate": ("checks_cheap", mean, "%.1f"), "checks": ("checks", mean, "%.1f")}
+
+
+def cell(p, column):
+    key, how, form = COLUMNS[column]
+    value = over_scenes(p, key, how)
+    return percent(value) if form == "%" else figure(value, form)
+
+
+def settings(heads, labelled, columns):
+    """A table of settings: [(cells of its own, setting)], and the columns after them."""
+    return table([*heads, *columns], [[*own, *[cell(p, c) for c in columns]] for own, p in labelled])
+
+
+def records(rows, columns):
+    """A table of figures that are kept row by row: {head: form of a row's figures}."""
+    return table(list(columns), [[form % r for form in columns.values()] for r in rows])
 
 
 def default_network(out):
@@ -29,25 +48,17 @@ def measured(out):
     return "; ".join(text if len(told) == 1 else "%s: %s" % (", ".join(steps), text) for text, steps in told.items())
 
 
-def row_of(p):
-    label = p[0] + ("" if is_default(p) or p[0] == "limit" else ", %s %g" % (p[1], p[2]))
-    return [label, figure(over_scenes(p, "samples"), "%.0f"), figure(over_scenes(p, "to_limit")),
-            figure(over_scenes(p, "total_ratio")), percent(over_scenes(p, "noisy", mean)), percent(over_scenes(p, "early", mean)),
-            figure(over_scenes(p, "worst")), figure(over_scenes(p, "flip", mean), "%.3f"),
-            figure(over_scenes(p, "relmse"), "%.4f"), figure(100 * over_scenes(p, "overhead"), "%.2f %%")]
-
-
-def setting_rows(points, criteria, dials=("visible", "threshold", "own", "spp")):
-    return [row_of(p) for c in criteria for p in points if p[0] == c and p[3]
-            and (is_default(p) or (p[1] in dials and p[2] in NAMED and not c.endswith(" bf16") and (c != "fixed" or p[2] == 1024)))]
-
-
 def frontier(out, name):
+    """The limit, and of every criterion its default and some other settings."""
     mine, others = default_network(out), networks(out)
     criteria = ("uniform", "fixed", "variance", "halfbuf", "variance, no guard", "halfbuf, no guard", "observer", mine, mine + ", no halves",
                 mine + " bf16", *others[1:], *BASELINES)
     points = points_of(out, name)
-    return table(HEADS, [row_of(p) for p in points if p[0] == "limit"] + setting_rows(points, criteria))
+    named = lambda p: p[1] in ("visible", "threshold", "own", "spp") and p[2] in NAMED and not p[0].endswith(" bf16") and (p[0] != "fixed" or p[2] == 1024)
+    chosen = [p for p in points if p[0] == "limit"] + [p for c in criteria for p in points if p[0] == c and p[3] and (is_default(p) or named(p))]
+    label = lambda p: p[0] + ("" if is_default(p) or p[0] == "limit" else ", %s %g" % (p[1], p[2]))
+    return settings(["setting"], [([label(p)], p) for p in chosen], ["samples", "time / limit", "time / uniform", "noisy", "early", "worst", "FLIP",
+                                                                     "relMSE", "checks' share"])
 
 
 def wanted_of(points):
@@ -57,7 +68,7 @@ def wanted_of(points):
     slow = [f for f in default[3].values() if f["sampling_s"] and f["sampling_s"] / f["samples"] / BLOCK > 1e-6]
     good, n, beaten = on_frontier(points, default)
     figures = ["%s × (%d scenes with more than one block)" % (figure(median([f["total_ratio"] / f["limit"] for f in several])), len(several)),
-               percent(over_scenes(default, "early", mean)),
+               cell(default, "early"),
                "%d of %d" % (sum(f["overhead"] <= 0.01 for f in slow), len(slow)) if slow else "not timed", "%d of %d" % (good, n)]
     text = ["On %s `%s` (%s %g) is as accurate in %s of the time." % (scene, p[0], p[1], p[2], figure(p[3][scene]["total_s"] / default[3][scene]["total_s"]))
             for scene, p in sorted(beaten.items())]
@@ -104,28 +115,30 @@ def real_why(r):
     return "not explained" if len(between) > 1 else "the two ask at other sample counts, one level apart"
 
 
+def real_rows(out):
+    again = lambda r: 1e-6 * r["recorded_us"] * r["stop"] * BLOCK
+    return [dict(r, why=real_why(r), again=again(r), ratio=r["sampling_s"] / again(r), ms=1e3 * r["criterion_s"],
+                 replay="%.0f" % r["replayed"] if r["replayed"] else "–") for r in out.get("real", [])]
+
+
 def real_table(out):
-    rows = []
-    for r in out.get("real", []):
-        again = 1e-6 * r["recorded_us"] * r["stop"] * BLOCK
-        rows.append([r["scene"], "%d" % r["block"], "%s %s" % (r["criterion"], r["params"]), "%d" % r["stop"],
-                     figure(r["replayed"], "%.0f") if r["replayed"] else "–", real_why(r), figure(r["threshold"], "%.0f"), figure(r["sampling_s"]),
-                     figure(again), figure(r["sampling_s"] / again), "%d" % r["checks"], figure(1e3 * r["criterion_s"], "%.1f")])
-    return table(["scene", "block", "criterion", "stop", "replayed", "", "threshold", "sampling, s", "as recorded, s", "ratio", "checks", "checks, ms"], rows)
+    return records(real_rows(out), {
+        "scene": "%(scene)s", "block": "%(block)d", "criterion": "%(criterion)s %(params)s", "stop": "%(stop)d", "replayed": "%(replay)s", "": "%(why)s",
+        "threshold": "%(threshold).0f", "sampling, s": "%(sampling_s).2f", "as recorded, s": "%(again).2f", "ratio": "%(ratio).2f", "checks": "%(checks)d",
+        "checks, ms": "%(ms).1f"})
 
 
 def real(out):
     """Figures of what is said of the real renders."""
-    rows = out["real"]
-    replayed = [r for r in rows if r["replayed"]]
-    timed = [r["sampling_s"] / (1e-6 * r["recorded_us"] * r["stop"] * BLOCK) for r in rows]
+    rows = real_rows(out)
+    ratios, replayed = [r["ratio"] for r in rows], [r for r in rows if r["replayed"]]
     default = "%s=%g" % tuple(out["defaults"]["observer"])
     return {"near": sum(abs(r["stop"] / r["replayed"] - 1) <= 0.1 for r in replayed), "replayed": len(replayed), "revision": out.get("real_revision", "?"),
-            "unexplained": sum(real_why(r) == "not explained" for r in replayed),
-            "soon": "; ".join("%s %d at %d of %.0f" % (r["scene"], r["block"], r["stop"], r["threshold"]) for r in rows
+            "unexplained": sum(r["why"] == "not explained" for r in replayed),
+            "soon": "; ".join("%(scene)s %(block)d at %(stop)d of %(threshold).0f" % r for r in rows
                               if (r["criterion"], r["params"]) == ("observer", default) and r["stop"] < 0.8 * r["threshold"]),
-            "median": figure(median(timed)), "least": figure(min(timed)), "most": figure(max(timed)),
-            "timed_near": sum(abs(t - 1) <= 0.1 for t in timed), "timed": len(timed)}
+            "median": figure(median(ratios)), "least": figure(min(ratios)), "most": figure(max(ratios)),
+            "timed_near": sum(abs(t - 1) <= 0.1 for t in ratios), "timed": len(ratios)}
 
 
 def blocks(out, name):
@@ -142,55 +155,46 @@ def references(out):
 
 
 def prices_table(out):
-    rows = [[name, figure(1e3 * p["check_s"], "%.2f"), figure(1e3 * p["most_s"], "%.2f") if "most_s" in p else "–",
-             figure(1e6 * p["check_s"] / BLOCK, "%.3f")] for name, p in out.get("prices", {}).items() if name != "uniform"]
-    return table(["criterion", "ms a check of 200×200 pixels", "most of the rounds", "as µs per pixel: a path that takes this long costs as much"], rows)
+    rows = [{"name": name, "ms": 1e3 * p["check_s"], "most": figure(1e3 * p.get("most_s", math.nan)), "us": 1e6 * p["check_s"] / BLOCK}
+            for name, p in out.get("prices", {}).items() if name != "uniform"]
+    return records(rows, {"criterion": "%(name)s", "ms a check of 200×200 pixels": "%(ms).2f", "most of the rounds": "%(most)s",
+                          "as µs per pixel: a path that takes this long costs as much": "%(us).3f"})
 
 
 def bf16_table(out):
-    return table(["networks", "GMAC", "float, ms", "bfloat16, ms", "ratio"],
-                 [[b["name"], figure(out.get("networks", {}).get(b["name"], {}).get("macs", math.nan) / 1e9), figure(b["f32_ms"], "%.1f"),
-                   figure(b["bf16_ms"], "%.1f"), figure(b["bf16_ms"] / b["f32_ms"])] for b in out["bench"]])
+    macs = lambda name: figure(out["networks"].get(name, {}).get("macs", math.nan) / 1e9)
+    return records([dict(b, gmac=macs(b["name"]), ratio=b["bf16_ms"] / b["f32_ms"]) for b in out["bench"]],
+                   {"networks": "%(name)s", "GMAC": "%(gmac)s", "float, ms": "%(f32_ms).1f", "bfloat16, ms": "%(bf16_ms).1f", "ratio": "%(ratio).2f"})
 
 
-def dial_row(p, label):
-    return [label, figure(over_scenes(p, "samples"), "%.0f"), figure(over_scenes(p, "to_limit")), percent(over_scenes(p, "noisy", mean)),
-            percent(over_scenes(p, "early", mean)), figure(over_scenes(p, "worst")), figure(mean([f["checks_full"] for f in p[3].values()]), "%.1f"),
-            figure(mean([f["checks_cheap"] for f in p[3].values()]), "%.1f")]
+PARAMETERS = ["samples", "time / limit", "noisy", "early", "worst", "asked", "spared by the gate"]
 
 
-def dial_table(out, criterion):
-    return table(DIAL_HEADS, [dial_row(p, "as shipped" if p[1] == "own" else "%s %g" % (p[1], p[2])) for p in points_of(out, "test")
-                              if p[0] == criterion and p[1] in ("own", "passes", "gate", "guard", "growth")])
+def parameter_table(out, criterion):
+    return settings(["setting"], [(["as shipped" if p[1] == "own" else "%s %g" % (p[1], p[2])], p) for p in points_of(out, "test")
+                                  if p[0] == criterion and p[1] in ("own", "passes", "gate", "guard", "growth")], PARAMETERS)
 
 
 def passes_table(out):
-    return table(DIAL_HEADS, [dial_row(p, "%s, passes %g" % (p[0], p[2])) for p in points_of(out, "test")
-                              if p[0] in BASELINES and p[1] == "passes"])
+    return settings(["setting"], [(["%s, passes %g" % (p[0], p[2])], p) for p in points_of(out, "test") if p[0] in BASELINES and p[1] == "passes"],
+                    PARAMETERS)
 
 
 def networks_table(out):
-    rows, points = [], points_of(out, "few" if "few" in out["sets"] else "test")
-    for name, n in out.get("networks", {}).items():
-        p = find(points, name)
-        if p:
-            rows.append([name, n["preset"], "%d" % n["window"], "yes" if n["picture"] else "no", figure(n["macs"] / 1e9), figure(over_scenes(p, "samples"), "%.0f"),
-                         figure(over_scenes(p, "to_limit")), percent(over_scenes(p, "early", mean)), figure(over_scenes(p, "worst")),
-                         figure(100 * over_scenes(p, "overhead"), "%.2f %%")])
-    return table(["network", "preset", "images in its window", "noise picture", "GMAC a decision", "samples", "time / limit", "early", "worst", "checks' share"], rows)
+    points = points_of(out, "few" if "few" in out["sets"] else "test")
+    found = [(name, n, find(points, name)) for name, n in out["networks"].items() if find(points, name)]
+    return settings(["network", "preset", "images in its window", "noise picture", "GMAC a decision"],
+                    [([name, n["preset"], "%d" % n["window"], "yes" if n["picture"] else "no", figure(n["macs"] / 1e9)], p) for name, n, p in found],
+                    ["samples", "time / limit", "early", "worst", "checks' share"])
 
 
 def cadence_table(out):
-    rows = []
     sets = {ratio: points_in(out, data) for ratio, data in out["cadence"].items()}
-    for criterion in ("observer", "variance", "halfbuf", default_network(out), *BASELINES):
-        for ratio, points in sets.items():
-            p = next((p for p in points if p[0] == criterion), None)
-            if p:
-                rows.append([criterion, ratio, figure(over_scenes(p, "samples"), "%.0f"), figure(over_scenes(p, "to_limit")), percent(over_scenes(p, "early", mean)),
-                             figure(over_scenes(p, "worst")), figure(mean([f["checks_full"] + f["checks_cheap"] for f in p[3].values()]), "%.1f"),
-                             figure(100 * over_scenes(p, "overhead"), "%.2f %%")])
-    return table(["criterion", "ratio", "samples", "time / limit", "early", "worst", "checks", "checks' share"], rows)
+    first = lambda points, criterion: next((p for p in points if p[0] == criterion), None)
+    return settings(["criterion", "ratio"], [([criterion, ratio], first(points, criterion))
+                                             for criterion in ("observer", "variance", "halfbuf", default_network(out), *BASELINES)
+                                             for ratio, points in sets.items() if first(points, criterion)],
+                    ["samples", "time / limit", "early", "worst", "checks", "checks' share"])
 
 
 def cadence_blocks(out):
@@ -198,10 +202,11 @@ def cadence_blocks(out):
 
 
 def growth_table(out):
-    rows = [[g["criterion"], "%d²" % g["side"], "%d" % g["threads"], "%d" % g["blocks"], "%d" % g["checks"], figure(1e3 * g["criterion_s"] / max(1, g["checks"]), "%.2f"),
-             figure(g["criterion_s"], "%.3f"), figure(g["sampling_s"]), figure(1e6 * g["sampling_s"] / g["side"]**2 / g["spp"], "%.2f"),
-             figure(g["render_wall_s"]), figure(g["peak_mb"], "%.0f") if g["peak_mb"] else "–"] for g in out.get("growth", [])]
-    return table(["criterion", "pixels", "threads", "blocks", "checks", "ms a check", "checks, thread s", "sampling, thread s", "µs per path", "wall s", "memory at its peak, MB"], rows)
+    rows = [dict(g, ms=1e3 * g["criterion_s"] / max(1, g["checks"]), us=1e6 * g["sampling_s"] / g["side"]**2 / g["spp"],
+                 peak=figure(g["peak_mb"] or math.nan, "%.0f")) for g in out.get("growth", [])]
+    return records(rows, {"criterion": "%(criterion)s", "pixels": "%(side)d²", "threads": "%(threads)d", "blocks": "%(blocks)d", "checks": "%(checks)d",
+                          "ms a check": "%(ms).2f", "checks, thread s": "%(criterion_s).3f", "sampling, thread s": "%(sampling_s).2f",
+                          "µs per path": "%(us).2f", "wall s": "%(render_wall_s).2f", "memory at its peak, MB": "%(peak)s"})
 
 
 def growth(out):
@@ -239,7 +244,7 @@ def sizes_table(out):
 
 def published(out):
     """What is said of published thresholds."""
-    return "; ".join("%s: %s early, %s of the limit's samples" % (p[0][:-len("-thresholds.csv")], percent(over_scenes(p, "early", mean)), figure(over_scenes(p, "to_limit")))
+    return "; ".join("%s: %s early, %s of the limit's samples" % (p[0][:-len("-thresholds.csv")], cell(p, "early"), cell(p, "time / limit"))
                      for p in points_of(out, "people") if p[0].endswith("-thresholds.csv")) or "not here"
 
 
@@ -318,15 +323,14 @@ def choice(out):
             rows.append([purpose, "none of those measured", "–", "–", "–", "–"])
             continue
         cost, p = found
-        rows.append([purpose, "`%s`, %s %g" % (p[0], p[1], p[2]), figure(cost), percent(over_scenes(p, "noisy", mean)),
-                     percent(over_scenes(p, "early", mean)), figure(over_scenes(p, "worst"))])
+        rows.append([purpose, "`%s`, %s %g" % (p[0], p[1], p[2]), figure(cost), cell(p, "noisy"), cell(p, "early"), cell(p, "worst")])
     return table(["for", "setting", "time / limit", "noisy", "early", "worst"], rows)
 
 
 def early_table(out):
-    return table(["stopped by", "scene", "block", "stop", "of what is visible", "`observer`'s stop", "threshold", "last level"],
-                 [[e["criterion"], e["scene"], "%d" % e["block"], "%d" % e["stop"], figure(math.sqrt(e["threshold"] / e["stop"])) + " ×",
-                   "%d" % e["observer"], figure(e["threshold"], "%.0f"), "%d" % e["last"]] for e in out["early"]])
+    return records([dict(e, visible=math.sqrt(e["threshold"] / e["stop"])) for e in out["early"]],
+                   {"stopped by": "%(criterion)s", "scene": "%(scene)s", "block": "%(block)d", "stop": "%(stop)d", "of what is visible": "%(visible).2f ×",
+                    "`observer`'s stop": "%(observer)d", "threshold": "%(threshold).0f", "last level": "%(last)d"})
 
 
 def worst_table(out):
@@ -342,43 +346,28 @@ def worst_table(out):
     return table(["default of", "leaves most noise on", "wastes most on"], rows)
 
 
-def early_pair(a, b):
-    tell = lambda p: "early %s, worst %s, samples %s" % (percent(over_scenes(p, "early", mean)), figure(over_scenes(p, "worst")),
-                                                        figure(over_scenes(p, "samples"), "%.0f"))
-    return [tell(a), tell(b)]
-
-
-def guards_of_criteria(out):
-    """Guards that are parameters: the same replay with and without."""
-    rows, points, network = [], points_of(out, "test"), default_network(out)
-    for criterion, without in (("variance", "variance, no guard"), ("halfbuf", "halfbuf, no guard")):
-        a = find(points, criterion)
-        b = next((p for p in points if a and p[0] == without and p[2] == a[2]), None)
-        if b:
-            rows.append(["rare bright paths, `%s` (parameter)" % criterion, "no pixel may hang on few samples"] + early_pair(a, b))
-    own = find(points, network)
-    for dial, value, case, guard in (("guard", 0, "rare bright paths, network", "tail and Gini of the half-buffer difference"),
-                                     ("passes", 1, "one lucky check, network", "two checks in a row")):
-        b = next((p for p in points if p[0] == network and p[1] == dial and p[2] == value), None)
-        if own and b:
-            rows.append([case, guard] + early_pair(own, b))
-    return rows
-
-
 def guards_table(out):
-    return table(["case", "guard", "with it", "without"],
-                 guards_of_criteria(out) + [["%s (`%s`)" % (g["case"], g["test"]), g["guard"], g["with"], g["without"]] for g in out.get("guards", [])])
+    """Guards that are parameters, the same replay with and without; those that were taken out of the tree."""
+    points, network, tail = points_of(out, "test"), default_network(out), "tail and Gini of the half-buffer difference"
+    setting = lambda criterion, parameter, value: next((p for p in points if p[:3] == (criterion, parameter, value)), None)
+    tell = lambda p: "early %s, worst %s, samples %s" % (cell(p, "early"), cell(p, "worst"), cell(p, "samples"))
+    pairs = [("rare bright paths, `%s` (parameter)" % c, "no pixel may hang on few samples", find(points, c), setting(c + ", no guard", *out["defaults"][c]))
+             for c in ("variance", "halfbuf")]
+    pairs += [("rare bright paths, network", tail, find(points, network), setting(network, "guard", 0)),
+              ("one lucky check, network", "two checks in a row", find(points, network), setting(network, "passes", 1))]
+    return table(["case", "guard", "with it", "without"], [[case, guard, tell(a), tell(b)] for case, guard, a, b in pairs if a and b] + [
+        ["%s (`%s`)" % (g["case"], g["test"]), g["guard"], g["with"], g["without"]] for g in out.get("guards", [])])
 
 
 def decisions_table(out):
-    rows = [[r["name"], "%d of %d" % (r["windows"] - r["same_bytes"], r["windows"]), "%.1e" % r["p_most"], "%.1e" % r["p_median"], "%d of %d" % (r["verdicts"], r["windows"]),
-             "%d of %d" % (r["stops"], r["blocks"])] for r in out.get("decisions", {}).get("rows", [])]
-    return table(["against float, AVX-512, -O3", "windows whose p moves", "at most by", "median", "verdicts changed", "stops changed"], rows)
+    rows = [dict(r, moved=r["windows"] - r["same_bytes"]) for r in out.get("decisions", {}).get("rows", [])]
+    return records(rows, {"against float, AVX-512, -O3": "%(name)s", "windows whose p moves": "%(moved)d of %(windows)d", "at most by": "%(p_most).1e",
+                          "median": "%(p_median).1e", "verdicts changed": "%(verdicts)d of %(windows)d", "stops changed": "%(stops)d of %(blocks)d"})
 
 
 def golden_table(out):
-    return table(["in p", "moved at most", "windows"], [[g["name"], "%.1e" % g["p_moved"], str(g["windows"])] for g in out.get("golden", [])])
+    return records(out.get("golden", []), {"in p": "%(name)s", "moved at most": "%(p_moved).1e", "windows": "%(windows)d"})
 
 
 def images_table(out):
-    return table(["against -O3, one thread", "pictures changed"], [[i["name"], "%d of %d" % (i["changed"], i["pictures"])] for i in out.get("images", [])])
+    return records(out.get("images", []), {"against -O3, one thread": "%(name)s", "pictures changed": "%(changed)d of %(pictures)d"})

@@ -1,17 +1,5 @@
 """Renders the block sequences that the models are trained, validated and tested on, as scripts/dataset.plan says.
 
-usage: scripts/lab data-set [--plan FILE] [--only SPLIT] [--threads N] [--launcher COMMAND] [--list | --csv | --histogram] [DIR]
-
-  DIR            where they are (default data)
-  --plan FILE    instead of scripts/dataset.plan
-  --only SPLIT   only train, validation, test or people
-  --threads N    threads of the renderer (default: all processors)
-  --launcher COMMAND   starts the renderer's processes, e.g. "mpirun -n 8 --hostfile HOSTS"
-  --list         print what would be rendered, in order, with planned minutes, and exit
-  --csv          print what is there: what was rendered, its checksums, the thresholds. scripts/dataset.csv lists what was rendered
-                 of scripts/dataset.plan, ggn/models/*.data.csv what a model was trained on; the data themselves are not kept
-  --histogram    print how many blocks of each split have their threshold in which octave
-
 The splits advance evenly. Of each, the faster half of its views comes first, and a half in four rounds, each a quarter of
 every view: whenever it is stopped, what there is covers many scenes.
 Resumable: stop it whenever you like (the block in hand is lost, all before it are safe) and run it again; finished blocks
@@ -21,7 +9,8 @@ that are not here (../shared) are left out.
 A line of the plan, fields apart by blanks, # begins a comment:
   SPLIT SCENE[/VIEW] FILE MINUTES LEVELS REFERENCE-SPP BLOCKS [EX EY EZ AX AY AZ UX UY UZ FOV]
 MINUTES are those of two idle cores; the last ten numbers replace the file's camera (lull-render --look-at, --fov).
-Exit status: 0 all done, 2 bad plan or a scene that cannot be rendered, 130 interrupted."""
+docs/results/data-set.csv is the --csv of scripts/dataset.plan, ggn/models/*.data.csv of what a model was trained on; the data
+themselves are not kept. Exit status: 0 all done, 2 bad plan or a scene that cannot be rendered, 130 interrupted."""
 import csv
 import os
 import shlex
@@ -39,13 +28,15 @@ EDGES = [20 * 2 ** k for k in range(9)]  # spp; the last column of the histogram
 
 
 def options(parser):
-    for option in ("--only", "--threads", "--launcher"):
-        parser.add_argument(option)
-    parser.add_argument("--plan", default=os.path.join(tool.ROOT, "scripts", "dataset.plan"))
+    parser.add_argument("dir", nargs="?", type=tool.path, default=os.path.join(tool.ROOT, "data"), help="where they are (data)")
+    parser.add_argument("--plan", default=os.path.join(tool.ROOT, "scripts", "dataset.plan"), help="scripts/dataset.plan")
+    parser.add_argument("--only", metavar="SPLIT", help="only one of " + ", ".join(SPLITS))
+    parser.add_argument("--threads", help="of the renderer (all processors)")
+    parser.add_argument("--launcher", metavar="COMMAND", help='starts the renderer\'s processes, e.g. "mpirun -n 8 --hostfile HOSTS"')
     shown = parser.add_mutually_exclusive_group()
-    for option in ("--list", "--csv", "--histogram"):
-        shown.add_argument(option, action="store_true")
-    parser.add_argument("dir", nargs="?", type=tool.path, default=os.path.join(tool.ROOT, "data"))
+    shown.add_argument("--list", action="store_true", help="print what would be rendered, in order, with planned minutes")
+    shown.add_argument("--csv", action="store_true", help="print what is there: what was rendered, its checksums, the thresholds")
+    shown.add_argument("--histogram", action="store_true", help="print how many blocks of each split have their threshold in which octave")
 
 
 def parse_blocks(text):

@@ -1,15 +1,7 @@
 """Compares `ggn` with PyTorch on the same networks.
 
-usage: scripts/lab networks [--check] [--json] [--isa avx2] [--model FILE] [--rounds N] [--threads N]
-
-  (default)  interleaved timings of denoiser, generator, discriminator, one decision and training, as ratios ours / PyTorch
-  --json     {"isa": [ours, PyTorch's], "times": a list of [name, ours in ms, PyTorch in ms or null]}
-  --isa      holds both sides to AVX2, whatever the processor has
-  --model    networks of the widths of this model, as told by the card beside it, instead of the published ones
-  --rounds N --threads N   (default 5, 2)
-  --check    golden values and one published training iteration in double precision against PyTorch, for several seeds
-
-Skips with a message when Debian's python3-torch is not installed."""
+Prints interleaved timings of denoiser, generator, discriminator, one decision and training, as ratios ours / PyTorch. Skips with a
+message when Debian's python3-torch is not installed."""
 import json
 import math
 import os
@@ -25,10 +17,11 @@ HELD = {"avx2": {"GGN_ISA": "avx2", "ATEN_CPU_CAPABILITY": "avx2", "ONEDNN_MAX_C
 
 
 def options(parser):
-    parser.add_argument("--check", action="store_true")
-    parser.add_argument("--json", action="store_true")
-    parser.add_argument("--isa", choices=list(HELD))
-    parser.add_argument("--model", type=tool.path)
+    parser.add_argument("--check", action="store_true", help="instead, golden values and one published training iteration in double "
+                        "precision against PyTorch, for several seeds")
+    parser.add_argument("--json", action="store_true", help='{"isa": [ours, PyTorch\'s], "times": [[name, ours in ms, PyTorch in ms or null]]}')
+    parser.add_argument("--isa", choices=list(HELD), help="hold both sides to it, whatever the processor has")
+    parser.add_argument("--model", type=tool.path, help="networks of the widths in the card beside this model, not the published ones")
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--threads", type=int, default=2)
 

@@ -1,13 +1,8 @@
 """Fills the pages of docs/ from the figures in docs/results/.
 
-usage: scripts/lab pages [--check] [--docs DIR]
-
-  --check     write nothing; say, one line each, what is not what the templates make of the figures, and which figures of the tables
-              stand in README.md by hand
-  --docs DIR  pages and figures (default docs)
-
-scripts/lablib/templates/NAME.md makes the whole page NAME.md, where that or results/NAME.json is. In every other page, what stands between `<!-- lab: EXPRESSION -->` and
-`<!-- lab: end -->` is the value of the expression (`bench.page()`: the text that the job bench makes of its figures)."""
+scripts/lablib/templates/NAME.md makes the whole page NAME.md, where that or results/NAME.json is. In every other page, what stands
+between `<!-- lab: EXPRESSION -->` and `<!-- lab: end -->` is the value of the expression (`bench.page()`: the text that the job bench
+makes of its figures)."""
 import glob
 import os
 import re
@@ -21,8 +16,9 @@ PLACE = re.compile(r"(<!-- lab: (?!end -->)(.*?) -->\n).*?(<!-- lab: end -->)", 
 
 
 def options(parser):
-    parser.add_argument("--check", action="store_true")
-    parser.add_argument("--docs", type=tool.path, default=tool.DOCS)
+    parser.add_argument("--check", action="store_true", help="write nothing; say, one line each, what is not what the templates make of "
+                        "the figures, and which figures of the tables stand in README.md by hand")
+    parser.add_argument("--docs", type=tool.path, default=tool.DOCS, help="pages and figures (docs)")
 
 
 class Job:

@@ -1,7 +1,5 @@
 """Renders every scene of scenes/ small and puts the pictures into docs/scenes.jpg, row by row in the order of their names.
 
-usage: scripts/lab pictures [--out FILE] [SPP]     (default docs/scenes.jpg, 64 samples per pixel)
-
 Needs oiiotool."""
 import glob
 import os
@@ -13,7 +11,7 @@ from lablib.tool import run
 
 
 def options(parser):
-    parser.add_argument("spp", nargs="?", type=int, default=64)
+    parser.add_argument("spp", nargs="?", type=int, default=64, help="samples per pixel (64)")
     parser.add_argument("--out", type=tool.path, default=os.path.join(tool.DOCS, "scenes.jpg"))
 
 

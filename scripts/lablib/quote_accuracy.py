@@ -1,13 +1,5 @@
 """Holds --quote and the progress line against real renders: a table and a picture for docs/quote.md.
 
-usage: scripts/lab quote-accuracy [--scenes FILE] [--size N] [--block N] [--work DIR] [--threads N] [--program FILE] [--tell] [--write [DIR]]
-
-  --scenes FILE  the plan, one "ROLE PATH" a line (default: the list in this job)
-  --size N       pixels of a side (default 64, blocks of 32; with another size the plan is a few cheap scenes)
-  --work DIR     results, one file per scene; what is there is not made again (default build/quote, with another size build/quote-N)
-  --tell         only read DIR
-  --write [DIR]  keep the tables in DIR/results/quote.json, fill the pages and draw DIR/quote.png (default docs)
-
 Every scene is quoted from a pilot and then rendered to its end, at most 2,000 spp. Times are thread seconds, so that other programs do
 not count; of another size than 64 wall seconds too, with the threads that were at work."""
 import json
@@ -22,39 +14,6 @@ import sys
 from lablib import plots, tables, tool
 
 SIZE, BLOCK, MOST = 64, 32, 2000
-LARGE = """
-held scenes/pergola.pbrt
-held scenes/rock-garden.pbrt
-held scenes/sky-image.pbrt
-held scenes/street.pbrt
-"""
-# tuned: looked at while the prediction was made; held: never before the figures of docs/quote.md.
-PLAN = """
-tuned scenes/cornell-box.pbrt
-tuned scenes/caustic-ring.pbrt
-tuned scenes/kitchen.pbrt
-tuned scenes/soft-shadow.pbrt
-tuned scenes/night-street.pbrt
-tuned scenes/chess.pbrt
-tuned scenes/corridor.pbrt
-held scenes/sky-image.pbrt
-held scenes/still-life.pbrt
-held scenes/defocus.pbrt
-held scenes/glossy-row.pbrt
-held scenes/stairwell.pbrt
-held scenes/rock-garden.pbrt
-held scenes/alpha.pbrt
-held scenes/street.pbrt
-held scenes/gallery.pbrt
-held ../shared/scenes/cornell-bunny-v4/cornell_bunny_dielectric.pbrt
-held ../shared/scenes/killeroos-v4/killeroo-coated-gold.pbrt
-held scenes/pergola.pbrt
-held scenes/garage.pbrt
-held scenes/fruit-bowl.pbrt
-held scenes/museum.pbrt
-held scenes/glass-shelf.pbrt
-held scenes/crockery.pbrt
-"""
 HEAD = ("scene", "seen in tuning", "real: spp, thread s", "quoted: spp, thread s (interval)", "time quoted / real", "blocks inside",
         "light not met", "ETA at 10, 25, 50 %")
 WALLS = ("scene", "spp", "thread s, quoted / real", "wall s, quoted / real", "threads at work", "wall at free processors, quoted / real",
@@ -62,14 +21,14 @@ WALLS = ("scene", "spp", "thread s, quoted / real", "wall s, quoted / real", "th
 
 
 def options(parser):
-    parser.add_argument("--scenes")
-    parser.add_argument("--size", type=int, default=SIZE)
-    parser.add_argument("--block", type=int, default=BLOCK)
-    parser.add_argument("--work")
+    parser.add_argument("--scenes", metavar="FILE", help='the plan, one "ROLE PATH" a line (scripts/quote.plan)')
+    parser.add_argument("--size", type=int, default=SIZE, help="pixels of a side (64); of another size only the cheap scenes of the plan")
+    parser.add_argument("--block", type=int, default=BLOCK, help="(32)")
+    parser.add_argument("--work", metavar="DIR", help="one file per scene, what is there is not made again (build/quote or build/quote-SIZE)")
     parser.add_argument("--program", default=tool.RENDER)
     parser.add_argument("--threads", type=int, default=1)
-    parser.add_argument("--tell", action="store_true")
-    tool.writes(parser)
+    parser.add_argument("--tell", action="store_true", help="measure nothing: the table of what is there already")
+    tool.writes(parser, ", draw DIR/quote.png")
 
 
 def base(o, scene):
@@ -219,15 +178,14 @@ def page(results, kind):
 
 def main(o):
     small = o.size == SIZE
-    plan = PLAN if small else LARGE
-    if o.scenes:
-        with open(o.scenes, encoding="utf-8") as file:
-            plan = file.read()
+    with open(o.scenes or os.path.join(tool.ROOT, "scripts", "quote.plan"), encoding="utf-8") as file:
+        plan = [line.split() for line in file if line.strip() and not line.startswith("#")]
     o.work = o.work or os.path.join(tool.BUILD, "quote" if small else "quote-%d" % o.size)
     os.makedirs(o.work, exist_ok=True)
     rows = []
-    for line in plan.strip().splitlines():
-        role, scene = line.split()
+    for role, scene, *cheap in plan:
+        if not (small or cheap or o.scenes):
+            continue
         path = os.path.join(o.work, os.path.basename(scene)[:-5] + ".json")
         if not os.path.exists(path):
             if o.tell:

@@ -1,13 +1,5 @@
 """Renders the reference scenes and compares with the answers of other renderers.
 
-usage: scripts/lab references [--spp N] [--pictures DIR] [--only TEXT] [--shared DIR] [--write [DIR]]
-
-  --spp N         samples per pixel of our render (default 128)
-  --pictures DIR  write our image beside the reference, one PNG each
-  --only TEXT     only references whose name contains this
-  --shared DIR    with references/ and scenes/ (default ../shared); where it is absent the job ends at once, with status 0
-  --write [DIR]   keep the rows in DIR/results/references.json, beside those of other references, and fill the pages (default docs)
-
 The references are pbrt-v4's images (references/SCENE--FILE.exr) and TungstenRender.exr of some scene folders. Images are compared by
 the luminance means of 20x20-pixel tiles after one exposure scalar (the median ratio). Needs oiiotool. Exit status 1: some missed."""
 import os
@@ -25,10 +17,10 @@ HEAD = ("reference", "spp of ours", "exposure", "median difference", "tiles with
 
 
 def options(parser):
-    parser.add_argument("--spp", type=int, default=128)
-    parser.add_argument("--pictures", type=tool.path)
-    parser.add_argument("--only", default="")
-    parser.add_argument("--shared", type=tool.path, default=tool.SHARED)
+    parser.add_argument("--spp", type=int, default=128, help="samples per pixel of our render (128)")
+    parser.add_argument("--pictures", type=tool.path, metavar="DIR", help="write our image beside the reference, one PNG each")
+    parser.add_argument("--only", default="", metavar="TEXT", help="only references whose name contains this")
+    parser.add_argument("--shared", type=tool.path, default=tool.SHARED, help="../shared; without references/ the job ends at once")
     tool.writes(parser)
 
 

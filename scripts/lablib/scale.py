@@ -1,20 +1,5 @@
 """How long a frame takes on 1 ... 10,000 cores: a discrete-event model of `mpirun lull-render` (docs/scale.md).
 
-usage: scripts/lab scale [OPTION...] RECORDING...      RECORDING: a folder of lull-render --sequence that ggn label has labelled
-
-  --measured FILE   costs of messages and checks (default: scripts/scale.json)
-  --frames LIST     WxH, comma separated (default 1920x1080,3840x2160,15360x8640)
-  --cores LIST      (default 1,2,4,8,16,64,256,1024,4096,10000)
-  --threads N       of each process, at most (default 64)
-  --work FACTOR     how many times dearer a sample is than in the recordings (default 1)
-  --at-rank-0       the criterion keeps a history and is asked at rank 0 only
-  --png FILE        a picture of the efficiency too (gnuplot)
-  --json            print JSON instead of a table
-  --here SCENE      no recordings: render SCENE with 1, 2, 4 and 8 processes of this machine and compare with the model,
-                    which is fed with the blocks of the first; wants a machine with nothing else to do
-  --size WxH --spp N --program FILE     of --here (800x600, 256, build/bin/lull-render)
-  --write [DIR]     keep the table in DIR/results/scale.json, as `frames`, `work` (with --work) or `here`, and fill the pages of DIR
-
 The model is fed with what blocks of recorded views cost and where they stop, and with measured costs of messages and of checks."""
 import heapq
 import json
@@ -253,19 +238,21 @@ def draw(rows, path):
 
 
 def options(parser):
-    parser.add_argument("recordings", nargs="*")
-    parser.add_argument("--here")
-    parser.add_argument("--size", default="800x600")
-    parser.add_argument("--spp", type=int, default=256)
+    parser.add_argument("recordings", nargs="*", metavar="RECORDING", help="a folder of lull-render --sequence that ggn label has labelled")
+    parser.add_argument("--measured", metavar="FILE", default=os.path.join(tool.ROOT, "scripts", "scale.json"),
+                        help="costs of messages and checks (scripts/scale.json)")
+    parser.add_argument("--frames", default="1920x1080,3840x2160,15360x8640", help="WxH, comma separated (%(default)s)")
+    parser.add_argument("--cores", default="1,2,4,8,16,64,256,1024,4096,10000", help="(%(default)s)")
+    parser.add_argument("--threads", type=int, default=64, help="of each process, at most (64)")
+    parser.add_argument("--work", type=float, default=1.0, metavar="FACTOR", help="how many times dearer a sample is than in the recordings")
+    parser.add_argument("--at-rank-0", action="store_true", help="the criterion keeps a history and is asked at rank 0 only")
+    parser.add_argument("--png", type=tool.path, metavar="FILE", help="a picture of the efficiency too (gnuplot)")
+    parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
+    parser.add_argument("--here", metavar="SCENE", help="no recordings: render SCENE with 1, 2, 4 and 8 processes of this machine and compare "
+                        "with the model, which is fed with the blocks of the first; wants a machine with nothing else to do")
+    parser.add_argument("--size", default="800x600", help="of --here (%(default)s)")
+    parser.add_argument("--spp", type=int, default=256, help="of --here (256)")
     parser.add_argument("--program", default=tool.RENDER)
-    parser.add_argument("--measured", default=os.path.join(tool.ROOT, "scripts", "scale.json"))
-    parser.add_argument("--frames", default="1920x1080,3840x2160,15360x8640")
-    parser.add_argument("--cores", default="1,2,4,8,16,64,256,1024,4096,10000")
-    parser.add_argument("--threads", type=int, default=64)
-    parser.add_argument("--work", type=float, default=1.0)
-    parser.add_argument("--at-rank-0", action="store_true")
-    parser.add_argument("--png", type=tool.path)
-    parser.add_argument("--json", action="store_true")
     tool.writes(parser)
 
 

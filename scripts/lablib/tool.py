@@ -21,13 +21,10 @@ class Refused(Exception):
 
 
 def options(job, module, words):
-    """What module.options(parser) declares; its docstring is the help. Values of type `path` do not depend on the folder."""
-    parser = argparse.ArgumentParser(prog="lab " + job, add_help=False, allow_abbrev=False)
-    parser.add_argument("--help", action="store_true")
+    """What module.options(parser) declares. Values of type `path` do not depend on the folder."""
+    parser = argparse.ArgumentParser(prog="scripts/lab " + job, description=module.__doc__, allow_abbrev=False,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
     module.options(parser)
-    if "--help" in words:
-        print(module.__doc__.rstrip())
-        sys.exit(0)
 
     def refuse(text):
         raise Refused("%s (see --help)" % text)
@@ -39,9 +36,10 @@ def options(job, module, words):
 path = os.path.abspath
 
 
-def writes(parser):
+def writes(parser, more=""):
     """--write [DIR]: where results and pages go; None: nowhere."""
-    parser.add_argument("--write", metavar="DIR", nargs="?", const=DOCS, type=path)
+    parser.add_argument("--write", metavar="DIR", nargs="?", const=DOCS, type=path,
+                        help="keep the figures in DIR/results/ and fill the pages of DIR (docs)" + more)
 
 
 def run(*command, env=None, **how):
