@@ -4,7 +4,7 @@
  * DATA/NAME/manifest.json (+ labels.json) for each view, and DATA/split.json:
  *     { "train": ["scene", …], "validation": ["scene", …], "test": ["scene", …] }
  * Instead of split.json the views may lie in DATA/train, DATA/validation, DATA/test and DATA/people (scripts/lab data-set
- * does so). A scene is on one side only; scenes that are on none are used by nobody. DATA may also be one sequence itself.
+ * does so). A scene is on one side only; scenes that are on none are not used. DATA may also be one sequence itself.
  */
 #ifndef GGN_DATA_DATASET_H
 #define GGN_DATA_DATASET_H

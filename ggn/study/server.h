@@ -1,5 +1,5 @@
 /*
- * Serves a study over HTTP until told to stop. One thread answers everybody and must never wait for the disk to sync
+ * Serves a study over HTTP until told to stop. One thread answers all requests and must never wait for the disk to sync
  * (ggn_study_store_sync_behind); nothing outside is ever asked for anything.
  */
 #ifndef GGN_STUDY_SERVER_H

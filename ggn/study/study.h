@@ -52,8 +52,8 @@ struct ggn_study {
     int show_ms, gap_ms;                                    /* two-interval: each interval, and the blank between them */
     int break_every;                                        /* trials between offered breaks; 0: none */
     double min_catch_passed, max_untouched;                 /* exclusion rules, shares: see FORMAT.md */
-    double min_ms;                                          /* an answer in less time is left out: nobody can have looked */
-    double max_fast;                                        /* nor does somebody count of whose answers a larger share is */
+    double min_ms;                                          /* an answer in less time is left out: too fast to have looked */
+    double max_fast;                                        /* a person of whose answers a larger share is does not count */
     char asked_by[GGN_STUDY_LINE], contact[GGN_STUDY_LINE]; /* UTF-8, who asks and where; empty in old studies */
     int n_views;
     struct ggn_study_view *views;       /* owns */

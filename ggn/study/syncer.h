@@ -1,5 +1,5 @@
 /*
- * Syncs a file to the disk behind those who write to it, on a thread of its own, so that nobody waits for the disk.
+ * Syncs a file to the disk behind those who write to it, on a thread of its own, so that no answer waits for the disk.
  *
  * What is written while a sync runs goes to the disk with the next one, all of it together.
  */

@@ -33,8 +33,8 @@ int ggn_calibrate_stopping(const struct ggn_checks *checks, int passes, double t
 
 /* The threshold (in steps of 0.01) and the number of passes (1 or 2) with the smallest mean |log2(stop / true)| of those
  * that keep the early rate at or below `early_rate`; one pass at 0.01 if none does. (The largest threshold that keeps the
- * rate would be 0.99 whenever the few blocks are easy. That the labels are unsure themselves is the business of who asks for
- * fewer viewers than half: a margin here as well would count it twice.) Into *policy and *out. */
+ * rate would be 0.99 whenever the few blocks are easy. The labels are unsure themselves: a caller that wants a margin asks
+ * for fewer viewers than half, and a margin here as well would count it twice.) Into *policy and *out. */
 int ggn_calibrate_threshold(const struct ggn_checks *checks, double early_rate, struct ggn_policy *policy,
                             struct ggn_stopping *out, struct base_err *err);
 

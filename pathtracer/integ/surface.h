@@ -118,7 +118,7 @@ static inline void pt_place_quadric(const struct pt_scene *scene, const struct p
 /* Object → render space. Out of line in surface.c: only instances need it. */
 void pt_place_instance(const struct pt_scene *scene, int32_t instance, float time, struct pt_place *at);
 
-/* All of *at but for what the effect set says nobody will read. */
+/* All of *at but for the fields that the effect set never reads. */
 static inline void pt_place_at_hit(pt_effects fx, const struct pt_scene *scene, const struct pt_ray *ray,
                                    const struct pt_hit *hit, struct pt_place *at)
 {

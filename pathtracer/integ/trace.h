@@ -8,7 +8,7 @@
 #include "integ/surface.h"
 
 struct pt_trace {
-    FILE *out; /* gets the lines; NULL: nobody reads them */
+    FILE *out; /* gets the lines; NULL: they are not wanted */
     int vertex;
     uint32_t met[PT_MET_COUNT]; /* vertices so far, by what they are */
 };

@@ -12,7 +12,7 @@
 struct pt_source {
     /* Reads all of `path`; *bytes is malloc'ed (caller frees) and NUL-terminated one past *size. Must be thread-safe. */
     int (*read)(void *data, const char *path, char **bytes, size_t *size, struct base_err *err);
-    /* Told about a real file that another library is about to read itself; NULL: nobody asks. */
+    /* Told about a real file that another library is about to read itself; NULL: not called. */
     int (*note)(void *data, const char *path, struct base_err *err);
     void *data;
     int files; /* 1: paths are real files that other libraries may open */

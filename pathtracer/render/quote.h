@@ -3,7 +3,7 @@
  *
  * While the pilot runs, the criterion is asked at the render's own checks by several instances that differ in how many
  * viewers may still see noise (its parameter `visible`): each row of the quote is one of them. Neither the film nor the
- * render's own instance is touched, so that the render can go on afterwards as if nobody had asked. Not thread-safe.
+ * render's own instance is touched, so that the render can go on afterwards as if there had been no quote. Not thread-safe.
  */
 #ifndef PT_RENDER_QUOTE_H
 #define PT_RENDER_QUOTE_H

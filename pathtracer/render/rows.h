@@ -1,8 +1,8 @@
 /*
  * The unit of work: one row of pixels of one block, from one number of samples to another.
  *
- * The sums of a pixel are continued in the order of its samples by whoever has its row, and a row is with one worker at a
- * time: so the film has the same bytes however rows are dealt out, to threads or to processes. Different rows may be sampled
+ * The worker that has a row continues the sums of its pixels in the order of their samples, and a row is with one worker at
+ * a time: the film has the same bytes however rows are dealt out, to threads or to processes. Different rows may be sampled
  * at the same time.
  */
 #ifndef PT_RENDER_ROWS_H

@@ -1,4 +1,4 @@
-/* The scattering models as a table, for those who read scenes or write about them. Static data. */
+/* The scattering models as a table, for the scene reader and the explanations. Static data. */
 #ifndef PT_SHADE_BSDF_MODELS_H
 #define PT_SHADE_BSDF_MODELS_H
 

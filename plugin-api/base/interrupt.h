@@ -7,7 +7,7 @@
 
 #include <signal.h>
 
-/* Not 0: somebody asked. */
+/* Not 0: asked to end. */
 extern volatile sig_atomic_t base_interrupted;
 
 /* From here on the first signal of a kind asks and a second one kills. Under nohup SIGHUP stays ignored (a shell that

@@ -23,7 +23,7 @@ struct pic_request { /* all borrowed */
     const char *channel; /* of PIC_CHANNEL */
 };
 
-/* A program has its address from the shared object; whoever links with that object's parts has it at once. */
+/* A program has its address from the shared object; a program linked with its parts has it at once. */
 struct pic_library {
     int (*read)(const struct pic_request *request, struct pic_image *out, struct base_err *err);
 };
