@@ -221,6 +221,7 @@ $(OUT)/tests/$(1)/base_%: $(OBJ)/tests/$(1)/base_%.c.o $(BASE_OBJ) $(SUPPORT_bas
 	$$(link) $$^ $$(LDFLAGS_ALL) $(BASE_LIBS) -lcmocka -o $$@
 endef
 $(foreach d,unit grad golden stat abi hard oom,$(eval $(call test_rules,$(d))))
+$(OUT)/tests/abi/api_oom: $(OBJ)/plugin-api/tools/alloc_probe.c.o
 # They load their modules from where a program's lie.
 $(TESTS) $(SANE): | $(OUT)/tests/lib
 $(OUT)/tests/lib: | $(MODULES)

@@ -21,8 +21,8 @@ struct pt_open {
     struct pt_scene *scene;
     pt_kernel *kernel;
     const char *kernel_name;
-    struct pt_render_config config; /* what the command line says over what the scene says */
-    struct pt_mask mask;
+    struct pt_render_config config;        /* what the command line says over what the scene says */
+    struct lull_plane mask;                /* data NULL: none */
     struct lull_host_criterion *criterion; /* NULL: uniform, or a recording that asks none */
     char settings[4096];      /* what decides the image, for checkpoints and other processes; "" when there are none */
     struct pt_render *render; /* of an image or its quote */

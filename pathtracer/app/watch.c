@@ -51,12 +51,6 @@ static int after_slice(void *data, struct pt_render *render, struct base_err *er
     return 0;
 }
 
-static int is_interrupted(void *data)
-{
-    (void)data;
-    return base_interrupted != 0;
-}
-
 static int suspend(void *data, struct pt_render *render, struct base_err *err)
 {
     const struct pt_watch *w = data;
@@ -66,5 +60,5 @@ static int suspend(void *data, struct pt_render *render, struct base_err *err)
 struct pt_render_hooks pt_watch_hooks(struct pt_watch *w)
 {
     return (struct pt_render_hooks){
-        .slice = after_slice, .interrupted = is_interrupted, .suspend = suspend, .log = w->log, .data = w};
+        .slice = after_slice, .interrupted = &base_interrupted, .suspend = suspend, .log = w->log, .data = w};
 }

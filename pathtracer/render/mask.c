@@ -1,6 +1,7 @@
 #include "render/mask.h"
 
 #include <math.h>
+#include <stdint.h>
 #include <stdlib.h>
 
 #include "picture/read.h"
@@ -11,7 +12,7 @@ static float sample(const struct pic_image *image, size_t i)
     return v > 0.0f ? fminf(v, 1.0f) : 0.0f;
 }
 
-int pt_mask_read(const char *path, int width, int height, struct pt_mask *out, struct base_err *err)
+int pt_mask_read(const char *path, int width, int height, struct lull_plane *out, struct base_err *err)
 {
     struct pic_image image;
     int rc = pic_read(path, &image, err);
@@ -34,26 +35,21 @@ int pt_mask_read(const char *path, int width, int height, struct pt_mask *out, s
             sum += sample(&image, channels * i + c);
         grey[i] = sum / (float)colours;
     }
-    *out = (struct pt_mask){width, height, grey};
+    *out = (struct lull_plane){.data = grey,
+                               .stride_x = sizeof *grey,
+                               .stride_y = (int64_t)sizeof *grey * width,
+                               .stride_c = sizeof *grey,
+                               .scale = 1.0,
+                               .type = LULL_TYPE_F32,
+                               .normaliser = LULL_NORM_ONE,
+                               .channels = 1};
 out:
     pic_release(&image);
     return rc;
 }
 
-void pt_mask_release(struct pt_mask *mask)
+void pt_mask_release(struct lull_plane *mask)
 {
-    free(mask->grey);
-    *mask = (struct pt_mask){0};
-}
-
-struct lull_plane pt_mask_plane(const struct pt_mask *mask)
-{
-    return (struct lull_plane){.data = mask->grey,
-                               .stride_x = sizeof *mask->grey,
-                               .stride_y = (int64_t)sizeof *mask->grey * mask->width,
-                               .stride_c = sizeof *mask->grey,
-                               .scale = 1.0,
-                               .type = LULL_TYPE_F32,
-                               .normaliser = LULL_NORM_ONE,
-                               .channels = 1};
+    free((void *)(uintptr_t)mask->data);
+    *mask = (struct lull_plane){0};
 }

@@ -82,7 +82,6 @@ static int begin_frame(struct pt_render *r, uint32_t film_planes, struct base_er
 {
     const struct pt_render_config *c = &r->config;
     struct lull_error e = {.struct_size = sizeof e};
-    struct lull_plane mask = c->mask ? pt_mask_plane(c->mask) : (struct lull_plane){0};
     int deterministic = c->time_budget_s <= 0.0 && c->max_check_overhead <= 0.0;
     int independent = c->integrator.sampler == PT_SAMPLER_INDEPENDENT;
     struct lull_host_config config = {
@@ -103,7 +102,7 @@ static int begin_frame(struct pt_render *r, uint32_t film_planes, struct base_er
         .time_budget_s = c->time_budget_s,
         .max_check_overhead = c->max_check_overhead,
         .max_seam = c->max_seam,
-        .mask = c->mask ? &mask : NULL,
+        .mask = c->mask,
     };
     int32_t code = lull_host_begin(&config, r->criterion, &r->frame, &e);
     const struct lull_requirements *n = r->criterion ? lull_host_needs(r->criterion) : NULL;
@@ -441,7 +440,7 @@ int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum
         }
         if (hooks->slice && (rc = hooks->slice(hooks->data, r, err)) != 0)
             break;
-        if (hooks->interrupted && hooks->interrupted(hooks->data)) {
+        if (hooks->interrupted && *hooks->interrupted) {
             *outcome = PT_RENDER_INTERRUPTED;
             rc = suspend(r, hooks, LULL_REASON_INTERRUPT, err);
             break;
@@ -471,7 +470,7 @@ int pt_render_advance(struct pt_render *r, uint64_t spp, const struct pt_render_
         rc = hooks->slice ? hooks->slice(hooks->data, r, err) : 0;
         if (rc)
             return rc;
-        if (hooks->interrupted && hooks->interrupted(hooks->data)) {
+        if (hooks->interrupted && *hooks->interrupted) {
             *stopped = 1;
             return 0;
         }

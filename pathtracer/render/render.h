@@ -10,6 +10,7 @@
 #ifndef PT_RENDER_RENDER_H
 #define PT_RENDER_RENDER_H
 
+#include <signal.h>
 #include <stdint.h>
 
 #include "base/err.h"
@@ -19,7 +20,6 @@
 #include "job/job.h"
 #include "render/host.h"
 #include "render/film.h"
-#include "render/mask.h"
 
 struct pt_render_config {
     int width, height; /* of the image, pixels */
@@ -32,7 +32,7 @@ struct pt_render_config {
     double pilot_s;     /* … and after so many seconds */
     double max_check_overhead;       /* share of the elapsed time that checks may take; 0 = no bound */
     double max_seam;                 /* most ratio of samples of neighbouring blocks, 0 = any (lull_host_reopen) */
-    const struct pt_mask *mask;      /* borrows for pt_render_create; NULL = none */
+    const struct lull_plane *mask;   /* borrows for pt_render_create; NULL = none */
     uint32_t planes;                 /* PT_FILM_* wanted besides those of the criterion */
     struct pt_integrator integrator; /* want_aux is set by the renderer */
     uint32_t order_seed;             /* not 0: work is handed out in a shuffled order (tests) */
@@ -70,7 +70,7 @@ struct pt_render_hooks {
      * NULL. */
     void (*judged)(void *data, struct pt_render *render, const uint32_t *due, uint32_t count);
     /* Not 0: end after this slice. May be NULL. */
-    int (*interrupted)(void *data);
+    const volatile sig_atomic_t *interrupted;
     /* Called once before the blocks still active are closed for time or interrupt, while everything is as a later run needs
      * it to go on. May be NULL. */
     int (*suspend)(void *data, struct pt_render *render, struct base_err *err);
@@ -85,12 +85,12 @@ int pt_render_create(const struct pt_render_config *config, const struct pt_scen
                      struct base_err *err);
 void pt_render_destroy(struct pt_render *render);
 
-/* Renders until all blocks are stopped, time is up, a pilot is over, or interrupted() says so. A pilot leaves the render
+/* Renders until all blocks are stopped, time is up, a pilot is over, or *interrupted is set. A pilot leaves the render
  * as it is between two slices: going on gives what it would have been without. */
 int pt_render_run(struct pt_render *render, const struct pt_render_hooks *hooks, enum pt_render_outcome *outcome,
                   struct base_err *err);
 
-/* For recording: samples every block up to spp, without checks; *stopped is set when interrupted() said so before. */
+/* For recording: samples every block up to spp, without checks; *stopped is set when *interrupted was before. */
 int pt_render_advance(struct pt_render *render, uint64_t spp, const struct pt_render_hooks *hooks, int *stopped,
                       struct base_err *err);
 /* Asks the criterion, if there is one, about every block as it is and notes the answers; nothing is stopped. */

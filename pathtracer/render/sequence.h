@@ -30,7 +30,7 @@ int pt_sequence_levels(const char *text, uint32_t spp[PT_SEQUENCE_MAX_LEVELS], s
 int pt_sequence_choose(const char *text, uint8_t *chosen, uint32_t count, struct base_err *err);
 
 /* criterion may be NULL; else its `error` is recorded at every level. *was_interrupted is set when
- * hooks->interrupted() said so: the block being recorded is lost, all before it are safe. Of the hooks slice, interrupted
+ * *hooks->interrupted was: the block being recorded is lost, all before it are safe. Of the hooks slice, interrupted
  * and log are used; a note is made of each block. */
 int pt_sequence_record(const struct pt_sequence_config *config, const struct pt_scene *scene, pt_kernel *kernel,
                        struct base_threads *threads, struct lull_host_criterion *criterion,

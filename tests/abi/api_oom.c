@@ -2,7 +2,7 @@
  * Loading and listing with the k-th allocation failing, for every k: an error or success, never a crash, and memory as
  * before. create and begin_frame are covered by lull-check's out-of-memory check.
  */
-#include "../../plugin-api/tools/alloc_probe.c"
+#include "../../plugin-api/tools/check.h"
 #include "support/api_folders.h"
 
 #include <setjmp.h>

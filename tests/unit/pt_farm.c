@@ -358,12 +358,6 @@ static int save(void *data, struct pt_render *r, struct base_err *err)
     return pt_checkpoint_save(w->checkpoint, r, "settings\n", err);
 }
 
-static int is_interrupted(void *data)
-{
-    (void)data;
-    return interrupted != 0;
-}
-
 /* Renders with workers until one is lost or it is interrupted after so many calls of the main thread; the checkpoint then goes on alone to the bytes of one process. */
 static void ends_well(const struct lull_criterion *table, enum behaviour last, int interrupt_after, const char *words)
 {
@@ -373,7 +367,7 @@ static void ends_well(const struct lull_criterion *table, enum behaviour last, i
     struct watch watch = {.checkpoint = "/tmp/pt_farm_test.ckp"};
     struct heard heard;
     hear_begin(&heard);
-    const struct pt_render_hooks hooks = {.interrupted = is_interrupted, .suspend = save, .log = &heard.log, .data = &watch};
+    const struct pt_render_hooks hooks = {.interrupted = &interrupted, .suspend = save, .log = &heard.log, .data = &watch};
     struct run one = {0}, lost = {0}, rest = {0};
     struct stage stage;
     config.planes = PT_FILM_ALL;

@@ -189,12 +189,15 @@ static void seams_are_bounded(void **state)
 struct stop_after {
     int slices;
     const char *checkpoint;
+    volatile sig_atomic_t now;
 };
 
-static int count_down(void *data)
+static int count_down(void *data, struct pt_render *r, struct base_err *err)
 {
     struct stop_after *s = data;
-    return --s->slices <= 0;
+    (void)r, (void)err;
+    s->now = --s->slices <= 0;
+    return 0;
 }
 
 static int save(void *data, struct pt_render *r, struct base_err *err)
@@ -230,7 +233,8 @@ static void resumed_render_is_identical(void **state)
     struct result whole = render(&config, pt_fake_nan, 2, "32");
     for (int slices = 1; slices < 12; slices += 2) {
         struct stop_after stop = {.slices = slices, .checkpoint = path};
-        struct pt_render_hooks hooks = {.interrupted = count_down, .suspend = save, .data = &stop}, none = {0};
+        struct pt_render_hooks hooks = {.slice = count_down, .interrupted = &stop.now, .suspend = save, .data = &stop},
+                               none = {0};
         enum pt_render_outcome outcome;
         struct base_err err = {0};
         struct result r = {.pool = base_threads_create(2, &err)};
@@ -511,12 +515,6 @@ static void checks_may_be_too_dear(void **state)
     }
 }
 
-static int always(void *data)
-{
-    (void)data;
-    return 1;
-}
-
 /* What the render is when it may be saved: as it would go on. */
 static int look_before(void *data, struct pt_render *r, struct base_err *err)
 {
@@ -534,7 +532,8 @@ static void interrupted_blocks_are_asked_once_more(void **state)
     struct base_err err = {0};
     enum pt_render_outcome outcome;
     int looks = 0;
-    const struct pt_render_hooks hooks = {.interrupted = always, .suspend = look_before, .data = &looks};
+    static const volatile sig_atomic_t always = 1;
+    const struct pt_render_hooks hooks = {.interrupted = &always, .suspend = look_before, .data = &looks};
     struct result r = {.pool = base_threads_create(1, &err)};
     config.width = config.crop[2] = 48;
     config.height = config.crop[3] = 16;

@@ -433,7 +433,8 @@ static void dropped_samples_are_counted(void **state)
 /* The slices of one phase fail, or are the last before an interrupt. */
 static struct {
     uint64_t spp_max; /* the phase: of levels or of the reference */
-    int fails, stop;
+    int fails;
+    volatile sig_atomic_t stop;
 } ending;
 
 static int end_there(void *data, struct pt_render *r, struct base_err *err)
@@ -443,12 +444,6 @@ static int end_there(void *data, struct pt_render *r, struct base_err *err)
         return 0;
     ending.stop = !ending.fails;
     return ending.fails ? base_fail(err, BASE_EIO, "the disk is gone") : 0;
-}
-
-static int stop_there(void *data)
-{
-    (void)data;
-    return ending.stop;
 }
 
 /* A block that failed or was interrupted, on its way up or in its reference, is not there; the next run makes it. */
@@ -465,7 +460,7 @@ static void a_block_is_recorded_whole_or_not(void **state)
         struct seq_manifest m;
         struct base_err err = {0};
         int stopped = 7;
-        const struct pt_render_hooks ends = {.slice = k < 4 ? end_there : NULL, .interrupted = stop_there};
+        const struct pt_render_hooks ends = {.slice = k < 4 ? end_there : NULL, .interrupted = &ending.stop};
         ending.spp_max = k % 2 ? 64 : 352;
         ending.fails = k < 2;
         ending.stop = 0;
