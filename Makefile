@@ -237,7 +237,7 @@ $(OUT)/tests/abi/plugins/%.so: $(OBJ)/tests/abi/plugins/%.c.o
 	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared $< $(LDFLAGS_ALL) -lm -o $@
 $(OUT)/tests/processors/embree_isa.so: $(OBJ)/tests/processors/embree_isa.c.o
 	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared $< $(LDFLAGS_ALL) -ldl -o $@
-$(patsubst tests/%.c,$(OUT)/tests/%,$(wildcard tests/abi/api_*.c)): | $(ABI_PLUGINS) $(CRITERIA)
+$(patsubst tests/%.c,$(OUT)/tests/%,$(wildcard tests/abi/api_*.c)): | $(ABI_PLUGINS) $(CRITERIA) $(HOST_LIB)
 $(OUT)/fuzz/replay-pt_%: $(OBJ)/tests/fuzz/pt_%.c.o $(OBJ)/tests/fuzz/replay.c.o $(PT_OBJ) $(LOADER_OBJ)
 	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) $(IMAGE_LIBS) -o $@
 $(OUT)/fuzz/replay-ggn_study%: $(OBJ)/tests/fuzz/ggn_study%.c.o $(OBJ)/tests/fuzz/replay.c.o $(STUDY_OBJ) $(GGN_OBJ)

@@ -2,29 +2,83 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 
 #include "render/checkpoint.h"
+#include "render/host_find.h"
 #include "render/output.h"
 #include "watch.h"
 
-/* Writes what was asked for; goes on after a failure so that one missing folder does not cost the other files. */
-static int write_outputs(const struct pt_cli *cli, const struct pt_open *o, int was_interrupted, struct base_err *err)
+/* What the criterion of noisy pictures says of this one, [blocks], the caller's; NULL when nobody can say. */
+static double *judge_noisy(const struct pt_open *o)
 {
-    const struct pt_image_files *files = &cli->files;
-    const struct pt_output_info info = {.scene = cli->scene,
-                                        .params = cli->params.list,
-                                        .param_count = cli->params.count,
-                                        .mask = cli->mask,
-                                        .effects = o->scene->effects,
-                                        .kernel = o->kernel_name,
-                                        .reproducible = files->reproducible,
-                                        .scene_bytes = o->scene->stats.bytes,
-                                        .interrupted = was_interrupted};
-    pt_output_or_keep(pt_output_exr, files->output, o->render, &info, err);
-    pt_output_or_keep(pt_output_preview, files->preview, o->render, &info, err);
+    const struct pt_render *r = o->render;
+    const uint32_t n = r->blocks->count;
+    struct lull_host_criterion *observer = NULL;
+    const struct lull_criterion *table;
+    struct base_err ignored = {0};
+    double *errors = calloc(n, sizeof *errors);
+    uint32_t *all = calloc(n, sizeof *all);
+    struct lull_decision *decisions = calloc(n, sizeof *decisions);
+    int rc = !errors || !all || !decisions || !(r->film.planes & PT_FILM_HALF) ||
+             pt_criterion_find(PT_OPEN_NOISY_CRITERION, NULL, NULL, &table, &ignored) ||
+             pt_criterion_create(table, NULL, 0, o->threads, NULL, &observer, &ignored) ||
+             lull_host_join(r->frame, observer, NULL) != LULL_OK;
+    for (uint32_t i = 0; !rc && i < n; i++)
+        all[i] = i;
+    rc = rc || pt_criterion_evaluate(observer, r->frame, &r->film, all, n, NULL, decisions, &ignored);
+    for (uint32_t i = 0; !rc && i < n; i++)
+        errors[i] = decisions[i].error;
+    lull_host_close(observer);
+    free(all);
+    free(decisions);
+    if (rc) {
+        free(errors);
+        errors = NULL;
+    }
+    return errors;
+}
+
+static void write_all(const struct pt_image_files *files, const struct pt_open *o, const struct pt_output_info *info,
+                      struct base_err *err)
+{
+    pt_output_or_keep(pt_output_exr, files->output, o->render, info, err);
+    pt_output_or_keep(pt_output_preview, files->preview, o->render, info, err);
     for (int i = 0; i < files->stop_map_count; i++)
-        pt_output_or_keep(pt_output_stop_map, files->stop_maps[i], o->render, &info, err);
-    pt_output_or_keep(pt_output_report, files->report, o->render, &info, err);
+        pt_output_or_keep(pt_output_stop_map, files->stop_maps[i], o->render, info, err);
+    pt_output_or_keep(pt_output_report, files->report, o->render, info, err);
+}
+
+/* Writes what was asked for; goes on after a failure so that one missing folder, or a denoiser that fails, does not cost the
+ * other files. */
+static int write_outputs(const struct pt_cli *cli, const struct pt_open *o, int was_interrupted, struct base_log *log,
+                         struct base_err *err)
+{
+    struct pt_output_info info = {.scene = cli->scene,
+                                  .params = cli->params.list,
+                                  .param_count = cli->params.count,
+                                  .mask = cli->mask,
+                                  .effects = o->scene->effects,
+                                  .kernel = o->kernel_name,
+                                  .reproducible = cli->files.reproducible,
+                                  .scene_bytes = o->scene->stats.bytes,
+                                  .interrupted = was_interrupted};
+    struct pt_denoised denoised = {0};
+    struct base_err why = {0};
+    double *noisy_error = NULL;
+    if (o->picture != PT_PICTURE_NOISY) {
+        pt_denoised_make(o->render, o->picture, o->denoiser, NULL, &denoised, &why);
+        info.denoised = why.code ? NULL : &denoised;
+        info.noisy_error = noisy_error = o->criterion ? judge_noisy(o) : NULL;
+    }
+    write_all(&cli->files, o, &info, err);
+    if (info.denoised && o->picture == PT_PICTURE_BLEND)
+        base_log_note(log, "denoised; %.0f %% of the picture is the noisy one, where the denoiser is not trusted",
+                      100.0 * denoised.weight_mean);
+    pt_denoised_release(&denoised);
+    free(noisy_error);
+    if (why.code && !err->code)
+        base_fail(err, why.code, "the picture is the noisy one: %s", why.text);
     return err->code;
 }
 
@@ -70,7 +124,7 @@ int pt_action_image(const struct pt_cli *cli, struct pt_open *o, struct base_log
     int rc = pt_render_run(o->render, &hooks, &outcome, err);
     base_log_clear(log);
     struct base_err write_err = {0};
-    if (write_outputs(cli, o, pt_action_status(outcome) != 0, &write_err) != 0) {
+    if (write_outputs(cli, o, pt_action_status(outcome) != 0, log, &write_err) != 0) {
         if (rc)
             base_log_say(log, "%s", write_err.text); /* besides the render's own error: it tells where the image is */
         else

@@ -4,6 +4,7 @@
 
 #include "quote_output.h"
 #include "render/checkpoint.h"
+#include "render/host_find.h"
 #include "watch.h"
 
 struct pilot {
@@ -29,13 +30,21 @@ static int print_quote(const struct pt_cli *cli, const struct pt_open *o, struct
     return rc || !cli->quote_map ? rc : pt_quote_map(cli->quote_map, quote, o->render, err);
 }
 
+static int open_quote(const struct pt_cli *cli, const struct pt_open *o, struct base_log *log, struct pt_quote **out,
+                      struct base_err *err)
+{
+    const struct lull_criterion *table = o->criterion ? lull_host_table(o->criterion) : NULL, *noisy = NULL;
+    int rc =
+        table && o->picture != PT_PICTURE_NOISY ? pt_criterion_find(PT_OPEN_NOISY_CRITERION, NULL, log, &noisy, err) : 0;
+    return rc ? rc : pt_quote_create(o->render, table, cli->params.list, cli->params.count, noisy, log, out, err);
+}
+
 /* When the pilot is over the checkpoint is the render's, whoever goes on with it. */
 int pt_action_quote(const struct pt_cli *cli, struct pt_open *o, struct base_log *log, int *status, struct base_err *err)
 {
     enum pt_render_outcome outcome;
     struct pilot pilot = {0};
-    int rc = pt_quote_create(o->render, o->criterion ? lull_host_table(o->criterion) : NULL, cli->params.list,
-                             cli->params.count, log, &pilot.quote, err);
+    int rc = open_quote(cli, o, log, &pilot.quote, err);
     if (rc)
         return rc;
     pt_watch_init(&pilot.watch, o, &cli->checkpoint, NULL, log);

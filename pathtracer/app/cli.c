@@ -156,6 +156,17 @@ static int set_aov(void *into, const char *value, struct base_err *err)
     }
 }
 
+static int set_denoise(void *into, const char *value, struct base_err *err)
+{
+    static const char *const words[] = {"blend", "full", NULL};
+    struct pt_cli *cli = into;
+    int i = value ? base_word_index(words, value, strlen(value)) : 0;
+    if (i < 0)
+        return expected(err, "blend or full");
+    cli->picture = i == 0 ? PT_PICTURE_BLEND : PT_PICTURE_DENOISED;
+    return 0;
+}
+
 static int set_stop_map(void *into, const char *value, struct base_err *err)
 {
     struct pt_image_files *files = &((struct pt_cli *)into)->files;
@@ -262,6 +273,10 @@ static const struct base_option options[] = {
      .help = "Samples per block as a picture or a table; may be repeated"},
     {"report", 0, "FILE.json", TO(files.report), .output = BASE_FILE, .words = json, .help = "Everything about the run"},
     {"aov", 0, "LIST", .set = set_aov, .help = "More layers: albedo,normal,depth"},
+    {"denoise", 0, "blend|full", .set = set_denoise, .optional = 1,
+     .help =
+         "Keep the denoised picture, and stop blocks by what is seen of it (criterion denoised): blend (default) keeps as "
+         "much of the noisy one as the denoiser is wrong, full none"},
     {"reproducible", 0, NULL, TO(files.reproducible), .help = "Leave times out of the EXR: equal renders are equal files"},
     {"quiet", 'q', NULL, TO(quiet), .help = "No progress, no notes"},
     {.help = "Interrupting and going on:"},
@@ -339,6 +354,8 @@ static int check_sequence(struct pt_cli *cli, struct base_err *err)
         return base_fail(err, BASE_EINVAL, "--sequence goes with neither --spp, --checkpoint, --crop nor --mask");
     if (pt_cli_writes_image(cli))
         return base_fail(err, BASE_EINVAL, "--sequence writes no image: leave out -o, --preview, --report and --stop-map");
+    if (cli->picture != PT_PICTURE_NOISY)
+        return base_fail(err, BASE_EINVAL, "--sequence records noisy blocks: leave out --denoise");
     if (cli->action != PT_CLI_RENDER)
         return base_fail(err, BASE_EINVAL, "--sequence records blocks: leave out what only looks at the scene or a path");
     cli->action = PT_CLI_SEQUENCE;

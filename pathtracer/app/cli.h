@@ -7,6 +7,7 @@
 #include "base/err.h"
 #include "base/outputs.h"
 #include "pbrt/load_options.h"
+#include "render/denoised.h"
 #include "render/render.h"
 #include "render/sequence.h"
 
@@ -46,6 +47,7 @@ struct pt_cli {
     int has_crop;
     const char *criterion; /* NULL = not given */
     struct pt_cli_params params;
+    enum pt_picture picture;     /* that is kept */
     const char *mask;            /* picture that scales the dial per block; NULL = none */
     int threads;                 /* 0 = all processors */
     double rank_timeout_s;       /* wait for an answer of another process */

@@ -9,9 +9,6 @@
 #include "render/host_find.h"
 #include "render/output.h"
 
-/* The criterion when none is named. */
-static const char DEFAULT_CRITERION[] = "observer";
-
 /* --- scene ---------------------------------------------------------------------------------------------------------- */
 
 /* What the command line puts over the scene's integrator. */
@@ -59,11 +56,47 @@ int pt_open_scene(const struct pt_cli *cli, struct job *job, struct base_log *lo
 
 /* --- criterion ------------------------------------------------------------------------------------------------------ */
 
-static int open_criterion(const struct pt_cli *cli, struct base_log *log, struct pt_open *o, struct base_err *err)
+static const char *parameter(const struct pt_cli_params *params, const char *key)
 {
-    const char *spec = cli->criterion ? cli->criterion : DEFAULT_CRITERION;
+    const char *value = NULL;
+    for (uint32_t i = 0; i < params->count; i++)
+        if (strcmp(params->list[i].key, key) == 0)
+            value = params->list[i].value;
+    return value;
+}
+
+/* A criterion that can judge either picture judges the one that is kept, unless a parameter says otherwise. */
+static int add_picture(struct pt_cli_params *params, enum pt_picture kept, const struct lull_criterion *table,
+                       struct base_err *err)
+{
+    const struct lull_param *picture = NULL;
+    lull_host_parameter(table, "picture", params->list, params->count, &picture);
+    if (kept != PT_PICTURE_DENOISED || !picture || parameter(params, "picture"))
+        return 0;
+    if (params->count == PT_CLI_MAX_PARAMS)
+        return base_fail(err, BASE_EINVAL, "more than %d parameters", PT_CLI_MAX_PARAMS);
+    params->list[params->count++] = (struct lull_pair){"picture", "denoised"};
+    return 0;
+}
+
+/* A denoiser that is not there is found out before the work. */
+static int open_denoiser(const struct pt_cli *cli, struct pt_open *o, struct base_err *err)
+{
+    struct lull_error e = {.struct_size = sizeof e};
+    o->picture = cli->picture;
+    o->denoiser = parameter(&cli->params, "library");
+    o->config.planes |= pt_denoised_planes(o->picture);
+    int32_t code = o->picture == PT_PICTURE_NOISY ? LULL_OK : lull_host_denoiser(o->denoiser, &e);
+    return code == LULL_OK ? 0 : base_fail(err, BASE_EINVAL, "--denoise: %s", e.message);
+}
+
+static int open_criterion(struct pt_cli *cli, struct base_log *log, struct pt_open *o, struct base_err *err)
+{
+    const char *usual = o->picture == PT_PICTURE_NOISY ? PT_OPEN_NOISY_CRITERION : "denoised";
     const struct lull_criterion *table;
-    int rc = pt_criterion_find(spec, &o->judging, log, &table, err);
+    int rc = pt_criterion_find(cli->criterion ? cli->criterion : usual, &o->judging, log, &table, err);
+    if (!rc)
+        rc = add_picture(&cli->params, o->picture, table, err);
     if (!rc)
         rc = pt_criterion_create(table, cli->params.list, cli->params.count, o->threads, log, &o->criterion, err);
     if (rc || !cli->mask)
@@ -166,12 +199,13 @@ int pt_open_render(struct pt_cli *cli, struct job *job, struct base_log *log, st
 {
     const int records = cli->action == PT_CLI_SEQUENCE;
     struct pt_render_config *c = &o->config;
-    int rc = 0;
+    int rc;
     c->job = job_rank(job) == 0 ? job : NULL;
     if (c->crop[2] > c->width || c->crop[3] > c->height)
         return base_fail(err, BASE_EINVAL, "--crop %d,%d,%d,%d: the image has %dx%d pixels", c->crop[0], c->crop[1],
                          c->crop[2], c->crop[3], c->width, c->height);
-    if (cli->criterion || !(records || c->uniform))
+    rc = open_denoiser(cli, o, err);
+    if (!rc && (cli->criterion || !(records || c->uniform)))
         rc = open_criterion(cli, log, o, err);
     if (!rc && !records && job_rank(job) == 0) /* the others write nothing */
         rc = check_outputs(cli, o, err);

@@ -13,6 +13,9 @@
 #include "render/render.h"
 #include "scene/scene.h"
 
+/* The criterion when none is named and the picture is not denoised. */
+#define PT_OPEN_NOISY_CRITERION "observer"
+
 struct pt_open {
     double start_s; /* wall time of the beginning … */
     double load_s;  /* … and how long until the scene was there */
@@ -22,6 +25,8 @@ struct pt_open {
     pt_kernel *kernel;
     const char *kernel_name;
     struct pt_render_config config;        /* what the command line says over what the scene says */
+    enum pt_picture picture;               /* that is kept */
+    const char *denoiser;                  /* library that makes it, as for lull_host_denoising */
     struct lull_plane mask;                /* data NULL: none */
     struct lull_host_criterion *criterion; /* NULL: uniform, or a recording that asks none */
     char settings[4096];      /* what decides the image, for checkpoints and other processes; "" when there are none */

@@ -182,6 +182,7 @@ static void add_row(cJSON *list, const struct pt_quote_row *row, uint32_t count,
 {
     cJSON *o = base_json_object(list, NULL, failed), *blocks;
     base_json_number(o, "visible", row->visible, failed);
+    base_json_text(o, "name", row->name, failed);
     base_json_bool(o, "as_asked", row->asked, failed);
     base_json_number(o, "spp_min", row->spp_min, failed);
     add_range(o, "spp_mean", row->spp_mean, row->spp_mean_low, row->spp_mean_high, failed);

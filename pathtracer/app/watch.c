@@ -27,14 +27,27 @@ static void save_now_and_then(struct pt_watch *w, const struct pt_render *render
     w->checkpoint_at_s = base_clock_wall_s() + w->checkpoint->every_s;
 }
 
+static int is_interrupted(void *data)
+{
+    (void)data;
+    return base_interrupted != 0;
+}
+
 /* The picture so far: after the first slice, then when three times as long has passed, at most so often that it takes a
- * hundredth of the time. One that cannot be written costs nothing yet: the last one is what fails. */
+ * hundredth of the time; denoised, which takes some 10 us a pixel and processor, when that is less than a hundredth. One
+ * that cannot be written costs nothing yet: the last one is what fails. */
 static void show_preview(struct pt_watch *w, const struct pt_render *render)
 {
-    const double ratio = 3.0, longest_s = 60.0, share = 0.01;
+    const double ratio = 3.0, longest_s = 60.0, share = 0.01, denoised_s = 10e-6;
+    const struct pt_open *o = w->open;
     struct base_err ignored = {0};
-    double begin_s = base_clock_wall_s();
-    pt_output_preview(w->preview, render, NULL, &ignored);
+    struct pt_denoised denoised = {0};
+    double begin_s = base_clock_wall_s(), to_denoise_s = denoised_s * (double)render->film.pixels;
+    if (o->picture != PT_PICTURE_NOISY && to_denoise_s / base_threads_count(o->threads) < share * (begin_s - o->start_s))
+        pt_denoised_make(render, PT_PICTURE_DENOISED, o->denoiser, is_interrupted, &denoised, &ignored);
+    const struct pt_output_info info = {.denoised = denoised.rgb ? &denoised : NULL};
+    pt_output_preview(w->preview, render, &info, &ignored);
+    pt_denoised_release(&denoised);
     double now_s = base_clock_wall_s();
     w->preview_at_s = now_s + fmax(fmin(ratio * (now_s - w->open->start_s), longest_s), (now_s - begin_s) / share);
 }

@@ -20,7 +20,7 @@ struct pt_scene;
 struct pt_path_result {
     pt_vec3 radiance;     /* linear Rec.709 RGB after the film's exposure scale; may be non-finite: the film decides */
     pt_vec3 albedo;       /* first non-specular surface: directional-hemispherical reflectance estimate in [0,1] */
-    pt_vec3 normal_world; /* shading normal at the first hit, facing the camera */
+    pt_vec3 normal_world; /* shading normal there, facing the ray */
     float depth;          /* distance along the camera ray to the first hit, scene units; INFINITY when none */
     uint32_t rays;        /* intersection and occlusion queries */
 };

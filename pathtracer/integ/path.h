@@ -280,12 +280,13 @@ PT_KERNEL_INLINE void pt_path_aux(pt_effects fx, const struct pt_path *path, con
                                   const struct pt_frame *frame)
 {
     struct pt_path_result *out = path->out;
-    if (out->depth == INFINITY) {
+    if (out->depth == INFINITY)
         out->depth = path->hit.t;
+    if (!pt_bsdf_has_smooth(fx, bsdf) || !v3_is_black(out->albedo))
+        return;
+    out->albedo = pt_clamp_unit(pt_bsdf_albedo(fx, bsdf, wo));
+    if (v3_is_black(out->normal_world))
         out->normal_world = v3_dot(frame->n, path->ray.direction) > 0.0f ? v3_neg(frame->n) : frame->n;
-    }
-    if (pt_bsdf_has_smooth(fx, bsdf) && v3_is_black(out->albedo))
-        out->albedo = pt_clamp_unit(pt_bsdf_albedo(fx, bsdf, wo));
 }
 
 /* The next direction: its ray replaces the path's. 0: the path ends. */

@@ -30,9 +30,15 @@ static const struct lull_host_block *block_at(const struct lull_host_blocks *b, 
 
 /* --- EXR ------------------------------------------------------------------------------------------------------------ */
 
-enum { R, G, B, SPP, P_NOISY, ERROR, REASON, FIRST_AOV, CHANNELS_MAX = FIRST_AOV + 7 };
+enum { R, G, B, SPP, P_NOISY, ERROR, REASON, FIRST_AOV, CHANNELS_MAX = FIRST_AOV + 7 + 8 };
 
-static void aov_pixel(const struct pt_film *f, uint32_t aov, size_t i, uint64_t spp, size_t x, float *const *rows)
+struct exr_source {
+    const struct pt_render *render;
+    const struct pt_output_info *info;
+};
+
+/* Returns the number of channels filled so far. */
+static int aov_pixel(const struct pt_film *f, uint32_t aov, size_t i, uint64_t spp, size_t x, float *const *rows)
 {
     int c = FIRST_AOV;
     double n = spp > 0 ? (double)spp : 1.0;
@@ -41,12 +47,26 @@ static void aov_pixel(const struct pt_film *f, uint32_t aov, size_t i, uint64_t 
     for (int k = 0; k < 3 && (aov & PT_FILM_NORMAL); k++)
         rows[c++][x] = (float)(f->normal[3 * i + (size_t)k] / n);
     if (aov & PT_FILM_DEPTH)
-        rows[c][x] = (float)f->depth[i];
+        rows[c++][x] = (float)f->depth[i];
+    return c;
+}
+
+/* What is kept takes the place of the noisy picture, which goes to a layer of its own. */
+static void denoised_pixel(const struct pt_denoised *d, size_t i, size_t x, int c, float *const *rows)
+{
+    for (int k = 0; k < 3; k++) {
+        rows[c + k][x] = rows[R + k][x];
+        rows[c + 3 + k][x] = d->denoised[3 * i + (size_t)k];
+        rows[R + k][x] = d->rgb[3 * i + (size_t)k];
+    }
+    rows[c + 6][x] = d->weight[i];
 }
 
 static void exr_row(void *data, int y, float *const *rows)
 {
-    const struct pt_render *r = data;
+    const struct exr_source *source = data;
+    const struct pt_output_info *info = source->info;
+    const struct pt_render *r = source->render;
     int x0 = r->config.crop[0];
     for (int x = x0; x < r->config.crop[2]; x++) {
         const struct lull_host_block *b = block_at(r->blocks, x, y);
@@ -59,7 +79,11 @@ static void exr_row(void *data, int y, float *const *rows)
         rows[P_NOISY][k] = (float)b->p_noisy;
         rows[ERROR][k] = (float)b->error;
         rows[REASON][k] = (float)b->reason;
-        aov_pixel(&r->film, r->config.planes, i, b->spp, k, rows);
+        int channels = aov_pixel(&r->film, r->config.planes, i, b->spp, k, rows);
+        if (info->denoised)
+            denoised_pixel(info->denoised, i, k, channels, rows);
+        if (info->denoised && info->noisy_error)
+            rows[channels + 7][k] = (float)info->noisy_error[b - r->blocks->list];
     }
 }
 
@@ -84,27 +108,41 @@ static void criterion_text(const struct pt_render *r, const struct pt_output_inf
         used += (size_t)snprintf(text + used, room - used, " %s=%s", info->params[i].key, info->params[i].value);
 }
 
+/* Names of the channels in the order of exr_row; V: a value, as Blender wants to know. Returns how many. */
+static int name_channels(uint32_t aov, const struct pt_output_info *info, const char *channels[CHANNELS_MAX])
+{
+    static const struct {
+        uint32_t aov; /* 0: always */
+        const char *name;
+    } list[] = {{0, "R"},
+                {0, "G"},
+                {0, "B"},
+                {0, "lull.spp.V"},
+                {0, "lull.p_noisy.V"},
+                {0, "lull.error.V"},
+                {0, "lull.reason.V"},
+                {PT_FILM_ALBEDO, "albedo.R"},
+                {PT_FILM_ALBEDO, "albedo.G"},
+                {PT_FILM_ALBEDO, "albedo.B"},
+                {PT_FILM_NORMAL, "normal.X"},
+                {PT_FILM_NORMAL, "normal.Y"},
+                {PT_FILM_NORMAL, "normal.Z"},
+                {PT_FILM_DEPTH, "depth.Z"}};
+    static const char *const denoised[] = {"noisy.R",    "noisy.G",    "noisy.B",       "denoised.R",
+                                           "denoised.G", "denoised.B", "lull.weight.V", "lull.noisy_error.V"};
+    int n = 0;
+    for (size_t i = 0; i < sizeof list / sizeof list[0]; i++)
+        if (!list[i].aov || (aov & list[i].aov))
+            channels[n++] = list[i].name;
+    for (int i = 0; info->denoised && i < 7 + (info->noisy_error != NULL); i++)
+        channels[n++] = denoised[i];
+    return n;
+}
+
 int pt_output_exr(const char *path, const struct pt_render *r, const struct pt_output_info *info, struct base_err *err)
 {
-    /* V: a value, as Blender wants to know */
-    static const char *const base[FIRST_AOV] = {
-        "R", "G", "B", "lull.spp.V", "lull.p_noisy.V", "lull.error.V", "lull.reason.V"};
     const char *channels[CHANNELS_MAX];
-    int n = FIRST_AOV;
-    memcpy(channels, base, sizeof base);
-    if (r->config.planes & PT_FILM_ALBEDO) {
-        channels[n++] = "albedo.R";
-        channels[n++] = "albedo.G";
-        channels[n++] = "albedo.B";
-    }
-    if (r->config.planes & PT_FILM_NORMAL) {
-        channels[n++] = "normal.X";
-        channels[n++] = "normal.Y";
-        channels[n++] = "normal.Z";
-    }
-    if (r->config.planes & PT_FILM_DEPTH)
-        channels[n++] = "depth.Z";
-
+    int n = name_channels(r->config.planes, info, channels);
     char effects[512], criterion[2048], reasons[256];
     size_t used = 0;
     for (int i = 0; i < LULL_REASON_COUNT; i++)
@@ -124,6 +162,7 @@ int pt_output_exr(const char *path, const struct pt_render *r, const struct pt_o
         {"software", "lull-render " BASE_VERSION, 0.0},
         {"lull:seconds", NULL, lull_host_elapsed_s(r->frame)}, /* last: left out of reproducible files */
     };
+    struct exr_source source = {r, info};
     const int *crop = r->config.crop;
     struct pt_exr_image image = {
         .width = r->config.width,
@@ -137,7 +176,7 @@ int pt_output_exr(const char *path, const struct pt_render *r, const struct pt_o
         .attribute_count = (int)(sizeof attributes / sizeof attributes[0]) - (info->reproducible ? 1 : 0),
         .attributes = attributes,
         .row = exr_row,
-        .data = (void *)(uintptr_t)r,
+        .data = &source,
     };
     return pt_exr_write(path, &image, err);
 }
@@ -163,7 +202,7 @@ int pt_output_is_ours(const char *path)
 
 int pt_output_preview(const char *path, const struct pt_render *r, const struct pt_output_info *info, struct base_err *err)
 {
-    (void)info;
+    const struct pt_denoised *denoised = info ? info->denoised : NULL;
     const int *crop = r->config.crop;
     int width = crop[2] - crop[0], height = crop[3] - crop[1];
     uint8_t *pixels = malloc((size_t)width * (size_t)height * 3);
@@ -172,10 +211,11 @@ int pt_output_preview(const char *path, const struct pt_render *r, const struct 
     uint8_t *out = pixels;
     for (int y = crop[1]; y < crop[3]; y++) {
         for (int x = crop[0]; x < crop[2]; x++, out += 3) {
+            const size_t i = pt_film_index(&r->film, x, y);
             double rgb[3];
-            pt_film_mean(&r->film, pt_film_index(&r->film, x, y), block_at(r->blocks, x, y)->spp, rgb);
+            pt_film_mean(&r->film, i, block_at(r->blocks, x, y)->spp, rgb);
             for (int c = 0; c < 3; c++)
-                out[c] = base_srgb_code(rgb[c]);
+                out[c] = base_srgb_code(denoised ? (double)denoised->rgb[3 * i + (size_t)c] : rgb[c]);
         }
     }
     int rc = pic_write_png(path, width, height, 3, pixels, err);
@@ -220,6 +260,11 @@ int pt_output_report(const char *path, const struct pt_render *r, const struct p
         .film_pixels = r->film.pixels,
         .scene_bytes = info->scene_bytes >= 0 ? (double)info->scene_bytes : (double)NAN,
     };
+    if (info->denoised) {
+        report.flags |= LULL_REPORT_DENOISED;
+        report.noisy_weight = info->denoised->weight_mean;
+        report.noisy_error = info->noisy_error;
+    }
     if (r->config.job) {
         const struct job_traffic traffic = job_traffic(r->config.job);
         report.flags |= LULL_REPORT_MESSAGES;

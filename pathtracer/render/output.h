@@ -6,6 +6,7 @@
 #define PT_RENDER_OUTPUT_H
 
 #include "base/err.h"
+#include "render/denoised.h"
 #include "render/render.h"
 
 struct pt_output_info {
@@ -18,17 +19,20 @@ struct pt_output_info {
     int reproducible;    /* leave times out of the EXR, so that equal renders are equal files */
     int64_t scene_bytes; /* memory of the scene; < 0 = not known */
     int interrupted;
+    const struct pt_denoised *denoised; /* the picture; NULL: the noisy one */
+    const double *noisy_error; /* [blocks] of the noisy picture, beside `error` of the denoised one; NULL: not known */
 };
 
 /* What the functions below are. */
 typedef int pt_output_writer(const char *path, const struct pt_render *render, const struct pt_output_info *info,
                              struct base_err *err);
 
-/* RGB, lull.spp.V, lull.p_noisy.V, lull.error.V, lull.reason.V and the config's AOVs, cropped as it says. */
+/* RGB, lull.spp.V, lull.p_noisy.V, lull.error.V, lull.reason.V and the config's AOVs, cropped as it says; of a denoised
+ * picture noisy.RGB, denoised.RGB and lull.weight.V too, and lull.noisy_error.V where it is known. */
 pt_output_writer pt_output_exr;
 /* 0 when there is a file at `path` that is not such an EXR. */
 int pt_output_is_ours(const char *path);
-/* sRGB, 8 bits; needs no info. */
+/* sRGB, 8 bits; without info the noisy picture. */
 pt_output_writer pt_output_preview;
 /* PNG or CSV by the name's ending. */
 pt_output_writer pt_output_stop_map, pt_output_report;

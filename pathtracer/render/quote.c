@@ -75,8 +75,21 @@ static int add_rows(struct pt_quote *q, const struct lull_criterion *table, cons
     return rc || met ? rc : add_row(q, asked, "as asked", 1, err);
 }
 
+/* The two pictures, as asked: rows for other shares would denoise each block once more. */
+static int add_pictures(struct pt_quote *q, const struct lull_criterion *table, const struct lull_pair *pairs,
+                        uint32_t pair_count, struct base_err *err)
+{
+    const char *text = lull_host_parameter(table, "visible", pairs, pair_count, NULL);
+    double asked;
+    if (!text || !base_parse_real(text, 0, 1, &asked))
+        asked = (double)NAN;
+    int rc = add_row(q, asked, "denoised", 1, err);
+    return rc ? rc : add_row(q, asked, "noisy", 0, err);
+}
+
 int pt_quote_create(const struct pt_render *r, const struct lull_criterion *table, const struct lull_pair *pairs,
-                    uint32_t pair_count, struct base_log *log, struct pt_quote **out, struct base_err *err)
+                    uint32_t pair_count, const struct lull_criterion *noisy, struct base_log *log, struct pt_quote **out,
+                    struct base_err *err)
 {
     struct pt_quote *q = calloc(1, sizeof *q);
     if (!q)
@@ -84,9 +97,12 @@ int pt_quote_create(const struct pt_render *r, const struct lull_criterion *tabl
     q->block_count = r->blocks->count;
     q->threads = pt_render_threads(r);
     q->block_cost_s = calloc(q->block_count, sizeof *q->block_cost_s);
-    int rc = q->block_cost_s ? add_rows(q, table, pairs, pair_count, err) : base_fail_nomem(err, "quote");
+    int rc = !q->block_cost_s ? base_fail_nomem(err, "quote")
+             : noisy          ? add_pictures(q, table, pairs, pair_count, err)
+                              : add_rows(q, table, pairs, pair_count, err);
     for (int i = 0; i < q->row_count && table && !rc; i++)
-        rc = open_row(&q->rows[i], r, table, pairs, pair_count, log, err);
+        rc = noisy && i == 1 ? open_row(&q->rows[i], r, noisy, NULL, 0, log, err)
+                             : open_row(&q->rows[i], r, table, pairs, pair_count, log, err);
     if (rc) {
         pt_quote_destroy(q);
         return rc;

@@ -44,10 +44,15 @@ struct pt_quote {
 };
 
 /* Rows of visible 0.5, of the criterion's default (0.25 if it names none) and of 0.05, and of the given one if it is
- * another; one row "as asked" where the criterion has no such parameter or the render has no criterion (table NULL). The
- * render's threads are borrowed until destroy. */
+ * another; one row "as asked" where the criterion has no such parameter or the render has no criterion (table NULL).
+ *
+ * noisy: NULL, or the criterion that judges the noisy picture of a render that keeps the denoised one; then there are two
+ * rows, both as asked, "denoised" and "noisy".
+ *
+ * The render's threads are borrowed until destroy. */
 int pt_quote_create(const struct pt_render *render, const struct lull_criterion *table, const struct lull_pair *pairs,
-                    uint32_t pair_count, struct base_log *log, struct pt_quote **out, struct base_err *err);
+                    uint32_t pair_count, const struct lull_criterion *noisy, struct base_log *log, struct pt_quote **out,
+                    struct base_err *err);
 void pt_quote_destroy(struct pt_quote *quote);
 
 /* The hook `judged` of the pilot. A row whose criterion fails keeps what it knew. */

@@ -174,7 +174,7 @@ static void print_help(const struct base_options *options, const char *program, 
                                               : o->key ? o->key
                                                        : KEY_LONG + n,
                                        .arg = value_name(o, names[n], sizeof names[n]),
-                                       .flags = o->hidden ? OPTION_HIDDEN : 0};
+                                       .flags = (o->hidden ? OPTION_HIDDEN : 0) | (o->optional ? OPTION_ARG_OPTIONAL : 0)};
     }
     rows[n++] = (struct argp_option){.name = "help", .key = '?', .doc = "Print this and exit", .group = -1};
     rows[n++] = (struct argp_option){.name = "usage", .key = KEY_USAGE, .doc = "Print a short usage and exit", .group = -1};
@@ -218,7 +218,7 @@ static void to_getopt(const struct base_option *list, struct getopt_form *form)
     for (int i = 0; list[i].name || list[i].help; i++) {
         if (!list[i].name)
             continue;
-        int has_value = is_flag(&list[i]) ? no_argument : required_argument;
+        int has_value = is_flag(&list[i]) ? no_argument : list[i].optional ? optional_argument : required_argument;
         form->longs[n++] = (struct option){list[i].name, has_value, NULL, KEY_LONG + i};
         if (list[i].key) {
             *s++ = (char)list[i].key;

@@ -64,6 +64,7 @@ struct base_option {
      * before it. Out of memory is passed on as it is. */
     int (*set)(void *into, const char *value, struct base_err *err);
     int needed, hidden;    /* needed: text only; without it the command line is refused */
+    int optional;          /* with `set`: the value, said by --name=VALUE, may be left out, and is NULL then */
     enum base_path input;  /* the value is read, if it is there: no output may take its place or go into its folder */
     enum base_path output; /* the value is written: refused when it cannot be, is an input, or is written twice */
     const struct base_file_kind *kind; /* of a file: refused when one of another kind is there; NULL: any is replaced */

@@ -10,7 +10,7 @@ struct lull_decision lull_host_undecided(void)
         .action = LULL_CONTINUE, .p_noisy = (double)NAN, .predicted_spp = (double)NAN, .error = (double)NAN};
 }
 
-static struct lull_block state_of(const struct lull_host_block *b, uint32_t index, int has_half)
+struct lull_block lull_host_state_of(const struct lull_host_block *b, uint32_t index, int has_half)
 {
     return (struct lull_block){.id = index,
                                .flags = b->reason != LULL_REASON_NONE ? LULL_BLOCK_STOPPED : 0,
@@ -93,7 +93,7 @@ int32_t lull_host_evaluate(struct lull_host_criterion *c, const struct lull_host
     if (code != LULL_OK)
         return code;
     for (uint32_t i = 0; i < b->count; i++)
-        c->all[i] = state_of(&b->list[i], i, shown.planes[LULL_PLANE_HALF].data != NULL);
+        c->all[i] = lull_host_state_of(&b->list[i], i, shown.planes[LULL_PLANE_HALF].data != NULL);
     code = evaluate(c, &q, view, shown.planes, err);
     for (uint32_t k = 0; k < count && code != LULL_OK; k++)
         decisions[k] = lull_host_undecided();

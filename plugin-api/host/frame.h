@@ -86,6 +86,11 @@ int32_t lull_host_show(const struct lull_host_blocks *blocks, const struct lull_
                        struct lull_host_shown *out, struct lull_error *err);
 void lull_host_hide(struct lull_host_shown *shown);
 
+/* --- ask.c ---------------------------------------------------------------------------------------------------------- */
+
+/* A block as a criterion gets it, of the view's halves if it has some. */
+struct lull_block lull_host_state_of(const struct lull_host_block *block, uint32_t index, int has_half);
+
 /* --- stop_map.c ----------------------------------------------------------------------------------------------------- */
 
 /* The picture of lull_host_value_map; the caller frees out->rgb. */

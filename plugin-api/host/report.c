@@ -34,7 +34,7 @@ static void add_criterion(cJSON *root, const struct lull_host_criterion *judge, 
     }
 }
 
-static void add_blocks(cJSON *root, const struct lull_host_frame *f, int *failed)
+static void add_blocks(cJSON *root, const struct lull_host_frame *f, const double *noisy_error, int *failed)
 {
     cJSON *list = base_json_array(root, "blocks", failed);
     for (uint32_t i = 0; i < f->blocks.count; i++) {
@@ -49,6 +49,8 @@ static void add_blocks(cJSON *root, const struct lull_host_frame *f, int *failed
         base_json_text(o, "reason", lull_host_reason(b->reason), failed);
         base_json_number(o, "p_noisy", b->p_noisy, failed);
         base_json_number(o, "error", b->error, failed);
+        if (noisy_error)
+            base_json_number(o, "noisy_error", noisy_error[i], failed);
         base_json_number(o, "checks", b->checks, failed);
         base_json_number(o, "thread_s", b->thread_s, failed);
         base_json_number(o, "dial", f->criterion ? lull_host_dial(b->step) : (double)NAN, failed);
@@ -121,10 +123,12 @@ static cJSON *make(const struct lull_host_frame *f, const struct lull_host_repor
     cJSON *effects = base_json_array(root, "effects", failed);
     for (uint32_t i = 0; i < r->effect_count; i++)
         base_json_text(effects, NULL, r->effects[i], failed);
-    add_blocks(root, f, failed);
+    add_blocks(root, f, r->flags & LULL_REPORT_DENOISED ? r->noisy_error : NULL, failed);
     add_totals(root, &f->totals, !(r->flags & LULL_REPORT_NO_RAYS), failed);
     base_json_bool(root, "interrupted", (r->flags & LULL_REPORT_INTERRUPTED) != 0, failed);
     base_json_text(root, "kernel", r->kernel, failed);
+    if (r->flags & LULL_REPORT_DENOISED)
+        base_json_number(root, "noisy_weight", r->noisy_weight, failed);
     add_dropped(root, f, failed);
     add_memory(root, r, failed);
     return root;

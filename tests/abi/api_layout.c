@@ -116,7 +116,12 @@ LAYOUT(lull_host_report, F(lull_host_report, struct_size), F(lull_host_report, f
        F(lull_host_report, effect_count), F(lull_host_report, threads), F(lull_host_report, processes),
        F(lull_host_report, zero), F(lull_host_report, messages), F(lull_host_report, message_bytes),
        F(lull_host_report, message_wait_s), F(lull_host_report, film_bytes), F(lull_host_report, film_pixels),
-       F(lull_host_report, scene_bytes));
+       F(lull_host_report, scene_bytes), F(lull_host_report, noisy_weight), F(lull_host_report, noisy_error));
+LAYOUT(lull_host_denoising, F(lull_host_denoising, struct_size), F(lull_host_denoising, flags),
+       F(lull_host_denoising, threads), F(lull_host_denoising, zero), F(lull_host_denoising, library),
+       F(lull_host_denoising, context), F(lull_host_denoising, cancelled));
+LAYOUT(lull_host_picture, F(lull_host_picture, struct_size), F(lull_host_picture, zero), F(lull_host_picture, rgb),
+       F(lull_host_picture, denoised), F(lull_host_picture, weight));
 
 /* The criterion's, then the host library's. */
 static const struct layout layouts[] = {
@@ -126,7 +131,8 @@ static const struct layout layouts[] = {
     ENTRY(lull_writer),        ENTRY(lull_reader),      ENTRY(lull_state),        ENTRY(lull_host_services),
     ENTRY(lull_host_config),   ENTRY(lull_host_block),  ENTRY(lull_host_blocks),  ENTRY(lull_host_totals),
     ENTRY(lull_host_view),     ENTRY(lull_host_said),   ENTRY(lull_host_stop_at), ENTRY(lull_host_work),
-    ENTRY(lull_host_forecast), ENTRY(lull_host_sample), ENTRY(lull_host_report),
+    ENTRY(lull_host_forecast), ENTRY(lull_host_sample), ENTRY(lull_host_report),  ENTRY(lull_host_denoising),
+    ENTRY(lull_host_picture),
 };
 enum { LAYOUTS = sizeof layouts / sizeof *layouts, OF_THE_ABI = 15 };
 

@@ -72,7 +72,7 @@ static void start(struct run *run, const char *visible, uint64_t pilot_spp)
         assert_int_equal(pt_criterion_create(table, &run->pair, 1, run->pool, NULL, &run->criterion, &err), 0);
     assert_int_equal(pt_render_create(&config, NULL, pt_fake_noise, run->pool, run->criterion, &run->render, &err), 0);
     if (pilot_spp > 0)
-        assert_int_equal(pt_quote_create(run->render, table, &run->pair, visible != NULL, NULL, &run->quote, &err), 0);
+        assert_int_equal(pt_quote_create(run->render, table, &run->pair, visible != NULL, NULL, NULL, &run->quote, &err), 0);
 }
 
 static enum pt_render_outcome go(struct run *run)

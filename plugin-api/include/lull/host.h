@@ -329,6 +329,7 @@ LULL_EXPORT const struct lull_host_sample *lull_host_dropped(const struct lull_h
 #define LULL_REPORT_INTERRUPTED UINT32_C(1)
 #define LULL_REPORT_MESSAGES UINT32_C(2) /* messages, message_bytes, message_wait_s are known */
 #define LULL_REPORT_NO_RAYS UINT32_C(4)  /* rays are not counted */
+#define LULL_REPORT_DENOISED UINT32_C(8) /* the picture is denoised: noisy_weight and noisy_error */
 
 /* What the library cannot know. Text may be NULL: null in the report. */
 struct lull_host_report {
@@ -343,6 +344,11 @@ struct lull_host_report {
     double message_wait_s;
     uint64_t film_bytes, film_pixels;
     double scene_bytes; /* NaN: not known */
+
+    /* With LULL_REPORT_DENOISED: the share of the noisy picture in it, over all pixels, and the error of the noisy picture,
+     * [blocks], NULL: not known. */
+    double noisy_weight;
+    const double *noisy_error;
 };
 
 /* The report as JSON (lull-render(1) says what is in it): to a file, replaced as a whole or not at all, or to a writer. */
@@ -364,6 +370,40 @@ LULL_EXPORT int32_t lull_host_value_map(const struct lull_host_blocks *blocks, c
                                         const char *path, struct lull_error *err);
 /* Colour of t in [0, 1] (clamped), dark blue to yellow, perceptually uniform. */
 LULL_EXPORT void lull_host_viridis(double t, uint8_t rgb[3]);
+
+/* --- the denoised picture ------------------------------------------------------------------------------------------- */
+
+#define LULL_DENOISE_FULL \
+    UINT32_C(1) /* the denoised picture alone; else a blend of it with the noisy one, which needs HALF */
+
+struct lull_host_denoising {
+    uint32_t struct_size;
+    uint32_t flags;   /* LULL_DENOISE_ */
+    uint32_t threads; /* 0: all processors */
+    uint32_t zero;
+    const char *library; /* Open Image Denoise, or a folder that holds it; NULL: LULL_OIDN and the usual places */
+    void *context;       /* of cancelled */
+    int (*cancelled)(void *context); /* asked while it works; not 0: it ends with LULL_E_INVALID. May be NULL */
+};
+
+/* Pictures over the pixels of the view, row by row from the top, the caller's. */
+struct lull_host_picture {
+    uint32_t struct_size;
+    uint32_t zero;
+    float *rgb;      /* [height][width][3]: what is kept */
+    float *denoised; /* [height][width][3]; may be NULL */
+    float *weight;   /* [height][width], in [0, 1]: share of the noisy picture in rgb; may be NULL */
+};
+
+/* Denoises the picture of a frame at any moment, by Open Image Denoise in a process of its own; with the planes ALBEDO and
+ * NORMAL, if the view has them. The blend weighs the two pictures at each pixel by their errors, which it estimates from the
+ * halves; where there are none it is the denoised picture. Pixels without samples are black. LULL_E_INVALID: no library, one
+ * that fails, or a view that lacks a plane; out is undefined then. Takes 170 bytes a pixel, the denoiser some 600 more. */
+LULL_EXPORT int32_t lull_host_denoise(const struct lull_host_frame *frame, const struct lull_host_view *view,
+                                      const struct lull_host_denoising *how, const struct lull_host_picture *out,
+                                      struct lull_error *err);
+/* Whether there is a library; the error says how to get one. */
+LULL_EXPORT int32_t lull_host_denoiser(const char *library, struct lull_error *err);
 
 /* --- state ---------------------------------------------------------------------------------------------------------- */
 
