@@ -34,14 +34,8 @@ void ggn_agreement_print_json(FILE *f, const struct ggn_agreement *a);
 /* DIR/scatter.png, errors.png, heatmaps.png and blocks.csv. The names are the labels of the two sides. */
 int ggn_compare_pictures(const char *dir, const struct ggn_pairing *p, const char *truth_name, const char *model_name,
                          struct base_err *err);
-/* The scatter and histogram alone, for any paired values. */
-int ggn_plot_scatter(const char *path, const double *truth, const double *model, size_t n, const char *truth_name,
-                     const char *model_name, struct base_err *err);
-int ggn_plot_errors(const char *path, const double *truth, const double *model, size_t n, const char *title,
-                    struct base_err *err);
-
-/* One small picture per view: the true map left, the model's right, one colour scale for all. At most 100 views. */
-int ggn_plot_heatmaps(const char *path, const struct ggn_pairing *p, const char *truth_name, const char *model_name,
-                      struct base_err *err);
+/* The last alone: the true map left, the model's right. */
+int ggn_compare_heatmaps(const char *path, const struct ggn_pairing *p, const char *truth_name, const char *model_name,
+                         struct base_err *err);
 
 #endif

@@ -8,7 +8,7 @@
 #include <unistd.h>
 
 #include "eval/viewer.h"
-#include "figures/plot.h"
+#include "figures/charts.h"
 #include "model/policy.h"
 #include "nn/ssim.h"
 #include "picture/colour_map.h"
@@ -32,22 +32,13 @@ static int add_strip(struct strips *s, const char *path, const uint8_t *rgb, int
 /* Draws the strips if rc says so; removes their files. */
 static int finish_strips(struct strips *s, const char *path, int width, int height_each, int rc, struct base_err *err)
 {
-    struct ggn_plot plot;
-    if (!rc && s->n > 0)
-        rc = ggn_plot_begin(&plot, path, width, height_each * s->n + 20, err);
-    if (!rc && s->n > 0) {
-        fprintf(plot.script,
-                "unset tics\nunset border\nset size ratio -1\nset yrange [] reverse\nset multiplot layout %d,1\n", s->n);
-        for (int i = 0; i < s->n; i++) {
-            fputs("set title ", plot.script);
-            ggn_plot_quote(plot.script, s->title[i]);
-            fputs("\nplot ", plot.script);
-            ggn_plot_quote(plot.script, s->file[i]);
-            fputs(" binary filetype=png with rgbimage notitle\n", plot.script);
-        }
-        fputs("unset multiplot\n", plot.script);
-        rc = ggn_plot_end(&plot, 1, err);
+    const char *files[STRIPS], *titles[STRIPS];
+    for (int i = 0; i < s->n; i++) {
+        files[i] = s->file[i];
+        titles[i] = s->title[i];
     }
+    if (!rc && s->n > 0)
+        rc = ggn_plot_strips(path, files, titles, s->n, width, height_each, err);
     for (int i = 0; i < s->n; i++)
         unlink(s->file[i]);
     return rc;

@@ -10,7 +10,7 @@
 #include "base/files.h"
 #include "base/json.h"
 #include "eval/compare.h"
-#include "figures/plot.h"
+#include "figures/charts.h"
 
 /* key, column head, format, value */
 #define COLUMNS(X) \
@@ -188,13 +188,18 @@ static int by_score_falling(const void *a, const void *b)
     return (x < y) - (x > y);
 }
 
-static int write_roc(FILE *f, const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split,
-                     struct base_err *err)
+/* Fills a series with points of the ROC curve; the caller frees its x. */
+static int roc_of(struct ggn_series *out, const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split,
+                  struct base_err *err)
 {
     struct point *p = malloc((s->n > 0 ? s->n : 1) * sizeof *p);
+    double *x = calloc(2 * (s->n + 1), sizeof *x), *y = x + s->n + 1; /* from (0, 0) */
     size_t n = 0, positive = 0, hit = 0, step;
-    if (!p)
+    *out = (struct ggn_series){.title = m->name, .n = 1, .x = x, .y = y, .at = (double)NAN};
+    if (!p || !x) {
+        free(p);
         return base_fail_nomem(err, m->name);
+    }
     for (int b = 0; b < s->n_blocks; b++)
         for (size_t i = s->blocks[b].first; i < s->blocks[b].end; i++)
             if (s->blocks[b].split == split && s->noisy[i] >= 0 && !isnan(m->score[i])) {
@@ -203,12 +208,12 @@ static int write_roc(FILE *f, const struct ggn_method *m, const struct ggn_eval_
             }
     qsort(p, n, sizeof *p, by_score_falling);
     step = n / 500 + 1;
-    fputs("0 0\n", f);
     for (size_t i = 0; i < n; i++) {
         hit += p[i].noisy == 1;
-        if (i + 1 == n || (p[i + 1].score != p[i].score && i % step == 0))
-            fprintf(f, "%.5f %.5f\n", n > positive ? (double)(i + 1 - hit) / (double)(n - positive) : 0.0,
-                    positive > 0 ? (double)hit / (double)positive : 0.0);
+        if (i + 1 == n || (p[i + 1].score != p[i].score && i % step == 0)) {
+            x[out->n] = n > positive ? (double)(i + 1 - hit) / (double)(n - positive) : 0.0;
+            y[out->n++] = positive > 0 ? (double)hit / (double)positive : 0.0;
+        }
     }
     free(p);
     return 0;
@@ -217,35 +222,28 @@ static int write_roc(FILE *f, const struct ggn_method *m, const struct ggn_eval_
 static int plot_roc(const char *path, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *methods,
                     int n, struct base_err *err)
 {
-    struct ggn_plot plot;
-    int rc = ggn_plot_begin(&plot, path, 720, 680, err), first = 1;
-    if (rc)
-        return rc;
-    for (int i = 0; i < n && !rc; i++) {
-        if (!methods[i].score)
-            continue;
-        fprintf(plot.script, "$m%d << EOD\n", i);
-        rc = write_roc(plot.script, &methods[i], s, split, err);
-        fputs("EOD\n", plot.script);
-    }
-    fprintf(plot.script,
-            "set size square\nset xrange [0:1]\nset yrange [0:1]\nset grid\nset key bottom right\n"
-            "set title 'all windows of the %s scenes pooled'\n"
-            "set xlabel 'share of converged images called noisy'\n"
-            "set ylabel 'share of noisy images called noisy'\nplot ",
-            ggn_split_names[split]);
-    for (int i = 0; i < n; i++)
-        if (methods[i].score) {
-            fprintf(plot.script, "%s$m%d with lines lw 2 title ", first ? "" : ", ", i);
-            ggn_plot_quote(plot.script, methods[i].name);
-            first = 0;
-        }
-    fputs(", x dt 2 lc '#999999' notitle\n", plot.script);
-    if (rc) {
-        ggn_plot_end(&plot, 0, NULL);
-        return rc;
-    }
-    return ggn_plot_end(&plot, !first, err);
+    struct ggn_series *curves = calloc((size_t)n, sizeof *curves);
+    char title[80];
+    int count = 0, rc = curves ? 0 : base_fail_nomem(err, path);
+    for (int i = 0; i < n && !rc; i++)
+        if (methods[i].score)
+            rc = roc_of(&curves[count++], &methods[i], s, split, err);
+    snprintf(title, sizeof title, "all windows of the %s scenes pooled", ggn_split_names[split]);
+    const struct ggn_chart chart = {.title = title,
+                                    .x_label = "share of converged images called noisy",
+                                    .y_label = "share of noisy images called noisy",
+                                    .to = {1, 1},
+                                    .square = 1,
+                                    .diagonal = 1,
+                                    .key = GGN_KEY_BOTTOM,
+                                    .series = curves,
+                                    .n = count};
+    if (!rc)
+        rc = ggn_plot_charts(path, 720, 680, &chart, 1, err);
+    for (int i = 0; i < count; i++)
+        free((void *)curves[i].x);
+    free(curves);
+    return rc;
 }
 
 /* Score against spp for six blocks spread over the split by threshold; dashed: the threshold. No picture of a method that
@@ -254,39 +252,44 @@ static int plot_scores(const char *path, const struct ggn_eval_set *s, enum ggn_
                        struct base_err *err)
 {
     enum { SHOWN = 6 };
-    struct ggn_plot plot;
-    int chosen[SHOWN], n = 0, total = ggn_eval_count(s, split), seen = 0, judged = 0;
     static const char *const colours[SHOWN] = {"#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#17becf"};
-    for (int b = 0; b < s->n_blocks && n < SHOWN; b++)
-        if (s->blocks[b].split == split && seen++ * SHOWN >= n * total)
-            chosen[n++] = b;
-    int rc = ggn_plot_begin(&plot, path, 900, 560, err);
-    if (rc)
-        return rc;
-    FILE *f = plot.script;
-    for (int k = 0; k < n; k++) {
-        const struct ggn_eval_block *b = &s->blocks[chosen[k]];
-        fprintf(f, "$b%d << EOD\n", k);
-        for (size_t i = b->first; i < b->end; i++)
-            if (!isnan(m->score[i]))
-                judged |= fprintf(f, "%.0f %.6g\n", s->spp[i], m->score[i]) > 0;
-        fprintf(f, "EOD\nset arrow from %.6g, graph 0 to %.6g, graph 1 nohead dt 2 lc '%s'\n", b->label.threshold,
-                b->label.threshold, colours[k]);
+    struct ggn_series series[SHOWN];
+    char titles[SHOWN][200];
+    double *x = malloc(2 * (s->n > 0 ? s->n : 1) * sizeof *x);
+    int n = 0, total = ggn_eval_count(s, split), seen = 0;
+    size_t at = 0;
+    if (!x)
+        return base_fail_nomem(err, path);
+    for (int b = 0; b < s->n_blocks && n < SHOWN; b++) {
+        const struct ggn_eval_block *block = &s->blocks[b];
+        const struct ggn_dataset_view *v = &s->chains.data.views[block->view];
+        if (block->split != split || seen++ * SHOWN < n * total)
+            continue;
+        snprintf(titles[n], sizeof titles[n], "%.120s %u", v->name, v->manifest.blocks[block->index].id);
+        series[n] = (struct ggn_series){titles[n], colours[n], 0, x + at, x + s->n + at, block->label.threshold};
+        for (size_t i = block->first; i < block->end; i++)
+            if (!isnan(m->score[i])) {
+                x[at] = s->spp[i];
+                x[s->n + at++] = m->score[i];
+                series[n].n++;
+            }
+        n++;
     }
-    fputs("set logscale x\nset grid\nset key outside right\nset xlabel 'samples per pixel (dashed: threshold)'\nset ylabel ",
-          f);
-    ggn_plot_quote(f, m->name);
-    fputs("\nplot ", f);
-    for (int k = 0; k < n; k++) {
-        const struct ggn_eval_block *b = &s->blocks[chosen[k]];
-        const struct ggn_dataset_view *v = &s->chains.data.views[b->view];
-        char title[200];
-        snprintf(title, sizeof title, "%.120s %u", v->name, v->manifest.blocks[b->index].id);
-        fprintf(f, "%s$b%d with linespoints pt 7 ps 0.5 lw 2 lc '%s' title ", k > 0 ? ", " : "", k, colours[k]);
-        ggn_plot_quote(f, title);
-    }
-    fprintf(f, ", %.9g dt 3 lc '#444444' title 'cut'\n", isnan(m->cut) ? 0.0 : m->cut);
-    return ggn_plot_end(&plot, judged, err);
+    const double open = (double)NAN;
+    const struct ggn_chart chart = {.x_label = "samples per pixel (dashed: threshold)",
+                                    .y_label = m->name,
+                                    .from = {open, open},
+                                    .to = {open, open},
+                                    .log_x = 1,
+                                    .key = GGN_KEY_OUTSIDE,
+                                    .point_size = 0.5,
+                                    .series = series,
+                                    .n = n,
+                                    .level = isnan(m->cut) ? 0.0 : m->cut,
+                                    .level_title = "cut"};
+    int rc = ggn_plot_charts(path, 900, 560, &chart, 1, err);
+    free(x);
+    return rc;
 }
 
 static void fill_view(struct ggn_view *v, const struct ggn_eval_set *s, int view, const double *stop)
@@ -370,7 +373,7 @@ static int method_pictures(const char *dir, const struct ggn_eval_set *s, enum g
     if (!rc && (rc = picture_path(path, dir, split, "errors", m, ".png", err)) == 0)
         rc = ggn_plot_errors(path, pairing.truth, pairing.model, pairing.n, m->name, err);
     if (!rc && (rc = picture_path(path, dir, split, "heatmaps", m, ".png", err)) == 0)
-        rc = ggn_plot_heatmaps(path, &pairing, "thresholds", m->name, err);
+        rc = ggn_compare_heatmaps(path, &pairing, "thresholds", m->name, err);
     if (!rc && m->score && (rc = picture_path(path, dir, split, "score", m, ".png", err)) == 0)
         rc = plot_scores(path, s, split, m, err);
     if (!rc && (rc = picture_path(path, dir, split, "stops", m, ".csv", err)) == 0)

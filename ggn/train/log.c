@@ -2,11 +2,12 @@
 
 #include <errno.h>
 #include <math.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/files.h"
-#include "figures/plot.h"
+#include "figures/charts.h"
 
 const char *const ggn_log_phases[] = {"denoiser", "judge"};
 
@@ -59,18 +60,6 @@ int ggn_log_write_csv(const struct ggn_log *log, const char *path, struct base_e
     return base_file_commit(&out, err);
 }
 
-static void data_block(FILE *f, const struct ggn_log *log, int phase)
-{
-    fprintf(f, "$phase%d << END\n", phase);
-    for (int i = 0; i < log->n; i++) {
-        const struct ggn_log_row *r = &log->rows[i];
-        if (r->phase == phase)
-            fprintf(f, "%g %g %g %g %g %g\n", r->step, r->loss, r->validation_loss, r->accuracy, r->validation_accuracy,
-                    r->validation_auc);
-    }
-    fputs("END\n", f);
-}
-
 static int has_phase(const struct ggn_log *log, int phase)
 {
     for (int i = 0; i < log->n; i++)
@@ -79,33 +68,47 @@ static int has_phase(const struct ggn_log *log, int phase)
     return 0;
 }
 
+/* What is drawn: of the rows of a phase a column over the step, into one of three charts. */
+static const struct {
+    int chart, phase;
+    size_t at;
+    const char *title, *colour;
+} curves[] = {{0, 0, offsetof(struct ggn_log_row, loss), "training", "#3366aa"},
+              {0, 0, offsetof(struct ggn_log_row, validation_loss), "validation", "#cc5522"},
+              {1, 1, offsetof(struct ggn_log_row, loss), "training", "#3366aa"},
+              {1, 1, offsetof(struct ggn_log_row, validation_loss), "validation, calibrated", "#cc5522"},
+              {2, 1, offsetof(struct ggn_log_row, accuracy), "training accuracy", "#3366aa"},
+              {2, 1, offsetof(struct ggn_log_row, validation_accuracy), "validation accuracy", "#cc5522"},
+              {2, 1, offsetof(struct ggn_log_row, validation_auc), "validation AUC", "#228833"}};
+enum { CHARTS = 3, CURVES = sizeof curves / sizeof curves[0] };
+
 int ggn_log_draw(const struct ggn_log *log, const char *path, struct base_err *err)
 {
-    struct ggn_plot plot;
-    int denoiser = has_phase(log, 0), judge = has_phase(log, 1);
-    int rc = ggn_plot_begin(&plot, path, 480 * (denoiser + 2 * judge), 400, err);
-
-    if (rc)
-        return rc;
-    FILE *f = plot.script;
-    data_block(f, log, 0);
-    data_block(f, log, 1);
-    fprintf(f, "set multiplot layout 1,%d\nset grid\nset xrange [0:*]\nset xlabel 'step'\n", denoiser + 2 * judge);
-    if (denoiser)
-        fputs("set title 'Denoiser: 1 - SSIM'\nplot $phase0 using 1:2 with linespoints lw 2 pt 7 ps 0.4 lc '#3366aa' title "
-              "'training', "
-              "$phase0 using 1:3 with linespoints lw 2 pt 7 ps 0.4 lc '#cc5522' title 'validation'\n",
-              f);
-    if (judge)
-        fputs("set title 'Generator and discriminator: cross-entropy'\nplot $phase1 using 1:2 with linespoints lw 2 pt 7 ps "
-              "0.4 lc '#3366aa' title "
-              "'training', $phase1 using 1:3 with linespoints lw 2 pt 7 ps 0.4 lc '#cc5522' title 'validation, calibrated'\n"
-              "set title 'Accuracy and AUC'\nset yrange [0.5:1]\nset key bottom right\n"
-              "plot $phase1 using 1:4 with linespoints lw 2 pt 7 ps 0.4 lc '#3366aa' title 'training accuracy', $phase1 "
-              "using 1:5 with linespoints lw 2 pt 7 ps 0.4 "
-              "lc '#cc5522' title 'validation accuracy', $phase1 using 1:6 with linespoints lw 2 pt 7 ps 0.4 lc '#228833' "
-              "title 'validation AUC'\n",
-              f);
-    fputs("unset multiplot\n", f);
-    return ggn_plot_end(&plot, 1, err);
+    const double open = (double)NAN;
+    struct ggn_chart charts[CHARTS] = {
+        {.title = "Denoiser: 1 - SSIM", .from = {0, open}, .to = {open, open}},
+        {.title = "Generator and discriminator: cross-entropy", .from = {0, open}, .to = {open, open}},
+        {.title = "Accuracy and AUC", .from = {0, 0.5}, .to = {open, 1}, .key = GGN_KEY_BOTTOM}};
+    struct ggn_series series[CURVES];
+    const size_t rows = (size_t)log->n;
+    double *values = malloc((rows > 0 ? 2 * CURVES * rows : 1) * sizeof *values);
+    if (!values)
+        return base_fail_nomem(err, path);
+    for (size_t c = 0; c < CURVES; c++) {
+        struct ggn_chart *chart = &charts[curves[c].chart];
+        double *x = values + 2 * c * rows, *y = x + rows;
+        series[c] = (struct ggn_series){curves[c].title, curves[c].colour, 0, x, y, open};
+        for (size_t i = 0; i < rows; i++)
+            if (log->rows[i].phase == curves[c].phase) {
+                x[series[c].n] = log->rows[i].step;
+                y[series[c].n++] = *(const double *)(const void *)((const char *)&log->rows[i] + curves[c].at);
+            }
+        chart->series = chart->n++ ? chart->series : &series[c];
+        chart->x_label = "step";
+        chart->point_size = 0.4;
+    }
+    const int denoiser = has_phase(log, 0), n = denoiser + 2 * has_phase(log, 1);
+    int rc = ggn_plot_charts(path, 480 * n, 400, charts + !denoiser, n, err);
+    free(values);
+    return rc;
 }
