@@ -124,7 +124,7 @@ REPLAY   := $(patsubst tests/fuzz/%.c,$(OUT)/fuzz/replay-%,$(FUZZ_SRC))
 FUZZERS  := $(patsubst tests/fuzz/%.c,build/fuzz/%,$(FUZZ_SRC))
 
 .DEFAULT_GOAL := all
-.PHONY: all demo test bench cost asan tsan fuzz mutants host-model hdr-check abi-check install man compdb clean help setup tests replay train-demo test-study test-hosts test-clang
+.PHONY: all demo test bench cost asan tsan fuzz mutants host-model hdr-check abi-check install man compdb clean help setup tests test-tools replay train-demo test-study test-hosts test-clang
 .SECONDARY:
 
 all: $(PROGRAMS) $(CRITERIA) $(MODULES) $(HOST_LIB) $(EXAMPLES) ## build the programs and the criteria
@@ -235,6 +235,9 @@ $(TESTS) $(SANE): | $(OIDN_STUB)
 ABI_PLUGINS := $(patsubst tests/%.c,$(OUT)/tests/%.so,$(wildcard tests/abi/plugins/*.c))
 $(OUT)/tests/abi/plugins/%.so: $(OBJ)/tests/abi/plugins/%.c.o
 	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared $< $(LDFLAGS_ALL) -lm -o $@
+# What scripts compare recorded texts with.
+$(OUT)/tests/approve: $(call o,tests/cli/approve.c tests/support/approve.c tests/support/foreign.c)
+	$(link) $^ $(LDFLAGS_ALL) -lcmocka -lm -o $@
 $(OUT)/tests/processors/embree_isa.so: $(OBJ)/tests/processors/embree_isa.c.o
 	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared $< $(LDFLAGS_ALL) -ldl -o $@
 $(patsubst tests/%.c,$(OUT)/tests/%,$(wildcard tests/abi/api_*.c)): | $(ABI_PLUGINS) $(CRITERIA) $(HOST_LIB)
@@ -255,7 +258,8 @@ $(OUT)/bench/ggn_%: $(OBJ)/tests/bench/ggn_%.c.o $(GGN_OBJ) $(SUPPORT_ggn)
 setup: ## install the Debian packages that are missing
 	@scripts/setup
 
-tests: $(TESTS) $(ABI_PLUGINS) $(OIDN_STUB) $(OUT)/tests/processors/embree_isa.so
+tests: $(TESTS) test-tools
+test-tools: $(ABI_PLUGINS) $(OIDN_STUB) $(OUT)/tests/approve $(OUT)/tests/processors/embree_isa.so # what test scripts need
 replay: $(REPLAY)
 
 # `test` builds in sub-makes so that packages installed by setup are seen by pkg-config.

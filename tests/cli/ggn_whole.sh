@@ -1,5 +1,5 @@
 #!/bin/sh
-# All that the commands of ggn print and write for small recorded inputs, compared whole with tests/golden/whole/ggn.txt (whole.py says how).
+# All that the commands of ggn print and write for small recorded inputs, compared with tests/golden/whole/ggn*.txt (whole.py says how).
 # gnuplot is one that hands its script back as the picture, and keeps the parts of a picture. What is called *.near depends on networks.
 . "$(dirname "$0")/ggn_setup"
 recorded=tests/data/recorded model=tests/data/tiny.ggn
@@ -210,5 +210,5 @@ run inspect-tensors inspect --tensors tests/fuzz/corpus/ggn_model/f16.ggn
 run inspect-json inspect --json tests/data/no-picture.ggn
 for type in f32 bf16 f16; do "$ggn" convert -t $type $model "$got/convert-$type" 2>"$tmp/err"; done
 
-python3 tests/cli/whole.py ggn "$got" $((n + 1)) "$tmp=TMP" '\.tmp-lull\d+-\d+\.=.tmp.' '"bytes":\t\d+=BYTES' '"crc32":\t"[0-9a-f]+"=CRC' "$PWD=TREE" || bad=1
+python3 tests/cli/whole.py ggn "$got" $((n + 1)) "$tmp=TMP" '\.tmp-lull\d+-\d+\.=.tmp.' 'workspace [0-9.]+ MB=workspace N MB' '"bytes":\t\d+=BYTES' '"crc32":\t"[0-9a-f]+"=CRC' "$PWD=TREE" || bad=1
 exit $bad

@@ -1,6 +1,6 @@
 """`lull-study` over raw HTTP: what is refused changes nothing and is logged; what is stored comes back. Speaks TAP.
 
-Every command, request and answer, what is stored, the exports and the reports are kept as they come and compared whole at the end
+Every command, request and answer, what is stored, the exports and the reports are kept as they come and compared at the end
 (tests/golden/whole/study.txt; whole.py says how to record anew). gnuplot is one that hands its script back as the picture."""
 
 import atexit
@@ -52,6 +52,12 @@ def keep(section, text):
     kept[section] = kept.get(section, "") + text
 
 
+def pixels_told(data):
+    """Size and checksum of a picture's pixels."""
+    shown = whole.pixels(data)
+    return "%s, checksum %08x" % (shown.split("\n")[0], zlib.crc32(shown.encode()))
+
+
 def keep_files(section, folder):
     """The files of a folder: text as it is, pictures by a checksum of their pixels."""
     for path, folders, names in os.walk(folder):
@@ -61,8 +67,7 @@ def keep_files(section, folder):
                 data = f.read()
             name = os.path.relpath(os.path.join(path, name), folder)
             if data[:4] == b"\x89PNG":
-                shown = whole.pixels(data)
-                keep(section, "%s: %s, checksum %08x\n" % (name, shown.split("\n")[0], zlib.crc32(shown.encode())))
+                keep(section, "%s: %s\n" % (name, pixels_told(data)))
             elif name == "texts.json":
                 with open(os.path.join(whole.ROOT, "ggn", "study", "page", "texts.en.json"), "rb") as f:
                     keep(section, name + (": those of the page\n" if f.read() == data else ": other texts\n"))
@@ -181,14 +186,16 @@ class Server:
         line = "%s %s %s%s" % (method, address, headers or "", "" if body is None else " " + shown.decode("latin-1"))
         if len(line) > 400:
             line = line[:60] + "... %d in all" % len(line)
-        keep("served", "%s\n%d %s, %s\n" % (line, r.status, kind, cache))
+        usual = (kind, cache) == ("application/json", "no-store")
+        line += " -> %d" % r.status + ("" if usual else " %s, %s" % (kind, cache))
+        if kind == "application/json" and address != "texts.json":
+            line += " " + raw.decode()
+        elif kind == "image/png":
+            line += " " + pixels_told(raw)
+        keep("served", line + "\n")
         if told != Server.headers:
             keep("served", "".join("%s: %s\n" % item for item in sorted(told.items())))
         Server.headers = told
-        if kind == "application/json" and address != "texts.json":
-            keep("served", raw.decode() + "\n")
-        elif kind == "image/png":
-            keep("served", whole.pixels(raw))
 
     def json(self, method, address, body=None, **more):
         status, raw, _ = self.request(method, address, body, **more)

@@ -1,35 +1,29 @@
-"""Whole outputs against recorded ones, word by word and number by number. Speaks TAP.
+"""Whole outputs against recorded ones. Speaks TAP.
 
 usage: whole.py NAME FOLDER FIRST [REGEX=WORD ...]
 
-Every file below FOLDER is a section of tests/golden/whole/NAME.txt: one that differs, is missing or is new is a failure. FIRST is the
-number of the first line of TAP. What a REGEX matches is recorded, and compared, as WORD: folders, times, names drawn at random.
+Every file below FOLDER is a section of a record tests/golden/whole/NAME*.txt, compared as support/approve.h says: one that differs, is
+missing or is new is a failure. FIRST is the number of the first line of TAP. What a REGEX matches is recorded, and compared, as WORD:
+folders, times, names drawn at random. Long JSON is recorded as tables, a PNG as mean codes.
 
-The record is made by the product, and was read by somebody before it was committed. To make it anew: RECORD=1 with the test's command,
-then read `git diff`.
+Which record a section is in follows from what it is: NAME-pictures has the mean codes, NAME-marks what somebody who has read the other
+records need not read, a mark for each; NAME-near and NAME-marks-near have what comes from networks in single precision, whose
+sums each instruction set makes in another order (.near in its name).
 """
 
-import errno
+import collections
+import json
 import os
 import re
 import struct
+import subprocess
 import sys
 import zlib
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 PICTURE = re.compile(r"\d+ x \d+, \d channels\n")
-NUMBER = re.compile(r"([-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)")
-# Another processor or mathematical library rounds the last bits of a sum otherwise.
-NEAR = 2e-6
-# Sections whose name has .near come from networks in single precision, whose sums each instruction set makes in another order.
-NEAR_FLOAT = 2e-4
-# A code of a picture may lie between two.
-NEAR_CODE = 1.0
-# What the C library says, where outputs were recorded, and what SQLite does.
-FOREIGN = [(os.strerror(code), text) for code, text in (
-    (errno.ENOENT, "No such file or directory"), (errno.EACCES, "Permission denied"), (errno.ENOTDIR, "Not a directory"),
-    (errno.EISDIR, "Is a directory"), (errno.EEXIST, "File exists"), (errno.ENOSPC, "No space left on device"))]
-FOREIGN.append(("file is encrypted or is not a database", "file is not a database"))
+APPROVE = os.path.join(ROOT, os.environ.get("BUILD", "build"), "tests", "approve")
+LONG = 40  # lines of JSON that are read as they are
 
 
 def pixels(data):
@@ -65,70 +59,67 @@ def pixels(data):
     return text
 
 
-def is_near(a, b, kind):
-    if a == b:
-        return True
-    if kind == "png":
-        return abs(float(a) - float(b)) <= NEAR_CODE
-    if not re.search("[.eE]", a + b):
-        return False
-    x, y = float(a), float(b)
-    if abs(x - y) <= (NEAR_FLOAT if kind == "near" else NEAR) * max(abs(x), abs(y)):
-        return True
-    decimals = min(len(v.partition(".")[2]) for v in (a, b))  # the last one of a rounded number
-    return decimals >= 3 and not re.search("[eE]", a + b) and abs(x - y) <= 1.01 * 10**-decimals
+def is_simple(value):
+    return not isinstance(value, dict) and not (isinstance(value, list) and any(isinstance(v, (dict, list)) for v in value))
 
 
-def same_line(a, b, kind):
-    x, y = NUMBER.split(a), NUMBER.split(b)
-    return len(x) == len(y) and all(u == v if i % 2 == 0 else is_near(u, v, kind) for i, (u, v) in enumerate(zip(x, y)))
+def shown(value):
+    if isinstance(value, list):
+        return "[" + " ".join(map(shown, value)) + "]"
+    return "%.8g" % value if isinstance(value, float) else value if isinstance(value, str) else json.dumps(value)
 
 
-def difference(wanted, got, kind):
-    """None, or the first lines that differ."""
-    a, b = wanted.split("\n"), got.split("\n")
-    lines = [i for i in range(max(len(a), len(b))) if i >= len(a) or i >= len(b) or not same_line(a[i], b[i], kind)]
-    if not lines:
-        return None
-    show = lambda text, i: text[i] if i < len(text) else "(nothing)"
-    return "\n".join("line %d: wanted %s\n%*sgot %s" % (i + 1, show(a, i), 10 + len(str(i + 1)), "", show(b, i)) for i in lines[:4])
+def table(name, value, known):
+    """Lines of a JSON value: a row for what an object has of simple values, below the names of its columns when they are new."""
+    if is_simple(value):
+        return ["%s %s" % (name, shown(value))]
+    items = value.items() if isinstance(value, dict) else [(str(i), v) for i, v in enumerate(value)]
+    simple = [(k, v) for k, v in items if is_simple(v)] if isinstance(value, dict) else []
+    lines, columns = [], tuple(k for k, _ in simple)
+    if simple and columns not in known:
+        known.add(columns)
+        lines.append("%-14s %s" % ("--", " ".join("%-11s" % k for k in columns)))
+    if simple:
+        lines.append("%-14s %s" % (name, " ".join("%-*s" % (max(len(k), 11), shown(v)) for k, v in simple)))
+    for k, v in items:
+        if not simple or not is_simple(v):
+            lines += table(k if simple or name == "" else name + " " + k, v, known)
+    return [line.rstrip() for line in lines]
 
 
-def record_of(name):
-    return os.path.join(ROOT, "tests", "golden", "whole", name + ".txt")
-
-
-def read_record(name):
+def laid_out(text):
+    """A long JSON as tables; what else there is as it is."""
+    if not text.startswith("{") or text.count("\n") < LONG:
+        return text
     try:
-        with open(record_of(name), encoding="utf-8") as f:
-            parts = re.split(r"^==> (.*) <==\n", f.read(), flags=re.M)
-    except FileNotFoundError:
-        return {}
-    return {key: text[:-1] for key, text in zip(parts[1::2], parts[2::2])}
+        value, end = json.JSONDecoder().raw_decode(text)
+    except ValueError:  # a mask is in it
+        return text
+    return "\n".join(table("", value, set())) + text[end:]
 
 
-def as_recorded(text):
-    for here, recorded in FOREIGN:
-        text = text.replace(here, recorded)
-    return text
+READ = re.compile(r".*(json|csv)|compared/|evaluated/people-(roc|.*-observer)[.]png")  # of what is drawn
+
+
+def record_of(name, section, text):
+    if PICTURE.match(text):
+        return name + "-pictures"
+    is_marked = re.match("(compared|evaluated).*/", section) and not READ.match(section)
+    return name + ("-marks" if is_marked else "") + ("-near" if ".near" in section else "")
 
 
 def compare(name, sections, first):
     """Prints TAP from the number `first`; sections: name -> text. Returns (the next number, whether all is well)."""
-    if os.environ.get("RECORD"):
-        with open(record_of(name), "w", encoding="utf-8") as f:
-            f.write("".join("==> %s <==\n%s\n" % item for item in sorted(sections.items())))
-    wanted, good = read_record(name), True
-    for key in sorted(wanted.keys() | sections.keys()):
-        if key not in sections or key not in wanted:
-            told = "not there" if key not in sections else "nothing is recorded under this name"
-        else:
-            told = difference(wanted[key], as_recorded(sections[key]), "png" if PICTURE.match(wanted[key]) else "near" if ".near" in key else "")
-        good &= told is None
-        print("%s %d - whole: %s" % ("ok" if told is None else "not ok", first, key))
-        if told is not None:
-            print("# " + told[:3000].replace("\n", "\n# "))
-        first += 1
+    records, good = collections.defaultdict(str), True
+    for key, text in sorted(sections.items()):
+        lines = laid_out(text).split("\n")
+        records[record_of(name, key, text)] += "> %s\n%s" % (key, "".join("  %s\n" % line for line in lines[: -1 if lines[-1] == "" else None]))
+    for record, text in sorted(records.items()):
+        path = os.path.join("tests", "golden", "whole", record + ".txt")
+        ran = subprocess.run([APPROVE, path, str(first)], input=text, stdout=subprocess.PIPE, text=True, cwd=ROOT)
+        print(ran.stdout, end="")
+        good &= ran.returncode == 0
+        first += len(re.findall("^(?:not )?ok ", ran.stdout, re.M))
     return first, good
 
 

@@ -64,6 +64,9 @@ static struct number number_of(const char *p)
     return n;
 }
 
+/* Blanks behind a number fill its column. */
+static const char *behind(struct number n) { return n.end + strspn(n.end, " "); }
+
 static int is_near(struct number a, struct number b, const struct tolerance *t)
 {
     const double apart = fabs(a.value - b.value);
@@ -102,7 +105,7 @@ static void write_mark(FILE *out, const char *lines, const char *end, int count,
         squares += off * off;
         turned = fmax(turned, weight * n.unit / (SMALL + size));
         numbers++;
-        p = n.end;
+        p = behind(n);
     }
     fprintf(out, "  [%d lines: words %08x, %d numbers %.6f ± %.6f]\n", count, words, numbers, sum,
             ROUNDED + 3 * sqrt(squares) + 2 * turned);
@@ -126,8 +129,8 @@ static int same_line(const char *a, const char *b, const struct tolerance *t)
             const struct number x = number_of(p), y = number_of(q);
             if (!is_near(x, y, t))
                 return 0;
-            p = x.end;
-            q = y.end;
+            p = behind(x);
+            q = behind(y);
         } else if (*p++ != *q++) {
             return 0;
         }
