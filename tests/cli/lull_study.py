@@ -775,11 +775,13 @@ check(lull_study().returncode == 2 and lull_study("taste", study).returncode == 
 VERBS = ("init", "serve", "status", "report", "export", "import", "delete")
 for verb in ((), *((v,) for v in VERBS)):
     check(lull_study(*verb, "--help").returncode == 0, " ".join((*verb, "--help")))
-manual = open(os.path.join(whole.ROOT, "docs", "man", "lull-study.1")).read().replace("\\", "")
+pages = os.path.join(whole.ROOT, "docs", "man")
+manual = "".join(open(os.path.join(pages, name)).read() for name in os.listdir(pages) if re.fullmatch("lull-study.*[.]1", name))
+manual = re.sub(r"\\f[BIR]|\\", "", manual)
 for verb in VERBS:
     said = subprocess.run([PROGRAM, verb, "--help"], capture_output=True, text=True).stdout
     options = set(re.findall("--[a-z][a-z-]*", said)) - {"--help", "--usage", "--version"}
-    check(options <= set(re.findall("--[a-z][a-z-]*", manual)) and ".B lull-study " + verb in manual, f"{verb}: in the manual page", options)
+    check(options <= set(re.findall("--[a-z][a-z-]*", manual)) and ".B lull-study " + verb in manual, f"{verb}: in the manual pages", options)
 for option in "trials repeats catch show gap break-every spacing spp-min spp-max block seed task method".split():
     fails(f"--{option}=x", f"--{option} x: expected", "init", f"--{option}=x")
 
