@@ -34,6 +34,7 @@ import json, sys
 lines = [l for l in open(sys.argv[1], encoding="utf-8") if l.startswith("| observer |")]
 r = json.load(open(sys.argv[2]))
 assert r["people"]["rows"]["observer"] == r["visible"]["rows"]["observer, `--visible 0.35`"]
+assert r["people"]["measured"]["visible"] == 0.35 and r["people"]["measured"]["level"] == 0.25, "said of whom the figures are"
 rows = [t["rows"] for name, t in r.items() if name != "visible"]
 assert len(lines) == len(rows) == 4, lines
 for line, row in zip(lines, (r["observer"] for r in rows)):
