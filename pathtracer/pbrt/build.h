@@ -143,9 +143,19 @@ struct pt_input pt_input_product(struct pt_builder *b, struct pt_input x, struct
 /* build_material.c, build_material_v3.c: id, or -1. */
 int32_t pt_build_material(struct pt_builder *b, const struct pt_state *s, const char *kind, struct pt_params *p);
 int32_t pt_build_default_material(struct pt_builder *b);
-/* v3 kinds; 0 when `kind` is none of them. */
-int pt_build_material_v3(struct pt_builder *b, const struct pt_state *s, const char *kind, struct pt_params *p,
-                         struct pt_material *m, struct pt_material_info *info);
+/* A material while its parameters are read. */
+struct pt_making {
+    struct pt_builder *b;
+    const struct pt_state *s;
+    struct pt_params *p;
+    const char *kind;
+    struct pt_material *m;
+    struct pt_material_info *info;
+};
+/* v3 kinds; 0 when making->kind is none of them. */
+int pt_build_material_v3(struct pt_making *making);
+/* A reflectance that may be textured; the fallback, grey, when absent. */
+struct pt_input pt_build_reflectance(struct pt_making *making, const char *name, float fallback);
 void pt_build_roughness(struct pt_builder *b, struct pt_params *p, double fallback, int v3_rule, struct pt_material *m);
 /* Number of the displacement texture, 0 = none. */
 int32_t pt_build_bump(struct pt_builder *b, struct pt_params *p, const char *name);

@@ -67,32 +67,24 @@ int32_t pt_build_material_named(struct pt_builder *b, struct pt_loc loc, const c
 
 /* --- kinds ------------------------------------------------------------------------------------------------------------ */
 
-struct context {
-    struct pt_builder *b;
-    const struct pt_state *s;
-    struct pt_params *p;
-    const char *kind;
-    struct pt_material *m;
-};
-
-static struct pt_input colour(struct context *c, const char *name, float fallback)
+struct pt_input pt_build_reflectance(struct pt_making *c, const char *name, float fallback)
 {
     return pt_build_colour_input(c->b, c->s, c->p, name, PT_USE_REFLECTANCE, v3_splat(fallback));
 }
 
-static void read_metal(struct context *c, const char *prefix)
+static void read_metal(struct pt_making *c, const char *prefix)
 {
     char eta[32], k[32];
     snprintf(eta, sizeof eta, "%seta", prefix);
     snprintf(k, sizeof k, "%sk", prefix);
     c->m->conductor_by_colour = pt_params_find(c->p, "reflectance") != NULL;
     if (c->m->conductor_by_colour)
-        c->m->reflectance = colour(c, "reflectance", 0.5f);
+        c->m->reflectance = pt_build_reflectance(c, "reflectance", 0.5f);
     else
         pt_build_conductor(c->b, c->s, c->p, eta, k, &c->m->eta_rgb.value, &c->m->k_rgb.value);
 }
 
-static void scale_colours(struct context *c, const struct pt_bsdf_read *reads, double scale)
+static void scale_colours(struct pt_making *c, const struct pt_bsdf_read *reads, double scale)
 {
     for (const struct pt_bsdf_read *r = reads; r->kind != PT_READ_END; r++) {
         struct pt_input *in = (struct pt_input *)((char *)c->m + r->field);
@@ -101,12 +93,12 @@ static void scale_colours(struct context *c, const struct pt_bsdf_read *reads, d
     }
 }
 
-static void read_model(struct context *c, const struct pt_bsdf_model *model)
+static void read_model(struct pt_making *c, const struct pt_bsdf_model *model)
 {
     for (const struct pt_bsdf_read *r = model->reads; r->kind != PT_READ_END; r++) {
         struct pt_input *in = (struct pt_input *)((char *)c->m + r->field);
         switch (r->kind) {
-        case PT_READ_COLOUR: *in = colour(c, r->name, (float)r->fallback); break;
+        case PT_READ_COLOUR: *in = pt_build_reflectance(c, r->name, (float)r->fallback); break;
         case PT_READ_NUMBER: *in = pt_build_float_input(c->b, c->p, r->name, r->fallback); break;
         case PT_READ_ROUGHNESS:
             read_roughness(c->b, c->p, r->name, r->fallback, &c->m->roughness_u, &c->m->roughness_v);
@@ -132,7 +124,7 @@ static void read_model(struct context *c, const struct pt_bsdf_model *model)
         c->m->kind = PT_MATERIAL_INTERFACE;
 }
 
-static void make_mix(struct context *c)
+static void make_mix(struct pt_making *c)
 {
     struct pt_param *list = pt_params_find(c->p, "materials");
     if (!list || list->type != PT_PARAM_STRING || list->count != 2) {
@@ -145,29 +137,29 @@ static void make_mix(struct context *c)
     c->m->mix_amount = pt_build_float_input(c->b, c->p, "amount", 0.5);
 }
 
-static void make_interface(struct context *c) { (void)c; }
+static void make_interface(struct pt_making *c) { (void)c; }
 
 /* Not simulated: a coated diffuse surface of about its colour. */
-static void make_subsurface(struct context *c)
+static void make_subsurface(struct pt_making *c)
 {
     pt_diag_warn(&c->b->diag, c->p->loc, "material \"%s\" is replaced by a coated diffuse one", c->kind);
-    c->m->reflectance = colour(c, "reflectance", 0.6f);
+    c->m->reflectance = pt_build_reflectance(c, "reflectance", 0.6f);
     pt_build_roughness(c->b, c->p, 0, 0, c->m);
     c->m->eta = (float)pt_build_index(c->b, c->p, "eta", 1.33);
     pt_params_ignore(c->p, "mfp sigma_a sigma_s scale g name filename");
     c->m->thickness = pt_input_constant(0.01, 0.01, 0.01);
 }
 
-static void make_hair(struct context *c)
+static void make_hair(struct pt_making *c)
 {
     pt_diag_warn(&c->b->diag, c->p->loc, "material \"hair\" is replaced by a diffuse one");
-    c->m->reflectance = colour(c, "color", 0.2f);
+    c->m->reflectance = pt_build_reflectance(c, "color", 0.2f);
     if (pt_params_find(c->p, "reflectance"))
-        c->m->reflectance = colour(c, "reflectance", 0.2f);
+        c->m->reflectance = pt_build_reflectance(c, "reflectance", 0.2f);
     pt_params_ignore(c->p, "sigma_a eumelanin pheomelanin eta beta_m beta_n alpha");
 }
 
-static void make_measured(struct context *c)
+static void make_measured(struct pt_making *c)
 {
     pt_diag_warn(&c->b->diag, c->p->loc, "material \"measured\" is replaced by a coated diffuse one");
     c->m->reflectance = pt_input_constant(0.5, 0.5, 0.5);
@@ -176,12 +168,12 @@ static void make_measured(struct context *c)
     pt_params_ignore(c->p, "filename");
 }
 
-static int build_v4(struct context *c)
+static int build_v4(struct pt_making *c)
 {
     static const struct {
         const char *name;
         int32_t kind;
-        void (*make)(struct context *c);
+        void (*make)(struct pt_making *c);
     } others[] = {
         {"mix", PT_MATERIAL_MIX, make_mix},
         {"interface", PT_MATERIAL_INTERFACE, make_interface},
@@ -219,9 +211,9 @@ int32_t pt_build_material(struct pt_builder *b, const struct pt_state *s, const 
 {
     struct pt_material m = {.kind = PT_BSDF_DIFFUSE, .eta = 1.5f};
     struct pt_material_info info = {.loc = p->loc, .opacity = pt_input_constant(1, 1, 1)};
-    struct context c = {b, s, p, kind, &m};
+    struct pt_making c = {b, s, p, kind, &m, &info};
     pt_params_ignore(p, "type");
-    if (!build_v4(&c) && !pt_build_material_v3(b, s, kind, p, &m, &info)) {
+    if (!build_v4(&c) && !pt_build_material_v3(&c)) {
         pt_diag_fail(&b->diag, p->loc,
                      "unknown material \"%s\" (expected diffuse, coateddiffuse, conductor, dielectric, "
                      "mix …)",

@@ -4,63 +4,49 @@
 
 #include "pbrt/build.h"
 
-struct context {
-    struct pt_builder *b;
-    const struct pt_state *s;
-    struct pt_params *p;
-    const char *kind;
-    struct pt_material *m;
-    struct pt_material_info *info;
-};
-
-static struct pt_input colour(struct context *c, const char *name, float fallback)
-{
-    return pt_build_colour_input(c->b, c->s, c->p, name, PT_USE_REFLECTANCE, v3_splat(fallback));
-}
-
 static int is_black(struct pt_input in) { return !in.texture && v3_is_black(in.value); }
 
-static void clear_coat(struct context *c)
+static void clear_coat(struct pt_making *c)
 {
     c->m->kind = PT_BSDF_COATED_DIFFUSE;
     c->m->thickness = pt_input_constant(0.01, 0.01, 0.01);
 }
 
-static double index_of(struct context *c, double fallback)
+static double index_of(struct pt_making *c, double fallback)
 {
     return pt_build_index(c->b, c->p, pt_params_find(c->p, "index") ? "index" : "eta", fallback);
 }
 
-static void make_matte(struct context *c)
+static void make_matte(struct pt_making *c)
 {
-    c->m->reflectance = colour(c, "Kd", 0.5f);
+    c->m->reflectance = pt_build_reflectance(c, "Kd", 0.5f);
     struct pt_input sigma = pt_build_float_input(c->b, c->p, "sigma", 0);
     if (sigma.texture || sigma.value.x != 0)
         pt_diag_warn(&c->b->diag, c->p->loc, "sigma of a matte material is ignored: plain diffuse");
 }
 
 /* Ks of these v3 models is the strength of the coat; the coat here is glass of index 1.5 (as pbrt-v4's own upgrade does). */
-static void make_plastic(struct context *c)
+static void make_plastic(struct pt_making *c)
 {
     int substrate = strcmp(c->kind, "substrate") == 0;
-    c->m->reflectance = colour(c, "Kd", substrate ? 0.5f : 0.25f);
-    struct pt_input ks = colour(c, "Ks", substrate ? 0.5f : 0.25f);
+    c->m->reflectance = pt_build_reflectance(c, "Kd", substrate ? 0.5f : 0.25f);
+    struct pt_input ks = pt_build_reflectance(c, "Ks", substrate ? 0.5f : 0.25f);
     pt_build_roughness(c->b, c->p, 0.1, 1, c->m);
     if (is_black(ks))
         return;
     clear_coat(c);
 }
 
-static void make_uber(struct context *c)
+static void make_uber(struct pt_making *c)
 {
-    struct pt_input kd = colour(c, "Kd", 0.25f), ks = colour(c, "Ks", 0.25f), kr = colour(c, "Kr", 0),
-                    kt = colour(c, "Kt", 0);
+    struct pt_input kd = pt_build_reflectance(c, "Kd", 0.25f), ks = pt_build_reflectance(c, "Ks", 0.25f),
+                    kr = pt_build_reflectance(c, "Kr", 0), kt = pt_build_reflectance(c, "Kt", 0);
     double eta = index_of(c, 1.5);
     pt_build_roughness(c->b, c->p, 0.1, 1, c->m);
     c->m->eta = (float)eta;
     struct pt_param *opacity = pt_params_find(c->p, "opacity");
     if (opacity) {
-        struct pt_input o = colour(c, "opacity", 1);
+        struct pt_input o = pt_build_reflectance(c, "opacity", 1);
         c->info->has_opacity = o.texture || v3_luminance(o.value) < 1;
         c->info->opacity = o.texture ? o
                                      : pt_input_constant((double)v3_luminance(o.value), (double)v3_luminance(o.value),
@@ -83,33 +69,33 @@ static void make_uber(struct context *c)
     }
 }
 
-static void make_metal(struct context *c)
+static void make_metal(struct pt_making *c)
 {
     c->m->kind = PT_BSDF_CONDUCTOR;
     pt_build_roughness(c->b, c->p, 0.01, 1, c->m);
     pt_build_conductor(c->b, c->s, c->p, "eta", "k", &c->m->eta_rgb.value, &c->m->k_rgb.value);
 }
 
-static void make_mirror(struct context *c)
+static void make_mirror(struct pt_making *c)
 {
     c->m->kind = PT_BSDF_CONDUCTOR;
     c->m->conductor_by_colour = 1;
-    c->m->reflectance = colour(c, "Kr", 0.9f);
+    c->m->reflectance = pt_build_reflectance(c, "Kr", 0.9f);
     pt_params_ignore(c->p, "remaproughness roughness");
 }
 
-static void make_shiny_metal(struct context *c)
+static void make_shiny_metal(struct pt_making *c)
 {
     c->m->kind = PT_BSDF_CONDUCTOR;
     c->m->conductor_by_colour = 1;
-    c->m->reflectance = colour(c, "Kr", 1);
+    c->m->reflectance = pt_build_reflectance(c, "Kr", 1);
     pt_params_ignore(c->p, "Ks");
     pt_build_roughness(c->b, c->p, 0.1, 1, c->m);
 }
 
-static void make_glass(struct context *c)
+static void make_glass(struct pt_making *c)
 {
-    struct pt_input kr = colour(c, "Kr", 1), kt = colour(c, "Kt", 1);
+    struct pt_input kr = pt_build_reflectance(c, "Kr", 1), kt = pt_build_reflectance(c, "Kt", 1);
     c->m->kind = PT_BSDF_DIELECTRIC;
     pt_build_roughness(c->b, c->p, 0, 1, c->m);
     c->m->eta = (float)index_of(c, 1.5);
@@ -117,19 +103,19 @@ static void make_glass(struct context *c)
         pt_diag_warn(&c->b->diag, c->p->loc, "Kr and Kt of glass are taken as 1");
 }
 
-static void make_translucent(struct context *c)
+static void make_translucent(struct pt_making *c)
 {
-    struct pt_input kd = colour(c, "Kd", 0.25f), ks = colour(c, "Ks", 0.25f);
+    struct pt_input kd = pt_build_reflectance(c, "Kd", 0.25f), ks = pt_build_reflectance(c, "Ks", 0.25f);
     c->m->kind = PT_BSDF_DIFFUSE_TRANSMISSION;
-    c->m->reflectance = pt_input_product(c->b, kd, colour(c, "reflect", 0.5f));
-    c->m->transmittance = pt_input_product(c->b, kd, colour(c, "transmit", 0.5f));
+    c->m->reflectance = pt_input_product(c->b, kd, pt_build_reflectance(c, "reflect", 0.5f));
+    c->m->transmittance = pt_input_product(c->b, kd, pt_build_reflectance(c, "transmit", 0.5f));
     pt_build_roughness(c->b, c->p, 0.1, 1, c->m);
     if (!is_black(ks))
         pt_diag_warn(&c->b->diag, c->p->loc, "Ks of a translucent material is ignored");
 }
 
 /* v3 gives the share of the first material, v4 that of the second. */
-static void make_mix(struct context *c)
+static void make_mix(struct pt_making *c)
 {
     struct pt_param *first = pt_params_find(c->p, "namedmaterial1"), *second = pt_params_find(c->p, "namedmaterial2");
     c->m->kind = PT_MATERIAL_MIX;
@@ -144,22 +130,22 @@ static void make_mix(struct context *c)
         c->m->mix_amount = pt_build_float_input(c->b, c->p, "amount", 0.5);
         return;
     }
-    c->m->mix_amount = colour(c, "amount", 0.5f);
+    c->m->mix_amount = pt_build_reflectance(c, "amount", 0.5f);
     float grey = v3_luminance(c->m->mix_amount.value);
     c->m->mix_amount.value = v3_splat(grey);
 }
 
-static void make_kd_subsurface(struct context *c)
+static void make_kd_subsurface(struct pt_making *c)
 {
     pt_diag_warn(&c->b->diag, c->p->loc, "material \"%s\" is replaced by a diffuse one", c->kind);
-    c->m->reflectance = colour(c, "Kd", 0.5f);
+    c->m->reflectance = pt_build_reflectance(c, "Kd", 0.5f);
     pt_params_ignore(c->p, "Kr Kt mfp eta scale uroughness vroughness roughness remaproughness g sigma_a sigma_s name");
 }
 
-static void make_disney(struct context *c)
+static void make_disney(struct pt_making *c)
 {
     pt_diag_warn(&c->b->diag, c->p->loc, "material \"%s\" is replaced by a coated diffuse one", c->kind);
-    c->m->reflectance = colour(c, "color", 0.5f);
+    c->m->reflectance = pt_build_reflectance(c, "color", 0.5f);
     pt_build_roughness(c->b, c->p, 0.5, 0, c->m);
     c->m->eta = (float)pt_build_index(c->b, c->p, "eta", 1.5);
     pt_params_ignore(c->p, "metallic speculartint anisotropic sheen sheentint clearcoat clearcoatgloss spectrans "
@@ -167,7 +153,7 @@ static void make_disney(struct context *c)
     clear_coat(c);
 }
 
-static void make_fourier(struct context *c)
+static void make_fourier(struct pt_making *c)
 {
     pt_diag_warn(&c->b->diag, c->p->loc, "material \"%s\" (a measured table) is replaced by a coated diffuse one", c->kind);
     c->m->reflectance = pt_input_constant(0.5, 0.5, 0.5);
@@ -176,12 +162,11 @@ static void make_fourier(struct context *c)
     clear_coat(c);
 }
 
-int pt_build_material_v3(struct pt_builder *b, const struct pt_state *s, const char *kind, struct pt_params *p,
-                         struct pt_material *m, struct pt_material_info *info)
+int pt_build_material_v3(struct pt_making *c)
 {
     static const struct {
         const char *name;
-        void (*make)(struct context *c);
+        void (*make)(struct pt_making *c);
     } kinds[] = {{"matte", make_matte},
                  {"plastic", make_plastic},
                  {"substrate", make_plastic},
@@ -195,11 +180,10 @@ int pt_build_material_v3(struct pt_builder *b, const struct pt_state *s, const c
                  {"kdsubsurface", make_kd_subsurface},
                  {"disney", make_disney},
                  {"fourier", make_fourier}};
-    struct context c = {b, s, p, kind, m, info};
     for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
-        if (strcmp(kinds[i].name, kind) == 0) {
-            kinds[i].make(&c);
-            m->bump = pt_build_bump(b, p, "bumpmap");
+        if (strcmp(kinds[i].name, c->kind) == 0) {
+            kinds[i].make(c);
+            c->m->bump = pt_build_bump(c->b, c->p, "bumpmap");
             return 1;
         }
     return 0;

@@ -46,6 +46,18 @@ static int add_quad(struct grower *g, size_t a, size_t b, size_t c, size_t d)
     return 1;
 }
 
+/* Quads between nx by ny vertices from `first` on. */
+static int add_grid(struct grower *g, size_t first, size_t nx, size_t ny)
+{
+    for (size_t y = 0; y + 1 < ny; y++)
+        for (size_t x = 0; x + 1 < nx; x++) {
+            size_t a = first + y * nx + x;
+            if (!add_quad(g, a, a + 1, a + nx, a + nx + 1))
+                return 0;
+        }
+    return 1;
+}
+
 static int finish(struct grower *g, int ok, struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
 {
     struct pt_soup soup = {.vertex_count = g->vertices,
@@ -129,11 +141,7 @@ int pt_build_bilinear(struct pt_builder *b, const struct pt_state *s, struct pt_
                 ok = add_vertex(&g, q, N ? m : NULL, lerp2(t[0], t[1], t[2], t[3], u, v, 0),
                                 lerp2(t[0], t[1], t[2], t[3], u, v, 1));
             }
-        for (size_t y = 0; y < cuts && ok; y++)
-            for (size_t x = 0; x < cuts && ok; x++) {
-                size_t a = first + y * (cuts + 1) + x;
-                ok = add_quad(&g, a, a + 1, a + cuts + 1, a + cuts + 2);
-            }
+        ok = ok && add_grid(&g, first, cuts + 1, cuts + 1);
     }
     if (pt_params_find(p, "emissionfilename"))
         pt_diag_warn(&b->diag, pt_params_find(p, "emissionfilename")->loc, "the image of an emitting patch is ignored");
@@ -238,17 +246,6 @@ int pt_build_curve(struct pt_builder *b, const struct pt_state *s, struct pt_par
 }
 
 /* --- height fields and surfaces of revolution (v3) -------------------------------------------------------------------- */
-
-static int add_grid(struct grower *g, size_t first, size_t nx, size_t ny)
-{
-    for (size_t y = 0; y + 1 < ny; y++)
-        for (size_t x = 0; x + 1 < nx; x++) {
-            size_t a = first + y * nx + x;
-            if (!add_quad(g, a, a + 1, a + nx, a + nx + 1))
-                return 0;
-        }
-    return 1;
-}
 
 int pt_build_height_field(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
 {

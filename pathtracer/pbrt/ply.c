@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "pbrt/number.h"
+#include "pbrt/params.h"
 
 enum ply_type { T_NONE, T_I8, T_U8, T_I16, T_U16, T_I32, T_U32, T_F32, T_F64 };
 static const uint8_t type_bytes[] = {0, 1, 1, 2, 2, 4, 4, 4, 8};
@@ -260,14 +261,8 @@ static int add_triangle(struct reader *r, uint32_t a, uint32_t b, uint32_t c)
     struct pt_ply *p = r->ply;
     if (p->triangle_count == UINT32_MAX / 3)
         return base_fail(r->err, BASE_EINVAL, "%s: too many triangles", r->name);
-    if (p->triangle_count == r->index_room) {
-        size_t room = r->index_room > 0 ? r->index_room * 2 : 64;
-        uint32_t *grown = realloc(p->indices, room * 3 * sizeof *grown);
-        if (!grown)
-            return base_fail_nomem(r->err, r->name);
-        p->indices = grown;
-        r->index_room = room;
-    }
+    if (!pt_grow((void **)&p->indices, &r->index_room, p->triangle_count, 3 * sizeof *p->indices))
+        return base_fail_nomem(r->err, r->name);
     uint32_t *t = p->indices + 3 * (size_t)p->triangle_count++;
     t[0] = a;
     t[1] = b;
