@@ -18,7 +18,14 @@ within() { stats "$1" "$2" | tee "$dir/log2" | awk -v l="$3" -v h="$4" 'NF == 3 
 mean() { stats "$1" "$2" | tee "$dir/log2" | awk -v l="$3" -v h="$4" 'NF == 3 {ok = $3 >= l && $3 <= h} END {exit !ok}'; }
 
 args="--criterion halfbuf -p threshold=0.05 --size 240x240 --block 40 --spp-min 16 --spp-max 150 --seed 3 -q"
-t "the demo runs" env DEMO_DIR="$dir" DEMO_SCENE=scenes/environment.pbrt DEMO_ARGS="$args" scripts/demo
+t "the demo runs" env DEMO_DENOISE=0 DEMO_DIR="$dir" DEMO_SCENE=scenes/environment.pbrt DEMO_ARGS="$args" scripts/demo
+denoised() {
+    DEMO_DENOISE=1 LULL_OIDN="${BUILD:-build}/tests/oidn-stub" DEMO_DIR="$dir/denoised" DEMO_SCENE=scenes/environment.pbrt \
+        DEMO_ARGS="--size 64x48 --block 32 --spp-max 64 -q" scripts/demo >"$dir/said"
+}
+t "and with a denoiser" denoised
+t "  …it leaves both pictures side by side" sh -c "oiiotool --info $dir/denoised/two.png | tr -d ' ' | grep -q '136x48'"
+t "  …with a time for each" grep -q "noisy after [0-9.]* s, denoised after [0-9.]* s" "$dir/said"
 for f in demo.exr demo.png stop-map.png stop-map.csv report.json; do t "it leaves $f" test -s "$dir/$f"; done
 t "nothing temporary is left" test -z "$(ls "$dir" | grep tmp)"
 t "the image has 240x240 pixels and all layers" sh -c "oiiotool --info -v $dir/demo.exr | tr -d ' ' | grep -q '240x240,14channel'"
