@@ -82,7 +82,7 @@ uint32_t lull_host_reopen(struct lull_host_blocks *b, double max_seam)
         if (need <= block->spp)
             continue;
         block->reason = LULL_REASON_NONE;
-        block->next_spp = need;
+        block->next_spp = lull_host_next_check(b, block->spp, need);
         reopened++;
     }
     return reopened;

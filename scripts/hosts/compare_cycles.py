@@ -63,8 +63,8 @@ def replay(folder, data, reference, criterion, dial, value):
         for r in rects:
             yield waves[first // wave, r.y0:r.y1, r.x0:r.x1]
     with lull.load(criterion, threads=1, **{dial: value}) as c:
-        frame = lull.Frame(c, width, height, block=block, spp_max=wave * len(waves))
-        driver = lull.Driver(frame, render, wave=wave)
+        frame = lull.Frame(c, width, height, block=block, spp_max=wave * len(waves), wave=wave)
+        driver = lull.Driver(frame, render)
         start = time.process_time()
         while driver.step() is None:
             pass

@@ -17,7 +17,6 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "plugin-api" / "python"))
 from lull import Rect, exr  # noqa: E402
 from lull.blender.cycles import Cycles  # noqa: E402
-from lull.blocks import grid  # noqa: E402
 from lull.files import replaced  # noqa: E402
 
 THRESHOLDS = (0.1, 0.05, 0.01)
@@ -58,7 +57,9 @@ def record(scene, out, width, height, block, spp, seed):
     render = scene.render
     render.engine, render.threads_mode, render.threads, scene.cycles.seed = "CYCLES", "FIXED", 1, seed
     render.resolution_x, render.resolution_y, render.resolution_percentage = width, height, 100
-    rects, count = [b.rect for b in grid(width, height, block, block)], spp // WAVE
+    rects = [Rect(x, y, min(x + block, width), min(y + block, height)) for y in range(0, height, block)
+             for x in range(0, width, block)]
+    count = spp // WAVE
     found = {"block": block, "wave": WAVE, "thresholds": THRESHOLDS, "wave-s": np.zeros((count, len(rects))),
              "waves": np.zeros((count, height, width, 3), np.float32)}
     turns = np.array_split(range(count), len(THRESHOLDS))

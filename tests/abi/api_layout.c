@@ -122,6 +122,7 @@ LAYOUT(lull_host_denoising, F(lull_host_denoising, struct_size), F(lull_host_den
        F(lull_host_denoising, context), F(lull_host_denoising, cancelled));
 LAYOUT(lull_host_picture, F(lull_host_picture, struct_size), F(lull_host_picture, zero), F(lull_host_picture, rgb),
        F(lull_host_picture, denoised), F(lull_host_picture, weight));
+LAYOUT(lull_host_output, F(lull_host_output, option), F(lull_host_output, path));
 
 /* The criterion's, then the host library's. */
 static const struct layout layouts[] = {
@@ -132,7 +133,7 @@ static const struct layout layouts[] = {
     ENTRY(lull_host_config),   ENTRY(lull_host_block),  ENTRY(lull_host_blocks),  ENTRY(lull_host_totals),
     ENTRY(lull_host_view),     ENTRY(lull_host_said),   ENTRY(lull_host_stop_at), ENTRY(lull_host_work),
     ENTRY(lull_host_forecast), ENTRY(lull_host_sample), ENTRY(lull_host_report),  ENTRY(lull_host_denoising),
-    ENTRY(lull_host_picture),
+    ENTRY(lull_host_picture),  ENTRY(lull_host_output),
 };
 enum { LAYOUTS = sizeof layouts / sizeof *layouts, OF_THE_ABI = 15 };
 
@@ -198,10 +199,10 @@ static void structs_have_no_padding(void **state)
 static void growing_structs_begin_with_their_size(void **state)
 {
     (void)state;
-    static const char *const elements[] = {"lull_param",      "lull_pair",         "lull_rect",       "lull_plane",
-                                           "lull_block",      "lull_decision",     "lull_host_block", "lull_host_totals",
-                                           "lull_host_said",  "lull_host_stop_at", "lull_host_work",  "lull_host_forecast",
-                                           "lull_host_sample"};
+    static const char *const elements[] = {"lull_param",       "lull_pair",         "lull_rect",       "lull_plane",
+                                           "lull_block",       "lull_decision",     "lull_host_block", "lull_host_totals",
+                                           "lull_host_said",   "lull_host_stop_at", "lull_host_work",  "lull_host_forecast",
+                                           "lull_host_sample", "lull_host_output"};
     for (int i = 0; i < LAYOUTS; i++) {
         int is_element = 0;
         for (size_t k = 0; k < sizeof elements / sizeof *elements; k++)

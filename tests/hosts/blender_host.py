@@ -13,7 +13,7 @@ sys.path[:0] = [str(ROOT / "plugin-api" / "python"), str(ROOT / "tests" / "hosts
 
 import bpy  # noqa: E402
 
-from lull import Rect  # noqa: E402
+from lull import Rect, exr  # noqa: E402
 from lull.blender import cli  # noqa: E402
 from lull.blender.cycles import Cycles  # noqa: E402
 
@@ -88,6 +88,12 @@ class NothingRendered:
 def saved(scene, name):
     bpy.ops.wm.save_as_mainfile(filepath=tmp(name))
     return tmp(name)
+
+
+def layers(path):
+    """The channels of an EXR of ours, [h, w] float32."""
+    subprocess.run(["oiiotool", path, "--compression", "none", "-o", tmp("layers.exr")], check=True)
+    return exr.read_layers(tmp("layers.exr"))[0]
 
 
 def start(*arguments, **environment):

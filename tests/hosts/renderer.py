@@ -53,9 +53,9 @@ class Playback(lull.Driver):
     """Shows the frame what the path tracer records of the same scene: one sequence per block and level asked for."""
 
     def __init__(self, frame, program, scene, options):
-        super().__init__(frame, None, wave=1 << 30, whole_waves=False)
+        super().__init__(frame, None)
         self.command = [program, scene, "-q", "--size", f"{frame.width}x{frame.height}", "--block",
-                        f"{frame.block_width}x{frame.block_height}", "--seed", str(frame.seed), *options]
+                        f"{frame.layout.block_width}x{frame.layout.block_height}", "--seed", str(frame.seed), *options]
 
     def render_blocks(self, blocks, first, count):
         spp = first + count

@@ -9,14 +9,14 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from blender_host import ROOT, SAME, TMP, NothingRendered, cube, one_render, tmp, whole_picture  # noqa: E402
+from blender_host import ROOT, SAME, TMP, NothingRendered, cube, layers, one_render, tmp, whole_picture  # noqa: E402
 import bpy  # noqa: E402
 import numpy as np  # noqa: E402
 import lull  # noqa: E402
 import tap  # noqa: E402
 from lull import Rect, exr  # noqa: E402
 from lull.blender import ui, view  # noqa: E402
-from lull.blender.cycles import Cycles, HostError  # noqa: E402
+from lull.blender.cycles import Cycles, HostError, merge  # noqa: E402
 from lull.blender.session import Session, Settings  # noqa: E402
 from tap import Skip, raises  # noqa: E402
 
@@ -73,7 +73,7 @@ def test_passes():
             session.begin(resume=True)
             session.write(session.run())
     assert any("Cryptomatte" in note for note in session.notes)
-    found, _, _ = exr.read_layers(tmp("passes.exr"))
+    found = layers(tmp("passes.exr"))
     layer = scene.view_layers[0]
     layer.use_pass_diffuse_color = True
     with Cycles(scene, 48) as host:
@@ -166,6 +166,20 @@ def test_borders():
                 y0, y1 = sorted(rng.choice(height + 1, 2, False).tolist())
                 part = next(iter(host.render([Rect(x0, y0, x1, y1)], 0, 1, False)))["color"]
                 assert (part == whole[y0:y1, x0:x1]).all(), (width, height, x0, y0, x1, y1)
+
+
+def test_merge():
+    """merged rectangles hold the same pixels"""
+    grid = [Rect(x, y, min(x + 16, 70), min(y + 16, 50)) for y in range(0, 50, 16) for x in range(0, 70, 16)]
+    rng = np.random.default_rng(4)
+    for _ in range(50):
+        chosen = [r for r in grid if rng.random() < .6]
+        before, after = np.zeros((50, 70), int), np.zeros((50, 70), int)
+        for rects, seen in ((chosen, before), (merge(chosen), after)):
+            for r in rects:
+                seen[r.y0:r.y1, r.x0:r.x1] += 1
+        assert (before == after).all()
+    assert merge(grid) == [Rect(0, 0, 70, 50)]
 
 
 def test_restored():

@@ -199,8 +199,8 @@ LULL_EXPORT int32_t lull_host_out_of_time(const struct lull_host_frame *frame);
 /* The sample count of the check after one at spp: `asked` when the criterion named one, else a geometric step. */
 LULL_EXPORT uint64_t lull_host_next_check(const struct lull_host_blocks *blocks, uint64_t spp, uint64_t asked);
 
-/* Re-opens stopped blocks beside one that has more than max_seam times their samples, up to that ratio, so that no edge in
- * noise level shows. Returns how many. */
+/* Re-opens stopped blocks beside one that has more than max_seam times their samples, up to the check at that ratio, so that
+ * no edge in noise level shows. Returns how many. */
 LULL_EXPORT uint32_t lull_host_reopen(struct lull_host_blocks *blocks, double max_seam);
 
 /* After a state was loaded into a frame with other limits: blocks that a limit or an interrupt had closed are active again
@@ -315,6 +315,14 @@ struct lull_host_forecast {
 LULL_EXPORT int32_t lull_host_outlook(const struct lull_host_blocks *blocks, const struct lull_host_totals *totals,
                                       int32_t threads, struct lull_host_forecast *out, struct lull_error *err);
 
+/* A line for people: share done, active blocks, their range of samples, speed, time left. left_s: wall seconds to come if
+ * the time budget (0: any) does not end the render before, INFINITY: not known. *percent: what the line before said, at
+ * first 0: the share never falls. What only a bound is known of says so: without predictions of the criterion the share is a
+ * lower one ("?" below 1 %), the time an upper one. */
+LULL_EXPORT void lull_host_progress(const struct lull_host_blocks *blocks, const struct lull_host_totals *totals,
+                                    const struct lull_host_forecast *forecast, double time_budget_s, double left_s,
+                                    double samples_per_s, double *percent, char *text, uint64_t room);
+
 /* --- report --------------------------------------------------------------------------------------------------------- */
 
 /* A dropped sample, so that its path can be replayed. The frame keeps the first LULL_HOST_DROPPED_KEPT for the report. */
@@ -404,6 +412,33 @@ LULL_EXPORT int32_t lull_host_denoise(const struct lull_host_frame *frame, const
                                       struct lull_error *err);
 /* Whether there is a library; the error says how to get one. */
 LULL_EXPORT int32_t lull_host_denoiser(const char *library, struct lull_error *err);
+
+/* --- files: for renderers without such functions of their own --------------------------------------------------------- */
+
+/* A file that will be written. option: what asked for it, a long option without its dashes, for messages. */
+struct lull_host_output {
+    const char *option, *path;
+};
+
+/* To be called before the work. Each can be written, no two are one file, and none is one of the inputs (files that are
+ * there): whatever they are called, through links too. LULL_E_IO or LULL_E_INVALID for the first that is not so. What
+ * killed processes left of such files is removed. At most 24 outputs. */
+LULL_EXPORT int32_t lull_host_check_outputs(const struct lull_host_output *outputs, uint32_t output_count,
+                                            const char *const *inputs, uint32_t input_count, struct lull_error *err);
+
+/* A file that becomes `path` when it is complete and on the disk, or never: what was there before stays until then. Write to
+ * *descriptor, which stays the file's. Commit and abort free the file; a commit that fails keeps the old one. */
+struct lull_host_file;
+LULL_EXPORT int32_t lull_host_file_begin(const char *path, struct lull_host_file **out, int32_t *descriptor,
+                                         struct lull_error *err);
+LULL_EXPORT int32_t lull_host_file_commit(struct lull_host_file *file, struct lull_error *err);
+LULL_EXPORT void lull_host_file_abort(struct lull_host_file *file);
+
+/* 8-bit sRGB codes (IEC 61966-2-1), the same on every processor: codes[i] of the linear value linear[i]; 0 for NaN. */
+LULL_EXPORT void lull_host_srgb(const double *linear, uint64_t count, uint8_t *codes);
+/* Writes such codes, rgb[height][width][3], as a PNG, which is replaced as a whole or not at all. */
+LULL_EXPORT int32_t lull_host_write_png(const char *path, uint32_t width, uint32_t height, const uint8_t *rgb,
+                                        struct lull_error *err);
 
 /* --- state ---------------------------------------------------------------------------------------------------------- */
 

@@ -8,8 +8,8 @@
     driver.run()
     frame.mean(), frame.spp()                          # the picture and its samples per pixel
 
-Low level: Criterion.begin_frame and evaluate with numpy arrays as they lie in memory (Plane). Ready hosts: lull.blender for
-Blender's Cycles, lull.mitsuba for Mitsuba 3. Needs numpy and the criteria's shared objects, nothing compiled.
+For renderers that keep their own film: HostFrame, which is shown numpy arrays as they lie in memory (Plane). Ready hosts:
+lull.blender for Blender's Cycles, lull.mitsuba for Mitsuba 3. Needs numpy and liblull-host.so; nothing is compiled.
 """
 import sys
 
@@ -22,14 +22,14 @@ except ImportError:
         sys.exit(2)
     raise ImportError(NEEDED) from None
 
-from .blocks import Block, merge
-from .criterion import BlockState, Criterion, Decision, Needs, Plane, Rect, load
+from .criterion import Criterion, Plane, Rect, load
 from .driver import Driver, Result
 from .frame import Frame
+from .host import Block, HostFrame
 from .library import Info, LullError, Parameter, criteria, find
 
-__all__ = ["Block", "BlockState", "Criterion", "Decision", "Driver", "Frame", "Info", "LullError", "Needs", "Parameter",
-           "Plane", "Rect", "Result", "criteria", "find", "load", "merge"]
+__all__ = ["Block", "Criterion", "Driver", "Frame", "HostFrame", "Info", "LullError", "Parameter", "Plane", "Rect", "Result",
+           "criteria", "find", "load"]
 __version__ = "1.0"
 
 # The package is a Blender add-on too: scripts/hosts/blender-addon packs it.

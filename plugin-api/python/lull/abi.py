@@ -1,19 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The structs and numbers of lull/criterion.h 1.0 for ctypes: nothing else. The header's comments are the contract.
-
-Each class stands for `struct lull_<name>`; tests/hosts compares every offset with plugin-api/layout-1.txt.
-"""
+"""The structs and numbers of lull/criterion.h, loader.h and host.h 1.0 for ctypes: nothing else. The headers' comments are
+the contract; tests/hosts compares every offset with plugin-api/layout-1.txt and host-layout-1.txt, every number with the
+headers."""
 import ctypes as C
-from ctypes import c_double as F64
-from ctypes import c_int32 as I32
-from ctypes import c_int64 as I64
-from ctypes import c_uint32 as U32
-from ctypes import c_uint64 as U64
-from ctypes import c_void_p as P
-
-API_MINOR = 0
-ENTRY_NAME = "lull_criterion_entry_v1"
-EXT_STATE = b"lull.state/1"
 
 OK, E_INVALID, E_KEY, E_VALUE, E_MEMORY, E_PLANE, E_STATE, E_IO, E_VERSION, E_UNSUPPORTED, E_CANCELLED, E_INTERNAL = \
     range(0, -12, -1)
@@ -24,100 +13,62 @@ TYPE_F32, TYPE_F16, TYPE_F64, TYPE_U32 = range(4)
 NORM_ONE, NORM_SPP, NORM_HALF_SPP, NORM_WEIGHT = range(4)
 TRANSFER_UNKNOWN, TRANSFER_LINEAR, TRANSFER_SRGB, TRANSFER_GAMMA = range(4)
 REQ_FLEXIBLE = 1
-FRAME_RESTART, FRAME_DETERMINISTIC, FRAME_INDEPENDENT, FRAME_SHARED = 1, 2, 4, 8
-BLOCK_STOPPED, BLOCK_FINAL = 1, 2
+FRAME_DETERMINISTIC, FRAME_INDEPENDENT, FRAME_SHARED = 2, 4, 8
 CONTINUE, STOP = 0, 1
-DECISION_TOO_EARLY, DECISION_BAD_INPUT = 1, 2
-THREADS_NONE, THREADS_INSTANCE, THREADS_FULL = range(3)
 CAP_DETERMINISTIC, CAP_BATCH_INVARIANT, CAP_REOPENS = 1, 2, 4
+HOST_UNIFORM = 0x100
+REPORT_INTERRUPTED, REPORT_NO_RAYS = 1, 4
+REASON_NONE, REASON_CRITERION, REASON_SPP_MAX, REASON_UNIFORM, REASON_TIME, REASON_INTERRUPT, REASON_DROPPED, \
+    REASON_COUNT = range(8)
+PATH_MAX = 4096
+
+LogFn = C.CFUNCTYPE(None, C.c_void_p, C.c_int32, C.c_char_p)
+WriteFn = C.CFUNCTYPE(C.c_int32, C.c_void_p, C.c_void_p, C.c_uint64)
+_KINDS = {"i32": C.c_int32, "u8": C.c_uint8, "u32": C.c_uint32, "i64": C.c_int64, "u64": C.c_uint64, "f64": C.c_double,
+          "ptr": C.c_void_p, "text": C.c_char_p, "log": LogFn, "write": WriteFn, "message": C.c_char * 504,
+          "path": C.c_char * PATH_MAX, "crop": C.c_int32 * 4, "matrix": C.c_double * 9}
 
 
-class Error(C.Structure):
-    _fields_ = [("struct_size", U32), ("code", I32), ("message", C.c_char * 504)]
+def _struct(name: str, fields: str) -> type:
+    """A ctypes struct. fields: "KIND NAME NAME …; KIND NAME …", in the order in which they lie."""
+    groups = [group.split() for group in fields.split(";")]
+    return type(name, (C.Structure,), {"_fields_": [(n, _KINDS[kind]) for kind, *names in groups for n in names]})
 
 
-TaskFn = C.CFUNCTYPE(None, P, U64, U32)
-LogFn = C.CFUNCTYPE(None, P, I32, C.c_char_p)
-ParallelForFn = C.CFUNCTYPE(I32, P, U64, TaskFn, P)
+Error = _struct("Error", "u32 struct_size; i32 code; message message")
+Param = _struct("Param", "text name help default_value choices; f64 min max; i32 type; u32 flags")
+Pair = _struct("Pair", "text key value")
+Requirements = _struct("Requirements", "u32 struct_size flags planes_required planes_used block_width block_height halo "
+                       "checks_hint; u64 first_spp bytes_per_block")
+Rect = _struct("Rect", "i32 x0 y0 x1 y1")
+Plane = _struct("Plane", "ptr data; i64 stride_x stride_y stride_c; f64 scale; i32 type normaliser; u32 channels flags")
+Decision = _struct("Decision", "i32 action; u32 flags; u64 next_spp; f64 p_noisy predicted_spp error")
+Criterion = _struct("Criterion", "u32 struct_size api_minor; text id name version description; ptr params; u32 param_count "
+                    "param_stride; i32 thread_level; u32 capabilities; ptr create requirements begin_frame evaluate "
+                    "end_frame destroy get_extension")
+Writer = _struct("Writer", "u32 struct_size flags; ptr context; write write")
+Search = _struct("Search", "ptr dirs; u64 dir_count; log log; ptr log_context")
+Found = _struct("Found", "ptr criterion; path path")
+HostServices = _struct("HostServices", "u32 struct_size threads; text name; ptr context; log log; ptr parallel_for release")
+HostConfig = _struct("HostConfig", "u32 struct_size flags width height block_width block_height; crop crop; ptr layout; u32 "
+                     "layout_count layout_stride planes; i32 transfer; f64 gamma exposure sample_clamp; matrix rgb_to_xyz; "
+                     "u64 spp_min spp_max seed; f64 time_budget_s max_check_overhead max_seam; u64 check_step; ptr mask")
+HostBlock = _struct("HostBlock", "u32 id; i32 x0 y0 x1 y1 reason; u64 spp half_spp; f64 thread_s; u64 rays dropped next_spp "
+                    "asked_spp; f64 p_noisy error predicted_spp; u32 asked checks stop_votes step")
+HostBlocks = _struct("HostBlocks", "u32 struct_size count; ptr list; u32 columns rows list_columns flags; i32 block_width "
+                     "block_height x0 y0 x1 y1; u64 spp_min spp_max check_step")
+HostTotals = _struct("HostTotals", "u64 samples paths rays dropped; f64 render_s criterion_s; u64 checks failed_checks "
+                     "skipped_checks; f64 criterion_thread_s; u64 asked")
+HostView = _struct("HostView", "u32 struct_size plane_count; i32 x0 y0 x1 y1; ptr planes dropped dropped_half")
+HostSaid = _struct("HostSaid", "u64 spp; f64 predicted; i32 stopped unmet")
+HostStopAt = _struct("HostStopAt", "f64 spp low high; i64 known")
+HostForecast = _struct("HostForecast", "f64 done_s left_s sampling_s check_s; u64 low high; u32 active known")
+HostReport = _struct("HostReport", "u32 struct_size flags; text scene mask kernel; ptr effects; u32 effect_count threads "
+                     "processes zero; u64 messages message_bytes; f64 message_wait_s; u64 film_bytes film_pixels; f64 "
+                     "scene_bytes noisy_weight; ptr noisy_error")
+HostOutput = _struct("HostOutput", "text option path")
 
 
-class Host(C.Structure):
-    _fields_ = [("struct_size", U32), ("api_minor", U32), ("context", P), ("name", C.c_char_p), ("max_workers", U32),
-                ("flags", U32), ("log", LogFn), ("parallel_for", ParallelForFn), ("cancelled", P), ("get_extension", P)]
-
-
-class Param(C.Structure):
-    _fields_ = [("name", C.c_char_p), ("help", C.c_char_p), ("default_value", C.c_char_p), ("choices", C.c_char_p),
-                ("min", F64), ("max", F64), ("type", I32), ("flags", U32)]
-
-
-class Pair(C.Structure):
-    _fields_ = [("key", C.c_char_p), ("value", C.c_char_p)]
-
-
-class Requirements(C.Structure):
-    _fields_ = [("struct_size", U32), ("flags", U32), ("planes_required", U32), ("planes_used", U32), ("block_width", U32),
-                ("block_height", U32), ("halo", U32), ("checks_hint", U32), ("first_spp", U64), ("bytes_per_block", U64)]
-
-
-class Rect(C.Structure):
-    _fields_ = [("x0", I32), ("y0", I32), ("x1", I32), ("y1", I32)]
-
-
-class Frame(C.Structure):
-    _fields_ = [("struct_size", U32), ("flags", U32), ("width", U32), ("height", U32), ("blocks", P), ("block_count", U32),
-                ("block_stride", U32), ("planes", U32), ("transfer", I32), ("gamma", F64), ("exposure", F64),
-                ("sample_clamp", F64), ("time_budget_s", F64), ("spp_min", U64), ("spp_max", U64), ("seed", U64),
-                ("rgb_to_xyz", F64 * 9)]
-
-
-class Plane(C.Structure):
-    _fields_ = [("data", P), ("stride_x", I64), ("stride_y", I64), ("stride_c", I64), ("scale", F64), ("type", I32),
-                ("normaliser", I32), ("channels", U32), ("flags", U32)]
-
-
-class Block(C.Structure):
-    _fields_ = [("id", U32), ("flags", U32), ("x0", I32), ("y0", I32), ("x1", I32), ("y1", I32), ("spp", U64),
-                ("half_spp", U64), ("thread_s", F64)]
-
-
-class View(C.Structure):
-    _fields_ = [("struct_size", U32), ("flags", U32), ("x0", I32), ("y0", I32), ("x1", I32), ("y1", I32), ("planes", P),
-                ("plane_count", U32), ("plane_stride", U32), ("all", P), ("all_count", U32), ("all_stride", U32),
-                ("elapsed_s", F64)]
-
-
-class Decision(C.Structure):
-    _fields_ = [("action", I32), ("flags", U32), ("next_spp", U64), ("p_noisy", F64), ("predicted_spp", F64), ("error", F64)]
-
-
-class Criterion(C.Structure):
-    _fields_ = [("struct_size", U32), ("api_minor", U32), ("id", C.c_char_p), ("name", C.c_char_p), ("version", C.c_char_p),
-                ("description", C.c_char_p), ("params", P), ("param_count", U32), ("param_stride", U32),
-                ("thread_level", I32), ("capabilities", U32),
-                ("create", C.CFUNCTYPE(I32, P, P, U32, U32, P, P)), ("requirements", C.CFUNCTYPE(I32, P, P, P)),
-                ("begin_frame", C.CFUNCTYPE(I32, P, P, P)), ("evaluate", C.CFUNCTYPE(I32, P, P, P, U32, P, U32, U32, P)),
-                ("end_frame", C.CFUNCTYPE(None, P)), ("destroy", C.CFUNCTYPE(None, P)),
-                ("get_extension", C.CFUNCTYPE(P, C.c_char_p))]
-
-
-WriteFn = C.CFUNCTYPE(I32, P, P, U64)
-ReadFn = C.CFUNCTYPE(I32, P, P, U64)
-
-
-class Writer(C.Structure):
-    _fields_ = [("struct_size", U32), ("flags", U32), ("context", P), ("write", WriteFn)]
-
-
-class Reader(C.Structure):
-    _fields_ = [("struct_size", U32), ("flags", U32), ("context", P), ("read", ReadFn)]
-
-
-class State(C.Structure):
-    _fields_ = [("struct_size", U32), ("flags", U32), ("save", C.CFUNCTYPE(I32, P, P, P)),
-                ("load", C.CFUNCTYPE(I32, P, P, P))]
-
-
-def sized(struct_type, **fields):
+def sized(struct_type: type, **fields: object):
     """A zeroed struct that can grow, its struct_size set."""
     return struct_type(struct_size=C.sizeof(struct_type), **fields)

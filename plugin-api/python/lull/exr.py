@@ -10,10 +10,9 @@ import numpy as np
 
 from .files import replaced
 
-_MAGIC = struct.pack("<II", 20000630, 2)
-_LONG_NAMES = 0x400
+_MAGIC, _LONG_NAMES = 20000630, 0x400
 _LINES = 16  # of a ZIP chunk
-_FLOAT, _HALF = 2, 1
+_TYPES = ("<u4", "<f2", "<f4")  # by pixel type
 
 
 def _attribute(name: str, kind: str, data: bytes) -> bytes:
@@ -36,7 +35,7 @@ def write(path: str, channels: Mapping[str, np.ndarray], size: tuple[int, int], 
     names = sorted(channels)
     height, width = channels[names[0]].shape
     x0, y0 = origin
-    listed = b"".join(n.encode() + b"\0" + struct.pack("<iiii", _FLOAT, 0, 1, 1) for n in names) + b"\0"
+    listed = b"".join(n.encode() + b"\0" + struct.pack("<iiii", _TYPES.index("<f4"), 0, 1, 1) for n in names) + b"\0"
     head = _attribute("channels", "chlist", listed) + _attribute("compression", "compression", b"\x03")
     head += _attribute("dataWindow", "box2i", struct.pack("<4i", x0, y0, x0 + width - 1, y0 + height - 1))
     head += _attribute("displayWindow", "box2i", struct.pack("<4i", 0, 0, size[0] - 1, size[1] - 1))
@@ -47,7 +46,7 @@ def write(path: str, channels: Mapping[str, np.ndarray], size: tuple[int, int], 
         head += (_attribute(name, "string", value.encode()) if isinstance(value, str) else
                  _attribute(name, "double", struct.pack("<d", value)))
     version = 2 | (_LONG_NAMES if any(len(n) > 31 for n in [*names, *(attributes or {})]) else 0)
-    head = struct.pack("<II", 20000630, version) + head + b"\0"
+    head = struct.pack("<II", _MAGIC, version) + head + b"\0"
     rows = np.stack([channels[n] for n in names], 1).astype("<f4")  # [h, channels, w]
     chunks = []
     for y in range(0, height, _LINES):
@@ -61,80 +60,41 @@ def write(path: str, channels: Mapping[str, np.ndarray], size: tuple[int, int], 
 
 def read(path: str, wanted: Sequence[str] = ("R", "G", "B")) -> tuple[np.ndarray, tuple[int, int]]:
     """The wanted channels [h, w, len(wanted)] float32 of an uncompressed file, and its data window's origin (x, y)."""
-    channels, origin, _ = read_layers(path)
+    channels, origin = read_layers(path)
     if missing := [name for name in wanted if name not in channels]:
         raise ValueError(f"{path}: not a picture with the channels {', '.join(wanted)}: there is no {missing[0]}")
     return np.stack([channels[name] for name in wanted], -1), origin
 
 
-def read_layers(path: str) -> tuple[dict[str, np.ndarray], tuple[int, int], dict[str, bytes]]:
-    """All channels by name, [h, w] float32, of a file that is uncompressed or that write() made; its data window's origin
-    (x, y); its header."""
+def read_layers(path: str) -> tuple[dict[str, np.ndarray], tuple[int, int]]:
+    """All channels by name, [h, w] float32, of an uncompressed file; its data window's origin (x, y)."""
     with open(path, "rb") as file:
         data = file.read()
     try:
         return _decode(data)
-    except (ValueError, struct.error, KeyError, IndexError, zlib.error) as error:
-        raise ValueError(f"{path}: not an uncompressed or ZIP-compressed scan-line EXR: {error}") from None
+    except (ValueError, struct.error, KeyError, IndexError) as error:
+        raise ValueError(f"{path}: not an uncompressed scan-line EXR: {error}") from None
 
 
-def _header(data: bytes) -> tuple[dict[str, bytes], int]:
-    if data[:4] != _MAGIC[:4] or data[4] != 2 or data[5] & 0x1a:  # tiled, deep or of several parts
+def _decode(data: bytes) -> tuple[dict[str, np.ndarray], tuple[int, int]]:
+    if struct.unpack_from("<IB", data) != (_MAGIC, 2) or data[5] & 0x1a:  # tiled, deep or of several parts
         raise ValueError("another kind of file")
-    attributes, at = {}, 8
+    head, at = {}, 8
     while data[at]:
         name_end = data.index(b"\0", at)
         kind_end = data.index(b"\0", name_end + 1)
-        size, = struct.unpack_from("<I", data, kind_end + 1)
-        attributes[data[at:name_end].decode()] = data[kind_end + 5:kind_end + 5 + size]
-        at = kind_end + 5 + size
-    return attributes, at + 1
-
-
-def _unzip(data: bytes, size: int) -> bytes:
-    """What _zip made of `size` bytes."""
-    if len(data) == size:
-        return data
-    raw = np.frombuffer(zlib.decompress(data), np.uint8)
-    if len(raw) != size:
-        raise ValueError("a chunk of another size")
-    steps = raw.astype(np.int64)
-    steps[1:] -= 128
-    split = np.cumsum(steps).astype(np.uint8)
-    out = np.empty(size, np.uint8)
-    out[::2], out[1::2] = split[:(size + 1) // 2], split[(size + 1) // 2:]
-    return out.tobytes()
-
-
-def _decode(data: bytes) -> tuple[dict[str, np.ndarray], tuple[int, int], dict[str, bytes]]:
-    head, at = _header(data)
-    if head["compression"] not in (b"\0", b"\2", b"\3"):
-        raise ValueError("its compression is another one")
+        end = kind_end + 5 + struct.unpack_from("<I", data, kind_end + 1)[0]
+        head[data[at:name_end].decode()], at = data[kind_end + 5:end], end
+    if head["compression"] != b"\0":
+        raise ValueError("it is compressed")
     x0, y0, x1, y1 = struct.unpack("<4i", head["dataWindow"])
-    width, height = x1 - x0 + 1, y1 - y0 + 1
-    listed, places, column = head["channels"], {}, 0
+    listed, fields = head["channels"], []
     while listed[:1] != b"\0":
-        channel, _, rest = listed.partition(b"\0")
-        kind, = struct.unpack_from("<i", rest)
-        bytes_each = 2 if kind == _HALF else 4
-        places[channel.decode()] = (column, "<f2" if kind == _HALF else "<f4" if kind == _FLOAT else "<u4")
-        column += bytes_each * width
+        name, _, rest = listed.partition(b"\0")
+        fields.append((name.decode(), _TYPES[struct.unpack_from("<i", rest)[0]], (x1 - x0 + 1,)))
         listed = rest[16:]
-    lines = {b"\0": 1, b"\2": 1, b"\3": _LINES}[head["compression"]]
-    chunks = -(-height // lines)
-    rows = np.zeros((height, column), np.uint8)
-    at += 8 * chunks
-    for _ in range(chunks):  # each: y, bytes, then for each line the channels one after the other
-        y, size = struct.unpack_from("<iI", data, at)
-        y -= y0
-        count = min(lines, height - y)
-        if y < 0 or count < 1 or at + 8 + size > len(data):
-            raise ValueError("a chunk lies outside")
-        raw = _unzip(data[at + 8:at + 8 + size], count * column)
-        rows[y:y + count] = np.frombuffer(raw, np.uint8).reshape(count, column)
-        at += 8 + size
-    channels = {}
-    for name, (start, stored) in places.items():
-        part = np.ascontiguousarray(rows[:, start:start + width * np.dtype(stored).itemsize])
-        channels[name] = part.view(stored).astype(np.float32)
-    return channels, (x0, y0), head
+    line = np.dtype([("#y", "<i4"), ("#bytes", "<u4"), *fields])  # its channels one after the other
+    lines = np.frombuffer(data, line, y1 - y0 + 1, at + 1 + 8 * (y1 - y0 + 1))
+    if (lines["#y"] != np.arange(y0, y1 + 1)).any() or (lines["#bytes"] != line.itemsize - 8).any():
+        raise ValueError("its lines are not in order")
+    return {name: lines[name].astype(np.float32) for name, *_ in fields}, (x0, y0)

@@ -6,11 +6,7 @@ import operator
 
 import numpy as np
 
-MAX_SIDE, MAX_PIXELS, MAX_BLOCK = 32768, 1 << 28, 4096  # of a picture and of a block
-MAX_BLOCKS = 1 << 20  # a block is an object here: more of them would fill the memory before the first sample
-MAX_SPP, MAX_TIME_S, MAX_SEAM = (1 << 31) - 1, 1e9, 1e6
-MAX_SEED = (1 << 64) - 1
-FINITE = float(np.finfo(float).max)
+MAX_SPP, FINITE = (1 << 31) - 1, float(np.finfo(float).max)
 
 
 def whole(name: str, value: object, low: int, high: int) -> int:
@@ -24,32 +20,16 @@ def whole(name: str, value: object, low: int, high: int) -> int:
     return n
 
 
-def real(name: str, value: object, low: float, high: float = FINITE) -> float:
-    """value, if it is a number in [low, high]; NaN is not."""
-    expected = f"expected a number from {low:g} to {high:g}" if high < FINITE else f"expected a finite number from {low:g}"
+def real(name: str, value: object, low: float, high: float = FINITE, above: bool = False) -> float:
+    """value, if it is a number in [low, high], or above low; NaN is not."""
+    expected = f"expected a finite number {'above' if above else 'from'} {low:g}" + f" to {high:g}" * (high < FINITE)
     try:
         x = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
         raise TypeError(f"{name} {value!r}: {expected}") from None
-    if not low <= x <= high:
+    if not low <= x <= high or above and x == low:
         raise ValueError(f"{name} {value}: {expected}")
     return x
-
-
-def positive(name: str, value: object) -> float:
-    """value, if it is a finite number above 0."""
-    x = real(name, value, 0)
-    if x == 0:
-        raise ValueError(f"{name} {value}: expected a number above 0")
-    return x
-
-
-def picture(width: object, height: object) -> tuple[int, int]:
-    """A picture's size in pixels."""
-    w, h = whole("width", width, 1, MAX_SIDE), whole("height", height, 1, MAX_SIDE)
-    if w * h > MAX_PIXELS:
-        raise ValueError(f"a picture of {w}x{h}: expected at most 2^28 pixels in all")
-    return w, h
 
 
 def unmasked(name: str, array: np.ndarray) -> np.ndarray:

@@ -20,13 +20,12 @@ import re
 import struct
 import sys
 import zlib
-from dataclasses import dataclass, field
-from typing import Any, Callable, Iterator, Optional, Sequence, Union
+from typing import Any, Callable, Iterator, NamedTuple, Optional, Sequence, Union
 
 import numpy as np
 
 from . import checkpoint as checkpoints
-from . import limits, png
+from . import limits
 from . import quote as quotes
 from .criterion import Criterion, Rect, load
 from .driver import Driver, Result
@@ -38,15 +37,14 @@ _AOVS = {"albedo": ("albedo.R", "albedo.G", "albedo.B"), "normal": ("normal.X", 
          "depth": ("depth.T",)}
 
 
-@dataclass
-class Picture:
+class Picture(NamedTuple):
     """What render gives back: image [height, width, 3] float64 linear, spp [height, width] uint32, layers: alpha ("A") and
     AOVs by the film's names, [height, width] float64. unsaved: why the checkpoint could not be written, if so."""
     image: np.ndarray
     spp: np.ndarray
     result: Result
     driver: Driver  # for lull.outputs and lull.checkpoint
-    layers: dict[str, np.ndarray] = field(default_factory=dict)
+    layers: dict[str, np.ndarray]
     unsaved: Optional[OSError] = None
 
 
@@ -85,7 +83,7 @@ class Film:
 
     def check_waves(self, wave: int, spp_max: int) -> None:
         """ValueError if the sampler does not take waves of this size, or the one that is left at the end."""
-        wave, spp_max = limits.whole("wave", wave, 1, limits.MAX_SPP), limits.whole("spp_max", spp_max, 1, limits.MAX_SPP)
+        wave, spp_max = (limits.whole(n, v, 1, limits.MAX_SPP) for n, v in (("wave", wave), ("spp_max", spp_max)))
         for count in {min(wave, spp_max), spp_max % wave or wave}:
             self._check_wave(count)
 
@@ -148,9 +146,20 @@ def _checked_integrator(mi: Any, scene: Any) -> Any:
     if integrator is None:
         raise ValueError("the scene has no integrator: add one, such as path")
     if isinstance(integrator, mi.AdjointIntegrator):
-        raise ValueError(f"the integrator {integrator.class_name()} (ptracer) splats light over the whole film, which cannot "
-                         "be rendered by blocks: use path or volpath")
+        raise ValueError(f"the integrator {integrator.class_name()} (ptracer) splats light over the whole film, which "
+                         "cannot be rendered by blocks: use path or volpath")
     return integrator
+
+
+def _read_mask(path: str) -> np.ndarray:
+    """[height, width] in [0, 1] of a picture file: the mean of its colours, as stored."""
+    import mitsuba as mi
+    try:
+        stored = np.array(mi.Bitmap(path))
+    except RuntimeError as error:
+        raise ValueError(f"{path}: cannot be read as a mask: {str(error).splitlines()[-1].strip()}") from None
+    colours = np.atleast_3d(stored)[..., :1 if stored.ndim == 2 or stored.shape[2] < 3 else 3].mean(-1)
+    return colours / np.iinfo(stored.dtype).max if stored.dtype.kind == "u" else colours
 
 
 def _tell(line: str) -> None:
@@ -203,16 +212,17 @@ def render(scene: Any, criterion: Union[str, Criterion] = "observer", *, sensor:
     if checkpoint:
         check_outputs([Output("checkpoint", checkpoint)], [mask] if isinstance(mask, str) else [])
         checkpoints.check(checkpoint)
-    shades = png.read_grey(mask) if isinstance(mask, str) else mask
+    shades = _read_mask(mask) if isinstance(mask, str) else mask
     with contextlib.ExitStack() as stack:
         judge = criterion if isinstance(criterion, Criterion) else stack.enter_context(load(criterion, **parameters))
         film = stack.enter_context(Film(scene, sensor, seed))
         film.check_waves(wave, spp_max)
         frame = Frame(judge, film.width, film.height, block=block, crop=film.crop, spp_min=spp_min, spp_max=spp_max,
                       time_budget_s=time_budget_s, deterministic=time_budget_s <= 0, seed=seed, independent=True,
-                      shared=film.splats, weighted=True, supplies=film.supplies, layers=film.layers, mask=shades)
+                      shared=film.splats, weighted=True, wave=wave, supplies=film.supplies, layers=film.layers,
+                      mask=shades)
         stack.callback(frame.close)
-        driver = Driver(frame, film.render, wave=wave, identity=film.identity() if checkpoint else None)
+        driver = Driver(frame, film.render, identity=film.identity() if checkpoint else None)
         hooks: list[Callable[[Driver], None]] = [after_call] if after_call else []
         if tell:
             hooks.append(_cost_line(tell))

@@ -1,23 +1,22 @@
 # SPDX-License-Identifier: MIT
 """What the criterion's dial will cost, told from the checks of a render that has begun: samples and time at its setting
 and at coarser and finer ones. As `lull-render --quote` does, with one more instance of the criterion per setting, each
-asked about the blocks as they are; neither the frame nor the render's own instances change."""
+asked about the blocks as they are; neither the frame nor the render's own instance changes."""
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+import ctypes as C
+from typing import NamedTuple
 
-from .criterion import BlockState, Criterion
+from . import abi
 from .driver import Driver
-from .library import LullError
-from .mask import dial_of
+from .host import HostFrame
+from .library import LullError, Parameter, library
 
 # The dial `visible` by name, with the criterion's own default; other dials are asked at twice and at four times their value.
 NAMED = {0.9: "coarse", 0.5: "draft", 0.05: "final"}
 
 
-@dataclass
-class Row:
+class Row(NamedTuple):
     """One setting. spp: of the least block, of the picture and of the dearest block; time_s: of the whole render, from its
     start. at_most: the criterion did not predict every block, those count with the most samples."""
     dial: str
@@ -35,27 +34,15 @@ def pilot_done(driver: Driver, spp: int = 128, seconds: float = 30.0) -> bool:
     return not asked or min(asked) >= spp or min(asked) > 0 and driver.totals.elapsed_s >= seconds
 
 
-def _predictions(driver: Driver, dial: str, value: float) -> list[float]:
-    """Samples at which each block will stop, NaN where the criterion does not say."""
-    frame = driver.frame
-    states = [BlockState(b.rect, b.spp, b.half_spp, False, False, b.thread_s) for b in frame.blocks]
-    planes, ends = frame.planes_now(), [math.nan] * len(states)
-    for scale in set(frame.dials):
-        parameter = frame.criterion.info.parameter(dial)
-        judge: Criterion = frame.criterion.with_parameters(**{dial: min(max(value * scale, parameter.min), parameter.max)})
-        try:
-            judge.begin_frame(frame.width, frame.height, [b.rect for b in frame.blocks], frame.planes, spp_min=frame.spp_min,
-                              spp_max=frame.spp_max, seed=frame.seed, **frame.shown)
-            due = [i for i, factor in enumerate(frame.dials) if factor == scale and frame.blocks[i].spp > 0]
-            for i, answer in zip(due, judge.evaluate(planes, states, due, frame.view, 0.0)):
-                ends[i] = float(states[i].spp) if answer.stop else answer.predicted_spp
-        finally:
-            judge.close()
-    return ends
+def _dial_of(frame: HostFrame) -> tuple[Parameter, float]:
+    """What a mask scales and a quote varies; KeyError when the criterion has no such parameter, or no value for it."""
+    for parameter in filter(None, map(frame.criterion.info.parameter, ("visible", "threshold"))):
+        if (value := frame.criterion.parameters.get(parameter.name, parameter.default)) is not None:
+            return parameter, float(value)
+    raise KeyError
 
 
-def _settings(driver: Driver) -> list[tuple[float, str]]:
-    parameter, value = dial_of(driver.frame.criterion)
+def _settings(parameter: Parameter, value: float) -> list[tuple[float, str]]:
     names = dict(NAMED) if parameter.name == "visible" else {4 * value: "coarse", 2 * value: "draft"}
     if parameter.name == "visible" and parameter.default is not None:
         names.setdefault(float(parameter.default), "default")
@@ -63,23 +50,35 @@ def _settings(driver: Driver) -> list[tuple[float, str]]:
     return sorted(((v, name) for v, name in names.items() if parameter.min <= v <= parameter.max), reverse=True)
 
 
+def _ends(frame: HostFrame, dial: str, value: float) -> list[abi.HostStopAt]:
+    """Where each block will stop."""
+    due = [i for i, b in enumerate(frame.blocks) if b.spp > 0]
+    with frame.criterion.with_parameters(**{dial: value}) as judge:
+        frame.join(judge)
+        answers = dict(zip(due, frame.evaluate(due, criterion=judge)))
+    said = [abi.HostSaid(b.spp, answers[i].predicted_spp, answers[i].action == abi.STOP) if i in answers else abi.HostSaid()
+            for i, b in enumerate(frame.blocks)]
+    for s in said:
+        s.predicted = s.spp if s.stopped else s.predicted
+    return [library().lull_host_expect(C.byref(s), C.c_uint64(b.spp), C.c_uint64(frame.spp_max))
+            for s, b in zip(said, frame.blocks)]
+
+
 def rows(driver: Driver) -> list[Row]:
     """Coarse to fine; [] if the criterion has no dial or cannot be asked. Every active block has been checked once at
     least."""
-    frame, out = driver.frame, []
+    frame, totals, out = driver.frame, driver.totals, []
+    pixels = [b.rect.pixels for b in frame.blocks]
     try:
-        parameter, chosen = dial_of(frame.criterion)
-        settings = _settings(driver)
-        asked = [(value, name, _predictions(driver, parameter.name, value)) for value, name in settings]
-    except (LullError, ValueError):
+        parameter, chosen = _dial_of(frame)
+        asked = [(value, name, _ends(frame, parameter.name, value)) for value, name in _settings(parameter, chosen)]
+    except (LullError, KeyError):
         return []
-    spent, rate = driver.totals.samples, driver.totals.samples / max(driver.totals.render_s, 1e-9)
     for value, name, ends in asked:
-        spp = [min(max(e, b.spp) if math.isfinite(e) else frame.spp_max, frame.spp_max) for e, b in zip(ends, frame.blocks)]
-        samples = sum(n * b.rect.pixels for n, b in zip(spp, frame.blocks))
-        time_s = driver.totals.elapsed_s + max(samples - spent, 0) / max(rate, 1e-9)
-        out.append(Row(parameter.name, value, name, (min(spp), samples / frame.view.pixels, max(spp)), time_s,
-                       any(math.isnan(e) for e in ends), value == chosen))
+        spp, samples = [end.spp for end in ends], sum(end.spp * n for end, n in zip(ends, pixels))
+        time_s = totals.elapsed_s + max(samples - totals.samples, 0) * totals.render_s / max(totals.samples, 1)
+        out.append(Row(parameter.name, value, name, (min(spp), samples / sum(pixels), max(spp)), time_s,
+                       not all(end.known for end in ends), value == chosen))
     return out
 
 
@@ -109,8 +108,7 @@ def line(driver: Driver) -> str:
     own = next((r for r in found if r.chosen), None)
     if own is None:
         return ""
-    coarser = [r for r in found if r.value > own.value][::-1]
     parts = [f"{r.dial} {r.value:g} would take {'at most ' if r.at_most else 'about '}{time_text(r.time_s)}"
-             for r in coarser]
-    return (f"{own.dial} {own.value:g} takes {'at most' if own.at_most else 'about'} {time_text(own.time_s)}, "
-            f"{own.spp[1]:,.0f} spp" + "".join(f"; {p}" for p in parts))
+             for r in reversed(found) if r.value > own.value]
+    return "; ".join([f"{own.dial} {own.value:g} takes {'at most' if own.at_most else 'about'} {time_text(own.time_s)}, "
+                      f"{own.spp[1]:,.0f} spp", *parts])

@@ -4,10 +4,9 @@ tracer."""
 from __future__ import annotations
 
 import signal
-from typing import Callable, Optional
+from typing import Any, Callable, Optional
 
 EXIT_STATUS = 130
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class Stopping:
@@ -16,7 +15,7 @@ class Stopping:
     def __init__(self) -> None:
         self.asked = False
         self.then: Optional[Callable[[], None]] = None
-        self._before: dict[int, object] = {}
+        self._before: dict[int, Any] = {}
 
     def _ask(self, number: int, _frame: object) -> None:
         self.asked = True
@@ -25,11 +24,11 @@ class Stopping:
             self.then()
 
     def __enter__(self) -> Stopping:
-        for number in SIGNALS:
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             if signal.getsignal(number) is not signal.SIG_IGN:  # nohup
                 self._before[number] = signal.signal(number, self._ask)
         return self
 
     def __exit__(self, *_) -> None:
         for number, handler in self._before.items():
-            signal.signal(number, signal.SIG_DFL if handler is None else handler)  # type: ignore[arg-type]
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)

@@ -210,8 +210,8 @@ def _tell_quote(session, result, progress) -> int:
     if result is not None and result.outcome in ("interrupt", "failed"):
         return _end(session, result, [])
     print(quote.table(session.driver), flush=True)
-    if session.settings.checkpoint:
-        session.save()
+    if session.keeper:
+        session.keeper.save(session.driver)
     return _end(session, result, [])
 
 

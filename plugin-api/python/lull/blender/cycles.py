@@ -18,10 +18,9 @@ import bpy
 import numpy as np
 
 from .. import exr
-from ..blocks import merge
 from ..criterion import Rect
 from .passes import Passes
-from .unnamed import UnnamedFile
+from .unnamed import unnamed_file
 
 # Sobol-Burley under its names in 3.x and 4.x: its waves add up to one render. The others' tables depend on the total
 # number of samples; they are usable where Cycles can be told that total apart from the subset to render (4.4 and later).
@@ -48,6 +47,22 @@ def _silence() -> Iterator[None]:
 # Names of the colour passes by which Cycles divides light, in 4.x and in 5.x
 COLOURS = {"diffuse": {"DiffCol", "Diffuse Color"}, "glossy": {"GlossCol", "Glossy Color"},
            "transmission": {"TransCol", "Transmission Color"}, "subsurface": {"SubsurfaceCol", "Subsurface Color"}}
+
+
+def _joined(rects: Sequence[Rect], axis: int) -> list[Rect]:
+    """Neighbours along an axis (0: x, 1: y) that are equal across it as one."""
+    out: list[Rect] = []
+    for r in sorted(rects, key=lambda r: (r[1 - axis], r[3 - axis], r[axis])):
+        if out and (out[-1][1 - axis], out[-1][3 - axis], out[-1][axis + 2]) == (r[1 - axis], r[3 - axis], r[axis]):
+            out[-1] = out[-1]._replace(**{"xy"[axis] + "1": r[axis + 2]})
+        else:
+            out.append(r)
+    return out
+
+
+def merge(rects: Sequence[Rect]) -> list[Rect]:
+    """The same pixels in fewer rectangles: rows of neighbours first, then equal rows below each other."""
+    return _joined(_joined(rects, 0), 1)
 
 
 class HostError(Exception):
@@ -121,7 +136,7 @@ class Cycles:
             self.notes.append(f"only the view layer '{self.layer.name}' is rendered, not {', '.join(others)}")
         self.pattern = self._choose_pattern()
         self._touched: list[tuple[object, str, object]] = []
-        self._wave: Optional[UnnamedFile] = None
+        self._wave = contextlib.ExitStack()
 
     def device(self) -> str:
         """What it renders on, by name."""
@@ -143,11 +158,11 @@ class Cycles:
 
     def __enter__(self) -> Cycles:
         render, cycles = self.scene.render, self.scene.cycles
-        self._wave = UnnamedFile()
+        path = self._wave.enter_context(unnamed_file())
         try:
             self._set(render, engine="CYCLES", use_persistent_data=True, use_border=True, use_crop_to_border=True,
                       use_compositing=False, use_sequencer=False, use_overwrite=True, use_placeholder=False,
-                      use_file_extension=False, filepath=self._wave.path)
+                      use_file_extension=False, filepath=path)
             for name in ("border_min_x", "border_min_y", "border_max_x", "border_max_y"):
                 self._set(render, **{name: getattr(render, name)})  # to be put back
             self._set(render.image_settings, media_type="MULTI_LAYER_IMAGE", file_format="OPEN_EXR_MULTILAYER",
@@ -207,9 +222,7 @@ class Cycles:
         for owner, name, value in self._touched:  # in order: what a file format allows depends on the format
             setattr(owner, name, value)
         self._touched.clear()
-        if self._wave:
-            self._wave.close()
-            self._wave = None
+        self._wave.close()
 
     # --- rendering -----------------------------------------------------------------------------------------------------
 
@@ -239,7 +252,7 @@ class Cycles:
             status = bpy.ops.render.render(write_still=True, scene=self.scene.name)
         if "FINISHED" not in status:
             raise HostError("Cycles did not finish the wave")
-        channels, _, _ = exr.read_layers(render.filepath)
+        channels, _ = exr.read_layers(render.filepath)
         own = f"{self.layer.name}."
         channels = {name.removeprefix(own): plane for name, plane in channels.items() if name.startswith(own)}
         shape = channels["Combined.R"].shape

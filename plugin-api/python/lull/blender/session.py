@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import time
 import zlib
 from dataclasses import dataclass, field, replace
 from typing import Any, Callable, Optional, Sequence
@@ -11,13 +10,13 @@ from typing import Any, Callable, Optional, Sequence
 import bpy
 import numpy as np
 
-from .. import checkpoint, outputs, png, quote, stopmap
+from .. import checkpoint, outputs, quote
 from ..criterion import Criterion, load
 from ..driver import Driver, Result
 from ..files import Output, check_outputs, write_each
 from ..frame import Frame
 from .cycles import Cycles
-from .view import display_of, is_plain, view_text
+from .view import display_of, is_plain, read_grey, view_text
 
 # Blender's own output path, which nobody has chosen
 _UNSET = ("", "/tmp/", "/tmp\\")
@@ -32,7 +31,6 @@ class Settings:
     spp_max: Optional[int] = None  # None: the scene's Max Samples
     time_budget_s: Optional[float] = None  # None: the scene's Time Limit
     block: Optional[int] = None  # pixels; None: the criterion's own size
-    wave: int = 16
     mask: str = ""
     output: str = ""
     preview: str = ""
@@ -92,10 +90,10 @@ def check_files(frames: Sequence[Settings], criterion: Criterion) -> None:
     """Before anything is rendered: OSError or ValueError for what cannot be written, or must not be."""
     first = frames[0]
     inputs = [*scene_inputs(), first.mask, criterion.info.path, *first.parameters.values()]
-    check_outputs([o for s in frames for o in s.outputs()], [path for path in inputs if path])
+    for settings in frames:
+        check_outputs(settings.outputs(), [path for path in inputs if path])
     for path in {s.checkpoint for s in frames} - {""}:
-        if os.path.exists(path) and os.path.getsize(path) > 0 and not checkpoint.is_one(path):
-            raise ValueError(f"{path}: this is no checkpoint and would be replaced: choose another name")
+        checkpoint.check(path)
 
 
 def _identity(scene: bpy.types.Scene, host: Cycles) -> dict[str, str]:
@@ -117,7 +115,7 @@ class Session:
     """The frame that the scene is at, in the making. Use as a context manager; call run(), or step() from an event loop.
 
     notes: lines for people about what is done otherwise than the scene says. quote: what the dial costs and what coarser
-    ones would, one line, "" before the first check. unsaved: why the checkpoint could not be written, if so.
+    ones would, one line, "" before the first check.
     """
 
     def __init__(self, scene: bpy.types.Scene, settings: Settings, criterion: Optional[Criterion] = None,
@@ -138,17 +136,14 @@ class Session:
                                layers=self.host.passes.names, spp_max=spp_max, time_budget_s=time_s,
                                deterministic=time_s <= 0,
                                spp_min=min(settings.spp_min, spp_max) if settings.spp_max is None else settings.spp_min,
-                               mask=png.read_grey(settings.mask) if settings.mask else None, seed=scene.cycles.seed, **shown)
-            self.driver = Driver(self.frame, self.host.render, wave=settings.wave, threads=self.host.threads,
-                                 identity=_identity(scene, self.host) if settings.checkpoint else None,
-                                 after_call=after_call)
+                               mask=read_grey(settings.mask) if settings.mask else None, seed=scene.cycles.seed, **shown)
+            self.driver = Driver(self.frame, self.host.render, threads=self.host.threads, after_call=after_call,
+                                 identity=_identity(scene, self.host) if settings.checkpoint else None)
         except BaseException:
             self.host.__exit__()
             raise
-        self.quote = ""
-        self.unsaved: Optional[OSError] = None
-        self._told = False
-        self._save_at_s = float("inf")
+        self.quote, self._told = "", False
+        self.keeper: Optional[checkpoint.Keeper] = None
 
     def __enter__(self) -> Session:
         return self
@@ -168,33 +163,28 @@ class Session:
             checkpoint.load(state, self.driver)
             self.host.passes.remember(self.frame)
         if state:
-            self.driver.suspend = lambda _: self.save()
-            self._every_s, self._save_at_s = every_s, time.monotonic() + every_s
+            self.keeper = checkpoint.Keeper(state, self.driver, every_s)
+
+    @property
+    def unsaved(self) -> Optional[OSError]:
+        """Why the checkpoint could not be written, if so."""
+        return self.keeper.unsaved if self.keeper else None
 
     def step(self) -> Optional[Result]:
         """One call of the renderer or one round of checks; the end, or None."""
         result = self.driver.step()
         if not self._told and all(b.asked_spp > 0 or not b.active for b in self.frame.blocks):
             self._told, self.quote = True, quote.line(self.driver)
-        if result is None and time.monotonic() >= self._save_at_s:
-            self.save()
-            self._save_at_s = time.monotonic() + self._every_s
-        if result is not None and result.outcome == "done" and self.settings.checkpoint:
-            self.save()
+        if self.keeper and result:
+            self.keeper.finish(self.driver, result)
+        elif self.keeper:
+            self.keeper.now_and_then(self.driver)
         return result
 
     def run(self) -> Result:
         while (result := self.step()) is None:
             pass
         return result
-
-    def save(self) -> None:
-        """The picture is worth more than its checkpoint: an error is kept for later."""
-        try:
-            checkpoint.save(self.settings.checkpoint, self.driver)
-            self.unsaved = None
-        except OSError as error:
-            self.unsaved = error
 
     def write(self, result: Result) -> tuple[list[str], list[str]]:
         """Writes the files of the settings. Returns their names, and a line for each that could not be written."""
@@ -205,5 +195,5 @@ class Session:
             (s.output, lambda p: outputs.write_exr(p, self.driver, scene, f"lull for Python 1.0; {kernel}",
                                                     self.host.passes.finished(self.frame))),
             (s.preview, lambda p: outputs.write_preview(p, self.driver)),
-            (s.stop_map, lambda p: stopmap.write(p, self.frame.blocks, scene)),
+            (s.stop_map, lambda p: outputs.write_stop_map(p, self.frame, scene)),
             (s.report, lambda p: outputs.write_report(p, self.driver, scene, kernel, interrupted, s.mask or None))))

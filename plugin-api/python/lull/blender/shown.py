@@ -8,7 +8,7 @@ import bpy
 import bpy.utils.previews
 import numpy as np
 
-from .. import outputs, stopmap
+from .. import outputs
 from ..frame import Frame
 
 PICTURE, STOP_MAP = "Lull", "Lull Stop Map"
@@ -16,15 +16,14 @@ _SIDE = 256  # pixels of a small picture
 _small: Optional[bpy.utils.previews.ImagePreviewCollection] = None
 
 
-def _image(name: str, width: int, height: int, is_float: bool) -> bpy.types.Image:
-    """The image of this name, of this size and without a file."""
-    image = bpy.data.images.get(name) or bpy.data.images.new(name, width, height, float_buffer=is_float)
+def _picture(width: int, height: int) -> bpy.types.Image:
+    """The image of the render, of this size and without a file."""
+    image = bpy.data.images.get(PICTURE) or bpy.data.images.new(PICTURE, width, height, float_buffer=True)
     if image.source != "GENERATED" or tuple(image.size) != (width, height):
-        image.source, image.use_generated_float = "GENERATED", is_float
+        image.source, image.use_generated_float = "GENERATED", True
         image.generated_width, image.generated_height = width, height
-    if is_float:
-        image.colorspace_settings.name = "Linear" if bpy.app.version < (4, 0) else "Linear Rec.709"
-        image.use_view_as_render = True
+    image.colorspace_settings.name = "Linear" if bpy.app.version < (4, 0) else "Linear Rec.709"
+    image.use_view_as_render = True
     return image
 
 
@@ -50,19 +49,10 @@ def _show_small(name: str, rgb: np.ndarray) -> None:
 def show_picture(frame: Frame) -> None:
     """The frame as far as it is."""
     mean = frame.cropped(frame.mean())
-    image = _image(PICTURE, mean.shape[1], mean.shape[0], True)
+    image = _picture(mean.shape[1], mean.shape[0])
     image.pixels.foreach_set(_rgba(mean).ravel())
     image.update()
     _show_small(PICTURE, outputs.shown(frame) / 255)
-
-
-def show_stops(frame: Frame) -> None:
-    """The blocks' samples."""
-    rgb = stopmap.draw(frame.blocks) / 255
-    image = _image(STOP_MAP, rgb.shape[1], rgb.shape[0], False)
-    image.pixels.foreach_set(_rgba(rgb).ravel())
-    image.update()
-    _show_small(STOP_MAP, rgb)
 
 
 def show_in_editors(screen: bpy.types.Screen) -> None:
@@ -76,9 +66,14 @@ def show_in_editors(screen: bpy.types.Screen) -> None:
 
 def keep(name: str, path: str) -> None:
     """The image comes from this file from now on, so that it is there when the .blend is opened again."""
-    image = bpy.data.images[name]
+    image = bpy.data.images.get(name) or bpy.data.images.new(name, 1, 1)
     image.source, image.filepath = "FILE", path
     image.reload()
+    if name == STOP_MAP:
+        width, height = image.size
+        rgba = np.empty(width * height * 4, np.float32)
+        image.pixels.foreach_get(rgba)
+        _show_small(name, rgba.reshape(height, width, 4)[::-1, :, :3])
 
 
 def icon(name: str) -> int:

@@ -147,7 +147,6 @@ class LULL_OT_render(bpy.types.Operator):
         session, settings = self._session, context.scene.lull
         session.__exit__()
         shown.show_picture(session.frame)
-        shown.show_stops(session.frame)
         written, failed = session.write(result)
         for name, path in ((shown.PICTURE, session.settings.output), (shown.STOP_MAP, session.settings.stop_map)):
             if path in written:

@@ -12,8 +12,7 @@ from typing import Callable, Optional
 import bpy
 import numpy as np
 
-from .. import png
-from .unnamed import UnnamedFile
+from .unnamed import unnamed_file
 
 LOW, HIGH, STEPS = -14.0, 8.0, 2048  # log2 of the darkest and the brightest grey of the ramp, and their number
 
@@ -44,6 +43,24 @@ def display_of(scene: bpy.types.Scene) -> Optional[Callable[[np.ndarray], np.nda
     return lambda linear: np.interp(linear, greys, shown)
 
 
+def read_grey(path: str) -> np.ndarray:
+    """[height, width] in [0, 1] of a picture file: the mean of its colours as stored, rows from the top."""
+    try:
+        image = bpy.data.images.load(path)
+    except RuntimeError:
+        raise ValueError(f"{path}: cannot be read as a picture") from None
+    try:
+        image.colorspace_settings.name, image.alpha_mode = "Non-Color", "CHANNEL_PACKED"
+        (width, height), channels = image.size, image.channels
+        if not width * height:
+            raise ValueError(f"{path}: cannot be read as a picture")
+        pixels = np.empty(width * height * channels, np.float32)
+        image.pixels.foreach_get(pixels)
+    finally:
+        bpy.data.images.remove(image)
+    return pixels.reshape(height, width, channels)[::-1, :, :min(channels, 3)].mean(-1, dtype=np.float64)
+
+
 def _save_ramp(scene: bpy.types.Scene, greys: np.ndarray) -> np.ndarray:
     """Display codes in [0, 1] of the greys."""
     settings = scene.render.image_settings
@@ -58,9 +75,9 @@ def _save_ramp(scene: bpy.types.Scene, greys: np.ndarray) -> np.ndarray:
                             "color_management": "FOLLOW_SCENE"}.items():
             if name in before:
                 setattr(settings, name, value)
-        with UnnamedFile() as file:
-            image.save_render(file.path, scene=scene)
-            return png.read_grey(file.path)[0]
+        with unnamed_file() as path:
+            image.save_render(path, scene=scene)
+            return read_grey(path)[0]
     finally:
         bpy.data.images.remove(image)
         for name, value in before.items():

@@ -1,0 +1,72 @@
+#include "host/frame.h"
+
+#include <stdlib.h>
+
+#include "base/colour.h"
+#include "base/files.h"
+#include "base/outputs.h"
+#include "picture/png.h"
+
+int32_t lull_host_check_outputs(const struct lull_host_output *outputs, uint32_t output_count, const char *const *inputs,
+                                uint32_t input_count, struct lull_error *err)
+{
+    struct base_outputs list = {0};
+    struct base_inputs read = BASE_INPUTS_EMPTY;
+    struct base_err e = {0};
+    int rc = 0;
+    for (uint32_t i = 0; i < output_count && !rc; i++)
+        rc = base_outputs_add(&list, outputs[i].option, outputs[i].path, &e);
+    for (uint32_t i = 0; i < input_count && !rc; i++)
+        rc = base_inputs_add(&read, inputs[i], &e);
+    if (!rc)
+        rc = base_outputs_protect(&list, &read, &e);
+    base_inputs_release(&read);
+    return rc ? lull_host_translate(&e, err) : LULL_OK;
+}
+
+struct lull_host_file {
+    struct base_file_out out;
+};
+
+int32_t lull_host_file_begin(const char *path, struct lull_host_file **out, int32_t *descriptor, struct lull_error *err)
+{
+    struct base_err e = {0};
+    struct lull_host_file *f = malloc(sizeof *f);
+    if (!f)
+        return lull_host_no_memory(err, path);
+    if (base_file_begin(&f->out, path, &e) != 0) {
+        free(f);
+        return lull_host_translate(&e, err);
+    }
+    *descriptor = fileno(f->out.file);
+    *out = f;
+    return LULL_OK;
+}
+
+int32_t lull_host_file_commit(struct lull_host_file *f, struct lull_error *err)
+{
+    struct base_err e = {0};
+    int rc = base_file_commit(&f->out, &e);
+    free(f);
+    return rc ? lull_host_translate(&e, err) : LULL_OK;
+}
+
+void lull_host_file_abort(struct lull_host_file *f)
+{
+    base_file_abort(&f->out);
+    free(f);
+}
+
+void lull_host_srgb(const double *linear, uint64_t count, uint8_t *codes)
+{
+    for (uint64_t i = 0; i < count; i++)
+        codes[i] = base_srgb_code(linear[i]);
+}
+
+int32_t lull_host_write_png(const char *path, uint32_t width, uint32_t height, const uint8_t *rgb, struct lull_error *err)
+{
+    struct base_err e = {0};
+    if (width > INT32_MAX || height > INT32_MAX)
+        return lull_error_set(err, LULL_E_INVALID, "%s: a picture of %ux%u pixels is too large", path, width, height);
+    return pic_write_png(path, (int32_t)width, (int32_t)height, 3, rgb, &e) ? lull_host_translate(&e, err) : LULL_OK;
+}

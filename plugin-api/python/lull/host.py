@@ -1,0 +1,250 @@
+# SPDX-License-Identifier: MIT
+"""A frame of the host library (lull/host.h): its blocks and totals, when to ask about which, limits, state, report. For
+renderers that keep their own film; lull.Frame is one with sums in numpy."""
+from __future__ import annotations
+
+import contextlib
+import ctypes as C
+import functools
+import weakref
+from typing import Iterator, Mapping, Optional, Sequence, Union
+
+import numpy as np
+
+from . import abi, limits
+from .criterion import PLANES, Criterion, Handle, Plane, Rect
+from .library import LullError, bytes_of, call, library
+
+TRANSFERS = {"linear": abi.TRANSFER_LINEAR, "srgb": abi.TRANSFER_SRGB, "gamma": abi.TRANSFER_GAMMA}
+MAX_SIDE, MAX_PIXELS, MAX_BLOCKS = 32768, 1 << 28, 1 << 20  # a block is an object here: more would fill the memory
+
+
+@functools.lru_cache(maxsize=None)
+def reasons() -> tuple[str, ...]:
+    """Why a block gets no more samples: "none" (it does), "criterion", "spp-max" …; the index is what the EXR holds."""
+    return tuple(library().lull_host_reason(i).decode() for i in range(abi.REASON_COUNT))
+
+
+class Block(abi.HostBlock):  # type: ignore[misc, valid-type]
+    """One block, in the library's memory: the fields of struct lull_host_block. A host writes spp, half_spp, thread_s and
+    dropped; predicted_spp, p_noisy and error are the last answer's, NaN = not known."""
+    frame: Handle  # keeps the memory
+
+    @property
+    def rect(self) -> Rect:
+        return Rect(self.x0, self.y0, self.x1, self.y1)
+
+    @property
+    def active(self) -> bool:
+        """It gets samples."""
+        return abi.HostBlock.reason.__get__(self) == abi.REASON_NONE
+
+    @property
+    def reason(self) -> str:
+        return reasons()[abi.HostBlock.reason.__get__(self)]
+
+
+class Totals(abi.HostTotals):  # type: ignore[misc, valid-type]
+    """Sums over the run (struct lull_host_totals); seconds are wall seconds, but criterion_thread_s: processor seconds."""
+
+    @property
+    def elapsed_s(self) -> float:
+        return self.render_s + self.criterion_s
+
+
+class HostFrame:
+    """Blocks of a picture, and the criterion that is asked about them. Opens the criterion's frame; if one is open on it,
+    this frame makes an instance of its own.
+
+    planes: names of those that every check will be given, "color" among them. block: pixels, one number or (width, height);
+    default the criterion's own size, else 200, or less where that would be fewer than 12 blocks. crop: blocks that it
+    touches are rendered whole. layout: disjoint rectangles instead of a grid. Limits, the first one wins: spp_max samples,
+    time_budget_s seconds (0 = any); spp_min: nobody stops before. uniform: every block gets spp_max samples and the
+    criterion is asked once at the end. max_check_overhead: share of the time that checks may take, 0 = any. max_seam: most ratio of
+    samples of neighbouring blocks, 0 = any. check_step: checks stand at multiples of so many samples. mask: [height, width]
+    in [0, 1], black leaves the criterion's dial (`visible`, else `threshold`) as it is, white takes a quarter of it, grey g
+    4^(-g), in steps of an eighth; the lightest pixel of a block counts. exposure: linear factor before the display transfer
+    ("srgb", "linear", "gamma"). independent: a pixel's samples are not stratified. shared: neighbouring pixels share samples
+    (a splatted filter).
+    view: the rectangle of pixels that planes hold, all blocks among them. first_spp: samples at the first check, at least.
+    """
+
+    def __init__(self, criterion: Criterion, width: int, height: int, planes: Sequence[str], *,
+                 block: Union[int, tuple[int, int], None] = None, crop: Optional[Rect] = None, layout: Sequence[Rect] = (),
+                 spp_min: int = 16, spp_max: int = 10000, time_budget_s: float = 0.0, uniform: bool = False,
+                 max_check_overhead: float = 0.0, max_seam: float = 0.0, check_step: int = 1,
+                 mask: Optional[np.ndarray] = None, seed: int = 0, exposure: float = 1.0, transfer: str = "srgb",
+                 gamma: float = 2.2, sample_clamp: float = 0.0, independent: bool = False, shared: bool = False,
+                 deterministic: bool = True):
+        self.criterion, self.planes = criterion, tuple(planes)
+        self.width, self.height = (limits.whole(n, v, 1, MAX_SIDE) for n, v in (("width", width), ("height", height)))
+        if self.width * self.height > MAX_PIXELS:
+            raise ValueError(f"a picture of {width}x{height}: expected at most 2^28 pixels in all")
+        self.crop = Rect(*(limits.whole("crop", v, -MAX_SIDE, MAX_SIDE) for v in crop or (0, 0, width, height)))
+        if self.crop.pixels == 0:
+            raise ValueError(f"crop {','.join(map(str, self.crop))}: it is empty")
+        size = self._block_size(block)
+        if transfer not in TRANSFERS:
+            raise ValueError(f"transfer '{transfer}': expected one of {', '.join(TRANSFERS)}")
+        self.spp_min, self.spp_max = (limits.whole(n, v, 1, limits.MAX_SPP)
+                                      for n, v in (("spp_min", spp_min), ("spp_max", spp_max)))
+        self.seed = limits.whole("seed", seed, 0, (1 << 64) - 1)
+        self.time_budget_s, self.uniform = limits.real("time_budget_s", time_budget_s, 0, 1e9), uniform
+        self.max_seam, self.check_step = limits.real("max_seam", max_seam, 0, 1e6), check_step
+        self.shown = {"exposure": limits.real("exposure", exposure, 0, above=True), "transfer": transfer,
+                      "gamma": limits.real("gamma", gamma, 0, above=True),
+                      "sample_clamp": limits.real("sample_clamp", sample_clamp, 0), "independent": independent,
+                      "shared": shared}
+        flags = (abi.HOST_UNIFORM * uniform | abi.FRAME_DETERMINISTIC * deterministic | abi.FRAME_INDEPENDENT * independent |
+                 abi.FRAME_SHARED * shared)
+        rects, painted = (abi.Rect * len(layout))(*layout), self._mask_plane(mask)
+        self._begin(abi.sized(
+            abi.HostConfig, flags=flags, width=self.width, height=self.height, block_width=size[0], block_height=size[1],
+            crop=tuple(self.crop), layout=C.addressof(rects) if layout else None, layout_count=len(layout),
+            layout_stride=C.sizeof(abi.Rect), planes=sum(1 << PLANES[name] for name in set(planes)),
+            transfer=TRANSFERS[transfer], gamma=gamma, exposure=exposure, sample_clamp=sample_clamp, spp_min=self.spp_min,
+            spp_max=self.spp_max, seed=self.seed, time_budget_s=self.time_budget_s, max_seam=self.max_seam,
+            max_check_overhead=limits.real("max_check_overhead", max_check_overhead, 0, 1), check_step=check_step,
+            mask=C.addressof(painted) if painted else None))
+
+    def _block_size(self, block: Union[int, tuple[int, int], None]) -> tuple[int, int]:
+        """(width, height), 0 = the library's choice."""
+        if block is None:
+            return 0, 0
+        pair = block if isinstance(block, (tuple, list)) else (block, block)
+        if len(pair) != 2:
+            raise ValueError(f"block {block}: expected one number or (width, height)")
+        w, h = (limits.whole("block", side, 1, 4096) for side in pair)
+        if -(-self.crop.width // w) * -(-self.crop.height // h) > MAX_BLOCKS:
+            raise ValueError(f"a picture of {self.width}x{self.height} in blocks of {w}x{h}: expected at most 2^20 blocks: "
+                             "take larger ones")
+        return w, h
+
+    def _mask_plane(self, mask: Optional[np.ndarray]) -> Optional[abi.Plane]:
+        if mask is None:
+            return None
+        grey = np.ascontiguousarray(limits.unmasked("mask", mask), np.float64)
+        if grey.shape != (self.height, self.width):
+            raise ValueError(f"mask of shape {grey.shape}: expected the picture's, [{self.height}, {self.width}]")
+        if not ((grey >= 0) & (grey <= 1)).all():
+            raise ValueError("mask: expected values in [0, 1]")
+        plane = Plane(grey).describe("mask", self.height, self.width)
+        plane.kept = grey
+        return plane
+
+    def _begin(self, config: abi.HostConfig) -> None:
+        used = self.criterion.frame
+        self.judge = self.criterion.with_parameters() if used is not None and used() else self.criterion
+        with self.judge.alone() as judge:
+            self.handle = Handle("lull_host_end", self.judge.handle)  # a report tells of the criterion
+            call("host_begin", C.byref(config), judge, C.byref(self.handle.pointer))
+            self.judge.frame = weakref.ref(self.handle)
+        self.layout = abi.HostBlocks.from_address(library().lull_host_blocks_of(self.handle.pointer))
+        self.blocks: list[Block] = list((Block * self.layout.count).from_address(self.layout.list))
+        for b in self.blocks:
+            b.frame = self.handle
+        self.totals = Totals.from_address(library().lull_host_totals_of(self.handle.pointer))
+        self.totals.frame = self.handle
+        self.view = Rect(self.layout.x0, self.layout.y0, self.layout.x1, self.layout.y1)
+        self.first_spp = max(self.spp_min, self.criterion.needs.first_spp)
+
+    @property
+    def active(self) -> list[int]:
+        """Indices of the blocks that still get samples."""
+        return [i for i, b in enumerate(self.blocks) if b.active]
+
+    @property
+    def dials(self) -> list[float]:
+        """For each block, the factor that the mask gives the criterion's dial."""
+        return [library().lull_host_dial(b.step) for b in self.blocks]
+
+    # --- asking --------------------------------------------------------------------------------------------------------
+
+    def planes_now(self) -> Mapping[str, Plane]:
+        """What a criterion is shown where no planes are given. "dropped" and "dropped_half" (uint32) are samples left out of
+        the sums of each pixel."""
+        raise ValueError("this frame keeps no picture: give the planes")
+
+    def _shown(self, planes: Optional[Mapping[str, Plane]]) -> abi.HostView:
+        """The view."""
+        planes = dict(self.planes_now() if planes is None else planes)
+        if "color" not in planes:
+            raise ValueError("the plane color is missing")
+        table, (height, width) = (abi.Plane * abi.PLANE_COUNT)(), (self.view.height, self.view.width)
+        left_out = {name: planes.pop(name).describe(name, height, width) for name in ("dropped", "dropped_half")
+                    if name in planes}
+        for name, plane in planes.items():
+            table[PLANES[name]] = plane.describe(name, height, width)
+        view = abi.sized(abi.HostView, plane_count=abi.PLANE_COUNT, x0=self.view.x0, y0=self.view.y0, x1=self.view.x1,
+                         y1=self.view.y1, planes=C.addressof(table),
+                         **{name: C.addressof(plane) for name, plane in left_out.items()})
+        view.kept = table, left_out, planes
+        return view
+
+    @contextlib.contextmanager
+    def _asking(self) -> Iterator[C.c_void_p]:
+        """The frame's own instance, alone; the error of a frame that was closed."""
+        if not self._is_open():
+            raise LullError(abi.E_STATE, f"criterion {self.judge.info.id}: this frame was closed: make a new Frame")
+        with self.judge.alone() as pointer:
+            yield pointer
+
+    def _is_open(self) -> bool:
+        return self.judge.frame is not None and self.judge.frame() is self.handle
+
+    def check(self, planes: Optional[Mapping[str, Plane]] = None) -> None:
+        """To be called when every active block is at its next_spp: asks about them, stops or schedules each. LullError when
+        the criterion fails: all blocks go on. planes: by name, over the pixels of `view`, as they lie in memory."""
+        view = self._shown(planes)
+        with self._asking():
+            call("host_check", self.handle.pointer, C.byref(view))
+
+    def stop(self, reason: int, planes: Optional[Mapping[str, Plane]] = None) -> None:
+        """Closes the active blocks (reason: abi.REASON_TIME or REASON_INTERRUPT); the criterion is asked once more about
+        them, for the report."""
+        view = self._shown(planes)
+        with self._asking():
+            call("host_stop", self.handle.pointer, reason, C.byref(view))
+
+    def evaluate(self, due: Sequence[int], planes: Optional[Mapping[str, Plane]] = None,
+                 criterion: Optional[Criterion] = None) -> list[abi.Decision]:
+        """Asks about blocks[i] for i in due, rising; nothing is noted. criterion: another one, opened for this frame."""
+        view, count = self._shown(planes), len(due)
+        answers = (abi.Decision * max(count, 1))()
+        with criterion.alone() if criterion else self._asking() as judge:
+            call("host_evaluate", judge, self.handle.pointer, C.byref(view), (C.c_uint32 * max(count, 1))(*due), None, count,
+                 answers)
+        return list(answers[:count])
+
+    def join(self, criterion: Criterion) -> None:
+        """Opens the frame for one more criterion, for evaluate()."""
+        with criterion.alone() as pointer:
+            call("host_join", self.handle.pointer, pointer)
+            criterion.frame = weakref.ref(self.handle)
+
+    def outlook(self, threads: int) -> abi.HostForecast:
+        """What is left: struct lull_host_forecast. threads: of the renderer."""
+        forecast = abi.HostForecast()
+        call("host_outlook", C.byref(self.layout), C.byref(self.totals), threads, C.byref(forecast))
+        return forecast
+
+    # --- state ---------------------------------------------------------------------------------------------------------
+
+    def save_state(self) -> bytes:
+        """Blocks, totals and the criterion's history."""
+        with self.judge.alone():
+            return bytes_of("host_save", self.handle.pointer)
+
+    def load_state(self, data: bytes, name: str = "state") -> None:
+        """Into a frame like the saved one, limits aside: blocks that a limit or an interrupt had closed are active again as
+        far as the limits of this frame allow. name: of the file, for messages. Refused bytes (LullError) change nothing."""
+        with self.judge.alone():
+            call("host_load", self.handle.pointer, data, C.c_uint64(len(data)), name.encode())
+            library().lull_host_extend(C.byref(self.layout))
+
+    def close(self) -> None:
+        """Ends the criterion's frame; blocks, totals and report stay readable."""
+        if self._is_open():
+            self.judge.frame = None
+        if self.judge is not self.criterion:
+            self.judge.close()
