@@ -65,13 +65,6 @@ static int read_entity(struct parser *p, struct pt_loc loc, int target)
     return rc;
 }
 
-static int check_world(struct parser *p, struct pt_loc loc, const char *name)
-{
-    if (p->in_world)
-        return 0;
-    return pt_diag_fail(&p->b->diag, loc, "%s before WorldBegin", name);
-}
-
 /* --- blocks ----------------------------------------------------------------------------------------------------------- */
 
 static int push(struct parser *p, char kind, struct pt_loc loc)
@@ -87,15 +80,25 @@ static const char *begin_name(char kind)
     return kind == 'A' ? "AttributeBegin" : kind == 'T' ? "TransformBegin" : kind == 'O' ? "ObjectBegin" : "Import";
 }
 
+/* The block that was opened last and is still open, or NULL. */
+static const struct frame *innermost(const struct parser *p)
+{
+    return p->frames.count > 0 ? (const struct frame *)p->frames.items + p->frames.count - 1 : NULL;
+}
+
+static int fail_open(struct parser *p, struct pt_loc loc, const char *name)
+{
+    return pt_diag_fail(&p->b->diag, loc, "%s where the %s of line %d is still open", name, begin_name(innermost(p)->kind),
+                        innermost(p)->loc.line);
+}
+
 static int pop(struct parser *p, char kind, struct pt_loc loc, const char *end_name)
 {
-    struct frame *frames = p->frames.items;
-    if (p->frames.count == 0 || frames[p->frames.count - 1].kind == 'I')
+    const struct frame *top = innermost(p);
+    if (!top || top->kind == 'I')
         return pt_diag_fail(&p->b->diag, loc, "%s without %s", end_name, begin_name(kind));
-    struct frame *top = &frames[p->frames.count - 1];
     if (top->kind != kind)
-        return pt_diag_fail(&p->b->diag, loc, "%s where the %s of line %d is still open", end_name, begin_name(top->kind),
-                            top->loc.line);
+        return fail_open(p, loc, end_name);
     if (kind == 'T') {
         memcpy(p->state.ctm, top->state.ctm, sizeof p->state.ctm);
         p->state.active = top->state.active;
@@ -106,11 +109,7 @@ static int pop(struct parser *p, char kind, struct pt_loc loc, const char *end_n
     return 0;
 }
 
-static int do_attribute_begin(struct parser *p, struct pt_loc loc)
-{
-    int rc = check_world(p, loc, "AttributeBegin");
-    return rc ? rc : push(p, 'A', loc);
-}
+static int do_attribute_begin(struct parser *p, struct pt_loc loc) { return push(p, 'A', loc); }
 
 static int do_attribute_end(struct parser *p, struct pt_loc loc) { return pop(p, 'A', loc, "AttributeEnd"); }
 
@@ -121,11 +120,10 @@ static int do_transform_end(struct parser *p, struct pt_loc loc) { return pop(p,
 static int do_object_begin(struct parser *p, struct pt_loc loc)
 {
     char name[NAME_MAX_BYTES];
-    int rc = check_world(p, loc, "ObjectBegin");
-    if (!rc && (rc = pt_parser_read_string(p, "object name", name, sizeof name)) == 0 &&
-        (rc = pt_build_object_begin(p->b, name, loc)) == 0)
-        rc = push(p, 'O', loc);
-    return rc;
+    int rc = pt_parser_read_string(p, "object name", name, sizeof name);
+    if (!rc)
+        rc = pt_build_object_begin(p->b, name, loc);
+    return rc ? rc : push(p, 'O', loc);
 }
 
 static int do_object_end(struct parser *p, struct pt_loc loc)
@@ -137,10 +135,8 @@ static int do_object_end(struct parser *p, struct pt_loc loc)
 static int do_object_instance(struct parser *p, struct pt_loc loc)
 {
     char name[NAME_MAX_BYTES];
-    int rc = check_world(p, loc, "ObjectInstance");
-    if (!rc && (rc = pt_parser_read_string(p, "object name", name, sizeof name)) == 0)
-        rc = pt_build_instance(p->b, &p->state, name, loc);
-    return rc;
+    int rc = pt_parser_read_string(p, "object name", name, sizeof name);
+    return rc ? rc : pt_build_instance(p->b, &p->state, name, loc);
 }
 
 static int do_reverse_orientation(struct parser *p, struct pt_loc loc)
@@ -199,16 +195,19 @@ static int do_pixel_filter(struct parser *p, struct pt_loc loc)
     return read_header(p, loc, PT_HEADER_FILTER, "PixelFilter");
 }
 
-static int do_accelerator(struct parser *p, struct pt_loc loc) { return read_entity(p, loc, -1); /* the choice is ours */ }
+/* The choice is ours. */
+static int do_accelerator(struct parser *p, struct pt_loc loc)
+{
+    (void)p, (void)loc;
+    return 0;
+}
 
 static int do_world_begin(struct parser *p, struct pt_loc loc)
 {
     if (p->in_world)
         return pt_diag_fail(&p->b->diag, loc, "WorldBegin occurs twice");
-    if (p->frames.count > 0)
-        return pt_diag_fail(&p->b->diag, loc, "WorldBegin where the %s of line %d is still open",
-                            begin_name(((struct frame *)p->frames.items)[p->frames.count - 1].kind),
-                            ((struct frame *)p->frames.items)[p->frames.count - 1].loc.line);
+    if (innermost(p))
+        return fail_open(p, loc, "WorldBegin");
     p->in_world = 1;
     p->state.ctm[0] = p->state.ctm[1] = pt_xform_identity();
     p->state.active = 3;
@@ -218,57 +217,40 @@ static int do_world_begin(struct parser *p, struct pt_loc loc)
 
 static int do_world_end(struct parser *p, struct pt_loc loc)
 {
-    int rc = check_world(p, loc, "WorldEnd");
-    if (!rc && p->frames.count > 0)
-        rc = pt_diag_fail(&p->b->diag, loc, "WorldEnd where the %s of line %d is still open",
-                          begin_name(((struct frame *)p->frames.items)[p->frames.count - 1].kind),
-                          ((struct frame *)p->frames.items)[p->frames.count - 1].loc.line);
     p->ended = 1;
-    return rc;
+    return innermost(p) ? fail_open(p, loc, "WorldEnd") : 0;
 }
 
 /* --- world ------------------------------------------------------------------------------------------------------------ */
 
 static int do_shape(struct parser *p, struct pt_loc loc)
 {
-    int rc = check_world(p, loc, "Shape");
-    if (!rc && (rc = read_entity(p, loc, PT_ATTR_SHAPE)) == 0)
-        rc = pt_build_shape(p->b, &p->state, &p->params);
-    return rc;
+    (void)loc;
+    return pt_build_shape(p->b, &p->state, &p->params);
 }
 
 static int do_light_source(struct parser *p, struct pt_loc loc)
 {
-    int rc = check_world(p, loc, "LightSource");
-    if (!rc && (rc = read_entity(p, loc, PT_ATTR_LIGHT)) == 0)
-        rc = pt_build_light(p->b, &p->state, &p->params);
-    return rc;
+    (void)loc;
+    return pt_build_light(p->b, &p->state, &p->params);
 }
 
 static int do_area_light_source(struct parser *p, struct pt_loc loc)
 {
-    int rc = check_world(p, loc, "AreaLightSource");
-    if (!rc && (rc = read_entity(p, loc, PT_ATTR_LIGHT)) == 0)
-        rc = pt_build_area_light(p->b, &p->state, &p->params, &p->state.area);
-    return rc;
+    (void)loc;
+    return pt_build_area_light(p->b, &p->state, &p->params, &p->state.area);
 }
 
 static int do_material(struct parser *p, struct pt_loc loc)
 {
-    int rc = check_world(p, loc, "Material");
-    if (!rc && (rc = read_entity(p, loc, PT_ATTR_MATERIAL)) == 0) {
-        p->state.material = pt_build_material(p->b, &p->state, pt_params_kind(&p->params), &p->params);
-        rc = p->b->diag.rc;
-    }
-    return rc;
+    (void)loc;
+    p->state.material = pt_build_material(p->b, &p->state, pt_params_kind(&p->params), &p->params);
+    return p->b->diag.rc;
 }
 
 static int do_make_named_material(struct parser *p, struct pt_loc loc)
 {
     char kind[NAME_MAX_BYTES], name[NAME_MAX_BYTES];
-    int rc = check_world(p, loc, "MakeNamedMaterial");
-    if (rc || (rc = read_entity(p, loc, PT_ATTR_MATERIAL)) != 0)
-        return rc;
     const char *type = pt_params_string(&p->params, "type", NULL);
     if (!type)
         return pt_diag_fail(&p->b->diag, loc, "MakeNamedMaterial \"%s\" without \"string type\"",
@@ -285,31 +267,28 @@ static int do_make_named_material(struct parser *p, struct pt_loc loc)
 static int do_named_material(struct parser *p, struct pt_loc loc)
 {
     char name[NAME_MAX_BYTES];
-    int rc = check_world(p, loc, "NamedMaterial");
-    if (!rc && (rc = pt_parser_read_string(p, "material name", name, sizeof name)) == 0) {
-        p->state.material = pt_build_material_named(p->b, loc, name);
-        rc = p->b->diag.rc;
-    }
-    return rc;
+    int rc = pt_parser_read_string(p, "material name", name, sizeof name);
+    if (rc)
+        return rc;
+    p->state.material = pt_build_material_named(p->b, loc, name);
+    return p->b->diag.rc;
 }
 
 static int do_texture(struct parser *p, struct pt_loc loc)
 {
     char name[NAME_MAX_BYTES], type[64];
-    int rc = check_world(p, loc, "Texture");
-    if (!rc && (rc = pt_parser_read_string(p, "texture name", name, sizeof name)) == 0 &&
-        (rc = pt_parser_read_string(p, "texture type", type, sizeof type)) == 0 &&
-        (rc = read_entity(p, loc, PT_ATTR_TEXTURE)) == 0)
-        rc = pt_build_texture(p->b, &p->state, name, type, &p->params);
-    return rc;
+    int rc = pt_parser_read_string(p, "texture name", name, sizeof name);
+    if (!rc)
+        rc = pt_parser_read_string(p, "texture type", type, sizeof type);
+    if (!rc)
+        rc = read_entity(p, loc, PT_ATTR_TEXTURE);
+    return rc ? rc : pt_build_texture(p->b, &p->state, name, type, &p->params);
 }
 
 static int do_make_named_medium(struct parser *p, struct pt_loc loc)
 {
     char name[NAME_MAX_BYTES];
-    int rc = read_entity(p, loc, PT_ATTR_MEDIUM);
-    if (rc)
-        return rc;
+    (void)loc;
     strcpy(name, pt_params_kind(&p->params));
     return pt_build_medium(p->b, &p->state, name, &p->params);
 }
@@ -332,9 +311,7 @@ static int do_medium_interface(struct parser *p, struct pt_loc loc)
 static int do_attribute(struct parser *p, struct pt_loc loc)
 {
     static const char *const targets[] = {"shape", "light", "material", "medium", "texture"};
-    int rc = read_entity(p, loc, -1), target = -1;
-    if (rc)
-        return rc;
+    int rc, target = -1;
     for (int i = 0; i < PT_ATTR_COUNT; i++)
         if (strcmp(pt_params_kind(&p->params), targets[i]) == 0)
             target = i;
@@ -397,67 +374,74 @@ static int include(struct parser *p, struct pt_loc loc, int scoped)
 
 static int do_include(struct parser *p, struct pt_loc loc) { return include(p, loc, 0); }
 
-static int do_import(struct parser *p, struct pt_loc loc)
-{
-    int rc = check_world(p, loc, "Import");
-    return rc ? rc : include(p, loc, 1);
-}
+static int do_import(struct parser *p, struct pt_loc loc) { return include(p, loc, 1); }
 
 /* --- the loop --------------------------------------------------------------------------------------------------------- */
 
-static const struct {
-    const char *name;
-    directive *run;
-} directives[] = {
-    {"Shape", do_shape},
-    {"AttributeBegin", do_attribute_begin},
-    {"AttributeEnd", do_attribute_end},
-    {"ObjectInstance", do_object_instance},
-    {"NamedMaterial", do_named_material},
-    {"Material", do_material},
-    {"MakeNamedMaterial", do_make_named_material},
-    {"Texture", do_texture},
-    {"ObjectBegin", do_object_begin},
-    {"ObjectEnd", do_object_end},
-    {"Include", do_include},
-    {"Import", do_import},
-    {"LightSource", do_light_source},
-    {"AreaLightSource", do_area_light_source},
-    {"TransformBegin", do_transform_begin},
-    {"TransformEnd", do_transform_end},
-    {"ReverseOrientation", do_reverse_orientation},
-    {"MakeNamedMedium", do_make_named_medium},
-    {"MediumInterface", do_medium_interface},
-    {"Attribute", do_attribute},
-    {"ColorSpace", do_color_space},
-    {"Option", do_option},
-    {"Film", do_film},
-    {"Camera", do_camera},
-    {"Sampler", do_sampler},
-    {"Integrator", do_integrator},
-    {"SurfaceIntegrator", do_integrator},
-    {"VolumeIntegrator", do_accelerator},
-    {"Renderer", do_accelerator},
-    {"PixelFilter", do_pixel_filter},
-    {"Accelerator", do_accelerator},
-    {"WorldBegin", do_world_begin},
-    {"WorldEnd", do_world_end},
+static const struct directive directives[] = {
+    {"Shape", do_shape, 1, READ_FOR_SHAPE},
+    {"AttributeBegin", do_attribute_begin, 1, READ_NOTHING},
+    {"AttributeEnd", do_attribute_end, 0, READ_NOTHING},
+    {"ObjectInstance", do_object_instance, 1, READ_NOTHING},
+    {"NamedMaterial", do_named_material, 1, READ_NOTHING},
+    {"Material", do_material, 1, READ_FOR_MATERIAL},
+    {"MakeNamedMaterial", do_make_named_material, 1, READ_FOR_MATERIAL},
+    {"Texture", do_texture, 1, READ_NOTHING},
+    {"ObjectBegin", do_object_begin, 1, READ_NOTHING},
+    {"ObjectEnd", do_object_end, 0, READ_NOTHING},
+    {"Include", do_include, 0, READ_NOTHING},
+    {"Import", do_import, 1, READ_NOTHING},
+    {"LightSource", do_light_source, 1, READ_FOR_LIGHT},
+    {"AreaLightSource", do_area_light_source, 1, READ_FOR_LIGHT},
+    {"TransformBegin", do_transform_begin, 0, READ_NOTHING},
+    {"TransformEnd", do_transform_end, 0, READ_NOTHING},
+    {"ReverseOrientation", do_reverse_orientation, 0, READ_NOTHING},
+    {"MakeNamedMedium", do_make_named_medium, 0, READ_FOR_MEDIUM},
+    {"MediumInterface", do_medium_interface, 0, READ_NOTHING},
+    {"Attribute", do_attribute, 0, READ_PLAIN},
+    {"ColorSpace", do_color_space, 0, READ_NOTHING},
+    {"Option", do_option, 0, READ_NOTHING},
+    {"Film", do_film, 0, READ_NOTHING},
+    {"Camera", do_camera, 0, READ_NOTHING},
+    {"Sampler", do_sampler, 0, READ_NOTHING},
+    {"Integrator", do_integrator, 0, READ_NOTHING},
+    {"SurfaceIntegrator", do_integrator, 0, READ_NOTHING},
+    {"VolumeIntegrator", do_accelerator, 0, READ_PLAIN},
+    {"Renderer", do_accelerator, 0, READ_PLAIN},
+    {"PixelFilter", do_pixel_filter, 0, READ_NOTHING},
+    {"Accelerator", do_accelerator, 0, READ_PLAIN},
+    {"WorldBegin", do_world_begin, 0, READ_NOTHING},
+    {"WorldEnd", do_world_end, 1, READ_NOTHING},
+    {0},
 };
 
-static directive *find_directive(const struct pt_token *t)
+static const struct directive *find_directive(const struct directive *list, const struct pt_token *t)
 {
-    for (size_t i = 0; i < sizeof directives / sizeof directives[0]; i++)
-        if (strlen(directives[i].name) == t->length && memcmp(directives[i].name, t->text, t->length) == 0)
-            return directives[i].run;
-    return pt_parser_transform_directive(t->text, t->length);
+    for (; list->name && t->kind == PT_TOKEN_WORD; list++)
+        if (strlen(list->name) == t->length && memcmp(list->name, t->text, t->length) == 0)
+            return list;
+    return NULL;
+}
+
+static int run_directive(struct parser *p, const struct pt_token *t)
+{
+    const struct directive *d = find_directive(directives, t);
+    if (!d)
+        d = find_directive(pt_transform_directives, t);
+    if (!d)
+        return pt_diag_fail(&p->b->diag, t->loc, "unknown directive \"%.*s\" (expected Shape, Material, AttributeBegin …)",
+                            t->length < 40 ? (int)t->length : 40, t->text);
+    if (d->in_world && !p->in_world)
+        return pt_diag_fail(&p->b->diag, t->loc, "%s before WorldBegin", d->name);
+    int rc = d->reads == READ_NOTHING ? 0 : read_entity(p, t->loc, (int)d->reads - READ_FOR_SHAPE);
+    return rc ? rc : d->run(p, t->loc);
 }
 
 static int finish(struct parser *p, struct pt_loc loc)
 {
-    if (p->frames.count > 0) {
-        const struct frame *top = &((struct frame *)p->frames.items)[p->frames.count - 1];
+    const struct frame *top = innermost(p);
+    if (top)
         return pt_diag_fail(&p->b->diag, top->loc, "%s is never closed", begin_name(top->kind));
-    }
     if (!p->in_world)
         return pt_diag_fail(&p->b->diag, loc, "the file ends without WorldBegin");
     return pt_build_media_check(p->b);
@@ -467,13 +451,12 @@ static int run(struct parser *p)
 {
     for (;;) {
         struct pt_token t = pt_lexer_next(&p->lexer);
-        int rc = 0;
         if (t.kind == PT_TOKEN_END)
             return finish(p, t.loc);
         if (t.kind == PT_TOKEN_BAD)
             return p->b->diag.rc;
         if (t.kind == PT_TOKEN_FILE_END) {
-            struct frame *top = &((struct frame *)p->frames.items)[p->frames.count - 1];
+            const struct frame *top = innermost(p);
             if (top->kind != 'I')
                 return pt_diag_fail(&p->b->diag, top->loc, "%s is never closed in its file", begin_name(top->kind));
             p->state = top->state;
@@ -484,16 +467,9 @@ static int run(struct parser *p)
             pt_diag_warn(&p->b->diag, t.loc, "text after WorldEnd is ignored");
             return finish(p, t.loc);
         }
-        directive *d = t.kind == PT_TOKEN_WORD ? find_directive(&t) : NULL;
-        if (!d)
-            return pt_diag_fail(&p->b->diag, t.loc,
-                                "unknown directive \"%.*s\" (expected Shape, Material, AttributeBegin …)",
-                                t.length < 40 ? (int)t.length : 40, t.text);
-        rc = d(p, t.loc);
-        if (rc)
-            return rc;
-        if (p->b->diag.rc)
-            return p->b->diag.rc;
+        int rc = run_directive(p, &t);
+        if (rc || p->b->diag.rc)
+            return rc ? rc : p->b->diag.rc;
     }
 }
 

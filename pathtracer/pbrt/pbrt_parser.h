@@ -26,7 +26,22 @@ struct parser {
     int in_world, ended;
 };
 
-typedef int directive(struct parser *p, struct pt_loc loc);
+/* What is read before a directive runs: nothing, or kind and parameters into parser.params, with those of an Attribute. */
+enum directive_reads {
+    READ_NOTHING,
+    READ_PLAIN,
+    READ_FOR_SHAPE, /* and on in the order of enum pt_attribute */
+    READ_FOR_LIGHT,
+    READ_FOR_MATERIAL,
+    READ_FOR_MEDIUM
+};
+
+struct directive {
+    const char *name;
+    int (*run)(struct parser *p, struct pt_loc loc);
+    int in_world; /* refused before WorldBegin */
+    enum directive_reads reads;
+};
 
 /* A quoted string, with or without brackets, of less than `room` bytes; `what` names it in errors. */
 int pt_parser_read_string(struct parser *p, const char *what, char *out, size_t room);
@@ -34,7 +49,7 @@ int pt_parser_read_string(struct parser *p, const char *what, char *out, size_t 
 int pt_parser_read_numbers(struct parser *p, const char *directive_name, double *out, int count);
 /* Names a coordinate system. */
 int pt_parser_save_system(struct parser *p, const char *name, const struct pt_xform ctm[2]);
-/* The directive of that name that concerns transforms, or NULL. */
-directive *pt_parser_transform_directive(const char *name, size_t length);
+/* The directives that concern transforms; ends with {0}. */
+extern const struct directive pt_transform_directives[];
 
 #endif

@@ -139,24 +139,17 @@ static int do_transform_times(struct parser *p, struct pt_loc loc)
     return 0;
 }
 
-directive *pt_parser_transform_directive(const char *name, size_t length)
-{
-    static const struct {
-        const char *name;
-        directive *run;
-    } directives[] = {{"Transform", do_transform},
-                      {"ConcatTransform", do_concat_transform},
-                      {"Translate", do_translate},
-                      {"Rotate", do_rotate},
-                      {"Scale", do_scale},
-                      {"Identity", do_identity},
-                      {"LookAt", do_look_at},
-                      {"CoordinateSystem", do_coordinate_system},
-                      {"CoordSysTransform", do_coord_sys_transform},
-                      {"ActiveTransform", do_active_transform},
-                      {"TransformTimes", do_transform_times}};
-    for (size_t i = 0; i < sizeof directives / sizeof directives[0]; i++)
-        if (strlen(directives[i].name) == length && memcmp(directives[i].name, name, length) == 0)
-            return directives[i].run;
-    return NULL;
-}
+const struct directive pt_transform_directives[] = {
+    {.name = "Transform", .run = do_transform},
+    {.name = "ConcatTransform", .run = do_concat_transform},
+    {.name = "Translate", .run = do_translate},
+    {.name = "Rotate", .run = do_rotate},
+    {.name = "Scale", .run = do_scale},
+    {.name = "Identity", .run = do_identity},
+    {.name = "LookAt", .run = do_look_at},
+    {.name = "CoordinateSystem", .run = do_coordinate_system},
+    {.name = "CoordSysTransform", .run = do_coord_sys_transform},
+    {.name = "ActiveTransform", .run = do_active_transform},
+    {.name = "TransformTimes", .run = do_transform_times},
+    {0},
+};
