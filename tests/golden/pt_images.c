@@ -46,16 +46,20 @@ struct picture {
     uint64_t met[PT_MET_COUNT]; /* vertices of one path in each pixel, by what they are */
 };
 
-/* A value may be off by this share of itself and of the plane's mean: five digits are recorded. */
-static const double TOLERANCE = 1e-4;
 /*
- * Where the processor and the libraries round as they did for the record, no pixel may be off. Elsewhere rounding sends a
+ * How near is the same says the first line of the record: a value may be off by a share of itself and of the plane's mean (five digits
+ * are recorded). Where the processor and the libraries round as they did for the record, no pixel may be off. Elsewhere rounding sends a
  * path here and there another way, which shows in its pixel: of Embree's code for SSE4.2, AVX and AVX2 against AVX-512,
  * 1.1 % of the pixels at most, and 14 % of one scene. The exceptions below have many places that lie just on an edge or a
  * portal, bumps that a last digit of uv tips, or random numbers that depend on the last digits of directions: their planes
  * must keep their means.
  */
-static const double OFF_IN_ALL = 0.03, OFF_IN_ONE = 0.2, MEAN_OFF = 0.1;
+static struct {
+    double value, off_in_all, off_in_one, mean; /* the last three in percent */
+} tolerance;
+#define TOLERANCE_LINE \
+    "# tolerance %lg of a value; pixels off where rounding differs: %lg %% in all, %lg %% of a scene; else means within " \
+    "%lg %%"
 static int off_in_all, pixels_in_all, strict; /* … this machine rounds as that of the record */
 static const char *const fickle[] = {"coated", "rock-garden", "window", "golden/walked-coats"};
 
@@ -235,8 +239,10 @@ static int read_file(void **state)
 {
     static char line[LINE_ROOM];
     FILE *file = fopen(file_name, "r");
-    int ok = file != NULL;
     (void)state;
+    int ok =
+        file && fgets(line, sizeof line, file) &&
+        sscanf(line, TOLERANCE_LINE, &tolerance.value, &tolerance.off_in_all, &tolerance.off_in_one, &tolerance.mean) == 4;
     while (ok && fgets(line, sizeof line, file) != NULL)
         ok = line[0] == '#' || read_line(line);
     if (file)
@@ -276,7 +282,10 @@ static void write_picture(FILE *file, const char *name, const struct picture *p)
 
 /* --- comparing -------------------------------------------------------------------------------------------------------- */
 
-static int is_off(double got, double want, double mean) { return !(fabs(got - want) <= TOLERANCE * (fabs(want) + mean)); }
+static int is_off(double got, double want, double mean)
+{
+    return !(fabs(got - want) <= tolerance.value * (fabs(want) + mean));
+}
 
 static double mean_of(const double *plane)
 {
@@ -345,7 +354,7 @@ static void check_picture(const char *path, const struct way *way, FILE *out)
     if (off > 0 && !strict && is_fickle(name)) {
         for (int c = 0; c < PLANE_COUNT; c++) {
             double mean = mean_of(got.plane[c]), was = mean_of(r->picture.plane[c]);
-            if (!(fabs(mean - was) <= MEAN_OFF * was))
+            if (!(fabs(mean - was) <= tolerance.mean / 100 * was))
                 fail_msg("%s: the mean of %s is %g, was %g", name, plane_names[c], mean, was);
         }
         return;
@@ -356,7 +365,7 @@ static void check_picture(const char *path, const struct way *way, FILE *out)
         print_message("%s: %d of %d pixels are not as recorded, the first %d, %d: %s %.6g, was %.6g\n", name, off, PIXELS,
                       pixel % WIDTH, pixel / WIDTH, plane_names[plane], got.plane[plane][pixel],
                       r->picture.plane[plane][pixel]);
-    if (off > (strict ? 0 : OFF_IN_ONE * PIXELS))
+    if (off > (strict ? 0 : tolerance.off_in_one / 100 * PIXELS))
         fail_msg("%s has changed", name);
 }
 
@@ -401,15 +410,16 @@ static void all_were_looked_at(void **state)
         if (!records[i].looked_at)
             fail_msg("%s: %s is no longer drawn", file_name, records[i].name);
     print_message("%d of %d pixels are off\n", off_in_all, pixels_in_all);
-    if (off_in_all > OFF_IN_ALL * pixels_in_all)
+    if (off_in_all > tolerance.off_in_all / 100 * pixels_in_all)
         fail_msg("more pixels are off than rounding explains");
 }
 
 static int record_anew(void)
 {
-    FILE *out = fopen(file_name, "w");
+    FILE *out = read_file(NULL) == 0 ? fopen(file_name, "w") : NULL; /* its tolerance stays */
     if (!out)
         return 1;
+    fprintf(out, TOLERANCE_LINE "\n", tolerance.value, tolerance.off_in_all, tolerance.off_in_one, tolerance.mean);
     fprintf(out,
             "# Made by RECORD=1 build/tests/golden/pt_images: %d x %d pixels, %d samples, row by row. See pt_images.c.\n",
             WIDTH, HEIGHT, SPP);
