@@ -10,9 +10,11 @@
 #define GGN_CLI_COMMANDS_H
 
 #include <stddef.h>
+#include <stdint.h>
 
 #include "base/err.h"
 #include "base/team.h"
+#include "picture/read.h"
 
 /* X(name, one-line help), in the order `ggn --help` lists them. */
 #define GGN_COMMANDS(X) \
@@ -47,7 +49,10 @@ void ggn_cmd_follow_rank_0(void);
 /* Is the i-th of equal pieces of work this process's? Always, when it is alone. */
 int ggn_cmd_is_mine(long i);
 
-/* Says on stderr how many pixels of the image at `path` could not be shown as they are, if any. */
-void ggn_cmd_tell_clipped(const char *command, const char *path, size_t clipped);
+/* Reads the two pictures that a command compares, of equal size; says on stderr how many pixels of one could not be shown as
+ * they are. images: zeroed; the caller releases both, also after a failure. */
+int ggn_cmd_read_pair(const char *command, const char *const paths[2], struct pic_image images[2], struct base_err *err);
+/* Magma colours of gain times each of n values, [n][3]; the caller frees them. NULL without memory. */
+uint8_t *ggn_cmd_magma(const float *map, double gain, size_t n);
 
 #endif

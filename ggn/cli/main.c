@@ -6,6 +6,7 @@
 #include "base/interrupt.h"
 #include "base/options.h"
 #include "cli/commands.h"
+#include "picture/colour_map.h"
 
 struct command {
     const char *name;
@@ -31,11 +32,27 @@ void ggn_cmd_follow_rank_0(void)
         base_interrupt_ignore();
 }
 
-void ggn_cmd_tell_clipped(const char *command, const char *path, size_t clipped)
+int ggn_cmd_read_pair(const char *command, const char *const paths[2], struct pic_image images[2], struct base_err *err)
 {
-    if (clipped > 0)
-        fprintf(stderr, "%s: %s: %zu pixels are NaN, infinite or negative; they are compared as black or white\n", command,
-                path, clipped);
+    int rc = 0;
+    for (int i = 0; i < 2 && !rc; i++)
+        rc = pic_read_display(paths[i], &images[i], err);
+    for (int i = 0; i < 2 && !rc; i++)
+        if (images[i].clipped > 0)
+            fprintf(stderr, "%s: %s: %zu pixels are NaN, infinite or negative; they are compared as black or white\n",
+                    command, paths[i], images[i].clipped);
+    if (!rc && (images[0].width != images[1].width || images[0].height != images[1].height))
+        rc = base_fail(err, BASE_EINVAL, "%s is %dx%d, %s is %dx%d: the sizes must be equal", paths[0], images[0].width,
+                       images[0].height, paths[1], images[1].width, images[1].height);
+    return rc;
+}
+
+uint8_t *ggn_cmd_magma(const float *map, double gain, size_t n)
+{
+    uint8_t *rgb = malloc(3 * n);
+    for (size_t i = 0; i < n && rgb; i++)
+        pic_colour(PIC_MAGMA, gain * (double)map[i], rgb + 3 * i);
+    return rgb;
 }
 
 int ggn_cmd_fail(const char *command, const struct base_err *err)

@@ -4,9 +4,7 @@
 
 #include "base/options.h"
 #include "cli/commands.h"
-#include "picture/read.h"
 #include "observer/remaining.h"
-#include "picture/colour_map.h"
 #include "picture/png.h"
 
 struct options {
@@ -83,12 +81,9 @@ static void frame(uint8_t *rgb, int stride, const struct ggn_remaining *b)
 
 static int write_map(const char *path, const float *map, int width, int height, const struct result *r, struct base_err *err)
 {
-    size_t n = (size_t)width * (size_t)height;
-    uint8_t *rgb = malloc(3 * n);
+    uint8_t *rgb = ggn_cmd_magma(map, 0.5, (size_t)width * (size_t)height);
     if (!rgb)
         return base_fail_nomem(err, path);
-    for (size_t i = 0; i < n; i++)
-        pic_colour(PIC_MAGMA, 0.5 * (double)map[i], rgb + 3 * i);
     for (int i = 0; i < r->count; i++)
         if (r->blocks[i].error > 1.0)
             frame(rgb, width, r->blocks + i);
@@ -104,9 +99,6 @@ static int run(const struct options *o, const struct pic_image images[2], struct
     struct ggn_remaining *blocks = NULL;
     float *map = NULL;
     int rc = 0;
-    if (images[0].width != width || images[0].height != height)
-        return base_fail(err, BASE_EINVAL, "%s is %dx%d, %s is %dx%d: the sizes must be equal", o->paths[0], images[0].width,
-                         images[0].height, o->paths[1], width, height);
     if (o->observer_path)
         rc = ggn_observer_read(o->observer_path, NULL, &observer, err);
     if (!rc && (!(blocks = malloc((size_t)count * sizeof *blocks)) ||
@@ -139,10 +131,8 @@ int ggn_cmd_visible(int argc, char **argv)
     struct pic_image images[2] = {{0}, {0}};
     struct base_err err = {0};
     int rc = base_options_parse(&options, argc, argv, &o, &err);
-    for (int i = 0; i < 2 && !rc; i++)
-        rc = pic_read_display(o.paths[i], &images[i], &err);
-    for (int i = 0; i < 2 && !rc; i++)
-        ggn_cmd_tell_clipped(argv[0], o.paths[i], images[i].clipped);
+    if (!rc)
+        rc = ggn_cmd_read_pair(argv[0], o.paths, images, &err);
     if (!rc)
         rc = run(&o, images, &err);
     pic_release(&images[0]);
