@@ -160,16 +160,12 @@ def bench_peers(rounds, quick):
                 figures["vs cycles"].append(figures["paths"][-1] / figures["cycles"][-1])
     box = "Cornell box, whole renders: "
     row(box + "specialised against general kernel", median(figures["all"]), 1.15, " x")
-    if have_cycles:
-        row(box + "paths against Cycles", median(figures["paths"]) / 1e6, unit=" Mpaths/s", limit=median(figures["cycles"]) / 1e6)
-        row(box + "ratio to Cycles", median(figures["vs cycles"]), 3.0, " x")
-    else:
-        missing(box + "paths against Cycles", "blender is not installed")
-    if have_embree:
-        row(box + "rays against Embree's sample", median(figures["rays"]) / 1e6, unit=" Mrays/s", limit=median(figures["embree"]) / 1e6)
-        row(box + "ratio to Embree's sample", median(figures["vs embree"]), 1.0, " x")
-    else:
-        missing(box + "rays against Embree's sample", "embree-tools is not installed")
+    for name, what, key, want, package in (("Cycles", "paths", "cycles", 3.0, "blender"), ("Embree's sample", "rays", "embree", 1.0, "embree-tools")):
+        if figures[key]:
+            row(box + "%s against %s" % (what, name), median(figures[what]) / 1e6, unit=" M%s/s" % what, limit=median(figures[key]) / 1e6)
+            row(box + "ratio to %s" % name, median(figures["vs " + key]), want, " x")
+        else:
+            missing(box + "%s against %s" % (what, name), package + " is not installed")
 
 
 HOSTED = {"halfbuf": ["-p", "threshold=1e-9"], "observer": ["--visible", "0.001"]}

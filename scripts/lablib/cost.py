@@ -10,7 +10,6 @@ import os
 import re
 import resource
 import statistics
-import subprocess
 
 from lablib import tool
 from lablib.cost_figures import bare, draw
@@ -159,7 +158,8 @@ def failures(points, blocks, defaults):
     rows = []
     for p in points:
         name = bare(p["criterion"])
-        if "stops" not in p or p["criterion"].startswith(("limit", "window", "paper")) or not (p["dial"] == "own" or defaults.get(name) == [p["dial"], p["value"]]):
+        own = defaults.get(name, ["own", p["value"]]) == [p["dial"], p["value"]]
+        if "stops" not in p or not own or name.startswith(("limit", "window", "paper")):
             continue
         caustic = [b for b in blocks if b["scene"] == "caustic-glass"]
         if p["criterion"] == "halfbuf, no guard" and caustic:
@@ -299,7 +299,7 @@ def price(o, out):
     for b in out["bench"]:  # rounding changes a decision's share of a check that no render is long enough to tell apart
         if b["name"] in out["prices"]:
             own = out["prices"][b["name"]]
-            out["prices"][b["name"] + " bf16"] = {**own, "check_s": own["check_s"] * b["bf16_ms"] / b["f32_ms"], "most_s": own["most_s"] * b["bf16_ms"] / b["f32_ms"]}
+            out["prices"][b["name"] + " bf16"] = {**own, **{k: own[k] * b["bf16_ms"] / b["f32_ms"] for k in ("check_s", "most_s")}}
     out["sides"] = []
     for name in ("variance", "halfbuf", "observer", os.path.basename(o.model[0])):
         criterion, params = criteria_of(o)[name]
@@ -385,8 +385,10 @@ def pictures_of(program, *options):
         path = os.path.join(ROOT, "scenes", scene + ".pbrt")
         if os.path.exists(path):
             out = os.path.join(WORK, "picture.exr")
-            run(program, "-q", path, "--reproducible", "--size", "48x48", "--block", 16, "--spp-max", 64, "-c", "variance", "-p", "threshold=0.2", "-o", out, *options)
+            run(program, "-q", path, "--reproducible", "--size", "48x48", "--block", 16, "--spp-max", 64, "-c", "variance", "-p", "threshold=0.2",
+                "-o", out, *options)
             found[scene] = [line for line in run("oiiotool", "--info", "--hash", out).splitlines() if "SHA-1" in line]
+    return found
 
 
 def other_builds():

@@ -2,7 +2,7 @@
 import math
 
 from lablib import tool
-from lablib.cost_figures import (BLOCK, SIDES, find, is_default, limits_by_side, mean, median, on_frontier, over_scenes,
+from lablib.cost_figures import (BLOCK, find, is_default, limits_by_side, mean, median, on_frontier, over_scenes,
                                  points_in, points_of, saving)
 from lablib.tables import figure, percent, table
 
@@ -80,7 +80,8 @@ def wanted_table(out):
     names = [(n, t) for n, t in names if n in out["sets"] and find(points_of(out, n), "observer")]
     found = [wanted_of(points_of(out, n)) for n, _ in names]
     rows = ["time, checks included, against the limit at the same worst block, median of scenes (wanted ≤ 1.15)", "early stops",
-            "scenes above 1 µs per path and thread on which the checks take ≤ 1 % (wanted: all)", "scenes on which no other setting is cheaper and as accurate (wanted 6 of 8)"]
+            "scenes above 1 µs per path and thread on which the checks take ≤ 1 % (wanted: all)",
+            "scenes on which no other setting is cheaper and as accurate (wanted 6 of 8)"]
     text = table(["the default, `observer`"] + [t for _, t in names], [[row] + [f[0][i] for f in found] for i, row in enumerate(rows)])
     for (_, title), (_, lines) in zip(names, found):
         if lines:
@@ -265,7 +266,8 @@ def pays_table(out):
     """The cheapest setting of each kind that is good enough for a final frame, if every path took so long."""
     points, networks = points_of(out, "recorded"), set(out.get("networks", {}))
     kinds = (("`observer`", lambda p: p[0] == "observer"), ("`variance`, `halfbuf`", lambda p: p[0].startswith(("variance", "halfbuf"))),
-             ("a network", lambda p: p[0].replace(" bf16", "") in networks), ("a baseline", lambda p: p[0] in BASELINES), ("uniform", lambda p: p[0] in ("uniform", "fixed")))
+             ("a network", lambda p: p[0].replace(" bf16", "") in networks), ("a baseline", lambda p: p[0] in BASELINES),
+             ("uniform", lambda p: p[0] in ("uniform", "fixed")))
     rows = []
     for us in (0.02, 0.1, 0.5, 1, 5, 20, 100):
         found = [best(points, final, allowed, us) for _, allowed in kinds]

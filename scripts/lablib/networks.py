@@ -3,7 +3,6 @@
 Prints interleaved timings of denoiser, generator, discriminator, one decision and training, as ratios ours / PyTorch. Skips with a
 message when Debian's python3-torch is not installed."""
 import json
-import math
 import os
 import re
 import statistics

@@ -42,15 +42,22 @@ def made(docs):
     jobs = {name: Job(module, tool.results(docs, name)) for name, module in (
         ("agreement", agreement), ("ablation", ablation), ("bench", bench), ("cost", cost_page), ("quote", quote_accuracy),
         ("references", references), ("scale", scale))}
+
+    def of_figures(name, make):
+        try:
+            return make()
+        except (jinja2.TemplateError, LookupError, TypeError, AttributeError, StopIteration) as why:
+            raise tool.Refused("%s: its figures are not whole (%r)" % (name, why)) from why
+
     value = lambda found: found[1] + env.compile_expression(found[2], undefined_to_none=False)(**jobs) + found[3]
     pages = []
     for name in sorted(glob.glob(os.path.join(docs, "*.md"))) + [os.path.join(docs, "..", other) for other in OTHERS]:
         if os.path.exists(name):
             with open(name, encoding="utf-8") as file:
                 text = file.read()
-            pages.append((name, PLACE.sub(value, text)))
+            pages.append((name, of_figures(name, lambda: PLACE.sub(value, text))))
     whole = {name: env.get_template(name) for name in sorted(os.listdir(TEMPLATES))}
-    return pages + [(os.path.join(docs, name), template.render(jobs)) for name, template in whole.items()
+    return pages + [(os.path.join(docs, name), of_figures(name, lambda: template.render(jobs))) for name, template in whole.items()
                     if any(os.path.exists(os.path.join(docs, *there)) for there in ((name,), ("results", name[:-3] + ".json")))]
 
 

@@ -11,7 +11,7 @@ def plot(folder, name, size, script, font="sans,11"):
             "set border lc '#444444'\nset grid lc '#dddddd'\nset key noenhanced\nset datafile missing 'nan'\n" % (*size, font, path + ".tmp"))
     done = subprocess.run(["gnuplot"], input=head + script, text=True, capture_output=True)
     if done.returncode:
-        raise Refused("%s: %s" % (name, done.stderr.strip().splitlines()[-1:] or "gnuplot failed"))
+        raise Refused("%s: %s" % (name, (done.stderr.strip() or "gnuplot failed").splitlines()[-1]))
     os.replace(path + ".tmp", path)
 
 

@@ -86,8 +86,6 @@ def figures(result):
     row = [r for r in result["quote"]["rows"] if r["as_asked"]][0]
     real = result["real"]
     seconds = sum(b["thread_s"] for b in real)
-    # Thread seconds of quote and render are two measurements; predicted samples at the render's own price are the samples' part.
-    at_price = sum(q["spp"]["expected"] * b["thread_s"] / b["spp"] for q, b in zip(row["blocks"], real))
     expected = row["thread_s"]["expected"]
     inside = [q["spp"]["low"] * 0.999 <= b["spp"] <= q["spp"]["high"] * 1.001 for q, b in zip(row["blocks"], real)]
     pilot = [b["pilot_spp"] for b in result["quote"]["blocks"]]
@@ -101,12 +99,11 @@ def figures(result):
     return {"scene": os.path.basename(result["scene"])[:-5], "role": result["role"],
             "spp": sum(b["spp"] for b in real) / len(real), "said_spp": row["spp_mean"]["expected"],
             "s": seconds, "said_s": expected, "low_s": row["thread_s"]["low"], "high_s": row["thread_s"]["high"],
-            "ratio": expected / seconds, "samples_ratio": at_price / seconds,
+            "ratio": expected / seconds,
             "holds": row["thread_s"]["low"] <= seconds <= row["thread_s"]["high"],
             "inside": sum(inside), "blocks": len(inside),
             "open_inside": sum(inside[i] for i in open_), "open": len(open_),
-            "unmet": sum(not q.get("met_light", True) for q in row["blocks"]),
-            "capped": sum(b["reason"] == "spp-max" for b in real), "eta": eta}
+            "unmet": sum(not q.get("met_light", True) for q in row["blocks"]), "eta": eta}
 
 
 def cells(r):

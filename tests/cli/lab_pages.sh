@@ -51,6 +51,8 @@ done
 sed -i 's/"samples_ratio": 1\./"samples_ratio": 3./' "$tmp/tree/docs/results/agreement.json"
 scripts/lab pages --check --docs "$tmp/tree/docs" 2>"$tmp/err"
 t "other figures make other pages" test "$(cut -d' ' -f3 "$tmp/err" | xargs -n 1 basename | sort | tr '\n' ' ')" = "README.md results.md "
+sed -i 's/"people"/"somebody"/' "$tmp/tree/docs/results/agreement.json"
+t "figures that lack are one line" refuses "results.md: its figures are not whole" pages --docs "$tmp/tree/docs"
 
 if command -v gnuplot >/dev/null; then
     mkdir -p "$tmp/out/results" && cp docs/results/cost.json "$tmp/out/results"
