@@ -53,9 +53,9 @@ int ggn_feature_set_make(struct ggn_feature_set *t, const struct ggn_baseline *b
     if (t->first)
         t->first[s->n_blocks] = rows;
     t->x = malloc(rows * t->size * sizeof *t->x);
-    int rc = !t->first || !t->x ? base_fail_nomem(err, "baseline") : ggn_eval_each_block(s, threads, extract_block, &j, err);
-    if (!rc)
-        rc = ggn_eval_share(s, t->x, t->size * sizeof *t->x, t->first, err);
+    const struct ggn_eval_values made = {t->x, t->size * sizeof *t->x, t->first};
+    int rc = !t->first || !t->x ? base_fail_nomem(err, "baseline")
+                                : ggn_eval_each_block(s, threads, extract_block, &j, &made, 1, err);
     if (rc)
         ggn_feature_set_release(t);
     return rc;
@@ -237,9 +237,8 @@ int ggn_method_baseline(struct ggn_method *m, const struct ggn_eval_set *s, cons
         return rc;
     m->cut = b->policy.threshold;
     m->passes = b->policy.passes;
-    rc = ggn_eval_each_block(s, threads, judge_block, &j, err);
-    if (!rc)
-        rc = ggn_eval_share(s, m->score, sizeof *m->score, NULL, err);
+    const struct ggn_eval_values made = {m->score, sizeof *m->score, NULL};
+    rc = ggn_eval_each_block(s, threads, judge_block, &j, &made, 1, err);
     if (rc)
         ggn_method_release(m);
     else

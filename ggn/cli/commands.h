@@ -13,7 +13,7 @@
 #include <stdint.h>
 
 #include "base/err.h"
-#include "base/team.h"
+#include "job/job.h"
 #include "picture/read.h"
 
 /* X(name, one-line help), in the order `ggn --help` lists them. */
@@ -43,11 +43,9 @@ enum { GGN_EXIT_OK = 0, GGN_EXIT_FAILED = 1, GGN_EXIT_BAD_INPUT = 2, GGN_EXIT_IN
 int ggn_cmd_fail(const char *command, const struct base_err *err);
 
 /* Under mpirun the processes of the job, else NULL. What a process says with ggn_cmd_fail is said once, by rank 0. */
-extern struct base_team *ggn_cmd_team;
+extern struct job *ggn_cmd_job;
 /* Rank 0 ends the job: the others leave it to be asked (base/interrupt.h). */
 void ggn_cmd_follow_rank_0(void);
-/* Is the i-th of equal pieces of work this process's? Always, when it is alone. */
-int ggn_cmd_is_mine(long i);
 
 /* Reads the two pictures that a command compares, of equal size; says on stderr how many pixels of one could not be shown as
  * they are. images: zeroed; the caller releases both, also after a failure. */

@@ -17,6 +17,7 @@
 #include "eval/tables.h"
 #include "eval/strips.h"
 #include "eval/trained.h"
+#include "job/farm.h"
 #include "observer/observer.h"
 
 enum { MAX_MODELS = 8, MAX_FILES = 8, MAX_METHODS = 10 + 2 * MAX_FILES + 2 * MAX_MODELS, MAX_ADJUSTED = 8 };
@@ -93,7 +94,7 @@ static const struct base_option list[] = {
     {"threads", 't', "N", TO(threads), 1, 1024, .help = "worker threads (all processors)"},
     {0}};
 
-struct job {
+struct evaluation {
     const struct options *o;
     struct ggn_eval_set set;
     struct ggn_model *models[MAX_MODELS];
@@ -104,7 +105,7 @@ struct job {
     enum ggn_split tuning, tuning_models;
 };
 
-static int load_models(struct job *j, int *window, struct base_err *err)
+static int load_models(struct evaluation *j, int *window, struct base_err *err)
 {
     *window = j->o->window;
     for (int i = 0; i < j->o->n_models; i++) {
@@ -117,7 +118,7 @@ static int load_models(struct job *j, int *window, struct base_err *err)
 }
 
 /* A method that could be made takes its place in the list; one that lacks its data does not. */
-static int add_trivial(struct job *j, struct base_err *err)
+static int add_trivial(struct evaluation *j, struct base_err *err)
 {
     int available, rc = ggn_method_spp(&j->methods[j->n], &j->set, err);
     if (!rc)
@@ -147,7 +148,7 @@ static void adjust(const struct options *o, struct ggn_policy *policy)
         ggn_policy_without_halves(policy);
 }
 
-static int add_baseline_file(struct job *j, const char *path, struct base_threads *threads, struct base_err *err)
+static int add_baseline_file(struct evaluation *j, const char *path, struct base_threads *threads, struct base_err *err)
 {
     struct ggn_baseline b;
     struct ggn_feature_set features = {0};
@@ -167,7 +168,7 @@ static int add_baseline_file(struct job *j, const char *path, struct base_thread
     return rc;
 }
 
-static int add_baselines(struct job *j, struct base_threads *threads, struct base_err *err)
+static int add_baselines(struct evaluation *j, struct base_threads *threads, struct base_err *err)
 {
     int rc = 0;
     for (int i = 0; i < j->o->n_trained && !rc; i++)
@@ -192,7 +193,7 @@ static int policy_of(const struct options *o, const struct ggn_model *model, str
     return rc;
 }
 
-static int add_models(struct job *j, struct base_threads *threads, struct base_err *err)
+static int add_models(struct evaluation *j, struct base_threads *threads, struct base_err *err)
 {
     int rc = 0, precisions = j->o->bf16 ? 2 : 1;
     for (int i = 0; i < precisions * j->o->n_models && !rc; i++) {
@@ -215,7 +216,7 @@ static int add_models(struct job *j, struct base_threads *threads, struct base_e
     return rc;
 }
 
-static int check_people(const struct job *j, struct base_err *err)
+static int check_people(const struct evaluation *j, struct base_err *err)
 {
     const struct ggn_dataset *d = &j->set.chains.data;
     for (int i = 0; i < d->n; i++) {
@@ -231,7 +232,7 @@ static int check_people(const struct job *j, struct base_err *err)
     return 0;
 }
 
-static int add_observed(struct job *j, struct base_err *err)
+static int add_observed(struct evaluation *j, struct base_err *err)
 {
     int available, rc = check_people(j, err);
     if (rc)
@@ -256,7 +257,7 @@ static int add_observed(struct job *j, struct base_err *err)
 }
 
 /* What other precisions and models change on a split: verdicts on windows that both judged, and where blocks stop. */
-static void report_changes(const struct job *j, enum ggn_split split, cJSON *to, int *failed)
+static void report_changes(const struct evaluation *j, enum ggn_split split, cJSON *to, int *failed)
 {
     for (int i = 0; i < j->n; i++) {
         if (j->likened[i] < 0)
@@ -291,7 +292,7 @@ static void report_changes(const struct job *j, enum ggn_split split, cJSON *to,
     }
 }
 
-static int pictures(const struct job *j, enum ggn_split split, struct base_err *err)
+static int pictures(const struct evaluation *j, enum ggn_split split, struct base_err *err)
 {
     char path[4096];
     int rc = ggn_report_pictures(j->o->out, &j->set, split, j->methods, j->n, err);
@@ -303,7 +304,7 @@ static int pictures(const struct job *j, enum ggn_split split, struct base_err *
     return !rc ? ggn_eval_feature_picture(path, &j->set, j->models[0], split, err) : rc;
 }
 
-static int report(struct job *j, int skipped, struct base_err *err)
+static int report(struct evaluation *j, int skipped, struct base_err *err)
 {
     struct ggn_method_metrics metrics[MAX_METHODS];
     cJSON *root = cJSON_CreateObject();
@@ -343,7 +344,7 @@ static int report(struct job *j, int skipped, struct base_err *err)
     return rc;
 }
 
-static int load(struct job *j, struct base_threads *threads, int *skipped, struct base_err *err)
+static int load(struct evaluation *j, struct base_threads *threads, int *skipped, struct base_err *err)
 {
     const struct options *o = j->o;
     const char *files[2 * MAX_FILES + MAX_MODELS + 1];
@@ -363,7 +364,7 @@ static int load(struct job *j, struct base_threads *threads, int *skipped, struc
                                   .recorded = o->recorded,
                                   .ratio = o->ratio,
                                   .seed = 1,
-                                  .team = ggn_cmd_team,
+                                  .job = ggn_cmd_job,
                                   .files = files,
                                   .n_files = n};
     for (int i = 0; i < o->n_models && !rc && !o->no_pictures; i++)
@@ -371,7 +372,7 @@ static int load(struct job *j, struct base_threads *threads, int *skipped, struc
     return rc ? rc : ggn_eval_set_load(&j->set, &eo, threads, skipped, err);
 }
 
-static int measure(struct job *j, struct base_threads *threads, struct base_err *err)
+static int measure(struct evaluation *j, struct base_threads *threads, struct base_err *err)
 {
     j->tuning = ggn_eval_count(&j->set, GGN_SPLIT_TRAIN) > 0 ? GGN_SPLIT_TRAIN : j->set.blocks[0].split;
     j->tuning_models = ggn_eval_count(&j->set, GGN_SPLIT_VALIDATION) > 0 ? GGN_SPLIT_VALIDATION : j->tuning;
@@ -391,9 +392,9 @@ int ggn_cmd_evaluate(int argc, char **argv)
             "Measures models, the trivial baselines and the criteria halfbuf and variance on the same recorded sequences, "
             "separately for training, validation and test scenes and for views that people judged. Under mpirun the "
             "processes share out the blocks."};
-    struct options o = {.early = 0.05, .threads = base_team_threads(ggn_cmd_team), .window = 6, .epochs = 15};
-    const int speaks = base_team_rank(ggn_cmd_team) == 0;
-    struct job j = {.o = &o};
+    struct options o = {.early = 0.05, .threads = job_threads(ggn_cmd_job), .window = 6, .epochs = 15};
+    const int speaks = job_rank(ggn_cmd_job) == 0;
+    struct evaluation j = {.o = &o};
     struct base_err err = {0};
     int skipped = 0;
 
@@ -401,7 +402,7 @@ int ggn_cmd_evaluate(int argc, char **argv)
         return ggn_cmd_fail(argv[0], &err);
     if (speaks && o.bf16)
         fprintf(stderr, "%s: bfloat16 products by %s\n", argv[0], ggn_precision_bf16_by());
-    if (ggn_cmd_team)
+    if (ggn_cmd_job)
         base_interrupt_catch(); /* that is how MPI says that a process has died */
     ggn_cmd_follow_rank_0();
     for (int i = 0; i < MAX_METHODS; i++)
@@ -422,5 +423,7 @@ int ggn_cmd_evaluate(int argc, char **argv)
     for (int i = 0; i < o.n_models; i++)
         ggn_model_destroy(j.models[i]);
     base_threads_destroy(threads);
-    return rc ? ggn_cmd_fail(argv[0], &err) : base_interrupted ? GGN_EXIT_INTERRUPTED : GGN_EXIT_OK;
+    if (rc && rc != JOB_STOPPED)
+        return ggn_cmd_fail(argv[0], &err);
+    return base_interrupted ? GGN_EXIT_INTERRUPTED : GGN_EXIT_OK;
 }

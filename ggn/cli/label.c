@@ -7,10 +7,12 @@
 #include "base/interrupt.h"
 #include "base/options.h"
 #include "base/threads.h"
+#include "base/version.h"
 #include "cli/commands.h"
 #include "data/dataset.h"
 #include "data/thresholds.h"
 #include "figures/stats.h"
+#include "job/farm.h"
 #include "observer/calibrate.h"
 #include "observer/views.h"
 #include "observer/trials.h"
@@ -147,9 +149,15 @@ static int check_view(const struct ggn_observer *observer, struct base_threads *
     return rc;
 }
 
-/* *seen counts the views of all folders: each is labelled by one process. */
-static int run_views(const struct options *o, const struct ggn_dataset *d, const struct ggn_observer *observer,
-                     const struct ggn_thresholds *human, struct base_threads *threads, long *seen, struct base_err *err)
+static int has_blocks(const struct ggn_dataset_view *v)
+{
+    if (v->manifest.n_blocks == 0)
+        fprintf(stderr, "ggn label: %s: no finished block yet, left out\n", v->dir);
+    return v->manifest.n_blocks > 0;
+}
+
+static int check_labels(const struct ggn_dataset *d, const struct ggn_observer *observer, struct base_threads *threads,
+                        struct base_err *err)
 {
     size_t count = 0, room = 1;
     int rc = 0;
@@ -158,25 +166,61 @@ static int run_views(const struct options *o, const struct ggn_dataset *d, const
     double *curves = malloc(room * sizeof *curves);
     if (!curves)
         return base_fail_nomem(err, "check");
-    if (o->check)
-        printf("%-24s %5s %10s %9s %8s %8s\n", "view", "block", "recorded", "halves", "log2", "curve");
-    for (int i = 0; i < d->n && !rc && !base_interrupted; i++) {
-        if (!o->check && !ggn_cmd_is_mine((*seen)++))
-            continue;
-        if (d->views[i].manifest.n_blocks == 0)
-            fprintf(stderr, "ggn label: %s: no finished block yet, left out\n", d->views[i].dir);
-        else if (o->check)
+    printf("%-24s %5s %10s %9s %8s %8s\n", "view", "block", "recorded", "halves", "log2", "curve");
+    for (int i = 0; i < d->n && !rc && !base_interrupted; i++)
+        if (has_blocks(&d->views[i]))
             rc = check_view(observer, threads, &d->views[i], curves, &count, err);
-        else if (o->human)
-            rc = label_human(o, human, &d->views[i], err);
-        else
-            rc = label_observer(o, observer, threads, &d->views[i], err);
-    }
-    if (!rc && o->check && count > 0)
+    if (!rc && count > 0)
         printf("%zu blocks (+: beyond the last level): |curve| median %.3f, 90th percentile %.3f octaves\n", count,
                ggn_stats_quantile(curves, count, 0.5), ggn_stats_quantile(curves, count, 0.9));
     free(curves);
     return rc;
+}
+
+/* Views are what the processes of a job share out. */
+struct labelling {
+    const struct options *o;
+    const struct ggn_dataset *d;
+    const struct ggn_observer *observer;
+    const struct ggn_thresholds *human;
+    struct base_threads *threads;
+};
+
+static int label_views(void *data, uint32_t first, uint32_t n, int thread, struct base_err *err)
+{
+    const struct labelling *l = data;
+    int rc = 0;
+    for (uint32_t i = first; i < first + n && !rc && !base_interrupted; i++) {
+        const struct ggn_dataset_view *v = &l->d->views[i];
+        if (has_blocks(v))
+            rc = l->o->human ? label_human(l->o, l->human, v, err) : label_observer(l->o, l->observer, l->threads, v, err);
+    }
+    (void)thread;
+    return rc;
+}
+
+static int label_task(void *data, struct job_task *task, uint32_t k, uint32_t n, void *answer, int thread,
+                      struct base_err *err)
+{
+    (void)answer; /* the file that is written */
+    return label_views(data, task->first + k, n, thread, err);
+}
+
+static int apply_nothing(void *data, uint32_t i, const void *answer)
+{
+    (void)data;
+    (void)i;
+    (void)answer;
+    return 0;
+}
+
+static int share_views(struct labelling *l, struct base_err *err)
+{
+    const struct job_service service = {label_task, l};
+    const struct job_farm farm = {
+        .whole = 1, .count = (uint32_t)l->d->n, .here = label_views, .apply = apply_nothing, .data = l};
+    int rc = job_share(ggn_cmd_job, l->threads, &farm, &service, err);
+    return rc == JOB_STOPPED ? 0 : rc;
 }
 
 /* Whether people's thresholds would be lost is known before the first view is labelled. */
@@ -200,18 +244,23 @@ static int label(const struct options *o, struct base_threads *threads, struct b
 {
     struct ggn_observer observer = ggn_observer_default;
     struct ggn_thresholds human = {0};
-    long seen = 0;
     int rc = o->observer_path ? ggn_observer_read(o->observer_path, NULL, &observer, err) : 0;
     if (o->spread > 0)
         observer.spread = o->spread;
     if (!rc && o->human)
         rc = ggn_thresholds_read(o->human, 200, &human, err);
+    if (!rc && !o->check)
+        rc = job_handshake(ggn_cmd_job, "version=" BASE_VERSION "\n", base_threads_count(threads), 1, err);
     for (int i = 0; i < 2 * o->n_inputs && !rc && !base_interrupted; i++) { /* a look at all, then the work */
         struct ggn_dataset d;
         rc = ggn_dataset_open(o->inputs[i % o->n_inputs], &d, err);
         if (rc)
             break;
-        rc = i < o->n_inputs ? check_views(o, &d, &human, err) : run_views(o, &d, &observer, &human, threads, &seen, err);
+        struct labelling l = {o, &d, &observer, &human, threads};
+        if (i < o->n_inputs)
+            rc = check_views(o, &d, &human, err);
+        else
+            rc = o->check ? check_labels(&d, &observer, threads, err) : share_views(&l, err);
         ggn_dataset_release(&d);
     }
     ggn_thresholds_release(&human);
@@ -314,14 +363,15 @@ int ggn_cmd_label(int argc, char **argv)
                                                 .doc = "Attaches thresholds to recorded sequences (DATA: a sequence or a "
                                                        "folder of them): those of people, or those of the "
                                                        "model observer, which are never called human."};
-    struct options o = {.source = GGN_FROM_HALVES, .threads = base_team_threads(ggn_cmd_team)};
+    struct options o = {.source = GGN_FROM_HALVES, .threads = job_threads(ggn_cmd_job)};
     struct base_err err = {0};
     int rc = base_options_parse(&options, argc, argv, &o, &err);
 
     if (rc)
         return ggn_cmd_fail(argv[0], &err);
     base_interrupt_catch();
-    if ((o.trials || o.calibrate || o.check) && !ggn_cmd_is_mine(0))
+    ggn_cmd_follow_rank_0();
+    if ((o.trials || o.calibrate || o.check) && job_rank(ggn_cmd_job) > 0)
         return GGN_EXIT_OK;
     if (o.trials) {
         rc = fit_trials(&o, &err);

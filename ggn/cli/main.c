@@ -20,15 +20,13 @@ static const struct command commands[] = {GGN_COMMANDS(COMMAND_ENTRY)};
 
 enum { N_COMMANDS = sizeof commands / sizeof commands[0] };
 
-struct base_team *ggn_cmd_team;
+struct job *ggn_cmd_job;
 
 static char last_words[512]; /* what a process other than rank 0 would have said */
 
-int ggn_cmd_is_mine(long i) { return i % base_team_count(ggn_cmd_team) == base_team_rank(ggn_cmd_team); }
-
 void ggn_cmd_follow_rank_0(void)
 {
-    if (base_team_rank(ggn_cmd_team) > 0)
+    if (job_rank(ggn_cmd_job) > 0)
         base_interrupt_ignore();
 }
 
@@ -57,7 +55,7 @@ uint8_t *ggn_cmd_magma(const float *map, double gain, size_t n)
 
 int ggn_cmd_fail(const char *command, const struct base_err *err)
 {
-    if (base_team_rank(ggn_cmd_team) > 0)
+    if (job_rank(ggn_cmd_job) > 0)
         snprintf(last_words, sizeof last_words, "%s", err->text);
     else
         fprintf(stderr, "%s: %s\n", command, err->text);
@@ -112,9 +110,9 @@ static int main_options(int argc, char **argv)
 static int part(const char *command, int status)
 {
     struct base_err err = {0};
-    int all = base_team_close(ggn_cmd_team, status, last_words, &err);
+    int all = job_close(ggn_cmd_job, status, last_words, &err);
 
-    ggn_cmd_team = NULL;
+    ggn_cmd_job = NULL;
     if (all != status && err.code)
         fprintf(stderr, "%s: %s\n", command, err.text);
     return all;
@@ -129,10 +127,10 @@ static int is_shared(const struct command *command)
 static int run(const struct command *command, int argc, char **argv)
 {
     struct base_err err = {0};
-    if (base_team_open(&ggn_cmd_team, &err))
+    if (job_open(&ggn_cmd_job, &err))
         return ggn_cmd_fail(argv[0], &err);
-    base_team_watch(ggn_cmd_team, 0, &base_interrupted);
-    if (ggn_cmd_team && !is_shared(command)) {
+    job_watch(ggn_cmd_job, 0, &base_interrupted);
+    if (ggn_cmd_job && !is_shared(command)) {
         base_fail(&err, BASE_EINVAL, "works in one process: start it without mpirun");
         return part(argv[0], ggn_cmd_fail(argv[0], &err));
     }

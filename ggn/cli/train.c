@@ -94,8 +94,9 @@ int ggn_cmd_train(int argc, char **argv)
     static const struct base_options options = {.list = list,
                                                 .doc = "Trains a stopping criterion on a data set of block sequences.\vThe "
                                                        "same data, options and seed give the same model bytes, also "
-                                                       "after an interruption and --resume, with any number of threads "
-                                                       "and (under mpirun) of processes."};
+                                                       "after an interruption and --resume, with any number of threads. "
+                                                       "Under mpirun processes share the batches: the same bytes for "
+                                                       "as many of them, within rounding for another number."};
     struct settings s = {.preset = GGN_PRESET_LULL, .rank_timeout_s = 120};
     struct base_err err = {0};
 
@@ -104,18 +105,18 @@ int ggn_cmd_train(int argc, char **argv)
     s.plan = ggn_train_plan_default((enum ggn_preset)s.preset);
     if (!rc)
         rc = base_options_parse(&options, argc, argv, &s, &err);
-    if (!rc && base_team_rank(ggn_cmd_team) == 0) /* the others write nothing */
+    if (!rc && job_rank(ggn_cmd_job) == 0) /* the others write nothing */
         rc = check_beside(&s.plan, &err);
     if (rc)
         return ggn_cmd_fail(argv[0], &err);
-    s.plan.progress = s.quiet || base_team_rank(ggn_cmd_team) > 0 ? NULL : stderr;
+    s.plan.progress = s.quiet || job_rank(ggn_cmd_job) > 0 ? NULL : stderr;
     s.plan.interrupted = &base_interrupted;
-    s.plan.team = ggn_cmd_team;
-    base_team_watch(ggn_cmd_team, s.rank_timeout_s, &base_interrupted);
+    s.plan.job = ggn_cmd_job;
+    job_watch(ggn_cmd_job, s.rank_timeout_s, &base_interrupted);
     base_interrupt_catch();
     ggn_cmd_follow_rank_0();
     rc = ggn_train(&s.plan, &err);
-    if (rc == GGN_TRAIN_INTERRUPTED && base_team_rank(ggn_cmd_team) == 0)
+    if (rc == GGN_TRAIN_INTERRUPTED && job_rank(ggn_cmd_job) == 0)
         fprintf(stderr, "%s: interrupted; --resume continues from the last validation\n", argv[0]);
     if (rc == GGN_TRAIN_INTERRUPTED)
         return GGN_EXIT_INTERRUPTED;

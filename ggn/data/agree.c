@@ -42,18 +42,18 @@ static int files_crc(const char *const *files, int n, uint32_t *crc, struct base
     return rc;
 }
 
-int ggn_agree(struct base_team *team, const struct ggn_chains *set, const char *const *files, int n_files, uint32_t options,
-              struct base_err *err)
+int ggn_agree(struct job *job, const struct ggn_chains *set, const char *const *files, int n_files, uint32_t options,
+              int threads, struct base_err *err)
 {
     uint32_t files_are = 0;
     char text[512];
 
-    if (!team)
+    if (!job)
         return 0;
     int rc = files_crc(files, n_files, &files_are, err);
     if (rc)
         return rc;
     snprintf(text, sizeof text, "version=%s\ninstructions=%s (GGN_ISA)\ndata-crc=%08x\nfiles-crc=%08x\noptions-crc=%08x\n",
              BASE_VERSION, ggn_isa_name(ggn_isa_best()), data_crc(set), (unsigned)files_are, (unsigned)options);
-    return base_team_agree(team, text, err);
+    return job_handshake(job, text, threads, 1, err);
 }

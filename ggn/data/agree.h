@@ -1,14 +1,14 @@
-/* What processes that work on the same data must have alike, so that their shares make what one process makes. */
+/* What processes that work on the same data must have alike, so that their shares fit together. */
 #ifndef GGN_DATA_AGREE_H
 #define GGN_DATA_AGREE_H
 
-#include "base/team.h"
+#include "job/job.h"
 #include "data/chains.h"
 
-/* Refuses (BASE_EINVAL) a process of another version, with vectors of another length (they add in another order), with
- * other images or labels, other bytes in files[n_files] or other options (any number that stands for them). Nothing without
- * team. */
-int ggn_agree(struct base_team *team, const struct ggn_chains *set, const char *const *files, int n_files, uint32_t options,
-              struct base_err *err);
+/* The handshake of a job (job/job.h) with what makes its processes compute the same: refuses (BASE_EINVAL) one of another
+ * version, with vectors of another length, with other images or labels, other bytes in files[n_files] or other options (any
+ * number that stands for them). Nothing without a job. */
+int ggn_agree(struct job *job, const struct ggn_chains *set, const char *const *files, int n_files, uint32_t options,
+              int threads, struct base_err *err);
 
 #endif

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "data/agree.h"
+#include "job/farm.h"
 #include "nn/ssim.h"
 #include "observer/curve.h"
 #include "observer/flip.h"
@@ -97,53 +98,85 @@ static int make_columns(struct ggn_eval_set *s, struct base_err *err)
 /* --- blocks in parallel --- */
 
 struct each {
-    long first; /* block of this process */
+    const struct ggn_eval_set *set;
     int (*fn)(void *, int, int, struct base_err *);
     void *data;
-    int *rc;
-    struct base_err *errs;
+    const struct ggn_eval_values *values;
+    int n_values;
+    struct base_err *errs; /* [blocks] */
 };
 
-static void each_block(void *data, long i, int worker)
+/* Where a block's values begin in bytes. */
+static size_t begin_of(const struct ggn_eval_set *s, const struct ggn_eval_values *v, int b)
 {
-    struct each *e = data;
-    i += e->first;
-    e->rc[i] = e->fn(e->data, (int)i, worker, &e->errs[i]);
+    return v->size * (v->begin ? v->begin[b] : b < s->n_blocks ? s->blocks[b].first : s->n);
 }
 
-int ggn_eval_each_block(const struct ggn_eval_set *set, struct base_threads *threads,
-                        int (*fn)(void *data, int block, int worker, struct base_err *err), void *data, struct base_err *err)
+static int do_blocks(void *data, uint32_t first, uint32_t n, int thread, struct base_err *err)
 {
-    int n = set->n_blocks, rc = 0, rank = base_team_rank(set->team);
-    struct each e = {.first = base_team_first(set->team, n, rank),
-                     .fn = fn,
-                     .data = data,
-                     .rc = calloc((size_t)n, sizeof(int)),
-                     .errs = calloc((size_t)n, sizeof(struct base_err))};
-    if (!e.rc || !e.errs)
-        rc = base_fail_nomem(err, "evaluation");
-    else
-        base_threads_for(threads, base_team_first(set->team, n, rank + 1) - e.first, each_block, &e);
-    for (int i = 0; i < n && !rc; i++)
-        if (e.rc[i] != 0)
-            rc = base_fail(err, e.rc[i], "%s", e.errs[i].text);
-    free(e.rc);
-    free(e.errs);
+    struct each *e = data;
+    for (uint32_t b = first; b < first + n; b++)
+        e->errs[b].code = e->fn(e->data, (int)b, thread, &e->errs[b]);
+    (void)err;
+    return 0;
+}
+
+/* A block's values to (or from) the bytes of an answer, one array after the other; returns how many. */
+static size_t move_values(const struct each *e, int b, void *to, const void *from)
+{
+    size_t at = 0;
+    for (int i = 0; i < e->n_values; i++) {
+        const size_t begin = begin_of(e->set, &e->values[i], b), bytes = begin_of(e->set, &e->values[i], b + 1) - begin;
+        char *values = (char *)e->values[i].values + begin;
+        if (to && bytes > 0)
+            memcpy((char *)to + at, values, bytes);
+        if (from && bytes > 0)
+            memcpy(values, (const char *)from + at, bytes);
+        at += bytes;
+    }
+    return at;
+}
+
+static int answer_block(void *data, struct job_task *task, uint32_t k, uint32_t n, void *answer, int thread,
+                        struct base_err *err)
+{
+    struct each *e = data;
+    const int b = (int)(task->first + k);
+    (void)n;
+    int rc = e->fn(e->data, b, thread, err);
+    if (!rc)
+        move_values(e, b, answer, NULL);
     return rc;
 }
 
-int ggn_eval_share(const struct ggn_eval_set *s, void *values, size_t size, const size_t *begin, struct base_err *err)
+static int apply_block(void *data, uint32_t b, const void *answer)
 {
-    size_t *start = malloc(((size_t)base_team_count(s->team) + 1) * sizeof *start);
-    if (!start)
+    move_values(data, (int)b, NULL, answer);
+    return 0;
+}
+
+int ggn_eval_each_block(const struct ggn_eval_set *set, struct base_threads *threads,
+                        int (*fn)(void *data, int block, int worker, struct base_err *err), void *data,
+                        const struct ggn_eval_values *values, int n_values, struct base_err *err)
+{
+    const int n = set->n_blocks;
+    struct each e = {set, fn, data, values, n_values, calloc((size_t)n, sizeof(struct base_err))};
+    struct job_farm farm = {.count = (uint32_t)n, .here = do_blocks, .apply = apply_block, .data = &e};
+    const struct job_service service = {answer_block, &e};
+    if (!e.errs)
         return base_fail_nomem(err, "evaluation");
-    for (int r = 0; r <= base_team_count(s->team); r++) {
-        long b = base_team_first(s->team, s->n_blocks, r);
-        start[r] = size * (begin ? begin[b] : b < s->n_blocks ? s->blocks[b].first : s->n);
+    for (int b = 0; b < n; b++) {
+        const size_t bytes = (move_values(&e, b, NULL, NULL) + 7) / 8 * 8;
+        farm.answer_bytes = bytes > farm.answer_bytes ? bytes : farm.answer_bytes;
     }
-    base_team_gather(s->team, values, start);
-    free(start);
-    return base_team_failed(s->team, err);
+    int rc = job_share(set->job, threads, &farm, &service, err);
+    for (int b = 0; b < n && !rc; b++)
+        if (e.errs[b].code != 0)
+            rc = base_fail(err, e.errs[b].code, "%s", e.errs[b].text);
+    free(e.errs);
+    for (int i = 0; i < n_values && !rc; i++)
+        rc = job_broadcast(set->job, values[i].values, begin_of(set, &values[i], n));
+    return rc ? rc : job_failed(set->job, err);
 }
 
 /* --- statistics and quality --- */
@@ -425,9 +458,10 @@ static int extend(struct ggn_chains *chains, double cadence, uint32_t seed, stru
 int ggn_eval_set_load(struct ggn_eval_set *out, const struct ggn_eval_options *o, struct base_threads *threads, int *skipped,
                       struct base_err *err)
 {
-    struct ggn_eval_set s = {.window = o->window, .team = o->team};
+    struct ggn_eval_set s = {.window = o->window, .job = o->job};
     struct ggn_chains_options co = {.dir = o->dir, .ratio = o->ratio, .with_test = 1, .pictures = o->pictures};
     struct fill f = {&s, o->quality, o->no_ssim};
+    struct ggn_eval_values columns[COLUMNS];
     int rc = ggn_chains_load(&s.chains, &co, err);
     if (rc)
         return rc;
@@ -437,12 +471,12 @@ int ggn_eval_set_load(struct ggn_eval_set *out, const struct ggn_eval_options *o
         rc = list_blocks(&s, skipped, err);
     if (!rc)
         rc = make_columns(&s, err);
-    if (!rc)
-        rc = ggn_agree(s.team, &s.chains, o->files, o->n_files, 0, err);
-    if (!rc)
-        rc = ggn_eval_each_block(&s, threads, fill_block, &f, err);
     for (size_t c = 0; c < COLUMNS && !rc; c++)
-        rc = ggn_eval_share(&s, s.spp + c * s.n, sizeof *s.spp, NULL, err);
+        columns[c] = (struct ggn_eval_values){s.spp + c * s.n, sizeof *s.spp, NULL};
+    if (!rc)
+        rc = ggn_agree(s.job, &s.chains, o->files, o->n_files, 0, base_threads_count(threads), err);
+    if (!rc)
+        rc = ggn_eval_each_block(&s, threads, fill_block, &f, columns, COLUMNS, err);
     if (rc)
         ggn_eval_set_release(&s);
     else

@@ -5,7 +5,7 @@
 #ifndef GGN_EVAL_SET_H
 #define GGN_EVAL_SET_H
 
-#include "base/team.h"
+#include "job/job.h"
 #include "base/threads.h"
 #include "data/chains.h"
 
@@ -25,7 +25,7 @@ struct ggn_eval_block {
 double ggn_eval_compared(const struct ggn_eval_block *block, double spp);
 
 struct ggn_eval_set {
-    struct base_team *team;   /* borrows; NULL: alone */
+    struct job *job;          /* borrows; NULL: alone */
     struct ggn_chains chains; /* owns: the images, continued beyond the recording where possible */
     int window;               /* S: the first S-1 levels of a block make no case */
     int n_blocks, n_scenes;
@@ -50,7 +50,7 @@ struct ggn_eval_options {
     double cadence;           /* > 1: simulate all levels, this far apart (ggn_chains_simulate); 0: no */
     uint32_t seed;            /* of the continuation */
     int pictures;             /* also make the noise pictures (data/chains.h) */
-    struct base_team *team;   /* the processes that share out the blocks, all with the same data; NULL: alone */
+    struct job *job;          /* the processes that share out the blocks, all with the same data; NULL: alone */
     const char *const *files; /* [n_files] what else must be the same for all of them (data/agree.h) */
     int n_files;
 };
@@ -62,12 +62,18 @@ int ggn_eval_set_load(struct ggn_eval_set *set, const struct ggn_eval_options *o
                       int *skipped, struct base_err *err);
 void ggn_eval_set_release(struct ggn_eval_set *set);
 
-/* Calls fn for each block that is this process's, in parallel; returns the first error (in order of blocks). */
+/* Values that are made block by block: those of block b, of `size` bytes each, lie from begin[b] to begin[b + 1],
+ * begin [n_blocks + 1]; NULL: one value for each case. */
+struct ggn_eval_values {
+    void *values;
+    size_t size;
+    const size_t *begin;
+};
+
+/* Calls fn for each block, in parallel and shared out to the processes of the job; returns the first error (in order of
+ * blocks). What fn has put into values[n_values] all processes have then. */
 int ggn_eval_each_block(const struct ggn_eval_set *set, struct base_threads *threads,
                         int (*fn)(void *data, int block, int worker, struct base_err *err), void *data,
-                        struct base_err *err);
-/* What each_block has put into values (of `size` bytes) by this process, now by all: those of block b lie from begin[b] to
- * begin[b + 1], begin [n_blocks + 1]; NULL: one value for each case. */
-int ggn_eval_share(const struct ggn_eval_set *set, void *values, size_t size, const size_t *begin, struct base_err *err);
+                        const struct ggn_eval_values *values, int n_values, struct base_err *err);
 
 #endif

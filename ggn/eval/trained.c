@@ -75,11 +75,11 @@ int ggn_eval_trained(struct ggn_method *m, const struct ggn_eval_set *s, const s
         rc = base_fail_nomem(err, name);
     for (; made < workers && !rc; made += !rc)
         rc = ggn_viewer_init(&r.viewers[made], model, precision, &s->chains, err);
+    const struct ggn_eval_values made_by_block[] = {{m->score, sizeof *m->score, NULL},
+                                                    {m->verdict, sizeof *m->verdict, NULL},
+                                                    {m->own_guard, sizeof *m->own_guard, NULL}};
     if (!rc)
-        rc = ggn_eval_each_block(s, threads, judge_block, &r, err);
-    double *const columns[] = {m->score, m->verdict, m->own_guard};
-    for (int i = 0; i < 3 && !rc; i++)
-        rc = ggn_eval_share(s, columns[i], sizeof *columns[i], NULL, err);
+        rc = ggn_eval_each_block(s, threads, judge_block, &r, made_by_block, 3, err);
     for (int i = 0; i < made; i++)
         ggn_viewer_release(&r.viewers[i]);
     free(r.viewers);

@@ -83,26 +83,26 @@ static int create_execs(struct ggn_trainer *t, struct base_err *err)
     const int drop = t->options.dropout ? 0 : GGN_EXEC_NO_DROPOUT, per_sample = paper ? 1 : 2;
 
     if (t->options.parts & GGN_TRAIN_R) {
-        t->r = ggn_exec_create_shared(&t->graph[GGN_NET_R], NULL, batch, GGN_EXEC_GRADS, t->threads, t->team, 1, err);
+        t->r = ggn_exec_create_shared(&t->graph[GGN_NET_R], NULL, batch, GGN_EXEC_GRADS, t->threads, t->job, 1, err);
         t->ssim = t->r ? ggn_ssim_create(t->hyper.height, t->hyper.width, t->threads, err) : NULL;
         if (!t->ssim)
             return BASE_ENOMEM;
     }
     if (t->options.parts & GGN_TRAIN_MD) {
         const struct ggn_graph *m = &t->graph[GGN_NET_M];
-        t->m = ggn_exec_create_shared(m, NULL, per_sample * batch, GGN_EXEC_GRADS, t->threads, t->team, per_sample, err);
+        t->m = ggn_exec_create_shared(m, NULL, per_sample * batch, GGN_EXEC_GRADS, t->threads, t->job, per_sample, err);
         t->d = ggn_exec_create_shared(&t->graph[GGN_NET_D], NULL, batch, GGN_EXEC_GRADS | GGN_EXEC_INPUT_GRAD | drop,
-                                      t->threads, t->team, 1, err);
+                                      t->threads, t->job, 1, err);
         if (!t->m || !t->d)
             return BASE_ENOMEM;
-        if (paper && !(t->m2 = ggn_exec_create_shared(m, NULL, batch, GGN_EXEC_GRADS, t->threads, t->team, 1, err)))
+        if (paper && !(t->m2 = ggn_exec_create_shared(m, NULL, batch, GGN_EXEC_GRADS, t->threads, t->job, 1, err)))
             return BASE_ENOMEM;
     }
     return 0;
 }
 
 struct ggn_trainer *ggn_trainer_create(const struct ggn_hyper *hyper, const struct ggn_train_options *options,
-                                       struct base_threads *threads, struct base_team *team, struct base_err *err)
+                                       struct base_threads *threads, struct job *job, struct base_err *err)
 {
     if (ggn_hyper_check(hyper, err))
         return NULL;
@@ -118,7 +118,7 @@ struct ggn_trainer *ggn_trainer_create(const struct ggn_hyper *hyper, const stru
     t->hyper = *hyper;
     t->options = *options;
     t->threads = threads;
-    t->team = team;
+    t->job = job;
     int rc = 0;
     for (int net = 0; net < GGN_NETS && !rc; net++)
         rc = create_net(t, net, err);
@@ -154,10 +154,10 @@ void ggn_trainer_destroy(struct ggn_trainer *t)
 /* The samples of a batch that this process has: how many, and *first of them. */
 static int mine(const struct ggn_trainer *t, int count, int *first)
 {
-    const int rank = base_team_rank(t->team);
+    const int rank = job_rank(t->job);
 
-    *first = (int)base_team_first(t->team, count, rank);
-    return (int)base_team_first(t->team, count, rank + 1) - *first;
+    *first = (int)job_first(t->job, count, rank);
+    return (int)job_first(t->job, count, rank + 1) - *first;
 }
 
 static double grad_l2(const struct ggn_trainer *t, int net, size_t n)
@@ -235,7 +235,7 @@ static double denoiser_loss(struct ggn_trainer *t, const real *const *reference,
 {
     const int out = t->graph[GGN_NET_R].n_values - 1;
     const struct ggn_value *v = &t->graph[GGN_NET_R].value[out], *in = &t->graph[GGN_NET_R].value[0];
-    double each[GGN_BATCH_MAX], total = 0;
+    double total = 0;
     int first, n = mine(t, count, &first);
 
     for (int i = 0; i < n; i++) {
@@ -249,11 +249,9 @@ static double denoiser_loss(struct ggn_trainer *t, const real *const *reference,
             dx[c] = ggn_exec_grad(t->r, out, i, c);
             y[c] = copy;
         }
-        each[first + i] = ggn_ssim_mean(t->ssim, x, y, dx, 3, v->row, -1.0 / count);
+        total += ggn_ssim_mean(t->ssim, x, y, dx, 3, v->row, -1.0 / count);
     }
-    base_team_gather_items(t->team, each, sizeof each[0], count);
-    for (int i = 0; i < count; i++)
-        total += each[i];
+    job_sum(t->job, &total, 1, sizeof total);
     return 1 - total / count;
 }
 
@@ -269,7 +267,7 @@ static int denoiser_gradient(struct ggn_trainer *t, const real *const *x, int x_
     ggn_exec_forward(t->r, t->weights[GGN_NET_R], count, GGN_TRAIN);
     *loss = denoiser_loss(t, reference, count);
     ggn_exec_backward(t->r, t->weights[GGN_NET_R], t->grad[GGN_NET_R]);
-    int rc = base_team_failed(t->team, err);
+    int rc = job_failed(t->job, err);
     return rc ? rc : check(t, GGN_NET_R, *loss, "loss", err);
 }
 
@@ -344,9 +342,10 @@ static double judge(struct ggn_trainer *t, const struct ggn_batch *b, double *lo
 
     t->d->dropout_seed = ggn_hash((uint32_t)t->steps, ggn_hash((uint32_t)t->adam_t[GGN_NET_D], t->options.seed));
     ggn_exec_forward(t->d, t->weights[GGN_NET_D], b->count, GGN_TRAIN);
+    memset(z, 0, (size_t)b->count * sizeof *z);
     for (int i = 0; i < n; i++)
         z[first + i] = (double)*ggn_exec_plane(t->d, out, i, 0);
-    base_team_gather_items(t->team, z, sizeof *z, b->count);
+    job_sum(t->job, z, (size_t)b->count, sizeof *z);
     for (int i = 0; i < b->count; i++) {
         total += share * ggn_bce(z[i], b->label[i]);
         if (i >= first && i < first + n)
@@ -378,14 +377,14 @@ int ggn_trainer_judge_step(struct ggn_trainer *t, const struct ggn_batch *b, dou
     exchange_maps(t, maps, n, 0);
     ggn_trainer_set_pictures(t, b->picture, n);
     *bce = judge(t, b, logits);
-    rc = base_team_failed(t->team, err);
+    rc = job_failed(t->job, err);
     if (!rc)
         rc = check(t, GGN_NET_D, *bce, "loss", err);
     if (rc)
         return rc;
     exchange_maps(t, maps, n, 1);
     ggn_exec_backward(t->m, t->weights[GGN_NET_M], t->grad[GGN_NET_M]);
-    rc = base_team_failed(t->team, err);
+    rc = job_failed(t->job, err);
     if (!rc)
         rc = update(t, GGN_NET_D, t->graph[GGN_NET_D].n_params, err);
     if (!rc)
@@ -454,7 +453,7 @@ int ggn_trainer_paper_step(struct ggn_trainer *t, const struct ggn_batch *b, str
     exchange_maps(t, maps, n, 0);
 
     record->bce_before = judge(t, b, record_all ? record->logit_before : NULL);
-    rc = base_team_failed(t->team, err);
+    rc = job_failed(t->job, err);
     if (!rc)
         rc = check(t, GGN_NET_D, record->bce_before, "loss", err);
     if (rc)
@@ -462,7 +461,7 @@ int ggn_trainer_paper_step(struct ggn_trainer *t, const struct ggn_batch *b, str
     paper_generator_backward(t, maps, n);
     record->d_grad_l2 = grad_l2(t, GGN_NET_D, d->n_params);
     record->m_grad_l2 = grad_l2(t, GGN_NET_M, m->n_params);
-    rc = base_team_failed(t->team, err);
+    rc = job_failed(t->job, err);
     if (!rc)
         rc = update(t, GGN_NET_D, d->n_params, err);
     if (rc)
@@ -472,7 +471,7 @@ int ggn_trainer_paper_step(struct ggn_trainer *t, const struct ggn_batch *b, str
     record->bce_after = judge(t, b, record_all ? record->logit_after : NULL);
     paper_generator_backward(t, maps, n);
     record->m_grad_l2_accumulated = grad_l2(t, GGN_NET_M, m_trained);
-    rc = base_team_failed(t->team, err);
+    rc = job_failed(t->job, err);
     if (!rc)
         rc = update(t, GGN_NET_M, m_trained, err);
     if (!rc)

@@ -5,8 +5,8 @@
  * ggn_trainer_state, so that resuming continues bit-exactly. Results do not depend on the number of threads. One call at a
  * time. Parts that a phase does not use (the denoiser when training on cached denoised windows) can be left out.
  *
- * A batch may be shared by the processes of a team: the trainers of all of them make the same steps and hold the same state,
- * with the bytes that one process would have. Each is given the samples of the batch that are its own.
+ * A batch may be shared by the processes of a job: the trainers of all of them make the same steps and hold the same state,
+ * equal to that of one process but for rounding. Each is given the samples of the batch that are its own.
  *
  * Every step checks its losses and gradients: when one is not finite or has exploded, nothing of the step remains, the
  * trainer returns to the last good state (ggn_trainer_keep) and the step returns GGN_EDIVERGED with the tensor's name.
@@ -39,7 +39,7 @@ struct ggn_train_options {
 struct ggn_train_options ggn_train_options_default(enum ggn_preset preset);
 
 /* A batch. Pictures are planes of height × width elements without gaps, values 0..1; of the `mine` samples from
- * base_team_first on that this process has (alone: mine = count). */
+ * job_first on that this process has (alone: mine = count). */
 struct ggn_batch {
     int count;                    /* of the whole batch */
     const real *const *noisy;     /* [mine][3S] windows, noisiest image first (M's input order: image, channel) */
@@ -53,7 +53,7 @@ struct ggn_trainer {
     struct ggn_hyper hyper;
     struct ggn_train_options options;
     struct base_threads *threads; /* borrows */
-    struct base_team *team;       /* borrows; NULL: alone */
+    struct job *job;              /* borrows; NULL: alone */
     struct ggn_graph graph[GGN_NETS];
     struct ggn_weights *weights[GGN_NETS];     /* owns */
     real *grad[GGN_NETS];                      /* [n_params] of the last step */
@@ -66,10 +66,10 @@ struct ggn_trainer {
     uint64_t good_t[GGN_NETS], good_steps;
 };
 
-/* NULL on failure. Weights are initialised and packed. team (NULL: alone) shares the batches; its failures are those of the
+/* NULL on failure. Weights are initialised and packed. job (NULL: alone) shares the batches; its failures are those of the
  * steps. */
 struct ggn_trainer *ggn_trainer_create(const struct ggn_hyper *hyper, const struct ggn_train_options *options,
-                                       struct base_threads *threads, struct base_team *team, struct base_err *err);
+                                       struct base_threads *threads, struct job *job, struct base_err *err);
 void ggn_trainer_destroy(struct ggn_trainer *trainer);
 
 /* Remembers the present state as the one to return to after a divergence (create does so too). */

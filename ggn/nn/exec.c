@@ -44,21 +44,7 @@ static size_t place_values(const struct ggn_graph *g, int flags, size_t offset[G
     return g->n_acts;
 }
 
-/* Most nodes of any batch up to that size, and most channels that a batch norm has. */
-static size_t most_nodes(const struct base_team *team, int samples, int images)
-{
-    struct ggn_node nodes[GGN_NODES_MAX];
-    const int rank = base_team_rank(team);
-    int most = 0;
-
-    for (int n = 1; n <= samples; n++) {
-        int k = ggn_nodes_list(nodes, images * (int)base_team_first(team, n, rank),
-                               images * (int)base_team_first(team, n, rank + 1));
-        most = k > most ? k : most;
-    }
-    return most > 0 ? (size_t)most : 1; /* who has no image needs room for the sum of the others */
-}
-
+/* Most channels that a batch norm has. */
 static size_t most_normed(const struct ggn_graph *g)
 {
     int most = 0;
@@ -82,7 +68,7 @@ static size_t leaf_size(const struct ggn_graph *g, int flags)
     return most;
 }
 
-static size_t sum_values(const struct ggn_graph *g, int capacity) { return 2 * most_normed(g) * (size_t)capacity; }
+static size_t sum_values(const struct ggn_graph *g, int capacity) { return 2 * most_normed(g) * ((size_t)capacity + 1); }
 
 static size_t total_size(const struct ggn_graph *g, const struct ggn_kernels *k, int capacity, int flags, int workers)
 {
@@ -94,8 +80,7 @@ static size_t total_size(const struct ggn_graph *g, const struct ggn_kernels *k,
 
 size_t ggn_exec_bytes(const struct ggn_graph *g, int capacity, int flags, int workers)
 {
-    size_t nodes = flags & GGN_EXEC_GRADS ? most_nodes(NULL, capacity, 1) * g->n_params : 0;
-    return (total_size(g, ggn_kernels_best(), capacity, flags, workers) + nodes) * sizeof(real) +
+    return total_size(g, ggn_kernels_best(), capacity, flags, workers) * sizeof(real) +
            sum_values(g, capacity) * sizeof(double) + sizeof(struct ggn_exec);
 }
 
@@ -119,14 +104,12 @@ static void place_memory(struct ggn_exec *e, char *memory, int workers)
 }
 
 struct ggn_exec *ggn_exec_create_shared(const struct ggn_graph *graph, const struct ggn_kernels *kernels, int capacity,
-                                        int flags, struct base_threads *threads, struct base_team *team, int images,
+                                        int flags, struct base_threads *threads, struct job *job, int images,
                                         struct base_err *err)
 {
-    const int workers = threads ? base_threads_count(threads) : 1, samples = capacity / images;
-    const int here = images * (int)base_team_most(team, samples);
+    const int workers = threads ? base_threads_count(threads) : 1, here = images * (int)job_most(job, capacity / images);
     const struct ggn_kernels *k = kernels ? kernels : ggn_kernels_best();
-    size_t bytes = total_size(graph, k, here, flags, workers) * sizeof(real), sums = sum_values(graph, capacity);
-    size_t nodes = flags & GGN_EXEC_GRADS ? most_nodes(team, samples, images) * graph->n_params : 0;
+    size_t bytes = total_size(graph, k, here, flags, workers) * sizeof(real), sums = sum_values(graph, here);
     struct ggn_exec *e = calloc(1, sizeof *e);
     /* calloc: fresh pages are zero already, and the zero padding of the layout is never written with anything else */
     char *memory = e ? calloc(1, bytes + ALIGN_BYTES) : NULL;
@@ -137,12 +120,12 @@ struct ggn_exec *ggn_exec_create_shared(const struct ggn_graph *graph, const str
                                .threads = threads,
                                .capacity = here,
                                .flags = flags,
-                               .team = team,
+                               .job = job,
                                .images = images,
                                .memory = memory,
                                .sums = malloc((sums + 1) * sizeof *e->sums),
-                               .nodes = malloc((nodes + 1) * sizeof *e->nodes)};
-    if (!memory || !e->sums || !e->nodes) {
+                               .shared = job ? malloc((graph->n_params + 1) * sizeof *e->shared) : NULL};
+    if (!memory || !e->sums || (job && !e->shared)) {
         ggn_exec_destroy(e);
         base_fail_nomem(err, "network activations");
         return NULL;
@@ -162,7 +145,7 @@ void ggn_exec_destroy(struct ggn_exec *e)
     if (!e)
         return;
     free(e->sums);
-    free(e->nodes);
+    free(e->shared);
     free(e->memory);
     free(e);
 }
@@ -194,13 +177,14 @@ static const struct ggn_layer *fusible_bn(const struct ggn_exec *e, int i)
 /* Which images of the batch are this process's. With running statistics each process has a batch of its own. */
 static void share_batch(struct ggn_exec *e, int batch, enum ggn_mode mode)
 {
-    const struct base_team *team = mode == GGN_TRAIN ? e->team : NULL;
-    const int samples = batch / e->images, rank = base_team_rank(team);
+    const struct job *job = mode == GGN_TRAIN ? e->job : NULL;
+    const int samples = batch / e->images, rank = job_rank(job);
 
     e->mode = mode;
     e->total = batch;
-    e->first = team ? e->images * (int)base_team_first(team, samples, rank) : 0;
-    e->batch = team ? e->images * (int)base_team_first(team, samples, rank + 1) - e->first : batch;
+    e->tells = rank == 0;
+    e->first = e->images * (int)job_first(job, samples, rank);
+    e->batch = e->images * (int)job_first(job, samples, rank + 1) - e->first;
 }
 
 void ggn_exec_forward(struct ggn_exec *e, struct ggn_weights *weights, int batch, enum ggn_mode mode)
@@ -216,55 +200,26 @@ void ggn_exec_forward(struct ggn_exec *e, struct ggn_weights *weights, int batch
     }
 }
 
-/* Rank 0: the nodes of everybody into one sum; parts: those of the others. NULL if somebody has sent something else. */
-static real *fold_nodes(struct ggn_exec *e, const struct base_team_part *parts)
+static void backward(struct ggn_exec *e, const struct ggn_weights *weights, real *params_grad)
 {
-    const size_t n = e->graph->n_params;
-    const int samples = e->total / e->images;
-    struct ggn_fold fold = {.n = 0};
-
-    for (int rank = 0; rank < (parts ? base_team_count(e->team) : 1); rank++) {
-        struct ggn_node node[GGN_NODES_MAX];
-        const int first = parts ? e->images * (int)base_team_first(e->team, samples, rank) : e->first;
-        const int end = parts ? e->images * (int)base_team_first(e->team, samples, rank + 1) : e->first + e->batch;
-        const int count = ggn_nodes_list(node, first, end);
-        real *sums = rank == 0 ? e->nodes : parts[rank].data;
-        if (rank > 0 && parts[rank].size != (size_t)count * n * sizeof *sums) {
-            base_team_refuse(e->team, rank);
-            return NULL;
-        }
-        for (int k = 0; k < count; k++)
-            ggn_nodes_fold(&fold, node[k], sums + (size_t)k * n, n, node[k].first + node[k].size == e->total);
-    }
-    return fold.sum[0];
-}
-
-/* The gradient of the whole batch, added to params_grad. */
-static void reduce(struct ggn_exec *e, real *params_grad)
-{
-    const size_t n = e->graph->n_params;
-    struct base_team *team = e->mode == GGN_TRAIN ? e->team : NULL;
-    const struct base_team_part *parts = base_team_collect(team, e->nodes, (size_t)e->n_nodes * n * sizeof *e->nodes);
-    real *sum = parts || !team ? fold_nodes(e, parts) : NULL;
-
-    sum = sum ? sum : e->nodes;
-    base_team_tell(team, sum, n * sizeof *sum);
-    for (size_t i = 0; i < n; i++)
-        params_grad[i] += sum[i];
-}
-
-void ggn_exec_backward(struct ggn_exec *e, const struct ggn_weights *weights, real *params_grad)
-{
-    const int alone = e->mode != GGN_TRAIN || !e->team;
-
-    e->n_nodes = ggn_nodes_list(e->node, e->first, e->first + e->batch);
-    e->node_grads = alone && e->n_nodes == 1 ? params_grad : e->nodes;
-    if (e->node_grads == e->nodes)
-        memset(e->nodes, 0, (size_t)e->n_nodes * e->graph->n_params * sizeof *e->nodes);
+    e->params_grad = params_grad;
     for (int i = e->graph->n_layers - 1; i >= 0; i--) {
         struct ggn_task t = {.e = e, .w = (struct ggn_weights *)(size_t)weights, .l = &e->graph->layer[i]};
         passes[t.l->op]->backward(&t);
     }
-    if (e->node_grads == e->nodes)
-        reduce(e, params_grad);
+}
+
+void ggn_exec_backward(struct ggn_exec *e, const struct ggn_weights *weights, real *params_grad)
+{
+    const size_t n = e->graph->n_params;
+
+    if (e->mode != GGN_TRAIN || !e->job) {
+        backward(e, weights, params_grad);
+        return;
+    }
+    memset(e->shared, 0, n * sizeof *e->shared);
+    backward(e, weights, e->shared);
+    job_sum(e->job, e->shared, n, sizeof *e->shared);
+    for (size_t i = 0; i < n; i++)
+        params_grad[i] += e->shared[i];
 }

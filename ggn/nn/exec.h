@@ -5,15 +5,14 @@
  * depend on the number of threads, nor, with running statistics (GGN_EVAL), on which images share a batch. One call at a
  * time per executor; several executors may read the same weights at once. Nothing is allocated after create but messages.
  *
- * A batch in GGN_TRAIN may be shared by the processes of a team: each has some of the images, statistics and gradients are
- * those of all of them, with the bytes that one process would compute (nn/nodes.h).
+ * A batch in GGN_TRAIN may be shared by the processes of a job: each has some of the images; statistics and gradients are
+ * all-reduced.
  */
 #ifndef GGN_NN_EXEC_H
 #define GGN_NN_EXEC_H
 
-#include "base/team.h"
 #include "base/threads.h"
-#include "nn/nodes.h"
+#include "job/job.h"
 #include "nn/weights.h"
 
 #define GGN_BN_MOMENTUM 0.1
@@ -34,26 +33,25 @@ enum {
 struct ggn_exec {
     const struct ggn_graph *graph;
     const struct ggn_kernels *kernels;
-    struct base_threads *threads;              /* NULL: the calling thread alone */
-    int capacity, batch, flags;                /* images of this process: most; of the last forward pass */
-    struct base_team *team;                    /* borrows; NULL: alone */
-    int images;                                /* of one sample: samples are what a team shares out */
-    int first, total;                          /* of the batch in all processes: images before those of this one; images */
-    enum ggn_mode mode;                        /* of the last forward pass */
-    uint32_t dropout_seed;                     /* masks are a function of it; change it between passes */
+    struct base_threads *threads; /* NULL: the calling thread alone */
+    int capacity, batch, flags;   /* images of this process: most; of the last forward pass */
+    struct job *job;              /* borrows; NULL: alone */
+    int images;                   /* of one sample: samples are what a job shares out */
+    int first, total;             /* of the batch in all processes: images before those of this one; images */
+    int tells;                    /* this process adds to a gradient what all processes know of the whole batch */
+    enum ggn_mode mode;           /* of the last forward pass */
+    uint32_t dropout_seed;        /* masks are a function of it; change it between passes */
     size_t offset[GGN_MAX_LAYERS + 1], n_acts; /* where each value starts in one image's activations; their total */
     real *acts, *grads;                        /* [capacity][n_acts] */
     real *bn_mean, *bn_inv;                    /* [n_stats] of the last training-mode pass */
     real *scratch;                             /* [workers][scratch_size] */
     size_t scratch_size;
-    void *memory;     /* owns */
-    double *sums;     /* owns; [total][channels][2] of one batch norm, image by image */
-    real *nodes;      /* owns; [n_nodes][n_params] gradients of nodes */
-    real *node_grads; /* of the backward pass under way: nodes, or the caller's where there is one node and nobody else */
-    real *leaves;     /* [capacity][leaf_size] the weights' gradient of each image, one convolution at a time */
+    void *memory;      /* owns */
+    double *sums;      /* owns; of one batch norm: [2][channels] of the batch, then [capacity][channels][2] of its images */
+    real *shared;      /* owns; [n_params] the gradient of this process's images, NULL: alone */
+    real *params_grad; /* of the backward pass under way */
+    real *leaves;      /* [capacity][leaf_size] the weights' gradient of each image, one convolution at a time */
     size_t leaf_size;
-    struct ggn_node node[GGN_NODES_MAX]; /* of this process's images */
-    int n_nodes;
     double *layer_s; /* [n_layers] or NULL; when set, forward adds the seconds of each layer */
 };
 
@@ -62,10 +60,10 @@ size_t ggn_exec_bytes(const struct ggn_graph *graph, int capacity, int flags, in
 /* `kernels` must be those of the weights (NULL = the best). NULL on failure. */
 struct ggn_exec *ggn_exec_create(const struct ggn_graph *graph, const struct ggn_kernels *kernels, int capacity, int flags,
                                  struct base_threads *threads, struct base_err *err);
-/* For batches that a team shares: capacity is that of all processes, of which base_team_most(team, capacity / images) ·
- * images find room in this one. capacity is below 4096 and a multiple of `images`, the images that make one sample. */
+/* For batches that a job shares: capacity is that of all processes, of which job_most(job, capacity / images) · images find
+ * room in this one. capacity is a multiple of `images`, the images that make one sample. */
 struct ggn_exec *ggn_exec_create_shared(const struct ggn_graph *graph, const struct ggn_kernels *kernels, int capacity,
-                                        int flags, struct base_threads *threads, struct base_team *team, int images,
+                                        int flags, struct base_threads *threads, struct job *job, int images,
                                         struct base_err *err);
 void ggn_exec_destroy(struct ggn_exec *exec);
 

@@ -144,20 +144,15 @@ static void conv_act_back(void *data, long c, int worker)
     const struct ggn_task *t = data;
     const struct ggn_graph *g = t->e->graph;
     const struct ggn_value *v = &g->value[t->l->out];
-    struct ggn_tree tree;
+    double sum = 0;
 
-    for (int k = 0; k < t->e->n_nodes; k++) {
-        const real *total = NULL;
-        for (int i = 0; i < t->e->node[k].size; i++) {
-            const int n = ggn_node_image(t, k, i);
-            real *dy = ggn_grad(t, t->l->out, n, (int)c);
-            real sum = (real)(t->l->slope == 1 ? t->e->kernels->sum(dy, v->h, v->w, v->row)
-                                               : t->e->kernels->act_grad(dy, ggn_act(t, t->l->out, n, (int)c),
-                                                                         (real)t->l->slope, v->h, v->w, v->row));
-            total = ggn_tree_add(&tree, i, &sum, 1);
-        }
-        ggn_node_grad(t, k)[t->l->bias + (size_t)c] += total[0];
+    for (int n = 0; n < t->e->batch; n++) {
+        real *dy = ggn_grad(t, t->l->out, n, (int)c);
+        sum += t->l->slope == 1
+                   ? t->e->kernels->sum(dy, v->h, v->w, v->row)
+                   : t->e->kernels->act_grad(dy, ggn_act(t, t->l->out, n, (int)c), (real)t->l->slope, v->h, v->w, v->row);
     }
+    t->e->params_grad[t->l->bias + (size_t)c] += (real)sum;
     (void)worker;
 }
 
@@ -251,21 +246,15 @@ static void conv_weight_back(void *data, long i, int worker)
     (t->weights_by_wino ? weights_by_wino : weights_by_definition)(t, &p, x + p.ic0, dy, scratch, ggn_leaf(t, n));
 }
 
-/* Some elements of the leaves of each node into its gradient: siblings first, in place. */
+/* Some elements of the leaves into the gradient. */
 static void conv_weight_sum(void *data, long i, int worker)
 {
     const struct ggn_task *t = data;
-    const struct ggn_kernels *k = t->e->kernels;
     const size_t from = (size_t)i * SUM_CHUNK, count = ggn_conv_weights(t->e->graph, t->l);
     const long n = (long)(count - from < SUM_CHUNK ? count - from : SUM_CHUNK);
 
-    for (int node = 0; node < t->e->n_nodes; node++) {
-        const int first = ggn_node_image(t, node, 0), size = t->e->node[node].size;
-        for (int step = 1; step < size; step *= 2)
-            for (int j = first; j < first + size; j += 2 * step)
-                k->axpy(ggn_leaf(t, j) + from, 1, ggn_leaf(t, j + step) + from, n);
-        k->axpy(ggn_node_grad(t, node) + t->l->weight + from, 1, ggn_leaf(t, first) + from, n);
-    }
+    for (int image = 0; image < t->e->batch; image++)
+        t->e->kernels->axpy(t->e->params_grad + t->l->weight + from, 1, ggn_leaf(t, image) + from, n);
     (void)worker;
 }
 

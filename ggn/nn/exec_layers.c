@@ -8,18 +8,16 @@
 
 /* --- batch norm ------------------------------------------------------------------------------------------------------- */
 
-/* The two sums of image n (of all processes) and channel c that the images share with each other. */
+/* The two sums of image n of this process and channel c. */
 static double *bn_sums_of(const struct ggn_task *t, int n, int c)
 {
-    return t->e->sums + 2 * ((size_t)n * (size_t)t->e->graph->value[t->l->out].c + (size_t)c);
+    return t->e->sums + 2 * ((size_t)(n + 1) * (size_t)t->e->graph->value[t->l->out].c + (size_t)c);
 }
 
-static void bn_share(const struct ggn_task *t)
+/* One of the two, 0 or 1, over the whole batch [channels]. */
+static double *bn_total(const struct ggn_task *t, int k)
 {
-    const size_t image = 2 * sizeof(double) * (size_t)t->e->graph->value[t->l->out].c;
-
-    base_team_gather_items(t->e->mode == GGN_TRAIN ? t->e->team : NULL, t->e->sums, image * (size_t)t->e->images,
-                           t->e->total / t->e->images);
+    return t->e->sums + (size_t)k * (size_t)t->e->graph->value[t->l->out].c;
 }
 
 /* Mean of one channel of one image, and the sum of squares around it. */
@@ -29,30 +27,41 @@ static void bn_image(void *data, long i, int worker)
     const struct ggn_value *v = &t->e->graph->value[t->l->out];
     const int n = (int)(i / v->c), c = (int)(i % v->c);
     const real *x = ggn_act(t, t->l->in, n, c);
-    double *sums = bn_sums_of(t, t->e->first + n, c);
+    double *sums = bn_sums_of(t, n, c);
 
     sums[0] = t->e->kernels->sum(x, v->h, v->w, v->row) / ((double)v->h * v->w);
     sums[1] = t->e->kernels->sum_sq(x, sums[0], v->h, v->w, v->row);
     (void)worker;
 }
 
-/* Batch statistics of channel c from those of the images (Chan, Golub & LeVeque 1979): biased variance to normalise,
- * unbiased for the running estimate. */
+/* Batch statistics from those of the images (Chan, Golub & LeVeque 1979): sums of means and of squares around the mean. */
+static void bn_combine(const struct ggn_task *t)
+{
+    const struct ggn_value *v = &t->e->graph->value[t->l->out];
+    const double pixels = (double)v->h * v->w;
+    double *means = bn_total(t, 0), *squares = bn_total(t, 1);
+
+    memset(t->e->sums, 0, 2 * (size_t)v->c * sizeof *means);
+    for (int n = 0; n < t->e->batch; n++)
+        for (int c = 0; c < v->c; c++)
+            means[c] += bn_sums_of(t, n, c)[0];
+    job_sum(t->e->job, means, (size_t)v->c, sizeof *means);
+    for (int n = 0; n < t->e->batch; n++)
+        for (int c = 0; c < v->c; c++) {
+            const double *image = bn_sums_of(t, n, c), off = image[0] - means[c] / t->e->total;
+            squares[c] += image[1] + pixels * off * off;
+        }
+    job_sum(t->e->job, squares, (size_t)v->c, sizeof *squares);
+}
+
+/* Of channel c: biased variance to normalise, unbiased for the running estimate. */
 static void bn_statistics(const struct ggn_task *t, long c)
 {
     const struct ggn_value *v = &t->e->graph->value[t->l->out];
     const size_t s = t->l->stats + (size_t)c;
-    const double pixels = (double)v->h * v->w, count = pixels * t->e->total;
-    double mean = 0, var = 0;
+    const double count = (double)v->h * v->w * t->e->total;
+    const double mean = bn_total(t, 0)[c] / t->e->total, var = bn_total(t, 1)[c] / count;
 
-    for (int n = 0; n < t->e->total; n++)
-        mean += bn_sums_of(t, n, (int)c)[0];
-    mean /= t->e->total;
-    for (int n = 0; n < t->e->total; n++) {
-        const double *image = bn_sums_of(t, n, (int)c);
-        var += image[1] + pixels * (image[0] - mean) * (image[0] - mean);
-    }
-    var /= count;
     t->e->bn_mean[s] = (real)mean;
     t->e->bn_inv[s] = (real)(1 / sqrt(var + GGN_BN_EPS));
     double unbiased = count > 1 ? var * count / (count - 1) : var;
@@ -88,7 +97,7 @@ static void bn_forward(struct ggn_task *t)
 
     if (t->e->mode == GGN_TRAIN) {
         ggn_task_run(t, (long)t->e->batch * channels, bn_image);
-        bn_share(t);
+        bn_combine(t);
     }
     ggn_task_run(t, channels, bn_channel);
 }
@@ -101,7 +110,7 @@ static void bn_back_image(void *data, long i, int worker)
     const struct ggn_value *v = &t->e->graph->value[t->l->out];
     const int n = (int)(i / v->c), c = (int)(i % v->c);
 
-    t->e->kernels->bn_sums(bn_sums_of(t, t->e->first + n, c), ggn_grad(t, t->l->out, n, c), ggn_act(t, t->l->in, n, c),
+    t->e->kernels->bn_sums(bn_sums_of(t, n, c), ggn_grad(t, t->l->out, n, c), ggn_act(t, t->l->in, n, c),
                            t->e->bn_mean[t->l->stats + (size_t)c], v->h, v->w, v->row);
     (void)worker;
 }
@@ -115,15 +124,11 @@ static void bn_back_channel(void *data, long c, int worker)
     const double count = (double)v->h * v->w * t->e->total;
     const double inv = (double)t->e->bn_inv[s], mean = (double)t->e->bn_mean[s];
     const double gamma = (double)t->w->params[t->l->weight + (size_t)c];
-    double sum[2] = {0, 0};
+    const double sum[2] = {bn_total(t, 0)[c], bn_total(t, 1)[c]};
 
-    for (int n = 0; n < t->e->total; n++) {
-        sum[0] += bn_sums_of(t, n, (int)c)[0];
-        sum[1] += bn_sums_of(t, n, (int)c)[1];
-    }
-    if (t->e->first == 0 && t->e->batch > 0) { /* they are of the whole batch: told once, by who has its first image */
-        ggn_node_grad(t, 0)[t->l->weight + (size_t)c] += (real)(sum[1] * inv);
-        ggn_node_grad(t, 0)[t->l->bias + (size_t)c] += (real)sum[0];
+    if (t->e->tells) {
+        t->e->params_grad[t->l->weight + (size_t)c] += (real)(sum[1] * inv);
+        t->e->params_grad[t->l->bias + (size_t)c] += (real)sum[0];
     }
     double b = t->e->mode == GGN_TRAIN ? -gamma * inv * inv * inv * sum[1] / count : 0;
     double shift = t->e->mode == GGN_TRAIN ? -gamma * inv * sum[0] / count - b * mean : 0;
@@ -139,7 +144,13 @@ static void bn_backward(struct ggn_task *t)
     const int channels = t->e->graph->value[t->l->out].c;
 
     ggn_task_run(t, (long)t->e->batch * channels, bn_back_image);
-    bn_share(t);
+    memset(t->e->sums, 0, 2 * (size_t)channels * sizeof *t->e->sums);
+    for (int n = 0; n < t->e->batch; n++)
+        for (int c = 0; c < channels; c++)
+            for (int k = 0; k < 2; k++)
+                bn_total(t, k)[c] += bn_sums_of(t, n, c)[k];
+    if (t->e->mode == GGN_TRAIN)
+        job_sum(t->e->job, t->e->sums, 2 * (size_t)channels, sizeof *t->e->sums);
     ggn_task_run(t, channels, bn_back_channel);
 }
 
@@ -314,25 +325,13 @@ static void linear_forward(struct ggn_task *t) { ggn_task_run(t, t->e->graph->va
 static void linear_weight_back(void *data, long o, int worker)
 {
     const struct ggn_task *t = data;
-    const int c_in = t->e->graph->value[t->l->in].c;
-    real leaf[GGN_TREE_WIDTH];
-    struct ggn_tree tree;
+    const long c_in = t->e->graph->value[t->l->in].c;
 
-    for (int k = 0; k < t->e->n_nodes; k++)
-        for (int from = 0; from <= c_in; from += GGN_TREE_WIDTH) { /* element c_in is the bias */
-            const int n = c_in + 1 - from < GGN_TREE_WIDTH ? c_in + 1 - from : GGN_TREE_WIDTH;
-            const real *total = NULL;
-            for (int i = 0; i < t->e->node[k].size; i++) {
-                const real d = ggn_grad(t, t->l->out, ggn_node_image(t, k, i), 0)[o];
-                const real *x = ggn_act(t, t->l->in, ggn_node_image(t, k, i), 0);
-                for (int c = 0; c < n; c++)
-                    leaf[c] = from + c < c_in ? d * x[from + c] : d;
-                total = ggn_tree_add(&tree, i, leaf, n);
-            }
-            real *g = ggn_node_grad(t, k);
-            for (int c = 0; c < n; c++)
-                g[from + c < c_in ? t->l->weight + (size_t)(o * c_in + from + c) : t->l->bias + (size_t)o] += total[c];
-        }
+    for (int n = 0; n < t->e->batch; n++) {
+        const real d = ggn_grad(t, t->l->out, n, 0)[o];
+        t->e->kernels->axpy(t->e->params_grad + t->l->weight + (size_t)(o * c_in), d, ggn_act(t, t->l->in, n, 0), c_in);
+        t->e->params_grad[t->l->bias + (size_t)o] += d;
+    }
     (void)worker;
 }
 

@@ -57,12 +57,6 @@ static inline real *ggn_grad(const struct ggn_task *t, int value, long n, int c)
     return ggn_plane_in(t->e, t->e->grads, value, n, c);
 }
 
-/* Where the gradient of the parameters of node k of the executor is added to. */
-static inline real *ggn_node_grad(const struct ggn_task *t, int k)
-{
-    return t->e->node_grads + (size_t)k * t->e->graph->n_params;
-}
-
 /* How many weights a convolution has. */
 static inline size_t ggn_conv_weights(const struct ggn_graph *g, const struct ggn_layer *l)
 {
@@ -71,8 +65,5 @@ static inline size_t ggn_conv_weights(const struct ggn_graph *g, const struct gg
 
 /* Where image n leaves the gradient of the weights of the present layer, laid out as they are. */
 static inline real *ggn_leaf(const struct ggn_task *t, long n) { return t->e->leaves + (size_t)n * t->e->leaf_size; }
-
-/* The i-th image of node k, as this process numbers its images. */
-static inline int ggn_node_image(const struct ggn_task *t, int k, int i) { return t->e->node[k].first - t->e->first + i; }
 
 #endif

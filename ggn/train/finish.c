@@ -160,7 +160,7 @@ int ggn_session_finish(struct ggn_session *s, struct base_err *err)
     double accuracy = (double)NAN;
     int rc = ggn_judge_validation(s, s->validation.n, &v, err), right = 0;
 
-    if (rc || base_team_rank(s->plan->team) > 0) {
+    if (rc || job_rank(s->plan->job) > 0) {
         ggn_judged_release(&v);
         return rc;
     }

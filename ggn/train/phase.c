@@ -46,8 +46,8 @@ static int asked_to_stop(const struct ggn_session *s)
     int stop = s->plan->interrupted && *s->plan->interrupted;
 
     if (stop)
-        base_team_look(s->plan->team);
-    base_team_tell(s->plan->team, &stop, sizeof stop);
+        job_find_dead(s->plan->job, NULL);
+    job_broadcast(s->plan->job, &stop, sizeof stop);
     return stop;
 }
 
@@ -60,7 +60,7 @@ static int epoch(struct ggn_session *s, const struct ggn_phase *phase, struct ba
     double start = base_clock_wall_s(), loss, right;
 
     while (s->progress.step < begin + n) {
-        int stop = asked_to_stop(s), rc = base_team_failed(s->plan->team, err);
+        int stop = asked_to_stop(s), rc = job_failed(s->plan->job, err);
         if (rc || stop)
             return rc ? rc : GGN_TRAIN_INTERRUPTED;
         rc = phase->step(s, s->progress.step, phase->steps, &loss, &right, err);
@@ -85,7 +85,7 @@ static int epoch(struct ggn_session *s, const struct ggn_phase *phase, struct ba
     if (rc)
         return rc;
     say(s, &row, phase, (double)n * phase->batch / fmax(seconds, 1e-9));
-    return base_team_rank(s->plan->team) == 0 ? write_files(s, err) : 0;
+    return job_rank(s->plan->job) == 0 ? write_files(s, err) : 0;
 }
 
 int ggn_phase_run(struct ggn_session *s, const struct ggn_phase *phase, struct base_err *err)

@@ -123,7 +123,7 @@ static void evaluate(struct ggn_session *s, int count, double *loss)
 /* Mean of 1 − SSIM over fixed crops of the validation scenes; NaN without any. */
 static int validate(struct ggn_session *s, struct ggn_log_row *row, struct base_err *err)
 {
-    const int n = (int)base_team_most(s->plan->team, s->plan->batch_r), any = nth_chain(s, GGN_SPLIT_VALIDATION, -1);
+    const int n = (int)job_most(s->plan->job, s->plan->batch_r), any = nth_chain(s, GGN_SPLIT_VALIDATION, -1);
     double loss[VALIDATION_CROPS] = {0}, total = 0;
     int mine, first = ggn_session_first(s, VALIDATION_CROPS, &mine);
 
@@ -133,12 +133,12 @@ static int validate(struct ggn_session *s, struct ggn_log_row *row, struct base_
         fill_batch(s, GGN_SPLIT_VALIDATION, 0, VALIDATION_SEED, first, count);
         evaluate(s, count, loss + first);
     }
-    base_team_gather_items(s->plan->team, loss, sizeof loss[0], VALIDATION_CROPS);
+    job_sum(s->plan->job, loss, VALIDATION_CROPS, sizeof loss[0]);
     for (int i = 0; i < VALIDATION_CROPS; i++)
         total += loss[i];
     row->validation_loss = any ? total / VALIDATION_CROPS : (double)NAN;
     row->validation_accuracy = row->validation_auc = (double)NAN;
-    return base_team_failed(s->plan->team, err);
+    return job_failed(s->plan->job, err);
 }
 
 static int begin(struct ggn_session *s, struct base_err *err)

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "figures/stats.h"
+#include "job/farm.h"
 #include "model/window.h"
 #include "nn/hash.h"
 #include "nn/loss.h"
@@ -109,11 +110,12 @@ static void generate(struct ggn_session *s, const float *const *planes, int coun
 static void logits(struct ggn_session *s, const struct ggn_windows *windows, const int *index, int n, double *logit)
 {
     struct ggn_trainer *t = s->trainer;
-    const int out = t->d->graph->n_values - 1, most = (int)base_team_most(s->plan->team, s->plan->batch);
+    const int out = t->d->graph->n_values - 1, most = (int)job_most(s->plan->job, s->plan->batch);
     int mine, first = ggn_session_first(s, n, &mine);
 
     ggn_weights_pack(t->weights[GGN_NET_M], NULL);
     ggn_weights_pack(t->weights[GGN_NET_D], NULL);
+    memset(logit, 0, (size_t)n * sizeof *logit);
     for (int end = first + mine; first < end; first += most) {
         int count = end - first < most ? end - first : most;
         struct fill f = {.s = s, .windows = windows, .index = index + first, .denoised = 1};
@@ -125,7 +127,7 @@ static void logits(struct ggn_session *s, const struct ggn_windows *windows, con
         for (int i = 0; i < count; i++)
             logit[first + i] = (double)*ggn_exec_plane(t->d, out, i, 0);
     }
-    base_team_gather_items(s->plan->team, logit, sizeof *logit, n);
+    job_sum(s->plan->job, logit, (size_t)n, sizeof *logit);
 }
 
 enum { DENOISED_AT_ONCE = 4 }; /* images */
@@ -133,6 +135,8 @@ enum { DENOISED_AT_ONCE = 4 }; /* images */
 struct denoise {
     struct ggn_session *s;
     struct ggn_exec *exec;
+    struct ggn_chain **chains; /* owns; [n] */
+    uint32_t n;
 };
 
 static void denoise_images(const struct denoise *d, struct ggn_chain *c, int first, int count)
@@ -156,63 +160,91 @@ static size_t denoised_bytes(const struct ggn_session *s, const struct ggn_chain
     return (size_t)c->n_levels * ggn_chains_values(&s->set) * sizeof *c->denoised;
 }
 
-/* The chains round[0 … n) have been denoised, the k-th by rank k: now by everybody. */
-static void share_denoised(const struct ggn_session *s, struct ggn_chain *const *round, int n)
+static void denoise_chain(const struct denoise *d, struct ggn_chain *c)
 {
-    struct base_team *team = s->plan->team;
-    const int rank = base_team_rank(team);
-    const struct base_team_part *parts =
-        base_team_collect(team, rank < n ? round[rank]->denoised : NULL, rank < n ? denoised_bytes(s, round[rank]) : 0);
-
-    for (int k = 1; parts && k < n; k++) {
-        if (parts[k].size != denoised_bytes(s, round[k]))
-            base_team_refuse(team, k);
-        else
-            memcpy(round[k]->denoised, parts[k].data, parts[k].size);
-    }
-    for (int k = 0; k < n; k++)
-        base_team_tell(team, round[k]->denoised, denoised_bytes(s, round[k]));
+    for (int k = 0; k < c->n_levels; k += DENOISED_AT_ONCE)
+        denoise_images(d, c, k, c->n_levels - k < DENOISED_AT_ONCE ? c->n_levels - k : DENOISED_AT_ONCE);
 }
 
-static int denoise_chains(struct ggn_session *s, enum ggn_split split, struct ggn_exec *exec, struct ggn_chain **round,
-                          struct base_err *err)
+static int denoise_here(void *data, uint32_t first, uint32_t n, int thread, struct base_err *err)
 {
-    const struct denoise d = {s, exec};
-    const int count = base_team_count(s->plan->team), rank = base_team_rank(s->plan->team);
-    int n = 0;
+    const struct denoise *d = data;
 
-    for (int i = 0; i < s->set.n; i++) {
-        struct ggn_chain *c = &s->set.chains[i];
+    for (uint32_t i = first; i < first + n; i++)
+        denoise_chain(d, d->chains[i]);
+    (void)thread;
+    (void)err;
+    return 0;
+}
+
+static int denoise_task(void *data, struct job_task *task, uint32_t k, uint32_t n, void *answer, int thread,
+                        struct base_err *err)
+{
+    const struct denoise *d = data;
+
+    denoise_here(data, task->first + k, n, thread, err);
+    for (uint32_t i = 0; i < n; i++) {
+        const struct ggn_chain *c = d->chains[task->first + k + i];
+        memcpy((char *)answer + i * task->answer_bytes, c->denoised, denoised_bytes(d->s, c));
+    }
+    return 0;
+}
+
+static int apply_denoised(void *data, uint32_t i, const void *answer)
+{
+    const struct denoise *d = data;
+
+    memcpy(d->chains[i]->denoised, answer, denoised_bytes(d->s, d->chains[i]));
+    return 0;
+}
+
+/* Denoises the listed chains, shared out to the processes of a job; then all of them have them. */
+static int share_denoised(struct denoise *d, struct base_err *err)
+{
+    struct job *job = d->s->plan->job;
+    const struct job_service service = {denoise_task, d};
+    struct job_farm farm = {
+        .whole = 1, .count = d->n, .here = denoise_here, .apply = apply_denoised, .data = d, .answer_bytes = 8};
+
+    for (uint32_t i = 0; i < d->n; i++)
+        while (farm.answer_bytes < denoised_bytes(d->s, d->chains[i]))
+            farm.answer_bytes += 8;
+    int rc = job_share(job, d->s->threads, &farm, &service, err);
+    for (uint32_t i = 0; i < d->n && !rc; i++)
+        job_broadcast(job, d->chains[i]->denoised, denoised_bytes(d->s, d->chains[i]));
+    return rc ? rc : job_failed(job, err);
+}
+
+/* The chains of one split (GGN_SPLITS: all), with room for what is denoised. */
+static int list_chains(struct denoise *d, enum ggn_split split, struct base_err *err)
+{
+    struct ggn_chains *set = &d->s->set;
+
+    for (int i = 0; i < set->n; i++) {
+        struct ggn_chain *c = &set->chains[i];
         if (split != GGN_SPLITS && c->split != split)
             continue;
         if (!c->denoised)
-            c->denoised = malloc(denoised_bytes(s, c) + 1);
+            c->denoised = malloc(denoised_bytes(d->s, c) + 1);
         if (!c->denoised)
             return base_fail_nomem(err, "denoised images");
-        for (int k = 0; n == rank && k < c->n_levels; k += DENOISED_AT_ONCE)
-            denoise_images(&d, c, k, c->n_levels - k < DENOISED_AT_ONCE ? c->n_levels - k : DENOISED_AT_ONCE);
-        round[n++] = c;
-        if (n == count)
-            share_denoised(s, round, n);
-        n %= count;
+        d->chains[d->n++] = c;
     }
-    if (n > 0)
-        share_denoised(s, round, n);
-    return base_team_failed(s->plan->team, err);
+    return 0;
 }
 
-/* Denoises the chains of one split (GGN_SPLITS: all) with s->r, in evaluation mode; processes take turns. */
+/* Denoises the chains of one split with s->r, in evaluation mode. */
 static int denoise(struct ggn_session *s, enum ggn_split split, struct base_err *err)
 {
-    struct ggn_chain **round = malloc((size_t)base_team_count(s->plan->team) * sizeof *round);
-    struct ggn_exec *exec = round ? ggn_exec_create(&s->r_graph, NULL, DENOISED_AT_ONCE, 0, s->threads, err) : NULL;
-    int rc = exec ? 0 : base_fail_nomem(err, "denoised images");
+    struct denoise d = {.s = s, .chains = malloc(((size_t)s->set.n + 1) * sizeof *d.chains)};
 
+    d.exec = d.chains ? ggn_exec_create(&s->r_graph, NULL, DENOISED_AT_ONCE, 0, s->threads, err) : NULL;
+    int rc = d.exec ? list_chains(&d, split, err) : base_fail_nomem(err, "denoised images");
     ggn_weights_pack(s->r, NULL);
     if (!rc)
-        rc = denoise_chains(s, split, exec, round, err);
-    ggn_exec_destroy(exec);
-    free(round);
+        rc = share_denoised(&d, err);
+    ggn_exec_destroy(d.exec);
+    free(d.chains);
     return rc;
 }
 
@@ -343,7 +375,7 @@ int ggn_judge_validation(struct ggn_session *s, int most, struct ggn_judged *o, 
     }
     if (!rc && n) {
         logits(s, &s->validation, index, n, o->logit);
-        rc = base_team_failed(s->plan->team, err);
+        rc = job_failed(s->plan->job, err);
     }
     if (!rc && n)
         rc = ggn_stats_auc(o->logit, o->noisy, (size_t)n, &o->auc, err);

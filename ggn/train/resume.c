@@ -208,15 +208,15 @@ static int share_state(struct ggn_session *s, struct base_err *err)
     size_t count;
     float *array;
 
-    base_team_tell(s->plan->team, &s->progress, sizeof s->progress);
-    base_team_tell(s->plan->team, &t->steps, sizeof t->steps);
-    base_team_tell(s->plan->team, t->adam_t, sizeof t->adam_t);
+    job_broadcast(s->plan->job, &s->progress, sizeof s->progress);
+    job_broadcast(s->plan->job, &t->steps, sizeof t->steps);
+    job_broadcast(s->plan->job, t->adam_t, sizeof t->adam_t);
     for (int i = 0; (array = state_array(s, i, &count)); i++)
-        base_team_tell(s->plan->team, array, count * sizeof *array);
+        job_broadcast(s->plan->job, array, count * sizeof *array);
     for (int net = 0; net < GGN_NETS; net++)
         ggn_weights_pack(t->weights[net], NULL);
     ggn_trainer_keep(t);
-    return base_team_failed(s->plan->team, err);
+    return job_failed(s->plan->job, err);
 }
 
 static int load(struct ggn_session *s, const char *path, struct base_err *err)
@@ -246,7 +246,7 @@ static int load(struct ggn_session *s, const char *path, struct base_err *err)
 
 int ggn_resume_load(struct ggn_session *s, const char *path, struct base_err *err)
 {
-    int rc = base_team_rank(s->plan->team) == 0 ? load(s, path, err) : 0;
+    int rc = job_rank(s->plan->job) == 0 ? load(s, path, err) : 0;
 
     return rc ? rc : share_state(s, err);
 }

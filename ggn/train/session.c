@@ -40,9 +40,9 @@ void ggn_session_load_best(struct ggn_session *s)
 
 int ggn_session_first(const struct ggn_session *s, int n, int *mine)
 {
-    const int rank = base_team_rank(s->plan->team), first = (int)base_team_first(s->plan->team, n, rank);
+    const int rank = job_rank(s->plan->job), first = (int)job_first(s->plan->job, n, rank);
 
-    *mine = (int)base_team_first(s->plan->team, n, rank + 1) - first;
+    *mine = (int)job_first(s->plan->job, n, rank + 1) - first;
     return first;
 }
 
@@ -80,7 +80,7 @@ int ggn_session_init(struct ggn_session *s, struct base_err *err)
     const struct ggn_train_plan *p = s->plan;
     const int paper = p->preset == GGN_PRESET_PAPER;
 
-    s->threads = base_threads_create(p->threads > 0 ? p->threads : base_team_threads(p->team), err);
+    s->threads = base_threads_create(p->threads > 0 ? p->threads : job_threads(p->job), err);
     struct ggn_chains_options data = p->data;
     data.pictures = p->picture > 0;
     data.mean_for_reference = 1;
@@ -114,8 +114,8 @@ int ggn_session_init(struct ggn_session *s, struct base_err *err)
     s->r = rc ? NULL : ggn_weights_create(&s->r_graph, NULL, 0, err);
     if (!s->r)
         return rc ? rc : BASE_ENOMEM;
-    size_t crops = 6 * (size_t)base_team_most(p->team, p->batch_r) * (size_t)p->crop * (size_t)p->crop;
-    size_t windows = (size_t)base_team_most(p->team, p->batch) * (2 * (size_t)p->window + 1) * ggn_chains_values(&s->set);
+    size_t crops = 6 * (size_t)job_most(p->job, p->batch_r) * (size_t)p->crop * (size_t)p->crop;
+    size_t windows = (size_t)job_most(p->job, p->batch) * (2 * (size_t)p->window + 1) * ggn_chains_values(&s->set);
     size_t pointers = 6 * (size_t)p->batch_r + (6 * (size_t)p->window + 1) * (size_t)p->batch;
     s->buffer = malloc((crops > windows ? crops : windows) * sizeof *s->buffer);
     s->planes = malloc(pointers * sizeof *s->planes);
@@ -166,6 +166,6 @@ int ggn_session_begin(struct ggn_session *s, int parts, int batch, int height, i
     o.lr[GGN_NET_R] = s->plan->lr_r;
     o.lr[GGN_NET_M] = o.lr[GGN_NET_D] = s->plan->lr;
     ggn_trainer_destroy(s->trainer);
-    s->trainer = ggn_trainer_create(&hyper, &o, s->threads, s->plan->team, err);
+    s->trainer = ggn_trainer_create(&hyper, &o, s->threads, s->plan->job, err);
     return s->trainer ? 0 : BASE_ENOMEM;
 }

@@ -43,12 +43,12 @@ static int find_checkpoint(const struct ggn_train_plan *plan, const char **path,
     struct stat st;
     int rc = 0, found[2] = {*phase, 0};
 
-    if (base_team_rank(plan->team) == 0 && plan->resume && stat(*path, &st) == 0) {
+    if (job_rank(plan->job) == 0 && plan->resume && stat(*path, &st) == 0) {
         rc = ggn_resume_phase(*path, &found[0], err);
         found[1] = 1;
     }
     if (!rc)
-        rc = base_team_tell(plan->team, found, sizeof found);
+        rc = job_broadcast(plan->job, found, sizeof found);
     *phase = found[0];
     *path = found[1] ? *path : NULL;
     return rc;
@@ -56,12 +56,12 @@ static int find_checkpoint(const struct ggn_train_plan *plan, const char **path,
 
 static void tell_traffic(const struct ggn_session *s)
 {
-    const struct base_team_traffic t = base_team_traffic(s->plan->team);
+    const struct job_traffic t = job_traffic(s->plan->job);
     double steps = s->plan->steps_r + (double)s->progress.step;
 
-    if (s->plan->team && s->plan->progress)
+    if (s->plan->job && s->plan->progress)
         fprintf(s->plan->progress, "%d processes: %.0f messages, %.2f MB per step at rank 0, which waited %.1f s for them\n",
-                base_team_count(s->plan->team), (double)t.messages / steps, (double)t.bytes / steps * 1e-6, t.waiting_s);
+                job_count(s->plan->job), (double)t.messages / steps, (double)t.bytes / steps * 1e-6, t.waiting_s);
 }
 
 int ggn_train(const struct ggn_train_plan *plan, struct base_err *err)
@@ -80,7 +80,8 @@ int ggn_train(const struct ggn_train_plan *plan, struct base_err *err)
     if (!rc && plan->init)
         rc = ggn_session_load_init(&s, err);
     if (!rc)
-        rc = ggn_agree(plan->team, &s.set, &plan->init, plan->init != NULL, ggn_resume_key(&s), err);
+        rc = ggn_agree(plan->job, &s.set, &plan->init, plan->init != NULL, ggn_resume_key(&s), base_threads_count(s.threads),
+                       err);
     if (!rc && phase == GGN_PHASE_DENOISER) {
         rc = ggn_phase_denoiser(&s, checkpoint, err);
         checkpoint = NULL;
@@ -89,7 +90,7 @@ int ggn_train(const struct ggn_train_plan *plan, struct base_err *err)
         rc = ggn_phase_judge(&s, checkpoint, err);
     if (!rc)
         rc = ggn_session_finish(&s, err);
-    if (!rc && base_team_rank(plan->team) == 0) {
+    if (!rc && job_rank(plan->job) == 0) {
         draw_curves(&s);
         tell_traffic(&s);
     }

@@ -5,7 +5,7 @@
 #include <signal.h>
 #include <stdio.h>
 
-#include "base/team.h"
+#include "job/job.h"
 #include "data/chains.h"
 #include "model/networks.h"
 
@@ -36,7 +36,7 @@ struct ggn_train_plan {
     double early_rate;      /* share of validation blocks that may be stopped early (ggn_stopping.early_rate) */
     uint32_t seed;
     int threads;                              /* of this process; 0: all that it may use */
-    struct base_team *team;                   /* borrows; who train together, all with this plan; NULL: alone */
+    struct job *job;                          /* borrows; whose processes train together, all with this plan; NULL: alone */
     FILE *progress;                           /* lines for people, or NULL; rank 0 */
     const volatile sig_atomic_t *interrupted; /* checked between steps, or NULL; rank 0 */
 };

@@ -332,8 +332,14 @@ static int receive(struct serving *s, double wait_s)
     return s->job->failed.code;
 }
 
+/* After the end of the farm messages are for others. */
 static void serve_now(struct serving *s, double wait_s)
 {
+    pthread_mutex_lock(&s->lock);
+    const int over = s->over;
+    pthread_mutex_unlock(&s->lock);
+    if (over)
+        return;
     if (send_finished(s) != 0 || receive(s, wait_s) != 0)
         give_up(s, &s->job->failed);
 }

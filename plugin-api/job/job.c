@@ -211,7 +211,8 @@ static int hear_farewell(struct job *job, int rank, const void *message, size_t 
                      f->text[0] ? f->text : "ended too early");
 }
 
-int job_receive(struct job *job, double wait_s, int *rank, struct job_message **message, size_t *size)
+/* The next message from the transport; as job_receive. */
+static int receive_new(struct job *job, double wait_s, int *rank, struct job_message **message, size_t *size)
 {
     void *data = NULL;
     int got = job->transport->calls->receive(job->transport, wait_s, rank, &data, size, &job->failed);
@@ -237,6 +238,37 @@ int job_receive(struct job *job, double wait_s, int *rank, struct job_message **
     }
     free(data);
     return rc;
+}
+
+int job_receive(struct job *job, double wait_s, int *rank, struct job_message **message, size_t *size)
+{
+    struct job_kept *k = job->kept;
+    if (!k)
+        return receive_new(job, wait_s, rank, message, size);
+    *rank = k->rank;
+    *message = k->message;
+    *size = k->size;
+    job->kept = k->next;
+    free(k);
+    return 1;
+}
+
+/* Keeps what comes within wait_s for later, unless it is about presence or ends. */
+static int keep_new(struct job *job, double wait_s)
+{
+    struct job_kept new = {0}, **last = &job->kept;
+    int got = receive_new(job, wait_s, &new.rank, &new.message, &new.size);
+    if (got <= 0)
+        return got;
+    while (*last)
+        last = &(*last)->next;
+    *last = malloc(sizeof new);
+    if (!*last) {
+        free(new.message);
+        return base_fail_nomem(&job->failed, "messages");
+    }
+    **last = new;
+    return 1;
 }
 
 /* --- the handshake --------------------------------------------------------------------------------------------------- */
@@ -310,12 +342,7 @@ static int call_roll(struct job *job)
         job_send_head(job, rank, JOB_PRESENT, 0);
     }
     while (!job->failed.code && absent < job->transport->count && base_clock_wall_s() - start_s < ROLL_CALL_S) {
-        struct job_message *message;
-        size_t size;
-        if (job_receive(job, LOOK_S, &rank, &message, &size) > 0) {
-            job_nonsense(job, rank);
-            free(message);
-        }
+        keep_new(job, LOOK_S);
         for (absent = 1; absent < job->transport->count && job->workers[absent].present;)
             absent++;
     }
@@ -323,21 +350,22 @@ static int call_roll(struct job *job)
                                                                : job_give_up(job, absent, 2 * job->timeout_s);
 }
 
+/* A worker that waits for a collective. Rank 0 may have ended after its own part, in order or not: then the rest comes soon. */
+static int wait_on(struct job *job, double *since_s)
+{
+    if (!job->over)
+        *since_s = base_clock_wall_s();
+    else if (job->status != 0 && base_clock_wall_s() - *since_s > ROLL_CALL_S)
+        base_fail(&job->failed, BASE_EIO, "rank 0 has ended"); /* nobody reads it: rank 0 says why */
+    return job->failed.code;
+}
+
 /* While nothing has come of a collective. */
 static int attend(struct job *job, double nap_s, double *since_s)
 {
-    int rank;
-    struct job_message *message;
-    size_t size;
-    int got = job_receive(job, nap_s, &rank, &message, &size);
-    if (got > 0) {
-        job_nonsense(job, rank);
-        free(message);
-    }
-    if (job->over)
-        base_fail(&job->failed, BASE_EIO, "rank 0 has ended"); /* nobody reads it: rank 0 says why */
+    keep_new(job, nap_s);
     if (job->failed.code || job->transport->rank > 0)
-        return job->failed.code;
+        return job->failed.code ? job->failed.code : wait_on(job, since_s);
     if (job->interrupted && *job->interrupted && job_find_dead(job, NULL))
         return job->failed.code;
     if (job->timeout_s <= 0 || base_clock_wall_s() - *since_s <= job->timeout_s)
@@ -440,6 +468,11 @@ int job_close(struct job *job, int status, const char *text, struct base_err *er
         job->transport->calls->abort(job->transport, job->transport->rank > 0 ? job->status : status);
     status = job->transport->rank > 0 ? 0 : status;
     job->transport->calls->close(job->transport);
+    for (struct job_kept *k = job->kept, *next; k; k = next) {
+        next = k->next;
+        free(k->message);
+        free(k);
+    }
     free(job->workers);
     free(job);
     return status;

@@ -48,6 +48,14 @@ struct job_worker {
     double since_s; /* wall time since which it owes an answer */
 };
 
+/* A message that came while a process waited for a collective: its sender was quicker. */
+struct job_kept {
+    struct job_kept *next;
+    struct job_message *message; /* owns */
+    size_t size;
+    int rank;
+};
+
 struct job {
     struct job_transport *transport;
     double timeout_s;
@@ -55,6 +63,7 @@ struct job {
     struct job_worker *workers; /* owns; [count] at rank 0, 0 unused */
     int threads, able;          /* of all workers */
     uint32_t serial;            /* farms so far */
+    struct job_kept *kept;      /* owns, in the order of arrival */
     int lost;                   /* somebody is gone for good or stays in a collective: there is no orderly end */
     int over, status;           /* rank 0 has said the end; with which status, of a worker */
     struct job_traffic traffic;

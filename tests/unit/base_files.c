@@ -28,7 +28,6 @@
 #include "base/json.h"
 #include "base/lock.h"
 #include "base/outputs.h"
-#include "base/peers.h"
 #include "picture/png.h"
 #include "base/threads.h"
 #include "support/foreign.h"
@@ -539,36 +538,6 @@ static void pictures(void **state)
     assert_int_equal(access("q.png", F_OK), -1);
 }
 
-/* --- processes ----------------------------------------------------------------------------------------------------------- */
-
-static void what_is_said_of_processes(void **state)
-{
-    (void)state;
-    struct base_err err = {0};
-    struct base_peer list[3] = {{"here", 0, "rank 0"}, {"here", 0, "rank 1"}, {"there", 999999999, "rank 2"}};
-    struct base_peers peers = {.rank = 0, .count = 3, .list = list};
-    list[0].pid = list[1].pid = getpid();
-    assert_int_equal(base_peers_mourn(&peers, &err), 0); /* of other hosts nothing is known */
-    strcpy(list[2].host, "here");
-    says(base_peers_mourn(&peers, &err), BASE_EIO, &err, "rank 2 has died");
-    says(base_peers_give_up(&peers, 1, 2.5, &err), BASE_EIO, &err, "rank 1 has not answered for 2.5 s (--rank-timeout)");
-    says(base_peers_differ(&peers, 1, "a=1\nb=3\nc=5\n", "a=1\nb=2\nc=4\n", &err), BASE_EINVAL, &err,
-         "rank 1 has b=3, but rank 0 has b=2: give all hosts the same files");
-    says(base_peers_differ(&peers, 2, "a=1\nbc=3", "a=1\nb=3", &err), BASE_EINVAL, &err,
-         "rank 2 has bc=3, but rank 0 has b=3: give all hosts the same files");
-    says(base_peers_differ(&peers, 2, "a=1\nb=3\n", "a=1\n", &err), BASE_EINVAL, &err,
-         "rank 2 has other settings than rank 0");
-    long processors = sysconf(_SC_NPROCESSORS_ONLN);
-    int available = base_threads_available();
-    assert_int_equal(base_peers_threads(NULL), available);
-    long share = processors / 3 < 1 ? 1 : processors / 3;
-    assert_int_equal(base_peers_threads(&peers), share < available ? share : available);
-    peers.rank = 2;
-    strcpy(list[2].host, "there");
-    share = processors < available ? processors : available;
-    assert_int_equal(base_peers_threads(&peers), share);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -583,7 +552,6 @@ int main(void)
         cmocka_unit_test(json),
         cmocka_unit_test(small_floats),
         cmocka_unit_test(pictures),
-        cmocka_unit_test(what_is_said_of_processes),
         cmocka_unit_test(one_file_or_two),
     };
     return cmocka_run_group_tests_name("files", tests, setup, teardown);
