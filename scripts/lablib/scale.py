@@ -14,8 +14,8 @@ from lablib import plots, tables, tool
 from lablib.tool import Refused
 
 # As in pathtracer/render/render.c, plugin-api/job/message.h and farm.c.
-SLICE_S, SLICE_PER_MEMBER_S, LONGEST_SLICE_S, ROWS_PER_THREAD = 0.25, 0.004, 5.0, 128
-PARCELS, MOST_ROWS, SHARES = 2, 32, 4
+SLICE_S, SLICE_PER_WORKER_S, LONGEST_SLICE_S, ROWS_PER_THREAD = 0.25, 0.004, 5.0, 128
+TASKS, MOST_ROWS, SHARES = 2, 32, 4
 BLOCK, SPP_MIN, SPP_MAX = 200, 16, 10000
 SLICES_SIMULATED = 6  # of a wave; the others go at their mean speed
 
@@ -63,7 +63,7 @@ class Machine:
         self.served_s = self.bytes = 0.0
 
     def serve_s(self, rows):
-        """Rank 0's time for a parcel of so many rows, one way."""
+        """Rank 0's time for a task of so many rows, one way."""
         size = rows * (BLOCK * self.m["bytes_per_pixel"] + 56) + 64
         self.bytes += size
         return self.m["message_s"] + size * self.m["byte_s"]
@@ -89,7 +89,7 @@ class Machine:
             free[rank] = start + max(n / self.threads, 1.0) * row_s
             heapq.heappush(events, (free[rank] + self.m["latency_s"], rank, n))
 
-        for _ in range(PARCELS):
+        for _ in range(TASKS):
             for rank in range(1, self.processes):
                 deal(rank, 0.0)
         others, here = self.threads - 1, 0.0  # rank 0's threads that never serve take rows all the time
@@ -116,7 +116,7 @@ class Machine:
         """Wall seconds for a wave: [(thread seconds, rows)] of its blocks, dearest first."""
         total = sum(w for w, _ in work)
         rows = sum(r for _, r in work)
-        span_s = min(SLICE_S + SLICE_PER_MEMBER_S * (self.cores - self.threads), LONGEST_SLICE_S)
+        span_s = min(SLICE_S + SLICE_PER_WORKER_S * (self.cores - self.threads), LONGEST_SLICE_S)
         capacity = span_s * self.cores
         slices = max(1, math.ceil(total / capacity))
         in_slice = min(rows, max(ROWS_PER_THREAD * self.cores, BLOCK)) if slices > 1 else rows
