@@ -330,7 +330,7 @@ int job_handshake(struct job *job, const char *settings, int threads, int able, 
     return job_failed(job, err);
 }
 
-/* --- collectives ------------------------------------------------------------------------------------------------------ */
+/* --- collectives --------------------------------------------------------------------------------------------------- */
 
 /* A collective lasts too long: asks who waits for it too, and gives up the first who does not say so. */
 static int call_roll(struct job *job)
@@ -350,7 +350,8 @@ static int call_roll(struct job *job)
                                                                : job_give_up(job, absent, 2 * job->timeout_s);
 }
 
-/* A worker that waits for a collective. Rank 0 may have ended after its own part, in order or not: then the rest comes soon. */
+/* A worker that waits for a collective. Rank 0 may have ended after its own part, in order or not: then the rest comes
+ * soon. */
 static int wait_on(struct job *job, double *since_s)
 {
     if (!job->over)
