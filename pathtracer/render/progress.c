@@ -1,11 +1,10 @@
 #include "render/progress.h"
 
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
+#include <stdio.h>
 
 #include "base/clock.h"
+
 static const double LIVE_S = 0.2, FIRST_PLAIN_S = 2.0, PLAIN_S = 10.0;
 
 void pt_progress_init(struct pt_progress *p, struct base_log *log)
