@@ -1,18 +1,8 @@
 #!/bin/sh
 # The host library as a renderer has it: its header, its symbols, the example in C++, an installed copy.
-tmp=$(mktemp -d) || exit 2
-trap 'rm -rf "$tmp"' EXIT
-n=0
+. "$(dirname "$0")/tap_setup"
 build=${BUILD:-build}
 lib=$build/lib/liblull-host.so.1
-t() { # t NAME COMMAND...
-    n=$((n + 1)) name=$1
-    shift
-    if "$@" >"$tmp/log" 2>&1; then echo "ok $n - $name"; else
-        echo "not ok $n - $name"
-        tail -n 20 "$tmp/log" | sed 's/^/#   /'
-    fi
-}
 header=plugin-api/include/lull/host.h
 flags="-Wall -Wextra -Wpedantic -Wshadow -Wundef -Wconversion -Werror -fsyntax-only -Iplugin-api/include"
 for cc in gcc clang; do

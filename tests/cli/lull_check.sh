@@ -1,14 +1,6 @@
 #!/bin/sh
 # lull-check: its options and exit statuses, and every criterion of the build against the whole contract.
 . tests/cli/lull_check_setup
-t() { # t NAME COMMAND...: passes if the command does
-    n=$((n + 1)) name=$1
-    shift
-    if "$@" >"$tmp/log" 2>&1; then echo "ok $n - $name"; else
-        echo "not ok $n - $name"
-        tail -n 30 "$tmp/log" | sed 's/^/#   /'
-    fi
-}
 status() { # status N ARGS...: lull-check ends with this status
     want=$1
     shift

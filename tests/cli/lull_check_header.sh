@@ -1,17 +1,7 @@
 #!/bin/sh
 # The ABI's header is clean C99 and C++11 with every compiler there is, has no padding, needs only stddef.h and stdint.h, and
 # makes a working criterion with nothing else; the version script leaves one symbol. The kit is clean C99 and C++11 too.
-tmp=$(mktemp -d) || exit 2
-trap 'rm -rf "$tmp"' EXIT
-n=0
-t() { # t NAME COMMAND...
-    n=$((n + 1)) name=$1
-    shift
-    if "$@" >"$tmp/log" 2>&1; then echo "ok $n - $name"; else
-        echo "not ok $n - $name"
-        tail -n 20 "$tmp/log" | sed 's/^/#   /'
-    fi
-}
+. "$(dirname "$0")/tap_setup"
 header=plugin-api/include/lull/criterion.h
 flags="-Wall -Wextra -Wpedantic -Wshadow -Wundef -Werror -fsyntax-only"
 for cc in gcc clang; do

@@ -3,17 +3,7 @@
 BUILD=${BUILD:-build}
 host=scripts/hosts/ctypes_host.py
 . tests/hosts/find-python
-tmp=$(mktemp -d) || exit 2
-trap 'rm -rf "$tmp"' EXIT
-n=0
-t() { # t NAME COMMAND...
-    n=$((n + 1)) name=$1
-    shift
-    if "$@" >"$tmp/log" 2>&1; then echo "ok $n - $name"; else
-        echo "not ok $n - $name"
-        tail -n 20 "$tmp/log" | sed 's/^/#   /'
-    fi
-}
+. tests/cli/tap_setup
 run() { "$python" "$host" "$@"; }
 counts() { run "$@" | sed -n 's/^  block .: *\([0-9]*\) spp.*/\1/p'; }
 # the quiet block stops first, the noisy one gets most; tail-share lets the block with fireflies go
