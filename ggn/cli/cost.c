@@ -1,4 +1,4 @@
-/* `ggn cost --data DATA`: what accuracy costs each criterion, over the range of its dials, from recorded sequences. */
+/* `ggn cost --data DATA`: what accuracy costs each criterion, over its quality parameters, from recorded sequences. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -89,13 +89,13 @@ static void put_cost(cJSON *to, const struct ggn_cost *c, int *failed)
 }
 
 /* One setting of one criterion: a point for each scene and one for all together (scene null). */
-static void put_setting(struct job *j, const char *criterion, const char *dial, double value, const double *stop,
+static void put_setting(struct job *j, const char *criterion, const char *parameter, double value, const double *stop,
                         const struct ggn_checks_made *checks)
 {
     const struct ggn_dataset *d = &j->set.chains.data;
     cJSON *o = base_json_object(j->points, NULL, &j->failed);
     base_json_text(o, "criterion", criterion, &j->failed);
-    base_json_text(o, "dial", dial, &j->failed);
+    base_json_text(o, "dial", parameter, &j->failed);
     base_json_number(o, "value", value, &j->failed);
     cJSON *stops = base_json_array(o, "stops", &j->failed);
     for (int b = 0; b < j->set.n_blocks; b++)
@@ -110,10 +110,10 @@ static void put_setting(struct job *j, const char *criterion, const char *dial, 
     }
 }
 
-static void put_method(struct job *j, const char *dial, double value, const struct ggn_method *m)
+static void put_method(struct job *j, const char *parameter, double value, const struct ggn_method *m)
 {
     ggn_cost_checks(m, &j->set, j->checks);
-    put_setting(j, m->name, dial, value, m->stop, j->checks);
+    put_setting(j, m->name, parameter, value, m->stop, j->checks);
 }
 
 /* Where a block is in the lists of stops. */
@@ -252,15 +252,15 @@ static int put_sizes(struct job *j, cJSON *root, struct base_err *err)
     return rc;
 }
 
-/* --- dials --- */
+/* --- quality parameters --- */
 
-static void turn(struct job *j, struct ggn_method *m, const char *dial, const double *values, size_t n)
+static void vary(struct job *j, struct ggn_method *m, const char *parameter, const double *values, size_t n)
 {
     double own = m->cut;
     for (size_t i = 0; i < n; i++) {
         m->cut = values[i];
         ggn_method_run(m, &j->set);
-        put_method(j, dial, values[i], m);
+        put_method(j, parameter, values[i], m);
     }
     m->cut = own;
     ggn_method_run(m, &j->set);
@@ -295,27 +295,27 @@ static int cost_errors(struct job *j, struct base_err *err)
             rc = k ? ggn_method_halfbuf(&m, &j->set, &available, err) : ggn_method_variance(&m, &j->set, &available, err);
         if (rc)
             return rc;
-        const double *dial = k ? halfbuf : variance, own = k ? 0.004 : 0.03; /* the criteria's defaults */
+        const double *thresholds = k ? halfbuf : variance, own = k ? 0.004 : 0.03; /* the criteria's defaults */
         const size_t n = k ? COUNT(halfbuf) : COUNT(variance);
         for (int guarded = 1; guarded >= 0 && available; guarded--) {
             if (!guarded)
                 snprintf(m.name, sizeof m.name, k ? "halfbuf, no guard" : "variance, no guard");
             m.guard = guarded ? m.guard : NULL;
-            turn(j, &m, "threshold", j->o->cadence > 0 ? &own : dial, j->o->cadence > 0 ? 1 : n);
+            vary(j, &m, "threshold", j->o->cadence > 0 ? &own : thresholds, j->o->cadence > 0 ? 1 : n);
         }
         ggn_method_release(&m);
     }
     return 0;
 }
 
-static int put_observer(struct job *j, const char *dial, double visible, double growth, struct base_err *err)
+static int put_observer(struct job *j, const char *parameter, double visible, double growth, struct base_err *err)
 {
     struct ggn_method m;
     int available, rc = ggn_method_observer(&m, &j->set, j->o->observer, 1, visible, growth, &available, err);
     if (rc)
         return rc;
     if (available)
-        put_method(j, dial, strcmp(dial, "growth") == 0 ? growth : visible, &m);
+        put_method(j, parameter, strcmp(parameter, "growth") == 0 ? growth : visible, &m);
     ggn_method_release(&m);
     return 0;
 }
@@ -351,7 +351,7 @@ static void cost_network(struct job *j, struct ggn_method *m)
     put_method(j, "own", m->cut, m);
     if (j->o->cadence > 0 || j->o->scores)
         return;
-    turn(j, m, "visible", shares, COUNT(shares));
+    vary(j, m, "visible", shares, COUNT(shares));
     turn_passes(j, m);
     m->verdict = NULL; /* scores of every window, as without the gate */
     ggn_method_run(m, &j->set);
@@ -424,7 +424,7 @@ static int cost_baselines(struct job *j, struct base_threads *threads, struct ba
             snprintf(m.name, sizeof m.name, "%s", ggn_baseline_names[b.kind]);
             put_method(j, "own", m.cut, &m);
             if (!(j->o->cadence > 0)) {
-                turn(j, &m, "visible", shares, COUNT(shares));
+                vary(j, &m, "visible", shares, COUNT(shares));
                 turn_passes(j, &m);
             }
             ggn_method_release(&m);
@@ -509,7 +509,8 @@ int ggn_cmd_cost(int argc, char **argv)
 {
     static const struct base_options options = {
         .list = list,
-        .doc = "Replays recorded blocks through every criterion over the range of its dials and writes, scene by scene, "
+        .doc = "Replays recorded blocks through every criterion over the range of its quality parameters and writes, scene "
+               "by scene, "
                "what was spent until the blocks stop and how good the picture is then, as JSON. scripts/lab cost puts "
                "measured prices on the checks and draws it."};
     struct options o = {.split = GGN_SPLIT_TEST, .threads = base_threads_available()};

@@ -220,8 +220,8 @@ static const struct base_option options[] = {
      .help = "Stop a block when at most this share of viewers would still see noise, of criteria that can tell (observer: "
              "default 0.35, ggn: the model's own)"},
     {"mask", 0, "FILE.png", TO(mask), .input = BASE_FILE, .words = png,
-     .help = "A grey picture of the image's size: lighter regions are rendered better. White takes a quarter of the dial "
-             "(visible, else threshold), black leaves it; the lightest pixel of a block counts"},
+     .help = "A grey picture of the image's size: lighter regions are rendered better. White takes a quarter of the quality "
+             "parameter (visible, else threshold), black leaves it; the lightest pixel of a block counts"},
     {"param", 'p', "KEY=VALUE", .set = set_param, .help = "Parameter of the criterion; may be repeated"},
     {"list-criteria", 0, NULL, TO(action), PT_CLI_LIST_CRITERIA,
      .help = "List the criteria that are found and their parameters, and exit"},

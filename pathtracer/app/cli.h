@@ -48,7 +48,7 @@ struct pt_cli {
     const char *criterion; /* NULL = not given */
     struct pt_cli_params params;
     enum pt_picture picture;     /* that is kept */
-    const char *mask;            /* picture that scales the dial per block; NULL = none */
+    const char *mask;            /* picture that scales the quality parameter per block; NULL = none */
     int threads;                 /* 0 = all processors */
     double rank_timeout_s;       /* wait for an answer of another process */
     struct base_outputs outputs; /* all files to be written that the command line names */

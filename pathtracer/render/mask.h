@@ -1,6 +1,6 @@
 /*
- * A region that the user wants better: a grey picture of the image's size that scales the criterion's dial per block
- * (lull_host_config.mask). Plain data, no locks.
+ * A region that the user wants better: a grey picture of the image's size that scales the criterion's quality parameter per
+ * block (lull_host_config.mask). Plain data, no locks.
  */
 #ifndef PT_RENDER_MASK_H
 #define PT_RENDER_MASK_H

@@ -13,7 +13,7 @@ struct pt_output_info {
     const char *scene;              /* path of the scene file */
     const struct lull_pair *params; /* of the criterion, as given */
     uint32_t param_count;
-    const char *mask;    /* path of the picture that scales the dial; NULL = none */
+    const char *mask;    /* path of the picture that scales the quality parameter; NULL = none */
     pt_effects effects;  /* what the scene calls for */
     const char *kernel;  /* name of the kernel that rendered it */
     int reproducible;    /* leave times out of the EXR, so that equal renders are equal files */

@@ -17,7 +17,7 @@ static struct lull_host_forecast look(const struct pt_render *r, double *wall_s)
 {
     struct lull_host_forecast f = {.known = 1};
     int threads = pt_render_threads(r);
-    int32_t code = lull_host_outlook(r->blocks, r->totals, threads, &f, NULL);
+    int32_t code = lull_host_forecast_of(r->blocks, r->totals, threads, &f, NULL);
     if (code != LULL_OK || r->busy_threads <= 0.0)
         *wall_s = INFINITY;
     else /* what keeps the threads from it now, other programs for one, will go on doing so */

@@ -2,7 +2,7 @@
  * The live line of a render: share done, active blocks, their range of samples, speed, time left. On a terminal it is
  * redrawn in place, elsewhere it is a plain line now and then. Without predictions of the criterion, the share is a lower
  * bound ("?" below 1 %) and the time an upper one. Where blocks stop is predicted as for
- * --quote (outlook.h).
+ * --quote (lull/host.h).
  */
 #ifndef PT_RENDER_PROGRESS_H
 #define PT_RENDER_PROGRESS_H

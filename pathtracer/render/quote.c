@@ -53,16 +53,16 @@ static int add_rows(struct pt_quote *q, const struct lull_criterion *table, cons
         double visible;
         const char *name;
     } shares[] = {{0.5, "draft"}, {0.25, "default"}, {0.05, "final"}};
-    const struct lull_param *dial = NULL;
-    const char *text = table ? lull_host_parameter(table, "visible", pairs, pair_count, &dial) : NULL;
+    const struct lull_param *parameter = NULL;
+    const char *text = table ? lull_host_parameter(table, "visible", pairs, pair_count, &parameter) : NULL;
     double asked;
     int met = !text || !base_parse_real(text, 0, 1, &asked);
     int rc = met ? add_row(q, (double)NAN, "as asked", 1, err) : 0;
-    if (!dial || rc)
+    if (!parameter || rc)
         return rc;
     if (met)
         asked = -1.0;
-    if (!base_parse_real(dial->default_value, 0.05, 0.5, &shares[1].visible)) /* a model's own */
+    if (!base_parse_real(parameter->default_value, 0.05, 0.5, &shares[1].visible)) /* a model's own */
         shares[1].name = "normal";
     for (size_t i = 0; i < sizeof shares / sizeof shares[0] && !rc; i++) {
         const double share = shares[i].visible;
@@ -129,8 +129,8 @@ void pt_quote_destroy(struct pt_quote *q)
 
 /* A row that would have stopped the block at an earlier check has stopped it; where between the two checks follows from what
  * it expected at the first. */
-static void hear(struct lull_host_said *said, const struct lull_host_block *b, const struct lull_decision *d,
-                 uint64_t spp_min)
+static void note_answer(struct lull_host_said *said, const struct lull_host_block *b, const struct lull_decision *d,
+                        uint64_t spp_min)
 {
     if (said->stopped || b->spp <= said->spp)
         return;
@@ -151,7 +151,7 @@ static int ask_row(struct pt_quote_row *row, struct pt_render *r, const uint32_t
     if (!rc)
         rc = pt_criterion_evaluate(row->criterion, r->frame, &r->film, due, count, final, decisions, err);
     for (uint32_t k = 0; k < count && !rc; k++)
-        hear(&row->said[due[k]], &r->blocks->list[due[k]], &decisions[k], r->config.spp_min);
+        note_answer(&row->said[due[k]], &r->blocks->list[due[k]], &decisions[k], r->config.spp_min);
     for (uint32_t k = 0; k < count && !rc; k++)
         if (row->first[due[k]].spp == 0)
             row->first[due[k]] = row->said[due[k]];

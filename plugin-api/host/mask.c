@@ -31,35 +31,36 @@ int32_t lull_host_read_mask(const struct lull_plane *mask, struct lull_host_bloc
     return LULL_OK;
 }
 
-double lull_host_dial(uint32_t step) { return pow(WHITE_SCALE, (double)step / LULL_HOST_STEPS); }
+double lull_host_mask_factor(uint32_t step) { return pow(WHITE_SCALE, (double)step / LULL_HOST_STEPS); }
 
 static int32_t scale_dial(const struct lull_criterion *t, const struct lull_pair *pairs, uint32_t pair_count, uint32_t step,
                           char value[32], struct lull_pair *pair, struct lull_error *err)
 {
-    static const char *const dials[] = {"visible", "threshold"};
-    const char *known = NULL; /* a dial that has no value */
-    for (size_t d = 0; d < sizeof dials / sizeof dials[0]; d++) {
+    static const char *const names[] = {"visible", "threshold"};
+    const char *known = NULL; /* a parameter that has no value */
+    for (size_t d = 0; d < sizeof names / sizeof names[0]; d++) {
         const struct lull_param *p;
-        const char *text = lull_host_parameter(t, dials[d], pairs, pair_count, &p);
-        double dial;
+        const char *text = lull_host_parameter(t, names[d], pairs, pair_count, &p);
+        double quality;
         if (p && !text && !known)
-            known = dials[d];
-        if (!text || !base_parse_real(text, p->min, p->max, &dial))
+            known = names[d];
+        if (!text || !base_parse_real(text, p->min, p->max, &quality))
             continue;
-        dial *= lull_host_dial(step);
-        snprintf(value, 32, "%.17g", fmin(fmax(dial, p->min), p->max));
-        *pair = (struct lull_pair){dials[d], value};
+        quality *= lull_host_mask_factor(step);
+        snprintf(value, 32, "%.17g", fmin(fmax(quality, p->min), p->max));
+        *pair = (struct lull_pair){names[d], value};
         return LULL_OK;
     }
     if (known)
         return lull_error_set(err, LULL_E_VALUE, "criterion %s: a mask scales '%s', which has no value: give one, %s=VALUE",
                               t->id, known, known);
-    return lull_error_set(err, LULL_E_KEY, "criterion %s has no dial 'visible' or 'threshold' for a mask to scale", t->id);
+    return lull_error_set(err, LULL_E_KEY,
+                          "criterion %s has no quality parameter 'visible' or 'threshold' for a mask to scale", t->id);
 }
 
 /* Numbers in text have the form of the C locale, whatever the renderer has set. */
-int32_t lull_host_scale_dial(const struct lull_criterion *t, const struct lull_pair *pairs, uint32_t pair_count,
-                             uint32_t step, char value[32], struct lull_pair *pair, struct lull_error *err)
+int32_t lull_host_scale_quality(const struct lull_criterion *t, const struct lull_pair *pairs, uint32_t pair_count,
+                                uint32_t step, char value[32], struct lull_pair *pair, struct lull_error *err)
 {
     locale_t c = newlocale(LC_ALL_MASK, "C", (locale_t)0);
     if (c == (locale_t)0)

@@ -131,7 +131,7 @@ const char *lull_host_parameter(const struct lull_criterion *t, const char *name
 
 /* --- its frame ------------------------------------------------------------------------------------------------------ */
 
-/* An instance like the first one, its dial scaled for this step of the mask. */
+/* An instance like the first one, its quality parameter scaled for this step of the mask. */
 static int32_t create_dialled(struct lull_host_criterion *c, uint32_t step, struct lull_error *err)
 {
     struct lull_error e = {.struct_size = sizeof e};
@@ -140,7 +140,7 @@ static int32_t create_dialled(struct lull_host_criterion *c, uint32_t step, stru
     if (!pairs)
         return lull_host_no_memory(err, "criterion");
     memcpy(pairs, c->pairs, c->pair_count * sizeof *pairs);
-    int32_t code = lull_host_scale_dial(c->table, c->pairs, c->pair_count, step, value, &pairs[c->pair_count], err);
+    int32_t code = lull_host_scale_quality(c->table, c->pairs, c->pair_count, step, value, &pairs[c->pair_count], err);
     if (code == LULL_OK) { /* a later pair wins */
         code = c->table->create(&c->host, pairs, c->pair_count + 1, sizeof *pairs, &c->dialled[step], &e);
         if (code != LULL_OK)
@@ -268,13 +268,13 @@ static uint64_t first_check(const struct lull_host_frame *f)
     return lull_host_next_check(&f->blocks, spp - 1, spp);
 }
 
-/* A criterion without a dial is refused whatever the mask shows. */
+/* A criterion without a quality parameter is refused whatever the mask shows. */
 static int32_t read_mask(const struct lull_host_criterion *c, const struct lull_plane *mask, struct lull_host_blocks *b,
                          struct lull_error *err)
 {
     char value[32];
-    struct lull_pair dial;
-    int32_t code = lull_host_scale_dial(c->table, c->pairs, c->pair_count, 0, value, &dial, err);
+    struct lull_pair quality;
+    int32_t code = lull_host_scale_quality(c->table, c->pairs, c->pair_count, 0, value, &quality, err);
     return code == LULL_OK ? lull_host_read_mask(mask, b, err) : code;
 }
 

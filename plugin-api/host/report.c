@@ -53,7 +53,7 @@ static void add_blocks(cJSON *root, const struct lull_host_frame *f, const doubl
             base_json_number(o, "noisy_error", noisy_error[i], failed);
         base_json_number(o, "checks", b->checks, failed);
         base_json_number(o, "thread_s", b->thread_s, failed);
-        base_json_number(o, "dial", f->criterion ? lull_host_dial(b->step) : (double)NAN, failed);
+        base_json_number(o, "dial", f->criterion ? lull_host_mask_factor(b->step) : (double)NAN, failed);
     }
 }
 

@@ -121,7 +121,7 @@ void lull_host_note(struct lull_host_frame *f, const uint32_t *due, uint32_t cou
 }
 
 /* A block that dropped samples stops at the second STOP in a row, and never counts as converged. */
-static void settle(const struct lull_host_blocks *blocks, struct lull_host_block *b, const struct lull_decision *d)
+static void apply_one(const struct lull_host_blocks *blocks, struct lull_host_block *b, const struct lull_decision *d)
 {
     int stop = d->action == LULL_STOP && b->spp >= blocks->spp_min;
     b->stop_votes = stop ? b->stop_votes + 1 : 0;
@@ -143,7 +143,7 @@ void lull_host_apply(struct lull_host_frame *f, const uint32_t *due, uint32_t co
 {
     lull_host_note(f, due, count, decisions);
     for (uint32_t k = 0; k < count; k++)
-        settle(&f->blocks, &f->blocks.list[due[k]], &decisions[k]);
+        apply_one(&f->blocks, &f->blocks.list[due[k]], &decisions[k]);
 }
 
 /* Checks may take config.max_check_overhead of the elapsed time: beyond it they are left out until rendering caught up. */
@@ -170,7 +170,7 @@ uint32_t lull_host_due(struct lull_host_frame *f, uint32_t *due, uint8_t *final)
         int last = is_active && b->spp >= blocks->spp_max;
         if (skip && !(last && f->criterion)) {
             if (is_active)
-                settle(blocks, b, &undecided);
+                apply_one(blocks, b, &undecided);
             f->totals.skipped_checks += f->criterion != NULL;
             continue;
         }

@@ -1,5 +1,5 @@
 #!/bin/sh
-# ggn cost: every criterion over its dial, the limit below all, the same bytes for any threads, and how it fails.
+# ggn cost: every criterion over its quality parameter, the limit below all, the same bytes for any threads, and how it fails.
 . "$(dirname "$0")/ggn_setup"
 run() { "$ggn" cost "$@" >"$tmp/out" 2>"$tmp/err"; rc=$?; }
 one_line() { [ "$(wc -l <"$tmp/err")" -eq 1 ] && [ ! -s "$tmp/out" ]; }

@@ -42,7 +42,7 @@ for line, row in zip(lines, (r["observer"] for r in rows)):
     assert cell[1] == "%.0f %%" % (100 * row["early_stop_rate"]) and float(cell[2]) == round(row["samples_ratio"], 2), (cell, row)
 assert rows[2]["observer"]["samples_ratio"] < rows[1]["observer"]["samples_ratio"], "half of the viewers cost no less than three quarters"
 EOF
-check "the figures are those of ggn evaluate, and the dial turns" $?
+check "the figures are those of ggn evaluate, and the quality parameter counts" $?
 record "$tmp/rendered/two" two 5 0 tests/cli/room.pbrt --levels geometric:4:60:1.3 --blocks 1 && agreement --data "$tmp/none" &&
     [ "$(grep -c 'Against' "$tmp/table")" -eq 4 ] && [ "$(grep -c '^| 1 blocks, 1 censored ' "$tmp/table")" -eq 2 ] &&
     [ "$(grep -c '^| observer |' "$tmp/table")" -eq 3 ] && [ "$(grep -c '^| halfbuf |' "$tmp/table")" -eq 1 ]

@@ -187,7 +187,7 @@ def test_engine():
 
 
 def test_quote():
-    """the dial's cost is told at the first check and by --quote, coarser ones too; a render goes on from the quote"""
+    """the quality parameter's cost is told at the first check and by --quote, coarser ones too; a render goes on from the quote"""
     blend = saved(cube(48, 32), "quote.blend")
     common = (blend, "--block", "16", "--spp-max", "256", "--visible", ".2")
     output = io.StringIO()
@@ -223,7 +223,7 @@ def test_told():
 
 
 def test_animation():
-    """the command renders frames of an animation, with the same dial, into numbered files"""
+    """the command renders frames of an animation, with the same quality parameter, into numbered files"""
     cube()
     bpy.ops.wm.save_as_mainfile(filepath=tmp("cube.blend"))
     status, text = command(tmp("cube.blend"), "-c", "halfbuf", "-p", "threshold=.02", "--frames", "1-2", "--block", "24",

@@ -235,7 +235,7 @@ def test_one_call():
 
 
 def test_quote():
-    """a quote tells what dials cost and stops after its pilot, from which a render goes on; a render tells it in one line"""
+    """a quote tells what quality parameters cost and stops after its pilot, from which a render goes on; a render tells it in one line"""
     with tempfile.TemporaryDirectory() as folder:
         settings = {"block": 48, "spp_max": 2048, "checkpoint": os.path.join(folder, "c.npz"), "visible": .35}
         table = lull.mitsuba.quote(scene("box"), "observer", **settings)

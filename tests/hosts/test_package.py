@@ -241,12 +241,12 @@ def test_mask_of_lull_render():
     mask = np.zeros((80, 96))
     mask[7, 50], mask[60, 3] = 1, .4
     files.write_png(tmp("mask.png"), np.dstack([(255 * mask).round().astype(np.uint8)] * 3))
-    for criterion, dial, value in (("halfbuf", "threshold", .03), ("ggn", "visible", .9)):
+    for criterion, name, value in (("halfbuf", "threshold", .03), ("ggn", "visible", .9)):
         subprocess.run([RENDER, "scenes/cornell-box.pbrt", "-q", "--size", "96x80", "--block", "48", "-c", criterion, "-p",
-                        f"{dial}={value}", "--spp-max", "1500", "--mask", tmp("mask.png"), "--report", tmp("mask.json")],
+                        f"{name}={value}", "--spp-max", "1500", "--mask", tmp("mask.png"), "--report", tmp("mask.json")],
                        check=True)
         wanted = json.loads(Path(tmp("mask.json")).read_text())
-        f = lull.Frame(lull.load(criterion, **{dial: value}), 96, 80, block=48, spp_max=1500, mask=mask, **WHOLE)
+        f = lull.Frame(lull.load(criterion, **{name: value}), 96, 80, block=48, spp_max=1500, mask=mask, **WHOLE)
         d = Playback(f, RENDER, "scenes/cornell-box.pbrt", [])
         assert d.run().outcome == "done"
         outputs.write_report(tmp("own.json"), d, mask=tmp("mask.png"))
@@ -550,7 +550,7 @@ def test_mask():
     plain, painted = run(sigmas=[[.2, .2], [.2, .2]])[1], run(sigmas=[[.2, .2], [.2, .2]], mask=mask)[1]
     spp = [b.spp for b in painted.blocks]
     assert spp[1] > 3 * plain.blocks[1].spp and [spp[i] for i in (0, 2, 3)] == [plain.blocks[i].spp for i in (0, 2, 3)]
-    raises(lull.LullError, "no dial", run, "fixed", parameters={}, mask=mask)
+    raises(lull.LullError, "no quality parameter", run, "fixed", parameters={}, mask=mask)
     raises(lull.LullError, "'visible', which has no value", run, "ggn", parameters={}, mask=mask)
     raises(lull.LullError, "a mask has no effect", run, mask=mask, uniform=True)
     saved, other = (lull.Driver(lull.Frame(lull.load("halfbuf"), 32, 32, block=16, mask=m), None) for m in (mask, mask * 0))
@@ -720,7 +720,7 @@ def test_weights():
 
 
 def test_quote():
-    """what the dial costs is told from the first checks: about what the render then takes, coarser less, and it changes nothing"""
+    """what the quality parameter costs is told from the first checks: about what the render then takes, coarser less, and it changes nothing"""
     sigmas = [[.05, .2, .5, 1], [.3] * 4, [.1, .2, .3, .4]]
     size = {"criterion": "observer", "sigmas": sigmas, "parameters": {}, "spp_max": 4096}
     _, plain, _ = run(**size)
@@ -736,7 +736,7 @@ def test_quote():
     assert .7 < rows[2].spp[1] / taken < 1.4, (rows[2], taken)
     assert quote.line(d).startswith("visible 0.35 takes about ") and "; visible 0.9 would take about " in quote.line(d)
     _, _, d = run("fixed", parameters={})
-    assert quote.rows(d) == [] and quote.line(d) == "" and "no dial" in quote.table(d)
+    assert quote.rows(d) == [] and quote.line(d) == "" and "no quality parameter" in quote.table(d)
 
 
 tap.main(dict(globals()))

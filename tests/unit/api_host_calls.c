@@ -20,7 +20,7 @@
 enum { MOST = 16, ALL_PLANES = LULL_PLANE_BIT(LULL_PLANE_COUNT) - 1 };
 
 struct lull_instance {
-    double dial;
+    double quality;
     const struct lull_host *host;
 };
 
@@ -28,7 +28,7 @@ static struct {
     struct lull_requirements needs;
     struct lull_decision answer[MOST];                    /* by block */
     int32_t create, require, begin, evaluate, save, load; /* to be answered */
-    double fails_at;                                      /* the dial of an instance that fails to evaluate */
+    double fails_at;                                      /* the quality of an instance that fails to evaluate */
     char calls[400];
     struct lull_frame frame;
     struct lull_rect rects[MOST];
@@ -70,8 +70,8 @@ static int32_t create(const struct lull_host *host, const struct lull_pair *pair
     in->host = host;
     for (uint32_t i = 0; i < count; i++)
         if (strcmp(pairs[i].key, "threshold") == 0)
-            in->dial = strtod(pairs[i].value, NULL);
-    note("create %g of %u; ", in->dial, count);
+            in->quality = strtod(pairs[i].value, NULL);
+    note("create %g of %u; ", in->quality, count);
     *out = in;
     return LULL_OK;
 }
@@ -88,7 +88,7 @@ static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *op
 {
     heard.frame = *opened;
     memcpy(heard.rects, opened->blocks, opened->block_count * sizeof *opened->blocks);
-    note("begin %g; ", in->dial);
+    note("begin %g; ", in->quality);
     return said(heard.begin, err);
 }
 
@@ -119,26 +119,26 @@ static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, 
     heard.pixel_spp = view->planes[LULL_PLANE_SPP].data ? at(view, LULL_PLANE_SPP, 8, 6, 0) : -1;
     for (int i = 0; i < 2; i++)
         heard.weight[i] = view->planes[LULL_PLANE_WEIGHT].data ? at(view, LULL_PLANE_WEIGHT, 8 + i, 6, 0) : -1;
-    note("ask %g of", in->dial);
+    note("ask %g of", in->quality);
     for (uint32_t k = 0; k < count; k++) {
         note(" %u%s", blocks[k].id, blocks[k].flags & LULL_BLOCK_FINAL ? "!" : "");
         decisions[k] = heard.answer[blocks[k].id];
     }
     note("; ");
-    return said(in->dial == heard.fails_at && in->dial > 0 ? LULL_E_INTERNAL : heard.evaluate, err);
+    return said(in->quality == heard.fails_at && in->quality > 0 ? LULL_E_INTERNAL : heard.evaluate, err);
 }
 
-static void end_frame(struct lull_instance *in) { note("end %g; ", in->dial); }
+static void end_frame(struct lull_instance *in) { note("end %g; ", in->quality); }
 
 static void destroy(struct lull_instance *in)
 {
-    note("destroy %g; ", in->dial);
+    note("destroy %g; ", in->quality);
     free(in);
 }
 
 static int32_t save(const struct lull_instance *in, const struct lull_writer *writer, struct lull_error *err)
 {
-    unsigned char bytes[3] = {1, 2, (unsigned char)(16 * in->dial)};
+    unsigned char bytes[3] = {1, 2, (unsigned char)(16 * in->quality)};
     assert_int_equal(writer->write(writer, bytes, 1), LULL_OK);
     assert_int_equal(writer->write(writer, bytes, 0), LULL_OK);
     assert_int_equal(writer->write(writer, bytes + 1, 2), LULL_OK);
@@ -711,30 +711,32 @@ static void what_a_criterion_fails_with(void **state)
 
 /* --- masks -------------------------------------------------------------------------------------------------------------- */
 
-static void dials(void **state)
+static void qualities(void **state)
 {
     (void)state;
-    struct lull_pair dial, given[2] = {{"threshold", "2"}, {"visible", "0.4"}};
+    struct lull_pair quality, given[2] = {{"threshold", "2"}, {"visible", "0.4"}};
     char value[32];
     err = (struct lull_error){.struct_size = sizeof err};
     for (uint32_t s = 0; s <= LULL_HOST_STEPS; s++)
-        assert_true(fabs(lull_host_dial(s) - pow(4, -(double)s / 8.0)) < 1e-15);
-    assert_int_equal(lull_host_scale_dial(&table, NULL, 0, 0, value, &dial, &err), LULL_OK); /* visible has no value */
-    assert_true(strcmp(dial.key, "threshold") == 0 && dial.value == value && strtod(value, NULL) == 0.5);
-    assert_int_equal(lull_host_scale_dial(&table, NULL, 0, 8, value, &dial, &err), LULL_OK); /* 0.125 is below its range */
+        assert_true(fabs(lull_host_mask_factor(s) - pow(4, -(double)s / 8.0)) < 1e-15);
+    assert_int_equal(lull_host_scale_quality(&table, NULL, 0, 0, value, &quality, &err), LULL_OK); /* visible has no value */
+    assert_true(strcmp(quality.key, "threshold") == 0 && quality.value == value && strtod(value, NULL) == 0.5);
+    assert_int_equal(lull_host_scale_quality(&table, NULL, 0, 8, value, &quality, &err),
+                     LULL_OK); /* 0.125 is below its range */
     assert_true(strtod(value, NULL) == 0.25);
-    assert_int_equal(lull_host_scale_dial(&table, given, 1, 4, value, &dial, &err), LULL_OK);
+    assert_int_equal(lull_host_scale_quality(&table, given, 1, 4, value, &quality, &err), LULL_OK);
     assert_true(strtod(value, NULL) == 1.0);
-    assert_int_equal(lull_host_scale_dial(&table, given, 2, 8, value, &dial, &err), LULL_OK);
-    assert_true(strcmp(dial.key, "visible") == 0 && fabs(strtod(value, NULL) - 0.1) < 1e-16);
+    assert_int_equal(lull_host_scale_quality(&table, given, 2, 8, value, &quality, &err), LULL_OK);
+    assert_true(strcmp(quality.key, "visible") == 0 && fabs(strtod(value, NULL) - 0.1) < 1e-16);
     struct lull_criterion less = table;
     less.param_count = 1;
-    assert_int_equal(lull_host_scale_dial(&less, NULL, 0, 0, value, &dial, &err), LULL_E_VALUE);
+    assert_int_equal(lull_host_scale_quality(&less, NULL, 0, 0, value, &quality, &err), LULL_E_VALUE);
     assert_string_equal(err.message,
                         "criterion logger: a mask scales 'visible', which has no value: give one, visible=VALUE");
     less.param_count = 0;
-    assert_int_equal(lull_host_scale_dial(&less, NULL, 0, 0, value, &dial, &err), LULL_E_KEY);
-    assert_string_equal(err.message, "criterion logger has no dial 'visible' or 'threshold' for a mask to scale");
+    assert_int_equal(lull_host_scale_quality(&less, NULL, 0, 0, value, &quality, &err), LULL_E_KEY);
+    assert_string_equal(err.message,
+                        "criterion logger has no quality parameter 'visible' or 'threshold' for a mask to scale");
     const struct lull_param *found;
     const struct lull_pair twice[2] = {{"threshold", "2"}, {"threshold", "3"}};
     assert_string_equal(lull_host_parameter(&table, "threshold", twice, 2, &found), "3");
@@ -752,7 +754,7 @@ static int32_t gather(const struct lull_writer *writer, const void *data, uint64
     return LULL_OK;
 }
 
-/* Blocks of a mask are judged by instances of their own dial, each asked once; the mask may be of either type, from the bottom up. */
+/* Blocks of a mask are judged by instances of their own quality, each asked once; the mask may be of either type, from the bottom up. */
 static void every_step_has_its_instance(void **state)
 {
     (void)state;
@@ -812,7 +814,7 @@ static void every_step_has_its_instance(void **state)
         char bytes[20], *end = bytes;
         struct lull_writer writer = {.struct_size = sizeof writer, .context = &end, .write = gather};
         assert_int_equal(lull_host_save_history(criterion, &writer, &err), LULL_OK);
-        static const unsigned char expected[9] = {1, 2, 32, 1, 2, 19, 1, 2, 16}; /* dials 2, 2 · 4^(-3/8), 1 */
+        static const unsigned char expected[9] = {1, 2, 32, 1, 2, 19, 1, 2, 16}; /* qualities 2, 2 · 4^(-3/8), 1 */
         assert_int_equal(end - bytes, 9);
         assert_memory_equal(bytes, expected, 9);
         assert_int_equal(lull_host_load_history(criterion, bytes, 9, &err), LULL_OK);
@@ -976,7 +978,7 @@ int main(void)
         cmocka_unit_test(a_view_is_described),
         cmocka_unit_test(dropped_samples),
         cmocka_unit_test(what_a_criterion_fails_with),
-        cmocka_unit_test(dials),
+        cmocka_unit_test(qualities),
         cmocka_unit_test(every_step_has_its_instance),
         cmocka_unit_test(histories),
         cmocka_unit_test(offers),

@@ -327,7 +327,7 @@ static void one_frame_at_a_time(void **state)
     end();
 }
 
-/* --- outlook ------------------------------------------------------------------------------------------------------------- */
+/* --- forecast ------------------------------------------------------------------------------------------------------------- */
 
 static void a_frame_is_forecast(void **state)
 {
@@ -346,16 +346,16 @@ static void a_frame_is_forecast(void **state)
     list[2].spp = 30;
     totals->checks = 4;
     totals->criterion_s = 2;
-    assert_int_equal(lull_host_outlook(lull_host_blocks_of(frame), totals, 1, &f, &fault), LULL_OK);
+    assert_int_equal(lull_host_forecast_of(lull_host_blocks_of(frame), totals, 1, &f, &fault), LULL_OK);
     assert_true(f.active == 3 && f.known == 1 && f.low == 20 && f.high == 30 && f.done_s == 8);
     assert_true(fabs(f.left_s - (2 + 2 + 2.0 / 3)) < 1e-12 && fabs(f.sampling_s - f.left_s) < 1e-12 &&
                 fabs(f.check_s - 1.5) < 1e-12);
     list[1].predicted_spp = (double)NAN;
-    assert_int_equal(lull_host_outlook(lull_host_blocks_of(frame), totals, 1, &f, &fault), LULL_OK);
+    assert_int_equal(lull_host_forecast_of(lull_host_blocks_of(frame), totals, 1, &f, &fault), LULL_OK);
     assert_true(f.known == 0 && fabs(f.left_s - (2 + 8 + 2.0 / 3)) < 1e-12);
     for (int i = 0; i < BLOCKS; i++)
         list[i].reason = LULL_REASON_CRITERION;
-    assert_int_equal(lull_host_outlook(lull_host_blocks_of(frame), totals, 1, &f, &fault), LULL_OK);
+    assert_int_equal(lull_host_forecast_of(lull_host_blocks_of(frame), totals, 1, &f, &fault), LULL_OK);
     assert_true(f.active == 0 && f.left_s == 0 && f.low > f.high);
     end();
 }

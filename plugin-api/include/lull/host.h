@@ -37,7 +37,7 @@ extern "C" {
 #endif
 
 struct lull_host_criterion; /* an instance of a criterion */
-struct lull_host_frame;     /* a picture in the making: its blocks, its totals, whom it asks */
+struct lull_host_frame;     /* a picture in the making: its blocks, its totals, its criterion */
 
 /* --- open: a criterion ---------------------------------------------------------------------------------------------- */
 
@@ -95,7 +95,7 @@ struct lull_host_config {
     /* The blocks are a grid that starts at the upper left corner … */
     uint32_t block_width, block_height; /* 0: what the criterion was made for, or 200, or less for at least 12 blocks */
     int32_t crop[4]; /* x0, y0, x1, y1; all 0: none. Blocks that it touches are rendered whole; without a criterion they
-                      * are cut to it, since nobody judges them */
+                      * are cut to it, since no criterion judges them */
     /* … or any disjoint rectangles inside the picture; NULL: the grid. */
     const struct lull_rect *layout;
     uint32_t layout_count, layout_stride; /* stride: bytes */
@@ -114,8 +114,8 @@ struct lull_host_config {
     uint64_t check_step;       /* checks stand at multiples of so many samples, or at spp_max; 0 reads as 1 */
 
     /* A grey plane of the whole picture in [0, 1] (f32 or f64, 1 channel, LULL_NORM_ONE), read by lull_host_begin; NULL:
-     * none. White takes a quarter of the criterion's dial, black leaves it, grey g takes 4^-g of it, in steps of an eighth;
-     * the lightest pixel of a block counts. The dial is `visible` if that has a value, else `threshold`. */
+     * none. White takes a quarter of the criterion's quality parameter, which is `visible` if that has a value, else
+     * `threshold`; black leaves it, grey g takes 4^-g of it, in steps of an eighth. The lightest pixel of a block counts. */
     const struct lull_plane *mask;
 };
 
@@ -148,7 +148,7 @@ struct lull_host_block {
     uint32_t asked;                       /* there is an answer */
     uint32_t checks;
     uint32_t stop_votes; /* STOP answers in a row */
-    uint32_t step;       /* of the mask, in eighths: its dial is scaled by 4^(-step / 8) */
+    uint32_t step;       /* of the mask, in eighths: its quality parameter is scaled by 4^(-step / 8) */
 };
 
 /* The blocks of a frame and their limits. Made by the library; tests make some by hand. */
@@ -173,7 +173,7 @@ struct lull_host_totals {
     uint64_t asked;            /* blocks that these were about */
 };
 
-/* Lays out the blocks and opens the criterion's frame. criterion: borrowed until end; NULL: nobody is asked (UNIFORM).
+/* Lays out the blocks and opens the criterion's frame. criterion: borrowed until end; NULL: no criterion is asked (UNIFORM).
  * LULL_E_UNSUPPORTED when it judges blocks of another size only, LULL_E_INVALID for anything that makes no sense. */
 LULL_EXPORT int32_t lull_host_begin(const struct lull_host_config *config, struct lull_host_criterion *criterion,
                                     struct lull_host_frame **out, struct lull_error *err);
@@ -234,7 +234,7 @@ LULL_EXPORT int32_t lull_host_stop(struct lull_host_frame *frame, int32_t reason
 /* --- ask: the parts of lull_host_check, for renderers with a way of their own ----------------------------------------- */
 
 /* Lists the blocks to be asked about, rising, and which of them get no more samples: due and final have room for every
- * block. Blocks whose check is left out are scheduled on. Returns how many; 0: nobody need be asked. */
+ * block. Blocks whose check is left out are scheduled on. Returns how many; 0: there is no question. */
 LULL_EXPORT uint32_t lull_host_due(struct lull_host_frame *frame, uint32_t *due, uint8_t *final);
 
 /* Asks any criterion that was opened for the frame about blocks list[due[0 … count)], rising; nothing is noted. Each
@@ -255,15 +255,15 @@ LULL_EXPORT void lull_host_note(struct lull_host_frame *frame, const uint32_t *d
 LULL_EXPORT void lull_host_apply(struct lull_host_frame *frame, const uint32_t *due, uint32_t count,
                                  const struct lull_decision *decisions);
 
-/* What is decided where nobody was asked: go on. */
+/* The decision where no criterion was asked: go on. */
 LULL_EXPORT struct lull_decision lull_host_undecided(void);
 
 /* --- mask ----------------------------------------------------------------------------------------------------------- */
 
-/* The factor of the criterion's dial for lull_host_block.step, 1 for step 0. */
-LULL_EXPORT double lull_host_dial(uint32_t step);
+/* The factor of the criterion's quality parameter for lull_host_block.step, 1 for step 0. */
+LULL_EXPORT double lull_host_mask_factor(uint32_t step);
 
-/* --- outlook -------------------------------------------------------------------------------------------------------- */
+/* --- forecast -------------------------------------------------------------------------------------------------------- */
 
 /* What a criterion said about a block last. Never grows, as all structs here. */
 struct lull_host_said {
@@ -277,7 +277,7 @@ struct lull_host_said {
 struct lull_host_stop_at {
     double spp;       /* samples per pixel */
     double low, high; /* 8 of 10 blocks stop between them */
-    int64_t known;    /* 0: nobody predicted anything; spp and high are spp_max, low is what the block has */
+    int64_t known;    /* 0: there is no prediction; spp and high are spp_max, low is what the block has */
 };
 
 /* Predictions are taken as they are: from a hundred samples on they were neither low nor high (docs/quote.md). The interval
@@ -312,8 +312,8 @@ struct lull_host_forecast {
     uint32_t active;            /* blocks */
     uint32_t known;             /* every active block has a prediction: else all of it is at most */
 };
-LULL_EXPORT int32_t lull_host_outlook(const struct lull_host_blocks *blocks, const struct lull_host_totals *totals,
-                                      int32_t threads, struct lull_host_forecast *out, struct lull_error *err);
+LULL_EXPORT int32_t lull_host_forecast_of(const struct lull_host_blocks *blocks, const struct lull_host_totals *totals,
+                                          int32_t threads, struct lull_host_forecast *out, struct lull_error *err);
 
 /* A line for people: share done, active blocks, their range of samples, speed, time left. left_s: wall seconds to come if
  * the time budget (0: any) does not end the render before, INFINITY: not known. *percent: what the line before said, at

@@ -21,7 +21,7 @@ extern "C" {
 
 #define LULL_PATH_MAX 4096
 
-/* Where to look and whom to tell. Borrowed for the call. */
+/* Where to search and where messages go. Borrowed for the call. */
 struct lull_search {
     const char *const *dirs; /* each entry: one directory or several joined by ':'; NULL and "" are skipped; in order.
                               * dirs itself NULL: the usual ones, $LULL_PLUGIN_PATH, ../lib/lull from the folder of the

@@ -143,7 +143,7 @@ class Frame(HostFrame):
         return {"picture": f"{self.width}x{self.height}", "crop": ",".join(map(str, self.crop)),
                 "block": f"{self.layout.block_width}x{self.layout.block_height}", "seed": str(self.seed),
                 "planes": " ".join((*self.planes, *self.layers)), "weighted": str(bool(self.weights)),
-                "spp-min": str(self.spp_min), "mask": _crc(np.array(self.dials)) if min(self.dials) < 1 else "none",
+                "spp-min": str(self.spp_min), "mask": _crc(np.array(self.mask_factors)) if min(self.mask_factors) < 1 else "none",
                 "wave": str(self.wave), "check-step": str(self.check_step), "uniform": str(self.uniform),
                 "max-seam": str(self.max_seam), "criterion": named(self.criterion),
                 "criterion-files": _files_crc(self.criterion),

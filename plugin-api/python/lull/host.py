@@ -62,7 +62,7 @@ class HostFrame:
     time_budget_s seconds (0 = any); spp_min: nobody stops before. uniform: every block gets spp_max samples and the
     criterion is asked once at the end. max_check_overhead: share of the time that checks may take, 0 = any. max_seam: most ratio of
     samples of neighbouring blocks, 0 = any. check_step: checks stand at multiples of so many samples. mask: [height, width]
-    in [0, 1], black leaves the criterion's dial (`visible`, else `threshold`) as it is, white takes a quarter of it, grey g
+    in [0, 1], black leaves the criterion's quality parameter (`visible`, else `threshold`) as it is, white takes a quarter of it, grey g
     4^(-g), in steps of an eighth; the lightest pixel of a block counts. exposure: linear factor before the display transfer
     ("srgb", "linear", "gamma"). independent: a pixel's samples are not stratified. shared: neighbouring pixels share samples
     (a splatted filter).
@@ -154,9 +154,9 @@ class HostFrame:
         return [i for i, b in enumerate(self.blocks) if b.active]
 
     @property
-    def dials(self) -> list[float]:
-        """For each block, the factor that the mask gives the criterion's dial."""
-        return [library().lull_host_dial(b.step) for b in self.blocks]
+    def mask_factors(self) -> list[float]:
+        """For each block, the factor that the mask gives the criterion's quality parameter."""
+        return [library().lull_host_mask_factor(b.step) for b in self.blocks]
 
     # --- asking --------------------------------------------------------------------------------------------------------
 
@@ -222,10 +222,10 @@ class HostFrame:
             call("host_join", self.handle.pointer, pointer)
             criterion.frame = weakref.ref(self.handle)
 
-    def outlook(self, threads: int) -> abi.HostForecast:
+    def forecast(self, threads: int) -> abi.HostForecast:
         """What is left: struct lull_host_forecast. threads: of the renderer."""
         forecast = abi.HostForecast()
-        call("host_outlook", C.byref(self.layout), C.byref(self.totals), threads, C.byref(forecast))
+        call("host_forecast_of", C.byref(self.layout), C.byref(self.totals), threads, C.byref(forecast))
         return forecast
 
     # --- state ---------------------------------------------------------------------------------------------------------

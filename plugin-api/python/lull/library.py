@@ -73,7 +73,7 @@ def library() -> C.CDLL:
                         "folder lib/lull of its build or prefix") from None
     for name in ("table", "needs", "blocks_of", "totals_of"):
         getattr(loaded, f"lull_host_{name}").restype = C.c_void_p
-    for name in ("dial", "elapsed_s"):
+    for name in ("mask_factor", "elapsed_s"):
         getattr(loaded, f"lull_host_{name}").restype = C.c_double
     loaded.lull_host_reason.restype, loaded.lull_host_expect.restype = C.c_char_p, abi.HostStopAt
     for name in ("stop_map", "progress", "end", "close", "file_abort"):

@@ -5,7 +5,7 @@
     mi.set_variant("llvm_ad_rgb")
     picture = lull.mitsuba.render(mi.load_file("scene.xml"), "observer", spp_max=2048, checkpoint="scene.npz")
     picture.image, picture.spp, picture.layers["A"]
-    print(lull.mitsuba.quote(scene, "observer"))       # what the dial costs, and coarser and finer ones
+    print(lull.mitsuba.quote(scene, "observer"))       # what the quality parameter costs, and coarser and finer ones
 
 Blocks are crops of the film, rendered with a border as wide as the reconstruction filter reaches; the weights of the filter
 are summed with the samples, so that the picture is that of one long render with any filter. Each wave of each block has a
@@ -167,7 +167,7 @@ def _tell(line: str) -> None:
 
 
 def _cost_line(tell: Callable[[str], None]) -> Callable[[Driver], None]:
-    """An after_call that tells once, when every block was checked, what the dial costs."""
+    """An after_call that tells once, when every block was checked, what the quality parameter costs."""
     told = False
 
     def look(driver: Driver) -> None:
@@ -180,7 +180,7 @@ def _cost_line(tell: Callable[[str], None]) -> Callable[[Driver], None]:
 
 
 def quote(scene: Any, criterion: Union[str, Criterion] = "observer", **settings: Any) -> str:
-    """A table of what the dial will cost, and coarser and finer ones, from a pilot of 128 samples or 30 seconds. settings:
+    """A table of what the quality parameter will cost, and coarser and finer ones, from a pilot of 128 samples or 30 seconds. settings:
     as render takes them; with checkpoint=, render(…, resume=True) goes on from the pilot, and nothing is lost."""
     def look(driver: Driver) -> None:
         if quotes.pilot_done(driver):
@@ -203,7 +203,7 @@ def render(scene: Any, criterion: Union[str, Criterion] = "observer", *, sensor:
     criterion: a name, a path or a lull.Criterion; parameters are its own (threshold=…). The film's crop is kept to. mask:
     an array, or the path of a PNG (lull.mask). checkpoint: a file that keeps the state at the end, however it ends, and
     every checkpoint_every_s seconds; resume: goes on from it, if it is there; with a higher spp_max a finished picture gets
-    more samples. tell: is given one line at the first check, what the dial costs and what coarser ones would (default: it is
+    more samples. tell: is given one line at the first check, what the quality parameter costs and what coarser ones would (default: it is
     printed to stderr; None: no line). An exception while rendering is not raised: see Picture.result. Raises LullError,
     ValueError, TypeError and OSError for bad input, before anything is rendered.
     """

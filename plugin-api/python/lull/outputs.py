@@ -81,7 +81,7 @@ def write_report(path: str, driver: Driver, scene: str = "", kernel: str = "", i
 def progress_text(driver: Driver) -> str:
     """Share done, active blocks, their range of samples, speed, time left; without the criterion's predictions a bound."""
     text, percent, frame = C.create_string_buffer(256), C.c_double(driver.percent_told), driver.frame
-    forecast = frame.outlook(driver.threads)
+    forecast = frame.forecast(driver.threads)
     left_s = forecast.sampling_s + forecast.check_s if driver.samples_per_s else math.inf
     numbers = map(C.c_double, (frame.time_budget_s, left_s, driver.samples_per_s))
     library().lull_host_progress(C.byref(frame.layout), C.byref(frame.totals), C.byref(forecast), *numbers,

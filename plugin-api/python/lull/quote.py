@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the criterion's dial will cost, told from the checks of a render that has begun: samples and time at its setting
+"""What the criterion's quality parameter will cost, told from the checks of a render that has begun: samples and time at its setting
 and at coarser and finer ones. As `lull-render --quote` does, with one more instance of the criterion per setting, each
 asked about the blocks as they are; neither the frame nor the render's own instance changes."""
 from __future__ import annotations
@@ -12,14 +12,14 @@ from .driver import Driver
 from .host import HostFrame
 from .library import LullError, Parameter, library
 
-# The dial `visible` by name, with the criterion's own default; other dials are asked at twice and at four times their value.
+# The quality parameter `visible` by name, with the criterion's own default; other quality parameters are asked at twice and at four times their value.
 NAMED = {0.9: "coarse", 0.5: "draft", 0.05: "final"}
 
 
 class Row(NamedTuple):
     """One setting. spp: of the least block, of the picture and of the dearest block; time_s: of the whole render, from its
     start. at_most: the criterion did not predict every block, those count with the most samples."""
-    dial: str
+    parameter: str
     value: float
     name: str
     spp: tuple[float, float, float]
@@ -50,10 +50,10 @@ def _settings(parameter: Parameter, value: float) -> list[tuple[float, str]]:
     return sorted(((v, name) for v, name in names.items() if parameter.min <= v <= parameter.max), reverse=True)
 
 
-def _ends(frame: HostFrame, dial: str, value: float) -> list[abi.HostStopAt]:
+def _ends(frame: HostFrame, parameter: str, value: float) -> list[abi.HostStopAt]:
     """Where each block will stop."""
     due = [i for i, b in enumerate(frame.blocks) if b.spp > 0]
-    with frame.criterion.with_parameters(**{dial: value}) as judge:
+    with frame.criterion.with_parameters(**{parameter: value}) as judge:
         frame.join(judge)
         answers = dict(zip(due, frame.evaluate(due, criterion=judge)))
     said = [abi.HostSaid(b.spp, answers[i].predicted_spp, answers[i].action == abi.STOP) if i in answers else abi.HostSaid()
@@ -65,7 +65,7 @@ def _ends(frame: HostFrame, dial: str, value: float) -> list[abi.HostStopAt]:
 
 
 def rows(driver: Driver) -> list[Row]:
-    """Coarse to fine; [] if the criterion has no dial or cannot be asked. Every active block has been checked once at
+    """Coarse to fine; [] if the criterion has no quality parameter or cannot be asked. Every active block has been checked once at
     least."""
     frame, totals, out = driver.frame, driver.totals, []
     pixels = [b.rect.pixels for b in frame.blocks]
@@ -93,8 +93,8 @@ def table(driver: Driver) -> str:
     """The rows as a table, or one line that says why there is none."""
     found = rows(driver)
     if not found:
-        return f"criterion {driver.frame.criterion.info.id} has no dial whose cost could be told"
-    lines = [f"{found[0].dial:>9}               spp min / mean / max        time"]
+        return f"criterion {driver.frame.criterion.info.id} has no quality parameter whose cost could be told"
+    lines = [f"{found[0].parameter:>9}               spp min / mean / max        time"]
     for r in found:
         counts = " / ".join(f"{n:7,.0f}" for n in r.spp)
         lines.append(f"{r.value:9.4g}  {r.name:8}  {counts}   {'at most ' if r.at_most else ''}{time_text(r.time_s)}"
@@ -103,12 +103,12 @@ def table(driver: Driver) -> str:
 
 
 def line(driver: Driver) -> str:
-    """One line for the first check: what the dial costs, and what coarser ones would; "" if that cannot be told."""
+    """One line for the first check: what the quality parameter costs, and what coarser ones would; "" if that cannot be told."""
     found = rows(driver)
     own = next((r for r in found if r.chosen), None)
     if own is None:
         return ""
-    parts = [f"{r.dial} {r.value:g} would take {'at most ' if r.at_most else 'about '}{time_text(r.time_s)}"
+    parts = [f"{r.parameter} {r.value:g} would take {'at most ' if r.at_most else 'about '}{time_text(r.time_s)}"
              for r in reversed(found) if r.value > own.value]
-    return "; ".join([f"{own.dial} {own.value:g} takes {'at most' if own.at_most else 'about'} {time_text(own.time_s)}, "
+    return "; ".join([f"{own.parameter} {own.value:g} takes {'at most' if own.at_most else 'about'} {time_text(own.time_s)}, "
                       f"{own.spp[1]:,.0f} spp", *parts])

@@ -114,7 +114,7 @@ def _identity(scene: bpy.types.Scene, host: Cycles) -> dict[str, str]:
 class Session:
     """The frame that the scene is at, in the making. Use as a context manager; call run(), or step() from an event loop.
 
-    notes: lines for people about what is done otherwise than the scene says. quote: what the dial costs and what coarser
+    notes: lines for people about what is done otherwise than the scene says. quote: what the quality parameter costs and what coarser
     ones would, one line, "" before the first check.
     """
 

@@ -20,7 +20,7 @@ from .session import Session, Settings, check_files, default_output
 REFUSED = (HostError, LullError, ValueError, OSError, RuntimeError)
 _items: list[tuple[str, str, str]] = []  # kept: Blender does not copy the texts of dynamic enums
 _running = False  # a render is in the making: its settings are not to be shown, since it lends some of the scene's
-_with_visible: set[str] = set()  # criteria whose dial is the share of viewers
+_with_visible: set[str] = set()  # criteria whose quality parameter is the share of viewers
 
 
 def _criteria(_self, _context) -> list[tuple[str, str, str]]:
@@ -56,8 +56,8 @@ class LullSettings(bpy.types.PropertyGroup):
         pairs = self.parameters.split()
         if bad := [p for p in pairs if "=" not in p]:
             raise ValueError(f"parameter {bad[0]}: expected KEY=VALUE")
-        dial = {"visible": f"{self.visible:.6g}"} if self.criterion in _with_visible else {}
-        settings = Settings(self.criterion, {**dial, **dict(p.split("=", 1) for p in pairs)}, self.spp_min,
+        quality = {"visible": f"{self.visible:.6g}"} if self.criterion in _with_visible else {}
+        settings = Settings(self.criterion, {**quality, **dict(p.split("=", 1) for p in pairs)}, self.spp_min,
                             block=self.block or None, mask=bpy.path.abspath(self.mask) if self.mask else "")
         if self.folder:
             settings.output = os.path.join(bpy.path.abspath(self.folder), "lull.exr")
@@ -218,8 +218,8 @@ class LULL_PT_render(bpy.types.Panel):
         if _running:
             layout.label(text="Esc: stop and keep", icon="INFO")
         else:
-            dial = ("visible",) if settings.criterion in _with_visible else ()
-            for properties in (((settings, "criterion"), *((settings, d) for d in dial), (settings, "parameters")),
+            quality = ("visible",) if settings.criterion in _with_visible else ()
+            for properties in (((settings, "criterion"), *((settings, d) for d in quality), (settings, "parameters")),
                                ((settings, "spp_min"), (cycles, "samples"), (cycles, "time_limit")),
                                ((settings, "block"), (settings, "mask"), (settings, "folder"))):
                 column = layout.column(align=True)

@@ -94,13 +94,13 @@ static struct lull_host_work look_at(const struct lull_host_blocks *blocks, cons
     return (struct lull_host_work){more, left_s, b->y1 - b->y0};
 }
 
-int32_t lull_host_outlook(const struct lull_host_blocks *blocks, const struct lull_host_totals *totals, int32_t threads,
-                          struct lull_host_forecast *out, struct lull_error *err)
+int32_t lull_host_forecast_of(const struct lull_host_blocks *blocks, const struct lull_host_totals *totals, int32_t threads,
+                              struct lull_host_forecast *out, struct lull_error *err)
 {
     struct lull_host_forecast f = {.known = 1, .low = UINT64_MAX};
     struct lull_host_work *work = calloc(blocks->count, sizeof *work);
     if (!work)
-        return lull_host_no_memory(err, "outlook");
+        return lull_host_no_memory(err, "forecast");
     for (uint32_t i = 0; i < blocks->count; i++) {
         const struct lull_host_block *b = &blocks->list[i];
         f.done_s += b->thread_s;
