@@ -21,7 +21,7 @@ _OWN = ("identity", "state")  # the library's parts, as bytes
 
 
 def _identity(driver: Driver) -> bytes:
-    return "".join(f"{name}={value}\n" for name, value in driver.identity.items()).encode()
+    return os.fsencode("".join(f"{name}={value}\n" for name, value in driver.identity.items()))
 
 
 def save(path: str, driver: Driver) -> None:
@@ -70,7 +70,7 @@ class Keeper:
     closed, and at the end (finish). unsaved: why that failed last; the picture is worth more than its checkpoint."""
 
     def __init__(self, path: str, driver: Driver, every_s: float = 60.0):
-        self.path, self.every_s = path, limits.real("checkpoint_every_s", every_s, 0)
+        self.path, self.every_s = path, limits.checked("checkpoint_every_s", every_s)
         self.unsaved: Optional[OSError] = None
         self._saved_s = time.monotonic()
         driver.suspend = self.save

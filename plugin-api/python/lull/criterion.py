@@ -117,11 +117,12 @@ class Criterion:
     def __init__(self, info: Info, parameters: Optional[Mapping[str, str]] = None, threads: Optional[int] = None,
                  log: Optional[Callable[[int, str], None]] = None):
         self.info, self.parameters, self.log = info, dict(parameters or {}), log or _warn
-        self.threads = limits.whole("threads", os.cpu_count() or 1 if threads is None else threads, 1, 1 << 20)
+        self.threads = limits.checked("threads", os.cpu_count() or 1 if threads is None else threads)
         log = self.log  # and not self, which would never be let go of
         tell = abi.LogFn(lambda _, level, text: log(level, text.decode(errors="replace")))
         services = abi.sized(abi.HostServices, threads=self.threads, name=b"lull for Python 1.0", log=tell)
-        pairs = (abi.Pair * max(len(self.parameters), 1))(*((k.encode(), v.encode()) for k, v in self.parameters.items()))
+        texts = [tuple(map(os.fsencode, pair)) for pair in self.parameters.items()]
+        pairs = (abi.Pair * max(len(texts), 1))(*texts)
         handle = Handle("lull_host_close", tell)
         call("host_create", C.byref(services), C.c_void_p(info.table), pairs, len(self.parameters), C.byref(handle.pointer))
         self.handle: Optional[Handle] = handle

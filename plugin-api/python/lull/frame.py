@@ -35,7 +35,7 @@ class Frame(HostFrame):
     def __init__(self, criterion: Criterion, width: int, height: int, *, wave: int = 16, whole_waves: bool = True,
                  supplies: Sequence[str] = (), layers: Sequence[str] = (), weighted: bool = False,
                  display: Optional[Callable[[np.ndarray], np.ndarray]] = None, **settings: Any):
-        self.wave, self.display = limits.whole("wave", wave, 1, limits.MAX_SPP), display
+        self.wave, self.display = limits.checked("wave", wave), display
         kept, self.layers = _choose_planes(criterion, supplies, display is not None), _layers(layers)
         if display:
             settings.update(exposure=1.0, transfer="srgb")  # pixels come as shown
@@ -143,8 +143,9 @@ class Frame(HostFrame):
         return {"picture": f"{self.width}x{self.height}", "crop": ",".join(map(str, self.crop)),
                 "block": f"{self.layout.block_width}x{self.layout.block_height}", "seed": str(self.seed),
                 "planes": " ".join((*self.planes, *self.layers)), "weighted": str(bool(self.weights)),
-                "spp-min": str(self.spp_min), "mask": _crc(np.array(self.mask_factors)) if min(self.mask_factors) < 1 else "none",
-                "wave": str(self.wave), "check-step": str(self.check_step), "uniform": str(self.uniform),
+                "spp-min": str(self.spp_min), "wave": str(self.wave),
+                "mask": _crc(np.array(self.mask_factors)) if min(self.mask_factors) < 1 else "none",
+                "check-step": str(self.check_step), "uniform": str(self.uniform),
                 "max-seam": str(self.max_seam), "criterion": named(self.criterion),
                 "criterion-files": _files_crc(self.criterion),
                 **{name.replace("_", "-"): str(value) for name, value in self.shown.items()},

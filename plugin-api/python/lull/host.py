@@ -6,6 +6,7 @@ from __future__ import annotations
 import contextlib
 import ctypes as C
 import functools
+import os
 import weakref
 from typing import Iterator, Mapping, Optional, Sequence, Union
 
@@ -16,7 +17,7 @@ from .criterion import PLANES, Criterion, Handle, Plane, Rect
 from .library import LullError, bytes_of, call, library
 
 TRANSFERS = {"linear": abi.TRANSFER_LINEAR, "srgb": abi.TRANSFER_SRGB, "gamma": abi.TRANSFER_GAMMA}
-MAX_SIDE, MAX_PIXELS, MAX_BLOCKS = 32768, 1 << 28, 1 << 20  # a block is an object here: more would fill the memory
+MAX_PIXELS, MAX_BLOCKS = 1 << 28, 1 << 20  # a block is an object here: more would fill the memory
 
 
 @functools.lru_cache(maxsize=None)
@@ -60,12 +61,12 @@ class HostFrame:
     default the criterion's own size, else 200, or less where that would be fewer than 12 blocks. crop: blocks that it
     touches are rendered whole. layout: disjoint rectangles instead of a grid. Limits, the first one wins: spp_max samples,
     time_budget_s seconds (0 = any); spp_min: nobody stops before. uniform: every block gets spp_max samples and the
-    criterion is asked once at the end. max_check_overhead: share of the time that checks may take, 0 = any. max_seam: most ratio of
-    samples of neighbouring blocks, 0 = any. check_step: checks stand at multiples of so many samples. mask: [height, width]
-    in [0, 1], black leaves the criterion's quality parameter (`visible`, else `threshold`) as it is, white takes a quarter of it, grey g
-    4^(-g), in steps of an eighth; the lightest pixel of a block counts. exposure: linear factor before the display transfer
-    ("srgb", "linear", "gamma"). independent: a pixel's samples are not stratified. shared: neighbouring pixels share samples
-    (a splatted filter).
+    criterion is asked once at the end. max_check_overhead: share of the time that checks may take, 0 = any. max_seam: most
+    ratio of samples of neighbouring blocks, 0 = any. check_step: checks stand at multiples of so many samples. mask:
+    [height, width] in [0, 1], black leaves the criterion's quality parameter (`visible`, else `threshold`) as it is, white
+    takes a quarter of it, grey g 4^(-g), in steps of an eighth; the lightest pixel of a block counts. exposure: linear
+    factor before the display transfer ("srgb", "linear", "gamma"). independent: a pixel's samples are not stratified.
+    shared: neighbouring pixels share samples (a splatted filter).
     view: the rectangle of pixels that planes hold, all blocks among them. first_spp: samples at the first check, at least.
     """
 
@@ -77,24 +78,23 @@ class HostFrame:
                  gamma: float = 2.2, sample_clamp: float = 0.0, independent: bool = False, shared: bool = False,
                  deterministic: bool = True):
         self.criterion, self.planes = criterion, tuple(planes)
-        self.width, self.height = (limits.whole(n, v, 1, MAX_SIDE) for n, v in (("width", width), ("height", height)))
+        self.width, self.height = limits.checked("width", width), limits.checked("height", height)
         if self.width * self.height > MAX_PIXELS:
             raise ValueError(f"a picture of {width}x{height}: expected at most 2^28 pixels in all")
-        self.crop = Rect(*(limits.whole("crop", v, -MAX_SIDE, MAX_SIDE) for v in crop or (0, 0, width, height)))
+        self.crop = Rect(*(limits.checked("crop", v) for v in crop or (0, 0, width, height)))
         if self.crop.pixels == 0:
             raise ValueError(f"crop {','.join(map(str, self.crop))}: it is empty")
         size = self._block_size(block)
         if transfer not in TRANSFERS:
             raise ValueError(f"transfer '{transfer}': expected one of {', '.join(TRANSFERS)}")
-        self.spp_min, self.spp_max = (limits.whole(n, v, 1, limits.MAX_SPP)
-                                      for n, v in (("spp_min", spp_min), ("spp_max", spp_max)))
-        self.seed = limits.whole("seed", seed, 0, (1 << 64) - 1)
-        self.time_budget_s, self.uniform = limits.real("time_budget_s", time_budget_s, 0, 1e9), uniform
-        self.max_seam, self.check_step = limits.real("max_seam", max_seam, 0, 1e6), check_step
-        self.shown = {"exposure": limits.real("exposure", exposure, 0, above=True), "transfer": transfer,
-                      "gamma": limits.real("gamma", gamma, 0, above=True),
-                      "sample_clamp": limits.real("sample_clamp", sample_clamp, 0), "independent": independent,
-                      "shared": shared}
+        given = {name: limits.checked(name, value) for name, value in (
+            ("spp_min", spp_min), ("spp_max", spp_max), ("seed", seed), ("time_budget_s", time_budget_s),
+            ("max_check_overhead", max_check_overhead), ("max_seam", max_seam), ("exposure", exposure), ("gamma", gamma),
+            ("sample_clamp", sample_clamp))}
+        self.spp_min, self.spp_max, self.seed, self.time_budget_s = list(given.values())[:4]
+        self.max_seam, self.check_step, self.uniform = given["max_seam"], check_step, uniform
+        self.shown = {"exposure": given["exposure"], "transfer": transfer, "gamma": given["gamma"],
+                      "sample_clamp": given["sample_clamp"], "independent": independent, "shared": shared}
         flags = (abi.HOST_UNIFORM * uniform | abi.FRAME_DETERMINISTIC * deterministic | abi.FRAME_INDEPENDENT * independent |
                  abi.FRAME_SHARED * shared)
         rects, painted = (abi.Rect * len(layout))(*layout), self._mask_plane(mask)
@@ -102,10 +102,7 @@ class HostFrame:
             abi.HostConfig, flags=flags, width=self.width, height=self.height, block_width=size[0], block_height=size[1],
             crop=tuple(self.crop), layout=C.addressof(rects) if layout else None, layout_count=len(layout),
             layout_stride=C.sizeof(abi.Rect), planes=sum(1 << PLANES[name] for name in set(planes)),
-            transfer=TRANSFERS[transfer], gamma=gamma, exposure=exposure, sample_clamp=sample_clamp, spp_min=self.spp_min,
-            spp_max=self.spp_max, seed=self.seed, time_budget_s=self.time_budget_s, max_seam=self.max_seam,
-            max_check_overhead=limits.real("max_check_overhead", max_check_overhead, 0, 1), check_step=check_step,
-            mask=C.addressof(painted) if painted else None))
+            transfer=TRANSFERS[transfer], check_step=check_step, mask=C.addressof(painted) if painted else None, **given))
 
     def _block_size(self, block: Union[int, tuple[int, int], None]) -> tuple[int, int]:
         """(width, height), 0 = the library's choice."""
@@ -114,7 +111,7 @@ class HostFrame:
         pair = block if isinstance(block, (tuple, list)) else (block, block)
         if len(pair) != 2:
             raise ValueError(f"block {block}: expected one number or (width, height)")
-        w, h = (limits.whole("block", side, 1, 4096) for side in pair)
+        w, h = (limits.checked("block", side) for side in pair)
         if -(-self.crop.width // w) * -(-self.crop.height // h) > MAX_BLOCKS:
             raise ValueError(f"a picture of {self.width}x{self.height} in blocks of {w}x{h}: expected at most 2^20 blocks: "
                              "take larger ones")
@@ -239,7 +236,7 @@ class HostFrame:
         """Into a frame like the saved one, limits aside: blocks that a limit or an interrupt had closed are active again as
         far as the limits of this frame allow. name: of the file, for messages. Refused bytes (LullError) change nothing."""
         with self.judge.alone():
-            call("host_load", self.handle.pointer, data, C.c_uint64(len(data)), name.encode())
+            call("host_load", self.handle.pointer, data, C.c_uint64(len(data)), os.fsencode(name))
             library().lull_host_extend(C.byref(self.layout))
 
     def close(self) -> None:

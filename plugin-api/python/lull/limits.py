@@ -6,30 +6,27 @@ import operator
 
 import numpy as np
 
-MAX_SPP, FINITE = (1 << 31) - 1, float(np.finfo(float).max)
+_SPP, _FINITE, _ABOVE_0 = (1, (1 << 31) - 1), float(np.finfo(float).max), 5e-324
+# Whole numbers where the ends are
+_RANGES: dict[str, tuple[float, float]] = {
+    "width": (1, 32768), "height": (1, 32768), "crop": (-32768, 32768), "block": (1, 4096), "wave": _SPP, "spp_min": _SPP,
+    "spp_max": _SPP, "seed": (0, (1 << 64) - 1), "threads": (1, 1 << 20), "time_budget_s": (0.0, 1e9),
+    "max_seam": (0.0, 1e6), "max_check_overhead": (0.0, 1.0), "exposure": (_ABOVE_0, _FINITE), "gamma": (_ABOVE_0, _FINITE),
+    "sample_clamp": (0.0, _FINITE), "checkpoint_every_s": (0.0, _FINITE)}
 
 
-def whole(name: str, value: object, low: int, high: int) -> int:
-    """value, if it is an integer in [low, high]."""
+def checked(name: str, value: object):
+    """value, if it is in the range of this name, as an int or a float; NaN is in none."""
+    low, high = _RANGES[name]
+    expected = (f"expected a {'whole' if isinstance(low, int) else 'finite'} number " +
+                ("above 0" if low == _ABOVE_0 else f"from {low}") + ("" if high == _FINITE else f" to {high}"))
     try:
-        n = operator.index(value)  # type: ignore[arg-type]
-    except TypeError:
-        raise TypeError(f"{name} {value!r}: expected a whole number from {low} to {high}") from None
-    if not low <= n <= high:
-        raise ValueError(f"{name} {n}: expected a whole number from {low} to {high}")
-    return n
-
-
-def real(name: str, value: object, low: float, high: float = FINITE, above: bool = False) -> float:
-    """value, if it is a number in [low, high], or above low; NaN is not."""
-    expected = f"expected a finite number {'above' if above else 'from'} {low:g}" + f" to {high:g}" * (high < FINITE)
-    try:
-        x = float(value)  # type: ignore[arg-type]
+        number = operator.index(value) if isinstance(low, int) else float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
         raise TypeError(f"{name} {value!r}: {expected}") from None
-    if not low <= x <= high or above and x == low:
+    if not low <= number <= high:
         raise ValueError(f"{name} {value}: {expected}")
-    return x
+    return number
 
 
 def unmasked(name: str, array: np.ndarray) -> np.ndarray:

@@ -83,7 +83,7 @@ class Film:
 
     def check_waves(self, wave: int, spp_max: int) -> None:
         """ValueError if the sampler does not take waves of this size, or the one that is left at the end."""
-        wave, spp_max = (limits.whole(n, v, 1, limits.MAX_SPP) for n, v in (("wave", wave), ("spp_max", spp_max)))
+        wave, spp_max = limits.checked("wave", wave), limits.checked("spp_max", spp_max)
         for count in {min(wave, spp_max), spp_max % wave or wave}:
             self._check_wave(count)
 
@@ -180,8 +180,9 @@ def _cost_line(tell: Callable[[str], None]) -> Callable[[Driver], None]:
 
 
 def quote(scene: Any, criterion: Union[str, Criterion] = "observer", **settings: Any) -> str:
-    """A table of what the quality parameter will cost, and coarser and finer ones, from a pilot of 128 samples or 30 seconds. settings:
-    as render takes them; with checkpoint=, render(…, resume=True) goes on from the pilot, and nothing is lost."""
+    """A table of what the quality parameter will cost, and coarser and finer ones, from a pilot of 128 samples or 30
+    seconds. settings: as render takes them; with checkpoint=, render(…, resume=True) goes on from the pilot, nothing is
+    lost."""
     def look(driver: Driver) -> None:
         if quotes.pilot_done(driver):
             driver.interrupt()
@@ -203,9 +204,9 @@ def render(scene: Any, criterion: Union[str, Criterion] = "observer", *, sensor:
     criterion: a name, a path or a lull.Criterion; parameters are its own (threshold=…). The film's crop is kept to. mask:
     an array, or the path of a PNG (lull.mask). checkpoint: a file that keeps the state at the end, however it ends, and
     every checkpoint_every_s seconds; resume: goes on from it, if it is there; with a higher spp_max a finished picture gets
-    more samples. tell: is given one line at the first check, what the quality parameter costs and what coarser ones would (default: it is
-    printed to stderr; None: no line). An exception while rendering is not raised: see Picture.result. Raises LullError,
-    ValueError, TypeError and OSError for bad input, before anything is rendered.
+    more samples. tell: is given one line at the first check, what the quality parameter costs and what coarser ones would
+    (default: it is printed to stderr; None: no line). An exception while rendering is not raised: see Picture.result. Raises
+    LullError, ValueError, TypeError and OSError for bad input, before anything is rendered.
     """
     if resume and not checkpoint:
         raise ValueError("resume: there is no checkpoint to go on from: name one with checkpoint=")

@@ -64,7 +64,7 @@ def write_preview(path: str, driver: Driver) -> None:
 def write_stop_map(path: str, frame: HostFrame, scene: str = "") -> None:
     """Each block in the colour of its samples, the count written into it; or with the ending .csv one line
     `name;spp;spp;…;` in the order of the blocks. scene: the file that gives the line its name."""
-    file_call("host_stop_map", C.byref(frame.layout), os.fsencode(path), scene.encode())
+    file_call("host_stop_map", C.byref(frame.layout), os.fsencode(path), os.fsencode(scene))
 
 
 def write_report(path: str, driver: Driver, scene: str = "", kernel: str = "", interrupted: bool = False,
@@ -73,7 +73,7 @@ def write_report(path: str, driver: Driver, scene: str = "", kernel: str = "", i
     frame = driver.frame
     flags = abi.REPORT_NO_RAYS | abi.REPORT_INTERRUPTED * interrupted
     file_call("host_report_write", frame.handle.pointer, C.byref(abi.sized(
-        abi.HostReport, flags=flags, scene=scene.encode(), mask=None if mask is None else os.fsencode(mask),
+        abi.HostReport, flags=flags, scene=os.fsencode(scene), mask=None if mask is None else os.fsencode(mask),
         kernel=kernel.encode(), threads=driver.threads, processes=1, film_pixels=frame.view.pixels, scene_bytes=math.nan,
         film_bytes=sum(a.nbytes for a in frame.arrays().values()))), os.fsencode(path))
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What the criterion's quality parameter will cost, told from the checks of a render that has begun: samples and time at its setting
-and at coarser and finer ones. As `lull-render --quote` does, with one more instance of the criterion per setting, each
-asked about the blocks as they are; neither the frame nor the render's own instance changes."""
+"""What the criterion's quality parameter will cost, told from the checks of a render that has begun: samples and time at its
+setting and at coarser and finer ones. As `lull-render --quote` does, with one more instance of the criterion per
+setting, each asked about the blocks as they are; neither the frame nor the render's own instance changes."""
 from __future__ import annotations
 
 import ctypes as C
@@ -12,7 +12,8 @@ from .driver import Driver
 from .host import HostFrame
 from .library import LullError, Parameter, library
 
-# The quality parameter `visible` by name, with the criterion's own default; other quality parameters are asked at twice and at four times their value.
+# The quality parameter `visible` by name, with the criterion's own default; others are asked at twice and at four times
+# their value.
 NAMED = {0.9: "coarse", 0.5: "draft", 0.05: "final"}
 
 
@@ -65,8 +66,8 @@ def _ends(frame: HostFrame, parameter: str, value: float) -> list[abi.HostStopAt
 
 
 def rows(driver: Driver) -> list[Row]:
-    """Coarse to fine; [] if the criterion has no quality parameter or cannot be asked. Every active block has been checked once at
-    least."""
+    """Coarse to fine; [] if the criterion has no quality parameter or cannot be asked. Every active block has been
+    checked once at least."""
     frame, totals, out = driver.frame, driver.totals, []
     pixels = [b.rect.pixels for b in frame.blocks]
     try:
@@ -103,12 +104,13 @@ def table(driver: Driver) -> str:
 
 
 def line(driver: Driver) -> str:
-    """One line for the first check: what the quality parameter costs, and what coarser ones would; "" if that cannot be told."""
+    """One line for the first check: what the quality parameter costs, and what coarser ones would; "" if that cannot be
+    told."""
     found = rows(driver)
     own = next((r for r in found if r.chosen), None)
     if own is None:
         return ""
     parts = [f"{r.parameter} {r.value:g} would take {'at most ' if r.at_most else 'about '}{time_text(r.time_s)}"
              for r in reversed(found) if r.value > own.value]
-    return "; ".join([f"{own.parameter} {own.value:g} takes {'at most' if own.at_most else 'about'} {time_text(own.time_s)}, "
-                      f"{own.spp[1]:,.0f} spp", *parts])
+    takes = f"takes {'at most' if own.at_most else 'about'} {time_text(own.time_s)}"
+    return "; ".join([f"{own.parameter} {own.value:g} {takes}, {own.spp[1]:,.0f} spp", *parts])

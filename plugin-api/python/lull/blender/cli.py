@@ -50,8 +50,9 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--checkpoint-every", type=float, default=60, metavar="SECONDS", help="how often (default 60)")
     p.add_argument("--resume", action="store_true", help="go on from the checkpoint, if it is there; with a higher "
                    "--spp-max a finished picture gets more samples")
-    p.add_argument("--quote", action="store_true", help="render a pilot of 128 samples or 30 seconds, print what the quality parameter "
-                   "will cost at its own and at other settings, and end; a render can go on from its --checkpoint")
+    p.add_argument("--quote", action="store_true", help="render a pilot of 128 samples or 30 seconds, print what the "
+                   "quality parameter will cost at its own and at other settings, and end; a render can go on from its "
+                   "--checkpoint")
     p.add_argument("-q", "--quiet", action="store_true", help="no progress and no notes")
     p.add_argument("--blender", default="blender", metavar="PROGRAM", help="which Blender to run (default: on PATH)")
     return p

@@ -20,7 +20,7 @@ import numpy as np
 from .. import exr
 from ..criterion import Rect
 from .passes import Passes
-from .unnamed import unnamed_file
+from .view import unnamed_file
 
 # Sobol-Burley under its names in 3.x and 4.x: its waves add up to one render. The others' tables depend on the total
 # number of samples; they are usable where Cycles can be told that total apart from the subset to render (4.4 and later).

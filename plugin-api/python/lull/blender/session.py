@@ -114,8 +114,8 @@ def _identity(scene: bpy.types.Scene, host: Cycles) -> dict[str, str]:
 class Session:
     """The frame that the scene is at, in the making. Use as a context manager; call run(), or step() from an event loop.
 
-    notes: lines for people about what is done otherwise than the scene says. quote: what the quality parameter costs and what coarser
-    ones would, one line, "" before the first check.
+    notes: lines for people about what is done otherwise than the scene says. quote: what the quality parameter
+    costs and what coarser ones would, one line, "" before the first check.
     """
 
     def __init__(self, scene: bpy.types.Scene, settings: Settings, criterion: Optional[Criterion] = None,
@@ -157,13 +157,13 @@ class Session:
     # --- rendering -----------------------------------------------------------------------------------------------------
 
     def begin(self, resume: bool = False, every_s: float = 60.0) -> None:
-        """Goes on from the checkpoint, if it is there; keeps it from now on."""
+        """Goes on from the checkpoint, if it is there; keeps it from now on. every_s 0: after every step."""
         state = self.settings.checkpoint
         if state and resume and os.path.exists(state):
             checkpoint.load(state, self.driver)
             self.host.passes.remember(self.frame)
         if state:
-            self.keeper = checkpoint.Keeper(state, self.driver, every_s)
+            self.keeper = checkpoint.Keeper(state, self.driver, every_s or 1e-9)
 
     @property
     def unsaved(self) -> Optional[OSError]:

@@ -7,14 +7,25 @@ colour out of highlights): the noise of luminance is judged as it is shown, that
 """
 from __future__ import annotations
 
-from typing import Callable, Optional
+import contextlib
+import os
+from typing import Callable, Iterator, Optional
 
 import bpy
 import numpy as np
 
-from .unnamed import unnamed_file
-
 LOW, HIGH, STEPS = -14.0, 8.0, 2048  # log2 of the darkest and the brightest grey of the ramp, and their number
+
+
+@contextlib.contextmanager
+def unnamed_file() -> Iterator[str]:
+    """A file in memory that Blender writes and we read: its path, for this process. It has no name in any folder, so that it
+    is gone with the process however that ends."""
+    handle = os.memfd_create("lull")
+    try:
+        yield f"/proc/self/fd/{handle}"
+    finally:
+        os.close(handle)
 
 
 def is_plain(scene: bpy.types.Scene) -> bool:
