@@ -26,14 +26,14 @@ struct extraction {
 static int extract_block(void *data, int index, int worker, struct base_err *err)
 {
     const struct extraction *j = data;
-    const struct ggn_chain *c = &j->set->chains.chains[j->set->blocks[index].chain];
-    int w = j->set->chains.width, h = j->set->chains.height;
+    const struct ggn_level_series *c = &j->set->images.series[j->set->blocks[index].series];
+    int w = j->set->images.width, h = j->set->images.height;
     struct ggn_baseline_reader *r = ggn_baseline_reader_create(j->baseline, err);
     (void)worker;
     if (!r)
         return err->code;
     for (int i = 0; i < c->n_levels; i++)
-        ggn_baseline_extract(r, c->noisy + ggn_chains_values(&j->set->chains) * (size_t)i, w, h,
+        ggn_baseline_extract(r, c->noisy + ggn_series_set_values(&j->set->images) * (size_t)i, w, h,
                              j->features->x + (j->features->first[index] + (size_t)i) * j->features->size);
     ggn_baseline_reader_destroy(r);
     return 0;
@@ -44,11 +44,11 @@ int ggn_feature_set_make(struct ggn_feature_set *t, const struct ggn_baseline *b
 {
     struct extraction j = {b, s, t};
     size_t rows = 0;
-    *t = (struct ggn_feature_set){.size = ggn_baseline_feature_count(b, s->chains.width, s->chains.height),
+    *t = (struct ggn_feature_set){.size = ggn_baseline_feature_count(b, s->images.width, s->images.height),
                                   .first = malloc(((size_t)s->n_blocks + 1) * sizeof *t->first)};
     for (int k = 0; k < s->n_blocks && t->first; k++) {
         t->first[k] = rows;
-        rows += (size_t)s->chains.chains[s->blocks[k].chain].n_levels;
+        rows += (size_t)s->images.series[s->blocks[k].series].n_levels;
     }
     if (t->first)
         t->first[s->n_blocks] = rows;
@@ -138,7 +138,7 @@ static int calibrate(struct ggn_baseline *b, const struct ggn_feature_set *t, co
         const double *features[GGN_WINDOW_MAX];
         for (int k = 0; k < b->window; k++)
             features[k] = c.window[i] + (size_t)k * t->size;
-        double l = ggn_baseline_logit(r, features, s->chains.width, s->chains.height);
+        double l = ggn_baseline_logit(r, features, s->images.width, s->images.height);
         if (isfinite(l)) {
             logit[n] = l;
             label[n++] = c.label[i];
@@ -156,7 +156,7 @@ static int calibrate(struct ggn_baseline *b, const struct ggn_feature_set *t, co
 /* The first window of the LSTM begins at the first level; an SVM answers from where that window ends. */
 static void set_cadence(struct ggn_baseline *b, const struct ggn_eval_set *s)
 {
-    const struct ggn_chains *c = &s->chains;
+    const struct ggn_series_set *c = &s->images;
     b->policy.ratio = c->ratio > 1.001 ? c->ratio : 0;
     b->policy.step_spp = c->step_spp;
     b->policy.first_spp = c->first_spp;
@@ -186,7 +186,7 @@ int ggn_baseline_train(struct ggn_baseline *b, const struct ggn_feature_set *t, 
 
 /* --- judging --- */
 
-struct judging {
+struct replaying {
     const struct ggn_eval_set *set;
     const struct ggn_baseline *baseline;
     const struct ggn_feature_set *features;
@@ -194,7 +194,7 @@ struct judging {
 };
 
 struct one_block {
-    const struct judging *j;
+    const struct replaying *j;
     struct ggn_baseline_reader *reader;
     const double *first; /* features of its level 0 */
 };
@@ -205,14 +205,14 @@ static double window_logit(void *data, const int *levels)
     const double *features[GGN_WINDOW_MAX];
     for (int k = 0; k < o->j->baseline->window; k++)
         features[k] = o->first + (size_t)levels[k] * o->j->features->size;
-    return ggn_baseline_logit(o->reader, features, o->j->set->chains.width, o->j->set->chains.height);
+    return ggn_baseline_logit(o->reader, features, o->j->set->images.width, o->j->set->images.height);
 }
 
 static int judge_block(void *data, int index, int worker, struct base_err *err)
 {
-    const struct judging *j = data;
+    const struct replaying *j = data;
     const struct ggn_eval_block *b = &j->set->blocks[index];
-    const struct ggn_chain *c = &j->set->chains.chains[b->chain];
+    const struct ggn_level_series *c = &j->set->images.series[b->series];
     const struct ggn_stop_rule rule = {.policy = j->baseline->policy, .window = j->baseline->window};
     struct one_block one = {j, ggn_baseline_reader_create(j->baseline, err),
                             j->features->x + j->features->first[index] * j->features->size};
@@ -220,7 +220,7 @@ static int judge_block(void *data, int index, int worker, struct base_err *err)
     int rc = !one.reader ? err->code : !seen ? base_fail_nomem(err, j->method->name) : 0;
     (void)worker;
     if (!rc)
-        ggn_replay(&j->set->chains, c, &rule, window_logit, &one, seen);
+        ggn_replay(&j->set->images, c, &rule, window_logit, &one, seen);
     for (size_t i = b->first; i < b->end && !rc; i++)
         j->method->score[i] = seen[i - b->first + (size_t)j->set->window - 1].p;
     free(seen);
@@ -231,7 +231,7 @@ static int judge_block(void *data, int index, int worker, struct base_err *err)
 int ggn_method_baseline(struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_baseline *b,
                         const struct ggn_feature_set *features, struct base_threads *threads, struct base_err *err)
 {
-    struct judging j = {s, b, features, m};
+    struct replaying j = {s, b, features, m};
     int rc = ggn_method_init(m, s, ggn_baseline_titles[b->kind], 1, err);
     if (rc)
         return rc;
@@ -252,7 +252,7 @@ int ggn_method_learned(struct ggn_method *m, struct ggn_baseline *b, const struc
 {
     struct ggn_feature_set features = {0};
     *b = (struct ggn_baseline){0};
-    int rc = ggn_baseline_init(b, kind, s->chains.width, s->chains.height, s->window, err), made = 0;
+    int rc = ggn_baseline_init(b, kind, s->images.width, s->images.height, s->window, err), made = 0;
     if (!rc)
         rc = ggn_feature_set_make(&features, b, s, threads, err);
     if (!rc)

@@ -46,7 +46,7 @@ static int save(const struct options *o, const struct ggn_baseline *b, const str
 {
     cJSON *from = cJSON_CreateObject();
     int failed = !from;
-    base_json_text(from, "labels", ggn_dataset_label_source(&s->chains.data), &failed);
+    base_json_text(from, "labels", ggn_dataset_label_source(&s->images.data), &failed);
     base_json_number(from, "blocks", m->blocks, &failed);
     base_json_number(from, "scenes", m->scenes, &failed);
     base_json_number(from, "windows", (double)m->cases, &failed);

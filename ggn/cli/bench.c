@@ -9,7 +9,7 @@
 #include "base/options.h"
 #include "cli/commands.h"
 #include "figures/stats.h"
-#include "model/judge.h"
+#include "model/inference.h"
 #include "model/stopper.h"
 #include "model/trainer.h"
 #include "nn/hash.h"
@@ -39,7 +39,7 @@ struct bench {
     struct ggn_exec *r, *m, *d;          /* inference */
     struct ggn_exec *(*alone)[GGN_NETS]; /* [threads] the same for each thread: criteria decide about blocks side by side */
     float *planes;                       /* random pictures */
-    const float *noisy[64 * 3 * GGN_WINDOW_MAX], *reference[64 * 3], *picture[64];
+    const float *noisy[64 * 3 * GGN_WINDOW_MAX], *reference[64 * 3], *noise_map[64];
 };
 
 enum {
@@ -124,7 +124,7 @@ static int setup(struct bench *b, struct base_err *err)
                 plane[k] = (float)ggn_hash_unit((uint32_t)k, (uint32_t)(i * planes + c));
             *(c < window ? &b->noisy[i * window + c] : &b->reference[i * 3 + c - window]) = plane;
         }
-        b->picture[i] = b->reference[3 * i];
+        b->noise_map[i] = b->reference[3 * i];
     }
     struct ggn_exec *const all[] = {b->r, b->m, b->d};
     for (int net = 0; net < GGN_NETS; net++)
@@ -194,11 +194,11 @@ static double judge_train_ms(struct bench *b, struct base_err *err)
 {
     double label[64], bce, start = now_s(b);
     struct ggn_batch batch = {
-        .count = b->o.batch, .noisy = b->noisy, .denoised = b->noisy, .label = label, .picture = b->picture};
+        .count = b->o.batch, .noisy = b->noisy, .denoised = b->noisy, .label = label, .noise_map = b->noise_map};
 
     for (int i = 0; i < b->o.batch; i++)
         label[i] = i & 1;
-    if (ggn_trainer_judge_step(b->trainer, &batch, &bce, NULL, err))
+    if (ggn_trainer_classifier_step(b->trainer, &batch, &bce, NULL, err))
         return 0;
     return 1e3 * (now_s(b) - start) / b->o.batch;
 }

@@ -20,7 +20,7 @@ enum { MAX_FILES = 16 };
 
 struct options {
     const char *data, *out, *observer, *models[MAX_FILES], *baselines[MAX_FILES], *thresholds[MAX_FILES];
-    int n_models, n_baselines, n_thresholds, split, threads, no_quality, recorded, sizes, scores, precision, no_pictures;
+    int n_models, n_baselines, n_thresholds, split, threads, no_quality, recorded, sizes, scores, precision, no_noise_maps;
     double ratio, cadence;
 };
 
@@ -46,7 +46,7 @@ static const struct base_option list[] = {
     {"precision", 0, NULL, TO(precision), .words = precisions, .help = "of the networks' arithmetic (f32)"},
     {"scores", 0, NULL, TO(scores), .help = "of the networks' own settings only: p of every window, and the stops"},
     {"recorded", 0, NULL, TO(recorded), .help = "recorded levels only; blocks that show noise in the last one are left out"},
-    {"no-pictures", 0, NULL, TO(no_pictures),
+    {"no-pictures", 0, NULL, TO(no_noise_maps),
      .help = "networks as in a host without half buffers: no noise pictures, no tail guard"},
     {"no-quality", 0, NULL, TO(no_quality), .help = "skip FLIP"},
     {"sizes", 0, NULL, TO(sizes), .help = "also thresholds of the blocks' parts, as of smaller blocks"},
@@ -92,7 +92,7 @@ static void put_cost(cJSON *to, const struct ggn_cost *c, int *failed)
 static void put_setting(struct job *j, const char *criterion, const char *parameter, double value, const double *stop,
                         const struct ggn_checks_made *checks)
 {
-    const struct ggn_dataset *d = &j->set.chains.data;
+    const struct ggn_dataset *d = &j->set.images.data;
     cJSON *o = base_json_object(j->points, NULL, &j->failed);
     base_json_text(o, "criterion", criterion, &j->failed);
     base_json_text(o, "dial", parameter, &j->failed);
@@ -136,13 +136,13 @@ static void put_scenes(struct job *j, cJSON *root)
             if (e->split != j->split || e->scene != scene)
                 continue;
             if (!o) {
-                o = base_json_object(to, s->chains.data.views[scene].manifest.scene, &j->failed);
+                o = base_json_object(to, s->images.data.views[scene].manifest.scene, &j->failed);
                 blocks = base_json_array(o, "blocks", &j->failed);
             }
-            const struct ggn_chain *c = &s->chains.chains[e->chain];
+            const struct ggn_level_series *c = &s->images.series[e->series];
             cJSON *block = base_json_object(blocks, NULL, &j->failed);
             base_json_number(block, "place", place_of(j, b), &j->failed);
-            base_json_text(block, "view", s->chains.data.views[e->view].name, &j->failed);
+            base_json_text(block, "view", s->images.data.views[e->view].name, &j->failed);
             base_json_number(block, "id", e->label.id, &j->failed);
             base_json_number(block, "threshold", e->label.threshold, &j->failed);
             base_json_number(block, "cap", e->cap, &j->failed);
@@ -203,7 +203,7 @@ static int four_at(const struct seq_manifest *m, int x, int y, int side, uint32_
 /* Thresholds of every square of four neighbours, of twice a block's side. */
 static int put_joined(struct job *j, cJSON *to, const struct ggn_dataset_view *v, struct base_err *err)
 {
-    const int side = j->set.chains.width;
+    const int side = j->set.images.width;
     for (int y = 0; y + 2 * side <= (int)v->manifest.height; y += 2 * side)
         for (int x = 0; x + 2 * side <= (int)v->manifest.width; x += 2 * side) {
             struct seq_block four[4];
@@ -235,7 +235,7 @@ static int put_sizes(struct job *j, cJSON *root, struct base_err *err)
     int rc = 0;
     for (int b = 0; b < s->n_blocks && !rc; b++) {
         const struct ggn_eval_block *e = &s->blocks[b];
-        const struct ggn_dataset_view *v = &s->chains.data.views[e->view];
+        const struct ggn_dataset_view *v = &s->images.data.views[e->view];
         struct seq_block p;
         if (e->split != j->split)
             continue;
@@ -246,9 +246,9 @@ static int put_sizes(struct job *j, cJSON *root, struct base_err *err)
             rc = put_parts(j, parts_of(j, to, v->manifest.scene, sides[i]), &p, sides[i], err);
         seq_block_release(&p);
     }
-    for (int v = 0; v < s->chains.data.n && !rc; v++)
-        if (s->chains.data.views[v].split == j->split)
-            rc = put_joined(j, to, &s->chains.data.views[v], err);
+    for (int v = 0; v < s->images.data.n && !rc; v++)
+        if (s->images.data.views[v].split == j->split)
+            rc = put_joined(j, to, &s->images.data.views[v], err);
     return rc;
 }
 
@@ -385,13 +385,13 @@ static int cost_models(struct job *j, struct base_threads *threads, struct base_
         struct ggn_method m;
         char name[GGN_METHOD_NAME];
         snprintf(name, sizeof name, "%.32s%s%s%s", base_file_name(j->o->models[i]), j->o->precision ? " " : "",
-                 j->o->precision ? precisions[j->o->precision] : "", j->o->no_pictures ? ", no halves" : "");
+                 j->o->precision ? precisions[j->o->precision] : "", j->o->no_noise_maps ? ", no halves" : "");
         rc = ggn_model_load(j->o->models[i], &model, err);
         if (!rc)
             rc = ggn_policy_of(model, &policy, err);
         if (j->o->cadence > 0)
             policy.ratio = j->o->cadence;
-        if (j->o->no_pictures)
+        if (j->o->no_noise_maps)
             ggn_policy_without_halves(&policy);
         if (!rc)
             rc = ggn_eval_trained(&m, &j->set, model, &policy, name, (enum ggn_precision)j->o->precision, threads, err);
@@ -453,15 +453,15 @@ static int cost_thresholds(struct job *j, struct base_err *err)
     return rc;
 }
 
-/* Whether a model takes the noise picture, and the longest window. */
-static int look_at_models(const struct options *o, int *pictures, int *window, struct base_err *err)
+/* Whether a model takes the noise map, and the longest window. */
+static int read_models(const struct options *o, int *noise_maps, int *window, struct base_err *err)
 {
     int rc = 0;
     for (int i = 0; i < o->n_models && !rc; i++) {
         struct ggn_model *model = NULL;
         rc = ggn_model_load(o->models[i], &model, err);
         if (!rc) {
-            *pictures |= model->hyper.picture && !o->no_pictures;
+            *noise_maps |= model->hyper.noise_map && !o->no_noise_maps;
             *window = model->hyper.window > *window ? model->hyper.window : *window;
         }
         ggn_model_destroy(model);
@@ -479,8 +479,8 @@ static int cost(struct job *j, struct base_threads *threads, struct base_err *er
     if (!root || !j->checks || !j->stop)
         rc = base_fail_nomem(err, "cost");
     base_json_text(root, "split", ggn_split_names[j->split], &j->failed);
-    base_json_text(root, "labels", ggn_dataset_label_source(&j->set.chains.data), &j->failed);
-    base_json_number(root, "ratio", j->set.chains.ratio, &j->failed);
+    base_json_text(root, "labels", ggn_dataset_label_source(&j->set.images.data), &j->failed);
+    base_json_number(root, "ratio", j->set.images.ratio, &j->failed);
     put_scenes(j, root);
     if (!rc && j->o->sizes)
         rc = put_sizes(j, root, err);
@@ -517,7 +517,7 @@ int ggn_cmd_cost(int argc, char **argv)
     struct job j = {.o = &o};
     struct base_threads *threads = NULL;
     struct base_err err = {0};
-    int skipped, pictures = 0, window = 6;
+    int skipped, noise_maps = 0, window = 6;
 
     int rc = base_options_parse(&options, argc, argv, &o, &err);
     j.split = (enum ggn_split)o.split;
@@ -526,7 +526,7 @@ int ggn_cmd_cost(int argc, char **argv)
     if (!rc && !(threads = base_threads_create(o.threads, &err)))
         rc = err.code;
     if (!rc)
-        rc = look_at_models(&o, &pictures, &window, &err);
+        rc = read_models(&o, &noise_maps, &window, &err);
     if (!rc)
         rc = ggn_eval_set_load(&j.set,
                                &(struct ggn_eval_options){.dir = o.data,
@@ -537,7 +537,7 @@ int ggn_cmd_cost(int argc, char **argv)
                                                           .ratio = o.ratio,
                                                           .seed = 1,
                                                           .cadence = o.cadence,
-                                                          .pictures = pictures},
+                                                          .noise_maps = noise_maps},
                                threads, &skipped, &err);
     for (int b = 0; o.recorded && b < j.set.n_blocks; b++) /* whose thresholds lie beyond: nothing is known there */
         if (j.set.blocks[b].label.censored)

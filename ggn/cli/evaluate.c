@@ -25,7 +25,7 @@ enum { MAX_MODELS = 8, MAX_FILES = 8, MAX_METHODS = 10 + 2 * MAX_FILES + 2 * MAX
 struct options {
     const char *data, *out, *observer, *models[MAX_MODELS], *thresholds[MAX_FILES], *trained[MAX_FILES];
     int n_models, n_thresholds, n_trained, json, no_quality, threads, window, retune, recorded, baselines, epochs, bf16,
-        no_pictures;
+        no_noise_maps;
     double early, ratio, visible;
     int n_adjusted;
     struct {
@@ -82,7 +82,7 @@ static const struct base_option list[] = {
     {"bf16", 0, NULL, TO(bf16),
      .help = "judge with bfloat16 products too: one more method per model, whose changed decisions are counted"},
     {"no-quality", 0, NULL, TO(no_quality), .help = "skip FLIP and SSIM at the stop"},
-    {"no-pictures", 0, NULL, TO(no_pictures),
+    {"no-pictures", 0, NULL, TO(no_noise_maps),
      .help = "judge as in a host without half buffers: models get no noise pictures and no tail guard"},
     {"baselines", 0, NULL, TO(baselines),
      .help = "train the published baselines on the training scenes and measure them too (minutes)"},
@@ -144,7 +144,7 @@ static void adjust(const struct options *o, struct ggn_policy *policy)
         policy->threshold = o->visible;
     for (int i = 0; i < o->n_adjusted; i++)
         ggn_policy_adjust(policy, o->adjusted[i].name, o->adjusted[i].value);
-    if (o->no_pictures)
+    if (o->no_noise_maps)
         ggn_policy_without_halves(policy);
 }
 
@@ -218,7 +218,7 @@ static int add_models(struct evaluation *j, struct base_threads *threads, struct
 
 static int check_people(const struct evaluation *j, struct base_err *err)
 {
-    const struct ggn_dataset *d = &j->set.chains.data;
+    const struct ggn_dataset *d = &j->set.images.data;
     for (int i = 0; i < d->n; i++) {
         const struct ggn_dataset_view *v = &d->views[i];
         if (v->split != GGN_SPLIT_PEOPLE)
@@ -311,14 +311,14 @@ static int report(struct evaluation *j, int skipped, struct base_err *err)
     char path[4096];
     int failed = 0;
     base_json_text(root, "data", j->o->data, &failed);
-    base_json_text(root, "labels", ggn_dataset_label_source(&j->set.chains.data), &failed);
+    base_json_text(root, "labels", ggn_dataset_label_source(&j->set.images.data), &failed);
     base_json_number(root, "window", j->set.window, &failed);
     base_json_number(root, "early_rate_tuned_for", j->o->early, &failed);
     base_json_text(root, "tuned_on", ggn_split_names[j->tuning], &failed);
     cJSON *splits = base_json_object(root, "splits", &failed), *changes = base_json_object(root, "changes", &failed);
     int rc = 0;
     if (!j->o->json)
-        printf("labels: %s; cuts tuned on %s for %.1f %% early stops%s\n", ggn_dataset_label_source(&j->set.chains.data),
+        printf("labels: %s; cuts tuned on %s for %.1f %% early stops%s\n", ggn_dataset_label_source(&j->set.images.data),
                ggn_split_names[j->tuning], 100.0 * j->o->early, skipped > 0 ? "; views without labels are left out" : "");
     for (int split = 0; split < GGN_SPLITS && !rc; split++) {
         if (ggn_eval_count(&j->set, (enum ggn_split)split) == 0)
@@ -367,8 +367,8 @@ static int load(struct evaluation *j, struct base_threads *threads, int *skipped
                                   .job = ggn_cmd_job,
                                   .files = files,
                                   .n_files = n};
-    for (int i = 0; i < o->n_models && !rc && !o->no_pictures; i++)
-        eo.pictures |= j->models[i]->hyper.picture;
+    for (int i = 0; i < o->n_models && !rc && !o->no_noise_maps; i++)
+        eo.noise_maps |= j->models[i]->hyper.noise_map;
     return rc ? rc : ggn_eval_set_load(&j->set, &eo, threads, skipped, err);
 }
 

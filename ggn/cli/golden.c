@@ -8,7 +8,7 @@
 #include "base/options.h"
 #include "cli/commands.h"
 #include "model/golden.h"
-#include "model/judge.h"
+#include "model/inference.h"
 
 struct options {
     struct ggn_golden_seeds seeds;

@@ -4,7 +4,7 @@
 
 #include "base/options.h"
 #include "cli/commands.h"
-#include "model/judge.h"
+#include "model/inference.h"
 
 struct options {
     const char *path;
@@ -38,7 +38,7 @@ static int print_model(const struct ggn_model *m, const struct ggn_container *c,
     printf("preset       %s\n", ggn_preset_names[h->preset]);
     printf("block        %d x %d pixels, window of %d images\n", h->width, h->height, h->window);
     printf("widths       denoiser %d, generator %d, discriminator %d\n", h->k_r, h->k_m, h->k_d);
-    printf("noise picture of half buffers: %s\n", h->picture ? "taken where the host has them" : "not taken");
+    printf("noise picture of half buffers: %s\n", h->noise_map ? "taken where the host has them" : "not taken");
     for (int net = 0; net < GGN_NETS; net++)
         printf("%-12s %zu parameters, %.0f MAC\n", m->graph[net].name, m->graph[net].n_params,
                ggn_graph_mac(&m->graph[net]));
@@ -46,7 +46,7 @@ static int print_model(const struct ggn_model *m, const struct ggn_container *c,
            1e-9 * (ggn_graph_mac(&m->graph[0]) + 2 * ggn_graph_mac(&m->graph[1]) + ggn_graph_mac(&m->graph[2])),
            1e-6 * 9.0 * (h->window + 1) * h->width *
                h->height, /* of 3 channels 8 bits noisy and 16 denoised, and a spare slot */
-           1e-6 * (double)ggn_judge_bytes(m, GGN_PRECISION_F32, 1));
+           1e-6 * (double)ggn_inference_bytes(m, GGN_PRECISION_F32, 1));
     printf("calibration  p = sigmoid(%g * logit + %g), stops below %g in %d checks in a row, spacing %g\n",
            m->calibration.scale, m->calibration.shift, m->calibration.threshold, m->calibration.consecutive,
            m->calibration.spacing);

@@ -49,7 +49,7 @@ static const struct base_option list[] = {
     {"soft-labels", 0, "N", TO(plan.soft_labels), 0, 1, .help = "1: labels between 0 and 1 near the threshold (lull 1)"},
     {"flips", 0, "N", TO(plan.flips), 0, 1, .help = "1: windows are flipped and rotated at random (lull 1)"},
     {"jitter", 0, "N", TO(plan.jitter), 0, 2, .help = "octaves over which the exposure of a window is varied (lull 0.3)"},
-    {"picture", 0, "SHARE", TO(plan.picture), 0, 1,
+    {"picture", 0, "SHARE", TO(plan.noise_map), 0, 1,
      .help = "share of windows that come with the noise picture of their half buffers, 0 = networks without that input; "
              "preset lull only (0)"},
     {"average", 0, "N", TO(plan.average), 0, 1e6,

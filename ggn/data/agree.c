@@ -7,23 +7,23 @@
 #include "base/version.h"
 #include "nn/isa.h"
 
-static unsigned data_crc(const struct ggn_chains *set)
+static unsigned data_crc(const struct ggn_series_set *set)
 {
-    const size_t values = ggn_chains_values(set);
+    const size_t values = ggn_series_set_values(set);
     uLong crc = crc32(0, NULL, 0);
 
     for (int i = 0; i < set->n; i++) {
-        const struct ggn_chain *c = &set->chains[i];
+        const struct ggn_level_series *c = &set->series[i];
         const double what[] = {c->split, c->block, c->n_levels, c->has_label ? c->label.threshold : -1};
         crc = crc32_z(crc, (const Bytef *)what, sizeof what);
         if (c->n_levels > 0)
             crc = crc32_z(crc, c->noisy, (size_t)c->n_levels * values);
         if (c->reference)
             crc = crc32_z(crc, c->reference, values);
-        for (int k = 0; c->picture && k < c->n_levels; k++) {
-            crc = crc32_z(crc, &c->has_picture[k], 1);
-            if (c->has_picture[k]) /* otherwise nobody has written it */
-                crc = crc32_z(crc, c->picture + (size_t)k * (values / 3), values / 3);
+        for (int k = 0; c->noise_map && k < c->n_levels; k++) {
+            crc = crc32_z(crc, &c->has_noise_map[k], 1);
+            if (c->has_noise_map[k]) /* otherwise nobody has written it */
+                crc = crc32_z(crc, c->noise_map + (size_t)k * (values / 3), values / 3);
         }
     }
     return (unsigned)crc;
@@ -42,7 +42,7 @@ static int files_crc(const char *const *files, int n, uint32_t *crc, struct base
     return rc;
 }
 
-int ggn_agree(struct job *job, const struct ggn_chains *set, const char *const *files, int n_files, uint32_t options,
+int ggn_agree(struct job *job, const struct ggn_series_set *set, const char *const *files, int n_files, uint32_t options,
               int threads, struct base_err *err)
 {
     uint32_t files_are = 0;

@@ -3,12 +3,12 @@
 #define GGN_DATA_AGREE_H
 
 #include "job/job.h"
-#include "data/chains.h"
+#include "data/series.h"
 
 /* The handshake of a job (job/job.h) with what makes its processes compute the same: refuses (BASE_EINVAL) one of another
  * version, with vectors of another length, with other images or labels, other bytes in files[n_files] or other options (any
  * number that stands for them). Nothing without a job. */
-int ggn_agree(struct job *job, const struct ggn_chains *set, const char *const *files, int n_files, uint32_t options,
+int ggn_agree(struct job *job, const struct ggn_series_set *set, const char *const *files, int n_files, uint32_t options,
               int threads, struct base_err *err);
 
 #endif

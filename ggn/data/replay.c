@@ -8,8 +8,8 @@
 
 /* The rule at one level. */
 struct look {
-    const struct ggn_chains *set;
-    const struct ggn_chain *chain;
+    const struct ggn_series_set *set;
+    const struct ggn_level_series *series;
     double (*logit)(void *data, const int *levels);
     void *data;
     int level[GGN_WINDOW_MAX], used; /* of the window's images, oldest first */
@@ -18,11 +18,11 @@ struct look {
 static double window_noise(void *data)
 {
     const struct look *l = data;
-    const size_t values = ggn_chains_values(l->set);
+    const size_t values = ggn_series_set_values(l->set);
     const int first = l->level[0], last = l->level[l->used - 1];
 
-    return ggn_window_noise(l->chain->noisy + values * (size_t)first, l->chain->noisy + values * (size_t)last, values,
-                            l->chain->spp[first], l->chain->spp[last]);
+    return ggn_window_noise(l->series->noisy + values * (size_t)first, l->series->noisy + values * (size_t)last, values,
+                            l->series->spp[first], l->series->spp[last]);
 }
 
 static double window_logit(void *data)
@@ -36,7 +36,7 @@ static double window_logit(void *data)
 static int tail_statistics(void *data, double *tail999, double *gini)
 {
     const struct look *l = data;
-    const struct ggn_chain *c = l->chain;
+    const struct ggn_level_series *c = l->series;
     const int last = l->level[l->used - 1];
     int k = last;
 
@@ -49,17 +49,17 @@ static int tail_statistics(void *data, double *tail999, double *gini)
     return 1;
 }
 
-static int is_check(const struct ggn_stop_rule *rule, const struct ggn_stopper *s, const struct ggn_chain *c, int i)
+static int is_check(const struct ggn_stop_rule *rule, const struct ggn_stopper *s, const struct ggn_level_series *c, int i)
 {
     double next = s->used ? (double)s->verdict.next_spp : rule->policy.first_spp;
 
     return c->spp[i] >= next || i + 1 == c->n_levels || next - c->spp[i] <= c->spp[i + 1] - next;
 }
 
-void ggn_replay(const struct ggn_chains *set, const struct ggn_chain *c, const struct ggn_stop_rule *rule,
+void ggn_replay(const struct ggn_series_set *set, const struct ggn_level_series *c, const struct ggn_stop_rule *rule,
                 double (*logit)(void *data, const int *levels), void *data, struct ggn_seen *seen)
 {
-    struct look look = {.set = set, .chain = c, .logit = logit, .data = data};
+    struct look look = {.set = set, .series = c, .logit = logit, .data = data};
     const struct ggn_evidence evidence = {&look, window_noise, window_logit, tail_statistics};
     struct ggn_stop_rule endless = *rule;
     struct ggn_stopper s = {0};
@@ -73,7 +73,7 @@ void ggn_replay(const struct ggn_chains *set, const struct ggn_chain *c, const s
         if (look.used == rule->window)
             memmove(look.level, look.level + 1, (size_t)--look.used * sizeof look.level[0]);
         look.level[look.used++] = i;
-        ggn_stopper_judge(&endless, &s, &evidence);
+        ggn_stopper_decide(&endless, &s, &evidence);
         seen[i].p = isnan(s.verdict.p) && !s.verdict.too_early ? INFINITY : s.verdict.p;
         seen[i].is_held = tail_statistics(&look, &tail999, &gini) && ggn_policy_tail_holds(&rule->policy, tail999, gini);
     }

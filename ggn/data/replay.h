@@ -5,7 +5,7 @@
 #ifndef GGN_DATA_REPLAY_H
 #define GGN_DATA_REPLAY_H
 
-#include "data/chains.h"
+#include "data/series.h"
 #include "model/stopper.h"
 
 struct ggn_seen {
@@ -17,7 +17,7 @@ struct ggn_seen {
 
 /* Fills seen [c->n_levels], as if nothing stopped the block: where it stops depends on the threshold, what is seen does not.
  * logit: of the window of these levels (indices, noisiest first). */
-void ggn_replay(const struct ggn_chains *set, const struct ggn_chain *c, const struct ggn_stop_rule *rule,
+void ggn_replay(const struct ggn_series_set *set, const struct ggn_level_series *c, const struct ggn_stop_rule *rule,
                 double (*logit)(void *data, const int *levels), void *data, struct ggn_seen *seen);
 
 /* The level at which these checks stop the block, -1 if none does. */

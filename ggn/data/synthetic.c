@@ -1,4 +1,4 @@
-/* Levels that were never rendered, from one pair of half buffers and a reference: whole chains, and the end of recorded
+/* Levels that were never rendered, from one pair of half buffers and a reference: whole series, and the end of recorded
  * ones. */
 #include <math.h>
 #include <stdlib.h>
@@ -7,7 +7,7 @@
 #include "base/colour.h"
 #include "model/preprocess.h"
 #include "nn/hash.h"
-#include "data/chains.h"
+#include "data/series.h"
 #include "sequence/simulate.h"
 
 enum { MAX_LEVELS = 192 };
@@ -52,13 +52,13 @@ static void step_down(const struct source *s, size_t pixels, double n, double ab
     }
 }
 
-/* Level k of the chain, whose mean is (a·(base + noise) + b·last)/(a + b), in display codes, and its noise picture. The
- * picture's D is that of the full level, whose signs the noise has not kept: noise of its own, as of other samples, but
+/* Level k of the series, whose mean is (a·(base + noise) + b·last)/(a + b), in display codes, and its noise map. The
+ * noise map's D is that of the full level, whose signs the noise has not kept: noise of its own, as of other samples, but
  * large in the same pixels. */
-static void fill_level(const struct ggn_chains *set, struct ggn_chain *c, int k, const struct source *s, const float *noise,
-                       double a, double b)
+static void fill_level(const struct ggn_series_set *set, struct ggn_level_series *c, int k, const struct source *s,
+                       const float *noise, double a, double b)
 {
-    const size_t values = ggn_chains_values(set), pixels = values / 3;
+    const size_t values = ggn_series_set_values(set), pixels = values / 3;
     uint8_t *out = c->noisy + values * (size_t)k;
 
     for (size_t p = 0; p < pixels; p++) {
@@ -70,13 +70,13 @@ static void fill_level(const struct ggn_chains *set, struct ggn_chain *c, int k,
         }
         s->mean[p] = (float)base_luminance(rgb[0], rgb[1], rgb[2]);
     }
-    ggn_chain_set_picture(set, c, k, s->mean, s->d_luminance, seq_noise_scale(s->n_full, c->spp[k]));
+    ggn_series_write_noise_map(set, c, k, s->mean, s->d_luminance, seq_noise_scale(s->n_full, c->spp[k]));
 }
 
-static void fill_levels(const struct ggn_chains *set, struct ggn_chain *c, const struct source *s, float *noise,
+static void fill_levels(const struct ggn_series_set *set, struct ggn_level_series *c, const struct source *s, float *noise,
                         uint32_t seed)
 {
-    const size_t pixels = ggn_chains_values(set) / 3;
+    const size_t pixels = ggn_series_set_values(set) / 3;
 
     memset(noise, 0, 3 * pixels * sizeof *noise);
     for (int k = c->n_levels - 1; k >= 0; k--) {
@@ -86,27 +86,27 @@ static void fill_levels(const struct ggn_chains *set, struct ggn_chain *c, const
     }
 }
 
-static void no_statistics(struct ggn_chain *c, int from)
+static void no_statistics(struct ggn_level_series *c, int from)
 {
     for (int k = from; k < c->n_levels; k++)
         c->tail999[k] = c->gini[k] = (double)NAN;
 }
 
-static int make_chain(struct ggn_chains *set, const struct ggn_chain *real, struct ggn_chain *c, const struct source *s,
-                      uint32_t seed, struct base_err *err)
+static int make_series(struct ggn_series_set *set, const struct ggn_level_series *real, struct ggn_level_series *c,
+                       const struct source *s, uint32_t seed, struct base_err *err)
 {
     double spp[MAX_LEVELS];
-    float *noise = malloc(ggn_chains_values(set) * sizeof *noise);
+    float *noise = malloc(ggn_series_set_values(set) * sizeof *noise);
     const double ratio = set->ratio > 1.01 ? set->ratio : 1.15;
     int n = choose_levels(spp, 0, set->first_spp, ratio, HIGHEST_SHARE * s->n_reference, 1, seed);
 
     *c = *real;
     c->synthetic = 1;
     c->spp = c->tail999 = c->gini = NULL;
-    c->noisy = c->picture = c->has_picture = NULL;
+    c->noisy = c->noise_map = c->has_noise_map = NULL;
     c->denoised = NULL;
     c->n_levels = n;
-    int rc = noise ? ggn_chain_grow(set, c, n ? n : 1, err) : base_fail_nomem(err, "synthetic images");
+    int rc = noise ? ggn_series_grow(set, c, n ? n : 1, err) : base_fail_nomem(err, "synthetic images");
     if (!rc) {
         memcpy(c->spp, spp, (size_t)n * sizeof *spp);
         no_statistics(c, 0);
@@ -117,8 +117,8 @@ static int make_chain(struct ggn_chains *set, const struct ggn_chain *real, stru
 }
 
 /* with_reference 0: as if none had been recorded. */
-static int read_source(const struct ggn_chains *set, const struct ggn_chain *c, int with_reference, struct source *s,
-                       int *usable, struct base_err *err)
+static int read_source(const struct ggn_series_set *set, const struct ggn_level_series *c, int with_reference,
+                       struct source *s, int *usable, struct base_err *err)
 {
     const struct ggn_dataset_view *v = &set->data.views[c->view];
     struct seq_block b = {0};
@@ -149,9 +149,9 @@ static int read_source(const struct ggn_chains *set, const struct ggn_chain *c, 
     return rc;
 }
 
-static int source_init(struct source *s, const struct ggn_chains *set, struct base_err *err)
+static int source_init(struct source *s, const struct ggn_series_set *set, struct base_err *err)
 {
-    size_t values = ggn_chains_values(set);
+    size_t values = ggn_series_set_values(set);
     float *memory = malloc((3 * values + 2 * (values / 3)) * sizeof *memory);
 
     if (!memory)
@@ -164,19 +164,19 @@ static int source_init(struct source *s, const struct ggn_chains *set, struct ba
     return 0;
 }
 
-int ggn_chains_add_synthetic(struct ggn_chains *set, int per_chain, uint32_t seed, struct base_err *err)
+int ggn_series_set_add_synthetic(struct ggn_series_set *set, int per_series, uint32_t seed, struct base_err *err)
 {
     struct source s = {0};
     int rc = source_init(&s, set, err), real = set->n;
 
     for (int i = 0; !rc && i < real; i++) {
         int usable = 0;
-        if (set->chains[i].split != GGN_SPLIT_TRAIN)
+        if (set->series[i].split != GGN_SPLIT_TRAIN)
             continue;
-        rc = read_source(set, &set->chains[i], 1, &s, &usable, err);
-        for (int k = 0; !rc && usable && isfinite(s.n_reference) && k < per_chain; k++) {
-            struct ggn_chain *c = ggn_chains_append(set, err);
-            rc = c ? make_chain(set, &set->chains[i], c, &s, ggn_hash((uint32_t)(i * 64 + k), seed), err) : BASE_ENOMEM;
+        rc = read_source(set, &set->series[i], 1, &s, &usable, err);
+        for (int k = 0; !rc && usable && isfinite(s.n_reference) && k < per_series; k++) {
+            struct ggn_level_series *c = ggn_series_set_append(set, err);
+            rc = c ? make_series(set, &set->series[i], c, &s, ggn_hash((uint32_t)(i * 64 + k), seed), err) : BASE_ENOMEM;
         }
     }
     free(s.base);
@@ -185,16 +185,16 @@ int ggn_chains_add_synthetic(struct ggn_chains *set, int per_chain, uint32_t see
 
 /* X_n = (n₀·X + m·Y_m)/n with m = n − n₀: the last recorded level X, continued with the first m samples of the reference,
  * whose running mean Y_m is the same walk as above. */
-static int extend_chain(const struct ggn_chains *set, struct ggn_chain *c, const struct source *s, uint32_t seed,
-                        struct base_err *err)
+static int extend_series(const struct ggn_series_set *set, struct ggn_level_series *c, const struct source *s, uint32_t seed,
+                         struct base_err *err)
 {
-    size_t values = ggn_chains_values(set);
+    size_t values = ggn_series_set_values(set);
     const int first = c->n_levels;
     const double n0 = c->spp[first - 1], ratio = set->ratio > 1.01 ? set->ratio : 1.15;
     double spp[MAX_LEVELS];
     int n = choose_levels(spp, n0, n0 * ratio, ratio, HIGHEST_SHARE * s->n_reference, 0, seed);
     float *noise = calloc(values, sizeof *noise);
-    int rc = noise ? ggn_chain_grow(set, c, first + n, err) : base_fail_nomem(err, "synthetic images");
+    int rc = noise ? ggn_series_grow(set, c, first + n, err) : base_fail_nomem(err, "synthetic images");
     for (int k = n - 1; !rc && k >= 0; k--) {
         double m = spp[k] - n0;
         step_down(s, values / 3, m, k + 1 < n ? spp[k + 1] - n0 : s->n_reference, ggn_hash((uint32_t)k, seed), noise);
@@ -210,16 +210,16 @@ static int extend_chain(const struct ggn_chains *set, struct ggn_chain *c, const
 }
 
 /* Without a reference: levels up to SEQ_SIMULATED_CAP in place of the recorded ones. */
-static int simulate_chain(const struct ggn_chains *set, struct ggn_chain *c, const struct source *s, double ratio,
-                          int jittered, uint32_t seed, struct base_err *err)
+static int simulate_series(const struct ggn_series_set *set, struct ggn_level_series *c, const struct source *s,
+                           double ratio, int jittered, uint32_t seed, struct base_err *err)
 {
     double spp[MAX_LEVELS];
     int n =
         choose_levels(spp, 0, set->first_spp < 16 ? set->first_spp : 16, ratio, SEQ_SIMULATED_CAP / ratio, jittered, seed);
 
     spp[n++] = SEQ_SIMULATED_CAP;
-    float *noise = malloc(ggn_chains_values(set) * sizeof *noise);
-    int rc = !noise ? base_fail_nomem(err, "simulated images") : n > c->n_levels ? ggn_chain_grow(set, c, n, err) : 0;
+    float *noise = malloc(ggn_series_set_values(set) * sizeof *noise);
+    int rc = !noise ? base_fail_nomem(err, "simulated images") : n > c->n_levels ? ggn_series_grow(set, c, n, err) : 0;
     if (!rc) {
         c->n_levels = n;
         c->simulated = 1;
@@ -231,14 +231,14 @@ static int simulate_chain(const struct ggn_chains *set, struct ggn_chain *c, con
     return rc;
 }
 
-int ggn_chains_extend(struct ggn_chains *set, uint32_t seed, struct base_err *err)
+int ggn_series_set_extend(struct ggn_series_set *set, uint32_t seed, struct base_err *err)
 {
     const double ratio = set->ratio > 1.01 && set->ratio < 2 ? set->ratio : 1.2565; /* a third of an octave */
     struct source s = {0};
     int rc = source_init(&s, set, err);
 
     for (int i = 0; !rc && i < set->n; i++) {
-        struct ggn_chain *c = &set->chains[i];
+        struct ggn_level_series *c = &set->series[i];
         int usable = 0;
         double last = c->n_levels ? c->spp[c->n_levels - 1] : 0;
         /* not where a clean end is recorded already, nor where nothing is known beyond it */
@@ -247,26 +247,26 @@ int ggn_chains_extend(struct ggn_chains *set, uint32_t seed, struct base_err *er
             continue;
         rc = read_source(set, c, 1, &s, &usable, err);
         if (!rc && usable && isfinite(s.n_reference))
-            rc = extend_chain(set, c, &s, ggn_hash((uint32_t)i, seed + 1), err);
+            rc = extend_series(set, c, &s, ggn_hash((uint32_t)i, seed + 1), err);
         else if (!rc && usable)
-            rc = simulate_chain(set, c, &s, ratio, 1, ggn_hash((uint32_t)i, seed + 1), err);
+            rc = simulate_series(set, c, &s, ratio, 1, ggn_hash((uint32_t)i, seed + 1), err);
     }
     free(s.base);
     return rc;
 }
 
-int ggn_chains_simulate(struct ggn_chains *set, double ratio, uint32_t seed, struct base_err *err)
+int ggn_series_set_simulate(struct ggn_series_set *set, double ratio, uint32_t seed, struct base_err *err)
 {
     struct source s = {0};
     int rc = source_init(&s, set, err);
 
     for (int i = 0; !rc && i < set->n; i++) {
         int usable = 0;
-        if (set->chains[i].synthetic || !set->chains[i].has_label)
+        if (set->series[i].synthetic || !set->series[i].has_label)
             continue;
-        rc = read_source(set, &set->chains[i], 0, &s, &usable, err);
+        rc = read_source(set, &set->series[i], 0, &s, &usable, err);
         if (!rc && usable)
-            rc = simulate_chain(set, &set->chains[i], &s, ratio, 0, ggn_hash((uint32_t)i, seed + 1), err);
+            rc = simulate_series(set, &set->series[i], &s, ratio, 0, ggn_hash((uint32_t)i, seed + 1), err);
     }
     set->ratio = ratio;
     set->step_spp = 0;

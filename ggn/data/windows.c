@@ -16,7 +16,7 @@ void ggn_windows_release(struct ggn_windows *w)
 }
 
 /* Whether the window that ends at `last` has a label, and which. */
-static int label_window(const struct ggn_chain *c, int chain, int last, const struct ggn_window_options *o,
+static int label_window(const struct ggn_level_series *c, int series, int last, const struct ggn_window_options *o,
                         struct ggn_window *out)
 {
     double spp = c->spp[o->label_first ? last - o->length + 1 : last];
@@ -24,20 +24,20 @@ static int label_window(const struct ggn_chain *c, int chain, int last, const st
 
     if (noisy < 0)
         return 0;
-    *out = (struct ggn_window){.chain = chain, .last = last, .noisy = noisy, .octave = log2(spp / c->label.threshold)};
+    *out = (struct ggn_window){.series = series, .last = last, .noisy = noisy, .octave = log2(spp / c->label.threshold)};
     double p = o->soft && c->spread > 0 ? ggn_label_p_noisy(&c->label, spp, c->spread) : (double)NAN;
     out->label = p >= 0 && p <= 1 ? p : noisy;
     return 1;
 }
 
-int ggn_windows_create(struct ggn_windows *w, const struct ggn_chains *set, const struct ggn_window_options *o,
+int ggn_windows_create(struct ggn_windows *w, const struct ggn_series_set *set, const struct ggn_window_options *o,
                        struct base_err *err)
 {
     size_t room = 1;
 
     *w = (struct ggn_windows){.set = set, .length = o->length};
     for (int i = 0; i < set->n; i++)
-        room += (size_t)set->chains[i].n_levels;
+        room += (size_t)set->series[i].n_levels;
     w->list = malloc(room * sizeof *w->list);
     w->first = malloc(((size_t)set->n + 1) * sizeof *w->first);
     if (!w->list || !w->first) {
@@ -45,7 +45,7 @@ int ggn_windows_create(struct ggn_windows *w, const struct ggn_chains *set, cons
         return base_fail_nomem(err, "windows");
     }
     for (int i = 0; i < set->n; i++) {
-        const struct ggn_chain *c = &set->chains[i];
+        const struct ggn_level_series *c = &set->series[i];
         w->first[i] = w->n;
         if (c->split != o->split || (c->synthetic && !o->synthetic))
             continue;
@@ -68,14 +68,14 @@ static int below(double unit, int n)
     return k < n ? k : n - 1;
 }
 
-/* The k-th of the scenes (or, within `scene`, of the chains) that have windows; their number when k < 0. */
+/* The k-th of the scenes (or, within `scene`, of the series) that have windows; their number when k < 0. */
 static int nth_scene(const struct ggn_windows *w, int k)
 {
     int n = 0;
 
     for (int s = 0; s < w->set->n_scenes; s++)
         for (int i = 0; i < w->set->n; i++)
-            if (w->set->chains[i].scene == s && w->first[i + 1] > w->first[i]) {
+            if (w->set->series[i].scene == s && w->first[i + 1] > w->first[i]) {
                 if (n++ == k)
                     return s;
                 break;
@@ -83,12 +83,12 @@ static int nth_scene(const struct ggn_windows *w, int k)
     return n;
 }
 
-static int nth_chain(const struct ggn_windows *w, int scene, int k)
+static int nth_series(const struct ggn_windows *w, int scene, int k)
 {
     int n = 0;
 
     for (int i = 0; i < w->set->n; i++)
-        if (w->set->chains[i].scene == scene && w->first[i + 1] > w->first[i] && n++ == k)
+        if (w->set->series[i].scene == scene && w->first[i + 1] > w->first[i] && n++ == k)
             return i;
     return n;
 }
@@ -99,9 +99,9 @@ static const double NEAR = 1.5;
 int ggn_windows_draw(const struct ggn_windows *w, uint64_t step, int i, uint32_t seed)
 {
     int scene = nth_scene(w, below(draw(1, step, i, seed), nth_scene(w, -1)));
-    int chain = nth_chain(w, scene, below(draw(2, step, i, seed), nth_chain(w, scene, -1)));
-    const struct ggn_window *list = w->list + w->first[chain];
-    int n = w->first[chain + 1] - w->first[chain], any[2] = {0, 0};
+    int series = nth_series(w, scene, below(draw(2, step, i, seed), nth_series(w, scene, -1)));
+    const struct ggn_window *list = w->list + w->first[series];
+    int n = w->first[series + 1] - w->first[series], any[2] = {0, 0};
 
     for (int k = 0; k < n; k++)
         any[list[k].noisy]++;
@@ -119,7 +119,7 @@ int ggn_windows_draw(const struct ggn_windows *w, uint64_t step, int i, uint32_t
         if (sum > target)
             break;
     }
-    return w->first[chain] + chosen;
+    return w->first[series] + chosen;
 }
 
 /* --- pixels --- */
@@ -131,7 +131,7 @@ struct ggn_augment ggn_augment_draw(uint64_t step, int i, uint32_t seed, const s
     struct ggn_augment a = {.flip_x = o->flips && draw(11, step, i, seed) < 0.5,
                             .flip_y = o->flips && draw(12, step, i, seed) < 0.5,
                             .transpose = o->flips && o->square && draw(13, step, i, seed) < 0.5,
-                            .blind = draw(18, step, i, seed) >= o->picture};
+                            .blind = draw(18, step, i, seed) >= o->noise_map};
     double exposure = o->jitter * (draw(14, step, i, seed) - 0.5);
 
     for (uint32_t c = 0; c < 3; c++)
@@ -191,7 +191,7 @@ static void plane_u16(const uint16_t *src, int width, int height, const struct g
     }
 }
 
-void ggn_window_planes(const struct ggn_chain *chain, int last, int length, int width, int height, int denoised,
+void ggn_window_planes(const struct ggn_level_series *series, int last, int length, int width, int height, int denoised,
                        const struct ggn_augment *augment, float difference, float *planes)
 {
     const size_t pixels = (size_t)width * (size_t)height;
@@ -204,9 +204,9 @@ void ggn_window_planes(const struct ggn_chain *chain, int last, int length, int 
             size_t at = (3 * (size_t)(last - length + 1 + k) + c) * pixels;
             float *out = planes + (3 * (size_t)k + c) * pixels;
             if (denoised)
-                plane_u16(chain->denoised + at, width, height, augment, table[c], out);
+                plane_u16(series->denoised + at, width, height, augment, table[c], out);
             else
-                plane_u8(chain->noisy + at, width, height, augment, table[c], out);
+                plane_u8(series->noisy + at, width, height, augment, table[c], out);
         }
     const float *newest = planes + 3 * (size_t)(length - 1) * pixels;
     for (int k = 0; k < length - 1 && difference > 0; k++) {
@@ -216,29 +216,29 @@ void ggn_window_planes(const struct ggn_chain *chain, int last, int length, int 
     }
 }
 
-int ggn_picture_plane(const struct ggn_chain *chain, int last, int width, int height, const struct ggn_augment *a,
-                      float *plane)
+int ggn_noise_map_plane(const struct ggn_level_series *series, int last, int width, int height, const struct ggn_augment *a,
+                        float *plane)
 {
-    if (!chain->picture || !chain->has_picture[last] || a->blind)
+    if (!series->noise_map || !series->has_noise_map[last] || a->blind)
         return 0;
-    const uint8_t *picture = chain->picture + (size_t)last * (size_t)width * (size_t)height;
+    const uint8_t *noise_map = series->noise_map + (size_t)last * (size_t)width * (size_t)height;
     double gain = base_luminance((double)a->gain[0], (double)a->gain[1], (double)a->gain[2]);
     float table[256];
 
     for (int i = 0; i < 256; i++)
-        table[i] = (float)(pow(gain, 1 / 2.4) * i) * GGN_PICTURE_GAIN;
-    plane_u8(picture, width, height, a, table, plane);
+        table[i] = (float)(pow(gain, 1 / 2.4) * i) * GGN_NOISE_MAP_GAIN;
+    plane_u8(noise_map, width, height, a, table, plane);
     return 1;
 }
 
-void ggn_crop_planes(const struct ggn_chain *chain, int level, int width, int height, int x0, int y0, int crop_w, int crop_h,
-                     const struct ggn_augment *augment, float *noisy, float *reference)
+void ggn_crop_planes(const struct ggn_level_series *series, int level, int width, int height, int x0, int y0, int crop_w,
+                     int crop_h, const struct ggn_augment *augment, float *noisy, float *reference)
 {
     const size_t pixels = (size_t)width * (size_t)height;
     float table[256];
 
     for (size_t c = 0; c < 3; c++) {
-        const uint8_t *x = chain->noisy + (3 * (size_t)level + c) * pixels, *y = chain->reference + c * pixels;
+        const uint8_t *x = series->noisy + (3 * (size_t)level + c) * pixels, *y = series->reference + c * pixels;
         gain_table(augment->gain[c], table);
         for (int r = 0; r < crop_h; r++)
             for (int s = 0; s < crop_w; s++) {

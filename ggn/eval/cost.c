@@ -22,7 +22,7 @@ double ggn_cost_path_s(const struct ggn_eval_set *s, const struct ggn_eval_block
     size_t i = b->end;
     while (i-- > b->first)
         if (s->seconds[i] > 0.0)
-            return s->seconds[i] / s->spp[i] / ((double)s->chains.width * s->chains.height);
+            return s->seconds[i] / s->spp[i] / ((double)s->images.width * s->images.height);
     return (double)NAN;
 }
 
@@ -45,7 +45,7 @@ void ggn_cost_of(const struct ggn_eval_set *s, enum ggn_split split, int scene, 
         const struct ggn_eval_block *e = &s->blocks[b];
         if (e->split != split || (scene >= 0 && e->scene != scene))
             continue;
-        double rate = ggn_cost_path_s(s, e) * s->chains.width * s->chains.height, t = e->label.threshold;
+        double rate = ggn_cost_path_s(s, e) * s->images.width * s->images.height, t = e->label.threshold;
         double flip = at_stop(s, e, s->flip, stop[b], 0.5);
         c.blocks++;
         c.samples += stop[b];

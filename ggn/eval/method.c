@@ -99,7 +99,7 @@ int ggn_method_halfbuf(struct ggn_method *m, const struct ggn_eval_set *s, int *
 {
     int rc = from_columns(m, s, "halfbuf", s->dammertz, s->half_unsettled, available, err);
     for (int b = 0; b < s->n_blocks && !rc; b++) {
-        const struct seq_manifest *v = &s->chains.data.views[s->blocks[b].view].manifest;
+        const struct seq_manifest *v = &s->images.data.views[s->blocks[b].view].manifest;
         const struct seq_manifest_block *r = &v->blocks[s->blocks[b].index];
         /* the paper's r = sqrt(area of the block / area of the picture), which the criterion applies */
         double area = sqrt((double)(r->x1 - r->x0) * (r->y1 - r->y0) / ((double)v->width * v->height));

@@ -19,7 +19,7 @@ static double error_at(const struct ggn_observer *o, const struct ggn_eval_set *
     while (i + 2 < b->end && s->spp[i + 1] < spp)
         i++;
     size_t k = i + 1 < b->end ? i + 1 : i;
-    size_t pixels = (size_t)s->chains.width * (size_t)s->chains.height;
+    size_t pixels = (size_t)s->images.width * (size_t)s->images.height;
     double one = ggn_observer_error(o, seen[i], pixels);
     double other = ggn_observer_error(o, seen[k], pixels);
     return ggn_curve_between(s->spp[i], one, s->spp[k], other, spp);
@@ -45,14 +45,14 @@ int ggn_method_observer(struct ggn_method *m, const struct ggn_eval_set *s, cons
     int rc = ggn_method_init(m, s, halves ? "observer" : "observer, no halves", 1, err), view = -1;
     const double *seen = halves ? s->visible : s->visible_means;
     struct ggn_observer o = ggn_observer_default;
-    size_t pixels = (size_t)s->chains.width * (size_t)s->chains.height;
+    size_t pixels = (size_t)s->images.width * (size_t)s->images.height;
     *available = 1;
     if (!rc && !(m->asked = malloc((size_t)s->n_blocks * sizeof *m->asked)))
         rc = base_fail_nomem(err, "observer");
     for (int b = 0; b < s->n_blocks && !rc; b++) {
         const struct ggn_eval_block *block = &s->blocks[b];
         if (path && block->view != view)
-            rc = ggn_observer_read(path, s->chains.data.views[block->view].name, &o, err);
+            rc = ggn_observer_read(path, s->images.data.views[block->view].name, &o, err);
         view = block->view;
         for (size_t i = block->first; i < block->end; i++) {
             m->score[i] = isnan(seen[i]) ? (double)NAN : ggn_observer_p_noisy(&o, ggn_observer_error(&o, seen[i], pixels));
@@ -80,7 +80,7 @@ int ggn_method_thresholds(struct ggn_method *m, const struct ggn_eval_set *s, co
     *available = 1;
     for (int b = 0; b < s->n_blocks && !rc; b++) {
         const struct ggn_eval_block *block = &s->blocks[b];
-        const struct ggn_dataset_view *v = &s->chains.data.views[block->view];
+        const struct ggn_dataset_view *v = &s->images.data.views[block->view];
         const struct ggn_view *row = ggn_thresholds_of(&t, v->name);
         uint32_t id = v->manifest.blocks[block->index].id;
         m->stop[b] = block->cap;

@@ -15,7 +15,7 @@
 
 void ggn_eval_set_release(struct ggn_eval_set *s)
 {
-    ggn_chains_release(&s->chains);
+    ggn_series_set_release(&s->images);
     free(s->blocks);
     free(s->spp); /* one allocation for all columns of doubles */
     free(s->noisy);
@@ -25,16 +25,16 @@ void ggn_eval_set_release(struct ggn_eval_set *s)
 /* Lists the labelled blocks and counts the cases. */
 static int list_blocks(struct ggn_eval_set *s, int *skipped, struct base_err *err)
 {
-    const struct ggn_dataset *d = &s->chains.data;
+    const struct ggn_dataset *d = &s->images.data;
     s->n_scenes = d->n;
-    s->blocks = malloc((size_t)(s->chains.n > 0 ? s->chains.n : 1) * sizeof *s->blocks);
+    s->blocks = malloc((size_t)(s->images.n > 0 ? s->images.n : 1) * sizeof *s->blocks);
     if (!s->blocks)
         return base_fail_nomem(err, "evaluation");
     *skipped = 0;
     for (int v = 0; v < d->n; v++)
         *skipped += !d->views[v].has_labels;
-    for (int i = 0; i < s->chains.n; i++) {
-        const struct ggn_chain *c = &s->chains.chains[i];
+    for (int i = 0; i < s->images.n; i++) {
+        const struct ggn_level_series *c = &s->images.series[i];
         const struct ggn_dataset_view *view = &d->views[c->view];
         if (!c->has_label)
             continue;
@@ -42,7 +42,7 @@ static int list_blocks(struct ggn_eval_set *s, int *skipped, struct base_err *er
             return base_fail(err, BASE_EINVAL, "%s: %d level%s, a window needs %d", view->dir, c->n_levels,
                              c->n_levels == 1 ? "" : "s", s->window);
         size_t cases = (size_t)(c->n_levels - s->window + 1);
-        struct ggn_eval_block b = {.chain = i,
+        struct ggn_eval_block b = {.series = i,
                                    .view = c->view,
                                    .scene = ggn_dataset_first(d, c->view),
                                    .index = seq_manifest_find(&view->manifest, c->block),
@@ -86,7 +86,7 @@ static int make_columns(struct ggn_eval_set *s, struct base_err *err)
     }
     for (int b = 0; b < s->n_blocks; b++) {
         const struct ggn_eval_block *block = &s->blocks[b];
-        const struct ggn_chain *c = &s->chains.chains[block->chain];
+        const struct ggn_level_series *c = &s->images.series[block->series];
         for (size_t i = block->first; i < block->end; i++) {
             s->spp[i] = c->spp[i - block->first + (size_t)s->window - 1];
             s->noisy[i] = (signed char)ggn_label_noisy(&block->label, s->spp[i]);
@@ -213,12 +213,12 @@ static void interleave(const uint8_t *planar, size_t pixels, uint8_t *rgb)
 static int comparison(const struct ggn_eval_set *s, const struct ggn_eval_block *block, uint8_t *codes, int *known,
                       struct base_err *err)
 {
-    const struct ggn_dataset_view *v = &s->chains.data.views[block->view];
-    const struct ggn_chain *c = &s->chains.chains[block->chain];
+    const struct ggn_dataset_view *v = &s->images.data.views[block->view];
+    const struct ggn_level_series *c = &s->images.series[block->series];
     struct seq_block p;
     *known = c->reference != NULL;
     if (c->reference) {
-        memcpy(codes, c->reference, ggn_chains_values(&s->chains));
+        memcpy(codes, c->reference, ggn_series_set_values(&s->images));
         return 0;
     }
     int rc = seq_manifest_read_block(v->dir, &v->manifest, block->index, &p, err);
@@ -234,8 +234,8 @@ static int comparison(const struct ggn_eval_set *s, const struct ggn_eval_block 
 
 static int measure_quality(struct ggn_eval_set *s, const struct ggn_eval_block *block, int with_ssim, struct base_err *err)
 {
-    const struct ggn_chain *c = &s->chains.chains[block->chain];
-    int w = s->chains.width, h = s->chains.height, rc = 0, known = 0;
+    const struct ggn_level_series *c = &s->images.series[block->series];
+    int w = s->images.width, h = s->images.height, rc = 0, known = 0;
     size_t pixels = (size_t)w * (size_t)h, values = 3 * pixels;
     uint8_t *rgb = malloc(3 * values), *against = rgb ? rgb + 2 * values : NULL;
     float *work = malloc(2 * values * sizeof *work);
@@ -327,7 +327,7 @@ static int see_levels(const struct seq_block *p, const struct seen *seen, struct
 static int fill_visible(struct ggn_eval_set *s, const struct ggn_eval_block *block, const struct seq_block *p,
                         const struct seen *seen, struct base_err *err)
 {
-    int simulated = s->chains.chains[block->chain].simulated, rc = 0, known = seq_full_level(p) != NULL;
+    int simulated = s->images.series[block->series].simulated, rc = 0, known = seq_full_level(p) != NULL;
     struct ggn_curve curve = {0};
     if (known)
         rc = ggn_curve_make(p, GGN_FROM_HALVES, 1, &curve, err);
@@ -398,7 +398,7 @@ static int fill_relmse(struct ggn_eval_set *s, const struct ggn_eval_block *bloc
 
 static int fill_statistics(struct ggn_eval_set *s, const struct ggn_eval_block *block, struct base_err *err)
 {
-    const struct ggn_dataset_view *v = &s->chains.data.views[block->view];
+    const struct ggn_dataset_view *v = &s->images.data.views[block->view];
     struct seq_block p;
     size_t i = block->first;
     int rc = seq_manifest_read_block(v->dir, &v->manifest, block->index, &p, err);
@@ -431,25 +431,25 @@ static int fill_block(void *data, int index, int worker, struct base_err *err)
     return !rc && f->quality ? measure_quality(f->set, block, !f->no_ssim, err) : rc;
 }
 
-/* Continues every labelled chain, also those that training has no use for: a method that does not stop in time must be seen
+/* Continues every labelled series, also those that training has no use for: a method that does not stop in time must be seen
  * to. */
-static int extend(struct ggn_chains *chains, double cadence, uint32_t seed, struct base_err *err)
+static int extend(struct ggn_series_set *set, double cadence, uint32_t seed, struct base_err *err)
 {
-    struct ggn_label *labels = malloc((size_t)(chains->n > 0 ? chains->n : 1) * sizeof *labels);
+    struct ggn_label *labels = malloc((size_t)(set->n > 0 ? set->n : 1) * sizeof *labels);
     if (!labels)
         return base_fail_nomem(err, "evaluation");
-    for (int i = 0; i < chains->n; i++) {
-        labels[i] = chains->chains[i].label;
-        chains->chains[i].label = (struct ggn_label){labels[i].id, INFINITY, 0};
+    for (int i = 0; i < set->n; i++) {
+        labels[i] = set->series[i].label;
+        set->series[i].label = (struct ggn_label){labels[i].id, INFINITY, 0};
     }
-    int rc = cadence > 1.0 ? ggn_chains_simulate(chains, cadence, seed, err) : ggn_chains_extend(chains, seed, err);
-    for (int i = 0; i < chains->n; i++) {
-        const struct ggn_chain *c = &chains->chains[i];
-        chains->chains[i].label = labels[i];
+    int rc = cadence > 1.0 ? ggn_series_set_simulate(set, cadence, seed, err) : ggn_series_set_extend(set, seed, err);
+    for (int i = 0; i < set->n; i++) {
+        const struct ggn_level_series *c = &set->series[i];
+        set->series[i].label = labels[i];
         /* A threshold that is only known to lie beyond the recording stays there. */
         if (labels[i].censored)
             for (int k = c->n_levels - 1; k > 0 && c->spp[k] > labels[i].threshold; k--)
-                chains->chains[i].n_levels = k;
+                set->series[i].n_levels = k;
     }
     free(labels);
     return rc;
@@ -459,14 +459,14 @@ int ggn_eval_set_load(struct ggn_eval_set *out, const struct ggn_eval_options *o
                       struct base_err *err)
 {
     struct ggn_eval_set s = {.window = o->window, .job = o->job};
-    struct ggn_chains_options co = {.dir = o->dir, .ratio = o->ratio, .with_test = 1, .pictures = o->pictures};
+    struct ggn_series_set_options co = {.dir = o->dir, .ratio = o->ratio, .with_test = 1, .noise_maps = o->noise_maps};
     struct fill f = {&s, o->quality, o->no_ssim};
     struct ggn_eval_values columns[COLUMNS];
-    int rc = ggn_chains_load(&s.chains, &co, err);
+    int rc = ggn_series_set_load(&s.images, &co, err);
     if (rc)
         return rc;
     if (!o->recorded)
-        rc = extend(&s.chains, o->cadence, o->seed, err);
+        rc = extend(&s.images, o->cadence, o->seed, err);
     if (!rc)
         rc = list_blocks(&s, skipped, err);
     if (!rc)
@@ -474,7 +474,7 @@ int ggn_eval_set_load(struct ggn_eval_set *out, const struct ggn_eval_options *o
     for (size_t c = 0; c < COLUMNS && !rc; c++)
         columns[c] = (struct ggn_eval_values){s.spp + c * s.n, sizeof *s.spp, NULL};
     if (!rc)
-        rc = ggn_agree(s.job, &s.chains, o->files, o->n_files, 0, base_threads_count(threads), err);
+        rc = ggn_agree(s.job, &s.images, o->files, o->n_files, 0, base_threads_count(threads), err);
     if (!rc)
         rc = ggn_eval_each_block(&s, threads, fill_block, &f, columns, COLUMNS, err);
     if (rc)

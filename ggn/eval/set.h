@@ -7,11 +7,11 @@
 
 #include "job/job.h"
 #include "base/threads.h"
-#include "data/chains.h"
+#include "data/series.h"
 
 struct ggn_eval_block {
-    int chain;      /* index into chains.chains */
-    int view;       /* index into chains.data.views */
+    int series;     /* index into images.series */
+    int view;       /* index into images.data.views */
     int scene;      /* index that equal scene names share */
     uint32_t index; /* in the view's manifest */
     enum ggn_split split;
@@ -25,9 +25,9 @@ struct ggn_eval_block {
 double ggn_eval_compared(const struct ggn_eval_block *block, double spp);
 
 struct ggn_eval_set {
-    struct job *job;          /* borrows; NULL: alone */
-    struct ggn_chains chains; /* owns: the images, continued beyond the recording where possible */
-    int window;               /* S: the first S-1 levels of a block make no case */
+    struct job *job;              /* borrows; NULL: alone */
+    struct ggn_series_set images; /* owns: the images, continued beyond the recording where possible */
+    int window;                   /* S: the first S-1 levels of a block make no case */
     int n_blocks, n_scenes;
     struct ggn_eval_block *blocks; /* owns; ordered by view, then as the manifest lists them */
     size_t n;                      /* cases */
@@ -45,11 +45,11 @@ struct ggn_eval_options {
     int window;               /* S */
     int quality;              /* also compute FLIP and SSIM of every case ... */
     int no_ssim;              /* ... but SSIM, which takes longer */
-    int recorded;             /* only recorded levels; else each block goes on as ggn_chains_extend says */
+    int recorded;             /* only recorded levels; else each block goes on as ggn_series_set_extend says */
     double ratio;             /* thin the levels to at least this ratio; 0: keep all */
-    double cadence;           /* > 1: simulate all levels, this far apart (ggn_chains_simulate); 0: no */
+    double cadence;           /* > 1: simulate all levels, this far apart (ggn_series_set_simulate); 0: no */
     uint32_t seed;            /* of the continuation */
-    int pictures;             /* also make the noise pictures (data/chains.h) */
+    int noise_maps;           /* also make the noise maps (data/series.h) */
     struct job *job;          /* the processes that share out the blocks, all with the same data; NULL: alone */
     const char *const *files; /* [n_files] what else must be the same for all of them (data/agree.h) */
     int n_files;

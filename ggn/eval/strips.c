@@ -64,8 +64,8 @@ static double ssim_of(struct ggn_ssim *ssim, const float *a, const float *b, siz
 static int denoiser_strip(const struct ggn_eval_set *s, const struct ggn_eval_block *b, struct ggn_viewer *v,
                           const char *path, struct strips *strips, struct base_err *err)
 {
-    const struct ggn_chain *c = &s->chains.chains[b->chain];
-    int w = s->chains.width, h = s->chains.height;
+    const struct ggn_level_series *c = &s->images.series[b->series];
+    int w = s->images.width, h = s->images.height;
     size_t pixels = (size_t)w * (size_t)h, values = 3 * pixels;
     uint8_t *strip = malloc(3 * values);
     float *planes = malloc(3 * values * sizeof *planes);
@@ -83,7 +83,7 @@ static int denoiser_strip(const struct ggn_eval_set *s, const struct ggn_eval_bl
             put_tile(strip, 3, k, planes + (size_t)k * values, (size_t)w, (size_t)h);
         snprintf(strips->title[strips->n], sizeof strips->title[0],
                  "%.80s block %u at %.0f spp: SSIM %.3f     denoised: SSIM %.3f     reference",
-                 s->chains.data.views[b->view].name, b->label.id, c->spp[0],
+                 s->images.data.views[b->view].name, b->label.id, c->spp[0],
                  ssim_of(ssim, planes, planes + 2 * values, pixels, w),
                  ssim_of(ssim, planes + values, planes + 2 * values, pixels, w));
         rc = add_strip(strips, path, strip, 3 * w, h, err);
@@ -99,12 +99,12 @@ int ggn_eval_denoiser_picture(const char *path, const struct ggn_eval_set *s, co
 {
     struct strips strips = {0};
     struct ggn_viewer v;
-    int last_view = -1, rc = ggn_viewer_init(&v, model, GGN_PRECISION_F32, &s->chains, err);
+    int last_view = -1, rc = ggn_viewer_init(&v, model, GGN_PRECISION_F32, &s->images, err);
     if (rc)
         return rc;
     for (int b = 0; b < s->n_blocks && strips.n < STRIPS && !rc; b++) {
         const struct ggn_eval_block *block = &s->blocks[b];
-        if (block->split != split || block->view == last_view || !s->chains.chains[block->chain].reference)
+        if (block->split != split || block->view == last_view || !s->images.series[block->series].reference)
             continue;
         last_view = block->view;
         rc = denoiser_strip(s, block, &v, path, &strips, err);
@@ -134,8 +134,8 @@ static int feature_strip(const struct ggn_eval_set *s, const struct ggn_eval_blo
                          const struct ggn_policy *policy, struct ggn_viewer *v, const char *path, struct strips *strips,
                          struct base_err *err)
 {
-    const struct ggn_chain *c = &s->chains.chains[b->chain];
-    int w = s->chains.width, h = s->chains.height, row;
+    const struct ggn_level_series *c = &s->images.series[b->series];
+    int w = s->images.width, h = s->images.height, row;
     size_t pixels = (size_t)w * (size_t)h, values = 3 * pixels;
     uint8_t *strip = malloc(4 * values);
     float *planes = malloc((values + 2 * pixels) * sizeof *planes);
@@ -149,7 +149,7 @@ static int feature_strip(const struct ggn_eval_set *s, const struct ggn_eval_blo
         for (size_t i = 0; i < values; i++)
             planes[i] = (float)c->noisy[values * (size_t)level + i] / 255.0f;
         for (int which = 0; which < 2; which++) {
-            const float *map = ggn_judge_feature_map(v->judge, which, &row);
+            const float *map = ggn_inference_feature_map(v->inference, which, &row);
             for (int y = 0; y < h; y++)
                 memcpy(planes + values + (size_t)which * pixels + (size_t)y * (size_t)w, map + (size_t)y * (size_t)row,
                        (size_t)w * sizeof *map);
@@ -160,7 +160,7 @@ static int feature_strip(const struct ggn_eval_set *s, const struct ggn_eval_blo
         put_map(strip, 4, 3, planes + values, planes + values + pixels, (size_t)w, (size_t)h);
         snprintf(strips->title[strips->n], sizeof strips->title[0],
                  "%.60s block %u, threshold %.0f: %.0f spp, p(noisy) %.3f   NFM of denoised   NFM of noisy   difference",
-                 s->chains.data.views[b->view].name, b->label.id, b->label.threshold, c->spp[level], p);
+                 s->images.data.views[b->view].name, b->label.id, b->label.threshold, c->spp[level], p);
         rc = add_strip(strips, path, strip, 4 * w, h, err);
     }
     free(planes);
@@ -176,10 +176,10 @@ int ggn_eval_feature_picture(const char *path, const struct ggn_eval_set *s, con
     struct ggn_viewer v;
     const struct ggn_eval_block *block = NULL;
     /* Tiles would not fit together into one map. */
-    if (s->chains.width != model->hyper.width || s->chains.height != model->hyper.height)
+    if (s->images.width != model->hyper.width || s->images.height != model->hyper.height)
         return 0;
     for (int b = 0; b < s->n_blocks; b++) {
-        const struct ggn_chain *c = &s->chains.chains[s->blocks[b].chain];
+        const struct ggn_level_series *c = &s->images.series[s->blocks[b].series];
         if (s->blocks[b].split != split || c->n_levels < model->hyper.window)
             continue;
         /* one whose threshold lies well inside what was recorded, if there is one */
@@ -190,13 +190,13 @@ int ggn_eval_feature_picture(const char *path, const struct ggn_eval_set *s, con
     }
     int rc = ggn_policy_of(model, &policy, err);
     if (!rc)
-        rc = ggn_viewer_init(&v, model, GGN_PRECISION_F32, &s->chains, err);
+        rc = ggn_viewer_init(&v, model, GGN_PRECISION_F32, &s->images, err);
     if (rc || !block) {
         if (!rc)
             ggn_viewer_release(&v);
         return rc;
     }
-    const struct ggn_chain *c = &s->chains.chains[block->chain];
+    const struct ggn_level_series *c = &s->images.series[block->series];
     int at[3] = {model->hyper.window - 1, model->hyper.window - 1, c->n_levels - 1};
     while (at[1] + 1 < c->n_levels && c->spp[at[1]] < block->label.threshold)
         at[1]++;

@@ -124,7 +124,7 @@ static void print_view(FILE *f, const struct ggn_eval_set *s, int view, const st
 
 int ggn_report_people(FILE *f, const struct ggn_eval_set *s, const struct ggn_method *methods, int n, struct base_err *err)
 {
-    const struct ggn_dataset *d = &s->chains.data;
+    const struct ggn_dataset *d = &s->images.data;
     double *room = malloc((size_t)s->n_blocks * sizeof *room);
     if (!room)
         return base_fail_nomem(err, "people");
@@ -262,7 +262,7 @@ static int plot_scores(const char *path, const struct ggn_eval_set *s, enum ggn_
         return base_fail_nomem(err, path);
     for (int b = 0; b < s->n_blocks && n < SHOWN; b++) {
         const struct ggn_eval_block *block = &s->blocks[b];
-        const struct ggn_dataset_view *v = &s->chains.data.views[block->view];
+        const struct ggn_dataset_view *v = &s->images.data.views[block->view];
         if (block->split != split || seen++ * SHOWN < n * total)
             continue;
         snprintf(titles[n], sizeof titles[n], "%.120s %u", v->name, v->manifest.blocks[block->index].id);
@@ -294,8 +294,8 @@ static int plot_scores(const char *path, const struct ggn_eval_set *s, enum ggn_
 
 static void fill_view(struct ggn_view *v, const struct ggn_eval_set *s, int view, const double *stop)
 {
-    const struct seq_manifest *m = &s->chains.data.views[view].manifest;
-    snprintf(v->name, sizeof v->name, "%.100s", s->chains.data.views[view].name);
+    const struct seq_manifest *m = &s->images.data.views[view].manifest;
+    snprintf(v->name, sizeof v->name, "%.100s", s->images.data.views[view].name);
     v->columns = (int)((m->width + m->block - 1) / m->block);
     for (int i = 0; i < v->n; i++)
         v->spp[i] = (double)NAN;
@@ -310,11 +310,11 @@ static void fill_view(struct ggn_view *v, const struct ggn_eval_set *s, int view
 static int make_maps(struct ggn_thresholds *t, const struct ggn_eval_set *s, enum ggn_split split, const double *stop,
                      struct base_err *err)
 {
-    *t = (struct ggn_thresholds){.views = calloc((size_t)s->chains.data.n, sizeof *t->views)};
+    *t = (struct ggn_thresholds){.views = calloc((size_t)s->images.data.n, sizeof *t->views)};
     if (!t->views)
         return base_fail_nomem(err, "maps");
-    for (int v = 0; v < s->chains.data.n; v++) {
-        uint32_t blocks = ggn_dataset_tiles(&s->chains.data.views[v]);
+    for (int v = 0; v < s->images.data.n; v++) {
+        uint32_t blocks = ggn_dataset_tiles(&s->images.data.views[v]);
         int used = 0;
         for (int b = 0; b < s->n_blocks; b++)
             used |= s->blocks[b].view == v && s->blocks[b].split == split;
@@ -346,7 +346,7 @@ static int write_stops(const char *path, const struct ggn_eval_set *s, enum ggn_
         const struct ggn_eval_block *e = &s->blocks[b];
         if (e->split != split)
             continue;
-        fprintf(out.file, "%s;%u;%.6g;%d;%.6g;", s->chains.data.views[e->view].name, e->label.id, e->label.threshold,
+        fprintf(out.file, "%s;%u;%.6g;%d;%.6g;", s->images.data.views[e->view].name, e->label.id, e->label.threshold,
                 e->label.censored, m->stop[b]);
         size_t i = ggn_method_stop_case(m, s, b);
         while (i > e->first && isnan(ggn_method_verdict(m, i))) /* a verdict stands until the next check */

@@ -17,7 +17,7 @@ static int judge_block(void *data, int index, int worker, struct base_err *err)
 {
     const struct run *r = data;
     const struct ggn_eval_block *b = &r->set->blocks[index];
-    const struct ggn_chain *c = &r->set->chains.chains[b->chain];
+    const struct ggn_level_series *c = &r->set->images.series[b->series];
     const int skipped = r->set->window - 1;
     struct ggn_stop_rule open = r->rule;
     struct ggn_seen *seen = malloc((size_t)c->n_levels * sizeof *seen);
@@ -26,10 +26,10 @@ static int judge_block(void *data, int index, int worker, struct base_err *err)
         return base_fail_nomem(err, r->method->name);
     ggn_viewer_turn(&r->viewers[worker], c);
     open.policy.gate_noise = 0;
-    ggn_replay(&r->set->chains, c, &open, ggn_viewer_logit, &r->viewers[worker], seen);
+    ggn_replay(&r->set->images, c, &open, ggn_viewer_logit, &r->viewers[worker], seen);
     for (int i = skipped; i < c->n_levels; i++)
         r->method->score[b->first + (size_t)(i - skipped)] = seen[i].p;
-    ggn_replay(&r->set->chains, c, &r->rule, ggn_viewer_logit, &r->viewers[worker], seen);
+    ggn_replay(&r->set->images, c, &r->rule, ggn_viewer_logit, &r->viewers[worker], seen);
     for (int i = skipped; i < c->n_levels; i++) {
         r->method->verdict[b->first + (size_t)(i - skipped)] = seen[i].p;
         r->method->own_guard[b->first + (size_t)(i - skipped)] = seen[i].is_held;
@@ -74,7 +74,7 @@ int ggn_eval_trained(struct ggn_method *m, const struct ggn_eval_set *s, const s
     if (!r.viewers)
         rc = base_fail_nomem(err, name);
     for (; made < workers && !rc; made += !rc)
-        rc = ggn_viewer_init(&r.viewers[made], model, precision, &s->chains, err);
+        rc = ggn_viewer_init(&r.viewers[made], model, precision, &s->images, err);
     const struct ggn_eval_values made_by_block[] = {{m->score, sizeof *m->score, NULL},
                                                     {m->verdict, sizeof *m->verdict, NULL},
                                                     {m->own_guard, sizeof *m->own_guard, NULL}};

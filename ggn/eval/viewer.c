@@ -5,7 +5,7 @@
 
 void ggn_viewer_release(struct ggn_viewer *v)
 {
-    ggn_judge_destroy(v->judge);
+    ggn_inference_destroy(v->inference);
     ggn_exact_destroy(v->exact);
     free(v->denoised[0]);
     free(v->known);
@@ -18,8 +18,8 @@ static int make_networks(struct ggn_viewer *v, const struct ggn_model *model, en
     const float *learned[GGN_NETS];
 
     if (precision != GGN_PRECISION_F64) {
-        v->judge = ggn_judge_create(model, precision, NULL, err);
-        return v->judge ? 0 : err->code;
+        v->inference = ggn_inference_create(model, precision, NULL, err);
+        return v->inference ? 0 : err->code;
     }
     if (v->set->width != model->hyper.width || v->set->height != model->hyper.height)
         return base_fail(err, BASE_EINVAL, "in double precision only blocks of the network's size, %dx%d, are judged",
@@ -31,14 +31,14 @@ static int make_networks(struct ggn_viewer *v, const struct ggn_model *model, en
 }
 
 int ggn_viewer_init(struct ggn_viewer *v, const struct ggn_model *model, enum ggn_precision precision,
-                    const struct ggn_chains *set, struct base_err *err)
+                    const struct ggn_series_set *set, struct base_err *err)
 {
-    size_t values = ggn_chains_values(set);
+    size_t values = ggn_series_set_values(set);
     int levels = 1;
 
     *v = (struct ggn_viewer){.set = set, .window = model->hyper.window};
     for (int i = 0; i < set->n; i++)
-        levels = set->chains[i].n_levels > levels ? set->chains[i].n_levels : levels;
+        levels = set->series[i].n_levels > levels ? set->series[i].n_levels : levels;
     if (make_networks(v, model, precision, err))
         return err->code;
     v->denoised[0] = malloc((size_t)v->window * values * sizeof *v->denoised[0]);
@@ -52,12 +52,12 @@ int ggn_viewer_init(struct ggn_viewer *v, const struct ggn_model *model, enum gg
     return 0;
 }
 
-void ggn_viewer_turn(struct ggn_viewer *v, const struct ggn_chain *chain)
+void ggn_viewer_turn(struct ggn_viewer *v, const struct ggn_level_series *series)
 {
-    v->chain = chain;
+    v->series = series;
     for (int i = 0; i < v->window; i++)
         v->holds[i] = -1;
-    for (int i = 0; i < chain->n_levels; i++)
+    for (int i = 0; i < series->n_levels; i++)
         v->known[i].level[0] = -1;
 }
 
@@ -72,7 +72,7 @@ static int is_in(int level, const int *levels, int n)
 /* Where a level's denoised image is; one that is not among the n that are needed makes room. */
 static uint16_t *denoised(struct ggn_viewer *v, int level, const int *needed, int n)
 {
-    const uint8_t *noisy = v->chain->noisy + ggn_chains_values(v->set) * (size_t)level;
+    const uint8_t *noisy = v->series->noisy + ggn_series_set_values(v->set) * (size_t)level;
     int spare = 0;
 
     for (int i = 0; i < v->window; i++) {
@@ -84,7 +84,7 @@ static uint16_t *denoised(struct ggn_viewer *v, int level, const int *needed, in
     if (v->exact)
         ggn_exact_denoise(v->exact, noisy, v->denoised[spare]);
     else
-        ggn_judge_denoise(v->judge, noisy, v->denoised[spare], v->set->width, v->set->height);
+        ggn_inference_denoise(v->inference, noisy, v->denoised[spare], v->set->width, v->set->height);
     v->holds[spare] = level;
     return v->denoised[spare];
 }
@@ -102,15 +102,15 @@ double ggn_viewer_logit(void *viewer, const int *levels)
     if (!memcmp(known->level, levels, bytes))
         return known->logit;
     for (int i = 0; i < v->window; i++) {
-        noisy[i] = v->chain->noisy + ggn_chains_values(v->set) * (size_t)levels[i];
+        noisy[i] = v->series->noisy + ggn_series_set_values(v->set) * (size_t)levels[i];
         clean[i] = denoised(v, levels[i], levels, v->window);
     }
     memcpy(known->level, levels, bytes);
     const int last = levels[v->window - 1];
-    const size_t pixels = ggn_chains_values(v->set) / 3;
-    const uint8_t *picture =
-        v->set->pictures && v->chain->has_picture[last] ? v->chain->picture + pixels * (size_t)last : NULL;
-    known->logit = v->exact ? ggn_exact_logit(v->exact, noisy, clean, picture)
-                            : ggn_judge_logit(v->judge, noisy, clean, picture, v->set->width, v->set->height);
+    const size_t pixels = ggn_series_set_values(v->set) / 3;
+    const uint8_t *noise_map =
+        v->set->noise_maps && v->series->has_noise_map[last] ? v->series->noise_map + pixels * (size_t)last : NULL;
+    known->logit = v->exact ? ggn_exact_logit(v->exact, noisy, clean, noise_map)
+                            : ggn_inference_logit(v->inference, noisy, clean, noise_map, v->set->width, v->set->height);
     return known->logit;
 }

@@ -2,9 +2,9 @@
 #ifndef GGN_EVAL_VIEWER_H
 #define GGN_EVAL_VIEWER_H
 
-#include "data/chains.h"
+#include "data/series.h"
 #include "model/exact.h"
-#include "model/judge.h"
+#include "model/inference.h"
 #include "model/stopper.h"
 
 struct ggn_viewed {
@@ -13,10 +13,10 @@ struct ggn_viewed {
 };
 
 struct ggn_viewer {
-    struct ggn_judge *judge;       /* owns; NULL: exact networks instead */
-    struct ggn_exact *exact;       /* owns; of GGN_PRECISION_F64 */
-    const struct ggn_chains *set;  /* borrows */
-    const struct ggn_chain *chain; /* borrows; the block */
+    struct ggn_inference *inference;       /* owns; NULL: exact networks instead */
+    struct ggn_exact *exact;               /* owns; of GGN_PRECISION_F64 */
+    const struct ggn_series_set *set;      /* borrows */
+    const struct ggn_level_series *series; /* borrows; the block */
     int window;
     uint16_t *denoised[GGN_WINDOW_MAX]; /* [3][H][W] each; one allocation, owned */
     int holds[GGN_WINDOW_MAX];          /* the level that is in it, -1: none */
@@ -24,11 +24,11 @@ struct ggn_viewer {
 };
 
 int ggn_viewer_init(struct ggn_viewer *v, const struct ggn_model *model, enum ggn_precision precision,
-                    const struct ggn_chains *set, struct base_err *err);
+                    const struct ggn_series_set *set, struct base_err *err);
 void ggn_viewer_release(struct ggn_viewer *v);
 
 /* Turns to a block; what was known of the one before is forgotten. */
-void ggn_viewer_turn(struct ggn_viewer *v, const struct ggn_chain *chain);
+void ggn_viewer_turn(struct ggn_viewer *v, const struct ggn_level_series *series);
 /* viewer: a struct ggn_viewer. Logit of the window of these levels, noisiest first. */
 double ggn_viewer_logit(void *viewer, const int *levels);
 /* One denoised level, borrowed until the next call. */

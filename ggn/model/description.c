@@ -73,7 +73,7 @@ static int parse_root(const cJSON *root, struct ggn_description *d, struct base_
     for (size_t i = 0; i < N_HYPER && !rc; i++)
         rc = get_int(root, hyper_field[i].name, 1, 1 << 20, (int *)(void *)((char *)&d->hyper + hyper_field[i].at), err);
     if (!rc && cJSON_HasObjectItem(root, "picture"))
-        rc = get_int(root, "picture", 0, 1, &d->hyper.picture, err);
+        rc = get_int(root, "picture", 0, 1, &d->hyper.noise_map, err);
     for (size_t i = 0; i < N_CALIBRATION && !rc; i++)
         rc = get_number(calibration, calibration_field[i].name, calibration_field[i].min, calibration_field[i].max,
                         (double *)(void *)((char *)&d->calibration + calibration_field[i].at), err);
@@ -113,8 +113,8 @@ static cJSON *to_json(const struct ggn_description *d, int *failed)
     for (size_t i = 0; i < N_HYPER; i++)
         base_json_number(root, hyper_field[i].name,
                          *(const int *)(const void *)((const char *)&d->hyper + hyper_field[i].at), failed);
-    if (d->hyper.picture)
-        base_json_number(root, "picture", d->hyper.picture, failed);
+    if (d->hyper.noise_map)
+        base_json_number(root, "picture", d->hyper.noise_map, failed);
     cJSON *calibration = base_json_object(root, "calibration", failed);
     for (size_t i = 0; i < N_CALIBRATION; i++)
         base_json_number(calibration, calibration_field[i].name,

@@ -4,7 +4,7 @@
  *   {"kind": "model", "preset": "paper"|"lull", "height", "width", "window", "k_r", "k_m", "k_d",
  *    "calibration": {"scale", "shift", "threshold", "consecutive", "spacing"}, "provenance": {...}}
  *
- * and "picture": 1 in a model that takes the noise picture.
+ * and "picture": 1 in a model that takes the noise map.
  */
 #ifndef GGN_MODEL_DESCRIPTION_H
 #define GGN_MODEL_DESCRIPTION_H

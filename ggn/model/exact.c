@@ -108,7 +108,7 @@ static void map_into(struct ggn_exact *e, int c)
 }
 
 double ggn_exact_logit(struct ggn_exact *e, const uint8_t *const *noisy, const uint16_t *const *denoised,
-                       const uint8_t *picture)
+                       const uint8_t *noise_map)
 {
     const size_t pixels = (size_t)e->hyper.width * (size_t)e->hyper.height;
 
@@ -121,9 +121,9 @@ double ggn_exact_logit(struct ggn_exact *e, const uint8_t *const *noisy, const u
     for (int i = 0; i < 3 * e->hyper.window; i++)
         load(e, GGN_NET_M, i, noisy[i / 3] + (size_t)(i % 3) * pixels, NULL, 1.0 / 255);
     map_into(e, 1);
-    if (e->hyper.picture) {
-        load(e, GGN_NET_D, 2, picture, NULL, picture ? (double)GGN_PICTURE_GAIN : 0);
-        load(e, GGN_NET_D, 3, NULL, NULL, picture ? 1 : 0);
+    if (e->hyper.noise_map) {
+        load(e, GGN_NET_D, 2, noise_map, NULL, noise_map ? (double)GGN_NOISE_MAP_GAIN : 0);
+        load(e, GGN_NET_D, 3, NULL, NULL, noise_map ? 1 : 0);
     }
     ggn_exec_forward(e->exec[GGN_NET_D], e->weights[GGN_NET_D], 1, GGN_EVAL);
     return *plane(e, GGN_NET_D, last(e, GGN_NET_D), 0);

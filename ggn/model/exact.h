@@ -1,7 +1,8 @@
 /*
- * The three networks at work on one block in double precision: what a judge (model/judge.h) would say if it did not round.
+ * The three networks at work on one block in double precision: the answer of an inference (model/inference.h) without its
+ * rounding.
  *
- * For measurements; slow. Between the networks it keeps what a judge keeps, denoised images of 16 bits. Blocks of the
+ * For measurements; slow. Between the networks it keeps what an inference keeps, denoised images of 16 bits. Blocks of the
  * network's own size only. Borrows the graphs until destroy, owns everything else. One call at a time per object.
  */
 #ifndef GGN_MODEL_EXACT_H
@@ -19,9 +20,9 @@ struct ggn_exact *ggn_exact_create(const struct ggn_hyper *hyper, const struct g
                                    struct base_err *err);
 void ggn_exact_destroy(struct ggn_exact *exact);
 
-/* As ggn_judge_denoise and ggn_judge_logit. */
+/* As ggn_inference_denoise and ggn_inference_logit. */
 void ggn_exact_denoise(struct ggn_exact *exact, const uint8_t *noisy, uint16_t *denoised);
 double ggn_exact_logit(struct ggn_exact *exact, const uint8_t *const *noisy, const uint16_t *const *denoised,
-                       const uint8_t *picture);
+                       const uint8_t *noise_map);
 
 #endif

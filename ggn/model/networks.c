@@ -21,7 +21,7 @@ int ggn_hyper_check(const struct ggn_hyper *p, struct base_err *err)
                   {"k_r", p->k_r, 1, 128},
                   {"k_m", p->k_m, 1, 128},
                   {"k_d", p->k_d, 1, 64},
-                  {"picture", p->picture, 0, p->preset == GGN_PRESET_LULL}};
+                  {"picture", p->noise_map, 0, p->preset == GGN_PRESET_LULL}};
 
     for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++)
         if (fields[i].value < fields[i].min || fields[i].value > fields[i].max)
@@ -120,7 +120,7 @@ static void build_discriminator(struct ggn_graph *g, const struct ggn_hyper *p)
     const int k = p->k_d;
     int x = 0;
 
-    ggn_graph_begin(g, "discriminator", p->picture ? 4 : 2, p->height, p->width);
+    ggn_graph_begin(g, "discriminator", p->noise_map ? 4 : 2, p->height, p->width);
     for (int i = 0; i < 3; i++) {
         ggn_graph_stage(g, conv[i]);
         x = ggn_graph_conv_strided(g, x, k << i, 3, 2);

@@ -22,7 +22,7 @@ struct ggn_hyper {
     int height, width; /* block, pixels; 16..1024 */
     int window;        /* images per window, S; 1..16 */
     int k_r, k_m, k_d; /* widths; 1..256 (k_d ≤ 64·16) */
-    int picture;       /* 1: D also gets the noise picture of the newest image; not in the published form */
+    int noise_map;     /* 1: D also gets the noise map of the newest image; not in the published form */
 };
 
 /* The paper's sizes: 200×200, S = 6, K = 16, 20, 64. */
@@ -30,8 +30,8 @@ struct ggn_hyper ggn_hyper_default(enum ggn_preset preset);
 /* BASE_EINVAL naming the field that is out of range. */
 int ggn_hyper_check(const struct ggn_hyper *hyper, struct base_err *err);
 
-/* R: 3×H×W → 3×H×W (sigmoid). M: 3S×H×W → 1×H×W (sigmoid). D: 2×H×W → logit (flat, 1); with `picture` 4×H×W: behind the
- * two maps GGN_PICTURE_GAIN · the noise picture (model/window.h), and 1 everywhere; without half buffers 0 in both. */
+/* R: 3×H×W → 3×H×W (sigmoid). M: 3S×H×W → 1×H×W (sigmoid). D: 2×H×W → logit (flat, 1); with `noise_map` 4×H×W: behind the
+ * two maps GGN_NOISE_MAP_GAIN · the noise map (model/window.h), and 1 everywhere; without half buffers 0 in both. */
 int ggn_network_build(struct ggn_graph *graph, int net, const struct ggn_hyper *hyper, struct base_err *err);
 
 #endif

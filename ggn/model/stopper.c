@@ -84,7 +84,7 @@ static int is_held(const struct ggn_policy *p, const struct ggn_evidence *e)
     return (p->tail999 > 0 || p->gini > 0) && e->tail(e->data, &tail999, &gini) && ggn_policy_tail_holds(p, tail999, gini);
 }
 
-void ggn_stopper_judge(const struct ggn_stop_rule *rule, struct ggn_stopper *s, const struct ggn_evidence *e)
+void ggn_stopper_decide(const struct ggn_stop_rule *rule, struct ggn_stopper *s, const struct ggn_evidence *e)
 {
     const struct ggn_policy *p = &rule->policy;
     struct ggn_verdict *v = &s->verdict;

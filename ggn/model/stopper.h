@@ -60,7 +60,7 @@ struct ggn_evidence {
  * the newest image that the two would hardly differ. */
 int ggn_stopper_ask(const struct ggn_stop_rule *rule, struct ggn_stopper *s, uint64_t spp);
 /* Sets s->verdict on the image that ggn_stopper_ask has just accepted. */
-void ggn_stopper_judge(const struct ggn_stop_rule *rule, struct ggn_stopper *s, const struct ggn_evidence *evidence);
+void ggn_stopper_decide(const struct ggn_stop_rule *rule, struct ggn_stopper *s, const struct ggn_evidence *evidence);
 
 /* The end of the rule, also of those criteria that have a score and a cut and no network: counts a check. 1: so many checks
  * in a row were below; the block stops unless a guard holds it back. */

@@ -316,23 +316,23 @@ static void exchange_maps(struct ggn_trainer *t, const struct maps of[2], int co
     }
 }
 
-/* The noise pictures behind the maps in D's input, each with a plane that says whether there is one. */
-void ggn_trainer_set_pictures(struct ggn_trainer *t, const real *const *pictures, int count)
+/* The noise maps behind the maps in D's input, each with a plane that says whether there is one. */
+void ggn_trainer_set_noise_maps(struct ggn_trainer *t, const real *const *noise_maps, int count)
 {
     const struct ggn_value *v = &t->graph[GGN_NET_D].value[0];
 
-    for (int i = 0; i < count && t->hyper.picture; i++) {
-        real *picture = ggn_exec_plane(t->d, 0, i, 2), *flag = ggn_exec_plane(t->d, 0, i, 3);
+    for (int i = 0; i < count && t->hyper.noise_map; i++) {
+        real *noise_map = ggn_exec_plane(t->d, 0, i, 2), *flag = ggn_exec_plane(t->d, 0, i, 3);
         for (int y = 0; y < v->h; y++)
             for (int x = 0; x < v->w; x++) {
-                picture[y * v->row + x] = pictures[i] ? pictures[i][y * v->w + x] : 0;
-                flag[y * v->row + x] = pictures[i] ? 1 : 0;
+                noise_map[y * v->row + x] = noise_maps[i] ? noise_maps[i][y * v->w + x] : 0;
+                flag[y * v->row + x] = noise_maps[i] ? 1 : 0;
             }
     }
 }
 
 /* D forward, mean BCE, D backward (its own gradient is added to grad, that of the maps stays in d). */
-static double judge(struct ggn_trainer *t, const struct ggn_batch *b, double *logits)
+static double classify(struct ggn_trainer *t, const struct ggn_batch *b, double *logits)
 {
     const int out = t->graph[GGN_NET_D].n_values - 1;
     const double share = 1.0 / b->count;
@@ -355,8 +355,8 @@ static double judge(struct ggn_trainer *t, const struct ggn_batch *b, double *lo
     return total;
 }
 
-int ggn_trainer_judge_step(struct ggn_trainer *t, const struct ggn_batch *b, double *bce, double *logits,
-                           struct base_err *err)
+int ggn_trainer_classifier_step(struct ggn_trainer *t, const struct ggn_batch *b, double *bce, double *logits,
+                                struct base_err *err)
 {
     const int planes = 3 * t->hyper.window;
     int rc = check_batch(t, b->count, GGN_TRAIN_MD, err);
@@ -375,8 +375,8 @@ int ggn_trainer_judge_step(struct ggn_trainer *t, const struct ggn_batch *b, dou
     zero_grad(t, GGN_NET_D);
     ggn_exec_forward(t->m, t->weights[GGN_NET_M], 2 * b->count, GGN_TRAIN);
     exchange_maps(t, maps, n, 0);
-    ggn_trainer_set_pictures(t, b->picture, n);
-    *bce = judge(t, b, logits);
+    ggn_trainer_set_noise_maps(t, b->noise_map, n);
+    *bce = classify(t, b, logits);
     rc = job_failed(t->job, err);
     if (!rc)
         rc = check(t, GGN_NET_D, *bce, "loss", err);
@@ -452,7 +452,7 @@ int ggn_trainer_paper_step(struct ggn_trainer *t, const struct ggn_batch *b, str
     ggn_exec_forward(t->m2, t->weights[GGN_NET_M], b->count, GGN_TRAIN);
     exchange_maps(t, maps, n, 0);
 
-    record->bce_before = judge(t, b, record_all ? record->logit_before : NULL);
+    record->bce_before = classify(t, b, record_all ? record->logit_before : NULL);
     rc = job_failed(t->job, err);
     if (!rc)
         rc = check(t, GGN_NET_D, record->bce_before, "loss", err);
@@ -468,7 +468,7 @@ int ggn_trainer_paper_step(struct ggn_trainer *t, const struct ggn_batch *b, str
         return rc;
 
     zero_grad(t, GGN_NET_D);
-    record->bce_after = judge(t, b, record_all ? record->logit_after : NULL);
+    record->bce_after = classify(t, b, record_all ? record->logit_after : NULL);
     paper_generator_backward(t, maps, n);
     record->m_grad_l2_accumulated = grad_l2(t, GGN_NET_M, m_trained);
     rc = job_failed(t->job, err);

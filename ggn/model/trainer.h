@@ -43,9 +43,9 @@ struct ggn_train_options ggn_train_options_default(enum ggn_preset preset);
 struct ggn_batch {
     int count;                    /* of the whole batch */
     const real *const *noisy;     /* [mine][3S] windows, noisiest image first (M's input order: image, channel) */
-    const real *const *denoised;  /* [mine][3S] for ggn_trainer_judge_step */
+    const real *const *denoised;  /* [mine][3S] for ggn_trainer_classifier_step */
     const real *const *reference; /* [mine][3] for ggn_trainer_paper_step */
-    const real *const *picture;   /* [mine] noise pictures, GGN_PICTURE_GAIN · codes, NULL: none; with hyper.picture */
+    const real *const *noise_map; /* [mine] noise maps, GGN_NOISE_MAP_GAIN · codes, NULL: none; with hyper.noise_map */
     const double *label;          /* [count] 1 = still noisy, 0 = not, between = uncertain */
 };
 
@@ -86,11 +86,11 @@ int ggn_trainer_denoiser_step(struct ggn_trainer *trainer, const real *const *x,
 
 /* One Adam step of M and D on given denoised windows, mended form: both windows pass M in one batch (shared statistics), one
  * backward pass, all of M is trained. *bce = mean before it; logits (may be NULL) [count]. */
-int ggn_trainer_judge_step(struct ggn_trainer *trainer, const struct ggn_batch *batch, double *bce, double *logits,
-                           struct base_err *err);
+int ggn_trainer_classifier_step(struct ggn_trainer *trainer, const struct ggn_batch *batch, double *bce, double *logits,
+                                struct base_err *err);
 
-/* Puts picture[count] into D's input, for who runs D without a step; nothing without hyper.picture. */
-void ggn_trainer_set_pictures(struct ggn_trainer *trainer, const real *const *picture, int count);
+/* Puts noise map[count] into D's input, for who runs D without a step; nothing without hyper.noise_map. */
+void ggn_trainer_set_noise_maps(struct ggn_trainer *trainer, const real *const *noise_map, int count);
 
 /* One published iteration: six steps of R, one of D, one of M on the sum of two gradients without its last convolution. */
 struct ggn_paper_record {

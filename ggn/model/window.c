@@ -14,7 +14,7 @@ double ggn_window_noise(const uint8_t *first, const uint8_t *last, size_t count,
     return count ? sqrt((double)sum / (double)count / (spp_last / spp_first - 1)) / 255 : 0;
 }
 
-uint8_t ggn_picture_code(double mean, double difference, const struct ggn_display *display)
+uint8_t ggn_noise_map_code(double mean, double difference, const struct ggn_display *display)
 {
     if (!isfinite(mean) || !isfinite(difference))
         return 0;

@@ -50,8 +50,8 @@ typedef double real;
 #define ggn_trainer_keep GGN_TYPED(ggn_trainer_keep)
 #define ggn_trainer_state GGN_TYPED(ggn_trainer_state)
 #define ggn_trainer_denoiser_step GGN_TYPED(ggn_trainer_denoiser_step)
-#define ggn_trainer_judge_step GGN_TYPED(ggn_trainer_judge_step)
-#define ggn_trainer_set_pictures GGN_TYPED(ggn_trainer_set_pictures)
+#define ggn_trainer_classifier_step GGN_TYPED(ggn_trainer_classifier_step)
+#define ggn_trainer_set_noise_maps GGN_TYPED(ggn_trainer_set_noise_maps)
 #define ggn_trainer_paper_step GGN_TYPED(ggn_trainer_paper_step)
 
 #define ggn_golden_run GGN_TYPED(ggn_golden_run)

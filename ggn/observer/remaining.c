@@ -48,7 +48,8 @@ static void lightness_of(const struct pic_image *image, const struct ggn_remaini
     ggn_visible_lightness(rgb, n, lightness);
 }
 
-static void judge(const struct ggn_observer *observer, struct ggn_remaining *b, struct workspace *w, float *map, int stride)
+static void measure(const struct ggn_observer *observer, struct ggn_remaining *b, struct workspace *w, float *map,
+                    int stride)
 {
     size_t n = (size_t)b->width * (size_t)b->height;
     ggn_visible_texture(w->reference, w->reference, b->width, b->height, w->scratch, w->texture);
@@ -77,7 +78,7 @@ int ggn_remaining(const struct ggn_observer *observer, const struct pic_image *r
             *blocks = (struct ggn_remaining){x, y, block < right ? block : right, block < below ? block : below, 0.0};
             lightness_of(reference, blocks, w.rgb, w.reference);
             lightness_of(image, blocks, w.rgb, w.image);
-            judge(observer, blocks, &w, map, image->width);
+            measure(observer, blocks, &w, map, image->width);
         }
     release(&w);
     return 0;

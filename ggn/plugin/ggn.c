@@ -8,9 +8,9 @@
  * the network is not asked; it says when to ask again. The *tail guard* reads the half buffer: a block whose noise sits
  * in a few pixels has not met its rare bright paths often enough for any judgement by eye, and is not stopped.
  *
- * A model may also take the noise picture that the half buffer shows; without half buffer it judges without.
+ * A model may also take the noise map that the half buffer shows; without half buffer it decides without.
  */
-#include "model/judge.h"
+#include "model/inference.h"
 #include "model/window.h"
 #include "plugin/translate.h"
 #include "plugin/windowed.h"
@@ -44,9 +44,9 @@ static const struct lull_param params[P_COUNT] = {
 /* --- what it sees ------------------------------------------------------------------------------------------------------ */
 
 struct worker {
-    struct ggn_judge *judge;
-    double *noise;    /* [pixels of the largest block], for the tail guard */
-    uint8_t *picture; /* [pixels of the largest block], for models with the noise picture */
+    struct ggn_inference *inference;
+    double *noise;      /* [pixels of the largest block], for the tail guard */
+    uint8_t *noise_map; /* [pixels of the largest block], for models with the noise map */
 };
 
 /* The noisy image, 8 bit, and the denoised one, 16 bit. */
@@ -64,9 +64,9 @@ static void worker_destroy(void *data)
 
     if (!w)
         return;
-    ggn_judge_destroy(w->judge);
+    ggn_inference_destroy(w->inference);
     free(w->noise);
-    free(w->picture);
+    free(w->noise_map);
     free(w);
 }
 
@@ -77,10 +77,10 @@ static void *worker_create(const struct lull_instance *in, size_t pixels, struct
     if (!w)
         return NULL;
     w->noise = malloc(pixels * sizeof *w->noise);
-    w->picture = malloc(pixels);
-    if (w->noise && w->picture)
-        w->judge = ggn_judge_create(in->model, (enum ggn_precision)in->kit.value[P_PRECISION], NULL, err);
-    if (w->judge)
+    w->noise_map = malloc(pixels);
+    if (w->noise && w->noise_map)
+        w->inference = ggn_inference_create(in->model, (enum ggn_precision)in->kit.value[P_PRECISION], NULL, err);
+    if (w->inference)
         return w;
     worker_destroy(w);
     return NULL;
@@ -118,25 +118,25 @@ static int has_half(const struct gp_block_view *seen, double *split)
 
 static const uint32_t HALVES = LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_HALF);
 
-/* The noise picture of the block as it is now, NULL: it has none. */
-static const uint8_t *read_picture(const struct gp_block_view *seen)
+/* The noise map of the block as it is now, NULL: it has none. */
+static const uint8_t *read_noise_map(const struct gp_block_view *seen)
 {
     const struct lull_kit *kit = &seen->in->kit;
     const struct ggn_model *model = seen->in->model;
     const struct worker *worker = seen->worker;
-    uint8_t *to = worker->picture;
+    uint8_t *to = worker->noise_map;
     struct lull_kit_span s;
     double split;
 
-    if (!model->hyper.picture || !has_half(seen, &split))
+    if (!model->hyper.noise_map || !has_half(seen, &split))
         return NULL;
     for (lull_kit_span_begin(&s, seen->view, seen->block, HALVES); lull_kit_span_next(&s);)
         for (int32_t i = 0; i < s.count; i++) {
             double mean = lull_kit_luminance(kit, s.value[LULL_PLANE_COLOR][i]);
             double half = lull_kit_luminance(kit, s.value[LULL_PLANE_HALF][i]);
-            *to++ = ggn_picture_code(mean, split * (half - mean), &seen->in->display);
+            *to++ = ggn_noise_map_code(mean, split * (half - mean), &seen->in->display);
         }
-    return worker->picture;
+    return worker->noise_map;
 }
 
 /* Denoises the images that have not been denoised yet. */
@@ -156,10 +156,10 @@ static double window_logit(void *data)
         noisy[i] = gp_history_kept(history, b->id, slot);
         denoised[i] = to;
         if (!(seen->head->made >> slot & 1))
-            ggn_judge_denoise(worker->judge, noisy[i], to, w, h);
+            ggn_inference_denoise(worker->inference, noisy[i], to, w, h);
         seen->head->made |= UINT32_C(1) << slot;
     }
-    return ggn_judge_logit(worker->judge, noisy, denoised, read_picture(seen), w, h);
+    return ggn_inference_logit(worker->inference, noisy, denoised, read_noise_map(seen), w, h);
 }
 
 static int tail_statistics(void *data, double *tail999, double *gini)
@@ -202,7 +202,7 @@ static int32_t load(struct lull_instance *in, int kind, const char *path, struct
     in->rule.window = model->hyper.window;
     if (in->rule.window < 2 || in->rule.window > GGN_WINDOW_MAX)
         return lull_kit_fail(err, LULL_E_IO, "model: %.200s: windows of %d images", path, in->rule.window);
-    if (model->hyper.picture) {
+    if (model->hyper.noise_map) {
         in->kit.need.planes_used |= LULL_PLANE_BIT(LULL_PLANE_HALF);
         in->half_wanted = "this model judges by half buffers too, which the host does not give: how well it decides without "
                           "them depends on how it was trained (ggn evaluate --no-pictures)";

@@ -195,7 +195,7 @@ static void read_block(struct lull_instance *in, const struct lull_view *view, c
         return;
     uint32_t slot = gp_head_push(head, in->rule.window, before);
     head->bad = in->ops->read(&seen, slot) > 0;
-    ggn_stopper_judge(&in->rule, &head->stopper, &evidence);
+    ggn_stopper_decide(&in->rule, &head->stopper, &evidence);
 }
 
 static void judge(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,

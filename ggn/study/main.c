@@ -192,7 +192,7 @@ static int run_init(int argc, char **argv)
 struct options {
     const char *args[2]; /* DIR; what is imported or deleted */
     const char *listen, *out;
-    int no_pictures;
+    int no_noise_maps;
 };
 #define TO(member) BASE_TO(struct options, member)
 #define ARGS(n) .args_min = n, .args_max = n, .args = offsetof(struct options, args), .args_are = BASE_ARGS_FILES
@@ -312,7 +312,7 @@ static int do_report(const struct options *o, const struct ggn_study *study, str
     if (!rc)
         rc = ggn_study_people_estimate(&people, threads, err);
     if (!rc)
-        rc = ggn_study_report(out, &people, !o->no_pictures, err);
+        rc = ggn_study_report(out, &people, !o->no_noise_maps, err);
     ggn_study_people_release(&people);
     base_threads_destroy(threads);
     return rc;
@@ -320,7 +320,7 @@ static int do_report(const struct options *o, const struct ggn_study *study, str
 
 static const struct base_option report_list[] = {
     {"output", 'o', "FOLDER", TO(out), .help = "where the report goes (DIR/report)"},
-    {"no-pictures", 'n', NULL, TO(no_pictures), .help = "tables only"},
+    {"no-pictures", 'n', NULL, TO(no_noise_maps), .help = "tables only"},
     {0}};
 
 static int run_report(int argc, char **argv)

@@ -8,7 +8,7 @@
 #include "base/json.h"
 #include "model/policy.h"
 #include "train/fit_policy.h"
-#include "train/phase_judge.h"
+#include "train/phase_classifier.h"
 #include "train/resume.h"
 #include "train/start.h"
 
@@ -33,7 +33,7 @@ static cJSON *describe_run(const struct ggn_session *s, int *failed)
                    {"soft_labels", p->soft_labels},
                    {"flips", p->flips},
                    {"jitter", p->jitter},
-                   {"picture", p->picture},
+                   {"picture", p->noise_map},
                    {"average", p->average},
                    {"synthetic_per_block", p->synthetic},
                    {"extended", p->extend},
@@ -57,10 +57,11 @@ static cJSON *describe_data(const struct ggn_session *s, int *failed)
                 base_json_text(list, NULL, s->set.data.views[i].manifest.scene, failed);
         }
     }
-    base_json_number(o, "training_blocks", ggn_chains_count(&s->set, GGN_SPLIT_TRAIN, 1), failed);
+    base_json_number(o, "training_blocks", ggn_series_set_count(&s->set, GGN_SPLIT_TRAIN, 1), failed);
     base_json_number(o, "synthetic_chains",
-                     ggn_chains_count(&s->set, GGN_SPLIT_TRAIN, 0) - ggn_chains_count(&s->set, GGN_SPLIT_TRAIN, 1), failed);
-    base_json_number(o, "validation_blocks", ggn_chains_count(&s->set, GGN_SPLIT_VALIDATION, 1), failed);
+                     ggn_series_set_count(&s->set, GGN_SPLIT_TRAIN, 0) - ggn_series_set_count(&s->set, GGN_SPLIT_TRAIN, 1),
+                     failed);
+    base_json_number(o, "validation_blocks", ggn_series_set_count(&s->set, GGN_SPLIT_VALIDATION, 1), failed);
     base_json_number(o, "training_windows", s->train.n, failed);
     base_json_number(o, "validation_windows", s->validation.n, failed);
     base_json_text(o, "labels", ggn_dataset_label_source(&s->set.data), failed);
@@ -137,7 +138,7 @@ static int export(struct ggn_session *s, const struct ggn_policy *policy, const 
     return rc;
 }
 
-static int choose_threshold(const struct ggn_session *s, const struct ggn_judged *v, struct ggn_policy *policy,
+static int choose_threshold(const struct ggn_session *s, const struct ggn_classified *v, struct ggn_policy *policy,
                             struct ggn_stopping *stopping, struct base_err *err)
 {
     struct ggn_checks checks;
@@ -156,12 +157,12 @@ int ggn_session_finish(struct ggn_session *s, struct base_err *err)
 {
     struct ggn_policy policy = ggn_policy_default();
     struct ggn_stopping stopping = {0};
-    struct ggn_judged v;
+    struct ggn_classified v;
     double accuracy = (double)NAN;
-    int rc = ggn_judge_validation(s, s->validation.n, &v, err), right = 0;
+    int rc = ggn_classify_validation(s, s->validation.n, &v, err), right = 0;
 
     if (rc || job_rank(s->plan->job) > 0) {
-        ggn_judged_release(&v);
+        ggn_classified_release(&v);
         return rc;
     }
     if (v.n) {
@@ -182,6 +183,6 @@ int ggn_session_finish(struct ggn_session *s, struct base_err *err)
         rc = export(s, &policy, &stopping, v.auc, accuracy, err);
     if (!rc)
         say(s, &policy, &stopping, v.auc, accuracy);
-    ggn_judged_release(&v);
+    ggn_classified_release(&v);
     return rc;
 }

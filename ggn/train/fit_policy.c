@@ -40,7 +40,8 @@ void ggn_calibrate_platt(const double *logit, const double *label, int n, struct
     policy->shift = b;
 }
 
-/* The logits of a chain's windows, which end at consecutive levels; unlabelled ones are not among them and never stop. */
+/* The logits of the windows of a series, which end at consecutive levels; unlabelled ones are not among them and never
+ * stop. */
 struct known {
     const struct ggn_windows *windows;
     const double *logit;
@@ -64,7 +65,7 @@ int ggn_checks_create(struct ggn_checks *checks, const struct ggn_windows *w, co
     size_t levels = 1;
 
     for (int c = 0; c < w->set->n; c++)
-        levels += (size_t)w->set->chains[c].n_levels;
+        levels += (size_t)w->set->series[c].n_levels;
     *checks = (struct ggn_checks){.windows = w, .policy = *policy, .seen = malloc(levels * sizeof *checks->seen)};
     if (!checks->seen)
         return base_fail_nomem(err, "thresholds");
@@ -72,8 +73,8 @@ int ggn_checks_create(struct ggn_checks *checks, const struct ggn_windows *w, co
     for (int c = 0; c < w->set->n; c++) {
         struct known known = {w, logit, w->first[c], w->first[c + 1]};
         if (known.end > known.first)
-            ggn_replay(w->set, &w->set->chains[c], &rule, known_logit, &known, seen);
-        seen += w->set->chains[c].n_levels;
+            ggn_replay(w->set, &w->set->series[c], &rule, known_logit, &known, seen);
+        seen += w->set->series[c].n_levels;
     }
     return 0;
 }
@@ -98,15 +99,15 @@ int ggn_calibrate_stopping(const struct ggn_checks *checks, int passes, double t
     policy.passes = passes;
     *out = (struct ggn_stopping){0};
     for (int c = 0; c < w->set->n; c++) {
-        const struct ggn_chain *chain = &w->set->chains[c];
+        const struct ggn_level_series *series = &w->set->series[c];
         const struct ggn_seen *own = seen;
-        seen += chain->n_levels;
+        seen += series->n_levels;
         if (w->first[c + 1] == w->first[c])
             continue;
-        int level = ggn_replay_stop(own, chain->n_levels, &policy, t);
-        double truth = chain->label.threshold;
-        /* nothing is known after the end of the chain: right if the noise is seen until there */
-        double stop = level < 0 ? fmax(chain->spp[chain->n_levels - 1], truth) : chain->spp[level];
+        int level = ggn_replay_stop(own, series->n_levels, &policy, t);
+        double truth = series->label.threshold;
+        /* nothing is known after the end of the series: right if the noise is seen until there */
+        double stop = level < 0 ? fmax(series->spp[series->n_levels - 1], truth) : series->spp[level];
         early += stop < 0.8 * truth;
         spent += stop;
         needed += truth;
@@ -168,10 +169,10 @@ static const double GATE_MARGIN = 1.1, TAIL_MARGIN = 1.5, GINI_MARGIN = 0.25; /*
 
 void ggn_calibrate_limits(const struct ggn_windows *w, struct ggn_policy *policy)
 {
-    const size_t values = ggn_chains_values(w->set);
+    const size_t values = ggn_series_set_values(w->set);
 
     for (int i = 0; i < w->n; i++) {
-        const struct ggn_chain *c = &w->set->chains[w->list[i].chain];
+        const struct ggn_level_series *c = &w->set->series[w->list[i].series];
         int last = w->list[i].last, first = last - w->length + 1;
         if (c->synthetic || w->list[i].octave < log2(0.8))
             continue;

@@ -14,7 +14,7 @@ void ggn_calibrate_platt(const double *logit, const double *label, int n, struct
 struct ggn_checks {
     const struct ggn_windows *windows; /* borrows */
     struct ggn_policy policy;
-    struct ggn_seen *seen; /* owns; the levels of every chain, one after the other */
+    struct ggn_seen *seen; /* owns; the levels of every series, one after the other */
 };
 /* logit: of each window of `windows`. */
 int ggn_checks_create(struct ggn_checks *checks, const struct ggn_windows *windows, const double *logit,

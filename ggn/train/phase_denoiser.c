@@ -12,9 +12,9 @@
 enum { VALIDATION_CROPS = 32 };
 static const uint32_t VALIDATION_SEED = 77;
 
-/* One sample of a step: which chain and level, which crop. */
+/* One sample of a step: which series and level, which crop. */
 struct crop {
-    int chain, level, x0, y0;
+    int series, level, x0, y0;
     struct ggn_augment augment;
 };
 
@@ -23,23 +23,23 @@ static double draw(uint32_t what, uint64_t step, int i, uint32_t seed)
     return ggn_hash_unit(what, ggn_hash((uint32_t)i, ggn_hash((uint32_t)step, seed)));
 }
 
-/* The k-th chain of the split that has a reference; their number when k < 0. */
-static int nth_chain(const struct ggn_session *s, enum ggn_split split, int k)
+/* The k-th series of the split that has a reference; their number when k < 0. */
+static int nth_series(const struct ggn_session *s, enum ggn_split split, int k)
 {
     int n = 0;
 
     for (int i = 0; i < s->set.n; i++)
-        if (s->set.chains[i].split == split && s->set.chains[i].reference && s->set.chains[i].n_levels && n++ == k)
+        if (s->set.series[i].split == split && s->set.series[i].reference && s->set.series[i].n_levels && n++ == k)
             return i;
     return n;
 }
 
 static struct crop draw_crop(const struct ggn_session *s, enum ggn_split split, uint64_t step, int i, uint32_t seed)
 {
-    const int size = s->plan->crop, chains = nth_chain(s, split, -1);
-    struct crop c = {.chain = nth_chain(s, split, (int)(draw(21, step, i, seed) * chains)), .augment = ggn_augment_none()};
+    const int size = s->plan->crop, series = nth_series(s, split, -1);
+    struct crop c = {.series = nth_series(s, split, (int)(draw(21, step, i, seed) * series)), .augment = ggn_augment_none()};
 
-    c.level = (int)(draw(22, step, i, seed) * s->set.chains[c.chain].n_levels);
+    c.level = (int)(draw(22, step, i, seed) * s->set.series[c.series].n_levels);
     c.x0 = (int)(draw(23, step, i, seed) * (s->set.width - size + 1));
     c.y0 = (int)(draw(24, step, i, seed) * (s->set.height - size + 1));
     if (split == GGN_SPLIT_TRAIN)
@@ -64,7 +64,7 @@ static void fill_sample(void *data, long i, int worker)
     struct crop c = draw_crop(f->s, f->split, f->step, f->first + (int)i, f->seed);
     float *noisy = f->s->buffer + 2 * (size_t)i * values;
 
-    ggn_crop_planes(&f->s->set.chains[c.chain], c.level, f->s->set.width, f->s->set.height, c.x0, c.y0, size, size,
+    ggn_crop_planes(&f->s->set.series[c.series], c.level, f->s->set.width, f->s->set.height, c.x0, c.y0, size, size,
                     &c.augment, noisy, noisy + values);
     (void)worker;
 }
@@ -123,7 +123,7 @@ static void evaluate(struct ggn_session *s, int count, double *loss)
 /* Mean of 1 − SSIM over fixed crops of the validation scenes; NaN without any. */
 static int validate(struct ggn_session *s, struct ggn_log_row *row, struct base_err *err)
 {
-    const int n = (int)job_most(s->plan->job, s->plan->batch_r), any = nth_chain(s, GGN_SPLIT_VALIDATION, -1);
+    const int n = (int)job_most(s->plan->job, s->plan->batch_r), any = nth_series(s, GGN_SPLIT_VALIDATION, -1);
     double loss[VALIDATION_CROPS] = {0}, total = 0;
     int mine, first = ggn_session_first(s, VALIDATION_CROPS, &mine);
 
@@ -166,7 +166,7 @@ int ggn_phase_denoiser(struct ggn_session *s, const char *checkpoint, struct bas
                                     .step = train_step,
                                     .validate = validate};
 
-    if (!nth_chain(s, GGN_SPLIT_TRAIN, -1) && phase.steps)
+    if (!nth_series(s, GGN_SPLIT_TRAIN, -1) && phase.steps)
         return base_fail(err, BASE_EINVAL, "%s: no training block has a reference for the denoiser", s->plan->data.dir);
     int rc = begin(s, err);
     if (!rc && checkpoint)

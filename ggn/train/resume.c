@@ -18,16 +18,17 @@ uint32_t ggn_resume_key(const struct ggn_session *s)
         (double)p->preset, p->window,    p->k_r,        p->k_m,        p->k_d,         p->crop,
         p->batch_r,        p->batch,     p->steps_r,    p->steps,      p->epochs,      p->epoch_steps,
         p->patience,       p->lr_r,      p->lr,         p->difference, p->soft_labels, p->flips,
-        p->jitter,         p->picture,   p->average,    p->synthetic,  p->extend,      p->validation_windows,
+        p->jitter,         p->noise_map, p->average,    p->synthetic,  p->extend,      p->validation_windows,
         p->seed,           s->set.width, s->set.height, s->set.n};
     uLong crc = crc32(0, (const Bytef *)numbers, sizeof numbers);
 
     for (int i = 0; i < s->set.n; i++) {
-        const struct ggn_chain *c = &s->set.chains[i];
+        const struct ggn_level_series *c = &s->set.series[i];
         const double what[] = {c->split, c->block, c->n_levels, c->has_label ? c->label.threshold : -1};
         crc = crc32(crc, (const Bytef *)what, sizeof what);
         if (c->n_levels)
-            crc = crc32(crc, c->noisy, (uInt)(ggn_chains_values(&s->set) < 4096 ? ggn_chains_values(&s->set) : 4096));
+            crc =
+                crc32(crc, c->noisy, (uInt)(ggn_series_set_values(&s->set) < 4096 ? ggn_series_set_values(&s->set) : 4096));
     }
     if (p->init)
         crc = crc32(crc, (const Bytef *)p->init, (uInt)strlen(p->init));
@@ -195,7 +196,7 @@ int ggn_resume_phase(const char *path, int *phase, struct base_err *err)
     double v = field(root, "phase");
     cJSON_Delete(root);
     ggn_container_release(&c);
-    if (v != GGN_PHASE_DENOISER && v != GGN_PHASE_JUDGE)
+    if (v != GGN_PHASE_DENOISER && v != GGN_PHASE_CLASSIFIER)
         return base_fail(err, BASE_EINVAL, "%s: of an unknown phase", path);
     *phase = (int)v;
     return 0;

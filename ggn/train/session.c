@@ -56,7 +56,7 @@ static int check_plan(const struct ggn_session *s, struct base_err *err)
     if (!paper && (p->crop < 16 || p->crop > s->set.width || p->crop > s->set.height))
         return base_fail(err, BASE_EINVAL, "crop %d is not in 16..%d, the side of the blocks", p->crop,
                          s->set.width < s->set.height ? s->set.width : s->set.height);
-    if (paper && (p->picture > 0 || p->average > 0))
+    if (paper && (p->noise_map > 0 || p->average > 0))
         return base_fail(err, BASE_EINVAL, "preset paper has neither noise pictures nor averaged weights");
     if (p->k_r < 3)
         return base_fail(err, BASE_EINVAL, "the denoiser needs a width of at least 3");
@@ -66,7 +66,7 @@ static int check_plan(const struct ggn_session *s, struct base_err *err)
     int noisy = 0;
     for (int i = 0; i < s->train.n; i++) {
         noisy += s->train.list[i].noisy;
-        if (paper && !s->set.chains[s->train.list[i].chain].reference)
+        if (paper && !s->set.series[s->train.list[i].series].reference)
             return base_fail(err, BASE_EINVAL, "%s: preset paper needs a reference for each training block", p->data.dir);
     }
     if (noisy == 0 || noisy == s->train.n)
@@ -81,15 +81,15 @@ int ggn_session_init(struct ggn_session *s, struct base_err *err)
     const int paper = p->preset == GGN_PRESET_PAPER;
 
     s->threads = base_threads_create(p->threads > 0 ? p->threads : job_threads(p->job), err);
-    struct ggn_chains_options data = p->data;
-    data.pictures = p->picture > 0;
+    struct ggn_series_set_options data = p->data;
+    data.noise_maps = p->noise_map > 0;
     data.mean_for_reference = 1;
-    int rc = s->threads ? ggn_chains_load(&s->set, &data, err) : BASE_ENOMEM;
+    int rc = s->threads ? ggn_series_set_load(&s->set, &data, err) : BASE_ENOMEM;
 
     if (!rc && p->synthetic > 0)
-        rc = ggn_chains_add_synthetic(&s->set, p->synthetic, p->seed, err);
+        rc = ggn_series_set_add_synthetic(&s->set, p->synthetic, p->seed, err);
     if (!rc && p->extend)
-        rc = ggn_chains_extend(&s->set, p->seed, err);
+        rc = ggn_series_set_extend(&s->set, p->seed, err);
     if (rc)
         return rc;
     struct ggn_window_options train = {
@@ -109,13 +109,13 @@ int ggn_session_init(struct ggn_session *s, struct base_err *err)
                                   .k_r = p->k_r,
                                   .k_m = p->k_m,
                                   .k_d = p->k_d,
-                                  .picture = p->picture > 0};
+                                  .noise_map = p->noise_map > 0};
     rc = ggn_network_build(&s->r_graph, GGN_NET_R, &s->hyper, err);
     s->r = rc ? NULL : ggn_weights_create(&s->r_graph, NULL, 0, err);
     if (!s->r)
         return rc ? rc : BASE_ENOMEM;
     size_t crops = 6 * (size_t)job_most(p->job, p->batch_r) * (size_t)p->crop * (size_t)p->crop;
-    size_t windows = (size_t)job_most(p->job, p->batch) * (2 * (size_t)p->window + 1) * ggn_chains_values(&s->set);
+    size_t windows = (size_t)job_most(p->job, p->batch) * (2 * (size_t)p->window + 1) * ggn_series_set_values(&s->set);
     size_t pointers = 6 * (size_t)p->batch_r + (6 * (size_t)p->window + 1) * (size_t)p->batch;
     s->buffer = malloc((crops > windows ? crops : windows) * sizeof *s->buffer);
     s->planes = malloc(pointers * sizeof *s->planes);
@@ -136,7 +136,7 @@ void ggn_session_release(struct ggn_session *s)
     ggn_log_release(&s->log);
     ggn_windows_release(&s->train);
     ggn_windows_release(&s->validation);
-    ggn_chains_release(&s->set);
+    ggn_series_set_release(&s->set);
     base_threads_destroy(s->threads);
 }
 
@@ -148,7 +148,7 @@ int ggn_session_load_init(struct ggn_session *s, struct base_err *err)
         return rc;
     const struct ggn_hyper *a = &s->init->hyper, *b = &s->hyper;
     if (a->preset == b->preset && a->height == b->height && a->width == b->width && a->window == b->window &&
-        a->k_r == b->k_r && a->k_m == b->k_m && a->k_d == b->k_d && a->picture == b->picture)
+        a->k_r == b->k_r && a->k_m == b->k_m && a->k_d == b->k_d && a->noise_map == b->noise_map)
         return 0;
     return base_fail(err, BASE_EINVAL, "%s: networks of another size, preset or input", s->plan->init);
 }

@@ -10,7 +10,7 @@
 #include "train/log.h"
 #include "train/train_plan.h"
 
-enum { GGN_PHASE_DENOISER, GGN_PHASE_JUDGE, GGN_PHASE_DONE };
+enum { GGN_PHASE_DENOISER, GGN_PHASE_CLASSIFIER, GGN_PHASE_DONE };
 
 /* Numbers of the run that a checkpoint keeps. */
 struct ggn_progress {
@@ -26,7 +26,7 @@ struct ggn_progress {
 struct ggn_session {
     const struct ggn_train_plan *plan;
     struct base_threads *threads;
-    struct ggn_chains set;
+    struct ggn_series_set set;
     struct ggn_windows train, validation;
     struct ggn_hyper hyper;      /* of the model */
     struct ggn_model *init;      /* where to start from, or NULL */

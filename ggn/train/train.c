@@ -6,7 +6,7 @@
 #include "data/agree.h"
 #include "train/finish.h"
 #include "train/phase_denoiser.h"
-#include "train/phase_judge.h"
+#include "train/phase_classifier.h"
 #include "train/resume.h"
 
 static void announce(const struct ggn_session *s)
@@ -16,9 +16,9 @@ static void announce(const struct ggn_session *s)
     fprintf(s->plan->progress,
             "%d scenes; blocks: %d training (+ %d synthetic), %d validation; windows: %d training, %d validation; levels "
             "from %g, %s %g\n",
-            s->set.n_scenes, ggn_chains_count(&s->set, GGN_SPLIT_TRAIN, 1),
-            ggn_chains_count(&s->set, GGN_SPLIT_TRAIN, 0) - ggn_chains_count(&s->set, GGN_SPLIT_TRAIN, 1),
-            ggn_chains_count(&s->set, GGN_SPLIT_VALIDATION, 1), s->train.n, s->validation.n, s->set.first_spp,
+            s->set.n_scenes, ggn_series_set_count(&s->set, GGN_SPLIT_TRAIN, 1),
+            ggn_series_set_count(&s->set, GGN_SPLIT_TRAIN, 0) - ggn_series_set_count(&s->set, GGN_SPLIT_TRAIN, 1),
+            ggn_series_set_count(&s->set, GGN_SPLIT_VALIDATION, 1), s->train.n, s->validation.n, s->set.first_spp,
             s->set.ratio > 0 ? "ratio" : "step", s->set.ratio > 0 ? s->set.ratio : s->set.step_spp);
     if (!s->validation.n)
         fprintf(s->plan->progress, "no validation windows: the last epoch counts and p stays uncalibrated\n");
@@ -69,7 +69,7 @@ int ggn_train(const struct ggn_train_plan *plan, struct base_err *err)
     struct ggn_session s = {.plan = plan};
     char path[4096];
     const char *checkpoint = path;
-    int phase = plan->preset == GGN_PRESET_PAPER ? GGN_PHASE_JUDGE : GGN_PHASE_DENOISER;
+    int phase = plan->preset == GGN_PRESET_PAPER ? GGN_PHASE_CLASSIFIER : GGN_PHASE_DENOISER;
 
     ggn_session_path(&s, ".ckpt", path, sizeof path);
     int rc = find_checkpoint(plan, &checkpoint, &phase, err);
@@ -87,7 +87,7 @@ int ggn_train(const struct ggn_train_plan *plan, struct base_err *err)
         checkpoint = NULL;
     }
     if (!rc)
-        rc = ggn_phase_judge(&s, checkpoint, err);
+        rc = ggn_phase_classifier(&s, checkpoint, err);
     if (!rc)
         rc = ggn_session_finish(&s, err);
     if (!rc && job_rank(plan->job) == 0) {

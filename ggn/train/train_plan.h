@@ -6,13 +6,13 @@
 #include <stdio.h>
 
 #include "job/job.h"
-#include "data/chains.h"
+#include "data/series.h"
 #include "model/networks.h"
 
 enum { GGN_TRAIN_INTERRUPTED = 1 }; /* returned by ggn_train and its phases beside 0 and errors */
 
 struct ggn_train_plan {
-    struct ggn_chains_options data;
+    struct ggn_series_set_options data;
     const char *out;  /* model file; OUT.ckpt, OUT.csv, OUT.png and OUT.card.json lie beside it */
     const char *init; /* model file to start from, or NULL */
     int resume;       /* continue from OUT.ckpt if it is there */
@@ -28,10 +28,10 @@ struct ggn_train_plan {
     int soft_labels;
     int flips;              /* see ggn_augment_options */
     double jitter;          /* octaves of exposure; see ggn_augment_options */
-    double picture;         /* preset lull: share of windows that come with the noise picture; 0: networks without it */
+    double noise_map;       /* preset lull: share of windows that come with the noise map; 0: networks without it */
     int average;            /* preset lull: steps over which the weights of M and D are averaged; 0: none */
-    int synthetic;          /* synthetic chains per block */
-    int extend;             /* continue recorded chains beyond their last level, see ggn_chains_extend */
+    int synthetic;          /* synthetic series per block */
+    int extend;             /* continue recorded series beyond their last level, see ggn_series_set_extend */
     int validation_windows; /* most windows per validation */
     double early_rate;      /* share of validation blocks that may be stopped early (ggn_stopping.early_rate) */
     uint32_t seed;

@@ -17,20 +17,21 @@ static void add_block_size(cJSON *root, int32_t width, int32_t height, int *fail
     base_json_number(block, NULL, height, failed);
 }
 
-static void add_criterion(cJSON *root, const struct lull_host_criterion *judge, int *failed)
+static void add_criterion(cJSON *root, const struct lull_host_criterion *criterion, int *failed)
 {
-    if (!judge) {
+    if (!criterion) {
         base_json_text(root, "criterion", NULL, failed);
         return;
     }
-    const struct lull_criterion *t = judge->table;
+    const struct lull_criterion *t = criterion->table;
     cJSON *c = base_json_object(root, "criterion", failed);
     base_json_text(c, "id", t->id, failed);
     base_json_text(c, "version", t->version, failed);
     cJSON *params = base_json_object(c, "params", failed);
     for (uint32_t i = 0; i < t->param_count; i++) {
         const struct lull_param *p = (const void *)((const char *)t->params + (size_t)i * t->param_stride);
-        base_json_text(params, p->name, lull_host_parameter(t, p->name, judge->pairs, judge->pair_count, NULL), failed);
+        base_json_text(params, p->name, lull_host_parameter(t, p->name, criterion->pairs, criterion->pair_count, NULL),
+                       failed);
     }
 }
 

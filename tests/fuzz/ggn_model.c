@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "baselines/baseline.h"
-#include "model/judge.h"
+#include "model/inference.h"
 #include "model/stopper.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
@@ -37,7 +37,7 @@ static void mend(uint8_t *p, size_t size)
 
 static void decide(const struct ggn_model *m)
 {
-    struct ggn_judge *j = ggn_judge_create(m, GGN_PRECISION_F32, NULL, NULL);
+    struct ggn_inference *j = ggn_inference_create(m, GGN_PRECISION_F32, NULL, NULL);
     size_t values = 3 * (size_t)m->hyper.height * (size_t)m->hyper.width, images = (size_t)m->hyper.window;
     uint8_t *noisy = calloc(values, 1);
     uint16_t *denoised = calloc(values, sizeof *denoised);
@@ -45,14 +45,14 @@ static void decide(const struct ggn_model *m)
     const uint16_t **d = calloc(images, sizeof *d);
 
     if (j && noisy && denoised && n && d) {
-        ggn_judge_denoise(j, noisy, denoised, m->hyper.width, m->hyper.height);
+        ggn_inference_denoise(j, noisy, denoised, m->hyper.width, m->hyper.height);
         for (size_t i = 0; i < images; i++) {
             n[i] = noisy;
             d[i] = denoised;
         }
-        ggn_judge_logit(j, n, d, NULL, m->hyper.width, m->hyper.height);
+        ggn_inference_logit(j, n, d, NULL, m->hyper.width, m->hyper.height);
     }
-    ggn_judge_destroy(j);
+    ggn_inference_destroy(j);
     free(noisy);
     free(denoised);
     free(n);

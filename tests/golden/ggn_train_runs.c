@@ -211,7 +211,7 @@ static struct ggn_train_plan small(const char *name, enum ggn_preset preset)
 {
     struct ggn_train_plan p = ggn_train_plan_default(preset);
 
-    p.data = (struct ggn_chains_options){.dir = data, .validation = "scene1"};
+    p.data = (struct ggn_series_set_options){.dir = data, .validation = "scene1"};
     p.out = path_of(name, "");
     p.window = 3;
     p.k_r = p.k_m = 3;
@@ -231,7 +231,7 @@ static struct ggn_train_plan full(const char *name)
 {
     struct ggn_train_plan p = small(name, GGN_PRESET_LULL);
 
-    p.picture = 0.7;
+    p.noise_map = 0.7;
     p.average = 3;
     p.validation_windows = 7;
     p.early_rate = 0.5;
@@ -578,7 +578,7 @@ static void plans(void **state)
     TRY(good, data.dir = "/nonexistent");
     TRY(good, data.validation = "scene9");
     TRY(good, data.validation = "scene0,scene1,scene2");
-    TRY(paper, picture = 0.5);
+    TRY(paper, noise_map = 0.5);
     TRY(paper, average = 1);
     TRY(paper, crop = 1);
     of_all.init = path_of("all", "");
@@ -586,7 +586,7 @@ static void plans(void **state)
     TRY(of_all, k_m = 4);
     TRY(of_all, k_d = 3);
     TRY(of_all, window = 4);
-    TRY(of_all, picture = 0);
+    TRY(of_all, noise_map = 0);
     TRY(of_all, init = path_of("paper", ""));
     TRY(of_all, init = "/nonexistent");
 }
@@ -671,7 +671,7 @@ static void keys_of_runs(void **state)
     uint32_t keys[64];
     int n = 0;
     (void)state;
-    assert_int_equal(ggn_chains_load(&s.set, &plan.data, NULL), 0);
+    assert_int_equal(ggn_series_set_load(&s.set, &plan.data, NULL), 0);
     keys[n++] = ggn_resume_key(&s);
     OTHER(preset = GGN_PRESET_PAPER);
     OTHER(window += 1);
@@ -692,7 +692,7 @@ static void keys_of_runs(void **state)
     OTHER(soft_labels = 0);
     OTHER(flips = 0);
     OTHER(jitter += 1);
-    OTHER(picture = 0.1);
+    OTHER(noise_map = 0.1);
     OTHER(average += 1);
     OTHER(synthetic += 1);
     OTHER(extend = 0);
@@ -700,7 +700,7 @@ static void keys_of_runs(void **state)
     OTHER(seed += 1);
     OTHER(init = "one");
     OTHER(init = "two");
-    struct ggn_chain *c = &s.set.chains[s.set.n - 1];
+    struct ggn_level_series *c = &s.set.series[s.set.n - 1];
     OTHER_SET(s.set.n, s.set.n - 1);
     OTHER_SET(c->split, GGN_SPLIT_VALIDATION);
     OTHER_SET(c->block, c->block + 7);
@@ -713,7 +713,7 @@ static void keys_of_runs(void **state)
         for (int k = 0; k < i; k++)
             if (keys[i] == keys[k])
                 fail_msg("runs %d and %d have the same key", i, k);
-    ggn_chains_release(&s.set);
+    ggn_series_set_release(&s.set);
 }
 
 int main(void)

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "model/judge.h"
+#include "model/inference.h"
 #include "model/policy.h"
 #include "model/preprocess.h"
 #include "model/trainer.h"
@@ -39,7 +39,7 @@ static struct ggn_model *make(void)
 static double decide(const struct ggn_model *m, float (*block)(int image, int k), struct ggn_pixel_counts *counts)
 {
     const struct ggn_policy policy = ggn_policy_default();
-    struct ggn_judge *j = ggn_judge_create(m, GGN_PRECISION_F32, NULL, NULL);
+    struct ggn_inference *j = ggn_inference_create(m, GGN_PRECISION_F32, NULL, NULL);
     static uint8_t noisy[3][BYTES];
     static uint16_t denoised[3][BYTES];
     const uint8_t *const n[3] = {noisy[0], noisy[1], noisy[2]};
@@ -49,10 +49,10 @@ static double decide(const struct ggn_model *m, float (*block)(int image, int k)
     for (int i = 0; i < 3; i++) {
         for (int k = 0; k < BYTES; k++)
             noisy[i][k] = ggn_preprocess((double)block(i, k), NULL, counts);
-        ggn_judge_denoise(j, noisy[i], denoised[i], SIDE, SIDE);
+        ggn_inference_denoise(j, noisy[i], denoised[i], SIDE, SIDE);
     }
-    double p = ggn_policy_p(&policy, ggn_judge_logit(j, n, d, NULL, SIDE, SIDE));
-    ggn_judge_destroy(j);
+    double p = ggn_policy_p(&policy, ggn_inference_logit(j, n, d, NULL, SIDE, SIDE));
+    ggn_inference_destroy(j);
     return p;
 }
 
@@ -402,7 +402,7 @@ static void test_equal_labels(void **state)
     fill_training();
     for (int i = 0; i < 6; i++) {
         struct ggn_batch b = {.count = BATCH, .noisy = p_noisy, .denoised = p_noisy, .label = label[i & 1]};
-        assert_int_equal(ggn_trainer_judge_step(t, &b, &bce, NULL, &err), 0);
+        assert_int_equal(ggn_trainer_classifier_step(t, &b, &bce, NULL, &err), 0);
         assert_true(isfinite(bce));
     }
     assert_true(all_finite(t));
@@ -448,10 +448,10 @@ static void test_nan_data(void **state)
 
     fill_training();
     noisy[4][77] = NAN;
-    assert_int_equal(ggn_trainer_judge_step(t, &b, &bce, NULL, &err), GGN_EDIVERGED);
+    assert_int_equal(ggn_trainer_classifier_step(t, &b, &bce, NULL, &err), GGN_EDIVERGED);
     assert_true(all_finite(t));
     noisy[4][77] = 0.5f;
-    assert_int_equal(ggn_trainer_judge_step(t, &b, &bce, NULL, &err), 0);
+    assert_int_equal(ggn_trainer_classifier_step(t, &b, &bce, NULL, &err), 0);
     ggn_trainer_destroy(t);
     (void)state;
 }

@@ -9,7 +9,7 @@
 
 #include "baselines/baseline.h"
 #include "baselines/lstm.h"
-#include "model/judge.h"
+#include "model/inference.h"
 #include "model/trainer.h"
 #include "support/fail_alloc.h"
 
@@ -44,10 +44,10 @@ static int save_and_load(struct base_err *err)
 static int judge(struct base_err *err)
 {
     struct ggn_model *m = ggn_model_create(&hyper, err);
-    struct ggn_judge *j = m ? ggn_judge_create(m, GGN_PRECISION_F32, NULL, err) : NULL;
+    struct ggn_inference *j = m ? ggn_inference_create(m, GGN_PRECISION_F32, NULL, err) : NULL;
     int rc = j ? 0 : BASE_ENOMEM;
 
-    ggn_judge_destroy(j);
+    ggn_inference_destroy(j);
     ggn_model_destroy(m);
     return rc;
 }

@@ -1,4 +1,4 @@
-/* Labels, soft and censored, thresholds, the split of a data set by scene, its chains and windows. */
+/* Labels, soft and censored, thresholds, the split of a data set by scene, its series and windows. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,7 +12,7 @@
 
 #include "support/ggn_near.h"
 
-#include "data/chains.h"
+#include "data/series.h"
 #include "data/dataset.h"
 #include "data/thresholds.h"
 #include "data/windows.h"
@@ -434,27 +434,27 @@ static void scenes_are_held_out(void **state)
     snprintf(dir, sizeof dir, "%s/scenes", root);
     assert_int_equal(mkdir(dir, 0777), 0);
     for (int n = 1; n <= 13; n++) {
-        struct ggn_chains set;
-        const struct ggn_chains_options o = {.dir = dir, .validation = n == 4 ? "s2" : NULL};
+        struct ggn_series_set set;
+        const struct ggn_series_set_options o = {.dir = dir, .validation = n == 4 ? "s2" : NULL};
         snprintf(command, sizeof command,
                  "cp -r tests/data/recorded/test/three %s/s%02d && sed -i 's/\"scene\":.*/\"scene\": \"s%d\",/' "
                  "%s/s%02d/manifest.json",
                  dir, n, n - n / 6, dir, n);
         assert_int_equal(system(command), 0);
-        assert_int_equal(ggn_chains_load(&set, &o, NULL), 0);
+        assert_int_equal(ggn_series_set_load(&set, &o, NULL), 0);
         fprintf(f, "%d scenes:", set.n_scenes);
         for (int i = 0; i < set.data.n; i++)
             fprintf(f, " %s %s", set.data.views[i].manifest.scene, ggn_split_names[set.data.views[i].split]);
         fputs("; of chains:", f);
         for (int i = 0; i < set.n; i++)
-            fprintf(f, " %d", set.chains[i].scene);
+            fprintf(f, " %d", set.series[i].scene);
         fputc('\n', f);
-        ggn_chains_release(&set);
+        ggn_series_set_release(&set);
     }
     transcript_end(&t, "data-scenes");
 }
 
-/* --- chains, windows and what training sees of them --- */
+/* --- series, windows and what training sees of them --- */
 
 /* Two sums of codes, one with weights by place: a code elsewhere changes it. */
 static void print_codes(FILE *f, const char *what, const uint8_t *codes, size_t n)
@@ -469,14 +469,14 @@ static void print_codes(FILE *f, const char *what, const uint8_t *codes, size_t 
         fprintf(f, " %s %.2f %.2f", what, sum / (double)n, placed / weights);
 }
 
-static void print_chains(FILE *f, const struct ggn_chains *set)
+static void print_series(FILE *f, const struct ggn_series_set *set)
 {
-    const size_t values = ggn_chains_values(set);
+    const size_t values = ggn_series_set_values(set);
     fprintf(f, "%d chains of %d scenes, %dx%d, first %g, ratio %.9g, step %g; %d %d to train\n", set->n, set->n_scenes,
-            set->width, set->height, set->first_spp, set->ratio, set->step_spp, ggn_chains_count(set, GGN_SPLIT_TRAIN, 0),
-            ggn_chains_count(set, GGN_SPLIT_TRAIN, 1));
+            set->width, set->height, set->first_spp, set->ratio, set->step_spp,
+            ggn_series_set_count(set, GGN_SPLIT_TRAIN, 0), ggn_series_set_count(set, GGN_SPLIT_TRAIN, 1));
     for (int i = 0; i < set->n; i++) {
-        const struct ggn_chain *c = &set->chains[i];
+        const struct ggn_level_series *c = &set->series[i];
         fprintf(f, "%d: view %d scene %d %s block %u%s%s, label %d %g %d %g;", i, c->view, c->scene,
                 ggn_split_names[c->split], c->block, c->synthetic ? " synthetic" : "", c->simulated ? " simulated" : "",
                 c->has_label, c->label.threshold, c->label.censored, c->spread);
@@ -485,8 +485,8 @@ static void print_chains(FILE *f, const struct ggn_chains *set)
         for (int k = 0; k < c->n_levels; k += 1 + (i % 3)) {
             fprintf(f, "  %g: %.4f %.4f", c->spp[k], c->tail999[k], c->gini[k]);
             print_codes(f, "noisy", c->noisy + values * (size_t)k, values);
-            if (set->pictures && c->has_picture[k])
-                print_codes(f, "picture", c->picture + values / 3 * (size_t)k, values / 3);
+            if (set->noise_maps && c->has_noise_map[k])
+                print_codes(f, "picture", c->noise_map + values / 3 * (size_t)k, values / 3);
             fputc('\n', f);
         }
     }
@@ -494,31 +494,31 @@ static void print_chains(FILE *f, const struct ggn_chains *set)
 
 static void chains_are_as_they_were(void **state)
 {
-    static const struct ggn_chains_options options[] = {
-        {.dir = "tests/data/recorded", .with_test = 1, .pictures = 1},
+    static const struct ggn_series_set_options options[] = {
+        {.dir = "tests/data/recorded", .with_test = 1, .noise_maps = 1},
         {.dir = "tests/data/recorded", .ratio = 2, .mean_for_reference = 1},
         {.dir = "tests/data/recorded", .validation = "one", .test = "two,three"},
         {.dir = "tests/data/recorded", .validation = "one,none"},
-        {.dir = "tests/data/train-demo", .validation = "scene1", .pictures = 1, .ratio = 3},
+        {.dir = "tests/data/train-demo", .validation = "scene1", .noise_maps = 1, .ratio = 3},
         {.dir = "tests/data/recorded/train/one-view1"}};
     struct transcript t;
     FILE *f = transcript_begin(&t);
     (void)state;
     for (size_t i = 0; i < sizeof options / sizeof options[0]; i++) {
-        struct ggn_chains set;
+        struct ggn_series_set set;
         struct base_err err = {0};
         fprintf(f, "> options %zu\n", i);
-        if (ggn_chains_load(&set, &options[i], &err)) {
+        if (ggn_series_set_load(&set, &options[i], &err)) {
             fprintf(f, "%s\n", err.text);
             continue;
         }
-        print_chains(f, &set);
-        ggn_chains_release(&set);
+        print_series(f, &set);
+        ggn_series_set_release(&set);
     }
     for (int how = 0; how < 4; how++) {
-        struct ggn_chains set;
-        const struct ggn_chains_options o = {.dir = "tests/data/recorded", .with_test = 1, .pictures = how != 1};
-        assert_int_equal(ggn_chains_load(&set, &o, NULL), 0);
+        struct ggn_series_set set;
+        const struct ggn_series_set_options o = {.dir = "tests/data/recorded", .with_test = 1, .noise_maps = how != 1};
+        assert_int_equal(ggn_series_set_load(&set, &o, NULL), 0);
         fprintf(f, "> %s\n",
                 how == 0   ? "synthetic"
                 : how == 1 ? "extended"
@@ -526,25 +526,25 @@ static void chains_are_as_they_were(void **state)
                            : "synthetic, linear");
         set.ratio = how == 3 ? 0 : set.ratio;
         if (how == 0 || how == 3)
-            assert_int_equal(ggn_chains_add_synthetic(&set, 2, 5, NULL), 0);
+            assert_int_equal(ggn_series_set_add_synthetic(&set, 2, 5, NULL), 0);
         else if (how == 1)
-            assert_int_equal(ggn_chains_extend(&set, 6, NULL), 0);
+            assert_int_equal(ggn_series_set_extend(&set, 6, NULL), 0);
         else
-            assert_int_equal(ggn_chains_simulate(&set, 1.9, 7, NULL), 0);
-        print_chains(f, &set);
-        ggn_chains_release(&set);
+            assert_int_equal(ggn_series_set_simulate(&set, 1.9, 7, NULL), 0);
+        print_series(f, &set);
+        ggn_series_set_release(&set);
     }
     transcript_end(&t, "data-chains");
 }
 
-static void print_windows(FILE *f, const struct ggn_chains *set, const struct ggn_window_options *o)
+static void print_windows(FILE *f, const struct ggn_series_set *set, const struct ggn_window_options *o)
 {
     struct ggn_windows w;
     assert_int_equal(ggn_windows_create(&w, set, o, NULL), 0);
     fprintf(f, "%s, %d images%s%s%s: %d windows\n", ggn_split_names[o->split], o->length, o->soft ? ", soft" : "",
             o->synthetic ? ", synthetic" : "", o->label_first ? ", first" : "", w.n);
     for (int i = 0; i < w.n; i++)
-        fprintf(f, " %d.%d:%d %.4f %.4f%s", w.list[i].chain, w.list[i].last, w.list[i].noisy, w.list[i].label,
+        fprintf(f, " %d.%d:%d %.4f %.4f%s", w.list[i].series, w.list[i].last, w.list[i].noisy, w.list[i].label,
                 w.list[i].octave, i % 6 == 5 || i + 1 == w.n ? "\n" : "");
     for (int i = 0; i <= set->n; i++)
         fprintf(f, "%s%d", i ? " " : "first: ", w.first[i]);
@@ -571,13 +571,13 @@ static void windows_are_as_they_were(void **state)
     enum { SIDE = 16, P = SIDE * SIDE };
     static float planes[3 * 4 * P], other[3 * P];
     static uint16_t denoised[64 * 3 * P];
-    const struct ggn_chains_options o = {.dir = "tests/data/recorded", .pictures = 1};
-    struct ggn_chains set;
+    const struct ggn_series_set_options o = {.dir = "tests/data/recorded", .noise_maps = 1};
+    struct ggn_series_set set;
     struct transcript t;
     FILE *f = transcript_begin(&t);
     (void)state;
-    assert_int_equal(ggn_chains_load(&set, &o, NULL), 0);
-    assert_int_equal(ggn_chains_add_synthetic(&set, 1, 5, NULL), 0);
+    assert_int_equal(ggn_series_set_load(&set, &o, NULL), 0);
+    assert_int_equal(ggn_series_set_add_synthetic(&set, 1, 5, NULL), 0);
     for (int i = 0; i < 8; i++)
         print_windows(f, &set,
                       &(struct ggn_window_options){.split = i & 1 ? GGN_SPLIT_VALIDATION : GGN_SPLIT_TRAIN,
@@ -588,11 +588,11 @@ static void windows_are_as_they_were(void **state)
     for (int i = 0; i < 12; i++) {
         struct ggn_augment a = ggn_augment_draw(
             (uint64_t)i << (i % 3 * 16), i % 4, 9,
-            &(struct ggn_augment_options){.flips = i < 9, .square = i < 7, .jitter = i < 11 ? 0.6 : 0, .picture = 0.5});
+            &(struct ggn_augment_options){.flips = i < 9, .square = i < 7, .jitter = i < 11 ? 0.6 : 0, .noise_map = 0.5});
         fprintf(f, "augment %d%d%d %d %.5f %.5f %.5f\n", a.flip_x, a.flip_y, a.transpose, a.blind, (double)a.gain[0],
                 (double)a.gain[1], (double)a.gain[2]);
     }
-    struct ggn_chain *c = &set.chains[2];
+    struct ggn_level_series *c = &set.series[2];
     for (size_t i = 0; i < (size_t)c->n_levels * 3 * P; i++)
         denoised[i] = (uint16_t)(c->noisy[i] * 250u + i % 257u);
     c->denoised = denoised;
@@ -607,7 +607,7 @@ static void windows_are_as_they_were(void **state)
         print_planes(f, "noisy", planes, 12 * P);
         ggn_window_planes(c, 5, 4, SIDE, SIDE, 1, &a, i < 4 ? 8 : 0, planes);
         print_planes(f, "denoised", planes, 12 * P);
-        if (ggn_picture_plane(c, 5, SIDE, SIDE, &a, planes))
+        if (ggn_noise_map_plane(c, 5, SIDE, SIDE, &a, planes))
             print_planes(f, "picture", planes, P);
         ggn_crop_planes(c, 3, SIDE, SIDE, 2, 3, 10, i >> 2 & 1 ? 10 : 7, &a, planes, other);
         print_planes(f, "crop", planes, 3 * 70);
@@ -615,7 +615,7 @@ static void windows_are_as_they_were(void **state)
         fputc('\n', f);
     }
     c->denoised = NULL;
-    ggn_chains_release(&set);
+    ggn_series_set_release(&set);
     transcript_end(&t, "data-windows");
 }
 

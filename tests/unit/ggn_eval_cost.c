@@ -17,7 +17,7 @@ static const double thresholds[B] = {100, 400, 1600}, rates[B] = {1e-3, 2e-3, 4e
 static int setup(void **state)
 {
     (void)state;
-    set.chains.width = set.chains.height = 10;
+    set.images.width = set.images.height = 10;
     for (int b = 0; b < B; b++) {
         blocks[b] = (struct ggn_eval_block){
             .split = GGN_SPLIT_TEST, .first = (size_t)(b * LEVELS), .end = (size_t)((b + 1) * LEVELS), .cap = 6400};

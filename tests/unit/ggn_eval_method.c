@@ -441,7 +441,7 @@ static void beyond_the_recording(void **state)
     double shares = 0, last_relmse = 0;
     for (int b = 0; b < 2; b++) {
         const struct ggn_eval_block *block = &more.blocks[b];
-        const struct ggn_dataset_view *v = &more.chains.data.views[0];
+        const struct ggn_dataset_view *v = &more.images.data.views[0];
         const size_t known = block->first + LEVELS - WINDOW; /* the case of the last recorded level */
         static float mean[3 * 24 * 20], d[24 * 20];
         struct seq_block p;

@@ -158,24 +158,24 @@ static void forge(const char *from, const char *to, const char *expected)
     free(data);
 }
 
-/* A model that takes the noise picture says so in its file, and a file that says so of other networks is refused. */
+/* A model that takes the noise map says so in its file, and a file that says so of other networks is refused. */
 static void test_picture(void **state)
 {
     struct base_err err = {0};
     struct ggn_hyper published = ggn_hyper_default(GGN_PRESET_PAPER);
 
-    small.picture = 1;
+    small.noise_map = 1;
     forge("\"picture\":\t1", "\"picture\":\t0", "does not have the shape");
     forge("\"picture\":\t1", "\"picture\":\t7", "'picture' is missing or not a number in 0..1");
     struct ggn_model *m = make(), *read = NULL;
     assert_int_equal(ggn_model_save(m, path, GGN_F32, NULL), 0);
     assert_int_equal(ggn_model_load(path, &read, &err), 0);
-    assert_int_equal(read->hyper.picture, 1);
+    assert_int_equal(read->hyper.noise_map, 1);
     assert_int_equal(read->graph[GGN_NET_D].value[0].c, 4);
     ggn_model_destroy(m);
     ggn_model_destroy(read);
-    small.picture = 0;
-    published.picture = 1;
+    small.noise_map = 0;
+    published.noise_map = 1;
     assert_int_equal(ggn_hyper_check(&published, &err), BASE_EINVAL);
     assert_non_null(strstr(err.text, "picture"));
     (void)state;
@@ -525,7 +525,7 @@ static void test_descriptions(void **state)
 
     assert_int_equal(ggn_description_parse(described, &d, NULL), 0);
     assert_true(d.hyper.preset == GGN_PRESET_LULL && d.hyper.height == 16 && d.hyper.width == 17 && d.hyper.window == 2);
-    assert_true(d.hyper.k_r == 3 && d.hyper.k_m == 4 && d.hyper.k_d == 5 && d.hyper.picture == 1);
+    assert_true(d.hyper.k_r == 3 && d.hyper.k_m == 4 && d.hyper.k_d == 5 && d.hyper.noise_map == 1);
     assert_true(d.calibration.scale == 2 && d.calibration.shift == -1 && d.calibration.threshold == 0.25);
     assert_true(d.calibration.spacing == 1.5 && d.calibration.consecutive == 3);
     char *text = ggn_description_print(&d), *flat = calloc(strlen(text) + 1, 1);

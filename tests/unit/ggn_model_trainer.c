@@ -73,7 +73,7 @@ static double judge(struct ggn_trainer *t)
     struct base_err err = {0};
     double bce;
 
-    if (ggn_trainer_judge_step(t, &batch, &bce, NULL, &err))
+    if (ggn_trainer_classifier_step(t, &batch, &bce, NULL, &err))
         fail_msg("%s", err.text);
     return bce;
 }
@@ -103,7 +103,7 @@ static void test_learns(void **state)
     (void)state;
 }
 
-/* Windows that do not differ, labels that the noise picture alone tells; one sample has none. */
+/* Windows that do not differ, labels that the noise map alone tells; one sample has none. */
 static void test_learns_from_the_picture(void **state)
 {
     static float picture[BATCH][AREA];
@@ -118,12 +118,12 @@ static void test_learns_from_the_picture(void **state)
     }
     for (int i = 0; i < BATCH * PLANES; i++)
         same[i] = data.denoised[i % PLANES];
-    struct ggn_batch batch = {.count = BATCH, .noisy = same, .denoised = same, .label = data.label, .picture = pictures};
+    struct ggn_batch batch = {.count = BATCH, .noisy = same, .denoised = same, .label = data.label, .noise_map = pictures};
     with_picture = 1;
     struct ggn_trainer *t = make(GGN_PRESET_LULL, 4e-3, NULL);
     with_picture = 0;
     for (int i = 0; i < 40; i++)
-        assert_int_equal(ggn_trainer_judge_step(t, &batch, &bce, NULL, &err), 0);
+        assert_int_equal(ggn_trainer_classifier_step(t, &batch, &bce, NULL, &err), 0);
     if (!(bce < 0.5)) /* log 2 = 0.69 is the least without the picture */
         fail_msg("cross-entropy %g", bce);
     const struct ggn_value *v = &t->graph[GGN_NET_D].value[0];
@@ -314,14 +314,14 @@ static void test_refusals(void **state)
         for (batch.count = 0; batch.count <= BATCH + 1; batch.count += BATCH + 1) {
             char want[64];
             snprintf(want, sizeof want, "a batch of %d is not in 1..%d", batch.count, BATCH);
-            assert_int_equal(ggn_trainer_judge_step(t, &batch, &loss, NULL, &err), BASE_EINVAL);
+            assert_int_equal(ggn_trainer_classifier_step(t, &batch, &loss, NULL, &err), BASE_EINVAL);
             assert_string_equal(err.text, want);
             assert_int_equal(ggn_trainer_denoiser_step(t, data.p_first, data.p_reference, batch.count, &loss, &err),
                              BASE_EINVAL);
             assert_string_equal(err.text, want);
         }
         batch.count = BATCH;
-        int rc = preset == GGN_PRESET_PAPER ? ggn_trainer_judge_step(t, &batch, &loss, NULL, &err)
+        int rc = preset == GGN_PRESET_PAPER ? ggn_trainer_classifier_step(t, &batch, &loss, NULL, &err)
                                             : ggn_trainer_paper_step(t, &batch, &record, &err);
         assert_int_equal(rc, BASE_EINVAL);
         assert_string_equal(err.text, preset == GGN_PRESET_PAPER ? "the published preset trains in its own order"
@@ -338,7 +338,7 @@ static void test_refusals(void **state)
         assert_non_null(t);
         assert_true((t->r != NULL) == (parts == GGN_TRAIN_R) && (t->d != NULL) == (parts == GGN_TRAIN_MD) && !t->m2);
         int rc = parts == GGN_TRAIN_MD ? ggn_trainer_denoiser_step(t, data.p_first, data.p_reference, BATCH, &loss, &err)
-                                       : ggn_trainer_judge_step(t, &batch, &loss, NULL, &err);
+                                       : ggn_trainer_classifier_step(t, &batch, &loss, NULL, &err);
         assert_int_equal(rc, BASE_EINVAL);
         assert_string_equal(err.text, "this trainer was made without the networks of the step");
         for (int net = 0; net < GGN_NETS; net++) {
@@ -419,7 +419,7 @@ static int take_steps(struct process *p)
         struct ggn_batch b = {.count = count,
                               .noisy = data.p_noisy + first * PLANES,
                               .label = data.label,
-                              .picture = none,
+                              .noise_map = none,
                               .denoised = data.p_denoised + first * PLANES,
                               .reference = data.p_reference + 3 * first};
         struct ggn_paper_record record;
@@ -431,7 +431,7 @@ static int take_steps(struct process *p)
         rc = ggn_trainer_denoiser_step(p->trainer, data.p_first + 3 * first, data.p_reference + 3 * first, count,
                                        &p->loss[step], &err);
         if (!rc)
-            rc = ggn_trainer_judge_step(p->trainer, &b, &p->loss[3 + step], logits, &err);
+            rc = ggn_trainer_classifier_step(p->trainer, &b, &p->loss[3 + step], logits, &err);
         p->loss[step] += logits[count - 1];
     }
     return rc;

@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "model/judge.h"
+#include "model/inference.h"
 #include "model/networks.h"
 #include "nn/bf16.h"
 #include "nn/exec.h"
@@ -50,7 +50,7 @@ static void put_graph(FILE *f, const struct ggn_graph *g)
     }
 }
 
-/* The published networks, small ones of odd sizes that take the noise picture, and what they need in memory. */
+/* The published networks, small ones of odd sizes that take the noise map, and what they need in memory. */
 static void structure(void **state)
 {
     const struct ggn_hyper published = ggn_hyper_default(GGN_PRESET_PAPER), odd = {GGN_PRESET_LULL, 37, 51, 2, 3, 5, 2, 1};
@@ -72,8 +72,8 @@ static void structure(void **state)
                         ggn_exec_bytes(&graph, 5, flags[k], 2) - sizeof(struct ggn_exec));
         }
     struct ggn_model *model = ggn_model_create(&odd, NULL);
-    fprintf(f, "a judge: %zu bytes, with two threads %zu\n", ggn_judge_bytes(model, GGN_PRECISION_F32, 1),
-            ggn_judge_bytes(model, GGN_PRECISION_F32, 2));
+    fprintf(f, "a judge: %zu bytes, with two threads %zu\n", ggn_inference_bytes(model, GGN_PRECISION_F32, 1),
+            ggn_inference_bytes(model, GGN_PRECISION_F32, 2));
     ggn_model_destroy(model);
     unsetenv("GGN_ISA");
     fclose(f);
@@ -299,7 +299,7 @@ static void ranges(void **state)
         {"preset", offsetof(struct ggn_hyper, preset), 0, 1},   {"height", offsetof(struct ggn_hyper, height), 16, 1024},
         {"width", offsetof(struct ggn_hyper, width), 16, 1024}, {"window", offsetof(struct ggn_hyper, window), 1, 16},
         {"k_r", offsetof(struct ggn_hyper, k_r), 1, 128},       {"k_m", offsetof(struct ggn_hyper, k_m), 1, 128},
-        {"k_d", offsetof(struct ggn_hyper, k_d), 1, 64},        {"picture", offsetof(struct ggn_hyper, picture), 0, 1}};
+        {"k_d", offsetof(struct ggn_hyper, k_d), 1, 64},        {"picture", offsetof(struct ggn_hyper, noise_map), 0, 1}};
     (void)state;
 
     for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++)
@@ -321,7 +321,7 @@ static void ranges(void **state)
     const struct ggn_hyper d = ggn_hyper_default(GGN_PRESET_LULL);
     assert_true(d.preset == GGN_PRESET_LULL && d.height == 200 && d.width == 200 && d.window == 6 && d.k_r == 16 &&
                 d.k_m == 20);
-    assert_true(d.k_d == 64 && d.picture == 0);
+    assert_true(d.k_d == 64 && d.noise_map == 0);
 }
 
 static int sized(int c, int h, int w, struct base_err *err)

@@ -17,7 +17,7 @@
 
 #include "base/colour.h"
 #include "baselines/baseline.h"
-#include "model/judge.h"
+#include "model/inference.h"
 #include "model/stopper.h"
 #include "model/window.h"
 #include "nn/hash.h"
@@ -181,14 +181,14 @@ static double other_logit(void *data)
     static uint16_t denoised[WINDOW][VALUES];
     const uint8_t *n[WINDOW];
     const uint16_t *d[WINDOW];
-    struct ggn_judge *j = ggn_judge_create(model, GGN_PRECISION_F32, NULL, NULL);
+    struct ggn_inference *j = ggn_inference_create(model, GGN_PRECISION_F32, NULL, NULL);
     for (int i = 0; i < WINDOW; i++) {
         n[i] = o->codes[i];
         d[i] = denoised[i];
-        ggn_judge_denoise(j, n[i], denoised[i], across(o), down(o));
+        ggn_inference_denoise(j, n[i], denoised[i], across(o), down(o));
     }
-    logit = ggn_judge_logit(j, n, d, NULL, across(o), down(o));
-    ggn_judge_destroy(j);
+    logit = ggn_inference_logit(j, n, d, NULL, across(o), down(o));
+    ggn_inference_destroy(j);
     return logit;
 }
 
@@ -225,7 +225,7 @@ static void other_ask(struct other *o, uint64_t spp)
         for (int y = o->r->y0; y < o->r->y1; y++)
             for (int x = o->r->x0; x < o->r->x1; x++)
                 *to++ = ggn_preprocess((double)color[y][x][c], &o->display, NULL);
-    ggn_stopper_judge(&o->rule, &o->stopper, &evidence);
+    ggn_stopper_decide(&o->rule, &o->stopper, &evidence);
 }
 
 static int same_number(double a, double b) { return isnan(a) ? isnan(b) : fabs(a - b) <= 1e-9 * fmax(1, fabs(b)); }

@@ -1,5 +1,5 @@
 /*
- * The criterion "ggn" through the ABI with a model that takes the noise picture: what a host with half buffers, one without and
+ * The criterion "ggn" through the ABI with a model that takes the noise map: what a host with half buffers, one without and
  * one whose halves are unequal get is what the networks say of the picture by its definition.
  */
 #include "support/ggn_cmocka.h"
@@ -11,7 +11,7 @@
 
 #include <lull/criterion.h>
 
-#include "model/judge.h"
+#include "model/inference.h"
 #include "model/policy.h"
 #include "nn/hash.h"
 #include "plugin/criteria.h"
@@ -70,21 +70,21 @@ static double expected(double h)
     static uint16_t denoised[WINDOW][3 * PIXELS];
     const uint8_t *const n[] = {noisy[0], noisy[1]};
     const uint16_t *const d[] = {denoised[0], denoised[1]};
-    struct ggn_judge *j = ggn_judge_create(model, GGN_PRECISION_F32, NULL, NULL);
+    struct ggn_inference *j = ggn_inference_create(model, GGN_PRECISION_F32, NULL, NULL);
 
     assert_non_null(j);
     for (int k = 0; k < WINDOW; k++) {
         for (int p = 0; p < PIXELS; p++)
             for (int c = 0; c < 3; c++)
                 noisy[k][c * PIXELS + p] = code((double)color[k][p][c]);
-        ggn_judge_denoise(j, noisy[k], denoised[k], W, H);
+        ggn_inference_denoise(j, noisy[k], denoised[k], W, H);
     }
     for (int p = 0; p < PIXELS && h > 0; p++) {
         double y = luminance(color[1][p]), difference = sqrt(h / (16 - h)) * (luminance(half[p]) - y);
         picture[p] = (uint8_t)abs(code(y + difference) - code(y));
     }
-    double p = ggn_policy_p(&policy, ggn_judge_logit(j, n, d, h > 0 ? picture : NULL, W, H));
-    ggn_judge_destroy(j);
+    double p = ggn_policy_p(&policy, ggn_inference_logit(j, n, d, h > 0 ? picture : NULL, W, H));
+    ggn_inference_destroy(j);
     return p;
 }
 

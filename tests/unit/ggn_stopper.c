@@ -50,7 +50,7 @@ static int ask(const struct ggn_stop_rule *rule, struct ggn_stopper *s, uint64_t
     const struct ggn_evidence e = {show, noise, logit, tail};
     int look = ggn_stopper_ask(rule, s, spp);
     if (look)
-        ggn_stopper_judge(rule, s, &e);
+        ggn_stopper_decide(rule, s, &e);
     return look;
 }
 

@@ -27,50 +27,50 @@
 
 static char dir[64];
 
-static void load(struct ggn_chains *set, double ratio)
+static void load(struct ggn_series_set *set, double ratio)
 {
-    struct ggn_chains_options o = {.dir = dir, .ratio = ratio};
+    struct ggn_series_set_options o = {.dir = dir, .ratio = ratio};
     struct base_err err = {0};
 
-    if (ggn_chains_load(set, &o, &err))
+    if (ggn_series_set_load(set, &o, &err))
         fail_msg("%s", err.text);
 }
 
 static void splits_and_levels(void **state)
 {
-    struct ggn_chains set, thin;
+    struct ggn_series_set set, thin;
 
     load(&set, 0);
     assert_int_equal(set.n, 12);
-    assert_int_equal(ggn_chains_count(&set, GGN_SPLIT_TRAIN, 1), 9);
-    assert_int_equal(ggn_chains_count(&set, GGN_SPLIT_VALIDATION, 1), 3);
+    assert_int_equal(ggn_series_set_count(&set, GGN_SPLIT_TRAIN, 1), 9);
+    assert_int_equal(ggn_series_set_count(&set, GGN_SPLIT_VALIDATION, 1), 3);
     assert_int_equal(set.n_scenes, 4);
-    assert_int_equal(set.chains[0].n_levels, 14);
+    assert_int_equal(set.series[0].n_levels, 14);
     assert_true(fabs(set.ratio - 1.35) < 0.02);
     load(&thin, 1.7);
-    assert_int_equal(thin.chains[0].n_levels, 7);
-    ggn_chains_release(&set);
-    ggn_chains_release(&thin);
+    assert_int_equal(thin.series[0].n_levels, 7);
+    ggn_series_set_release(&set);
+    ggn_series_set_release(&thin);
     (void)state;
 }
 
 /* Noise of a synthetic level against the reference: as large as that of a rendered level at the same samples. */
 static void synthetic_noise_has_the_variance_of_rendered_noise(void **state)
 {
-    struct ggn_chains set;
+    struct ggn_series_set set;
     struct base_err err = {0};
     double ratio_sum = 0;
     int compared = 0;
 
     load(&set, 0);
-    assert_int_equal(ggn_chains_add_synthetic(&set, 1, 3, &err), 0);
+    assert_int_equal(ggn_series_set_add_synthetic(&set, 1, 3, &err), 0);
     assert_int_equal(set.n, 21);
-    size_t values = ggn_chains_values(&set);
+    size_t values = ggn_series_set_values(&set);
     for (int i = 12; i < set.n; i++) {
-        const struct ggn_chain *c = &set.chains[i], *measured = NULL;
+        const struct ggn_level_series *c = &set.series[i], *measured = NULL;
         for (int k = 0; k < 12; k++)
-            if (set.chains[k].view == c->view && set.chains[k].block == c->block)
-                measured = &set.chains[k];
+            if (set.series[k].view == c->view && set.series[k].block == c->block)
+                measured = &set.series[k];
         assert_non_null(measured);
         assert_true(c->synthetic && c->label.threshold == measured->label.threshold);
         double e[2] = {0, 0};
@@ -83,26 +83,26 @@ static void synthetic_noise_has_the_variance_of_rendered_noise(void **state)
         compared++;
     }
     assert_true(fabs(ratio_sum / compared - 1) < 0.1);
-    ggn_chains_release(&set);
+    ggn_series_set_release(&set);
     (void)state;
 }
 
 /* Continued levels: rising, and their noise goes on falling as 1/n. */
 static void extended_levels_continue_the_recording(void **state)
 {
-    struct ggn_chains set;
+    struct ggn_series_set set;
     struct base_err err = {0};
     double sum = 0;
     int extended = 0;
 
     load(&set, 0);
-    size_t values = ggn_chains_values(&set);
+    size_t values = ggn_series_set_values(&set);
     for (int i = 0; i < set.n; i++)
-        set.chains[i].label.threshold = i ? 400 : 30;
-    assert_int_equal(ggn_chains_extend(&set, 3, &err), 0);
-    assert_int_equal(set.chains[0].n_levels, 14);
+        set.series[i].label.threshold = i ? 400 : 30;
+    assert_int_equal(ggn_series_set_extend(&set, 3, &err), 0);
+    assert_int_equal(set.series[0].n_levels, 14);
     for (int i = 1; i < set.n; i++) {
-        const struct ggn_chain *c = &set.chains[i];
+        const struct ggn_level_series *c = &set.series[i];
         assert_true(c->n_levels > 17 && c->spp[14] > c->spp[13] && c->spp[c->n_levels - 1] > 1800);
         assert_true(isnan(c->tail999[14]));
         double e[2] = {0, 0};
@@ -117,7 +117,7 @@ static void extended_levels_continue_the_recording(void **state)
         extended++;
     }
     assert_true(fabs(sum / extended - 1) < 0.2);
-    ggn_chains_release(&set);
+    ggn_series_set_release(&set);
     (void)state;
 }
 
@@ -125,17 +125,17 @@ static void extended_levels_continue_the_recording(void **state)
  * mean of the halves as large as the samples say. */
 static void simulated_levels_lie_as_far_apart_as_asked(void **state)
 {
-    struct ggn_chains set;
+    struct ggn_series_set set;
     struct base_err err = {0};
     const double wanted[] = {1.05, 1.5};
 
     for (int t = 0; t < 2; t++) {
         load(&set, 0);
-        const double first = set.chains[0].spp[0];
-        const size_t values = ggn_chains_values(&set);
-        assert_int_equal(ggn_chains_simulate(&set, wanted[t], 3, &err), 0);
+        const double first = set.series[0].spp[0];
+        const size_t values = ggn_series_set_values(&set);
+        assert_int_equal(ggn_series_set_simulate(&set, wanted[t], 3, &err), 0);
         for (int i = 0; i < set.n; i++) {
-            const struct ggn_chain *c = &set.chains[i];
+            const struct ggn_level_series *c = &set.series[i];
             const int end = c->n_levels - 1;
             double low = 0, high = 0;
             int half = 0;
@@ -154,14 +154,14 @@ static void simulated_levels_lie_as_far_apart_as_asked(void **state)
             assert_true(fabs(high / low - 1) < 0.35); /* eight bits, and noise that is cut off at black and white */
         }
         assert_true(set.ratio == wanted[t] && set.step_spp == 0);
-        ggn_chains_release(&set);
+        ggn_series_set_release(&set);
     }
     (void)state;
 }
 
 static void windows_are_labelled_by_their_last_image(void **state)
 {
-    struct ggn_chains set;
+    struct ggn_series_set set;
     struct ggn_windows w, published;
     struct ggn_window_options o = {.split = GGN_SPLIT_TRAIN, .length = 6, .soft = 1};
     struct base_err err = {0};
@@ -174,7 +174,7 @@ static void windows_are_labelled_by_their_last_image(void **state)
     assert_int_equal(w.n, 9 * (14 - 5));
     int later = 0;
     for (int i = 0; i < w.n; i++) {
-        const struct ggn_chain *c = &set.chains[w.list[i].chain];
+        const struct ggn_level_series *c = &set.series[w.list[i].series];
         assert_int_equal(w.list[i].noisy, c->spp[w.list[i].last] < c->label.threshold);
         assert_true(fabs(w.list[i].label - w.list[i].noisy) <= 0.5);
         later += published.list[i].noisy && !w.list[i].noisy;
@@ -184,17 +184,17 @@ static void windows_are_labelled_by_their_last_image(void **state)
         int a = ggn_windows_draw(&w, (uint64_t)i, i % 16, 7);
         assert_int_equal(a, ggn_windows_draw(&w, (uint64_t)i, i % 16, 7));
         assert_in_range(a, 0, w.n - 1);
-        assert_int_equal(set.chains[w.list[a].chain].split, GGN_SPLIT_TRAIN);
+        assert_int_equal(set.series[w.list[a].series].split, GGN_SPLIT_TRAIN);
         drawn[w.list[a].noisy]++;
     }
     assert_true(drawn[0] > 120 && drawn[1] > 120);
     ggn_windows_release(&w);
     ggn_windows_release(&published);
-    ggn_chains_release(&set);
+    ggn_series_set_release(&set);
     (void)state;
 }
 
-/* --- noise pictures --- */
+/* --- noise maps --- */
 
 static int code(double linear)
 {
@@ -202,23 +202,24 @@ static int code(double linear)
     return (int)floor(255 * (v <= 0.0031308 ? 12.92 * v : 1.055 * pow(v, 1 / 2.4) - 0.055) + 0.5);
 }
 
-/* The noise picture of level k of a recorded block by its definition, from the halves of record `from`. */
-static void compare_picture(const struct ggn_chains *set, const struct ggn_chain *c, int k, const struct seq_block *b,
-                            const struct seq_record *r, const struct seq_record *from)
+/* The noise map of level k of a recorded block by its definition, from the halves of record `from`. */
+static void compare_picture(const struct ggn_series_set *set, const struct ggn_level_series *c, int k,
+                            const struct seq_block *b, const struct seq_record *r, const struct seq_record *from)
 {
-    const size_t pixels = ggn_chains_values(set) / 3;
+    const size_t pixels = ggn_series_set_values(set) / 3;
     float *mean = malloc(4 * pixels * sizeof *mean), *d = mean + 3 * pixels;
     struct base_err err = {0};
 
     assert_int_equal(seq_mean(b, r, mean, &err), 0);
     assert_int_equal(seq_half_luminance(b, from, d, &err), 0);
     const double n = from->spp, h = from->half_spp, even = 2 * sqrt(h * (n - h)) / n; /* 1 for equal halves */
-    assert_int_equal(c->has_picture[k], h > 0);
+    assert_int_equal(c->has_noise_map[k], h > 0);
     int largest = 0;
     for (size_t p = 0; p < pixels && h > 0; p++) {
         double y =
             0.2126729 * (double)mean[p] + 0.7151522 * (double)mean[pixels + p] + 0.0721750 * (double)mean[2 * pixels + p];
-        int want = abs(code(y + even * sqrt(n / r->spp) * (double)d[p]) - code(y)), got = c->picture[(size_t)k * pixels + p];
+        int want = abs(code(y + even * sqrt(n / r->spp) * (double)d[p]) - code(y)),
+            got = c->noise_map[(size_t)k * pixels + p];
         assert_true(abs(got - want) <= 1); /* a value between two codes may be rounded either way */
         largest = want > largest ? want : largest;
     }
@@ -240,12 +241,12 @@ static void pictures_of_recorded_levels(void **state)
     snprintf(view, sizeof view, "%s/view", own);
     ggn_noise_view(view, "view", &noise, sigma, 1, 100);
     for (int which = 0; which < 2; which++) {
-        struct ggn_chains_options o = {.dir = dirs[which], .pictures = 1};
-        struct ggn_chains set;
+        struct ggn_series_set_options o = {.dir = dirs[which], .noise_maps = 1};
+        struct ggn_series_set set;
         struct seq_block b;
-        if (ggn_chains_load(&set, &o, &err))
+        if (ggn_series_set_load(&set, &o, &err))
             fail_msg("%s", err.text);
-        const struct ggn_chain *c = &set.chains[0];
+        const struct ggn_level_series *c = &set.series[0];
         const struct ggn_dataset_view *v = &set.data.views[c->view];
         assert_int_equal(seq_manifest_read_block(v->dir, &v->manifest, 0, &b, &err), 0);
         int full = 0, with = 0;
@@ -257,69 +258,69 @@ static void pictures_of_recorded_levels(void **state)
         for (int k = 0; k < c->n_levels; k++)
             compare_picture(&set, c, k, &b, &b.levels[k], &b.levels[which == 0 ? k : full]);
         seq_block_release(&b);
-        ggn_chains_release(&set);
+        ggn_series_set_release(&set);
     }
-    struct ggn_chains_options o = {.dir = own};
-    struct ggn_chains set;
-    assert_int_equal(ggn_chains_load(&set, &o, &err), 0);
-    assert_null(set.chains[0].picture);
+    struct ggn_series_set_options o = {.dir = own};
+    struct ggn_series_set set;
+    assert_int_equal(ggn_series_set_load(&set, &o, &err), 0);
+    assert_null(set.series[0].noise_map);
     struct ggn_augment none = ggn_augment_none();
-    assert_int_equal(ggn_picture_plane(&set.chains[0], 1, set.width, set.height, &none, NULL), 0);
-    ggn_chains_release(&set);
+    assert_int_equal(ggn_noise_map_plane(&set.series[0], 1, set.width, set.height, &none, NULL), 0);
+    ggn_series_set_release(&set);
     (void)state;
 }
 
 /* Levels that were never rendered have pictures as strong as those of rendered levels at the same samples. */
 static void pictures_of_made_levels(void **state)
 {
-    struct ggn_chains_options o = {.dir = dir, .pictures = 1, .mean_for_reference = 1};
-    struct ggn_chains set;
+    struct ggn_series_set_options o = {.dir = dir, .noise_maps = 1, .mean_for_reference = 1};
+    struct ggn_series_set set;
     struct base_err err = {0};
     double sum[2] = {0, 0};
 
-    if (ggn_chains_load(&set, &o, &err))
+    if (ggn_series_set_load(&set, &o, &err))
         fail_msg("%s", err.text);
     for (int i = 0; i < set.n; i++)
-        set.chains[i].label.threshold = 400;
-    assert_int_equal(ggn_chains_add_synthetic(&set, 1, 3, &err), 0);
-    assert_int_equal(ggn_chains_extend(&set, 3, &err), 0);
-    const size_t pixels = ggn_chains_values(&set) / 3;
+        set.series[i].label.threshold = 400;
+    assert_int_equal(ggn_series_set_add_synthetic(&set, 1, 3, &err), 0);
+    assert_int_equal(ggn_series_set_extend(&set, 3, &err), 0);
+    const size_t pixels = ggn_series_set_values(&set) / 3;
     for (int i = 0; i < set.n; i++) {
-        const struct ggn_chain *c = &set.chains[i];
+        const struct ggn_level_series *c = &set.series[i];
         for (int k = 2; k < c->n_levels; k++) {
             double mean = 0;
-            assert_true(c->has_picture[k]);
+            assert_true(c->has_noise_map[k]);
             for (size_t p = 0; p < pixels; p++)
-                mean += c->picture[(size_t)k * pixels + p] / (double)pixels;
+                mean += c->noise_map[(size_t)k * pixels + p] / (double)pixels;
             if (c->spp[k] < 100) /* codes of more than one, so that rounding matters little */
                 sum[c->synthetic] += mean * sqrt(c->spp[k]) / (c->synthetic ? 9 : 12);
         }
     }
     if (fabs(sum[1] / sum[0] - 1) > 0.15)
         fail_msg("made %g, rendered %g", sum[1], sum[0]);
-    ggn_chains_release(&set);
+    ggn_series_set_release(&set);
     (void)state;
 }
 
 /* Flips and gains as of the images, and nothing for the share of samples that goes without. */
 static void pictures_are_augmented_with_their_window(void **state)
 {
-    struct ggn_chains_options o = {.dir = dir, .pictures = 1};
-    struct ggn_chains set;
+    struct ggn_series_set_options o = {.dir = dir, .noise_maps = 1};
+    struct ggn_series_set set;
     struct base_err err = {0};
     struct ggn_augment a = {.flip_x = 1, .flip_y = 1, .gain = {2, 2, 2}};
-    const struct ggn_augment_options half = {.picture = 0.5}, all = {.flips = 1, .picture = 1};
+    const struct ggn_augment_options half = {.noise_map = 0.5}, all = {.flips = 1, .noise_map = 1};
     int blind = 0, flips = 0;
 
-    assert_int_equal(ggn_chains_load(&set, &o, &err), 0);
-    const struct ggn_chain *c = &set.chains[0];
-    const size_t pixels = ggn_chains_values(&set) / 3;
+    assert_int_equal(ggn_series_set_load(&set, &o, &err), 0);
+    const struct ggn_level_series *c = &set.series[0];
+    const size_t pixels = ggn_series_set_values(&set) / 3;
     float *plane = malloc(pixels * sizeof *plane);
-    assert_int_equal(ggn_picture_plane(c, 3, set.width, set.height, &a, plane), 1);
+    assert_int_equal(ggn_noise_map_plane(c, 3, set.width, set.height, &a, plane), 1);
     for (size_t p = 0; p < pixels; p++) /* (2^(1/2.4) codes of 16/255 each) */
-        assert_float_equal(plane[pixels - 1 - p], 1.334840 * 16 / 255 * c->picture[3 * pixels + p], 1e-4);
+        assert_float_equal(plane[pixels - 1 - p], 1.334840 * 16 / 255 * c->noise_map[3 * pixels + p], 1e-4);
     a.blind = 1;
-    assert_int_equal(ggn_picture_plane(c, 3, set.width, set.height, &a, plane), 0);
+    assert_int_equal(ggn_noise_map_plane(c, 3, set.width, set.height, &a, plane), 0);
     for (int i = 0; i < 1000; i++) {
         struct ggn_augment without = ggn_augment_draw((uint64_t)i, 1, 5, &half),
                            with = ggn_augment_draw((uint64_t)i, 1, 5, &all);
@@ -330,18 +331,18 @@ static void pictures_are_augmented_with_their_window(void **state)
     assert_in_range(blind, 430, 570);
     assert_in_range(flips, 430, 570);
     free(plane);
-    ggn_chains_release(&set);
+    ggn_series_set_release(&set);
     (void)state;
 }
 
 /* All eight symmetries, the same for noisy images and reference of a crop that is the whole block. */
 static void augmentation_moves_whole_windows(void **state)
 {
-    struct ggn_chains set;
+    struct ggn_series_set set;
 
     load(&set, 0);
-    const struct ggn_chain *c = &set.chains[0];
-    size_t values = ggn_chains_values(&set), pixels = values / 3;
+    const struct ggn_level_series *c = &set.series[0];
+    size_t values = ggn_series_set_values(&set), pixels = values / 3;
     float *window = malloc(2 * values * sizeof *window), *crop = malloc(2 * values * sizeof *crop);
     double sum[8] = {0};
     for (int k = 0; k < 8; k++) {
@@ -366,7 +367,7 @@ static void augmentation_moves_whole_windows(void **state)
         assert_float_equal(window[i], 8 * ((float)c->noisy[2 * values + i] - (float)c->noisy[3 * values + i]) / 255, 1e-4);
     free(window);
     free(crop);
-    ggn_chains_release(&set);
+    ggn_series_set_release(&set);
     (void)state;
 }
 
@@ -474,7 +475,7 @@ static void platt_recovers_the_scale(void **state)
  * cost a check more, and are chosen where a single low logit long before the threshold would stop the block. */
 static void the_threshold_respects_the_early_rate(void **state)
 {
-    struct ggn_chains set;
+    struct ggn_series_set set;
     struct ggn_windows w;
     struct ggn_window_options o = {.split = GGN_SPLIT_TRAIN, .length = 6};
     struct ggn_policy policy = ggn_policy_default();
@@ -513,8 +514,8 @@ static void the_threshold_respects_the_early_rate(void **state)
     ggn_checks_release(&checks);
     /* a guard that no level satisfies lets nothing stop, a gate that spares the network everywhere neither */
     for (int c = 0; c < set.n; c++)
-        for (int i = 0; i < set.chains[c].n_levels; i++)
-            set.chains[c].tail999[i] = set.chains[c].gini[i] = 0.5;
+        for (int i = 0; i < set.series[c].n_levels; i++)
+            set.series[c].tail999[i] = set.series[c].gini[i] = 0.5;
     for (int k = 0; k < 2; k++) {
         struct ggn_policy held = policy;
         *(k ? &held.gate_noise : &held.tail999) = 1e-12;
@@ -526,7 +527,7 @@ static void the_threshold_respects_the_early_rate(void **state)
     }
     free(logit);
     ggn_windows_release(&w);
-    ggn_chains_release(&set);
+    ggn_series_set_release(&set);
     (void)state;
 }
 
@@ -555,7 +556,7 @@ static void default_plans(void **state)
         assert_true(p.epochs == want[preset].epochs && p.epoch_steps == want[preset].epoch_steps);
         assert_true(p.patience == want[preset].patience && p.lr == want[preset].lr && p.lr_r == p.lr);
         assert_true(p.difference == want[preset].difference && p.soft_labels == want[preset].soft);
-        assert_true(p.flips == want[preset].flips && p.jitter == want[preset].jitter && p.picture == 0 && p.average == 0);
+        assert_true(p.flips == want[preset].flips && p.jitter == want[preset].jitter && p.noise_map == 0 && p.average == 0);
         assert_true(p.synthetic == want[preset].synthetic && p.extend == want[preset].extend && p.seed == 1);
         assert_true(p.validation_windows == 400 && p.early_rate == 0.02 && p.threads == 0);
         const struct ggn_train_options o = ggn_train_options_default((enum ggn_preset)preset);
@@ -667,7 +668,7 @@ static void slopes(void **state)
 static void stopping_by_hand(void **state)
 {
     static double spp[] = {10, 20, 40, 80};
-    struct ggn_chain chains[4];
+    struct ggn_level_series series[4];
     /* the third stops at no level at 0.5; the second never */
     struct ggn_seen seen[16] = {{.p = 0.9},
                                 {.p = 0.4},
@@ -691,8 +692,8 @@ static void stopping_by_hand(void **state)
     struct base_err err = {0};
 
     for (int c = 0; c < 4; c++)
-        chains[c] = (struct ggn_chain){.n_levels = 4, .spp = spp, .label.threshold = truth[c]};
-    struct ggn_chains set = {.n = 4, .chains = chains};
+        series[c] = (struct ggn_level_series){.n_levels = 4, .spp = spp, .label.threshold = truth[c]};
+    struct ggn_series_set set = {.n = 4, .series = series};
     struct ggn_windows w = {.set = &set, .n = 3, .first = first};
     struct ggn_checks checks = {.windows = &w, .policy = ggn_policy_default(), .seen = seen};
     assert_int_equal(ggn_calibrate_stopping(&checks, 1, 0.5, &got, &err), 0);
@@ -701,21 +702,21 @@ static void stopping_by_hand(void **state)
     assert_true(got.early_rate == 0 && fabs(got.samples_ratio - 260.0 / 255) < 1e-12);
     assert_true(fabs(got.median_abs_log2 - log2(25.0 / 20)) < 1e-12);
     assert_true(fabs(got.mean_abs_log2 - (log2(25.0 / 20) + log2(40.0 / 30)) / 3) < 1e-12);
-    chains[0].label.threshold = 25.1; /* now 20 is early */
-    chains[1].label.threshold = 50;   /* and the end of the recording late */
+    series[0].label.threshold = 25.1; /* now 20 is early */
+    series[1].label.threshold = 50;   /* and the end of the recording late */
     assert_int_equal(ggn_calibrate_stopping(&checks, 1, 0.5, &got, &err), 0);
     assert_true(got.early_rate == 1.0 / 3 && fabs(got.samples_ratio - 140.0 / 105.1) < 1e-12);
     assert_int_equal(ggn_calibrate_stopping(&checks, 2, 0.5, &got, &err), 0); /* 40, never, 80 */
     assert_true(got.early_rate == 0 && fabs(got.samples_ratio - 200.0 / 105.1) < 1e-12);
     /* one pass below 0.5 is right for the first and too early for none of the others: the best that is allowed */
-    chains[0].label.threshold = 20;
-    chains[1].label.threshold = 80;
-    chains[3].label.threshold = 40;
+    series[0].label.threshold = 20;
+    series[1].label.threshold = 80;
+    series[3].label.threshold = 40;
     struct ggn_policy p = ggn_policy_default();
     assert_int_equal(ggn_calibrate_threshold(&checks, 0, &p, &got, &err), 0);
     assert_true(p.threshold == 0.41 && p.passes == 1 && got.mean_abs_log2 == 0 &&
                 got.samples_ratio == 1); /* p < t, not p <= t */
-    chains[0].label.threshold = 50;      /* 40 is four fifths of it, which is not early; 20, better for two passes, is */
+    series[0].label.threshold = 50;      /* 40 is four fifths of it, which is not early; 20, better for two passes, is */
     assert_int_equal(ggn_calibrate_threshold(&checks, 0, &p, &got, &err), 0);
     assert_true(p.threshold == 0.31 && p.passes == 1 && fabs(got.mean_abs_log2 - log2(1.25) / 3) < 1e-12);
     (void)state;
@@ -724,7 +725,7 @@ static void stopping_by_hand(void **state)
 /* The largest values of windows that count, each with its margin; what the policy has already is kept where it is larger. */
 static void limits_by_brute_force(void **state)
 {
-    struct ggn_chains set;
+    struct ggn_series_set set;
     struct ggn_windows w;
     struct ggn_window_options o = {.split = GGN_SPLIT_TRAIN, .length = 4};
     struct ggn_policy got = {.tail999 = 0.01}, kept = {.gate_noise = 7, .tail999 = 8, .gini = 1.5};
@@ -733,16 +734,16 @@ static void limits_by_brute_force(void **state)
 
     load(&set, 0);
     assert_int_equal(ggn_windows_create(&w, &set, &o, &err), 0);
-    const size_t values = ggn_chains_values(&set);
+    const size_t values = ggn_series_set_values(&set);
     for (int c = 0; c < set.n; c++)
-        for (int k = 0; k < set.chains[c].n_levels; k++) {
+        for (int k = 0; k < set.series[c].n_levels; k++) {
             uint32_t at = (uint32_t)(100 * c + k);
-            set.chains[c].synthetic = c == 1;
-            set.chains[c].tail999[k] = at % 5 == 1 ? (double)NAN : ggn_hash_unit(at, 1);
-            set.chains[c].gini[k] = at % 7 == 2 ? (double)NAN : 0.9 * ggn_hash_unit(at, 2);
+            set.series[c].synthetic = c == 1;
+            set.series[c].tail999[k] = at % 5 == 1 ? (double)NAN : ggn_hash_unit(at, 1);
+            set.series[c].gini[k] = at % 7 == 2 ? (double)NAN : 0.9 * ggn_hash_unit(at, 2);
         }
     for (int i = 0; i < w.n; i++) {
-        const struct ggn_chain *c = &set.chains[w.list[i].chain];
+        const struct ggn_level_series *c = &set.series[w.list[i].series];
         const int last = w.list[i].last;
         double octave = log2(c->spp[last] / c->label.threshold), square = 0;
         if (c->synthetic || octave < log2(0.8))
@@ -763,9 +764,9 @@ static void limits_by_brute_force(void **state)
     ggn_calibrate_limits(&w, &kept);
     assert_true(kept.gate_noise == 7 && kept.tail999 == 8 && kept.gini == 1.5);
     for (int c = 0; c < set.n; c++)
-        set.chains[c].synthetic = 0; /* who owns its reference */
+        set.series[c].synthetic = 0; /* who owns its reference */
     ggn_windows_release(&w);
-    ggn_chains_release(&set);
+    ggn_series_set_release(&set);
     (void)state;
 }
 

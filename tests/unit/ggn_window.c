@@ -52,14 +52,14 @@ static void noise_pictures_are_differences_of_codes(void **state)
 
     for (uint32_t k = 0; k < 20000; k++) {
         double mean = exp2(-14 + 16 * ggn_hash_unit(k, 1)), d = mean * 0.5 * (ggn_hash_unit(k, 2) - 0.5);
-        assert_int_equal(ggn_picture_code(mean, d, NULL), abs(shown(mean + d) - shown(mean)));
-        assert_int_equal(ggn_picture_code(mean, d, &exposed), ggn_picture_code(2 * mean, 2 * d, NULL));
+        assert_int_equal(ggn_noise_map_code(mean, d, NULL), abs(shown(mean + d) - shown(mean)));
+        assert_int_equal(ggn_noise_map_code(mean, d, &exposed), ggn_noise_map_code(2 * mean, 2 * d, NULL));
     }
-    assert_int_equal(ggn_picture_code(5, 1, NULL), 0);
-    assert_int_equal(ggn_picture_code(1.1, -1.05, NULL), 255 - shown(0.05));
-    assert_int_equal(ggn_picture_code(0.2, (double)NAN, NULL), 0);
-    assert_int_equal(ggn_picture_code((double)NAN, 0.2, NULL), 0);
-    assert_int_equal(ggn_picture_code(0.2, (double)INFINITY, NULL), 0);
+    assert_int_equal(ggn_noise_map_code(5, 1, NULL), 0);
+    assert_int_equal(ggn_noise_map_code(1.1, -1.05, NULL), 255 - shown(0.05));
+    assert_int_equal(ggn_noise_map_code(0.2, (double)NAN, NULL), 0);
+    assert_int_equal(ggn_noise_map_code((double)NAN, 0.2, NULL), 0);
+    assert_int_equal(ggn_noise_map_code(0.2, (double)INFINITY, NULL), 0);
     uint8_t image[6] = {0, 1, 2, 3, 4, 5};
     float tile[5 * 8], three[3 * 5 * 8];
     uint8_t thrice[18];

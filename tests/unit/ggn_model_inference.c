@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "model/exact.h"
-#include "model/judge.h"
+#include "model/inference.h"
 #include "model/preprocess.h"
 #include "model/window.h"
 #include "nn/exec.h"
@@ -34,8 +34,8 @@ static void image(uint8_t *rgb, uint32_t seed)
         rgb[k] = (uint8_t)(ggn_hash(k, seed) >> 24);
 }
 
-/* The logit of the window of images `first` and the next two, with a noise picture or NULL. */
-static double picture_logit(struct ggn_judge *j, uint32_t first, const uint8_t *picture)
+/* The logit of the window of images `first` and the next two, with a noise map or NULL. */
+static double picture_logit(struct ggn_inference *j, uint32_t first, const uint8_t *picture)
 {
     static uint8_t noisy[3][BYTES];
     static uint16_t denoised[3][BYTES];
@@ -44,28 +44,28 @@ static double picture_logit(struct ggn_judge *j, uint32_t first, const uint8_t *
 
     for (uint32_t i = 0; i < 3; i++) {
         image(noisy[i], first + i);
-        ggn_judge_denoise(j, noisy[i], denoised[i], 33, 24);
+        ggn_inference_denoise(j, noisy[i], denoised[i], 33, 24);
     }
-    double logit = ggn_judge_logit(j, n, d, picture, 33, 24);
+    double logit = ggn_inference_logit(j, n, d, picture, 33, 24);
     assert_true(isfinite(logit));
     return logit;
 }
 
-static double window_logit(struct ggn_judge *j, uint32_t first) { return picture_logit(j, first, NULL); }
+static double window_logit(struct ggn_inference *j, uint32_t first) { return picture_logit(j, first, NULL); }
 
 /* The answer depends on the window alone: not on the judge, nor on what it judged before. */
 static void test_no_memory(void **state)
 {
     struct ggn_model *m = make();
-    struct ggn_judge *a = ggn_judge_create(m, GGN_PRECISION_F32, NULL, NULL),
-                     *b = ggn_judge_create(m, GGN_PRECISION_F32, NULL, NULL);
+    struct ggn_inference *a = ggn_inference_create(m, GGN_PRECISION_F32, NULL, NULL),
+                         *b = ggn_inference_create(m, GGN_PRECISION_F32, NULL, NULL);
 
     assert_true(a && b);
     double before = window_logit(a, 1), used = window_logit(a, 5), fresh = window_logit(b, 5);
     assert_true(before != used);
     assert_memory_equal(&used, &fresh, sizeof used);
-    ggn_judge_destroy(a);
-    ggn_judge_destroy(b);
+    ggn_inference_destroy(a);
+    ggn_inference_destroy(b);
     ggn_model_destroy(m);
     (void)state;
 }
@@ -74,7 +74,7 @@ static void test_no_memory(void **state)
 static void compare_with_networks(const uint8_t *picture)
 {
     struct ggn_model *m = make();
-    struct ggn_judge *j = ggn_judge_create(m, GGN_PRECISION_F32, NULL, NULL);
+    struct ggn_inference *j = ggn_inference_create(m, GGN_PRECISION_F32, NULL, NULL);
     struct ggn_exec *den = ggn_exec_create(&m->graph[GGN_NET_R], NULL, 1, GGN_EXEC_NO_FUSE, NULL, NULL);
     struct ggn_exec *gen = ggn_exec_create(&m->graph[GGN_NET_M], NULL, 2, GGN_EXEC_NO_FUSE, NULL, NULL);
     struct ggn_exec *dis = ggn_exec_create(&m->graph[GGN_NET_D], NULL, 1, GGN_EXEC_NO_FUSE, NULL, NULL);
@@ -100,11 +100,11 @@ static void compare_with_networks(const uint8_t *picture)
             memcpy(ggn_exec_plane(dis, 0, 0, c) + y * 34, ggn_exec_plane(gen, out, c, 0) + y * 34, 33 * sizeof(float));
     for (int k = 0; k < 2 * AREA; k++) { /* its maps, to a few roundings of a float */
         int row;
-        const float *map = ggn_judge_feature_map(j, k / AREA, &row);
+        const float *map = ggn_inference_feature_map(j, k / AREA, &row);
         const int y = k % AREA / 33, x = k % AREA % 33;
         assert_true(fabsf(map[y * row + x] - ggn_exec_plane(gen, out, k / AREA, 0)[y * 34 + x]) < 1.5e-6f);
     }
-    for (int k = 0; k < AREA && hyper.picture; k++) {
+    for (int k = 0; k < AREA && hyper.noise_map; k++) {
         ggn_exec_plane(dis, 0, 0, 2)[k / 33 * 34 + k % 33] = picture ? 16.0F * (float)picture[k] / 255 : 0;
         ggn_exec_plane(dis, 0, 0, 3)[k / 33 * 34 + k % 33] = picture ? 1 : 0;
     }
@@ -115,7 +115,7 @@ static void compare_with_networks(const uint8_t *picture)
     ggn_exec_destroy(den);
     ggn_exec_destroy(gen);
     ggn_exec_destroy(dis);
-    ggn_judge_destroy(j);
+    ggn_inference_destroy(j);
     ggn_model_destroy(m);
     free(rgb);
 }
@@ -126,30 +126,30 @@ static void test_against_networks(void **state)
     (void)state;
 }
 
-/* The noise picture reaches the discriminator; none is not the same as one without noise; other models do not look at it. */
+/* The noise map reaches the discriminator; none is not the same as one without noise; other models do not look at it. */
 static void test_picture(void **state)
 {
     static uint8_t picture[AREA], still[AREA];
-    struct ggn_judge *j;
+    struct ggn_inference *j;
     struct ggn_model *m = make();
 
     for (uint32_t k = 0; k < AREA; k++)
         picture[k] = (uint8_t)(ggn_hash(k, 77) >> 30);
-    assert_non_null(j = ggn_judge_create(m, GGN_PRECISION_F32, NULL, NULL));
+    assert_non_null(j = ggn_inference_create(m, GGN_PRECISION_F32, NULL, NULL));
     assert_true(picture_logit(j, 1, picture) == window_logit(j, 1));
-    ggn_judge_destroy(j);
+    ggn_inference_destroy(j);
     ggn_model_destroy(m);
-    hyper.picture = 1;
+    hyper.noise_map = 1;
     compare_with_networks(picture);
     compare_with_networks(NULL);
     m = make();
-    assert_non_null(j = ggn_judge_create(m, GGN_PRECISION_F32, NULL, NULL));
+    assert_non_null(j = ggn_inference_create(m, GGN_PRECISION_F32, NULL, NULL));
     double with = picture_logit(j, 1, picture), without = window_logit(j, 1), calm = picture_logit(j, 1, still);
     assert_true(with != without && with != calm && calm != without);
     assert_true(window_logit(j, 1) == without);
-    ggn_judge_destroy(j);
+    ggn_inference_destroy(j);
     ggn_model_destroy(m);
-    hyper.picture = 0;
+    hyper.noise_map = 0;
     (void)state;
 }
 
@@ -157,16 +157,16 @@ static void test_picture(void **state)
 static void test_bf16(void **state)
 {
     struct ggn_model *m = make();
-    struct ggn_judge *f = ggn_judge_create(m, GGN_PRECISION_F32, NULL, NULL),
-                     *b = ggn_judge_create(m, GGN_PRECISION_BF16, NULL, NULL);
+    struct ggn_inference *f = ggn_inference_create(m, GGN_PRECISION_F32, NULL, NULL),
+                         *b = ggn_inference_create(m, GGN_PRECISION_BF16, NULL, NULL);
 
     assert_true(f && b);
     double exact = window_logit(f, 1), rounded = window_logit(b, 1), again = window_logit(b, 1);
     assert_memory_equal(&rounded, &again, sizeof again);
     assert_true(fabs(rounded - exact) < 0.1);
     assert_true(rounded != exact);
-    ggn_judge_destroy(f);
-    ggn_judge_destroy(b);
+    ggn_inference_destroy(f);
+    ggn_inference_destroy(b);
     ggn_model_destroy(m);
     (void)state;
 }
@@ -177,8 +177,8 @@ static void test_memory_bounds(void **state)
     struct ggn_model *m = ggn_model_create(&full, NULL);
 
     assert_non_null(m);
-    assert_true(ggn_judge_bytes(m, GGN_PRECISION_F32, 1) <= 64000000);
-    assert_true(ggn_judge_bytes(m, GGN_PRECISION_BF16, 1) <= 64000000);
+    assert_true(ggn_inference_bytes(m, GGN_PRECISION_F32, 1) <= 64000000);
+    assert_true(ggn_inference_bytes(m, GGN_PRECISION_BF16, 1) <= 64000000);
     ggn_model_destroy(m);
     (void)state;
 }
@@ -203,7 +203,7 @@ static void test_srgb(void **state)
     (void)state;
 }
 
-/* In double the same answer, as far as floats go, with and without a noise picture; and not the very same. */
+/* In double the same answer, as far as floats go, with and without a noise map; and not the very same. */
 static void test_exact(void **state)
 {
     static uint8_t noisy[3][BYTES], picture[AREA];
@@ -211,19 +211,19 @@ static void test_exact(void **state)
     const uint8_t *const n[3] = {noisy[0], noisy[1], noisy[2]};
     const uint16_t *const w[3] = {wide[0], wide[1], wide[2]};
     const float *learned[GGN_NETS];
-    const int before = hyper.picture;
+    const int before = hyper.noise_map;
 
-    hyper.picture = 1;
+    hyper.noise_map = 1;
     struct ggn_model *m = make();
     for (int net = 0; net < GGN_NETS; net++)
         learned[net] = m->weights[net]->params;
-    struct ggn_judge *j = ggn_judge_create(m, GGN_PRECISION_F32, NULL, NULL);
+    struct ggn_inference *j = ggn_inference_create(m, GGN_PRECISION_F32, NULL, NULL);
     struct ggn_exact *e = ggn_exact_create(&m->hyper, m->graph, learned, NULL);
     assert_true(j && e);
     int differ = 0;
     for (uint32_t i = 0; i < 3; i++) {
         image(noisy[i], 1 + i);
-        ggn_judge_denoise(j, noisy[i], narrow[i], 33, 24);
+        ggn_inference_denoise(j, noisy[i], narrow[i], 33, 24);
         ggn_exact_denoise(e, noisy[i], wide[i]);
         for (int k = 0; k < BYTES; k++)
             assert_in_range((int)wide[i][k] - (int)narrow[i][k] + 2, 0, 4);
@@ -232,16 +232,16 @@ static void test_exact(void **state)
         picture[k] = (uint8_t)(k % 7);
     for (int with = 0; with < 2; with++) {
         double exact = ggn_exact_logit(e, n, w, with ? picture : NULL),
-               judged = ggn_judge_logit(j, n, w, with ? picture : NULL, 33, 24);
+               judged = ggn_inference_logit(j, n, w, with ? picture : NULL, 33, 24);
         if (!(fabs(exact - judged) < 1e-4 * fmax(1, fabs(judged))))
             fail_msg("picture %d: double %.12g, judge %.12g", with, exact, judged);
         differ += exact != judged;
     }
     assert_true(differ > 0);
     ggn_exact_destroy(e);
-    ggn_judge_destroy(j);
+    ggn_inference_destroy(j);
     ggn_model_destroy(m);
-    hyper.picture = before;
+    hyper.noise_map = before;
     (void)state;
 }
 
@@ -284,7 +284,7 @@ static int begin_of(int n, int tile, int k)
 
 /* The block cut into images of the network's size, each judged alone: the highest logit, and what the last tile that covers a pixel makes
  * of it. */
-static double tile_by_tile(struct ggn_judge *j, uint8_t noisy[3][MOST], const uint8_t *picture, int w, int h,
+static double tile_by_tile(struct ggn_inference *j, uint8_t noisy[3][MOST], const uint8_t *picture, int w, int h,
                            uint16_t denoised[3][MOST])
 {
     static uint8_t cut[3][BYTES], small[AREA];
@@ -306,14 +306,14 @@ static double tile_by_tile(struct ggn_judge *j, uint8_t noisy[3][MOST], const ui
                     small[k % AREA] = picture[at % (w * h)];
                 }
                 if (!pass)
-                    ggn_judge_denoise(j, cut[i], out[i], NET_W, NET_H);
+                    ggn_inference_denoise(j, cut[i], out[i], NET_W, NET_H);
                 for (int k = 0; k < BYTES && !pass; k++) {
                     const int y = y0 + k % AREA / NET_W, x = x0 + k % NET_W;
                     if (y < h && x < w)
                         denoised[i][k / AREA * w * h + y * w + x] = out[i][k];
                 }
             }
-            highest = pass ? fmax(highest, ggn_judge_logit(j, n, d, small, NET_W, NET_H)) : highest;
+            highest = pass ? fmax(highest, ggn_inference_logit(j, n, d, small, NET_W, NET_H)) : highest;
         }
     return highest;
 }
@@ -325,11 +325,11 @@ static void test_tiles(void **state)
     static uint16_t want[3][MOST], got[3][MOST];
     const uint8_t *const n[3] = {noisy[0], noisy[1], noisy[2]};
     const uint16_t *const d[3] = {got[0], got[1], got[2]};
-    const int before = hyper.picture;
+    const int before = hyper.noise_map;
 
-    hyper.picture = 1;
+    hyper.noise_map = 1;
     struct ggn_model *m = make();
-    struct ggn_judge *j = ggn_judge_create(m, GGN_PRECISION_F32, NULL, NULL);
+    struct ggn_inference *j = ggn_inference_create(m, GGN_PRECISION_F32, NULL, NULL);
     assert_non_null(j);
     for (uint32_t k = 0; k < MOST; k++) {
         picture[k] = (uint8_t)(ggn_hash(k, 7) >> 29);
@@ -340,16 +340,16 @@ static void test_tiles(void **state)
         const int w = sizes[s][0], h = sizes[s][1];
         double highest = tile_by_tile(j, noisy, picture, w, h, want);
         for (int i = 0; i < 3; i++) {
-            ggn_judge_denoise(j, noisy[i], got[i], w, h);
+            ggn_inference_denoise(j, noisy[i], got[i], w, h);
             assert_memory_equal(got[i], want[i], (size_t)(3 * w * h) * sizeof got[i][0]);
         }
-        assert_true(ggn_judge_logit(j, n, d, picture, w, h) == highest);
+        assert_true(ggn_inference_logit(j, n, d, picture, w, h) == highest);
         got[1][3 * w * h - 1] = GGN_FIXED_NAN; /* one value that is none, of the last image's neighbour */
-        assert_true(isnan(ggn_judge_logit(j, n, d, picture, w, h)));
+        assert_true(isnan(ggn_inference_logit(j, n, d, picture, w, h)));
     }
-    ggn_judge_destroy(j);
+    ggn_inference_destroy(j);
     ggn_model_destroy(m);
-    hyper.picture = before;
+    hyper.noise_map = before;
     (void)state;
 }
 

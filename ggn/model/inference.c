@@ -1,4 +1,4 @@
-#include "model/judge.h"
+#include "model/inference.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -8,7 +8,7 @@
 #include "nn/bf16.h"
 #include "nn/exec.h"
 
-struct ggn_judge {
+struct ggn_inference {
     const struct ggn_model *model; /* borrows */
     struct ggn_exec *exec[GGN_NETS];
 };
@@ -24,19 +24,19 @@ int ggn_precision_is_slow(enum ggn_precision precision)
 
 static int exec_flags(enum ggn_precision precision) { return precision == GGN_PRECISION_BF16 ? GGN_EXEC_BF16 : 0; }
 
-size_t ggn_judge_bytes(const struct ggn_model *model, enum ggn_precision precision, int threads)
+size_t ggn_inference_bytes(const struct ggn_model *model, enum ggn_precision precision, int threads)
 {
-    size_t bytes = sizeof(struct ggn_judge);
+    size_t bytes = sizeof(struct ggn_inference);
 
     for (int net = 0; net < GGN_NETS; net++)
         bytes += ggn_exec_bytes(&model->graph[net], 1, exec_flags(precision), threads);
     return bytes;
 }
 
-struct ggn_judge *ggn_judge_create(const struct ggn_model *model, enum ggn_precision precision, struct base_threads *threads,
-                                   struct base_err *err)
+struct ggn_inference *ggn_inference_create(const struct ggn_model *model, enum ggn_precision precision,
+                                           struct base_threads *threads, struct base_err *err)
 {
-    struct ggn_judge *j = calloc(1, sizeof *j);
+    struct ggn_inference *j = calloc(1, sizeof *j);
 
     if (!j) {
         base_fail_nomem(err, "judge");
@@ -46,14 +46,14 @@ struct ggn_judge *ggn_judge_create(const struct ggn_model *model, enum ggn_preci
     for (int net = 0; net < GGN_NETS; net++) {
         j->exec[net] = ggn_exec_create(&model->graph[net], NULL, 1, exec_flags(precision), threads, err);
         if (!j->exec[net]) {
-            ggn_judge_destroy(j);
+            ggn_inference_destroy(j);
             return NULL;
         }
     }
     return j;
 }
 
-void ggn_judge_destroy(struct ggn_judge *j)
+void ggn_inference_destroy(struct ggn_inference *j)
 {
     if (!j)
         return;
@@ -62,21 +62,24 @@ void ggn_judge_destroy(struct ggn_judge *j)
     free(j);
 }
 
-static const struct ggn_value *input(const struct ggn_judge *j, int net) { return &j->model->graph[net].value[0]; }
+static const struct ggn_value *input(const struct ggn_inference *j, int net) { return &j->model->graph[net].value[0]; }
 
-static const struct ggn_value *output(const struct ggn_judge *j, int net)
+static const struct ggn_value *output(const struct ggn_inference *j, int net)
 {
     return &j->model->graph[net].value[j->model->graph[net].n_values - 1];
 }
 
-static float *output_plane(const struct ggn_judge *j, int net)
+static float *output_plane(const struct ggn_inference *j, int net)
 {
     return ggn_exec_plane(j->exec[net], j->model->graph[net].n_values - 1, 0, 0);
 }
 
-static void forward(struct ggn_judge *j, int net) { ggn_exec_forward(j->exec[net], j->model->weights[net], 1, GGN_EVAL); }
+static void forward(struct ggn_inference *j, int net)
+{
+    ggn_exec_forward(j->exec[net], j->model->weights[net], 1, GGN_EVAL);
+}
 
-void ggn_judge_denoise(struct ggn_judge *j, const uint8_t *noisy, uint16_t *denoised, int width, int height)
+void ggn_inference_denoise(struct ggn_inference *j, const uint8_t *noisy, uint16_t *denoised, int width, int height)
 {
     const struct ggn_value *in = input(j, GGN_NET_R), *out = output(j, GGN_NET_R);
     const int nx = ggn_tile_count(width, in->w), ny = ggn_tile_count(height, in->h);
@@ -92,7 +95,7 @@ void ggn_judge_denoise(struct ggn_judge *j, const uint8_t *noisy, uint16_t *deno
 }
 
 /* The generator's map of its present input, into plane `which` of the discriminator's input. */
-static void map_into(struct ggn_judge *j, int which)
+static void map_into(struct ggn_inference *j, int which)
 {
     const struct ggn_value *map = output(j, GGN_NET_M), *to = input(j, GGN_NET_D);
 
@@ -100,22 +103,22 @@ static void map_into(struct ggn_judge *j, int which)
     ggn_plane_copy(to, ggn_exec_plane(j->exec[GGN_NET_D], 0, 0, which), output_plane(j, GGN_NET_M), map->row);
 }
 
-/* The noise picture, and whether there is one, into the discriminator's input. */
-static void load_picture(struct ggn_judge *j, const uint8_t *picture, int width, int height, int x0, int y0)
+/* The noise map, and whether there is one, into the discriminator's input. */
+static void load_noise_map(struct ggn_inference *j, const uint8_t *noise_map, int width, int height, int x0, int y0)
 {
     static const uint8_t there[2] = {0, 1};
     const struct ggn_value *to = input(j, GGN_NET_D);
     float *plane = ggn_exec_plane(j->exec[GGN_NET_D], 0, 0, 2), *flag = ggn_exec_plane(j->exec[GGN_NET_D], 0, 0, 3);
 
-    if (picture)
-        ggn_tile_load_plane(picture, width, height, x0, y0, to->w, to->h, GGN_PICTURE_GAIN, plane, (size_t)to->row);
+    if (noise_map)
+        ggn_tile_load_plane(noise_map, width, height, x0, y0, to->w, to->h, GGN_NOISE_MAP_GAIN, plane, (size_t)to->row);
     else
         ggn_tile_load_plane(&there[0], 1, 1, 0, 0, to->w, to->h, 1, plane, (size_t)to->row);
-    ggn_tile_load_plane(&there[picture != NULL], 1, 1, 0, 0, to->w, to->h, 1, flag, (size_t)to->row);
+    ggn_tile_load_plane(&there[noise_map != NULL], 1, 1, 0, 0, to->w, to->h, 1, flag, (size_t)to->row);
 }
 
-static double tile_logit(struct ggn_judge *j, const uint8_t *const *noisy, const uint16_t *const *denoised,
-                         const uint8_t *picture, int width, int height, int x0, int y0)
+static double tile_logit(struct ggn_inference *j, const uint8_t *const *noisy, const uint16_t *const *denoised,
+                         const uint8_t *noise_map, int width, int height, int x0, int y0)
 {
     const struct ggn_value *in = input(j, GGN_NET_M);
 
@@ -127,14 +130,14 @@ static double tile_logit(struct ggn_judge *j, const uint8_t *const *noisy, const
         ggn_tile_load_u8(noisy[k], width, height, x0, y0, in->w, in->h, 1.0F / 255,
                          ggn_exec_plane(j->exec[GGN_NET_M], 0, 0, 3 * k), (size_t)in->row, in->plane);
     map_into(j, 1);
-    if (j->model->hyper.picture)
-        load_picture(j, picture, width, height, x0, y0);
+    if (j->model->hyper.noise_map)
+        load_noise_map(j, noise_map, width, height, x0, y0);
     forward(j, GGN_NET_D);
     return (double)*output_plane(j, GGN_NET_D);
 }
 
-double ggn_judge_logit(struct ggn_judge *j, const uint8_t *const *noisy, const uint16_t *const *denoised,
-                       const uint8_t *picture, int width, int height)
+double ggn_inference_logit(struct ggn_inference *j, const uint8_t *const *noisy, const uint16_t *const *denoised,
+                           const uint8_t *noise_map, int width, int height)
 {
     const struct ggn_value *in = input(j, GGN_NET_M);
     const int nx = ggn_tile_count(width, in->w), ny = ggn_tile_count(height, in->h);
@@ -144,7 +147,7 @@ double ggn_judge_logit(struct ggn_judge *j, const uint8_t *const *noisy, const u
         if (!ggn_fixed_is_finite(denoised[k], 3 * (size_t)width * (size_t)height))
             return (double)NAN;
     for (int t = 0; t < nx * ny; t++) {
-        double z = tile_logit(j, noisy, denoised, picture, width, height, ggn_tile_start(width, in->w, t % nx),
+        double z = tile_logit(j, noisy, denoised, noise_map, width, height, ggn_tile_start(width, in->w, t % nx),
                               ggn_tile_start(height, in->h, t / nx));
         if (!isfinite(z))
             return z;
@@ -153,7 +156,7 @@ double ggn_judge_logit(struct ggn_judge *j, const uint8_t *const *noisy, const u
     return highest;
 }
 
-const float *ggn_judge_feature_map(const struct ggn_judge *j, int which, int *row)
+const float *ggn_inference_feature_map(const struct ggn_inference *j, int which, int *row)
 {
     *row = input(j, GGN_NET_D)->row;
     return ggn_exec_plane(j->exec[GGN_NET_D], 0, 0, which);

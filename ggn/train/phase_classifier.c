@@ -1,4 +1,4 @@
-#include "train/phase_judge.h"
+#include "train/phase_classifier.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -14,13 +14,13 @@
 #include "train/resume.h"
 #include "train/start.h"
 
-/* Of a sample: the window, the second window or reference, and the noise picture, which needs no more than an image. */
+/* Of a sample: the window, the second window or reference, and the noise map, which needs no more than an image. */
 static size_t sample_values(const struct ggn_session *s)
 {
-    return (2 * (size_t)s->hyper.window + 1) * ggn_chains_values(&s->set);
+    return (2 * (size_t)s->hyper.window + 1) * ggn_series_set_values(&s->set);
 }
 
-static size_t window_values(const struct ggn_session *s) { return (size_t)s->hyper.window * ggn_chains_values(&s->set); }
+static size_t window_values(const struct ggn_session *s) { return (size_t)s->hyper.window * ggn_series_set_values(&s->set); }
 
 static float difference(const struct ggn_session *s)
 {
@@ -43,12 +43,12 @@ static void fill_window(void *data, long i, int worker)
     const struct fill *f = data;
     const struct ggn_session *s = f->s;
     const struct ggn_window *w = &f->windows->list[f->index[i]];
-    const struct ggn_chain *c = &s->set.chains[w->chain];
+    const struct ggn_level_series *c = &s->set.series[w->series];
     const struct ggn_augment_options how = {s->plan->flips, s->set.width == s->set.height, s->plan->jitter,
-                                            s->plan->picture};
+                                            s->plan->noise_map};
     struct ggn_augment augment =
         f->augment ? ggn_augment_draw(f->step, f->first + (int)i, ggn_session_seed(s) ^ 2, &how) : ggn_augment_none();
-    float *at = s->buffer + (size_t)i * sample_values(s), *picture = at + 2 * window_values(s);
+    float *at = s->buffer + (size_t)i * sample_values(s), *noise_map = at + 2 * window_values(s);
 
     ggn_window_planes(c, w->last, s->hyper.window, s->set.width, s->set.height, 0, &augment, difference(s), at);
     at += window_values(s);
@@ -56,16 +56,16 @@ static void fill_window(void *data, long i, int worker)
         ggn_window_planes(c, w->last, s->hyper.window, s->set.width, s->set.height, 1, &augment, difference(s), at);
     } else {
         /* the reference, in the place of the window that preset paper denoises itself */
-        struct ggn_chain once = *c;
+        struct ggn_level_series once = *c;
         once.noisy = c->reference;
         ggn_window_planes(&once, 0, 1, s->set.width, s->set.height, 0, &augment, 0, at);
     }
     s->planes[6 * (size_t)s->hyper.window * (size_t)s->plan->batch + (size_t)i] =
-        ggn_picture_plane(c, w->last, s->set.width, s->set.height, &augment, picture) ? picture : NULL;
+        ggn_noise_map_plane(c, w->last, s->set.width, s->set.height, &augment, noise_map) ? noise_map : NULL;
     (void)worker;
 }
 
-/* Fills the buffer and the plane pointers: noisy windows first, then denoised ones (or references), then noise pictures. */
+/* Fills the buffer and the plane pointers: noisy windows first, then denoised ones (or references), then noise maps. */
 static struct ggn_batch fill_batch(struct ggn_session *s, const struct fill *f, int count)
 {
     const size_t plane = (size_t)s->set.width * (size_t)s->set.height;
@@ -85,7 +85,7 @@ static struct ggn_batch fill_batch(struct ggn_session *s, const struct fill *f, 
                               .noisy = noisy,
                               .denoised = f->denoised ? second : NULL,
                               .reference = f->denoised ? NULL : second,
-                              .picture = second + planes * (size_t)s->plan->batch};
+                              .noise_map = second + planes * (size_t)s->plan->batch};
 }
 
 /* --- evaluation mode -------------------------------------------------------------------------------------------------- */
@@ -122,7 +122,7 @@ static void logits(struct ggn_session *s, const struct ggn_windows *windows, con
         struct ggn_batch b = fill_batch(s, &f, count);
         generate(s, b.denoised, count, 0);
         generate(s, b.noisy, count, 1);
-        ggn_trainer_set_pictures(t, b.picture, count);
+        ggn_trainer_set_noise_maps(t, b.noise_map, count);
         ggn_exec_forward(t->d, t->weights[GGN_NET_D], count, GGN_EVAL);
         for (int i = 0; i < count; i++)
             logit[first + i] = (double)*ggn_exec_plane(t->d, out, i, 0);
@@ -135,15 +135,15 @@ enum { DENOISED_AT_ONCE = 4 }; /* images */
 struct denoise {
     struct ggn_session *s;
     struct ggn_exec *exec;
-    struct ggn_chain **chains; /* owns; [n] */
+    struct ggn_level_series **series; /* owns; [n] */
     uint32_t n;
 };
 
-static void denoise_images(const struct denoise *d, struct ggn_chain *c, int first, int count)
+static void denoise_images(const struct denoise *d, struct ggn_level_series *c, int first, int count)
 {
     const struct ggn_value *in = &d->exec->graph->value[0];
     const int out = d->exec->graph->n_values - 1, width = d->s->set.width, height = d->s->set.height;
-    const size_t values = ggn_chains_values(&d->s->set);
+    const size_t values = ggn_series_set_values(&d->s->set);
 
     for (int i = 0; i < count; i++)
         ggn_tile_load_u8(c->noisy + (size_t)(first + i) * values, width, height, 0, 0, width, height, 1.0F / 255,
@@ -155,12 +155,12 @@ static void denoise_images(const struct denoise *d, struct ggn_chain *c, int fir
                            d->exec->graph->value[out].plane);
 }
 
-static size_t denoised_bytes(const struct ggn_session *s, const struct ggn_chain *c)
+static size_t denoised_bytes(const struct ggn_session *s, const struct ggn_level_series *c)
 {
-    return (size_t)c->n_levels * ggn_chains_values(&s->set) * sizeof *c->denoised;
+    return (size_t)c->n_levels * ggn_series_set_values(&s->set) * sizeof *c->denoised;
 }
 
-static void denoise_chain(const struct denoise *d, struct ggn_chain *c)
+static void denoise_chain(const struct denoise *d, struct ggn_level_series *c)
 {
     for (int k = 0; k < c->n_levels; k += DENOISED_AT_ONCE)
         denoise_images(d, c, k, c->n_levels - k < DENOISED_AT_ONCE ? c->n_levels - k : DENOISED_AT_ONCE);
@@ -171,7 +171,7 @@ static int denoise_here(void *data, uint32_t first, uint32_t n, int thread, stru
     const struct denoise *d = data;
 
     for (uint32_t i = first; i < first + n; i++)
-        denoise_chain(d, d->chains[i]);
+        denoise_chain(d, d->series[i]);
     (void)thread;
     (void)err;
     return 0;
@@ -184,7 +184,7 @@ static int denoise_task(void *data, struct job_task *task, uint32_t k, uint32_t 
 
     denoise_here(data, task->first + k, n, thread, err);
     for (uint32_t i = 0; i < n; i++) {
-        const struct ggn_chain *c = d->chains[task->first + k + i];
+        const struct ggn_level_series *c = d->series[task->first + k + i];
         memcpy((char *)answer + i * task->answer_bytes, c->denoised, denoised_bytes(d->s, c));
     }
     return 0;
@@ -194,11 +194,11 @@ static int apply_denoised(void *data, uint32_t i, const void *answer)
 {
     const struct denoise *d = data;
 
-    memcpy(d->chains[i]->denoised, answer, denoised_bytes(d->s, d->chains[i]));
+    memcpy(d->series[i]->denoised, answer, denoised_bytes(d->s, d->series[i]));
     return 0;
 }
 
-/* Denoises the listed chains, shared out to the processes of a job; then all of them have them. */
+/* Denoises the listed series, shared out to the processes of a job; then all of them have them. */
 static int share_denoised(struct denoise *d, struct base_err *err)
 {
     struct job *job = d->s->plan->job;
@@ -207,44 +207,44 @@ static int share_denoised(struct denoise *d, struct base_err *err)
         .whole = 1, .count = d->n, .here = denoise_here, .apply = apply_denoised, .data = d, .answer_bytes = 8};
 
     for (uint32_t i = 0; i < d->n; i++)
-        while (farm.answer_bytes < denoised_bytes(d->s, d->chains[i]))
+        while (farm.answer_bytes < denoised_bytes(d->s, d->series[i]))
             farm.answer_bytes += 8;
     int rc = job_share(job, d->s->threads, &farm, &service, err);
     for (uint32_t i = 0; i < d->n && !rc; i++)
-        job_broadcast(job, d->chains[i]->denoised, denoised_bytes(d->s, d->chains[i]));
+        job_broadcast(job, d->series[i]->denoised, denoised_bytes(d->s, d->series[i]));
     return rc ? rc : job_failed(job, err);
 }
 
-/* The chains of one split (GGN_SPLITS: all), with room for what is denoised. */
+/* The series of one split (GGN_SPLITS: all), with room for what is denoised. */
 static int list_chains(struct denoise *d, enum ggn_split split, struct base_err *err)
 {
-    struct ggn_chains *set = &d->s->set;
+    struct ggn_series_set *set = &d->s->set;
 
     for (int i = 0; i < set->n; i++) {
-        struct ggn_chain *c = &set->chains[i];
+        struct ggn_level_series *c = &set->series[i];
         if (split != GGN_SPLITS && c->split != split)
             continue;
         if (!c->denoised)
             c->denoised = malloc(denoised_bytes(d->s, c) + 1);
         if (!c->denoised)
             return base_fail_nomem(err, "denoised images");
-        d->chains[d->n++] = c;
+        d->series[d->n++] = c;
     }
     return 0;
 }
 
-/* Denoises the chains of one split with s->r, in evaluation mode. */
+/* Denoises the series of one split with s->r, in evaluation mode. */
 static int denoise(struct ggn_session *s, enum ggn_split split, struct base_err *err)
 {
-    struct denoise d = {.s = s, .chains = malloc(((size_t)s->set.n + 1) * sizeof *d.chains)};
+    struct denoise d = {.s = s, .series = malloc(((size_t)s->set.n + 1) * sizeof *d.series)};
 
-    d.exec = d.chains ? ggn_exec_create(&s->r_graph, NULL, DENOISED_AT_ONCE, 0, s->threads, err) : NULL;
+    d.exec = d.series ? ggn_exec_create(&s->r_graph, NULL, DENOISED_AT_ONCE, 0, s->threads, err) : NULL;
     int rc = d.exec ? list_chains(&d, split, err) : base_fail_nomem(err, "denoised images");
     ggn_weights_pack(s->r, NULL);
     if (!rc)
         rc = share_denoised(&d, err);
     ggn_exec_destroy(d.exec);
-    free(d.chains);
+    free(d.series);
     return rc;
 }
 
@@ -330,7 +330,7 @@ static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, doub
     s->trainer->options.lr[GGN_NET_M] = s->trainer->options.lr[GGN_NET_D] = s->plan->lr * scale;
     s->trainer->options.lr[GGN_NET_R] = s->plan->lr_r * scale;
     int rc = paper ? ggn_trainer_paper_step(s->trainer, &b, &record, err)
-                   : ggn_trainer_judge_step(s->trainer, &b, loss, logit, err);
+                   : ggn_trainer_classifier_step(s->trainer, &b, loss, logit, err);
     if (rc)
         return rc;
     if (paper)
@@ -347,25 +347,25 @@ static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, doub
 
 /* --- validation ------------------------------------------------------------------------------------------------------- */
 
-void ggn_judged_release(struct ggn_judged *o)
+void ggn_classified_release(struct ggn_classified *o)
 {
     free(o->logit);
     free(o->label);
     free(o->noisy);
-    *o = (struct ggn_judged){0};
+    *o = (struct ggn_classified){0};
 }
 
-int ggn_judge_validation(struct ggn_session *s, int most, struct ggn_judged *o, struct base_err *err)
+int ggn_classify_validation(struct ggn_session *s, int most, struct ggn_classified *o, struct base_err *err)
 {
     const int n = s->validation.n < most ? s->validation.n : most;
     const size_t room = (size_t)n + 1;
     int *index = malloc(room * sizeof *index), rc = 0;
 
-    *o = (struct ggn_judged){.n = n,
-                             .logit = malloc(room * sizeof *o->logit),
-                             .label = malloc(room * sizeof *o->label),
-                             .noisy = malloc(room),
-                             .auc = (double)NAN};
+    *o = (struct ggn_classified){.n = n,
+                                 .logit = malloc(room * sizeof *o->logit),
+                                 .label = malloc(room * sizeof *o->label),
+                                 .noisy = malloc(room),
+                                 .auc = (double)NAN};
     if (!index || !o->logit || !o->label || !o->noisy)
         rc = base_fail_nomem(err, "validation");
     for (int i = 0; !rc && i < n; i++) {
@@ -388,8 +388,8 @@ int ggn_judge_validation(struct ggn_session *s, int most, struct ggn_judged *o, 
 static int measure(struct ggn_session *s, struct ggn_log_row *row, struct base_err *err)
 {
     struct ggn_policy calibrated = ggn_policy_default();
-    struct ggn_judged v;
-    int rc = ggn_judge_validation(s, s->plan->validation_windows, &v, err), right = 0;
+    struct ggn_classified v;
+    int rc = ggn_classify_validation(s, s->plan->validation_windows, &v, err), right = 0;
 
     row->validation_auc = v.auc;
     row->validation_loss = row->validation_accuracy = v.n ? 0 : (double)NAN;
@@ -402,7 +402,7 @@ static int measure(struct ggn_session *s, struct ggn_log_row *row, struct base_e
     }
     if (v.n)
         row->validation_accuracy = (double)right / v.n;
-    ggn_judged_release(&v);
+    ggn_classified_release(&v);
     return rc;
 }
 
@@ -452,7 +452,7 @@ static int begin(struct ggn_session *s, struct base_err *err)
     const int paper = s->hyper.preset == GGN_PRESET_PAPER;
 
     s->progress =
-        (struct ggn_progress){.phase = GGN_PHASE_JUDGE, .best_loss = HUGE_VAL, .seconds = {s->progress.seconds[0], 0}};
+        (struct ggn_progress){.phase = GGN_PHASE_CLASSIFIER, .best_loss = HUGE_VAL, .seconds = {s->progress.seconds[0], 0}};
     int rc =
         ggn_session_begin(s, paper ? GGN_TRAIN_ALL : GGN_TRAIN_MD, s->plan->batch, s->hyper.height, s->hyper.width, err);
     for (int net = paper ? GGN_NET_R : GGN_NET_M; net < GGN_NETS && !rc; net++) {
@@ -474,7 +474,7 @@ static int begin(struct ggn_session *s, struct base_err *err)
     return rc;
 }
 
-int ggn_phase_judge(struct ggn_session *s, const char *checkpoint, struct base_err *err)
+int ggn_phase_classifier(struct ggn_session *s, const char *checkpoint, struct base_err *err)
 {
     const struct ggn_train_plan *p = s->plan;
     const int paper = p->preset == GGN_PRESET_PAPER;

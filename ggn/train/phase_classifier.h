@@ -2,16 +2,16 @@
  * Phase 1: generator and discriminator, on windows whose denoised images are computed once; in preset paper all three
  * networks at once.
  */
-#ifndef GGN_TRAIN_PHASE_JUDGE_H
-#define GGN_TRAIN_PHASE_JUDGE_H
+#ifndef GGN_TRAIN_PHASE_CLASSIFIER_H
+#define GGN_TRAIN_PHASE_CLASSIFIER_H
 
 #include "train/session.h"
 
 /* checkpoint: where to continue from, or NULL. Leaves the weights of the best epoch in place. */
-int ggn_phase_judge(struct ggn_session *session, const char *checkpoint, struct base_err *err);
+int ggn_phase_classifier(struct ggn_session *session, const char *checkpoint, struct base_err *err);
 
 /* Windows of a list as the networks see them. */
-struct ggn_judged {
+struct ggn_classified {
     int n;
     double *logit, *label; /* [n] raw logit; label of the window; own */
     unsigned char *noisy;  /* [n] own */
@@ -19,7 +19,7 @@ struct ggn_judged {
 };
 /* Judges evenly strided windows of the validation scenes, at most `most`, with the weights as they are. Release it also
  * after a failure. */
-int ggn_judge_validation(struct ggn_session *session, int most, struct ggn_judged *out, struct base_err *err);
-void ggn_judged_release(struct ggn_judged *judged);
+int ggn_classify_validation(struct ggn_session *session, int most, struct ggn_classified *out, struct base_err *err);
+void ggn_classified_release(struct ggn_classified *judged);
 
 #endif

@@ -1,4 +1,4 @@
-#include "data/chains.h"
+#include "data/series.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -9,52 +9,52 @@
 
 enum { MAX_CHAINS = 1 << 16 };
 
-size_t ggn_chains_values(const struct ggn_chains *set) { return 3 * (size_t)set->width * (size_t)set->height; }
+size_t ggn_series_set_values(const struct ggn_series_set *set) { return 3 * (size_t)set->width * (size_t)set->height; }
 
-void ggn_chains_release(struct ggn_chains *set)
+void ggn_series_set_release(struct ggn_series_set *set)
 {
     for (int i = 0; i < set->n; i++) {
-        struct ggn_chain *c = &set->chains[i];
+        struct ggn_level_series *c = &set->series[i];
         free(c->spp);
         free(c->noisy);
         free(c->denoised);
         if (!c->synthetic)
             free(c->reference);
-        free(c->picture);
-        free(c->has_picture);
+        free(c->noise_map);
+        free(c->has_noise_map);
         free(c->tail999);
         free(c->gini);
     }
-    free(set->chains);
+    free(set->series);
     ggn_dataset_release(&set->data);
-    *set = (struct ggn_chains){0};
+    *set = (struct ggn_series_set){0};
 }
 
-int ggn_chains_count(const struct ggn_chains *set, enum ggn_split split, int real_only)
+int ggn_series_set_count(const struct ggn_series_set *set, enum ggn_split split, int real_only)
 {
     int n = 0;
 
     for (int i = 0; i < set->n; i++)
-        n += set->chains[i].split == split && !(real_only && set->chains[i].synthetic);
+        n += set->series[i].split == split && !(real_only && set->series[i].synthetic);
     return n;
 }
 
-struct ggn_chain *ggn_chains_append(struct ggn_chains *set, struct base_err *err)
+struct ggn_level_series *ggn_series_set_append(struct ggn_series_set *set, struct base_err *err)
 {
     if (set->n == MAX_CHAINS) {
         base_fail(err, BASE_EINVAL, "more than %d blocks", MAX_CHAINS);
         return NULL;
     }
     if ((set->n & (set->n - 1)) == 0) {
-        struct ggn_chain *more = realloc(set->chains, (set->n ? 2 * (size_t)set->n : 1) * sizeof *more);
+        struct ggn_level_series *more = realloc(set->series, (set->n ? 2 * (size_t)set->n : 1) * sizeof *more);
         if (!more) {
             base_fail_nomem(err, "blocks");
             return NULL;
         }
-        set->chains = more;
+        set->series = more;
     }
-    struct ggn_chain *c = &set->chains[set->n++];
-    *c = (struct ggn_chain){0};
+    struct ggn_level_series *c = &set->series[set->n++];
+    *c = (struct ggn_level_series){0};
     return c;
 }
 
@@ -89,7 +89,7 @@ static int split_list(struct ggn_dataset *data, const char *list, enum ggn_split
     return 0;
 }
 
-static int choose_split(struct ggn_chains *set, const struct ggn_chains_options *o, struct base_err *err)
+static int choose_split(struct ggn_series_set *set, const struct ggn_series_set_options *o, struct base_err *err)
 {
     struct ggn_dataset *data = &set->data;
     int any = 0, rc = 0;
@@ -110,13 +110,13 @@ static int choose_split(struct ggn_chains *set, const struct ggn_chains_options 
     return rc;
 }
 
-/* --- chains --- */
+/* --- series --- */
 
-int ggn_chain_grow(const struct ggn_chains *set, struct ggn_chain *c, int levels, struct base_err *err)
+int ggn_series_grow(const struct ggn_series_set *set, struct ggn_level_series *c, int levels, struct base_err *err)
 {
-    const size_t n = (size_t)levels, values = ggn_chains_values(set);
+    const size_t n = (size_t)levels, values = ggn_series_set_values(set);
     double **const numbers[] = {&c->spp, &c->tail999, &c->gini};
-    uint8_t **const images[] = {&c->noisy, &c->has_picture, &c->picture};
+    uint8_t **const images[] = {&c->noisy, &c->has_noise_map, &c->noise_map};
     const size_t bytes[] = {values, 1, values / 3};
 
     for (size_t i = 0; i < 3; i++) {
@@ -125,7 +125,7 @@ int ggn_chain_grow(const struct ggn_chains *set, struct ggn_chain *c, int levels
             return base_fail_nomem(err, "images of the data set");
         *numbers[i] = grown;
     }
-    for (size_t i = 0; i < (set->pictures ? 3 : 2); i++) {
+    for (size_t i = 0; i < (set->noise_maps ? 3 : 2); i++) {
         uint8_t *grown = realloc(*images[i], n * bytes[i]);
         if (!grown)
             return base_fail_nomem(err, "images of the data set");
@@ -134,18 +134,18 @@ int ggn_chain_grow(const struct ggn_chains *set, struct ggn_chain *c, int levels
     return 0;
 }
 
-void ggn_chain_set_picture(const struct ggn_chains *set, struct ggn_chain *c, int k, const float *mean, const float *d,
-                           double scale)
+void ggn_series_write_noise_map(const struct ggn_series_set *set, struct ggn_level_series *c, int k, const float *mean,
+                                const float *d, double scale)
 {
-    const size_t pixels = ggn_chains_values(set) / 3;
-    uint8_t *out = set->pictures ? c->picture + pixels * (size_t)k : NULL;
+    const size_t pixels = ggn_series_set_values(set) / 3;
+    uint8_t *out = set->noise_maps ? c->noise_map + pixels * (size_t)k : NULL;
 
-    c->has_picture[k] = set->pictures != 0;
+    c->has_noise_map[k] = set->noise_maps != 0;
     for (size_t p = 0; out && p < pixels; p++)
-        out[p] = ggn_picture_code((double)mean[p], scale * (double)d[p], NULL);
+        out[p] = ggn_noise_map_code((double)mean[p], scale * (double)d[p], NULL);
 }
 
-/* Scratch for noise pictures of recorded levels: luminance of the mean and of D, [P] each. */
+/* Scratch for noise maps of recorded levels: luminance of the mean and of D, [P] each. */
 struct halves {
     const struct seq_record *full; /* NULL: no level has halves of all channels */
     float *mean, *d;
@@ -153,24 +153,24 @@ struct halves {
 
 /* From the level's own halves. Where none are recorded, from those of the full level: their noise has another draw, the
  * same strength in the mean, and bright paths spread out that few samples meet one by one. */
-static int recorded_picture(const struct ggn_chains *set, struct ggn_chain *c, int k, const struct seq_block *b,
-                            const struct seq_record *r, const struct halves *h, struct base_err *err)
+static int recorded_noise_map(const struct ggn_series_set *set, struct ggn_level_series *c, int k, const struct seq_block *b,
+                              const struct seq_record *r, const struct halves *h, struct base_err *err)
 {
     const struct seq_record *from = seq_has_halves(r) ? r : h->full;
     const double scale = from ? seq_half_scale(from->spp, from->half_spp) : 0;
 
-    c->has_picture[k] = 0;
-    if (!set->pictures || scale == 0)
+    c->has_noise_map[k] = 0;
+    if (!set->noise_maps || scale == 0)
         return 0;
     int rc = seq_mean_luminance(b, r, h->mean, err);
     if (!rc)
         rc = seq_half_luminance(b, from, h->d, err);
     if (!rc)
-        ggn_chain_set_picture(set, c, k, h->mean, h->d, scale * seq_noise_scale(from->spp, r->spp));
+        ggn_series_write_noise_map(set, c, k, h->mean, h->d, scale * seq_noise_scale(from->spp, r->spp));
     return rc;
 }
 
-static int fill_levels(const struct ggn_chains *set, struct ggn_chain *c, const struct seq_block *b, double ratio,
+static int fill_levels(const struct ggn_series_set *set, struct ggn_level_series *c, const struct seq_block *b, double ratio,
                        const struct halves *h, struct base_err *err)
 {
     double wanted = 0;
@@ -184,23 +184,23 @@ static int fill_levels(const struct ggn_chains *set, struct ggn_chain *c, const 
         c->spp[c->n_levels] = r->spp;
         c->tail999[c->n_levels] = seq_stat(r, "tail999");
         c->gini[c->n_levels] = seq_stat(r, "gini");
-        rc = seq_display_planar(b, r, c->noisy + (size_t)c->n_levels * ggn_chains_values(set), err);
+        rc = seq_display_planar(b, r, c->noisy + (size_t)c->n_levels * ggn_series_set_values(set), err);
         if (!rc)
-            rc = recorded_picture(set, c, c->n_levels, b, r, h, err);
+            rc = recorded_noise_map(set, c, c->n_levels, b, r, h, err);
         c->n_levels++;
     }
     return rc;
 }
 
-static int fill_chain(const struct ggn_chains *set, struct ggn_chain *c, const struct seq_block *b,
-                      const struct ggn_chains_options *o, struct base_err *err)
+static int fill_series(const struct ggn_series_set *set, struct ggn_level_series *c, const struct seq_block *b,
+                       const struct ggn_series_set_options *o, struct base_err *err)
 {
-    const size_t values = ggn_chains_values(set);
+    const size_t values = ggn_series_set_values(set);
     struct halves h = {.full = seq_full_level(b)};
     const struct seq_record *reference = b->reference || !o->mean_for_reference ? b->reference : h.full;
-    float *memory = set->pictures ? malloc(2 * (values / 3) * sizeof *memory) : NULL;
+    float *memory = set->noise_maps ? malloc(2 * (values / 3) * sizeof *memory) : NULL;
     int rc =
-        set->pictures && !memory ? base_fail_nomem(err, "noise pictures") : ggn_chain_grow(set, c, (int)b->n_levels, err);
+        set->noise_maps && !memory ? base_fail_nomem(err, "noise pictures") : ggn_series_grow(set, c, (int)b->n_levels, err);
 
     h.mean = memory;
     h.d = memory ? memory + values / 3 : NULL;
@@ -213,7 +213,7 @@ static int fill_chain(const struct ggn_chains *set, struct ggn_chain *c, const s
     return c->reference ? seq_display_planar(b, reference, c->reference, err) : base_fail_nomem(err, "a reference");
 }
 
-static int load_block(struct ggn_chains *set, int view, uint32_t index, const struct ggn_chains_options *o,
+static int load_block(struct ggn_series_set *set, int view, uint32_t index, const struct ggn_series_set_options *o,
                       struct base_err *err)
 {
     const struct ggn_dataset_view *v = &set->data.views[view];
@@ -226,11 +226,11 @@ static int load_block(struct ggn_chains *set, int view, uint32_t index, const st
         set->width = (int)b.width;
         set->height = (int)b.height;
     }
-    struct ggn_chain *c = NULL;
+    struct ggn_level_series *c = NULL;
     if ((int)b.width != set->width || (int)b.height != set->height)
         rc = base_fail(err, BASE_EINVAL, "%s/%s: a block of %ux%u pixels among blocks of %dx%d", v->dir,
                        v->manifest.blocks[index].file, b.width, b.height, set->width, set->height);
-    else if (!(c = ggn_chains_append(set, err)))
+    else if (!(c = ggn_series_set_append(set, err)))
         rc = BASE_ENOMEM;
     if (!rc) {
         const struct ggn_label *label = v->has_labels ? ggn_labels_find(&v->labels, b.id) : NULL;
@@ -242,7 +242,7 @@ static int load_block(struct ggn_chains *set, int view, uint32_t index, const st
         if (label)
             c->label = *label;
         c->spread = v->has_labels ? v->labels.spread : 0;
-        rc = fill_chain(set, c, &b, o, err);
+        rc = fill_series(set, c, &b, o, err);
     }
     seq_block_release(&b);
     return rc;
@@ -255,17 +255,17 @@ static int by_value(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* The spacing of the longest chain: equal steps when its first step is its last, else the median ratio of its upper half,
+/* The spacing of the longest series: equal steps when its first step is its last, else the median ratio of its upper half,
  * where rounding to whole samples matters least. */
-static void find_spacing(struct ggn_chains *set)
+static void find_spacing(struct ggn_series_set *set)
 {
-    const struct ggn_chain *longest = &set->chains[0];
+    const struct ggn_level_series *longest = &set->series[0];
     double ratio[SEQ_MAX_RECORDS];
     int n = 0;
 
     for (int i = 1; i < set->n; i++)
-        if (set->chains[i].n_levels > longest->n_levels)
-            longest = &set->chains[i];
+        if (set->series[i].n_levels > longest->n_levels)
+            longest = &set->series[i];
     set->first_spp = longest->spp[0];
     if (longest->n_levels < 2)
         return;
@@ -281,9 +281,9 @@ static void find_spacing(struct ggn_chains *set)
     set->ratio = ratio[n / 2];
 }
 
-int ggn_chains_load(struct ggn_chains *set, const struct ggn_chains_options *o, struct base_err *err)
+int ggn_series_set_load(struct ggn_series_set *set, const struct ggn_series_set_options *o, struct base_err *err)
 {
-    struct ggn_chains made = {.pictures = o->pictures};
+    struct ggn_series_set made = {.noise_maps = o->noise_maps};
     int rc = ggn_dataset_open(o->dir, &made.data, err);
 
     if (rc)
@@ -299,7 +299,7 @@ int ggn_chains_load(struct ggn_chains *set, const struct ggn_chains_options *o, 
     if (!rc && !made.n)
         rc = base_fail(err, BASE_EINVAL, "%s: no blocks to learn from", o->dir);
     if (rc) {
-        ggn_chains_release(&made);
+        ggn_series_set_release(&made);
         return rc;
     }
     find_spacing(&made);

@@ -1,0 +1,89 @@
+/*
+ * The images of training: level series, each one block at rising sample counts with the label that tells where its noise
+ * stops being visible.
+ *
+ * Real series are recorded levels. Synthetic ones are made from a recorded pair (ggn_series_set_add_synthetic): levels that
+ * were never rendered, with other noise each time. The set owns everything; read-only after loading except for `denoised`.
+ */
+#ifndef GGN_DATA_SERIES_H
+#define GGN_DATA_SERIES_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "data/dataset.h"
+
+struct ggn_level_series {
+    int view, scene, synthetic;
+    int simulated; /* the recording had no reference: all levels are made from its two halves */
+    enum ggn_split split;
+    uint32_t block;
+    int n_levels;
+    double *spp;        /* [n_levels], rising */
+    uint8_t *noisy;     /* [n_levels][3][H][W] display codes */
+    uint16_t *denoised; /* the same, 16-bit fixed point; NULL until needed */
+    uint8_t *reference; /* [3][H][W] display codes; NULL without; a synthetic series shares its original's */
+    /* with set->noise_maps: the noise maps (model/window.h), [n_levels][H][W], and whether a level has one */
+    uint8_t *noise_map, *has_noise_map;
+    double *tail999, *gini; /* [n_levels], NaN where not recorded */
+    int has_label;
+    struct ggn_label label;
+    double spread; /* octaves, for soft labels */
+};
+
+struct ggn_series_set {
+    struct ggn_dataset data; /* the views */
+    int width, height;       /* of every block */
+    int noise_maps;          /* series have noise maps */
+    int n, n_scenes;
+    struct ggn_level_series *series;
+    double first_spp, ratio, step_spp; /* how real levels are spaced: ratio, or (ratio 0) a constant step */
+};
+
+struct ggn_series_set_options {
+    const char *dir; /* a data set (data/dataset.h) */
+    /* comma-separated scenes: over the data set's split; NULL: the split, or every fifth scene without */
+    const char *validation;
+    const char *test; /* likewise; NULL: the split, or none */
+    double ratio;     /* thin the levels to at least this ratio; 0: keep all */
+    int noise_maps;   /* also make the noise maps */
+    /* where there is no reference, the mean of the full level stands for it: as noisy as that many samples are, which
+     * levels recorded below it share */
+    int mean_for_reference;
+    int with_test; /* read the pixels of the test scenes and of the people's views too (training never does) */
+};
+
+/* Reads and checks everything. BASE_EINVAL names the file that does not fit. */
+int ggn_series_set_load(struct ggn_series_set *set, const struct ggn_series_set_options *options, struct base_err *err);
+void ggn_series_set_release(struct ggn_series_set *set);
+
+/* Adds `per_series` synthetic series for each training series whose sequence has a full level and an independent reference.
+ * The same seed gives the same series. */
+int ggn_series_set_add_synthetic(struct ggn_series_set *set, int per_series, uint32_t seed, struct base_err *err);
+
+/* Continues recorded series of all splits that end near or before their threshold, up to 0.7 of the reference's samples
+ * beyond the last level: the reference's samples go on where the recording stopped, their running mean simulated from the
+ * half buffers. Where there is no reference but a full level, the whole series is made anew, up to SEQ_SIMULATED_CAP: its
+ * mean stands for the converged image. */
+int ggn_series_set_extend(struct ggn_series_set *set, uint32_t seed, struct base_err *err);
+
+/* Makes every labelled series that has a full level anew, its levels `ratio` > 1 apart and up to SEQ_SIMULATED_CAP: from
+ * the two halves alone, so that series with and without a reference are made alike. The same seed gives the same series. */
+int ggn_series_set_simulate(struct ggn_series_set *set, double ratio, uint32_t seed, struct base_err *err);
+
+/* Series of a split, real ones only if real_only. */
+int ggn_series_set_count(const struct ggn_series_set *set, enum ggn_split split, int real_only);
+/* Values of one image: 3·H·W. */
+size_t ggn_series_set_values(const struct ggn_series_set *set);
+
+/* Makes room for n levels, or for more. */
+int ggn_series_grow(const struct ggn_series_set *set, struct ggn_level_series *series, int n, struct base_err *err);
+/* With set->noise_maps: the noise map of level k, from the luminance of its mean and of a half difference D (linear,
+ * [H][W]) whose noise is that of `scale`⁻² times fewer samples: scale = √(N/n) takes D from N samples to n. */
+void ggn_series_write_noise_map(const struct ggn_series_set *set, struct ggn_level_series *series, int k, const float *mean,
+                                const float *d, double scale);
+
+/* Appends an empty series; NULL: out of memory. Pointers to series are invalid afterwards. */
+struct ggn_level_series *ggn_series_set_append(struct ggn_series_set *set, struct base_err *err);
+
+#endif

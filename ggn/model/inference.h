@@ -1,0 +1,47 @@
+/*
+ * The three networks at work on one block: noisy image → denoised image, window of both → logit of "still noisy".
+ *
+ * A new image costs one pass of the denoiser, a window two of the generator and one of the discriminator (3.885 GMAC at the
+ * published size); the caller keeps the denoised images, 16 bits per value. An inference owns activations for one image and
+ * one window (ggn_inference_bytes, ≤ 64 MB at the published size) and borrows the model; nothing is allocated after create.
+ * One call at a time per inference; any number of inferences on one model. The result depends on the window alone, never on
+ * other blocks. Images are planar (see model/window.h), of any size: blocks unlike the network's size are cut into tiles or
+ * continued by reflection, and the noisiest tile counts.
+ */
+#ifndef GGN_MODEL_INFERENCE_H
+#define GGN_MODEL_INFERENCE_H
+
+#include "base/threads.h"
+#include "model/model.h"
+
+/* Of the products inside convolutions; sums are float either way. */
+enum ggn_precision {
+    GGN_PRECISION_F32,
+    GGN_PRECISION_BF16,
+    GGN_PRECISION_F64 /* model/exact.h only */
+};
+extern const char *const ggn_precision_names[]; /* "f32", "bf16", NULL */
+/* How this processor makes bfloat16 products: "AVX512-BF16", or "software" (the same numbers, slowly). */
+const char *ggn_precision_bf16_by(void);
+int ggn_precision_is_slow(enum ggn_precision precision);
+
+struct ggn_inference;
+
+size_t ggn_inference_bytes(const struct ggn_model *model, enum ggn_precision precision, int threads);
+/* `threads` may be NULL: the calling thread alone. NULL on failure. */
+struct ggn_inference *ggn_inference_create(const struct ggn_model *model, enum ggn_precision precision,
+                                           struct base_threads *threads, struct base_err *err);
+void ggn_inference_destroy(struct ggn_inference *inference);
+
+/* noisy [3][height][width] display codes → denoised, 16-bit fixed point. */
+void ggn_inference_denoise(struct ggn_inference *inference, const uint8_t *noisy, uint16_t *denoised, int width, int height);
+/* noisy, denoised: S images each, noisiest first. noise_map: [height][width], the noise map of the newest image, or NULL:
+ * it has none; a model without it ignores it. The raw logit of the discriminator; calibrate it with
+ * ggn_policy_p. NaN or infinite when the model's weights overflow on this window. */
+double ggn_inference_logit(struct ggn_inference *inference, const uint8_t *const *noisy, const uint16_t *const *denoised,
+                           const uint8_t *noise_map, int width, int height);
+/* The noise feature map of the last tile that was judged, for pictures: 0 of the denoised window, 1 of the noisy one. Rows
+ * are *row apart. Borrowed until the next call. */
+const float *ggn_inference_feature_map(const struct ggn_inference *inference, int which, int *row);
+
+#endif
