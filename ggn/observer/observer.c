@@ -4,7 +4,7 @@
 
 static const double STUDY_REFERENCE = 20000.0; /* R */
 
-const struct ggn_observer ggn_observer_default = {.level = 0.256801, .spread = 0.465799};
+const struct ggn_observer ggn_observer_default = {.level = 0.261835, .spread = 0.437111};
 
 static double min(double a, double b) { return a < b ? a : b; }
 

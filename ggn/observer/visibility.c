@@ -104,13 +104,14 @@ static void blur_row(const double *column, int width, double *sixth, float *blur
     }
 }
 
-/* Over the patches of one row of them: the sum of what is seen, and the blurred rows in units of what texture hides. */
+/* Over the patches of one row of them: the sum of squares of what is seen, and the blurred rows in units of what texture
+ * hides. */
 static double finish_patches(const double *means, const double *texture, int width, int rows, float *blurred)
 {
     double sum = 0.0;
     for (int k = 0; k < parts(width); k++) {
-        double unit = 1.0 / sqrt(texture[k] + TEXTURE_OFFSET);
-        sum += sqrt(cbrt(means[k])) * unit;
+        double unit = 1.0 / sqrt(texture[k] + TEXTURE_OFFSET), seen = sqrt(cbrt(means[k])) * unit;
+        sum += seen * seen;
         for (int y = 0; blurred && y < rows; y++)
             for (int x = part_begin(width, k); x < part_begin(width, k + 1); x++)
                 blurred[(size_t)y * (size_t)width + (size_t)x] *= (float)unit;
@@ -139,7 +140,7 @@ double ggn_visible_noise(const float *noise, int width, int height, const double
         sum += finish_patches(means, texture + (size_t)j * across, width, end - begin,
                               blurred ? blurred + (size_t)begin * row_size : NULL);
     }
-    return sum / (double)ggn_visible_patches(width, height);
+    return sqrt(sum / (double)ggn_visible_patches(width, height));
 }
 
 /* Sums over five rows of a, b, a b and ((a - b) / 2)^2, each [RADIUS + width + RADIUS]. */

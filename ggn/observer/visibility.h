@@ -10,8 +10,9 @@
  * - Texture s of a patch: the mean over it of sqrt(max(0, cov(L*(A), L*(B)) - mean(N^2) / 5)), both over 5x5 px. Noise adds
  *   nothing to a covariance, but scatters it by 2/5 mean(N^2) in standard error, and the root of the part above 0 is not 0
  *   in the mean. Half that error is taken off, so that next to nothing is added.
- * - Visible noise r of the block: the mean over its patches of (mean over the patch of G^6)^(1/6) / sqrt(s + 2). A norm of
- *   6 lets a few bright pixels count, because people see them. observer/observer.h turns r into an answer.
+ * - Visible noise r of the block: the root mean square over its patches of (mean over the patch of G^6)^(1/6) / sqrt(s + 2).
+ *   A norm of 6 lets a few bright pixels count, because people see them; squares let one noisy patch count beside smooth
+ *   ones. observer/observer.h turns r into an answer.
  *
  * Beyond the edges of a block its outermost pixels are repeated; a block may be as small as one pixel. Pure functions on
  * memory of the caller, thread-safe; the same bits on every processor (square and cube roots only).

@@ -266,9 +266,9 @@ static double crossed_error(const struct gd_block_view *l, const float *raw, int
     for (size_t k = 0; k < patches; k++) {
         int patch[4];
         const double hidden = ggn_visible_patch(width, height, k, l->texture, patch);
-        sum += sqrt(cbrt(sixth_moment(l, raw, width, patch, 1.0 / hidden)));
+        sum += cbrt(sixth_moment(l, raw, width, patch, 1.0 / hidden)); /* the square of what is seen */
     }
-    return sum / (double)patches;
+    return sqrt(sum / (double)patches);
 }
 
 static int cancelled(void *data)
