@@ -75,9 +75,9 @@ static double naive_noise(const float *noise, int w, int h, const double *textur
             sixth[y * w + x] = pow(seen / weights, 6.0);
         }
     for (int k = 0; k < patches; k++)
-        sum += pow(patch_mean(sixth, w, h, k), 1.0 / 6.0) / sqrt(texture[k] + 2.0);
+        sum += pow(patch_mean(sixth, w, h, k), 1.0 / 3.0) / (texture[k] + 2.0);
     free(sixth);
-    return sum / patches;
+    return sqrt(sum / patches);
 }
 
 static void naive_texture(const float *a, const float *b, int w, int h, double *texture)
