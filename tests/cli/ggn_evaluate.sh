@@ -41,7 +41,7 @@ fails "baseline: nothing is written into the data" "labels.json: this is inside 
 fails "cost: nor by this" "labels.json: this is inside its data, " $ggn cost -d "$tmp/data" -o "$d/labels.json"
 fails "evaluate: nor a folder" "figures: this is inside its data, " $ggn evaluate -d "$tmp/data" -o "$tmp/data/figures"
 fails "evaluate: nor beside the labels" "this is inside its data, " $ggn evaluate -d "$tmp/data" -o "$d/"
-fails "reconstruct: nor a picture" "manifest.json: this is inside its data, " $ggn reconstruct "$d" -o "$d/manifest.json"
+fails "reconstruct: nor a picture" "seen.png: this is inside its data, " $ggn reconstruct "$d" -o "$d/seen.png"
 fails "label --calibrate: nor parameters" "labels.json: this is inside its data, " $ggn label "$tmp/data" --calibrate "$tmp/human.csv" -o "$d/labels.json"
 fails "label --calibrate: nor onto what it reads" "this is an input" $ggn label "$tmp/data" --calibrate "$tmp/human.csv" -o "$tmp/human.csv"
 fails "reconstruct: two pictures, one name" "--reference .*/none.png: the same file as --output" $ggn reconstruct "$d" -o "$tmp/./none.png" -r "$tmp/none.png"
