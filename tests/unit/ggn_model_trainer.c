@@ -490,7 +490,8 @@ static void near(const struct process *a, const struct process *b)
             sum += x * x;
             off += d * d;
         }
-        if (!(sum > 0 && off <= 1e-4 * sum))
+        const double most = a->preset == GGN_PRESET_PAPER ? 0.03 : 1e-3;
+        if (!(sum > 0 && sqrt(off) <= most * sqrt(sum)))
             fail_msg("gradient of network %d: %g of %g", net, sqrt(off), sqrt(sum));
     }
 }
