@@ -11,6 +11,7 @@ need() { # need COMMAND PACKAGE
     command -v "$1" >/dev/null 2>&1 || skip "$1 is not installed (apt-get install $2)"
 }
 need node nodejs
-mkdir -p "$work" && cp tests/study/*.mjs "$work" || exit 2
+mkdir -p "$work" && copy=$(mktemp -d "$work/copy.XXXXXX") || exit 2
+cp tests/study/*.mjs "$copy" && mv -f "$copy"/*.mjs "$work" && rmdir "$copy" || exit 2 # the others run at the same time
 LULL_STUDY=$PWD/${BUILD:-build}/bin/lull-study PAGE=$PWD/ggn/study/page
 export LULL_STUDY PAGE

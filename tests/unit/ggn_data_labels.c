@@ -78,8 +78,8 @@ static void round_trip(void **state)
         "{\"format\":\"lull-labels\",\"source\":\"human\",\"spread\":1,\"blocks\":[{\"id\":0,\"threshold\":1}]}",
         "{\"format\":\"lull-labels\",\"source\":\"human\",\"cap\":1,\"spread\":1,\"blocks\":[]}",
         "{\"format\":\"lull-labels\",\"source\":\"human\",\"cap\":1,\"spread\":1,\"blocks\":[{\"id\":0,\"threshold\":-1}]}",
-        "{\"format\":\"lull-labels\",\"source\":\"human\",\"cap\":1,\"spread\":1,\"blocks\":[{\"id\":0,\"threshold\":1},{"
-        "\"id\":0,\"threshold\":1}]}",
+        ("{\"format\":\"lull-labels\",\"source\":\"human\",\"cap\":1,\"spread\":1,\"blocks\":[{\"id\":0,\"threshold\":1},{"
+         "\"id\":0,\"threshold\":1}]}"),
     };
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
         if (ggn_labels_parse("l.json", bad[i], strlen(bad[i]), &back, &err) != BASE_EINVAL)
@@ -309,8 +309,8 @@ static void thresholds_are_told_word_by_word(void **state)
                                           "{\"blocks\":{}}",
                                           "{\"blocks\":[{\"id\":0,\"spp\":5}]}",
                                           "{\"scene\":7,\"blocks\":[{\"id\":1,\"spp\":5,\"y0\":0}]}",
-                                          "{\"scene\":\"b\",\"blocks\":[{\"id\":3,\"spp\":5,\"threshold\":6,\"y0\":1},{"
-                                          "\"id\":0,\"spp\":2,\"y0\":0},{\"id\":1,\"spp\":3,\"y0\":0}]}",
+                                          ("{\"scene\":\"b\",\"blocks\":[{\"id\":3,\"spp\":5,\"threshold\":6,\"y0\":1},{"
+                                           "\"id\":0,\"spp\":2,\"y0\":0},{\"id\":1,\"spp\":3,\"y0\":0}]}"),
                                           "{\"blocks\":[{\"id\":-1,\"spp\":5}]}",
                                           "{\"blocks\":[{\"id\":\"0\",\"spp\":5}]}",
                                           "{\"blocks\":[{\"id\":65535,\"spp\":5}]}",
