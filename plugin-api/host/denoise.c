@@ -78,12 +78,16 @@ static void read_halves(struct picture *p, const struct lull_kit_span *s, size_t
 static void read_mean(struct picture *p, const struct lull_kit_span *s, size_t at)
 {
     for (size_t i = 0; i < (size_t)s->count; i++)
-        for (size_t c = 0; c < 3; c++) {
+        for (size_t c = 0; c < 3; c++)
             p->color[0][3 * (at + i) + c] = (float)s->value[LULL_PLANE_COLOR][i][c];
-            for (int k = 0; k < 2; k++)
-                if (p->aux[k] && (s->planes & LULL_PLANE_BIT(LULL_PLANE_ALBEDO + k)))
-                    p->aux[k][3 * (at + i) + c] = (float)s->value[LULL_PLANE_ALBEDO + k][i][c];
-        }
+}
+
+static void read_auxiliary(struct picture *p, const struct lull_kit_span *s, size_t at)
+{
+    for (int k = 0; k < 2; k++)
+        for (size_t i = 0; p->aux[k] && i < (size_t)s->count; i++)
+            for (size_t c = 0; c < 3; c++)
+                p->aux[k][3 * (at + i) + c] = (float)s->value[LULL_PLANE_ALBEDO + k][i][c];
 }
 
 /* --- denoising --------------------------------------------------------------------------------------------------------- */
@@ -163,8 +167,7 @@ static int32_t prepare(struct picture *p, struct lull_error *err)
         if (((k ? p->normal : p->albedo) && !p->aux[k]) || !p->color[k] || !p->clean[k])
             return no_memory(err);
     }
-    each_span(p, LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_ALBEDO) | LULL_PLANE_BIT(LULL_PLANE_NORMAL),
-              read_mean); /* the auxiliary planes; color[0] is read again when its turn comes */
+    each_span(p, LULL_PLANE_BIT(LULL_PLANE_ALBEDO) | LULL_PLANE_BIT(LULL_PLANE_NORMAL), read_auxiliary);
     return LULL_OK;
 }
 
