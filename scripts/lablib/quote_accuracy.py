@@ -124,10 +124,13 @@ def summary(rows):
 def told(s, name):
     share = lambda part, whole: "%d of %d (%.0f %%)" % (s[part], s[whole], 100 * s[part] / max(1, s[whole]))
     eta = ["at %d %% of the time %.2f (worst %.2f; %d scenes)" % (at, *e) for at, e in zip((10, 25, 50), s["eta"]) if e]
-    return ("**%s** (%d scenes): time within 35 %% in %s, median factor off %.2f, worst %.2f; interval of the time holds in %d; blocks inside their "
-            "interval: %s%s.\nTotal that the progress line's share implies, median factor off: %s.\n"
-            % (name, s["scenes"], share("near", "scenes"), s["median"], s["worst"], s["holds"], share("inside", "blocks"),
-               ", of those that the pilot left open " + share("open_inside", "open") if "open" in s else "", "; ".join(eta)))
+    lines = ["time within 35 %% in %s, median factor off %.2f, worst %.2f" % (share("near", "scenes"), s["median"], s["worst"]),
+             "interval of the time holds in %d" % s["holds"],
+             "blocks inside their interval: " + share("inside", "blocks")]
+    if "open" in s:
+        lines.append("of those that the pilot left open: " + share("open_inside", "open"))
+    lines.append("\n  - ".join(["total that the progress line's share implies, median factor off:", *eta]))
+    return "**%s** (%d scenes):\n\n%s\n" % (name, s["scenes"], "\n".join("- " + line for line in lines))
 
 
 def kept(rows, large):
