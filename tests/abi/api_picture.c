@@ -167,6 +167,30 @@ static void full_is_the_denoised_picture(void **state)
     end(frame);
 }
 
+/* The denoiser gets the means of albedo and normal, pixel by pixel, and no normal without albedo. */
+static void auxiliary_planes(void **state)
+{
+    (void)state;
+    static double albedo[N][3], normal[N][3];
+    render(0.1, flat);
+    for (int i = 0; i < N; i++)
+        for (int c = 0; c < 3; c++) {
+            albedo[i][c] = SPP * (i % W + c) / (W + 3.0);
+            normal[i][c] = SPP * (i / W - c) / (H + 3.0);
+        }
+    planes[LULL_PLANE_ALBEDO] = plane_of(albedo, LULL_NORM_SPP);
+    planes[LULL_PLANE_NORMAL] = plane_of(normal, LULL_NORM_SPP);
+    for (int with = 1; with >= 0; with--) {
+        if (!with)
+            planes[LULL_PLANE_ALBEDO].data = NULL;
+        assert_int_equal(make("auxiliary", LULL_DENOISE_FULL, NULL), LULL_OK);
+        for (int i = 0; i < N; i++)
+            for (int c = 0; c < 3; c++)
+                assert_true(fabs((double)rgb[i][c] - with * (albedo[i][c] + normal[i][c]) / SPP) < 1e-6);
+    }
+    end(frame);
+}
+
 /* A block without samples is black; one whose halves cannot be told apart is the denoised picture. */
 static void blocks_without_halves(void **state)
 {
@@ -212,6 +236,7 @@ int main(void)
                                        cmocka_unit_test(blend_keeps_what_a_denoiser_removes),
                                        cmocka_unit_test(every_pixel_is_the_blend),
                                        cmocka_unit_test(full_is_the_denoised_picture),
+                                       cmocka_unit_test(auxiliary_planes),
                                        cmocka_unit_test(blocks_without_halves),
                                        cmocka_unit_test(failures_are_one_line)};
     if (api_folder(path, sizeof path, "../../lib/liblull-host.so.1") != 0 ||

@@ -3,7 +3,8 @@
  * plugin-api/denoise calls, with the library's names and types. OIDN_STUB, read when a device is made, says what it does:
  *
  *     identity (also if not set), box (mean of 5x5 pixels), constant (0.5), nan (every third value), version (3.0.1),
- *     no-device, commit (fails when a filter is committed), crash (there), memory (fails when one is executed), endless
+ *     no-device, commit (fails when a filter is committed), crash (there), memory (fails when one is executed), endless,
+ *     auxiliary (albedo + normal)
  *
  * It also refuses what the real library would take in silence and get wrong: pictures that are not finite, no inputScale.
  */
@@ -15,10 +16,10 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { IDENTITY, BOX, CONSTANT, BAD_NUMBERS, VERSION, NO_DEVICE, COMMIT, MEMORY, ENDLESS, CRASH, KINDS };
+enum { IDENTITY, BOX, CONSTANT, BAD_NUMBERS, VERSION, NO_DEVICE, COMMIT, MEMORY, ENDLESS, CRASH, AUXILIARY, KINDS };
 enum { INVALID_ARGUMENT = 2, INVALID_OPERATION = 3, OUT_OF_MEMORY = 4 };
-static const char *const kinds[KINDS] = {"identity",  "box",    "constant", "nan",     "version",
-                                         "no-device", "commit", "memory",   "endless", "crash"};
+static const char *const kinds[KINDS] = {"identity", "box",    "constant", "nan",   "version",  "no-device",
+                                         "commit",   "memory", "endless",  "crash", "auxiliary"};
 
 struct device {
     int kind, error;
@@ -180,6 +181,8 @@ static float mean_at(const struct image *i, size_t x, size_t y, size_t c)
     return sum / count;
 }
 
+static float value_of(const struct image *i, size_t k) { return i->data ? i->data[k] : 0.0f; }
+
 void oidnExecuteFilter(void *filter)
 {
     const struct filter *f = filter;
@@ -197,5 +200,6 @@ void oidnExecuteFilter(void *filter)
                 f->output.data[k] = kind == BOX                         ? mean_at(in, x, y, c)
                                     : kind == CONSTANT                  ? 0.5f
                                     : kind == BAD_NUMBERS && k % 3 == 0 ? NAN
+                                    : kind == AUXILIARY                 ? value_of(&f->albedo, k) + value_of(&f->normal, k)
                                                                         : in->data[k];
 }
