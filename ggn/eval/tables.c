@@ -266,7 +266,8 @@ static int plot_scores(const char *path, const struct ggn_eval_set *s, enum ggn_
         if (block->split != split || seen++ * SHOWN < n * total)
             continue;
         snprintf(titles[n], sizeof titles[n], "%.120s %u", v->name, v->manifest.blocks[block->index].id);
-        series[n] = (struct ggn_series){titles[n], colours[n], 0, x + at, x + s->n + at, block->label.threshold};
+        series[n] = (struct ggn_series){
+            .title = titles[n], .colour = colours[n], .x = x + at, .y = x + s->n + at, .at = block->label.threshold};
         for (size_t i = block->first; i < block->end; i++)
             if (!isnan(m->score[i])) {
                 x[at] = s->spp[i];
@@ -280,7 +281,7 @@ static int plot_scores(const char *path, const struct ggn_eval_set *s, enum ggn_
                                     .y_label = m->name,
                                     .from = {open, open},
                                     .to = {open, open},
-                                    .log_x = 1,
+                                    .x_scale = GGN_LOG10,
                                     .key = GGN_KEY_OUTSIDE,
                                     .point_size = 0.5,
                                     .series = series,

@@ -27,35 +27,74 @@ static void put_range(FILE *f, char axis, double from, double to)
     }
 }
 
-static void put_chart(FILE *f, const struct ggn_chart *c)
+static void put_axes(FILE *f, const struct ggn_chart *c)
 {
     static const char *const keys[] = {"top right", "bottom right", "outside right"};
-    for (int k = 0; k < c->n; k++) {
-        const struct ggn_series *s = &c->series[k];
-        fprintf(f, "$s%d << EOD\n", k);
-        for (size_t i = 0; i < s->n; i++)
-            fprintf(f, "%.6g %.6g\n", s->x[i], s->y[i]);
-        fputs("EOD\n", f);
-        if (!isnan(s->at))
-            fprintf(f, "set arrow from %.6g, graph 0 to %.6g, graph 1 nohead dt 2 lc '%s'\n", s->at, s->at, s->colour);
-    }
-    fputs(c->log_x ? "set logscale x\n" : "", f);
+    static const char *const bases[] = {[GGN_LOG10] = "", [GGN_LOG2] = " 2"};
+    if (c->x_scale)
+        fprintf(f, "set logscale x%s\n", bases[c->x_scale]);
+    if (c->y_scale)
+        fprintf(f, "set logscale y%s\n", bases[c->y_scale]);
     fputs(c->square ? "set size square\n" : "", f);
     put_range(f, 'x', c->from[0], c->to[0]);
     put_range(f, 'y', c->from[1], c->to[1]);
+    for (int i = 0; i < c->n_x_names; i++) {
+        fputs(i > 0 ? ", " : "set xtics (", f);
+        ggn_plot_quote(f, c->x_names[i]);
+        fprintf(f, i + 1 < c->n_x_names ? " %d" : " %d)\n", i);
+    }
     fprintf(f, "set grid\nset key %s\n", keys[c->key]);
     put_text(f, "title", c->title);
     put_text(f, "xlabel", c->x_label);
     put_text(f, "ylabel", c->y_label);
-    fputs("plot ", f);
+}
+
+static void put_data(FILE *f, const struct ggn_series *s, int k)
+{
+    fprintf(f, "$s%d << EOD\n", k);
+    for (size_t i = 0; i < s->n; i++) {
+        fprintf(f, "%.6g %.6g", s->x[i], s->y[i]);
+        if (s->lo)
+            fprintf(f, " %.6g %.6g", s->lo[i], s->hi[i]);
+        else if (s->sizes)
+            fprintf(f, " %.6g", s->sizes[i]);
+        putc('\n', f);
+    }
+    fputs("EOD\n", f);
+    if (!isnan(s->at))
+        fprintf(f, "set arrow from %.6g, graph 0 to %.6g, graph 1 nohead dt 2 lc '%s'\n", s->at, s->at, s->colour);
+}
+
+static void put_series(FILE *f, const struct ggn_series *s, int k, double point_size)
+{
+    fprintf(f, "$s%d with ", k);
+    if (s->lo)
+        fprintf(f, "yerrorbars pt 7 ps %g", point_size);
+    else if (s->sizes)
+        fputs("points pt 6 ps variable", f);
+    else if (s->apart)
+        fprintf(f, "points pt 7 ps %g", point_size);
+    else if (point_size > 0)
+        fprintf(f, "linespoints pt 7 ps %g", point_size);
+    else
+        fputs("lines", f);
+    if (s->colour)
+        fprintf(f, " lc '%s'", s->colour);
+    if (!s->apart && !s->lo && !s->sizes)
+        fputs(" lw 2", f);
+    fputs(s->title ? " title " : " notitle", f);
+    if (s->title)
+        ggn_plot_quote(f, s->title);
+}
+
+static void put_chart(FILE *f, const struct ggn_chart *c)
+{
+    for (int k = 0; k < c->n; k++)
+        put_data(f, &c->series[k], k);
+    put_axes(f, c);
     for (int k = 0; k < c->n; k++) {
-        fprintf(f, "%s$s%d with lines", k > 0 ? ", " : "", k);
-        if (c->point_size > 0)
-            fprintf(f, "points pt 7 ps %g", c->point_size);
-        if (c->series[k].colour)
-            fprintf(f, " lc '%s'", c->series[k].colour);
-        fputs(" lw 2 title ", f);
-        ggn_plot_quote(f, c->series[k].title);
+        fputs(k > 0 ? ", " : "plot ", f);
+        put_series(f, &c->series[k], k, c->point_size);
     }
     fputs(c->diagonal ? ", x dt 2 lc '#999999' notitle" : "", f);
     if (c->level_title) {
@@ -68,11 +107,12 @@ static void put_chart(FILE *f, const struct ggn_chart *c)
 int ggn_plot_charts(const char *path, int width, int height, const struct ggn_chart *charts, int n, struct base_err *err)
 {
     struct ggn_plot plot;
+    const int across = n < GGN_CHARTS_ACROSS ? n : GGN_CHARTS_ACROSS;
     int any = 0, rc = ggn_plot_begin(&plot, path, width, height, err);
     if (rc)
         return rc;
     if (n > 1)
-        fprintf(plot.script, "set multiplot layout 1,%d\n", n);
+        fprintf(plot.script, "set multiplot layout %d,%d\n", (n + across - 1) / across, across);
     for (int i = 0; i < n; i++) {
         put_chart(plot.script, &charts[i]);
         for (int k = 0; k < charts[i].n; k++)

@@ -12,27 +12,35 @@
 #include "base/err.h"
 
 struct ggn_series {             /* borrows */
-    const char *title, *colour; /* "#rrggbb"; NULL: one of gnuplot's own */
+    const char *title, *colour; /* title NULL: not in the key. "#rrggbb"; NULL: one of gnuplot's own */
     size_t n;
-    const double *x, *y; /* [n]; NaN: no point */
-    double at;           /* a dashed vertical line there, in the series' colour; NaN: none */
+    const double *x, *y;   /* [n]; NaN: no point */
+    double at;             /* a dashed vertical line there, in the series' colour; NaN: none */
+    int apart;             /* no line joins the points */
+    const double *lo, *hi; /* [n]; the ends of a vertical bar through each point, which stands apart; NULL: none */
+    const double *sizes;   /* [n]; of points that stand apart; NULL: the chart's */
 };
 
+enum ggn_scale { GGN_LINEAR, GGN_LOG10, GGN_LOG2 };
 enum ggn_key { GGN_KEY_TOP, GGN_KEY_BOTTOM, GGN_KEY_OUTSIDE };
 
 struct ggn_chart {                         /* borrows */
     const char *title, *x_label, *y_label; /* NULL: none */
     double from[2], to[2];                 /* of x and y; NaN: as far as the series go */
-    int log_x, square, diagonal;           /* diagonal: a dashed line y = x */
+    enum ggn_scale x_scale, y_scale;
+    int square, diagonal; /* diagonal: a dashed line y = x */
     enum ggn_key key;
     double point_size; /* 0: lines without points */
     const struct ggn_series *series;
     int n;
-    double level;            /* a dotted horizontal line, called level_title */
-    const char *level_title; /* NULL: none */
+    double level;               /* a dotted horizontal line, called level_title */
+    const char *level_title;    /* NULL: none */
+    const char *const *x_names; /* [n_x_names]; at x = 0, 1, …, in place of numbers; NULL: numbers */
+    int n_x_names;
 };
 
-/* Charts side by side. No picture where no series has a point. */
+enum { GGN_CHARTS_ACROSS = 4 };
+/* Charts side by side, in rows of GGN_CHARTS_ACROSS. No picture where no series has a point. */
 int ggn_plot_charts(const char *path, int width, int height, const struct ggn_chart *charts, int n, struct base_err *err);
 
 /* Predicted against true thresholds (spp), both logarithmic, with their regression. */

@@ -1,5 +1,5 @@
 /*
- * Pictures through gnuplot: the caller writes a gnuplot script, data included, to plot->script; `end` runs gnuplot on it.
+ * A gnuplot script being written, data included, to plot->script; `end` runs gnuplot on it. Included in this folder alone.
  *
  * The script starts with the terminal (pngcairo), output and house style set. The picture appears under its name only when
  * gnuplot succeeded. One thread per plot.

@@ -97,7 +97,7 @@ int ggn_log_draw(const struct ggn_log *log, const char *path, struct base_err *e
     for (size_t c = 0; c < CURVES; c++) {
         struct ggn_chart *chart = &charts[curves[c].chart];
         double *x = values + 2 * c * rows, *y = x + rows;
-        series[c] = (struct ggn_series){curves[c].title, curves[c].colour, 0, x, y, open};
+        series[c] = (struct ggn_series){.title = curves[c].title, .colour = curves[c].colour, .x = x, .y = y, .at = open};
         for (size_t i = 0; i < rows; i++)
             if (log->rows[i].phase == curves[c].phase) {
                 x[series[c].n] = log->rows[i].step;

@@ -56,6 +56,13 @@ echo '#include "study/s.h"' | plant ggn/cli/c.c
 echo 'int s;' | plant ggn/study/s.h
 finds "a study inside another program" "ggn/cli/c.c:1: ggn/study is a program of its own: only its files include them"
 rm "$tmp/t/ggn/cli/c.c"
+echo 'floors: cli plugin study figures nn' | plant ggn/README.md
+echo '#include "figures/plot.h"' | plant ggn/cli/c.c
+echo 'char p[] = "gnuplot";' | plant ggn/figures/plot.h
+finds "a picture's language outside its folder" "ggn/cli/c.c:1: only ggn/figures writes gnuplot: hand figures/charts.h series"
+echo 'char c[] = "gnuplot";' | plant ggn/cli/c.c
+finds "gnuplot started outside its folder" "ggn/cli/c.c:1: only ggn/figures starts gnuplot"
+rm -r "$tmp/t/ggn/cli/c.c" "$tmp/t/ggn/figures"
 rm "$tmp/t/pathtracer/render/c.h"
 echo '#include "shade/c.h"' | plant pathtracer/shade/b.c
 echo '#include "shade/b.h"' | plant pathtracer/shade/c.h
