@@ -111,12 +111,12 @@ GGN_PLUGIN_OBJ := $(call o,$(GGN_PLUGIN))
 STUDY_OBJ   := $(call o,$(STUDY_SRC))
 
 PROGRAMS := $(if $(PT_MAIN),$(BIN)/lull-render) $(if $(GGN_CLI),$(BIN)/ggn) $(BIN)/lull-study $(if $(TOOL_SRC),$(BIN)/lull-check)
-MPI_MODULE := $(if $(MPI),$(OUT)/lib/lull-mpi.so)# loaded only by processes that a launcher has started
+MPI_MODULE := $(if $(MPI),$(OUT)/lib/lull/modules/lull-mpi.so)# loaded only by processes that a launcher has started
 # The host library for renderers (lull/host.h): the file has the major version in its name, programs link the other.
 HOST_LIB := $(OUT)/lib/liblull-host.so.1
 EXAMPLES := $(BIN)/host-example
-DENOISER := $(OUT)/lib/lull-denoiser# a program that denoise/oidn.h runs
-MODULES  := $(DENOISER) $(MPI_MODULE) $(OUT)/lib/lull-images.so
+DENOISER := $(OUT)/lib/lull/modules/lull-denoiser# a program that denoise/oidn.h runs
+MODULES  := $(DENOISER) $(MPI_MODULE) $(OUT)/lib/lull/modules/lull-images.so
 CRITERIA := $(EXAMPLE_SRC:plugin-api/examples/%.c=$(LIB)/%.so) $(GGN_ENTRIES:ggn/plugin/entry_%.c=$(LIB)/%.so)
 TESTS    := $(patsubst tests/%.c,$(OUT)/tests/%,$(TEST_SRC))
 SANE     := $(patsubst tests/%.c,build/asan/tests/%,$(SANE_SRC))
@@ -160,23 +160,23 @@ LINKER := $(if $(shell command -v ld.gold),-fuse-ld=gold)
 link = @mkdir -p $(@D); echo "  LD   $@"; $(CC) $(LINKER)
 so   = @mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--version-script=plugin-api/plugin.map -Wl,-z,defs
 
-$(BIN)/lull-render: $(call o,$(PT_MAIN)) $(PT_CORE_OBJ) $(LOADER_OBJ) | $(OUT)/lib/lull-images.so
+$(BIN)/lull-render: $(call o,$(PT_MAIN)) $(PT_CORE_OBJ) $(LOADER_OBJ) | $(OUT)/lib/lull/modules/lull-images.so
 	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) -o $@
-$(BIN)/ggn: $(call o,$(GGN_CLI)) $(GGN_CORE_OBJ) | $(OUT)/lib/lull-images.so
+$(BIN)/ggn: $(call o,$(GGN_CLI)) $(GGN_CORE_OBJ) | $(OUT)/lib/lull/modules/lull-images.so
 	$(link) $^ $(LDFLAGS_ALL) $(GGN_LIBS) -o $@
 # Of the rest of ggn the study takes what it names, and no network is among it.
-$(BIN)/lull-study: $(call o,$(STUDY_MAIN)) $(STUDY_OBJ) $(OBJ)/ggn.a | $(OUT)/lib/lull-images.so
+$(BIN)/lull-study: $(call o,$(STUDY_MAIN)) $(STUDY_OBJ) $(OBJ)/ggn.a | $(OUT)/lib/lull/modules/lull-images.so
 	$(link) $^ $(LDFLAGS_ALL) -Wl,--as-needed $(STUDY_LIBS) $(GGN_LIBS) -o $@
 # Of what both programs stand on the checker takes what it names.
 $(OBJ)/base.a: $(BASE_OBJ)
 	@rm -f $@; echo "  AR   $@"; $(AR) rcs $@ $^
 $(BIN)/lull-check: $(call o,$(TOOL_SRC)) $(LOADER_OBJ) $(OBJ)/base.a
 	$(link) $^ $(LDFLAGS_ALL) -ldl -lm -o $@
-$(OUT)/lib/lull-images.so: $(call o,$(IMAGES_SRC)) $(OBJ)/base.a
+$(OUT)/lib/lull/modules/lull-images.so: $(call o,$(IMAGES_SRC)) $(OBJ)/base.a
 	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--exclude-libs,ALL $^ $(LDFLAGS_ALL) $(IMAGE_LIBS) -lz -lm -o $@
 $(DENOISER): $(call o,$(wildcard plugin-api/denoise/program/*.c)) $(OBJ)/base.a
 	$(link) $^ $(LDFLAGS_ALL) -ldl -lm -o $@
-$(OUT)/lib/lull-mpi.so: $(call o,$(MPI_SRC)) $(OBJ)/base.a
+$(OUT)/lib/lull/modules/lull-mpi.so: $(call o,$(MPI_SRC)) $(OBJ)/base.a
 	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--exclude-libs,ALL $^ $(LDFLAGS_ALL) $(MPI_LIBS) -lm -o $@
 $(HOST_LIB): $(call o,$(HOST_SRC)) $(LOADER_OBJ) $(OBJ)/base.a plugin-api/host.map
 	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--version-script=plugin-api/host.map -Wl,-z,defs -Wl,-soname,$(@F) \

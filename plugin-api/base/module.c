@@ -15,7 +15,7 @@ void *base_module_symbol(const char *file, const char *symbol, int share)
     program[n] = '\0';
     char *slash = strrchr(program, '/');
     int folder = slash ? (int)(slash + 1 - program) : 0;
-    if (snprintf(path, sizeof path, "%.*s../lib/%s", folder, program, file) >= (int)sizeof path)
+    if (snprintf(path, sizeof path, "%.*s../lib/lull/modules/%s", folder, program, file) >= (int)sizeof path)
         return NULL;
     void *module = dlopen(path, share ? RTLD_NOW | RTLD_GLOBAL : RTLD_LAZY | RTLD_LOCAL);
     return module ? dlsym(module, symbol) : NULL;

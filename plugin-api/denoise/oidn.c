@@ -50,7 +50,7 @@ static int own_file(char *path, size_t room)
 /* From bin/ or the like, and from lib/lull/. */
 static int find_program(struct lull_oidn *o, struct base_err *err)
 {
-    static const char *const places[] = {"%.*s/../lib/lull-denoiser", "%.*s/../lull-denoiser"};
+    static const char *const places[] = {"%.*s/../lib/lull/modules/lull-denoiser", "%.*s/modules/lull-denoiser"};
     char own[PATH_MAX];
     const char *slash = own_file(own, sizeof own) ? strrchr(own, '/') : NULL;
     for (size_t i = 0; slash && i < 2; i++) {
@@ -58,7 +58,8 @@ static int find_program(struct lull_oidn *o, struct base_err *err)
         if (access(o->program, X_OK) == 0)
             return 0;
     }
-    return base_fail(err, BASE_EINVAL, "no program lull-denoiser in lib/: is this tree built, or installed, as a whole?");
+    return base_fail(err, BASE_EINVAL,
+                     "no program lull-denoiser in lib/lull/modules: is this tree built, or installed, as a whole?");
 }
 
 /* Waits until the program ends or is no longer wanted; returns whether it is not. */

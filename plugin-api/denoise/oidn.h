@@ -2,13 +2,14 @@
  * Open Image Denoise 2, in a process of its own: nothing is linked, nothing else needs it.
  *
  * The library starts a thread for each device, allocates while it works and, out of memory, ends the process that it is in.
- * None of that may happen to a host of criteria, so each run is one of the program lib/lull-denoiser (denoise/program), with
- * pictures in shared memory; whatever happens there is an error here. The library is looked for in this order:
+ * None of that may happen to a host of criteria, so each run is one of the program lib/lull/modules/lull-denoiser
+ * (denoise/program), with pictures in shared memory; whatever happens there is an error here. The library is looked for in
+ * this order:
  *
  * - the path given, a file or a folder that holds one;
  * - the environment's LULL_OIDN, likewise;
  * - the loader's own path;
- * - lib/ of a folder oidn beside the program or up to three folders above it: scripts/setup --denoiser makes build/oidn.
+ * - lib/ of a folder oidn beside the program or up to five folders above it: scripts/setup --denoiser makes build/oidn.
  *
  * The same bits for every number of threads and for every run on one processor, but not for every instruction set. A crop
  * gives the bits of the whole picture inside if its corner lies on a multiple of LULL_OIDN_GRID of the frame and it has

@@ -49,7 +49,7 @@ int job_open(struct job **out, struct base_err *err)
     memcpy(&open, &symbol, sizeof open);
     if (!open)
         return base_fail(err, BASE_EINVAL,
-                         "started by an MPI launcher, but this program has no MPI (its lib/lull-mpi.so): "
+                         "started by an MPI launcher, but this program has no MPI (its lib/lull/modules/lull-mpi.so): "
                          "build it with MPI installed, or start it without the launcher");
     int rc = open(&transport, err);
     return rc || !transport ? rc : job_create(transport, out, err);

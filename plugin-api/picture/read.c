@@ -13,7 +13,8 @@ static int answer(const struct pic_request *request, struct pic_image *out, stru
     const struct pic_library *l = linked ? linked : base_module_symbol("lull-images.so", "pic_library", 0);
     return l ? l->read(request, out, err)
              : base_fail(err, BASE_EIO,
-                         "%s: images cannot be read: lib/lull-images.so, which belongs beside this program's bin/, or "
+                         "%s: images cannot be read: lib/lull/modules/lull-images.so, which belongs beside this program's "
+                         "bin/, or "
                          "OpenImageIO cannot be loaded",
                          request->name);
 }

@@ -3,7 +3,7 @@
  * is accepted: EXR, HDR, PFM, PNG, JPEG, TGA, TIFF …
  *
  * All functions fail
- * - with BASE_EIO when the file cannot be opened, or lib/lull-images.so cannot be loaded;
+ * - with BASE_EIO when the file cannot be opened, or lib/lull/modules/lull-images.so cannot be loaded;
  * - with BASE_EINVAL when the file is no image, is damaged, or has more pixels than an image may have;
  * - with BASE_ENOMEM.
  * Then *out stays as it was. Thread-safe on distinct images.

@@ -236,12 +236,12 @@ t "  …and one of the end" oiiotool --info early.png
 mkdir -p alone/bin && cp "$P" alone/bin
 t "a scene without pictures is rendered without the image library" alone/bin/lull-render room.pbrt -q --spp 1 --preview plain.png
 t "  …and its preview is a PNG of its size" sh -c "head -c 8 plain.png | od -An -tx1 | tr -d ' ' | grep -q '^89504e470d0a1a0a' && oiiotool --info plain.png | grep -q '64 x *48, 3 channel'"
-refused "a.png: images cannot be read: lib/lull-images.so" alone/bin/lull-render textured.pbrt -q --spp 1 --preview b.png
+refused "a.png: images cannot be read: lib/lull/modules/lull-images.so" alone/bin/lull-render textured.pbrt -q --spp 1 --preview b.png
 cp "$ggn" alone/bin
-refused "a.png: images cannot be read: lib/lull-images.so" alone/bin/ggn flip a.png a.png
-refused "b.exr: images cannot be read: lib/lull-images.so" alone/bin/ggn compare stops.csv b.exr
+refused "a.png: images cannot be read: lib/lull/modules/lull-images.so" alone/bin/ggn flip a.png a.png
+refused "b.exr: images cannot be read: lib/lull/modules/lull-images.so" alone/bin/ggn compare stops.csv b.exr
 t "ggn without the image library compares tables" alone/bin/ggn compare stops.csv stops.csv
-mkdir alone/lib && cp "$bin/../lib/lull-images.so" alone/lib
+mkdir -p alone/lib/lull/modules && cp "$bin/../lib/lull/modules/lull-images.so" alone/lib/lull/modules
 sed 's/^Material "diffuse" "rgb reflectance" \[0.7.*/Texture "t" "spectrum" "imagemap" "string filename" "a.png"\nMaterial "diffuse" "texture reflectance" "t"/' \
     room.pbrt >seen.pbrt
 t "  …which is found beside the program" alone/bin/lull-render seen.pbrt -q --spp 1 -o with.exr

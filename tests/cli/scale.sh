@@ -31,7 +31,7 @@ import json
 assert json.load(open("dear.1"))[0]["seconds"] < json.load(open("dear.2"))[0]["seconds"]'
 export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_plm=isolated # as in mpi_setup
 t "this machine: measured beside predicted, for 1 to 8 processes" sh -c "'$M' scale --here $scene --size 40x40 --spp 2 --program $P | grep -c '^| [1248] |' \
-    | grep -qx $(command -v mpirun >/dev/null 2>&1 && [ -f "${P%/bin/*}/lib/lull-mpi.so" ] && echo 4 || echo 0)"
+    | grep -qx $(command -v mpirun >/dev/null 2>&1 && [ -f "${P%/bin/*}/lib/lull/modules/lull-mpi.so" ] && echo 4 || echo 0)"
 refuses "a recording or --here SCENE is needed"
 refuses "nowhere.pbrt" --here nowhere.pbrt --program "$P"
 exit $bad

@@ -39,8 +39,8 @@ refused "--param x: expected KEY=VALUE" "$bin/lull-check" -p x y
 mkdir -p "$tmp/alone/bin" && cp "$bin/ggn" "$tmp/alone/bin" && "$tmp/alone/bin/ggn" --version >"$tmp/out"
 check "ggn starts without the image library" $?
 picture=scenes/demo-reference.png
-refused "$picture: images cannot be read: lib/lull-images.so" "$tmp/alone/bin/ggn" flip $picture $picture
-mkdir "$tmp/alone/lib" && cp "$bin/../lib/lull-images.so" "$tmp/alone/lib" && "$tmp/alone/bin/ggn" flip $picture $picture >"$tmp/out"
+refused "$picture: images cannot be read: lib/lull/modules/lull-images.so" "$tmp/alone/bin/ggn" flip $picture $picture
+mkdir -p "$tmp/alone/lib/lull/modules" && cp "$bin/../lib/lull/modules/lull-images.so" "$tmp/alone/lib/lull/modules" && "$tmp/alone/bin/ggn" flip $picture $picture >"$tmp/out"
 check "  ...which is found beside the program" $?
 # What the path tracer says of itself.
 for o in --help --usage; do

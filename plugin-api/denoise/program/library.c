@@ -59,7 +59,7 @@ static void *open_at(const char *path)
     return library;
 }
 
-/* oidn/ beside this program, or up to three folders above it. */
+/* oidn/ beside this program, or up to five folders above it. */
 static void *open_nearby(void)
 {
     char folder[4096], path[4200];
@@ -68,7 +68,7 @@ static void *open_nearby(void)
     if (n <= 0)
         return NULL;
     folder[n] = '\0';
-    for (int up = 0; up < 4 && !library; up++) {
+    for (int up = 0; up < 6 && !library; up++) {
         char *slash = strrchr(folder, '/');
         if (!slash)
             break;
