@@ -124,7 +124,7 @@ REPLAY   := $(patsubst tests/fuzz/%.c,$(OUT)/fuzz/replay-%,$(FUZZ_SRC))
 FUZZERS  := $(patsubst tests/fuzz/%.c,build/fuzz/%,$(FUZZ_SRC))
 
 .DEFAULT_GOAL := all
-.PHONY: all demo test bench cost asan tsan fuzz mutants host-model hdr-check abi-check install man compdb clean help setup tests test-tools replay train-demo test-study test-hosts test-clang
+.PHONY: all demo test bench cost asan tsan fuzz mutants host-model hdr-check abi-check install uninstall deb man compdb clean help setup tests test-tools replay train-demo test-study test-hosts test-packages test-clang
 .SECONDARY:
 
 all: $(PROGRAMS) $(CRITERIA) $(MODULES) $(HOST_LIB) $(EXAMPLES) ## build the programs and the criteria
@@ -281,6 +281,9 @@ test-hosts: setup ## install Blender, Mitsuba and bpy as far as they can be had,
 	@scripts/hosts/setup
 	@BUILD=build tests/run $(HOST_TEST)
 
+test-packages: all ## make, install, use and remove what people install: make install, Debian packages
+	@BUILD=build JOBS=1 tests/run $(wildcard tests/packages/*.sh)
+
 asan tsan: ## run the unit and ABI tests under the sanitizer
 	@$(MAKE) --no-print-directory MODE=$@ all tests
 	@BUILD=build/$@ tests/run --$@ $(patsubst tests/%.c,build/$@/tests/%,$(SANE_SRC)) $(if $(filter tsan,$@),$(wildcard tests/tsan/*.sh))
@@ -332,23 +335,33 @@ cost: all ## measure what accuracy costs each criterion, from recordings in data
 train-demo: all ## train a tiny model on a tiny bundled data set and show that it learns
 	@scripts/train-demo
 
-install: all ## install under $(DESTDIR)$(PREFIX)
-	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib/lull $(DESTDIR)$(PREFIX)/lib/pkgconfig \
-	    $(DESTDIR)$(PREFIX)/include/lull $(DESTDIR)$(PREFIX)/share/man/man1 $(DESTDIR)$(PREFIX)/share/man/man7
-	install -m 755 $(PROGRAMS) $(DESTDIR)$(PREFIX)/bin
-	install -m 755 $(CRITERIA) $(DESTDIR)$(PREFIX)/lib/lull
-	install -m 755 $(MODULES) $(DESTDIR)$(PREFIX)/lib
-	install -m 755 $(HOST_LIB) $(DESTDIR)$(PREFIX)/lib
-	ln -sf $(notdir $(HOST_LIB)) $(DESTDIR)$(PREFIX)/lib/liblull-host.so
-	install -m 644 plugin-api/include/lull/*.h $(DESTDIR)$(PREFIX)/include/lull
-	install -m 644 $(wildcard docs/man/*.1) $(DESTDIR)$(PREFIX)/share/man/man1
-	install -m 644 $(wildcard docs/man/*.7) $(DESTDIR)$(PREFIX)/share/man/man7
-	$(if $(wildcard ggn/models/*.ggn),install -d $(DESTDIR)$(PREFIX)/share/lull && install -m 644 $(wildcard ggn/models/*.ggn) $(DESTDIR)$(PREFIX)/share/lull)
-	install -d $(DESTDIR)$(PREFIX)/share/lull/study/vendor
-	install -m 644 $(wildcard ggn/study/page/*.*) $(DESTDIR)$(PREFIX)/share/lull/study
-	install -m 644 $(wildcard ggn/study/page/vendor/*) $(DESTDIR)$(PREFIX)/share/lull/study/vendor
-	for name in lull-criterion lull-host; do \
-	    sed 's|@PREFIX@|$(PREFIX)|g' plugin-api/$$name.pc.in > $(DESTDIR)$(PREFIX)/lib/pkgconfig/$$name.pc || exit 1; done
+# FOLDER:MODE:FILE of everything that install puts below PREFIX and uninstall takes away; links stay links.
+put = $(foreach f,$(3),$(1):$(2):$(f))
+INSTALLED = $(call put,bin,755,$(PROGRAMS)) $(call put,lib/lull,755,$(CRITERIA)) $(call put,lib/lull/modules,755,$(MODULES)) \
+    $(call put,lib,755,$(HOST_LIB) $(HOST_LIB:.1=)) $(call put,lib/pkgconfig,644,$(PC_FILES)) \
+    $(call put,include/lull,644,$(wildcard plugin-api/include/lull/*.h)) \
+    $(call put,share/man/man1,644,$(wildcard docs/man/*.1)) $(call put,share/man/man7,644,$(wildcard docs/man/*.7)) \
+    $(call put,share/bash-completion/completions,644,$(wildcard scripts/packages/completions/*)) \
+    $(call put,share/lull,644,$(wildcard ggn/models/*.ggn)) $(call put,share/lull/study,644,$(wildcard ggn/study/page/*.*)) \
+    $(call put,share/lull/study/vendor,644,$(wildcard ggn/study/page/vendor/*))
+OWN_FOLDERS := lib/lull/modules lib/lull include/lull share/lull/study/vendor share/lull/study share/lull
+PC_FILES := $(OUT)/lull-criterion.pc $(OUT)/lull-host.pc
+.PHONY: $(PC_FILES)
+$(PC_FILES): $(OUT)/%.pc: plugin-api/%.pc.in
+	@mkdir -p $(@D); sed 's|@PREFIX@|$(PREFIX)|g' $< >$@
+
+install: all $(PC_FILES) ## install under $(DESTDIR)$(PREFIX): programs, criteria, host library, headers, models, man pages, completions
+	@for i in $(INSTALLED); do \
+	    folder=$(DESTDIR)$(PREFIX)/$${i%%:*} file=$${i##*:} mode=$${i#*:}; \
+	    install -d $$folder || exit 1; \
+	    if [ -h $$file ]; then cp -P $$file $$folder; else install -m $${mode%%:*} $$file $$folder; fi || exit 1; done
+	@echo "  installed $(words $(INSTALLED)) files under $(DESTDIR)$(PREFIX)"
+uninstall: ## remove what install put under $(DESTDIR)$(PREFIX)
+	@for i in $(INSTALLED); do rm -f $(DESTDIR)$(PREFIX)/$${i%%:*}/$${i##*/} || exit 1; done
+	@for f in $(OWN_FOLDERS); do [ ! -d $(DESTDIR)$(PREFIX)/$$f ] || rmdir --ignore-fail-on-non-empty $(DESTDIR)$(PREFIX)/$$f; done
+
+deb: all ## make the Debian packages lull, liblull-host1 and lull-dev in build/deb (needs debhelper)
+	@scripts/packages/deb
 
 man: all ## write docs/man/*.1 from --help and docs/man/*.h2m (needs help2man)
 	@docs/man/write

@@ -111,7 +111,7 @@ t "  …and the report says so" grep -q '"reason":[[:space:]]*"time"' part.json
 t "without mpirun there is one process" "$P" "$scene" -q --spp 2 --report alone.json -o a.exr
 t "  …and it needs no MPI library" sh -c "! ldd $P | grep -qi libmpi"
 t "--version says which MPI there is" sh -c "$P --version | grep -q '^MPI: .*[0-9]'"
-mkdir -p bare/bin bare/lib && cp "$P" bare/bin/ && cp -r "${P%/bin/*}/lib/lull" bare/lib/
+mkdir -p bare/bin bare/lib && cp "$P" bare/bin/ && cp -r "${P%/bin/*}/lib/lull" bare/lib/ && rm bare/lib/lull/modules/lull-mpi.so
 t "--version of a program built without" sh -c "bare/bin/lull-render --version | grep -q '^MPI: none'"
 t "which runs alone" bare/bin/lull-render "$scene" -q --spp 2 -o a.exr
 mpi_refused "build it with MPI" 1 env OMPI_COMM_WORLD_SIZE=2 bare/bin/lull-render "$scene" -q --spp 2 -o a.exr

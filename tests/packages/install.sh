@@ -1,0 +1,29 @@
+#!/bin/sh
+# `make install`, what it puts in place, and `make uninstall`.
+. "$(dirname "$0")/setup"
+as sudo 'exec "$@"'
+as make "exec $(command -v make) -s -o all PREFIX=/opt/lull DESTDIR=$tmp/root \"\$@\"" # all: what is built
+at=$tmp/root/opt/lull
+line=$(readme_line "make && sudo make install")
+t "README's line: $line" sh -c "$line"
+t "a renderer that finds its criteria" sh -c "cd $tmp && $at/bin/lull-render $room --preview a.png && $at/bin/lull-render --list-criteria | grep -q ' $at/.*/observer.so'"
+t "the same picture as from the build tree" sh -c "$BUILD/bin/lull-render $room --preview $tmp/b.png && cmp $tmp/a.png $tmp/b.png"
+t "networks that find their models" "$at/bin/lull-render" $room -c ggn -o "$tmp/c.exr"
+t "modules that the programs find" sh -c "$at/bin/ggn flip scenes/demo-reference.png scenes/demo-reference.png && [ -x $at/lib/lull/modules/lull-denoiser ]"
+t "a man page of each program" sh -c "for p in $at/bin/*; do [ -s $at/share/man/man1/\${p##*/}.1 ] || exit 1; done"
+# As people press Tab: $@ are the words of the line, the last one is completed.
+complete() { bash -c 'PATH=$0/bin:$PATH; . $0/share/bash-completion/completions/${1##*/}; COMP_WORDS=("$@") COMP_CWORD=$(($# - 1)); _lull; echo "${COMPREPLY[@]}"' "$at" "$@"; }
+said() { want=$1; shift; complete "$@"; [ "$(complete "$@")" = "$want" ]; }
+t "Tab: options" said "--spp= --spp-max= --spp-min=" lull-render --spp
+t "  …with a short form" said "--criterion=" lull-render --crit
+t "  …their choices" said "box triangle gaussian" lull-render --filter =
+t "  …as they begin" said triangle lull-render --filter = t
+t "  …criteria" said observer lull-render -c obs
+t "  …files" said scenes/demo.pbrt lull-render scenes/demo.
+t "  …commands" said train ggn tr
+t "  …and their options" said "--preset=" ggn train --pres
+t "  …of every program" sh -c "for p in $at/bin/*; do [ -e $at/share/bash-completion/completions/\${p##*/} ] || exit 1; done"
+t "uninstall" make uninstall
+t "  …leaves no file" sh -c "! find $tmp/root ! -type d | grep ." 
+t "  …and no folder of its own" sh -c "! find $at -mindepth 1 -name '*lull*' | grep ."
+echo "1..$n"
