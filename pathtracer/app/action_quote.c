@@ -33,10 +33,11 @@ static int print_quote(const struct pt_cli *cli, const struct pt_open *o, struct
 static int open_quote(const struct pt_cli *cli, const struct pt_open *o, struct base_log *log, struct pt_quote **out,
                       struct base_err *err)
 {
-    const struct lull_criterion *table = o->criterion ? lull_host_table(o->criterion) : NULL, *noisy = NULL;
-    int rc =
-        table && o->picture != PT_PICTURE_NOISY ? pt_criterion_find(PT_OPEN_NOISY_CRITERION, NULL, log, &noisy, err) : 0;
-    return rc ? rc : pt_quote_create(o->render, table, cli->params.list, cli->params.count, noisy, log, out, err);
+    const struct lull_criterion *noisy = NULL;
+    int rc = o->criterion && o->picture != PT_PICTURE_NOISY
+                 ? pt_criterion_find(PT_OPEN_NOISY_CRITERION, NULL, log, &noisy, err)
+                 : 0;
+    return rc ? rc : pt_quote_create(o->render, cli->params.list, cli->params.count, noisy, log, out, err);
 }
 
 /* When the pilot is over the checkpoint is the render's, whoever goes on with it. */

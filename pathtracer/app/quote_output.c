@@ -10,7 +10,7 @@
 
 enum { DEAREST = 5, REPLAYED = 256 };
 
-static const struct pt_quote_row *asked_row(const struct pt_quote *q)
+static const struct lull_host_quote_row *asked_row(const struct pt_quote *q)
 {
     int i = 0;
     while (!q->rows[i].asked)
@@ -53,9 +53,9 @@ static void take_census(const struct pt_render *r, const struct lull_host_block 
 /* The blocks that cost most, dearest first. Returns their number. */
 static uint32_t find_dearest(const struct pt_quote *q, const struct pt_render *r, struct dear_block out[DEAREST])
 {
-    const struct pt_quote_row *row = asked_row(q);
+    const struct lull_host_quote_row *row = asked_row(q);
     uint32_t n = 0;
-    for (uint32_t i = 0; i < q->block_count; i++) {
+    for (uint32_t i = 0; i < r->blocks->count; i++) {
         uint32_t at = n < DEAREST ? n++ : DEAREST;
         for (; at > 0 && row->blocks[out[at - 1].index].thread_s < row->blocks[i].thread_s; at--)
             if (at < DEAREST)
@@ -97,13 +97,13 @@ const char *pt_quote_thousands(double value, int more, char text[32])
     return text;
 }
 
-static void print_row(FILE *out, const struct pt_quote_row *row)
+static void print_row(FILE *out, const struct pt_quote_setting *setting, const struct lull_host_quote_row *row)
 {
     char who[32], least[32], mean[32], most[32], samples[112], time[32], low[32], high[32], from_to[80], wall[160];
-    if (isnan(row->visible))
-        snprintf(who, sizeof who, "%s", row->name);
+    if (isnan(setting->visible))
+        snprintf(who, sizeof who, "%s", setting->name);
     else
-        snprintf(who, sizeof who, "%3.3g %%  %s", 100 * row->visible, row->name);
+        snprintf(who, sizeof who, "%3.3g %%  %s", 100 * setting->visible, setting->name);
     snprintf(samples, sizeof samples, "%6s / %6s / %7s", pt_quote_thousands(row->spp_min, 0, least),
              pt_quote_thousands(row->spp_mean, row->unknown > 0 || row->capped > 0, mean),
              pt_quote_thousands(row->spp_max, row->unknown > 0 || row->capped > 0, most));
@@ -117,7 +117,7 @@ static void print_dearest(FILE *out, const struct pt_quote *q, const struct pt_r
 {
     struct dear_block dear[DEAREST];
     uint32_t n = find_dearest(q, r, dear);
-    const struct pt_quote_row *row = asked_row(q);
+    const struct lull_host_quote_row *row = asked_row(q);
     fprintf(out, "\nblocks that take most of the time, as asked:\n");
     for (uint32_t k = 0; k < n; k++) {
         const struct lull_host_block *b = &r->blocks->list[dear[k].index];
@@ -134,32 +134,32 @@ static void print_dearest(FILE *out, const struct pt_quote *q, const struct pt_r
 }
 
 /* Their noise comes from light that few of their pixels have met: what they need is known to an octave either way only. */
-static void print_unmet(FILE *out, const struct pt_quote_row *row, const struct pt_render *r)
+static void print_unmet(FILE *out, const struct lull_host_quote_row *row, const struct pt_render *r)
 {
     if (row->unmet == 0)
         return;
     fprintf(out, "\n%u of %u blocks have not met their light yet (a longer --quote-pilot says more):", row->unmet,
             r->blocks->count);
     for (uint32_t i = 0; i < r->blocks->count; i++)
-        if (row->said[i].unmet)
+        if (row->blocks[i].unmet)
             fprintf(out, " %u", r->blocks->list[i].id);
     fprintf(out, "\n");
 }
 
 void pt_quote_text(FILE *out, const struct pt_quote *q, const struct pt_render *r, const struct pt_quote_info *info)
 {
-    const struct pt_quote_row *asked = asked_row(q);
+    const struct lull_host_quote_row *asked = asked_row(q);
     char time[64], took[32], load[32];
     snprintf(time, sizeof time, "time, %d thread%s", q->threads, q->threads > 1 ? "s" : "");
     fprintf(out, "%-26s  %-26s  %-30s  %s\n", "viewers who still see noise", "spp min / mean / max", time,
             "against uniform");
-    for (int i = 0; i < q->row_count; i++)
-        print_row(out, &q->rows[i]);
+    for (uint32_t i = 0; i < q->row_count; i++)
+        print_row(out, &q->settings[i], &q->rows[i]);
     if (asked->unknown > 0)
         fprintf(out,
                 "criterion %s does not say when it expects to stop %u of %u blocks: those are counted with --spp-max, "
                 "so that all is at most\n",
-                lull_host_table(r->criterion)->id, asked->unknown, q->block_count);
+                lull_host_table(r->criterion)->id, asked->unknown, r->blocks->count);
     print_dearest(out, q, r);
     print_unmet(out, asked, r);
     fprintf(out, "\npilot: %.0f spp on average in %s, loading %s, %.1f of %d threads at work%s\n",
@@ -178,11 +178,12 @@ static void add_range(cJSON *to, const char *key, double value, double low, doub
     base_json_number(o, "high", high, failed);
 }
 
-static void add_row(cJSON *list, const struct pt_quote_row *row, uint32_t count, int *failed)
+static void add_row(cJSON *list, const struct pt_quote_setting *setting, const struct lull_host_quote_row *row,
+                    uint32_t count, int *failed)
 {
     cJSON *o = base_json_object(list, NULL, failed), *blocks;
-    base_json_number(o, "visible", row->visible, failed);
-    base_json_text(o, "name", row->name, failed);
+    base_json_number(o, "visible", setting->visible, failed);
+    base_json_text(o, "name", setting->name, failed);
     base_json_bool(o, "as_asked", row->asked, failed);
     base_json_number(o, "spp_min", row->spp_min, failed);
     add_range(o, "spp_mean", row->spp_mean, row->spp_mean_low, row->spp_mean_high, failed);
@@ -195,12 +196,12 @@ static void add_row(cJSON *list, const struct pt_quote_row *row, uint32_t count,
     base_json_number(o, "blocks_at_spp_max", row->capped, failed);
     blocks = base_json_array(o, "blocks", failed);
     for (uint32_t i = 0; i < count; i++) {
-        const struct pt_quote_block *b = &row->blocks[i];
+        const struct lull_host_quote_block *b = &row->blocks[i];
         cJSON *block = base_json_object(blocks, NULL, failed);
         add_range(block, "spp", b->stop.spp, b->stop.low, b->stop.high, failed);
         add_range(block, "thread_s", b->thread_s, b->thread_low_s, b->thread_high_s, failed);
         base_json_bool(block, "known", b->stop.known != 0, failed);
-        base_json_bool(block, "met_light", !row->said[i].unmet, failed);
+        base_json_bool(block, "met_light", !row->blocks[i].unmet, failed);
     }
 }
 
@@ -243,10 +244,10 @@ int pt_quote_json(FILE *out, const struct pt_quote *q, const struct pt_render *r
     base_json_number(root, "threads", q->threads, &failed);
     base_json_text(root, "criterion", r->criterion ? lull_host_table(r->criterion)->id : NULL, &failed);
     cJSON *rows = base_json_array(root, "rows", &failed);
-    for (int i = 0; i < q->row_count; i++)
-        add_row(rows, &q->rows[i], q->block_count, &failed);
+    for (uint32_t i = 0; i < q->row_count; i++)
+        add_row(rows, &q->settings[i], &q->rows[i], r->blocks->count, &failed);
     cJSON *blocks = base_json_array(root, "blocks", &failed);
-    for (uint32_t i = 0; i < q->block_count; i++) {
+    for (uint32_t i = 0; i < r->blocks->count; i++) {
         const struct lull_host_block *b = &r->blocks->list[i];
         cJSON *o = base_json_object(blocks, NULL, &failed);
         base_json_number(o, "id", b->id, &failed);
@@ -255,7 +256,7 @@ int pt_quote_json(FILE *out, const struct pt_quote *q, const struct pt_render *r
         base_json_number(o, "x1", b->x1, &failed);
         base_json_number(o, "y1", b->y1, &failed);
         base_json_number(o, "pilot_spp", (double)b->spp, &failed);
-        base_json_number(o, "thread_s_per_spp", q->block_cost_s[i], &failed);
+        base_json_number(o, "thread_s_per_spp", q->rows[0].blocks[i].sample_s, &failed);
     }
     add_dearest(root, q, r, &failed);
     add_pilot(root, r, info, &failed);
@@ -272,15 +273,15 @@ int pt_quote_json(FILE *out, const struct pt_quote *q, const struct pt_render *r
 
 int pt_quote_map(const char *path, const struct pt_quote *q, const struct pt_render *r, struct base_err *err)
 {
-    const struct pt_quote_row *row = asked_row(q);
+    const struct lull_host_quote_row *row = asked_row(q);
     struct lull_error e = {.struct_size = sizeof e};
-    double *values = calloc(q->block_count, sizeof *values), most_s = 0.0;
+    double *values = calloc(r->blocks->count, sizeof *values), most_s = 0.0;
     if (!values)
         return base_fail_nomem(err, "quote map");
-    for (uint32_t i = 0; i < q->block_count; i++)
+    for (uint32_t i = 0; i < r->blocks->count; i++)
         most_s = fmax(most_s, row->blocks[i].thread_s);
     int minutes = most_s >= 60.0;
-    for (uint32_t i = 0; i < q->block_count; i++)
+    for (uint32_t i = 0; i < r->blocks->count; i++)
         values[i] = row->blocks[i].thread_s / (minutes ? 60.0 : 1.0);
     int32_t code = lull_host_value_map(r->blocks, values, minutes ? "min" : "s", path, &e);
     free(values);

@@ -57,20 +57,13 @@ static int32_t evaluate_step(struct lull_host_criterion *c, uint32_t step, const
 }
 
 static int32_t evaluate(struct lull_host_criterion *c, const struct question *q, const struct lull_host_view *v,
-                        const struct lull_plane *planes, struct lull_error *err)
+                        const struct lull_host_shown *shown, struct lull_error *err)
 {
-    struct lull_view view = {.struct_size = sizeof view,
-                             .x0 = v->x0,
-                             .y0 = v->y0,
-                             .x1 = v->x1,
-                             .y1 = v->y1,
-                             .planes = planes,
-                             .plane_count = LULL_PLANE_COUNT,
-                             .plane_stride = sizeof planes[0],
-                             .all = c->all,
-                             .all_count = q->blocks->count,
-                             .all_stride = sizeof c->all[0],
-                             .elapsed_s = base_clock_wall_s() - c->begin_s};
+    struct lull_view view = lull_host_seen(v, shown);
+    view.all = c->all;
+    view.all_count = q->blocks->count;
+    view.all_stride = sizeof c->all[0];
+    view.elapsed_s = base_clock_wall_s() - c->begin_s;
     struct lull_error e = {.struct_size = sizeof e};
     int32_t code = LULL_OK;
     for (uint32_t s = 0; s <= LULL_HOST_STEPS && code == LULL_OK; s++)
@@ -94,7 +87,7 @@ int32_t lull_host_evaluate(struct lull_host_criterion *c, const struct lull_host
         return code;
     for (uint32_t i = 0; i < b->count; i++)
         c->all[i] = lull_host_state_of(&b->list[i], i, shown.planes[LULL_PLANE_HALF].data != NULL);
-    code = evaluate(c, &q, view, shown.planes, err);
+    code = evaluate(c, &q, view, &shown, err);
     for (uint32_t k = 0; k < count && code != LULL_OK; k++)
         decisions[k] = lull_host_undecided();
     lull_host_hide(&shown);

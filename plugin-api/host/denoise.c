@@ -206,18 +206,6 @@ static int32_t make(struct picture *p, const struct lull_host_picture *out, stru
     return code;
 }
 
-static void set_colours(struct picture *p)
-{
-    const struct lull_host_config *g = &p->frame->config;
-    const double *y = g->rgb_to_xyz + 3;
-    int given = 0;
-    for (int c = 0; c < 9; c++)
-        given |= g->rgb_to_xyz[c] != 0.0;
-    for (int c = 0; c < 3; c++)
-        p->luminance[c] = given ? y[c] : base_luminance(c == 0, c == 1, c == 2);
-    p->exposure = g->exposure > 0.0 ? g->exposure : 1.0;
-}
-
 int32_t lull_host_denoise(const struct lull_host_frame *frame, const struct lull_host_view *view,
                           const struct lull_host_denoising *how, const struct lull_host_picture *out, struct lull_error *err)
 {
@@ -229,20 +217,14 @@ int32_t lull_host_denoise(const struct lull_host_frame *frame, const struct lull
         return code;
     struct picture p = {.frame = frame,
                         .how = how,
-                        .view = {.struct_size = sizeof p.view,
-                                 .x0 = view->x0,
-                                 .y0 = view->y0,
-                                 .x1 = view->x1,
-                                 .y1 = view->y1,
-                                 .planes = s.planes,
-                                 .plane_count = LULL_PLANE_COUNT,
-                                 .plane_stride = sizeof s.planes[0]},
+                        .view = lull_host_seen(view, &s),
                         .width = view->x1 - view->x0,
                         .height = view->y1 - view->y0,
+                        .exposure = frame->config.exposure > 0.0 ? frame->config.exposure : 1.0,
                         .albedo = s.planes[LULL_PLANE_ALBEDO].data != NULL};
     p.normal = p.albedo && s.planes[LULL_PLANE_NORMAL].data;
     p.pixels = (size_t)p.width * (size_t)p.height;
-    set_colours(&p);
+    lull_host_luminance(frame, p.luminance);
     if (!s.planes[LULL_PLANE_COLOR].data || (!(how->flags & LULL_DENOISE_FULL) && !s.planes[LULL_PLANE_HALF].data))
         code = lull_error_set(err, LULL_E_INVALID, "a denoised picture needs the plane COLOR, a blend HALF besides");
     else

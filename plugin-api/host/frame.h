@@ -51,12 +51,34 @@ struct lull_host_frame {
     struct lull_decision *decisions; /* owns */
 };
 
+/* What a row of a quote asks, and what it was told. */
+struct lull_host_quote_asked {
+    struct lull_host_criterion *criterion; /* owns; NULL: nobody is asked */
+    struct lull_host_said *said;           /* owns; [blocks] */
+    struct lull_host_said *first;          /* owns; [blocks] what it said when it was asked first */
+    struct lull_host_quote_block *blocks;  /* owns; the answer */
+};
+
+struct lull_host_quote {
+    const struct lull_host_frame *frame; /* borrows */
+    int32_t threads;
+    uint32_t count;
+    struct lull_host_quote_asked *asked; /* owns; [count], as the rows */
+    struct lull_host_quote_row *rows;    /* owns; the answer */
+    double check_s;                      /* wall seconds that the criterion takes for one block */
+};
+
 /* --- services.c ----------------------------------------------------------------------------------------------------- */
 
 /* Copies what is offered and makes criterion->host; criterion->table is set. */
 int32_t lull_host_offer(struct lull_host_criterion *criterion, const struct lull_host_services *services,
                         struct lull_error *err);
 void lull_host_withdraw(struct lull_host_criterion *criterion);
+
+/* --- open.c --------------------------------------------------------------------------------------------------------- */
+
+/* What makes luminance of the frame's colours. */
+void lull_host_luminance(const struct lull_host_frame *frame, double weights[3]);
 
 /* --- grid.c --------------------------------------------------------------------------------------------------------- */
 
@@ -85,6 +107,8 @@ struct lull_host_shown {
 int32_t lull_host_show(const struct lull_host_blocks *blocks, const struct lull_host_view *view, int counts,
                        struct lull_host_shown *out, struct lull_error *err);
 void lull_host_hide(struct lull_host_shown *shown);
+/* The planes for lull_kit_span. */
+struct lull_view lull_host_seen(const struct lull_host_view *view, const struct lull_host_shown *shown);
 
 /* --- ask.c ---------------------------------------------------------------------------------------------------------- */
 

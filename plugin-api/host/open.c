@@ -170,10 +170,24 @@ static int32_t fits(const struct lull_host_criterion *c, const struct lull_host_
                           n->block_width, n->block_height);
 }
 
+/* To XYZ, row by row. */
+static const double *primaries(const struct lull_host_config *g)
+{
+    static const double srgb[9] = BASE_RGB_TO_XYZ;
+    int given = 0;
+    for (int i = 0; i < 9; i++)
+        given |= g->rgb_to_xyz[i] != 0.0;
+    return given ? g->rgb_to_xyz : srgb;
+}
+
+void lull_host_luminance(const struct lull_host_frame *f, double weights[3])
+{
+    memcpy(weights, primaries(&f->config) + 3, 3 * sizeof *weights);
+}
+
 static struct lull_frame describe(const struct lull_host_frame *f, const struct lull_host_criterion *c,
                                   const struct lull_rect *rects)
 {
-    static const double srgb[9] = BASE_RGB_TO_XYZ;
     const struct lull_host_config *g = &f->config;
     const uint32_t told = LULL_FRAME_DETERMINISTIC | LULL_FRAME_INDEPENDENT | LULL_FRAME_SHARED;
     struct lull_frame frame = {.struct_size = sizeof frame,
@@ -192,10 +206,7 @@ static struct lull_frame describe(const struct lull_host_frame *f, const struct 
                                .spp_min = g->spp_min,
                                .spp_max = g->spp_max,
                                .seed = g->seed};
-    int given = 0;
-    for (int i = 0; i < 9; i++)
-        given |= g->rgb_to_xyz[i] != 0.0;
-    memcpy(frame.rgb_to_xyz, given ? g->rgb_to_xyz : srgb, sizeof frame.rgb_to_xyz);
+    memcpy(frame.rgb_to_xyz, primaries(g), sizeof frame.rgb_to_xyz);
     return frame;
 }
 

@@ -4,7 +4,7 @@
  *
  * - The criterion ggn is held back by tail999 and gini (ggn_policy_tail_holds).
  * - The criteria halfbuf and variance are held back by the share of unsettled pixels.
- * - A quote takes top_share for light that was not met yet (pathtracer/render/quote.h).
+ * - A quote takes top_share for light that was not met yet (plugin-api/host/quote.c).
  * - Recorded sequences keep tail999, gini and the shares of unsettled pixels (FORMAT.md).
  */
 #ifndef SEQUENCE_TAIL_H

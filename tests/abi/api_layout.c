@@ -123,17 +123,50 @@ LAYOUT(lull_host_denoising, F(lull_host_denoising, struct_size), F(lull_host_den
 LAYOUT(lull_host_picture, F(lull_host_picture, struct_size), F(lull_host_picture, zero), F(lull_host_picture, rgb),
        F(lull_host_picture, denoised), F(lull_host_picture, weight));
 LAYOUT(lull_host_output, F(lull_host_output, option), F(lull_host_output, path));
+LAYOUT(lull_host_quote_block, F(lull_host_quote_block, stop), F(lull_host_quote_block, thread_s),
+       F(lull_host_quote_block, thread_low_s), F(lull_host_quote_block, thread_high_s), F(lull_host_quote_block, sample_s),
+       F(lull_host_quote_block, unmet));
+LAYOUT(lull_host_quote_row, F(lull_host_quote_row, blocks), F(lull_host_quote_row, spp_min),
+       F(lull_host_quote_row, spp_mean), F(lull_host_quote_row, spp_max), F(lull_host_quote_row, spp_mean_low),
+       F(lull_host_quote_row, spp_mean_high), F(lull_host_quote_row, thread_s), F(lull_host_quote_row, thread_low_s),
+       F(lull_host_quote_row, thread_high_s), F(lull_host_quote_row, wall_s), F(lull_host_quote_row, wall_low_s),
+       F(lull_host_quote_row, wall_high_s), F(lull_host_quote_row, against_uniform), F(lull_host_quote_row, unknown),
+       F(lull_host_quote_row, unmet), F(lull_host_quote_row, capped), F(lull_host_quote_row, asked));
 
 /* The criterion's, then the host library's. */
 static const struct layout layouts[] = {
-    ENTRY(lull_error),         ENTRY(lull_host),        ENTRY(lull_param),        ENTRY(lull_pair),
-    ENTRY(lull_requirements),  ENTRY(lull_rect),        ENTRY(lull_frame),        ENTRY(lull_plane),
-    ENTRY(lull_block),         ENTRY(lull_view),        ENTRY(lull_decision),     ENTRY(lull_criterion),
-    ENTRY(lull_writer),        ENTRY(lull_reader),      ENTRY(lull_state),        ENTRY(lull_host_services),
-    ENTRY(lull_host_config),   ENTRY(lull_host_block),  ENTRY(lull_host_blocks),  ENTRY(lull_host_totals),
-    ENTRY(lull_host_view),     ENTRY(lull_host_said),   ENTRY(lull_host_stop_at), ENTRY(lull_host_work),
-    ENTRY(lull_host_forecast), ENTRY(lull_host_sample), ENTRY(lull_host_report),  ENTRY(lull_host_denoising),
-    ENTRY(lull_host_picture),  ENTRY(lull_host_output),
+    ENTRY(lull_error),
+    ENTRY(lull_host),
+    ENTRY(lull_param),
+    ENTRY(lull_pair),
+    ENTRY(lull_requirements),
+    ENTRY(lull_rect),
+    ENTRY(lull_frame),
+    ENTRY(lull_plane),
+    ENTRY(lull_block),
+    ENTRY(lull_view),
+    ENTRY(lull_decision),
+    ENTRY(lull_criterion),
+    ENTRY(lull_writer),
+    ENTRY(lull_reader),
+    ENTRY(lull_state),
+    ENTRY(lull_host_services),
+    ENTRY(lull_host_config),
+    ENTRY(lull_host_block),
+    ENTRY(lull_host_blocks),
+    ENTRY(lull_host_totals),
+    ENTRY(lull_host_view),
+    ENTRY(lull_host_said),
+    ENTRY(lull_host_stop_at),
+    ENTRY(lull_host_work),
+    ENTRY(lull_host_forecast),
+    ENTRY(lull_host_sample),
+    ENTRY(lull_host_report),
+    ENTRY(lull_host_denoising),
+    ENTRY(lull_host_picture),
+    ENTRY(lull_host_output),
+    ENTRY(lull_host_quote_block),
+    ENTRY(lull_host_quote_row),
 };
 enum { LAYOUTS = sizeof layouts / sizeof *layouts, OF_THE_ABI = 15 };
 
@@ -199,10 +232,11 @@ static void structs_have_no_padding(void **state)
 static void growing_structs_begin_with_their_size(void **state)
 {
     (void)state;
-    static const char *const elements[] = {"lull_param",       "lull_pair",         "lull_rect",       "lull_plane",
-                                           "lull_block",       "lull_decision",     "lull_host_block", "lull_host_totals",
-                                           "lull_host_said",   "lull_host_stop_at", "lull_host_work",  "lull_host_forecast",
-                                           "lull_host_sample", "lull_host_output"};
+    static const char *const elements[] = {
+        "lull_param",         "lull_pair",          "lull_rect",        "lull_plane",       "lull_block",
+        "lull_decision",      "lull_host_block",    "lull_host_totals", "lull_host_said",   "lull_host_stop_at",
+        "lull_host_work",     "lull_host_forecast", "lull_host_sample", "lull_host_output", "lull_host_quote_block",
+        "lull_host_quote_row"};
     for (int i = 0; i < LAYOUTS; i++) {
         int is_element = 0;
         for (size_t k = 0; k < sizeof elements / sizeof *elements; k++)

@@ -331,41 +331,41 @@ static struct pt_scene *scene;
 static struct pt_render render;
 static struct pt_quote quote;
 static struct lull_host_block *list;
-static struct pt_quote_block answers[3][7];
-static struct lull_host_said said[3][7];
+static struct lull_host_quote_row rows[3];
+static struct lull_host_quote_block answers[3][7];
 static struct base_threads *pool;
 static double black[3]; /* of the first pixel */
 static uint32_t no_drops[1];
 static struct lull_criterion table;
 static struct lull_host_criterion *criterion;
 
-static void fill_row(struct pt_quote_row *row, int k, double visible)
+static void fill_row(struct lull_host_quote_row *row, int k)
 {
-    *row = (struct pt_quote_row){.visible = visible,
-                                 .name = (const char *const[]){"draft", "as asked", "final"}[k],
-                                 .asked = k == 1,
-                                 .blocks = answers[k],
-                                 .said = said[k],
-                                 .spp_min = 12.4 + k,
-                                 .spp_mean = 1234.6 * (k + 1),
-                                 .spp_max = 99999.5 * (k + 1),
-                                 .spp_mean_low = 1000 + k,
-                                 .spp_mean_high = 2000 + k,
-                                 .thread_s = 40 + k,
-                                 .thread_low_s = 30 + k,
-                                 .thread_high_s = 60 + k,
-                                 .against_uniform = 0.25 * (k + 1),
-                                 .unmet = (uint32_t)k,
-                                 .capped = k == 2 ? 5 : 0};
+    *row = (struct lull_host_quote_row){.asked = k == 1,
+                                        .blocks = answers[k],
+                                        .spp_min = 12.4 + k,
+                                        .spp_mean = 1234.6 * (k + 1),
+                                        .spp_max = 99999.5 * (k + 1),
+                                        .spp_mean_low = 1000 + k,
+                                        .spp_mean_high = 2000 + k,
+                                        .thread_s = 40 + k,
+                                        .thread_low_s = 30 + k,
+                                        .thread_high_s = 60 + k,
+                                        .against_uniform = 0.25 * (k + 1),
+                                        .unmet = (uint32_t)k,
+                                        .capped = k == 2 ? 5 : 0};
     const double walls[3][3] = {{9.94, 0.04, 9.96}, {99.4, 99.6, 9.96 * 60}, {99.4 * 60, 99.6 * 60, 123456}};
     row->wall_s = walls[k][0];
     row->wall_low_s = walls[k][1];
     row->wall_high_s = walls[k][2];
     for (int i = 0; i < 7; i++) {
         static const double share[7] = {3, 9, 1, 7, 5, 9, 2};
-        answers[k][i] = (struct pt_quote_block){
-            {100.0 * (i + 1) + k, 90.0 * (i + 1), 12345.0 * (i + 1), i != 2}, share[i], share[i] / 2, share[i] * 2};
-        said[k][i].unmet = k > 0 && i < 2 * k;
+        answers[k][i] = (struct lull_host_quote_block){{100.0 * (i + 1) + k, 90.0 * (i + 1), 12345.0 * (i + 1), i != 2},
+                                                       share[i],
+                                                       share[i] / 2,
+                                                       share[i] * 2,
+                                                       0.25 * (i + 1),
+                                                       k > 0 && i < 2 * k};
     }
 }
 
@@ -419,11 +419,10 @@ static int set_up_quote(void **state)
     render.totals->samples = 4321;
     render.totals->render_s = 50.5;
     render.totals->criterion_s = 60.75;
-    static double costs[7] = {0.25, 0.5, 0.75, 1, 1.25, 1.5, 1.75};
-    quote = (struct pt_quote){.row_count = 3, .threads = 2, .block_count = 7, .block_cost_s = costs, .check_s = 0.125};
-    static const double visible[3] = {0.5, 0.125, 0.05};
+    quote = (struct pt_quote){
+        .row_count = 3, .rows = rows, .threads = 2, .settings = {{0.5, "draft"}, {0.125, "as asked"}, {0.05, "final"}}};
     for (int k = 0; k < 3; k++)
-        fill_row(&quote.rows[k], k, visible[k]);
+        fill_row(&rows[k], k);
     return pool ? 0 : -1;
 }
 
@@ -448,10 +447,10 @@ static char *tell_quote(struct approve_case *c)
                                        .interrupted = strstr(c->text, "interrupted") != NULL};
     FILE *out = open_memstream(&text, &size);
     assert_non_null(out);
-    quote.rows[1].unknown = strstr(c->text, "unknown") ? 2 : 0;
-    quote.rows[1].visible = strstr(c->text, "uniform") ? (double)NAN : strstr(c->text, "default") ? 0.25 : 0.125;
-    quote.rows[1].name = strstr(c->text, "default") ? "default" : "as asked";
-    quote.rows[1].unmet = strstr(c->text, "met") ? 0 : 1;
+    rows[1].unknown = strstr(c->text, "unknown") ? 2 : 0;
+    quote.settings[1].visible = strstr(c->text, "uniform") ? (double)NAN : strstr(c->text, "default") ? 0.25 : 0.125;
+    quote.settings[1].name = strstr(c->text, "default") ? "default" : "as asked";
+    rows[1].unmet = strstr(c->text, "met") ? 0 : 1;
     quote.threads = strstr(c->text, "one-thread") ? 1 : 2;
     render.criterion = strstr(c->text, "uniform") ? NULL : criterion;
     if (strstr(c->text, "json"))
@@ -635,7 +634,7 @@ static void quotes_as_pictures(void **state)
     struct base_err err = {0};
     char path[64];
     snprintf(path, sizeof path, "/tmp/pt_main_%ld.png", (long)getpid());
-    quote.rows[1].visible = 0.125;
+    quote.settings[1].visible = 0.125;
     for (int k = 0; k < 2; k++) {
         struct pic_canvas map;
         double values[7];

@@ -12,6 +12,7 @@
 
 #include <lull/criterion_kit.h>
 
+#include "host/frame.h"
 #include "render/quote.h"
 #include "support/approve.h"
 #include "support/pt_fake.h"
@@ -72,7 +73,7 @@ static void start(struct run *run, const char *visible, uint64_t pilot_spp)
         assert_int_equal(pt_criterion_create(table, &run->pair, 1, run->pool, NULL, &run->criterion, &err), 0);
     assert_int_equal(pt_render_create(&config, NULL, pt_fake_noise, run->pool, run->criterion, &run->render, &err), 0);
     if (pilot_spp > 0)
-        assert_int_equal(pt_quote_create(run->render, table, &run->pair, visible != NULL, NULL, NULL, &run->quote, &err), 0);
+        assert_int_equal(pt_quote_create(run->render, &run->pair, visible != NULL, NULL, NULL, &run->quote, &err), 0);
 }
 
 static enum pt_render_outcome go(struct run *run)
@@ -108,12 +109,12 @@ static void rows_follow_the_law(void **state)
     assert_int_equal(pilot.quote->row_count, 3);
     for (int i = 0; i < 3; i++) {
         char text[16];
-        const struct pt_quote_row *row = &pilot.quote->rows[i];
+        const struct lull_host_quote_row *row = &pilot.quote->rows[i];
         snprintf(text, sizeof text, "%g", visible[i]);
         start(&real, text, 0);
         assert_int_equal(go(&real), PT_RENDER_DONE);
         assert_int_equal(row->asked, i == 1);
-        for (uint32_t k = 0; k < pilot.quote->block_count; k++) {
+        for (uint32_t k = 0; k < pilot.render->blocks->count; k++) {
             const struct lull_host_block *b = &real.render->blocks->list[k];
             double law = fmin(law_spp(b, visible[i]), 10000.0), said = row->blocks[k].stop.spp;
             assert_true(row->blocks[k].stop.known);
@@ -138,9 +139,9 @@ static void sums_are_those_of_the_blocks(void **state)
         pilot.render->blocks->list[i].thread_s = 1e-3 * (1 + i) * (double)pilot.render->blocks->list[i].spp;
     pilot.render->totals->criterion_s = 0.5e-3 * (double)pilot.render->totals->checks;
     assert_int_equal(pt_quote_finish(pilot.quote, pilot.render, &err), 0);
-    const struct pt_quote_row *row = &pilot.quote->rows[1];
+    const struct lull_host_quote_row *row = &pilot.quote->rows[1];
     double thread_s = 0.0, samples = 0.0;
-    for (uint32_t i = 0; i < pilot.quote->block_count; i++) {
+    for (uint32_t i = 0; i < pilot.render->blocks->count; i++) {
         const struct lull_host_block *b = &pilot.render->blocks->list[i];
         thread_s += 1e-3 * (1 + i) * row->blocks[i].stop.spp;
         samples += (b->x1 - b->x0) * (b->y1 - b->y0) * row->blocks[i].stop.spp;
@@ -159,10 +160,11 @@ static void what_was_asked_has_a_row(void **state)
     struct run run;
     start(&run, "0.1", 64);
     assert_int_equal(run.quote->row_count, 4);
-    assert_true(run.quote->rows[2].visible == 0.1 && run.quote->rows[2].asked && run.quote->rows[3].visible == 0.05);
+    assert_true(run.quote->settings[2].visible == 0.1 && run.quote->told->rows[2].asked &&
+                run.quote->settings[3].visible == 0.05);
     end(&run);
     start(&run, "0.01", 64);
-    assert_true(run.quote->row_count == 4 && run.quote->rows[3].visible == 0.01 && run.quote->rows[3].asked);
+    assert_true(run.quote->row_count == 4 && run.quote->settings[3].visible == 0.01 && run.quote->told->rows[3].asked);
     end(&run);
 }
 
@@ -231,9 +233,9 @@ static void light_that_few_pixels_met_is_told(void **state)
     for (int i = 0; i < 2; i++)
         film->half[3 * pt_film_index(film, 3 + 5 * i, 4) + 1] *= 100.0;
     assert_int_equal(pt_quote_finish(run.quote, run.render, &err), 0);
-    for (uint32_t i = 1; i < run.quote->block_count; i++)
-        assert_false(run.quote->rows[2].said[i].unmet);
-    assert_true(run.quote->rows[2].said[0].unmet);
+    for (uint32_t i = 1; i < run.render->blocks->count; i++)
+        assert_false(run.quote->rows[2].blocks[i].unmet);
+    assert_true(run.quote->rows[2].blocks[0].unmet);
     assert_int_equal(run.quote->rows[2].unmet, 1);
     end(&run);
 }
@@ -342,27 +344,27 @@ static char *quote_of(struct approve_case *c)
         r->blocks->list[i].thread_s = 1e-3 * (1 + i) * (double)r->blocks->list[i].spp;
     if (strstr(c->text, "unasked"))
         r->blocks->list[3].spp = 0;
-    for (int i = 0; i < run.quote->row_count && strstr(c->text, "unsaid"); i++)
-        run.quote->rows[i].said[2] = (struct lull_host_said){.spp = r->blocks->list[2].spp, .predicted = (double)NAN};
+    for (uint32_t i = 0; i < run.quote->row_count && strstr(c->text, "unsaid"); i++)
+        run.quote->told->asked[i].said[2] = (struct lull_host_said){.spp = r->blocks->list[2].spp, .predicted = (double)NAN};
     r->totals->criterion_s = 0.25 * (double)r->totals->checks;
     assert_int_equal(pt_quote_finish(run.quote, r, &err), 0);
-    fprintf(out, "a check takes %.9g\n", run.quote->check_s);
-    for (int i = 0; i < run.quote->row_count; i++) {
-        const struct pt_quote_row *row = &run.quote->rows[i];
+    fprintf(out, "a check takes %.9g\n", run.quote->told->check_s);
+    for (uint32_t i = 0; i < run.quote->row_count; i++) {
+        const struct lull_host_quote_row *row = &run.quote->rows[i];
+        const struct lull_host_said *said = run.quote->told->asked[i].said, *first = run.quote->told->asked[i].first;
         fprintf(
             out,
             "row %g asked %d spp %.9g %.9g %.9g from %.9g to %.9g thread %.9g %.9g %.9g wall %.9g %.9g %.9g of uniform %.9g",
-            row->visible, row->asked, row->spp_min, row->spp_mean, row->spp_max, row->spp_mean_low, row->spp_mean_high,
-            row->thread_s, row->thread_low_s, row->thread_high_s, row->wall_s, row->wall_low_s, row->wall_high_s,
-            row->against_uniform);
+            run.quote->settings[i].visible, row->asked, row->spp_min, row->spp_mean, row->spp_max, row->spp_mean_low,
+            row->spp_mean_high, row->thread_s, row->thread_low_s, row->thread_high_s, row->wall_s, row->wall_low_s,
+            row->wall_high_s, row->against_uniform);
         fprintf(out, " unknown %u unmet %u capped %u\n", row->unknown, row->unmet, row->capped);
-        for (uint32_t k = 0; k < run.quote->block_count; k++) {
-            const struct pt_quote_block *b = &row->blocks[k];
+        for (uint32_t k = 0; k < run.render->blocks->count; k++) {
+            const struct lull_host_quote_block *b = &row->blocks[k];
             fprintf(out, "  block %u said %llu %.9g%s%s first %llu %.9g stop %.9g %.9g %.9g %d thread %.9g %.9g %.9g\n", k,
-                    (unsigned long long)row->said[k].spp, row->said[k].predicted, row->said[k].stopped ? " stopped" : "",
-                    row->said[k].unmet ? " unmet" : "", (unsigned long long)row->first[k].spp, row->first[k].predicted,
-                    b->stop.spp, b->stop.low, b->stop.high, (int)b->stop.known, b->thread_s, b->thread_low_s,
-                    b->thread_high_s);
+                    (unsigned long long)said[k].spp, said[k].predicted, said[k].stopped ? " stopped" : "",
+                    said[k].unmet ? " unmet" : "", (unsigned long long)first[k].spp, first[k].predicted, b->stop.spp,
+                    b->stop.low, b->stop.high, (int)b->stop.known, b->thread_s, b->thread_low_s, b->thread_high_s);
         }
     }
     end(&run);

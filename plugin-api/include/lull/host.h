@@ -323,6 +323,54 @@ LULL_EXPORT void lull_host_progress(const struct lull_host_blocks *blocks, const
                                     const struct lull_host_forecast *forecast, double time_budget_s, double left_s,
                                     double samples_per_s, double *percent, char *text, uint64_t room);
 
+/* --- quote ----------------------------------------------------------------------------------------------------------- */
+
+/* What accuracy will cost, told from the first checks of a render (its pilot). Each row is one more instance of the frame's
+ * criterion, most with another value of a parameter, that is asked about the blocks as they are. Neither the frame nor its
+ * own criterion changes: the render can go on as if there had been no quote. It borrows the frame, and ends before the
+ * frame's criterion is closed. */
+struct lull_host_quote;
+
+struct lull_host_quote_block {
+    struct lull_host_stop_at stop;
+    double thread_s, thread_low_s, thread_high_s; /* of sampling up to there, and to the ends of the interval */
+    double sample_s; /* of one sample of every pixel; where there is no sample yet that of the other blocks' pixels */
+    int64_t unmet;   /* as in lull_host_said */
+};
+
+struct lull_host_quote_row {
+    const struct lull_host_quote_block *blocks; /* of the frame, by index; the quote's */
+    double spp_min, spp_mean, spp_max;          /* samples per pixel: least block, all pixels, dearest block */
+    double spp_mean_low, spp_mean_high;
+    double thread_s, thread_low_s, thread_high_s; /* of sampling, the whole picture from its start */
+    double wall_s, wall_low_s, wall_high_s;       /* with the checks, on free processors */
+    double against_uniform;                       /* samples over those of the dearest block everywhere */
+    uint32_t unknown, unmet, capped; /* blocks without a prediction; without their light yet; that reach spp_max */
+    int32_t asked;                   /* this is the render that is going on */
+};
+
+/* A quote without rows. threads: that the renderer samples with, at least 1. */
+LULL_EXPORT int32_t lull_host_quote_begin(const struct lull_host_frame *frame, int32_t threads, struct lull_host_quote **out,
+                                          struct lull_error *err);
+LULL_EXPORT void lull_host_quote_end(struct lull_host_quote *quote);
+
+/* One more row: an instance like the frame's criterion, with this parameter after those that it has; NULL: like it, or
+ * nothing where the frame has none. asked: it stands for the render itself, whose own stops and checks are followed. */
+LULL_EXPORT int32_t lull_host_quote_add(struct lull_host_quote *quote, const struct lull_pair *changed, int32_t asked,
+                                        struct lull_error *err);
+/* One more row: any other criterion, which is the quote's from now on, even after a failure. */
+LULL_EXPORT int32_t lull_host_quote_add_other(struct lull_host_quote *quote, struct lull_host_criterion *criterion,
+                                              struct lull_error *err);
+
+/* May be called at each check of the pilot, with its blocks, rising: stops between two checks are then known. A row whose
+ * criterion fails keeps what it knew. */
+LULL_EXPORT void lull_host_quote_ask(struct lull_host_quote *quote, const struct lull_host_view *view, const uint32_t *due,
+                                     uint32_t count);
+/* Asks about every block that has samples, and works out the rows, in the order in which they were added; the quote's. After
+ * a failure the quote can only end. */
+LULL_EXPORT int32_t lull_host_quote_finish(struct lull_host_quote *quote, const struct lull_host_view *view,
+                                           const struct lull_host_quote_row **rows, uint32_t *count, struct lull_error *err);
+
 /* --- report --------------------------------------------------------------------------------------------------------- */
 
 /* A dropped sample, so that its path can be replayed. The frame keeps the first LULL_HOST_DROPPED_KEPT for the report. */

@@ -1,0 +1,307 @@
+/* What accuracy will cost, from the first checks of a render. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <lull/criterion_kit.h>
+
+#include "host/frame.h"
+#include "sequence/tail.h"
+
+static int32_t no_memory(struct lull_error *err) { return lull_host_no_memory(err, "quote"); }
+
+/* --- rows -------------------------------------------------------------------------------------------------------------- */
+
+int32_t lull_host_quote_begin(const struct lull_host_frame *frame, int32_t threads, struct lull_host_quote **out,
+                              struct lull_error *err)
+{
+    struct lull_host_quote *q = calloc(1, sizeof *q);
+    if (!q)
+        return no_memory(err);
+    q->frame = frame;
+    q->threads = threads;
+    *out = q;
+    return LULL_OK;
+}
+
+void lull_host_quote_end(struct lull_host_quote *q)
+{
+    for (uint32_t i = 0; q && i < q->count; i++) {
+        lull_host_close(q->asked[i].criterion);
+        free(q->asked[i].said);
+        free(q->asked[i].first);
+        free(q->asked[i].blocks);
+    }
+    if (q) {
+        free(q->asked);
+        free(q->rows);
+    }
+    free(q);
+}
+
+/* The new row is the last one, even after a failure, so that it is freed. */
+static int32_t add_row(struct lull_host_quote *q, int32_t asked, struct lull_error *err)
+{
+    const size_t n = q->frame->blocks.count;
+    void *rows = realloc(q->rows, (q->count + 1) * sizeof *q->rows);
+    q->rows = rows ? rows : q->rows;
+    void *answers = realloc(q->asked, (q->count + 1) * sizeof *q->asked);
+    q->asked = answers ? answers : q->asked;
+    if (!rows || !answers)
+        return no_memory(err);
+    struct lull_host_quote_asked *a = &q->asked[q->count];
+    *a = (struct lull_host_quote_asked){
+        .said = calloc(n, sizeof *a->said), .first = calloc(n, sizeof *a->first), .blocks = calloc(n, sizeof *a->blocks)};
+    q->rows[q->count++] = (struct lull_host_quote_row){.asked = asked};
+    return a->said && a->first && a->blocks ? LULL_OK : no_memory(err);
+}
+
+int32_t lull_host_quote_add(struct lull_host_quote *q, const struct lull_pair *changed, int32_t asked,
+                            struct lull_error *err)
+{
+    const struct lull_host_criterion *own = q->frame->criterion;
+    int32_t code = add_row(q, asked, err);
+    if (code != LULL_OK || !own)
+        return code;
+    struct lull_host_services services = own->offered;
+    struct lull_pair *pairs = calloc((size_t)own->pair_count + 1, sizeof *pairs);
+    if (!pairs)
+        return no_memory(err);
+    services.struct_size = sizeof services;
+    services.release = NULL; /* the context is the frame's criterion's */
+    memcpy(pairs, own->pairs, own->pair_count * sizeof *pairs);
+    if (changed)
+        pairs[own->pair_count] = *changed; /* a later pair wins */
+    struct lull_host_criterion **made = &q->asked[q->count - 1].criterion;
+    code = lull_host_create(&services, own->table, pairs, own->pair_count + (changed != NULL), made, err);
+    free(pairs);
+    return code == LULL_OK ? lull_host_join(q->frame, *made, err) : code;
+}
+
+int32_t lull_host_quote_add_other(struct lull_host_quote *q, struct lull_host_criterion *criterion, struct lull_error *err)
+{
+    int32_t code = add_row(q, 0, err);
+    if (code != LULL_OK) {
+        lull_host_close(criterion);
+        return code;
+    }
+    q->asked[q->count - 1].criterion = criterion;
+    return lull_host_join(q->frame, criterion, err);
+}
+
+/* --- asking ------------------------------------------------------------------------------------------------------------ */
+
+/* A row that would have stopped the block at an earlier check has stopped it; where between the two checks follows from what
+ * it expected at the first. */
+static void note_answer(struct lull_host_said *said, const struct lull_host_block *b, const struct lull_decision *d,
+                        uint64_t spp_min)
+{
+    if (said->stopped || b->spp <= said->spp)
+        return;
+    if (d->action == LULL_STOP && b->spp >= spp_min) {
+        double expected = said->spp > 0 && isfinite(said->predicted) ? said->predicted : (double)b->spp;
+        double stop = fmin(fmax(expected, (double)said->spp), (double)b->spp);
+        *said = (struct lull_host_said){.spp = b->spp, .predicted = fmax(stop, (double)spp_min), .stopped = 1};
+    } else {
+        *said = (struct lull_host_said){.spp = b->spp, .predicted = d->predicted_spp};
+    }
+}
+
+static int32_t ask_row(const struct lull_host_quote *q, const struct lull_host_quote_asked *a,
+                       const struct lull_host_view *view, const uint32_t *due, uint32_t count, struct lull_error *err)
+{
+    const struct lull_host_blocks *blocks = &q->frame->blocks;
+    if (!a->criterion || count == 0 || (blocks->flags & LULL_HOST_UNIFORM))
+        return LULL_OK;
+    struct lull_decision *decisions = calloc(count, sizeof *decisions);
+    if (!decisions)
+        return no_memory(err);
+    int32_t code = lull_host_evaluate(a->criterion, q->frame, view, due, NULL, count, decisions, err);
+    for (uint32_t k = 0; k < count && code == LULL_OK; k++) {
+        note_answer(&a->said[due[k]], &blocks->list[due[k]], &decisions[k], blocks->spp_min);
+        if (a->first[due[k]].spp == 0)
+            a->first[due[k]] = a->said[due[k]];
+    }
+    free(decisions);
+    return code;
+}
+
+void lull_host_quote_ask(struct lull_host_quote *q, const struct lull_host_view *view, const uint32_t *due, uint32_t count)
+{
+    for (uint32_t i = 0; i < q->count; i++)
+        ask_row(q, &q->asked[i], view, due, count, NULL);
+}
+
+static int32_t ask_all(const struct lull_host_quote *q, const struct lull_host_view *view, struct lull_error *err)
+{
+    const struct lull_host_blocks *blocks = &q->frame->blocks;
+    uint32_t *due = calloc(blocks->count, sizeof *due), n = 0;
+    int32_t code = due ? LULL_OK : no_memory(err);
+    for (uint32_t i = 0; i < blocks->count && due; i++)
+        if (blocks->list[i].spp > 0)
+            due[n++] = i;
+    for (uint32_t i = 0; i < q->count && code == LULL_OK; i++)
+        code = ask_row(q, &q->asked[i], view, due, n, err);
+    free(due);
+    return code;
+}
+
+/* --- light that is rare --- */
+
+/* One pixel in a hundred with more than this share of the squared difference of the halves (8 % in normal noise) … */
+static const double MOST_TOP_SHARE = 0.6;
+/* … or predicted samples that grow by half as many octaves as the samples do: noise that more samples find more of. */
+static const double GROWTH = 0.5;
+
+/* Of the halves' luminance difference, where what is no number is 0; 0 without halves. scratch: [pixels of the block] */
+static double top_share(const struct lull_host_frame *f, const struct lull_view *view, uint32_t index, double *scratch)
+{
+    const struct lull_block b =
+        lull_host_state_of(&f->blocks.list[index], index, lull_kit_plane(view, LULL_PLANE_HALF) != NULL);
+    double weights[3];
+    size_t n = 0;
+    struct lull_kit_span s;
+    if (b.half_spp == 0 || b.half_spp == b.spp)
+        return 0.0;
+    lull_host_luminance(f, weights);
+    lull_kit_span_begin(&s, view, &b, LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_HALF));
+    while (lull_kit_span_next(&s))
+        for (int32_t i = 0; i < s.count; i++) {
+            double d = 0.0;
+            for (int c = 0; c < 3; c++)
+                d += weights[c] * (s.value[LULL_PLANE_HALF][i][c] - s.value[LULL_PLANE_COLOR][i][c]);
+            scratch[n++] = isfinite(d) ? fabs(d) : 0.0;
+        }
+    return seq_tail_of(scratch, n, 0.0).top_share;
+}
+
+static int grows(const struct lull_host_said *first, const struct lull_host_said *said)
+{
+    return first->spp > 0 && said->spp > first->spp && !said->stopped &&
+           log2(said->predicted / first->predicted) > GROWTH * log2((double)said->spp / (double)first->spp);
+}
+
+static size_t pixels_of(const struct lull_host_block *b) { return (size_t)(b->x1 - b->x0) * (size_t)(b->y1 - b->y0); }
+
+static int32_t find_unmet(const struct lull_host_quote *q, const struct lull_host_view *view, struct lull_error *err)
+{
+    const struct lull_host_blocks *blocks = &q->frame->blocks;
+    struct lull_host_shown shown;
+    size_t most = 0;
+    for (uint32_t i = 0; i < blocks->count; i++)
+        most = pixels_of(&blocks->list[i]) > most ? pixels_of(&blocks->list[i]) : most;
+    double *scratch = malloc(most * sizeof *scratch);
+    if (!scratch)
+        return no_memory(err);
+    int32_t code = lull_host_show(blocks, view, 0, &shown, err);
+    const struct lull_view seen = lull_host_seen(view, &shown);
+    for (uint32_t i = 0; i < blocks->count && code == LULL_OK; i++) {
+        int tail = top_share(q->frame, &seen, i, scratch) > MOST_TOP_SHARE;
+        for (uint32_t k = 0; k < q->count; k++) {
+            struct lull_host_said *said = &q->asked[k].said[i];
+            said->unmet = !said->stopped && (tail || grows(&q->asked[k].first[i], said));
+        }
+    }
+    if (code == LULL_OK)
+        lull_host_hide(&shown);
+    free(scratch);
+    return code;
+}
+
+/* --- the answer -------------------------------------------------------------------------------------------------------- */
+
+/* Thread seconds of one sample of every pixel of each block; blocks that have none take the mean of the rest. */
+static void cost_blocks(const struct lull_host_blocks *blocks, struct lull_host_quote_block *out)
+{
+    double thread_s = 0.0, samples = 0.0;
+    for (uint32_t i = 0; i < blocks->count; i++) {
+        thread_s += blocks->list[i].thread_s;
+        samples += (double)blocks->list[i].spp * (double)pixels_of(&blocks->list[i]);
+    }
+    for (uint32_t i = 0; i < blocks->count; i++) {
+        const struct lull_host_block *b = &blocks->list[i];
+        out[i].sample_s = b->spp > 0 ? b->thread_s / (double)b->spp : (double)pixels_of(b) * thread_s / samples;
+    }
+}
+
+static double wall_s(const struct lull_host_quote *q, const struct lull_host_quote_row *row, int which,
+                     struct lull_host_work *work)
+{
+    const struct lull_host_blocks *blocks = &q->frame->blocks;
+    double checks = 0.0;
+    for (uint32_t i = 0; i < blocks->count; i++) {
+        const struct lull_host_block *b = &blocks->list[i];
+        const struct lull_host_stop_at *stop = &row->blocks[i].stop;
+        const double spp[3] = {stop->spp, stop->low, stop->high};
+        work[i] = (struct lull_host_work){spp[which], spp[which] * row->blocks[i].sample_s, b->y1 - b->y0};
+        checks += blocks->flags & LULL_HOST_UNIFORM ? 0.0 : (double)b->checks + lull_host_expect_checks(b, spp[which]);
+    }
+    return lull_host_wall_s(work, blocks->count, q->threads) + checks * q->check_s;
+}
+
+/* The render's own blocks are where they are; another row's may have stopped before, or would go on. */
+static struct lull_host_stop_at stop_of(const struct lull_host_blocks *blocks, const struct lull_host_block *b,
+                                        struct lull_host_said said, int asked)
+{
+    if (blocks->flags & LULL_HOST_UNIFORM)
+        return lull_host_expect_block(blocks, b);
+    if (!asked)
+        return lull_host_expect(&said, 0, blocks->spp_max);
+    if (b->reason == LULL_REASON_CRITERION || b->reason == LULL_REASON_SPP_MAX || b->reason == LULL_REASON_DROPPED)
+        return lull_host_expect_block(blocks, b);
+    if (said.stopped)
+        said.predicted = (double)b->next_spp;
+    return lull_host_expect(&said, b->next_spp, blocks->spp_max);
+}
+
+static void add_up(const struct lull_host_quote *q, const struct lull_host_quote_asked *a, struct lull_host_quote_row *row,
+                   struct lull_host_work *work)
+{
+    const struct lull_host_blocks *blocks = &q->frame->blocks;
+    double pixels = 0.0;
+    *row = (struct lull_host_quote_row){.blocks = a->blocks, .asked = row->asked, .spp_min = INFINITY};
+    cost_blocks(blocks, a->blocks);
+    for (uint32_t i = 0; i < blocks->count; i++) {
+        struct lull_host_quote_block *to = &a->blocks[i];
+        const struct lull_host_stop_at stop = stop_of(blocks, &blocks->list[i], a->said[i], row->asked);
+        const double size = (double)pixels_of(&blocks->list[i]), cost_s = to->sample_s;
+        *to = (struct lull_host_quote_block){stop,   stop.spp * cost_s, stop.low * cost_s, stop.high * cost_s,
+                                             cost_s, a->said[i].unmet};
+        row->thread_s += to->thread_s;
+        row->thread_low_s += to->thread_low_s;
+        row->thread_high_s += to->thread_high_s;
+        row->spp_mean += size * stop.spp;
+        row->spp_mean_low += size * stop.low;
+        row->spp_mean_high += size * stop.high;
+        row->spp_min = fmin(row->spp_min, stop.spp);
+        row->spp_max = fmax(row->spp_max, stop.spp);
+        row->unknown += (uint32_t)!stop.known;
+        row->unmet += (uint32_t)to->unmet;
+        row->capped += (uint32_t)(!(blocks->flags & LULL_HOST_UNIFORM) && stop.spp >= (double)blocks->spp_max);
+        pixels += size;
+    }
+    row->spp_mean /= pixels;
+    row->spp_mean_low /= pixels;
+    row->spp_mean_high /= pixels;
+    row->against_uniform = row->spp_mean / row->spp_max;
+    row->wall_s = wall_s(q, row, 0, work);
+    row->wall_low_s = wall_s(q, row, 1, work);
+    row->wall_high_s = wall_s(q, row, 2, work);
+}
+
+int32_t lull_host_quote_finish(struct lull_host_quote *q, const struct lull_host_view *view,
+                               const struct lull_host_quote_row **rows, uint32_t *count, struct lull_error *err)
+{
+    const struct lull_host_totals *totals = &q->frame->totals;
+    struct lull_host_work *work = calloc(q->frame->blocks.count, sizeof *work);
+    int32_t code = work ? ask_all(q, view, err) : no_memory(err);
+    if (code == LULL_OK)
+        code = find_unmet(q, view, err);
+    q->check_s = totals->checks > 0 ? totals->criterion_s / (double)totals->checks : 0.0;
+    for (uint32_t i = 0; i < q->count && code == LULL_OK; i++)
+        add_up(q, &q->asked[i], &q->rows[i], work);
+    free(work);
+    *rows = q->rows;
+    *count = q->count;
+    return code;
+}
