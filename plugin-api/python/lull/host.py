@@ -203,21 +203,26 @@ class HostFrame:
         with self._asking():
             call("host_stop", self.handle.pointer, reason, C.byref(view))
 
-    def evaluate(self, due: Sequence[int], planes: Optional[Mapping[str, Plane]] = None,
-                 criterion: Optional[Criterion] = None) -> list[abi.Decision]:
-        """Asks about blocks[i] for i in due, rising; nothing is noted. criterion: another one, opened for this frame."""
+    def evaluate(self, due: Sequence[int], planes: Optional[Mapping[str, Plane]] = None) -> list[abi.Decision]:
+        """Asks about blocks[i] for i in due, rising; nothing is noted."""
         view, count = self._shown(planes), len(due)
         answers = (abi.Decision * max(count, 1))()
-        with criterion.alone() if criterion else self._asking() as judge:
+        with self._asking() as judge:
             call("host_evaluate", judge, self.handle.pointer, C.byref(view), (C.c_uint32 * max(count, 1))(*due), None, count,
                  answers)
         return list(answers[:count])
 
-    def join(self, criterion: Criterion) -> None:
-        """Opens the frame for one more criterion, for evaluate()."""
-        with criterion.alone() as pointer:
-            call("host_join", self.handle.pointer, pointer)
-            criterion.frame = weakref.ref(self.handle)
+    def quote(self, threads: int, name: str, values: Sequence[float], own: float) -> list[abi.HostQuoteRow]:
+        """What the frame costs with other values of a parameter, `own` being the criterion's: struct lull_host_quote_row for
+        each, without its blocks. threads: of the renderer."""
+        view, rows, count = self._shown(None), C.POINTER(abi.HostQuoteRow)(), C.c_uint32()
+        with self._asking():
+            quote = Handle("lull_host_quote_end", self.handle)
+            call("host_quote_begin", self.handle.pointer, threads, C.byref(quote.pointer))
+            for value in values:
+                call("host_quote_add", quote.pointer, C.byref(abi.Pair(name.encode(), repr(value).encode())), value == own)
+            call("host_quote_finish", quote.pointer, C.byref(view), C.byref(rows), C.byref(count))
+            return [abi.HostQuoteRow.from_buffer_copy(row) for row in rows[:count.value]]
 
     def forecast(self, threads: int) -> abi.HostForecast:
         """What is left: struct lull_host_forecast. threads: of the renderer."""

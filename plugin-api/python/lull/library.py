@@ -75,9 +75,9 @@ def library() -> C.CDLL:
         getattr(loaded, f"lull_host_{name}").restype = C.c_void_p
     for name in ("mask_factor", "elapsed_s"):
         getattr(loaded, f"lull_host_{name}").restype = C.c_double
-    loaded.lull_host_reason.restype, loaded.lull_host_expect.restype = C.c_char_p, abi.HostStopAt
-    for name in ("stop_map", "progress", "end", "close", "file_abort"):
-        getattr(loaded, f"lull_host_{name}").restype = None if name != "stop_map" else C.c_int32
+    loaded.lull_host_reason.restype = C.c_char_p
+    for name in ("progress", "end", "close", "file_abort", "quote_end"):
+        getattr(loaded, f"lull_host_{name}").restype = None
     return loaded
 
 

@@ -1,16 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""What the criterion's quality parameter will cost, told from the checks of a render that has begun: samples and time at its
-setting and at coarser and finer ones. As `lull-render --quote` does, with one more instance of the criterion per
-setting, each asked about the blocks as they are; neither the frame nor the render's own instance changes."""
+"""What the criterion's quality parameter will cost, told from the checks of a render that has begun: samples and time at
+its setting and at coarser and finer ones, as `lull-render --quote` tells them (lull/host.h). Neither the frame nor the
+render's own instance changes."""
 from __future__ import annotations
 
-import ctypes as C
 from typing import NamedTuple
 
-from . import abi
 from .driver import Driver
 from .host import HostFrame
-from .library import LullError, Parameter, library
+from .library import LullError, Parameter
 
 # The quality parameter `visible` by name, with the criterion's own default; others are asked at twice and at four times
 # their value.
@@ -18,8 +16,9 @@ NAMED = {0.9: "coarse", 0.5: "draft", 0.05: "final"}
 
 
 class Row(NamedTuple):
-    """One setting. spp: of the least block, of the picture and of the dearest block; time_s: of the whole render, from its
-    start. at_most: the criterion did not predict every block, those count with the most samples."""
+    """One setting. spp: of the least block, of the picture and of the dearest block; time_s: of the whole render from its
+    start, wall seconds on free processors. at_most: the criterion did not predict every block, those count with the most
+    samples."""
     parameter: str
     value: float
     name: str
@@ -51,36 +50,17 @@ def _settings(parameter: Parameter, value: float) -> list[tuple[float, str]]:
     return sorted(((v, name) for v, name in names.items() if parameter.min <= v <= parameter.max), reverse=True)
 
 
-def _ends(frame: HostFrame, parameter: str, value: float) -> list[abi.HostStopAt]:
-    """Where each block will stop."""
-    due = [i for i, b in enumerate(frame.blocks) if b.spp > 0]
-    with frame.criterion.with_parameters(**{parameter: value}) as judge:
-        frame.join(judge)
-        answers = dict(zip(due, frame.evaluate(due, criterion=judge)))
-    said = [abi.HostSaid(b.spp, answers[i].predicted_spp, answers[i].action == abi.STOP) if i in answers else abi.HostSaid()
-            for i, b in enumerate(frame.blocks)]
-    for s in said:
-        s.predicted = s.spp if s.stopped else s.predicted
-    return [library().lull_host_expect(C.byref(s), C.c_uint64(b.spp), C.c_uint64(frame.spp_max))
-            for s, b in zip(said, frame.blocks)]
-
-
 def rows(driver: Driver) -> list[Row]:
     """Coarse to fine; [] if the criterion has no quality parameter or cannot be asked. Every active block has been
     checked once at least."""
-    frame, totals, out = driver.frame, driver.totals, []
-    pixels = [b.rect.pixels for b in frame.blocks]
     try:
-        parameter, chosen = _dial_of(frame)
-        asked = [(value, name, _ends(frame, parameter.name, value)) for value, name in _settings(parameter, chosen)]
+        parameter, chosen = _dial_of(driver.frame)
+        settings = _settings(parameter, chosen)
+        costs = driver.frame.quote(driver.threads, parameter.name, [value for value, _ in settings], chosen)
     except (LullError, KeyError):
         return []
-    for value, name, ends in asked:
-        spp, samples = [end.spp for end in ends], sum(end.spp * n for end, n in zip(ends, pixels))
-        time_s = totals.elapsed_s + max(samples - totals.samples, 0) * totals.render_s / max(totals.samples, 1)
-        out.append(Row(parameter.name, value, name, (min(spp), samples / sum(pixels), max(spp)), time_s,
-                       not all(end.known for end in ends), value == chosen))
-    return out
+    return [Row(parameter.name, value, name, (cost.spp_min, cost.spp_mean, cost.spp_max), cost.wall_s, cost.unknown > 0,
+                value == chosen) for (value, name), cost in zip(settings, costs)]
 
 
 def time_text(seconds: float) -> str:
