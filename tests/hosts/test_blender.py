@@ -297,7 +297,10 @@ def test_addon():
         os.mkdir(tmp("frames"))
         assert bpy.ops.lull.render(animation=True) == {"FINISHED"}
         assert {"lull_0001.exr", "lull_0002.exr", "lull_0002-report.json"} <= set(os.listdir(tmp("frames")))
-        scene.lull.criterion, scene.lull.visible, scene.lull.parameters = "observer", .5, "growth=2"
+        scene.lull.criterion, scene.lull.parameters = "observer", ""
+        assert abs(scene.lull.visible - float(lull.find("observer").parameter("visible").default)) < 1e-6
+        assert scene.lull.chosen(scene).parameters == {}  # the criterion's own
+        scene.lull.visible, scene.lull.parameters = .5, "growth=2"
         assert scene.lull.chosen(scene).parameters == {"visible": "0.5", "growth": "2"}
         scene.lull.parameters = "visible=.1"
         assert scene.lull.chosen(scene).parameters == {"visible": ".1"}

@@ -20,7 +20,7 @@ from .session import Session, Settings, check_files, default_output
 REFUSED = (HostError, LullError, ValueError, OSError, RuntimeError)
 _items: list[tuple[str, str, str]] = []  # kept: Blender does not copy the texts of dynamic enums
 _running = False  # a render is in the making: its settings are not to be shown, since it lends some of the scene's
-_with_visible: set[str] = set()  # criteria whose quality parameter is the share of viewers
+_visible: dict[str, float] = {}  # criteria whose quality parameter is the share of viewers, with their default, 0 = none
 
 
 def _criteria(_self, _context) -> list[tuple[str, str, str]]:
@@ -28,7 +28,7 @@ def _criteria(_self, _context) -> list[tuple[str, str, str]]:
         found = [c for c in criteria() if c.id != "null"]
         found.sort(key=lambda c: (c.id != "observer", c.id))
         _items.extend((c.id, c.name, c.description) for c in found)
-        _with_visible.update(c.id for c in found if c.parameter("visible"))
+        _visible.update((c.id, float(p.default or 0)) for c in found if (p := c.parameter("visible")))
         if not _items:
             _items.append(("none", "none found", f"No criteria in {', '.join(search_path())}: set LULL_PLUGIN_PATH"))
     return _items
@@ -37,8 +37,12 @@ def _criteria(_self, _context) -> list[tuple[str, str, str]]:
 class LullSettings(bpy.types.PropertyGroup):
     """Kept with the scene."""
     criterion: EnumProperty(name="Criterion", items=_criteria, description="What decides that a block may stop")
-    visible: FloatProperty(name="Visible To", default=.25, min=.0001, max=.9999, subtype="FACTOR", precision=3,
-                           description="Stop a block when at most this share of viewers would still see its noise")
+    share: FloatProperty(options={"HIDDEN"})  # as chosen; 0 = not at all
+    visible: FloatProperty(name="Visible To", min=0, max=.9999, subtype="FACTOR", precision=3,
+                           get=lambda self: self.share or _visible.get(self.criterion, 0.0),
+                           set=lambda self, value: setattr(self, "share", value),
+                           description="Stop a block when at most this share of viewers would still see its noise; 0 = the "
+                           "criterion's own")
     parameters: StringProperty(name="Parameters", description="KEY=VALUE pairs of the criterion, with spaces between; for "
                                "example first-spp=64")
     spp_min: IntProperty(name="Min Samples", default=16, min=1, description="Samples before the first decision")
@@ -56,7 +60,7 @@ class LullSettings(bpy.types.PropertyGroup):
         pairs = self.parameters.split()
         if bad := [p for p in pairs if "=" not in p]:
             raise ValueError(f"parameter {bad[0]}: expected KEY=VALUE")
-        quality = {"visible": f"{self.visible:.6g}"} if self.criterion in _with_visible else {}
+        quality = {"visible": f"{self.share:.6g}"} if self.share and self.criterion in _visible else {}
         settings = Settings(self.criterion, {**quality, **dict(p.split("=", 1) for p in pairs)}, self.spp_min,
                             block=self.block or None, mask=bpy.path.abspath(self.mask) if self.mask else "")
         if self.folder:
@@ -218,7 +222,7 @@ class LULL_PT_render(bpy.types.Panel):
         if _running:
             layout.label(text="Esc: stop and keep", icon="INFO")
         else:
-            quality = ("visible",) if settings.criterion in _with_visible else ()
+            quality = ("visible",) if settings.criterion in _visible else ()
             for properties in (((settings, "criterion"), *((settings, d) for d in quality), (settings, "parameters")),
                                ((settings, "spp_min"), (cycles, "samples"), (cycles, "time_limit")),
                                ((settings, "block"), (settings, "mask"), (settings, "folder"))):
