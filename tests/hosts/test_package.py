@@ -735,6 +735,9 @@ def test_quote():
     taken = d.totals.samples / f.view.pixels
     assert .7 < rows[2].spp[1] / taken < 1.4, (rows[2], taken)
     assert quote.line(d).startswith("visible 0.35 takes about ") and "; visible 0.9 would take about " in quote.line(d)
+    f.close()
+    f.criterion.close()
+    assert len(quote.rows(d)) == 4  # of a render that is over, too
     _, _, d = run("fixed", parameters={})
     assert quote.rows(d) == [] and quote.line(d) == "" and "no quality parameter" in quote.table(d)
 

@@ -214,9 +214,9 @@ class HostFrame:
 
     def quote(self, threads: int, name: str, values: Sequence[float], own: float) -> list[abi.HostQuoteRow]:
         """What the frame costs with other values of a parameter, `own` being the criterion's: struct lull_host_quote_row for
-        each, without its blocks. threads: of the renderer."""
+        each, without its blocks; also after close(). threads: of the renderer."""
         view, rows, count = self._shown(None), C.POINTER(abi.HostQuoteRow)(), C.c_uint32()
-        with self._asking():
+        with self._asking() if self._is_open() else contextlib.nullcontext():
             quote = Handle("lull_host_quote_end", self.handle)
             call("host_quote_begin", self.handle.pointer, threads, C.byref(quote.pointer))
             for value in values:
