@@ -61,16 +61,17 @@ static inline uint32_t pt_owen_hash(uint32_t x, uint32_t seed)
     return x;
 }
 
-/* Second Sobol' dimension from the first, both as 32-bit fractions. Its matrix is Pascal's triangle mod 2, an entry set when
- * the bits of one index are among those of the other (Lucas), so the product is five steps of an xor over subsets. */
-static inline uint32_t pt_sobol_second(uint32_t first)
+/* Second Sobol' dimension of a sample, as a 32-bit fraction with its bits reversed; the first one is the index itself. Its matrix
+ * is Pascal's triangle mod 2, an entry set when the bits of one index are among those of the other (Lucas), so the product is five
+ * steps of an xor over subsets. */
+static inline uint32_t pt_sobol_second(uint32_t index)
 {
-    first ^= (first & 0x55555555u) << 1;
-    first ^= (first & 0x33333333u) << 2;
-    first ^= (first & 0x0f0f0f0fu) << 4;
-    first ^= (first & 0x00ff00ffu) << 8;
-    first ^= first << 16;
-    return first;
+    index ^= (index & 0xaaaaaaaau) >> 1;
+    index ^= (index & 0xccccccccu) >> 2;
+    index ^= (index & 0xf0f0f0f0u) >> 4;
+    index ^= (index & 0xff00ff00u) >> 8;
+    index ^= index >> 16;
+    return index;
 }
 
 /* sobol: 0 = independent. */
@@ -93,12 +94,14 @@ struct pt_sample2 {
     float x, y;
 };
 
-/* The Owen shuffle of the index is at the same time an Owen scramble of the first dimension, which is the index reversed. */
+/* The shuffled index, reversed, is the first dimension, but no scramble of it: within a prefix of 2^m samples all its bits beyond
+ * the m-th are the same, so that each stratum would have its sample at the same place. */
 static inline struct pt_sample2 pt_sobol_pair(const struct pt_sampler *s, uint32_t dim)
 {
     uint32_t seed = pt_hash32(s->pixel_key + 0x9e3779b9u * dim);
-    uint32_t x = pt_owen_hash(s->index_reversed, seed);
-    uint32_t y = pt_reverse_bits(pt_owen_hash(pt_reverse_bits(pt_sobol_second(x)), seed * 0x2c1b3c6du + 0x297a2d39u));
+    uint32_t shuffled = pt_reverse_bits(pt_owen_hash(s->index_reversed, seed));
+    uint32_t x = pt_reverse_bits(pt_owen_hash(shuffled, seed * 0x9c8f2d35u + 0x6a09e667u));
+    uint32_t y = pt_reverse_bits(pt_owen_hash(pt_sobol_second(shuffled), seed * 0x2c1b3c6du + 0x297a2d39u));
     return (struct pt_sample2){pt_bits_to_float(x), pt_bits_to_float(y)};
 }
 
