@@ -61,9 +61,9 @@ static inline uint32_t pt_owen_hash(uint32_t x, uint32_t seed)
     return x;
 }
 
-/* Second Sobol' dimension of a sample, as a 32-bit fraction with its bits reversed; the first one is the index itself. Its matrix
- * is Pascal's triangle mod 2, an entry set when the bits of one index are among those of the other (Lucas), so the product is five
- * steps of an xor over subsets. */
+/* Second Sobol' dimension of a sample, as a 32-bit fraction with its bits reversed; the first one is the index itself. Its
+ * matrix is Pascal's triangle mod 2, an entry set when the bits of one index are among those of the other (Lucas), so the
+ * product is five steps of an xor over subsets. */
 static inline uint32_t pt_sobol_second(uint32_t index)
 {
     index ^= (index & 0xaaaaaaaau) >> 1;
@@ -94,8 +94,8 @@ struct pt_sample2 {
     float x, y;
 };
 
-/* The shuffled index, reversed, is the first dimension, but no scramble of it: within a prefix of 2^m samples all its bits beyond
- * the m-th are the same, so that each stratum would have its sample at the same place. */
+/* The shuffled index, reversed, is the first dimension, but no scramble of it: within a prefix of 2^m samples all its bits
+ * beyond the m-th are the same, so that each stratum would have its sample at the same place. */
 static inline struct pt_sample2 pt_sobol_pair(const struct pt_sampler *s, uint32_t dim)
 {
     uint32_t seed = pt_hash32(s->pixel_key + 0x9e3779b9u * dim);
