@@ -200,9 +200,10 @@ $(LIB)/%.so: $(OBJ)/plugin-api/examples/%.c.o plugin-api/plugin.map
 
 # --- tests ---------------------------------------------------------------------------------------------------------------
 # tests/support/*.c is linked into every test of its prefix (pt_*.c, ggn_*.c; base_*.c into theirs too) or into all (no prefix).
-SUPPORT_pt  := $(call o,$(filter-out tests/support/ggn_%,$(wildcard tests/support/*.c)))
-SUPPORT_ggn := $(call o,$(filter-out tests/support/pt_%,$(wildcard tests/support/*.c)))
-SUPPORT_api := $(call o,$(filter-out tests/support/pt_% tests/support/ggn_% tests/support/base_%,$(wildcard tests/support/*.c)))
+SUPPORT_pt  := $(call o,$(filter-out tests/support/ggn_% tests/support/api_%,$(wildcard tests/support/*.c)))
+SUPPORT_ggn := $(call o,$(filter-out tests/support/pt_% tests/support/api_%,$(wildcard tests/support/*.c)))
+SUPPORT_api := $(call o,$(filter-out tests/support/pt_% tests/support/ggn_% tests/support/base_% tests/support/api_%,$(wildcard tests/support/*.c)))
+SUPPORT_host := $(SUPPORT_api) $(call o,$(wildcard tests/support/api_host_*.c))
 SUPPORT_base := $(call o,$(wildcard tests/support/base_*.c) tests/support/open_files.c tests/support/foreign.c)
 define test_rules
 $(OUT)/tests/$(1)/pt_%: $(OBJ)/tests/$(1)/pt_%.c.o $(PT_CORE_OBJ) $(LOADER_OBJ) $(SUPPORT_pt)
@@ -215,7 +216,7 @@ $(OUT)/tests/$(1)/ggn_plugin%: $(OBJ)/tests/$(1)/ggn_plugin%.c.o $(GGN_PLUGIN_OB
 	$$(link) $$^ $$(LDFLAGS_ALL) $(GGN_LIBS) -lcmocka -o $$@
 $(OUT)/tests/$(1)/api_%: $(OBJ)/tests/$(1)/api_%.c.o $(LOADER_OBJ) $(SUPPORT_api)
 	$$(link) $$^ $$(LDFLAGS_ALL) -ldl -lm -lcmocka -o $$@
-$(OUT)/tests/$(1)/api_host%: $(OBJ)/tests/$(1)/api_host%.c.o $(call o,$(HOST_SRC)) $(LOADER_OBJ) $(OBJ)/base.a $(SUPPORT_api)
+$(OUT)/tests/$(1)/api_host%: $(OBJ)/tests/$(1)/api_host%.c.o $(call o,$(HOST_SRC)) $(LOADER_OBJ) $(OBJ)/base.a $(SUPPORT_host)
 	$$(link) $$^ $$(LDFLAGS_ALL) $(BASE_LIBS) -ldl -lcmocka -o $$@
 $(OUT)/tests/$(1)/base_%: $(OBJ)/tests/$(1)/base_%.c.o $(BASE_OBJ) $(SUPPORT_base)
 	$$(link) $$^ $$(LDFLAGS_ALL) $(BASE_LIBS) -lcmocka -o $$@
