@@ -120,9 +120,14 @@ int pt_action_image(const struct pt_cli *cli, struct pt_open *o, struct base_log
             return rc;
     }
     pt_watch_init(&watch, o, &cli->checkpoint, cli->files.preview, log);
+    if (cli->display) {
+        int rc = pt_watch_display(&watch, cli->display, cli->scene, err);
+        if (rc)
+            return rc;
+    }
     const struct pt_render_hooks hooks = pt_watch_hooks(&watch);
     int rc = pt_render_run(o->render, &hooks, &outcome, err);
-    base_log_clear(log);
+    pt_watch_end(&watch);
     struct base_err write_err = {0};
     if (write_outputs(cli, o, pt_action_status(outcome) != 0, log, &write_err) != 0) {
         if (rc)

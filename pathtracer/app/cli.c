@@ -278,6 +278,9 @@ static const struct base_option options[] = {
          "Keep the denoised picture, and stop blocks by what is seen of it (criterion denoised): blend (default) keeps as "
          "much of the noisy one as the denoiser is wrong, full none"},
     {"reproducible", 0, NULL, TO(files.reproducible), .help = "Leave times out of the EXR: equal renders are equal files"},
+    {"display-server", 0, "HOST[:PORT]", TO(display),
+     .help = "Show the image while rendering in an image viewer that listens there (tev, HDRView); port 14158 if none is "
+             "named"},
     {"quiet", 'q', NULL, TO(quiet), .help = "No progress, no notes"},
     {.help = "Interrupting and going on:"},
     {"checkpoint", 0, "FILE", TO(checkpoint.path), .output = BASE_FILE, .kind = &pt_checkpoint_kind,
@@ -322,13 +325,23 @@ int pt_cli_writes_image(const struct pt_cli *cli)
     return files->output || files->preview || files->report || files->stop_map_count > 0;
 }
 
+/* What goes with an image alone. */
+static int check_no_image(const struct pt_cli *cli, const char *option, struct base_err *err)
+{
+    if (pt_cli_writes_image(cli))
+        return base_fail(err, BASE_EINVAL, "%s writes no image: leave out -o, --preview, --report and --stop-map", option);
+    if (cli->display)
+        return base_fail(err, BASE_EINVAL, "%s shows no image: leave out --display-server", option);
+    return 0;
+}
+
 static int check_quote(struct pt_cli *cli, struct base_err *err)
 {
     struct pt_render_config *r = &cli->render;
     if (cli->action != PT_CLI_RENDER)
         return base_fail(err, BASE_EINVAL, "--quote goes with none of --explain, --debug-path and --sequence");
-    if (pt_cli_writes_image(cli))
-        return base_fail(err, BASE_EINVAL, "--quote writes no image: leave out -o, --preview, --report and --stop-map");
+    if (check_no_image(cli, "--quote", err) != 0)
+        return BASE_EINVAL;
     if (cli->checkpoint.resume || r->time_budget_s > 0)
         return base_fail(err, BASE_EINVAL, "--quote goes with neither --resume nor --time-budget (--quote-pilot bounds it)");
     if (r->max_seam > 0)
@@ -352,8 +365,8 @@ static int check_sequence(struct pt_cli *cli, struct base_err *err)
 {
     if (cli->spp > 0 || cli->checkpoint.path || cli->has_crop || cli->mask)
         return base_fail(err, BASE_EINVAL, "--sequence goes with neither --spp, --checkpoint, --crop nor --mask");
-    if (pt_cli_writes_image(cli))
-        return base_fail(err, BASE_EINVAL, "--sequence writes no image: leave out -o, --preview, --report and --stop-map");
+    if (check_no_image(cli, "--sequence", err) != 0)
+        return BASE_EINVAL;
     if (cli->picture != PT_PICTURE_NOISY)
         return base_fail(err, BASE_EINVAL, "--sequence records noisy blocks: leave out --denoise");
     if (cli->action != PT_CLI_RENDER)

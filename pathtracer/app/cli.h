@@ -55,6 +55,7 @@ struct pt_cli {
     struct pt_image_files files;
     struct pt_checkpoint_plan checkpoint;
     struct pt_sequence_config sequence; /* directory NULL: none */
+    const char *display;                /* address of a viewer; NULL: none */
     const char *quote_map;
     int quote, json;
     int debug[3]; /* x, y, sample of --debug-path */

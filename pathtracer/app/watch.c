@@ -3,8 +3,10 @@
 #include <math.h>
 
 #include "base/clock.h"
+#include "base/files.h"
 #include "base/interrupt.h"
 #include "render/checkpoint.h"
+#include "render/host_planes.h"
 #include "render/output.h"
 
 void pt_watch_init(struct pt_watch *w, const struct pt_open *open, const struct pt_checkpoint_plan *checkpoint,
@@ -16,6 +18,25 @@ void pt_watch_init(struct pt_watch *w, const struct pt_open *open, const struct 
                            .preview = preview,
                            .checkpoint_at_s = base_clock_wall_s() + checkpoint->every_s};
     pt_progress_init(&w->progress, log);
+}
+
+int pt_watch_display(struct pt_watch *w, const char *address, const char *scene, struct base_err *err)
+{
+    struct lull_error e = {.struct_size = sizeof e};
+    int32_t code = lull_host_display_open(w->open->render->frame, address, base_file_name(scene), &w->display, &e);
+    return code == LULL_OK
+               ? 0
+               : base_fail(err, code == LULL_E_MEMORY ? BASE_ENOMEM : BASE_EINVAL, "--display-server %s", e.message);
+}
+
+void pt_watch_end(struct pt_watch *w)
+{
+    struct pt_host_view show;
+    const struct pt_render *r = w->open->render;
+    base_log_clear(w->log);
+    if (w->display && !lull_host_display_close(w->display, pt_host_show(&r->film, r->blocks, &show)))
+        base_log_note(w->log, "--display-server: no viewer has taken the last picture");
+    w->display = NULL;
 }
 
 /* A checkpoint that fails on the way costs nothing yet: the next one may succeed. */
@@ -58,6 +79,9 @@ static int after_slice(void *data, struct pt_render *render, struct base_err *er
     (void)err;
     if (w->preview && !base_interrupted && base_clock_wall_s() >= w->preview_at_s)
         show_preview(w, render);
+    struct pt_host_view show;
+    if (w->display)
+        lull_host_display_update(w->display, pt_host_show(&render->film, render->blocks, &show), NULL);
     pt_progress_update(&w->progress, render);
     if (w->checkpoint->path && !base_interrupted && base_clock_wall_s() >= w->checkpoint_at_s)
         save_now_and_then(w, render);

@@ -1,4 +1,4 @@
-/* What goes on beside a render: its progress, a checkpoint and a preview now and then. Of one thread. */
+/* What goes on beside a render: its progress, a checkpoint and a preview now and then, a live view. Of one thread. */
 #ifndef PT_WATCH_H
 #define PT_WATCH_H
 
@@ -11,12 +11,17 @@ struct pt_watch {
     const struct pt_open *open;                  /* of whom the settings are saved */
     const struct pt_checkpoint_plan *checkpoint; /* path NULL: none */
     const char *preview;                         /* NULL: none */
+    struct lull_host_display *display;           /* owns; NULL: none */
     double checkpoint_at_s, preview_at_s;        /* wall times of the next ones */
 };
 
 /* All is borrowed. */
 void pt_watch_init(struct pt_watch *watch, const struct pt_open *open, const struct pt_checkpoint_plan *checkpoint,
                    const char *preview, struct base_log *log);
+/* Shows the render in a viewer, under the name of the scene, until pt_watch_end. */
+int pt_watch_display(struct pt_watch *watch, const char *address, const char *scene, struct base_err *err);
+/* Closes the live view, with the picture as it is, and takes the progress line away. */
+void pt_watch_end(struct pt_watch *watch);
 /* The hooks of pt_render_run that do it; their data is the watch. */
 struct pt_render_hooks pt_watch_hooks(struct pt_watch *watch);
 

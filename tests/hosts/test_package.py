@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 import warnings
 from pathlib import Path
 
@@ -740,6 +741,24 @@ def test_quote():
     assert len(quote.rows(d)) == 4  # of a render that is over, too
     _, _, d = run("fixed", parameters={})
     assert quote.rows(d) == [] and quote.line(d) == "" and "no quality parameter" in quote.table(d)
+
+
+def test_display_server():
+    """a viewer has the last picture, and nobody in its place changes nothing"""
+    viewer = subprocess.Popen([sys.executable, "tests/cli/viewer.py", tmp("port"), tmp("seen.json")])
+    while not os.path.exists(tmp("port")):
+        assert viewer.poll() is None
+        time.sleep(.02)
+    address = "127.0.0.1:" + Path(tmp("port")).read_text()
+    _, f, d = run(driver={"display_server": address})
+    assert viewer.wait(30) == 0 and not d.display.close()
+    seen = json.loads(Path(tmp("seen.json")).read_text())
+    assert (seen["width"], seen["height"]) == (f.width, f.height)
+    assert np.array_equal(np.reshape(seen["pixels"][0], (f.height, f.width)), f.mean()[..., 0].astype(np.float32))
+    assert np.array_equal(np.reshape(seen["pixels"][3], (f.height, f.width)), f.spp())
+    _, alone, _ = run(driver={"display_server": "localhost:1"})
+    assert np.array_equal(alone.mean(), f.mean())
+    raises(lull.LullError, "nosuch.invalid: no such host", lambda: run(driver={"display_server": "nosuch.invalid"}))
 
 
 tap.main(dict(globals()))

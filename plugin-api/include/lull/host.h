@@ -461,6 +461,27 @@ LULL_EXPORT int32_t lull_host_denoise(const struct lull_host_frame *frame, const
 /* Whether there is a library; the error says how to get one. */
 LULL_EXPORT int32_t lull_host_denoiser(const char *library, struct lull_error *err);
 
+/* --- the live view (1.1) ---------------------------------------------------------------------------------------------- */
+
+/* Shows the picture in an image viewer while it is made: noisy R, G, B and lull.spp, lull.p_noisy, lull.error, and a frame
+ * around each block, bright while it is active, thin with its samples when it has stopped. A thread of its own speaks the
+ * protocol of tev, which HDRView and others know too. It never holds the renderer: what a slow viewer does not take in time
+ * is replaced by what is newer, a viewer that is gone is looked for again every second, and one that comes late gets all.
+ * Takes 12 bytes a pixel. */
+struct lull_host_display;
+
+/* address: "HOST", "HOST:PORT" or "[IPv6]:PORT"; the port is 14158 where none is named. May wait for a name server; whether
+ * there is a viewer makes no difference. name: of the image in the viewer, copied. frame: borrowed until close. */
+LULL_EXPORT int32_t lull_host_display_open(const struct lull_host_frame *frame, const char *address, const char *name,
+                                           struct lull_host_display **out, struct lull_error *err);
+/* To be called between samples, as often as one likes: copies the pixels of blocks that have changed if there is a viewer,
+ * at most every quarter of a second, and so that it takes at most a fiftieth of the time. The view needs the plane COLOR. */
+LULL_EXPORT int32_t lull_host_display_update(struct lull_host_display *display, const struct lull_host_view *view,
+                                             struct lull_error *err);
+/* Sends the last picture, NULL: the one copied last, as long as the viewer takes it and for two seconds at most. Returns 1
+ * if it did, else 0; frees the display, which may be NULL. */
+LULL_EXPORT int32_t lull_host_display_close(struct lull_host_display *display, const struct lull_host_view *view);
+
 /* --- files: for renderers without such functions of their own --------------------------------------------------------- */
 
 /* A file that will be written. option: what asked for it, a long option without its dashes, for messages. */

@@ -18,6 +18,7 @@ from typing import Callable, Iterable, Mapping, NamedTuple, Optional, Sequence
 
 from . import abi
 from .criterion import Rect
+from .display import Display
 from .frame import Frame, Sample
 from .host import Block
 from .library import LullError
@@ -47,18 +48,21 @@ class Driver:
     threads: of the host, for the report and the time left. identity: what the samples depend on (scene, frame, camera, the
     renderer's version …), by name: a checkpoint is only resumed where all of it and of Frame.identity() is the same.
     after_call: called after each call of the render function (progress, a partial picture). suspend: called before active
-    blocks are closed for time, interrupt or failure, the moment for lull.checkpoint.save.
+    blocks are closed for time, interrupt or failure, the moment for lull.checkpoint.save. display_server: "HOST" or
+    "HOST:PORT" of an image viewer that shows the picture while it is made (lull.display).
     """
 
     def __init__(self, frame: Frame, render: Optional[Render], *, threads: int = 1,
                  identity: Optional[Mapping[str, str]] = None, after_call: Optional[Callable[[Driver], None]] = None,
-                 suspend: Optional[Callable[[Driver], None]] = None, warn: Callable[[str], None] = print):
+                 suspend: Optional[Callable[[Driver], None]] = None, warn: Callable[[str], None] = print,
+                 display_server: str = ""):
         self.frame, self.render, self.threads = frame, render, threads
         self.after_call, self.suspend, self.warn = after_call, suspend, warn
         self.identity, self.totals = self._identity(identity or {}), frame.totals
         self.samples_per_s = 0.0  # recent, 0 = not known yet
         self.percent_told = 0.0  # of the work, by the progress line, which never goes back
         self.interrupted = False
+        self.display = Display(frame, display_server) if display_server else None
 
     def _identity(self, of_host: Mapping[str, str]) -> dict[str, str]:
         own = self.frame.identity()
@@ -91,6 +95,14 @@ class Driver:
 
     def step(self) -> Optional[Result]:
         """One call of the render function or one round of checks, for hosts with an event loop. The end, or None."""
+        result = self._step()
+        if self.display and result:
+            self.display.close()
+        elif self.display:
+            self.display.update()
+        return result
+
+    def _step(self) -> Optional[Result]:
         if not self.frame.active:
             return Result("done")
         try:

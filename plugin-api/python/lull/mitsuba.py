@@ -198,15 +198,16 @@ def render(scene: Any, criterion: Union[str, Criterion] = "observer", *, sensor:
            spp_max: int = 1024, time_budget_s: float = 0.0, block: Optional[int] = None, wave: int = 8, seed: int = 0,
            mask: Union[np.ndarray, str, None] = None, checkpoint: str = "", resume: bool = False,
            checkpoint_every_s: float = 60.0, after_call: Optional[Callable[[Driver], None]] = None,
-           tell: Optional[Callable[[str], None]] = _tell, **parameters: Any) -> Picture:
+           tell: Optional[Callable[[str], None]] = _tell, display_server: str = "", **parameters: Any) -> Picture:
     """Renders a mi.Scene; each block until the criterion stops it.
 
     criterion: a name, a path or a lull.Criterion; parameters are its own (threshold=…). The film's crop is kept to. mask:
     an array, or the path of a PNG (lull.mask). checkpoint: a file that keeps the state at the end, however it ends, and
     every checkpoint_every_s seconds; resume: goes on from it, if it is there; with a higher spp_max a finished picture gets
     more samples. tell: is given one line at the first check, what the quality parameter costs and what coarser ones would
-    (default: it is printed to stderr; None: no line). An exception while rendering is not raised: see Picture.result. Raises
-    LullError, ValueError, TypeError and OSError for bad input, before anything is rendered.
+    (default: it is printed to stderr; None: no line). display_server: "HOST:PORT" of an image viewer (lull.display). An
+    exception while rendering is not raised: see Picture.result. Raises LullError, ValueError, TypeError and OSError for bad
+    input, before anything is rendered.
     """
     if resume and not checkpoint:
         raise ValueError("resume: there is no checkpoint to go on from: name one with checkpoint=")
@@ -223,7 +224,8 @@ def render(scene: Any, criterion: Union[str, Criterion] = "observer", *, sensor:
                       shared=film.splats, weighted=True, wave=wave, supplies=film.supplies, layers=film.layers,
                       mask=shades)
         stack.callback(frame.close)
-        driver = Driver(frame, film.render, identity=film.identity() if checkpoint else None)
+        driver = Driver(frame, film.render, identity=film.identity() if checkpoint else None,
+                        display_server=display_server)
         hooks: list[Callable[[Driver], None]] = [after_call] if after_call else []
         if tell:
             hooks.append(_cost_line(tell))
