@@ -2,10 +2,17 @@
 #include "ggn_seqgen.h"
 
 #include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
+
+#include <cmocka.h>
 
 #include "base/files.h"
 #include "data/labels.h"
@@ -243,4 +250,36 @@ int seqgen_write(const char *dir, const struct seqgen *g, struct base_err *err)
     }
     fputs(" }\n", out.file);
     return base_file_commit(&out, err);
+}
+
+/* --- of a group of tests --- */
+
+char seqgen_dir[64];
+
+int seqgen_make(void **state)
+{
+    struct seqgen g = seqgen_default();
+    struct base_err err = {0};
+
+    snprintf(seqgen_dir, sizeof seqgen_dir, "/tmp/ggn_train.%ld", (long)getpid());
+    (void)state;
+    return seqgen_write(seqgen_dir, &g, &err);
+}
+
+int seqgen_remove(void **state)
+{
+    char command[128];
+
+    snprintf(command, sizeof command, "rm -r %s", seqgen_dir);
+    (void)state;
+    return system(command);
+}
+
+void seqgen_load(struct ggn_series_set *set, double ratio)
+{
+    struct ggn_series_set_options o = {.dir = seqgen_dir, .ratio = ratio};
+    struct base_err err = {0};
+
+    if (ggn_series_set_load(set, &o, &err))
+        fail_msg("%s", err.text);
 }
