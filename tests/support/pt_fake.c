@@ -1,8 +1,14 @@
 #include "support/pt_fake.h"
 
 #include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include <cmocka.h>
 
 static uint32_t hash(uint32_t v)
 {
@@ -196,19 +202,47 @@ struct pt_render_config pt_fake_config(void)
                                      .integrator = {.seed = 7, .max_component = INFINITY}};
 }
 
-int pt_fake_render(const struct pt_render_config *config, pt_kernel *kernel, int threads, const char *at,
-                   struct pt_render **render, struct lull_host_criterion **criterion, struct base_threads **pool)
+struct pt_fake_run pt_fake_render(const struct pt_render_config *config, pt_kernel *kernel, int threads, const char *at)
 {
     struct lull_pair pair = {"at", at};
     struct pt_render_hooks hooks = {0};
+    struct pt_fake_run run = {0};
     enum pt_render_outcome outcome;
     struct base_err err = {0};
-    *criterion = NULL;
-    *pool = base_threads_create(threads, &err);
-    int rc = *pool ? 0 : BASE_ENOMEM;
+    run.pool = base_threads_create(threads, &err);
+    int rc = run.pool ? 0 : BASE_ENOMEM;
     if (!rc && at)
-        rc = pt_criterion_create(pt_fake_criterion(), &pair, 1, *pool, NULL, criterion, &err);
+        rc = pt_criterion_create(pt_fake_criterion(), &pair, 1, run.pool, NULL, &run.criterion, &err);
     if (!rc)
-        rc = pt_render_create(config, NULL, kernel, *pool, *criterion, render, &err);
-    return !rc ? pt_render_run(*render, &hooks, &outcome, &err) : rc;
+        rc = pt_render_create(config, NULL, kernel, run.pool, run.criterion, &run.render, &err);
+    if (!rc)
+        rc = pt_render_run(run.render, &hooks, &outcome, &err);
+    assert_int_equal(rc, 0);
+    return run;
+}
+
+void pt_fake_release(struct pt_fake_run *run)
+{
+    pt_render_destroy(run->render);
+    lull_host_close(run->criterion);
+    base_threads_destroy(run->pool);
+    *run = (struct pt_fake_run){0};
+}
+
+void pt_fake_assert_same(const struct pt_render *a, const struct pt_render *b)
+{
+    struct pt_film_array x[PT_FILM_ARRAYS], y[PT_FILM_ARRAYS];
+    int n = pt_film_list_arrays(&a->film, x);
+    assert_int_equal(n, pt_film_list_arrays(&b->film, y));
+    for (int i = 0; i < n; i++)
+        assert_memory_equal(x[i].data, y[i].data, x[i].bytes);
+    assert_int_equal(a->blocks->count, b->blocks->count);
+    for (uint32_t i = 0; i < a->blocks->count; i++) {
+        const struct lull_host_block *p = &a->blocks->list[i], *q = &b->blocks->list[i];
+        assert_int_equal(p->spp, q->spp);
+        assert_int_equal(p->reason, q->reason);
+        assert_int_equal(p->checks, q->checks);
+        assert_memory_equal(&p->error, &q->error, sizeof p->error);
+        assert_memory_equal(&p->p_noisy, &q->p_noisy, sizeof p->p_noisy);
+    }
 }

@@ -21,8 +21,15 @@ const struct lull_criterion *pt_fake_criterion(void);
 /* 4x3 blocks of 16x16 pixels, the last column and row narrower (60x44 pixels), spp 8 to 256. */
 struct pt_render_config pt_fake_config(void);
 
-/* Renders to the end. The caller destroys *render. at: as above, NULL for a uniform render. */
-int pt_fake_render(const struct pt_render_config *config, pt_kernel *kernel, int threads, const char *at,
-                   struct pt_render **render, struct lull_host_criterion **criterion, struct base_threads **pool);
+struct pt_fake_run { /* owns */
+    struct pt_render *render;
+    struct lull_host_criterion *criterion; /* NULL: uniform */
+    struct base_threads *pool;
+};
+/* Renders to the end, or the test fails. at: as above, NULL for a uniform render. */
+struct pt_fake_run pt_fake_render(const struct pt_render_config *config, pt_kernel *kernel, int threads, const char *at);
+void pt_fake_release(struct pt_fake_run *run);
+/* Same film bytes and same decisions; times aside. */
+void pt_fake_assert_same(const struct pt_render *a, const struct pt_render *b);
 
 #endif

@@ -25,9 +25,7 @@
 #include "support/approve.h"
 #include "support/pt_fake.h"
 
-static struct pt_render *render;
-static struct lull_host_criterion *criterion;
-static struct base_threads *pool;
+static struct pt_fake_run run;
 static char folder[] = "/tmp/pt_report_XXXXXX";
 static struct lull_pair param = {"at", "32"};
 static struct pt_output_info info;
@@ -64,7 +62,7 @@ static struct sums sums_of(int x, int y, uint64_t spp)
     struct sums s = {0};
     for (uint32_t k = 0; k < spp; k++) {
         struct pt_path_result r;
-        varied(NULL, &render->config.integrator, (uint32_t)x, (uint32_t)y, 1, k, &r);
+        varied(NULL, &run.render->config.integrator, (uint32_t)x, (uint32_t)y, 1, k, &r);
         int good = v3_is_finite(r.radiance);
         const float *from[3] = {&r.radiance.x, &r.albedo.x, &r.normal_world.x};
         double *to[3] = {s.radiance, s.albedo, s.normal};
@@ -96,15 +94,14 @@ static int setup(void **state)
                                    .scene_bytes = 1000};
     if (!mkdtemp(folder))
         return -1;
-    return pt_fake_render(&config, varied, 2, "32", &render, &criterion, &pool);
+    run = pt_fake_render(&config, varied, 2, "32");
+    return 0;
 }
 
 static int teardown(void **state)
 {
     (void)state;
-    pt_render_destroy(render);
-    lull_host_close(criterion);
-    base_threads_destroy(pool);
+    pt_fake_release(&run);
     static const char *const names[] = {"a.exr", "a.png", "s.png", "s.csv", "r.json"};
     for (int i = 0; i < 5; i++)
         unlink(in_folder(names[i]));
@@ -150,7 +147,7 @@ static void exr_holds_every_layer(void **state)
     exr_attr_box2i_t window;
     int32_t length;
     const char *text;
-    assert_int_equal(pt_output_exr(in_folder("a.exr"), render, &info, &err), 0);
+    assert_int_equal(pt_output_exr(in_folder("a.exr"), run.render, &info, &err), 0);
     assert_int_equal(exr_start_read(&file, in_folder("a.exr"), NULL), EXR_ERR_SUCCESS);
     assert_int_equal(exr_get_data_window(file, 0, &window), EXR_ERR_SUCCESS);
     assert_true(window.min.x == 3 && window.min.y == 5 && window.max.x == 59 && window.max.y == 39);
@@ -174,8 +171,8 @@ static void exr_holds_every_layer(void **state)
         const char *name;
         double value;
     } figures[] = {{"lull:seed", 7},
-                   {"lull:samples", (double)render->totals->samples},
-                   {"lull:seconds", lull_host_elapsed_s(render->frame)}};
+                   {"lull:samples", (double)run.render->totals->samples},
+                   {"lull:seconds", lull_host_elapsed_s(run.render->frame)}};
     for (int i = 0; i < 3; i++) {
         double value = -1;
         assert_int_equal(exr_attr_get_double(file, 0, figures[i].name, &value), EXR_ERR_SUCCESS);
@@ -188,7 +185,7 @@ static void exr_holds_every_layer(void **state)
         read_channel(file, names[k], pixels);
         for (int y = 5; y < 40; y++)
             for (int x = 3; x < 60; x++) {
-                const struct lull_host_block *b = &render->blocks->list[y / 16 * 4 + x / 16];
+                const struct lull_host_block *b = &run.render->blocks->list[y / 16 * 4 + x / 16];
                 const struct sums s = sums_of(x, y, b->spp);
                 double n = (double)b->spp;
                 const double expected[14] = {s.radiance[0] / s.kept,
@@ -220,10 +217,10 @@ static void exr_of_equal_renders_are_equal(void **state)
     char *a, *b;
     size_t na, nb;
     info.reproducible = 1;
-    assert_int_equal(pt_output_exr(in_folder("a.exr"), render, &info, &err), 0);
+    assert_int_equal(pt_output_exr(in_folder("a.exr"), run.render, &info, &err), 0);
     assert_int_equal(base_file_read(in_folder("a.exr"), 1 << 24, &a, &na, &err), 0);
-    render->totals->render_s += 1.0;
-    assert_int_equal(pt_output_exr(in_folder("a.exr"), render, &info, &err), 0);
+    run.render->totals->render_s += 1.0;
+    assert_int_equal(pt_output_exr(in_folder("a.exr"), run.render, &info, &err), 0);
     assert_int_equal(base_file_read(in_folder("a.exr"), 1 << 24, &b, &nb, &err), 0);
     info.reproducible = 0;
     assert_int_equal(na, nb);
@@ -236,12 +233,12 @@ static void unwritable_folder_is_one_line(void **state)
 {
     (void)state;
     struct base_err err = {0};
-    assert_int_equal(pt_output_exr("/nowhere/a.exr", render, &info, &err), BASE_EIO);
+    assert_int_equal(pt_output_exr("/nowhere/a.exr", run.render, &info, &err), BASE_EIO);
     assert_non_null(strstr(err.text, "/nowhere/a.exr"));
     assert_null(strchr(err.text, '\n'));
-    assert_int_equal(pt_output_report("/nowhere/a.json", render, &info, &err), BASE_EIO);
-    assert_int_not_equal(pt_output_preview("/nowhere/a.png", render, NULL, &err), 0);
-    assert_int_equal(pt_output_stop_map("/nowhere/a.csv", render, &info, &err), BASE_EIO);
+    assert_int_equal(pt_output_report("/nowhere/a.json", run.render, &info, &err), BASE_EIO);
+    assert_int_not_equal(pt_output_preview("/nowhere/a.png", run.render, NULL, &err), 0);
+    assert_int_equal(pt_output_stop_map("/nowhere/a.csv", run.render, &info, &err), BASE_EIO);
 }
 
 /* --- pictures ------------------------------------------------------------------------------------------------------- */
@@ -252,10 +249,10 @@ static void preview_is_srgb(void **state)
     struct base_err err = {0};
     struct pic_image image;
     double rgb[3];
-    assert_int_equal(pt_output_preview(in_folder("a.png"), render, NULL, &err), 0);
+    assert_int_equal(pt_output_preview(in_folder("a.png"), run.render, NULL, &err), 0);
     assert_int_equal(pic_read(in_folder("a.png"), &image, &err), 0);
     assert_true(image.width == 57 && image.height == 35 && image.channels == 3 && image.u8);
-    pt_film_mean(&render->film, pt_film_index(&render->film, 13, 15), render->blocks->list[0].spp, rgb);
+    pt_film_mean(&run.render->film, pt_film_index(&run.render->film, 13, 15), run.render->blocks->list[0].spp, rgb);
     for (int c = 0; c < 3; c++)
         assert_int_equal(image.u8[3 * (10 * 57 + 10) + c], base_srgb_code(rgb[c]));
     pic_release(&image);
@@ -298,7 +295,7 @@ static void stop_map_picture(void **state)
             ink += map.rgb[3 * (y * 400 + x)] == 255;
     assert_in_range(ink, 100, 2000);
     free(map.rgb);
-    assert_int_equal(pt_output_stop_map(in_folder("s.png"), render, &info, &err), 0);
+    assert_int_equal(pt_output_stop_map(in_folder("s.png"), run.render, &info, &err), 0);
 }
 
 static void stop_map_table(void **state)
@@ -307,12 +304,12 @@ static void stop_map_table(void **state)
     struct base_err err = {0};
     char *text, expected[512];
     size_t n;
-    assert_int_equal(pt_output_stop_map(in_folder("s.csv"), render, &info, &err), 0);
+    assert_int_equal(pt_output_stop_map(in_folder("s.csv"), run.render, &info, &err), 0);
     assert_int_equal(base_file_read(in_folder("s.csv"), 4096, &text, &n, &err), 0);
     int used = snprintf(expected, sizeof expected, "fake-view1;");
-    for (uint32_t i = 0; i < render->blocks->count; i++)
+    for (uint32_t i = 0; i < run.render->blocks->count; i++)
         used += snprintf(expected + used, sizeof expected - (size_t)used, "%llu;",
-                         (unsigned long long)render->blocks->list[i].spp);
+                         (unsigned long long)run.render->blocks->list[i].spp);
     snprintf(expected + used, sizeof expected - (size_t)used, "\n");
     assert_string_equal(text, expected);
     free(text);
@@ -373,7 +370,7 @@ static void check_totals(const cJSON *root, const struct sums *all, double sampl
     assert_true(cJSON_GetArraySize(cJSON_GetObjectItem(root, "dropped")) > 0);
     cJSON_ArrayForEach (d, cJSON_GetObjectItem(root, "dropped")) {
         struct pt_path_result r;
-        varied(NULL, &render->config.integrator, (uint32_t)number(d, "x"), (uint32_t)number(d, "y"), 1,
+        varied(NULL, &run.render->config.integrator, (uint32_t)number(d, "x"), (uint32_t)number(d, "y"), 1,
                (uint32_t)number(d, "sample"), &r);
         assert_false(v3_is_finite(r.radiance));
     }
@@ -387,7 +384,7 @@ static void report_is_what_happened(void **state)
     double samples = 0.0;
     char *text;
     size_t n;
-    assert_int_equal(pt_output_report(in_folder("r.json"), render, &info, &err), 0);
+    assert_int_equal(pt_output_report(in_folder("r.json"), run.render, &info, &err), 0);
     assert_int_equal(base_file_read(in_folder("r.json"), 1 << 20, &text, &n, &err), 0);
     cJSON *root = cJSON_Parse(text);
     assert_non_null(root);
@@ -421,11 +418,11 @@ static char *report_of(struct approve_case *c)
     char *text;
     size_t n;
     int alone = strstr(c->text, "uniform") != NULL;
-    struct pt_render r = *render;
-    struct lull_host_frame frame = *render->frame;
+    struct pt_render r = *run.render;
+    struct lull_host_frame frame = *run.render->frame;
     struct lull_host_block list[12];
     struct pt_output_info told = info;
-    memcpy(list, render->blocks->list, sizeof list);
+    memcpy(list, run.render->blocks->list, sizeof list);
     for (int i = 0; i < 12; i++) {
         list[i].thread_s = 0.25 * (i + 1);
         list[i].reason = alone ? i % LULL_REASON_COUNT : list[i].reason;
@@ -479,16 +476,16 @@ static void progress_lines(void **state)
     base_log_init(&log, null, "name", 0);
     pt_progress_init(&p, &log);
     assert_true(!log.terminal && p.next_s >= before_s + 2 && p.next_s <= base_clock_wall_s() + 2 && !log.live);
-    pt_progress_text(render, &percent, line, sizeof line);
+    pt_progress_text(run.render, &percent, line, sizeof line);
     assert_string_equal(line + strlen(line) - 8, "ETA 0:00");
     for (int terminal = 0; terminal < 2; terminal++) {
         rewind(out);
         before_s = base_clock_wall_s();
         log = (struct base_log){.out = out, .name = "name", .terminal = terminal};
         p = (struct pt_progress){.log = &log, .next_s = before_s + 1e6};
-        pt_progress_update(&p, render); /* too early */
+        pt_progress_update(&p, run.render); /* too early */
         p.next_s = 0;
-        pt_progress_update(&p, render);
+        pt_progress_update(&p, run.render);
         const double pause_s = terminal ? 0.2 : 10;
         assert_true(log.live == terminal && p.next_s >= before_s + pause_s && p.next_s <= base_clock_wall_s() + pause_s);
         base_log_clear(&log);
@@ -503,7 +500,7 @@ static void progress_lines(void **state)
     log = (struct base_log){.out = out, .quiet = 1};
     p = (struct pt_progress){.log = &log};
     long at = ftell(out);
-    pt_progress_update(&p, render);
+    pt_progress_update(&p, run.render);
     base_log_clear(&log);
     assert_int_equal(ftell(out), at);
     fclose(out);
@@ -516,7 +513,7 @@ static void progress_is_honest(void **state)
     (void)state;
     double percent = 0;
     char text[256];
-    struct pt_render r = *render;
+    struct pt_render r = *run.render;
     struct lull_host_block list[2] = {{.x1 = 10,
                                        .y1 = 10,
                                        .spp = 100,
@@ -527,7 +524,7 @@ static void progress_is_honest(void **state)
                                        .thread_s = 30.0},
                                       {.x1 = 10, .y1 = 10, .spp = 50, .reason = LULL_REASON_CRITERION, .thread_s = 10.0}};
     struct lull_host_blocks blocks = {.list = list, .count = 2, .spp_max = 1000};
-    struct lull_host_totals totals = *render->totals;
+    struct lull_host_totals totals = *run.render->totals;
     r.blocks = &blocks;
     r.totals = &totals;
     r.samples_per_s = 1000.0;
